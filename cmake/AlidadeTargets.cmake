@@ -1,0 +1,98 @@
+# The one way to declare a library, a program, a test and a benchmark: every target gets the same
+# standard, warnings and sanitizers, and a test cannot be built without being registered.
+include_guard(GLOBAL)
+
+if(NOT CMAKE_BUILD_TYPE AND NOT CMAKE_CONFIGURATION_TYPES)
+  set(CMAKE_BUILD_TYPE Release CACHE STRING "Build type" FORCE)
+endif()
+set(CMAKE_POSITION_INDEPENDENT_CODE ON)
+
+add_library(alidade_options INTERFACE)
+target_compile_features(alidade_options INTERFACE cxx_std_17)
+target_compile_options(alidade_options INTERFACE
+  -Wall -Wextra -Wpedantic -Wshadow -Wconversion -Wnon-virtual-dtor -Wold-style-cast
+  -Woverloaded-virtual -Wnull-dereference -Werror)
+# GCC 12 reports -Wnull-dereference and -Wmaybe-uninitialized inside inlined library code when it
+# also instruments; the plain release build keeps both.
+if(ALIDADE_SANITIZE)
+  target_compile_options(alidade_options INTERFACE
+    -fsanitize=${ALIDADE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
+    -Wno-null-dereference -Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow)
+  target_link_options(alidade_options INTERFACE -fsanitize=${ALIDADE_SANITIZE})
+endif()
+
+# alidade_library(model HEADERS ... SOURCES ... PUBLIC ... PRIVATE ... OPTIONS ...)
+# makes target alidade_model and alias alidade::model. Without SOURCES it is header-only.
+# PUBLIC and PRIVATE name what it links; OPTIONS are compile options for its own sources.
+function(alidade_library name)
+  cmake_parse_arguments(A "" "" "HEADERS;SOURCES;PUBLIC;PRIVATE;OPTIONS" ${ARGN})
+  set(target alidade_${name})
+  if(A_SOURCES)
+    add_library(${target} STATIC ${A_SOURCES} ${A_HEADERS})
+    set(scope PUBLIC)
+    target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:alidade_options> ${A_PRIVATE})
+    target_compile_options(${target} PRIVATE ${A_OPTIONS})
+  else()
+    add_library(${target} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  target_compile_features(${target} ${scope} cxx_std_17)
+  target_include_directories(${target} ${scope}
+    $<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}>
+    $<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}/alidade>)
+  target_link_libraries(${target} ${scope} ${A_PUBLIC})
+  set_target_properties(${target} PROPERTIES EXPORT_NAME ${name})
+  add_library(alidade::${name} ALIAS ${target})
+  set_property(GLOBAL APPEND PROPERTY ALIDADE_LIBRARIES ${target})
+  file(RELATIVE_PATH here "${PROJECT_SOURCE_DIR}" "${CMAKE_CURRENT_SOURCE_DIR}")
+  foreach(header IN LISTS A_HEADERS)
+    get_filename_component(folder "${here}/${header}" DIRECTORY)
+    install(FILES ${header} DESTINATION ${CMAKE_INSTALL_INCLUDEDIR}/alidade/${folder})
+  endforeach()
+endfunction()
+
+# alidade_executable(alidade SOURCES ... LINK ...)
+function(alidade_executable name)
+  cmake_parse_arguments(A "" "" "SOURCES;LINK" ${ARGN})
+  add_executable(${name} ${A_SOURCES})
+  target_link_libraries(${name} PRIVATE alidade_options ${A_LINK})
+  target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
+endfunction()
+
+# alidade_test(camera_test SOURCES camera_test.cpp LINK alidade::model [LABELS ...] [TIMEOUT s]
+#              [ARGUMENTS ...] [DEPENDS target...])
+# builds a GoogleTest program and registers each of its tests with ctest.
+function(alidade_test name)
+  cmake_parse_arguments(A "" "TIMEOUT" "SOURCES;LINK;LABELS;ARGUMENTS;DEPENDS" ${ARGN})
+  if(NOT ALIDADE_BUILD_TESTS)
+    return()
+  endif()
+  if(NOT A_TIMEOUT)
+    set(A_TIMEOUT 120)
+  endif()
+  alidade_executable(${name} SOURCES ${A_SOURCES} LINK ${A_LINK} GTest::gmock GTest::gtest GTest::gtest_main)
+  if(A_DEPENDS)
+    add_dependencies(${name} ${A_DEPENDS})
+  endif()
+  include(GoogleTest)
+  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60
+    EXTRA_ARGS ${A_ARGUMENTS}
+    PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}")
+endfunction()
+
+# alidade_benchmark(pt_mode_benchmark SOURCES ... LINK ...)
+# builds a Google Benchmark program; `ctest -L benchmark` runs it and keeps its JSON in
+# <build>/benchmark-results/.
+function(alidade_benchmark name)
+  cmake_parse_arguments(A "" "" "SOURCES;LINK" ${ARGN})
+  if(NOT ALIDADE_BUILD_BENCHMARKS)
+    return()
+  endif()
+  find_package(benchmark REQUIRED)
+  alidade_executable(${name} SOURCES ${A_SOURCES} LINK ${A_LINK} benchmark::benchmark)
+  file(MAKE_DIRECTORY ${PROJECT_BINARY_DIR}/benchmark-results)
+  add_test(NAME ${name} COMMAND ${name}
+    --benchmark_out=${PROJECT_BINARY_DIR}/benchmark-results/${name}.json
+    --benchmark_out_format=json)
+  set_tests_properties(${name} PROPERTIES LABELS benchmark RUN_SERIAL ON TIMEOUT 600)
+endfunction()

@@ -1,0 +1,66 @@
+#pragma once
+// FrameSource: one interface for every origin of video frames (RTSP, RTP, recording; V4L2 and MJPEG
+// over HTTP implement the same contract).
+//
+// A source owns its connection: it opens it, notices its loss, and opens it again with back-off.
+// read() blocks on the calling (capture) thread only; stop() may be called from any other thread and
+// makes a blocked read() return soon. Times are seconds of the host's CLOCK_MONOTONIC, taken when
+// the last packet of the frame arrived, never after decoding.
+// Not for the real-time thread: read() allocates and waits.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+
+namespace alidade {
+
+// When and in which order a frame came. Fixed size: crosses queues by value.
+struct FrameStamp {
+  std::int64_t frame = 0;        // 0, 1, 2, ... of the frames this source delivered
+  double receive_time_s = 0;     // host CLOCK_MONOTONIC at the arrival of the frame's last packet
+  std::optional<double> sender_time_s;  // capture time on the sender's clock, unwrapped, any epoch
+  std::optional<double> sender_utc_s;   // the same as Unix time, once RTCP or the like has told it
+  std::optional<std::int64_t> sequence;  // sender's count of frames, unwrapped; a gap is a loss
+  bool restarted = false;  // first frame after a (re)connection: sender clock and sequence begin anew
+};
+
+// One frame: its stamp and, if decoded, its luma plane.
+struct Frame {
+  FrameStamp stamp;
+  int width = 0;   // px
+  int height = 0;  // px
+  // 8-bit luma, row v starts at luma + v * stride; null if the source was told not to decode.
+  const std::uint8_t* luma = nullptr;
+  std::ptrdiff_t stride = 0;          // bytes
+  std::shared_ptr<const void> owner;  // keeps luma alive
+};
+
+enum class ReadStatus {
+  kOk,            // the item is valid
+  kTimeout,       // nothing came within the time given; the connection is believed good
+  kDisconnected,  // connection lost or refused; the next read() tries again; see error()
+  kEnd,           // a recording is over
+  kStopped,       // stop() was called
+  kFailed         // will never work (no such file, wrong password, unknown codec); see error()
+};
+
+class FrameSource {
+ public:
+  virtual ~FrameSource() = default;
+
+  // Waits at most timeout_s for the next frame. Fills frame only on kOk.
+  [[nodiscard]] virtual ReadStatus read(Frame& frame, double timeout_s) = 0;
+
+  // Thread-safe, idempotent. Every later read() returns kStopped.
+  virtual void stop() = 0;
+
+  // One line for the person: what failed, where (URL without password), what would be right.
+  // Valid after read() returned kDisconnected or kFailed; called from the reading thread.
+  [[nodiscard]] virtual std::string error() const = 0;
+
+  // URL without password, device or directory.
+  [[nodiscard]] virtual std::string name() const = 0;
+};
+
+}  // namespace alidade
