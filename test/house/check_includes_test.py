@@ -1,0 +1,53 @@
+#!/usr/bin/env python3
+"""scripts/check-includes must accept the repository and bite on each kind of wrong arrow."""
+import pathlib
+import subprocess
+import sys
+import tempfile
+import unittest
+
+TOP = pathlib.Path(__file__).resolve().parents[2]
+
+
+def check(files):
+    """Runs the script on a tree made of {path: text}; returns (exit code, output)."""
+    with tempfile.TemporaryDirectory() as folder:
+        for path, text in files.items():
+            file = pathlib.Path(folder, path)
+            file.parent.mkdir(parents=True, exist_ok=True)
+            file.write_text(text)
+        done = subprocess.run([sys.executable, TOP / "scripts/check-includes", folder],
+                              capture_output=True, text=True, check=False)
+    return done.returncode, done.stdout
+
+
+class CheckIncludes(unittest.TestCase):
+    def test_accepts_this_repository(self):
+        done = subprocess.run([sys.executable, TOP / "scripts/check-includes"],
+                              capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stdout)
+
+    def test_accepts_an_arrow_of_the_table(self):
+        code, output = check({"core/realtime/a.h": '#include "core/model/b.h"\n#include <Eigen/Core>\n'})
+        self.assertEqual(code, 0, output)
+
+    def test_rejects_wrong_arrows(self):
+        for path, line in (
+                ("core/model/a.h", '#include "core/realtime/b.h"'),
+                ("core/realtime/a.h", '#include "core/calibration/b.h"'),
+                ("core/realtime/a.h", "#include <mutex>"),
+                ("core/realtime/a.h", "#include <opencv2/core.hpp>"),
+                ("core/calibration/a.cpp", '#include "platform/system/clock.h"'),
+                ("platform/video/a.cpp", '#include "core/model/camera.h"'),
+                ("edge_app/pipeline/a.cpp", '#include "test/support/guard.h"'),
+                ("test/simulator/a.cpp", '#include "core/model/camera.h"'),
+                ("ros_wrapper/a.cpp", '#include "core/model/camera.h"'),
+                ("core/model/a.h", '#include "neighbour.h"')):
+            with self.subTest(path=path, line=line):
+                code, output = check({path: "#pragma once\n" + line + "\n"})
+                self.assertEqual(code, 1)
+                self.assertIn(f"{path}:2:", output)
+
+
+if __name__ == "__main__":
+    unittest.main()
