@@ -1,0 +1,155 @@
+#pragma once
+// The line below a cloud of points whose errors are never negative.
+//
+// Points (x_i, y_i), x strictly increasing, obey y_i = h + b x_i + e_i with e_i >= 0 and a density
+// near zero of 1/scale (exponential, or anything that looks so close to its floor). With b uniform
+// in [slope_min, slope_max] and a flat prior on h the posterior is
+//   p(h, b) ~ exp(n (h + b mean(x)) / scale)   where   h + b x_i <= y_i for all i,
+// whose mode is the linear programme "highest line below all points". Only the lower convex hull
+// counts; between two neighbouring edge slopes one vertex binds and b is a truncated exponential,
+// so mean and covariance are sums of closed forms: no iteration, no sampling. The mean lies below
+// the mode by scale / n and more: this is the shrinkage that makes a young estimate honest.
+// Allocates nothing, no exceptions; the caller lends the memory of the hull. Any consistent units.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+namespace alidade {
+
+// A straight line with covariance: value and slope at the abscissa x.
+struct LineEstimate {
+  double x = 0;
+  double value = 0;
+  double slope = 0;
+  double var_value = 0;
+  double cov_value_slope = 0;
+  double var_slope = 0;
+
+  double value_at(double at) const { return value + slope * (at - x); }
+  double variance_at(double at) const {
+    const double dx = at - x;
+    return std::max(0.0, var_value + dx * (2 * cov_value_slope + dx * var_slope));
+  }
+};
+
+// Indices of the vertices of the lower convex hull, left to right; returns their number.
+inline std::size_t lower_hull(const double* x, const double* y, std::size_t n,
+                              std::uint16_t* hull) {
+  std::size_t size = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    while (size >= 2) {
+      const std::size_t a = hull[size - 2];
+      const std::size_t b = hull[size - 1];
+      if ((y[b] - y[a]) * (x[i] - x[a]) < (y[i] - y[a]) * (x[b] - x[a])) {
+        break;
+      }
+      --size;
+    }
+    hull[size++] = static_cast<std::uint16_t>(i);
+  }
+  return size;
+}
+
+namespace internal {
+
+// Integral, mean and variance of exp(rate * t) over [0, width], the integral relative to
+// exp(rate * width) if rate > 0 and to 1 otherwise.
+struct TruncatedExponential {
+  double mass, mean, variance;
+
+  TruncatedExponential(double rate, double width) {
+    const double u = std::abs(rate) * width;
+    double from_peak;  // mean distance from the end where the density is highest
+    if (u < 1e-3) {
+      mass = width * (1 - u / 2);
+      from_peak = width * (0.5 - u / 12);
+      variance = width * width / 12;
+    } else {
+      const double tail = -std::expm1(-u);  // 1 - exp(-u)
+      mass = width * tail / u;
+      from_peak = width * (1 / u - (1 - tail) / tail);
+      variance = width * width * (1 / (u * u) - (1 - tail) / (tail * tail));
+    }
+    mean = rate > 0 ? width - from_peak : from_peak;
+  }
+};
+
+}  // namespace internal
+
+// Posterior mean and covariance at abscissa `at`. n >= 1, scale > 0, slope_min < slope_max;
+// hull: room for n indices.
+inline LineEstimate fit_lower_line(const double* x, const double* y, std::size_t n, double scale,
+                                   double slope_min, double slope_max, double at,
+                                   std::uint16_t* hull) {
+  const std::size_t vertices = lower_hull(x, y, n, hull);
+  double mean_x = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    mean_x += x[i] - x[0];
+  }
+  mean_x = x[0] + mean_x / static_cast<double>(n);
+  const double rate = static_cast<double>(n) / scale;
+
+  // While b is between the slopes of the edges left and right of vertex j the line hangs on j.
+  const auto binding_from = [&](std::size_t j) {
+    if (j == 0) return slope_min;
+    const double slope = (y[hull[j]] - y[hull[j - 1]]) / (x[hull[j]] - x[hull[j - 1]]);
+    return std::clamp(slope, slope_min, slope_max);
+  };
+
+  // The mode: the vertex under mean_x, or the one where a slope limit stops the descent.
+  double peak = 0;
+  double peak_slope = 0;
+  double peak_value = 0;
+  bool found = false;
+  for (std::size_t j = 0; j < vertices; ++j) {
+    const double from = binding_from(j);
+    const double to = j + 1 < vertices ? binding_from(j + 1) : slope_max;
+    const double b = x[hull[j]] < mean_x ? to : from;
+    const double height = y[hull[j]] + b * (mean_x - x[hull[j]]);
+    if (from < to && (!found || height > peak)) {
+      found = true;
+      peak = height;
+      peak_slope = b;
+      peak_value = y[hull[j]] + b * (at - x[hull[j]]);
+    }
+  }
+
+  // Moments of slope and value about the mode.
+  double mass = 0, b1 = 0, b2 = 0, h1 = 0, h2 = 0, hb = 0;
+  for (std::size_t j = 0; j < vertices; ++j) {
+    const double from = binding_from(j);
+    const double to = j + 1 < vertices ? binding_from(j + 1) : slope_max;
+    if (!(from < to)) {
+      continue;
+    }
+    const double xj = x[hull[j]];
+    const double yj = y[hull[j]];
+    const double growth = rate * (mean_x - xj);  // of the log density with b
+    const internal::TruncatedExponential piece(growth, to - from);
+    const double top = yj + (growth > 0 ? to : from) * (mean_x - xj);
+    const double weight = piece.mass * std::exp(rate * (top - peak));
+    const double b = from + piece.mean - peak_slope;
+    const double h = yj + (b + peak_slope) * (at - xj) - peak_value;
+    const double lever = at - xj;
+    mass += weight;
+    b1 += weight * b;
+    b2 += weight * (b * b + piece.variance);
+    h1 += weight * h;
+    h2 += weight * (h * h + lever * lever * piece.variance);
+    hb += weight * (h * b + lever * piece.variance);
+  }
+  b1 /= mass;
+  h1 /= mass;
+  LineEstimate line;
+  line.x = at;
+  line.slope = peak_slope + b1;
+  line.value = peak_value + h1 - 1 / rate;
+  line.var_slope = std::max(0.0, b2 / mass - b1 * b1);
+  line.cov_value_slope = hb / mass - h1 * b1;
+  line.var_value = std::max(0.0, h2 / mass - h1 * h1) + 1 / (rate * rate);
+  return line;
+}
+
+}  // namespace alidade
