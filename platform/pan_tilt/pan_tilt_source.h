@@ -1,12 +1,12 @@
 #pragma once
-// PanTiltSource: one interface for every origin of pan/tilt telemetry (Axis VAPIX, recording; serial
-// protocols and ONVIF implement the same contract).
+// PanTiltSource: one interface for every origin of pan/tilt telemetry (Axis VAPIX, recording;
+// serial protocols and ONVIF implement the same contract).
 //
 // Angles are radians as the device measures them (scale and axes are the calibration's business),
 // turned into the axes of the model: pan positive to the right (about base z, down), tilt positive
-// upwards (about base y, right). Times are seconds of the host's CLOCK_MONOTONIC. A polled value was
-// true at some moment of [earliest_time_s, latest_time_s].
-// Like FrameSource, a source reconnects by itself; read() blocks its own thread only, stop() ends it.
+// upwards (about base y, right). Times are seconds of the host's CLOCK_MONOTONIC. A polled value
+// was true at some moment of [earliest_time_s, latest_time_s]. Like FrameSource, a source
+// reconnects by itself; read() blocks its own thread only, stop() ends it.
 
 #include <cstdint>
 #include <optional>
@@ -31,7 +31,8 @@ class PanTiltSource {
  public:
   virtual ~PanTiltSource() = default;
 
-  // Waits at most timeout_s for the next sample; a polling source paces itself. Fills sample on kOk.
+  // Waits at most timeout_s for the next sample; a polling source paces itself. Fills sample on
+  // kOk.
   [[nodiscard]] virtual ReadStatus read(PanTiltSample& sample, double timeout_s) = 0;
 
   // Thread-safe, idempotent. Every later read() returns kStopped.

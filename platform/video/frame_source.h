@@ -3,10 +3,10 @@
 // over HTTP implement the same contract).
 //
 // A source owns its connection: it opens it, notices its loss, and opens it again with back-off.
-// read() blocks on the calling (capture) thread only; stop() may be called from any other thread and
-// makes a blocked read() return soon. Times are seconds of the host's CLOCK_MONOTONIC, taken when
-// the last packet of the frame arrived, never after decoding.
-// Not for the real-time thread: read() allocates and waits.
+// read() blocks on the calling (capture) thread only; stop() may be called from any other thread
+// and makes a blocked read() return soon. Times are seconds of the host's CLOCK_MONOTONIC, taken
+// when the last packet of the frame arrived, never after decoding. Not for the real-time thread:
+// read() allocates and waits.
 
 #include <cstdint>
 #include <memory>
@@ -17,12 +17,13 @@ namespace alidade {
 
 // When and in which order a frame came. Fixed size: crosses queues by value.
 struct FrameStamp {
-  std::int64_t frame = 0;        // 0, 1, 2, ... of the frames this source delivered
-  double receive_time_s = 0;     // host CLOCK_MONOTONIC at the arrival of the frame's last packet
-  std::optional<double> sender_time_s;  // capture time on the sender's clock, unwrapped, any epoch
-  std::optional<double> sender_utc_s;   // the same as Unix time, once RTCP or the like has told it
+  std::int64_t frame = 0;     // 0, 1, 2, ... of the frames this source delivered
+  double receive_time_s = 0;  // host CLOCK_MONOTONIC at the arrival of the frame's last packet
+  std::optional<double> sender_time_s;   // capture time on the sender's clock, unwrapped, any epoch
+  std::optional<double> sender_utc_s;    // the same as Unix time, once RTCP or the like has told it
   std::optional<std::int64_t> sequence;  // sender's count of frames, unwrapped; a gap is a loss
-  bool restarted = false;  // first frame after a (re)connection: sender clock and sequence begin anew
+  bool restarted =
+      false;  // first frame after a (re)connection: sender clock and sequence begin anew
 };
 
 // One frame: its stamp and, if decoded, its luma plane.

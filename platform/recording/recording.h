@@ -1,0 +1,36 @@
+#pragma once
+// Reads the tables of a recording, a directory:
+//   recording.yaml   format: 1, width, height (px), free-form notes
+//   frames.csv       frame,receive_time_s[,sender_time_s][,sender_utc_s][,sequence][,restarted]
+//   telemetry.csv    receive_time_s,pan_rad,tilt_rad[,zoom][,device_time_s][,sequence]
+//                    [,earliest_time_s][,restarted]
+// Times are seconds of one clock (of the recording host), angles radians. A cell of an optional
+// column may be empty: not known. Unknown columns are ignored. Every line ends with a newline, so
+// that a file which was cut off in the middle of a number does not pass for a whole one.
+// Stamps are passed on as they are: equal or jumping ones are the clock filter's business.
+// On failure the functions return false and *error is one line: what, file:line, what is right.
+
+#include <string>
+#include <vector>
+
+#include "platform/pan_tilt/pan_tilt_source.h"
+#include "platform/video/frame_source.h"
+
+namespace alidade {
+
+struct RecordingInfo {
+  int width = 0;   // px
+  int height = 0;  // px
+  std::string notes;
+};
+
+[[nodiscard]] bool read_recording_info(const std::string& directory, RecordingInfo* info,
+                                       std::string* error);
+
+[[nodiscard]] bool read_frames_csv(const std::string& directory, std::vector<FrameStamp>* frames,
+                                   std::string* error);
+
+[[nodiscard]] bool read_telemetry_csv(const std::string& directory,
+                                      std::vector<PanTiltSample>* samples, std::string* error);
+
+}  // namespace alidade

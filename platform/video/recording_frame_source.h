@@ -1,0 +1,47 @@
+#pragma once
+// RecordingFrameSource: the frames of a recording (recording.h), at full speed or at the pace of
+// their receive times. Stamps, frame numbers included, are those of frames.csv.
+//
+// Pictures come from video.mkv (row k of frames.csv belongs to picture k) or from
+// frames/<frame, 6 digits>.png, .jpg or .pgm. A recording with tracks.csv in place of pictures, and
+// any recording if decode is false, yields frames without luma.
+// Pictures must have an 8-bit luma plane (grey, or YUV) and recording.yaml's size. One that cannot
+// be decoded is skipped and counted. When video.mkv ends before frames.csv, as after a kill of the
+// recorder, the recording ends there, and missing_frames() tells how many rows were left.
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "platform/video/frame_source.h"
+
+namespace alidade {
+
+struct RecordingFrameSourceOptions {
+  std::string directory;
+  bool decode = true;
+  // Pace: the recording's first stamp (of frames and telemetry) is due at the first read().
+  bool realtime = false;
+};
+
+class RecordingFrameSource : public FrameSource {
+ public:
+  explicit RecordingFrameSource(const RecordingFrameSourceOptions& options);
+  ~RecordingFrameSource() override;
+  RecordingFrameSource(const RecordingFrameSource&) = delete;
+  RecordingFrameSource& operator=(const RecordingFrameSource&) = delete;
+
+  [[nodiscard]] ReadStatus read(Frame& frame, double timeout_s) override;
+  void stop() override;
+  [[nodiscard]] std::string error() const override;
+  [[nodiscard]] std::string name() const override;
+
+  [[nodiscard]] std::int64_t damaged_frames() const;
+  [[nodiscard]] std::int64_t missing_frames() const;  // valid after kEnd
+
+ private:
+  class Implementation;  // keeps libav out of this header
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,67 @@
+#pragma once
+// RtpSource: MJPEG or H.264 video over RTSP or plain RTP (libavformat, libavcodec).
+//
+// url is one of: rtsp://host[:port]/path; the name of an .sdp file; rtp://@:port or
+// rtp://group:port (then `format` says what comes).
+// A thread of its own, started by the first read() and so with the scheduling of the capture
+// thread, connects, stamps and queues; read() decodes. So a stamp is never late by a decoding time,
+// and a read() can time out without hurting the stream.
+// - receive_time_s: arrival of the frame's last packet. sender_time_s: the RTP timestamp,
+// unwrapped,
+//   in seconds since the connection's first. sender_utc_s: the same by the latest RTCP report.
+// - An MJPEG frame is delivered on arrival, an H.264 frame when the first packet of the next one
+//   shows that it is complete (libavformat does not tell the end of an access unit).
+// - Frames before the first key frame, damaged and undecodable frames are skipped and counted. When
+//   the reader is too slow, what waits is dropped and counted, up to the next key frame.
+// - Luma is the decoder's plane 0, without copy or conversion.
+// - copy_to: each delivered frame's data is also stored, not re-encoded, in that Matroska file, in
+//   which a kill loses at most the last second. The file goes on over reconnections.
+// Streams with B-frames are refused: they come out of order and late.
+
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "platform/video/frame_source.h"
+
+namespace alidade {
+
+struct RtpSourceOptions {
+  enum class Transport { kTcp, kUdp };
+
+  std::string url;
+  std::string user;  // these go before what the URL may hold
+  std::string password;
+  std::string format = "MJPG";            // rtp:// only: MJPG or H264
+  Transport transport = Transport::kTcp;  // rtsp:// only: RTP interleaved with RTSP, or in UDP
+  bool decode = true;        // false: Frame::luma stays null, only the first frame is decoded
+  double timeout_s = 3;      // without a packet for so long, the connection counts as lost
+  double max_backoff_s = 5;  // longest pause between two tries
+  std::string copy_to;       // video.mkv to copy the stream into; empty: none
+};
+
+struct RtpSourceCounters {
+  std::int64_t damaged = 0;  // frames that were incomplete or not decodable
+  std::int64_t dropped = 0;  // frames that read() did not fetch in time
+};
+
+class RtpSource : public FrameSource {
+ public:
+  explicit RtpSource(const RtpSourceOptions& options);
+  ~RtpSource() override;
+  RtpSource(const RtpSource&) = delete;
+  RtpSource& operator=(const RtpSource&) = delete;
+
+  [[nodiscard]] ReadStatus read(Frame& frame, double timeout_s) override;
+  void stop() override;
+  [[nodiscard]] std::string error() const override;
+  [[nodiscard]] std::string name() const override;
+
+  [[nodiscard]] RtpSourceCounters counters() const;  // thread-safe
+
+ private:
+  class Implementation;  // keeps libav out of this header
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace alidade
