@@ -1,0 +1,481 @@
+#include "core/calibration/calibration_file.h"
+
+#include <fcntl.h>
+#include <sys/stat.h>
+#include <unistd.h>
+#include <yaml-cpp/yaml.h>
+
+#include <Eigen/Eigenvalues>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <fstream>
+#include <initializer_list>
+#include <iomanip>
+#include <locale>
+#include <set>
+#include <sstream>
+#include <utility>
+#include <vector>
+
+namespace alidade {
+
+namespace {
+
+// What is wrong, and with which line (from 1; 0: none). Never leaves this file.
+struct Problem {
+  int line;
+  std::string text;
+};
+
+[[noreturn]] void fail(const YAML::Node& node, const std::string& text) {
+  throw Problem{node.Mark().line + 1, text};
+}
+
+// Independent of the locale. The digits read back as the same bits.
+std::string number_text(double value) {
+  std::ostringstream stream;
+  stream.imbue(std::locale::classic());
+  stream << std::setprecision(17) << value;
+  return stream.str();
+}
+
+// For messages: as many digits as a person wrote.
+std::string short_text(double value) {
+  std::ostringstream stream;
+  stream.imbue(std::locale::classic());
+  stream << value;
+  return stream.str();
+}
+
+struct Range {
+  double least;
+  double most;
+  const char* hint;
+};
+
+// The range of a plausible value in the right unit. A value outside is more likely in another unit.
+Range plausible_range(Parameter parameter) {
+  switch (parameter) {
+    case Parameter::kFocalLength:
+      return {1, 1e7, "pixels, more than 0"};
+    case Parameter::kAspect:
+      return {0.5, 2, "a ratio near 1"};
+    case Parameter::kLineDelay:
+      return {-1e-3, 1e-3, "seconds a row; 14 microseconds are 14e-6"};
+    case Parameter::kPanScale:
+    case Parameter::kTiltScale:
+      return {0.5, 2, "measured angle / true angle, near 1"};
+    case Parameter::kClockOffset:
+      return {-10, 10, "seconds; 84 milliseconds are 84e-3"};
+    default:
+      return {-1e12, 1e12, "a plain number"};
+  }
+}
+
+class Reader {
+ public:
+  explicit Reader(YAML::Node root) : root_(std::move(root)) {}
+
+  Calibration read() {
+    if (!root_.IsMap()) fail(root_, "not a calibration; start with `format: 1`");
+    check_keys(root_,
+               {"format", "image", "focal_length", "aspect", "radial_distortion", "line_delay",
+                "pan_axis", "tilt_axis", "pan_scale", "tilt_scale", "clock_offset", "zoom",
+                "covariance", "quality", "landmarks"},
+               "");
+    const YAML::Node format = required(root_, "format", "");
+    if (number(format, "format") != 1) {
+      fail(format, "format " + format.Scalar() + " is not known; this version reads format 1");
+    }
+    const YAML::Node image = required(root_, "image", "");
+    check_keys(image, {"width", "height"}, "image.");
+    calibration_.camera.width = pixels(image, "width");
+    calibration_.camera.height = pixels(image, "height");
+
+    calibration_.camera.focal_length = scalar(Parameter::kFocalLength);
+    if (calibration_.camera.focal_length < 0.1 * calibration_.camera.width) {
+      fail(root_["focal_length"]["value"],
+           "focal_length " + short_text(calibration_.camera.focal_length) +
+               " sees more than 157 degrees across the image; give pixels, not millimetres");
+    }
+    if (root_["aspect"]) calibration_.camera.aspect = scalar(Parameter::kAspect);
+    calibration_.camera.radial_distortion = scalar(Parameter::kRadialDistortion);
+    calibration_.line_delay = scalar(Parameter::kLineDelay);
+    calibration_.mechanics.pan_axis =
+        axis("pan_axis", calibration_.mechanics.pan_axis, Parameter::kPanAxis0);
+    calibration_.mechanics.tilt_axis =
+        axis("tilt_axis", calibration_.mechanics.tilt_axis, Parameter::kTiltAxis0);
+    calibration_.mechanics.pan_scale = scalar(Parameter::kPanScale);
+    calibration_.mechanics.tilt_scale = scalar(Parameter::kTiltScale);
+    calibration_.clock_offset = scalar(Parameter::kClockOffset);
+    if (root_["zoom"]) calibration_.zoom = number(root_["zoom"], "zoom");
+    if (root_["quality"] && !root_["quality"].IsMap()) {
+      fail(root_["quality"], "quality is not a map; write `quality: {name: value, ...}`");
+    }
+    if (root_["landmarks"] && !root_["landmarks"].IsScalar()) {
+      fail(root_["landmarks"], "landmarks is not a file name; write `landmarks: map.bin`");
+    }
+    covariance();
+    return calibration_;
+  }
+
+ private:
+  static void check_keys(const YAML::Node& map, std::initializer_list<const char*> known,
+                         const std::string& prefix) {
+    std::set<std::string> seen;
+    for (const auto& entry : map) {
+      if (!entry.first.IsScalar()) fail(entry.first, "a key is not a word; write `name: value`");
+      const std::string& key = entry.first.Scalar();
+      if (!seen.insert(key).second) {
+        fail(entry.first, prefix + key + " stands here a second time; keep one");
+      }
+      bool is_known = false;
+      std::string names;
+      for (const char* name : known) {
+        is_known = is_known || key == name;
+        names += names.empty() ? name : std::string(", ") + name;
+      }
+      if (!is_known) fail(entry.first, "unknown key " + prefix + key + "; known are " + names);
+    }
+  }
+
+  static YAML::Node required(const YAML::Node& map, const char* key, const std::string& prefix) {
+    if (!map.IsMap()) {
+      fail(map, prefix.substr(0, prefix.size() - 1) + " is not a map; write {" + key + ": ...}");
+    }
+    const YAML::Node node = map[key];
+    if (!node) fail(map, prefix + key + " is missing; add it");
+    return node;
+  }
+
+  static double number(const YAML::Node& node, const std::string& name) {
+    double value = 0;
+    if (node.IsScalar()) {
+      std::istringstream stream(node.Scalar());
+      stream.imbue(std::locale::classic());
+      if (stream >> value && stream.peek() == std::istringstream::traits_type::eof() &&
+          std::isfinite(value)) {
+        return value;
+      }
+      fail(node, name + " is \"" + node.Scalar() + "\"; a finite number is needed");
+    }
+    fail(node, name + " is not a single value; a finite number is needed");
+  }
+
+  static int pixels(const YAML::Node& image, const char* key) {
+    const std::string name = std::string("image.") + key;
+    const YAML::Node node = required(image, key, "image.");
+    const double value = number(node, name);
+    if (value < 1 || value > 1e5 || value != std::floor(value)) {
+      fail(node, name + " is " + node.Scalar() + "; a whole number of pixels from 1 to 100000");
+    }
+    return static_cast<int>(value);
+  }
+
+  static std::vector<double> numbers(const YAML::Node& node, const std::string& name,
+                                     std::size_t count) {
+    if (!node.IsSequence() || node.size() != count) {
+      fail(node, name + " needs a list of " + std::to_string(count) + " numbers");
+    }
+    std::vector<double> values;
+    for (const YAML::Node& item : node) values.push_back(number(item, name));
+    return values;
+  }
+
+  // sigma, from 0 on, no larger than `most`.
+  void set_sigma(const YAML::Node& node, const std::string& name, double sigma, double most,
+                 Parameter parameter) {
+    if (sigma < 0 || sigma > most) {
+      fail(node,
+           name + ".sigma is " + short_text(sigma) +
+               "; one standard deviation, in the unit of the value (axes: radians), is needed");
+    }
+    sigmas_.push_back({parameter, sigma, node});
+    calibration_.covariance(index(parameter), index(parameter)) = sigma * sigma;
+  }
+
+  double scalar(Parameter parameter) {
+    const std::string name = to_string(parameter);
+    const YAML::Node entry = required(root_, name.c_str(), "");
+    check_entry(entry, name);
+    const YAML::Node node = required(entry, "value", name + ".");
+    const double value = number(node, name);
+    const Range range = plausible_range(parameter);
+    if (value < range.least || value > range.most) {
+      fail(node, name + " is " + node.Scalar() + "; give " + range.hint);
+    }
+    if (entry["sigma"]) {
+      set_sigma(entry["sigma"], name, number(entry["sigma"], name + ".sigma"), 1e12, parameter);
+    }
+    return value;
+  }
+
+  Vector3<double> axis(const std::string& name, const Vector3<double>& nominal, Parameter first) {
+    const YAML::Node entry = required(root_, name.c_str(), "");
+    check_entry(entry, name);
+    const YAML::Node node = required(entry, "value", name + ".");
+    const std::vector<double> values = numbers(node, name, 3);
+    Vector3<double> axis(values[0], values[1], values[2]);
+    const double norm = axis.norm();
+    if (std::abs(norm - 1) > 1e-6) {
+      fail(node, name + " has length " + short_text(norm) + "; a unit vector is needed");
+    }
+    if (axis.dot(nominal) < 0.5 * norm) {
+      fail(node, name + " is more than 60 degrees from its nominal [" + short_text(nominal.x()) +
+                     ", " + short_text(nominal.y()) + ", " + short_text(nominal.z()) +
+                     "]; base axes are forward, right, down");
+    }
+    // What a person rounded is made a unit vector; what a program wrote stays as it is, bit by bit.
+    if (std::abs(norm - 1) > 1e-15) axis /= norm;
+    if (entry["sigma"]) {
+      const YAML::Node sigma = entry["sigma"];
+      const std::vector<double> pair = numbers(sigma, name + ".sigma", 2);
+      for (int i = 0; i < 2; ++i) {
+        set_sigma(sigma, name, pair[static_cast<std::size_t>(i)], 1,
+                  static_cast<Parameter>(index(first) + i));
+      }
+    }
+    return axis;
+  }
+
+  static void check_entry(const YAML::Node& entry, const std::string& name) {
+    if (!entry.IsMap()) fail(entry, name + " is not a map; write {value: ..., sigma: ...}");
+    check_keys(entry, {"value", "sigma"}, name + ".");
+  }
+
+  void covariance() {
+    const YAML::Node entry = root_["covariance"];
+    if (!entry) return;
+    if (!entry.IsMap()) fail(entry, "covariance is not a map; write {names: ..., matrix: ...}");
+    check_keys(entry, {"names", "matrix"}, "covariance.");
+    const std::vector<int> rows = covariance_rows(required(entry, "names", "covariance."));
+    const YAML::Node matrix = required(entry, "matrix", "covariance.");
+    if (!matrix.IsSequence() || matrix.size() != rows.size()) {
+      fail(matrix, "covariance.matrix needs a row for each of the " + std::to_string(rows.size()) +
+                       " names");
+    }
+    ParameterCovariance<double>& cov = calibration_.covariance;
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      const std::vector<double> values = numbers(matrix[i], "covariance.matrix", rows.size());
+      for (std::size_t j = 0; j < rows.size(); ++j) cov(rows[i], rows[j]) = values[j];
+    }
+    for (const int i : rows) {
+      if (cov(i, i) < 0) {
+        fail(matrix, std::string("covariance.matrix has the negative variance ") +
+                         short_text(cov(i, i)) + " of " + to_string(static_cast<Parameter>(i)) +
+                         "; 0 stands for exact");
+      }
+    }
+    check_positive(matrix);
+    for (const Sigma& sigma : sigmas_) {
+      const double expected = std::sqrt(cov(index(sigma.parameter), index(sigma.parameter)));
+      if (std::abs(sigma.value - expected) > 1e-3 * expected) {
+        fail(sigma.node, std::string("sigma of ") + to_string(sigma.parameter) + " is " +
+                             short_text(sigma.value) + ", its covariance says " +
+                             short_text(expected) + "; make them agree, or leave one out");
+      }
+    }
+  }
+
+  static std::vector<int> covariance_rows(const YAML::Node& names) {
+    if (!names.IsSequence()) fail(names, "covariance.names is not a list; write [name, ...]");
+    std::vector<int> rows;
+    for (const YAML::Node& name : names) {
+      int row = 0;
+      while (row < kParameterCount &&
+             !(name.IsScalar() && name.Scalar() == to_string(static_cast<Parameter>(row)))) {
+        ++row;
+      }
+      if (row == kParameterCount) {
+        fail(name,
+             "covariance.names has an unknown name; known are focal_length, aspect, ..., "
+             "pan_axis_0, pan_axis_1, ..., clock_offset");
+      }
+      for (const int other : rows) {
+        if (other == row) fail(name, "covariance.names has " + name.Scalar() + " twice; keep one");
+      }
+      rows.push_back(row);
+    }
+    return rows;
+  }
+
+  // Judged on the correlations: the variances of f and of the line delay are 17 orders apart.
+  void check_positive(const YAML::Node& matrix) {
+    ParameterCovariance<double> correlation = calibration_.covariance;
+    for (int i = 0; i < kParameterCount; ++i) {
+      for (int j = 0; j < kParameterCount; ++j) {
+        const double scale =
+            std::sqrt(calibration_.covariance(i, i)) * std::sqrt(calibration_.covariance(j, j));
+        if (scale > 0) correlation(i, j) /= scale;
+      }
+    }
+    if ((correlation - correlation.transpose()).cwiseAbs().maxCoeff() > 1e-9) {
+      fail(matrix, "covariance.matrix is not symmetric; give both halves");
+    }
+    const Eigen::SelfAdjointEigenSolver<ParameterCovariance<double>> solver(correlation,
+                                                                            Eigen::EigenvaluesOnly);
+    if (solver.eigenvalues().minCoeff() < -1e-9) {
+      fail(matrix, "covariance.matrix is not positive semidefinite; no data has such a covariance");
+    }
+  }
+
+  struct Sigma {
+    Parameter parameter;
+    double value;
+    YAML::Node node;
+  };
+
+  const YAML::Node root_;
+  Calibration calibration_;
+  std::vector<Sigma> sigmas_;
+};
+
+}  // namespace
+
+bool parse_calibration(const std::string& text, const std::string& name, Calibration* calibration,
+                       std::string* error) {
+  try {
+    *calibration = Reader(YAML::Load(text)).read();
+    return true;
+  } catch (const Problem& problem) {
+    *error = name + ":" + std::to_string(problem.line) + ": " + problem.text;
+  } catch (const YAML::Exception& exception) {
+    *error = name + ":" + std::to_string(exception.mark.line + 1) + ": " + exception.msg +
+             "; valid YAML is needed";
+  }
+  return false;
+}
+
+std::string format_calibration(const Calibration& calibration) {
+  YAML::Emitter out;
+  const auto& cov = calibration.covariance;
+  const auto sigma = [&cov](Parameter parameter) {
+    return number_text(std::sqrt(cov(index(parameter), index(parameter))));
+  };
+  const auto write_scalar = [&](Parameter parameter, double value, const char* comment) {
+    out << YAML::Key << to_string(parameter) << YAML::Value << YAML::Flow << YAML::BeginMap
+        << YAML::Key << "value" << YAML::Value << number_text(value) << YAML::Key << "sigma"
+        << YAML::Value << sigma(parameter) << YAML::EndMap << YAML::Comment(comment);
+  };
+  const auto write_axis = [&](const char* name, const Vector3<double>& axis, Parameter first,
+                              const char* comment) {
+    out << YAML::Key << name << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "value"
+        << YAML::Value << YAML::BeginSeq;
+    for (int i = 0; i < 3; ++i) out << number_text(axis[i]);
+    out << YAML::EndSeq << YAML::Key << "sigma" << YAML::Value << YAML::BeginSeq << sigma(first)
+        << sigma(static_cast<Parameter>(index(first) + 1)) << YAML::EndSeq << YAML::EndMap
+        << YAML::Comment(comment);
+  };
+
+  out << YAML::BeginMap;
+  out << YAML::Key << "format" << YAML::Value << 1;
+  out << YAML::Key << "image" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "width"
+      << YAML::Value << calibration.camera.width << YAML::Key << "height" << YAML::Value
+      << calibration.camera.height << YAML::EndMap;
+  write_scalar(Parameter::kFocalLength, calibration.camera.focal_length, "px");
+  write_scalar(Parameter::kAspect, calibration.camera.aspect, "f_v / f_u");
+  write_scalar(Parameter::kRadialDistortion, calibration.camera.radial_distortion,
+               "u = f x (1 + k |x|^2) + centre");
+  write_scalar(Parameter::kLineDelay, calibration.line_delay, "s/row");
+  write_axis("pan_axis", calibration.mechanics.pan_axis, Parameter::kPanAxis0,
+             "unit vector in the base: forward, right, down; sigma in rad");
+  write_axis("tilt_axis", calibration.mechanics.tilt_axis, Parameter::kTiltAxis0,
+             "unit vector in the base; sigma in rad");
+  write_scalar(Parameter::kPanScale, calibration.mechanics.pan_scale, "measured / true angle");
+  write_scalar(Parameter::kTiltScale, calibration.mechanics.tilt_scale, "measured / true angle");
+  write_scalar(Parameter::kClockOffset, calibration.clock_offset,
+               "s; telemetry clock = image clock + clock_offset");
+  if (calibration.zoom) out << YAML::Key << "zoom" << YAML::Value << number_text(*calibration.zoom);
+  if (!cov.isZero(0)) {
+    out << YAML::Key << "covariance" << YAML::Value << YAML::BeginMap << YAML::Key << "names"
+        << YAML::Value << YAML::Flow << YAML::BeginSeq;
+    for (int i = 0; i < kParameterCount; ++i) out << to_string(static_cast<Parameter>(i));
+    out << YAML::EndSeq << YAML::Key << "matrix" << YAML::Value << YAML::BeginSeq;
+    for (int i = 0; i < kParameterCount; ++i) {
+      out << YAML::Flow << YAML::BeginSeq;
+      for (int j = 0; j < kParameterCount; ++j) out << number_text(cov(i, j));
+      out << YAML::EndSeq;
+    }
+    out << YAML::EndSeq << YAML::EndMap;
+  }
+  out << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+bool load_calibration(const std::string& path, Calibration* calibration, std::string* error) {
+  std::ifstream file(path);
+  std::ostringstream text;
+  if (!file || !(text << file.rdbuf())) {
+    *error = path + ": cannot be read: " + std::strerror(errno);
+    return false;
+  }
+  return parse_calibration(text.str(), path, calibration, error);
+}
+
+namespace {
+
+// A file beside the target, renamed onto it once it is safely on disk; otherwise removed.
+class TemporaryFile {
+ public:
+  explicit TemporaryFile(const std::string& target) : name_(target + ".XXXXXX") {
+    descriptor_ = ::mkostemp(name_.data(), O_CLOEXEC);
+  }
+  TemporaryFile(const TemporaryFile&) = delete;
+  TemporaryFile& operator=(const TemporaryFile&) = delete;
+  ~TemporaryFile() {
+    if (descriptor_ < 0) return;
+    ::close(descriptor_);
+    if (!renamed_) ::unlink(name_.c_str());
+  }
+
+  // False leaves the reason in errno.
+  bool replace(const std::string& target, const std::string& content) {
+    if (descriptor_ < 0) return false;
+    std::size_t written = 0;
+    while (written < content.size()) {
+      const ssize_t n = ::write(descriptor_, content.data() + written, content.size() - written);
+      if (n < 0 && errno == EINTR) continue;
+      if (n < 0) return false;
+      written += static_cast<std::size_t>(n);
+    }
+    // mkostemp lets the owner alone read it; a calibration is no secret.
+    renamed_ = ::fchmod(descriptor_, 0644) == 0 && ::fsync(descriptor_) == 0 &&
+               ::rename(name_.c_str(), target.c_str()) == 0;
+    return renamed_;
+  }
+
+ private:
+  std::string name_;
+  int descriptor_ = -1;
+  bool renamed_ = false;
+};
+
+// Makes a rename in this folder survive a power cut.
+bool sync_folder(const std::string& path) {
+  const std::size_t slash = path.find_last_of('/');
+  const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return false;
+  const bool synced = ::fsync(descriptor) == 0;
+  const int reason = errno;
+  ::close(descriptor);
+  errno = reason;
+  return synced;
+}
+
+}  // namespace
+
+bool save_calibration(const std::string& path, const Calibration& calibration, std::string* error) {
+  const std::string text = format_calibration(calibration);
+  Calibration as_read;
+  if (!parse_calibration(text, "refused to write " + path, &as_read, error)) return false;
+  TemporaryFile file(path);
+  if (!file.replace(path, text) || !sync_folder(path)) {
+    *error = path + ": cannot be written: " + std::strerror(errno);
+    return false;
+  }
+  return true;
+}
+
+}  // namespace alidade

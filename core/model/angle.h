@@ -1,0 +1,53 @@
+#pragma once
+// Pan and tilt angles (rad) on the torus, without seams: a difference goes the short way round.
+//   wrap_angle(x) is the angle in [-pi, pi) that differs from x by whole turns; an x already there
+//   is returned unchanged, bit by bit. NaN and infinities give NaN. plus(p, xi) = wrap(p + xi),
+//   minus(q, p) = wrap(q - p)  (PTCEE 12 to 14; their complex numbers of unit length are replaced
+//   by the wrap). The Jacobians are the identity, for minus its negative with respect to p (PTCEE
+//   15), except at the seam.
+// Pan is positive to the right, tilt positive upwards. No allocation.
+
+#include <cmath>
+
+#include "core/model/linear_algebra.h"
+#include "core/model/trigonometry.h"
+
+namespace alidade {
+
+template <class S>
+[[nodiscard]] S wrap_angle(const S& angle) {
+  using std::floor;
+  const S pi = S(kPi);
+  const S turn = S(2 * kPi);
+  S wrapped = angle - turn * floor((angle + pi) / turn);
+  // Rounding can leave it one step outside.
+  if (wrapped >= pi) wrapped = wrapped - turn;
+  if (wrapped < -pi) wrapped = wrapped + turn;
+  return wrapped;
+}
+
+// Two angles, or their rates (rad/s).
+template <class S>
+struct PanTilt {
+  S pan = S(0);
+  S tilt = S(0);
+
+  [[nodiscard]] Vector2<S> vector() const { return Vector2<S>(pan, tilt); }
+
+  template <class T>
+  [[nodiscard]] PanTilt<T> cast() const {
+    return {T(pan), T(tilt)};
+  }
+};
+
+template <class S>
+[[nodiscard]] PanTilt<S> plus(const PanTilt<S>& p, const Vector2<S>& xi) {
+  return {wrap_angle(S(p.pan + xi[0])), wrap_angle(S(p.tilt + xi[1]))};
+}
+
+template <class S>
+[[nodiscard]] Vector2<S> minus(const PanTilt<S>& q, const PanTilt<S>& p) {
+  return Vector2<S>(wrap_angle(S(q.pan - p.pan)), wrap_angle(S(q.tilt - p.tilt)));
+}
+
+}  // namespace alidade

@@ -1,0 +1,78 @@
+#pragma once
+// One calibration of a camera at one zoom: the parameters of the model, and how well each is known.
+// The parameters are numbered by Parameter, the order of rows and columns of every covariance and
+// parameter Jacobian of Alidade. An axis has two numbers, its change (rad) in its own tangent_basis
+// (direction.h). SI units; see the members. Plain values; no allocation.
+
+#include <optional>
+
+#include "core/model/camera.h"
+#include "core/model/linear_algebra.h"
+#include "core/model/mechanics.h"
+
+namespace alidade {
+
+enum class Parameter : int {
+  kFocalLength,
+  kAspect,
+  kRadialDistortion,
+  kLineDelay,
+  kPanAxis0,
+  kPanAxis1,
+  kTiltAxis0,
+  kTiltAxis1,
+  kPanScale,
+  kTiltScale,
+  kClockOffset,
+  kCount
+};
+
+inline constexpr int kParameterCount = static_cast<int>(Parameter::kCount);
+
+[[nodiscard]] constexpr int index(Parameter parameter) { return static_cast<int>(parameter); }
+
+// The name in files and reports.
+[[nodiscard]] constexpr const char* to_string(Parameter parameter) {
+  switch (parameter) {
+    case Parameter::kFocalLength:
+      return "focal_length";
+    case Parameter::kAspect:
+      return "aspect";
+    case Parameter::kRadialDistortion:
+      return "radial_distortion";
+    case Parameter::kLineDelay:
+      return "line_delay";
+    case Parameter::kPanAxis0:
+      return "pan_axis_0";
+    case Parameter::kPanAxis1:
+      return "pan_axis_1";
+    case Parameter::kTiltAxis0:
+      return "tilt_axis_0";
+    case Parameter::kTiltAxis1:
+      return "tilt_axis_1";
+    case Parameter::kPanScale:
+      return "pan_scale";
+    case Parameter::kTiltScale:
+      return "tilt_scale";
+    case Parameter::kClockOffset:
+      return "clock_offset";
+    case Parameter::kCount:
+      break;
+  }
+  return "unknown parameter";
+}
+
+template <class S>
+using ParameterCovariance = Matrix<S, kParameterCount, kParameterCount>;
+
+struct Calibration {
+  Camera<double> camera;
+  double line_delay = 0;  // s/row: row v is exposed at t0 + v * line_delay; any sign
+  Mechanics<double> mechanics;
+  double clock_offset = 0;     // s: telemetry clock = image clock + clock_offset
+  std::optional<double> zoom;  // device units at which this calibration holds
+  // Zero rows are parameters taken as exact.
+  ParameterCovariance<double> covariance = ParameterCovariance<double>::Zero();
+};
+
+}  // namespace alidade

@@ -1,0 +1,50 @@
+#pragma once
+// Short names for the fixed-size Eigen types that the model uses. Everything in core/model is a
+// template on the scalar S: float, double or an automatic-differentiation type such as ceres::Jet,
+// and calls sin, sqrt, ... through argument-dependent lookup. Nothing here allocates or throws.
+//
+// Names: R_a_from_b rotates coordinates of frame b into frame a; d_a is a unit vector in frame a;
+// J_out_in is the Jacobian of out with respect to in. A Jacobian argument is an optional output
+// pointer: nullptr, the default, costs nothing.
+
+#include <Eigen/Core>
+#include <cmath>
+
+namespace alidade {
+
+template <class S, int kRows, int kColumns>
+using Matrix = Eigen::Matrix<S, kRows, kColumns>;
+
+template <class S>
+using Vector2 = Matrix<S, 2, 1>;
+template <class S>
+using Vector3 = Matrix<S, 3, 1>;
+template <class S>
+using Vector4 = Matrix<S, 4, 1>;
+template <class S>
+using Matrix2 = Matrix<S, 2, 2>;
+template <class S>
+using Matrix3 = Matrix<S, 3, 3>;
+template <class S>
+using Matrix4 = Matrix<S, 4, 4>;
+
+// C++20's std::type_identity_t: a parameter of type NonDeduced<T> takes no part in deducing S, so
+// that callers may pass Eigen expressions and nullptr.
+template <class T>
+struct TypeIdentity {
+  using type = T;
+};
+template <class T>
+using NonDeduced = typename TypeIdentity<T>::type;
+
+// True if every coefficient is finite (the value part, for a differentiation type).
+template <class S, int kRows, int kColumns>
+[[nodiscard]] bool all_finite(const Matrix<S, kRows, kColumns>& m) {
+  using std::isfinite;
+  for (int i = 0; i < m.size(); ++i) {
+    if (!isfinite(m.coeff(i))) return false;
+  }
+  return true;
+}
+
+}  // namespace alidade

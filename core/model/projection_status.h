@@ -1,0 +1,32 @@
+#pragma once
+// Why a projection or a back-projection has, or has not, a result. Outputs are written with kOk
+// only.
+
+namespace alidade {
+
+enum class ProjectionStatus {
+  kOk,
+  kBehindCamera,           // the direction has no positive component along the optical axis
+  kBeyondDistortionLimit,  // radial_distortion < 0 and outside the radius where the model is
+                           // monotone
+  kNoRow,     // rolling shutter: no unique row sees the direction (motion overtakes read-out)
+  kNotFinite  // an argument is not finite, or the result is too large to represent
+};
+
+[[nodiscard]] constexpr const char* to_string(ProjectionStatus status) {
+  switch (status) {
+    case ProjectionStatus::kOk:
+      return "ok";
+    case ProjectionStatus::kBehindCamera:
+      return "behind the camera";
+    case ProjectionStatus::kBeyondDistortionLimit:
+      return "beyond the radius where the distortion model is invertible";
+    case ProjectionStatus::kNoRow:
+      return "no unique row of the rolling shutter sees it";
+    case ProjectionStatus::kNotFinite:
+      return "not finite";
+  }
+  return "unknown status";
+}
+
+}  // namespace alidade

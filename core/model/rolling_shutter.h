@@ -1,0 +1,219 @@
+#pragma once
+// The camera as it is: rows exposed one after the other while the mount turns.
+//   row v is exposed at t(v) = t0 + v * line_delay, any sign (MODEL: beyond PTCEE 26, 27, which
+//   hold the body rate constant; here the ANGLES move at constant rates and pass through the
+//   mechanism) angle(v) = angle + rate * (v - reference_row) * line_delay d_b =
+//   R_base_from_camera(angle(v)) unproject(u),  v = u_v                 back-projection: direct v
+//   = project(R_base_from_camera(angle(v))^T d_b)_v                       projection: solved for v
+// v is a continuous coordinate of the whole row axis: the row solved for may lie outside [0,
+// height]. The solution is unique if the image of the direction moves down more slowly than the
+// read-out: slope d project_v / d v < 1. Where that fails the status is kNoRow. A direction that
+// the distortion model or the half space in front excludes at the reference row is refused with
+// that status. Jacobians of the solved pixel follow from the implicit function theorem. J_*_motion
+// has the columns pan, tilt, pan rate, tilt rate (of the true angles); J_*_parameters those of
+// Parameter, where the scales and the clock offset are 0: they act on the motion, see
+// motion_parameter_jacobian(). Outputs are written with kOk only. Domain: as camera.h and
+// mechanics.h. No allocation.
+
+#include <Eigen/Core>
+#include <cmath>
+
+#include "core/model/calibration.h"
+#include "core/model/camera.h"
+#include "core/model/mechanics.h"
+
+namespace alidade {
+
+// The mount's motion about one frame: TRUE angles (rad) when the row reference_row is exposed, and
+// constant rates (rad/s).
+template <class S>
+struct FrameMotion {
+  PanTilt<S> angle;
+  PanTilt<S> rate;
+  S reference_row = S(0);  // px
+
+  template <class T>
+  [[nodiscard]] FrameMotion<T> cast() const {
+    return {angle.template cast<T>(), rate.template cast<T>(), T(reference_row)};
+  }
+};
+
+// True angles, not wrapped, when a row is exposed.
+template <class S>
+[[nodiscard]] PanTilt<S> angle_at_row(const FrameMotion<S>& motion, const NonDeduced<S>& line_delay,
+                                      const NonDeduced<S>& row) {
+  const S time = (row - motion.reference_row) * line_delay;
+  return {motion.angle.pan + motion.rate.pan * time, motion.angle.tilt + motion.rate.tilt * time};
+}
+
+// How the motion depends on the parameters when it was made from MEASURED angles looked up at the
+// image's time plus clock_offset: d (pan, tilt, pan rate, tilt rate) / d Parameter, for rates that
+// are constant about that time. A total parameter Jacobian is J_parameters + J_motion *
+// motion_parameter_jacobian(...).
+template <class S>
+[[nodiscard]] Matrix<S, 4, kParameterCount> motion_parameter_jacobian(
+    const Mechanics<S>& mechanics, const FrameMotion<S>& motion) {
+  Matrix<S, 4, kParameterCount> J = Matrix<S, 4, kParameterCount>::Zero();
+  J(0, index(Parameter::kPanScale)) = -motion.angle.pan / mechanics.pan_scale;
+  J(1, index(Parameter::kTiltScale)) = -motion.angle.tilt / mechanics.tilt_scale;
+  J(2, index(Parameter::kPanScale)) = -motion.rate.pan / mechanics.pan_scale;
+  J(3, index(Parameter::kTiltScale)) = -motion.rate.tilt / mechanics.tilt_scale;
+  J(0, index(Parameter::kClockOffset)) = motion.rate.pan;
+  J(1, index(Parameter::kClockOffset)) = motion.rate.tilt;
+  return J;
+}
+
+template <class S>
+[[nodiscard]] ProjectionStatus rolling_shutter_unproject(
+    const Camera<S>& camera, const Mechanics<S>& mechanics, const NonDeduced<S>& line_delay,
+    const FrameMotion<S>& motion, const NonDeduced<Vector2<S>>& u, NonDeduced<Vector3<S>>* d_b,
+    NonDeduced<Matrix<S, 3, 2>>* J_d_u = nullptr, NonDeduced<Matrix<S, 3, 4>>* J_d_motion = nullptr,
+    NonDeduced<Matrix<S, 3, kParameterCount>>* J_d_parameters = nullptr) {
+  const bool with_jacobians =
+      J_d_u != nullptr || J_d_motion != nullptr || J_d_parameters != nullptr;
+  Vector3<S> d_c;
+  Matrix<S, 3, 2> J_dc_u;
+  Matrix3<S> J_dc_camera;
+  const ProjectionStatus status = unproject(camera, u, &d_c, J_d_u != nullptr ? &J_dc_u : nullptr,
+                                            J_d_parameters != nullptr ? &J_dc_camera : nullptr);
+  if (status != ProjectionStatus::kOk) return status;
+
+  Matrix<S, 3, 2> J_xi_angle;
+  Matrix<S, 3, 4> J_xi_axes;
+  const Matrix3<S> R = R_base_from_camera(mechanics, angle_at_row(motion, line_delay, u.y()),
+                                          with_jacobians ? &J_xi_angle : nullptr,
+                                          J_d_parameters != nullptr ? &J_xi_axes : nullptr);
+  const Vector3<S> d = R * d_c;
+  if (!all_finite(d)) return ProjectionStatus::kNotFinite;
+  *d_b = d;
+  if (!with_jacobians) return ProjectionStatus::kOk;
+
+  const Matrix3<S> J_d_xi = -R * skew(d_c);
+  const Vector3<S> J_d_time = J_d_xi * (J_xi_angle * motion.rate.vector());
+  const S rows = u.y() - motion.reference_row;
+  if (J_d_u != nullptr) {
+    *J_d_u = R * J_dc_u;
+    J_d_u->col(1) += J_d_time * line_delay;
+  }
+  if (J_d_motion != nullptr) {
+    J_d_motion->template leftCols<2>() = J_d_xi * J_xi_angle;
+    J_d_motion->template rightCols<2>() = J_d_motion->template leftCols<2>() * (rows * line_delay);
+  }
+  if (J_d_parameters != nullptr) {
+    J_d_parameters->setZero();
+    J_d_parameters->template middleCols<3>(index(Parameter::kFocalLength)) = R * J_dc_camera;
+    J_d_parameters->col(index(Parameter::kLineDelay)) = J_d_time * rows;
+    J_d_parameters->template middleCols<4>(index(Parameter::kPanAxis0)) = J_d_xi * J_xi_axes;
+  }
+  return ProjectionStatus::kOk;
+}
+
+// Where a direction would be seen if every row were exposed when `row` is (PTCEE 41, 42). J_u_row
+// is the image's motion per row, whose second component is the slope above.
+template <class S>
+[[nodiscard]] ProjectionStatus project_at_row(
+    const Camera<S>& camera, const Mechanics<S>& mechanics, const NonDeduced<S>& line_delay,
+    const FrameMotion<S>& motion, const NonDeduced<S>& row, const NonDeduced<Vector3<S>>& d_b,
+    NonDeduced<Vector2<S>>* u, NonDeduced<Vector2<S>>* J_u_row = nullptr,
+    NonDeduced<Matrix<S, 2, 3>>* J_u_d = nullptr, NonDeduced<Matrix<S, 2, 4>>* J_u_motion = nullptr,
+    NonDeduced<Matrix<S, 2, kParameterCount>>* J_u_parameters = nullptr) {
+  const bool with_jacobians =
+      J_u_row != nullptr || J_u_d != nullptr || J_u_motion != nullptr || J_u_parameters != nullptr;
+  Matrix<S, 3, 2> J_xi_angle;
+  Matrix<S, 3, 4> J_xi_axes;
+  const Matrix3<S> R = R_base_from_camera(mechanics, angle_at_row(motion, line_delay, row),
+                                          with_jacobians ? &J_xi_angle : nullptr,
+                                          J_u_parameters != nullptr ? &J_xi_axes : nullptr);
+  const Vector3<S> d_c = R.transpose() * d_b;
+  Matrix<S, 2, 3> J_u_dc;
+  Matrix<S, 2, 3> J_u_camera;
+  const ProjectionStatus status = project(camera, d_c, u, with_jacobians ? &J_u_dc : nullptr,
+                                          J_u_parameters != nullptr ? &J_u_camera : nullptr);
+  if (status != ProjectionStatus::kOk || !with_jacobians) return status;
+
+  const Matrix<S, 2, 3> J_u_xi = J_u_dc * skew(d_c);
+  const Matrix<S, 2, 2> J_u_angle = J_u_xi * J_xi_angle;
+  const Vector2<S> J_u_time = J_u_angle * motion.rate.vector();
+  const S rows = row - motion.reference_row;
+  if (J_u_row != nullptr) *J_u_row = J_u_time * line_delay;
+  if (J_u_d != nullptr) *J_u_d = J_u_dc * R.transpose();
+  if (J_u_motion != nullptr) *J_u_motion << J_u_angle, J_u_angle * (rows * line_delay);
+  if (J_u_parameters != nullptr) {
+    J_u_parameters->setZero();
+    J_u_parameters->template middleCols<3>(index(Parameter::kFocalLength)) = J_u_camera;
+    J_u_parameters->col(index(Parameter::kLineDelay)) = J_u_time * rows;
+    J_u_parameters->template middleCols<4>(index(Parameter::kPanAxis0)) = J_u_xi * J_xi_axes;
+  }
+  return ProjectionStatus::kOk;
+}
+
+template <class S>
+[[nodiscard]] ProjectionStatus rolling_shutter_project(
+    const Camera<S>& camera, const Mechanics<S>& mechanics, const NonDeduced<S>& line_delay,
+    const FrameMotion<S>& motion, const NonDeduced<Vector3<S>>& d_b, NonDeduced<Vector2<S>>* u,
+    NonDeduced<Matrix<S, 2, 3>>* J_u_d = nullptr, NonDeduced<Matrix<S, 2, 4>>* J_u_motion = nullptr,
+    NonDeduced<Matrix<S, 2, kParameterCount>>* J_u_parameters = nullptr) {
+  using std::abs;
+  // Newton doubles the correct digits with each step: three steps are common, and a step below the
+  // rounding of the projection itself is the last that can help.
+  constexpr int kMaxSteps = 20;
+  const S tolerance = S(16) * S(Eigen::NumTraits<S>::epsilon()) *
+                      (camera.focal_length * camera.aspect + S(camera.height));
+  S row = motion.reference_row;
+  Vector2<S> projected;
+  Vector2<S> J_u_row;
+  for (int step_count = 0;; ++step_count) {
+    if (step_count == kMaxSteps) return ProjectionStatus::kNoRow;
+    const ProjectionStatus status =
+        project_at_row(camera, mechanics, line_delay, motion, row, d_b, &projected, &J_u_row);
+    if (status != ProjectionStatus::kOk) return status;
+    if (J_u_row.y() >= S(1)) return ProjectionStatus::kNoRow;
+    const S step = (projected.y() - row) / (S(1) - J_u_row.y());
+    row += step;
+    if (abs(step) <= tolerance) break;
+  }
+  const ProjectionStatus status =
+      project_at_row(camera, mechanics, line_delay, motion, row, d_b, &projected, &J_u_row, J_u_d,
+                     J_u_motion, J_u_parameters);
+  if (status != ProjectionStatus::kOk) return status;
+  if (J_u_row.y() >= S(1)) return ProjectionStatus::kNoRow;
+  *u = projected;
+  // At a fixed row u changes by G; with the row that follows it, by G + J_u_row G_v / (1 - slope).
+  Matrix2<S> J_u_fixed = Matrix2<S>::Identity();
+  J_u_fixed.col(1) += J_u_row / (S(1) - J_u_row.y());
+  if (J_u_d != nullptr) *J_u_d = (J_u_fixed * *J_u_d).eval();
+  if (J_u_motion != nullptr) *J_u_motion = (J_u_fixed * *J_u_motion).eval();
+  if (J_u_parameters != nullptr) *J_u_parameters = (J_u_fixed * *J_u_parameters).eval();
+  return ProjectionStatus::kOk;
+}
+
+// Covariance of the reprojection error e = u - project_at_row(row = u_v) that a pixel noise of
+// cov_u causes: A cov_u A^T with A = I - [0, J_u_row], because a row error moves the row time too
+// (Oth 18 to 21).
+template <class S>
+[[nodiscard]] Matrix2<S> reprojection_error_covariance(const Vector2<S>& J_u_row,
+                                                       const Matrix2<S>& cov_u) {
+  Matrix2<S> A = Matrix2<S>::Identity();
+  A.col(1) -= J_u_row;
+  return A * cov_u * A.transpose();
+}
+
+// First-order covariance (rad^2) of a pixel's direction in tangent_basis(d_b), from the independent
+// covariances of the pixel, the motion and the parameters and the Jacobians of
+// rolling_shutter_unproject(). For a motion made from measured angles, cov_motion is the
+// measurement's noise alone and J_d_parameters the total Jacobian, see motion_parameter_jacobian().
+template <class S>
+[[nodiscard]] Matrix2<S> direction_covariance(const Vector3<S>& d_b, const Matrix<S, 3, 2>& J_d_u,
+                                              const Matrix<S, 3, 4>& J_d_motion,
+                                              const Matrix<S, 3, kParameterCount>& J_d_parameters,
+                                              const Matrix2<S>& cov_u, const Matrix4<S>& cov_motion,
+                                              const ParameterCovariance<S>& cov_parameters) {
+  const Matrix<S, 2, 3> to_tangent = tangent_basis(d_b).transpose();
+  const Matrix<S, 2, 2> J_u = to_tangent * J_d_u;
+  const Matrix<S, 2, 4> J_motion = to_tangent * J_d_motion;
+  const Matrix<S, 2, kParameterCount> J_parameters = to_tangent * J_d_parameters;
+  return J_u * cov_u * J_u.transpose() + J_motion * cov_motion * J_motion.transpose() +
+         J_parameters * cov_parameters * J_parameters.transpose();
+}
+
+}  // namespace alidade
