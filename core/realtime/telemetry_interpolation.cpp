@@ -1,0 +1,193 @@
+#include "core/realtime/telemetry_interpolation.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace alidade {
+namespace {
+
+constexpr int kCubicCoefficients = 4;
+constexpr int kLeastCubicSamples = kCubicCoefficients + 2;
+
+// 95 % quantiles of chi-square with 2, 3 and 4 degrees of freedom.
+constexpr std::array<double, 3> kChiSquareBound = {5.991, 7.815, 9.488};
+static_assert(kInterpolationWindow - kLeastCubicSamples + 1 == kChiSquareBound.size());
+
+// An answer as weighted sums of the samples: rows angle, rate.
+struct Weights {
+  Matrix<double, 2, kInterpolationWindow> of_sample =
+      Matrix<double, 2, kInterpolationWindow>::Zero();
+  // What an acceleration of 1 rad/s^2 does to (angle, rate) unseen by the sums.
+  Vector2<double> acceleration_effect = Vector2<double>::Zero();
+};
+
+// The samples' angles relative to one of them, one axis a row.
+using Angles = Matrix<double, 2, kInterpolationWindow>;
+
+// What one sample's angle is worth, without the errors of its time.
+double angle_variance(const TelemetryNoise& noise) {
+  return noise.pan_tilt_sigma * noise.pan_tilt_sigma + noise.quantum * noise.quantum / 12;
+}
+
+// PTCEE 22 to 24, for a time between the two knots.
+Weights line_weights(const TelemetryKnot* knots, int before, double time_s) {
+  const double period = knots[before + 1].time_s - knots[before].time_s;
+  const double l = (time_s - knots[before].time_s) / period;
+  Weights weights;
+  weights.of_sample.col(before) << 1 - l, -1 / period;
+  weights.of_sample.col(before + 1) << l, 1 / period;
+  if (!knots[before + 1].held) {
+    weights.acceleration_effect << -l * (1 - l) * period * period / 2, (l - 0.5) * period;
+  }
+  return weights;
+}
+
+// Largest square of the acceleration that the second differences about the line's two samples show,
+// less what noise alone makes of it.
+Vector2<double> acceleration_square_by_differences(const TelemetryKnot* knots, int count,
+                                                   int before, const Angles& angles,
+                                                   double variance) {
+  Vector2<double> largest = Vector2<double>::Zero();
+  for (int i = std::max(before, 1); i <= std::min(before + 1, count - 2); ++i) {
+    const double h0 = knots[i].time_s - knots[i - 1].time_s;
+    const double h1 = knots[i + 1].time_s - knots[i].time_s;
+    const Vector3<double> weights(2 / (h0 * (h0 + h1)), -2 / (h0 * h1), 2 / (h1 * (h0 + h1)));
+    const Vector2<double> acceleration = angles.middleCols<3>(i - 1) * weights;
+    largest = largest.cwiseMax(
+        (acceleration.array().square() - variance * weights.squaredNorm()).matrix());
+  }
+  return largest;
+}
+
+// Weights of the least-squares cubic's value, slope and curvature at time_s. False if the samples
+// cannot carry a cubic, or do not lie on one.
+bool cubic_weights(const TelemetryKnot* knots, int count, double time_s, const Angles& angles,
+                   double variance, Weights* weights, Vector2<double>* acceleration_square) {
+  if (count < kLeastCubicSamples) return false;
+  const double scale = 0.5 * (knots[count - 1].time_s - knots[0].time_s);
+  using Powers = Matrix<double, kCubicCoefficients, kInterpolationWindow>;
+  Powers powers = Powers::Zero();
+  double own_variance = 0;
+  for (int i = 0; i < count; ++i) {
+    const double x = (knots[i].time_s - time_s) / scale;
+    powers.col(i) << 1, x, x * x, x * x * x;
+    own_variance += knots[i].own_variance / count;
+  }
+  const Matrix4<double> normal = powers * powers.transpose();
+  const Eigen::LLT<Matrix4<double>> cholesky(normal);
+  if (cholesky.info() != Eigen::Success) return false;
+  const Powers to_coefficients = cholesky.solve(powers);
+  const Matrix<double, 2, kCubicCoefficients> coefficients = angles * to_coefficients.transpose();
+
+  const Vector2<double> rate = coefficients.col(1) / scale;
+  const Vector2<double> residual_square =
+      (angles - coefficients * powers).leftCols(count).rowwise().squaredNorm();
+  const double bound = kChiSquareBound[static_cast<std::size_t>(count - kLeastCubicSamples)];
+  for (int axis = 0; axis < 2; ++axis) {
+    if (!(residual_square[axis] <= bound * (variance + own_variance * rate[axis] * rate[axis]))) {
+      return false;
+    }
+  }
+  weights->of_sample.row(0) = to_coefficients.row(0);
+  weights->of_sample.row(1) = to_coefficients.row(1) / scale;
+  weights->acceleration_effect.setZero();
+  const double to_acceleration = 2 / (scale * scale);
+  *acceleration_square =
+      (to_acceleration * to_acceleration *
+       (coefficients.col(2).array().square() - variance * to_coefficients.row(2).squaredNorm()))
+          .max(0.0)
+          .matrix();
+  return true;
+}
+
+}  // namespace
+
+bool TelemetryNoise::validate(const char** error) const {
+  const auto not_negative = [](double v) { return std::isfinite(v) && v >= 0; };
+  const char* problem = nullptr;
+  if (!not_negative(pan_tilt_sigma)) problem = "pan_tilt_sigma must not be negative";
+  if (!not_negative(quantum)) problem = "quantum must not be negative";
+  if (!not_negative(period_sigma_s)) problem = "period_sigma_s must not be negative";
+  if (!not_negative(acceleration_sigma)) problem = "acceleration_sigma must not be negative";
+  if (problem == nullptr && pan_tilt_sigma == 0 && quantum == 0) {
+    problem = "one of pan_tilt_sigma and quantum must be positive";
+  }
+  if (error != nullptr && problem != nullptr) *error = problem;
+  return problem == nullptr;
+}
+
+bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int count, int before,
+                 double time_s, double time_sigma_s, InterpolatedPanTilt* out) {
+  const double variance = angle_variance(noise);
+  const TelemetryKnot& origin = knots[before];
+  Angles angles = Angles::Zero();
+  for (int i = 0; i < count; ++i) {
+    angles.col(i) << knots[i].pan - origin.pan, knots[i].tilt - origin.tilt;
+  }
+
+  // Beyond the ends: the state at the end, carried on at a constant rate.
+  const double inside_s = std::clamp(time_s, knots[0].time_s, knots[count - 1].time_s);
+  const double beyond_s = time_s - inside_s;
+  Weights weights;
+  Vector2<double> acceleration_square;
+  const bool cubic =
+      cubic_weights(knots, count, inside_s, angles, variance, &weights, &acceleration_square);
+  if (!cubic) {
+    weights = line_weights(knots, before, inside_s);
+    acceleration_square =
+        acceleration_square_by_differences(knots, count, before, angles, variance);
+  }
+  if (!cubic || beyond_s != 0) {
+    const double expected = noise.acceleration_sigma * noise.acceleration_sigma;
+    acceleration_square = acceleration_square.cwiseMax(expected);
+  }
+  weights.of_sample.row(0) += beyond_s * weights.of_sample.row(1);
+  Vector2<double>& effect = weights.acceleration_effect;
+  effect[0] += beyond_s * effect[1] + beyond_s * beyond_s / 2;
+  effect[1] += beyond_s;
+
+  const Vector2<double> angle = angles * weights.of_sample.row(0).transpose();
+  const Vector2<double> rate = angles * weights.of_sample.row(1).transpose();
+
+  Matrix2<double> by_angle = Matrix2<double>::Zero();  // (angle, rate) from unit angle variances
+  Matrix2<double> by_time = Matrix2<double>::Zero();   // ... from the samples' own time variances
+  for (int i = 0; i < count; ++i) {
+    const Matrix2<double> square = weights.of_sample.col(i) * weights.of_sample.col(i).transpose();
+    by_angle += square;
+    by_time += knots[i].own_variance * square;
+  }
+  by_time(0, 0) += std::max(knots[before].shared_variance, knots[before + 1].shared_variance) +
+                   time_sigma_s * time_sigma_s;
+  const Matrix2<double> rate_square = rate * rate.transpose();
+  const double spacing = (knots[count - 1].time_s - knots[0].time_s) / (count - 1);
+  Matrix4<double> covariance;
+  for (int i = 0; i < 2; ++i) {
+    for (int j = 0; j < 2; ++j) {
+      covariance.block<2, 2>(2 * i, 2 * j) = by_time(i, j) * rate_square;
+      covariance.block<2, 2>(2 * i, 2 * j).diagonal() +=
+          Vector2<double>::Constant(by_angle(i, j) * variance) +
+          effect[i] * effect[j] * acceleration_square;
+    }
+  }
+  for (int axis = 0; axis < 2; ++axis) {
+    // An axis that moves less than a quantum from sample to sample is rounded alike each time:
+    // averaging does not help.
+    if (std::abs(rate[axis]) * spacing < noise.quantum) {
+      covariance(axis, axis) += noise.quantum * noise.quantum / 12;
+    }
+  }
+  if (!all_finite(angle) || !all_finite(rate) || !all_finite(covariance) ||
+      !all_finite(acceleration_square)) {
+    return false;
+  }
+  out->angle = {wrap_angle(origin.pan + angle[0]), wrap_angle(origin.tilt + angle[1])};
+  out->rate = {rate[0], rate[1]};
+  out->covariance = covariance;
+  out->acceleration_square = acceleration_square;
+  out->samples = cubic ? count : 2;
+  return true;
+}
+
+}  // namespace alidade

@@ -1,0 +1,65 @@
+#pragma once
+// Where the mount pointed between two telemetry samples, how fast it turned, and how well that is
+// known: the mathematics behind TelemetryBuffer, on a short run of neighbouring samples.
+//
+// The plain answer is PTCEE 22 to 25: a straight line through the two samples around the time asked
+// for. Where at least 6 (at most 8) neighbours lie on a cubic in time within their noise, that cubic
+// answers instead, as it averages the noise and follows the curve. It is fitted by least squares and
+// held against a chi-square bound (95 %); a jerk of the mount fails the test, and the line speaks,
+// with the curvature of its surroundings added to its covariance. Both answers are weighted sums of
+// the samples, so one formula gives the exact first-order covariance of angle and rate together.
+//
+// A stamp's error has a part that neighbouring samples share (a clock's offset) and a part of its
+// own; the difference of two own parts has the standard deviation period_sigma_s (PTCEE 20, 21, made
+// symmetric in the two samples). A rate w turns a time error tau into an angle error w tau of both
+// axes. Angles in rad as measured, times in s on the telemetry clock. No allocation.
+
+#include <cstdint>
+
+#include "core/model/angle.h"
+#include "core/model/linear_algebra.h"
+
+namespace alidade {
+
+struct TelemetryNoise {
+  double pan_tilt_sigma = 1e-4;   // rad, white noise of one measured angle
+  double quantum = 0;             // rad, smallest step of a measured angle; 0 = none
+  double period_sigma_s = 50e-6;  // s, of the time between two neighbouring samples
+  // rad/s^2, acceleration to expect of either axis where the samples do not show it: beyond the
+  // newest sample, beside a jerk, and with too few samples. One standard deviation.
+  double acceleration_sigma = 0.1;
+
+  // False and one line in *error (if not null) when a value makes no sense.
+  [[nodiscard]] bool validate(const char** error = nullptr) const;
+};
+
+// A sample as the buffer keeps it.
+struct TelemetryKnot {
+  double time_s;
+  double pan;              // rad, continuous: not wrapped
+  double tilt;             // rad, continuous
+  double shared_variance;  // s^2, of the stamp: the part shared with the neighbours
+  double own_variance;     // s^2, of the stamp: this sample's own part
+  bool held;               // the mount stood still since the knot before
+};
+
+struct InterpolatedPanTilt {
+  PanTilt<double> angle;  // rad, measured units, wrapped
+  PanTilt<double> rate;   // rad/s, measured units
+  // Of (pan, tilt, pan rate, tilt rate).
+  Matrix4<double> covariance = Matrix4<double>::Zero();
+  // (rad/s^2)^2, expected square of the acceleration (pan, tilt) about this time.
+  Vector2<double> acceleration_square = Vector2<double>::Zero();
+  int samples = 0;  // how many the answer rests on: 2 is the straight line
+};
+
+inline constexpr int kInterpolationWindow = 8;
+
+// knots[0..count), 2 <= count <= kInterpolationWindow, times strictly ascending; the time asked for
+// lies between knots[before] and knots[before + 1], or beyond the end that is nearest to it. False
+// if the result cannot be represented; *out is then untouched.
+[[nodiscard]] bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int count,
+                               int before, double time_s, double time_sigma_s,
+                               InterpolatedPanTilt* out);
+
+}  // namespace alidade
