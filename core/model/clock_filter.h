@@ -27,6 +27,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 #include <type_traits>
 
 #include "core/model/lower_line.h"
@@ -44,7 +45,7 @@ struct ClockFilterOptions {
   double nominal_period_s = 0;        // of a sequence; 0 = unknown: estimated
   double nominal_period_sigma_s = 0;  // 0 = max_skew * nominal_period_s
   double max_skew = 200e-6;           // |rate - 1| of a sender clock
-  double skew_wander = 1e-7;          // 1/sqrt(s): random walk of the skew
+  double skew_wander = 1.5e-7;        // 1/sqrt(s): random walk of the skew
   double expected_jitter_s = 5e-3;    // first guess, soon outweighed by the data
   double stamp_resolution_s = 1e-6;   // of the stamps, e.g. 1/90000 for RTP
   double floor_shift_s = 1e-3;        // smaller steps of the least delay are followed
@@ -120,7 +121,7 @@ class ClockFilter {
 
   // Host time of any sender time (or count), with the line as it is now. 0 before the first item.
   double to_host(double sender) const {
-    return items_ == 0 ? 0.0 : anchor_receive_ + line_.value_at(sender - anchor_sender_);
+    return started_ ? anchor_receive_ + line_.value_at(sender - anchor_sender_) : 0.0;
   }
   double sigma(double sender) const { return sigma_at(sender - anchor_sender_); }
 
@@ -134,45 +135,380 @@ class ClockFilter {
   // For a reconnection that the caller knows of. The next item starts a new line.
   void restart() {
     ++counters_.restarts;
-    begin_again();
+    announce_restart_ = true;
+    started_ = false;
+    state_ = ClockState::kWarmingUp;
+    shift_ = shift_variance_ = 0;
+    late_run_ = early_run_ = {};
+    symmetric_items_ = 0;
   }
 
   const ClockCounters& counters() const { return counters_; }
   ClockState state() const { return state_; }
 
  private:
-  static constexpr double kMaxPeriod = 10;  // s
+  static constexpr double kMaxPeriod = 10;      // s, of a sequence whose period is not given
+  static constexpr double kMaxSpan = 1e12;      // beyond it differences of stamps are nonsense
+  static constexpr int kWildToRestart = 3;      // in a row
+  static constexpr double kHuber = 2.5;         // sigmas
+  static constexpr double kGate = 6;            // sigmas no honest item leaves on the early side
+  static constexpr double kSameFloor = 20;      // e^-20: odds that chance explains it
+  static constexpr double kPriorItems = 2;      // weight of expected_jitter_s
+  static constexpr double kNoiseMemory = 1000;  // items
 
-  void begin_again() {
-    items_ = 0;
-    state_ = ClockState::kWarmingUp;
+  // Items that may show a floor shift. Their least residuals are watched in halves of settle_s: only
+  // when two neighbouring halves agree is the new floor a floor.
+  struct Run {
+    double since = 0;   // receive time of the first item of the older half
+    double middle = 0;  // ... of the younger half
+    double older = 0;   // least receive - line, s
+    double younger = 0;
+    std::int64_t items = 0;  // of the younger half
+    std::int64_t early = 0;
+
+    void add(double receive, double residual, bool is_early) {
+      if (items == 0) {
+        since = middle = receive;
+        older = younger = residual;
+      }
+      younger = std::min(younger, residual);
+      ++items;
+      early += is_early ? 1 : 0;
+    }
+    void begin_half(double receive) {
+      since = middle;
+      older = younger;
+      middle = receive;
+      younger = std::numeric_limits<double>::infinity();
+      items = 1;
+      early = 0;
+    }
+  };
+
+  ClockEstimate accept(double receive, double sender, double rate, double half_range) {
+    ++counters_.items;
+    if (!std::isfinite(receive) || !std::isfinite(sender)) {
+      return reject(std::isfinite(receive) ? receive : last_time_);
+    }
+    if (!started_) {
+      start(receive, sender, rate, half_range);
+    } else if (is_wild(receive, sender)) {
+      if (++wild_ < kWildToRestart) {
+        return reject(receive - shift_ - (one_sided() ? delay_ : 0.0));
+      }
+      restart();
+      start(receive, sender, rate, half_range);
+    }
+    wild_ = 0;
+
+    const double x = sender - anchor_sender_;
+    const bool newer = x > last_x_;
+    const bool shifted =
+        one_sided() ? learn_one_sided(receive, x, newer) : learn_symmetric(receive, x, newer);
+    last_x_ = std::max(last_x_, x);
+    if (state_ == ClockState::kWarmingUp && receive - first_receive_ >= options_.settle_s &&
+        sigma_at(x) < options_.floor_shift_s) {
+      state_ = ClockState::kLocked;
+      locked_since_ = bound_since_ = receive;
+    }
+
+    ClockEstimate estimate;
+    estimate.time_s = last_time_ = to_host(sender);
+    estimate.sigma_s = sigma_at(x);
+    estimate.state = state_;
+    estimate.restarted = announce_restart_;
+    estimate.floor_shifted = shifted;
+    announce_restart_ = false;
+    return estimate;
+  }
+
+  bool one_sided() const { return options_.jitter == ClockJitter::kOneSided; }
+
+  ClockEstimate reject(double time_s) {
+    ++counters_.rejected;
+    ClockEstimate estimate;
+    estimate.time_s = last_time_ = time_s;
+    estimate.sigma_s = std::max(delay_, options_.expected_jitter_s);
+    estimate.state = state_;
+    estimate.rejected = true;
+    return estimate;
+  }
+
+  void start(double receive, double sender, double rate, double half_range) {
+    started_ = true;
+    anchor_receive_ = first_receive_ = receive;
+    anchor_sender_ = sender;
+    rate_ = rate;
+    half_range_ = half_range;
+    rate_min_ = rate - half_range;
+    rate_max_ = rate + half_range;
+    last_x_ = -1;
+    delay_ = scale_ = options_.expected_jitter_s;
+    line_ = {0, 0, rate, delay_ * delay_, 0, half_range * half_range / 3};
+    slots_ = 0;
+    slot_width_ = options_.window_s / (16.0 * Capacity);
+  }
+
+  bool is_wild(double receive, double sender) const {
+    const double x = sender - anchor_sender_;
+    const double y = receive - anchor_receive_;
+    if (!(std::abs(x) < kMaxSpan && std::abs(y) < kMaxSpan)) {
+      return true;
+    }
+    const double residual = y - shift_ - line_.value_at(x);
+    const double gate = std::max(options_.restart_gap_s, kGate * sigma_at(x));
+    return (last_x_ - x) * line_.slope > options_.restart_gap_s || residual < -gate ||
+           residual > 10 * gate;
   }
 
   double sigma_at(double x) const {
-    return items_ == 0 ? options_.expected_jitter_s : std::sqrt(line_.variance_at(x));
+    const double reach = std::max(0.0, x - last_x_) * line_.slope;
+    const double memory = one_sided() && slots_ > 0 ? (x_[slots_ - 1] - x_[0]) * line_.slope : 0.0;
+    const double wander = options_.skew_wander * options_.skew_wander *
+                          (reach * reach * reach / 3 + memory * memory * memory / 270);
+    const double resolution = options_.stamp_resolution_s * options_.stamp_resolution_s / 12;
+    return std::sqrt(line_.variance_at(x) + wander + resolution + shift_variance_);
   }
 
-  ClockEstimate accept(double receive, double sender, double rate, double half_range) {
-    (void)rate;
-    (void)half_range;
-    ++counters_.items;
-    ++items_;
-    anchor_receive_ = receive;
-    anchor_sender_ = sender;
-    ClockEstimate estimate;
-    estimate.time_s = receive;
-    estimate.sigma_s = options_.expected_jitter_s;
-    return estimate;
+  // ---- one-sided ----
+
+  bool learn_one_sided(double receive, double x, bool newer) {
+    const double y = receive - anchor_receive_ - shift_;
+    const double residual = y - line_.value_at(x);
+    const double gate = std::max(options_.floor_shift_s, kGate * sigma_at(x));
+    const bool locked = state_ == ClockState::kLocked;
+    const bool early = locked && residual < -gate;
+    delay_ += (std::clamp(residual, 0.0, 10 * delay_) - delay_) / 100;
+
+    if (residual < gate) {
+      late_run_ = {};
+    }
+    const bool shifted = judge(early_run_, receive) || judge(late_run_, receive);
+    if (residual >= gate) {
+      late_run_.add(receive, residual, false);
+    }
+    if (early && early_run_.items == 0) {
+      slots_ = settled_slots();  // the youngest may belong to the new floor
+    }
+    if (early || early_run_.items > 0) {
+      early_run_.add(receive, residual, early);
+    }
+    // While a fall of the floor is being judged nothing may pull the line down.
+    if (newer && (shifted || early_run_.items == 0 || residual >= 0)) {
+      insert(receive, x, receive - anchor_receive_ - shift_);
+    }
+    if (locked && receive - bound_since_ >= options_.window_s && late_run_.items == 0 &&
+        early_run_.items == 0) {
+      bound_since_ = receive;
+      bound_rate();
+    }
+    return shifted;
+  }
+
+  // True if the run has lasted and shows a new floor.
+  bool judge(Run& run, double receive) {
+    const double half = options_.settle_s / 2;
+    if (run.items == 0 || receive - run.middle < half) {
+      return false;
+    }
+    const bool falls = &run == &early_run_;
+    if (falls && run.early < 2) {
+      run = {};  // a stray outlier
+      return false;
+    }
+    const double slots = std::min(static_cast<double>(run.items), half / slot_width_);
+    const double spread = scale_ / slots;  // of the least residual of a half
+    const double step = std::min(run.older, run.younger);
+    if (run.middle == run.since || std::abs(run.older - run.younger) > kSameFloor * spread ||
+        (!falls && step < kSameFloor * spread)) {
+      run.begin_half(receive);
+      return false;
+    }
+    const double since = run.since;
+    late_run_ = early_run_ = {};
+    if (state_ != ClockState::kLocked || since < locked_since_) {
+      forget_before(since);
+      return false;
+    }
+    step_floor(since, step - spread / 2, spread / 2);
+    return true;
+  }
+
+  // The true mapping goes on: what changes is the least delay.
+  void step_floor(double since, double step, double sigma) {
+    const double first = since - anchor_receive_ - shift_;
+    for (std::size_t i = 0; i < slots_; ++i) {
+      if (y_[i] >= first) {
+        y_[i] -= step;
+      }
+    }
+    shift_ += step;
+    shift_variance_ += sigma * sigma;
+    ++counters_.floor_shifts;
+  }
+
+  // An early item in the warm-up had dragged the line down: only what came since counts.
+  void forget_before(double receive) {
+    const double first = receive - anchor_receive_ - shift_;
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < slots_; ++i) {
+      if (y_[i] >= first) {
+        x_[kept] = x_[i];
+        y_[kept++] = y_[i];
+      }
+    }
+    slots_ = kept;
+  }
+
+  // Keeps the lowest item of each slot.
+  void insert(double receive, double x, double y) {
+    if (slots_ > 0 && receive - slot_since_ < slot_width_) {
+      const std::size_t last = slots_ - 1;
+      if (y - y_[last] >= line_.slope * (x - x_[last])) {
+        return;
+      }
+      x_[last] = x;
+      y_[last] = y;
+    } else {
+      if (slots_ == Capacity) {
+        make_room();
+      }
+      slot_since_ = receive;
+      x_[slots_] = x;
+      y_[slots_++] = y;
+    }
+    fit(x);
+  }
+
+  // Doubles the slots until they span the window, then drops the oldest.
+  void make_room() {
+    if (slot_width_ * Capacity > 0.999 * options_.window_s) {
+      std::copy(x_.begin() + 1, x_.end(), x_.begin());
+      std::copy(y_.begin() + 1, y_.end(), y_.begin());
+      --slots_;
+      return;
+    }
+    for (std::size_t i = 0; i < Capacity / 2; ++i) {
+      const std::size_t a = 2 * i;
+      const bool first = y_[a] - line_.value_at(x_[a]) <= y_[a + 1] - line_.value_at(x_[a + 1]);
+      x_[i] = x_[first ? a : a + 1];
+      y_[i] = y_[first ? a : a + 1];
+    }
+    slots_ = Capacity / 2;
+    slot_width_ *= 2;
+    scale_ /= 2;
+  }
+
+  // Once locked a slot must have aged before it counts: should the floor fall, the items that betray
+  // it come first.
+  std::size_t settled_slots() const {
+    std::size_t n = slots_;
+    if (state_ == ClockState::kLocked) {
+      const double limit = y_[slots_ - 1] - options_.settle_s / 10;
+      while (n > 1 && y_[n - 1] > limit) {
+        --n;
+      }
+    }
+    return n;
+  }
+
+  void fit(double x) {
+    const std::size_t n = settled_slots();
+    std::array<std::uint16_t, Capacity> hull{};
+    line_ = fit_lower_line(x_.data(), y_.data(), n, scale_, rate_min_, rate_max_, x, hull.data());
+    std::array<double, Capacity> scratch{};
+    scale_ = delay_scale(x_.data(), y_.data(), n, line_, options_.stamp_resolution_s,
+                         options_.expected_jitter_s, scratch.data());
+  }
+
+  // From now on the rate may leave what the last window said only as far as clocks wander.
+  void bound_rate() {
+    const double reach = kGate * std::sqrt(line_.var_slope) + 1e-9 * rate_ +
+                         3 * rate_ * options_.skew_wander * std::sqrt(options_.window_s);
+    rate_min_ = std::max(rate_ - half_range_, line_.slope - reach);
+    rate_max_ = std::min(rate_ + half_range_, line_.slope + reach);
+  }
+
+  // ---- symmetric ----
+
+  bool learn_symmetric(double receive, double x, bool newer) {
+    if (!newer) {
+      return false;
+    }
+    const double y = receive - anchor_receive_;
+    if (symmetric_items_++ == 0) {
+      return false;  // start() has put the line through the first item
+    }
+    // Time update: the skew walks, and the value with it.
+    const double dx = x - line_.x;
+    const double walk =
+        options_.skew_wander * options_.skew_wander * line_.slope * line_.slope * line_.slope * dx;
+    line_.value = line_.value_at(x);
+    line_.var_value = line_.variance_at(x) + walk * dx * dx / 3;
+    line_.cov_value_slope += line_.var_slope * dx + walk * dx / 2;
+    line_.var_slope += walk;
+    line_.x = x;
+    // Measurement update.
+    const double innovation = y - line_.value;
+    double noise = delay_ * delay_;
+    const double sigmas = std::abs(innovation) / std::sqrt(line_.var_value + noise);
+    if (symmetric_items_ > 0) {
+      // Mean of the logarithm: outliers cannot carry it away. E log|N(0,1)| = -0.635.
+      const double log_size = std::log(std::clamp(sigmas, 1e-3, 3.0)) + 0.635;
+      const double n = std::min(static_cast<double>(symmetric_items_), kNoiseMemory);
+      delay_ =
+          std::max(delay_ * std::exp(log_size / (n + kPriorItems)), options_.stamp_resolution_s);
+    }
+    ++symmetric_items_;
+    if (sigmas > kHuber) {
+      noise *= sigmas / kHuber;
+    }
+    const double total = line_.var_value + noise;
+    const double gain_value = line_.var_value / total;
+    const double gain_slope = line_.cov_value_slope / total;
+    line_.value += gain_value * innovation;
+    line_.slope += gain_slope * innovation;
+    line_.var_slope = std::max(0.0, line_.var_slope - gain_slope * line_.cov_value_slope);
+    line_.cov_value_slope *= 1 - gain_value;
+    line_.var_value *= 1 - gain_value;
+    return false;
   }
 
   ClockFilterOptions options_;
   ClockCounters counters_;
   ClockState state_ = ClockState::kWarmingUp;
-  std::int64_t items_ = 0;
+  bool started_ = false;
+  bool announce_restart_ = false;
+  int wild_ = 0;
+  double last_time_ = 0;
+
+  // The line in seconds since the anchors, so that a double resolves far below a microsecond.
   double anchor_receive_ = 0;
   double anchor_sender_ = 0;
-  double shift_ = 0;
+  double first_receive_ = 0;
+  double last_x_ = 0;
   LineEstimate line_;
+  double rate_ = 1;
+  double half_range_ = 0;
+  double delay_ = 0;  // typical delay (one-sided) or noise sigma (symmetric), s
+
+  double shift_ = 0;
+  double shift_variance_ = 0;
+  Run late_run_;
+  Run early_run_;
+
+  // Lowest item of each time slot, oldest first.
+  std::array<double, Capacity> x_{};
+  std::array<double, Capacity> y_{};
+  std::size_t slots_ = 0;
+  double slot_width_ = 0;
+  double slot_since_ = 0;
+  double scale_ = 0;  // of the slots' residuals
+  double rate_min_ = 0;
+  double rate_max_ = 0;
+  double bound_since_ = 0;
+  double locked_since_ = 0;
+  std::int64_t symmetric_items_ = 0;
 };
 
 static_assert(std::is_trivially_copyable_v<ClockFilter<>>,
