@@ -1,0 +1,116 @@
+#include "platform/recording/recording.h"
+
+#include <yaml-cpp/yaml.h>
+
+#include <array>
+
+#include "platform/recording/csv_reader.h"
+
+namespace alidade {
+namespace {
+
+std::optional<std::int64_t> whole(const std::optional<double>& cell) {
+  return cell ? std::optional<std::int64_t>(static_cast<std::int64_t>(*cell)) : std::nullopt;
+}
+
+constexpr std::array<CsvColumn, 6> kFrameColumns = {{{"frame", true, true},
+                                                     {"receive_time_s", true, false},
+                                                     {"sender_time_s", false, false},
+                                                     {"sender_utc_s", false, false},
+                                                     {"sequence", false, true},
+                                                     {"restarted", false, true}}};
+
+constexpr std::array<CsvColumn, 8> kTelemetryColumns = {{{"receive_time_s", true, false},
+                                                         {"pan_rad", true, false},
+                                                         {"tilt_rad", true, false},
+                                                         {"zoom", false, false},
+                                                         {"device_time_s", false, false},
+                                                         {"sequence", false, true},
+                                                         {"earliest_time_s", false, false},
+                                                         {"restarted", false, true}}};
+
+}  // namespace
+
+bool read_recording_info(const std::string& directory, RecordingInfo* info, std::string* error) {
+  const std::string path = directory + "/recording.yaml";
+  const auto flaw = [&](const YAML::Mark& mark, const std::string& what) {
+    *error = path + ":" + std::to_string(mark.line + 1) + ": " + what +
+             "; needed are format: 1, width and height in px";
+    return false;
+  };
+  try {
+    const YAML::Node root = YAML::LoadFile(path);
+    if (!root.IsMap() || !root["format"] || root["format"].as<int>() != 1) {
+      return flaw(root.Mark(), "not a recording of format 1");
+    }
+    RecordingInfo read;
+    for (const auto& [name, value] :
+         {std::pair("width", &read.width), std::pair("height", &read.height)}) {
+      if (!root[name]) {
+        return flaw(root.Mark(), std::string("no ") + name);
+      }
+      *value = root[name].as<int>();
+      if (*value < 1) {
+        return flaw(root[name].Mark(), std::string(name) + " must be positive");
+      }
+    }
+    if (root["notes"] && root["notes"].IsScalar()) {
+      read.notes = root["notes"].Scalar();
+    }
+    *info = read;
+    return true;
+  } catch (const YAML::BadFile&) {
+    *error = path + ": cannot be read; a recording is a directory with this file";
+    return false;
+  } catch (const YAML::Exception& exception) {
+    return flaw(exception.mark, exception.msg);
+  }
+}
+
+bool read_frames_csv(const std::string& directory, std::vector<FrameStamp>* frames,
+                     std::string* error) {
+  frames->clear();
+  return read_csv(
+      directory + "/frames.csv", kFrameColumns,
+      [frames](const CsvCells<6>& cells) -> std::string {
+        if (*cells[0] < 0) {
+          return "a negative frame number";
+        }
+        FrameStamp stamp;
+        stamp.frame = *whole(cells[0]);
+        stamp.receive_time_s = *cells[1];
+        stamp.sender_time_s = cells[2];
+        stamp.sender_utc_s = cells[3];
+        stamp.sequence = whole(cells[4]);
+        stamp.restarted = cells[5].value_or(0) != 0;
+        frames->push_back(stamp);
+        return {};
+      },
+      error);
+}
+
+bool read_telemetry_csv(const std::string& directory, std::vector<PanTiltSample>* samples,
+                        std::string* error) {
+  samples->clear();
+  return read_csv(
+      directory + "/telemetry.csv", kTelemetryColumns,
+      [samples](const CsvCells<8>& cells) -> std::string {
+        PanTiltSample sample;
+        sample.latest_time_s = *cells[0];
+        sample.pan_rad = *cells[1];
+        sample.tilt_rad = *cells[2];
+        sample.zoom = cells[3];
+        sample.device_time_s = cells[4];
+        sample.sequence = whole(cells[5]);
+        sample.earliest_time_s = cells[6].value_or(sample.latest_time_s);
+        sample.restarted = cells[7].value_or(0) != 0;
+        if (sample.earliest_time_s > sample.latest_time_s) {
+          return "earliest_time_s lies after receive_time_s";
+        }
+        samples->push_back(sample);
+        return {};
+      },
+      error);
+}
+
+}  // namespace alidade

@@ -1,0 +1,70 @@
+#include "platform/system/url.h"
+
+#include <curl/curl.h>
+
+#include <memory>
+
+namespace alidade {
+namespace {
+
+using Handle = std::unique_ptr<CURLU, decltype(&curl_url_cleanup)>;
+
+constexpr unsigned kAnyScheme = CURLU_NON_SUPPORT_SCHEME | CURLU_NO_AUTHORITY;
+
+Handle parsed(const std::string& text) {
+  Handle handle(curl_url(), curl_url_cleanup);
+  if (handle && curl_url_set(handle.get(), CURLUPART_URL, text.c_str(), kAnyScheme) != CURLUE_OK) {
+    handle.reset();
+  }
+  return handle;
+}
+
+std::string part(const Handle& handle, CURLUPart which, unsigned flags = 0) {
+  char* text = nullptr;
+  if (curl_url_get(handle.get(), which, &text, flags) != CURLUE_OK) {
+    return {};
+  }
+  const std::unique_ptr<char, decltype(&curl_free)> owner(text, curl_free);
+  return text;
+}
+
+}  // namespace
+
+bool parse_url(const std::string& text, Url* url, std::string* error) {
+  const Handle handle = parsed(text);
+  if (!handle) {
+    const std::size_t scheme_end = text.find("://");
+    url->bare = scheme_end == std::string::npos ? text : text.substr(0, scheme_end) + "://...";
+    *error =
+        "not a URL; it must look like scheme://host[:port]/path, special characters of a user or "
+        "password written as %XX";
+    return false;
+  }
+  url->scheme = part(handle, CURLUPART_SCHEME);
+  url->host = part(handle, CURLUPART_HOST);
+  url->port = part(handle, CURLUPART_PORT);
+  url->path = part(handle, CURLUPART_PATH);
+  const std::string query = part(handle, CURLUPART_QUERY);
+  if (!query.empty()) {
+    url->path += "?" + query;
+  }
+  url->user = part(handle, CURLUPART_USER, CURLU_URLDECODE);
+  url->password = part(handle, CURLUPART_PASSWORD, CURLU_URLDECODE);
+  curl_url_set(handle.get(), CURLUPART_USER, nullptr, 0);
+  curl_url_set(handle.get(), CURLUPART_PASSWORD, nullptr, 0);
+  url->bare = part(handle, CURLUPART_URL, kAnyScheme);
+  return true;
+}
+
+std::string with_credentials(const std::string& bare, const std::string& user,
+                             const std::string& password) {
+  const Handle handle = parsed(bare);
+  if (!handle || (user.empty() && password.empty())) {
+    return bare;
+  }
+  curl_url_set(handle.get(), CURLUPART_USER, user.c_str(), CURLU_URLENCODE);
+  curl_url_set(handle.get(), CURLUPART_PASSWORD, password.c_str(), CURLU_URLENCODE);
+  return part(handle, CURLUPART_URL, kAnyScheme);
+}
+
+}  // namespace alidade

@@ -1,0 +1,25 @@
+#pragma once
+// Splits a URL (with libcurl) so that the password can be kept apart from what is shown and logged.
+
+#include <string>
+
+namespace alidade {
+
+struct Url {
+  std::string scheme;
+  std::string host;      // may be empty: rtp://@:5004
+  std::string port;      // empty if not given
+  std::string path;      // with its leading '/', and the query
+  std::string user;      // decoded
+  std::string password;  // decoded
+  std::string bare;      // the URL without user and password
+};
+
+// False: text is no URL; *error says so, and url->bare is what of it can be shown.
+[[nodiscard]] bool parse_url(const std::string& text, Url* url, std::string* error);
+
+// bare with percent-encoded user and password put in; bare itself if both are empty.
+[[nodiscard]] std::string with_credentials(const std::string& bare, const std::string& user,
+                                           const std::string& password);
+
+}  // namespace alidade

@@ -1,0 +1,52 @@
+#pragma once
+// LumaDecoder: compressed pictures in, 8-bit luma planes out, by libavcodec.
+//
+// The luma plane is the decoder's own plane 0 (grey, any 8-bit YUV 4xx, NV12), neither copied nor
+// converted; the picture's owner keeps it alive. Other pixel formats are refused.
+// Runs on the caller's thread only: frame threads would add frames of delay. One thread at a time.
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "platform/video/av_handles.h"
+
+namespace alidade {
+
+struct Picture {
+  int width = 0;   // px
+  int height = 0;  // px
+  const std::uint8_t* luma = nullptr;
+  std::ptrdiff_t stride = 0;          // bytes
+  std::int64_t pts = AV_NOPTS_VALUE;  // of the packet it came from
+  std::shared_ptr<const void> owner;
+};
+
+class LumaDecoder {
+ public:
+  enum class Result {
+    kPicture,
+    kNone,        // nothing more until the next packet
+    kDamaged,     // a picture that is incomplete; others may follow
+    kUnsupported  // no 8-bit luma plane: see error()
+  };
+
+  // low_delay: never hold a picture back to put it in order.
+  [[nodiscard]] bool open(const AVCodecParameters& parameters, bool low_delay);
+
+  // One whole picture, or null for "no more will come". False: the data cannot be decoded.
+  [[nodiscard]] bool send(const AVPacket* packet);
+
+  // The next picture that is ready; call until kNone.
+  [[nodiscard]] Result receive(Picture* picture);
+
+  // One line; valid after open() failed and after kUnsupported.
+  [[nodiscard]] const std::string& error() const { return error_; }
+
+ private:
+  CodecContextPtr context_;
+  std::string error_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,292 @@
+#include "platform/video/recording_frame_source.h"
+
+#include <algorithm>
+#include <array>
+#include <cstdio>
+#include <filesystem>
+#include <fstream>
+#include <iterator>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "platform/recording/playback.h"
+#include "platform/recording/recording.h"
+#include "platform/video/luma_decoder.h"
+
+namespace alidade {
+namespace {
+
+struct ImageType {
+  const char* extension;
+  AVCodecID codec;
+};
+
+constexpr std::array<ImageType, 3> kImageTypes = {
+    {{".png", AV_CODEC_ID_PNG}, {".jpg", AV_CODEC_ID_MJPEG}, {".pgm", AV_CODEC_ID_PGM}}};
+
+}  // namespace
+
+class RecordingFrameSource::Implementation {
+ public:
+  explicit Implementation(const RecordingFrameSourceOptions& options)
+      : options_(options), playback_(options.directory, options.realtime) {
+    silence_av_log();
+  }
+
+  ~Implementation() { avformat_close_input(&video_); }
+
+  ReadStatus read(Frame& frame, double timeout_s);
+  void stop() { playback_.stop(); }
+  const std::string& error() const { return error_; }
+  const std::string& name() const { return options_.directory; }
+  std::int64_t damaged_frames() const { return damaged_; }
+  std::int64_t missing_frames() const {
+    return static_cast<std::int64_t>(stamps_.size()) - static_cast<std::int64_t>(row_);
+  }
+
+ private:
+  using NextFrame = ReadStatus (Implementation::*)(Frame* frame);
+
+  ReadStatus load();
+  ReadStatus open_video(const std::string& path);
+  ReadStatus next_stamp(Frame* frame);
+  ReadStatus next_in_video(Frame* frame);
+  ReadStatus next_image(Frame* frame);
+  bool feed_decoder();
+  ReadStatus finish(const Picture& picture, const FrameStamp& stamp, Frame* frame);
+  ReadStatus fail(const std::string& error) {
+    error_ = error;
+    return ReadStatus::kFailed;
+  }
+
+  RecordingFrameSourceOptions options_;
+  Playback playback_;
+  ReadStatus status_ = ReadStatus::kOk;  // how it ended, once it has
+  std::string error_;
+  bool loaded_ = false;
+  RecordingInfo info_;
+  std::vector<FrameStamp> stamps_;
+  NextFrame next_frame_ = &Implementation::next_stamp;
+  std::size_t row_ = 0;         // the first row of stamps_ that is neither delivered nor skipped
+  std::optional<Frame> ready_;  // decoded, waiting until it is due
+  std::int64_t damaged_ = 0;
+  LumaDecoder decoder_;
+
+  // video.mkv
+  AVFormatContext* video_ = nullptr;
+  int stream_ = 0;
+  bool drained_ = false;
+  std::int64_t packets_ = 0;
+  std::set<std::int64_t> in_decoder_;  // timestamps of packets whose picture has not come
+
+  // frames/
+  AVCodecID image_codec_ = AV_CODEC_ID_NONE;
+};
+
+ReadStatus RecordingFrameSource::Implementation::load() {
+  const std::string& directory = options_.directory;
+  if (!read_recording_info(directory, &info_, &error_) ||
+      !read_frames_csv(directory, &stamps_, &error_)) {
+    return ReadStatus::kFailed;
+  }
+  if (!options_.decode) {
+    return ReadStatus::kOk;
+  }
+  std::error_code ignored;
+  if (std::filesystem::exists(directory + "/video.mkv", ignored)) {
+    next_frame_ = &Implementation::next_in_video;
+    return open_video(directory + "/video.mkv");
+  }
+  if (std::filesystem::is_directory(directory + "/frames", ignored)) {
+    next_frame_ = &Implementation::next_image;
+    return ReadStatus::kOk;
+  }
+  if (std::filesystem::exists(directory + "/tracks.csv", ignored)) {
+    return ReadStatus::kOk;
+  }
+  return fail(directory + ": no pictures; a recording holds video.mkv, frames/ or tracks.csv");
+}
+
+ReadStatus RecordingFrameSource::Implementation::open_video(const std::string& path) {
+  int code = avformat_open_input(&video_, path.c_str(), nullptr, nullptr);
+  if (code < 0) {
+    return fail(path + ": " + av_error_text(code));
+  }
+  stream_ = av_find_best_stream(video_, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
+  if (stream_ < 0) {
+    return fail(path + ": there is no video in it");
+  }
+  if (!decoder_.open(*video_->streams[stream_]->codecpar, false)) {
+    return fail(path + ": " + decoder_.error());
+  }
+  return ReadStatus::kOk;
+}
+
+ReadStatus RecordingFrameSource::Implementation::next_stamp(Frame* frame) {
+  if (row_ == stamps_.size()) {
+    return ReadStatus::kEnd;
+  }
+  *frame = Frame{};
+  frame->stamp = stamps_[row_++];
+  frame->width = info_.width;
+  frame->height = info_.height;
+  return ReadStatus::kOk;
+}
+
+// Gives the decoder one more packet, at the end of the file once nothing; false: it had that already.
+bool RecordingFrameSource::Implementation::feed_decoder() {
+  if (drained_) {
+    return false;
+  }
+  const PacketPtr packet(av_packet_alloc());
+  int code = 0;
+  do {
+    av_packet_unref(packet.get());
+    code = av_read_frame(video_, packet.get());
+  } while (code >= 0 && packet->stream_index != stream_);
+  if (code < 0) {  // the end, or where a kill cut the file off
+    drained_ = true;
+    (void)decoder_.send(nullptr);
+    return true;
+  }
+  if (packet->pts == AV_NOPTS_VALUE) {
+    packet->pts = packets_;
+  }
+  ++packets_;
+  in_decoder_.insert(packet->pts);
+  (void)decoder_.send(packet.get());  // an undecodable one is noticed when the next picture comes
+  return true;
+}
+
+// A decoder gives pictures in the order of their timestamps, so a picture's place is the number of
+// packets with an earlier one, also after some that gave no picture.
+ReadStatus RecordingFrameSource::Implementation::next_in_video(Frame* frame) {
+  for (;;) {
+    Picture picture;
+    const LumaDecoder::Result result = decoder_.receive(&picture);
+    if (result == LumaDecoder::Result::kUnsupported) {
+      return fail(options_.directory + "/video.mkv: " + decoder_.error());
+    }
+    if (result == LumaDecoder::Result::kNone && !feed_decoder()) {
+      damaged_ += static_cast<std::int64_t>(in_decoder_.size());
+      row_ = std::min(row_ + in_decoder_.size(), stamps_.size());
+      return ReadStatus::kEnd;
+    }
+    if (result == LumaDecoder::Result::kPicture) {
+      const auto end = in_decoder_.upper_bound(picture.pts);
+      const auto places = static_cast<std::size_t>(std::distance(in_decoder_.begin(), end));
+      in_decoder_.erase(in_decoder_.begin(), end);
+      row_ += places;
+      damaged_ += static_cast<std::int64_t>(places) - 1;
+      if (row_ > stamps_.size()) {
+        row_ = stamps_.size();
+        return ReadStatus::kEnd;
+      }
+      return finish(picture, stamps_[row_ - 1], frame);
+    }
+  }
+}
+
+ReadStatus RecordingFrameSource::Implementation::next_image(Frame* frame) {
+  while (row_ < stamps_.size()) {
+    const FrameStamp& stamp = stamps_[row_++];
+    char number[24];
+    std::snprintf(number, sizeof number, "%06lld", static_cast<long long>(stamp.frame));
+    const std::string path = options_.directory + "/frames/" + number;
+    std::ifstream file;
+    const auto type = std::find_if(kImageTypes.begin(), kImageTypes.end(), [&](const auto& t) {
+      file.open(path + t.extension, std::ios::binary);
+      return file.is_open();
+    });
+    if (type == kImageTypes.end()) {
+      return fail(path + ": no such picture with .png, .jpg or .pgm, but a row in frames.csv");
+    }
+    if (type->codec != image_codec_) {
+      const std::shared_ptr<AVCodecParameters> parameters(avcodec_parameters_alloc(), AvDeleter());
+      parameters->codec_type = AVMEDIA_TYPE_VIDEO;
+      parameters->codec_id = type->codec;
+      if (!decoder_.open(*parameters, true)) {
+        return fail(path + type->extension + ": " + decoder_.error());
+      }
+      image_codec_ = type->codec;
+    }
+    const std::vector<char> bytes{std::istreambuf_iterator<char>(file), {}};
+    const PacketPtr packet(av_packet_alloc());
+    Picture picture;
+    LumaDecoder::Result result = LumaDecoder::Result::kNone;
+    if (av_new_packet(packet.get(), static_cast<int>(bytes.size())) == 0) {
+      std::copy(bytes.begin(), bytes.end(), packet->data);
+      if (!bytes.empty() && decoder_.send(packet.get())) {
+        result = decoder_.receive(&picture);
+      }
+    }
+    if (result == LumaDecoder::Result::kUnsupported) {
+      return fail(path + type->extension + ": " + decoder_.error());
+    }
+    if (result == LumaDecoder::Result::kPicture) {
+      return finish(picture, stamp, frame);
+    }
+    ++damaged_;
+  }
+  return ReadStatus::kEnd;
+}
+
+ReadStatus RecordingFrameSource::Implementation::finish(const Picture& picture,
+                                                        const FrameStamp& stamp, Frame* frame) {
+  if (picture.width != info_.width || picture.height != info_.height) {
+    return fail(options_.directory + "/recording.yaml: the size is given as " +
+                std::to_string(info_.width) + "x" + std::to_string(info_.height) + ", frame " +
+                std::to_string(stamp.frame) + " has " + std::to_string(picture.width) + "x" +
+                std::to_string(picture.height));
+  }
+  *frame = Frame{};
+  frame->stamp = stamp;
+  frame->width = picture.width;
+  frame->height = picture.height;
+  frame->luma = picture.luma;
+  frame->stride = picture.stride;
+  frame->owner = picture.owner;
+  return ReadStatus::kOk;
+}
+
+ReadStatus RecordingFrameSource::Implementation::read(Frame& frame, double timeout_s) {
+  if (playback_.stopped()) {
+    return ReadStatus::kStopped;
+  }
+  if (!loaded_) {
+    loaded_ = true;
+    status_ = load();
+  }
+  if (status_ == ReadStatus::kOk && !ready_) {
+    ready_.emplace();
+    status_ = (this->*next_frame_)(&*ready_);
+  }
+  if (status_ != ReadStatus::kOk) {
+    return status_;
+  }
+  const ReadStatus due = playback_.wait_until_due(ready_->stamp.receive_time_s, timeout_s);
+  if (due == ReadStatus::kOk) {
+    frame = std::move(*ready_);
+    ready_.reset();
+  }
+  return due;
+}
+
+RecordingFrameSource::RecordingFrameSource(const RecordingFrameSourceOptions& options)
+    : implementation_(std::make_unique<Implementation>(options)) {}
+RecordingFrameSource::~RecordingFrameSource() = default;
+ReadStatus RecordingFrameSource::read(Frame& frame, double timeout_s) {
+  return implementation_->read(frame, timeout_s);
+}
+void RecordingFrameSource::stop() { implementation_->stop(); }
+std::string RecordingFrameSource::error() const { return implementation_->error(); }
+std::string RecordingFrameSource::name() const { return implementation_->name(); }
+std::int64_t RecordingFrameSource::damaged_frames() const {
+  return implementation_->damaged_frames();
+}
+std::int64_t RecordingFrameSource::missing_frames() const {
+  return implementation_->missing_frames();
+}
+
+}  // namespace alidade

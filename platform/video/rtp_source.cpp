@@ -1,0 +1,324 @@
+#include "platform/video/rtp_source.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <deque>
+#include <mutex>
+#include <thread>
+#include <utility>
+
+#include "platform/system/backoff.h"
+#include "platform/system/url.h"
+#include "platform/video/luma_decoder.h"
+#include "platform/video/rtp_connection.h"
+#include "platform/video/stream_copy.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t kQueueCapacity = 32;    // pictures: a second of video
+constexpr std::size_t kDecoderCapacity = 16;  // pictures: the most that H.264 may hold back
+
+}  // namespace
+
+class RtpSource::Implementation {
+ public:
+  explicit Implementation(const RtpSourceOptions& options) : options_(options) {
+    silence_av_log();
+    // The form "any interface" that libcurl takes for no URL.
+    if (options_.url.rfind("rtp://@:", 0) == 0) {
+      options_.url.replace(0, 8, "rtp://0.0.0.0:");
+    }
+    check();
+  }
+
+  ~Implementation() {
+    stop();
+    if (thread_.joinable()) {
+      thread_.join();
+    }
+  }
+
+  ReadStatus read(Frame& frame, double timeout_s);
+
+  void stop() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stopped_ = true;
+    }
+    changed_.notify_all();
+  }
+
+  const std::string& error() const { return error_; }
+  const std::string& name() const { return options_.url; }
+  RtpSourceCounters counters() const { return {damaged_, dropped_}; }
+
+ private:
+  // What the receiving thread hands to read(): a picture, or why there is none.
+  struct Event {
+    ReadStatus status = ReadStatus::kOk;
+    std::string error;
+    AccessUnit unit;
+    std::shared_ptr<const AVCodecParameters> parameters;  // of the unit's connection
+  };
+
+  void check();
+  void receive();
+  ReadStatus receive_connection(std::string* error);
+  void push(Event event);
+  ReadStatus fail(std::string error) {
+    error_ = options_.url + ": " + std::move(error);
+    failed_ = true;
+    return ReadStatus::kFailed;
+  }
+  ReadStatus deliver(Event event, Frame& frame);
+  ReadStatus decode(AccessUnit* unit, Picture* picture);
+
+  RtpSourceOptions options_;
+
+  // Shared by the receiving thread and read().
+  mutable std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Event> queue_;           // guarded by mutex_
+  std::atomic<bool> stopped_{false};  // set under mutex_, read anywhere
+  std::atomic<std::int64_t> damaged_{0};
+  std::atomic<std::int64_t> dropped_{0};
+
+  // The receiving thread's own.
+  Backoff backoff_{options_.max_backoff_s};
+  bool wait_for_key_ = true;
+
+  // read()'s own.
+  std::thread thread_;
+  std::string error_;
+  bool failed_ = false;
+  bool restarted_ = true;
+  std::int64_t next_frame_ = 0;
+  std::shared_ptr<const AVCodecParameters> parameters_;
+  LumaDecoder decoder_;
+  std::deque<AccessUnit> in_decoder_;
+  bool size_known_ = false;  // of this connection's pictures
+  int width_ = 0;
+  int height_ = 0;
+  StreamCopy copy_;
+};
+
+// What the options cannot mean, before any connection; leaves the URL without credentials.
+void RtpSource::Implementation::check() {
+  if (options_.url.find("://") == std::string::npos) {
+    return;  // an SDP file: libavformat says whether it can be used
+  }
+  Url url;
+  std::string error;
+  const bool is_url = parse_url(options_.url, &url, &error);
+  options_.url = url.bare;
+  if (!is_url) {
+    (void)fail(error);
+    return;
+  }
+  if (options_.user.empty() && options_.password.empty()) {
+    options_.user = url.user;
+    options_.password = url.password;
+  }
+  if (url.scheme == "rtp") {
+    if (url.port.empty()) {
+      (void)fail("no port; write rtp://@:PORT or rtp://GROUP:PORT");
+    } else if (options_.format != "MJPG" && options_.format != "H264") {
+      (void)fail("unknown format '" + options_.format + "'; plain RTP needs MJPG or H264");
+    }
+  } else if (url.scheme != "rtsp") {
+    (void)fail("not a video stream; the URL must be rtsp://, rtp:// or an .sdp file");
+  }
+}
+
+void RtpSource::Implementation::push(Event event) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (queue_.size() >= kQueueCapacity) {
+      const auto is_picture = [](const Event& e) { return e.status == ReadStatus::kOk; };
+      const std::size_t before = queue_.size();
+      queue_.erase(std::remove_if(queue_.begin(), queue_.end(), is_picture), queue_.end());
+      dropped_ += static_cast<std::int64_t>(before - queue_.size());
+      wait_for_key_ = true;
+    }
+    if (event.status != ReadStatus::kOk && !queue_.empty() &&
+        queue_.back().status == event.status) {
+      queue_.pop_back();  // nobody reads: the last report is enough
+    }
+    queue_.push_back(std::move(event));
+  }
+  changed_.notify_all();
+}
+
+// The receiving thread: connects again and again.
+void RtpSource::Implementation::receive() {
+  while (!stopped_) {
+    Event event;
+    event.status = receive_connection(&event.error);
+    if (stopped_) {
+      return;
+    }
+    const bool failed = event.status == ReadStatus::kFailed;
+    push(std::move(event));
+    if (failed) {
+      return;
+    }
+    std::unique_lock<std::mutex> lock(mutex_);
+    changed_.wait_for(lock, std::chrono::duration<double>(backoff_.next_s()),
+                      [this] { return stopped_.load(); });
+  }
+}
+
+// One connection from its beginning to its end.
+ReadStatus RtpSource::Implementation::receive_connection(std::string* error) {
+  RtpConnection connection(options_, stopped_);
+  ReadStatus status = connection.open(error);
+  wait_for_key_ = true;
+  std::int64_t damaged = 0;
+  while (status == ReadStatus::kOk) {
+    Event event;
+    status = connection.read(&event.unit, error);
+    damaged_ += connection.damaged() - damaged;
+    damaged = connection.damaged();
+    if (status != ReadStatus::kOk || (wait_for_key_ && !event.unit.key)) {
+      continue;
+    }
+    wait_for_key_ = false;
+    backoff_.reset();
+    event.parameters = connection.parameters();
+    push(std::move(event));
+  }
+  return status;
+}
+
+ReadStatus RtpSource::Implementation::read(Frame& frame, double timeout_s) {
+  const auto deadline =
+      std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                             std::chrono::duration<double>(timeout_s));
+  if (failed_) {
+    return stopped_ ? ReadStatus::kStopped : ReadStatus::kFailed;
+  }
+  if (!thread_.joinable()) {
+    thread_ = std::thread([this] { receive(); });
+  }
+  for (;;) {
+    Event event;
+    {
+      std::unique_lock<std::mutex> lock(mutex_);
+      changed_.wait_until(lock, deadline, [this] { return stopped_ || !queue_.empty(); });
+      if (stopped_) {
+        return ReadStatus::kStopped;
+      }
+      if (queue_.empty()) {
+        return ReadStatus::kTimeout;
+      }
+      event = std::move(queue_.front());
+      queue_.pop_front();
+    }
+    if (event.status == ReadStatus::kFailed) {
+      return fail(std::move(event.error));
+    }
+    if (event.status != ReadStatus::kOk) {
+      error_ = options_.url + ": " + event.error;
+      restarted_ = true;
+      return event.status;
+    }
+    const ReadStatus status = deliver(std::move(event), frame);
+    if (status != ReadStatus::kTimeout) {
+      return status;
+    }
+  }
+}
+
+// Turns a picture's data into the frame; kTimeout if that cannot be done with this one.
+ReadStatus RtpSource::Implementation::deliver(Event event, Frame& frame) {
+  AccessUnit unit = std::move(event.unit);
+  if (event.parameters != parameters_) {
+    parameters_ = std::move(event.parameters);
+    in_decoder_.clear();
+    size_known_ = false;
+    if (!decoder_.open(*parameters_, true)) {
+      return fail(decoder_.error());
+    }
+  }
+  Picture picture;
+  if (options_.decode || !size_known_) {
+    const ReadStatus status = decode(&unit, &picture);
+    if (status != ReadStatus::kOk) {
+      return status;
+    }
+    size_known_ = true;
+    width_ = picture.width;
+    height_ = picture.height;
+  }
+  if (!options_.copy_to.empty()) {
+    if (next_frame_ == 0 && !unit.key) {
+      ++damaged_;  // the key frame was; a file that begins without one cannot be decoded
+      return ReadStatus::kTimeout;
+    }
+    std::string error;
+    if (!copy_.add(options_.copy_to, *parameters_, width_, height_, *unit.packet,
+                   unit.receive_time_s, &error)) {
+      return fail(std::move(error));
+    }
+  }
+  frame = Frame{};
+  frame.stamp.frame = next_frame_++;
+  frame.stamp.receive_time_s = unit.receive_time_s;
+  frame.stamp.sender_time_s = unit.sender_time_s;
+  frame.stamp.sender_utc_s = unit.sender_utc_s;
+  frame.stamp.restarted = std::exchange(restarted_, false);
+  frame.width = width_;
+  frame.height = height_;
+  if (options_.decode) {
+    frame.luma = picture.luma;
+    frame.stride = picture.stride;
+    frame.owner = std::move(picture.owner);
+  }
+  return ReadStatus::kOk;
+}
+
+// A decoder may hold a picture back: *unit becomes the one that belongs to the picture that came out.
+// kTimeout if none came.
+ReadStatus RtpSource::Implementation::decode(AccessUnit* unit, Picture* picture) {
+  if (!decoder_.send(unit->packet.get())) {
+    ++damaged_;
+    return ReadStatus::kTimeout;
+  }
+  in_decoder_.push_back(std::move(*unit));
+  LumaDecoder::Result result = LumaDecoder::Result::kDamaged;
+  while (result == LumaDecoder::Result::kDamaged) {
+    result = decoder_.receive(picture);
+  }
+  if (result == LumaDecoder::Result::kUnsupported) {
+    return fail(decoder_.error());
+  }
+  // What lies before the picture's own packet gave no picture.
+  const bool came = result == LumaDecoder::Result::kPicture;
+  while (!in_decoder_.empty() && (came ? in_decoder_.front().packet->pts != picture->pts
+                                       : in_decoder_.size() > kDecoderCapacity)) {
+    in_decoder_.pop_front();
+    ++damaged_;
+  }
+  if (!came || in_decoder_.empty()) {
+    return ReadStatus::kTimeout;
+  }
+  *unit = std::move(in_decoder_.front());
+  in_decoder_.pop_front();
+  return ReadStatus::kOk;
+}
+
+RtpSource::RtpSource(const RtpSourceOptions& options)
+    : implementation_(std::make_unique<Implementation>(options)) {}
+RtpSource::~RtpSource() = default;
+ReadStatus RtpSource::read(Frame& frame, double timeout_s) {
+  return implementation_->read(frame, timeout_s);
+}
+void RtpSource::stop() { implementation_->stop(); }
+std::string RtpSource::error() const { return implementation_->error(); }
+std::string RtpSource::name() const { return implementation_->name(); }
+RtpSourceCounters RtpSource::counters() const { return implementation_->counters(); }
+
+}  // namespace alidade

@@ -1,0 +1,147 @@
+#include "platform/video/stream_copy.h"
+
+extern "C" {
+#include <libavcodec/bsf.h>
+}
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+
+namespace alidade {
+namespace {
+
+// Matroska wants H.264's parameter sets in its header; where the sender's description lacks them, the
+// first key frame holds them.
+int fill_extradata(const AVPacket& key_frame, AVCodecParameters* parameters) {
+  AVBSFContext* filter = nullptr;
+  int code = av_bsf_alloc(av_bsf_get_by_name("extract_extradata"), &filter);
+  if (code < 0) {
+    return code;
+  }
+  const PacketPtr packet(av_packet_clone(&key_frame));
+  code = avcodec_parameters_copy(filter->par_in, parameters);
+  if (code >= 0) {
+    code = av_bsf_init(filter);
+  }
+  if (code >= 0) {
+    code = av_bsf_send_packet(filter, packet.get());
+  }
+  if (code >= 0) {
+    code = av_bsf_receive_packet(filter, packet.get());
+  }
+  av_bsf_free(&filter);
+  if (code < 0) {
+    return code;
+  }
+  std::size_t size = 0;
+  const std::uint8_t* data =
+      av_packet_get_side_data(packet.get(), AV_PKT_DATA_NEW_EXTRADATA, &size);
+  if (data == nullptr) {
+    return AVERROR_INVALIDDATA;
+  }
+  parameters->extradata =
+      static_cast<std::uint8_t*>(av_mallocz(size + AV_INPUT_BUFFER_PADDING_SIZE));
+  if (parameters->extradata == nullptr) {
+    return AVERROR(ENOMEM);
+  }
+  std::memcpy(parameters->extradata, data, size);
+  parameters->extradata_size = static_cast<int>(size);
+  return 0;
+}
+
+bool same_extradata(const AVCodecParameters& a, const AVCodecParameters& b) {
+  return a.extradata_size == 0 || b.extradata_size == 0 ||
+         (a.extradata_size == b.extradata_size &&
+          std::memcmp(a.extradata, b.extradata, static_cast<std::size_t>(a.extradata_size)) == 0);
+}
+
+}  // namespace
+
+StreamCopy::~StreamCopy() {
+  if (format_ != nullptr) {
+    if (header_written_) {
+      av_write_trailer(format_);
+    }
+    avio_closep(&format_->pb);
+    avformat_free_context(format_);
+  }
+}
+
+int StreamCopy::create(const std::string& path, const AVCodecParameters& parameters, int width,
+                       int height, const AVPacket& first) {
+  parameters_.reset(avcodec_parameters_alloc());
+  int code = avcodec_parameters_copy(parameters_.get(), &parameters);
+  if (code < 0) {
+    return code;
+  }
+  parameters_->width = width;
+  parameters_->height = height;
+  parameters_->codec_tag = 0;
+  if (parameters_->codec_id == AV_CODEC_ID_H264 && parameters_->extradata_size == 0) {
+    code = fill_extradata(first, parameters_.get());
+    if (code < 0) {
+      return code;
+    }
+  }
+  code = avformat_alloc_output_context2(&format_, nullptr, "matroska", path.c_str());
+  if (code < 0) {
+    return code;
+  }
+  AVStream* stream = avformat_new_stream(format_, nullptr);
+  code = stream == nullptr ? AVERROR(ENOMEM)
+                           : avcodec_parameters_copy(stream->codecpar, parameters_.get());
+  if (code >= 0) {
+    code = avio_open(&format_->pb, path.c_str(), AVIO_FLAG_WRITE);
+  }
+  if (code >= 0) {
+    format_->flags |= AVFMT_FLAG_FLUSH_PACKETS;
+    AVDictionary* dictionary = nullptr;
+    av_dict_set(&dictionary, "cluster_time_limit", "1000", 0);  // ms
+    code = avformat_write_header(format_, &dictionary);
+    av_dict_free(&dictionary);
+    header_written_ = code >= 0;
+  }
+  return code;
+}
+
+bool StreamCopy::add(const std::string& path, const AVCodecParameters& parameters, int width,
+                     int height, const AVPacket& picture, double receive_time_s,
+                     std::string* error) {
+  int code = 0;
+  if (format_ == nullptr) {
+    code = create(path, parameters, width, height, picture);
+    first_receive_time_s_ = receive_time_s;
+  } else if (parameters.codec_id != parameters_->codec_id || width != parameters_->width ||
+             height != parameters_->height || !same_extradata(parameters, *parameters_)) {
+    *error = path + " began as " + avcodec_get_name(parameters_->codec_id) + " of " +
+             std::to_string(parameters_->width) + "x" + std::to_string(parameters_->height) +
+             ", the stream is now another one (" + avcodec_get_name(parameters.codec_id) + " " +
+             std::to_string(width) + "x" + std::to_string(height) + "): start a new recording";
+    return false;
+  }
+  if (code >= 0) {
+    const AVStream& stream = *format_->streams[0];
+    const PacketPtr packet(av_packet_clone(&picture));
+    const double since_first_s = receive_time_s - first_receive_time_s_;
+    const auto pts =
+        static_cast<std::int64_t>(std::llround(since_first_s / av_q2d(stream.time_base)));
+    last_pts_ = std::max(last_pts_ + 1, pts);  // each picture needs its own
+    packet->pts = last_pts_;
+    packet->dts = last_pts_;
+    packet->duration = 0;
+    packet->pos = -1;
+    packet->stream_index = 0;
+    code = av_write_frame(format_, packet.get());
+  }
+  if (code >= 0) {
+    code = format_->pb->error;  // flushing the buffer reports here only
+  }
+  if (code < 0) {
+    *error = "cannot write " + path + ": " + av_error_text(code);
+    return false;
+  }
+  return true;
+}
+
+}  // namespace alidade

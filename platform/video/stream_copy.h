@@ -1,0 +1,38 @@
+#pragma once
+// StreamCopy: stores compressed pictures in a Matroska file as they are. Part of RtpSource.
+//
+// The file's timestamps are arrival times, milliseconds since the first picture: they go on over a
+// reconnection, whatever the sender's clock does (frames.csv holds the exact stamps).
+// Clusters are closed and flushed after a second at most: a kill loses no more.
+
+#include <string>
+
+#include "platform/video/av_handles.h"
+
+namespace alidade {
+
+class StreamCopy {
+ public:
+  StreamCopy() = default;
+  ~StreamCopy();
+  StreamCopy(const StreamCopy&) = delete;
+  StreamCopy& operator=(const StreamCopy&) = delete;
+
+  // Adds a picture, the first time making the file. A connection whose codec or picture size differs
+  // from the first one's cannot be continued. False: *error is one line.
+  [[nodiscard]] bool add(const std::string& path, const AVCodecParameters& parameters, int width,
+                         int height, const AVPacket& picture, double receive_time_s,
+                         std::string* error);
+
+ private:
+  [[nodiscard]] int create(const std::string& path, const AVCodecParameters& parameters, int width,
+                           int height, const AVPacket& first);
+
+  AVFormatContext* format_ = nullptr;
+  bool header_written_ = false;
+  CodecParametersPtr parameters_;  // of the connection that began the file
+  double first_receive_time_s_ = 0;
+  std::int64_t last_pts_ = -1;
+};
+
+}  // namespace alidade
