@@ -74,6 +74,26 @@ struct ClockFilterOptions {
   }
 };
 
+// What is known of the rate before the first item: uniform in rate +- half_range.
+struct ClockRatePrior {
+  double rate;
+  double half_range;
+};
+
+inline ClockRatePrior sender_rate_prior(const ClockFilterOptions& options) {
+  return {1.0, options.max_skew};
+}
+
+inline ClockRatePrior sequence_rate_prior(const ClockFilterOptions& options) {
+  constexpr double kLongestPeriod = 10;  // s
+  const double period = options.nominal_period_s;
+  if (!(period > 0)) {
+    return {kLongestPeriod / 2, kLongestPeriod / 2};
+  }
+  return {period, options.nominal_period_sigma_s > 0 ? 4 * options.nominal_period_sigma_s
+                                                     : options.max_skew * period};
+}
+
 enum class ClockState {
   kWarmingUp,  // usable, sigma_s says how well; the line may still move by more than floor_shift_s
   kLocked      // settle_s of data seen
@@ -104,19 +124,12 @@ class ClockFilter {
 
   // The next item of a stream with a sender clock.
   ClockEstimate update(double receive_time_s, double sender_time_s) {
-    return accept(receive_time_s, sender_time_s, 1.0, options_.max_skew);
+    return accept(receive_time_s, sender_time_s, sender_rate_prior(options_));
   }
 
-  // The next item of a counted stream.
+  // The next item of a counted stream; |sequence| < 2^53.
   ClockEstimate update_sequence(double receive_time_s, std::int64_t sequence) {
-    double period = options_.nominal_period_s;
-    double half_range = options_.nominal_period_sigma_s > 0 ? 4 * options_.nominal_period_sigma_s
-                                                            : options_.max_skew * period;
-    if (!(period > 0)) {
-      period = 0.5 * kMaxPeriod;
-      half_range = 0.5 * kMaxPeriod;
-    }
-    return accept(receive_time_s, static_cast<double>(sequence), period, half_range);
+    return accept(receive_time_s, static_cast<double>(sequence), sequence_rate_prior(options_));
   }
 
   // Host time of any sender time (or count), with the line as it is now. 0 before the first item.
@@ -131,6 +144,13 @@ class ClockFilter {
 
   // Sum of the floor shifts since the start: what the least delay is now, less what it was.
   double floor_shift_s() const { return shift_; }
+  // Receive time of the first item on the floor that the last floor_shifted announced.
+  double floor_shift_since_s() const { return shift_since_; }
+  // What the shifts so far have made uncertain; contained in every sigma.
+  double floor_shift_sigma_s() const { return std::sqrt(shift_variance_); }
+
+  // Mean delay above the least one (one-sided) or sigma of the noise (symmetric).
+  double jitter_s() const { return delay_; }
 
   // For a reconnection that the caller knows of. The next item starts a new line.
   void restart() {
@@ -147,7 +167,6 @@ class ClockFilter {
   ClockState state() const { return state_; }
 
  private:
-  static constexpr double kMaxPeriod = 10;      // s, of a sequence whose period is not given
   static constexpr double kMaxSpan = 1e12;      // beyond it differences of stamps are nonsense
   static constexpr int kWildToRestart = 3;      // in a row
   static constexpr double kHuber = 2.5;         // sigmas
@@ -159,7 +178,8 @@ class ClockFilter {
   // Items that may show a floor shift. Their least residuals are watched in halves of settle_s: only
   // when two neighbouring halves agree is the new floor a floor.
   struct Run {
-    double since = 0;   // receive time of the first item of the older half
+    double first = 0;   // receive time of the first item
+    double since = 0;   // ... of the older half
     double middle = 0;  // ... of the younger half
     double older = 0;   // least receive - line, s
     double younger = 0;
@@ -168,7 +188,7 @@ class ClockFilter {
 
     void add(double receive, double residual, bool is_early) {
       if (items == 0) {
-        since = middle = receive;
+        first = since = middle = receive;
         older = younger = residual;
       }
       younger = std::min(younger, residual);
@@ -185,19 +205,19 @@ class ClockFilter {
     }
   };
 
-  ClockEstimate accept(double receive, double sender, double rate, double half_range) {
+  ClockEstimate accept(double receive, double sender, const ClockRatePrior& prior) {
     ++counters_.items;
     if (!std::isfinite(receive) || !std::isfinite(sender)) {
       return reject(std::isfinite(receive) ? receive : last_time_);
     }
     if (!started_) {
-      start(receive, sender, rate, half_range);
+      start(receive, sender, prior);
     } else if (is_wild(receive, sender)) {
       if (++wild_ < kWildToRestart) {
         return reject(receive - shift_ - (one_sided() ? delay_ : 0.0));
       }
       restart();
-      start(receive, sender, rate, half_range);
+      start(receive, sender, prior);
     }
     wild_ = 0;
 
@@ -234,17 +254,16 @@ class ClockFilter {
     return estimate;
   }
 
-  void start(double receive, double sender, double rate, double half_range) {
+  void start(double receive, double sender, const ClockRatePrior& prior) {
     started_ = true;
     anchor_receive_ = first_receive_ = receive;
     anchor_sender_ = sender;
-    rate_ = rate;
-    half_range_ = half_range;
-    rate_min_ = rate - half_range;
-    rate_max_ = rate + half_range;
+    prior_ = prior;
+    rate_min_ = prior.rate - prior.half_range;
+    rate_max_ = prior.rate + prior.half_range;
     last_x_ = -1;
     delay_ = scale_ = options_.expected_jitter_s;
-    line_ = {0, 0, rate, delay_ * delay_, 0, half_range * half_range / 3};
+    line_ = {0, 0, prior.rate, delay_ * delay_, 0, prior.half_range * prior.half_range / 3};
     slots_ = 0;
     slot_width_ = options_.window_s / (16.0 * Capacity);
   }
@@ -289,6 +308,7 @@ class ClockFilter {
     }
     if (early && early_run_.items == 0) {
       slots_ = settled_slots();  // the youngest may belong to the new floor
+      slot_since_ = receive - slot_width_;
     }
     if (early || early_run_.items > 0) {
       early_run_.add(receive, residual, early);
@@ -324,7 +344,7 @@ class ClockFilter {
       run.begin_half(receive);
       return false;
     }
-    const double since = run.since;
+    const double since = falls ? run.first : run.since;
     late_run_ = early_run_ = {};
     if (state_ != ClockState::kLocked || since < locked_since_) {
       forget_before(since);
@@ -343,6 +363,7 @@ class ClockFilter {
       }
     }
     shift_ += step;
+    shift_since_ = since;
     shift_variance_ += sigma * sigma;
     ++counters_.floor_shifts;
   }
@@ -352,7 +373,7 @@ class ClockFilter {
     const double first = receive - anchor_receive_ - shift_;
     std::size_t kept = 0;
     for (std::size_t i = 0; i < slots_; ++i) {
-      if (y_[i] >= first) {
+      if (y_[i] >= first || i + 1 == slots_) {
         x_[kept] = x_[i];
         y_[kept++] = y_[i];
       }
@@ -423,10 +444,10 @@ class ClockFilter {
 
   // From now on the rate may leave what the last window said only as far as clocks wander.
   void bound_rate() {
-    const double reach = kGate * std::sqrt(line_.var_slope) + 1e-9 * rate_ +
-                         3 * rate_ * options_.skew_wander * std::sqrt(options_.window_s);
-    rate_min_ = std::max(rate_ - half_range_, line_.slope - reach);
-    rate_max_ = std::min(rate_ + half_range_, line_.slope + reach);
+    const double reach = kGate * std::sqrt(line_.var_slope) + 1e-9 * prior_.rate +
+                         3 * prior_.rate * options_.skew_wander * std::sqrt(options_.window_s);
+    rate_min_ = std::max(prior_.rate - prior_.half_range, line_.slope - reach);
+    rate_max_ = std::min(prior_.rate + prior_.half_range, line_.slope + reach);
   }
 
   // ---- symmetric ----
@@ -452,14 +473,10 @@ class ClockFilter {
     const double innovation = y - line_.value;
     double noise = delay_ * delay_;
     const double sigmas = std::abs(innovation) / std::sqrt(line_.var_value + noise);
-    if (symmetric_items_ > 0) {
-      // Mean of the logarithm: outliers cannot carry it away. E log|N(0,1)| = -0.635.
-      const double log_size = std::log(std::clamp(sigmas, 1e-3, 3.0)) + 0.635;
-      const double n = std::min(static_cast<double>(symmetric_items_), kNoiseMemory);
-      delay_ =
-          std::max(delay_ * std::exp(log_size / (n + kPriorItems)), options_.stamp_resolution_s);
-    }
-    ++symmetric_items_;
+    // Mean of the logarithm: outliers cannot carry it away. E log|N(0,1)| = -0.635.
+    const double log_size = std::log(std::clamp(sigmas, 1e-3, 3.0)) + 0.635;
+    const double n = std::min(static_cast<double>(symmetric_items_), kNoiseMemory);
+    delay_ = std::max(delay_ * std::exp(log_size / (n + kPriorItems)), options_.stamp_resolution_s);
     if (sigmas > kHuber) {
       noise *= sigmas / kHuber;
     }
@@ -488,12 +505,12 @@ class ClockFilter {
   double first_receive_ = 0;
   double last_x_ = 0;
   LineEstimate line_;
-  double rate_ = 1;
-  double half_range_ = 0;
+  ClockRatePrior prior_{1, 0};
   double delay_ = 0;  // typical delay (one-sided) or noise sigma (symmetric), s
 
   double shift_ = 0;
   double shift_variance_ = 0;
+  double shift_since_ = 0;
   Run late_run_;
   Run early_run_;
 
