@@ -1,0 +1,97 @@
+#include "test/simulator/camera_model.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+
+namespace alidade::simulator {
+namespace {
+
+// Linear interpolation in a table this long is good to 1e-4 px or better: see camera_model_test.
+constexpr std::size_t kTableSize = 1 << 16;
+// Boil and the corners' own pixels look a little past the image's corner.
+constexpr double kTableMargin = 1.2;
+
+// Turns the unit vector `axis` by a small angle towards the two tangent directions.
+Eigen::Vector3d tilted(const Eigen::Vector3d& axis, const Eigen::Vector3d& tangent_0,
+                       const Eigen::Vector3d& tangent_1, const Eigen::Vector2d& offset) {
+  const double angle = offset.norm();
+  if (angle == 0) return axis;
+  const Eigen::Vector3d towards = (tangent_0 * offset.x() + tangent_1 * offset.y()) / angle;
+  return axis * std::cos(angle) + towards * std::sin(angle);
+}
+
+}  // namespace
+
+CameraModel::CameraModel(const CameraConfig& camera, const ImageConfig& image, const Path& path)
+    : camera_(camera),
+      image_(image),
+      path_(&path),
+      focal_(camera.focal_length, camera.focal_length * camera.aspect),
+      per_focal_(focal_.cwiseInverse()),
+      centre_(image.width / 2.0, image.height / 2.0),
+      pan_axis_(tilted(Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(),
+                       camera.pan_axis_offset)),
+      tilt_axis_(tilted(Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitX(),
+                        Eigen::Vector3d::UnitZ(), camera.tilt_axis_offset)) {
+  const double k = camera.radial_distortion;
+  largest_slope_squared_ = k < 0 ? -1 / (3 * k) : std::numeric_limits<double>::infinity();
+  // At the largest slope the distorted radius is 2/3 of it.
+  const double corner_squared = (centre_.cwiseQuotient(focal_)).squaredNorm();
+  const double largest_squared =
+      std::min(corner_squared * kTableMargin, largest_slope_squared_ * 4 / 9);
+  samples_per_square_ = static_cast<double>(kTableSize - 1) / largest_squared;
+  shrink_.reserve(kTableSize);
+  double slope = 0;
+  for (std::size_t i = 0; i < kTableSize; ++i) {
+    const double radius = std::sqrt(static_cast<double>(i) / samples_per_square_);
+    // Newton from the previous entry; near the fold (k < 0) it converges slowly, hence the count.
+    for (int step = 0; step < 60; ++step) {
+      const double derivative = 1 + 3 * k * slope * slope;
+      const double excess = slope + k * slope * slope * slope - radius;
+      if (derivative < 1e-9 || std::abs(excess) < 1e-16) break;
+      slope -= excess / derivative;
+    }
+    shrink_.push_back(radius > 0 ? slope / radius : 1);
+  }
+}
+
+Eigen::Matrix3d CameraModel::base_from_camera(const Angles& angles) const {
+  Eigen::Matrix3d base_from_rdf;  // right, down and forward, each in forward-right-down
+  base_from_rdf << 0, 0, 1, 1, 0, 0, 0, 1, 0;
+  return Eigen::AngleAxisd(angles.pan, pan_axis_).toRotationMatrix() *
+         Eigen::AngleAxisd(angles.tilt, tilt_axis_).toRotationMatrix() * base_from_rdf;
+}
+
+std::optional<Eigen::Vector2d> CameraModel::project(const Eigen::Vector3d& d_camera) const {
+  if (d_camera.z() <= 0) return std::nullopt;
+  const Eigen::Vector2d slope = d_camera.head<2>() / d_camera.z();
+  const double square = slope.squaredNorm();
+  if (square >= largest_slope_squared_) return std::nullopt;
+  return centre_ + focal_.cwiseProduct(slope) * (1 + camera_.radial_distortion * square);
+}
+
+std::optional<Eigen::Vector2d> CameraModel::project_rolling(const Eigen::Vector3d& d_base,
+                                                            double t0_s) const {
+  const auto seen_from_row = [&](double row) {
+    const double time = t0_s + row * camera_.line_delay;
+    return project(base_from_camera_at(time).transpose() * d_base);
+  };
+  // The row that is exposed while the direction lies on it: the root of v(row) - row, by bisection.
+  double low = 0;
+  double high = image_.height;
+  const auto first = seen_from_row(low);
+  const auto last = seen_from_row(high);
+  if (!first || !last || first->y() < low || last->y() > high) return std::nullopt;
+  for (int step = 0; step < 60; ++step) {
+    const double middle = (low + high) / 2;
+    const auto seen = seen_from_row(middle);
+    if (!seen) return std::nullopt;
+    (seen->y() > middle ? low : high) = middle;
+  }
+  const auto seen = seen_from_row((low + high) / 2);
+  if (!seen || seen->x() < 0 || seen->x() > image_.width) return std::nullopt;
+  return seen;
+}
+
+}  // namespace alidade::simulator

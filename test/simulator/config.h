@@ -1,0 +1,154 @@
+#pragma once
+// Configuration of the virtual camera: one struct with defaults, read from a strictly checked YAML
+// file. An unknown key, a wrong type or a value out of range is an error with file and line.
+//
+// Units: inside the program SI (rad, s, px); the keys of the file carry their unit in their name
+// (README.md lists them). File names are relative to the folder of the configuration.
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace alidade::simulator {
+
+// The text is one line: file:line: what was wrong and what would be right.
+class ConfigError : public std::runtime_error {
+ public:
+  using std::runtime_error::runtime_error;
+};
+
+struct ImageConfig {
+  int width = 1280;     // px
+  int height = 720;     // px
+  double rate_hz = 25;  // on the host clock
+};
+
+struct CameraConfig {
+  double focal_length = 1500;                                 // px
+  double aspect = 1;                                          // f_v / f_u
+  double radial_distortion = 0;                               // k
+  double line_delay = 0;                                      // s/row
+  Eigen::Vector2d pan_axis_offset{Eigen::Vector2d::Zero()};   // rad along base x, y
+  Eigen::Vector2d tilt_axis_offset{Eigen::Vector2d::Zero()};  // rad along base x, z
+  double pan_scale = 1;                                       // measured / true
+  double tilt_scale = 1;                                      // measured / true
+  double clock_offset = 0;                                    // s, telemetry clock - image clock
+};
+
+struct PathConfig {
+  enum class Type { kTripleCosine, kSweep, kJerky, kCsv };
+  Type type = Type::kTripleCosine;
+  double amplitude = 1;      // 1 = the paper's path: three fields of view wide, one high
+  double period = 10;        // s
+  double stop = 0.5;         // s of rest after each move of a sweep
+  double pan = 0, tilt = 0;  // rad, the centre
+  std::filesystem::path file;
+};
+
+// A rectangle on the sphere around a direction: a photo, generated texture, or one brightness.
+struct PatchConfig {
+  enum class Projection {
+    kTangent,         // a rectilinear picture (gnomonic), less than 170 degrees
+    kEquirectangular  // columns are longitudes, rows latitudes, about the patch's centre
+  };
+  std::filesystem::path file;                   // photo; empty for a generated patch
+  double azimuth = 0;                           // rad, positive to the right
+  double elevation = 0;                         // rad, positive up
+  double width = 0, height = 0;                 // rad; a photo's height follows from its shape
+  double azimuth_rate = 0, elevation_rate = 0;  // rad/s, moving objects only
+  double brightness = 0.5;                      // flat areas and moving objects, 1 = white
+  Projection projection = Projection::kTangent;
+};
+
+struct SceneConfig {
+  double background = 0.5;  // where no patch lies, 1 = white
+  double detail = 1;        // generated contrast at the scales a photo lacks, 1 = natural
+  std::vector<PatchConfig> photos, procedural, flat, moving;
+};
+
+struct SensorConfig {
+  struct Step {
+    double time = 0;    // s
+    double factor = 1;  // from then on
+  };
+  struct Interval {
+    double from = 0, to = 0;  // s
+  };
+  double exposure = 0;    // s, centred on the row's time
+  double shot_noise = 0;  // grey levels per electron: variance = shot_noise * signal
+  double read_noise = 0;  // grey levels
+  double vignetting = 0;  // light lost in the corners, 0 to 1
+  double boil = 0;        // px, standard deviation along each axis
+  int jpeg_quality = 90;
+  std::vector<Step> brightness_steps;
+  std::vector<Interval> covered;
+};
+
+struct TelemetryConfig {
+  double rate_hz = 30;                  // of a recording; live, the client polls as it likes
+  double sigma = 0;                     // rad
+  double quantum = 0;                   // rad
+  double internal_rate_hz = 0;          // > 0: the device refreshes its value only so often
+  double stale_repeat_probability = 0;  // a sample repeats its predecessor
+  double latency = 0;                   // s, live only: age of the angle the device reports
+};
+
+struct JitterConfig {
+  double sigma = 0;        // s, white and symmetric
+  double exponential = 0;  // s, mean of a one-sided delay
+  double burst = 0;        // s, longest one-sided delay of a burst
+  double burst_probability = 0;
+};
+
+struct TimingConfig {
+  JitterConfig image, telemetry;
+  double frame_loss = 0;              // probability
+  double image_clock_skew = 0;        // sender clock rate / host clock rate - 1
+  double image_period_sigma = 0;      // s, of the one draw that noise.yaml tells
+  double telemetry_period_sigma = 0;  // s, likewise
+};
+
+struct RecordingConfig {
+  enum class Images { kVideo, kPng, kPgm, kNone };
+  Images images = Images::kVideo;  // kNone: tracks.csv stands in place of images
+  double landmark_spacing = 0.1;   // of tracks.csv, in horizontal fields of view
+  double pixel_sigma = 0.3;        // px, of tracks.csv
+};
+
+struct LiveConfig {
+  enum class Codec { kMjpeg, kH264 };
+  int rtsp_port = 0, http_port = 0;  // 0: any free one
+  Codec codec = Codec::kMjpeg;
+  std::string rtp_host;  // if set, plain RTP is sent there besides RTSP
+  int rtp_port = 0;
+  std::filesystem::path sdp_file;  // of the plain RTP stream
+  std::string user, password;      // of RTSP and HTTP; empty: no login
+};
+
+struct Config {
+  std::uint64_t seed = 1;
+  double duration = 0;  // s; 0: live without end
+  ImageConfig image;
+  CameraConfig camera;
+  PathConfig path;
+  SceneConfig scene;
+  SensorConfig sensor;
+  TelemetryConfig telemetry;
+  TimingConfig timing;
+  RecordingConfig recording;
+  LiveConfig live;
+  std::optional<double> guess_focal_length;  // px, of guess.yaml; default: the truth, rounded
+  std::filesystem::path truth_dir;           // live: where truth.yaml and truth.csv go
+};
+
+// Throws ConfigError.
+[[nodiscard]] Config load_config(const std::filesystem::path& file);
+
+// Angle of the image's width seen through an undistorted lens, rad: the s of the paper's path.
+[[nodiscard]] double horizontal_field_of_view(const Config& config);
+
+}  // namespace alidade::simulator

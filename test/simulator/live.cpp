@@ -1,0 +1,186 @@
+#include "test/simulator/live.h"
+
+#include <time.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "test/simulator/parallel.h"
+#include "test/simulator/renderer.h"
+#include "test/simulator/servers/encoder.h"
+#include "test/simulator/servers/vapix_server.h"
+#include "test/simulator/servers/video_server.h"
+#include "test/simulator/telemetry.h"
+#include "test/simulator/timeline.h"
+#include "test/simulator/truth.h"
+
+namespace alidade::simulator {
+namespace {
+
+constexpr double kDegreesPerRadian = 180 / 3.14159265358979323846;
+
+double monotonic_now() {
+  timespec time{};
+  clock_gettime(CLOCK_MONOTONIC, &time);
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+// Sleeps until a moment of CLOCK_MONOTONIC, or shortly after `stop` is set.
+void sleep_until(double moment, const std::atomic<bool>& stop) {
+  constexpr double kSlice = 0.1;
+  while (!stop && monotonic_now() < moment) {
+    const double target = std::min(moment, monotonic_now() + kSlice);
+    timespec time{};
+    time.tv_sec = static_cast<time_t>(target);
+    time.tv_nsec = static_cast<long>(1e9 * (target - std::floor(target)));
+    clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &time, nullptr);
+  }
+}
+
+// How many frames stand for all of them.
+std::size_t frames_to_render(const Config& config, const Path& path, const Renderer& renderer) {
+  const double per_period = path.period_s() * config.image.rate_hz;
+  const bool repeats =
+      per_period > 0 && renderer.steady() && std::abs(per_period - std::round(per_period)) < 1e-6;
+  const double in_all = std::ceil(config.duration * config.image.rate_hz);
+  if (!repeats && config.duration <= 0) {
+    throw ConfigError(
+        "duration_s is missing: this path or scene does not repeat after a whole number of frames");
+  }
+  double count = repeats ? std::round(per_period) : in_all;
+  if (config.duration > 0) count = std::min(count, in_all);
+  return static_cast<std::size_t>(count);
+}
+
+std::vector<std::vector<std::uint8_t>> encoded_frames(const Config& config,
+                                                      const Renderer& renderer, std::size_t count,
+                                                      const std::atomic<bool>& stop) {
+  const int width = config.image.width;
+  const int height = config.image.height;
+  const bool h264 = config.live.codec == LiveConfig::Codec::kH264;
+  H264Encoder encoder;
+  std::string error;
+  if (h264 && !encoder.open(width, height, config.image.rate_hz, &error)) {
+    throw std::runtime_error("H.264: " + error);
+  }
+  std::vector<std::vector<std::uint8_t>> frames(count);
+  const Progress progress("rendering frame", count);
+  const std::size_t batch = 4 * processors();
+  for (std::size_t start = 0; start < count && !stop; start += batch) {
+    const std::size_t size = std::min(batch, count - start);
+    parallel_for(size, [&](std::size_t i) {
+      auto& frame = frames[start + i];
+      frame = renderer.render(static_cast<double>(start + i) / config.image.rate_hz,
+                              static_cast<std::int64_t>(start + i));
+      if (!h264) {
+        frame = encode_jpeg(frame.data(), width, height, width, config.sensor.jpeg_quality);
+      }
+    });
+    for (std::size_t i = start; i < start + size; ++i) {
+      // The first frame begins the loop anew each time round, so nothing may precede it.
+      if (h264) frames[i] = encoder.encode(frames[i].data(), width, i == 0);
+      if (frames[i].empty()) throw std::runtime_error("a frame could not be encoded");
+    }
+    progress.show(start + size);
+  }
+  return frames;
+}
+
+VideoServerOptions video_options(const Config& config) {
+  VideoServerOptions options;
+  options.port = config.live.rtsp_port;
+  options.codec = config.live.codec == LiveConfig::Codec::kH264 ? VideoServerOptions::Codec::kH264
+                                                                : VideoServerOptions::Codec::kMjpeg;
+  options.width = config.image.width;
+  options.height = config.image.height;
+  options.rate_hz = config.image.rate_hz;
+  options.user = config.live.user;
+  options.password = config.live.password;
+  return options;
+}
+
+VideoServerOptions rtp_options(const Config& config) {
+  VideoServerOptions options = video_options(config);
+  options.rtp_host = config.live.rtp_host;
+  options.rtp_port = config.live.rtp_port;
+  options.sdp_file = config.live.sdp_file.string();
+  return options;
+}
+
+template <class Server>
+void start(Server& server) {
+  std::string error;
+  if (!server.start(&error)) throw std::runtime_error(error);
+}
+
+}  // namespace
+
+void serve_live(const Config& config, const std::atomic<bool>& stop) {
+  const double video_latency = config.telemetry.latency - config.camera.clock_offset;
+  if (video_latency < 0) {
+    throw ConfigError(
+        "clock_offset_ms must not exceed the telemetry's latency_ms: live video cannot arrive "
+        "before it is captured");
+  }
+  const std::unique_ptr<Path> path = make_path(config);
+  const Renderer renderer(config, *path);
+  const auto frames =
+      encoded_frames(config, renderer, frames_to_render(config, *path, renderer), stop);
+  if (stop) return;
+
+  std::optional<TruthCsv> truth;
+  if (!config.truth_dir.empty()) {
+    std::filesystem::create_directories(config.truth_dir);
+    write_truth_yaml(config.truth_dir / "truth.yaml", config, renderer.camera());
+    truth.emplace(config.truth_dir / "truth.csv");
+  }
+
+  VideoServer video(video_options(config));
+  start(video);
+  std::optional<VideoServer> rtp;
+  if (config.live.rtp_port != 0) start(rtp.emplace(rtp_options(config)));
+
+  const double origin = monotonic_now();
+  Telemetry telemetry(config, *path);
+  VapixServerOptions vapix_options;
+  vapix_options.port = config.live.http_port;
+  vapix_options.user = config.live.user;
+  vapix_options.password = config.live.password;
+  VapixServer vapix(vapix_options, [&](double now) {
+    const Angles angles = telemetry.measure(now - origin - config.telemetry.latency);
+    return VapixPosition{angles.pan * kDegreesPerRadian, angles.tilt * kDegreesPerRadian, 1};
+  });
+  start(vapix);
+  std::printf("ready rtsp://127.0.0.1:%d/video http://127.0.0.1:%d\n", video.port(), vapix.port());
+  std::fflush(stdout);
+
+  FrameTimeline timeline(config);
+  double next_flush = origin;
+  while (!stop) {
+    FrameEvent event = timeline.next();
+    if (config.duration > 0 && event.capture_s >= config.duration) break;
+    event.stamp_s += video_latency;
+    sleep_until(origin + event.stamp_s, stop);
+    if (stop) break;
+    const auto& frame = frames[static_cast<std::size_t>(event.sequence) % frames.size()];
+    video.push(frame.data(), frame.size(), origin + event.sender_s);
+    if (rtp) rtp->push(frame.data(), frame.size(), origin + event.sender_s);
+    if (!truth) continue;
+    truth->add(event, path->at(event.capture_s), origin);
+    if (monotonic_now() >= next_flush) {
+      truth->flush();
+      next_flush += 1;
+    }
+  }
+  if (truth) truth->flush();
+  if (rtp) rtp->stop();
+  video.stop();
+  vapix.stop();
+}
+
+}  // namespace alidade::simulator

@@ -1,0 +1,212 @@
+#include "test/simulator/path.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <random>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "test/simulator/random.h"
+
+namespace alidade::simulator {
+namespace {
+
+constexpr double kTwoPi = 6.28318530717958647692;
+
+// From 0 to 1 with no velocity and no acceleration at either end.
+double smooth_step(double x) {
+  x = std::clamp(x, 0.0, 1.0);
+  return x * x * x * (10 - 15 * x + 6 * x * x);
+}
+
+double phase(double time, double period) { return time - period * std::floor(time / period); }
+
+class TripleCosine : public Path {
+ public:
+  TripleCosine(const PathConfig& config, double field) : config_(config), field_(field) {}
+
+  Angles at(double time_s) const override {
+    const double scale = config_.amplitude * field_ / kTwoPi;
+    const double angle = kTwoPi * time_s / config_.period;
+    return {config_.pan + 9 * scale * std::sin(angle),
+            config_.tilt - 3 * scale * std::cos(3 * angle)};
+  }
+  double period_s() const override { return config_.period; }
+
+ private:
+  PathConfig config_;
+  double field_;
+};
+
+// Moves from point to point, each within its share of the period, then rests until the next.
+class Moves : public Path {
+ public:
+  struct Move {
+    double start, duration;  // s
+    Angles from, to;
+  };
+
+  Moves(std::vector<Move> moves, double period) : moves_(std::move(moves)), period_(period) {}
+
+  Angles at(double time_s) const override {
+    const double time = phase(time_s, period_);
+    const auto next = std::upper_bound(moves_.begin(), moves_.end(), time,
+                                       [](double t, const Move& move) { return t < move.start; });
+    const Move& move = next == moves_.begin() ? moves_.front() : *std::prev(next);
+    const double part = smooth_step((time - move.start) / move.duration);
+    return {move.from.pan + part * (move.to.pan - move.from.pan),
+            move.from.tilt + part * (move.to.tilt - move.from.tilt)};
+  }
+  double period_s() const override { return period_; }
+
+ private:
+  std::vector<Move> moves_;
+  double period_;
+};
+
+std::unique_ptr<Path> make_sweep(const PathConfig& config, double field) {
+  const double pan = 1.5 * config.amplitude * field;
+  const double tilt = 0.5 * config.amplitude * field;
+  const std::array<Angles, 5> corners{{{config.pan - pan, config.tilt - tilt},
+                                       {config.pan + pan, config.tilt - tilt},
+                                       {config.pan + pan, config.tilt + tilt},
+                                       {config.pan - pan, config.tilt + tilt},
+                                       {config.pan - pan, config.tilt - tilt}}};
+  std::vector<Moves::Move> moves;
+  const double quarter = config.period / 4;
+  for (std::size_t i = 0; i < 4; ++i) {
+    moves.push_back({static_cast<double>(i) * quarter, quarter - config.stop, corners.at(i),
+                     corners.at(i + 1)});
+  }
+  return std::make_unique<Moves>(std::move(moves), config.period);
+}
+
+std::unique_ptr<Path> make_jerky(const PathConfig& config, double field, std::uint64_t seed) {
+  std::mt19937_64 generator = make_generator(seed, Stream::kPath);
+  std::uniform_real_distribution<double> point(-1, 1);
+  std::uniform_real_distribution<double> share(0.3, 0.9);
+  const int count = std::max(2, static_cast<int>(config.period / 0.4));
+  const double step = config.period / count;
+  std::vector<Moves::Move> moves;
+  const Angles home{config.pan, config.tilt};
+  Angles from = home;
+  for (int i = 0; i < count; ++i) {
+    Angles to{config.pan + 1.5 * config.amplitude * field * point(generator),
+              config.tilt + 0.5 * config.amplitude * field * point(generator)};
+    if (i == count - 1) to = home;
+    moves.push_back({i * step, share(generator) * step, from, to});
+    from = to;
+  }
+  return std::make_unique<Moves>(std::move(moves), config.period);
+}
+
+// Cubic Hermite through the points, tangents from the neighbours; at rest before and after.
+class Sampled : public Path {
+ public:
+  explicit Sampled(const std::filesystem::path& file) {
+    std::ifstream stream(file);
+    std::string line;
+    if (!std::getline(stream, line)) throw ConfigError(file.string() + ": cannot be read");
+    const std::array<std::size_t, 3> columns = find_columns(file, line);
+    for (int number = 2; std::getline(stream, line); ++number) {
+      add(file.string() + ":" + std::to_string(number), columns, split(line));
+    }
+    if (times_.size() < 2) throw ConfigError(file.string() + ": a path needs two points or more");
+  }
+
+  Angles at(double time_s) const override {
+    if (time_s <= times_.front()) return points_.front();
+    if (time_s >= times_.back()) return points_.back();
+    const auto next = std::upper_bound(times_.begin(), times_.end(), time_s);
+    const auto i = static_cast<std::size_t>(next - times_.begin()) - 1;
+    const double step = times_[i + 1] - times_[i];
+    const double x = (time_s - times_[i]) / step;
+    const auto value = [&](double Angles::*axis) {
+      return points_[i].*axis * ((1 + 2 * x) * (1 - x) * (1 - x)) +
+             points_[i + 1].*axis * (x * x * (3 - 2 * x)) +
+             step * (tangent(i, axis) * (x * (1 - x) * (1 - x)) -
+                     tangent(i + 1, axis) * (x * x * (1 - x)));
+    };
+    return {value(&Angles::pan), value(&Angles::tilt)};
+  }
+  double period_s() const override { return 0; }
+
+ private:
+  static std::vector<std::string> split(const std::string& line) {
+    std::vector<std::string> cells;
+    std::stringstream stream(line);
+    for (std::string cell; std::getline(stream, cell, ',');) {
+      while (!cell.empty() && (cell.back() == '\r' || cell.back() == ' ')) cell.pop_back();
+      cells.push_back(cell);
+    }
+    return cells;
+  }
+
+  static std::array<std::size_t, 3> find_columns(const std::filesystem::path& file,
+                                                 const std::string& header) {
+    const std::vector<std::string> names = split(header);
+    std::array<std::size_t, 3> columns{};
+    const std::array<const char*, 3> wanted{"time_s", "pan_rad", "tilt_rad"};
+    for (std::size_t i = 0; i < wanted.size(); ++i) {
+      const auto found = std::find(names.begin(), names.end(), wanted.at(i));
+      if (found == names.end()) {
+        throw ConfigError(file.string() + ":1: column " + wanted.at(i) + " is missing");
+      }
+      columns.at(i) = static_cast<std::size_t>(found - names.begin());
+    }
+    return columns;
+  }
+
+  void add(const std::string& where, const std::array<std::size_t, 3>& columns,
+           const std::vector<std::string>& cells) {
+    std::array<double, 3> values{};
+    for (std::size_t i = 0; i < 3; ++i) {
+      char* end = nullptr;
+      const std::string cell = columns.at(i) < cells.size() ? cells[columns.at(i)] : "";
+      values.at(i) = std::strtod(cell.c_str(), &end);
+      if (cell.empty() || *end != '\0' || !std::isfinite(values.at(i))) {
+        throw ConfigError(where + ": a path needs a number in time_s, pan_rad and tilt_rad");
+      }
+    }
+    Angles point{values[1], values[2]};
+    if (!times_.empty()) {
+      if (values[0] <= times_.back()) throw ConfigError(where + ": time_s must increase");
+      // The shorter way round: a truth.csv wraps its angles.
+      point.pan = points_.back().pan + std::remainder(point.pan - points_.back().pan, kTwoPi);
+      point.tilt = points_.back().tilt + std::remainder(point.tilt - points_.back().tilt, kTwoPi);
+    }
+    times_.push_back(values[0]);
+    points_.push_back(point);
+  }
+
+  double tangent(std::size_t i, double Angles::*axis) const {
+    if (i == 0 || i + 1 == times_.size()) return 0;
+    return (points_[i + 1].*axis - points_[i - 1].*axis) / (times_[i + 1] - times_[i - 1]);
+  }
+
+  std::vector<double> times_;
+  std::vector<Angles> points_;
+};
+
+}  // namespace
+
+std::unique_ptr<Path> make_path(const Config& config) {
+  const double field = horizontal_field_of_view(config);
+  switch (config.path.type) {
+    case PathConfig::Type::kTripleCosine:
+      return std::make_unique<TripleCosine>(config.path, field);
+    case PathConfig::Type::kSweep:
+      return make_sweep(config.path, field);
+    case PathConfig::Type::kJerky:
+      return make_jerky(config.path, field, config.seed);
+    case PathConfig::Type::kCsv:
+      return std::make_unique<Sampled>(config.path.file);
+  }
+  throw std::logic_error("unknown path type");
+}
+
+}  // namespace alidade::simulator

@@ -1,0 +1,255 @@
+#include "test/simulator/recording_writer.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <map>
+#include <memory>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "test/simulator/parallel.h"
+#include "test/simulator/random.h"
+#include "test/simulator/renderer.h"
+#include "test/simulator/servers/encoder.h"
+#include "test/simulator/telemetry.h"
+#include "test/simulator/timeline.h"
+#include "test/simulator/truth.h"
+#include "test/simulator/video_writer.h"
+
+namespace alidade::simulator {
+namespace {
+
+namespace fs = std::filesystem;
+using Images = RecordingConfig::Images;
+
+constexpr double kPi = 3.14159265358979323846;
+constexpr double kTelemetryMargin = 1;  // s before the first and after the last frame
+
+void prepare_directory(const fs::path& directory) {
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (!fs::is_directory(directory)) {
+    throw std::runtime_error(directory.string() + ": cannot be made a directory");
+  }
+  if (!fs::is_empty(directory)) {
+    throw std::runtime_error(directory.string() + ": is not empty; name a new directory");
+  }
+}
+
+std::vector<FrameEvent> all_frames(const Config& config) {
+  std::vector<FrameEvent> frames;
+  FrameTimeline timeline(config);
+  for (FrameEvent event = timeline.next(); event.capture_s < config.duration;
+       event = timeline.next()) {
+    frames.push_back(event);
+  }
+  return frames;
+}
+
+void write_recording_yaml(const Config& config, const fs::path& directory) {
+  OutputFile output(directory / "recording.yaml");
+  output.stream() << "format: 1\nwidth: " << config.image.width
+                  << "\nheight: " << config.image.height
+                  << "\nnotes: made by alidade-simulate, seed " << config.seed << "\n";
+  output.flush();
+}
+
+void write_frames(const std::vector<FrameEvent>& frames, const Path& path,
+                  const fs::path& directory) {
+  OutputFile stamps(directory / "frames.csv");
+  TruthCsv truth(directory / "truth.csv");
+  stamps.stream() << "frame,receive_time_s,sender_time_s,sequence\n";
+  for (const FrameEvent& event : frames) {
+    stamps.stream() << event.frame << ',' << event.stamp_s << ',' << event.sender_s << ','
+                    << event.sequence << '\n';
+    truth.add(event, path.at(event.capture_s), 0);
+  }
+  stamps.flush();
+  truth.flush();
+}
+
+void write_telemetry(const Config& config, const Path& path, const fs::path& directory) {
+  OutputFile output(directory / "telemetry.csv");
+  output.stream() << "receive_time_s,pan_rad,tilt_rad,sequence\n";
+  Telemetry telemetry(config, path);
+  JitteredStamps stamps(config.timing.telemetry, config.seed, Stream::kTelemetryStamp);
+  const double rate = config.telemetry.rate_hz;
+  const auto count = std::llround((config.duration + 2 * kTelemetryMargin) * rate);
+  for (std::int64_t i = 0; i < count; ++i) {
+    const double time = static_cast<double>(i) / rate - kTelemetryMargin;
+    const Angles angles = telemetry.measure(time);
+    output.stream() << stamps.stamp(time) + config.camera.clock_offset << ',' << angles.pan << ','
+                    << angles.tilt << ',' << i << '\n';
+  }
+  output.flush();
+}
+
+// What a person would know of the noise; what is zero is left for the estimator to find.
+void write_noise_yaml(const Config& config, const fs::path& directory) {
+  OutputFile output(directory / "noise.yaml");
+  const auto sigma = [&](const char* name, double value) {
+    if (value > 0) output.stream() << name << ": " << value << '\n';
+  };
+  const auto stamp_sigma = [](const JitterConfig& jitter) {
+    const double p = jitter.burst_probability;
+    const double burst_variance = jitter.burst * jitter.burst * p * (1.0 / 3 - p / 4);
+    return std::sqrt(jitter.sigma * jitter.sigma + jitter.exponential * jitter.exponential +
+                     burst_variance);
+  };
+  std::mt19937_64 generator = make_generator(config.seed, Stream::kPeriods);
+  std::normal_distribution<double> normal;
+  const auto period = [&](const char* stream, double rate, double period_sigma) {
+    const double draw = normal(generator);
+    if (period_sigma <= 0) return;
+    output.stream() << stream << "_period_s: " << 1 / rate + period_sigma * draw << '\n'
+                    << stream << "_period_sigma_s: " << period_sigma << '\n';
+  };
+  const TimingConfig& timing = config.timing;
+  const TelemetryConfig& telemetry = config.telemetry;
+  sigma("image_stamp_sigma_s", stamp_sigma(timing.image));
+  period("image", config.image.rate_hz, timing.image_period_sigma);
+  sigma("telemetry_stamp_sigma_s", stamp_sigma(timing.telemetry));
+  period("telemetry", telemetry.rate_hz, timing.telemetry_period_sigma);
+  sigma("pan_tilt_sigma_rad",
+        std::sqrt(telemetry.sigma * telemetry.sigma + telemetry.quantum * telemetry.quantum / 12));
+  if (config.recording.images == Images::kNone) {
+    sigma("pixel_sigma_px", config.recording.pixel_sigma);
+  }
+  output.flush();
+}
+
+// As a data sheet would tell it: two digits of the focal length, nothing else.
+void write_guess_yaml(const Config& config, const fs::path& directory) {
+  const double focal_length = config.camera.focal_length;
+  const double unit = std::pow(10, std::floor(std::log10(focal_length)) - 1);
+  const double guess = config.guess_focal_length.value_or(std::round(focal_length / unit) * unit);
+  OutputFile output(directory / "guess.yaml");
+  output.stream() << "focal_length: {value: " << guess
+                  << "}\nradial_distortion: {value: 0}\nclock_offset: {value: 0}\n"
+                     "line_delay: {value: 0}\n";
+  output.flush();
+}
+
+// Landmarks stand on a grid of azimuth and elevation over the whole sphere.
+void write_tracks(const Config& config, const std::vector<FrameEvent>& frames,
+                  const CameraModel& camera, const fs::path& directory) {
+  OutputFile output(directory / "tracks.csv");
+  output.stream() << "frame,landmark,u_px,v_px,sigma_px\n";
+  const double wanted = config.recording.landmark_spacing * horizontal_field_of_view(config);
+  const int around = std::max(4, static_cast<int>(std::lround(2 * kPi / wanted)));
+  const double spacing = 2 * kPi / around;
+  const double reach = 0.55 * std::atan2(std::hypot(config.image.width, config.image.height),
+                                         config.camera.focal_length) +
+                       2 * spacing;
+  std::map<std::pair<int, int>, int> numbers;
+  std::mt19937_64 generator = make_generator(config.seed, Stream::kTracks);
+  std::normal_distribution<double> noise(0, config.recording.pixel_sigma);
+  for (const FrameEvent& event : frames) {
+    const Eigen::Vector3d axis = camera.base_from_camera_at(event.capture_s).col(2);
+    const double azimuth = std::atan2(axis.y(), axis.x());
+    const double elevation = -std::asin(std::clamp(axis.z(), -1.0, 1.0));
+    const auto row_of = [&](double angle) {
+      return static_cast<int>(std::lround(angle / spacing));
+    };
+    const double highest = std::min(std::abs(elevation) + reach, kPi / 2);
+    const double sideways = std::min(kPi - spacing, reach / std::max(0.01, std::cos(highest)));
+    for (int row = row_of(elevation - reach); row <= row_of(elevation + reach); ++row) {
+      if (std::abs(row) * spacing > kPi / 2) continue;
+      for (int column = row_of(azimuth - sideways); column <= row_of(azimuth + sideways);
+           ++column) {
+        const auto seen =
+            camera.project_rolling(direction(column * spacing, row * spacing), event.capture_s);
+        if (!seen) continue;
+        const std::pair<int, int> place{row, (column % around + around) % around};
+        const int number = numbers.emplace(place, static_cast<int>(numbers.size())).first->second;
+        const double u = seen->x() + noise(generator);
+        output.stream() << event.frame << ',' << number << ',' << u << ','
+                        << seen->y() + noise(generator) << ',' << config.recording.pixel_sigma
+                        << '\n';
+      }
+    }
+  }
+  output.flush();
+}
+
+std::vector<std::uint8_t> encode(const Config& config, std::vector<std::uint8_t> image) {
+  const int width = config.image.width;
+  const int height = config.image.height;
+  if (config.recording.images == Images::kVideo) {
+    return encode_jpeg(image.data(), width, height, width, config.sensor.jpeg_quality);
+  }
+  const cv::Mat picture(height, width, CV_8U, image.data());
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(config.recording.images == Images::kPng ? ".png" : ".pgm", picture, bytes,
+               {cv::IMWRITE_PNG_COMPRESSION, 1});
+  return bytes;
+}
+
+void write_images(const Config& config, const std::vector<FrameEvent>& frames,
+                  const Renderer& renderer, const fs::path& directory) {
+  const bool video = config.recording.images == Images::kVideo;
+  const char* extension = config.recording.images == Images::kPng ? "png" : "pgm";
+  std::optional<VideoWriter> writer;
+  if (video) {
+    writer.emplace(directory / "video.mkv", config.image.width, config.image.height,
+                   config.image.rate_hz);
+  } else {
+    fs::create_directory(directory / "frames");
+  }
+  const Progress progress("rendering frame", frames.size());
+  // Rendered side by side in batches, written in order.
+  const std::size_t batch = 4 * processors();
+  for (std::size_t start = 0; start < frames.size(); start += batch) {
+    std::vector<std::vector<std::uint8_t>> encoded(std::min(batch, frames.size() - start));
+    parallel_for(encoded.size(), [&](std::size_t i) {
+      const FrameEvent& event = frames[start + i];
+      encoded[i] = encode(config, renderer.render(event.capture_s, event.sequence));
+    });
+    for (std::size_t i = 0; i < encoded.size(); ++i) {
+      if (encoded[i].empty()) throw std::runtime_error("a frame could not be encoded");
+      if (video) {
+        writer->write(encoded[i], frames[start + i].capture_s);
+        continue;
+      }
+      std::array<char, 32> name{};
+      std::snprintf(name.data(), name.size(), "%06lld.%s",
+                    static_cast<long long>(frames[start + i].frame), extension);
+      OutputFile file(directory / "frames" / name.data());
+      file.stream().write(reinterpret_cast<const char*>(encoded[i].data()),
+                          static_cast<std::streamsize>(encoded[i].size()));
+      file.flush();
+    }
+    progress.show(start + encoded.size());
+  }
+  if (video) writer->finish();
+}
+
+}  // namespace
+
+void write_recording(const Config& config, const fs::path& directory) {
+  if (config.duration <= 0) throw ConfigError("duration_s is missing: a recording needs an end");
+  const std::unique_ptr<Path> path = make_path(config);
+  const CameraModel camera(config.camera, config.image, *path);
+  const bool images = config.recording.images != Images::kNone;
+  const auto renderer = images ? std::make_unique<Renderer>(config, *path) : nullptr;
+
+  prepare_directory(directory);
+  const std::vector<FrameEvent> frames = all_frames(config);
+  write_recording_yaml(config, directory);
+  write_frames(frames, *path, directory);
+  write_telemetry(config, *path, directory);
+  write_noise_yaml(config, directory);
+  write_guess_yaml(config, directory);
+  write_truth_yaml(directory / "truth.yaml", config, camera);
+  if (images) {
+    write_images(config, frames, *renderer, directory);
+  } else {
+    write_tracks(config, frames, camera, directory);
+  }
+}
+
+}  // namespace alidade::simulator

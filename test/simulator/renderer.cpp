@@ -1,0 +1,185 @@
+#include "test/simulator/renderer.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <random>
+
+#include "test/simulator/random.h"
+
+namespace alidade::simulator {
+namespace {
+
+constexpr double kTwoPi = 6.28318530717958647692;
+constexpr int kMostExposures = 64;
+constexpr int kWaves = 24;
+// Boil is evaluated at every so many columns, and is linear in between.
+constexpr int kBoilStep = 16;
+constexpr double kCoveredLight = 0.02;  // what comes through a lens cover
+constexpr std::array<std::array<double, 2>, 4> kPointsOfPixel{
+    {{-0.25, -0.25}, {0.25, 0.25}, {0.25, -0.25}, {-0.25, 0.25}}};
+
+std::vector<float> normal_quantiles() {
+  std::vector<float> quantiles(1 << 16);
+  for (std::size_t i = 0; i < quantiles.size() / 2; ++i) {
+    const double probability =
+        (static_cast<double>(i) + 0.5) / static_cast<double>(quantiles.size());
+    double low = -6;
+    double high = 0;
+    for (int step = 0; step < 40; ++step) {
+      const double middle = (low + high) / 2;
+      (std::erfc(-middle / std::sqrt(2.0)) / 2 < probability ? low : high) = middle;
+    }
+    quantiles[i] = static_cast<float>(low);
+    quantiles[quantiles.size() - 1 - i] = static_cast<float>(-low);
+  }
+  return quantiles;
+}
+
+// Directions that bound what the camera will see: a grid over the image, all along the path.
+std::vector<Eigen::Vector3d> seen_directions(const Config& config, const Path& path,
+                                             const CameraModel& camera) {
+  constexpr int kTimes = 600;
+  constexpr int kGrid = 4;
+  const double length = std::max(config.duration, path.period_s());
+  std::vector<Eigen::Vector3d> seen;
+  for (int i = 0; i <= kTimes; ++i) {
+    const Eigen::Matrix3d turn = camera.base_from_camera_at(length * i / kTimes);
+    for (int row = 0; row <= kGrid; ++row) {
+      for (int column = 0; column <= kGrid; ++column) {
+        const Eigen::Vector2d slope =
+            camera.slope(config.image.width * column / static_cast<double>(kGrid),
+                         config.image.height * row / static_cast<double>(kGrid));
+        if (!slope.hasNaN()) seen.push_back(turn * slope.homogeneous().normalized());
+      }
+    }
+  }
+  return seen;
+}
+
+}  // namespace
+
+Renderer::Renderer(const Config& config, const Path& path)
+    : config_(config),
+      camera_(config.camera, config.image, path),
+      scene_(config.scene, config.camera.focal_length, seen_directions(config, path, camera_),
+             config.seed),
+      normal_quantiles_(normal_quantiles()) {
+  if (config.sensor.boil > 0) {
+    std::mt19937_64 generator = make_generator(config.seed, Stream::kBoil);
+    std::normal_distribution<double> normal;
+    std::uniform_real_distribution<double> turn(0, kTwoPi);
+    for (int i = 0; i < kWaves; ++i) {
+      // A sum of n waves of amplitude a has the variance n a^2 / 2 at every point.
+      const double angle = turn(generator);
+      const double amplitude = config.sensor.boil * std::sqrt(4.0 / kWaves);
+      waves_.push_back({kTwoPi / (0.2 * config.image.width) * normal(generator),
+                        kTwoPi / (0.2 * config.image.width) * normal(generator),
+                        kTwoPi / 0.5 * normal(generator), turn(generator),
+                        amplitude * Eigen::Vector2d(std::cos(angle), std::sin(angle))});
+    }
+  }
+}
+
+bool Renderer::steady() const {
+  return config_.sensor.boil == 0 && config_.scene.moving.empty() &&
+         config_.sensor.brightness_steps.empty() && config_.sensor.covered.empty();
+}
+
+Eigen::Vector2d Renderer::boil(double u, double v, double time_s) const {
+  Eigen::Vector2d sum = Eigen::Vector2d::Zero();
+  for (const Wave& wave : waves_) {
+    sum += wave.amplitude *
+           std::sin(wave.along_u * u + wave.along_v * v + wave.along_time * time_s + wave.phase);
+  }
+  return sum;
+}
+
+void Renderer::rays_of_row(double v, double offset_u, double time_s, std::vector<double>* x,
+                           std::vector<double>* y) const {
+  Eigen::Vector2d left = Eigen::Vector2d::Zero();
+  Eigen::Vector2d right = boil(0, v, time_s);
+  for (int column = 0; column < config_.image.width; ++column) {
+    const int within = column % kBoilStep;
+    if (within == 0) {
+      left = right;
+      right = boil(column + kBoilStep, v, time_s);
+    }
+    const Eigen::Vector2d shift = left + (right - left) * (within / double{kBoilStep});
+    const Eigen::Vector2d slope = camera_.slope(column + 0.5 + offset_u + shift.x(), v + shift.y());
+    (*x)[static_cast<std::size_t>(column)] = slope.x();
+    (*y)[static_cast<std::size_t>(column)] = slope.y();
+  }
+}
+
+double Renderer::light(double time_s) const {
+  double factor = 1;
+  for (const SensorConfig::Step& step : config_.sensor.brightness_steps) {
+    if (time_s >= step.time) factor = step.factor;
+  }
+  for (const SensorConfig::Interval& covered : config_.sensor.covered) {
+    if (time_s >= covered.from && time_s < covered.to) factor *= kCoveredLight;
+  }
+  return factor;
+}
+
+std::vector<std::uint8_t> Renderer::render(double t0_s, std::int64_t sequence) const {
+  const SensorConfig& sensor = config_.sensor;
+  const int width = config_.image.width;
+  const int height = config_.image.height;
+  const auto row_size = static_cast<std::size_t>(width);
+
+  const double readout = height * config_.camera.line_delay;
+  const Eigen::Matrix3d before =
+      camera_.base_from_camera_at(t0_s + readout / 2 - sensor.exposure / 2);
+  const Eigen::Matrix3d after =
+      camera_.base_from_camera_at(t0_s + readout / 2 + sensor.exposure / 2);
+  // The norm of a difference of rotations by the small angle a is sqrt(2) a.
+  const double blur = config_.camera.focal_length * (after - before).norm() / std::sqrt(2.0);
+  const int exposures = std::clamp(4 * static_cast<int>(std::ceil(blur / 4)), 4, kMostExposures);
+
+  const double corner_squared = (width * width + height * height) / 4.0;
+  const std::uint64_t noise_seed =
+      mix(mix(config_.seed, static_cast<std::uint64_t>(Stream::kPixel)),
+          static_cast<std::uint64_t>(sequence));
+
+  std::vector<std::uint8_t> image(row_size * static_cast<std::size_t>(height));
+  std::vector<double> x(row_size);
+  std::vector<double> y(row_size);
+  std::vector<float> signal(row_size);
+  for (int row = 0; row < height; ++row) {
+    const double v = row + 0.5;
+    const double row_time = t0_s + v * config_.camera.line_delay;
+    std::fill(signal.begin(), signal.end(), 0.0F);
+    for (int i = 0; i < exposures; ++i) {
+      const double time = row_time + sensor.exposure * ((i + 0.5) / exposures - 0.5);
+      const auto& [offset_u, offset_v] = kPointsOfPixel.at(static_cast<std::size_t>(i % 4));
+      rays_of_row(v + offset_v, offset_u, time, &x, &y);
+      scene_.shade(camera_.base_from_camera_at(time), time, x.data(), y.data(), row_size,
+                   1.0F / static_cast<float>(exposures), signal.data());
+    }
+
+    const double row_light = 255 * light(row_time);
+    const double from_axis_v = v - height / 2.0;
+    std::uint64_t bits = 0;
+    std::uint8_t* out = image.data() + static_cast<std::size_t>(row) * row_size;
+    const std::uint64_t row_seed = mix(noise_seed, static_cast<std::uint64_t>(row));
+    for (int column = 0; column < width; ++column) {
+      const auto i = static_cast<std::size_t>(column);
+      const double from_axis_u = column + 0.5 - width / 2.0;
+      const double r_squared =
+          (from_axis_u * from_axis_u + from_axis_v * from_axis_v) / corner_squared;
+      // Catmull-Rom overshoots a little at crisp edges; light is not negative.
+      const double grey =
+          std::max(0.0F, signal[i]) * row_light * (1 - sensor.vignetting * r_squared);
+      if (column % 4 == 0) bits = mix(row_seed, static_cast<std::uint64_t>(column));
+      const double normal = normal_quantiles_[(bits >> (16 * (column % 4))) & 0xffffU];
+      const double noisy = grey + normal * std::sqrt(sensor.shot_noise * grey +
+                                                     sensor.read_noise * sensor.read_noise);
+      out[i] = static_cast<std::uint8_t>(std::clamp(noisy + 0.5, 0.0, 255.0));
+    }
+  }
+  return image;
+}
+
+}  // namespace alidade::simulator

@@ -1,0 +1,55 @@
+#pragma once
+// Frames of the virtual camera, row by row: every row sees the scene with the orientation of its own
+// time, evaluated on the true path.
+//
+// A pixel's signal is the mean over its area and its exposure: sub-exposures spread evenly over the
+// exposure, each with the orientation of its own moment and taken in turn at one of four points of
+// the pixel, at least four of them and at most one pixel of motion apart (until kMostExposures).
+// Then, in grey levels (255 = white): vignetting 1 - a (r / r_corner)^2, brightness step, lens cover,
+// noise of variance shot_noise * signal + read_noise^2, rounding and clipping to 8 bits.
+// Boil moves each pixel's ray by a random field, smooth in space (about a tenth of the image) and time
+// (about a quarter of a second), of zero mean and the standard deviation asked for.
+// render() is thread-safe, and what it makes depends on its arguments only.
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "test/simulator/camera_model.h"
+#include "test/simulator/scene.h"
+
+namespace alidade::simulator {
+
+class Renderer {
+ public:
+  // The path must outlive the renderer. Throws ConfigError as Scene does.
+  Renderer(const Config& config, const Path& path);
+
+  // The frame whose row coordinate 0 is exposed at t0_s: width x height bytes, row after row.
+  // `sequence` selects the noise.
+  [[nodiscard]] std::vector<std::uint8_t> render(double t0_s, std::int64_t sequence) const;
+
+  // Whether the scene and the sensor look the same after a period of the path (but for the noise).
+  [[nodiscard]] bool steady() const;
+
+  [[nodiscard]] const CameraModel& camera() const { return camera_; }
+
+ private:
+  struct Wave {
+    double along_u, along_v, along_time, phase;  // rad/px, rad/px, rad/s, rad
+    Eigen::Vector2d amplitude;                   // px
+  };
+
+  [[nodiscard]] Eigen::Vector2d boil(double u, double v, double time_s) const;
+  void rays_of_row(double v, double offset_u, double time_s, std::vector<double>* x,
+                   std::vector<double>* y) const;
+  [[nodiscard]] double light(double time_s) const;
+
+  Config config_;
+  CameraModel camera_;
+  Scene scene_;
+  std::vector<Wave> waves_;
+  std::vector<float> normal_quantiles_;  // 65536 equally likely values of N(0, 1)
+};
+
+}  // namespace alidade::simulator

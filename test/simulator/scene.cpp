@@ -1,0 +1,238 @@
+#include "test/simulator/scene.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <opencv2/imgcodecs.hpp>
+#include <optional>
+#include <string>
+
+#include "test/simulator/random.h"
+
+namespace alidade::simulator {
+namespace {
+
+// Texels a pixel at the optical axis: dense enough that Catmull-Rom passes what a pixel passes.
+constexpr double kTexelsPerPixel = 1.4;
+constexpr double kLargestTexture = 2e8;  // texels; 2 bytes each, and 4/3 of that with the pyramid
+constexpr int kProceduralWidth = 1024;   // px of the generated photo
+// The mip level is chosen once for so many pixels of a row.
+constexpr std::size_t kBlock = 16;
+constexpr std::size_t kMostPatches = 32;
+
+using Projection = PatchConfig::Projection;
+
+// Rows: right, down and outward at the patch's centre, in base.
+Eigen::Matrix3d patch_from_base(double azimuth, double elevation) {
+  Eigen::Matrix3d rows;
+  rows.row(0) << -std::sin(azimuth), std::cos(azimuth), 0;
+  rows.row(2) = direction(azimuth, elevation).transpose();
+  rows.row(1) = rows.row(2).cross(rows.row(0));
+  return rows;
+}
+
+// Patch coordinates of a direction in the patch's frame; false if on the far side.
+inline bool patch_coordinates(Projection projection, double right, double down, double outward,
+                              double* x, double* y) {
+  if (projection == Projection::kEquirectangular) {
+    *x = std::atan2(right, outward);
+    *y = std::atan2(down, std::hypot(right, outward));
+    return true;
+  }
+  if (outward <= 0) return false;
+  *x = right / outward;
+  *y = down / outward;
+  return true;
+}
+
+double half_extent(Projection projection, double angle) {
+  return projection == Projection::kTangent ? std::tan(angle / 2) : angle / 2;
+}
+
+// The part of a patch, in patch coordinates, that holds everything seen, with a margin of a tenth.
+std::optional<Eigen::AlignedBox2d> seen_part(const PatchConfig& config,
+                                             const std::vector<Eigen::Vector3d>& seen,
+                                             const Eigen::Vector2d& half_size) {
+  const Eigen::Matrix3d rows = patch_from_base(config.azimuth, config.elevation);
+  Eigen::AlignedBox2d box;
+  for (const Eigen::Vector3d& d_base : seen) {
+    const Eigen::Vector3d d_patch = rows * d_base;
+    // Just above the patch plane's horizon the tangents run away, far beyond any patch.
+    if (config.projection == Projection::kTangent && d_patch.z() < 0.02) continue;
+    Eigen::Vector2d point;
+    if (patch_coordinates(config.projection, d_patch.x(), d_patch.y(), d_patch.z(), &point.x(),
+                          &point.y())) {
+      box.extend(point);
+    }
+  }
+  if (box.isEmpty()) return std::nullopt;
+  const Eigen::Vector2d margin = 0.1 * box.sizes();
+  box.min() -= margin;
+  box.max() += margin;
+  box = box.intersection(Eigen::AlignedBox2d(-half_size, half_size));
+  if (box.isEmpty() || box.sizes().minCoeff() <= 0) return std::nullopt;
+  return box;
+}
+
+// A rectangle with a coarse pattern, so that it looks like something and not like a flat area.
+cv::Mat object_picture(double brightness) {
+  cv::Mat picture(32, 64, CV_32F, cv::Scalar(brightness));
+  for (int y = 4; y < 28; ++y) {
+    for (int x = 4; x < 60; ++x) {
+      if ((x / 14 + y / 12) % 2 == 0) picture.at<float>(y, x) += brightness > 0.5 ? -0.3F : 0.3F;
+    }
+  }
+  return picture;
+}
+
+}  // namespace
+
+Eigen::Vector3d direction(double azimuth, double elevation) {
+  return {std::cos(elevation) * std::cos(azimuth), std::cos(elevation) * std::sin(azimuth),
+          -std::sin(elevation)};
+}
+
+Scene::Scene(const SceneConfig& config, double focal_length,
+             const std::vector<Eigen::Vector3d>& seen, std::uint64_t seed)
+    : background_(static_cast<float>(config.background)), pixels_per_unit_(focal_length) {
+  for (const PatchConfig& moving : config.moving) {
+    add_object(moving, object_picture(moving.brightness));
+  }
+  for (const PatchConfig& flat : config.flat) {
+    add_object(flat, cv::Mat(8, 8, CV_32F, cv::Scalar(flat.brightness)));
+  }
+  const double density = focal_length * kTexelsPerPixel;
+  std::uint64_t texture_seed = mix(seed, static_cast<std::uint64_t>(Stream::kTexture));
+  for (const PatchConfig& photo : config.photos) {
+    cv::Mat bytes = cv::imread(photo.file.string(), cv::IMREAD_GRAYSCALE);
+    if (bytes.empty()) throw ConfigError(photo.file.string() + ": not a picture that can be read");
+    cv::Mat picture;
+    bytes.convertTo(picture, CV_32F, 1 / 255.0);
+    add_photo(photo, picture, seen, density, config.detail, ++texture_seed);
+  }
+  for (const PatchConfig& procedural : config.procedural) {
+    const double shape = half_extent(procedural.projection, procedural.height) /
+                         half_extent(procedural.projection, procedural.width);
+    const int height = std::max(1, static_cast<int>(std::lround(kProceduralWidth * shape)));
+    ++texture_seed;
+    add_photo(procedural, make_procedural(kProceduralWidth, height, mix(texture_seed)), seen,
+              density, config.detail, texture_seed);
+  }
+  if (patches_.size() > kMostPatches) {
+    throw ConfigError("scene: at most " + std::to_string(kMostPatches) + " patches can be seen");
+  }
+}
+
+void Scene::add_object(const PatchConfig& config, const cv::Mat& picture) {
+  const Eigen::Vector2d half_size(half_extent(config.projection, config.width),
+                                  half_extent(config.projection, config.height));
+  const Eigen::Vector2d texels(picture.cols, picture.rows);
+  patches_.push_back(
+      {config, Texture(picture), -half_size, texels.cwiseQuotient(2 * half_size), half_size});
+}
+
+void Scene::add_photo(const PatchConfig& config, cv::Mat photo,
+                      const std::vector<Eigen::Vector3d>& seen, double density, double detail,
+                      std::uint64_t seed) {
+  Eigen::Vector2d half_size;
+  half_size.x() = half_extent(config.projection, config.width);
+  half_size.y() = half_size.x() * photo.rows / photo.cols;
+  const std::string name = config.file.empty() ? "procedural patch" : config.file.string();
+  if (config.projection == Projection::kEquirectangular && half_size.y() > 1.5708) {
+    throw ConfigError(name + ": is more than 180 degrees high; make it narrower");
+  }
+  const auto part = seen_part(config, seen, half_size);
+  if (!part) return;
+
+  const double photo_density = photo.cols / (2 * half_size.x());
+  const Eigen::Vector2d low = (part->min() + half_size) * photo_density;
+  const Eigen::Vector2d high = (part->max() + half_size) * photo_density;
+  const cv::Point first(static_cast<int>(std::floor(low.x())) - 4,
+                        static_cast<int>(std::floor(low.y())) - 4);
+  const cv::Point last(static_cast<int>(std::ceil(high.x())) + 4,
+                       static_cast<int>(std::ceil(high.y())) + 4);
+  const cv::Rect window = cv::Rect(first, last) & cv::Rect(0, 0, photo.cols, photo.rows);
+  const double scale = density / photo_density;
+  if (window.width * scale * window.height * scale > kLargestTexture) {
+    throw ConfigError(name + ": the area swept at this focal length is too large to be prepared; " +
+                      "take a smaller path amplitude, width_deg or focal_length_px");
+  }
+  cv::Mat picture = make_detailed(photo, window, scale, detail, seed);
+  const Eigen::Vector2d texels(picture.cols, picture.rows);
+  const Eigen::Vector2d extent = Eigen::Vector2d(window.width, window.height) / photo_density;
+  const Eigen::Vector2d corner = Eigen::Vector2d(window.x, window.y) / photo_density - half_size;
+  patches_.push_back({config, Texture(picture), corner, texels.cwiseQuotient(extent), half_size});
+}
+
+void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, const double* x,
+                  const double* y, std::size_t count, float weight, float* sum) const {
+  std::array<Eigen::Matrix3d, kMostPatches> patch_from_camera;
+  for (std::size_t n = 0; n < patches_.size(); ++n) {
+    const PatchConfig& config = patches_[n].config;
+    patch_from_camera[n] = patch_from_base(config.azimuth + config.azimuth_rate * time_s,
+                                           config.elevation + config.elevation_rate * time_s) *
+                           base_from_camera;
+  }
+
+  std::array<float, kBlock> shine{};  // light of the block, front patches first
+  std::array<float, kBlock> open{};   // share of each pixel that no patch has covered yet
+  for (std::size_t start = 0; start < count; start += kBlock) {
+    const std::size_t size = std::min(kBlock, count - start);
+    shine.fill(0);
+    open.fill(1);
+    for (std::size_t n = 0; n < patches_.size(); ++n) {
+      const Patch& patch = patches_[n];
+      const Eigen::Matrix3d& turn = patch_from_camera[n];
+      std::array<double, kBlock> texel_x{};
+      std::array<double, kBlock> texel_y{};
+      std::array<float, kBlock> cover{};
+      bool any = false;
+      for (std::size_t i = 0; i < size; ++i) {
+        const double ray_x = x[start + i];
+        const double ray_y = y[start + i];
+        double px = 0;
+        double py = 0;
+        // A NaN ray is outside every patch: all comparisons with it are false.
+        if (open[i] > 0 &&
+            patch_coordinates(patch.config.projection,
+                              turn(0, 0) * ray_x + turn(0, 1) * ray_y + turn(0, 2),
+                              turn(1, 0) * ray_x + turn(1, 1) * ray_y + turn(1, 2),
+                              turn(2, 0) * ray_x + turn(2, 1) * ray_y + turn(2, 2), &px, &py)) {
+          texel_x[i] = (px - patch.corner.x()) * patch.density.x();
+          texel_y[i] = (py - patch.corner.y()) * patch.density.y();
+          const double inside = pixels_per_unit_ * std::min(patch.half_size.x() - std::abs(px),
+                                                            patch.half_size.y() - std::abs(py));
+          if (inside > -0.5) {
+            cover[i] = static_cast<float>(std::min(inside + 0.5, 1.0));
+            any = true;
+          }
+        }
+      }
+      if (!any) continue;
+      // Texels from pixel to pixel: at most one texel of the level keeps the picture smooth.
+      double spacing = 1;
+      for (std::size_t i = 0; i + 1 < size; ++i) {
+        if (cover[i] > 0 && cover[i + 1] > 0) {
+          spacing =
+              std::max(1e-3, std::hypot(texel_x[i + 1] - texel_x[i], texel_y[i + 1] - texel_y[i]));
+          break;
+        }
+      }
+      const int level = std::clamp(static_cast<int>(std::lround(std::log2(0.7 * spacing))), 0,
+                                   patch.texture.highest_level());
+      for (std::size_t i = 0; i < size; ++i) {
+        if (cover[i] <= 0) continue;
+        shine[i] += open[i] * cover[i] * patch.texture.sample(texel_x[i], texel_y[i], level);
+        open[i] *= 1 - cover[i];
+      }
+    }
+    for (std::size_t i = 0; i < size; ++i) {
+      if (x[start + i] == x[start + i]) {
+        sum[start + i] += weight * (shine[i] + open[i] * background_);
+      }
+    }
+  }
+}
+
+}  // namespace alidade::simulator

@@ -1,0 +1,43 @@
+#include "test/simulator/telemetry.h"
+
+#include <cmath>
+
+#include "test/simulator/random.h"
+
+namespace alidade::simulator {
+
+double wrapped(double angle) {
+  constexpr double kTwoPi = 6.28318530717958647692;
+  return angle - kTwoPi * std::floor(angle / kTwoPi + 0.5);
+}
+
+Telemetry::Telemetry(const Config& config, const Path& path)
+    : config_(config.telemetry),
+      pan_scale_(config.camera.pan_scale),
+      tilt_scale_(config.camera.tilt_scale),
+      path_(&path),
+      noise_(make_generator(config.seed, Stream::kAngle)),
+      stale_(make_generator(config.seed, Stream::kStaleRepeat)) {}
+
+Angles Telemetry::measure(double time_s) {
+  const bool stale = std::bernoulli_distribution(config_.stale_repeat_probability)(stale_);
+  if (stale && last_) return *last_;
+
+  if (config_.internal_rate_hz > 0) {
+    const auto refresh = static_cast<std::int64_t>(std::floor(time_s * config_.internal_rate_hz));
+    if (last_ && refresh_ == refresh) return *last_;
+    refresh_ = refresh;
+    time_s = static_cast<double>(refresh) / config_.internal_rate_hz;
+  }
+  const auto report = [this](double truth, double scale) {
+    double value = scale * wrapped(truth) + config_.sigma * normal_(noise_);
+    if (config_.quantum > 0) value = std::round(value / config_.quantum) * config_.quantum;
+    return wrapped(value);
+  };
+  const Angles truth = path_->at(time_s);
+  const double pan = report(truth.pan, pan_scale_);
+  last_ = Angles{pan, report(truth.tilt, tilt_scale_)};
+  return *last_;
+}
+
+}  // namespace alidade::simulator

@@ -1,0 +1,40 @@
+#pragma once
+// What the virtual pan/tilt head reports: the true angle, scaled, noisy, rounded, sometimes old.
+//
+//   measured = round(wrap(scale * wrap(true angle) + N(0, sigma)) / quantum) * quantum   (PTCEE 17)
+//
+// With internal_rate_hz the head refreshes its value at multiples of that period and repeats it in
+// between: the value is then up to one such period old, half of it on average, and so much is to be
+// added to the clock offset that an estimator finds. A stale repeat is the value of the sample before.
+// Angles are rad, wrapped to [-pi, pi). Not thread-safe.
+
+#include <cstdint>
+#include <optional>
+#include <random>
+
+#include "test/simulator/path.h"
+
+namespace alidade::simulator {
+
+// Into [-pi, pi).
+[[nodiscard]] double wrapped(double angle);
+
+class Telemetry {
+ public:
+  // The path must outlive this.
+  Telemetry(const Config& config, const Path& path);
+
+  // What the head says when the truth is that of time_s.
+  [[nodiscard]] Angles measure(double time_s);
+
+ private:
+  TelemetryConfig config_;
+  double pan_scale_, tilt_scale_;
+  const Path* path_;
+  std::mt19937_64 noise_, stale_;
+  std::normal_distribution<double> normal_;
+  std::optional<std::int64_t> refresh_;  // count of the internal refresh that made last_
+  std::optional<Angles> last_;
+};
+
+}  // namespace alidade::simulator

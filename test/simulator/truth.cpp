@@ -1,0 +1,55 @@
+#include "test/simulator/truth.h"
+
+#include <iomanip>
+#include <stdexcept>
+
+#include "test/simulator/telemetry.h"
+
+namespace alidade::simulator {
+
+OutputFile::OutputFile(const std::filesystem::path& file) : file_(file), stream_(file) {
+  stream_ << std::setprecision(15);
+  if (!stream_) throw std::runtime_error(file_.string() + ": cannot be written");
+}
+
+void OutputFile::flush() {
+  stream_.flush();
+  if (!stream_) throw std::runtime_error(file_.string() + ": writing failed");
+}
+
+void write_truth_yaml(const std::filesystem::path& file, const Config& config,
+                      const CameraModel& camera) {
+  OutputFile output(file);
+  const auto value = [&](const char* name, double number) {
+    output.stream() << name << ": {value: " << number << ", sigma: 0}\n";
+  };
+  const auto axis = [&](const char* name, const Eigen::Vector3d& vector) {
+    output.stream() << name << ": {value: [" << vector.x() << ", " << vector.y() << ", "
+                    << vector.z() << "], sigma: [0, 0]}\n";
+  };
+  output.stream() << "format: 1\nimage: {width: " << config.image.width
+                  << ", height: " << config.image.height << "}\n";
+  value("focal_length", config.camera.focal_length);
+  value("aspect", config.camera.aspect);
+  value("radial_distortion", config.camera.radial_distortion);
+  value("line_delay", config.camera.line_delay);
+  axis("pan_axis", camera.pan_axis());
+  axis("tilt_axis", camera.tilt_axis());
+  value("pan_scale", config.camera.pan_scale);
+  value("tilt_scale", config.camera.tilt_scale);
+  value("clock_offset", config.camera.clock_offset);
+  output.flush();
+}
+
+TruthCsv::TruthCsv(const std::filesystem::path& file) : file_(file) {
+  file_.stream() << "frame,time_s,pan_rad,tilt_rad,sequence,sender_time_s,stamp_time_s\n";
+}
+
+void TruthCsv::add(const FrameEvent& event, const Angles& angles, double origin_s) {
+  std::ofstream& out = file_.stream();
+  out << event.frame << ',' << origin_s + event.capture_s << ',' << wrapped(angles.pan) << ','
+      << wrapped(angles.tilt) << ',' << event.sequence << ',' << origin_s + event.sender_s << ','
+      << origin_s + event.stamp_s << '\n';
+}
+
+}  // namespace alidade::simulator

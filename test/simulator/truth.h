@@ -1,0 +1,50 @@
+#pragma once
+// truth.yaml and truth.csv: what an estimator should have found. For evaluation only.
+//
+// truth.yaml holds the camera under the names of calibration.yaml, every sigma 0, so that it serves as
+// a perfect calibration too. truth.csv has one line a frame:
+//   frame        0, 1, 2, ... of the frames delivered
+//   time_s       when row coordinate 0 was exposed: on the image clock in a recording, on the host's
+//                CLOCK_MONOTONIC when live
+//   pan_rad, tilt_rad   true angles at that time, wrapped to [-pi, pi)
+//   sequence     counts the lost frames too
+//   sender_time_s       the same moment on the sender's own, perhaps skewed clock
+//   stamp_time_s        recording: the stamp in frames.csv; live: when the frame is handed out
+
+#include <filesystem>
+#include <fstream>
+
+#include "test/simulator/camera_model.h"
+#include "test/simulator/timeline.h"
+
+namespace alidade::simulator {
+
+// Throws std::runtime_error naming the file if it cannot be written; so do the others here.
+void write_truth_yaml(const std::filesystem::path& file, const Config& config,
+                      const CameraModel& camera);
+
+// An output file with its name, that notices when writing fails.
+class OutputFile {
+ public:
+  explicit OutputFile(const std::filesystem::path& file);
+  std::ofstream& stream() { return stream_; }
+  // Also checks for errors.
+  void flush();
+
+ private:
+  std::filesystem::path file_;
+  std::ofstream stream_;
+};
+
+class TruthCsv {
+ public:
+  explicit TruthCsv(const std::filesystem::path& file);
+  // The times of the event are shifted by origin_s: 0 in a recording.
+  void add(const FrameEvent& event, const Angles& angles, double origin_s);
+  void flush() { file_.flush(); }
+
+ private:
+  OutputFile file_;
+};
+
+}  // namespace alidade::simulator
