@@ -3,6 +3,13 @@
 #include "core/model/direction.h"
 
 namespace alidade {
+namespace {
+
+// The last parameters, on which the orientation of row 0 depends: axes, scales, clock offset.
+constexpr int kMountParameters = kParameterCount - index(Parameter::kPanAxis0);
+static_assert(index(Parameter::kClockOffset) == kParameterCount - 1 && kMountParameters == 7);
+
+}  // namespace
 
 ProjectionStatus FrameOrientation::direction(const Vector2<double>& u, Vector3<double>* d_b,
                                              Matrix2<double>* cov) const {
@@ -54,12 +61,13 @@ bool make_frame_orientation(const Calibration& calibration, double time_s, Orien
   const Matrix3<double> R =
       R_base_from_camera(calibration.mechanics, angle, &J_xi_angle, &J_xi_axes);
   const FrameMotion<double> motion{angle, rate, 0.0};
-  Matrix<double, 3, kParameterCount> J_xi_parameters =
-      J_xi_angle * motion_parameter_jacobian(calibration.mechanics, motion).topRows<2>();
-  J_xi_parameters.middleCols<4>(index(Parameter::kPanAxis0)) += J_xi_axes;
+  Matrix<double, 3, kMountParameters> J_xi_mount;
+  J_xi_mount << J_xi_axes, J_xi_angle * motion_parameter_jacobian(calibration.mechanics, motion)
+                                            .topRightCorner<2, kMountParameters - 4>();
   const Matrix3<double> orientation_covariance =
       J_xi_angle * motion_covariance.topLeftCorner<2, 2>() * J_xi_angle.transpose() +
-      J_xi_parameters * calibration.covariance * J_xi_parameters.transpose();
+      J_xi_mount * calibration.covariance.bottomRightCorner<kMountParameters, kMountParameters>() *
+          J_xi_mount.transpose();
   const Vector3<double> angular_velocity = J_xi_angle * rate.vector();  // PTCEE 46
   if (!std::isfinite(time_s) || !all_finite(R) || !all_finite(angular_velocity) ||
       !all_finite(motion_covariance) || !all_finite(orientation_covariance)) {

@@ -233,7 +233,8 @@ class TelemetryBuffer {
   }
 
   PushStatus repeat(TelemetryKnot added) {
-    if (added.time_s <= last_poll_s_) return PushStatus::kStaleRepeat;
+    if (added.time_s == last_poll_s_) return PushStatus::kDuplicateTime;
+    if (added.time_s < last_poll_s_) return PushStatus::kStaleRepeat;
     last_poll_s_ = added.time_s;
     repeated_ = true;
     added.time_s -= limits_.max_repeat_s;
@@ -297,8 +298,6 @@ class TelemetryBuffer {
     }
     return counters_.not_finite;
   }
-
-  static constexpr double kPi = static_cast<double>(EIGEN_PI);
 
   TelemetryNoise noise_;
   TelemetryLimits limits_;

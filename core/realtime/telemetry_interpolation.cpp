@@ -1,6 +1,5 @@
 #include "core/realtime/telemetry_interpolation.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,21 +9,27 @@ namespace {
 
 constexpr int kCubicCoefficients = 4;
 constexpr int kLeastCubicSamples = kCubicCoefficients + 2;
+// Smallest norm of a power of time once the lower ones are taken out: samples bunched at fewer than
+// four times fall below.
+constexpr double kLeastIndependence = 1e-4;
 
 // 95 % quantiles of chi-square with 2, 3 and 4 degrees of freedom.
 constexpr std::array<double, 3> kChiSquareBound = {5.991, 7.815, 9.488};
 static_assert(kInterpolationWindow - kLeastCubicSamples + 1 == kChiSquareBound.size());
 
+// One column a sample; the columns beyond the last sample are zero.
+template <int kRows>
+using Rows = Eigen::Matrix<double, kRows, kInterpolationWindow, Eigen::RowMajor>;
+
+// Pan and tilt, relative to one of the samples.
+using Angles = Rows<2>;
+
 // An answer as weighted sums of the samples: rows angle, rate.
 struct Weights {
-  Matrix<double, 2, kInterpolationWindow> of_sample =
-      Matrix<double, 2, kInterpolationWindow>::Zero();
+  Rows<2> of_sample = Rows<2>::Zero();
   // What an acceleration of 1 rad/s^2 does to (angle, rate) unseen by the sums.
   Vector2<double> acceleration_effect = Vector2<double>::Zero();
 };
-
-// The samples' angles relative to one of them, one axis a row.
-using Angles = Matrix<double, 2, kInterpolationWindow>;
 
 // What one sample's angle is worth, without the errors of its time.
 double angle_variance(const TelemetryNoise& noise) {
@@ -61,44 +66,57 @@ Vector2<double> acceleration_square_by_differences(const TelemetryKnot* knots, i
   return largest;
 }
 
-// Weights of the least-squares cubic's value, slope and curvature at time_s. False if the samples
-// cannot carry a cubic, or do not lie on one.
+// Weights of the least-squares cubic's value and slope at time_s. False if the samples cannot carry
+// a cubic, or do not lie on one.
 bool cubic_weights(const TelemetryKnot* knots, int count, double time_s, const Angles& angles,
                    double variance, Weights* weights, Vector2<double>* acceleration_square) {
   if (count < kLeastCubicSamples) return false;
   const double scale = 0.5 * (knots[count - 1].time_s - knots[0].time_s);
-  using Powers = Matrix<double, kCubicCoefficients, kInterpolationWindow>;
-  Powers powers = Powers::Zero();
+  // The rows 1, x, x^2, x^3 at the samples, made orthonormal: rows = R^T Q, R upper triangular.
+  Rows<kCubicCoefficients> Q = Rows<kCubicCoefficients>::Zero();
   double own_variance = 0;
   for (int i = 0; i < count; ++i) {
     const double x = (knots[i].time_s - time_s) / scale;
-    powers.col(i) << 1, x, x * x, x * x * x;
+    Q(0, i) = 1;
+    Q(1, i) = x;
+    Q(2, i) = x * x;
+    Q(3, i) = x * x * x;
     own_variance += knots[i].own_variance / count;
   }
-  const Matrix4<double> normal = powers * powers.transpose();
-  const Eigen::LLT<Matrix4<double>> cholesky(normal);
-  if (cholesky.info() != Eigen::Success) return false;
-  const Powers to_coefficients = cholesky.solve(powers);
-  const Matrix<double, 2, kCubicCoefficients> coefficients = angles * to_coefficients.transpose();
-
-  const Vector2<double> rate = coefficients.col(1) / scale;
-  const Vector2<double> residual_square =
-      (angles - coefficients * powers).leftCols(count).rowwise().squaredNorm();
-  const double bound = kChiSquareBound[static_cast<std::size_t>(count - kLeastCubicSamples)];
-  for (int axis = 0; axis < 2; ++axis) {
-    if (!(residual_square[axis] <= bound * (variance + own_variance * rate[axis] * rate[axis]))) {
-      return false;
+  Matrix4<double> R = Matrix4<double>::Zero();
+  for (int i = 0; i < kCubicCoefficients; ++i) {
+    for (int j = 0; j < i; ++j) {
+      R(j, i) = Q.row(j).dot(Q.row(i));
+      Q.row(i) -= R(j, i) * Q.row(j);
     }
+    R(i, i) = Q.row(i).norm();
+    if (!(R(i, i) > kLeastIndependence)) return false;
+    Q.row(i) /= R(i, i);
+  }
+  // Coefficients = to_coefficients * angles; R^-1 Q.
+  Rows<kCubicCoefficients> to_coefficients = Q;
+  for (int i = kCubicCoefficients - 1; i >= 0; --i) {
+    for (int j = i + 1; j < kCubicCoefficients; ++j) {
+      to_coefficients.row(i) -= R(i, j) * to_coefficients.row(j);
+    }
+    to_coefficients.row(i) /= R(i, i);
+  }
+
+  const double bound = kChiSquareBound[static_cast<std::size_t>(count - kLeastCubicSamples)];
+  const double to_acceleration = 2 / (scale * scale);
+  const double acceleration_variance =
+      to_acceleration * to_acceleration * variance * to_coefficients.row(2).squaredNorm();
+  for (int axis = 0; axis < 2; ++axis) {
+    Rows<1> residual = angles.row(axis);
+    for (int i = 0; i < kCubicCoefficients; ++i) residual -= residual.dot(Q.row(i)) * Q.row(i);
+    const double rate = angles.row(axis).dot(to_coefficients.row(1)) / scale;
+    if (!(residual.squaredNorm() <= bound * (variance + own_variance * rate * rate))) return false;
+    const double acceleration = to_acceleration * angles.row(axis).dot(to_coefficients.row(2));
+    (*acceleration_square)[axis] =
+        std::max(acceleration * acceleration - acceleration_variance, 0.0);
   }
   weights->of_sample.row(0) = to_coefficients.row(0);
   weights->of_sample.row(1) = to_coefficients.row(1) / scale;
-  weights->acceleration_effect.setZero();
-  const double to_acceleration = 2 / (scale * scale);
-  *acceleration_square =
-      (to_acceleration * to_acceleration *
-       (coefficients.col(2).array().square() - variance * to_coefficients.row(2).squaredNorm()))
-          .max(0.0)
-          .matrix();
   return true;
 }
 
