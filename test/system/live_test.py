@@ -1,0 +1,176 @@
+#!/usr/bin/env python3
+"""The edge executable against the virtual camera: real processes, real RTSP, real HTTP."""
+import json
+import pathlib
+import signal
+import unittest
+
+from harness import (CLOCK_OFFSET_MS, FOCAL_LENGTH_PX, IMAGE, LINE_DELAY_US, Process, SIMULATE, SystemTest,
+                     TELEMETRY_SIGMA_RAD, Truth, free_port, rms, wait_until)
+
+FIELDS = {"frame", "time_s", "receive_time_s", "mode", "calibrated", "pan_rad", "tilt_rad", "pan_rate_rad_s",
+          "tilt_rate_rad_s", "q_base_from_camera", "orientation_sigma_rad", "landmarks", "line_delay_s",
+          "focal_length_px", "aspect", "radial_distortion", "latency_s"}
+
+
+class Run(SystemTest):
+    def records(self, process, count, keep=lambda record: record["mode"] == "PT"):
+        """The next `count` records that are kept."""
+        kept = []
+        while len(kept) < count:
+            line = process.line()
+            self.assertIsNotNone(line, f"ended after {len(kept)} records\n{process.error_text()}")
+            record = json.loads(line)
+            if keep(record):
+                kept.append(record)
+        return kept
+
+    def assert_angles_are_true(self, records, camera):
+        """Angles agree with the truth as the records' own sigmas say."""
+        camera.end(signal.SIGTERM)
+        truth = Truth(camera.truth)
+        offset = CLOCK_OFFSET_MS * 1e-3
+        errors, speeds = [], []
+        for record in records:
+            angles = truth.angles(record["time_s"] + offset)
+            if angles is None:
+                continue
+            errors += [record["pan_rad"] - angles[0], record["tilt_rad"] - angles[1]]
+            speeds += [record["pan_rate_rad_s"], record["tilt_rate_rad_s"]]
+        self.assertGreaterEqual(len(errors), len(records), "hardly any record matches a true frame")
+        # Noise of two samples, plus the time that packets need on loopback: below 10 ms even on a busy machine,
+        # where a forgotten clock offset would make 84 ms.
+        self.assertLess(rms(errors), 2 * TELEMETRY_SIGMA_RAD + 0.010 * rms(speeds))
+
+    def check_run(self, video=None, **options):
+        camera = self.camera(**options)
+        user = options.get("user", "")
+        login = {"user": user, "password_env": "TEST_PASSWORD"} if user else {}
+        config = self.write_config(camera, video={**login, **(video or {})}, pan_tilt=login)
+        run = self.alidade("run", "-c", config, TEST_PASSWORD="right horse")
+        records = self.records(run, 60)
+        code, _ = run.end(signal.SIGINT)
+        self.assertEqual(code, 0, run.error_text())
+        for record in records:
+            self.assertLessEqual(FIELDS, record.keys())
+            self.assertTrue(record["calibrated"])
+            self.assertAlmostEqual(record["line_delay_s"], LINE_DELAY_US * 1e-6, places=12)
+            self.assertAlmostEqual(record["focal_length_px"], FOCAL_LENGTH_PX)
+        frames = [record["frame"] for record in records]
+        self.assertEqual(frames, sorted(set(frames)))
+        self.assert_angles_are_true(records, camera)
+        self.assertNotIn("right horse", run.error_text())
+
+    def test_mjpeg_over_tcp(self):
+        self.check_run()
+
+    def test_h264_over_udp(self):
+        self.check_run(codec="h264", video={"transport": "udp"})
+
+    def test_with_digest_login(self):
+        self.check_run(user="viewer")
+
+    def test_survives_the_death_and_return_of_the_camera(self):
+        rtsp_port, http_port = free_port(), free_port()
+        camera = self.camera(rtsp_port=rtsp_port, http_port=http_port)
+        config = self.write_config(camera, video={"timeout_s": 2, "max_backoff_s": 0.5},
+                                   pan_tilt={"timeout_s": 1, "max_backoff_s": 0.5})
+        run = self.alidade("run", "-c", config)
+        before = self.records(run, 30)
+        camera.end(signal.SIGKILL)
+        lost = self.records(run, 1, keep=lambda record: record["mode"] == "none")[0]
+        self.assertIsNone(lost["q_base_from_camera"])
+        self.assertNotEqual(lost["status"], "ok")
+        second = self.camera(rtsp_port=rtsp_port, http_port=http_port, seed=2)
+        after = self.records(run, 40)
+        self.assertGreater(after[0]["receive_time_s"], before[-1]["receive_time_s"])
+        code, _ = run.end(signal.SIGTERM)
+        self.assertEqual(code, 0, run.error_text())
+        self.assert_angles_are_true(after, second)
+
+    def test_says_that_the_password_is_wrong(self):
+        camera = self.camera(user="viewer")
+        login = {"user": "viewer", "password_env": "TEST_PASSWORD"}
+        config = self.write_config(camera, video=login, pan_tilt=login)
+        for command in ("run", "check"):
+            with self.subTest(command=command):
+                process = self.alidade(command, "-c", config, TEST_PASSWORD="wrong horse")
+                code, _ = process.end()
+                self.assertEqual(code, 1)
+                self.assertIn("password", process.error_text())
+                self.assertNotIn("wrong horse", process.error_text())
+
+    def test_says_that_the_image_size_differs_from_the_calibration(self):
+        camera = self.camera()
+        calibration = self.folder / "other-size.yaml"
+        truth = (camera.truth / "truth.yaml").read_text()
+        self.assertIn(str(IMAGE["width"]), truth)
+        calibration.write_text(truth.replace(f"width: {IMAGE['width']}", "width: 640"))
+        config = self.write_config(camera, calibration={"file": str(calibration)})
+        run = self.alidade("run", "-c", config)
+        code, _ = run.end()
+        self.assertNotEqual(code, 0)
+        self.assertIn("640x180", run.error_text())
+        self.assertIn("320x180", run.error_text())
+
+    def test_ends_when_its_reader_goes_away(self):
+        camera = self.camera()
+        run = self.alidade("run", "-c", self.write_config(camera))
+        self.records(run, 1)
+        run.child.stdout.close()
+        run.child.wait(60)
+        self.assertEqual(run.child.returncode, 0)
+
+    def test_check_reports_what_it_found(self):
+        camera = self.camera()
+        check = self.alidade("check", "-c", self.write_config(camera))
+        code, lines = check.end()
+        self.assertEqual(code, 0, check.error_text())
+        self.assertIn("320x180", "\n".join(lines))
+
+
+class Record(SystemTest):
+    def test_recording_replays_to_the_same_angles(self):
+        camera = self.camera()
+        config = self.write_config(camera)
+        folder = self.folder / "recording"
+        record = self.alidade("record", "-c", config, "-o", folder)
+        frames = folder / "frames.csv"
+        wait_until(lambda: record.child.poll() is not None or
+                   frames.exists() and len(frames.read_text().splitlines()) > 100, "a recording of 100 frames")
+        code, _ = record.end(signal.SIGINT)
+        self.assertEqual(code, 0, record.error_text())
+
+        replay = self.alidade("replay", folder, "--calibration", camera.truth / "truth.yaml", "--json")
+        code, lines = replay.end()
+        self.assertEqual(code, 0, replay.error_text())
+        records = [r for r in map(json.loads, lines) if r["mode"] == "PT"]
+        self.assertGreater(len(records), 60)
+        self.assertTrue((folder / "alidade" / "orientation.csv").exists())
+        self.assert_angles_are_true(records, camera)
+
+    assert_angles_are_true = Run.assert_angles_are_true
+
+
+class Simulate(SystemTest):
+    def test_writes_a_recording_that_replays(self):
+        camera = self.camera()  # for its configuration; the live server is not needed
+        camera.end(signal.SIGTERM)
+        folder = self.folder / "written"
+        config = json.loads((self.folder / "camera-1.yaml").read_text())
+        config["duration_s"] = 4
+        file = self.folder / "write.yaml"
+        file.write_text(json.dumps(config))
+        writer = Process(SIMULATE, "-c", file, "-o", folder)
+        self.processes.append(writer)
+        code, _ = writer.end()
+        self.assertEqual(code, 0, writer.error_text())
+        replay = self.alidade("replay", folder, "--calibration", folder / "truth.yaml")
+        code, _ = replay.end()
+        self.assertEqual(code, 0, replay.error_text())
+        rows = pathlib.Path(folder, "alidade", "orientation.csv").read_text().splitlines()
+        self.assertEqual(len(rows), 1 + 4 * IMAGE["rate_hz"])
+
+
+if __name__ == "__main__":
+    unittest.main()
