@@ -2,16 +2,16 @@
 // calibration.yaml: one calibration as text that a person can read and correct.
 //   format: 1
 //   image: {width: 1920, height: 1080}
-//   focal_length: {value: 32008, sigma: 24}          and so on for every parameter; units are the
-//   model's: pan_axis: {value: [0, 0, 1], sigma: [0, 0]}      px, s, s/row, unit vectors (sigma:
-//   rad in tangent_basis) zoom: 1234                                       optional covariance:
-//   {names: [...], matrix: [[...], ...]} optional; wins over the sigmas, which must agree with it
-// aspect may be absent (1), a sigma may be absent (0: exact). quality and landmarks are accepted
-// and not kept: they belong to the run that wrote them. Everything else is strict: an unknown,
-// missing or doubled key, a text for a number, a number that is not finite or betrays another unit,
-// is one line `file:line: what is wrong; what would be right`. Reading back what was written gives
-// the same bits. Not for the real-time thread: allocates and does input and output. Free of shared
-// state.
+//   focal_length: {value: 32008, sigma: 24}         so for every parameter, in the model's units
+//   pan_axis: {value: [0, 0, 1], sigma: [0, 0]}     unit vector; sigma in rad, in tangent_basis
+//   zoom: 1234                                      optional
+//   covariance: {names: [...], matrix: [[...]]}     optional; the sigmas must agree with it
+// aspect may be absent (1), a sigma may be absent (0, exact, unless the covariance says otherwise).
+// quality and landmarks are accepted and not kept: they belong to the run that wrote them.
+// All else is strict: an unknown, missing or doubled key, text for a number, a number that is not
+// finite or betrays another unit is an error in one line, `file:line: what; what would be right`.
+// Reading back what was written gives the same bits.
+// Not for the real-time thread: allocates, reads and writes files. No shared state.
 
 #include <string>
 

@@ -1,10 +1,11 @@
 #pragma once
 // Pan and tilt angles (rad) on the torus, without seams: a difference goes the short way round.
-//   wrap_angle(x) is the angle in [-pi, pi) that differs from x by whole turns; an x already there
-//   is returned unchanged, bit by bit. NaN and infinities give NaN. plus(p, xi) = wrap(p + xi),
-//   minus(q, p) = wrap(q - p)  (PTCEE 12 to 14; their complex numbers of unit length are replaced
-//   by the wrap). The Jacobians are the identity, for minus its negative with respect to p (PTCEE
-//   15), except at the seam.
+//   wrap_angle(x)    the angle in [-pi, pi) that differs from x by whole turns; an x already there
+//                    is returned unchanged, bit by bit; NaN and infinities give NaN
+//   plus(p, xi)      wrap(p + xi)                                                     (PTCEE 13)
+//   minus(q, p)      wrap(q - p)                                                      (PTCEE 14)
+// The paper's complex numbers of unit length (PTCEE 12) are replaced by the wrap. All Jacobians are
+// the identity, that of minus with respect to p its negative (PTCEE 15).
 // Pan is positive to the right, tilt positive upwards. No allocation.
 
 #include <cmath>

@@ -3,14 +3,15 @@
 //   x = (d_1, d_2) / d_3,   s = 1 + k |x|^2
 //   u = f x_1 s + w/2,      v = alpha f x_2 s + h/2
 // Pixels are continuous, the centre of the top-left pixel is at (0.5, 0.5). The image's border
-// plays no part: pixels outside it have directions too. The inverse needs no iteration. With r_d =
-// |x| s and q = k r_d^2, the ratio m = |x| / r_d solves m + q m^3 = 1, so it is a function of q
-// alone:
-//   q > 0: m = sinh(asinh(y)/3) * 3/y,   q < 0: m = sin(asin(y)/3) * 3/y,   y = sqrt(27 |q| / 4),
-// neither of which cancels, so m keeps full relative accuracy for any q, and the series about q = 0
-// where y's derivative is singular. For k < 0 the model turns back at 3 |k| |x|^2 = 1 (y = 1): no
-// direction beyond projects, no pixel beyond has a direction. Domain: f > 0, alpha > 0. Outputs are
-// written with kOk only. No allocation.
+// plays no part: pixels outside it have directions too.
+// The inverse needs no iteration. With r_d = |x| s and q = k r_d^2, the ratio m = |x| / r_d solves
+// m + q m^3 = 1, so it is a function of q alone:
+//   q > 0: m = sinh(asinh(y)/3) 3/y,   q < 0: m = sin(asin(y)/3) 3/y,   y = sqrt(27 |q| / 4).
+// Neither cancels, so m keeps its relative accuracy for any q; about q = 0, where the derivative of
+// y is singular, a series stands in.
+// For k < 0 the model turns back at 3 |k| |x|^2 = 1 (y = 1): no direction beyond has a pixel, no
+// pixel beyond has a direction.
+// Domain: f > 0, alpha > 0. Outputs are written with kOk only. No allocation.
 
 #include <cmath>
 

@@ -6,9 +6,9 @@
 // Frames: base b is FRD (forward, right, down), fixed to the mount; camera c is RDF (right, down,
 // forward). Axes are unit vectors in b; pan about +z (down) is positive to the right, tilt about +y
 // (right) is positive upwards. Angles in rad, not wrapped by these functions; rates in rad/s.
-// Jacobians of the orientation are those of xi in R Exp(xi), xi in the camera frame (PTCEE 5). An
-// axis changes by a 2-vector in its own tangent_basis (direction.h): J_*_axes has the columns pan
-// axis 0, 1, tilt axis 0, 1. Domain: unit axes, scales other than 0. No allocation.
+// Jacobians of the orientation are those of xi in R Exp(xi), xi in the camera frame (PTCEE 5).
+// An axis changes by a 2-vector in its own tangent_basis (direction.h): J_*_axes has the columns
+// pan axis 0, 1, tilt axis 0, 1. Domain: unit axes, scales other than 0. No allocation.
 
 #include "core/model/angle.h"
 #include "core/model/direction.h"
@@ -106,15 +106,14 @@ template <class S>
   return axes_c * true_rate.vector();
 }
 
-// For angles and, alike, for rates. The Jacobians are diagonal: J_angle = diag(scales), J_scale =
-// diag(angle).
+// For angles and rates alike. Jacobians: J_angle = diag(scale), J_scale = diag(true angle).
 template <class S>
 [[nodiscard]] PanTilt<S> measured_from_true(const Mechanics<S>& mechanics,
                                             const PanTilt<S>& true_angle) {
   return {mechanics.pan_scale * true_angle.pan, mechanics.tilt_scale * true_angle.tilt};
 }
 
-// The Jacobians are diagonal: J_angle = diag(1 / scale), J_scale = diag(-true angle / scale).
+// The inverse: J_angle = diag(1 / scale), J_scale = diag(-true angle / scale).
 template <class S>
 [[nodiscard]] PanTilt<S> true_from_measured(const Mechanics<S>& mechanics,
                                             const PanTilt<S>& measured_angle) {

@@ -1,16 +1,15 @@
 #pragma once
-// Why a projection or a back-projection has, or has not, a result. Outputs are written with kOk
-// only.
+// Why a projection or a back-projection has, or has not, a result.
+// Outputs are written with kOk only.
 
 namespace alidade {
 
 enum class ProjectionStatus {
   kOk,
   kBehindCamera,           // the direction has no positive component along the optical axis
-  kBeyondDistortionLimit,  // radial_distortion < 0 and outside the radius where the model is
-                           // monotone
-  kNoRow,     // rolling shutter: no unique row sees the direction (motion overtakes read-out)
-  kNotFinite  // an argument is not finite, or the result is too large to represent
+  kBeyondDistortionLimit,  // radial_distortion < 0, beyond the radius where the model turns back
+  kNoRow,                  // rolling shutter: no unique row; the motion overtakes the read-out
+  kNotFinite               // an argument is not finite, or the result is too large to represent
 };
 
 [[nodiscard]] constexpr const char* to_string(ProjectionStatus status) {

@@ -1,19 +1,18 @@
 #pragma once
 // The camera as it is: rows exposed one after the other while the mount turns.
-//   row v is exposed at t(v) = t0 + v * line_delay, any sign (MODEL: beyond PTCEE 26, 27, which
-//   hold the body rate constant; here the ANGLES move at constant rates and pass through the
-//   mechanism) angle(v) = angle + rate * (v - reference_row) * line_delay d_b =
-//   R_base_from_camera(angle(v)) unproject(u),  v = u_v                 back-projection: direct v
-//   = project(R_base_from_camera(angle(v))^T d_b)_v                       projection: solved for v
-// v is a continuous coordinate of the whole row axis: the row solved for may lie outside [0,
-// height]. The solution is unique if the image of the direction moves down more slowly than the
-// read-out: slope d project_v / d v < 1. Where that fails the status is kNoRow. A direction that
-// the distortion model or the half space in front excludes at the reference row is refused with
-// that status. Jacobians of the solved pixel follow from the implicit function theorem. J_*_motion
-// has the columns pan, tilt, pan rate, tilt rate (of the true angles); J_*_parameters those of
-// Parameter, where the scales and the clock offset are 0: they act on the motion, see
-// motion_parameter_jacobian(). Outputs are written with kOk only. Domain: as camera.h and
-// mechanics.h. No allocation.
+//   row v is exposed at t(v) = t0 + v * line_delay, any sign of line_delay
+//   angle(v) = angle + rate * (v - reference_row) * line_delay
+//   back-projection, direct:    d_b = R_base_from_camera(angle(v)) unproject(u),  v = u_v
+//   projection, solved for v:   v = project(R_base_from_camera(angle(v))^T d_b)_v
+// Where PTCEE 26, 27 hold the body rate constant, here the ANGLES move at constant rates.
+// v is a continuous coordinate of the whole row axis: the row solved for may lie outside the image.
+// A row is unique while the image of the direction moves down more slowly than the read-out, slope
+// d project_v / d v < 1. Where that fails between the reference row and the solution, the status is
+// kNoRow; a direction that the camera refuses at the reference row is refused with its status.
+// Jacobians of the solved pixel follow from the implicit function theorem. J_*_motion has the
+// columns pan, tilt, pan rate, tilt rate (of the true angles); J_*_parameters those of Parameter,
+// where scales and clock offset are 0: they act on the motion, see motion_parameter_jacobian().
+// Domain: as camera.h and mechanics.h. Outputs are written with kOk only. No allocation.
 
 #include <Eigen/Core>
 #include <cmath>
@@ -46,10 +45,9 @@ template <class S>
   return {motion.angle.pan + motion.rate.pan * time, motion.angle.tilt + motion.rate.tilt * time};
 }
 
-// How the motion depends on the parameters when it was made from MEASURED angles looked up at the
-// image's time plus clock_offset: d (pan, tilt, pan rate, tilt rate) / d Parameter, for rates that
-// are constant about that time. A total parameter Jacobian is J_parameters + J_motion *
-// motion_parameter_jacobian(...).
+// d (pan, tilt, pan rate, tilt rate) / d Parameter of a motion made from MEASURED angles that were
+// looked up at the image's time plus clock_offset, with rates constant about that time. The total
+// Jacobian of a pixel or direction is J_parameters + J_motion * motion_parameter_jacobian(...).
 template <class S>
 [[nodiscard]] Matrix<S, 4, kParameterCount> motion_parameter_jacobian(
     const Mechanics<S>& mechanics, const FrameMotion<S>& motion) {

@@ -1,13 +1,14 @@
 #pragma once
 // SO(3): rotation matrices R and their tangent vectors w (rad).
-//   Exp(w) = I + sin(t)/t [w] + (1 - cos(t))/t^2 [w]^2,  t = |w|  (PTCEE 4, Rodrigues)
-//   Log(Exp(w)) = w for |w| < pi; at |w| = pi either of the two logarithms.
-//   Exp(w + e) = Exp(J_l(w) e) Exp(w) = Exp(w) Exp(J_r(w) e)  to first order in e.
-// Everywhere in Alidade a rotation is perturbed on the right, R Exp(xi) (PTCEE 5): for
-// R_base_from_camera xi is in the camera frame. Domain: Exp and the Jacobians take any w, also
-// beyond pi; the inverse Jacobians need |w| < 2 pi; Log needs an orthonormal R with determinant 1.
-// All are accurate at and near 0 and pi. No allocation. Source of the Jacobians: Sola, Deray,
-// Atchuthan, "A micro Lie theory", 2018, eqs. 143 to 146.
+//   Exp(w) = I + sin(t)/t [w] + (1 - cos(t))/t^2 [w]^2,  t = |w|          (PTCEE 4, Rodrigues)
+//   Log(Exp(w)) = w for |w| < pi; at |w| = pi either of the two logarithms
+//   Exp(w + e) = Exp(J_l(w) e) Exp(w) = Exp(w) Exp(J_r(w) e)              to first order in e
+// Everywhere in Alidade a rotation is perturbed on the right, R Exp(xi) (PTCEE 5): the xi of an
+// R_base_from_camera is in the camera frame.
+// Domain: Exp and the Jacobians take any w, also beyond pi; the inverse Jacobians need |w| < 2 pi;
+// Log needs an orthonormal R with determinant 1. All are accurate at and near 0 and pi.
+// Source of the Jacobians: Sola, Deray, Atchuthan, "A micro Lie theory", 2018, eqs. 143 to 146.
+// No allocation.
 
 #include <Eigen/Geometry>
 

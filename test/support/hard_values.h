@@ -1,6 +1,7 @@
 #pragma once
-// Hand-picked values on which geometry breaks: zero, the edges of the series, half and whole turns, the
-// cameras and mounts at the ends of what Alidade meets. Every property of the model is tested over them.
+// Hand-picked values on which geometry breaks: zero, the edges of the series, half and whole turns,
+// the cameras and mounts at the ends of what Alidade meets. Every property of the model is tested
+// over them.
 
 #include <cmath>
 #include <string>
@@ -50,7 +51,7 @@ inline std::vector<Vector3<double>> hard_directions() {
 struct NamedCamera {
   std::string name;
   Camera<double> camera;
-  // How far beyond each border of the image the model still has directions to be tested, in image sizes.
+  // How far beyond each border of the image tests go, in image sizes: as far as the model reaches.
   double margin;
 };
 
@@ -96,8 +97,8 @@ inline std::vector<Mechanics<double>> hard_mechanics() {
   return {Mechanics<double>(), paper_mechanics(), slanted};
 }
 
-// s/row: none, the paper's (a camera upside down), and a slow sensor.
-inline std::vector<double> hard_line_delays() { return {0, -14.2e-6, 14.2e-6, 60e-6}; }
+// s/row: none, the paper's (a camera upside down), and 1080 rows in a 30th of a second.
+inline std::vector<double> hard_line_delays() { return {0, -14.2e-6, 14.2e-6, 30e-6}; }
 
 // At rest, slow, fast, and across the seam at half a turn.
 inline std::vector<FrameMotion<double>> hard_motions() {

@@ -1,13 +1,13 @@
 #pragma once
 // The one numeric Jacobian of all tests, beside which analytic ones are checked.
-// J = (8 (f(+h) - f(-h)) - (f(+2h) - f(-2h))) / 12 h for each input: an error of order h^4 f''''', plus the
-// rounding 1.5 noise / h of values that carry an absolute error of `noise`.
-// f takes a small change of its input (so that a manifold's (+) stands in the test) and returns the output,
-// or nullopt where there is none. evaluated counts the outputs obtained: 4 for each input, or the test
-// has skipped something, and a skipped column is NaN so that no comparison with it succeeds.
+// J = (8 (f(+h) - f(-h)) - (f(+2h) - f(-2h))) / 12 h for each input: its error is of order h^4,
+// plus a rounding of 1.5 noise / h if the values of f carry an absolute error of `noise`.
+// f takes a small change of its input (so that a manifold's (+) stands in the test) and returns the
+// output, or nullopt where there is none. evaluated counts the outputs: 4 for each input, or the
+// test has skipped something; a skipped column is NaN, with which no comparison succeeds.
 
 #include <Eigen/Core>
-#include <algorithm>
+#include <cmath>
 #include <limits>
 #include <optional>
 
@@ -16,6 +16,7 @@ namespace alidade::test {
 template <int kOut, int kIn>
 struct NumericJacobian {
   Eigen::Matrix<double, kOut, kIn> J;
+  Eigen::Matrix<double, kIn, 1> steps;
   int evaluated = 0;
 };
 
@@ -25,6 +26,7 @@ template <int kOut, int kIn, class Function>
   using In = Eigen::Matrix<double, kIn, 1>;
   using Out = Eigen::Matrix<double, kOut, 1>;
   NumericJacobian<kOut, kIn> result;
+  result.steps = steps;
   for (int i = 0; i < kIn; ++i) {
     const auto evaluate = [&](double multiple) -> Out {
       In change = In::Zero();
@@ -46,27 +48,20 @@ template <int kOut, int kIn, class Function>
       f, Eigen::Matrix<double, kIn, 1>(Eigen::Matrix<double, kIn, 1>::Constant(step)));
 }
 
-// The worst column's |J - expected| / (|expected| + floor): columns of one Jacobian can be ten orders apart.
-// NaN, which no bound admits, if there is one in either.
+// The worst column's |J - numeric| as a multiple of what the numeric one may be off: a millionth of
+// itself by truncation, 1.5 noise / step by rounding. Columns of one Jacobian can be ten orders
+// apart, hence each by itself. Below 1 is agreement; NaN if there is one in either.
 template <int kOut, int kIn>
-[[nodiscard]] double worst_column_error(const Eigen::Matrix<double, kOut, kIn>& J,
-                                        const Eigen::Matrix<double, kOut, kIn>& expected,
-                                        const Eigen::Matrix<double, kIn, 1>& floor) {
+[[nodiscard]] double disagreement(const Eigen::Matrix<double, kOut, kIn>& J,
+                                  const NumericJacobian<kOut, kIn>& numeric, double noise) {
   double worst = 0;
   for (int i = 0; i < kIn; ++i) {
-    const double error = (J.col(i) - expected.col(i)).norm() / (expected.col(i).norm() + floor[i]);
-    if (!(error <= worst)) worst = error;
-    if (worst != worst) break;
+    const double allowed = 1e-6 * numeric.J.col(i).norm() + 1.5 * noise / numeric.steps[i];
+    const double ratio = (J.col(i) - numeric.J.col(i)).norm() / allowed;
+    if (!(ratio <= worst)) worst = ratio;
+    if (std::isnan(worst)) break;
   }
   return worst;
-}
-
-template <int kOut, int kIn>
-[[nodiscard]] double worst_column_error(const Eigen::Matrix<double, kOut, kIn>& J,
-                                        const Eigen::Matrix<double, kOut, kIn>& expected,
-                                        double floor) {
-  return worst_column_error<kOut, kIn>(
-      J, expected, Eigen::Matrix<double, kIn, 1>(Eigen::Matrix<double, kIn, 1>::Constant(floor)));
 }
 
 }  // namespace alidade::test

@@ -9,8 +9,8 @@
 namespace alidade {
 namespace {
 
-// sum over n of (-1)^n theta^(2n) / (2n + first)!, the quotients' common form. Its terms stay below 100 for
-// theta < 7, so that long double, or the double it is on some boards, loses at most two digits.
+// sum over n of (-1)^n theta^(2n) / (2n + first)!, the quotients' common form. Its terms stay below
+// 100 for theta < 7, so that long double, or the double it is on some boards, loses two digits.
 long double alternating_series(long double theta, int first) {
   long double term = 1;
   for (int i = 2; i <= first; ++i) term /= i;
