@@ -111,9 +111,10 @@ bool cubic_weights(const TelemetryKnot* knots, int count, double time_s, const A
     for (int i = 0; i < kCubicCoefficients; ++i) residual -= residual.dot(Q.row(i)) * Q.row(i);
     const double rate = angles.row(axis).dot(to_coefficients.row(1)) / scale;
     if (!(residual.squaredNorm() <= bound * (variance + own_variance * rate * rate))) return false;
+    // What noise may feign does not count.
     const double acceleration = to_acceleration * angles.row(axis).dot(to_coefficients.row(2));
-    (*acceleration_square)[axis] =
-        std::max(acceleration * acceleration - acceleration_variance, 0.0);
+    const double square = acceleration * acceleration;
+    (*acceleration_square)[axis] = square > 4 * acceleration_variance ? square : 0;
   }
   weights->of_sample.row(0) = to_coefficients.row(0);
   weights->of_sample.row(1) = to_coefficients.row(1) / scale;
@@ -179,7 +180,7 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
   by_time(0, 0) += std::max(knots[before].shared_variance, knots[before + 1].shared_variance) +
                    time_sigma_s * time_sigma_s;
   const Matrix2<double> rate_square = rate * rate.transpose();
-  const double spacing = (knots[count - 1].time_s - knots[0].time_s) / (count - 1);
+  const double span_s = knots[count - 1].time_s - knots[0].time_s;
   Matrix4<double> covariance;
   for (int i = 0; i < 2; ++i) {
     for (int j = 0; j < 2; ++j) {
@@ -190,9 +191,9 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
     }
   }
   for (int axis = 0; axis < 2; ++axis) {
-    // An axis that moves less than a quantum from sample to sample is rounded alike each time:
-    // averaging does not help.
-    if (std::abs(rate[axis]) * spacing < noise.quantum) {
+    // All samples of an axis that moves less than a quantum are rounded alike: averaging them does
+    // not help.
+    if (std::abs(rate[axis]) * span_s < noise.quantum) {
       covariance(axis, axis) += noise.quantum * noise.quantum / 12;
     }
   }

@@ -1,0 +1,195 @@
+#include "core/realtime/frame_orientation.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "core/model/direction.h"
+#include "test/core/realtime/pixel_truth.h"
+#include "test/support/hard_values.h"
+#include "test/support/numeric_jacobian.h"
+
+namespace alidade {
+namespace {
+
+Calibration paper_calibration() {
+  Calibration calibration;
+  calibration.camera = {32008, 1, 55.4, 1920, 1080};
+  calibration.line_delay = -14.2e-6;
+  calibration.mechanics.pan_axis = Vector3<double>(0.012, 0.003, 1).normalized();
+  calibration.mechanics.tilt_axis = Vector3<double>(-0.004, 1, 0.014).normalized();
+  calibration.mechanics.pan_scale = 1.02;
+  calibration.mechanics.tilt_scale = 0.98;
+  calibration.clock_offset = -84.4e-3;
+  return calibration;
+}
+
+FrameOrientation orientation(const Calibration& calibration, const PanTilt<double>& angle,
+                             const PanTilt<double>& rate) {
+  FrameOrientation frame;
+  EXPECT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kPt, 0, angle, rate,
+                                     1e-10 * Matrix4<double>::Identity(), &frame));
+  return frame;
+}
+
+TEST(FrameOrientation, MapsEveryPixelAsTheSlowForwardModelDoes) {
+  int compared = 0;
+  for (const test::NamedCamera& named : test::hard_cameras()) {
+    for (const double line_delay : {30e-6, -14.2e-6, 0.0}) {
+      Calibration calibration = paper_calibration();
+      calibration.camera = named.camera;
+      calibration.line_delay = line_delay;
+      const PanTilt<double> angle{3.1, -0.4};
+      const PanTilt<double> rate{0.7, -0.3};
+      const FrameOrientation frame = orientation(calibration, angle, rate);
+      const test::TrueCamera truth{named.camera.focal_length,
+                                   named.camera.aspect,
+                                   named.camera.radial_distortion,
+                                   named.camera.width,
+                                   named.camera.height,
+                                   line_delay,
+                                   calibration.mechanics.pan_axis,
+                                   calibration.mechanics.tilt_axis};
+      const auto path = [&](double t) {
+        return Eigen::Vector2d(angle.pan + rate.pan * (t - 7), angle.tilt + rate.tilt * (t - 7));
+      };
+      test::NamedCamera inside = named;
+      inside.margin = 0;
+      for (const Vector2<double>& u : test::pixel_grid(inside, 7)) {
+        Vector3<double> d_b;
+        ASSERT_EQ(frame.direction(u, &d_b), ProjectionStatus::kOk) << named.name;
+        EXPECT_LT((d_b - test::true_direction(truth, path, 7, u)).norm(), 1e-12) << named.name;
+        Vector2<double> back;
+        ASSERT_EQ(frame.pixel(d_b, &back), ProjectionStatus::kOk) << named.name;
+        EXPECT_LT((back - u).norm(), 1e-7) << named.name;
+        ++compared;
+      }
+    }
+  }
+  EXPECT_EQ(compared, 8 * 3 * 49);
+}
+
+TEST(FrameOrientation, HoldsTheRotationAndItsRateAtRow0) {
+  const Calibration calibration = paper_calibration();
+  const PanTilt<double> angle{2, 0.3};
+  const PanTilt<double> rate{0.5, -0.2};
+  const FrameOrientation frame = orientation(calibration, angle, rate);
+  EXPECT_EQ(frame.time_s, 7);
+  EXPECT_EQ(frame.mode, OrientationMode::kPt);
+  EXPECT_LT((frame.quaternion().toRotationMatrix() - frame.R_base_from_camera).norm(), 1e-14);
+  // R(t + h) = R(t) Exp(h w)
+  const double h = 1e-6;
+  const FrameOrientation after =
+      orientation(calibration, {angle.pan + h * rate.pan, angle.tilt + h * rate.tilt}, rate);
+  const Vector3<double> turned =
+      log_so3<double>(frame.R_base_from_camera.transpose() * after.R_base_from_camera);
+  EXPECT_LT((turned / h - frame.angular_velocity).norm(), 1e-6);
+}
+
+// J cov J^T with J by differences of the orientation itself, over measured angles and parameters.
+TEST(FrameOrientation, OrientationCovarianceFollowsMotionAndCalibration) {
+  Calibration calibration = paper_calibration();
+  const PanTilt<double> angle{2, 0.3};
+  const PanTilt<double> rate{0.5, -0.2};
+  Matrix<double, kParameterCount, kParameterCount> root;
+  for (int i = 0; i < kParameterCount; ++i) {
+    for (int j = 0; j < kParameterCount; ++j) root(i, j) = 1e-5 * std::sin(1 + 3 * i + 7 * j);
+  }
+  calibration.covariance = root * root.transpose();
+  Matrix4<double> motion_root;
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) motion_root(i, j) = 1e-5 * std::cos(2 + 5 * i + 2 * j);
+  }
+  const Matrix4<double> motion_covariance = motion_root * motion_root.transpose();
+  FrameOrientation frame;
+  ASSERT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kPt, 0, angle, rate,
+                                     motion_covariance, &frame));
+
+  // Inputs: angles (2), then pan axis, tilt axis, scales, clock offset.
+  const PanTilt<double> measured = measured_from_true(calibration.mechanics, angle);
+  const auto turned = [&](const Matrix<double, 9, 1>& x) -> std::optional<Vector3<double>> {
+    Mechanics<double> changed = calibration.mechanics;
+    changed.pan_axis = direction_plus<double>(changed.pan_axis, x.segment<2>(2));
+    changed.tilt_axis = direction_plus<double>(changed.tilt_axis, x.segment<2>(4));
+    changed.pan_scale += x[6];
+    changed.tilt_scale += x[7];
+    PanTilt<double> changed_angle = true_from_measured(changed, measured);
+    changed_angle.pan += x[0] + rate.pan * x[8];
+    changed_angle.tilt += x[1] + rate.tilt * x[8];
+    return log_so3<double>(frame.R_base_from_camera.transpose() *
+                           R_base_from_camera(changed, changed_angle));
+  };
+  const auto numeric = test::numeric_jacobian<3, 9>(turned, Matrix<double, 9, 1>::Constant(1e-3));
+  ASSERT_EQ(numeric.evaluated, 9 * 4);
+  const Matrix<double, 3, 2> J_angle = numeric.J.leftCols<2>();
+  const Matrix<double, 3, 7> J_mount = numeric.J.rightCols<7>();
+  const Matrix3<double> expected =
+      J_angle * motion_covariance.topLeftCorner<2, 2>() * J_angle.transpose() +
+      J_mount * calibration.covariance.bottomRightCorner<7, 7>() * J_mount.transpose();
+  EXPECT_LT((frame.orientation_covariance - expected).norm(), 1e-7 * expected.norm());
+}
+
+// The covariances of direction and pixel describe one uncertainty: what the camera turns one into is
+// the other.
+TEST(FrameOrientation, PixelCovarianceIsTheDirectionsSeenInTheImage) {
+  Calibration calibration = paper_calibration();
+  calibration.covariance.diagonal() << 600, 1e-8, 1e-2, 5e-15, 1e-9, 1e-9, 1e-9, 1e-9, 1e-8, 1e-8,
+      1e-6;
+  const FrameOrientation frame = orientation(calibration, {-1, 0.2}, {0.3, 0.2});
+  for (const Vector2<double>& u :
+       {Vector2<double>(0, 0), Vector2<double>(1900, 30), Vector2<double>(960, 1080)}) {
+    Vector3<double> d_b;
+    Matrix2<double> direction_cov;
+    ASSERT_EQ(frame.direction(u, &d_b, &direction_cov), ProjectionStatus::kOk);
+    Vector2<double> back;
+    Matrix2<double> pixel_cov;
+    ASSERT_EQ(frame.pixel(d_b, &back, &pixel_cov), ProjectionStatus::kOk);
+    Matrix<double, 3, 2> J_d_u;
+    ASSERT_EQ(rolling_shutter_unproject(calibration.camera, calibration.mechanics,
+                                        calibration.line_delay, frame.motion(), u, &d_b, &J_d_u),
+              ProjectionStatus::kOk);
+    const Matrix2<double> J = tangent_basis(d_b).transpose() * J_d_u;
+    EXPECT_LT((J * pixel_cov * J.transpose() - direction_cov).norm(), 1e-6 * direction_cov.norm());
+    EXPECT_GT(direction_cov.determinant(), 0);
+  }
+}
+
+TEST(FrameOrientation, HasNoDirectionsWithoutAnOrientation) {
+  const FrameOrientation none;
+  Vector3<double> d_b(1, 2, 3);
+  Vector2<double> u(4, 5);
+  EXPECT_EQ(none.direction({1, 1}, &d_b), ProjectionStatus::kNotFinite);
+  EXPECT_EQ(none.pixel({1, 0, 0}, &u), ProjectionStatus::kNotFinite);
+  EXPECT_EQ(d_b, Vector3<double>(1, 2, 3));
+  EXPECT_EQ(u, Vector2<double>(4, 5));
+}
+
+TEST(FrameOrientation, SaysWhyAPixelOrDirectionHasNone) {
+  Calibration calibration = paper_calibration();
+  calibration.camera = {900, 1, -0.3, 1920, 1080};
+  const FrameOrientation frame = orientation(calibration, {0, 0}, {0, 0});
+  Vector3<double> d_b;
+  EXPECT_EQ(frame.direction({1919, 1}, &d_b), ProjectionStatus::kBeyondDistortionLimit);
+  EXPECT_EQ(frame.direction({NAN, 1}, &d_b), ProjectionStatus::kNotFinite);
+  Vector2<double> u;
+  EXPECT_EQ(frame.pixel({-1, 0, 0}, &u), ProjectionStatus::kBehindCamera);
+}
+
+TEST(FrameOrientation, RefusesWhatIsNotFinite) {
+  FrameOrientation frame;
+  const double infinity = std::numeric_limits<double>::infinity();
+  const Matrix4<double> covariance = Matrix4<double>::Identity();
+  const auto made = [&](double time, double pan, double rate, const Matrix4<double>& cov) {
+    return make_frame_orientation(paper_calibration(), time, OrientationMode::kPt, 0, {pan, 0},
+                                  {rate, 0}, cov, &frame);
+  };
+  EXPECT_TRUE(made(1, 1, 1, covariance));
+  EXPECT_FALSE(made(NAN, 1, 1, covariance));
+  EXPECT_FALSE(made(1, infinity, 1, covariance));
+  EXPECT_FALSE(made(1, 1, NAN, covariance));
+  EXPECT_FALSE(made(1, 1, 1, covariance * NAN));
+}
+
+}  // namespace
+}  // namespace alidade
