@@ -6,6 +6,7 @@
 #include <yaml-cpp/yaml.h>
 
 #include <Eigen/Eigenvalues>
+#include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstring>
@@ -13,6 +14,7 @@
 #include <initializer_list>
 #include <iomanip>
 #include <locale>
+#include <optional>
 #include <set>
 #include <sstream>
 #include <utility>
@@ -22,31 +24,46 @@ namespace alidade {
 
 namespace {
 
-// What is wrong, and with which line (from 1; 0: none). Never leaves this file.
+// What is wrong, and in which line, from 1. Never leaves this file.
 struct Problem {
   int line;
   std::string text;
 };
 
 [[noreturn]] void fail(const YAML::Node& node, const std::string& text) {
-  throw Problem{node.Mark().line + 1, text};
+  throw Problem{std::max(node.Mark().line, 0) + 1, text};
 }
 
-// Independent of the locale. The digits read back as the same bits.
-std::string number_text(double value) {
+// Text and number are converted in the classic locale, whatever the program's.
+std::string number_text(double value, int digits) {
   std::ostringstream stream;
   stream.imbue(std::locale::classic());
-  stream << std::setprecision(17) << value;
+  stream << std::setprecision(digits) << value;
   return stream.str();
 }
 
-// For messages: as many digits as a person wrote.
-std::string short_text(double value) {
-  std::ostringstream stream;
+std::optional<double> number_of(const std::string& text) {
+  std::istringstream stream(text);
   stream.imbue(std::locale::classic());
-  stream << value;
-  return stream.str();
+  double value = 0;
+  if (stream >> value && stream.peek() == std::istringstream::traits_type::eof() &&
+      std::isfinite(value)) {
+    return value;
+  }
+  return std::nullopt;
 }
+
+// The shortest text that reads back as the same bits: 55.4 rather than 55.399999999999999.
+std::string exact_text(double value) {
+  for (int digits = 15; digits < 17; ++digits) {
+    std::string text = number_text(value, digits);
+    if (number_of(text) == value) return text;
+  }
+  return number_text(value, 17);
+}
+
+// For messages: as many digits as a person would write.
+std::string short_text(double value) { return number_text(value, 6); }
 
 struct Range {
   double least;
@@ -150,14 +167,9 @@ class Reader {
   }
 
   static double number(const YAML::Node& node, const std::string& name) {
-    double value = 0;
     if (node.IsScalar()) {
-      std::istringstream stream(node.Scalar());
-      stream.imbue(std::locale::classic());
-      if (stream >> value && stream.peek() == std::istringstream::traits_type::eof() &&
-          std::isfinite(value)) {
-        return value;
-      }
+      const std::optional<double> value = number_of(node.Scalar());
+      if (value) return *value;
       fail(node, name + " is \"" + node.Scalar() + "\"; a finite number is needed");
     }
     fail(node, name + " is not a single value; a finite number is needed");
@@ -176,7 +188,7 @@ class Reader {
   static std::vector<double> numbers(const YAML::Node& node, const std::string& name,
                                      std::size_t count) {
     if (!node.IsSequence() || node.size() != count) {
-      fail(node, name + " needs a list of " + std::to_string(count) + " numbers");
+      fail(node, name + " is not a list of " + std::to_string(count) + " numbers; write [x, ...]");
     }
     std::vector<double> values;
     for (const YAML::Node& item : node) values.push_back(number(item, name));
@@ -206,7 +218,8 @@ class Reader {
       fail(node, name + " is " + node.Scalar() + "; give " + range.hint);
     }
     if (entry["sigma"]) {
-      set_sigma(entry["sigma"], name, number(entry["sigma"], name + ".sigma"), 1e12, parameter);
+      set_sigma(entry["sigma"], name, number(entry["sigma"], name + ".sigma"),
+                range.most - range.least, parameter);
     }
     return value;
   }
@@ -252,8 +265,8 @@ class Reader {
     const std::vector<int> rows = covariance_rows(required(entry, "names", "covariance."));
     const YAML::Node matrix = required(entry, "matrix", "covariance.");
     if (!matrix.IsSequence() || matrix.size() != rows.size()) {
-      fail(matrix, "covariance.matrix needs a row for each of the " + std::to_string(rows.size()) +
-                       " names");
+      fail(matrix, "covariance.matrix is not square; give a row for each of the " +
+                       std::to_string(rows.size()) + " names");
     }
     ParameterCovariance<double>& cov = calibration_.covariance;
     for (std::size_t i = 0; i < rows.size(); ++i) {
@@ -307,7 +320,14 @@ class Reader {
       for (int j = 0; j < kParameterCount; ++j) {
         const double scale =
             std::sqrt(calibration_.covariance(i, i)) * std::sqrt(calibration_.covariance(j, j));
-        if (scale > 0) correlation(i, j) /= scale;
+        if (scale > 0) {
+          correlation(i, j) /= scale;
+        } else if (correlation(i, j) != 0) {
+          fail(matrix, std::string("covariance.matrix ties ") +
+                           to_string(static_cast<Parameter>(i)) + " to " +
+                           to_string(static_cast<Parameter>(j)) +
+                           ", one of which has no variance; give 0 here or a variance there");
+        }
       }
     }
     if ((correlation - correlation.transpose()).cwiseAbs().maxCoeff() > 1e-9) {
@@ -341,8 +361,8 @@ bool parse_calibration(const std::string& text, const std::string& name, Calibra
   } catch (const Problem& problem) {
     *error = name + ":" + std::to_string(problem.line) + ": " + problem.text;
   } catch (const YAML::Exception& exception) {
-    *error = name + ":" + std::to_string(exception.mark.line + 1) + ": " + exception.msg +
-             "; valid YAML is needed";
+    *error = name + ":" + std::to_string(std::max(exception.mark.line, 0) + 1) + ": " +
+             exception.msg + "; valid YAML is needed";
   }
   return false;
 }
@@ -351,18 +371,18 @@ std::string format_calibration(const Calibration& calibration) {
   YAML::Emitter out;
   const auto& cov = calibration.covariance;
   const auto sigma = [&cov](Parameter parameter) {
-    return number_text(std::sqrt(cov(index(parameter), index(parameter))));
+    return exact_text(std::sqrt(cov(index(parameter), index(parameter))));
   };
   const auto write_scalar = [&](Parameter parameter, double value, const char* comment) {
     out << YAML::Key << to_string(parameter) << YAML::Value << YAML::Flow << YAML::BeginMap
-        << YAML::Key << "value" << YAML::Value << number_text(value) << YAML::Key << "sigma"
+        << YAML::Key << "value" << YAML::Value << exact_text(value) << YAML::Key << "sigma"
         << YAML::Value << sigma(parameter) << YAML::EndMap << YAML::Comment(comment);
   };
   const auto write_axis = [&](const char* name, const Vector3<double>& axis, Parameter first,
                               const char* comment) {
     out << YAML::Key << name << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "value"
         << YAML::Value << YAML::BeginSeq;
-    for (int i = 0; i < 3; ++i) out << number_text(axis[i]);
+    for (int i = 0; i < 3; ++i) out << exact_text(axis[i]);
     out << YAML::EndSeq << YAML::Key << "sigma" << YAML::Value << YAML::BeginSeq << sigma(first)
         << sigma(static_cast<Parameter>(index(first) + 1)) << YAML::EndSeq << YAML::EndMap
         << YAML::Comment(comment);
@@ -371,8 +391,8 @@ std::string format_calibration(const Calibration& calibration) {
   out << YAML::BeginMap;
   out << YAML::Key << "format" << YAML::Value << 1;
   out << YAML::Key << "image" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "width"
-      << YAML::Value << calibration.camera.width << YAML::Key << "height" << YAML::Value
-      << calibration.camera.height << YAML::EndMap;
+      << YAML::Value << std::to_string(calibration.camera.width) << YAML::Key << "height"
+      << YAML::Value << std::to_string(calibration.camera.height) << YAML::EndMap;
   write_scalar(Parameter::kFocalLength, calibration.camera.focal_length, "px");
   write_scalar(Parameter::kAspect, calibration.camera.aspect, "f_v / f_u");
   write_scalar(Parameter::kRadialDistortion, calibration.camera.radial_distortion,
@@ -386,7 +406,7 @@ std::string format_calibration(const Calibration& calibration) {
   write_scalar(Parameter::kTiltScale, calibration.mechanics.tilt_scale, "measured / true angle");
   write_scalar(Parameter::kClockOffset, calibration.clock_offset,
                "s; telemetry clock = image clock + clock_offset");
-  if (calibration.zoom) out << YAML::Key << "zoom" << YAML::Value << number_text(*calibration.zoom);
+  if (calibration.zoom) out << YAML::Key << "zoom" << YAML::Value << exact_text(*calibration.zoom);
   if (!cov.isZero(0)) {
     out << YAML::Key << "covariance" << YAML::Value << YAML::BeginMap << YAML::Key << "names"
         << YAML::Value << YAML::Flow << YAML::BeginSeq;
@@ -394,7 +414,7 @@ std::string format_calibration(const Calibration& calibration) {
     out << YAML::EndSeq << YAML::Key << "matrix" << YAML::Value << YAML::BeginSeq;
     for (int i = 0; i < kParameterCount; ++i) {
       out << YAML::Flow << YAML::BeginSeq;
-      for (int j = 0; j < kParameterCount; ++j) out << number_text(cov(i, j));
+      for (int j = 0; j < kParameterCount; ++j) out << exact_text(cov(i, j));
       out << YAML::EndSeq;
     }
     out << YAML::EndSeq << YAML::EndMap;
@@ -405,11 +425,13 @@ std::string format_calibration(const Calibration& calibration) {
 
 bool load_calibration(const std::string& path, Calibration* calibration, std::string* error) {
   std::ifstream file(path);
-  std::ostringstream text;
-  if (!file || !(text << file.rdbuf())) {
+  file.peek();  // a folder opens, but cannot be read
+  if (!file.is_open() || file.bad()) {
     *error = path + ": cannot be read: " + std::strerror(errno);
     return false;
   }
+  std::ostringstream text;
+  text << file.rdbuf();
   return parse_calibration(text.str(), path, calibration, error);
 }
 
@@ -451,17 +473,15 @@ class TemporaryFile {
   bool renamed_ = false;
 };
 
-// Makes a rename in this folder survive a power cut.
-bool sync_folder(const std::string& path) {
+// Makes the rename survive a power cut, where the file system can do so; elsewhere the old file,
+// whole, may come back.
+void sync_folder_of(const std::string& path) {
   const std::size_t slash = path.find_last_of('/');
   const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
   const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return false;
-  const bool synced = ::fsync(descriptor) == 0;
-  const int reason = errno;
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
   ::close(descriptor);
-  errno = reason;
-  return synced;
 }
 
 }  // namespace
@@ -471,10 +491,11 @@ bool save_calibration(const std::string& path, const Calibration& calibration, s
   Calibration as_read;
   if (!parse_calibration(text, "refused to write " + path, &as_read, error)) return false;
   TemporaryFile file(path);
-  if (!file.replace(path, text) || !sync_folder(path)) {
+  if (!file.replace(path, text)) {
     *error = path + ": cannot be written: " + std::strerror(errno);
     return false;
   }
+  sync_folder_of(path);
   return true;
 }
 
