@@ -7,6 +7,10 @@ install(TARGETS ${libraries} EXPORT alidadeTargets
   ARCHIVE DESTINATION ${CMAKE_INSTALL_LIBDIR})
 install(EXPORT alidadeTargets NAMESPACE alidade::
   DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/alidade)
+set(ALIDADE_PACKAGE_HAS_CALIBRATION OFF)
+if(TARGET alidade::calibration)
+  set(ALIDADE_PACKAGE_HAS_CALIBRATION ON)
+endif()
 configure_package_config_file(cmake/alidadeConfig.cmake.in alidadeConfig.cmake
   INSTALL_DESTINATION ${CMAKE_INSTALL_LIBDIR}/cmake/alidade)
 write_basic_package_version_file(alidadeConfigVersion.cmake COMPATIBILITY SameMinorVersion)
