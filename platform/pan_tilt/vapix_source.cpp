@@ -223,14 +223,18 @@ ReadStatus VapixSource::Implementation::finish_poll(CURLcode code, PanTiltSample
   if (!parse_vapix_position(body_, &position, &error)) {
     return disconnect(error);
   }
-  // libcurl counts from a moment after started_s_ until just before it sends; the request that counts
-  // is also later than the 401 that went before.
-  curl_off_t until_send_us = 0;
-  curl_easy_getinfo(easy_, CURLINFO_PRETRANSFER_TIME_T, &until_send_us);
-  const double sent_s = started_s_ + 1e-6 * static_cast<double>(until_send_us);
+  // The request was sent after the connection stood (libcurl counts from a moment after started_s_)
+  // and after the 401 that may have gone before. CURLINFO_PRETRANSFER_TIME_T is too late: it is taken
+  // when the request has left.
+  curl_off_t connected_us = 0;
+  curl_off_t encrypted_us = 0;
+  curl_easy_getinfo(easy_, CURLINFO_CONNECT_TIME_T, &connected_us);
+  curl_easy_getinfo(easy_, CURLINFO_APPCONNECT_TIME_T, &encrypted_us);
+  const double ready_s =
+      started_s_ + 1e-6 * static_cast<double>(std::max(connected_us, encrypted_us));
   *sample = PanTiltSample{};
   sample->latest_time_s = answer_s_;
-  sample->earliest_time_s = std::min(std::max(sent_s, previous_answer_s_), answer_s_);
+  sample->earliest_time_s = std::min(std::max(ready_s, previous_answer_s_), answer_s_);
   sample->pan_rad = position.pan_rad;
   sample->tilt_rad = position.tilt_rad;
   sample->zoom = position.zoom;

@@ -2,6 +2,7 @@
 
 #include <yaml-cpp/yaml.h>
 
+#include <algorithm>
 #include <array>
 
 #include "platform/recording/csv_reader.h"
@@ -34,7 +35,7 @@ constexpr std::array<CsvColumn, 8> kTelemetryColumns = {{{"receive_time_s", true
 bool read_recording_info(const std::string& directory, RecordingInfo* info, std::string* error) {
   const std::string path = directory + "/recording.yaml";
   const auto flaw = [&](const YAML::Mark& mark, const std::string& what) {
-    *error = path + ":" + std::to_string(mark.line + 1) + ": " + what +
+    *error = path + ":" + std::to_string(std::max(mark.line, 0) + 1) + ": " + what +
              "; needed are format: 1, width and height in px";
     return false;
   };

@@ -1,5 +1,9 @@
 #include "platform/video/rtp_connection.h"
 
+extern "C" {
+#include <libavutil/time.h>
+}
+
 #include <cmath>
 #include <cstdio>
 #include <cstring>
@@ -41,7 +45,8 @@ int RtpConnection::is_over(void* self) {
 }
 
 std::string RtpConnection::why_lost(int code) const {
-  if (code == AVERROR_EXIT || code == AVERROR(ETIMEDOUT)) {
+  // Whatever libavformat makes of being interrupted.
+  if (code == AVERROR(ETIMEDOUT) || monotonic_now_s() > deadline_s_) {
     char text[64];
     std::snprintf(text, sizeof text, "nothing received for %g s", options_.timeout_s);
     return text;
@@ -51,6 +56,9 @@ std::string RtpConnection::why_lost(int code) const {
   }
   if (code == AVERROR_HTTP_NOT_FOUND) {
     return "no such stream on this camera (404)";
+  }
+  if (code == AVERROR_HTTP_OTHER_4XX) {
+    return "the camera refuses to play this stream (4xx); does it hold video?";
   }
   return av_error_text(code);
 }
@@ -171,7 +179,7 @@ ReadStatus RtpConnection::read(AccessUnit* unit, std::string* error) {
   const AVPacket& packet = *unit->packet;
   if (packet.pts != AV_NOPTS_VALUE) {
     unit->sender_time_s = static_cast<double>(packet.pts) * av_q2d(format_->streams[0]->time_base);
-    unit->sender_utc_s = utc(packet, *unit->sender_time_s);
+    unit->sender_utc_s = utc(packet);
   }
   if (sender_jumped(*unit)) {
     *error = "the sender's clock jumped: it began anew";
@@ -202,24 +210,21 @@ bool RtpConnection::inspect(AccessUnit* unit) {
   return true;
 }
 
-// libavformat adds to each packet what the latest RTCP report says about its timestamp.
-std::optional<double> RtpConnection::utc(const AVPacket& packet, double sender_time_s) {
+// libavformat adds to each packet what the latest RTCP report says about its timestamp, but without
+// unwrapping: between a wrap and the next report the time is one wrap (13 h) off, which shows as long as
+// the camera's clock and ours agree to some minutes.
+std::optional<double> RtpConnection::utc(const AVPacket& packet) const {
   const auto* reference = reinterpret_cast<const AVProducerReferenceTime*>(
       av_packet_get_side_data(&packet, AV_PKT_DATA_PRFT, nullptr));
   if (reference == nullptr) {
     return std::nullopt;
   }
-  double offset_s = 1e-6 * static_cast<double>(reference->wallclock) - sender_time_s;
-  // It subtracts the report's 32-bit timestamp without unwrapping: one wrap off until the next report.
-  if (utc_offset_s_) {
-    const double wrap_s = 4294967296.0 * av_q2d(format_->streams[0]->time_base);
-    const double wraps = std::round((offset_s - *utc_offset_s_) / wrap_s);
-    if (wraps != 0 && std::abs(offset_s - *utc_offset_s_ - wraps * wrap_s) < 1) {
-      offset_s -= wraps * wrap_s;
-    }
-  }
-  utc_offset_s_ = offset_s;
-  return sender_time_s + offset_s;
+  constexpr double kAgreement_s = 600;
+  const double utc_s = 1e-6 * static_cast<double>(reference->wallclock);
+  const double wrap_s = 4294967296.0 * av_q2d(format_->streams[0]->time_base);
+  const double ahead_s = utc_s - 1e-6 * static_cast<double>(av_gettime());
+  const double wraps = std::round(ahead_s / wrap_s);
+  return std::abs(ahead_s - wraps * wrap_s) < kAgreement_s ? utc_s - wraps * wrap_s : utc_s;
 }
 
 // A gap of the link moves the arrival against the sender's clock by less than timeout_s. More is

@@ -51,7 +51,7 @@ class RtpConnection {
   static int is_over(void* self);
   [[nodiscard]] std::string why_lost(int code) const;
   [[nodiscard]] bool inspect(AccessUnit* unit);
-  [[nodiscard]] std::optional<double> utc(const AVPacket& packet, double sender_time_s);
+  [[nodiscard]] std::optional<double> utc(const AVPacket& packet) const;
   [[nodiscard]] bool sender_jumped(const AccessUnit& unit);
 
   const RtpSourceOptions& options_;
@@ -63,7 +63,6 @@ class RtpConnection {
   CodecContextPtr parser_context_;
   ParserPtr parser_;
   AccessUnit growing_;  // H.264: the picture whose pieces are arriving
-  std::optional<double> utc_offset_s_;
   std::optional<double> last_sender_time_s_;
   double last_receive_time_s_ = 0;
   std::int64_t damaged_ = 0;

@@ -67,7 +67,8 @@ class RtpSource::Implementation {
   void check();
   void receive();
   ReadStatus receive_connection(std::string* error);
-  void push(Event event);
+  void push_picture(Event event);
+  void push_report(Event event);
   ReadStatus fail(std::string error) {
     error_ = options_.url + ": " + std::move(error);
     failed_ = true;
@@ -133,7 +134,7 @@ void RtpSource::Implementation::check() {
   }
 }
 
-void RtpSource::Implementation::push(Event event) {
+void RtpSource::Implementation::push_picture(Event event) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     if (queue_.size() >= kQueueCapacity) {
@@ -143,8 +144,19 @@ void RtpSource::Implementation::push(Event event) {
       dropped_ += static_cast<std::int64_t>(before - queue_.size());
       wait_for_key_ = true;
     }
-    if (event.status != ReadStatus::kOk && !queue_.empty() &&
-        queue_.back().status == event.status) {
+    if (wait_for_key_ && !event.unit.key) {
+      return;
+    }
+    wait_for_key_ = false;
+    queue_.push_back(std::move(event));
+  }
+  changed_.notify_all();
+}
+
+void RtpSource::Implementation::push_report(Event event) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!queue_.empty() && queue_.back().status == event.status) {
       queue_.pop_back();  // nobody reads: the last report is enough
     }
     queue_.push_back(std::move(event));
@@ -161,7 +173,7 @@ void RtpSource::Implementation::receive() {
       return;
     }
     const bool failed = event.status == ReadStatus::kFailed;
-    push(std::move(event));
+    push_report(std::move(event));
     if (failed) {
       return;
     }
@@ -182,13 +194,11 @@ ReadStatus RtpSource::Implementation::receive_connection(std::string* error) {
     status = connection.read(&event.unit, error);
     damaged_ += connection.damaged() - damaged;
     damaged = connection.damaged();
-    if (status != ReadStatus::kOk || (wait_for_key_ && !event.unit.key)) {
-      continue;
+    if (status == ReadStatus::kOk) {
+      backoff_.reset();
+      event.parameters = connection.parameters();
+      push_picture(std::move(event));
     }
-    wait_for_key_ = false;
-    backoff_.reset();
-    event.parameters = connection.parameters();
-    push(std::move(event));
   }
   return status;
 }

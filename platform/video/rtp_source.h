@@ -6,9 +6,9 @@
 // A thread of its own, started by the first read() and so with the scheduling of the capture
 // thread, connects, stamps and queues; read() decodes. So a stamp is never late by a decoding time,
 // and a read() can time out without hurting the stream.
-// - receive_time_s: arrival of the frame's last packet. sender_time_s: the RTP timestamp,
-// unwrapped,
-//   in seconds since the connection's first. sender_utc_s: the same by the latest RTCP report.
+// - receive_time_s: arrival of the frame's last packet. sender_time_s: the RTP timestamp in seconds,
+//   unwrapped, from some moment near the connection's beginning on. sender_utc_s: the same by the
+//   latest RTCP report.
 // - An MJPEG frame is delivered on arrival, an H.264 frame when the first packet of the next one
 //   shows that it is complete (libavformat does not tell the end of an access unit).
 // - Frames before the first key frame, damaged and undecodable frames are skipped and counted. When
@@ -42,7 +42,8 @@ struct RtpSourceOptions {
 
 struct RtpSourceCounters {
   std::int64_t damaged = 0;  // frames that were incomplete or not decodable
-  std::int64_t dropped = 0;  // frames that read() did not fetch in time
+  std::int64_t dropped = 0;  // frames that read() did not fetch in time; those up to the next key
+                             // frame, which cannot be decoded any more, are not counted
 };
 
 class RtpSource : public FrameSource {

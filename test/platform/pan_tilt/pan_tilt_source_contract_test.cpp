@@ -1,0 +1,122 @@
+// What every PanTiltSource promises, run on each of them.
+
+#include <gtest/gtest.h>
+
+#include <functional>
+#include <memory>
+#include <ostream>
+#include <thread>
+
+#include "platform/pan_tilt/pan_tilt_source.h"
+#include "platform/pan_tilt/recording_pan_tilt_source.h"
+#include "platform/pan_tilt/vapix_source.h"
+#include "test/platform/support/axis_server.h"
+#include "test/platform/support/eventually.h"
+#include "test/platform/support/temporary_directory.h"
+
+namespace alidade {
+namespace {
+
+// A source and what it needs to live.
+struct Rig {
+  virtual ~Rig() = default;
+  std::unique_ptr<PanTiltSource> source;
+};
+
+struct VapixRig : Rig {
+  VapixRig() {
+    VapixSourceOptions options;
+    options.url = server.url();
+    options.user = "user";
+    options.password = "secret";
+    options.timeout_s = kDeadline_s;
+    source = std::make_unique<VapixSource>(options);
+  }
+  ~VapixRig() override { source.reset(); }
+  AxisServer server{"user", "secret", [] { return "pan=10\r\ntilt=20\r\n"; }};
+};
+
+struct RecordingRig : Rig {
+  explicit RecordingRig(bool realtime) {
+    std::string rows;
+    for (int i = 0; i < 10'000; ++i) {
+      rows += std::to_string(i * 0.01) + ",0.1,0.2\n";
+    }
+    directory.write("telemetry.csv", "receive_time_s,pan_rad,tilt_rad\n" + rows);
+    RecordingPanTiltSourceOptions options;
+    options.directory = directory.path();
+    options.realtime = realtime;
+    source = std::make_unique<RecordingPanTiltSource>(options);
+  }
+  TemporaryDirectory directory;
+};
+
+struct Case {
+  const char* name;
+  std::function<std::unique_ptr<Rig>()> make;
+};
+
+void PrintTo(const Case& which, std::ostream* out) { *out << which.name; }
+
+class PanTiltSourceContract : public ::testing::TestWithParam<Case> {
+ protected:
+  std::unique_ptr<Rig> rig_ = GetParam().make();
+  PanTiltSource& source_ = *rig_->source;
+  PanTiltSample sample_;
+};
+
+TEST_P(PanTiltSourceContract, DeliversSamplesWithOrderedIntervals) {
+  double last_s = -1;
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_EQ(source_.read(sample_, kDeadline_s), ReadStatus::kOk) << source_.error();
+    EXPECT_LE(sample_.earliest_time_s, sample_.latest_time_s);
+    EXPECT_GE(sample_.latest_time_s, last_s);
+    last_s = sample_.latest_time_s;
+  }
+}
+
+TEST_P(PanTiltSourceContract, LosesNothingWhenAReadDoesNotWait) {
+  int samples = 0;
+  EXPECT_TRUE(eventually([&] {
+    const ReadStatus status = source_.read(sample_, 0);
+    EXPECT_TRUE(status == ReadStatus::kOk || status == ReadStatus::kTimeout) << source_.error();
+    samples += status == ReadStatus::kOk ? 1 : 0;
+    return samples == 5;
+  }));
+}
+
+TEST_P(PanTiltSourceContract, StaysStoppedWhenStoppedBeforeTheFirstRead) {
+  source_.stop();
+  source_.stop();
+  EXPECT_EQ(source_.read(sample_, kDeadline_s), ReadStatus::kStopped);
+  EXPECT_EQ(source_.read(sample_, 0), ReadStatus::kStopped);
+}
+
+TEST_P(PanTiltSourceContract, EndsAReadWhenAnotherThreadStopsIt) {
+  std::thread reader([&] {
+    ReadStatus status = ReadStatus::kOk;
+    while (status == ReadStatus::kOk || status == ReadStatus::kTimeout) {
+      status = source_.read(sample_, kDeadline_s);
+    }
+    EXPECT_TRUE(status == ReadStatus::kStopped || status == ReadStatus::kEnd);
+  });
+  source_.stop();
+  reader.join();
+  EXPECT_EQ(source_.read(sample_, 0), ReadStatus::kStopped);
+}
+
+TEST_P(PanTiltSourceContract, HasANameWithoutPassword) {
+  EXPECT_FALSE(source_.name().empty());
+  EXPECT_EQ(source_.name().find("secret"), std::string::npos);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Sources, PanTiltSourceContract,
+    ::testing::Values(Case{"Vapix", [] { return std::make_unique<VapixRig>(); }},
+                      Case{"Recording", [] { return std::make_unique<RecordingRig>(false); }},
+                      Case{"RecordingInRealTime",
+                           [] { return std::make_unique<RecordingRig>(true); }}),
+    [](const auto& which) { return which.param.name; });
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,45 @@
+#pragma once
+// Waiting for events: everything that a test waits for comes within kDeadline_s, or the test fails.
+
+#include <chrono>
+#include <thread>
+
+#include "platform/system/clock.h"
+
+namespace alidade {
+
+constexpr double kDeadline_s = 30;
+
+// Reads until the status is one of those wanted (or none is left to come); returns the last status.
+template <class Source, class Item, class Wanted>
+ReadStatus read_until(Source& source, Item& item, Wanted wanted) {
+  const double end_s = monotonic_now_s() + kDeadline_s;
+  ReadStatus status = ReadStatus::kTimeout;
+  while (monotonic_now_s() < end_s) {
+    status = source.read(item, 1);
+    if (wanted(status) || status == ReadStatus::kFailed || status == ReadStatus::kStopped ||
+        status == ReadStatus::kEnd) {
+      break;
+    }
+  }
+  return status;
+}
+
+template <class Source, class Item>
+ReadStatus read_until(Source& source, Item& item, ReadStatus wanted) {
+  return read_until(source, item, [wanted](ReadStatus status) { return status == wanted; });
+}
+
+template <class Condition>
+bool eventually(Condition condition) {
+  const double end_s = monotonic_now_s() + kDeadline_s;
+  while (!condition()) {
+    if (monotonic_now_s() > end_s) {
+      return false;
+    }
+    std::this_thread::sleep_for(std::chrono::milliseconds(2));
+  }
+  return true;
+}
+
+}  // namespace alidade

@@ -1,0 +1,137 @@
+#include "test/platform/support/rtp_sender.h"
+
+extern "C" {
+#include <libavutil/opt.h>
+#include <libavutil/time.h>
+}
+
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstring>
+#include <stdexcept>
+
+namespace alidade {
+namespace {
+
+void check(int code) {
+  if (code < 0) {
+    throw std::runtime_error(av_error_text(code));
+  }
+}
+
+// The bound port, or -1.
+int bound_udp_port(int wanted, int* fd) {
+  *fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_ANY);
+  address.sin_port = htons(static_cast<std::uint16_t>(wanted));
+  socklen_t size = sizeof address;
+  auto* generic = reinterpret_cast<sockaddr*>(&address);
+  return ::bind(*fd, generic, size) == 0 && ::getsockname(*fd, generic, &size) == 0
+             ? ntohs(address.sin_port)
+             : -1;
+}
+
+}  // namespace
+
+int free_rtp_port() {
+  for (;;) {
+    int first_fd = -1;
+    int second_fd = -1;
+    const int first = bound_udp_port(0, &first_fd);
+    const int second = first > 0 && first % 2 == 0 ? bound_udp_port(first + 1, &second_fd) : -1;
+    ::close(first_fd);
+    ::close(second_fd);
+    if (second > 0) {
+      return first;
+    }
+  }
+}
+
+bool rtp_port_taken(int port) {
+  bool taken = true;
+  for (const int each : {port, port + 1}) {
+    int fd = -1;
+    taken = bound_udp_port(each, &fd) < 0 && taken;
+    ::close(fd);
+  }
+  return taken;
+}
+
+RtpSender::RtpSender(Codec codec, int port, double first_time_s)
+    : first_time_s_(first_time_s), began_utc_us_(av_gettime()) {
+  const bool mjpeg = codec == Codec::kMjpeg;
+  const AVCodec* encoder = avcodec_find_encoder_by_name(mjpeg ? "mjpeg" : "libx264");
+  encoder_.reset(avcodec_alloc_context3(encoder));
+  encoder_->width = kWidth;
+  encoder_->height = kHeight;
+  encoder_->time_base = {1, 30};
+  encoder_->gop_size = 10;
+  encoder_->max_b_frames = 0;
+  encoder_->thread_count = 1;
+  encoder_->pix_fmt = mjpeg ? AV_PIX_FMT_YUVJ420P : AV_PIX_FMT_YUV420P;
+  if (mjpeg) {
+    encoder_->color_range = AVCOL_RANGE_JPEG;
+    av_opt_set(encoder_->priv_data, "huffman", "default", 0);  // RFC 2435 knows no other tables
+    av_opt_set(encoder_->priv_data, "force_duplicated_matrix", "1", 0);
+  } else {
+    av_opt_set(encoder_->priv_data, "preset", "ultrafast", 0);
+    av_opt_set(encoder_->priv_data, "tune", "zerolatency", 0);
+  }
+  check(avcodec_open2(encoder_.get(), encoder, nullptr));
+
+  const std::string url = "rtp://127.0.0.1:" + std::to_string(port) + "?pkt_size=1200";
+  check(avformat_alloc_output_context2(&format_, nullptr, "rtp", url.c_str()));
+  format_->flags |= AVFMT_FLAG_BITEXACT;  // RTP timestamps begin at zero, not at a random number
+  // Lets the RTCP reports say that first_time_s is now.
+  format_->start_time_realtime = began_utc_us_ - std::llround(1e6 * first_time_s);
+  AVStream* stream = avformat_new_stream(format_, nullptr);
+  check(avcodec_parameters_from_context(stream->codecpar, encoder_.get()));
+  stream->time_base = {1, 90'000};
+  check(avio_open(&format_->pb, url.c_str(), AVIO_FLAG_WRITE));
+  check(avformat_write_header(format_, nullptr));
+
+  picture_.reset(av_frame_alloc());
+  picture_->width = kWidth;
+  picture_->height = kHeight;
+  picture_->format = encoder_->pix_fmt;
+  check(av_frame_get_buffer(picture_.get(), 0));
+}
+
+RtpSender::~RtpSender() {
+  avio_closep(&format_->pb);
+  avformat_free_context(format_);
+}
+
+void RtpSender::send(double fraction) {
+  check(av_frame_make_writable(picture_.get()));
+  for (int plane = 0; plane < 3; ++plane) {
+    const int rows = plane == 0 ? kHeight : kHeight / 2;
+    std::memset(picture_->data[plane], plane == 0 ? grey_of(next_) : 128,
+                static_cast<std::size_t>(picture_->linesize[plane] * rows));
+  }
+  picture_->pts = next_;
+  check(avcodec_send_frame(encoder_.get(), picture_.get()));
+  const PacketPtr packet(av_packet_alloc());
+  check(avcodec_receive_packet(encoder_.get(), packet.get()));
+  av_shrink_packet(packet.get(), static_cast<int>(fraction * packet->size));
+  packet->pts = std::llround(90'000 * (first_time_s_ + static_cast<double>(next_) * kPeriod_s));
+  packet->dts = packet->pts;
+  packet->stream_index = 0;
+  check(av_write_frame(format_, packet.get()));
+  ++next_;
+}
+
+std::string RtpSender::sdp() const {
+  char text[2048];
+  AVFormatContext* sessions[] = {format_};
+  check(av_sdp_create(sessions, 1, text, sizeof text));
+  return text;
+}
+
+}  // namespace alidade

@@ -1,0 +1,40 @@
+#pragma once
+// RtspServer: runs the program rtsp_server as a child that can be killed and started again.
+
+#include <sys/types.h>
+
+#include <string>
+
+namespace alidade {
+
+struct RtspStream {
+  std::string path;
+  std::string launch;  // GStreamer pipeline
+};
+
+// Test pictures of 320x240 at 30 Hz, all white (luma 235), and MJPEG or H.264 of them.
+extern const char* const kWhitePictures;
+extern const RtspStream kMjpegStream;
+extern const RtspStream kH264Stream;
+
+class RtspServer {
+ public:
+  explicit RtspServer(RtspStream stream, std::string user = "", std::string password = "");
+  ~RtspServer() { kill(); }
+  RtspServer(const RtspServer&) = delete;
+  RtspServer& operator=(const RtspServer&) = delete;
+
+  std::string url() const { return "rtsp://127.0.0.1:" + std::to_string(port_) + stream_.path; }
+
+  void kill();     // as a power failure would
+  void restart();  // on the same port
+
+ private:
+  RtspStream stream_;
+  std::string user_;
+  std::string password_;
+  int port_ = 0;
+  pid_t child_ = -1;
+};
+
+}  // namespace alidade

@@ -1,0 +1,46 @@
+#include "platform/system/url.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+TEST(Url, KeepsThePasswordApartFromWhatIsShown) {
+  Url url;
+  std::string error;
+  ASSERT_TRUE(parse_url("rtsp://user:p%40ss%3A@camera:8554/a/b?x=1", &url, &error)) << error;
+  EXPECT_EQ(url.scheme, "rtsp");
+  EXPECT_EQ(url.host, "camera");
+  EXPECT_EQ(url.port, "8554");
+  EXPECT_EQ(url.path, "/a/b?x=1");
+  EXPECT_EQ(url.user, "user");
+  EXPECT_EQ(url.password, "p@ss:");
+  EXPECT_EQ(url.bare, "rtsp://camera:8554/a/b?x=1");
+}
+
+TEST(Url, PutsCredentialsBackPercentEncoded) {
+  const std::string full = with_credentials("rtsp://camera/x", "us er", "p@s:s/%");
+  EXPECT_THAT(full, HasSubstr("us%20er:"));
+  Url url;
+  std::string error;
+  ASSERT_TRUE(parse_url(full, &url, &error)) << error;
+  EXPECT_EQ(url.user, "us er");
+  EXPECT_EQ(url.password, "p@s:s/%");
+  EXPECT_EQ(url.bare, "rtsp://camera/x");
+  EXPECT_EQ(with_credentials("rtsp://camera/x", "", ""), "rtsp://camera/x");
+}
+
+TEST(Url, ShowsNoPasswordOfAUrlItCannotParse) {
+  Url url;
+  std::string error;
+  EXPECT_FALSE(parse_url("rtsp://user:se@cret@camera/x", &url, &error));
+  EXPECT_EQ(url.bare, "rtsp://...");
+  EXPECT_THAT(error, Not(HasSubstr("cret")));
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,467 @@
+// RtpSource with plain RTP: a sender in this process, each of whose pictures tells its number by its
+// grey (rtp_sender.h).
+
+#include "platform/video/rtp_source.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <iterator>
+#include <memory>
+#include <set>
+#include <thread>
+#include <vector>
+
+#include "platform/recording/recording_writer.h"
+#include "platform/video/recording_frame_source.h"
+#include "test/platform/support/eventually.h"
+#include "test/platform/support/rtp_sender.h"
+#include "test/platform/support/temporary_directory.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+using Codec = RtpSender::Codec;
+
+constexpr double kNever_s = 1e6;
+
+RtpSourceOptions options_for(int port, Codec codec) {
+  RtpSourceOptions options;
+  options.url = "rtp://@:" + std::to_string(port);
+  options.format = codec == Codec::kMjpeg ? "MJPG" : "H264";
+  options.timeout_s = kDeadline_s;
+  options.max_backoff_s = 0.01;
+  return options;
+}
+
+// From here on no packet is lost.
+void listen(RtpSource& source, int port) {
+  Frame frame;
+  ASSERT_EQ(source.read(frame, 0), ReadStatus::kTimeout);
+  ASSERT_TRUE(eventually([port] { return rtp_port_taken(port); }));
+}
+
+// Sends until the source says something.
+ReadStatus next(RtpSource& source, RtpSender& sender, Frame& frame) {
+  const double end_s = monotonic_now_s() + kDeadline_s;
+  ReadStatus status = ReadStatus::kTimeout;
+  while (status == ReadStatus::kTimeout && monotonic_now_s() < end_s) {
+    sender.send();
+    status = source.read(frame, 0.05);
+  }
+  return status;
+}
+
+// The mean of all pixels: a wrong stride or a damaged edge shows.
+double grey_of(const Frame& frame) {
+  double sum = 0;
+  for (int v = 0; v < frame.height; ++v) {
+    for (int u = 0; u < frame.width; ++u) {
+      sum += frame.luma[v * frame.stride + u];
+    }
+  }
+  return sum / (frame.width * frame.height);
+}
+
+constexpr double kGreyTolerance = 3;  // neighbouring numbers differ by 7
+
+// The picture's number by its stamp, if the first one's is 0.
+double number_of(const Frame& frame, const FrameStamp& first) {
+  return (*frame.stamp.sender_time_s - *first.sender_time_s) / RtpSender::kPeriod_s;
+}
+
+class RtpSourceWith : public ::testing::TestWithParam<Codec> {
+ protected:
+  const int port_ = free_rtp_port();
+  RtpSourceOptions options_ = options_for(port_, GetParam());
+};
+
+INSTANTIATE_TEST_SUITE_P(Codecs, RtpSourceWith, ::testing::Values(Codec::kMjpeg, Codec::kH264),
+                         ::testing::PrintToStringParamName());
+
+TEST_P(RtpSourceWith, DeliversEveryPictureWithItsOwnStamp) {
+  RtpSource source(options_);
+  listen(source, port_);
+  RtpSender sender(GetParam(), port_);
+  FrameStamp first;
+  FrameStamp last;
+  for (int i = 0; i < 40; ++i) {
+    Frame frame;
+    ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+    first = i == 0 ? frame.stamp : first;
+    EXPECT_EQ(frame.stamp.frame, i);
+    EXPECT_EQ(frame.stamp.restarted, i == 0);
+    EXPECT_EQ(frame.stamp.sequence, std::nullopt);
+    ASSERT_TRUE(frame.stamp.sender_time_s);
+    EXPECT_NEAR(number_of(frame, first), i, 1e-3);
+    EXPECT_EQ(frame.width, RtpSender::kWidth);
+    EXPECT_EQ(frame.height, RtpSender::kHeight);
+    EXPECT_NEAR(grey_of(frame), RtpSender::grey_of(i), kGreyTolerance);
+    EXPECT_GE(frame.stamp.receive_time_s, last.receive_time_s);
+    last = frame.stamp;
+  }
+  EXPECT_EQ(source.counters().damaged, 0);
+  EXPECT_EQ(source.counters().dropped, 0);
+}
+
+// An H.264 picture is delivered only when the next one begins; a stamp taken then would be a period
+// late.
+TEST_P(RtpSourceWith, StampsAPictureOnItsOwnArrival) {
+  RtpSource source(options_);
+  listen(source, port_);
+  RtpSender sender(GetParam(), port_);
+  std::vector<double> sent_s;
+  int on_time = 0;
+  for (std::size_t i = 0; i < 20; ++i) {
+    Frame frame;
+    sent_s.push_back(monotonic_now_s());
+    sender.send();
+    if (source.read(frame, 0.05) == ReadStatus::kOk) {
+      const auto number = static_cast<std::size_t>(frame.stamp.frame);
+      ASSERT_LT(number, sent_s.size());
+      EXPECT_GE(frame.stamp.receive_time_s, sent_s[number]);
+      // The receiving thread may be kept waiting on a busy machine, but not always.
+      on_time += number + 1 == sent_s.size() || frame.stamp.receive_time_s < sent_s[number + 1];
+    }
+  }
+  EXPECT_GT(on_time, 0);
+}
+
+TEST_P(RtpSourceWith, ReadsASessionDescription) {
+  RtpSender sender(GetParam(), port_);
+  const TemporaryDirectory directory;
+  directory.write("camera.sdp", sender.sdp());
+  options_.url = directory.path() + "/camera.sdp";
+  options_.format.clear();
+  RtpSource source(options_);
+  EXPECT_EQ(source.name(), options_.url);
+  Frame frame;
+  EXPECT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+  EXPECT_EQ(frame.width, RtpSender::kWidth);
+}
+
+TEST_P(RtpSourceWith, UnwrapsTimestampsAndPassesUtcOnAcrossTheWrap) {
+  constexpr double kWrap_s = 4294967296.0 / 90'000;
+  RtpSource source(options_);
+  listen(source, port_);
+  RtpSender sender(GetParam(), port_, kWrap_s - 20 * RtpSender::kPeriod_s);
+  FrameStamp first;
+  int with_utc = 0;
+  for (int i = 0; i < 40; ++i) {
+    Frame frame;
+    ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+    first = i == 0 ? frame.stamp : first;
+    ASSERT_TRUE(frame.stamp.sender_time_s);
+    EXPECT_NEAR(number_of(frame, first), i, 1e-3);
+    if (frame.stamp.sender_utc_s) {
+      // The sender's report calls its own beginning picture 0.
+      EXPECT_NEAR(*frame.stamp.sender_utc_s - sender.began_utc_s(), i * RtpSender::kPeriod_s, 2e-3);
+      ++with_utc;
+    }
+  }
+  EXPECT_GE(with_utc, 30);  // some before the wrap, all after it
+}
+
+TEST_P(RtpSourceWith, BeginsAtAKeyFrame) {
+  RtpSender sender(GetParam(), port_);
+  for (int i = 0; i < 3; ++i) {
+    sender.send();
+  }
+  RtpSource source(options_);
+  listen(source, port_);
+  Frame frame;
+  ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+  const int number = GetParam() == Codec::kMjpeg ? 3 : 10;
+  EXPECT_NEAR(grey_of(frame), RtpSender::grey_of(number), kGreyTolerance);
+  EXPECT_EQ(frame.stamp.frame, 0);
+  EXPECT_EQ(source.counters().damaged, 0);
+}
+
+TEST_P(RtpSourceWith, SkipsAndCountsADamagedPicture) {
+  RtpSource source(options_);
+  listen(source, port_);
+  RtpSender sender(GetParam(), port_);
+  Frame frame;
+  ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+  const FrameStamp first = frame.stamp;
+  const std::int64_t damaged = sender.sent();
+  sender.send(GetParam() == Codec::kMjpeg ? 0.9 : 0.6);  // JPEG: within the picture, not its header
+  std::set<std::int64_t> numbers;
+  for (int i = 0; i < 25; ++i) {
+    ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+    numbers.insert(std::llround(number_of(frame, first)));
+  }
+  EXPECT_EQ(numbers.count(damaged), 0U);
+  EXPECT_GE(source.counters().damaged, 1);
+  EXPECT_EQ(frame.stamp.frame, 25);
+}
+
+TEST_P(RtpSourceWith, DropsWhatASlowReaderLeavesAndGoesOnAtAKeyFrame) {
+  RtpSource source(options_);
+  listen(source, port_);
+  RtpSender sender(GetParam(), port_);
+  Frame frame;
+  ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+  const FrameStamp first = frame.stamp;
+  ASSERT_TRUE(eventually([&] {
+    sender.send();
+    return source.counters().dropped > 0;
+  }));
+  std::int64_t last = -1;
+  for (int i = 1; i <= 60; ++i) {
+    ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+    EXPECT_EQ(frame.stamp.frame, i);
+    const std::int64_t number = std::llround(number_of(frame, first));
+    EXPECT_GT(number, last);
+    EXPECT_NEAR(grey_of(frame), RtpSender::grey_of(number), kGreyTolerance);
+    last = number;
+  }
+}
+
+TEST_P(RtpSourceWith, BeginsAnewWithAnotherSender) {
+  options_.timeout_s = 1;
+  RtpSource source(options_);
+  listen(source, port_);
+  Frame frame;
+  {
+    RtpSender sender(GetParam(), port_);
+    for (int i = 0; i < 5; ++i) {
+      ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+    }
+  }
+  RtpSender sender(GetParam(), port_, 1000);
+  ReadStatus status = ReadStatus::kOk;
+  while (status == ReadStatus::kOk) {
+    status = next(source, sender, frame);
+  }
+  ASSERT_EQ(status, ReadStatus::kDisconnected);
+  const std::int64_t frames = frame.stamp.frame;
+  ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+  EXPECT_TRUE(frame.stamp.restarted);
+  EXPECT_EQ(frame.stamp.frame, frames + 1);
+}
+
+TEST_P(RtpSourceWith, ReportsThatNothingComesAnyMore) {
+  options_.timeout_s = 0.1;
+  RtpSource source(options_);
+  listen(source, port_);
+  Frame frame;
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_EQ(source.error(),
+            "rtp://0.0.0.0:" + std::to_string(port_) + "/: nothing received for 0.1 s");
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+}
+
+TEST_P(RtpSourceWith, DeliversStampsAndSizeWithoutDecoding) {
+  options_.decode = false;
+  RtpSource source(options_);
+  listen(source, port_);
+  RtpSender sender(GetParam(), port_);
+  FrameStamp first;
+  for (int i = 0; i < 20; ++i) {
+    Frame frame;
+    ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+    first = i == 0 ? frame.stamp : first;
+    EXPECT_EQ(frame.luma, nullptr);
+    EXPECT_EQ(frame.width, RtpSender::kWidth);
+    EXPECT_EQ(frame.height, RtpSender::kHeight);
+    EXPECT_NEAR(number_of(frame, first), i, 1e-3);
+  }
+}
+
+TEST_P(RtpSourceWith, KeepsAPictureAliveBeyondItself) {
+  auto source = std::make_unique<RtpSource>(options_);
+  listen(*source, port_);
+  RtpSender sender(GetParam(), port_);
+  std::vector<Frame> frames(10);
+  for (Frame& frame : frames) {
+    ASSERT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
+  }
+  source.reset();
+  for (int i = 0; i < 10; ++i) {
+    EXPECT_NEAR(grey_of(frames[static_cast<std::size_t>(i)]), RtpSender::grey_of(i),
+                kGreyTolerance);
+  }
+}
+
+// Compares a recording with the greys that its frames must have.
+void expect_recording(const std::string& directory, const std::vector<double>& greys,
+                      std::size_t may_be_missing) {
+  RecordingFrameSourceOptions options;
+  options.directory = directory;
+  RecordingFrameSource recording(options);
+  Frame frame;
+  std::size_t i = 0;
+  while (recording.read(frame, 0) == ReadStatus::kOk) {
+    ASSERT_LT(i, greys.size());
+    EXPECT_EQ(frame.stamp.frame, static_cast<std::int64_t>(i));
+    EXPECT_NEAR(grey_of(frame), greys[i], kGreyTolerance);
+    ++i;
+  }
+  ASSERT_EQ(recording.read(frame, 0), ReadStatus::kEnd) << recording.error();
+  EXPECT_GE(i + may_be_missing, greys.size());
+  EXPECT_EQ(recording.missing_frames(), static_cast<std::int64_t>(greys.size() - i));
+  EXPECT_EQ(recording.damaged_frames(), 0);
+}
+
+class RtpSourceCopy : public RtpSourceWith {
+ protected:
+  void SetUp() override {
+    options_.copy_to = directory_.path() + "/video.mkv";
+    std::string error;
+    ASSERT_TRUE(writer_.open(directory_.path(), RtpSender::kWidth, RtpSender::kHeight, "", &error))
+        << error;
+  }
+
+  TemporaryDirectory directory_;
+  RecordingWriter writer_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Codecs, RtpSourceCopy, ::testing::Values(Codec::kMjpeg, Codec::kH264),
+                         ::testing::PrintToStringParamName());
+
+TEST_P(RtpSourceCopy, HoldsTheFramesDeliveredAlsoAfterAKill) {
+  options_.decode = false;
+  std::string error;
+  std::vector<double> greys;
+  {
+    RtpSource source(options_);
+    listen(source, port_);
+    RtpSender sender(GetParam(), port_);
+    for (int i = 0; i < 40; ++i) {
+      Frame frame;
+      ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+      ASSERT_TRUE(writer_.add_frame(frame.stamp, &error)) << error;
+      greys.push_back(RtpSender::grey_of(i));
+    }
+    expect_recording(directory_.path(), greys, 31);  // the open file: up to a second may be missing
+  }
+  expect_recording(directory_.path(), greys, 0);
+}
+
+TEST_P(RtpSourceCopy, GoesOnOverAReconnection) {
+  options_.timeout_s = 1;
+  std::string error;
+  std::vector<double> greys;
+  {
+    RtpSource source(options_);
+    listen(source, port_);
+    auto sender = std::make_unique<RtpSender>(GetParam(), port_);
+    int connections = 0;
+    while (greys.size() < 40) {
+      Frame frame;
+      const ReadStatus status = next(source, *sender, frame);
+      if (status == ReadStatus::kOk) {
+        ASSERT_TRUE(writer_.add_frame(frame.stamp, &error)) << error;
+        greys.push_back(grey_of(frame));
+        connections += frame.stamp.restarted ? 1 : 0;
+      } else {
+        ASSERT_EQ(status, ReadStatus::kDisconnected) << source.error();
+      }
+      if (greys.size() == 20) {
+        sender = std::make_unique<RtpSender>(GetParam(), port_, 1000 * (connections + 1));
+      }
+    }
+    EXPECT_GE(connections, 2);
+  }
+  expect_recording(directory_.path(), greys, 0);
+}
+
+TEST(RtpSourceCopyFailure, EndsTheSourceWithTheReason) {
+  const int port = free_rtp_port();
+  const TemporaryDirectory directory;
+  RtpSourceOptions options = options_for(port, Codec::kMjpeg);
+  options.copy_to = directory.path() + "/nowhere/video.mkv";
+  RtpSource source(options);
+  listen(source, port);
+  RtpSender sender(Codec::kMjpeg, port);
+  Frame frame;
+  EXPECT_EQ(next(source, sender, frame), ReadStatus::kFailed);
+  EXPECT_THAT(source.error(), HasSubstr("cannot write " + options.copy_to + ": No such file"));
+  EXPECT_EQ(source.read(frame, 0), ReadStatus::kFailed);
+}
+
+TEST(RtpSourceOptions, ThatCannotWorkFailAtOnceAndShowNoPassword) {
+  const TemporaryDirectory directory;
+  directory.write("text.sdp", "this describes nothing");
+  const struct {
+    std::string url;
+    std::string format;
+    std::string says;
+  } cases[] = {
+      {"rtsp://user:se@cret@camera/x", "MJPG", "rtsp://...: not a URL"},
+      {"http://user:secret@camera/x", "MJPG", "http://camera/x: not a video stream"},
+      {"rtp://@:5004", "HEVC", "unknown format 'HEVC'"},
+      {"rtp://239.1.1.1", "MJPG", "no port"},
+      {directory.path() + "/none.sdp", "", "none.sdp: no usable SDP description: No such file"},
+      {directory.path() + "/text.sdp", "", "text.sdp: there is no video in this stream"},
+      {"", "", "no usable SDP description"},
+  };
+  for (const auto& which : cases) {
+    RtpSourceOptions options;
+    options.url = which.url;
+    options.format = which.format;
+    RtpSource source(options);
+    Frame frame;
+    EXPECT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed) << which.url;
+    EXPECT_THAT(source.error(), HasSubstr(which.says));
+    EXPECT_THAT(source.error() + source.name(), Not(HasSubstr("cret")));
+    EXPECT_EQ(source.read(frame, 0), ReadStatus::kFailed);
+  }
+}
+
+TEST(RtpSourceReconnection, LeaksNoFileDescriptor) {
+  RtpSourceOptions options = options_for(free_rtp_port(), Codec::kMjpeg);
+  options.timeout_s = 0.001;
+  RtpSource source(options);
+  Frame frame;
+  const auto open_files = [] {
+    return std::distance(std::filesystem::directory_iterator("/proc/self/fd"),
+                         std::filesystem::directory_iterator());
+  };
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  const auto before = open_files();
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  }
+  EXPECT_LE(open_files(),
+            before + 3);  // a connection may be open: two sockets and a resolver's file
+}
+
+TEST(RtpSourceStop, EndsAReadThatWaitsForPackets) {
+  const int port = free_rtp_port();
+  RtpSourceOptions options = options_for(port, Codec::kMjpeg);
+  options.timeout_s = kNever_s;
+  RtpSource source(options);
+  std::thread stopper([&] {
+    eventually([&] { return rtp_port_taken(port); });
+    source.stop();
+  });
+  Frame frame;
+  EXPECT_EQ(source.read(frame, kNever_s), ReadStatus::kStopped);
+  stopper.join();
+}
+
+TEST(RtpSourceStop, EndsAPause) {
+  RtpSourceOptions options = options_for(free_rtp_port(), Codec::kMjpeg);
+  options.timeout_s = 0.001;
+  options.max_backoff_s = kNever_s;
+  RtpSource source(options);
+  Frame frame;
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  std::thread stopper([&] { source.stop(); });
+  ReadStatus status = ReadStatus::kDisconnected;
+  while (status == ReadStatus::kDisconnected) {
+    status = source.read(frame, kNever_s);
+  }
+  EXPECT_EQ(status, ReadStatus::kStopped);
+  stopper.join();
+}
+
+}  // namespace
+}  // namespace alidade

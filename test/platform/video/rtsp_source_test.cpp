@@ -1,0 +1,260 @@
+// RtpSource with RTSP: a real server (gst-rtsp-server) that is killed and started again.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <iterator>
+#include <thread>
+
+#include "platform/video/rtp_source.h"
+#include "test/platform/support/eventually.h"
+#include "test/platform/support/raw_server.h"
+#include "test/platform/support/rtsp_server.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+using Transport = RtpSourceOptions::Transport;
+
+constexpr double kNever_s = 1e6;
+
+RtpSourceOptions options_for(const std::string& url, Transport transport = Transport::kTcp) {
+  RtpSourceOptions options;
+  options.url = url;
+  options.transport = transport;
+  options.timeout_s = 10;  // the server needs a moment for its first picture
+  options.max_backoff_s = 0.05;
+  return options;
+}
+
+struct Way {
+  const char* name;
+  const RtspStream* stream;
+  Transport transport;
+};
+
+void PrintTo(const Way& way, std::ostream* out) { *out << way.name; }
+
+class RtspSource : public ::testing::TestWithParam<Way> {
+ protected:
+  RtspServer server_{*GetParam().stream};
+  RtpSourceOptions options_ = options_for(server_.url(), GetParam().transport);
+};
+
+INSTANTIATE_TEST_SUITE_P(Ways, RtspSource,
+                         ::testing::Values(Way{"MjpegTcp", &kMjpegStream, Transport::kTcp},
+                                           Way{"MjpegUdp", &kMjpegStream, Transport::kUdp},
+                                           Way{"H264Tcp", &kH264Stream, Transport::kTcp},
+                                           Way{"H264Udp", &kH264Stream, Transport::kUdp}),
+                         [](const auto& way) { return way.param.name; });
+
+TEST_P(RtspSource, DeliversWhitePicturesOnTheSendersClock) {
+  RtpSource source(options_);
+  double last_s = -1;
+  double utc_offset_s = 0;
+  bool utc_known = false;
+  int frames = 0;
+  while (frames < 30 || !utc_known) {
+    Frame frame;
+    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    EXPECT_EQ(frame.stamp.frame, frames++);
+    ASSERT_EQ(frame.width, 320);
+    ASSERT_EQ(frame.height, 240);
+    for (const int v : {0, 120, 239}) {
+      for (const int u : {0, 160, 319}) {
+        EXPECT_NEAR(frame.luma[v * frame.stride + u], 235, 3);
+      }
+    }
+    ASSERT_TRUE(frame.stamp.sender_time_s);
+    EXPECT_GT(*frame.stamp.sender_time_s, last_s);
+    last_s = *frame.stamp.sender_time_s;
+    if (frame.stamp.sender_utc_s) {
+      const double offset_s = *frame.stamp.sender_utc_s - *frame.stamp.sender_time_s;
+      if (utc_known) {
+        EXPECT_NEAR(offset_s, utc_offset_s, 1);
+      }
+      utc_offset_s = offset_s;
+      utc_known = true;
+      const double now_utc_s =
+          1e-9 * static_cast<double>(
+                     std::chrono::nanoseconds(std::chrono::system_clock::now().time_since_epoch())
+                         .count());
+      EXPECT_NEAR(*frame.stamp.sender_utc_s, now_utc_s, 60);  // the right epoch
+    }
+  }
+}
+
+TEST_P(RtspSource, OutlivesAKillAndARestartOfTheServer) {
+  RtpSource source(options_);
+  Frame frame;
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  }
+  const std::int64_t before = frame.stamp.frame;
+  server_.kill();
+  ReadStatus status = ReadStatus::kOk;
+  while (status == ReadStatus::kOk || status == ReadStatus::kTimeout) {
+    status = source.read(frame, kDeadline_s);
+  }
+  ASSERT_EQ(status, ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), StartsWith(server_.url() + ": "));
+  server_.restart();
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  EXPECT_TRUE(frame.stamp.restarted);
+  EXPECT_GT(frame.stamp.frame, before);
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  EXPECT_FALSE(frame.stamp.restarted);
+}
+
+TEST(RtspSourceLogin, TakesAPasswordOfAnyCharacters) {
+  const RtspServer server(kMjpegStream, "user", "p@s/w%rd? &x");
+  RtpSourceOptions options = options_for(server.url());
+  options.user = "user";
+  options.password = "p@s/w%rd? &x";
+  RtpSource source(options);
+  Frame frame;
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+}
+
+TEST(RtspSourceLogin, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
+  const RtspServer server(kMjpegStream, "user", "secret");
+  RtpSourceOptions options = options_for(server.url());
+  options.url.replace(0, 7, "rtsp://user:guess@");
+  RtpSource source(options);
+  Frame frame;
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_EQ(source.error(), server.url() + ": wrong user or password (401)");
+  EXPECT_EQ(source.name(), server.url());
+  EXPECT_EQ(source.read(frame, 0), ReadStatus::kFailed);
+
+  RtpSource anonymous(options_for(server.url()));
+  EXPECT_EQ(read_until(anonymous, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(anonymous.error(), HasSubstr("the camera wants a user and a password (401)"));
+}
+
+TEST(RtspSourceErrors, NameAStreamThatIsNotThere) {
+  const RtspServer server(kMjpegStream);
+  RtpSource source(options_for(server.url() + "/none"));
+  Frame frame;
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("/none: no such stream on this camera (404)"));
+}
+
+TEST(RtspSourceErrors, NameARefusedConnectionAndTryAgain) {
+  RtpSourceOptions options =
+      options_for("rtsp://user:secret@127.0.0.1:" + std::to_string(unused_port()) + "/x");
+  RtpSource source(options);
+  Frame frame;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_THAT(source.error(), AllOf(HasSubstr("Connection refused"), Not(HasSubstr("secret"))));
+  }
+}
+
+TEST(RtspSourceErrors, NameASilentServer) {
+  RawServer server([&server](int fd) { server.stay_silent(fd); });
+  RtpSourceOptions options =
+      options_for("rtsp://127.0.0.1:" + std::to_string(server.port()) + "/x");
+  options.timeout_s = 0.2;
+  RtpSource source(options);
+  Frame frame;
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("nothing received for 0.2 s"));
+}
+
+TEST(RtspSourceErrors, NameACodecThatIsNotSupported) {
+  const RtspServer server(
+      {"/vp8", std::string(kWhitePictures) + "vp8enc deadline=1 ! rtpvp8pay name=pay0 pt=96"});
+  RtpSource source(options_for(server.url()));
+  Frame frame;
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source.error(), HasSubstr("the video is vp8; set the camera to MJPEG or H.264"));
+}
+
+TEST(RtspSourceErrors, NameAStreamWithoutVideo) {
+  const RtspServer server({"/sound",
+                           "audiotestsrc is-live=true ! alawenc ! "
+                           "rtppcmapay name=pay0 pt=8"});
+  RtpSource source(options_for(server.url()));
+  Frame frame;
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("does it hold video?"));
+}
+
+TEST(RtspSourceErrors, NameBFrames) {
+  const RtspServer server(
+      {"/b",
+       "videotestsrc is-live=true pattern=ball ! "
+       "video/x-raw,format=I420,width=320,height=240,framerate=30/1 ! "
+       "x264enc bframes=2 b-adapt=false rc-lookahead=0 key-int-max=30 ! "
+       "video/x-h264,profile=main ! rtph264pay config-interval=1 name=pay0 pt=96"});
+  RtpSource source(options_for(server.url()));
+  Frame frame;
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source.error(), HasSubstr("B-frames"));
+}
+
+TEST(RtspSourceStream, KeepsTheVideosClockWhenThereIsSoundToo) {
+  const RtspServer server(
+      {"/both",
+       kMjpegStream.launch + " audiotestsrc is-live=true ! alawenc ! rtppcmapay name=pay1 pt=8"});
+  RtpSource source(options_for(server.url()));
+  Frame frame;
+  bool utc_known = false;
+  double last_s = -1;
+  int after_report = 0;
+  while (after_report < 10) {
+    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    if (last_s >= 0) {
+      EXPECT_GT(*frame.stamp.sender_time_s, last_s);
+      EXPECT_LT(*frame.stamp.sender_time_s, last_s + 1000);
+    }
+    last_s = *frame.stamp.sender_time_s;
+    utc_known = utc_known || frame.stamp.sender_utc_s.has_value();
+    after_report += utc_known ? 1 : 0;
+  }
+}
+
+TEST(RtspSourceStop, EndsAConnectionThatIsNotAnswered) {
+  RawServer server([&server](int fd) { server.stay_silent(fd); });
+  RtpSourceOptions options =
+      options_for("rtsp://127.0.0.1:" + std::to_string(server.port()) + "/x");
+  options.timeout_s = kNever_s;
+  RtpSource source(options);
+  std::thread stopper([&] {
+    eventually([&] { return server.connections() > 0; });
+    source.stop();
+  });
+  Frame frame;
+  EXPECT_EQ(source.read(frame, kNever_s), ReadStatus::kStopped);
+  stopper.join();
+}
+
+TEST(RtspSourceStop, LeaksNoFileDescriptorOverManyReconnections) {
+  RawServer server([](int fd) { RawServer::reset(fd); });
+  RtpSourceOptions options =
+      options_for("rtsp://127.0.0.1:" + std::to_string(server.port()) + "/x");
+  options.max_backoff_s = 0.001;
+  RtpSource source(options);
+  Frame frame;
+  const auto open_files = [] {
+    return std::distance(std::filesystem::directory_iterator("/proc/self/fd"),
+                         std::filesystem::directory_iterator());
+  };
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  const auto before = open_files();
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  }
+  EXPECT_LE(open_files(), before + 3);  // a connection may be under way at both ends
+}
+
+}  // namespace
+}  // namespace alidade
