@@ -8,6 +8,7 @@ bool pt_orientation(const Calibration& calibration, double frame_time_s,
   const PanTilt<double> middle = true_from_measured(mechanics, at_middle_row.angle);
   const PanTilt<double> rate = true_from_measured(mechanics, at_middle_row.rate);
   const double half_readout_s = calibration.line_delay * (0.5 * calibration.camera.height);
+  const double half_readout_square = half_readout_s * half_readout_s;
 
   const Vector2<double> to_true(1 / mechanics.pan_scale, 1 / mechanics.tilt_scale);
   Vector4<double> to_true_motion;
@@ -17,7 +18,7 @@ bool pt_orientation(const Calibration& calibration, double frame_time_s,
   // Mean over the rows of (a t^2 / 2)^2, t from -half_readout_s to half_readout_s.
   covariance.diagonal().head<2>() +=
       to_true.cwiseAbs2().cwiseProduct(at_middle_row.acceleration_square) *
-      (std::pow(half_readout_s, 4) / 20);
+      (half_readout_square * half_readout_square / 20);
 
   Matrix4<double> to_row_0 = Matrix4<double>::Identity();
   to_row_0.topRightCorner<2, 2>().diagonal().setConstant(-half_readout_s);
