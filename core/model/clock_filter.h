@@ -57,18 +57,19 @@ struct ClockFilterOptions {
     const auto positive = [](double v) { return std::isfinite(v) && v > 0; };
     const auto not_negative = [](double v) { return std::isfinite(v) && v >= 0; };
     const char* problem = nullptr;
-    if (!positive(window_s)) problem = "window_s must be positive";
-    if (!not_negative(nominal_period_s)) problem = "nominal_period_s must not be negative";
-    if (!not_negative(nominal_period_sigma_s)) {
-      problem = "nominal_period_sigma_s must not be negative";
-    }
-    if (!positive(max_skew) || max_skew >= 0.5) problem = "max_skew must be in (0, 0.5)";
-    if (!not_negative(skew_wander)) problem = "skew_wander must not be negative";
-    if (!positive(expected_jitter_s)) problem = "expected_jitter_s must be positive";
-    if (!positive(stamp_resolution_s)) problem = "stamp_resolution_s must be positive";
-    if (!positive(floor_shift_s)) problem = "floor_shift_s must be positive";
-    if (!positive(settle_s) || settle_s > window_s) problem = "settle_s must be in (0, window_s]";
-    if (!positive(restart_gap_s)) problem = "restart_gap_s must be positive";
+    const auto require = [&problem](bool ok, const char* what) {
+      problem = problem == nullptr && !ok ? what : problem;
+    };
+    require(positive(window_s), "window_s must be positive");
+    require(not_negative(nominal_period_s), "nominal_period_s must not be negative");
+    require(not_negative(nominal_period_sigma_s), "nominal_period_sigma_s must not be negative");
+    require(positive(max_skew) && max_skew < 0.5, "max_skew must be in (0, 0.5)");
+    require(not_negative(skew_wander), "skew_wander must not be negative");
+    require(positive(expected_jitter_s), "expected_jitter_s must be positive");
+    require(positive(stamp_resolution_s), "stamp_resolution_s must be positive");
+    require(positive(floor_shift_s), "floor_shift_s must be positive");
+    require(positive(settle_s) && settle_s <= window_s, "settle_s must be in (0, window_s]");
+    require(positive(restart_gap_s), "restart_gap_s must be positive");
     if (error != nullptr && problem != nullptr) *error = problem;
     return problem == nullptr;
   }
@@ -136,7 +137,9 @@ class ClockFilter {
   double to_host(double sender) const {
     return started_ ? anchor_receive_ + line_.value_at(sender - anchor_sender_) : 0.0;
   }
-  double sigma(double sender) const { return sigma_at(sender - anchor_sender_); }
+  double sigma(double sender) const {
+    return started_ ? sigma_at(sender - anchor_sender_) : options_.expected_jitter_s;
+  }
 
   // Seconds of host clock per second of sender clock, less one; or the period of a counted stream.
   double skew() const { return line_.slope - 1; }
@@ -160,7 +163,7 @@ class ClockFilter {
     state_ = ClockState::kWarmingUp;
     shift_ = shift_variance_ = 0;
     late_run_ = early_run_ = {};
-    symmetric_items_ = 0;
+    young_ = {};
   }
 
   const ClockCounters& counters() const { return counters_; }
@@ -172,37 +175,45 @@ class ClockFilter {
   static constexpr double kHuber = 2.5;         // sigmas
   static constexpr double kGate = 6;            // sigmas no honest item leaves on the early side
   static constexpr double kSameFloor = 20;      // e^-20: odds that chance explains it
+  static constexpr double kLeastItems = 3;      // in half a run
   static constexpr double kPriorItems = 2;      // weight of expected_jitter_s
   static constexpr double kNoiseMemory = 1000;  // items
+  static constexpr double kYoungItems = 64;
 
-  // Items that may show a floor shift. Their least residuals are watched in halves of settle_s: only
-  // when two neighbouring halves agree is the new floor a floor.
+  // Items that may show a floor shift, in halves of settle_s: only when the least residuals of two
+  // neighbouring halves agree is the new floor a floor.
   struct Run {
+    bool active = false;
     double first = 0;   // receive time of the first item
     double since = 0;   // ... of the older half
     double middle = 0;  // ... of the younger half
     double older = 0;   // least receive - line, s
     double younger = 0;
-    std::int64_t items = 0;  // of the younger half
-    std::int64_t early = 0;
+    // Of the younger half:
+    double items = 0;
+    double early = 0;
+    double sum = 0;
 
     void add(double receive, double residual, bool is_early) {
-      if (items == 0) {
+      if (!active) {
+        active = true;
         first = since = middle = receive;
         older = younger = residual;
       }
       younger = std::min(younger, residual);
-      ++items;
+      items += 1;
       early += is_early ? 1 : 0;
+      sum += residual;
     }
     void begin_half(double receive) {
       since = middle;
       older = younger;
       middle = receive;
       younger = std::numeric_limits<double>::infinity();
-      items = 1;
-      early = 0;
+      items = early = sum = 0;
     }
+    // Standard deviation of the least residual of a half, were its delays exponential.
+    double spread() const { return (sum / items - younger) / items; }
   };
 
   ClockEstimate accept(double receive, double sender, const ClockRatePrior& prior) {
@@ -226,8 +237,8 @@ class ClockFilter {
     const bool shifted =
         one_sided() ? learn_one_sided(receive, x, newer) : learn_symmetric(receive, x, newer);
     last_x_ = std::max(last_x_, x);
-    if (state_ == ClockState::kWarmingUp && receive - first_receive_ >= options_.settle_s &&
-        sigma_at(x) < options_.floor_shift_s) {
+    if (newer && state_ == ClockState::kWarmingUp &&
+        receive - first_receive_ >= options_.settle_s && sigma_at(x) < options_.floor_shift_s) {
       state_ = ClockState::kLocked;
       locked_since_ = bound_since_ = receive;
     }
@@ -265,7 +276,7 @@ class ClockFilter {
     delay_ = scale_ = options_.expected_jitter_s;
     line_ = {0, 0, prior.rate, delay_ * delay_, 0, prior.half_range * prior.half_range / 3};
     slots_ = 0;
-    slot_width_ = options_.window_s / (16.0 * Capacity);
+    slot_width_ = 0;  // at first each item has its own
   }
 
   bool is_wild(double receive, double sender) const {
@@ -306,19 +317,19 @@ class ClockFilter {
     if (residual >= gate) {
       late_run_.add(receive, residual, false);
     }
-    if (early && early_run_.items == 0) {
+    if (early && !early_run_.active) {
       slots_ = settled_slots();  // the youngest may belong to the new floor
       slot_since_ = receive - slot_width_;
     }
-    if (early || early_run_.items > 0) {
+    if (early || early_run_.active) {
       early_run_.add(receive, residual, early);
     }
     // While a fall of the floor is being judged nothing may pull the line down.
-    if (newer && (shifted || early_run_.items == 0 || residual >= 0)) {
+    if (newer && (shifted || !early_run_.active || residual >= 0)) {
       insert(receive, x, receive - anchor_receive_ - shift_);
     }
-    if (locked && receive - bound_since_ >= options_.window_s && late_run_.items == 0 &&
-        early_run_.items == 0) {
+    if (locked && receive - bound_since_ >= options_.window_s && !late_run_.active &&
+        !early_run_.active) {
       bound_since_ = receive;
       bound_rate();
     }
@@ -328,7 +339,7 @@ class ClockFilter {
   // True if the run has lasted and shows a new floor.
   bool judge(Run& run, double receive) {
     const double half = options_.settle_s / 2;
-    if (run.items == 0 || receive - run.middle < half) {
+    if (!run.active || receive - run.middle < half) {
       return false;
     }
     const bool falls = &run == &early_run_;
@@ -336,10 +347,10 @@ class ClockFilter {
       run = {};  // a stray outlier
       return false;
     }
-    const double slots = std::min(static_cast<double>(run.items), half / slot_width_);
-    const double spread = scale_ / slots;  // of the least residual of a half
+    const double spread = std::max(run.spread(), options_.stamp_resolution_s);
     const double step = std::min(run.older, run.younger);
-    if (run.middle == run.since || std::abs(run.older - run.younger) > kSameFloor * spread ||
+    if (run.middle == run.since || run.items < kLeastItems ||
+        std::abs(run.older - run.younger) > kSameFloor * spread ||
         (!falls && step < kSameFloor * spread)) {
       run.begin_half(receive);
       return false;
@@ -390,6 +401,9 @@ class ClockFilter {
       }
       x_[last] = x;
       y_[last] = y;
+      if (state_ == ClockState::kLocked) {
+        return;  // the youngest slot does not count yet
+      }
     } else {
       if (slots_ == Capacity) {
         make_room();
@@ -401,9 +415,10 @@ class ClockFilter {
     fit(x);
   }
 
-  // Doubles the slots until they span the window, then drops the oldest.
+  // Joins the slots in pairs until they span the window, then drops the oldest.
   void make_room() {
-    if (slot_width_ * Capacity > 0.999 * options_.window_s) {
+    const double widest = options_.window_s / Capacity;
+    if (slot_width_ >= widest) {
       std::copy(x_.begin() + 1, x_.end(), x_.begin());
       std::copy(y_.begin() + 1, y_.end(), y_.begin());
       --slots_;
@@ -416,7 +431,7 @@ class ClockFilter {
       y_[i] = y_[first ? a : a + 1];
     }
     slots_ = Capacity / 2;
-    slot_width_ *= 2;
+    slot_width_ = std::min(widest, (y_[slots_ - 1] - y_[0]) / (Capacity / 2));
     scale_ /= 2;
   }
 
@@ -452,14 +467,39 @@ class ClockFilter {
 
   // ---- symmetric ----
 
+  // Weighted least squares of the first items: unlike a Kalman filter's their covariance follows
+  // the noise level while it is still being learnt.
+  struct YoungLine {
+    double items = 0;
+    double weight = 0, mean_x = 0, mean_y = 0, sxx = 0, sxy = 0;
+
+    void add(double x, double y, double w) {
+      weight += w;
+      const double dx = x - mean_x;
+      mean_x += dx * w / weight;
+      mean_y += (y - mean_y) * w / weight;
+      sxx += w * dx * (x - mean_x);
+      sxy += w * dx * (y - mean_y);
+    }
+    LineEstimate line(double at, double noise, const ClockRatePrior& prior) const {
+      const double ridge = 3 * noise * noise / (prior.half_range * prior.half_range);
+      const double slope = (sxy + ridge * prior.rate) / (sxx + ridge);
+      const double var_slope = noise * noise / (sxx + ridge);
+      const double lever = at - mean_x;
+      return {at,
+              mean_y + lever * slope,
+              slope,
+              noise * noise / weight + lever * lever * var_slope,
+              lever * var_slope,
+              var_slope};
+    }
+  };
+
   bool learn_symmetric(double receive, double x, bool newer) {
     if (!newer) {
       return false;
     }
     const double y = receive - anchor_receive_;
-    if (symmetric_items_++ == 0) {
-      return false;  // start() has put the line through the first item
-    }
     // Time update: the skew walks, and the value with it.
     const double dx = x - line_.x;
     const double walk =
@@ -469,18 +509,25 @@ class ClockFilter {
     line_.cov_value_slope += line_.var_slope * dx + walk * dx / 2;
     line_.var_slope += walk;
     line_.x = x;
-    // Measurement update.
+
     const double innovation = y - line_.value;
-    double noise = delay_ * delay_;
-    const double sigmas = std::abs(innovation) / std::sqrt(line_.var_value + noise);
-    // Mean of the logarithm: outliers cannot carry it away. E log|N(0,1)| = -0.635.
-    const double log_size = std::log(std::clamp(sigmas, 1e-3, 3.0)) + 0.635;
-    const double n = std::min(static_cast<double>(symmetric_items_), kNoiseMemory);
-    delay_ = std::max(delay_ * std::exp(log_size / (n + kPriorItems)), options_.stamp_resolution_s);
-    if (sigmas > kHuber) {
-      noise *= sigmas / kHuber;
+    double weight = 1;
+    if (young_.items > 0) {
+      const double sigmas = std::abs(innovation) / std::sqrt(line_.var_value + delay_ * delay_);
+      // Mean of the logarithm: outliers cannot carry it away. E log|N(0,1)| = -0.635.
+      const double log_size = std::log(std::clamp(sigmas, 1e-3, 3.0)) + 0.635;
+      const double n = std::min(young_.items, kNoiseMemory);
+      delay_ =
+          std::max(delay_ * std::exp(log_size / (n + kPriorItems)), options_.stamp_resolution_s);
+      weight = sigmas > kHuber ? kHuber / sigmas : 1.0;
     }
-    const double total = line_.var_value + noise;
+    young_.items += 1;
+    if (young_.items <= kYoungItems) {
+      young_.add(x, y, weight);
+      line_ = young_.line(x, delay_, prior_);
+      return false;
+    }
+    const double total = line_.var_value + delay_ * delay_ / weight;
     const double gain_value = line_.var_value / total;
     const double gain_slope = line_.cov_value_slope / total;
     line_.value += gain_value * innovation;
@@ -525,7 +572,7 @@ class ClockFilter {
   double rate_max_ = 0;
   double bound_since_ = 0;
   double locked_since_ = 0;
-  std::int64_t symmetric_items_ = 0;
+  YoungLine young_;
 };
 
 static_assert(std::is_trivially_copyable_v<ClockFilter<>>,

@@ -53,8 +53,8 @@ class OfflineClock {
         shift = 0;
         judge_after = kNever;
       }
-      y_[i] = estimate.time_s;
       if (estimate.rejected) {
+        y_[i] = i > begin ? y_[i - 1] : 0.0;  // only for the order in time
         continue;
       }
       y_[i] = receive_[i] - shift;
@@ -119,6 +119,9 @@ class OfflineClock {
   }
 
   void smooth(std::size_t begin, std::size_t end) {
+    while (begin < end && estimates_[begin].rejected) {
+      ++begin;
+    }
     if (begin == end) {
       return;
     }
@@ -143,7 +146,7 @@ class OfflineClock {
         ++to;
       }
       const double centre = 0.5 * (y_[from] + y_[to - 1]);
-      const double start = std::clamp(centre - window / 2, first_time, last_time - window);
+      const double start = std::max(first_time, std::min(centre - window / 2, last_time - window));
       while (low < from && y_[low] < start) {
         ++low;
       }
@@ -362,8 +365,9 @@ inline double periods_skipped(const std::array<double, kItemsAhead>& late, std::
 }  // namespace internal
 
 // Counts for a recording without them: which multiple of the period lies between neighbouring
-// items. Losses are gaps, a duplicate repeats its count. The period may be off by 1 %: it is
-// tracked. False if period_s or a receive time is unusable.
+// items. Losses are gaps, a duplicate repeats its count. Good for noise up to a sixth of a period
+// (sigma); the period may be off by 1 %: it is tracked. False if period_s or a receive time is
+// unusable.
 [[nodiscard]] inline bool infer_sequence(const double* receive_time_s, std::size_t n,
                                          double period_s, std::int64_t* sequence) {
   constexpr double kTracking = 1.0 / 16;

@@ -152,22 +152,30 @@ inline LineEstimate fit_lower_line(const double* x, const double* y, std::size_t
   return line;
 }
 
-// Scale of the delays from their residuals above a fitted line: a low quantile, since what counts is
-// the density next to the floor (heavy tails do not), but not of fewer than a handful of points.
-// `least` keeps it positive; `guess` weighs as much as two points. residual: room for n values.
+// Scale of the delays from their residuals above the lowest point, seen along a fitted line: a low
+// quantile, since what counts is the density next to the floor (heavy tails do not), but not of
+// fewer than a handful of points. `least` keeps it positive; `guess` weighs as much as two points.
+// residual: room for n values.
 inline double delay_scale(const double* x, const double* y, std::size_t n, const LineEstimate& line,
                           double least, double guess, double* residual) {
   constexpr double kGuessWeight = 2;
+  if (n < 2) {
+    return guess;
+  }
   for (std::size_t i = 0; i < n; ++i) {
     residual[i] = y[i] - line.value_at(x[i]);
   }
-  const std::size_t low = std::max(n / 8, std::min<std::size_t>(n / 2, 16));
-  std::nth_element(residual, residual + low, residual + n);
+  const std::size_t rank = std::max(n / 8, std::min<std::size_t>(n / 2, 16));
+  std::nth_element(residual, residual + rank, residual + n);
+  const double lowest = *std::min_element(residual, residual + rank);
   const double count = static_cast<double>(n);
-  const double quantile = (static_cast<double>(low) + 0.5) / (count + 1);
-  const double scale = std::max(residual[low] / -std::log1p(-quantile), least);
-  return std::exp((kGuessWeight * std::log(guess) + count * std::log(scale)) /
-                  (kGuessWeight + count));
+  const double low = static_cast<double>(rank);
+  // The last factor makes up for the squared error that a scale from few points causes.
+  const double scale =
+      std::max((residual[rank] - lowest) / -std::log1p(-(low - 0.5) / count), least) *
+      (1 + 1 / (low + 1));
+  return std::exp((kGuessWeight * std::log(guess) + (count - 1) * std::log(scale)) /
+                  (kGuessWeight + count - 1));
 }
 
 }  // namespace alidade
