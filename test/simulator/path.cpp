@@ -88,8 +88,8 @@ std::unique_ptr<Path> make_sweep(const PathConfig& config, double field) {
 std::unique_ptr<Path> make_jerky(const PathConfig& config, double field, std::uint64_t seed) {
   std::mt19937_64 generator = make_generator(seed, Stream::kPath);
   std::uniform_real_distribution<double> point(-1, 1);
-  std::uniform_real_distribution<double> share(0.3, 0.9);
-  const int count = std::max(2, static_cast<int>(config.period / 0.4));
+  std::uniform_real_distribution<double> share(0.5, 0.9);
+  const int count = std::max(2, static_cast<int>(config.period / 0.8));
   const double step = config.period / count;
   std::vector<Moves::Move> moves;
   const Angles home{config.pan, config.tilt};

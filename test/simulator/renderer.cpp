@@ -16,8 +16,21 @@ constexpr int kWaves = 24;
 // Boil is evaluated at every so many columns, and is linear in between.
 constexpr int kBoilStep = 16;
 constexpr double kCoveredLight = 0.02;  // what comes through a lens cover
-constexpr std::array<std::array<double, 2>, 4> kPointsOfPixel{
-    {{-0.25, -0.25}, {0.25, 0.25}, {0.25, -0.25}, {-0.25, 0.25}}};
+// Where in a pixel each sub-exposure looks, in the order of time. Opposite points come at opposite
+// times, so that the blur of a moving edge is symmetric; in the larger set, used when motion is to be
+// seen, neither coordinate is correlated with time nor with the other, so that the blur has its width.
+using Point = std::array<double, 2>;  // px from the pixel's centre
+constexpr std::array<Point, 4> kPointsAtRest{
+    {{0.125, 0.375}, {-0.375, 0.125}, {0.375, -0.125}, {-0.125, -0.375}}};
+constexpr std::array<Point, 8> kPointsInMotion{{{0.0625, 0.1875},
+                                                {-0.1875, 0.0625},
+                                                {0.3125, -0.4375},
+                                                {-0.4375, -0.3125},
+                                                {0.4375, 0.3125},
+                                                {-0.3125, 0.4375},
+                                                {0.1875, -0.0625},
+                                                {-0.0625, -0.1875}}};
+constexpr double kRestBlur = 1;  // px during the exposure
 
 std::vector<float> normal_quantiles() {
   std::vector<float> quantiles(1 << 16);
@@ -69,13 +82,15 @@ Renderer::Renderer(const Config& config, const Path& path)
     std::mt19937_64 generator = make_generator(config.seed, Stream::kBoil);
     std::normal_distribution<double> normal;
     std::uniform_real_distribution<double> turn(0, kTwoPi);
+    std::uniform_real_distribution<double> pace(0.5, 1.5);
     for (int i = 0; i < kWaves; ++i) {
-      // A sum of n waves of amplitude a has the variance n a^2 / 2 at every point.
-      const double angle = turn(generator);
+      // A sum of n waves of amplitude a, in directions all round, has a variance of n a^2 / 4 along
+      // each axis.
+      const double angle = kTwoPi * i / kWaves;
       const double amplitude = config.sensor.boil * std::sqrt(4.0 / kWaves);
       waves_.push_back({kTwoPi / (0.2 * config.image.width) * normal(generator),
                         kTwoPi / (0.2 * config.image.width) * normal(generator),
-                        kTwoPi / 0.5 * normal(generator), turn(generator),
+                        kTwoPi / 0.5 * pace(generator), turn(generator),
                         amplitude * Eigen::Vector2d(std::cos(angle), std::sin(angle))});
     }
   }
@@ -136,7 +151,9 @@ std::vector<std::uint8_t> Renderer::render(double t0_s, std::int64_t sequence) c
       camera_.base_from_camera_at(t0_s + readout / 2 + sensor.exposure / 2);
   // The norm of a difference of rotations by the small angle a is sqrt(2) a.
   const double blur = config_.camera.focal_length * (after - before).norm() / std::sqrt(2.0);
-  const int exposures = std::clamp(4 * static_cast<int>(std::ceil(blur / 4)), 4, kMostExposures);
+  const bool rests = blur < kRestBlur;
+  const int exposures =
+      rests ? 4 : std::min(8 * static_cast<int>(std::ceil(blur / 8)), kMostExposures);
 
   const double corner_squared = (width * width + height * height) / 4.0;
   const std::uint64_t noise_seed =
@@ -153,7 +170,9 @@ std::vector<std::uint8_t> Renderer::render(double t0_s, std::int64_t sequence) c
     std::fill(signal.begin(), signal.end(), 0.0F);
     for (int i = 0; i < exposures; ++i) {
       const double time = row_time + sensor.exposure * ((i + 0.5) / exposures - 0.5);
-      const auto& [offset_u, offset_v] = kPointsOfPixel.at(static_cast<std::size_t>(i % 4));
+      const auto& [offset_u, offset_v] = rests
+                                             ? kPointsAtRest.at(static_cast<std::size_t>(i))
+                                             : kPointsInMotion.at(static_cast<std::size_t>(i % 8));
       rays_of_row(v + offset_v, offset_u, time, &x, &y);
       scene_.shade(camera_.base_from_camera_at(time), time, x.data(), y.data(), row_size,
                    1.0F / static_cast<float>(exposures), signal.data());

@@ -3,8 +3,8 @@
 // time, evaluated on the true path.
 //
 // A pixel's signal is the mean over its area and its exposure: sub-exposures spread evenly over the
-// exposure, each with the orientation of its own moment and taken in turn at one of four points of
-// the pixel, at least four of them and at most one pixel of motion apart (until kMostExposures).
+// exposure, each with the orientation of its own moment and at a point of the pixel of its own: four
+// if nothing moves by a pixel meanwhile, else eight or more, at most one pixel apart (up to 64).
 // Then, in grey levels (255 = white): vignetting 1 - a (r / r_corner)^2, brightness step, lens cover,
 // noise of variance shot_noise * signal + read_noise^2, rounding and clipping to 8 bits.
 // Boil moves each pixel's ray by a random field, smooth in space (about a tenth of the image) and time

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <filesystem>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <string>
@@ -105,7 +106,11 @@ Scene::Scene(const SceneConfig& config, double focal_length,
   const double density = focal_length * kTexelsPerPixel;
   std::uint64_t texture_seed = mix(seed, static_cast<std::uint64_t>(Stream::kTexture));
   for (const PatchConfig& photo : config.photos) {
-    cv::Mat bytes = cv::imread(photo.file.string(), cv::IMREAD_GRAYSCALE);
+    cv::Mat bytes;
+    // imread() would write a warning of its own about a file that is not there.
+    if (std::filesystem::exists(photo.file)) {
+      bytes = cv::imread(photo.file.string(), cv::IMREAD_GRAYSCALE);
+    }
     if (bytes.empty()) throw ConfigError(photo.file.string() + ": not a picture that can be read");
     cv::Mat picture;
     bytes.convertTo(picture, CV_32F, 1 / 255.0);

@@ -1,0 +1,169 @@
+#include "test/simulator/config.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdlib>
+
+#include "test/simulator/path.h"
+#include "test/support/temporary_directory.h"
+
+namespace alidade::simulator {
+namespace {
+
+class VirtualCameraConfig : public testing::Test {
+ protected:
+  Config load(const std::string& text) {
+    return load_config(directory_.write("camera.yaml", text));
+  }
+
+  // The one-line error, without the directory.
+  std::string error_of(const std::string& text) {
+    try {
+      (void)make_path(load(text));
+    } catch (const ConfigError& error) {
+      const std::string what = error.what();
+      EXPECT_EQ(what.find('\n'), std::string::npos);
+      EXPECT_EQ(what.rfind(directory_.path() + "/", 0), 0U) << what;
+      return what.substr(directory_.path().size() + 1);
+    }
+    return "no error";
+  }
+
+  TemporaryDirectory directory_;
+};
+
+TEST_F(VirtualCameraConfig, ConvertsTheUnitsOfItsKeys) {
+  const Config config = load(
+      "camera: {line_delay_us: -14.2, clock_offset_ms: -84.4, pan_axis_mrad: [-12, 3]}\n"
+      "telemetry: {quantum_deg: 180}\n"
+      "sensor: {exposure_ms: 2}\n");
+  EXPECT_DOUBLE_EQ(config.camera.line_delay, -14.2e-6);
+  EXPECT_DOUBLE_EQ(config.camera.clock_offset, -84.4e-3);
+  EXPECT_DOUBLE_EQ(config.camera.pan_axis_offset.x(), -12e-3);
+  EXPECT_DOUBLE_EQ(config.camera.pan_axis_offset.y(), 3e-3);
+  EXPECT_DOUBLE_EQ(config.telemetry.quantum, 3.14159265358979323846);
+  EXPECT_DOUBLE_EQ(config.sensor.exposure, 2e-3);
+}
+
+TEST_F(VirtualCameraConfig, FindsFilesBesideItself) {
+  const Config config = load("scene: {photos: [{file: a/b.jpg, width_deg: 20}]}\ntruth_dir: t\n");
+  EXPECT_EQ(config.scene.photos.at(0).file, directory_.path() + "/a/b.jpg");
+  EXPECT_EQ(config.truth_dir, directory_.path() + "/t");
+}
+
+TEST_F(VirtualCameraConfig, NamesFileAndLineOfEveryMistake) {
+  struct Mistake {
+    const char* text;
+    const char* error;
+  };
+  for (const Mistake& mistake : {
+           Mistake{"seed: 1\nfoo: 2\n", "camera.yaml:2: unknown key 'foo' in the configuration"},
+           Mistake{"camera:\n  focal_length_px: 1000\n  focal_length: 2\n",
+                   "camera.yaml:3: unknown key 'focal_length' in camera"},
+           Mistake{"camera:\n  focal_length_px: long\n",
+                   "camera.yaml:2: focal_length_px must be a number"},
+           Mistake{"camera:\n  focal_length_px: .nan\n",
+                   "camera.yaml:2: focal_length_px must be a number"},
+           Mistake{"\ncamera: {focal_length_px: -3}\n",
+                   "camera.yaml:2: focal_length_px is -3, must be more than 0"},
+           Mistake{"image: {width: 640.5}\n", "camera.yaml:1: width must be a whole number"},
+           Mistake{"sensor: {jpeg_quality: 101}\n",
+                   "camera.yaml:1: jpeg_quality is 101, must be between 1 and 100"},
+           Mistake{"camera: 7\n", "camera.yaml:1: 'camera' must hold keys with values"},
+           Mistake{"camera: {pan_axis_mrad: 3}\n",
+                   "camera.yaml:1: pan_axis_mrad must be two numbers: [a, b]"},
+           Mistake{"path: {type: circle}\n",
+                   "camera.yaml:1: type must be one of: triple_cosine, sweep, jerky, csv"},
+           Mistake{"path: {type: csv}\n",
+                   "camera.yaml:1: path needs 'file' with 'type: csv', and only then"},
+           Mistake{"path: {type: csv, file: none.csv}\n", "none.csv: cannot be read"},
+           Mistake{"scene:\n  photos:\n    - {file: a.jpg}\n",
+                   "camera.yaml:3: width_deg is missing"},
+           Mistake{"scene: {photos: 3}\n", "camera.yaml:1: photos must be a list"},
+           Mistake{"live: {user: me}\n", "camera.yaml:1: user and password_env come together"},
+           Mistake{"camera: {line_delay_us: 60}\n",
+                   "camera.yaml:1: camera: reading out all rows (line_delay_us x height) outlasts "
+                   "a frame"},
+       }) {
+    EXPECT_EQ(error_of(mistake.text), mistake.error);
+  }
+  EXPECT_THAT(error_of("camera: {a: [}\n"), testing::StartsWith("camera.yaml:1: "));
+  EXPECT_THROW((void)load_config(directory_.path() + "/none.yaml"), ConfigError);
+}
+
+TEST_F(VirtualCameraConfig, NamesTheLineOfABrokenPathFile) {
+  const std::string config = "path: {type: csv, file: path.csv}\n";
+  directory_.write("path.csv", "time_s,pan_rad,tilt_rad\n0,0,0\n1,x,0\n");
+  EXPECT_EQ(error_of(config), "path.csv:3: a path needs a number in time_s, pan_rad and tilt_rad");
+  directory_.write("path.csv", "time_s,pan_rad,tilt_rad\n0,0,0\n1,0\n");
+  EXPECT_EQ(error_of(config), "path.csv:3: a path needs a number in time_s, pan_rad and tilt_rad");
+  directory_.write("path.csv", "time_s,pan_rad,tilt_rad\n0,0,0\n0,0,0\n");
+  EXPECT_EQ(error_of(config), "path.csv:3: time_s must increase");
+  directory_.write("path.csv", "time_s,pan_deg,tilt_rad\n0,0,0\n0,0,0\n");
+  EXPECT_EQ(error_of(config), "path.csv:1: column pan_rad is missing");
+  directory_.write("path.csv", "time_s,pan_rad,tilt_rad\n0,0,0\n");
+  EXPECT_EQ(error_of(config), "path.csv: a path needs two points or more");
+}
+
+TEST_F(VirtualCameraConfig, TakesThePasswordFromTheEnvironment) {
+  ASSERT_EQ(setenv("ALIDADE_TEST_PASSWORD", "secret", 1), 0);
+  const Config config = load("live: {user: root, password_env: ALIDADE_TEST_PASSWORD}\n");
+  EXPECT_EQ(config.live.password, "secret");
+  EXPECT_EQ(
+      error_of("live: {user: root, password_env: ALIDADE_TEST_NO_PASSWORD}\n"),
+      "camera.yaml:1: environment variable ALIDADE_TEST_NO_PASSWORD (password_env) is not set");
+}
+
+TEST_F(VirtualCameraConfig, FollowsThePapersTripleInfinity) {
+  const Config config = load("camera: {focal_length_px: 640}\npath: {pan_deg: 90, amplitude: 2}\n");
+  const auto path = make_path(config);
+  // 90 degrees wide: s = pi / 2.
+  const double pi = 3.14159265358979323846;
+  EXPECT_NEAR(path->at(2.5).pan, pi / 2 + 2 * 9.0 / 4, 1e-12);
+  EXPECT_NEAR(path->at(2.5).tilt, 0, 1e-12);
+  EXPECT_NEAR(path->at(0).tilt, -2 * 3.0 / 4, 1e-12);
+  EXPECT_EQ(path->period_s(), 10);
+}
+
+TEST_F(VirtualCameraConfig, MovesSmoothlyAndClosesTheLoopOnEveryPeriodicPath) {
+  for (const char* type : {"triple_cosine", "sweep", "jerky"}) {
+    const Config config = load("path: {type: " + std::string(type) + ", period_s: 8}\n");
+    const auto path = make_path(config);
+    double length = 0;
+    Angles last = path->at(-8);
+    const Angles start = last;
+    for (int i = 1; i <= 8000; ++i) {
+      const Angles now = path->at(-8 + 1e-3 * i);
+      const double step = std::hypot(now.pan - last.pan, now.tilt - last.tilt);
+      // Nothing jumps: at most 20 fields of view a second.
+      EXPECT_LT(step, 20e-3 * horizontal_field_of_view(config)) << type << " " << i;
+      length += step;
+      last = now;
+    }
+    EXPECT_NEAR(last.pan, start.pan, 1e-9) << type;
+    EXPECT_NEAR(last.tilt, start.tilt, 1e-9) << type;
+    EXPECT_GT(length, 4 * horizontal_field_of_view(config)) << type;
+  }
+}
+
+TEST_F(VirtualCameraConfig, RestsBetweenTheMovesOfASweep) {
+  const auto path = make_path(load("path: {type: sweep, period_s: 8, stop_s: 0.5}\n"));
+  EXPECT_EQ(path->at(1.6).pan, path->at(1.9).pan);
+  EXPECT_NE(path->at(1.0).pan, path->at(1.4).pan);
+}
+
+TEST_F(VirtualCameraConfig, FollowsACsvPathThroughItsPointsAndAcrossHalfATurn) {
+  directory_.write("path.csv",
+                   "frame,time_s,pan_rad,tilt_rad\n0,0,3.1,0\n1,1,-3.08318530717958647692,0.1\n");
+  const auto path = make_path(load("path: {type: csv, file: path.csv}\n"));
+  EXPECT_NEAR(path->at(0).pan, 3.1, 1e-12);
+  EXPECT_NEAR(path->at(0.5).pan, 3.15, 1e-12);
+  EXPECT_NEAR(path->at(1).pan, 3.2, 1e-12);
+  EXPECT_NEAR(path->at(9).pan, 3.2, 1e-12);
+  EXPECT_NEAR(path->at(1).tilt, 0.1, 1e-12);
+}
+
+}  // namespace
+}  // namespace alidade::simulator

@@ -1,0 +1,232 @@
+#include "test/simulator/recording_writer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <cstdlib>
+#include <fstream>
+#include <map>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+
+#include "test/simulator/camera_model.h"
+#include "test/simulator/scene.h"
+#include "test/support/temporary_directory.h"
+
+extern "C" {
+#include <libavformat/avformat.h>
+}
+
+namespace alidade::simulator {
+namespace {
+
+// Rows of numbers under the names of their columns.
+using Table = std::vector<std::map<std::string, double>>;
+
+Table read_csv(const std::string& file, const std::string& expected_header) {
+  std::ifstream stream(file);
+  std::string line;
+  std::getline(stream, line);
+  EXPECT_EQ(line, expected_header) << file;
+  std::vector<std::string> names;
+  std::stringstream header(line);
+  for (std::string name; std::getline(header, name, ',');) names.push_back(name);
+  Table table;
+  while (std::getline(stream, line)) {
+    std::map<std::string, double> row;
+    std::stringstream cells(line);
+    for (const std::string& name : names) {
+      std::string cell;
+      EXPECT_TRUE(std::getline(cells, cell, ',')) << line;
+      char* end = nullptr;
+      row[name] = std::strtod(cell.c_str(), &end);
+      EXPECT_EQ(*end, '\0') << line;
+    }
+    table.push_back(row);
+  }
+  return table;
+}
+
+class VirtualRecording : public testing::Test {
+ protected:
+  VirtualRecording() {
+    config_.image = {160, 120, 25};
+    config_.duration = 2;
+    config_.camera.focal_length = 4321;
+    config_.camera.line_delay = -20e-6;
+    config_.camera.clock_offset = 0.2;
+    config_.camera.pan_axis_offset = {-0.012, 0};
+    config_.path.period = 4;
+    config_.recording.images = RecordingConfig::Images::kNone;
+  }
+
+  std::string write() {
+    write_recording(config_, directory());
+    return directory() + "/";
+  }
+  std::string directory() const { return root_.path() + "/recording"; }
+
+  TemporaryDirectory root_;
+  Config config_;
+};
+
+TEST_F(VirtualRecording, HoldsTheParametersUnderTheNamesOfACalibration) {
+  const YAML::Node truth = YAML::LoadFile(write() + "truth.yaml");
+  EXPECT_EQ(truth["format"].as<int>(), 1);
+  EXPECT_EQ(truth["image"]["width"].as<int>(), 160);
+  EXPECT_EQ(truth["focal_length"]["value"].as<double>(), 4321);
+  EXPECT_EQ(truth["aspect"]["value"].as<double>(), 1);
+  EXPECT_EQ(truth["radial_distortion"]["value"].as<double>(), 0);
+  EXPECT_EQ(truth["line_delay"]["value"].as<double>(), -20e-6);
+  EXPECT_EQ(truth["clock_offset"]["value"].as<double>(), 0.2);
+  EXPECT_EQ(truth["pan_scale"]["value"].as<double>(), 1);
+  EXPECT_EQ(truth["tilt_scale"]["value"].as<double>(), 1);
+  EXPECT_NEAR(truth["pan_axis"]["value"][0].as<double>(), std::sin(-0.012), 1e-12);
+  EXPECT_NEAR(truth["tilt_axis"]["value"][1].as<double>(), 1, 1e-12);
+  const YAML::Node recording = YAML::LoadFile(directory() + "/recording.yaml");
+  EXPECT_EQ(recording["format"].as<int>(), 1);
+  EXPECT_EQ(recording["height"].as<int>(), 120);
+  EXPECT_EQ(YAML::LoadFile(directory() + "/guess.yaml")["focal_length"]["value"].as<double>(),
+            4300);
+}
+
+TEST_F(VirtualRecording, StampsFramesOnTheImageClockAndTellsTheTrueAngles) {
+  config_.timing.frame_loss = 0.2;
+  config_.timing.image.exponential = 1e-3;
+  config_.timing.image_clock_skew = 1e-4;
+  const std::string recording = write();
+  const Table frames =
+      read_csv(recording + "frames.csv", "frame,receive_time_s,sender_time_s,sequence");
+  const Table truth = read_csv(recording + "truth.csv",
+                               "frame,time_s,pan_rad,tilt_rad,sequence,sender_time_s,stamp_time_s");
+  ASSERT_EQ(frames.size(), truth.size());
+  ASSERT_GT(frames.size(), 30U);
+  ASSERT_LT(frames.size(), 50U);
+  const auto path = make_path(config_);
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const double time = truth[i].at("time_s");
+    EXPECT_EQ(frames[i].at("frame"), static_cast<double>(i));
+    EXPECT_NEAR(time, frames[i].at("sequence") / 25, 1e-12);
+    EXPECT_GE(frames[i].at("receive_time_s"), time);
+    EXPECT_NEAR(frames[i].at("sender_time_s"), time * 1.0001, 1e-12);
+    EXPECT_NEAR(truth[i].at("pan_rad"), path->at(time).pan, 1e-12);
+    EXPECT_NEAR(truth[i].at("tilt_rad"), path->at(time).tilt, 1e-12);
+  }
+}
+
+TEST_F(VirtualRecording, PutsTelemetryOnItsOwnClockAheadByTheOffset) {
+  config_.telemetry.rate_hz = 50;
+  config_.telemetry.sigma = 1e-5;
+  const Table telemetry =
+      read_csv(write() + "telemetry.csv", "receive_time_s,pan_rad,tilt_rad,sequence");
+  ASSERT_EQ(telemetry.size(), 200U);
+  const auto path = make_path(config_);
+  const auto misfit = [&](double offset) {
+    double sum = 0;
+    for (const auto& row : telemetry) {
+      const Angles truth = path->at(row.at("receive_time_s") - offset);
+      sum +=
+          std::pow(row.at("pan_rad") - truth.pan, 2) + std::pow(row.at("tilt_rad") - truth.tilt, 2);
+    }
+    return sum / static_cast<double>(2 * telemetry.size());
+  };
+  // 400 squares of N(0, 1e-5): the mean is within 4 sqrt(2 / 400) of 1e-10.
+  EXPECT_NEAR(misfit(0.2), 1e-10, 1e-10 * 4 * std::sqrt(2.0 / 400));
+  EXPECT_GT(misfit(-0.2), 1e-6);
+  EXPECT_GT(misfit(0.201), 2e-10);
+  EXPECT_GT(misfit(0.199), 2e-10);
+  EXPECT_NEAR(telemetry.front().at("receive_time_s"), -0.8, 1e-12);
+}
+
+TEST_F(VirtualRecording, ProjectsLandmarksOfAGridIntoTracks) {
+  config_.recording.pixel_sigma = 0;
+  config_.camera.tilt_axis_offset = {0, 0.014};
+  const Table tracks = read_csv(write() + "tracks.csv", "frame,landmark,u_px,v_px,sigma_px");
+  const auto path = make_path(config_);
+  const CameraModel camera(config_.camera, config_.image, *path);
+  // Any landmark is one direction, whichever frame it is seen in.
+  std::map<double, Eigen::Vector3d> directions;
+  std::map<double, int> per_frame;
+  int seen_again = 0;
+  for (const auto& row : tracks) {
+    const double v = row.at("v_px");
+    const double time = row.at("frame") / 25 + v * config_.camera.line_delay;
+    const Eigen::Vector2d slope = camera.slope(row.at("u_px"), v);
+    const Eigen::Vector3d d_base =
+        (camera.base_from_camera_at(time) * Eigen::Vector3d(slope.x(), slope.y(), 1)).normalized();
+    const auto [first, is_new] = directions.emplace(row.at("landmark"), d_base);
+    EXPECT_LT((first->second - d_base).norm(), 1e-8);
+    seen_again += is_new ? 0 : 1;
+    ++per_frame[row.at("frame")];
+  }
+  EXPECT_GT(seen_again, 1000);
+  ASSERT_EQ(per_frame.size(), 50U);
+  // A tenth of the field apart: about 10 x 7.5 in a picture of 4:3.
+  for (const auto& [frame, count] : per_frame) EXPECT_NEAR(count, 75, 25) << frame;
+}
+
+TEST_F(VirtualRecording, WritesVideoThatLibavReads) {
+  config_.recording.images = RecordingConfig::Images::kVideo;
+  config_.duration = 0.4;
+  const std::string file = write() + "video.mkv";
+  AVFormatContext* video = nullptr;
+  ASSERT_EQ(avformat_open_input(&video, file.c_str(), nullptr, nullptr), 0);
+  AVPacket* packet = av_packet_alloc();
+  int frames = 0;
+  for (; av_read_frame(video, packet) >= 0; ++frames) {
+    const cv::Mat bytes(1, packet->size, CV_8U, packet->data);
+    const cv::Mat picture = cv::imdecode(bytes, cv::IMREAD_GRAYSCALE);
+    EXPECT_EQ(picture.size(), cv::Size(160, 120));
+    EXPECT_NEAR(picture.at<std::uint8_t>(60, 80), 128, 1);
+    EXPECT_NEAR(static_cast<double>(packet->pts) * av_q2d(video->streams[0]->time_base),
+                frames / 25.0, 1e-3);
+    av_packet_unref(packet);
+  }
+  EXPECT_EQ(frames, 10);
+  av_packet_free(&packet);
+  avformat_close_input(&video);
+}
+
+TEST_F(VirtualRecording, WritesNumberedPictures) {
+  for (const auto& [images, extension] : {std::pair(RecordingConfig::Images::kPng, "png"),
+                                          std::pair(RecordingConfig::Images::kPgm, "pgm")}) {
+    config_.recording.images = images;
+    config_.duration = 0.2;
+    const std::string last = root_.path() + "/" + extension + "/frames/000004." + extension;
+    write_recording(config_, root_.path() + "/" + extension);
+    EXPECT_EQ(cv::imread(last, cv::IMREAD_UNCHANGED).size(), cv::Size(160, 120)) << last;
+  }
+}
+
+TEST_F(VirtualRecording, TellsTheNoiseThatIsThere) {
+  config_.timing.telemetry.sigma = 3e-3;
+  config_.timing.image.exponential = 2e-3;
+  config_.timing.image_period_sigma = 20e-6;
+  config_.telemetry.sigma = 1e-4;
+  config_.recording.pixel_sigma = 0.4;
+  const YAML::Node noise = YAML::LoadFile(write() + "noise.yaml");
+  EXPECT_DOUBLE_EQ(noise["telemetry_stamp_sigma_s"].as<double>(), 3e-3);
+  EXPECT_DOUBLE_EQ(noise["image_stamp_sigma_s"].as<double>(), 2e-3);
+  EXPECT_DOUBLE_EQ(noise["image_period_sigma_s"].as<double>(), 20e-6);
+  EXPECT_NEAR(noise["image_period_s"].as<double>(), 0.04, 5 * 20e-6);
+  EXPECT_NE(noise["image_period_s"].as<double>(), 0.04);
+  EXPECT_FALSE(noise["telemetry_period_s"]);
+  EXPECT_DOUBLE_EQ(noise["pan_tilt_sigma_rad"].as<double>(), 1e-4);
+  EXPECT_DOUBLE_EQ(noise["pixel_sigma_px"].as<double>(), 0.4);
+}
+
+TEST_F(VirtualRecording, RefusesADirectoryThatHoldsSomething) {
+  root_.write("recording/other.txt", "");
+  EXPECT_THROW(write_recording(config_, directory()), std::runtime_error);
+  EXPECT_FALSE(std::filesystem::exists(directory() + "/truth.yaml"));
+}
+
+TEST_F(VirtualRecording, NeedsADuration) {
+  config_.duration = 0;
+  EXPECT_THROW(write_recording(config_, directory()), ConfigError);
+}
+
+}  // namespace
+}  // namespace alidade::simulator
