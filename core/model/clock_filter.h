@@ -7,20 +7,21 @@
 // sequence; rate = period). The filter estimates the line and answers line(sender_i) with its
 // standard deviation. A constant least delay cannot be seen: the line contains it, and so does the
 // clock offset d that the visual calibration estimates; hence the line must not step.
-//   kOneSided   delay >= 0 (a packet is never early): Bayesian lower line (lower_line.h) over the
-//               lowest item of each time slot of a sliding window.
-//   kSymmetric  zero-mean noise: Kalman filter of (offset, rate), Huber weights, noise level from
-//   the data.
-// Behaviour, in the order in which it is checked for each item:
-//   non-finite                   rejected; answered from the line or the receive time.
-//   wild: sender backwards or receive earlier than the line by restart_gap_s, or later than it by
-//   ten times that                   rejected; the third in a row restarts the filter (restarted =
-//   true). floor shift (one-sided, locked): for settle_s no item comes near the line, or many come
-//   too early, by more than floor_shift_s   flagged ONCE, and subtracted from all later receive
-//   times: the line
-//                                goes on as before. While warming up the line moves there instead.
-// Lost items are gaps in sender; late duplicates and reordered items are answered but teach
-// nothing. Fixed memory, trivially copyable, no exceptions. One thread. Goes beyond PTCEE 20-21.
+//   kOneSided   a packet is never early: Bayesian lower line (lower_line.h) over the lowest item of
+//               each time slot of a sliding window.
+//   kSymmetric  zero-mean noise: least squares, then a Kalman filter of value and rate; Huber
+//               weights; noise level from the data.
+// Bad input, in the order in which it is looked for:
+//   not finite   rejected: answered by the receive time, or the last answer.
+//   wild         sender backwards or receive before the line by restart_gap_s, or after it by ten
+//                times that. Rejected, answered from the receive time; the third in a row starts a
+//                new line (restarted).
+//   floor shift  one-sided only: for settle_s every item stays above the line, or some come before
+//                it, by more than floor_shift_s and by a steady amount. Flagged once and subtracted
+//                from all later receive times, so the line goes on for as long as it takes; its
+//                sigma grows by what the step is uncertain. While warming up, the line moves there.
+// Lost items are gaps in sender; repeated and reordered items are answered and teach nothing.
+// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. Beyond PTCEE 20, 21.
 
 #include <algorithm>
 #include <array>
@@ -97,7 +98,7 @@ inline ClockRatePrior sequence_rate_prior(const ClockFilterOptions& options) {
 
 enum class ClockState {
   kWarmingUp,  // usable, sigma_s says how well; the line may still move by more than floor_shift_s
-  kLocked      // settle_s of data seen
+  kLocked      // settle_s of data seen, and sigma_s below floor_shift_s
 };
 
 struct ClockEstimate {
@@ -435,8 +436,8 @@ class ClockFilter {
     scale_ /= 2;
   }
 
-  // Once locked a slot must have aged before it counts: should the floor fall, the items that betray
-  // it come first.
+  // Once locked a slot must have aged before it counts: if the floor falls, the items that betray it
+  // must not have moved the line.
   std::size_t settled_slots() const {
     std::size_t n = slots_;
     if (state_ == ClockState::kLocked) {

@@ -51,7 +51,7 @@ struct Stream {
 
   double host(double t) const { return host_start_s + t * (1 + skew) + 0.5 * drift * t * t; }
 
-  // Calls visit(t, true host time, receive time, count) for each item that arrives in [0, duration).
+  // Calls visit(t, true host time, receive time, count) for each item that arrives.
   template <class Visit>
   void play(unsigned seed, double duration_s, Visit visit) const {
     Random random(seed);
@@ -65,7 +65,7 @@ struct Stream {
   }
 };
 
-// Root mean square error over items after `from_s`, in s.
+// Errors of many items against the truth.
 struct Score {
   double sum = 0, squares = 0, normalised = 0, worst = 0;
   std::int64_t n = 0;
@@ -147,8 +147,8 @@ TEST(ClockFilter, AnswersFromTheFirstItemWithTheExpectedJitter) {
   }
 }
 
-// The floor of n exponential delays of mean tau is known to tau / n; a line's end is known four times
-// worse than its middle (variance) or so: with tau = 4 ms and 60 s at 25 Hz, 2.7 us and 11 us.
+// The floor of n exponential delays of mean tau is known to tau / n, a line's end about four times
+// worse than its middle: with tau = 4 ms and 60 s at 25 Hz, 2.7 us and 11 us.
 TEST(ClockFilter, OneSidedJitterOfFourMillisecondsBecomesTenMicroseconds) {
   Score score;
   Score raw;
@@ -171,8 +171,8 @@ TEST(ClockFilter, OneSidedJitterOfFourMillisecondsBecomesTenMicroseconds) {
   EXPECT_LT(score.worst, 100e-6);
 }
 
-// Over R runs the mean of squared normalised errors has a standard deviation of sqrt(2 / R) = 0.12 if
-// they are Gaussian, about twice that for the skewed posterior of the lower line, whose scale
+// Over R runs the mean of squared normalised errors has a standard deviation of sqrt(2 / R) = 0.12
+// if they are Gaussian, about twice that for the skewed posterior of the lower line, whose scale
 // besides is known to 1 / sqrt(8) or worse while young.
 TEST(ClockFilter, OneSidedSigmaIsHonestAtEveryAge) {
   for (const double mean_s : {2e-3, 4e-3, 10e-3}) {
@@ -255,7 +255,8 @@ TEST(ClockFilter, AnHourAtSixtyHertzEndsAsPreciseAsItsSecondMinute) {
   EXPECT_NEAR(filter.skew(), 50e-6, 1e-6);
 }
 
-// The line of the last 60 s lags behind a skew that grows by 50 ppm an hour: 1.4e-8/s (60 s)^2 / 8 = 6 us.
+// The line of the last 60 s lags behind a skew that grows by 50 ppm an hour:
+// 1.4e-8/s (60 s)^2 / 8 = 6 us.
 TEST(ClockFilter, FollowsASkewThatDriftsByFiftyPpmInAnHour) {
   Stream stream;
   stream.skew = 0;
@@ -492,12 +493,12 @@ TEST_P(ClockFilterRestart, IsDetectedAtTheThirdItemAndFlaggedOnce) {
     EXPECT_EQ(filter.counters().restarts, 1);
     EXPECT_EQ(filter.counters().rejected, 2);
     EXPECT_EQ(filter.state(), ClockState::kLocked);
-    // White noise would have the line pass 4 ms (the mean delay) above the floor.
+    // The symmetric line passes above the floor by the mean delay of 4 ms.
     EXPECT_LT(score.worst, jitter == ClockJitter::kSymmetric ? 10e-3 : 1e-3);
   }
 }
 
-// Back to zero, a wrapped 32-bit counter of 90 kHz that nobody unwrapped, forwards by a little and a lot.
+// Back to zero, a 32-bit counter of 90 kHz that nobody unwrapped, forwards by a little and a lot.
 INSTANTIATE_TEST_SUITE_P(Jumps, ClockFilterRestart,
                          testing::Values(-1e9, -4294967296.0 / 90000, -2.0, 2.0, 1e9));
 
