@@ -1,0 +1,154 @@
+#include "edge_app/commands/command.h"
+
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <filesystem>
+
+#include "core/calibration/calibration_file.h"
+#include "platform/pan_tilt/recording_pan_tilt_source.h"
+#include "platform/pan_tilt/vapix_source.h"
+#include "platform/video/recording_frame_source.h"
+#include "platform/video/rtp_source.h"
+
+namespace alidade {
+
+Config require_config(const std::string& path) {
+  Config config;
+  std::string error;
+  if (!load_config(path, &config, &error)) throw CommandError(kExitUsage, error);
+  for (const std::string& warning : config.warnings) spdlog::warn("{}", warning);
+  return config;
+}
+
+NamedCalibration require_calibration_file(const std::string& path) {
+  NamedCalibration chosen;
+  std::string error;
+  if (!load_calibration(path, &chosen.calibration, &error)) throw CommandError(kExitUsage, error);
+  chosen.calibrated = true;
+  chosen.name = path;
+  return chosen;
+}
+
+NamedCalibration choose_calibration(const Config& config) {
+  const std::string& file = config.calibration.file;
+  const bool not_yet = config.calibration.automatic && config.camera.focal_length_px &&
+                       !std::filesystem::exists(file);
+  if (!file.empty() && !not_yet) return require_calibration_file(file);
+  if (not_yet) spdlog::warn("{}: no calibration yet; the data sheet's camera is used", file);
+  return {data_sheet_calibration(config.camera), false, "data sheet"};
+}
+
+Calibration data_sheet_calibration(const CameraConfig& camera) {
+  Calibration calibration;
+  calibration.camera.focal_length = *camera.focal_length_px;
+  calibration.camera.aspect = camera.aspect;
+  calibration.camera.radial_distortion = camera.radial_distortion;
+  calibration.line_delay = camera.upside_down ? -camera.line_delay_s : camera.line_delay_s;
+  // What is not measured is nominal: axes as well mounted as PTCEE takes them to be, and the
+  // difference between two network links.
+  constexpr double kAxisSigma = 0.05;        // rad
+  constexpr double kClockOffsetSigma = 0.1;  // s
+  for (const Parameter axis :
+       {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
+    calibration.covariance(index(axis), index(axis)) = kAxisSigma * kAxisSigma;
+  }
+  calibration.covariance(index(Parameter::kClockOffset), index(Parameter::kClockOffset)) =
+      kClockOffsetSigma * kClockOffsetSigma;
+  return calibration;
+}
+
+OrientationStepOptions step_options(const Config& config, const NamedCalibration& calibration) {
+  OrientationStepOptions options = step_options(RecordingNoise{}, calibration);
+  TelemetryNoise& noise = options.telemetry_noise;
+  noise.pan_tilt_sigma = config.pan_tilt.angle_sigma_rad.value_or(noise.pan_tilt_sigma);
+  noise.quantum = config.pan_tilt.angle_quantum_rad;
+  noise.acceleration_sigma = config.pan_tilt.acceleration_sigma_rad_s2;
+  options.telemetry_limits.max_repeat_s = config.pan_tilt.max_repeat_s;
+  options.telemetry_limits.max_extrapolation_s = config.realtime.max_extrapolation_s;
+  return options;
+}
+
+OrientationStepOptions step_options(const RecordingNoise& noise,
+                                    const NamedCalibration& calibration) {
+  const auto clock = [](std::optional<double> stamp_sigma_s, std::optional<double> period_s,
+                        std::optional<double> period_sigma_s) {
+    ClockFilterOptions options;
+    options.jitter = stamp_sigma_s ? ClockJitter::kSymmetric : ClockJitter::kOneSided;
+    options.expected_jitter_s = stamp_sigma_s.value_or(options.expected_jitter_s);
+    options.nominal_period_s = period_s.value_or(options.nominal_period_s);
+    options.nominal_period_sigma_s = period_sigma_s.value_or(options.nominal_period_sigma_s);
+    return options;
+  };
+  OrientationStepOptions options;
+  options.calibration = calibration.calibration;
+  options.calibrated = calibration.calibrated;
+  options.video_clock =
+      clock(noise.image_stamp_sigma_s, noise.image_period_s, noise.image_period_sigma_s);
+  // The clock of RTP, which every live video stream has in this version.
+  options.video_clock.stamp_resolution_s = 1.0 / 90000;
+  options.telemetry_clock = clock(noise.telemetry_stamp_sigma_s, noise.telemetry_period_s,
+                                  noise.telemetry_period_sigma_s);
+  options.video_stamp_sigma_s = noise.image_stamp_sigma_s.value_or(options.video_stamp_sigma_s);
+  options.telemetry_stamp_sigma_s =
+      noise.telemetry_stamp_sigma_s.value_or(options.telemetry_stamp_sigma_s);
+  options.telemetry_noise.pan_tilt_sigma =
+      noise.pan_tilt_sigma_rad.value_or(options.telemetry_noise.pan_tilt_sigma);
+  options.telemetry_noise.period_sigma_s =
+      noise.telemetry_period_sigma_s.value_or(options.telemetry_noise.period_sigma_s);
+  return options;
+}
+
+std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config,
+                                               const std::string& copy_to) {
+  if (config.type == VideoConfig::Type::kRecording) {
+    return std::make_unique<RecordingFrameSource>(
+        RecordingFrameSourceOptions{config.directory, false, true});
+  }
+  RtpSourceOptions options;
+  options.url = config.url;
+  options.user = config.user;
+  options.password = config.password;
+  options.format = config.format;
+  options.transport = config.transport == VideoConfig::Transport::kUdp
+                          ? RtpSourceOptions::Transport::kUdp
+                          : RtpSourceOptions::Transport::kTcp;
+  options.decode = false;  // PT mode touches no pixel
+  options.timeout_s = config.timeout_s;
+  options.max_backoff_s = config.max_backoff_s;
+  options.copy_to = copy_to;
+  return std::make_unique<RtpSource>(options);
+}
+
+std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config) {
+  if (config.type == PanTiltConfig::Type::kRecording) {
+    return std::make_unique<RecordingPanTiltSource>(
+        RecordingPanTiltSourceOptions{config.directory, true});
+  }
+  VapixSourceOptions options;
+  options.url = config.url;
+  options.user = config.user;
+  options.password = config.password;
+  options.camera = config.camera;
+  options.rate_hz = config.rate_hz;
+  options.timeout_s = config.timeout_s;
+  options.max_backoff_s = config.max_backoff_s;
+  return std::make_unique<VapixSource>(options);
+}
+
+void log_source_losses(const FrameSource& source) {
+  const auto* rtp = dynamic_cast<const RtpSource*>(&source);
+  if (rtp == nullptr) return;
+  const RtpSourceCounters counters = rtp->counters();
+  if (counters.damaged == 0 && counters.dropped == 0) return;
+  spdlog::warn("{}: {} frames damaged, {} dropped before they were read", source.name(),
+               counters.damaged, counters.dropped);
+}
+
+bool is_recording(const Config& config) {
+  return config.video.type == VideoConfig::Type::kRecording;
+}
+
+bool is_terminal(int descriptor) { return ::isatty(descriptor) == 1; }
+
+}  // namespace alidade

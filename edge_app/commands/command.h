@@ -1,0 +1,71 @@
+#pragma once
+// What the sub-commands share: exit codes, the one-line failure, and the way from a configuration to
+// sources and to the options of a real-time step. One file a sub-command registers itself with the
+// parser and stores its exit code.
+
+#include <CLI/CLI.hpp>
+
+#include <memory>
+#include <optional>
+#include <stdexcept>
+#include <string>
+
+#include "edge_app/config/config.h"
+#include "edge_app/config/noise_file.h"
+#include "edge_app/pipeline/orientation_step.h"
+#include "platform/pan_tilt/pan_tilt_source.h"
+#include "platform/video/frame_source.h"
+
+namespace alidade {
+
+enum ExitCode : int { kExitOk = 0, kExitFailed = 1, kExitUsage = 2 };
+
+// Ends the command with one line on stderr: what is wrong, where, what would be right.
+struct CommandError : std::runtime_error {
+  CommandError(ExitCode code, const std::string& line)
+      : std::runtime_error(line), exit_code(code) {}
+  ExitCode exit_code;
+};
+
+void register_run(CLI::App& app, int* exit_code);
+void register_record(CLI::App& app, int* exit_code);
+void register_replay(CLI::App& app, int* exit_code);
+void register_check(CLI::App& app, int* exit_code);
+
+// Loads it and logs its warnings; throws CommandError.
+Config require_config(const std::string& path);
+
+// A calibration with what a person calls it.
+struct NamedCalibration {
+  Calibration calibration;
+  bool calibrated = false;  // false: the data sheet's values
+  std::string name;         // file, or "data sheet"
+};
+
+NamedCalibration require_calibration_file(const std::string& path);
+
+// The file's calibration; the data sheet's if there is no file, or not yet (calibration.auto).
+NamedCalibration choose_calibration(const Config& config);
+
+// A camera known from its data sheet only: nominal axes, no offsets, and standard deviations that admit it.
+Calibration data_sheet_calibration(const CameraConfig& camera);
+
+// With the noise the configuration states, or the noise.yaml of a recording.
+OrientationStepOptions step_options(const Config& config, const NamedCalibration& calibration);
+OrientationStepOptions step_options(const RecordingNoise& noise,
+                                    const NamedCalibration& calibration);
+
+// copy_to: a file for the video stream; empty: none.
+std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config,
+                                               const std::string& copy_to = "");
+std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config);
+
+// Logs the frames that a network source received damaged or had to drop, if any.
+void log_source_losses(const FrameSource& source);
+
+// Recordings bear the stamps of their own clock, so that live and recorded streams cannot be mixed.
+bool is_recording(const Config& config);
+
+bool is_terminal(int descriptor);
+
+}  // namespace alidade

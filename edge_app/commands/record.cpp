@@ -1,0 +1,230 @@
+// `alidade record`: the live streams as a recording. The video stream is copied by its source, not
+// encoded again; the stamps of both streams go to the recording's tables. The recording begins with
+// the first frame; telemetry from shortly before it is kept.
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cstdio>
+#include <deque>
+#include <filesystem>
+#include <fstream>
+#include <limits>
+#include <mutex>
+#include <system_error>
+#include <thread>
+
+#include "edge_app/commands/command.h"
+#include "edge_app/commands/stop_signals.h"
+#include "edge_app/pipeline/read_loop.h"
+#include "platform/recording/recording_writer.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct RecordOptions {
+  std::string config;
+  std::string directory;
+  double duration_s = std::numeric_limits<double>::infinity();
+};
+
+// Refuses a directory that holds a recording already, so that none is ever overwritten.
+void prepare_directory(const std::string& directory) {
+  for (const char* name : {"recording.yaml", "frames.csv", "telemetry.csv", "video.mkv"}) {
+    if (fs::exists(fs::path(directory) / name)) {
+      throw CommandError(kExitUsage, directory + ": already holds a recording (" + name +
+                                         "); give a new or empty directory with -o");
+    }
+  }
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error) {
+    throw CommandError(kExitFailed, directory + ": cannot be made: " + error.message() +
+                                        "; give a directory that can be written");
+  }
+}
+
+// What the configuration knows and a later calibration or replay of the recording needs.
+void write_side_files(const Config& config, const std::string& directory) {
+  if (config.pan_tilt.angle_sigma_rad) {
+    std::ofstream(fs::path(directory) / "noise.yaml")
+        << fmt::format("pan_tilt_sigma_rad: {}\n", *config.pan_tilt.angle_sigma_rad);
+  }
+  if (config.camera.focal_length_px) {
+    const Camera<double>& camera = data_sheet_calibration(config.camera).camera;
+    std::ofstream(fs::path(directory) / "guess.yaml")
+        << fmt::format("focal_length: {{value: {}}}\nradial_distortion: {{value: {}}}\n",
+                       camera.focal_length, camera.radial_distortion);
+  }
+}
+
+class Recorder {
+ public:
+  Recorder(FrameSource& video, PanTiltSource& pan_tilt, std::string directory)
+      : video_(video),
+        pan_tilt_(pan_tilt),
+        directory_(std::move(directory)),
+        finished_(::eventfd(0, EFD_CLOEXEC)) {
+    if (finished_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+  }
+  ~Recorder() {
+    stop();
+    ::close(finished_);
+  }
+  Recorder(const Recorder&) = delete;
+  Recorder& operator=(const Recorder&) = delete;
+
+  void start() {
+    threads_.emplace_back(&Recorder::record_telemetry, this);
+    threads_.emplace_back(&Recorder::record_video, this);
+  }
+
+  void stop() {
+    video_.stop();
+    pan_tilt_.stop();
+    for (std::thread& thread : threads_) thread.join();
+    threads_.clear();
+  }
+
+  // Polls readable when a stream failed for good or the disk takes no more.
+  [[nodiscard]] int finished_fd() const { return finished_; }
+  [[nodiscard]] long frames() const { return frames_; }
+  [[nodiscard]] long samples() const { return samples_; }
+
+  // After stop(): brings the rows to the disk and says what went wrong first, if anything.
+  std::string finish() {
+    std::string error;
+    if (open_ && !writer_.flush(&error)) fail(error);
+    if (error_.empty() && frames_ == 0)
+      error_ = video_.name() + ": no frame came; see `alidade check`";
+    return error_;
+  }
+
+ private:
+  void record_video() {
+    const auto on_frame = [this](const Frame& frame) {
+      std::string error;
+      if (!open_) {
+        if (!writer_.open(directory_, frame.width, frame.height, "", &error)) return fail(error);
+        width_ = frame.width;
+        height_ = frame.height;
+        open_ = true;
+      }
+      if (frame.width != width_ || frame.height != height_) {
+        return fail(
+            fmt::format("{}: frames changed from {} x {} to {} x {} px; a recording holds one size",
+                        video_.name(), width_, height_, frame.width, frame.height));
+      }
+      if (!writer_.add_frame(frame.stamp, &error)) return fail(error);
+      ++frames_;
+      return true;
+    };
+    const std::string error = read_to_the_end<Frame>(video_, on_frame, [](double) {});
+    if (!error.empty()) fail(error);
+  }
+
+  void record_telemetry() {
+    constexpr std::size_t kEarlySamples = 256;
+    std::deque<PanTiltSample> early;
+    const auto on_sample = [this, &early](const PanTiltSample& sample) {
+      early.push_back(sample);
+      if (early.size() > kEarlySamples) early.pop_front();
+      std::string error;
+      for (; open_ && !early.empty(); early.pop_front()) {
+        if (!writer_.add_telemetry(early.front(), &error)) return fail(error);
+        ++samples_;
+      }
+      return true;
+    };
+    const std::string error = read_to_the_end<PanTiltSample>(pan_tilt_, on_sample, [](double) {});
+    if (!error.empty()) fail(error);
+  }
+
+  // The first of two threads to fail is heard. False, for its callers to return.
+  bool fail(const std::string& error) {
+    const std::lock_guard<std::mutex> lock(error_mutex_);
+    if (error_.empty()) error_ = error;
+    static_cast<void>(::eventfd_write(finished_, 1));
+    return false;
+  }
+
+  FrameSource& video_;
+  PanTiltSource& pan_tilt_;
+  std::string directory_;
+  int finished_;
+  RecordingWriter writer_;
+  std::atomic<bool> open_{false};  // writer_ is open
+  int width_ = 0;                  // video thread
+  int height_ = 0;
+  std::atomic<long> frames_{0};
+  std::atomic<long> samples_{0};
+  std::mutex error_mutex_;
+  std::string error_;
+  std::vector<std::thread> threads_;
+};
+
+void wait_with_progress(StopSignals& signals, const Recorder& recorder, double duration_s) {
+  constexpr double kProgressPeriod = 1;  // s
+  const bool show = is_terminal(STDERR_FILENO);
+  const double start_s = monotonic_now_s();
+  const double end_s = start_s + duration_s;
+  while (true) {
+    const double left_s = end_s - monotonic_now_s();
+    const auto event =
+        signals.wait(recorder.finished_fd(), show ? std::min(left_s, kProgressPeriod) : left_s);
+    if (show) {
+      fmt::print(stderr, "\r{:.0f} s: {} frames, {} telemetry samples ",
+                 monotonic_now_s() - start_s, recorder.frames(), recorder.samples());
+    }
+    if (event == StopSignals::Event::kTimeout && monotonic_now_s() < end_s) continue;
+    if (show) fmt::print(stderr, "\n");
+    return;
+  }
+}
+
+int record(const RecordOptions& options) {
+  const Config config = require_config(options.config);
+  if (is_recording(config)) {
+    throw CommandError(
+        kExitUsage,
+        options.config + ": video.type: a recording cannot be recorded; name a live source");
+  }
+  prepare_directory(options.directory);
+  write_side_files(config, options.directory);
+
+  StopSignals signals;
+  const auto video =
+      make_frame_source(config.video, (fs::path(options.directory) / "video.mkv").string());
+  const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
+  Recorder recorder(*video, *pan_tilt, options.directory);
+  recorder.start();
+  wait_with_progress(signals, recorder, options.duration_s);
+  recorder.stop();
+  const std::string error = recorder.finish();
+  spdlog::info("{}: {} frames, {} telemetry samples stored", options.directory, recorder.frames(),
+               recorder.samples());
+  log_source_losses(*video);
+  if (!error.empty()) throw CommandError(kExitFailed, error);
+  return kExitOk;
+}
+
+}  // namespace
+
+void register_record(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<RecordOptions>();
+  CLI::App* command = app.add_subcommand(
+      "record", "Store the live streams as a recording (video copied, not re-encoded)");
+  command->add_option("-c,--config", options->config, "Configuration (YAML)")->required();
+  command->add_option("-o,--output", options->directory, "Directory of the new recording")
+      ->required();
+  command->add_option("--duration", options->duration_s, "End after so many seconds")
+      ->check(CLI::PositiveNumber);
+  command->callback([options, exit_code] { *exit_code = record(*options); });
+}
+
+}  // namespace alidade

@@ -1,0 +1,182 @@
+// `alidade replay`: the real-time step over a recording, on one thread: telemetry up to a frame's
+// receive time is known when the frame is answered, and nothing later is. So the answer is what
+// `run` would have given, and the same in each replay.
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <filesystem>
+#include <limits>
+#include <system_error>
+
+#include "edge_app/commands/command.h"
+#include "edge_app/commands/stop_signals.h"
+#include "edge_app/config/noise_file.h"
+#include "edge_app/output/record_writer.h"
+#include "platform/pan_tilt/recording_pan_tilt_source.h"
+#include "platform/recording/recording.h"
+#include "platform/system/clock.h"
+#include "platform/video/recording_frame_source.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ReplayOptions {
+  std::string recording;
+  std::string directory;    // empty: <recording>/alidade
+  std::string calibration;  // empty: <recording>/alidade/calibration.yaml
+  bool realtime = false;
+  bool json = false;
+  bool csv = false;
+};
+
+// The records' file, which has its name only when it is whole.
+class OrientationFile {
+ public:
+  explicit OrientationFile(const std::string& directory)
+      : path_(fs::path(directory) / "orientation.csv"), partial_(path_.string() + ".partial") {
+    std::error_code error;
+    fs::create_directories(directory, error);
+    descriptor_ = ::open(partial_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
+    if (descriptor_ < 0) {
+      throw CommandError(kExitFailed, partial_.string() + ": cannot be written: " +
+                                          std::generic_category().message(errno) +
+                                          "; give a directory that can be written with -o");
+    }
+    writer_.emplace(descriptor_, OutputFormat::kCsv, path_.string());
+  }
+  ~OrientationFile() {
+    ::close(descriptor_);
+    std::error_code ignored;
+    fs::remove(partial_, ignored);  // gone already after complete()
+  }
+  OrientationFile(const OrientationFile&) = delete;
+  OrientationFile& operator=(const OrientationFile&) = delete;
+
+  void write(const OrientationRecord& record) {
+    if (!writer_->write(record)) throw CommandError(kExitFailed, writer_->error());
+  }
+  void complete() { fs::rename(partial_, path_); }
+  [[nodiscard]] std::string path() const { return path_.string(); }
+
+ private:
+  fs::path path_;
+  fs::path partial_;
+  int descriptor_ = -1;
+  std::optional<RecordWriter> writer_;
+};
+
+NamedCalibration find_calibration(const ReplayOptions& options) {
+  if (!options.calibration.empty()) return require_calibration_file(options.calibration);
+  const fs::path beside = fs::path(options.recording) / "alidade" / "calibration.yaml";
+  if (!fs::exists(beside)) {
+    throw CommandError(kExitUsage, options.recording + ": has no calibration (" + beside.string() +
+                                       "); name one with --calibration FILE");
+  }
+  return require_calibration_file(beside.string());
+}
+
+void check_size(const RecordingInfo& info, const NamedCalibration& calibration,
+                const std::string& recording) {
+  const Camera<double>& camera = calibration.calibration.camera;
+  if (info.width == camera.width && info.height == camera.height) return;
+  throw CommandError(
+      kExitFailed,
+      fmt::format(
+          "{}: frames of {} x {} px, but {} is for {} x {} px; name the calibration of this size",
+          recording, info.width, info.height, calibration.name, camera.width, camera.height));
+}
+
+// The next item of a recording; empty at its end.
+template <typename Item, typename Source>
+std::optional<Item> next(Source& source) {
+  Item item;
+  const ReadStatus status = source.read(item, std::numeric_limits<double>::infinity());
+  if (status == ReadStatus::kOk) return item;
+  if (status == ReadStatus::kEnd) return std::nullopt;
+  throw CommandError(kExitFailed, source.error());
+}
+
+int replay(const ReplayOptions& options) {
+  std::string error;
+  RecordingInfo info;
+  if (!read_recording_info(options.recording, &info, &error))
+    throw CommandError(kExitFailed, error);
+  const NamedCalibration calibration = find_calibration(options);
+  check_size(info, calibration, options.recording);
+  RecordingNoise noise;
+  if (!load_noise(options.recording, &noise, &error)) throw CommandError(kExitFailed, error);
+  OrientationStep step(step_options(noise, calibration));
+
+  StopSignals signals;
+  RecordingFrameSource video({options.recording, false, false});
+  RecordingPanTiltSource pan_tilt({options.recording, false});
+  OrientationFile file(options.directory.empty()
+                           ? (fs::path(options.recording) / "alidade").string()
+                           : options.directory);
+  std::optional<RecordWriter> out;
+  if (options.json || options.csv) {
+    out.emplace(STDOUT_FILENO, options.json ? OutputFormat::kJson : OutputFormat::kCsv, "stdout");
+  }
+
+  const bool progress = is_terminal(STDERR_FILENO);
+  const double start_s = monotonic_now_s();
+  std::optional<double> first_s;
+  std::int64_t frames = 0;
+  std::int64_t with_orientation = 0;
+  std::optional<PanTiltSample> sample = next<PanTiltSample>(pan_tilt);
+  while (const std::optional<Frame> frame = next<Frame>(video)) {
+    const FrameStamp& stamp = frame->stamp;
+    if (!first_s) first_s = stamp.receive_time_s;
+    // A live frame is due when it was received; stamps that jump back are due at once.
+    const double wait_s =
+        options.realtime ? start_s + (stamp.receive_time_s - *first_s) - monotonic_now_s() : 0;
+    if (signals.wait(-1, wait_s) == StopSignals::Event::kSignal) {
+      throw CommandError(kExitFailed, options.recording + ": replay interrupted; nothing stored");
+    }
+    for (; sample && sample->latest_time_s <= stamp.receive_time_s;
+         sample = next<PanTiltSample>(pan_tilt)) {
+      step.add_telemetry(*sample);
+    }
+    StepEvents events;
+    const OrientationRecord record = step.add_frame(stamp, &events);
+    ++frames;
+    if (record.orientation) ++with_orientation;
+    file.write(record);
+    if (out && !out->write(record)) {
+      if (!out->error().empty()) throw CommandError(kExitFailed, out->error());
+      out.reset();
+    }
+    if (progress && frames % 1000 == 0) fmt::print(stderr, "\r{} frames ", frames);
+  }
+  if (progress) fmt::print(stderr, "\r");
+  file.complete();
+  spdlog::info("{}: {} frames: PT {}, none {}", file.path(), frames, with_orientation,
+               frames - with_orientation);
+  return kExitOk;
+}
+
+}  // namespace
+
+void register_replay(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<ReplayOptions>();
+  CLI::App* command = app.add_subcommand(
+      "replay", "Run the real-time modes over a recording; writes orientation.csv");
+  command->add_option("recording", options->recording, "Directory of the recording")->required();
+  command->add_option("-o,--output", options->directory,
+                      "Directory for orientation.csv (default: DIR/alidade)");
+  command->add_option("--calibration", options->calibration,
+                      "Calibration (default: DIR/alidade/calibration.yaml)");
+  command->add_flag("--realtime", options->realtime, "At the pace of the recording");
+  CLI::Option* json = command->add_flag("--json", options->json, "Also on stdout, as JSON Lines");
+  command->add_flag("--csv", options->csv, "Also on stdout, as CSV")->excludes(json);
+  command->callback([options, exit_code] { *exit_code = replay(*options); });
+}
+
+}  // namespace alidade

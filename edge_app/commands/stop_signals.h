@@ -1,0 +1,26 @@
+#pragma once
+// StopSignals: SIGINT and SIGTERM as an event to wait for, so that a live command ends cleanly.
+// Construct it before any thread is started: threads inherit the blocked signals, and only wait()
+// sees them. After the first signal the second ends the process at once, as usual.
+
+#include <signal.h>
+
+namespace alidade {
+
+class StopSignals {
+ public:
+  StopSignals();
+  ~StopSignals();
+  StopSignals(const StopSignals&) = delete;
+  StopSignals& operator=(const StopSignals&) = delete;
+
+  enum class Event { kSignal, kDescriptor, kTimeout };
+  // Waits for a signal, for `descriptor` to become readable, or for timeout_s to pass (infinity: for ever).
+  Event wait(int descriptor, double timeout_s);
+
+ private:
+  sigset_t signals_{};
+  int descriptor_ = -1;  // signalfd
+};
+
+}  // namespace alidade

@@ -1,0 +1,215 @@
+#include "edge_app/config/config.h"
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+#include "edge_app/config/yaml_section.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr NumberRange kSeconds{0.1, 3600, "s"};
+constexpr NumberRange kAngle{0, 0.1, "rad"};
+
+std::string path_relative_to(const std::string& config_path, const std::string& path) {
+  return (fs::path(config_path).parent_path() / path).string();
+}
+
+std::string required_text(YamlSection& section, const std::string& key,
+                          const std::string& example) {
+  const std::optional<std::string> value = section.text(key);
+  if (!value) section.fail(key, "is missing; expected for example " + key + ": " + example);
+  return *value;
+}
+
+// An address with one of the given schemes and without a user or password in it.
+std::string required_url(YamlSection& section, const std::string& example,
+                         const std::vector<std::string>& schemes) {
+  const std::string url = required_text(section, "url", example);
+  bool known = false;
+  std::string rest;
+  for (const std::string& scheme : schemes) {
+    if (url.rfind(scheme, 0) != 0) continue;
+    known = true;
+    rest = url.substr(scheme.size());
+  }
+  if (!known || rest.empty() || rest[0] == '/') {
+    section.fail("url", "is not an address that starts with " + join(schemes) +
+                            "; expected for example " + example);
+  }
+  if (rest.substr(0, rest.find('/')).find('@') != std::string::npos) {
+    section.fail("url", "holds a user or password; give them as user and password_env");
+  }
+  return url;
+}
+
+void read_login(YamlSection& section, std::string* user, std::string* password) {
+  *user = section.text("user").value_or("");
+  const std::optional<std::string> variable = section.text("password_env");
+  if (!variable) return;
+  if (user->empty()) section.fail("password_env", "stands without a user; add user");
+  const char* value = std::getenv(variable->c_str());
+  if (value == nullptr) {
+    section.fail("password_env",
+                 fmt::format("the environment has no variable '{}'; export it with the password",
+                             *variable));
+  }
+  *password = value;
+}
+
+VideoConfig read_video(YamlSection section, const std::string& path) {
+  VideoConfig video;
+  const auto type = section.choice("type", {"rtsp", "rtp", "recording"}, {"v4l2", "mjpeg"});
+  if (!type) section.fail("type", "is missing; expected one of rtsp, rtp, recording");
+  if (*type == "recording") {
+    video.type = VideoConfig::Type::kRecording;
+    video.directory = path_relative_to(path, required_text(section, "directory", "my-recording"));
+  } else if (*type == "rtsp") {
+    video.type = VideoConfig::Type::kRtsp;
+    video.url = required_url(section, "rtsp://camera/stream", {"rtsp://"});
+    read_login(section, &video.user, &video.password);
+    if (section.choice("transport", {"tcp", "udp"}).value_or("tcp") == "udp") {
+      video.transport = VideoConfig::Transport::kUdp;
+    }
+  } else {
+    video.type = VideoConfig::Type::kRtp;
+    video.url = required_text(section, "url", "camera.sdp");
+    if (video.url.rfind("rtp://", 0) == 0) {
+      video.format = section.choice("format", {"MJPG", "H264"}).value_or(video.format);
+    } else {
+      video.url = path_relative_to(path, video.url);
+    }
+  }
+  if (video.type != VideoConfig::Type::kRecording) {
+    video.timeout_s = section.number("timeout_s", kSeconds).value_or(video.timeout_s);
+    video.max_backoff_s = section.number("max_backoff_s", kSeconds).value_or(video.max_backoff_s);
+  }
+  section.finish();
+  return video;
+}
+
+PanTiltConfig read_pan_tilt(YamlSection section, const std::string& path) {
+  PanTiltConfig pan_tilt;
+  const auto type =
+      section.choice("type", {"vapix", "recording"}, {"onvif", "pelco_d", "visca", "ptu"});
+  if (!type) section.fail("type", "is missing; expected one of vapix, recording");
+  if (*type == "recording") {
+    pan_tilt.type = PanTiltConfig::Type::kRecording;
+    pan_tilt.directory =
+        path_relative_to(path, required_text(section, "directory", "my-recording"));
+  } else {
+    pan_tilt.url = required_url(section, "http://camera", {"http://", "https://"});
+    read_login(section, &pan_tilt.user, &pan_tilt.password);
+    pan_tilt.camera = section.integer("camera", {1, 64, "camera number"}).value_or(pan_tilt.camera);
+    pan_tilt.rate_hz = section.number("rate_hz", {0.1, 1000, "Hz"}).value_or(pan_tilt.rate_hz);
+    pan_tilt.timeout_s = section.number("timeout_s", kSeconds).value_or(pan_tilt.timeout_s);
+    pan_tilt.max_backoff_s =
+        section.number("max_backoff_s", kSeconds).value_or(pan_tilt.max_backoff_s);
+  }
+  pan_tilt.angle_sigma_rad = section.number("angle_sigma_rad", kAngle);
+  pan_tilt.angle_quantum_rad =
+      section.number("angle_quantum_rad", kAngle).value_or(pan_tilt.angle_quantum_rad);
+  if (pan_tilt.angle_sigma_rad == 0.0 && pan_tilt.angle_quantum_rad == 0) {
+    section.fail("angle_sigma_rad",
+                 "no head measures without error; give a sigma or angle_quantum_rad above 0");
+  }
+  pan_tilt.acceleration_sigma_rad_s2 =
+      section.number("acceleration_sigma_rad_s2", {0, 1000, "rad/s^2"})
+          .value_or(pan_tilt.acceleration_sigma_rad_s2);
+  pan_tilt.max_repeat_s =
+      section.number("max_repeat_s", {0, 10, "s"}).value_or(pan_tilt.max_repeat_s);
+  section.finish();
+  return pan_tilt;
+}
+
+CameraConfig read_camera(YamlSection section) {
+  CameraConfig camera;
+  camera.focal_length_px = section.number("focal_length_px", {1, 1e8, "px"});
+  camera.aspect = section.number("aspect", {0.5, 2, "1"}).value_or(camera.aspect);
+  camera.radial_distortion =
+      section.number("radial_distortion", {-1e8, 1e8, "1"}).value_or(camera.radial_distortion);
+  camera.line_delay_s =
+      section.number("line_delay_s", {-1e-3, 1e-3, "s/row"}).value_or(camera.line_delay_s);
+  camera.upside_down = section.truth("upside_down").value_or(camera.upside_down);
+  static_cast<void>(section.choice("zoom", {"fixed"}));
+  section.finish();
+  return camera;
+}
+
+CalibrationConfig read_calibration(YamlSection section, const std::string& path,
+                                   std::vector<std::string>* warnings) {
+  CalibrationConfig calibration;
+  if (const auto file = section.text("file")) calibration.file = path_relative_to(path, *file);
+  calibration.automatic = section.truth("auto").value_or(calibration.automatic);
+  if (calibration.automatic) {
+    warnings->push_back(section.where("auto") +
+                        ": automatic calibration is not available in this version; the calibration "
+                        "file is used as it is");
+  }
+  section.finish();
+  return calibration;
+}
+
+RealtimeConfig read_realtime(YamlSection section) {
+  RealtimeConfig realtime;
+  static_cast<void>(section.choice("mode", {"PT"}, {"OE"}));
+  realtime.priority =
+      section.integer("priority", {0, 99, "SCHED_FIFO priority"}).value_or(realtime.priority);
+  realtime.cpu = section.integer("cpu", {0, 1023, "processor number"}).value_or(realtime.cpu);
+  realtime.lock_memory = section.truth("lock_memory").value_or(realtime.lock_memory);
+  realtime.max_extrapolation_s =
+      section.number("max_extrapolation_s", {0, 10, "s"}).value_or(realtime.max_extrapolation_s);
+  section.finish();
+  return realtime;
+}
+
+OutputFormat read_output(YamlSection section) {
+  const bool json = section.truth("json").value_or(false);
+  const bool csv = section.truth("csv").value_or(false);
+  if (section.has("http")) {
+    section.fail("http", "is not available in this version; available: json, csv (on stdout)");
+  }
+  if (json && csv) section.fail("csv", "json and csv cannot both go to stdout; keep one");
+  section.finish();
+  return csv ? OutputFormat::kCsv : OutputFormat::kJson;
+}
+
+void read_config(YamlSection& top, const std::string& path, Config* config) {
+  for (const char* required : {"video", "pan_tilt"}) {
+    if (!top.has(required))
+      throw ConfigError(path + ": section '" + required + "' is missing; add it");
+  }
+  config->video = read_video(top.section("video"), path);
+  config->pan_tilt = read_pan_tilt(top.section("pan_tilt"), path);
+  config->camera = read_camera(top.section("camera"));
+  config->calibration = read_calibration(top.section("calibration"), path, &config->warnings);
+  config->realtime = read_realtime(top.section("realtime"));
+  config->output = read_output(top.section("output"));
+  top.finish();
+  if ((config->video.type == VideoConfig::Type::kRecording) !=
+      (config->pan_tilt.type == PanTiltConfig::Type::kRecording)) {
+    throw ConfigError(
+        path +
+        ": video and pan_tilt are a recording and a live stream, which have no common "
+        "clock; set both types to recording, or neither");
+  }
+  if (config->calibration.file.empty() && !config->camera.focal_length_px) {
+    throw ConfigError(path +
+                      ": neither a calibration nor a data sheet is given; set calibration.file or "
+                      "camera.focal_length_px");
+  }
+}
+
+}  // namespace
+
+bool load_config(const std::string& path, Config* config, std::string* error) {
+  *config = Config();
+  return read_yaml_file(
+      path, [&](YamlSection& top) { read_config(top, path, config); }, error);
+}
+
+}  // namespace alidade

@@ -1,0 +1,84 @@
+#pragma once
+// The configuration of `alidade`: one YAML file, strictly checked (yaml_section.h).
+//
+// Every value carries its unit here as in the file. What the file leaves out has the default below;
+// what has no default (types, addresses) is required. Passwords stand in the environment, never in
+// the file: `password_env` names the variable. Relative paths are relative to the file's folder.
+// Reading touches nothing but the file and the environment: no connection is tried.
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "edge_app/output/record_format.h"  // OutputFormat
+
+namespace alidade {
+
+struct VideoConfig {
+  enum class Type { kRtsp, kRtp, kRecording };
+  enum class Transport { kTcp, kUdp };
+  Type type = Type::kRtsp;
+  std::string url;              // rtsp: rtsp://...; rtp: an .sdp file or rtp://address:port
+  std::string format = "MJPG";  // rtp://address:port: MJPG or H264
+  std::string directory;        // recording
+  std::string user;             // rtsp
+  std::string password;
+  Transport transport = Transport::kTcp;  // rtsp
+  double timeout_s = 3;                   // silence that counts as a loss
+  double max_backoff_s = 5;               // longest pause between two attempts
+};
+
+struct PanTiltConfig {
+  enum class Type { kVapix, kRecording };
+  Type type = Type::kVapix;
+  std::string url;        // vapix
+  std::string directory;  // recording
+  std::string user;
+  std::string password;
+  int camera = 0;  // VAPIX camera number; 0 leaves it out of the query
+  double rate_hz = 30;
+  double timeout_s = 1;
+  double max_backoff_s = 5;
+  std::optional<double> angle_sigma_rad;   // white noise of one measured angle
+  double angle_quantum_rad = 0;            // step of the encoder or of its print-out
+  double acceleration_sigma_rad_s2 = 0.1;  // to expect of the head where samples do not show it
+  double max_repeat_s =
+      0.1;  // longest time between two measurements of the device; 0: each answer is fresh
+};
+
+// The data sheet's camera: used as long as there is no calibration.
+struct CameraConfig {
+  std::optional<double> focal_length_px;
+  double aspect = 1;
+  double radial_distortion = 0;
+  double line_delay_s = 0;  // of the sensor read top to bottom
+  bool upside_down =
+      false;  // mounted upside down, image turned by 180 degrees: negates line_delay_s
+};
+
+struct CalibrationConfig {
+  std::string file;  // empty: none
+  bool automatic = false;
+};
+
+struct RealtimeConfig {
+  int priority = 0;  // SCHED_FIFO priority; 0 leaves the scheduler alone
+  int cpu = -1;      // -1: any
+  bool lock_memory = false;
+  double max_extrapolation_s = 0.25;  // how far beyond the newest telemetry an angle is stated
+};
+
+struct Config {
+  VideoConfig video;
+  PanTiltConfig pan_tilt;
+  CameraConfig camera;
+  CalibrationConfig calibration;
+  RealtimeConfig realtime;
+  OutputFormat output = OutputFormat::kJson;
+  std::vector<std::string> warnings;  // FILE:LINE: ... lines for the log
+};
+
+// False with a line "FILE[:LINE]: KEY: what is wrong; what would be right" in *error.
+[[nodiscard]] bool load_config(const std::string& path, Config* config, std::string* error);
+
+}  // namespace alidade

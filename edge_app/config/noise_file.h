@@ -1,0 +1,25 @@
+#pragma once
+// noise.yaml of a recording: what is known about the noise of its streams. Everything is optional,
+// the file too. A stamp sigma says that the stamps scatter to both sides of the true time (symmetric
+// jitter); without it they are taken to be late only, as those of a live stream are.
+
+#include <optional>
+#include <string>
+
+namespace alidade {
+
+struct RecordingNoise {
+  std::optional<double> image_stamp_sigma_s;
+  std::optional<double> image_period_s;
+  std::optional<double> image_period_sigma_s;
+  std::optional<double> telemetry_stamp_sigma_s;
+  std::optional<double> telemetry_period_s;
+  std::optional<double> telemetry_period_sigma_s;
+  std::optional<double> pan_tilt_sigma_rad;
+};
+
+// False with a line FILE:LINE: ... in *error if directory/noise.yaml is there and malformed.
+[[nodiscard]] bool load_noise(const std::string& directory, RecordingNoise* noise,
+                              std::string* error);
+
+}  // namespace alidade

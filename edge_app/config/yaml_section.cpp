@@ -1,0 +1,188 @@
+#include "edge_app/config/yaml_section.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <filesystem>
+#include <fstream>
+#include <sstream>
+#include <utility>
+
+#include <fmt/format.h>
+
+namespace alidade {
+namespace {
+
+std::string place(const std::string& file, const YAML::Node& node) {
+  // yaml-cpp counts from 0 and gives -1 for a node that is not in the file.
+  const int line = node.Mark().line;
+  return line < 0 ? file : fmt::format("{}:{}", file, line + 1);
+}
+
+bool contains(const std::vector<std::string>& words, const std::string& word) {
+  return std::find(words.begin(), words.end(), word) != words.end();
+}
+
+// Strictly a decimal number from the first to the last character.
+std::optional<double> parse_number(const std::string& text) {
+  if (text.empty() || text.find_first_not_of("0123456789+-.eE") != std::string::npos) {
+    return std::nullopt;
+  }
+  char* end = nullptr;
+  const double value = std::strtod(text.c_str(), &end);
+  if (*end != '\0' || !std::isfinite(value)) return std::nullopt;
+  return value;
+}
+
+}  // namespace
+
+bool read_yaml_file(const std::string& path, const std::function<void(YamlSection&)>& read,
+                    std::string* error) {
+  std::ifstream file(path);
+  std::stringstream text;
+  // A directory opens, but does not read; an empty file sets failbit, and is an empty section.
+  if (!file || std::filesystem::is_directory(path) || (text << file.rdbuf(), file.bad())) {
+    *error = path + ": cannot be read; expected a YAML file";
+    return false;
+  }
+  try {
+    YamlSection top(YAML::Load(text.str()), "", path);
+    read(top);
+    return true;
+  } catch (const ConfigError& e) {
+    *error = e.what();
+  } catch (const YAML::Exception& e) {
+    *error = fmt::format("{}:{}: not YAML: {}; check indentation, colons and quotes", path,
+                         e.mark.line + 1, e.msg);
+  }
+  return false;
+}
+
+std::string join(const std::vector<std::string>& words) {
+  std::string joined;
+  for (const std::string& word : words) joined += (joined.empty() ? "" : ", ") + word;
+  return joined;
+}
+
+YamlSection::YamlSection(const YAML::Node& node, std::string name, std::string file)
+    : node_(node), name_(std::move(name)), file_(std::move(file)) {
+  if (!node_.IsDefined() || node_.IsNull()) {
+    node_ = YAML::Node(YAML::NodeType::Map);
+    return;
+  }
+  const std::string title = name_.empty() ? "configuration" : name_;
+  if (!node_.IsMap()) {
+    throw ConfigError(
+        fmt::format("{}: {}: expected a mapping of keys to values", place(file_, node_), title));
+  }
+  std::vector<std::string> seen;
+  for (const auto& entry : node_) {
+    if (!entry.first.IsScalar()) {
+      throw ConfigError(
+          fmt::format("{}: {}: a key must be a plain word", place(file_, entry.first), title));
+    }
+    if (contains(seen, entry.first.Scalar())) {
+      throw ConfigError(fmt::format("{}: {}: key '{}' stands twice; keep one",
+                                    place(file_, entry.first), title, entry.first.Scalar()));
+    }
+    seen.push_back(entry.first.Scalar());
+  }
+}
+
+std::optional<YAML::Node> YamlSection::find(const std::string& key) const {
+  for (const auto& entry : node_) {
+    if (entry.first.Scalar() == key) return entry.second;
+  }
+  return std::nullopt;
+}
+
+bool YamlSection::has(const std::string& key) const { return find(key).has_value(); }
+
+std::string YamlSection::where(const std::string& key) const {
+  // The key's line: an empty value has no place of its own.
+  std::string at = place(file_, node_);
+  for (const auto& entry : node_) {
+    if (entry.first.Scalar() == key) at = place(file_, entry.first);
+  }
+  return fmt::format("{}: {}{}{}", at, name_, name_.empty() ? "" : ".", key);
+}
+
+void YamlSection::fail(const std::string& key, const std::string& what) const {
+  throw ConfigError(where(key) + ": " + what);
+}
+
+std::optional<std::string> YamlSection::scalar(const std::string& key, const std::string& expected,
+                                               bool plain) {
+  asked_.push_back(key);
+  const std::optional<YAML::Node> value = find(key);
+  if (!value) return std::nullopt;
+  if (value->IsNull()) fail(key, "has no value; expected " + expected);
+  if (!value->IsScalar()) fail(key, "expected " + expected + ", not a list or mapping");
+  // yaml-cpp tags quoted scalars "!" and plain ones "?".
+  if (plain && value->Tag() == "!") {
+    fail(key, fmt::format("'{}' is quoted text; expected {}", value->Scalar(), expected));
+  }
+  return value->Scalar();
+}
+
+std::optional<std::string> YamlSection::text(const std::string& key) {
+  std::optional<std::string> value = scalar(key, "text", false);
+  if (value && value->empty()) fail(key, "is empty; expected text");
+  return value;
+}
+
+std::optional<double> YamlSection::number(const std::string& key, const NumberRange& range) {
+  const std::string expected =
+      fmt::format("a plain number from {} to {} ({})", range.low, range.high, range.unit);
+  const std::optional<std::string> value = scalar(key, expected, true);
+  if (!value) return std::nullopt;
+  const std::optional<double> number = parse_number(*value);
+  if (!number || *number < range.low || *number > range.high) {
+    fail(key, fmt::format("'{}' is not {}", *value, expected));
+  }
+  return number;
+}
+
+std::optional<int> YamlSection::integer(const std::string& key, const NumberRange& range) {
+  const std::optional<double> value = number(key, range);
+  if (!value) return std::nullopt;
+  if (*value != std::floor(*value)) fail(key, fmt::format("{} is not a whole number", *value));
+  return static_cast<int>(*value);
+}
+
+std::optional<bool> YamlSection::truth(const std::string& key) {
+  const std::optional<std::string> value = scalar(key, "true or false", true);
+  if (!value) return std::nullopt;
+  if (*value != "true" && *value != "false")
+    fail(key, fmt::format("'{}' is not true or false", *value));
+  return *value == "true";
+}
+
+std::optional<std::string> YamlSection::choice(const std::string& key,
+                                               const std::vector<std::string>& available,
+                                               const std::vector<std::string>& planned) {
+  std::optional<std::string> value = scalar(key, "one of " + join(available), false);
+  if (!value || contains(available, *value)) return value;
+  fail(key, contains(planned, *value)
+                ? fmt::format("'{}' is not available in this version; available: {}", *value,
+                              join(available))
+                : fmt::format("'{}' is unknown; expected one of {}", *value, join(available)));
+}
+
+YamlSection YamlSection::section(const std::string& key) {
+  asked_.push_back(key);
+  const std::optional<YAML::Node> value = find(key);
+  return YamlSection(value ? *value : YAML::Node(), name_.empty() ? key : name_ + "." + key, file_);
+}
+
+void YamlSection::finish() const {
+  for (const auto& entry : node_) {
+    const std::string key = entry.first.Scalar();
+    if (contains(asked_, key)) continue;
+    throw ConfigError(fmt::format("{}: {}{}{}: unknown key; known here: {}",
+                                  place(file_, entry.first), name_, name_.empty() ? "" : ".", key,
+                                  join(asked_)));
+  }
+}
+
+}  // namespace alidade

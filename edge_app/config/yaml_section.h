@@ -1,0 +1,77 @@
+#pragma once
+// One mapping of a YAML configuration, read strictly.
+//
+// Each reader (text, number, ...) takes the key's value out and checks its type and range; finish()
+// then rejects every key that no reader asked for. All complaints are ConfigError with one line
+//     FILE:LINE: SECTION.KEY: what is wrong; what would be right
+// An absent key is an empty optional; a key without a value is an error. Numbers are plain (a
+// unit belongs to the key's name); quoted numbers and words such as "yes" for a truth value are
+// errors, as they hide slips.
+
+#include <yaml-cpp/yaml.h>
+
+#include <functional>
+#include <optional>
+#include <stdexcept>
+#include <string>
+#include <vector>
+
+namespace alidade {
+
+struct ConfigError : std::runtime_error {
+  using std::runtime_error::runtime_error;
+};
+
+// Inclusive limits of a number and its unit for the message ("px", "s", "1").
+struct NumberRange {
+  double low;
+  double high;
+  const char* unit;
+};
+
+class YamlSection {
+ public:
+  // `name` is "" for the top of the file. `node` may be null: an empty section.
+  YamlSection(const YAML::Node& node, std::string name, std::string file);
+
+  [[nodiscard]] bool has(const std::string& key) const;
+  std::optional<std::string> text(const std::string& key);
+  std::optional<double> number(const std::string& key, const NumberRange& range);
+  std::optional<int> integer(const std::string& key, const NumberRange& range);
+  std::optional<bool> truth(const std::string& key);
+  // One of `available`; a word of `planned` is refused as not available in this version.
+  std::optional<std::string> choice(const std::string& key,
+                                    const std::vector<std::string>& available,
+                                    const std::vector<std::string>& planned = {});
+  // A section inside this one; an empty one if the key is absent.
+  YamlSection section(const std::string& key);
+
+  // Throws if a key is left that no reader asked for.
+  void finish() const;
+
+  // "FILE:LINE: SECTION.KEY", of the section itself if it lacks the key.
+  [[nodiscard]] std::string where(const std::string& key) const;
+  [[noreturn]] void fail(const std::string& key, const std::string& what) const;
+
+ private:
+  [[nodiscard]] std::optional<YAML::Node> find(const std::string& key) const;
+  // The value as a scalar's text. `expected` completes "expected ...".
+  std::optional<std::string> scalar(const std::string& key, const std::string& expected,
+                                    bool plain);
+
+  YAML::Node node_;
+  std::string name_;
+  std::string file_;
+  std::vector<std::string> asked_;
+};
+
+// Opens the file and hands its top section to `read`, which may throw ConfigError. False with one
+// line in *error if the file cannot be read, is not YAML, or `read` threw.
+[[nodiscard]] bool read_yaml_file(const std::string& path,
+                                  const std::function<void(YamlSection&)>& read,
+                                  std::string* error);
+
+// "a, b, c"
+std::string join(const std::vector<std::string>& words);
+
+}  // namespace alidade

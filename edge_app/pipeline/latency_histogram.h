@@ -1,0 +1,44 @@
+#pragma once
+// LatencyHistogram: quantiles of a positive quantity over any length of time in fixed memory.
+// Buckets grow by 5 % from 1 us to beyond 100 s, so a quantile is right to 5 %; smaller and larger
+// values fall into the first and last bucket. One thread.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+
+namespace alidade {
+
+class LatencyHistogram {
+ public:
+  void add(double seconds) {
+    const double bucket =
+        std::ceil(std::log(std::max(seconds, kLowest) / kLowest) / std::log(kGrowth));
+    ++counts_[static_cast<std::size_t>(std::min(bucket, static_cast<double>(kBuckets - 1)))];
+    ++total_;
+  }
+
+  // Upper edge of the bucket that holds the quantile, s; 0 if nothing was added.
+  [[nodiscard]] double quantile(double fraction) const {
+    if (total_ == 0) return 0;
+    const double wanted = fraction * static_cast<double>(total_);
+    std::int64_t seen = 0;
+    std::size_t bucket = 0;
+    for (; bucket + 1 < kBuckets; ++bucket) {
+      seen += counts_[bucket];
+      if (static_cast<double>(seen) >= wanted) break;
+    }
+    return kLowest * std::pow(kGrowth, static_cast<double>(bucket));
+  }
+
+ private:
+  static constexpr std::size_t kBuckets = 384;
+  static constexpr double kLowest = 1e-6;
+  static constexpr double kGrowth = 1.05;
+  std::array<std::int64_t, kBuckets> counts_{};
+  std::int64_t total_ = 0;
+};
+
+}  // namespace alidade

@@ -1,0 +1,134 @@
+#include "edge_app/pipeline/orientation_step.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace alidade {
+namespace {
+
+OrientationRecord::Orientation to_record(const FrameOrientation& frame) {
+  OrientationRecord::Orientation orientation;
+  orientation.pan_rad = wrap_angle(frame.angle.pan);
+  orientation.tilt_rad = wrap_angle(frame.angle.tilt);
+  orientation.pan_rate_rad_s = frame.rate.pan;
+  orientation.tilt_rate_rad_s = frame.rate.tilt;
+  // q and -q are one rotation: the one with w >= 0 is written.
+  const Eigen::Quaterniond q = frame.quaternion();
+  const double sign = q.w() < 0 ? -1 : 1;
+  orientation.q_base_from_camera = {sign * q.x(), sign * q.y(), sign * q.z(), sign * q.w()};
+  for (std::size_t i = 0; i < orientation.sigma_rad.size(); ++i) {
+    const auto row = static_cast<Eigen::Index>(i);
+    // Rounding may leave a zero variance negative.
+    orientation.sigma_rad[i] = std::sqrt(std::max(frame.orientation_covariance(row, row), 0.0));
+  }
+  return orientation;
+}
+
+}  // namespace
+
+OrientationStep::OrientationStep(const OrientationStepOptions& options)
+    : options_(options),
+      video_clock_(options.video_clock),
+      telemetry_clock_(options.telemetry_clock),
+      telemetry_(empty_telemetry(false)) {}
+
+OrientationStep::Telemetry OrientationStep::empty_telemetry(bool filtered) const {
+  // Filtered times share the error of their line; polled ones have each an error of its own, which a
+  // bound beyond every stamp's sigma says.
+  constexpr double kAllOwn = 1e3;  // s
+  TelemetryNoise noise = options_.telemetry_noise;
+  if (!filtered) noise.period_sigma_s = kAllOwn;
+  return Telemetry(noise, options_.telemetry_limits);
+}
+
+void OrientationStep::add_telemetry(const PanTiltSample& sample) {
+  const std::optional<ClockEstimate> clock = telemetry_clock_.update(
+      sample.latest_time_s, sample.device_time_s, sample.sequence, sample.restarted);
+  const bool filtered = clock.has_value();
+  if (sample.restarted || filtered != telemetry_filtered_ || (clock && clock->restarted)) {
+    telemetry_ = empty_telemetry(filtered);
+    telemetry_filtered_ = filtered;
+  }
+  telemetry_lost_ = false;
+
+  TelemetrySample timed;
+  timed.pan = sample.pan_rad;
+  timed.tilt = sample.tilt_rad;
+  const double width_s = sample.latest_time_s - sample.earliest_time_s;
+  if (clock) {
+    timed.time_s = clock->time_s;
+    timed.time_sigma_s = clock->sigma_s;
+  } else {
+    timed.time_s = sample.latest_time_s - width_s / 2;
+    timed.time_sigma_s = width_s > 0 ? width_s / std::sqrt(12.0) : options_.telemetry_stamp_sigma_s;
+  }
+  // What the buffer refuses (a duplicate, a value that is not finite) it counts, and the records'
+  // sigma says the rest.
+  static_cast<void>(telemetry_.push(timed));
+}
+
+void OrientationStep::telemetry_lost() { telemetry_lost_ = true; }
+
+OrientationRecord OrientationStep::empty_record() const {
+  OrientationRecord record;
+  record.calibrated = options_.calibrated;
+  record.line_delay_s = options_.calibration.line_delay;
+  record.focal_length_px = options_.calibration.camera.focal_length;
+  record.aspect = options_.calibration.camera.aspect;
+  record.radial_distortion = options_.calibration.camera.radial_distortion;
+  return record;
+}
+
+OrientationRecord OrientationStep::video_lost(double now_s) const {
+  OrientationRecord record = empty_record();
+  record.receive_time_s = now_s;
+  record.status = RecordStatus::kVideoLost;
+  return record;
+}
+
+OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, StepEvents* events) {
+  ClockEstimate clock;
+  clock.time_s = stamp.receive_time_s;
+  clock.sigma_s = options_.video_stamp_sigma_s;
+  clock.state = ClockState::kLocked;
+  clock = video_clock_
+              .update(stamp.receive_time_s, stamp.sender_time_s, stamp.sequence, stamp.restarted)
+              .value_or(clock);
+  events->video_clock_restarted = clock.restarted;
+  events->video_floor_shifted = clock.floor_shifted;
+
+  OrientationRecord record = empty_record();
+  record.frame = stamp.frame;
+  record.time_s = clock.time_s;
+  record.receive_time_s = stamp.receive_time_s;
+  FrameOrientation orientation;
+  const QueryStatus query =
+      pt_orientation(options_.calibration, telemetry_, clock.time_s, clock.sigma_s, &orientation);
+  record.status = status_of(query, clock.state == ClockState::kLocked);
+  if (!has_result(query)) return record;
+  record.mode = RecordMode::kPt;
+  record.orientation = to_record(orientation);
+  return record;
+}
+
+RecordStatus OrientationStep::status_of(QueryStatus query, bool clock_locked) const {
+  switch (query) {
+    case QueryStatus::kOk:
+    case QueryStatus::kExtrapolated:
+      return clock_locked ? RecordStatus::kOk : RecordStatus::kClockWarmingUp;
+    case QueryStatus::kEmpty:
+    case QueryStatus::kOneSample:
+      return telemetry_lost_ ? RecordStatus::kTelemetryLost : RecordStatus::kTelemetryMissing;
+    case QueryStatus::kTooNew:
+      return telemetry_lost_ ? RecordStatus::kTelemetryLost : RecordStatus::kTelemetryTooOld;
+    case QueryStatus::kTooOld:
+      return RecordStatus::kFrameBeforeTelemetry;
+    case QueryStatus::kGap:
+      return RecordStatus::kTelemetryGap;
+    case QueryStatus::kNotFinite:
+      break;
+  }
+  return RecordStatus::kNotFinite;
+}
+
+}  // namespace alidade

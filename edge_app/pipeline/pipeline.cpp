@@ -1,0 +1,168 @@
+#include "edge_app/pipeline/pipeline.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <system_error>
+
+#include "edge_app/pipeline/read_loop.h"
+#include "platform/system/clock.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kDropLogInterval = 1;  // s
+
+}  // namespace
+
+Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink,
+                   const PipelineOptions& options)
+    : video_(video),
+      pan_tilt_(pan_tilt),
+      sink_(sink),
+      options_(options),
+      stage_(options.step, options.measure_latency),
+      finished_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  if (finished_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+}
+
+Pipeline::~Pipeline() {
+  stop();
+  ::close(finished_);
+}
+
+void Pipeline::start() {
+  // The consumers first, so that nothing is dropped at the start.
+  threads_.emplace_back(&Pipeline::write_output, this);
+  threads_.emplace_back(&Pipeline::run_realtime, this);
+  threads_.emplace_back(&Pipeline::read_telemetry, this);
+  threads_.emplace_back(&Pipeline::capture, this);
+}
+
+void Pipeline::stop() {
+  // The capture thread's end goes through the queues and ends the others behind it.
+  video_.stop();
+  pan_tilt_.stop();
+  sink_.interrupt();
+  for (std::thread& thread : threads_) thread.join();
+  threads_.clear();
+}
+
+PipelineSummary Pipeline::summary() const {
+  PipelineSummary summary = summary_;
+  summary.drops = stage_.drops();
+  return summary;
+}
+
+void Pipeline::fail(const std::string& error) {
+  {
+    const std::lock_guard<std::mutex> lock(error_mutex_);
+    if (error_.empty()) error_ = error;
+  }
+  finish();
+}
+
+// Fails only if the counter is full, and then the descriptor is readable already.
+void Pipeline::finish() { static_cast<void>(::eventfd_write(finished_, 1)); }
+
+bool Pipeline::check_size(const Frame& frame) {
+  if (options_.width == 0) return true;
+  if (frame.width == options_.width && frame.height == options_.height) return true;
+  fail(
+      fmt::format("{}: frames of {} x {} px, but {} is for {} x {} px; calibrate at this size or "
+                  "set the camera to "
+                  "the calibration's",
+                  video_.name(), frame.width, frame.height, options_.calibration_name,
+                  options_.width, options_.height));
+  return false;
+}
+
+void Pipeline::capture() {
+  const auto on_frame = [this](const Frame& frame) {
+    if (!check_size(frame)) return false;
+    VideoMessage message;
+    message.stamp = frame.stamp;
+    stage_.push(message);
+    return true;
+  };
+  const auto on_loss = [this](double now_s) {
+    VideoMessage message;
+    message.kind = VideoMessage::Kind::kLost;
+    message.time_s = now_s;
+    stage_.push(message);
+  };
+  const std::string error = read_to_the_end<Frame>(video_, on_frame, on_loss);
+  if (!error.empty()) fail(error);
+  stage_.end_input();
+}
+
+void Pipeline::read_telemetry() {
+  const auto on_sample = [this](const PanTiltSample& sample) {
+    stage_.push(TelemetryMessage{TelemetryMessage::Kind::kSample, sample});
+    return true;
+  };
+  const auto on_loss = [this](double) {
+    stage_.push(TelemetryMessage{TelemetryMessage::Kind::kLost, {}});
+  };
+  const std::string error = read_to_the_end<PanTiltSample>(pan_tilt_, on_sample, on_loss);
+  if (!error.empty()) fail(error);
+}
+
+void Pipeline::run_realtime() {
+  // Start-up: the last that may allocate or log on this thread.
+  for (const std::string& warning : apply_realtime(options_.realtime))
+    spdlog::warn("real-time thread: {}", warning);
+  do {
+    stage_.wait();
+  } while (stage_.process());
+}
+
+void Pipeline::write_output() {
+  bool open = true;
+  bool last = false;
+  while (!last) {
+    stage_.wait_output();
+    last = stage_.output_ended();
+    OutputMessage message;
+    while (stage_.pop(message)) {
+      account(message);
+      if (!open) continue;
+      open = sink_.write(message.record);
+      if (open) continue;
+      if (sink_.error().empty()) {
+        finish();
+      } else {
+        fail(sink_.error());
+      }
+    }
+  }
+  finish();
+}
+
+void Pipeline::account(const OutputMessage& message) {
+  ++summary_.records;
+  if (message.record.frame) ++summary_.frames;
+  if (message.record.orientation) ++summary_.with_orientation;
+  if (message.record.frame && message.record.latency_s)
+    summary_.latency.add(*message.record.latency_s);
+  if (message.events.video_clock_restarted) {
+    spdlog::info("{}: clock filter restarted at frame {}", video_.name(), *message.record.frame);
+  }
+  if (message.events.video_floor_shifted) {
+    spdlog::warn("{}: the least delay of the video stepped at frame {}; not followed",
+                 video_.name(), *message.record.frame);
+  }
+  const DropCounters drops = stage_.drops();
+  const double now_s = monotonic_now_s();
+  if (drops.total() == drops_logged_.total() || now_s < drops_logged_at_s_ + kDropLogInterval)
+    return;
+  spdlog::warn("queues full: {} frames, {} telemetry samples, {} records dropped so far",
+               drops.frames, drops.telemetry, drops.records);
+  drops_logged_ = drops;
+  drops_logged_at_s_ = now_s;
+}
+
+}  // namespace alidade

@@ -1,0 +1,94 @@
+#pragma once
+// Pipeline: the threads of `alidade run` between two sources and a sink of records.
+//
+//   capture thread    frame source -> queue       | reads, checks the image size, logs losses
+//   telemetry thread  pan/tilt source -> queue    |
+//   real-time thread  RealtimeStage::process(); scheduled as RealtimeOptions say
+//   output thread     queue -> sink; logs what the real-time thread may not log; counts
+//
+// A source that loses its connection is waited for; records of mode `none` are made at the loss and
+// then each second until it is back. The pipeline is finished when the video has ended, a source
+// has failed for good, or the sink takes no more; stop() ends it at any time.
+// One thread owns the pipeline and calls everything here.
+
+#include <atomic>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "edge_app/pipeline/latency_histogram.h"
+#include "edge_app/pipeline/realtime_stage.h"
+#include "platform/pan_tilt/pan_tilt_source.h"
+#include "platform/system/realtime.h"
+#include "platform/video/frame_source.h"
+
+namespace alidade {
+
+struct PipelineOptions {
+  OrientationStepOptions step;
+  RealtimeOptions realtime;
+  // Frames of any other size end the pipeline with an error that names calibration_name. 0: any.
+  int width = 0;
+  int height = 0;
+  std::string calibration_name;
+  bool measure_latency = true;  // false for a recording, whose stamps are of another clock
+};
+
+struct PipelineSummary {
+  std::int64_t records = 0;
+  std::int64_t frames = 0;
+  std::int64_t with_orientation = 0;
+  DropCounters drops;
+  LatencyHistogram latency;
+};
+
+class Pipeline {
+ public:
+  // Borrows all three until it is destroyed.
+  Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink,
+           const PipelineOptions& options);
+  ~Pipeline();
+  Pipeline(const Pipeline&) = delete;
+  Pipeline& operator=(const Pipeline&) = delete;
+
+  void start();
+
+  // A descriptor that polls readable once the pipeline is finished.
+  [[nodiscard]] int finished_fd() const { return finished_; }
+
+  // Ends the threads and waits for them; records on their way are still written.
+  void stop();
+
+  // After stop(): why it failed, one line; empty if it did not.
+  [[nodiscard]] const std::string& error() const { return error_; }
+  // After stop().
+  [[nodiscard]] PipelineSummary summary() const;
+
+ private:
+  void capture();
+  void read_telemetry();
+  void run_realtime();
+  void write_output();
+  void account(const OutputMessage& message);
+  bool check_size(const Frame& frame);
+  void fail(const std::string& error);
+  void finish();
+
+  FrameSource& video_;
+  PanTiltSource& pan_tilt_;
+  RecordSink& sink_;
+  PipelineOptions options_;
+  RealtimeStage stage_;
+  int finished_;               // eventfd
+  std::mutex error_mutex_;     // the first of several threads to fail is heard; not on the
+  std::string error_;          // real-time thread
+  PipelineSummary summary_;    // output thread
+  DropCounters drops_logged_;  // output thread
+  double drops_logged_at_s_ = 0;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,59 @@
+#pragma once
+// read_to_the_end: what a capture or telemetry thread does with its source, from the first item to the
+// last, over losses of the connection. Logs each loss and return. Allocates and waits: never on the
+// real-time thread.
+
+#include <spdlog/spdlog.h>
+
+#include <limits>
+#include <string>
+
+#include "platform/system/clock.h"
+#include "platform/video/frame_source.h"  // ReadStatus
+
+namespace alidade {
+
+// Item: Frame or PanTiltSample. on_item(item) returns false to end. on_loss(now_s) is called at a loss
+// and then each second until the next item. Returns the source's error if it failed for good.
+template <typename Item, typename Source, typename OnItem, typename OnLoss>
+std::string read_to_the_end(Source& source, const OnItem& on_item, const OnLoss& on_loss) {
+  constexpr double kReadTimeout = 0.2;  // s; bounds how late a notice of a loss can be
+  constexpr double kNoticePeriod = 1;   // s
+  bool lost = false;
+  double next_notice_s = 0;
+  std::string said;
+  Item item;
+  while (true) {
+    switch (source.read(item, kReadTimeout)) {
+      case ReadStatus::kOk:
+        if (lost) spdlog::info("{}: connected again", source.name());
+        lost = false;
+        said.clear();
+        if (!on_item(item)) return "";
+        break;
+      case ReadStatus::kDisconnected:
+        // Each attempt to reconnect fails with much the same words: say them once.
+        if (source.error() != said) {
+          said = source.error();
+          spdlog::warn("{}; trying again", said);
+        }
+        if (!lost) next_notice_s = -std::numeric_limits<double>::infinity();
+        lost = true;
+        break;
+      case ReadStatus::kTimeout:
+        break;
+      case ReadStatus::kFailed:
+        return source.error();
+      case ReadStatus::kEnd:
+      case ReadStatus::kStopped:
+        return "";
+    }
+    const double now = monotonic_now_s();
+    if (lost && now >= next_notice_s) {
+      on_loss(now);
+      next_notice_s = now + kNoticePeriod;
+    }
+  }
+}
+
+}  // namespace alidade

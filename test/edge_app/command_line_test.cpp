@@ -1,0 +1,496 @@
+// The executable as a person meets it: exit codes, one-line errors, and a replay whose truth comes from
+// this file's own model of a crooked pan/tilt head, independent of core's.
+
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <netinet/in.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "test/edge_app/process.h"
+#include "test/support/temporary_directory.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::AnyOf;
+using ::testing::EndsWith;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+struct Result {
+  int exit_code;
+  std::string output;
+  std::string errors;
+};
+
+std::vector<std::string> command(const std::vector<std::string>& arguments) {
+  std::vector<std::string> all = {ALIDADE_EXECUTABLE};
+  all.insert(all.end(), arguments.begin(), arguments.end());
+  return all;
+}
+
+Result alidade(const std::vector<std::string>& arguments) {
+  Process process(command(arguments));
+  std::string output = process.read_all();
+  const int exit_code = process.wait();
+  return {exit_code, std::move(output), process.errors()};
+}
+
+// A port of the loopback on which nobody listens.
+int refusing_port() {
+  const int descriptor = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in address{};
+  address.sin_family = AF_INET;
+  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  socklen_t size = sizeof address;
+  auto* generic = reinterpret_cast<sockaddr*>(&address);
+  EXPECT_EQ(::bind(descriptor, generic, size), 0);
+  EXPECT_EQ(::getsockname(descriptor, generic, &size), 0);
+  ::close(descriptor);
+  return ntohs(address.sin_port);
+}
+
+using Vector = std::array<double, 3>;
+
+// v turned by angle about a unit axis (Rodrigues).
+Vector turn(const Vector& axis, double angle, const Vector& v) {
+  const double c = std::cos(angle);
+  const double s = std::sin(angle);
+  const double along = axis[0] * v[0] + axis[1] * v[1] + axis[2] * v[2];
+  const Vector cross = {axis[1] * v[2] - axis[2] * v[1], axis[2] * v[0] - axis[0] * v[2],
+                        axis[0] * v[1] - axis[1] * v[0]};
+  Vector turned{};
+  for (std::size_t i = 0; i < 3; ++i) {
+    turned[i] = c * v[i] + s * cross[i] + (1 - c) * along * axis[i];
+  }
+  return turned;
+}
+
+// v turned by a unit quaternion x, y, z, w.
+Vector turn_by_quaternion(const std::array<double, 4>& q, const Vector& v) {
+  const double norm = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2]);
+  if (norm == 0) return v;
+  return turn({q[0] / norm, q[1] / norm, q[2] / norm}, 2 * std::atan2(norm, q[3]), v);
+}
+
+// A crooked head on a slow, smooth path, and how it is recorded.
+struct CrookedHead {
+  Vector pan_axis = {0.012, -0.008, std::sqrt(1 - 0.012 * 0.012 - 0.008 * 0.008)};
+  Vector tilt_axis = {0.014, std::sqrt(1 - 0.014 * 0.014 - 0.006 * 0.006), -0.006};
+  double pan_scale = 1.01;
+  double tilt_scale = 0.99;
+  double clock_offset = -0.0844;
+  double line_delay = -14.2e-6;
+
+  [[nodiscard]] double pan(double t) const { return 1.1 + 0.3 * std::sin(0.7 * t); }
+  [[nodiscard]] double tilt(double t) const { return -0.2 + 0.1 * std::cos(0.5 * t); }
+
+  // Camera axis `which` (0 right, 1 down, 2 forward) in the base at image time t.
+  [[nodiscard]] Vector camera_axis(std::size_t which, double t) const {
+    const std::array<Vector, 3> at_rest = {{{0, 1, 0}, {0, 0, 1}, {1, 0, 0}}};
+    return turn(pan_axis, pan(t), turn(tilt_axis, tilt(t), at_rest[which]));
+  }
+
+  [[nodiscard]] std::string calibration(int width = 1920, int height = 1080) const {
+    std::ostringstream text;
+    text.precision(17);
+    text << "format: 1\nimage: {width: " << width << ", height: " << height << "}\n"
+         << "focal_length: {value: 32008}\naspect: {value: 1}\nradial_distortion: {value: 55.4}\n"
+         << "line_delay: {value: " << line_delay << "}\nclock_offset: {value: " << clock_offset
+         << "}\n"
+         << "pan_axis: {value: [" << pan_axis[0] << ", " << pan_axis[1] << ", " << pan_axis[2]
+         << "]}\n"
+         << "tilt_axis: {value: [" << tilt_axis[0] << ", " << tilt_axis[1] << ", " << tilt_axis[2]
+         << "]}\n"
+         << "pan_scale: {value: " << pan_scale << "}\ntilt_scale: {value: " << tilt_scale << "}\n";
+    return text.str();
+  }
+
+  static double frame_time(int frame) { return 10 + 0.04 * frame; }
+
+  // `frames` frames and 100 Hz telemetry, whose stamp of the head's state at image time t is t + d.
+  void record(const TemporaryDirectory& directory, int frames) const {
+    directory.write("recording.yaml", "format: 1\nwidth: 1920\nheight: 1080\n");
+    std::ostringstream frames_csv;
+    frames_csv.precision(17);
+    frames_csv << "frame,receive_time_s\n";
+    for (int i = 0; i < frames; ++i) frames_csv << i << "," << frame_time(i) << "\n";
+    directory.write("frames.csv", frames_csv.str());
+    directory.write("tracks.csv", "frame,landmark,u_px,v_px,sigma_px\n");
+    std::ostringstream telemetry;
+    telemetry.precision(17);
+    telemetry << "receive_time_s,pan_rad,tilt_rad,earliest_time_s\n";
+    for (double t = 9.5; t < frame_time(frames) + 0.5; t += 0.01) {
+      const double stamp = t + clock_offset;
+      telemetry << stamp + 0.001 << "," << pan_scale * pan(t) << "," << tilt_scale * tilt(t) << ","
+                << stamp - 0.001 << "\n";
+    }
+    directory.write("telemetry.csv", telemetry.str());
+  }
+};
+
+std::vector<std::map<std::string, std::string>> read_csv(const std::string& text) {
+  const auto split = [](const std::string& line) {
+    std::vector<std::string> cells;
+    std::istringstream stream(line + ",");
+    for (std::string cell; std::getline(stream, cell, ',');) cells.push_back(cell);
+    return cells;
+  };
+  std::istringstream stream(text);
+  std::string line;
+  std::getline(stream, line);
+  const std::vector<std::string> names = split(line);
+  std::vector<std::map<std::string, std::string>> rows;
+  while (std::getline(stream, line)) {
+    const std::vector<std::string> cells = split(line);
+    EXPECT_EQ(cells.size(), names.size()) << line;
+    std::map<std::string, std::string> row;
+    for (std::size_t i = 0; i < std::min(cells.size(), names.size()); ++i) row[names[i]] = cells[i];
+    rows.push_back(row);
+  }
+  return rows;
+}
+
+TEST(CommandLine, HelpAndVersionGoToStdout) {
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"--help"},
+                                                    {"run", "--help"},
+                                                    {"record", "--help"},
+                                                    {"replay", "--help"},
+                                                    {"check", "--help"}}) {
+    const Result result = alidade(arguments);
+    EXPECT_EQ(result.exit_code, 0);
+    EXPECT_THAT(result.output, HasSubstr("Usage: alidade"));
+    EXPECT_THAT(result.errors, IsEmpty());
+  }
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{"--version"},
+                                                    {"run", "--version"},
+                                                    {"record", "--version"},
+                                                    {"replay", "--version"},
+                                                    {"check", "--version"}}) {
+    const Result result = alidade(arguments);
+    EXPECT_EQ(result.exit_code, 0);
+    EXPECT_THAT(result.output, StartsWith("alidade "));
+  }
+}
+
+TEST(CommandLine, BadUsageIsOneLineAndExitCodeTwo) {
+  for (const std::vector<std::string>& arguments : {std::vector<std::string>{},
+                                                    {"fly"},
+                                                    {"run"},
+                                                    {"run", "-c", "x", "--json", "--csv"},
+                                                    {"replay"},
+                                                    {"record", "-c", "x"},
+                                                    {"check", "-c", "x", "--duration", "-3"},
+                                                    {"run", "-c", "none.yaml"},
+                                                    {"check", "-c", "none.yaml"}}) {
+    const Result result = alidade(arguments);
+    EXPECT_EQ(result.exit_code, 2) << result.errors;
+    EXPECT_THAT(result.errors, StartsWith("alidade: "));
+    EXPECT_EQ(result.errors.find('\n'), result.errors.size() - 1) << result.errors;
+    EXPECT_THAT(result.output, IsEmpty());
+  }
+}
+
+class CommandLineTest : public ::testing::Test {
+ protected:
+  // A configuration of recorded streams, which needs no camera.
+  std::string recorded_config(const std::string& more = "") {
+    return directory_.write("alidade.yaml",
+                            "video: {type: recording, directory: .}\n"
+                            "pan_tilt: {type: recording, directory: .}\n"
+                            "calibration: {file: calibration.yaml}\n" +
+                                more);
+  }
+  std::string live_config() {
+    const std::string port = std::to_string(refusing_port());
+    return directory_.write("alidade.yaml",
+                            "video: {type: rtsp, url: 'rtsp://127.0.0.1:" + port + "/stream'}\n" +
+                                "pan_tilt: {type: vapix, url: 'http://127.0.0.1:" + port + "'}\n" +
+                                "camera: {focal_length_px: 30000}\n");
+  }
+  std::string path(const std::string& name) { return directory_.path() + "/" + name; }
+
+  TemporaryDirectory directory_;
+  CrookedHead head_;
+};
+
+TEST_F(CommandLineTest, ConfigurationMistakesAreNamedWithTheirLine) {
+  const std::string config = recorded_config("realtime: {prioritty: 60}\n");
+  for (const char* name : {"run", "check"}) {
+    const Result result = alidade({name, "-c", config});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.errors,
+                StartsWith("alidade: " + config + ":4: realtime.prioritty: unknown key"));
+  }
+}
+
+TEST_F(CommandLineTest, MissingCalibrationIsABadConfiguration) {
+  head_.record(directory_, 10);
+  const Result result = alidade({"run", "-c", recorded_config()});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr(path("calibration.yaml")));
+}
+
+TEST_F(CommandLineTest, CheckNamesAnUnreachableCameraByItsAddress) {
+  const Result result = alidade({"check", "-c", live_config()});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("alidade: rtsp://127.0.0.1:"),
+                                   HasSubstr("alidade: http://127.0.0.1:")));
+  EXPECT_THAT(result.output, AllOf(HasSubstr("configuration"), HasSubstr("failed")));
+}
+
+TEST_F(CommandLineTest, RunGoesOnWithoutACameraAndSaysNone) {
+  Process process(command({"run", "-c", live_config()}));
+  const auto record = nlohmann::json::parse(process.read_line());
+  EXPECT_EQ(record["mode"], "none");
+  EXPECT_EQ(record["status"], "video lost");
+  EXPECT_TRUE(record["frame"].is_null());
+  EXPECT_EQ(record["calibrated"], false);
+  process.send(SIGTERM);
+  static_cast<void>(process.read_all());
+  EXPECT_EQ(process.wait(), 0) << process.errors();
+}
+
+TEST_F(CommandLineTest, RecordWithoutACameraFailsAndStoresNoRecording) {
+  const Result result =
+      alidade({"record", "-c", live_config(), "-o", path("new"), "--duration", "0.1"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, HasSubstr("no frame came"));
+  EXPECT_FALSE(std::filesystem::exists(path("new/recording.yaml")));
+}
+
+TEST_F(CommandLineTest, RecordRefusesADirectoryThatHoldsARecording) {
+  directory_.write("old/frames.csv", "frame,receive_time_s\n");
+  const Result result = alidade({"record", "-c", live_config(), "-o", path("old")});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, AllOf(HasSubstr(path("old")), HasSubstr("already holds a recording")));
+  EXPECT_EQ(directory_.read("old/frames.csv"), "frame,receive_time_s\n");
+}
+
+TEST_F(CommandLineTest, ReplayGivesTheTrueOrientationOfACrookedHead) {
+  constexpr int kFrames = 250;
+  head_.record(directory_, kFrames);
+  directory_.write("alidade/calibration.yaml", head_.calibration());
+  const Result result = alidade({"replay", directory_.path()});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.output, IsEmpty());
+  const auto rows = read_csv(directory_.read("alidade/orientation.csv"));
+  ASSERT_EQ(rows.size(), static_cast<std::size_t>(kFrames));
+  for (int i = 0; i < kFrames; ++i) {
+    const std::map<std::string, std::string>& row = rows[static_cast<std::size_t>(i)];
+    ASSERT_EQ(row.at("mode"), "PT") << i;
+    const auto number = [&row](const char* name) { return std::stod(row.at(name)); };
+    const double t = head_.frame_time(i);
+    EXPECT_EQ(number("time_s"), t);
+    EXPECT_EQ(row.at("calibrated"), "true");
+    EXPECT_EQ(row.at("latency_s"), "");
+    // Without noise the angles of the middle row are exact but for the interpolation. Row 0 is half
+    // the read-out, 7.7 ms, away at a constant rate: half the acceleration (0.15 rad/s^2) times the
+    // square of that is 4.4e-6 rad.
+    const double to_middle_s = 540 * number("line_delay_s");
+    const double middle = t + to_middle_s;
+    EXPECT_NEAR(number("pan_rad") + to_middle_s * number("pan_rate_rad_s"), head_.pan(middle), 1e-7)
+        << i;
+    EXPECT_NEAR(number("tilt_rad") + to_middle_s * number("tilt_rate_rad_s"), head_.tilt(middle),
+                1e-7)
+        << i;
+    EXPECT_NEAR(number("pan_rate_rad_s"), 0.3 * 0.7 * std::cos(0.7 * middle), 1e-4) << i;
+    const std::array<double, 4> q = {number("q_x"), number("q_y"), number("q_z"), number("q_w")};
+    const std::array<Vector, 3> axes = {{{1, 0, 0}, {0, 1, 0}, {0, 0, 1}}};
+    for (std::size_t which = 0; which < 3; ++which) {
+      const Vector stated = turn_by_quaternion(q, axes[which]);
+      const Vector truth = head_.camera_axis(which, t);
+      for (std::size_t j = 0; j < 3; ++j) EXPECT_NEAR(stated[j], truth[j], 5e-6) << i << which << j;
+    }
+  }
+}
+
+TEST_F(CommandLineTest, ReplayGivesTheSameBytesAtAnySpeed) {
+  head_.record(directory_, 25);
+  const std::string calibration = directory_.write("c.yaml", head_.calibration());
+  for (const char* where : {"a", "b"}) {
+    const Result result =
+        alidade({"replay", directory_.path(), "--calibration", calibration, "-o", path(where)});
+    ASSERT_EQ(result.exit_code, 0) << result.errors;
+  }
+  const Result paced = alidade({"replay", directory_.path(), "--calibration", calibration, "-o",
+                                path("c"), "--realtime", "--csv"});
+  ASSERT_EQ(paced.exit_code, 0) << paced.errors;
+  const std::string once = directory_.read("a/orientation.csv");
+  EXPECT_THAT(once, Not(IsEmpty()));
+  EXPECT_EQ(directory_.read("b/orientation.csv"), once);
+  EXPECT_EQ(directory_.read("c/orientation.csv"), once);
+  EXPECT_EQ(paced.output, once);
+}
+
+TEST_F(CommandLineTest, ReplayWithoutACalibrationSaysWhatToDo) {
+  head_.record(directory_, 5);
+  const Result result = alidade({"replay", directory_.path()});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("--calibration FILE"));
+}
+
+TEST_F(CommandLineTest, ReplayRefusesACalibrationOfAnotherSize) {
+  head_.record(directory_, 5);
+  directory_.write("alidade/calibration.yaml", head_.calibration(1280, 720));
+  const Result result = alidade({"replay", directory_.path()});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920 x 1080"), HasSubstr("1280 x 720")));
+  EXPECT_FALSE(std::filesystem::exists(path("alidade/orientation.csv")));
+}
+
+TEST_F(CommandLineTest, ReplayNamesFileAndLineOfDamagedTables) {
+  head_.record(directory_, 5);
+  directory_.write("alidade/calibration.yaml", head_.calibration());
+  directory_.write("telemetry.csv",
+                   "receive_time_s,pan_rad,tilt_rad\n9.9,0.1,0.2\n10.1,east,0.2\n");
+  Result result = alidade({"replay", directory_.path()});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, HasSubstr("telemetry.csv:3: "));
+  directory_.write("telemetry.csv", "receive_time_s,pan_rad,tilt_rad\n9.9,0.1,0.2\n10.1,0.");
+  result = alidade({"replay", directory_.path()});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, HasSubstr("telemetry.csv"));
+  EXPECT_FALSE(std::filesystem::exists(path("alidade/orientation.csv")));
+  EXPECT_FALSE(std::filesystem::exists(path("alidade/orientation.csv.partial")));
+}
+
+TEST_F(CommandLineTest, ReplayOfAMissingDirectoryNamesIt) {
+  const Result result = alidade({"replay", path("nowhere")});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, HasSubstr(path("nowhere")));
+}
+
+TEST_F(CommandLineTest, ReplaySaysNoneWithZeroOrOneSample) {
+  head_.record(directory_, 5);
+  directory_.write("alidade/calibration.yaml", head_.calibration());
+  for (const char* row : {"", "10.0,0.1,0.2\n"}) {
+    directory_.write("telemetry.csv", std::string("receive_time_s,pan_rad,tilt_rad\n") + row);
+    const Result result = alidade({"replay", directory_.path()});
+    ASSERT_EQ(result.exit_code, 0) << result.errors;
+    const auto rows = read_csv(directory_.read("alidade/orientation.csv"));
+    ASSERT_EQ(rows.size(), 5U);
+    for (const auto& record : rows) {
+      EXPECT_EQ(record.at("mode"), "none");
+      EXPECT_EQ(record.at("status"), "too little telemetry");
+      EXPECT_EQ(record.at("pan_rad"), "");
+    }
+  }
+}
+
+TEST_F(CommandLineTest, ReplayOfEqualAndJumpingStampsGivesARecordForEach) {
+  head_.record(directory_, 5);
+  directory_.write("alidade/calibration.yaml", head_.calibration());
+  directory_.write(
+      "frames.csv",
+      "frame,receive_time_s,sender_time_s,sequence\n"
+      "0,10.0,5,0\n1,10.0,5,0\n2,10.04,5,0\n3,9.0,900000,-7\n4,10.1,5.1,2\n5,1e9,5.2,3\n");
+  const Result result = alidade({"replay", directory_.path()});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  const auto rows = read_csv(directory_.read("alidade/orientation.csv"));
+  ASSERT_EQ(rows.size(), 6U);
+  for (const auto& record : rows) {
+    EXPECT_TRUE(std::isfinite(std::stod(record.at("time_s"))));
+    EXPECT_EQ(record.at("mode") == "PT", !record.at("pan_rad").empty());
+  }
+}
+
+TEST_F(CommandLineTest, RunOverARecordingEndsWithItAndGivesEachFrame) {
+  head_.record(directory_, 25);
+  directory_.write("calibration.yaml", head_.calibration());
+  const Result result = alidade({"run", "-c", recorded_config()});
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  std::istringstream lines(result.output);
+  int frames = 0;
+  for (std::string line; std::getline(lines, line); ++frames) {
+    const auto record = nlohmann::json::parse(line);
+    EXPECT_EQ(record["frame"], frames);
+    EXPECT_TRUE(record["latency_s"].is_null());
+  }
+  EXPECT_EQ(frames, 25);
+  EXPECT_THAT(result.errors, HasSubstr("25 frames"));
+}
+
+TEST_F(CommandLineTest, RunEndsWhenFramesAreNotOfTheCalibrationsSize) {
+  head_.record(directory_, 25);
+  directory_.write("calibration.yaml", head_.calibration(1280, 720));
+  const Result result = alidade({"run", "-c", recorded_config()});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920 x 1080"), HasSubstr("1280 x 720")));
+}
+
+TEST_F(CommandLineTest, CheckReportsBothStreamsAndTheSizes) {
+  head_.record(directory_, 100);
+  directory_.write("calibration.yaml", head_.calibration());
+  Result result = alidade({"check", "-c", recorded_config(), "--duration", "0.5"});
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.output, AllOf(HasSubstr("1920 x 1080 px (as calibrated), 25.00 Hz"),
+                                   HasSubstr("100.00 Hz"), HasSubstr("known to 2.0 ms")));
+  directory_.write("calibration.yaml", head_.calibration(1280, 720));
+  result = alidade({"check", "-c", recorded_config(), "--duration", "0.5"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920 x 1080"), HasSubstr("1280 x 720")));
+}
+
+// Streams of an hour, so that only the event under test ends the program.
+class EndlessRunTest : public CommandLineTest {
+ protected:
+  void SetUp() override {
+    head_.record(directory_, 2);
+    directory_.write("calibration.yaml", head_.calibration());
+    std::ostringstream frames;
+    frames << "frame,receive_time_s\n";
+    for (int i = 0; i < 90000; ++i) frames << i << "," << 0.04 * i << "\n";
+    directory_.write("frames.csv", frames.str());
+  }
+};
+
+TEST_F(EndlessRunTest, SignalsEndItCleanly) {
+  for (const int signal : {SIGINT, SIGTERM}) {
+    Process process(command({"run", "-c", recorded_config(), "--csv"}));
+    EXPECT_THAT(process.read_line(), StartsWith("frame,time_s"));
+    EXPECT_THAT(process.read_line(), StartsWith("0,"));
+    process.send(signal);
+    EXPECT_THAT(process.read_all(), AnyOf(IsEmpty(), EndsWith("\n")));  // no half record
+    EXPECT_EQ(process.wait(), 0) << process.errors();
+    EXPECT_THAT(process.errors(), HasSubstr("frames"));
+  }
+}
+
+TEST_F(EndlessRunTest, EndsCleanlyWhenTheReaderGoes) {
+  Process process(command({"run", "-c", recorded_config()}));
+  EXPECT_THAT(process.read_line(), Not(IsEmpty()));
+  process.close_output();
+  EXPECT_EQ(process.wait(), 0) << process.errors();
+}
+
+TEST_F(EndlessRunTest, EndsAfterTheTimeAskedFor) {
+  const Result result = alidade({"run", "-c", recorded_config(), "--duration", "0.3"});
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+}
+
+TEST_F(EndlessRunTest, AFullDiskIsAFailure) {
+  const std::string shell =
+      "exec '" ALIDADE_EXECUTABLE "' run -c '" + recorded_config() + "' > /dev/full";
+  Process process({"/bin/sh", "-c", shell});
+  EXPECT_EQ(process.wait(), 1);
+  EXPECT_THAT(process.errors(), HasSubstr("stdout: cannot write a record: No space left"));
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,313 @@
+// The configuration is strict: whatever is wrong is refused in one line that names file, line and key.
+
+#include "edge_app/config/config.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <string>
+
+#include "edge_app/config/noise_file.h"
+#include "test/support/temporary_directory.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+// The smallest configuration that works; line numbers of the cases count from its end (line 3).
+constexpr char kMinimal[] =
+    "video: {type: rtsp, url: rtsp://camera/stream}\n"
+    "pan_tilt: {type: vapix, url: http://camera}\n"
+    "calibration: {file: calibration.yaml}\n";
+
+class ConfigTest : public ::testing::Test {
+ protected:
+  // Returns the error; empty if the text was accepted.
+  std::string load(const std::string& text) {
+    path_ = directory_.write("alidade.yaml", text);
+    std::string error;
+    const bool ok = load_config(path_, &config_, &error);
+    EXPECT_EQ(ok, error.empty());
+    EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+    return error;
+  }
+
+  TemporaryDirectory directory_;
+  std::string path_;
+  Config config_;
+};
+
+TEST_F(ConfigTest, MinimalConfigurationHasTheDocumentedDefaults) {
+  ASSERT_THAT(load(kMinimal), IsEmpty());
+  EXPECT_EQ(config_.video.type, VideoConfig::Type::kRtsp);
+  EXPECT_EQ(config_.video.url, "rtsp://camera/stream");
+  EXPECT_EQ(config_.video.transport, VideoConfig::Transport::kTcp);
+  EXPECT_EQ(config_.pan_tilt.url, "http://camera");
+  EXPECT_EQ(config_.pan_tilt.rate_hz, 30);
+  EXPECT_FALSE(config_.pan_tilt.angle_sigma_rad);
+  EXPECT_EQ(config_.realtime.priority, 0);
+  EXPECT_EQ(config_.realtime.cpu, -1);
+  EXPECT_FALSE(config_.realtime.lock_memory);
+  EXPECT_EQ(config_.output, OutputFormat::kJson);
+  EXPECT_THAT(config_.warnings, IsEmpty());
+}
+
+TEST_F(ConfigTest, RelativePathsStartAtTheConfigurationsFolder) {
+  ASSERT_THAT(load(kMinimal), IsEmpty());
+  EXPECT_EQ(config_.calibration.file, directory_.path() + "/calibration.yaml");
+}
+
+TEST_F(ConfigTest, EveryKeyIsRead) {
+  ::setenv("ALIDADE_TEST_PASSWORD", "secret", 1);
+  ASSERT_THAT(
+      load("video: {type: rtsp, url: 'rtsp://camera/s', transport: udp, user: eve,\n"
+           "        password_env: ALIDADE_TEST_PASSWORD, timeout_s: 2.5, max_backoff_s: 8}\n"
+           "pan_tilt: {type: vapix, url: 'https://camera', user: eve, camera: 2, rate_hz: 12.5,\n"
+           "           password_env: ALIDADE_TEST_PASSWORD, timeout_s: 0.5, max_backoff_s: 9,\n"
+           "           angle_sigma_rad: 2e-5, angle_quantum_rad: 1e-4}\n"
+           "camera: {focal_length_px: 30000, aspect: 1.01, radial_distortion: -2.5,\n"
+           "         line_delay_s: 1.5e-5, upside_down: true, zoom: fixed}\n"
+           "calibration: {file: /etc/c.yaml, auto: false}\n"
+           "realtime: {mode: PT, priority: 60, cpu: 3, lock_memory: true, max_extrapolation_s: "
+           "0.5}\n"
+           "output: {csv: true, json: false}\n"),
+      IsEmpty());
+  EXPECT_EQ(config_.video.transport, VideoConfig::Transport::kUdp);
+  EXPECT_EQ(config_.video.user, "eve");
+  EXPECT_EQ(config_.video.password, "secret");
+  EXPECT_EQ(config_.video.timeout_s, 2.5);
+  EXPECT_EQ(config_.video.max_backoff_s, 8);
+  EXPECT_EQ(config_.pan_tilt.camera, 2);
+  EXPECT_EQ(config_.pan_tilt.rate_hz, 12.5);
+  EXPECT_EQ(config_.pan_tilt.password, "secret");
+  EXPECT_EQ(config_.pan_tilt.timeout_s, 0.5);
+  EXPECT_EQ(config_.pan_tilt.max_backoff_s, 9);
+  EXPECT_EQ(config_.pan_tilt.angle_sigma_rad, 2e-5);
+  EXPECT_EQ(config_.pan_tilt.angle_quantum_rad, 1e-4);
+  EXPECT_EQ(config_.camera.focal_length_px, 30000);
+  EXPECT_EQ(config_.camera.aspect, 1.01);
+  EXPECT_EQ(config_.camera.radial_distortion, -2.5);
+  EXPECT_EQ(config_.camera.line_delay_s, 1.5e-5);
+  EXPECT_TRUE(config_.camera.upside_down);
+  EXPECT_EQ(config_.calibration.file, "/etc/c.yaml");
+  EXPECT_EQ(config_.realtime.priority, 60);
+  EXPECT_EQ(config_.realtime.cpu, 3);
+  EXPECT_TRUE(config_.realtime.lock_memory);
+  EXPECT_EQ(config_.realtime.max_extrapolation_s, 0.5);
+  EXPECT_EQ(config_.output, OutputFormat::kCsv);
+}
+
+TEST_F(ConfigTest, RecordingAndRtpSourcesAreRead) {
+  ASSERT_THAT(load("video: {type: recording, directory: tour}\n"
+                   "pan_tilt: {type: recording, directory: /tour}\n"
+                   "camera: {focal_length_px: 1000}\n"),
+              IsEmpty());
+  EXPECT_EQ(config_.video.directory, directory_.path() + "/tour");
+  EXPECT_EQ(config_.pan_tilt.directory, "/tour");
+  ASSERT_THAT(load("video: {type: rtp, url: 'rtp://@:5004', format: H264}\n"
+                   "pan_tilt: {type: vapix, url: http://camera}\n"
+                   "camera: {focal_length_px: 1000}\n"),
+              IsEmpty());
+  EXPECT_EQ(config_.video.format, "H264");
+  ASSERT_THAT(load("video: {type: rtp, url: camera.sdp}\n"
+                   "pan_tilt: {type: vapix, url: http://camera}\n"
+                   "camera: {focal_length_px: 1000}\n"),
+              IsEmpty());
+  EXPECT_EQ(config_.video.url, directory_.path() + "/camera.sdp");
+}
+
+TEST_F(ConfigTest, AutomaticCalibrationWarnsThatItIsNotAvailable) {
+  ASSERT_THAT(load("video: {type: rtsp, url: rtsp://camera/stream}\n"
+                   "pan_tilt: {type: vapix, url: http://camera}\n"
+                   "calibration:\n  file: c.yaml\n  auto: true\n"),
+              IsEmpty());
+  ASSERT_EQ(config_.warnings.size(), 1U);
+  EXPECT_THAT(config_.warnings[0], StartsWith(path_ + ":5: calibration.auto: "));
+}
+
+TEST_F(ConfigTest, TheExampleIsReadAndShowsTheDefaults) {
+  ::setenv("CAMERA_PASSWORD", "secret", 1);
+  Config example;
+  std::string error;
+  ASSERT_TRUE(load_config(ALIDADE_EXAMPLE, &example, &error)) << error;
+  ASSERT_THAT(load(kMinimal), IsEmpty());
+  EXPECT_EQ(example.video.timeout_s, config_.video.timeout_s);
+  EXPECT_EQ(example.video.max_backoff_s, config_.video.max_backoff_s);
+  EXPECT_EQ(example.pan_tilt.rate_hz, config_.pan_tilt.rate_hz);
+  EXPECT_EQ(example.pan_tilt.timeout_s, config_.pan_tilt.timeout_s);
+  EXPECT_EQ(example.pan_tilt.max_backoff_s, config_.pan_tilt.max_backoff_s);
+  EXPECT_EQ(example.pan_tilt.angle_quantum_rad, config_.pan_tilt.angle_quantum_rad);
+  EXPECT_EQ(example.pan_tilt.acceleration_sigma_rad_s2, config_.pan_tilt.acceleration_sigma_rad_s2);
+  EXPECT_EQ(example.pan_tilt.max_repeat_s, config_.pan_tilt.max_repeat_s);
+  EXPECT_EQ(example.camera.aspect, config_.camera.aspect);
+  EXPECT_EQ(example.camera.line_delay_s, config_.camera.line_delay_s);
+  EXPECT_EQ(example.realtime.priority, config_.realtime.priority);
+  EXPECT_EQ(example.realtime.max_extrapolation_s, config_.realtime.max_extrapolation_s);
+}
+
+TEST_F(ConfigTest, MissingFileAndDirectoryInItsPlaceAreRefused) {
+  std::string error;
+  EXPECT_FALSE(load_config(directory_.path() + "/none.yaml", &config_, &error));
+  EXPECT_THAT(error, StartsWith(directory_.path() + "/none.yaml: cannot be read"));
+  EXPECT_FALSE(load_config(directory_.path(), &config_, &error));
+  EXPECT_THAT(error, StartsWith(directory_.path() + ": cannot be read"));
+}
+
+TEST_F(ConfigTest, EmptyFileLacksSections) {
+  const std::string error = load("");
+  EXPECT_EQ(error, path_ + ": section 'video' is missing; add it");
+}
+
+TEST_F(ConfigTest, PasswordStaysOutOfEveryError) {
+  ::setenv("ALIDADE_TEST_PASSWORD", "open-sesame", 1);
+  const std::string error = load(
+      "video: {type: rtsp, url: rtsp://camera/s, user: u, password_env: ALIDADE_TEST_PASSWORD, x: "
+      "1}\n"
+      "pan_tilt: {type: vapix, url: http://camera}\n");
+  EXPECT_THAT(error, Not(IsEmpty()));
+  EXPECT_THAT(error, Not(HasSubstr("open-sesame")));
+}
+
+// One mistake, where it is, and words that the message must hold.
+struct Mistake {
+  const char* name;
+  const char* text;   // of the file
+  const char* where;  // ":LINE: KEY" or ": " for the file as a whole
+  const char* saying;
+};
+
+void PrintTo(const Mistake& mistake, std::ostream* out) { *out << mistake.name; }
+
+class ConfigMistake : public ConfigTest, public ::testing::WithParamInterface<Mistake> {};
+
+TEST_P(ConfigMistake, IsNamedWithItsLine) {
+  const Mistake& mistake = GetParam();
+  const std::string error = load(mistake.text);
+  EXPECT_THAT(error, StartsWith(path_ + mistake.where));
+  EXPECT_THAT(error, HasSubstr(mistake.saying));
+}
+
+#define VIDEO "video: {type: rtsp, url: rtsp://camera/stream}\n"
+#define PAN_TILT "pan_tilt: {type: vapix, url: http://camera}\n"
+#define CALIBRATION "calibration: {file: c.yaml}\n"
+#define MINIMAL VIDEO PAN_TILT CALIBRATION
+
+INSTANTIATE_TEST_SUITE_P(
+    Each, ConfigMistake,
+    ::testing::Values(
+        Mistake{"NotYaml", "video: {type: rtsp\npan_tilt: x\n", ":2: ", "not YAML"},
+        Mistake{"TopIsAList", "- video\n", ":1: configuration", "expected a mapping"},
+        Mistake{"SectionIsAWord", MINIMAL "camera: wide\n", ":4: camera", "expected a mapping"},
+        Mistake{"UnknownSection", MINIMAL "audio: {}\n", ":4: audio",
+                "unknown key; known here: video,"},
+        Mistake{"UnknownKey", MINIMAL "camera:\n  focal_length_mm: 30\n",
+                ":5: camera.focal_length_mm", "unknown key; known here: focal_length_px"},
+        Mistake{"KeyOfAnotherType",
+                "video: {type: rtsp, url: rtsp://c/s, device: /dev/video0}\n" PAN_TILT,
+                ":1: video.device", "unknown key"},
+        Mistake{"DoubledKey", MINIMAL "camera:\n  aspect: 1\n  aspect: 1\n", ":6: camera",
+                "stands twice"},
+        Mistake{"NoVideo", PAN_TILT CALIBRATION, ": ", "section 'video' is missing"},
+        Mistake{"NoPanTilt", VIDEO CALIBRATION, ": ", "section 'pan_tilt' is missing"},
+        Mistake{"NoCalibrationAndNoDataSheet", VIDEO PAN_TILT, ": ",
+                "set calibration.file or camera.focal_length_px"},
+        Mistake{"NoVideoType", "video: {url: rtsp://camera/s}\n" PAN_TILT, ":1: video.type",
+                "is missing"},
+        Mistake{"UnknownVideoType", "video: {type: film, url: x}\n" PAN_TILT, ":1: video.type",
+                "'film' is unknown; expected one of rtsp, rtp, recording"},
+        Mistake{"PlannedVideoType", "video: {type: v4l2, device: /dev/video0}\n" PAN_TILT,
+                ":1: video.type",
+                "'v4l2' is not available in this version; available: rtsp, rtp, recording"},
+        Mistake{"PlannedPanTiltType", VIDEO "pan_tilt: {type: pelco_d, baud: 9600}\n",
+                ":2: pan_tilt.type",
+                "'pelco_d' is not available in this version; available: vapix, recording"},
+        Mistake{"PlannedMode", MINIMAL "realtime: {mode: OE}\n", ":4: realtime.mode",
+                "'OE' is not available in this version; available: PT"},
+        Mistake{"PlannedHttp", MINIMAL "output: {http: '127.0.0.1:8080'}\n", ":4: output.http",
+                "not available in this version"},
+        Mistake{"BothFormats", MINIMAL "output: {json: true, csv: true}\n", ":4: output.csv",
+                "keep one"},
+        Mistake{"NoUrl", "video: {type: rtsp}\n" PAN_TILT, ":1: video.url", "is missing"},
+        Mistake{"EmptyUrl", "video: {type: rtsp, url: ''}\n" PAN_TILT, ":1: video.url", "is empty"},
+        Mistake{"NullUrl", "video:\n  type: rtsp\n  url:\n" PAN_TILT, ":3: video.url",
+                "has no value"},
+        Mistake{"WrongScheme", "video: {type: rtsp, url: http://camera}\n" PAN_TILT,
+                ":1: video.url", "is not an address that starts with rtsp://"},
+        Mistake{"NoHost", "video: {type: rtsp, url: 'rtsp:///stream'}\n" PAN_TILT, ":1: video.url",
+                "is not an address"},
+        Mistake{"PasswordInUrl", "video: {type: rtsp, url: 'rtsp://u:p@camera/s'}\n" PAN_TILT,
+                ":1: video.url", "give them as user and password_env"},
+        Mistake{"PasswordWithoutUser",
+                "video: {type: rtsp, url: rtsp://c/s, password_env: HOME}\n" PAN_TILT,
+                ":1: video.password_env", "add user"},
+        Mistake{"UnsetPassword",
+                "video: {type: rtsp, url: rtsp://c/s, user: u, password_env: "
+                "ALIDADE_NO_SUCH_VARIABLE}\n" PAN_TILT,
+                ":1: video.password_env",
+                "the environment has no variable 'ALIDADE_NO_SUCH_VARIABLE'"},
+        Mistake{"UnknownTransport",
+                "video: {type: rtsp, url: rtsp://c/s, transport: sctp}\n" PAN_TILT,
+                ":1: video.transport", "expected one of tcp, udp"},
+        Mistake{"RecordingWithoutDirectory", "video: {type: recording}\n" PAN_TILT,
+                ":1: video.directory", "is missing"},
+        Mistake{"LiveAndRecorded", "video: {type: recording, directory: d}\n" PAN_TILT CALIBRATION,
+                ": ", "no common clock"},
+        Mistake{"NumberWithUnit", VIDEO "pan_tilt: {type: vapix, url: http://c, rate_hz: 30 Hz}\n",
+                ":2: pan_tilt.rate_hz", "'30 Hz' is not a plain number from 0.1 to 1000 (Hz)"},
+        Mistake{"NumberIsText", MINIMAL "camera: {focal_length_px: long}\n",
+                ":4: camera.focal_length_px", "'long' is not a plain number"},
+        Mistake{"NumberIsQuoted", MINIMAL "camera: {focal_length_px: '30000'}\n",
+                ":4: camera.focal_length_px", "quoted text"},
+        Mistake{"NumberIsAList", MINIMAL "camera: {focal_length_px: [1, 2]}\n",
+                ":4: camera.focal_length_px", "not a list or mapping"},
+        Mistake{"NumberIsNotFinite", MINIMAL "camera: {focal_length_px: .inf}\n",
+                ":4: camera.focal_length_px", "not a plain number"},
+        Mistake{"NumberOverflows", MINIMAL "camera: {focal_length_px: 1e999}\n",
+                ":4: camera.focal_length_px", "not a plain number"},
+        Mistake{"NumberOutOfRange", MINIMAL "camera: {focal_length_px: -5}\n",
+                ":4: camera.focal_length_px", "from 1 to 100000000 (px)"},
+        Mistake{"LineDelayInMicroseconds", MINIMAL "camera: {line_delay_s: 14.2}\n",
+                ":4: camera.line_delay_s", "(s/row)"},
+        Mistake{"FractionForAWholeNumber", MINIMAL "realtime: {priority: 1.5}\n",
+                ":4: realtime.priority", "not a whole number"},
+        Mistake{"PriorityOutOfRange", MINIMAL "realtime: {priority: 100}\n",
+                ":4: realtime.priority", "from 0 to 99"},
+        Mistake{"TruthIsYes", MINIMAL "realtime: {lock_memory: yes}\n", ":4: realtime.lock_memory",
+                "'yes' is not true or false"},
+        Mistake{"TruthIsANumber", MINIMAL "camera: {upside_down: 1}\n", ":4: camera.upside_down",
+                "is not true or false"},
+        Mistake{"ZoomIsNotFixed", MINIMAL "camera: {zoom: auto}\n", ":4: camera.zoom",
+                "expected one of fixed"}),
+    [](const ::testing::TestParamInfo<Mistake>& tested) { return std::string(tested.param.name); });
+
+TEST(NoiseFile, IsOptional) {
+  const TemporaryDirectory directory;
+  RecordingNoise noise;
+  std::string error;
+  ASSERT_TRUE(load_noise(directory.path(), &noise, &error)) << error;
+  EXPECT_FALSE(noise.image_stamp_sigma_s);
+}
+
+TEST(NoiseFile, GivesItsValuesAndNamesItsMistakes) {
+  const TemporaryDirectory directory;
+  RecordingNoise noise;
+  std::string error;
+  directory.write("noise.yaml",
+                  "image_stamp_sigma_s: 2e-4\npan_tilt_sigma_rad: 1e-5\npixel_sigma_px: 0.3\n");
+  ASSERT_TRUE(load_noise(directory.path(), &noise, &error)) << error;
+  EXPECT_EQ(noise.image_stamp_sigma_s, 2e-4);
+  EXPECT_EQ(noise.pan_tilt_sigma_rad, 1e-5);
+  EXPECT_FALSE(noise.telemetry_stamp_sigma_s);
+  const std::string path =
+      directory.write("noise.yaml", "pixel_sigma_px: 0.3\nimage_stamp_sigma_s: small\n");
+  EXPECT_FALSE(load_noise(directory.path(), &noise, &error));
+  EXPECT_THAT(error, StartsWith(path + ":2: image_stamp_sigma_s: 'small' is not a plain number"));
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,28 @@
+#include "edge_app/pipeline/latency_histogram.h"
+
+#include <gtest/gtest.h>
+
+namespace alidade {
+namespace {
+
+TEST(LatencyHistogram, IsZeroWhenEmpty) { EXPECT_EQ(LatencyHistogram().quantile(0.5), 0); }
+
+TEST(LatencyHistogram, GivesQuantilesToFivePercent) {
+  LatencyHistogram histogram;
+  for (int i = 1; i <= 1000; ++i) histogram.add(1e-5 * i);
+  EXPECT_GE(histogram.quantile(0.5), 5e-3);
+  EXPECT_LE(histogram.quantile(0.5), 5e-3 * 1.05);
+  EXPECT_GE(histogram.quantile(0.99), 9.9e-3);
+  EXPECT_LE(histogram.quantile(0.99), 9.9e-3 * 1.05);
+}
+
+TEST(LatencyHistogram, KeepsValuesBeyondItsRangeInTheEndBuckets) {
+  LatencyHistogram histogram;
+  histogram.add(-1);
+  EXPECT_EQ(histogram.quantile(0.5), 1e-6);
+  for (int i = 0; i < 3; ++i) histogram.add(1e9);
+  EXPECT_GT(histogram.quantile(0.5), 100);
+}
+
+}  // namespace
+}  // namespace alidade

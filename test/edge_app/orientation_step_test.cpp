@@ -1,0 +1,321 @@
+// The step from samples and frames to records, on paths whose angles are known in closed form.
+
+#include "edge_app/pipeline/orientation_step.h"
+
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+#include <random>
+
+namespace alidade {
+namespace {
+
+constexpr double kPi = 3.14159265358979323846;
+
+OrientationStepOptions options_without_offsets() {
+  OrientationStepOptions options;
+  options.calibration.camera.focal_length = 30000;
+  options.calibration.camera.width = 1920;
+  options.calibration.camera.height = 1080;
+  options.calibrated = true;
+  return options;
+}
+
+// A head that turns at constant rates; telemetry polled each 1/50 s, each answer true in the middle of a
+// 2 ms interval.
+struct Sweep {
+  double pan_0 = 0.1;
+  double pan_rate = 0.2;
+  double tilt_0 = -0.05;
+  double tilt_rate = 0.03;
+
+  [[nodiscard]] double pan(double t) const { return pan_0 + pan_rate * t; }
+  [[nodiscard]] double tilt(double t) const { return tilt_0 + tilt_rate * t; }
+  [[nodiscard]] PanTiltSample sample(double t) const {
+    PanTiltSample sample;
+    sample.earliest_time_s = t - 1e-3;
+    sample.latest_time_s = t + 1e-3;
+    sample.pan_rad = std::remainder(pan(t), 2 * kPi);
+    sample.tilt_rad = tilt(t);
+    return sample;
+  }
+  void feed(OrientationStep* step, double from_s, double to_s) const {
+    for (int i = 0; from_s + 0.02 * i <= to_s; ++i) step->add_telemetry(sample(from_s + 0.02 * i));
+  }
+};
+
+FrameStamp stamp_at(double receive_time_s, std::int64_t frame = 0) {
+  FrameStamp stamp;
+  stamp.frame = frame;
+  stamp.receive_time_s = receive_time_s;
+  return stamp;
+}
+
+OrientationRecord add_frame(OrientationStep* step, const FrameStamp& stamp) {
+  StepEvents events;
+  return step->add_frame(stamp, &events);
+}
+
+TEST(OrientationStep, LooksTheFrameUpAtItsTimePlusTheClockOffset) {
+  OrientationStepOptions options = options_without_offsets();
+  options.calibration.clock_offset = -0.0844;
+  OrientationStep step(options);
+  const Sweep sweep;
+  sweep.feed(&step, 0, 1);
+  const OrientationRecord record = add_frame(&step, stamp_at(0.7, 42));
+  EXPECT_EQ(record.frame, 42);
+  EXPECT_EQ(record.time_s, 0.7);
+  EXPECT_EQ(record.receive_time_s, 0.7);
+  EXPECT_EQ(record.mode, RecordMode::kPt);
+  EXPECT_EQ(record.status, RecordStatus::kOk);
+  EXPECT_TRUE(record.calibrated);
+  EXPECT_EQ(record.focal_length_px, 30000);
+  ASSERT_TRUE(record.orientation);
+  EXPECT_NEAR(record.orientation->pan_rad, sweep.pan(0.7 - 0.0844), 1e-9);
+  EXPECT_NEAR(record.orientation->tilt_rad, sweep.tilt(0.7 - 0.0844), 1e-9);
+  EXPECT_NEAR(record.orientation->pan_rate_rad_s, sweep.pan_rate, 1e-9);
+  EXPECT_NEAR(record.orientation->tilt_rate_rad_s, sweep.tilt_rate, 1e-9);
+}
+
+TEST(OrientationStep, StatesTheAngleOfRowZeroForEitherSignOfTheLineDelay) {
+  for (const double line_delay : {1.42e-5, -1.42e-5}) {
+    OrientationStepOptions options = options_without_offsets();
+    options.calibration.line_delay = line_delay;
+    OrientationStep step(options);
+    const Sweep sweep;
+    sweep.feed(&step, 0, 1);
+    const OrientationRecord record = add_frame(&step, stamp_at(0.7));
+    ASSERT_TRUE(record.orientation);
+    EXPECT_NEAR(record.orientation->pan_rad, sweep.pan(0.7), 1e-9);
+    EXPECT_EQ(record.line_delay_s, line_delay);
+  }
+}
+
+TEST(OrientationStep, DividesByTheScales) {
+  OrientationStepOptions options = options_without_offsets();
+  options.calibration.mechanics.pan_scale = 1.02;
+  options.calibration.mechanics.tilt_scale = 0.97;
+  OrientationStep step(options);
+  const Sweep sweep;
+  sweep.feed(&step, 0, 1);
+  const OrientationRecord record = add_frame(&step, stamp_at(0.7));
+  ASSERT_TRUE(record.orientation);
+  EXPECT_NEAR(record.orientation->pan_rad, sweep.pan(0.7) / 1.02, 1e-9);
+  EXPECT_NEAR(record.orientation->tilt_rad, sweep.tilt(0.7) / 0.97, 1e-9);
+}
+
+// Columns of R_base_from_camera by hand: camera x (right), y (down), z (forward) in FRD at pan p, tilt t.
+TEST(OrientationStep, QuaternionTurnsCameraAxesIntoTheBase) {
+  OrientationStep step(options_without_offsets());
+  const Sweep sweep;
+  sweep.feed(&step, 0, 1);
+  const OrientationRecord record = add_frame(&step, stamp_at(0.7));
+  ASSERT_TRUE(record.orientation);
+  const double p = sweep.pan(0.7);
+  const double t = sweep.tilt(0.7);
+  const std::array<std::array<double, 3>, 3> columns = {
+      {{-std::sin(p), std::cos(p), 0},
+       {std::cos(p) * std::sin(t), std::sin(p) * std::sin(t), std::cos(t)},
+       {std::cos(p) * std::cos(t), std::sin(p) * std::cos(t), -std::sin(t)}}};
+  const auto& q = record.orientation->q_base_from_camera;
+  const double x = q[0], y = q[1], z = q[2], w = q[3];
+  const std::array<std::array<double, 3>, 3> of_q = {
+      {{1 - 2 * (y * y + z * z), 2 * (x * y + z * w), 2 * (x * z - y * w)},
+       {2 * (x * y - z * w), 1 - 2 * (x * x + z * z), 2 * (y * z + x * w)},
+       {2 * (x * z + y * w), 2 * (y * z - x * w), 1 - 2 * (x * x + y * y)}}};
+  for (std::size_t column = 0; column < 3; ++column) {
+    for (std::size_t row = 0; row < 3; ++row) {
+      EXPECT_NEAR(of_q[column][row], columns[column][row], 1e-9) << column << row;
+    }
+  }
+  EXPECT_GE(w, 0);
+}
+
+TEST(OrientationStep, GoesOnSmoothlyAcrossTheSeamOfThePanAngle) {
+  OrientationStep step(options_without_offsets());
+  Sweep sweep;
+  sweep.pan_0 = kPi - 0.1;  // passes the seam at 0.5 s
+  sweep.feed(&step, 0, 1);
+  for (int i = 0; i <= 50; ++i) {
+    const double t = 0.25 + 0.01 * i;
+    const OrientationRecord record = add_frame(&step, stamp_at(t, i));
+    ASSERT_TRUE(record.orientation) << t;
+    EXPECT_NEAR(std::remainder(record.orientation->pan_rad - sweep.pan(t), 2 * kPi), 0, 1e-9) << t;
+    EXPECT_LE(std::abs(record.orientation->pan_rad), kPi);
+    EXPECT_NEAR(record.orientation->pan_rate_rad_s, sweep.pan_rate, 1e-9) << t;
+  }
+}
+
+TEST(OrientationStep, SaysNoneUntilThereAreTwoSamples) {
+  OrientationStep step(options_without_offsets());
+  const Sweep sweep;
+  for (int samples = 0; samples < 2; ++samples) {
+    const OrientationRecord record = add_frame(&step, stamp_at(0.02));
+    EXPECT_EQ(record.mode, RecordMode::kNone);
+    EXPECT_EQ(record.status, RecordStatus::kTelemetryMissing);
+    EXPECT_FALSE(record.orientation);
+    EXPECT_EQ(record.time_s, 0.02);
+    step.add_telemetry(sweep.sample(0.02 * samples));
+  }
+  EXPECT_EQ(add_frame(&step, stamp_at(0.02)).mode, RecordMode::kPt);
+}
+
+TEST(OrientationStep, ExtrapolatesWithGrowingSigmaAndThenRefuses) {
+  OrientationStepOptions options = options_without_offsets();
+  options.telemetry_limits.max_extrapolation_s = 0.25;
+  OrientationStep step(options);
+  const Sweep sweep;
+  sweep.feed(&step, 0, 1);
+  double sigma = 0;
+  for (const double beyond : {0.05, 0.1, 0.2}) {
+    const OrientationRecord record = add_frame(&step, stamp_at(1 + beyond));
+    ASSERT_TRUE(record.orientation);
+    EXPECT_NEAR(record.orientation->pan_rad, sweep.pan(1 + beyond), 1e-9);
+    EXPECT_GT(record.orientation->sigma_rad[1], sigma);
+    sigma = record.orientation->sigma_rad[1];
+  }
+  EXPECT_EQ(add_frame(&step, stamp_at(1.3)).status, RecordStatus::kTelemetryTooOld);
+  step.telemetry_lost();
+  EXPECT_EQ(add_frame(&step, stamp_at(1.3)).status, RecordStatus::kTelemetryLost);
+  EXPECT_EQ(add_frame(&step, stamp_at(1.2)).status, RecordStatus::kOk);
+}
+
+TEST(OrientationStep, RefusesFramesFromBeforeTheTelemetryAndInItsGaps) {
+  OrientationStep step(options_without_offsets());
+  const Sweep sweep;
+  sweep.feed(&step, 10, 11);
+  sweep.feed(&step, 15, 16);
+  EXPECT_EQ(add_frame(&step, stamp_at(9)).status, RecordStatus::kFrameBeforeTelemetry);
+  EXPECT_EQ(add_frame(&step, stamp_at(13)).status, RecordStatus::kTelemetryGap);
+  EXPECT_EQ(add_frame(&step, stamp_at(15.5)).status, RecordStatus::kOk);
+}
+
+TEST(OrientationStep, ForgetsTelemetryFromBeforeAReconnection) {
+  OrientationStep step(options_without_offsets());
+  const Sweep sweep;
+  sweep.feed(&step, 0, 1);
+  step.telemetry_lost();
+  PanTiltSample first = sweep.sample(1.02);
+  first.restarted = true;
+  step.add_telemetry(first);
+  EXPECT_EQ(add_frame(&step, stamp_at(1.02)).status, RecordStatus::kTelemetryMissing);
+  step.add_telemetry(sweep.sample(1.04));
+  EXPECT_EQ(add_frame(&step, stamp_at(1.04)).status, RecordStatus::kOk);
+}
+
+TEST(OrientationStep, ReportsARestartOfTheVideoClockButNotItsStart) {
+  OrientationStep step(options_without_offsets());
+  StepEvents events;
+  FrameStamp stamp = stamp_at(100);
+  stamp.sender_time_s = 0;
+  stamp.restarted = true;  // as the very first frame of a source is
+  static_cast<void>(step.add_frame(stamp, &events));
+  EXPECT_FALSE(events.video_clock_restarted);
+  stamp = stamp_at(100.04, 1);
+  stamp.sender_time_s = 0.04;
+  static_cast<void>(step.add_frame(stamp, &events));
+  EXPECT_FALSE(events.video_clock_restarted);
+  stamp = stamp_at(130, 2);
+  stamp.sender_time_s = 0;
+  stamp.restarted = true;
+  const OrientationRecord record = step.add_frame(stamp, &events);
+  EXPECT_TRUE(events.video_clock_restarted);
+  EXPECT_NEAR(*record.time_s, 130, 0.1);  // on the new line, not 30 s back on the old one
+}
+
+TEST(OrientationStep, VideoLossIsARecordWithoutAFrame) {
+  OrientationStep step(options_without_offsets());
+  Sweep().feed(&step, 0, 1);
+  const OrientationRecord record = step.video_lost(1.5);
+  EXPECT_FALSE(record.frame);
+  EXPECT_FALSE(record.time_s);
+  EXPECT_EQ(record.receive_time_s, 1.5);
+  EXPECT_EQ(record.mode, RecordMode::kNone);
+  EXPECT_EQ(record.status, RecordStatus::kVideoLost);
+  EXPECT_FALSE(record.orientation);
+}
+
+TEST(OrientationStep, EqualAndJumpingStampsGiveFiniteTimesOrARefusal) {
+  OrientationStep step(options_without_offsets());
+  const Sweep sweep;
+  sweep.feed(&step, 0, 2);
+  const double infinity = std::numeric_limits<double>::infinity();
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  int frame = 0;
+  for (const double sender : {0.0, 0.0, 0.04, -5.0, 1e9, 0.08, 0.08, infinity, nan, 0.12, 0.12}) {
+    for (const double receive : {1.0, 1.0, 1e6, -1e6, 1.1}) {
+      FrameStamp stamp = stamp_at(receive, frame++);
+      stamp.sender_time_s = sender;
+      const OrientationRecord record = add_frame(&step, stamp);
+      ASSERT_TRUE(std::isfinite(*record.time_s)) << "sender " << sender << " receive " << receive;
+      EXPECT_EQ(record.orientation.has_value(), record.mode == RecordMode::kPt);
+    }
+  }
+  EXPECT_EQ(add_frame(&step, stamp_at(nan)).status, RecordStatus::kNotFinite);
+}
+
+// Arrival is late by an exponential delay of 10 ms; after a minute the filtered times must be as regular as
+// the sender's clock, to a tenth of that.
+TEST(OrientationStep, FiltersTheSenderClockOfALateStream) {
+  OrientationStep step(options_without_offsets());
+  std::mt19937 random(20);
+  std::exponential_distribution<double> delay(1 / 0.010);
+  double square = 0;
+  int locked = 0;
+  for (int i = 0; i < 1500; ++i) {
+    const double capture = 0.04 * i;
+    FrameStamp stamp = stamp_at(1000 + capture + delay(random), i);
+    stamp.sender_time_s = capture;
+    const OrientationRecord record = add_frame(&step, stamp);
+    if (i < 750) continue;
+    const double error = *record.time_s - (1000 + capture);
+    square += error * error;
+    ++locked;
+  }
+  EXPECT_LT(std::sqrt(square / locked), 1e-3);
+}
+
+TEST(OrientationStep, SaysThatTheClockFilterIsWarmingUpAndGivesTheAngleNevertheless) {
+  OrientationStep step(options_without_offsets());
+  const Sweep sweep;
+  sweep.feed(&step, 0, 1);
+  FrameStamp stamp = stamp_at(0.7);
+  stamp.sender_time_s = 55;
+  const OrientationRecord record = add_frame(&step, stamp);
+  EXPECT_EQ(record.mode, RecordMode::kPt);
+  EXPECT_EQ(record.status, RecordStatus::kClockWarmingUp);
+}
+
+// Numbered samples whose stamps scatter by 3 ms: the sequence knows better.
+TEST(OrientationStep, FiltersTheStampsOfNumberedTelemetry) {
+  OrientationStepOptions options = options_without_offsets();
+  options.telemetry_clock.jitter = ClockJitter::kSymmetric;
+  OrientationStep step(options);
+  Sweep sweep;
+  sweep.pan_rate = 1;
+  std::mt19937 random(21);
+  std::normal_distribution<double> jitter(0, 3e-3);
+  double square = 0;
+  int frames = 0;
+  for (int i = 0; i < 1500; ++i) {
+    const double t = 0.02 * i;
+    PanTiltSample sample = sweep.sample(t);
+    sample.latest_time_s = t + jitter(random);
+    sample.earliest_time_s = sample.latest_time_s;
+    sample.sequence = i;
+    step.add_telemetry(sample);
+    if (i < 750) continue;
+    const OrientationRecord record = add_frame(&step, stamp_at(t - 0.05, i));
+    ASSERT_TRUE(record.orientation);
+    const double error = std::remainder(record.orientation->pan_rad - sweep.pan(t - 0.05), 2 * kPi);
+    square += error * error;
+    ++frames;
+  }
+  // 1 rad/s: one raw stamp would cost 3e-3 rad.
+  EXPECT_LT(std::sqrt(square / frames), 1e-3);
+}
+
+}  // namespace
+}  // namespace alidade

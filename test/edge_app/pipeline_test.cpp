@@ -1,0 +1,238 @@
+// The threads of `alidade run` between scripted sources and a collecting sink: losses, returns, ends.
+
+#include "edge_app/pipeline/pipeline.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <poll.h>
+
+#include <algorithm>
+
+#include "platform/system/clock.h"
+#include "test/edge_app/scripted_sources.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+PipelineOptions options_for_tests() {
+  PipelineOptions options;
+  options.step.calibration.camera.focal_length = 30000;
+  options.step.calibrated = true;
+  return options;
+}
+
+class PipelineTest : public ::testing::Test {
+ protected:
+  // A frame received now.
+  Frame frame() {
+    Frame frame;
+    frame.stamp.frame = next_frame_++;
+    frame.stamp.receive_time_s = monotonic_now_s();
+    frame.width = 1920;
+    frame.height = 1080;
+    return frame;
+  }
+
+  // The head turns at a constant rate from the beginning of the test.
+  [[nodiscard]] double pan(double time_s) const { return 0.1 * (time_s - start_s_); }
+
+  // Two samples about now: enough for an orientation of frames of the next quarter of a second.
+  void push_telemetry(bool restarted = false) {
+    const double now = monotonic_now_s();
+    for (const double age : {0.02, 0.0}) {
+      PanTiltSample sample;
+      sample.latest_time_s = now - age;
+      sample.earliest_time_s = sample.latest_time_s - 0.001;
+      sample.pan_rad = pan(now - age - 0.0005);  // the middle of the interval
+      sample.restarted = restarted && age > 0;
+      pan_tilt_.push(sample);
+    }
+  }
+
+  // The record of a frame pushed now.
+  OrientationRecord next_record() {
+    const Frame pushed = frame();
+    video_.push(pushed);
+    const auto of_frame = [&](const OrientationRecord& record) {
+      return record.frame == pushed.stamp.frame;
+    };
+    const std::vector<OrientationRecord> records = sink_.wait_until(
+        [&](const auto& so_far) { return std::any_of(so_far.begin(), so_far.end(), of_frame); });
+    const auto found = std::find_if(records.begin(), records.end(), of_frame);
+    if (found != records.end()) return *found;
+    ADD_FAILURE() << "no record of frame " << pushed.stamp.frame;
+    return {};
+  }
+
+  // Pushes telemetry and frames until a record says `status`: the two have queues of their own, so
+  // that which arrives first is open.
+  OrientationRecord push_until(RecordStatus status) {
+    for (int attempt = 0; attempt < 1000 && !HasFailure(); ++attempt) {
+      push_telemetry();
+      const OrientationRecord record = next_record();
+      if (record.status == status) return record;
+    }
+    ADD_FAILURE() << "no record said " << to_string(status);
+    return {};
+  }
+
+  // Waits for the news of a loss.
+  OrientationRecord wait_for(RecordStatus status, std::size_t count = 1) {
+    const auto says = [status](const OrientationRecord& record) { return record.status == status; };
+    const auto enough = [&](const std::vector<OrientationRecord>& records) {
+      return static_cast<std::size_t>(std::count_if(records.begin(), records.end(), says)) >= count;
+    };
+    const std::vector<OrientationRecord> records = sink_.wait_until(enough);
+    EXPECT_TRUE(enough(records)) << "no record said " << to_string(status);
+    return records.empty() ? OrientationRecord() : records.back();
+  }
+
+  static bool finished(const Pipeline& pipeline) {
+    pollfd descriptor{pipeline.finished_fd(), POLLIN, 0};
+    return ::poll(&descriptor, 1, 60000) == 1;
+  }
+  static bool finished_now(const Pipeline& pipeline) {
+    pollfd descriptor{pipeline.finished_fd(), POLLIN, 0};
+    return ::poll(&descriptor, 1, 0) == 1;
+  }
+
+  ScriptedVideo video_{"rtsp://camera/stream"};
+  ScriptedPanTilt pan_tilt_{"http://camera"};
+  CollectingSink sink_;
+  std::int64_t next_frame_ = 0;
+  const double start_s_ = monotonic_now_s();
+};
+
+TEST_F(PipelineTest, GivesOneRecordAFrameInTheirOrder) {
+  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  pipeline.start();
+  for (int i = 0; i < 100; ++i) video_.push(frame());
+  video_.push(ReadStatus::kEnd);
+  ASSERT_TRUE(finished(pipeline));
+  pipeline.stop();
+  const std::vector<OrientationRecord> records = sink_.records();
+  ASSERT_EQ(records.size(), 100U);
+  for (std::size_t i = 0; i < records.size(); ++i) {
+    EXPECT_EQ(records[i].frame, static_cast<std::int64_t>(i));
+    EXPECT_GT(*records[i].latency_s, 0);
+  }
+  EXPECT_EQ(pipeline.error(), "");
+  EXPECT_EQ(pipeline.summary().frames, 100);
+  EXPECT_EQ(pipeline.summary().drops.total(), 0);
+  EXPECT_GT(pipeline.summary().latency.quantile(0.5), 0);
+}
+
+TEST_F(PipelineTest, GivesAnOrientationFromTheTelemetryOfItsTime) {
+  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  pipeline.start();
+  const OrientationRecord record = push_until(RecordStatus::kOk);
+  EXPECT_EQ(record.mode, RecordMode::kPt);
+  EXPECT_TRUE(record.calibrated);
+  ASSERT_TRUE(record.orientation);
+  EXPECT_NEAR(record.orientation->pan_rad, pan(*record.time_s), 1e-6);
+  pipeline.stop();
+  EXPECT_EQ(pipeline.error(), "");
+}
+
+TEST_F(PipelineTest, SaysNoneWhileTheVideoIsAwayAndGoesOnWhenItIsBack) {
+  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  pipeline.start();
+  static_cast<void>(push_until(RecordStatus::kOk));
+  video_.push(ReadStatus::kDisconnected, "rtsp://camera/stream: connection refused");
+  // At the loss, and then each second.
+  const OrientationRecord lost = wait_for(RecordStatus::kVideoLost, 2);
+  EXPECT_EQ(lost.mode, RecordMode::kNone);
+  EXPECT_FALSE(lost.frame);
+  const OrientationRecord back = push_until(RecordStatus::kOk);
+  EXPECT_TRUE(back.orientation);
+  EXPECT_FALSE(finished_now(pipeline));
+  pipeline.stop();
+  EXPECT_EQ(pipeline.error(), "");
+}
+
+TEST_F(PipelineTest, SaysThatTheTelemetryIsLostAndGoesOnWhenItIsBack) {
+  PipelineOptions options = options_for_tests();
+  options.step.telemetry_limits.max_extrapolation_s = 0;
+  Pipeline pipeline(video_, pan_tilt_, sink_, options);
+  pipeline.start();
+  pan_tilt_.push(ReadStatus::kDisconnected, "http://camera: connection refused");
+  for (bool lost = false; !lost && !HasFailure();) {
+    const OrientationRecord record = next_record();
+    EXPECT_EQ(record.mode, RecordMode::kNone);
+    lost = record.status == RecordStatus::kTelemetryLost;
+  }
+  push_telemetry(true);
+  static_cast<void>(push_until(RecordStatus::kTelemetryTooOld));  // connected: no longer "lost"
+  EXPECT_FALSE(finished_now(pipeline));
+  pipeline.stop();
+}
+
+TEST_F(PipelineTest, StopEndsSourcesThatGiveNothing) {
+  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  pipeline.start();
+  pipeline.stop();
+  EXPECT_TRUE(sink_.records().empty());
+  EXPECT_EQ(pipeline.error(), "");
+}
+
+TEST_F(PipelineTest, StopEndsAPipelineWhoseReaderHasStalled) {
+  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  sink_.hold(true);
+  pipeline.start();
+  for (int i = 0; i < 3000; ++i) video_.push(frame());
+  pipeline.stop();
+  const PipelineSummary summary = pipeline.summary();
+  EXPECT_EQ(pipeline.error(), "");
+  // What did not fit into the queues is counted, and nothing else is missing.
+  EXPECT_EQ(static_cast<std::size_t>(summary.records), sink_.records().size());
+}
+
+TEST_F(PipelineTest, FinishesWithTheErrorOfASourceThatFailed) {
+  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  pipeline.start();
+  pan_tilt_.push(ReadStatus::kFailed, "http://camera: wrong user or password (401)");
+  ASSERT_TRUE(finished(pipeline));
+  pipeline.stop();
+  EXPECT_EQ(pipeline.error(), "http://camera: wrong user or password (401)");
+}
+
+TEST_F(PipelineTest, FinishesWhenFramesAreNotOfTheCalibrationsSize) {
+  PipelineOptions options = options_for_tests();
+  options.width = 1280;
+  options.height = 720;
+  options.calibration_name = "calibration.yaml";
+  Pipeline pipeline(video_, pan_tilt_, sink_, options);
+  pipeline.start();
+  video_.push(frame());
+  ASSERT_TRUE(finished(pipeline));
+  pipeline.stop();
+  EXPECT_THAT(pipeline.error(), AllOf(HasSubstr("1920 x 1080"), HasSubstr("1280 x 720"),
+                                      HasSubstr("calibration.yaml")));
+  EXPECT_TRUE(sink_.records().empty());
+}
+
+TEST_F(PipelineTest, FinishesWithoutAnErrorWhenTheReaderGoes) {
+  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  sink_.close("");
+  pipeline.start();
+  video_.push(frame());
+  ASSERT_TRUE(finished(pipeline));
+  pipeline.stop();
+  EXPECT_EQ(pipeline.error(), "");
+}
+
+TEST_F(PipelineTest, FinishesWithTheErrorOfASinkThatFailed) {
+  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  sink_.close("stdout: cannot write a record: No space left on device");
+  pipeline.start();
+  video_.push(frame());
+  ASSERT_TRUE(finished(pipeline));
+  pipeline.stop();
+  EXPECT_EQ(pipeline.error(), "stdout: cannot write a record: No space left on device");
+}
+
+}  // namespace
+}  // namespace alidade

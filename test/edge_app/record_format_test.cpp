@@ -1,0 +1,99 @@
+// The names, order and digits of the records are what other programs rely on.
+
+#include "edge_app/output/record_format.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <limits>
+#include <nlohmann/json.hpp>
+
+namespace alidade {
+namespace {
+
+OrientationRecord full_record() {
+  OrientationRecord record;
+  record.frame = 7;
+  record.time_s = 12345.678901234;
+  record.receive_time_s = 12345.75;
+  record.mode = RecordMode::kPt;
+  record.calibrated = true;
+  record.orientation = OrientationRecord::Orientation{
+      0.5, -0.25, 0.125, -0.0625, {0.5, -0.5, 0.5, 0.5}, {1e-5, 2e-5, 3e-5}};
+  record.line_delay_s = -1.42e-5;
+  record.focal_length_px = 32008;
+  record.radial_distortion = 55.4;
+  record.latency_s = 2.5e-5;
+  return record;
+}
+
+OrientationRecord record_without_frame() {
+  OrientationRecord record;
+  record.receive_time_s = 3.5;
+  record.status = RecordStatus::kVideoLost;
+  record.focal_length_px = 1000;
+  return record;
+}
+
+TEST(RecordFormat, WritesAllFieldsAsOneJsonLine) {
+  EXPECT_EQ(
+      json_line(full_record()),
+      R"({"frame":7,"time_s":12345.678901234,"receive_time_s":12345.75,"mode":"PT","status":"ok",)"
+      R"("calibrated":true,"pan_rad":0.5,"tilt_rad":-0.25,"pan_rate_rad_s":0.125,"tilt_rate_rad_s":-0.0625,)"
+      R"("q_base_from_camera":[0.5,-0.5,0.5,0.5],"orientation_sigma_rad":[1e-05,2e-05,3e-05],"landmarks":0,)"
+      R"("line_delay_s":-1.42e-05,"focal_length_px":32008.0,"aspect":1.0,"radial_distortion":55.4,)"
+      R"("latency_s":2.5e-05})"
+      "\n");
+}
+
+TEST(RecordFormat, WritesNullForWhatARecordLacks) {
+  EXPECT_EQ(
+      json_line(record_without_frame()),
+      R"({"frame":null,"time_s":null,"receive_time_s":3.5,"mode":"none","status":"video lost",)"
+      R"("calibrated":false,"pan_rad":null,"tilt_rad":null,"pan_rate_rad_s":null,"tilt_rate_rad_s":null,)"
+      R"("q_base_from_camera":null,"orientation_sigma_rad":null,"landmarks":0,)"
+      R"("line_delay_s":0.0,"focal_length_px":1000.0,"aspect":1.0,"radial_distortion":0.0,)"
+      R"("latency_s":null})"
+      "\n");
+}
+
+TEST(RecordFormat, WritesCsvColumnsInTheOrderOfTheHeader) {
+  EXPECT_EQ(csv_header(),
+            "frame,time_s,receive_time_s,mode,status,calibrated,pan_rad,tilt_rad,pan_rate_rad_s,"
+            "tilt_rate_rad_s,"
+            "q_x,q_y,q_z,q_w,orientation_sigma_rad_0,orientation_sigma_rad_1,orientation_sigma_rad_"
+            "2,landmarks,"
+            "line_delay_s,focal_length_px,aspect,radial_distortion,latency_s\n");
+  EXPECT_EQ(csv_line(full_record()),
+            "7,12345.678901234,12345.75,PT,ok,true,0.5,-0.25,0.125,-0.0625,0.5,-0.5,0.5,0.5,1e-05,"
+            "2e-05,3e-05,0,"
+            "-1.42e-05,32008.0,1.0,55.4,2.5e-05\n");
+}
+
+TEST(RecordFormat, LeavesCsvCellsEmptyForWhatARecordLacks) {
+  const std::string line = csv_line(record_without_frame());
+  EXPECT_EQ(line, ",,3.5,none,video lost,false,,,,,,,,,,,,0,0.0,1000.0,1.0,0.0,\n");
+  const std::string header = csv_header();
+  EXPECT_EQ(std::count(line.begin(), line.end(), ','),
+            std::count(header.begin(), header.end(), ','));
+}
+
+TEST(RecordFormat, NumbersReadBackToTheSameBits) {
+  OrientationRecord record = full_record();
+  for (const double value :
+       {0.1, 1.0 / 3, 86400.123456789012, 5e-324, std::numeric_limits<double>::max()}) {
+    record.time_s = value;
+    EXPECT_EQ(nlohmann::json::parse(json_line(record))["time_s"].get<double>(), value);
+  }
+}
+
+TEST(RecordFormat, EveryStatusHasWordsWithoutACommaOrQuote) {
+  for (int i = 0; i <= static_cast<int>(RecordStatus::kNotFinite); ++i) {
+    const std::string words = to_string(static_cast<RecordStatus>(i));
+    EXPECT_EQ(words.find_first_of(",\"\n"), std::string::npos) << words;
+    EXPECT_NE(words, "unknown status");
+  }
+}
+
+}  // namespace
+}  // namespace alidade
