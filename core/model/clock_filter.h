@@ -314,7 +314,12 @@ class ClockFilter {
     if (residual < gate) {
       late_run_ = {};
     }
-    const bool shifted = judge(early_run_, receive) || judge(late_run_, receive);
+    if (judge(early_run_, receive) || judge(late_run_, receive)) {
+      if (newer) {
+        insert(receive, x, receive - anchor_receive_ - shift_);
+      }
+      return true;
+    }
     if (residual >= gate) {
       late_run_.add(receive, residual, false);
     }
@@ -326,15 +331,15 @@ class ClockFilter {
       early_run_.add(receive, residual, early);
     }
     // While a fall of the floor is being judged nothing may pull the line down.
-    if (newer && (shifted || !early_run_.active || residual >= 0)) {
-      insert(receive, x, receive - anchor_receive_ - shift_);
+    if (newer && (!early_run_.active || residual >= 0)) {
+      insert(receive, x, y);
     }
     if (locked && receive - bound_since_ >= options_.window_s && !late_run_.active &&
         !early_run_.active) {
       bound_since_ = receive;
       bound_rate();
     }
-    return shifted;
+    return false;
   }
 
   // True if the run has lasted and shows a new floor.
@@ -432,12 +437,12 @@ class ClockFilter {
       y_[i] = y_[first ? a : a + 1];
     }
     slots_ = Capacity / 2;
-    slot_width_ = std::min(widest, (y_[slots_ - 1] - y_[0]) / (Capacity / 2));
+    slot_width_ = std::min(widest, 2 * (y_[slots_ - 1] - y_[0]) / Capacity);
     scale_ /= 2;
   }
 
-  // Once locked a slot must have aged before it counts: if the floor falls, the items that betray it
-  // must not have moved the line.
+  // Once locked a slot must have aged before it counts: if the floor falls, the items that betray
+  // it must not have moved the line.
   std::size_t settled_slots() const {
     std::size_t n = slots_;
     if (state_ == ClockState::kLocked) {

@@ -61,7 +61,7 @@ struct TruncatedExponential {
 
   TruncatedExponential(double rate, double width) {
     const double u = std::abs(rate) * width;
-    double from_peak;  // mean distance from the end where the density is highest
+    double from_peak = 0;  // mean distance from the end where the density is highest
     if (u < 1e-3) {
       mass = width * (1 - u / 2);
       from_peak = width * (0.5 - u / 12);

@@ -1,8 +1,8 @@
 // What the clock filter makes of a stream's stamps, as a Markdown table on stdout and as JSON:
 //   clock_filter_table [file.json]
 // Each row is a simulated stream: error of the raw receive times, of the online filter (bias, sd,
-// worst and mean squared normalised error, after the first minute), of the offline filter over the whole
-// recording, and of the online filter in the first seconds. Raw sd is about the mean: the constant
+// worst and mean squared normalised error, after the first minute), of the offline filter over the
+// whole recording, and of the online filter in the first seconds. Raw sd is about the mean: the constant
 // mean delay does not count. Last, the time of one update against storing the raw stamp.
 
 #include <algorithm>
