@@ -1,0 +1,40 @@
+#pragma once
+// The virtual camera's encoders: one 8-bit grey picture in, one encoded picture out.
+//
+// encode_jpeg makes what RFC 2435 can carry: baseline, standard Huffman tables, YUV 4:2:0 (type 1)
+// with grey chroma. H264Encoder makes Annex B access units without delay (no B frames, no
+// look-ahead): the picture that went in comes out of the same call. An IDR with SPS and PPS begins
+// every second of frames, so a viewer can join within a second. Luma is full range (0..255) in
+// both. Row v of the picture starts at gray + v * stride (bytes). Both allocate. encode_jpeg may be
+// called from any thread; an H264Encoder belongs to one at a time.
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace alidade {
+
+// quality: 1..100, the scale of libjpeg. Empty if the arguments make no picture.
+[[nodiscard]] std::vector<std::uint8_t> encode_jpeg(const std::uint8_t* gray, int width, int height,
+                                                    std::ptrdiff_t stride, int quality);
+
+class H264Encoder {
+ public:
+  H264Encoder();
+  ~H264Encoder();
+
+  // width and height must be even (4:2:0). On failure says why in *error.
+  [[nodiscard]] bool open(int width, int height, double rate_hz, std::string* error);
+
+  // One access unit; empty only if the encoder failed. force_idr starts a new sequence here.
+  [[nodiscard]] std::vector<std::uint8_t> encode(const std::uint8_t* gray, std::ptrdiff_t stride,
+                                                 bool force_idr);
+
+ private:
+  struct Codec;
+  std::unique_ptr<Codec> codec_;
+};
+
+}  // namespace alidade
