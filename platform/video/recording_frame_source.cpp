@@ -110,6 +110,9 @@ ReadStatus RecordingFrameSource::Implementation::load() {
 
 ReadStatus RecordingFrameSource::Implementation::open_video(const std::string& path) {
   int code = avformat_open_input(&video_, path.c_str(), nullptr, nullptr);
+  if (code >= 0) {
+    code = avformat_find_stream_info(video_, nullptr);  // how far pictures are out of order
+  }
   if (code < 0) {
     return fail(path + ": " + av_error_text(code));
   }

@@ -15,6 +15,7 @@ extern "C" {
 namespace alidade {
 namespace {
 
+constexpr int kMaxPicture = 32 << 20;  // bytes of compressed data
 constexpr double kGoodbye_s =
     0.5;  // given to RTSP's TEARDOWN, so that the camera frees the session
 
@@ -146,7 +147,7 @@ ReadStatus RtpConnection::read(AccessUnit* unit, std::string* error) {
     piece.packet.reset(av_packet_alloc());
     const int code = av_read_frame(format_, piece.packet.get());
     piece.receive_time_s = monotonic_now_s();
-    if (code == AVERROR(EAGAIN)) {
+    if (code == AVERROR(EAGAIN) && is_over(this) == 0) {
       continue;
     }
     if (code < 0) {
@@ -163,8 +164,9 @@ ReadStatus RtpConnection::read(AccessUnit* unit, std::string* error) {
       growing_ = std::move(piece);
     } else if (growing_.packet->pts == piece.packet->pts) {
       const int end = growing_.packet->size;
-      if (av_grow_packet(growing_.packet.get(), piece.packet->size) < 0) {
-        *error = "a picture larger than memory";
+      if (end > kMaxPicture - piece.packet->size ||
+          av_grow_packet(growing_.packet.get(), piece.packet->size) < 0) {
+        *error = "a picture of more than " + std::to_string(kMaxPicture >> 20) + " MB";
         return ReadStatus::kDisconnected;
       }
       std::memcpy(growing_.packet->data + end, piece.packet->data,

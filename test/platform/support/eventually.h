@@ -5,6 +5,7 @@
 #include <thread>
 
 #include "platform/system/clock.h"
+#include "platform/video/frame_source.h"
 
 namespace alidade {
 

@@ -104,6 +104,7 @@ RtpSender::RtpSender(Codec codec, int port, double first_time_s)
 }
 
 RtpSender::~RtpSender() {
+  av_write_trailer(format_);
   avio_closep(&format_->pb);
   avformat_free_context(format_);
 }
