@@ -4,6 +4,7 @@
 // compare core with it.
 
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <cmath>
 #include <functional>
 
@@ -20,11 +21,12 @@ struct TrueCamera {
   Eigen::Vector3d tilt_axis = Eigen::Vector3d::UnitY();
 };
 
-// Radius r with r (1 + k r^2) = r_d, by halving the interval where the model is monotone.
+// Radius r with r (1 + k r^2) = r_d, by halving the interval where the model is monotone, in which r is
+// never above 1.5 r_d.
 inline double undistorted_radius(double k, double r_d) {
   double low = 0;
-  double high = k < 0 ? std::sqrt(-1 / (3 * k)) : r_d;
-  for (int i = 0; i < 200; ++i) {
+  double high = k < 0 ? std::min(1.5 * r_d, std::sqrt(-1 / (3 * k))) : r_d;
+  for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high);
     (middle * (1 + k * middle * middle) < r_d ? low : high) = middle;
   }

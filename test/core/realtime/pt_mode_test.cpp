@@ -45,7 +45,7 @@ std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.nam
 
 class PtModeErrors : public testing::TestWithParam<Case> {};
 
-constexpr int kRuns = 1500;
+constexpr int kRuns = 1000;
 
 double normalised(const Vector2<double>& error, const Matrix2<double>& covariance) {
   return error.dot(covariance.ldlt().solve(error)) / 2;

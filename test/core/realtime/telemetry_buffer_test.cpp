@@ -100,7 +100,7 @@ TEST(TelemetryBuffer, IsExactOnSteadyMotion) {
       }
       const double oldest = times[times.size() - buffer.size()];
       for (int i = 0; i <= 50; ++i) {
-        const double t = oldest + (time - oldest) * i / 50;
+        const double t = std::min(oldest + (time - oldest) * i / 50, time);
         InterpolatedPanTilt result;
         ASSERT_EQ(buffer.query(t, 0, &result), QueryStatus::kOk) << t;
         expect_steady(result, mount, t);
