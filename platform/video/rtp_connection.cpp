@@ -16,8 +16,8 @@ namespace alidade {
 namespace {
 
 constexpr int kMaxPicture = 32 << 20;  // bytes of compressed data
-constexpr double kGoodbye_s =
-    0.5;  // given to RTSP's TEARDOWN, so that the camera frees the session
+// Given to RTSP's TEARDOWN, so that the camera frees the session.
+constexpr double kGoodbye_s = 0.5;
 
 // The description that a sender of plain RTP does not send.
 std::string sdp_of(const Url& url, const std::string& format) {
@@ -112,11 +112,15 @@ ReadStatus RtpConnection::open(std::string* error) {
     *error = why_lost(code);
     return ReadStatus::kDisconnected;
   }
+  return prepare(error);
+}
+
+// What can be read of the stream that was found.
+ReadStatus RtpConnection::prepare(std::string* error) {
   if (format_->nb_streams == 0) {
     *error = "there is no video in this stream";
     return ReadStatus::kFailed;
   }
-
   const AVCodecParameters& found = *format_->streams[0]->codecpar;
   if (found.codec_id != AV_CODEC_ID_MJPEG && found.codec_id != AV_CODEC_ID_H264) {
     *error = std::string("the video is ") + avcodec_get_name(found.codec_id) +

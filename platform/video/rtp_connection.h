@@ -49,6 +49,7 @@ class RtpConnection {
 
  private:
   static int is_over(void* self);
+  [[nodiscard]] ReadStatus prepare(std::string* error);
   [[nodiscard]] std::string why_lost(int code) const;
   [[nodiscard]] bool inspect(AccessUnit* unit);
   [[nodiscard]] std::optional<double> utc(const AVPacket& packet) const;

@@ -19,6 +19,7 @@ namespace alidade {
 namespace {
 
 constexpr std::size_t kQueueCapacity = 32;    // pictures: a second of video
+constexpr std::size_t kCredentials = 126;     // characters; libavformat cuts longer ones off
 constexpr std::size_t kDecoderCapacity = 16;  // pictures: the most that H.264 may hold back
 
 }  // namespace
@@ -80,7 +81,7 @@ class RtpSource::Implementation {
   RtpSourceOptions options_;
 
   // Shared by the receiving thread and read().
-  mutable std::mutex mutex_;
+  std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Event> queue_;           // guarded by mutex_
   std::atomic<bool> stopped_{false};  // set under mutex_, read anywhere
@@ -131,6 +132,10 @@ void RtpSource::Implementation::check() {
     }
   } else if (url.scheme != "rtsp") {
     (void)fail("not a video stream; the URL must be rtsp://, rtp:// or an .sdp file");
+  } else if (with_credentials(url.bare, options_.user, options_.password).size() >
+             url.bare.size() + kCredentials) {
+    (void)fail("user and password together have more than " + std::to_string(kCredentials) +
+               " characters (each special one counts as 3)");
   }
 }
 
