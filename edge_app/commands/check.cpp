@@ -83,14 +83,14 @@ std::string report_video(const Sampled<Frame>& video, const NamedCalibration& ca
     const bool match = first.width == camera.width && first.height == camera.height;
     size = match ? "as calibrated" : "not as calibrated";
     if (!match) {
-      errors->push_back(fmt::format(
-          "video: frames of {} x {} px, but {} is for {} x {} px; set the camera to the "
-          "calibration's size or calibrate at this one",
-          first.width, first.height, calibration.name, camera.width, camera.height));
+      errors->push_back(
+          fmt::format("video: frames of {}x{} px, but {} is for {}x{} px; set the camera to the "
+                      "calibration's size or calibrate at this one",
+                      first.width, first.height, calibration.name, camera.width, camera.height));
     }
   }
   return fmt::format(
-      "{} x {} px ({}), {}, {}", first.width, first.height, size,
+      "{}x{} px ({}), {}, {}", first.width, first.height, size,
       rate(video.items.size(), first.stamp.receive_time_s, last.stamp.receive_time_s), clock);
 }
 
@@ -133,7 +133,7 @@ int check(const CheckOptions& options) {
   const Camera<double>& camera = calibration.calibration.camera;
   fmt::print("calibration    {}: {}focal length {:.1f} px, clock offset {:.1f} ms\n",
              calibration.name,
-             calibration.calibrated ? fmt::format("{} x {} px, ", camera.width, camera.height)
+             calibration.calibrated ? fmt::format("{}x{} px, ", camera.width, camera.height)
                                     : "not calibrated, ",
              camera.focal_length, 1e3 * calibration.calibration.clock_offset);
 

@@ -117,7 +117,7 @@ class Recorder {
       }
       if (frame.width != width_ || frame.height != height_) {
         return fail(
-            fmt::format("{}: frames changed from {} x {} to {} x {} px; a recording holds one size",
+            fmt::format("{}: frames changed from {}x{} to {}x{} px; a recording holds one size",
                         video_.name(), width_, height_, frame.width, frame.height));
       }
       if (!writer_.add_frame(frame.stamp, &error)) return fail(error);

@@ -89,7 +89,7 @@ void check_size(const RecordingInfo& info, const NamedCalibration& calibration,
   throw CommandError(
       kExitFailed,
       fmt::format(
-          "{}: frames of {} x {} px, but {} is for {} x {} px; name the calibration of this size",
+          "{}: frames of {}x{} px, but {} is for {}x{} px; name the calibration of this size",
           recording, info.width, info.height, calibration.name, camera.width, camera.height));
 }
 

@@ -1,5 +1,6 @@
 #include "edge_app/output/record_format.h"
 
+#include <cmath>
 #include <nlohmann/json.hpp>
 #include <vector>
 
@@ -52,7 +53,9 @@ std::vector<Field> fields(const OrientationRecord& record) {
 }
 
 std::string csv_cell(const Json& value) {
-  if (value.is_null()) return "";
+  // What is not finite has no value, as in JSON.
+  const bool not_finite = value.is_number_float() && !std::isfinite(value.get<double>());
+  if (value.is_null() || not_finite) return "";
   return value.is_string() ? value.get<std::string>() : value.dump();
 }
 

@@ -72,7 +72,7 @@ bool Pipeline::check_size(const Frame& frame) {
   if (options_.width == 0) return true;
   if (frame.width == options_.width && frame.height == options_.height) return true;
   fail(
-      fmt::format("{}: frames of {} x {} px, but {} is for {} x {} px; calibrate at this size or "
+      fmt::format("{}: frames of {}x{} px, but {} is for {}x{} px; calibrate at this size or "
                   "set the camera to "
                   "the calibration's",
                   video_.name(), frame.width, frame.height, options_.calibration_name,

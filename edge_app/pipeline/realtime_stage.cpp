@@ -33,7 +33,7 @@ void RealtimeStage::drain_telemetry() {
   }
 }
 
-bool RealtimeStage::process() {
+bool RealtimeStage::process() noexcept {
   const bool ended = input_ended_.load(std::memory_order_acquire);
   drain_telemetry();
   VideoMessage message;

@@ -63,7 +63,7 @@ class RealtimeStage {
   void wait() { input_.wait(); }
   // Real-time thread: handles everything that waits. Telemetry goes first, as a frame's angle may
   // depend on a sample that came in just before it. False once the last video is handled.
-  bool process();
+  bool process() noexcept;
 
   // Output thread: sleeps until there is something to do.
   void wait_output() { output_.wait(); }

@@ -350,7 +350,7 @@ TEST_F(CommandLineTest, ReplayRefusesACalibrationOfAnotherSize) {
   directory_.write("alidade/calibration.yaml", head_.calibration(1280, 720));
   const Result result = alidade({"replay", directory_.path()});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920 x 1080"), HasSubstr("1280 x 720")));
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"), HasSubstr("1280x720")));
   EXPECT_FALSE(std::filesystem::exists(path("alidade/orientation.csv")));
 }
 
@@ -431,7 +431,7 @@ TEST_F(CommandLineTest, RunEndsWhenFramesAreNotOfTheCalibrationsSize) {
   directory_.write("calibration.yaml", head_.calibration(1280, 720));
   const Result result = alidade({"run", "-c", recorded_config()});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920 x 1080"), HasSubstr("1280 x 720")));
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"), HasSubstr("1280x720")));
 }
 
 TEST_F(CommandLineTest, CheckReportsBothStreamsAndTheSizes) {
@@ -439,12 +439,12 @@ TEST_F(CommandLineTest, CheckReportsBothStreamsAndTheSizes) {
   directory_.write("calibration.yaml", head_.calibration());
   Result result = alidade({"check", "-c", recorded_config(), "--duration", "0.5"});
   EXPECT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.output, AllOf(HasSubstr("1920 x 1080 px (as calibrated), 25.00 Hz"),
+  EXPECT_THAT(result.output, AllOf(HasSubstr("1920x1080 px (as calibrated), 25.00 Hz"),
                                    HasSubstr("100.00 Hz"), HasSubstr("known to 2.0 ms")));
   directory_.write("calibration.yaml", head_.calibration(1280, 720));
   result = alidade({"check", "-c", recorded_config(), "--duration", "0.5"});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920 x 1080"), HasSubstr("1280 x 720")));
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"), HasSubstr("1280x720")));
 }
 
 // Streams of an hour, so that only the event under test ends the program.

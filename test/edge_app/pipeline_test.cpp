@@ -209,8 +209,8 @@ TEST_F(PipelineTest, FinishesWhenFramesAreNotOfTheCalibrationsSize) {
   video_.push(frame());
   ASSERT_TRUE(finished(pipeline));
   pipeline.stop();
-  EXPECT_THAT(pipeline.error(), AllOf(HasSubstr("1920 x 1080"), HasSubstr("1280 x 720"),
-                                      HasSubstr("calibration.yaml")));
+  EXPECT_THAT(pipeline.error(),
+              AllOf(HasSubstr("1920x1080"), HasSubstr("1280x720"), HasSubstr("calibration.yaml")));
   EXPECT_TRUE(sink_.records().empty());
 }
 

@@ -87,6 +87,14 @@ TEST(RecordFormat, NumbersReadBackToTheSameBits) {
   }
 }
 
+TEST(RecordFormat, WhatIsNotFiniteHasNoValue) {
+  OrientationRecord record = record_without_frame();
+  record.receive_time_s = std::numeric_limits<double>::quiet_NaN();
+  record.latency_s = std::numeric_limits<double>::infinity();
+  EXPECT_TRUE(nlohmann::json::parse(json_line(record))["receive_time_s"].is_null());
+  EXPECT_EQ(csv_line(record), ",,,none,video lost,false,,,,,,,,,,,,0,0.0,1000.0,1.0,0.0,\n");
+}
+
 TEST(RecordFormat, EveryStatusHasWordsWithoutACommaOrQuote) {
   for (int i = 0; i <= static_cast<int>(RecordStatus::kNotFinite); ++i) {
     const std::string words = to_string(static_cast<RecordStatus>(i));
