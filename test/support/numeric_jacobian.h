@@ -8,6 +8,7 @@
 
 #include <Eigen/Core>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <optional>
 
@@ -20,9 +21,13 @@ struct NumericJacobian {
   int evaluated = 0;
 };
 
-template <int kOut, int kIn, class Function>
+template <int kOut, int kIn>
+using NumericFunction = std::function<std::optional<Eigen::Matrix<double, kOut, 1>>(
+    const Eigen::Matrix<double, kIn, 1>&)>;
+
+template <int kOut, int kIn>
 [[nodiscard]] NumericJacobian<kOut, kIn> numeric_jacobian(
-    const Function& f, const Eigen::Matrix<double, kIn, 1>& steps) {
+    const NumericFunction<kOut, kIn>& f, const Eigen::Matrix<double, kIn, 1>& steps) {
   using In = Eigen::Matrix<double, kIn, 1>;
   using Out = Eigen::Matrix<double, kOut, 1>;
   NumericJacobian<kOut, kIn> result;
@@ -42,8 +47,9 @@ template <int kOut, int kIn, class Function>
   return result;
 }
 
-template <int kOut, int kIn, class Function>
-[[nodiscard]] NumericJacobian<kOut, kIn> numeric_jacobian(const Function& f, double step) {
+template <int kOut, int kIn>
+[[nodiscard]] NumericJacobian<kOut, kIn> numeric_jacobian(const NumericFunction<kOut, kIn>& f,
+                                                          double step) {
   return numeric_jacobian<kOut, kIn>(
       f, Eigen::Matrix<double, kIn, 1>(Eigen::Matrix<double, kIn, 1>::Constant(step)));
 }

@@ -75,30 +75,43 @@ struct Setting {
     return {pixel, pixel, 1e-3, 1e-3};
   }
 
-  [[nodiscard]] std::optional<Vec3> unproject(const Vec2& u) const {
+  // The functions under test. Not inlined, or the compiler spends minutes on copies of them.
+  [[nodiscard, gnu::noinline]] ProjectionStatus unproject(
+      const Vec2& u, Vec3* d, Matrix<double, 3, 2>* J_u = nullptr,
+      Matrix<double, 3, 4>* J_motion = nullptr,
+      Matrix<double, 3, kParameterCount>* J_parameters = nullptr) const {
+    return rolling_shutter_unproject(camera, mechanics, line_delay, motion, u, d, J_u, J_motion,
+                                     J_parameters);
+  }
+
+  [[nodiscard, gnu::noinline]] ProjectionStatus project(
+      const Vec3& d, Vec2* u, Matrix<double, 2, 3>* J_d = nullptr,
+      Matrix<double, 2, 4>* J_motion = nullptr,
+      Matrix<double, 2, kParameterCount>* J_parameters = nullptr) const {
+    return rolling_shutter_project(camera, mechanics, line_delay, motion, d, u, J_d, J_motion,
+                                   J_parameters);
+  }
+
+  [[nodiscard, gnu::noinline]] ProjectionStatus project_at(double row, const Vec3& d, Vec2* u,
+                                                           Vec2* J_u_row = nullptr) const {
+    return project_at_row(camera, mechanics, line_delay, motion, row, d, u, J_u_row);
+  }
+
+  [[nodiscard]] std::optional<Vec3> direction_of(const Vec2& u) const {
     Vec3 d;
-    if (rolling_shutter_unproject(camera, mechanics, line_delay, motion, u, &d) !=
-        ProjectionStatus::kOk) {
-      return std::nullopt;
-    }
+    if (unproject(u, &d) != ProjectionStatus::kOk) return std::nullopt;
     return d;
   }
 
-  [[nodiscard]] std::optional<Vec2> project(const Vec3& d) const {
+  [[nodiscard]] std::optional<Vec2> pixel_of(const Vec3& d) const {
     Vec2 u;
-    if (rolling_shutter_project(camera, mechanics, line_delay, motion, d, &u) !=
-        ProjectionStatus::kOk) {
-      return std::nullopt;
-    }
+    if (project(d, &u) != ProjectionStatus::kOk) return std::nullopt;
     return u;
   }
 
-  [[nodiscard]] std::optional<Vec2> project_at(double row, const Vec3& d) const {
+  [[nodiscard]] std::optional<Vec2> pixel_at(double row, const Vec3& d) const {
     Vec2 u;
-    if (project_at_row(camera, mechanics, line_delay, motion, row, d, &u) !=
-        ProjectionStatus::kOk) {
-      return std::nullopt;
-    }
+    if (project_at(row, d, &u) != ProjectionStatus::kOk) return std::nullopt;
     return u;
   }
 
@@ -106,8 +119,7 @@ struct Setting {
   [[nodiscard]] double slope(double row, const Vec3& d) const {
     Vec2 u;
     Vec2 J_u_row;
-    EXPECT_EQ(project_at_row(camera, mechanics, line_delay, motion, row, d, &u, &J_u_row),
-              ProjectionStatus::kOk);
+    EXPECT_EQ(project_at(row, d, &u, &J_u_row), ProjectionStatus::kOk);
     return J_u_row.y();
   }
 };
@@ -140,7 +152,7 @@ TEST(RollingShutter, MountAtRestSeesAsAGlobalShutter) {
     for (const Vec2& u : pixel_grid(named, 3)) {
       Vec3 d_c;
       ASSERT_EQ(unproject(setting.camera, u, &d_c), ProjectionStatus::kOk);
-      const auto d_b = setting.unproject(u);
+      const auto d_b = setting.direction_of(u);
       ASSERT_TRUE(d_b);
       EXPECT_LE((*d_b - R * d_c).norm(), 1e-15);
       ++checked;
@@ -151,14 +163,15 @@ TEST(RollingShutter, MountAtRestSeesAsAGlobalShutter) {
 
 TEST(RollingShutter, RowIsSeenFromTheOrientationAtItsTime) {
   // Panning right at 1 rad/s with 10 us a row: 500 rows below the reference row, 5 ms later.
-  const Camera<double> camera{1000, 1, 0, 1280, 720};
-  const FrameMotion<double> motion{{0.2, 0}, {1, 0}, 100};
+  Setting setting;
+  setting.camera = {1000, 1, 0, 1280, 720};
+  setting.motion = {{0.2, 0}, {1, 0}, 100};
+  setting.line_delay = 10e-6;
   Vec3 d;
-  ASSERT_EQ(rolling_shutter_unproject(camera, Mechanics<double>(), 10e-6, motion, {640, 600}, &d),
-            ProjectionStatus::kOk);
+  ASSERT_EQ(setting.unproject({640, 600}, &d), ProjectionStatus::kOk);
   EXPECT_NEAR(std::atan2(d.y(), d.x()), 0.205, 1e-15);
-  ASSERT_EQ(rolling_shutter_unproject(camera, Mechanics<double>(), -10e-6, motion, {640, 600}, &d),
-            ProjectionStatus::kOk);
+  setting.line_delay = -10e-6;
+  ASSERT_EQ(setting.unproject({640, 600}, &d), ProjectionStatus::kOk);
   EXPECT_NEAR(std::atan2(d.y(), d.x()), 0.195, 1e-15);
 }
 
@@ -167,21 +180,21 @@ TEST(RollingShutter, ProjectInvertsUnproject) {
   int refused_at_reference_row = 0;
   for (const auto& [named, setting] : hard_settings()) {
     for (const Vec2& u : pixel_grid(named, 11)) {
-      const auto d = setting.unproject(u);
+      const auto d = setting.direction_of(u);
       ASSERT_TRUE(d) << named.name;
-      if (!setting.project_at(setting.motion.reference_row, *d)) {
-        EXPECT_FALSE(setting.project(*d));
+      if (!setting.pixel_at(setting.motion.reference_row, *d)) {
+        EXPECT_FALSE(setting.pixel_of(*d));
         ++refused_at_reference_row;
         continue;
       }
-      const auto again = setting.project(*d);
+      const auto again = setting.pixel_of(*d);
       ASSERT_TRUE(again) << named.name << " " << u.transpose();
       // Rounding of about epsilon in the direction, times f, enlarged where the image nearly keeps
       // up with the read-out.
       const double tolerance = 1e-14 * (setting.camera.focal_length + setting.camera.width) /
                                (1 - setting.slope(u.y(), *d));
       EXPECT_LE((*again - u).norm(), tolerance) << named.name << " " << u.transpose();
-      const auto d_again = setting.unproject(*again);
+      const auto d_again = setting.direction_of(*again);
       ASSERT_TRUE(d_again);
       EXPECT_LE((*d_again - *d).norm(), 1e-14);
       ++checked;
@@ -201,7 +214,7 @@ TEST(RollingShutter, ProjectFindsTheOnlyRowThatADenseSearchFinds) {
       for (double tilt = -0.24; tilt < -0.16; tilt += 0.007) {
         const Vec3 d = R_base_from_camera(setting.mechanics, {pan, tilt}) * Vec3::UnitZ();
         const auto miss = [&](double row) {
-          const auto u = setting.project_at(row, d);
+          const auto u = setting.pixel_at(row, d);
           EXPECT_TRUE(u);
           return u ? u->y() - row : 0;
         };
@@ -218,7 +231,7 @@ TEST(RollingShutter, ProjectFindsTheOnlyRowThatADenseSearchFinds) {
           rows.push_back(low);
         }
         ASSERT_EQ(rows.size(), 1u);
-        const auto u = setting.project(d);
+        const auto u = setting.pixel_of(d);
         ASSERT_TRUE(u);
         EXPECT_NEAR(u->y(), rows[0], 1e-8);
         ++found;
@@ -231,9 +244,9 @@ TEST(RollingShutter, ProjectFindsTheOnlyRowThatADenseSearchFinds) {
 TEST(RollingShutter, RowsOutsideTheImageHaveSolutionsToo) {
   const Setting setting = paper_setting();
   for (const double row : {-2000.0, -1.0, 1081.0, 3000.0}) {
-    const auto d = setting.unproject({960, row});
+    const auto d = setting.direction_of({960, row});
     ASSERT_TRUE(d);
-    const auto u = setting.project(*d);
+    const auto u = setting.pixel_of(*d);
     ASSERT_TRUE(u);
     EXPECT_NEAR(u->y(), row, 1e-8);
   }
@@ -248,14 +261,12 @@ TEST(RollingShutter, NoRowSeesWhatMovesDownAsFastAsTheReadOut) {
     setting.line_delay = sign * 14.2e-6;
     Vec2 u(-1, -2);
     setting.motion.rate = {0, sign * 3};
-    EXPECT_EQ(rolling_shutter_project(setting.camera, setting.mechanics, setting.line_delay,
-                                      setting.motion, ahead, &u),
-              ProjectionStatus::kNoRow);
+    EXPECT_EQ(setting.project(ahead, &u), ProjectionStatus::kNoRow);
     EXPECT_EQ(u, Vec2(-1, -2)) << "a refusal writes nothing";
     ++refused;
     // Against the read-out any speed is seen, once.
     setting.motion.rate = {0, -sign * 3};
-    EXPECT_TRUE(setting.project(ahead));
+    EXPECT_TRUE(setting.pixel_of(ahead));
   }
   EXPECT_EQ(refused, 2);
 }
@@ -265,10 +276,10 @@ TEST(RollingShutter, PassesOnTheCamerasRefusals) {
   Vec2 u;
   Vec3 d;
   const auto project_status = [&](const Setting& s, const Vec3& direction) {
-    return rolling_shutter_project(s.camera, s.mechanics, s.line_delay, s.motion, direction, &u);
+    return s.project(direction, &u);
   };
   const auto unproject_status = [&](const Setting& s, const Vec2& pixel) {
-    return rolling_shutter_unproject(s.camera, s.mechanics, s.line_delay, s.motion, pixel, &d);
+    return s.unproject(pixel, &d);
   };
   EXPECT_EQ(project_status(setting, {-1, 0, 0}), ProjectionStatus::kBehindCamera);
   Setting barrel = setting;
@@ -281,7 +292,7 @@ TEST(RollingShutter, PassesOnTheCamerasRefusals) {
   EXPECT_EQ(project_status(setting, {1, nan, 0}), ProjectionStatus::kNotFinite);
   EXPECT_EQ(unproject_status(setting, {nan, 0}), ProjectionStatus::kNotFinite);
   int refused = 0;
-  const Vec3 ahead = *setting.unproject({960, 540});
+  const Vec3 ahead = *setting.direction_of({960, 540});
   for (int i = 0; i < 4; ++i) {
     const Setting bad = setting.plus_motion(nan * Vec4::Unit(i));
     EXPECT_EQ(project_status(bad, ahead), ProjectionStatus::kNotFinite);
@@ -302,16 +313,14 @@ TEST(RollingShutter, JacobiansOfUnprojectAgreeWithNumericOnes) {
       Matrix<double, 3, 2> J_u;
       Matrix<double, 3, 4> J_motion;
       Matrix<double, 3, kParameterCount> J_parameters;
-      ASSERT_EQ(rolling_shutter_unproject(setting.camera, setting.mechanics, setting.line_delay,
-                                          setting.motion, u, &d, &J_u, &J_motion, &J_parameters),
-                ProjectionStatus::kOk);
+      ASSERT_EQ(setting.unproject(u, &d, &J_u, &J_motion, &J_parameters), ProjectionStatus::kOk);
       const auto numeric_u =
-          numeric_jacobian<3, 2>([&](const Vec2& e) { return setting.unproject(u + e); }, 1.0);
-      const auto numeric_motion =
-          numeric_jacobian<3, 4>([&](const Vec4& e) { return setting.plus_motion(e).unproject(u); },
-                                 setting.motion_steps());
+          numeric_jacobian<3, 2>([&](const Vec2& e) { return setting.direction_of(u + e); }, 1.0);
+      const auto numeric_motion = numeric_jacobian<3, 4>(
+          [&](const Vec4& e) { return setting.plus_motion(e).direction_of(u); },
+          setting.motion_steps());
       const auto numeric_parameters = numeric_jacobian<3, kParameterCount>(
-          [&](const ParameterVector& e) { return setting.plus_parameters(e).unproject(u); },
+          [&](const ParameterVector& e) { return setting.plus_parameters(e).direction_of(u); },
           setting.parameter_steps());
       // Directions carry a rounding of a few epsilon.
       EXPECT_LT(test::disagreement(J_u, numeric_u, 2e-15), 1) << named.name;
@@ -332,27 +341,26 @@ TEST(RollingShutter, JacobiansOfProjectAgreeWithNumericOnes) {
   for (const auto& [named, setting_at] : hard_settings()) {
     const Setting& setting = setting_at;
     for (const Vec2& u_at : pixel_grid(named, 3)) {
-      const auto unprojected = setting.unproject(u_at);
+      const auto unprojected = setting.direction_of(u_at);
       ASSERT_TRUE(unprojected);
       const Vec3 d = *unprojected;
       Vec2 u;
       Matrix<double, 2, 3> J_d;
       Matrix<double, 2, 4> J_motion;
       Matrix<double, 2, kParameterCount> J_parameters;
-      if (!setting.project_at(setting.motion.reference_row, d)) {
+      if (!setting.pixel_at(setting.motion.reference_row, d)) {
         ++refused_at_reference_row;
         continue;
       }
-      ASSERT_EQ(rolling_shutter_project(setting.camera, setting.mechanics, setting.line_delay,
-                                        setting.motion, d, &u, &J_d, &J_motion, &J_parameters),
-                ProjectionStatus::kOk);
+      ASSERT_EQ(setting.project(d, &u, &J_d, &J_motion, &J_parameters), ProjectionStatus::kOk);
       const double pixel = 1 / setting.camera.focal_length;
       const auto numeric_d = numeric_jacobian<2, 2>(
-          [&](const Vec2& e) { return setting.project(direction_plus(d, e)); }, pixel);
-      const auto numeric_motion = numeric_jacobian<2, 4>(
-          [&](const Vec4& e) { return setting.plus_motion(e).project(d); }, setting.motion_steps());
+          [&](const Vec2& e) { return setting.pixel_of(direction_plus(d, e)); }, pixel);
+      const auto numeric_motion =
+          numeric_jacobian<2, 4>([&](const Vec4& e) { return setting.plus_motion(e).pixel_of(d); },
+                                 setting.motion_steps());
       const auto numeric_parameters = numeric_jacobian<2, kParameterCount>(
-          [&](const ParameterVector& e) { return setting.plus_parameters(e).project(d); },
+          [&](const ParameterVector& e) { return setting.plus_parameters(e).pixel_of(d); },
           setting.parameter_steps());
       const Matrix<double, 2, 2> J_tangent = J_d * tangent_basis(d);
       // The rounding of a direction, in pixels, up to ten times larger as the slope is below 0.9.
@@ -440,17 +448,15 @@ TEST(RollingShutter, ReprojectionErrorHasThePredictedCovariance) {
        {PanTilt<double>{0, 0}, {0.5, 0.6}, {-0.5, -0.8}, {0.9, -0.1}}) {
     setting.motion.rate = rate;
     const Vec2 u(300, 900);
-    const Vec3 d = *setting.unproject(u);
+    const Vec3 d = *setting.direction_of(u);
     Vec2 projected;
     Vec2 J_u_row;
-    ASSERT_EQ(project_at_row(setting.camera, setting.mechanics, setting.line_delay, setting.motion,
-                             u.y(), d, &projected, &J_u_row),
-              ProjectionStatus::kOk);
+    ASSERT_EQ(setting.project_at(u.y(), d, &projected, &J_u_row), ProjectionStatus::kOk);
     Noise noise(1);
     std::vector<Vec2> errors;
     for (int i = 0; i < kSamples; ++i) {
       const Vec2 observed = u + noise(factor);
-      errors.push_back(observed - *setting.project_at(observed.y(), d));
+      errors.push_back(observed - *setting.pixel_at(observed.y(), d));
     }
     expect_covariance(errors,
                       reprojection_error_covariance<double>(J_u_row, factor * factor.transpose()));
@@ -488,9 +494,7 @@ TEST(RollingShutter, DirectionOfAPixelHasThePredictedCovariance) {
         Matrix<double, 3, 2> J_u;
         Matrix<double, 3, 4> J_motion;
         Matrix<double, 3, kParameterCount> J_parameters;
-        ASSERT_EQ(rolling_shutter_unproject(setting.camera, setting.mechanics, setting.line_delay,
-                                            setting.motion, u, &d, &J_u, &J_motion, &J_parameters),
-                  ProjectionStatus::kOk);
+        ASSERT_EQ(setting.unproject(u, &d, &J_u, &J_motion, &J_parameters), ProjectionStatus::kOk);
         J_parameters += J_motion * motion_parameter_jacobian(setting.mechanics, setting.motion);
         const Matrix2<double> predicted = direction_covariance<double>(
             d, J_u, J_motion, J_parameters, pixel_factor * pixel_factor.transpose(),
@@ -508,7 +512,7 @@ TEST(RollingShutter, DirectionOfAPixelHasThePredictedCovariance) {
                                 measured.tilt + measured_rate.tilt * later});
           guess.motion.rate = true_from_measured(guess.mechanics, measured_rate);
           guess = guess.plus_motion(noise(motion_factor));
-          const auto seen = guess.unproject(u + noise(pixel_factor));
+          const auto seen = guess.direction_of(u + noise(pixel_factor));
           ASSERT_TRUE(seen);
           errors.push_back(direction_minus(*seen, d));
         }
