@@ -74,7 +74,10 @@ int read_number(const std::uint8_t* gray, int width, std::ptrdiff_t stride) {
 }
 
 struct AvClient::Session {
+  Session() = default;
   ~Session() { avformat_close_input(&format); }
+  Session(const Session&) = delete;
+  Session& operator=(const Session&) = delete;
 
   static int is_overdue(void* self) {
     return monotonic_s() > static_cast<Session*>(self)->deadline_s ? 1 : 0;
@@ -91,7 +94,7 @@ struct AvClient::Session {
 AvClient::AvClient() { av_log_set_level(AV_LOG_FATAL); }
 AvClient::~AvClient() = default;
 
-int AvClient::open(const std::string& url, Transport transport, bool decode) {
+int AvClient::open(const std::string& url, Transport transport) {
   session_ = std::make_unique<Session>();
   Session& session = *session_;
   session.deadline_s = monotonic_s() + kDeadlineS;
@@ -108,7 +111,6 @@ int AvClient::open(const std::string& url, Transport transport, bool decode) {
   av_dict_free(&options);
   if (status < 0) return status;
   if (session.format->nb_streams != 1) return AVERROR_STREAM_NOT_FOUND;
-  if (!decode) return 0;
   const AVCodecParameters* parameters = session.format->streams[0]->codecpar;
   const AVCodec* codec = avcodec_find_decoder(parameters->codec_id);
   if (codec == nullptr) return AVERROR_DECODER_NOT_FOUND;
@@ -126,23 +128,18 @@ std::optional<ReceivedFrame> AvClient::read() {
   while (av_read_frame(session.format, packet) >= 0) {
     ReceivedFrame received;
     received.receive_time_s = monotonic_s();
-    received.key_frame = (packet->flags & AV_PKT_FLAG_KEY) != 0;
-    received.number = -1;
     if (session.format->start_time_realtime != AV_NOPTS_VALUE && packet->pts != AV_NOPTS_VALUE) {
       const double since_start_s =
           static_cast<double>(packet->pts) * av_q2d(session.format->streams[0]->time_base);
       received.utc_s =
           static_cast<double>(session.format->start_time_realtime) * 1e-6 + since_start_s;
     }
-    if (!session.decoder) {
-      av_packet_unref(packet);
-      return received;
-    }
     const int status = avcodec_send_packet(session.decoder.get(), packet);
     av_packet_unref(packet);
-    if (status < 0) continue;
-    const AVFrame* frame = session.frame.get();
-    if (avcodec_receive_frame(session.decoder.get(), session.frame.get()) < 0) continue;
+    AVFrame* frame = session.frame.get();
+    // Until the first key frame nothing can be decoded.
+    if (status < 0 || avcodec_receive_frame(session.decoder.get(), frame) < 0) continue;
+    received.key_frame = frame->key_frame != 0;
     received.number = read_number(frame->data[0], frame->width, frame->linesize[0]);
     return received;
   }

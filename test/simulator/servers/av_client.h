@@ -25,7 +25,7 @@ int read_number(const std::uint8_t* gray, int width, std::ptrdiff_t stride);
 enum class Transport { kTcp, kUdp, kPlainRtp };
 
 struct ReceivedFrame {
-  int number = 0;  // as drawn by numbered_picture; -1 if not asked to decode
+  int number = 0;  // as drawn by numbered_picture
   bool key_frame = false;
   double receive_time_s = 0;    // CLOCK_MONOTONIC, when libavformat returned the packet
   std::optional<double> utc_s;  // of the capture; known after the first RTCP sender report
@@ -35,11 +35,14 @@ class AvClient {
  public:
   AvClient();
   ~AvClient();
+  AvClient(const AvClient&) = delete;
+  AvClient& operator=(const AvClient&) = delete;
 
   // Opens an rtsp:// URL or an SDP file. 0, or libav's error code.
-  [[nodiscard]] int open(const std::string& url, Transport transport, bool decode = true);
+  [[nodiscard]] int open(const std::string& url, Transport transport);
 
-  // The next frame, or nothing if the connection ended or nothing came for kDeadlineS.
+  // The next frame that can be decoded, or nothing if the connection ended or was silent for
+  // kDeadlineS.
   [[nodiscard]] std::optional<ReceivedFrame> read();
 
   static constexpr double kDeadlineS = 30;

@@ -24,6 +24,8 @@ class H264Encoder {
  public:
   H264Encoder();
   ~H264Encoder();
+  H264Encoder(const H264Encoder&) = delete;
+  H264Encoder& operator=(const H264Encoder&) = delete;
 
   // width and height must be even (4:2:0). On failure says why in *error.
   [[nodiscard]] bool open(int width, int height, double rate_hz, std::string* error);

@@ -78,7 +78,7 @@ TEST(EncodeJpeg, HonoursTheStride) {
   constexpr int kStride = kWidth + 37;
   const auto picture = numbered_picture(kWidth, kHeight, 7);
   std::vector<std::uint8_t> padded(std::size_t{kStride} * kHeight, 255);
-  for (int v = 0; v < kHeight; ++v) {
+  for (std::ptrdiff_t v = 0; v < kHeight; ++v) {
     std::copy_n(picture.begin() + v * kWidth, kWidth, padded.begin() + v * kStride);
   }
   EXPECT_EQ(encode_jpeg(padded.data(), kWidth, kHeight, kStride, 90),

@@ -7,6 +7,7 @@
 // what libraries access (memcpy and the like) is left out; every access compiled into our own code
 // is checked.
 
+// NOLINTBEGIN(bugprone-reserved-identifier): the names are the run times'.
 extern "C" {
 
 const char* __asan_default_options();
@@ -20,3 +21,4 @@ const char* __lsan_default_suppressions() { return "leak:_dl_init\n"; }
 const char* __tsan_default_options() { return "ignore_noninstrumented_modules=1"; }
 
 }  // extern "C"
+// NOLINTEND(bugprone-reserved-identifier)

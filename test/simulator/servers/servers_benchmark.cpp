@@ -56,7 +56,7 @@ void mjpeg_frame(benchmark::State& state, Transport transport) {
   pusher.join();
   if (status < 0) return state.SkipWithError("no stream");
   std::vector<double> latency_s;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     const double pushed_s = monotonic_s();
     server.push(measured.data(), measured.size(), pushed_s);
     auto frame = client.read();
@@ -86,7 +86,7 @@ void vapix_poll(benchmark::State& state) {
   curl_easy_setopt(curl, CURLOPT_USERPWD, "root:pass");
   curl_easy_setopt(curl, CURLOPT_WRITEFUNCTION, ignore);
   std::vector<double> latency_s;
-  for (auto _ : state) {
+  while (state.KeepRunning()) {
     const double sent_s = monotonic_s();
     if (curl_easy_perform(curl) != CURLE_OK) {
       state.SkipWithError("no answer");

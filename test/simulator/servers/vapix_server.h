@@ -56,6 +56,8 @@ class VapixServer {
 
   VapixServer(VapixServerOptions options, PositionAt position_at);
   ~VapixServer();
+  VapixServer(const VapixServer&) = delete;
+  VapixServer& operator=(const VapixServer&) = delete;
 
   // On failure says why in *error. May be called again after stop().
   [[nodiscard]] bool start(std::string* error);

@@ -70,6 +70,8 @@ class LoopThread {
     run([this] { g_main_loop_quit(loop_.get()); });
     thread_.join();
   }
+  LoopThread(const LoopThread&) = delete;
+  LoopThread& operator=(const LoopThread&) = delete;
 
   // Runs the task on the thread and waits until it is done.
   void run(std::function<void()> task) {
@@ -130,6 +132,8 @@ class RtspServer {
       remove_all();
     });
   }
+  RtspServer(const RtspServer&) = delete;
+  RtspServer& operator=(const RtspServer&) = delete;
 
   bool start(std::string* error) {
     gst_rtsp_server_set_address(server_.get(), options_.address.c_str());
@@ -237,6 +241,8 @@ class RtpPusher {
     input_.disconnect(pipeline_.get());
     gst_element_set_state(pipeline_.get(), GST_STATE_NULL);
   }
+  RtpPusher(const RtpPusher&) = delete;
+  RtpPusher& operator=(const RtpPusher&) = delete;
 
   bool start(std::string* error) {
     const std::string line = input_.launch_line() +

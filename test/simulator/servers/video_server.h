@@ -40,6 +40,8 @@ class VideoServer {
  public:
   explicit VideoServer(VideoServerOptions options);
   ~VideoServer();
+  VideoServer(const VideoServer&) = delete;
+  VideoServer& operator=(const VideoServer&) = delete;
 
   // On failure says why in *error. May be called again after stop().
   [[nodiscard]] bool start(std::string* error);

@@ -88,6 +88,8 @@ class Camera {
     changed_.notify_all();
     thread_.join();
   }
+  Camera(const Camera&) = delete;
+  Camera& operator=(const Camera&) = delete;
 
   double capture_time_s(int number) {
     const std::lock_guard<std::mutex> lock(mutex_);
