@@ -63,6 +63,9 @@ function(alidade_executable name)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
 endfunction()
 
+# Everything that the thread sanitizer is worth building for: the tests labelled `threads`.
+add_custom_target(threaded_programs)
+
 # alidade_test(camera_test SOURCES camera_test.cpp LINK alidade::model [LABELS ...] [TIMEOUT s]
 #              [ARGUMENTS ...] [DEPENDS target...])
 # builds a GoogleTest program and registers each of its tests with ctest.
@@ -77,6 +80,9 @@ function(alidade_test name)
   alidade_executable(${name} SOURCES ${A_SOURCES} LINK ${A_LINK} GTest::gmock GTest::gtest GTest::gtest_main)
   if(A_DEPENDS)
     add_dependencies(${name} ${A_DEPENDS})
+  endif()
+  if("threads" IN_LIST A_LABELS)
+    add_dependencies(threaded_programs ${name})
   endif()
   include(GoogleTest)
   gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60

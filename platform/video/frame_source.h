@@ -8,6 +8,7 @@
 // when the last packet of the frame arrived, never after decoding. Not for the real-time thread:
 // read() allocates and waits.
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
