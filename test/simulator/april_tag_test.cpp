@@ -37,8 +37,8 @@ constexpr double kTagTurn = 0.4;      // rad: oblique edges average the detector
 constexpr double kPhotoPixels = 120;  // width of a tag's photo as rendered
 constexpr int kTagsAcross = 3;
 constexpr double kBorder = 60;  // px between a tag's centre and the image's border
-// The detector samples whole pixels along an edge, at 16 places: on a picture as rendered that alone
-// makes errors of 0.04 px. Enlarged pictures make it as many times more precise.
+// The detector rounds to whole pixels where it samples along an edge: on a picture as rendered that
+// alone makes errors of 0.05 px rms. From four times enlarged on they stay at 0.006 px.
 constexpr double kEnlarged = 4;
 
 Matrix3d about(const Vector3d& axis, double angle) {
@@ -262,9 +262,8 @@ TEST_P(AprilTags, AreFoundWhereTheTruthPutsThem) {
   double squares = 0;
   Vector2d sum = Vector2d::Zero();
   // Moments near the turning points and crossings of the path, when most tags are in view.
-  const std::vector<double> times = config.path.amplitude > 0
-                                        ? std::vector<double>{0.02, 0.25, 0.4, 2.7, 3.1, 3.3}
-                                        : std::vector<double>{0};
+  const std::vector<double> times =
+      config.path.amplitude > 0 ? std::vector<double>{0.02, 0.4, 2.7, 3.3} : std::vector<double>{0};
   for (const double t0 : times) {
     for (const auto& [id, centre] : detect(renderer.render(t0, 0), config.image)) {
       const PatchConfig& tag = config.scene.photos.at(static_cast<std::size_t>(id));
@@ -282,7 +281,7 @@ TEST_P(AprilTags, AreFoundWhereTheTruthPutsThem) {
     }
   }
   // A tag or more of each frame may be out of view.
-  ASSERT_GE(found, config.path.amplitude > 0 ? 20 : 5);
+  ASSERT_GE(found, config.path.amplitude > 0 ? 12 : 5);
   EXPECT_LT((sum / found).norm(), 0.01);
   EXPECT_LT(std::sqrt(squares / found), 0.02);
 }

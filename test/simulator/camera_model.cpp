@@ -89,7 +89,7 @@ std::optional<Eigen::Vector2d> CameraModel::project_rolling(const Eigen::Vector3
     if (!seen) return std::nullopt;
     (seen->y() > middle ? low : high) = middle;
   }
-  const auto seen = seen_from_row((low + high) / 2);
+  auto seen = seen_from_row((low + high) / 2);
   if (!seen || seen->x() < 0 || seen->x() > image_.width) return std::nullopt;
   return seen;
 }

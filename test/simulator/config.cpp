@@ -32,8 +32,8 @@ constexpr Range kPort{0, 65535};
 // for. A key that is absent leaves the value as it was.
 class Section {
  public:
-  Section(std::filesystem::path file, YAML::Node node, std::string name)
-      : file_(std::move(file)), node_(std::move(node)), name_(std::move(name)) {
+  Section(std::filesystem::path file, const YAML::Node& node, std::string name)
+      : file_(std::move(file)), node_(node), name_(std::move(name)) {
     if (!node_.IsMap()) fail(node_, "'" + name_ + "' must hold keys with values");
   }
 

@@ -25,9 +25,7 @@ void stop_on_signals() {
   sigaction(SIGTERM, &action, nullptr);
 }
 
-}  // namespace
-
-int main(int argc, char** argv) {
+int run(int argc, char** argv) {
   CLI::App app("A virtual pan-tilt-zoom camera with known truth.");
   std::string config_file;
   std::string output;
@@ -38,20 +36,28 @@ int main(int argc, char** argv) {
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
-    return app.exit(error) == 0 ? 0 : 2;
+    if (error.get_exit_code() == 0) return app.exit(error);  // --help, --version
+    std::fprintf(stderr, "alidade-simulate: %s (see --help)\n", error.what());
+    return 2;
   }
 
   using namespace alidade::simulator;
+  const Config config = load_config(config_file);
+  if (output.empty()) {
+    stop_on_signals();
+    serve_live(config, stop_requested);
+  } else {
+    write_recording(config, output);
+  }
+  return 0;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
   try {
-    const Config config = load_config(config_file);
-    if (output.empty()) {
-      stop_on_signals();
-      serve_live(config, stop_requested);
-    } else {
-      write_recording(config, output);
-    }
-    return 0;
-  } catch (const ConfigError& error) {
+    return run(argc, argv);
+  } catch (const alidade::simulator::ConfigError& error) {
     std::fprintf(stderr, "alidade-simulate: %s\n", error.what());
     return 2;
   } catch (const std::exception& error) {

@@ -90,6 +90,7 @@ TEST(VirtualCameraProgram, PrintsItsVersionAndItsHelp) {
 TEST(VirtualCameraProgram, ExplainsBadUsageAndBadConfigurationWithExitCodeTwo) {
   Child no_config({});
   EXPECT_THAT(no_config.read_line(), HasSubstr("--config is required"));
+  EXPECT_EQ(no_config.read_line(), "");
   EXPECT_EQ(no_config.exit_code(), 2);
   const TemporaryDirectory directory;
   Child unknown_key({"-c", directory.write("a.yaml", "seed: 1\nsead: 2\n")});
@@ -130,7 +131,7 @@ TEST(VirtualCameraProgram, ServesVideoAndPanTiltWithTheTruthUntilItIsStopped) {
 
     // Capture times as they come by RTCP; the first frames come before the first report.
     AvClient viewer;
-    ASSERT_EQ(viewer.open(video_url, Transport::kTcp, false), 0);
+    ASSERT_EQ(viewer.open(video_url, Transport::kTcp), 0);
     const double utc_offset = utc_minus_monotonic_s();
     std::vector<double> captures;
     while (captures.size() < 10) {

@@ -137,7 +137,7 @@ void Scene::add_object(const PatchConfig& config, const cv::Mat& picture) {
       {config, Texture(picture), -half_size, texels.cwiseQuotient(2 * half_size), half_size});
 }
 
-void Scene::add_photo(const PatchConfig& config, cv::Mat photo,
+void Scene::add_photo(const PatchConfig& config, const cv::Mat& photo,
                       const std::vector<Eigen::Vector3d>& seen, double density, double detail,
                       std::uint64_t seed) {
   Eigen::Vector2d half_size;

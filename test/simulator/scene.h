@@ -44,8 +44,9 @@ class Scene {
     Eigen::Vector2d half_size;  // of the whole patch, in patch coordinates
   };
 
-  void add_photo(const PatchConfig& config, cv::Mat photo, const std::vector<Eigen::Vector3d>& seen,
-                 double density, double detail, std::uint64_t seed);
+  void add_photo(const PatchConfig& config, const cv::Mat& photo,
+                 const std::vector<Eigen::Vector3d>& seen, double density, double detail,
+                 std::uint64_t seed);
   void add_object(const PatchConfig& config, const cv::Mat& picture);
 
   float background_;

@@ -11,9 +11,11 @@ namespace {
 cv::Mat lattice_noise(const cv::Rect& part, std::uint64_t seed) {
   cv::Mat noise(part.height, part.width, CV_32F);
   for (int y = 0; y < part.height; ++y) {
-    const std::uint64_t row_seed = mix(seed, static_cast<std::uint64_t>(part.y + y));
+    const int row = part.y + y;
+    const std::uint64_t row_seed = mix(seed, static_cast<std::uint64_t>(row));
     for (int x = 0; x < part.width; ++x) {
-      const std::uint64_t bits = mix(row_seed, static_cast<std::uint64_t>(part.x + x));
+      const int column = part.x + x;
+      const std::uint64_t bits = mix(row_seed, static_cast<std::uint64_t>(column));
       const double uniform = static_cast<double>(bits >> 11) * 0x1p-53;
       noise.at<float>(y, x) = static_cast<float>((uniform - 0.5) * std::sqrt(12.0));
     }
@@ -42,7 +44,7 @@ Texture::Texture(const cv::Mat& picture) {
     for (int y = 0; y < level.rows; ++y) {
       for (int x = 0; x < level.cols; ++x) {
         const float value = std::clamp(level.at<float>(y, x), 0.0F, 1.0F);
-        stored.texels.push_back(static_cast<std::uint16_t>(value * kWhite + 0.5F));
+        stored.texels.push_back(static_cast<std::uint16_t>(std::lround(value * kWhite)));
       }
     }
     levels_.push_back(std::move(stored));

@@ -18,6 +18,9 @@ struct VideoWriter::Muxer {
   AVFormatContext* context = nullptr;
   AVPacket* packet = av_packet_alloc();
 
+  Muxer() = default;
+  Muxer(const Muxer&) = delete;
+  Muxer& operator=(const Muxer&) = delete;
   ~Muxer() {
     av_packet_free(&packet);
     if (context != nullptr) avio_closep(&context->pb);

@@ -13,6 +13,8 @@ class VideoWriter {
  public:
   VideoWriter(const std::filesystem::path& file, int width, int height, double rate_hz);
   ~VideoWriter();
+  VideoWriter(const VideoWriter&) = delete;
+  VideoWriter& operator=(const VideoWriter&) = delete;
 
   void write(const std::vector<std::uint8_t>& jpeg, double time_s);
   // The file is complete only after this.
