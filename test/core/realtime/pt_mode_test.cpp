@@ -278,6 +278,42 @@ TEST(PtMode, DividesByTheScales) {
   EXPECT_EQ(pt_orientation(calibration, telemetry, 0.2, 0, &frame), QueryStatus::kNotFinite);
 }
 
+TEST(PtMode, TurnsTheMeasuredCovarianceIntoTheTrueOneAtRow0) {
+  Calibration calibration = simple_calibration(50e-6);
+  calibration.mechanics.pan_scale = 1.5;
+  calibration.mechanics.tilt_scale = 0.5;
+  Matrix4<double> root;
+  root << 3, 0, 1, 2, 1, 2, 0, 1, 0, 2, 4, 1, 2, 0, 1, 5;
+  InterpolatedPanTilt measured;
+  measured.covariance = root * root.transpose();
+  FrameOrientation frame;
+  ASSERT_TRUE(pt_orientation(calibration, 0, measured, &frame));
+  const double half = 50e-6 * 240;
+  Matrix4<double> J;  // d true (pan, tilt, rates) at row 0 / d measured at the middle row
+  J << 1 / 1.5, 0, -half / 1.5, 0,  //
+      0, 2, 0, -half * 2,           //
+      0, 0, 1 / 1.5, 0,             //
+      0, 0, 0, 2;
+  const Matrix4<double> expected = J * measured.covariance * J.transpose();
+  EXPECT_LT((frame.motion_covariance - expected).norm(), 1e-12 * expected.norm());
+}
+
+TEST(PtMode, AddsWhatAnAccelerationDoesToTheRows) {
+  const Calibration calibration = simple_calibration(-50e-6);
+  InterpolatedPanTilt measured;
+  measured.acceleration_square = {4, 9};
+  FrameOrientation frame;
+  ASSERT_TRUE(pt_orientation(calibration, 0, measured, &frame));
+  double mean = 0;
+  const int rows = 480;
+  for (int row = 0; row < rows; ++row) {
+    const double time = -50e-6 * (row + 0.5 - 240);
+    mean += std::pow(time * time / 2, 2) / rows;
+  }
+  EXPECT_NEAR(frame.motion_covariance(0, 0), 4 * mean, 1e-3 * mean);
+  EXPECT_NEAR(frame.motion_covariance(1, 1), 9 * mean, 1e-3 * mean);
+}
+
 TEST(PtMode, SaysWhyThereIsNoOrientation) {
   const Calibration calibration = simple_calibration(0);
   TelemetryBuffer<32> telemetry;
