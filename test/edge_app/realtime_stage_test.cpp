@@ -71,7 +71,7 @@ TEST(RealtimeStage, EndsBehindTheLastMessage) {
 
 // Every kind of message, fed by two other threads as in the pipeline, while the guard watches this one.
 TEST(RealtimeStage, AllocatesNothing) {
-  constexpr int kRounds = 5000;
+  constexpr int kRounds = 1000;
   const auto stage = make_stage();
   std::thread capture([&] {
     for (int i = 0; i < kRounds; ++i) {
