@@ -17,7 +17,6 @@
 #include <optional>
 #include <set>
 #include <sstream>
-#include <utility>
 #include <vector>
 
 namespace alidade {
@@ -92,7 +91,7 @@ Range plausible_range(Parameter parameter) {
 
 class Reader {
  public:
-  explicit Reader(YAML::Node root) : root_(std::move(root)) {}
+  explicit Reader(const YAML::Node& root) : root_(root) {}
 
   Calibration read() {
     if (!root_.IsMap()) fail(root_, "not a calibration; start with `format: 1`");
@@ -151,7 +150,8 @@ class Reader {
       std::string names;
       for (const char* name : known) {
         is_known = is_known || key == name;
-        names += names.empty() ? name : std::string(", ") + name;
+        if (!names.empty()) names += ", ";
+        names += name;
       }
       if (!is_known) fail(entry.first, "unknown key " + prefix + key + "; known are " + names);
     }

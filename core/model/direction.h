@@ -91,7 +91,7 @@ template <class S>
   if (sine_squared < S(1e-4) && cosine > S(0)) {
     const S& x = sine_squared;
     ratio = S(1) + x / S(6) * (S(1) + x * S(9) / S(20) * (S(1) + x * S(25) / S(42)));
-    slope = -S(2) / S(3) - x / S(5) - x * x * S(3) / S(28);
+    slope = -S(2) / S(3) - x / S(5);
   } else if (sine_squared == S(0)) {
     return Vector2<S>(S(kPi), S(0));
   } else {

@@ -5,9 +5,8 @@
 //   cubic_quotient     (theta - sin(theta)) / theta^3
 //   inverse_quotient   1 / theta^2 - cot(theta / 2) / (2 theta)
 // They are smooth at 0 although their formulas are not: below theta^2 = 0.01 a series takes over,
-// whose truncation is under 1e-15 of the value (double). Taking theta^2, not theta, keeps the
-// derivative of a differentiation type finite at 0. inverse_quotient is singular at theta = 2 pi,
-// the others nowhere.
+// whose truncation is under 3e-15 of the value. Taking theta^2, not theta, keeps the derivative of
+// a differentiation type finite at 0. inverse_quotient is singular at theta = 2 pi.
 
 #include <cmath>
 
@@ -51,8 +50,7 @@ template <class S>
   using std::sqrt;
   const S& x = theta_squared;
   if (x < S(0.01)) {
-    return S(1) / S(12) *
-           (S(1) + x / S(60) * (S(1) + x / S(42) * (S(1) + x / S(40) * (S(1) + x / S(39.6)))));
+    return S(1) / S(12) * (S(1) + x / S(60) * (S(1) + x / S(42) * (S(1) + x / S(40))));
   }
   const S half = sqrt(x) / S(2);
   return (S(1) - half * cos(half) / sin(half)) / x;
