@@ -5,6 +5,7 @@
 #include <array>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <string>
@@ -16,7 +17,7 @@ namespace {
 
 // Texels a pixel at the optical axis: dense enough that Catmull-Rom passes what a pixel passes.
 constexpr double kTexelsPerPixel = 1.4;
-constexpr double kLargestTexture = 2e8;  // texels; 2 bytes each, and 4/3 of that with the pyramid
+constexpr double kLargestTexture = 1e8;  // texels of 4 bytes; the pyramid adds a third
 constexpr int kProceduralWidth = 1024;   // px of the generated photo
 // The mip level is chosen once for so many pixels of a row.
 constexpr std::size_t kBlock = 16;
@@ -33,18 +34,14 @@ Eigen::Matrix3d patch_from_base(double azimuth, double elevation) {
   return rows;
 }
 
-// Patch coordinates of a direction in the patch's frame; false if on the far side.
-inline bool patch_coordinates(Projection projection, double right, double down, double outward,
-                              double* x, double* y) {
+// Patch coordinates of a direction in the patch's frame; NaN on the far side of a tangent plane.
+inline Eigen::Vector2d patch_coordinates(Projection projection, double right, double down,
+                                         double outward) {
   if (projection == Projection::kEquirectangular) {
-    *x = std::atan2(right, outward);
-    *y = std::atan2(down, std::hypot(right, outward));
-    return true;
+    return {std::atan2(right, outward), std::atan2(down, std::hypot(right, outward))};
   }
-  if (outward <= 0) return false;
-  *x = right / outward;
-  *y = down / outward;
-  return true;
+  const double scale = outward > 0 ? 1 / outward : std::numeric_limits<double>::quiet_NaN();
+  return {right * scale, down * scale};
 }
 
 double half_extent(Projection projection, double angle) {
@@ -61,11 +58,7 @@ std::optional<Eigen::AlignedBox2d> seen_part(const PatchConfig& config,
     const Eigen::Vector3d d_patch = rows * d_base;
     // Just above the patch plane's horizon the tangents run away, far beyond any patch.
     if (config.projection == Projection::kTangent && d_patch.z() < 0.02) continue;
-    Eigen::Vector2d point;
-    if (patch_coordinates(config.projection, d_patch.x(), d_patch.y(), d_patch.z(), &point.x(),
-                          &point.y())) {
-      box.extend(point);
-    }
+    box.extend(patch_coordinates(config.projection, d_patch.x(), d_patch.y(), d_patch.z()));
   }
   if (box.isEmpty()) return std::nullopt;
   const Eigen::Vector2d margin = 0.1 * box.sizes();
@@ -192,29 +185,24 @@ void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, const 
       std::array<double, kBlock> texel_x{};
       std::array<double, kBlock> texel_y{};
       std::array<float, kBlock> cover{};
-      bool any = false;
+      float most = 0;
       for (std::size_t i = 0; i < size; ++i) {
         const double ray_x = x[start + i];
         const double ray_y = y[start + i];
-        double px = 0;
-        double py = 0;
-        // A NaN ray is outside every patch: all comparisons with it are false.
-        if (open[i] > 0 &&
-            patch_coordinates(patch.config.projection,
-                              turn(0, 0) * ray_x + turn(0, 1) * ray_y + turn(0, 2),
-                              turn(1, 0) * ray_x + turn(1, 1) * ray_y + turn(1, 2),
-                              turn(2, 0) * ray_x + turn(2, 1) * ray_y + turn(2, 2), &px, &py)) {
-          texel_x[i] = (px - patch.corner.x()) * patch.density.x();
-          texel_y[i] = (py - patch.corner.y()) * patch.density.y();
-          const double inside = pixels_per_unit_ * std::min(patch.half_size.x() - std::abs(px),
-                                                            patch.half_size.y() - std::abs(py));
-          if (inside > -0.5) {
-            cover[i] = static_cast<float>(std::min(inside + 0.5, 1.0));
-            any = true;
-          }
-        }
+        const Eigen::Vector2d point = patch_coordinates(
+            patch.config.projection, turn(0, 0) * ray_x + turn(0, 1) * ray_y + turn(0, 2),
+            turn(1, 0) * ray_x + turn(1, 1) * ray_y + turn(1, 2),
+            turn(2, 0) * ray_x + turn(2, 1) * ray_y + turn(2, 2));
+        texel_x[i] = (point.x() - patch.corner.x()) * patch.density.x();
+        texel_y[i] = (point.y() - patch.corner.y()) * patch.density.y();
+        const double inside =
+            0.5 + pixels_per_unit_ * std::min(patch.half_size.x() - std::abs(point.x()),
+                                              patch.half_size.y() - std::abs(point.y()));
+        // A NaN, of the ray or of the far side, is not inside.
+        cover[i] = inside > 0 ? static_cast<float>(std::min(inside, 1.0)) : 0.0F;
+        most = std::max(most, cover[i]);
       }
-      if (!any) continue;
+      if (most == 0) continue;
       // Texels from pixel to pixel: at most one texel of the level keeps the picture smooth.
       double spacing = 1;
       for (std::size_t i = 0; i + 1 < size; ++i) {
@@ -227,7 +215,7 @@ void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, const 
       const int level = std::clamp(static_cast<int>(std::lround(std::log2(0.7 * spacing))), 0,
                                    patch.texture.highest_level());
       for (std::size_t i = 0; i < size; ++i) {
-        if (cover[i] <= 0) continue;
+        if (cover[i] * open[i] <= 0) continue;
         shine[i] += open[i] * cover[i] * patch.texture.sample(texel_x[i], texel_y[i], level);
         open[i] *= 1 - cover[i];
       }

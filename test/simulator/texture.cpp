@@ -37,18 +37,10 @@ cv::Mat finest_contrast(const cv::Mat& photo) {
 }  // namespace
 
 Texture::Texture(const cv::Mat& picture) {
-  cv::Mat level = picture;
+  cv::Mat level = cv::min(cv::max(picture, 0), 1);
   for (double scale = 1;; scale /= 2) {
-    Level stored{level.cols, level.rows, scale, {}};
-    stored.texels.reserve(level.total());
-    for (int y = 0; y < level.rows; ++y) {
-      for (int x = 0; x < level.cols; ++x) {
-        const float value = std::clamp(level.at<float>(y, x), 0.0F, 1.0F);
-        stored.texels.push_back(static_cast<std::uint16_t>(std::lround(value * kWhite)));
-      }
-    }
-    levels_.push_back(std::move(stored));
-    if (level.cols < 8 || level.rows < 8) break;
+    levels_.push_back({level, level.ptr<float>(), level.cols, level.rows, scale});
+    if (level.cols < 8 || level.rows < 8) return;
     cv::Mat even;
     cv::copyMakeBorder(level, even, 0, level.rows % 2, 0, level.cols % 2, cv::BORDER_REPLICATE);
     cv::Mat half;

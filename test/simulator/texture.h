@@ -10,9 +10,10 @@
 // tied to the photo's own pixels: it is the same whatever part is wanted and however densely.
 // Sampling is thread-safe and does not allocate.
 
+#include <Eigen/Core>
 #include <algorithm>
-#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <opencv2/core.hpp>
 #include <vector>
@@ -21,11 +22,9 @@ namespace alidade::simulator {
 
 class Texture {
  public:
-  // CV_32F, [0, 1]
+  // CV_32F; clipped to [0, 1]
   explicit Texture(const cv::Mat& picture);
 
-  [[nodiscard]] int width() const { return levels_.front().width; }
-  [[nodiscard]] int height() const { return levels_.front().height; }
   [[nodiscard]] int highest_level() const { return static_cast<int>(levels_.size()) - 1; }
 
   // Beyond the border the outermost texel goes on.
@@ -36,47 +35,42 @@ class Texture {
     const double row = std::max(y * picture.scale - 0.5, -2.0);
     const int left = static_cast<int>(column + 2) - 2;
     const int top = static_cast<int>(row + 2) - 2;
-    const std::array<float, 4> across = weights(static_cast<float>(column - left));
-    const std::array<float, 4> down = weights(static_cast<float>(row - top));
+    const Eigen::Array4f down = weights(static_cast<float>(row - top));
     const int i = left - 1;
     const int j = top - 1;
-    std::array<float, 4> columns{};
+    Eigen::Array4f columns = Eigen::Array4f::Zero();
     if (i >= 0 && j >= 0 && i + 4 <= picture.width && j + 4 <= picture.height) {
-      const std::uint16_t* texel = picture.texels.data() + picture.offset(i, j);
-      for (std::size_t n = 0; n < 4; ++n, texel += picture.width) {
-        for (std::size_t m = 0; m < 4; ++m) columns[m] += down[n] * static_cast<float>(texel[m]);
+      const float* texels = picture.first + j * picture.width + i;
+      for (int n = 0; n < 4; ++n, texels += picture.width) {
+        columns += down[n] * Eigen::Array4f::Map(texels);
       }
     } else {
       for (int n = 0; n < 4; ++n) {
-        const int y_texel = std::clamp(j + n, 0, picture.height - 1);
+        const float* texels =
+            picture.first +
+            std::clamp<std::ptrdiff_t>(j + n, 0, picture.height - 1) * picture.width;
         for (int m = 0; m < 4; ++m) {
-          const int x_texel = std::clamp(i + m, 0, picture.width - 1);
-          columns[static_cast<std::size_t>(m)] +=
-              down[static_cast<std::size_t>(n)] * picture.texels[picture.offset(x_texel, y_texel)];
+          columns[m] += down[n] * texels[std::clamp<std::ptrdiff_t>(i + m, 0, picture.width - 1)];
         }
       }
     }
-    return (across[0] * columns[0] + across[1] * columns[1] + across[2] * columns[2] +
-            across[3] * columns[3]) *
-           (1.0F / kWhite);
+    return (weights(static_cast<float>(column - left)) * columns).sum();
   }
 
  private:
-  static constexpr float kWhite = 65535;
-
   struct Level {
-    int width, height;
+    cv::Mat texels;  // rows without gaps
+    const float* first;
+    std::ptrdiff_t width, height;
     double scale;  // 2^-level
-    std::vector<std::uint16_t> texels;
-    [[nodiscard]] std::size_t offset(int x, int y) const {
-      return static_cast<std::size_t>(y) * static_cast<std::size_t>(width) +
-             static_cast<std::size_t>(x);
-    }
   };
 
-  static std::array<float, 4> weights(float t) {
-    return {t * (-0.5F + t * (1 - 0.5F * t)), 1 + t * t * (1.5F * t - 2.5F),
-            t * (0.5F + t * (2 - 1.5F * t)), t * t * (0.5F * t - 0.5F)};
+  // Of the texels at -1, 0, 1 and 2 for a point at t in [0, 1).
+  static Eigen::Array4f weights(float t) {
+    const Eigen::Array4f linear(-0.5F, 0, 0.5F, 0);
+    const Eigen::Array4f square(1, -2.5F, 2, -0.5F);
+    const Eigen::Array4f cube(-0.5F, 1.5F, -1.5F, 0.5F);
+    return Eigen::Array4f(0, 1, 0, 0) + t * (linear + t * (square + t * cube));
   }
 
   std::vector<Level> levels_;
