@@ -357,16 +357,18 @@ TEST(TelemetryBuffer, KeepsEveryRepeatOfADeviceThatMeasuresForEachPoll) {
   EXPECT_NEAR(result.rate.pan, 0, 1e-12);
 }
 
-TEST(TelemetryBuffer, ALateSampleWithinAStandstillEndsIt) {
+TEST(TelemetryBuffer, NoLongerBelievesInAStandstillThatALateSampleContradicts) {
   TelemetryLimits limits;
   limits.max_repeat_s = 0.01;
   TelemetryBuffer<16> buffer(quiet(), limits);
-  expect_stored(buffer, {0.00, 0, 0.1, 0});
-  expect_stored(buffer, {0.05, 0, 0.1, 0});
-  EXPECT_EQ(buffer.push({0.02, 0, 0.3, 0}), PushStatus::kOutOfOrderStored);
+  for (int i = 0; i <= 40; ++i) expect_stored(buffer, {0.05 * i, 0, 0.1, 0});
   InterpolatedPanTilt result;
-  ASSERT_EQ(buffer.query(0.03, 0, &result), QueryStatus::kOk);
-  EXPECT_NEAR(result.rate.pan, -0.2 / 0.02, 1e-9);
+  ASSERT_EQ(buffer.query(1, 0, &result), QueryStatus::kOk);
+  EXPECT_EQ(result.rate.pan, 0);
+  EXPECT_EQ(buffer.push({0.02, 0, 0.3, 0}), PushStatus::kOutOfOrderStored);
+  EXPECT_EQ(buffer.query(1, 0, &result), QueryStatus::kGap);
+  ASSERT_EQ(buffer.query(0.01, 0, &result), QueryStatus::kOk);
+  EXPECT_NEAR(result.rate.pan, 0.2 / 0.02, 1e-9);
 }
 
 TEST(TelemetryBuffer, StartsAfreshAfterClear) {
