@@ -78,10 +78,10 @@ std::string report_video(const Sampled<Frame>& video, const NamedCalibration& ca
                       : last.stamp.sequence    ? "sequence numbers"
                                                : "arrival times only";
   const Camera<double>& camera = calibration.calibration.camera;
-  std::string size = "no calibration to compare with";
-  if (calibration.calibrated) {
+  std::string size = "no size to compare with";
+  if (camera.width > 0) {
     const bool match = first.width == camera.width && first.height == camera.height;
-    size = match ? "as calibrated" : "not as calibrated";
+    size = match ? "as expected" : "not as expected";
     if (!match) {
       errors->push_back(
           fmt::format("video: frames of {}x{} px, but {} is for {}x{} px; set the camera to the "

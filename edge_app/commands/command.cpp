@@ -1,5 +1,6 @@
 #include "edge_app/commands/command.h"
 
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
@@ -34,9 +35,25 @@ NamedCalibration choose_calibration(const Config& config) {
   const std::string& file = config.calibration.file;
   const bool not_yet = config.calibration.automatic && config.camera.focal_length_px &&
                        !std::filesystem::exists(file);
-  if (!file.empty() && !not_yet) return require_calibration_file(file);
+  const VideoConfig& video = config.video;
+  if (!file.empty() && !not_yet) {
+    NamedCalibration chosen = require_calibration_file(file);
+    const Camera<double>& camera = chosen.calibration.camera;
+    if (video.width > 0 && (video.width != camera.width || video.height != camera.height)) {
+      throw CommandError(
+          kExitUsage,
+          fmt::format(
+              "{}: is for {}x{} px, but the configuration's video is {}x{} px; set "
+              "video.width and video.height to the calibration's, or calibrate at this size",
+              file, camera.width, camera.height, video.width, video.height));
+    }
+    return chosen;
+  }
   if (not_yet) spdlog::warn("{}: no calibration yet; the data sheet's camera is used", file);
-  return {data_sheet_calibration(config.camera), false, "data sheet"};
+  NamedCalibration chosen{data_sheet_calibration(config.camera), false, "data sheet"};
+  chosen.calibration.camera.width = video.width;
+  chosen.calibration.camera.height = video.height;
+  return chosen;
 }
 
 Calibration data_sheet_calibration(const CameraConfig& camera) {

@@ -14,6 +14,7 @@ namespace fs = std::filesystem;
 
 constexpr NumberRange kSeconds{0.1, 3600, "s"};
 constexpr NumberRange kAngle{0, 0.1, "rad"};
+constexpr NumberRange kPixels{1, 65536, "px"};
 
 std::string path_relative_to(const std::string& config_path, const std::string& path) {
   return (fs::path(config_path).parent_path() / path).string();
@@ -85,6 +86,11 @@ VideoConfig read_video(YamlSection section, const std::string& path) {
     }
   }
   if (video.type != VideoConfig::Type::kRecording) {
+    video.width = section.integer("width", kPixels).value_or(0);
+    video.height = section.integer("height", kPixels).value_or(0);
+    if ((video.width == 0) != (video.height == 0)) {
+      section.fail(video.width == 0 ? "height" : "width", "stands alone; give width and height");
+    }
     video.timeout_s = section.number("timeout_s", kSeconds).value_or(video.timeout_s);
     video.max_backoff_s = section.number("max_backoff_s", kSeconds).value_or(video.max_backoff_s);
   }

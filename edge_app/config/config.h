@@ -21,6 +21,8 @@ struct VideoConfig {
   std::string url;              // rtsp: rtsp://...; rtp: an .sdp file or rtp://address:port
   std::string format = "MJPG";  // rtp://address:port: MJPG or H264
   std::string directory;        // recording
+  int width = 0;                // px, what live video must have; 0: whatever comes
+  int height = 0;               // px
   std::string user;             // rtsp
   std::string password;
   Transport transport = Transport::kTcp;  // rtsp

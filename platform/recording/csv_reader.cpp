@@ -2,6 +2,7 @@
 
 #include <cerrno>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -10,20 +11,21 @@ namespace alidade {
 
 bool check_csv_file(const std::string& path, std::string* error) {
   errno = 0;
-  std::ifstream file(path, std::ios::binary | std::ios::ate);
+  std::ifstream file(path, std::ios::binary);
   if (!file) {
     *error = path + ": " + std::strerror(errno);
     return false;
   }
-  char last = '\n';
-  if (file.tellg() > 0) {
-    file.seekg(-1, std::ios::end);
-    file.get(last);
+  std::int64_t lines = 0;
+  for (std::string line; std::getline(file, line); ++lines) {
+    if (!file.eof()) continue;  // it ended with its newline
+    *error = path + ":" + std::to_string(lines + 1) +
+             ": the file is cut off: its last line does not end with a newline; delete that line, "
+             "or complete it";
+    return false;
   }
-  if (!file || last != '\n') {
-    *error = path +
-             ": the file is cut off: its last line does not end with a newline; delete that " +
-             "line, or complete it";
+  if (file.bad()) {
+    *error = path + ": " + std::strerror(errno);
     return false;
   }
   return true;

@@ -246,6 +246,18 @@ TEST_F(CommandLineTest, MissingCalibrationIsABadConfiguration) {
   EXPECT_THAT(result.errors, HasSubstr(path("calibration.yaml")));
 }
 
+TEST_F(CommandLineTest, VideoSizeOtherThanTheCalibrationsIsABadConfiguration) {
+  directory_.write("calibration.yaml", head_.calibration());
+  const std::string config = directory_.write(
+      "alidade.yaml",
+      "video: {type: rtsp, url: 'rtsp://127.0.0.1:9/stream', width: 1280, height: 720}\n"
+      "pan_tilt: {type: vapix, url: 'http://127.0.0.1:9'}\n"
+      "calibration: {file: calibration.yaml}\n");
+  const Result result = alidade({"run", "-c", config});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"), HasSubstr("1280x720")));
+}
+
 TEST_F(CommandLineTest, CheckNamesAnUnreachableCameraByItsAddress) {
   const Result result = alidade({"check", "-c", live_config()});
   EXPECT_EQ(result.exit_code, 1);
@@ -439,7 +451,7 @@ TEST_F(CommandLineTest, CheckReportsBothStreamsAndTheSizes) {
   directory_.write("calibration.yaml", head_.calibration());
   Result result = alidade({"check", "-c", recorded_config(), "--duration", "0.5"});
   EXPECT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.output, AllOf(HasSubstr("1920x1080 px (as calibrated), 25.00 Hz"),
+  EXPECT_THAT(result.output, AllOf(HasSubstr("1920x1080 px (as expected), 25.00 Hz"),
                                    HasSubstr("100.00 Hz"), HasSubstr("known to 2.0 ms")));
   directory_.write("calibration.yaml", head_.calibration(1280, 720));
   result = alidade({"check", "-c", recorded_config(), "--duration", "0.5"});

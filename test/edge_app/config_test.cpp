@@ -66,7 +66,8 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   ::setenv("ALIDADE_TEST_PASSWORD", "secret", 1);
   ASSERT_THAT(
       load("video: {type: rtsp, url: 'rtsp://camera/s', transport: udp, user: eve,\n"
-           "        password_env: ALIDADE_TEST_PASSWORD, timeout_s: 2.5, max_backoff_s: 8}\n"
+           "        password_env: ALIDADE_TEST_PASSWORD, timeout_s: 2.5, max_backoff_s: 8,\n"
+           "        width: 1280, height: 720}\n"
            "pan_tilt: {type: vapix, url: 'https://camera', user: eve, camera: 2, rate_hz: 12.5,\n"
            "           password_env: ALIDADE_TEST_PASSWORD, timeout_s: 0.5, max_backoff_s: 9,\n"
            "           angle_sigma_rad: 2e-5, angle_quantum_rad: 1e-4}\n"
@@ -80,6 +81,8 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.video.transport, VideoConfig::Transport::kUdp);
   EXPECT_EQ(config_.video.user, "eve");
   EXPECT_EQ(config_.video.password, "secret");
+  EXPECT_EQ(config_.video.width, 1280);
+  EXPECT_EQ(config_.video.height, 720);
   EXPECT_EQ(config_.video.timeout_s, 2.5);
   EXPECT_EQ(config_.video.max_backoff_s, 8);
   EXPECT_EQ(config_.pan_tilt.camera, 2);
@@ -100,6 +103,14 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_TRUE(config_.realtime.lock_memory);
   EXPECT_EQ(config_.realtime.max_extrapolation_s, 0.5);
   EXPECT_EQ(config_.output, OutputFormat::kCsv);
+}
+
+TEST_F(ConfigTest, WidthWithoutHeightIsRefused) {
+  const std::string error = load(
+      "video:\n  type: rtsp\n  url: rtsp://camera/s\n  width: 1280\n"
+      "pan_tilt: {type: vapix, url: http://camera}\n"
+      "camera: {focal_length_px: 1000}\n");
+  EXPECT_EQ(error, path_ + ":4: video.width: stands alone; give width and height");
 }
 
 TEST_F(ConfigTest, RecordingAndRtpSourcesAreRead) {

@@ -22,7 +22,7 @@ ALIDADE = os.environ["ALIDADE"]
 SIMULATE = os.environ["ALIDADE_SIMULATE"]
 DEADLINE_S = 90  # for any one event: a sanitized build on a busy machine is slow
 
-IMAGE = {"width": 320, "height": 180, "rate_hz": 25}
+IMAGE = {"width": 320, "height": 192, "rate_hz": 25}  # RTP's JPEG comes in blocks of 8 px
 FOCAL_LENGTH_PX = 5335.0  # the paper's field of view of 3.4 degrees
 LINE_DELAY_US = -60.0
 CLOCK_OFFSET_MS = -84.4
@@ -79,10 +79,7 @@ class Process:
             thread.join()
         self.child.stdout.close()
         self.child.stderr.close()
-        rest = []
-        while (line := self.lines.get_nowait()) is not None:
-            rest.append(line)
-        return self.child.returncode, rest
+        return self.child.returncode, [line for line in list(self.lines.queue) if line is not None]
 
 
 class Camera(Process):

@@ -110,8 +110,8 @@ class Run(SystemTest):
         run = self.alidade("run", "-c", config)
         code, _ = run.end()
         self.assertNotEqual(code, 0)
-        self.assertIn("640x180", run.error_text())
-        self.assertIn("320x180", run.error_text())
+        self.assertIn("640x192", run.error_text())
+        self.assertIn("320x192", run.error_text())
 
     def test_ends_when_its_reader_goes_away(self):
         camera = self.camera()
@@ -126,7 +126,7 @@ class Run(SystemTest):
         check = self.alidade("check", "-c", self.write_config(camera))
         code, lines = check.end()
         self.assertEqual(code, 0, check.error_text())
-        self.assertIn("320x180", "\n".join(lines))
+        self.assertIn("320x192", "\n".join(lines))
 
 
 class Record(SystemTest):

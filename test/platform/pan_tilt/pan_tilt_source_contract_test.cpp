@@ -12,7 +12,7 @@
 #include "platform/pan_tilt/vapix_source.h"
 #include "test/platform/support/axis_server.h"
 #include "test/platform/support/eventually.h"
-#include "test/platform/support/temporary_directory.h"
+#include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {

@@ -3,7 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "test/platform/support/temporary_directory.h"
+#include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <thread>
 
-#include "test/platform/support/temporary_directory.h"
+#include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {

@@ -5,7 +5,7 @@
 
 #include <ostream>
 
-#include "test/platform/support/temporary_directory.h"
+#include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {
@@ -119,7 +119,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(FramesCsv, TakesAFileThatIsCutOffInItsLastNumberForMalformed) {
   const FramesCsv csv("frame,receive_time_s\n0,1.25\n1,1.5");
   EXPECT_FALSE(csv.ok);
-  EXPECT_THAT(csv.error, AllOf(HasSubstr("/frames.csv: "), HasSubstr("cut off")));
+  EXPECT_THAT(csv.error, AllOf(HasSubstr("/frames.csv:3: "), HasSubstr("cut off")));
 }
 
 TEST(FramesCsv, SaysThatItIsMissing) {

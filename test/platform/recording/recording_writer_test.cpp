@@ -11,7 +11,7 @@
 #include <thread>
 
 #include "platform/recording/recording.h"
-#include "test/platform/support/temporary_directory.h"
+#include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {

@@ -13,7 +13,7 @@
 #include "test/platform/support/eventually.h"
 #include "test/platform/support/rtp_sender.h"
 #include "test/platform/support/rtsp_server.h"
-#include "test/platform/support/temporary_directory.h"
+#include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "test/platform/support/eventually.h"
 #include "test/platform/support/picture_files.h"
-#include "test/platform/support/temporary_directory.h"
+#include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {

@@ -18,7 +18,7 @@
 #include "platform/video/recording_frame_source.h"
 #include "test/platform/support/eventually.h"
 #include "test/platform/support/rtp_sender.h"
-#include "test/platform/support/temporary_directory.h"
+#include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {
