@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <memory>
 #include <thread>
 
@@ -69,30 +70,35 @@ TEST(RealtimeStage, EndsBehindTheLastMessage) {
   EXPECT_EQ(count_records(stage.get()), 1);
 }
 
-// Every kind of message, fed by two other threads as in the pipeline, while the guard watches this one.
+// Every kind of message, fed by two other threads as in the pipeline, while the guard watches this one. The
+// feeders take turns, so that each frame has its telemetry however they are scheduled.
 TEST(RealtimeStage, AllocatesNothing) {
   constexpr int kRounds = 1000;
   const auto stage = make_stage();
+  std::atomic<int> frames{0};
+  std::atomic<int> samples{0};
   std::thread capture([&] {
     for (int i = 0; i < kRounds; ++i) {
+      while (samples <= i) std::this_thread::yield();
       VideoMessage message = frame_message(i);
       if (i % 3 == 0) message.stamp.sender_time_s = 0.04 * i;
       if (i % 3 == 1) message.stamp.sequence = i;
       message.stamp.restarted = i % 100 == 0;
       if (i % 50 == 49) message.kind = VideoMessage::Kind::kLost;
       stage->push(message);
-      std::this_thread::yield();
+      ++frames;
     }
     stage->end_input();
   });
   std::thread telemetry([&] {
     for (int i = 0; i < kRounds; ++i) {
+      while (frames < i) std::this_thread::yield();
       TelemetryMessage message = sample_message(0.001 * (i % 1000));
       if (i % 1000 > 500) message.sample.sequence = i;
       message.sample.restarted = i % 700 == 0;
       if (i % 60 == 59) message.kind = TelemetryMessage::Kind::kLost;
       stage->push(message);
-      std::this_thread::yield();
+      ++samples;
     }
   });
   std::int64_t records = 0;
