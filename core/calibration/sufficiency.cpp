@@ -1,0 +1,220 @@
+#include "core/calibration/sufficiency.h"
+
+#include <Eigen/Eigenvalues>
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+
+namespace alidade::internal {
+
+namespace {
+
+// Limits of use. An error of the clock offset shows at the mount's rate, one of the others over half an image.
+constexpr double kMinImageMotion = 5;          // px in half a second
+constexpr double kMinCorrelation = 0.6;        // of image motion and telemetry
+constexpr double kMinTravelShare = 0.03;       // of the image's width, of each axis
+constexpr double kMinRateVariation = 0.05;     // of the rate
+constexpr double kMaxFieldOfViewRatio = 0.2;   // least focal length / width: 136 deg
+constexpr double kMaxFocalLengthError = 0.05;  // relative
+constexpr double kMaxClockOffsetError = 0.01;  // s
+constexpr double kMaxReadoutError = 5e-3;      // s from the first to the last row
+constexpr double kMaxDistortionError = 0.02;   // of the distance from the centre, in the corner
+
+std::string text(const char* format, double a, double b = 0) {
+  char buffer[320];
+  std::snprintf(buffer, sizeof buffer, format, a, b);
+  return buffer;
+}
+
+double sigma(const Calibration& c, Parameter parameter) {
+  return std::sqrt(c.covariance(index(parameter), index(parameter)));
+}
+
+// The direction in which the parameters are most uncertain together.
+void describe_weakest(CalibrationResult* result) {
+  const auto& cov = result->calibration.covariance;
+  // Exact parameters stand apart with a correlation of 1 with themselves: they are never the extremes.
+  ParameterCovariance<double> correlation = ParameterCovariance<double>::Identity();
+  for (int i = 0; i < kParameterCount; ++i) {
+    for (int j = 0; j < kParameterCount; ++j) {
+      if (cov(i, i) > 0 && cov(j, j) > 0) {
+        correlation(i, j) = cov(i, j) / std::sqrt(cov(i, i) * cov(j, j));
+      }
+    }
+  }
+  const Eigen::SelfAdjointEigenSolver<ParameterCovariance<double>> eigen(correlation);
+  const auto& values = eigen.eigenvalues();
+  result->quality.condition = values[kParameterCount - 1] / std::max(values[0], 1e-300);
+  const Eigen::Matrix<double, kParameterCount, 1> direction =
+      eigen.eigenvectors().col(kParameterCount - 1);
+  int strongest = 0;
+  direction.cwiseAbs().maxCoeff(&strongest);
+  std::string words;
+  for (int i = 0; i < kParameterCount; ++i) {
+    // Half the strongest's share or more takes part.
+    if (std::abs(direction[i]) < 0.5 * std::abs(direction[strongest])) continue;
+    const bool up = direction[i] * direction[strongest] > 0;
+    words += words.empty() ? "" : " with ";
+    words += to_string(static_cast<Parameter>(i));
+    words += up ? " up" : " down";
+  }
+  result->quality.weakest_direction = words;
+}
+
+}  // namespace
+
+MotionExtent measure_motion(const TrajectorySpline& trajectory) {
+  constexpr int kSteps = 1000;
+  Vector2<double> low = Vector2<double>::Constant(1e300);
+  Vector2<double> high = -low;
+  Vector2<double> sum = Vector2<double>::Zero();
+  Vector2<double> squares = Vector2<double>::Zero();
+  MotionExtent extent;
+  extent.largest_rate.setZero();
+  for (int i = 0; i <= kSteps; ++i) {
+    const auto basis = trajectory.basis(trajectory.begin_s() +
+                                        (trajectory.end_s() - trajectory.begin_s()) * i / kSteps);
+    const Vector2<double> angle = trajectory.position(basis).vector();
+    const Vector2<double> rate = trajectory.rate(basis).vector();
+    low = low.cwiseMin(angle);
+    high = high.cwiseMax(angle);
+    extent.largest_rate = extent.largest_rate.cwiseMax(rate.cwiseAbs());
+    sum += rate;
+    squares += rate.cwiseAbs2();
+  }
+  const double n = kSteps + 1;
+  extent.range = high - low;
+  extent.varying_rate = (squares / n - (sum / n).cwiseAbs2()).cwiseMax(0).cwiseSqrt();
+  return extent;
+}
+
+CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
+                               const TrajectorySpline& telemetry, const MotionMatch& match,
+                               const CalibrationInput& input, std::string* why) {
+  if (motion.size() < 3) {
+    *why =
+        "hardly two frames share three landmarks over half a second: track landmarks longer, or "
+        "move "
+        "more slowly";
+    return CalibrationStatus::kTooFewLandmarks;
+  }
+  double largest_shift = 0;
+  for (const ImageMotion& m : motion) largest_shift = std::max(largest_shift, m.shift.norm());
+  if (largest_shift < kMinImageMotion) {
+    *why = text(
+        "the image moves by no more than %.1f px in half a second: pan and tilt while recording, "
+        "best along a figure that crosses the field of view in some seconds",
+        largest_shift);
+    return CalibrationStatus::kNoMotion;
+  }
+  const MotionExtent extent = measure_motion(telemetry);
+  const double rate = extent.largest_rate.norm();
+  const double in_px = match.focal_length;
+  if (match.correlation > kMinCorrelation && in_px < kMaxFieldOfViewRatio * input.width) {
+    *why = text(
+        "image motion against telemetry gives a focal length of %.0f px, a field of view no lens "
+        "of this "
+        "kind has: are the angles in degrees? Radians are needed",
+        in_px);
+    return CalibrationStatus::kBadInput;
+  }
+  // Only with rates above what smoothed noise makes of rest.
+  if (match.correlation > kMinCorrelation &&
+      extent.varying_rate.norm() < kMinRateVariation * rate) {
+    *why =
+        "pan and tilt move at constant velocity: clock offset and line delay cannot be told from a "
+        "turned "
+        "scene; change speed and direction some times";
+    return CalibrationStatus::kConstantVelocity;
+  }
+  if (match.correlation < kMinCorrelation) {
+    *why = text(
+        "telemetry does not describe the motion seen in the video (best correlation %.2f with the "
+        "clocks shifted by %.3f s): is it of the same camera and the same time, and are pan right "
+        "and "
+        "tilt up positive?",
+        match.correlation, match.shift_s);
+    return CalibrationStatus::kTelemetryMismatch;
+  }
+  for (int axis = 0; axis < 2; ++axis) {
+    if (extent.range[axis] * in_px >= kMinTravelShare * input.width) continue;
+    *why = std::string(axis == 0 ? "pan" : "tilt") +
+           text(
+               " moves the image by %.0f px only: both axes have to move, by a good part of the "
+               "image or more",
+               extent.range[axis] * in_px);
+    return CalibrationStatus::kOneAxisOnly;
+  }
+  return CalibrationStatus::kOk;
+}
+
+void judge(const CalibrationOptions& options, const MotionExtent& motion,
+           CalibrationResult* result) {
+  const Calibration& c = result->calibration;
+  auto& advice = result->quality.advice;
+  describe_weakest(result);
+
+  std::vector<std::string> reasons;
+  const double f_error = sigma(c, Parameter::kFocalLength) / c.camera.focal_length;
+  const auto correlation = [&c](Parameter a, Parameter b) {
+    const double scale = sigma(c, a) * sigma(c, b);
+    return scale > 0 ? c.covariance(index(a), index(b)) / scale : 0.0;
+  };
+  const bool scale_from_prior =
+      options.pan_scale.sigma > 0 &&
+      sigma(c, Parameter::kPanScale) > 0.5 * options.pan_scale.sigma &&
+      std::abs(correlation(Parameter::kFocalLength, Parameter::kPanScale)) > 0.95;
+  if (scale_from_prior) {
+    advice.push_back(text(
+        "scales and focal length cannot be told apart in this field of view: the focal length "
+        "is known to %.2g relative to the telemetry's scale, which is believed to %.2g; turning "
+        "a whole circle, or a wider field of view, would separate them",
+        f_error, options.pan_scale.sigma));
+  }
+  if (f_error > kMaxFocalLengthError && !scale_from_prior) {
+    reasons.push_back(
+        text("focal length known to %.1f %% only: move farther on both axes", 100 * f_error));
+  }
+  const double d_error = sigma(c, Parameter::kClockOffset);
+  if (d_error > kMaxClockOffsetError) {
+    reasons.push_back(
+        text("clock offset known to %.1f ms only (largest rate %.3f rad/s): change speed and "
+             "direction more and faster",
+             1e3 * d_error, motion.largest_rate.norm()));
+  }
+  const double readout_error = sigma(c, Parameter::kLineDelay) * c.camera.height;
+  if (readout_error > kMaxReadoutError) {
+    reasons.push_back(
+        text("read-out known to %.1f ms only: move faster while the image is read out",
+             1e3 * readout_error));
+  }
+  const double corner = 0.5 * std::hypot(c.camera.width, c.camera.height) / c.camera.focal_length;
+  const double distortion_error = sigma(c, Parameter::kRadialDistortion) * corner * corner;
+  if (distortion_error > kMaxDistortionError) {
+    reasons.push_back(
+        text("radial distortion known to %.1f %% of the radius only: let landmarks cross the whole "
+             "image",
+             100 * distortion_error));
+  }
+  for (const Parameter p :
+       {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
+    if (options.axis_sigma_rad > 0 && sigma(c, p) > 0.7 * options.axis_sigma_rad) {
+      advice.push_back(std::string(to_string(p)) +
+                       " rests on its prior: a larger range of the other axis would show it");
+    }
+  }
+  if (reasons.empty()) {
+    result->status = CalibrationStatus::kOk;
+    result->message =
+        text("focal length %.1f px (sigma %.2g)", c.camera.focal_length,
+             sigma(c, Parameter::kFocalLength)) +
+        text(", clock offset %.3f ms (sigma %.2g)", 1e3 * c.clock_offset, 1e3 * d_error);
+    return;
+  }
+  result->status = CalibrationStatus::kWeak;
+  for (const auto& reason : reasons) {
+    result->message += (result->message.empty() ? "" : "; ") + reason;
+  }
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,36 @@
+#pragma once
+// Can these data support a calibration, and what would help? Two looks:
+//   check_motion   before the adjustment: no motion, one axis only, telemetry that does not describe the video.
+//   judge          after it, from the covariance: a parameter that the data leave (nearly) open, constant velocity, a
+//                  scale that cannot be told from the focal length, axes and scales that only the prior holds;
+//                  the weakest direction in words.
+// The limits are those of use: what the calibration is for is to point a pixel. Allocates.
+
+#include <string>
+#include <vector>
+
+#include "core/calibration/adjustment.h"
+#include "core/calibration/calibrate.h"
+#include "core/calibration/initialization.h"
+
+namespace alidade::internal {
+
+// kOk, or a refusal and *why.
+[[nodiscard]] CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
+                                             const TrajectorySpline& telemetry,
+                                             const MotionMatch& match,
+                                             const CalibrationInput& input, std::string* why);
+
+// The motion that was there, true angles.
+struct MotionExtent {
+  Vector2<double> range;         // rad, largest less smallest
+  Vector2<double> largest_rate;  // rad/s
+  Vector2<double> varying_rate;  // rad/s, standard deviation of the rate
+};
+[[nodiscard]] MotionExtent measure_motion(const TrajectorySpline& trajectory);
+
+// Fills status, message, condition, weakest_direction and advice of a result whose calibration is complete.
+void judge(const CalibrationOptions& options, const MotionExtent& motion,
+           CalibrationResult* result);
+
+}  // namespace alidade::internal

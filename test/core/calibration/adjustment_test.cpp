@@ -1,0 +1,196 @@
+#include "core/calibration/adjustment.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "core/model/rolling_shutter.h"
+
+namespace alidade::internal {
+namespace {
+
+// A state, and data that it explains exactly: every observation is the solved rolling-shutter projection.
+struct Scene {
+  AdjustmentState state;
+  AdjustmentData data;
+  AdjustmentPriors priors;
+  std::array<bool, kGlobalCount> fixed{};
+};
+
+Scene make_scene() {
+  Scene scene;
+  AdjustmentState& s = scene.state;
+  s.camera = {3000, 1.02, 0, 1920, 1080};
+  s.distortion = 0.02;
+  s.readout_s = 0.02;
+  s.mechanics.pan_axis = Vector3<double>(0.03, -0.01, 1).normalized();
+  s.mechanics.tilt_axis = Vector3<double>(-0.02, 1, 0.04).normalized();
+  s.mechanics.pan_scale = 1.01;
+  s.mechanics.tilt_scale = 0.98;
+  s.shift_s = 0.03;
+  s.drift = 1e-4;
+  s.trajectory = TrajectorySpline({0, 0.5, 0.7, 1.2, 2});
+  for (int i = 0; i < s.trajectory.control_points(); ++i) {
+    s.trajectory.control_point(i) = {0.6 + 0.08 * std::sin(1.1 * i), 0.05 * std::cos(1.3 * i)};
+  }
+  s.anchor = {0.6, 0.0};
+  const Matrix3<double> R_base_from_anchor = R_base_from_camera(s.mechanics, s.anchor);
+  for (int i = 0; i < 40; ++i) {
+    s.landmarks.push_back(
+        Vector3<double>(0.3 * std::sin(2.1 * i), 0.2 * std::cos(1.7 * i), 1).normalized());
+  }
+  for (int f = 0; f < 12; ++f) scene.data.frame_time_s.push_back(0.1 + 0.15 * f);
+  for (int l = 0; l < 40; ++l) {
+    const Vector3<double> d_b = R_base_from_anchor * s.landmarks[static_cast<std::size_t>(l)];
+    for (int f = 0; f < 12; ++f) {
+      // The spline is no constant rate: expand about the row that is found, until it stays.
+      const double t0 = scene.data.frame_time_s[static_cast<std::size_t>(f)];
+      Vector2<double> u(960, 540);
+      bool seen = true;
+      for (int pass = 0; pass < 20 && seen; ++pass) {
+        const double t = t0 + u.y() * s.line_delay();
+        const FrameMotion<double> motion{s.trajectory.position(t), s.trajectory.rate(t), u.y()};
+        seen = rolling_shutter_project(s.physical_camera(), s.mechanics, s.line_delay(), motion,
+                                       d_b, &u) == ProjectionStatus::kOk;
+      }
+      if (!seen || u.x() < 0 || u.x() > 1920 || u.y() < 0 || u.y() > 1080) continue;
+      scene.data.observations.push_back({l, f, u, 0.3, true});
+    }
+  }
+  const Vector2<double> scale(s.mechanics.pan_scale, s.mechanics.tilt_scale);
+  scene.data.reference_s = 1;
+  for (int i = 0; i < 60; ++i) {
+    const double t = 0.04 + 0.032 * i;
+    const double image_time = t - s.shift_s + s.drift * (t - scene.data.reference_s);
+    scene.data.telemetry.push_back({t,
+                                    scale.cwiseProduct(s.trajectory.position(image_time).vector()),
+                                    Vector2<double>(1e-4, 2e-4), true});
+  }
+  scene.priors.mean = s;
+  scene.priors.information.setConstant(100);
+  return scene;
+}
+
+// The normal equations of landmarks and all, as one dense vector: control points, parameters, landmarks.
+Eigen::VectorXd full_gradient(const Linearisation& at) {
+  Eigen::VectorXd g(at.g.size() + 2 * static_cast<Eigen::Index>(at.g_landmark.size()));
+  g.head(at.g.size()) = at.g;
+  for (std::size_t l = 0; l < at.g_landmark.size(); ++l) {
+    g.segment<2>(at.g.size() + 2 * static_cast<Eigen::Index>(l)) = at.g_landmark[l];
+  }
+  return g;
+}
+
+AdjustmentState moved(const AdjustmentState& state, const Eigen::VectorXd& x, Eigen::Index size) {
+  AdjustmentState result = state;
+  std::vector<Vector2<double>> x_landmark(state.landmarks.size());
+  for (std::size_t l = 0; l < x_landmark.size(); ++l) {
+    x_landmark[l] = x.segment<2>(size + 2 * static_cast<Eigen::Index>(l));
+  }
+  apply_step(x.head(size), x_landmark, &result);
+  return result;
+}
+
+TEST(Adjustment, ResidualIsThatOfTheSolvedRollingShutterProjection) {
+  const Scene scene = make_scene();
+  Adjustment adjustment(scene.data, scene.priors, scene.fixed);
+  Linearisation at;
+  adjustment.linearise(scene.state, {}, &at);
+  ASSERT_GT(scene.data.observations.size(), 200u);
+  for (const auto& residual : at.observations) {
+    ASSERT_TRUE(residual.valid);
+    EXPECT_LE(residual.error.norm(), 1e-8);
+  }
+  EXPECT_LE(at.cost, 1e-12);
+}
+
+TEST(Adjustment, NormalMatrixIsTheDerivativeOfItsGradientAtThePerfectFit) {
+  const Scene scene = make_scene();
+  Adjustment adjustment(scene.data, scene.priors, scene.fixed);
+  Linearisation at;
+  adjustment.linearise(scene.state, {}, &at);
+  const Eigen::Index size = at.g.size();
+  const Eigen::Index total = size + 2 * static_cast<Eigen::Index>(scene.state.landmarks.size());
+  Eigen::MatrixXd H = Eigen::MatrixXd::Zero(total, total);
+  H.topLeftCorner(size, size) = at.H;
+  for (std::size_t l = 0; l < at.H_landmark.size(); ++l) {
+    const Eigen::Index row = size + 2 * static_cast<Eigen::Index>(l);
+    H.block<2, 2>(row, row) = at.H_landmark[l];
+    for (std::size_t i = at.touched_begin[l]; i < at.touched_begin[l + 1]; ++i) {
+      H.block<2, 2>(row, 2 * at.touched[i]) = at.H_touched[i].transpose();
+    }
+    H.block<2, kCameraCount>(row, size - kGlobalCount) = at.H_camera[l].transpose();
+  }
+  H = H.selfadjointView<Eigen::Lower>();
+  int checked = 0;
+  for (Eigen::Index i = 0; i < total; ++i) {
+    // A step of 1e-3 standard deviations of this unknown alone.
+    const double step = 1e-3 / std::sqrt(H(i, i));
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(total);
+    Linearisation plus;
+    Linearisation minus;
+    x[i] = step;
+    adjustment.linearise(moved(scene.state, x, size), {}, &plus);
+    x[i] = -step;
+    adjustment.linearise(moved(scene.state, x, size), {}, &minus);
+    const Eigen::VectorXd numeric = (full_gradient(minus) - full_gradient(plus)) / (2 * step);
+    for (Eigen::Index j = 0; j < total; ++j) {
+      EXPECT_NEAR(numeric[j], H(j, i), 1e-5 * std::sqrt(H(i, i) * H(j, j))) << i << ", " << j;
+      ++checked;
+    }
+  }
+  EXPECT_EQ(checked, total * total);
+}
+
+TEST(Adjustment, EliminatingLandmarksGivesTheSolutionOfTheWholeSystem) {
+  Scene scene = make_scene();
+  for (std::size_t i = 0; i < scene.data.observations.size(); ++i) {
+    scene.data.observations[i].u += 0.3 * Vector2<double>(std::sin(7.0 * static_cast<double>(i)),
+                                                          std::cos(3.0 * static_cast<double>(i)));
+  }
+  Adjustment adjustment(scene.data, scene.priors, scene.fixed);
+  Linearisation at;
+  adjustment.linearise(scene.state, {}, &at);
+  Eigen::VectorXd x;
+  std::vector<Vector2<double>> x_landmark;
+  ASSERT_TRUE(adjustment.solve(at, 0, &x, &x_landmark));
+  // Put back into the normal equations.
+  const Eigen::MatrixXd H = at.H.selfadjointView<Eigen::Lower>();
+  Eigen::VectorXd left = H * x;
+  double scale = at.g.cwiseAbs().maxCoeff();
+  for (std::size_t l = 0; l < x_landmark.size(); ++l) {
+    Vector2<double> row = at.H_landmark[l] * x_landmark[l];
+    for (std::size_t i = at.touched_begin[l]; i < at.touched_begin[l + 1]; ++i) {
+      left.segment<2>(2 * at.touched[i]) += at.H_touched[i] * x_landmark[l];
+      row += at.H_touched[i].transpose() * x.segment<2>(2 * at.touched[i]);
+    }
+    left.segment<kCameraCount>(x.size() - kGlobalCount) += at.H_camera[l] * x_landmark[l];
+    row += at.H_camera[l].transpose() * x.segment<kCameraCount>(x.size() - kGlobalCount);
+    EXPECT_LE((row - at.g_landmark[l]).norm(), 1e-9 * scale);
+  }
+  EXPECT_LE((left - at.g).norm(), 1e-9 * scale);
+}
+
+TEST(Adjustment, ConvergesFromFarAwayAndHoldsWhatIsFixed) {
+  Scene scene = make_scene();
+  scene.fixed[static_cast<std::size_t>(index(Parameter::kAspect))] = true;
+  scene.priors.information.setConstant(0);
+  scene.priors.information[index(Parameter::kPanScale)] = 1e16;
+  scene.priors.information[index(Parameter::kTiltScale)] = 1e16;
+  scene.priors.information[kDrift] = 1e8;
+  Adjustment adjustment(scene.data, scene.priors, scene.fixed);
+  AdjustmentState start = scene.state;
+  start.camera.focal_length *= 1.2;
+  start.distortion = 0;
+  start.readout_s = 0;
+  start.shift_s += 0.005;
+  Linearisation at;
+  ASSERT_TRUE(adjustment.minimise({}, 50, 1e-6, &start, &at));
+  EXPECT_LE(at.cost, 1e-6);
+  EXPECT_NEAR(start.camera.focal_length, scene.state.camera.focal_length, 1e-3);
+  EXPECT_NEAR(start.readout_s, scene.state.readout_s, 1e-8);
+  EXPECT_EQ(start.camera.aspect, scene.state.camera.aspect);
+}
+
+}  // namespace
+}  // namespace alidade::internal

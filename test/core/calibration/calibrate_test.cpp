@@ -1,0 +1,353 @@
+#include "core/calibration/calibrate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "test/core/calibration/simulated_recording.h"
+
+namespace alidade {
+namespace {
+
+using test::calibration_error;
+using test::draw_base_simulation;
+using test::simulate;
+using test::Simulation;
+using ::testing::HasSubstr;
+
+// One error in 1.5e5 of a Gaussian is larger; a test looks at some hundred.
+constexpr double kSigmas = 4.5;
+
+void expect_within_sigmas(const Simulation& s, const CalibrationResult& result) {
+  ASSERT_TRUE(result.ok()) << to_string(result.status) << ": " << result.message;
+  const auto error = calibration_error(s, result.calibration);
+  for (int i = 0; i < kParameterCount; ++i) {
+    const double sigma = std::sqrt(result.calibration.covariance(i, i));
+    EXPECT_LE(std::abs(error[i]), kSigmas * sigma + 1e-15)
+        << to_string(static_cast<Parameter>(i)) << ", seed " << s.seed;
+  }
+}
+
+Simulation small_simulation(std::uint64_t seed) {
+  Simulation s;
+  s.seed = seed;
+  s.landmarks_per_field = 7;
+  return s;
+}
+
+TEST(Calibrate, ErrorsAreWhatItsCovarianceSays) {
+  constexpr int kRuns = 12;
+  Eigen::Matrix<double, kParameterCount, 1> nees;
+  nees.setZero();
+  for (int run = 0; run < kRuns; ++run) {
+    const Simulation s = draw_base_simulation(static_cast<std::uint64_t>(100 + run));
+    const CalibrationResult result = calibrate(simulate(s));
+    ASSERT_TRUE(result.ok()) << result.message << ", seed " << s.seed;
+    const auto error = calibration_error(s, result.calibration);
+    for (int i = 0; i < kParameterCount; ++i) {
+      const double variance = result.calibration.covariance(i, i);
+      if (variance > 0) nees[i] += error[i] * error[i] / variance;
+    }
+  }
+  // 99.99 % of chi-square with 12 degrees of freedom lie in (1.6, 40).
+  for (const Parameter p :
+       {Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kLineDelay,
+        Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1,
+        Parameter::kClockOffset}) {
+    EXPECT_LT(nees[index(p)], 40) << to_string(p);
+    EXPECT_GT(nees[index(p)], 1.6) << to_string(p);
+  }
+  // The true scales are the prior's mean.
+  EXPECT_LT(nees[index(Parameter::kPanScale)], 1);
+  EXPECT_EQ(nees[index(Parameter::kAspect)], 0);
+}
+
+TEST(Calibrate, IsTheSameTwice) {
+  const CalibrationInput input = simulate(small_simulation(3));
+  const CalibrationResult a = calibrate(input);
+  const CalibrationResult b = calibrate(input);
+  ASSERT_TRUE(a.ok()) << a.message;
+  EXPECT_EQ(a.calibration.camera.focal_length, b.calibration.camera.focal_length);
+  EXPECT_EQ(a.calibration.covariance, b.calibration.covariance);
+}
+
+TEST(Calibrate, FindsAnyClockOffset) {
+  for (const double offset : {-1.0, -0.5, 0.5, 1.0, 1.7}) {
+    Simulation s = small_simulation(4);
+    s.clock_offset = offset;
+    s.duration_s = 12;
+    SCOPED_TRACE(offset);
+    expect_within_sigmas(s, calibrate(simulate(s)));
+  }
+}
+
+TEST(Calibrate, TakesLineDelaysOfEverySign) {
+  for (const double line_delay : {-20e-6, 0.0, 14e-6, 40e-6}) {
+    Simulation s = small_simulation(5);
+    s.line_delay = line_delay;
+    SCOPED_TRACE(line_delay);
+    expect_within_sigmas(s, calibrate(simulate(s)));
+  }
+}
+
+TEST(Calibrate, WorksAcrossTheSeamAtHalfATurn) {
+  Simulation s = small_simulation(6);
+  s.pan_offset_rad = 3.1;
+  expect_within_sigmas(s, calibrate(simulate(s)));
+}
+
+TEST(Calibrate, SurvivesLostFramesNumberedOrNot) {
+  for (const bool numbered : {true, false}) {
+    Simulation s = small_simulation(7);
+    s.lost_frames = 0.1;
+    s.with_sequence = numbered;
+    SCOPED_TRACE(numbered);
+    const CalibrationResult result = calibrate(simulate(s));
+    expect_within_sigmas(s, result);
+    EXPECT_GT(result.image_timing.lost, 0);
+  }
+}
+
+TEST(Calibrate, LeavesOutliersOut) {
+  Simulation s = small_simulation(8);
+  s.image_outliers = 0.2;
+  s.telemetry_outliers = 0.1;
+  const CalibrationInput input = simulate(s);
+  const CalibrationResult result = calibrate(input);
+  expect_within_sigmas(s, result);
+  EXPECT_NEAR(result.exclusions.observations_outliers,
+              0.2 * static_cast<double>(input.observations.size()),
+              0.03 * static_cast<double>(input.observations.size()));
+  EXPECT_GT(result.exclusions.telemetry_outliers, 50);
+}
+
+TEST(Calibrate, NeedsNoStatedNoise) {
+  Simulation s = small_simulation(9);
+  s.with_noise = false;
+  const CalibrationResult result = calibrate(simulate(s));
+  expect_within_sigmas(s, result);
+  EXPECT_NEAR(result.image_timing.stamp_sigma_s, s.image_stamp_sigma_s,
+              0.3 * s.image_stamp_sigma_s);
+}
+
+TEST(Calibrate, BelievesTheResidualsRatherThanAWrongStatementOfTheNoise) {
+  Simulation s = small_simulation(10);
+  CalibrationInput input = simulate(s);
+  for (auto& o : input.observations) o.sigma_px /= 3;
+  input.noise.pan_tilt_sigma_rad = s.pan_tilt_sigma / 2;
+  const CalibrationResult result = calibrate(input);
+  expect_within_sigmas(s, result);
+  EXPECT_NEAR(result.quality.pixel_sigma_ratio, 3, 0.2);
+  EXPECT_NEAR(result.quality.telemetry_sigma_ratio, 2, 0.3);
+}
+
+TEST(Calibrate, TakesQuantisedTelemetryForWhatItIs) {
+  for (const double quantum_deg : {0.01, 0.1}) {
+    Simulation s = small_simulation(11);
+    s.angle_quantum_rad = quantum_deg * kPi / 180;
+    SCOPED_TRACE(quantum_deg);
+    expect_within_sigmas(s, calibrate(simulate(s)));
+  }
+}
+
+TEST(Calibrate, EstimatesTheAspectWhenAsked) {
+  Simulation s = small_simulation(12);
+  s.aspect = 1.01;
+  CalibrationOptions options;
+  options.aspect = std::nullopt;
+  expect_within_sigmas(s, calibrate(simulate(s), options));
+}
+
+TEST(Calibrate, TakesOneSidedStamps) {
+  Simulation s = small_simulation(13);
+  s.one_sided_stamps = true;
+  CalibrationOptions options;
+  options.image_stamps = options.telemetry_stamps = StampNoise::kOneSided;
+  expect_within_sigmas(s, calibrate(simulate(s), options));
+}
+
+TEST(Calibrate, SaysThatScaleAndFocalLengthCannotBeToldApart) {
+  Simulation s = small_simulation(14);
+  s.focal_length = 60000;
+  s.pan_scale = 1.008;
+  s.tilt_scale = 0.995;
+  CalibrationOptions options;
+  options.pan_scale.sigma = options.tilt_scale.sigma = 0.01;
+  const CalibrationResult result = calibrate(simulate(s), options);
+  expect_within_sigmas(s, result);
+  ASSERT_FALSE(result.quality.advice.empty());
+  EXPECT_THAT(result.quality.advice.front(), HasSubstr("cannot be told apart"));
+  EXPECT_THAT(result.quality.weakest_direction, HasSubstr("pan_scale"));
+}
+
+TEST(Calibrate, RefusesACameraThatDoesNotMove) {
+  Simulation s = small_simulation(15);
+  s.path = [](double) { return Eigen::Vector2d(0.1, -0.05); };
+  const CalibrationResult result = calibrate(simulate(s));
+  EXPECT_EQ(result.status, CalibrationStatus::kNoMotion) << result.message;
+}
+
+TEST(Calibrate, RefusesPanAloneAndTiltAlone) {
+  for (const int axis : {0, 1}) {
+    Simulation s = small_simulation(16);
+    s.path = [axis](double t) {
+      Eigen::Vector2d angle = Eigen::Vector2d::Zero();
+      angle[axis] = 0.4 * std::sin(t);
+      return angle;
+    };
+    const CalibrationResult result = calibrate(simulate(s));
+    EXPECT_EQ(result.status, CalibrationStatus::kOneAxisOnly) << result.message;
+    EXPECT_THAT(result.message, HasSubstr(axis == 0 ? "tilt" : "pan"));
+  }
+}
+
+TEST(Calibrate, RefusesConstantVelocity) {
+  Simulation s = small_simulation(17);
+  s.path = [](double t) { return Eigen::Vector2d(0.05 * t, 0.02 * t); };
+  const CalibrationResult result = calibrate(simulate(s));
+  EXPECT_EQ(result.status, CalibrationStatus::kConstantVelocity) << result.message;
+}
+
+TEST(Calibrate, RefusesTelemetryOfSomethingElse) {
+  Simulation s = small_simulation(18);
+  CalibrationInput input = simulate(s);
+  s.path = [](double t) {
+    return Eigen::Vector2d(0.3 * std::sin(2.9 * t), 0.2 * std::cos(4.1 * t));
+  };
+  input.telemetry = simulate(s).telemetry;
+  const CalibrationResult result = calibrate(input);
+  EXPECT_EQ(result.status, CalibrationStatus::kTelemetryMismatch) << result.message;
+}
+
+TEST(Calibrate, RefusesAMirroredAxis) {
+  CalibrationInput input = simulate(small_simulation(19));
+  for (auto& sample : input.telemetry) sample.pan_rad = -sample.pan_rad;
+  const CalibrationResult result = calibrate(input);
+  EXPECT_EQ(result.status, CalibrationStatus::kTelemetryMismatch) << result.message;
+}
+
+TEST(Calibrate, RefusesTooFewLandmarks) {
+  CalibrationInput input = simulate(small_simulation(20));
+  std::vector<CalibrationObservation> few;
+  for (const auto& o : input.observations) {
+    for (std::size_t i = 0; i < 5; ++i) {
+      if (o.landmark == input.observations[i].landmark) few.push_back(o);
+    }
+  }
+  input.observations = few;
+  EXPECT_EQ(calibrate(input).status, CalibrationStatus::kTooFewLandmarks);
+}
+
+TEST(Calibrate, NoticesDegrees) {
+  CalibrationInput input = simulate(small_simulation(21));
+  for (auto& sample : input.telemetry) {
+    sample.pan_rad *= 180 / kPi;
+    sample.tilt_rad *= 180 / kPi;
+  }
+  const CalibrationResult result = calibrate(input);
+  EXPECT_EQ(result.status, CalibrationStatus::kBadInput);
+  EXPECT_THAT(result.message, HasSubstr("degrees"));
+}
+
+TEST(Calibrate, CountsWhatItLeavesOut) {
+  const Simulation s = small_simulation(22);
+  CalibrationInput input = simulate(s);
+  const double nan = std::numeric_limits<double>::quiet_NaN();
+  input.observations.push_back({3, 7, nan, 5, 0.3});
+  input.observations.push_back({3, 8, 5, 5, 0});
+  input.observations.push_back({999999, 8, 5, 5, 0.3});
+  input.observations.push_back({3, 9, -400, 5, 0.3});
+  input.observations.push_back({3, 987654321, 500, 500, 0.3});
+  input.observations.push_back(input.observations.front());
+  input.telemetry.push_back(input.telemetry.front());
+  input.telemetry[5].pan_rad = nan;
+  input.frames.push_back(input.frames.front());
+  const CalibrationResult result = calibrate(input);
+  expect_within_sigmas(s, result);
+  const CalibrationExclusions& excluded = result.exclusions;
+  EXPECT_EQ(excluded.observations_not_finite, 1);
+  EXPECT_EQ(excluded.observations_bad_sigma, 1);
+  EXPECT_EQ(excluded.observations_unknown_frame, 1);
+  EXPECT_EQ(excluded.observations_outside_image, 1);
+  EXPECT_GE(excluded.observations_of_single_landmarks, 1);
+  EXPECT_EQ(excluded.observations_duplicate, 2);
+  EXPECT_EQ(excluded.telemetry_duplicate, 1);
+  EXPECT_EQ(excluded.telemetry_not_finite, 1);
+  EXPECT_EQ(excluded.frames_duplicate, 1);
+  EXPECT_GE(excluded.describe().size(), 9u);
+}
+
+TEST(Calibrate, LeavesOutFramesThatNoTelemetryAccompanies) {
+  const Simulation s = small_simulation(23);
+  CalibrationInput input = simulate(s);
+  std::vector<CalibrationTelemetry> late;
+  for (const auto& sample : input.telemetry) {
+    if (sample.stamp_s > 2) late.push_back(sample);
+  }
+  input.telemetry = late;
+  const CalibrationResult result = calibrate(input);
+  expect_within_sigmas(s, result);
+  EXPECT_NEAR(result.exclusions.frames_without_telemetry, 30, 3);
+}
+
+TEST(Calibrate, SaysWhatIsMissingInsteadOfCrashing) {
+  EXPECT_EQ(calibrate({}).status, CalibrationStatus::kBadInput);
+  CalibrationInput input = simulate(small_simulation(24));
+  CalibrationInput without = input;
+  without.telemetry.clear();
+  EXPECT_EQ(calibrate(without).status, CalibrationStatus::kBadInput);
+  without = input;
+  without.observations.clear();
+  EXPECT_EQ(calibrate(without).status, CalibrationStatus::kTooFewLandmarks);
+  without = input;
+  without.frames.clear();
+  EXPECT_EQ(calibrate(without).status, CalibrationStatus::kBadInput);
+  for (auto& sample : input.telemetry) sample.stamp_s += 1000;
+  EXPECT_NE(calibrate(input).status, CalibrationStatus::kOk);
+}
+
+TEST(Calibrate, HoldsParametersThatAreExact) {
+  const Simulation s = small_simulation(25);
+  CalibrationOptions options;
+  options.focal_length = CalibrationPrior{s.focal_length, 0};
+  options.line_delay = CalibrationPrior{s.line_delay, 0};
+  const CalibrationResult result = calibrate(simulate(s), options);
+  expect_within_sigmas(s, result);
+  EXPECT_EQ(result.calibration.camera.focal_length, s.focal_length);
+  EXPECT_EQ(
+      result.calibration.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength)),
+      0);
+}
+
+TEST(Calibrate, StopsWhenAsked) {
+  CalibrationOptions options;
+  options.progress = [](double done, const char*) { return done < 0.25; };
+  EXPECT_EQ(calibrate(simulate(small_simulation(26)), options).status,
+            CalibrationStatus::kCancelled);
+}
+
+TEST(Calibrate, AddsKnotsWhereTheMotionChangesQuickly) {
+  Simulation s = small_simulation(27);
+  s.path = [](double t) {
+    // Slow, but for one quick swing about t = 5.
+    const double swing = std::exp(-std::pow((t - 5) / 0.15, 2));
+    return Eigen::Vector2d(0.1 * std::sin(0.6 * t) + 0.05 * swing, 0.08 * std::cos(0.7 * t));
+  };
+  const CalibrationResult result = calibrate(simulate(s));
+  expect_within_sigmas(s, result);
+  double shortest_far = 10;
+  double shortest_near = 10;
+  for (int i = 0; i < result.trajectory.segments(); ++i) {
+    const double length = result.trajectory.knot(i + 1) - result.trajectory.knot(i);
+    const bool near = std::abs(result.trajectory.knot(i) - 5) < 0.4;
+    double& shortest = near ? shortest_near : shortest_far;
+    shortest = std::min(shortest, length);
+  }
+  EXPECT_LT(shortest_near, 0.1);
+  EXPECT_LT(shortest_near, shortest_far);
+}
+
+}  // namespace
+}  // namespace alidade

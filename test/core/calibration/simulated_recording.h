@@ -1,0 +1,251 @@
+#pragma once
+// What a turning camera would have seen: recordings with known truth, made without the model's code.
+// Landmarks on a grid of azimuth and elevation (spacing: field of view / 10), the published path
+//   pan = 9 s sin(2 pi t / 10) / (2 pi), tilt = -3 s cos(6 pi t / 10) / (2 pi), s the field of view (rad)
+// or any other, white noise on pixels, angles and stamps, one draw of each measured period. Each
+// landmark is projected at the row that sees it, found by bisection. Fixed seed, same recording.
+
+#include <Eigen/Geometry>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <random>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+
+namespace alidade::test {
+
+struct Simulation {
+  std::uint64_t seed = 1;
+  double focal_length = 4000;  // px
+  double aspect = 1;
+  double radial_distortion = 0;
+  double line_delay = 1e-6;  // s/row
+  Eigen::Vector3d pan_axis = Eigen::Vector3d(0.02, -0.01, 1).normalized();
+  Eigen::Vector3d tilt_axis = Eigen::Vector3d(-0.03, 1, 0.02).normalized();
+  double pan_scale = 1;
+  double tilt_scale = 1;
+  double clock_offset = 0.02;  // s
+  int width = 1920;
+  int height = 1080;
+  double duration_s = 10;
+  double image_rate_hz = 15;
+  double telemetry_rate_hz = 60;
+  double pixel_sigma = 0.3;
+  double pan_tilt_sigma = 5e-5;
+  double image_stamp_sigma_s = 1e-3;
+  double telemetry_stamp_sigma_s = 1e-3;
+  double image_period_sigma_s = 3e-5;
+  double telemetry_period_sigma_s = 3e-5;
+  double landmarks_per_field = 10;              // across the width
+  std::function<Eigen::Vector2d(double)> path;  // true pan, tilt (rad); the published one if empty
+
+  // Disturbances.
+  double lost_frames = 0;         // share
+  double image_outliers = 0;      // share, anywhere in the image
+  double telemetry_outliers = 0;  // share
+  double telemetry_outlier_rad = 0.02;
+  double angle_quantum_rad = 0;
+  bool one_sided_stamps = false;  // exponential instead of normal, same sigma
+  double sender_skew = 0;         // the image clock's relative error: periods, not the motion
+  bool with_noise = true;         // tell the estimator the noise
+  bool with_sequence = true;
+  double pan_offset_rad = 0;  // of the whole path; angles are wrapped
+
+  [[nodiscard]] double field_of_view() const { return 2 * std::atan(width / (2 * focal_length)); }
+  [[nodiscard]] Eigen::Vector2d angles(double t) const {
+    if (path) return path(t) + Eigen::Vector2d(pan_offset_rad, 0);
+    const double s = field_of_view();
+    return {9 * s * std::sin(2 * kPi * t / 10) / (2 * kPi) + pan_offset_rad,
+            -3 * s * std::cos(6 * kPi * t / 10) / (2 * kPi)};
+  }
+};
+
+// The base experiment's distribution of everything.
+inline Simulation draw_base_simulation(std::uint64_t seed) {
+  std::mt19937_64 random(seed * 7919 + 13);
+  const auto uniform = [&](double a, double b) {
+    return std::uniform_real_distribution<double>(a, b)(random);
+  };
+  const auto log_uniform = [&](double a, double b) {
+    return std::exp(uniform(std::log(a), std::log(b)));
+  };
+  Simulation s;
+  s.seed = seed;
+  s.image_rate_hz = uniform(10, 30);
+  s.telemetry_rate_hz = uniform(3 * s.image_rate_hz, 100);
+  s.pan_tilt_sigma = log_uniform(1e-5, 1e-4);
+  s.pixel_sigma = log_uniform(0.2, 0.5);
+  s.image_stamp_sigma_s = log_uniform(1e-4, 5e-3);
+  s.telemetry_stamp_sigma_s = log_uniform(1e-4, 5e-3);
+  s.image_period_sigma_s = log_uniform(1e-5, std::min(1e-4, s.image_stamp_sigma_s));
+  s.telemetry_period_sigma_s = log_uniform(1e-5, std::min(1e-4, s.telemetry_stamp_sigma_s));
+  s.focal_length = uniform(960 / std::tan(kPi / 6), 960 / std::tan(kPi / 360));
+  s.radial_distortion = uniform(-0.3, 0.3);
+  s.clock_offset = uniform(-0.1, 0.1);
+  const auto axis = [&](Eigen::Vector3d d) {
+    for (int i = 0; i < 3; ++i) {
+      if (d[i] == 0) d[i] = uniform(-0.05, 0.05);
+    }
+    return d.normalized();
+  };
+  s.pan_axis = axis({0, 0, 1});
+  s.tilt_axis = axis({0, 1, 0});
+  s.line_delay = uniform(0, 2e-3 / 1080);
+  return s;
+}
+
+namespace internal {
+
+inline Eigen::Matrix3d camera_to_base(const Simulation& s, const Eigen::Vector2d& angle) {
+  // Columns: where the camera's right, down and forward point in forward, right, down.
+  Eigen::Matrix3d right_down_forward;
+  right_down_forward.col(0) = Eigen::Vector3d::UnitY();
+  right_down_forward.col(1) = Eigen::Vector3d::UnitZ();
+  right_down_forward.col(2) = Eigen::Vector3d::UnitX();
+  return (Eigen::AngleAxisd(angle[0], s.pan_axis) * Eigen::AngleAxisd(angle[1], s.tilt_axis))
+             .toRotationMatrix() *
+         right_down_forward;
+}
+
+// False behind the camera.
+inline bool pixel_at(const Simulation& s, double time, const Eigen::Vector3d& d, double* u,
+                     double* v) {
+  const Eigen::Vector3d c = camera_to_base(s, s.angles(time)).transpose() * d;
+  if (c[2] <= 0.1) return false;
+  const double x = c[0] / c[2];
+  const double y = c[1] / c[2];
+  const double stretch = 1 + s.radial_distortion * (x * x + y * y);
+  *u = s.focal_length * x * stretch + s.width / 2.0;
+  *v = s.focal_length * s.aspect * y * stretch + s.height / 2.0;
+  return true;
+}
+
+// The row whose exposure meets the landmark in it, and the column.
+inline bool rolling_pixel(const Simulation& s, double frame_time, const Eigen::Vector3d& d,
+                          double* u, double* v) {
+  double low = -0.2 * s.height;
+  double high = 1.2 * s.height;
+  const auto above = [&](double row) {
+    return pixel_at(s, frame_time + row * s.line_delay, d, u, v) && *v > row;
+  };
+  if (!above(low) || above(high)) return false;
+  for (int i = 0; i < 60; ++i) {
+    const double middle = 0.5 * (low + high);
+    (above(middle) ? low : high) = middle;
+  }
+  return pixel_at(s, frame_time + 0.5 * (low + high) * s.line_delay, d, u, v) && *u >= 0 &&
+         *u <= s.width && *v >= 0 && *v <= s.height;
+}
+
+}  // namespace internal
+
+inline CalibrationInput simulate(const Simulation& s) {
+  std::mt19937_64 random(s.seed);
+  std::normal_distribution<double> normal;
+  std::exponential_distribution<double> exponential;
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const auto stamp_noise = [&](double sigma) {
+    return sigma * (s.one_sided_stamps ? exponential(random) : normal(random));
+  };
+  CalibrationInput input;
+  input.width = s.width;
+  input.height = s.height;
+  const double image_period = 1 / s.image_rate_hz;
+  const double telemetry_period = 1 / s.telemetry_rate_hz;
+  if (s.with_noise) {
+    input.noise.image_stamp_sigma_s = s.image_stamp_sigma_s;
+    input.noise.image_period_s = image_period + s.image_period_sigma_s * normal(random);
+    input.noise.image_period_sigma_s = s.image_period_sigma_s;
+    input.noise.telemetry_stamp_sigma_s = s.telemetry_stamp_sigma_s;
+    input.noise.telemetry_period_s = telemetry_period + s.telemetry_period_sigma_s * normal(random);
+    input.noise.telemetry_period_sigma_s = s.telemetry_period_sigma_s;
+    input.noise.pan_tilt_sigma_rad = s.pan_tilt_sigma;
+  }
+
+  // The grid covers what the path can show.
+  const double spacing = s.field_of_view() / s.landmarks_per_field;
+  Eigen::Vector2d low = s.angles(0);
+  Eigen::Vector2d high = low;
+  for (double t = 0; t < s.duration_s; t += 0.01) {
+    low = low.cwiseMin(s.angles(t));
+    high = high.cwiseMax(s.angles(t));
+  }
+  const double reach = 0.75 * s.field_of_view() + 0.15;
+  std::vector<Eigen::Vector3d> landmarks;
+  for (double azimuth = low[0] - reach; azimuth < high[0] + reach; azimuth += spacing) {
+    for (double elevation = std::max(-1.5, low[1] - reach);
+         elevation < std::min(1.5, high[1] + reach); elevation += spacing) {
+      landmarks.emplace_back(std::cos(elevation) * std::cos(azimuth),
+                             std::cos(elevation) * std::sin(azimuth), -std::sin(elevation));
+    }
+  }
+
+  const double image_phase = uniform(random) * image_period;
+  for (int n = 0; image_phase + n * image_period < s.duration_s; ++n) {
+    const double time = image_phase + n * image_period;
+    const bool lost = uniform(random) < s.lost_frames;
+    CalibrationFrame frame;
+    frame.frame = n;
+    frame.stamp_s = time * (1 + s.sender_skew) + stamp_noise(s.image_stamp_sigma_s);
+    if (s.with_sequence) frame.sequence = n;
+    if (lost) continue;
+    input.frames.push_back(frame);
+    const Eigen::Vector3d forward = internal::camera_to_base(s, s.angles(time)).col(2);
+    const double near = std::cos(0.8 * s.field_of_view() + 0.01);
+    for (std::size_t l = 0; l < landmarks.size(); ++l) {
+      double u = 0;
+      double v = 0;
+      if (forward.dot(landmarks[l]) < near) continue;
+      if (!internal::rolling_pixel(s, time, landmarks[l], &u, &v)) continue;
+      u += s.pixel_sigma * normal(random);
+      v += s.pixel_sigma * normal(random);
+      if (uniform(random) < s.image_outliers) {
+        u = s.width * uniform(random);
+        v = s.height * uniform(random);
+      }
+      input.observations.push_back({n, static_cast<std::int64_t>(l), u, v, s.pixel_sigma});
+    }
+  }
+
+  const double telemetry_phase = uniform(random) * telemetry_period;
+  for (int m = 0; telemetry_phase + m * telemetry_period < s.duration_s + 2; ++m) {
+    const double time = telemetry_phase + m * telemetry_period - 1;
+    const Eigen::Vector2d angle = s.angles(time);
+    CalibrationTelemetry sample;
+    sample.stamp_s = time + s.clock_offset + stamp_noise(s.telemetry_stamp_sigma_s);
+    if (s.with_sequence) sample.sequence = m;
+    const auto measure = [&](double true_angle, double scale) {
+      double measured = scale * true_angle + s.pan_tilt_sigma * normal(random);
+      if (uniform(random) < s.telemetry_outliers) {
+        measured += s.telemetry_outlier_rad * normal(random);
+      }
+      if (s.angle_quantum_rad > 0) {
+        measured = std::round(measured / s.angle_quantum_rad) * s.angle_quantum_rad;
+      }
+      return std::remainder(measured, 2 * kPi);
+    };
+    sample.pan_rad = measure(angle[0], s.pan_scale);
+    sample.tilt_rad = measure(angle[1], s.tilt_scale);
+    input.telemetry.push_back(sample);
+  }
+  return input;
+}
+
+// (estimate - truth), in the order of Parameter; an axis's in the tangent basis of its estimate.
+inline Eigen::Matrix<double, kParameterCount, 1> calibration_error(const Simulation& s,
+                                                                   const Calibration& c) {
+  Eigen::Matrix<double, kParameterCount, 1> error;
+  const auto axis_error = [](const Eigen::Vector3d& estimate, const Eigen::Vector3d& truth) {
+    return Eigen::Vector2d(-direction_minus<double>(truth, estimate));
+  };
+  error << c.camera.focal_length - s.focal_length, c.camera.aspect - s.aspect,
+      c.camera.radial_distortion - s.radial_distortion, c.line_delay - s.line_delay,
+      axis_error(c.mechanics.pan_axis, s.pan_axis), axis_error(c.mechanics.tilt_axis, s.tilt_axis),
+      c.mechanics.pan_scale - s.pan_scale, c.mechanics.tilt_scale - s.tilt_scale,
+      c.clock_offset - s.clock_offset;
+  return error;
+}
+
+}  // namespace alidade::test
