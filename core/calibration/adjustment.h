@@ -9,9 +9,9 @@
 // rolling-shutter projection, with white noise of sigma_px, and nothing is biased by the noise of v.
 // Parameters are scaled so that every lens is equally easy: log f, log alpha, k (R / f)^2 (R: half the
 // image's diagonal, px), read-out time l h; changes are local (direction.h for axes and landmarks).
-// Why not Ceres: the Kronecker structure J (x) spline weights, with the same 2x2 J for all four
-// control points, makes one iteration several times cheaper than blocks of a general solver, and
-// the reduced normal matrix, which knots and covariance need too, falls out of it.
+// The normal equations are formed here and not by a general solver: J (x) spline weights, with the same
+// 2x2 J for all four control points, is short to write, and the reduced normal matrix, which knots
+// and covariance need too, falls out of it.
 // Angles in rad, times in s on the image clock. Allocates; one object for each thread.
 
 #include <Eigen/Core>
