@@ -7,6 +7,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <random>
@@ -103,8 +104,9 @@ TEST_P(SteadyTrial, CovarianceIsHonest) {
   noise.period_sigma_s = trial.stamps.period_sigma;
   noise.acceleration_sigma = 0;
   const double own_sigma = trial.stamps.period_sigma / std::sqrt(2);
+  // Raw stamps share nothing: rounding must not make that a negative number.
   const double shared_sigma =
-      std::sqrt(trial.stamps.sigma * trial.stamps.sigma - own_sigma * own_sigma);
+      std::sqrt(std::max(0.0, trial.stamps.sigma * trial.stamps.sigma - own_sigma * own_sigma));
   std::mt19937_64 random(4);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform(-1, 1);
