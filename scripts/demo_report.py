@@ -168,15 +168,16 @@ def plots(results, truth, path, output):
         axis.semilogy(result["times"] - t0, result["per_frame"], ".-", lw=0.6, ms=3, color=colour, label=result["name"])
     axis.set(xlabel="time (s)", ylabel="direction error, RMS over the image (px)", title="Error of every frame against truth")
     axis.grid(True, which="both", alpha=0.3)
-    axis.legend(loc="center right")
+    axis.legend(loc="upper center", bbox_to_anchor=(0.5, -0.15), ncol=len(results), fontsize=8)
     figure.tight_layout()
     figure.savefig(output / "error-over-time.png", dpi=110)
 
+    runs = [result for result in results if not result["same_records"]]
     best = results[-1]
     figure, axes = plt.subplots(2, 1, figsize=(10, 5.5), sharex=True)
     for component, (axis, name) in enumerate(zip(axes, ("pan", "tilt"))):
         axis.plot(path.time - truth.clock_offset - t0, np.degrees(path.angle[:, component]), color="0.6", lw=3, label="truth")
-        for result, colour in zip(results, colours):
+        for result, colour in zip(runs, colours):
             axis.plot(result["times"] - t0, np.degrees([float(r[f"{name}_rad"]) for r in result["records"]]),
                       lw=1, color=colour, label=result["name"])
         axis.set(ylabel=f"{name} (deg)")
@@ -200,7 +201,7 @@ def plots(results, truth, path, output):
     figure.savefig(output / "error-over-image.png", dpi=110)
 
     figure, axis = plt.subplots(figsize=(8, 3.6))
-    for result, colour in zip(results, colours):
+    for result, colour in zip(runs, colours):
         axis.hist(1e3 * result["latency"], bins=60, histtype="step", color=colour, label=result["name"])
     axis.set(xlabel="frame received to record made (ms)", ylabel="frames", title="Latency")
     axis.legend()
@@ -232,7 +233,7 @@ def main():
                 return 1
             matched = set(times)
             results.append({
-                "name": row_name, "modes": modes, "times": times, "errors": errors, "latency": latency,
+                "name": row_name, "same_records": row_name != name, "modes": modes, "times": times, "errors": errors, "latency": latency,
                 "normalised": normalised, "pixels": pixels,
                 "records": [r for r in records if float(r["time_s"]) in matched],
                 "per_frame": np.sqrt((errors**2).sum(2).mean(1))})
