@@ -22,8 +22,9 @@ ALIDADE = os.environ["ALIDADE"]
 SIMULATE = os.environ["ALIDADE_SIMULATE"]
 DEADLINE_S = 90  # for any one event: a sanitized build on a busy machine is slow
 
-IMAGE = {"width": 320, "height": 192, "rate_hz": 25}  # RTP's JPEG comes in blocks of 8 px
-FOCAL_LENGTH_PX = 5335.0  # the paper's field of view of 3.4 degrees
+# Small: a sanitized camera takes its time to render. RTP's JPEG comes in blocks of 8 px.
+IMAGE = {"width": 160, "height": 96, "rate_hz": 25}
+FOCAL_LENGTH_PX = 2667.5  # the paper's field of view of 3.4 degrees
 LINE_DELAY_US = -60.0
 CLOCK_OFFSET_MS = -84.4
 TELEMETRY_SIGMA_RAD = 5e-5
@@ -89,7 +90,7 @@ class Camera(Process):
         self.truth = pathlib.Path(folder, f"truth-{seed}")
         config = {
             "seed": seed, "truth_dir": str(self.truth), "image": IMAGE,
-            "camera": {"focal_length_px": FOCAL_LENGTH_PX, "radial_distortion": 55.4, "line_delay_us": LINE_DELAY_US,
+            "camera": {"focal_length_px": FOCAL_LENGTH_PX, "radial_distortion": 13.9, "line_delay_us": LINE_DELAY_US,
                        "clock_offset_ms": CLOCK_OFFSET_MS, "pan_axis_mrad": [12, 0],
                        "tilt_axis_mrad": [0, 14]},
             "path": {"type": "triple_cosine", "period_s": 10},

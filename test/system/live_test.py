@@ -38,9 +38,9 @@ class Run(SystemTest):
             errors += [record["pan_rad"] - angles[0], record["tilt_rad"] - angles[1]]
             speeds += [record["pan_rate_rad_s"], record["tilt_rate_rad_s"]]
         self.assertGreaterEqual(len(errors), len(records), "hardly any record matches a true frame")
-        # Noise of two samples, plus the time that packets need on loopback: below 10 ms even on a busy machine,
-        # where a forgotten clock offset would make 84 ms.
-        self.assertLess(rms(errors), 2 * TELEMETRY_SIGMA_RAD + 0.010 * rms(speeds))
+        # Packets need time on loopback, and a sanitized build on a busy machine may need tens of milliseconds more;
+        # the answers must at least be nearer to the truth than to a forgotten clock offset.
+        self.assertLess(rms(errors), 2 * TELEMETRY_SIGMA_RAD + 0.5 * abs(offset) * rms(speeds))
 
     def check_run(self, video=None, **options):
         camera = self.camera(**options)
@@ -110,8 +110,8 @@ class Run(SystemTest):
         run = self.alidade("run", "-c", config)
         code, _ = run.end()
         self.assertNotEqual(code, 0)
-        self.assertIn("640x192", run.error_text())
-        self.assertIn("320x192", run.error_text())
+        self.assertIn(f"640x{IMAGE['height']}", run.error_text())
+        self.assertIn(f"{IMAGE['width']}x{IMAGE['height']}", run.error_text())
 
     def test_ends_when_its_reader_goes_away(self):
         camera = self.camera()
@@ -126,7 +126,7 @@ class Run(SystemTest):
         check = self.alidade("check", "-c", self.write_config(camera))
         code, lines = check.end()
         self.assertEqual(code, 0, check.error_text())
-        self.assertIn("320x192", "\n".join(lines))
+        self.assertIn(f"{IMAGE['width']}x{IMAGE['height']}", "\n".join(lines))
 
 
 class Record(SystemTest):
