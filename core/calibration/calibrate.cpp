@@ -694,7 +694,13 @@ void Calibrator::conclude() {
   quality.telemetry = samples;
   const Matrix3<double> R_base_from_anchor = R_base_from_camera(state_.mechanics, state_.anchor);
   for (std::size_t i = 0; i < landmark_name_.size(); ++i) {
-    result_.landmarks.push_back({landmark_name_[i], R_base_from_anchor * state_.landmarks[i], 0});
+    CalibrationLandmark mark;
+    mark.landmark = landmark_name_[i];
+    mark.d_b = R_base_from_anchor * state_.landmarks[i];
+    const Matrix2<double> turn = tangent_basis(mark.d_b).transpose() * R_base_from_anchor *
+                                 tangent_basis(state_.landmarks[i]);
+    mark.covariance = turn * at_.H_landmark[i].inverse() * turn.transpose();
+    result_.landmarks.push_back(mark);
   }
   std::vector<char> frame_used(frame_index_.size(), 0);
   for (const auto& o : data_.observations) {

@@ -150,6 +150,8 @@ struct CalibrationExclusions {
 struct CalibrationLandmark {
   std::int64_t landmark = 0;
   Vector3<double> d_b;
+  // rad^2, in tangent_basis(d_b): of the landmark's own observations, camera and trajectory given.
+  Matrix2<double> covariance = Matrix2<double>::Zero();
   int observations = 0;
 };
 
