@@ -45,7 +45,9 @@ struct AdjustmentObservation {
 struct AdjustmentTelemetry {
   double time_s = 0;  // on the telemetry clock
   Vector2<double> measured;
-  Vector2<double> sigma = Vector2<double>::Ones();  // rad
+  Vector2<double> sigma = Vector2<double>::Ones();  // rad; infinite: nothing is said of this axis
+  // Whether the residual of each axis tells how large the noise is: a rounding error does not.
+  std::array<bool, 2> is_noise = {true, true};
   bool used = true;
 };
 

@@ -66,6 +66,7 @@ class Calibrator {
   bool start();
   void set_priors();
   bool adjust();
+  void replace_rounded_telemetry();
   bool adjust_robustly(Adjustment* adjustment);
   bool adjust_on_inliers(Adjustment* adjustment);
   bool mark_outliers(const Linearisation& at);
@@ -82,6 +83,8 @@ class Calibrator {
   std::vector<std::int64_t> landmark_name_;
   ClockLine image_clock_;
   ClockLine telemetry_clock_;
+  double quantum_ = 0;      // rad, of the telemetry; 0: none
+  double white_sigma_ = 0;  // rad, of the telemetry, rounding apart
   AdjustmentData data_;
   AdjustmentPriors priors_;
   std::array<bool, kGlobalCount> fixed_{};
@@ -358,14 +361,13 @@ bool Calibrator::start() {
   if (!smooth) {
     return fail(CalibrationStatus::kBadInput, "the telemetry cannot be fitted by a smooth motion");
   }
-  const double quantum = internal::angle_quantum(data_.telemetry);
+  quantum_ = internal::angle_quantum(data_.telemetry);
   const double stated = input_.noise.pan_tilt_sigma_rad.value_or(0);
-  const double white =
-      stated > 0 ? stated
-      : quantum == 0
-          ? telemetry_sigma
-          : std::sqrt(std::max(0.0, telemetry_sigma * telemetry_sigma - quantum * quantum / 12));
-  internal::set_telemetry_sigma(white, quantum,
+  white_sigma_ =
+      stated > 0
+          ? stated
+          : std::sqrt(std::max(0.0, telemetry_sigma * telemetry_sigma - quantum_ * quantum_ / 12));
+  internal::set_telemetry_sigma(white_sigma_, quantum_,
                                 telemetry_clock_.steady ? 0 : telemetry_clock_.stamp_sigma_s,
                                 *smooth, &data_.telemetry);
 
@@ -536,10 +538,23 @@ bool Calibrator::adjust_on_inliers(Adjustment* adjustment) {
   return true;
 }
 
+// Only now, from close by: rounded readings hold a trajectory everywhere, their crossings do not.
+void Calibrator::replace_rounded_telemetry() {
+  std::vector<std::size_t> source;
+  data_.telemetry = internal::quantum_crossings(data_.telemetry, quantum_, white_sigma_,
+                                                state_.trajectory, state_.shift_s, &source);
+  for (std::size_t& sample : source) sample = telemetry_index_[sample];
+  telemetry_index_ = std::move(source);
+}
+
 bool Calibrator::adjust() {
   Adjustment adjustment(data_, priors_, fixed_);
   if (!report(0.3, "robust adjustment")) return false;
-  const bool robust = adjust_robustly(&adjustment);
+  bool robust = adjust_robustly(&adjustment);
+  if (robust && quantum_ > 0) {
+    replace_rounded_telemetry();
+    robust = adjust_robustly(&adjustment);
+  }
   adjustment.linearise(state_, {}, &at_);
   mark_outliers(at_);
   if (!report(0.7, "adjustment")) return false;
@@ -574,7 +589,7 @@ bool Calibrator::correct_noise() {
   double pixel_squares = 0;
   double telemetry_squares = 0;
   double observations = 0;
-  double samples = 0;
+  double angles = 0;
   std::vector<char> seen(state_.landmarks.size(), 0);
   for (std::size_t i = 0; i < data_.observations.size(); ++i) {
     if (!data_.observations[i].used) continue;
@@ -583,13 +598,16 @@ bool Calibrator::correct_noise() {
     seen[static_cast<std::size_t>(data_.observations[i].landmark)] = 1;
   }
   for (std::size_t i = 0; i < data_.telemetry.size(); ++i) {
-    if (!data_.telemetry[i].used) continue;
-    telemetry_squares += at_.telemetry[i].error.squaredNorm();
-    samples += 1;
+    const auto& sample = data_.telemetry[i];
+    for (int axis = 0; sample.used && axis < 2; ++axis) {
+      if (!sample.is_noise[static_cast<std::size_t>(axis)]) continue;
+      telemetry_squares += std::pow(at_.telemetry[i].error[axis], 2);
+      angles += 1;
+    }
   }
   const double landmarks = std::accumulate(seen.begin(), seen.end(), 0.0);
   const double unknowns = 2 * state_.trajectory.control_points() + kGlobalCount;
-  const double telemetry_redundancy = 2 * samples - telemetry_unknowns_;
+  const double telemetry_redundancy = angles - telemetry_unknowns_;
   const double pixel_redundancy =
       2 * observations - 2 * landmarks - std::max(0.0, unknowns - telemetry_unknowns_);
   if (pixel_redundancy < 10 || telemetry_redundancy < 10) return false;

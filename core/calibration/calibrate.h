@@ -168,6 +168,8 @@ struct ObservationResidual {
   Vector2<double> error_px;
   bool outlier = false;
 };
+// With angles in coarse whole steps there is one more for each change of a reading, at the middle of the two times:
+// half-way between them the angle passed then. It has NaN for an axis that did not change.
 struct TelemetryResidual {
   std::size_t sample = 0;  // index into the input
   double time_s = 0;       // image clock

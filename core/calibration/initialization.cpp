@@ -2,8 +2,10 @@
 
 #include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
+#include <limits>
 
 namespace alidade::internal {
 
@@ -246,23 +248,73 @@ double angle_quantum(const std::vector<AdjustmentTelemetry>& telemetry) {
 void set_telemetry_sigma(double white_sigma, double quantum, double stamp_sigma_s,
                          const TrajectorySpline& smooth,
                          std::vector<AdjustmentTelemetry>* telemetry) {
+  for (auto& sample : *telemetry) {
+    const Vector2<double> stamp = stamp_sigma_s * smooth.rate(sample.time_s).vector();
+    const double variance = white_sigma * white_sigma + quantum * quantum / 12;
+    sample.sigma = (stamp.array().square() + variance).sqrt();
+  }
+}
+
+std::vector<AdjustmentTelemetry> quantum_crossings(
+    const std::vector<AdjustmentTelemetry>& telemetry, double quantum, double white_sigma,
+    const TrajectorySpline& trajectory, double shift_s, std::vector<std::size_t>* source) {
+  constexpr double kDither = 0.25;
+  // Share of a quantum below which no device rounds evenly.
+  constexpr double kUnevenness = 0.02;
+  constexpr double kNone = std::numeric_limits<double>::infinity();
+  std::vector<AdjustmentTelemetry> items;
+  source->clear();
+  const std::size_t count = telemetry.size();
+  // Steps from sample i to the next, in quanta.
+  const auto step = [&](std::size_t i, int axis) {
+    return std::abs(
+        std::round((telemetry[i + 1].measured[axis] - telemetry[i].measured[axis]) / quantum));
+  };
+  std::array<bool, 2> steps_singly{};
   for (int axis = 0; axis < 2; ++axis) {
-    for (std::size_t begin = 0; begin < telemetry->size();) {
-      std::size_t end = begin + 1;
-      while (end < telemetry->size() &&
-             std::abs((*telemetry)[end].measured[axis] - (*telemetry)[begin].measured[axis]) <
-                 0.5 * quantum) {
-        ++end;
-      }
-      const double repeats = static_cast<double>(end - begin);
-      for (; begin < end; ++begin) {
-        auto& sample = (*telemetry)[begin];
-        const double stamp = stamp_sigma_s * smooth.rate(sample.time_s).vector()[axis];
-        sample.sigma[axis] =
-            std::sqrt(white_sigma * white_sigma + repeats * quantum * quantum / 12 + stamp * stamp);
-      }
+    for (std::size_t i = 0; quantum > 0 && white_sigma < kDither * quantum && i + 1 < count; ++i) {
+      auto& singly = steps_singly[static_cast<std::size_t>(axis)];
+      singly = singly || step(i, axis) == 1;
     }
   }
+  std::array<std::size_t, 2> run_end{};  // of the equal readings that sample i belongs to
+  std::array<double, 2> run_sigma{};
+  for (std::size_t i = 0; i < count; ++i) {
+    AdjustmentTelemetry reading = telemetry[i];
+    AdjustmentTelemetry crossing = telemetry[i];
+    crossing.sigma.setConstant(kNone);
+    crossing.is_noise = {false, false};
+    for (int axis = 0; axis < 2; ++axis) {
+      if (!steps_singly[static_cast<std::size_t>(axis)]) continue;
+      const bool slow = (i > 0 && step(i - 1, axis) < 2) || (i + 1 < count && step(i, axis) < 2);
+      const auto a = static_cast<std::size_t>(axis);
+      if (i == run_end[a]) {
+        while (run_end[a] + 1 < count && step(run_end[a], axis) == 0) ++run_end[a];
+        ++run_end[a];
+        run_sigma[a] = quantum * std::sqrt(static_cast<double>(run_end[a] - i));
+      }
+      if (slow) {
+        reading.sigma[axis] = run_sigma[a];
+        reading.is_noise[a] = false;
+      }
+      if (i + 1 == count || step(i, axis) != 1) continue;
+      const double interval = telemetry[i + 1].time_s - telemetry[i].time_s;
+      crossing.time_s = telemetry[i].time_s + 0.5 * interval;
+      const double moved = std::min(
+          quantum, interval * std::abs(trajectory.rate(crossing.time_s - shift_s).vector()[axis]));
+      crossing.measured[axis] =
+          0.5 * (telemetry[i].measured[axis] + telemetry[i + 1].measured[axis]);
+      crossing.sigma[axis] =
+          std::hypot(white_sigma, moved / std::sqrt(12.0), kUnevenness * quantum);
+      crossing.is_noise[a] = true;
+    }
+    items.push_back(reading);
+    source->push_back(i);
+    if (std::isinf(crossing.sigma.minCoeff())) continue;
+    items.push_back(crossing);
+    source->push_back(i);
+  }
+  return items;
 }
 
 void initialise_landmarks(const AdjustmentData& data, AdjustmentState* state) {

@@ -47,11 +47,22 @@ struct MotionMatch {
 // The step between neighbouring readings if angles come in whole steps, otherwise 0.
 [[nodiscard]] double angle_quantum(const std::vector<AdjustmentTelemetry>& telemetry);
 
-// The noise of each sample: white noise, the rounding to whole quanta, of which a reading that repeats n times
-// is one and not n (variance n quantum^2 / 12), and the stamp's own error, at the smoothed rate.
+// The noise of each sample: white noise, the rounding to whole quanta, and the stamp's own error, at the
+// smoothed rate.
 void set_telemetry_sigma(double white_sigma, double quantum, double stamp_sigma_s,
                          const TrajectorySpline& smooth,
                          std::vector<AdjustmentTelemetry>* telemetry);
+
+// What telemetry in whole quanta says without the bias of its rounding. Where an axis moves less than two quanta
+// from sample to sample, rounding errors are no noise: readings stay off to one side while it turns round. But
+// between two neighbouring readings it passed half-way between them: that is added, as a sample at the middle of
+// their times with the uncertainty of the moment (trajectory time = telemetry time - shift_s). All equal readings in
+// a row together keep the weight of one with a sigma of a quantum: enough to hold what nothing else holds.
+// source[i]: index of the sample (the first of the two) that gave item i. Noise of a quarter quantum or more
+// dithers the readings: they stay as they are.
+[[nodiscard]] std::vector<AdjustmentTelemetry> quantum_crossings(
+    const std::vector<AdjustmentTelemetry>& telemetry, double quantum, double white_sigma,
+    const TrajectorySpline& trajectory, double shift_s, std::vector<std::size_t>* source);
 
 // Landmarks in the frame of the anchor, from the state's camera, mount and trajectory.
 void initialise_landmarks(const AdjustmentData& data, AdjustmentState* state);
