@@ -99,6 +99,24 @@ RobustCost robust_cost(double squared_error, double scale) {
 // What an observation without a projection costs: it must not pay to lose one.
 constexpr double kLostSquaredError = 1e10;
 
+// L^-1 in place of L, a lower triangle; a third of the work of solving for the identity.
+void invert_lower(Eigen::Ref<Eigen::MatrixXd> L) {
+  const auto size = L.rows();
+  if (size <= 32) {
+    const Eigen::MatrixXd inverse =
+        L.triangularView<Eigen::Lower>().solve(Eigen::MatrixXd::Identity(size, size));
+    L.triangularView<Eigen::Lower>() = inverse;
+    return;
+  }
+  const auto half = size / 2;
+  auto below = L.bottomLeftCorner(size - half, half);
+  L.bottomRightCorner(size - half, size - half).triangularView<Eigen::Lower>().solveInPlace(below);
+  L.topLeftCorner(half, half).triangularView<Eigen::Lower>().solveInPlace<Eigen::OnTheRight>(below);
+  below *= -1;
+  invert_lower(L.topLeftCorner(half, half));
+  invert_lower(L.bottomRightCorner(size - half, size - half));
+}
+
 // H's block of four control points: J^T J (x) w w^T, lower triangle.
 void add_control_points(const TrajectorySpline::Basis& basis, const Matrix2<double>& J_squared,
                         Eigen::MatrixXd* H) {
@@ -229,8 +247,10 @@ void Adjustment::add_observations(const AdjustmentState& state, const LossScales
           touched_now.push_back(point);
         }
       }
-      H_cc += robust.weight * result.J_camera.transpose() * result.J_camera;
-      g_c += robust.weight * (result.J_camera.transpose() * result.error);
+      const Eigen::Matrix<double, kCameraCount, 2> Jt_camera =
+          robust.weight * result.J_camera.transpose();
+      H_cc.noalias() += Jt_camera * result.J_camera;
+      g_c.noalias() += Jt_camera * result.error;
       out->H_landmark[l] += Jt_landmark * result.J_landmark;
       out->g_landmark[l] += Jt_landmark * result.error;
       out->H_camera[l] += (Jt_landmark * result.J_camera).transpose();
@@ -414,7 +434,7 @@ bool Adjustment::solve(const Linearisation& in, double damping, Eigen::VectorXd*
 bool Adjustment::minimise(const LossScales& loss, int max_steps, double tolerance,
                           AdjustmentState* state, Linearisation* at) {
   constexpr double kMaxDamping = 1e8;
-  double damping = 1e-8;
+  constexpr double kLeastDamping = 1e-10;
   linearise(*state, loss, at);
   if (!at->valid) return false;
   Linearisation next;
@@ -423,7 +443,7 @@ bool Adjustment::minimise(const LossScales& loss, int max_steps, double toleranc
   for (int step = 0; step < max_steps;) {
     bool accepted = false;
     double promised = 0;
-    if (solve(*at, damping, &x, &x_landmark)) {
+    if (solve(*at, damping_, &x, &x_landmark)) {
       promised = x.dot(at->g);
       for (std::size_t l = 0; l < x_landmark.size(); ++l) {
         promised += x_landmark[l].dot(at->g_landmark[l]);
@@ -442,10 +462,13 @@ bool Adjustment::minimise(const LossScales& loss, int max_steps, double toleranc
     }
     if (accepted) {
       if (promised < tolerance) return true;
-      damping = std::max(damping / 10, 1e-10);
+      damping_ = std::max(damping_ / 10, kLeastDamping);
     } else {
-      damping = std::max(damping * 10, 1e-5);
-      if (damping > kMaxDamping) return false;
+      damping_ = std::max(damping_ * 10, 1e-5);
+      if (damping_ > kMaxDamping) {
+        damping_ = kLeastDamping;
+        return false;
+      }
     }
   }
   return false;
@@ -462,9 +485,21 @@ bool Adjustment::covariance(const Linearisation& in, GlobalMatrix* covariance,
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>, Eigen::Lower> llt(reduced_);
   if (llt.info() != Eigen::Success) return false;
   if (reduced_.diagonal().cwiseAbs2().minCoeff() < kMinPivot) return false;
-  Eigen::MatrixXd inverse = llt.solve(Eigen::MatrixXd::Identity(size, size));
-  inverse = scale.asDiagonal() * inverse * scale.asDiagonal();
-  *covariance = inverse.bottomRightCorner<kGlobalCount, kGlobalCount>();
+  // H^-1 = S (L^-1)^T L^-1 S; only the band of control points that share a segment and the parameters are asked for.
+  invert_lower(reduced_);
+  const auto root = [&](Eigen::Index i, Eigen::Index from) {
+    return reduced_.col(i).tail(size - from);
+  };
+  const auto inverse = [&](Eigen::Index i, Eigen::Index j) {
+    const auto from = std::max(i, j);
+    return scale[i] * scale[j] * root(i, from).dot(root(j, from));
+  };
+  const auto first_global = size - kGlobalCount;
+  for (int i = 0; i < kGlobalCount; ++i) {
+    for (int j = 0; j < kGlobalCount; ++j) {
+      (*covariance)(i, j) = inverse(first_global + i, first_global + j);
+    }
+  }
   for (int i = 0; i < kGlobalCount; ++i) {
     if (!fixed_[static_cast<std::size_t>(i)]) continue;
     covariance->row(i).setZero();
@@ -472,9 +507,11 @@ bool Adjustment::covariance(const Linearisation& in, GlobalMatrix* covariance,
   }
   *telemetry_unknowns = 0;
   for (Eigen::Index j = 0; j < size; ++j) {
-    const auto below = size - 1 - j;
-    *telemetry_unknowns += inverse(j, j) * in.H_telemetry(j, j) +
-                           2 * inverse.col(j).tail(below).dot(in.H_telemetry.col(j).tail(below));
+    for (Eigen::Index i = j; i < size; ++i) {
+      const double h = in.H_telemetry(i, j);
+      if (h == 0) continue;
+      *telemetry_unknowns += (i == j ? 1 : 2) * h * inverse(i, j);
+    }
   }
   return true;
 }

@@ -6,12 +6,14 @@
 // + priors,        t' = t_telemetry - shift + drift (t_telemetry - reference).
 // A is the row-time effect of (Oth 18 to 21): A^-1 e is the Newton step from the observed row
 // (PTCEE 42) to the row at which the landmark is seen, so the residual is u minus the full
-// rolling-shutter projection, with white noise of sigma_px, and nothing is biased by the noise of v.
+// rolling-shutter projection, with white noise of sigma_px. Derivatives hold A fixed, at the observed row: the
+// noise of v then shifts the line delay by some hundredths of its sigma (bounded in ceres_adjustment_test).
 // Parameters are scaled so that every lens is equally easy: log f, log alpha, k (R / f)^2 (R: half the
 // image's diagonal, px), read-out time l h; changes are local (direction.h for axes and landmarks).
-// The normal equations are formed here and not by a general solver: J (x) spline weights, with the same
-// 2x2 J for all four control points, is short to write, and the reduced normal matrix, which knots
-// and covariance need too, falls out of it.
+// The normal equations are formed here and not by Ceres, against which the tests hold them: Ceres takes three
+// times as long for the same minimum (adjustment_benchmark), and what knots, noise and covariance need of the
+// reduced normal matrix falls out. Landmarks tie distant times together on a path that returns, so the matrix left
+// over the control points is dense.
 // Angles in rad, times in s on the image clock. Allocates; one object for each thread.
 
 #include <Eigen/Core>
@@ -155,6 +157,8 @@ class Adjustment {
   AdjustmentPriors priors_;
   std::array<bool, kGlobalCount> fixed_;
   int steps_taken_ = 0;
+  // What served last: a few steps at a time must get as far as many at once.
+  double damping_ = 1e-8;
 
   Eigen::MatrixXd reduced_;
   Eigen::VectorXd reduced_g_;
