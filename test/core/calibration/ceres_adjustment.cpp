@@ -210,9 +210,8 @@ class ObservationCost final : public ceres::SizedCostFunction<2, 2, 2, 2, 2, 2, 
     }
     if (jacobians[6] != nullptr || jacobians[7] != nullptr) {
       const Matrix<double, 2, 4> J_axes =
-          whiten *
-          (J.J_u_xi * J.J_xi_axes -
-           (J_u_anchor * skew<double>(d_anchor)) * shared_.J_xi_axes_anchor);
+          whiten * (J.J_u_xi * J.J_xi_axes -
+                    (J_u_anchor * skew<double>(d_anchor)) * shared_.J_xi_axes_anchor);
       if (jacobians[6] != nullptr) {
         write<3>(J_axes.leftCols<2>() * shared_.B_pan_axis.transpose(), jacobians[6]);
       }
@@ -299,12 +298,13 @@ class TelemetryCost final : public ceres::SizedCostFunction<2, 2, 2, 2, 2, 1, 1,
 
   bool Evaluate(double const* const* parameters, double* residuals,
                 double** jacobians) const override {
-    const Motion motion(
-        segment_, sample_.time_s - parameters[6][1] + parameters[7][0] * since_reference_s_,
-        parameters);
+    const Motion motion(segment_,
+                        sample_.time_s - parameters[6][1] + parameters[7][0] * since_reference_s_,
+                        parameters);
     const Vector2<double> scale(parameters[4][0], parameters[5][0]);
     for (int i = 0; i < 2; ++i) {
-      residuals[i] = wrap_angle(sample_.measured[i] - scale[i] * motion.angle[i]) / sample_.sigma[i];
+      residuals[i] =
+          wrap_angle(sample_.measured[i] - scale[i] * motion.angle[i]) / sample_.sigma[i];
     }
     if (jacobians == nullptr) return true;
     const Vector2<double> slope = -scale.cwiseQuotient(sample_.sigma);
@@ -351,8 +351,7 @@ class PriorCost final : public ceres::SizedCostFunction<kGlobalCount, 2, 2, 3, 3
                 double** jacobians) const override {
     constexpr int kAxes[] = {index(Parameter::kPanAxis0), index(Parameter::kTiltAxis0)};
     Eigen::Map<GlobalVector> e(residuals);
-    const double stretch =
-        std::exp(2 * (parameters[0][0] - std::log(mean_.camera.focal_length)));
+    const double stretch = std::exp(2 * (parameters[0][0] - std::log(mean_.camera.focal_length)));
     e[index(Parameter::kFocalLength)] = std::log(mean_.camera.focal_length) - parameters[0][0];
     e[index(Parameter::kRadialDistortion)] = mean_.distortion - parameters[0][1] * stretch;
     e[index(Parameter::kLineDelay)] = mean_.readout_s - parameters[1][0];
@@ -390,7 +389,8 @@ class PriorCost final : public ceres::SizedCostFunction<kGlobalCount, 2, 2, 3, 3
         case 2:
         case 3:
           for (int i = 0; i < 2; ++i) {
-            for (int j = 0; j < 3; ++j) set(block, kAxes[block - 2] + i, j, -J_axis[block - 2](i, j));
+            for (int j = 0; j < 3; ++j)
+              set(block, kAxes[block - 2] + i, j, -J_axis[block - 2](i, j));
           }
           break;
         case 4:
@@ -436,7 +436,8 @@ struct CeresAdjustment::Implementation {
     options.loss_function_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     options.manifold_ownership = ceres::DO_NOT_TAKE_OWNERSHIP;
     problem = std::make_unique<ceres::Problem>(options);
-    for (int i = 0; i < state.trajectory.segments(); ++i) segments.emplace_back(state.trajectory, i);
+    for (int i = 0; i < state.trajectory.segments(); ++i)
+      segments.emplace_back(state.trajectory, i);
     if (std::isfinite(loss.pixel)) pixel_loss = std::make_unique<ceres::CauchyLoss>(loss.pixel);
     if (std::isfinite(loss.telemetry)) {
       telemetry_loss = std::make_unique<ceres::CauchyLoss>(loss.telemetry);
@@ -444,14 +445,16 @@ struct CeresAdjustment::Implementation {
     add_observations(row);
     add_telemetry();
     problem->AddResidualBlock(new PriorCost(priors), nullptr, blocks.lens.data(),
-                              blocks.timing.data(), blocks.pan_axis.data(),
-                              blocks.tilt_axis.data(), &blocks.log_aspect, &blocks.pan_scale,
-                              &blocks.tilt_scale, &blocks.drift);
+                              blocks.timing.data(), blocks.pan_axis.data(), blocks.tilt_axis.data(),
+                              &blocks.log_aspect, &blocks.pan_scale, &blocks.tilt_scale,
+                              &blocks.drift);
     set_manifolds();
   }
 
   [[nodiscard]] double* point(int i) { return state.trajectory.control_point(i).data(); }
-  [[nodiscard]] const Segment& segment(int i) const { return segments[static_cast<std::size_t>(i)]; }
+  [[nodiscard]] const Segment& segment(int i) const {
+    return segments[static_cast<std::size_t>(i)];
+  }
 
   void add_observations(ObservationRow row) {
     int hint = 0;
@@ -463,9 +466,8 @@ struct CeresAdjustment::Implementation {
       problem->AddResidualBlock(
           new ObservationCost(o, frame_time, segment(hint), shared, row, pixel_loss != nullptr),
           pixel_loss.get(), point(hint), point(hint + 1), point(hint + 2), point(hint + 3),
-          blocks.lens.data(), blocks.timing.data(), blocks.pan_axis.data(),
-          blocks.tilt_axis.data(), &blocks.log_aspect,
-          state.landmarks[static_cast<std::size_t>(o.landmark)].data());
+          blocks.lens.data(), blocks.timing.data(), blocks.pan_axis.data(), blocks.tilt_axis.data(),
+          &blocks.log_aspect, state.landmarks[static_cast<std::size_t>(o.landmark)].data());
     }
   }
 
@@ -476,9 +478,9 @@ struct CeresAdjustment::Implementation {
       hint = state.trajectory.segment_at(telemetry_time(sample), hint);
       home.push_back(hint);
       problem->AddResidualBlock(new TelemetryCost(sample, data.reference_s, segment(hint)),
-                                telemetry_loss.get(), point(hint), point(hint + 1),
-                                point(hint + 2), point(hint + 3), &blocks.pan_scale,
-                                &blocks.tilt_scale, blocks.timing.data(), &blocks.drift);
+                                telemetry_loss.get(), point(hint), point(hint + 1), point(hint + 2),
+                                point(hint + 3), &blocks.pan_scale, &blocks.tilt_scale,
+                                blocks.timing.data(), &blocks.drift);
     }
   }
 
@@ -574,8 +576,7 @@ CeresAdjustment::CeresAdjustment(const AdjustmentData& data, const AdjustmentPri
                                  const std::array<bool, kGlobalCount>& fixed,
                                  const LossScales& loss, ObservationRow row,
                                  const AdjustmentState& start)
-    : implementation_(
-          std::make_unique<Implementation>(data, priors, fixed, loss, row, start)) {}
+    : implementation_(std::make_unique<Implementation>(data, priors, fixed, loss, row, start)) {}
 
 CeresAdjustment::~CeresAdjustment() = default;
 
@@ -604,10 +605,9 @@ ceres::Solver::Summary CeresAdjustment::solve(ceres::Solver::Options options) {
   for (int i = 0; i < in.state.trajectory.control_points(); ++i) {
     if (in.problem->HasParameterBlock(in.point(i))) ordering->AddElementToGroup(in.point(i), 1);
   }
-  for (double* block :
-       {in.blocks.lens.data(), &in.blocks.log_aspect, in.blocks.timing.data(), &in.blocks.drift,
-        in.blocks.pan_axis.data(), in.blocks.tilt_axis.data(), &in.blocks.pan_scale,
-        &in.blocks.tilt_scale}) {
+  for (double* block : {in.blocks.lens.data(), &in.blocks.log_aspect, in.blocks.timing.data(),
+                        &in.blocks.drift, in.blocks.pan_axis.data(), in.blocks.tilt_axis.data(),
+                        &in.blocks.pan_scale, &in.blocks.tilt_scale}) {
     ordering->AddElementToGroup(block, 1);
   }
   options.linear_solver_ordering = ordering;
@@ -622,15 +622,14 @@ bool CeresAdjustment::at_home() const {
   std::size_t next = 0;
   for (const AdjustmentObservation& o : in.data.observations) {
     if (!o.used) continue;
-    const double time = in.data.frame_time_s[static_cast<std::size_t>(o.frame)] +
-                        o.u.y() * in.state.line_delay();
+    const double time =
+        in.data.frame_time_s[static_cast<std::size_t>(o.frame)] + o.u.y() * in.state.line_delay();
     if (in.state.trajectory.segment_at(time, in.home[next]) != in.home[next]) return false;
     ++next;
   }
   for (const AdjustmentTelemetry& sample : in.data.telemetry) {
     if (!sample.used) continue;
-    if (in.state.trajectory.segment_at(in.telemetry_time(sample), in.home[next]) !=
-        in.home[next]) {
+    if (in.state.trajectory.segment_at(in.telemetry_time(sample), in.home[next]) != in.home[next]) {
       return false;
     }
     ++next;
@@ -712,8 +711,7 @@ CeresMinimum minimise_by_ceres(const AdjustmentData& data, const AdjustmentPrior
   CeresMinimum result;
   AdjustmentState state = start;
   while (result.problems < kMaxProblems) {
-    result.adjustment =
-        std::make_unique<CeresAdjustment>(data, priors, fixed, loss, row, state);
+    result.adjustment = std::make_unique<CeresAdjustment>(data, priors, fixed, loss, row, state);
     ++result.problems;
     const ceres::Solver::Summary summary = result.adjustment->solve(options);
     result.iterations += static_cast<int>(summary.iterations.size()) - 1;

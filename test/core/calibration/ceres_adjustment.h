@@ -26,7 +26,8 @@ enum class ObservationRow { kObserved, kProjected };
 
 class CeresAdjustment {
  public:
-  CeresAdjustment(const ::alidade::internal::AdjustmentData& data, const ::alidade::internal::AdjustmentPriors& priors,
+  CeresAdjustment(const ::alidade::internal::AdjustmentData& data,
+                  const ::alidade::internal::AdjustmentPriors& priors,
                   const std::array<bool, ::alidade::internal::kGlobalCount>& fixed,
                   const ::alidade::internal::LossScales& loss, ObservationRow row,
                   const ::alidade::internal::AdjustmentState& start);
@@ -66,9 +67,10 @@ struct CeresMinimum {
 };
 
 [[nodiscard]] CeresMinimum minimise_by_ceres(
-    const ::alidade::internal::AdjustmentData& data, const ::alidade::internal::AdjustmentPriors& priors,
-    const std::array<bool, ::alidade::internal::kGlobalCount>& fixed, const ::alidade::internal::LossScales& loss,
-    ObservationRow row, const ceres::Solver::Options& options,
-    const ::alidade::internal::AdjustmentState& start);
+    const ::alidade::internal::AdjustmentData& data,
+    const ::alidade::internal::AdjustmentPriors& priors,
+    const std::array<bool, ::alidade::internal::kGlobalCount>& fixed,
+    const ::alidade::internal::LossScales& loss, ObservationRow row,
+    const ceres::Solver::Options& options, const ::alidade::internal::AdjustmentState& start);
 
 }  // namespace alidade::test

@@ -42,15 +42,15 @@ struct Changes {
 };
 constexpr int kLandmarkVariable = 8 + kGlobalCount;
 constexpr int kVariables = kLandmarkVariable + 2;
-using J22 = ceres::Jet<double, kVariables>;
+using Variable = ceres::Jet<double, kVariables>;
 
-Changes<J22> variables() {
-  Changes<J22> changes;
+Changes<Variable> variables() {
+  Changes<Variable> changes;
   for (int i = 0; i < 8; ++i) {
-    changes.control_points[static_cast<std::size_t>(i / 2)][i % 2] = J22(0, i);
+    changes.control_points[static_cast<std::size_t>(i / 2)][i % 2] = Variable(0, i);
   }
-  for (int i = 0; i < kGlobalCount; ++i) changes.globals[i] = J22(0, 8 + i);
-  for (int i = 0; i < 2; ++i) changes.landmark[i] = J22(0, kLandmarkVariable + i);
+  for (int i = 0; i < kGlobalCount; ++i) changes.globals[i] = Variable(0, 8 + i);
+  for (int i = 0; i < 2; ++i) changes.landmark[i] = Variable(0, kLandmarkVariable + i);
   return changes;
 }
 
@@ -105,12 +105,10 @@ class Model {
   template <class T>
   [[nodiscard]] Vector2<T> pixel(const T& time, const Vector3<double>& d_anchor) const {
     const Vector2<T> p = angle<T>(time);
-    const Vector3<S> d_a =
-        direction_plus<S>(Vector3<S>(d_anchor.cast<S>()), changes_.landmark);
+    const Vector3<S> d_a = direction_plus<S>(Vector3<S>(d_anchor.cast<S>()), changes_.landmark);
     const PanTilt<S> anchor = state_.anchor.cast<S>();
     const Vector3<S> d_b = R_base_from_camera(mechanics_, anchor) * d_a;
-    const Matrix3<T> R =
-        R_base_from_camera(mechanics_.template cast<T>(), PanTilt<T>{p[0], p[1]});
+    const Matrix3<T> R = R_base_from_camera(mechanics_.template cast<T>(), PanTilt<T>{p[0], p[1]});
     Vector2<T> u(T(0), T(0));
     if (project(camera_.template cast<T>(), R.transpose() * d_b.template cast<T>(), &u) !=
         ProjectionStatus::kOk) {
@@ -166,24 +164,24 @@ class Model {
 };
 
 // kObserved: A^-1 (u - pi) with A held while it is differentiated; kProjected: u less the full projection.
-Vector2<J22> observation_residual(const AdjustmentState& state, double frame_time,
-                                  const AdjustmentObservation& o, ObservationRow row) {
+Vector2<Variable> observation_residual(const AdjustmentState& state, double frame_time,
+                                       const AdjustmentObservation& o, ObservationRow row) {
   const double time = frame_time + o.u.y() * state.line_delay();
   const int segment = state.trajectory.segment_at(time);
-  const Model<J22> model(state, segment, variables());
+  const Model<Variable> model(state, segment, variables());
   const Vector3<double>& d = state.landmarks[static_cast<std::size_t>(o.landmark)];
-  const Vector2<J22> observed = o.u.cast<J22>();
+  const Vector2<Variable> observed = o.u.cast<Variable>();
   if (row == ObservationRow::kProjected) {
-    return (observed - model.rolling_pixel(frame_time, d)) / J22(o.sigma);
+    return (observed - model.rolling_pixel(frame_time, d)) / Variable(o.sigma);
   }
   using Time = ceres::Jet<double, 1>;
   const Vector2<Time> u = Model<double>(state, segment, {}).pixel<Time>(Time(time, 0), d);
   Matrix2<double> A = Matrix2<double>::Identity();
   A(0, 1) = -u[0].v[0] * state.line_delay();
   A(1, 1) -= u[1].v[0] * state.line_delay();
-  const Vector2<J22> raw =
-      observed - model.pixel<J22>(J22(frame_time) + o.u.y() * model.line_delay(), d);
-  return Matrix2<double>(A.inverse() / o.sigma).cast<J22>() * raw;
+  const Vector2<Variable> raw =
+      observed - model.pixel<Variable>(Variable(frame_time) + o.u.y() * model.line_delay(), d);
+  return Matrix2<double>(A.inverse() / o.sigma).cast<Variable>() * raw;
 }
 
 // ---- scenes at ugly values ----
@@ -203,7 +201,7 @@ std::vector<Ugly> ugly_scenes() {
           {"barrel, camera upside down", 3000, 1.01, -0.05, -0.02, 0.6, -0.3},
           {"no line delay, no distortion", 3000, 1, 0, 0, 0.6, 0.2},
           {"narrow, at the seam", 1e5, 0.98, 0.03, 0.015, kPi - 1e-3, 0.9},
-          {"wide barrel, at the other seam", 700, 1, -0.2, -0.03, -kPi + 1e-3, 0.4},
+          {"wide barrel, at the other seam", 700, 1, -0.1, -0.03, -kPi + 1e-3, 0.4},
           {"wide pincushion, far round", 700, 1.02, 0.3, 0.03, -2.5, -0.8}};
 }
 
@@ -249,7 +247,8 @@ AdjustmentProblem make_ugly_problem(const Ugly& ugly) {
       const Model<double> model(s, s.trajectory.segment_at(middle), {});
       const PanTilt<double> p = s.trajectory.position(middle);
       const Vector3<double> d_b = R_base_from_anchor * s.landmarks[l];
-      if (R_base_from_camera(s.mechanics, p).col(2).dot(d_b) < std::cos(1.25 * half_field)) continue;
+      if (R_base_from_camera(s.mechanics, p).col(2).dot(d_b) < std::cos(1.25 * half_field))
+        continue;
       const Vector2<double> u = model.rolling_pixel(data.frame_time_s[f], s.landmarks[l]);
       if (u.x() < -1 || u.x() > 1921 || u.y() < -1 || u.y() > 1081) continue;
       const double n = static_cast<double>(data.observations.size());
@@ -298,7 +297,7 @@ void jet_jacobian(const AdjustmentProblem& problem, ObservationRow row, Eigen::V
   e->resize(rows);
   J->setZero(rows, landmark + 2 * static_cast<Eigen::Index>(s.landmarks.size()));
   Eigen::Index at = 0;
-  const auto put = [&](const J22& value, int segment, int landmark_index) {
+  const auto put = [&](const Variable& value, int segment, int landmark_index) {
     (*e)[at] = value.a;
     J->row(at).segment<8>(2 * segment) += value.v.head<8>();
     J->row(at).segment<kGlobalCount>(global) = value.v.segment<kGlobalCount>(8);
@@ -310,17 +309,17 @@ void jet_jacobian(const AdjustmentProblem& problem, ObservationRow row, Eigen::V
   for (const auto& o : data.observations) {
     const double frame_time = data.frame_time_s[static_cast<std::size_t>(o.frame)];
     const int segment = s.trajectory.segment_at(frame_time + o.u.y() * s.line_delay());
-    const Vector2<J22> residual = observation_residual(s, frame_time, o, row);
+    const Vector2<Variable> residual = observation_residual(s, frame_time, o, row);
     for (int i = 0; i < 2; ++i) put(residual[i], segment, o.landmark);
   }
   for (const auto& sample : data.telemetry) {
     const double time = sample.time_s - s.shift_s + s.drift * (sample.time_s - data.reference_s);
     const int segment = s.trajectory.segment_at(time);
-    const Vector2<J22> residual =
-        Model<J22>(s, segment, variables()).telemetry(sample, data.reference_s);
+    const Vector2<Variable> residual =
+        Model<Variable>(s, segment, variables()).telemetry(sample, data.reference_s);
     for (int i = 0; i < 2; ++i) put(residual[i], segment, -1);
   }
-  const auto prior = Model<J22>(s, 0, variables()).prior(problem.priors.mean);
+  const auto prior = Model<Variable>(s, 0, variables()).prior(problem.priors.mean);
   for (int i = 0; i < kGlobalCount; ++i) {
     put(prior[i] * std::sqrt(problem.priors.information[i]), 0, -1);
   }
@@ -392,8 +391,8 @@ TEST(CeresAdjustment, NormalEquationsAreThoseOfJets) {
       for (Eigen::Index i = 0; i + kGlobalCount < e.size(); i += 2) {
         const double ratio = e.segment<2>(i).squaredNorm() / (scale * scale);
         weight.segment<2>(i).setConstant(1 / (1 + ratio));
-        cost += std::isinf(scale) ? e.segment<2>(i).squaredNorm()
-                                  : scale * scale * std::log1p(ratio);
+        cost +=
+            std::isinf(scale) ? e.segment<2>(i).squaredNorm() : scale * scale * std::log1p(ratio);
       }
       const Eigen::MatrixXd H_jet = J.transpose() * weight.asDiagonal() * J;
       const Eigen::VectorXd g_jet = -J.transpose() * weight.cwiseProduct(e);
@@ -471,48 +470,76 @@ internal::GlobalVector difference(const AdjustmentState& a, const AdjustmentStat
   return d;
 }
 
+struct OwnMinimum {
+  bool converged = false;
+  AdjustmentState state;
+  double cost = 0;
+  GlobalMatrix covariance;
+};
+
+OwnMinimum minimise(const AdjustmentProblem& problem, const LossScales& loss) {
+  OwnMinimum minimum;
+  minimum.state = problem.start;
+  Adjustment adjustment(problem.data, problem.priors, problem.fixed);
+  Linearisation at;
+  double telemetry_unknowns = 0;
+  minimum.converged = adjustment.minimise(loss, 100, 1e-8, &minimum.state, &at) &&
+                      adjustment.covariance(at, &minimum.covariance, &telemetry_unknowns);
+  minimum.cost = at.cost;
+  return minimum;
+}
+
 TEST(CeresAdjustment, ReachesTheSameMinimumWithTheSameCovariance) {
   for (const Recording& recording : recordings()) {
     SCOPED_TRACE(recording.name);
     const AdjustmentProblem problem =
         make_adjustment_problem(recording.simulation, recording.knot_spacing_s);
     ASSERT_GT(problem.data.observations.size(), 1000u);
-    Adjustment adjustment(problem.data, problem.priors, problem.fixed);
-    AdjustmentState state = problem.start;
-    Linearisation at;
-    ASSERT_TRUE(adjustment.minimise(recording.loss, 100, 1e-8, &state, &at));
-    GlobalMatrix covariance;
-    double telemetry_unknowns = 0;
-    ASSERT_TRUE(adjustment.covariance(at, &covariance, &telemetry_unknowns));
+    const OwnMinimum own = minimise(problem, recording.loss);
+    ASSERT_TRUE(own.converged);
+    const CeresMinimum ceres = minimise_by_ceres(
+        problem.data, problem.priors, problem.fixed, recording.loss, ObservationRow::kObserved,
+        CeresAdjustment::options(ceres::DENSE_SCHUR, 1e-13), problem.start);
+    ASSERT_TRUE(ceres.converged);
+    ASSERT_TRUE(ceres.adjustment->at_home());
 
-    for (const ObservationRow row : {ObservationRow::kObserved, ObservationRow::kProjected}) {
-      const CeresMinimum minimum =
-          minimise_by_ceres(problem.data, problem.priors, problem.fixed, recording.loss, row,
-                            CeresAdjustment::options(ceres::DENSE_SCHUR, 1e-13), problem.start);
-      ASSERT_TRUE(minimum.converged);
-      ASSERT_TRUE(minimum.adjustment->at_home());
-      Linearisation there;
-      adjustment.linearise(minimum.adjustment->state(), recording.loss, &there);
-      EXPECT_NEAR(there.cost, at.cost, 1e-9 * at.cost);
-      const auto d = difference(state, minimum.adjustment->state());
-      for (int i = 0; i < kGlobalCount; ++i) {
-        const double sigma = std::sqrt(covariance(i, i));
-        if (sigma == 0) {
-          EXPECT_EQ(d[i], 0) << i;
-          continue;
-        }
-        std::printf("%s row %d param %d: %.3g\n", recording.name.c_str(), static_cast<int>(row), i, d[i] / sigma);
-        EXPECT_LE(std::abs(d[i]), 1e-3 * sigma) << i;
+    Linearisation there;
+    Adjustment(problem.data, problem.priors, problem.fixed)
+        .linearise(ceres.adjustment->state(), recording.loss, &there);
+    EXPECT_NEAR(there.cost, own.cost, 1e-9 * own.cost);
+    const auto moved = difference(own.state, ceres.adjustment->state());
+    // At one and the same state: in a narrow field a thousandth of a sigma changes the axes' by more than 1e-6.
+    CeresAdjustment here(problem.data, problem.priors, problem.fixed, recording.loss,
+                         ObservationRow::kObserved, own.state);
+    GlobalMatrix covariance;
+    ASSERT_TRUE(here.covariance(&covariance));
+    for (int i = 0; i < kGlobalCount; ++i) {
+      EXPECT_LE(std::abs(moved[i]), 1e-3 * std::sqrt(own.covariance(i, i))) << i;
+      for (int j = 0; j < kGlobalCount; ++j) {
+        EXPECT_NEAR(covariance(i, j), own.covariance(i, j),
+                    1e-6 * std::sqrt(own.covariance(i, i) * own.covariance(j, j)))
+            << i << ", " << j;
       }
-      GlobalMatrix by_ceres;
-      ASSERT_TRUE(minimum.adjustment->covariance(&by_ceres));
-      for (int i = 0; i < kGlobalCount; ++i) {
-        for (int j = 0; j < kGlobalCount; ++j) {
-          EXPECT_NEAR(by_ceres(i, j), covariance(i, j),
-                      1e-5 * std::sqrt(covariance(i, i) * covariance(j, j)))
-              << i << ", " << j;
-        }
-      }
+    }
+  }
+}
+
+// A derivative at the observed row sees that row's noise again. Half a tenth of a sigma, added squarely, is a
+// thousandth of the error.
+TEST(CeresAdjustment, HoldingTheRowTimeEffectHardlyMovesTheMinimum) {
+  for (const Recording& recording : recordings()) {
+    SCOPED_TRACE(recording.name);
+    const AdjustmentProblem problem =
+        make_adjustment_problem(recording.simulation, recording.knot_spacing_s);
+    const OwnMinimum own = minimise(problem, recording.loss);
+    ASSERT_TRUE(own.converged);
+    const CeresMinimum exact = minimise_by_ceres(
+        problem.data, problem.priors, problem.fixed, recording.loss, ObservationRow::kProjected,
+        CeresAdjustment::options(ceres::DENSE_SCHUR, 1e-13), problem.start);
+    ASSERT_TRUE(exact.converged);
+    const auto moved = difference(own.state, exact.adjustment->state());
+    for (int i = 0; i < kGlobalCount; ++i) {
+      EXPECT_LE(std::abs(moved[i]), 0.05 * std::sqrt(own.covariance(i, i))) << i;
     }
   }
 }
