@@ -1,9 +1,10 @@
 #pragma once
 // What a turning camera would have seen: recordings with known truth, made without the model's code.
-// Landmarks on a grid of azimuth and elevation (spacing: field of view / 10), the published path
+// Landmarks on a grid of azimuth and elevation (multiples of field of view / 10), the published path
 //   pan = 9 s sin(2 pi t / 10) / (2 pi), tilt = -3 s cos(6 pi t / 10) / (2 pi), s the field of view (rad)
 // or any other, white noise on pixels, angles and stamps, one draw of each measured period. Each
-// landmark is projected at the row that sees it, found by bisection. Fixed seed, same recording.
+// landmark is projected at the row that sees it, found by bisection. Fixed seed, same recording;
+// disturbances draw from a generator of their own, so that all else stays the same with and without.
 
 #include <Eigen/Geometry>
 #include <cmath>
@@ -52,6 +53,7 @@ struct Simulation {
   bool with_noise = true;         // tell the estimator the noise
   bool with_sequence = true;
   double pan_offset_rad = 0;  // of the whole path; angles are wrapped
+  Eigen::Vector2d optical_centre_offset_px = Eigen::Vector2d::Zero();
 
   [[nodiscard]] double field_of_view() const { return 2 * std::atan(width / (2 * focal_length)); }
   [[nodiscard]] Eigen::Vector2d angles(double t) const {
@@ -60,6 +62,17 @@ struct Simulation {
     return {9 * s * std::sin(2 * kPi * t / 10) / (2 * kPi) + pan_offset_rad,
             -3 * s * std::cos(6 * kPi * t / 10) / (2 * kPi)};
   }
+};
+
+// What calibrate() gets, and the truth behind it.
+struct SimulatedRecording {
+  CalibrationInput input;
+  std::vector<double> frame_time_s;        // of input.frames, row 0
+  std::vector<double> telemetry_time_s;    // of input.telemetry
+  std::vector<Eigen::Vector3d> landmarks;  // the index is the landmark's name
+  std::vector<Eigen::Vector2i> grid;       // azimuth, elevation in steps of the grid
+  std::vector<bool> observation_is_outlier;
+  std::vector<bool> telemetry_is_outlier;
 };
 
 // The base experiment's distribution of everything.
@@ -117,8 +130,8 @@ inline bool pixel_at(const Simulation& s, double time, const Eigen::Vector3d& d,
   const double x = c[0] / c[2];
   const double y = c[1] / c[2];
   const double stretch = 1 + s.radial_distortion * (x * x + y * y);
-  *u = s.focal_length * x * stretch + s.width / 2.0;
-  *v = s.focal_length * s.aspect * y * stretch + s.height / 2.0;
+  *u = s.focal_length * x * stretch + s.width / 2.0 + s.optical_centre_offset_px[0];
+  *v = s.focal_length * s.aspect * y * stretch + s.height / 2.0 + s.optical_centre_offset_px[1];
   return true;
 }
 
@@ -141,25 +154,29 @@ inline bool rolling_pixel(const Simulation& s, double frame_time, const Eigen::V
 
 }  // namespace internal
 
-inline CalibrationInput simulate(const Simulation& s) {
+inline SimulatedRecording simulate_with_truth(const Simulation& s) {
   std::mt19937_64 random(s.seed);
+  std::mt19937_64 disturbance(s.seed + 0x9e3779b97f4a7c15u);
   std::normal_distribution<double> normal;
   std::exponential_distribution<double> exponential;
   std::uniform_real_distribution<double> uniform(0, 1);
   const auto stamp_noise = [&](double sigma) {
     return sigma * (s.one_sided_stamps ? exponential(random) : normal(random));
   };
-  CalibrationInput input;
+  SimulatedRecording out;
+  CalibrationInput& input = out.input;
   input.width = s.width;
   input.height = s.height;
   const double image_period = 1 / s.image_rate_hz;
   const double telemetry_period = 1 / s.telemetry_rate_hz;
+  const double image_period_error = s.image_period_sigma_s * normal(random);
+  const double telemetry_period_error = s.telemetry_period_sigma_s * normal(random);
   if (s.with_noise) {
     input.noise.image_stamp_sigma_s = s.image_stamp_sigma_s;
-    input.noise.image_period_s = image_period + s.image_period_sigma_s * normal(random);
+    input.noise.image_period_s = image_period * (1 + s.sender_skew) + image_period_error;
     input.noise.image_period_sigma_s = s.image_period_sigma_s;
     input.noise.telemetry_stamp_sigma_s = s.telemetry_stamp_sigma_s;
-    input.noise.telemetry_period_s = telemetry_period + s.telemetry_period_sigma_s * normal(random);
+    input.noise.telemetry_period_s = telemetry_period + telemetry_period_error;
     input.noise.telemetry_period_sigma_s = s.telemetry_period_sigma_s;
     input.noise.pan_tilt_sigma_rad = s.pan_tilt_sigma;
   }
@@ -173,39 +190,47 @@ inline CalibrationInput simulate(const Simulation& s) {
     high = high.cwiseMax(s.angles(t));
   }
   const double reach = 0.75 * s.field_of_view() + 0.15;
-  std::vector<Eigen::Vector3d> landmarks;
-  for (double azimuth = low[0] - reach; azimuth < high[0] + reach; azimuth += spacing) {
-    for (double elevation = std::max(-1.5, low[1] - reach);
-         elevation < std::min(1.5, high[1] + reach); elevation += spacing) {
-      landmarks.emplace_back(std::cos(elevation) * std::cos(azimuth),
-                             std::cos(elevation) * std::sin(azimuth), -std::sin(elevation));
+  const auto step = [&](double angle) { return static_cast<int>(std::ceil(angle / spacing)); };
+  for (int i = step(low[0] - reach); i < step(high[0] + reach); ++i) {
+    for (int j = step(std::max(-1.5, low[1] - reach)); j < step(std::min(1.5, high[1] + reach));
+         ++j) {
+      const double azimuth = i * spacing;
+      const double elevation = j * spacing;
+      out.grid.emplace_back(i, j);
+      out.landmarks.emplace_back(std::cos(elevation) * std::cos(azimuth),
+                                 std::cos(elevation) * std::sin(azimuth), -std::sin(elevation));
     }
   }
 
   const double image_phase = uniform(random) * image_period;
   for (int n = 0; image_phase + n * image_period < s.duration_s; ++n) {
     const double time = image_phase + n * image_period;
-    const bool lost = uniform(random) < s.lost_frames;
+    const bool lost = uniform(disturbance) < s.lost_frames;
     CalibrationFrame frame;
     frame.frame = n;
     frame.stamp_s = time * (1 + s.sender_skew) + stamp_noise(s.image_stamp_sigma_s);
     if (s.with_sequence) frame.sequence = n;
-    if (lost) continue;
-    input.frames.push_back(frame);
+    if (!lost) {
+      input.frames.push_back(frame);
+      out.frame_time_s.push_back(time);
+    }
     const Eigen::Vector3d forward = internal::camera_to_base(s, s.angles(time)).col(2);
     const double near = std::cos(0.8 * s.field_of_view() + 0.01);
-    for (std::size_t l = 0; l < landmarks.size(); ++l) {
+    for (std::size_t l = 0; l < out.landmarks.size(); ++l) {
       double u = 0;
       double v = 0;
-      if (forward.dot(landmarks[l]) < near) continue;
-      if (!internal::rolling_pixel(s, time, landmarks[l], &u, &v)) continue;
+      if (forward.dot(out.landmarks[l]) < near) continue;
+      if (!internal::rolling_pixel(s, time, out.landmarks[l], &u, &v)) continue;
       u += s.pixel_sigma * normal(random);
       v += s.pixel_sigma * normal(random);
-      if (uniform(random) < s.image_outliers) {
-        u = s.width * uniform(random);
-        v = s.height * uniform(random);
+      if (lost) continue;
+      const bool outlier = uniform(disturbance) < s.image_outliers;
+      if (outlier) {
+        u = s.width * uniform(disturbance);
+        v = s.height * uniform(disturbance);
       }
       input.observations.push_back({n, static_cast<std::int64_t>(l), u, v, s.pixel_sigma});
+      out.observation_is_outlier.push_back(outlier);
     }
   }
 
@@ -216,10 +241,12 @@ inline CalibrationInput simulate(const Simulation& s) {
     CalibrationTelemetry sample;
     sample.stamp_s = time + s.clock_offset + stamp_noise(s.telemetry_stamp_sigma_s);
     if (s.with_sequence) sample.sequence = m;
+    bool outlier = false;
     const auto measure = [&](double true_angle, double scale) {
       double measured = scale * true_angle + s.pan_tilt_sigma * normal(random);
-      if (uniform(random) < s.telemetry_outliers) {
-        measured += s.telemetry_outlier_rad * normal(random);
+      if (uniform(disturbance) < s.telemetry_outliers) {
+        measured += s.telemetry_outlier_rad * std::normal_distribution<double>()(disturbance);
+        outlier = true;
       }
       if (s.angle_quantum_rad > 0) {
         measured = std::round(measured / s.angle_quantum_rad) * s.angle_quantum_rad;
@@ -229,8 +256,17 @@ inline CalibrationInput simulate(const Simulation& s) {
     sample.pan_rad = measure(angle[0], s.pan_scale);
     sample.tilt_rad = measure(angle[1], s.tilt_scale);
     input.telemetry.push_back(sample);
+    out.telemetry_time_s.push_back(time);
+    out.telemetry_is_outlier.push_back(outlier);
   }
-  return input;
+  return out;
+}
+
+inline CalibrationInput simulate(const Simulation& s) { return simulate_with_truth(s).input; }
+
+// The clock offset at the recording's middle, which is the one that is estimated.
+inline double true_clock_offset(const Simulation& s) {
+  return s.clock_offset - s.sender_skew * s.duration_s / 2;
 }
 
 // (estimate - truth), in the order of Parameter; an axis's in the tangent basis of its estimate.
@@ -244,7 +280,7 @@ inline Eigen::Matrix<double, kParameterCount, 1> calibration_error(const Simulat
       c.camera.radial_distortion - s.radial_distortion, c.line_delay - s.line_delay,
       axis_error(c.mechanics.pan_axis, s.pan_axis), axis_error(c.mechanics.tilt_axis, s.tilt_axis),
       c.mechanics.pan_scale - s.pan_scale, c.mechanics.tilt_scale - s.tilt_scale,
-      c.clock_offset - s.clock_offset;
+      c.clock_offset - true_clock_offset(s);
   return error;
 }
 
