@@ -123,9 +123,9 @@ inline Eigen::Matrix3d camera_to_base(const Simulation& s, const Eigen::Vector2d
 }
 
 // False behind the camera.
-inline bool pixel_at(const Simulation& s, double time, const Eigen::Vector3d& d, double* u,
-                     double* v) {
-  const Eigen::Vector3d c = camera_to_base(s, s.angles(time)).transpose() * d;
+inline bool pixel_at(const Simulation& s, const Eigen::Vector2d& angle, const Eigen::Vector3d& d,
+                     double* u, double* v) {
+  const Eigen::Vector3d c = camera_to_base(s, angle).transpose() * d;
   if (c[2] <= 0.1) return false;
   const double x = c[0] / c[2];
   const double y = c[1] / c[2];
@@ -141,15 +141,16 @@ inline bool rolling_pixel(const Simulation& s, double frame_time, const Eigen::V
   double low = -0.2 * s.height;
   double high = 1.2 * s.height;
   const auto above = [&](double row) {
-    return pixel_at(s, frame_time + row * s.line_delay, d, u, v) && *v > row;
+    return pixel_at(s, s.angles(frame_time + row * s.line_delay), d, u, v) && *v > row;
   };
   if (!above(low) || above(high)) return false;
   for (int i = 0; i < 60; ++i) {
     const double middle = 0.5 * (low + high);
     (above(middle) ? low : high) = middle;
   }
-  return pixel_at(s, frame_time + 0.5 * (low + high) * s.line_delay, d, u, v) && *u >= 0 &&
-         *u <= s.width && *v >= 0 && *v <= s.height;
+  const double time = frame_time + 0.5 * (low + high) * s.line_delay;
+  return pixel_at(s, s.angles(time), d, u, v) && *u >= 0 && *u <= s.width && *v >= 0 &&
+         *v <= s.height;
 }
 
 }  // namespace internal

@@ -1,0 +1,54 @@
+// alidade_accuracy: how accurate and how honest the batch calibration is, by Monte Carlo.
+//   alidade_accuracy --experiment base --runs 300       (README.md lists all it can do)
+// Exit status: 0 all statistics lie where they should, 1 some do not (listed last), 2 wrong usage.
+
+#include <CLI/CLI.hpp>
+#include <fstream>
+#include <iostream>
+
+#include "test/accuracy/backend.h"
+#include "test/accuracy/comparison.h"
+
+int main(int argc, char** argv) {
+  using alidade::test::Report;
+  using alidade::test::Scales;
+
+  CLI::App app("Monte-Carlo accuracy of the batch calibration");
+  std::string experiment;
+  std::string data;
+  std::string json;
+  int runs = 20;
+  std::uint64_t seed = 1;
+  app.add_option("--experiment", experiment, "base or soft")
+      ->check(CLI::IsMember({"base", "soft"}));
+  app.add_option("--data", data, "a folder with recordings of known truth, to be compared");
+  app.add_option("--runs", runs, "how many, of each row or field of view")
+      ->check(CLI::PositiveNumber);
+  app.add_option("--seed", seed, "of the first run; the others follow");
+  app.add_option("--json", json, "also write tables and runs to this file");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+
+  Report report(std::cout);
+  if (experiment == "base") run_backend(Scales::kBase, runs, seed, &report);
+  if (experiment == "soft") run_backend(Scales::kSoft, runs, seed, &report);
+  std::string error;
+  if (!data.empty() && !alidade::test::compare_recordings(data, &report, &error)) {
+    std::cerr << "alidade_accuracy: " << error << "\n";
+    return 2;
+  }
+
+  if (!json.empty()) {
+    std::ofstream file(json);
+    file << report.to_json().dump(1) << "\n";
+    if (!file.flush()) {
+      std::cerr << "alidade_accuracy: cannot write " << json << "\n";
+      return 2;
+    }
+  }
+  for (const std::string& what : report.missed()) std::cout << "MISSED: " << what << "\n";
+  return report.missed().empty() ? 0 : 1;
+}
