@@ -8,6 +8,7 @@
 
 #include "test/accuracy/backend.h"
 #include "test/accuracy/comparison.h"
+#include "test/accuracy/narrow.h"
 
 int main(int argc, char** argv) {
   using alidade::test::Report;
@@ -15,13 +16,17 @@ int main(int argc, char** argv) {
 
   CLI::App app("Monte-Carlo accuracy of the batch calibration");
   std::string experiment;
+  alidade::test::NarrowOptions narrow;
   std::string data;
   std::string json;
   int runs = 20;
   std::uint64_t seed = 1;
-  app.add_option("--experiment", experiment, "base or soft")
-      ->check(CLI::IsMember({"base", "soft"}));
+  app.add_option("--experiment", experiment, "base, soft or narrow")
+      ->check(CLI::IsMember({"base", "soft", "narrow"}));
   app.add_option("--data", data, "a folder with recordings of known truth, to be compared");
+  app.add_option("--fields", narrow.fields_deg, "of view, degrees, each half the one before")
+      ->delimiter(',');
+  app.add_flag("!--no-baselines", narrow.baselines, "narrow: ours alone");
   app.add_option("--runs", runs, "how many, of each row or field of view")
       ->check(CLI::PositiveNumber);
   app.add_option("--seed", seed, "of the first run; the others follow");
@@ -35,6 +40,7 @@ int main(int argc, char** argv) {
   Report report(std::cout);
   if (experiment == "base") run_backend(Scales::kBase, runs, seed, &report);
   if (experiment == "soft") run_backend(Scales::kSoft, runs, seed, &report);
+  if (experiment == "narrow") run_narrow(narrow, runs, seed, &report);
   std::string error;
   if (!data.empty() && !alidade::test::compare_recordings(data, &report, &error)) {
     std::cerr << "alidade_accuracy: " << error << "\n";
