@@ -8,7 +8,9 @@
 
 #include "test/accuracy/backend.h"
 #include "test/accuracy/comparison.h"
+#include "test/accuracy/disturbances.h"
 #include "test/accuracy/narrow.h"
+#include "test/accuracy/scaling.h"
 
 int main(int argc, char** argv) {
   using alidade::test::Report;
@@ -16,6 +18,8 @@ int main(int argc, char** argv) {
 
   CLI::App app("Monte-Carlo accuracy of the batch calibration");
   std::string experiment;
+  bool disturbances = false;
+  bool scaling = false;
   alidade::test::NarrowOptions narrow;
   std::string data;
   std::string json;
@@ -24,7 +28,10 @@ int main(int argc, char** argv) {
   app.add_option("--experiment", experiment, "base, soft or narrow")
       ->check(CLI::IsMember({"base", "soft", "narrow"}));
   app.add_option("--data", data, "a folder with recordings of known truth, to be compared");
-  app.add_option("--fields", narrow.fields_deg, "of view, degrees, each half the one before")
+  app.add_flag("--disturbances", disturbances, "base recordings with one thing wrong at a time");
+  app.add_flag("--scaling", scaling, "CPU time for recordings of 10 to 80 s");
+  app.add_option("--fields", narrow.fields_deg,
+                 "of view, degrees, each a whole multiple of the next")
       ->delimiter(',');
   app.add_flag("!--no-baselines", narrow.baselines, "narrow: ours alone");
   app.add_option("--runs", runs, "how many, of each row or field of view")
@@ -41,6 +48,8 @@ int main(int argc, char** argv) {
   if (experiment == "base") run_backend(Scales::kBase, runs, seed, &report);
   if (experiment == "soft") run_backend(Scales::kSoft, runs, seed, &report);
   if (experiment == "narrow") run_narrow(narrow, runs, seed, &report);
+  if (disturbances) run_disturbances(runs, seed, &report);
+  if (scaling) run_scaling(runs, seed, &report);
   std::string error;
   if (!data.empty() && !alidade::test::compare_recordings(data, &report, &error)) {
     std::cerr << "alidade_accuracy: " << error << "\n";

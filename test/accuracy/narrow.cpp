@@ -87,7 +87,8 @@ void run_seed(const NarrowOptions& options, std::uint64_t seed, std::vector<Resu
     std::vector<ZoomLevel> together;
     for (std::size_t wider = 0; wider <= n; ++wider) {
       together.push_back({&levels[wider].simulation, &levels[wider].recording,
-                          levels[wider].first_focal_length, 1 << (n - wider)});
+                          levels[wider].first_focal_length,
+                          static_cast<int>(std::lround((*results)[wider].field / result.field))});
     }
     result.one_level.add(focal_length_by_adjustment({together.back()}), result.field);
     result.multi_level.add(focal_length_by_adjustment(together), result.field);

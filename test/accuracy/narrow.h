@@ -10,7 +10,7 @@
 namespace alidade::test {
 
 struct NarrowOptions {
-  std::vector<double> fields_deg = {32, 16, 8, 4, 2, 1};  // from wide to narrow, halved each time
+  std::vector<double> fields_deg = {32, 16, 8, 4, 2, 1};  // each a whole multiple of the next
   bool baselines = true;
 };
 

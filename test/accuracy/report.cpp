@@ -26,7 +26,7 @@ void Report::list_failures(const std::string& name, const std::vector<Run>& runs
   } else {
     out_ << name << ": " << failures << " of " << runs.size() << " runs refused or wrong\n";
   }
-  out_ << std::endl;
+  out_.flush();
 }
 
 nlohmann::json Report::to_json() const {

@@ -26,11 +26,11 @@ void Table::print(std::ostream& out) const {
     }
     out << "\n";
   };
-  out << title << "\n";
+  out << "\n" << title << "\n";
   print_row(header);
   for (const auto& row : rows) print_row(row);
   for (const auto& note : notes) out << "  " << note << "\n";
-  out << std::endl;
+  out.flush();
 }
 
 nlohmann::json Table::to_json() const {
