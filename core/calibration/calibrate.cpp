@@ -83,8 +83,9 @@ class Calibrator {
   std::vector<std::int64_t> landmark_name_;
   ClockLine image_clock_;
   ClockLine telemetry_clock_;
-  double quantum_ = 0;      // rad, of the telemetry; 0: none
-  double white_sigma_ = 0;  // rad, of the telemetry, rounding apart
+  double start_focal_length_ = 0;  // px, from image motion against telemetry
+  double quantum_ = 0;             // rad, of the telemetry; 0: none
+  double white_sigma_ = 0;         // rad, of the telemetry, rounding apart
   AdjustmentData data_;
   AdjustmentPriors priors_;
   std::array<bool, kGlobalCount> fixed_{};
@@ -384,6 +385,7 @@ bool Calibrator::start() {
   if (status != CalibrationStatus::kOk) return fail(status, why);
   if (!report(0.2, "start values")) return false;
 
+  start_focal_length_ = match.focal_length;
   state_.camera = {match.focal_length, 1, 0, input_.width, input_.height};
   set_priors();
   const AdjustmentState& mean = priors_.mean;
@@ -576,8 +578,8 @@ bool Calibrator::adjust() {
   if (!converged) {
     return fail(CalibrationStatus::kNotConverged,
                 "the adjustment does not converge: the model does not describe these data; are the "
-                "image's size "
-                "and the tracks those of one zoom?");
+                "image's size and the tracks those of one zoom?" +
+                    internal::ask_for_degrees(start_focal_length_, input_.width));
   }
   return true;
 }

@@ -88,6 +88,13 @@ MotionExtent measure_motion(const TrajectorySpline& trajectory) {
   return extent;
 }
 
+std::string ask_for_degrees(double focal_length, int width) {
+  // Read as radians, degrees make any telephoto lens a wide one.
+  if (focal_length > 3 * width) return "";
+  return text(" Are the angles in degrees? In radians the focal length would be about %.0f px.",
+              focal_length * 180 / kPi);
+}
+
 CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
                                const TrajectorySpline& telemetry, const MotionMatch& match,
                                const CalibrationInput& input, std::string* why) {

@@ -21,6 +21,9 @@ namespace alidade::internal {
                                              const MotionMatch& match,
                                              const CalibrationInput& input, std::string* why);
 
+// A question for the user, where the focal length that motions gave (px) makes degrees likely; else nothing.
+[[nodiscard]] std::string ask_for_degrees(double focal_length, int width);
+
 // The motion that was there, true angles.
 struct MotionExtent {
   Vector2<double> range;         // rad, largest less smallest
