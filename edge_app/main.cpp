@@ -22,6 +22,7 @@ int run_command_line(int argc, char** argv) {
   register_run(app, &exit_code);
   register_record(app, &exit_code);
   register_replay(app, &exit_code);
+  register_calibrate(app, &exit_code);
   register_check(app, &exit_code);
   try {
     app.parse(argc, argv);

@@ -1,8 +1,5 @@
 #include "core/calibration/calibration_file.h"
 
-#include <fcntl.h>
-#include <sys/stat.h>
-#include <unistd.h>
 #include <yaml-cpp/yaml.h>
 
 #include <Eigen/Eigenvalues>
@@ -18,6 +15,8 @@
 #include <set>
 #include <sstream>
 #include <vector>
+
+#include "core/calibration/atomic_file.h"
 
 namespace alidade {
 
@@ -367,7 +366,49 @@ bool parse_calibration(const std::string& text, const std::string& name, Calibra
   return false;
 }
 
-std::string format_calibration(const Calibration& calibration) {
+namespace {
+
+void write_quality(const CalibrationNotes& notes, YAML::Emitter* out) {
+  const CalibrationQuality& quality = *notes.quality;
+  const auto number = [out](const char* name, double value, const char* comment) {
+    *out << YAML::Key << name << YAML::Value << short_text(value) << YAML::Comment(comment);
+  };
+  const auto count = [out](const char* name, int value) {
+    *out << YAML::Key << name << YAML::Value << value;
+  };
+  const auto texts = [out](const char* name, const std::vector<std::string>& lines) {
+    if (lines.empty()) return;
+    *out << YAML::Key << name << YAML::Value << YAML::BeginSeq;
+    for (const std::string& line : lines) *out << YAML::DoubleQuoted << line;
+    *out << YAML::EndSeq;
+  };
+  *out << YAML::Key << "quality" << YAML::Value << YAML::BeginMap;
+  number("pixel_sigma_ratio", quality.pixel_sigma_ratio, "residuals / stated noise");
+  number("telemetry_sigma_ratio", quality.telemetry_sigma_ratio, "residuals / assumed noise");
+  number("mean_reprojection_error_px", quality.mean_reprojection_error_px, "px");
+  number("motion_correlation", quality.motion_correlation, "image motion and telemetry");
+  count("frames", quality.frames);
+  count("observations", quality.observations);
+  count("landmarks", quality.landmarks);
+  count("telemetry", quality.telemetry);
+  number("condition", quality.condition, "of the parameters' correlation matrix");
+  *out << YAML::Key << "weakest_direction" << YAML::Value << YAML::DoubleQuoted
+       << quality.weakest_direction;
+  *out << YAML::Key << "priors" << YAML::Value << YAML::BeginMap;
+  for (const auto& [name, prior] : notes.priors) {
+    *out << YAML::Key << name << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "value"
+         << YAML::Value << exact_text(prior.value) << YAML::Key << "sigma" << YAML::Value
+         << exact_text(prior.sigma) << YAML::EndMap;
+  }
+  *out << YAML::EndMap;
+  texts("excluded", notes.excluded);
+  texts("advice", quality.advice);
+  *out << YAML::EndMap;
+}
+
+}  // namespace
+
+std::string format_calibration(const Calibration& calibration, const CalibrationNotes& notes) {
   YAML::Emitter out;
   const auto& cov = calibration.covariance;
   const auto sigma = [&cov](Parameter parameter) {
@@ -419,6 +460,10 @@ std::string format_calibration(const Calibration& calibration) {
     }
     out << YAML::EndSeq << YAML::EndMap;
   }
+  if (notes.quality) write_quality(notes, &out);
+  if (!notes.landmarks.empty()) {
+    out << YAML::Key << "landmarks" << YAML::Value << YAML::DoubleQuoted << notes.landmarks;
+  }
   out << YAML::EndMap;
   return std::string(out.c_str()) + "\n";
 }
@@ -435,68 +480,16 @@ bool load_calibration(const std::string& path, Calibration* calibration, std::st
   return parse_calibration(text.str(), path, calibration, error);
 }
 
-namespace {
-
-// A file beside the target, renamed onto it once it is safely on disk; otherwise removed.
-class TemporaryFile {
- public:
-  explicit TemporaryFile(const std::string& target) : name_(target + ".XXXXXX") {
-    descriptor_ = ::mkostemp(name_.data(), O_CLOEXEC);
-  }
-  TemporaryFile(const TemporaryFile&) = delete;
-  TemporaryFile& operator=(const TemporaryFile&) = delete;
-  ~TemporaryFile() {
-    if (descriptor_ < 0) return;
-    ::close(descriptor_);
-    if (!renamed_) ::unlink(name_.c_str());
-  }
-
-  // False leaves the reason in errno.
-  bool replace(const std::string& target, const std::string& content) {
-    if (descriptor_ < 0) return false;
-    std::size_t written = 0;
-    while (written < content.size()) {
-      const ssize_t n = ::write(descriptor_, content.data() + written, content.size() - written);
-      if (n < 0 && errno == EINTR) continue;
-      if (n < 0) return false;
-      written += static_cast<std::size_t>(n);
-    }
-    // mkostemp lets the owner alone read it; a calibration is no secret.
-    renamed_ = ::fchmod(descriptor_, 0644) == 0 && ::fsync(descriptor_) == 0 &&
-               ::rename(name_.c_str(), target.c_str()) == 0;
-    return renamed_;
-  }
-
- private:
-  std::string name_;
-  int descriptor_ = -1;
-  bool renamed_ = false;
-};
-
-// Makes the rename survive a power cut, where the file system can do so; elsewhere the old file,
-// whole, may come back.
-void sync_folder_of(const std::string& path) {
-  const std::size_t slash = path.find_last_of('/');
-  const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  ::fsync(descriptor);
-  ::close(descriptor);
+bool save_calibration(const std::string& path, const Calibration& calibration, std::string* error) {
+  return save_calibration(path, calibration, {}, error);
 }
 
-}  // namespace
-
-bool save_calibration(const std::string& path, const Calibration& calibration, std::string* error) {
-  const std::string text = format_calibration(calibration);
+bool save_calibration(const std::string& path, const Calibration& calibration,
+                      const CalibrationNotes& notes, std::string* error) {
+  const std::string text = format_calibration(calibration, notes);
   Calibration as_read;
   if (!parse_calibration(text, "refused to write " + path, &as_read, error)) return false;
-  TemporaryFile file(path);
-  if (!file.replace(path, text)) {
-    *error = path + ": cannot be written: " + std::strerror(errno);
-    return false;
-  }
-  sync_folder_of(path);
-  return true;
+  return write_file_atomically(path, text, error);
 }
 
 }  // namespace alidade

@@ -6,6 +6,8 @@
 //   pan_axis: {value: [0, 0, 1], sigma: [0, 0]}     unit vector; sigma in rad, in tangent_basis
 //   zoom: 1234                                      optional
 //   covariance: {names: [...], matrix: [[...]]}     optional; the sigmas must agree with it
+//   quality: {...}                                  optional: residuals, counts, priors, condition, advice
+//   landmarks: map.bin                              optional: side file, see landmark_file.h
 // aspect may be absent (1), a sigma may be absent (0, exact, unless the covariance says otherwise).
 // quality and landmarks are accepted and not kept: they belong to the run that wrote them.
 // All else is strict: an unknown, missing or doubled key, text for a number, a number that is not
@@ -13,22 +15,37 @@
 // Reading back what was written gives the same bits.
 // Not for the real-time thread: allocates, reads and writes files. No shared state.
 
+#include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
+#include "core/calibration/calibrate.h"
 #include "core/model/calibration.h"
 
 namespace alidade {
 
+// What a file tells people of the run that wrote it.
+struct CalibrationNotes {
+  std::optional<CalibrationQuality> quality;
+  std::vector<std::string> excluded;  // CalibrationExclusions::describe()
+  std::vector<std::pair<std::string, CalibrationPrior>> priors;  // that were used, by parameter
+  std::string landmarks;                                         // side file's name; empty: none
+};
+
 // Pure: text in, calibration or error out. name stands for the file in errors.
 [[nodiscard]] bool parse_calibration(const std::string& text, const std::string& name,
                                      Calibration* calibration, std::string* error);
-[[nodiscard]] std::string format_calibration(const Calibration& calibration);
+[[nodiscard]] std::string format_calibration(const Calibration& calibration,
+                                             const CalibrationNotes& notes = {});
 
 [[nodiscard]] bool load_calibration(const std::string& path, Calibration* calibration,
                                     std::string* error);
 
 // Atomic: a reader, or a power cut, meets the old file or the new one, never half of one. A
 // calibration that load_calibration() would refuse is refused here.
+[[nodiscard]] bool save_calibration(const std::string& path, const Calibration& calibration,
+                                    const CalibrationNotes& notes, std::string* error);
 [[nodiscard]] bool save_calibration(const std::string& path, const Calibration& calibration,
                                     std::string* error);
 

@@ -30,6 +30,7 @@ struct CommandError : std::runtime_error {
 void register_run(CLI::App& app, int* exit_code);
 void register_record(CLI::App& app, int* exit_code);
 void register_replay(CLI::App& app, int* exit_code);
+void register_calibrate(CLI::App& app, int* exit_code);
 void register_check(CLI::App& app, int* exit_code);
 
 // Loads it and logs its warnings; throws CommandError.

@@ -22,9 +22,9 @@ bool load_noise(const std::string& directory, RecordingNoise* noise, std::string
         noise->telemetry_period_s = top.number("telemetry_period_s", kPeriod);
         noise->telemetry_period_sigma_s = top.number("telemetry_period_sigma_s", kStampSigma);
         noise->pan_tilt_sigma_rad = top.number("pan_tilt_sigma_rad", {1e-9, 0.1, "rad"});
-        // Of use to a calibration only.
+        noise->pan_tilt_scale_sigma = top.number("pan_tilt_scale_sigma", {0, 1, "1"});
+        // Each track states its own.
         static_cast<void>(top.number("pixel_sigma_px", {0, 100, "px"}));
-        static_cast<void>(top.number("pan_tilt_scale_sigma", {0, 1, "1"}));
         top.finish();
       },
       error);

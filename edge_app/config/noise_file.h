@@ -6,16 +6,12 @@
 #include <optional>
 #include <string>
 
+#include "core/calibration/calibrate.h"
+
 namespace alidade {
 
-struct RecordingNoise {
-  std::optional<double> image_stamp_sigma_s;
-  std::optional<double> image_period_s;
-  std::optional<double> image_period_sigma_s;
-  std::optional<double> telemetry_stamp_sigma_s;
-  std::optional<double> telemetry_period_s;
-  std::optional<double> telemetry_period_sigma_s;
-  std::optional<double> pan_tilt_sigma_rad;
+struct RecordingNoise : CalibrationNoise {
+  std::optional<double> pan_tilt_scale_sigma;  // prior of both scales
 };
 
 // False with a line FILE:LINE: ... in *error if directory/noise.yaml is there and malformed.

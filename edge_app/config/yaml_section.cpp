@@ -143,6 +143,24 @@ std::optional<double> YamlSection::number(const std::string& key, const NumberRa
   return number;
 }
 
+std::optional<std::vector<double>> YamlSection::numbers(const std::string& key, std::size_t count,
+                                                        const NumberRange& range) {
+  asked_.push_back(key);
+  const std::optional<YAML::Node> list = find(key);
+  if (!list) return std::nullopt;
+  const std::string expected = fmt::format("a list of {} plain numbers from {} to {} ({})", count,
+                                           range.low, range.high, range.unit);
+  if (!list->IsSequence() || list->size() != count) fail(key, "expected " + expected);
+  std::vector<double> values;
+  for (const YAML::Node& item : *list) {
+    const std::optional<double> value =
+        item.IsScalar() ? parse_number(item.Scalar()) : std::optional<double>();
+    if (!value || *value < range.low || *value > range.high) fail(key, "expected " + expected);
+    values.push_back(*value);
+  }
+  return values;
+}
+
 std::optional<int> YamlSection::integer(const std::string& key, const NumberRange& range) {
   const std::optional<double> value = number(key, range);
   if (!value) return std::nullopt;

@@ -37,6 +37,9 @@ class YamlSection {
   [[nodiscard]] bool has(const std::string& key) const;
   std::optional<std::string> text(const std::string& key);
   std::optional<double> number(const std::string& key, const NumberRange& range);
+  // A list of exactly `count` numbers.
+  std::optional<std::vector<double>> numbers(const std::string& key, std::size_t count,
+                                             const NumberRange& range);
   std::optional<int> integer(const std::string& key, const NumberRange& range);
   std::optional<bool> truth(const std::string& key);
   // One of `available`; a word of `planned` is refused as not available in this version.

@@ -30,6 +30,12 @@ constexpr std::array<CsvColumn, 8> kTelemetryColumns = {{{"receive_time_s", true
                                                          {"earliest_time_s", false, false},
                                                          {"restarted", false, true}}};
 
+constexpr std::array<CsvColumn, 5> kTrackColumns = {{{"frame", true, true},
+                                                     {"landmark", true, true},
+                                                     {"u_px", true, false},
+                                                     {"v_px", true, false},
+                                                     {"sigma_px", true, false}}};
+
 }  // namespace
 
 bool read_recording_info(const std::string& directory, RecordingInfo* info, std::string* error) {
@@ -109,6 +115,18 @@ bool read_telemetry_csv(const std::string& directory, std::vector<PanTiltSample>
           return "earliest_time_s lies after receive_time_s";
         }
         samples->push_back(sample);
+        return {};
+      },
+      error);
+}
+
+bool read_tracks_csv(const std::string& directory, std::vector<TrackPoint>* points,
+                     std::string* error) {
+  points->clear();
+  return read_csv(
+      directory + "/tracks.csv", kTrackColumns,
+      [points](const CsvCells<5>& cells) -> std::string {
+        points->push_back({*whole(cells[0]), *whole(cells[1]), *cells[2], *cells[3], *cells[4]});
         return {};
       },
       error);

@@ -171,6 +171,7 @@ TEST(CommandLine, HelpAndVersionGoToStdout) {
                                                     {"run", "--help"},
                                                     {"record", "--help"},
                                                     {"replay", "--help"},
+                                                    {"calibrate", "--help"},
                                                     {"check", "--help"}}) {
     const Result result = alidade(arguments);
     EXPECT_EQ(result.exit_code, 0);
@@ -181,6 +182,7 @@ TEST(CommandLine, HelpAndVersionGoToStdout) {
                                                     {"run", "--version"},
                                                     {"record", "--version"},
                                                     {"replay", "--version"},
+                                                    {"calibrate", "--version"},
                                                     {"check", "--version"}}) {
     const Result result = alidade(arguments);
     EXPECT_EQ(result.exit_code, 0);
@@ -194,6 +196,7 @@ TEST(CommandLine, BadUsageIsOneLineAndExitCodeTwo) {
                                                     {"run"},
                                                     {"run", "-c", "x", "--json", "--csv"},
                                                     {"replay"},
+                                                    {"calibrate"},
                                                     {"record", "-c", "x"},
                                                     {"check", "-c", "x", "--duration", "-3"},
                                                     {"run", "-c", "none.yaml"},

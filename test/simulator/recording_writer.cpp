@@ -94,11 +94,10 @@ void write_noise_yaml(const Config& config, const fs::path& directory) {
   const auto sigma = [&](const char* name, double value) {
     if (value > 0) output.stream() << name << ": " << value << '\n';
   };
+  // A stamp sigma says that stamps scatter to both sides; of late ones it would promise too much.
   const auto stamp_sigma = [](const JitterConfig& jitter) {
-    const double p = jitter.burst_probability;
-    const double burst_variance = jitter.burst * jitter.burst * p * (1.0 / 3 - p / 4);
-    return std::sqrt(jitter.sigma * jitter.sigma + jitter.exponential * jitter.exponential +
-                     burst_variance);
+    const bool late = jitter.exponential > 0 || jitter.burst_probability > 0;
+    return late ? 0 : jitter.sigma;
   };
   std::mt19937_64 generator = make_generator(config.seed, Stream::kPeriods);
   std::normal_distribution<double> normal;

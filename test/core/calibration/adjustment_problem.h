@@ -12,7 +12,7 @@
 
 #include "core/calibration/adjustment.h"
 #include "core/calibration/initialization.h"
-#include "test/core/calibration/simulated_recording.h"
+#include "test/support/simulated_recording.h"
 
 namespace alidade::test {
 

@@ -374,5 +374,28 @@ TEST(CalibrationFile, SaysWhyAFileCannotBeReadOrWritten) {
   EXPECT_FALSE(std::filesystem::exists(folder.path() + ".yaml"));
 }
 
+TEST(CalibrationFile, TellsPeopleOfTheRunAndReadsBackWithoutIt) {
+  CalibrationNotes notes;
+  notes.quality.emplace();
+  notes.quality->pixel_sigma_ratio = 1.25;
+  notes.quality->landmarks = 567;
+  notes.quality->weakest_direction = "focal_length up: with \"pan_scale\" up";
+  notes.quality->advice = {"turn: a whole circle", "#2"};
+  notes.excluded = {"2 observations that are outliers"};
+  notes.priors = {{"aspect", {1, 0}}, {"pan_scale", {1, 1e-8}}};
+  notes.landmarks = "map.bin";
+  const std::string text = format_calibration(paper_calibration(), notes);
+  for (const char* part :
+       {"quality:", "pixel_sigma_ratio: 1.25", "landmarks: 567",
+        "pan_scale: {value: 1, sigma: 1e-08}", "\"2 observations that are outliers\"", "\"#2\"",
+        "landmarks: \"map.bin\""}) {
+    EXPECT_THAT(text, HasSubstr(part));
+  }
+  Calibration read;
+  std::string error;
+  ASSERT_TRUE(parse_calibration(text, "test", &read, &error)) << error;
+  expect_same_bits(read, paper_calibration());
+}
+
 }  // namespace
 }  // namespace alidade

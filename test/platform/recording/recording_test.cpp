@@ -39,6 +39,51 @@ struct TelemetryCsv {
   bool ok = false;
 };
 
+struct TracksCsv {
+  explicit TracksCsv(const std::string& content) {
+    directory.write("tracks.csv", content);
+    ok = read_tracks_csv(directory.path(), &points, &error);
+  }
+  TemporaryDirectory directory;
+  std::vector<TrackPoint> points;
+  std::string error;
+  bool ok = false;
+};
+
+TEST(TracksCsv, ReadsPointsAsTheyAre) {
+  const TracksCsv csv(
+      "landmark,quality,frame,v_px,u_px,sigma_px\n"
+      "9007199254740991,good,3,-1.5,960.25,0.3\n"
+      "9007199254740991,bad,3,1e3,0,0\n");
+  ASSERT_TRUE(csv.ok) << csv.error;
+  ASSERT_EQ(csv.points.size(), 2U);
+  EXPECT_EQ(csv.points[0].frame, 3);
+  EXPECT_EQ(csv.points[0].landmark, 9007199254740991);
+  EXPECT_EQ(csv.points[0].u_px, 960.25);
+  EXPECT_EQ(csv.points[0].v_px, -1.5);
+  EXPECT_EQ(csv.points[0].sigma_px, 0.3);
+  EXPECT_EQ(csv.points[1].sigma_px, 0);
+}
+
+TEST(TracksCsv, NamesTheLineOfAMalformedRow) {
+  const std::string header = "frame,landmark,u_px,v_px,sigma_px\n0,1,2,3,0.5\n";
+  for (const auto& [row, what] : {std::pair("0,1,2,3\n", "fewer cells"),
+                                  {"0,1,2,3,0.5,6\n", "more cells"},
+                                  {"0,1,nan,3,0.5\n", "'nan' in column u_px is not a number"},
+                                  {"0,1,2,inf,0.5\n", "'inf' in column v_px is not a number"},
+                                  {"0,1.5,2,3,0.5\n", "'1.5' in column landmark"},
+                                  {"0,1,2,3,\n", "'' in column sigma_px"},
+                                  {"0,1,two,3,0.5\n", "'two' in column u_px"},
+                                  {"0,1,2,3,0.5", "cut off"}}) {
+    const TracksCsv csv(header + row);
+    EXPECT_FALSE(csv.ok) << row;
+    EXPECT_THAT(csv.error, StartsWith(csv.directory.path() + "/tracks.csv:3: "));
+    EXPECT_THAT(csv.error, HasSubstr(what));
+  }
+  EXPECT_THAT(TracksCsv("frame,u_px,v_px,sigma_px\n").error,
+              HasSubstr("tracks.csv:1: no column 'landmark'; the columns are frame,landmark,"));
+}
+
 TEST(FramesCsv, ReadsEveryColumnInAnyOrderAndIgnoresUnknownOnes) {
   const FramesCsv csv(
       "sequence,weather,receive_time_s,sender_utc_s,frame,restarted,sender_time_s\n"

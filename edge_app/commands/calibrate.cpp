@@ -1,0 +1,253 @@
+// `alidade calibrate`: from the tracks and the telemetry of a recording to its calibration, its landmarks
+// and a report; `--compare`: many recordings against what is known of them. A calibration that is not
+// good enough is not written, so that it cannot replace one that is.
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <filesystem>
+#include <system_error>
+
+#include "core/calibration/atomic_file.h"
+#include "core/calibration/calibration_file.h"
+#include "core/calibration/landmark_file.h"
+#include "edge_app/commands/calibration_comparison.h"
+#include "edge_app/commands/calibration_input.h"
+#include "edge_app/commands/command.h"
+#include "edge_app/commands/stop_signals.h"
+#include "edge_app/output/calibration_report.h"
+#include "edge_app/output/calibration_summary.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct CalibrateOptions {
+  std::vector<std::string> recordings;
+  std::string directory;  // empty: <recording>/alidade
+  bool compare = false;
+  bool json = false;
+  // VALUE or VALUE,SIGMA; "free"; empty: as the estimator has it.
+  std::string focal_length;
+  std::string aspect;
+  std::string radial_distortion;
+  std::string line_delay;
+  std::string clock_offset;
+  std::optional<double> scale_sigma;
+};
+
+// Leaves *prior as it is if text is empty.
+void set_prior(const char* option, const std::string& text, const char* unit,
+               std::optional<CalibrationPrior>* prior) {
+  if (text.empty()) return;
+  if (text == "free") {
+    prior->reset();
+    return;
+  }
+  const char* at = text.c_str();
+  char* end = nullptr;
+  CalibrationPrior read;
+  read.value = std::strtod(at, &end);
+  bool good = end != at;
+  if (good && *end == ',') {
+    at = end + 1;
+    read.sigma = std::strtod(at, &end);
+    good = end != at;
+  }
+  if (!good || *end != '\0' || !std::isfinite(read.value) || !(read.sigma >= 0) ||
+      !std::isfinite(read.sigma)) {
+    throw CommandError(
+        kExitUsage, fmt::format("{} {}: expected VALUE (exact), VALUE,SIGMA or free, in {}", option,
+                                text, unit));
+  }
+  *prior = read;
+}
+
+void set_priors(const CalibrateOptions& options, CalibrationOptions* calibration) {
+  set_prior("--focal-length", options.focal_length, "px", &calibration->focal_length);
+  set_prior("--aspect", options.aspect, "f_v / f_u", &calibration->aspect);
+  set_prior("--radial-distortion", options.radial_distortion, "1", &calibration->radial_distortion);
+  set_prior("--line-delay", options.line_delay, "s/row", &calibration->line_delay);
+  set_prior("--clock-offset", options.clock_offset, "s", &calibration->clock_offset);
+  if (options.scale_sigma) {
+    calibration->pan_scale.sigma = *options.scale_sigma;
+    calibration->tilt_scale.sigma = *options.scale_sigma;
+  }
+  std::string error;
+  if (!calibration->validate(&error)) throw CommandError(kExitUsage, error);
+}
+
+CalibrationJob load_job(const std::string& recording, const CalibrateOptions& options) {
+  CalibrationJob job = load_calibration_job(recording);
+  set_priors(options, &job.options);
+  return job;
+}
+
+// The first SIGINT or SIGTERM cancels at the next step; the second ends the process as usual.
+CalibrationResult calibrate_visibly(const std::string& name, CalibrationJob* job,
+                                    StopSignals* signals) {
+  const bool show = is_terminal(STDERR_FILENO);
+  job->options.progress = [&](double done, const char* what) {
+    if (show) fmt::print(stderr, "\r\033[K{}: {:3.0f} % {}", name, 100 * done, what);
+    return signals->wait(-1, 0) != StopSignals::Event::kSignal;
+  };
+  CalibrationResult result = calibrate(job->input, job->options);
+  if (show) fmt::print(stderr, "\r\033[K");
+  if (result.status == CalibrationStatus::kCancelled) {
+    throw CommandError(kExitFailed, name + ": calibration interrupted; nothing stored");
+  }
+  return result;
+}
+
+class OutputDirectory {
+ public:
+  OutputDirectory(const std::string& given, const std::string& recording)
+      : path_(given.empty() ? fs::path(recording) / "alidade" : fs::path(given)) {
+    std::error_code error;
+    fs::create_directories(path_, error);
+    if (error) {
+      throw CommandError(kExitFailed, path_.string() + ": cannot be made: " + error.message() +
+                                          "; give a directory that can be written with -o");
+    }
+  }
+
+  // write(path, &error) -> bool. Remembers the file under `kind`.
+  template <class Write>
+  void add(const char* kind, const char* name, Write write) {
+    const std::string path = (path_ / name).string();
+    std::string error;
+    if (!write(path, &error)) {
+      throw CommandError(kExitFailed, error + "; give a directory with room with -o");
+    }
+    files_.emplace_back(kind, path);
+  }
+  [[nodiscard]] const std::vector<std::pair<std::string, std::string>>& files() const {
+    return files_;
+  }
+
+ private:
+  fs::path path_;
+  std::vector<std::pair<std::string, std::string>> files_;
+};
+
+int calibrate_recording(const CalibrateOptions& options) {
+  const std::string& recording = options.recordings.front();
+  StopSignals signals;
+  CalibrationJob job = load_job(recording, options);
+  for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", recording, remark);
+  const CalibrationResult result = calibrate_visibly(recording, &job, &signals);
+  // Without a solution there is nothing to draw.
+  if (result.frames.empty()) {
+    for (const std::string& line : result.exclusions.describe()) {
+      spdlog::warn("{}: left out: {}", recording, line);
+    }
+    throw CommandError(kExitFailed, fmt::format("{}: {}: {}", recording, to_string(result.status),
+                                                result.message));
+  }
+
+  OutputDirectory directory(options.directory, recording);
+  directory.add("report", "report.html", [&](const std::string& path, std::string* error) {
+    return write_file_atomically(
+        path, calibration_report({recording, job.input, job.options, result, job.remarks}), error);
+  });
+  if (result.ok()) {
+    directory.add("landmarks", "map.bin", [&](const std::string& path, std::string* error) {
+      return save_landmarks(path, result.landmarks, result.calibration, error);
+    });
+    // Last: when it stands, all of its run does.
+    directory.add("calibration", "calibration.yaml",
+                  [&](const std::string& path, std::string* error) {
+                    const CalibrationNotes notes{result.quality, result.exclusions.describe(),
+                                                 stated_priors(job.options), "map.bin"};
+                    return save_calibration(path, result.calibration, notes, error);
+                  });
+  }
+  std::fputs(options.json ? summary_json(result, job.options, directory.files()).c_str()
+                          : summary_text(result, job.options).c_str(),
+             stdout);
+  if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
+  for (const auto& [kind, path] : directory.files()) spdlog::info("{}: {}", kind, path);
+  if (!result.ok()) {
+    throw CommandError(kExitFailed, fmt::format("{}: {}: {}", recording, to_string(result.status),
+                                                result.message));
+  }
+  return kExitOk;
+}
+
+int compare_recordings(const CalibrateOptions& options) {
+  StopSignals signals;
+  CalibrationComparison comparison;
+  for (const std::string& recording : options.recordings) {
+    try {
+      CalibrationJob job = load_job(recording, options);
+      const ComparedRun known = load_known_values(recording);
+      const CalibrationResult result = calibrate_visibly(recording, &job, &signals);
+      if (!result.ok()) {
+        throw CommandError(kExitFailed, fmt::format("{}: {}: {}", recording,
+                                                    to_string(result.status), result.message));
+      }
+      fmt::print("{}", comparison.add(known, result));
+    } catch (const CommandError& failure) {
+      // Usage that no recording can mend, and a cancelled run, end all.
+      if (signals.wait(-1, 0) == StopSignals::Event::kSignal) throw;
+      comparison.add_failure(failure.what());
+      fmt::print("{}\n\n", failure.what());
+    }
+    std::fflush(stdout);
+  }
+  fmt::print("{}", comparison.statistics());
+  return comparison.failures() == 0 ? kExitOk : kExitFailed;
+}
+
+int run_calibrate(const CalibrateOptions& options) {
+  if (!options.compare && options.recordings.size() > 1) {
+    throw CommandError(kExitUsage, "calibrate: one recording at a time; use --compare for many");
+  }
+  if (options.compare && (options.json || !options.directory.empty())) {
+    throw CommandError(kExitUsage,
+                       "calibrate --compare: writes no files and no JSON; leave out -o and --json");
+  }
+  return options.compare ? compare_recordings(options) : calibrate_recording(options);
+}
+
+}  // namespace
+
+void register_calibrate(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<CalibrateOptions>();
+  CLI::App* command = app.add_subcommand(
+      "calibrate",
+      "Calibrate from a recording's tracks and telemetry; writes calibration.yaml, "
+      "map.bin and report.html");
+  command
+      ->add_option("recording", options->recordings,
+                   "Directory of the recording (--compare: of each)")
+      ->required();
+  command->add_option("-o,--output", options->directory,
+                      "Directory for the results (default: DIR/alidade)");
+  command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
+  command->add_flag("--compare", options->compare,
+                    "Many recordings: estimate, truth.yaml and peer.yaml side by side, statistics");
+  const char* group = "What is known beforehand: VALUE (exact), VALUE,SIGMA, or free";
+  const auto add_prior = [&](const char* name, std::string* text, const char* help) {
+    command->add_option(name, *text, help)->group(group)->type_name("PRIOR");
+  };
+  add_prior("--focal-length", &options->focal_length, "px (default: free)");
+  add_prior("--aspect", &options->aspect, "f_v / f_u (default: 1, square pixels)");
+  add_prior("--radial-distortion", &options->radial_distortion, "(default: free)");
+  add_prior("--line-delay", &options->line_delay, "s/row (default: free)");
+  add_prior("--clock-offset", &options->clock_offset, "s (default: free)");
+  command
+      ->add_option("--scale-sigma", options->scale_sigma,
+                   "How well measured angles are known to be true angles, relative (default: "
+                   "noise.yaml's pan_tilt_scale_sigma, or 1e-8)")
+      ->check(CLI::Range(0.0, 1.0))
+      ->group(group);
+  command->callback([options, exit_code] { *exit_code = run_calibrate(*options); });
+}
+
+}  // namespace alidade

@@ -1,0 +1,185 @@
+#include "edge_app/output/calibration_summary.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+namespace alidade {
+namespace {
+
+double sigma_of(const Calibration& calibration, Parameter parameter) {
+  return std::sqrt(calibration.covariance(index(parameter), index(parameter)));
+}
+
+// Digits after the point that show two digits of sigma.
+int decimals_for(double sigma) {
+  return std::clamp(1 - static_cast<int>(std::floor(std::log10(sigma))), 0, 12);
+}
+
+std::string value_text(double value, double sigma) {
+  return sigma > 0 ? fmt::format("{:.{}f}", value, decimals_for(sigma)) : fmt::format("{}", value);
+}
+
+std::string sigma_text(double sigma) {
+  if (!(sigma > 0)) return "exact";
+  return sigma < 1e-4 ? fmt::format("{:.1e}", sigma)
+                      : fmt::format("{:.{}f}", sigma, decimals_for(sigma));
+}
+
+std::string prior_text(const std::optional<CalibrationPrior>& prior, double unit) {
+  if (!prior) return "none";
+  if (prior->sigma == 0) return fmt::format("{:.6g}, exact", prior->value / unit);
+  return fmt::format("{:.6g} ± {:.2g}", prior->value / unit, prior->sigma / unit);
+}
+
+SummaryRow scalar_row(const Calibration& calibration, Parameter parameter, double value,
+                      double unit, const char* unit_name,
+                      const std::optional<CalibrationPrior>& prior) {
+  const double sigma = sigma_of(calibration, parameter) / unit;
+  return {to_string(parameter), value_text(value / unit, sigma), sigma_text(sigma), unit_name,
+          prior_text(prior, unit)};
+}
+
+SummaryRow axis_row(const Calibration& calibration, const char* name, const Vector3<double>& axis,
+                    Parameter first, double prior_sigma) {
+  constexpr double kMilli = 1e-3;
+  const double s0 = sigma_of(calibration, first);
+  const double s1 = sigma_of(calibration, static_cast<Parameter>(index(first) + 1));
+  const double least = s0 > 0 && s1 > 0 ? std::min(s0, s1) : std::max(s0, s1);
+  std::string value;
+  for (int i = 0; i < 3; ++i) value += (i == 0 ? "" : " ") + value_text(axis[i], least);
+  return {name, value, sigma_text(s0 / kMilli) + ", " + sigma_text(s1 / kMilli),
+          "unit vector, mrad",
+          prior_sigma > 0 ? fmt::format("nominal ± {:.3g}", prior_sigma / kMilli)
+                          : std::string("nominal, exact")};
+}
+
+// In characters, not bytes: a prior has a plus-minus sign.
+std::size_t width_of(const std::string& text) {
+  return static_cast<std::size_t>(std::count_if(text.begin(), text.end(), [](char c) {
+    return (static_cast<unsigned char>(c) & 0xc0) != 0x80;
+  }));
+}
+
+std::string pad(const std::string& text, std::size_t width) {
+  return text + std::string(width - std::min(width, width_of(text)), ' ');
+}
+
+}  // namespace
+
+std::vector<SummaryRow> summary_rows(const CalibrationResult& result,
+                                     const CalibrationOptions& options) {
+  const Calibration& c = result.calibration;
+  const auto& m = c.mechanics;
+  return {
+      scalar_row(c, Parameter::kFocalLength, c.camera.focal_length, 1, "px", options.focal_length),
+      scalar_row(c, Parameter::kAspect, c.camera.aspect, 1, "1", options.aspect),
+      scalar_row(c, Parameter::kRadialDistortion, c.camera.radial_distortion, 1, "1",
+                 options.radial_distortion),
+      scalar_row(c, Parameter::kLineDelay, c.line_delay, 1e-6, "us/row", options.line_delay),
+      axis_row(c, "pan_axis", m.pan_axis, Parameter::kPanAxis0, options.axis_sigma_rad),
+      axis_row(c, "tilt_axis", m.tilt_axis, Parameter::kTiltAxis0, options.axis_sigma_rad),
+      scalar_row(c, Parameter::kPanScale, m.pan_scale, 1, "1", options.pan_scale),
+      scalar_row(c, Parameter::kTiltScale, m.tilt_scale, 1, "1", options.tilt_scale),
+      scalar_row(c, Parameter::kClockOffset, c.clock_offset, 1e-3, "ms", options.clock_offset)};
+}
+
+std::string summary_text(const CalibrationResult& result, const CalibrationOptions& options) {
+  std::vector<SummaryRow> rows = {{"parameter", "value", "sigma", "unit", "prior"}};
+  const std::vector<SummaryRow> parameters = summary_rows(result, options);
+  rows.insert(rows.end(), parameters.begin(), parameters.end());
+  std::size_t widths[4] = {};
+  for (const SummaryRow& row : rows) {
+    const std::string* cells[] = {&row.parameter, &row.value, &row.sigma, &row.unit};
+    for (std::size_t i = 0; i < 4; ++i) widths[i] = std::max(widths[i], width_of(*cells[i]));
+  }
+  std::string text;
+  for (const SummaryRow& row : rows) {
+    text += fmt::format("{}  {}  {}  {}  {}\n", pad(row.parameter, widths[0]),
+                        pad(row.value, widths[1]), pad(row.sigma, widths[2]),
+                        pad(row.unit, widths[3]), row.prior);
+  }
+  const CalibrationQuality& quality = result.quality;
+  text += fmt::format(
+      "from {} frames, {} observations of {} landmarks, {} telemetry samples; "
+      "residuals / noise: image {:.2f}, telemetry {:.2f}\n",
+      quality.frames, quality.observations, quality.landmarks, quality.telemetry,
+      quality.pixel_sigma_ratio, quality.telemetry_sigma_ratio);
+  for (const std::string& line : result.exclusions.describe()) text += "left out: " + line + "\n";
+  text +=
+      fmt::format("weakest: {} (condition {:.3g})\n", quality.weakest_direction, quality.condition);
+  for (const std::string& line : quality.advice) text += "advice: " + line + "\n";
+  return text;
+}
+
+std::string summary_json(const CalibrationResult& result, const CalibrationOptions& options,
+                         const std::vector<std::pair<std::string, std::string>>& files) {
+  using nlohmann::ordered_json;
+  const Calibration& c = result.calibration;
+  ordered_json json;
+  json["status"] = to_string(result.status);
+  json["message"] = result.message;
+  ordered_json& parameters = json["calibration"];
+  const auto scalar = [&](Parameter parameter, double value) {
+    parameters[to_string(parameter)] = {{"value", value}, {"sigma", sigma_of(c, parameter)}};
+  };
+  const auto axis = [&](const char* name, const Vector3<double>& value, Parameter first) {
+    parameters[name] = {
+        {"value", {value.x(), value.y(), value.z()}},
+        {"sigma", {sigma_of(c, first), sigma_of(c, static_cast<Parameter>(index(first) + 1))}}};
+  };
+  scalar(Parameter::kFocalLength, c.camera.focal_length);
+  scalar(Parameter::kAspect, c.camera.aspect);
+  scalar(Parameter::kRadialDistortion, c.camera.radial_distortion);
+  scalar(Parameter::kLineDelay, c.line_delay);
+  axis("pan_axis", c.mechanics.pan_axis, Parameter::kPanAxis0);
+  axis("tilt_axis", c.mechanics.tilt_axis, Parameter::kTiltAxis0);
+  scalar(Parameter::kPanScale, c.mechanics.pan_scale);
+  scalar(Parameter::kTiltScale, c.mechanics.tilt_scale);
+  scalar(Parameter::kClockOffset, c.clock_offset);
+  for (const auto& [name, prior] : stated_priors(options)) {
+    json["priors"][name] = {{"value", prior.value}, {"sigma", prior.sigma}};
+  }
+  const CalibrationQuality& quality = result.quality;
+  json["quality"] = {{"pixel_sigma_ratio", quality.pixel_sigma_ratio},
+                     {"telemetry_sigma_ratio", quality.telemetry_sigma_ratio},
+                     {"mean_reprojection_error_px", quality.mean_reprojection_error_px},
+                     {"frames", quality.frames},
+                     {"observations", quality.observations},
+                     {"landmarks", quality.landmarks},
+                     {"telemetry", quality.telemetry},
+                     {"motion_correlation", quality.motion_correlation},
+                     {"condition", quality.condition},
+                     {"weakest_direction", quality.weakest_direction},
+                     {"advice", quality.advice}};
+  json["excluded"] = result.exclusions.describe();
+  json["files"] = ordered_json::object();
+  for (const auto& [kind, path] : files) json["files"][kind] = path;
+  // A folder's name may be no UTF-8.
+  return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
+
+std::vector<std::pair<std::string, CalibrationPrior>> stated_priors(
+    const CalibrationOptions& options) {
+  std::vector<std::pair<std::string, CalibrationPrior>> priors;
+  const auto add = [&priors](Parameter parameter, const std::optional<CalibrationPrior>& prior) {
+    if (prior) priors.emplace_back(to_string(parameter), *prior);
+  };
+  add(Parameter::kFocalLength, options.focal_length);
+  add(Parameter::kAspect, options.aspect);
+  add(Parameter::kRadialDistortion, options.radial_distortion);
+  add(Parameter::kLineDelay, options.line_delay);
+  for (const Parameter axis :
+       {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
+    add(axis, CalibrationPrior{0, options.axis_sigma_rad});
+  }
+  add(Parameter::kPanScale, options.pan_scale);
+  add(Parameter::kTiltScale, options.tilt_scale);
+  add(Parameter::kClockOffset, options.clock_offset);
+  return priors;
+}
+
+}  // namespace alidade

@@ -1,0 +1,151 @@
+// The report as a reader's browser meets it: whole, self-contained, harmless, of bearable size.
+
+#include "edge_app/output/calibration_report.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <regex>
+
+#include "edge_app/output/svg_plot.h"
+#include "test/support/simulated_recording.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+struct Calibrated {
+  explicit Calibrated(const test::Simulation& simulation) : input(test::simulate(simulation)) {
+    result = calibrate(input, options);
+  }
+  [[nodiscard]] std::string report(const std::string& name = "recording") const {
+    return calibration_report({name, input, options, result, remarks});
+  }
+  CalibrationInput input;
+  CalibrationOptions options;
+  CalibrationResult result;
+  std::vector<std::string> remarks;
+};
+
+std::size_t count(const std::string& text, const std::string& part) {
+  std::size_t found = 0;
+  for (auto at = text.find(part); at != std::string::npos; at = text.find(part, at + 1)) ++found;
+  return found;
+}
+
+TEST(CalibrationReport, HoldsVerdictTablesAndEveryPlot) {
+  const Calibrated run{test::Simulation()};
+  ASSERT_TRUE(run.result.ok()) << run.result.message;
+  const std::string page = run.report();
+  for (const char* part :
+       {"<strong>Calibrated</strong>", "Parameters", "focal_length", "nominal \u00b1 50",
+        "Correlations", "Image residuals over time, u", "Image residuals over time, v",
+        "Image residuals over the image", "Distribution", "Telemetry minus spline, pan",
+        "Telemetry minus spline, tilt", "Stamps of the image", "Stamps of the telemetry",
+        "Map in the base", "prefers-color-scheme: dark"}) {
+    EXPECT_THAT(page, HasSubstr(part));
+  }
+  EXPECT_EQ(count(page, "<svg"), 11U);
+}
+
+TEST(CalibrationReport, LoadsNothingAndRunsNothing) {
+  const std::string page = Calibrated{test::Simulation()}.report();
+  for (const char* part :
+       {"http:", "https:", "src=", "href=", "url(", "<script", "@import", "nan", "inf\"", "inf "}) {
+    EXPECT_THAT(page, Not(HasSubstr(part)));
+  }
+}
+
+TEST(CalibrationReport, DrawsOnlyNumbersOfCoarseTelemetry) {
+  test::Simulation simulation;
+  simulation.angle_quantum_rad = 2e-4;
+  const Calibrated run{simulation};
+  ASSERT_TRUE(run.result.ok()) << run.result.message;
+  EXPECT_THAT(run.report(), Not(HasSubstr("nan")));
+}
+
+TEST(CalibrationReport, ClosesEveryElementItOpens) {
+  const std::string page = Calibrated{test::Simulation()}.report();
+  std::vector<std::string> open;
+  const std::regex tag("<(/?)([a-z0-9]+)([^<>]*?)(/?)>");
+  std::size_t seen = 0;
+  for (auto it = std::sregex_iterator(page.begin(), page.end(), tag); it != std::sregex_iterator();
+       ++it) {
+    const std::string name = (*it)[2];
+    ++seen;
+    if (name == "meta" || (*it)[4].length() > 0) continue;
+    if ((*it)[1].length() == 0) {
+      open.push_back(name);
+      continue;
+    }
+    ASSERT_FALSE(open.empty());
+    EXPECT_EQ(open.back(), name);
+    open.pop_back();
+  }
+  EXPECT_GT(seen, 300U);
+  EXPECT_TRUE(open.empty());
+}
+
+TEST(CalibrationReport, EscapesWhatComesFromOutside) {
+  Calibrated run{test::Simulation()};
+  run.remarks = {"a <b> & 'c'"};
+  const std::string page = run.report("<script>alert(\"x\")</script>");
+  EXPECT_THAT(page, Not(HasSubstr("<script>")));
+  EXPECT_THAT(page, HasSubstr("&lt;script&gt;alert(&quot;x&quot;)&lt;/script&gt;"));
+  EXPECT_THAT(page, HasSubstr("a &lt;b&gt; &amp; &#39;c&#39;"));
+}
+
+TEST(CalibrationReport, SaysThatAWeakResultIsNotWritten) {
+  Calibrated run{test::Simulation()};
+  run.result.status = CalibrationStatus::kWeak;
+  run.result.message = "clock offset known to 30 ms only";
+  const std::string page = run.report();
+  EXPECT_THAT(page, HasSubstr("no calibration was written"));
+  EXPECT_THAT(page, HasSubstr("clock offset known to 30 ms only"));
+}
+
+TEST(CalibrationReport, OfAHundredThousandObservationsStaysBelowTwoMegabytes) {
+  Calibrated run{test::Simulation()};
+  // The same run ten times over, each at its own error.
+  const std::vector<CalibrationObservation> seen = run.input.observations;
+  const std::vector<ObservationResidual> residuals = run.result.observation_residuals;
+  for (int copy = 1; run.input.observations.size() < 100000; ++copy) {
+    for (ObservationResidual residual : residuals) {
+      residual.observation += static_cast<std::size_t>(copy) * seen.size();
+      residual.error_px *= 1 + 0.01 * copy;
+      run.result.observation_residuals.push_back(residual);
+    }
+    run.input.observations.insert(run.input.observations.end(), seen.begin(), seen.end());
+  }
+  EXPECT_GT(run.result.observation_residuals.size(), 95000U);
+  EXPECT_LT(run.report().size(), 2000000U);
+}
+
+TEST(SvgPlot, PutsPointsBeyondTheRangeOnItsEdge) {
+  SvgPlot plot(200, 100, {0, 10, "x"}, {-1, 1, "y"});
+  plot.dots({{5, 100}}, "a");
+  plot.dots({{5, -100}}, "b");
+  const std::string svg = plot.svg("test");
+  EXPECT_THAT(svg, HasSubstr("M126 10h0"));
+  EXPECT_THAT(svg, HasSubstr("M126 56h0"));
+}
+
+TEST(SvgPlot, LabelsItsAxesWithRoundNumbersAndUnits) {
+  const SvgPlot plot(400, 200, {-0.03, 0.11, "angle <1>, rad"}, {0, 1, "y"});
+  const std::string svg = plot.svg("a & b");
+  for (const char* part : {">0.00<", ">0.05<", ">0.10<", "angle &lt;1&gt;, rad", "a &amp; b"}) {
+    EXPECT_THAT(svg, HasSubstr(part));
+  }
+}
+
+TEST(SvgPlot, DrawsDotsThatCoverEachOtherOnce) {
+  SvgPlot plot(200, 100, {0, 10, "x"}, {-1, 1, "y"});
+  plot.dots(std::vector<PlotPoint>(1000, {5, 0}), "a");
+  EXPECT_EQ(count(plot.svg("test"), "h0"), 1U);
+}
+
+}  // namespace
+}  // namespace alidade
