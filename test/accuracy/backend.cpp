@@ -86,11 +86,13 @@ void add_errors(const std::vector<Run>& runs, Scales scales, const std::string& 
   }
   for (const int i : {0, 1}) {
     std::vector<double> angles;
+    std::vector<double> bounds;
     for (const Run& run : runs) {
       if (run.estimated) angles.push_back(run.axis_angle[i] * 1e3);
+      bounds.push_back(run.axis_mean_at_bound[i] * 1e3);
     }
     table.rows.push_back({i == 0 ? "pan axis, mrad" : "tilt axis, mrad", number(mean(angles)),
-                          number(median(angles)), "-",
+                          number(median(angles)), number(mean(bounds)),
                           number(soft ? kUnknown : kAuthorsAxesMilliradian[i])});
   }
   std::vector<double> pixels;
@@ -113,7 +115,8 @@ void add_consistency(const std::vector<Run>& runs, const std::string& title, Rep
   Judge judge(report, title, 2 * static_cast<int>(std::size(kRows)) + 4 + 4);
   Table bound_table;
   bound_table.title = title + ": error / bound, root mean square over the runs";
-  bound_table.header = {"parameter", "ours", "efficient", "95 %", "verdict", "authors, base"};
+  bound_table.header = {"parameter",         "ours",         "efficient", "95 %", "verdict",
+                        "our sigma / bound", "authors, base"};
   Table anees_table;
   anees_table.title = title + ": honesty, mean of (error / reported sigma)^2 (ANEES)";
   anees_table.header = {"parameter", "ours", "expected", "95 %", "verdict", "authors, base"};
@@ -132,21 +135,26 @@ void add_consistency(const std::vector<Run>& runs, const std::string& title, Rep
          judge.mean_square(name + ", ANEES,", value, expected, count), number(authors)});
   };
   const auto add_bound = [&](const std::string& name, double value, double expected, int count,
-                             double authors) {
+                             double sigma_over_bound, double authors) {
     bound_table.rows.push_back(
-        {name, number(value), number(expected),
+        {name, number(value, 4), number(expected),
          interval_text(root_mean_square_interval(count, kPrintedProbability), expected),
          judge.root_mean_square(name + ", error / bound,", value, expected, count),
-         number(authors)});
+         number(sigma_over_bound, 4), number(authors)});
   };
   for (const Row& row : kRows) {
     const std::string name = to_string(row.parameter);
     const std::vector<double> over_bound = errors_over_bound(runs, row.parameter);
     const std::vector<double> normalised = normalised_errors(runs, row.parameter);
     const double expected = mean_expected(row.parameter);
+    std::vector<double> sigmas;
+    for (const Run& run : runs) {
+      const int p = index(row.parameter);
+      if (run.estimated && run.bound[p] > 0) sigmas.push_back(run.sigma[p] / run.bound[p]);
+    }
     const int count = static_cast<int>(normalised.size());
     add_bound(name, root_mean_square(over_bound), std::sqrt(expected),
-              static_cast<int>(over_bound.size()), row.authors_over_bound);
+              static_cast<int>(over_bound.size()), median(sigmas), row.authors_over_bound);
     add_anees(name, std::pow(root_mean_square(normalised), 2), expected, count, row.authors_anees);
   }
   for (const Parameter p :
@@ -166,7 +174,7 @@ void add_consistency(const std::vector<Run>& runs, const std::string& title, Rep
     const std::string name = i == 0 ? "pan_axis" : "tilt_axis";
     const int count = 2 * static_cast<int>(nees.size());
     add_anees(name + " (both together)", mean(nees), 1, count, kUnknown);
-    add_bound(name, std::sqrt(mean(over_bound)), 1, count, kUnknown);
+    add_bound(name, std::sqrt(mean(over_bound)), 1, count, kUnknown, kUnknown);
   }
   const std::string verdicts =
       "verdict: in, below, above the 95 % interval of chi-square; with ! also outside of the "
@@ -175,6 +183,7 @@ void add_consistency(const std::vector<Run>& runs, const std::string& title, Rep
       "bound: own information matrix at the truth (bound.h), made as the published limit.yaml.",
       "efficient: what the bound itself would show; not 1 where the prior weighs and the truth "
       "is drawn otherwise.",
+      "our sigma / bound: median of what is reported; 1 if all information is used.",
       "authors' program: 60 base runs.", verdicts};
   anees_table.notes = {
       "expected: 1, but for the prior's part where the truth is not drawn from the prior (soft "

@@ -92,7 +92,7 @@ void add_group(const std::string& name, const std::vector<const Compared*>& grou
                           number(std::pow(root_mean_square(our_nees), 2)), number(mean(expected)),
                           number(std::pow(root_mean_square(peer_nees), 2)),
                           interval_text(mean_square_interval(count, kPrintedProbability)),
-                          number(median(bounds), 4)});
+                          bounds.empty() ? "-" : number(median(bounds), 4)});
   }
   std::vector<double> nees[2];
   for (const Compared* c : group) {
@@ -105,6 +105,19 @@ void add_group(const std::string& name, const std::vector<const Compared*>& grou
                           "1.00", "-",
                           interval_text(mean_square_interval(count, kPrintedProbability)), "-"});
   }
+  std::string axes = "Axes, mean error in mrad, pan and tilt:";
+  for (const int i : {0, 1}) {
+    std::vector<double> our_angles;
+    std::vector<double> peer_angles;
+    for (const Compared* c : group) {
+      const Simulation& s = c->given.simulation;
+      if (c->run.estimated) our_angles.push_back(c->run.axis_angle[i] * 1e3);
+      peer_angles.push_back(1e3 * (i == 0 ? (c->given.peer_pan_axis - s.pan_axis).norm()
+                                          : (c->given.peer_tilt_axis - s.tilt_axis).norm()));
+    }
+    axes += " ours " + number(mean(our_angles)) + ", peer's " + number(mean(peer_angles)) +
+            (i == 0 ? ";" : ".");
+  }
   std::vector<double> ours;
   std::vector<double> peers;
   for (const Compared* c : group) {
@@ -116,7 +129,8 @@ void add_group(const std::string& name, const std::vector<const Compared*>& grou
       "% intervals of chi-square for what is 1 by itself.",
       "own bound / limit: median; see bound.h. CPU s, median and largest: ours " +
           number(median(ours)) + ", " + number(largest(ours)) + "; peer's " +
-          number(median(peers)) + ", " + number(largest(peers)) + "."};
+          number(median(peers)) + ", " + number(largest(peers)) + ".",
+      axes};
   report->add(table);
 }
 

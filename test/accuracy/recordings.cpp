@@ -158,6 +158,8 @@ bool read_given_recording(const std::string& directory, GivenRecording* given, s
       given->peer[i] = value_of(peer, kFour[i]);
       given->peer_sigma[i] = value_of(peer, kFour[i], "sigma");
     }
+    given->peer_pan_axis = axis_of(peer, "pan_axis");
+    given->peer_tilt_axis = axis_of(peer, "tilt_axis");
     given->peer_cpu_s = peer["cpu_s"].as<double>();
     if (std::filesystem::exists(directory + "/limit.yaml")) {
       const YAML::Node limit = YAML::LoadFile(directory + "/limit.yaml");

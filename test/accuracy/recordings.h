@@ -23,6 +23,8 @@ struct GivenRecording {
   CalibrationOptions options;
   FourParameters peer = FourParameters::Zero();  // estimates; the focal length in px
   FourParameters peer_sigma = FourParameters::Zero();
+  Eigen::Vector3d peer_pan_axis;
+  Eigen::Vector3d peer_tilt_axis;
   double peer_cpu_s = 0;
   std::optional<FourParameters> limit;
 };

@@ -1,6 +1,9 @@
 #include "test/accuracy/run.h"
 
+#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
+#include <algorithm>
+#include <boost/math/special_functions/ellint_2.hpp>
 #include <cmath>
 #include <ctime>
 #include <nlohmann/json.hpp>
@@ -24,6 +27,16 @@ double axis_mean_square(const Eigen::Vector3d& error, const Eigen::Matrix<double
   return e.dot(covariance.inverse() * e) / 2;
 }
 
+// Mean length of a Gaussian vector in the plane: with the larger sigma a and the smaller one b,
+// sqrt(2 / pi) a E(sqrt(1 - b^2 / a^2)), E the complete elliptic integral of the second kind.
+double mean_length(const Eigen::Matrix2d& covariance) {
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(covariance);
+  const double large = solver.eigenvalues()[1];
+  if (!(large > 0)) return 0;
+  const double ratio = std::max(0.0, solver.eigenvalues()[0]) / large;
+  return std::sqrt(2 / kPi * large) * boost::math::ellint_2(std::sqrt(1 - ratio));
+}
+
 }  // namespace
 
 Run run_recording(const Simulation& s, const SimulatedRecording& recording,
@@ -41,6 +54,10 @@ Run run_recording(const Simulation& s, const SimulatedRecording& recording,
   if (bound.ok) {
     run.bound = bound.covariance.diagonal().cwiseSqrt();
     run.expected = expected_nees(bound, spread);
+    run.axis_mean_at_bound = {mean_length(bound.covariance.block<2, 2>(
+                                  index(Parameter::kPanAxis0), index(Parameter::kPanAxis0))),
+                              mean_length(bound.covariance.block<2, 2>(
+                                  index(Parameter::kTiltAxis0), index(Parameter::kTiltAxis0)))};
   }
   if (!run.estimated) return run;
 

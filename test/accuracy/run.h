@@ -35,6 +35,7 @@ struct Run {
   Eigen::Vector2d axis_angle = Eigen::Vector2d::Zero();
   Eigen::Vector2d axis_nees = Eigen::Vector2d::Zero();
   Eigen::Vector2d axis_over_bound = Eigen::Vector2d::Zero();
+  Eigen::Vector2d axis_mean_at_bound = Eigen::Vector2d::Zero();  // mean angle of an estimator there
 
   [[nodiscard]] bool published() const { return status == CalibrationStatus::kOk; }
   [[nodiscard]] bool wrong() const;  // published, and beyond kWrongSigmas
