@@ -86,8 +86,9 @@ void add_group(const std::string& name, const std::vector<const Compared*>& grou
       expected.push_back(c->run.expected[p]);
     }
     const int count = static_cast<int>(our_nees.size());
-    table.rows.push_back({to_string(kFour[i]), number(root_mean_square(ours)),
-                          number(root_mean_square(peers)),
+    table.rows.push_back({to_string(kFour[i]),
+                          (ours.empty() ? "-" : number(root_mean_square(ours))),
+                          (peers.empty() ? "-" : number(root_mean_square(peers))),
                           interval_text(root_mean_square_interval(count, kPrintedProbability)),
                           number(std::pow(root_mean_square(our_nees), 2)), number(mean(expected)),
                           number(std::pow(root_mean_square(peer_nees), 2)),
