@@ -585,7 +585,7 @@ ceres::Solver::Options CeresAdjustment::options(ceres::LinearSolverType solver,
   ceres::Solver::Options options;
   options.linear_solver_type = solver;
   options.num_threads = 1;
-  options.max_num_iterations = 100;
+  options.max_num_iterations = 400;
   options.initial_trust_region_radius = 1e8;
   options.function_tolerance = relative_tolerance;
   options.parameter_tolerance = 1e-16;

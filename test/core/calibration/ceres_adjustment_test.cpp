@@ -483,7 +483,8 @@ OwnMinimum minimise(const AdjustmentProblem& problem, const LossScales& loss) {
   Adjustment adjustment(problem.data, problem.priors, problem.fixed);
   Linearisation at;
   double telemetry_unknowns = 0;
-  minimum.converged = adjustment.minimise(loss, 100, 1e-8, &minimum.state, &at) &&
+  // A robust loss is reweighted: it converges by a constant factor a step.
+  minimum.converged = adjustment.minimise(loss, 400, 1e-8, &minimum.state, &at) &&
                       adjustment.covariance(at, &minimum.covariance, &telemetry_unknowns);
   minimum.cost = at.cost;
   return minimum;
