@@ -712,6 +712,8 @@ void Calibrator::conclude() {
     if (sample.used) ++samples;
   }
   quality.telemetry = samples;
+  quality.pan_tilt_sigma_rad =
+      std::hypot(white_sigma_, quantum_ / std::sqrt(12.0)) * result_.quality.telemetry_sigma_ratio;
   const Matrix3<double> R_base_from_anchor = R_base_from_camera(state_.mechanics, state_.anchor);
   for (std::size_t i = 0; i < landmark_name_.size(); ++i) {
     CalibrationLandmark mark;

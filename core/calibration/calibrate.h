@@ -180,7 +180,7 @@ struct TelemetryResidual {
 struct CalibrationQuality {
   double pixel_sigma_ratio = 0;      // residual / stated noise, redundancy accounted for
   double telemetry_sigma_ratio = 0;  // likewise
-  double pan_tilt_sigma_rad = 0;     // of one sample, as used
+  double pan_tilt_sigma_rad = 0;     // of one reading, as used
   double mean_reprojection_error_px = 0;
   int frames = 0;
   int observations = 0;

@@ -152,6 +152,70 @@ TEST(Calibrate, TakesQuantisedTelemetryForWhatItIs) {
   }
 }
 
+TEST(Calibrate, RoundedAnglesDoNotBiasTheFocalLengthOfANarrowField) {
+  constexpr int kRuns = 12;
+  double sum = 0;
+  double squares = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    Simulation s = small_simulation(static_cast<std::uint64_t>(200 + run));
+    s.focal_length = 100000;  // a field of 1.1 degrees, crossed in 31 readings
+    s.angle_quantum_rad = 0.1 * kPi / 180;
+    s.pan_scale = s.tilt_scale = 1;
+    const CalibrationResult result = calibrate(simulate(s));
+    ASSERT_TRUE(result.ok()) << result.message;
+    const int f = index(Parameter::kFocalLength);
+    const double error = calibration_error(s, result.calibration)[f] /
+                         std::sqrt(result.calibration.covariance(f, f));
+    sum += error;
+    squares += error * error;
+  }
+  EXPECT_LE(std::abs(sum), kSigmas * std::sqrt(kRuns));
+  // 99.99 % of chi-square with 12 degrees of freedom lie below 40.
+  EXPECT_LT(squares, 40);
+}
+
+TEST(Calibrate, LandmarkCovarianceIsThatOfItsObservations) {
+  Simulation s = small_simulation(15);
+  s.focal_length = 20000;  // narrow: a pixel is the same angle everywhere
+  const CalibrationResult result = calibrate(simulate(s));
+  ASSERT_TRUE(result.ok()) << result.message;
+  ASSERT_GT(result.landmarks.size(), 50u);
+  for (const CalibrationLandmark& mark : result.landmarks) {
+    const double variance =
+        std::pow(s.pixel_sigma * result.quality.pixel_sigma_ratio / s.focal_length, 2) /
+        mark.observations;
+    EXPECT_NEAR(mark.covariance(0, 0), variance, 0.1 * variance);
+    EXPECT_NEAR(mark.covariance(1, 1), variance, 0.1 * variance);
+    EXPECT_NEAR(mark.covariance(0, 1), 0, 0.1 * variance);
+  }
+}
+
+TEST(Calibrate, AsksForDegreesWhenATelephotoLensLooksWide) {
+  Simulation s = small_simulation(16);
+  s.focal_length = 55000;
+  CalibrationInput input = simulate(s);
+  for (auto& sample : input.telemetry) {
+    sample.pan_rad *= 180 / kPi;
+    sample.tilt_rad *= 180 / kPi;
+  }
+  const CalibrationResult result = calibrate(input);
+  EXPECT_FALSE(result.ok());
+  EXPECT_THAT(result.message, HasSubstr("degrees"));
+}
+
+TEST(Calibrate, WithholdsWhatIsTooUncertainAndSaysWhatWouldHelp) {
+  // The image hardly moves while it is read out slowly from a shaky mount.
+  Simulation s = small_simulation(17);
+  s.pixel_sigma = 20;
+  s.pan_tilt_sigma = 1e-3;
+  s.path = [](double t) {
+    return Eigen::Vector2d(0.05 * std::sin(2 * kPi * t / 10), 0.02 * std::cos(6 * kPi * t / 10));
+  };
+  const CalibrationResult result = calibrate(simulate(s));
+  EXPECT_EQ(result.status, CalibrationStatus::kWeak) << result.message;
+  EXPECT_THAT(result.message, HasSubstr("only"));
+}
+
 TEST(Calibrate, EstimatesTheAspectWhenAsked) {
   Simulation s = small_simulation(12);
   s.aspect = 1.01;
