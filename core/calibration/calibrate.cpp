@@ -267,6 +267,7 @@ bool Calibrator::fit_clocks() {
   image.period_s = input_.noise.image_period_s;
   image.period_sigma_s = input_.noise.image_period_sigma_s;
   image.one_sided = options_.image_stamps == StampNoise::kOneSided;
+  image.own_times = options_.image_stamps == StampNoise::kOwnTimes;
   image_clock_ = internal::fit_clock(image);
 
   ClockInput telemetry;
@@ -278,6 +279,7 @@ bool Calibrator::fit_clocks() {
   telemetry.period_s = input_.noise.telemetry_period_s;
   telemetry.period_sigma_s = input_.noise.telemetry_period_sigma_s;
   telemetry.one_sided = options_.telemetry_stamps == StampNoise::kOneSided;
+  telemetry.own_times = options_.telemetry_stamps == StampNoise::kOwnTimes;
   telemetry_clock_ = internal::fit_clock(telemetry);
 
   const auto publish = [](const ClockLine& line) {

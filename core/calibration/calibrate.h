@@ -72,7 +72,8 @@ struct CalibrationPrior {
 // How the stamps of a stream err.
 enum class StampNoise {
   kSymmetric,  // zero mean
-  kOneSided    // never early: network, software
+  kOneSided,   // never early: network, software
+  kOwnTimes    // polled: each sample was taken about when its stamp says, no steady clock behind it
 };
 
 struct CalibrationOptions {

@@ -98,6 +98,10 @@ ClockLine fit_clock(const ClockInput& input) {
   const std::size_t count = input.stamp_s.size();
   result.time_s = input.stamp_s;
   if (count < 3) return result;
+  if (input.own_times) {
+    result.stamp_sigma_s = input.stamp_sigma_s.value_or(0);
+    return result;
+  }
   std::vector<double> n(count);
   bool counted = true;
   for (std::size_t i = 0; i < count && counted; ++i) {

@@ -6,7 +6,8 @@
 // there is one; offset and period are then uncorrelated. kOneSided: the highest line below the
 // stamps (core/model/lower_line.h); its constant least delay becomes part of the clock offset.
 // n_i are sequence numbers or, without them, counted along the stamps, gaps included. Stamps that do
-// not fit a steady clock (a polled device) are kept as they are, and that is said. Allocates.
+// not fit a steady clock are kept as they are, and that is said; so are those that have none behind them (a
+// polled device). Allocates.
 
 #include <cstdint>
 #include <optional>
@@ -21,6 +22,7 @@ struct ClockInput {
   std::optional<double> period_s;
   std::optional<double> period_sigma_s;
   bool one_sided = false;
+  bool own_times = false;  // no clock behind the stamps
 };
 
 struct ClockLine {

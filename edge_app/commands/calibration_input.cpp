@@ -116,8 +116,10 @@ void add_telemetry(std::vector<PanTiltSample> samples, CalibrationJob* job) {
     noise.telemetry_stamp_sigma_s =
         std::sqrt(square_widths / static_cast<double>(samples.size()) / 12);
   }
-  job->options.telemetry_stamps =
-      noise.telemetry_stamp_sigma_s ? StampNoise::kSymmetric : StampNoise::kOneSided;
+  // Only an interval tells a poll from a stream whose device sends neither count nor time.
+  job->options.telemetry_stamps = polled && square_widths > 0     ? StampNoise::kOwnTimes
+                                  : noise.telemetry_stamp_sigma_s ? StampNoise::kSymmetric
+                                                                  : StampNoise::kOneSided;
 }
 
 // Single points beyond the image are the calibration's business, many are another image's.

@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "test/support/simulated_recording.h"
 
@@ -230,6 +231,30 @@ TEST(Calibrate, TakesOneSidedStamps) {
   CalibrationOptions options;
   options.image_stamps = options.telemetry_stamps = StampNoise::kOneSided;
   expect_within_sigmas(s, calibrate(simulate(s), options));
+}
+
+TEST(Calibrate, UsesPolledTelemetryAtItsOwnTimes) {
+  Simulation s = small_simulation(18);
+  s.telemetry_rate_hz = 400;
+  s.telemetry_stamp_sigma_s = 1e-5;
+  CalibrationInput input = simulate(s);
+  // A poll that comes back after 5 to 40 ms.
+  std::mt19937 random(18);
+  std::uniform_int_distribution<std::size_t> ticks(2, 16);
+  std::vector<CalibrationTelemetry> polled;
+  for (std::size_t i = 0; i < input.telemetry.size(); i += ticks(random)) {
+    polled.push_back(input.telemetry[i]);
+    polled.back().sequence.reset();
+  }
+  input.telemetry = polled;
+  input.noise.telemetry_period_s.reset();
+  input.noise.telemetry_period_sigma_s.reset();
+  CalibrationOptions options;
+  options.telemetry_stamps = StampNoise::kOwnTimes;
+  const CalibrationResult result = calibrate(input, options);
+  expect_within_sigmas(s, result);
+  EXPECT_FALSE(result.telemetry_timing.steady);
+  EXPECT_NEAR(result.quality.telemetry_sigma_ratio, 1, 0.2);
 }
 
 TEST(Calibrate, SaysThatScaleAndFocalLengthCannotBeToldApart) {
