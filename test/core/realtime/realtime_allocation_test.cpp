@@ -2,9 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include <array>
 #include <cmath>
+#include <random>
 
+#include "core/realtime/fast_corners.h"
+#include "core/realtime/patch_alignment.h"
 #include "core/realtime/pt_mode.h"
+#include "core/realtime/pyramid.h"
+#include "test/core/realtime/analytic_image.h"
 #include "test/support/allocation_guard.h"
 
 namespace alidade::test {
@@ -49,6 +55,34 @@ TEST(RealtimeAllocation, PtModeAllocatesNothing) {
   EXPECT_EQ(guard.count(), 0);
   EXPECT_GT(directions, 190);
   EXPECT_EQ(pixels, directions);
+}
+
+TEST(RealtimeAllocation, LookingAtPicturesAllocatesNothing) {
+  std::mt19937_64 random(1);
+  const AnalyticImage texture(&random, 10);
+  const Pixels pixels = make_pixels(320, 200, texture, 2, &random);
+  Pyramid pyramid(320, 200, 3);
+  FastGrid grid(320, 200, 32);
+  std::array<FastCorner, 100> corners;
+  ReferencePatch reference;
+  Alignment alignment;
+  Matrix2<double> A = Matrix2<double>::Identity();
+  int found = 0;
+  const AllocationGuard guard;
+  for (int i = 0; i < 20; ++i) {
+    (void)pyramid.build(pixels.view, 3);
+    const FastResult result = grid.detect(pyramid.octave(i % 3), 5, corners.data(), 100);
+    A(0, 1) = 0.01 * (i % 2);
+    for (int j = 0; j < result.count; ++j) {
+      const FastCorner& corner = corners[static_cast<std::size_t>(j)];
+      const Vector2<double> centre(corner.u + 0.5, corner.v + 0.5);
+      if (!is_usable(prepare(pyramid.octave(i % 3), centre, A, 2, &reference))) continue;
+      found += align(reference, pyramid.octave(i % 3), centre + Vector2<double>(0.5, 0.3), {},
+                     &alignment) == AlignmentStatus::kConverged;
+    }
+  }
+  EXPECT_EQ(guard.count(), 0);
+  EXPECT_GT(found, 200);
 }
 
 }  // namespace
