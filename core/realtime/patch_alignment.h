@@ -19,8 +19,8 @@
 // variance there is kUnobservedVariance: the answer is then one of one dimension.
 //
 // Positions and covariance are in pixels of the octave at hand: the caller multiplies by 2^l and 4^l.
-// Valid for starts within about half the size of what the patch shows (measured: 2 to 3 px). Pure
-// functions: no allocation, no state, no waiting.
+// Valid for starts within 2 px (98 % found again, none wrong; two thirds at 3 px; waves of 6 to 40 px).
+// Pure functions: no allocation, no state, no waiting.
 
 #include <Eigen/Core>
 #include <type_traits>
@@ -32,7 +32,7 @@ namespace alidade {
 
 inline constexpr int kPatchSize = 8;                  // points in each direction
 inline constexpr double kUnobservedVariance = 100.0;  // px^2
-// tr(MR)^2 / tr(MRMR), M the projection to the residuals: 29 to 31 for any texture.
+// tr(MR)^2 / tr(MRMR), M the projection to the residuals: 29 to 31 for any texture, 8x8 points.
 inline constexpr double kNoiseFreedom = 30;
 
 struct ReferencePatch {
