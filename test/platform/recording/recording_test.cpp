@@ -14,40 +14,34 @@ using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-struct FramesCsv {
-  explicit FramesCsv(const std::string& content) {
-    directory.write("frames.csv", content);
-    ok = read_frames_csv(directory.path(), &frames, &error);
+// One table of a recording, as it is read back.
+template <class Row>
+struct ReadTable {
+  using Reader = bool (*)(const std::string&, std::vector<Row>*, std::string*);
+  ReadTable(const char* file, Reader read, const std::string& content) : name(file) {
+    directory.write(name, content);
+    ok = read(directory.path(), &rows, &error);
   }
   std::string at(int line) const {
-    return directory.path() + "/frames.csv:" + std::to_string(line) + ": ";
+    return directory.path() + "/" + name + ":" + std::to_string(line) + ": ";
   }
   TemporaryDirectory directory;
-  std::vector<FrameStamp> frames;
+  std::string name;
+  std::vector<Row> rows;
   std::string error;
   bool ok = false;
 };
-
-struct TelemetryCsv {
-  explicit TelemetryCsv(const std::string& content) {
-    directory.write("telemetry.csv", content);
-    ok = read_telemetry_csv(directory.path(), &samples, &error);
-  }
-  TemporaryDirectory directory;
-  std::vector<PanTiltSample> samples;
-  std::string error;
-  bool ok = false;
+struct FramesCsv : ReadTable<FrameStamp> {
+  explicit FramesCsv(const std::string& content)
+      : ReadTable("frames.csv", read_frames_csv, content) {}
 };
-
-struct TracksCsv {
-  explicit TracksCsv(const std::string& content) {
-    directory.write("tracks.csv", content);
-    ok = read_tracks_csv(directory.path(), &points, &error);
-  }
-  TemporaryDirectory directory;
-  std::vector<TrackPoint> points;
-  std::string error;
-  bool ok = false;
+struct TelemetryCsv : ReadTable<PanTiltSample> {
+  explicit TelemetryCsv(const std::string& content)
+      : ReadTable("telemetry.csv", read_telemetry_csv, content) {}
+};
+struct TracksCsv : ReadTable<TrackPoint> {
+  explicit TracksCsv(const std::string& content)
+      : ReadTable("tracks.csv", read_tracks_csv, content) {}
 };
 
 TEST(TracksCsv, ReadsPointsAsTheyAre) {
@@ -56,13 +50,13 @@ TEST(TracksCsv, ReadsPointsAsTheyAre) {
       "9007199254740991,good,3,-1.5,960.25,0.3\n"
       "9007199254740991,bad,3,1e3,0,0\n");
   ASSERT_TRUE(csv.ok) << csv.error;
-  ASSERT_EQ(csv.points.size(), 2U);
-  EXPECT_EQ(csv.points[0].frame, 3);
-  EXPECT_EQ(csv.points[0].landmark, 9007199254740991);
-  EXPECT_EQ(csv.points[0].u_px, 960.25);
-  EXPECT_EQ(csv.points[0].v_px, -1.5);
-  EXPECT_EQ(csv.points[0].sigma_px, 0.3);
-  EXPECT_EQ(csv.points[1].sigma_px, 0);
+  ASSERT_EQ(csv.rows.size(), 2U);
+  EXPECT_EQ(csv.rows[0].frame, 3);
+  EXPECT_EQ(csv.rows[0].landmark, 9007199254740991);
+  EXPECT_EQ(csv.rows[0].u_px, 960.25);
+  EXPECT_EQ(csv.rows[0].v_px, -1.5);
+  EXPECT_EQ(csv.rows[0].sigma_px, 0.3);
+  EXPECT_EQ(csv.rows[1].sigma_px, 0);
 }
 
 TEST(TracksCsv, NamesTheLineOfAMalformedRow) {
@@ -77,7 +71,7 @@ TEST(TracksCsv, NamesTheLineOfAMalformedRow) {
                                   {"0,1,2,3,0.5", "cut off"}}) {
     const TracksCsv csv(header + row);
     EXPECT_FALSE(csv.ok) << row;
-    EXPECT_THAT(csv.error, StartsWith(csv.directory.path() + "/tracks.csv:3: "));
+    EXPECT_THAT(csv.error, StartsWith(csv.at(3)));
     EXPECT_THAT(csv.error, HasSubstr(what));
   }
   EXPECT_THAT(TracksCsv("frame,u_px,v_px,sigma_px\n").error,
@@ -90,38 +84,38 @@ TEST(FramesCsv, ReadsEveryColumnInAnyOrderAndIgnoresUnknownOnes) {
       "70,fine,0.1,1700000000.5,3,1,5.25\n"
       ",,-2e-1,,4,,\n");
   ASSERT_TRUE(csv.ok) << csv.error;
-  ASSERT_EQ(csv.frames.size(), 2U);
-  EXPECT_EQ(csv.frames[0].frame, 3);
-  EXPECT_EQ(csv.frames[0].receive_time_s, 0.1);
-  EXPECT_EQ(csv.frames[0].sender_time_s, 5.25);
-  EXPECT_EQ(csv.frames[0].sender_utc_s, 1700000000.5);
-  EXPECT_EQ(csv.frames[0].sequence, 70);
-  EXPECT_TRUE(csv.frames[0].restarted);
-  EXPECT_EQ(csv.frames[1].frame, 4);
-  EXPECT_EQ(csv.frames[1].receive_time_s, -0.2);
-  EXPECT_EQ(csv.frames[1].sender_time_s, std::nullopt);
-  EXPECT_EQ(csv.frames[1].sender_utc_s, std::nullopt);
-  EXPECT_EQ(csv.frames[1].sequence, std::nullopt);
-  EXPECT_FALSE(csv.frames[1].restarted);
+  ASSERT_EQ(csv.rows.size(), 2U);
+  EXPECT_EQ(csv.rows[0].frame, 3);
+  EXPECT_EQ(csv.rows[0].receive_time_s, 0.1);
+  EXPECT_EQ(csv.rows[0].sender_time_s, 5.25);
+  EXPECT_EQ(csv.rows[0].sender_utc_s, 1700000000.5);
+  EXPECT_EQ(csv.rows[0].sequence, 70);
+  EXPECT_TRUE(csv.rows[0].restarted);
+  EXPECT_EQ(csv.rows[1].frame, 4);
+  EXPECT_EQ(csv.rows[1].receive_time_s, -0.2);
+  EXPECT_EQ(csv.rows[1].sender_time_s, std::nullopt);
+  EXPECT_EQ(csv.rows[1].sender_utc_s, std::nullopt);
+  EXPECT_EQ(csv.rows[1].sequence, std::nullopt);
+  EXPECT_FALSE(csv.rows[1].restarted);
 }
 
 TEST(FramesCsv, AcceptsWindowsLineEndsBlanksAndEmptyLines) {
   const FramesCsv csv("frame,receive_time_s\r\n 0 ,\t1.5 \r\n\r\n1,2.5\r\n");
   ASSERT_TRUE(csv.ok) << csv.error;
-  ASSERT_EQ(csv.frames.size(), 2U);
-  EXPECT_EQ(csv.frames[1].receive_time_s, 2.5);
+  ASSERT_EQ(csv.rows.size(), 2U);
+  EXPECT_EQ(csv.rows[1].receive_time_s, 2.5);
 }
 
 TEST(FramesCsv, ReadsATableWithoutRows) {
   const FramesCsv csv("frame,receive_time_s\n");
   EXPECT_TRUE(csv.ok) << csv.error;
-  EXPECT_TRUE(csv.frames.empty());
+  EXPECT_TRUE(csv.rows.empty());
 }
 
 TEST(FramesCsv, PassesEqualAndJumpingStampsOn) {
   const FramesCsv csv("frame,receive_time_s\n0,5\n1,5\n2,1\n");
   ASSERT_TRUE(csv.ok) << csv.error;
-  EXPECT_EQ(csv.frames[2].receive_time_s, 1);
+  EXPECT_EQ(csv.rows[2].receive_time_s, 1);
 }
 
 struct Flaw {
@@ -180,8 +174,8 @@ TEST(TelemetryCsv, ReadsEveryColumn) {
       "receive_time_s,pan_rad,tilt_rad,zoom,device_time_s,sequence,earliest_time_s,restarted\n"
       "1,0.5,-0.25,900,77.5,6,0.75,1\n");
   ASSERT_TRUE(csv.ok) << csv.error;
-  ASSERT_EQ(csv.samples.size(), 1U);
-  const PanTiltSample& sample = csv.samples[0];
+  ASSERT_EQ(csv.rows.size(), 1U);
+  const PanTiltSample& sample = csv.rows[0];
   EXPECT_EQ(sample.latest_time_s, 1);
   EXPECT_EQ(sample.earliest_time_s, 0.75);
   EXPECT_EQ(sample.pan_rad, 0.5);
@@ -195,9 +189,9 @@ TEST(TelemetryCsv, ReadsEveryColumn) {
 TEST(TelemetryCsv, TakesASampleWithoutEarliestTimeForTrueAtItsReceiveTime) {
   const TelemetryCsv csv("receive_time_s,pan_rad,tilt_rad\n1.5,0,0\n");
   ASSERT_TRUE(csv.ok) << csv.error;
-  EXPECT_EQ(csv.samples.at(0).earliest_time_s, 1.5);
-  EXPECT_EQ(csv.samples.at(0).zoom, std::nullopt);
-  EXPECT_FALSE(csv.samples.at(0).restarted);
+  EXPECT_EQ(csv.rows.at(0).earliest_time_s, 1.5);
+  EXPECT_EQ(csv.rows.at(0).zoom, std::nullopt);
+  EXPECT_FALSE(csv.rows.at(0).restarted);
 }
 
 TEST(TelemetryCsv, RejectsAnIntervalThatEndsBeforeItBegins) {
