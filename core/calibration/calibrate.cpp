@@ -10,6 +10,7 @@
 #include "core/calibration/adjustment.h"
 #include "core/calibration/initialization.h"
 #include "core/calibration/knot_choice.h"
+#include "core/calibration/median.h"
 #include "core/calibration/stream_clock.h"
 #include "core/calibration/sufficiency.h"
 
@@ -35,6 +36,8 @@ constexpr double kMargin = 0.25;  // s
 const double kOutlierSquaredError = 2 * std::log(1e4);
 // Cauchy scale (sigmas) of the robust adjustment.
 constexpr double kRobustScale = 3;
+// Seen in two frames or more.
+constexpr std::size_t kMinLandmarks = 8;
 
 class Calibrator {
  public:
@@ -68,6 +71,7 @@ class Calibrator {
   bool adjust();
   void replace_rounded_telemetry();
   bool adjust_robustly(Adjustment* adjustment);
+  bool split_knots();
   bool adjust_on_inliers(Adjustment* adjustment);
   bool mark_outliers(const Linearisation& at);
   bool correct_noise();
@@ -237,13 +241,12 @@ bool Calibrator::sort_observations() {
     }
     i = end;
   }
-  constexpr std::size_t kMinLandmarks = 8;
   if (landmark_name_.size() < kMinLandmarks) {
-    return fail(
-        CalibrationStatus::kTooFewLandmarks,
-        "only " + std::to_string(landmark_name_.size()) +
-            " landmarks are seen in two frames or more; at least 8 are needed, some hundred "
-            "are good: point the camera at a scene with texture");
+    return fail(CalibrationStatus::kTooFewLandmarks,
+                "only " + std::to_string(landmark_name_.size()) +
+                    " landmarks are seen in two frames or more; at least " +
+                    std::to_string(kMinLandmarks) +
+                    " are needed, some hundred are good: point the camera at a scene with texture");
   }
   return true;
 }
@@ -257,30 +260,32 @@ bool Calibrator::sort_input() {
   return sort_frames() && sort_telemetry() && sort_observations();
 }
 
-bool Calibrator::fit_clocks() {
-  ClockInput image;
-  for (const std::size_t i : frame_index_) {
-    image.stamp_s.push_back(input_.frames[i].stamp_s);
-    image.sequence.push_back(input_.frames[i].sequence);
+// The items' stamps and numbers added to what is known of the stream.
+template <class Item>
+ClockLine fit_stream_clock(const std::vector<Item>& items, const std::vector<std::size_t>& used,
+                           StampNoise stamps, ClockInput clock) {
+  for (const std::size_t i : used) {
+    clock.stamp_s.push_back(items[i].stamp_s);
+    clock.sequence.push_back(items[i].sequence);
   }
-  image.stamp_sigma_s = input_.noise.image_stamp_sigma_s;
-  image.period_s = input_.noise.image_period_s;
-  image.period_sigma_s = input_.noise.image_period_sigma_s;
-  image.one_sided = options_.image_stamps == StampNoise::kOneSided;
-  image.own_times = options_.image_stamps == StampNoise::kOwnTimes;
-  image_clock_ = internal::fit_clock(image);
+  clock.one_sided = stamps == StampNoise::kOneSided;
+  clock.own_times = stamps == StampNoise::kOwnTimes;
+  return internal::fit_clock(clock);
+}
 
+bool Calibrator::fit_clocks() {
+  const CalibrationNoise& noise = input_.noise;
+  ClockInput image;
+  image.stamp_sigma_s = noise.image_stamp_sigma_s;
+  image.period_s = noise.image_period_s;
+  image.period_sigma_s = noise.image_period_sigma_s;
+  image_clock_ = fit_stream_clock(input_.frames, frame_index_, options_.image_stamps, image);
   ClockInput telemetry;
-  for (const std::size_t i : telemetry_index_) {
-    telemetry.stamp_s.push_back(input_.telemetry[i].stamp_s);
-    telemetry.sequence.push_back(input_.telemetry[i].sequence);
-  }
-  telemetry.stamp_sigma_s = input_.noise.telemetry_stamp_sigma_s;
-  telemetry.period_s = input_.noise.telemetry_period_s;
-  telemetry.period_sigma_s = input_.noise.telemetry_period_sigma_s;
-  telemetry.one_sided = options_.telemetry_stamps == StampNoise::kOneSided;
-  telemetry.own_times = options_.telemetry_stamps == StampNoise::kOwnTimes;
-  telemetry_clock_ = internal::fit_clock(telemetry);
+  telemetry.stamp_sigma_s = noise.telemetry_stamp_sigma_s;
+  telemetry.period_s = noise.telemetry_period_s;
+  telemetry.period_sigma_s = noise.telemetry_period_sigma_s;
+  telemetry_clock_ =
+      fit_stream_clock(input_.telemetry, telemetry_index_, options_.telemetry_stamps, telemetry);
 
   const auto publish = [](const ClockLine& line) {
     return StreamTiming{line.steady,         line.period_s,      line.period_sigma_s,
@@ -448,7 +453,7 @@ bool Calibrator::start() {
     first = std::min(first, time);
     last = std::max(last, time);
   }
-  if (landmark_name_.size() < 8 || !(first < last)) {
+  if (landmark_name_.size() < kMinLandmarks || !(first < last)) {
     return fail(CalibrationStatus::kBadInput, "video and telemetry hardly overlap in time");
   }
   first -= kMargin;
@@ -499,16 +504,24 @@ bool Calibrator::mark_outliers(const Linearisation& at) {
   return changed;
 }
 
+// True if the residuals asked for knots and got them.
+bool Calibrator::split_knots() {
+  const internal::KnotChoice choice = internal::choose_knots(data_, state_.trajectory, at_);
+  if (choice.split.empty() ||
+      state_.trajectory.segments() + static_cast<int>(choice.split.size()) >= options_.max_knots) {
+    return false;
+  }
+  state_.trajectory = state_.trajectory.split(choice.split);
+  return true;
+}
+
 bool Calibrator::adjust_robustly(Adjustment* adjustment) {
   const auto median_error = [](const std::vector<internal::LinearisedResidual>& residuals) {
     std::vector<double> errors;
     for (const auto& r : residuals) {
       if (r.valid) errors.push_back(r.error.norm());
     }
-    if (errors.empty()) return 1.0;
-    const auto middle = errors.begin() + static_cast<std::ptrdiff_t>(errors.size() / 2);
-    std::nth_element(errors.begin(), middle, errors.end());
-    return *middle;
+    return errors.empty() ? 1.0 : internal::median(std::move(errors));
   };
   LossScales loss;
   adjustment->linearise(state_, {1e6, 1e6}, &at_);
@@ -517,12 +530,7 @@ bool Calibrator::adjust_robustly(Adjustment* adjustment) {
     loss.pixel = std::max(kRobustScale, 2 * median_error(at_.observations));
     loss.telemetry = std::max(kRobustScale, 2 * median_error(at_.telemetry));
     settled = adjustment->minimise(loss, 3, 1.0, &state_, &at_);
-    const internal::KnotChoice choice = internal::choose_knots(data_, state_.trajectory, at_);
-    if (!choice.split.empty() &&
-        state_.trajectory.segments() + static_cast<int>(choice.split.size()) < options_.max_knots) {
-      state_.trajectory = state_.trajectory.split(choice.split);
-      continue;
-    }
+    if (split_knots()) continue;
     if (settled && loss.pixel == kRobustScale) return true;
   }
   return settled;
@@ -531,12 +539,7 @@ bool Calibrator::adjust_robustly(Adjustment* adjustment) {
 bool Calibrator::adjust_on_inliers(Adjustment* adjustment) {
   for (int round = 0; round < 8; ++round) {
     if (!adjustment->minimise({}, 20, 1e-4, &state_, &at_)) return false;
-    const internal::KnotChoice choice = internal::choose_knots(data_, state_.trajectory, at_);
-    if (!choice.split.empty() &&
-        state_.trajectory.segments() + static_cast<int>(choice.split.size()) < options_.max_knots) {
-      state_.trajectory = state_.trajectory.split(choice.split);
-      continue;
-    }
+    if (split_knots()) continue;
     if (!mark_outliers(at_)) return true;
   }
   return true;
@@ -708,14 +711,18 @@ void Calibrator::conclude() {
   for (std::size_t i = 0; i < data_.telemetry.size(); ++i) {
     const auto& sample = data_.telemetry[i];
     const auto& residual = at_.telemetry[i];
+    Vector2<double> sigma = sample.sigma;
+    for (int axis = 0; axis < 2; ++axis) {
+      if (!sample.is_noise[static_cast<std::size_t>(axis)]) {
+        sigma[axis] = std::numeric_limits<double>::infinity();
+      }
+    }
     result_.telemetry_residuals.push_back({telemetry_index_[i], residual.time_s,
-                                           residual.error.cwiseProduct(sample.sigma),
+                                           residual.error.cwiseProduct(sample.sigma), sigma,
                                            !sample.used});
     if (sample.used) ++samples;
   }
   quality.telemetry = samples;
-  quality.pan_tilt_sigma_rad =
-      std::hypot(white_sigma_, quantum_ / std::sqrt(12.0)) * result_.quality.telemetry_sigma_ratio;
   const Matrix3<double> R_base_from_anchor = R_base_from_camera(state_.mechanics, state_.anchor);
   for (std::size_t i = 0; i < landmark_name_.size(); ++i) {
     CalibrationLandmark mark;

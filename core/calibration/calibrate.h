@@ -175,13 +175,13 @@ struct TelemetryResidual {
   std::size_t sample = 0;  // index into the input
   double time_s = 0;       // image clock
   Vector2<double> error_rad;
+  Vector2<double> sigma_rad;  // as used; infinite where the error is a rounding's and no noise
   bool outlier = false;
 };
 
 struct CalibrationQuality {
   double pixel_sigma_ratio = 0;      // residual / stated noise, redundancy accounted for
   double telemetry_sigma_ratio = 0;  // likewise
-  double pan_tilt_sigma_rad = 0;     // of one reading, as used
   double mean_reprojection_error_px = 0;
   int frames = 0;
   int observations = 0;

@@ -6,18 +6,11 @@
 #include <cmath>
 #include <cstddef>
 #include <limits>
+#include <utility>
+
+#include "core/calibration/median.h"
 
 namespace alidade::internal {
-
-namespace {
-
-double median(std::vector<double>* values) {
-  const auto middle = values->begin() + static_cast<std::ptrdiff_t>(values->size() / 2);
-  std::nth_element(values->begin(), middle, values->end());
-  return *middle;
-}
-
-}  // namespace
 
 void unwrap(std::vector<AdjustmentTelemetry>* telemetry) {
   constexpr std::size_t kMemory = 5;
@@ -27,7 +20,7 @@ void unwrap(std::vector<AdjustmentTelemetry>* telemetry) {
       for (std::size_t j = i - std::min(i, kMemory); j < i; ++j) {
         recent.push_back((*telemetry)[j].measured[axis]);
       }
-      const double near = median(&recent);
+      const double near = median(std::move(recent));
       double& angle = (*telemetry)[i].measured[axis];
       angle = near + wrap_angle(angle - near);
     }
@@ -99,9 +92,8 @@ std::optional<TrajectorySpline> fit_telemetry(const std::vector<AdjustmentTeleme
       error[i] =
           (inside[i]->measured - spline.position(inside[i]->time_s - shift_s).vector()).norm();
     }
-    std::vector<double> sorted = error;
     // The median length of a 2-vector of unit noise is sqrt(2 ln 2).
-    const double scale = std::max(median(&sorted) / std::sqrt(2 * std::log(2.0)), 1e-12);
+    const double scale = std::max(median(error) / std::sqrt(2 * std::log(2.0)), 1e-12);
     if (sigma != nullptr) *sigma = scale;
     for (std::size_t i = 0; i < inside.size(); ++i) {
       const double x = error[i] / (3 * scale);
@@ -139,7 +131,7 @@ std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baselin
     }
     const bool linked = du.size() >= kMinShared;
     chain[i] = chain[i - 1] + (linked ? 0 : 1);
-    if (linked) position[i] = position[i - 1] + Vector2<double>(median(&du), median(&dv));
+    if (linked) position[i] = position[i - 1] + Vector2<double>(median(du), median(dv));
   }
   std::vector<ImageMotion> motion;
   std::size_t to = 0;
@@ -345,7 +337,7 @@ void initialise_landmarks(const AdjustmentData& data, AdjustmentState* state) {
       z.push_back(d.z());
     }
     Vector3<double> d = Vector3<double>::UnitX();
-    if (!x.empty()) d = Vector3<double>(median(&x), median(&y), median(&z));
+    if (!x.empty()) d = Vector3<double>(median(x), median(y), median(z));
     state->landmarks[l] = d.norm() > 0 ? Vector3<double>(d.normalized()) : Vector3<double>::UnitX();
   }
 }

@@ -4,17 +4,13 @@
 #include <cmath>
 #include <cstddef>
 
+#include "core/calibration/median.h"
+
 #include "core/model/lower_line.h"
 
 namespace alidade::internal {
 
 namespace {
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 struct Line {
   double middle = 0;  // n

@@ -333,13 +333,10 @@ void Page::histograms() {
   for (const TelemetryResidual& residual : result_.telemetry_residuals) {
     if (residual.outlier) continue;
     for (int i = 0; i < 2; ++i) {
-      if (std::isfinite(residual.error_rad[i])) telemetry.push_back(residual.error_rad[i]);
+      const double sigma = residual.sigma_rad[i];
+      if (std::isfinite(sigma)) telemetry.push_back(residual.error_rad[i] / sigma);
     }
   }
-  const double telemetry_sigma = result_.quality.pan_tilt_sigma_rad > 0
-                                     ? result_.quality.pan_tilt_sigma_rad
-                                     : root_mean_square(telemetry);
-  for (double& value : telemetry) value /= std::max(telemetry_sigma, 1e-300);
   constexpr double kReach = 5;
   constexpr double kBin = 0.25;
   constexpr int kBins = static_cast<int>(2 * kReach / kBin);

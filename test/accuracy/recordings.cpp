@@ -105,27 +105,18 @@ bool read_tables(const std::string& directory, GivenRecording* given, std::strin
     given->recording.frame_time_s.push_back(time_of_frame.at(frame.frame));
   }
 
+  std::vector<TrackPoint> tracks;
+  if (!read_tracks_csv(directory, &tracks, error)) return false;
   std::map<std::int64_t, std::int64_t> landmark_of;
-  const auto add_observation = [&](const CsvCells<5>& cells) {
-    const auto frame = static_cast<std::int64_t>(*cells[0]);
+  for (const TrackPoint& point : tracks) {
     const auto next = static_cast<std::int64_t>(landmark_of.size());
-    const auto [landmark, is_new] = landmark_of.emplace(static_cast<std::int64_t>(*cells[1]), next);
-    input.observations.push_back({frame, landmark->second, *cells[2], *cells[3], *cells[4]});
-    if (is_new) {
-      const double time = time_of_frame.at(frame) + *cells[3] * given->simulation.line_delay;
-      given->recording.landmarks.push_back(
-          direction_at(given->simulation, time, *cells[2], *cells[3]));
-    }
-    return std::string();
-  };
-  if (!read_csv(directory + "/tracks.csv",
-                std::array<CsvColumn, 5>{{{"frame", true, true},
-                                          {"landmark", true, true},
-                                          {"u_px", true, false},
-                                          {"v_px", true, false},
-                                          {"sigma_px", true, false}}},
-                add_observation, error)) {
-    return false;
+    const auto [landmark, is_new] = landmark_of.emplace(point.landmark, next);
+    input.observations.push_back(
+        {point.frame, landmark->second, point.u_px, point.v_px, point.sigma_px});
+    if (!is_new) continue;
+    const double time = time_of_frame.at(point.frame) + point.v_px * given->simulation.line_delay;
+    given->recording.landmarks.push_back(
+        direction_at(given->simulation, time, point.u_px, point.v_px));
   }
   given->recording.observation_is_outlier.assign(input.observations.size(), false);
   return true;

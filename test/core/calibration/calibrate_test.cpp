@@ -149,7 +149,22 @@ TEST(Calibrate, TakesQuantisedTelemetryForWhatItIs) {
     Simulation s = small_simulation(11);
     s.angle_quantum_rad = quantum_deg * kPi / 180;
     SCOPED_TRACE(quantum_deg);
-    expect_within_sigmas(s, calibrate(simulate(s)));
+    const CalibrationResult result = calibrate(simulate(s));
+    expect_within_sigmas(s, result);
+    // Errors that are noise are as large as their sigmas; there are some, even in coarse steps.
+    double squares = 0;
+    int count = 0;
+    for (const TelemetryResidual& residual : result.telemetry_residuals) {
+      for (int axis = 0; axis < 2; ++axis) {
+        if (residual.outlier || !std::isfinite(residual.sigma_rad[axis])) continue;
+        ASSERT_TRUE(std::isfinite(residual.error_rad[axis]));
+        squares += std::pow(residual.error_rad[axis] / residual.sigma_rad[axis], 2);
+        ++count;
+      }
+    }
+    ASSERT_GT(count, 50);
+    EXPECT_LT(squares / count, 1.5);
+    EXPECT_GT(squares / count, 0.5);
   }
 }
 

@@ -1,0 +1,16 @@
+#pragma once
+// median(): the upper one of two in the middle. values must not be empty. Allocates.
+
+#include <algorithm>
+#include <cstddef>
+#include <vector>
+
+namespace alidade::internal {
+
+[[nodiscard]] inline double median(std::vector<double> values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+}  // namespace alidade::internal
