@@ -1,0 +1,106 @@
+#pragma once
+// OE mode: a frame's orientation from telemetry and from landmarks seen in the frame, to a few hundredths
+// of a pixel (PTCEE sections V-A, V-C).
+//
+//   process()   1 predict pan and tilt from telemetry (and, without it, from the frames before)
+//               2 coarse alignment over pan and tilt, coarse to fine (PTCEE 30, 31)
+//               3 project the map's landmarks with rolling shutter, align each patch (PTCEE 32, 33)
+//               4 solve angle, rate and acceleration of pan and tilt, and the offset of map against
+//                 telemetry, robustly, with telemetry as prior (PTCEE 35)
+//   maintain()  after the answer is out: refines and retires landmarks, and makes new ones where
+//               cells are empty (PTCEE 36)
+//
+// One estimator for OE and PT: without landmarks the solution is telemetry's, with its covariance. Where
+// landmarks contradict telemetry beyond what both claim, telemetry is believed and the mode is PT.
+// The map begins empty, in the frame that the first telemetry gave it. Its offset from the base frame
+// (pan, tilt) is estimated from all telemetry since.
+// Fixed memory, taken by the constructor; nothing else allocates, waits or throws. One thread.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+
+#include "core/model/calibration.h"
+#include "core/realtime/frame_orientation.h"
+#include "core/realtime/image_view.h"
+#include "core/realtime/landmark_map.h"
+#include "core/realtime/telemetry_interpolation.h"
+
+namespace alidade {
+
+struct OeOptions {
+  int max_width = 1920;      // px
+  int max_height = 1080;     // px
+  int max_landmarks = 4096;  // in the map
+  int max_used = 200;        // aligned in a frame; at most kMaxUsed
+  double cell_size_px = 64;  // of the map's cells, in pixels of a landmark's octave, image centre
+  int max_new = 40;          // landmarks that one maintain() may make
+  std::uint8_t corner_threshold = 10;  // of FAST, grey levels
+};
+
+enum class OeStatus {
+  kOk,             // orientation from landmarks and telemetry
+  kTooFew,         // too few landmarks held: telemetry alone
+  kContradiction,  // landmarks and telemetry exclude each other: telemetry alone
+  kNoPrediction,   // neither telemetry nor a frame before: nothing is written
+  kBadImage,       // none, or not of the calibration's size: telemetry alone
+  kNotFinite       // nothing is written
+};
+
+// One landmark in one frame.
+struct OeObservation {
+  int slot = 0;          // of the map
+  std::uint32_t id = 0;  // of the landmark
+  int octave = 0;
+  Vector2<double> u = Vector2<double>::Zero();           // px of the image, where it was found
+  Matrix2<double> covariance = Matrix2<double>::Zero();  // px^2, of u
+  Vector2<double> residual = Vector2<double>::Zero();  // px, found minus predicted by the solution
+  bool inlier = false;
+};
+
+struct OeStatistics {
+  OeStatus status = OeStatus::kNoPrediction;
+  int visible = 0;             // landmarks of the map that the prediction puts into the image
+  int looked_for = 0;          // of these, up to max_used
+  int aligned = 0;             // found by patch alignment
+  int inliers = 0;             // that agree with the solution
+  double coarse_shift_px = 0;  // by which coarse alignment moved the prediction, image centre
+  PanTilt<double> map_offset;  // rad, base minus map
+  Matrix2<double> map_offset_covariance = Matrix2<double>::Zero();
+};
+
+class OeMode {
+ public:
+  static constexpr int kMaxUsed = 1024;
+
+  explicit OeMode(const OeOptions& options);
+  ~OeMode();
+  OeMode(const OeMode&) = delete;
+  OeMode& operator=(const OeMode&) = delete;
+
+  // Begins anew: empty map, nothing remembered. Real-time safe.
+  void reset(const Calibration& calibration);
+
+  // frame_time_s: t0, row 0 on the image clock. at_middle_row: telemetry at t0 + clock_offset +
+  // line_delay * height / 2, null if there is none. The image must outlive the maintain() that
+  // follows. *out is written with every status but kNoPrediction and kNotFinite.
+  [[nodiscard]] OeStatus process(const ImageView& image, double frame_time_s,
+                                 const InterpolatedPanTilt* at_middle_row, FrameOrientation* out);
+
+  // Map upkeep with the frame last processed; does nothing where that had no sure orientation.
+  void maintain();
+
+  // Of the frame last processed.
+  [[nodiscard]] const OeStatistics& statistics() const;
+  [[nodiscard]] const OeObservation* observations() const;  // statistics().aligned of them
+  [[nodiscard]] const LandmarkMap& map() const;
+
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+}  // namespace alidade
