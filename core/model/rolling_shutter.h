@@ -1,16 +1,19 @@
 #pragma once
 // The camera as it is: rows exposed one after the other while the mount turns.
 //   row v is exposed at t(v) = t0 + v * line_delay, any sign of line_delay
-//   angle(v) = angle + rate * (v - reference_row) * line_delay
+//   angle(v) = angle + rate t + acceleration t^2 / 2,  t = (v - reference_row) * line_delay
 //   back-projection, direct:    d_b = R_base_from_camera(angle(v)) unproject(u),  v = u_v
 //   projection, solved for v:   v = project(R_base_from_camera(angle(v))^T d_b)_v
-// Where PTCEE 26, 27 hold the body rate constant, here the ANGLES move at constant rates.
+// Where PTCEE 26, 27 hold the body rate constant, here the ANGLES move at constant rates, or, where
+// somebody knows them, at constant accelerations: half a field of view a second gained in a second bends a
+// frame that is read out in 30 ms by 0.1 px.
 // v is a continuous coordinate of the whole row axis: the row solved for may lie outside the image.
 // A row is unique while the image of the direction moves down more slowly than the read-out, slope
 // d project_v / d v < 1. Where that fails between the reference row and the solution, the status is
 // kNoRow; a direction that the camera refuses at the reference row is refused with its status.
 // Jacobians of the solved pixel follow from the implicit function theorem. J_*_motion has the
-// columns pan, tilt, pan rate, tilt rate (of the true angles); J_*_parameters those of Parameter,
+// columns pan, tilt, pan rate, tilt rate (of the true angles; by accelerations it is t / 2 times that
+// by rates); J_*_parameters those of Parameter,
 // where scales and clock offset are 0: they act on the motion, see motion_parameter_jacobian().
 // Domain: as camera.h and mechanics.h. Outputs are written with kOk only. No allocation.
 
@@ -24,25 +27,44 @@
 namespace alidade {
 
 // The mount's motion about one frame: TRUE angles (rad) when the row reference_row is exposed, and
-// constant rates (rad/s).
+// rates (rad/s) then, constant accelerations (rad/s^2).
 template <class S>
 struct FrameMotion {
   PanTilt<S> angle;
   PanTilt<S> rate;
   S reference_row = S(0);  // px
+  PanTilt<S> acceleration = {};
 
   template <class T>
   [[nodiscard]] FrameMotion<T> cast() const {
-    return {angle.template cast<T>(), rate.template cast<T>(), T(reference_row)};
+    return {angle.template cast<T>(), rate.template cast<T>(), T(reference_row),
+            acceleration.template cast<T>()};
   }
 };
+
+// When a row is exposed, s after the reference row.
+template <class S>
+[[nodiscard]] S time_of_row(const FrameMotion<S>& motion, const NonDeduced<S>& line_delay,
+                            const NonDeduced<S>& row) {
+  return (row - motion.reference_row) * line_delay;
+}
 
 // True angles, not wrapped, when a row is exposed.
 template <class S>
 [[nodiscard]] PanTilt<S> angle_at_row(const FrameMotion<S>& motion, const NonDeduced<S>& line_delay,
                                       const NonDeduced<S>& row) {
-  const S time = (row - motion.reference_row) * line_delay;
-  return {motion.angle.pan + motion.rate.pan * time, motion.angle.tilt + motion.rate.tilt * time};
+  const S time = time_of_row(motion, line_delay, row);
+  const S half_square = time * time / S(2);
+  return {motion.angle.pan + motion.rate.pan * time + motion.acceleration.pan * half_square,
+          motion.angle.tilt + motion.rate.tilt * time + motion.acceleration.tilt * half_square};
+}
+
+template <class S>
+[[nodiscard]] PanTilt<S> rate_at_row(const FrameMotion<S>& motion, const NonDeduced<S>& line_delay,
+                                     const NonDeduced<S>& row) {
+  const S time = time_of_row(motion, line_delay, row);
+  return {motion.rate.pan + motion.acceleration.pan * time,
+          motion.rate.tilt + motion.acceleration.tilt * time};
 }
 
 // d (pan, tilt, pan rate, tilt rate) / d Parameter of a motion made from MEASURED angles that were
@@ -87,7 +109,8 @@ template <class S>
   if (!with_jacobians) return ProjectionStatus::kOk;
 
   const Matrix3<S> J_d_xi = -R * skew(d_c);
-  const Vector3<S> J_d_time = J_d_xi * (J_xi_angle * motion.rate.vector());
+  const Vector3<S> J_d_time =
+      J_d_xi * (J_xi_angle * rate_at_row(motion, line_delay, u.y()).vector());
   const S rows = u.y() - motion.reference_row;
   if (J_d_u != nullptr) {
     *J_d_u = R * J_dc_u;
@@ -131,7 +154,7 @@ template <class S>
 
   const Matrix<S, 2, 3> J_u_xi = J_u_dc * skew(d_c);
   const Matrix<S, 2, 2> J_u_angle = J_u_xi * J_xi_angle;
-  const Vector2<S> J_u_time = J_u_angle * motion.rate.vector();
+  const Vector2<S> J_u_time = J_u_angle * rate_at_row(motion, line_delay, row).vector();
   const S rows = row - motion.reference_row;
   if (J_u_row != nullptr) *J_u_row = J_u_time * line_delay;
   if (J_u_d != nullptr) *J_u_d = J_u_dc * R.transpose();

@@ -9,6 +9,30 @@ namespace {
 constexpr int kMountParameters = kParameterCount - index(Parameter::kPanAxis0);
 static_assert(index(Parameter::kClockOffset) == kParameterCount - 1 && kMountParameters == 7);
 
+// d motion / d parameters. Landmarks do not ask the telemetry's clock: in OE mode its offset has no
+// part. (The scales keep theirs, as the landmarks' map was laid out by telemetry's angles.)
+Matrix<double, 4, kParameterCount> mount_jacobian(OrientationMode mode,
+                                                  const Mechanics<double>& mechanics,
+                                                  const FrameMotion<double>& motion) {
+  Matrix<double, 4, kParameterCount> J = motion_parameter_jacobian(mechanics, motion);
+  if (mode == OrientationMode::kOe) J.col(index(Parameter::kClockOffset)).setZero();
+  return J;
+}
+
+// Of a pixel or direction of one row, from its Jacobians by (angle, rate) there and by the parameters.
+Matrix2<double> covariance(const FrameOrientation& frame, double row,
+                           const Matrix<double, 2, 4>& J_motion,
+                           const Matrix<double, 2, kParameterCount>& J_parameters) {
+  const FrameMotion<double> motion = frame.motion();
+  const double time = time_of_row(motion, frame.calibration.line_delay, row);
+  Matrix<double, 2, 6> J;
+  J << J_motion, J_motion.rightCols<2>() * (time / 2);
+  const Matrix<double, 2, kParameterCount> J_all =
+      J_parameters + J_motion * mount_jacobian(frame.mode, frame.calibration.mechanics, motion);
+  return J * frame.motion_covariance * J.transpose() +
+         J_all * frame.calibration.covariance * J_all.transpose();
+}
+
 }  // namespace
 
 ProjectionStatus FrameOrientation::direction(const Vector2<double>& u, Vector3<double>* d_b,
@@ -24,12 +48,8 @@ ProjectionStatus FrameOrientation::direction(const Vector2<double>& u, Vector3<d
       rolling_shutter_unproject(calibration.camera, calibration.mechanics, calibration.line_delay,
                                 motion(), u, d_b, nullptr, &J_d_motion, &J_d_parameters);
   if (status != ProjectionStatus::kOk) return status;
-  J_d_parameters += J_d_motion * motion_parameter_jacobian(calibration.mechanics, motion());
   const Matrix<double, 2, 3> to_tangent = tangent_basis(*d_b).transpose();
-  const Matrix<double, 2, 4> J_motion = to_tangent * J_d_motion;
-  const Matrix<double, 2, kParameterCount> J_parameters = to_tangent * J_d_parameters;
-  *cov = J_motion * motion_covariance * J_motion.transpose() +
-         J_parameters * calibration.covariance * J_parameters.transpose();
+  *cov = covariance(*this, u.y(), to_tangent * J_d_motion, to_tangent * J_d_parameters);
   return ProjectionStatus::kOk;
 }
 
@@ -46,31 +66,38 @@ ProjectionStatus FrameOrientation::pixel(const Vector3<double>& d_b, Vector2<dou
       rolling_shutter_project(calibration.camera, calibration.mechanics, calibration.line_delay,
                               motion(), d_b, u, nullptr, &J_motion, &J_parameters);
   if (status != ProjectionStatus::kOk) return status;
-  J_parameters += J_motion * motion_parameter_jacobian(calibration.mechanics, motion());
-  *cov = J_motion * motion_covariance * J_motion.transpose() +
-         J_parameters * calibration.covariance * J_parameters.transpose();
+  *cov = covariance(*this, u->y(), J_motion, J_parameters);
   return ProjectionStatus::kOk;
 }
 
 bool make_frame_orientation(const Calibration& calibration, double time_s, OrientationMode mode,
-                            int landmarks, const PanTilt<double>& angle,
-                            const PanTilt<double>& rate, const Matrix4<double>& motion_covariance,
-                            FrameOrientation* out) {
+                            int landmarks, const FrameMotion<double>& motion,
+                            const MotionCovariance& motion_covariance, FrameOrientation* out) {
+  const PanTilt<double> angle = angle_at_row(motion, calibration.line_delay, 0.0);
+  const PanTilt<double> rate = rate_at_row(motion, calibration.line_delay, 0.0);
+  const double time = time_of_row(motion, calibration.line_delay, 0.0);
+  MotionCovariance to_row_0 = MotionCovariance::Identity();
+  to_row_0.block<2, 2>(0, 2).diagonal().setConstant(time);
+  to_row_0.block<2, 2>(2, 4).diagonal().setConstant(time);
+  to_row_0.block<2, 2>(0, 4).diagonal().setConstant(time * time / 2);
+  const MotionCovariance covariance_at_row_0 = to_row_0 * motion_covariance * to_row_0.transpose();
+
+  const FrameMotion<double> motion_at_row_0{angle, rate, 0.0, motion.acceleration};
   Matrix<double, 3, 2> J_xi_angle;
   Matrix<double, 3, 4> J_xi_axes;
   const Matrix3<double> R =
       R_base_from_camera(calibration.mechanics, angle, &J_xi_angle, &J_xi_axes);
-  const FrameMotion<double> motion{angle, rate, 0.0};
   Matrix<double, 3, kMountParameters> J_xi_mount;
-  J_xi_mount << J_xi_axes, J_xi_angle * motion_parameter_jacobian(calibration.mechanics, motion)
+  J_xi_mount << J_xi_axes, J_xi_angle * mount_jacobian(mode, calibration.mechanics, motion_at_row_0)
                                             .topRightCorner<2, kMountParameters - 4>();
   const Matrix3<double> orientation_covariance =
-      J_xi_angle * motion_covariance.topLeftCorner<2, 2>() * J_xi_angle.transpose() +
+      J_xi_angle * covariance_at_row_0.topLeftCorner<2, 2>() * J_xi_angle.transpose() +
       J_xi_mount * calibration.covariance.bottomRightCorner<kMountParameters, kMountParameters>() *
           J_xi_mount.transpose();
   const Vector3<double> angular_velocity = J_xi_angle * rate.vector();  // PTCEE 46
   if (!std::isfinite(time_s) || !all_finite(R) || !all_finite(angular_velocity) ||
-      !all_finite(motion_covariance) || !all_finite(orientation_covariance)) {
+      !all_finite(motion.acceleration.vector()) || !all_finite(covariance_at_row_0) ||
+      !all_finite(orientation_covariance)) {
     return false;
   }
   out->time_s = time_s;
@@ -79,7 +106,8 @@ bool make_frame_orientation(const Calibration& calibration, double time_s, Orien
   out->calibration = calibration;
   out->angle = angle;
   out->rate = rate;
-  out->motion_covariance = motion_covariance;
+  out->acceleration = motion.acceleration;
+  out->motion_covariance = covariance_at_row_0;
   out->R_base_from_camera = R;
   out->orientation_covariance = orientation_covariance;
   out->angular_velocity = angular_velocity;

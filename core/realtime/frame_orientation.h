@@ -3,7 +3,8 @@
 // direction of each of its pixels, whichever mode found it.
 //
 //   R_base_from_camera at row 0 (PTCEE 45), angular velocity (PTCEE 46), and, for any row v,
-//   direction = R_base_from_camera(angle + rate * v * line_delay) unproject(u)   (PTCEE 26, 27)
+//   direction = R_base_from_camera(angle + rate t + acceleration t^2 / 2) unproject(u),
+//   t = v * line_delay   (PTCEE 26, 27, and beyond)
 //
 // Angles are TRUE ones (rad), i.e. the measured ones divided by the calibrated scales; frames b (FRD)
 // and c (RDF). An orientation is perturbed as R Exp(xi), xi in the camera frame (PTCEE 5). Pixels are
@@ -38,6 +39,9 @@ enum class OrientationMode {
   return "unknown mode";
 }
 
+// Of (pan, tilt, pan rate, tilt rate, pan acceleration, tilt acceleration).
+using MotionCovariance = Matrix<double, 6, 6>;
+
 struct FrameOrientation {
   double time_s = 0;  // capture of row 0, image clock
   OrientationMode mode = OrientationMode::kNone;
@@ -46,14 +50,15 @@ struct FrameOrientation {
 
   // At row 0.
   PanTilt<double> angle;  // rad, true, not wrapped
-  PanTilt<double> rate;   // rad/s, true, constant during the frame
-  // Of (pan, tilt, pan rate, tilt rate), WITHOUT the calibration's part.
-  Matrix4<double> motion_covariance = Matrix4<double>::Zero();
+  PanTilt<double> rate;   // rad/s, true
+  // rad/s^2, true, constant during the frame; 0 in PT mode, which has its effect in the covariance
+  PanTilt<double> acceleration;
+  MotionCovariance motion_covariance = MotionCovariance::Zero();  // WITHOUT the calibration's part
   Matrix3<double> R_base_from_camera = r_frd_from_rdf<double>();
   Matrix3<double> orientation_covariance = Matrix3<double>::Zero();  // rad^2, of xi
   Vector3<double> angular_velocity = Vector3<double>::Zero();        // rad/s, camera frame
 
-  [[nodiscard]] FrameMotion<double> motion() const { return {angle, rate, 0.0}; }
+  [[nodiscard]] FrameMotion<double> motion() const { return {angle, rate, 0.0, acceleration}; }
   [[nodiscard]] Eigen::Quaterniond quaternion() const {
     return Eigen::Quaterniond(R_base_from_camera);
   }
@@ -68,12 +73,12 @@ struct FrameOrientation {
                                        Matrix2<double>* cov = nullptr) const;
 };
 
-// Fills everything from the true motion at row 0 and its measurement's covariance. False if a result
-// is not finite; *out is then untouched.
+// Fills everything from the true motion about any row and its measurement's covariance. False if a
+// result is not finite; *out is then untouched.
 [[nodiscard]] bool make_frame_orientation(const Calibration& calibration, double time_s,
                                           OrientationMode mode, int landmarks,
-                                          const PanTilt<double>& angle, const PanTilt<double>& rate,
-                                          const Matrix4<double>& motion_covariance,
+                                          const FrameMotion<double>& motion,
+                                          const MotionCovariance& motion_covariance,
                                           FrameOrientation* out);
 
 }  // namespace alidade

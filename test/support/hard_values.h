@@ -100,13 +100,14 @@ inline std::vector<Mechanics<double>> hard_mechanics() {
 // s/row: none, the paper's (a camera upside down), and 1080 rows in a 30th of a second.
 inline std::vector<double> hard_line_delays() { return {0, -14.2e-6, 14.2e-6, 30e-6}; }
 
-// At rest, slow, fast, and across the seam at half a turn.
+// At rest, slow, fast, across the seam at half a turn, and accelerating.
 inline std::vector<FrameMotion<double>> hard_motions() {
   return {{{0, 0}, {0, 0}, 0},
           {{0.4, -0.2}, {0.02, -0.01}, 540},
           {{-2, 0.9}, {-0.5, 0.3}, 0},
           {{kPi - 1e-4, 0.1}, {0.6, -0.2}, 360},
-          {{-kPi, -1.2}, {-0.3, -0.4}, 1080}};
+          {{-kPi, -1.2}, {-0.3, -0.4}, 1080},
+          {{0.2, 0.3}, {0.4, -0.3}, 540, {3, -5}}};
 }
 
 }  // namespace alidade::test

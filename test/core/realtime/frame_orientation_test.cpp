@@ -28,8 +28,8 @@ Calibration paper_calibration() {
 FrameOrientation orientation(const Calibration& calibration, const PanTilt<double>& angle,
                              const PanTilt<double>& rate) {
   FrameOrientation frame;
-  EXPECT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kPt, 0, angle, rate,
-                                     1e-10 * Matrix4<double>::Identity(), &frame));
+  EXPECT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kPt, 0, {angle, rate, 0},
+                                     1e-10 * MotionCovariance::Identity(), &frame));
   return frame;
 }
 
@@ -42,7 +42,11 @@ TEST(FrameOrientation, MapsEveryPixelAsTheSlowForwardModelDoes) {
       calibration.line_delay = line_delay;
       const PanTilt<double> angle{3.1, -0.4};
       const PanTilt<double> rate{0.7, -0.3};
-      const FrameOrientation frame = orientation(calibration, angle, rate);
+      const PanTilt<double> acceleration{2, 5};
+      FrameOrientation frame;
+      ASSERT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kOe, 0,
+                                         {angle, rate, 0, acceleration},
+                                         1e-10 * MotionCovariance::Identity(), &frame));
       const test::TrueCamera truth{named.camera.focal_length,
                                    named.camera.aspect,
                                    named.camera.radial_distortion,
@@ -52,7 +56,9 @@ TEST(FrameOrientation, MapsEveryPixelAsTheSlowForwardModelDoes) {
                                    calibration.mechanics.pan_axis,
                                    calibration.mechanics.tilt_axis};
       const auto path = [&](double t) {
-        return Eigen::Vector2d(angle.pan + rate.pan * (t - 7), angle.tilt + rate.tilt * (t - 7));
+        const double h = t - 7;
+        return Eigen::Vector2d(angle.pan + rate.pan * h + acceleration.pan * h * h / 2,
+                               angle.tilt + rate.tilt * h + acceleration.tilt * h * h / 2);
       };
       test::NamedCamera inside = named;
       inside.margin = 0;
@@ -97,13 +103,13 @@ TEST(FrameOrientation, OrientationCovarianceFollowsMotionAndCalibration) {
     for (int j = 0; j < kParameterCount; ++j) root(i, j) = 1e-5 * std::sin(1 + 3 * i + 7 * j);
   }
   calibration.covariance = root * root.transpose();
-  Matrix4<double> motion_root;
-  for (int i = 0; i < 4; ++i) {
-    for (int j = 0; j < 4; ++j) motion_root(i, j) = 1e-5 * std::cos(2 + 5 * i + 2 * j);
+  MotionCovariance motion_root;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) motion_root(i, j) = 1e-5 * std::cos(2 + 5 * i + 2 * j);
   }
-  const Matrix4<double> motion_covariance = motion_root * motion_root.transpose();
+  const MotionCovariance motion_covariance = motion_root * motion_root.transpose();
   FrameOrientation frame;
-  ASSERT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kPt, 0, angle, rate,
+  ASSERT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kPt, 0, {angle, rate, 0},
                                      motion_covariance, &frame));
 
   // Inputs: angles (2), then pan axis, tilt axis, scales, clock offset.
@@ -128,6 +134,52 @@ TEST(FrameOrientation, OrientationCovarianceFollowsMotionAndCalibration) {
       J_angle * motion_covariance.topLeftCorner<2, 2>() * J_angle.transpose() +
       J_mount * calibration.covariance.bottomRightCorner<7, 7>() * J_mount.transpose();
   EXPECT_LT((frame.orientation_covariance - expected).norm(), 1e-7 * expected.norm());
+}
+
+// One motion, told of the middle row and of row 0; and the covariance of a direction by differences of
+// the motion itself.
+TEST(FrameOrientation, IsTheSameFromWhateverRowItWasMade) {
+  const Calibration calibration = paper_calibration();
+  const FrameMotion<double> at_middle{{0.5, 0.1}, {0.6, -0.4}, 540, {3, -2}};
+  MotionCovariance root;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < 6; ++j) root(i, j) = std::pow(30.0, i / 2) * 1e-6 * std::cos(2 + 5 * i + j);
+  }
+  const MotionCovariance covariance = root * root.transpose();
+  FrameOrientation frame;
+  ASSERT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kOe, 9, at_middle, covariance,
+                                     &frame));
+  FrameOrientation again;
+  ASSERT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kOe, 9, frame.motion(),
+                                     frame.motion_covariance, &again));
+  EXPECT_EQ(again.motion_covariance, frame.motion_covariance);
+  for (const Vector2<double>& u :
+       {Vector2<double>(3, 5), Vector2<double>(1900, 530), Vector2<double>(960, 1079)}) {
+    const auto seen = [&](const Matrix<double, 6, 1>& x) -> std::optional<Vector3<double>> {
+      FrameMotion<double> moved = at_middle;
+      moved.angle = {moved.angle.pan + x[0], moved.angle.tilt + x[1]};
+      moved.rate = {moved.rate.pan + x[2], moved.rate.tilt + x[3]};
+      moved.acceleration = {moved.acceleration.pan + x[4], moved.acceleration.tilt + x[5]};
+      Vector3<double> d;
+      if (rolling_shutter_unproject(calibration.camera, calibration.mechanics,
+                                    calibration.line_delay, moved, u,
+                                    &d) != ProjectionStatus::kOk) {
+        return std::nullopt;
+      }
+      return d;
+    };
+    Vector3<double> d_b;
+    Matrix2<double> cov;
+    ASSERT_EQ(frame.direction(u, &d_b, &cov), ProjectionStatus::kOk);
+    EXPECT_LT((d_b - *seen(Matrix<double, 6, 1>::Zero())).norm(), 1e-14);
+    Matrix<double, 6, 1> steps;
+    steps << 1e-3, 1e-3, 1e-1, 1e-1, 10, 10;
+    const auto numeric = test::numeric_jacobian<3, 6>(seen, steps);
+    ASSERT_EQ(numeric.evaluated, 6 * 4);
+    const Matrix<double, 2, 6> J = tangent_basis(d_b).transpose() * numeric.J;
+    const Matrix2<double> expected = J * covariance * J.transpose();
+    EXPECT_LT((cov - expected).norm(), 1e-6 * expected.norm());
+  }
 }
 
 // The covariances of direction and pixel describe one uncertainty: what the camera turns one into is
@@ -179,10 +231,10 @@ TEST(FrameOrientation, SaysWhyAPixelOrDirectionHasNone) {
 TEST(FrameOrientation, RefusesWhatIsNotFinite) {
   FrameOrientation frame;
   const double infinity = std::numeric_limits<double>::infinity();
-  const Matrix4<double> covariance = Matrix4<double>::Identity();
-  const auto made = [&](double time, double pan, double rate, const Matrix4<double>& cov) {
-    return make_frame_orientation(paper_calibration(), time, OrientationMode::kPt, 0, {pan, 0},
-                                  {rate, 0}, cov, &frame);
+  const MotionCovariance covariance = MotionCovariance::Identity();
+  const auto made = [&](double time, double pan, double rate, const MotionCovariance& cov) {
+    return make_frame_orientation(paper_calibration(), time, OrientationMode::kPt, 0,
+                                  {{pan, 0}, {rate, 0}, 0}, cov, &frame);
   };
   EXPECT_TRUE(made(1, 1, 1, covariance));
   EXPECT_FALSE(made(NAN, 1, 1, covariance));
