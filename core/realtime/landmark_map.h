@@ -10,6 +10,7 @@
 // All memory is taken by the constructor; nothing else allocates, waits or throws. One thread.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 #include <vector>
 
@@ -62,13 +63,13 @@ class LandmarkMap {
  public:
   static constexpr int kMaxOctaves = 8;
 
-  // capacity: at least 1. cell_size: rad, of octave 0, in (0, 0.5]; what is outside is taken as the
-  // nearest. All at once: about 420 bytes a landmark.
+  // capacity: at least 1. cell_size: rad, of octave 0, in [1e-6, 0.5]; what is outside is taken as
+  // the nearest. A landmark costs about half a kilobyte.
   LandmarkMap(int capacity, double cell_size);
   LandmarkMap(const LandmarkMap&) = delete;
   LandmarkMap& operator=(const LandmarkMap&) = delete;
 
-  // Forgets all landmarks; cells have a new size.
+  // Forgets all landmarks, but not which ids were given; cells have a new size.
   void clear(double cell_size);
 
   [[nodiscard]] int capacity() const;
@@ -83,23 +84,47 @@ class LandmarkMap {
   [[nodiscard]] const Landmark& at(int slot) const;        // occupied(slot)
   [[nodiscard]] LandmarkStatistics& statistics(int slot);  // occupied(slot)
 
-  // Gives it an id and, on kOk, a slot. now: count of frames, for worth().
+  // On kOk it has a new id, a slot and fresh statistics, last looked for now (count of frames).
   [[nodiscard]] InsertStatus insert(const Landmark& landmark, std::uint32_t now, int* slot);
   void retire(int slot);  // occupied(slot)
 
-  // A better direction, a few pixels from the old one; the cell stays that of the first.
+  // A better direction, a few pixels from the old one; the cell stays that of the first. One that
+  // is not finite or not of unit length is ignored.
   void refine(int slot, const Vector3<double>& d, const Matrix2<double>& covariance);
 
   // Whether a landmark of this octave has d's cell.
   [[nodiscard]] bool cell_taken(const Vector3<double>& d, int octave) const;
 
   // Slots of all landmarks within an angle of a direction, in ascending order; at most `capacity` of
-  // them are written. Returns how many there are.
+  // them are written. Returns how many there are: none for a direction or angle that is not finite.
   [[nodiscard]] int find(const Vector3<double>& centre, double cosine_of_angle, int* slots,
                          int capacity) const;
 
-  // Of use, larger is better: a landmark that is found when looked for, and not long forgotten.
+  // Of use, 0 to 1: a landmark that is found when looked for, and not long forgotten; what was found
+  // often is forgotten later. A new one has 1/2 for a second of frames, so that others made soon
+  // after do not drive it out.
   [[nodiscard]] double worth(int slot, std::uint32_t now) const;
+
+ private:
+  using Key = std::uint64_t;  // of a cell, octave included
+
+  [[nodiscard]] Key cell_of(const Vector3<double>& d, int octave) const;
+  [[nodiscard]] std::size_t home(Key key) const;      // where the search for it begins
+  [[nodiscard]] std::size_t position(Key key) const;  // where it is, or the gap where it would be
+  [[nodiscard]] int slot_of_least_worth(std::uint32_t now) const;
+  void place(int slot, const Vector3<double>& d);  // where find() looks for it
+
+  std::vector<Landmark> landmarks_;       // by slot
+  std::vector<Key> cells_;                // by slot
+  std::vector<float> x_, y_, z_;          // by slot; free ones are far from the sphere
+  std::vector<int> free_;                 // slots, the next to give last; size_ of them are not
+  std::vector<int> table_;                // slots by cell, or kNone: linear probing
+  std::array<int, kMaxOctaves> rings_{};  // from pole to pole
+  double cell_size_ = 0;
+  int size_ = 0;
+  int end_ = 0;  // no slot from here on is in use
+  std::uint32_t last_id_ = 0;
+  std::int64_t replaced_ = 0;
 };
 
 }  // namespace alidade

@@ -7,6 +7,7 @@
 #include <random>
 
 #include "core/realtime/fast_corners.h"
+#include "core/realtime/landmark_map.h"
 #include "core/realtime/patch_alignment.h"
 #include "core/realtime/pt_mode.h"
 #include "core/realtime/pyramid.h"
@@ -83,6 +84,28 @@ TEST(RealtimeAllocation, LookingAtPicturesAllocatesNothing) {
   }
   EXPECT_EQ(guard.count(), 0);
   EXPECT_GT(found, 200);
+}
+
+TEST(RealtimeAllocation, LandmarkMapAllocatesNothing) {
+  LandmarkMap map(100, 0.01);
+  Landmark landmark;
+  std::array<int, 100> slots;
+  int found = 0;
+  const AllocationGuard guard;
+  for (std::uint32_t i = 0; i < 2000; ++i) {
+    const double angle = 0.011 * i;
+    landmark.d = {std::cos(angle), std::sin(angle), 0};
+    int slot = 0;
+    if (map.insert(landmark, 10 * i, &slot) == InsertStatus::kOk) {
+      map.refine(slot, landmark.d, landmark.covariance);
+    }
+    if (i % 5 == 0) map.retire(slot);
+    found += map.find(landmark.d, 0.9, slots.data(), 100);
+    if (i == 1000) map.clear(0.02);
+  }
+  EXPECT_EQ(guard.count(), 0);
+  EXPECT_GT(map.replaced(), 100);
+  EXPECT_GT(found, 2000);
 }
 
 }  // namespace
