@@ -1,0 +1,84 @@
+#pragma once
+// The orientation of one frame from landmarks found in it, with telemetry as prior (PTCEE 35, and beyond).
+//
+//   x = (angle, rate, acceleration) of pan and tilt at the reference row, in the map's frame,
+//   g = (pan, tilt) offset, base minus map
+//   landmarks:  found - predicted = J (dx_angle + t dx_rate + t^2/2 dx_acceleration) + noise, t the row's time
+//   telemetry:  angle = x_angle + g, rate = x_rate;   accelerations are small;   g is known from before
+//
+// Robust: from the component-wise median of what each landmark alone would say, weights fall with the
+// residual (Geman-McClure), the scale going down to what the residuals show; then those within the gate
+// count fully and the rest not at all. Up to half of the landmarks may be wrong.
+// Covariance: of the linear problem, times how much larger the residuals are than claimed, one by one
+// and averaged over neighbours (a tenth of the image), which finds errors that neighbours share; plus the
+// shared covariance of the landmarks themselves, averaged with their weights.
+// Pure functions; no allocation.
+
+#include <array>
+
+#include "core/model/angle.h"
+#include "core/model/linear_algebra.h"
+
+namespace alidade {
+
+using Vector6 = Matrix<double, 6, 1>;
+using Matrix6 = Matrix<double, 6, 6>;
+
+// One landmark that was found.
+struct FoundLandmark {
+  Vector2<double> u;           // px, where
+  Vector2<double> residual;    // px, found minus predicted
+  Matrix2<double> J_angle;     // px/rad, see SeenDirection
+  double time_s;               // of its row, after the reference row
+  Matrix2<double> covariance;  // px^2, of the residual by noise and by the landmark's own direction
+  Matrix2<double> shared_covariance;  // rad^2, of (pan, tilt), see Landmark
+  double normalised_square = 0;       // out: residual after the solution, by covariance
+  bool inlier = false;                // out
+};
+
+// What is known without landmarks, relative to the motion the residuals were predicted with.
+struct MotionPrior {
+  bool has_telemetry = false;
+  Vector4<double> telemetry = Vector4<double>::Zero();  // measured minus (predicted + offset), true units
+  Matrix4<double> telemetry_covariance = Matrix4<double>::Zero();
+  // Of g, before this frame, rad^2.
+  Matrix2<double> offset_covariance = Matrix2<double>::Zero();
+  // Of (angle, rate) from the frames before, and of acceleration; information, as some know nothing.
+  Vector6 motion = Vector6::Zero();  // expected minus predicted
+  Matrix6 motion_information = Matrix6::Zero();
+};
+
+enum class SolveStatus {
+  kOk,
+  kTooFew,         // inliers
+  kContradiction,  // of landmarks and telemetry
+  kNotFinite
+};
+
+struct SolvedMotion {
+  Vector6 correction = Vector6::Zero();  // of the predicted motion, map frame
+  Vector2<double> offset_correction = Vector2<double>::Zero();        // of g, from now on
+  Vector2<double> local_offset_correction = Vector2<double>::Zero();  // more, in this frame only
+  Matrix6 covariance = Matrix6::Zero();              // of x + g (base)
+  Matrix6 map_covariance = Matrix6::Zero();          // of x (map)
+  Matrix2<double> offset_covariance = Matrix2<double>::Zero();
+  int inliers = 0;
+  double inflation = 1;      // of the landmarks' covariances
+  double contradiction = 0;  // chi-square, 2 degrees of freedom, of landmarks against telemetry
+};
+
+struct SolveLimits {
+  int min_inliers = 8;
+  double min_inlier_share = 0.3;
+  double max_contradiction = 36;  // chi-square
+  double max_scale = 30;          // by which residuals may exceed what is claimed, standard deviations
+  double min_half_readout_s = 1e-3;
+};
+
+// cell_px: size of a neighbourhood; half_readout_s: scale of the rows' times.
+[[nodiscard]] SolveStatus solve_orientation(FoundLandmark* landmarks, int count,
+                                            const MotionPrior& prior, const SolveLimits& limits,
+                                            double width, double height, double half_readout_s,
+                                            SolvedMotion* out);
+
+}  // namespace alidade
