@@ -9,7 +9,6 @@ namespace alidade {
 namespace {
 
 constexpr double kMinCellSize = 1e-6;  // rad
-constexpr double kMaxCellSize = 0.5;
 constexpr double kUnitTolerance = 1e-6;
 constexpr int kNone = -1;
 constexpr std::size_t kBlock = 16;   // slots that find() looks at together
@@ -35,7 +34,7 @@ double worth_of(const LandmarkStatistics& statistics, std::uint32_t now) {
 
 }  // namespace
 
-LandmarkMap::LandmarkMap(int capacity, double cell_size) {
+LandmarkMap::LandmarkMap(int capacity, double cell_size, double largest_cell_size) {
   const auto count = static_cast<std::size_t>(std::max(capacity, 1));
   landmarks_.resize(count);
   cells_.resize(count);
@@ -45,13 +44,15 @@ LandmarkMap::LandmarkMap(int capacity, double cell_size) {
   std::size_t places = 2;
   while (places < 2 * count) places *= 2;
   table_.resize(places);
-  clear(cell_size);
+  clear(cell_size, largest_cell_size);
 }
 
-void LandmarkMap::clear(double cell_size) {
+void LandmarkMap::clear(double cell_size, double largest_cell_size) {
   cell_size_ = cell_size >= kMinCellSize ? std::min(cell_size, kMaxCellSize) : kMinCellSize;
   for (int octave = 0; octave < kMaxOctaves; ++octave) {
-    const double rings = std::round(kPi / std::ldexp(cell_size_, octave));
+    const double size =
+        std::max(cell_size_, std::min(std::ldexp(cell_size_, octave), largest_cell_size));
+    const double rings = std::round(kPi / size);
     rings_[static_cast<std::size_t>(octave)] = std::max(1, static_cast<int>(rings));
   }
   for (std::size_t i = 0; i < free_.size(); ++i) free_[i] = static_cast<int>(free_.size() - 1 - i);

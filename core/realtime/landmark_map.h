@@ -5,7 +5,8 @@
 // Directions are unit vectors in the map's frame, which follows the base frame but for an offset that
 // OeMode knows. The unit sphere is divided into cells of about equal size: rings of constant
 // latitude, each cut into as many cells as its circumference has room for. Cells of octave l are 2^l
-// times as wide as those of octave 0, and hold at most one landmark of that octave (PTCEE V-A).
+// times as wide as those of octave 0, up to a largest size, and hold at most one landmark of that
+// octave (PTCEE V-A).
 // A full map replaces its least useful landmark, see worth(), by a new one.
 // All memory is taken by the constructor; nothing else allocates, waits or throws. One thread.
 
@@ -62,15 +63,16 @@ enum class InsertStatus {
 class LandmarkMap {
  public:
   static constexpr int kMaxOctaves = 8;
+  static constexpr double kMaxCellSize = 0.5;  // rad
 
   // capacity: at least 1. cell_size: rad, of octave 0, in [1e-6, 0.5]; what is outside is taken as
   // the nearest. A landmark costs about half a kilobyte.
-  LandmarkMap(int capacity, double cell_size);
+  LandmarkMap(int capacity, double cell_size, double largest_cell_size = kMaxCellSize);
   LandmarkMap(const LandmarkMap&) = delete;
   LandmarkMap& operator=(const LandmarkMap&) = delete;
 
   // Forgets all landmarks, but not which ids were given; cells have a new size.
-  void clear(double cell_size);
+  void clear(double cell_size, double largest_cell_size = kMaxCellSize);
 
   [[nodiscard]] int capacity() const;
   [[nodiscard]] int size() const;

@@ -34,8 +34,8 @@ struct OeOptions {
   int max_height = 1080;     // px
   int max_landmarks = 4096;  // in the map
   int max_used = 200;        // aligned in a frame; at most kMaxUsed
-  double cell_size_px = 64;  // of the map's cells, in pixels of a landmark's octave, image centre
-  int max_new = 40;          // landmarks that one maintain() may make
+  double cell_size_px = 80;  // of the map's cells, px of a landmark's octave at the image's centre
+  int max_new = 100;         // landmarks that one maintain() may make; all, in an empty view
   std::uint8_t corner_threshold = 10;  // of FAST, grey levels
 };
 

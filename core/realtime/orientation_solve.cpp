@@ -13,13 +13,12 @@ using Vector8 = Matrix<double, 8, 1>;
 
 // More are not looked at; OeMode gives fewer.
 constexpr int kMaxLandmarks = 1024;
-constexpr int kMinInliers = 3;             // for 6 unknowns, whatever the limits say
+constexpr int kMinInliers = 3;               // for 6 unknowns, whatever the limits say
 constexpr double kChiSquare2Median = 1.386;  // of 2 degrees of freedom
 constexpr double kChiSquare2Gate = 13.8;     // 99.9 %
 
 Matrix2<double> inverse_of(const Matrix2<double>& symmetric) {
-  const double determinant =
-      symmetric(0, 0) * symmetric(1, 1) - symmetric(0, 1) * symmetric(0, 1);
+  const double determinant = symmetric(0, 0) * symmetric(1, 1) - symmetric(0, 1) * symmetric(0, 1);
   Matrix2<double> inverse;
   inverse << symmetric(1, 1), -symmetric(0, 1), -symmetric(0, 1), symmetric(0, 0);
   return inverse / determinant;
@@ -81,8 +80,7 @@ class Problem {
 
   [[nodiscard]] Vector2<double> left(int i, const Vector6& x) const {
     const double t = terms_[static_cast<std::size_t>(i)].t;
-    const Vector2<double> angle =
-        x.head<2>() + t * x.segment<2>(2) + (0.5 * t * t) * x.tail<2>();
+    const Vector2<double> angle = x.head<2>() + t * x.segment<2>(2) + (0.5 * t * t) * x.tail<2>();
     return landmarks_[i].residual - landmarks_[i].J_angle * angle;
   }
 
@@ -320,8 +318,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   out->correction = unscale.cwiseProduct(solution.head<6>());
   // Of the offset found, the part that is every frame's.
   const Matrix2<double> lasting =
-      prior.offset_covariance *
-      inverse_of(prior_offset + 1e-30 * Matrix2<double>::Identity());
+      prior.offset_covariance * inverse_of(prior_offset + 1e-30 * Matrix2<double>::Identity());
   const Matrix2<double> gained = prior_offset - posterior.bottomRightCorner<2, 2>();
   out->offset_correction = lasting * solution.tail<2>();
   out->local_offset_correction = solution.tail<2>() - out->offset_correction;

@@ -39,7 +39,8 @@ struct FoundLandmark {
 // What is known without landmarks, relative to the motion the residuals were predicted with.
 struct MotionPrior {
   bool has_telemetry = false;
-  Vector4<double> telemetry = Vector4<double>::Zero();  // measured minus (predicted + offset), true units
+  Vector4<double> telemetry =
+      Vector4<double>::Zero();  // measured minus (predicted + offset), true units
   Matrix4<double> telemetry_covariance = Matrix4<double>::Zero();
   // Of g, before this frame, rad^2.
   Matrix2<double> offset_covariance = Matrix2<double>::Zero();
@@ -59,8 +60,8 @@ struct SolvedMotion {
   Vector6 correction = Vector6::Zero();  // of the predicted motion, map frame
   Vector2<double> offset_correction = Vector2<double>::Zero();        // of g, from now on
   Vector2<double> local_offset_correction = Vector2<double>::Zero();  // more, in this frame only
-  Matrix6 covariance = Matrix6::Zero();              // of x + g (base)
-  Matrix6 map_covariance = Matrix6::Zero();          // of x (map)
+  Matrix6 covariance = Matrix6::Zero();                               // of x + g (base)
+  Matrix6 map_covariance = Matrix6::Zero();                           // of x (map)
   Matrix2<double> offset_covariance = Matrix2<double>::Zero();
   int inliers = 0;
   double inflation = 1;      // of the landmarks' covariances
@@ -71,7 +72,7 @@ struct SolveLimits {
   int min_inliers = 8;
   double min_inlier_share = 0.3;
   double max_contradiction = 36;  // chi-square
-  double max_scale = 30;          // by which residuals may exceed what is claimed, standard deviations
+  double max_scale = 30;  // by which residuals may exceed what is claimed, standard deviations
   double min_half_readout_s = 1e-3;
 };
 

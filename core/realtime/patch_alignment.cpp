@@ -124,6 +124,19 @@ PrepareStatus sample_reference(const ImageView& reference, const Vector2<double>
   return PrepareStatus::kOk;
 }
 
+// image = gain * value + moved . gradient + constant, moved = gain * displacement
+struct Fit {
+  Vector2<float> moved;
+  float gain;
+};
+
+Fit fit(const ReferencePatch& reference, const Points& seen) {
+  const Vector2<float> moved(sum_of_product(reference.to_u, seen),
+                             sum_of_product(reference.to_v, seen));
+  return {moved, (sum_of_product(reference.value, seen) - moved.dot(reference.value_gradient)) /
+                     reference.energy};
+}
+
 }  // namespace
 
 PrepareStatus prepare(const ImageView& reference, const Vector2<double>& centre,
@@ -199,12 +212,7 @@ AlignmentStatus align(const ReferencePatch& reference, const ImageView& image,
     }
     Points seen;
     sample_grid<false>(image, place, &seen, nullptr, nullptr);
-    // image = gain * value + (gain * displacement) . gradient + constant
-    const Vector2<float> moved(sum_of_product(reference.to_u, seen),
-                               sum_of_product(reference.to_v, seen));
-    const float gain =
-        (sum_of_product(reference.value, seen) - moved.dot(reference.value_gradient)) /
-        reference.energy;
+    const auto [moved, gain] = fit(reference, seen);
     if (!(gain >= limits.min_gain && gain <= limits.max_gain)) {
       *out = {};
       out->position = u;
@@ -245,6 +253,25 @@ AlignmentStatus align(const ReferencePatch& reference, const ImageView& image,
                                                       : AlignmentStatus::kUnlike;
   }
   return AlignmentStatus::kNotConverged;
+}
+
+bool measure_step(const ReferencePatch& reference, const ImageView& image,
+                  const Vector2<double>& at, PatchStep* out) {
+  TapPlace place;
+  if (!image.valid() || find_taps<kTaps>(image, at.x() - kHalf, at.y() - kHalf, kSize, kSize,
+                                         &place) != SampleStatus::kOk) {
+    return false;
+  }
+  Points seen;
+  sample_grid<false>(image, place, &seen, nullptr, nullptr);
+  const auto [moved, gain] = fit(reference, seen);
+  const float mean = seen.mean();
+  const float energy = sum_of_product(seen, seen) - kPoints * mean * mean;
+  if (!(energy > 0) || gain == 0) return false;
+  out->step = -(moved / gain).cast<double>();
+  out->gain = gain;
+  out->correlation = sum_of_product(reference.value, seen) / std::sqrt(energy * reference.energy);
+  return true;
 }
 
 }  // namespace alidade

@@ -100,4 +100,16 @@ struct Alignment {
                                     const Vector2<double>& start, const AlignmentLimits& limits,
                                     Alignment* out);
 
+// One step of align(), for those who move many patches together.
+struct PatchStep {
+  Vector2<double>
+      step;            // px, towards where the patch lies; as align() would take it, not shortened
+  double gain;         // of contrast; the step means nothing if it is not positive
+  double correlation;  // -1 to 1, of image and reference where the patch is now
+};
+
+// False if the patch would leave the image, `at` is not finite, or the image is of one grey level there.
+[[nodiscard]] bool measure_step(const ReferencePatch& reference, const ImageView& image,
+                                const Vector2<double>& at, PatchStep* out);
+
 }  // namespace alidade

@@ -206,6 +206,8 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
   out->covariance = covariance;
   out->acceleration_square = acceleration_square;
   out->samples = cubic ? count : 2;
+  // White samples h apart tell sigma^2 h in a unit of time, whatever answers are made of them.
+  out->renewal_s = span_s / (count - 1) / by_angle(0, 0);
   return true;
 }
 

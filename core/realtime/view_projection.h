@@ -17,9 +17,9 @@ namespace alidade {
 
 // A direction in the frame, and how its pixel follows motion and direction, the row's own time included.
 struct SeenDirection {
-  Vector2<double> u;        // px
-  double time_s;            // of its row, after the reference row
-  Matrix2<double> J_angle;  // d u / d (pan, tilt) at that time, px/rad
+  Vector2<double> u;         // px
+  double time_s;             // of its row, after the reference row
+  Matrix2<double> J_angle;   // d u / d (pan, tilt) at that time, px/rad
   Matrix<double, 2, 3> J_d;  // d u / d direction (tangential changes), px/rad
 };
 

@@ -1,0 +1,802 @@
+#include "core/realtime/oe_mode.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <vector>
+
+#include "core/model/direction.h"
+#include "core/realtime/coarse_alignment.h"
+#include "core/realtime/fast_corners.h"
+#include "core/realtime/orientation_solve.h"
+#include "core/realtime/patch_alignment.h"
+#include "core/realtime/pt_mode.h"
+#include "core/realtime/pyramid.h"
+#include "core/realtime/view_projection.h"
+
+namespace alidade {
+namespace {
+
+// Octaves below align landmarks one by one, those from here on together, coarsely.
+constexpr int kFirstCoarseOctave = 2;
+constexpr int kLeastCoarseHeight = 32;  // px, of the coarsest octave
+constexpr double kLargestCells = 3;     // the cells of coarse octaves, in cells of octave 0
+constexpr int kCoarsePatches = 40;      // of each octave
+constexpr double kLeastCell = 16;       // px
+constexpr int kLeastCornerCell = 8;     // px, of FastGrid
+constexpr int kCornerBorder = 3;        // px, where FastGrid finds nothing
+constexpr double kExpectedNoise = 2;    // grey levels, until landmarks tell
+
+// Accelerations to expect, in fields of view per s^2: weak knowledge, for frames with few landmarks.
+constexpr double kAcceleration = 10;
+constexpr double kLongestPrediction = 0.5;  // s, without telemetry
+// The offset of map and telemetry drifts: heat, gears. rad / sqrt(s)
+constexpr double kOffsetDrift = 1e-6;
+
+constexpr int kMaxMisses = 15;  // in a row
+constexpr std::uint32_t kProbation = 20;
+constexpr double kLeastMatched = 0.3;
+// A map that fits no more for so many frames in a row is of no use.
+constexpr int kContradictionsToReset = 50;
+constexpr int kLostToReset = 1000;
+
+// As the reference was seen; a patch is prepared again when its warp has changed by this.
+constexpr float kFineWarpTolerance = 0.01F;
+constexpr float kCoarseWarpTolerance = 0.04F;
+
+struct Prepared {
+  ReferencePatch patch;
+  Matrix2<float> A;
+  std::uint32_t id = 0;  // of the landmark it belongs to
+  PrepareStatus status = PrepareStatus::kTooFlat;
+};
+
+struct Visible {
+  int slot;
+  int octave;
+  Vector2<double> u;  // px of the image, predicted
+};
+
+Matrix2<double> symmetric(const Matrix2<double>& m) { return 0.5 * (m + m.transpose()); }
+
+}  // namespace
+
+struct OeMode::State {
+  explicit State(const OeOptions& options);
+
+  void reset(const Calibration& new_calibration);
+  OeStatus process(const ImageView& image, double frame_time_s,
+                   const InterpolatedPanTilt* telemetry, FrameOrientation* out);
+  void maintain();
+
+  [[nodiscard]] std::size_t memory_bytes() const;
+  [[nodiscard]] int top_octave() const;
+  [[nodiscard]] int corner_cell(int octave) const;
+  [[nodiscard]] int cells(int size_px, int octave) const;
+  [[nodiscard]] double cell_px(int octave) const;
+  [[nodiscard]] double noise(int octave) const;
+  [[nodiscard]] double least_contrast(int octave) const;
+  [[nodiscard]] bool inside(const Vector2<double>& u, int octave) const;
+
+  void find_visible(const ViewProjection& view);
+  const ReferencePatch* reference(int slot, const SeenDirection& seen);
+  void take_coarse_patches(const ViewProjection& view);
+  bool align_coarse(double sigma_px);
+  void choose_fine(const ViewProjection& view);
+  void align_fine(const ViewProjection& view);
+  void finish_observations(const SolvedMotion& solved);
+  void learn_noise();
+
+  void judge_coarse(const ViewProjection& view);
+  void refine_landmarks();
+  void mark(int slot, bool matched, double residual_square);
+  void make_landmarks(const ViewProjection& view);
+  bool make_landmark(const FastCorner& corner, int octave);
+  void forget_map();
+
+  OeOptions options;
+  Calibration calibration;
+  bool ready = false;
+  double cone = 0;           // rad, from the optical axis to the farthest corner
+  double field_of_view = 0;  // rad, horizontal
+
+  Pyramid pyramid;
+  LandmarkMap map;
+  std::vector<Prepared> prepared;                       // by slot
+  std::vector<std::unique_ptr<FastGrid>> corner_grids;  // by octave
+  std::vector<int> slots;
+  std::vector<Visible> visible;  // of the last projection
+  int visible_count = 0;
+  std::vector<CoarsePatch> coarse;
+  std::vector<int> coarse_slots;
+  int coarse_count = 0;
+  std::vector<Visible> chosen;
+  int chosen_count = 0;
+  std::vector<FoundLandmark> found;
+  std::vector<Matrix2<double>> J_tangent;  // d u / d landmark's tangent coordinates, of found
+  std::vector<Matrix2<double>> alignment_covariance;
+  std::vector<float> noises;
+  std::vector<OeObservation> observations;
+  std::vector<std::uint8_t> cell_taken;  // of the image, at one octave
+  std::vector<FastCorner> corners;
+
+  // base angle = map angle + offset
+  Vector2<double> offset = Vector2<double>::Zero();
+  Matrix2<double> offset_covariance = Matrix2<double>::Zero();
+  double noise_sigma = kExpectedNoise;
+  std::uint32_t frames = 0;
+  int contradictions = 0;
+  int lost = 0;
+
+  // The frame last processed.
+  OeStatistics statistics;
+  ImageView image;
+  FrameMotion<double> motion;  // map's frame
+  Matrix6 motion_covariance = Matrix6::Zero();
+  bool may_make = false;  // motion is sure enough for new landmarks
+  double inflation = 1;
+
+  // The last frame with an orientation.
+  bool has_last = false;
+  double last_time_s = 0;
+  FrameMotion<double> last_motion;
+  Matrix6 last_covariance = Matrix6::Zero();
+};
+
+OeMode::State::State(const OeOptions& o)
+    : options(o),
+      pyramid(o.max_width, o.max_height, Pyramid::kMaxOctaves),
+      map(o.max_landmarks, LandmarkMap::kMaxCellSize) {
+  options.max_used = std::clamp(options.max_used, 1, kMaxUsed);
+  options.cell_size_px = std::max(options.cell_size_px, kLeastCell);
+  const auto capacity = static_cast<std::size_t>(map.capacity());
+  prepared.resize(capacity);
+  slots.resize(capacity);
+  visible.resize(capacity);
+  coarse.resize(static_cast<std::size_t>(kCoarsePatches) * Pyramid::kMaxOctaves);
+  coarse_slots.resize(coarse.size());
+  const auto used = static_cast<std::size_t>(options.max_used);
+  chosen.resize(used);
+  found.resize(used);
+  J_tangent.resize(used);
+  alignment_covariance.resize(used);
+  noises.resize(used);
+  observations.resize(used);
+  cell_taken.resize(static_cast<std::size_t>(cells(o.max_width, 0) * cells(o.max_height, 0)));
+  int most_corners = 0;
+  for (int octave = 0; octave < Pyramid::kMaxOctaves; ++octave) {
+    const int cell = corner_cell(octave);
+    // Fine octaves are searched cell by cell, where landmarks are missing; coarse ones at once.
+    const bool fine = octave < kFirstCoarseOctave;
+    corner_grids.push_back(
+        std::make_unique<FastGrid>(fine ? cell + 2 * kCornerBorder : o.max_width >> octave,
+                                   fine ? cell + 2 * kCornerBorder : o.max_height >> octave, cell));
+    most_corners = std::max(most_corners, corner_grids.back()->max_cells());
+  }
+  corners.resize(static_cast<std::size_t>(most_corners));
+}
+
+std::size_t OeMode::State::memory_bytes() const {
+  const auto of = [](const auto& v) { return v.size() * sizeof(v[0]); };
+  return sizeof(*this) - sizeof(map) + map.memory_bytes() + pyramid.memory_bytes() + of(prepared) +
+         of(slots) + of(visible) + of(coarse) + of(coarse_slots) + of(chosen) + of(found) +
+         of(J_tangent) + of(alignment_covariance) + of(noises) + of(observations) + of(cell_taken) +
+         of(corners);
+}
+
+double OeMode::State::cell_px(int octave) const {
+  return options.cell_size_px * std::min(std::ldexp(1.0, octave), kLargestCells);
+}
+
+int OeMode::State::corner_cell(int octave) const {
+  return std::max(kLeastCornerCell, static_cast<int>(std::ldexp(cell_px(octave), -octave)));
+}
+
+int OeMode::State::cells(int size_px, int octave) const {
+  return static_cast<int>(size_px / cell_px(octave)) + 1;
+}
+
+// The coarsest octave that is still large enough for several patches.
+int OeMode::State::top_octave() const {
+  int octave = 0;
+  while (octave + 1 < Pyramid::kMaxOctaves &&
+         calibration.camera.height >> (octave + 1) >= kLeastCoarseHeight) {
+    ++octave;
+  }
+  return octave;
+}
+
+// Grey levels, of one octave's pixels: averaging takes it down, rounding remains.
+double OeMode::State::noise(int octave) const {
+  constexpr double kRounding = 0.3;
+  return std::max(std::ldexp(noise_sigma, -octave), kRounding);
+}
+
+// Three times what noise alone would show; below that a patch's covariance is too small.
+double OeMode::State::least_contrast(int octave) const { return 1.5 * noise(octave); }
+
+// Whether all of a patch is in the image.
+bool OeMode::State::inside(const Vector2<double>& u, int octave) const {
+  const double border = std::ldexp(0.5 * kPatchSize + 2.5, octave);
+  return u.x() >= border && u.y() >= border && u.x() <= calibration.camera.width - border &&
+         u.y() <= calibration.camera.height - border;
+}
+
+void OeMode::State::reset(const Calibration& new_calibration) {
+  calibration = new_calibration;
+  const Camera<double>& camera = calibration.camera;
+  ready = camera.width > 0 && camera.height > 0 && camera.width <= options.max_width &&
+          camera.height <= options.max_height && camera.focal_length > 0;
+  if (!ready) return;
+  const double w = camera.width;
+  const double h = camera.height;
+  field_of_view = 2 * std::atan(0.5 * w / camera.focal_length);
+  cone = 0;
+  for (const Vector2<double>& corner : {Vector2<double>(0, 0), Vector2<double>(w, 0),
+                                        Vector2<double>(0, h), Vector2<double>(w, h)}) {
+    Vector3<double> d_c;
+    // A corner beyond the distortion's limit sees nothing: the cone to it may be anything.
+    const bool seen = unproject(camera, corner, &d_c) == ProjectionStatus::kOk;
+    cone = std::max(cone, seen ? std::acos(std::min(1.0, d_c.z())) : kPi / 2);
+  }
+  // Room for what the camera turns while it reads out, and for a wrong prediction.
+  cone = std::min(kPi, 1.3 * cone);
+  forget_map();
+}
+
+void OeMode::State::forget_map() {
+  const double f = calibration.camera.focal_length;
+  map.clear(options.cell_size_px / f, kLargestCells * options.cell_size_px / f);
+  offset.setZero();
+  offset_covariance.setZero();
+  noise_sigma = kExpectedNoise;
+  contradictions = 0;
+  lost = 0;
+  may_make = false;
+  has_last = false;
+  chosen_count = 0;
+  coarse_count = 0;
+  statistics = {};
+}
+
+void OeMode::State::find_visible(const ViewProjection& view) {
+  visible_count = 0;
+  const int near = map.find(view.optical_axis(), std::cos(cone), slots.data(), map.capacity());
+  for (int i = 0; i < near; ++i) {
+    const int slot = slots[static_cast<std::size_t>(i)];
+    const Landmark& landmark = map.at(slot);
+    Vector2<double> u;
+    if (!view.project(landmark.d, &u) || !inside(u, landmark.octave)) continue;
+    visible[static_cast<std::size_t>(visible_count++)] = {slot, landmark.octave, u};
+  }
+}
+
+// The landmark's picture as this frame should show it; null if it cannot.
+const ReferencePatch* OeMode::State::reference(int slot, const SeenDirection& seen) {
+  const Landmark& landmark = map.at(slot);
+  const Matrix2<double> J_image =
+      std::ldexp(1.0, -landmark.octave) * seen.J_d * tangent_basis(landmark.d);
+  const Matrix2<double> A = landmark.J_pixel_tangent * J_image.inverse();
+  Prepared& ready_patch = prepared[static_cast<std::size_t>(slot)];
+  const float tolerance =
+      landmark.octave < kFirstCoarseOctave ? kFineWarpTolerance : kCoarseWarpTolerance;
+  const Matrix2<float> wanted = A.cast<float>();
+  if (ready_patch.id != landmark.id ||
+      !((ready_patch.A - wanted).cwiseAbs().maxCoeff() <= tolerance)) {
+    // Seen as it was, it needs no resampling.
+    const bool alike =
+        (wanted - Matrix2<float>::Identity()).cwiseAbs().maxCoeff() <= 0.5F * tolerance;
+    ready_patch.A = alike ? Matrix2<float>::Identity() : wanted;
+    ready_patch.id = landmark.id;
+    ready_patch.status =
+        prepare(landmark.picture(), Vector2<double>::Constant(kReferenceCentre),
+                ready_patch.A.cast<double>(), least_contrast(landmark.octave), &ready_patch.patch);
+  }
+  return is_usable(ready_patch.status) ? &ready_patch.patch : nullptr;
+}
+
+void OeMode::State::take_coarse_patches(const ViewProjection& view) {
+  coarse_count = 0;
+  for (int octave = pyramid.octaves() - 1; octave >= kFirstCoarseOctave; --octave) {
+    int taken = 0;
+    for (int i = 0; i < visible_count && taken < kCoarsePatches; ++i) {
+      const Visible& candidate = visible[static_cast<std::size_t>(i)];
+      if (candidate.octave != octave) continue;
+      SeenDirection seen;
+      if (!view.project(map.at(candidate.slot).d, &seen)) continue;
+      const ReferencePatch* patch = reference(candidate.slot, seen);
+      if (patch == nullptr) continue;
+      const auto at = static_cast<std::size_t>(coarse_count++);
+      coarse[at] = {patch, octave, seen.u, seen.J_angle};
+      coarse_slots[at] = candidate.slot;
+      ++taken;
+    }
+  }
+}
+
+// Moves `motion` to where the coarse octaves fit. False where they do not.
+bool OeMode::State::align_coarse(double sigma_px) {
+  constexpr double kSurely = 3;
+  constexpr double kFar = 96;  // px
+  CoarseOptions coarse_options;
+  // Within half the reach of the coarsest octave nothing needs a search.
+  const double reach = std::ldexp(0.75, pyramid.octaves() - 1);
+  coarse_options.search_px = kSurely * sigma_px > reach ? kSurely * sigma_px : 0;
+  CoarseAlignment aligned;
+  bool ok = align_coarsely(pyramid, coarse.data(), coarse_count, coarse_options, &aligned);
+  if (!ok && coarse_count > 0 && coarse_options.search_px < kFar) {
+    coarse_options.search_px = kFar;
+    ok = align_coarsely(pyramid, coarse.data(), coarse_count, coarse_options, &aligned);
+  }
+  if (!ok) return false;
+  motion.angle.pan += aligned.angle.x();
+  motion.angle.tilt += aligned.angle.y();
+  statistics.coarse_shift_px = aligned.angle.norm() * calibration.camera.focal_length;
+  return true;
+}
+
+// Up to max_used fine landmarks: the most reliable of each part of the image first.
+void OeMode::State::choose_fine(const ViewProjection& view) {
+  find_visible(view);
+  chosen_count = 0;
+  constexpr int kColumns = 20;
+  constexpr int kRows = 12;
+  std::array<int, kColumns * kRows> best;
+  best.fill(-1);
+  const auto reliability = [&](const Visible& v) {
+    const LandmarkStatistics& s = map.at(v.slot).statistics;
+    // An octave further up sees half as sharply.
+    return std::ldexp((s.matched + 1.0) / (s.seen + 2.0), -v.octave);
+  };
+  int fine = 0;
+  for (int i = 0; i < visible_count; ++i) {
+    const Visible& candidate = visible[static_cast<std::size_t>(i)];
+    if (candidate.octave >= kFirstCoarseOctave) continue;
+    ++fine;
+    const int column = std::min(
+        kColumns - 1, static_cast<int>(candidate.u.x() / calibration.camera.width * kColumns));
+    const int row =
+        std::min(kRows - 1, static_cast<int>(candidate.u.y() / calibration.camera.height * kRows));
+    int& incumbent = best[static_cast<std::size_t>(row * kColumns + column)];
+    if (incumbent < 0 ||
+        reliability(candidate) > reliability(visible[static_cast<std::size_t>(incumbent)])) {
+      incumbent = i;
+    }
+  }
+  statistics.visible = fine;
+  const auto choose = [&](int i) {
+    Visible& candidate = visible[static_cast<std::size_t>(i)];
+    if (candidate.slot < 0 || chosen_count == options.max_used) return;
+    chosen[static_cast<std::size_t>(chosen_count++)] = candidate;
+    candidate.slot = -1;
+  };
+  if (fine > options.max_used) {
+    for (const int i : best) {
+      if (i >= 0) choose(i);
+    }
+  }
+  for (int i = 0; i < visible_count; ++i) {
+    if (visible[static_cast<std::size_t>(i)].octave < kFirstCoarseOctave) choose(i);
+  }
+  statistics.looked_for = chosen_count;
+}
+
+void OeMode::State::align_fine(const ViewProjection& view) {
+  int count = 0;
+  for (int i = 0; i < chosen_count; ++i) {
+    const Visible& wanted = chosen[static_cast<std::size_t>(i)];
+    const Landmark& landmark = map.at(wanted.slot);
+    SeenDirection seen;
+    if (!view.project(landmark.d, &seen)) continue;
+    const ReferencePatch* patch = reference(wanted.slot, seen);
+    if (patch == nullptr) continue;
+    const double to_octave = std::ldexp(1.0, -wanted.octave);
+    Alignment alignment;
+    if (align(*patch, pyramid.octave(wanted.octave), to_octave * seen.u, AlignmentLimits{},
+              &alignment) != AlignmentStatus::kConverged) {
+      continue;
+    }
+    const auto at = static_cast<std::size_t>(count++);
+    const Matrix2<double> J = seen.J_d * tangent_basis(landmark.d);
+    FoundLandmark& f = found[at];
+    f.u = alignment.position / to_octave;
+    f.residual = f.u - seen.u;
+    f.J_angle = seen.J_angle;
+    f.time_s = seen.time_s;
+    alignment_covariance[at] = alignment.covariance / (to_octave * to_octave);
+    f.covariance = alignment_covariance[at] + J * landmark.covariance * J.transpose();
+    f.shared_covariance = landmark.shared_covariance;
+    J_tangent[at] = J;
+    // Picture and reference were equally noisy.
+    noises[at] = static_cast<float>(std::ldexp(alignment.noise_sigma, wanted.octave) /
+                                    std::sqrt(1 + alignment.gain * alignment.gain));
+    OeObservation& observation = observations[at];
+    observation.slot = wanted.slot;
+    observation.id = landmark.id;
+    observation.octave = wanted.octave;
+    observation.u = f.u;
+    observation.covariance = alignment_covariance[at];
+  }
+  statistics.aligned = count;
+}
+
+void OeMode::State::finish_observations(const SolvedMotion& solved) {
+  for (int i = 0; i < statistics.aligned; ++i) {
+    const auto at = static_cast<std::size_t>(i);
+    const FoundLandmark& f = found[at];
+    const double t = f.time_s;
+    const Vector2<double> angle = solved.correction.head<2>() +
+                                  t * solved.correction.segment<2>(2) +
+                                  (0.5 * t * t) * solved.correction.tail<2>();
+    observations[at].residual = f.residual - f.J_angle * angle;
+    observations[at].inlier = f.inlier;
+  }
+}
+
+OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
+                                const InterpolatedPanTilt* telemetry, FrameOrientation* out) {
+  image = new_image;
+  ++frames;
+  statistics = {};
+  statistics.map_offset = {offset.x(), offset.y()};
+  statistics.map_offset_covariance = offset_covariance;
+  may_make = false;
+  chosen_count = 0;
+  coarse_count = 0;
+  const auto finish = [&](OeStatus status) { return statistics.status = status; };
+  if (!std::isfinite(frame_time_s)) return finish(OeStatus::kNotFinite);
+  if (!ready) return finish(OeStatus::kNoPrediction);
+
+  const Mechanics<double>& mechanics = calibration.mechanics;
+  const double since_last_s = has_last ? std::abs(frame_time_s - last_time_s) : 0;
+  const bool follows = has_last && since_last_s < kLongestPrediction;
+  if (telemetry != nullptr) {
+    if (!pt_orientation(calibration, frame_time_s, *telemetry, out)) {
+      return finish(OeStatus::kNotFinite);
+    }
+  } else if (!follows) {
+    return finish(OeStatus::kNoPrediction);
+  }
+  const bool fits = image.valid() && image.width == calibration.camera.width &&
+                    image.height == calibration.camera.height;
+  if (!fits || pyramid.build(image, top_octave() + 1) != PyramidStatus::kOk) {
+    return finish(telemetry != nullptr ? OeStatus::kBadImage : OeStatus::kNoPrediction);
+  }
+
+  // 1. Prediction.
+  const double acceleration_sigma = kAcceleration * field_of_view;
+  MotionPrior prior;
+  prior.motion_information.diagonal().tail<2>().setConstant(
+      1 / (acceleration_sigma * acceleration_sigma));
+  Matrix2<double> angle_covariance;
+  const double middle_row = 0.5 * calibration.camera.height;
+  if (telemetry != nullptr) {
+    const PanTilt<double> angle = true_from_measured(mechanics, telemetry->angle);
+    motion = {{angle.pan - offset.x(), angle.tilt - offset.y()},
+              true_from_measured(mechanics, telemetry->rate),
+              middle_row};
+    const Vector2<double> to_true(1 / mechanics.pan_scale, 1 / mechanics.tilt_scale);
+    Vector4<double> scale;
+    scale << to_true, to_true;
+    prior.has_telemetry = true;
+    prior.telemetry_covariance = scale.asDiagonal() * telemetry->covariance * scale.asDiagonal();
+    angle_covariance = prior.telemetry_covariance.topLeftCorner<2, 2>() + offset_covariance;
+    motion_covariance.setZero();
+    motion_covariance.topLeftCorner<2, 2>() = angle_covariance;
+    // Of an answer that the same samples gave before, only a part is news.
+    if (follows && telemetry->renewal_s > since_last_s) {
+      const double dilution = std::sqrt(telemetry->renewal_s / since_last_s);
+      const Vector4<double> dilute(dilution, dilution, 1, 1);
+      prior.telemetry_covariance =
+          dilute.asDiagonal() * prior.telemetry_covariance * dilute.asDiagonal();
+    }
+  } else {
+    motion = last_motion;
+    motion.angle = {last_motion.angle.pan + since_last_s * last_motion.rate.pan,
+                    last_motion.angle.tilt + since_last_s * last_motion.rate.tilt};
+    motion.acceleration = {};
+    Matrix4<double> carry = Matrix4<double>::Identity();
+    carry.topRightCorner<2, 2>().diagonal().setConstant(since_last_s);
+    Matrix<double, 4, 2> push;
+    push << since_last_s * since_last_s / 2 * Matrix2<double>::Identity(),
+        since_last_s * Matrix2<double>::Identity();
+    const Matrix4<double> covariance =
+        carry * last_covariance.topLeftCorner<4, 4>() * carry.transpose() +
+        acceleration_sigma * acceleration_sigma * push * push.transpose();
+    angle_covariance = covariance.topLeftCorner<2, 2>();
+    prior.motion_information.topLeftCorner<4, 4>() = covariance.inverse();
+  }
+  const FrameMotion<double> predicted = motion;
+
+  // 2. Coarse alignment.
+  const double sigma_px =
+      calibration.camera.focal_length * std::sqrt(angle_covariance.diagonal().maxCoeff());
+  {
+    const ViewProjection view(calibration, motion);
+    find_visible(view);
+    take_coarse_patches(view);
+  }
+  const bool coarse_aligned = align_coarse(sigma_px);
+
+  // 3. Landmarks. Where the coarse octaves found nothing, they are worth a look only nearby.
+  constexpr double kNearby = 2;  // px
+  if (coarse_aligned || sigma_px < kNearby) {
+    const ViewProjection view(calibration, motion);
+    choose_fine(view);
+    align_fine(view);
+  }
+
+  // 4. Solution, about where the residuals were taken.
+  offset_covariance.diagonal().array() += kOffsetDrift * kOffsetDrift * since_last_s;
+  prior.offset_covariance = offset_covariance;
+  const Vector2<double> moved(predicted.angle.pan - motion.angle.pan,
+                              predicted.angle.tilt - motion.angle.tilt);
+  if (prior.has_telemetry) {
+    prior.telemetry.head<2>() = moved;
+  } else {
+    prior.motion.head<2>() = moved;
+  }
+  SolvedMotion solved;
+  const double half_readout_s = calibration.line_delay * middle_row;
+  const SolveStatus status = solve_orientation(found.data(), statistics.aligned, prior,
+                                               SolveLimits{}, calibration.camera.width,
+                                               calibration.camera.height, half_readout_s, &solved);
+  if (status != SolveStatus::kOk) {
+    finish_observations(SolvedMotion{});
+    motion = predicted;
+    // Where no landmark was to be expected, telemetry may found new ones.
+    constexpr int kFew = 10;
+    constexpr int kFewCoarse = 5;
+    may_make = telemetry != nullptr && statistics.looked_for < kFew && coarse_count < kFewCoarse;
+    contradictions = status == SolveStatus::kContradiction ? contradictions + 1 : 0;
+    ++lost;
+    if (telemetry == nullptr) return finish(OeStatus::kNoPrediction);
+    return finish(status == SolveStatus::kContradiction ? OeStatus::kContradiction
+                                                        : OeStatus::kTooFew);
+  }
+  finish_observations(solved);
+  contradictions = 0;
+  lost = 0;
+  motion.angle = {motion.angle.pan + solved.correction[0],
+                  motion.angle.tilt + solved.correction[1]};
+  motion.rate = {motion.rate.pan + solved.correction[2], motion.rate.tilt + solved.correction[3]};
+  motion.acceleration = {solved.correction[4], solved.correction[5]};
+  motion_covariance = solved.map_covariance;
+  inflation = solved.inflation;
+  FrameMotion<double> in_base = motion;
+  const Vector2<double> total = offset + solved.offset_correction + solved.local_offset_correction;
+  in_base.angle = {motion.angle.pan + total.x(), motion.angle.tilt + total.y()};
+  if (!make_frame_orientation(calibration, frame_time_s, OrientationMode::kOe, solved.inliers,
+                              in_base, solved.covariance, out)) {
+    return finish(telemetry != nullptr ? OeStatus::kTooFew : OeStatus::kNoPrediction);
+  }
+  offset += solved.offset_correction;
+  offset_covariance = symmetric(solved.offset_covariance);
+  statistics.map_offset = {offset.x(), offset.y()};
+  statistics.map_offset_covariance = offset_covariance;
+  statistics.inliers = solved.inliers;
+  may_make = true;
+  has_last = true;
+  last_time_s = frame_time_s;
+  last_motion = motion;
+  last_covariance = motion_covariance;
+  return finish(OeStatus::kOk);
+}
+
+void OeMode::State::learn_noise() {
+  if (statistics.aligned < 10) return;
+  float* middle = noises.data() + statistics.aligned / 2;
+  std::nth_element(noises.data(), middle, noises.data() + statistics.aligned);
+  constexpr double kMemory = 0.1;
+  noise_sigma += kMemory * (std::clamp<double>(*middle, 0.3, 30) - noise_sigma);
+}
+
+void OeMode::State::mark(int slot, bool matched, double residual_square) {
+  LandmarkStatistics& s = map.statistics(slot);
+  ++s.seen;
+  s.last_frame = frames;
+  if (matched) {
+    ++s.matched;
+    s.missed_in_a_row = 0;
+    constexpr float kMemory = 0.1F;
+    s.residual_square += kMemory * (static_cast<float>(residual_square) - s.residual_square);
+  } else {
+    ++s.missed_in_a_row;
+  }
+  const bool unreliable = s.seen >= kProbation && s.matched < kLeastMatched * s.seen;
+  if (s.missed_in_a_row >= kMaxMisses || unreliable) map.retire(slot);
+}
+
+void OeMode::State::judge_coarse(const ViewProjection& view) {
+  constexpr double kAlike = 0.6;
+  for (int i = 0; i < coarse_count; ++i) {
+    const int slot = coarse_slots[static_cast<std::size_t>(i)];
+    const CoarsePatch& patch = coarse[static_cast<std::size_t>(i)];
+    Vector2<double> u;
+    PatchStep step;
+    // One that has left the image was not missed.
+    if (!view.project(map.at(slot).d, &u) ||
+        !measure_step(*patch.reference, pyramid.octave(patch.octave),
+                      std::ldexp(1.0, -patch.octave) * u, &step)) {
+      continue;
+    }
+    mark(slot, step.correlation >= kAlike, 1);
+  }
+}
+
+void OeMode::State::refine_landmarks() {
+  int next = 0;  // of the observations, which are a part of the chosen in their order
+  for (int i = 0; i < chosen_count; ++i) {
+    const int slot = chosen[static_cast<std::size_t>(i)].slot;
+    if (next == statistics.aligned || observations[static_cast<std::size_t>(next)].slot != slot) {
+      mark(slot, false, 0);
+      continue;
+    }
+    const auto at = static_cast<std::size_t>(next++);
+    const OeObservation& observation = observations[at];
+    const FoundLandmark& f = found[at];
+    if (observation.inlier) {
+      const Landmark& landmark = map.at(slot);
+      const Matrix2<double> to_tangent = J_tangent[at].inverse();
+      const Matrix2<double> measured =
+          to_tangent *
+          (inflation * alignment_covariance[at] +
+           f.J_angle * motion_covariance.topLeftCorner<2, 2>() * f.J_angle.transpose()) *
+          to_tangent.transpose();
+      const Matrix2<double> gain = landmark.covariance * (landmark.covariance + measured).inverse();
+      const Vector2<double> change = gain * (to_tangent * observation.residual);
+      // So much is left to be learnt always: textures alias, and the light changes.
+      constexpr double kLeast = 0.01;
+      const Matrix2<double> covariance =
+          symmetric((Matrix2<double>::Identity() - gain) * landmark.covariance) + kLeast * measured;
+      if (all_finite(change) && all_finite(covariance)) {
+        map.refine(slot, direction_plus<double>(landmark.d, change), covariance);
+      }
+    }
+    mark(slot, observation.inlier, f.normalised_square);
+  }
+}
+
+bool OeMode::State::make_landmark(const FastCorner& corner, int octave) {
+  const ImageView& picture = pyramid.octave(octave);
+  constexpr int kBefore = kReferencePixels / 2;
+  const int left = corner.u - kBefore;
+  const int top = corner.v - kBefore;
+  if (left < 0 || top < 0 || left + kReferencePixels > picture.width ||
+      top + kReferencePixels > picture.height) {
+    return false;
+  }
+  const double to_image = std::ldexp(1.0, octave);
+  const Vector2<double> u(to_image * (corner.u + 0.5), to_image * (corner.v + 0.5));
+  Landmark landmark;
+  Matrix<double, 3, 2> J_d_u;
+  if (rolling_shutter_unproject(calibration.camera, calibration.mechanics, calibration.line_delay,
+                                motion, u, &landmark.d, &J_d_u) != ProjectionStatus::kOk ||
+      map.cell_taken(landmark.d, octave)) {
+    return false;
+  }
+  for (int row = 0; row < kReferencePixels; ++row) {
+    std::copy_n(picture.row(top + row) + left, kReferencePixels,
+                landmark.pixels.data() + row * kReferencePixels);
+  }
+  ReferencePatch patch;
+  if (prepare(landmark.picture(), Vector2<double>::Constant(kReferenceCentre),
+              Matrix2<double>::Identity(), least_contrast(octave), &patch) != PrepareStatus::kOk) {
+    return false;
+  }
+  landmark.octave = static_cast<std::uint8_t>(octave);
+  const Matrix2<double> J_tangent_u = tangent_basis(landmark.d).transpose() * J_d_u;
+  landmark.J_pixel_tangent = J_tangent_u.inverse() / to_image;
+  // Where its point lies is exact; what makes it find itself elsewhere is the picture's noise.
+  const Matrix2<double> J_tangent_pixel = to_image * J_tangent_u;
+  landmark.covariance = noise(octave) * noise(octave) * J_tangent_pixel *
+                        patch.unit_covariance.cast<double>() * J_tangent_pixel.transpose();
+  landmark.shared_covariance = motion_covariance.topLeftCorner<2, 2>();
+  int slot = 0;
+  return map.insert(landmark, frames, &slot) == InsertStatus::kOk;
+}
+
+void OeMode::State::make_landmarks(const ViewProjection& view) {
+  find_visible(view);
+  // An empty view takes all it can at once.
+  int left = visible_count < 50 ? std::numeric_limits<int>::max() : options.max_new;
+  for (int octave = pyramid.octaves() - 1; octave >= 0; --octave) {
+    const double cell = cell_px(octave);
+    const int columns = cells(calibration.camera.width, octave);
+    const int rows = cells(calibration.camera.height, octave);
+    std::fill(cell_taken.begin(), cell_taken.begin() + columns * rows, std::uint8_t{0});
+    const auto cell_at = [&](double u, double v) -> std::uint8_t& {
+      return cell_taken[static_cast<std::size_t>(static_cast<int>(v / cell) * columns +
+                                                 static_cast<int>(u / cell))];
+    };
+    for (int i = 0; i < visible_count; ++i) {
+      const Visible& v = visible[static_cast<std::size_t>(i)];
+      if (v.octave == octave) cell_at(v.u.x(), v.u.y()) = 1;
+    }
+    FastGrid& grid = *corner_grids[static_cast<std::size_t>(octave)];
+    const ImageView& picture = pyramid.octave(octave);
+    const double to_image = std::ldexp(1.0, octave);
+    if (octave >= kFirstCoarseOctave) {
+      const FastResult result = grid.detect(picture, options.corner_threshold, corners.data(),
+                                            static_cast<int>(corners.size()));
+      for (int i = 0; i < result.count && left > 0; ++i) {
+        const FastCorner& corner = corners[static_cast<std::size_t>(i)];
+        std::uint8_t& taken = cell_at(to_image * corner.u, to_image * corner.v);
+        if (taken != 0 || !make_landmark(corner, octave)) continue;
+        taken = 1;
+        --left;
+      }
+      continue;
+    }
+    // Cell by cell, each time from another one on, so that a budget reaches all in turn.
+    const int count = columns * rows;
+    const int first = static_cast<int>(frames * 97 % static_cast<std::uint32_t>(count));
+    const int size = grid.cell_size();
+    int searches = left == std::numeric_limits<int>::max() ? count : 4 * options.max_new;
+    for (int i = 0; i < count && left > 0 && searches > 0; ++i) {
+      const int index = (first + i) % count;
+      if (cell_taken[static_cast<std::size_t>(index)] != 0) continue;
+      const int u0 = index % columns * size - kCornerBorder;
+      const int v0 = index / columns * size - kCornerBorder;
+      const int u1 = std::min(u0 + size + 2 * kCornerBorder, picture.width);
+      const int v1 = std::min(v0 + size + 2 * kCornerBorder, picture.height);
+      const ImageView part{picture.row(std::max(v0, 0)) + std::max(u0, 0), u1 - std::max(u0, 0),
+                           v1 - std::max(v0, 0), picture.stride};
+      if (part.width <= 0 || part.height <= 0) continue;
+      --searches;
+      const FastResult result = grid.detect(part, options.corner_threshold, corners.data(), 1);
+      if (result.count == 0) continue;
+      FastCorner corner = corners[0];
+      corner.u = static_cast<std::uint16_t>(corner.u + std::max(u0, 0));
+      corner.v = static_cast<std::uint16_t>(corner.v + std::max(v0, 0));
+      if (make_landmark(corner, octave)) --left;
+    }
+  }
+}
+
+void OeMode::State::maintain() {
+  if (contradictions > kContradictionsToReset || lost > kLostToReset) {
+    const std::uint32_t now = frames;
+    forget_map();
+    frames = now;
+    return;
+  }
+  if (!may_make) return;
+  may_make = false;
+  if (map.size() == 0) {
+    // The map's frame is what telemetry says now.
+    motion.angle = {motion.angle.pan + offset.x(), motion.angle.tilt + offset.y()};
+    offset.setZero();
+    offset_covariance = motion_covariance.topLeftCorner<2, 2>();
+    motion_covariance.setZero();
+  }
+  const ViewProjection view(calibration, motion);
+  if (statistics.status == OeStatus::kOk) {
+    refine_landmarks();
+    judge_coarse(view);
+    learn_noise();
+  }
+  make_landmarks(view);
+}
+
+OeMode::OeMode(const OeOptions& options) : state_(std::make_unique<State>(options)) {}
+OeMode::~OeMode() = default;
+
+void OeMode::reset(const Calibration& calibration) { state_->reset(calibration); }
+
+OeStatus OeMode::process(const ImageView& image, double frame_time_s,
+                         const InterpolatedPanTilt* at_middle_row, FrameOrientation* out) {
+  return state_->process(image, frame_time_s, at_middle_row, out);
+}
+
+void OeMode::maintain() { state_->maintain(); }
+
+const OeStatistics& OeMode::statistics() const { return state_->statistics; }
+const OeObservation* OeMode::observations() const { return state_->observations.data(); }
+const LandmarkMap& OeMode::map() const { return state_->map; }
+
+std::size_t OeMode::memory_bytes() const { return state_->memory_bytes(); }
+
+}  // namespace alidade
