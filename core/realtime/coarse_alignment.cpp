@@ -1,5 +1,6 @@
 #include "core/realtime/coarse_alignment.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <cmath>
