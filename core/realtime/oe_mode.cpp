@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <tuple>
 #include <vector>
 
 #include "core/model/direction.h"
@@ -89,6 +90,9 @@ struct OeMode::State {
   void finish_observations(const SolvedMotion& solved);
   void learn_noise();
 
+  void remember_motion();
+  void straighten_map();
+  void bend_map(const Vector2<double>& rate, const Vector2<double>& acceleration);
   void judge_coarse(const ViewProjection& view);
   void refine_landmarks();
   void mark(int slot, bool matched, double residual_square);
@@ -125,6 +129,16 @@ struct OeMode::State {
   // base angle = map angle + offset
   Vector2<double> offset = Vector2<double>::Zero();
   Matrix2<double> offset_covariance = Matrix2<double>::Zero();
+  // Of rates and accelerations as the map makes them appear: see straighten_map().
+  Vector2<double> bend_rate_variance = Vector2<double>::Zero();
+  Vector2<double> bend_acceleration_variance = Vector2<double>::Zero();
+  struct Past {
+    double time_s;  // middle row
+    Vector2<double> angle;
+    Vector2<double> surprise;  // rad, by which it missed the cubic through the four before
+  };
+  std::array<Past, 5> past;  // of the latest frames, newest first
+  int past_count = 0;
   double noise_sigma = kExpectedNoise;
   std::uint32_t frames = 0;
   int contradictions = 0;
@@ -133,8 +147,9 @@ struct OeMode::State {
   // The frame last processed.
   OeStatistics statistics;
   ImageView image;
-  FrameMotion<double> motion;  // map's frame
-  Matrix6 motion_covariance = Matrix6::Zero();
+  FrameMotion<double> motion;                                   // map's frame
+  Matrix6 motion_covariance = Matrix6::Zero();                  // by the frame's own noise
+  Matrix2<double> shared_covariance = Matrix2<double>::Zero();  // of its angles, by the map's
   bool may_make = false;  // motion is sure enough for new landmarks
   double inflation = 1;
 
@@ -252,6 +267,9 @@ void OeMode::State::forget_map() {
   offset.setZero();
   offset_covariance.setZero();
   noise_sigma = kExpectedNoise;
+  bend_rate_variance.setZero();
+  bend_acceleration_variance.setZero();
+  past_count = 0;
   contradictions = 0;
   lost = 0;
   may_make = false;
@@ -484,7 +502,9 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
     prior.telemetry_covariance = scale.asDiagonal() * telemetry->covariance * scale.asDiagonal();
     angle_covariance = prior.telemetry_covariance.topLeftCorner<2, 2>() + offset_covariance;
     motion_covariance.setZero();
-    motion_covariance.topLeftCorner<2, 2>() = angle_covariance;
+    motion_covariance.topLeftCorner<4, 4>() = prior.telemetry_covariance;
+    motion_covariance.diagonal().tail<2>().setConstant(acceleration_sigma * acceleration_sigma);
+    shared_covariance = offset_covariance;
     // Of an answer that the same samples gave before, only a part is news.
     if (follows && telemetry->renewal_s > since_last_s) {
       const double dilution = std::sqrt(telemetry->renewal_s / since_last_s);
@@ -563,13 +583,17 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
                   motion.angle.tilt + solved.correction[1]};
   motion.rate = {motion.rate.pan + solved.correction[2], motion.rate.tilt + solved.correction[3]};
   motion.acceleration = {solved.correction[4], solved.correction[5]};
-  motion_covariance = solved.map_covariance;
+  motion_covariance = solved.frame_covariance;
+  shared_covariance = solved.shared_covariance;
   inflation = solved.inflation;
+  Matrix6 covariance = solved.covariance;
+  covariance.diagonal().segment<2>(2) += bend_rate_variance;
+  covariance.diagonal().tail<2>() += bend_acceleration_variance;
   FrameMotion<double> in_base = motion;
   const Vector2<double> total = offset + solved.offset_correction + solved.local_offset_correction;
   in_base.angle = {motion.angle.pan + total.x(), motion.angle.tilt + total.y()};
   if (!make_frame_orientation(calibration, frame_time_s, OrientationMode::kOe, solved.inliers,
-                              in_base, solved.covariance, out)) {
+                              in_base, covariance, out)) {
     return finish(telemetry != nullptr ? OeStatus::kTooFew : OeStatus::kNoPrediction);
   }
   offset += solved.offset_correction;
@@ -582,6 +606,7 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   last_time_s = frame_time_s;
   last_motion = motion;
   last_covariance = motion_covariance;
+  last_covariance.topLeftCorner<2, 2>() += shared_covariance;
   return finish(OeStatus::kOk);
 }
 
@@ -607,6 +632,118 @@ void OeMode::State::mark(int slot, bool matched, double residual_square) {
   }
   const bool unreliable = s.seen >= kProbation && s.matched < kLeastMatched * s.seen;
   if (s.missed_in_a_row >= kMaxMisses || unreliable) map.retire(slot);
+}
+
+// The cubic through four earlier angles tells what was to be expected now; a jerk surprises it.
+void OeMode::State::remember_motion() {
+  constexpr double kLongest = 0.5;  // s
+  const double time_s = last_time_s + calibration.line_delay * motion.reference_row;
+  if (past_count > 0 && !(time_s > past[0].time_s && time_s - past[0].time_s < kLongest)) {
+    past_count = 0;
+  }
+  constexpr auto kKept = static_cast<int>(std::tuple_size_v<decltype(past)>);
+  Past now{time_s, motion.angle.vector(), Vector2<double>::Constant(field_of_view)};
+  if (past_count >= 4) {
+    now.surprise = now.angle;
+    for (std::size_t i = 0; i < 4; ++i) {
+      double weight = 1;
+      for (std::size_t j = 0; j < 4; ++j) {
+        if (j != i) weight *= (time_s - past[j].time_s) / (past[i].time_s - past[j].time_s);
+      }
+      now.surprise -= weight * past[i].angle;
+    }
+  }
+  std::copy_backward(past.begin(), past.end() - 1, past.end());
+  past[0] = now;
+  past_count = std::min(past_count + 1, kKept);
+}
+
+// All landmarks together may be bent: those of the first frame were placed by telemetry's rate, so that
+// its error times the row's time stands in their directions, and as every later frame then shows
+// the wrong rate, in the directions of all made since. The angles of neighbouring frames know
+// better: their difference quotient is held against the rates that the map shows, and the map is bent
+// back, as far as that is sure (Kalman). Accelerations likewise.
+void OeMode::State::straighten_map() {
+  // Landmarks made in a frame take over the errors of its rates: so much of their variance a frame.
+  constexpr double kInherited = 0.02;
+  bend_rate_variance += kInherited * motion_covariance.diagonal().segment<2>(2);
+  bend_acceleration_variance += kInherited * motion_covariance.diagonal().tail<2>();
+  if (past_count < 4 || calibration.line_delay == 0) return;
+  Matrix4<double> powers;
+  for (std::size_t i = 0; i < 4; ++i) {
+    const double t = past[i].time_s - past[0].time_s;
+    powers.row(static_cast<int>(i)) << 1, t, t * t, t * t * t;
+  }
+  const Matrix4<double> to_coefficients = powers.inverse();
+  const double h = (past[0].time_s - past[3].time_s) / 3;
+  Vector2<double> rate = Vector2<double>::Zero();
+  Vector2<double> acceleration = Vector2<double>::Zero();
+  for (std::size_t i = 0; i < 4; ++i) {
+    rate += to_coefficients(1, static_cast<int>(i)) * past[i].angle;
+    acceleration += 2 * to_coefficients(2, static_cast<int>(i)) * past[i].angle;
+  }
+  const Vector2<double> shown_rate = motion.rate.vector();
+  const Vector2<double> shown_acceleration = motion.acceleration.vector();
+  // For equal steps: the cubic misses the fourth derivative, whose h^4 is the surprise.
+  const Vector2<double> surprise = past[0]
+                                       .surprise.cwiseAbs()
+                                       .cwiseMax(past[1].surprise.cwiseAbs())
+                                       .cwiseMax(past[2].surprise.cwiseAbs());
+  const Vector2<double> angle_variance = motion_covariance.diagonal().head<2>();
+  const auto bend = [](const Vector2<double>& shown, const Vector2<double>& expected,
+                       const Vector2<double>& noise, Vector2<double>* variance) {
+    constexpr double kGate = 16;
+    Vector2<double> change = Vector2<double>::Zero();
+    for (int axis = 0; axis < 2; ++axis) {
+      const double total = (*variance)[axis] + noise[axis];
+      const double wrong = shown[axis] - expected[axis];
+      if (!(wrong * wrong < kGate * total)) continue;
+      const double gain = (*variance)[axis] / total;
+      change[axis] = gain * wrong;
+      (*variance)[axis] *= 1 - gain;
+    }
+    return change;
+  };
+  const Vector2<double> rate_noise = to_coefficients.row(1).squaredNorm() * angle_variance +
+                                     (surprise / (4 * h)).cwiseAbs2() +
+                                     motion_covariance.diagonal().segment<2>(2);
+  const Vector2<double> acceleration_noise =
+      4 * to_coefficients.row(2).squaredNorm() * angle_variance + (surprise / (h * h)).cwiseAbs2() +
+      motion_covariance.diagonal().tail<2>();
+  bend_map(bend(shown_rate, rate, rate_noise, &bend_rate_variance),
+           bend(shown_acceleration, acceleration, acceleration_noise, &bend_acceleration_variance));
+}
+
+// Takes from all landmarks what so much too high a rate and acceleration have put into them: their angle
+// at the time of the row in which this frame would see their elevation.
+void OeMode::State::bend_map(const Vector2<double>& rate, const Vector2<double>& acceleration) {
+  const Vector3<double>& a_pan = calibration.mechanics.pan_axis;
+  const double row_time_per_angle =
+      -calibration.line_delay * calibration.camera.focal_length * calibration.camera.aspect;
+  const auto error_at = [&](double elevation) -> Vector2<double> {
+    const double t = row_time_per_angle * elevation;
+    return t * rate + (0.5 * t * t) * acceleration;
+  };
+  const Vector3<double> axis = ViewProjection(calibration, motion).optical_axis();
+  const double axis_elevation = -std::asin(std::clamp(a_pan.dot(axis), -1.0, 1.0));
+  for (int slot = 0; slot < map.capacity(); ++slot) {
+    if (!map.occupied(slot)) continue;
+    const Landmark& landmark = map.at(slot);
+    const Vector3<double>& d = landmark.d;
+    const double elevation = -std::asin(std::clamp(a_pan.dot(d), -1.0, 1.0));
+    const Vector2<double> error = error_at(elevation - axis_elevation);
+    const Vector3<double> right = a_pan.cross(d);
+    const Vector3<double> turned = d - error.x() * right - error.y() * right.normalized().cross(d);
+    map.refine(slot, turned.normalized(), landmark.covariance);
+  }
+  for (int i = 0; i < past_count; ++i) {
+    Vector2<double>& angle = past[static_cast<std::size_t>(i)].angle;
+    angle -= error_at(angle.y() - past[0].angle.y());
+  }
+  motion.rate = {motion.rate.pan - rate.x(), motion.rate.tilt - rate.y()};
+  motion.acceleration = {motion.acceleration.pan - acceleration.x(),
+                         motion.acceleration.tilt - acceleration.y()};
+  last_motion = motion;
 }
 
 void OeMode::State::judge_coarse(const ViewProjection& view) {
@@ -693,7 +830,7 @@ bool OeMode::State::make_landmark(const FastCorner& corner, int octave) {
   const Matrix2<double> J_tangent_pixel = to_image * J_tangent_u;
   landmark.covariance = noise(octave) * noise(octave) * J_tangent_pixel *
                         patch.unit_covariance.cast<double>() * J_tangent_pixel.transpose();
-  landmark.shared_covariance = motion_covariance.topLeftCorner<2, 2>();
+  landmark.shared_covariance = shared_covariance + motion_covariance.topLeftCorner<2, 2>();
   int slot = 0;
   return map.insert(landmark, frames, &slot) == InsertStatus::kOk;
 }
@@ -770,14 +907,21 @@ void OeMode::State::maintain() {
     motion.angle = {motion.angle.pan + offset.x(), motion.angle.tilt + offset.y()};
     offset.setZero();
     offset_covariance = motion_covariance.topLeftCorner<2, 2>();
-    motion_covariance.setZero();
+    motion_covariance.topLeftCorner<2, 2>().setZero();
+    shared_covariance.setZero();
   }
-  const ViewProjection view(calibration, motion);
   if (statistics.status == OeStatus::kOk) {
     refine_landmarks();
-    judge_coarse(view);
     learn_noise();
+    remember_motion();
+    straighten_map();
+  } else {
+    past_count = 0;
+    bend_rate_variance = motion_covariance.diagonal().segment<2>(2);
+    bend_acceleration_variance = motion_covariance.diagonal().tail<2>();
   }
+  const ViewProjection view(calibration, motion);
+  if (statistics.status == OeStatus::kOk) judge_coarse(view);
   make_landmarks(view);
 }
 

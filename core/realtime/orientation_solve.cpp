@@ -309,12 +309,11 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   const Vector6 unscale = D.cwiseInverse();
   Matrix<double, 6, 8> to_base = Matrix<double, 6, 8>::Zero();
   to_base.topLeftCorner<6, 6>() = unscale.asDiagonal();
-  const Matrix6 map_covariance =
+  out->frame_covariance =
       unscale.asDiagonal() * posterior.topLeftCorner<6, 6>() * unscale.asDiagonal();
+  out->shared_covariance = shared;
   to_base.topRightCorner<2, 2>().setIdentity();
   out->covariance = to_base * posterior * to_base.transpose();
-  out->map_covariance = map_covariance;
-  out->map_covariance.topLeftCorner<2, 2>() += shared;
   out->correction = unscale.cwiseProduct(solution.head<6>());
   // Of the offset found, the part that is every frame's.
   const Matrix2<double> lasting =

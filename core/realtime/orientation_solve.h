@@ -61,7 +61,8 @@ struct SolvedMotion {
   Vector2<double> offset_correction = Vector2<double>::Zero();        // of g, from now on
   Vector2<double> local_offset_correction = Vector2<double>::Zero();  // more, in this frame only
   Matrix6 covariance = Matrix6::Zero();                               // of x + g (base)
-  Matrix6 map_covariance = Matrix6::Zero();                           // of x (map)
+  Matrix6 frame_covariance = Matrix6::Zero();  // of x (map), by this frame's noise alone
+  Matrix2<double> shared_covariance = Matrix2<double>::Zero();  // of angles, by the landmarks used
   Matrix2<double> offset_covariance = Matrix2<double>::Zero();
   int inliers = 0;
   double inflation = 1;      // of the landmarks' covariances
