@@ -1,62 +1,65 @@
 // What a frame's orientation from the picture costs, beside two ways to have it from OpenCV, on the same
-// frames in the same run, one thread each:
-//   oe            OeMode::process() with N landmarks, and beside it maintain(), which may come later
-//   lucas_kanade  FAST on every frame, pyramidal Lucas-Kanade (21x21, 4 octaves) on N of its corners from
-//                 the frame before, rotation by Kabsch with Huber weights
-//   orb           N ORB features of every frame, matched by brute force to the N of the nearest of five
-//                 key frames (the map), homography by RANSAC; the way of Lisanti et al.'s mapping
-// Both get the mount's rate for the rolling shutter for nothing where they can use it, and the pyramid of
-// the frame before is kept. Frames that fill the map or the caches first are not counted.
-// error_px: of the turn from one frame to the next against truth, RMS over frames, over centre and
-// corners, and over u and v. ratio: median over the median of oe in this run.
-// Times of a way follow from a list of all its frames; a table of them is printed at the end.
+// frames in the same run, one thread each, in turns of some frames so that all meet the same load:
+//   oe            OeMode::process() with N landmarks, and maintain(), which may come later
+//   stage         what process() is made of, by the same public functions, on the map that oe made
+//   lucas_kanade  pyramidal Lucas-Kanade (21x21, 4 octaves, the last pyramid kept) on N corners of the
+//                 frame before, rotation by Kabsch with Huber weights, FAST for the next N corners
+//   orb           N ORB features matched by brute force to the N of the nearest of five key frames (the
+//                 map), homography by RANSAC, after Lisanti, Masi, Pernici and Del Bimbo's mapping
+// Lucas-Kanade is told the mount's rate, for the rolling shutter; a homography bends by itself, but ORB
+// crowds its features where contrast is, and the corners of the picture hang free.
+// Times are those of the thread on its core: what other programs take does not count. ratio: median over
+// the median of process(). error: of the turn from one frame to the next against truth, RMS over
+// frames, over centre and corners and over u and v; held: landmarks that hold a frame's answer, on
+// average. p99 of fewer than 100 frames is their largest. A table of all is printed at the end.
 
 #include <benchmark/benchmark.h>
 
+#include <time.h>
+
+#include <Eigen/LU>
 #include <Eigen/SVD>
 #include <algorithm>
 #include <array>
-#include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <cstdlib>
 #include <functional>
-#include <map>
 #include <memory>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/video/tracking.hpp>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/model/camera.h"
+#include "core/realtime/coarse_alignment.h"
 #include "core/realtime/oe_mode.h"
+#include "core/realtime/orientation_solve.h"
+#include "core/realtime/patch_alignment.h"
+#include "core/realtime/pyramid.h"
+#include "core/realtime/view_projection.h"
 #include "test/benchmark/turning_camera.h"
 
 namespace alidade::benchmarks {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr int kFrames = 40;
 
-double milliseconds(Clock::time_point begin) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - begin).count();
+// ms that this thread has been on a core.
+double now_ms() {
+  timespec t;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &t);
+  return 1e3 * static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_nsec);
 }
 
-// Times of one thing, frame by frame, ms.
-class Times {
- public:
-  void add(double ms) { values_.push_back(ms); }
-  [[nodiscard]] double quantile(double q) const {
-    std::vector<double> sorted = values_;
-    std::sort(sorted.begin(), sorted.end());
-    return sorted[static_cast<std::size_t>(
-        std::lround(q * static_cast<double>(sorted.size() - 1)))];
-  }
-
- private:
-  std::vector<double> values_;
-};
+template <class Work>
+double milliseconds(Work&& work) {
+  const double begin = now_ms();
+  work();
+  return now_ms() - begin;
+}
 
 // Only the pictures of one size are held at a time.
 TurningCamera& camera_of(int height) {
@@ -116,94 +119,237 @@ class Errors {
   std::size_t known_count_ = 0;
 };
 
-// A line of the table.
-struct Row {
-  std::string way;
-  int height = 0;
-  int points = 0;
-  std::string part;
-  double p50 = 0, p99 = 0, max = 0, ratio = 0, error_px = 0, held = 0;
-};
-std::vector<Row> table;
+double quantile(std::vector<double> values, double q) {
+  std::sort(values.begin(), values.end());
+  return values[static_cast<std::size_t>(std::lround(q * static_cast<double>(values.size() - 1)))];
+}
 
-// Writes a part's times to the JSON and to the table.
-void report(benchmark::State& state, const char* way, const char* part, const Times& times,
-            double error_px = 0, double held = 0) {
-  Row row{way,
-          static_cast<int>(state.range(0)),
-          static_cast<int>(state.range(1)),
-          part,
-          times.quantile(0.5),
-          times.quantile(0.99),
-          times.quantile(1),
-          0,
-          error_px,
-          held};
-  for (const Row& other : table) {
-    if (other.way == "oe" && other.part == "process" && other.height == row.height &&
-        other.points == row.points) {
-      row.ratio = row.p50 / other.p50;
+// One way to an orientation, frame after frame, and what it cost.
+class Way {
+ public:
+  Way(std::string name, TurningCamera* camera)
+      : camera_(*camera), errors_(*camera), name_(std::move(name)) {}
+  virtual ~Way() = default;
+  Way(const Way&) = delete;
+  Way& operator=(const Way&) = delete;
+
+  void run(int frames, bool counted) {
+    counted_ = counted;
+    for (int i = 0; i < frames; ++i) process(frame_++);
+  }
+
+  [[nodiscard]] const std::string& name() const { return name_; }
+  using Part = std::pair<std::string, std::vector<double>>;  // ms of each frame
+  [[nodiscard]] const std::vector<Part>& parts() const { return parts_; }
+  [[nodiscard]] double error_px() const { return errors_.rms_px(); }
+  [[nodiscard]] double answered() const {
+    return static_cast<double>(errors_.frames_with_result()) /
+           static_cast<double>(parts_[0].second.size());
+  }
+  [[nodiscard]] double held() const { return held_ / static_cast<double>(parts_[0].second.size()); }
+
+ protected:
+  virtual void process(int k) = 0;
+
+  void record(const char* part, double ms) {
+    if (!counted_) return;
+    auto at =
+        std::find_if(parts_.begin(), parts_.end(), [&](const Part& p) { return p.first == part; });
+    if (at == parts_.end()) at = parts_.insert(at, {part, {}});
+    at->second.push_back(ms);
+  }
+  void record_answer(int k, int held, const Errors::Direction& direction) {
+    if (!counted_) return;
+    held_ += held;
+    errors_.add(k, direction);
+  }
+
+  TurningCamera& camera_;
+
+ private:
+  Errors errors_;
+  std::string name_;
+  std::vector<Part> parts_;
+  double held_ = 0;
+  int frame_ = 0;
+  bool counted_ = false;
+};
+
+class Oe : public Way {
+ public:
+  Oe(TurningCamera* camera, int points) : Way("oe", camera), mode_(options(*camera, points)) {
+    mode_.reset(camera->calibration());
+  }
+  [[nodiscard]] const OeMode& mode() const { return mode_; }
+
+ private:
+  static OeOptions options(const TurningCamera& camera, int points) {
+    const Camera<double>& c = camera.calibration().camera;
+    OeOptions options;
+    options.max_width = c.width;
+    options.max_height = c.height;
+    options.max_used = points;
+    options.cell_size_px = std::sqrt(c.width * c.height / (2.5 * points));  // more than are used
+    return options;
+  }
+
+  void process(int k) override {
+    const InterpolatedPanTilt telemetry = camera_.telemetry(k);
+    FrameOrientation frame;
+    OeStatus status = OeStatus::kNotFinite;
+    record("process", milliseconds([&] {
+             status = mode_.process(camera_.view(k), camera_.time_s(k), &telemetry, &frame);
+           }));
+    record("maintain", milliseconds([&] { mode_.maintain(); }));
+    record_answer(k, mode_.statistics().inliers, [&](const Vector2<double>& u, Vector3<double>* d) {
+      return status == OeStatus::kOk && frame.direction(u, d) == ProjectionStatus::kOk;
+    });
+  }
+
+  OeMode mode_;
+};
+
+// From telemetry to the motion's correction, like OeMode::process(), but with all patches prepared and
+// landmarks projected once, where it does so before and after coarse alignment.
+class Stages : public Way {
+ public:
+  Stages(TurningCamera* camera, const OeMode* mode, int points)
+      : Way("stage", camera),
+        mode_(*mode),
+        pyramid_(camera->calibration().camera.width, camera->calibration().camera.height, kOctaves),
+        slots_(static_cast<std::size_t>(mode->map().capacity())),
+        points_(static_cast<std::size_t>(points)) {}
+
+ private:
+  static constexpr int kOctaves = 6;
+  static constexpr int kFirstCoarse = 2;
+  static constexpr std::size_t kCoarse = 40;  // of each octave
+
+  struct Seen {
+    const Landmark* landmark;
+    Vector2<double> u;
+  };
+
+  void process(int k) override {
+    const Calibration& calibration = camera_.calibration();
+    const Camera<double>& c = calibration.camera;
+    const LandmarkMap& map = mode_.map();
+    const PanTilt<double> offset = mode_.statistics().map_offset;
+    const InterpolatedPanTilt telemetry = camera_.telemetry(k);
+    FrameMotion<double> motion{telemetry.angle, telemetry.rate, 0.5 * c.height};
+    motion.angle.pan -= offset.pan;
+    motion.angle.tilt -= offset.tilt;
+
+    record("pyramid", milliseconds([&] {
+             if (pyramid_.build(camera_.view(k), kOctaves) != PyramidStatus::kOk) std::abort();
+           }));
+    seen_.clear();
+    record("project", milliseconds([&] {
+             const ViewProjection view(calibration, motion);
+             const double cosine =
+                 std::cos(1.3 * std::atan(std::hypot(c.width, c.height) / 2 / c.focal_length));
+             const int near = map.find(view.optical_axis(), cosine, slots_.data(), map.capacity());
+             for (int i = 0; i < near; ++i) {
+               const Landmark& landmark = map.at(slots_[static_cast<std::size_t>(i)]);
+               const double border = std::ldexp(8, landmark.octave);
+               Vector2<double> u;
+               if (view.project(landmark.d, &u) && u.x() >= border && u.y() >= border &&
+                   u.x() <= c.width - border && u.y() <= c.height - border) {
+                 seen_.push_back({&landmark, u});
+               }
+             }
+           }));
+    prepare_patches(ViewProjection(calibration, motion));
+    const PanTilt<double> predicted = motion.angle;
+    record(
+        "coarse", milliseconds([&] {
+          CoarseAlignment aligned;
+          if (align_coarsely(pyramid_, coarse_.data(), static_cast<int>(coarse_.size()), {},
+                             &aligned)) {
+            motion.angle = {predicted.pan + aligned.angle.x(), predicted.tilt + aligned.angle.y()};
+          }
+        }));
+    record("align", milliseconds([&] { align_landmarks(ViewProjection(calibration, motion)); }));
+    MotionPrior prior;
+    prior.has_telemetry = true;
+    prior.telemetry.head<2>() = predicted.vector() - motion.angle.vector();
+    prior.telemetry_covariance = telemetry.covariance;
+    prior.motion_information.diagonal().tail<2>().setConstant(0.1);
+    SolvedMotion solved;
+    record("solve", milliseconds([&] {
+             benchmark::DoNotOptimize(solve_orientation(
+                 found_.data(), static_cast<int>(found_.size()), prior, {}, c.width, c.height,
+                 0.5 * c.height * calibration.line_delay, &solved));
+           }));
+    record_answer(k, solved.inliers,
+                  [](const Vector2<double>&, Vector3<double>*) { return false; });
+  }
+
+  // Coarse ones from the coarsest octave down, up to kCoarse of each, and as many fine ones as asked for.
+  void prepare_patches(const ViewProjection& view) {
+    patches_.clear();
+    coarse_.clear();
+    fine_.clear();
+    patches_.reserve(seen_.size());
+    for (int octave = kOctaves - 1; octave >= 0; --octave) {
+      std::size_t taken = 0;
+      for (const Seen& seen : seen_) {
+        const Landmark& landmark = *seen.landmark;
+        SeenDirection direction;
+        const bool enough = octave >= kFirstCoarse ? taken == kCoarse : fine_.size() == points_;
+        if (landmark.octave != octave || enough || !view.project(landmark.d, &direction)) continue;
+        const Matrix2<double> J =
+            std::ldexp(1, -octave) * direction.J_d * tangent_basis(landmark.d);
+        patches_.emplace_back();
+        if (!is_usable(prepare(landmark.picture(), Vector2<double>::Constant(kReferenceCentre),
+                               landmark.J_pixel_tangent * J.inverse(), 1, &patches_.back()))) {
+          patches_.pop_back();
+          continue;
+        }
+        ++taken;
+        if (octave >= kFirstCoarse) {
+          coarse_.push_back({&patches_.back(), octave, direction.u, direction.J_angle});
+        } else {
+          fine_.push_back({&landmark, &patches_.back()});
+        }
+      }
     }
   }
-  const std::string prefix = std::string(part) + "_";
-  state.counters[prefix + "p50_ms"] = row.p50;
-  state.counters[prefix + "p99_ms"] = row.p99;
-  state.counters[prefix + "max_ms"] = row.max;
-  if (row.ratio > 0) state.counters[prefix + "ratio"] = row.ratio;
-  table.push_back(row);
-}
 
-void report_quality(benchmark::State& state, const Errors& errors, double held) {
-  state.counters["error_px"] = errors.rms_px();
-  state.counters["held"] = held;
-  state.counters["frames"] = static_cast<double>(errors.frames_with_result());
-}
-
-void BM_Oe(benchmark::State& state) {
-  const auto height = static_cast<int>(state.range(0));
-  const auto points = static_cast<int>(state.range(1));
-  TurningCamera& camera = camera_of(height);
-  const Calibration& calibration = camera.calibration();
-  const double area = calibration.camera.width * calibration.camera.height;
-  OeOptions options;
-  options.max_width = calibration.camera.width;
-  options.max_height = height;
-  options.max_used = points;
-  options.cell_size_px = std::sqrt(area / (2.5 * points));  // more in view than are used
-  OeMode mode(options);
-  mode.reset(calibration);
-  Times process;
-  Times maintain;
-  Errors errors(camera);
-  double held = 0;
-  int k = 0;
-  const auto next = [&](bool counted) {
-    const InterpolatedPanTilt telemetry = camera.telemetry(k);
-    FrameOrientation frame;
-    const auto begin = Clock::now();
-    const OeStatus status = mode.process(camera.view(k), camera.time_s(k), &telemetry, &frame);
-    const double process_ms = milliseconds(begin);
-    const auto begin_maintain = Clock::now();
-    mode.maintain();
-    const double maintain_ms = milliseconds(begin_maintain);
-    if (counted) {
-      process.add(process_ms);
-      maintain.add(maintain_ms);
-      held += mode.statistics().inliers;
-      errors.add(k, [&](const Vector2<double>& u, Vector3<double>* d) {
-        return status == OeStatus::kOk && frame.direction(u, d) == ProjectionStatus::kOk;
-      });
+  void align_landmarks(const ViewProjection& view) {
+    found_.clear();
+    for (const auto& [landmark, patch] : fine_) {
+      SeenDirection seen;
+      Alignment alignment;
+      const double to_octave = std::ldexp(1, -landmark->octave);
+      if (!view.project(landmark->d, &seen) ||
+          align(*patch, pyramid_.octave(landmark->octave), to_octave * seen.u, {}, &alignment) !=
+              AlignmentStatus::kConverged) {
+        continue;
+      }
+      const Matrix2<double> J = seen.J_d * tangent_basis(landmark->d);
+      FoundLandmark found;
+      found.u = alignment.position / to_octave;
+      found.residual = found.u - seen.u;
+      found.J_angle = seen.J_angle;
+      found.time_s = seen.time_s;
+      found.covariance =
+          alignment.covariance / (to_octave * to_octave) + J * landmark->covariance * J.transpose();
+      found.shared_covariance = landmark->shared_covariance;
+      found_.push_back(found);
     }
-    ++k;
-    return process_ms;
-  };
-  while (k < 2 * kFrames) (void)next(false);
-  for (auto _ : state) state.SetIterationTime(1e-3 * next(true));
-  held /= static_cast<double>(state.iterations());
-  report(state, "oe", "process", process, errors.rms_px(), held);
-  report(state, "oe", "maintain", maintain);
-  report_quality(state, errors, held);
-}
+  }
+
+  const OeMode& mode_;
+  Pyramid pyramid_;
+  std::vector<int> slots_;
+  std::size_t points_;
+  std::vector<Seen> seen_;
+  std::vector<ReferencePatch> patches_;
+  std::vector<CoarsePatch> coarse_;
+  std::vector<std::pair<const Landmark*, const ReferencePatch*>> fine_;
+  std::vector<FoundLandmark> found_;
+};
 
 // As many of the best corners as asked for, spread over the picture.
 std::vector<cv::Point2f> spread(std::vector<cv::KeyPoint>* corners, int count,
@@ -254,218 +400,227 @@ Matrix3<double> fit_rotation(const std::vector<Vector3<double>>& base,
   return R;
 }
 
-void BM_LucasKanade(benchmark::State& state) {
-  constexpr int kThreshold = 20;
-  constexpr int kLevels = 3;
-  constexpr double kHuberPx = 1;
-  const cv::Size window(21, 21);
-  const auto height = static_cast<int>(state.range(0));
-  const auto points = static_cast<int>(state.range(1));
-  TurningCamera& camera = camera_of(height);
-  const Calibration& calibration = camera.calibration();
-  Times total;
-  Times fast;
-  Times flow;
-  Times fit;
-  Errors errors(camera);
-  double held = 0;
-  int k = 0;
-  std::vector<cv::KeyPoint> corners;
-  std::vector<cv::Point2f> from;
-  std::vector<cv::Point2f> to;
-  std::vector<uchar> found;
-  std::vector<cv::Mat> pyramid_before;
-  std::vector<cv::Mat> pyramid;
-  std::vector<Vector3<double>> base;
-  std::vector<Vector3<double>> seen;
-  Matrix3<double> R_before = camera.R_base_from_camera(camera.middle_row_time_s(0));
-  Vector3<double> w_before = Vector3<double>::Zero();  // rad/s, camera frame
+class LucasKanade : public Way {
+ public:
+  LucasKanade(TurningCamera* camera, int points)
+      : Way("lucas_kanade", camera),
+        points_(points),
+        R_(camera->R_base_from_camera(camera->middle_row_time_s(0))) {}
 
-  // Direction of a pixel in the camera as it stood at the middle row.
-  const auto direction = [&](const cv::Point2f& at, const Vector3<double>& w) {
+ private:
+  static constexpr int kThreshold = 20;
+  static constexpr int kLevels = 3;
+  static constexpr double kHuberPx = 1;
+
+  void process(int k) override {
+    const Calibration& calibration = camera_.calibration();
+    const cv::Size window(21, 21);
+    const InterpolatedPanTilt telemetry = camera_.telemetry(k);
+    const cv::Mat& picture = camera_.picture(k);
+    const Vector3<double> w =
+        angular_velocity(calibration.mechanics, telemetry.angle, telemetry.rate);
+    const double flow_ms = milliseconds([&] {
+      cv::buildOpticalFlowPyramid(picture, pyramid_, window, kLevels);
+      if (from_.empty()) return;
+      cv::calcOpticalFlowPyrLK(pyramid_before_, pyramid_, from_, to_, found_, cv::noArray(), window,
+                               kLevels);
+    });
+    int inliers = 0;
+    const double fit_ms = milliseconds([&] {
+      if (from_.empty()) return;
+      base_.clear();
+      seen_.clear();
+      for (std::size_t i = 0; i < from_.size(); ++i) {
+        if (found_[i] == 0) continue;
+        base_.emplace_back(R_ * direction(from_[i], w_));
+        seen_.push_back(direction(to_[i], w));
+      }
+      R_ = fit_rotation(base_, seen_, kHuberPx / calibration.camera.focal_length, &inliers);
+    });
+    const double fast_ms = milliseconds([&] {
+      cv::FAST(picture, corners_, kThreshold, true, cv::FastFeatureDetector::TYPE_9_16);
+      from_ = spread(&corners_, points_, picture.size());
+    });
+    std::swap(pyramid_, pyramid_before_);
+    w_ = w;
+    record("total", flow_ms + fit_ms + fast_ms);
+    record("flow", flow_ms);
+    record("fit", fit_ms);
+    record("fast", fast_ms);
+    record_answer(k, inliers, [&](const Vector2<double>& u, Vector3<double>* d) {
+      *d = R_ * direction({static_cast<float>(u.x() - 0.5), static_cast<float>(u.y() - 0.5)}, w);
+      return inliers > 0;
+    });
+  }
+
+  // Of a pixel, in the camera as it stood at the middle row.
+  [[nodiscard]] Vector3<double> direction(const cv::Point2f& at, const Vector3<double>& w) const {
+    const Calibration& calibration = camera_.calibration();
     const Vector2<double> u(at.x + 0.5, at.y + 0.5);
     Vector3<double> d;
     if (unproject(calibration.camera, u, &d) != ProjectionStatus::kOk) std::abort();
-    const double time = (u.y() - 0.5 * height) * calibration.line_delay;
-    return Vector3<double>((d + time * w.cross(d)).normalized());
-  };
-  const auto next = [&](bool counted) {
-    const InterpolatedPanTilt telemetry = camera.telemetry(k);
-    const auto begin = Clock::now();
-    const Vector3<double> w =
-        angular_velocity(calibration.mechanics, telemetry.angle, telemetry.rate);
-    cv::buildOpticalFlowPyramid(camera.picture(k), pyramid, window, kLevels);
-    Matrix3<double> R = R_before;
-    int inliers = 0;
-    double flow_ms = 0;
-    double fit_ms = 0;
-    if (!from.empty()) {
-      cv::calcOpticalFlowPyrLK(pyramid_before, pyramid, from, to, found, cv::noArray(), window,
-                               kLevels);
-      flow_ms = milliseconds(begin);
-      const auto begin_fit = Clock::now();
-      base.clear();
-      seen.clear();
-      for (std::size_t i = 0; i < from.size(); ++i) {
-        if (found[i] == 0) continue;
-        base.emplace_back(R_before * direction(from[i], w_before));
-        seen.push_back(direction(to[i], w));
-      }
-      R = fit_rotation(base, seen, kHuberPx / calibration.camera.focal_length, &inliers);
-      fit_ms = milliseconds(begin_fit);
-    }
-    const auto begin_fast = Clock::now();
-    cv::FAST(camera.picture(k), corners, kThreshold, true, cv::FastFeatureDetector::TYPE_9_16);
-    from = spread(&corners, points, camera.picture(k).size());
-    const double fast_ms = milliseconds(begin_fast);
-    std::swap(pyramid, pyramid_before);
-    R_before = R;
-    w_before = w;
-    const double total_ms = milliseconds(begin);
-    if (counted) {
-      total.add(total_ms);
-      fast.add(fast_ms);
-      flow.add(flow_ms);
-      fit.add(fit_ms);
-      held += inliers;
-      errors.add(k, [&](const Vector2<double>& u, Vector3<double>* d) {
-        *d = R *
-             direction(
-                 cv::Point2f(static_cast<float>(u.x() - 0.5), static_cast<float>(u.y() - 0.5)), w);
-        return inliers > 0;
-      });
-    }
-    ++k;
-    return total_ms;
-  };
-  while (k < 10) (void)next(false);
-  for (auto _ : state) state.SetIterationTime(1e-3 * next(true));
-  held /= static_cast<double>(state.iterations());
-  report(state, "lucas_kanade", "total", total, errors.rms_px(), held);
-  report(state, "lucas_kanade", "flow", flow);
-  report(state, "lucas_kanade", "fast", fast);
-  report(state, "lucas_kanade", "fit", fit);
-  report_quality(state, errors, held);
-}
+    const double time = (u.y() - 0.5 * calibration.camera.height) * calibration.line_delay;
+    return (d + time * w.cross(d)).normalized();
+  }
 
-void BM_Orb(benchmark::State& state) {
-  constexpr int kKeyFrames = 5;
-  constexpr int kSpacing = kFrames / kKeyFrames;
-  constexpr float kRatio = 0.8F;  // of the nearest neighbour's distance to the second's
-  constexpr double kInlierPx = 3;
-  const auto height = static_cast<int>(state.range(0));
-  const auto points = static_cast<int>(state.range(1));
-  TurningCamera& camera = camera_of(height);
-  const auto orb = cv::ORB::create(points);
-  const cv::BFMatcher matcher(cv::NORM_HAMMING);
+  int points_;
+  Matrix3<double> R_;
+  Vector3<double> w_ = Vector3<double>::Zero();  // rad/s, camera frame
+  std::vector<cv::KeyPoint> corners_;
+  std::vector<cv::Point2f> from_, to_;
+  std::vector<uchar> found_;
+  std::vector<cv::Mat> pyramid_before_, pyramid_;
+  std::vector<Vector3<double>> base_, seen_;
+};
+
+class Orb : public Way {
+ public:
+  Orb(TurningCamera* camera, int points) : Way("orb", camera), orb_(cv::ORB::create(points)) {
+    for (std::size_t i = 0; i < map_.size(); ++i) {
+      orb_->detectAndCompute(camera->picture(static_cast<int>(i) * kSpacing), cv::noArray(),
+                             map_[i].points, map_[i].descriptors);
+    }
+  }
+
+ private:
+  static constexpr int kKeyFrames = 5;
+  static constexpr int kSpacing = kFrames / kKeyFrames;
+  static constexpr float kRatio = 0.8F;  // of the nearest neighbour's distance to the second's
+  static constexpr double kInlierPx = 3;
+
   struct KeyFrame {
     std::vector<cv::KeyPoint> points;
     cv::Mat descriptors;
   };
-  std::array<KeyFrame, kKeyFrames> map;
-  for (int i = 0; i < kKeyFrames; ++i) {
-    KeyFrame& key = map[static_cast<std::size_t>(i)];
-    orb->detectAndCompute(camera.picture(i * kSpacing), cv::noArray(), key.points, key.descriptors);
-  }
-  Times total;
-  Times features;
-  Times matching;
-  Times fit;
-  Errors errors(camera);
-  double held = 0;
-  int k = 0;
-  std::vector<cv::KeyPoint> corners;
-  cv::Mat descriptors;
-  std::vector<std::vector<cv::DMatch>> matches;
-  std::vector<cv::Point2f> from;
-  std::vector<cv::Point2f> to;
-  cv::Mat inliers;
-  const auto next = [&](bool counted) {
+
+  void process(int k) override {
     // The last one before this frame: never the frame itself, whose noise would be the same.
     const int key_index = (k + kFrames - 1) % kFrames / kSpacing;
-    const KeyFrame& key = map[static_cast<std::size_t>(key_index)];
-    const auto begin = Clock::now();
-    orb->detectAndCompute(camera.picture(k), cv::noArray(), corners, descriptors);
-    const double features_ms = milliseconds(begin);
-    const auto begin_matching = Clock::now();
-    matches.clear();  // knnMatch appends
-    matcher.knnMatch(descriptors, key.descriptors, matches, 2);
-    from.clear();
-    to.clear();
-    for (const auto& match : matches) {
-      if (match.size() < 2 || match[0].distance > kRatio * match[1].distance) continue;
-      from.push_back(corners[static_cast<std::size_t>(match[0].queryIdx)].pt);
-      to.push_back(key.points[static_cast<std::size_t>(match[0].trainIdx)].pt);
-    }
-    const double matching_ms = milliseconds(begin_matching);
-    const auto begin_fit = Clock::now();
+    const KeyFrame& key = map_[static_cast<std::size_t>(key_index)];
+    const double features_ms = milliseconds(
+        [&] { orb_->detectAndCompute(camera_.picture(k), cv::noArray(), corners_, descriptors_); });
+    const double matching_ms = milliseconds([&] {
+      matches_.clear();  // knnMatch appends
+      matcher_.knnMatch(descriptors_, key.descriptors, matches_, 2);
+      from_.clear();
+      to_.clear();
+      for (const auto& match : matches_) {
+        if (match.size() < 2 || match[0].distance > kRatio * match[1].distance) continue;
+        from_.push_back(corners_[static_cast<std::size_t>(match[0].queryIdx)].pt);
+        to_.push_back(key.points[static_cast<std::size_t>(match[0].trainIdx)].pt);
+      }
+    });
     cv::Mat H;
-    int held_now = 0;
-    if (from.size() >= 4) {
-      H = cv::findHomography(from, to, cv::RANSAC, kInlierPx, inliers);
-      held_now = H.empty() ? 0 : cv::countNonZero(inliers);
-    }
-    const double fit_ms = milliseconds(begin_fit);
-    const double total_ms = milliseconds(begin);
-    if (counted) {
-      total.add(total_ms);
-      features.add(features_ms);
-      matching.add(matching_ms);
-      fit.add(fit_ms);
-      held += held_now;
-      errors.add(k, [&](const Vector2<double>& u, Vector3<double>* d) {
-        if (H.empty()) return false;
-        const cv::Matx33d matrix = H;
-        const cv::Vec3d there = matrix * cv::Vec3d(u.x() - 0.5, u.y() - 0.5, 1);
-        *d = camera.direction(key_index * kSpacing,
-                              {there[0] / there[2] + 0.5, there[1] / there[2] + 0.5});
-        return true;
-      });
-    }
-    ++k;
-    return total_ms;
-  };
-  while (k < 3) (void)next(false);
-  for (auto _ : state) state.SetIterationTime(1e-3 * next(true));
-  held /= static_cast<double>(state.iterations());
-  report(state, "orb", "total", total, errors.rms_px(), held);
-  report(state, "orb", "features", features);
-  report(state, "orb", "matching", matching);
-  report(state, "orb", "fit", fit);
-  report_quality(state, errors, held);
+    int inliers = 0;
+    const double fit_ms = milliseconds([&] {
+      if (from_.size() < 4) return;
+      H = cv::findHomography(from_, to_, cv::RANSAC, kInlierPx, mask_);
+      if (!H.empty()) inliers = cv::countNonZero(mask_);
+    });
+    record("total", features_ms + matching_ms + fit_ms);
+    record("features", features_ms);
+    record("matching", matching_ms);
+    record("fit", fit_ms);
+    record_answer(k, inliers, [&](const Vector2<double>& u, Vector3<double>* d) {
+      if (H.empty()) return false;
+      const cv::Vec3d there = cv::Matx33d(H) * cv::Vec3d(u.x() - 0.5, u.y() - 0.5, 1);
+      *d = camera_.direction(key_index * kSpacing,
+                             {there[0] / there[2] + 0.5, there[1] / there[2] + 0.5});
+      return true;
+    });
+  }
+
+  cv::Ptr<cv::ORB> orb_;
+  cv::BFMatcher matcher_{cv::NORM_HAMMING};
+  std::array<KeyFrame, kKeyFrames> map_;
+  std::vector<cv::KeyPoint> corners_;
+  cv::Mat descriptors_, mask_;
+  std::vector<std::vector<cv::DMatch>> matches_;
+  std::vector<cv::Point2f> from_, to_;
+};
+
+std::vector<std::string> table;
+
+template <class... Values>
+void add_line(const char* format, Values... values) {
+  char line[160];
+  std::snprintf(line, sizeof(line), format, values...);
+  table.emplace_back(line);
 }
 
-void register_all() {
-  const auto add = [](const char* name, void (*function)(benchmark::State&), int height, int points,
-                      int iterations) {
-    benchmark::RegisterBenchmark(name, function)
-        ->Args({height, points})
-        ->Iterations(iterations)
-        ->UseManualTime()
-        ->Unit(benchmark::kMillisecond);
-  };
-  // One size after the other: its pictures are made once. Each way runs right after the one that it is
-  // compared with.
-  for (const int height : {720, 1080, 2160}) {
-    for (const int points : {50, 200, 800}) {
-      add("oe", BM_Oe, height, points, 1000);
-      add("lucas_kanade", BM_LucasKanade, height, points, height == 2160 ? 100 : 200);
-      add("orb", BM_Orb, height, points, height == 2160 ? 40 : 100);
-    }
+// To the JSON and to the table.
+void report(benchmark::State& state, const Way& way, double reference_ms) {
+  for (const auto& [part, ms] : way.parts()) {
+    const double p50 = quantile(ms, 0.5);
+    const double p99 = quantile(ms, 0.99);
+    const double max = quantile(ms, 1);
+    const std::string name = way.name() + "_" + part;
+    state.counters[name + "_p50_ms"] = p50;
+    state.counters[name + "_p99_ms"] = p99;
+    state.counters[name + "_max_ms"] = max;
+    const bool whole = &ms == &way.parts()[0].second && way.name() != "stage";
+    add_line("%5d %7d  %-13s %-9s %8.3f %8.3f %8.3f", static_cast<int>(state.range(0)),
+             static_cast<int>(state.range(1)), way.name().c_str(), part.c_str(), p50, p99, max);
+    if (!whole) continue;
+    state.counters[way.name() + "_ratio"] = p50 / reference_ms;
+    state.counters[way.name() + "_error_px"] = way.error_px();
+    state.counters[way.name() + "_held"] = way.held();
+    state.counters[way.name() + "_answered"] = way.answered();
+    char rest[80];
+    std::snprintf(rest, sizeof(rest), " %7.1f %9.3f %7.1f %8.0f %%", p50 / reference_ms,
+                  way.error_px(), way.held(), 100 * way.answered());
+    table.back() += rest;
   }
 }
+
+// An iteration is a turn of every way. The time that Google Benchmark shows is process()'s.
+void BM_Frames(benchmark::State& state) {
+  const auto height = static_cast<int>(state.range(0));
+  const auto points = static_cast<int>(state.range(1));
+  TurningCamera& camera = camera_of(height);
+  Oe oe(&camera, points);
+  LucasKanade lucas_kanade(&camera, points);
+  Orb orb(&camera, points);
+  oe.run(2 * kFrames, false);  // the map is made
+  lucas_kanade.run(3, false);
+  orb.run(3, false);
+  Stages stages(&camera, &oe.mode(), points);
+  const bool large = height > 1080;
+  for (auto _ : state) {
+    const int frames = large ? 30 : 60;
+    oe.run(frames, true);
+    stages.run(10, true);
+    lucas_kanade.run(large ? 5 : 10, true);
+    orb.run(large ? 2 : 4, true);
+    const auto& ms = oe.parts()[0].second;
+    double sum = 0;
+    for (auto at = ms.end() - frames; at != ms.end(); ++at) sum += *at;
+    state.SetIterationTime(1e-3 * sum);
+  }
+  const double reference_ms = quantile(oe.parts()[0].second, 0.5);
+  report(state, oe, reference_ms);
+  report(state, stages, reference_ms);
+  report(state, lucas_kanade, reference_ms);
+  report(state, orb, reference_ms);
+}
+
+void configurations(benchmark::internal::Benchmark* benchmark) {
+  for (const int height : {720, 1080, 2160}) {
+    for (const int points : {50, 200, 800}) benchmark->Args({height, points});
+  }
+}
+
+BENCHMARK(BM_Frames)
+    ->Apply(configurations)
+    ->ArgNames({"lines", "points"})
+    ->Iterations(20)
+    ->UseManualTime()
+    ->Unit(benchmark::kMillisecond);
 
 void print_table() {
-  std::printf("\n%-6s %-7s %-13s %-9s %9s %9s %9s %7s %9s %7s\n", "lines", "points", "way", "part",
-              "p50 ms", "p99 ms", "max ms", "ratio", "error px", "held");
-  for (const Row& row : table) {
-    std::printf("%-6d %-7d %-13s %-9s %9.3f %9.3f %9.3f", row.height, row.points, row.way.c_str(),
-                row.part.c_str(), row.p50, row.p99, row.max);
-    if (row.held > 0) {
-      std::printf(" %7.1f %9.3f %7.1f", row.ratio, row.error_px, row.held);
-    }
-    std::printf("\n");
-  }
+  std::printf("\n%5s %7s  %-13s %-9s %8s %8s %8s %7s %9s %7s %10s\n", "lines", "points", "way",
+              "part", "p50 ms", "p99 ms", "max ms", "ratio", "error px", "held", "answered");
+  for (const std::string& line : table) std::printf("%s\n", line.c_str());
 }
 
 }  // namespace
@@ -475,7 +630,6 @@ int main(int argc, char** argv) {
   cv::setNumThreads(1);
   benchmark::Initialize(&argc, argv);
   if (benchmark::ReportUnrecognizedArguments(argc, argv)) return 1;
-  alidade::benchmarks::register_all();
   benchmark::RunSpecifiedBenchmarks();
   alidade::benchmarks::print_table();
   benchmark::Shutdown();
