@@ -204,7 +204,7 @@ TEST(LandmarkMap, CellsOfAnOctaveAreAboutEqualEverywhere) {
       const InsertStatus status = map.insert(landmark_at(anywhere(&random), octave), 0, &slot);
       ASSERT_TRUE(status == InsertStatus::kOk || status == InsertStatus::kCellTaken);
     }
-    const double width = std::ldexp(kSize, octave);
+    const double width = std::min(std::ldexp(kSize, octave), LandmarkMap::kMaxCellSize);
     const double expected = 4 * kPi / (width * width);
     EXPECT_NEAR(map.size() / expected, 1, octave < 3 ? 0.05 : 0.15) << octave;
     // The caps around the poles have as many as others of their size.
@@ -215,6 +215,23 @@ TEST(LandmarkMap, CellsOfAnOctaveAreAboutEqualEverywhere) {
       const auto in_cap = find(map, pole * Vector3<double>::UnitZ(), std::cos(cap));
       EXPECT_NEAR(static_cast<double>(in_cap.size()) / expected_in_cap, 1, 0.25);
     }
+  }
+}
+
+TEST(LandmarkMap, CellsOfCoarseOctavesGrowNoLargerThanAsked) {
+  std::mt19937_64 random(9);
+  constexpr double kSize = 0.1;
+  constexpr double kLargest = 0.15;
+  LandmarkMap map(4096, kSize, kLargest);
+  for (const int octave : {0, 1, 7}) {
+    map.clear(kSize, kLargest);
+    int slot = 0;
+    for (int i = 0; i < 50000; ++i) {
+      const InsertStatus status = map.insert(landmark_at(anywhere(&random), octave), 0, &slot);
+      ASSERT_TRUE(status == InsertStatus::kOk || status == InsertStatus::kCellTaken);
+    }
+    const double width = octave == 0 ? kSize : kLargest;
+    EXPECT_NEAR(map.size() / (4 * kPi / (width * width)), 1, 0.05) << octave;
   }
 }
 
