@@ -36,6 +36,7 @@ constexpr double kLongestPrediction = 0.5;  // s, without telemetry
 // The offset of map and telemetry drifts: heat, gears. rad / sqrt(s)
 constexpr double kOffsetDrift = 1e-6;
 
+constexpr int kEmptyView = 50;  // landmarks; with fewer a view needs all that can be made
 constexpr int kMaxMisses = 15;  // in a row
 constexpr std::uint32_t kProbation = 20;
 constexpr double kLeastMatched = 0.3;
@@ -44,7 +45,7 @@ constexpr int kContradictionsToReset = 50;
 constexpr int kLostToReset = 1000;
 
 // As the reference was seen; a patch is prepared again when its warp has changed by this.
-constexpr float kFineWarpTolerance = 0.01F;
+constexpr float kFineWarpTolerance = 0.02F;
 constexpr float kCoarseWarpTolerance = 0.04F;
 
 struct Prepared {
@@ -85,14 +86,15 @@ struct OeMode::State {
   const ReferencePatch* reference(int slot, const SeenDirection& seen);
   void take_coarse_patches(const ViewProjection& view);
   bool align_coarse(double sigma_px);
-  void choose_fine(const ViewProjection& view);
+  void choose_fine();
   void align_fine(const ViewProjection& view);
   void finish_observations(const SolvedMotion& solved);
   void learn_noise();
 
   void remember_motion();
   void straighten_map();
-  void bend_map(const Vector2<double>& rate, const Vector2<double>& acceleration);
+  void bend_map(const Vector2<double>& rate, const Vector2<double>& acceleration,
+                double origin_tilt);
   void judge_coarse(const ViewProjection& view);
   void refine_landmarks();
   void mark(int slot, bool matched, double residual_square);
@@ -134,10 +136,12 @@ struct OeMode::State {
   Vector2<double> bend_acceleration_variance = Vector2<double>::Zero();
   struct Past {
     double time_s;  // middle row
-    Vector2<double> angle;
-    Vector2<double> surprise;  // rad, by which it missed the cubic through the four before
+    Vector2<double> angle, rate, acceleration;
+    Matrix6 covariance;
+    Vector2<double> surprise;  // rad, by which it missed the curve through those before
   };
-  std::array<Past, 5> past;  // of the latest frames, newest first
+  static constexpr std::size_t kCurve = 5;  // angles in a row that give a polynomial of degree 4
+  std::array<Past, kCurve + 1> past;        // of the latest frames, newest first
   int past_count = 0;
   double noise_sigma = kExpectedNoise;
   std::uint32_t frames = 0;
@@ -286,7 +290,7 @@ void OeMode::State::find_visible(const ViewProjection& view) {
     const int slot = slots[static_cast<std::size_t>(i)];
     const Landmark& landmark = map.at(slot);
     Vector2<double> u;
-    if (!view.project(landmark.d, &u) || !inside(u, landmark.octave)) continue;
+    if (!view.project_roughly(landmark.d, &u) || !inside(u, landmark.octave)) continue;
     visible[static_cast<std::size_t>(visible_count++)] = {slot, landmark.octave, u};
   }
 }
@@ -356,8 +360,7 @@ bool OeMode::State::align_coarse(double sigma_px) {
 }
 
 // Up to max_used fine landmarks: the most reliable of each part of the image first.
-void OeMode::State::choose_fine(const ViewProjection& view) {
-  find_visible(view);
+void OeMode::State::choose_fine() {
   chosen_count = 0;
   constexpr int kColumns = 20;
   constexpr int kRows = 12;
@@ -391,7 +394,9 @@ void OeMode::State::choose_fine(const ViewProjection& view) {
     candidate.slot = -1;
   };
   if (fine > options.max_used) {
-    for (const int i : best) {
+    // In strides, so that a small number is spread too; 97 divides no number of parts.
+    for (std::size_t j = 0; j < best.size(); ++j) {
+      const int i = best[j * 97 % best.size()];
       if (i >= 0) choose(i);
     }
   }
@@ -544,7 +549,10 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   constexpr double kNearby = 2;  // px
   if (coarse_aligned || sigma_px < kNearby) {
     const ViewProjection view(calibration, motion);
-    choose_fine(view);
+    // Which landmarks are in view hardly changes by a few pixels.
+    constexpr double kOtherView = 16;  // px
+    if (statistics.coarse_shift_px > kOtherView) find_visible(view);
+    choose_fine();
     align_fine(view);
   }
 
@@ -634,20 +642,24 @@ void OeMode::State::mark(int slot, bool matched, double residual_square) {
   if (s.missed_in_a_row >= kMaxMisses || unreliable) map.retire(slot);
 }
 
-// The cubic through four earlier angles tells what was to be expected now; a jerk surprises it.
+// The curve through the earlier angles tells what was to be expected now; a jerk surprises it.
 void OeMode::State::remember_motion() {
   constexpr double kLongest = 0.5;  // s
   const double time_s = last_time_s + calibration.line_delay * motion.reference_row;
   if (past_count > 0 && !(time_s > past[0].time_s && time_s - past[0].time_s < kLongest)) {
     past_count = 0;
   }
-  constexpr auto kKept = static_cast<int>(std::tuple_size_v<decltype(past)>);
-  Past now{time_s, motion.angle.vector(), Vector2<double>::Constant(field_of_view)};
-  if (past_count >= 4) {
+  Past now{time_s,
+           motion.angle.vector(),
+           motion.rate.vector(),
+           motion.acceleration.vector(),
+           motion_covariance,
+           Vector2<double>::Constant(field_of_view)};
+  if (past_count >= static_cast<int>(kCurve)) {
     now.surprise = now.angle;
-    for (std::size_t i = 0; i < 4; ++i) {
+    for (std::size_t i = 0; i < kCurve; ++i) {
       double weight = 1;
-      for (std::size_t j = 0; j < 4; ++j) {
+      for (std::size_t j = 0; j < kCurve; ++j) {
         if (j != i) weight *= (time_s - past[j].time_s) / (past[i].time_s - past[j].time_s);
       }
       now.surprise -= weight * past[i].angle;
@@ -655,41 +667,45 @@ void OeMode::State::remember_motion() {
   }
   std::copy_backward(past.begin(), past.end() - 1, past.end());
   past[0] = now;
-  past_count = std::min(past_count + 1, kKept);
+  past_count = std::min(past_count + 1, static_cast<int>(past.size()));
 }
 
 // All landmarks together may be bent: those of the first frame were placed by telemetry's rate, so that
 // its error times the row's time stands in their directions, and as every later frame then shows
 // the wrong rate, in the directions of all made since. The angles of neighbouring frames know
-// better: their difference quotient is held against the rates that the map shows, and the map is bent
-// back, as far as that is sure (Kalman). Accelerations likewise.
+// better: the derivatives of the curve through five of them, in its middle, are held against the rate
+// and acceleration that the map showed there, and the map is bent back, as far as that is sure
+// (Kalman).
 void OeMode::State::straighten_map() {
-  // Landmarks made in a frame take over the errors of its rates: so much of their variance a frame.
-  constexpr double kInherited = 0.02;
+  // Of the landmarks in view a twentieth is new and takes over the errors of the frame it was made in.
+  constexpr double kInherited = 0.05 * 0.05;
   bend_rate_variance += kInherited * motion_covariance.diagonal().segment<2>(2);
   bend_acceleration_variance += kInherited * motion_covariance.diagonal().tail<2>();
-  if (past_count < 4 || calibration.line_delay == 0) return;
-  Matrix4<double> powers;
-  for (std::size_t i = 0; i < 4; ++i) {
-    const double t = past[i].time_s - past[0].time_s;
-    powers.row(static_cast<int>(i)) << 1, t, t * t, t * t * t;
+  if (past_count < static_cast<int>(past.size()) || calibration.line_delay == 0) return;
+  const Past& middle = past[kCurve / 2];
+  const double h = (past[0].time_s - past[kCurve - 1].time_s) / (kCurve - 1);
+  Matrix<double, kCurve, kCurve> powers;
+  for (std::size_t i = 0; i < kCurve; ++i) {
+    const double t = (past[i].time_s - middle.time_s) / h;
+    powers.row(static_cast<int>(i)) << 1, t, t * t, t * t * t, t * t * t * t;
   }
-  const Matrix4<double> to_coefficients = powers.inverse();
-  const double h = (past[0].time_s - past[3].time_s) / 3;
+  const Matrix<double, kCurve, kCurve> to_coefficients = powers.inverse();
+  const Matrix<double, 1, kCurve> to_rate = to_coefficients.row(1) / h;
+  const Matrix<double, 1, kCurve> to_acceleration = 2 * to_coefficients.row(2) / (h * h);
   Vector2<double> rate = Vector2<double>::Zero();
   Vector2<double> acceleration = Vector2<double>::Zero();
-  for (std::size_t i = 0; i < 4; ++i) {
-    rate += to_coefficients(1, static_cast<int>(i)) * past[i].angle;
-    acceleration += 2 * to_coefficients(2, static_cast<int>(i)) * past[i].angle;
+  for (std::size_t i = 0; i < kCurve; ++i) {
+    rate += to_rate[static_cast<int>(i)] * past[i].angle;
+    acceleration += to_acceleration[static_cast<int>(i)] * past[i].angle;
   }
-  const Vector2<double> shown_rate = motion.rate.vector();
-  const Vector2<double> shown_acceleration = motion.acceleration.vector();
-  // For equal steps: the cubic misses the fourth derivative, whose h^4 is the surprise.
-  const Vector2<double> surprise = past[0]
-                                       .surprise.cwiseAbs()
-                                       .cwiseMax(past[1].surprise.cwiseAbs())
-                                       .cwiseMax(past[2].surprise.cwiseAbs());
-  const Vector2<double> angle_variance = motion_covariance.diagonal().head<2>();
+  // Derivatives that the polynomial lacks do a thirtieth of what they surprise by; a jerk between two
+  // frames up to several times as much.
+  constexpr double kOfSurprise = 1.0 / 6;
+  const Vector2<double> surprise = kOfSurprise * past[0]
+                                                     .surprise.cwiseAbs()
+                                                     .cwiseMax(past[1].surprise.cwiseAbs())
+                                                     .cwiseMax(past[2].surprise.cwiseAbs());
+  const Vector2<double> angle_variance = middle.covariance.diagonal().head<2>();
   const auto bend = [](const Vector2<double>& shown, const Vector2<double>& expected,
                        const Vector2<double>& noise, Vector2<double>* variance) {
     constexpr double kGate = 16;
@@ -704,45 +720,61 @@ void OeMode::State::straighten_map() {
     }
     return change;
   };
-  const Vector2<double> rate_noise = to_coefficients.row(1).squaredNorm() * angle_variance +
-                                     (surprise / (4 * h)).cwiseAbs2() +
-                                     motion_covariance.diagonal().segment<2>(2);
-  const Vector2<double> acceleration_noise =
-      4 * to_coefficients.row(2).squaredNorm() * angle_variance + (surprise / (h * h)).cwiseAbs2() +
-      motion_covariance.diagonal().tail<2>();
-  bend_map(bend(shown_rate, rate, rate_noise, &bend_rate_variance),
-           bend(shown_acceleration, acceleration, acceleration_noise, &bend_acceleration_variance));
+  const Vector2<double> rate_noise = to_rate.squaredNorm() * angle_variance +
+                                     (surprise / h).cwiseAbs2() +
+                                     middle.covariance.diagonal().segment<2>(2);
+  const Vector2<double> acceleration_noise = to_acceleration.squaredNorm() * angle_variance +
+                                             (surprise / (h * h)).cwiseAbs2() +
+                                             middle.covariance.diagonal().tail<2>();
+  const Vector2<double> too_fast = bend(middle.rate, rate, rate_noise, &bend_rate_variance);
+  const Vector2<double> too_much =
+      bend(middle.acceleration, acceleration, acceleration_noise, &bend_acceleration_variance);
+  bend_map(too_fast, too_much, middle.angle.y());
 }
 
-// Takes from all landmarks what so much too high a rate and acceleration have put into them: their angle
-// at the time of the row in which this frame would see their elevation.
-void OeMode::State::bend_map(const Vector2<double>& rate, const Vector2<double>& acceleration) {
+// Takes from all landmarks what so much too high a rate and acceleration, shown by a frame that looked
+// at origin_tilt, have put into them: the angle at the time of the row in which that frame would have seen
+// their elevation.
+void OeMode::State::bend_map(const Vector2<double>& rate, const Vector2<double>& acceleration,
+                             double origin_tilt) {
   const Vector3<double>& a_pan = calibration.mechanics.pan_axis;
-  const double row_time_per_angle =
+  const double time_per_angle =
       -calibration.line_delay * calibration.camera.focal_length * calibration.camera.aspect;
-  const auto error_at = [&](double elevation) -> Vector2<double> {
-    const double t = row_time_per_angle * elevation;
+  const auto angle_error = [&](double t) -> Vector2<double> {
     return t * rate + (0.5 * t * t) * acceleration;
   };
-  const Vector3<double> axis = ViewProjection(calibration, motion).optical_axis();
-  const double axis_elevation = -std::asin(std::clamp(a_pan.dot(axis), -1.0, 1.0));
+  const auto straighten = [&](Vector2<double>* angle, Vector2<double>* shown_rate,
+                              Vector2<double>* shown_acceleration) {
+    const double t = time_per_angle * (angle->y() - origin_tilt);
+    *angle -= angle_error(t);
+    *shown_rate -= rate + t * acceleration;
+    *shown_acceleration -= acceleration;
+  };
+  const auto elevation_of = [&](const Vector3<double>& d) {
+    return -std::asin(std::clamp(a_pan.dot(d), -1.0, 1.0));
+  };
+  const double origin = elevation_of(ViewProjection(calibration, motion).optical_axis()) -
+                        (motion.angle.tilt - origin_tilt);
   for (int slot = 0; slot < map.capacity(); ++slot) {
     if (!map.occupied(slot)) continue;
     const Landmark& landmark = map.at(slot);
     const Vector3<double>& d = landmark.d;
-    const double elevation = -std::asin(std::clamp(a_pan.dot(d), -1.0, 1.0));
-    const Vector2<double> error = error_at(elevation - axis_elevation);
+    const Vector2<double> error = angle_error(time_per_angle * (elevation_of(d) - origin));
     const Vector3<double> right = a_pan.cross(d);
     const Vector3<double> turned = d - error.x() * right - error.y() * right.normalized().cross(d);
     map.refine(slot, turned.normalized(), landmark.covariance);
   }
   for (int i = 0; i < past_count; ++i) {
-    Vector2<double>& angle = past[static_cast<std::size_t>(i)].angle;
-    angle -= error_at(angle.y() - past[0].angle.y());
+    Past& p = past[static_cast<std::size_t>(i)];
+    straighten(&p.angle, &p.rate, &p.acceleration);
   }
-  motion.rate = {motion.rate.pan - rate.x(), motion.rate.tilt - rate.y()};
-  motion.acceleration = {motion.acceleration.pan - acceleration.x(),
-                         motion.acceleration.tilt - acceleration.y()};
+  Vector2<double> angle = motion.angle.vector();
+  Vector2<double> now_rate = motion.rate.vector();
+  Vector2<double> now_acceleration = motion.acceleration.vector();
+  straighten(&angle, &now_rate, &now_acceleration);
+  motion.angle = {angle.x(), angle.y()};
+  motion.rate = {now_rate.x(), now_rate.y()};
+  motion.acceleration = {now_acceleration.x(), now_acceleration.y()};
   last_motion = motion;
 }
 
@@ -838,7 +870,7 @@ bool OeMode::State::make_landmark(const FastCorner& corner, int octave) {
 void OeMode::State::make_landmarks(const ViewProjection& view) {
   find_visible(view);
   // An empty view takes all it can at once.
-  int left = visible_count < 50 ? std::numeric_limits<int>::max() : options.max_new;
+  int left = visible_count < kEmptyView ? std::numeric_limits<int>::max() : options.max_new;
   for (int octave = pyramid.octaves() - 1; octave >= 0; --octave) {
     const double cell = cell_px(octave);
     const int columns = cells(calibration.camera.width, octave);
@@ -856,6 +888,9 @@ void OeMode::State::make_landmarks(const ViewProjection& view) {
     const ImageView& picture = pyramid.octave(octave);
     const double to_image = std::ldexp(1.0, octave);
     if (octave >= kFirstCoarseOctave) {
+      // One of them each time, but for an empty view.
+      const auto turn = static_cast<int>(frames) % (pyramid.octaves() - kFirstCoarseOctave);
+      if (visible_count >= kEmptyView && octave != kFirstCoarseOctave + turn) continue;
       const FastResult result = grid.detect(picture, options.corner_threshold, corners.data(),
                                             static_cast<int>(corners.size()));
       for (int i = 0; i < result.count && left > 0; ++i) {
@@ -871,7 +906,7 @@ void OeMode::State::make_landmarks(const ViewProjection& view) {
     const int count = columns * rows;
     const int first = static_cast<int>(frames * 97 % static_cast<std::uint32_t>(count));
     const int size = grid.cell_size();
-    int searches = left == std::numeric_limits<int>::max() ? count : 4 * options.max_new;
+    int searches = left == std::numeric_limits<int>::max() ? count : options.max_new;
     for (int i = 0; i < count && left > 0 && searches > 0; ++i) {
       const int index = (first + i) % count;
       if (cell_taken[static_cast<std::size_t>(index)] != 0) continue;

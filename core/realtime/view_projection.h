@@ -8,6 +8,8 @@
 // Pure; no allocation. Directions outside the image are projected too, as far as the camera goes.
 
 #include <Eigen/Core>
+#include <algorithm>
+#include <cmath>
 
 #include "core/model/calibration.h"
 #include "core/model/camera.h"
@@ -45,6 +47,16 @@ class ViewProjection {
   [[nodiscard]] bool project(const Vector3<double>& d, Vector2<double>* u) const {
     Path path;
     return find(d, &path, u);
+  }
+
+  // To a pixel or so, for choosing.
+  [[nodiscard]] bool project_roughly(const Vector3<double>& d, Vector2<double>* u) const {
+    const Vector3<double> middle = R_[0] * d;
+    if (alidade::project(camera_, middle, u) != ProjectionStatus::kOk) return false;
+    if (line_delay_ == 0) return true;
+    const double s = std::clamp(parameter(u->y()), -1.5, 1.5);
+    return alidade::project(camera_, (middle + s * (R_[1] * d + s * (R_[2] * d))).eval(), u) ==
+           ProjectionStatus::kOk;
   }
 
   [[nodiscard]] bool project(const Vector3<double>& d, SeenDirection* out) const {
