@@ -61,6 +61,14 @@ struct Visible {
   Vector2<double> u;  // px of the image, predicted
 };
 
+// Of (rate, acceleration) of one axis.
+Matrix2<double> rate_covariance(const Matrix6& motion, int axis) {
+  Matrix2<double> out;
+  out << motion(2 + axis, 2 + axis), motion(2 + axis, 4 + axis), motion(4 + axis, 2 + axis),
+      motion(4 + axis, 4 + axis);
+  return out;
+}
+
 Matrix2<double> symmetric(const Matrix2<double>& m) { return 0.5 * (m + m.transpose()); }
 
 }  // namespace
@@ -91,6 +99,9 @@ struct OeMode::State {
   void finish_observations(const SolvedMotion& solved);
   void learn_noise();
 
+  [[nodiscard]] double time_per_angle() const;
+  void move_bend(double tilt);
+  void add_bend(Matrix6* covariance) const;
   void remember_motion();
   void straighten_map();
   void bend_map(const Vector2<double>& rate, const Vector2<double>& acceleration,
@@ -132,8 +143,8 @@ struct OeMode::State {
   Vector2<double> offset = Vector2<double>::Zero();
   Matrix2<double> offset_covariance = Matrix2<double>::Zero();
   // Of rates and accelerations as the map makes them appear: see straighten_map().
-  Vector2<double> bend_rate_variance = Vector2<double>::Zero();
-  Vector2<double> bend_acceleration_variance = Vector2<double>::Zero();
+  std::array<Matrix2<double>, 2> bend_covariance{};  // of (rate, acceleration) of pan, of tilt ...
+  double bend_tilt = 0;                              // ... for a frame that looks at this tilt
   struct Past {
     double time_s;  // middle row
     Vector2<double> angle, rate, acceleration;
@@ -271,8 +282,7 @@ void OeMode::State::forget_map() {
   offset.setZero();
   offset_covariance.setZero();
   noise_sigma = kExpectedNoise;
-  bend_rate_variance.setZero();
-  bend_acceleration_variance.setZero();
+  for (Matrix2<double>& covariance : bend_covariance) covariance.setZero();
   past_count = 0;
   contradictions = 0;
   lost = 0;
@@ -595,8 +605,8 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   shared_covariance = solved.shared_covariance;
   inflation = solved.inflation;
   Matrix6 covariance = solved.covariance;
-  covariance.diagonal().segment<2>(2) += bend_rate_variance;
-  covariance.diagonal().tail<2>() += bend_acceleration_variance;
+  move_bend(motion.angle.tilt);
+  add_bend(&covariance);
   FrameMotion<double> in_base = motion;
   const Vector2<double> total = offset + solved.offset_correction + solved.local_offset_correction;
   in_base.angle = {motion.angle.pan + total.x(), motion.angle.tilt + total.y()};
@@ -642,6 +652,31 @@ void OeMode::State::mark(int slot, bool matched, double residual_square) {
   if (s.missed_in_a_row >= kMaxMisses || unreliable) map.retire(slot);
 }
 
+// Of the rows' times by what a landmark is seen lower.
+double OeMode::State::time_per_angle() const {
+  return -calibration.line_delay * calibration.camera.focal_length * calibration.camera.aspect;
+}
+
+// A frame that looks elsewhere sees the landmarks at other times: a wrong acceleration is another wrong
+// rate there.
+void OeMode::State::move_bend(double tilt) {
+  Matrix2<double> carry = Matrix2<double>::Identity();
+  carry(0, 1) = time_per_angle() * (tilt - bend_tilt);
+  for (Matrix2<double>& covariance : bend_covariance) {
+    covariance = symmetric(carry * covariance * carry.transpose());
+  }
+  bend_tilt = tilt;
+}
+
+void OeMode::State::add_bend(Matrix6* covariance) const {
+  for (int axis = 0; axis < 2; ++axis) {
+    const Matrix2<double>& bend = bend_covariance[static_cast<std::size_t>(axis)];
+    for (int i = 0; i < 2; ++i) {
+      for (int j = 0; j < 2; ++j) (*covariance)(2 + 2 * i + axis, 2 + 2 * j + axis) += bend(i, j);
+    }
+  }
+}
+
 // The curve through the earlier angles tells what was to be expected now; a jerk surprises it.
 void OeMode::State::remember_motion() {
   constexpr double kLongest = 0.5;  // s
@@ -679,8 +714,10 @@ void OeMode::State::remember_motion() {
 void OeMode::State::straighten_map() {
   // Of the landmarks in view a twentieth is new and takes over the errors of the frame it was made in.
   constexpr double kInherited = 0.05 * 0.05;
-  bend_rate_variance += kInherited * motion_covariance.diagonal().segment<2>(2);
-  bend_acceleration_variance += kInherited * motion_covariance.diagonal().tail<2>();
+  for (int axis = 0; axis < 2; ++axis) {
+    bend_covariance[static_cast<std::size_t>(axis)] +=
+        kInherited * rate_covariance(motion_covariance, axis);
+  }
   if (past_count < static_cast<int>(past.size()) || calibration.line_delay == 0) return;
   const Past& middle = past[kCurve / 2];
   const double h = (past[0].time_s - past[kCurve - 1].time_s) / (kCurve - 1);
@@ -705,30 +742,28 @@ void OeMode::State::straighten_map() {
                                                      .surprise.cwiseAbs()
                                                      .cwiseMax(past[1].surprise.cwiseAbs())
                                                      .cwiseMax(past[2].surprise.cwiseAbs());
-  const Vector2<double> angle_variance = middle.covariance.diagonal().head<2>();
-  const auto bend = [](const Vector2<double>& shown, const Vector2<double>& expected,
-                       const Vector2<double>& noise, Vector2<double>* variance) {
-    constexpr double kGate = 16;
-    Vector2<double> change = Vector2<double>::Zero();
-    for (int axis = 0; axis < 2; ++axis) {
-      const double total = (*variance)[axis] + noise[axis];
-      const double wrong = shown[axis] - expected[axis];
-      if (!(wrong * wrong < kGate * total)) continue;
-      const double gain = (*variance)[axis] / total;
-      change[axis] = gain * wrong;
-      (*variance)[axis] *= 1 - gain;
-    }
-    return change;
-  };
-  const Vector2<double> rate_noise = to_rate.squaredNorm() * angle_variance +
-                                     (surprise / h).cwiseAbs2() +
-                                     middle.covariance.diagonal().segment<2>(2);
-  const Vector2<double> acceleration_noise = to_acceleration.squaredNorm() * angle_variance +
-                                             (surprise / (h * h)).cwiseAbs2() +
-                                             middle.covariance.diagonal().tail<2>();
-  const Vector2<double> too_fast = bend(middle.rate, rate, rate_noise, &bend_rate_variance);
-  const Vector2<double> too_much =
-      bend(middle.acceleration, acceleration, acceleration_noise, &bend_acceleration_variance);
+  move_bend(middle.angle.y());
+  Vector2<double> too_fast = Vector2<double>::Zero();
+  Vector2<double> too_much = Vector2<double>::Zero();
+  for (int axis = 0; axis < 2; ++axis) {
+    Matrix2<double>& bend = bend_covariance[static_cast<std::size_t>(axis)];
+    const Vector2<double> wrong(middle.rate[axis] - rate[axis],
+                                middle.acceleration[axis] - acceleration[axis]);
+    Matrix2<double> noise = rate_covariance(middle.covariance, axis);
+    const double angle_variance = middle.covariance(axis, axis);
+    const double rate_surprise = surprise[axis] / h;
+    const double acceleration_surprise = surprise[axis] / (h * h);
+    noise(0, 0) += to_rate.squaredNorm() * angle_variance + rate_surprise * rate_surprise;
+    noise(1, 1) += to_acceleration.squaredNorm() * angle_variance +
+                   acceleration_surprise * acceleration_surprise;
+    const Matrix2<double> to_information = (bend + noise).inverse();
+    constexpr double kGate = 25;  // chi-square, 2 degrees of freedom
+    if (!(wrong.dot(to_information * wrong) < kGate)) continue;
+    const Matrix2<double> gain = bend * to_information;
+    too_fast[axis] = gain.row(0) * wrong;
+    too_much[axis] = gain.row(1) * wrong;
+    bend = symmetric((Matrix2<double>::Identity() - gain) * bend);
+  }
   bend_map(too_fast, too_much, middle.angle.y());
 }
 
@@ -738,14 +773,12 @@ void OeMode::State::straighten_map() {
 void OeMode::State::bend_map(const Vector2<double>& rate, const Vector2<double>& acceleration,
                              double origin_tilt) {
   const Vector3<double>& a_pan = calibration.mechanics.pan_axis;
-  const double time_per_angle =
-      -calibration.line_delay * calibration.camera.focal_length * calibration.camera.aspect;
   const auto angle_error = [&](double t) -> Vector2<double> {
     return t * rate + (0.5 * t * t) * acceleration;
   };
   const auto straighten = [&](Vector2<double>* angle, Vector2<double>* shown_rate,
                               Vector2<double>* shown_acceleration) {
-    const double t = time_per_angle * (angle->y() - origin_tilt);
+    const double t = time_per_angle() * (angle->y() - origin_tilt);
     *angle -= angle_error(t);
     *shown_rate -= rate + t * acceleration;
     *shown_acceleration -= acceleration;
@@ -759,7 +792,7 @@ void OeMode::State::bend_map(const Vector2<double>& rate, const Vector2<double>&
     if (!map.occupied(slot)) continue;
     const Landmark& landmark = map.at(slot);
     const Vector3<double>& d = landmark.d;
-    const Vector2<double> error = angle_error(time_per_angle * (elevation_of(d) - origin));
+    const Vector2<double> error = angle_error(time_per_angle() * (elevation_of(d) - origin));
     const Vector3<double> right = a_pan.cross(d);
     const Vector3<double> turned = d - error.x() * right - error.y() * right.normalized().cross(d);
     map.refine(slot, turned.normalized(), landmark.covariance);
@@ -952,8 +985,10 @@ void OeMode::State::maintain() {
     straighten_map();
   } else {
     past_count = 0;
-    bend_rate_variance = motion_covariance.diagonal().segment<2>(2);
-    bend_acceleration_variance = motion_covariance.diagonal().tail<2>();
+    bend_tilt = motion.angle.tilt;
+    for (int axis = 0; axis < 2; ++axis) {
+      bend_covariance[static_cast<std::size_t>(axis)] = rate_covariance(motion_covariance, axis);
+    }
   }
   const ViewProjection view(calibration, motion);
   if (statistics.status == OeStatus::kOk) judge_coarse(view);
