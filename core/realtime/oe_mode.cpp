@@ -11,6 +11,7 @@
 #include "core/model/direction.h"
 #include "core/realtime/coarse_alignment.h"
 #include "core/realtime/fast_corners.h"
+#include "core/realtime/image_noise.h"
 #include "core/realtime/orientation_solve.h"
 #include "core/realtime/patch_alignment.h"
 #include "core/realtime/pt_mode.h"
@@ -28,7 +29,8 @@ constexpr int kCoarsePatches = 40;      // of each octave
 constexpr double kLeastCell = 16;       // px
 constexpr int kLeastCornerCell = 8;     // px, of FastGrid
 constexpr int kCornerBorder = 3;        // px, where FastGrid finds nothing
-constexpr double kExpectedNoise = 2;    // grey levels, until landmarks tell
+constexpr double kExpectedNoise = 2;    // grey levels, until a picture tells
+constexpr std::size_t kNoiseSamples = 2048;
 
 // Accelerations to expect, in fields of view per s^2: weak knowledge, for frames with few landmarks.
 constexpr double kAcceleration = 10;
@@ -134,7 +136,7 @@ struct OeMode::State {
   std::vector<FoundLandmark> found;
   std::vector<Matrix2<double>> J_tangent;  // d u / d landmark's tangent coordinates, of found
   std::vector<Matrix2<double>> alignment_covariance;
-  std::vector<float> noises;
+  std::vector<float> noise_samples;
   std::vector<OeObservation> observations;
   std::vector<std::uint8_t> cell_taken;  // of the image, at one octave
   std::vector<FastCorner> corners;
@@ -192,7 +194,7 @@ OeMode::State::State(const OeOptions& o)
   found.resize(used);
   J_tangent.resize(used);
   alignment_covariance.resize(used);
-  noises.resize(used);
+  noise_samples.resize(kNoiseSamples);
   observations.resize(used);
   cell_taken.resize(static_cast<std::size_t>(cells(o.max_width, 0) * cells(o.max_height, 0)));
   int most_corners = 0;
@@ -212,8 +214,8 @@ std::size_t OeMode::State::memory_bytes() const {
   const auto of = [](const auto& v) { return v.size() * sizeof(v[0]); };
   return sizeof(*this) - sizeof(map) + map.memory_bytes() + pyramid.memory_bytes() + of(prepared) +
          of(slots) + of(visible) + of(coarse) + of(coarse_slots) + of(chosen) + of(found) +
-         of(J_tangent) + of(alignment_covariance) + of(noises) + of(observations) + of(cell_taken) +
-         of(corners);
+         of(J_tangent) + of(alignment_covariance) + of(noise_samples) + of(observations) +
+         of(cell_taken) + of(corners);
 }
 
 double OeMode::State::cell_px(int octave) const {
@@ -442,9 +444,6 @@ void OeMode::State::align_fine(const ViewProjection& view) {
     f.covariance = alignment_covariance[at] + J * landmark.covariance * J.transpose();
     f.shared_covariance = landmark.shared_covariance;
     J_tangent[at] = J;
-    // Picture and reference were equally noisy.
-    noises[at] = static_cast<float>(std::ldexp(alignment.noise_sigma, wanted.octave) /
-                                    std::sqrt(1 + alignment.gain * alignment.gain));
     OeObservation& observation = observations[at];
     observation.slot = wanted.slot;
     observation.id = landmark.id;
@@ -628,12 +627,12 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   return finish(OeStatus::kOk);
 }
 
+// Of the picture and not of what alignment leaves over, which motion blur makes larger.
 void OeMode::State::learn_noise() {
-  if (statistics.aligned < 10) return;
-  float* middle = noises.data() + statistics.aligned / 2;
-  std::nth_element(noises.data(), middle, noises.data() + statistics.aligned);
+  const double now =
+      image_noise(image, noise_samples.data(), static_cast<int>(noise_samples.size()));
   constexpr double kMemory = 0.1;
-  noise_sigma += kMemory * (std::clamp<double>(*middle, 0.3, 30) - noise_sigma);
+  noise_sigma += (map.size() == 0 ? 1 : kMemory) * (now - noise_sigma);
 }
 
 void OeMode::State::mark(int slot, bool matched, double residual_square) {
@@ -970,6 +969,7 @@ void OeMode::State::maintain() {
   }
   if (!may_make) return;
   may_make = false;
+  learn_noise();
   if (map.size() == 0) {
     // The map's frame is what telemetry says now.
     motion.angle = {motion.angle.pan + offset.x(), motion.angle.tilt + offset.y()};
@@ -980,7 +980,6 @@ void OeMode::State::maintain() {
   }
   if (statistics.status == OeStatus::kOk) {
     refine_landmarks();
-    learn_noise();
     remember_motion();
     straighten_map();
   } else {

@@ -17,6 +17,7 @@
 #include <cmath>
 
 #include "core/model/linear_algebra.h"
+#include "core/realtime/byte_vector.h"
 #include "core/realtime/image_view.h"
 
 namespace alidade {
@@ -92,24 +93,31 @@ template <class Kernel>
   if (status != SampleStatus::kOk) return status;
   const auto across = Kernel::taps(place.t_u);
   const auto down = Kernel::taps(place.t_v);
-  float sum = 0;
-  float sum_du = 0;
-  float sum_dv = 0;
-  for (int j = 0; j < Kernel::kTaps; ++j) {
-    const std::uint8_t* pixels = image.row(place.row + j) + place.column;
-    float line = 0;
-    float line_du = 0;
-    for (int i = 0; i < Kernel::kTaps; ++i) {
-      const auto pixel = static_cast<float>(pixels[i]);
-      line += across.weight[i] * pixel;
-      line_du += across.slope[i] * pixel;
+  if constexpr (Kernel::kTaps == 4) {
+    FloatVector column{};
+    FloatVector column_dv{};
+    for (int j = 0; j < 4; ++j) {
+      const FloatVector pixels = load_four(image.row(place.row + j) + place.column);
+      column += down.weight[j] * pixels;
+      column_dv += down.slope[j] * pixels;
     }
-    sum += down.weight[j] * line;
-    sum_du += down.weight[j] * line_du;
-    sum_dv += down.slope[j] * line;
+    const FloatVector weight = load_four(across.weight);
+    *value = sum(weight * column);
+    if (gradient != nullptr) {
+      *gradient = {sum(load_four(across.slope) * column), sum(weight * column_dv)};
+    }
+  } else {
+    const std::uint8_t* upper = image.row(place.row) + place.column;
+    const std::uint8_t* lower = image.row(place.row + 1) + place.column;
+    const float line[2] = {across.weight[0] * upper[0] + across.weight[1] * upper[1],
+                           across.weight[0] * lower[0] + across.weight[1] * lower[1]};
+    *value = down.weight[0] * line[0] + down.weight[1] * line[1];
+    if (gradient != nullptr) {
+      *gradient = {down.weight[0] * static_cast<float>(upper[1] - upper[0]) +
+                       down.weight[1] * static_cast<float>(lower[1] - lower[0]),
+                   line[1] - line[0]};
+    }
   }
-  *value = sum;
-  if (gradient != nullptr) *gradient = {sum_du, sum_dv};
   return SampleStatus::kOk;
 }
 
