@@ -282,10 +282,7 @@ void run_oe_robustness(const OeExperimentOptions& options, Report* report, nlohm
     if (disturbance.name.find(options.only) == std::string::npos) continue;
     simulator::Config config = disturbance.config;
     config.telemetry.sigma *= options.telemetry_sigma_px;
-    std::string folder = disturbance.name;
-    std::replace_if(
-        folder.begin(), folder.end(), [](char c) { return std::isalnum(c) == 0; }, '_');
-    const RenderedRecording recording(folder, config, options.cache);
+    const RenderedRecording recording("robustness", config, options.cache);
     EvaluationOptions how;
     how.oe = options.oe;
     how.disturbance = &disturbance;

@@ -18,7 +18,6 @@ int main(int argc, char** argv) {
   bool robustness = false;
   bool small = false;
   std::filesystem::path photo;
-  std::string only;
   std::string json;
   std::pair<int, std::string> picture{-1, ""};
   app.add_option("--cache", options.cache, "keep rendered frames in this folder");

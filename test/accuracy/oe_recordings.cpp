@@ -10,7 +10,6 @@ using simulator::PatchConfig;
 using PathType = simulator::PathConfig::Type;
 
 constexpr double kFocalLength1920 = 32008;  // px
-constexpr double kDegree = 3.14159265358979323846 / 180;
 
 }  // namespace
 
@@ -93,19 +92,21 @@ std::vector<Disturbance> disturbances(const Scene& scene, const RecordingSize& s
   add("brightness halved").config.sensor.brightness_steps = {{from, 0.5}, {to, 1}};
 
   {
-    // A swarm that crosses the view from left to right: 5 x 6 objects of 0.17 fields of view, one every
-    // 0.31, so 30 % of what they cross. It meets the view between the two times.
+    // A swarm that crosses the view from left to right: 10 x 3 objects of 0.17 fields of view, one every
+    // 0.31, so 30 % of what they cross. It fills the view between the two times.
     Disturbance& disturbance = add("30 % moving objects");
+    constexpr int kColumns = 10;
+    constexpr int kRows = 3;
     constexpr double kPitch = 0.31;
     const double rate = 0.9 * field;
-    for (int column = 0; column < 5; ++column) {
-      for (int row = 0; row < 6; ++row) {
+    for (int column = 0; column < kColumns; ++column) {
+      for (int row = 0; row < kRows; ++row) {
         PatchConfig object;
         object.width = object.height = 0.17 * field;
         object.brightness = 0.15 + 0.12 * ((column * 5 + row * 3) % 7);
         object.azimuth_rate = rate;
-        object.azimuth = (column - 2) * kPitch * field - rate * (from + to) / 2;
-        object.elevation = (row - 2.5) * kPitch * field;
+        object.azimuth = (column - (kColumns - 1) / 2.0) * kPitch * field - rate * (from + to) / 2;
+        object.elevation = (row - (kRows - 1) / 2.0) * kPitch * field;
         disturbance.config.scene.moving.push_back(object);
       }
     }
