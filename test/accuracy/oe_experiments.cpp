@@ -185,7 +185,7 @@ void run_oe_accuracy(const OeExperimentOptions& options, Report* report, nlohman
       "frames: independent ones that tell as much of NEES as these correlated ones",
       "delay 0: in map, with the line delay taken as 0; times: that over 'in map'"};
   Table times;
-  times.title = "Time on one core, ms, and memory";
+  times.title = "CPU time, ms, and memory";
   times.header = {"recording", "process p50", "p99", "max", "maintain p50",
                   "p99",       "max",         "map", "MiB"};
   Table octaves;

@@ -8,7 +8,8 @@ namespace alidade::test {
 namespace {
 
 constexpr double kMagnification = 50;
-constexpr int kShift = 4;  // bits of a fraction of a pixel in OpenCV's drawing
+constexpr int kThickness = 2;  // px
+constexpr int kShift = 4;      // bits of a fraction of a pixel in OpenCV's drawing
 
 // OpenCV has the first pixel's centre at (0, 0).
 cv::Point fixed_point(const Eigen::Vector2d& u) {
@@ -25,10 +26,10 @@ cv::Mat draw_landmarks(const cv::Mat& image, const OeMode& oe) {
     const OeObservation& observation = oe.observations()[i];
     const cv::Scalar colour = observation.inlier ? cv::Scalar(0, 220, 0) : cv::Scalar(0, 0, 255);
     const int radius = (kPatchSize / 2) << observation.octave;
-    cv::circle(picture, fixed_point(observation.u), radius << kShift, colour, 1, cv::LINE_AA,
-               kShift);
+    cv::circle(picture, fixed_point(observation.u), radius << kShift, colour, kThickness,
+               cv::LINE_AA, kShift);
     cv::line(picture, fixed_point(observation.u),
-             fixed_point(observation.u + kMagnification * observation.residual), colour, 1,
+             fixed_point(observation.u + kMagnification * observation.residual), colour, kThickness,
              cv::LINE_AA, kShift);
   }
   return picture;
