@@ -24,15 +24,18 @@ std::vector<RecordingPlan> small_plans() {
 class SmallRecording : public testing::TestWithParam<int> {};
 INSTANTIATE_TEST_SUITE_P(Diagonal, SmallRecording, testing::Values(0, 1, 2));
 
-// The bounds are the requirement's own.
-TEST_P(SmallRecording, IsOrientedToATwentiethOfAPixel) {
+// The requirement is for 200 landmarks in 1080 rows. In 270 rows there is room for 20: errors may be
+// sqrt(10) times as large by that alone; twice is allowed.
+constexpr double kSmallErrorBoundPx = 2 * kErrorBoundPx;
+
+TEST_P(SmallRecording, IsOrientedToATenthOfAPixel) {
   const RecordingPlan plan = small_plans()[static_cast<std::size_t>(GetParam())];
   SCOPED_TRACE(plan.name);
   const RenderedRecording recording(plan.name, plan.config);
   const std::vector<cv::Mat> images = recording.images(FrameNoise::kSensorAndJpeg);
   const Evaluation evaluation = evaluate(recording, images, recording.calibration(), {});
   const double in_map = rms(without_common_offset(map_errors_of(evaluation)));
-  EXPECT_LE(in_map, kErrorBoundPx);
+  EXPECT_LE(in_map, kSmallErrorBoundPx);
   EXPECT_LT(rms(errors_of(evaluation)), rms(pt_errors_of(evaluation)));
   const Honesty honesty = honesty_of(frames_between(evaluation, 0, kSmall.duration_s));
   EXPECT_EQ(honesty.frames, recording.size());
