@@ -1,0 +1,174 @@
+// alidade_photo_alignment DIR...: patch alignment between neighbouring photos of a camera that turned in
+// place, against the homography that SIFT finds between them.
+//
+// Neighbours are photos that follow each other by name and overlap: at least kFewest features agree with
+// one homography. FAST corners of the first are looked for in the second from where the homography puts
+// them plus 1 px each way, with the homography's derivative as warp, as OE mode would with a known
+// camera. SIFT's own error (0.1 to 0.3 px) and what lens and parallax keep from being a homography
+// are part of the difference.
+// Exit status: 0 every median is below the bound, 1 some are not, 2 wrong usage or unreadable photos.
+
+#include <CLI/CLI.hpp>
+#include <Eigen/Geometry>
+#include <Eigen/LU>
+#include <algorithm>
+#include <filesystem>
+#include <iostream>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/features2d.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <vector>
+
+#include "core/realtime/fast_corners.h"
+#include "core/realtime/image_noise.h"
+#include "core/realtime/patch_alignment.h"
+
+namespace alidade::test {
+namespace {
+
+constexpr int kFewest = 25;
+constexpr double kBound = 0.3;  // px, of the median
+
+struct Photo {
+  cv::Mat picture;
+  std::vector<cv::KeyPoint> points;
+  cv::Mat descriptors;
+
+  [[nodiscard]] ImageView view() const {
+    return {picture.data, picture.cols, picture.rows, static_cast<std::ptrdiff_t>(picture.step[0])};
+  }
+};
+
+Photo read_photo(const std::filesystem::path& file) {
+  Photo photo;
+  photo.picture = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
+  if (photo.picture.empty()) throw std::runtime_error(file.string() + ": is no picture");
+  cv::SIFT::create()->detectAndCompute(photo.picture, cv::noArray(), photo.points,
+                                       photo.descriptors);
+  return photo;
+}
+
+// In pixels whose centres are at halves; empty where the photos hardly overlap.
+std::vector<Matrix3<double>> homography(const Photo& from, const Photo& to) {
+  if (from.points.size() < kFewest || to.points.size() < kFewest) return {};
+  std::vector<std::vector<cv::DMatch>> matches;
+  cv::BFMatcher().knnMatch(from.descriptors, to.descriptors, matches, 2);
+  std::vector<cv::Point2f> a;
+  std::vector<cv::Point2f> b;
+  for (const auto& pair : matches) {
+    if (pair.size() < 2 || pair[0].distance > 0.75F * pair[1].distance) continue;
+    a.push_back(from.points[static_cast<std::size_t>(pair[0].queryIdx)].pt);
+    b.push_back(to.points[static_cast<std::size_t>(pair[0].trainIdx)].pt);
+  }
+  if (a.size() < kFewest) return {};
+  cv::setRNGSeed(1);
+  cv::Mat inliers;
+  const cv::Mat found = cv::findHomography(a, b, cv::RANSAC, 1, inliers);
+  if (found.empty() || cv::countNonZero(inliers) < kFewest) return {};
+  Matrix3<double> H;
+  for (int i = 0; i < 3; ++i) {
+    for (int j = 0; j < 3; ++j) H(i, j) = found.at<double>(i, j);
+  }
+  Matrix3<double> to_halves = Matrix3<double>::Identity();
+  to_halves.topRightCorner<2, 1>().setConstant(0.5);
+  return {to_halves * H * to_halves.inverse()};
+}
+
+struct Differences {
+  int pairs = 0;
+  int looked_for = 0;
+  std::vector<double> px;  // of those found
+};
+
+void compare(const Photo& from, const Photo& to, Differences* out) {
+  const auto found = homography(from, to);
+  if (found.empty()) return;
+  const Matrix3<double>& H = found[0];
+  ++out->pairs;
+  FastGrid grid(from.picture.cols, from.picture.rows, 12);
+  std::vector<FastCorner> corners(static_cast<std::size_t>(grid.max_cells()));
+  std::vector<float> scratch(2000);
+  const double noise = image_noise(from.view(), scratch.data(), static_cast<int>(scratch.size()));
+  const FastResult result =
+      grid.detect(from.view(), 10, corners.data(), static_cast<int>(corners.size()));
+  for (int i = 0; i < result.count; ++i) {
+    const FastCorner& corner = corners[static_cast<std::size_t>(i)];
+    const Vector2<double> u(corner.u + 0.5, corner.v + 0.5);
+    const Vector3<double> projected = H * u.homogeneous();
+    const Vector2<double> expected = projected.hnormalized();
+    // A patch's width from the border: beyond it the other photo has nothing to show.
+    if (projected.z() <= 0 || expected.minCoeff() < kPatchSize ||
+        expected.x() > to.picture.cols - kPatchSize ||
+        expected.y() > to.picture.rows - kPatchSize) {
+      continue;
+    }
+    const Matrix2<double> J =
+        (H.topLeftCorner<2, 2>() - expected * H.block<1, 2>(2, 0)) / projected.z();
+    ReferencePatch patch;
+    if (prepare(from.view(), u, J.inverse(), 1.5 * noise, &patch) != PrepareStatus::kOk) continue;
+    ++out->looked_for;
+    Alignment alignment;
+    if (align(patch, to.view(), expected + Vector2<double>(1, 1), {}, &alignment) !=
+        AlignmentStatus::kConverged) {
+      continue;
+    }
+    out->px.push_back((alignment.position - expected).norm());
+  }
+}
+
+double quantile(std::vector<double> values, double share) {
+  if (values.empty()) return NAN;
+  const auto at =
+      values.begin() + static_cast<std::ptrdiff_t>(share * static_cast<double>(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+}  // namespace
+}  // namespace alidade::test
+
+int main(int argc, char** argv) {
+  using namespace alidade::test;
+  CLI::App app("Patch alignment between neighbouring photos, against SIFT's homography");
+  std::vector<std::string> directories;
+  app.add_option("DIR", directories, "folders of photos")
+      ->required()
+      ->check(CLI::ExistingDirectory);
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  bool ok = true;
+  try {
+    for (const std::string& directory : directories) {
+      std::vector<std::filesystem::path> files;
+      for (const auto& entry : std::filesystem::directory_iterator(directory)) {
+        if (entry.path().extension() == ".png" || entry.path().extension() == ".jpg") {
+          files.push_back(entry.path());
+        }
+      }
+      std::sort(files.begin(), files.end());
+      Differences differences;
+      std::vector<Photo> photos;
+      for (const auto& file : files) photos.push_back(read_photo(file));
+      for (std::size_t i = 1; i < photos.size(); ++i) {
+        compare(photos[i - 1], photos[i], &differences);
+        compare(photos[i], photos[i - 1], &differences);
+      }
+      const double median = quantile(differences.px, 0.5);
+      std::cout << directory << ": " << photos.size() << " photos, " << differences.pairs
+                << " pairs (either way), " << differences.px.size() << " of "
+                << differences.looked_for << " patches found; from the homography: median "
+                << median << " px, 90 % " << quantile(differences.px, 0.9) << " px\n";
+      if (!(median <= kBound)) {
+        ok = false;
+        std::cout << "MISSED: " << directory << ": bound " << kBound << " px\n";
+      }
+    }
+  } catch (const std::exception& error) {
+    std::cerr << "alidade_photo_alignment: " << error.what() << "\n";
+    return 2;
+  }
+  return ok ? 0 : 1;
+}
