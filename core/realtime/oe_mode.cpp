@@ -590,8 +590,14 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
     contradictions = status == SolveStatus::kContradiction ? contradictions + 1 : 0;
     ++lost;
     if (telemetry == nullptr) return finish(OeStatus::kNoPrediction);
-    return finish(status == SolveStatus::kContradiction ? OeStatus::kContradiction
-                                                        : OeStatus::kTooFew);
+    if (status != SolveStatus::kContradiction) return finish(OeStatus::kTooFew);
+    // One of the two is wrong, and nobody here can tell which: the answer has to cover both.
+    MotionCovariance covering = out->motion_covariance;
+    covering.topLeftCorner<2, 2>() += solved.innovation * solved.innovation.transpose();
+    return finish(make_frame_orientation(calibration, frame_time_s, OrientationMode::kPt, 0,
+                                         out->motion(), covering, out)
+                      ? OeStatus::kContradiction
+                      : OeStatus::kNotFinite);
   }
   finish_observations(solved);
   contradictions = 0;

@@ -11,7 +11,8 @@
 //               cells are empty (PTCEE 36)
 //
 // One estimator for OE and PT: without landmarks the solution is telemetry's, with its covariance. Where
-// landmarks contradict telemetry beyond what both claim, telemetry is believed and the mode is PT.
+// landmarks contradict telemetry beyond what both claim, the answer is telemetry's with a covariance
+// that covers both, and the mode is PT.
 // The map begins empty, in the frame that the first telemetry gave it. Its offset from the base frame
 // (pan, tilt) is estimated from all telemetry since.
 // Fixed memory, taken by the constructor; nothing else allocates, waits or throws. One thread.

@@ -274,10 +274,10 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   out->contradiction = 0;
   if (prior.has_telemetry) {
     const Matrix4<double> telemetry_covariance = scaled.telemetry_information.inverse();
-    const Vector2<double> innovation = scaled.telemetry.head<2>() - x.head<2>();
+    out->innovation = scaled.telemetry.head<2>() - x.head<2>();
     const Matrix2<double> expected = telemetry_covariance.topLeftCorner<2, 2>() + prior_offset +
                                      covariance.topLeftCorner<2, 2>();
-    out->contradiction = innovation.dot(inverse_of(expected) * innovation);
+    out->contradiction = out->innovation.dot(inverse_of(expected) * out->innovation);
     if (!(out->contradiction < limits.max_contradiction)) return SolveStatus::kContradiction;
 
     // The rates were used once already: here again from the beginning, with the angles.

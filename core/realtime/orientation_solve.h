@@ -67,6 +67,7 @@ struct SolvedMotion {
   int inliers = 0;
   double inflation = 1;      // of the landmarks' covariances
   double contradiction = 0;  // chi-square, 2 degrees of freedom, of landmarks against telemetry
+  Vector2<double> innovation = Vector2<double>::Zero();  // rad, telemetry's angles minus landmarks'
 };
 
 struct SolveLimits {
