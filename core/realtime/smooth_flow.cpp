@@ -13,7 +13,10 @@ namespace {
 constexpr double kPriorOfOrder[] = {100, 3, 1, 0.3};
 constexpr double kLeastMotion = 4;  // px
 constexpr int kOrders[] = {0, 1, 1, 2, 2, 2, 3, 3, 3, 3};
-constexpr int kIterations = 6;
+// Order after order, so that what moves by itself at an edge of the image is out before a term could bend
+// towards it.
+constexpr int kOrderOfIteration[] = {1, 1, 2, 2, 3, 3, 3};
+constexpr int kTermsOfOrder[] = {1, 3, 6, 10};
 // The median distance of two normal components, in standard deviations.
 constexpr double kMedianDistance = 1.1774;
 // Where a sample has a quarter of its weight, in standard deviations.
@@ -71,7 +74,8 @@ double SmoothFlow::left_over(const FlowSample* samples, int count) {
 double SmoothFlow::fit(const FlowSample* samples, int count, double sigma) {
   count = std::min(count, static_cast<int>(distances_.size()));
   if (count < 4) return std::numeric_limits<double>::infinity();
-  for (int iteration = 0; iteration < kIterations; ++iteration) {
+  coefficients_.bottomRows<kTerms - kTermsOfOrder[1]>().setZero();
+  for (const int order : kOrderOfIteration) {
     const double scale = std::max(left_over(samples, count), sigma);
     Eigen::Matrix<double, kTerms, kTerms> H = Eigen::Matrix<double, kTerms, kTerms>::Zero();
     Eigen::Matrix<double, kTerms, 2> b = Eigen::Matrix<double, kTerms, 2>::Zero();
@@ -82,6 +86,11 @@ double SmoothFlow::fit(const FlowSample* samples, int count, double sigma) {
       H.noalias() += weight * t * t.transpose();
       b.noalias() += weight * t * samples[i].moved.transpose();
     }
+    // Terms of higher orders stay zero.
+    const int terms_used = kTermsOfOrder[order];
+    H.rightCols(kTerms - terms_used).setZero();
+    H.bottomRows(kTerms - terms_used).setZero();
+    b.bottomRows(kTerms - terms_used).setZero();
     const double motion = coefficients_.row(0).norm() + kLeastMotion;
     for (int i = 0; i < kTerms; ++i) {
       const double prior = scale / (kPriorOfOrder[kOrders[i]] * motion);

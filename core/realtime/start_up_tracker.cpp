@@ -30,6 +30,7 @@ constexpr double kFlowSigma = 0.05;  // px of the octave at hand
 // Of the distance from the smooth motion: of what is left over by all, and of the point's own.
 constexpr double kMaxDeviations = 5;
 constexpr double kMaxOwnDeviations = 4;
+constexpr double kMemory = 0.9;  // of former distances, from frame to frame
 constexpr int kMinBelieved = 4;
 constexpr int kMinMedian = 10;     // values
 constexpr double kSpacing = 0.75;  // of a cell, between an old point and a new one
@@ -282,7 +283,14 @@ void StartUpTracker::align_with_first(const Frame& now) {
     if (!point.is_found) continue;
     const double limit =
         kMaxDeviations * left_over + kMaxOwnDeviations * std::sqrt(0.5 * point.covariance.trace());
-    point.is_found = std::isfinite(left_over) && (point.found - point.predicted).norm() < limit;
+    const Vector2<double> deviation = point.found - point.predicted;
+    point.deviation = kMemory * point.deviation + deviation;
+    point.is_found = std::isfinite(left_over) && deviation.norm() < limit;
+    // Something that goes its own way, slowly.
+    if (!(point.deviation.norm() < 2 * limit)) {
+      point.is_found = false;
+      point.misses = kMaxMisses;
+    }
     statistics_.believed += point.is_found;
   }
 }
@@ -360,6 +368,7 @@ void StartUpTracker::begin_points(const Frame& now) {
       point.misses = 0;
       point.u = u;
       point.J_now_first.setIdentity();
+      point.deviation.setZero();
       for (int row = 0; row < kReferencePixels; ++row) {
         std::memcpy(point.pixels.data() + row * kReferencePixels,
                     image.row(corner.v - kHalf + row) + corner.u - kHalf, kReferencePixels);

@@ -92,6 +92,7 @@ class StartUpTracker {
     Matrix2<double> J_now_first;  // d(px now) / d(px in the frame where it was found)
     Vector2<double> predicted;    // px, in this frame
     Vector2<double> found;        // px, in this frame, if is_found
+    Vector2<double> deviation;    // px, from the smooth motion: a sum that forgets
     Matrix2<double> covariance;
     float noise;  // grey levels, of a pixel of this frame
     bool is_found;

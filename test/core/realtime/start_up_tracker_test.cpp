@@ -209,20 +209,55 @@ Run track(const sim::Config& config, const std::function<sim::Angles(double)>& a
   return run;
 }
 
+
 TEST(StartUpTracker, Explore) {
-  for (const double field : {3.0, 20.0, 60.0}) {
-    for (const double line_delay : {-40e-6, 0.0, 70e-6}) {
-      sim::Config config = camera(field, 0.07);
-      config.camera.line_delay = line_delay;
-      std::printf("field %g line delay %g\n", field, line_delay);
-      track(config, swing(field), 60);
-    }
+  {
+    sim::Config config = camera(60, 0.07);
+    sim::PatchConfig object;
+    object.file = config.scene.photos[0].file;
+    std::printf("moving 30 percent\n");
+    object.width = 18 * kDegree; object.height = 17 * kDegree;
+    for (double a : {-16.0, 14.0}) { object.azimuth = a * kDegree; object.azimuth_rate = 10 * kDegree; object.elevation = 0.2*a*kDegree;
+    object.brightness = 0.3; config.scene.moving.push_back(object); }
+    track(config, swing(60, 0.3), 40);
   }
-  for (const double noise : {0.0, 2.0, 5.0}) {
-    sim::Config config = camera(60, -0.07);
-    config.sensor.read_noise = noise;
-    std::printf("noise %g\n", noise);
-    track(config, swing(60), 60);
+  {
+    sim::Config config = camera(60, 0.07);
+    std::printf("rests, object slow\n");
+    sim::PatchConfig object;
+    object.width = 20 * kDegree; object.height = 17 * kDegree;
+    object.file = config.scene.photos[0].file;
+    object.azimuth_rate = 1 * kDegree;
+    config.scene.moving.push_back(object);
+    track(config, [](double) { return sim::Angles{0.1, 0.1}; }, 30);
+  }
+  {
+    sim::Config config = camera(60, 0.07);
+    std::printf("3 fields a second\n");
+    track(config, swing(60, 3), 40);
+  }
+  {
+    sim::Config config = camera(100, 0.0);
+    std::printf("100 degrees\n");
+    config.scene.photos.clear();
+    track(config, swing(60, 1), 40);
+  }
+  {
+    sim::Config config = camera(60, 0.07);
+    config.scene.photos.clear();
+    std::printf("60 degrees, tilt -70\n");
+    const auto s = swing(60, 3);
+    track(config, [s](double t) { auto a = s(t); a.tilt = 0.2*a.tilt -70 * kDegree; return a; }, 40);
+  }
+  {
+    sim::Config config = camera(20, 0.07);
+    std::printf("brightness step, cover\n");
+    config.sensor.brightness_steps.push_back({0.39, 0.5});
+    config.sensor.covered.push_back({0.79, 0.83});
+    config.sensor.covered.push_back({1.19, 1.43});
+    const auto run = track(config, swing(20, 1), 45);
+    for (auto& s : run.statistics) std::printf("%d:%d/%d/%d+%d-%d(%.1f) ", static_cast<int>(s.status), s.looked_for, s.found, s.believed, s.begun, s.ended, s.noise);
+    std::printf("\n");
   }
 }
 
