@@ -20,7 +20,7 @@ constexpr int kTermsOfOrder[] = {1, 3, 6, 10};
 // The median distance of two normal components, in standard deviations.
 constexpr double kMedianDistance = 1.1774;
 // Where a sample has a quarter of its weight, in standard deviations.
-constexpr double kCutOff = 3;
+constexpr double kCutOff = 2;
 
 }  // namespace
 

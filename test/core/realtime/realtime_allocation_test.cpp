@@ -5,12 +5,14 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <vector>
 
 #include "core/realtime/fast_corners.h"
 #include "core/realtime/landmark_map.h"
 #include "core/realtime/patch_alignment.h"
 #include "core/realtime/pt_mode.h"
 #include "core/realtime/pyramid.h"
+#include "core/realtime/start_up_tracker.h"
 #include "test/core/realtime/analytic_image.h"
 #include "test/support/allocation_guard.h"
 
@@ -106,6 +108,33 @@ TEST(RealtimeAllocation, LandmarkMapAllocatesNothing) {
   EXPECT_EQ(guard.count(), 0);
   EXPECT_GT(map.replaced(), 100);
   EXPECT_GT(found, 2000);
+}
+
+// A picture that moves, a lost one now and then, and one of nothing.
+TEST(RealtimeAllocation, TrackingFromTheStartAllocatesNothing) {
+  std::mt19937_64 random(1);
+  const AnalyticImage texture(&random, 10);
+  std::vector<Pixels> pictures;
+  for (int i = 0; i < 8; ++i) {
+    const Vector2<double> shift(3.2 * i, 1.7 * (i % 3));
+    pictures.push_back(make_pixels(
+        320, 200, [&](const Vector2<double>& at) { return texture(at + shift); }, 2, &random));
+  }
+  const Pixels blank = make_pixels(
+      320, 200, [](const Vector2<double>&) { return 50.0; }, 0, &random);
+  StartUpTracker tracker({320, 200});
+  int observations = 0;
+  int lost = 0;
+  const AllocationGuard guard;
+  for (std::size_t i = 0; i < 200; ++i) {
+    const bool is_blank = i % 20 == 7 || i % 50 > 47;
+    const StartUpStatus status = tracker.process(is_blank ? blank.view : pictures[i % 8].view);
+    observations += tracker.observation_count();
+    lost += status == StartUpStatus::kLost;
+  }
+  EXPECT_EQ(guard.count(), 0);
+  EXPECT_GT(observations, 5000);
+  EXPECT_GT(lost, 5);
 }
 
 }  // namespace
