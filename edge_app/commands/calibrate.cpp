@@ -1,6 +1,6 @@
-// `alidade calibrate`: from the tracks and the telemetry of a recording to its calibration, its landmarks
-// and a report; `--compare`: many recordings against what is known of them. A calibration that is not
-// good enough is not written, so that it cannot replace one that is.
+// `alidade calibrate`: from the tracks or the video, and the telemetry, of a recording to its calibration,
+// its landmarks and a report; `--compare`: many recordings against what is known of them. A calibration
+// that is not good enough is not written, so that it cannot replace one that is.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -19,6 +19,7 @@
 #include "edge_app/commands/calibration_input.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
+#include "edge_app/commands/video_tracks.h"
 #include "edge_app/output/calibration_report.h"
 #include "edge_app/output/calibration_summary.h"
 
@@ -32,6 +33,7 @@ struct CalibrateOptions {
   std::string directory;  // empty: <recording>/alidade
   bool compare = false;
   bool json = false;
+  int passes = 2;  // of finding tracks in the video
   // VALUE or VALUE,SIGMA; "free"; empty: as the estimator has it.
   std::string focal_length;
   std::string aspect;
@@ -88,20 +90,107 @@ CalibrationJob load_job(const std::string& recording, const CalibrateOptions& op
   return job;
 }
 
-// The first SIGINT or SIGTERM cancels at the next step; the second ends the process as usual.
-CalibrationResult calibrate_visibly(const std::string& name, CalibrationJob* job,
-                                    StopSignals* signals) {
-  const bool show = is_terminal(STDERR_FILENO);
-  job->options.progress = [&](double done, const char* what) {
-    if (show) fmt::print(stderr, "\r\033[K{}: {:3.0f} % {}", name, 100 * done, what);
-    return signals->wait(-1, 0) != StopSignals::Event::kSignal;
+// What is done on a terminal; the first SIGINT or SIGTERM cancels at the next step, the second ends the process
+// as usual.
+class VisibleProgress {
+ public:
+  VisibleProgress(const std::string& name, StopSignals* signals) : name_(name), signals_(signals) {}
+  VisibleProgress(const VisibleProgress&) = delete;
+  VisibleProgress& operator=(const VisibleProgress&) = delete;
+  ~VisibleProgress() {
+    if (show_) fmt::print(stderr, "\r\033[K");
+  }
+
+  // What show() is told from now on is the part of the whole from `begin` to `end`.
+  void set_part(double begin, double end) {
+    begin_ = begin;
+    end_ = end;
+  }
+  // False: cancelled.
+  bool show(double done, const char* what) {
+    const double percent = 100 * (begin_ + done * (end_ - begin_));
+    if (show_) fmt::print(stderr, "\r\033[K{}: {:3.0f} % {}", name_, percent, what);
+    return signals_->wait(-1, 0) != StopSignals::Event::kSignal;
+  }
+  [[nodiscard]] CommandError cancelled() const {
+    return {kExitFailed, name_ + ": calibration interrupted; nothing stored"};
+  }
+
+ private:
+  const std::string& name_;
+  StopSignals* signals_;
+  bool show_ = is_terminal(STDERR_FILENO);
+  double begin_ = 0;
+  double end_ = 1;
+};
+
+CalibrationResult calibrate_visibly(CalibrationJob* job, VisibleProgress* progress) {
+  job->options.progress = [progress](double done, const char* what) {
+    return progress->show(done, what);
   };
   CalibrationResult result = calibrate(job->input, job->options);
-  if (show) fmt::print(stderr, "\r\033[K");
-  if (result.status == CalibrationStatus::kCancelled) {
-    throw CommandError(kExitFailed, name + ": calibration interrupted; nothing stored");
-  }
+  if (result.status == CalibrationStatus::kCancelled) throw progress->cancelled();
   return result;
+}
+
+// Finds tracks, without or with a first estimate, and calibrates with them.
+CalibrationResult calibrate_video(const std::string& recording, const CalibrationResult* estimate,
+                                  CalibrationJob* job, std::vector<std::string>* remarks,
+                                  VisibleProgress* progress) {
+  const VideoProgress look = [progress, estimate](double done) {
+    const char* what = estimate == nullptr ? "following points in the video"
+                                           : "following points again, with the estimated camera";
+    // Looking at the video takes nearly all of the time; the rest is shown by the last tenth.
+    if (!progress->show(0.9 * done, what)) throw progress->cancelled();
+  };
+  VideoTracks tracks = estimate == nullptr ? track_video(recording, job->input, look)
+                                           : track_video(recording, job->input, *estimate, look);
+  *remarks = std::move(tracks.remarks);
+  job->input.observations = choose_tracks(tracks.observations);
+  return calibrate_visibly(job, progress);
+}
+
+CalibrationResult calibrate_job(const std::string& recording, int passes, CalibrationJob* job,
+                                StopSignals* signals) {
+  VisibleProgress progress(recording, signals);
+  if (!job->tracks_from_video) return calibrate_visibly(job, &progress);
+  std::vector<std::string> remarks;
+  progress.set_part(0, passes > 1 ? 0.5 : 1);
+  CalibrationResult first = calibrate_video(recording, nullptr, job, &remarks, &progress);
+  if (job->input.observations.empty()) {
+    throw CommandError(
+        kExitFailed,
+        fmt::format(
+            "{}: no point of the video could be followed through {} frames; film a far scene "
+            "with texture, lit and in focus, that stays in view for that long",
+            recording, kMinSightings));
+  }
+  const bool usable = first.ok() || first.status == CalibrationStatus::kWeak;
+  if (passes > 1 && usable) {
+    const std::vector<CalibrationObservation> first_tracks = job->input.observations;
+    progress.set_part(0.5, 1);
+    CalibrationResult second = calibrate_video(recording, &first, job, &remarks, &progress);
+    if (second.ok() || !first.ok()) {
+      first = std::move(second);
+    } else {
+      job->input.observations = first_tracks;
+      remarks.push_back(fmt::format(
+          "the second look at the video led to no calibration ({}: {}); this is the first one's",
+          to_string(second.status), second.message));
+    }
+  }
+  job->remarks.insert(job->remarks.end(), remarks.begin(), remarks.end());
+  return first;
+}
+
+// The format of a recording's tracks.csv.
+std::string tracks_text(const std::vector<CalibrationObservation>& observations) {
+  std::string text = "frame,landmark,u_px,v_px,sigma_px\n";
+  for (const CalibrationObservation& seen : observations) {
+    text += fmt::format("{},{},{:.4f},{:.4f},{:.4f}\n", seen.frame, seen.landmark, seen.u_px,
+                        seen.v_px, seen.sigma_px);
+  }
+  return text;
 }
 
 class OutputDirectory {
@@ -139,8 +228,8 @@ int calibrate_recording(const CalibrateOptions& options) {
   const std::string& recording = options.recordings.front();
   StopSignals signals;
   CalibrationJob job = load_job(recording, options);
+  const CalibrationResult result = calibrate_job(recording, options.passes, &job, &signals);
   for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", recording, remark);
-  const CalibrationResult result = calibrate_visibly(recording, &job, &signals);
   // Without a solution there is nothing to draw.
   if (result.frames.empty()) {
     for (const std::string& line : result.exclusions.describe()) {
@@ -155,6 +244,11 @@ int calibrate_recording(const CalibrateOptions& options) {
     return write_file_atomically(
         path, calibration_report({recording, job.input, job.options, result, job.remarks}), error);
   });
+  if (job.tracks_from_video) {
+    directory.add("tracks", "tracks.csv", [&](const std::string& path, std::string* error) {
+      return write_file_atomically(path, tracks_text(job.input.observations), error);
+    });
+  }
   if (result.ok()) {
     directory.add("landmarks", "map.bin", [&](const std::string& path, std::string* error) {
       return save_landmarks(path, result.landmarks, result.calibration, error);
@@ -186,7 +280,7 @@ int compare_recordings(const CalibrateOptions& options) {
     try {
       CalibrationJob job = load_job(recording, options);
       const ComparedRun known = load_known_values(recording);
-      const CalibrationResult result = calibrate_visibly(recording, &job, &signals);
+      const CalibrationResult result = calibrate_job(recording, options.passes, &job, &signals);
       if (!result.ok()) {
         throw CommandError(kExitFailed, fmt::format("{}: {}: {}", recording,
                                                     to_string(result.status), result.message));
@@ -219,10 +313,10 @@ int run_calibrate(const CalibrateOptions& options) {
 
 void register_calibrate(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<CalibrateOptions>();
-  CLI::App* command = app.add_subcommand(
-      "calibrate",
-      "Calibrate from a recording's tracks and telemetry; writes calibration.yaml, "
-      "map.bin and report.html");
+  CLI::App* command =
+      app.add_subcommand("calibrate",
+                         "Calibrate from a recording's video (or tracks.csv) and telemetry; writes "
+                         "calibration.yaml, map.bin and report.html");
   command
       ->add_option("recording", options->recordings,
                    "Directory of the recording (--compare: of each)")
@@ -232,6 +326,12 @@ void register_calibrate(CLI::App& app, int* exit_code) {
   command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
   command->add_flag("--compare", options->compare,
                     "Many recordings: estimate, truth.yaml and peer.yaml side by side, statistics");
+  command
+      ->add_option(
+          "--passes", options->passes,
+          "Video without tracks.csv: look once (1), or again with the estimated camera (2)")
+      ->check(CLI::Range(1, 2))
+      ->capture_default_str();
   const char* group = "What is known beforehand: VALUE (exact), VALUE,SIGMA, or free";
   const auto add_prior = [&](const char* name, std::string* text, const char* help) {
     command->add_option(name, *text, help)->group(group)->type_name("PRIOR");

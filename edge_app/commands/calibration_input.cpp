@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/video_tracks.h"
 #include "edge_app/config/noise_file.h"
 #include "platform/recording/recording.h"
 
@@ -153,11 +154,14 @@ CalibrationJob load_calibration_job(const std::string& directory) {
   require(read_recording_info(directory, &info, &error), error);
   require_file("frames.csv", "a calibration needs the time of each frame");
   require_file("telemetry.csv", "a calibration needs what the head reported");
-  require_file("tracks.csv",
-               "a calibration needs keypoint tracks (frame,landmark,u_px,v_px,sigma_px); this "
-               "version does not find them in the video itself");
 
   CalibrationJob job;
+  job.tracks_from_video = !fs::exists(fs::path(directory) / "tracks.csv") && has_video(directory);
+  if (!job.tracks_from_video) {
+    require_file("tracks.csv",
+                 "a calibration needs keypoint tracks (frame,landmark,u_px,v_px,sigma_px), or the "
+                 "video (video.mkv or frames/) to find them in");
+  }
   job.input.width = info.width;
   job.input.height = info.height;
   RecordingNoise noise;
@@ -175,6 +179,7 @@ CalibrationJob load_calibration_job(const std::string& directory) {
   std::vector<PanTiltSample> telemetry;
   require(read_telemetry_csv(directory, &telemetry, &error), error);
   add_telemetry(std::move(telemetry), &job);
+  if (job.tracks_from_video) return job;
   std::vector<TrackPoint> tracks;
   require(read_tracks_csv(directory, &tracks, &error), error);
   check_size(directory, info, tracks);

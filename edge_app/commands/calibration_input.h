@@ -1,5 +1,5 @@
 #pragma once
-// From a recording's files to what calibrate() takes.
+// From a recording's files to what calibrate() takes. Without tracks.csv its video must hold them.
 //   clocks  Frames are counted by their sequence numbers, else by sender times that lie on a steady grid,
 //           else by their stamps. Telemetry likewise (sequence, device time); samples that were polled have
 //           no clock of their own, and were true in the middle of [earliest_time_s, receive_time_s].
@@ -19,6 +19,7 @@ struct CalibrationJob {
   CalibrationInput input;
   CalibrationOptions options;
   CalibrationValues guess;
+  bool tracks_from_video = false;    // input.observations are still to be found in the video
   std::vector<std::string> remarks;  // about the recording, for the report
 };
 

@@ -1,0 +1,183 @@
+#include "edge_app/commands/video_tracks.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+#include <unordered_map>
+#include <unordered_set>
+
+#include "core/realtime/oe_mode.h"
+#include "core/realtime/start_up_tracker.h"
+#include "edge_app/commands/command.h"
+#include "platform/video/recording_frame_source.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+// use(frame, luma) for each picture of the input's frames, in the order of the recording.
+template <class Use>
+void for_each_picture(const std::string& directory, const CalibrationInput& input,
+                      const VideoProgress& progress, std::vector<std::string>* remarks, Use use) {
+  std::unordered_set<std::int64_t> wanted;
+  for (const CalibrationFrame& frame : input.frames) wanted.insert(frame.frame);
+  RecordingFrameSource video({directory, true, false});
+  std::size_t done = 0;
+  for (;;) {
+    Frame frame;
+    const ReadStatus status = video.read(frame, std::numeric_limits<double>::infinity());
+    if (status == ReadStatus::kEnd) break;
+    if (status != ReadStatus::kOk) throw CommandError(kExitFailed, video.error());
+    if (wanted.count(frame.stamp.frame) == 0) continue;
+    use(frame.stamp.frame, ImageView{frame.luma, frame.width, frame.height, frame.stride});
+    progress(static_cast<double>(++done) / static_cast<double>(wanted.size()));
+  }
+  if (done == 0)
+    throw CommandError(kExitFailed, directory + ": no picture of its video can be read");
+  if (video.damaged_frames() > 0) {
+    remarks->push_back(
+        fmt::format("video: {} pictures could not be decoded", video.damaged_frames()));
+  }
+  if (video.missing_frames() > 0) {
+    remarks->push_back(
+        fmt::format("video: ends {} frames before frames.csv does", video.missing_frames()));
+  }
+}
+
+// What the trajectory says of a time, in the units of telemetry. It stands for measurements that OE mode
+// weighs against what it sees, so it claims no more than it must to predict the picture.
+InterpolatedPanTilt predict(const CalibrationResult& estimate, double time_s) {
+  constexpr double kSigmaPx = 1;       // of the angle
+  constexpr double kSigmaPxPerS = 20;  // of the rate
+  constexpr double kHalfSpan = 0.02;   // s, over which the acceleration is taken
+  constexpr double kRenewal = 0.5;     // s, about a segment of the trajectory
+  const TrajectorySpline& trajectory = estimate.trajectory;
+  const Mechanics<double>& mechanics = estimate.calibration.mechanics;
+  const Vector2<double> scale(mechanics.pan_scale, mechanics.tilt_scale);
+  const double per_px = 1 / estimate.calibration.camera.focal_length;
+  const PanTilt<double> angle = trajectory.position(time_s);
+  const PanTilt<double> rate = trajectory.rate(time_s);
+  const PanTilt<double> before = trajectory.rate(time_s - kHalfSpan);
+  const PanTilt<double> after = trajectory.rate(time_s + kHalfSpan);
+  InterpolatedPanTilt result;
+  result.angle = {wrap_angle(scale.x() * angle.pan), wrap_angle(scale.y() * angle.tilt)};
+  result.rate = {scale.x() * rate.pan, scale.y() * rate.tilt};
+  const double of_angle = kSigmaPx * per_px;
+  const double of_rate = kSigmaPxPerS * per_px;
+  result.covariance.diagonal() << of_angle * of_angle, of_angle * of_angle, of_rate * of_rate,
+      of_rate * of_rate;
+  const Vector2<double> acceleration(scale.x() * (after.pan - before.pan) / (2 * kHalfSpan),
+                                     scale.y() * (after.tilt - before.tilt) / (2 * kHalfSpan));
+  result.acceleration_square =
+      acceleration.cwiseAbs2().array() + of_rate * of_rate / (kRenewal * kRenewal);
+  result.samples = kInterpolationWindow;
+  result.renewal_s = kRenewal;
+  return result;
+}
+
+}  // namespace
+
+bool has_video(const std::string& directory) {
+  return fs::exists(fs::path(directory) / "video.mkv") ||
+         fs::is_directory(fs::path(directory) / "frames");
+}
+
+VideoTracks track_video(const std::string& directory, const CalibrationInput& input,
+                        const VideoProgress& progress) {
+  StartUpOptions options;
+  options.width = input.width;
+  options.height = input.height;
+  StartUpTracker tracker(options);
+  VideoTracks tracks;
+  for_each_picture(
+      directory, input, progress, &tracks.remarks, [&](std::int64_t frame, const ImageView& image) {
+        if (tracker.process(image) == StartUpStatus::kBadImage) {
+          throw CommandError(
+              kExitFailed, fmt::format("{}: pictures of {}x{} px are too small to follow points in",
+                                       directory, image.width, image.height));
+        }
+        for (int i = 0; i < tracker.observation_count(); ++i) {
+          const TrackObservation& seen = tracker.observations()[i];
+          tracks.observations.push_back({frame, seen.landmark, seen.u.x(), seen.u.y(), seen.sigma});
+        }
+      });
+  return tracks;
+}
+
+VideoTracks track_video(const std::string& directory, const CalibrationInput& input,
+                        const CalibrationResult& estimate, const VideoProgress& progress) {
+  std::unordered_map<std::int64_t, double> times;
+  for (const FrameResult& frame : estimate.frames) times[frame.frame] = frame.time_s;
+  OeOptions options;
+  options.max_width = input.width;
+  options.max_height = input.height;
+  OeMode mode(options);
+  mode.reset(estimate.calibration);
+  const double to_middle_s = estimate.calibration.line_delay * input.height / 2;
+  VideoTracks tracks;
+  for_each_picture(
+      directory, input, progress, &tracks.remarks, [&](std::int64_t frame, const ImageView& image) {
+        const auto time = times.find(frame);
+        if (time == times.end()) return;  // no telemetry accompanies it
+        const InterpolatedPanTilt prediction = predict(estimate, time->second + to_middle_s);
+        FrameOrientation orientation;
+        const OeStatus status = mode.process(image, time->second, &prediction, &orientation);
+        for (int i = 0; status == OeStatus::kOk && i < mode.statistics().aligned; ++i) {
+          const OeObservation& seen = mode.observations()[i];
+          if (!seen.inlier) continue;
+          tracks.observations.push_back(
+              {frame, seen.id, seen.u.x(), seen.u.y(), std::sqrt(0.5 * seen.covariance.trace())});
+        }
+        mode.maintain();
+      });
+  return tracks;
+}
+
+std::vector<CalibrationObservation> choose_tracks(
+    const std::vector<CalibrationObservation>& observations, std::size_t max_observations) {
+  struct Track {
+    std::int64_t landmark = 0;
+    std::size_t count = 0;
+    double left = std::numeric_limits<double>::infinity();
+    double top = std::numeric_limits<double>::infinity();
+    double right = -std::numeric_limits<double>::infinity();
+    double bottom = -std::numeric_limits<double>::infinity();
+    [[nodiscard]] double extent() const { return std::hypot(right - left, bottom - top); }
+  };
+  std::unordered_map<std::int64_t, Track> all;
+  for (const CalibrationObservation& seen : observations) {
+    Track& track = all[seen.landmark];
+    track.landmark = seen.landmark;
+    ++track.count;
+    track.left = std::min(track.left, seen.u_px);
+    track.right = std::max(track.right, seen.u_px);
+    track.top = std::min(track.top, seen.v_px);
+    track.bottom = std::max(track.bottom, seen.v_px);
+  }
+  std::vector<Track> tracks;
+  for (const auto& [landmark, track] : all) {
+    if (track.count >= kMinSightings) tracks.push_back(track);
+  }
+  // The second criterion makes the choice the same each time.
+  std::sort(tracks.begin(), tracks.end(), [](const Track& a, const Track& b) {
+    return a.extent() != b.extent() ? a.extent() > b.extent() : a.landmark < b.landmark;
+  });
+  std::unordered_set<std::int64_t> chosen;
+  std::size_t count = 0;
+  for (const Track& track : tracks) {
+    count += track.count;
+    if (count > max_observations) break;
+    chosen.insert(track.landmark);
+  }
+  std::vector<CalibrationObservation> result;
+  for (const CalibrationObservation& seen : observations) {
+    if (chosen.count(seen.landmark) != 0) result.push_back(seen);
+  }
+  return result;
+}
+
+}  // namespace alidade

@@ -1,0 +1,45 @@
+#pragma once
+// Keypoint tracks for a calibration, found in a recording's video.
+//   first pass   nothing is known of the camera: StartUpTracker
+//   second pass  with the camera, the clocks and the trajectory of a first calibration: OeMode, whose map
+//                recognises what the camera comes back to, so that tracks span the whole recording
+// Pixels as in CONVENTIONS.md; sigma_px is that of a component, sqrt(trace of covariance / 2), of what
+// differs between the observations of one landmark.
+// Reads the whole video; throws CommandError (no or unreadable pictures, or of another size than
+// recording.yaml says). Runs on the caller's thread.
+
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+
+namespace alidade {
+
+struct VideoTracks {
+  std::vector<CalibrationObservation> observations;
+  std::vector<std::string> remarks;  // about the video, for the report
+};
+
+// Called for each frame with the part of the video that is done, 0 to 1.
+using VideoProgress = std::function<void(double done)>;
+
+// video.mkv or frames/.
+[[nodiscard]] bool has_video(const std::string& directory);
+
+// Of the input's frames; its observations are not looked at.
+[[nodiscard]] VideoTracks track_video(const std::string& directory, const CalibrationInput& input,
+                                      const VideoProgress& progress);
+[[nodiscard]] VideoTracks track_video(const std::string& directory, const CalibrationInput& input,
+                                      const CalibrationResult& estimate,
+                                      const VideoProgress& progress);
+
+// Leaves what an adjustment can use in reasonable time: landmarks seen kMinSightings times or more, and of
+// these, if there are more than max_observations, those that moved farthest through the image.
+inline constexpr int kMinSightings = 5;
+inline constexpr std::size_t kMaxObservations = 30000;
+[[nodiscard]] std::vector<CalibrationObservation> choose_tracks(
+    const std::vector<CalibrationObservation>& observations,
+    std::size_t max_observations = kMaxObservations);
+
+}  // namespace alidade
