@@ -10,6 +10,7 @@
 #include <unordered_set>
 
 #include "core/realtime/oe_mode.h"
+#include "core/realtime/patch_alignment.h"
 #include "core/realtime/start_up_tracker.h"
 #include "edge_app/commands/command.h"
 #include "platform/video/recording_frame_source.h"
@@ -18,6 +19,8 @@ namespace alidade {
 namespace {
 
 namespace fs = std::filesystem;
+
+constexpr int kPoints = 250;  // in a frame
 
 // use(frame, luma) for each picture of the input's frames, in the order of the recording.
 template <class Use>
@@ -91,6 +94,7 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
   StartUpOptions options;
   options.width = input.width;
   options.height = input.height;
+  options.max_points = kPoints;
   StartUpTracker tracker(options);
   VideoTracks tracks;
   for_each_picture(
@@ -115,6 +119,8 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
   OeOptions options;
   options.max_width = input.width;
   options.max_height = input.height;
+  options.max_used = kPoints;
+  options.cell_size_px = std::sqrt(static_cast<double>(input.width) * input.height / kPoints);
   OeMode mode(options);
   mode.reset(estimate.calibration);
   const double to_middle_s = estimate.calibration.line_delay * input.height / 2;
@@ -128,9 +134,11 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
         const OeStatus status = mode.process(image, time->second, &prediction, &orientation);
         for (int i = 0; status == OeStatus::kOk && i < mode.statistics().aligned; ++i) {
           const OeObservation& seen = mode.observations()[i];
-          if (!seen.inlier) continue;
+          // One sigma for both components cannot tell of an edge, which leaves one of them open.
+          const bool edge = seen.covariance.trace() >= kUnobservedVariance;
+          if (!seen.inlier || edge) continue;
           tracks.observations.push_back(
-              {frame, seen.id, seen.u.x(), seen.u.y(), std::sqrt(0.5 * seen.covariance.trace())});
+              {frame, seen.id, seen.u.x(), seen.u.y(), std::sqrt(0.25 * seen.covariance.trace())});
         }
         mode.maintain();
       });
