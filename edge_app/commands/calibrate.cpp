@@ -28,6 +28,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+constexpr double kShareOfLooking = 0.9;  // of the time that tracks and adjustment take
+
 struct CalibrateOptions {
   std::vector<std::string> recordings;
   std::string directory;  // empty: <recording>/alidade
@@ -124,9 +126,10 @@ class VisibleProgress {
   double end_ = 1;
 };
 
-CalibrationResult calibrate_visibly(CalibrationJob* job, VisibleProgress* progress) {
-  job->options.progress = [progress](double done, const char* what) {
-    return progress->show(done, what);
+// `begin` of the part is done already.
+CalibrationResult calibrate_visibly(CalibrationJob* job, double begin, VisibleProgress* progress) {
+  job->options.progress = [begin, progress](double done, const char* what) {
+    return progress->show(begin + (1 - begin) * done, what);
   };
   CalibrationResult result = calibrate(job->input, job->options);
   if (result.status == CalibrationStatus::kCancelled) throw progress->cancelled();
@@ -140,20 +143,20 @@ CalibrationResult calibrate_video(const std::string& recording, const Calibratio
   const VideoProgress look = [progress, estimate](double done) {
     const char* what = estimate == nullptr ? "following points in the video"
                                            : "following points again, with the estimated camera";
-    // Looking at the video takes nearly all of the time; the rest is shown by the last tenth.
-    if (!progress->show(0.9 * done, what)) throw progress->cancelled();
+    // Looking at the video takes nearly all of the time.
+    if (!progress->show(kShareOfLooking * done, what)) throw progress->cancelled();
   };
   VideoTracks tracks = estimate == nullptr ? track_video(recording, job->input, look)
                                            : track_video(recording, job->input, *estimate, look);
   *remarks = std::move(tracks.remarks);
   job->input.observations = choose_tracks(tracks.observations);
-  return calibrate_visibly(job, progress);
+  return calibrate_visibly(job, kShareOfLooking, progress);
 }
 
 CalibrationResult calibrate_job(const std::string& recording, int passes, CalibrationJob* job,
                                 StopSignals* signals) {
   VisibleProgress progress(recording, signals);
-  if (!job->tracks_from_video) return calibrate_visibly(job, &progress);
+  if (!job->tracks_from_video) return calibrate_visibly(job, 0, &progress);
   std::vector<std::string> remarks;
   progress.set_part(0, passes > 1 ? 0.5 : 1);
   CalibrationResult first = calibrate_video(recording, nullptr, job, &remarks, &progress);

@@ -164,8 +164,9 @@ TEST_F(CalibrateVideo, StoresTheTracksItUsed) {
   EXPECT_FALSE(fs::exists(from_tracks + "/tracks.csv"));
 }
 
-TEST_F(CalibrateVideo, CompareTakesVideoToo) {
-  const Result result = calibrate_command({"--compare", "--passes", "1", recording()});
+TEST_F(CalibrateVideo, CompareTakesPicturesToo) {
+  film(directory_, camera(std::string(kTexture) + "recording: {images: pgm}\n"), "pictures");
+  const Result result = calibrate_command({"--compare", "--passes", "1", path("pictures")});
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("1 recordings: 1 calibrated, 0 failed"));
 }
