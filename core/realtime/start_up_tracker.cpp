@@ -7,6 +7,7 @@
 #include <cstring>
 #include <limits>
 
+#include "core/realtime/image_noise.h"
 #include "core/realtime/patch_alignment.h"
 
 namespace alidade {
@@ -47,34 +48,6 @@ int octaves_for(int width, int height) {
 int cell_size_for(const StartUpOptions& options) {
   const double area = static_cast<double>(options.width) * options.height;
   return std::max(16, static_cast<int>(std::sqrt(area / std::max(options.max_points, 1))));
-}
-
-// Standard deviation of white noise, from the second differences of the smoothest quarter of a sample
-// of pixels (Immerkaer 1996, made robust). Where all is textured it is too large.
-double noise_of(const ImageView& image, std::vector<float>* scratch) {
-  constexpr double kQuarter = 0.3186;  // |N(0, 1)| is below it with probability 1/4
-  constexpr double kGain = 6;          // of the mask, for white noise
-  constexpr double kRounding = 0.29;
-  const auto room = scratch->size();
-  const double area = static_cast<double>(image.width) * image.height;
-  const int step =
-      std::max(1, static_cast<int>(std::ceil(std::sqrt(area / static_cast<double>(room)))));
-  std::size_t count = 0;
-  for (int v = 1; v + 1 < image.height; v += step) {
-    const std::uint8_t* above = image.row(v - 1);
-    const std::uint8_t* here = image.row(v);
-    const std::uint8_t* below = image.row(v + 1);
-    for (int u = 1; u + 1 < image.width && count < room; u += step) {
-      const int corners = above[u - 1] + above[u + 1] + below[u - 1] + below[u + 1];
-      const int edges = above[u] + below[u] + here[u - 1] + here[u + 1];
-      (*scratch)[count++] = static_cast<float>(std::abs(corners - 2 * edges + 4 * here[u]));
-    }
-  }
-  if (count == 0) return kRounding;
-  const auto quarter = scratch->begin() + static_cast<std::ptrdiff_t>(count / 4);
-  std::nth_element(scratch->begin(), quarter,
-                   scratch->begin() + static_cast<std::ptrdiff_t>(count));
-  return std::max(*quarter / (kQuarter * kGain), kRounding);
 }
 
 }  // namespace
@@ -310,7 +283,8 @@ void StartUpTracker::estimate_noise(const Frame& now) {
       std::nth_element(scratch_.begin(), middle, scratch_.begin() + count);
       noise = *middle;
     } else {
-      noise = noise_of(now.pyramid.octave(octave), &scratch_);
+      noise = image_noise(now.pyramid.octave(octave), scratch_.data(),
+                          static_cast<int>(scratch_.size()));
     }
   }
   statistics_.noise = noise_[0];
