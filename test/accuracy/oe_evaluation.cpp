@@ -124,6 +124,10 @@ class LandmarkTruth {
       ++octave.observations;
       if (!observation.inlier) continue;
       ++octave.inliers;
+      if (observation.covariance.trace() > kEdgeVariance * (1 << 2 * observation.octave)) {
+        ++octave.edges;
+        continue;
+      }
       octave.residual_square += observation.residual.squaredNorm();
       octave.variance += observation.covariance.trace();
       const Eigen::Vector3d d = recording.direction(frame, observation.u);
@@ -150,17 +154,21 @@ class LandmarkTruth {
     std::array<OctaveEvaluation, LandmarkMap::kMaxOctaves> all;
     for (std::size_t i = 0; i < all.size(); ++i) {
       const Octave& octave = octaves_.at(i);
-      const double inliers = std::max(1, octave.inliers);
-      all.at(i) = {octave.observations, octave.inliers, std::sqrt(octave.residual_square / inliers),
-                   std::sqrt(octave.variance / inliers),
+      const double known = std::max(1, octave.inliers - octave.edges);
+      all.at(i) = {octave.observations,
+                   octave.inliers,
+                   octave.edges,
+                   std::sqrt(octave.residual_square / known),
+                   std::sqrt(octave.variance / known),
                    freedom.at(i) > 0 ? std::sqrt(scatter.at(i) / freedom.at(i)) : 0};
     }
     return all;
   }
 
  private:
+  static constexpr double kEdgeVariance = 1;  // px^2 of the octave
   struct Octave {
-    int observations = 0, inliers = 0;
+    int observations = 0, inliers = 0, edges = 0;
     double residual_square = 0, variance = 0;
   };
   struct Sums {

@@ -55,13 +55,15 @@ struct FrameEvaluation {
   double acceleration = 0;  // fields of view / s^2, in the middle of the frame
 };
 
-// How patch alignment did, of one octave: seen against the truth.
+// How patch alignment did, of one octave: seen against the truth. Edges, which are known in one direction
+// only, are counted and left out of the rest.
 struct OctaveEvaluation {
   int observations = 0;
   int inliers = 0;
-  double residual_rms_px = 0;  // of inliers, length
+  int edges = 0;               // of the inliers
+  double residual_rms_px = 0;  // length
   double claimed_rms_px = 0;   // root of the mean trace of their covariance
-  // How inliers of one landmark scatter about their mean, by the truth; length, px.
+  // How those of one landmark scatter about their mean, by the truth; length, px.
   double scatter_rms_px = 0;
 };
 

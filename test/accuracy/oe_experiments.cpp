@@ -124,6 +124,7 @@ void add_details(const std::string& name, const Evaluation& evaluation, Table* o
     if (octave.observations == 0) continue;
     octaves->rows.push_back({name, std::to_string(i), std::to_string(octave.observations),
                              number(static_cast<double>(octave.inliers) / octave.observations),
+                             number(static_cast<double>(octave.edges) / octave.observations),
                              number(octave.residual_rms_px), number(octave.claimed_rms_px),
                              number(octave.scatter_rms_px)});
   }
@@ -190,7 +191,8 @@ void run_oe_accuracy(const OeExperimentOptions& options, Report* report, nlohman
                   "p99",       "max",         "map", "MiB"};
   Table octaves;
   octaves.title = "Landmarks by octave (px of the image, length)";
-  octaves.header = {"recording", "octave", "seen", "inliers", "residual", "claimed", "scatter"};
+  octaves.header = {"recording", "octave",   "seen",    "inliers",
+                    "edges",     "residual", "claimed", "scatter"};
   Table splits;
   splits.title = "Error 'in map' by";
   splits.header = {"recording", "class", "frames' worth", "rms", "mean u", "mean v"};
