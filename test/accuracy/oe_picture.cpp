@@ -7,7 +7,7 @@
 namespace alidade::test {
 namespace {
 
-constexpr double kMagnification = 50;
+constexpr double kMagnification = 300;
 constexpr int kThickness = 2;  // px
 constexpr int kShift = 4;      // bits of a fraction of a pixel in OpenCV's drawing
 

@@ -1,6 +1,6 @@
 #pragma once
 // A frame with what OE mode made of it, to look at: inliers green, outliers red, a circle as wide as the
-// patch at its octave, and residuals drawn 50 times as long as they are.
+// patch at its octave, and residuals drawn 300 times as long as they are.
 
 #include <opencv2/core.hpp>
 
