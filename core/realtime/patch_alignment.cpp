@@ -83,6 +83,38 @@ Points correlate(const Points& field) {
   return out;
 }
 
+// What light adds to a patch: a level and a slope each way, as orthonormal fields.
+struct Light {
+  Points level = Points::Constant(1.0F / kSize);
+  Points slope_u, slope_v;
+  float trace = 0;  // of these three with R: what a fit of them takes out of unit noise
+
+  Light() {
+    for (int j = 0; j < kSize; ++j) {
+      for (int i = 0; i < kSize; ++i) {
+        slope_u(j, i) = static_cast<float>(i - kHalf);
+        slope_v(j, i) = static_cast<float>(j - kHalf);
+      }
+    }
+    slope_u /= std::sqrt(slope_u.square().sum());
+    slope_v /= std::sqrt(slope_v.square().sum());
+    for (const Points* field : {&level, &slope_u, &slope_v}) {
+      trace += sum_of_product(*field, correlate(*field));
+    }
+  }
+
+  void take_out_of(Points* field) const {
+    const float u = sum_of_product(slope_u, *field);
+    const float v = sum_of_product(slope_v, *field);
+    *field -= field->mean() + u * slope_u + v * slope_v;
+  }
+};
+
+const Light& light() {
+  static const Light instance;
+  return instance;
+}
+
 struct Eigenpairs {
   float large, small;          // eigenvalues
   Vector2<float> along_large;  // unit; the other is at right angles to it
@@ -150,13 +182,15 @@ PrepareStatus prepare(const ImageView& reference, const Vector2<double>& centre,
   if (status != PrepareStatus::kOk) return status;
 
   const float mean = value.mean();
-  value -= mean;
+  light().take_out_of(&value);
+  light().take_out_of(&du);
+  light().take_out_of(&dv);
   const float energy = sum_of_product(value, value);
   const Vector2<float> value_gradient(sum_of_product(value, du), sum_of_product(value, dv));
-  // What of the gradients neither offset nor gain can imitate.
+  // What of the gradients neither light nor gain can imitate.
   const float per_energy = energy > 0 ? 1 / energy : 0;
-  du -= du.mean() + value_gradient.x() * per_energy * value;
-  dv -= dv.mean() + value_gradient.y() * per_energy * value;
+  du -= value_gradient.x() * per_energy * value;
+  dv -= value_gradient.y() * per_energy * value;
   const Eigenpairs H =
       eigenpairs(sum_of_product(du, du), sum_of_product(du, dv), sum_of_product(dv, dv));
   const auto least = static_cast<float>(kPoints * min_contrast * min_contrast);
@@ -168,9 +202,8 @@ PrepareStatus prepare(const ImageView& reference, const Vector2<double>& centre,
   const Vector2<float> b(-a.y(), a.x());
   const Points large = (a.x() * du + a.y() * dv) / std::sqrt(H.large);
   const Points R_large = correlate(large);
-  const Points level = Points::Constant(1.0F / kSize);
   const Points contrast = value * std::sqrt(per_energy);
-  float residual_trace = kPoints * kNoise0 * kNoise0 - sum_of_product(level, correlate(level)) -
+  float residual_trace = kPoints * kNoise0 * kNoise0 - light().trace -
                          sum_of_product(contrast, correlate(contrast)) -
                          sum_of_product(large, R_large);
   const Vector2<float> by_large = a / std::sqrt(H.large);
@@ -233,7 +266,8 @@ AlignmentStatus align(const ReferencePatch& reference, const ImageView& image,
     if (!converged && iteration < limits.max_iterations) continue;
 
     const float mean = seen.mean();
-    const Points contrast = seen - mean;
+    Points contrast = seen;
+    light().take_out_of(&contrast);
     const Points residual = contrast - gain * reference.value;
     const double energy = sum_of_product(contrast, contrast);
     const double left = sum_of_product(residual, residual);
@@ -265,8 +299,8 @@ bool measure_step(const ReferencePatch& reference, const ImageView& image,
   Points seen;
   sample_grid<false>(image, place, &seen, nullptr, nullptr);
   const auto [moved, gain] = fit(reference, seen);
-  const float mean = seen.mean();
-  const float energy = sum_of_product(seen, seen) - kPoints * mean * mean;
+  light().take_out_of(&seen);
+  const float energy = sum_of_product(seen, seen);
   if (!(energy > 0) || gain == 0) return false;
   out->step = -(moved / gain).cast<double>();
   out->gain = gain;

@@ -2,16 +2,17 @@
 // Patch alignment: where a small reference picture lies in an image, to a few hundredths of a pixel, with
 // covariance (PTCEE 33; inverse compositional after Baker and Matthews, with gain and offset).
 //
-//   image(u + x) = gain * reference(centre + A x) + offset + noise   for the kPatchSize^2 points x,
+//   image(u + x) = gain * reference(centre + A x) + offset + slope . x + noise   for the kPatchSize^2 points x,
 //
 // a grid 1 px apart around 0. A, d(reference pixel)/d(image pixel), holds what the caller knows of scale,
-// rotation and the rolling shutter's shear; u, gain and offset are estimated. Both sides are sampled by
+// rotation and the rolling shutter's shear; u, gain, offset and slope are estimated. (The slope is the light's:
+// vignetting puts one across every patch, which would pull it by hundredths of a pixel, everywhere alike.) Both sides are sampled by
 // CubicSpline (sampling.h): alike, so that fractions of a pixel do not bend the answer. The linearisation
 // stands on the reference side, so that everything but 3 sums over the patch is done once, by
-// prepare(); gain and offset are solved for exactly in every step.
+// prepare(); gain, offset and slope are solved for exactly in every step.
 //
 // Covariance of u: the noise is what remains after the fit, so it holds the image's noise, the
-// reference's, and whatever does not fit. With G the gradients free of gain and offset, H = G'G and R the
+// reference's, and whatever does not fit. With G the gradients free of gain and light, H = G'G and R the
 // correlation that the blur gives to the noise of neighbouring points,
 //   cov = noise_sigma^2 / gain^2 * H^-1 G' R G H^-1 * n / (n - 2),
 // the last factor because noise_sigma comes from only n = kNoiseFreedom independent values (Student's t).
@@ -37,7 +38,7 @@ inline constexpr double kNoiseFreedom = 30;
 
 struct ReferencePatch {
   using Points = Eigen::Array<float, kPatchSize, kPatchSize, Eigen::RowMajor>;
-  Points value;                    // blurred reference, mean removed, grey levels
+  Points value;                    // blurred reference, level and slope removed, grey levels
   Points to_u, to_v;               // H^-1 G': image to gain times displacement, px per grey level
   float energy = 0;                // sum of squares of value
   Vector2<float> value_gradient;   // sums of value times gradient
