@@ -327,8 +327,9 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   for (int i = 0; i < count; ++i) {
     landmarks[i].normalised_square = problem.normalised_square(i, solution.head<6>());
   }
+  // What nothing tells has no finite variance, and the factorisation gives it none.
   if (!all_finite(out->correction) || !all_finite(out->covariance) ||
-      !all_finite(out->offset_covariance)) {
+      !all_finite(out->offset_covariance) || !(out->covariance.diagonal().minCoeff() > 0)) {
     return SolveStatus::kNotFinite;
   }
   return SolveStatus::kOk;
