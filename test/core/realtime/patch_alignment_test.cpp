@@ -300,5 +300,77 @@ TEST(PatchAlignment, SaysWhyItFoundNothing) {
   EXPECT_LT(found, (unlike + moved_too_far + not_converged + found) / 10);
 }
 
+// One step is what align() takes, where that does not shorten it.
+TEST(PatchAlignment, OneStepIsThatOfTheWholeAlignment) {
+  std::mt19937_64 random(9);
+  AlignmentLimits one;
+  one.max_iterations = 1;
+  one.min_correlation = 0;
+  one.min_gain = 1e-3;
+  int compared = 0;
+  int nearer = 0;
+  for (int n = 0; n < 500; ++n) {
+    const AnalyticImage texture(&random, 4);
+    const Pixels before = make_pixels(kSize, kSize, texture, 1, &random);
+    const double gain = 0.5 + n % 3 * 0.5;
+    const auto changed = [&](const Vector2<double>& at) {
+      return 128 + gain * (texture(at) - 128);
+    };
+    const Pixels after = make_pixels(kSize, kSize, changed, 1, &random);
+    ReferencePatch reference;
+    if (prepare(before.view, kCentre, kIdentity, kMinContrast, &reference) != PrepareStatus::kOk) {
+      continue;
+    }
+    PatchStep step;
+    ASSERT_TRUE(measure_step(reference, after.view, kCentre, &step));
+    EXPECT_NEAR(step.gain, gain, 0.15);
+    EXPECT_GT(step.correlation, 0.9);
+    EXPECT_LT(step.step.norm(), 1);
+
+    const Vector2<double> away = random_shift(&random) - Vector2<double>(0.5, 0.5);
+    const Vector2<double> start = kCentre + away;
+    ASSERT_TRUE(measure_step(reference, after.view, start, &step));
+    EXPECT_LE(std::abs(step.correlation), 1 + 1e-5);
+    if (!(step.gain > one.min_gain) || !(step.step.norm() < 1)) continue;
+    Alignment alignment;
+    (void)align(reference, after.view, start, one, &alignment);
+    EXPECT_LT((alignment.position - start - step.step).norm(), 1e-6);
+    EXPECT_NEAR(alignment.gain, step.gain, 1e-6);
+    ++compared;
+    nearer += (start + step.step - kCentre).norm() < 0.5 * away.norm() + 0.1 ? 1 : 0;
+  }
+  EXPECT_GT(compared, 50);
+  EXPECT_GT(nearer, 0.9 * compared);
+}
+
+TEST(PatchAlignment, OneStepTellsLikeFromUnlike) {
+  std::mt19937_64 random(10);
+  const AnalyticImage texture(&random);
+  const Pixels before = make_pixels(kSize, kSize, texture, 0, &random);
+  ReferencePatch reference;
+  ASSERT_TRUE(is_usable(prepare(before.view, kCentre, kIdentity, 0.1, &reference)));
+  const auto negative = [&](const Vector2<double>& at) { return 256 - texture(at); };
+  const Pixels opposite = make_pixels(kSize, kSize, negative, 0, &random);
+  PatchStep step;
+  ASSERT_TRUE(measure_step(reference, opposite.view, kCentre, &step));
+  EXPECT_LT(step.gain, -0.9);
+  EXPECT_LT(step.correlation, -0.99);
+  ASSERT_TRUE(measure_step(reference, before.view, kCentre, &step));
+  EXPECT_NEAR(step.correlation, 1, 1e-5);
+  EXPECT_NEAR(step.gain, 1, 1e-4);
+  EXPECT_LT(step.step.norm(), 1e-4);
+
+  const auto flat = [](const Vector2<double>&) { return 90.0; };
+  const Pixels blank = make_pixels(kSize, kSize, flat, 0, &random);
+  EXPECT_FALSE(measure_step(reference, blank.view, kCentre, &step));
+  EXPECT_FALSE(measure_step(reference, {}, kCentre, &step));
+  const double kNaN = std::numeric_limits<double>::quiet_NaN();
+  const double kInfinity = std::numeric_limits<double>::infinity();
+  for (const double bad : {kNaN, kInfinity, -kInfinity, 4.99, kSize - 4.99, -100.0, 1e300}) {
+    EXPECT_FALSE(measure_step(reference, before.view, {bad, 12}, &step)) << bad;
+    EXPECT_FALSE(measure_step(reference, before.view, {12, bad}, &step)) << bad;
+  }
+}
+
 }  // namespace
 }  // namespace alidade::test

@@ -9,6 +9,7 @@
 
 #include "core/realtime/fast_corners.h"
 #include "core/realtime/landmark_map.h"
+#include "core/realtime/oe_mode.h"
 #include "core/realtime/patch_alignment.h"
 #include "core/realtime/pt_mode.h"
 #include "core/realtime/pyramid.h"
@@ -135,6 +136,72 @@ TEST(RealtimeAllocation, TrackingFromTheStartAllocatesNothing) {
   EXPECT_EQ(guard.count(), 0);
   EXPECT_GT(observations, 5000);
   EXPECT_GT(lost, 5);
+}
+
+// A narrow camera that goes round in a small circle for ever, its telemetry right.
+TEST(RealtimeAllocation, OeModeAllocatesNothing) {
+  constexpr int kWidth = 128;
+  constexpr int kHeight = 128;
+  constexpr int kPictures = 20;
+  constexpr double kFocalLength = 20000;  // px
+  constexpr double kRadius = 8;           // px
+  Calibration calibration;
+  calibration.camera = {kFocalLength, 1, 0, kWidth, kHeight};
+  calibration.line_delay = 20e-6;
+  std::mt19937_64 random(2);
+  const AnalyticImage texture(&random, 8);
+  std::vector<Pixels> pictures;
+  const auto turn_of = [](int k) { return 2 * kPi * (k % kPictures) / kPictures; };
+  for (int k = 0; k < kPictures; ++k) {
+    const Vector2<double> shift =
+        kRadius * Vector2<double>(std::cos(turn_of(k)), std::sin(turn_of(k)));
+    pictures.push_back(make_pixels(
+        kWidth, kHeight, [&](const Vector2<double>& at) { return texture(at + shift); }, 2,
+        &random));
+  }
+  OeOptions options;
+  options.max_width = kWidth;
+  options.max_height = kHeight;
+  options.max_landmarks = 64;
+  options.max_used = 16;
+  options.cell_size_px = 16;
+  OeMode oe(options);
+  FrameOrientation frame;
+  int in_oe = 0;
+  int without = 0;
+  constexpr int kFrames = 10000;
+  const AllocationGuard guard;
+  oe.reset(calibration);
+  for (int k = 0; k < kFrames; ++k) {
+    const double radius = kRadius / kFocalLength;
+    const double rate = 2 * kPi * 25 / kPictures;
+    InterpolatedPanTilt telemetry;
+    telemetry.angle = {radius * std::cos(turn_of(k)), -radius * std::sin(turn_of(k))};
+    telemetry.rate = {-radius * rate * std::sin(turn_of(k)), -radius * rate * std::cos(turn_of(k))};
+    telemetry.covariance.diagonal() << 1e-9, 1e-9, 1e-7, 1e-7;
+    // Now and then no telemetry or no picture.
+    const ImageView image =
+        k % 1000 == 500 ? ImageView{} : pictures[static_cast<std::size_t>(k % kPictures)].view;
+    const OeStatus status =
+        oe.process(image, k / 25.0, k % 100 == 50 ? nullptr : &telemetry, &frame);
+    in_oe += status == OeStatus::kOk ? 1 : 0;
+    without += status != OeStatus::kOk ? 1 : 0;
+    oe.maintain();
+    if (k == kFrames / 2) oe.reset(calibration);
+  }
+  EXPECT_EQ(guard.count(), 0);
+  EXPECT_GT(in_oe, kFrames * 99 / 100);
+  EXPECT_GE(without, 10);
+  EXPECT_GT(oe.map().size(), 20);
+  EXPECT_LE(oe.map().size(), oe.map().capacity());
+}
+
+TEST(RealtimeAllocation, OeModeOfFullHdFitsIntoThirtyTwoMebibytes) {
+  OeOptions options;
+  options.max_width = 1920;
+  options.max_height = 1080;
+  options.max_landmarks = 4096;
+  EXPECT_LE(OeMode(options).memory_bytes(), std::size_t{32} << 20);
 }
 
 }  // namespace

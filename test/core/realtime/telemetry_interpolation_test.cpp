@@ -290,5 +290,70 @@ TEST(TelemetryInterpolation, OwnsUpToTheErrorsOfAJerk) {
   }
 }
 
+// Whatever a mean over a long time is made of, white samples h apart leave sigma^2 h / T in it: so must the
+// answers, each worth its renewal.
+TEST(TelemetryInterpolation, AnAnswerIsWorthItsRenewal) {
+  std::mt19937_64 random(8);
+  std::normal_distribution<double> normal;
+  const double sigma = 3e-5;
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = sigma;
+  noise.period_sigma_s = 0;
+  for (const double rate_hz : {30.0, 100.0}) {
+    double mean_square = 0;
+    double expected = 0;
+    const int runs = 400;
+    const int kSamples = 120;
+    for (int run = 0; run < runs; ++run) {
+      TelemetryBuffer<256> buffer(noise);
+      for (int i = 0; i < kSamples; ++i) {
+        const double time = i / rate_hz;
+        ASSERT_EQ(buffer.push({time, 0, 0.1 * time + sigma * normal(random),
+                               -0.2 * time + sigma * normal(random)}),
+                  PushStatus::kStored);
+      }
+      // Away from the ends, whose windows are lopsided.
+      const double from = 10 / rate_hz;
+      const double to = (kSamples - 11) / rate_hz;
+      const int queries = 4 * (kSamples - 21);
+      Vector2<double> mean = Vector2<double>::Zero();
+      double worth = 0;
+      for (int i = 0; i < queries; ++i) {
+        const double time = from + (to - from) * (i + 0.5) / queries;
+        InterpolatedPanTilt result;
+        ASSERT_EQ(buffer.query(time, 0, &result), QueryStatus::kOk);
+        mean += Vector2<double>(result.angle.pan - 0.1 * time, result.angle.tilt + 0.2 * time) /
+                queries;
+        ASSERT_GT(result.renewal_s, 0.9 / rate_hz);
+        ASSERT_LT(result.renewal_s, 8.1 / rate_hz);
+        worth += result.covariance(0, 0) * result.renewal_s / queries;
+      }
+      mean_square += mean.squaredNorm() / 2 / runs;
+      expected += worth / (to - from) / runs;
+    }
+    // Four standard deviations of a mean of squares, and the ends, a hundredth; the covariance holds
+    // curvature besides, which noise feigns.
+    const double tolerance = 4 * std::sqrt(2.0 / (2 * runs)) + 0.01;
+    EXPECT_NEAR(mean_square / (sigma * sigma / rate_hz / ((kSamples - 21) / rate_hz)), 1,
+                tolerance);
+    EXPECT_LT(mean_square, (1 + tolerance) * expected);
+    EXPECT_GT(mean_square, (1 - tolerance - 0.2) * expected);
+  }
+}
+
+TEST(TelemetryInterpolation, TwoSamplesAreWorthOneAtASampleAndTwoBetween) {
+  TelemetryNoise noise;
+  noise.period_sigma_s = 0;
+  TelemetryBuffer<8> buffer(noise);
+  ASSERT_EQ(buffer.push({1, 0, 0, 0}), PushStatus::kStored);
+  ASSERT_EQ(buffer.push({1.04, 0, 0.001, 0.002}), PushStatus::kStored);
+  InterpolatedPanTilt result;
+  ASSERT_EQ(buffer.query(1.02, 0, &result), QueryStatus::kOk);
+  EXPECT_EQ(result.samples, 2);
+  EXPECT_NEAR(result.renewal_s, 0.08, 1e-9);
+  ASSERT_EQ(buffer.query(1.04, 0, &result), QueryStatus::kOk);
+  EXPECT_NEAR(result.renewal_s, 0.04, 1e-9);
+}
+
 }  // namespace
 }  // namespace alidade

@@ -1,0 +1,587 @@
+// OE mode on frames of the virtual camera, from nothing: what it finds, what it does when it finds nothing,
+// and that it never claims more than it knows.
+
+#include "core/realtime/oe_mode.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <memory>
+#include <optional>
+#include <random>
+#include <vector>
+
+#include "core/realtime/pt_mode.h"
+#include "test/simulator/renderer.h"
+
+namespace alidade::test {
+namespace {
+
+constexpr int kWidth = 480;
+constexpr int kHeight = 270;
+constexpr double kFocalLength = 1500;  // px
+constexpr double kRateHz = 25;
+constexpr double kPixel = 1 / kFocalLength;  // rad
+
+OeOptions small_options() {
+  OeOptions options;
+  options.max_width = kWidth;
+  options.max_height = kHeight;
+  options.max_landmarks = 2000;
+  options.cell_size_px = 24;
+  return options;
+}
+
+simulator::Config camera_before_mountains() {
+  simulator::Config config;
+  config.image = {kWidth, kHeight, kRateHz};
+  config.duration = 10;
+  config.camera.focal_length = kFocalLength;
+  config.camera.radial_distortion = 0.3;
+  config.camera.line_delay = 50e-6;
+  config.path.amplitude = 0.25;
+  config.path.period = 6;
+  simulator::PatchConfig mountains;
+  mountains.file = ALIDADE_TEST_DATA "/picosdeeuropa_by_Aitzol_Berasategi.jpg";
+  mountains.width = 40 * kPi / 180;
+  config.scene.photos.push_back(mountains);
+  config.sensor.exposure = 2e-3;
+  config.sensor.shot_noise = 0.02;
+  config.sensor.read_noise = 0.7;
+  return config;
+}
+
+// The standard deviations of one telemetry answer.
+struct Sigmas {
+  double angle = 1 * kPixel;
+  double rate = 5 * kPixel;
+};
+
+class VirtualCamera {
+ public:
+  explicit VirtualCamera(const simulator::Config& config = camera_before_mountains())
+      : path_(simulator::make_path(config)), renderer_(config, *path_) {
+    const simulator::CameraConfig& c = config.camera;
+    calibration_.camera = {c.focal_length, c.aspect, c.radial_distortion, kWidth, kHeight};
+    calibration_.line_delay = c.line_delay;
+  }
+
+  [[nodiscard]] const Calibration& calibration() const { return calibration_; }
+  [[nodiscard]] static double time_s(int k) { return k / kRateHz; }
+
+  // Of frame k; lives as long as the camera.
+  [[nodiscard]] ImageView image(int k) {
+    std::vector<std::uint8_t>& picture = pictures_[k];
+    if (picture.empty()) picture = renderer_.render(time_s(k), k);
+    return {picture.data(), kWidth, kHeight, kWidth};
+  }
+
+  [[nodiscard]] InterpolatedPanTilt telemetry(int k, const Sigmas& sigmas = {}) {
+    constexpr double h = 1e-3;  // s
+    const double t = time_s(k) + calibration_.line_delay * kHeight / 2;
+    const simulator::Angles before = path_->at(t - h);
+    const simulator::Angles now = path_->at(t);
+    const simulator::Angles after = path_->at(t + h);
+    const auto noise = [&](double sigma) { return sigma * normal_(random_); };
+    InterpolatedPanTilt out;
+    out.angle = {now.pan + noise(sigmas.angle), now.tilt + noise(sigmas.angle)};
+    out.rate = {(after.pan - before.pan) / (2 * h) + noise(sigmas.rate),
+                (after.tilt - before.tilt) / (2 * h) + noise(sigmas.rate)};
+    out.covariance.diagonal() << sigmas.angle * sigmas.angle, sigmas.angle * sigmas.angle,
+        sigmas.rate * sigmas.rate, sigmas.rate * sigmas.rate;
+    const Vector2<double> acceleration((after.pan - 2 * now.pan + before.pan) / (h * h),
+                                       (after.tilt - 2 * now.tilt + before.tilt) / (h * h));
+    out.acceleration_square = acceleration.cwiseAbs2();
+    out.samples = 2;
+    return out;
+  }
+
+  // Where the direction that the frame gives to u truly is, less u, px.
+  [[nodiscard]] Vector2<double> error(int k, const FrameOrientation& frame,
+                                      const Vector2<double>& u) const {
+    Vector3<double> d;
+    EXPECT_EQ(frame.direction(u, &d), ProjectionStatus::kOk);
+    const std::optional<Eigen::Vector2d> truth = renderer_.camera().project_rolling(d, time_s(k));
+    EXPECT_TRUE(truth.has_value());
+    return truth.value_or(u) - u;
+  }
+
+  // The largest error, px, and the largest of its squares by covariance, 2 degrees of freedom, at the
+  // centre and near the corners.
+  void judge(int k, const FrameOrientation& frame, double* px, double* square) const {
+    *px = 0;
+    *square = 0;
+    for (const Vector2<double>& u :
+         {Vector2<double>(240, 135), Vector2<double>(24, 14), Vector2<double>(456, 14),
+          Vector2<double>(24, 256), Vector2<double>(456, 256)}) {
+      Vector3<double> d;
+      ASSERT_EQ(frame.direction(u, &d), ProjectionStatus::kOk);
+      Vector2<double> back;
+      Matrix2<double> covariance;
+      ASSERT_EQ(frame.pixel(d, &back, &covariance), ProjectionStatus::kOk);
+      const Vector2<double> e = error(k, frame, u);
+      *px = std::max(*px, e.norm());
+      *square = std::max(*square, e.dot(covariance.inverse() * e));
+    }
+  }
+
+ private:
+  std::unique_ptr<simulator::Path> path_;
+  simulator::Renderer renderer_;
+  Calibration calibration_;
+  std::map<int, std::vector<std::uint8_t>> pictures_;
+  std::mt19937_64 random_{1};
+  std::normal_distribution<double> normal_;
+};
+
+// One in 10^6 of chi-squares of 2 degrees is larger.
+constexpr double kImpossible = 27.6;
+
+void expect_honest(const VirtualCamera& camera, int k, const FrameOrientation& frame) {
+  double px = 0;
+  double square = 0;
+  camera.judge(k, frame, &px, &square);
+  EXPECT_LT(square, kImpossible) << "frame " << k << ", " << px << " px";
+}
+
+void expect_same(const FrameOrientation& a, const FrameOrientation& b) {
+  EXPECT_EQ(a.time_s, b.time_s);
+  EXPECT_EQ(a.mode, b.mode);
+  EXPECT_EQ(a.landmarks, b.landmarks);
+  EXPECT_EQ(a.angle.vector(), b.angle.vector());
+  EXPECT_EQ(a.rate.vector(), b.rate.vector());
+  EXPECT_EQ(a.acceleration.vector(), b.acceleration.vector());
+  EXPECT_EQ(a.motion_covariance, b.motion_covariance);
+  EXPECT_EQ(a.R_base_from_camera, b.R_base_from_camera);
+  EXPECT_EQ(a.orientation_covariance, b.orientation_covariance);
+  EXPECT_EQ(a.angular_velocity, b.angular_velocity);
+}
+
+// Telemetry's own answer, and nothing of landmarks.
+void expect_pt(const VirtualCamera& camera, int k, const InterpolatedPanTilt& telemetry,
+               const FrameOrientation& frame) {
+  FrameOrientation pt;
+  ASSERT_TRUE(pt_orientation(camera.calibration(), VirtualCamera::time_s(k), telemetry, &pt));
+  EXPECT_EQ(frame.mode, OrientationMode::kPt);
+  expect_same(frame, pt);
+}
+
+class OeModeOnFrames : public testing::Test {
+ protected:
+  void SetUp() override { oe_.reset(camera_.calibration()); }
+
+  OeStatus process(int k) {
+    telemetry_ = camera_.telemetry(k);
+    return oe_.process(camera_.image(k), VirtualCamera::time_s(k), &telemetry_, &frame_);
+  }
+
+  // Frames [from, to), all of which must be in OE.
+  void run(int from, int to) {
+    for (int k = from; k < to; ++k) {
+      ASSERT_EQ(process(k), OeStatus::kOk) << k;
+      oe_.maintain();
+    }
+  }
+
+  void start(int frames) {
+    ASSERT_EQ(process(0), OeStatus::kTooFew);
+    oe_.maintain();
+    run(1, frames);
+  }
+
+  // Back in OE by the third frame at the latest, counting k.
+  void expect_back(int k) {
+    OeStatus status = OeStatus::kTooFew;
+    for (int i = 0; i < 3 && status != OeStatus::kOk; ++i) {
+      status = process(k + i);
+      expect_honest(camera_, k + i, frame_);
+      oe_.maintain();
+    }
+    EXPECT_EQ(status, OeStatus::kOk);
+  }
+
+  VirtualCamera camera_;
+  OeMode oe_{small_options()};
+  InterpolatedPanTilt telemetry_;
+  FrameOrientation frame_;
+};
+
+TEST_F(OeModeOnFrames, BeginsWithNothingAndIsInOeFromTheSecondFrameOn) {
+  ASSERT_EQ(process(0), OeStatus::kTooFew);
+  expect_pt(camera_, 0, telemetry_, frame_);
+  EXPECT_EQ(oe_.map().size(), 0);
+  oe_.maintain();
+  EXPECT_GT(oe_.map().size(), 50);
+  Vector2<double> before = Vector2<double>::Zero();
+  double turns = 0;
+  constexpr int kFrames = 150;
+  for (int k = 1; k < kFrames; ++k) {
+    ASSERT_EQ(process(k), OeStatus::kOk) << k;
+    EXPECT_EQ(frame_.mode, OrientationMode::kOe);
+    EXPECT_GE(frame_.landmarks, 20);
+    expect_honest(camera_, k, frame_);
+    const Vector2<double> error = camera_.error(k, frame_, {kWidth / 2, kHeight / 2});
+    if (k > 1) turns += (error - before).squaredNorm() / 2;
+    before = error;
+    oe_.maintain();
+  }
+  // From frame to frame, where telemetry alone would show sqrt(2) px.
+  EXPECT_LT(std::sqrt(turns / (kFrames - 2)), 0.1);
+}
+
+TEST_F(OeModeOnFrames, KnowsTheBaseBetterTheLongerItSeesTelemetry) {
+  start(2);
+  Matrix2<double> covariance = oe_.statistics().map_offset_covariance;
+  run(2, 100);
+  // White noise of a pixel, averaged 100 times.
+  const double sigma = std::sqrt(oe_.statistics().map_offset_covariance(0, 0));
+  EXPECT_LT(sigma, 1.5 * kPixel / std::sqrt(100.0));
+  EXPECT_LT(sigma, std::sqrt(covariance(0, 0)) / 4);
+}
+
+TEST_F(OeModeOnFrames, IsTelemetryAloneWhereThePictureShowsNothing) {
+  start(20);
+  std::mt19937_64 random(2);
+  std::vector<std::uint8_t> picture(static_cast<std::size_t>(kWidth) * kHeight);
+  const ImageView view{picture.data(), kWidth, kHeight, kWidth};
+  int k = 20;
+  for (const int kind : {0, 1, 2, 3}) {
+    for (int i = 0; i < 10; ++i, ++k) {
+      for (std::uint8_t& pixel : picture) {
+        const auto noise = static_cast<std::uint8_t>(random() % 7);
+        if (kind == 0) pixel = 0;
+        if (kind == 1) pixel = 255;
+        if (kind == 2) pixel = static_cast<std::uint8_t>(20 + noise);
+        if (kind == 3) pixel = static_cast<std::uint8_t>(random() % 256);
+      }
+      telemetry_ = camera_.telemetry(k);
+      const OeStatus status = oe_.process(view, VirtualCamera::time_s(k), &telemetry_, &frame_);
+      EXPECT_NE(status, OeStatus::kOk) << kind;
+      EXPECT_NE(status, OeStatus::kNoPrediction) << kind;
+      expect_pt(camera_, k, telemetry_, frame_);
+      oe_.maintain();
+    }
+    expect_back(k);
+    k += 3;
+    run(k, k + 5);
+    k += 5;
+  }
+}
+
+TEST(OeMode, IsTelemetryAloneWhileTheLensIsCovered) {
+  simulator::Config config = camera_before_mountains();
+  config.sensor.covered = {{0.795, 1.215}};
+  VirtualCamera camera(config);
+  OeMode oe(small_options());
+  oe.reset(camera.calibration());
+  FrameOrientation frame;
+  int in_oe_after = 0;
+  for (int k = 0; k < 40; ++k) {
+    const InterpolatedPanTilt telemetry = camera.telemetry(k);
+    const OeStatus status =
+        oe.process(camera.image(k), VirtualCamera::time_s(k), &telemetry, &frame);
+    if (k >= 20 && k <= 30) {
+      EXPECT_NE(status, OeStatus::kOk);
+      expect_pt(camera, k, telemetry, frame);
+    } else if (k > 0 && k < 20) {
+      EXPECT_EQ(status, OeStatus::kOk) << k;
+    } else if (k > 32) {
+      in_oe_after += status == OeStatus::kOk ? 1 : 0;
+    }
+    expect_honest(camera, k, frame);
+    oe.maintain();
+  }
+  EXPECT_EQ(in_oe_after, 7);
+}
+
+TEST_F(OeModeOnFrames, RecoversFromTelemetryThatIsFarOffAndSaysSo) {
+  start(30);
+  for (int k = 30; k < 46; ++k) {
+    telemetry_ = camera_.telemetry(k);
+    const double turn = k;
+    telemetry_.angle.pan += 60 * kPixel * std::cos(turn);
+    telemetry_.angle.tilt += 60 * kPixel * std::sin(turn);
+    telemetry_.covariance.topLeftCorner<2, 2>() =
+        40 * 40 * kPixel * kPixel * Matrix2<double>::Identity();
+    ASSERT_EQ(oe_.process(camera_.image(k), VirtualCamera::time_s(k), &telemetry_, &frame_),
+              OeStatus::kOk)
+        << k;
+    EXPECT_NEAR(oe_.statistics().coarse_shift_px, 60, 8);
+    expect_honest(camera_, k, frame_);
+    double px = 0;
+    double square = 0;
+    camera_.judge(k, frame_, &px, &square);
+    EXPECT_LT(px, 1.5) << k;
+    oe_.maintain();
+  }
+}
+
+// Landmarks that hold against a telemetry that is wrong and does not say so are not believed.
+TEST_F(OeModeOnFrames, BelievesTelemetryThatLandmarksContradict) {
+  start(20);
+  for (int k = 20; k < 25; ++k) {
+    telemetry_ = camera_.telemetry(k);
+    telemetry_.angle.pan += 15 * kPixel;
+    EXPECT_EQ(oe_.process(camera_.image(k), VirtualCamera::time_s(k), &telemetry_, &frame_),
+              OeStatus::kContradiction);
+    expect_pt(camera_, k, telemetry_, frame_);
+    oe_.maintain();
+  }
+  expect_back(25);
+}
+
+TEST_F(OeModeOnFrames, GoesOnWithoutTelemetryWhileItSees) {
+  start(30);
+  // 0.3 s
+  for (int k = 30; k < 38; ++k) {
+    EXPECT_EQ(oe_.process(camera_.image(k), VirtualCamera::time_s(k), nullptr, &frame_),
+              OeStatus::kOk)
+        << k;
+    EXPECT_EQ(frame_.mode, OrientationMode::kOe);
+    expect_honest(camera_, k, frame_);
+    oe_.maintain();
+  }
+  run(38, 50);
+}
+
+TEST_F(OeModeOnFrames, WritesNothingWithoutPrediction) {
+  FrameOrientation untouched;
+  untouched.time_s = -7;
+  frame_ = untouched;
+  EXPECT_EQ(oe_.process(camera_.image(0), 0, nullptr, &frame_), OeStatus::kNoPrediction);
+  expect_same(frame_, untouched);
+  oe_.maintain();
+  EXPECT_EQ(oe_.map().size(), 0);
+
+  start(10);
+  frame_ = untouched;
+  // The last frame is a second old.
+  EXPECT_EQ(oe_.process(camera_.image(35), VirtualCamera::time_s(35), nullptr, &frame_),
+            OeStatus::kNoPrediction);
+  expect_same(frame_, untouched);
+  EXPECT_EQ(oe_.statistics().status, OeStatus::kNoPrediction);
+  oe_.maintain();
+  // Recent, but dark.
+  run(36, 40);
+  frame_ = untouched;
+  const std::vector<std::uint8_t> black(static_cast<std::size_t>(kWidth) * kHeight, 0);
+  for (int k = 40; k < 43; ++k) {
+    EXPECT_EQ(oe_.process({black.data(), kWidth, kHeight, kWidth}, VirtualCamera::time_s(k),
+                          nullptr, &frame_),
+              OeStatus::kNoPrediction);
+    oe_.maintain();
+  }
+  EXPECT_EQ(oe_.process({}, VirtualCamera::time_s(43), nullptr, &frame_), OeStatus::kNoPrediction);
+  expect_same(frame_, untouched);
+  expect_back(44);
+}
+
+TEST_F(OeModeOnFrames, AnswersWithTelemetryWhereThePictureIsNone) {
+  start(10);
+  const ImageView good = camera_.image(10);
+  const ImageView bad[] = {{},
+                           {nullptr, kWidth, kHeight, kWidth},
+                           {good.luma, kWidth - 1, kHeight, kWidth},
+                           {good.luma, kWidth, kHeight - 1, kWidth},
+                           {good.luma, 16, 16, kWidth},
+                           {good.luma, kWidth, kHeight, kWidth - 1},
+                           {good.luma, 0, 0, 0}};
+  for (const ImageView& view : bad) {
+    telemetry_ = camera_.telemetry(10);
+    EXPECT_EQ(oe_.process(view, VirtualCamera::time_s(10), &telemetry_, &frame_),
+              OeStatus::kBadImage);
+    EXPECT_EQ(oe_.statistics().status, OeStatus::kBadImage);
+    expect_pt(camera_, 10, telemetry_, frame_);
+    const int size = oe_.map().size();
+    oe_.maintain();
+    EXPECT_EQ(oe_.map().size(), size);
+  }
+  run(10, 12);
+}
+
+TEST_F(OeModeOnFrames, WritesNothingForWhatIsNotFinite) {
+  start(10);
+  FrameOrientation untouched;
+  untouched.time_s = -7;
+  const double kNaN = std::numeric_limits<double>::quiet_NaN();
+  const double kInfinity = std::numeric_limits<double>::infinity();
+  for (const double bad : {kNaN, kInfinity, -kInfinity}) {
+    frame_ = untouched;
+    telemetry_ = camera_.telemetry(10);
+    EXPECT_EQ(oe_.process(camera_.image(10), bad, &telemetry_, &frame_), OeStatus::kNotFinite);
+    EXPECT_EQ(oe_.process(camera_.image(10), bad, nullptr, &frame_), OeStatus::kNotFinite);
+    InterpolatedPanTilt wrong = telemetry_;
+    wrong.angle.pan = bad;
+    EXPECT_EQ(oe_.process(camera_.image(10), 0.4, &wrong, &frame_), OeStatus::kNotFinite);
+    wrong = telemetry_;
+    wrong.rate.tilt = bad;
+    EXPECT_EQ(oe_.process(camera_.image(10), 0.4, &wrong, &frame_), OeStatus::kNotFinite);
+    wrong = telemetry_;
+    wrong.covariance(1, 1) = bad;
+    EXPECT_EQ(oe_.process(camera_.image(10), 0.4, &wrong, &frame_), OeStatus::kNotFinite);
+    expect_same(frame_, untouched);
+    oe_.maintain();
+  }
+  run(10, 12);
+}
+
+// Each frame once more at the same time, and time that runs backwards: as good, or telemetry's.
+TEST_F(OeModeOnFrames, SurvivesRepeatedAndDisorderedTimes) {
+  start(20);
+  for (const int k : {20, 20, 20, 21, 19, 25, 24, 22, 26}) {
+    const OeStatus status = process(k);
+    EXPECT_TRUE(status == OeStatus::kOk || status == OeStatus::kTooFew) << k;
+    expect_honest(camera_, k, frame_);
+    oe_.maintain();
+  }
+  run(27, 30);
+}
+
+TEST_F(OeModeOnFrames, TakesPicturesBottomUpAndWithPadding) {
+  OeMode other(small_options());
+  other.reset(camera_.calibration());
+  constexpr int kStride = kWidth + 13;
+  std::vector<std::uint8_t> memory(static_cast<std::size_t>(kStride) * kHeight, 77);
+  for (int k = 0; k < 20; ++k) {
+    const ImageView image = camera_.image(k);
+    std::uint8_t* first = memory.data() + static_cast<std::ptrdiff_t>(kHeight - 1) * kStride;
+    for (int v = 0; v < kHeight; ++v) {
+      std::copy_n(image.row(v), kWidth, first - static_cast<std::ptrdiff_t>(v) * kStride);
+    }
+    const OeStatus status = process(k);
+    FrameOrientation frame;
+    EXPECT_EQ(other.process({first, kWidth, kHeight, -kStride}, VirtualCamera::time_s(k),
+                            &telemetry_, &frame),
+              status);
+    expect_same(frame, frame_);
+    oe_.maintain();
+    other.maintain();
+  }
+  EXPECT_EQ(oe_.statistics().status, OeStatus::kOk);
+}
+
+// What every answer rests on, ids aside, which are never given twice.
+TEST_F(OeModeOnFrames, AnswersAlikeAgainAndAfterAReset) {
+  struct Answer {
+    OeStatus status;
+    FrameOrientation frame;
+    int map;
+  };
+  const auto answers_of = [&](OeMode* oe) {
+    VirtualCamera camera;
+    oe->reset(camera.calibration());
+    EXPECT_EQ(oe->map().size(), 0);
+    EXPECT_EQ(oe->statistics().aligned, 0);
+    EXPECT_EQ(oe->statistics().status, OeStatus::kNoPrediction);
+    std::vector<Answer> answers;
+    for (int k = 0; k < 40; ++k) {
+      const InterpolatedPanTilt telemetry = camera.telemetry(k);
+      Answer answer;
+      answer.status =
+          oe->process(camera_.image(k), VirtualCamera::time_s(k), &telemetry, &answer.frame);
+      oe->maintain();
+      answer.map = oe->map().size();
+      answers.push_back(answer);
+    }
+    return answers;
+  };
+  OeMode other(small_options());
+  const std::vector<Answer> first = answers_of(&oe_);
+  const std::vector<Answer> second = answers_of(&other);
+  const std::vector<Answer> after_reset = answers_of(&oe_);
+  for (std::size_t k = 0; k < first.size(); ++k) {
+    SCOPED_TRACE(k);
+    for (const Answer* again : {&second[k], &after_reset[k]}) {
+      EXPECT_EQ(again->status, first[k].status);
+      EXPECT_EQ(again->map, first[k].map);
+      expect_same(again->frame, first[k].frame);
+    }
+  }
+  // Nothing is left to go on from.
+  oe_.reset(camera_.calibration());
+  EXPECT_EQ(oe_.process(camera_.image(40), VirtualCamera::time_s(40), nullptr, &frame_),
+            OeStatus::kNoPrediction);
+}
+
+TEST_F(OeModeOnFrames, TellsWhatEachAnswerRestsOn) {
+  start(2);
+  for (int k = 2; k < 60; ++k) {
+    ASSERT_EQ(process(k), OeStatus::kOk);
+    const OeStatistics& s = oe_.statistics();
+    EXPECT_EQ(s.status, OeStatus::kOk);
+    EXPECT_LE(s.inliers, s.aligned);
+    EXPECT_LE(s.aligned, s.looked_for);
+    EXPECT_LE(s.looked_for, std::min(s.visible, small_options().max_used));
+    EXPECT_LE(s.visible, oe_.map().size());
+    EXPECT_EQ(s.inliers, frame_.landmarks);
+    int inliers = 0;
+    std::vector<std::uint32_t> ids;
+    for (int i = 0; i < s.aligned; ++i) {
+      const OeObservation& seen = oe_.observations()[i];
+      inliers += seen.inlier ? 1 : 0;
+      ASSERT_TRUE(oe_.map().occupied(seen.slot));
+      const Landmark& landmark = oe_.map().at(seen.slot);
+      EXPECT_EQ(landmark.id, seen.id);
+      EXPECT_EQ(landmark.octave, seen.octave);
+      EXPECT_GT(seen.covariance.determinant(), 0);
+      EXPECT_TRUE(seen.u.x() > 0 && seen.u.x() < kWidth && seen.u.y() > 0 && seen.u.y() < kHeight);
+      ids.push_back(seen.id);
+      if (!seen.inlier) continue;
+      // Found where the answer, less the map's offset, sees the landmark. The offset of this frame's
+      // own landmarks, and where the mean of the map lies, is not told.
+      EXPECT_LT(seen.residual.norm(), 4);
+    }
+    EXPECT_EQ(inliers, s.inliers);
+    std::sort(ids.begin(), ids.end());
+    EXPECT_EQ(std::adjacent_find(ids.begin(), ids.end()), ids.end());
+    oe_.maintain();
+  }
+}
+
+TEST(OeMode, NeitherFillsItsMapNorUsesMoreThanItMay) {
+  OeOptions options = small_options();
+  options.max_landmarks = 150;
+  options.max_used = 25;
+  VirtualCamera camera;
+  OeMode oe(options);
+  oe.reset(camera.calibration());
+  FrameOrientation frame;
+  int in_oe = 0;
+  for (int k = 0; k < 150; ++k) {
+    const InterpolatedPanTilt telemetry = camera.telemetry(k);
+    const OeStatus status =
+        oe.process(camera.image(k), VirtualCamera::time_s(k), &telemetry, &frame);
+    in_oe += status == OeStatus::kOk ? 1 : 0;
+    EXPECT_LE(oe.statistics().looked_for, 25);
+    EXPECT_LE(oe.statistics().aligned, 25);
+    EXPECT_LE(frame.landmarks, 25);
+    expect_honest(camera, k, frame);
+    oe.maintain();
+    ASSERT_LE(oe.map().size(), 150);
+  }
+  EXPECT_GT(oe.map().replaced(), 0);
+  EXPECT_GT(in_oe, 140);
+}
+
+TEST(OeMode, NeedsACalibrationThatItHasRoomFor) {
+  VirtualCamera camera;
+  FrameOrientation frame;
+  const InterpolatedPanTilt telemetry = camera.telemetry(0);
+  OeMode oe(small_options());
+  EXPECT_EQ(oe.process(camera.image(0), 0, &telemetry, &frame), OeStatus::kNoPrediction);
+  Calibration large = camera.calibration();
+  large.camera.width = kWidth + 1;
+  oe.reset(large);
+  EXPECT_EQ(oe.process(camera.image(0), 0, &telemetry, &frame), OeStatus::kNoPrediction);
+  oe.maintain();
+  oe.reset(camera.calibration());
+  EXPECT_EQ(oe.process(camera.image(0), 0, &telemetry, &frame), OeStatus::kTooFew);
+}
+
+}  // namespace
+}  // namespace alidade::test
