@@ -1,22 +1,28 @@
 // `alidade replay`: the real-time step over a recording, on one thread: telemetry up to a frame's
 // receive time is known when the frame is answered, and nothing later is. So the answer is what
-// `run` would have given, and the same in each replay.
+// a live step would have given, and the same in each replay.
+// In OE mode pictures are decoded besides; a frame whose picture cannot be is answered from telemetry.
 
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstdio>
 #include <filesystem>
 #include <limits>
+#include <optional>
+#include <string>
 #include <system_error>
+#include <vector>
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/config/noise_file.h"
 #include "edge_app/output/record_writer.h"
+#include "edge_app/pipeline/latency_histogram.h"
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
 #include "platform/recording/recording.h"
 #include "platform/system/clock.h"
@@ -31,6 +37,7 @@ struct ReplayOptions {
   std::string recording;
   std::string directory;    // empty: <recording>/alidade
   std::string calibration;  // empty: <recording>/alidade/calibration.yaml
+  std::string mode;         // "OE", "PT"; empty: OE if there are pictures
   bool realtime = false;
   bool json = false;
   bool csv = false;
@@ -103,6 +110,93 @@ std::optional<Item> next(Source& source) {
   throw CommandError(kExitFailed, source.error());
 }
 
+bool has_pictures(const std::string& recording) {
+  std::error_code ignored;
+  return fs::exists(fs::path(recording) / "video.mkv", ignored) ||
+         fs::is_directory(fs::path(recording) / "frames", ignored);
+}
+
+// The pictures of a recording whose frames are counted by another source: some frames may have none.
+class Pictures {
+ public:
+  explicit Pictures(const std::string& recording) : source_({recording, true, false}) {
+    next_ = next<Frame>(source_);
+    if (!next_) {
+      throw CommandError(kExitFailed, recording + ": none of its pictures can be decoded");
+    }
+  }
+
+  // The picture of the frame with this stamp, none if it is missing. Asked once for each frame, in order.
+  std::optional<Frame> of(const FrameStamp& stamp) {
+    std::optional<Frame> frame;
+    if (next_ && next_->stamp.frame == stamp.frame &&
+        next_->stamp.receive_time_s == stamp.receive_time_s) {
+      frame = std::move(next_);
+      next_ = next<Frame>(source_);
+    }
+    return frame;
+  }
+
+ private:
+  RecordingFrameSource source_;
+  std::optional<Frame> next_;
+};
+
+// The pictures for OE mode; null: PT mode.
+std::unique_ptr<Pictures> open_pictures(const ReplayOptions& options) {
+  const std::string& recording = options.recording;
+  const bool demanded = options.mode == "OE";
+  if (options.mode == "PT") return nullptr;
+  if (!has_pictures(recording)) {
+    if (!demanded) return nullptr;
+    throw CommandError(kExitUsage, recording +
+                                       ": has no pictures (video.mkv or frames/), which OE mode "
+                                       "needs; use --mode PT");
+  }
+  try {
+    return std::make_unique<Pictures>(recording);
+  } catch (const CommandError& error) {
+    if (demanded) throw;
+    spdlog::warn("{}; replayed in PT mode", error.what());
+    return nullptr;
+  }
+}
+
+ImageView view_of(const std::optional<Frame>& picture) {
+  if (!picture) return {};
+  return {picture->luma, picture->width, picture->height, picture->stride};
+}
+
+// What the last line tells.
+class Summary {
+ public:
+  void add(const OrientationRecord& record, double step_s) {
+    ++frames_;
+    if (record.mode == RecordMode::kOe) landmarks_.push_back(record.landmarks);
+    if (record.mode == RecordMode::kPt) ++pt_;
+    step_s_.add(step_s);
+  }
+  [[nodiscard]] std::int64_t frames() const { return frames_; }
+  std::string line() {
+    const auto oe = static_cast<std::int64_t>(landmarks_.size());
+    std::string line =
+        fmt::format("{} frames: OE {}, PT {}, none {}", frames_, oe, pt_, frames_ - oe - pt_);
+    if (!landmarks_.empty()) {
+      const auto middle = landmarks_.begin() + oe / 2;
+      std::nth_element(landmarks_.begin(), middle, landmarks_.end());
+      line += fmt::format("; {} landmarks (median)", *middle);
+    }
+    return line + fmt::format("; step {:.3f} / {:.3f} ms (p50 / p99)", 1e3 * step_s_.quantile(0.5),
+                              1e3 * step_s_.quantile(0.99));
+  }
+
+ private:
+  std::int64_t frames_ = 0;
+  std::int64_t pt_ = 0;
+  std::vector<int> landmarks_;  // of each frame in OE mode
+  LatencyHistogram step_s_;
+};
+
 int replay(const ReplayOptions& options) {
   std::string error;
   RecordingInfo info;
@@ -112,7 +206,10 @@ int replay(const ReplayOptions& options) {
   check_size(info, calibration, options.recording);
   RecordingNoise noise;
   if (!load_noise(options.recording, &noise, &error)) throw CommandError(kExitFailed, error);
-  OrientationStep step(step_options(noise, calibration));
+  const std::unique_ptr<Pictures> pictures = open_pictures(options);
+  OrientationStepOptions of_step = step_options(noise, calibration);
+  if (pictures) of_step.oe.emplace();
+  OrientationStep step(of_step);
 
   StopSignals signals;
   RecordingFrameSource video({options.recording, false, false});
@@ -128,8 +225,7 @@ int replay(const ReplayOptions& options) {
   const bool progress = is_terminal(STDERR_FILENO);
   const double start_s = monotonic_now_s();
   std::optional<double> first_s;
-  std::int64_t frames = 0;
-  std::int64_t with_orientation = 0;
+  Summary summary;
   std::optional<PanTiltSample> sample = next<PanTiltSample>(pan_tilt);
   while (const std::optional<Frame> frame = next<Frame>(video)) {
     const FrameStamp& stamp = frame->stamp;
@@ -144,21 +240,23 @@ int replay(const ReplayOptions& options) {
          sample = next<PanTiltSample>(pan_tilt)) {
       step.add_telemetry(*sample);
     }
+    const std::optional<Frame> picture = pictures ? pictures->of(stamp) : std::nullopt;
     StepEvents events;
-    const OrientationRecord record = step.add_frame(stamp, &events);
-    ++frames;
-    if (record.orientation) ++with_orientation;
+    const double before_s = monotonic_now_s();
+    const OrientationRecord record = step.add_frame(stamp, view_of(picture), &events);
+    summary.add(record, monotonic_now_s() - before_s);
     file.write(record);
     if (out && !out->write(record)) {
       if (!out->error().empty()) throw CommandError(kExitFailed, out->error());
       out.reset();
     }
-    if (progress && frames % 1000 == 0) fmt::print(stderr, "\r{} frames ", frames);
+    step.maintain();
+    if (progress && summary.frames() % 1000 == 0)
+      fmt::print(stderr, "\r{} frames ", summary.frames());
   }
   if (progress) fmt::print(stderr, "\r");
   file.complete();
-  spdlog::info("{}: {} frames: PT {}, none {}", file.path(), frames, with_orientation,
-               frames - with_orientation);
+  spdlog::info("{}: {}", file.path(), summary.line());
   return kExitOk;
 }
 
@@ -173,6 +271,10 @@ void register_replay(CLI::App& app, int* exit_code) {
                       "Directory for orientation.csv (default: DIR/alidade)");
   command->add_option("--calibration", options->calibration,
                       "Calibration (default: DIR/alidade/calibration.yaml)");
+  command
+      ->add_option("--mode", options->mode,
+                   "OE or PT (default: OE if the recording has pictures, PT if not)")
+      ->check(CLI::IsMember({"OE", "PT"}));
   command->add_flag("--realtime", options->realtime, "At the pace of the recording");
   CLI::Option* json = command->add_flag("--json", options->json, "Also on stdout, as JSON Lines");
   command->add_flag("--csv", options->csv, "Also on stdout, as CSV")->excludes(json);

@@ -37,6 +37,8 @@ std::vector<Field> fields(const OrientationRecord& record) {
       {"tilt_rad", of_orientation(&Orientation::tilt_rad), {}},
       {"pan_rate_rad_s", of_orientation(&Orientation::pan_rate_rad_s), {}},
       {"tilt_rate_rad_s", of_orientation(&Orientation::tilt_rate_rad_s), {}},
+      {"pan_acceleration_rad_s2", of_orientation(&Orientation::pan_acceleration_rad_s2), {}},
+      {"tilt_acceleration_rad_s2", of_orientation(&Orientation::tilt_acceleration_rad_s2), {}},
       {"q_base_from_camera",
        of_orientation(&Orientation::q_base_from_camera),
        {"q_x", "q_y", "q_z", "q_w"}},

@@ -2,10 +2,12 @@
 // OrientationRecord: what `alidade` says about one frame, and RecordSink, where the records go.
 //
 // Angles are TRUE angles of the mechanism (measured / scale), rad, and with the rates and q hold at
-// time_s, when row 0 was exposed; at row v both angles are angle + v * line_delay_s * rate.
+// time_s, when row 0 was exposed; at row v both angles are
+//   angle + rate t + acceleration t^2 / 2,  t = v * line_delay_s.
 // q is R_base_from_camera; sigma is of a perturbation R * Exp(xi), xi in the camera frame.
 // A record without a frame (video lost) has neither frame nor time_s; one of mode `none` has no
-// orientation and its status says why.
+// orientation and its status says why. Where landmarks were looked for and the answer is telemetry's
+// (mode PT), the status says why too.
 // Fixed size and trivially copyable: crosses the queue to the output thread by value.
 
 #include <array>
@@ -16,21 +18,34 @@
 
 namespace alidade {
 
-enum class RecordMode : std::uint8_t { kNone, kPt };
+enum class RecordMode : std::uint8_t { kNone, kPt, kOe };
 
 enum class RecordStatus : std::uint8_t {
   kOk,
-  kClockWarmingUp,    // mode PT: too few frames since the (re)start to know their times well
+  kClockWarmingUp,    // mode PT or OE: too few frames since the (re)start to know their times well
   kVideoLost,         // no connection to the video source
   kTelemetryLost,     // no connection to the pan/tilt source, and its last sample is too old
   kTelemetryMissing,  // fewer than two usable samples so far
   kTelemetryTooOld,   // the frame lies further beyond the newest sample than may be extrapolated
   kTelemetryGap,      // the samples around the frame lie too far apart
   kFrameBeforeTelemetry,  // the frame is older than the oldest sample kept
+  kTooFewLandmarks,       // mode PT: too few landmarks held
+  kContradiction,         // mode PT: landmarks and telemetry exclude each other
+  kBadImage,              // mode PT: no picture, or one that is not of the calibration's size
   kNotFinite              // a stamp is not a finite number
 };
 
-constexpr const char* to_string(RecordMode mode) { return mode == RecordMode::kPt ? "PT" : "none"; }
+constexpr const char* to_string(RecordMode mode) {
+  switch (mode) {
+    case RecordMode::kNone:
+      return "none";
+    case RecordMode::kPt:
+      return "PT";
+    case RecordMode::kOe:
+      return "OE";
+  }
+  return "unknown mode";
+}
 
 constexpr const char* to_string(RecordStatus status) {
   switch (status) {
@@ -50,6 +65,12 @@ constexpr const char* to_string(RecordStatus status) {
       return "gap in telemetry";
     case RecordStatus::kFrameBeforeTelemetry:
       return "frame before telemetry";
+    case RecordStatus::kTooFewLandmarks:
+      return "too few landmarks";
+    case RecordStatus::kContradiction:
+      return "landmarks contradict telemetry";
+    case RecordStatus::kBadImage:
+      return "no usable picture";
     case RecordStatus::kNotFinite:
       return "not finite";
   }
@@ -62,6 +83,8 @@ struct OrientationRecord {
     double tilt_rad = 0;
     double pan_rate_rad_s = 0;
     double tilt_rate_rad_s = 0;
+    double pan_acceleration_rad_s2 = 0;  // 0 in mode PT
+    double tilt_acceleration_rad_s2 = 0;
     std::array<double, 4> q_base_from_camera{0, 0, 0, 1};  // x, y, z, w
     std::array<double, 3> sigma_rad{};
   };
@@ -73,7 +96,7 @@ struct OrientationRecord {
   RecordStatus status = RecordStatus::kOk;
   bool calibrated = false;  // false: data-sheet values
   std::optional<Orientation> orientation;
-  int landmarks = 0;  // that held it
+  int landmarks = 0;  // that held it: 0 but in mode OE
   double line_delay_s = 0;
   double focal_length_px = 0;
   double aspect = 1;

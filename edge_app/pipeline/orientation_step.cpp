@@ -12,6 +12,8 @@ OrientationRecord::Orientation to_record(const FrameOrientation& frame) {
   orientation.tilt_rad = wrap_angle(frame.angle.tilt);
   orientation.pan_rate_rad_s = frame.rate.pan;
   orientation.tilt_rate_rad_s = frame.rate.tilt;
+  orientation.pan_acceleration_rad_s2 = frame.acceleration.pan;
+  orientation.tilt_acceleration_rad_s2 = frame.acceleration.tilt;
   // q and -q are one rotation: the one with w >= 0 is written.
   const Eigen::Quaterniond q = frame.quaternion();
   const double sign = q.w() < 0 ? -1 : 1;
@@ -24,13 +26,38 @@ OrientationRecord::Orientation to_record(const FrameOrientation& frame) {
   return orientation;
 }
 
+// Why the answer is telemetry's, if it is.
+RecordStatus to_record(OeStatus status) {
+  switch (status) {
+    case OeStatus::kOk:
+      return RecordStatus::kOk;
+    case OeStatus::kTooFew:
+      return RecordStatus::kTooFewLandmarks;
+    case OeStatus::kContradiction:
+      return RecordStatus::kContradiction;
+    case OeStatus::kBadImage:
+      return RecordStatus::kBadImage;
+    case OeStatus::kNoPrediction:
+    case OeStatus::kNotFinite:
+      break;
+  }
+  return RecordStatus::kNotFinite;
+}
+
 }  // namespace
 
 OrientationStep::OrientationStep(const OrientationStepOptions& options)
     : options_(options),
       video_clock_(options.video_clock),
       telemetry_clock_(options.telemetry_clock),
-      telemetry_(empty_telemetry(false)) {}
+      telemetry_(empty_telemetry(false)) {
+  if (!options.oe) return;
+  OeOptions oe = *options.oe;
+  oe.max_width = options.calibration.camera.width;
+  oe.max_height = options.calibration.camera.height;
+  oe_ = std::make_unique<OeMode>(oe);
+  oe_->reset(options.calibration);
+}
 
 OrientationStep::Telemetry OrientationStep::empty_telemetry(bool filtered) const {
   // Filtered times share the error of their line; polled ones have each an error of its own, which a
@@ -86,7 +113,8 @@ OrientationRecord OrientationStep::video_lost(double now_s) const {
   return record;
 }
 
-OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, StepEvents* events) {
+OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const ImageView& picture,
+                                             StepEvents* events) {
   ClockEstimate clock;
   clock.time_s = stamp.receive_time_s;
   clock.sigma_s = options_.video_stamp_sigma_s;
@@ -101,14 +129,37 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, StepEvents
   record.frame = stamp.frame;
   record.time_s = clock.time_s;
   record.receive_time_s = stamp.receive_time_s;
-  FrameOrientation orientation;
-  const QueryStatus query =
-      pt_orientation(options_.calibration, telemetry_, clock.time_s, clock.sigma_s, &orientation);
+  const Calibration& calibration = options_.calibration;
+  const double to_middle_row_s = calibration.line_delay * (0.5 * calibration.camera.height);
+  InterpolatedPanTilt measured;
+  const QueryStatus query = telemetry_.query(
+      clock.time_s + calibration.clock_offset + to_middle_row_s, clock.sigma_s, &measured);
   record.status = status_of(query, clock.state == ClockState::kLocked);
-  if (!has_result(query)) return record;
-  record.mode = RecordMode::kPt;
-  record.orientation = to_record(orientation);
+  orient(has_result(query) ? &measured : nullptr, picture, &record);
   return record;
+}
+
+void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageView& picture,
+                             OrientationRecord* record) {
+  FrameOrientation frame;
+  if (oe_) {
+    const OeStatus status = oe_->process(picture, *record->time_s, measured, &frame);
+    if (record->status == RecordStatus::kOk) record->status = to_record(status);
+  } else if (measured != nullptr) {
+    // Where this fails the frame stays without orientation.
+    static_cast<void>(pt_orientation(options_.calibration, *record->time_s, *measured, &frame));
+  }
+  if (frame.mode == OrientationMode::kNone) {
+    if (measured != nullptr) record->status = RecordStatus::kNotFinite;
+    return;
+  }
+  record->mode = frame.mode == OrientationMode::kOe ? RecordMode::kOe : RecordMode::kPt;
+  record->landmarks = frame.landmarks;
+  record->orientation = to_record(frame);
+}
+
+void OrientationStep::maintain() {
+  if (oe_) oe_->maintain();
 }
 
 RecordStatus OrientationStep::status_of(QueryStatus query, bool clock_locked) const {

@@ -8,11 +8,19 @@
 // The frame is looked up in the telemetry at time + d at once (pt_mode.h): if it lies beyond the
 // newest sample the angle is extrapolated, with growing sigma, for as long as the limits permit;
 // nothing waits for a later sample.
+// In OE mode (oe_mode.h) landmarks of the frame's picture join in; the same telemetry is the prior.
+// The record is PT's, and its status says why, where they do not hold; it is OE's also where
+// telemetry is missing but landmarks carry the orientation on (its status then names what is missing).
 // After a reconnection the stream's clock begins anew; telemetry from before it is forgotten.
-// Fixed memory: allocates nothing, throws nothing, takes no lock. One thread.
+// Fixed memory, taken by the constructor; after it nothing is allocated, thrown or locked. One thread.
+
+#include <memory>
+#include <optional>
 
 #include "core/model/calibration.h"
 #include "core/model/clock_filter.h"
+#include "core/realtime/image_view.h"
+#include "core/realtime/oe_mode.h"
 #include "core/realtime/pt_mode.h"
 #include "core/realtime/telemetry_buffer.h"
 #include "edge_app/pipeline/orientation_record.h"
@@ -33,6 +41,8 @@ struct OrientationStepOptions {
   // period_sigma_s holds for filtered times only.
   TelemetryNoise telemetry_noise;
   TelemetryLimits telemetry_limits;
+  // OE mode, for pictures of the calibration's size, which replaces max_width and max_height; none: PT.
+  std::optional<OeOptions> oe;
 };
 
 // What a frame brought to light, for the log.
@@ -49,7 +59,12 @@ class OrientationStep {
   // The connection to the pan/tilt source was lost; the next sample ends that.
   void telemetry_lost();
 
-  OrientationRecord add_frame(const FrameStamp& stamp, StepEvents* events);
+  // picture: one that is not valid() stands for none; PT mode looks at none. It must outlive the
+  // maintain() that follows.
+  OrientationRecord add_frame(const FrameStamp& stamp, const ImageView& picture,
+                              StepEvents* events);
+  // OE mode: upkeep of the landmark map with the frame last added, for when its record is out.
+  void maintain();
   // The record in place of frames while there is no connection to the video source.
   [[nodiscard]] OrientationRecord video_lost(double now_s) const;
 
@@ -60,11 +75,15 @@ class OrientationStep {
   [[nodiscard]] Telemetry empty_telemetry(bool filtered) const;
   [[nodiscard]] OrientationRecord empty_record() const;
   [[nodiscard]] RecordStatus status_of(QueryStatus query, bool clock_locked) const;
+  // Completes a record that has its time and telemetry's status; measured: null if there is none.
+  void orient(const InterpolatedPanTilt* measured, const ImageView& picture,
+              OrientationRecord* record);
 
   OrientationStepOptions options_;
   StreamClock video_clock_;
   StreamClock telemetry_clock_;
   Telemetry telemetry_;
+  std::unique_ptr<OeMode> oe_;       // null: PT mode
   bool telemetry_filtered_ = false;  // times in telemetry_ come from telemetry_clock_
   bool telemetry_lost_ = false;
 };

@@ -41,7 +41,7 @@ bool RealtimeStage::process() noexcept {
     drain_telemetry();
     OutputMessage out;
     if (message.kind == VideoMessage::Kind::kFrame) {
-      out.record = step_.add_frame(message.stamp, &out.events);
+      out.record = step_.add_frame(message.stamp, ImageView{}, &out.events);
     } else {
       out.record = step_.video_lost(message.time_s);
     }

@@ -55,7 +55,7 @@ FrameStamp stamp_at(double receive_time_s, std::int64_t frame = 0) {
 
 OrientationRecord add_frame(OrientationStep* step, const FrameStamp& stamp) {
   StepEvents events;
-  return step->add_frame(stamp, &events);
+  return step->add_frame(stamp, ImageView{}, &events);
 }
 
 TEST(OrientationStep, LooksTheFrameUpAtItsTimePlusTheClockOffset) {
@@ -211,16 +211,16 @@ TEST(OrientationStep, ReportsARestartOfTheVideoClockButNotItsStart) {
   FrameStamp stamp = stamp_at(100);
   stamp.sender_time_s = 0;
   stamp.restarted = true;  // as the very first frame of a source is
-  static_cast<void>(step.add_frame(stamp, &events));
+  static_cast<void>(step.add_frame(stamp, ImageView{}, &events));
   EXPECT_FALSE(events.video_clock_restarted);
   stamp = stamp_at(100.04, 1);
   stamp.sender_time_s = 0.04;
-  static_cast<void>(step.add_frame(stamp, &events));
+  static_cast<void>(step.add_frame(stamp, ImageView{}, &events));
   EXPECT_FALSE(events.video_clock_restarted);
   stamp = stamp_at(130, 2);
   stamp.sender_time_s = 0;
   stamp.restarted = true;
-  const OrientationRecord record = step.add_frame(stamp, &events);
+  const OrientationRecord record = step.add_frame(stamp, ImageView{}, &events);
   EXPECT_TRUE(events.video_clock_restarted);
   EXPECT_NEAR(*record.time_s, 130, 0.1);  // on the new line, not 30 s back on the old one
 }
