@@ -162,6 +162,14 @@ std::unique_ptr<Pictures> open_pictures(const ReplayOptions& options) {
   }
 }
 
+// Small pictures have as many landmarks as large ones, closer together.
+OeOptions oe_options(const Camera<double>& camera) {
+  constexpr double kLeastColumns = 24;
+  OeOptions options;
+  options.cell_size_px = std::min(options.cell_size_px, camera.width / kLeastColumns);
+  return options;
+}
+
 ImageView view_of(const std::optional<Frame>& picture) {
   if (!picture) return {};
   return {picture->luma, picture->width, picture->height, picture->stride};
@@ -208,7 +216,7 @@ int replay(const ReplayOptions& options) {
   if (!load_noise(options.recording, &noise, &error)) throw CommandError(kExitFailed, error);
   const std::unique_ptr<Pictures> pictures = open_pictures(options);
   OrientationStepOptions of_step = step_options(noise, calibration);
-  if (pictures) of_step.oe.emplace();
+  if (pictures) of_step.oe = oe_options(calibration.calibration.camera);
   OrientationStep step(of_step);
 
   StopSignals signals;

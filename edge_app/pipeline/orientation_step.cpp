@@ -144,7 +144,8 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
   FrameOrientation frame;
   if (oe_) {
     const OeStatus status = oe_->process(picture, *record->time_s, measured, &frame);
-    if (record->status == RecordStatus::kOk) record->status = to_record(status);
+    // That the frame's time is not yet known well, sigma says too.
+    if (measured != nullptr && status != OeStatus::kOk) record->status = to_record(status);
   } else if (measured != nullptr) {
     // Where this fails the frame stays without orientation.
     static_cast<void>(pt_orientation(options_.calibration, *record->time_s, *measured, &frame));

@@ -4,10 +4,15 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 #include <random>
+#include <vector>
+
+#include "test/support/allocation_guard.h"
 
 namespace alidade {
 namespace {
@@ -315,6 +320,177 @@ TEST(OrientationStep, FiltersTheStampsOfNumberedTelemetry) {
   }
   // 1 rad/s: one raw stamp would cost 3e-3 rad.
   EXPECT_LT(std::sqrt(square / frames), 1e-3);
+}
+
+// A textured picture of which a camera at rest sees the same part in each frame.
+class Scene {
+ public:
+  static constexpr int kWidth = 640;
+  static constexpr int kHeight = 480;
+
+  // Blocks of 64, 16 and 8 px of random brightness, softened by the mean of 3 x 3 px.
+  Scene() : luma_(static_cast<std::size_t>(kStride * kHeight)) {
+    std::mt19937 random(22);
+    std::uniform_int_distribution<int> level(-30, 30);
+    std::vector<int> sum(luma_.size(), 128);
+    for (const int block : {64, 16, 8}) {
+      const int columns = kStride / block;
+      std::vector<int> levels(static_cast<std::size_t>(columns * (kHeight / block + 1)));
+      for (int& l : levels) l = level(random);
+      for (int v = 0; v < kHeight; ++v) {
+        for (int u = 0; u < kStride; ++u) {
+          sum[at(u, v)] += levels[static_cast<std::size_t>((v / block) * columns + u / block)];
+        }
+      }
+    }
+    for (int v = 0; v < kHeight; ++v) {
+      for (int u = 0; u < kStride; ++u) {
+        int of_nine = 0;
+        for (int i = 0; i < 9; ++i) {
+          of_nine += sum[at(std::min(u + i % 3, kStride - 1), std::min(v + i / 3, kHeight - 1))];
+        }
+        luma_[at(u, v)] = static_cast<std::uint8_t>(of_nine / 9);
+      }
+    }
+  }
+
+  // What a camera turned to the right by so many px sees.
+  [[nodiscard]] ImageView picture(int right_px = 0) const {
+    return {luma_.data() + right_px, kWidth, kHeight, kStride};
+  }
+
+ private:
+  static constexpr int kStride = 704;
+  static std::size_t at(int u, int v) { return static_cast<std::size_t>(v * kStride + u); }
+  std::vector<std::uint8_t> luma_;
+};
+
+// A camera at rest in OE mode: 12.5 frames and 50 samples a second.
+class OeStepTest : public ::testing::Test {
+ protected:
+  static OrientationStepOptions options() {
+    OrientationStepOptions options;
+    options.calibration.camera.focal_length = 2000;
+    options.calibration.camera.width = Scene::kWidth;
+    options.calibration.camera.height = Scene::kHeight;
+    options.telemetry_limits.max_repeat_s = 0;  // a camera at rest says the same again
+    options.oe.emplace();
+    options.oe->cell_size_px = 30;  // so that there are coarse landmarks too
+    return options;
+  }
+  OeStepTest() {
+    rest_.pan_rate = 0;
+    rest_.tilt_rate = 0;
+  }
+
+  OrientationRecord add(const ImageView& picture, bool with_telemetry = true) {
+    const double t = 0.08 * frame_;
+    if (with_telemetry) rest_.feed(&step_, t, t + 0.07);
+    StepEvents events;
+    const OrientationRecord record = step_.add_frame(stamp_at(t, frame_++), picture, &events);
+    step_.maintain();
+    return record;
+  }
+  void build_map() {
+    for (int i = 0; i < 10; ++i) static_cast<void>(add(scene_.picture()));
+  }
+
+  Scene scene_;
+  Sweep rest_;
+  OrientationStep step_{options()};
+  int frame_ = 0;
+};
+
+TEST_F(OeStepTest, BeginsWithTelemetryAndThenHoldsToLandmarks) {
+  const OrientationRecord first = add(scene_.picture());
+  EXPECT_EQ(first.mode, RecordMode::kPt);
+  EXPECT_EQ(first.status, RecordStatus::kTooFewLandmarks);
+  EXPECT_EQ(first.landmarks, 0);
+  EXPECT_EQ(first.orientation->pan_acceleration_rad_s2, 0);
+  for (int i = 0; i < 10; ++i) {
+    const OrientationRecord record = add(scene_.picture());
+    EXPECT_EQ(record.mode, RecordMode::kOe) << i;
+    EXPECT_EQ(record.status, RecordStatus::kOk) << i;
+    EXPECT_GE(record.landmarks, 10) << i;
+    ASSERT_TRUE(record.orientation);
+    EXPECT_NEAR(record.orientation->pan_rad, rest_.pan_0, 1e-5);  // 0.02 px
+    EXPECT_NEAR(record.orientation->tilt_rad, rest_.tilt_0, 1e-5);
+  }
+}
+
+TEST_F(OeStepTest, AnswersFromTelemetryAndSaysWhyWhereThePictureDoesNotHelp) {
+  build_map();
+  const std::vector<std::uint8_t> covered(static_cast<std::size_t>(Scene::kWidth) * Scene::kHeight,
+                                          30);
+  struct Case {
+    const char* name;
+    ImageView picture;
+    RecordStatus status;
+  };
+  for (const Case& c :
+       {Case{"none", ImageView{}, RecordStatus::kBadImage},
+        Case{"too small",
+             {scene_.picture().luma, Scene::kWidth - 2, Scene::kHeight, scene_.picture().stride},
+             RecordStatus::kBadImage},
+        Case{"covered",
+             {covered.data(), Scene::kWidth, Scene::kHeight, Scene::kWidth},
+             RecordStatus::kTooFewLandmarks},
+        // 30 px are 15 mrad, where telemetry is sure of 0.1 mrad.
+        Case{"turned", scene_.picture(30), RecordStatus::kContradiction}}) {
+    const OrientationRecord record = add(c.picture);
+    EXPECT_EQ(record.mode, RecordMode::kPt) << c.name;
+    EXPECT_STREQ(to_string(record.status), to_string(c.status)) << c.name;
+    EXPECT_EQ(record.landmarks, 0) << c.name;
+    ASSERT_TRUE(record.orientation) << c.name;
+    EXPECT_NEAR(record.orientation->pan_rad, rest_.pan_0, 1e-9) << c.name;
+    EXPECT_EQ(add(scene_.picture()).mode, RecordMode::kOe) << c.name;
+  }
+}
+
+TEST_F(OeStepTest, LandmarksCarryOnWhereTelemetryIsMissing) {
+  build_map();
+  step_.telemetry_lost();
+  OrientationRecord record;
+  for (int i = 0; i < 10; ++i) record = add(scene_.picture(), false);
+  EXPECT_EQ(record.mode, RecordMode::kOe);
+  EXPECT_EQ(record.status, RecordStatus::kTelemetryLost);
+  EXPECT_GE(record.landmarks, 10);
+  ASSERT_TRUE(record.orientation);
+  EXPECT_NEAR(record.orientation->pan_rad, rest_.pan_0, 1e-5);
+  record = add(ImageView{}, false);
+  EXPECT_EQ(record.mode, RecordMode::kNone);
+  EXPECT_EQ(record.status, RecordStatus::kTelemetryLost);
+  EXPECT_EQ(record.landmarks, 0);
+  EXPECT_FALSE(record.orientation);
+}
+
+TEST_F(OeStepTest, StatesTheTimeOfAFrameAsPtModeDoes) {
+  OrientationStepOptions pt_options = options();
+  pt_options.oe.reset();
+  OrientationStep pt(pt_options);
+  for (int i = 0; i < 50; ++i) {
+    const double t = 0.08 * i;
+    rest_.feed(&step_, t, t + 0.07);
+    rest_.feed(&pt, t, t + 0.07);
+    FrameStamp stamp = stamp_at(t, i);
+    stamp.sequence = i;
+    StepEvents events;
+    const OrientationRecord record = step_.add_frame(stamp, scene_.picture(), &events);
+    EXPECT_EQ(record.time_s, pt.add_frame(stamp, ImageView{}, &events).time_s);
+    step_.maintain();
+  }
+}
+
+TEST_F(OeStepTest, AllocatesNothingAfterItsConstruction) {
+  const test::AllocationGuard guard;
+  int oe = 0;
+  for (int i = 0; i < 40; ++i) {
+    // New landmarks, lost ones, none, and pictures that contradict telemetry.
+    const ImageView picture = i % 10 == 9 ? ImageView{} : scene_.picture(i % 10 == 8 ? 30 : 0);
+    if (add(picture, i % 5 != 4).mode == RecordMode::kOe) ++oe;
+  }
+  EXPECT_EQ(guard.count(), 0);
+  EXPECT_GT(oe, 20);
 }
 
 }  // namespace
