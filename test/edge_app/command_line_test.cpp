@@ -18,6 +18,7 @@
 #include <string>
 #include <vector>
 
+#include "test/edge_app/alidade_command.h"
 #include "test/edge_app/process.h"
 #include "test/support/temporary_directory.h"
 
@@ -31,25 +32,6 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 using ::testing::Not;
 using ::testing::StartsWith;
-
-struct Result {
-  int exit_code;
-  std::string output;
-  std::string errors;
-};
-
-std::vector<std::string> command(const std::vector<std::string>& arguments) {
-  std::vector<std::string> all = {ALIDADE_EXECUTABLE};
-  all.insert(all.end(), arguments.begin(), arguments.end());
-  return all;
-}
-
-Result alidade(const std::vector<std::string>& arguments) {
-  Process process(command(arguments));
-  std::string output = process.read_all();
-  const int exit_code = process.wait();
-  return {exit_code, std::move(output), process.errors()};
-}
 
 // A port of the loopback on which nobody listens.
 int refusing_port() {
@@ -144,28 +126,6 @@ struct CrookedHead {
   }
 };
 
-std::vector<std::map<std::string, std::string>> read_csv(const std::string& text) {
-  const auto split = [](const std::string& line) {
-    std::vector<std::string> cells;
-    std::istringstream stream(line + ",");
-    for (std::string cell; std::getline(stream, cell, ',');) cells.push_back(cell);
-    return cells;
-  };
-  std::istringstream stream(text);
-  std::string line;
-  std::getline(stream, line);
-  const std::vector<std::string> names = split(line);
-  std::vector<std::map<std::string, std::string>> rows;
-  while (std::getline(stream, line)) {
-    const std::vector<std::string> cells = split(line);
-    EXPECT_EQ(cells.size(), names.size()) << line;
-    std::map<std::string, std::string> row;
-    for (std::size_t i = 0; i < std::min(cells.size(), names.size()); ++i) row[names[i]] = cells[i];
-    rows.push_back(row);
-  }
-  return rows;
-}
-
 TEST(CommandLine, HelpAndVersionGoToStdout) {
   for (const std::vector<std::string>& arguments : {std::vector<std::string>{"--help"},
                                                     {"run", "--help"},
@@ -196,6 +156,7 @@ TEST(CommandLine, BadUsageIsOneLineAndExitCodeTwo) {
                                                     {"run"},
                                                     {"run", "-c", "x", "--json", "--csv"},
                                                     {"replay"},
+                                                    {"replay", "x", "--mode", "ORB"},
                                                     {"calibrate"},
                                                     {"record", "-c", "x"},
                                                     {"check", "-c", "x", "--duration", "-3"},
@@ -358,6 +319,17 @@ TEST_F(CommandLineTest, ReplayWithoutACalibrationSaysWhatToDo) {
   const Result result = alidade({"replay", directory_.path()});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr("--calibration FILE"));
+}
+
+TEST_F(CommandLineTest, ReplayInOeModeRefusesARecordingWithoutPictures) {
+  head_.record(directory_, 5);
+  directory_.write("alidade/calibration.yaml", head_.calibration());
+  const Result result = alidade({"replay", directory_.path(), "--mode", "OE"});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, AllOf(StartsWith("alidade: " + directory_.path()),
+                                   HasSubstr("has no pictures"), HasSubstr("--mode PT")));
+  EXPECT_EQ(result.errors.find('\n'), result.errors.size() - 1) << result.errors;
+  EXPECT_FALSE(std::filesystem::exists(path("alidade/orientation.csv")));
 }
 
 TEST_F(CommandLineTest, ReplayRefusesACalibrationOfAnotherSize) {
