@@ -4,7 +4,7 @@
     demo_report.py --truth DIR --output DIR NAME=RECORDS.csv:CALIBRATION.yaml ...
 
 For every record and every pixel of a grid it takes the direction that the record gives the pixel (its own angles,
-rates and camera, the calibration's axes) and the true direction of that pixel at its own row's true time; the angle
+rates, accelerations and camera, the calibration's axes) and the true direction of that pixel at its own row's true time; the angle
 between them times the true focal length is the error in px. The forward model here is written with numpy for this
 comparison alone: it shares nothing with the program it judges, nor with the virtual camera.
 """
@@ -126,8 +126,8 @@ def compare(records, calibration, truth, path, link_delay=0.0):
         record.radial_distortion = float(row["radial_distortion"])
         dt = pixels[:, 1] * float(row["line_delay_s"])
         d_record = directions(record, calibration, pixels,
-                              float(row["pan_rad"]) + dt * float(row["pan_rate_rad_s"]),
-                              float(row["tilt_rad"]) + dt * float(row["tilt_rate_rad_s"]))
+                              *(float(row[f"{angle}_rad"]) + dt * float(row[f"{angle}_rate_rad_s"])
+                                + dt**2 / 2 * float(row[f"{angle}_acceleration_rad_s2"]) for angle in ("pan", "tilt")))
         true_angles = path.at(i, pixels[:, 1] * truth.line_delay + link_delay)
         d_true = directions(truth, truth, pixels, true_angles[:, 0], true_angles[:, 1])
         # Tangent components: to the right and downwards as seen by the true camera.
