@@ -75,6 +75,8 @@ class Calibrator {
   bool adjust_on_inliers(Adjustment* adjustment);
   bool mark_outliers(const Linearisation& at);
   bool correct_noise();
+  [[nodiscard]] double repetition() const;
+  bool adjust_for_repetition(Adjustment* adjustment);
   void conclude();
 
   const CalibrationInput& input_;
@@ -585,6 +587,63 @@ bool Calibrator::adjust() {
                 "the adjustment does not converge: the model does not describe these data; are the "
                 "image's size and the tracks those of one zoom?" +
                     internal::ask_for_degrees(start_focal_length_, input_.width));
+  }
+  return adjust_for_repetition(&adjustment);
+}
+
+// By how much more than independent ones the observations of a landmark in neighbouring frames err alike:
+// 1 + 2 sum of the correlations, as long as there are any.
+double Calibrator::repetition() const {
+  constexpr std::size_t kLongest = 15;     // frames apart
+  constexpr double kNoCorrelation = 0.02;  // and none beyond
+  struct Seen {
+    int frame;
+    Vector2<double> error;
+  };
+  std::vector<std::vector<Seen>> tracks(state_.landmarks.size());
+  double observations = 0;
+  for (std::size_t i = 0; i < data_.observations.size(); ++i) {
+    const auto& o = data_.observations[i];
+    if (!o.used) continue;
+    tracks[static_cast<std::size_t>(o.landmark)].push_back({o.frame, at_.observations[i].error});
+    observations += 1;
+  }
+  std::array<double, kLongest + 1> products{};
+  std::array<double, kLongest + 1> pairs{};
+  for (auto& track : tracks) {
+    std::sort(track.begin(), track.end(),
+              [](const Seen& a, const Seen& b) { return a.frame < b.frame; });
+    // The landmark's direction took the mean out of them, and so their products fall short.
+    const double taken = track.empty() ? 0 : 2.0 / static_cast<double>(track.size());
+    for (std::size_t i = 0; i < track.size(); ++i) {
+      for (std::size_t j = i + 1; j < track.size(); ++j) {
+        const auto apart = static_cast<std::size_t>(track[j].frame - track[i].frame);
+        if (apart > kLongest) break;
+        products[apart] += track[i].error.dot(track[j].error) + taken;
+        pairs[apart] += 1;
+      }
+    }
+  }
+  double sum = 1;
+  for (std::size_t apart = 1; apart <= kLongest && pairs[apart] > 0; ++apart) {
+    const double correlation = products[apart] / (2 * pairs[apart]);
+    if (correlation < kNoCorrelation) break;
+    sum += 2 * correlation * pairs[apart] / observations;
+  }
+  return sum;
+}
+
+// Errors that repeat from frame to frame (a patch that looks different in another light, or is moved
+// across another part of the lens) are averaged less than the count of observations says.
+bool Calibrator::adjust_for_repetition(Adjustment* adjustment) {
+  constexpr double kChance = 1.1;
+  result_.quality.repetition = std::max(1.0, repetition());
+  if (result_.quality.repetition < kChance) return true;
+  for (auto& o : data_.observations) o.sigma *= std::sqrt(result_.quality.repetition);
+  if (!adjustment->minimise({}, 20, 1e-4, &state_, &at_) ||
+      !adjustment->covariance(at_, &covariance_, &telemetry_unknowns_)) {
+    return fail(CalibrationStatus::kNotConverged,
+                "the adjustment does not converge with errors that repeat from frame to frame");
   }
   return true;
 }

@@ -182,6 +182,9 @@ struct TelemetryResidual {
 struct CalibrationQuality {
   double pixel_sigma_ratio = 0;      // residual / stated noise, redundancy accounted for
   double telemetry_sigma_ratio = 0;  // likewise
+  // How many observations of a landmark in neighbouring frames are worth one, as their errors repeat each other:
+  // the sigmas account for it. 1: they are independent.
+  double repetition = 1;
   double mean_reprojection_error_px = 0;
   int frames = 0;
   int observations = 0;

@@ -384,6 +384,7 @@ void write_quality(const CalibrationNotes& notes, YAML::Emitter* out) {
   };
   *out << YAML::Key << "quality" << YAML::Value << YAML::BeginMap;
   number("pixel_sigma_ratio", quality.pixel_sigma_ratio, "residuals / stated noise");
+  number("repetition", quality.repetition, "observations of a landmark that count as one");
   number("telemetry_sigma_ratio", quality.telemetry_sigma_ratio, "residuals / assumed noise");
   number("mean_reprojection_error_px", quality.mean_reprojection_error_px, "px");
   number("motion_correlation", quality.motion_correlation, "image motion and telemetry");

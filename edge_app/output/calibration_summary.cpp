@@ -108,6 +108,11 @@ std::string summary_text(const CalibrationResult& result, const CalibrationOptio
       "residuals / noise: image {:.2f}, telemetry {:.2f}\n",
       quality.frames, quality.observations, quality.landmarks, quality.telemetry,
       quality.pixel_sigma_ratio, quality.telemetry_sigma_ratio);
+  if (quality.repetition > 1.1) {
+    text += fmt::format(
+        "image errors repeat from frame to frame: {:.1f} observations of a landmark count as one\n",
+        quality.repetition);
+  }
   for (const std::string& line : result.exclusions.describe()) text += "left out: " + line + "\n";
   text +=
       fmt::format("weakest: {} (condition {:.3g})\n", quality.weakest_direction, quality.condition);
