@@ -331,8 +331,8 @@ TEST(PatchAlignment, OneStepIsThatOfTheWholeAlignment) {
   one.min_gain = 1e-3;
   int compared = 0;
   int nearer = 0;
-  for (int n = 0; n < 500; ++n) {
-    const AnalyticImage texture(&random, 4);
+  for (int n = 0; n < 800; ++n) {
+    const AnalyticImage texture(&random, 5);
     const Pixels before = make_pixels(kSize, kSize, texture, 1, &random);
     const double gain = 0.5 + n % 3 * 0.5;
     const auto changed = [&](const Vector2<double>& at) {
