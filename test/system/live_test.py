@@ -141,15 +141,13 @@ class Record(SystemTest):
         code, _ = record.end(signal.SIGINT)
         self.assertEqual(code, 0, record.error_text())
 
-        for mode in "PT", "OE":
-            replay = self.alidade("replay", folder, "--calibration", camera.truth / "truth.yaml", "--json",
-                                  "--mode", mode)
-            code, lines = replay.end()
-            self.assertEqual(code, 0, replay.error_text())
-            records = [r for r in map(json.loads, lines) if r["mode"] == mode]
-            self.assertGreater(len(records), 60)
-            self.assertTrue((folder / "alidade" / "orientation.csv").exists())
-            self.assert_angles_are_true(records, camera)
+        replay = self.alidade("replay", folder, "--calibration", camera.truth / "truth.yaml", "--json", "--mode", "PT")
+        code, lines = replay.end()
+        self.assertEqual(code, 0, replay.error_text())
+        records = [r for r in map(json.loads, lines) if r["mode"] == "PT"]
+        self.assertGreater(len(records), 60)
+        self.assertTrue((folder / "alidade" / "orientation.csv").exists())
+        self.assert_angles_are_true(records, camera)
 
     assert_angles_are_true = Run.assert_angles_are_true
 
