@@ -276,6 +276,7 @@ void OeMode::State::reset(const Calibration& new_calibration) {
   // Room for what the camera turns while it reads out, and for a wrong prediction.
   cone = std::min(kPi, 1.3 * cone);
   forget_map();
+  frames = 0;
 }
 
 void OeMode::State::forget_map() {
@@ -968,9 +969,7 @@ void OeMode::State::make_landmarks(const ViewProjection& view) {
 
 void OeMode::State::maintain() {
   if (contradictions > kContradictionsToReset || lost > kLostToReset) {
-    const std::uint32_t now = frames;
     forget_map();
-    frames = now;
     return;
   }
   if (!may_make) return;

@@ -43,7 +43,7 @@ struct OeOptions {
 enum class OeStatus {
   kOk,             // orientation from landmarks and telemetry
   kTooFew,         // too few landmarks held: telemetry alone
-  kContradiction,  // landmarks and telemetry exclude each other: telemetry alone
+  kContradiction,  // landmarks and telemetry exclude each other: telemetry, with room for both
   kNoPrediction,   // neither telemetry nor a frame before: nothing is written
   kBadImage,       // none, or not of the calibration's size: telemetry alone
   kNotFinite       // nothing is written

@@ -78,7 +78,7 @@ struct SolveLimits {
   double min_half_readout_s = 1e-3;
 };
 
-// cell_px: size of a neighbourhood; half_readout_s: scale of the rows' times.
+// width, height: px, of the image; half_readout_s: scale of the rows' times.
 [[nodiscard]] SolveStatus solve_orientation(FoundLandmark* landmarks, int count,
                                             const MotionPrior& prior, const SolveLimits& limits,
                                             double width, double height, double half_readout_s,

@@ -177,8 +177,10 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
     by_angle += square;
     by_time += knots[i].own_variance * square;
   }
-  by_time(0, 0) += std::max(knots[before].shared_variance, knots[before + 1].shared_variance) +
-                   time_sigma_s * time_sigma_s;
+  const double shared_time_variance =
+      std::max(knots[before].shared_variance, knots[before + 1].shared_variance) +
+      time_sigma_s * time_sigma_s;
+  by_time(0, 0) += shared_time_variance;
   const Matrix2<double> rate_square = rate * rate.transpose();
   const double span_s = knots[count - 1].time_s - knots[0].time_s;
   Matrix4<double> covariance;
@@ -206,8 +208,18 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
   out->covariance = covariance;
   out->acceleration_square = acceleration_square;
   out->samples = cubic ? count : 2;
-  // White samples h apart tell sigma^2 h in a unit of time, whatever answers are made of them.
-  out->renewal_s = span_s / (count - 1) / by_angle(0, 0);
+  // White samples h apart tell sigma^2 h in a unit of time, whatever answers are made of them. What the
+  // clock and an unknown acceleration do stays alike for longer than neighbouring samples last.
+  constexpr double kLasting = 1;  // s
+  const double white_renewal_s = span_s / (count - 1) / by_angle(0, 0);
+  out->renewal_s = 0;
+  for (int axis = 0; axis < 2; ++axis) {
+    const double white = by_angle(0, 0) * variance;
+    const double lasting = shared_time_variance * rate[axis] * rate[axis] +
+                           effect[0] * effect[0] * acceleration_square[axis];
+    out->renewal_s = std::max(out->renewal_s,
+                              (white * white_renewal_s + lasting * kLasting) / (white + lasting));
+  }
   return true;
 }
 
