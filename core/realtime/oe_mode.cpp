@@ -145,8 +145,9 @@ struct OeMode::State {
   Vector2<double> offset = Vector2<double>::Zero();
   Matrix2<double> offset_covariance = Matrix2<double>::Zero();
   // Of rates and accelerations as the map makes them appear: see straighten_map().
-  std::array<Matrix2<double>, 2> bend_covariance{};  // of (rate, acceleration) of pan, of tilt ...
-  double bend_tilt = 0;                              // ... for a frame that looks at this tilt
+  // Of (angle, rate, acceleration) of pan, of tilt, by the map's bend: angle against the first frame's ...
+  std::array<Matrix3<double>, 2> bend_covariance{};
+  double bend_tilt = 0;  // ... for a frame that looks at this tilt
   struct Past {
     double time_s;  // middle row
     Vector2<double> angle, rate, acceleration;
@@ -285,7 +286,7 @@ void OeMode::State::forget_map() {
   offset.setZero();
   offset_covariance.setZero();
   noise_sigma = kExpectedNoise;
-  for (Matrix2<double>& covariance : bend_covariance) covariance.setZero();
+  for (Matrix3<double>& covariance : bend_covariance) covariance.setZero();
   past_count = 0;
   contradictions = 0;
   lost = 0;
@@ -666,19 +667,23 @@ double OeMode::State::time_per_angle() const {
 // A frame that looks elsewhere sees the landmarks at other times: a wrong acceleration is another wrong
 // rate there.
 void OeMode::State::move_bend(double tilt) {
-  Matrix2<double> carry = Matrix2<double>::Identity();
-  carry(0, 1) = time_per_angle() * (tilt - bend_tilt);
-  for (Matrix2<double>& covariance : bend_covariance) {
-    covariance = symmetric(carry * covariance * carry.transpose());
+  const double t = time_per_angle() * (tilt - bend_tilt);
+  Matrix3<double> carry = Matrix3<double>::Identity();
+  carry(0, 1) = t;
+  carry(0, 2) = t * t / 2;
+  carry(1, 2) = t;
+  for (Matrix3<double>& covariance : bend_covariance) {
+    covariance = carry * covariance * carry.transpose();
+    covariance = (0.5 * (covariance + covariance.transpose())).eval();
   }
   bend_tilt = tilt;
 }
 
 void OeMode::State::add_bend(Matrix6* covariance) const {
   for (int axis = 0; axis < 2; ++axis) {
-    const Matrix2<double>& bend = bend_covariance[static_cast<std::size_t>(axis)];
-    for (int i = 0; i < 2; ++i) {
-      for (int j = 0; j < 2; ++j) (*covariance)(2 + 2 * i + axis, 2 + 2 * j + axis) += bend(i, j);
+    const Matrix3<double>& bend = bend_covariance[static_cast<std::size_t>(axis)];
+    for (int i = 0; i < 3; ++i) {
+      for (int j = 0; j < 3; ++j) (*covariance)(2 * i + axis, 2 * j + axis) += bend(i, j);
     }
   }
 }
@@ -721,7 +726,7 @@ void OeMode::State::straighten_map() {
   // Of the landmarks in view a twentieth is new and takes over the errors of the frame it was made in.
   constexpr double kInherited = 0.05 * 0.05;
   for (int axis = 0; axis < 2; ++axis) {
-    bend_covariance[static_cast<std::size_t>(axis)] +=
+    bend_covariance[static_cast<std::size_t>(axis)].bottomRightCorner<2, 2>() +=
         kInherited * rate_covariance(motion_covariance, axis);
   }
   if (past_count < static_cast<int>(past.size()) || calibration.line_delay == 0) return;
@@ -752,7 +757,7 @@ void OeMode::State::straighten_map() {
   Vector2<double> too_fast = Vector2<double>::Zero();
   Vector2<double> too_much = Vector2<double>::Zero();
   for (int axis = 0; axis < 2; ++axis) {
-    Matrix2<double>& bend = bend_covariance[static_cast<std::size_t>(axis)];
+    Matrix3<double>& bend = bend_covariance[static_cast<std::size_t>(axis)];
     const Vector2<double> wrong(middle.rate[axis] - rate[axis],
                                 middle.acceleration[axis] - acceleration[axis]);
     Matrix2<double> noise = rate_covariance(middle.covariance, axis);
@@ -762,13 +767,17 @@ void OeMode::State::straighten_map() {
     noise(0, 0) += to_rate.squaredNorm() * angle_variance + rate_surprise * rate_surprise;
     noise(1, 1) += to_acceleration.squaredNorm() * angle_variance +
                    acceleration_surprise * acceleration_surprise;
-    const Matrix2<double> to_information = (bend + noise).inverse();
+    const Matrix2<double> to_information = (bend.bottomRightCorner<2, 2>() + noise).inverse();
     constexpr double kGate = 25;  // chi-square, 2 degrees of freedom
     if (!(wrong.dot(to_information * wrong) < kGate)) continue;
-    const Matrix2<double> gain = bend * to_information;
-    too_fast[axis] = gain.row(0) * wrong;
-    too_much[axis] = gain.row(1) * wrong;
-    bend = symmetric((Matrix2<double>::Identity() - gain) * bend);
+    const Matrix<double, 3, 2> gain = bend.rightCols<2>() * to_information;
+    const Vector3<double> error = gain * wrong;
+    // The angle has gone wrong with the way from where the map began, by the rate that was.
+    offset[axis] -= error[0];
+    too_fast[axis] = error[1];
+    too_much[axis] = error[2];
+    bend -= gain * bend.bottomRows<2>();
+    bend = (0.5 * (bend + bend.transpose())).eval();
   }
   bend_map(too_fast, too_much, middle.angle.y());
 }
@@ -991,7 +1000,9 @@ void OeMode::State::maintain() {
     past_count = 0;
     bend_tilt = motion.angle.tilt;
     for (int axis = 0; axis < 2; ++axis) {
-      bend_covariance[static_cast<std::size_t>(axis)] = rate_covariance(motion_covariance, axis);
+      Matrix3<double>& bend = bend_covariance[static_cast<std::size_t>(axis)];
+      bend.setZero();
+      bend.bottomRightCorner<2, 2>() = rate_covariance(motion_covariance, axis);
     }
   }
   const ViewProjection view(calibration, motion);
