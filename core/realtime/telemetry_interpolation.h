@@ -51,8 +51,9 @@ struct InterpolatedPanTilt {
   // (rad/s^2)^2, expected square of the acceleration (pan, tilt) about this time.
   Vector2<double> acceleration_square = Vector2<double>::Zero();
   int samples = 0;  // how many the answer rests on: 2 is the straight line
-  // s, after which the noise of the angle is another: the same samples answer for a while. So much time
-  // is worth one independent answer.
+  // s, after which the error of the angle is another: the same samples answer for a while, and what the
+  // clock or an unknown acceleration does lasts for about a second. So much time is worth one
+  // independent answer.
   double renewal_s = 0;
 };
 
