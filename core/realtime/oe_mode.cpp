@@ -105,7 +105,7 @@ struct OeMode::State {
   void move_bend(double tilt);
   void add_bend(Matrix6* covariance) const;
   void remember_motion();
-  void straighten_map();
+  [[nodiscard]] bool straighten_map();
   void bend_map(const Vector2<double>& rate, const Vector2<double>& acceleration,
                 double origin_tilt);
   void judge_coarse(const ViewProjection& view);
@@ -113,6 +113,7 @@ struct OeMode::State {
   void mark(int slot, bool matched, double residual_square);
   void make_landmarks(const ViewProjection& view);
   bool make_landmark(const FastCorner& corner, int octave);
+  void clear_landmarks();
   void forget_map();
 
   OeOptions options;
@@ -280,9 +281,15 @@ void OeMode::State::reset(const Calibration& new_calibration) {
   frames = 0;
 }
 
-void OeMode::State::forget_map() {
+void OeMode::State::clear_landmarks() {
   const double f = calibration.camera.focal_length;
   map.clear(options.cell_size_px / f, kLargestCells * options.cell_size_px / f);
+  chosen_count = 0;
+  coarse_count = 0;
+}
+
+void OeMode::State::forget_map() {
+  clear_landmarks();
   offset.setZero();
   offset_covariance.setZero();
   noise_sigma = kExpectedNoise;
@@ -292,8 +299,6 @@ void OeMode::State::forget_map() {
   lost = 0;
   may_make = false;
   has_last = false;
-  chosen_count = 0;
-  coarse_count = 0;
   statistics = {};
 }
 
@@ -721,15 +726,15 @@ void OeMode::State::remember_motion() {
 // the wrong rate, in the directions of all made since. The angles of neighbouring frames know
 // better: the derivatives of the curve through five of them, in its middle, are held against the rate
 // and acceleration that the map showed there, and the map is bent back, as far as that is sure
-// (Kalman).
-void OeMode::State::straighten_map() {
+// (Kalman). True if it was bent by so much that the small corrections this can make leave it crooked.
+bool OeMode::State::straighten_map() {
   // Of the landmarks in view a twentieth is new and takes over the errors of the frame it was made in.
   constexpr double kInherited = 0.05 * 0.05;
   for (int axis = 0; axis < 2; ++axis) {
     bend_covariance[static_cast<std::size_t>(axis)].bottomRightCorner<2, 2>() +=
         kInherited * rate_covariance(motion_covariance, axis);
   }
-  if (past_count < static_cast<int>(past.size()) || calibration.line_delay == 0) return;
+  if (past_count < static_cast<int>(past.size()) || calibration.line_delay == 0) return false;
   const Past& middle = past[kCurve / 2];
   const double h = (past[0].time_s - past[kCurve - 1].time_s) / (kCurve - 1);
   Matrix<double, kCurve, kCurve> powers;
@@ -769,7 +774,11 @@ void OeMode::State::straighten_map() {
                    acceleration_surprise * acceleration_surprise;
     const Matrix2<double> to_information = (bend.bottomRightCorner<2, 2>() + noise).inverse();
     constexpr double kGate = 25;  // chi-square, 2 degrees of freedom
-    if (!(wrong.dot(to_information * wrong) < kGate)) continue;
+    if (!(wrong.dot(to_information * wrong) < kGate)) {
+      // A jerk, or a bend beyond what was thought: if it stays, it will be believed.
+      bend *= 2;
+      continue;
+    }
     const Matrix<double, 3, 2> gain = bend.rightCols<2>() * to_information;
     const Vector3<double> error = gain * wrong;
     // The angle has gone wrong with the way from where the map began, by the rate that was.
@@ -780,6 +789,9 @@ void OeMode::State::straighten_map() {
     bend = (0.5 * (bend + bend.transpose())).eval();
   }
   bend_map(too_fast, too_much, middle.angle.y());
+  constexpr double kCrooked = 0.2;  // px, at the first and the last row
+  const double half_readout_s = calibration.line_delay * motion.reference_row;
+  return too_fast.norm() * std::abs(half_readout_s) * calibration.camera.focal_length > kCrooked;
 }
 
 // Takes from all landmarks what so much too high a rate and acceleration, shown by a frame that looked
@@ -995,7 +1007,14 @@ void OeMode::State::maintain() {
   if (statistics.status == OeStatus::kOk) {
     refine_landmarks();
     remember_motion();
-    straighten_map();
+    if (straighten_map()) {
+      // This frame's motion is right now: better landmarks than those of the first can be had.
+      clear_landmarks();
+      for (int axis = 0; axis < 2; ++axis) {
+        bend_covariance[static_cast<std::size_t>(axis)].bottomRightCorner<2, 2>() +=
+            rate_covariance(motion_covariance, axis);
+      }
+    }
   } else {
     past_count = 0;
     bend_tilt = motion.angle.tilt;
