@@ -561,32 +561,59 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   }
   const bool coarse_aligned = align_coarse(sigma_px);
 
-  // 3. Landmarks. Where the coarse octaves found nothing, they are worth a look only nearby.
-  constexpr double kNearby = 2;  // px
-  if (coarse_aligned || sigma_px < kNearby) {
-    const ViewProjection view(calibration, motion);
-    // Which landmarks are in view hardly changes by a few pixels.
-    constexpr double kOtherView = 16;  // px
-    if (statistics.coarse_shift_px > kOtherView) find_visible(view);
-    choose_fine();
-    align_fine(view);
-  }
-
-  // 4. Solution, about where the residuals were taken.
+  // 3. Landmarks, and 4. the solution, about where the residuals were taken.
   offset_covariance.diagonal().array() += kOffsetDrift * kOffsetDrift * since_last_s;
   prior.offset_covariance = offset_covariance;
-  const Vector2<double> moved(predicted.angle.pan - motion.angle.pan,
-                              predicted.angle.tilt - motion.angle.tilt);
-  if (prior.has_telemetry) {
-    prior.telemetry.head<2>() = moved;
-  } else {
-    prior.motion.head<2>() = moved;
-  }
   SolvedMotion solved;
-  const double half_readout_s = calibration.line_delay * middle_row;
-  const SolveStatus status = solve_orientation(found.data(), statistics.aligned, prior,
-                                               SolveLimits{}, calibration.camera.width,
-                                               calibration.camera.height, half_readout_s, &solved);
+  const auto solve_from = [&](const FrameMotion<double>& start) {
+    motion = start;
+    const ViewProjection view(calibration, motion);
+    find_visible(view);
+    choose_fine();
+    align_fine(view);
+    const Vector2<double> moved = predicted.angle.vector() - motion.angle.vector();
+    if (prior.has_telemetry) {
+      prior.telemetry.head<2>() = moved;
+    } else {
+      prior.motion.head<2>() = moved;
+    }
+    solved = {};
+    return solve_orientation(found.data(), statistics.aligned, prior, SolveLimits{},
+                             calibration.camera.width, calibration.camera.height,
+                             calibration.line_delay * middle_row, &solved);
+  };
+  SolveStatus status = SolveStatus::kTooFew;
+  // Where the coarse octaves found nothing, landmarks are worth a look only nearby.
+  constexpr double kNearby = 2;  // px
+  const FrameMotion<double> first = motion;
+  if (coarse_aligned || sigma_px < kNearby) status = solve_from(first);
+  // Texture that repeats can hold the coarse octaves elsewhere: most landmarks are then not found, and how
+  // the camera moved before is another place to look.
+  constexpr double kMost = 0.6;
+  constexpr int kMany = 40;
+  const bool doubtful =
+      status == SolveStatus::kTooFew ||
+      (status == SolveStatus::kOk && solved.inliers < kMost * statistics.looked_for);
+  if (follows && doubtful) {
+    FrameMotion<double> carried = last_motion;
+    const double t = frame_time_s - last_time_s;
+    carried.angle = {
+        last_motion.angle.pan + t * last_motion.rate.pan + t * t / 2 * last_motion.acceleration.pan,
+        last_motion.angle.tilt + t * last_motion.rate.tilt +
+            t * t / 2 * last_motion.acceleration.tilt};
+    carried.rate = {last_motion.rate.pan + t * last_motion.acceleration.pan,
+                    last_motion.rate.tilt + t * last_motion.acceleration.tilt};
+    carried.acceleration = {};
+    const SolveStatus before = status;
+    const int looked_for = statistics.looked_for;
+    status = solve_from(carried);
+    if (status != SolveStatus::kOk || solved.inliers < kMany ||
+        solved.inliers < kMost * statistics.looked_for) {
+      // No better, or by a few only, which agree by chance too.
+      status = before == SolveStatus::kOk ? solve_from(first) : before;
+      statistics.looked_for = looked_for;
+    }
+  }
   if (status != SolveStatus::kOk) {
     finish_observations(SolvedMotion{});
     motion = predicted;
