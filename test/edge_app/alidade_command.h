@@ -26,11 +26,24 @@ inline std::vector<std::string> command(const std::vector<std::string>& argument
   return all;
 }
 
-inline Result alidade(const std::vector<std::string>& arguments) {
-  Process process(command(arguments));
+inline Result run(const std::vector<std::string>& program_and_arguments) {
+  Process process(program_and_arguments);
   std::string output = process.read_all();
   const int exit_code = process.wait();
   return {exit_code, std::move(output), process.errors()};
+}
+
+inline Result alidade(const std::vector<std::string>& arguments) { return run(command(arguments)); }
+
+inline Result calibrate_command(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "calibrate");
+  return alidade(arguments);
+}
+
+// The line that says why, after the log.
+inline std::string last_line(const std::string& text) {
+  const std::size_t begin = text.rfind('\n', text.size() - 2);
+  return begin == std::string::npos ? text : text.substr(begin + 1);
 }
 
 // Rows of a CSV table by the names of its columns.

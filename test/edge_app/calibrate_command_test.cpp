@@ -17,7 +17,7 @@
 
 #include "core/calibration/calibration_file.h"
 #include "core/calibration/landmark_file.h"
-#include "test/edge_app/process.h"
+#include "test/edge_app/alidade_command.h"
 #include "test/edge_app/recording_files.h"
 #include "test/support/temporary_directory.h"
 
@@ -32,30 +32,6 @@ using ::testing::Not;
 using ::testing::StartsWith;
 
 namespace fs = std::filesystem;
-
-struct Result {
-  int exit_code;
-  std::string output;
-  std::string errors;
-};
-
-Result run(const std::vector<std::string>& arguments) {
-  Process process(arguments);
-  std::string output = process.read_all();
-  const int exit_code = process.wait();
-  return {exit_code, std::move(output), process.errors()};
-}
-
-Result calibrate_command(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), {ALIDADE_EXECUTABLE, "calibrate"});
-  return run(arguments);
-}
-
-// The line that says why, after the log.
-std::string last_line(const std::string& text) {
-  const std::size_t begin = text.rfind('\n', text.size() - 2);
-  return begin == std::string::npos ? text : text.substr(begin + 1);
-}
 
 // Line `number` (from 1) replaced; an empty one is removed.
 std::string with_line(const std::string& text, int number, const std::string& replacement) {

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/calibration/calibration_file.h"
-#include "test/edge_app/process.h"
+#include "test/edge_app/alidade_command.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {
@@ -45,29 +45,6 @@ const char* const kTexture =
     "scene:\n"
     "  procedural:\n"
     "    - {width_deg: 360, height_deg: 180, projection: equirectangular}\n";
-
-struct Result {
-  int exit_code;
-  std::string output;
-  std::string errors;
-};
-
-Result run(const std::vector<std::string>& arguments) {
-  Process process(arguments);
-  std::string output = process.read_all();
-  const int exit_code = process.wait();
-  return {exit_code, std::move(output), process.errors()};
-}
-
-Result calibrate_command(std::vector<std::string> arguments) {
-  arguments.insert(arguments.begin(), {ALIDADE_EXECUTABLE, "calibrate"});
-  return run(arguments);
-}
-
-std::string last_line(const std::string& text) {
-  const std::size_t begin = text.rfind('\n', text.size() - 2);
-  return begin == std::string::npos ? text : text.substr(begin + 1);
-}
 
 void film(const TemporaryDirectory& directory, const std::string& configuration,
           const std::string& name) {
