@@ -101,6 +101,8 @@ class ViewProjection {
     if (line_delay_ == 0) return true;
     double row = middle_row_;
     double v = u->y();
+    // Also because a difference quotient over a step that is rounding alone would be anything.
+    if (std::abs(v - row) < kTolerance) return true;
     double slope = 0;
     for (int step = 0; step < kMaxSteps; ++step) {
       // Far outside the image the quadratic is an extrapolation, and nobody asks.
@@ -109,8 +111,7 @@ class ViewProjection {
       if (alidade::project(camera_, path->at(parameter(next)), u) != ProjectionStatus::kOk) {
         return false;
       }
-      const double moved = next - row;
-      if (moved != 0) slope = (u->y() - v) / moved;
+      slope = (u->y() - v) / (next - row);
       if (!(slope < 1)) return false;
       row = next;
       v = u->y();
