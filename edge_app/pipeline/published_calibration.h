@@ -1,0 +1,53 @@
+#pragma once
+// PublishedCalibration: what the calibration thread hands to the real-time thread: a calibration and the map
+// made with it, as one object that nobody changes any more. CalibrationReport: what the calibration thread
+// is doing and what it needs, for records and log.
+
+#include <cstdint>
+#include <string>
+
+#include "core/model/calibration.h"
+#include "core/realtime/map_state.h"
+
+namespace alidade {
+
+struct PublishedCalibration {
+  Calibration calibration;
+  bool calibrated = false;  // false: the data sheet's values; landmarks are not looked for
+  MapState map;             // may be empty
+  std::string name;         // for people: a file, "data sheet", "live"
+};
+
+// What the calibration thread is doing.
+enum class CalibrationActivity : std::uint8_t {
+  kOff,         // no automatic calibration: the calibration stays as it is
+  kCollecting,  // no calibration for this camera at this zoom: watches the camera move
+  kAdjusting,   // computes one
+  kWatching,    // there is one; new data is held against it, and refines it
+  kDoubtful     // there is one that landmarks or telemetry contradict: withdrawn, collects anew
+};
+
+// What would help it.
+enum class CalibrationNeed : std::uint8_t {
+  kNothing,
+  kVideo,         // no frames come
+  kTelemetry,     // no pan/tilt samples come
+  kMotion,        // the camera must move
+  kPan,           // it tilts only
+  kTilt,          // it pans only
+  kAcceleration,  // constant velocity: clock offset and line delay stay unknown
+  kTexture,       // scene too plain: too few landmarks
+  kAgreement,     // telemetry does not describe the motion in the video
+  kTime,          // more of the same
+  kSteadyZoom     // the zoom is moving
+};
+
+[[nodiscard]] const char* to_string(CalibrationActivity activity);
+[[nodiscard]] const char* to_string(CalibrationNeed need);  // "tilt more"; empty for kNothing
+
+struct CalibrationReport {
+  CalibrationActivity activity = CalibrationActivity::kOff;
+  CalibrationNeed need = CalibrationNeed::kNothing;
+};
+
+}  // namespace alidade
