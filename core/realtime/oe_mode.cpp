@@ -38,6 +38,7 @@ constexpr double kLongestPrediction = 0.5;  // s, without telemetry
 // The offset of map and telemetry drifts: heat, gears. rad / sqrt(s)
 constexpr double kOffsetDrift = 1e-6;
 
+constexpr int kFew = 10;        // landmarks; with fewer a view is one that the map does not know
 constexpr int kEmptyView = 50;  // landmarks; with fewer a view needs all that can be made
 constexpr int kMaxMisses = 15;  // in a row
 constexpr std::uint32_t kProbation = 20;
@@ -45,6 +46,8 @@ constexpr double kLeastMatched = 0.3;
 // A map that fits no more for so many frames in a row is of no use.
 constexpr int kContradictionsToReset = 50;
 constexpr int kLostToReset = 1000;
+// ... and one that was handed over and never fitted, sooner.
+constexpr int kLostToDoubt = 50;
 
 // As the reference was seen; a patch is prepared again when its warp has changed by this.
 constexpr float kFineWarpTolerance = 0.02F;
@@ -73,12 +76,32 @@ Matrix2<double> rate_covariance(const Matrix6& motion, int axis) {
 
 Matrix2<double> symmetric(const Matrix2<double>& m) { return 0.5 * (m + m.transpose()); }
 
+template <int kSize>
+bool is_covariance(const Matrix<double, kSize, kSize>& m) {
+  constexpr double kRounding = 1e-9;
+  // Principal minors of order 2 do: what they let pass of a 3x3 harms nothing.
+  for (int i = 0; i < kSize; ++i) {
+    for (int j = 0; j < kSize; ++j) {
+      const double bound = m(i, i) * m(j, j) * (1 + kRounding);
+      if (!(m(i, i) >= 0) || !(m(i, j) * m(i, j) <= bound)) return false;
+    }
+  }
+  return all_finite(m);
+}
+
+bool makes_sense(const Landmark& landmark) {
+  return is_covariance(landmark.covariance) && is_covariance(landmark.shared_covariance) &&
+         std::isnormal(landmark.J_pixel_tangent.determinant());
+}
+
 }  // namespace
 
 struct OeMode::State {
   explicit State(const OeOptions& options);
 
   void reset(const Calibration& new_calibration);
+  void take(const MapState& from);
+  [[nodiscard]] MapState map_state() const;
   OeStatus process(const ImageView& image, double frame_time_s,
                    const InterpolatedPanTilt* telemetry, FrameOrientation* out);
   void maintain();
@@ -115,6 +138,7 @@ struct OeMode::State {
   bool make_landmark(const FastCorner& corner, int octave);
   void clear_landmarks();
   void forget_map();
+  void doubt_map();
 
   OeOptions options;
   Calibration calibration;
@@ -162,6 +186,7 @@ struct OeMode::State {
   std::uint32_t frames = 0;
   int contradictions = 0;
   int lost = 0;
+  int unfound = 0;  // frames in a row that lacked the landmarks they should show
 
   // The frame last processed.
   OeStatistics statistics;
@@ -297,9 +322,48 @@ void OeMode::State::forget_map() {
   past_count = 0;
   contradictions = 0;
   lost = 0;
+  unfound = 0;
   may_make = false;
   has_last = false;
   statistics = {};
+}
+
+void OeMode::State::take(const MapState& from) {
+  const bool bend_known =
+      is_covariance(from.bend_covariance[0]) && is_covariance(from.bend_covariance[1]);
+  if (!ready || !bend_known || !std::isfinite(from.bend_tilt) ||
+      !all_finite(from.offset.vector()) || !is_covariance(from.offset_covariance)) {
+    return;
+  }
+  for (const Landmark& landmark : from.landmarks) {
+    int slot = 0;
+    if (map.size() == map.capacity()) break;
+    if (landmark.octave > top_octave() || !makes_sense(landmark) ||
+        map.insert(landmark, frames, &slot) != InsertStatus::kOk) {
+      continue;
+    }
+    LandmarkStatistics& known = map.statistics(slot);
+    known.matched = std::min(landmark.statistics.matched, landmark.statistics.seen);
+    known.seen = landmark.statistics.seen;
+  }
+  if (map.size() == 0) return;
+  offset = from.offset.vector();
+  offset_covariance = symmetric(from.offset_covariance);
+  bend_covariance = from.bend_covariance;
+  bend_tilt = from.bend_tilt;
+}
+
+MapState OeMode::State::map_state() const {
+  MapState out;
+  out.landmarks.reserve(static_cast<std::size_t>(map.size()));
+  for (int slot = 0; slot < map.capacity(); ++slot) {
+    if (map.occupied(slot)) out.landmarks.push_back(map.at(slot));
+  }
+  out.offset = {offset.x(), offset.y()};
+  out.offset_covariance = offset_covariance;
+  out.bend_covariance = bend_covariance;
+  out.bend_tilt = bend_tilt;
+  return out;
 }
 
 void OeMode::State::find_visible(const ViewProjection& view) {
@@ -618,11 +682,11 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
     finish_observations(SolvedMotion{});
     motion = predicted;
     // Where no landmark was to be expected, telemetry may found new ones.
-    constexpr int kFew = 10;
     constexpr int kFewCoarse = 5;
     may_make = telemetry != nullptr && statistics.looked_for < kFew && coarse_count < kFewCoarse;
     contradictions = status == SolveStatus::kContradiction ? contradictions + 1 : 0;
     ++lost;
+    if (status == SolveStatus::kTooFew && telemetry != nullptr && !may_make) ++unfound;
     if (telemetry == nullptr) return finish(OeStatus::kNoPrediction);
     if (status != SolveStatus::kContradiction) return finish(OeStatus::kTooFew);
     // One of the two is wrong, and nobody here can tell which: the answer has to cover both.
@@ -636,6 +700,7 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   finish_observations(solved);
   contradictions = 0;
   lost = 0;
+  unfound = 0;
   motion.angle = {motion.angle.pan + solved.correction[0],
                   motion.angle.tilt + solved.correction[1]};
   motion.rate = {motion.rate.pan + solved.correction[2], motion.rate.tilt + solved.correction[3]};
@@ -1015,11 +1080,33 @@ void OeMode::State::make_landmarks(const ViewProjection& view) {
   }
 }
 
+// What was handed over and is not found where it should be has gone, or was never there, if the
+// picture has something to show: that is taken in its place. Landmarks that were looked for in a frame
+// that fitted are another matter: fog lifts.
+void OeMode::State::doubt_map() {
+  constexpr double kTextured = 0.25;  // of the cells
+  if (pyramid.octaves() <= kFirstCoarseOctave) return;
+  find_visible(ViewProjection(calibration, motion));
+  const auto doubtful = [&](const Visible& v) { return map.at(v.slot).statistics.last_frame == 0; };
+  const auto end = std::partition(visible.begin(), visible.begin() + visible_count, doubtful);
+  if (end == visible.begin()) return;
+  const ImageView& picture = pyramid.octave(kFirstCoarseOctave);
+  FastGrid& grid = *corner_grids[kFirstCoarseOctave];
+  const FastResult result = grid.detect(picture, options.corner_threshold, corners.data(),
+                                        static_cast<int>(corners.size()));
+  const double cells_of_picture =
+      static_cast<double>(picture.width) * picture.height / (grid.cell_size() * grid.cell_size());
+  if (result.count < kTextured * cells_of_picture) return;
+  for (auto v = visible.begin(); v != end; ++v) map.retire(v->slot);
+  may_make = visible.begin() + visible_count - end < kFew;
+}
+
 void OeMode::State::maintain() {
   if (contradictions > kContradictionsToReset || lost > kLostToReset) {
     forget_map();
     return;
   }
+  if (unfound > kLostToDoubt) doubt_map();
   if (!may_make) return;
   may_make = false;
   learn_noise();
@@ -1060,6 +1147,10 @@ OeMode::OeMode(const OeOptions& options) : state_(std::make_unique<State>(option
 OeMode::~OeMode() = default;
 
 void OeMode::reset(const Calibration& calibration) { state_->reset(calibration); }
+void OeMode::reset(const Calibration& calibration, const MapState& map) {
+  state_->reset(calibration);
+  state_->take(map);
+}
 
 OeStatus OeMode::process(const ImageView& image, double frame_time_s,
                          const InterpolatedPanTilt* at_middle_row, FrameOrientation* out) {
@@ -1071,6 +1162,7 @@ void OeMode::maintain() { state_->maintain(); }
 const OeStatistics& OeMode::statistics() const { return state_->statistics; }
 const OeObservation* OeMode::observations() const { return state_->observations.data(); }
 const LandmarkMap& OeMode::map() const { return state_->map; }
+MapState OeMode::map_state() const { return state_->map_state(); }
 
 std::size_t OeMode::memory_bytes() const { return state_->memory_bytes(); }
 

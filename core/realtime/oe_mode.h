@@ -13,8 +13,10 @@
 // One estimator for OE and PT: without landmarks the solution is telemetry's, with its covariance. Where
 // landmarks contradict telemetry beyond what both claim, the answer is telemetry's with a covariance
 // that covers both, and the mode is PT.
-// The map begins empty, in the frame that the first telemetry gave it. Its offset from the base frame
-// (pan, tilt) is estimated from all telemetry since.
+// The map begins empty, in the frame that the first telemetry gave it, or as another OeMode left it. Its
+// offset from the base frame (pan, tilt) is estimated from all telemetry since.
+// What was handed over is believed as far as pictures bear it out: a map that telemetry contradicts is
+// forgotten after 50 frames, as is, after 50 frames that show other things, what should be in view of it.
 // Fixed memory, taken by the constructor; nothing else allocates, waits or throws. One thread.
 
 #include <array>
@@ -26,6 +28,7 @@
 #include "core/realtime/frame_orientation.h"
 #include "core/realtime/image_view.h"
 #include "core/realtime/landmark_map.h"
+#include "core/realtime/map_state.h"
 #include "core/realtime/telemetry_interpolation.h"
 
 namespace alidade {
@@ -82,6 +85,10 @@ class OeMode {
 
   // Begins anew: empty map, nothing remembered. Real-time safe.
   void reset(const Calibration& calibration);
+  // The same, but with this map, made with this calibration, by this mount without a restart that
+  // moved its zero; it is in OE mode in its first frame. Landmarks that make no sense, or that there is
+  // no room for, are left out; a map whose offset makes no sense is none. Real-time safe: 0.3 us a landmark.
+  void reset(const Calibration& calibration, const MapState& map);
 
   // frame_time_s: t0, row 0 on the image clock. at_middle_row: telemetry at t0 + clock_offset +
   // line_delay * height / 2, null if there is none. The image must outlive the maintain() that
@@ -96,6 +103,9 @@ class OeMode {
   [[nodiscard]] const OeStatistics& statistics() const;
   [[nodiscard]] const OeObservation* observations() const;  // statistics().aligned of them
   [[nodiscard]] const LandmarkMap& map() const;
+
+  // For another OeMode, or for the next start. Allocates: not for the real-time thread.
+  [[nodiscard]] MapState map_state() const;
 
   [[nodiscard]] std::size_t memory_bytes() const;
 

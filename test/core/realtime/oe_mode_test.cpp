@@ -9,11 +9,13 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <limits>
 #include <map>
 #include <memory>
 #include <optional>
 #include <random>
+#include <set>
 #include <vector>
 
 #include "core/realtime/pt_mode.h"
@@ -588,6 +590,237 @@ TEST(OeMode, NeedsACalibrationThatItHasRoomFor) {
   oe.maintain();
   oe.reset(camera.calibration());
   EXPECT_EQ(oe.process(camera.image(0), 0, &telemetry, &frame), OeStatus::kTooFew);
+}
+
+// One OeMode's map in the hands of another.
+class HandedOverMap : public OeModeOnFrames {
+ protected:
+  // Frame k for the OeMode that takes over, telemetry off by so much.
+  OeStatus take_over(int k, const Vector2<double>& off_px = Vector2<double>::Zero(),
+                     const Sigmas& sigmas = {}) {
+    telemetry_ = camera_.telemetry(k, sigmas);
+    telemetry_.angle.pan += off_px.x() * kPixel;
+    telemetry_.angle.tilt += off_px.y() * kPixel;
+    return other_.process(camera_.image(k), VirtualCamera::time_s(k), &telemetry_, &frame_);
+  }
+
+  [[nodiscard]] std::set<std::uint32_t> ids() const {
+    std::set<std::uint32_t> out;
+    for (int slot = 0; slot < other_.map().capacity(); ++slot) {
+      if (other_.map().occupied(slot)) out.insert(other_.map().at(slot).id);
+    }
+    return out;
+  }
+
+  OeMode other_{small_options()};
+};
+
+TEST_F(HandedOverMap, HoldsTheNextFrameAsItHeldTheLast) {
+  start(60);
+  const MapState map = oe_.map_state();
+  ASSERT_EQ(static_cast<int>(map.landmarks.size()), oe_.map().size());
+  other_.reset(camera_.calibration(), map);
+  EXPECT_GE(other_.map().size(), oe_.map().size() * 98 / 100);
+  for (int k = 60; k < 90; ++k) {
+    ASSERT_EQ(take_over(k), OeStatus::kOk) << k;
+    EXPECT_GE(frame_.landmarks, 20);
+    expect_honest(camera_, k, frame_);
+    // The offset goes on from where it was: a single sample of telemetry says 1 px.
+    EXPECT_LT(frame_.motion_covariance(0, 0), 0.3 * 0.3 * kPixel * kPixel);
+    other_.maintain();
+  }
+}
+
+TEST_F(HandedOverMap, IsThatMapAgainWhenItIsToldAtOnce) {
+  start(60);
+  const MapState map = oe_.map_state();
+  other_.reset(camera_.calibration(), map);
+  const MapState again = other_.map_state();
+  EXPECT_EQ(again.offset.vector(), map.offset.vector());
+  EXPECT_EQ(again.offset_covariance, map.offset_covariance);
+  EXPECT_EQ(again.bend_covariance, map.bend_covariance);
+  EXPECT_EQ(again.bend_tilt, map.bend_tilt);
+  // Refined directions may have got into a neighbour's cell: one of the two stays.
+  EXPECT_GE(again.landmarks.size(), map.landmarks.size() * 98 / 100);
+  std::size_t next = 0;
+  for (const Landmark& a : again.landmarks) {
+    const auto same = [&](const Landmark& l) { return (l.d - a.d).norm() < 1e-15; };
+    while (next < map.landmarks.size() && !same(map.landmarks[next])) ++next;
+    ASSERT_LT(next, map.landmarks.size());
+    const Landmark& b = map.landmarks[next];
+    EXPECT_EQ(a.octave, b.octave);
+    EXPECT_EQ(a.covariance, b.covariance);
+    EXPECT_EQ(a.shared_covariance, b.shared_covariance);
+    EXPECT_EQ(a.J_pixel_tangent, b.J_pixel_tangent);
+    EXPECT_EQ(a.pixels, b.pixels);
+    EXPECT_EQ(a.statistics.matched, b.statistics.matched);
+  }
+}
+
+TEST_F(HandedOverMap, IsFoundWhereTelemetryIsOffByAFewPixels) {
+  start(40);
+  const MapState map = oe_.map_state();
+  for (const Vector2<double>& off :
+       {Vector2<double>(6, -4), Vector2<double>(-9, 2), Vector2<double>(3, 8)}) {
+    other_.reset(camera_.calibration(), map);
+    ASSERT_EQ(take_over(40, off, {5 * kPixel, 5 * kPixel}), OeStatus::kOk) << off.transpose();
+    expect_honest(camera_, 40, frame_);
+    double px = 0;
+    double square = 0;
+    camera_.judge(40, frame_, &px, &square);
+    EXPECT_LT(px, 1) << off.transpose();
+  }
+}
+
+TEST_F(HandedOverMap, LosesWhatMakesNoSense) {
+  start(20);
+  const double kNaN = std::numeric_limits<double>::quiet_NaN();
+  const MapState good = oe_.map_state();
+  const std::size_t size = good.landmarks.size();
+  const std::vector<std::function<void(Landmark*)>> damages = {
+      [&](Landmark* l) { l->d.y() = kNaN; },
+      [&](Landmark* l) { l->d *= 1.01; },
+      [&](Landmark* l) { l->d.setZero(); },
+      [&](Landmark* l) { l->octave = 200; },
+      [&](Landmark* l) { l->octave = 5; },  // the picture is too low for that
+      [&](Landmark* l) { l->covariance(0, 1) = kNaN; },
+      [&](Landmark* l) { l->covariance(1, 1) *= -1; },
+      [&](Landmark* l) { l->shared_covariance(1, 1) = -1; },
+      [&](Landmark* l) { l->J_pixel_tangent.setZero(); },
+      [&](Landmark* l) { l->J_pixel_tangent(1, 0) = kNaN; }};
+  ASSERT_GT(size, damages.size());
+  MapState map = good;
+  for (std::size_t i = 0; i < damages.size(); ++i) damages[i](&map.landmarks[i]);
+  other_.reset(camera_.calibration(), map);
+  EXPECT_EQ(other_.map().size(), static_cast<int>(size - damages.size()));
+  EXPECT_EQ(take_over(20), OeStatus::kOk);
+  expect_honest(camera_, 20, frame_);
+
+  const std::vector<std::function<void(MapState*)>> hopeless = {
+      [&](MapState* m) { m->offset.pan = kNaN; },
+      [&](MapState* m) { m->offset_covariance(0, 0) = kNaN; },
+      [&](MapState* m) { m->offset_covariance(1, 1) = -1; },
+      [&](MapState* m) { m->bend_covariance[1](2, 2) = kNaN; },
+      [&](MapState* m) { m->bend_tilt = kNaN; },
+      [&](MapState* m) { m->landmarks.clear(); }};
+  for (const auto& damage : hopeless) {
+    map = good;
+    damage(&map);
+    other_.reset(camera_.calibration(), map);
+    EXPECT_EQ(other_.map().size(), 0);
+    EXPECT_EQ(take_over(20), OeStatus::kTooFew);
+    expect_pt(camera_, 20, telemetry_, frame_);
+  }
+}
+
+TEST_F(HandedOverMap, IsCutWhereThereIsNoRoom) {
+  start(20);
+  OeOptions options = small_options();
+  options.max_landmarks = 80;
+  OeMode small(options);
+  small.reset(camera_.calibration(), oe_.map_state());
+  EXPECT_EQ(small.map().size(), 80);
+}
+
+// Only what should be in view is given up: the rest may be right.
+TEST_F(HandedOverMap, IsForgottenWhereThePictureShowsSomethingElse) {
+  start(30);
+  other_.reset(camera_.calibration(), oe_.map_state());
+  std::mt19937_64 random(3);
+  // Night: neither to be found nor a reason to give up what is not.
+  std::vector<std::uint8_t> dark(static_cast<std::size_t>(kWidth) * kHeight);
+  int frames = 0;
+  const int size = other_.map().size();
+  for (; frames < 120; ++frames) {
+    for (std::uint8_t& pixel : dark) pixel = static_cast<std::uint8_t>(20 + random() % 7);
+    telemetry_ = camera_.telemetry(30);
+    EXPECT_EQ(other_.process({dark.data(), kWidth, kHeight, kWidth},
+                             VirtualCamera::time_s(30 + frames), &telemetry_, &frame_),
+              OeStatus::kTooFew);
+    other_.maintain();
+  }
+  EXPECT_EQ(other_.map().size(), size);
+  // Another scene, from the same mount.
+  simulator::Config config = camera_before_mountains();
+  config.scene.photos[0].azimuth = 4.5 * kPi / 180;
+  config.scene.photos[0].elevation = 5 * kPi / 180;
+  VirtualCamera elsewhere(config);
+  OeStatus status = OeStatus::kTooFew;
+  int lost = 0;
+  for (int k = 30; k < 110; ++k) {
+    telemetry_ = elsewhere.telemetry(k);
+    status = other_.process(elsewhere.image(k), VirtualCamera::time_s(k), &telemetry_, &frame_);
+    expect_honest(elsewhere, k, frame_);
+    lost += status != OeStatus::kOk ? 1 : 0;
+    other_.maintain();
+  }
+  EXPECT_EQ(status, OeStatus::kOk);
+  EXPECT_LT(lost, 55);
+}
+
+TEST_F(HandedOverMap, IsForgottenWhereTelemetryContradictsIt) {
+  start(30);
+  MapState map = oe_.map_state();
+  for (const double off_px : {20.0, 50.0, 300.0}) {
+    MapState wrong = map;
+    wrong.offset.pan += off_px * kPixel;
+    wrong.offset_covariance = kPixel * kPixel * Matrix2<double>::Identity();
+    other_.reset(camera_.calibration(), wrong);
+    OeStatus status = OeStatus::kTooFew;
+    int lost = 0;
+    for (int k = 30; k < 100; ++k) {
+      status = take_over(k);
+      expect_honest(camera_, k, frame_);
+      lost += status != OeStatus::kOk ? 1 : 0;
+      other_.maintain();
+    }
+    EXPECT_EQ(status, OeStatus::kOk) << off_px;
+    EXPECT_LT(lost, 55) << off_px;
+  }
+}
+
+TEST(OeMode, GoesOnBesideAMapThatIsNotInViewAndFindsItAgain) {
+  simulator::Config config = camera_before_mountains();
+  config.path.amplitude = 0.8;
+  config.path.period = 10;
+  config.scene.photos[0].width = 75 * kPi / 180;
+  VirtualCamera camera(config);
+  OeMode oe(small_options());
+  oe.reset(camera.calibration());
+  FrameOrientation frame;
+  const auto process = [&](int k) {
+    const InterpolatedPanTilt telemetry = camera.telemetry(k);
+    const OeStatus status =
+        oe.process(camera.image(k), VirtualCamera::time_s(k), &telemetry, &frame);
+    double px = 0;
+    double square = 0;
+    camera.judge(k, frame, &px, &square);
+    EXPECT_LT(px, 4) << k;
+    return status;
+  };
+  // The left end of the path.
+  for (int k = 175; k < 200; ++k) {
+    EXPECT_EQ(process(k), k == 175 ? OeStatus::kTooFew : OeStatus::kOk) << k;
+    oe.maintain();
+  }
+  const MapState map = oe.map_state();
+  oe.reset(camera.calibration(), map);
+  std::set<std::uint32_t> old;
+  for (int slot = 0; slot < oe.map().capacity(); ++slot) {
+    if (oe.map().occupied(slot)) old.insert(oe.map().at(slot).id);
+  }
+  // From the right end back.
+  int found = 0;
+  for (int k = 50; k < 200; ++k) {
+    EXPECT_EQ(process(k), k == 50 ? OeStatus::kTooFew : OeStatus::kOk) << k;
+    found = 0;
+    for (int i = 0; i < oe.statistics().aligned; ++i) {
+      const OeObservation& seen = oe.observations()[i];
+      found += seen.inlier && old.count(seen.id) > 0 ? 1 : 0;
+    }
+    if (k % 5 == 0) oe.maintain();
+  }
+  EXPECT_GT(found, 20);
 }
 
 }  // namespace

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <random>
@@ -170,6 +171,19 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
   int in_oe = 0;
   int without = 0;
   constexpr int kFrames = 10000;
+  // A map that is taken over, and one that shows something else and is given up again.
+  oe.reset(calibration);
+  InterpolatedPanTilt first;
+  first.angle = {kRadius / kFocalLength, 0};
+  first.covariance.diagonal() << 1e-9, 1e-9, 1e-7, 1e-7;
+  (void)oe.process(pictures[0].view, 0, &first, &frame);
+  oe.maintain();
+  const MapState good = oe.map_state();
+  MapState bad = good;
+  for (Landmark& landmark : bad.landmarks) {
+    std::shuffle(landmark.pixels.begin(), landmark.pixels.end(), random);
+  }
+  ASSERT_GT(good.landmarks.size(), 10U);
   const AllocationGuard guard;
   oe.reset(calibration);
   for (int k = 0; k < kFrames; ++k) {
@@ -187,7 +201,9 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
     in_oe += status == OeStatus::kOk ? 1 : 0;
     without += status != OeStatus::kOk ? 1 : 0;
     oe.maintain();
+    if (k == kFrames / 4) oe.reset(calibration, good);
     if (k == kFrames / 2) oe.reset(calibration);
+    if (k == kFrames * 3 / 4) oe.reset(calibration, bad);
   }
   EXPECT_EQ(guard.count(), 0);
   EXPECT_GT(in_oe, kFrames * 99 / 100);
