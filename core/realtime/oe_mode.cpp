@@ -569,7 +569,10 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   }
 
   // 1. Prediction.
-  const double acceleration_sigma = kAcceleration * field_of_view;
+  double acceleration_sigma = kAcceleration * field_of_view;
+  const bool acceleration_known =
+      telemetry != nullptr && telemetry->acceleration_sigma < acceleration_sigma;
+  if (acceleration_known) acceleration_sigma = telemetry->acceleration_sigma;
   MotionPrior prior;
   prior.motion_information.diagonal().tail<2>().setConstant(
       1 / (acceleration_sigma * acceleration_sigma));
@@ -580,6 +583,9 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
     motion = {{angle.pan - offset.x(), angle.tilt - offset.y()},
               true_from_measured(mechanics, telemetry->rate),
               middle_row};
+    if (acceleration_known) {
+      motion.acceleration = true_from_measured(mechanics, telemetry->acceleration);
+    }
     const Vector2<double> to_true(1 / mechanics.pan_scale, 1 / mechanics.tilt_scale);
     Vector4<double> scale;
     scale << to_true, to_true;
@@ -635,6 +641,7 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
     find_visible(view);
     choose_fine();
     align_fine(view);
+    prior.motion.tail<2>() = predicted.acceleration.vector() - motion.acceleration.vector();
     const Vector2<double> moved = predicted.angle.vector() - motion.angle.vector();
     if (prior.has_telemetry) {
       prior.telemetry.head<2>() = moved;
@@ -704,7 +711,8 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   motion.angle = {motion.angle.pan + solved.correction[0],
                   motion.angle.tilt + solved.correction[1]};
   motion.rate = {motion.rate.pan + solved.correction[2], motion.rate.tilt + solved.correction[3]};
-  motion.acceleration = {solved.correction[4], solved.correction[5]};
+  motion.acceleration = {motion.acceleration.pan + solved.correction[4],
+                         motion.acceleration.tilt + solved.correction[5]};
   motion_covariance = solved.frame_covariance;
   shared_covariance = solved.shared_covariance;
   inflation = solved.inflation;

@@ -15,6 +15,7 @@
 // axes. Angles in rad as measured, times in s on the telemetry clock. No allocation.
 
 #include <cstdint>
+#include <limits>
 
 #include "core/model/angle.h"
 #include "core/model/linear_algebra.h"
@@ -50,6 +51,9 @@ struct InterpolatedPanTilt {
   Matrix4<double> covariance = Matrix4<double>::Zero();
   // (rad/s^2)^2, expected square of the acceleration (pan, tilt) about this time.
   Vector2<double> acceleration_square = Vector2<double>::Zero();
+  // rad/s^2, the acceleration itself, where somebody knows it; of either axis.
+  PanTilt<double> acceleration = {};
+  double acceleration_sigma = std::numeric_limits<double>::infinity();  // > 0
   int samples = 0;  // how many the answer rests on: 2 is the straight line
   // s, after which the error of the angle is another: the same samples answer for a while, and what the
   // clock or an unknown acceleration does lasts for about a second. So much time is worth one
