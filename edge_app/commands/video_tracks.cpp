@@ -13,6 +13,7 @@
 #include "core/realtime/patch_alignment.h"
 #include "core/realtime/start_up_tracker.h"
 #include "edge_app/commands/command.h"
+#include "edge_app/pipeline/keyframe_map.h"
 #include "platform/video/recording_frame_source.h"
 
 namespace alidade {
@@ -21,6 +22,9 @@ namespace {
 namespace fs = std::filesystem;
 
 constexpr int kPoints = 250;  // in a frame
+// Of a first trajectory's angles. It stands for measurements that OE mode weighs against what it sees, so
+// it claims no more than it must to predict the picture.
+constexpr double kFirstSigmaPx = 1;
 
 // use(frame, luma) for each picture of the input's frames, in the order of the recording.
 template <class Use>
@@ -49,37 +53,6 @@ void for_each_picture(const std::string& directory, const CalibrationInput& inpu
     remarks->push_back(
         fmt::format("video: ends {} frames before frames.csv does", video.missing_frames()));
   }
-}
-
-// What the trajectory says of a time, in the units of telemetry. It stands for measurements that OE mode
-// weighs against what it sees, so it claims no more than it must to predict the picture.
-InterpolatedPanTilt predict(const CalibrationResult& estimate, double time_s) {
-  constexpr double kSigmaPx = 1;       // of the angle
-  constexpr double kSigmaPxPerS = 20;  // of the rate
-  constexpr double kHalfSpan = 0.02;   // s, over which the acceleration is taken
-  constexpr double kRenewal = 0.5;     // s, about a segment of the trajectory
-  const TrajectorySpline& trajectory = estimate.trajectory;
-  const Mechanics<double>& mechanics = estimate.calibration.mechanics;
-  const Vector2<double> scale(mechanics.pan_scale, mechanics.tilt_scale);
-  const double per_px = 1 / estimate.calibration.camera.focal_length;
-  const PanTilt<double> angle = trajectory.position(time_s);
-  const PanTilt<double> rate = trajectory.rate(time_s);
-  const PanTilt<double> before = trajectory.rate(time_s - kHalfSpan);
-  const PanTilt<double> after = trajectory.rate(time_s + kHalfSpan);
-  InterpolatedPanTilt result;
-  result.angle = {wrap_angle(scale.x() * angle.pan), wrap_angle(scale.y() * angle.tilt)};
-  result.rate = {scale.x() * rate.pan, scale.y() * rate.tilt};
-  const double of_angle = kSigmaPx * per_px;
-  const double of_rate = kSigmaPxPerS * per_px;
-  result.covariance.diagonal() << of_angle * of_angle, of_angle * of_angle, of_rate * of_rate,
-      of_rate * of_rate;
-  const Vector2<double> acceleration(scale.x() * (after.pan - before.pan) / (2 * kHalfSpan),
-                                     scale.y() * (after.tilt - before.tilt) / (2 * kHalfSpan));
-  result.acceleration_square =
-      acceleration.cwiseAbs2().array() + of_rate * of_rate / (kRenewal * kRenewal);
-  result.samples = kInterpolationWindow;
-  result.renewal_s = kRenewal;
-  return result;
 }
 
 }  // namespace
@@ -129,7 +102,8 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
       directory, input, progress, &tracks.remarks, [&](std::int64_t frame, const ImageView& image) {
         const auto time = times.find(frame);
         if (time == times.end()) return;  // no telemetry accompanies it
-        const InterpolatedPanTilt prediction = predict(estimate, time->second + to_middle_s);
+        const InterpolatedPanTilt prediction =
+            predict(estimate, time->second + to_middle_s, kFirstSigmaPx);
         FrameOrientation orientation;
         const OeStatus status = mode.process(image, time->second, &prediction, &orientation);
         for (int i = 0; status == OeStatus::kOk && i < mode.statistics().aligned; ++i) {
