@@ -1,0 +1,225 @@
+// The map from keyframes of the virtual camera: what another OeMode makes of it, and what it claims.
+
+#include "edge_app/pipeline/keyframe_map.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <cmath>
+#include <limits>
+#include <memory>
+#include <random>
+#include <vector>
+
+#include "core/realtime/oe_mode.h"
+#include "test/simulator/renderer.h"
+
+namespace alidade {
+namespace {
+
+constexpr int kWidth = 480;
+constexpr int kHeight = 270;
+constexpr double kFocalLength = 1500;  // px
+constexpr double kPixel = 1 / kFocalLength;
+constexpr double kDuration = 8;  // s
+constexpr int kSamples = 400;    // of telemetry
+
+simulator::Config camera_before_mountains() {
+  simulator::Config config;
+  config.image = {kWidth, kHeight, 25};
+  config.duration = kDuration;
+  config.camera.focal_length = kFocalLength;
+  config.camera.radial_distortion = 0.3;
+  config.camera.line_delay = 50e-6;
+  config.path.amplitude = 0.4;
+  config.path.period = 3;
+  simulator::PatchConfig mountains;
+  mountains.file = ALIDADE_TEST_DATA "/picosdeeuropa_by_Aitzol_Berasategi.jpg";
+  mountains.width = 40 * kPi / 180;
+  config.scene.photos.push_back(mountains);
+  config.sensor.exposure = 2e-3;
+  config.sensor.shot_noise = 0.02;
+  config.sensor.read_noise = 0.7;
+  return config;
+}
+
+// A spline through what the path does, knots 0.1 s apart.
+TrajectorySpline spline_of(const simulator::Path& path) {
+  std::vector<double> knots;
+  for (int i = -1; i <= 10 * kDuration + 1; ++i) knots.push_back(0.1 * i);
+  TrajectorySpline spline(knots);
+  const int points = spline.control_points();
+  Eigen::MatrixXd normal = Eigen::MatrixXd::Zero(points, points);
+  Eigen::MatrixXd right = Eigen::MatrixXd::Zero(points, 2);
+  for (double t = spline.begin_s(); t < spline.end_s(); t += 0.01) {
+    const TrajectorySpline::Basis basis = spline.basis(t);
+    const simulator::Angles at = path.at(t);
+    normal.block<4, 4>(basis.segment, basis.segment) += basis.weight * basis.weight.transpose();
+    right.block<4, 2>(basis.segment, 0) += basis.weight * Eigen::RowVector2d(at.pan, at.tilt);
+  }
+  const Eigen::MatrixXd solved = normal.fullPivLu().solve(right);
+  for (int i = 0; i < points; ++i) spline.control_point(i) = solved.row(i).transpose();
+  return spline;
+}
+
+// White telemetry residuals of this sigma, stated as this one.
+std::vector<TelemetryResidual> residuals(double sigma, double stated) {
+  std::mt19937_64 random(3);
+  std::normal_distribution<double> normal(0, sigma);
+  std::vector<TelemetryResidual> out(kSamples);
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    out[i].sample = i;
+    out[i].time_s = static_cast<double>(i) * kDuration / kSamples;
+    out[i].error_rad = {normal(random), normal(random)};
+    out[i].sigma_rad = {stated, stated};
+  }
+  return out;
+}
+
+class KeyframeMap : public ::testing::Test {
+ protected:
+  KeyframeMap()
+      : config_(camera_before_mountains()),
+        path_(simulator::make_path(config_)),
+        renderer_(config_, *path_) {
+    const simulator::CameraConfig& camera = config_.camera;
+    result_.status = CalibrationStatus::kOk;
+    result_.calibration.camera = {camera.focal_length, camera.aspect, camera.radial_distortion,
+                                  kWidth, kHeight};
+    result_.calibration.line_delay = camera.line_delay;
+    result_.trajectory = spline_of(*path_);
+    result_.telemetry_residuals = residuals(kPixel, kPixel);
+    result_.quality.telemetry_sigma_ratio = 1;
+  }
+
+  std::vector<Keyframe> keyframes(int count) {
+    std::vector<Keyframe> out;
+    for (int i = 0; i < count; ++i) {
+      const double time_s = (i + 0.5) * kDuration / count;
+      pictures_.push_back(renderer_.render(time_s, i));
+      out.push_back({time_s, {pictures_.back().data(), kWidth, kHeight, kWidth}});
+    }
+    return out;
+  }
+  // Where the direction that the frame gives to u truly is, less u, px.
+  Vector2<double> error(double time_s, const FrameOrientation& frame, const Vector2<double>& u) {
+    Vector3<double> d;
+    EXPECT_EQ(frame.direction(u, &d), ProjectionStatus::kOk);
+    return renderer_.camera().project_rolling(d, time_s).value_or(u + Vector2<double>(1e3, 0)) - u;
+  }
+
+  simulator::Config config_;
+  std::unique_ptr<simulator::Path> path_;
+  simulator::Renderer renderer_;
+  CalibrationResult result_;
+  std::vector<std::vector<std::uint8_t>> pictures_;
+};
+
+TEST_F(KeyframeMap, PutsAnotherOeModeIntoTheBaseFrameInItsFirstFrame) {
+  const MapState map = map_from_keyframes(result_, keyframes(24));
+  const double offset_sigma = std::sqrt(map.offset_covariance(0, 0));
+  // The average of 400 samples of one pixel, and the trajectory's own part.
+  EXPECT_GT(offset_sigma, kPixel / std::sqrt(kSamples));
+  EXPECT_LT(offset_sigma, 3 * kPixel / std::sqrt(kSamples));
+
+  OeOptions options;
+  options.max_width = kWidth;
+  options.max_height = kHeight;
+  options.cell_size_px = 20;
+  double worst_px = 0;
+  double worst_square = 0;
+  for (int i = 0; i < 20; ++i) {
+    // Not a keyframe's time; telemetry is 3 px off.
+    const double time_s = 0.3 + 0.37 * i;
+    const double to_middle_s = result_.calibration.line_delay * kHeight / 2;
+    InterpolatedPanTilt telemetry = predict(result_, time_s + to_middle_s, 3);
+    telemetry.angle.pan += 3 * kPixel;
+    telemetry.angle.tilt -= 3 * kPixel;
+    const std::vector<std::uint8_t> picture = renderer_.render(time_s, 100 + i);
+    OeMode mode(options);
+    mode.reset(result_.calibration, map);
+    FrameOrientation frame;
+    ASSERT_EQ(mode.process({picture.data(), kWidth, kHeight, kWidth}, time_s, &telemetry, &frame),
+              OeStatus::kOk)
+        << time_s;
+    for (const Vector2<double>& u :
+         {Vector2<double>(240, 135), Vector2<double>(24, 14), Vector2<double>(456, 14),
+          Vector2<double>(24, 256), Vector2<double>(456, 256)}) {
+      Vector3<double> d;
+      ASSERT_EQ(frame.direction(u, &d), ProjectionStatus::kOk);
+      Vector2<double> back;
+      Matrix2<double> covariance;
+      ASSERT_EQ(frame.pixel(d, &back, &covariance), ProjectionStatus::kOk);
+      const Vector2<double> e = error(time_s, frame, u);
+      worst_px = std::max(worst_px, e.norm());
+      worst_square = std::max(worst_square, e.dot(covariance.inverse() * e));
+    }
+  }
+  // A hundred looks of 2 degrees of freedom stay below 23 (one in a thousand); telemetry erred by 3 px.
+  EXPECT_LT(worst_square, 23);
+  EXPECT_LT(worst_px, 0.1);
+}
+
+TEST_F(KeyframeMap, PassesOverPicturesThatAreNoneOrOfAnotherSize) {
+  std::vector<Keyframe> some = keyframes(3);
+  const std::size_t landmarks = map_from_keyframes(result_, some).landmarks.size();
+  some.push_back({kDuration, {}});
+  some.push_back({kDuration, {pictures_[0].data(), kWidth, kHeight - 1, kWidth}});
+  EXPECT_EQ(map_from_keyframes(result_, some).landmarks.size(), landmarks);
+  EXPECT_TRUE(map_from_keyframes(result_, {some[3], some[4]}).landmarks.empty());
+  EXPECT_TRUE(map_from_keyframes(result_, {}).landmarks.empty());
+}
+
+// Relative; the estimated repetition of white residuals scatters by sqrt(lags / samples), mostly upwards.
+TEST_F(KeyframeMap, IsTiedToTheBaseByTheAverageOfTelemetry) {
+  const Matrix2<double> covariance = tie_covariance(result_);
+  const double average = kPixel * kPixel / kSamples;
+  for (int axis = 0; axis < 2; ++axis) {
+    EXPECT_GE(covariance(axis, axis), 2 * average * (1 - 1e-9));
+    EXPECT_LT(covariance(axis, axis), 3 * average);
+  }
+  EXPECT_EQ(covariance(0, 1), 0);
+}
+
+TEST_F(KeyframeMap, IsTiedLessWellByErrorsThatRepeatThemselves) {
+  const double white = tie_covariance(result_)(0, 0);
+  // Each error eight times: an eighth of the samples is left.
+  for (std::size_t i = 0; i < kSamples; ++i) {
+    result_.telemetry_residuals[i].error_rad = result_.telemetry_residuals[i / 8 * 8].error_rad;
+  }
+  const double repeated = tie_covariance(result_)(0, 0);
+  EXPECT_GT(repeated, 5 * white);
+  EXPECT_LT(repeated, 20 * white);
+}
+
+TEST_F(KeyframeMap, IsTiedLessWellByErrorsLargerThanStated) {
+  const double white = tie_covariance(result_)(1, 1);
+  result_.telemetry_residuals = residuals(3 * kPixel, kPixel);
+  result_.quality.telemetry_sigma_ratio = 3;
+  EXPECT_NEAR(tie_covariance(result_)(1, 1), 9 * white, 1e-6 * white);
+}
+
+TEST_F(KeyframeMap, DoesNotAverageErrorsThatAreButRounding) {
+  result_.telemetry_residuals = residuals(kPixel, std::numeric_limits<double>::infinity());
+  for (int axis = 0; axis < 2; ++axis) {
+    const double sigma = std::sqrt(tie_covariance(result_)(axis, axis));
+    EXPECT_GT(sigma, kPixel);
+    EXPECT_LT(sigma, 2 * kPixel);
+  }
+}
+
+TEST_F(KeyframeMap, LeavesOutliersAndReadingsThatDidNotChangeAside) {
+  const Matrix2<double> before = tie_covariance(result_);
+  TelemetryResidual odd;
+  odd.error_rad = {1, 1};
+  odd.sigma_rad = {kPixel, kPixel};
+  odd.outlier = true;
+  result_.telemetry_residuals.push_back(odd);
+  odd.outlier = false;
+  odd.error_rad.setConstant(std::numeric_limits<double>::quiet_NaN());
+  result_.telemetry_residuals.push_back(odd);
+  EXPECT_EQ(tie_covariance(result_), before);
+}
+
+}  // namespace
+}  // namespace alidade
