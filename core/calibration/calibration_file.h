@@ -7,7 +7,7 @@
 //   zoom: 1234                                      optional
 //   covariance: {names: [...], matrix: [[...]]}     optional; the sigmas must agree with it
 //   quality: {...}                                  optional: residuals, counts, priors, condition, advice
-//   landmarks: map.bin                              optional: side file, see landmark_file.h
+//   landmarks: map.bin                              optional: side file, beside this one
 // aspect may be absent (1), a sigma may be absent (0, exact, unless the covariance says otherwise).
 // quality and landmarks are accepted and not kept: they belong to the run that wrote them.
 // All else is strict: an unknown, missing or doubled key, text for a number, a number that is not

@@ -14,12 +14,12 @@
 
 #include "core/calibration/atomic_file.h"
 #include "core/calibration/calibration_file.h"
-#include "core/calibration/landmark_file.h"
 #include "edge_app/commands/calibration_comparison.h"
 #include "edge_app/commands/calibration_input.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/commands/video_tracks.h"
+#include "edge_app/config/map_file.h"
 #include "edge_app/output/calibration_report.h"
 #include "edge_app/output/calibration_summary.h"
 
@@ -186,6 +186,14 @@ CalibrationResult calibrate_job(const std::string& recording, int passes, Calibr
   return first;
 }
 
+MapState map_visibly(const std::string& recording, const CalibrationResult& result,
+                     StopSignals* signals) {
+  VisibleProgress progress(recording, signals);
+  return map_video(recording, result, [&progress](double done) {
+    if (!progress.show(done, "looking at some pictures for the map")) throw progress.cancelled();
+  });
+}
+
 // The format of a recording's tracks.csv.
 std::string tracks_text(const std::vector<CalibrationObservation>& observations) {
   std::string text = "frame,landmark,u_px,v_px,sigma_px\n";
@@ -242,6 +250,9 @@ int calibrate_recording(const CalibrateOptions& options) {
                                                 result.message));
   }
 
+  MapState map;
+  if (job.tracks_from_video && result.ok()) map = map_visibly(recording, result, &signals);
+
   OutputDirectory directory(options.directory, recording);
   directory.add("report", "report.html", [&](const std::string& path, std::string* error) {
     return write_file_atomically(
@@ -254,7 +265,7 @@ int calibrate_recording(const CalibrateOptions& options) {
   }
   if (result.ok()) {
     directory.add("landmarks", "map.bin", [&](const std::string& path, std::string* error) {
-      return save_landmarks(path, result.landmarks, result.calibration, error);
+      return save_map(path, {result.landmarks, map}, result.calibration, error);
     });
     // Last: when it stands, all of its run does.
     directory.add("calibration", "calibration.yaml",

@@ -8,6 +8,7 @@
 #include <limits>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 
 #include "core/realtime/oe_mode.h"
 #include "core/realtime/patch_alignment.h"
@@ -117,6 +118,33 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
         mode.maintain();
       });
   return tracks;
+}
+
+MapState map_video(const std::string& directory, const CalibrationResult& result,
+                   const VideoProgress& progress) {
+  CalibrationInput chosen;
+  std::unordered_map<std::int64_t, double> times;
+  const std::size_t frames = result.frames.size();
+  const std::size_t count = std::min(frames, kMaxKeyframes);
+  for (std::size_t i = 0; i < count; ++i) {
+    const FrameResult& frame = result.frames[(2 * i + 1) * frames / (2 * count)];
+    chosen.frames.push_back({frame.frame, frame.time_s, {}});
+    times[frame.frame] = frame.time_s;
+  }
+  std::vector<std::vector<std::uint8_t>> pictures;
+  std::vector<Keyframe> keyframes;
+  std::vector<std::string> said_before;
+  for_each_picture(
+      directory, chosen, progress, &said_before, [&](std::int64_t frame, const ImageView& image) {
+        std::vector<std::uint8_t> picture;
+        for (int row = 0; row < image.height; ++row) {
+          picture.insert(picture.end(), image.row(row), image.row(row) + image.width);
+        }
+        pictures.push_back(std::move(picture));
+        keyframes.push_back(
+            {times.at(frame), {pictures.back().data(), image.width, image.height, image.width}});
+      });
+  return map_from_keyframes(result, keyframes);
 }
 
 std::vector<CalibrationObservation> choose_tracks(

@@ -3,6 +3,7 @@
 //   first pass   nothing is known of the camera: StartUpTracker
 //   second pass  with the camera, the clocks and the trajectory of a first calibration: OeMode, whose map
 //                recognises what the camera comes back to, so that tracks span the whole recording
+// And the map that belongs to the calibration that came of it.
 // Pixels as in CONVENTIONS.md; sigma_px is that of a component, sqrt(trace of covariance / 2), of what
 // differs between the observations of one landmark.
 // Reads the whole video; throws CommandError (no or unreadable pictures, or of another size than
@@ -13,6 +14,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/realtime/map_state.h"
 
 namespace alidade {
 
@@ -33,6 +35,11 @@ using VideoProgress = std::function<void(double done)>;
 [[nodiscard]] VideoTracks track_video(const std::string& directory, const CalibrationInput& input,
                                       const CalibrationResult& estimate,
                                       const VideoProgress& progress);
+
+// Of up to kMaxKeyframes pictures, spread over the calibrated frames.
+inline constexpr std::size_t kMaxKeyframes = 24;
+[[nodiscard]] MapState map_video(const std::string& directory, const CalibrationResult& result,
+                                 const VideoProgress& progress);
 
 // Leaves what an adjustment can use in reasonable time: landmarks seen kMinSightings times or more, and of
 // these, if there are more than max_observations, those that moved farthest through the image.

@@ -1,11 +1,13 @@
 #pragma once
 // CalibrationStore: the calibrations of one camera on disk, one for each zoom setting, each with its map.
 //   FILE                      the calibration without zoom (INTERFACES: calibration.file)
-//   STEM.zoom-1234.5.yaml     the one at that zoom, beside it
-//   map: the side file that the yaml names, beside it, tied to it by version and checksum (map_file.h)
-// A file that is damaged, or not of this image size, is set aside (renamed to NAME.damaged, .damaged.1 ...), said,
-// and never used. A map that is damaged costs the map only. Everything is written atomically, the map
-// first; a power cut leaves the old pair or the new one.
+//   STEM.zoom-1234.5.yaml     the one at that zoom, beside it; the zoom that it holds counts, not its name
+//   *.map-1a2b3c4d.bin        the map that a yaml names, beside it, tied to it by checksum (map_file.h)
+// A file that is damaged, cannot be read, or is not of this image size, is set aside with its maps (renamed to
+// NAME.damaged, .damaged.1 ...), said, and never used. A map that is damaged costs the map only.
+// Each file is written atomically: first the map, under a name that no other content has, then the yaml
+// that names it, and only then the old map is removed. A power cut leaves the old pair or the new one, and
+// perhaps a map that nobody names, which the next save removes.
 // Not for the real-time thread. One thread.
 
 #include <cstddef>
@@ -37,11 +39,13 @@ class CalibrationStore {
   [[nodiscard]] std::vector<std::string> load(int width, int height);
 
   // The calibration for a zoom: the nearest within the tolerance, else the one without zoom, which holds for
-  // any. Without a zoom: the one without, else the only one. Null if there is none.
+  // any. Without a zoom: the one without, else the only one. Null if there is none. Holds until load() or save().
   [[nodiscard]] const StoredCalibration* find(std::optional<double> zoom) const;
 
-  // Keeps it in memory in any case, in place of the one for its zoom. False with one line if it could not be
-  // written (disk full, no permission); save_pending() tries again.
+  // Keeps it in memory in any case, in place of the one for its zoom, within the tolerance; its `path` is
+  // ignored. False with one line if it could not be written (disk full, no permission): what was stored before
+  // stays stored, and save_pending() tries again. False too if the map makes no sense: the calibration is then
+  // stored without it, and nothing is pending.
   [[nodiscard]] bool save(const StoredCalibration& calibration, std::string* error);
   [[nodiscard]] bool has_pending() const;
   [[nodiscard]] bool save_pending(std::string* error);
@@ -51,6 +55,12 @@ class CalibrationStore {
     StoredCalibration stored;
     bool pending = false;
   };
+
+  void load_file(const std::string& path, int width, int height, std::vector<std::string>* lines);
+  [[nodiscard]] std::optional<std::size_t> nearest(std::optional<double> zoom) const;
+  [[nodiscard]] std::string free_path(std::optional<double> zoom) const;
+  [[nodiscard]] bool write(Entry* entry, std::string* error);
+
   std::string file_;
   double zoom_tolerance_;
   std::vector<Entry> entries_;

@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "core/calibration/calibration_file.h"
-#include "core/calibration/landmark_file.h"
+#include "edge_app/config/map_file.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/edge_app/recording_files.h"
 #include "test/support/temporary_directory.h"
@@ -92,10 +92,11 @@ TEST_F(CalibrateCommand, WritesCalibrationMapAndReport) {
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   const Calibration calibration = stored();
   expect_near_truth(calibration, simulation_);
-  std::vector<CalibrationLandmark> landmarks;
+  MapContent content;
   std::string error;
-  ASSERT_TRUE(load_landmarks(path("alidade/map.bin"), calibration, &landmarks, &error)) << error;
-  EXPECT_GT(landmarks.size(), 100U);
+  ASSERT_TRUE(load_map(path("alidade/map.bin"), calibration, &content, &error)) << error;
+  EXPECT_GT(content.points.size(), 100U);
+  EXPECT_TRUE(content.map.landmarks.empty());
   EXPECT_THAT(directory_.read("alidade/report.html"), HasSubstr("<strong>Calibrated</strong>"));
   EXPECT_THAT(directory_.read("alidade/calibration.yaml"),
               AllOf(HasSubstr("weakest_direction:"), HasSubstr("landmarks: \"map.bin\"")));
