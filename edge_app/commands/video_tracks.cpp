@@ -11,10 +11,10 @@
 #include <utility>
 
 #include "core/realtime/oe_mode.h"
-#include "core/realtime/patch_alignment.h"
 #include "core/realtime/start_up_tracker.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/pipeline/keyframe_map.h"
+#include "edge_app/pipeline/calibration_feed.h"
 #include "platform/video/recording_frame_source.h"
 
 namespace alidade {
@@ -109,11 +109,8 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
         const OeStatus status = mode.process(image, time->second, &prediction, &orientation);
         for (int i = 0; status == OeStatus::kOk && i < mode.statistics().aligned; ++i) {
           const OeObservation& seen = mode.observations()[i];
-          // One sigma for both components cannot tell of an edge, which leaves one of them open.
-          const bool edge = seen.covariance.trace() >= kUnobservedVariance;
-          if (!seen.inlier || edge) continue;
-          tracks.observations.push_back(
-              {frame, seen.id, seen.u.x(), seen.u.y(), std::sqrt(0.25 * seen.covariance.trace())});
+          if (const auto sigma = track_sigma(seen))
+            tracks.observations.push_back({frame, seen.id, seen.u.x(), seen.u.y(), *sigma});
         }
         mode.maintain();
       });
@@ -145,49 +142,6 @@ MapState map_video(const std::string& directory, const CalibrationResult& result
             {times.at(frame), {pictures.back().data(), image.width, image.height, image.width}});
       });
   return map_from_keyframes(result, keyframes);
-}
-
-std::vector<CalibrationObservation> choose_tracks(
-    const std::vector<CalibrationObservation>& observations, std::size_t max_observations) {
-  struct Track {
-    std::int64_t landmark = 0;
-    std::size_t count = 0;
-    double left = std::numeric_limits<double>::infinity();
-    double top = std::numeric_limits<double>::infinity();
-    double right = -std::numeric_limits<double>::infinity();
-    double bottom = -std::numeric_limits<double>::infinity();
-    [[nodiscard]] double extent() const { return std::hypot(right - left, bottom - top); }
-  };
-  std::unordered_map<std::int64_t, Track> all;
-  for (const CalibrationObservation& seen : observations) {
-    Track& track = all[seen.landmark];
-    track.landmark = seen.landmark;
-    ++track.count;
-    track.left = std::min(track.left, seen.u_px);
-    track.right = std::max(track.right, seen.u_px);
-    track.top = std::min(track.top, seen.v_px);
-    track.bottom = std::max(track.bottom, seen.v_px);
-  }
-  std::vector<Track> tracks;
-  for (const auto& [landmark, track] : all) {
-    if (track.count >= kMinSightings) tracks.push_back(track);
-  }
-  // The second criterion makes the choice the same each time.
-  std::sort(tracks.begin(), tracks.end(), [](const Track& a, const Track& b) {
-    return a.extent() != b.extent() ? a.extent() > b.extent() : a.landmark < b.landmark;
-  });
-  std::unordered_set<std::int64_t> chosen;
-  std::size_t count = 0;
-  for (const Track& track : tracks) {
-    count += track.count;
-    if (count > max_observations) break;
-    chosen.insert(track.landmark);
-  }
-  std::vector<CalibrationObservation> result;
-  for (const CalibrationObservation& seen : observations) {
-    if (chosen.count(seen.landmark) != 0) result.push_back(seen);
-  }
-  return result;
 }
 
 }  // namespace alidade

@@ -41,12 +41,4 @@ inline constexpr std::size_t kMaxKeyframes = 24;
 [[nodiscard]] MapState map_video(const std::string& directory, const CalibrationResult& result,
                                  const VideoProgress& progress);
 
-// Leaves what an adjustment can use in reasonable time: landmarks seen kMinSightings times or more, and of
-// these, if there are more than max_observations, those that moved farthest through the image.
-inline constexpr int kMinSightings = 5;
-inline constexpr std::size_t kMaxObservations = 30000;
-[[nodiscard]] std::vector<CalibrationObservation> choose_tracks(
-    const std::vector<CalibrationObservation>& observations,
-    std::size_t max_observations = kMaxObservations);
-
 }  // namespace alidade

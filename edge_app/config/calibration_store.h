@@ -15,20 +15,11 @@
 #include <string>
 #include <vector>
 
-#include "core/calibration/calibration_file.h"
-#include "core/model/calibration.h"
-#include "core/realtime/map_state.h"
+#include "edge_app/pipeline/calibration_archive.h"
 
 namespace alidade {
 
-struct StoredCalibration {
-  Calibration calibration;
-  CalibrationNotes notes;  // not read back
-  MapState map;
-  std::string path;  // of the yaml; empty: not stored yet
-};
-
-class CalibrationStore {
+class CalibrationStore final : public CalibrationArchive {
  public:
   // file: the configuration's calibration.file; its folder is created at the first save.
   // zoom_tolerance: device units within which two zooms are one.
@@ -38,17 +29,10 @@ class CalibrationStore {
   // was loaded, what was set aside and why.
   [[nodiscard]] std::vector<std::string> load(int width, int height);
 
-  // The calibration for a zoom: the nearest within the tolerance, else the one without zoom, which holds for
-  // any. Without a zoom: the one without, else the only one. Null if there is none. Holds until load() or save().
-  [[nodiscard]] const StoredCalibration* find(std::optional<double> zoom) const;
-
-  // Keeps it in memory in any case, in place of the one for its zoom, within the tolerance; its `path` is
-  // ignored. False with one line if it could not be written (disk full, no permission): what was stored before
-  // stays stored, and save_pending() tries again. False too if the map makes no sense: the calibration is then
-  // stored without it, and nothing is pending.
-  [[nodiscard]] bool save(const StoredCalibration& calibration, std::string* error);
-  [[nodiscard]] bool has_pending() const;
-  [[nodiscard]] bool save_pending(std::string* error);
+  [[nodiscard]] const StoredCalibration* find(std::optional<double> zoom) const override;
+  [[nodiscard]] bool save(const StoredCalibration& calibration, std::string* error) override;
+  [[nodiscard]] bool has_pending() const override;
+  [[nodiscard]] bool save_pending(std::string* error) override;
 
  private:
   struct Entry {

@@ -3,10 +3,13 @@
 // found in it, and how it went. Fixed size and trivially copyable: crosses the queue by value.
 
 #include <array>
+#include <cmath>
 #include <cstdint>
+#include <optional>
 #include <type_traits>
 
 #include "core/realtime/oe_mode.h"
+#include "core/realtime/patch_alignment.h"
 #include "platform/video/frame_source.h"
 
 namespace alidade {
@@ -21,7 +24,7 @@ struct TrackedPoint {
 struct FrameTracks {
   static constexpr int kMaxPoints = 256;
 
-  // Landmarks of different trackings, and of different runs of one tracker, have nothing in common.
+  // Landmarks of different trackers have nothing in common.
   enum class Tracker : std::uint8_t {
     kNone,     // no picture
     kStartUp,  // StartUpTracker: the camera is not calibrated
@@ -31,7 +34,6 @@ struct FrameTracks {
   FrameStamp stamp;
   double time_s = 0;  // filtered capture time of row 0, as in the record
   Tracker tracker = Tracker::kNone;
-  std::uint32_t run = 0;                         // of that tracker: another one since it began anew
   bool clock_restarted = false;                  // the frame clock began anew with this frame
   bool floor_shifted = false;                    // the least delay of the video stepped
   OeStatus oe_status = OeStatus::kNoPrediction;  // kOe
@@ -40,5 +42,14 @@ struct FrameTracks {
   std::array<TrackedPoint, kMaxPoints> points;  // the first `count`
 };
 static_assert(std::is_trivially_copyable_v<FrameTracks>);
+
+// px, of a component, of an observation that a calibration can use; empty for outliers, and for edges, whose
+// open direction one sigma for both components cannot tell of.
+[[nodiscard]] inline std::optional<double> track_sigma(const OeObservation& seen) {
+  const double trace = seen.covariance.trace();
+  if (!seen.inlier || trace >= kUnobservedVariance) return std::nullopt;
+  // What all observations of a landmark have in common, about half, moves the landmark instead.
+  return std::sqrt(0.25 * trace);
+}
 
 }  // namespace alidade

@@ -16,6 +16,8 @@
 #include <string>
 #include <type_traits>
 
+#include "edge_app/pipeline/published_calibration.h"
+
 namespace alidade {
 
 enum class RecordMode : std::uint8_t { kNone, kPt, kOe };
@@ -32,6 +34,7 @@ enum class RecordStatus : std::uint8_t {
   kTooFewLandmarks,       // mode PT: too few landmarks held
   kContradiction,         // mode PT: landmarks and telemetry exclude each other
   kBadImage,              // mode PT: no picture, or one that is not of the calibration's size
+  kOtherZoom,             // no calibration for the zoom that the pan/tilt source reports
   kNotFinite              // a stamp is not a finite number
 };
 
@@ -71,6 +74,8 @@ constexpr const char* to_string(RecordStatus status) {
       return "landmarks contradict telemetry";
     case RecordStatus::kBadImage:
       return "no usable picture";
+    case RecordStatus::kOtherZoom:
+      return "no calibration for this zoom";
     case RecordStatus::kNotFinite:
       return "not finite";
   }
@@ -94,7 +99,8 @@ struct OrientationRecord {
   double receive_time_s = 0;     // of the frame, or of the news of the loss
   RecordMode mode = RecordMode::kNone;
   RecordStatus status = RecordStatus::kOk;
-  bool calibrated = false;  // false: data-sheet values
+  bool calibrated = false;        // false: data-sheet values
+  CalibrationReport calibration;  // what the calibration thread does and needs
   std::optional<Orientation> orientation;
   int landmarks = 0;  // that held it: 0 but in mode OE
   double line_delay_s = 0;

@@ -56,7 +56,13 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
   oe.max_width = options.calibration.camera.width;
   oe.max_height = options.calibration.camera.height;
   oe_ = std::make_unique<OeMode>(oe);
-  oe_->reset(options.calibration);
+  oe_->reset(options.calibration, options.map);
+  if (!options.follow_points) return;
+  StartUpOptions start_up;
+  start_up.width = oe.max_width;
+  start_up.height = oe.max_height;
+  start_up.max_points = FrameTracks::kMaxPoints;
+  start_up_ = std::make_unique<StartUpTracker>(start_up);
 }
 
 OrientationStep::Telemetry OrientationStep::empty_telemetry(bool filtered) const {
@@ -77,6 +83,10 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
     telemetry_filtered_ = filtered;
   }
   telemetry_lost_ = false;
+  if (sample.zoom) {
+    zoom_ = sample.zoom;
+    if (!zoom_at_adoption_) zoom_at_adoption_ = sample.zoom;
+  }
 
   TelemetrySample timed;
   timed.pan = sample.pan_rad;
@@ -96,9 +106,24 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
 
 void OrientationStep::telemetry_lost() { telemetry_lost_ = true; }
 
+void OrientationStep::adopt(const PublishedCalibration& published) {
+  options_.calibration = published.calibration;
+  options_.calibrated = published.calibrated;
+  zoom_at_adoption_ = zoom_;
+  floor_sigma_s_ = 0;
+  if (oe_) oe_->reset(published.calibration, published.map);
+}
+
+bool OrientationStep::zoom_fits() const {
+  const std::optional<double>& wanted =
+      options_.calibration.zoom ? options_.calibration.zoom : zoom_at_adoption_;
+  return !options_.calibrated || !zoom_ || !wanted ||
+         std::abs(*zoom_ - *wanted) <= options_.zoom_tolerance;
+}
+
 OrientationRecord OrientationStep::empty_record() const {
   OrientationRecord record;
-  record.calibrated = options_.calibrated;
+  record.calibrated = options_.calibrated && zoom_fits();
   record.line_delay_s = options_.calibration.line_delay;
   record.focal_length_px = options_.calibration.camera.focal_length;
   record.aspect = options_.calibration.camera.aspect;
@@ -124,6 +149,13 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
               .value_or(clock);
   events->video_clock_restarted = clock.restarted;
   events->video_floor_shifted = clock.floor_shifted;
+  if (clock.restarted || clock.floor_shifted) floor_sigma_s_ = options_.floor_sigma_s;
+  picture_ = picture;
+  tracks_.stamp = stamp;
+  tracks_.time_s = clock.time_s;
+  tracks_.clock_restarted = clock.restarted;
+  tracks_.floor_shifted = clock.floor_shifted;
+  tracks_.tracker = FrameTracks::Tracker::kNone;
 
   OrientationRecord record = empty_record();
   record.frame = stamp.frame;
@@ -132,9 +164,15 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const Calibration& calibration = options_.calibration;
   const double to_middle_row_s = calibration.line_delay * (0.5 * calibration.camera.height);
   InterpolatedPanTilt measured;
-  const QueryStatus query = telemetry_.query(
-      clock.time_s + calibration.clock_offset + to_middle_row_s, clock.sigma_s, &measured);
+  const QueryStatus query =
+      telemetry_.query(clock.time_s + calibration.clock_offset + to_middle_row_s,
+                       std::hypot(clock.sigma_s, floor_sigma_s_), &measured);
   record.status = status_of(query, clock.state == ClockState::kLocked);
+  if (!zoom_fits()) {
+    // Neither the lens nor the axes of another zoom are this one's.
+    record.status = RecordStatus::kOtherZoom;
+    return record;
+  }
   orient(has_result(query) ? &measured : nullptr, picture, &record);
   return record;
 }
@@ -142,7 +180,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
 void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageView& picture,
                              OrientationRecord* record) {
   FrameOrientation frame;
-  if (oe_) {
+  if (finds_landmarks()) {
     const OeStatus status = oe_->process(picture, *record->time_s, measured, &frame);
     // That the frame's time is not yet known well, sigma says too.
     if (measured != nullptr && status != OeStatus::kOk) record->status = to_record(status);
@@ -160,7 +198,39 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
 }
 
 void OrientationStep::maintain() {
-  if (oe_) oe_->maintain();
+  if (finds_landmarks()) {
+    oe_->maintain();
+    if (picture_.valid()) tracks_.tracker = FrameTracks::Tracker::kOe;
+  } else if (start_up_ && picture_.valid()) {
+    if (start_up_->process(picture_) != StartUpStatus::kBadImage)
+      tracks_.tracker = FrameTracks::Tracker::kStartUp;
+  }
+  picture_ = {};
+}
+
+void OrientationStep::get_tracks(FrameTracks* tracks) const {
+  *tracks = tracks_;
+  const auto add = [tracks](std::uint32_t landmark, const Vector2<double>& u, double sigma) {
+    if (tracks->count == FrameTracks::kMaxPoints) return;
+    tracks->points[static_cast<std::size_t>(tracks->count++)] = {
+        landmark, static_cast<float>(u.x()), static_cast<float>(u.y()), static_cast<float>(sigma)};
+  };
+  tracks->count = 0;
+  if (tracks_.tracker == FrameTracks::Tracker::kStartUp) {
+    tracks->looked_for = start_up_->statistics().looked_for;
+    for (int i = 0; i < start_up_->observation_count(); ++i) {
+      const TrackObservation& seen = start_up_->observations()[i];
+      add(seen.landmark, seen.u, seen.sigma);
+    }
+  } else if (tracks_.tracker == FrameTracks::Tracker::kOe) {
+    const OeStatistics& statistics = oe_->statistics();
+    tracks->oe_status = statistics.status;
+    tracks->looked_for = statistics.looked_for;
+    for (int i = 0; statistics.status == OeStatus::kOk && i < statistics.aligned; ++i) {
+      const OeObservation& seen = oe_->observations()[i];
+      if (const auto sigma = track_sigma(seen)) add(seen.id, seen.u, *sigma);
+    }
+  }
 }
 
 RecordStatus OrientationStep::status_of(QueryStatus query, bool clock_locked) const {

@@ -11,7 +11,10 @@
 // In OE mode (oe_mode.h) landmarks of the frame's picture join in; the same telemetry is the prior.
 // The record is PT's, and its status says why, where they do not hold; it is OE's also where
 // telemetry is missing but landmarks carry the orientation on (its status then names what is missing).
-// After a reconnection the stream's clock begins anew; telemetry from before it is forgotten.
+// While there is no calibration for the camera, or none for the zoom that the pan/tilt source reports, points
+// are followed instead (start_up_tracker.h), for the calibration thread to make one of.
+// After a reconnection the stream's clock begins anew; telemetry from before it is forgotten. The least
+// delay of the new connection may be another, so that d holds less surely until the next adopt().
 // Fixed memory, taken by the constructor; after it nothing is allocated, thrown or locked. One thread.
 
 #include <memory>
@@ -22,8 +25,11 @@
 #include "core/realtime/image_view.h"
 #include "core/realtime/oe_mode.h"
 #include "core/realtime/pt_mode.h"
+#include "core/realtime/start_up_tracker.h"
 #include "core/realtime/telemetry_buffer.h"
+#include "edge_app/pipeline/calibration_feed.h"
 #include "edge_app/pipeline/orientation_record.h"
+#include "edge_app/pipeline/published_calibration.h"
 #include "edge_app/pipeline/stream_clock.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
@@ -43,6 +49,13 @@ struct OrientationStepOptions {
   TelemetryLimits telemetry_limits;
   // OE mode, for pictures of the calibration's size, which replaces max_width and max_height; none: PT.
   std::optional<OeOptions> oe;
+  // The map OE mode begins with.
+  MapState map;
+  // With OE mode: follow points as long as there is no calibration.
+  bool follow_points = false;
+  double zoom_tolerance = 0;  // device units within which the calibration holds
+  double floor_sigma_s =
+      5e-3;  // by how much a new connection's least delay differs, one standard deviation
 };
 
 // What a frame brought to light, for the log.
@@ -63,8 +76,13 @@ class OrientationStep {
   // maintain() that follows.
   OrientationRecord add_frame(const FrameStamp& stamp, const ImageView& picture,
                               StepEvents* events);
-  // OE mode: upkeep of the landmark map with the frame last added, for when its record is out.
+  // For when the record is out: upkeep of the landmark map with the frame last added, or the following of
+  // points through it.
   void maintain();
+  // What the frame last added, and maintained, has for the calibration thread.
+  void get_tracks(FrameTracks* tracks) const;
+  // Takes over another calibration with its map, between two frames.
+  void adopt(const PublishedCalibration& published);
   // The record in place of frames while there is no connection to the video source.
   [[nodiscard]] OrientationRecord video_lost(double now_s) const;
 
@@ -75,6 +93,9 @@ class OrientationStep {
   [[nodiscard]] Telemetry empty_telemetry(bool filtered) const;
   [[nodiscard]] OrientationRecord empty_record() const;
   [[nodiscard]] RecordStatus status_of(QueryStatus query, bool clock_locked) const;
+  // False: there is a calibration, but not for the zoom that the pan/tilt source reports.
+  [[nodiscard]] bool zoom_fits() const;
+  [[nodiscard]] bool finds_landmarks() const { return oe_ && options_.calibrated && zoom_fits(); }
   // Completes a record that has its time and telemetry's status; measured: null if there is none.
   void orient(const InterpolatedPanTilt* measured, const ImageView& picture,
               OrientationRecord* record);
@@ -83,7 +104,13 @@ class OrientationStep {
   StreamClock video_clock_;
   StreamClock telemetry_clock_;
   Telemetry telemetry_;
-  std::unique_ptr<OeMode> oe_;       // null: PT mode
+  std::unique_ptr<OeMode> oe_;                // null: PT mode
+  std::unique_ptr<StartUpTracker> start_up_;  // null: nobody wants its points
+  std::optional<double> zoom_;                // as last reported
+  std::optional<double> zoom_at_adoption_;    // that a calibration without zoom is for
+  double floor_sigma_s_ = 0;
+  ImageView picture_;                // of the frame last added, until it is maintained
+  FrameTracks tracks_;               // of the frame last added, but for its points
   bool telemetry_filtered_ = false;  // times in telemetry_ come from telemetry_clock_
   bool telemetry_lost_ = false;
 };

@@ -5,6 +5,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <system_error>
 
@@ -19,14 +20,17 @@ constexpr double kDropLogInterval = 1;  // s
 }  // namespace
 
 Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink,
-                   const PipelineOptions& options)
+                   SelfCalibration* calibration, const PipelineOptions& options)
     : video_(video),
       pan_tilt_(pan_tilt),
       sink_(sink),
+      calibration_(calibration),
       options_(options),
-      stage_(options.step, options.measure_latency),
+      stage_(options.step, options.measure_latency, calibration != nullptr),
+      pictures_(kPictureSlots),
       finished_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (finished_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+  for (PictureSlot slot = 0; slot < kPictureSlots; ++slot) free_slots_.push_back(slot);
 }
 
 Pipeline::~Pipeline() {
@@ -37,6 +41,7 @@ Pipeline::~Pipeline() {
 void Pipeline::start() {
   // The consumers first, so that nothing is dropped at the start.
   threads_.emplace_back(&Pipeline::write_output, this);
+  if (calibration_ != nullptr) threads_.emplace_back(&Pipeline::calibrate, this);
   threads_.emplace_back(&Pipeline::run_realtime, this);
   threads_.emplace_back(&Pipeline::read_telemetry, this);
   threads_.emplace_back(&Pipeline::capture, this);
@@ -47,6 +52,7 @@ void Pipeline::stop() {
   video_.stop();
   pan_tilt_.stop();
   sink_.interrupt();
+  if (calibration_ != nullptr) calibration_->cancel();
   for (std::thread& thread : threads_) thread.join();
   threads_.clear();
 }
@@ -80,14 +86,27 @@ bool Pipeline::check_size(const Frame& frame) {
   return false;
 }
 
+// The picture stays where it is until its slot comes back; a frame whose picture finds no slot goes without.
+bool Pipeline::push(const Frame& frame) {
+  for (PictureSlot slot = kNoPicture; stage_.pop_returned(slot);) {
+    pictures_[static_cast<std::size_t>(slot)] = Frame();
+    free_slots_.push_back(slot);
+  }
+  VideoMessage message;
+  message.stamp = frame.stamp;
+  if (frame.luma != nullptr && !free_slots_.empty()) {
+    message.slot = free_slots_.back();
+    message.picture = {frame.luma, frame.width, frame.height, frame.stride};
+    free_slots_.pop_back();
+    pictures_[static_cast<std::size_t>(message.slot)] = frame;
+  }
+  message.decoded_s = monotonic_now_s();
+  if (!stage_.push(message) && message.slot != kNoPicture) free_slots_.push_back(message.slot);
+  return true;
+}
+
 void Pipeline::capture() {
-  const auto on_frame = [this](const Frame& frame) {
-    if (!check_size(frame)) return false;
-    VideoMessage message;
-    message.stamp = frame.stamp;
-    stage_.push(message);
-    return true;
-  };
+  const auto on_frame = [this](const Frame& frame) { return check_size(frame) && push(frame); };
   const auto on_loss = [this](double now_s) {
     VideoMessage message;
     message.kind = VideoMessage::Kind::kLost;
@@ -120,6 +139,52 @@ void Pipeline::run_realtime() {
   } while (stage_.process());
 }
 
+void Pipeline::feed_calibration() {
+  for (PanTiltSample sample; stage_.pop(sample);) calibration_->add(sample);
+  for (FeedFrame frame; stage_.pop(frame);) {
+    calibration_->add(frame.tracks);
+    if (frame.slot != kNoPicture) {
+      calibration_->add_keyframe(frame.picture);
+      stage_.give_back(frame.slot);
+    } else if (calibration_->wants_keyframe()) {
+      stage_.want_picture();
+    }
+  }
+  if (stage_.video_is_lost()) calibration_->video_lost();
+  if (stage_.telemetry_is_lost()) calibration_->telemetry_lost();
+}
+
+void Pipeline::calibrate() {
+  for (const std::string& warning : set_lowest_priority())
+    spdlog::warn("calibration thread: {}", warning);
+  std::vector<std::shared_ptr<const PublishedCalibration>> lent;
+  CalibrationReport said;
+  while (!stage_.output_ended()) {
+    stage_.wait_feed();
+    feed_calibration();
+    for (const PublishedCalibration* adopted = nullptr; stage_.pop_adopted(adopted);) {
+      lent.erase(std::remove_if(lent.begin(), lent.end(),
+                                [&](const auto& one) { return one.get() == adopted; }),
+                 lent.end());
+    }
+    CalibrationReport report = calibration_->report();
+    if (calibration_->due()) stage_.report({CalibrationActivity::kAdjusting, report.need});
+    if (auto published = calibration_->work()) {
+      if (stage_.publish(published.get())) lent.push_back(std::move(published));
+    }
+    report = calibration_->report();
+    stage_.report(report);
+    for (const std::string& line : calibration_->take_messages())
+      spdlog::info("calibration: {}", line);
+    if (report.activity != said.activity || report.need != said.need) {
+      spdlog::info(
+          "calibration: {}{}{}", to_string(report.activity),
+          report.need == CalibrationNeed::kNothing ? "" : "; needs: ", to_string(report.need));
+      said = report;
+    }
+  }
+}
+
 void Pipeline::write_output() {
   bool open = true;
   bool last = false;
@@ -131,6 +196,7 @@ void Pipeline::write_output() {
       account(message);
       if (!open) continue;
       open = sink_.write(message.record);
+      account_way(message, monotonic_now_s());
       if (open) continue;
       if (sink_.error().empty()) {
         finish();
@@ -142,10 +208,19 @@ void Pipeline::write_output() {
   finish();
 }
 
+void Pipeline::account_way(const OutputMessage& message, double written_s) {
+  if (!message.record.frame || !options_.measure_latency) return;
+  summary_.decoding.add(message.decoded_s - message.record.receive_time_s);
+  summary_.waiting.add(message.taken_s - message.decoded_s);
+  summary_.computing.add(message.made_s - message.taken_s);
+  summary_.writing.add(written_s - message.made_s);
+}
+
 void Pipeline::account(const OutputMessage& message) {
   ++summary_.records;
   if (message.record.frame) ++summary_.frames;
   if (message.record.orientation) ++summary_.with_orientation;
+  if (message.record.mode == RecordMode::kOe) ++summary_.with_landmarks;
   if (message.record.frame && message.record.latency_s)
     summary_.latency.add(*message.record.latency_s);
   if (message.events.video_clock_restarted) {

@@ -4,6 +4,8 @@
 //   capture thread    frame source -> queue       | reads, checks the image size, logs losses
 //   telemetry thread  pan/tilt source -> queue    |
 //   real-time thread  RealtimeStage::process(); scheduled as RealtimeOptions say
+//   calibration thread  SelfCalibration, with the lowest priority: tracks and telemetry in, a calibration
+//                     with its map out, which the real-time thread takes over between two frames
 //   output thread     queue -> sink; logs what the real-time thread may not log; counts
 //
 // A source that loses its connection is waited for; records of mode `none` are made at the loss and
@@ -21,6 +23,7 @@
 
 #include "edge_app/pipeline/latency_histogram.h"
 #include "edge_app/pipeline/realtime_stage.h"
+#include "edge_app/pipeline/self_calibration.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/system/realtime.h"
 #include "platform/video/frame_source.h"
@@ -42,14 +45,21 @@ struct PipelineSummary {
   std::int64_t frames = 0;
   std::int64_t with_orientation = 0;
   DropCounters drops;
+  std::int64_t with_landmarks = 0;  // of these, in OE mode
   LatencyHistogram latency;
+  // A frame's way: received (its last packet), pushed by the capture thread, taken up by the real-time thread,
+  // record made, record written.
+  LatencyHistogram decoding;
+  LatencyHistogram waiting;
+  LatencyHistogram computing;
+  LatencyHistogram writing;
 };
 
 class Pipeline {
  public:
-  // Borrows all three until it is destroyed.
+  // Borrows all until it is destroyed. calibration: null if nothing is to be calibrated.
   Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink,
-           const PipelineOptions& options);
+           SelfCalibration* calibration, const PipelineOptions& options);
   ~Pipeline();
   Pipeline(const Pipeline&) = delete;
   Pipeline& operator=(const Pipeline&) = delete;
@@ -71,8 +81,12 @@ class Pipeline {
   void capture();
   void read_telemetry();
   void run_realtime();
+  void calibrate();
+  void feed_calibration();
   void write_output();
   void account(const OutputMessage& message);
+  void account_way(const OutputMessage& message, double written_s);
+  bool push(const Frame& frame);
   bool check_size(const Frame& frame);
   void fail(const std::string& error);
   void finish();
@@ -80,9 +94,12 @@ class Pipeline {
   FrameSource& video_;
   PanTiltSource& pan_tilt_;
   RecordSink& sink_;
+  SelfCalibration* calibration_;
   PipelineOptions options_;
   RealtimeStage stage_;
-  int finished_;               // eventfd
+  std::vector<Frame> pictures_;  // capture thread: by slot, those that somebody still looks at
+  std::vector<PictureSlot> free_slots_;  // capture thread
+  int finished_;                         // eventfd
   std::mutex error_mutex_;     // the first of several threads to fail is heard; not on the
   std::string error_;          // real-time thread
   PipelineSummary summary_;    // output thread

@@ -4,12 +4,20 @@
 
 namespace alidade {
 
-RealtimeStage::RealtimeStage(const OrientationStepOptions& options, bool measure_latency)
-    : step_(options), measure_latency_(measure_latency) {}
+RealtimeStage::RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed)
+    : step_(options), measure_latency_(measure_latency), feed_wanted_(feed) {}
 
-void RealtimeStage::push(const VideoMessage& message) {
-  if (!video_queue_.push(message)) dropped_frames_.fetch_add(1, std::memory_order_relaxed);
+bool RealtimeStage::push(const VideoMessage& message) {
+  const bool pushed = video_queue_.push(message);
+  if (!pushed) dropped_frames_.fetch_add(1, std::memory_order_relaxed);
   input_.post();
+  return pushed;
+}
+
+bool RealtimeStage::publish(const PublishedCalibration* calibration) {
+  const bool pushed = published_.push(calibration);
+  input_.post();
+  return pushed;
 }
 
 void RealtimeStage::push(const TelemetryMessage& message) {
@@ -25,32 +33,79 @@ void RealtimeStage::end_input() {
 void RealtimeStage::drain_telemetry() {
   TelemetryMessage message;
   while (telemetry_queue_.pop(message)) {
-    if (message.kind == TelemetryMessage::Kind::kSample) {
-      step_.add_telemetry(message.sample);
-    } else {
+    const bool is_sample = message.kind == TelemetryMessage::Kind::kSample;
+    telemetry_lost_.store(!is_sample, std::memory_order_relaxed);
+    if (!is_sample) {
       step_.telemetry_lost();
+      continue;
     }
+    step_.add_telemetry(message.sample);
+    if (feed_wanted_ && !feed_samples_.push(message.sample))
+      unheard_.fetch_add(1, std::memory_order_relaxed);
   }
+}
+
+void RealtimeStage::adopt_published() {
+  const PublishedCalibration* calibration = nullptr;
+  while (published_.pop(calibration)) {
+    step_.adopt(*calibration);
+    // There is room for all that were published.
+    adopted_.push(calibration);
+    feed_.post();
+  }
+}
+
+void RealtimeStage::process_frame(const VideoMessage& message) {
+  OutputMessage out;
+  out.decoded_s = message.decoded_s;
+  out.taken_s = monotonic_now_s();
+  out.record = step_.add_frame(message.stamp, message.picture, &out.events);
+  out.record.calibration = report_.load(std::memory_order_relaxed);
+  out.made_s = monotonic_now_s();
+  if (measure_latency_) out.record.latency_s = out.made_s - out.record.receive_time_s;
+  emit(out);
+  step_.maintain();
+  bool lent = false;
+  if (feed_wanted_) feed(message, &lent);
+  if (message.slot != kNoPicture && !lent) returned_.push(message.slot);
+}
+
+void RealtimeStage::feed(const VideoMessage& message, bool* lent) {
+  step_.get_tracks(&feed_frame_.tracks);
+  const bool lend = message.picture.valid() && message.slot != kNoPicture &&
+                    picture_wanted_.exchange(false, std::memory_order_relaxed);
+  feed_frame_.picture = lend ? message.picture : ImageView{};
+  feed_frame_.slot = lend ? message.slot : kNoPicture;
+  *lent = feed_frames_.push(feed_frame_) && lend;
+  if (lend && !*lent) picture_wanted_.store(true, std::memory_order_relaxed);
+  feed_.post();
 }
 
 bool RealtimeStage::process() noexcept {
   const bool ended = input_ended_.load(std::memory_order_acquire);
   drain_telemetry();
+  adopt_published();
   VideoMessage message;
   while (video_queue_.pop(message)) {
     drain_telemetry();
-    OutputMessage out;
-    if (message.kind == VideoMessage::Kind::kFrame) {
-      out.record = step_.add_frame(message.stamp, ImageView{}, &out.events);
-    } else {
-      out.record = step_.video_lost(message.time_s);
+    adopt_published();
+    const bool is_frame = message.kind == VideoMessage::Kind::kFrame;
+    video_lost_.store(!is_frame, std::memory_order_relaxed);
+    if (is_frame) {
+      process_frame(message);
+      continue;
     }
+    OutputMessage out;
+    out.record = step_.video_lost(message.time_s);
+    out.record.calibration = report_.load(std::memory_order_relaxed);
     if (measure_latency_) out.record.latency_s = monotonic_now_s() - out.record.receive_time_s;
     emit(out);
+    feed_.post();
   }
   if (ended) {
     output_ended_.store(true, std::memory_order_release);
     output_.post();
+    feed_.post();
   }
   return !ended;
 }
@@ -63,7 +118,8 @@ void RealtimeStage::emit(const OutputMessage& message) {
 DropCounters RealtimeStage::drops() const {
   return {dropped_frames_.load(std::memory_order_relaxed),
           dropped_telemetry_.load(std::memory_order_relaxed),
-          dropped_records_.load(std::memory_order_relaxed)};
+          dropped_records_.load(std::memory_order_relaxed),
+          unheard_.load(std::memory_order_relaxed)};
 }
 
 }  // namespace alidade

@@ -1,9 +1,13 @@
 #pragma once
 // RealtimeStage: the queues around the real-time thread, and what that thread does when woken.
 //
-//   capture thread   --VideoMessage------>  |               |
-//   telemetry thread --TelemetryMessage-->  | process()     | --OutputMessage--> output thread
+//   capture thread     --VideoMessage---------->  |           | --OutputMessage--> output thread
+//   telemetry thread   --TelemetryMessage------>  | process() | --PictureSlot----> capture thread
+//   calibration thread --PublishedCalibration-->  |           | --FeedFrame,
+//                                                 |           |   PanTiltSample--> calibration thread
 //
+// Pictures stay where the decoder put them: a frame occupies a slot of the capture thread, and whoever had the
+// picture last, this thread or the calibration thread, gives the slot back.
 // Each queue has one producer and one consumer, a fixed capacity and fixed-size messages. A full
 // queue drops the new message and counts it; nobody waits for anybody. process() allocates nothing,
 // takes no lock, logs nothing and throws nothing.
@@ -18,11 +22,18 @@
 
 namespace alidade {
 
+using PictureSlot = std::int32_t;
+inline constexpr PictureSlot kNoPicture = -1;
+inline constexpr PictureSlot kPictureSlots = 32;
+
 struct VideoMessage {
   enum class Kind : std::uint8_t { kFrame, kLost };
   Kind kind = Kind::kFrame;
   FrameStamp stamp;   // kFrame
-  double time_s = 0;  // kLost: host time of the news
+  ImageView picture;  // kFrame; not valid() if nobody looks at pictures
+  PictureSlot slot = kNoPicture;
+  double decoded_s = 0;  // host time when the frame was pushed
+  double time_s = 0;     // kLost: host time of the news
 };
 
 struct TelemetryMessage {
@@ -34,27 +45,46 @@ struct TelemetryMessage {
 struct OutputMessage {
   OrientationRecord record;
   StepEvents events;
+  // Host times on a frame's way: pushed by the capture thread, taken up here, record made.
+  double decoded_s = 0;
+  double taken_s = 0;
+  double made_s = 0;
+};
+
+// For the calibration thread.
+struct FeedFrame {
+  FrameTracks tracks;
+  ImageView picture;  // lent with its slot, if one was wanted
+  PictureSlot slot = kNoPicture;
 };
 
 static_assert(std::is_trivially_copyable_v<VideoMessage> &&
               std::is_trivially_copyable_v<TelemetryMessage> &&
-              std::is_trivially_copyable_v<OutputMessage>);
+              std::is_trivially_copyable_v<OutputMessage> &&
+              std::is_trivially_copyable_v<FeedFrame>);
 
 // Messages lost to full queues.
 struct DropCounters {
   std::int64_t frames = 0;
   std::int64_t telemetry = 0;
   std::int64_t records = 0;
+  // Frames and samples that the calibration thread was too busy to hear of: no loss for the records.
+  std::int64_t unheard = 0;
   [[nodiscard]] std::int64_t total() const { return frames + telemetry + records; }
 };
 
 class RealtimeStage {
  public:
   // measure_latency: receive times are of this host's running clock (not of a recording).
-  RealtimeStage(const OrientationStepOptions& options, bool measure_latency);
+  // feed: there is a calibration thread.
+  RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed);
 
-  // Capture thread.
-  void push(const VideoMessage& message);
+  // Capture thread: a slot that nobody needs any more, one after the other.
+  bool pop_returned(PictureSlot& slot) {
+    return returned_.pop(slot) || returned_by_calibration_.pop(slot);
+  }
+  // Capture thread. False: the queue is full, the message and its slot are refused.
+  bool push(const VideoMessage& message);
   void end_input();  // no video will follow
   // Telemetry thread.
   void push(const TelemetryMessage& message);
@@ -71,16 +101,54 @@ class RealtimeStage {
   // True: what can still be popped now is the last.
   [[nodiscard]] bool output_ended() const { return output_ended_.load(std::memory_order_acquire); }
 
+  // Calibration thread: sleeps until there is something to do, or the output has ended.
+  void wait_feed() { feed_.wait(); }
+  bool pop(FeedFrame& frame) { return feed_frames_.pop(frame); }
+  bool pop(PanTiltSample& sample) { return feed_samples_.pop(sample); }
+  [[nodiscard]] bool video_is_lost() const { return video_lost_.load(std::memory_order_relaxed); }
+  [[nodiscard]] bool telemetry_is_lost() const {
+    return telemetry_lost_.load(std::memory_order_relaxed);
+  }
+  void give_back(PictureSlot slot) { returned_by_calibration_.push(slot); }
+  // The next frame's picture is wanted.
+  void want_picture() { picture_wanted_.store(true, std::memory_order_relaxed); }
+  // The real-time thread takes it over between two frames. It lives on until pop_adopted() gives it back. False:
+  // too many wait already.
+  bool publish(const PublishedCalibration* calibration);
+  bool pop_adopted(const PublishedCalibration*& calibration) { return adopted_.pop(calibration); }
+  void report(CalibrationReport report) { report_.store(report, std::memory_order_relaxed); }
+
   // Any thread.
   [[nodiscard]] DropCounters drops() const;
 
  private:
   void drain_telemetry();
+  void adopt_published();
+  void process_frame(const VideoMessage& message);
+  void feed(const VideoMessage& message, bool* lent);
   void emit(const OutputMessage& message);
 
+  static constexpr std::size_t kPublished = 4;
   boost::lockfree::spsc_queue<VideoMessage, boost::lockfree::capacity<256>> video_queue_;
   boost::lockfree::spsc_queue<TelemetryMessage, boost::lockfree::capacity<1024>> telemetry_queue_;
   boost::lockfree::spsc_queue<OutputMessage, boost::lockfree::capacity<1024>> output_queue_;
+  boost::lockfree::spsc_queue<PictureSlot, boost::lockfree::capacity<2 * kPictureSlots>> returned_;
+  boost::lockfree::spsc_queue<PictureSlot, boost::lockfree::capacity<2 * kPictureSlots>>
+      returned_by_calibration_;
+  boost::lockfree::spsc_queue<FeedFrame, boost::lockfree::capacity<256>> feed_frames_;
+  boost::lockfree::spsc_queue<PanTiltSample, boost::lockfree::capacity<4096>> feed_samples_;
+  boost::lockfree::spsc_queue<const PublishedCalibration*, boost::lockfree::capacity<kPublished>>
+      published_;
+  boost::lockfree::spsc_queue<const PublishedCalibration*,
+                              boost::lockfree::capacity<2 * kPublished>>
+      adopted_;
+  std::atomic<CalibrationReport> report_{CalibrationReport{}};
+  static_assert(std::atomic<CalibrationReport>::is_always_lock_free);
+  std::atomic<bool> picture_wanted_{false};
+  std::atomic<bool> video_lost_{false};
+  std::atomic<bool> telemetry_lost_{false};
+  FeedFrame feed_frame_;  // real-time thread: too large for its stack
+  Semaphore feed_;
   Semaphore input_;
   Semaphore output_;
   // Flags and not messages, so that a full queue cannot lose them. Set with release after the last
@@ -91,8 +159,10 @@ class RealtimeStage {
   std::atomic<std::int64_t> dropped_frames_{0};
   std::atomic<std::int64_t> dropped_telemetry_{0};
   std::atomic<std::int64_t> dropped_records_{0};
+  std::atomic<std::int64_t> unheard_{0};
   OrientationStep step_;
   bool measure_latency_;
+  bool feed_wanted_;
 };
 
 }  // namespace alidade

@@ -1,6 +1,6 @@
 #pragma once
 // SelfCalibration: what the calibration thread does with what the real-time thread tells it. Pure: no thread, no
-// clock of its own, no files but through the CalibrationStore it is given; a simulation runs it step by step.
+// clock of its own, no files but through the CalibrationArchive it is given; a simulation runs it step by step.
 //
 //   collects   tracks, telemetry and some pictures (keyframes) of the latest motion, in bounded memory;
 //              anew after a reconnection, a change of zoom, or a restart of the tracker
@@ -22,29 +22,29 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/realtime/image_view.h"
+#include "edge_app/pipeline/calibration_archive.h"
 #include "edge_app/pipeline/calibration_feed.h"
 #include "edge_app/pipeline/published_calibration.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 
 namespace alidade {
 
-class CalibrationStore;
-
 struct SelfCalibrationOptions {
-  Calibration data_sheet;  // with the image size; what holds without a calibration
-  CalibrationOptions adjustment;
-  double angle_sigma_rad = 1e-4;  // of telemetry: how well the map is tied to it
-  double zoom_tolerance = 0;      // device units within which a calibration holds
-  double first_try_s = 6;         // of motion
-  double window_s = 20;           // the data kept, at most
+  Calibration data_sheet;         // with the image size; what holds without a calibration
+  CalibrationOptions adjustment;  // priors of a first calibration
+  CalibrationNoise noise;
+  double zoom_tolerance = 0;  // device units within which a calibration holds
+  double first_try_s = 6;     // of data
+  double window_s = 40;       // the data kept, at most
+  std::size_t max_frames = 1500;
   std::size_t max_keyframes = 16;
-  bool automatic = true;  // false: looks for stored calibrations only
+  bool automatic = true;  // false: stored calibrations only
 };
 
 class SelfCalibration {
  public:
-  // store: borrowed; null: nothing is kept.
-  SelfCalibration(const SelfCalibrationOptions& options, CalibrationStore* store);
+  // archive: borrowed; null: nothing is kept.
+  SelfCalibration(const SelfCalibrationOptions& options, CalibrationArchive* archive);
   ~SelfCalibration();
 
   // What the real-time thread begins with: the stored calibration, or the data sheet's.
@@ -55,13 +55,17 @@ class SelfCalibration {
   [[nodiscard]] bool wants_keyframe() const;
   void add_keyframe(const ImageView& picture);  // copies it
   void add(const PanTiltSample& sample);
-  void video_lost();
-  void telemetry_lost();
+  void video_lost();      // the next frame ends that
+  void telemetry_lost();  // the next sample ends that
 
+  // Whether work() would compute.
+  [[nodiscard]] bool due() const;
   // Does what is due; null if nothing is to be published.
   [[nodiscard]] std::shared_ptr<const PublishedCalibration> work();
 
   [[nodiscard]] CalibrationReport report() const;
+  // Thread-safe: work() that is under way, and all later, ends soon with nothing.
+  void cancel();
   // Lines for the log since the last call: what was found, why something was refused.
   [[nodiscard]] std::vector<std::string> take_messages();
 

@@ -1,0 +1,38 @@
+#pragma once
+// CalibrationArchive: where the calibrations of one camera are kept, one for each zoom setting, each with its
+// map. On disk it is the CalibrationStore. Not for the real-time thread; one thread.
+
+#include <optional>
+#include <string>
+
+#include "core/calibration/calibration_file.h"
+#include "core/model/calibration.h"
+#include "core/realtime/map_state.h"
+
+namespace alidade {
+
+struct StoredCalibration {
+  Calibration calibration;
+  CalibrationNotes notes;  // written, not read back
+  MapState map;
+  std::string path;  // of the file; empty: not stored yet
+};
+
+class CalibrationArchive {
+ public:
+  virtual ~CalibrationArchive() = default;
+
+  // The calibration for a zoom: the nearest within the tolerance, else the one without zoom, which holds for
+  // any. Without a zoom: the one without, else the only one. Null if there is none. Holds until the next save().
+  [[nodiscard]] virtual const StoredCalibration* find(std::optional<double> zoom) const = 0;
+
+  // Keeps it in memory in any case, in place of the one for its zoom, within the tolerance; its `path` is
+  // ignored. False with one line if it could not be written (disk full, no permission): what was stored before
+  // stays stored, and save_pending() tries again. False too if the map makes no sense: the calibration is then
+  // stored without it, and nothing is pending.
+  [[nodiscard]] virtual bool save(const StoredCalibration& calibration, std::string* error) = 0;
+  [[nodiscard]] virtual bool has_pending() const = 0;
+  [[nodiscard]] virtual bool save_pending(std::string* error) = 0;
+};
+
+}  // namespace alidade

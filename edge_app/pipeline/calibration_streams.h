@@ -1,0 +1,36 @@
+#pragma once
+// From the stamps of frames and samples, and from tracks, to what calibrate() takes; for a recording as for the
+// calibration thread.
+//   clocks  Frames are counted by their sequence numbers, else by sender times that lie on a steady grid,
+//           else by their stamps. Telemetry likewise (sequence, device time); samples that were polled have
+//           no clock of their own, and were true in the middle of [earliest_time_s, receive_time_s].
+//   stamps  of receipt: with a stamp sigma in the input's noise they err to both sides, otherwise they are late
+//           only, as for `run` and `replay`.
+//   restarts  A sender's clock begins anew after a reconnection: the longest part without one is used.
+// Pure functions; they allocate.
+
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+#include "platform/pan_tilt/pan_tilt_source.h"
+#include "platform/video/frame_source.h"
+
+namespace alidade {
+
+// Frames into input->frames, and what is known of their stamps into *options; remarks get a line for what was left out.
+void add_frames(std::vector<FrameStamp> stamps, CalibrationInput* input,
+                CalibrationOptions* options, std::vector<std::string>* remarks);
+void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
+                   CalibrationOptions* options, std::vector<std::string>* remarks);
+
+// Leaves what an adjustment can use in reasonable time: landmarks seen kMinSightings times or more, and of
+// these, if there are more than max_observations, those that moved farthest through the image.
+inline constexpr int kMinSightings = 5;
+inline constexpr std::size_t kMaxObservations = 30000;
+[[nodiscard]] std::vector<CalibrationObservation> choose_tracks(
+    const std::vector<CalibrationObservation>& observations,
+    std::size_t max_observations = kMaxObservations);
+
+}  // namespace alidade

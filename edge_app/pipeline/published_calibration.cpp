@@ -1,0 +1,49 @@
+#include "edge_app/pipeline/published_calibration.h"
+
+namespace alidade {
+
+const char* to_string(CalibrationActivity activity) {
+  switch (activity) {
+    case CalibrationActivity::kOff:
+      return "off";
+    case CalibrationActivity::kCollecting:
+      return "collecting";
+    case CalibrationActivity::kAdjusting:
+      return "adjusting";
+    case CalibrationActivity::kWatching:
+      return "watching";
+    case CalibrationActivity::kDoubtful:
+      return "doubtful";
+  }
+  return "unknown activity";
+}
+
+const char* to_string(CalibrationNeed need) {
+  switch (need) {
+    case CalibrationNeed::kNothing:
+      return "";
+    case CalibrationNeed::kVideo:
+      return "video";
+    case CalibrationNeed::kTelemetry:
+      return "telemetry";
+    case CalibrationNeed::kMotion:
+      return "move the camera";
+    case CalibrationNeed::kPan:
+      return "pan more";
+    case CalibrationNeed::kTilt:
+      return "tilt more";
+    case CalibrationNeed::kAcceleration:
+      return "accelerate";
+    case CalibrationNeed::kTexture:
+      return "scene too plain";
+    case CalibrationNeed::kAgreement:
+      return "telemetry that describes the motion in the video";
+    case CalibrationNeed::kTime:
+      return "more of the same motion";
+    case CalibrationNeed::kSteadyZoom:
+      return "a steady zoom";
+  }
+  return "unknown need";
+}
+
+}  // namespace alidade
