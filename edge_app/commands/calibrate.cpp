@@ -22,6 +22,7 @@
 #include "edge_app/config/map_file.h"
 #include "edge_app/output/calibration_report.h"
 #include "edge_app/output/calibration_summary.h"
+#include "edge_app/pipeline/calibration_streams.h"
 
 namespace alidade {
 namespace {

@@ -137,7 +137,7 @@ int check(const CheckOptions& options) {
                                     : "not calibrated, ",
              camera.focal_length, 1e3 * calibration.calibration.clock_offset);
 
-  const auto video_source = make_frame_source(config.video);
+  const auto video_source = make_frame_source(config.video, false);
   const auto pan_tilt_source = make_pan_tilt_source(config.pan_tilt);
   Sampled<PanTiltSample> telemetry;
   std::thread telemetry_thread([&] {

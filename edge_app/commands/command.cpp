@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
 
 #include "core/calibration/calibration_file.h"
@@ -116,11 +117,18 @@ OrientationStepOptions step_options(const RecordingNoise& noise,
   return options;
 }
 
-std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config,
+OeOptions oe_options(const Camera<double>& camera) {
+  constexpr double kLeastColumns = 24;
+  OeOptions options;
+  options.cell_size_px = std::min(options.cell_size_px, camera.width / kLeastColumns);
+  return options;
+}
+
+std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,
                                                const std::string& copy_to) {
   if (config.type == VideoConfig::Type::kRecording) {
     return std::make_unique<RecordingFrameSource>(
-        RecordingFrameSourceOptions{config.directory, false, true});
+        RecordingFrameSourceOptions{config.directory, decode, true});
   }
   RtpSourceOptions options;
   options.url = config.url;
@@ -130,7 +138,7 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config,
   options.transport = config.transport == VideoConfig::Transport::kUdp
                           ? RtpSourceOptions::Transport::kUdp
                           : RtpSourceOptions::Transport::kTcp;
-  options.decode = false;  // PT mode touches no pixel
+  options.decode = decode;
   options.timeout_s = config.timeout_s;
   options.max_backoff_s = config.max_backoff_s;
   options.copy_to = copy_to;

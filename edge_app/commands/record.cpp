@@ -199,7 +199,7 @@ int record(const RecordOptions& options) {
 
   StopSignals signals;
   const auto video =
-      make_frame_source(config.video, (fs::path(options.directory) / "video.mkv").string());
+      make_frame_source(config.video, false, (fs::path(options.directory) / "video.mkv").string());
   const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
   Recorder recorder(*video, *pan_tilt, options.directory);
   recorder.start();

@@ -162,14 +162,6 @@ std::unique_ptr<Pictures> open_pictures(const ReplayOptions& options) {
   }
 }
 
-// Small pictures have as many landmarks as large ones, closer together.
-OeOptions oe_options(const Camera<double>& camera) {
-  constexpr double kLeastColumns = 24;
-  OeOptions options;
-  options.cell_size_px = std::min(options.cell_size_px, camera.width / kLeastColumns);
-  return options;
-}
-
 ImageView view_of(const std::optional<Frame>& picture) {
   if (!picture) return {};
   return {picture->luma, picture->width, picture->height, picture->stride};

@@ -1,14 +1,16 @@
-// `alidade run`: live orientation of each frame. The threads are the Pipeline's; this one waits for
-// a signal, the end of the time asked for, or the end of the pipeline.
+// `alidade run`: live orientation of each frame, by a camera that calibrates itself. The threads are the
+// Pipeline's; this one waits for a signal, the end of the time asked for, or the end of the pipeline.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <cmath>
 #include <limits>
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
+#include "edge_app/config/calibration_store.h"
 #include "edge_app/output/record_writer.h"
 #include "edge_app/pipeline/pipeline.h"
 
@@ -31,48 +33,122 @@ std::string describe(const RealtimeOptions& options) {
 }
 
 std::string describe(const PipelineSummary& summary, bool latency_measured) {
-  const std::string latency = latency_measured ? fmt::format("latency p50 {:.3f} ms, p99 {:.3f} ms",
-                                                             1e3 * summary.latency.quantile(0.5),
-                                                             1e3 * summary.latency.quantile(0.99))
-                                               : "latency not measured on a recording";
+  const auto quantiles = [](const LatencyHistogram& histogram) {
+    return fmt::format("{:.3f}/{:.3f}", 1e3 * histogram.quantile(0.5),
+                       1e3 * histogram.quantile(0.99));
+  };
+  const std::string latency =
+      latency_measured
+          ? fmt::format(
+                "latency p50/p99 {} ms, of this decoding {}, waiting {}, computing {}; then "
+                "writing {}",
+                quantiles(summary.latency), quantiles(summary.decoding), quantiles(summary.waiting),
+                quantiles(summary.computing), quantiles(summary.writing))
+          : "latency not measured on a recording";
   return fmt::format(
-      "{} frames; {} records: PT {}, none {}; {}; dropped by full queues: {} frames, {} telemetry "
-      "samples, {} records",
-      summary.frames, summary.records, summary.with_orientation,
-      summary.records - summary.with_orientation, latency, summary.drops.frames,
-      summary.drops.telemetry, summary.drops.records);
+      "{} frames; {} records: OE {}, PT {}, none {}; {}; dropped by full queues: {} frames, {} "
+      "telemetry samples, {} records",
+      summary.frames, summary.records, summary.with_landmarks,
+      summary.with_orientation - summary.with_landmarks, summary.records - summary.with_orientation,
+      latency, summary.drops.frames, summary.drops.telemetry, summary.drops.records);
+}
+
+// What calibrates a camera while it runs; empty where nothing is to be calibrated.
+struct Calibrating {
+  std::unique_ptr<CalibrationStore> store;
+  std::unique_ptr<SelfCalibration> calibration;
+};
+
+// Begins with the stored calibration, else with the data sheet.
+Calibrating begin_calibrating(const Config& config) {
+  Calibrating result;
+  SelfCalibrationOptions options;
+  const int width = config.video.width;
+  const int height = config.video.height;
+  if (!config.calibration.file.empty()) {
+    result.store = std::make_unique<CalibrationStore>(config.calibration.file,
+                                                      config.calibration.zoom_tolerance);
+    for (const std::string& line : result.store->load(width, height))
+      spdlog::info("calibration: {}", line);
+  }
+  const StoredCalibration* stored =
+      result.store == nullptr ? nullptr : result.store->find(std::nullopt);
+  if (config.camera.focal_length_px) {
+    options.data_sheet = data_sheet_calibration(config.camera);
+  } else if (stored != nullptr) {
+    CameraConfig camera;
+    camera.focal_length_px = stored->calibration.camera.focal_length;
+    options.data_sheet = data_sheet_calibration(camera);
+  } else {
+    throw CommandError(kExitUsage,
+                       "camera.focal_length_px is missing: without a calibration, the first one "
+                       "begins with the data sheet's; give it, or set realtime.mode: PT");
+  }
+  Camera<double>& camera = options.data_sheet.camera;
+  camera.width = stored == nullptr ? width : stored->calibration.camera.width;
+  camera.height = stored == nullptr ? height : stored->calibration.camera.height;
+  if (camera.width == 0) {
+    throw CommandError(kExitUsage,
+                       "video.width and video.height are missing: without a calibration, OE mode "
+                       "needs the size of the picture; give it, or set realtime.mode: PT");
+  }
+  if (config.pan_tilt.angle_sigma_rad) {
+    options.noise.pan_tilt_sigma_rad = std::hypot(
+        *config.pan_tilt.angle_sigma_rad, config.pan_tilt.angle_quantum_rad / std::sqrt(12.0));
+  }
+  options.zoom_tolerance = config.calibration.zoom_tolerance;
+  options.automatic = config.calibration.automatic;
+  result.calibration = std::make_unique<SelfCalibration>(options, result.store.get());
+  return result;
+}
+
+PipelineOptions pipeline_options(const Config& config, const NamedCalibration& calibration) {
+  PipelineOptions options;
+  options.step = step_options(config, calibration);
+  options.step.zoom_tolerance = config.calibration.zoom_tolerance;
+  if (config.realtime.landmarks) options.step.oe = oe_options(calibration.calibration.camera);
+  options.realtime = {config.realtime.priority, config.realtime.cpu, config.realtime.lock_memory};
+  options.width = calibration.calibration.camera.width;
+  options.height = calibration.calibration.camera.height;
+  options.calibration_name = calibration.name;
+  options.measure_latency = !is_recording(config);
+  return options;
 }
 
 int run(const RunOptions& options) {
   const Config config = require_config(options.config);
-  const NamedCalibration calibration = choose_calibration(config);
+  Calibrating calibrating;
+  NamedCalibration calibration;
+  MapState map;
+  if (config.realtime.landmarks && !is_recording(config)) {
+    calibrating = begin_calibrating(config);
+    const auto first = calibrating.calibration->first();
+    calibration = {first->calibration, first->calibrated, first->name};
+    map = first->map;
+  } else {
+    calibration = choose_calibration(config);
+  }
   spdlog::info("calibration: {}", calibration.name);
-
-  PipelineOptions pipeline_options;
-  pipeline_options.step = step_options(config, calibration);
-  pipeline_options.realtime = {config.realtime.priority, config.realtime.cpu,
-                               config.realtime.lock_memory};
-  pipeline_options.width = calibration.calibration.camera.width;
-  pipeline_options.height = calibration.calibration.camera.height;
-  pipeline_options.calibration_name = calibration.name;
-  pipeline_options.measure_latency = !is_recording(config);
+  PipelineOptions of_pipeline = pipeline_options(config, calibration);
+  of_pipeline.step.map = std::move(map);
+  of_pipeline.step.follow_points = calibrating.calibration && config.calibration.automatic;
 
   OutputFormat format = config.output;
   if (options.json) format = OutputFormat::kJson;
   if (options.csv) format = OutputFormat::kCsv;
 
   StopSignals signals;
-  const auto video = make_frame_source(config.video);
+  const auto video = make_frame_source(config.video, config.realtime.landmarks);
   const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
   spdlog::info("video: {}; pan/tilt: {}", video->name(), pan_tilt->name());
-  spdlog::info("real-time thread: {}", describe(pipeline_options.realtime));
+  spdlog::info("real-time thread: {}", describe(of_pipeline.realtime));
   RecordWriter writer(STDOUT_FILENO, format, "stdout");
-  Pipeline pipeline(*video, *pan_tilt, writer, pipeline_options);
+  Pipeline pipeline(*video, *pan_tilt, writer, calibrating.calibration.get(), of_pipeline);
   pipeline.start();
   static_cast<void>(signals.wait(pipeline.finished_fd(), options.duration_s));
   pipeline.stop();
 
-  spdlog::info("{}", describe(pipeline.summary(), pipeline_options.measure_latency));
+  spdlog::info("{}", describe(pipeline.summary(), of_pipeline.measure_latency));
   log_source_losses(*video);
   if (writer.dropped() > 0)
     spdlog::warn("{} records not taken by a stalled reader at the end", writer.dropped());

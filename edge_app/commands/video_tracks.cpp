@@ -13,8 +13,8 @@
 #include "core/realtime/oe_mode.h"
 #include "core/realtime/start_up_tracker.h"
 #include "edge_app/commands/command.h"
-#include "edge_app/pipeline/keyframe_map.h"
 #include "edge_app/pipeline/calibration_feed.h"
+#include "edge_app/pipeline/keyframe_map.h"
 #include "platform/video/recording_frame_source.h"
 
 namespace alidade {

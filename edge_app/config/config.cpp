@@ -146,23 +146,19 @@ CameraConfig read_camera(YamlSection section) {
   return camera;
 }
 
-CalibrationConfig read_calibration(YamlSection section, const std::string& path,
-                                   std::vector<std::string>* warnings) {
+CalibrationConfig read_calibration(YamlSection section, const std::string& path) {
   CalibrationConfig calibration;
   if (const auto file = section.text("file")) calibration.file = path_relative_to(path, *file);
   calibration.automatic = section.truth("auto").value_or(calibration.automatic);
-  if (calibration.automatic) {
-    warnings->push_back(section.where("auto") +
-                        ": automatic calibration is not available in this version; the calibration "
-                        "file is used as it is");
-  }
+  calibration.zoom_tolerance = section.number("zoom_tolerance", {0, 1e6, "units of the device"})
+                                   .value_or(calibration.zoom_tolerance);
   section.finish();
   return calibration;
 }
 
 RealtimeConfig read_realtime(YamlSection section) {
   RealtimeConfig realtime;
-  static_cast<void>(section.choice("mode", {"PT"}, {"OE"}));
+  realtime.landmarks = section.choice("mode", {"OE", "PT"}, {}).value_or("OE") == "OE";
   realtime.priority =
       section.integer("priority", {0, 99, "SCHED_FIFO priority"}).value_or(realtime.priority);
   realtime.cpu = section.integer("cpu", {0, 1023, "processor number"}).value_or(realtime.cpu);
@@ -192,7 +188,7 @@ void read_config(YamlSection& top, const std::string& path, Config* config) {
   config->video = read_video(top.section("video"), path);
   config->pan_tilt = read_pan_tilt(top.section("pan_tilt"), path);
   config->camera = read_camera(top.section("camera"));
-  config->calibration = read_calibration(top.section("calibration"), path, &config->warnings);
+  config->calibration = read_calibration(top.section("calibration"), path);
   config->realtime = read_realtime(top.section("realtime"));
   config->output = read_output(top.section("output"));
   top.finish();

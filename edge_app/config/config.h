@@ -60,12 +60,15 @@ struct CameraConfig {
 
 struct CalibrationConfig {
   std::string file;  // empty: none
-  bool automatic = false;
+  // Live only: calibrate while the camera moves, and store the result in file.
+  bool automatic = true;
+  double zoom_tolerance = 0;  // device units within which a calibration holds
 };
 
 struct RealtimeConfig {
-  int priority = 0;  // SCHED_FIFO priority; 0 leaves the scheduler alone
-  int cpu = -1;      // -1: any
+  bool landmarks = true;  // mode OE; false: PT, and nothing is calibrated
+  int priority = 0;       // SCHED_FIFO priority; 0 leaves the scheduler alone
+  int cpu = -1;           // -1: any
   bool lock_memory = false;
   double max_extrapolation_s = 0.25;  // how far beyond the newest telemetry an angle is stated
 };

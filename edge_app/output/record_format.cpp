@@ -33,6 +33,12 @@ std::vector<Field> fields(const OrientationRecord& record) {
       {"mode", to_string(record.mode), {}},
       {"status", to_string(record.status), {}},
       {"calibrated", record.calibrated, {}},
+      {"calibration", to_string(record.calibration.activity), {}},
+      {"needs",
+       record.calibration.need == CalibrationNeed::kNothing
+           ? Json()
+           : Json(to_string(record.calibration.need)),
+       {}},
       {"pan_rad", of_orientation(&Orientation::pan_rad), {}},
       {"tilt_rad", of_orientation(&Orientation::tilt_rad), {}},
       {"pan_rate_rad_s", of_orientation(&Orientation::pan_rate_rad_s), {}},

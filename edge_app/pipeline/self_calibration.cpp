@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <array>
 #include <atomic>
@@ -33,8 +34,8 @@ constexpr double kSilence = 2;        // s without a frame or sample, while the 
 
 // Published parameters as priors leave out their correlations; so much larger sigmas make up for it.
 constexpr double kPriorInflation = 1.5;
-// Chi-square of two estimates' difference: 99.9 % of 9 numbers lie below 28; sigmas may be 1.5 times too small.
-constexpr double kContradiction = 63;
+// Chi-square of two estimates' difference: 99.9 % of 8 numbers' lie below 26; sigmas may be 1.5 times too small.
+constexpr double kContradiction = 60;
 constexpr double kWorthPublishing = 0.75;  // of a parameter's sigma
 
 // A calibration that predicts frames it has not seen worse than so is not believed (rms of normalised residuals).
@@ -88,7 +89,7 @@ double sigma_of(const Calibration& c, Parameter p) {
 constexpr std::array<Parameter, 8> kCompared = {
     Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kLineDelay,
     Parameter::kPanAxis0,    Parameter::kPanAxis1,         Parameter::kTiltAxis0,
-    Parameter::kTiltAxis1,   Parameter::kClockOffset};
+    Parameter::kTiltAxis1,   Parameter::kClockOffset};  // the last one
 
 // b - a, by Parameter.
 Eigen::Matrix<double, kParameterCount, 1> difference(const Calibration& a, const Calibration& b) {
@@ -106,26 +107,31 @@ Eigen::Matrix<double, kParameterCount, 1> difference(const Calibration& a, const
 
 // Chi-square of their difference; with_clock_offset: false where the frames' clock began anew in between.
 double disagreement(const Calibration& a, const Calibration& b, bool with_clock_offset) {
+  constexpr int kCount = static_cast<int>(kCompared.size());
   const auto d = difference(a, b);
-  const std::size_t n = kCompared.size() - (with_clock_offset ? 0 : 1);
-  Eigen::MatrixXd covariance(n, n);
-  Eigen::VectorXd x(n);
-  for (std::size_t i = 0; i < n; ++i) {
-    const int row = index(kCompared[i]);
-    const auto r = static_cast<Eigen::Index>(i);
-    x[r] = d[row];
-    for (std::size_t j = 0; j < n; ++j) {
-      const int column = index(kCompared[j]);
-      covariance(r, static_cast<Eigen::Index>(j)) =
-          a.covariance(row, column) + b.covariance(row, column);
+  Eigen::Matrix<double, kCount, kCount> covariance;
+  Eigen::Matrix<double, kCount, 1> x;
+  for (int i = 0; i < kCount; ++i) {
+    const int row = index(kCompared[static_cast<std::size_t>(i)]);
+    x[i] = d[row];
+    for (int j = 0; j < kCount; ++j) {
+      const int column = index(kCompared[static_cast<std::size_t>(j)]);
+      covariance(i, j) = a.covariance(row, column) + b.covariance(row, column);
     }
   }
+  if (!with_clock_offset) {
+    covariance.row(kCount - 1).setZero();
+    covariance.col(kCount - 1).setZero();
+    covariance(kCount - 1, kCount - 1) = 1;
+    x[kCount - 1] = 0;
+  }
   // In units of the sigmas, as the parameters' own differ by many orders of magnitude.
-  const Eigen::VectorXd scale = covariance.diagonal().cwiseSqrt().cwiseMax(1e-300);
-  const Eigen::MatrixXd correlation =
-      scale.cwiseInverse().asDiagonal() * covariance * scale.cwiseInverse().asDiagonal();
-  const Eigen::VectorXd normalised = x.cwiseQuotient(scale);
-  return normalised.dot(correlation.ldlt().solve(normalised));
+  const Eigen::Matrix<double, kCount, 1> scale =
+      covariance.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  const Eigen::Matrix<double, kCount, kCount> correlation =
+      scale.asDiagonal() * covariance * scale.asDiagonal();
+  const Eigen::Matrix<double, kCount, 1> normalised = scale.cwiseProduct(x);
+  return normalised.dot(correlation.inverse() * normalised);
 }
 
 bool is_better(const Calibration& now, const Calibration& before) {
@@ -316,8 +322,8 @@ double SelfCalibration::State::hold_out(const CalibrationInput& all,
     const auto landmark = landmark_of.find(seen.landmark);
     if (frame == frame_of.end() || landmark == landmark_of.end()) continue;
     const FrameMotion<double> motion{frame->second->angle, frame->second->rate, 0.0, {}};
-    Vector2<double> u;
-    Matrix<double, 2, 3> J_d;
+    Vector2<double> u = Vector2<double>::Zero();
+    Matrix<double, 2, 3> J_d = Matrix<double, 2, 3>::Zero();
     const Calibration& c = result.calibration;
     if (rolling_shutter_project(c.camera, c.mechanics, c.line_delay, motion, landmark->second->d_b,
                                 &u, &J_d) != ProjectionStatus::kOk) {

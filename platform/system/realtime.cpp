@@ -59,4 +59,11 @@ std::vector<std::string> apply_realtime(const RealtimeOptions& options) {
   return warnings;
 }
 
+std::vector<std::string> set_lowest_priority() {
+  const sched_param parameters{};
+  const int error = pthread_setschedparam(pthread_self(), SCHED_IDLE, &parameters);
+  if (error == 0) return {};
+  return {std::string("normal priority (") + std::strerror(error) + ")"};
+}
+
 }  // namespace alidade

@@ -19,4 +19,7 @@ struct RealtimeOptions {
 // was not permitted, with what would permit it; empty = all granted.
 [[nodiscard]] std::vector<std::string> apply_realtime(const RealtimeOptions& options);
 
+// The calling thread runs when nothing else wants to. Lines as above.
+[[nodiscard]] std::vector<std::string> set_lowest_priority();
+
 }  // namespace alidade
