@@ -118,27 +118,31 @@ std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baselin
   std::vector<int> chain(frames, 0);
   std::vector<double> du;
   std::vector<double> dv;
+  // A frame in which nothing was looked for says nothing of the motion, not even that it broke off.
+  std::size_t before = 0;
   for (std::size_t i = 1; i < frames; ++i) {
+    if (seen[i].empty()) continue;
     du.clear();
     dv.clear();
-    auto a = seen[i - 1].begin();
+    auto a = seen[before].begin();
     for (const Seen& b : seen[i]) {
-      while (a != seen[i - 1].end() && a->landmark < b.landmark) ++a;
-      if (a == seen[i - 1].end()) break;
+      while (a != seen[before].end() && a->landmark < b.landmark) ++a;
+      if (a == seen[before].end()) break;
       if (a->landmark != b.landmark) continue;
       du.push_back(b.u.x() - a->u.x());
       dv.push_back(b.u.y() - a->u.y());
     }
     const bool linked = du.size() >= kMinShared;
-    chain[i] = chain[i - 1] + (linked ? 0 : 1);
-    if (linked) position[i] = position[i - 1] + Vector2<double>(median(du), median(dv));
+    chain[i] = chain[before] + (linked ? 0 : 1);
+    if (linked) position[i] = position[before] + Vector2<double>(median(du), median(dv));
+    before = i;
   }
   std::vector<ImageMotion> motion;
   std::size_t to = 0;
   for (std::size_t from = 0; from < frames; ++from) {
     while (to < frames && data.frame_time_s[to] < data.frame_time_s[from] + baseline_s) ++to;
     if (to == frames) break;
-    if (chain[from] != chain[to]) continue;
+    if (seen[from].empty() || seen[to].empty() || chain[from] != chain[to]) continue;
     motion.push_back(
         {data.frame_time_s[from], data.frame_time_s[to], position[to] - position[from]});
   }
