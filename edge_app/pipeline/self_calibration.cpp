@@ -85,6 +85,8 @@ double sigma_of(const Calibration& c, Parameter p) {
   return std::sqrt(std::max(0.0, c.covariance(index(p), index(p))));
 }
 
+bool is_held_out(std::size_t frame) { return frame % kHeldOut == kHeldOut / 2; }
+
 // The parameters by which two calibrations of one camera are compared. Scales and aspect rest on priors.
 constexpr std::array<Parameter, 8> kCompared = {
     Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kLineDelay,
@@ -165,7 +167,10 @@ struct SelfCalibration::State {
   [[nodiscard]] bool adjusting_is_due() const;
   [[nodiscard]] CalibrationInput input() const;
   [[nodiscard]] Checked adjust(const Calibration* known) const;
-  [[nodiscard]] double hold_out(const CalibrationInput& all, const CalibrationResult& result) const;
+  [[nodiscard]] std::optional<double> time_between(
+      std::size_t frame, const std::unordered_map<std::int64_t, double>& time_of) const;
+  [[nodiscard]] double hold_out(const std::vector<CalibrationObservation>& held,
+                                const CalibrationResult& result) const;
   [[nodiscard]] MapState make_map(const CalibrationResult& result) const;
   void try_first();
   void hold_against_published();
@@ -308,39 +313,68 @@ CalibrationInput SelfCalibration::State::input() const {
   return result;
 }
 
+// When row 0 of a frame that the calibration did not use was captured: between its neighbours, as their stamps
+// and its own say.
+std::optional<double> SelfCalibration::State::time_between(
+    std::size_t frame, const std::unordered_map<std::int64_t, double>& time_of) const {
+  if (frame == 0 || frame + 1 >= frames.size()) return std::nullopt;
+  const FrameStamp& before = frames[frame - 1].stamp;
+  const FrameStamp& after = frames[frame + 1].stamp;
+  const FrameStamp& own = frames[frame].stamp;
+  const auto from = time_of.find(before.frame);
+  const auto to = time_of.find(after.frame);
+  if (from == time_of.end() || to == time_of.end()) return std::nullopt;
+  double share = 0.5;
+  if (before.sender_time_s && own.sender_time_s && after.sender_time_s) {
+    share = (*own.sender_time_s - *before.sender_time_s) /
+            (*after.sender_time_s - *before.sender_time_s);
+  } else if (before.sequence && own.sequence && after.sequence) {
+    share = static_cast<double>(*own.sequence - *before.sequence) /
+            static_cast<double>(*after.sequence - *before.sequence);
+  }
+  if (!(share > 0 && share < 1)) return std::nullopt;
+  return from->second + share * (to->second - from->second);
+}
+
 // The rms of the normalised residuals in frames that the calibration did not see.
-double SelfCalibration::State::hold_out(const CalibrationInput& all,
+double SelfCalibration::State::hold_out(const std::vector<CalibrationObservation>& held,
                                         const CalibrationResult& result) const {
-  std::unordered_map<std::int64_t, const FrameResult*> frame_of;
-  for (const FrameResult& frame : result.frames) frame_of[frame.frame] = &frame;
+  std::unordered_map<std::int64_t, double> time_of;
+  for (const FrameResult& frame : result.frames) time_of[frame.frame] = frame.time_s;
+  std::unordered_map<std::int64_t, std::optional<double>> held_time_of;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    if (is_held_out(i)) held_time_of[frames[i].stamp.frame] = time_between(i, time_of);
+  }
   std::unordered_map<std::int64_t, const CalibrationLandmark*> landmark_of;
   for (const CalibrationLandmark& landmark : result.landmarks)
     landmark_of[landmark.landmark] = &landmark;
+  const Calibration& c = result.calibration;
   std::vector<double> squares;
-  for (const CalibrationObservation& seen : all.observations) {
-    const auto frame = frame_of.find(seen.frame);
+  for (const CalibrationObservation& seen : held) {
+    const std::optional<double>& time_s = held_time_of[seen.frame];
     const auto landmark = landmark_of.find(seen.landmark);
-    if (frame == frame_of.end() || landmark == landmark_of.end()) continue;
-    const FrameMotion<double> motion{frame->second->angle, frame->second->rate, 0.0, {}};
+    if (!time_s || landmark == landmark_of.end()) continue;
+    const FrameMotion<double> motion{
+        result.trajectory.position(*time_s), result.trajectory.rate(*time_s), 0.0, {}};
+    const Vector3<double>& d_b = landmark->second->d_b;
     Vector2<double> u = Vector2<double>::Zero();
     Matrix<double, 2, 3> J_d = Matrix<double, 2, 3>::Zero();
-    const Calibration& c = result.calibration;
-    if (rolling_shutter_project(c.camera, c.mechanics, c.line_delay, motion, landmark->second->d_b,
-                                &u, &J_d) != ProjectionStatus::kOk) {
+    if (rolling_shutter_project(c.camera, c.mechanics, c.line_delay, motion, d_b, &u, &J_d) !=
+        ProjectionStatus::kOk) {
       continue;
     }
-    const Matrix2<double> J = J_d * tangent_basis(landmark->second->d_b);
+    const Matrix2<double> J = J_d * tangent_basis(d_b);
     const Matrix2<double> covariance = seen.sigma_px * seen.sigma_px * Matrix2<double>::Identity() +
                                        J * landmark->second->covariance * J.transpose();
     const Vector2<double> residual = Vector2<double>(seen.u_px, seen.v_px) - u;
-    squares.push_back(0.5 * residual.dot(covariance.inverse() * residual));
+    squares.push_back(residual.dot(covariance.inverse() * residual));
   }
   if (squares.empty()) return 0;
-  // Robust: an outlier among them says nothing of the calibration. The median of chi-square / 2, 2 degrees of
-  // freedom, is ln 2.
+  // Robust: an outlier among them says nothing of the calibration. Half of chi-squares with 2 degrees of freedom lie
+  // below 2 ln 2.
   const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
   std::nth_element(squares.begin(), middle, squares.end());
-  return std::sqrt(*middle / std::log(2.0));
+  return std::sqrt(*middle / (2 * std::log(2.0)));
 }
 
 // known: what is published, as prior; null: from the data alone.
@@ -375,15 +409,11 @@ Checked SelfCalibration::State::adjust(const Calibration* known) const {
   std::unordered_map<std::int64_t, std::size_t> order;
   for (std::size_t i = 0; i < frames.size(); ++i) order[frames[i].stamp.frame] = i;
   all.observations = choose_tracks(all.observations, kMostObservations);
-  CalibrationInput held = all;
-  const auto is_held = [&](const CalibrationObservation& seen) {
-    return order[seen.frame] % kHeldOut == kHeldOut / 2;
-  };
-  held.observations.clear();
-  std::copy_if(all.observations.begin(), all.observations.end(),
-               std::back_inserter(held.observations), is_held);
-  all.observations.erase(std::remove_if(all.observations.begin(), all.observations.end(), is_held),
-                         all.observations.end());
+  const auto held = std::stable_partition(
+      all.observations.begin(), all.observations.end(),
+      [&](const CalibrationObservation& seen) { return !is_held_out(order[seen.frame]); });
+  const std::vector<CalibrationObservation> held_out(held, all.observations.end());
+  all.observations.erase(held, all.observations.end());
 
   Checked checked;
   checked.result = calibrate(all, adjustment);
@@ -392,7 +422,7 @@ Checked SelfCalibration::State::adjust(const Calibration* known) const {
     checked.refusal = result.message;
     return checked;
   }
-  checked.hold_out = hold_out(held, result);
+  checked.hold_out = hold_out(held_out, result);
   const double unit = std::max(1.0, result.quality.pixel_sigma_ratio);
   if (checked.hold_out > kWorstHoldOut * unit) {
     checked.refusal = fmt::format(
