@@ -1,0 +1,192 @@
+// alidade_endurance: a virtual hour, faster than real time, with a drifting clock, zoom changes, a bump and lost
+// connections; each record held against the truth (endurance_judge.h).
+//   alidade_endurance [--camera-bump] [--small] [--json FILE] [--plot FILE.html]     (README.md)
+// Exit status: 0 all that is asked holds, 1 it does not (listed last), 2 wrong usage, unreadable files.
+
+#include <unistd.h>
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <fstream>
+#include <future>
+#include <iostream>
+
+#include "test/accuracy/endurance_consumer.h"
+#include "test/accuracy/endurance_day.h"
+#include "test/accuracy/endurance_judge.h"
+
+namespace alidade::test {
+namespace {
+
+constexpr std::size_t kBatch = 64;  // frames rendered before they are looked at
+
+// Pages of this process that are in memory, MiB.
+double resident_mib() {
+  std::ifstream statm("/proc/self/statm");
+  double size = 0;
+  double resident = 0;
+  statm >> size >> resident;
+  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / (1 << 20);
+}
+
+OrientationStepOptions step_options(const VirtualDay& day, const Calibration& calibration) {
+  OrientationStepOptions options;
+  options.calibration = calibration;
+  options.calibrated = true;
+  options.video_clock.stamp_resolution_s = 1.0 / 90000;
+  options.telemetry_noise.pan_tilt_sigma = day.telemetry_sigma();
+  options.telemetry_noise.acceleration_sigma = day.acceleration_sigma();
+  options.telemetry_limits.max_repeat_s = 0;
+  OeOptions oe;
+  oe.cell_size_px = std::min(oe.cell_size_px, calibration.camera.width / 24.0);
+  options.oe = oe;
+  return options;
+}
+
+// The pictures of a day, some frames ahead.
+class Pictures {
+ public:
+  Pictures(const VirtualDay& day, std::size_t threads)
+      : day_(day),
+        threads_(threads),
+        size_(static_cast<std::size_t>(day.plan().width * day.plan().height)),
+        bytes_(kBatch * size_) {}
+
+  // Asked for frame after frame.
+  ImageView of(std::size_t frame) {
+    if (frame % kBatch == 0) render(frame);
+    const std::uint8_t* picture = bytes_.data() + frame % kBatch * size_;
+    return {picture, day_.plan().width, day_.plan().height, day_.plan().width};
+  }
+
+ private:
+  void render(std::size_t first) {
+    const std::size_t end = std::min(first + kBatch, day_.frames().size());
+    std::vector<std::future<void>> workers;
+    for (std::size_t n = 0; n < threads_; ++n) {
+      workers.push_back(std::async(std::launch::async, [this, first, end, n] {
+        for (std::size_t i = first + n; i < end; i += threads_) {
+          day_.render(i, bytes_.data() + (i - first) * size_);
+        }
+      }));
+    }
+    for (auto& worker : workers) worker.get();
+  }
+
+  const VirtualDay& day_;
+  std::size_t threads_, size_;
+  std::vector<std::uint8_t> bytes_;
+};
+
+struct Options {
+  bool small = false;
+  bool camera_bump = false;
+  bool known = false;
+  bool narrow = false;
+  std::size_t threads = 2;
+  double minutes = 0;
+  std::uint64_t seed = 1;
+  std::string json, plot;
+};
+
+DayPlan plan_of(const Options& options) {
+  DayPlan plan = options.small ? small_day_plan()
+                               : hour_plan(options.camera_bump ? DayPlan::Bump::Kind::kCamera
+                                                               : DayPlan::Bump::Kind::kBase);
+  plan.seed = options.seed;
+  if (options.minutes > 0) plan.duration_s = std::min(plan.duration_s, 60 * options.minutes);
+  if (options.known) plan.zooms.clear();
+  if (options.narrow) plan.zooms = {{-2 * VirtualDay::kZoomRamp, 1}};
+  return plan;
+}
+
+void run(const Options& options, Report* report, nlohmann::json* series) {
+  const auto begin = std::chrono::steady_clock::now();
+  const VirtualDay day(plan_of(options), ALIDADE_TEST_DATA);
+  EnduranceConsumer consumer(step_options(day, day.calibration(0)));
+  EnduranceJudge judge_of_day(day.marks());
+  Pictures pictures(day, options.threads);
+
+  const double start_mib = resident_mib();
+  double warm_mib = 0;
+  double most_mib = 0;
+  for (const DayEvent& event : day.events()) {
+    switch (event.kind) {
+      case DayEvent::Kind::kSample:
+        consumer.add(day.samples()[event.index]);
+        break;
+      case DayEvent::Kind::kTelemetryLost:
+        consumer.telemetry_lost();
+        break;
+      case DayEvent::Kind::kVideoLost:
+        consumer.video_lost(event.host_time_s);
+        break;
+      case DayEvent::Kind::kFrame: {
+        const FrameStamp& stamp = day.frames()[event.index];
+        const Answer answer = consumer.add(stamp, pictures.of(event.index));
+        judge_of_day.add(judge(day, event.index, answer));
+        if (event.index % kBatch == 0) {
+          most_mib = std::max(most_mib, resident_mib());
+          if (day.time(event.index) < day.plan().duration_s / 4) warm_mib = most_mib;
+        }
+        break;
+      }
+    }
+    for (const std::string& message : consumer.take_messages()) {
+      std::cout << number(event.host_time_s - VirtualDay::kHostEpoch, 6) << " s: " << message
+                << "\n";
+    }
+  }
+  judge_of_day.report(report);
+  const double seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+  Table cost;
+  cost.title = day.plan().name + ": " + std::to_string(day.frames().size()) + " frames";
+  cost.header = {"", "at the start", "first quarter", "most", "at the end"};
+  cost.rows.push_back({"resident, MiB", number(start_mib, 4), number(warm_mib, 4),
+                       number(most_mib, 4), number(resident_mib(), 4)});
+  cost.notes = {number(seconds) + " s on the clock"};
+  report->add(cost);
+  if (!options.json.empty()) *series = judge_of_day.to_json();
+  if (!options.plot.empty()) judge_of_day.write_plot(options.plot, day.plan().name);
+}
+
+}  // namespace
+}  // namespace alidade::test
+
+int main(int argc, char** argv) {
+  using namespace alidade::test;
+  CLI::App app("A virtual hour of live orientation, held against its truth");
+  Options options;
+  app.add_flag("--small", options.small, "two and a half minutes with all that the hour has");
+  app.add_flag("--camera-bump", options.camera_bump, "the camera is bumped, in place of the base");
+  app.add_flag("--known", options.known, "begins with the true calibration; no zoom changes");
+  app.add_flag("--narrow", options.narrow, "always at the narrow end of the zoom");
+  app.add_option("--minutes", options.minutes, "not all of it")->check(CLI::PositiveNumber);
+  app.add_option("--seed", options.seed, "of all that is random");
+  app.add_option("--threads", options.threads, "that render")->check(CLI::Range(1, 64));
+  app.add_option("--json", options.json, "also write tables and every record to this file");
+  app.add_option("--plot", options.plot, "also write errors and sigmas over time to this page");
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : 2;
+  }
+  Report report(std::cout);
+  nlohmann::json series;
+  try {
+    run(options, &report, &series);
+    if (!options.json.empty()) {
+      nlohmann::json all = report.to_json();
+      all["records"] = series;
+      std::ofstream file(options.json);
+      file << all.dump() << "\n";
+      if (!file.flush()) throw std::runtime_error(options.json + ": cannot be written");
+    }
+  } catch (const std::exception& error) {
+    std::cerr << "alidade_endurance: " << error.what() << "\n";
+    return 2;
+  }
+  for (const std::string& what : report.missed()) std::cout << "MISSED: " << what << "\n";
+  return report.missed().empty() ? 0 : 1;
+}
