@@ -28,8 +28,6 @@ constexpr ZoomEnd kNarrow{3432, 3.0, {-0.6e-3, 1.6e-3, -0.8e-3}};
 // The head's own axes.
 const Eigen::Vector2d kPanAxisOffset(-6e-3, 2e-3);
 const Eigen::Vector2d kTiltAxisOffset(3e-3, 8e-3);
-constexpr double kPanScale = 1.0008;
-constexpr double kTiltScale = 0.9995;
 
 constexpr double kReadout = 16e-3;         // s, all rows
 constexpr double kExposure = 2e-3;         // s
@@ -196,8 +194,7 @@ std::vector<float> normal_quantiles(std::uint64_t seed) {
   return values;
 }
 
-// Seconds since the last zoom change, bump or loss before which everything could settle.
-constexpr double kMinute = 60;
+constexpr double kMinute = 60;  // s
 
 }  // namespace
 
@@ -213,6 +210,21 @@ DayPlan hour_plan(DayPlan::Bump::Kind bump) {
                  {Link::kTelemetry, 27 * kMinute, 27 * kMinute + 12, 0},
                  {Link::kVideo, 44 * kMinute, 44 * kMinute + 20, -5e-3}};
   return plan;
+}
+
+std::vector<UnsuitableDay> unsuitable_days() {
+  DayPlan steady;
+  steady.name = "constant velocity";
+  steady.motion = DayPlan::Motion::kConstantVelocity;
+  DayPlan rest;
+  rest.name = "no motion";
+  rest.motion = DayPlan::Motion::kAtRest;
+  DayPlan plain;
+  plain.name = "plain scene";
+  plain.plain_scene = true;
+  return {{steady, CalibrationNeed::kAcceleration},
+          {rest, CalibrationNeed::kMotion},
+          {plain, CalibrationNeed::kTexture}};
 }
 
 DayPlan small_day_plan() {
@@ -241,8 +253,6 @@ VirtualDay::VirtualDay(const DayPlan& plan, const std::filesystem::path& scenes)
   config_.camera.line_delay = kReadout / plan.height;
   config_.camera.pan_axis_offset = kPanAxisOffset;
   config_.camera.tilt_axis_offset = kTiltAxisOffset;
-  config_.camera.pan_scale = kPanScale;
-  config_.camera.tilt_scale = kTiltScale;
   config_.telemetry.sigma = telemetry_sigma_;
   const auto lens_of = [this](double zoom) {
     simulator::CameraConfig camera = config_.camera;
@@ -377,6 +387,11 @@ std::vector<DayMark> VirtualDay::marks() const {
     marks.push_back(
         {loss.link == DayPlan::Loss::Link::kVideo ? "video back" : "telemetry back", loss.to_s});
   }
+  marks.erase(std::remove_if(marks.begin(), marks.end(),
+                             [this](const DayMark& mark) {
+                               return mark.time_s < 0 || mark.time_s >= plan_.duration_s;
+                             }),
+              marks.end());
   std::sort(marks.begin(), marks.end(),
             [](const DayMark& a, const DayMark& b) { return a.time_s < b.time_s; });
   return marks;
@@ -451,8 +466,7 @@ Calibration VirtualDay::calibration(std::size_t frame) const {
                         plan_.height};
   calibration.line_delay = config_.camera.line_delay;
   calibration.mechanics = {optics.boresight.transpose() * wide_->pan_axis(),
-                           optics.boresight.transpose() * wide_->tilt_axis(), kPanScale,
-                           kTiltScale};
+                           optics.boresight.transpose() * wide_->tilt_axis(), 1, 1};
   calibration.clock_offset = -captures_[frame].latency_s;
   calibration.zoom = zoom(frame);
   return calibration;

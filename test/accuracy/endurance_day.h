@@ -26,6 +26,7 @@
 #include <vector>
 
 #include "core/model/calibration.h"
+#include "edge_app/pipeline/published_calibration.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
 #include "test/simulator/camera_model.h"
@@ -71,6 +72,13 @@ struct DayPlan {
 [[nodiscard]] DayPlan hour_plan(DayPlan::Bump::Kind bump);
 // Everything that the hour has, within two and a half minutes.
 [[nodiscard]] DayPlan small_day_plan();
+
+// A minute that no calibration can be made of, and what is missing.
+struct UnsuitableDay {
+  DayPlan plan;
+  CalibrationNeed need;
+};
+[[nodiscard]] std::vector<UnsuitableDay> unsuitable_days();
 
 struct DayEvent {
   enum class Kind { kFrame, kSample, kVideoLost, kTelemetryLost };

@@ -55,7 +55,8 @@ JudgedRecord judge(const VirtualDay& day, std::size_t frame, const Answer& answe
   judged.calibrated = record.calibrated;
   judged.landmarks = record.landmarks;
   judged.says_so = !record.calibrated || !record.orientation ||
-                   record.status != RecordStatus::kOk || answer.doubtful;
+                   record.status != RecordStatus::kOk ||
+                   record.calibration.activity == CalibrationActivity::kDoubtful;
   if (!record.orientation) return judged;
   const Eigen::Matrix3d error =
       turn_of(*record.orientation).transpose() * day.base_from_camera(frame, 0);

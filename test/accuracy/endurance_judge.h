@@ -5,8 +5,8 @@
 //   NEES    mean over the three axes of (xi_i / sigma_i)^2: 1 is honest
 //   pixels  of the middle column in the first, middle and last row: the angle between where the record
 //           (with its rates, accelerations, focal length) says it looks and where it did
-// A record `says so` if it is not calibrated, has no orientation, has a status that is not ok, or what stands
-// beside it doubts the calibration. A record beyond kWorst sigmas that does not say so is silent; silent
+// A record `says so` if it is not calibrated, has no orientation, has a status that is not ok, or its
+// calibration is told to be doubtful. A record beyond kWorst sigmas that does not say so is silent; silent
 // records in a row are an episode.
 
 #include <Eigen/Core>
