@@ -55,6 +55,8 @@ class EnduranceConsumer {
   [[nodiscard]] CalibrationReport report() const { return said_; }
   // How often a calibration was taken over that says calibrated.
   [[nodiscard]] int published() const { return published_; }
+  // The one in force.
+  [[nodiscard]] const Calibration& calibration() const { return calibration_; }
   // Of the log, since the last call.
   [[nodiscard]] std::vector<std::string> take_messages();
 

@@ -212,6 +212,12 @@ DayPlan hour_plan(DayPlan::Bump::Kind bump) {
   return plan;
 }
 
+void make_coarse(DayPlan* plan) {
+  plan->width = 320;
+  plan->height = 180;
+  plan->rate_hz = 10;
+}
+
 std::vector<UnsuitableDay> unsuitable_days() {
   DayPlan steady;
   steady.name = "constant velocity";
@@ -222,6 +228,7 @@ std::vector<UnsuitableDay> unsuitable_days() {
   DayPlan plain;
   plain.name = "plain scene";
   plain.plain_scene = true;
+  for (DayPlan* plan : {&steady, &rest, &plain}) make_coarse(plan);
   return {{steady, CalibrationNeed::kAcceleration},
           {rest, CalibrationNeed::kMotion},
           {plain, CalibrationNeed::kTexture}};
@@ -232,9 +239,7 @@ DayPlan small_day_plan() {
   DayPlan plan;
   plan.name = "small";
   plan.duration_s = 150;
-  plan.width = 320;
-  plan.height = 180;
-  plan.rate_hz = 10;
+  make_coarse(&plan);
   plan.zooms = {{40, 1}, {65, 0}};
   plan.losses = {{Link::kVideo, 80, 83, 3e-3},
                  {Link::kTelemetry, 105, 109, 0},

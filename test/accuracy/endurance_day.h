@@ -70,6 +70,8 @@ struct DayPlan {
 };
 
 [[nodiscard]] DayPlan hour_plan(DayPlan::Bump::Kind bump);
+// Fewer and smaller pictures.
+void make_coarse(DayPlan* plan);
 // Everything that the hour has, within two and a half minutes.
 [[nodiscard]] DayPlan small_day_plan();
 
@@ -115,6 +117,7 @@ class VirtualDay {
   // Truth about a frame. time_s is the capture of row coordinate 0, true time.
   [[nodiscard]] double time(std::size_t frame) const { return captures_[frame].time_s; }
   [[nodiscard]] Eigen::Matrix3d base_from_camera(std::size_t frame, double row) const;
+  [[nodiscard]] simulator::Angles angles(double time_s) const { return path_->at(time_s); }
   // Of a pixel, in the base frame, at its own row's time.
   [[nodiscard]] Eigen::Vector3d direction(std::size_t frame, const Eigen::Vector2d& u) const;
   // As an estimator is told it: without any uncertainty.
