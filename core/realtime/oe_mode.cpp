@@ -34,9 +34,12 @@ constexpr std::size_t kNoiseSamples = 2048;
 
 // Accelerations to expect, in fields of view per s^2: weak knowledge, for frames with few landmarks.
 constexpr double kAcceleration = 10;
+constexpr double kNever = -std::numeric_limits<double>::infinity();
 constexpr double kLongestPrediction = 0.5;  // s, without telemetry
 // The offset of map and telemetry drifts: heat, gears. rad / sqrt(s)
 constexpr double kOffsetDrift = 1e-6;
+// What the landmarks in view have in common stays with them; so long they are taken to be the same. s
+constexpr double kSharedRenewal = 10;
 
 constexpr int kFew = 10;        // landmarks; with fewer a view is one that the map does not know
 constexpr int kEmptyView = 50;  // landmarks; with fewer a view needs all that can be made
@@ -72,6 +75,12 @@ Matrix2<double> rate_covariance(const Matrix6& motion, int axis) {
   out << motion(2 + axis, 2 + axis), motion(2 + axis, 4 + axis), motion(4 + axis, 2 + axis),
       motion(4 + axis, 4 + axis);
   return out;
+}
+
+// By how much a variance grows if an error that is another after renewal_s was met elapsed_s ago already.
+double diluted(double renewal_s, double elapsed_s) {
+  constexpr double kLeastElapsed = 1e-3;  // s
+  return std::max(1.0, renewal_s / std::max(std::abs(elapsed_s), kLeastElapsed));
 }
 
 Matrix2<double> symmetric(const Matrix2<double>& m) { return 0.5 * (m + m.transpose()); }
@@ -127,6 +136,12 @@ struct OeMode::State {
   [[nodiscard]] double time_per_angle() const;
   void move_bend(double tilt);
   void add_bend(Matrix6* covariance) const;
+  [[nodiscard]] Matrix2<double> bend_of_angles() const;
+  [[nodiscard]] bool learn_offset(double frame_time_s, const Vector2<double>& innovation,
+                                  const Matrix2<double>& covariance, const Matrix2<double>& shared);
+  void add_late_telemetry(double frame_time_s, const InterpolatedPanTilt& telemetry);
+  void remember_untold(const Vector2<double>& angle, const Matrix2<double>& covariance,
+                       const Matrix2<double>& shared);
   void remember_motion();
   [[nodiscard]] bool straighten_map();
   void bend_map(const Vector2<double>& rate, const Vector2<double>& acceleration,
@@ -167,8 +182,22 @@ struct OeMode::State {
   std::vector<FastCorner> corners;
 
   // base angle = map angle + offset
-  Vector2<double> offset = Vector2<double>::Zero();
-  Matrix2<double> offset_covariance = Matrix2<double>::Zero();
+  MapOffset offset;
+  // The frame whose telemetry it learnt from last; before the first, no time.
+  double told_time_s = kNever;
+  double answered_time_s = kNever;  // the frame that telemetry, extrapolated or not, answered last
+  // Frames whose telemetry was extrapolated, the latest in a ring.
+  struct Untold {
+    double time_s = kNever;
+    // rad, map, at the middle row
+    Vector2<double> angle = Vector2<double>::Zero();
+    // Of it, by noise and the map's bend ...
+    Matrix2<double> covariance = Matrix2<double>::Zero();
+    // ... and by what the landmarks share.
+    Matrix2<double> shared = Matrix2<double>::Zero();
+  };
+  std::array<Untold, kRemembered> untold;
+  std::size_t next_untold = 0;
   // Of rates and accelerations as the map makes them appear: see straighten_map().
   // Of (angle, rate, acceleration) of pan, of tilt, by the map's bend: angle against the first frame's ...
   std::array<Matrix3<double>, 2> bend_covariance{};
@@ -185,6 +214,7 @@ struct OeMode::State {
   double noise_sigma = kExpectedNoise;
   std::uint32_t frames = 0;
   int contradictions = 0;
+  bool late_contradiction = false;
   int lost = 0;
   int unfound = 0;  // frames in a row that lacked the landmarks they should show
 
@@ -194,6 +224,8 @@ struct OeMode::State {
   FrameMotion<double> motion;                                   // map's frame
   Matrix6 motion_covariance = Matrix6::Zero();                  // by the frame's own noise
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();  // of its angles, by the map's
+  double now_s = 0;                                             // its frame_time_s
+  bool told = false;      // by telemetry that was not extrapolated
   bool may_make = false;  // motion is sure enough for new landmarks
   double inflation = 1;
 
@@ -315,8 +347,11 @@ void OeMode::State::clear_landmarks() {
 
 void OeMode::State::forget_map() {
   clear_landmarks();
-  offset.setZero();
-  offset_covariance.setZero();
+  offset = {};
+  told_time_s = kNever;
+  answered_time_s = kNever;
+  untold.fill({});
+  late_contradiction = false;
   noise_sigma = kExpectedNoise;
   for (Matrix3<double>& covariance : bend_covariance) covariance.setZero();
   past_count = 0;
@@ -347,8 +382,7 @@ void OeMode::State::take(const MapState& from) {
     known.seen = landmark.statistics.seen;
   }
   if (map.size() == 0) return;
-  offset = from.offset.vector();
-  offset_covariance = symmetric(from.offset_covariance);
+  offset = {from.offset.vector(), symmetric(from.offset_covariance)};
   bend_covariance = from.bend_covariance;
   bend_tilt = from.bend_tilt;
 }
@@ -359,8 +393,8 @@ MapState OeMode::State::map_state() const {
   for (int slot = 0; slot < map.capacity(); ++slot) {
     if (map.occupied(slot)) out.landmarks.push_back(map.at(slot));
   }
-  out.offset = {offset.x(), offset.y()};
-  out.offset_covariance = offset_covariance;
+  out.offset = {offset.value.x(), offset.value.y()};
+  out.offset_covariance = offset.covariance;
   out.bend_covariance = bend_covariance;
   out.bend_tilt = bend_tilt;
   return out;
@@ -543,9 +577,11 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   image = new_image;
   ++frames;
   statistics = {};
-  statistics.map_offset = {offset.x(), offset.y()};
-  statistics.map_offset_covariance = offset_covariance;
+  statistics.map_offset = {offset.value.x(), offset.value.y()};
+  statistics.map_offset_covariance = offset.covariance;
   may_make = false;
+  told = false;
+  now_s = frame_time_s;
   chosen_count = 0;
   coarse_count = 0;
   const auto finish = [&](OeStatus status) { return statistics.status = status; };
@@ -580,7 +616,7 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   const double middle_row = 0.5 * calibration.camera.height;
   if (telemetry != nullptr) {
     const PanTilt<double> angle = true_from_measured(mechanics, telemetry->angle);
-    motion = {{angle.pan - offset.x(), angle.tilt - offset.y()},
+    motion = {{angle.pan - offset.value.x(), angle.tilt - offset.value.y()},
               true_from_measured(mechanics, telemetry->rate),
               middle_row};
     if (acceleration_known) {
@@ -591,14 +627,16 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
     scale << to_true, to_true;
     prior.has_telemetry = true;
     prior.telemetry_covariance = scale.asDiagonal() * telemetry->covariance * scale.asDiagonal();
-    angle_covariance = prior.telemetry_covariance.topLeftCorner<2, 2>() + offset_covariance;
+    angle_covariance = prior.telemetry_covariance.topLeftCorner<2, 2>() + offset.covariance;
     motion_covariance.setZero();
     motion_covariance.topLeftCorner<4, 4>() = prior.telemetry_covariance;
     motion_covariance.diagonal().tail<2>().setConstant(acceleration_sigma * acceleration_sigma);
-    shared_covariance = offset_covariance;
+    shared_covariance = offset.covariance;
+    told = !telemetry->extrapolated;
     // Of an answer that the same samples gave before, only a part is news.
-    if (follows && telemetry->renewal_s > since_last_s) {
-      const double dilution = std::sqrt(telemetry->renewal_s / since_last_s);
+    {
+      const double before_s = telemetry->extrapolated ? answered_time_s : told_time_s;
+      const double dilution = std::sqrt(diluted(telemetry->renewal_s, frame_time_s - before_s));
       const Vector4<double> dilute(dilution, dilution, 1, 1);
       prior.telemetry_covariance =
           dilute.asDiagonal() * prior.telemetry_covariance * dilute.asDiagonal();
@@ -632,8 +670,8 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   const bool coarse_aligned = align_coarse(sigma_px);
 
   // 3. Landmarks, and 4. the solution, about where the residuals were taken.
-  offset_covariance.diagonal().array() += kOffsetDrift * kOffsetDrift * since_last_s;
-  prior.offset_covariance = offset_covariance;
+  offset.covariance.diagonal().array() += kOffsetDrift * kOffsetDrift * since_last_s;
+  prior.offset_covariance = offset.covariance;
   SolvedMotion solved;
   const auto solve_from = [&](const FrameMotion<double>& start) {
     motion = start;
@@ -685,6 +723,16 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
       statistics.looked_for = looked_for;
     }
   }
+  if (status == SolveStatus::kOk && telemetry != nullptr && telemetry->extrapolated) {
+    move_bend(motion.angle.tilt + solved.correction[1]);
+    remember_untold(motion.angle.vector() + solved.correction.head<2>(),
+                    solved.frame_covariance.topLeftCorner<2, 2>() + bend_of_angles(),
+                    solved.shared_covariance);
+  }
+  // Until telemetry that belongs to a frame says otherwise.
+  if (status == SolveStatus::kOk && late_contradiction && !told) {
+    status = SolveStatus::kContradiction;
+  }
   if (status != SolveStatus::kOk) {
     finish_observations(SolvedMotion{});
     motion = predicted;
@@ -706,6 +754,7 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   }
   finish_observations(solved);
   contradictions = 0;
+  late_contradiction = false;
   lost = 0;
   unfound = 0;
   motion.angle = {motion.angle.pan + solved.correction[0],
@@ -720,16 +769,20 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   move_bend(motion.angle.tilt);
   add_bend(&covariance);
   FrameMotion<double> in_base = motion;
-  const Vector2<double> total = offset + solved.offset_correction + solved.local_offset_correction;
+  const Vector2<double> total = offset.value + solved.offset_correction;
   in_base.angle = {motion.angle.pan + total.x(), motion.angle.tilt + total.y()};
   if (!make_frame_orientation(calibration, frame_time_s, OrientationMode::kOe, solved.inliers,
                               in_base, covariance, out)) {
     return finish(telemetry != nullptr ? OeStatus::kTooFew : OeStatus::kNoPrediction);
   }
-  offset += solved.offset_correction;
-  offset_covariance = symmetric(solved.offset_covariance);
-  statistics.map_offset = {offset.x(), offset.y()};
-  statistics.map_offset_covariance = offset_covariance;
+  if (told) {
+    // What contradicts is not here any more: see solve_orientation().
+    static_cast<void>(learn_offset(frame_time_s, solved.innovation, solved.innovation_covariance,
+                                   shared_covariance));
+  }
+  answered_time_s = frame_time_s;
+  statistics.map_offset = {offset.value.x(), offset.value.y()};
+  statistics.map_offset_covariance = offset.covariance;
   statistics.inliers = solved.inliers;
   may_make = true;
   has_last = true;
@@ -791,6 +844,46 @@ void OeMode::State::add_bend(Matrix6* covariance) const {
       for (int j = 0; j < 3; ++j) (*covariance)(2 * i + axis, 2 * j + axis) += bend(i, j);
     }
   }
+}
+
+Matrix2<double> OeMode::State::bend_of_angles() const {
+  return Vector2<double>(bend_covariance[0](0, 0), bend_covariance[1](0, 0)).asDiagonal();
+}
+
+bool OeMode::State::learn_offset(double frame_time_s, const Vector2<double>& innovation,
+                                 const Matrix2<double>& covariance, const Matrix2<double>& shared) {
+  const double dilution = diluted(kSharedRenewal, frame_time_s - told_time_s);
+  if (!offset.learn(innovation, covariance + dilution * shared, SolveLimits{}.max_contradiction)) {
+    return false;
+  }
+  told_time_s = frame_time_s;
+  return true;
+}
+
+void OeMode::State::remember_untold(const Vector2<double>& angle, const Matrix2<double>& covariance,
+                                    const Matrix2<double>& shared) {
+  untold[next_untold] = {now_s, angle, covariance, shared};
+  next_untold = (next_untold + 1) % untold.size();
+}
+
+void OeMode::State::add_late_telemetry(double frame_time_s, const InterpolatedPanTilt& telemetry) {
+  const auto frame = std::find_if(untold.begin(), untold.end(), [&](const Untold& candidate) {
+    return candidate.time_s == frame_time_s;
+  });
+  if (frame == untold.end() || telemetry.extrapolated) return;
+  const Mechanics<double>& mechanics = calibration.mechanics;
+  const Vector2<double> to_true(1 / mechanics.pan_scale, 1 / mechanics.tilt_scale);
+  const Matrix2<double> covariance =
+      to_true.asDiagonal() * telemetry.covariance.topLeftCorner<2, 2>() * to_true.asDiagonal();
+  const Vector2<double> innovation = minus(
+      true_from_measured(mechanics, telemetry.angle),
+      PanTilt<double>{frame->angle.x() + offset.value.x(), frame->angle.y() + offset.value.y()});
+  const double dilution = diluted(telemetry.renewal_s, frame_time_s - told_time_s);
+  if (all_finite(innovation) && all_finite(covariance)) {
+    late_contradiction = !learn_offset(frame_time_s, innovation,
+                                       frame->covariance + dilution * covariance, frame->shared);
+  }
+  frame->time_s = kNever;
 }
 
 // The curve through the earlier angles tells what was to be expected now; a jerk surprises it.
@@ -882,7 +975,7 @@ bool OeMode::State::straighten_map() {
     const Matrix<double, 3, 2> gain = bend.rightCols<2>() * to_information;
     const Vector3<double> error = gain * wrong;
     // The angle has gone wrong with the way from where the map began, by the rate that was.
-    offset[axis] -= error[0];
+    offset.value[axis] -= error[0];
     too_fast[axis] = error[1];
     too_much[axis] = error[2];
     bend -= gain * bend.bottomRows<2>();
@@ -923,6 +1016,11 @@ void OeMode::State::bend_map(const Vector2<double>& rate, const Vector2<double>&
     const Vector3<double> right = a_pan.cross(d);
     const Vector3<double> turned = d - error.x() * right - error.y() * right.normalized().cross(d);
     map.refine(slot, turned.normalized(), landmark.covariance);
+  }
+  for (Untold& frame : untold) {
+    if (frame.time_s != kNever) {
+      frame.angle -= angle_error(time_per_angle() * (frame.angle.y() - origin_tilt));
+    }
   }
   for (int i = 0; i < past_count; ++i) {
     Past& p = past[static_cast<std::size_t>(i)];
@@ -1120,9 +1218,14 @@ void OeMode::State::maintain() {
   learn_noise();
   if (map.size() == 0) {
     // The map's frame is what telemetry says now.
-    motion.angle = {motion.angle.pan + offset.x(), motion.angle.tilt + offset.y()};
-    offset.setZero();
-    offset_covariance = motion_covariance.topLeftCorner<2, 2>();
+    motion.angle = {motion.angle.pan + offset.value.x(), motion.angle.tilt + offset.value.y()};
+    offset = {Vector2<double>::Zero(), motion_covariance.topLeftCorner<2, 2>()};
+    answered_time_s = now_s;
+    if (told) {
+      told_time_s = now_s;
+    } else {
+      remember_untold(motion.angle.vector(), Matrix2<double>::Zero(), Matrix2<double>::Zero());
+    }
     motion_covariance.topLeftCorner<2, 2>().setZero();
     shared_covariance.setZero();
   }
@@ -1163,6 +1266,10 @@ void OeMode::reset(const Calibration& calibration, const MapState& map) {
 OeStatus OeMode::process(const ImageView& image, double frame_time_s,
                          const InterpolatedPanTilt* at_middle_row, FrameOrientation* out) {
   return state_->process(image, frame_time_s, at_middle_row, out);
+}
+
+void OeMode::add_late_telemetry(double frame_time_s, const InterpolatedPanTilt& at_middle_row) {
+  state_->add_late_telemetry(frame_time_s, at_middle_row);
 }
 
 void OeMode::maintain() { state_->maintain(); }

@@ -77,6 +77,7 @@ struct OeStatistics {
 class OeMode {
  public:
   static constexpr int kMaxUsed = 1024;
+  static constexpr std::size_t kRemembered = 32;
 
   explicit OeMode(const OeOptions& options);
   ~OeMode();
@@ -93,8 +94,14 @@ class OeMode {
   // frame_time_s: t0, row 0 on the image clock. at_middle_row: telemetry at t0 + clock_offset +
   // line_delay * height / 2, null if there is none. The image must outlive the maintain() that
   // follows. *out is written with every status but kNoPrediction and kNotFinite.
+  // Extrapolated telemetry is a prior for this frame only: the map's offset learns nothing from it.
   [[nodiscard]] OeStatus process(const ImageView& image, double frame_time_s,
                                  const InterpolatedPanTilt* at_middle_row, FrameOrientation* out);
+
+  // Telemetry, now interpolated, for one of the latest kRemembered frames, which extrapolated telemetry
+  // answered: the map's offset learns from it. A frame that is not remembered, or was told already, is
+  // ignored. Where such telemetry contradicts landmarks, so do the frames that follow it.
+  void add_late_telemetry(double frame_time_s, const InterpolatedPanTilt& at_middle_row);
 
   // Map upkeep with the frame last processed; does nothing where that had no sure orientation.
   void maintain();

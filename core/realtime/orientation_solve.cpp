@@ -203,6 +203,17 @@ double neighbours_inflation(const Problem& problem, const FoundLandmark* landmar
 
 }  // namespace
 
+bool MapOffset::learn(const Vector2<double>& innovation,
+                      const Matrix2<double>& innovation_covariance, double max_chi_square) {
+  const Matrix2<double> information = inverse_of(innovation_covariance + covariance);
+  if (!(innovation.dot(information * innovation) < max_chi_square)) return false;
+  const Matrix2<double> gain = covariance * information;
+  value += gain * innovation;
+  covariance = (covariance - gain * covariance).eval();
+  covariance = (0.5 * (covariance + covariance.transpose())).eval();
+  return true;
+}
+
 SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionPrior& prior,
                               const SolveLimits& limits, double width, double height,
                               double half_readout_s, SolvedMotion* out) {
@@ -275,8 +286,9 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   if (prior.has_telemetry) {
     const Matrix4<double> telemetry_covariance = scaled.telemetry_information.inverse();
     out->innovation = scaled.telemetry.head<2>() - x.head<2>();
-    const Matrix2<double> expected = telemetry_covariance.topLeftCorner<2, 2>() + prior_offset +
-                                     covariance.topLeftCorner<2, 2>();
+    out->innovation_covariance =
+        telemetry_covariance.topLeftCorner<2, 2>() + covariance.topLeftCorner<2, 2>();
+    const Matrix2<double> expected = out->innovation_covariance + prior_offset;
     out->contradiction = out->innovation.dot(inverse_of(expected) * out->innovation);
     if (!(out->contradiction < limits.max_contradiction)) return SolveStatus::kContradiction;
 
@@ -315,13 +327,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   to_base.topRightCorner<2, 2>().setIdentity();
   out->covariance = to_base * posterior * to_base.transpose();
   out->correction = unscale.cwiseProduct(solution.head<6>());
-  // Of the offset found, the part that is every frame's.
-  const Matrix2<double> lasting =
-      prior.offset_covariance * inverse_of(prior_offset + 1e-30 * Matrix2<double>::Identity());
-  const Matrix2<double> gained = prior_offset - posterior.bottomRightCorner<2, 2>();
-  out->offset_correction = lasting * solution.tail<2>();
-  out->local_offset_correction = solution.tail<2>() - out->offset_correction;
-  out->offset_covariance = prior.offset_covariance - lasting * gained * lasting.transpose();
+  out->offset_correction = solution.tail<2>();
   out->inliers = inliers;
   out->inflation = inflation;
   for (int i = 0; i < count; ++i) {
@@ -329,7 +335,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   }
   // What nothing tells has no finite variance, and the factorisation gives it none.
   if (!all_finite(out->correction) || !all_finite(out->covariance) ||
-      !all_finite(out->offset_covariance) || !(out->covariance.diagonal().minCoeff() > 0)) {
+      !all_finite(out->offset_correction) || !(out->covariance.diagonal().minCoeff() > 0)) {
     return SolveStatus::kNotFinite;
   }
   return SolveStatus::kOk;

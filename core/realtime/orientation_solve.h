@@ -58,16 +58,18 @@ enum class SolveStatus {
 
 struct SolvedMotion {
   Vector6 correction = Vector6::Zero();  // of the predicted motion, map frame
-  Vector2<double> offset_correction = Vector2<double>::Zero();        // of g, from now on
-  Vector2<double> local_offset_correction = Vector2<double>::Zero();  // more, in this frame only
-  Matrix6 covariance = Matrix6::Zero();                               // of x + g (base)
+  // Of g, in this frame: what its landmarks share is in it.
+  Vector2<double> offset_correction = Vector2<double>::Zero();
+  Matrix6 covariance = Matrix6::Zero();        // of x + g (base)
   Matrix6 frame_covariance = Matrix6::Zero();  // of x (map), by this frame's noise alone
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();  // of angles, by the landmarks used
-  Matrix2<double> offset_covariance = Matrix2<double>::Zero();
   int inliers = 0;
   double inflation = 1;      // of the landmarks' covariances
   double contradiction = 0;  // chi-square, 2 degrees of freedom, of landmarks against telemetry
-  Vector2<double> innovation = Vector2<double>::Zero();  // rad, telemetry's angles minus landmarks'
+  // rad, telemetry's angles minus landmarks', without the offset known before; and rad^2, how well both
+  // know them, apart from g and from what the landmarks share.
+  Vector2<double> innovation = Vector2<double>::Zero();
+  Matrix2<double> innovation_covariance = Matrix2<double>::Zero();
 };
 
 struct SolveLimits {
@@ -76,6 +78,16 @@ struct SolveLimits {
   double max_contradiction = 36;  // chi-square
   double max_scale = 30;  // by which residuals may exceed what is claimed, standard deviations
   double min_half_readout_s = 1e-3;
+};
+
+// What is known of g, rad and rad^2, and what an innovation with this covariance, apart from g's, adds to it
+// (Kalman). False, and nothing changes, where the innovation lies beyond max_chi_square.
+struct MapOffset {
+  Vector2<double> value = Vector2<double>::Zero();
+  Matrix2<double> covariance = Matrix2<double>::Zero();
+
+  [[nodiscard]] bool learn(const Vector2<double>& innovation,
+                           const Matrix2<double>& innovation_covariance, double max_chi_square);
 };
 
 // width, height: px, of the image; half_readout_s: scale of the rows' times.

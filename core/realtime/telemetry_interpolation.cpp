@@ -207,6 +207,7 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
   out->rate = {rate[0], rate[1]};
   out->covariance = covariance;
   out->acceleration_square = acceleration_square;
+  out->extrapolated = beyond_s != 0;
   out->samples = cubic ? count : 2;
   // White samples h apart tell sigma^2 h in a unit of time, whatever answers are made of them. What the
   // clock and an unknown acceleration do stays alike for longer than neighbouring samples last.

@@ -54,7 +54,8 @@ struct InterpolatedPanTilt {
   // rad/s^2, the acceleration itself, where somebody knows it; of either axis.
   PanTilt<double> acceleration = {};
   double acceleration_sigma = std::numeric_limits<double>::infinity();  // > 0
-  int samples = 0;  // how many the answer rests on: 2 is the straight line
+  bool extrapolated = false;  // the time lies beyond the samples
+  int samples = 0;            // how many the answer rests on: 2 is the straight line
   // s, after which the error of the angle is another: the same samples answer for a while, and what the
   // clock or an unknown acceleration does lasts for about a second. So much time is worth one
   // independent answer.

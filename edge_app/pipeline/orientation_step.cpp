@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 namespace alidade {
 namespace {
@@ -81,6 +82,7 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   if (sample.restarted || filtered != telemetry_filtered_ || (clock && clock->restarted)) {
     telemetry_ = empty_telemetry(filtered);
     telemetry_filtered_ = filtered;
+    pending_.clear();
   }
   telemetry_lost_ = false;
   if (sample.zoom) {
@@ -102,6 +104,18 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   // What the buffer refuses (a duplicate, a value that is not finite) it counts, and the records'
   // sigma says the rest.
   static_cast<void>(telemetry_.push(timed));
+  tell_pending_frames();
+}
+
+void OrientationStep::tell_pending_frames() {
+  while (const auto frame = pending_.take(
+             telemetry_.newest_time().value_or(-std::numeric_limits<double>::infinity()))) {
+    InterpolatedPanTilt measured;
+    if (telemetry_.query(frame->telemetry_time_s, frame->time_sigma_s, &measured) ==
+        QueryStatus::kOk) {
+      oe_->add_late_telemetry(frame->frame_time_s, measured);
+    }
+  }
 }
 
 void OrientationStep::telemetry_lost() { telemetry_lost_ = true; }
@@ -111,6 +125,7 @@ void OrientationStep::adopt(const PublishedCalibration& published) {
   options_.calibrated = published.calibrated;
   zoom_at_adoption_ = zoom_;
   floor_sigma_s_ = 0;
+  pending_.clear();
   if (oe_) oe_->reset(published.calibration, published.map);
 }
 
@@ -164,9 +179,9 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const Calibration& calibration = options_.calibration;
   const double to_middle_row_s = calibration.line_delay * (0.5 * calibration.camera.height);
   InterpolatedPanTilt measured;
-  const QueryStatus query =
-      telemetry_.query(clock.time_s + calibration.clock_offset + to_middle_row_s,
-                       std::hypot(clock.sigma_s, floor_sigma_s_), &measured);
+  const double telemetry_time_s = clock.time_s + calibration.clock_offset + to_middle_row_s;
+  const double time_sigma_s = std::hypot(clock.sigma_s, floor_sigma_s_);
+  const QueryStatus query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
   record.status = status_of(query, clock.state == ClockState::kLocked);
   if (!zoom_fits()) {
     // Neither the lens nor the axes of another zoom are this one's.
@@ -174,6 +189,9 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
     return record;
   }
   orient(has_result(query) ? &measured : nullptr, picture, &record);
+  if (query == QueryStatus::kExtrapolated && finds_landmarks()) {
+    pending_.add({clock.time_s, telemetry_time_s, time_sigma_s});
+  }
   return record;
 }
 

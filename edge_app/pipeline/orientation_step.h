@@ -7,7 +7,7 @@
 // [earliest, latest], sigma = width / sqrt(12), each sample with an error of its own.
 // The frame is looked up in the telemetry at time + d at once (pt_mode.h): if it lies beyond the
 // newest sample the angle is extrapolated, with growing sigma, for as long as the limits permit;
-// nothing waits for a later sample.
+// nothing waits for a later sample. When later samples enclose it, OE mode's map learns from them.
 // In OE mode (oe_mode.h) landmarks of the frame's picture join in; the same telemetry is the prior.
 // The record is PT's, and its status says why, where they do not hold; it is OE's also where
 // telemetry is missing but landmarks carry the orientation on (its status then names what is missing).
@@ -29,6 +29,7 @@
 #include "core/realtime/telemetry_buffer.h"
 #include "edge_app/pipeline/calibration_feed.h"
 #include "edge_app/pipeline/orientation_record.h"
+#include "edge_app/pipeline/pending_frames.h"
 #include "edge_app/pipeline/published_calibration.h"
 #include "edge_app/pipeline/stream_clock.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
@@ -96,6 +97,7 @@ class OrientationStep {
   // False: there is a calibration, but not for the zoom that the pan/tilt source reports.
   [[nodiscard]] bool zoom_fits() const;
   [[nodiscard]] bool finds_landmarks() const { return oe_ && options_.calibrated && zoom_fits(); }
+  void tell_pending_frames();
   // Completes a record that has its time and telemetry's status; measured: null if there is none.
   void orient(const InterpolatedPanTilt* measured, const ImageView& picture,
               OrientationRecord* record);
@@ -104,6 +106,7 @@ class OrientationStep {
   StreamClock video_clock_;
   StreamClock telemetry_clock_;
   Telemetry telemetry_;
+  PendingFrames pending_;                     // of OE mode
   std::unique_ptr<OeMode> oe_;                // null: PT mode
   std::unique_ptr<StartUpTracker> start_up_;  // null: nobody wants its points
   std::optional<double> zoom_;                // as last reported

@@ -792,10 +792,7 @@ TEST(OeMode, GoesOnBesideAMapThatIsNotInViewAndFindsItAgain) {
     const InterpolatedPanTilt telemetry = camera.telemetry(k);
     const OeStatus status =
         oe.process(camera.image(k), VirtualCamera::time_s(k), &telemetry, &frame);
-    double px = 0;
-    double square = 0;
-    camera.judge(k, frame, &px, &square);
-    EXPECT_LT(px, 4) << k;
+    expect_honest(camera, k, frame);
     return status;
   };
   // The left end of the path.

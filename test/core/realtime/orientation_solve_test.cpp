@@ -21,8 +21,10 @@ namespace {
 
 constexpr double kWidth = 1920;
 constexpr double kHeight = 1080;
-constexpr double kFocalLength = 8000;     // px
-constexpr double kNoise = 0.1;            // px, of a landmark, about
+constexpr double kFocalLength = 8000;  // px
+constexpr double kNoise = 0.1;         // px, of a landmark, about
+constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
+constexpr double kNoLimit = std::numeric_limits<double>::infinity();
 constexpr double kAccelerationSigma = 2;  // rad/s^2, of the prior
 
 struct World {
@@ -148,7 +150,7 @@ class Simulation {
 // Errors of base angle, rate and acceleration; without telemetry of the map's.
 Vector6 error_of(const Frame& frame, const SolvedMotion& solved) {
   Vector6 error = solved.correction - frame.x;
-  error.head<2>() += solved.offset_correction + solved.local_offset_correction - frame.g;
+  error.head<2>() += solved.offset_correction - frame.g;
   return error;
 }
 
@@ -486,35 +488,53 @@ TEST(OrientationSolve, AveragesTelemetryOverAllFrames) {
   double squares = 0;
   Vector2<double> bias = Vector2<double>::Zero();
   for (int mount = 0; mount < kMounts; ++mount) {
-    Vector2<double> offset = Vector2<double>::Zero();  // as estimated
-    Matrix2<double> covariance = world.offset * world.offset * Matrix2<double>::Identity();
+    MapOffset offset;
+    offset.covariance = world.offset * world.offset * Matrix2<double>::Identity();
     Vector2<double> g;
     double information = 1 / (world.offset * world.offset);
     for (int i = 0; i < kFrames; ++i) {
       Frame frame = simulation.frame(world);
       if (i == 0) g = frame.g;
-      frame.g = g - offset;
+      frame.g = g - offset.value;
       simulation.measure(world, &frame);
-      frame.prior.offset_covariance = covariance;
+      frame.prior.offset_covariance = offset.covariance;
       SolvedMotion solved;
       ASSERT_EQ(frame.solve(world, &solved), SolveStatus::kOk);
-      offset += solved.offset_correction;
-      // Without an error that the landmarks share all of it is every frame's.
-      ASSERT_LT(solved.local_offset_correction.norm(), 1e-12);
-      ASSERT_LE(solved.offset_covariance.trace(), covariance.trace());
-      covariance = solved.offset_covariance;
+      const MapOffset before = offset;
+      ASSERT_TRUE(offset.learn(solved.innovation, solved.innovation_covariance, kNoLimit));
+      // Without an error that the landmarks share, all that the frame found is every frame's.
+      const double sigma = world.telemetry_angle;
+      ASSERT_LT((offset.value - before.value - solved.offset_correction).norm(), 1e-6 * sigma);
+      ASSERT_LE(offset.covariance.trace(), before.covariance.trace());
+      const Matrix2<double>& covariance = offset.covariance;
       // The landmarks' own noise of a frame is 0.1 px / sqrt(40) = 2e-6 rad beside telemetry's 3e-5; its
       // correlation with rate and acceleration makes it no more than 3 times that.
       information += 1 / (world.telemetry_angle * world.telemetry_angle);
       ASSERT_GT(covariance.eigenvalues().real().minCoeff(), 0.999 / information);
       ASSERT_LT(covariance.eigenvalues().real().maxCoeff(), 1.05 / information);
     }
-    const Vector2<double> error = offset - g;
-    squares += error.dot(covariance.ldlt().solve(error));
-    bias += error.cwiseQuotient(covariance.diagonal().cwiseSqrt()) / kMounts;
+    const Vector2<double> error = offset.value - g;
+    squares += error.dot(offset.covariance.ldlt().solve(error));
+    bias += error.cwiseQuotient(offset.covariance.diagonal().cwiseSqrt()) / kMounts;
   }
   EXPECT_NEAR(squares / kMounts, 2, 4 * std::sqrt(4.0 / kMounts));
   EXPECT_LT(bias.cwiseAbs().maxCoeff() * std::sqrt(kMounts), 4);
+}
+
+TEST(OrientationSolve, LearnsNothingFromAnInnovationThatCannotBe) {
+  MapOffset offset;
+  offset.value = {1e-3, 2e-3};
+  offset.covariance << 4e-10, 1e-10, 1e-10, 9e-10;
+  const MapOffset before = offset;
+  const Matrix2<double> noise = 5e-10 * Matrix2<double>::Identity();
+  const Vector2<double> sigma =
+      (before.covariance + noise).llt().matrixL() * Vector2<double>::UnitX();
+  EXPECT_FALSE(offset.learn(6.001 * sigma, noise, 36));
+  EXPECT_FALSE(offset.learn({kNaN, 0}, noise, 36));
+  EXPECT_EQ(offset.value, before.value);
+  EXPECT_EQ(offset.covariance, before.covariance);
+  EXPECT_TRUE(offset.learn(5.999 * sigma, noise, 36));
+  EXPECT_NE(offset.value, before.value);
 }
 
 // What the landmarks of a frame have in common is not learnt as every frame's offset.
@@ -527,23 +547,22 @@ TEST(OrientationSolve, KeepsTheLandmarksCommonErrorOutOfTheLastingOffset) {
   Simulation simulation(11);
   double squares = 0;
   for (int mount = 0; mount < kMounts; ++mount) {
-    Vector2<double> offset = Vector2<double>::Zero();
-    Matrix2<double> covariance = world.offset * world.offset * Matrix2<double>::Identity();
+    MapOffset offset;
+    offset.covariance = world.offset * world.offset * Matrix2<double>::Identity();
     const Vector2<double> g(simulation.normal(world.offset), simulation.normal(world.offset));
     for (int i = 0; i < kFrames; ++i) {
       Frame frame = simulation.frame(world);
-      frame.g = g - offset +
+      frame.g = g - offset.value +
                 Vector2<double>(simulation.normal(world.shared), simulation.normal(world.shared));
       simulation.measure(world, &frame);
-      frame.prior.offset_covariance = covariance;
+      frame.prior.offset_covariance = offset.covariance;
       SolvedMotion solved;
       ASSERT_EQ(frame.solve(world, &solved), SolveStatus::kOk);
-      offset += solved.offset_correction;
-      ASSERT_LE(solved.offset_covariance.trace(), covariance.trace());
-      covariance = solved.offset_covariance;
+      ASSERT_TRUE(offset.learn(solved.innovation,
+                               solved.innovation_covariance + solved.shared_covariance, kNoLimit));
     }
-    const Vector2<double> error = offset - g;
-    squares += error.dot(covariance.ldlt().solve(error));
+    const Vector2<double> error = offset.value - g;
+    squares += error.dot(offset.covariance.ldlt().solve(error));
   }
   EXPECT_NEAR(squares / kMounts, 2, 4 * std::sqrt(4.0 / kMounts));
 }
@@ -589,7 +608,6 @@ TEST(OrientationSolve, SolvesForLandmarksInOnePlace) {
 }
 
 TEST(OrientationSolve, WritesNothingThatIsNotFinite) {
-  const double kNaN = std::numeric_limits<double>::quiet_NaN();
   const double kInfinity = std::numeric_limits<double>::infinity();
   Simulation simulation(14);
   int refused = 0;
@@ -635,9 +653,9 @@ TEST(OrientationSolve, WritesNothingThatIsNotFinite) {
             EXPECT_TRUE(all_finite(solved.covariance));
             EXPECT_TRUE(all_finite(solved.frame_covariance));
             EXPECT_TRUE(all_finite(solved.shared_covariance));
-            EXPECT_TRUE(all_finite(solved.offset_covariance));
             EXPECT_TRUE(all_finite(solved.offset_correction));
-            EXPECT_TRUE(all_finite(solved.local_offset_correction));
+            EXPECT_TRUE(all_finite(solved.innovation));
+            EXPECT_TRUE(all_finite(solved.innovation_covariance));
             EXPECT_TRUE(std::isfinite(solved.inflation));
             EXPECT_GE(solved.covariance.diagonal().minCoeff(), 0);
           }
