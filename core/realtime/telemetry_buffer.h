@@ -151,11 +151,14 @@ class TelemetryBuffer {
     }
     std::array<TelemetryKnot, kInterpolationWindow> window;
     for (std::size_t i = first; i < end; ++i) window[i - first] = knot(i);
+    const bool beyond = time_s < oldest || time_s > newest;
+    const Vector2<double> beyond_square =
+        beyond ? expected_acceleration_square(time_s - newest) : Vector2<double>::Zero();
     if (!interpolate(noise_, window.data(), static_cast<int>(end - first),
-                     static_cast<int>(before - first), time_s, time_sigma_s, out)) {
+                     static_cast<int>(before - first), time_s, time_sigma_s, beyond_square, out)) {
       return QueryStatus::kNotFinite;
     }
-    return time_s < oldest || time_s > newest ? QueryStatus::kExtrapolated : QueryStatus::kOk;
+    return beyond ? QueryStatus::kExtrapolated : QueryStatus::kOk;
   }
 
   // After a restart of the device or of its clock. Counters stay.
@@ -180,6 +183,18 @@ class TelemetryBuffer {
   // Whether knots i and i + 1 belong to one motion.
   [[nodiscard]] bool connected(std::size_t i) const {
     return !knot(i + 1).held && knot(i + 1).time_s - knot(i).time_s <= limits_.max_gap_s;
+  }
+
+  // Beyond the newest knot, by so much; before the oldest it makes no difference.
+  [[nodiscard]] Vector2<double> expected_acceleration_square(double beyond_s) const {
+    const TelemetryKnot& newest = knot(size_ - 1);
+    ExpectedAcceleration expected(noise_, beyond_s);
+    for (std::size_t i = size_; i > 0; --i) {
+      const bool gap = i < size_ && !knot(i).held && !connected(i - 1);
+      if (gap || newest.time_s - knot(i - 1).time_s > ExpectedAcceleration::kMemory) break;
+      expected.add(knot(i - 1));
+    }
+    return expected.square();
   }
 
   // i such that time_s lies between the knots i and i + 1, or beyond that one of them which is an

@@ -49,6 +49,11 @@ Weights line_weights(const TelemetryKnot* knots, int before, double time_s) {
   return weights;
 }
 
+// What three angles have to be multiplied by to give their acceleration.
+Vector3<double> second_difference(double h0, double h1) {
+  return {2 / (h0 * (h0 + h1)), -2 / (h0 * h1), 2 / (h1 * (h0 + h1))};
+}
+
 // Largest square of the acceleration that the second differences about the line's two samples show,
 // less what noise alone makes of it.
 Vector2<double> acceleration_square_by_differences(const TelemetryKnot* knots, int count,
@@ -58,7 +63,7 @@ Vector2<double> acceleration_square_by_differences(const TelemetryKnot* knots, i
   for (int i = std::max(before, 1); i <= std::min(before + 1, count - 2); ++i) {
     const double h0 = knots[i].time_s - knots[i - 1].time_s;
     const double h1 = knots[i + 1].time_s - knots[i].time_s;
-    const Vector3<double> weights(2 / (h0 * (h0 + h1)), -2 / (h0 * h1), 2 / (h1 * (h0 + h1)));
+    const Vector3<double> weights = second_difference(h0, h1);
     const Vector2<double> acceleration = angles.middleCols<3>(i - 1) * weights;
     largest = largest.cwiseMax(
         (acceleration.array().square() - variance * weights.squaredNorm()).matrix());
@@ -137,8 +142,45 @@ bool TelemetryNoise::validate(const char** error) const {
   return problem == nullptr;
 }
 
+ExpectedAcceleration::ExpectedAcceleration(const TelemetryNoise& noise, double step_s)
+    : noise_(noise), step_s_(step_s) {}
+
+void ExpectedAcceleration::add(const TelemetryKnot& knot) {
+  constexpr double kAlmost = 0.9;  // samples come a little early or late
+  if (knots_ > 0 && !(middle_.time_s - knot.time_s > kAlmost * step_s_)) return;
+  if (knots_ > 1) {
+    const Vector3<double> weights =
+        second_difference(middle_.time_s - knot.time_s, newest_.time_s - middle_.time_s);
+    const Vector2<double> acceleration(
+        weights.dot(Vector3<double>(knot.pan, middle_.pan, newest_.pan)),
+        weights.dot(Vector3<double>(knot.tilt, middle_.tilt, newest_.tilt)));
+    const Vector2<double> rate = Vector2<double>(newest_.pan - knot.pan, newest_.tilt - knot.tilt) /
+                                 (newest_.time_s - knot.time_s);
+    const Vector2<double> variance =
+        Vector2<double>::Constant(angle_variance(noise_)) + middle_.own_variance * rate.cwiseAbs2();
+    const Vector2<double> square =
+        (acceleration.cwiseAbs2() - weights.squaredNorm() * variance).cwiseMax(0);
+    fourth_powers_ += square.cwiseAbs2();
+    ++differences_;
+    if (knots_ == 2) latest_rate_ = rate;
+  }
+  newest_ = middle_;
+  middle_ = knot;
+  if (knots_ < 3) ++knots_;
+}
+
+Vector2<double> ExpectedAcceleration::square() const {
+  constexpr double kToRest = 1;  // s
+  if (noise_.acceleration_sigma == 0) return Vector2<double>::Zero();
+  const double least = noise_.acceleration_sigma * noise_.acceleration_sigma;
+  const Vector2<double> learnt =
+      (fourth_powers_ / std::max(differences_, 1)).cwiseSqrt().cwiseMax(least);
+  return learnt.cwiseMax(latest_rate_.cwiseAbs2() / (kToRest * kToRest));
+}
+
 bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int count, int before,
-                 double time_s, double time_sigma_s, InterpolatedPanTilt* out) {
+                 double time_s, double time_sigma_s, const Vector2<double>& beyond_square,
+                 InterpolatedPanTilt* out) {
   const double variance = angle_variance(noise);
   const TelemetryKnot& origin = knots[before];
   Angles angles = Angles::Zero();
@@ -158,10 +200,11 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
     acceleration_square =
         acceleration_square_by_differences(knots, count, before, angles, variance);
   }
-  if (!cubic || beyond_s != 0) {
+  if (!cubic) {
     const double expected = noise.acceleration_sigma * noise.acceleration_sigma;
     acceleration_square = acceleration_square.cwiseMax(expected);
   }
+  if (beyond_s != 0) acceleration_square = acceleration_square.cwiseMax(beyond_square);
   weights.of_sample.row(0) += beyond_s * weights.of_sample.row(1);
   Vector2<double>& effect = weights.acceleration_effect;
   effect[0] += beyond_s * effect[1] + beyond_s * beyond_s / 2;

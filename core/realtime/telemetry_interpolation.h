@@ -26,8 +26,9 @@ struct TelemetryNoise {
   double pan_tilt_sigma = 1e-4;   // rad, white noise of one measured angle
   double quantum = 0;             // rad, smallest step of a measured angle; 0 = none
   double period_sigma_s = 50e-6;  // s, of the time between two neighbouring samples
-  // rad/s^2, acceleration to expect of either axis where the samples do not show it: beyond the
-  // newest sample, beside a jerk, and with too few samples. One standard deviation.
+  // rad/s^2, acceleration to expect of either axis where the samples do not show it: beside a jerk, and
+  // with too few samples. Beyond the newest sample the least to expect; 0: the mount keeps its rate. One
+  // standard deviation.
   double acceleration_sigma = 0.1;
 
   // False and one line in *error (if not null) when a value makes no sense.
@@ -62,13 +63,39 @@ struct InterpolatedPanTilt {
   double renewal_s = 0;
 };
 
+// What acceleration to expect of a mount that goes on as it did: the fourth root of the mean fourth power of
+// what second differences show of its last seconds, less what noise makes of them. The fourth power, as a
+// mount that stops at once does so seldom and by much. Knots are given from the newest back.
+class ExpectedAcceleration {
+ public:
+  static constexpr double kMemory = 5;  // s, that are worth looking at
+
+  // step_s: of the differences; about as long as what is to be extrapolated.
+  ExpectedAcceleration(const TelemetryNoise& noise, double step_s);
+  void add(const TelemetryKnot& knot);
+  // Squares (pan, tilt), (rad/s^2)^2; at least acceleration_sigma's, and what brings the latest rate to rest
+  // in a second.
+  [[nodiscard]] Vector2<double> square() const;
+
+ private:
+  TelemetryNoise noise_;
+  double step_s_;
+  TelemetryKnot newest_{};  // the two that the next one makes a difference with
+  TelemetryKnot middle_{};
+  int knots_ = 0;
+  int differences_ = 0;
+  Vector2<double> latest_rate_ = Vector2<double>::Zero();
+  Vector2<double> fourth_powers_ = Vector2<double>::Zero();
+};
+
 inline constexpr int kInterpolationWindow = 8;
 
 // knots[0..count), 2 <= count <= kInterpolationWindow, times strictly ascending; the time asked for
-// lies between knots[before] and knots[before + 1], or beyond the end that is nearest to it. False
-// if the result cannot be represented; *out is then untouched.
+// lies between knots[before] and knots[before + 1], or beyond the end that is nearest to it.
+// beyond_square: (rad/s^2)^2, (pan, tilt), accelerations to expect beyond the ends. False if the result
+// cannot be represented; *out is then untouched.
 [[nodiscard]] bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int count,
                                int before, double time_s, double time_sigma_s,
-                               InterpolatedPanTilt* out);
+                               const Vector2<double>& beyond_square, InterpolatedPanTilt* out);
 
 }  // namespace alidade

@@ -290,6 +290,93 @@ TEST(TelemetryInterpolation, OwnsUpToTheErrorsOfAJerk) {
   }
 }
 
+// Beyond the newest sample nobody has seen the mount: what it did in the seconds before is what it may do.
+// Errors of pan and tilt in standard deviations, at all times from the newest sample on to 80 ms after it.
+struct Extrapolation {
+  double mean_square = 0;
+  double largest = 0;
+};
+
+template <typename Truth>
+Extrapolation extrapolate(double rate_hz, double sigma, double from_s, double to_s,
+                          const Truth& truth) {
+  constexpr double kBeyond = 0.08;  // s
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal;
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = sigma;
+  noise.period_sigma_s = 0;
+  TelemetryBuffer<1024> buffer(noise);
+  Extrapolation out;
+  int count = 0;
+  for (int i = 0; i < to_s * rate_hz; ++i) {
+    const double time = i / rate_hz;
+    const PanTilt<double> angle = truth(time);
+    EXPECT_EQ(buffer.push({time, 0, angle.pan + sigma * normal(random),
+                           angle.tilt + sigma * normal(random)}),
+              PushStatus::kStored);
+    if (time < from_s) continue;
+    for (const double beyond : {0.25 * kBeyond, 0.5 * kBeyond, 0.75 * kBeyond, kBeyond}) {
+      InterpolatedPanTilt result;
+      EXPECT_EQ(buffer.query(time + beyond, 0, &result), QueryStatus::kExtrapolated);
+      EXPECT_TRUE(result.extrapolated);
+      const Vector2<double> sigmas =
+          minus(result.angle, truth(time + beyond))
+              .cwiseQuotient(result.covariance.diagonal().head<2>().cwiseSqrt());
+      out.mean_square += sigmas.squaredNorm() / 2;
+      out.largest = std::max(out.largest, sigmas.cwiseAbs().maxCoeff());
+      ++count;
+    }
+  }
+  out.mean_square /= count;
+  return out;
+}
+
+// The paper's path with the fields of view of three cameras, at the paper's speed and twice that.
+TEST(TelemetryInterpolation, LearnsFromAFastMountWhatToExpectBeyondTheNewestSample) {
+  for (const double field : {0.06, 0.35, 0.87}) {
+    for (const double period : {10.0, 5.0}) {
+      const auto truth = [&](double t) {
+        const double angle = 2 * kPi * t / period;
+        const double scale = field / (2 * kPi);
+        return PanTilt<double>{9 * scale * std::sin(angle), -3 * scale * std::cos(3 * angle)};
+      };
+      for (const double rate_hz : {20.0, 50.0}) {
+        for (const double sigma : {1e-5, 1e-4}) {
+          SCOPED_TRACE(testing::Message()
+                       << field << " rad, " << period << " s, " << rate_hz << " Hz, " << sigma);
+          const Extrapolation e = extrapolate(rate_hz, sigma, 3, 3 + 2 * period, truth);
+          // Peaks of a sine stand sqrt(2) above its mean square, the fourth root of its mean fourth power
+          // is 1.11 times that; the floor is more than the slowest does.
+          EXPECT_LT(e.mean_square, 1.1);
+          EXPECT_GT(e.mean_square, field < 0.1 ? 0.1 : 0.4);
+          EXPECT_LT(e.largest, 5);
+        }
+      }
+    }
+  }
+}
+
+// A mount that stops within a sample: the first time nobody could know, and then it is known. Errors in
+// the 80 ms after a stop are no normal ones; before, they were up to 250 sigmas.
+TEST(TelemetryInterpolation, RemembersThatTheMountStopsAtOnce) {
+  constexpr double kRate = 0.3;  // rad/s
+  constexpr double kMoves = 2;   // s
+  constexpr double kRests = 1;   // s
+  const auto truth = [&](double t) {
+    const double round = std::floor(t / (kMoves + kRests));
+    const double pan = kRate * (round * kMoves + std::min(t - round * (kMoves + kRests), kMoves));
+    return PanTilt<double>{pan, -pan};
+  };
+  for (const double rate_hz : {20.0, 50.0}) {
+    for (const double sigma : {1e-5, 1e-4}) {
+      const Extrapolation e = extrapolate(rate_hz, sigma, kMoves + kRests + 1, 20, truth);
+      EXPECT_LT(e.mean_square, 3) << rate_hz << " Hz, " << sigma;
+      EXPECT_LT(e.largest, 20) << rate_hz << " Hz, " << sigma;
+    }
+  }
+}
+
 // Whatever a mean over a long time is made of, white samples h apart leave sigma^2 h / T in it: so must the
 // answers, each worth its renewal.
 TEST(TelemetryInterpolation, AnAnswerIsWorthItsRenewal) {
