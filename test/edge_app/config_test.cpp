@@ -73,7 +73,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
            "           angle_sigma_rad: 2e-5, angle_quantum_rad: 1e-4}\n"
            "camera: {focal_length_px: 30000, aspect: 1.01, radial_distortion: -2.5,\n"
            "         line_delay_s: 1.5e-5, upside_down: true, zoom: fixed}\n"
-           "calibration: {file: /etc/c.yaml, auto: false}\n"
+           "calibration: {file: /etc/c.yaml, auto: false, zoom_tolerance: 2.5}\n"
            "realtime: {mode: PT, priority: 60, cpu: 3, lock_memory: true, max_extrapolation_s: "
            "0.5}\n"
            "output: {csv: true, json: false}\n"),
@@ -98,6 +98,9 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.camera.line_delay_s, 1.5e-5);
   EXPECT_TRUE(config_.camera.upside_down);
   EXPECT_EQ(config_.calibration.file, "/etc/c.yaml");
+  EXPECT_FALSE(config_.calibration.automatic);
+  EXPECT_EQ(config_.calibration.zoom_tolerance, 2.5);
+  EXPECT_FALSE(config_.realtime.landmarks);
   EXPECT_EQ(config_.realtime.priority, 60);
   EXPECT_EQ(config_.realtime.cpu, 3);
   EXPECT_TRUE(config_.realtime.lock_memory);
@@ -130,15 +133,6 @@ TEST_F(ConfigTest, RecordingAndRtpSourcesAreRead) {
                    "camera: {focal_length_px: 1000}\n"),
               IsEmpty());
   EXPECT_EQ(config_.video.url, directory_.path() + "/camera.sdp");
-}
-
-TEST_F(ConfigTest, AutomaticCalibrationWarnsThatItIsNotAvailable) {
-  ASSERT_THAT(load("video: {type: rtsp, url: rtsp://camera/stream}\n"
-                   "pan_tilt: {type: vapix, url: http://camera}\n"
-                   "calibration:\n  file: c.yaml\n  auto: true\n"),
-              IsEmpty());
-  ASSERT_EQ(config_.warnings.size(), 1U);
-  EXPECT_THAT(config_.warnings[0], StartsWith(path_ + ":5: calibration.auto: "));
 }
 
 TEST_F(ConfigTest, TheExampleIsReadAndShowsTheDefaults) {
@@ -237,8 +231,8 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"PlannedPanTiltType", VIDEO "pan_tilt: {type: pelco_d, baud: 9600}\n",
                 ":2: pan_tilt.type",
                 "'pelco_d' is not available in this version; available: vapix, recording"},
-        Mistake{"PlannedMode", MINIMAL "realtime: {mode: OE}\n", ":4: realtime.mode",
-                "'OE' is not available in this version; available: PT"},
+        Mistake{"UnknownMode", MINIMAL "realtime: {mode: OF}\n", ":4: realtime.mode",
+                "'OF' is unknown; expected one of OE, PT"},
         Mistake{"PlannedHttp", MINIMAL "output: {http: '127.0.0.1:8080'}\n", ":4: output.http",
                 "not available in this version"},
         Mistake{"BothFormats", MINIMAL "output: {json: true, csv: true}\n", ":4: output.csv",

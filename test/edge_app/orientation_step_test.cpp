@@ -374,6 +374,9 @@ class OeStepTest : public ::testing::Test {
     options.calibration.camera.width = Scene::kWidth;
     options.calibration.camera.height = Scene::kHeight;
     options.telemetry_limits.max_repeat_s = 0;  // a camera at rest says the same again
+    options.calibrated = true;
+    options.follow_points = true;
+    options.zoom_tolerance = 1;
     options.oe.emplace();
     options.oe->cell_size_px = 30;  // so that there are coarse landmarks too
     return options;
@@ -491,6 +494,112 @@ TEST_F(OeStepTest, AllocatesNothingAfterItsConstruction) {
   }
   EXPECT_EQ(guard.count(), 0);
   EXPECT_GT(oe, 20);
+}
+
+TEST_F(OeStepTest, AnotherZoomHasNoOrientationUntilItsCalibrationComes) {
+  build_map();
+  const auto report_zoom = [&](double zoom) {
+    PanTiltSample sample;
+    sample.earliest_time_s = sample.latest_time_s = 0.08 * frame_ - 0.005;
+    sample.pan_rad = rest_.pan_0;
+    sample.tilt_rad = rest_.tilt_0;
+    sample.zoom = zoom;
+    step_.add_telemetry(sample);
+  };
+  report_zoom(100);
+  EXPECT_EQ(add(scene_.picture()).mode, RecordMode::kOe) << "the zoom it has been at all along";
+  report_zoom(100.9);
+  EXPECT_EQ(add(scene_.picture()).mode, RecordMode::kOe) << "within the tolerance";
+  report_zoom(102);
+  OrientationRecord record = add(scene_.picture());
+  EXPECT_EQ(record.mode, RecordMode::kNone);
+  EXPECT_EQ(record.status, RecordStatus::kOtherZoom);
+  EXPECT_FALSE(record.calibrated);
+  EXPECT_FALSE(record.orientation);
+  FrameTracks tracks;
+  step_.get_tracks(&tracks);
+  EXPECT_EQ(tracks.tracker, FrameTracks::Tracker::kStartUp) << "for the calibration of this zoom";
+  PublishedCalibration published;
+  published.calibration = options().calibration;
+  published.calibration.zoom = 102;
+  published.calibrated = true;
+  step_.adopt(published);
+  static_cast<void>(add(scene_.picture()));
+  record = add(scene_.picture());
+  EXPECT_EQ(record.mode, RecordMode::kOe);
+  EXPECT_TRUE(record.calibrated);
+}
+
+TEST_F(OeStepTest, TellsTheCalibrationThreadWhatItSaw) {
+  build_map();
+  FrameTracks tracks;
+  step_.get_tracks(&tracks);
+  EXPECT_EQ(tracks.tracker, FrameTracks::Tracker::kOe);
+  EXPECT_EQ(tracks.oe_status, OeStatus::kOk);
+  EXPECT_EQ(tracks.stamp.frame, frame_ - 1);
+  ASSERT_GT(tracks.count, 20);
+  EXPECT_GE(tracks.looked_for, tracks.count);
+  for (int i = 0; i < tracks.count; ++i) {
+    const TrackedPoint& point = tracks.points[static_cast<std::size_t>(i)];
+    EXPECT_TRUE(point.u_px > 0 && point.u_px < Scene::kWidth && point.v_px > 0 &&
+                point.v_px < Scene::kHeight);
+    EXPECT_TRUE(point.sigma_px > 0 && point.sigma_px < 1) << point.sigma_px;
+  }
+  static_cast<void>(add(ImageView{}));
+  step_.get_tracks(&tracks);
+  EXPECT_EQ(tracks.tracker, FrameTracks::Tracker::kNone);
+  EXPECT_EQ(tracks.count, 0);
+}
+
+TEST_F(OeStepTest, WithoutACalibrationItFollowsPointsAndAnswersFromTelemetry) {
+  OrientationStepOptions uncalibrated = options();
+  uncalibrated.calibrated = false;
+  OrientationStep step(uncalibrated);
+  OrientationRecord record;
+  FrameTracks tracks;
+  for (int i = 0; i < 5; ++i) {
+    const double t = 0.08 * i;
+    rest_.feed(&step, t, t + 0.07);
+    StepEvents events;
+    record = step.add_frame(stamp_at(t, i), scene_.picture(), &events);
+    step.maintain();
+    step.get_tracks(&tracks);
+  }
+  EXPECT_EQ(record.mode, RecordMode::kPt);
+  EXPECT_FALSE(record.calibrated);
+  EXPECT_EQ(tracks.tracker, FrameTracks::Tracker::kStartUp);
+  EXPECT_GT(tracks.count, 20);
+}
+
+// d was found with the least delay of one connection; another one's may differ by milliseconds.
+TEST_F(OeStepTest, ANewConnectionsDelayIsLessSureUntilACalibrationOfIt) {
+  OrientationStepOptions moving = options();
+  moving.oe.reset();
+  OrientationStep step(moving);
+  Sweep sweep;
+  const auto sigma = [&](int first, bool reconnected) {
+    OrientationRecord record;
+    for (int i = first; i < first + 100; ++i) {
+      const double t = 0.08 * i;
+      sweep.feed(&step, t, t + 0.07);
+      FrameStamp stamp = stamp_at(t, i);
+      stamp.sequence = i;
+      stamp.restarted = reconnected && i == first;
+      StepEvents events;
+      record = step.add_frame(stamp, ImageView{}, &events);
+    }
+    // Pan turns the camera about its down axis, but for the tilt.
+    return record.orientation->sigma_rad[1];
+  };
+  const double before = sigma(0, false);
+  const double after = sigma(100, true);
+  const double expected = moving.floor_sigma_s * std::abs(sweep.pan_rate);
+  EXPECT_NEAR(std::sqrt(after * after - before * before), expected, 0.1 * expected);
+  PublishedCalibration published;
+  published.calibration = moving.calibration;
+  published.calibrated = true;
+  step.adopt(published);
+  EXPECT_LT(sigma(200, false), 1.05 * before) << "the clock itself is known better by now";
 }
 
 }  // namespace

@@ -107,7 +107,7 @@ class PipelineTest : public ::testing::Test {
 };
 
 TEST_F(PipelineTest, GivesOneRecordAFrameInTheirOrder) {
-  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options_for_tests());
   pipeline.start();
   for (int i = 0; i < 100; ++i) video_.push(frame());
   video_.push(ReadStatus::kEnd);
@@ -126,7 +126,7 @@ TEST_F(PipelineTest, GivesOneRecordAFrameInTheirOrder) {
 }
 
 TEST_F(PipelineTest, GivesAnOrientationFromTheTelemetryOfItsTime) {
-  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options_for_tests());
   pipeline.start();
   const OrientationRecord record = push_until(RecordStatus::kOk);
   EXPECT_EQ(record.mode, RecordMode::kPt);
@@ -138,7 +138,7 @@ TEST_F(PipelineTest, GivesAnOrientationFromTheTelemetryOfItsTime) {
 }
 
 TEST_F(PipelineTest, SaysNoneWhileTheVideoIsAwayAndGoesOnWhenItIsBack) {
-  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options_for_tests());
   pipeline.start();
   static_cast<void>(push_until(RecordStatus::kOk));
   video_.push(ReadStatus::kDisconnected, "rtsp://camera/stream: connection refused");
@@ -156,7 +156,7 @@ TEST_F(PipelineTest, SaysNoneWhileTheVideoIsAwayAndGoesOnWhenItIsBack) {
 TEST_F(PipelineTest, SaysThatTheTelemetryIsLostAndGoesOnWhenItIsBack) {
   PipelineOptions options = options_for_tests();
   options.step.telemetry_limits.max_extrapolation_s = 0;
-  Pipeline pipeline(video_, pan_tilt_, sink_, options);
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options);
   pipeline.start();
   pan_tilt_.push(ReadStatus::kDisconnected, "http://camera: connection refused");
   for (bool lost = false; !lost && !HasFailure();) {
@@ -171,7 +171,7 @@ TEST_F(PipelineTest, SaysThatTheTelemetryIsLostAndGoesOnWhenItIsBack) {
 }
 
 TEST_F(PipelineTest, StopEndsSourcesThatGiveNothing) {
-  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options_for_tests());
   pipeline.start();
   pipeline.stop();
   EXPECT_TRUE(sink_.records().empty());
@@ -179,7 +179,7 @@ TEST_F(PipelineTest, StopEndsSourcesThatGiveNothing) {
 }
 
 TEST_F(PipelineTest, StopEndsAPipelineWhoseReaderHasStalled) {
-  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options_for_tests());
   sink_.hold(true);
   pipeline.start();
   for (int i = 0; i < 3000; ++i) video_.push(frame());
@@ -191,7 +191,7 @@ TEST_F(PipelineTest, StopEndsAPipelineWhoseReaderHasStalled) {
 }
 
 TEST_F(PipelineTest, FinishesWithTheErrorOfASourceThatFailed) {
-  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options_for_tests());
   pipeline.start();
   pan_tilt_.push(ReadStatus::kFailed, "http://camera: wrong user or password (401)");
   ASSERT_TRUE(finished(pipeline));
@@ -204,7 +204,7 @@ TEST_F(PipelineTest, FinishesWhenFramesAreNotOfTheCalibrationsSize) {
   options.width = 1280;
   options.height = 720;
   options.calibration_name = "calibration.yaml";
-  Pipeline pipeline(video_, pan_tilt_, sink_, options);
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options);
   pipeline.start();
   video_.push(frame());
   ASSERT_TRUE(finished(pipeline));
@@ -215,7 +215,7 @@ TEST_F(PipelineTest, FinishesWhenFramesAreNotOfTheCalibrationsSize) {
 }
 
 TEST_F(PipelineTest, FinishesWithoutAnErrorWhenTheReaderGoes) {
-  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options_for_tests());
   sink_.close("");
   pipeline.start();
   video_.push(frame());
@@ -225,7 +225,7 @@ TEST_F(PipelineTest, FinishesWithoutAnErrorWhenTheReaderGoes) {
 }
 
 TEST_F(PipelineTest, FinishesWithTheErrorOfASinkThatFailed) {
-  Pipeline pipeline(video_, pan_tilt_, sink_, options_for_tests());
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options_for_tests());
   sink_.close("stdout: cannot write a record: No space left on device");
   pipeline.start();
   video_.push(frame());

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <memory>
 #include <thread>
+#include <vector>
 
 #include "platform/system/clock.h"
 #include "test/support/allocation_guard.h"
@@ -41,7 +42,7 @@ int count_records(RealtimeStage* stage) {
 std::unique_ptr<RealtimeStage> make_stage() {
   OrientationStepOptions options;
   options.calibration.camera.focal_length = 30000;
-  return std::make_unique<RealtimeStage>(options, true);
+  return std::make_unique<RealtimeStage>(options, true, false);
 }
 
 TEST(RealtimeStage, CountsWhatFullQueuesLose) {
@@ -121,6 +122,173 @@ TEST(RealtimeStage, AllocatesNothing) {
   telemetry.join();
   EXPECT_EQ(records, kRounds - stage->drops().frames - stage->drops().records);
   EXPECT_GT(with_orientation, 0);
+}
+
+// Blocks of random brightness, which shift with the frame: something to follow, and to make a map of.
+class Scene {
+ public:
+  static constexpr int kWidth = 320;
+  static constexpr int kHeight = 240;
+
+  Scene() : pixels_(static_cast<std::size_t>(kSide * kSide)) {
+    std::uint32_t state = 1;
+    for (int row = 0; row < kSide; row += kBlock) {
+      for (int column = 0; column < kSide; column += kBlock) {
+        state = state * 1664525U + 1013904223U;
+        for (int i = 0; i < kBlock * kBlock; ++i) {
+          pixels_[static_cast<std::size_t>((row + i / kBlock) * kSide + column + i % kBlock)] =
+              static_cast<std::uint8_t>(40 + (state >> 25));
+        }
+      }
+    }
+  }
+  [[nodiscard]] ImageView picture(int frame) const {
+    const int shift = frame % 64;
+    return {pixels_.data() + shift * kSide + shift, kWidth, kHeight, kSide};
+  }
+
+ private:
+  static constexpr int kSide = 480;
+  static constexpr int kBlock = 6;
+  std::vector<std::uint8_t> pixels_;
+};
+
+OrientationStepOptions options_with_pictures() {
+  OrientationStepOptions options;
+  options.calibration.camera = {2000, 1, 0, Scene::kWidth, Scene::kHeight};
+  options.oe.emplace();
+  options.oe->cell_size_px = 20;
+  options.follow_points = true;
+  return options;
+}
+
+VideoMessage picture_message(const Scene& scene, int frame, PictureSlot slot) {
+  VideoMessage message = frame_message(frame);
+  message.stamp.sequence = frame;
+  message.picture = scene.picture(frame);
+  message.slot = slot;
+  return message;
+}
+
+TEST(RealtimeStage, GivesEachPictureBackOnceAndLendsTheOneThatIsWanted) {
+  const Scene scene;
+  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);
+  for (PictureSlot slot = 0; slot < 3; ++slot) stage->push(picture_message(scene, slot, slot));
+  stage->want_picture();
+  EXPECT_TRUE(stage->process());
+  FeedFrame fed;
+  ASSERT_TRUE(stage->pop(fed));
+  EXPECT_EQ(fed.slot, 0) << "the first frame after the wish";
+  EXPECT_TRUE(fed.picture.valid());
+  EXPECT_EQ(fed.tracks.stamp.frame, 0);
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_TRUE(stage->pop(fed));
+    EXPECT_EQ(fed.slot, kNoPicture) << "one wish, one picture";
+  }
+  PictureSlot slot = kNoPicture;
+  ASSERT_TRUE(stage->pop_returned(slot));
+  EXPECT_EQ(slot, 1);
+  ASSERT_TRUE(stage->pop_returned(slot));
+  EXPECT_EQ(slot, 2);
+  EXPECT_FALSE(stage->pop_returned(slot)) << "the lent one is still looked at";
+  stage->give_back(0);
+  ASSERT_TRUE(stage->pop_returned(slot));
+  EXPECT_EQ(slot, 0);
+}
+
+TEST(RealtimeStage, TellsTheCalibrationThreadOfTracksSamplesAndLosses) {
+  const Scene scene;
+  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);
+  stage->push(sample_message(0.25));
+  stage->push(picture_message(scene, 0, kNoPicture));
+  stage->push(picture_message(scene, 1, kNoPicture));
+  EXPECT_TRUE(stage->process());
+  PanTiltSample sample;
+  ASSERT_TRUE(stage->pop(sample));
+  EXPECT_EQ(sample.pan_rad, 0.25);
+  FeedFrame fed;
+  ASSERT_TRUE(stage->pop(fed));
+  ASSERT_TRUE(stage->pop(fed));
+  EXPECT_EQ(fed.tracks.tracker, FrameTracks::Tracker::kStartUp);
+  EXPECT_GT(fed.tracks.count, 20);
+  EXPECT_FALSE(stage->video_is_lost());
+  VideoMessage lost;
+  lost.kind = VideoMessage::Kind::kLost;
+  stage->push(lost);
+  TelemetryMessage silent;
+  silent.kind = TelemetryMessage::Kind::kLost;
+  stage->push(silent);
+  EXPECT_TRUE(stage->process());
+  EXPECT_TRUE(stage->video_is_lost());
+  EXPECT_TRUE(stage->telemetry_is_lost());
+}
+
+TEST(RealtimeStage, TakesOverWhatIsPublishedBeforeTheNextFrame) {
+  const Scene scene;
+  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);
+  PublishedCalibration published;
+  published.calibration = options_with_pictures().calibration;
+  published.calibration.camera.focal_length = 2100;
+  published.calibrated = true;
+  stage->report({CalibrationActivity::kWatching, CalibrationNeed::kNothing});
+  ASSERT_TRUE(stage->publish(&published));
+  stage->push(picture_message(scene, 0, kNoPicture));
+  EXPECT_TRUE(stage->process());
+  OutputMessage out;
+  ASSERT_TRUE(stage->pop(out));
+  EXPECT_TRUE(out.record.calibrated);
+  EXPECT_EQ(out.record.focal_length_px, 2100);
+  EXPECT_EQ(out.record.calibration.activity, CalibrationActivity::kWatching);
+  const PublishedCalibration* adopted = nullptr;
+  ASSERT_TRUE(stage->pop_adopted(adopted));
+  EXPECT_EQ(adopted, &published) << "and is given back to whom it belongs";
+  EXPECT_FALSE(stage->pop_adopted(adopted));
+}
+
+// Following points, taking over a calibration with a map, OE mode, another zoom and back: all without allocating.
+TEST(RealtimeStage, AllocatesNothingWhileCalibrationsComeAndGo) {
+  const Scene scene;
+  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);
+  PublishedCalibration calibrated;
+  calibrated.calibration = options_with_pictures().calibration;
+  calibrated.calibrated = true;
+  calibrated.map.landmarks.resize(500);
+  PublishedCalibration withdrawn;
+  withdrawn.calibration = calibrated.calibration;
+  int oe = 0;
+  int followed = 0;
+  {
+    const test::AllocationGuard guard;
+    FeedFrame fed;
+    PanTiltSample sample;
+    OutputMessage out;
+    for (int i = 0; i < 200; ++i) {
+      TelemetryMessage message = sample_message(0);
+      message.sample.zoom = i > 150 && i < 170 ? 2 : 1;
+      stage->push(message);
+      bool published = true;
+      if (i == 50 || i == 130) published = stage->publish(&calibrated);
+      if (i == 110) published = stage->publish(&withdrawn);
+      EXPECT_TRUE(published);
+      if (i % 7 == 0) stage->want_picture();
+      stage->push(picture_message(scene, i % 2, 0));
+      EXPECT_TRUE(stage->process());
+      while (stage->pop(out)) oe += out.record.mode == RecordMode::kOe ? 1 : 0;
+      while (stage->pop(fed)) {
+        followed += fed.tracks.tracker == FrameTracks::Tracker::kStartUp ? 1 : 0;
+        if (fed.slot != kNoPicture) stage->give_back(fed.slot);
+      }
+      while (stage->pop(sample)) {
+      }
+      for (PictureSlot slot = kNoPicture; stage->pop_returned(slot);) {
+      }
+      for (const PublishedCalibration* adopted = nullptr; stage->pop_adopted(adopted);) {
+      }
+    }
+    EXPECT_EQ(guard.count(), 0);
+  }
+  EXPECT_GT(oe, 50);
+  EXPECT_GE(followed, 50 + 20 + 19);
 }
 
 }  // namespace

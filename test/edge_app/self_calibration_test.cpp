@@ -1,0 +1,399 @@
+// The calibration thread's work, step by step, on simulated cameras with known truth: when it publishes, what
+// it asks for, what it does when the camera changes.
+
+#include "edge_app/pipeline/self_calibration.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+
+#include "test/support/simulated_recording.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+
+// In memory; refuses to store on demand, as a full disk does.
+class MemoryArchive final : public CalibrationArchive {
+ public:
+  [[nodiscard]] const StoredCalibration* find(std::optional<double> zoom) const override {
+    for (const StoredCalibration& stored : stored_) {
+      if (stored.calibration.zoom == zoom) return &stored;
+    }
+    return stored_.size() == 1 && !zoom ? &stored_[0] : nullptr;
+  }
+  [[nodiscard]] bool save(const StoredCalibration& calibration, std::string* error) override {
+    stored_.push_back(calibration);
+    pending_ = full;
+    if (full) *error = "disk full";
+    return !full;
+  }
+  [[nodiscard]] bool has_pending() const override { return pending_; }
+  [[nodiscard]] bool save_pending(std::string* error) override {
+    ++tries;
+    pending_ = full;
+    if (full) *error = "disk full";
+    return !full;
+  }
+
+  bool full = false;
+  int tries = 0;
+  std::vector<StoredCalibration> stored_;
+
+ private:
+  bool pending_ = false;
+};
+
+test::Simulation camera() {
+  test::Simulation s;
+  s.seed = 3;
+  s.focal_length = 4000;
+  s.image_rate_hz = 20;
+  s.telemetry_rate_hz = 60;
+  s.pixel_sigma = 0.1;
+  s.image_stamp_sigma_s = 5e-4;
+  s.telemetry_stamp_sigma_s = 5e-4;
+  s.one_sided_stamps = true;
+  s.duration_s = 14;
+  return s;
+}
+
+SelfCalibrationOptions options_for(const test::Simulation& s) {
+  SelfCalibrationOptions options;
+  options.data_sheet.camera.focal_length = 1.15 * s.focal_length;
+  options.data_sheet.camera.width = s.width;
+  options.data_sheet.camera.height = s.height;
+  options.noise.pan_tilt_sigma_rad = s.pan_tilt_sigma;
+  return options;
+}
+
+struct Published {
+  std::shared_ptr<const PublishedCalibration> calibration;
+  double time_s;
+};
+
+// What the real-time thread would tell of a recording, in the order of its stamps.
+struct Feed {
+  FrameTracks::Tracker tracker = FrameTracks::Tracker::kStartUp;
+  std::optional<double> zoom;
+  double from_s = 0;      // shift of all stamps
+  bool restarts = false;  // the first frame is of a new connection
+  double contradicting_from_s = std::numeric_limits<double>::infinity();
+  std::int64_t first_frame = 0;
+};
+
+std::vector<Published> feed(SelfCalibration* calibration, const test::Simulation& s,
+                            const Feed& how) {
+  const CalibrationInput input = test::simulate(s);
+  std::map<std::int64_t, std::vector<TrackedPoint>> points;
+  for (const CalibrationObservation& seen : input.observations) {
+    points[seen.frame].push_back({static_cast<std::uint32_t>(seen.landmark),
+                                  static_cast<float>(seen.u_px), static_cast<float>(seen.v_px),
+                                  static_cast<float>(seen.sigma_px)});
+  }
+  std::vector<Published> published;
+  std::size_t next_sample = 0;
+  for (const CalibrationFrame& frame : input.frames) {
+    for (; next_sample < input.telemetry.size() &&
+           input.telemetry[next_sample].stamp_s <= frame.stamp_s;
+         ++next_sample) {
+      const CalibrationTelemetry& from = input.telemetry[next_sample];
+      PanTiltSample sample;
+      sample.earliest_time_s = sample.latest_time_s = how.from_s + from.stamp_s;
+      sample.pan_rad = from.pan_rad;
+      sample.tilt_rad = from.tilt_rad;
+      sample.sequence = from.sequence;
+      sample.zoom = how.zoom;
+      calibration->add(sample);
+    }
+    FrameTracks tracks;
+    tracks.stamp.frame = how.first_frame + frame.frame;
+    tracks.stamp.receive_time_s = how.from_s + frame.stamp_s;
+    tracks.stamp.sequence = frame.sequence;
+    tracks.time_s = tracks.stamp.receive_time_s;
+    tracks.tracker = how.tracker;
+    tracks.clock_restarted = tracks.stamp.restarted = how.restarts && frame.frame == 0;
+    tracks.oe_status =
+        frame.stamp_s >= how.contradicting_from_s ? OeStatus::kContradiction : OeStatus::kOk;
+    for (const TrackedPoint& point : points[frame.frame]) {
+      if (tracks.count == FrameTracks::kMaxPoints) break;
+      tracks.points[static_cast<std::size_t>(tracks.count++)] = point;
+    }
+    tracks.looked_for = tracks.count;
+    calibration->add(tracks);
+    if (auto news = calibration->work()) published.push_back({news, frame.stamp_s});
+  }
+  return published;
+}
+
+void expect_truth(const test::Simulation& s, const Calibration& c) {
+  const auto error = test::calibration_error(s, c);
+  // 9 numbers of which chance takes 1 in 30,000 beyond: 99.97 %.
+  constexpr double kBeyondChance = 4.2;
+  for (const Parameter p :
+       {Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kLineDelay,
+        Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1,
+        Parameter::kClockOffset}) {
+    const double sigma = std::sqrt(c.covariance(index(p), index(p)));
+    EXPECT_GT(sigma, 0) << to_string(p);
+    EXPECT_LT(std::abs(error[index(p)]), kBeyondChance * sigma) << to_string(p);
+  }
+}
+
+TEST(SelfCalibration, BeginsWithTheDataSheetAndPublishesOnceTheMotionSuffices) {
+  const test::Simulation s = camera();
+  const SelfCalibrationOptions options = options_for(s);
+  SelfCalibration calibration(options, nullptr);
+  EXPECT_FALSE(calibration.first()->calibrated);
+  EXPECT_EQ(calibration.first()->calibration.camera.focal_length,
+            options.data_sheet.camera.focal_length);
+  const auto published = feed(&calibration, s, {});
+  ASSERT_FALSE(published.empty());
+  EXPECT_TRUE(published[0].calibration->calibrated);
+  EXPECT_GE(published[0].time_s, options.first_try_s);
+  expect_truth(s, published[0].calibration->calibration);
+  EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
+  EXPECT_EQ(calibration.report().need, CalibrationNeed::kNothing);
+  EXPECT_THAT(calibration.take_messages(), Contains(HasSubstr("calibrated from")));
+  EXPECT_THAT(calibration.take_messages(), IsEmpty());
+}
+
+TEST(SelfCalibration, HearsNothingWhileItIsNotAutomatic) {
+  const test::Simulation s = camera();
+  SelfCalibrationOptions options = options_for(s);
+  options.automatic = false;
+  SelfCalibration calibration(options, nullptr);
+  EXPECT_THAT(feed(&calibration, s, {}), IsEmpty());
+  EXPECT_EQ(calibration.report().activity, CalibrationActivity::kOff);
+}
+
+struct Unsuitable {
+  const char* name;
+  std::function<Eigen::Vector2d(double)> path;
+  CalibrationNeed need;
+};
+
+class SelfCalibrationNeeds : public ::testing::TestWithParam<Unsuitable> {};
+
+TEST_P(SelfCalibrationNeeds, SaysWhatIsMissingAndPublishesNothing) {
+  test::Simulation s = camera();
+  s.path = GetParam().path;
+  SelfCalibration calibration(options_for(s), nullptr);
+  EXPECT_THAT(feed(&calibration, s, {}), IsEmpty());
+  EXPECT_EQ(calibration.report().activity, CalibrationActivity::kCollecting);
+  EXPECT_STREQ(to_string(calibration.report().need), to_string(GetParam().need));
+  EXPECT_THAT(calibration.take_messages(), Contains(HasSubstr("not calibrated yet")));
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Motions, SelfCalibrationNeeds,
+    ::testing::Values(
+        Unsuitable{"Rest", [](double) { return Eigen::Vector2d(0.1, 0.05); },
+                   CalibrationNeed::kMotion},
+        Unsuitable{"ConstantVelocity", [](double x) { return Eigen::Vector2d(0.1 * x, 0.02 * x); },
+                   CalibrationNeed::kAcceleration},
+        Unsuitable{"PanOnly", [](double x) { return Eigen::Vector2d(0.4 * std::sin(x), 0.0); },
+                   CalibrationNeed::kTilt},
+        Unsuitable{"TiltOnly", [](double x) { return Eigen::Vector2d(0.0, 0.4 * std::sin(x)); },
+                   CalibrationNeed::kPan}),
+    [](const auto& p) { return p.param.name; });
+
+TEST(SelfCalibration, AsksForTextureWhereHardlyAnythingIsSeen) {
+  test::Simulation s = camera();
+  s.landmarks_per_field = 1.4;
+  SelfCalibration calibration(options_for(s), nullptr);
+  EXPECT_THAT(feed(&calibration, s, {}), IsEmpty());
+  EXPECT_STREQ(to_string(calibration.report().need), to_string(CalibrationNeed::kTexture));
+}
+
+TEST(SelfCalibration, DoesNotBelieveTelemetryOfAnotherMotion) {
+  test::Simulation s = camera();
+  // The head reports the motion mirrored.
+  s.pan_scale = -1;
+  SelfCalibration calibration(options_for(s), nullptr);
+  EXPECT_THAT(feed(&calibration, s, {}), IsEmpty());
+  EXPECT_STREQ(to_string(calibration.report().need), to_string(CalibrationNeed::kAgreement));
+}
+
+TEST(SelfCalibration, NamesTheStreamThatIsLost) {
+  const test::Simulation s = camera();
+  SelfCalibration calibration(options_for(s), nullptr);
+  calibration.video_lost();
+  EXPECT_EQ(calibration.report().need, CalibrationNeed::kVideo);
+  FrameTracks frame;
+  frame.stamp.receive_time_s = 1;
+  calibration.add(frame);
+  calibration.telemetry_lost();
+  EXPECT_EQ(calibration.report().need, CalibrationNeed::kTelemetry);
+}
+
+TEST(SelfCalibration, LaterMotionRefinesWhatIsKnown) {
+  const test::Simulation s = camera();
+  SelfCalibration calibration(options_for(s), nullptr);
+  const auto first = feed(&calibration, s, {});
+  ASSERT_FALSE(first.empty());
+  test::Simulation later = s;
+  later.seed = 4;
+  const auto refined = feed(
+      &calibration, later,
+      {FrameTracks::Tracker::kOe, {}, 20, false, std::numeric_limits<double>::infinity(), 1000});
+  ASSERT_FALSE(refined.empty());
+  const Calibration& before = first.back().calibration->calibration;
+  const Calibration& after = refined.back().calibration->calibration;
+  expect_truth(s, after);
+  EXPECT_LT(after.covariance(0, 0), before.covariance(0, 0));
+}
+
+TEST(SelfCalibration, ReplacesTheCalibrationOfACameraThatWasTurnedOnItsMount) {
+  const test::Simulation s = camera();
+  SelfCalibration calibration(options_for(s), nullptr);
+  ASSERT_FALSE(feed(&calibration, s, {}).empty());
+  test::Simulation turned = s;
+  turned.pan_axis = (s.pan_axis + Eigen::Vector3d(0, 0.005, 0)).normalized();
+  turned.tilt_axis = (s.tilt_axis + Eigen::Vector3d(0.005, 0, 0)).normalized();
+  turned.duration_s = 40;
+  const auto published = feed(
+      &calibration, turned,
+      {FrameTracks::Tracker::kOe, {}, 20, false, std::numeric_limits<double>::infinity(), 1000});
+  ASSERT_FALSE(published.empty());
+  expect_truth(turned, published.back().calibration->calibration);
+  EXPECT_THAT(calibration.take_messages(),
+              Contains(HasSubstr("the camera is not what the calibration says")));
+}
+
+TEST(SelfCalibration, WithdrawsWhatLandmarksContradictForLong) {
+  const test::Simulation s = camera();
+  SelfCalibrationOptions options = options_for(s);
+  options.data_sheet.covariance.setIdentity();
+  SelfCalibration calibration(options, nullptr);
+  ASSERT_FALSE(feed(&calibration, s, {}).empty());
+  const auto published = feed(&calibration, s, {FrameTracks::Tracker::kOe, {}, 20, false, 0, 1000});
+  ASSERT_FALSE(published.empty());
+  EXPECT_FALSE(published[0].calibration->calibrated);
+  // As little is sure of it as of the data sheet's.
+  EXPECT_EQ(published[0].calibration->calibration.covariance, options.data_sheet.covariance);
+  EXPECT_EQ(calibration.report().activity, CalibrationActivity::kDoubtful);
+  EXPECT_THAT(calibration.take_messages(), Contains(HasSubstr("is withdrawn")));
+  // And the camera, followed anew, is calibrated again.
+  const auto again = feed(&calibration, s,
+                          {FrameTracks::Tracker::kStartUp,
+                           {},
+                           40,
+                           false,
+                           std::numeric_limits<double>::infinity(),
+                           2000});
+  ASSERT_FALSE(again.empty());
+  EXPECT_TRUE(again[0].calibration->calibrated);
+  EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
+}
+
+TEST(SelfCalibration, FindsTheClockOffsetOfANewConnection) {
+  const test::Simulation s = camera();
+  SelfCalibration calibration(options_for(s), nullptr);
+  ASSERT_FALSE(feed(&calibration, s, {}).empty());
+  test::Simulation reconnected = s;
+  reconnected.clock_offset += 0.004;
+  reconnected.duration_s = 16;
+  const auto published = feed(
+      &calibration, reconnected,
+      {FrameTracks::Tracker::kOe, {}, 20, true, std::numeric_limits<double>::infinity(), 1000});
+  ASSERT_EQ(published.size(), 1U);
+  expect_truth(reconnected, published[0].calibration->calibration);
+}
+
+TEST(SelfCalibration, KeepsOneCalibrationForEachZoom) {
+  const test::Simulation wide = camera();
+  test::Simulation narrow = camera();
+  narrow.focal_length = 8000;
+  MemoryArchive archive;
+  SelfCalibration calibration(options_for(wide), &archive);
+  Feed how;
+  how.zoom = 100;
+  ASSERT_FALSE(feed(&calibration, wide, how).empty());
+  how.zoom = 900;
+  how.from_s = 20;
+  how.first_frame = 1000;
+  const auto at_900 = feed(&calibration, narrow, how);
+  ASSERT_FALSE(at_900.empty());
+  expect_truth(narrow, at_900.back().calibration->calibration);
+  EXPECT_EQ(at_900.back().calibration->calibration.zoom, 900.0);
+  // Back again: with the first sample, not after a new calibration.
+  how.zoom = 100;
+  how.from_s = 40;
+  how.first_frame = 2000;
+  const auto back = feed(&calibration, wide, how);
+  ASSERT_FALSE(back.empty());
+  EXPECT_LT(back[0].time_s, 0.2);
+  EXPECT_EQ(back[0].calibration->calibration.zoom, 100.0);
+  expect_truth(wide, back[0].calibration->calibration);
+}
+
+TEST(SelfCalibration, BeginsWithWhatIsStored) {
+  MemoryArchive archive;
+  StoredCalibration stored;
+  stored.calibration.camera = {5000, 1, 0, 1920, 1080};
+  stored.path = "/somewhere/calibration.yaml";
+  archive.stored_.push_back(stored);
+  SelfCalibration calibration(options_for(camera()), &archive);
+  EXPECT_TRUE(calibration.first()->calibrated);
+  EXPECT_EQ(calibration.first()->calibration.camera.focal_length, 5000);
+  EXPECT_EQ(calibration.first()->name, stored.path);
+  EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
+}
+
+TEST(SelfCalibration, KeepsWhatAFullDiskDoesNotTakeAndTriesAgain) {
+  const test::Simulation s = camera();
+  MemoryArchive archive;
+  archive.full = true;
+  SelfCalibration calibration(options_for(s), &archive);
+  ASSERT_FALSE(feed(&calibration, s, {}).empty());
+  EXPECT_THAT(calibration.take_messages(),
+              Contains(AllOf(HasSubstr("disk full"), HasSubstr("tried again"))));
+  archive.full = false;
+  PanTiltSample later;
+  later.latest_time_s = 120;
+  calibration.add(later);
+  ASSERT_TRUE(calibration.due());
+  static_cast<void>(calibration.work());
+  EXPECT_EQ(archive.tries, 1);
+  EXPECT_FALSE(archive.has_pending());
+  EXPECT_THAT(calibration.take_messages(), Contains("the calibration is stored now"));
+}
+
+TEST(SelfCalibration, CancelledItPublishesNothingMore) {
+  const test::Simulation s = camera();
+  SelfCalibration calibration(options_for(s), nullptr);
+  calibration.cancel();
+  EXPECT_THAT(feed(&calibration, s, {}), IsEmpty());
+  EXPECT_FALSE(calibration.due());
+}
+
+TEST(SelfCalibration, TakesKeyframesWhereItHasNone) {
+  const test::Simulation s = camera();
+  SelfCalibrationOptions options = options_for(s);
+  options.max_keyframes = 3;
+  SelfCalibration calibration(options, nullptr);
+  EXPECT_FALSE(calibration.wants_keyframe()) << "no frame to take one of";
+  PanTiltSample sample;
+  FrameTracks tracks;
+  tracks.tracker = FrameTracks::Tracker::kStartUp;
+  const std::vector<std::uint8_t> pixels(static_cast<std::size_t>(s.width * s.height), 128);
+  const ImageView picture{pixels.data(), s.width, s.height, s.width};
+  for (int i = 0; i < 6; ++i) {
+    sample.pan_rad = i;  // far apart, with a field of view of half a radian
+    calibration.add(sample);
+    tracks.stamp.frame = i;
+    calibration.add(tracks);
+    EXPECT_TRUE(calibration.wants_keyframe()) << i;
+    calibration.add_keyframe(picture);
+    EXPECT_FALSE(calibration.wants_keyframe()) << "one of this view is enough";
+  }
+}
+
+}  // namespace
+}  // namespace alidade
