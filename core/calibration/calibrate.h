@@ -195,6 +195,8 @@ struct CalibrationQuality {
   // Of the parameters' correlation matrix: largest over smallest eigenvalue, and the direction in words.
   double condition = 0;
   std::string weakest_direction;
+  // kWeak: clock offset or read-out are among what is too uncertain; changes of speed would help.
+  bool weak_in_time = false;
   std::vector<std::string> advice;  // what motion or knowledge would help; also with kOk
 };
 

@@ -210,6 +210,7 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
                        " rests on its prior: a larger range of the other axis would show it");
     }
   }
+  result->quality.weak_in_time = d_error > kMaxClockOffsetError || readout_error > kMaxReadoutError;
   if (reasons.empty()) {
     result->status = CalibrationStatus::kOk;
     result->message =

@@ -29,6 +29,7 @@ constexpr double kWatchWindow = 12;  // s of data for a calibration that is held
 constexpr double kFirstWatch = 12;   // s between two, doubling up to ...
 constexpr double kLongestWatch = 600;
 constexpr double kStoreRetry = 60;    // s
+constexpr double kZoomArrives = 0.1;  // s, without a change: it does not just pass by
 constexpr double kZoomSettles = 0.5;  // s
 constexpr double kSilence = 2;        // s without a frame or sample, while the other stream goes on
 
@@ -66,8 +67,8 @@ struct Checked {
   double hold_out = 0;  // rms of normalised residuals in frames that were not used
 };
 
-CalibrationNeed need_of(CalibrationStatus status) {
-  switch (status) {
+CalibrationNeed need_of(const CalibrationResult& result) {
+  switch (result.status) {
     case CalibrationStatus::kNoMotion:
       return CalibrationNeed::kMotion;
     case CalibrationStatus::kConstantVelocity:
@@ -76,6 +77,8 @@ CalibrationNeed need_of(CalibrationStatus status) {
       return CalibrationNeed::kTexture;
     case CalibrationStatus::kTelemetryMismatch:
       return CalibrationNeed::kAgreement;
+    case CalibrationStatus::kWeak:
+      return result.quality.weak_in_time ? CalibrationNeed::kAcceleration : CalibrationNeed::kTime;
     default:
       return CalibrationNeed::kTime;
   }
@@ -167,8 +170,8 @@ struct SelfCalibration::State {
   [[nodiscard]] bool adjusting_is_due() const;
   [[nodiscard]] CalibrationInput input() const;
   [[nodiscard]] Checked adjust(const Calibration* known) const;
-  [[nodiscard]] std::optional<double> time_between(
-      std::size_t frame, const std::unordered_map<std::int64_t, double>& time_of) const;
+  [[nodiscard]] std::unordered_map<std::int64_t, double> frame_times(
+      const CalibrationResult& result) const;
   [[nodiscard]] double hold_out(const std::vector<CalibrationObservation>& held,
                                 const CalibrationResult& result) const;
   [[nodiscard]] MapState make_map(const CalibrationResult& result) const;
@@ -241,7 +244,7 @@ double SelfCalibration::State::span_s() const {
 
 // The zoom is another one: is it one that the camera had before?
 void SelfCalibration::State::look_for_stored() {
-  if (archive == nullptr || calibrated_here()) return;
+  if (archive == nullptr || calibrated_here() || now_s < zoom_changed_s + kZoomArrives) return;
   const StoredCalibration* stored = archive->find(zoom);
   // One that claims to hold for any zoom would have fitted already.
   if (stored == nullptr || !stored->calibration.zoom) return;
@@ -313,49 +316,50 @@ CalibrationInput SelfCalibration::State::input() const {
   return result;
 }
 
-// When row 0 of a frame that the calibration did not use was captured: between its neighbours, as their stamps
-// and its own say.
-std::optional<double> SelfCalibration::State::time_between(
-    std::size_t frame, const std::unordered_map<std::int64_t, double>& time_of) const {
-  if (frame == 0 || frame + 1 >= frames.size()) return std::nullopt;
-  const FrameStamp& before = frames[frame - 1].stamp;
-  const FrameStamp& after = frames[frame + 1].stamp;
-  const FrameStamp& own = frames[frame].stamp;
-  const auto from = time_of.find(before.frame);
-  const auto to = time_of.find(after.frame);
-  if (from == time_of.end() || to == time_of.end()) return std::nullopt;
-  double share = 0.5;
-  if (before.sender_time_s && own.sender_time_s && after.sender_time_s) {
-    share = (*own.sender_time_s - *before.sender_time_s) /
-            (*after.sender_time_s - *before.sender_time_s);
-  } else if (before.sequence && own.sequence && after.sequence) {
-    share = static_cast<double>(*own.sequence - *before.sequence) /
-            static_cast<double>(*after.sequence - *before.sequence);
+// When row 0 of each frame was captured; of frames that the calibration did not use between their neighbours, as
+// their stamps say.
+std::unordered_map<std::int64_t, double> SelfCalibration::State::frame_times(
+    const CalibrationResult& result) const {
+  std::unordered_map<std::int64_t, double> time_of;
+  for (const FrameResult& frame : result.frames) time_of[frame.frame] = frame.time_s;
+  for (std::size_t i = 1; i + 1 < frames.size(); ++i) {
+    const FrameStamp& before = frames[i - 1].stamp;
+    const FrameStamp& after = frames[i + 1].stamp;
+    const FrameStamp& own = frames[i].stamp;
+    const auto from = time_of.find(before.frame);
+    const auto to = time_of.find(after.frame);
+    if (!is_held_out(i) || from == time_of.end() || to == time_of.end()) continue;
+    double share = 0.5;
+    if (before.sender_time_s && own.sender_time_s && after.sender_time_s) {
+      share = (*own.sender_time_s - *before.sender_time_s) /
+              (*after.sender_time_s - *before.sender_time_s);
+    } else if (before.sequence && own.sequence && after.sequence) {
+      share = static_cast<double>(*own.sequence - *before.sequence) /
+              static_cast<double>(*after.sequence - *before.sequence);
+    }
+    if (share > 0 && share < 1)
+      time_of[own.frame] = from->second + share * (to->second - from->second);
   }
-  if (!(share > 0 && share < 1)) return std::nullopt;
-  return from->second + share * (to->second - from->second);
+  return time_of;
 }
 
 // The rms of the normalised residuals in frames that the calibration did not see.
 double SelfCalibration::State::hold_out(const std::vector<CalibrationObservation>& held,
                                         const CalibrationResult& result) const {
-  std::unordered_map<std::int64_t, double> time_of;
-  for (const FrameResult& frame : result.frames) time_of[frame.frame] = frame.time_s;
-  std::unordered_map<std::int64_t, std::optional<double>> held_time_of;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    if (is_held_out(i)) held_time_of[frames[i].stamp.frame] = time_between(i, time_of);
-  }
+  const std::unordered_map<std::int64_t, double> time_of = frame_times(result);
   std::unordered_map<std::int64_t, const CalibrationLandmark*> landmark_of;
   for (const CalibrationLandmark& landmark : result.landmarks)
     landmark_of[landmark.landmark] = &landmark;
   const Calibration& c = result.calibration;
   std::vector<double> squares;
   for (const CalibrationObservation& seen : held) {
-    const std::optional<double>& time_s = held_time_of[seen.frame];
+    const auto time_s = time_of.find(seen.frame);
     const auto landmark = landmark_of.find(seen.landmark);
-    if (!time_s || landmark == landmark_of.end()) continue;
-    const FrameMotion<double> motion{
-        result.trajectory.position(*time_s), result.trajectory.rate(*time_s), 0.0, {}};
+    if (time_s == time_of.end() || landmark == landmark_of.end()) continue;
+    const FrameMotion<double> motion{result.trajectory.position(time_s->second),
+                                     result.trajectory.rate(time_s->second),
+                                     0.0,
+                                     {}};
     const Vector3<double>& d_b = landmark->second->d_b;
     Vector2<double> u = Vector2<double>::Zero();
     Matrix<double, 2, 3> J_d = Matrix<double, 2, 3>::Zero();
@@ -436,13 +440,16 @@ Checked SelfCalibration::State::adjust(const Calibration* known) const {
         "telemetry is {:.1f} times as noisy as stated: is pan_tilt.angle_sigma_rad right?",
         result.quality.telemetry_sigma_ratio);
   }
+  // What the model lacks shows where it was not fitted: a trajectory that is coarser than the motion, patches
+  // that err alike.
+  const double excess = std::max(1.0, checked.hold_out / unit);
+  result.calibration.covariance *= excess * excess;
   result.calibration.zoom = zoom;
   return checked;
 }
 
 MapState SelfCalibration::State::make_map(const CalibrationResult& result) const {
-  std::unordered_map<std::int64_t, double> time_of;
-  for (const FrameResult& frame : result.frames) time_of[frame.frame] = frame.time_s;
+  const std::unordered_map<std::int64_t, double> time_of = frame_times(result);
   std::vector<Keyframe> keyframes;
   for (const KeptPicture& picture : pictures) {
     const auto time = time_of.find(picture.frame);
@@ -493,7 +500,7 @@ void SelfCalibration::State::try_first() {
     publish(checked);
     return;
   }
-  need = need_of(checked.result.status);
+  need = need_of(checked.result);
   if (checked.result.status == CalibrationStatus::kOneAxisOnly) {
     need = checked.refusal.rfind("pan", 0) == 0 ? CalibrationNeed::kPan : CalibrationNeed::kTilt;
   }
@@ -632,8 +639,8 @@ void SelfCalibration::add(const PanTiltSample& sample) {
     if (s.zoom) s.zoom_changed_s = sample.latest_time_s;
     s.zoom = sample.zoom;
     s.begin_anew();
-    s.look_for_stored();
   }
+  s.look_for_stored();
   s.telemetry.push_back(sample);
   // Without frames nothing else bounds it.
   constexpr std::size_t kMostSamples = 20000;
