@@ -12,7 +12,7 @@ namespace alidade::test {
 namespace {
 
 constexpr double kEnlarged = 4;
-constexpr float kCoarse = 2;  // the whole picture is searched at half its size
+constexpr float kCoarse = 3;  // the whole picture is searched at a third of its size: tags of 40 px
 // Round the corners: white that the library needs, and room for what enlarging does at a border.
 constexpr double kMargin = 12;  // px
 
