@@ -84,9 +84,10 @@ class Process:
 
 
 class Camera(Process):
-    """The virtual camera, serving live. Ports may be given so that a second one can take a dead one's place."""
+    """The virtual camera, serving live. Ports may be given so that a second one can take a dead one's place;
+    settings are sections of its configuration that take the place of those here."""
 
-    def __init__(self, folder, rtsp_port=0, http_port=0, codec="mjpeg", user="", seed=1):
+    def __init__(self, folder, rtsp_port=0, http_port=0, codec="mjpeg", user="", seed=1, settings=None):
         self.truth = pathlib.Path(folder, f"truth-{seed}")
         config = {
             "seed": seed, "truth_dir": str(self.truth), "image": IMAGE,
@@ -97,6 +98,7 @@ class Camera(Process):
             "scene": {"procedural": [{"azimuth_deg": 0, "elevation_deg": 0, "width_deg": 16, "height_deg": 8}]},
             "telemetry": {"sigma_rad": TELEMETRY_SIGMA_RAD},
             "live": {"rtsp_port": rtsp_port, "http_port": http_port, "codec": codec},
+            **(settings or {}),
         }
         environment = {}
         if user:
