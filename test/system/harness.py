@@ -148,13 +148,13 @@ class SystemTest(unittest.TestCase):
         self.processes.append(process)
         return process
 
-    def write_config(self, camera=None, video=None, pan_tilt=None, **sections):
+    def write_config(self, camera=None, video=None, pan_tilt=None, focal_length_px=FOCAL_LENGTH_PX, **sections):
         """Configuration of alidade for the given camera, with the truth as its calibration."""
         config = {
             "video": {"type": "rtsp", "url": camera.video_url if camera else "", **(video or {})},
             "pan_tilt": {"type": "vapix", "url": camera.pan_tilt_url if camera else "", "rate_hz": 50,
                          "angle_sigma_rad": TELEMETRY_SIGMA_RAD, **(pan_tilt or {})},
-            "camera": {"focal_length_px": FOCAL_LENGTH_PX},
+            "camera": {"focal_length_px": focal_length_px},
             "calibration": {"file": str(camera.truth / "truth.yaml")} if camera else {},
             "output": {"json": True}, **sections}
         file = self.folder / "alidade.yaml"
