@@ -99,6 +99,24 @@ class Path:
         return self.angle[i] + np.outer(dt, self.rate[i]) + 0.5 * np.outer(dt**2, self.acceleration[i])
 
 
+def telemetry_lead(file, path):
+    """How much later than the middle of their polls telemetry's samples were true, s: the shift in time that brings them to the
+    true path, by least squares."""
+    along, square = 0.0, 0.0
+    with open(file, newline="", encoding="utf-8") as stream:
+        for row in csv.DictReader(stream):
+            time = (float(row["earliest_time_s"]) + float(row["receive_time_s"])) / 2
+            i = path.nearest(time)
+            dt = time - path.time[i]
+            if abs(dt) > 0.05 or not np.isfinite(path.rate[i]).all():
+                continue
+            rate = path.rate[i] + dt * path.acceleration[i]
+            measured = np.array([float(row["pan_rad"]), float(row["tilt_rad"])])
+            along += float((measured - path.at(i, np.array([dt]))[0]) @ rate)
+            square += float(rate @ rate)
+    return along / square
+
+
 def read_records(path):
     with open(path, encoding="utf-8") as file:
         return [json.loads(line) for line in file]
@@ -175,6 +193,9 @@ def switch_over(records):
         record = next((r for r in records if holds(r)), None)
         if record is not None:
             events[name] = record
+    for before, record in zip(records, records[1:]):
+        if before["calibrated"] and record["calibrated"] and before["focal_length_px"] != record["focal_length_px"]:
+            events.setdefault("first refined calibration", record)
     changes = [record for before, record in zip(records, records[1:]) if state_of(before) != state_of(record)]
     shown = {id(record): (record, "") for record in changes}
     for name, record in events.items():
@@ -196,7 +217,7 @@ def parameter_table(arguments, delay_s):
     rows = []
     for row in calibration_errors.compare(arguments.calibration, arguments.truth / "truth.yaml", delay_s):
         digits = 3 if abs(row.truth) < 1e4 else 2
-        axis = " axis " in row.name or row.name[:-2].endswith("_axis")
+        axis = row.name[:-2].endswith("_axis")
         rows.append([row.name, "" if axis else f"{row.estimate:.{digits + 1}f}", "" if axis else f"{row.truth:.{digits + 1}f}",
                      f"{row.error:+.4f}", f"{row.sigma:.4f}", f"{row.sigmas:+.1f}" if row.sigmas is not None else "-", row.unit])
     return table(["", "found live", "truth", "error", "sigma", "error / sigma", "unit"], rows)
@@ -235,7 +256,8 @@ def tag_table(tags):
 
 
 def mark(axis, events, first_s):
-    for name, style in (("first calibrated record", ":"), ("first record in OE mode", "--")):
+    for name, style in (("first calibrated record", ":"), ("first record in OE mode", "--"),
+                        ("first refined calibration", "-.")):
         if name in events:
             axis.axvline(events[name]["receive_time_s"] - first_s, color="k", ls=style, lw=1, label=name)
 
@@ -289,12 +311,14 @@ def plot_latency(records, output):
         if record["latency_s"] is not None:
             kinds.setdefault(f"{record['mode']}, {record.get('calibration') or 'no calibration thread'}", []).append(
                 1e3 * record["latency_s"])
-    edges = np.linspace(0, max(np.percentile(values, 99) for values in kinds.values()) * 1.2, 70)
     for name, values in kinds.items():
-        axis.hist(np.clip(values, 0, edges[-1]), bins=edges, histtype="step", label=f"{name} ({len(values)})")
-    axis.set(xlabel="frame received to record made (ms)", ylabel="frames", title="Latency; what is later stands in the last bin")
+        if len(values) >= 5:
+            later = 1 - np.arange(len(values)) / len(values)
+            axis.step(np.sort(values), later, where="post", label=f"{name} ({len(values)} frames)")
+    axis.set(xscale="log", yscale="log", xlabel="frame received to record made (ms)", ylabel="share of frames that are later",
+             title="Latency")
     axis.legend(fontsize=8)
-    axis.grid(True, alpha=0.3)
+    axis.grid(True, which="both", alpha=0.3)
     figure.tight_layout()
     figure.savefig(output / "latency.png", dpi=110)
 
@@ -324,6 +348,7 @@ def main():
     parser.add_argument("--live", required=True, help="records of `alidade run`, JSON Lines")
     parser.add_argument("--data-sheet", required=True, help="what run began with, as a calibration file")
     parser.add_argument("--calibration", required=True, help="what run found and stored")
+    parser.add_argument("--telemetry", required=True, help="telemetry.csv of the recording made meanwhile")
     parser.add_argument("--tags", required=True, help="what alidade_tag_table wrote")
     parser.add_argument("--output", required=True, type=pathlib.Path, help="folder for the report")
     parser.add_argument("replay", nargs="*", help="NAME=RECORDS.jsonl:CALIBRATION")
@@ -338,6 +363,8 @@ def main():
     with_orientation = [record for record in live if record["mode"] != "none"]
     calibrated = [record for record in with_orientation if record["calibrated"]]
     delay_s = calibration_errors.link_delay([record["time_s"] for record in calibrated], path.time.tolist(), truth.clock_offset)
+
+    lead_s = telemetry_lead(arguments.telemetry, path)
 
     found = Camera(arguments.calibration)
     results = []
@@ -366,15 +393,17 @@ def main():
          "What `alidade run` said of itself, seconds after its first frame. It was given the focal length of the data sheet, and nothing "
          "else of the camera. A line for each change.", events_table, None),
         ("What it found out",
-         f"Against the virtual camera. Frames need {1e3 * delay_s:.2f} ms (median) through the sockets: constant, so that a "
-         "calibration finds it as part of the clock offset, and it is taken into account here. It wanders by some tenths of a "
-         "millisecond with the load of the machine, which no sigma of the clock offset knows of.",
-         parameter_table(arguments, delay_s), None),
+         f"Against the virtual camera. Frames need {1e3 * delay_s:.2f} ms (median) through the sockets, and answers about pan and tilt "
+         f"are true {1e3 * lead_s:.2f} ms after the middle of their polls: a calibration finds both as part of the clock offset, and "
+         "the truth is shifted by them here. Both wander by some tenths of a millisecond with the load of the machine, which no "
+         "sigma of the clock offset knows of.",
+         parameter_table(arguments, delay_s + lead_s), None),
         ("The tag: Table VI of the PTCEE paper",
          f"A tag 64 px wide is found in {len(tags['frames'])} frames of the recording by the AprilTag library, and its centre carried into frame "
          f"{tags['common_frame']}, by what each row says of the two. `beyond detector`: root of the square of the total less "
          "that of the detector's own noise, which the true orientation of every frame shows. `sigma told`: what the records' own sigmas "
-         "let expect. The rows but the live one are replays of a recording of the same streams; a frame counts where all rows have it. "
+         "let expect. The rows but the live one are replays of a recording of the same streams, with the calibration found last; the live one "
+         "has whatever was in force. A frame counts where all rows have it. "
          "The virtual camera repeats its 250 pictures, so that noise is the same each time round.",
          tag_table(tags), "tag"),
         ("All directions against the truth",
