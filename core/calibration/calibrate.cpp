@@ -301,7 +301,7 @@ bool Calibrator::fit_clocks() {
     const auto& sample = input_.telemetry[telemetry_index_[i]];
     data_.telemetry.push_back({telemetry_clock_.time_s[i],
                                Vector2<double>(sample.pan_rad, sample.tilt_rad),
-                               Vector2<double>::Ones(), true});
+                               Vector2<double>::Ones()});
   }
   return report(0.1, "clocks");
 }

@@ -64,7 +64,7 @@ Scene make_scene() {
     const double image_time = t - s.shift_s + s.drift * (t - scene.data.reference_s);
     scene.data.telemetry.push_back({t,
                                     scale.cwiseProduct(s.trajectory.position(image_time).vector()),
-                                    Vector2<double>(1e-4, 2e-4), true});
+                                    Vector2<double>(1e-4, 2e-4)});
   }
   scene.priors.mean = s;
   scene.priors.information.setConstant(100);
