@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "core/calibration/calibration_file.h"
+#include "edge_app/config/calibration_store.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/support/temporary_directory.h"
 
@@ -18,6 +19,7 @@ namespace alidade {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -122,6 +124,25 @@ TEST_F(CalibrateVideo, FindsTheCameraFromNothing) {
   }
   EXPECT_FALSE(fs::exists(recording() + "/tracks.csv"));
   EXPECT_FALSE(fs::exists(recording() + "/alidade"));
+}
+
+TEST_F(CalibrateVideo, StoresTheMapThatBelongsToTheCalibration) {
+  const std::string out = path("out");
+  ASSERT_EQ(calibrate_command({recording(), "-o", out}).exit_code, 0);
+  // As a start of `alidade run` would.
+  CalibrationStore store(out + "/calibration.yaml");
+  EXPECT_THAT(store.load(320, 180), ElementsAre(HasSubstr("landmarks")));
+  const StoredCalibration* stored = store.find({});
+  ASSERT_NE(stored, nullptr);
+  const MapState& map = stored->map;
+  EXPECT_GT(map.landmarks.size(), 500U);
+  // 400 samples of 2e-4 rad, up to twice that to be safe, and a tenth of a pixel of the trajectory's own.
+  const double average = 2e-4 / std::sqrt(400);
+  for (int axis = 0; axis < 2; ++axis) {
+    const double sigma = std::sqrt(map.offset_covariance(axis, axis));
+    EXPECT_GT(sigma, average);
+    EXPECT_LT(sigma, 2 * average + 0.1 / kFocalLength);
+  }
 }
 
 TEST_F(CalibrateVideo, StoresTheTracksItUsed) {
