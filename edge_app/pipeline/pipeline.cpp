@@ -132,8 +132,9 @@ void Pipeline::read_telemetry() {
 
 void Pipeline::run_realtime() {
   // Start-up: the last that may allocate or log on this thread.
-  for (const std::string& warning : apply_realtime(options_.realtime))
-    spdlog::warn("real-time thread: {}", warning);
+  const RealtimeReport report = apply_realtime(options_.realtime);
+  spdlog::log(report.warnings.empty() ? spdlog::level::info : spdlog::level::warn,
+              "real-time thread: {}", report.line());
   do {
     stage_.wait();
   } while (stage_.process());
@@ -155,8 +156,8 @@ void Pipeline::feed_calibration() {
 }
 
 void Pipeline::calibrate() {
-  for (const std::string& warning : set_lowest_priority())
-    spdlog::warn("calibration thread: {}", warning);
+  const std::string warning = set_lowest_priority();
+  if (!warning.empty()) spdlog::warn("calibration thread: {}", warning);
   std::vector<std::shared_ptr<const PublishedCalibration>> lent;
   CalibrationReport said;
   while (!stage_.output_ended()) {

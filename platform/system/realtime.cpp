@@ -1,5 +1,6 @@
 #include "platform/system/realtime.h"
 
+#include <malloc.h>
 #include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
@@ -19,51 +20,126 @@ bool memory_lock_is_limited() {
          limit.rlim_cur != RLIM_INFINITY;
 }
 
-}  // namespace
-
-std::vector<std::string> apply_realtime(const RealtimeOptions& options) {
-  std::vector<std::string> warnings;
-  if (options.priority > 0) {
-    sched_param parameters{};
-    parameters.sched_priority = options.priority;
-    const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
-    if (error != 0) {
-      warnings.push_back("no real-time priority " + std::to_string(options.priority) + " (" +
-                         std::strerror(error) +
-                         "): allow it with `ulimit -r` or LimitRTPRIO=, values 1 to 99");
-    }
+void set_priority(int priority, RealtimeReport* report) {
+  sched_param parameters{};
+  parameters.sched_priority = priority;
+  const int error = pthread_setschedparam(pthread_self(), SCHED_FIFO, &parameters);
+  if (error == 0) {
+    report->granted.push_back("SCHED_FIFO " + std::to_string(priority));
+  } else {
+    report->warnings.push_back("no real-time priority " + std::to_string(priority) + " (" +
+                               std::strerror(error) +
+                               "): allow it with `ulimit -r` or LimitRTPRIO=, values 1 to 99");
   }
-  if (options.cpu >= 0) {
-    int error = EINVAL;
-    if (options.cpu < CPU_SETSIZE) {
-      cpu_set_t cpus;
-      CPU_ZERO(&cpus);
-      CPU_SET(static_cast<unsigned>(options.cpu), &cpus);
-      error = pthread_setaffinity_np(pthread_self(), sizeof cpus, &cpus);
-    }
-    if (error != 0) {
-      warnings.push_back("cannot run on processor " + std::to_string(options.cpu) + " (" +
-                         std::strerror(error) + "): this machine has processors 0 to " +
-                         std::to_string(sysconf(_SC_NPROCESSORS_CONF) - 1));
-    }
-  }
-  if (options.lock_memory) {
-    if (memory_lock_is_limited()) {
-      warnings.emplace_back(
-          "memory is not locked: the limit is finite; allow it with `ulimit -l unlimited` or "
-          "LimitMEMLOCK=infinity");
-    } else if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
-      warnings.push_back(std::string("memory is not locked (") + std::strerror(errno) + ")");
-    }
-  }
-  return warnings;
 }
 
-std::vector<std::string> set_lowest_priority() {
-  const sched_param parameters{};
-  const int error = pthread_setschedparam(pthread_self(), SCHED_IDLE, &parameters);
-  if (error == 0) return {};
-  return {std::string("normal priority (") + std::strerror(error) + ")"};
+void set_processor(int cpu, RealtimeReport* report) {
+  int error = EINVAL;
+  if (cpu < CPU_SETSIZE) {
+    cpu_set_t cpus;
+    CPU_ZERO(&cpus);
+    CPU_SET(static_cast<unsigned>(cpu), &cpus);
+    error = pthread_setaffinity_np(pthread_self(), sizeof cpus, &cpus);
+  }
+  if (error == 0) {
+    report->granted.push_back("processor " + std::to_string(cpu));
+  } else {
+    report->warnings.push_back("cannot run on processor " + std::to_string(cpu) + " (" +
+                               std::strerror(error) + "): this machine has processors 0 to " +
+                               std::to_string(sysconf(_SC_NPROCESSORS_CONF) - 1));
+  }
+}
+
+void lock_memory(RealtimeReport* report) {
+  if (memory_lock_is_limited()) {
+    report->warnings.emplace_back(
+        "memory is not locked: the limit is finite; allow it with `ulimit -l unlimited` or "
+        "LimitMEMLOCK=infinity");
+    return;
+  }
+  // First, so that what malloc has is locked once and stays.
+  const bool kept = mallopt(M_TRIM_THRESHOLD, -1) == 1 && mallopt(M_MMAP_MAX, 0) == 1;
+  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
+    report->warnings.push_back(std::string("memory is not locked (") + std::strerror(errno) + ")");
+    return;
+  }
+  report->granted.emplace_back("memory locked");
+  if (!kept) {
+    report->warnings.emplace_back(
+        "freed memory may go back to the kernel: this malloc cannot be told to keep it");
+  }
+}
+
+__attribute__((noinline)) void touch_stack() {
+  constexpr std::size_t kPage = 4096;  // or larger
+  volatile char stack[kPrefaultedStack];
+  for (std::size_t i = 0; i < sizeof stack; i += kPage) stack[i] = 0;
+}
+
+void prefault_stack(RealtimeReport* report) {
+  constexpr std::size_t kReserve = std::size_t{64}
+                                   << 10;  // what the caller and this one still need
+  pthread_attr_t attributes;
+  void* lowest = nullptr;
+  std::size_t size = 0;
+  if (pthread_getattr_np(pthread_self(), &attributes) != 0) return;
+  const bool known = pthread_attr_getstack(&attributes, &lowest, &size) == 0;
+  pthread_attr_destroy(&attributes);
+  const char here = 0;
+  if (known && &here - static_cast<const char*>(lowest) >
+                   static_cast<std::ptrdiff_t>(kPrefaultedStack + kReserve)) {
+    touch_stack();
+    report->granted.emplace_back("stack pre-faulted");
+  } else {
+    report->warnings.emplace_back("stack is not pre-faulted: too small");
+  }
+}
+
+std::string joined(const std::vector<std::string>& words, const char* between) {
+  std::string all;
+  for (const std::string& word : words) all += (all.empty() ? "" : between) + word;
+  return all;
+}
+
+}  // namespace
+
+std::string RealtimeReport::line() const {
+  std::string text = "granted: " + (granted.empty() ? "nothing" : joined(granted, ", "));
+  if (!warnings.empty()) text += "; not permitted: " + joined(warnings, "; ");
+  return text;
+}
+
+RealtimeReport apply_realtime(const RealtimeOptions& options) {
+  RealtimeReport report;
+  if (options.priority > 0) set_priority(options.priority, &report);
+  if (options.cpu >= 0) set_processor(options.cpu, &report);
+  if (options.lock_memory) lock_memory(&report);
+  prefault_stack(&report);
+  return report;
+}
+
+std::string set_lowest_priority() {
+  // Where the process may run, as its first thread does: not on the processor that a thread that started
+  // this one has for itself.
+  cpu_set_t cpus;
+  if (sched_getaffinity(getpid(), sizeof cpus, &cpus) == 0) {
+    static_cast<void>(pthread_setaffinity_np(pthread_self(), sizeof cpus, &cpus));
+  }
+  const sched_param none{};
+  const int error = pthread_setschedparam(pthread_self(), SCHED_IDLE, &none);
+  if (error == 0) return "";
+  constexpr int kNicest = 19;
+  if (pthread_setschedparam(pthread_self(), SCHED_OTHER, &none) == 0 &&
+      setpriority(PRIO_PROCESS, 0, kNicest) == 0) {  // of this thread alone, on Linux
+    return "";
+  }
+  return std::string("cannot run at the lowest priority (") + std::strerror(error) + ")";
+}
+
+PageFaults thread_page_faults() {
+  rusage usage{};
+  if (getrusage(RUSAGE_THREAD, &usage) != 0) return {};
+  return {usage.ru_minflt, usage.ru_majflt};
 }
 
 }  // namespace alidade

@@ -1,9 +1,11 @@
 #pragma once
 // What a thread asks of the kernel to meet its deadlines: SCHED_FIFO, a processor of its own, and
-// memory that is never paged out (this one holds for the whole process).
+// memory that is there when it is touched: never paged out, never given back (these hold for the whole
+// process), the stack touched beforehand. And the opposite, for a thread that must never be in the way.
 // Everything is optional: without the permission the thread runs on, only less punctually.
 // Threads started by a thread inherit its scheduling.
 
+#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -12,14 +14,35 @@ namespace alidade {
 struct RealtimeOptions {
   int priority = 0;  // SCHED_FIFO priority 1..99; 0 leaves the normal scheduling
   int cpu = -1;      // processor to run on; -1: any
+  // Locks all memory of the process, now and later, and keeps malloc from returning it to the kernel
+  // and from fetching large blocks one by one: fresh memory is a page fault.
   bool lock_memory = false;
 };
 
-// Applies the options to the calling thread. Returns one line in plain words for each thing that
-// was not permitted, with what would permit it; empty = all granted.
-[[nodiscard]] std::vector<std::string> apply_realtime(const RealtimeOptions& options);
+// A few words for each thing that was granted ("SCHED_FIFO 60"), and a line in plain words for each
+// that was not permitted, with what would permit it.
+struct RealtimeReport {
+  std::vector<std::string> granted;
+  std::vector<std::string> warnings;
 
-// The calling thread runs when nothing else wants to. Lines as above.
-[[nodiscard]] std::vector<std::string> set_lowest_priority();
+  // For the log: "granted: SCHED_FIFO 60, processor 3, memory locked, stack pre-faulted; not permitted: ...".
+  [[nodiscard]] std::string line() const;
+};
+
+// Applies the options to the calling thread and touches kPrefaultedStack of its stack, if it has that much.
+// Allocates.
+inline constexpr std::size_t kPrefaultedStack = std::size_t{256} << 10;  // bytes
+[[nodiscard]] RealtimeReport apply_realtime(const RealtimeOptions& options);
+
+// Lets the calling thread run only when no other wants to (SCHED_IDLE, else the highest nice value), whatever
+// the thread that started it runs as. Returns one line if it could not be had; empty = granted.
+[[nodiscard]] std::string set_lowest_priority();
+
+// Of the calling thread, since it began.
+struct PageFaults {
+  long minor = 0;  // the page was in memory, but not there yet for this process
+  long major = 0;  // it had to be read
+};
+[[nodiscard]] PageFaults thread_page_faults();
 
 }  // namespace alidade
