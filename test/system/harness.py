@@ -155,8 +155,8 @@ class SystemTest(unittest.TestCase):
             "pan_tilt": {"type": "vapix", "url": camera.pan_tilt_url if camera else "", "rate_hz": 50,
                          "angle_sigma_rad": TELEMETRY_SIGMA_RAD, **(pan_tilt or {})},
             "camera": {"focal_length_px": focal_length_px},
-            "calibration": {"file": str(camera.truth / "truth.yaml")} if camera else {},
-            "output": {"json": True}, **sections}
+            "calibration": {"file": str(camera.truth / "truth.yaml"), "auto": False} if camera else {},
+            "realtime": {"mode": "PT"}, "output": {"json": True}, **sections}
         file = self.folder / "alidade.yaml"
         file.write_text(json.dumps(config))
         return file
