@@ -969,7 +969,9 @@ bool OeMode::State::straighten_map() {
     constexpr double kGate = 25;  // chi-square, 2 degrees of freedom
     if (!(wrong.dot(to_information * wrong) < kGate)) {
       // A jerk, or a bend beyond what was thought: if it stays, it will be believed.
-      bend *= 2;
+      // What it has done to the angle is told by move_bend() alone: nothing here could ever take that back.
+      const Vector3<double> doubt(1, std::sqrt(2.0), std::sqrt(2.0));
+      bend = (doubt.asDiagonal() * bend * doubt.asDiagonal()).eval();
       continue;
     }
     const Matrix<double, 3, 2> gain = bend.rightCols<2>() * to_information;

@@ -43,8 +43,8 @@ constexpr double kLeastRest = 0.3;    // s
 // What the path stays within: the photos reach half a wide field further.
 constexpr double kPanRange = 18 * kDegree;
 constexpr double kTiltRange = 6 * kDegree;
-constexpr double kTopSpeed = 7 * kDegree;  // rad/s: 0.9 narrow fields a second
-constexpr double kSteadySpeed = 0.5 * kDegree;
+constexpr double kTopSpeed = 7 * kDegree;       // rad/s: 0.9 narrow fields a second
+constexpr double kSteadySpeed = 0.8 * kDegree;  // above what counts as no motion in small pictures
 
 Eigen::Matrix3d rotation(const Eigen::Vector3d& turn) {
   const double angle = turn.norm();

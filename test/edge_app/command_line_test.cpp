@@ -183,7 +183,8 @@ class CommandLineTest : public ::testing::Test {
   std::string live_config() {
     const std::string port = std::to_string(refusing_port());
     return directory_.write("alidade.yaml",
-                            "video: {type: rtsp, url: 'rtsp://127.0.0.1:" + port + "/stream'}\n" +
+                            "video: {type: rtsp, url: 'rtsp://127.0.0.1:" + port +
+                                "/stream', width: 320, height: 240}\n" +
                                 "pan_tilt: {type: vapix, url: 'http://127.0.0.1:" + port + "'}\n" +
                                 "camera: {focal_length_px: 30000}\n");
   }

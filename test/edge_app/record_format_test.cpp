@@ -22,6 +22,7 @@ OrientationRecord full_record() {
       0.5, -0.25, 0.125, -0.0625, 0.03125, -0.015625, {0.5, -0.5, 0.5, 0.5}, {1e-5, 2e-5, 3e-5}};
   record.landmarks = 187;
   record.line_delay_s = -1.42e-5;
+  record.calibration = {CalibrationActivity::kWatching, CalibrationNeed::kNothing};
   record.focal_length_px = 32008;
   record.radial_distortion = 55.4;
   record.latency_s = 2.5e-5;
@@ -32,6 +33,7 @@ OrientationRecord record_without_frame() {
   OrientationRecord record;
   record.receive_time_s = 3.5;
   record.status = RecordStatus::kVideoLost;
+  record.calibration = {CalibrationActivity::kCollecting, CalibrationNeed::kTilt};
   record.focal_length_px = 1000;
   return record;
 }
@@ -40,7 +42,7 @@ TEST(RecordFormat, WritesAllFieldsAsOneJsonLine) {
   EXPECT_EQ(
       json_line(full_record()),
       R"({"frame":7,"time_s":12345.678901234,"receive_time_s":12345.75,"mode":"OE","status":"ok",)"
-      R"("calibrated":true,"pan_rad":0.5,"tilt_rad":-0.25,"pan_rate_rad_s":0.125,"tilt_rate_rad_s":-0.0625,)"
+      R"("calibrated":true,"calibration":"watching","needs":null,"pan_rad":0.5,"tilt_rad":-0.25,"pan_rate_rad_s":0.125,"tilt_rate_rad_s":-0.0625,)"
       R"("pan_acceleration_rad_s2":0.03125,"tilt_acceleration_rad_s2":-0.015625,)"
       R"("q_base_from_camera":[0.5,-0.5,0.5,0.5],"orientation_sigma_rad":[1e-05,2e-05,3e-05],"landmarks":187,)"
       R"("line_delay_s":-1.42e-05,"focal_length_px":32008.0,"aspect":1.0,"radial_distortion":55.4,)"
@@ -52,7 +54,7 @@ TEST(RecordFormat, WritesNullForWhatARecordLacks) {
   EXPECT_EQ(
       json_line(record_without_frame()),
       R"({"frame":null,"time_s":null,"receive_time_s":3.5,"mode":"none","status":"video lost",)"
-      R"("calibrated":false,"pan_rad":null,"tilt_rad":null,"pan_rate_rad_s":null,"tilt_rate_rad_s":null,)"
+      R"("calibrated":false,"calibration":"collecting","needs":"tilt more","pan_rad":null,"tilt_rad":null,"pan_rate_rad_s":null,"tilt_rate_rad_s":null,)"
       R"("pan_acceleration_rad_s2":null,"tilt_acceleration_rad_s2":null,)"
       R"("q_base_from_camera":null,"orientation_sigma_rad":null,"landmarks":0,)"
       R"("line_delay_s":0.0,"focal_length_px":1000.0,"aspect":1.0,"radial_distortion":0.0,)"
@@ -62,20 +64,24 @@ TEST(RecordFormat, WritesNullForWhatARecordLacks) {
 
 TEST(RecordFormat, WritesCsvColumnsInTheOrderOfTheHeader) {
   EXPECT_EQ(csv_header(),
-            "frame,time_s,receive_time_s,mode,status,calibrated,pan_rad,tilt_rad,pan_rate_rad_s,"
+            "frame,time_s,receive_time_s,mode,status,calibrated,calibration,needs,"
+            "pan_rad,tilt_rad,pan_rate_rad_s,"
             "tilt_rate_rad_s,pan_acceleration_rad_s2,tilt_acceleration_rad_s2,"
             "q_x,q_y,q_z,q_w,orientation_sigma_rad_0,orientation_sigma_rad_1,orientation_sigma_rad_"
             "2,landmarks,"
             "line_delay_s,focal_length_px,aspect,radial_distortion,latency_s\n");
-  EXPECT_EQ(csv_line(full_record()),
-            "7,12345.678901234,12345.75,OE,ok,true,0.5,-0.25,0.125,-0.0625,0.03125,-0.015625,"
-            "0.5,-0.5,0.5,0.5,1e-05,2e-05,3e-05,187,"
-            "-1.42e-05,32008.0,1.0,55.4,2.5e-05\n");
+  EXPECT_EQ(
+      csv_line(full_record()),
+      "7,12345.678901234,12345.75,OE,ok,true,watching,,0.5,-0.25,0.125,-0.0625,0.03125,-0.015625,"
+      "0.5,-0.5,0.5,0.5,1e-05,2e-05,3e-05,187,"
+      "-1.42e-05,32008.0,1.0,55.4,2.5e-05\n");
 }
 
 TEST(RecordFormat, LeavesCsvCellsEmptyForWhatARecordLacks) {
   const std::string line = csv_line(record_without_frame());
-  EXPECT_EQ(line, ",,3.5,none,video lost,false,,,,,,,,,,,,,,0,0.0,1000.0,1.0,0.0,\n");
+  EXPECT_EQ(
+      line,
+      ",,3.5,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,0,0.0,1000.0,1.0,0.0,\n");
   const std::string header = csv_header();
   EXPECT_EQ(std::count(line.begin(), line.end(), ','),
             std::count(header.begin(), header.end(), ','));
@@ -95,7 +101,8 @@ TEST(RecordFormat, WhatIsNotFiniteHasNoValue) {
   record.receive_time_s = std::numeric_limits<double>::quiet_NaN();
   record.latency_s = std::numeric_limits<double>::infinity();
   EXPECT_TRUE(nlohmann::json::parse(json_line(record))["receive_time_s"].is_null());
-  EXPECT_EQ(csv_line(record), ",,,none,video lost,false,,,,,,,,,,,,,,0,0.0,1000.0,1.0,0.0,\n");
+  EXPECT_EQ(csv_line(record),
+            ",,,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,0,0.0,1000.0,1.0,0.0,\n");
 }
 
 TEST(RecordFormat, NamesTheModes) {
