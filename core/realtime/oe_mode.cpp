@@ -870,7 +870,7 @@ void OeMode::State::add_late_telemetry(double frame_time_s, const InterpolatedPa
   const auto frame = std::find_if(untold.begin(), untold.end(), [&](const Untold& candidate) {
     return candidate.time_s == frame_time_s;
   });
-  if (frame == untold.end() || telemetry.extrapolated) return;
+  if (!std::isfinite(frame_time_s) || frame == untold.end() || telemetry.extrapolated) return;
   const Mechanics<double>& mechanics = calibration.mechanics;
   const Vector2<double> to_true(1 / mechanics.pan_scale, 1 / mechanics.tilt_scale);
   const Matrix2<double> covariance =

@@ -83,9 +83,10 @@ class VirtualCamera {
     return {picture.data(), kWidth, kHeight, kWidth};
   }
 
-  [[nodiscard]] InterpolatedPanTilt telemetry(int k, const Sigmas& sigmas = {}) {
+  [[nodiscard]] InterpolatedPanTilt telemetry(int k, const Sigmas& sigmas = {},
+                                              double before_s = 0) {
     constexpr double h = 1e-3;  // s
-    const double t = time_s(k) + calibration_.line_delay * kHeight / 2;
+    const double t = time_s(k) + calibration_.line_delay * kHeight / 2 - before_s;
     const simulator::Angles before = path_->at(t - h);
     const simulator::Angles now = path_->at(t);
     const simulator::Angles after = path_->at(t + h);
@@ -100,6 +101,28 @@ class VirtualCamera {
                                        (after.tilt - 2 * now.tilt + before.tilt) / (h * h));
     out.acceleration_square = acceleration.cwiseAbs2();
     out.samples = 2;
+    return out;
+  }
+
+  // What telemetry that ends so long before the frame's middle row makes of it: at a constant rate, with
+  // the standard deviation of the accelerations that it does not know.
+  [[nodiscard]] InterpolatedPanTilt extrapolated(int k, double beyond_s) {
+    InterpolatedPanTilt out = telemetry(k, {}, beyond_s);
+    out.angle.pan += beyond_s * out.rate.pan;
+    out.angle.tilt += beyond_s * out.rate.tilt;
+    constexpr double kAcceleration =
+        0.3;  // rad/s^2; the path's are 0.09 and 0.27, root mean square
+    const Vector2<double> effect(kAcceleration * beyond_s * beyond_s / 2, kAcceleration * beyond_s);
+    for (int i = 0; i < 2; ++i) {
+      for (int j = 0; j < 2; ++j) {
+        const double own = i == j ? 0 : beyond_s * out.covariance(2, 2);
+        out.covariance.block<2, 2>(2 * i, 2 * j).diagonal().array() += effect[i] * effect[j] + own;
+      }
+    }
+    out.covariance.topLeftCorner<2, 2>().diagonal().array() +=
+        beyond_s * beyond_s * out.covariance(2, 2);
+    out.extrapolated = true;
+    out.renewal_s = 1;
     return out;
   }
 
@@ -590,6 +613,128 @@ TEST(OeMode, NeedsACalibrationThatItHasRoomFor) {
   oe.maintain();
   oe.reset(camera.calibration());
   EXPECT_EQ(oe.process(camera.image(0), 0, &telemetry, &frame), OeStatus::kTooFew);
+}
+
+// Telemetry that ends 80 ms before each frame, and tells of it two frames later.
+class LateTelemetry : public OeModeOnFrames {
+ protected:
+  static constexpr int kLate = 2;                     // frames
+  static constexpr double kBeyond = kLate / kRateHz;  // s
+
+  OeStatus process_extrapolated(int k) {
+    telemetry_ = camera_.extrapolated(k, kBeyond);
+    return oe_.process(camera_.image(k), VirtualCamera::time_s(k), &telemetry_, &frame_);
+  }
+
+  void tell(int k, double off_px = 0) {
+    InterpolatedPanTilt late = camera_.telemetry(k);
+    late.angle.pan += off_px * kPixel;
+    oe_.add_late_telemetry(VirtualCamera::time_s(k), late);
+  }
+
+  // Frames [from, to), all in OE but the very first.
+  void run_late(int from, int to) {
+    for (int k = from; k < to; ++k) {
+      if (k >= kLate) tell(k - kLate);
+      ASSERT_EQ(process_extrapolated(k), k == 0 ? OeStatus::kTooFew : OeStatus::kOk) << k;
+      expect_honest(camera_, k, frame_);
+      oe_.maintain();
+    }
+  }
+
+  [[nodiscard]] Matrix2<double> offset_covariance() const {
+    return oe_.map_state().offset_covariance;
+  }
+};
+
+TEST_F(LateTelemetry, TellsTheOffsetAsWellAsTelemetryInTime) {
+  constexpr int kFrames = 250;
+  double squares = 0;
+  for (int k = 0; k < kFrames; ++k) {
+    run_late(k, k + 1);
+    double px = 0;
+    double square = 0;
+    camera_.judge(k, frame_, &px, &square);
+    squares += square / 2;
+    if (k > kFrames / 2) {
+      EXPECT_LT(px, 0.6) << k;
+    }
+  }
+  // Of five places the worst; one offset is in all frames, so that this is but a few draws.
+  EXPECT_LT(squares / kFrames, 5);
+  // White noise of a pixel, averaged.
+  EXPECT_LT(std::sqrt(offset_covariance()(0, 0)), 1.5 * kPixel / std::sqrt(1.0 * kFrames));
+}
+
+TEST_F(LateTelemetry, IsNotReplacedByWhatWasExtrapolated) {
+  run_late(0, 20);
+  const Matrix2<double> before = offset_covariance();
+  for (int k = 20; k < 40; ++k) {
+    ASSERT_EQ(process_extrapolated(k), OeStatus::kOk) << k;
+    oe_.maintain();
+  }
+  EXPECT_GE(offset_covariance()(0, 0), before(0, 0));
+  EXPECT_GE(offset_covariance()(1, 1), before(1, 1));
+  // All the time it may be told.
+  for (int k = 18; k < 40; ++k) tell(k);
+  EXPECT_LT(offset_covariance()(0, 0), before(0, 0) / 1.5);
+  run_late(42, 45);
+}
+
+TEST_F(LateTelemetry, IsIgnoredWhereItBelongsToNoFrame) {
+  run_late(0, 20);
+  tell(18);
+  const MapState before = oe_.map_state();
+  const auto expect_unchanged = [&] {
+    const MapState now = oe_.map_state();
+    EXPECT_EQ(now.offset.vector(), before.offset.vector());
+    EXPECT_EQ(now.offset_covariance, before.offset_covariance);
+  };
+  tell(18);   // again
+  tell(100);  // not yet
+  InterpolatedPanTilt late = camera_.telemetry(19);
+  oe_.add_late_telemetry(VirtualCamera::time_s(19) + 1e-4, late);
+  const double kNaN = std::numeric_limits<double>::quiet_NaN();
+  oe_.add_late_telemetry(kNaN, late);
+  oe_.add_late_telemetry(-std::numeric_limits<double>::infinity(), late);
+  oe_.add_late_telemetry(VirtualCamera::time_s(19), camera_.extrapolated(19, kBeyond));
+  expect_unchanged();
+  late.angle.tilt = kNaN;
+  oe_.add_late_telemetry(VirtualCamera::time_s(19), late);
+  expect_unchanged();
+  // Of a map that is gone.
+  ASSERT_EQ(process_extrapolated(20), OeStatus::kOk);
+  oe_.reset(camera_.calibration());
+  tell(20);
+  EXPECT_EQ(offset_covariance(), (Matrix2<double>::Zero()));
+}
+
+// The frames in between cannot know: extrapolated telemetry hides 15 px. The next one says so.
+TEST_F(LateTelemetry, ThatContradictsTheLandmarksIsAContradiction) {
+  run_late(0, 60);
+  tell(58, 15);
+  EXPECT_EQ(process_extrapolated(60), OeStatus::kContradiction);
+  EXPECT_EQ(frame_.mode, OrientationMode::kPt);
+  EXPECT_GT(frame_.motion_covariance(0, 0), kPixel * kPixel);
+  oe_.maintain();
+  tell(59);
+  run_late(61, 65);
+}
+
+TEST_F(LateTelemetry, ForgetsAMapThatItContradictsForLong) {
+  run_late(0, 60);
+  OeStatus status = OeStatus::kOk;
+  int lost = 0;
+  for (int k = 60; k < 140; ++k) {
+    tell(k - kLate, 15);
+    telemetry_ = camera_.extrapolated(k, kBeyond);
+    telemetry_.angle.pan += 15 * kPixel;
+    status = oe_.process(camera_.image(k), VirtualCamera::time_s(k), &telemetry_, &frame_);
+    lost += status != OeStatus::kOk ? 1 : 0;
+    oe_.maintain();
+  }
+  EXPECT_EQ(status, OeStatus::kOk);
+  EXPECT_LT(lost, 60);
 }
 
 // One OeMode's map in the hands of another.

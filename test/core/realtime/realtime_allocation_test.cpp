@@ -193,6 +193,7 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
     telemetry.angle = {radius * std::cos(turn_of(k)), -radius * std::sin(turn_of(k))};
     telemetry.rate = {-radius * rate * std::sin(turn_of(k)), -radius * rate * std::cos(turn_of(k))};
     telemetry.covariance.diagonal() << 1e-9, 1e-9, 1e-7, 1e-7;
+    telemetry.extrapolated = k % 3 == 0;
     // Now and then no telemetry or no picture.
     const ImageView image =
         k % 1000 == 500 ? ImageView{} : pictures[static_cast<std::size_t>(k % kPictures)].view;
@@ -201,6 +202,8 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
     in_oe += status == OeStatus::kOk ? 1 : 0;
     without += status != OeStatus::kOk ? 1 : 0;
     oe.maintain();
+    telemetry.extrapolated = false;
+    if (k % 6 == 0) oe.add_late_telemetry(k / 25.0, telemetry);
     if (k == kFrames / 4) oe.reset(calibration, good);
     if (k == kFrames / 2) oe.reset(calibration);
     if (k == kFrames * 3 / 4) oe.reset(calibration, bad);
