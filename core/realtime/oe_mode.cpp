@@ -83,7 +83,16 @@ double diluted(double renewal_s, double elapsed_s) {
   return std::max(1.0, renewal_s / std::max(std::abs(elapsed_s), kLeastElapsed));
 }
 
-Matrix2<double> symmetric(const Matrix2<double>& m) { return 0.5 * (m + m.transpose()); }
+// At a constant acceleration; what it is later, nobody knows.
+FrameMotion<double> carried_on(const FrameMotion<double>& from, double t) {
+  FrameMotion<double> to = from;
+  to.angle = {from.angle.pan + t * from.rate.pan + t * t / 2 * from.acceleration.pan,
+              from.angle.tilt + t * from.rate.tilt + t * t / 2 * from.acceleration.tilt};
+  to.rate = {from.rate.pan + t * from.acceleration.pan,
+             from.rate.tilt + t * from.acceleration.tilt};
+  to.acceleration = {};
+  return to;
+}
 
 template <int kSize>
 bool is_covariance(const Matrix<double, kSize, kSize>& m) {
@@ -198,7 +207,6 @@ struct OeMode::State {
   };
   std::array<Untold, kRemembered> untold;
   std::size_t next_untold = 0;
-  // Of rates and accelerations as the map makes them appear: see straighten_map().
   // Of (angle, rate, acceleration) of pan, of tilt, by the map's bend: angle against the first frame's ...
   std::array<Matrix3<double>, 2> bend_covariance{};
   double bend_tilt = 0;  // ... for a frame that looks at this tilt
@@ -563,11 +571,7 @@ void OeMode::State::finish_observations(const SolvedMotion& solved) {
   for (int i = 0; i < statistics.aligned; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const FoundLandmark& f = found[at];
-    const double t = f.time_s;
-    const Vector2<double> angle = solved.correction.head<2>() +
-                                  t * solved.correction.segment<2>(2) +
-                                  (0.5 * t * t) * solved.correction.tail<2>();
-    observations[at].residual = f.residual - f.J_angle * angle;
+    observations[at].residual = f.residual - f.J_angle * angle_at(solved.correction, f.time_s);
     observations[at].inlier = f.inlier;
   }
 }
@@ -634,18 +638,15 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
     shared_covariance = offset.covariance;
     told = !telemetry->extrapolated;
     // Of an answer that the same samples gave before, only a part is news.
-    {
-      const double before_s = telemetry->extrapolated ? answered_time_s : told_time_s;
-      const double dilution = std::sqrt(diluted(telemetry->renewal_s, frame_time_s - before_s));
-      const Vector4<double> dilute(dilution, dilution, 1, 1);
-      prior.telemetry_covariance =
-          dilute.asDiagonal() * prior.telemetry_covariance * dilute.asDiagonal();
-    }
+    const double before_s = told ? told_time_s : answered_time_s;
+    const double dilution = std::sqrt(diluted(telemetry->renewal_s, frame_time_s - before_s));
+    const Vector4<double> dilute(dilution, dilution, 1, 1);
+    prior.telemetry_covariance =
+        dilute.asDiagonal() * prior.telemetry_covariance * dilute.asDiagonal();
   } else {
-    motion = last_motion;
-    motion.angle = {last_motion.angle.pan + since_last_s * last_motion.rate.pan,
-                    last_motion.angle.tilt + since_last_s * last_motion.rate.tilt};
-    motion.acceleration = {};
+    FrameMotion<double> steady = last_motion;
+    steady.acceleration = {};
+    motion = carried_on(steady, since_last_s);
     Matrix4<double> carry = Matrix4<double>::Identity();
     carry.topRightCorner<2, 2>().diagonal().setConstant(since_last_s);
     Matrix<double, 4, 2> push;
@@ -704,18 +705,9 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
       status == SolveStatus::kTooFew ||
       (status == SolveStatus::kOk && solved.inliers < kMost * statistics.looked_for);
   if (follows && doubtful) {
-    FrameMotion<double> carried = last_motion;
-    const double t = frame_time_s - last_time_s;
-    carried.angle = {
-        last_motion.angle.pan + t * last_motion.rate.pan + t * t / 2 * last_motion.acceleration.pan,
-        last_motion.angle.tilt + t * last_motion.rate.tilt +
-            t * t / 2 * last_motion.acceleration.tilt};
-    carried.rate = {last_motion.rate.pan + t * last_motion.acceleration.pan,
-                    last_motion.rate.tilt + t * last_motion.acceleration.tilt};
-    carried.acceleration = {};
     const SolveStatus before = status;
     const int looked_for = statistics.looked_for;
-    status = solve_from(carried);
+    status = solve_from(carried_on(last_motion, frame_time_s - last_time_s));
     if (status != SolveStatus::kOk || solved.inliers < kMany ||
         solved.inliers < kMost * statistics.looked_for) {
       // No better, or by a few only, which agree by chance too.
@@ -832,7 +824,7 @@ void OeMode::State::move_bend(double tilt) {
   carry(1, 2) = t;
   for (Matrix3<double>& covariance : bend_covariance) {
     covariance = carry * covariance * carry.transpose();
-    covariance = (0.5 * (covariance + covariance.transpose())).eval();
+    covariance = symmetric(covariance);
   }
   bend_tilt = tilt;
 }
@@ -981,7 +973,7 @@ bool OeMode::State::straighten_map() {
     too_fast[axis] = error[1];
     too_much[axis] = error[2];
     bend -= gain * bend.bottomRows<2>();
-    bend = (0.5 * (bend + bend.transpose())).eval();
+    bend = symmetric(bend);
   }
   bend_map(too_fast, too_much, middle.angle.y());
   constexpr double kCrooked = 0.2;  // px, at the first and the last row
@@ -1079,7 +1071,8 @@ void OeMode::State::refine_landmarks() {
       // So much is left to be learnt always: textures alias, and the light changes.
       constexpr double kLeast = 0.01;
       const Matrix2<double> covariance =
-          symmetric((Matrix2<double>::Identity() - gain) * landmark.covariance) + kLeast * measured;
+          symmetric<2>((Matrix2<double>::Identity() - gain) * landmark.covariance) +
+          kLeast * measured;
       if (all_finite(change) && all_finite(covariance)) {
         map.refine(slot, direction_plus<double>(landmark.d, change), covariance);
       }

@@ -80,8 +80,7 @@ class Problem {
 
   [[nodiscard]] Vector2<double> left(int i, const Vector6& x) const {
     const double t = terms_[static_cast<std::size_t>(i)].t;
-    const Vector2<double> angle = x.head<2>() + t * x.segment<2>(2) + (0.5 * t * t) * x.tail<2>();
-    return landmarks_[i].residual - landmarks_[i].J_angle * angle;
+    return landmarks_[i].residual - landmarks_[i].J_angle * angle_at(x, t);
   }
 
   [[nodiscard]] double normalised_square(int i, const Vector6& x) const {
@@ -210,7 +209,7 @@ bool MapOffset::learn(const Vector2<double>& innovation,
   const Matrix2<double> gain = covariance * information;
   value += gain * innovation;
   covariance = (covariance - gain * covariance).eval();
-  covariance = (0.5 * (covariance + covariance.transpose())).eval();
+  covariance = symmetric(covariance);
   return true;
 }
 

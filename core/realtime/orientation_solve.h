@@ -24,6 +24,17 @@ namespace alidade {
 using Vector6 = Matrix<double, 6, 1>;
 using Matrix6 = Matrix<double, 6, 6>;
 
+// x is (angle, rate, acceleration) of pan and tilt.
+[[nodiscard]] inline Vector2<double> angle_at(const Vector6& x, double t) {
+  return x.head<2>() + t * x.segment<2>(2) + (0.5 * t * t) * x.tail<2>();
+}
+
+// Without what rounding makes of a covariance.
+template <int kSize>
+[[nodiscard]] Matrix<double, kSize, kSize> symmetric(const Matrix<double, kSize, kSize>& m) {
+  return 0.5 * (m + m.transpose());
+}
+
 // One landmark that was found.
 struct FoundLandmark {
   Vector2<double> u;           // px, where
