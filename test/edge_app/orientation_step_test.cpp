@@ -421,6 +421,28 @@ TEST_F(OeStepTest, BeginsWithTelemetryAndThenHoldsToLandmarks) {
   }
 }
 
+// Frames are answered before the samples around them are there; a step that learnt nothing from these would
+// know the base no better than its first, extrapolated, answer.
+TEST_F(OeStepTest, LearnsFromTelemetryThatComesAfterTheAnswer) {
+  double first_sigma = 0;
+  double last_sigma = 0;
+  for (int i = 1; i <= 60; ++i) {
+    const double t = 0.08 * i;
+    rest_.feed(&step_, t - 0.1, t - 0.03);
+    StepEvents events;
+    const OrientationRecord record = step_.add_frame(stamp_at(t, i), scene_.picture(), &events);
+    step_.maintain();
+    ASSERT_TRUE(record.orientation) << i;
+    if (i > 1) {
+      ASSERT_EQ(record.mode, RecordMode::kOe) << i;
+    }
+    (i == 1 ? first_sigma : last_sigma) = record.orientation->sigma_rad[0];
+  }
+  EXPECT_GT(first_sigma, 1e-4);  // of one measured angle
+  // Sixty answers, of which those to neighbouring frames share samples.
+  EXPECT_LT(last_sigma, 0.4e-4);
+}
+
 TEST_F(OeStepTest, AnswersFromTelemetryAndSaysWhyWhereThePictureDoesNotHelp) {
   build_map();
   const std::vector<std::uint8_t> covered(static_cast<std::size_t>(Scene::kWidth) * Scene::kHeight,
