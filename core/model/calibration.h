@@ -65,6 +65,12 @@ inline constexpr int kParameterCount = static_cast<int>(Parameter::kCount);
 template <class S>
 using ParameterCovariance = Matrix<S, kParameterCount, kParameterCount>;
 
+// d x / d Parameter of n numbers that are estimated with a calibration: how they come out by another
+// one from the same measurements. Sensitivity * covariance * Sensitivity^T is what the calibration's error
+// adds to theirs ("consider" covariance, Schmidt 1966).
+template <int n>
+using Sensitivity = Matrix<double, n, kParameterCount>;
+
 struct Calibration {
   Camera<double> camera;
   double line_delay = 0;  // s/row: row v is exposed at t0 + v * line_delay; any sign

@@ -5,32 +5,16 @@
 namespace alidade {
 namespace {
 
-// The last parameters, on which the orientation of row 0 depends: axes, scales, clock offset.
-constexpr int kMountParameters = kParameterCount - index(Parameter::kPanAxis0);
-static_assert(index(Parameter::kClockOffset) == kParameterCount - 1 && kMountParameters == 7);
-
-// d motion / d parameters. Landmarks do not ask the telemetry's clock: in OE mode its offset has no
-// part. (The scales keep theirs, as the landmarks' map was laid out by telemetry's angles.)
-Matrix<double, 4, kParameterCount> mount_jacobian(OrientationMode mode,
-                                                  const Mechanics<double>& mechanics,
-                                                  const FrameMotion<double>& motion) {
-  Matrix<double, 4, kParameterCount> J = motion_parameter_jacobian(mechanics, motion);
-  if (mode == OrientationMode::kOe) J.col(index(Parameter::kClockOffset)).setZero();
-  return J;
-}
-
 // Of a pixel or direction of one row, from its Jacobians by (angle, rate) there and by the parameters.
 Matrix2<double> covariance(const FrameOrientation& frame, double row,
                            const Matrix<double, 2, 4>& J_motion,
-                           const Matrix<double, 2, kParameterCount>& J_parameters) {
-  const FrameMotion<double> motion = frame.motion();
-  const double time = time_of_row(motion, frame.calibration.line_delay, row);
+                           const Sensitivity<2>& J_parameters) {
+  const double time = time_of_row(frame.motion(), frame.calibration.line_delay, row);
   Matrix<double, 2, 6> J;
   J << J_motion, J_motion.rightCols<2>() * (time / 2);
-  const Matrix<double, 2, kParameterCount> J_all =
-      J_parameters + J_motion * mount_jacobian(frame.mode, frame.calibration.mechanics, motion);
+  const Sensitivity<2> sensitivity = J_parameters + J * frame.motion_sensitivity;
   return J * frame.motion_covariance * J.transpose() +
-         J_all * frame.calibration.covariance * J_all.transpose();
+         sensitivity * frame.calibration.covariance * sensitivity.transpose();
 }
 
 }  // namespace
@@ -61,7 +45,7 @@ ProjectionStatus FrameOrientation::pixel(const Vector3<double>& d_b, Vector2<dou
                                    calibration.line_delay, motion(), d_b, u);
   }
   Matrix<double, 2, 4> J_motion;
-  Matrix<double, 2, kParameterCount> J_parameters;
+  Sensitivity<2> J_parameters;
   const ProjectionStatus status =
       rolling_shutter_project(calibration.camera, calibration.mechanics, calibration.line_delay,
                               motion(), d_b, u, nullptr, &J_motion, &J_parameters);
@@ -70,9 +54,19 @@ ProjectionStatus FrameOrientation::pixel(const Vector3<double>& d_b, Vector2<dou
   return ProjectionStatus::kOk;
 }
 
+Sensitivity<6> telemetry_sensitivity(const Mechanics<double>& mechanics,
+                                     const FrameMotion<double>& motion) {
+  Sensitivity<6> out;
+  out << motion_parameter_jacobian(mechanics, motion), Sensitivity<2>::Zero();
+  // A longer line delay makes it look later.
+  out.col(index(Parameter::kLineDelay)).head<2>() = motion.reference_row * motion.rate.vector();
+  return out;
+}
+
 bool make_frame_orientation(const Calibration& calibration, double time_s, OrientationMode mode,
                             int landmarks, const FrameMotion<double>& motion,
-                            const MotionCovariance& motion_covariance, FrameOrientation* out) {
+                            const MotionCovariance& motion_covariance,
+                            const Sensitivity<6>& motion_sensitivity, FrameOrientation* out) {
   const PanTilt<double> angle = angle_at_row(motion, calibration.line_delay, 0.0);
   const PanTilt<double> rate = rate_at_row(motion, calibration.line_delay, 0.0);
   const double time = time_of_row(motion, calibration.line_delay, 0.0);
@@ -81,23 +75,24 @@ bool make_frame_orientation(const Calibration& calibration, double time_s, Orien
   to_row_0.block<2, 2>(2, 4).diagonal().setConstant(time);
   to_row_0.block<2, 2>(0, 4).diagonal().setConstant(time * time / 2);
   const MotionCovariance covariance_at_row_0 = to_row_0 * motion_covariance * to_row_0.transpose();
+  Sensitivity<6> sensitivity_at_row_0 = to_row_0 * motion_sensitivity;
+  sensitivity_at_row_0.col(index(Parameter::kLineDelay)).head<4>() -=
+      motion.reference_row *
+      Vector4<double>(rate.pan, rate.tilt, motion.acceleration.pan, motion.acceleration.tilt);
 
-  const FrameMotion<double> motion_at_row_0{angle, rate, 0.0, motion.acceleration};
   Matrix<double, 3, 2> J_xi_angle;
   Matrix<double, 3, 4> J_xi_axes;
   const Matrix3<double> R =
       R_base_from_camera(calibration.mechanics, angle, &J_xi_angle, &J_xi_axes);
-  Matrix<double, 3, kMountParameters> J_xi_mount;
-  J_xi_mount << J_xi_axes, J_xi_angle * mount_jacobian(mode, calibration.mechanics, motion_at_row_0)
-                                            .topRightCorner<2, kMountParameters - 4>();
+  Sensitivity<3> sensitivity = J_xi_angle * sensitivity_at_row_0.topRows<2>();
+  sensitivity.middleCols<4>(index(Parameter::kPanAxis0)) += J_xi_axes;
   const Matrix3<double> orientation_covariance =
       J_xi_angle * covariance_at_row_0.topLeftCorner<2, 2>() * J_xi_angle.transpose() +
-      J_xi_mount * calibration.covariance.bottomRightCorner<kMountParameters, kMountParameters>() *
-          J_xi_mount.transpose();
+      sensitivity * calibration.covariance * sensitivity.transpose();
   const Vector3<double> angular_velocity = J_xi_angle * rate.vector();  // PTCEE 46
   if (!std::isfinite(time_s) || !all_finite(R) || !all_finite(angular_velocity) ||
       !all_finite(motion.acceleration.vector()) || !all_finite(covariance_at_row_0) ||
-      !all_finite(orientation_covariance)) {
+      !all_finite(sensitivity_at_row_0) || !all_finite(orientation_covariance)) {
     return false;
   }
   out->time_s = time_s;
@@ -108,6 +103,7 @@ bool make_frame_orientation(const Calibration& calibration, double time_s, Orien
   out->rate = rate;
   out->acceleration = motion.acceleration;
   out->motion_covariance = covariance_at_row_0;
+  out->motion_sensitivity = sensitivity_at_row_0;
   out->R_base_from_camera = R;
   out->orientation_covariance = orientation_covariance;
   out->angular_velocity = angular_velocity;

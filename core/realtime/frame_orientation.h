@@ -54,6 +54,7 @@ struct FrameOrientation {
   // rad/s^2, true, constant during the frame; 0 in PT mode, which has its effect in the covariance
   PanTilt<double> acceleration;
   MotionCovariance motion_covariance = MotionCovariance::Zero();  // WITHOUT the calibration's part
+  Sensitivity<6> motion_sensitivity = Sensitivity<6>::Zero();     // which this tells
   Matrix3<double> R_base_from_camera = r_frd_from_rdf<double>();
   Matrix3<double> orientation_covariance = Matrix3<double>::Zero();  // rad^2, of xi
   Vector3<double> angular_velocity = Vector3<double>::Zero();        // rad/s, camera frame
@@ -73,12 +74,17 @@ struct FrameOrientation {
                                        Matrix2<double>* cov = nullptr) const;
 };
 
-// Fills everything from the true motion about any row and its measurement's covariance. False if a
-// result is not finite; *out is then untouched.
+// Of a motion that telemetry tells, looked up when the reference row is exposed.
+[[nodiscard]] Sensitivity<6> telemetry_sensitivity(const Mechanics<double>& mechanics,
+                                                   const FrameMotion<double>& motion);
+
+// Fills everything from the true motion about any row, its measurement's covariance and its
+// sensitivity. False if a result is not finite; *out is then untouched.
 [[nodiscard]] bool make_frame_orientation(const Calibration& calibration, double time_s,
                                           OrientationMode mode, int landmarks,
                                           const FrameMotion<double>& motion,
                                           const MotionCovariance& motion_covariance,
+                                          const Sensitivity<6>& motion_sensitivity,
                                           FrameOrientation* out);
 
 }  // namespace alidade

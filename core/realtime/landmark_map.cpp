@@ -87,6 +87,10 @@ LandmarkStatistics& LandmarkMap::statistics(int slot) {
   return landmarks_[static_cast<std::size_t>(slot)].statistics;
 }
 
+LandmarkSensitivity& LandmarkMap::sensitivity(int slot) {
+  return landmarks_[static_cast<std::size_t>(slot)].sensitivity;
+}
+
 // Every ring is as high as the others; its columns are about as wide as it is high in its middle.
 LandmarkMap::Key LandmarkMap::cell_of(const Vector3<double>& d, int octave) const {
   const int rings = rings_[static_cast<std::size_t>(octave)];

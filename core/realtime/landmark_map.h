@@ -15,6 +15,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "core/model/calibration.h"
 #include "core/model/linear_algebra.h"
 #include "core/realtime/image_view.h"
 
@@ -34,6 +35,8 @@ struct LandmarkStatistics {
   float residual_square = 1;
 };
 
+using LandmarkSensitivity = Matrix<float, 2, kParameterCount>;
+
 struct Landmark {
   std::uint32_t id = 0;                          // never given twice
   std::uint8_t octave = 0;                       // of the pyramid its picture was taken from
@@ -42,6 +45,8 @@ struct Landmark {
   Matrix2<double> covariance = Matrix2<double>::Zero();
   // ... and rad^2 of (pan, tilt) of the frame that it came from, shared by all made there.
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();
+  // Of d in tangent_basis(d): all that was made with the calibration shares its errors.
+  LandmarkSensitivity sensitivity = LandmarkSensitivity::Zero();
   // d(reference pixel, px of its octave) / d(tangent_basis(d) coordinates, rad), as the camera saw
   // it then, rolling shutter and distortion included.
   Matrix2<double> J_pixel_tangent = Matrix2<double>::Identity();
@@ -66,7 +71,7 @@ class LandmarkMap {
   static constexpr double kMaxCellSize = 0.5;  // rad
 
   // capacity: at least 1. cell_size: rad, of octave 0, in [1e-6, 0.5]; what is outside is taken as
-  // the nearest. A landmark costs about half a kilobyte.
+  // the nearest. A landmark costs about 600 bytes.
   LandmarkMap(int capacity, double cell_size, double largest_cell_size = kMaxCellSize);
   LandmarkMap(const LandmarkMap&) = delete;
   LandmarkMap& operator=(const LandmarkMap&) = delete;
@@ -83,8 +88,9 @@ class LandmarkMap {
 
   // Slots: 0 to capacity() - 1; one stays with its landmark until that is retired or replaced.
   [[nodiscard]] bool occupied(int slot) const;
-  [[nodiscard]] const Landmark& at(int slot) const;        // occupied(slot)
-  [[nodiscard]] LandmarkStatistics& statistics(int slot);  // occupied(slot)
+  [[nodiscard]] const Landmark& at(int slot) const;          // occupied(slot)
+  [[nodiscard]] LandmarkStatistics& statistics(int slot);    // occupied(slot)
+  [[nodiscard]] LandmarkSensitivity& sensitivity(int slot);  // occupied(slot)
 
   // On kOk it has a new id, a slot and fresh statistics, last looked for now (count of frames).
   [[nodiscard]] InsertStatus insert(const Landmark& landmark, std::uint32_t now, int* slot);

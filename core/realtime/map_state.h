@@ -16,6 +16,7 @@ struct MapState {
   std::vector<Landmark> landmarks;  // ids mean nothing to the OeMode that takes them
   PanTilt<double> offset;           // rad, base minus map
   Matrix2<double> offset_covariance = Matrix2<double>::Zero();  // rad^2
+  Sensitivity<2> offset_sensitivity = Sensitivity<2>::Zero();
   // Of (angle, rate, acceleration) of pan, of tilt: how far the map may be bent, see oe_mode.cpp ...
   std::array<Matrix3<double>, 2> bend_covariance{Matrix3<double>::Zero(), Matrix3<double>::Zero()};
   double bend_tilt = 0;  // rad, ... for a frame that looks at this tilt

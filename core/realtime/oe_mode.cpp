@@ -109,7 +109,7 @@ bool is_covariance(const Matrix<double, kSize, kSize>& m) {
 
 bool makes_sense(const Landmark& landmark) {
   return is_covariance(landmark.covariance) && is_covariance(landmark.shared_covariance) &&
-         std::isnormal(landmark.J_pixel_tangent.determinant());
+         all_finite(landmark.sensitivity) && std::isnormal(landmark.J_pixel_tangent.determinant());
 }
 
 }  // namespace
@@ -147,10 +147,11 @@ struct OeMode::State {
   void add_bend(Matrix6* covariance) const;
   [[nodiscard]] Matrix2<double> bend_of_angles() const;
   [[nodiscard]] bool learn_offset(double frame_time_s, const Vector2<double>& innovation,
-                                  const Matrix2<double>& covariance, const Matrix2<double>& shared);
+                                  const Matrix2<double>& covariance, const Matrix2<double>& shared,
+                                  const Sensitivity<2>& sensitivity);
   void add_late_telemetry(double frame_time_s, const InterpolatedPanTilt& telemetry);
-  void remember_untold(const Vector2<double>& angle, const Matrix2<double>& covariance,
-                       const Matrix2<double>& shared);
+  void remember_untold(const Vector2<double>& angle, const Sensitivity<2>& sensitivity,
+                       const Matrix2<double>& covariance, const Matrix2<double>& shared);
   void remember_motion();
   [[nodiscard]] bool straighten_map();
   void bend_map(const Vector2<double>& rate, const Vector2<double>& acceleration,
@@ -200,6 +201,7 @@ struct OeMode::State {
     double time_s = kNever;
     // rad, map, at the middle row
     Vector2<double> angle = Vector2<double>::Zero();
+    Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
     // Of it, by noise and the map's bend ...
     Matrix2<double> covariance = Matrix2<double>::Zero();
     // ... and by what the landmarks share.
@@ -232,7 +234,8 @@ struct OeMode::State {
   FrameMotion<double> motion;                                   // map's frame
   Matrix6 motion_covariance = Matrix6::Zero();                  // by the frame's own noise
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();  // of its angles, by the map's
-  double now_s = 0;                                             // its frame_time_s
+  Sensitivity<6> motion_sensitivity = Sensitivity<6>::Zero();
+  double now_s = 0;       // its frame_time_s
   bool told = false;      // by telemetry that was not extrapolated
   bool may_make = false;  // motion is sure enough for new landmarks
   double inflation = 1;
@@ -242,6 +245,7 @@ struct OeMode::State {
   double last_time_s = 0;
   FrameMotion<double> last_motion;
   Matrix6 last_covariance = Matrix6::Zero();
+  Sensitivity<6> last_sensitivity = Sensitivity<6>::Zero();
 };
 
 OeMode::State::State(const OeOptions& o)
@@ -375,7 +379,8 @@ void OeMode::State::take(const MapState& from) {
   const bool bend_known =
       is_covariance(from.bend_covariance[0]) && is_covariance(from.bend_covariance[1]);
   if (!ready || !bend_known || !std::isfinite(from.bend_tilt) ||
-      !all_finite(from.offset.vector()) || !is_covariance(from.offset_covariance)) {
+      !all_finite(from.offset.vector()) || !is_covariance(from.offset_covariance) ||
+      !all_finite(from.offset_sensitivity)) {
     return;
   }
   for (const Landmark& landmark : from.landmarks) {
@@ -390,7 +395,7 @@ void OeMode::State::take(const MapState& from) {
     known.seen = landmark.statistics.seen;
   }
   if (map.size() == 0) return;
-  offset = {from.offset.vector(), symmetric(from.offset_covariance)};
+  offset = {from.offset.vector(), symmetric(from.offset_covariance), from.offset_sensitivity};
   bend_covariance = from.bend_covariance;
   bend_tilt = from.bend_tilt;
 }
@@ -403,6 +408,7 @@ MapState OeMode::State::map_state() const {
   }
   out.offset = {offset.value.x(), offset.value.y()};
   out.offset_covariance = offset.covariance;
+  out.offset_sensitivity = offset.sensitivity;
   out.bend_covariance = bend_covariance;
   out.bend_tilt = bend_tilt;
   return out;
@@ -537,7 +543,8 @@ void OeMode::State::align_fine(const ViewProjection& view) {
     const Visible& wanted = chosen[static_cast<std::size_t>(i)];
     const Landmark& landmark = map.at(wanted.slot);
     SeenDirection seen;
-    if (!view.project(landmark.d, &seen)) continue;
+    Sensitivity<2> J_parameters;
+    if (!view.project(landmark.d, &seen, &J_parameters)) continue;
     const ReferencePatch* patch = reference(wanted.slot, seen);
     if (patch == nullptr) continue;
     const double to_octave = std::ldexp(1.0, -wanted.octave);
@@ -556,6 +563,7 @@ void OeMode::State::align_fine(const ViewProjection& view) {
     alignment_covariance[at] = alignment.covariance / (to_octave * to_octave);
     f.covariance = alignment_covariance[at] + J * landmark.covariance * J.transpose();
     f.shared_covariance = landmark.shared_covariance;
+    f.sensitivity = -J_parameters - J * landmark.sensitivity.cast<double>();
     J_tangent[at] = J;
     OeObservation& observation = observations[at];
     observation.slot = wanted.slot;
@@ -630,6 +638,9 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
     Vector4<double> scale;
     scale << to_true, to_true;
     prior.has_telemetry = true;
+    motion_sensitivity = telemetry_sensitivity(mechanics, motion);
+    motion_sensitivity.topRows<2>() -= offset.sensitivity;
+    prior.telemetry_sensitivity = motion_sensitivity.topRows<4>();
     prior.telemetry_covariance = scale.asDiagonal() * telemetry->covariance * scale.asDiagonal();
     angle_covariance = prior.telemetry_covariance.topLeftCorner<2, 2>() + offset.covariance;
     motion_covariance.setZero();
@@ -647,6 +658,10 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
     FrameMotion<double> steady = last_motion;
     steady.acceleration = {};
     motion = carried_on(steady, since_last_s);
+    motion_sensitivity << last_sensitivity.topRows<2>() +
+                              since_last_s * last_sensitivity.middleRows<2>(2),
+        last_sensitivity.middleRows<2>(2), Sensitivity<2>::Zero();
+    prior.motion_sensitivity = motion_sensitivity;
     Matrix4<double> carry = Matrix4<double>::Identity();
     carry.topRightCorner<2, 2>().diagonal().setConstant(since_last_s);
     Matrix<double, 4, 2> push;
@@ -717,9 +732,9 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   }
   if (status == SolveStatus::kOk && telemetry != nullptr && telemetry->extrapolated) {
     move_bend(motion.angle.tilt + solved.correction[1]);
-    remember_untold(motion.angle.vector() + solved.correction.head<2>(),
-                    solved.frame_covariance.topLeftCorner<2, 2>() + bend_of_angles(),
-                    solved.shared_covariance);
+    remember_untold(
+        motion.angle.vector() + solved.correction.head<2>(), solved.sensitivity.topRows<2>(),
+        solved.frame_covariance.topLeftCorner<2, 2>() + bend_of_angles(), solved.shared_covariance);
   }
   // Until telemetry that belongs to a frame says otherwise.
   if (status == SolveStatus::kOk && late_contradiction && !told) {
@@ -740,7 +755,7 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
     MotionCovariance covering = out->motion_covariance;
     covering.topLeftCorner<2, 2>() += solved.innovation * solved.innovation.transpose();
     return finish(make_frame_orientation(calibration, frame_time_s, OrientationMode::kPt, 0,
-                                         out->motion(), covering, out)
+                                         out->motion(), covering, out->motion_sensitivity, out)
                       ? OeStatus::kContradiction
                       : OeStatus::kNotFinite);
   }
@@ -755,6 +770,7 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   motion.acceleration = {motion.acceleration.pan + solved.correction[4],
                          motion.acceleration.tilt + solved.correction[5]};
   motion_covariance = solved.frame_covariance;
+  motion_sensitivity = solved.sensitivity;
   shared_covariance = solved.shared_covariance;
   inflation = solved.inflation;
   Matrix6 covariance = solved.covariance;
@@ -763,14 +779,17 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   FrameMotion<double> in_base = motion;
   const Vector2<double> total = offset.value + solved.offset_correction;
   in_base.angle = {motion.angle.pan + total.x(), motion.angle.tilt + total.y()};
+  Sensitivity<6> sensitivity = motion_sensitivity;
+  sensitivity.topRows<2>() += offset.sensitivity + solved.offset_correction_sensitivity;
   if (!make_frame_orientation(calibration, frame_time_s, OrientationMode::kOe, solved.inliers,
-                              in_base, covariance, out)) {
+                              in_base, covariance, sensitivity, out)) {
     return finish(telemetry != nullptr ? OeStatus::kTooFew : OeStatus::kNoPrediction);
   }
   if (told) {
     // What contradicts is not here any more: see solve_orientation().
-    static_cast<void>(learn_offset(frame_time_s, solved.innovation, solved.innovation_covariance,
-                                   shared_covariance));
+    static_cast<void>(learn_offset(
+        frame_time_s, solved.innovation, solved.innovation_covariance, shared_covariance,
+        prior.telemetry_sensitivity.topRows<2>() - motion_sensitivity.topRows<2>()));
   }
   answered_time_s = frame_time_s;
   statistics.map_offset = {offset.value.x(), offset.value.y()};
@@ -781,6 +800,7 @@ OeStatus OeMode::State::process(const ImageView& new_image, double frame_time_s,
   last_time_s = frame_time_s;
   last_motion = motion;
   last_covariance = motion_covariance;
+  last_sensitivity = motion_sensitivity;
   last_covariance.topLeftCorner<2, 2>() += shared_covariance;
   return finish(OeStatus::kOk);
 }
@@ -843,18 +863,21 @@ Matrix2<double> OeMode::State::bend_of_angles() const {
 }
 
 bool OeMode::State::learn_offset(double frame_time_s, const Vector2<double>& innovation,
-                                 const Matrix2<double>& covariance, const Matrix2<double>& shared) {
+                                 const Matrix2<double>& covariance, const Matrix2<double>& shared,
+                                 const Sensitivity<2>& sensitivity) {
   const double dilution = diluted(kSharedRenewal, frame_time_s - told_time_s);
-  if (!offset.learn(innovation, covariance + dilution * shared, SolveLimits{}.max_contradiction)) {
+  if (!offset.learn(innovation, covariance + dilution * shared, sensitivity,
+                    SolveLimits{}.max_contradiction)) {
     return false;
   }
   told_time_s = frame_time_s;
   return true;
 }
 
-void OeMode::State::remember_untold(const Vector2<double>& angle, const Matrix2<double>& covariance,
+void OeMode::State::remember_untold(const Vector2<double>& angle, const Sensitivity<2>& sensitivity,
+                                    const Matrix2<double>& covariance,
                                     const Matrix2<double>& shared) {
-  untold[next_untold] = {now_s, angle, covariance, shared};
+  untold[next_untold] = {now_s, angle, sensitivity, covariance, shared};
   next_untold = (next_untold + 1) % untold.size();
 }
 
@@ -867,13 +890,19 @@ void OeMode::State::add_late_telemetry(double frame_time_s, const InterpolatedPa
   const Vector2<double> to_true(1 / mechanics.pan_scale, 1 / mechanics.tilt_scale);
   const Matrix2<double> covariance =
       to_true.asDiagonal() * telemetry.covariance.topLeftCorner<2, 2>() * to_true.asDiagonal();
+  const FrameMotion<double> told_motion{true_from_measured(mechanics, telemetry.angle),
+                                        true_from_measured(mechanics, telemetry.rate),
+                                        0.5 * calibration.camera.height};
   const Vector2<double> innovation = minus(
-      true_from_measured(mechanics, telemetry.angle),
+      told_motion.angle,
       PanTilt<double>{frame->angle.x() + offset.value.x(), frame->angle.y() + offset.value.y()});
+  const Sensitivity<2> sensitivity = telemetry_sensitivity(mechanics, told_motion).topRows<2>() -
+                                     frame->sensitivity - offset.sensitivity;
   const double dilution = diluted(telemetry.renewal_s, frame_time_s - told_time_s);
   if (all_finite(innovation) && all_finite(covariance)) {
-    late_contradiction = !learn_offset(frame_time_s, innovation,
-                                       frame->covariance + dilution * covariance, frame->shared);
+    late_contradiction =
+        !learn_offset(frame_time_s, innovation, frame->covariance + dilution * covariance,
+                      frame->shared, sensitivity);
   }
   frame->time_s = kNever;
 }
@@ -1074,6 +1103,9 @@ void OeMode::State::refine_landmarks() {
           symmetric<2>((Matrix2<double>::Identity() - gain) * landmark.covariance) +
           kLeast * measured;
       if (all_finite(change) && all_finite(covariance)) {
+        const Sensitivity<2> left =
+            f.sensitivity - f.J_angle * angle_at(motion_sensitivity, f.time_s);
+        map.sensitivity(slot) += (gain * (to_tangent * left)).cast<float>();
         map.refine(slot, direction_plus<double>(landmark.d, change), covariance);
       }
     }
@@ -1094,8 +1126,11 @@ bool OeMode::State::make_landmark(const FastCorner& corner, int octave) {
   const Vector2<double> u(to_image * (corner.u + 0.5), to_image * (corner.v + 0.5));
   Landmark landmark;
   Matrix<double, 3, 2> J_d_u;
+  Matrix<double, 3, 4> J_d_motion;
+  Sensitivity<3> J_d_parameters;
   if (rolling_shutter_unproject(calibration.camera, calibration.mechanics, calibration.line_delay,
-                                motion, u, &landmark.d, &J_d_u) != ProjectionStatus::kOk ||
+                                motion, u, &landmark.d, &J_d_u, &J_d_motion,
+                                &J_d_parameters) != ProjectionStatus::kOk ||
       map.cell_taken(landmark.d, octave)) {
     return false;
   }
@@ -1109,7 +1144,10 @@ bool OeMode::State::make_landmark(const FastCorner& corner, int octave) {
     return false;
   }
   landmark.octave = static_cast<std::uint8_t>(octave);
-  const Matrix2<double> J_tangent_u = tangent_basis(landmark.d).transpose() * J_d_u;
+  const Matrix<double, 2, 3> to_tangent = tangent_basis(landmark.d).transpose();
+  const Matrix2<double> J_tangent_u = to_tangent * J_d_u;
+  landmark.sensitivity =
+      (to_tangent * (J_d_parameters + J_d_motion * motion_sensitivity.topRows<4>())).cast<float>();
   landmark.J_pixel_tangent = J_tangent_u.inverse() / to_image;
   // Where its point lies is exact; what makes it find itself elsewhere is the picture's noise.
   const Matrix2<double> J_tangent_pixel = to_image * J_tangent_u;
@@ -1214,12 +1252,15 @@ void OeMode::State::maintain() {
   if (map.size() == 0) {
     // The map's frame is what telemetry says now.
     motion.angle = {motion.angle.pan + offset.value.x(), motion.angle.tilt + offset.value.y()};
-    offset = {Vector2<double>::Zero(), motion_covariance.topLeftCorner<2, 2>()};
+    motion_sensitivity.topRows<2>() += offset.sensitivity;
+    offset = {Vector2<double>::Zero(), motion_covariance.topLeftCorner<2, 2>(),
+              Sensitivity<2>::Zero()};
     answered_time_s = now_s;
     if (told) {
       told_time_s = now_s;
     } else {
-      remember_untold(motion.angle.vector(), Matrix2<double>::Zero(), Matrix2<double>::Zero());
+      remember_untold(motion.angle.vector(), motion_sensitivity.topRows<2>(),
+                      Matrix2<double>::Zero(), Matrix2<double>::Zero());
     }
     motion_covariance.topLeftCorner<2, 2>().setZero();
     shared_covariance.setZero();

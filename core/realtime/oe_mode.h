@@ -13,6 +13,8 @@
 // One estimator for OE and PT: without landmarks the solution is telemetry's, with its covariance. Where
 // landmarks contradict telemetry beyond what both claim, the answer is telemetry's with a covariance
 // that covers both, and the mode is PT.
+// How map, offset and answer follow the calibration they were found with is carried along (Sensitivity),
+// and what its covariance makes of that is in the answer's.
 // The map begins empty, in the frame that the first telemetry gave it, or as another OeMode left it. Its
 // offset from the base frame (pan, tilt) is estimated from all telemetry since.
 // What was handed over is believed as far as pictures bear it out: a map that telemetry contradicts is

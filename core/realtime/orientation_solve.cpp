@@ -78,6 +78,23 @@ class Problem {
     *b << c[0], c[1], c[2] / 2;
   }
 
+  // The right-hand side of normal_equations(), of sensitivities in place of residuals, inliers only.
+  [[nodiscard]] Sensitivity<6> right_of_sensitivities() const {
+    std::array<Sensitivity<2>, 3> c;
+    for (Sensitivity<2>& m : c) m.setZero();
+    for (int i = 0; i < count_; ++i) {
+      if (!landmarks_[i].inlier) continue;
+      const Term& term = terms_[static_cast<std::size_t>(i)];
+      const Sensitivity<2> v = term.JtW * landmarks_[i].sensitivity;
+      c[0] += v;
+      c[1] += term.t * v;
+      c[2] += (0.5 * term.t * term.t) * v;
+    }
+    Sensitivity<6> right;
+    right << c[0], c[1], c[2];
+    return right;
+  }
+
   [[nodiscard]] Vector2<double> left(int i, const Vector6& x) const {
     const double t = terms_[static_cast<std::size_t>(i)].t;
     return landmarks_[i].residual - landmarks_[i].J_angle * angle_at(x, t);
@@ -203,11 +220,13 @@ double neighbours_inflation(const Problem& problem, const FoundLandmark* landmar
 }  // namespace
 
 bool MapOffset::learn(const Vector2<double>& innovation,
-                      const Matrix2<double>& innovation_covariance, double max_chi_square) {
+                      const Matrix2<double>& innovation_covariance,
+                      const Sensitivity<2>& innovation_sensitivity, double max_chi_square) {
   const Matrix2<double> information = inverse_of(innovation_covariance + covariance);
   if (!(innovation.dot(information * innovation) < max_chi_square)) return false;
   const Matrix2<double> gain = covariance * information;
   value += gain * innovation;
+  sensitivity += gain * innovation_sensitivity;
   covariance = (covariance - gain * covariance).eval();
   covariance = symmetric(covariance);
   return true;
@@ -279,6 +298,10 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   shared /= total;
   const Matrix2<double> prior_offset = prior.offset_covariance + shared;
 
+  const Sensitivity<6> right_of_sensitivities =
+      problem.right_of_sensitivities() / inflation +
+      scaled.motion_information * (D.asDiagonal() * prior.motion_sensitivity);
+  Sensitivity<8> sensitivity = Sensitivity<8>::Zero();
   Vector8 solution = Vector8::Zero();
   Matrix8 posterior = Matrix8::Zero();
   out->contradiction = 0;
@@ -311,8 +334,14 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
     const Eigen::LDLT<Matrix8> factor(all);
     solution = factor.solve(right);
     posterior = factor.solve(Matrix8::Identity());
+    const Vector4<double> D4(1, 1, unit_s, unit_s);
+    sensitivity.topRows<6>() = right_of_sensitivities;
+    sensitivity += H.transpose() *
+                   (scaled.telemetry_information * (D4.asDiagonal() * prior.telemetry_sensitivity));
+    sensitivity = (posterior * sensitivity).eval();
   } else {
     solution.head<6>() = x;
+    sensitivity.topRows<6>() = covariance * right_of_sensitivities;
     posterior.topLeftCorner<6, 6>() = covariance;
     posterior.bottomRightCorner<2, 2>() = prior_offset;
   }
@@ -327,6 +356,8 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   out->covariance = to_base * posterior * to_base.transpose();
   out->correction = unscale.cwiseProduct(solution.head<6>());
   out->offset_correction = solution.tail<2>();
+  out->sensitivity = unscale.asDiagonal() * sensitivity.topRows<6>();
+  out->offset_correction_sensitivity = sensitivity.bottomRows<2>();
   out->inliers = inliers;
   out->inflation = inflation;
   for (int i = 0; i < count; ++i) {

@@ -12,11 +12,14 @@
 // Covariance: of the linear problem, times how much larger the residuals are than claimed, one by one
 // and averaged over neighbours (a tenth of the image), which finds errors that neighbours share; plus the
 // shared covariance of the landmarks themselves, averaged with their weights.
+// The calibration is taken as exact; how the solution depends on it follows from how the residuals and the
+// prior do (Sensitivity): the linear problem once more, with these on the right-hand side.
 // Pure functions; no allocation.
 
 #include <array>
 
 #include "core/model/angle.h"
+#include "core/model/calibration.h"
 #include "core/model/linear_algebra.h"
 
 namespace alidade {
@@ -24,9 +27,11 @@ namespace alidade {
 using Vector6 = Matrix<double, 6, 1>;
 using Matrix6 = Matrix<double, 6, 6>;
 
-// x is (angle, rate, acceleration) of pan and tilt.
-[[nodiscard]] inline Vector2<double> angle_at(const Vector6& x, double t) {
-  return x.head<2>() + t * x.segment<2>(2) + (0.5 * t * t) * x.tail<2>();
+// x is (angle, rate, acceleration) of pan and tilt, or their changes, a column each.
+template <int kColumns>
+[[nodiscard]] Matrix<double, 2, kColumns> angle_at(const Matrix<double, 6, kColumns>& x, double t) {
+  return x.template topRows<2>() + t * x.template middleRows<2>(2) +
+         (0.5 * t * t) * x.template bottomRows<2>();
 }
 
 // Without what rounding makes of a covariance.
@@ -42,9 +47,10 @@ struct FoundLandmark {
   Matrix2<double> J_angle;     // px/rad, see SeenDirection
   double time_s;               // of its row, after the reference row
   Matrix2<double> covariance;  // px^2, of the residual by noise and by the landmark's own direction
-  Matrix2<double> shared_covariance;  // rad^2, of (pan, tilt), see Landmark
-  double normalised_square = 0;       // out: residual after the solution, by covariance
-  bool inlier = false;                // out
+  Matrix2<double> shared_covariance;                    // rad^2, of (pan, tilt), see Landmark
+  Sensitivity<2> sensitivity = Sensitivity<2>::Zero();  // px/unit, of the residual
+  double normalised_square = 0;  // out: residual after the solution, by covariance
+  bool inlier = false;           // out
 };
 
 // What is known without landmarks, relative to the motion the residuals were predicted with.
@@ -53,11 +59,13 @@ struct MotionPrior {
   Vector4<double> telemetry =
       Vector4<double>::Zero();  // measured minus (predicted + offset), true units
   Matrix4<double> telemetry_covariance = Matrix4<double>::Zero();
+  Sensitivity<4> telemetry_sensitivity = Sensitivity<4>::Zero();
   // Of g, before this frame, rad^2.
   Matrix2<double> offset_covariance = Matrix2<double>::Zero();
   // Of (angle, rate) from the frames before, and of acceleration; information, as some know nothing.
   Vector6 motion = Vector6::Zero();  // expected minus predicted
   Matrix6 motion_information = Matrix6::Zero();
+  Sensitivity<6> motion_sensitivity = Sensitivity<6>::Zero();
 };
 
 enum class SolveStatus {
@@ -74,6 +82,8 @@ struct SolvedMotion {
   Matrix6 covariance = Matrix6::Zero();        // of x + g (base)
   Matrix6 frame_covariance = Matrix6::Zero();  // of x (map), by this frame's noise alone
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();  // of angles, by the landmarks used
+  Sensitivity<6> sensitivity = Sensitivity<6>::Zero();          // of correction
+  Sensitivity<2> offset_correction_sensitivity = Sensitivity<2>::Zero();  // of offset_correction
   int inliers = 0;
   double inflation = 1;      // of the landmarks' covariances
   double contradiction = 0;  // chi-square, 2 degrees of freedom, of landmarks against telemetry
@@ -96,9 +106,11 @@ struct SolveLimits {
 struct MapOffset {
   Vector2<double> value = Vector2<double>::Zero();
   Matrix2<double> covariance = Matrix2<double>::Zero();
+  Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
 
   [[nodiscard]] bool learn(const Vector2<double>& innovation,
-                           const Matrix2<double>& innovation_covariance, double max_chi_square);
+                           const Matrix2<double>& innovation_covariance,
+                           const Sensitivity<2>& innovation_sensitivity, double max_chi_square);
 };
 
 // width, height: px, of the image; half_readout_s: scale of the rows' times.

@@ -22,7 +22,7 @@ bool pt_orientation(const Calibration& calibration, double frame_time_s,
                                    true_from_measured(mechanics, at_middle_row.rate),
                                    0.5 * calibration.camera.height};
   return make_frame_orientation(calibration, frame_time_s, OrientationMode::kPt, 0, motion,
-                                covariance, out);
+                                covariance, telemetry_sensitivity(mechanics, motion), out);
 }
 
 }  // namespace alidade

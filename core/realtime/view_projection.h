@@ -33,7 +33,8 @@ class ViewProjection {
         motion_(motion),
         middle_row_(0.5 * calibration.camera.height) {
     const auto R_at = [&](double row, Matrix<double, 3, 2>* J) -> Matrix3<double> {
-      return R_base_from_camera(calibration.mechanics, angle_at_row(motion, line_delay_, row), J)
+      return R_base_from_camera(calibration.mechanics, angle_at_row(motion, line_delay_, row), J,
+                                J != nullptr ? &J_xi_axes_ : nullptr)
           .transpose();
     };
     const Matrix3<double> first = R_at(0, nullptr);
@@ -59,14 +60,21 @@ class ViewProjection {
            ProjectionStatus::kOk;
   }
 
-  [[nodiscard]] bool project(const Vector3<double>& d, SeenDirection* out) const {
+  // J_parameters: d u / d Parameter for this motion about its reference row.
+  [[nodiscard]] bool project(const Vector3<double>& d, SeenDirection* out,
+                             Sensitivity<2>* J_parameters = nullptr) const {
     Path path;
     if (!find(d, &path, &out->u)) return false;
     const double s = parameter(out->u.y());
     const Vector3<double> d_c = path.at(s);
     Vector2<double> u;
     Matrix<double, 2, 3> J_u_dc;
-    if (alidade::project(camera_, d_c, &u, &J_u_dc) != ProjectionStatus::kOk) return false;
+    Matrix<double, 2, 3> J_u_camera;
+    if (alidade::project(camera_, d_c, &u, &J_u_dc,
+                         J_parameters != nullptr ? &J_u_camera : nullptr) !=
+        ProjectionStatus::kOk) {
+      return false;
+    }
     out->time_s = time_of_row(motion_, line_delay_, out->u.y());
     const Vector2<double> J_u_row = J_u_dc * path.slope(s) / middle_row_;
     // The row follows the pixel: see rolling_shutter_project().
@@ -77,6 +85,13 @@ class ViewProjection {
     out->J_angle.col(0) = J_u * d_c.cross(J_xi_angle_.col(0));
     out->J_angle.col(1) = J_u * d_c.cross(J_xi_angle_.col(1));
     out->J_d = J_u * (R_[0] + s * (R_[1] + s * R_[2]));
+    if (J_parameters == nullptr) return true;
+    J_parameters->setZero();
+    J_parameters->leftCols<3>() = J_u_fixed * J_u_camera;
+    const PanTilt<double> rate = rate_at_row(motion_, line_delay_, out->u.y());
+    J_parameters->col(index(Parameter::kLineDelay)) =
+        (out->u.y() - motion_.reference_row) * (out->J_angle * rate.vector());
+    J_parameters->middleCols<4>(index(Parameter::kPanAxis0)) = J_u * skew(d_c) * J_xi_axes_;
     return true;
   }
 
@@ -126,6 +141,7 @@ class ViewProjection {
   double middle_row_;
   Matrix3<double> R_[3];  // camera from base: R_[0] + s R_[1] + s^2 R_[2], s from -1 to 1
   Matrix<double, 3, 2> J_xi_angle_;
+  Matrix<double, 3, 4> J_xi_axes_;
 };
 
 }  // namespace alidade

@@ -23,11 +23,11 @@ static_assert(std::numeric_limits<double>::is_iec559 && sizeof(double) == sizeof
 
 constexpr char kMagic[] = "ALIDMAP\n";
 constexpr std::size_t kMagicSize = sizeof kMagic - 1;
-constexpr std::uint32_t kVersion = 2;
+constexpr std::uint32_t kVersion = 3;
 constexpr std::size_t kVersionEnd = 12;
-constexpr std::size_t kHeaderSize = 176;
+constexpr std::size_t kHeaderSize = 352;
 constexpr std::size_t kPointSize = 60;
-constexpr std::size_t kLandmarkSize = 376;
+constexpr std::size_t kLandmarkSize = 464;
 constexpr std::size_t kChecksumSize = 4;
 
 class Writer {
@@ -53,6 +53,12 @@ class Writer {
     for (int i = 0; i < kSize; ++i) {
       for (int j = i; j < kSize; ++j) f64(m(i, j));
     }
+  }
+  void sensitivity(const Sensitivity<2>& m) {
+    for (int i = 0; i < m.size(); ++i) f64(m(i / kParameterCount, i % kParameterCount));
+  }
+  void sensitivity(const LandmarkSensitivity& m) {
+    for (int i = 0; i < m.size(); ++i) f32(m(i / kParameterCount, i % kParameterCount));
   }
   [[nodiscard]] const std::string& bytes() const { return bytes_; }
 
@@ -91,6 +97,12 @@ class Cursor {
     for (int i = 0; i < kSize; ++i) {
       for (int j = i; j < kSize; ++j) (*m)(i, j) = (*m)(j, i) = f64();
     }
+  }
+  void sensitivity(Sensitivity<2>* m) {
+    for (int i = 0; i < m->size(); ++i) (*m)(i / kParameterCount, i % kParameterCount) = f64();
+  }
+  void sensitivity(LandmarkSensitivity* m) {
+    for (int i = 0; i < m->size(); ++i) (*m)(i / kParameterCount, i % kParameterCount) = f32();
   }
 
  private:
@@ -150,8 +162,8 @@ const char* flaw_of(const CalibrationLandmark& point) {
 const char* flaw_of(const Landmark& landmark) {
   const LandmarkStatistics& statistics = landmark.statistics;
   if (!landmark.d.allFinite() || !landmark.covariance.allFinite() ||
-      !landmark.shared_covariance.allFinite() || !landmark.J_pixel_tangent.allFinite() ||
-      !std::isfinite(statistics.residual_square)) {
+      !landmark.shared_covariance.allFinite() || !landmark.sensitivity.allFinite() ||
+      !landmark.J_pixel_tangent.allFinite() || !std::isfinite(statistics.residual_square)) {
     return kNotFinite;
   }
   if (landmark.octave >= LandmarkMap::kMaxOctaves) return "has an octave that there is not";
@@ -169,8 +181,8 @@ const char* flaw_of(const Landmark& landmark) {
 
 const char* flaw_of(const MapState& map) {
   const bool finite = map.offset.vector().allFinite() && map.offset_covariance.allFinite() &&
-                      map.bend_covariance[0].allFinite() && map.bend_covariance[1].allFinite() &&
-                      std::isfinite(map.bend_tilt);
+                      map.offset_sensitivity.allFinite() && map.bend_covariance[0].allFinite() &&
+                      map.bend_covariance[1].allFinite() && std::isfinite(map.bend_tilt);
   if (!finite) return kNotFinite;
   if (!is_positive(map.offset_covariance) || !is_positive(map.bend_covariance[0]) ||
       !is_positive(map.bend_covariance[1])) {
@@ -198,6 +210,7 @@ void write(const Landmark& landmark, Writer* out) {
   out->vector(landmark.d);
   out->symmetric(landmark.covariance);
   out->symmetric(landmark.shared_covariance);
+  out->sensitivity(landmark.sensitivity);
   for (int i = 0; i < 4; ++i) out->f64(landmark.J_pixel_tangent(i / 2, i % 2));
   for (const std::uint8_t pixel : landmark.pixels) {
     const char byte = static_cast<char>(pixel);
@@ -214,6 +227,7 @@ void read(Cursor* in, Landmark* landmark) {
   in->vector(&landmark->d);
   in->symmetric(&landmark->covariance);
   in->symmetric(&landmark->shared_covariance);
+  in->sensitivity(&landmark->sensitivity);
   for (int i = 0; i < 4; ++i) landmark->J_pixel_tangent(i / 2, i % 2) = in->f64();
   for (std::uint8_t& pixel : landmark->pixels) pixel = in->u8();
   landmark->statistics.seen = in->u32();
@@ -250,6 +264,7 @@ std::string format_map(const MapContent& content, const Calibration& calibration
   out.symmetric(map.offset_covariance);
   for (const Matrix3<double>& bend : map.bend_covariance) out.symmetric(bend);
   out.f64(map.bend_tilt);
+  out.sensitivity(map.offset_sensitivity);
   for (const CalibrationLandmark& point : content.points) write(point, &out);
   for (const Landmark& landmark : map.landmarks) write(landmark, &out);
   out.u32(checksum(out.bytes(), out.bytes().size()));
@@ -298,6 +313,7 @@ bool parse_map(const std::string& bytes, const std::string& name, const Calibrat
   in.symmetric(&map.offset_covariance);
   for (Matrix3<double>& bend : map.bend_covariance) in.symmetric(&bend);
   map.bend_tilt = in.f64();
+  in.sensitivity(&map.offset_sensitivity);
   std::string flaw = flaw_of(map);
   if (!flaw.empty()) return refuse("its frame " + flaw);
   found.points.resize(static_cast<std::size_t>(points));

@@ -7,7 +7,7 @@
 //            sigma as the calibration used it, ratio of the residuals to it, tau = 1 + 2 sum of the residuals'
 //            autocorrelations: samples whose errors repeat each other count as one. The 2 is for safety.
 //   bend     how far the trajectory's rates and accelerations may be wrong
-// The calibration is taken as exact, as everywhere in OE mode. Angles rad, times s on the image clock.
+// Angles rad, times s on the image clock.
 // Pure; allocates; some 10 ms a keyframe. Not for the real-time thread.
 
 #include <vector>

@@ -18,9 +18,9 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
-constexpr std::size_t kHeaderSize = 176;
+constexpr std::size_t kHeaderSize = 352;
 constexpr std::size_t kPointSize = 60;
-constexpr std::size_t kLandmarkSize = 376;
+constexpr std::size_t kLandmarkSize = 464;
 constexpr std::size_t kChecksumSize = 4;
 constexpr std::size_t kPoints = 16;     // where their number stands
 constexpr std::size_t kLandmarks = 24;  // likewise
@@ -70,6 +70,9 @@ MapContent some_content(int points, int landmarks) {
     landmark.d = random.direction();
     landmark.covariance = random.covariance<2>(1e-10);
     landmark.shared_covariance = random.covariance<2>(1e-10);
+    for (int j = 0; j < landmark.sensitivity.size(); ++j) {
+      landmark.sensitivity(j) = static_cast<float>(random.normal());
+    }
     landmark.J_pixel_tangent << 4000 + random.normal(), random.normal(), random.normal(), 4000;
     for (std::uint8_t& pixel : landmark.pixels) pixel = static_cast<std::uint8_t>(random.byte());
     landmark.statistics.seen = 10 + static_cast<std::uint32_t>(i);
@@ -81,6 +84,9 @@ MapContent some_content(int points, int landmarks) {
   map.offset_covariance = random.covariance<2>(1e-12);
   for (Matrix3<double>& bend : map.bend_covariance) bend = random.covariance<3>(1e-8);
   map.bend_tilt = -0.1 / 3;
+  for (int i = 0; i < map.offset_sensitivity.size(); ++i) {
+    map.offset_sensitivity(i) = random.normal();
+  }
   return content;
 }
 
@@ -112,6 +118,7 @@ TEST(MapFile, ReadsBackTheSameBits) {
   EXPECT_EQ(map.bend_covariance[0], written.map.bend_covariance[0]);
   EXPECT_EQ(map.bend_covariance[1], written.map.bend_covariance[1]);
   EXPECT_EQ(map.bend_tilt, written.map.bend_tilt);
+  EXPECT_EQ(map.offset_sensitivity, written.map.offset_sensitivity);
   ASSERT_EQ(map.landmarks.size(), written.map.landmarks.size());
   for (std::size_t i = 0; i < map.landmarks.size(); ++i) {
     const Landmark& is = map.landmarks[i];
@@ -120,6 +127,7 @@ TEST(MapFile, ReadsBackTheSameBits) {
     EXPECT_EQ(is.d, was.d);
     EXPECT_EQ(is.covariance, was.covariance);
     EXPECT_EQ(is.shared_covariance, was.shared_covariance);
+    EXPECT_EQ(is.sensitivity, was.sensitivity);
     EXPECT_EQ(is.J_pixel_tangent, was.J_pixel_tangent);
     EXPECT_EQ(is.pixels, was.pixels);
     EXPECT_EQ(is.statistics.seen, was.statistics.seen);
@@ -139,7 +147,7 @@ TEST(MapFile, HoldsNothingToo) {
 
 TEST(MapFile, IsLittleEndianWithItsVersionFirst) {
   const std::string bytes = some_bytes(3, 2);
-  EXPECT_EQ(bytes.substr(0, 12), std::string("ALIDMAP\n\2\0\0\0", 12));
+  EXPECT_EQ(bytes.substr(0, 12), std::string("ALIDMAP\n\3\0\0\0", 12));
   EXPECT_EQ(bytes.substr(kPoints, 8), std::string("\3\0\0\0\0\0\0\0", 8));
   EXPECT_EQ(bytes.substr(kLandmarks, 8), std::string("\2\0\0\0\0\0\0\0", 8));
 }
@@ -195,13 +203,13 @@ TEST(MapFile, SaysWhichVersionItCannotRead) {
   std::string bytes = some_bytes(1, 0);
   MapContent read;
   std::string error;
-  for (const char version : {'\1', '\3'}) {
+  for (const char version : {'\2', '\4'}) {
     bytes[8] = version;
     // Others are of another length.
     for (const std::size_t size : {bytes.size(), std::size_t{28}}) {
       EXPECT_FALSE(parse(bytes.substr(0, size), &read, &error));
       EXPECT_EQ(error, "map.bin: map of version " + std::to_string(int{version}) +
-                           ", this program reads version 2; calibrate again");
+                           ", this program reads version 3; calibrate again");
     }
   }
 }
@@ -263,6 +271,8 @@ TEST(MapFile, RefusesLandmarksThatMakeNoSense) {
                  "not positive");
   expect_refused([](MapContent* c) { c->map.landmarks[1].shared_covariance(0, 1) = kNan; },
                  "not finite");
+  expect_refused([](MapContent* c) { c->map.landmarks[1].sensitivity(0, 3) = HUGE_VALF; },
+                 "not finite");
   expect_refused([](MapContent* c) { c->map.landmarks[1].J_pixel_tangent.setOnes(); }, "no extent");
   expect_refused([](MapContent* c) { c->map.landmarks[1].J_pixel_tangent(1, 0) = HUGE_VAL; },
                  "not finite");
@@ -277,6 +287,7 @@ TEST(MapFile, RefusesAFrameThatMakesNoSense) {
   expect_refused([](MapContent* c) { c->map.offset.tilt = kNan; }, "its frame has a number");
   expect_refused([](MapContent* c) { c->map.offset_covariance(0, 0) = -1; }, "not positive");
   expect_refused([](MapContent* c) { c->map.bend_tilt = HUGE_VAL; }, "not finite");
+  expect_refused([](MapContent* c) { c->map.offset_sensitivity(1, 10) = kNan; }, "not finite");
   expect_refused([](MapContent* c) { c->map.bend_covariance[0](0, 2) = kNan; }, "not finite");
   expect_refused([](MapContent* c) { c->map.bend_covariance[1](1, 2) = 1; }, "not positive");
   // Each two of the three may be so, but not all three.

@@ -8,6 +8,7 @@
 
 #include "test/support/hard_values.h"
 #include "test/support/numeric_jacobian.h"
+#include "test/support/parameter_changes.h"
 
 namespace alidade {
 namespace {
@@ -23,7 +24,7 @@ using test::pixel_grid;
 using Vec2 = Vector2<double>;
 using Vec3 = Vector3<double>;
 using Vec4 = Vector4<double>;
-using ParameterVector = Matrix<double, kParameterCount, 1>;
+using test::ParameterVector;
 
 // Everything that rolling_shutter_*() takes besides the pixel or the direction.
 struct Setting {
@@ -43,31 +44,12 @@ struct Setting {
 
   // The scales and the clock offset change nothing while the true motion is held.
   [[nodiscard]] Setting plus_parameters(const ParameterVector& e) const {
-    Setting changed = *this;
-    changed.camera.focal_length += e[index(Parameter::kFocalLength)];
-    changed.camera.aspect += e[index(Parameter::kAspect)];
-    changed.camera.radial_distortion += e[index(Parameter::kRadialDistortion)];
-    changed.line_delay += e[index(Parameter::kLineDelay)];
-    changed.mechanics.pan_axis =
-        direction_plus<double>(mechanics.pan_axis, e.segment<2>(index(Parameter::kPanAxis0)));
-    changed.mechanics.tilt_axis =
-        direction_plus<double>(mechanics.tilt_axis, e.segment<2>(index(Parameter::kTiltAxis0)));
-    changed.mechanics.pan_scale += e[index(Parameter::kPanScale)];
-    changed.mechanics.tilt_scale += e[index(Parameter::kTiltScale)];
-    return changed;
-  }
-
-  // Steps of each parameter that move the image by about a pixel.
-  [[nodiscard]] ParameterVector parameter_steps() const {
-    const double pixel = 1 / camera.focal_length;
-    ParameterVector steps = ParameterVector::Constant(pixel);
-    steps[index(Parameter::kFocalLength)] = 1;
-    steps[index(Parameter::kAspect)] = 1e-3;
-    steps[index(Parameter::kRadialDistortion)] =
-        1e-3 * std::max(1.0, std::abs(camera.radial_distortion));
-    steps[index(Parameter::kLineDelay)] = 1e-7;
-    steps[index(Parameter::kClockOffset)] = 1e-3;
-    return steps;
+    Calibration calibration;
+    calibration.camera = camera;
+    calibration.mechanics = mechanics;
+    calibration.line_delay = line_delay;
+    const Calibration changed = test::plus(calibration, e);
+    return {changed.camera, changed.mechanics, changed.line_delay, motion};
   }
 
   [[nodiscard]] Vec4 motion_steps() const {
@@ -322,7 +304,7 @@ TEST(RollingShutter, JacobiansOfUnprojectAgreeWithNumericOnes) {
           setting.motion_steps());
       const auto numeric_parameters = numeric_jacobian<3, kParameterCount>(
           [&](const ParameterVector& e) { return setting.plus_parameters(e).direction_of(u); },
-          setting.parameter_steps());
+          test::parameter_steps(setting.camera));
       // Directions carry a rounding of a few epsilon.
       EXPECT_LT(test::disagreement(J_u, numeric_u, 2e-15), 1) << named.name;
       EXPECT_LT(test::disagreement(J_motion, numeric_motion, 2e-15), 1) << named.name;
@@ -362,7 +344,7 @@ TEST(RollingShutter, JacobiansOfProjectAgreeWithNumericOnes) {
                                  setting.motion_steps());
       const auto numeric_parameters = numeric_jacobian<2, kParameterCount>(
           [&](const ParameterVector& e) { return setting.plus_parameters(e).pixel_of(d); },
-          setting.parameter_steps());
+          test::parameter_steps(setting.camera));
       const Matrix<double, 2, 2> J_tangent = J_d * tangent_basis(d);
       // The rounding of a direction, in pixels, up to ten times larger as the slope is below 0.9.
       const double noise = 1e-14 * (setting.camera.focal_length + setting.camera.width);

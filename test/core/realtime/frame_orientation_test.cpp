@@ -9,6 +9,7 @@
 #include "test/core/realtime/pixel_truth.h"
 #include "test/support/hard_values.h"
 #include "test/support/numeric_jacobian.h"
+#include "test/support/parameter_changes.h"
 
 namespace alidade {
 namespace {
@@ -29,7 +30,8 @@ FrameOrientation orientation(const Calibration& calibration, const PanTilt<doubl
                              const PanTilt<double>& rate) {
   FrameOrientation frame;
   EXPECT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kPt, 0, {angle, rate, 0},
-                                     1e-10 * MotionCovariance::Identity(), &frame));
+                                     1e-10 * MotionCovariance::Identity(), Sensitivity<6>::Zero(),
+                                     &frame));
   return frame;
 }
 
@@ -44,9 +46,9 @@ TEST(FrameOrientation, MapsEveryPixelAsTheSlowForwardModelDoes) {
       const PanTilt<double> rate{0.7, -0.3};
       const PanTilt<double> acceleration{2, 5};
       FrameOrientation frame;
-      ASSERT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kOe, 0,
-                                         {angle, rate, 0, acceleration},
-                                         1e-10 * MotionCovariance::Identity(), &frame));
+      ASSERT_TRUE(make_frame_orientation(
+          calibration, 7, OrientationMode::kOe, 0, {angle, rate, 0, acceleration},
+          1e-10 * MotionCovariance::Identity(), Sensitivity<6>::Zero(), &frame));
       const test::TrueCamera truth{named.camera.focal_length,
                                    named.camera.aspect,
                                    named.camera.radial_distortion,
@@ -109,8 +111,9 @@ TEST(FrameOrientation, OrientationCovarianceFollowsMotionAndCalibration) {
   }
   const MotionCovariance motion_covariance = motion_root * motion_root.transpose();
   FrameOrientation frame;
-  ASSERT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kPt, 0, {angle, rate, 0},
-                                     motion_covariance, &frame));
+  ASSERT_TRUE(make_frame_orientation(
+      calibration, 7, OrientationMode::kPt, 0, {angle, rate, 0}, motion_covariance,
+      telemetry_sensitivity(calibration.mechanics, {angle, rate, 0}), &frame));
 
   // Inputs: angles (2), then pan axis, tilt axis, scales, clock offset.
   const PanTilt<double> measured = measured_from_true(calibration.mechanics, angle);
@@ -137,9 +140,24 @@ TEST(FrameOrientation, OrientationCovarianceFollowsMotionAndCalibration) {
 }
 
 // One motion, told of the middle row and of row 0; and the covariance of a direction by differences of
-// the motion itself.
+// the motion itself, and of the calibration, which the motion follows as its sensitivity says.
 TEST(FrameOrientation, IsTheSameFromWhateverRowItWasMade) {
-  const Calibration calibration = paper_calibration();
+  Calibration calibration = paper_calibration();
+  const test::ParameterVector parameter_steps = test::parameter_steps(calibration.camera);
+  Sensitivity<6> sensitivity;
+  for (int i = 0; i < 6; ++i) {
+    for (int j = 0; j < kParameterCount; ++j) {
+      sensitivity(i, j) = std::pow(30.0, i / 2) * 1e-5 / parameter_steps[j] * std::sin(i + 2 * j);
+    }
+  }
+  for (int i = 0; i < kParameterCount; ++i) {
+    for (int j = 0; j < kParameterCount; ++j) {
+      calibration.covariance(i, j) = std::cos(1 + 3 * i + 7 * j);
+    }
+  }
+  calibration.covariance = (parameter_steps.asDiagonal() * calibration.covariance *
+                            calibration.covariance.transpose() * parameter_steps.asDiagonal())
+                               .eval();
   const FrameMotion<double> at_middle{{0.5, 0.1}, {0.6, -0.4}, 540, {3, -2}};
   MotionCovariance root;
   for (int i = 0; i < 6; ++i) {
@@ -148,21 +166,25 @@ TEST(FrameOrientation, IsTheSameFromWhateverRowItWasMade) {
   const MotionCovariance covariance = root * root.transpose();
   FrameOrientation frame;
   ASSERT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kOe, 9, at_middle, covariance,
-                                     &frame));
+                                     sensitivity, &frame));
   FrameOrientation again;
   ASSERT_TRUE(make_frame_orientation(calibration, 7, OrientationMode::kOe, 9, frame.motion(),
-                                     frame.motion_covariance, &again));
+                                     frame.motion_covariance, frame.motion_sensitivity, &again));
   EXPECT_EQ(again.motion_covariance, frame.motion_covariance);
+  EXPECT_EQ(again.motion_sensitivity, frame.motion_sensitivity);
   for (const Vector2<double>& u :
        {Vector2<double>(3, 5), Vector2<double>(1900, 530), Vector2<double>(960, 1079)}) {
-    const auto seen = [&](const Matrix<double, 6, 1>& x) -> std::optional<Vector3<double>> {
+    using Input = Matrix<double, 6 + kParameterCount, 1>;
+    const auto seen = [&](const Input& input) -> std::optional<Vector3<double>> {
+      const test::ParameterVector e = input.tail<kParameterCount>();
+      const Matrix<double, 6, 1> x = input.head<6>() + sensitivity * e;
+      const Calibration changed = test::plus(calibration, e);
       FrameMotion<double> moved = at_middle;
       moved.angle = {moved.angle.pan + x[0], moved.angle.tilt + x[1]};
       moved.rate = {moved.rate.pan + x[2], moved.rate.tilt + x[3]};
       moved.acceleration = {moved.acceleration.pan + x[4], moved.acceleration.tilt + x[5]};
       Vector3<double> d;
-      if (rolling_shutter_unproject(calibration.camera, calibration.mechanics,
-                                    calibration.line_delay, moved, u,
+      if (rolling_shutter_unproject(changed.camera, changed.mechanics, changed.line_delay, moved, u,
                                     &d) != ProjectionStatus::kOk) {
         return std::nullopt;
       }
@@ -171,13 +193,17 @@ TEST(FrameOrientation, IsTheSameFromWhateverRowItWasMade) {
     Vector3<double> d_b;
     Matrix2<double> cov;
     ASSERT_EQ(frame.direction(u, &d_b, &cov), ProjectionStatus::kOk);
-    EXPECT_LT((d_b - *seen(Matrix<double, 6, 1>::Zero())).norm(), 1e-14);
-    Matrix<double, 6, 1> steps;
-    steps << 1e-3, 1e-3, 1e-1, 1e-1, 10, 10;
-    const auto numeric = test::numeric_jacobian<3, 6>(seen, steps);
-    ASSERT_EQ(numeric.evaluated, 6 * 4);
-    const Matrix<double, 2, 6> J = tangent_basis(d_b).transpose() * numeric.J;
-    const Matrix2<double> expected = J * covariance * J.transpose();
+    EXPECT_LT((d_b - *seen(Input::Zero())).norm(), 1e-14);
+    Input steps;
+    steps << 1e-3, 1e-3, 1e-1, 1e-1, 10, 10, parameter_steps;
+    const auto numeric = test::numeric_jacobian<3, 6 + kParameterCount>(seen, steps);
+    ASSERT_EQ(numeric.evaluated, steps.size() * 4);
+    const Matrix<double, 2, 6 + kParameterCount> J = tangent_basis(d_b).transpose() * numeric.J;
+    const Matrix2<double> by_motion = J.leftCols<6>() * covariance * J.leftCols<6>().transpose();
+    const Matrix2<double> by_calibration = J.rightCols<kParameterCount>() * calibration.covariance *
+                                           J.rightCols<kParameterCount>().transpose();
+    EXPECT_GT(by_calibration.norm(), 0.1 * by_motion.norm());
+    const Matrix2<double> expected = by_motion + by_calibration;
     EXPECT_LT((cov - expected).norm(), 1e-6 * expected.norm());
   }
 }
@@ -232,15 +258,18 @@ TEST(FrameOrientation, RefusesWhatIsNotFinite) {
   FrameOrientation frame;
   const double infinity = std::numeric_limits<double>::infinity();
   const MotionCovariance covariance = MotionCovariance::Identity();
+  Sensitivity<6> sensitivity = Sensitivity<6>::Zero();
   const auto made = [&](double time, double pan, double rate, const MotionCovariance& cov) {
     return make_frame_orientation(paper_calibration(), time, OrientationMode::kPt, 0,
-                                  {{pan, 0}, {rate, 0}, 0}, cov, &frame);
+                                  {{pan, 0}, {rate, 0}, 0}, cov, sensitivity, &frame);
   };
   EXPECT_TRUE(made(1, 1, 1, covariance));
   EXPECT_FALSE(made(NAN, 1, 1, covariance));
   EXPECT_FALSE(made(1, infinity, 1, covariance));
   EXPECT_FALSE(made(1, 1, NAN, covariance));
   EXPECT_FALSE(made(1, 1, 1, covariance * NAN));
+  sensitivity(5, 0) = NAN;
+  EXPECT_FALSE(made(1, 1, 1, covariance));
 }
 
 }  // namespace

@@ -20,6 +20,7 @@
 
 #include "core/realtime/pt_mode.h"
 #include "test/simulator/renderer.h"
+#include "test/support/parameter_changes.h"
 
 namespace alidade::test {
 namespace {
@@ -257,6 +258,47 @@ TEST_F(OeModeOnFrames, BeginsWithNothingAndIsInOeFromTheSecondFrameOn) {
   }
   // From frame to frame, where telemetry alone would show sqrt(2) px.
   EXPECT_LT(std::sqrt(turns / (kFrames - 2)), 0.1);
+}
+
+// The same pictures and the same telemetry, by one calibration and by another.
+TEST_F(OeModeOnFrames, FollowsTheCalibrationAsItsSensitivitySays) {
+  constexpr int kFrames = 40;
+  std::vector<InterpolatedPanTilt> telemetry;
+  for (int k = 0; k < kFrames; ++k) telemetry.push_back(camera_.telemetry(k));
+  const Calibration& calibration = camera_.calibration();
+  const auto last_frame = [&](const ParameterVector& e) {
+    const double later_s = e[index(Parameter::kClockOffset)] +
+                           e[index(Parameter::kLineDelay)] * calibration.camera.height / 2;
+    oe_.reset(plus(calibration, e));
+    for (int k = 0; k < kFrames; ++k) {
+      InterpolatedPanTilt told = telemetry[static_cast<std::size_t>(k)];
+      told.angle = {told.angle.pan + later_s * told.rate.pan,
+                    told.angle.tilt + later_s * told.rate.tilt};
+      const OeStatus status =
+          oe_.process(camera_.image(k), VirtualCamera::time_s(k), &told, &frame_);
+      EXPECT_EQ(status, k == 0 ? OeStatus::kTooFew : OeStatus::kOk);
+      oe_.maintain();
+    }
+    return frame_;
+  };
+  const FrameOrientation frame = last_frame(ParameterVector::Zero());
+  int shown = 0;
+  // Small enough for the same corners and the same inliers.
+  const ParameterVector steps = 0.3 * parameter_steps(calibration.camera);
+  for (int j = 0; j < kParameterCount; ++j) {
+    ParameterVector e = ParameterVector::Zero();
+    e[j] = steps[j];
+    const FrameOrientation more = last_frame(e);
+    const FrameOrientation less = last_frame(-e);
+    const Vector2<double> numeric = (more.angle.vector() - less.angle.vector()) / (2 * kPixel);
+    const Vector2<double> told = frame.motion_sensitivity.col(j).head<2>() * steps[j] / kPixel;
+    // Of the third of a pixel by which the image itself has moved.
+    EXPECT_LT((told - numeric).norm(), 2e-3 + 0.06 * numeric.norm())
+        << to_string(static_cast<Parameter>(j)) << " " << told.transpose() << ", by difference "
+        << numeric.transpose();
+    shown += numeric.norm() > 0.01 ? 1 : 0;
+  }
+  EXPECT_GE(shown, 4);
 }
 
 TEST_F(OeModeOnFrames, KnowsTheBaseBetterTheLongerItSeesTelemetry) {

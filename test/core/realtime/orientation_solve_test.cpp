@@ -501,7 +501,8 @@ TEST(OrientationSolve, AveragesTelemetryOverAllFrames) {
       SolvedMotion solved;
       ASSERT_EQ(frame.solve(world, &solved), SolveStatus::kOk);
       const MapOffset before = offset;
-      ASSERT_TRUE(offset.learn(solved.innovation, solved.innovation_covariance, kNoLimit));
+      ASSERT_TRUE(offset.learn(solved.innovation, solved.innovation_covariance,
+                               Sensitivity<2>::Zero(), kNoLimit));
       // Without an error that the landmarks share, all that the frame found is every frame's.
       const double sigma = world.telemetry_angle;
       ASSERT_LT((offset.value - before.value - solved.offset_correction).norm(), 1e-6 * sigma);
@@ -529,11 +530,11 @@ TEST(OrientationSolve, LearnsNothingFromAnInnovationThatCannotBe) {
   const Matrix2<double> noise = 5e-10 * Matrix2<double>::Identity();
   const Vector2<double> sigma =
       (before.covariance + noise).llt().matrixL() * Vector2<double>::UnitX();
-  EXPECT_FALSE(offset.learn(6.001 * sigma, noise, 36));
-  EXPECT_FALSE(offset.learn({kNaN, 0}, noise, 36));
+  EXPECT_FALSE(offset.learn(6.001 * sigma, noise, Sensitivity<2>::Zero(), 36));
+  EXPECT_FALSE(offset.learn({kNaN, 0}, noise, Sensitivity<2>::Zero(), 36));
   EXPECT_EQ(offset.value, before.value);
   EXPECT_EQ(offset.covariance, before.covariance);
-  EXPECT_TRUE(offset.learn(5.999 * sigma, noise, 36));
+  EXPECT_TRUE(offset.learn(5.999 * sigma, noise, Sensitivity<2>::Zero(), 36));
   EXPECT_NE(offset.value, before.value);
 }
 
@@ -559,12 +560,85 @@ TEST(OrientationSolve, KeepsTheLandmarksCommonErrorOutOfTheLastingOffset) {
       SolvedMotion solved;
       ASSERT_EQ(frame.solve(world, &solved), SolveStatus::kOk);
       ASSERT_TRUE(offset.learn(solved.innovation,
-                               solved.innovation_covariance + solved.shared_covariance, kNoLimit));
+                               solved.innovation_covariance + solved.shared_covariance,
+                               Sensitivity<2>::Zero(), kNoLimit));
     }
     const Vector2<double> error = offset.value - g;
     squares += error.dot(offset.covariance.ldlt().solve(error));
   }
   EXPECT_NEAR(squares / kMounts, 2, 4 * std::sqrt(4.0 / kMounts));
+}
+
+// What is seen within its claims makes the problem linear: one calibration's residuals and prior become
+// another's as their sensitivities tell, and the solution follows.
+TEST(OrientationSolve, SensitivityIsHowTheSolutionFollowsTheCalibration) {
+  for (const bool has_telemetry : {true, false}) {
+    World world;
+    world.has_telemetry = has_telemetry;
+    world.understated = 0.3;
+    Simulation simulation(31);
+    Frame frame = simulation.frame(world);
+    // Weak enough to leave the landmarks their say, strong enough to be seen.
+    Vector6 sigma;
+    sigma << 3e-6, 3e-6, 1e-3, 1e-3, kAccelerationSigma, kAccelerationSigma;
+    frame.prior.motion_information.diagonal() = sigma.cwiseAbs2().cwiseInverse();
+    frame.prior.motion.head<4>() = frame.x.head<4>();
+    const auto fill = [&](auto* sensitivity, double scale) {
+      for (int i = 0; i < sensitivity->size(); ++i) (*sensitivity)(i) = simulation.normal(scale);
+    };
+    for (FoundLandmark& landmark : frame.landmarks) fill(&landmark.sensitivity, kNoise);
+    fill(&frame.prior.telemetry_sensitivity, world.telemetry_angle);
+    fill(&frame.prior.motion_sensitivity, 3e-6);
+    SolvedMotion solved;
+    ASSERT_EQ(frame.solve(world, &solved), SolveStatus::kOk);
+    ASSERT_EQ(solved.inflation, 1);
+    constexpr double kStep = 0.1;
+    for (int j = 0; j < kParameterCount; ++j) {
+      const auto with = [&](double change) {
+        Frame changed = frame;
+        for (FoundLandmark& landmark : changed.landmarks) {
+          landmark.residual += change * landmark.sensitivity.col(j);
+        }
+        changed.prior.telemetry += change * changed.prior.telemetry_sensitivity.col(j);
+        changed.prior.motion += change * changed.prior.motion_sensitivity.col(j);
+        SolvedMotion out;
+        EXPECT_EQ(changed.solve(world, &out), SolveStatus::kOk);
+        EXPECT_EQ(out.inliers, solved.inliers);
+        return out;
+      };
+      const SolvedMotion more = with(kStep);
+      const SolvedMotion less = with(-kStep);
+      const Vector6 numeric = (more.correction - less.correction) / (2 * kStep);
+      EXPECT_LT((solved.sensitivity.col(j) - numeric).cwiseQuotient(sigma).norm(),
+                1e-6 * numeric.cwiseQuotient(sigma).norm());
+      const Vector2<double> of_offset =
+          (more.offset_correction - less.offset_correction) / (2 * kStep);
+      EXPECT_LT((solved.offset_correction_sensitivity.col(j) - of_offset).norm(),
+                1e-6 * of_offset.norm() + 1e-18);
+      EXPECT_EQ(of_offset.norm() > 0, has_telemetry);
+    }
+  }
+}
+
+TEST(OrientationSolve, OffsetFollowsTheCalibrationAsItsSensitivitySays) {
+  Simulation simulation(32);
+  MapOffset offset;
+  offset.covariance << 4e-10, 1e-10, 1e-10, 9e-10;
+  MapOffset changed = offset;
+  const Matrix2<double> noise = 5e-10 * Matrix2<double>::Identity();
+  constexpr int kParameter = 7;
+  for (int i = 0; i < 20; ++i) {
+    const Vector2<double> innovation(simulation.normal(1e-6), simulation.normal(1e-6));
+    Sensitivity<2> sensitivity = -offset.sensitivity;
+    sensitivity.col(kParameter) += Vector2<double>(1 + i, 2) * 1e-6;
+    const Vector2<double> in_changed =
+        innovation - (changed.value - offset.value) + Vector2<double>(1 + i, 2) * 1e-6;
+    ASSERT_TRUE(offset.learn(innovation, noise, sensitivity, kNoLimit));
+    ASSERT_TRUE(changed.learn(in_changed, noise, sensitivity, kNoLimit));
+  }
+  const Vector2<double> difference = changed.value - offset.value;
+  EXPECT_GT(difference.norm(), 1e-6);
+  EXPECT_LT((offset.sensitivity.col(kParameter) - difference).norm(), 1e-9 * difference.norm());
 }
 
 // The same landmark many times is one.

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <vector>
 
 #include "test/support/hard_values.h"
 #include "test/support/numeric_jacobian.h"
@@ -29,9 +30,11 @@ struct View {
   [[nodiscard]] double parameter(double row) const { return row / middle_row() - 1; }
 
   [[nodiscard]] ProjectionStatus exact(const Vector3<double>& d, Vector2<double>* u,
-                                       Matrix<double, 2, 3>* J_u_d = nullptr) const {
+                                       Matrix<double, 2, 3>* J_u_d = nullptr,
+                                       Sensitivity<2>* J_u_parameters = nullptr) const {
     return rolling_shutter_project(calibration.camera, calibration.mechanics,
-                                   calibration.line_delay, motion, d, u, J_u_d);
+                                   calibration.line_delay, motion, d, u, J_u_d, nullptr,
+                                   J_u_parameters);
   }
 
   [[nodiscard]] Vector2<double> per_row(const Vector3<double>& d, double row) const {
@@ -173,12 +176,20 @@ TEST(ViewProjection, JacobiansAreThoseOfTheExactProjection) {
   for_all_views([&](const View& view, const NamedCamera& named) {
     const ViewProjection projection(view.calibration, view.motion);
     const double delay = view.calibration.line_delay;
+    struct ByParameters {
+      double relative;
+      Sensitivity<2> seen, exact;
+    };
+    std::vector<ByParameters> errors;
+    double largest_stretch = 0;
     for (const Point& point : points_of(view, {named.name, named.camera, 0})) {
       SeenDirection seen;
-      ASSERT_TRUE(projection.project(point.d, &seen));
+      Sensitivity<2> seen_parameters;
+      ASSERT_TRUE(projection.project(point.d, &seen, &seen_parameters));
       Matrix<double, 2, 3> J_u_d;
       Vector2<double> exact;
-      ASSERT_EQ(view.exact(point.d, &exact, &J_u_d), ProjectionStatus::kOk);
+      Sensitivity<2> exact_parameters;
+      ASSERT_EQ(view.exact(point.d, &exact, &J_u_d, &exact_parameters), ProjectionStatus::kOk);
       const double f = named.camera.focal_length;
       const double noise = 1e-13 * (f + named.camera.width);
       const double step = 1e-3 / std::sqrt(f);
@@ -219,7 +230,22 @@ TEST(ViewProjection, JacobiansAreThoseOfTheExactProjection) {
                 1.5 * stretch * relative + rounding);
       EXPECT_LE((seen.J_angle - numeric_angle.J).norm(),
                 1.5 * stretch * (relative + tilted) + rounding);
+      const Vector2<double> turned = minus(angle_at_row(view.motion, delay, exact.y()),
+                                           angle_at_row(view.motion, delay, view.middle_row()));
+      largest_stretch = std::max(largest_stretch, stretch);
+      errors.push_back({relative + turned.lpNorm<1>(), seen_parameters, exact_parameters});
       ++compared;
+    }
+    // Of what the parameter does anywhere in the image, as it may do nothing where the point is; an
+    // axis' effect changes with the angles as a whole turn about it would.
+    const int first_axis = index(Parameter::kPanAxis0);
+    for (int i = 0; i < kParameterCount; ++i) {
+      double most = i >= first_axis && i < first_axis + 4 ? largest_stretch : 1e-9;
+      for (const auto& e : errors) most = std::max(most, e.exact.col(i).norm());
+      for (const auto& e : errors) {
+        ASSERT_LE((e.seen.col(i) - e.exact.col(i)).norm(), 3 * most * e.relative)
+            << to_string(static_cast<Parameter>(i));
+      }
     }
   });
   EXPECT_GT(compared, 8 * 3 * 4 * 6 * 20);
