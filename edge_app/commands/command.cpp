@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <filesystem>
 
 #include "core/calibration/calibration_file.h"
@@ -114,13 +113,6 @@ OrientationStepOptions step_options(const RecordingNoise& noise,
       noise.pan_tilt_sigma_rad.value_or(options.telemetry_noise.pan_tilt_sigma);
   options.telemetry_noise.period_sigma_s =
       noise.telemetry_period_sigma_s.value_or(options.telemetry_noise.period_sigma_s);
-  return options;
-}
-
-OeOptions oe_options(const Camera<double>& camera) {
-  constexpr double kLeastColumns = 24;
-  OeOptions options;
-  options.cell_size_px = std::min(options.cell_size_px, camera.width / kLeastColumns);
   return options;
 }
 

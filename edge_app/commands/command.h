@@ -56,9 +56,6 @@ OrientationStepOptions step_options(const Config& config, const NamedCalibration
 OrientationStepOptions step_options(const RecordingNoise& noise,
                                     const NamedCalibration& calibration);
 
-// Small pictures have as many landmarks as large ones, closer together.
-OeOptions oe_options(const Camera<double>& camera);
-
 // decode: with pictures. copy_to: a file for the video stream; empty: none.
 std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,
                                                const std::string& copy_to = "");

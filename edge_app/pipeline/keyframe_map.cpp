@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "core/realtime/oe_mode.h"
+#include "edge_app/pipeline/orientation_step.h"
 
 namespace alidade {
 namespace {
@@ -34,17 +35,6 @@ double samples_worth_one(const std::vector<double>& errors) {
     sum += pair;
   }
   return 1 + 2 * sum / variance;
-}
-
-OeOptions options_for(const Camera<double>& camera) {
-  constexpr double kLeastColumns = 24;
-  OeOptions options;
-  options.max_width = camera.width;
-  options.max_height = camera.height;
-  options.cell_size_px = std::min(options.cell_size_px, camera.width / kLeastColumns);
-  // A view is there once only.
-  options.max_new = options.max_landmarks;
-  return options;
 }
 
 }  // namespace
@@ -109,7 +99,9 @@ MapState map_from_keyframes(const CalibrationResult& result,
   const Camera<double>& camera = result.calibration.camera;
   const double to_middle_s = result.calibration.line_delay * camera.height / 2;
   const double acceleration_sigma = kAccelerationSigmaPxPerS2 / camera.focal_length;
-  OeMode mode(options_for(camera));
+  OeOptions options = oe_options(camera);
+  options.max_new = options.max_landmarks;  // a view is there once only
+  OeMode mode(options);
   mode.reset(result.calibration);
   double tilt = 0;
   for (const Keyframe& keyframe : keyframes) {

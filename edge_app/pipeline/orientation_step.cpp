@@ -47,6 +47,15 @@ RecordStatus to_record(OeStatus status) {
 
 }  // namespace
 
+OeOptions oe_options(const Camera<double>& camera) {
+  constexpr double kLeastColumns = 24;
+  OeOptions options;
+  options.max_width = camera.width;
+  options.max_height = camera.height;
+  options.cell_size_px = std::min(options.cell_size_px, camera.width / kLeastColumns);
+  return options;
+}
+
 OrientationStep::OrientationStep(const OrientationStepOptions& options)
     : options_(options),
       video_clock_(options.video_clock),

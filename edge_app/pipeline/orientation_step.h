@@ -59,6 +59,9 @@ struct OrientationStepOptions {
       5e-3;  // by how much a new connection's least delay differs, one standard deviation
 };
 
+// OE mode for a camera's pictures: small ones have as many landmarks as large ones, closer together.
+[[nodiscard]] OeOptions oe_options(const Camera<double>& camera);
+
 // What a frame brought to light, for the log.
 struct StepEvents {
   bool video_clock_restarted = false;

@@ -42,9 +42,7 @@ OrientationStepOptions step_options(const VirtualDay& day) {
   options.telemetry_noise.acceleration_sigma = day.acceleration_sigma();
   options.telemetry_limits.max_repeat_s = 0;
   options.zoom_tolerance = kZoomTolerance;
-  OeOptions oe;
-  oe.cell_size_px = std::min(oe.cell_size_px, day.plan().width / 24.0);
-  options.oe = oe;
+  options.oe = oe_options(day.calibration(0).camera);
   return options;
 }
 
