@@ -31,6 +31,8 @@ Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink
       finished_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (finished_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
   for (PictureSlot slot = 0; slot < kPictureSlots; ++slot) free_slots_.push_back(slot);
+  // Records made before the calibration thread first wakes say it too.
+  if (calibration_ != nullptr) stage_.report(calibration_->report());
 }
 
 Pipeline::~Pipeline() {

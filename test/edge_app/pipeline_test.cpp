@@ -175,6 +175,25 @@ TEST_F(PipelineTest, SaysThatTheTelemetryIsLostAndGoesOnWhenItIsBack) {
   pipeline.stop();
 }
 
+TEST_F(PipelineTest, SaysFromTheFirstRecordOnWhetherItCalibrates) {
+  for (const bool automatic : {true, false}) {
+    SelfCalibrationOptions calibrating;
+    calibrating.automatic = automatic;
+    SelfCalibration calibration(calibrating, nullptr);
+    CollectingSink sink;
+    ScriptedVideo video("rtsp://camera/stream");
+    ScriptedPanTilt pan_tilt("http://camera");
+    Pipeline pipeline(video, pan_tilt, sink, &calibration, options_for_tests());
+    pipeline.start();
+    video.push(frame());
+    const auto records = sink.wait_until([](const auto& so_far) { return !so_far.empty(); });
+    ASSERT_FALSE(records.empty());
+    EXPECT_EQ(records[0].calibration.activity,
+              automatic ? CalibrationActivity::kCollecting : CalibrationActivity::kOff);
+    pipeline.stop();
+  }
+}
+
 TEST_F(PipelineTest, StopEndsSourcesThatGiveNothing) {
   Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options_for_tests());
   pipeline.start();
