@@ -111,30 +111,34 @@ bool read_text(const fs::path& path, std::string* text, std::string* error) {
   return true;
 }
 
-// Of a calibration that was parsed before; empty: none.
-std::string map_name(const std::string& yaml) {
-  const YAML::Node root = YAML::Load(yaml);
-  return root["landmarks"] ? root["landmarks"].Scalar() : "";
+// The map that a calibration names, which was parsed before; an empty path if it names none. False with a
+// line if it names none that is there.
+bool find_map(const fs::path& yaml, const std::string& text, fs::path* map, std::string* error) {
+  map->clear();
+  const YAML::Node root = YAML::Load(text);
+  const fs::path name = root["landmarks"] ? root["landmarks"].Scalar() : "";
+  if (name.empty()) return true;
+  const fs::path path = folder_of(yaml) / name;
+  if (name.filename() != name) {
+    *error = fmt::format("{}: its map {} is not a file beside it: not used", yaml.string(),
+                         name.string());
+  } else if (!is_there(path)) {
+    *error = fmt::format("{}: its map {} is missing", yaml.string(), name.string());
+  } else {
+    *map = path;
+  }
+  return !map->empty();
 }
 
-void load_map_beside(const fs::path& yaml, const std::string& name, StoredCalibration* stored,
+void load_map_beside(const fs::path& yaml, const std::string& text, StoredCalibration* stored,
                      std::vector<std::string>* lines) {
-  if (name.empty()) return;
-  const fs::path path = folder_of(yaml) / name;
-  if (fs::path(name).filename() != name) {
-    lines->push_back(
-        fmt::format("{}: its map {} is not a file beside it: not used", yaml.string(), name));
-    return;
-  }
-  if (!is_there(path)) {
-    lines->push_back(fmt::format("{}: its map {} is missing", yaml.string(), name));
-    return;
-  }
+  fs::path path;
   MapContent content;
   std::string error;
-  if (!load_map(path.string(), stored->calibration, &content, &error)) {
+  if (!find_map(yaml, text, &path, &error)) {
+    lines->push_back(error);
+  } else if (!path.empty() && !load_map(path.string(), stored->calibration, &content, &error)) {
     lines->push_back(fmt::format("{}; {}", error, set_aside(path)));
-    return;
   }
   stored->map = std::move(content.map);
 }
@@ -144,6 +148,17 @@ std::string zoom_text(std::optional<double> zoom) {
 }
 
 }  // namespace
+
+bool load_map_of(const std::string& file, const Calibration& calibration, MapState* map,
+                 std::string* error) {
+  std::string text;
+  fs::path path;
+  MapContent content;
+  if (!read_text(file, &text, error) || !find_map(file, text, &path, error)) return false;
+  if (!path.empty() && !load_map(path.string(), calibration, &content, error)) return false;
+  *map = std::move(content.map);
+  return true;
+}
 
 CalibrationStore::CalibrationStore(std::string file, double zoom_tolerance)
     : file_(std::move(file)), zoom_tolerance_(std::max(zoom_tolerance, 0.0)) {}
@@ -200,7 +215,7 @@ void CalibrationStore::load_file(const std::string& path, int width, int height,
       return;
     }
   }
-  load_map_beside(path, map_name(text), &stored, lines);
+  load_map_beside(path, text, &stored, lines);
   lines->push_back(fmt::format("{}: calibration for {}, {} landmarks", path, zoom_text(zoom),
                                stored.map.landmarks.size()));
   entries_.push_back({std::move(stored), false});
