@@ -59,8 +59,8 @@ struct Calibrating {
   std::unique_ptr<SelfCalibration> calibration;
 };
 
-// Begins with the stored calibration, else with the data sheet.
-Calibrating begin_calibrating(const Config& config) {
+// Begins with the stored calibration, else with the data sheet. path: of the configuration.
+Calibrating begin_calibrating(const Config& config, const std::string& path) {
   Calibrating result;
   SelfCalibrationOptions options;
   const int width = config.video.width;
@@ -73,6 +73,13 @@ Calibrating begin_calibrating(const Config& config) {
   }
   const StoredCalibration* stored =
       result.store == nullptr ? nullptr : result.store->find(std::nullopt);
+  if (result.store != nullptr && result.store->empty() && !config.calibration.automatic) {
+    throw CommandError(
+        kExitUsage,
+        fmt::format("{}: calibration.file {} holds no calibration that can be used, and "
+                    "calibration.auto is false; name one, or set calibration.auto: true",
+                    path, config.calibration.file));
+  }
   if (config.camera.focal_length_px) {
     options.data_sheet = data_sheet_calibration(config.camera);
   } else if (stored != nullptr) {
@@ -80,17 +87,22 @@ Calibrating begin_calibrating(const Config& config) {
     camera.focal_length_px = stored->calibration.camera.focal_length;
     options.data_sheet = data_sheet_calibration(camera);
   } else {
-    throw CommandError(kExitUsage,
-                       "camera.focal_length_px is missing: without a calibration, the first one "
-                       "begins with the data sheet's; give it, or set realtime.mode: PT");
+    throw CommandError(
+        kExitUsage,
+        fmt::format(
+            "{}: camera.focal_length_px is missing: {} holds no calibration to begin with, and the "
+            "first one begins with the data sheet's; give it, or name a calibration in "
+            "calibration.file",
+            path, config.calibration.file));
   }
   Camera<double>& camera = options.data_sheet.camera;
   camera.width = stored == nullptr ? width : stored->calibration.camera.width;
   camera.height = stored == nullptr ? height : stored->calibration.camera.height;
   if (camera.width == 0) {
-    throw CommandError(kExitUsage,
-                       "video.width and video.height are missing: without a calibration, OE mode "
-                       "needs the size of the picture; give it, or set realtime.mode: PT");
+    throw CommandError(
+        kExitUsage, path +
+                        ": video.width and video.height are missing: without a calibration, OE "
+                        "mode needs the size of the picture; give them, or set realtime.mode: PT");
   }
   if (config.pan_tilt.angle_sigma_rad) {
     options.noise.pan_tilt_sigma_rad = std::hypot(
@@ -121,7 +133,7 @@ int run(const RunOptions& options) {
   NamedCalibration calibration;
   MapState map;
   if (config.realtime.landmarks && !is_recording(config)) {
-    calibrating = begin_calibrating(config);
+    calibrating = begin_calibrating(config, options.config);
     const auto first = calibrating.calibration->first();
     calibration = {first->calibration, first->calibrated, first->name};
     map = first->map;

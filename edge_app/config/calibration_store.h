@@ -34,6 +34,7 @@ class CalibrationStore final : public CalibrationArchive {
   // was loaded, what was set aside and why.
   [[nodiscard]] std::vector<std::string> load(int width, int height);
 
+  [[nodiscard]] bool empty() const { return entries_.empty(); }
   [[nodiscard]] const StoredCalibration* find(std::optional<double> zoom) const override;
   [[nodiscard]] bool save(const StoredCalibration& calibration, std::string* error) override;
   [[nodiscard]] bool has_pending() const override;

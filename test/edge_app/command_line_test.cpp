@@ -180,13 +180,13 @@ class CommandLineTest : public ::testing::Test {
                             "calibration: {file: calibration.yaml}\n" +
                                 more);
   }
-  std::string live_config() {
+  std::string live_config(const std::string& size = ", width: 320, height: 240",
+                          const std::string& more = "camera: {focal_length_px: 30000}\n") {
     const std::string port = std::to_string(refusing_port());
-    return directory_.write("alidade.yaml",
-                            "video: {type: rtsp, url: 'rtsp://127.0.0.1:" + port +
-                                "/stream', width: 320, height: 240}\n" +
-                                "pan_tilt: {type: vapix, url: 'http://127.0.0.1:" + port + "'}\n" +
-                                "camera: {focal_length_px: 30000}\n");
+    return directory_.write(
+        "alidade.yaml", "video: {type: rtsp, url: 'rtsp://127.0.0.1:" + port + "/stream'" + size +
+                            "}\npan_tilt: {type: vapix, url: 'http://127.0.0.1:" + port + "'}\n" +
+                            more);
   }
   std::string path(const std::string& name) { return directory_.path() + "/" + name; }
 
@@ -209,6 +209,70 @@ TEST_F(CommandLineTest, MissingCalibrationIsABadConfiguration) {
   const Result result = alidade({"run", "-c", recorded_config()});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, HasSubstr(path("calibration.yaml")));
+}
+
+TEST_F(CommandLineTest, RunWithNothingToBeginWithSaysWhatIsMissing) {
+  const std::string size = ", width: 320, height: 240";
+  const std::string data_sheet = "camera: {focal_length_px: 30000}\n";
+  const std::string not_there = "calibration: {file: calibration.yaml}\n";
+  const std::string not_there_and_not_auto = "calibration: {file: calibration.yaml, auto: false}\n";
+  const std::string not_auto = "calibration: {auto: false}\n";
+  const std::string file = path("calibration.yaml");
+  struct Case {
+    std::string size;
+    std::string more;
+    std::string what;
+    std::string remedy;
+  };
+  for (const Case& c : {
+           Case{size, not_there, "camera.focal_length_px is missing: " + file, "give it"},
+           Case{"", not_there, "camera.focal_length_px is missing: " + file, "give it"},
+           Case{"", not_there + data_sheet, "video.width and video.height are missing",
+                "give them, or set realtime.mode: PT"},
+           Case{"", data_sheet, "video.width and video.height are missing", "give them"},
+           Case{"", not_auto + data_sheet, "video.width and video.height are missing", "give them"},
+           Case{size, not_there_and_not_auto, "calibration.file " + file + " holds no calibration",
+                "set calibration.auto: true"},
+           Case{size, not_there_and_not_auto + data_sheet,
+                "calibration.file " + file + " holds no calibration", "set calibration.auto: true"},
+           Case{size, "", "neither a calibration nor a data sheet is given",
+                "set calibration.file or camera.focal_length_px"},
+           Case{size, not_auto, "neither a calibration nor a data sheet is given",
+                "set calibration.file or camera.focal_length_px"},
+           Case{", width: 320", data_sheet, "video.width: stands alone", "give width and height"},
+       }) {
+    const std::string config = live_config(c.size, c.more);
+    const Result result = alidade({"run", "-c", config});
+    EXPECT_EQ(result.exit_code, 2) << config;
+    EXPECT_THAT(result.errors, AllOf(StartsWith("alidade: " + config + ":"), HasSubstr(c.what),
+                                     HasSubstr(c.remedy)))
+        << c.size << "\n"
+        << c.more;
+    EXPECT_EQ(result.errors.find('\n'), result.errors.size() - 1) << result.errors;
+    EXPECT_THAT(result.output, IsEmpty());
+  }
+}
+
+// None to begin with, but one for each zoom that the head may report.
+TEST_F(CommandLineTest, RunWithoutCalibratingTakesCalibrationsOfSeveralZooms) {
+  for (const char* zoom : {"1", "2"}) {
+    directory_.write(std::string("calibration.zoom-") + zoom + ".yaml",
+                     head_.calibration() + "zoom: " + zoom + "\n");
+  }
+  const std::string config = live_config(", width: 1920, height: 1080",
+                                         "camera: {focal_length_px: 30000}\n"
+                                         "calibration: {file: calibration.yaml, auto: false}\n");
+  const Result result = alidade({"run", "-c", config, "--duration", "0.1"});
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("zoom 1"), HasSubstr("zoom 2")));
+}
+
+// What the error recommends.
+TEST_F(CommandLineTest, RunInPtModeNeedsNoSizeOfThePicture) {
+  const std::string config =
+      live_config("", "camera: {focal_length_px: 30000}\nrealtime: {mode: PT}\n");
+  const Result result = alidade({"run", "-c", config, "--duration", "0.1"});
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
 }
 
 TEST_F(CommandLineTest, VideoSizeOtherThanTheCalibrationsIsABadConfiguration) {
