@@ -7,6 +7,8 @@
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <fstream>
+#include <sstream>
 
 namespace alidade {
 
@@ -69,6 +71,19 @@ bool write_file_atomically(const std::string& path, const std::string& content,
     return false;
   }
   sync_folder_of(path);
+  return true;
+}
+
+bool read_file(const std::string& path, std::string* content, std::string* error) {
+  std::ifstream file(path, std::ios::binary);
+  file.peek();  // a folder opens, but cannot be read
+  if (!file.is_open() || file.bad()) {
+    *error = path + ": cannot be read: " + std::strerror(errno);
+    return false;
+  }
+  std::ostringstream bytes;
+  bytes << file.rdbuf();
+  *content = bytes.str();
   return true;
 }
 

@@ -4,10 +4,7 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
-#include <cstring>
-#include <fstream>
 #include <initializer_list>
 #include <iomanip>
 #include <locale>
@@ -470,15 +467,8 @@ std::string format_calibration(const Calibration& calibration, const Calibration
 }
 
 bool load_calibration(const std::string& path, Calibration* calibration, std::string* error) {
-  std::ifstream file(path);
-  file.peek();  // a folder opens, but cannot be read
-  if (!file.is_open() || file.bad()) {
-    *error = path + ": cannot be read: " + std::strerror(errno);
-    return false;
-  }
-  std::ostringstream text;
-  text << file.rdbuf();
-  return parse_calibration(text.str(), path, calibration, error);
+  std::string text;
+  return read_file(path, &text, error) && parse_calibration(text, path, calibration, error);
 }
 
 bool save_calibration(const std::string& path, const Calibration& calibration, std::string* error) {

@@ -5,13 +5,10 @@
 #include <zlib.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
 #include <limits>
-#include <sstream>
 #include <system_error>
 #include <utility>
 
@@ -98,19 +95,6 @@ std::string set_aside_with_maps(const fs::path& yaml) {
   return set_aside(yaml);
 }
 
-bool read_text(const fs::path& path, std::string* text, std::string* error) {
-  std::ifstream file(path, std::ios::binary);
-  file.peek();  // a folder opens, but cannot be read
-  if (!file.is_open() || file.bad()) {
-    *error = path.string() + ": cannot be read: " + std::strerror(errno);
-    return false;
-  }
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  *text = bytes.str();
-  return true;
-}
-
 // The map that a calibration names, which was parsed before; an empty path if it names none. False with a
 // line if it names none that is there.
 bool find_map(const fs::path& yaml, const std::string& text, fs::path* map, std::string* error) {
@@ -154,7 +138,7 @@ bool load_map_of(const std::string& file, const Calibration& calibration, MapSta
   std::string text;
   fs::path path;
   MapContent content;
-  if (!read_text(file, &text, error) || !find_map(file, text, &path, error)) return false;
+  if (!read_file(file, &text, error) || !find_map(file, text, &path, error)) return false;
   if (!path.empty() && !load_map(path.string(), calibration, &content, error)) return false;
   *map = std::move(content.map);
   return true;
@@ -195,7 +179,7 @@ void CalibrationStore::load_file(const std::string& path, int width, int height,
   stored.path = path;
   std::string text;
   std::string error;
-  if (!read_text(path, &text, &error) ||
+  if (!read_file(path, &text, &error) ||
       !parse_calibration(text, path, &stored.calibration, &error)) {
     lines->push_back(fmt::format("{}; {}", error, set_aside_with_maps(path)));
     return;

@@ -4,12 +4,9 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <cerrno>
 #include <cmath>
 #include <cstring>
-#include <fstream>
 #include <limits>
-#include <sstream>
 
 #include "core/calibration/atomic_file.h"
 
@@ -334,15 +331,8 @@ bool parse_map(const std::string& bytes, const std::string& name, const Calibrat
 
 bool load_map(const std::string& path, const Calibration& calibration, MapContent* content,
               std::string* error) {
-  std::ifstream file(path, std::ios::binary);
-  file.peek();  // a folder opens, but cannot be read
-  if (!file.is_open() || file.bad()) {
-    *error = path + ": cannot be read: " + std::strerror(errno);
-    return false;
-  }
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  return parse_map(bytes.str(), path, calibration, content, error);
+  std::string bytes;
+  return read_file(path, &bytes, error) && parse_map(bytes, path, calibration, content, error);
 }
 
 bool save_map(const std::string& path, const MapContent& content, const Calibration& calibration,
