@@ -13,6 +13,7 @@
 
 #include "core/realtime/oe_mode.h"
 #include "test/simulator/renderer.h"
+#include "test/support/mountains.h"
 
 namespace alidade {
 namespace {
@@ -24,22 +25,11 @@ constexpr double kPixel = 1 / kFocalLength;
 constexpr double kDuration = 8;  // s
 constexpr int kSamples = 400;    // of telemetry
 
-simulator::Config camera_before_mountains() {
-  simulator::Config config;
-  config.image = {kWidth, kHeight, 25};
+simulator::Config swinging_camera() {
+  simulator::Config config = test::camera_before_mountains({kWidth, kHeight, 25}, kFocalLength);
   config.duration = kDuration;
-  config.camera.focal_length = kFocalLength;
-  config.camera.radial_distortion = 0.3;
-  config.camera.line_delay = 50e-6;
   config.path.amplitude = 0.4;
   config.path.period = 3;
-  simulator::PatchConfig mountains;
-  mountains.file = ALIDADE_TEST_DATA "/picosdeeuropa_by_Aitzol_Berasategi.jpg";
-  mountains.width = 40 * kPi / 180;
-  config.scene.photos.push_back(mountains);
-  config.sensor.exposure = 2e-3;
-  config.sensor.shot_noise = 0.02;
-  config.sensor.read_noise = 0.7;
   return config;
 }
 
@@ -79,7 +69,7 @@ std::vector<TelemetryResidual> residuals(double sigma, double stated) {
 class KeyframeMap : public ::testing::Test {
  protected:
   KeyframeMap()
-      : config_(camera_before_mountains()),
+      : config_(swinging_camera()),
         path_(simulator::make_path(config_)),
         renderer_(config_, *path_) {
     const simulator::CameraConfig& camera = config_.camera;

@@ -20,6 +20,7 @@
 
 #include "core/realtime/pt_mode.h"
 #include "test/simulator/renderer.h"
+#include "test/support/mountains.h"
 #include "test/support/parameter_changes.h"
 
 namespace alidade::test {
@@ -40,22 +41,11 @@ OeOptions small_options() {
   return options;
 }
 
-simulator::Config camera_before_mountains() {
-  simulator::Config config;
-  config.image = {kWidth, kHeight, kRateHz};
+simulator::Config swinging_camera() {
+  simulator::Config config = camera_before_mountains({kWidth, kHeight, kRateHz}, kFocalLength);
   config.duration = 10;
-  config.camera.focal_length = kFocalLength;
-  config.camera.radial_distortion = 0.3;
-  config.camera.line_delay = 50e-6;
   config.path.amplitude = 0.25;
   config.path.period = 6;
-  simulator::PatchConfig mountains;
-  mountains.file = ALIDADE_TEST_DATA "/picosdeeuropa_by_Aitzol_Berasategi.jpg";
-  mountains.width = 40 * kPi / 180;
-  config.scene.photos.push_back(mountains);
-  config.sensor.exposure = 2e-3;
-  config.sensor.shot_noise = 0.02;
-  config.sensor.read_noise = 0.7;
   return config;
 }
 
@@ -67,7 +57,7 @@ struct Sigmas {
 
 class VirtualCamera {
  public:
-  explicit VirtualCamera(const simulator::Config& config = camera_before_mountains())
+  explicit VirtualCamera(const simulator::Config& config = swinging_camera())
       : path_(simulator::make_path(config)), renderer_(config, *path_) {
     const simulator::CameraConfig& c = config.camera;
     calibration_.camera = {c.focal_length, c.aspect, c.radial_distortion, kWidth, kHeight};
@@ -341,7 +331,7 @@ TEST_F(OeModeOnFrames, IsTelemetryAloneWhereThePictureShowsNothing) {
 }
 
 TEST(OeMode, IsTelemetryAloneWhileTheLensIsCovered) {
-  simulator::Config config = camera_before_mountains();
+  simulator::Config config = swinging_camera();
   config.sensor.covered = {{0.795, 1.215}};
   VirtualCamera camera(config);
   OeMode oe(small_options());
@@ -928,7 +918,7 @@ TEST_F(HandedOverMap, IsForgottenWhereThePictureShowsSomethingElse) {
   }
   EXPECT_EQ(other_.map().size(), size);
   // Another scene, from the same mount.
-  simulator::Config config = camera_before_mountains();
+  simulator::Config config = swinging_camera();
   config.scene.photos[0].azimuth = 4.5 * kPi / 180;
   config.scene.photos[0].elevation = 5 * kPi / 180;
   VirtualCamera elsewhere(config);
@@ -967,7 +957,7 @@ TEST_F(HandedOverMap, IsForgottenWhereTelemetryContradictsIt) {
 }
 
 TEST(OeMode, GoesOnBesideAMapThatIsNotInViewAndFindsItAgain) {
-  simulator::Config config = camera_before_mountains();
+  simulator::Config config = swinging_camera();
   config.path.amplitude = 0.8;
   config.path.period = 10;
   config.scene.photos[0].width = 75 * kPi / 180;

@@ -160,6 +160,7 @@ double normalised(const Vector6& error, const Matrix6& covariance) {
 
 struct Score {
   int runs = 0;
+  int inliers = 0;
   double squares = 0;           // normalised, 6 degrees of freedom
   double squares_as_drawn = 0;  // ... by the covariance before inflation, about
   double inflation = 0;
@@ -169,6 +170,7 @@ struct Score {
     const Vector6 error = error_of(frame, solved);
     const double square = normalised(error, solved.covariance);
     ++runs;
+    inliers += solved.inliers;
     squares += square;
     squares_as_drawn += solved.inflation * square;
     inflation += solved.inflation;
@@ -196,6 +198,19 @@ void expect_consistent(const Score& score) {
 
 constexpr int kRuns = 600;
 
+// Frames as they are drawn, which all can be solved.
+Score score_of(const World& world, std::uint64_t seed) {
+  Simulation simulation(seed);
+  Score score;
+  for (int run = 0; run < kRuns; ++run) {
+    Frame frame = simulation.frame(world);
+    SolvedMotion solved;
+    EXPECT_EQ(frame.solve(world, &solved), SolveStatus::kOk);
+    score.add(frame, solved);
+  }
+  return score;
+}
+
 TEST(OrientationSolve, ErrorsAreAsLargeAsTheCovarianceSaysWithAndWithoutTelemetry) {
   for (const double line_delay : {20e-6, -14.2e-6}) {
     for (const bool has_telemetry : {true, false}) {
@@ -211,19 +226,10 @@ TEST(OrientationSolve, ErrorsAreAsLargeAsTheCovarianceSaysWithAndWithoutTelemetr
             world.telemetry_angle *= weak;
             world.telemetry_rate *= weak;
             world.shared = shared;
-            Simulation simulation(1);
-            Score score;
-            int inliers = 0;
-            for (int run = 0; run < kRuns; ++run) {
-              Frame frame = simulation.frame(world);
-              SolvedMotion solved;
-              ASSERT_EQ(frame.solve(world, &solved), SolveStatus::kOk);
-              inliers += solved.inliers;
-              score.add(frame, solved);
-            }
+            const Score score = score_of(world, 1);
             expect_consistent(score);
             // The gate's thousandth, and what a far start costs.
-            EXPECT_GT(inliers, 0.995 * kRuns * landmarks);
+            EXPECT_GT(score.inliers, 0.995 * kRuns * landmarks);
             EXPECT_LT(score.mean_inflation(), 1.3);
           }
         }
@@ -385,15 +391,7 @@ TEST(OrientationSolve, TakesFromEdgesWhatTheyKnow) {
     SCOPED_TRACE(edges);
     World world;
     world.edges = edges;
-    Simulation simulation(6);
-    Score score;
-    for (int run = 0; run < kRuns; ++run) {
-      Frame frame = simulation.frame(world);
-      SolvedMotion solved;
-      ASSERT_EQ(frame.solve(world, &solved), SolveStatus::kOk);
-      score.add(frame, solved);
-    }
-    expect_consistent(score);
+    expect_consistent(score_of(world, 6));
   }
 }
 
@@ -423,14 +421,7 @@ TEST(OrientationSolve, FindsOutThatNoiseWasUnderstated) {
   World world;
   world.understated = 3;
   world.has_telemetry = false;
-  Simulation simulation(8);
-  Score score;
-  for (int run = 0; run < kRuns; ++run) {
-    Frame frame = simulation.frame(world);
-    SolvedMotion solved;
-    ASSERT_EQ(frame.solve(world, &solved), SolveStatus::kOk);
-    score.add(frame, solved);
-  }
+  const Score score = score_of(world, 8);
   const double freedom = 2 * world.landmarks - 6;
   EXPECT_LT(score.mean(), 6 * freedom / (freedom - 2) + score.tolerance());
   // The larger of two estimates with standard deviations of 9 and 13 % is too large by up to 6 %, and

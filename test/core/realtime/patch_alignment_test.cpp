@@ -29,6 +29,7 @@ struct Statistics {
   double normalised = 0;                          // error squared by covariance, 2 degrees
   double noise_variances = 0;
 
+  [[nodiscard]] double bias() const { return (sum / count).cwiseAbs().maxCoeff(); }
   [[nodiscard]] double rms() const { return std::sqrt(squares / count); }
   [[nodiscard]] double anees() const { return normalised / count; }
 };
@@ -85,8 +86,7 @@ TEST(PatchAlignment, HasNoBiasAtAnyFractionOfAPixel) {
       change.shift = {i / 8.0, j / 8.0};
       for (int n = 0; n < 100; ++n) try_once(change, 0, &random, &statistics);
       ASSERT_GT(statistics.count, 20);
-      const Vector2<double> bias = statistics.sum / statistics.count;
-      EXPECT_LT(bias.cwiseAbs().maxCoeff(), 0.01) << change.shift.transpose();
+      EXPECT_LT(statistics.bias(), 0.01) << change.shift.transpose();
       EXPECT_LT(statistics.rms(), 0.02) << change.shift.transpose();
     }
   }
@@ -109,8 +109,7 @@ TEST(PatchAlignment, ErrorsAreAsLargeAsTheCovarianceSays) {
   EXPECT_NEAR(statistics.anees(), 2, 4 * sigma + 0.05 * 2);
   EXPECT_NEAR(statistics.rms(), std::sqrt(statistics.variances / statistics.count),
               0.05 * statistics.rms());
-  const Vector2<double> bias = statistics.sum / statistics.count;
-  EXPECT_LT(bias.cwiseAbs().maxCoeff(), 4 * statistics.rms() / std::sqrt(statistics.count));
+  EXPECT_LT(statistics.bias(), 4 * statistics.rms() / std::sqrt(statistics.count));
   // Both pictures' noise and rounding; the averaged correlation is 5 % too large.
   const double truth = 2 * (2 * 2 + 1.0 / 12);
   EXPECT_NEAR(statistics.noise_variances / statistics.count, 1.05 * truth, 0.05 * truth);
@@ -156,8 +155,7 @@ TEST(PatchAlignment, SlopeOfTheLightMovesNothing) {
       try_once(change, 0, &random, &statistics);
     }
     ASSERT_GT(statistics.count, 50);
-    const Vector2<double> bias = statistics.sum / statistics.count;
-    EXPECT_LT(bias.cwiseAbs().maxCoeff(), 0.01) << slope.transpose();
+    EXPECT_LT(statistics.bias(), 0.01) << slope.transpose();
     EXPECT_LT(statistics.rms(), 0.02) << slope.transpose();
   }
 }
@@ -181,8 +179,7 @@ TEST(PatchAlignment, FollowsRotationScaleAndShearThatTheCallerKnows) {
       try_once(change, 0, &random, &statistics);
     }
     ASSERT_GT(statistics.count, 50);
-    const Vector2<double> bias = statistics.sum / statistics.count;
-    EXPECT_LT(bias.cwiseAbs().maxCoeff(), 0.01) << A;
+    EXPECT_LT(statistics.bias(), 0.01) << A;
     EXPECT_LT(statistics.rms(), 0.03) << A;
   }
 }

@@ -292,15 +292,21 @@ TEST(StartUpTracker, FollowsAPictureThatTurns) {
   EXPECT_LT(run.errors.normalised, 1.25);
 }
 
+// A part of the landscape that moves to the side.
+sim::PatchConfig moving_object(const sim::Config& config, double width_deg, double rate_deg) {
+  sim::PatchConfig object;
+  object.file = config.scene.photos.front().file;
+  object.width = width_deg * kDegree;
+  object.height = 17 * kDegree;
+  object.azimuth_rate = rate_deg * kDegree;
+  return object;
+}
+
 // Two objects on 30 % of the view move at 3 px a frame.
 TEST(StartUpTracker, LeavesAloneWhatMovesByItself) {
   sim::Config config = camera(60, 0.07);
-  sim::PatchConfig object;
-  object.file = config.scene.photos.front().file;
-  object.width = 18 * kDegree;
-  object.height = 17 * kDegree;
+  sim::PatchConfig object = moving_object(config, 18, 10);
   object.brightness = 0.3;
-  object.azimuth_rate = 10 * kDegree;
   for (const double azimuth : {-16.0, 14.0}) {
     object.azimuth = azimuth * kDegree;
     config.scene.moving.push_back(object);
@@ -312,12 +318,7 @@ TEST(StartUpTracker, LeavesAloneWhatMovesByItself) {
 
 TEST(StartUpTracker, EndsPointsOnAnObjectTooSlowToContradictFromFrameToFrame) {
   sim::Config config = camera(60, 0.07);
-  sim::PatchConfig object;
-  object.file = config.scene.photos.front().file;
-  object.width = 20 * kDegree;
-  object.height = 17 * kDegree;
-  object.azimuth_rate = 1.8 * kDegree;  // 0.5 px a frame
-  config.scene.moving.push_back(object);
+  config.scene.moving.push_back(moving_object(config, 20, 1.8));  // 0.5 px a frame
   const Tracked run = track(
       config,
       [](double) {
