@@ -13,6 +13,7 @@
 
 #include "core/realtime/oe_mode.h"
 #include "test/simulator/renderer.h"
+#include "test/support/frame_errors.h"
 #include "test/support/mountains.h"
 
 namespace alidade {
@@ -91,12 +92,6 @@ class KeyframeMap : public ::testing::Test {
     }
     return out;
   }
-  // Where the direction that the frame gives to u truly is, less u, px.
-  Vector2<double> error(double time_s, const FrameOrientation& frame, const Vector2<double>& u) {
-    Vector3<double> d;
-    EXPECT_EQ(frame.direction(u, &d), ProjectionStatus::kOk);
-    return renderer_.camera().project_rolling(d, time_s).value_or(u + Vector2<double>(1e3, 0)) - u;
-  }
 
   simulator::Config config_;
   std::unique_ptr<simulator::Path> path_;
@@ -132,18 +127,11 @@ TEST_F(KeyframeMap, PutsAnotherOeModeIntoTheBaseFrameInItsFirstFrame) {
     ASSERT_EQ(mode.process({picture.data(), kWidth, kHeight, kWidth}, time_s, &telemetry, &frame),
               OeStatus::kOk)
         << time_s;
-    for (const Vector2<double>& u :
-         {Vector2<double>(240, 135), Vector2<double>(24, 14), Vector2<double>(456, 14),
-          Vector2<double>(24, 256), Vector2<double>(456, 256)}) {
-      Vector3<double> d;
-      ASSERT_EQ(frame.direction(u, &d), ProjectionStatus::kOk);
-      Vector2<double> back;
-      Matrix2<double> covariance;
-      ASSERT_EQ(frame.pixel(d, &back, &covariance), ProjectionStatus::kOk);
-      const Vector2<double> e = error(time_s, frame, u);
-      worst_px = std::max(worst_px, e.norm());
-      worst_square = std::max(worst_square, e.dot(covariance.inverse() * e));
-    }
+    double px = 0;
+    double square = 0;
+    test::judge_frame(renderer_.camera(), time_s, frame, &px, &square);
+    worst_px = std::max(worst_px, px);
+    worst_square = std::max(worst_square, square);
   }
   // A hundred looks of 2 degrees of freedom stay below 23 (one in a thousand); telemetry erred by 3 px.
   EXPECT_LT(worst_square, 23);

@@ -13,13 +13,13 @@
 #include <limits>
 #include <map>
 #include <memory>
-#include <optional>
 #include <random>
 #include <set>
 #include <vector>
 
 #include "core/realtime/pt_mode.h"
 #include "test/simulator/renderer.h"
+#include "test/support/frame_errors.h"
 #include "test/support/mountains.h"
 #include "test/support/parameter_changes.h"
 
@@ -120,30 +120,10 @@ class VirtualCamera {
   // Where the direction that the frame gives to u truly is, less u, px.
   [[nodiscard]] Vector2<double> error(int k, const FrameOrientation& frame,
                                       const Vector2<double>& u) const {
-    Vector3<double> d;
-    EXPECT_EQ(frame.direction(u, &d), ProjectionStatus::kOk);
-    const std::optional<Eigen::Vector2d> truth = renderer_.camera().project_rolling(d, time_s(k));
-    EXPECT_TRUE(truth.has_value());
-    return truth.value_or(u) - u;
+    return pixel_error(renderer_.camera(), time_s(k), frame, u);
   }
-
-  // The largest error, px, and the largest of its squares by covariance, 2 degrees of freedom, at the
-  // centre and near the corners.
   void judge(int k, const FrameOrientation& frame, double* px, double* square) const {
-    *px = 0;
-    *square = 0;
-    for (const Vector2<double>& u :
-         {Vector2<double>(240, 135), Vector2<double>(24, 14), Vector2<double>(456, 14),
-          Vector2<double>(24, 256), Vector2<double>(456, 256)}) {
-      Vector3<double> d;
-      ASSERT_EQ(frame.direction(u, &d), ProjectionStatus::kOk);
-      Vector2<double> back;
-      Matrix2<double> covariance;
-      ASSERT_EQ(frame.pixel(d, &back, &covariance), ProjectionStatus::kOk);
-      const Vector2<double> e = error(k, frame, u);
-      *px = std::max(*px, e.norm());
-      *square = std::max(*square, e.dot(covariance.inverse() * e));
-    }
+    judge_frame(renderer_.camera(), time_s(k), frame, px, square);
   }
 
  private:
