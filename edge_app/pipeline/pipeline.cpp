@@ -62,6 +62,7 @@ void Pipeline::stop() {
 PipelineSummary Pipeline::summary() const {
   PipelineSummary summary = summary_;
   summary.drops = stage_.drops();
+  summary.page_faults = page_faults_;
   return summary;
 }
 
@@ -137,9 +138,12 @@ void Pipeline::run_realtime() {
   const RealtimeReport report = apply_realtime(options_.realtime);
   spdlog::log(report.warnings.empty() ? spdlog::level::info : spdlog::level::warn,
               "real-time thread: {}", report.line());
+  const PageFaults at_start = thread_page_faults();
   do {
     stage_.wait();
   } while (stage_.process());
+  const PageFaults at_end = thread_page_faults();
+  page_faults_ = {at_end.minor - at_start.minor, at_end.major - at_start.major};
 }
 
 void Pipeline::feed_calibration() {

@@ -53,6 +53,7 @@ struct PipelineSummary {
   LatencyHistogram waiting;
   LatencyHistogram computing;
   LatencyHistogram writing;
+  PageFaults page_faults;  // of the real-time thread, after its start-up
 };
 
 class Pipeline {
@@ -103,6 +104,7 @@ class Pipeline {
   std::mutex error_mutex_;     // the first of several threads to fail is heard; not on the
   std::string error_;          // real-time thread
   PipelineSummary summary_;    // output thread
+  PageFaults page_faults_;     // real-time thread
   DropCounters drops_logged_;  // output thread
   double drops_logged_at_s_ = 0;
   std::vector<std::thread> threads_;
