@@ -3,9 +3,27 @@
 #include "platform/system/clock.h"
 
 namespace alidade {
+namespace {
+
+// A page that is touched for the first time is a page fault: this touches all of a queue's.
+template <class Message, class Queue>
+void touch(Queue* queue) {
+  while (queue->push(Message())) {
+  }
+  queue->reset();
+}
+
+}  // namespace
 
 RealtimeStage::RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed)
-    : step_(options), measure_latency_(measure_latency), feed_wanted_(feed) {}
+    : step_(options), measure_latency_(measure_latency), feed_wanted_(feed) {
+  // Those that the real-time thread fills.
+  touch<OutputMessage>(&output_queue_);
+  touch<FeedFrame>(&feed_frames_);
+  touch<PanTiltSample>(&feed_samples_);
+  touch<PictureSlot>(&returned_);
+  touch<const PublishedCalibration*>(&adopted_);
+}
 
 bool RealtimeStage::push(const VideoMessage& message) {
   const bool pushed = video_queue_.push(message);

@@ -10,7 +10,7 @@
 // picture last, this thread or the calibration thread, gives the slot back.
 // Each queue has one producer and one consumer, a fixed capacity and fixed-size messages. A full
 // queue drops the new message and counts it; nobody waits for anybody. process() allocates nothing,
-// takes no lock, logs nothing and throws nothing.
+// takes no lock, logs nothing and throws nothing; what it writes the constructor has touched.
 
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>

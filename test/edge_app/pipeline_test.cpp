@@ -11,6 +11,7 @@
 
 #include "platform/system/clock.h"
 #include "test/edge_app/scripted_sources.h"
+#include "test/support/fresh_memory.h"
 
 namespace alidade {
 namespace {
@@ -140,6 +141,32 @@ TEST_F(PipelineTest, GivesAnOrientationFromTheTelemetryOfItsTime) {
   EXPECT_NEAR(record.orientation->pan_rad, pan(*record.time_s), 1e-6);
   pipeline.stop();
   EXPECT_EQ(pipeline.error(), "");
+}
+
+// A picture that nobody has touched is a page fault a page to the thread that looks at it first.
+TEST_F(PipelineTest, CountsThePageFaultsOfTheRealtimeThread) {
+  constexpr std::size_t kPage = 4096;
+  PipelineOptions options = options_for_tests();
+  Camera<double>& camera = options.step.calibration.camera;
+  camera.width = 1280;
+  camera.height = 720;
+  options.step.calibrated = false;
+  options.step.oe = OeOptions();
+  options.step.follow_points = true;  // whatever is known of the camera's angle
+  const test::FreshMemory picture(static_cast<std::size_t>(camera.width) *
+                                  static_cast<std::size_t>(camera.height));
+  Frame unseen = frame();
+  unseen.width = camera.width;
+  unseen.height = camera.height;
+  unseen.stride = camera.width;
+  unseen.luma = reinterpret_cast<const std::uint8_t*>(picture.data());
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options);
+  pipeline.start();
+  video_.push(unseen);
+  video_.push(ReadStatus::kEnd);
+  ASSERT_TRUE(finished(pipeline));
+  pipeline.stop();
+  EXPECT_GE(pipeline.summary().page_faults.minor, static_cast<long>(picture.size() / kPage));
 }
 
 TEST_F(PipelineTest, SaysNoneWhileTheVideoIsAwayAndGoesOnWhenItIsBack) {

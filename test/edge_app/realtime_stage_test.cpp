@@ -7,11 +7,14 @@
 
 #include <atomic>
 #include <memory>
+#include <new>
 #include <thread>
 #include <vector>
 
 #include "platform/system/clock.h"
+#include "platform/system/realtime.h"
 #include "test/support/allocation_guard.h"
+#include "test/support/fresh_memory.h"
 
 namespace alidade {
 namespace {
@@ -122,6 +125,36 @@ TEST(RealtimeStage, AllocatesNothing) {
   telemetry.join();
   EXPECT_EQ(records, kRounds - stage->drops().frames - stage->drops().records);
   EXPECT_GT(with_orientation, 0);
+}
+
+// As many frames as the queues hold: each is written into memory that was not used before.
+TEST(RealtimeStage, TouchesItsQueuesBeforehand) {
+  constexpr std::size_t kPage = 4096;
+  constexpr int kFrames = 200;
+  constexpr int kBeforehand = 10;  // to bring in the code
+  const test::FreshMemory memory(sizeof(RealtimeStage));
+  OrientationStepOptions options;
+  options.calibration.camera.focal_length = 30000;
+  auto* const stage = new (memory.data()) RealtimeStage(options, true, true);
+  const auto process = [stage](int from, int to) {
+    for (int i = from; i < to; ++i) {
+      stage->push(sample_message(0.001 * i));
+      stage->push(frame_message(i));
+      EXPECT_TRUE(stage->process());
+    }
+  };
+  process(0, kBeforehand);
+  const PageFaults before = thread_page_faults();
+  process(kBeforehand, kFrames);
+  const PageFaults after = thread_page_faults();
+  FeedFrame heard;
+  int count = 0;
+  while (stage->pop(heard)) ++count;
+  stage->~RealtimeStage();
+  EXPECT_EQ(count, kFrames);
+  // Untouched, these frames alone would take so many; the kernel may have reasons of its own for some.
+  constexpr long kUntouched = (kFrames - kBeforehand) * sizeof(FeedFrame) / kPage;
+  EXPECT_LT(after.minor - before.minor, kUntouched / 4);
 }
 
 // Blocks of random brightness, which shift with the frame: something to follow, and to make a map of.

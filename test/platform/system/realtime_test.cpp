@@ -4,7 +4,6 @@
 #include <gtest/gtest.h>
 #include <pthread.h>
 #include <sched.h>
-#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -18,10 +17,12 @@
 #include <vector>
 
 #include "platform/system/clock.h"
+#include "test/support/fresh_memory.h"
 
 namespace alidade {
 namespace {
 
+using test::FreshMemory;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -58,27 +59,6 @@ constexpr bool kOwnMemoryOnly = false;
 #else
 constexpr bool kOwnMemoryOnly = true;
 #endif
-
-// Memory that nobody has touched, in small pages.
-class FreshMemory {
- public:
-  explicit FreshMemory(std::size_t size)
-      : size_(size),
-        data_(::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0)) {
-    if (data_ == MAP_FAILED) std::abort();
-    static_cast<void>(::madvise(data_, size_, MADV_NOHUGEPAGE));
-  }
-  FreshMemory(const FreshMemory&) = delete;
-  FreshMemory& operator=(const FreshMemory&) = delete;
-  ~FreshMemory() { ::munmap(data_, size_); }
-
-  [[nodiscard]] char* data() const { return static_cast<char*>(data_); }
-  [[nodiscard]] std::size_t size() const { return size_; }
-
- private:
-  std::size_t size_;
-  void* data_;
-};
 
 // Page faults of touching all of it.
 long faults_of_touching(char* memory, std::size_t size) {
