@@ -365,7 +365,6 @@ nlohmann::json report(const char* name, const Condition& condition) {
 nlohmann::json run(const RealtimeOptions& options) {
   const TurningCamera camera(kHeight, kPictures);
   const Heard heard(camera);
-  // On the heap of the process before the real-time thread locks it, as in `alidade run`.
   CalibrationThread calibration(heard);
   LiveStage live(camera, options);
   Condition start_up;
@@ -390,25 +389,25 @@ nlohmann::json run(const RealtimeOptions& options) {
     add(between, live.uses(), &without.uses);
   }
   for (const std::string& line : calibration.messages()) std::printf("%s\n", line.c_str());
+  if (with.frames.empty() || calibration.publications() == 0) return {};
 
   Condition adopting;
   const Uses before = live.uses();
-  for (int i = 0; calibration.published() != nullptr && i < kAdoptions; ++i) {
+  for (int i = 0; i < kAdoptions; ++i) {
     live.adopt(calibration.published().get());
     for (int k = 0; k < kAfterAdoption; ++k) adopting.frames.push_back(live.next_frame());
   }
   add(before, live.uses(), &adopting.uses);
 
   std::printf(
-      "real-time thread: %s\n%d works of the calibration thread, %d publications, %.2f s each, "
-      "%.0f %% of a "
+      "real-time thread: %s\n"
+      "%d works of the calibration thread, %d publications, %.2f s each, %.0f %% of a "
       "processor\n\n",
       live.granted().c_str(), calibration.works(), calibration.publications(),
       calibration.wall_s() / std::max(1, calibration.works()), 100 * calibration.cpu_share());
   std::printf(
-      "| frames | count | in OE mode | computing p50 ms | p99 | max | from pushed p50 ms | p99 | "
-      "max "
-      "| processors taken by others | page faults | heap uses |\n"
+      "| frames | count | in OE mode | computing p50 ms | p99 | max | from pushed p50 ms | p99 "
+      "| max | processors taken by others | page faults | heap uses |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   nlohmann::json out;
   out["width"] = camera.calibration().camera.width;
@@ -417,7 +416,7 @@ nlohmann::json run(const RealtimeOptions& options) {
   out["start_up"] = report("start-up", start_up);
   out["without"] = report("without calibration", without);
   out["with"] = report("with calibration", with);
-  if (!adopting.frames.empty()) out["adopting"] = report("adopting", adopting);
+  out["adopting"] = report("adopting", adopting);
   out["calibration"]["works"] = calibration.works();
   out["calibration"]["publications"] = calibration.publications();
   out["calibration"]["cpu_share"] = calibration.cpu_share();
@@ -439,6 +438,10 @@ int main(int argc, char** argv) {
   options.priority = normal ? 0 : alidade::benchmarks::kPriority;
   options.lock_memory = !normal;
   const nlohmann::json report = alidade::benchmarks::run(options);
+  if (report.is_null()) {
+    std::fprintf(stderr, "nothing was calibrated meanwhile\n");
+    return 1;
+  }
   if (argc > 1) {
     std::ofstream file(argv[1]);
     file << report.dump(2) << '\n';
