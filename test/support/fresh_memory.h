@@ -8,6 +8,13 @@
 
 namespace alidade::test {
 
+// False: the sanitizers touch memory besides the program's.
+#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+inline constexpr bool kOwnMemoryOnly = false;
+#else
+inline constexpr bool kOwnMemoryOnly = true;
+#endif
+
 class FreshMemory {
  public:
   explicit FreshMemory(std::size_t size)

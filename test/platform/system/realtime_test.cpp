@@ -23,6 +23,7 @@ namespace alidade {
 namespace {
 
 using test::FreshMemory;
+using test::kOwnMemoryOnly;
 using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
@@ -52,13 +53,6 @@ int in_child(const std::function<int()>& run) {
 }
 constexpr int kGood = 0;
 constexpr int kNotPermitted = 77;
-
-// Sanitizers touch memory of their own.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
-constexpr bool kOwnMemoryOnly = false;
-#else
-constexpr bool kOwnMemoryOnly = true;
-#endif
 
 // Page faults of touching all of it.
 long faults_of_touching(char* memory, std::size_t size) {
