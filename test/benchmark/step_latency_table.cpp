@@ -127,8 +127,7 @@ OrientationStepOptions step_options(const TurningCamera& camera, bool calibrated
   options.calibration = camera.calibration();
   options.calibrated = calibrated;
   options.telemetry_noise.pan_tilt_sigma = kAngleSigma;
-  options.oe = OeOptions();
-  options.oe->cell_size_px = camera.calibration().camera.width / 24.0;
+  options.oe = oe_options(camera.calibration().camera);
   options.follow_points = true;
   return options;
 }
