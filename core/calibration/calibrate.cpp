@@ -78,6 +78,7 @@ class Calibrator {
   [[nodiscard]] double repetition() const;
   bool adjust_for_repetition(Adjustment* adjustment);
   void conclude();
+  [[nodiscard]] double stamps_variance() const;  // s^2, what stamps leave open of the clock offset
 
   const CalibrationInput& input_;
   const CalibrationOptions& options_;
@@ -344,9 +345,8 @@ void Calibrator::set_priors() {
   if (options_.clock_offset) {
     // The shift between the lines is d plus what the stamps' noise leaves open; never exact.
     mean.shift_s = options_.clock_offset->value;
-    set(Parameter::kClockOffset, std::sqrt(std::pow(options_.clock_offset->sigma, 2) +
-                                           std::pow(image_clock_.offset_sigma_s, 2) +
-                                           std::pow(telemetry_clock_.offset_sigma_s, 2)));
+    set(Parameter::kClockOffset,
+        std::sqrt(std::pow(options_.clock_offset->sigma, 2) + stamps_variance()));
   }
   const bool both_steady = image_clock_.steady && telemetry_clock_.steady;
   const double drift_variance =
@@ -696,6 +696,11 @@ bool Calibrator::correct_noise() {
   return pixels || telemetry;
 }
 
+double Calibrator::stamps_variance() const {
+  return std::pow(image_clock_.offset_sigma_s, 2) + std::pow(telemetry_clock_.offset_sigma_s, 2) +
+         std::pow(input_.noise.telemetry_common_sigma_s, 2);
+}
+
 void Calibrator::conclude() {
   const double image_variance =
       image_clock_.steady ? std::pow(image_clock_.period_sigma_s / image_clock_.period_s, 2) : 0;
@@ -709,11 +714,10 @@ void Calibrator::conclude() {
   const double image_rate = -share * state_.drift;
   const double rate_variance = total > 0 ? image_variance * telemetry_variance / total : 0;
   const double lever = data_.reference_s - state_.shift_s - image_clock_.middle_s;
-  const double stamps_variance =
-      std::pow(image_clock_.offset_sigma_s, 2) + std::pow(telemetry_clock_.offset_sigma_s, 2);
   double stamps_share = 0;
   if (options_.clock_offset) {
-    stamps_share = stamps_variance / (stamps_variance + std::pow(options_.clock_offset->sigma, 2));
+    stamps_share =
+        stamps_variance() / (stamps_variance() + std::pow(options_.clock_offset->sigma, 2));
   }
 
   Calibration& c = result_.calibration;
@@ -745,7 +749,7 @@ void Calibrator::conclude() {
   J(d, kDrift) = lever * share;
   c.covariance = J * covariance_ * J.transpose();
   ParameterCovariance<double> timing = ParameterCovariance<double>::Zero();
-  timing(d, d) = stamps_variance * (1 - stamps_share) + lever * lever * rate_variance;
+  timing(d, d) = stamps_variance() * (1 - stamps_share) + lever * lever * rate_variance;
   if (!line_delay_known) {
     timing(l, l) = state_.line_delay() * state_.line_delay() * rate_variance;
     timing(l, d) = timing(d, l) = -lever * state_.line_delay() * rate_variance;

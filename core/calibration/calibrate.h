@@ -52,6 +52,9 @@ struct CalibrationNoise {
   std::optional<double> telemetry_period_s;
   std::optional<double> telemetry_period_sigma_s;
   std::optional<double> pan_tilt_sigma_rad;
+  // Of an error that all telemetry stamps have in common, on top of the above: no number of samples
+  // averages it out of the clock offset. s
+  double telemetry_common_sigma_s = 0;
 };
 
 struct CalibrationInput {

@@ -105,17 +105,25 @@ void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
       samples, [](const PanTiltSample& sample) { return sample.sequence; },
       [](const PanTiltSample& sample) { return sample.device_time_s; });
   double square_widths = 0;
+  std::vector<double> widths;
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const PanTiltSample& sample = samples[i];
     const double width = sample.latest_time_s - sample.earliest_time_s;
     const double stamp = polled ? sample.latest_time_s - width / 2 : sample.latest_time_s;
     input->telemetry.push_back({stamp, sample.pan_rad, sample.tilt_rad, counts[i]});
     square_widths += width * width;
+    widths.push_back(width);
   }
   CalibrationNoise& noise = input->noise;
   if (polled && square_widths > 0 && !noise.telemetry_stamp_sigma_s) {
     noise.telemetry_stamp_sigma_s =
         std::sqrt(square_widths / static_cast<double>(samples.size()) / 12);
+  }
+  if (polled && square_widths > 0) {
+    // Where in the interval a device looks, it does so in every poll.
+    const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
+    std::nth_element(widths.begin(), middle, widths.end());
+    noise.telemetry_common_sigma_s = *middle / std::sqrt(12.0);
   }
   // Only an interval tells a poll from a stream whose device sends neither count nor time.
   options->telemetry_stamps = polled && square_widths > 0     ? StampNoise::kOwnTimes

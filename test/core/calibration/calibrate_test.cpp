@@ -272,6 +272,25 @@ TEST(Calibrate, UsesPolledTelemetryAtItsOwnTimes) {
   EXPECT_NEAR(result.quality.telemetry_sigma_ratio, 1, 0.2);
 }
 
+// A device that answers late, each time, moves the clock offset by that much, and nothing else.
+TEST(Calibrate, StampsThatErrAlikeAreInTheClockOffsetOnly) {
+  const Simulation s = small_simulation(19);
+  CalibrationInput input = simulate(s);
+  const CalibrationResult before = calibrate(input);
+  constexpr double kCommon = 2e-3;  // s
+  for (CalibrationTelemetry& sample : input.telemetry) sample.stamp_s += kCommon;
+  input.noise.telemetry_common_sigma_s = kCommon;
+  const CalibrationResult after = calibrate(input);
+  expect_within_sigmas(s, after);
+  EXPECT_NEAR(after.calibration.clock_offset - before.calibration.clock_offset, kCommon, 1e-6);
+  const int d = index(Parameter::kClockOffset);
+  ParameterCovariance<double> expected = before.calibration.covariance;
+  expected(d, d) += kCommon * kCommon;
+  for (int i = 0; i < kParameterCount; ++i) {
+    EXPECT_NEAR(after.calibration.covariance(i, i), expected(i, i), 1e-3 * expected(i, i));
+  }
+}
+
 TEST(Calibrate, SaysThatScaleAndFocalLengthCannotBeToldApart) {
   Simulation s = small_simulation(14);
   s.focal_length = 60000;

@@ -977,5 +977,51 @@ TEST(OeMode, GoesOnBesideAMapThatIsNotInViewAndFindsItAgain) {
   EXPECT_GT(found, 20);
 }
 
+// What a wrong rate has done to landmarks that were founded elsewhere is taken from those alone.
+TEST(OeMode, LeavesAMapThatIsNotInViewAsItIs) {
+  simulator::Config config = swinging_camera();
+  config.path.amplitude = 0.8;
+  config.path.period = 10;
+  config.scene.photos[0].width = 75 * kPi / 180;
+  VirtualCamera camera(config);
+  OeMode oe(small_options());
+  oe.reset(camera.calibration());
+  FrameOrientation frame;
+  const auto process = [&](int k, const InterpolatedPanTilt& telemetry) {
+    const OeStatus status =
+        oe.process(camera.image(k), VirtualCamera::time_s(k), &telemetry, &frame);
+    oe.maintain();
+    return status;
+  };
+  // The second is so much that landmarks are made anew.
+  for (const double wrong : {25 * kPixel, 80 * kPixel}) {
+    oe.reset(camera.calibration());
+    for (int k = 175; k < 200; ++k) {
+      ASSERT_EQ(process(k, camera.telemetry(k)), k == 175 ? OeStatus::kTooFew : OeStatus::kOk) << k;
+    }
+    const MapState map = oe.map_state();
+    double too_fast_at_first = 0;
+    double too_fast = 0;
+    for (int k = 50; k < 75; ++k) {
+      const Sigmas exact{kPixel, 1e-3 * kPixel};
+      const double truth = camera.telemetry(k, exact).rate.pan;
+      InterpolatedPanTilt telemetry = camera.telemetry(k, {kPixel, wrong});
+      if (k == 50) telemetry.rate.pan = truth + wrong;
+      ASSERT_EQ(process(k, telemetry), k == 50 ? OeStatus::kTooFew : OeStatus::kOk) << k;
+      too_fast = frame.rate.pan - truth;
+      if (k == 51) too_fast_at_first = too_fast;
+    }
+    expect_honest(camera, 74, frame);
+    EXPECT_GT(too_fast_at_first, 0.5 * wrong);
+    EXPECT_LT(std::abs(too_fast), 0.3 * wrong);
+    std::map<std::uint32_t, Vector3<double>> after;
+    for (const Landmark& landmark : oe.map_state().landmarks) after[landmark.id] = landmark.d;
+    for (const Landmark& landmark : map.landmarks) {
+      ASSERT_EQ(after.count(landmark.id), 1U);
+      EXPECT_LT((after[landmark.id] - landmark.d).norm(), 0.02 * kPixel);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace alidade::test
