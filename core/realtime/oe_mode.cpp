@@ -154,10 +154,8 @@ struct OeMode::State {
                        const Matrix2<double>& covariance, const Matrix2<double>& shared);
   void remember_motion();
   [[nodiscard]] bool straighten_map();
-  void bend_map(const Matrix2<double>& map_error, const Matrix2<double>& view_error,
+  void bend_map(const Vector2<double>& rate, const Vector2<double>& acceleration,
                 double origin_tilt);
-  [[nodiscard]] double share_of_view(const Vector3<double>& axis, const Vector3<double>& d) const;
-  void retire_landmarks_about_view();
   void judge_coarse(const ViewProjection& view);
   void refine_landmarks();
   void mark(int slot, bool matched, double residual_square);
@@ -211,10 +209,8 @@ struct OeMode::State {
   };
   std::array<Untold, kRemembered> untold;
   std::size_t next_untold = 0;
-  // Of (angle, rate, acceleration) of pan, of tilt, by the bend that all of the map has ...
-  std::array<Matrix3<double>, 2> map_bend{};
-  // ... and by that which what is in view now has besides: angles against the first frame's ...
-  std::array<Matrix3<double>, 2> view_bend{};
+  // Of (angle, rate, acceleration) of pan, of tilt, by the map's bend: angle against the first frame's ...
+  std::array<Matrix3<double>, 2> bend_covariance{};
   double bend_tilt = 0;  // ... for a frame that looks at this tilt
   struct Past {
     double time_s;  // middle row
@@ -239,9 +235,10 @@ struct OeMode::State {
   Matrix6 motion_covariance = Matrix6::Zero();                  // by the frame's own noise
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();  // of its angles, by the map's
   Sensitivity<6> motion_sensitivity = Sensitivity<6>::Zero();
-  double now_s = 0;       // its frame_time_s
-  bool told = false;      // by telemetry that was not extrapolated
-  bool may_make = false;  // motion is sure enough for new landmarks
+  double now_s = 0;         // its frame_time_s
+  bool told = false;        // by telemetry that was not extrapolated
+  bool may_make = false;    // motion is sure enough for new landmarks
+  double share_of_new = 0;  // of the landmarks in view, made by the maintain() before
   double inflation = 1;
 
   // The last frame with an orientation.
@@ -369,8 +366,7 @@ void OeMode::State::forget_map() {
   untold.fill({});
   late_contradiction = false;
   noise_sigma = kExpectedNoise;
-  map_bend.fill(Matrix3<double>::Zero());
-  view_bend.fill(Matrix3<double>::Zero());
+  for (Matrix3<double>& covariance : bend_covariance) covariance.setZero();
   past_count = 0;
   contradictions = 0;
   lost = 0;
@@ -401,7 +397,7 @@ void OeMode::State::take(const MapState& from) {
   }
   if (map.size() == 0) return;
   offset = {from.offset.vector(), symmetric(from.offset_covariance), from.offset_sensitivity};
-  map_bend = from.bend_covariance;
+  bend_covariance = from.bend_covariance;
   bend_tilt = from.bend_tilt;
 }
 
@@ -414,9 +410,7 @@ MapState OeMode::State::map_state() const {
   out.offset = {offset.value.x(), offset.value.y()};
   out.offset_covariance = offset.covariance;
   out.offset_sensitivity = offset.sensitivity;
-  for (std::size_t axis = 0; axis < 2; ++axis) {
-    out.bend_covariance[axis] = map_bend[axis] + view_bend[axis];
-  }
+  out.bend_covariance = bend_covariance;
   out.bend_tilt = bend_tilt;
   return out;
 }
@@ -849,19 +843,16 @@ void OeMode::State::move_bend(double tilt) {
   carry(0, 1) = t;
   carry(0, 2) = t * t / 2;
   carry(1, 2) = t;
-  for (auto* bend : {&map_bend, &view_bend}) {
-    for (Matrix3<double>& covariance : *bend) {
-      covariance = carry * covariance * carry.transpose();
-      covariance = symmetric(covariance);
-    }
+  for (Matrix3<double>& covariance : bend_covariance) {
+    covariance = carry * covariance * carry.transpose();
+    covariance = symmetric(covariance);
   }
   bend_tilt = tilt;
 }
 
 void OeMode::State::add_bend(Matrix6* covariance) const {
   for (int axis = 0; axis < 2; ++axis) {
-    const auto at = static_cast<std::size_t>(axis);
-    const Matrix3<double> bend = map_bend[at] + view_bend[at];
+    const Matrix3<double>& bend = bend_covariance[static_cast<std::size_t>(axis)];
     for (int i = 0; i < 3; ++i) {
       for (int j = 0; j < 3; ++j) (*covariance)(2 * i + axis, 2 * j + axis) += bend(i, j);
     }
@@ -869,9 +860,7 @@ void OeMode::State::add_bend(Matrix6* covariance) const {
 }
 
 Matrix2<double> OeMode::State::bend_of_angles() const {
-  return Vector2<double>(map_bend[0](0, 0) + view_bend[0](0, 0),
-                         map_bend[1](0, 0) + view_bend[1](0, 0))
-      .asDiagonal();
+  return Vector2<double>(bend_covariance[0](0, 0), bend_covariance[1](0, 0)).asDiagonal();
 }
 
 bool OeMode::State::learn_offset(double frame_time_s, const Vector2<double>& innovation,
@@ -953,14 +942,12 @@ void OeMode::State::remember_motion() {
 // better: the derivatives of the curve through five of them, in its middle, are held against the rate
 // and acceleration that the map showed there, and the map is bent back, as far as that is sure
 // (Kalman). True if it was bent by so much that the small corrections this can make leave it crooked.
-// What the first frame did to all is learnt once and taken from all; what frames since have added to it is in
-// what they saw, and taken from that alone: in the rest of a map, small corrections without end would add up.
 bool OeMode::State::straighten_map() {
-  // Of the landmarks in view a twentieth is new and takes over the errors of the frame it was made in.
-  constexpr double kInherited = 0.05 * 0.05;
+  // New landmarks take over the errors of the frame they are made in.
+  const double inherited = share_of_new * share_of_new;
   for (int axis = 0; axis < 2; ++axis) {
-    view_bend[static_cast<std::size_t>(axis)].bottomRightCorner<2, 2>() +=
-        kInherited * rate_covariance(motion_covariance, axis);
+    bend_covariance[static_cast<std::size_t>(axis)].bottomRightCorner<2, 2>() +=
+        inherited * rate_covariance(motion_covariance, axis);
   }
   if (past_count < static_cast<int>(past.size()) || calibration.line_delay == 0) return false;
   const Past& middle = past[kCurve / 2];
@@ -987,12 +974,10 @@ bool OeMode::State::straighten_map() {
                                                      .cwiseMax(past[1].surprise.cwiseAbs())
                                                      .cwiseMax(past[2].surprise.cwiseAbs());
   move_bend(middle.angle.y());
-  // Columns rate, acceleration.
-  Matrix2<double> map_error = Matrix2<double>::Zero();
-  Matrix2<double> view_error = Matrix2<double>::Zero();
+  Vector2<double> too_fast = Vector2<double>::Zero();
+  Vector2<double> too_much = Vector2<double>::Zero();
   for (int axis = 0; axis < 2; ++axis) {
-    Matrix3<double>& of_map = map_bend[static_cast<std::size_t>(axis)];
-    Matrix3<double>& of_view = view_bend[static_cast<std::size_t>(axis)];
+    Matrix3<double>& bend = bend_covariance[static_cast<std::size_t>(axis)];
     const Vector2<double> wrong(middle.rate[axis] - rate[axis],
                                 middle.acceleration[axis] - acceleration[axis]);
     Matrix2<double> noise = rate_covariance(middle.covariance, axis);
@@ -1002,70 +987,67 @@ bool OeMode::State::straighten_map() {
     noise(0, 0) += to_rate.squaredNorm() * angle_variance + rate_surprise * rate_surprise;
     noise(1, 1) += to_acceleration.squaredNorm() * angle_variance +
                    acceleration_surprise * acceleration_surprise;
-    const Matrix2<double> to_information =
-        (of_map.bottomRightCorner<2, 2>() + of_view.bottomRightCorner<2, 2>() + noise).inverse();
+    const Matrix2<double> to_information = (bend.bottomRightCorner<2, 2>() + noise).inverse();
     constexpr double kGate = 25;  // chi-square, 2 degrees of freedom
     if (!(wrong.dot(to_information * wrong) < kGate)) {
       // A jerk, or a bend beyond what was thought: if it stays, it will be believed.
       // What it has done to the angle is told by move_bend() alone: nothing here could ever take that back.
       const Vector3<double> doubt(1, std::sqrt(2.0), std::sqrt(2.0));
-      of_map = (doubt.asDiagonal() * of_map * doubt.asDiagonal()).eval();
-      of_view = (doubt.asDiagonal() * of_view * doubt.asDiagonal()).eval();
+      bend = (doubt.asDiagonal() * bend * doubt.asDiagonal()).eval();
       continue;
     }
-    const auto learn = [&](Matrix3<double>* bend, Matrix2<double>* error) {
-      const Matrix<double, 3, 2> gain = bend->rightCols<2>() * to_information;
-      const Vector3<double> found_error = gain * wrong;
-      // The angle has gone wrong with the way from where the map began, by the rate that was.
-      offset.value[axis] -= found_error[0];
-      error->row(axis) = found_error.tail<2>();
-      *bend = symmetric<3>(*bend - gain * bend->bottomRows<2>());
-    };
-    learn(&of_map, &map_error);
-    learn(&of_view, &view_error);
+    const Matrix<double, 3, 2> gain = bend.rightCols<2>() * to_information;
+    const Vector3<double> error = gain * wrong;
+    // The angle has gone wrong with the way from where the map began, by the rate that was.
+    offset.value[axis] -= error[0];
+    too_fast[axis] = error[1];
+    too_much[axis] = error[2];
+    bend -= gain * bend.bottomRows<2>();
+    bend = symmetric(bend);
   }
-  bend_map(map_error, view_error, middle.angle.y());
+  bend_map(too_fast, too_much, middle.angle.y());
   constexpr double kCrooked = 0.2;  // px, at the first and the last row
   const double half_readout_s = calibration.line_delay * motion.reference_row;
-  const double too_fast = (map_error + view_error).col(0).norm();
-  return too_fast * std::abs(half_readout_s) * calibration.camera.focal_length > kCrooked;
+  return too_fast.norm() * std::abs(half_readout_s) * calibration.camera.focal_length > kCrooked;
 }
 
-// Takes from landmarks what so much too high rates and accelerations (columns), shown by a frame that looked
+// Takes from all landmarks what so much too high a rate and acceleration, shown by a frame that looked
 // at origin_tilt, have put into them: the angle at the time of the row in which that frame would have seen
-// their elevation. map_error is in all of them, view_error in those about the view.
-void OeMode::State::bend_map(const Matrix2<double>& map_error, const Matrix2<double>& view_error,
+// their elevation.
+void OeMode::State::bend_map(const Vector2<double>& rate, const Vector2<double>& acceleration,
                              double origin_tilt) {
   const Vector3<double>& a_pan = calibration.mechanics.pan_axis;
-  const Matrix2<double> in_view = map_error + view_error;
-  const auto angle_error = [](const Matrix2<double>& of, double t) -> Vector2<double> {
-    return t * of.col(0) + (0.5 * t * t) * of.col(1);
+  // Small errors of the acceleration are many, and far from the row they were seen in they would be large:
+  // beyond the frame it is taken to go on as it is at the border.
+  const double border = std::abs(calibration.line_delay * calibration.camera.height / 2);
+  const auto angle_error = [&](double t) -> Vector2<double> {
+    const double within = std::clamp(t, -border, border);
+    return t * rate + (0.5 * within * within) * acceleration;
   };
   const auto straighten = [&](Vector2<double>* angle, Vector2<double>* shown_rate,
                               Vector2<double>* shown_acceleration) {
     const double t = time_per_angle() * (angle->y() - origin_tilt);
-    *angle -= angle_error(in_view, t);
-    *shown_rate -= in_view.col(0) + t * in_view.col(1);
-    *shown_acceleration -= in_view.col(1);
+    *angle -= angle_error(t);
+    *shown_rate -= rate + t * acceleration;
+    *shown_acceleration -= acceleration;
   };
   const auto elevation_of = [&](const Vector3<double>& d) {
     return -std::asin(std::clamp(a_pan.dot(d), -1.0, 1.0));
   };
-  const Vector3<double> axis = ViewProjection(calibration, motion).optical_axis();
-  const double origin = elevation_of(axis) - (motion.angle.tilt - origin_tilt);
+  const double origin = elevation_of(ViewProjection(calibration, motion).optical_axis()) -
+                        (motion.angle.tilt - origin_tilt);
   for (int slot = 0; slot < map.capacity(); ++slot) {
     if (!map.occupied(slot)) continue;
     const Landmark& landmark = map.at(slot);
     const Vector3<double>& d = landmark.d;
-    const Vector2<double> error = angle_error(map_error + share_of_view(axis, d) * view_error,
-                                              time_per_angle() * (elevation_of(d) - origin));
+    const Vector2<double> error = angle_error(time_per_angle() * (elevation_of(d) - origin));
     const Vector3<double> right = a_pan.cross(d);
     const Vector3<double> turned = d - error.x() * right - error.y() * right.normalized().cross(d);
     map.refine(slot, turned.normalized(), landmark.covariance);
   }
   for (Untold& frame : untold) {
     if (frame.time_s != kNever) {
-      frame.angle -= angle_error(in_view, time_per_angle() * (frame.angle.y() - origin_tilt));
+      frame.angle -= angle_error(time_per_angle() * (frame.angle.y() - origin_tilt));
     }
   }
   for (int i = 0; i < past_count; ++i) {
@@ -1080,20 +1062,6 @@ void OeMode::State::bend_map(const Matrix2<double>& map_error, const Matrix2<dou
   motion.rate = {now_rate.x(), now_rate.y()};
   motion.acceleration = {now_acceleration.x(), now_acceleration.y()};
   last_motion = motion;
-}
-
-// All of it in view, none from half as far beyond.
-double OeMode::State::share_of_view(const Vector3<double>& axis, const Vector3<double>& d) const {
-  return std::clamp(3 - 2 * std::acos(std::min(1.0, axis.dot(d))) / cone, 0.0, 1.0);
-}
-
-void OeMode::State::retire_landmarks_about_view() {
-  const Vector3<double> axis = ViewProjection(calibration, motion).optical_axis();
-  for (int slot = 0; slot < map.capacity(); ++slot) {
-    if (map.occupied(slot) && share_of_view(axis, map.at(slot).d) > 0) map.retire(slot);
-  }
-  chosen_count = 0;
-  coarse_count = 0;
 }
 
 void OeMode::State::judge_coarse(const ViewProjection& view) {
@@ -1197,6 +1165,7 @@ bool OeMode::State::make_landmark(const FastCorner& corner, int octave) {
 
 void OeMode::State::make_landmarks(const ViewProjection& view) {
   find_visible(view);
+  int made = 0;
   // An empty view takes all it can at once.
   int left = visible_count < kEmptyView ? std::numeric_limits<int>::max() : options.max_new;
   for (int octave = pyramid.octaves() - 1; octave >= 0; --octave) {
@@ -1227,6 +1196,7 @@ void OeMode::State::make_landmarks(const ViewProjection& view) {
         if (taken != 0 || !make_landmark(corner, octave)) continue;
         taken = 1;
         --left;
+        ++made;
       }
       continue;
     }
@@ -1251,9 +1221,13 @@ void OeMode::State::make_landmarks(const ViewProjection& view) {
       FastCorner corner = corners[0];
       corner.u = static_cast<std::uint16_t>(corner.u + std::max(u0, 0));
       corner.v = static_cast<std::uint16_t>(corner.v + std::max(v0, 0));
-      if (make_landmark(corner, octave)) --left;
+      if (make_landmark(corner, octave)) {
+        --left;
+        ++made;
+      }
     }
   }
+  share_of_new = static_cast<double>(made) / std::max(1, visible_count + made);
 }
 
 // What was handed over and is not found where it should be has gone, or was never there, if the
@@ -1306,24 +1280,20 @@ void OeMode::State::maintain() {
     refine_landmarks();
     remember_motion();
     if (straighten_map()) {
-      // This frame's motion is right now: better landmarks than those that were bent can be had.
-      retire_landmarks_about_view();
-      auto& bend = map.size() == 0 ? map_bend : view_bend;
+      // This frame's motion is right now: better landmarks than those of the first can be had.
+      clear_landmarks();
       for (int axis = 0; axis < 2; ++axis) {
-        bend[static_cast<std::size_t>(axis)].bottomRightCorner<2, 2>() +=
+        bend_covariance[static_cast<std::size_t>(axis)].bottomRightCorner<2, 2>() +=
             rate_covariance(motion_covariance, axis);
       }
     }
   } else {
     past_count = 0;
-    move_bend(motion.angle.tilt);
-    // A map's first frame bends all of it; beside a map that is there, only what is made now.
-    view_bend.fill(Matrix3<double>::Zero());
-    auto& bend = map.size() == 0 ? map_bend : view_bend;
+    bend_tilt = motion.angle.tilt;
     for (int axis = 0; axis < 2; ++axis) {
-      Matrix3<double>& covariance = bend[static_cast<std::size_t>(axis)];
-      covariance.setZero();
-      covariance.bottomRightCorner<2, 2>() = rate_covariance(motion_covariance, axis);
+      Matrix3<double>& bend = bend_covariance[static_cast<std::size_t>(axis)];
+      bend.setZero();
+      bend.bottomRightCorner<2, 2>() = rate_covariance(motion_covariance, axis);
     }
   }
   const ViewProjection view(calibration, motion);
