@@ -1,0 +1,72 @@
+#include "platform/video/jpeg_decoder.h"
+
+#include <turbojpeg.h>
+
+namespace alidade {
+namespace {
+
+constexpr long kMaxPixels = 100'000'000;  // keeps a few forged bytes from asking for gigabytes
+
+const unsigned char* bytes_of(std::string_view jpeg) {
+  return reinterpret_cast<const unsigned char*>(jpeg.data());
+}
+
+}  // namespace
+
+void JpegDecoder::Close::operator()(void* handle) const { tjDestroy(handle); }
+
+JpegDecoder::JpegDecoder() : handle_(tjInitDecompress()) {}
+
+bool JpegDecoder::read_size(std::string_view jpeg, int* width, int* height) {
+  if (!handle_) {
+    error_ = "libjpeg-turbo does not start";
+    return false;
+  }
+  int subsampling = 0;
+  int colours = 0;
+  if (tjDecompressHeader3(handle_.get(), bytes_of(jpeg), jpeg.size(), width, height, &subsampling,
+                          &colours) != 0) {
+    error_ = std::string("not a JPEG picture: ") + tjGetErrorStr2(handle_.get());
+    return false;
+  }
+  if (colours == TJCS_CMYK || colours == TJCS_YCCK) {
+    error_ = "the JPEG picture is in printing colours; use grey or YCbCr pictures";
+    return false;
+  }
+  if (static_cast<long>(*width) * *height > kMaxPixels) {
+    error_ = "the JPEG picture claims " + std::to_string(*width) + "x" + std::to_string(*height) +
+             " pixels; at most " + std::to_string(kMaxPixels) + " are taken";
+    return false;
+  }
+  return true;
+}
+
+bool JpegDecoder::decode(std::string_view jpeg, Picture* picture) {
+  int width = 0;
+  int height = 0;
+  if (!read_size(jpeg, &width, &height)) {
+    return false;
+  }
+  const std::size_t size = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
+  const std::shared_ptr<unsigned char> luma(new unsigned char[size],
+                                            std::default_delete<unsigned char[]>());
+  if (tjDecompress2(handle_.get(), bytes_of(jpeg), jpeg.size(), luma.get(), width, width, height,
+                    TJPF_GRAY, 0) != 0) {
+    const std::string message = tjGetErrorStr2(handle_.get());
+    // "Corrupt JPEG data: 2 extraneous bytes before marker 0xd9": all rows are there.
+    if (tjGetErrorCode(handle_.get()) != TJERR_WARNING ||
+        message.find("extraneous bytes before marker 0xd9") == std::string::npos) {
+      error_ = "damaged JPEG picture: " + message;
+      return false;
+    }
+  }
+  picture->width = width;
+  picture->height = height;
+  picture->luma = luma.get();
+  picture->stride = width;
+  picture->pts = AV_NOPTS_VALUE;
+  picture->owner = luma;
+  return true;
+}
+
+}  // namespace alidade

@@ -1,0 +1,37 @@
+#pragma once
+// JpegDecoder: a JPEG picture to its luma plane, by libjpeg-turbo. The chroma is neither transformed
+// nor converted. Pictures without Huffman tables (as in AVI) are decoded with the standard ones.
+// A picture that is cut off or damaged is told from a whole one; excess bytes before its end marker,
+// which some cameras write, are no damage. One thread at a time; allocates each picture.
+
+#include <cstddef>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "platform/video/luma_decoder.h"  // Picture
+
+namespace alidade {
+
+class JpegDecoder {
+ public:
+  JpegDecoder();
+
+  // Of the header alone. False: no JPEG, or larger than any camera's picture.
+  [[nodiscard]] bool read_size(std::string_view jpeg, int* width, int* height);
+
+  // False: see error().
+  [[nodiscard]] bool decode(std::string_view jpeg, Picture* picture);
+
+  // One line; valid after read_size() or decode() said false.
+  [[nodiscard]] const std::string& error() const { return error_; }
+
+ private:
+  struct Close {
+    void operator()(void* handle) const;
+  };
+  std::unique_ptr<void, Close> handle_;
+  std::string error_;
+};
+
+}  // namespace alidade

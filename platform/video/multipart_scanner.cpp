@@ -1,0 +1,296 @@
+#include "platform/video/multipart_scanner.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <utility>
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t kMaxBoundary = 200;      // bytes of a line; RFC 2046 allows a boundary 70
+constexpr std::size_t kMaxHeaders = 8192;      // bytes of one part's headers
+constexpr std::size_t kMaxDelimiterTail = 32;  // dashes and blanks between boundary and line end
+constexpr const char* kBlanks = " \t\r\n";
+
+char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
+
+std::string lower(std::string_view text) {
+  std::string copy(text);
+  std::transform(copy.begin(), copy.end(), copy.begin(), [](char c) { return lower(c); });
+  return copy;
+}
+
+std::string_view stripped(std::string_view text, const char* what) {
+  const std::size_t first = text.find_first_not_of(what);
+  if (first == std::string_view::npos) {
+    return {};
+  }
+  return text.substr(first, text.find_last_not_of(what) - first + 1);
+}
+
+// Digits only; empty if it is no such number or too large to matter.
+std::optional<std::size_t> parse_length(std::string_view text, std::size_t max) {
+  if (text.empty()) {
+    return std::nullopt;
+  }
+  std::size_t value = 0;
+  for (const char c : text) {
+    if (c < '0' || c > '9') {
+      return std::nullopt;
+    }
+    value = 10 * value + static_cast<std::size_t>(c - '0');
+    if (value > max) {
+      return std::nullopt;
+    }
+  }
+  return value;
+}
+
+std::optional<double> parse_seconds(std::string_view text) {
+  const std::string copy(text);  // strtod needs the terminating null
+  char* end = nullptr;
+  const double value = std::strtod(copy.c_str(), &end);
+  if (end == copy.c_str() || *end != '\0' || !std::isfinite(value)) {
+    return std::nullopt;
+  }
+  return value;
+}
+
+bool jpeg_ends_at(std::string_view bytes, std::size_t end) {
+  return end >= 2 && bytes[end - 2] == '\xFF' && bytes[end - 1] == '\xD9';
+}
+
+}  // namespace
+
+bool parse_multipart_type(std::string_view content_type, std::string* boundary) {
+  boundary->clear();
+  const std::string small = lower(content_type);
+  if (small.rfind("multipart/", 0) != 0) {
+    return false;
+  }
+  for (std::size_t at = small.find(';'); at != std::string::npos; at = small.find(';', at + 1)) {
+    const std::string_view rest = std::string_view(small).substr(at + 1);
+    const std::size_t name_at = rest.find_first_not_of(kBlanks);
+    constexpr std::string_view kName = "boundary";
+    if (name_at == std::string_view::npos || rest.substr(name_at, kName.size()) != kName) {
+      continue;
+    }
+    const std::size_t equals = rest.find_first_not_of(kBlanks, name_at + kName.size());
+    if (equals == std::string_view::npos || rest[equals] != '=') {
+      continue;
+    }
+    const std::string_view value = stripped(content_type.substr(at + 1 + equals + 1), kBlanks);
+    *boundary = !value.empty() && value.front() == '"'
+                    ? value.substr(1, value.find('"', 1) - 1)
+                    : stripped(value.substr(0, value.find(';')), kBlanks);
+    return true;
+  }
+  return true;
+}
+
+MultipartScanner::MultipartScanner(std::string_view boundary, std::size_t max_part_bytes)
+    : core_(stripped(boundary, "-")),
+      max_part_bytes_(max_part_bytes),
+      state_(core_.empty() ? State::kLearnBoundary : State::kSkip) {}
+
+void MultipartScanner::feed(std::string_view bytes, double arrival_s) {
+  if (bytes.empty()) {
+    return;
+  }
+  arrival_s_ = arrival_s;
+  if (std::exchange(stamp_next_byte_, false)) {
+    part_.first_byte_s = arrival_s;
+  }
+  buffer_.append(bytes);
+  while (advance()) {
+  }
+}
+
+bool MultipartScanner::next(MultipartPart* part) {
+  if (whole_.empty()) {
+    return false;
+  }
+  *part = std::move(whole_.front());
+  whole_.pop_front();
+  return true;
+}
+
+// False when nothing can be done before more bytes come.
+bool MultipartScanner::advance() {
+  switch (state_) {
+    case State::kLearnBoundary:
+      return learn_boundary();
+    case State::kSkip:
+      return skip_to_delimiter();
+    case State::kHeaders:
+      return read_header_line();
+    case State::kBody:
+      return read_body();
+  }
+  return false;
+}
+
+void MultipartScanner::drop_front(std::size_t count) {
+  buffer_.erase(0, count);
+  scan_ -= std::min(scan_, count);
+}
+
+bool MultipartScanner::learn_boundary() {
+  const std::size_t end = buffer_.find('\n');
+  if (end == std::string::npos) {
+    if (buffer_.size() > kMaxBoundary) {
+      buffer_.resize(kMaxBoundary);  // no boundary; only its line end is still of interest
+    }
+    return false;
+  }
+  const std::string_view line = stripped(std::string_view(buffer_).substr(0, end), kBlanks);
+  const bool told = line.substr(0, 2) == "--" && line.size() < kMaxBoundary;
+  core_ = told ? std::string(stripped(line, "-")) : "";
+  if (core_.empty()) {
+    drop_front(end + 1);
+  } else {
+    state_ = State::kSkip;
+  }
+  return true;
+}
+
+// Moves scan_ on as far as it can decide.
+std::optional<MultipartScanner::Delimiter> MultipartScanner::find_delimiter() {
+  for (;;) {
+    const std::size_t at = buffer_.find(core_, scan_);
+    if (at == std::string::npos) {
+      scan_ = std::max(scan_, buffer_.size() - std::min(buffer_.size(), core_.size() - 1));
+      return std::nullopt;
+    }
+    scan_ = at;
+    std::size_t begin = at;
+    while (begin > 0 && buffer_[begin - 1] == '-') {
+      --begin;
+    }
+    const bool at_line_start = begin == 0 || buffer_[begin - 1] == '\n';
+    const std::size_t after = at + core_.size();
+    std::size_t end = after;
+    while (end < buffer_.size() && end - after < kMaxDelimiterTail &&
+           std::string_view("- \t\r").find(buffer_[end]) != std::string_view::npos) {
+      ++end;
+    }
+    if (end == buffer_.size()) {
+      return std::nullopt;  // the line may go on
+    }
+    if (buffer_[end] != '\n' || !(at_line_start || at - begin >= 2)) {
+      ++scan_;
+      continue;
+    }
+    if (begin > 0 && buffer_[begin - 1] == '\n') {
+      --begin;
+      if (begin > 0 && buffer_[begin - 1] == '\r') {
+        --begin;
+      }
+    }
+    return Delimiter{begin, end + 1};
+  }
+}
+
+void MultipartScanner::begin_part(std::size_t delimiter_end) {
+  drop_front(delimiter_end);
+  scan_ = 0;
+  part_ = MultipartPart{};
+  part_.first_byte_s = arrival_s_;
+  stamp_next_byte_ = buffer_.empty();
+  header_bytes_ = 0;
+  content_length_.reset();
+  state_ = State::kHeaders;
+}
+
+bool MultipartScanner::skip_to_delimiter() {
+  if (const std::optional<Delimiter> delimiter = find_delimiter()) {
+    begin_part(delimiter->end);
+    return true;
+  }
+  // What stands before scan_ is of no use, but for the dashes and the line end before a boundary.
+  const std::size_t kept = std::min(scan_, kMaxDelimiterTail);
+  drop_front(scan_ - kept);
+  return false;
+}
+
+bool MultipartScanner::read_header_line() {
+  if (!buffer_.empty() &&
+      buffer_.front() == '\xFF') {  // a picture without the empty line before it
+    state_ = State::kBody;
+    return true;
+  }
+  const std::size_t end = buffer_.find('\n');
+  if (header_bytes_ + std::min(end, buffer_.size()) > kMaxHeaders) {
+    ++discarded_;
+    state_ = State::kSkip;
+    return true;
+  }
+  if (end == std::string::npos) {
+    return false;
+  }
+  const std::string line(stripped(std::string_view(buffer_).substr(0, end), kBlanks));
+  if (stripped(line, "-") == core_) {  // the part had no body
+    begin_part(end + 1);
+    return true;
+  }
+  header_bytes_ += end + 1;
+  drop_front(end + 1);
+  if (line.empty()) {
+    scan_ = 0;
+    state_ = State::kBody;
+  } else {
+    take_header(line);
+  }
+  return true;
+}
+
+void MultipartScanner::take_header(std::string_view line) {
+  const std::size_t colon = line.find(':');
+  if (colon == std::string_view::npos) {
+    return;
+  }
+  const std::string name = lower(stripped(line.substr(0, colon), kBlanks));
+  const std::string_view value = stripped(line.substr(colon + 1), kBlanks);
+  if (name == "content-length") {
+    content_length_ = parse_length(value, max_part_bytes_);
+  } else if (name == "content-type") {
+    part_.content_type = lower(stripped(value.substr(0, value.find(';')), kBlanks));
+  } else if (name == "x-timestamp") {
+    part_.timestamp_s = parse_seconds(value);
+  }
+}
+
+bool MultipartScanner::read_body() {
+  const std::optional<Delimiter> delimiter = find_delimiter();
+  const std::size_t known_end = delimiter ? delimiter->begin : buffer_.size();
+  if (content_length_ && *content_length_ <= known_end && jpeg_ends_at(buffer_, *content_length_)) {
+    end_part(*content_length_);
+    return true;
+  }
+  if (known_end > max_part_bytes_) {
+    ++discarded_;
+    state_ = State::kSkip;
+    return true;
+  }
+  if (!delimiter) {
+    return false;
+  }
+  end_part(delimiter->begin);
+  return true;
+}
+
+// What follows is skipped up to the delimiter.
+void MultipartScanner::end_part(std::size_t body_end) {
+  std::string rest = buffer_.substr(body_end);
+  buffer_.resize(body_end);
+  part_.body = std::move(buffer_);
+  buffer_ = std::move(rest);
+  scan_ = 0;
+  state_ = State::kSkip;
+  if (!part_.body.empty()) {
+    whole_.push_back(std::move(part_));
+  }
+}
+
+}  // namespace alidade

@@ -1,0 +1,79 @@
+#pragma once
+// MultipartScanner: the pictures in a multipart/x-mixed-replace body, as cameras really send it.
+//
+//   --boundary CRLF  Name: value CRLF ... CRLF  picture CRLF  --boundary CRLF ...
+//
+// Bytes go in as they come, in pieces of any size. Tolerated: any number of dashes around the
+// boundary, in the declaration and in the stream; a boundary that is not declared (the first line
+// that begins with "--" tells it); lines that end in LF alone; no line end before a delimiter; parts
+// without headers; a Content-Length that is missing or wrong.
+// A part ends at its Content-Length if a JPEG ends there, too (FF D9), and at the next delimiter
+// otherwise; so a camera that tells no length delivers a picture when the next delimiter comes.
+// Pure: no I/O, no clock, no exceptions but for memory, which is bounded by max_part_bytes and the
+// piece fed. After each feed() call next() until it has nothing more.
+
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace alidade {
+
+struct MultipartPart {
+  std::string body;
+  double first_byte_s = 0;            // arrival of the first byte after the delimiter's line
+  std::string content_type;           // lower case without parameters; empty if not told
+  std::optional<double> timestamp_s;  // X-Timestamp: the sender's clock, any epoch
+};
+
+// False: content_type is not multipart/*. The boundary is empty if none is declared.
+[[nodiscard]] bool parse_multipart_type(std::string_view content_type, std::string* boundary);
+
+class MultipartScanner {
+ public:
+  // boundary as declared; empty: not declared.
+  MultipartScanner(std::string_view boundary, std::size_t max_part_bytes);
+
+  void feed(std::string_view bytes, double arrival_s);
+
+  // The next whole part, in order of arrival.
+  [[nodiscard]] bool next(MultipartPart* part);
+
+  // Parts given up because they were longer than max_part_bytes or their headers had no end.
+  [[nodiscard]] std::int64_t discarded() const { return discarded_; }
+
+ private:
+  enum class State { kLearnBoundary, kSkip, kHeaders, kBody };
+  struct Delimiter {
+    std::size_t begin = 0;  // where what stands before it ends
+    std::size_t end = 0;    // after its line
+  };
+
+  bool advance();
+  bool learn_boundary();
+  bool skip_to_delimiter();
+  bool read_header_line();
+  bool read_body();
+  std::optional<Delimiter> find_delimiter();
+  void take_header(std::string_view line);
+  void begin_part(std::size_t delimiter_end);
+  void end_part(std::size_t body_end);
+  void drop_front(std::size_t count);
+
+  std::string core_;  // the boundary without the dashes around it
+  std::size_t max_part_bytes_;
+  State state_;
+  std::string buffer_;    // not yet used up
+  std::size_t scan_ = 0;  // no delimiter's core begins before this place in buffer_
+  double arrival_s_ = 0;  // of the piece being fed
+  bool stamp_next_byte_ = false;
+  MultipartPart part_;  // under way
+  std::size_t header_bytes_ = 0;
+  std::optional<std::size_t> content_length_;
+  std::deque<MultipartPart> whole_;
+  std::int64_t discarded_ = 0;
+};
+
+}  // namespace alidade
