@@ -9,6 +9,7 @@
 #include "core/calibration/calibration_file.h"
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
 #include "platform/pan_tilt/vapix_source.h"
+#include "platform/video/mjpeg_source.h"
 #include "platform/video/recording_frame_source.h"
 #include "platform/video/rtp_source.h"
 
@@ -154,9 +155,9 @@ std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config)
 }
 
 void log_source_losses(const FrameSource& source) {
-  const auto* rtp = dynamic_cast<const RtpSource*>(&source);
-  if (rtp == nullptr) return;
-  const RtpSourceCounters counters = rtp->counters();
+  FrameSourceCounters counters;
+  if (const auto* rtp = dynamic_cast<const RtpSource*>(&source)) counters = rtp->counters();
+  if (const auto* mjpeg = dynamic_cast<const MjpegSource*>(&source)) counters = mjpeg->counters();
   if (counters.damaged == 0 && counters.dropped == 0) return;
   spdlog::warn("{}: {} frames damaged, {} dropped before they were read", source.name(),
                counters.damaged, counters.dropped);

@@ -18,8 +18,10 @@ namespace alidade {
 
 // When and in which order a frame came. Fixed size: crosses queues by value.
 struct FrameStamp {
-  std::int64_t frame = 0;     // 0, 1, 2, ... of the frames this source delivered
-  double receive_time_s = 0;  // host CLOCK_MONOTONIC at the arrival of the frame's last packet
+  std::int64_t frame = 0;  // 0, 1, 2, ... of the frames this source delivered
+  // host CLOCK_MONOTONIC at the arrival of the frame's last packet (of its first byte where the
+  // source says so)
+  double receive_time_s = 0;
   std::optional<double> sender_time_s;   // capture time on the sender's clock, unwrapped, any epoch
   std::optional<double> sender_utc_s;    // the same as Unix time, once RTCP or the like has told it
   std::optional<std::int64_t> sequence;  // sender's count of frames, unwrapped; a gap is a loss
@@ -45,6 +47,12 @@ enum class ReadStatus {
   kEnd,           // a recording is over
   kStopped,       // stop() was called
   kFailed         // will never work (no such file, wrong password, unknown codec); see error()
+};
+
+// What a source that receives and decodes on its own could not deliver.
+struct FrameSourceCounters {
+  std::int64_t damaged = 0;  // frames that were incomplete or not decodable
+  std::int64_t dropped = 0;  // frames that read() did not fetch in time
 };
 
 class FrameSource {

@@ -17,6 +17,13 @@ void JpegDecoder::Close::operator()(void* handle) const { tjDestroy(handle); }
 
 JpegDecoder::JpegDecoder() : handle_(tjInitDecompress()) {}
 
+// A handle whose header went wrong takes every later picture for the same (libjpeg-turbo 2.1).
+bool JpegDecoder::fail(const std::string& error) {
+  error_ = error;
+  handle_.reset(tjInitDecompress());
+  return false;
+}
+
 bool JpegDecoder::read_size(std::string_view jpeg, int* width, int* height) {
   if (!handle_) {
     error_ = "libjpeg-turbo does not start";
@@ -26,17 +33,15 @@ bool JpegDecoder::read_size(std::string_view jpeg, int* width, int* height) {
   int colours = 0;
   if (tjDecompressHeader3(handle_.get(), bytes_of(jpeg), jpeg.size(), width, height, &subsampling,
                           &colours) != 0) {
-    error_ = std::string("not a JPEG picture: ") + tjGetErrorStr2(handle_.get());
-    return false;
+    return fail(std::string("damaged JPEG picture: ") + tjGetErrorStr2(handle_.get()));
   }
   if (colours == TJCS_CMYK || colours == TJCS_YCCK) {
-    error_ = "the JPEG picture is in printing colours; use grey or YCbCr pictures";
-    return false;
+    return fail("the JPEG picture is in printing colours; use grey or YCbCr pictures");
   }
   if (static_cast<long>(*width) * *height > kMaxPixels) {
-    error_ = "the JPEG picture claims " + std::to_string(*width) + "x" + std::to_string(*height) +
-             " pixels; at most " + std::to_string(kMaxPixels) + " are taken";
-    return false;
+    return fail("the JPEG picture claims " + std::to_string(*width) + "x" +
+                std::to_string(*height) + " pixels; at most " + std::to_string(kMaxPixels) +
+                " are taken");
   }
   return true;
 }
@@ -56,8 +61,7 @@ bool JpegDecoder::decode(std::string_view jpeg, Picture* picture) {
     // "Corrupt JPEG data: 2 extraneous bytes before marker 0xd9": all rows are there.
     if (tjGetErrorCode(handle_.get()) != TJERR_WARNING ||
         message.find("extraneous bytes before marker 0xd9") == std::string::npos) {
-      error_ = "damaged JPEG picture: " + message;
-      return false;
+      return fail("damaged JPEG picture: " + message);
     }
   }
   picture->width = width;

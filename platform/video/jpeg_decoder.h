@@ -30,6 +30,8 @@ class JpegDecoder {
   struct Close {
     void operator()(void* handle) const;
   };
+  bool fail(const std::string& error);
+
   std::unique_ptr<void, Close> handle_;
   std::string error_;
 };

@@ -54,7 +54,7 @@ class RtpSource::Implementation {
 
   const std::string& error() const { return error_; }
   const std::string& name() const { return options_.url; }
-  RtpSourceCounters counters() const { return {damaged_, dropped_}; }
+  FrameSourceCounters counters() const { return {damaged_, dropped_}; }
 
  private:
   // What the receiving thread hands to read(): a picture, or why there is none.
@@ -334,6 +334,6 @@ ReadStatus RtpSource::read(Frame& frame, double timeout_s) {
 void RtpSource::stop() { implementation_->stop(); }
 std::string RtpSource::error() const { return implementation_->error(); }
 std::string RtpSource::name() const { return implementation_->name(); }
-RtpSourceCounters RtpSource::counters() const { return implementation_->counters(); }
+FrameSourceCounters RtpSource::counters() const { return implementation_->counters(); }
 
 }  // namespace alidade

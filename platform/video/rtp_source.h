@@ -12,7 +12,8 @@
 // - An MJPEG frame is delivered on arrival, an H.264 frame when the first packet of the next one
 //   shows that it is complete (libavformat does not tell the end of an access unit).
 // - Frames before the first key frame, damaged and undecodable frames are skipped and counted. When
-//   the reader is too slow, what waits is dropped and counted, up to the next key frame.
+//   the reader is too slow, what waits is dropped and counted; what comes up to the next
+//   key frame, which cannot be decoded any more, is not counted.
 // - Luma is the decoder's plane 0, without copy or conversion.
 // - copy_to: each delivered frame's data is also stored, not re-encoded, in that Matroska file, in
 //   which a kill loses at most the last second. The file goes on over reconnections.
@@ -40,12 +41,6 @@ struct RtpSourceOptions {
   std::string copy_to;       // video.mkv to copy the stream into; empty: none
 };
 
-struct RtpSourceCounters {
-  std::int64_t damaged = 0;  // frames that were incomplete or not decodable
-  std::int64_t dropped = 0;  // frames that read() did not fetch in time; those up to the next key
-                             // frame, which cannot be decoded any more, are not counted
-};
-
 class RtpSource : public FrameSource {
  public:
   explicit RtpSource(const RtpSourceOptions& options);
@@ -58,7 +53,7 @@ class RtpSource : public FrameSource {
   [[nodiscard]] std::string error() const override;
   [[nodiscard]] std::string name() const override;
 
-  [[nodiscard]] RtpSourceCounters counters() const;  // thread-safe
+  [[nodiscard]] FrameSourceCounters counters() const;  // thread-safe
 
  private:
   class Implementation;  // keeps libav out of this header

@@ -11,6 +11,8 @@
 #include <string>
 #include <thread>
 
+#include "test/platform/support/digest_check.h"
+
 namespace alidade {
 
 class AxisServer {
@@ -32,11 +34,9 @@ class AxisServer {
   std::size_t connections() const;
 
  private:
-  bool authorised(const httplib::Request& request) const;
   void serve_position(const httplib::Request& request, httplib::Response& response);
 
-  std::string user_;
-  std::string password_;
+  DigestCheck check_;
   std::function<std::string()> answer_;
   httplib::Server server_;
   int port_;

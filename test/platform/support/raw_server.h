@@ -48,9 +48,15 @@ class RawServer {
   int connections() const { return connections_; }
   bool closing() const { return closing_; }
 
-  // False once the other side has closed or the server is closing.
+  // The request's line and headers. False once the other side has closed or the server is closing.
   bool read_request(int fd) const {
     std::string request;
+    return read_request(fd, &request);
+  }
+
+  bool read_request(int fd, std::string* text) const {
+    std::string& request = *text;
+    request.clear();
     char buffer[2048];
     while (request.find("\r\n\r\n") == std::string::npos) {
       if (!wait_readable(fd)) {
@@ -65,8 +71,10 @@ class RawServer {
     return true;
   }
 
-  static void send(int fd, const std::string& bytes) {
-    (void)!::send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+  // False: the other side has closed.
+  static bool send(int fd, const std::string& bytes) {
+    return ::send(fd, bytes.data(), bytes.size(), MSG_NOSIGNAL) ==
+           static_cast<ssize_t>(bytes.size());
   }
 
   // Says nothing until the other side closes.

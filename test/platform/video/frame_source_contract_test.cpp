@@ -8,9 +8,12 @@
 #include <ostream>
 #include <thread>
 
+#include "platform/video/mjpeg_source.h"
 #include "platform/video/recording_frame_source.h"
 #include "platform/video/rtp_source.h"
 #include "test/platform/support/eventually.h"
+#include "test/platform/support/mjpeg_server.h"
+#include "test/platform/support/open_files.h"
 #include "test/platform/support/rtp_sender.h"
 #include "test/platform/support/rtsp_server.h"
 #include "test/support/temporary_directory.h"
@@ -21,28 +24,31 @@ namespace {
 // A source and what it needs to live.
 struct Rig {
   virtual ~Rig() = default;
+  virtual std::unique_ptr<FrameSource> open() const = 0;
   std::unique_ptr<FrameSource> source;
 };
 
 struct RtspRig : Rig {
   explicit RtspRig(const RtspStream& stream) : server(stream, "user", "secret") {
-    RtpSourceOptions options;
     options.url = server.url();
     options.user = "user";
     options.password = "secret";
     options.timeout_s = kDeadline_s;
-    source = std::make_unique<RtpSource>(options);
+    source = open();
+  }
+  std::unique_ptr<FrameSource> open() const override {
+    return std::make_unique<RtpSource>(options);
   }
   RtspServer server;
+  RtpSourceOptions options;
 };
 
 struct RtpRig : Rig {
   RtpRig() {
     const int port = free_rtp_port();
-    RtpSourceOptions options;
     options.url = "rtp://@:" + std::to_string(port);
     options.timeout_s = kDeadline_s;
-    source = std::make_unique<RtpSource>(options);
+    source = open();
     thread = std::thread([this, port] {
       RtpSender sender(RtpSender::Codec::kMjpeg, port);
       while (!over) {
@@ -55,8 +61,28 @@ struct RtpRig : Rig {
     over = true;
     thread.join();
   }
+  std::unique_ptr<FrameSource> open() const override {
+    return std::make_unique<RtpSource>(options);
+  }
+  RtpSourceOptions options;
   std::atomic<bool> over{false};
   std::thread thread;
+};
+
+struct MjpegRig : Rig {
+  MjpegRig() {
+    options.url = server.url();
+    options.user = MjpegServer::kUser;
+    options.password = "secret";
+    options.timeout_s = kDeadline_s;
+    source = open();
+  }
+  ~MjpegRig() override { source.reset(); }  // before the server, which waits for it
+  std::unique_ptr<FrameSource> open() const override {
+    return std::make_unique<MjpegSource>(options);
+  }
+  MjpegServer server;
+  MjpegSourceOptions options;
 };
 
 struct RecordingRig : Rig {
@@ -72,12 +98,15 @@ struct RecordingRig : Rig {
       std::snprintf(name, sizeof name, "frames/%06d.pgm", i);
       directory.write(name, "P5\n4 2\n255\nabcdefgh");
     }
-    RecordingFrameSourceOptions options;
     options.directory = directory.path();
     options.realtime = realtime;
-    source = std::make_unique<RecordingFrameSource>(options);
+    source = open();
+  }
+  std::unique_ptr<FrameSource> open() const override {
+    return std::make_unique<RecordingFrameSource>(options);
   }
   TemporaryDirectory directory;
+  RecordingFrameSourceOptions options;
 };
 
 struct Case {
@@ -142,6 +171,23 @@ TEST_P(FrameSourceContract, EndsAReadWhenAnotherThreadStopsIt) {
   EXPECT_EQ(source_.read(frame_, 0), ReadStatus::kStopped);
 }
 
+TEST_P(FrameSourceContract, LeaksNoFileDescriptorOverAThousandLives) {
+  rig_->source.reset();
+  const auto one_life = [&](double timeout_s) {
+    const std::unique_ptr<FrameSource> source = rig_->open();
+    const ReadStatus status = source->read(frame_, timeout_s);
+    EXPECT_NE(status, ReadStatus::kFailed) << source->error();
+    frame_ = Frame{};
+  };
+  one_life(1);  // what stays open for good
+  const auto before = open_files();
+  for (int i = 0; i < 1000; ++i) {
+    one_life(i % 250 == 0 ? 1 : 0);  // most end in the middle of connecting
+  }
+  // The rig's server, in this process, has its own ends; it notices their closing in time.
+  EXPECT_TRUE(eventually([&] { return open_files() <= before; })) << open_files() - before;
+}
+
 TEST_P(FrameSourceContract, HasANameWithoutPassword) {
   EXPECT_FALSE(source_.name().empty());
   EXPECT_EQ(source_.name().find("secret"), std::string::npos);
@@ -152,6 +198,7 @@ INSTANTIATE_TEST_SUITE_P(
     ::testing::Values(Case{"RtspMjpeg", [] { return std::make_unique<RtspRig>(kMjpegStream); }},
                       Case{"RtspH264", [] { return std::make_unique<RtspRig>(kH264Stream); }},
                       Case{"Rtp", [] { return std::make_unique<RtpRig>(); }},
+                      Case{"Mjpeg", [] { return std::make_unique<MjpegRig>(); }},
                       Case{"Recording", [] { return std::make_unique<RecordingRig>(false); }},
                       Case{"RecordingInRealTime",
                            [] { return std::make_unique<RecordingRig>(true); }}),

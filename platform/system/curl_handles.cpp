@@ -1,0 +1,60 @@
+#include "platform/system/curl_handles.h"
+
+#include <algorithm>
+#include <cmath>
+#include <mutex>
+
+namespace alidade {
+namespace {
+
+constexpr double kLongestWait_s = 10;  // keeps the milliseconds of a wait within an int
+
+void initialise_curl() {
+  static std::once_flag initialised;
+  std::call_once(initialised, [] { curl_global_init(CURL_GLOBAL_DEFAULT); });
+}
+
+}  // namespace
+
+CurlEasyPtr make_http_handle(const std::string& user, const std::string& password, long methods,
+                             char* error_buffer) {
+  initialise_curl();
+  CurlEasyPtr easy(curl_easy_init());
+  if (!easy) {
+    return easy;
+  }
+  if (!user.empty()) {
+    curl_easy_setopt(easy.get(), CURLOPT_HTTPAUTH, methods);
+    curl_easy_setopt(easy.get(), CURLOPT_USERNAME, user.c_str());
+    curl_easy_setopt(easy.get(), CURLOPT_PASSWORD, password.c_str());
+  }
+  curl_easy_setopt(easy.get(), CURLOPT_NOPROXY, "*");
+  curl_easy_setopt(easy.get(), CURLOPT_NOSIGNAL, 1L);
+  curl_easy_setopt(easy.get(), CURLOPT_ERRORBUFFER, error_buffer);
+  return easy;
+}
+
+CurlMultiPtr make_curl_multi() {
+  initialise_curl();
+  return CurlMultiPtr(curl_multi_init());
+}
+
+std::string login_error(CURL* easy, const std::string& user, long methods) {
+  if (user.empty()) {
+    return "the camera wants a user and a password (401)";
+  }
+  long offered = 0;
+  curl_easy_getinfo(easy, CURLINFO_HTTPAUTH_AVAIL, &offered);
+  if ((offered & methods) != 0) {
+    return "wrong user or password (401)";
+  }
+  return std::string("the camera does not offer HTTP digest ") +
+         ((methods & static_cast<long>(CURLAUTH_BASIC)) != 0 ? "or basic " : "") +
+         "authentication (401)";
+}
+
+int poll_milliseconds(double seconds) {
+  return static_cast<int>(std::ceil(1e3 * std::clamp(seconds, 0.0, kLongestWait_s)));
+}
+
+}  // namespace alidade

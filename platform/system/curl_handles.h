@@ -1,0 +1,32 @@
+#pragma once
+// Owners of libcurl's handles, and what every HTTP link of ours has in common.
+
+#include <curl/curl.h>
+
+#include <memory>
+#include <string>
+
+namespace alidade {
+
+struct CurlEasyCleanup {
+  void operator()(CURL* easy) const { curl_easy_cleanup(easy); }
+};
+struct CurlMultiCleanup {
+  void operator()(CURLM* multi) const { curl_multi_cleanup(multi); }
+};
+using CurlEasyPtr = std::unique_ptr<CURL, CurlEasyCleanup>;
+using CurlMultiPtr = std::unique_ptr<CURLM, CurlMultiCleanup>;
+
+// A handle without proxy and signals; null if libcurl does not start. methods: CURLAUTH_..., used
+// if user is not empty. error_buffer of CURL_ERROR_SIZE bytes must outlive the handle.
+[[nodiscard]] CurlEasyPtr make_http_handle(const std::string& user, const std::string& password,
+                                           long methods, char* error_buffer);
+[[nodiscard]] CurlMultiPtr make_curl_multi();
+
+// Why the answer was 401, for the person; methods as given above.
+[[nodiscard]] std::string login_error(CURL* easy, const std::string& user, long methods);
+
+// What a wait of this length is for curl_multi_poll: whole milliseconds, rounded up.
+[[nodiscard]] int poll_milliseconds(double seconds);
+
+}  // namespace alidade

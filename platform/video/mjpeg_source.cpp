@@ -1,0 +1,417 @@
+#include "platform/video/mjpeg_source.h"
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <cmath>
+#include <condition_variable>
+#include <cstring>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <thread>
+#include <utility>
+
+#include "platform/system/backoff.h"
+#include "platform/system/clock.h"
+#include "platform/system/curl_handles.h"
+#include "platform/system/url.h"
+#include "platform/video/jpeg_decoder.h"
+#include "platform/video/multipart_scanner.h"
+#include "platform/video/stream_copy.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t kQueueCapacity = 32;       // pictures: a second of video
+constexpr std::size_t kQueueBytes = 64U << 20U;  // of the pictures that wait
+constexpr long kReceiveBuffer = 128 * 1024;      // bytes read at a time
+constexpr int kDamagedInARow = 30;               // pictures: more are no accident
+constexpr long kMethods = static_cast<long>(CURLAUTH_DIGEST | CURLAUTH_BASIC);
+
+CodecParametersPtr jpeg_parameters() {
+  CodecParametersPtr parameters(avcodec_parameters_alloc());
+  parameters->codec_type = AVMEDIA_TYPE_VIDEO;
+  parameters->codec_id = AV_CODEC_ID_MJPEG;
+  return parameters;
+}
+
+PacketPtr packet_of(const std::string& jpeg) {
+  PacketPtr packet(av_packet_alloc());
+  if (packet && av_new_packet(packet.get(), static_cast<int>(jpeg.size())) == 0) {
+    std::memcpy(packet->data, jpeg.data(), jpeg.size());
+    packet->flags |= AV_PKT_FLAG_KEY;
+  }
+  return packet;
+}
+
+}  // namespace
+
+class MjpegSource::Implementation {
+ public:
+  explicit Implementation(const MjpegSourceOptions& options);
+  ~Implementation() {
+    stop();
+    if (thread_.joinable()) {
+      thread_.join();
+    }
+  }
+
+  ReadStatus read(Frame& frame, double timeout_s);
+
+  void stop() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stopped_ = true;
+    }
+    changed_.notify_all();
+    if (multi_) {
+      curl_multi_wakeup(multi_.get());
+    }
+  }
+
+  const std::string& error() const { return error_; }
+  const std::string& name() const { return name_; }
+  FrameSourceCounters counters() const { return {damaged_, dropped_}; }
+
+ private:
+  // What the receiving thread hands to read(): a picture, or why there is none.
+  struct Event {
+    ReadStatus status = ReadStatus::kOk;
+    std::string error;
+    MultipartPart part;
+  };
+
+  static std::size_t on_body(char* data, std::size_t size, std::size_t count, void* self);
+  bool begin_stream();
+  void take_bytes(std::string_view bytes, double arrival_s);
+  void receive();
+  ReadStatus receive_connection(std::string* error);
+  ReadStatus connection_end(CURLcode code, std::string* error);
+  void push_picture(MultipartPart part);
+  void push_report(Event event);
+  ReadStatus fail(const std::string& error) {
+    error_ = name_ + ": " + error;
+    failed_ = true;
+    return ReadStatus::kFailed;
+  }
+  ReadStatus deliver(MultipartPart part, Frame& frame);
+  std::optional<double> sender_time(const MultipartPart& part);
+
+  MjpegSourceOptions options_;
+  std::string name_;
+
+  // Shared by the receiving thread and read().
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Event> queue_;           // guarded by mutex_
+  std::size_t queue_bytes_ = 0;       // guarded by mutex_
+  std::atomic<bool> stopped_{false};  // set under mutex_, read anywhere
+  std::atomic<std::int64_t> damaged_{0};
+  std::atomic<std::int64_t> dropped_{0};
+
+  // The receiving thread's own.
+  char curl_error_[CURL_ERROR_SIZE] = "";
+  CurlMultiPtr multi_;  // stop() wakes it up
+  CurlEasyPtr easy_;
+  Backoff backoff_{options_.max_backoff_s};
+  std::optional<MultipartScanner> scanner_;  // of this connection, from its first bytes on
+  std::string refusal_;                      // why the answer's body was not taken
+  std::int64_t discarded_ = 0;               // by the scanner, as far as counted
+  std::int64_t pictures_ = 0;                // of this connection
+  double last_picture_s_ = 0;                // or the connection's beginning
+
+  // read()'s own.
+  std::thread thread_;
+  std::string error_;
+  bool failed_ = false;
+  bool restarted_ = true;
+  std::int64_t next_frame_ = 0;
+  int damaged_in_a_row_ = 0;
+  bool sender_has_clock_ = true;
+  std::optional<double> last_sender_time_s_;
+  JpegDecoder decoder_;
+  CodecParametersPtr parameters_ = jpeg_parameters();
+  StreamCopy copy_;
+};
+
+MjpegSource::Implementation::Implementation(const MjpegSourceOptions& options) : options_(options) {
+  silence_av_log();
+  Url url;
+  std::string error;
+  const bool is_url = parse_url(options.url, &url, &error);
+  name_ = url.bare;
+  if (!is_url) {
+    (void)fail(error);
+    return;
+  }
+  if (url.scheme != "http" && url.scheme != "https") {
+    (void)fail("not an MJPEG stream; the URL must be http://host[:port]/path or https://...");
+    return;
+  }
+  if (options_.user.empty() && options_.password.empty()) {
+    options_.user = url.user;
+    options_.password = url.password;
+  }
+  multi_ = make_curl_multi();
+  easy_ = make_http_handle(options_.user, options_.password, kMethods, curl_error_);
+  if (!multi_ || !easy_) {
+    (void)fail("libcurl does not start");
+    return;
+  }
+  curl_easy_setopt(easy_.get(), CURLOPT_URL, url.bare.c_str());
+  curl_easy_setopt(easy_.get(), CURLOPT_BUFFERSIZE, kReceiveBuffer);
+  curl_easy_setopt(easy_.get(), CURLOPT_WRITEFUNCTION, &Implementation::on_body);
+  curl_easy_setopt(easy_.get(), CURLOPT_WRITEDATA, this);
+}
+
+std::size_t MjpegSource::Implementation::on_body(char* data, std::size_t size, std::size_t count,
+                                                 void* self) {
+  auto* source = static_cast<Implementation*>(self);
+  const double arrival_s = monotonic_now_s();
+  const std::size_t bytes = size * count;
+  long status = 0;
+  curl_easy_getinfo(source->easy_.get(), CURLINFO_RESPONSE_CODE, &status);
+  if (status != 200) {
+    return bytes;  // an error's page; the status tells more
+  }
+  if (!source->scanner_ && !source->begin_stream()) {
+    return 0;  // ends the transfer with CURLE_WRITE_ERROR
+  }
+  source->take_bytes({data, bytes}, arrival_s);
+  return bytes;
+}
+
+bool MjpegSource::Implementation::begin_stream() {
+  const char* type = nullptr;
+  curl_easy_getinfo(easy_.get(), CURLINFO_CONTENT_TYPE, &type);
+  std::string boundary;
+  if (!parse_multipart_type(type == nullptr ? "" : type, &boundary)) {
+    refusal_ = std::string("the answer is ") + (type == nullptr ? "of no type" : type) +
+               ", not a stream of pictures (multipart/x-mixed-replace); give the address of the "
+               "camera's MJPEG stream";
+    return false;
+  }
+  scanner_.emplace(boundary, options_.max_picture_bytes);
+  discarded_ = 0;
+  return true;
+}
+
+void MjpegSource::Implementation::take_bytes(std::string_view bytes, double arrival_s) {
+  scanner_->feed(bytes, arrival_s);
+  damaged_ += scanner_->discarded() - std::exchange(discarded_, scanner_->discarded());
+  MultipartPart part;
+  while (scanner_->next(&part)) {
+    if (part.body.compare(0, 2, "\xFF\xD8") == 0) {
+      backoff_.reset();
+      ++pictures_;
+      last_picture_s_ = arrival_s;
+      push_picture(std::move(part));
+    } else if (part.content_type.empty() || part.content_type.rfind("image/", 0) == 0) {
+      ++damaged_;
+    }  // else text between the pictures
+  }
+}
+
+void MjpegSource::Implementation::push_picture(MultipartPart part) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    queue_bytes_ += part.body.size();
+    Event event;
+    event.part = std::move(part);
+    queue_.push_back(std::move(event));
+    while (queue_.size() > 1 && (queue_.size() > kQueueCapacity || queue_bytes_ > kQueueBytes)) {
+      const auto oldest = std::find_if(queue_.begin(), queue_.end(), [](const Event& waiting) {
+        return waiting.status == ReadStatus::kOk;
+      });
+      queue_bytes_ -= oldest->part.body.size();
+      queue_.erase(oldest);
+      ++dropped_;
+    }
+  }
+  changed_.notify_all();
+}
+
+void MjpegSource::Implementation::push_report(Event event) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!queue_.empty() && queue_.back().status == event.status) {
+      queue_.pop_back();  // nobody reads: the last report is enough
+    }
+    queue_.push_back(std::move(event));
+  }
+  changed_.notify_all();
+}
+
+// The receiving thread: connects again and again.
+void MjpegSource::Implementation::receive() {
+  while (!stopped_) {
+    Event event;
+    event.status = receive_connection(&event.error);
+    if (stopped_) {
+      return;
+    }
+    const bool failed = event.status == ReadStatus::kFailed;
+    push_report(std::move(event));
+    if (failed) {
+      return;
+    }
+    std::unique_lock<std::mutex> lock(mutex_);
+    changed_.wait_for(lock, std::chrono::duration<double>(backoff_.next_s()),
+                      [this] { return stopped_.load(); });
+  }
+}
+
+// One connection from its beginning to its end.
+ReadStatus MjpegSource::Implementation::receive_connection(std::string* error) {
+  scanner_.reset();
+  refusal_.clear();
+  curl_error_[0] = '\0';
+  pictures_ = 0;
+  last_picture_s_ = monotonic_now_s();
+  curl_multi_add_handle(multi_.get(), easy_.get());
+  ReadStatus status = ReadStatus::kStopped;
+  while (!stopped_) {
+    int running = 0;
+    curl_multi_perform(multi_.get(), &running);
+    int queued = 0;
+    const CURLMsg* message = curl_multi_info_read(multi_.get(), &queued);
+    if (message != nullptr && message->msg == CURLMSG_DONE) {
+      status = connection_end(message->data.result, error);
+      break;
+    }
+    const double left_s = last_picture_s_ + options_.timeout_s - monotonic_now_s();
+    if (left_s <= 0) {
+      *error = std::string(scanner_ ? "bytes come, but no whole picture" : "no answer") +
+               " within " + std::to_string(std::lround(1e3 * options_.timeout_s)) + " ms";
+      status = ReadStatus::kDisconnected;
+      break;
+    }
+    curl_multi_poll(multi_.get(), nullptr, 0, poll_milliseconds(left_s), nullptr);
+  }
+  curl_multi_remove_handle(multi_.get(), easy_.get());
+  return status;
+}
+
+ReadStatus MjpegSource::Implementation::connection_end(CURLcode code, std::string* error) {
+  long status = 0;
+  curl_easy_getinfo(easy_.get(), CURLINFO_RESPONSE_CODE, &status);
+  if (status == 401) {
+    *error = login_error(easy_.get(), options_.user, kMethods);
+    return ReadStatus::kFailed;
+  }
+  if (!refusal_.empty()) {
+    *error = refusal_;
+  } else if (code != CURLE_OK) {
+    *error = curl_error_[0] != '\0' ? curl_error_ : curl_easy_strerror(code);
+  } else if (status != 200) {
+    *error = "HTTP status " + std::to_string(status) + " instead of a stream of pictures";
+  } else {
+    *error = std::string("the camera ended the stream") +
+             (pictures_ == 0 ? " before its first picture" : "");
+  }
+  return ReadStatus::kDisconnected;
+}
+
+ReadStatus MjpegSource::Implementation::read(Frame& frame, double timeout_s) {
+  const auto deadline =
+      std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(
+                                             std::chrono::duration<double>(timeout_s));
+  if (failed_) {
+    return stopped_ ? ReadStatus::kStopped : ReadStatus::kFailed;
+  }
+  if (!thread_.joinable()) {
+    thread_ = std::thread([this] { receive(); });
+  }
+  for (;;) {
+    Event event;
+    {
+      std::unique_lock<std::mutex> lock(mutex_);
+      changed_.wait_until(lock, deadline, [this] { return stopped_ || !queue_.empty(); });
+      if (stopped_) {
+        return ReadStatus::kStopped;
+      }
+      if (queue_.empty()) {
+        return ReadStatus::kTimeout;
+      }
+      event = std::move(queue_.front());
+      queue_.pop_front();
+      queue_bytes_ -= event.part.body.size();
+    }
+    if (event.status == ReadStatus::kFailed) {
+      return fail(event.error);
+    }
+    if (event.status != ReadStatus::kOk) {
+      error_ = name_ + ": " + event.error;
+      restarted_ = true;
+      return event.status;
+    }
+    const ReadStatus status = deliver(std::move(event.part), frame);
+    if (status != ReadStatus::kTimeout) {
+      return status;
+    }
+  }
+}
+
+// Turns a part into the frame; kTimeout if that cannot be done with this one.
+ReadStatus MjpegSource::Implementation::deliver(MultipartPart part, Frame& frame) {
+  Picture picture;
+  if (options_.decode ? !decoder_.decode(part.body, &picture)
+                      : !decoder_.read_size(part.body, &picture.width, &picture.height)) {
+    ++damaged_;
+    if (++damaged_in_a_row_ < kDamagedInARow) {
+      return ReadStatus::kTimeout;
+    }
+    damaged_in_a_row_ = 0;
+    restarted_ = true;
+    error_ = name_ + ": " + std::to_string(kDamagedInARow) +
+             " pictures in a row cannot be used; the last one: " + decoder_.error();
+    return ReadStatus::kDisconnected;
+  }
+  damaged_in_a_row_ = 0;
+  if (!options_.copy_to.empty()) {
+    const PacketPtr packet = packet_of(part.body);
+    std::string error;
+    if (!packet || packet->data == nullptr) {
+      return fail("no memory for a picture");
+    }
+    if (!copy_.add(options_.copy_to, *parameters_, picture.width, picture.height, *packet,
+                   part.first_byte_s, &error)) {
+      return fail(error);
+    }
+  }
+  frame = Frame{};
+  frame.stamp.frame = next_frame_++;
+  frame.stamp.receive_time_s = part.first_byte_s;
+  frame.stamp.restarted = std::exchange(restarted_, false);
+  if (frame.stamp.restarted) {
+    last_sender_time_s_.reset();
+  }
+  frame.stamp.sender_time_s = sender_time(part);
+  frame.width = picture.width;
+  frame.height = picture.height;
+  frame.luma = picture.luma;
+  frame.stride = picture.stride;
+  frame.owner = std::move(picture.owner);
+  return ReadStatus::kOk;
+}
+
+std::optional<double> MjpegSource::Implementation::sender_time(const MultipartPart& part) {
+  sender_has_clock_ = sender_has_clock_ && part.timestamp_s &&
+                      (!last_sender_time_s_ || *part.timestamp_s > *last_sender_time_s_);
+  last_sender_time_s_ = part.timestamp_s;
+  return sender_has_clock_ ? part.timestamp_s : std::nullopt;
+}
+
+MjpegSource::MjpegSource(const MjpegSourceOptions& options)
+    : implementation_(std::make_unique<Implementation>(options)) {}
+MjpegSource::~MjpegSource() = default;
+ReadStatus MjpegSource::read(Frame& frame, double timeout_s) {
+  return implementation_->read(frame, timeout_s);
+}
+void MjpegSource::stop() { implementation_->stop(); }
+std::string MjpegSource::error() const { return implementation_->error(); }
+std::string MjpegSource::name() const { return implementation_->name(); }
+FrameSourceCounters MjpegSource::counters() const { return implementation_->counters(); }
+
+}  // namespace alidade

@@ -1,0 +1,59 @@
+#pragma once
+// MjpegSource: JPEG pictures one after another in the answer to one HTTP request
+// (multipart/x-mixed-replace; libcurl, multipart_scanner.h, libjpeg-turbo), with HTTP digest or basic
+// authentication.
+//
+// A thread of its own, started by the first read() and so with the scheduling of the capture
+// thread, connects, stamps and queues; read() decodes. So a stamp is never late by a decoding time,
+// and a read() can time out without hurting the stream.
+// - receive_time_s: arrival of the first byte of the picture's part, headers included. Unlike the
+//   last byte's, it does not depend on how large the picture is.
+// - sender_time_s: the part's X-Timestamp, as long as every part has a later one than the part
+//   before; a camera that once fails in that has no clock from then on.
+// - Damaged pictures are skipped and counted; many in a row are reported. When the reader is too
+//   slow, the oldest that wait are dropped and counted.
+// - copy_to: each delivered picture is also stored as it came in that Matroska file, in which a kill
+//   loses at most the last second. The file goes on over reconnections.
+// kDisconnected: unreachable, no whole picture for timeout_s, HTTP status other than 200, an answer
+// that is no multipart stream. kFailed: wrong user or password (401), unusable URL.
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <string>
+
+#include "platform/video/frame_source.h"
+
+namespace alidade {
+
+struct MjpegSourceOptions {
+  std::string url;   // http://host[:port]/path or https://...
+  std::string user;  // these go before what the URL may hold
+  std::string password;
+  bool decode = true;        // false: Frame::luma stays null, only the headers are read
+  double timeout_s = 3;      // without a picture for so long, the connection counts as lost
+  double max_backoff_s = 5;  // longest pause between two tries
+  std::size_t max_picture_bytes = 16U << 20U;  // a longer part is no picture
+  std::string copy_to;                         // video.mkv to copy the pictures into; empty: none
+};
+
+class MjpegSource : public FrameSource {
+ public:
+  explicit MjpegSource(const MjpegSourceOptions& options);
+  ~MjpegSource() override;
+  MjpegSource(const MjpegSource&) = delete;
+  MjpegSource& operator=(const MjpegSource&) = delete;
+
+  [[nodiscard]] ReadStatus read(Frame& frame, double timeout_s) override;
+  void stop() override;
+  [[nodiscard]] std::string error() const override;
+  [[nodiscard]] std::string name() const override;
+
+  [[nodiscard]] FrameSourceCounters counters() const;  // thread-safe
+
+ private:
+  class Implementation;  // keeps libcurl out of this header
+  std::unique_ptr<Implementation> implementation_;
+};
+
+}  // namespace alidade

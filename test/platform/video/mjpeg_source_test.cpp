@@ -1,0 +1,484 @@
+// MjpegSource with a camera in this process, each of whose pictures tells its number by its grey
+// (mjpeg_server.h), and with servers that misbehave.
+
+#include "platform/video/mjpeg_source.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <iterator>
+#include <memory>
+#include <thread>
+#include <vector>
+
+#include "platform/recording/recording_writer.h"
+#include "platform/video/jpeg_decoder.h"
+#include "platform/video/recording_frame_source.h"
+#include "test/platform/support/eventually.h"
+#include "test/platform/support/mjpeg_server.h"
+#include "test/platform/support/picture_files.h"
+#include "test/support/temporary_directory.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+using Login = MjpegServer::Login;
+
+constexpr double kNever_s = 1e6;
+constexpr double kGreyTolerance = 3;  // neighbouring numbers differ by 7
+
+MjpegSourceOptions options_for(const std::string& url) {
+  MjpegSourceOptions options;
+  options.url = url;
+  options.timeout_s = kDeadline_s;
+  options.max_backoff_s = 0.01;
+  return options;
+}
+
+MjpegSourceOptions options_for(const RawServer& server) {
+  return options_for("http://127.0.0.1:" + std::to_string(server.port()) + "/");
+}
+
+// The mean of all pixels: a wrong stride or a damaged edge shows.
+double grey_of(const Frame& frame) {
+  double sum = 0;
+  for (int v = 0; v < frame.height; ++v) {
+    for (int u = 0; u < frame.width; ++u) {
+      sum += frame.luma[v * frame.stride + u];
+    }
+  }
+  return sum / (frame.width * frame.height);
+}
+
+std::string stream_head(const std::string& type = "multipart/x-mixed-replace;boundary=b") {
+  return "HTTP/1.1 200 OK\r\nContent-Type: " + type + "\r\n\r\n";
+}
+
+std::string part(const std::string& body) {
+  return "--b\r\nContent-Type: image/jpeg\r\nContent-Length: " + std::to_string(body.size()) +
+         "\r\n\r\n" + body + "\r\n";
+}
+
+struct Style {
+  const char* name;
+  MjpegStyle style;
+};
+
+void PrintTo(const Style& style, std::ostream* out) { *out << style.name; }
+
+std::vector<Style> styles() {
+  std::vector<Style> all{{"Usual", {}}};
+  MjpegStyle style;
+  style.length = false;
+  all.push_back({"WithoutLength", style});
+  style.after = "";
+  all.push_back({"WithoutLineEndBeforeTheDelimiter", style});
+  style = {};
+  style.type = "multipart/x-mixed-replace";
+  all.push_back({"UndeclaredBoundary", style});
+  style = {};
+  style.type = "Multipart/X-Mixed-Replace ; Boundary = \"myboundary\"";
+  style.before = "----myboundary\n";
+  style.headers = "content-type:image/jpeg\n";
+  all.push_back({"QuotedBoundaryAndLineFeeds", style});
+  style = {};
+  style.headers = "Content-Length: 20\r\n";
+  style.length = false;
+  all.push_back({"WrongLength", style});
+  return all;
+}
+
+class MjpegSourceStyles : public ::testing::TestWithParam<Style> {};
+
+TEST_P(MjpegSourceStyles, DeliversEveryPictureInOrder) {
+  const MjpegServer server(GetParam().style);
+  MjpegSource source(options_for(server.url()));
+  Frame frame;
+  double last_s = 0;
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+    EXPECT_EQ(frame.stamp.frame, i);
+    EXPECT_EQ(frame.stamp.restarted, i == 0);
+    EXPECT_FALSE(frame.stamp.sender_time_s);
+    EXPECT_EQ(frame.width, MjpegServer::kWidth);
+    EXPECT_EQ(frame.height, MjpegServer::kHeight);
+    EXPECT_NEAR(grey_of(frame), MjpegServer::grey_of(i), kGreyTolerance);
+    EXPECT_GE(frame.stamp.receive_time_s, server.sent(i).before_first_s);
+    EXPECT_GE(frame.stamp.receive_time_s, last_s);
+    last_s = frame.stamp.receive_time_s;
+  }
+  EXPECT_EQ(source.counters().damaged, 0);
+  EXPECT_EQ(source.counters().dropped, 0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras, MjpegSourceStyles, ::testing::ValuesIn(styles()),
+                         [](const auto& which) { return which.param.name; });
+
+TEST(MjpegSource, StampsTheFirstByteOfAPictureThatComesSlowly) {
+  MjpegStyle style;
+  style.pause_in_part = true;
+  const MjpegServer server(style);
+  MjpegSource source(options_for(server.url()));
+  Frame frame;
+  int early = 0;
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+    EXPECT_GE(frame.stamp.receive_time_s, server.sent(i).before_first_s);
+    early += frame.stamp.receive_time_s < server.sent(i).before_rest_s ? 1 : 0;
+  }
+  EXPECT_GE(early,
+            1);  // a busy machine may sleep over a pause, but a stamp of the last byte never is
+}
+
+std::string name_of(Login login) {
+  return login == Login::kBasic       ? "Basic"
+         : login == Login::kDigestMd5 ? "DigestMd5"
+                                      : "DigestSha256";
+}
+
+class MjpegSourceLogin : public ::testing::TestWithParam<Login> {};
+
+TEST_P(MjpegSourceLogin, LogsIn) {
+  const MjpegServer server({}, GetParam());
+  MjpegSourceOptions options = options_for(server.url());
+  options.user = MjpegServer::kUser;
+  options.password = MjpegServer::kPassword;
+  MjpegSource source(options);
+  Frame frame;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+  }
+  EXPECT_EQ(server.refusals, 1);
+}
+
+TEST_P(MjpegSourceLogin, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
+  const MjpegServer server({}, GetParam());
+  Frame frame;
+  {
+    MjpegSource source(options_for(
+        "http://us%20er:guess@127.0.0.1:" + std::to_string(server.port()) + "/video.cgi?x=y"));
+    EXPECT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+    EXPECT_EQ(source.error(), server.url() + ": wrong user or password (401)");
+    EXPECT_EQ(source.read(frame, 0), ReadStatus::kFailed);
+  }  // and its connection: the server has one at a time
+  MjpegSource anonymous(options_for(server.url()));
+  EXPECT_EQ(read_until(anonymous, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(anonymous.error(), HasSubstr("wants a user and a password (401)"));
+}
+
+INSTANTIATE_TEST_SUITE_P(Methods, MjpegSourceLogin,
+                         ::testing::Values(Login::kBasic, Login::kDigestMd5, Login::kDigestSha256),
+                         [](const auto& which) { return name_of(which.param); });
+
+TEST(MjpegSource, FailsAtOnceOnAUrlItCannotUse) {
+  Frame frame;
+  for (const char* url : {"http://user:se@cret@camera/", "camera", "rtsp://camera/", ""}) {
+    MjpegSource source(options_for(url));
+    EXPECT_EQ(source.read(frame, 0), ReadStatus::kFailed) << url;
+    EXPECT_THAT(source.error(), AllOf(HasSubstr("://"), Not(HasSubstr("cret"))));
+  }
+}
+
+TEST(MjpegSource, TakesTheSendersClockWhileItAdvances) {
+  MjpegStyle style;
+  style.timestamp_step_s = 0.04;
+  const MjpegServer server(style);
+  MjpegSource source(options_for(server.url()));
+  Frame frame;
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+    ASSERT_TRUE(frame.stamp.sender_time_s);
+    EXPECT_NEAR(*frame.stamp.sender_time_s, 1000 + 0.04 * i, 1e-6);
+  }
+}
+
+TEST(MjpegSource, ForgetsASendersClockThatStands) {
+  MjpegStyle style;
+  style.timestamp_step_s = 0;
+  const MjpegServer server(style);
+  MjpegSource source(options_for(server.url()));
+  Frame frame;
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+    EXPECT_EQ(frame.stamp.sender_time_s.has_value(), i == 0);
+  }
+}
+
+TEST(MjpegSource, ReportsRefusedConnectionsAndTriesAgainUntilTheCameraIsThere) {
+  MjpegServer server;
+  MjpegSource lost(options_for("http://user:secret@127.0.0.1:" + std::to_string(unused_port())));
+  Frame frame;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_EQ(read_until(lost, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_THAT(lost.error(), AllOf(StartsWith("http://127.0.0.1:"), HasSubstr("connect"),
+                                    Not(HasSubstr("secret"))));
+  }
+  MjpegSource source(options_for(server.url()));
+  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+  server.hang_up = true;
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("ended the stream"));
+  server.hang_up = false;
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk);
+  EXPECT_TRUE(frame.stamp.restarted);
+  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk);
+  EXPECT_FALSE(frame.stamp.restarted);
+}
+
+TEST(MjpegSource, SaysWhatTheAnswerIsInPlaceOfAStream) {
+  struct Answer {
+    const char* head;
+    const char* error;
+  };
+  for (const Answer& answer :
+       {Answer{"404 Not Found\r\nContent-Type: text/html", "HTTP status 404"},
+        Answer{"500 Internal Server Error\r\nContent-Type: text/html", "HTTP status 500"},
+        Answer{"302 Found\r\nLocation: /login", "HTTP status 302"},
+        Answer{"200 OK\r\nContent-Type: text/html", "the answer is text/html, not a stream"},
+        Answer{"200 OK\r\nContent-Type: image/jpeg", "the answer is image/jpeg, not a stream"},
+        Answer{"200 OK\r\nX: y", "the answer is of no type, not a stream"}}) {
+    RawServer server([&](int fd) {
+      if (server.read_request(fd)) {
+        RawServer::send(fd, std::string("HTTP/1.1 ") + answer.head +
+                                "\r\nContent-Length: 5\r\nConnection: close\r\n\r\nhello");
+      }
+    });
+    MjpegSource source(options_for(server));
+    Frame frame;
+    for (int i = 0; i < 2; ++i) {
+      ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+      EXPECT_THAT(source.error(), HasSubstr(answer.error));
+    }
+  }
+}
+
+TEST(MjpegSource, SurvivesConnectionsThatBreakAtAnyPoint) {
+  const std::string jpeg = MjpegServer::picture(0);
+  int turn = 0;
+  RawServer server([&](int fd) {
+    ++turn;
+    if (turn % 5 == 1) {
+      RawServer::reset(fd);
+      return;
+    }
+    if (!server.read_request(fd) || turn % 5 == 2) {
+      return;
+    }
+    RawServer::send(fd, stream_head());
+    if (turn % 5 == 3) {
+      RawServer::send(fd, part(jpeg).substr(0, 20));
+      RawServer::reset(fd);
+    } else if (turn % 5 == 4) {
+      RawServer::send(fd, part(jpeg).substr(0, jpeg.size()));
+    } else {
+      RawServer::send(fd, part(jpeg));
+    }
+  });
+  MjpegSource source(options_for(server));
+  Frame frame;
+  int lost = 0;
+  for (int good = 0; good < 3;) {
+    const ReadStatus status = source.read(frame, kDeadline_s);
+    ASSERT_TRUE(status == ReadStatus::kOk || status == ReadStatus::kDisconnected);
+    if (status == ReadStatus::kOk) {
+      EXPECT_TRUE(frame.stamp.restarted);
+      EXPECT_EQ(frame.stamp.frame, good++);
+    } else {
+      ++lost;
+    }
+  }
+  EXPECT_GE(lost, 3);  // reports that follow each other become one
+  EXPECT_EQ(source.counters().damaged, 0);
+}
+
+TEST(MjpegSource, SkipsAndCountsDamagedPicturesAndPassesOverText) {
+  const std::string jpeg = MjpegServer::picture(3);
+  RawServer server([&](int fd) {
+    if (!server.read_request(fd)) {
+      return;
+    }
+    RawServer::send(fd, stream_head());
+    RawServer::send(fd, part(jpeg.substr(0, jpeg.size() / 2)));
+    RawServer::send(fd, "--b\r\nContent-Type: text/plain\r\n\r\nmotion=1\r\n");
+    RawServer::send(fd, part("no picture"));
+    RawServer::send(fd, part("\xFF\xD8 no picture either \xFF\xD9"));
+    RawServer::send(fd, part(std::string(100'000, 'x')));
+    RawServer::send(fd, part(jpeg));
+    server.stay_silent(fd);
+  });
+  MjpegSourceOptions options = options_for(server);
+  options.max_picture_bytes = 50'000;
+  MjpegSource source(options);
+  Frame frame;
+  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+  EXPECT_EQ(frame.stamp.frame, 0);
+  EXPECT_NEAR(grey_of(frame), MjpegServer::grey_of(3), kGreyTolerance);
+  EXPECT_EQ(source.counters().damaged, 4);
+}
+
+TEST(MjpegSource, ReportsPicturesThatAreAllDamaged) {
+  const std::string jpeg = MjpegServer::picture(0);
+  const std::string half = jpeg.substr(0, jpeg.size() / 2) + "\xFF\xD9";
+  RawServer server([&](int fd) {
+    if (server.read_request(fd) && RawServer::send(fd, stream_head())) {
+      while (!server.closing() && RawServer::send(fd, part(half))) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+      }
+    }
+  });
+  MjpegSource source(options_for(server));
+  Frame frame;
+  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("30 pictures in a row cannot be used"));
+  EXPECT_THAT(source.error(), HasSubstr("damaged JPEG"));
+}
+
+TEST(MjpegSource, GivesUpAConnectionWithoutAnAnswer) {
+  RawServer server([&server](int fd) { server.stay_silent(fd); });
+  MjpegSourceOptions options = options_for(server);
+  options.timeout_s = 0.05;
+  MjpegSource source(options);
+  Frame frame;
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("no answer within 50 ms"));
+}
+
+TEST(MjpegSource, GivesUpAStreamInWhichNoPictureEnds) {
+  RawServer server([&server](int fd) {
+    if (server.read_request(fd) && RawServer::send(fd, stream_head())) {
+      while (!server.closing() && RawServer::send(fd, "x")) {
+        std::this_thread::sleep_for(std::chrono::milliseconds(5));
+      }
+    }
+  });
+  MjpegSourceOptions options = options_for(server);
+  options.timeout_s = 0.2;
+  MjpegSource source(options);
+  Frame frame;
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("no whole picture within 200 ms"));
+}
+
+TEST(MjpegSource, DropsTheOldestPicturesWhenTheReaderIsSlow) {
+  const MjpegServer server;
+  MjpegSource source(options_for(server.url()));
+  Frame frame;
+  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk);
+  ASSERT_TRUE(eventually([&] { return source.counters().dropped >= 10; }));
+  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk);
+  EXPECT_EQ(frame.stamp.frame, 1);
+  EXPECT_GE(frame.stamp.receive_time_s, server.sent(11).before_first_s);
+}
+
+TEST(MjpegSource, CopiesThePicturesOverReconnections) {
+  const TemporaryDirectory directory;
+  RecordingWriter writer;
+  std::string error;
+  ASSERT_TRUE(writer.open(directory.path(), MjpegServer::kWidth, MjpegServer::kHeight, "", &error));
+  MjpegServer server;
+  MjpegSourceOptions options = options_for(server.url());
+  options.decode = false;
+  options.copy_to = directory.path() + "/video.mkv";
+  {
+    MjpegSource source(options);
+    Frame frame;
+    for (int i = 0; i < 10; ++i) {
+      ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+      EXPECT_EQ(frame.luma, nullptr);
+      EXPECT_EQ(frame.width, MjpegServer::kWidth);
+      ASSERT_TRUE(writer.add_frame(frame.stamp, &error)) << error;
+    }
+    server.hang_up = true;
+    ASSERT_TRUE(eventually([&] {
+      const ReadStatus status = source.read(frame, 0);
+      if (status == ReadStatus::kOk) {
+        EXPECT_TRUE(writer.add_frame(frame.stamp, &error)) << error;
+      }
+      return status == ReadStatus::kDisconnected;
+    }));
+    server.hang_up = false;
+    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk);
+    ASSERT_TRUE(writer.add_frame(frame.stamp, &error)) << error;
+  }
+  RecordingFrameSourceOptions recorded;
+  recorded.directory = directory.path();
+  RecordingFrameSource recording(recorded);
+  Frame frame;
+  int frames = 0;
+  for (; recording.read(frame, 0) == ReadStatus::kOk; ++frames) {
+    EXPECT_NEAR(grey_of(frame), MjpegServer::grey_of(frames), kGreyTolerance);
+  }
+  EXPECT_GE(frames, 11);
+  EXPECT_EQ(recording.missing_frames(), 0);
+}
+
+TEST(MjpegSource, StopEndsAReadThatGetsNoAnswer) {
+  RawServer server([&server](int fd) { server.stay_silent(fd); });
+  MjpegSource source(options_for(server));
+  std::thread stopper([&] {
+    eventually([&] { return server.connections() > 0; });
+    source.stop();
+  });
+  Frame frame;
+  EXPECT_EQ(source.read(frame, kNever_s), ReadStatus::kStopped);
+  stopper.join();
+}
+
+TEST(MjpegSource, StopEndsAPause) {
+  MjpegSourceOptions options = options_for("http://127.0.0.1:" + std::to_string(unused_port()));
+  options.max_backoff_s = kNever_s;
+  MjpegSource source(options);
+  Frame frame;
+  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kDisconnected);
+  std::thread stopper([&] { source.stop(); });
+  ReadStatus status = ReadStatus::kDisconnected;
+  while (status == ReadStatus::kDisconnected) {
+    status = source.read(frame, kNever_s);
+  }
+  EXPECT_EQ(status, ReadStatus::kStopped);
+  stopper.join();
+}
+
+TEST(JpegDecoder, TellsWholePicturesFromCutOffOnes) {
+  const std::string jpeg = picture_file("mjpeg", 50, 34, 100);
+  JpegDecoder decoder;
+  Picture picture;
+  ASSERT_TRUE(decoder.decode(jpeg, &picture)) << decoder.error();
+  EXPECT_EQ(picture.width, 50);
+  EXPECT_EQ(picture.height, 34);
+  EXPECT_NEAR(picture.luma[33 * picture.stride + 49], 100, kGreyTolerance);
+  for (std::size_t size = 0; size + 2 < jpeg.size(); ++size) {
+    EXPECT_FALSE(decoder.decode(jpeg.substr(0, size), &picture)) << size;
+    EXPECT_THAT(decoder.error(), Not(HasSubstr("\n")));
+    ASSERT_TRUE(decoder.decode(jpeg, &picture)) << "after one of " << size << " bytes";
+  }
+}
+
+TEST(JpegDecoder, ForgivesBytesTooManyBeforeTheEndMarker) {
+  std::string jpeg = picture_file("mjpeg", 50, 34, 100);
+  jpeg.insert(jpeg.size() - 2, "  ");
+  JpegDecoder decoder;
+  Picture picture;
+  EXPECT_TRUE(decoder.decode(jpeg, &picture)) << decoder.error();
+}
+
+TEST(JpegDecoder, RefusesASizeThatNoCameraHas) {
+  std::string jpeg = picture_file("mjpeg", 48, 32, 100);
+  const std::size_t frame_header = jpeg.find("\xFF\xC0");
+  ASSERT_NE(frame_header, std::string::npos);
+  jpeg.replace(frame_header + 5, 4, "\xFF\x00\xFF\x00", 4);
+  JpegDecoder decoder;
+  Picture picture;
+  EXPECT_FALSE(decoder.decode(jpeg, &picture));
+  EXPECT_THAT(decoder.error(), HasSubstr("65280x65280"));
+}
+
+}  // namespace
+}  // namespace alidade
