@@ -1,0 +1,62 @@
+#pragma once
+// DeviceClockTrial: whether the times that a polled device tells with its answers are of use.
+//
+// Devices tell the time of the measurement, the time of the answer, whole seconds, always the same,
+// or nothing. Of use is what never goes backwards, is finer than whole seconds, and advances no
+// faster than the host's clock (within kSlack_s). The verdict comes with the second change, or as
+// "no" when that is long in coming; it then stands. Pure, one thread.
+
+#include <cmath>
+#include <optional>
+
+namespace alidade {
+
+class DeviceClockTrial {
+ public:
+  enum class Verdict { kOpen, kUseful, kUseless };
+
+  // device_time_s of an answer that came at host_time_s.
+  Verdict add(std::optional<double> device_time_s, double host_time_s) {
+    if (verdict_ != Verdict::kOpen) {
+      return verdict_;
+    }
+    if (!device_time_s) {
+      return verdict_ = Verdict::kUseless;
+    }
+    fine_ = fine_ || *device_time_s != std::floor(*device_time_s);
+    ++answers_;
+    if (answers_ == 1) {
+      first_host_s_ = host_time_s;
+      first_device_s_ = *device_time_s;
+    } else {
+      const double advance_s = *device_time_s - last_device_s_;
+      const double ahead_s = (*device_time_s - first_device_s_) - (host_time_s - first_host_s_);
+      changes_ += advance_s > 0 ? 1 : 0;
+      if (advance_s < 0 || std::abs(ahead_s) > kSlack_s) {
+        verdict_ = Verdict::kUseless;
+      } else if (changes_ >= kChanges) {
+        verdict_ = fine_ ? Verdict::kUseful : Verdict::kUseless;
+      } else if (answers_ >= kAnswers && host_time_s - first_host_s_ > kPatience_s) {
+        verdict_ = Verdict::kUseless;
+      }
+    }
+    last_device_s_ = *device_time_s;
+    return verdict_;
+  }
+
+ private:
+  static constexpr int kChanges = 2;
+  static constexpr int kAnswers = 4;
+  static constexpr double kPatience_s = 1;
+  static constexpr double kSlack_s = 1;
+
+  Verdict verdict_ = Verdict::kOpen;
+  int answers_ = 0;
+  int changes_ = 0;
+  bool fine_ = false;
+  double first_host_s_ = 0;
+  double first_device_s_ = 0;
+  double last_device_s_ = 0;
+};
+
+}  // namespace alidade

@@ -1,0 +1,316 @@
+#include "platform/pan_tilt/http_polling_source.h"
+
+#include <algorithm>
+#include <atomic>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "platform/system/backoff.h"
+#include "platform/system/clock.h"
+#include "platform/system/curl_handles.h"
+
+namespace alidade {
+namespace {
+
+constexpr long kMethod = static_cast<long>(CURLAUTH_DIGEST);
+
+struct HeaderListCleanup {
+  void operator()(curl_slist* list) const { curl_slist_free_all(list); }
+};
+using HeaderListPtr = std::unique_ptr<curl_slist, HeaderListCleanup>;
+
+HeaderListPtr header_list(const std::vector<std::string>& headers) {
+  HeaderListPtr list;
+  for (const std::string& header : headers) {
+    if (curl_slist* longer = curl_slist_append(list.get(), header.c_str())) {
+      (void)list.release();
+      list.reset(longer);
+    }
+  }
+  return list;
+}
+
+}  // namespace
+
+std::string take_http_url(const std::string& text, Url* url, HttpPollingOptions* options) {
+  std::string error;
+  const bool is_url = parse_url(text, url, &error);
+  options->name = url->bare;
+  if (!is_url) {
+    return error;
+  }
+  if (options->user.empty() && options->password.empty()) {
+    options->user = url->user;
+    options->password = url->password;
+  }
+  return url->scheme == "http" || url->scheme == "https"
+             ? ""
+             : "the URL must be http://host[:port] or https://host[:port]";
+}
+
+class HttpPollingSource::Implementation {
+ public:
+  explicit Implementation(HttpPollingPlan plan);
+  ~Implementation() {
+    if (under_way_) {
+      curl_multi_remove_handle(multi_.get(), easy_.get());
+    }
+  }
+
+  ReadStatus read(PanTiltSample& sample, double timeout_s);
+
+  void stop() {
+    stopped_ = true;
+    if (multi_) {
+      curl_multi_wakeup(multi_.get());
+    }
+  }
+
+  const std::string& error() const { return error_; }
+  const std::string& name() const { return options_.name; }
+
+ private:
+  static std::size_t on_header(char* data, std::size_t size, std::size_t count, void* self);
+  static std::size_t on_body(char* data, std::size_t size, std::size_t count, void* self);
+  void start_request(double now_s);
+  bool request_is_over(CURLcode* code);
+  HttpAnswer answer() const;
+  // kTimeout: it gave no sample, and was no failure.
+  ReadStatus finish_request(CURLcode code, PanTiltSample* sample);
+  ReadStatus fail(const std::string& error);
+  ReadStatus disconnect(const std::string& error);
+
+  HttpPollingOptions options_;
+  std::unique_ptr<HttpConversation> conversation_;
+  std::string error_;
+  bool failed_ = false;
+  std::atomic<bool> stopped_{false};
+
+  char curl_error_[CURL_ERROR_SIZE] = "";
+  CurlMultiPtr multi_;
+  CurlEasyPtr easy_;  // one for all requests: it keeps the connection and the digest's nonce
+
+  double period_s_;
+  double due_s_ = 0;     // when the next poll is to be sent
+  bool ask_on_ = false;  // the next request does not wait for that
+  Backoff backoff_;
+  bool restarted_ = true;
+
+  // The request under way.
+  bool under_way_ = false;
+  HttpRequest request_;
+  HeaderListPtr headers_;
+  double started_s_ = 0;
+  double previous_answer_s_ = 0;  // to this request: a 401 before the answer
+  double answer_s_ = 0;           // when the first bytes of the latest answer were here
+  std::string body_;
+};
+
+HttpPollingSource::Implementation::Implementation(HttpPollingPlan plan)
+    : options_(std::move(plan.options)),
+      conversation_(std::move(plan.conversation)),
+      period_s_(1 / options_.rate_hz),
+      backoff_(options_.max_backoff_s) {
+  if (!plan.error.empty()) {
+    (void)fail(plan.error);
+    return;
+  }
+  if (!(options_.rate_hz > 0)) {
+    (void)fail("rate_hz must be positive");
+    return;
+  }
+  multi_ = make_curl_multi();
+  easy_ = make_http_handle(options_.user, options_.password, kMethod, curl_error_);
+  if (!multi_ || !easy_) {
+    (void)fail("libcurl does not start");
+    return;
+  }
+  curl_easy_setopt(easy_.get(), CURLOPT_TIMEOUT_MS, std::lround(1e3 * options_.timeout_s));
+  curl_easy_setopt(easy_.get(), CURLOPT_HEADERFUNCTION, &Implementation::on_header);
+  curl_easy_setopt(easy_.get(), CURLOPT_HEADERDATA, this);
+  curl_easy_setopt(easy_.get(), CURLOPT_WRITEFUNCTION, &Implementation::on_body);
+  curl_easy_setopt(easy_.get(), CURLOPT_WRITEDATA, this);
+}
+
+std::size_t HttpPollingSource::Implementation::on_header(char* data, std::size_t size,
+                                                         std::size_t count, void* self) {
+  auto* poll = static_cast<Implementation*>(self);
+  const std::size_t bytes = size * count;
+  if (std::string_view(data, bytes).substr(0, 5) == "HTTP/") {
+    poll->previous_answer_s_ = poll->answer_s_;
+    poll->answer_s_ = monotonic_now_s();
+    poll->body_.clear();
+  }
+  return bytes;
+}
+
+std::size_t HttpPollingSource::Implementation::on_body(char* data, std::size_t size,
+                                                       std::size_t count, void* self) {
+  auto* poll = static_cast<Implementation*>(self);
+  const std::size_t bytes = size * count;
+  if (poll->body_.size() + bytes > poll->options_.max_body) {
+    return 0;  // ends the transfer with CURLE_WRITE_ERROR
+  }
+  poll->body_.append(data, bytes);
+  return bytes;
+}
+
+ReadStatus HttpPollingSource::Implementation::fail(const std::string& error) {
+  error_ = options_.name + ": " + error;
+  failed_ = true;
+  return ReadStatus::kFailed;
+}
+
+ReadStatus HttpPollingSource::Implementation::disconnect(const std::string& error) {
+  error_ = options_.name + ": " + error;
+  restarted_ = true;
+  ask_on_ = false;
+  due_s_ = monotonic_now_s() + backoff_.next_s();
+  return ReadStatus::kDisconnected;
+}
+
+void HttpPollingSource::Implementation::start_request(double now_s) {
+  if (!std::exchange(ask_on_, false)) {
+    // The next point of the grid that lies ahead.
+    due_s_ = due_s_ == 0
+                 ? now_s + period_s_
+                 : due_s_ + period_s_ * std::max(1.0, std::ceil((now_s - due_s_) / period_s_));
+  }
+  request_ = conversation_->next_request(now_s);
+  headers_ = header_list(request_.headers);
+  curl_easy_setopt(easy_.get(), CURLOPT_URL, request_.url.c_str());
+  curl_easy_setopt(easy_.get(), CURLOPT_HTTPHEADER, headers_.get());
+  if (!options_.user.empty()) {
+    curl_easy_setopt(easy_.get(), CURLOPT_HTTPAUTH,
+                     request_.digest ? kMethod : static_cast<long>(CURLAUTH_NONE));
+  }
+  if (request_.body) {
+    curl_easy_setopt(easy_.get(), CURLOPT_POSTFIELDS, request_.body->c_str());
+    curl_easy_setopt(easy_.get(), CURLOPT_POSTFIELDSIZE, static_cast<long>(request_.body->size()));
+  } else {
+    curl_easy_setopt(easy_.get(), CURLOPT_HTTPGET, 1L);
+  }
+  body_.clear();
+  curl_error_[0] = '\0';
+  answer_s_ = 0;
+  previous_answer_s_ = 0;
+  under_way_ = true;
+  started_s_ = monotonic_now_s();
+  curl_multi_add_handle(multi_.get(), easy_.get());
+}
+
+bool HttpPollingSource::Implementation::request_is_over(CURLcode* code) {
+  int running = 0;
+  curl_multi_perform(multi_.get(), &running);
+  int queued = 0;
+  const CURLMsg* message = curl_multi_info_read(multi_.get(), &queued);
+  if (message == nullptr || message->msg != CURLMSG_DONE) {
+    return false;
+  }
+  *code = message->data.result;
+  curl_multi_remove_handle(multi_.get(), easy_.get());
+  under_way_ = false;
+  return true;
+}
+
+HttpAnswer HttpPollingSource::Implementation::answer() const {
+  HttpAnswer answer;
+  curl_easy_getinfo(easy_.get(), CURLINFO_RESPONSE_CODE, &answer.status);
+  if (answer.status == 401) {
+    long offered = 0;
+    curl_easy_getinfo(easy_.get(), CURLINFO_HTTPAUTH_AVAIL, &offered);
+    answer.offers_digest = (offered & kMethod) != 0;
+    answer.login_error = login_error(easy_.get(), options_.user, kMethod);
+  }
+  answer.body = body_;
+  // The request was sent after the connection stood (libcurl counts from a moment after started_s_)
+  // and after the 401 that may have gone before. CURLINFO_PRETRANSFER_TIME_T is too late: it is taken
+  // when the request has left.
+  curl_off_t connected_us = 0;
+  curl_off_t encrypted_us = 0;
+  curl_easy_getinfo(easy_.get(), CURLINFO_CONNECT_TIME_T, &connected_us);
+  curl_easy_getinfo(easy_.get(), CURLINFO_APPCONNECT_TIME_T, &encrypted_us);
+  const double ready_s =
+      started_s_ + 1e-6 * static_cast<double>(std::max(connected_us, encrypted_us));
+  answer.latest_time_s = answer_s_;
+  answer.earliest_time_s = std::min(std::max(ready_s, previous_answer_s_), answer_s_);
+  return answer;
+}
+
+ReadStatus HttpPollingSource::Implementation::finish_request(CURLcode code, PanTiltSample* sample) {
+  if (code != CURLE_OK) {
+    conversation_->reset();
+    return disconnect(code == CURLE_WRITE_ERROR
+                          ? "the answer is longer than " + std::to_string(options_.max_body) +
+                                " bytes: not " + options_.expected
+                      : curl_error_[0] != '\0' ? curl_error_
+                                               : curl_easy_strerror(code));
+  }
+  const HttpAnswer given = answer();
+  PanTiltSample taken;
+  std::string error;
+  switch (conversation_->take(given, &taken, &error)) {
+    case HttpConversation::Outcome::kFailed:
+      return fail(error);
+    case HttpConversation::Outcome::kDisconnected:
+      return disconnect(error);
+    case HttpConversation::Outcome::kAskOn:
+      ask_on_ = true;
+      return ReadStatus::kTimeout;
+    case HttpConversation::Outcome::kNothing:
+      return ReadStatus::kTimeout;
+    case HttpConversation::Outcome::kSample:
+      break;
+  }
+  *sample = taken;
+  sample->earliest_time_s = given.earliest_time_s;
+  sample->latest_time_s = given.latest_time_s;
+  sample->restarted = std::exchange(restarted_, false);
+  backoff_.reset();
+  return ReadStatus::kOk;
+}
+
+ReadStatus HttpPollingSource::Implementation::read(PanTiltSample& sample, double timeout_s) {
+  const double deadline_s = monotonic_now_s() + timeout_s;
+  for (;;) {
+    if (stopped_) {
+      return ReadStatus::kStopped;
+    }
+    if (failed_) {
+      return ReadStatus::kFailed;
+    }
+    double now_s = monotonic_now_s();
+    if (!under_way_ && (ask_on_ || now_s >= due_s_)) {
+      start_request(now_s);
+    }
+    CURLcode code = CURLE_OK;
+    if (under_way_ && request_is_over(&code)) {
+      const ReadStatus status = finish_request(code, &sample);
+      if (status != ReadStatus::kTimeout) {
+        return status;
+      }
+    }
+    now_s = monotonic_now_s();
+    if (now_s >= deadline_s) {
+      return ReadStatus::kTimeout;
+    }
+    if (!ask_on_) {
+      // Until the transfer moves on, stop() is called, or the time is over.
+      const double until_s = under_way_ ? deadline_s : std::min(due_s_, deadline_s);
+      curl_multi_poll(multi_.get(), nullptr, 0, poll_milliseconds(until_s - now_s), nullptr);
+    }
+  }
+}
+
+HttpPollingSource::HttpPollingSource(HttpPollingPlan plan)
+    : implementation_(std::make_unique<Implementation>(std::move(plan))) {}
+HttpPollingSource::~HttpPollingSource() = default;
+ReadStatus HttpPollingSource::read(PanTiltSample& sample, double timeout_s) {
+  return implementation_->read(sample, timeout_s);
+}
+void HttpPollingSource::stop() { implementation_->stop(); }
+std::string HttpPollingSource::error() const { return implementation_->error(); }
+std::string HttpPollingSource::name() const { return implementation_->name(); }
+
+}  // namespace alidade

@@ -1,0 +1,100 @@
+#pragma once
+// HttpPollingSource: a PanTiltSource that asks a device again and again over one kept HTTP
+// connection (libcurl). What is asked and what the answers mean is an HttpConversation's business,
+// which has no I/O of its own.
+//
+// Samples are polled on a fixed grid of 1/rate_hz; a late answer skips grid points and does not
+// shift the grid. The answer was true between earliest_time_s, just before the request was sent,
+// and latest_time_s, when the answer's first bytes were here. A server that writes header and body
+// in two pieces may hold the second back for the 40 ms of a delayed acknowledgement: that limits
+// the rate, not the interval. kDisconnected: unreachable, timed out, or what the conversation
+// takes for such; the next try comes after a growing pause. kFailed: unusable URL, or what the
+// conversation takes for good. read() runs the transfer on the calling thread; it allocates.
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "platform/pan_tilt/pan_tilt_source.h"
+#include "platform/system/url.h"
+
+namespace alidade {
+
+struct HttpRequest {
+  std::string url;
+  std::optional<std::string> body;   // POSTed; none: GET
+  std::vector<std::string> headers;  // "Name: value"
+  bool digest = true;                // log in by HTTP digest, if there is a user
+};
+
+struct HttpAnswer {
+  long status = 0;
+  std::string body;
+  bool offers_digest = false;  // with 401
+  std::string login_error;     // with 401: one line on what may be wrong
+  double earliest_time_s = 0;
+  double latest_time_s = 0;
+};
+
+class HttpConversation {
+ public:
+  enum class Outcome {
+    kSample,        // *sample holds pan, tilt, zoom, device time; the next request is paced
+    kAskOn,         // the next request follows at once
+    kNothing,       // no sample; the next request is paced
+    kDisconnected,  // *error says why; next_request() begins anew after a pause
+    kFailed         // *error says why
+  };
+
+  virtual ~HttpConversation() = default;
+  // now_s: host CLOCK_MONOTONIC.
+  virtual HttpRequest next_request(double now_s) = 0;
+  virtual Outcome take(const HttpAnswer& answer, PanTiltSample* sample, std::string* error) = 0;
+  // A request got no answer: begin anew.
+  virtual void reset() = 0;
+};
+
+struct HttpPollingOptions {
+  std::string name;  // of the source: the URL without password
+  std::string user;
+  std::string password;
+  double rate_hz = 30;
+  double timeout_s = 1;         // for one request
+  double max_backoff_s = 5;     // longest pause between two tries
+  std::size_t max_body = 4096;  // bytes of an answer
+  std::string expected;         // what an answer is: "a camera's position"
+};
+
+// All that a source needs.
+struct HttpPollingPlan {
+  HttpPollingOptions options;
+  std::unique_ptr<HttpConversation> conversation;
+  std::string error;  // why no request can ever be made; empty: none
+};
+
+class HttpPollingSource : public PanTiltSource {
+ public:
+  ~HttpPollingSource() override;
+  HttpPollingSource(const HttpPollingSource&) = delete;
+  HttpPollingSource& operator=(const HttpPollingSource&) = delete;
+
+  [[nodiscard]] ReadStatus read(PanTiltSample& sample, double timeout_s) override;
+  void stop() override;
+  [[nodiscard]] std::string error() const override;
+  [[nodiscard]] std::string name() const override;
+
+ protected:
+  explicit HttpPollingSource(HttpPollingPlan plan);
+
+ private:
+  class Implementation;  // keeps libcurl out of this header
+  std::unique_ptr<Implementation> implementation_;
+};
+
+// The parts of an http or https URL. Takes user and password out of it where options have none, and
+// puts its bare form into options->name. Empty, or what is wrong.
+[[nodiscard]] std::string take_http_url(const std::string& text, Url* url,
+                                        HttpPollingOptions* options);
+
+}  // namespace alidade

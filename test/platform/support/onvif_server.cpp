@@ -1,0 +1,203 @@
+#include "test/platform/support/onvif_server.h"
+
+#include <time.h>
+
+#include <cmath>
+#include <ctime>
+#include <regex>
+#include <stdexcept>
+#include <utility>
+
+namespace alidade {
+namespace {
+
+constexpr double kTokenLife_s = 5;
+
+double host_utc_s() {
+  timespec now{};
+  ::clock_gettime(CLOCK_REALTIME, &now);
+  return static_cast<double>(now.tv_sec) + 1e-9 * static_cast<double>(now.tv_nsec);
+}
+
+// The text of the first element with this local name.
+std::string element(const std::string& xml, const std::string& name) {
+  std::smatch match;
+  const std::regex pattern("<(?:\\w+:)?" + name + "(?:\\s[^>]*)?>([^<]*)<");
+  return std::regex_search(xml, match, pattern) ? match[1].str() : std::string();
+}
+
+std::string unescaped(std::string text) {
+  text = std::regex_replace(text, std::regex("&lt;"), "<");
+  text = std::regex_replace(text, std::regex("&gt;"), ">");
+  return std::regex_replace(text, std::regex("&amp;"), "&");
+}
+
+}  // namespace
+
+OnvifServer::OnvifServer(OnvifDevice device, int port)
+    : device_(std::move(device)),
+      digest_(device_.user, device_.password,
+              device_.login == OnvifDevice::Login::kDigestSha256 ? DigestCheck::Algorithm::kSha256
+                                                                 : DigestCheck::Algorithm::kMd5) {
+  server_.set_keep_alive_max_count(1'000'000);
+  server_.set_tcp_nodelay(true);
+  server_.Post("/onvif/.*", [this](const httplib::Request& request, httplib::Response& response) {
+    serve(request, response);
+  });
+  port_ = port == 0 ? server_.bind_to_any_port("127.0.0.1") : port;
+  if (port != 0 && !server_.bind_to_port("127.0.0.1", port)) {
+    throw std::runtime_error("the port is taken");
+  }
+  thread_ = std::thread([this] { server_.listen_after_bind(); });
+  while (!server_.is_running()) {
+    std::this_thread::yield();
+  }
+}
+
+OnvifServer::~OnvifServer() {
+  server_.stop();
+  thread_.join();
+}
+
+void OnvifServer::set_fault(const std::string& code, const std::string& reason) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  fault_code_ = code;
+  fault_reason_ = reason;
+}
+
+int OnvifServer::count(const std::string& call) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const auto found = counts_.find(call);
+  return found == counts_.end() ? 0 : found->second;
+}
+
+std::string OnvifServer::last_profile() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return last_profile_;
+}
+
+std::size_t OnvifServer::connections() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return client_ports_.size();
+}
+
+bool OnvifServer::token_is_good(const std::string& body) {
+  const std::string nonce = element(body, "Nonce");
+  const std::string created = element(body, "Created");
+  const std::string password = password_changed ? "another" : device_.password;
+  if (unescaped(element(body, "Username")) != device_.user || nonce.empty() ||
+      element(body, "Password") != base64(sha1(from_base64(nonce) + created + password)) ||
+      body.find("#PasswordDigest\"") == std::string::npos) {
+    return false;
+  }
+  std::tm tm{};
+  const char* rest = ::strptime(created.c_str(), "%Y-%m-%dT%H:%M:%S", &tm);
+  if (rest == nullptr || created.back() != 'Z') {
+    return false;
+  }
+  const double age_s = host_utc_s() + clock_offset_s - static_cast<double>(::timegm(&tm));
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return std::abs(age_s) < kTokenLife_s && nonces_.insert(nonce).second;
+}
+
+std::string OnvifServer::fault(const std::string& code, const std::string& reason) const {
+  return "<env:Body><env:Fault><env:Code><env:Value>env:Sender</"
+         "env:Value><env:Subcode><env:Value>" +
+         code + "</env:Value></env:Subcode></env:Code><env:Reason><env:Text xml:lang=\"en\">" +
+         reason + "</env:Text></env:Reason></env:Fault></env:Body>";
+}
+
+std::string OnvifServer::answer(const std::string& call) const {
+  const std::string base = device_.announced_host.empty() ? "" : "http://" + device_.announced_host;
+  std::string content;
+  if (call == "GetSystemDateAndTime") {
+    const auto now = static_cast<std::time_t>(std::floor(host_utc_s() + clock_offset_s));
+    std::tm tm{};
+    ::gmtime_r(&now, &tm);
+    const auto number = [](const char* name, int value) {
+      return std::string("<tt:") + name + ">" + std::to_string(value) + "</tt:" + name + ">";
+    };
+    content =
+        "<tt:SystemDateAndTime><tt:DateTimeType>NTP</tt:DateTimeType><tt:UTCDateTime><tt:Time>" +
+        number("Hour", tm.tm_hour) + number("Minute", tm.tm_min) + number("Second", tm.tm_sec) +
+        "</tt:Time><tt:Date>" + number("Year", tm.tm_year + 1900) + number("Month", tm.tm_mon + 1) +
+        number("Day", tm.tm_mday) + "</tt:Date></tt:UTCDateTime></tt:SystemDateAndTime>";
+  } else if (call == "GetCapabilities") {
+    content = "<tt:Capabilities><tt:Device><tt:XAddr>" + base +
+              "/onvif/device_service</tt:XAddr></tt:Device><tt:Media><tt:XAddr>" + base +
+              "/onvif/media</tt:XAddr></tt:Media><tt:PTZ><tt:XAddr>" + base +
+              "/onvif/ptz</tt:XAddr></tt:PTZ></tt:Capabilities>";
+  } else if (call == "GetProfiles") {
+    content =
+        "<tt:Profiles token=\"fixed\"><tt:Name>a</tt:Name></tt:Profiles>"
+        "<tt:Profiles fixed=\"true\" token=\"turning&amp;1\"><tt:Name>b</tt:Name>"
+        "<tt:PTZConfiguration token=\"p\"><tt:Name>c</tt:Name></tt:PTZConfiguration>"
+        "</tt:Profiles>";
+  } else {
+    const std::string utc = device_.utc_time();
+    content = "<tt:PTZStatus><tt:Position>" + device_.position() +
+              "</tt:Position><tt:MoveStatus><tt:PanTilt>IDLE</tt:PanTilt></tt:MoveStatus>" +
+              (utc.empty() ? "" : "<tt:UtcTime>" + utc + "</tt:UtcTime>") + "</tt:PTZStatus>";
+  }
+  content = "<tt:" + call + "Response>" + content + "</tt:" + call + "Response>";
+  content = std::regex_replace(content, std::regex("tt:"), device_.prefix);
+  return "<env:Body>" + content + "</env:Body>";
+}
+
+void OnvifServer::serve(const httplib::Request& request, httplib::Response& response) {
+  using Login = OnvifDevice::Login;
+  std::smatch match;
+  const std::regex pattern("<(?:\\w+:)?Body[^>]*><(\\w+)");
+  const std::string call =
+      std::regex_search(request.body, match, pattern) ? match[1].str() : std::string();
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    client_ports_.insert(request.remote_port);
+  }
+  const auto reply = [&](int code, const std::string& body) {
+    response.status = code;
+    response.set_content(
+        "<?xml version=\"1.0\" encoding=\"utf-8\"?>\n<env:Envelope "
+        "xmlns:env=\"http://www.w3.org/2003/05/soap-envelope\">" +
+            body + "</env:Envelope>",
+        "application/soap+xml; charset=utf-8");
+  };
+  const bool open = device_.login == Login::kNone ||
+                    (call == "GetSystemDateAndTime" && !device_.clock_needs_login);
+  const std::string authorization = request.get_header_value("Authorization");
+  if (!open && device_.login == Login::kToken && !token_is_good(request.body)) {
+    ++refusals;
+    return reply(400, fault("ter:NotAuthorized", "Sender not authorized"));
+  }
+  if (!open && device_.login != Login::kToken &&
+      (password_changed || !digest_.accepts("POST", request.target, authorization))) {
+    ++refusals;
+    response.set_header("WWW-Authenticate", digest_.challenge());
+    response.status = 401;
+    return;
+  }
+  const std::string where = call == "GetProfiles" ? "/onvif/media"
+                            : call == "GetStatus" ? "/onvif/ptz"
+                                                  : "/onvif/device_service";
+  if (call.empty() || request.target != where) {
+    return reply(400, fault("ter:ActionNotSupported", "not here"));
+  }
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    ++counts_[call];
+    if (call == "GetStatus") {
+      last_profile_ = unescaped(element(request.body, "ProfileToken"));
+      if (!fault_code_.empty()) {
+        return reply(500, fault(fault_code_, fault_reason_));
+      }
+    }
+  }
+  if (call == "GetStatus" && status != 200) {
+    response.status = status;
+    response.set_content("<html>busy</html>", "text/html");
+    return;
+  }
+  reply(200, answer(call));
+}
+
+}  // namespace alidade

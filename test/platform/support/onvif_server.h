@@ -1,0 +1,76 @@
+#pragma once
+// OnvifServer: an ONVIF camera's device, media and PTZ service on the loopback (cpp-httplib), written from
+// the WSDLs and the WS-UsernameToken profile. Its clock may be another than the host's; a token is good
+// once, and only if it was made within 5 s of that clock.
+
+#include <httplib.h>
+
+#include <atomic>
+#include <functional>
+#include <map>
+#include <mutex>
+#include <set>
+#include <string>
+#include <thread>
+
+#include "test/platform/support/digest_check.h"
+
+namespace alidade {
+
+struct OnvifDevice {
+  enum class Login { kNone, kToken, kDigestMd5, kDigestSha256 };
+  Login login = Login::kNone;
+  std::string user = "us<er";
+  std::string password = "p&ss:\"w";
+  bool clock_needs_login = false;  // against the standard
+  std::string announced_host =
+      "192.168.1.64";          // in the addresses of its services; empty: a path alone
+  std::string prefix = "tt:";  // of every element's name; "x:" or "" occur, too
+  std::function<std::string()> position = [] {
+    return R"(<tt:PanTilt x="0.5" y="-0.25"/><tt:Zoom x="0.125"/>)";
+  };
+  std::function<std::string()> utc_time = [] { return std::string(); };  // empty: none
+};
+
+class OnvifServer {
+ public:
+  explicit OnvifServer(OnvifDevice device = {}, int port = 0);
+  ~OnvifServer();
+  OnvifServer(const OnvifServer&) = delete;
+  OnvifServer& operator=(const OnvifServer&) = delete;
+
+  int port() const { return port_; }
+  std::string url() const { return "http://127.0.0.1:" + std::to_string(port_); }
+
+  std::atomic<double> clock_offset_s{0};  // the device's clock less the host's
+  std::atomic<bool> password_changed{false};
+  // A status other than 200, or a fault's code, for GetStatus.
+  std::atomic<int> status{200};
+  void set_fault(const std::string& code, const std::string& reason);
+
+  int count(const std::string& call) const;  // answered requests
+  std::atomic<int> refusals{0};              // 401 and NotAuthorized
+  std::string last_profile() const;
+  std::size_t connections() const;
+
+ private:
+  void serve(const httplib::Request& request, httplib::Response& response);
+  bool token_is_good(const std::string& body);
+  std::string answer(const std::string& call) const;
+  std::string fault(const std::string& code, const std::string& reason) const;
+
+  OnvifDevice device_;
+  DigestCheck digest_;
+  httplib::Server server_;
+  int port_ = 0;
+  mutable std::mutex mutex_;  // guards what follows
+  std::set<std::string> nonces_;
+  std::map<std::string, int> counts_;
+  std::string last_profile_;
+  std::string fault_code_;
+  std::string fault_reason_;
+  std::set<int> client_ports_;
+  std::thread thread_;
+};
+
+}  // namespace alidade
