@@ -4,9 +4,11 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <array>
 #include <filesystem>
 
 #include "core/calibration/calibration_file.h"
+#include "platform/pan_tilt/onvif_source.h"
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
 #include "platform/pan_tilt/vapix_source.h"
 #include "platform/video/mjpeg_source.h"
@@ -103,7 +105,7 @@ OrientationStepOptions step_options(const RecordingNoise& noise,
   options.calibrated = calibration.calibrated;
   options.video_clock =
       clock(noise.image_stamp_sigma_s, noise.image_period_s, noise.image_period_sigma_s);
-  // The clock of RTP, which every live video stream has in this version.
+  // The clock of RTP, the coarsest that a live video stream has.
   options.video_clock.stamp_resolution_s = 1.0 / 90000;
   options.telemetry_clock = clock(noise.telemetry_stamp_sigma_s, noise.telemetry_period_s,
                                   noise.telemetry_period_sigma_s);
@@ -123,6 +125,17 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
     return std::make_unique<RecordingFrameSource>(
         RecordingFrameSourceOptions{config.directory, decode, true});
   }
+  if (config.type == VideoConfig::Type::kMjpeg) {
+    MjpegSourceOptions options;
+    options.url = config.url;
+    options.user = config.user;
+    options.password = config.password;
+    options.decode = decode;
+    options.timeout_s = config.timeout_s;
+    options.max_backoff_s = config.max_backoff_s;
+    options.copy_to = copy_to;
+    return std::make_unique<MjpegSource>(options);
+  }
   RtpSourceOptions options;
   options.url = config.url;
   options.user = config.user;
@@ -138,11 +151,35 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
   return std::make_unique<RtpSource>(options);
 }
 
+namespace {
+
+std::unique_ptr<PanTiltSource> make_onvif_source(const PanTiltConfig& config) {
+  const auto radians = [](const std::optional<std::array<double, 2>>& deg) {
+    constexpr double kRadians = 3.14159265358979323846 / 180;
+    return deg ? std::optional<OnvifRange>({kRadians * deg->front(), kRadians * deg->back()})
+               : std::nullopt;
+  };
+  OnvifSourceOptions options;
+  options.url = config.url;
+  options.user = config.user;
+  options.password = config.password;
+  options.profile = config.profile;
+  options.pan_range = radians(config.pan_range_deg);
+  options.tilt_range = radians(config.tilt_range_deg);
+  options.rate_hz = config.rate_hz;
+  options.timeout_s = config.timeout_s;
+  options.max_backoff_s = config.max_backoff_s;
+  return std::make_unique<OnvifSource>(options);
+}
+
+}  // namespace
+
 std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config) {
   if (config.type == PanTiltConfig::Type::kRecording) {
     return std::make_unique<RecordingPanTiltSource>(
         RecordingPanTiltSourceOptions{config.directory, true});
   }
+  if (config.type == PanTiltConfig::Type::kOnvif) return make_onvif_source(config);
   VapixSourceOptions options;
   options.url = config.url;
   options.user = config.user;

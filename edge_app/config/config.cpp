@@ -64,8 +64,8 @@ void read_login(YamlSection& section, std::string* user, std::string* password) 
 
 VideoConfig read_video(YamlSection section, const std::string& path) {
   VideoConfig video;
-  const auto type = section.choice("type", {"rtsp", "rtp", "recording"}, {"v4l2", "mjpeg"});
-  if (!type) section.fail("type", "is missing; expected one of rtsp, rtp, recording");
+  const auto type = section.choice("type", {"rtsp", "rtp", "mjpeg", "recording"}, {"v4l2"});
+  if (!type) section.fail("type", "is missing; expected one of rtsp, rtp, mjpeg, recording");
   if (*type == "recording") {
     video.type = VideoConfig::Type::kRecording;
     video.directory = path_relative_to(path, required_text(section, "directory", "my-recording"));
@@ -76,6 +76,10 @@ VideoConfig read_video(YamlSection section, const std::string& path) {
     if (section.choice("transport", {"tcp", "udp"}).value_or("tcp") == "udp") {
       video.transport = VideoConfig::Transport::kUdp;
     }
+  } else if (*type == "mjpeg") {
+    video.type = VideoConfig::Type::kMjpeg;
+    video.url = required_url(section, "http://camera/mjpg/video.mjpg", {"http://", "https://"});
+    read_login(section, &video.user, &video.password);
   } else {
     video.type = VideoConfig::Type::kRtp;
     video.url = required_text(section, "url", "camera.sdp");
@@ -98,11 +102,33 @@ VideoConfig read_video(YamlSection section, const std::string& path) {
   return video;
 }
 
+// The angles at both ends of a device's own scale, of which none may be the other.
+std::optional<std::array<double, 2>> read_range(YamlSection& section, const std::string& key) {
+  const auto ends = section.numbers(key, 2, {-360, 360, "deg"});
+  if (!ends) return std::nullopt;
+  if (ends->front() == ends->back()) {
+    section.fail(key, "spans no angle; give the angles at -1 and at 1");
+  }
+  return std::array<double, 2>{ends->front(), ends->back()};
+}
+
+void read_onvif(YamlSection& section, PanTiltConfig* pan_tilt) {
+  pan_tilt->type = PanTiltConfig::Type::kOnvif;
+  pan_tilt->profile = section.text("profile").value_or("");
+  pan_tilt->pan_range_deg = read_range(section, "pan_range_deg");
+  pan_tilt->tilt_range_deg = read_range(section, "tilt_range_deg");
+  if (pan_tilt->pan_range_deg.has_value() != pan_tilt->tilt_range_deg.has_value()) {
+    section.fail(pan_tilt->pan_range_deg ? "tilt_range_deg" : "pan_range_deg",
+                 "is missing; give pan_range_deg and tilt_range_deg, or neither");
+  }
+  pan_tilt->rate_hz = 10;  // SOAP is work for a camera
+}
+
 PanTiltConfig read_pan_tilt(YamlSection section, const std::string& path) {
   PanTiltConfig pan_tilt;
   const auto type =
-      section.choice("type", {"vapix", "recording"}, {"onvif", "pelco_d", "visca", "ptu"});
-  if (!type) section.fail("type", "is missing; expected one of vapix, recording");
+      section.choice("type", {"vapix", "onvif", "recording"}, {"pelco_d", "visca", "ptu"});
+  if (!type) section.fail("type", "is missing; expected one of vapix, onvif, recording");
   if (*type == "recording") {
     pan_tilt.type = PanTiltConfig::Type::kRecording;
     pan_tilt.directory =
@@ -110,7 +136,12 @@ PanTiltConfig read_pan_tilt(YamlSection section, const std::string& path) {
   } else {
     pan_tilt.url = required_url(section, "http://camera", {"http://", "https://"});
     read_login(section, &pan_tilt.user, &pan_tilt.password);
-    pan_tilt.camera = section.integer("camera", {1, 64, "camera number"}).value_or(pan_tilt.camera);
+    if (*type == "onvif") {
+      read_onvif(section, &pan_tilt);
+    } else {
+      pan_tilt.camera =
+          section.integer("camera", {1, 64, "camera number"}).value_or(pan_tilt.camera);
+    }
     pan_tilt.rate_hz = section.number("rate_hz", {0.1, 1000, "Hz"}).value_or(pan_tilt.rate_hz);
     pan_tilt.timeout_s = section.number("timeout_s", kSeconds).value_or(pan_tilt.timeout_s);
     pan_tilt.max_backoff_s =

@@ -6,6 +6,7 @@
 // the file: `password_env` names the variable. Relative paths are relative to the file's folder.
 // Reading touches nothing but the file and the environment: no connection is tried.
 
+#include <array>
 #include <optional>
 #include <string>
 #include <vector>
@@ -15,15 +16,15 @@
 namespace alidade {
 
 struct VideoConfig {
-  enum class Type { kRtsp, kRtp, kRecording };
+  enum class Type { kRtsp, kRtp, kMjpeg, kRecording };
   enum class Transport { kTcp, kUdp };
   Type type = Type::kRtsp;
-  std::string url;              // rtsp: rtsp://...; rtp: an .sdp file or rtp://address:port
+  std::string url;  // rtsp: rtsp://...; mjpeg: http://...; rtp: an .sdp file or rtp://address:port
   std::string format = "MJPG";  // rtp://address:port: MJPG or H264
   std::string directory;        // recording
   int width = 0;                // px, what live video must have; 0: whatever comes
   int height = 0;               // px
-  std::string user;             // rtsp
+  std::string user;             // rtsp, mjpeg
   std::string password;
   Transport transport = Transport::kTcp;  // rtsp
   double timeout_s = 3;                   // silence that counts as a loss
@@ -31,14 +32,18 @@ struct VideoConfig {
 };
 
 struct PanTiltConfig {
-  enum class Type { kVapix, kRecording };
+  enum class Type { kVapix, kOnvif, kRecording };
   Type type = Type::kVapix;
-  std::string url;        // vapix
+  std::string url;        // vapix, onvif
   std::string directory;  // recording
   std::string user;
   std::string password;
-  int camera = 0;  // VAPIX camera number; 0 leaves it out of the query
-  double rate_hz = 30;
+  int camera = 0;       // VAPIX camera number; 0 leaves it out of the query
+  std::string profile;  // onvif: token; empty: the device's first with PTZ
+  // onvif: the angles at -1 and 1 of the generic space; positive right and up.
+  std::optional<std::array<double, 2>> pan_range_deg;
+  std::optional<std::array<double, 2>> tilt_range_deg;
+  double rate_hz = 30;  // onvif: 10 unless given
   double timeout_s = 1;
   double max_backoff_s = 5;
   std::optional<double> angle_sigma_rad;   // white noise of one measured angle

@@ -135,6 +135,37 @@ TEST_F(ConfigTest, RecordingAndRtpSourcesAreRead) {
   EXPECT_EQ(config_.video.url, directory_.path() + "/camera.sdp");
 }
 
+TEST_F(ConfigTest, MjpegAndOnvifSourcesAreRead) {
+  ::setenv("ALIDADE_TEST_PASSWORD", "secret", 1);
+  const std::string login = "user: eve, password_env: ALIDADE_TEST_PASSWORD";
+  ASSERT_THAT(
+      load("video: {type: mjpeg, url: 'http://camera/v?a=b', width: 640, height: 480, " + login +
+           "}\n"
+           "pan_tilt: {type: onvif, url: http://camera, profile: main, rate_hz: 5, " +
+           login +
+           ",\n           pan_range_deg: [-180, 180], tilt_range_deg: [30, -90]}\n"
+           "camera: {focal_length_px: 1000}\n"),
+      IsEmpty());
+  EXPECT_EQ(config_.video.type, VideoConfig::Type::kMjpeg);
+  EXPECT_EQ(config_.video.url, "http://camera/v?a=b");
+  EXPECT_EQ(config_.video.user, "eve");
+  EXPECT_EQ(config_.video.password, "secret");
+  EXPECT_EQ(config_.video.width, 640);
+  EXPECT_EQ(config_.pan_tilt.type, PanTiltConfig::Type::kOnvif);
+  EXPECT_EQ(config_.pan_tilt.password, "secret");
+  EXPECT_EQ(config_.pan_tilt.profile, "main");
+  EXPECT_EQ(config_.pan_tilt.rate_hz, 5);
+  ASSERT_TRUE(config_.pan_tilt.pan_range_deg && config_.pan_tilt.tilt_range_deg);
+  EXPECT_EQ(config_.pan_tilt.pan_range_deg->front(), -180);
+  EXPECT_EQ(config_.pan_tilt.tilt_range_deg->back(), -90);
+  ASSERT_THAT(load("video: {type: mjpeg, url: 'http://camera/v'}\n"
+                   "pan_tilt: {type: onvif, url: http://camera}\n"
+                   "camera: {focal_length_px: 1000}\n"),
+              IsEmpty());
+  EXPECT_EQ(config_.pan_tilt.rate_hz, 10);
+  EXPECT_FALSE(config_.pan_tilt.pan_range_deg);
+}
+
 TEST_F(ConfigTest, TheExampleIsReadAndShowsTheDefaults) {
   ::setenv("CAMERA_PASSWORD", "secret", 1);
   Config example;
@@ -224,13 +255,13 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"NoVideoType", "video: {url: rtsp://camera/s}\n" PAN_TILT, ":1: video.type",
                 "is missing"},
         Mistake{"UnknownVideoType", "video: {type: film, url: x}\n" PAN_TILT, ":1: video.type",
-                "'film' is unknown; expected one of rtsp, rtp, recording"},
+                "'film' is unknown; expected one of rtsp, rtp, mjpeg, recording"},
         Mistake{"PlannedVideoType", "video: {type: v4l2, device: /dev/video0}\n" PAN_TILT,
                 ":1: video.type",
-                "'v4l2' is not available in this version; available: rtsp, rtp, recording"},
+                "'v4l2' is not available in this version; available: rtsp, rtp, mjpeg, recording"},
         Mistake{"PlannedPanTiltType", VIDEO "pan_tilt: {type: pelco_d, baud: 9600}\n",
                 ":2: pan_tilt.type",
-                "'pelco_d' is not available in this version; available: vapix, recording"},
+                "'pelco_d' is not available in this version; available: vapix, onvif, recording"},
         Mistake{"UnknownMode", MINIMAL "realtime: {mode: OF}\n", ":4: realtime.mode",
                 "'OF' is unknown; expected one of OE, PT"},
         Mistake{"PlannedHttp", MINIMAL "output: {http: '127.0.0.1:8080'}\n", ":4: output.http",
@@ -262,6 +293,18 @@ INSTANTIATE_TEST_SUITE_P(
                 ":1: video.directory", "is missing"},
         Mistake{"LiveAndRecorded", "video: {type: recording, directory: d}\n" PAN_TILT CALIBRATION,
                 ": ", "no common clock"},
+        Mistake{"MjpegOverRtsp", "video: {type: mjpeg, url: rtsp://camera}\n" PAN_TILT,
+                ":1: video.url", "is not an address that starts with http://, https://"},
+        Mistake{"OneRangeAlone",
+                VIDEO "pan_tilt: {type: onvif, url: http://c, tilt_range_deg: [-90, 90]}\n",
+                ":2: pan_tilt", "give pan_range_deg and tilt_range_deg, or neither"},
+        Mistake{"RangeOfOneAngle",
+                VIDEO "pan_tilt: {type: onvif, url: http://c, pan_range_deg: [9, 9], "
+                      "tilt_range_deg: [0, 1]}\n",
+                ":2: pan_tilt.pan_range_deg", "spans no angle"},
+        Mistake{"OnvifHasNoCameraNumber",
+                VIDEO "pan_tilt: {type: onvif, url: http://c, camera: 1}\n", ":2: pan_tilt.camera",
+                "unknown key"},
         Mistake{"NumberWithUnit", VIDEO "pan_tilt: {type: vapix, url: http://c, rate_hz: 30 Hz}\n",
                 ":2: pan_tilt.rate_hz", "'30 Hz' is not a plain number from 0.1 to 1000 (Hz)"},
         Mistake{"NumberIsText", MINIMAL "camera: {focal_length_px: long}\n",
