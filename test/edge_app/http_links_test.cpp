@@ -1,0 +1,95 @@
+// The built executable with a camera that speaks HTTP only: MJPEG for the video, ONVIF for pan and tilt.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstdlib>
+#include <string>
+
+#include "test/edge_app/alidade_command.h"
+#include "test/platform/support/mjpeg_server.h"
+#include "test/platform/support/onvif_server.h"
+#include "test/support/temporary_directory.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+
+class HttpLinks : public ::testing::Test {
+ protected:
+  HttpLinks() {
+    ::setenv("ALIDADE_TEST_VIDEO_PASSWORD", MjpegServer::kPassword, 1);
+    ::setenv("ALIDADE_TEST_HEAD_PASSWORD", device_.password.c_str(), 1);
+  }
+
+  static OnvifDevice device_with_login() {
+    OnvifDevice device;
+    device.login = OnvifDevice::Login::kToken;
+    return device;
+  }
+
+  static MjpegStyle style_with_clock() {
+    MjpegStyle style;
+    style.timestamp_step_s = 0.04;
+    return style;
+  }
+
+  std::string config(
+      const std::string& ranges = "pan_range_deg: [-180, 180], tilt_range_deg: [-90, 90],") {
+    return directory_.write(
+        "alidade.yaml",
+        "video: {type: mjpeg, url: '" + video_.url() + "', user: '" + MjpegServer::kUser +
+            "', password_env: ALIDADE_TEST_VIDEO_PASSWORD, width: 96, height: 64, timeout_s: 30}\n"
+            "pan_tilt: {type: onvif, url: '" +
+            head_.url() + "', user: '" + device_.user + "', " + ranges +
+            " password_env: ALIDADE_TEST_HEAD_PASSWORD, timeout_s: 30}\n"
+            "camera: {focal_length_px: 1000}\nrealtime: {mode: PT}\n");
+  }
+
+  const OnvifDevice device_ = device_with_login();
+  MjpegServer video_{style_with_clock(), MjpegServer::Login::kDigestSha256};
+  OnvifServer head_{device_};
+  TemporaryDirectory directory_;
+};
+
+TEST_F(HttpLinks, AreMeasuredByCheck) {
+  const Result result = alidade({"check", "-c", config(), "--duration", "1"});
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.output, AllOf(HasSubstr("96x64 px"), HasSubstr("sender clock"),
+                                   HasSubstr("pan 90.0000 deg, tilt -22.5000 deg")));
+}
+
+TEST_F(HttpLinks, GiveRecordsToRun) {
+  Process process(command({"run", "-c", config(), "--json"}));
+  std::string line = process.read_line();
+  while (!line.empty() && line.find("\"mode\":\"PT\"") == std::string::npos) {
+    line = process.read_line();
+  }
+  EXPECT_THAT(line, HasSubstr("\"pan_rad\":1.5707963"));
+}
+
+TEST_F(HttpLinks, AreRecorded) {
+  const std::string recording = directory_.path() + "/recording";
+  Result result = alidade({"record", "-c", config(), "-o", recording, "--duration", "2"});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  result = alidade({"run", "--csv", "-c",
+                    directory_.write("recorded.yaml",
+                                     "video: {type: recording, directory: recording}\n"
+                                     "pan_tilt: {type: recording, directory: recording}\n"
+                                     "camera: {focal_length_px: 1000}\nrealtime: {mode: PT}\n")});
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_EQ(read_csv(result.output).size(),
+            read_csv(directory_.read("recording/frames.csv")).size());
+  EXPECT_THAT(result.output, HasSubstr(",PT,"));
+}
+
+TEST_F(HttpLinks, SayInOneLineWhatIsMissing) {
+  const Result result = alidade({"check", "-c", config(""), "--duration", "1"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, AllOf(HasSubstr(head_.url()), HasSubstr("pan_range_deg")));
+}
+
+}  // namespace
+}  // namespace alidade
