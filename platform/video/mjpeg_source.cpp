@@ -89,6 +89,7 @@ class MjpegSource::Implementation {
   ReadStatus receive_connection(std::string* error);
   ReadStatus connection_end(CURLcode code, std::string* error);
   void push_picture(MultipartPart part);
+  void drop_oldest_picture();
   void push_report(Event event);
   ReadStatus fail(const std::string& error) {
     error_ = name_ + ": " + error;
@@ -105,6 +106,7 @@ class MjpegSource::Implementation {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::deque<Event> queue_;           // guarded by mutex_
+  std::size_t queue_pictures_ = 0;    // guarded by mutex_
   std::size_t queue_bytes_ = 0;       // guarded by mutex_
   std::atomic<bool> stopped_{false};  // set under mutex_, read anywhere
   std::atomic<std::int64_t> damaged_{0};
@@ -217,19 +219,30 @@ void MjpegSource::Implementation::push_picture(MultipartPart part) {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     queue_bytes_ += part.body.size();
+    ++queue_pictures_;
     Event event;
     event.part = std::move(part);
     queue_.push_back(std::move(event));
-    while (queue_.size() > 1 && (queue_.size() > kQueueCapacity || queue_bytes_ > kQueueBytes)) {
-      const auto oldest = std::find_if(queue_.begin(), queue_.end(), [](const Event& waiting) {
-        return waiting.status == ReadStatus::kOk;
-      });
-      queue_bytes_ -= oldest->part.body.size();
-      queue_.erase(oldest);
-      ++dropped_;
+    while (queue_pictures_ > 1 &&
+           (queue_pictures_ > kQueueCapacity || queue_bytes_ > kQueueBytes)) {
+      drop_oldest_picture();
     }
   }
   changed_.notify_all();
+}
+
+// Of reports that then follow each other, the last is enough: there are never more than pictures, and
+// one.
+void MjpegSource::Implementation::drop_oldest_picture() {
+  auto at = std::find_if(queue_.begin(), queue_.end(),
+                         [](const Event& waiting) { return waiting.status == ReadStatus::kOk; });
+  queue_bytes_ -= at->part.body.size();
+  --queue_pictures_;
+  ++dropped_;
+  at = queue_.erase(at);
+  if (at != queue_.begin() && at->status != ReadStatus::kOk) {
+    queue_.erase(at - 1);
+  }
 }
 
 void MjpegSource::Implementation::push_report(Event event) {
@@ -336,7 +349,10 @@ ReadStatus MjpegSource::Implementation::read(Frame& frame, double timeout_s) {
       }
       event = std::move(queue_.front());
       queue_.pop_front();
-      queue_bytes_ -= event.part.body.size();
+      if (event.status == ReadStatus::kOk) {
+        queue_bytes_ -= event.part.body.size();
+        --queue_pictures_;
+      }
     }
     if (event.status == ReadStatus::kFailed) {
       return fail(event.error);

@@ -377,6 +377,27 @@ TEST(MjpegSource, DropsTheOldestPicturesWhenTheReaderIsSlow) {
   EXPECT_GE(frame.stamp.receive_time_s, server.sent(11).before_first_s);
 }
 
+TEST(MjpegSource, KeepsABoundedNumberOfPicturesAndReportsWhenNobodyReads) {
+  const std::string jpeg = MjpegServer::picture(0);
+  RawServer server([&](int fd) {
+    if (server.read_request(fd)) {
+      RawServer::send(fd, stream_head() + part(jpeg));
+    }
+  });
+  MjpegSource source(options_for(server));
+  Frame frame;
+  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_TRUE(eventually([&] { return source.counters().dropped >= 100; }));
+  ReadStatus before = ReadStatus::kOk;
+  for (int i = 0; i < 20; ++i) {  // all from the queue
+    const ReadStatus status = source.read(frame, kDeadline_s);
+    ASSERT_TRUE(status == ReadStatus::kOk || status == ReadStatus::kDisconnected);
+    EXPECT_TRUE(status == ReadStatus::kOk || before == ReadStatus::kOk) << "two reports in a row";
+    EXPECT_TRUE(status != ReadStatus::kOk || i == 0 || frame.stamp.restarted);
+    before = status;
+  }
+}
+
 TEST(MjpegSource, CopiesThePicturesOverReconnections) {
   const TemporaryDirectory directory;
   RecordingWriter writer;
