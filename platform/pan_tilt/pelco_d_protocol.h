@@ -1,0 +1,53 @@
+#pragma once
+// Pelco-D: frames of seven bytes, FF address command1 command2 data1 data2 sum, the sum of bytes 2 to
+// 6 modulo 256. Queries 0x51 pan, 0x53 tilt, 0x55 zoom; answers 0x59, 0x5B, 0x5D with 16 bits.
+//   FF 01 00 51 00 00 52 -> FF 01 00 59 11 94 FF = 4500 steps
+// Any byte can be FF, the sum included: a frame is known by its length, address, opcode and sum, never
+// by FF alone. Pan 0..35999 steps of 0.01 degree; tilt 0 at the horizon, 9000 straight down, 33000
+// thirty degrees up. There is no negative answer: a query that is not known gets none.
+
+#include <cstdint>
+#include <optional>
+
+#include "platform/pan_tilt/query_protocol.h"
+
+namespace alidade {
+
+struct PelcoDOptions {
+  int address = 1;  // 1..255
+  double pan_deg_per_step = 0.01;
+  double tilt_deg_per_step = 0.01;
+  bool read_zoom = false;
+};
+
+struct PelcoDAnswer {
+  std::uint16_t value = 0;
+  std::size_t begin = 0;
+};
+
+[[nodiscard]] std::string pelco_d_query(int address, std::uint8_t opcode);
+
+// The latest whole answer with this address and opcode; *problem says what came instead, if anything.
+[[nodiscard]] std::optional<PelcoDAnswer> find_pelco_d_answer(std::string_view bytes, int address,
+                                                              std::uint8_t opcode,
+                                                              std::string* problem);
+
+class PelcoDProtocol : public QueryProtocol {
+ public:
+  explicit PelcoDProtocol(const PelcoDOptions& options) : options_(options) {}
+
+  [[nodiscard]] const char* name() const override { return "Pelco-D"; }
+  void restart() override { turn_ = 0; }
+  [[nodiscard]] Query next() override;
+  [[nodiscard]] Answer find(std::string_view bytes) override;
+  [[nodiscard]] std::string give_up() override { return {}; }
+  [[nodiscard]] int polls_per_reading() const override { return 2; }
+  [[nodiscard]] int bytes_per_reading() const override { return 28; }
+
+ private:
+  PelcoDOptions options_;
+  int turn_ = 0;  // of pan, tilt, pan, tilt, ... zoom
+  Answer::Kind asked_ = Answer::Kind::kNone;
+};
+
+}  // namespace alidade

@@ -1,0 +1,72 @@
+#pragma once
+// QueryProtocol: what a pan/tilt head is asked and how its answers are found among the bytes that
+// come: Pelco-D, VISCA, FLIR PTU. No I/O, no clock, no exceptions; QuerySource does the talking.
+//
+// One query is under way at a time. next() gives it; find() looks for its answer in all bytes that
+// have come since it was sent (at most kMaxAnswer; a device that babbles loses the oldest). What is
+// no answer to it (noise, half frames, echoes, late answers to another query, unsolicited lines) is
+// passed over. give_up() tells that no answer came.
+//
+// Angles are degrees as the device counts them; signs and zeros are QuerySource's.
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+
+namespace alidade {
+
+constexpr std::size_t kMaxAnswer = 512;  // bytes
+
+struct Query {
+  std::string bytes;
+  bool paced = true;  // on the grid of polls; false: at once (what comes before the first poll)
+};
+
+struct Answer {
+  enum class Kind {
+    kNone,  // not yet
+    kPan,
+    kTilt,
+    kPanTilt,
+    kZoom,
+    kDone,    // an answer without a reading
+    kRefused  // the device answers that it does not
+  };
+  Kind kind = Kind::kNone;
+  double pan_deg = 0;
+  double tilt_deg = 0;
+  double zoom = 0;        // device units
+  std::size_t begin = 0;  // index of the answer's first byte
+  std::string problem;    // what the device said, or what is wrong with what came; may be empty
+};
+
+class QueryProtocol {
+ public:
+  virtual ~QueryProtocol() = default;
+
+  [[nodiscard]] virtual const char* name() const = 0;
+  virtual void restart() = 0;  // a new connection: nothing is known of the device
+  [[nodiscard]] virtual Query next() = 0;
+  [[nodiscard]] virtual Answer find(std::string_view bytes) = 0;
+  // Bytes that bring the device back to the start of a command; mostly none.
+  [[nodiscard]] virtual std::string give_up() = 0;
+
+  // Of one reading of pan and tilt: polls, and bytes of queries and answers together.
+  [[nodiscard]] virtual int polls_per_reading() const = 0;
+  [[nodiscard]] virtual int bytes_per_reading() const = 0;
+};
+
+// Readings of pan and tilt a second that a line can carry. byte_time_s > 0.
+[[nodiscard]] inline double ceiling_hz(const QueryProtocol& protocol, double byte_time_s) {
+  return 1 / (protocol.bytes_per_reading() * byte_time_s);
+}
+
+// A reading beyond a turn is none: garbled, or another degree per step than configured.
+[[nodiscard]] constexpr bool is_within_a_turn(double angle_deg) {
+  return angle_deg >= -360 && angle_deg <= 360;
+}
+
+// With the zoom asked too, every so many readings bring it.
+constexpr int kReadingsPerZoom = 10;
+
+}  // namespace alidade

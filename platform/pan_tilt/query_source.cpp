@@ -1,0 +1,283 @@
+#include "platform/pan_tilt/query_source.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "platform/system/clock.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
+constexpr double kQuietBytes = 10;  // times of a byte without one are silence
+constexpr double kLeastQuiet_s = 0.02;
+constexpr int kTriesPerTimeout = 4;
+constexpr int kMaxStaleChunks = 64;
+
+double mapped_rad(double angle_deg, const AxisMapping& mapping) {
+  return wrap_to_half_turn(mapping.sign * (angle_deg - mapping.zero_deg) * kRadPerDeg);
+}
+
+}  // namespace
+
+QuerySource::QuerySource(std::unique_ptr<QueryProtocol> protocol, const QuerySourceOptions& options)
+    : protocol_(std::move(protocol)),
+      options_(options),
+      link_(options.link),
+      backoff_(options.max_backoff_s) {
+  if (!(options.rate_hz > 0) || !(options.timeout_s > 0)) {
+    static_cast<void>(fail("rate_hz and timeout_s must be positive"));
+    return;
+  }
+  double rate_hz = options.rate_hz;
+  if (link_.byte_time_s() > 0) {
+    rate_hz = std::min(rate_hz, ceiling_hz(*protocol_, link_.byte_time_s()));
+  }
+  poll_period_s_ = 1 / (rate_hz * protocol_->polls_per_reading());
+  quiet_time_s_ = std::max(kLeastQuiet_s, kQuietBytes * link_.byte_time_s());
+}
+
+void QuerySource::stop() {
+  stopped_ = true;
+  link_.stop();
+}
+
+ReadStatus QuerySource::fail(const std::string& error) {
+  error_ = name() + ": " + error;
+  failed_ = true;
+  link_.close();
+  return ReadStatus::kFailed;
+}
+
+ReadStatus QuerySource::disconnect(const std::string& error) {
+  error_ = name() + ": " + error;
+  link_.close();
+  state_ = State::kClosed;
+  restarted_ = true;
+  due_s_ = monotonic_now_s() + backoff_.next_s();
+  return ReadStatus::kDisconnected;
+}
+
+double QuerySource::next_event_s() const {
+  switch (state_) {
+    case State::kClosed:
+    case State::kIdle:
+      return due_s_;
+    case State::kSettling:
+      return std::min(quiet_s_, until_s_);
+    case State::kOpening:
+    case State::kAsked:
+      break;
+  }
+  return until_s_;
+}
+
+ReadStatus QuerySource::act(double now_s) {
+  switch (state_) {
+    case State::kClosed: {
+      const LinkStatus status = link_.open();
+      if (status == LinkStatus::kUnusable) {
+        return fail(link_.error());
+      }
+      if (status != LinkStatus::kOk) {
+        return disconnect(link_.error());
+      }
+      state_ = State::kOpening;
+      until_s_ = now_s + options_.timeout_s;
+      return ReadStatus::kOk;
+    }
+    case State::kOpening:
+      return disconnect("no connection within " + std::to_string(options_.timeout_s) + " s");
+    case State::kSettling:
+      // The grid begins where the connection did.
+      if (due_s_ < now_s) {
+        due_s_ += poll_period_s_ * std::ceil((now_s - due_s_) / poll_period_s_);
+      }
+      state_ = State::kIdle;
+      return ReadStatus::kOk;
+    case State::kIdle:
+      return ask(now_s);
+    case State::kAsked:
+      return give_up(now_s);
+  }
+  return ReadStatus::kOk;
+}
+
+void QuerySource::settle(double now_s) {
+  state_ = State::kSettling;
+  quiet_s_ = now_s + quiet_time_s_;
+  until_s_ = now_s + options_.timeout_s / kTriesPerTimeout;
+}
+
+ReadStatus QuerySource::ask(double now_s) {
+  const Query query = protocol_->next();
+  // What is still in the buffers came before the query and is no answer to it.
+  std::string stale;
+  LinkStatus status = LinkStatus::kOk;
+  for (int i = 0; i < kMaxStaleChunks && status == LinkStatus::kOk; ++i) {
+    status = link_.receive(&stale, 0);
+  }
+  if (status == LinkStatus::kStopped) {
+    return ReadStatus::kStopped;
+  }
+  received_.clear();
+  arrivals_s_.clear();
+  sent_s_ = monotonic_now_s();
+  if (status == LinkStatus::kLost || link_.send(query.bytes) != LinkStatus::kOk) {
+    return disconnect(link_.error());
+  }
+  if (query.paced) {
+    due_s_ += poll_period_s_ * std::max(1.0, std::ceil((now_s - due_s_) / poll_period_s_));
+  }
+  if (!failing_since_s_) {
+    failing_since_s_ = sent_s_;
+  }
+  state_ = State::kAsked;
+  until_s_ = sent_s_ + options_.timeout_s / kTriesPerTimeout;
+  return ReadStatus::kOk;
+}
+
+ReadStatus QuerySource::give_up(double now_s) {
+  if (now_s - *failing_since_s_ >= options_.timeout_s) {
+    return disconnect(problem_.empty() ? std::string("no answer of ") + protocol_->name() +
+                                             "; check power, wiring, address and baud or port"
+                                       : problem_);
+  }
+  pairing_.reset();
+  const std::string bytes = protocol_->give_up();
+  if (!bytes.empty() && link_.send(bytes) != LinkStatus::kOk) {
+    return disconnect(link_.error());
+  }
+  settle(now_s);
+  return ReadStatus::kOk;
+}
+
+// True: *sample is filled.
+bool QuerySource::take_bytes(const std::string& bytes, double now_s, PanTiltSample* sample) {
+  if (state_ == State::kSettling) {
+    quiet_s_ = now_s + quiet_time_s_;
+    return false;
+  }
+  if (state_ != State::kAsked) {
+    return false;
+  }
+  if (link_.is_datagram()) {
+    received_.clear();
+    arrivals_s_.clear();
+  }
+  received_ += bytes;
+  arrivals_s_.resize(received_.size(), now_s);
+  if (received_.size() > kMaxAnswer) {
+    const std::size_t excess = received_.size() - kMaxAnswer;
+    received_.erase(0, excess);
+    arrivals_s_.erase(arrivals_s_.begin(),
+                      arrivals_s_.begin() + static_cast<std::ptrdiff_t>(excess));
+  }
+  const Answer answer = protocol_->find(received_);
+  if (!answer.problem.empty()) {
+    problem_ = answer.problem;
+  }
+  if (answer.kind == Answer::Kind::kNone) {
+    return false;
+  }
+  if (answer.kind == Answer::Kind::kRefused) {
+    until_s_ = now_s;  // given up at once
+    return false;
+  }
+  state_ = State::kIdle;
+  if (answer.kind == Answer::Kind::kDone) {
+    return false;
+  }
+  problem_.clear();
+  failing_since_s_.reset();
+  return take_reading(answer, sent_s_, arrivals_s_[answer.begin], sample);
+}
+
+bool QuerySource::take_reading(const Answer& answer, double earliest_s, double latest_s,
+                               PanTiltSample* sample) {
+  const double pan_rad = mapped_rad(answer.pan_deg, options_.pan);
+  const double tilt_rad = mapped_rad(answer.tilt_deg, options_.tilt);
+  std::optional<PairedReading> paired;
+  switch (answer.kind) {
+    case Answer::Kind::kPan:
+      paired = pairing_.add_pan({earliest_s, latest_s, pan_rad});
+      break;
+    case Answer::Kind::kTilt:
+      pairing_.add_tilt({earliest_s, latest_s, tilt_rad});
+      break;
+    case Answer::Kind::kPanTilt:
+      paired = PairedReading{earliest_s, latest_s, pan_rad, tilt_rad};
+      break;
+    case Answer::Kind::kZoom:
+      zoom_ = answer.zoom;
+      break;
+    case Answer::Kind::kNone:
+    case Answer::Kind::kDone:
+    case Answer::Kind::kRefused:
+      break;
+  }
+  if (!paired) {
+    return false;
+  }
+  *sample = PanTiltSample{};
+  sample->earliest_time_s = paired->earliest_s;
+  sample->latest_time_s = paired->latest_s;
+  sample->pan_rad = paired->pan_rad;
+  sample->tilt_rad = paired->tilt_rad;
+  sample->zoom = zoom_;
+  sample->restarted = std::exchange(restarted_, false);
+  backoff_.reset();
+  return true;
+}
+
+ReadStatus QuerySource::read(PanTiltSample& sample, double timeout_s) {
+  const double deadline_s = monotonic_now_s() + timeout_s;
+  std::string bytes;
+  for (;;) {
+    if (stopped_) {
+      return ReadStatus::kStopped;
+    }
+    if (failed_) {
+      return ReadStatus::kFailed;
+    }
+    double now_s = monotonic_now_s();
+    const double wait_s = std::min(next_event_s(), deadline_s) - now_s;
+    const LinkStatus status =
+        state_ == State::kOpening ? link_.finish_open(wait_s) : link_.receive(&bytes, wait_s);
+    now_s = monotonic_now_s();
+    switch (status) {
+      case LinkStatus::kOk:
+        if (state_ == State::kOpening) {
+          protocol_->restart();
+          pairing_.reset();
+          zoom_.reset();
+          problem_.clear();
+          failing_since_s_.reset();
+          due_s_ = now_s;
+          settle(now_s);
+        } else if (take_bytes(bytes, now_s, &sample)) {
+          return ReadStatus::kOk;
+        }
+        break;
+      case LinkStatus::kTimeout:
+        break;
+      case LinkStatus::kStopped:
+        return ReadStatus::kStopped;
+      case LinkStatus::kLost:
+        return disconnect(link_.error());
+      case LinkStatus::kUnusable:
+        return fail(link_.error());
+    }
+    if (now_s >= next_event_s()) {
+      const ReadStatus acted = act(now_s);
+      if (acted != ReadStatus::kOk) {
+        return acted;
+      }
+    } else if (now_s >= deadline_s) {
+      return ReadStatus::kTimeout;
+    }
+  }
+}
+
+}  // namespace alidade

@@ -1,0 +1,100 @@
+#pragma once
+// QuerySource: a head that is asked for its position, by any QueryProtocol over any ByteLink.
+//
+// Polls lie on a fixed grid of rate_hz, or of what a serial line can carry if that is less; a late
+// answer skips points of the grid and does not shift it. One query is under way at a time. What was true
+// when it answered lies between the sending of the query and the first byte of the answer. A query
+// without answer is given up after a quarter of timeout_s; then the source waits until the line is
+// silent, so that a late answer is not taken for the next one. Protocols that give one axis at a time
+// yield a sample for each tilt, with the pan of the same moment (AxisPairing). Signs and zeros turn
+// what the device counts into the axes of the model, in [-pi, pi).
+//
+// kDisconnected: no link, or no reading within timeout_s; error() says what came instead. The link is
+// then closed and opened again after a growing pause. kFailed: an address or a device that can never
+// work. read() talks on the calling thread; it allocates.
+
+#include <atomic>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "platform/pan_tilt/axis_pairing.h"
+#include "platform/pan_tilt/pan_tilt_source.h"
+#include "platform/pan_tilt/query_protocol.h"
+#include "platform/system/backoff.h"
+#include "platform/system/byte_link.h"
+
+namespace alidade {
+
+struct AxisMapping {
+  double sign = 1;      // -1: the device counts to the left, or down
+  double zero_deg = 0;  // what the device says where the angle is 0
+};
+
+struct QuerySourceOptions {
+  ByteLinkOptions link;
+  AxisMapping pan;
+  AxisMapping tilt;
+  double rate_hz = 30;
+  double timeout_s = 1;      // without a reading: the head is lost
+  double max_backoff_s = 5;  // longest pause between two tries
+};
+
+class QuerySource : public PanTiltSource {
+ public:
+  QuerySource(std::unique_ptr<QueryProtocol> protocol, const QuerySourceOptions& options);
+
+  [[nodiscard]] ReadStatus read(PanTiltSample& sample, double timeout_s) override;
+  void stop() override;
+  [[nodiscard]] std::string error() const override { return error_; }
+  [[nodiscard]] std::string name() const override { return link_.name(); }
+
+ private:
+  enum class State {
+    kClosed,    // until due_s_
+    kOpening,   // until until_s_
+    kSettling,  // waits for silence: until until_s_, or until quiet_s_ if that is earlier
+    kIdle,      // until due_s_
+    kAsked      // until until_s_
+  };
+
+  [[nodiscard]] double next_event_s() const;
+  ReadStatus act(double now_s);  // the event's time has come
+  ReadStatus ask(double now_s);
+  ReadStatus give_up(double now_s);
+  void settle(double now_s);
+  bool take_bytes(const std::string& bytes, double now_s, PanTiltSample* sample);
+  bool take_reading(const Answer& answer, double earliest_s, double latest_s,
+                    PanTiltSample* sample);
+  ReadStatus disconnect(const std::string& error);
+  ReadStatus fail(const std::string& error);
+
+  std::unique_ptr<QueryProtocol> protocol_;
+  QuerySourceOptions options_;
+  ByteLink link_;
+  double poll_period_s_ = 0;
+  double quiet_time_s_ = 0;
+  Backoff backoff_;
+  std::string error_;
+  bool failed_ = false;
+  std::atomic<bool> stopped_{false};
+
+  State state_ = State::kClosed;
+  double due_s_ = 0;  // of the next try or the next poll
+  double until_s_ = 0;
+  double quiet_s_ = 0;
+  std::optional<double> failing_since_s_;  // the first query since the latest reading
+  bool restarted_ = true;
+  std::string problem_;  // what came instead of a reading, lately
+
+  // The query under way.
+  double sent_s_ = 0;
+  std::string received_;
+  std::vector<double> arrivals_s_;  // of each byte
+
+  AxisPairing pairing_;
+  std::optional<double> zoom_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,251 @@
+#include "platform/pan_tilt/visca_protocol.h"
+
+#include <algorithm>
+#include <cstdio>
+
+namespace alidade {
+namespace {
+
+constexpr char kEnd = '\xFF';
+constexpr std::size_t kHeader = 8;    // bytes
+constexpr std::size_t kLongest = 12;  // bytes of a frame without its end
+constexpr std::uint16_t kInquiry = 0x0110;
+constexpr std::uint16_t kReply = 0x0111;
+constexpr std::uint16_t kControl = 0x0200;
+constexpr std::uint16_t kControlReply = 0x0201;
+constexpr std::string_view kBeginNumbering("\x01", 1);
+constexpr std::string_view kWrongNumber("\x0F\x01", 2);
+
+unsigned byte_at(std::string_view bytes, std::size_t i) {
+  return static_cast<std::uint8_t>(bytes[i]);
+}
+
+// Big endian, `count` bytes.
+std::uint32_t number_at(std::string_view bytes, std::size_t begin, std::size_t count) {
+  std::uint32_t value = 0;
+  for (std::size_t i = begin; i < begin + count; ++i) {
+    value = value << 8U | byte_at(bytes, i);
+  }
+  return value;
+}
+
+std::string with_header(std::uint16_t type, std::uint32_t sequence, const std::string& payload) {
+  const auto length = static_cast<std::uint32_t>(payload.size());
+  std::string bytes;
+  for (const std::uint32_t byte :
+       {std::uint32_t{type} >> 8U, std::uint32_t{type}, length >> 8U, length, sequence >> 24U,
+        sequence >> 16U, sequence >> 8U, sequence}) {
+    bytes += static_cast<char>(byte & 0xFFU);
+  }
+  return bytes + payload;
+}
+
+// None if one of the bytes is more than a nibble.
+std::optional<unsigned> nibbles(std::string_view bytes) {
+  unsigned value = 0;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    if (byte_at(bytes, i) > 0x0F) {
+      return std::nullopt;
+    }
+    value = value << 4U | byte_at(bytes, i);
+  }
+  return value;
+}
+
+std::optional<int> signed_nibbles(std::string_view bytes) {
+  const std::optional<unsigned> value = nibbles(bytes);
+  if (!value) {
+    return std::nullopt;
+  }
+  const unsigned sign = 1U << (4 * bytes.size() - 1);
+  return static_cast<int>(*value & (sign - 1)) - static_cast<int>(*value & sign);
+}
+
+// A frame without its end.
+std::optional<ViscaFrame> parse_frame(std::string_view frame, int address) {
+  if (frame.size() < 3 || byte_at(frame, 0) != 0x80U + 16U * static_cast<unsigned>(address)) {
+    return std::nullopt;
+  }
+  ViscaFrame parsed;
+  parsed.length = frame.size() + 1;
+  if (byte_at(frame, 1) >> 4U == 6 && frame.size() == 3) {
+    parsed.kind = ViscaFrame::Kind::kError;
+    parsed.error = static_cast<int>(byte_at(frame, 2));
+    return parsed;
+  }
+  if (byte_at(frame, 1) != 0x50) {
+    return std::nullopt;
+  }
+  const std::string_view digits = frame.substr(2);
+  if (digits.size() == 4) {
+    const std::optional<unsigned> zoom = nibbles(digits);
+    parsed.kind = ViscaFrame::Kind::kZoom;
+    parsed.zoom = static_cast<int>(zoom.value_or(0));
+    return zoom ? std::optional(parsed) : std::nullopt;
+  }
+  if (digits.size() < 8 || digits.size() > 10) {
+    return std::nullopt;
+  }
+  const std::size_t of_pan = digits.size() == 8 ? 4 : 5;
+  const std::optional<int> pan = signed_nibbles(digits.substr(0, of_pan));
+  const std::optional<int> tilt = signed_nibbles(digits.substr(of_pan));
+  if (!pan || !tilt) {
+    return std::nullopt;
+  }
+  parsed.pan = *pan;
+  parsed.tilt = *tilt;
+  return parsed;
+}
+
+}  // namespace
+
+std::optional<ViscaHeader> parse_visca_header(std::string_view datagram) {
+  if (datagram.size() <= kHeader || number_at(datagram, 2, 2) != datagram.size() - kHeader) {
+    return std::nullopt;
+  }
+  return ViscaHeader{static_cast<std::uint16_t>(number_at(datagram, 0, 2)),
+                     number_at(datagram, 4, 4), datagram.substr(kHeader)};
+}
+
+std::optional<ViscaFrame> find_visca_frame(std::string_view bytes, int address) {
+  std::optional<ViscaFrame> found;
+  std::size_t begin = 0;
+  for (std::size_t end = bytes.find(kEnd); end != std::string_view::npos;
+       end = bytes.find(kEnd, begin)) {
+    // Noise may stand before the frame.
+    for (std::size_t i = std::max(begin, end - std::min(end, kLongest)); i < end; ++i) {
+      if (std::optional<ViscaFrame> frame = parse_frame(bytes.substr(i, end - i), address)) {
+        frame->begin = i;
+        found = frame;
+      }
+    }
+    begin = end + 1;
+  }
+  return found;
+}
+
+const char* visca_error_text(int code) {
+  switch (code) {
+    case 0x01:
+      return "wrong message length";
+    case 0x02:
+      return "syntax error";
+    case 0x03:
+      return "command buffer full";
+    case 0x04:
+      return "cancelled";
+    case 0x05:
+      return "no socket";
+    case 0x41:
+      return "not executable now";
+    default:
+      return "unknown error";
+  }
+}
+
+void ViscaProtocol::restart() {
+  numbered_ = false;
+  sequence_ = 0;
+  turn_ = 0;
+  answer_length_ = 0;
+  asked_ = Asked::kPosition;
+}
+
+Query ViscaProtocol::next() {
+  if (options_.header && !numbered_) {
+    asked_ = Asked::kNumbering;
+    sequence_ = 0;
+    return {with_header(kControl, 0, std::string(kBeginNumbering)), false};
+  }
+  if (options_.read_zoom && turn_ == 0 && asked_ != Asked::kZoom) {
+    asked_ = Asked::kZoom;
+  } else {
+    asked_ = Asked::kPosition;
+    turn_ = (turn_ + 1) % kReadingsPerZoom;
+  }
+  std::string query(1, static_cast<char>(0x80 + options_.address));
+  query += asked_ == Asked::kZoom ? "\x09\x04\x47\xFF" : "\x09\x06\x12\xFF";
+  if (options_.header) {
+    return {with_header(kInquiry, ++sequence_, query)};
+  }
+  return {query};
+}
+
+std::string ViscaProtocol::give_up() {
+  if (asked_ == Asked::kNumbering) {
+    numbered_ = true;  // a device that does not answer control datagrams is asked all the same
+  }
+  return {};
+}
+
+Answer ViscaProtocol::find(std::string_view bytes) {
+  Answer answer;
+  if (!options_.header) {
+    return find_in_payload(bytes);
+  }
+  const std::optional<ViscaHeader> header = parse_visca_header(bytes);
+  if (!header) {
+    answer.problem =
+        bytes.empty() ? "" : "datagrams come without a VISCA header; is visca_header: false right?";
+    return answer;
+  }
+  if (header->type == kControlReply) {
+    if (asked_ == Asked::kNumbering && header->payload == kBeginNumbering) {
+      numbered_ = true;
+      answer.kind = Answer::Kind::kDone;
+    } else if (header->payload.substr(0, kWrongNumber.size()) == kWrongNumber) {
+      numbered_ = false;
+      answer.kind = Answer::Kind::kRefused;
+      answer.problem = "the device finds the sequence number wrong";
+    }
+    return answer;
+  }
+  if (header->type != kReply || header->sequence != sequence_ || asked_ == Asked::kNumbering) {
+    return answer;
+  }
+  answer = find_in_payload(header->payload);
+  answer.begin = 0;
+  return answer;
+}
+
+Answer ViscaProtocol::find_in_payload(std::string_view bytes) {
+  Answer answer;
+  const std::optional<ViscaFrame> frame = find_visca_frame(bytes, options_.address);
+  if (!frame) {
+    if (bytes.find(kEnd) != std::string_view::npos) {
+      answer.problem =
+          "bytes come, but no answer of VISCA among them: is it this address and baud?";
+    }
+    return answer;
+  }
+  answer.begin = frame->begin;
+  if (frame->kind == ViscaFrame::Kind::kError) {
+    answer.kind = Answer::Kind::kRefused;
+    char code[8];
+    std::snprintf(code, sizeof code, "%02X", static_cast<unsigned>(frame->error));
+    answer.problem = std::string("the device answers '") + visca_error_text(frame->error) +
+                     "' (error " + code + ")";
+  } else if (frame->kind == ViscaFrame::Kind::kZoom && asked_ == Asked::kZoom) {
+    answer.kind = Answer::Kind::kZoom;
+    answer.zoom = frame->zoom;
+  } else if (frame->kind == ViscaFrame::Kind::kPosition && asked_ == Asked::kPosition) {
+    const bool as_before = frame->length == answer_length_;
+    answer_length_ = frame->length;
+    answer.pan_deg = frame->pan * options_.pan_deg_per_step;
+    answer.tilt_deg = frame->tilt * options_.tilt_deg_per_step;
+    if (!is_within_a_turn(answer.pan_deg) || !is_within_a_turn(answer.tilt_deg)) {
+      answer.kind = Answer::Kind::kRefused;
+      answer.problem = "a position of " + std::to_string(frame->pan) + ", " +
+                       std::to_string(frame->tilt) +
+                       " steps is more than a turn; are the degrees per step right?";
+    } else if (!as_before) {
+      answer.kind = Answer::Kind::kRefused;
+      answer.problem = "positions of changing length: noise on the line";
+    } else {
+      answer.kind = Answer::Kind::kPanTilt;
+    }
+  }
+  return answer;
+}
+
+}  // namespace alidade

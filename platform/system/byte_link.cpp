@@ -1,0 +1,285 @@
+#include "platform/system/byte_link.h"
+
+#include <fcntl.h>
+#include <netdb.h>
+#include <netinet/in.h>
+#include <netinet/tcp.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <sys/file.h>
+#include <sys/socket.h>
+#include <termios.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <memory>
+
+#include "platform/system/url.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t kChunk = 512;    // bytes
+constexpr double kLongestWait_s = 10;  // keeps the milliseconds of a wait within an int
+constexpr double kBitsPerByte = 10;    // start bit, 8 data bits, stop bit
+
+struct Speed {
+  int baud;
+  speed_t code;
+};
+constexpr std::array<Speed, 8> kSpeeds = {{{1200, B1200},
+                                           {2400, B2400},
+                                           {4800, B4800},
+                                           {9600, B9600},
+                                           {19200, B19200},
+                                           {38400, B38400},
+                                           {57600, B57600},
+                                           {115200, B115200}}};
+
+// B0 if there is no such speed.
+speed_t speed_code(int baud) {
+  for (const Speed& speed : kSpeeds) {
+    if (speed.baud == baud) {
+      return speed.code;
+    }
+  }
+  return B0;
+}
+
+// The system's word for an error number.
+std::string reason(int error) {
+  char buffer[128];
+  return ::strerror_r(error, buffer, sizeof buffer);
+}
+
+}  // namespace
+
+bool is_baud(int baud) { return speed_code(baud) != B0; }
+
+ByteLink::ByteLink(const ByteLinkOptions& options)
+    : options_(options), stop_fd_(::eventfd(0, EFD_CLOEXEC)) {
+  const std::string& address = options_.address;
+  if (stop_fd_ < 0) {
+    error_ = "no event descriptor: " + reason(errno);
+    return;
+  }
+  if (address.find("://") == std::string::npos) {
+    if (address.empty()) {
+      error_ = "no device is given; expected a path or tcp://host:port or udp://host:port";
+    } else if (!is_baud(options_.baud)) {
+      error_ = std::to_string(options_.baud) +
+               " baud is no speed of a serial line; expected 1200, 2400, ... 115200";
+    } else {
+      kind_ = Kind::kSerial;
+    }
+    return;
+  }
+  Url url;
+  std::string error;
+  if (!parse_url(address, &url, &error)) {
+    options_.address = url.bare;
+    error_ = error;
+    return;
+  }
+  if ((url.scheme != "tcp" && url.scheme != "udp") || url.host.empty() || url.port.empty() ||
+      !(url.path.empty() || url.path == "/") || !url.user.empty() || !url.password.empty()) {
+    options_.address = url.bare;
+    error_ = "expected a path such as /dev/ttyUSB0, or tcp://host:port, or udp://host:port";
+    return;
+  }
+  kind_ = url.scheme == "tcp" ? Kind::kTcp : Kind::kUdp;
+  host_ = url.host;
+  if (host_.front() == '[' && host_.back() == ']') {
+    host_ = host_.substr(1, host_.size() - 2);
+  }
+  port_ = url.port;
+}
+
+ByteLink::~ByteLink() {
+  close();
+  if (stop_fd_ >= 0) {
+    ::close(stop_fd_);
+  }
+}
+
+void ByteLink::close() {
+  if (fd_ >= 0) {
+    ::close(fd_);
+    fd_ = -1;
+  }
+}
+
+void ByteLink::stop() {
+  if (stop_fd_ >= 0) {
+    static_cast<void>(::eventfd_write(stop_fd_, 1));
+  }
+}
+
+double ByteLink::byte_time_s() const {
+  return kind_ == Kind::kSerial ? kBitsPerByte / options_.baud : 0;
+}
+
+LinkStatus ByteLink::lost(const std::string& error) {
+  error_ = error;
+  close();
+  return LinkStatus::kLost;
+}
+
+LinkStatus ByteLink::open() {
+  close();
+  switch (kind_) {
+    case Kind::kSerial:
+      return open_serial();
+    case Kind::kTcp:
+    case Kind::kUdp:
+      return open_socket();
+    case Kind::kNone:
+      break;
+  }
+  return LinkStatus::kUnusable;
+}
+
+LinkStatus ByteLink::open_serial() {
+  fd_ = ::open(options_.address.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
+  if (fd_ < 0) {
+    // All of these may pass: the device is plugged in, its rights are set a moment later.
+    const int code = errno;
+    return lost(reason(code) + (code == ENOENT || code == ENXIO ? "; is it plugged in?"
+                                : code == EACCES
+                                    ? "; add the user to the group of the device (dialout)"
+                                    : ""));
+  }
+  termios line{};
+  if (::tcgetattr(fd_, &line) != 0) {
+    static_cast<void>(lost("is not a serial line; expected one such as /dev/ttyUSB0"));
+    return LinkStatus::kUnusable;
+  }
+  if (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
+    return lost("is in use by another program; end that one first");
+  }
+  const speed_t speed = speed_code(options_.baud);
+  ::cfmakeraw(&line);  // 8 bits, no parity, nothing translated
+  line.c_cflag |= CLOCAL | CREAD;
+  line.c_cflag &= ~(static_cast<tcflag_t>(CSTOPB) | static_cast<tcflag_t>(CRTSCTS));
+  line.c_cc[VMIN] = 1;  // a read of nothing is then EAGAIN, and 0 is the end of the line
+  line.c_cc[VTIME] = 0;
+  termios taken{};
+  if (::cfsetspeed(&line, speed) != 0 || ::tcsetattr(fd_, TCSANOW, &line) != 0 ||
+      ::tcgetattr(fd_, &taken) != 0) {
+    return lost("does not take its settings: " + reason(errno));
+  }
+  // tcsetattr() succeeds if it could do any of it.
+  if (::cfgetospeed(&taken) != speed) {
+    static_cast<void>(lost("does not take " + std::to_string(options_.baud) + " baud"));
+    return LinkStatus::kUnusable;
+  }
+  static_cast<void>(::tcflush(fd_, TCIOFLUSH));
+  return LinkStatus::kOk;
+}
+
+LinkStatus ByteLink::open_socket() {
+  addrinfo hints{};
+  hints.ai_family = AF_UNSPEC;
+  hints.ai_socktype = kind_ == Kind::kTcp ? SOCK_STREAM : SOCK_DGRAM;
+  hints.ai_flags = AI_NUMERICSERV;
+  addrinfo* list = nullptr;
+  const int code = ::getaddrinfo(host_.c_str(), port_.c_str(), &hints, &list);
+  if (code != 0) {
+    return lost(std::string("the host is not found: ") + ::gai_strerror(code));
+  }
+  const std::unique_ptr<addrinfo, decltype(&::freeaddrinfo)> owner(list, &::freeaddrinfo);
+  // A host may have several addresses: each try takes the next.
+  std::size_t count = 0;
+  for (const addrinfo* each = list; each != nullptr; each = each->ai_next) {
+    ++count;
+  }
+  const addrinfo* chosen = list;
+  for (std::size_t skipped = tries_++ % count; skipped > 0; --skipped) {
+    chosen = chosen->ai_next;
+  }
+  fd_ = ::socket(chosen->ai_family, chosen->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC,
+                 chosen->ai_protocol);
+  if (fd_ < 0) {
+    return lost(reason(errno));
+  }
+  const int on = 1;
+  if (kind_ == Kind::kTcp) {
+    static_cast<void>(::setsockopt(fd_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on));
+  }
+  if (::connect(fd_, chosen->ai_addr, chosen->ai_addrlen) != 0 && errno != EINPROGRESS) {
+    return lost(reason(errno));
+  }
+  return LinkStatus::kOk;
+}
+
+LinkStatus ByteLink::finish_open(double timeout_s) {
+  if (kind_ != Kind::kTcp) {
+    return LinkStatus::kOk;
+  }
+  const LinkStatus status = wait(POLLOUT, timeout_s);
+  if (status != LinkStatus::kOk) {
+    return status;
+  }
+  int code = 0;
+  socklen_t size = sizeof code;
+  if (::getsockopt(fd_, SOL_SOCKET, SO_ERROR, &code, &size) != 0 || code != 0) {
+    return lost(reason(code));
+  }
+  return LinkStatus::kOk;
+}
+
+LinkStatus ByteLink::wait(short events, double timeout_s) {
+  const double milliseconds = std::ceil(1e3 * std::clamp(timeout_s, 0.0, kLongestWait_s));
+  std::array<pollfd, 2> waited = {{{stop_fd_, POLLIN, 0}, {fd_, events, 0}}};
+  const int ready = ::poll(waited.data(), waited.size(), static_cast<int>(milliseconds));
+  if (ready > 0 && waited[0].revents != 0) {
+    return LinkStatus::kStopped;
+  }
+  return ready > 0 ? LinkStatus::kOk : LinkStatus::kTimeout;
+}
+
+LinkStatus ByteLink::send(std::string_view bytes) {
+  const ssize_t sent = kind_ == Kind::kSerial
+                           ? ::write(fd_, bytes.data(), bytes.size())
+                           : ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+  if (sent < 0 && errno != EAGAIN) {
+    return lost(reason(errno));
+  }
+  if (sent != static_cast<ssize_t>(bytes.size())) {
+    return lost("takes no more bytes: the device does not read them");
+  }
+  return LinkStatus::kOk;
+}
+
+LinkStatus ByteLink::receive(std::string* bytes, double timeout_s) {
+  bytes->clear();
+  const LinkStatus status = wait(POLLIN, timeout_s);
+  if (status != LinkStatus::kOk) {
+    return status;
+  }
+  char buffer[kChunk];
+  const ssize_t count = ::read(fd_, buffer, sizeof buffer);
+  if (count > 0) {
+    bytes->assign(buffer, static_cast<std::size_t>(count));
+    return LinkStatus::kOk;
+  }
+  if (count < 0 && (errno == EAGAIN || errno == EINTR)) {
+    return LinkStatus::kTimeout;
+  }
+  if (count == 0) {
+    // An empty datagram is no end.
+    return is_datagram() ? LinkStatus::kTimeout
+                         : lost(kind_ == Kind::kSerial ? "the line is gone: unplugged?"
+                                                       : "the device closed the connection");
+  }
+  const int code = errno;
+  return lost(kind_ == Kind::kSerial && (code == EIO || code == ENXIO)
+                  ? "the line is gone: unplugged?"
+                  : reason(code));
+}
+
+}  // namespace alidade
