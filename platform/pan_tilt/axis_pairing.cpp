@@ -23,7 +23,9 @@ double wrap_to_half_turn(double angle_rad) {
 void AxisPairing::reset() {
   pan_.reset();
   tilt_.reset();
+  last_tilt_.reset();
   pan_repeats_ = false;
+  tilt_repeats_ = false;
 }
 
 std::optional<PairedReading> AxisPairing::add_pan(const AxisReading& pan) {
@@ -35,15 +37,22 @@ std::optional<PairedReading> AxisPairing::add_pan(const AxisReading& pan) {
         span_s > 0 ? std::clamp((time_s - middle(*pan_)) / span_s, 0.0, 1.0) : 0.0;
     const double half_s =
         std::max(half_width(*tilt_), (1 - weight) * half_width(*pan_) + weight * half_width(pan));
-    const double step_rad = pan_repeats_ ? 0 : wrap_to_half_turn(pan.angle_rad - pan_->angle_rad);
+    const bool repeats = pan_repeats_ && tilt_repeats_;
+    const double step_rad = repeats ? 0 : wrap_to_half_turn(pan.angle_rad - pan_->angle_rad);
     paired =
         PairedReading{time_s - half_s, time_s + half_s,
                       wrap_to_half_turn(pan_->angle_rad + weight * step_rad), tilt_->angle_rad};
   }
   pan_repeats_ = pan_ && pan_->angle_rad == pan.angle_rad;
   pan_ = pan;
+  last_tilt_ = tilt_ ? std::optional(tilt_->angle_rad) : std::nullopt;
   tilt_.reset();
   return paired;
+}
+
+void AxisPairing::add_tilt(const AxisReading& tilt) {
+  tilt_repeats_ = last_tilt_ == tilt.angle_rad;
+  tilt_ = tilt;
 }
 
 }  // namespace alidade

@@ -6,8 +6,8 @@
 // the pan readings' intervals and t1, h1 of the tilt's, w = (t1 - t0) / (t2 - t0):
 //   pan = pan0 + w wrap(pan2 - pan0), interval t1 -+ max(h1, (1 - w) h0 + w h2).
 // Without it pan and tilt would be apart by half a cycle: 15 ms with Pelco-D at 9600 baud, more than any
-// clock offset can repair. The price is that a sample comes half a cycle later. A pan that repeats the
-// reading before it is stale or at rest and is taken as it is, so that stale repeats stay repeats.
+// clock offset can repair. The price is that a sample comes half a cycle later. Where both axes repeat
+// the reading before, the head is at rest or the device has not measured since: the sample repeats, too.
 //
 // Pure; radians and seconds; no allocation.
 
@@ -35,12 +35,14 @@ class AxisPairing {
 
   // Later than all before. A sample comes with the pan after the tilt.
   std::optional<PairedReading> add_pan(const AxisReading& pan);
-  void add_tilt(const AxisReading& tilt) { tilt_ = tilt; }
+  void add_tilt(const AxisReading& tilt);
 
  private:
   std::optional<AxisReading> pan_;
-  bool pan_repeats_ = false;  // the reading before it
-  std::optional<AxisReading> tilt_;
+  std::optional<AxisReading> tilt_;  // since that pan
+  std::optional<double> last_tilt_;  // rad, before that pan
+  bool pan_repeats_ = false;         // the reading before it
+  bool tilt_repeats_ = false;
 };
 
 [[nodiscard]] double wrap_to_half_turn(double angle_rad);  // into [-pi, pi)

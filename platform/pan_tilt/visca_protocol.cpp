@@ -186,7 +186,7 @@ Answer ViscaProtocol::find(std::string_view bytes) {
   const std::optional<ViscaHeader> header = parse_visca_header(bytes);
   if (!header) {
     answer.problem =
-        bytes.empty() ? "" : "datagrams come without a VISCA header; is visca_header: false right?";
+        bytes.empty() ? "" : "datagrams come without a VISCA header; would header: false be right?";
     return answer;
   }
   if (header->type == kControlReply) {

@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <filesystem>
 #include <functional>
+#include <iterator>
 #include <memory>
 #include <ostream>
 #include <thread>
@@ -13,6 +15,7 @@
 #include "platform/pan_tilt/vapix_source.h"
 #include "test/platform/support/axis_server.h"
 #include "test/platform/support/eventually.h"
+#include "test/platform/support/head_rig.h"
 #include "test/platform/support/onvif_server.h"
 #include "test/platform/support/open_files.h"
 #include "test/support/temporary_directory.h"
@@ -23,41 +26,32 @@ namespace {
 // A source and what it needs to live.
 struct Rig {
   virtual ~Rig() = default;
-  virtual std::unique_ptr<PanTiltSource> open() const = 0;
-  std::unique_ptr<PanTiltSource> source;
+  virtual std::unique_ptr<PanTiltSource> open() = 0;
 };
 
 struct VapixRig : Rig {
-  VapixRig() {
+  std::unique_ptr<PanTiltSource> open() override {
+    VapixSourceOptions options;
     options.url = server.url();
     options.user = "user";
     options.password = "secret";
     options.timeout_s = kDeadline_s;
-    source = open();
-  }
-  ~VapixRig() override { source.reset(); }
-  std::unique_ptr<PanTiltSource> open() const override {
     return std::make_unique<VapixSource>(options);
   }
-  VapixSourceOptions options;
   AxisServer server{"user", "secret", [] { return "pan=10\r\ntilt=20\r\n"; }};
 };
 
 struct OnvifRig : Rig {
-  OnvifRig() {
+  std::unique_ptr<PanTiltSource> open() override {
+    OnvifSourceOptions options;
     options.url = server.url();
     options.user = "user";
     options.password = "secret";
     options.pan_range = {-3, 3};
     options.tilt_range = {-1, 1};
     options.timeout_s = kDeadline_s;
-    source = open();
-  }
-  ~OnvifRig() override { source.reset(); }
-  std::unique_ptr<PanTiltSource> open() const override {
     return std::make_unique<OnvifSource>(options);
   }
-  OnvifSourceOptions options;
   OnvifServer server{[] {
     OnvifDevice device;
     device.login = OnvifDevice::Login::kToken;
@@ -68,21 +62,27 @@ struct OnvifRig : Rig {
 };
 
 struct RecordingRig : Rig {
-  explicit RecordingRig(bool realtime) {
+  explicit RecordingRig(bool in_real_time) : realtime(in_real_time) {
     std::string rows;
-    for (int i = 0; i < 2000; ++i) {
+    for (int i = 0; i < 1000; ++i) {
       rows += std::to_string(i * 0.01) + ",0.1,0.2\n";
     }
     directory.write("telemetry.csv", "receive_time_s,pan_rad,tilt_rad\n" + rows);
+  }
+  std::unique_ptr<PanTiltSource> open() override {
+    RecordingPanTiltSourceOptions options;
     options.directory = directory.path();
     options.realtime = realtime;
-    source = open();
-  }
-  std::unique_ptr<PanTiltSource> open() const override {
     return std::make_unique<RecordingPanTiltSource>(options);
   }
   TemporaryDirectory directory;
-  RecordingPanTiltSourceOptions options;
+  bool realtime;
+};
+
+struct AskedHeadRig : Rig {
+  explicit AskedHeadRig(HeadKind kind) : rig(kind) {}
+  std::unique_ptr<PanTiltSource> open() override { return rig.open(); }
+  HeadRig rig;
 };
 
 struct Case {
@@ -95,7 +95,8 @@ void PrintTo(const Case& which, std::ostream* out) { *out << which.name; }
 class PanTiltSourceContract : public ::testing::TestWithParam<Case> {
  protected:
   std::unique_ptr<Rig> rig_ = GetParam().make();
-  PanTiltSource& source_ = *rig_->source;
+  std::unique_ptr<PanTiltSource> owned_ = rig_->open();
+  PanTiltSource& source_ = *owned_;
   PanTiltSample sample_;
 };
 
@@ -140,7 +141,7 @@ TEST_P(PanTiltSourceContract, EndsAReadWhenAnotherThreadStopsIt) {
 }
 
 TEST_P(PanTiltSourceContract, LeaksNoFileDescriptorOverAThousandLives) {
-  rig_->source.reset();
+  owned_.reset();
   const auto one_life = [&](double timeout_s) {
     const std::unique_ptr<PanTiltSource> source = rig_->open();
     EXPECT_NE(source->read(sample_, timeout_s), ReadStatus::kFailed) << source->error();
@@ -159,13 +160,23 @@ TEST_P(PanTiltSourceContract, HasANameWithoutPassword) {
   EXPECT_EQ(source_.name().find("secret"), std::string::npos);
 }
 
+Case asked_head(const char* name, HeadKind kind) {
+  return {name, [kind] { return std::make_unique<AskedHeadRig>(kind); }};
+}
+
 INSTANTIATE_TEST_SUITE_P(
     Sources, PanTiltSourceContract,
-    ::testing::Values(Case{"Vapix", [] { return std::make_unique<VapixRig>(); }},
-                      Case{"Onvif", [] { return std::make_unique<OnvifRig>(); }},
-                      Case{"Recording", [] { return std::make_unique<RecordingRig>(false); }},
-                      Case{"RecordingInRealTime",
-                           [] { return std::make_unique<RecordingRig>(true); }}),
+    ::testing::Values(
+        Case{"Vapix", [] { return std::make_unique<VapixRig>(); }},
+        Case{"Onvif", [] { return std::make_unique<OnvifRig>(); }},
+        Case{"Recording", [] { return std::make_unique<RecordingRig>(false); }},
+        Case{"RecordingInRealTime", [] { return std::make_unique<RecordingRig>(true); }},
+        asked_head("PelcoDSerial", HeadKind::kPelcoDSerial),
+        asked_head("PelcoDTcp", HeadKind::kPelcoDTcp),
+        asked_head("ViscaSerial", HeadKind::kViscaSerial),
+        asked_head("ViscaTcp", HeadKind::kViscaTcp), asked_head("ViscaUdp", HeadKind::kViscaUdp),
+        asked_head("ViscaUdpHeader", HeadKind::kViscaUdpHeader),
+        asked_head("PtuSerial", HeadKind::kPtuSerial), asked_head("PtuTcp", HeadKind::kPtuTcp)),
     [](const auto& which) { return which.param.name; });
 
 }  // namespace

@@ -1,0 +1,370 @@
+#include "platform/pan_tilt/query_source.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <iterator>
+#include <thread>
+
+#include "platform/pan_tilt/pelco_d_protocol.h"
+#include "platform/pan_tilt/ptu_protocol.h"
+#include "platform/pan_tilt/visca_protocol.h"
+#include "platform/system/clock.h"
+#include "test/platform/support/eventually.h"
+#include "test/platform/support/head_rig.h"
+#include "test/platform/support/raw_server.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::AnyOf;
+using ::testing::HasSubstr;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+constexpr double kNever_s = 1e6;
+constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
+constexpr HeadKind kKinds[] = {
+    HeadKind::kPelcoDSerial, HeadKind::kPelcoDTcp, HeadKind::kViscaSerial,
+    HeadKind::kViscaTcp,     HeadKind::kViscaUdp,  HeadKind::kViscaUdpHeader,
+    HeadKind::kPtuSerial,    HeadKind::kPtuTcp,    HeadKind::kPtuVerboseSerial};
+
+double difference_deg(double a_rad, double b_deg) {
+  return std::abs(std::remainder(a_rad / kRadPerDeg - b_deg, 360));
+}
+
+long open_files() {
+  return std::distance(std::filesystem::directory_iterator("/proc/self/fd"),
+                       std::filesystem::directory_iterator());
+}
+
+class QuerySourceTest : public ::testing::TestWithParam<HeadKind> {
+ protected:
+  PanTiltSample sample_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Heads, QuerySourceTest, ::testing::ValuesIn(kKinds),
+                         [](const auto& tested) { return to_string(tested.param); });
+
+TEST_P(QuerySourceTest, DeliversPositionsInTheAxesOfTheModel) {
+  for (const HeadPosition& position :
+       {HeadPosition{-123.45, 30.5, 0x1234}, HeadPosition{123.45, -30.5, 0x1234},
+        HeadPosition{0, 0, 0x1234}}) {
+    HeadRig rig(GetParam(), [&] { return position; });
+    const auto source = rig.open();
+    for (int i = 0; i < 30; ++i) {
+      ASSERT_EQ(source->read(sample_, kDeadline_s), ReadStatus::kOk) << source->error();
+      EXPECT_LE(difference_deg(sample_.pan_rad, position.pan_deg), rig.quantum_deg());
+      EXPECT_LE(difference_deg(sample_.tilt_rad, position.tilt_deg), rig.quantum_deg());
+      EXPECT_EQ(sample_.zoom, is_ptu(GetParam()) ? std::nullopt : std::optional<double>(0x1234));
+      EXPECT_EQ(sample_.restarted, i == 0);
+    }
+  }
+}
+
+// The head notes the moment at which it looks at its angles, and answers with that moment.
+TEST_P(QuerySourceTest, GivesAnIntervalThatHoldsTheMomentOfTheMeasurement) {
+  constexpr double kRate = 10;  // deg/s
+  const double origin_s = monotonic_now_s();
+  HeadRig rig(GetParam(), [origin_s] {
+    const double angle_deg = kRate * (monotonic_now_s() - origin_s);
+    return HeadPosition{std::remainder(angle_deg + 170, 360), std::remainder(angle_deg, 90), 1};
+  });
+  const auto source = rig.open();
+  // Half a step by rounding; where both axes repeat, the head turned by less than a step of the tilt.
+  const double slack_s = 1.5 * rig.quantum_deg() / kRate;
+  double last_s = 0;
+  for (int i = 0; i < 100; ++i) {
+    ASSERT_EQ(source->read(sample_, kDeadline_s), ReadStatus::kOk) << source->error();
+    EXPECT_GE(sample_.latest_time_s, last_s);
+    EXPECT_GE(sample_.pan_rad, -180 * kRadPerDeg);
+    EXPECT_LT(sample_.pan_rad, 180 * kRadPerDeg);
+    const double middle_s = (sample_.earliest_time_s + sample_.latest_time_s) / 2;
+    const double half_s = (sample_.latest_time_s - sample_.earliest_time_s) / 2;
+    const double angle_deg = kRate * (middle_s - origin_s);
+    EXPECT_LE(difference_deg(sample_.pan_rad, angle_deg + 170) / kRate, half_s + slack_s);
+    const double tilt_error_deg = std::remainder(sample_.tilt_rad / kRadPerDeg - angle_deg, 90);
+    EXPECT_LE(std::abs(tilt_error_deg) / kRate, half_s + slack_s);
+    last_s = sample_.latest_time_s;
+  }
+}
+
+TEST_P(QuerySourceTest, AppliesSignAndZeroOfEachAxis) {
+  HeadRig rig(GetParam());
+  QuerySourceOptions options = rig.options();
+  options.pan.sign = -options.pan.sign;
+  options.pan.zero_deg = 10;
+  options.tilt.zero_deg = -20;
+  const auto source = rig.open(options);
+  ASSERT_EQ(source->read(sample_, kDeadline_s), ReadStatus::kOk) << source->error();
+  const double counted_pan = -options.pan.sign * -123.45;
+  const double counted_tilt = options.tilt.sign * 30.5;
+  EXPECT_LE(difference_deg(sample_.pan_rad, options.pan.sign * (counted_pan - 10)),
+            rig.quantum_deg());
+  EXPECT_LE(difference_deg(sample_.tilt_rad, options.tilt.sign * (counted_tilt + 20)),
+            rig.quantum_deg());
+}
+
+TEST_P(QuerySourceTest, OutlivesUnpluggingAndComesBackByItself) {
+  HeadRig rig(GetParam());
+  QuerySourceOptions options = rig.options();
+  options.timeout_s = 0.4;
+  const auto source = rig.open(options);
+  for (int turn = 0; turn < 3; ++turn) {
+    ASSERT_EQ(read_until(*source, sample_, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+    EXPECT_TRUE(sample_.restarted);
+    rig.server().unplug();
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_EQ(read_until(*source, sample_, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+      EXPECT_THAT(source->error(), StartsWith(rig.server().address() + ": "));
+      EXPECT_THAT(source->error(), Not(HasSubstr("\n")));
+    }
+    EXPECT_THAT(source->error(), AnyOf(HasSubstr("No such file"), HasSubstr("Connection refused")));
+    rig.server().plug();
+  }
+}
+
+TEST_P(QuerySourceTest, ReportsSilenceAndComesBackByItself) {
+  HeadRig rig(GetParam());
+  QuerySourceOptions options = rig.options();
+  options.timeout_s = 0.4;
+  const auto source = rig.open(options);
+  ASSERT_EQ(read_until(*source, sample_, ReadStatus::kOk), ReadStatus::kOk);
+  rig.server().fault = LineFault::kSilence;
+  ASSERT_EQ(read_until(*source, sample_, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("; check power, wiring, address and baud or port"));
+  rig.server().fault = LineFault::kNone;
+  ASSERT_EQ(read_until(*source, sample_, ReadStatus::kOk), ReadStatus::kOk);
+  EXPECT_TRUE(sample_.restarted);
+}
+
+TEST_P(QuerySourceTest, ReportsBabbleAndComesBackByItself) {
+  HeadRig rig(GetParam());
+  QuerySourceOptions options = rig.options();
+  options.timeout_s = 0.4;
+  const auto source = rig.open(options);
+  ASSERT_EQ(read_until(*source, sample_, ReadStatus::kOk), ReadStatus::kOk);
+  rig.server().fault = LineFault::kBabble;
+  ASSERT_EQ(read_until(*source, sample_, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  rig.server().fault = LineFault::kNone;
+  ASSERT_EQ(read_until(*source, sample_, ReadStatus::kOk), ReadStatus::kOk);
+}
+
+TEST_P(QuerySourceTest, LosesOnlyAnswersToALineWithFaults) {
+  const HeadPosition position{-123.45, 30.5, 0x1234};
+  HeadRig rig(GetParam(), [position] { return position; });
+  QuerySourceOptions options = rig.options();
+  options.timeout_s = 0.4;  // an answer is given up after a quarter of it
+  rig.server().late_s = 0.12;
+  const auto source = rig.open(options);
+  for (const LineFault fault :
+       {LineFault::kNoise, LineFault::kRepeated, LineFault::kUnsolicited, LineFault::kLate,
+        LineFault::kMerged, LineFault::kLostByte, LineFault::kChangedByte}) {
+    SCOPED_TRACE(static_cast<int>(fault));
+    rig.server().fault = fault;
+    rig.server().faults = 0;
+    // Without a sum or a sequence of their own, digits of a PTU and nibbles of VISCA can change
+    // unseen.
+    const bool unseen = (fault == LineFault::kChangedByte && !is_pelco_d(GetParam())) ||
+                        (fault == LineFault::kLostByte && is_ptu(GetParam()));
+    const double end_s = monotonic_now_s() + kDeadline_s;
+    int samples = 0;
+    while ((samples < 5 || rig.server().faults < 4) && monotonic_now_s() < end_s) {
+      const ReadStatus status = source->read(sample_, kDeadline_s);
+      ASSERT_TRUE(status == ReadStatus::kOk || status == ReadStatus::kDisconnected);
+      if (status != ReadStatus::kOk) {
+        continue;
+      }
+      ++samples;
+      if (!unseen) {
+        EXPECT_LE(difference_deg(sample_.pan_rad, position.pan_deg), rig.quantum_deg());
+        EXPECT_LE(difference_deg(sample_.tilt_rad, position.tilt_deg), rig.quantum_deg());
+      }
+    }
+    EXPECT_GE(samples, 5);
+    EXPECT_GE(rig.server().faults, 4);
+  }
+  // And then all is as before.
+  rig.server().fault = LineFault::kNone;
+  const auto is_right = [&] {
+    return source->read(sample_, kDeadline_s) == ReadStatus::kOk &&
+           difference_deg(sample_.pan_rad, position.pan_deg) <= rig.quantum_deg() &&
+           difference_deg(sample_.tilt_rad, position.tilt_deg) <= rig.quantum_deg();
+  };
+  EXPECT_TRUE(eventually(is_right));
+  for (int i = 0; i < 20; ++i) {
+    EXPECT_TRUE(is_right());
+  }
+}
+
+TEST_P(QuerySourceTest, StopEndsAQueryThatIsNotAnswered) {
+  HeadRig rig(GetParam());
+  rig.server().fault = LineFault::kSilence;
+  const auto source = rig.open();
+  std::thread stopper([&] {
+    eventually([&] { return rig.server().queries > 0; });
+    source->stop();
+  });
+  EXPECT_EQ(source->read(sample_, kNever_s), ReadStatus::kStopped);
+  stopper.join();
+}
+
+TEST_P(QuerySourceTest, StopEndsAPause) {
+  HeadRig rig(GetParam());
+  rig.server().unplug();
+  QuerySourceOptions options = rig.options();
+  options.max_backoff_s = kNever_s;
+  options.timeout_s = 0.05;
+  const auto source = rig.open(options);
+  ASSERT_EQ(read_until(*source, sample_, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  std::thread stopper([&] { source->stop(); });
+  ReadStatus status = ReadStatus::kDisconnected;
+  while (status == ReadStatus::kDisconnected) {
+    status = source->read(sample_, kNever_s);
+  }
+  EXPECT_EQ(status, ReadStatus::kStopped);
+  stopper.join();
+}
+
+TEST_P(QuerySourceTest, LeaksNoFileDescriptorOverManyReconnections) {
+  HeadRig rig(GetParam());
+  rig.server().unplug();
+  QuerySourceOptions options = rig.options();
+  options.max_backoff_s = 1e-4;
+  options.timeout_s = 0.02;
+  const auto source = rig.open(options);
+  ASSERT_EQ(read_until(*source, sample_, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  const long before = open_files();
+  for (int i = 0; i < 1000; ++i) {
+    ASSERT_EQ(read_until(*source, sample_, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  }
+  EXPECT_LE(open_files(), before);
+}
+
+QuerySourceOptions options_for(const std::string& address) {
+  QuerySourceOptions options;
+  options.link.address = address;
+  options.timeout_s = 0.2;
+  options.max_backoff_s = 0.01;
+  return options;
+}
+
+TEST(QuerySource, FailsForGoodOnWhatIsNoLine) {
+  const TemporaryDirectory directory;
+  const std::string file = directory.write("file", "text");
+  PanTiltSample sample;
+  for (const auto& [address, says] : {std::pair<std::string, const char*>{"", "no device is given"},
+                                      {file, "is not a serial line"},
+                                      {"tcp://127.0.0.1", "expected a path"},
+                                      {"http://127.0.0.1:80", "expected a path"},
+                                      {"tcp://user:secret@127.0.0.1:80", "expected a path"},
+                                      {"udp://127.0.0.1:80/path", "expected a path"}}) {
+    QuerySource source(std::make_unique<PelcoDProtocol>(PelcoDOptions{}), options_for(address));
+    EXPECT_EQ(read_until(source, sample, ReadStatus::kFailed), ReadStatus::kFailed) << address;
+    EXPECT_THAT(source.error(), AllOf(HasSubstr(says), Not(HasSubstr("secret"))));
+    EXPECT_EQ(source.read(sample, 0), ReadStatus::kFailed);
+  }
+  QuerySourceOptions odd = options_for("/dev/null");
+  odd.link.baud = 9601;
+  QuerySource source(std::make_unique<PelcoDProtocol>(PelcoDOptions{}), odd);
+  EXPECT_EQ(read_until(source, sample, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source.error(), HasSubstr("9601 baud is no speed"));
+}
+
+TEST(QuerySource, LetsOneProgramAtATimeHaveTheLine) {
+  HeadRig rig(HeadKind::kPelcoDSerial);
+  const auto first = rig.open();
+  PanTiltSample sample;
+  ASSERT_EQ(first->read(sample, kDeadline_s), ReadStatus::kOk) << first->error();
+  const auto second = rig.open();
+  EXPECT_EQ(second->read(sample, kDeadline_s), ReadStatus::kDisconnected);
+  EXPECT_THAT(second->error(), HasSubstr("in use by another program"));
+  EXPECT_EQ(first->read(sample, kDeadline_s), ReadStatus::kOk) << first->error();
+}
+
+TEST(QuerySource, SaysWhatAnswersInPlaceOfTheHead) {
+  const auto error_of = [](std::unique_ptr<QueryProtocol> protocol, HeadServer::Link link,
+                           std::unique_ptr<SimulatedHead> head) {
+    HeadServer server(link, std::move(head));
+    QuerySource source(std::move(protocol), options_for(server.address()));
+    PanTiltSample sample;
+    EXPECT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    return source.error();
+  };
+  const auto position = [] { return HeadPosition{}; };
+  PelcoDOptions seven;
+  seven.address = 7;
+  EXPECT_THAT(error_of(std::make_unique<PelcoDProtocol>(seven), HeadServer::Link::kSerial,
+                       std::make_unique<PelcoDHead>(position)),
+              HasSubstr("no answer of Pelco-D; check power, wiring, address and baud"));
+  auto refusing = std::make_unique<ViscaHead>(position);
+  refusing->error = 0x41;
+  EXPECT_THAT(error_of(std::make_unique<ViscaProtocol>(ViscaOptions{}), HeadServer::Link::kUdp,
+                       std::move(refusing)),
+              HasSubstr("the device answers 'not executable now' (error 41)"));
+  ViscaOptions with_header;
+  with_header.header = true;
+  EXPECT_THAT(error_of(std::make_unique<ViscaProtocol>(with_header), HeadServer::Link::kUdp,
+                       std::make_unique<ViscaHead>(position)),
+              HasSubstr("without a VISCA header"));
+  EXPECT_THAT(error_of(std::make_unique<ViscaProtocol>(ViscaOptions{}), HeadServer::Link::kTcp,
+                       std::make_unique<PtuHead>(position)),
+              AnyOf(HasSubstr("no answer of VISCA"), HasSubstr("bytes come")));
+}
+
+TEST(QuerySource, SurvivesConnectionsThatAreReset) {
+  RawServer server([](int fd) { RawServer::reset(fd); });
+  QuerySource source(std::make_unique<PtuProtocol>(PtuOptions{}),
+                     options_for("tcp://127.0.0.1:" + std::to_string(server.port())));
+  PanTiltSample sample;
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  }
+  EXPECT_GE(server.connections(), 20);
+}
+
+TEST(QuerySource, ReturnsFromAFloodInTime) {
+  RawServer server([&server](int fd) {
+    const std::string flood(4096, '*');
+    while (!server.closing() && ::send(fd, flood.data(), flood.size(), MSG_NOSIGNAL) > 0) {
+    }
+  });
+  QuerySource source(std::make_unique<PtuProtocol>(PtuOptions{}),
+                     options_for("tcp://127.0.0.1:" + std::to_string(server.port())));
+  PanTiltSample sample;
+  EXPECT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("no answer of a PTU"));
+}
+
+TEST(QuerySource, NeverPollsFasterThanAskedOrThanTheLineCarries) {
+  for (const auto& [rate_hz, baud, expected_hz] :
+       {std::tuple(50.0, 115200, 50.0), {1000.0, 19200, 19200.0 / 280}}) {
+    HeadRig rig(HeadKind::kPelcoDSerial);
+    QuerySourceOptions options = rig.options();
+    options.rate_hz = rate_hz;
+    options.link.baud = baud;
+    const auto source = rig.open(options);
+    PanTiltSample sample;
+    ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
+    const double first_s = monotonic_now_s();
+    for (int i = 0; i < 20; ++i) {
+      ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
+    }
+    // The first may have come late, by no more than its own answer took: one cycle is spared.
+    EXPECT_GT(monotonic_now_s() - first_s, 19 / expected_hz);
+  }
+}
+
+TEST(QuerySource, SurvivesAnAddressWithoutAHost) {
+  QuerySource source(std::make_unique<ViscaProtocol>(ViscaOptions{}),
+                     options_for("udp://no-such-host.invalid:52381"));
+  PanTiltSample sample;
+  EXPECT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("the host is not found"));
+}
+
+}  // namespace
+}  // namespace alidade

@@ -1,0 +1,76 @@
+#pragma once
+// SimulatedHead: the device's side of Pelco-D, VISCA and PTU, written from the protocols' manuals and
+// without the code that it tests: bytes of a master in, bytes of the head out. No I/O: head_server.h
+// puts it on a line.
+
+#include <functional>
+#include <memory>
+#include <string>
+#include <vector>
+
+namespace alidade {
+
+struct HeadPosition {
+  double pan_deg = 0;   // to the right
+  double tilt_deg = 0;  // up
+  int zoom = 0;
+};
+
+class SimulatedHead {
+ public:
+  explicit SimulatedHead(std::function<HeadPosition()> position) : position_(std::move(position)) {}
+  virtual ~SimulatedHead() = default;
+
+  virtual void power_on() { received_.clear(); }
+  // Answers to what is complete of the bytes so far, the position as it is now.
+  virtual std::vector<std::string> take(const std::string& bytes) = 0;
+  // Something that nobody asked for.
+  virtual std::string unsolicited() = 0;
+
+ protected:
+  std::function<HeadPosition()> position_;
+  std::string received_;
+};
+
+struct PelcoDHead : SimulatedHead {
+  explicit PelcoDHead(std::function<HeadPosition()> position, int its_address = 1)
+      : SimulatedHead(std::move(position)), address(its_address) {}
+  std::vector<std::string> take(const std::string& bytes) override;
+  std::string unsolicited() override;
+  int address;
+};
+
+struct ViscaHead : SimulatedHead {
+  using SimulatedHead::SimulatedHead;
+  void power_on() override;
+  std::vector<std::string> take(const std::string& bytes) override;
+  std::string unsolicited() override;
+
+  double steps_per_deg = 51.2;
+  int pan_nibbles = 4;
+  int tilt_nibbles = 4;
+  bool header = false;  // of the datagrams
+  int error = 0;        // code that answers every query; 0: none
+
+ private:
+  std::string reply_to(const std::string& query) const;
+  unsigned last_sequence_ = 0;
+};
+
+struct PtuHead : SimulatedHead {
+  using SimulatedHead::SimulatedHead;
+  void power_on() override;  // verbose, with echo
+  std::vector<std::string> take(const std::string& bytes) override;
+  std::string unsolicited() override { return "!P\r\n"; }
+
+  // Counts to the left and up.
+  static constexpr double kPanArcSeconds = 185.1428;
+  static constexpr double kTiltArcSeconds = 92.5714;
+
+ private:
+  std::string reply_to(const std::string& command);
+  bool terse_ = false;
+  bool echo_ = true;
+};
+
+}  // namespace alidade
