@@ -9,6 +9,7 @@
 
 #include "core/calibration/calibration_file.h"
 #include "platform/pan_tilt/onvif_source.h"
+#include "platform/pan_tilt/query_source.h"
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
 #include "platform/pan_tilt/vapix_source.h"
 #include "platform/video/mjpeg_source.h"
@@ -180,6 +181,16 @@ std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config)
         RecordingPanTiltSourceOptions{config.directory, true});
   }
   if (config.type == PanTiltConfig::Type::kOnvif) return make_onvif_source(config);
+  if (config.type == PanTiltConfig::Type::kHead) {
+    QuerySourceOptions options;
+    options.link = config.head.link;
+    options.pan = config.head.pan;
+    options.tilt = config.head.tilt;
+    options.rate_hz = config.rate_hz;
+    options.timeout_s = config.timeout_s;
+    options.max_backoff_s = config.max_backoff_s;
+    return std::make_unique<QuerySource>(make_protocol(config.head), options);
+  }
   VapixSourceOptions options;
   options.url = config.url;
   options.user = config.user;

@@ -127,22 +127,30 @@ void read_onvif(YamlSection& section, PanTiltConfig* pan_tilt) {
 PanTiltConfig read_pan_tilt(YamlSection section, const std::string& path) {
   PanTiltConfig pan_tilt;
   const auto type =
-      section.choice("type", {"vapix", "onvif", "recording"}, {"pelco_d", "visca", "ptu"});
-  if (!type) section.fail("type", "is missing; expected one of vapix, onvif, recording");
+      section.choice("type", {"vapix", "onvif", "pelco_d", "visca", "ptu", "recording"}, {});
+  if (!type) {
+    section.fail("type",
+                 "is missing; expected one of vapix, onvif, pelco_d, visca, ptu, recording");
+  }
   if (*type == "recording") {
     pan_tilt.type = PanTiltConfig::Type::kRecording;
     pan_tilt.directory =
         path_relative_to(path, required_text(section, "directory", "my-recording"));
   } else {
-    pan_tilt.url = required_url(section, "http://camera", {"http://", "https://"});
-    read_login(section, &pan_tilt.user, &pan_tilt.password);
-    if (*type == "onvif") {
-      read_onvif(section, &pan_tilt);
+    if (*type == "vapix" || *type == "onvif") {
+      pan_tilt.url = required_url(section, "http://camera", {"http://", "https://"});
+      read_login(section, &pan_tilt.user, &pan_tilt.password);
+      if (*type == "onvif") {
+        read_onvif(section, &pan_tilt);
+      } else {
+        pan_tilt.camera =
+            section.integer("camera", {1, 64, "camera number"}).value_or(pan_tilt.camera);
+      }
+      pan_tilt.rate_hz = section.number("rate_hz", {0.1, 1000, "Hz"}).value_or(pan_tilt.rate_hz);
     } else {
-      pan_tilt.camera =
-          section.integer("camera", {1, 64, "camera number"}).value_or(pan_tilt.camera);
+      pan_tilt.type = PanTiltConfig::Type::kHead;
+      pan_tilt.head = read_head(section, *type, path, &pan_tilt.rate_hz);
     }
-    pan_tilt.rate_hz = section.number("rate_hz", {0.1, 1000, "Hz"}).value_or(pan_tilt.rate_hz);
     pan_tilt.timeout_s = section.number("timeout_s", kSeconds).value_or(pan_tilt.timeout_s);
     pan_tilt.max_backoff_s =
         section.number("max_backoff_s", kSeconds).value_or(pan_tilt.max_backoff_s);

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "edge_app/config/head_config.h"
 #include "edge_app/output/record_format.h"  // OutputFormat
 
 namespace alidade {
@@ -32,9 +33,10 @@ struct VideoConfig {
 };
 
 struct PanTiltConfig {
-  enum class Type { kVapix, kOnvif, kRecording };
+  enum class Type { kVapix, kOnvif, kHead, kRecording };
   Type type = Type::kVapix;
   std::string url;        // vapix, onvif
+  HeadConfig head;        // pelco_d, visca, ptu
   std::string directory;  // recording
   std::string user;
   std::string password;

@@ -1,6 +1,6 @@
 #pragma once
-// PanTiltSource: one interface for every origin of pan/tilt telemetry (Axis VAPIX, ONVIF,
-// recording; serial protocols implement the same contract).
+// PanTiltSource: one interface for every origin of pan/tilt telemetry (Axis VAPIX, ONVIF, heads on
+// serial lines, recording).
 //
 // Angles are radians as the device measures them (scale and axes are the calibration's business),
 // turned into the axes of the model: pan positive to the right (about base z, down), tilt positive

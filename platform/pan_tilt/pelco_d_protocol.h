@@ -41,6 +41,7 @@ class PelcoDProtocol : public QueryProtocol {
   [[nodiscard]] Query next() override;
   [[nodiscard]] Answer find(std::string_view bytes) override;
   [[nodiscard]] std::string give_up() override { return {}; }
+  [[nodiscard]] bool answers_name_queries() const override { return true; }
   [[nodiscard]] int polls_per_reading() const override { return 2; }
   [[nodiscard]] int bytes_per_reading() const override { return 28; }
 

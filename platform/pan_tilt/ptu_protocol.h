@@ -6,9 +6,9 @@
 // unless the configuration states the degrees per step, then PP and TP in turn.
 //
 // Answer N need not belong to query N. A verbose answer names its axis and must name the one asked. A
-// terse one does not, so after a query without answer a space ends what the device may have half
-// received, QuerySource waits for silence, and the other axis is asked next. A digit lost on the way
-// is noticed in neither: terse answers are short, verbose ones safe.
+// terse one does not: a surplus line makes a pan of a tilt until the line is next found silent. After a
+// query without answer a space ends what the device may have half received, QuerySource waits for
+// silence, and the other axis is asked next. A digit lost on the way is noticed in neither.
 
 #include <optional>
 
@@ -17,7 +17,7 @@
 namespace alidade {
 
 struct PtuOptions {
-  bool verbose = false;
+  bool verbose = true;
   std::optional<double> pan_deg_per_step;  // else the device is asked
   std::optional<double> tilt_deg_per_step;
 };
@@ -43,9 +43,10 @@ class PtuProtocol : public QueryProtocol {
   [[nodiscard]] Query next() override;
   [[nodiscard]] Answer find(std::string_view bytes) override;
   [[nodiscard]] std::string give_up() override;
+  [[nodiscard]] bool answers_name_queries() const override { return options_.verbose; }
   [[nodiscard]] int polls_per_reading() const override { return 2; }
   // "PP " and "* -12345\r\n", or "* Current Pan position is -12345\r\n", and the tilt's.
-  [[nodiscard]] int bytes_per_reading() const override { return options_.verbose ? 78 : 26; }
+  [[nodiscard]] int bytes_per_reading() const override { return options_.verbose ? 75 : 26; }
 
  private:
   enum class Asked { kFeedback, kEcho, kImmediate, kPanStep, kTiltStep, kPan, kTilt };

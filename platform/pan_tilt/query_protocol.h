@@ -51,6 +51,9 @@ class QueryProtocol {
   // Bytes that bring the device back to the start of a command; mostly none.
   [[nodiscard]] virtual std::string give_up() = 0;
 
+  // Whether a late answer is known from the answer to the query under way.
+  [[nodiscard]] virtual bool answers_name_queries() const = 0;
+
   // Of one reading of pan and tilt: polls, and bytes of queries and answers together.
   [[nodiscard]] virtual int polls_per_reading() const = 0;
   [[nodiscard]] virtual int bytes_per_reading() const = 0;

@@ -1,7 +1,6 @@
 #include "platform/pan_tilt/query_source.h"
 
 #include <algorithm>
-#include <cmath>
 #include <utility>
 
 #include "platform/system/clock.h"
@@ -14,6 +13,7 @@ constexpr double kQuietBytes = 10;  // times of a byte without one are silence
 constexpr double kLeastQuiet_s = 0.02;
 constexpr int kTriesPerTimeout = 4;
 constexpr int kMaxStaleChunks = 64;
+constexpr int kAskedBetweenSilences = 64;
 
 double mapped_rad(double angle_deg, const AxisMapping& mapping) {
   return wrap_to_half_turn(mapping.sign * (angle_deg - mapping.zero_deg) * kRadPerDeg);
@@ -30,12 +30,12 @@ QuerySource::QuerySource(std::unique_ptr<QueryProtocol> protocol, const QuerySou
     static_cast<void>(fail("rate_hz and timeout_s must be positive"));
     return;
   }
-  double rate_hz = options.rate_hz;
-  if (link_.byte_time_s() > 0) {
-    rate_hz = std::min(rate_hz, ceiling_hz(*protocol_, link_.byte_time_s()));
-  }
+  const double byte_time_s = wire_time_of_byte_s(options.link);
+  const double rate_hz = byte_time_s > 0
+                             ? std::min(options.rate_hz, ceiling_hz(*protocol_, byte_time_s))
+                             : options.rate_hz;
   poll_period_s_ = 1 / (rate_hz * protocol_->polls_per_reading());
-  quiet_time_s_ = std::max(kLeastQuiet_s, kQuietBytes * link_.byte_time_s());
+  quiet_time_s_ = std::max(kLeastQuiet_s, kQuietBytes * byte_time_s);
 }
 
 void QuerySource::stop() {
@@ -88,12 +88,8 @@ ReadStatus QuerySource::act(double now_s) {
       return ReadStatus::kOk;
     }
     case State::kOpening:
-      return disconnect("no connection within " + std::to_string(options_.timeout_s) + " s");
+      return disconnect("no connection in time; is the host there?");
     case State::kSettling:
-      // The grid begins where the connection did.
-      if (due_s_ < now_s) {
-        due_s_ += poll_period_s_ * std::ceil((now_s - due_s_) / poll_period_s_);
-      }
       state_ = State::kIdle;
       return ReadStatus::kOk;
     case State::kIdle:
@@ -106,29 +102,41 @@ ReadStatus QuerySource::act(double now_s) {
 
 void QuerySource::settle(double now_s) {
   state_ = State::kSettling;
+  asked_ = 0;
   quiet_s_ = now_s + quiet_time_s_;
   until_s_ = now_s + options_.timeout_s / kTriesPerTimeout;
 }
 
 ReadStatus QuerySource::ask(double now_s) {
-  const Query query = protocol_->next();
   // What is still in the buffers came before the query and is no answer to it.
   std::string stale;
-  LinkStatus status = LinkStatus::kOk;
+  LinkStatus status = link_.receive(&stale, 0);
+  bool surplus = status == LinkStatus::kOk;
   for (int i = 0; i < kMaxStaleChunks && status == LinkStatus::kOk; ++i) {
     status = link_.receive(&stale, 0);
   }
   if (status == LinkStatus::kStopped) {
     return ReadStatus::kStopped;
   }
+  if (status == LinkStatus::kLost) {
+    return disconnect(link_.error());
+  }
+  // One answer too many, unseen so far, would make each answer that of the query before.
+  surplus = surplus || (!protocol_->answers_name_queries() && asked_ >= kAskedBetweenSilences);
+  if (surplus && asked_ > 0) {
+    settle(now_s);
+    return ReadStatus::kOk;
+  }
+  const Query query = protocol_->next();
+  ++asked_;
   received_.clear();
   arrivals_s_.clear();
   sent_s_ = monotonic_now_s();
-  if (status == LinkStatus::kLost || link_.send(query.bytes) != LinkStatus::kOk) {
+  if (link_.send(query.bytes) != LinkStatus::kOk) {
     return disconnect(link_.error());
   }
   if (query.paced) {
-    due_s_ += poll_period_s_ * std::max(1.0, std::ceil((now_s - due_s_) / poll_period_s_));
+    due_s_ = std::max(due_s_ + poll_period_s_, now_s);
   }
   if (!failing_since_s_) {
     failing_since_s_ = sent_s_;
@@ -158,6 +166,9 @@ bool QuerySource::take_bytes(const std::string& bytes, double now_s, PanTiltSamp
   if (state_ == State::kSettling) {
     quiet_s_ = now_s + quiet_time_s_;
     return false;
+  }
+  if (state_ == State::kIdle && asked_ > 0) {
+    settle(now_s);
   }
   if (state_ != State::kAsked) {
     return false;

@@ -1,11 +1,12 @@
 #pragma once
 // QuerySource: a head that is asked for its position, by any QueryProtocol over any ByteLink.
 //
-// Polls lie on a fixed grid of rate_hz, or of what a serial line can carry if that is less; a late
-// answer skips points of the grid and does not shift it. One query is under way at a time. What was true
-// when it answered lies between the sending of the query and the first byte of the answer. A query
-// without answer is given up after a quarter of timeout_s; then the source waits until the line is
-// silent, so that a late answer is not taken for the next one. Protocols that give one axis at a time
+// Polls lie on a grid of rate_hz, or of what a serial line can carry if that is less. One query is under
+// way at a time: an answer later than that shifts the grid, for a head that cannot keep up is asked as
+// often as it answers. What was true lies between the sending of the query and the first byte of the answer. A query
+// without answer is given up after a quarter of timeout_s. Then, after bytes that nobody asked for, and
+// now and then where answers do not name their query, the source waits until the line is silent, so
+// that no late or surplus answer is taken for the next one, at least not for long. Protocols that give one axis at a time
 // yield a sample for each tilt, with the pan of the same moment (AxisPairing). Signs and zeros turn
 // what the device counts into the axes of the model, in [-pi, pi).
 //
@@ -81,6 +82,7 @@ class QuerySource : public PanTiltSource {
   std::atomic<bool> stopped_{false};
 
   State state_ = State::kClosed;
+  int asked_ = 0;     // queries since the line was silent
   double due_s_ = 0;  // of the next try or the next poll
   double until_s_ = 0;
   double quiet_s_ = 0;

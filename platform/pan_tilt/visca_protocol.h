@@ -61,6 +61,7 @@ class ViscaProtocol : public QueryProtocol {
   [[nodiscard]] Query next() override;
   [[nodiscard]] Answer find(std::string_view bytes) override;
   [[nodiscard]] std::string give_up() override;
+  [[nodiscard]] bool answers_name_queries() const override { return options_.header; }
   [[nodiscard]] int polls_per_reading() const override { return 1; }
   [[nodiscard]] int bytes_per_reading() const override { return 18; }
 

@@ -56,7 +56,26 @@ std::string reason(int error) {
   return ::strerror_r(error, buffer, sizeof buffer);
 }
 
+bool is_device(const std::string& address) { return address.find("://") == std::string::npos; }
+
+// On false url->bare is what can be shown.
+bool parse_link_url(const std::string& text, Url* url) {
+  std::string error;
+  return parse_url(text, url, &error) && (url->scheme == "tcp" || url->scheme == "udp") &&
+         !url->host.empty() && !url->port.empty() && (url->path.empty() || url->path == "/") &&
+         url->user.empty() && url->password.empty();
+}
+
 }  // namespace
+
+bool is_byte_link_url(const std::string& text) {
+  Url url;
+  return parse_link_url(text, &url);
+}
+
+double wire_time_of_byte_s(const ByteLinkOptions& options) {
+  return is_device(options.address) ? kBitsPerByte / options.baud : 0;
+}
 
 bool is_baud(int baud) { return speed_code(baud) != B0; }
 
@@ -67,7 +86,7 @@ ByteLink::ByteLink(const ByteLinkOptions& options)
     error_ = "no event descriptor: " + reason(errno);
     return;
   }
-  if (address.find("://") == std::string::npos) {
+  if (is_device(address)) {
     if (address.empty()) {
       error_ = "no device is given; expected a path or tcp://host:port or udp://host:port";
     } else if (!is_baud(options_.baud)) {
@@ -79,14 +98,8 @@ ByteLink::ByteLink(const ByteLinkOptions& options)
     return;
   }
   Url url;
-  std::string error;
-  if (!parse_url(address, &url, &error)) {
-    options_.address = url.bare;
-    error_ = error;
-    return;
-  }
-  if ((url.scheme != "tcp" && url.scheme != "udp") || url.host.empty() || url.port.empty() ||
-      !(url.path.empty() || url.path == "/") || !url.user.empty() || !url.password.empty()) {
+  const bool is_url = parse_link_url(address, &url);
+  if (!is_url) {
     options_.address = url.bare;
     error_ = "expected a path such as /dev/ttyUSB0, or tcp://host:port, or udp://host:port";
     return;
@@ -117,10 +130,6 @@ void ByteLink::stop() {
   if (stop_fd_ >= 0) {
     static_cast<void>(::eventfd_write(stop_fd_, 1));
   }
-}
-
-double ByteLink::byte_time_s() const {
-  return kind_ == Kind::kSerial ? kBitsPerByte / options_.baud : 0;
 }
 
 LinkStatus ByteLink::lost(const std::string& error) {

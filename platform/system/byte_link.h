@@ -31,6 +31,12 @@ enum class LinkStatus {
 // Whether a serial line can have this speed here.
 [[nodiscard]] bool is_baud(int baud);
 
+// Of one byte on the wire; 0 but for a serial line.
+[[nodiscard]] double wire_time_of_byte_s(const ByteLinkOptions& options);
+
+// Whether this is tcp://host:port or udp://host:port, without a user, a password or a path.
+[[nodiscard]] bool is_byte_link_url(const std::string& text);
+
 class ByteLink {
  public:
   explicit ByteLink(const ByteLinkOptions& options);
@@ -52,7 +58,6 @@ class ByteLink {
   void stop();  // every later call that could wait returns kStopped
 
   [[nodiscard]] bool is_datagram() const { return kind_ == Kind::kUdp; }
-  [[nodiscard]] double byte_time_s() const;  // on the wire; 0 but for a serial line
   // What is wrong, without the link's name; valid after kLost and kUnusable.
   [[nodiscard]] const std::string& error() const { return error_; }
   [[nodiscard]] const std::string& name() const { return options_.address; }

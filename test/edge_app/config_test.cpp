@@ -166,6 +166,62 @@ TEST_F(ConfigTest, MjpegAndOnvifSourcesAreRead) {
   EXPECT_FALSE(config_.pan_tilt.pan_range_deg);
 }
 
+#define CAMERA "camera: {focal_length_px: 1000}\n"
+#define RTSP "video: {type: rtsp, url: rtsp://camera/stream}\n"
+
+TEST_F(ConfigTest, PelcoDHasTheProtocolsOwnUnitsAndRate) {
+  ASSERT_THAT(load(RTSP "pan_tilt: {type: pelco_d, device: /dev/ttyUSB0}\n" CAMERA), IsEmpty());
+  const PanTiltConfig& pan_tilt = config_.pan_tilt;
+  EXPECT_EQ(pan_tilt.type, PanTiltConfig::Type::kHead);
+  EXPECT_EQ(pan_tilt.head.link.address, "/dev/ttyUSB0");
+  EXPECT_EQ(pan_tilt.head.link.baud, 9600);
+  EXPECT_EQ(pan_tilt.head.pan.sign, 1);
+  EXPECT_EQ(pan_tilt.head.tilt.sign, -1);
+  EXPECT_EQ(pan_tilt.rate_hz, 30);
+  const auto& pelco_d = std::get<PelcoDOptions>(pan_tilt.head.protocol);
+  EXPECT_EQ(pelco_d.address, 1);
+  EXPECT_EQ(pelco_d.tilt_deg_per_step, 0.01);
+  EXPECT_STREQ(make_protocol(pan_tilt.head)->name(), "Pelco-D");
+  ASSERT_THAT(load(RTSP "pan_tilt: {type: pelco_d, device: line, baud: 2400, address: 3,\n"
+                        "  tilt_positive: up, pan_positive: left, pan_zero_deg: 90,\n"
+                        "  read_zoom: true}\n" CAMERA),
+              IsEmpty());
+  EXPECT_EQ(config_.pan_tilt.head.link.address, directory_.path() + "/line");
+  EXPECT_EQ(config_.pan_tilt.head.pan.sign, -1);
+  EXPECT_EQ(config_.pan_tilt.head.pan.zero_deg, 90);
+  EXPECT_EQ(config_.pan_tilt.head.tilt.sign, 1);
+  EXPECT_NEAR(config_.pan_tilt.rate_hz, 2400.0 / 280, 1e-9);
+  EXPECT_EQ(std::get<PelcoDOptions>(config_.pan_tilt.head.protocol).address, 3);
+  EXPECT_TRUE(std::get<PelcoDOptions>(config_.pan_tilt.head.protocol).read_zoom);
+}
+
+TEST_F(ConfigTest, ViscaAndPtuAreRead) {
+  ASSERT_THAT(load(RTSP "pan_tilt: {type: visca, url: 'udp://camera:52381', header: true,\n"
+                        "  pan_deg_per_step: 0.0042, tilt_deg_per_step: 0.00195,\n"
+                        "  pan_positive: right, tilt_positive: up, rate_hz: 100}\n" CAMERA),
+              IsEmpty());
+  const auto& visca = std::get<ViscaOptions>(config_.pan_tilt.head.protocol);
+  EXPECT_EQ(config_.pan_tilt.head.link.address, "udp://camera:52381");
+  EXPECT_TRUE(visca.header);
+  EXPECT_EQ(visca.pan_deg_per_step, 0.0042);
+  EXPECT_EQ(visca.tilt_deg_per_step, 0.00195);
+  EXPECT_EQ(config_.pan_tilt.rate_hz, 100);
+  EXPECT_STREQ(make_protocol(config_.pan_tilt.head)->name(), "VISCA");
+  ASSERT_THAT(load(RTSP "pan_tilt: {type: ptu, url: 'tcp://10.0.0.2:4000', feedback: terse,\n"
+                        "  pan_positive: left, tilt_positive: up}\n" CAMERA),
+              IsEmpty());
+  const auto& ptu = std::get<PtuOptions>(config_.pan_tilt.head.protocol);
+  EXPECT_FALSE(ptu.verbose);
+  EXPECT_FALSE(ptu.pan_deg_per_step);
+  EXPECT_EQ(config_.pan_tilt.head.pan.sign, -1);
+  EXPECT_STREQ(make_protocol(config_.pan_tilt.head)->name(), "PTU");
+}
+
+TEST_F(ConfigTest, TheExampleOfHeadsIsRead) {
+  std::string error;
+  EXPECT_TRUE(load_config(ALIDADE_HEAD_EXAMPLE, &config_, &error)) << error;
+}
+
 TEST_F(ConfigTest, TheExampleIsReadAndShowsTheDefaults) {
   ::setenv("CAMERA_PASSWORD", "secret", 1);
   Config example;
@@ -259,9 +315,38 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"PlannedVideoType", "video: {type: v4l2, device: /dev/video0}\n" PAN_TILT,
                 ":1: video.type",
                 "'v4l2' is not available in this version; available: rtsp, rtp, mjpeg, recording"},
-        Mistake{"PlannedPanTiltType", VIDEO "pan_tilt: {type: pelco_d, baud: 9600}\n",
-                ":2: pan_tilt.type",
-                "'pelco_d' is not available in this version; available: vapix, onvif, recording"},
+        Mistake{"HeadWithoutLine", VIDEO "pan_tilt: {type: pelco_d}\n", ":2: pan_tilt.device",
+                "is missing; expected for example device: /dev/ttyUSB0, or url: tcp://"},
+        Mistake{"HeadOnTwoLines", VIDEO "pan_tilt: {type: ptu, device: /dev/x, url: tcp://h:1}\n",
+                ":2: pan_tilt.url", "stands beside device; keep one"},
+        Mistake{"HeadWithoutPort", VIDEO "pan_tilt: {type: ptu, url: tcp://head}\n",
+                ":2: pan_tilt.url", "is not an address tcp://host:port or udp://host:port"},
+        Mistake{"OddBaud", VIDEO "pan_tilt: {type: pelco_d, device: /dev/x, baud: 9601}\n",
+                ":2: pan_tilt.baud", "is no speed of a serial line"},
+        Mistake{"BaudOfASocket", VIDEO "pan_tilt: {type: pelco_d, url: tcp://h:1, baud: 9600}\n",
+                ":2: pan_tilt.baud", "unknown key"},
+        Mistake{"MoreThanTheLineCarries",
+                VIDEO "pan_tilt: {type: pelco_d, device: /dev/x, baud: 2400, rate_hz: 10}\n",
+                ":2: pan_tilt.rate_hz",
+                "10 Hz is more than the line carries at 2400 baud; expected at most 8.6"},
+        Mistake{"ViscaWithoutSteps", VIDEO "pan_tilt: {type: visca, device: /dev/x}\n",
+                ":2: pan_tilt.pan_deg_per_step", "is missing; expected the model's"},
+        Mistake{"ViscaOfUdpWithoutHeader",
+                VIDEO "pan_tilt: {type: visca, url: udp://c:1, pan_deg_per_step: 0.01,\n"
+                      "  tilt_deg_per_step: 0.01}\n",
+                ":2: pan_tilt.header", "is missing; expected true (datagrams begin with"},
+        Mistake{"ViscaHeaderOfASerialLine",
+                VIDEO "pan_tilt: {type: visca, device: /dev/x, pan_deg_per_step: 0.01,\n"
+                      "  tilt_deg_per_step: 0.01, pan_positive: right, tilt_positive: up,\n"
+                      "  header: true}\n",
+                ":4: pan_tilt.header", "unknown key"},
+        Mistake{"ViscaAddress", VIDEO "pan_tilt: {type: visca, device: /dev/x, address: 8}\n",
+                ":2: pan_tilt.address", "from 1 to 7"},
+        Mistake{"PtuWithoutSigns", VIDEO "pan_tilt: {type: ptu, device: /dev/x}\n",
+                ":2: pan_tilt.pan_positive",
+                "is missing; expected right or left: where the head turns while its pan grows"},
+        Mistake{"SignIsANumber", VIDEO "pan_tilt: {type: ptu, device: /dev/x, pan_positive: -1}\n",
+                ":2: pan_tilt.pan_positive", "expected one of right, left"},
         Mistake{"UnknownMode", MINIMAL "realtime: {mode: OF}\n", ":4: realtime.mode",
                 "'OF' is unknown; expected one of OE, PT"},
         Mistake{"PlannedHttp", MINIMAL "output: {http: '127.0.0.1:8080'}\n", ":4: output.http",

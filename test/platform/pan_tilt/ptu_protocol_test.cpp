@@ -105,7 +105,7 @@ std::string start(PtuProtocol& protocol, bool steps) {
 }
 
 TEST(PtuProtocol, AsksTheDeviceForItsStepsUntilItSaysTheSameTwice) {
-  PtuProtocol protocol({});
+  PtuProtocol protocol({false, {}, {}});
   EXPECT_EQ(start(protocol, true), "PP ");
   Answer answer = protocol.find("* -100\r\n");
   ASSERT_EQ(answer.kind, Answer::Kind::kPan);

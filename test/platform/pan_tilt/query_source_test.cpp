@@ -30,7 +30,7 @@ constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 constexpr HeadKind kKinds[] = {
     HeadKind::kPelcoDSerial, HeadKind::kPelcoDTcp, HeadKind::kViscaSerial,
     HeadKind::kViscaTcp,     HeadKind::kViscaUdp,  HeadKind::kViscaUdpHeader,
-    HeadKind::kPtuSerial,    HeadKind::kPtuTcp,    HeadKind::kPtuVerboseSerial};
+    HeadKind::kPtuSerial,    HeadKind::kPtuTcp,    HeadKind::kPtuTerseSerial};
 
 double difference_deg(double a_rad, double b_deg) {
   return std::abs(std::remainder(a_rad / kRadPerDeg - b_deg, 360));
@@ -166,10 +166,11 @@ TEST_P(QuerySourceTest, LosesOnlyAnswersToALineWithFaults) {
     SCOPED_TRACE(static_cast<int>(fault));
     rig.server().fault = fault;
     rig.server().faults = 0;
-    // Without a sum or a sequence of their own, digits of a PTU and nibbles of VISCA can change
-    // unseen.
-    const bool unseen = (fault == LineFault::kChangedByte && !is_pelco_d(GetParam())) ||
-                        (fault == LineFault::kLostByte && is_ptu(GetParam()));
+    // Digits of a PTU and nibbles of VISCA have no sum, and terse answers no name.
+    const bool unseen =
+        (fault == LineFault::kRepeated && GetParam() == HeadKind::kPtuTerseSerial) ||
+        (fault == LineFault::kChangedByte && !is_pelco_d(GetParam())) ||
+        (fault == LineFault::kLostByte && is_ptu(GetParam()));
     const double end_s = monotonic_now_s() + kDeadline_s;
     int samples = 0;
     while ((samples < 5 || rig.server().faults < 4) && monotonic_now_s() < end_s) {

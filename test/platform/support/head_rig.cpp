@@ -58,8 +58,8 @@ const char* to_string(HeadKind kind) {
       return "PtuSerial";
     case HeadKind::kPtuTcp:
       return "PtuTcp";
-    case HeadKind::kPtuVerboseSerial:
-      return "PtuVerboseSerial";
+    case HeadKind::kPtuTerseSerial:
+      return "PtuTerseSerial";
   }
   return "";
 }
@@ -70,7 +70,7 @@ bool is_pelco_d(HeadKind kind) {
 
 bool is_ptu(HeadKind kind) {
   return kind == HeadKind::kPtuSerial || kind == HeadKind::kPtuTcp ||
-         kind == HeadKind::kPtuVerboseSerial;
+         kind == HeadKind::kPtuTerseSerial;
 }
 
 HeadRig::HeadRig(HeadKind kind, std::function<HeadPosition()> position)
@@ -96,7 +96,7 @@ std::unique_ptr<QueryProtocol> HeadRig::protocol() const {
   }
   if (is_ptu(kind_)) {
     PtuOptions options;
-    options.verbose = kind_ == HeadKind::kPtuVerboseSerial;
+    options.verbose = kind_ != HeadKind::kPtuTerseSerial;
     return std::make_unique<PtuProtocol>(options);
   }
   ViscaOptions options;

@@ -19,7 +19,7 @@ enum class HeadKind {
   kViscaUdpHeader,
   kPtuSerial,
   kPtuTcp,
-  kPtuVerboseSerial
+  kPtuTerseSerial
 };
 
 const char* to_string(HeadKind kind);
