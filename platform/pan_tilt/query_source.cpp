@@ -138,18 +138,23 @@ ReadStatus QuerySource::ask(double now_s) {
   if (query.paced) {
     due_s_ = std::max(due_s_ + poll_period_s_, now_s);
   }
-  if (!failing_since_s_) {
-    failing_since_s_ = sent_s_;
-  }
   state_ = State::kAsked;
   until_s_ = sent_s_ + options_.timeout_s / kTriesPerTimeout;
   return ReadStatus::kOk;
 }
 
 ReadStatus QuerySource::give_up(double now_s) {
-  if (now_s - *failing_since_s_ >= options_.timeout_s) {
-    return disconnect(problem_.empty() ? std::string("no answer of ") + protocol_->name() +
-                                             "; check power, wiring, address and baud or port"
+  if (given_up_ == 0) {
+    failing_since_s_ = sent_s_;
+    some_answered_ = false;
+  }
+  ++given_up_;
+  if (given_up_ >= kTriesPerTimeout && now_s - failing_since_s_ >= options_.timeout_s) {
+    const std::string silence =
+        some_answered_
+            ? std::string(": not every query is answered; does the head tell both pan and tilt?")
+            : std::string("; check power, wiring, address and baud or port");
+    return disconnect(problem_.empty() ? std::string("no answer of ") + protocol_->name() + silence
                                        : problem_);
   }
   pairing_.reset();
@@ -201,7 +206,7 @@ bool QuerySource::take_bytes(const std::string& bytes, double now_s, PanTiltSamp
     return false;
   }
   problem_.clear();
-  failing_since_s_.reset();
+  some_answered_ = true;
   return take_reading(answer, sent_s_, arrivals_s_[answer.begin], sample);
 }
 
@@ -239,6 +244,7 @@ bool QuerySource::take_reading(const Answer& answer, double earliest_s, double l
   sample->zoom = zoom_;
   sample->restarted = std::exchange(restarted_, false);
   backoff_.reset();
+  given_up_ = 0;
   return true;
 }
 
@@ -264,7 +270,7 @@ ReadStatus QuerySource::read(PanTiltSample& sample, double timeout_s) {
           pairing_.reset();
           zoom_.reset();
           problem_.clear();
-          failing_since_s_.reset();
+          given_up_ = 0;
           due_s_ = now_s;
           settle(now_s);
         } else if (take_bytes(bytes, now_s, &sample)) {

@@ -3,16 +3,16 @@
 //
 // Polls lie on a grid of rate_hz, or of what a serial line can carry if that is less. One query is under
 // way at a time: an answer later than that shifts the grid, for a head that cannot keep up is asked as
-// often as it answers. What was true lies between the sending of the query and the first byte of the answer. A query
-// without answer is given up after a quarter of timeout_s. Then, after bytes that nobody asked for, and
-// now and then where answers do not name their query, the source waits until the line is silent, so
-// that no late or surplus answer is taken for the next one, at least not for long. Protocols that give one axis at a time
-// yield a sample for each tilt, with the pan of the same moment (AxisPairing). Signs and zeros turn
-// what the device counts into the axes of the model, in [-pi, pi).
+// often as it answers. What an answer tells was true between the sending of the query and the answer's
+// first byte. A query without answer is given up after a quarter of timeout_s. Then, after bytes that
+// nobody asked for, and now and then where answers do not name their query, the source waits until the
+// line is silent, so that no late or surplus answer is taken for the next one, at least not for long.
+// Protocols that give one axis at a time yield a sample for each tilt, with the pan of the same moment
+// (AxisPairing). Signs and zeros turn what the device counts into the axes of the model, in [-pi, pi).
 //
-// kDisconnected: no link, or no reading within timeout_s; error() says what came instead. The link is
-// then closed and opened again after a growing pause. kFailed: an address or a device that can never
-// work. read() talks on the calling thread; it allocates.
+// kDisconnected: no link, or no sample within timeout_s and four queries given up; error() says what
+// came instead. The link is then closed and opened again after a growing pause. kFailed: an address or a
+// device that can never work. read() talks on the calling thread; it allocates.
 
 #include <atomic>
 #include <memory>
@@ -38,7 +38,7 @@ struct QuerySourceOptions {
   AxisMapping pan;
   AxisMapping tilt;
   double rate_hz = 30;
-  double timeout_s = 1;      // without a reading: the head is lost
+  double timeout_s = 1;      // without a sample: the head is lost
   double max_backoff_s = 5;  // longest pause between two tries
 };
 
@@ -86,7 +86,9 @@ class QuerySource : public PanTiltSource {
   double due_s_ = 0;  // of the next try or the next poll
   double until_s_ = 0;
   double quiet_s_ = 0;
-  std::optional<double> failing_since_s_;  // the first query since the latest reading
+  int given_up_ = 0;            // queries since the latest sample
+  double failing_since_s_ = 0;  // when the first of them was sent
+  bool some_answered_ = false;  // since then
   bool restarted_ = true;
   std::string problem_;  // what came instead of a reading, lately
 

@@ -301,6 +301,11 @@ TEST(QuerySource, SaysWhatAnswersInPlaceOfTheHead) {
   EXPECT_THAT(error_of(std::make_unique<PelcoDProtocol>(seven), HeadServer::Link::kSerial,
                        std::make_unique<PelcoDHead>(position)),
               HasSubstr("no answer of Pelco-D; check power, wiring, address and baud"));
+  auto pan_only = std::make_unique<PelcoDHead>(position);
+  pan_only->knows_tilt = false;
+  EXPECT_THAT(error_of(std::make_unique<PelcoDProtocol>(PelcoDOptions{}), HeadServer::Link::kSerial,
+                       std::move(pan_only)),
+              HasSubstr("does the head tell both pan and tilt?"));
   auto refusing = std::make_unique<ViscaHead>(position);
   refusing->error = 0x41;
   EXPECT_THAT(error_of(std::make_unique<ViscaProtocol>(ViscaOptions{}), HeadServer::Link::kUdp,

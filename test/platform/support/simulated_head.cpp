@@ -43,7 +43,8 @@ std::vector<std::string> PelcoDHead::take(const std::string& bytes) {
     const long to = byte_at(received_, 1);
     const long command = byte_at(received_, 3);
     received_.erase(0, 7);
-    if (to != address || (command != 0x51 && command != 0x53 && command != 0x55)) {
+    if (to != address || (command == 0x53 && !knows_tilt) ||
+        (command != 0x51 && command != 0x53 && command != 0x55)) {
       continue;
     }
     const HeadPosition now = position_();

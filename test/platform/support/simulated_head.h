@@ -38,6 +38,7 @@ struct PelcoDHead : SimulatedHead {
   std::vector<std::string> take(const std::string& bytes) override;
   std::string unsolicited() override;
   int address;
+  bool knows_tilt = true;  // a query that a head does not know gets no answer
 };
 
 struct ViscaHead : SimulatedHead {
