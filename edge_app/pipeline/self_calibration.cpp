@@ -391,6 +391,9 @@ Checked SelfCalibration::State::adjust(const Calibration* known) const {
   std::vector<std::string> remarks;
   add_frames(std::move(stamps), &all, &adjustment, &remarks);
   add_telemetry({telemetry.begin(), telemetry.end()}, &all, &adjustment, &remarks);
+  // What all polls have in common is in the published clock offset as in the new data: no two of them
+  // average it out.
+  const double common_s = std::exchange(all.noise.telemetry_common_sigma_s, 0.0);
   if (known != nullptr) {
     const auto prior = [&](double value, Parameter p) {
       return CalibrationPrior{value, kPriorInflation * sigma_of(*known, p)};
@@ -399,8 +402,13 @@ Checked SelfCalibration::State::adjust(const Calibration* known) const {
     adjustment.radial_distortion =
         prior(known->camera.radial_distortion, Parameter::kRadialDistortion);
     adjustment.line_delay = prior(known->line_delay, Parameter::kLineDelay);
-    if (clock_offset_known)
-      adjustment.clock_offset = prior(known->clock_offset, Parameter::kClockOffset);
+    if (clock_offset_known) {
+      constexpr double kLeastOwn = 0.2;
+      const double sigma_s = sigma_of(*known, Parameter::kClockOffset);
+      const double own_s = std::sqrt(
+          std::max(sigma_s * sigma_s - common_s * common_s, std::pow(kLeastOwn * sigma_s, 2)));
+      adjustment.clock_offset = CalibrationPrior{known->clock_offset, kPriorInflation * own_s};
+    }
     adjustment.pan_axis = known->mechanics.pan_axis;
     adjustment.tilt_axis = known->mechanics.tilt_axis;
     adjustment.axis_sigma_rad = 0;
@@ -444,6 +452,8 @@ Checked SelfCalibration::State::adjust(const Calibration* known) const {
   // that err alike.
   const double excess = std::max(1.0, checked.hold_out / unit);
   result.calibration.covariance *= excess * excess;
+  const int d = index(Parameter::kClockOffset);
+  result.calibration.covariance(d, d) += common_s * common_s;
   result.calibration.zoom = zoom;
   return checked;
 }

@@ -85,6 +85,7 @@ struct Feed {
   bool restarts = false;  // the first frame is of a new connection
   double contradicting_from_s = std::numeric_limits<double>::infinity();
   std::int64_t first_frame = 0;
+  double poll_s = 0;  // so long before its stamp a sample was asked for; 0: it came by itself
 };
 
 std::vector<Published> feed(SelfCalibration* calibration, const test::Simulation& s,
@@ -104,10 +105,11 @@ std::vector<Published> feed(SelfCalibration* calibration, const test::Simulation
          ++next_sample) {
       const CalibrationTelemetry& from = input.telemetry[next_sample];
       PanTiltSample sample;
-      sample.earliest_time_s = sample.latest_time_s = how.from_s + from.stamp_s;
+      sample.latest_time_s = how.from_s + from.stamp_s;
+      sample.earliest_time_s = sample.latest_time_s - how.poll_s;
       sample.pan_rad = from.pan_rad;
       sample.tilt_rad = from.tilt_rad;
-      sample.sequence = from.sequence;
+      if (how.poll_s == 0) sample.sequence = from.sequence;
       sample.zoom = how.zoom;
       calibration->add(sample);
     }
@@ -247,6 +249,25 @@ TEST(SelfCalibration, LaterMotionRefinesWhatIsKnown) {
   const Calibration& after = refined.back().calibration->calibration;
   expect_truth(s, after);
   EXPECT_LT(after.covariance(0, 0), before.covariance(0, 0));
+}
+
+// Where in its interval a device answers, it does so in every poll, however many there are.
+TEST(SelfCalibration, RefiningDoesNotAverageOutWhatAllPollsHaveInCommon) {
+  test::Simulation s = camera();
+  s.duration_s = 40;
+  Feed polls;
+  polls.poll_s = 6e-3;
+  SelfCalibration calibration(options_for(s), nullptr);
+  const std::vector<Published> published = feed(&calibration, s, polls);
+  ASSERT_GE(published.size(), 2U);
+  const int d = index(Parameter::kClockOffset);
+  for (const Published& p : published) {
+    const Calibration& found = p.calibration->calibration;
+    const double sigma_s = std::sqrt(found.covariance(d, d));
+    EXPECT_GE(sigma_s, polls.poll_s / std::sqrt(12.0));
+    // The samples were true at the end of their intervals.
+    EXPECT_LT(std::abs(test::calibration_error(s, found)[d]), 3 * sigma_s);
+  }
 }
 
 TEST(SelfCalibration, ReplacesTheCalibrationOfACameraThatWasTurnedOnItsMount) {
