@@ -1,8 +1,7 @@
 // `alidade replay`: the real-time step over a recording, on one thread: telemetry up to a frame's
 // receive time is known when the frame is answered, and nothing later is. So the answer is what
 // a live step would have given, and the same in each replay.
-// In OE mode pictures are decoded besides; a frame whose picture cannot be is answered from telemetry. As live, it
-// begins with the map that the calibration names, if there is one.
+// In OE mode pictures are decoded besides; a frame whose picture cannot be is answered from telemetry.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -21,7 +20,6 @@
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
-#include "edge_app/config/calibration_store.h"
 #include "edge_app/config/noise_file.h"
 #include "edge_app/output/record_writer.h"
 #include "edge_app/pipeline/latency_histogram.h"
@@ -100,19 +98,6 @@ void check_size(const RecordingInfo& info, const NamedCalibration& calibration,
       fmt::format(
           "{}: frames of {}x{} px, but {} is for {}x{} px; name the calibration of this size",
           recording, info.width, info.height, calibration.name, camera.width, camera.height));
-}
-
-// What OE mode begins with; empty if there is no map that can be used.
-MapState find_map(const NamedCalibration& calibration) {
-  MapState map;
-  std::string error;
-  if (!load_map_of(calibration.name, calibration.calibration, &map, &error)) {
-    spdlog::warn("{}; OE mode begins with an empty map", error);
-  } else if (!map.landmarks.empty()) {
-    spdlog::info("{}: OE mode begins with its map of {} landmarks", calibration.name,
-                 map.landmarks.size());
-  }
-  return map;
 }
 
 // The next item of a recording; empty at its end.
@@ -223,10 +208,7 @@ int replay(const ReplayOptions& options) {
   if (!load_noise(options.recording, &noise, &error)) throw CommandError(kExitFailed, error);
   const std::unique_ptr<Pictures> pictures = open_pictures(options);
   OrientationStepOptions of_step = step_options(noise, calibration);
-  if (pictures) {
-    of_step.oe = oe_options(calibration.calibration.camera);
-    of_step.map = find_map(calibration);
-  }
+  if (pictures) of_step.oe = oe_options(calibration.calibration.camera);
   OrientationStep step(of_step);
 
   StopSignals signals;
@@ -288,8 +270,7 @@ void register_replay(CLI::App& app, int* exit_code) {
   command->add_option("-o,--output", options->directory,
                       "Directory for orientation.csv (default: DIR/alidade)");
   command->add_option("--calibration", options->calibration,
-                      "Calibration (default: DIR/alidade/calibration.yaml); in OE mode with the "
-                      "map that it names, if that stands beside it");
+                      "Calibration (default: DIR/alidade/calibration.yaml)");
   command
       ->add_option("--mode", options->mode,
                    "OE or PT (default: OE if the recording has pictures, PT if not)")

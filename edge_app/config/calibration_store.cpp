@@ -133,17 +133,6 @@ std::string zoom_text(std::optional<double> zoom) {
 
 }  // namespace
 
-bool load_map_of(const std::string& file, const Calibration& calibration, MapState* map,
-                 std::string* error) {
-  std::string text;
-  fs::path path;
-  MapContent content;
-  if (!read_file(file, &text, error) || !find_map(file, text, &path, error)) return false;
-  if (!path.empty() && !load_map(path.string(), calibration, &content, error)) return false;
-  *map = std::move(content.map);
-  return true;
-}
-
 CalibrationStore::CalibrationStore(std::string file, double zoom_tolerance)
     : file_(std::move(file)), zoom_tolerance_(std::max(zoom_tolerance, 0.0)) {}
 

@@ -19,11 +19,6 @@
 
 namespace alidade {
 
-// The map that the calibration in `file` names, for a reader that changes nothing: *map is empty if it names
-// none. False with one line if the map is not there, damaged, or made with another calibration than this.
-[[nodiscard]] bool load_map_of(const std::string& file, const Calibration& calibration,
-                               MapState* map, std::string* error);
-
 class CalibrationStore final : public CalibrationArchive {
  public:
   // file: the configuration's calibration.file; its folder is created at the first save.

@@ -57,7 +57,6 @@ class ReplayVideoTest : public ::testing::Test {
   }
   static void TearDownTestSuite() { rendered_.reset(); }
 
-  static std::string rendered(const std::string& name) { return rendered_->read(name); }
   static std::string recording() { return rendered_->path() + "/recording"; }
   // One's own, to spoil.
   std::string copy_of_recording() {
@@ -65,30 +64,22 @@ class ReplayVideoTest : public ::testing::Test {
     return directory_.path() + "/copy";
   }
 
-  Result replay_with(const std::string& calibration, const std::string& recording,
-                     const std::vector<std::string>& more = {}) {
-    std::vector<std::string> arguments = {"replay",    recording, "--calibration",
-                                          calibration, "-o",      directory_.path() + "/out"};
+  // Replays with the true calibration.
+  Result replay(const std::string& recording, const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {"replay",
+                                          recording,
+                                          "--calibration",
+                                          recording + "/truth.yaml",
+                                          "-o",
+                                          directory_.path() + "/out"};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return alidade(arguments);
   }
-  // Replays with the true calibration.
-  Result replay(const std::string& recording, const std::vector<std::string>& more = {}) {
-    return replay_with(recording + "/truth.yaml", recording, more);
-  }
   Rows records() { return read_csv(directory_.read("out/orientation.csv")); }
-
-  // A calibration of the recording, whose map stands beside it.
-  std::string calibration_with_map() {
-    const Result result =
-        calibrate_command({recording(), "--passes", "1", "-o", directory_.path() + "/found"});
-    EXPECT_EQ(result.exit_code, 0) << result.errors;
-    return directory_.path() + "/found/calibration.yaml";
-  }
 
   // Root mean square of the angles' distance from truth, without what all have in common, from 1 s on. px
   static double spread(const Rows& rows, const std::string& angle) {
-    const Rows truth = read_csv(rendered("recording/truth.csv"));
+    const Rows truth = read_csv(rendered_->read("recording/truth.csv"));
     std::vector<double> errors;
     for (std::size_t i = 13; i < rows.size(); ++i) {
       EXPECT_EQ(rows[i].at("frame"), truth.at(i).at("frame"));
@@ -152,50 +143,6 @@ TEST_F(ReplayVideoTest, GivesTheSameBytesAgain) {
   ASSERT_EQ(again.exit_code, 0) << again.errors;
   EXPECT_EQ(directory_.read("out/orientation.csv"), once);
   EXPECT_EQ(again.output, once);
-}
-
-TEST_F(ReplayVideoTest, BeginsWithTheMapThatTheCalibrationNames) {
-  const std::string calibration = calibration_with_map();
-  const Result result = replay_with(calibration, recording());
-  ASSERT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.errors, AllOf(HasSubstr(calibration + ": OE mode begins with its map of "),
-                                   Not(HasSubstr("empty map"))));
-  const Rows rows = records();
-  ASSERT_EQ(rows.size(), static_cast<std::size_t>(kFrames));
-  EXPECT_EQ(rows.front().at("mode"), "OE");
-  EXPECT_GE(std::stoi(rows.front().at("landmarks")), 20);
-  // Twice the same: the map on disk has not learnt from the first time.
-  const std::string once = directory_.read("out/orientation.csv");
-  ASSERT_EQ(replay_with(calibration, recording()).exit_code, 0);
-  EXPECT_EQ(directory_.read("out/orientation.csv"), once);
-
-  const Result pt = replay_with(calibration, recording(), {"--mode", "PT"});
-  ASSERT_EQ(pt.exit_code, 0) << pt.errors;
-  EXPECT_THAT(pt.errors, Not(HasSubstr("map")));
-}
-
-TEST_F(ReplayVideoTest, GoesOnWithoutAMapThatIsOfNoUse) {
-  const std::string calibration = calibration_with_map();
-  const std::string map = directory_.path() + "/found/map.bin";
-  // Of the same size: only the checks tell.
-  const std::string other = directory_.write(
-      "found/other.yaml", rendered("recording/truth.yaml") + "\nlandmarks: map.bin\n");
-  const auto expect_empty_map = [&](const std::string& with, const std::string& why) {
-    const Result result = replay_with(with, recording());
-    ASSERT_EQ(result.exit_code, 0) << result.errors;
-    EXPECT_THAT(result.errors, HasSubstr(why + "; OE mode begins with an empty map\n"));
-    EXPECT_EQ(records().front().at("status"), "too few landmarks");
-    EXPECT_EQ(records()[1].at("mode"), "OE");
-  };
-  expect_empty_map(other, map +
-                              ": belongs to another calibration than the one it stands beside; "
-                              "calibrate again");
-  // A replay reads: what it cannot use stays where it is.
-  fs::resize_file(map, fs::file_size(map) / 2);
-  expect_empty_map(calibration, "cut off, or damaged; calibrate again");
-  EXPECT_TRUE(fs::exists(map));
-  fs::remove(map);
-  expect_empty_map(calibration, calibration + ": its map map.bin is missing");
 }
 
 TEST_F(ReplayVideoTest, AnswersFramesWithoutAPictureFromTelemetry) {
