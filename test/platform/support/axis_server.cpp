@@ -1,6 +1,5 @@
 #include "test/platform/support/axis_server.h"
 
-#include <stdexcept>
 #include <utility>
 
 namespace alidade {
@@ -8,25 +7,11 @@ namespace alidade {
 AxisServer::AxisServer(std::string user, std::string password, std::function<std::string()> answer,
                        int port)
     : check_(std::move(user), std::move(password)), answer_(std::move(answer)) {
-  server_.set_keep_alive_max_count(1'000'000);
-  server_.set_tcp_nodelay(true);
-  server_.Get("/axis-cgi/com/ptz.cgi",
-              [this](const httplib::Request& request, httplib::Response& response) {
-                serve_position(request, response);
-              });
-  port_ = port == 0 ? server_.bind_to_any_port("127.0.0.1") : port;
-  if (port != 0 && !server_.bind_to_port("127.0.0.1", port)) {
-    throw std::runtime_error("the port is taken");
-  }
-  thread_ = std::thread([this] { server_.listen_after_bind(); });
-  while (!server_.is_running()) {
-    std::this_thread::yield();
-  }
-}
-
-AxisServer::~AxisServer() {
-  server_.stop();
-  thread_.join();
+  server_.handlers().Get("/axis-cgi/com/ptz.cgi",
+                         [this](const httplib::Request& request, httplib::Response& response) {
+                           serve_position(request, response);
+                         });
+  server_.listen(port);
 }
 
 std::string AxisServer::last_query() const {

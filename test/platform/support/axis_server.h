@@ -9,9 +9,9 @@
 #include <mutex>
 #include <set>
 #include <string>
-#include <thread>
 
 #include "test/platform/support/digest_check.h"
+#include "test/platform/support/loopback_http_server.h"
 
 namespace alidade {
 
@@ -20,12 +20,11 @@ class AxisServer {
   // user empty: no authentication. port 0: any. answer makes the body of a position request.
   AxisServer(std::string user, std::string password, std::function<std::string()> answer,
              int port = 0);
-  ~AxisServer();
   AxisServer(const AxisServer&) = delete;
   AxisServer& operator=(const AxisServer&) = delete;
 
-  int port() const { return port_; }
-  std::string url() const { return "http://127.0.0.1:" + std::to_string(port_); }
+  int port() const { return server_.port(); }
+  std::string url() const { return server_.url(); }
 
   std::atomic<int> status{200};  // of a position request that is let through
   std::atomic<int> refusals{0};  // answers 401
@@ -38,12 +37,10 @@ class AxisServer {
 
   DigestCheck check_;
   std::function<std::string()> answer_;
-  httplib::Server server_;
-  int port_;
   mutable std::mutex mutex_;
   std::string last_query_;
   std::set<int> client_ports_;
-  std::thread thread_;
+  LoopbackHttpServer server_;  // last: its thread uses the others
 };
 
 }  // namespace alidade

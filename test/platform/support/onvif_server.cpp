@@ -5,7 +5,6 @@
 #include <cmath>
 #include <ctime>
 #include <regex>
-#include <stdexcept>
 #include <utility>
 
 namespace alidade {
@@ -39,24 +38,11 @@ OnvifServer::OnvifServer(OnvifDevice device, int port)
       digest_(device_.user, device_.password,
               device_.login == OnvifDevice::Login::kDigestSha256 ? DigestCheck::Algorithm::kSha256
                                                                  : DigestCheck::Algorithm::kMd5) {
-  server_.set_keep_alive_max_count(1'000'000);
-  server_.set_tcp_nodelay(true);
-  server_.Post("/onvif/.*", [this](const httplib::Request& request, httplib::Response& response) {
-    serve(request, response);
-  });
-  port_ = port == 0 ? server_.bind_to_any_port("127.0.0.1") : port;
-  if (port != 0 && !server_.bind_to_port("127.0.0.1", port)) {
-    throw std::runtime_error("the port is taken");
-  }
-  thread_ = std::thread([this] { server_.listen_after_bind(); });
-  while (!server_.is_running()) {
-    std::this_thread::yield();
-  }
-}
-
-OnvifServer::~OnvifServer() {
-  server_.stop();
-  thread_.join();
+  server_.handlers().Post("/onvif/.*",
+                          [this](const httplib::Request& request, httplib::Response& response) {
+                            serve(request, response);
+                          });
+  server_.listen(port);
 }
 
 void OnvifServer::set_fault(const std::string& code, const std::string& reason) {

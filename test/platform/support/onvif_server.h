@@ -11,9 +11,9 @@
 #include <mutex>
 #include <set>
 #include <string>
-#include <thread>
 
 #include "test/platform/support/digest_check.h"
+#include "test/platform/support/loopback_http_server.h"
 
 namespace alidade {
 
@@ -35,12 +35,11 @@ struct OnvifDevice {
 class OnvifServer {
  public:
   explicit OnvifServer(OnvifDevice device = {}, int port = 0);
-  ~OnvifServer();
   OnvifServer(const OnvifServer&) = delete;
   OnvifServer& operator=(const OnvifServer&) = delete;
 
-  int port() const { return port_; }
-  std::string url() const { return "http://127.0.0.1:" + std::to_string(port_); }
+  int port() const { return server_.port(); }
+  std::string url() const { return server_.url(); }
 
   std::atomic<double> clock_offset_s{0};  // the device's clock less the host's
   std::atomic<bool> password_changed{false};
@@ -61,8 +60,6 @@ class OnvifServer {
 
   OnvifDevice device_;
   DigestCheck digest_;
-  httplib::Server server_;
-  int port_ = 0;
   mutable std::mutex mutex_;  // guards what follows
   std::set<std::string> nonces_;
   std::map<std::string, int> counts_;
@@ -70,7 +67,7 @@ class OnvifServer {
   std::string fault_code_;
   std::string fault_reason_;
   std::set<int> client_ports_;
-  std::thread thread_;
+  LoopbackHttpServer server_;  // last: its thread uses the others
 };
 
 }  // namespace alidade
