@@ -395,8 +395,8 @@ def main():
         ("What it found out",
          f"Against the virtual camera. Frames need {1e3 * delay_s:.2f} ms (median) through the sockets, and answers about pan and tilt "
          f"are true {1e3 * lead_s:.2f} ms after the middle of their polls: a calibration finds both as part of the clock offset, and "
-         "the truth is shifted by them here. Both wander by some tenths of a millisecond with the load of the machine, which no "
-         "sigma of the clock offset knows of.",
+         "the truth is shifted by them here. Both wander by some tenths of a millisecond with the load of the machine, and "
+         "the sigma of the clock offset knows of the polls alone.",
          parameter_table(arguments, delay_s + lead_s), None),
         ("The tag: Table VI of the PTCEE paper",
          f"A tag 64 px wide is found in {len(tags['frames'])} frames of the recording by the AprilTag library, and its centre carried into frame "
