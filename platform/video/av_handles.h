@@ -17,12 +17,14 @@ struct AvDeleter {
   void operator()(AVCodecContext* context) const { avcodec_free_context(&context); }
   void operator()(AVCodecParameters* parameters) const { avcodec_parameters_free(&parameters); }
   void operator()(AVCodecParserContext* parser) const { av_parser_close(parser); }
+  void operator()(AVIOContext* io) const { avio_close(io); }
 };
 
 using PacketPtr = std::unique_ptr<AVPacket, AvDeleter>;
 using FramePtr = std::unique_ptr<AVFrame, AvDeleter>;
 using CodecContextPtr = std::unique_ptr<AVCodecContext, AvDeleter>;
 using CodecParametersPtr = std::unique_ptr<AVCodecParameters, AvDeleter>;
+using AvioPtr = std::unique_ptr<AVIOContext, AvDeleter>;
 using ParserPtr = std::unique_ptr<AVCodecParserContext, AvDeleter>;
 
 inline std::string av_error_text(int code) {

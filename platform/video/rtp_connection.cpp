@@ -4,115 +4,150 @@ extern "C" {
 #include <libavutil/time.h>
 }
 
+#include <algorithm>
+#include <cerrno>
 #include <cmath>
 #include <cstdio>
 #include <cstring>
+#include <fstream>
+#include <sstream>
 #include <utility>
 
 #include "platform/system/clock.h"
 #include "platform/system/url.h"
+#include "platform/video/rtsp_session.h"
 
 namespace alidade {
 namespace {
 
-constexpr int kMaxPicture = 32 << 20;  // bytes of compressed data
-// Given to RTSP's TEARDOWN, so that the camera frees the session.
-constexpr double kGoodbye_s = 0.5;
+constexpr int kMaxPicture = 32 << 20;    // bytes of compressed data
+constexpr int kMaxPacket = 65'536;       // bytes: RTSP's and UDP's lengths have 16 bits
+constexpr int kMaxDescription = 16'384;  // bytes that libavformat reads
 
 // The description that a sender of plain RTP does not send.
 std::string sdp_of(const Url& url, const std::string& format) {
   const bool h264 = format == "H264";
-  return "data:application/sdp,v=0\nc=IN IP4 " + url.host + "\nt=0 0\nm=video " + url.port +
-         " RTP/AVP " + (h264 ? "96\na=rtpmap:96 H264/90000\n" : "26\n");
+  return "v=0\nc=IN IP4 " + url.host + "\nt=0 0\nm=video " + url.port + " RTP/AVP " +
+         (h264 ? "96\na=rtpmap:96 H264/90000\n" : "26\n");
+}
+
+bool read_text(const std::string& path, std::string* text, std::string* error) {
+  std::ifstream file(path, std::ios::binary);
+  std::ostringstream content;
+  content << file.rdbuf();
+  if (!file) *error = std::strerror(errno);
+  *text = content.str();
+  return error->empty();
+}
+
+struct Text {
+  const std::string& text;
+  std::size_t read = 0;
+};
+
+int read_description(void* opaque, std::uint8_t* data, int capacity) {
+  auto* from = static_cast<Text*>(opaque);
+  const std::size_t count =
+      std::min(from->text.size() - from->read, static_cast<std::size_t>(capacity));
+  std::memcpy(data, from->text.data() + from->read, count);
+  from->read += count;
+  return count == 0 ? AVERROR_EOF : static_cast<int>(count);
+}
+
+AVIOContext* make_io(int size, void* opaque, int (*read)(void*, std::uint8_t*, int)) {
+  auto* buffer = static_cast<std::uint8_t*>(av_malloc(static_cast<std::size_t>(size)));
+  return avio_alloc_context(buffer, size, 0, opaque, read, nullptr, nullptr);
 }
 
 }  // namespace
 
-RtpConnection::RtpConnection(const RtpSourceOptions& options, const std::atomic<bool>& stopped)
-    : options_(options), stopped_(stopped) {}
-
-RtpConnection::~RtpConnection() {
-  closing_ = true;
-  deadline_s_ = monotonic_now_s() + kGoodbye_s;
-  avformat_close_input(&format_);
+void RtpConnection::FreeIo::operator()(AVIOContext* io) const {
+  av_freep(&io->buffer);
+  avio_context_free(&io);
 }
 
-int RtpConnection::is_over(void* self) {
-  const auto* connection = static_cast<const RtpConnection*>(self);
-  return (connection->stopped_ && !connection->closing_) ||
-                 monotonic_now_s() > connection->deadline_s_
-             ? 1
-             : 0;
+RtpConnection::RtpConnection(const RtpSourceOptions& options) : options_(options) {
+  Url url;
+  if (options_.url.find("://") == std::string::npos) {
+    std::string sdp;
+    std::string error;
+    if (!read_text(options_.url, &sdp, &error)) {
+      no_transport_ = "no usable SDP description: " + error;
+    }
+    transport_ = std::make_unique<UdpTransport>(sdp);
+  } else if (parse_url(options_.url, &url, &no_transport_) && url.scheme == "rtp") {
+    transport_ = std::make_unique<UdpTransport>(sdp_of(url, options_.format));
+  } else {
+    transport_ = std::make_unique<RtspSession>(options_);
+  }
 }
 
-std::string RtpConnection::why_lost(int code) const {
-  // Whatever libavformat makes of being interrupted.
-  if (code == AVERROR(ETIMEDOUT) || monotonic_now_s() > deadline_s_) {
-    char text[64];
-    std::snprintf(text, sizeof text, "nothing received for %g s", options_.timeout_s);
-    return text;
-  }
-  if (code == AVERROR_EOF) {
-    return "the sender ended the stream";
-  }
-  if (code == AVERROR_HTTP_NOT_FOUND) {
-    return "no such stream on this camera (404)";
-  }
-  if (code == AVERROR_HTTP_OTHER_4XX) {
-    return "the camera refuses to play this stream (4xx); does it hold video?";
-  }
-  return av_error_text(code);
+RtpConnection::~RtpConnection() { avformat_close_input(&format_); }
+
+ReadStatus RtpConnection::nothing_received(std::string* error) const {
+  char text[64];
+  std::snprintf(text, sizeof text, "nothing received for %g s", options_.timeout_s);
+  *error = text;
+  return ReadStatus::kDisconnected;
 }
 
 ReadStatus RtpConnection::open(std::string* error) {
-  Url url;
-  std::string input = options_.url;
-  const AVInputFormat* input_format = nullptr;
-  if (input.find("://") == std::string::npos) {
-    input_format = av_find_input_format("sdp");
-  } else if (!parse_url(options_.url, &url, error)) {
+  if (!no_transport_.empty()) {
+    *error = no_transport_;
     return ReadStatus::kFailed;
-  } else if (url.scheme == "rtp") {
-    input_format = av_find_input_format("sdp");
-    input = sdp_of(url, options_.format);
-  } else {
-    input = with_credentials(options_.url, options_.user, options_.password);
   }
+  std::string sdp;
+  const ReadStatus status = transport_->open(monotonic_now_s() + options_.timeout_s, &sdp, error);
+  if (status == ReadStatus::kTimeout) return nothing_received(error);
+  return status == ReadStatus::kOk ? open_demuxer(sdp, error) : status;
+}
 
+ReadStatus RtpConnection::open_demuxer(const std::string& sdp, std::string* error) {
   format_ = avformat_alloc_context();
   if (format_ == nullptr) {
     *error = av_error_text(AVERROR(ENOMEM));
     return ReadStatus::kFailed;
   }
-  format_->interrupt_callback = {&RtpConnection::is_over, this};
   format_->flags |= AVFMT_FLAG_NOPARSE | AVFMT_FLAG_NOFILLIN;
   // With a second stream libavformat would begin to rewrite timestamps at the first RTCP report.
   format_->max_streams = 1;
   format_->max_delay = 20'000;  // us that a gap of UDP packets is waited for
+  Text text{sdp};
+  const IoPtr description(make_io(kMaxDescription, &text, &read_description));
+  format_->pb = description.get();
   AVDictionary* dictionary = nullptr;
+  av_dict_set(&dictionary, "sdp_flags", "custom_io", 0);
   av_dict_set(&dictionary, "allowed_media_types", "video", 0);
-  av_dict_set(&dictionary, "rtsp_transport",
-              options_.transport == RtpSourceOptions::Transport::kTcp ? "tcp" : "udp", 0);
-  av_dict_set(&dictionary, "protocol_whitelist", "file,data,rtp,udp,tcp,rtsp", 0);
-  av_dict_set_int(&dictionary, "buffer_size", 4 << 20, 0);  // bytes: several pictures in UDP
-  deadline_s_ = monotonic_now_s() + options_.timeout_s;
-  const int code = avformat_open_input(&format_, input.c_str(), input_format, &dictionary);
+  // Within a connection nothing comes out of order.
+  const bool by_tcp = options_.url.rfind("rtsp://", 0) == 0 &&
+                      options_.transport == RtpSourceOptions::Transport::kTcp;
+  if (by_tcp) av_dict_set(&dictionary, "reorder_queue_size", "0", 0);
+  const int code = avformat_open_input(&format_, "", av_find_input_format("sdp"), &dictionary);
   av_dict_free(&dictionary);
-  if (code == AVERROR_HTTP_UNAUTHORIZED) {
-    *error = options_.user.empty() ? "the camera wants a user and a password (401)"
-                                   : "wrong user or password (401)";
-    return ReadStatus::kFailed;
-  }
-  if (input_format != nullptr && (code == AVERROR(ENOENT) || code == AVERROR(EACCES) ||
-                                  code == AVERROR(EINVAL) || code == AVERROR_INVALIDDATA)) {
+  if (code < 0) {
     *error = "no usable SDP description: " + av_error_text(code);
     return ReadStatus::kFailed;
   }
-  if (code < 0) {
-    *error = why_lost(code);
-    return ReadStatus::kDisconnected;
-  }
+  // libavformat writes its receiver reports there, too: `direct` keeps them out of the buffer, and no
+  // write function means nowhere.
+  packets_.reset(make_io(2 * kMaxPacket, this, &RtpConnection::next_packet));
+  packets_->max_packet_size = kMaxPacket;
+  packets_->direct = AVIO_FLAG_DIRECT;
+  format_->pb = packets_.get();
   return prepare(error);
+}
+
+// libavformat asks for a packet.
+int RtpConnection::next_packet(void* self, std::uint8_t* data, int capacity) {
+  auto* connection = static_cast<RtpConnection*>(self);
+  std::size_t size = 0;
+  connection->transport_status_ = connection->transport_->receive(
+      monotonic_now_s() + connection->options_.timeout_s, data, static_cast<std::size_t>(capacity),
+      &size, &connection->transport_error_);
+  if (connection->transport_status_ != ReadStatus::kOk) return AVERROR_EXIT;
+  connection->arrival_s_ = monotonic_now_s();
+  if (const auto header = parse_rtp_header(data, size)) connection->ends_.packet_in(*header);
+  return static_cast<int>(size);
 }
 
 // What can be read of the stream that was found.
@@ -143,49 +178,73 @@ ReadStatus RtpConnection::prepare(std::string* error) {
   return ReadStatus::kOk;
 }
 
-ReadStatus RtpConnection::read(AccessUnit* unit, std::string* error) {
-  deadline_s_ = monotonic_now_s() + options_.timeout_s;
+ReadStatus RtpConnection::read_picture(AccessUnit* unit, std::string* error) {
   const bool in_pieces = parameters_->codec_id == AV_CODEC_ID_H264;
-  for (bool complete = false; !complete;) {
+  while (!grown_) {
     AccessUnit piece;
     piece.packet.reset(av_packet_alloc());
     const int code = av_read_frame(format_, piece.packet.get());
-    piece.receive_time_s = monotonic_now_s();
-    if (code == AVERROR(EAGAIN) && is_over(this) == 0) {
-      continue;
+    if (transport_status_ == ReadStatus::kTimeout) return nothing_received(error);
+    if (transport_status_ != ReadStatus::kOk) {
+      *error = transport_error_;
+      return transport_status_;
     }
+    if (code == AVERROR(EAGAIN)) continue;
     if (code < 0) {
-      *error = why_lost(code);
+      *error = av_error_text(code);
       return ReadStatus::kDisconnected;
     }
-    deadline_s_ = piece.receive_time_s + options_.timeout_s;
+    piece.receive_time_s = arrival_s_;
+    PictureEnds::Piece end;
+    if (piece.packet->pts != AV_NOPTS_VALUE) end = ends_.piece_out(piece.packet->pts);
+    piece.sender_utc_s = end.capture_utc_s;
     if ((piece.packet->flags & AV_PKT_FLAG_CORRUPT) != 0 || piece.packet->size == 0) {
       ++damaged_;
-    } else if (!in_pieces) {
-      *unit = std::move(piece);
-      complete = true;
-    } else if (!growing_.packet) {
-      growing_ = std::move(piece);
-    } else if (growing_.packet->pts == piece.packet->pts) {
-      const int end = growing_.packet->size;
-      if (end > kMaxPicture - piece.packet->size ||
-          av_grow_packet(growing_.packet.get(), piece.packet->size) < 0) {
-        *error = "a picture of more than " + std::to_string(kMaxPicture >> 20) + " MB";
-        return ReadStatus::kDisconnected;
-      }
-      std::memcpy(growing_.packet->data + end, piece.packet->data,
-                  static_cast<std::size_t>(piece.packet->size));
-      growing_.receive_time_s = piece.receive_time_s;
-    } else {
-      *unit = std::exchange(growing_, std::move(piece));
-      complete = true;
+      continue;
     }
+    const bool next = growing_.packet && growing_.packet->pts != piece.packet->pts;
+    if (!in_pieces) {
+      *unit = std::move(piece);
+      return ReadStatus::kOk;
+    }
+    if (next) *unit = std::exchange(growing_, AccessUnit{});
+    if (!append(&piece)) {
+      *error = "a picture of more than " + std::to_string(kMaxPicture >> 20) + " MB";
+      return ReadStatus::kDisconnected;
+    }
+    grown_ = end.last;
+    if (next) return ReadStatus::kOk;
   }
+  grown_ = false;
+  *unit = std::exchange(growing_, AccessUnit{});
+  return ReadStatus::kOk;
+}
 
+// Adds the piece to the picture that is growing. False: too large.
+bool RtpConnection::append(AccessUnit* piece) {
+  if (!growing_.packet) {
+    growing_ = std::move(*piece);
+    return true;
+  }
+  const int end = growing_.packet->size;
+  if (end > kMaxPicture - piece->packet->size ||
+      av_grow_packet(growing_.packet.get(), piece->packet->size) < 0) {
+    return false;
+  }
+  std::memcpy(growing_.packet->data + end, piece->packet->data,
+              static_cast<std::size_t>(piece->packet->size));
+  growing_.receive_time_s = piece->receive_time_s;
+  if (piece->sender_utc_s) growing_.sender_utc_s = piece->sender_utc_s;
+  return true;
+}
+
+ReadStatus RtpConnection::read(AccessUnit* unit, std::string* error) {
+  const ReadStatus status = read_picture(unit, error);
+  if (status != ReadStatus::kOk) return status;
   const AVPacket& packet = *unit->packet;
   if (packet.pts != AV_NOPTS_VALUE) {
     unit->sender_time_s = static_cast<double>(packet.pts) * av_q2d(format_->streams[0]->time_base);
-    unit->sender_utc_s = utc(packet);
+    if (!unit->sender_utc_s) unit->sender_utc_s = utc(packet);
   }
   if (sender_jumped(*unit)) {
     *error = "the sender's clock jumped: it began anew";

@@ -2,20 +2,21 @@
 // RtpConnection: one connection to an RTSP or RTP sender: whole compressed pictures with their stamps.
 // Part of RtpSource, which reconnects, queues and decodes.
 //
+// A transport brings the packets, libavformat takes them apart (its SDP demuxer with custom I/O).
 // libavformat's parser is switched off: it gives a picture out, and so stamps it, only with the next
-// one's first packet. Pieces of one RTP timestamp are put together here instead, so that the stamp is
-// the arrival of the picture's own last piece. avformat_find_stream_info() is left out too: it holds
-// the first second of the stream back.
-// Blocks; a wait ends when *stopped becomes true or after timeout_s without a packet.
+// one's first packet. Pieces of one RTP timestamp are put together here instead, up to the picture's
+// marker (picture_ends.h).
+// Blocks; a wait ends with interrupt() or after timeout_s without a packet.
 
-#include <atomic>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
 
 #include "platform/video/av_handles.h"
+#include "platform/video/picture_ends.h"
 #include "platform/video/rtp_source.h"
+#include "platform/video/rtp_transport.h"
 
 namespace alidade {
 
@@ -29,15 +30,18 @@ struct AccessUnit {
 
 class RtpConnection {
  public:
-  // options.url without credentials. Both must outlive the connection.
-  RtpConnection(const RtpSourceOptions& options, const std::atomic<bool>& stopped);
+  // options.url without credentials; options must outlive the connection.
+  explicit RtpConnection(const RtpSourceOptions& options);
   ~RtpConnection();
   RtpConnection(const RtpConnection&) = delete;
   RtpConnection& operator=(const RtpConnection&) = delete;
 
-  // kOk, kDisconnected or kFailed; then *error is one line without URL and password.
+  // kOk, kDisconnected or kFailed; then *error is one line without URL and password. kStopped.
   [[nodiscard]] ReadStatus open(std::string* error);
   [[nodiscard]] ReadStatus read(AccessUnit* unit, std::string* error);
+
+  // Thread-safe. Ends a wait, for good.
+  void interrupt() { transport_->interrupt(); }
 
   // Of the open connection.
   [[nodiscard]] const std::shared_ptr<const AVCodecParameters>& parameters() const {
@@ -48,22 +52,36 @@ class RtpConnection {
   [[nodiscard]] std::int64_t damaged() const { return damaged_; }
 
  private:
-  static int is_over(void* self);
+  struct FreeIo {
+    void operator()(AVIOContext* io) const;
+  };
+  using IoPtr = std::unique_ptr<AVIOContext, FreeIo>;
+
+  static int next_packet(void* self, std::uint8_t* data, int capacity);
+  [[nodiscard]] ReadStatus open_demuxer(const std::string& sdp, std::string* error);
   [[nodiscard]] ReadStatus prepare(std::string* error);
-  [[nodiscard]] std::string why_lost(int code) const;
+  [[nodiscard]] ReadStatus read_picture(AccessUnit* unit, std::string* error);
+  [[nodiscard]] bool append(AccessUnit* piece);
   [[nodiscard]] bool inspect(AccessUnit* unit);
   [[nodiscard]] std::optional<double> utc(const AVPacket& packet) const;
   [[nodiscard]] bool sender_jumped(const AccessUnit& unit);
+  ReadStatus nothing_received(std::string* error) const;
 
   const RtpSourceOptions& options_;
-  const std::atomic<bool>& stopped_;
-  double deadline_s_ = 0;
-  bool closing_ = false;
+  std::string no_transport_;  // why, if it is null
+  std::unique_ptr<RtpTransport> transport_;
+  IoPtr packets_;
   AVFormatContext* format_ = nullptr;
+  // What ended the last wait for a packet, if it was no packet.
+  ReadStatus transport_status_ = ReadStatus::kOk;
+  std::string transport_error_;
+  double arrival_s_ = 0;  // of the last packet
+  PictureEnds ends_;
   std::shared_ptr<const AVCodecParameters> parameters_;
   CodecContextPtr parser_context_;
   ParserPtr parser_;
   AccessUnit growing_;  // H.264: the picture whose pieces are arriving
+  bool grown_ = false;  // and its last one came
   std::optional<double> last_sender_time_s_;
   double last_receive_time_s_ = 0;
   std::int64_t damaged_ = 0;

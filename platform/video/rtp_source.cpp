@@ -48,6 +48,7 @@ class RtpSource::Implementation {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       stopped_ = true;
+      if (connection_ != nullptr) connection_->interrupt();
     }
     changed_.notify_all();
   }
@@ -83,8 +84,9 @@ class RtpSource::Implementation {
   // Shared by the receiving thread and read().
   std::mutex mutex_;
   std::condition_variable changed_;
-  std::deque<Event> queue_;           // guarded by mutex_
-  std::atomic<bool> stopped_{false};  // set under mutex_, read anywhere
+  std::deque<Event> queue_;              // guarded by mutex_
+  RtpConnection* connection_ = nullptr;  // guarded by mutex_
+  std::atomic<bool> stopped_{false};     // set under mutex_, read anywhere
   std::atomic<std::int64_t> damaged_{0};
   std::atomic<std::int64_t> dropped_{0};
 
@@ -190,7 +192,12 @@ void RtpSource::Implementation::receive() {
 
 // One connection from its beginning to its end.
 ReadStatus RtpSource::Implementation::receive_connection(std::string* error) {
-  RtpConnection connection(options_, stopped_);
+  RtpConnection connection(options_);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (stopped_) return ReadStatus::kStopped;
+    connection_ = &connection;
+  }
   ReadStatus status = connection.open(error);
   wait_for_key_ = true;
   std::int64_t damaged = 0;
@@ -205,6 +212,8 @@ ReadStatus RtpSource::Implementation::receive_connection(std::string* error) {
       push_picture(std::move(event));
     }
   }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  connection_ = nullptr;
   return status;
 }
 

@@ -7,10 +7,11 @@
 // thread, connects, stamps and queues; read() decodes. So a stamp is never late by a decoding time,
 // and a read() can time out without hurting the stream.
 // - receive_time_s: arrival of the frame's last packet. sender_time_s: the RTP timestamp in seconds,
-//   unwrapped, from some moment near the connection's beginning on. sender_utc_s: the same by the
-//   latest RTCP report.
-// - An MJPEG frame is delivered on arrival, an H.264 frame when the first packet of the next one
-//   shows that it is complete (libavformat does not tell the end of an access unit).
+//   unwrapped, from some moment near the connection's beginning on. sender_utc_s: by the packets'
+//   extension 0xABAC (ONVIF: when the picture was taken), else by the latest RTCP report.
+// - A frame is delivered when its last packet is here. An H.264 frame with lost or overtaking packets,
+//   a connection's first one, and each one of a sender that sets markers within pictures is delivered
+//   when the next one begins.
 // - Frames before the first key frame, damaged and undecodable frames are skipped and counted. When
 //   the reader is too slow, what waits is dropped and counted; what comes up to the next
 //   key frame, which cannot be decoded any more, is not counted.

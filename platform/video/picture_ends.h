@@ -1,0 +1,51 @@
+#pragma once
+// PictureEnds: which piece of a picture is its last, and when the picture was taken.
+//
+// libavformat puts RTP packets in order and gives out each one's piece of an H.264 picture, but not
+// the marker that ends the picture; without it, only the next picture's first packet shows the end,
+// one period late. So the headers of the packets that go in are noted here, and the pieces that come
+// out are counted: a picture whose packets arrived in order up to its marker is complete when as many
+// pieces came out. After a loss or a reordering, and always with a sender that sets markers within
+// pictures, this says nothing, and the next picture's beginning is the end.
+// Fixed memory. One thread at a time.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+
+#include "platform/video/rtp_packet.h"
+
+namespace alidade {
+
+class PictureEnds {
+ public:
+  // A packet that libavformat takes in.
+  void packet_in(const RtpHeader& header);
+
+  struct Piece {
+    bool last = false;                    // of its picture, for sure
+    std::optional<double> capture_utc_s;  // the picture's, by the extension of a packet so far
+  };
+
+  // A piece that libavformat gave out, with its time stamp: ticks, unwrapped, from another zero.
+  [[nodiscard]] Piece piece_out(std::int64_t pts);
+
+ private:
+  struct Picture {
+    std::uint32_t timestamp = 0;
+    int packets = 0;
+    int pieces = 0;
+    bool in_order = false;  // all its packets so far, from the one after another's marker on
+    bool ended = false;     // its marker came
+    std::optional<double> capture_utc_s;
+  };
+
+  std::array<Picture, 16> pictures_;  // the latest; more than wait in libavformat for a late packet
+  std::size_t latest_ = 0;
+  std::optional<RtpHeader> last_;
+  bool markers_within_ = false;        // this sender's markers mean nothing
+  std::optional<std::uint32_t> zero_;  // timestamp of pts 0
+};
+
+}  // namespace alidade

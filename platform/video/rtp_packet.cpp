@@ -1,0 +1,48 @@
+#include "platform/video/rtp_packet.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t kFixedHeader = 12;            // bytes
+constexpr std::size_t kWord = 4;                    // bytes
+constexpr std::uint32_t kOnvifReplay = 0xABAC;      // the extension's name
+constexpr std::size_t kReplayWords = 3;             // time in two words, flags in one
+constexpr double kUnixInNtp = 2'208'988'800.0;      // s from 1900 to 1970
+constexpr double kNtpEra = 4'294'967'296.0;         // s that NTP's seconds count before they wrap
+constexpr std::uint32_t kSecondHalf = 0x8000'0000;  // of the era that began in 1900: since 1968
+
+std::uint32_t big_endian(const std::uint8_t* bytes, std::size_t count) {
+  std::uint32_t value = 0;
+  for (std::size_t i = 0; i < count; ++i) value = value << 8U | bytes[i];
+  return value;
+}
+
+std::optional<double> unix_time(std::uint32_t ntp_seconds, std::uint32_t ntp_fraction) {
+  if (ntp_seconds == 0 && ntp_fraction == 0) return std::nullopt;  // the sender does not know
+  const double era_s = ntp_seconds < kSecondHalf ? kNtpEra : 0;
+  return era_s + ntp_seconds - kUnixInNtp + ntp_fraction / kNtpEra;
+}
+
+}  // namespace
+
+std::optional<RtpHeader> parse_rtp_header(const std::uint8_t* data, std::size_t size) {
+  if (size < kFixedHeader || data[0] >> 6U != 2) return std::nullopt;
+  // The types of RTCP packets, which payload types avoid for this purpose (RFC 5761, 4).
+  if (data[1] >= 192 && data[1] <= 223) return std::nullopt;
+  RtpHeader header;
+  header.marker = (data[1] & 0x80U) != 0;
+  header.sequence = static_cast<std::uint16_t>(big_endian(data + 2, 2));
+  header.timestamp = big_endian(data + 4, 4);
+  const bool has_extension = (data[0] & 0x10U) != 0;
+  const std::size_t extension = kFixedHeader + kWord * (data[0] & 0x0FU);  // behind the CSRCs
+  if (!has_extension || size < extension + kWord) return header;
+  const std::size_t words = big_endian(data + extension + 2, 2);
+  if (big_endian(data + extension, 2) == kOnvifReplay && words >= kReplayWords &&
+      size >= extension + kWord * (1 + words)) {
+    header.capture_utc_s = unix_time(big_endian(data + extension + kWord, kWord),
+                                     big_endian(data + extension + 2 * kWord, kWord));
+  }
+  return header;
+}
+
+}  // namespace alidade

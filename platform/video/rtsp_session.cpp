@@ -1,0 +1,394 @@
+#include "platform/video/rtsp_session.h"
+
+#include <poll.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <cmath>
+#include <cstring>
+#include <optional>
+#include <random>
+#include <utility>
+
+#include "platform/system/clock.h"
+#include "platform/video/session_description.h"
+
+namespace alidade {
+namespace {
+
+constexpr int kRtspPort = 554;
+constexpr int kRedirections = 5;
+constexpr int kPortTries = 100;
+constexpr double kGoodbye_s = 0.5;  // given to TEARDOWN, so that the camera frees the session
+constexpr double kSlice_s = 0.1;    // of a wait: how late an interruption is noticed at most
+constexpr double kLongest_s = 1e9;  // what the libraries' integers hold
+constexpr std::size_t kMaxEarlyPackets = 1000;
+
+// What GStreamer's functions take: microseconds, never 0 (which is for ever).
+gint64 microseconds_until(double deadline_s) {
+  const double left_s = std::clamp(deadline_s - monotonic_now_s(), 0.0, kLongest_s);
+  return 1 + static_cast<gint64>(1e6 * left_s);
+}
+
+// A control attribute (RFC 2326, C.1.1) against the address that it is relative to.
+std::string resolve(const std::string& base, const std::string& control) {
+  if (control.empty() || control == "*") return base;
+  if (control.find("://") != std::string::npos) return control;
+  return base + (base.empty() || base.back() != '/' ? "/" : "") + control;
+}
+
+std::string refusal(int status, const char* reason) {
+  return "the camera refuses: RTSP status " + std::to_string(status) +
+         (reason == nullptr || *reason == '\0' ? "" : std::string(" ") + reason);
+}
+
+}  // namespace
+
+class RtspSession::Message {
+ public:
+  Message() { gst_rtsp_message_init(&message_); }
+  ~Message() { gst_rtsp_message_unset(&message_); }
+  Message(const Message&) = delete;
+  Message& operator=(const Message&) = delete;
+
+  GstRTSPMessage* get() { return &message_; }
+  // For a function that fills it anew.
+  GstRTSPMessage* cleared() {
+    gst_rtsp_message_unset(&message_);
+    return &message_;
+  }
+  GstRTSPMsgType type() { return gst_rtsp_message_get_type(&message_); }
+  int status() const { return message_.type_data.response.code; }
+  const char* reason() const { return message_.type_data.response.reason; }
+  std::string header(GstRTSPHeaderField field) {
+    gchar* value = nullptr;
+    gst_rtsp_message_get_header(&message_, field, &value, 0);
+    return value == nullptr ? "" : value;
+  }
+  std::pair<const std::uint8_t*, std::size_t> body() {
+    guint8* data = nullptr;
+    guint size = 0;
+    gst_rtsp_message_get_body(&message_, &data, &size);
+    return {data, size};
+  }
+
+ private:
+  GstRTSPMessage message_{};
+};
+
+RtspSession::RtspSession(const RtpSourceOptions& options) : options_(options), url_(options.url) {}
+
+RtspSession::~RtspSession() {
+  if (connection_ && !session_url_.empty()) {
+    gst_rtsp_connection_flush(connection_.get(), FALSE);
+    Message goodbye;
+    gst_rtsp_message_init_request(goodbye.cleared(), GST_RTSP_TEARDOWN, session_url_.c_str());
+    gst_rtsp_connection_send_usec(connection_.get(), goodbye.get(),
+                                  microseconds_until(monotonic_now_s() + kGoodbye_s));
+  }
+}
+
+void RtspSession::interrupt() {
+  interrupted_ = true;
+  g_cancellable_cancel(cancellable_.get());
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (connection_) gst_rtsp_connection_flush(connection_.get(), TRUE);
+  if (ports_) ports_->interrupt();
+}
+
+ReadStatus RtspSession::lost(GstRTSPResult result, std::string* error) const {
+  if (interrupted_) return ReadStatus::kStopped;
+  if (result == GST_RTSP_ETIMEOUT) return ReadStatus::kTimeout;
+  if (result == GST_RTSP_EEOF) {
+    *error = "the camera closed the connection";
+  } else if (result == GST_RTSP_EPARSE) {
+    *error = "what the camera sends is not RTSP";
+  } else {
+    gchar* text = gst_rtsp_strresult(result);
+    *error = text;
+    g_free(text);
+  }
+  return ReadStatus::kDisconnected;
+}
+
+ReadStatus RtspSession::open(double deadline_s, std::string* sdp, std::string* error) {
+  deadline_s_ = deadline_s;
+  for (int i = 0; i <= kRedirections; ++i) {
+    const std::string asked = url_;
+    ReadStatus status = connect(error);
+    if (status == ReadStatus::kOk) status = describe(sdp, error);
+    if (status == ReadStatus::kOk && url_ == asked) status = play(*sdp, error);
+    if (status != ReadStatus::kOk || url_ == asked) return status;
+  }
+  *error = "more than " + std::to_string(kRedirections) + " redirections";
+  return ReadStatus::kDisconnected;
+}
+
+ReadStatus RtspSession::connect(std::string* error) {
+  GstRTSPUrl* parsed = nullptr;
+  if (gst_rtsp_url_parse(url_.c_str(), &parsed) != GST_RTSP_OK) {
+    *error = "not the address of a stream; expected rtsp://host[:port]/path";
+    return ReadStatus::kFailed;
+  }
+  const std::unique_ptr<GstRTSPUrl, void (*)(GstRTSPUrl*)> url(parsed, &gst_rtsp_url_free);
+  const std::unique_ptr<GSocketClient, Unref> client(g_socket_client_new());
+  // In whole seconds, rounded up; 0 would be for ever.
+  const double left_s = std::clamp(deadline_s_ - monotonic_now_s(), 0.0, kLongest_s);
+  g_socket_client_set_timeout(client.get(), 1 + static_cast<guint>(left_s));
+  g_socket_client_set_enable_proxy(client.get(), FALSE);
+  const auto port = static_cast<guint16>(parsed->port == 0 ? kRtspPort : parsed->port);
+  GError* failure = nullptr;
+  std::unique_ptr<GSocketConnection, Unref> socket(g_socket_client_connect_to_host(
+      client.get(), parsed->host, port, cancellable_.get(), &failure));
+  if (!socket) {
+    *error = failure->message;
+    g_error_free(failure);
+    return interrupted_ ? ReadStatus::kStopped : ReadStatus::kDisconnected;
+  }
+  GSocket* plain = g_socket_connection_get_socket(socket.get());
+  g_socket_set_timeout(plain, 0);  // each wait has its own
+  GstRTSPConnection* connection = nullptr;
+  const GstRTSPResult result =
+      gst_rtsp_connection_create_from_socket(plain, parsed->host, port, nullptr, &connection);
+  if (result != GST_RTSP_OK) return lost(result, error);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  connection_.reset(connection);
+  socket_ = std::move(socket);
+  if (interrupted_) gst_rtsp_connection_flush(connection, TRUE);
+  return ReadStatus::kOk;
+}
+
+// kOk with another url_ than before: redirected.
+ReadStatus RtspSession::describe(std::string* sdp, std::string* error) {
+  Message options;
+  ReadStatus status = ask({GST_RTSP_OPTIONS, url_}, &options, error);
+  if (status != ReadStatus::kOk) return status;
+  if (options.header(GST_RTSP_HDR_PUBLIC).find("GET_PARAMETER") != std::string::npos) {
+    ping_ = GST_RTSP_GET_PARAMETER;
+  }
+  Message answer;
+  status = ask({GST_RTSP_DESCRIBE, url_, GST_RTSP_HDR_ACCEPT, "application/sdp"}, &answer, error);
+  if (status != ReadStatus::kOk) return status;
+  const int code = answer.status();
+  const std::string location = answer.header(GST_RTSP_HDR_LOCATION);
+  if (code / 100 == 3 && !location.empty()) {
+    url_ = location;
+    return ReadStatus::kOk;
+  }
+  if (code != GST_RTSP_STS_OK) {
+    *error = code == GST_RTSP_STS_NOT_FOUND ? "no such stream on this camera (404)"
+                                            : refusal(code, answer.reason());
+    return ReadStatus::kDisconnected;
+  }
+  const auto [data, size] = answer.body();
+  sdp->assign(reinterpret_cast<const char*>(data), size);
+  base_url_ = answer.header(GST_RTSP_HDR_CONTENT_BASE);
+  if (base_url_.empty()) base_url_ = answer.header(GST_RTSP_HDR_CONTENT_LOCATION);
+  if (base_url_.empty()) base_url_ = url_;
+  return ReadStatus::kOk;
+}
+
+ReadStatus RtspSession::play(const std::string& sdp, std::string* error) {
+  const std::optional<VideoDescription> video = find_video(sdp);
+  if (!video) {
+    *error = "there is no video in this stream";
+    return ReadStatus::kFailed;
+  }
+  const bool by_tcp = options_.transport == RtpSourceOptions::Transport::kTcp;
+  if (!by_tcp && !open_ports()) {
+    *error = "found no pair of free UDP ports";
+    return ReadStatus::kDisconnected;
+  }
+  const std::string ports = std::to_string(first_port_) + "-" + std::to_string(first_port_ + 1);
+  const std::string wanted =
+      by_tcp ? "RTP/AVP/TCP;unicast;interleaved=0-1" : "RTP/AVP;unicast;client_port=" + ports;
+  Message answer;
+  ReadStatus status =
+      ask({GST_RTSP_SETUP, resolve(base_url_, video->control), GST_RTSP_HDR_TRANSPORT, wanted},
+          &answer, error);
+  if (status != ReadStatus::kOk) return status;
+  if (answer.status() == GST_RTSP_STS_UNSUPPORTED_TRANSPORT) {
+    *error = std::string("the camera does not send RTP by ") +
+             (by_tcp ? "TCP (461); set transport: udp" : "UDP (461); set transport: tcp");
+    return ReadStatus::kFailed;
+  }
+  if (answer.status() != GST_RTSP_STS_OK) {
+    *error = refusal(answer.status(), answer.reason());
+    return ReadStatus::kDisconnected;
+  }
+  session_url_ = resolve(base_url_, video->session_control);
+  GstRTSPTransport* agreed = nullptr;
+  gst_rtsp_transport_new(&agreed);
+  if (gst_rtsp_transport_parse(answer.header(GST_RTSP_HDR_TRANSPORT).c_str(), agreed) ==
+          GST_RTSP_OK &&
+      agreed->interleaved.min >= 0) {
+    first_channel_ = agreed->interleaved.min;
+  }
+  gst_rtsp_transport_free(agreed);
+
+  status = ask({GST_RTSP_PLAY, session_url_, GST_RTSP_HDR_RANGE, "npt=0.000-"}, &answer, error);
+  if (status == ReadStatus::kOk && answer.status() != GST_RTSP_STS_OK) {
+    *error = refusal(answer.status(), answer.reason());
+    return ReadStatus::kDisconnected;
+  }
+  return status;
+}
+
+bool RtspSession::open_ports() {
+  std::minstd_rand random(std::random_device{}());
+  std::uniform_int_distribution<int> any(10'000, 30'000);
+  for (int i = 0; i < kPortTries; ++i) {
+    auto ports = std::make_unique<RtpPorts>();
+    std::string error;
+    first_port_ = 2 * any(random);
+    if (ports->open("0.0.0.0", first_port_, &error) == ReadStatus::kOk) {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      ports_ = std::move(ports);
+      return true;
+    }
+  }
+  return false;
+}
+
+ReadStatus RtspSession::send(const Request& request, double deadline_s, std::string* error) {
+  Message message;
+  gst_rtsp_message_init_request(message.cleared(), request.method, request.url.c_str());
+  gst_rtsp_message_add_header(message.get(), request.header, request.value.c_str());
+  const GstRTSPResult result = gst_rtsp_connection_send_usec(connection_.get(), message.get(),
+                                                             microseconds_until(deadline_s));
+  return result == GST_RTSP_OK ? ReadStatus::kOk : lost(result, error);
+}
+
+// Sends the request, logs in if that is wanted, and waits for the answer.
+ReadStatus RtspSession::ask(const Request& request, Message* answer, std::string* error) {
+  for (bool logged_in = false;;) {
+    ReadStatus status = send(request, deadline_s_, error);
+    while (status == ReadStatus::kOk) {
+      status = next_message(deadline_s_, answer, error);
+      if (status != ReadStatus::kOk || answer->type() == GST_RTSP_MESSAGE_RESPONSE) break;
+      const auto [data, size] = answer->body();
+      if (answer->type() == GST_RTSP_MESSAGE_REQUEST) {
+        reply(answer);
+      } else if (answer->type() == GST_RTSP_MESSAGE_DATA && early_.size() < kMaxEarlyPackets) {
+        early_.emplace_back(data, data + size);
+      }
+    }
+    if (status != ReadStatus::kOk || answer->status() != GST_RTSP_STS_UNAUTHORIZED) return status;
+    if (options_.user.empty()) {
+      *error = "the camera wants a user and a password (401)";
+      return ReadStatus::kFailed;
+    }
+    if (logged_in) {
+      *error = "wrong user or password (401)";
+      return ReadStatus::kFailed;
+    }
+    if (!accept_challenge(answer)) {
+      *error = "the camera offers neither digest (MD5) nor basic authentication (401)";
+      return ReadStatus::kFailed;
+    }
+    logged_in = true;
+  }
+}
+
+// From here on GStreamer's library adds the login to each request.
+bool RtspSession::accept_challenge(Message* answer) {
+  GstRTSPAuthCredential** offered =
+      gst_rtsp_message_parse_auth_credentials(answer->get(), GST_RTSP_HDR_WWW_AUTHENTICATE);
+  const GstRTSPAuthCredential* best = nullptr;
+  for (GstRTSPAuthCredential** each = offered; each != nullptr && *each != nullptr; ++each) {
+    bool usable = (*each)->scheme == GST_RTSP_AUTH_DIGEST ||
+                  ((*each)->scheme == GST_RTSP_AUTH_BASIC && best == nullptr);
+    for (GstRTSPAuthParam** p = (*each)->params; p != nullptr && *p != nullptr; ++p) {
+      usable = usable && (g_ascii_strcasecmp((*p)->name, "algorithm") != 0 ||
+                          g_ascii_strcasecmp((*p)->value, "MD5") == 0);
+    }
+    if (usable) best = *each;
+  }
+  if (best != nullptr) {
+    gst_rtsp_connection_clear_auth_params(connection_.get());
+    gst_rtsp_connection_set_auth(connection_.get(), best->scheme, options_.user.c_str(),
+                                 options_.password.c_str());
+    for (GstRTSPAuthParam** p = best->params; p != nullptr && *p != nullptr; ++p) {
+      gst_rtsp_connection_set_auth_param(connection_.get(), (*p)->name, (*p)->value);
+    }
+  }
+  const bool accepted = best != nullptr;
+  gst_rtsp_auth_credentials_free(offered);
+  return accepted;
+}
+
+ReadStatus RtspSession::next_message(double deadline_s, Message* message, std::string* error) {
+  const GstRTSPResult result = gst_rtsp_connection_receive_usec(
+      connection_.get(), message->cleared(), microseconds_until(deadline_s));
+  return result == GST_RTSP_OK ? ReadStatus::kOk : lost(result, error);
+}
+
+// Cameras ask whether we are still there.
+void RtspSession::reply(Message* request) {
+  Message answer;
+  gst_rtsp_message_init_response(answer.cleared(), GST_RTSP_STS_OK, "OK", request->get());
+  gst_rtsp_connection_send_usec(connection_.get(), answer.get(),
+                                microseconds_until(monotonic_now_s() + kGoodbye_s));
+}
+
+ReadStatus RtspSession::keep_alive(std::string* error) {
+  if (gst_rtsp_connection_next_timeout_usec(connection_.get()) > 0) return ReadStatus::kOk;
+  gst_rtsp_connection_reset_timeout(connection_.get());
+  return send({ping_, session_url_}, monotonic_now_s() + options_.timeout_s, error);
+}
+
+bool RtspSession::readable(double wait_s) const {
+  pollfd waiting{g_socket_get_fd(g_socket_connection_get_socket(socket_.get())), POLLIN, 0};
+  return ::poll(&waiting, 1, static_cast<int>(1e3 * std::clamp(wait_s, 0.0, kSlice_s))) > 0;
+}
+
+ReadStatus RtspSession::next_packet(double deadline_s, Packet* packet, std::string* error) {
+  Message message;
+  const ReadStatus status = next_message(deadline_s, &message, error);
+  if (status != ReadStatus::kOk) return status;
+  if (message.type() == GST_RTSP_MESSAGE_REQUEST) {
+    reply(&message);
+  } else if (message.type() == GST_RTSP_MESSAGE_RESPONSE) {
+    // To a ping. Digest's number used once may have run out.
+    if (message.status() == GST_RTSP_STS_UNAUTHORIZED) (void)accept_challenge(&message);
+  } else if (message.type() == GST_RTSP_MESSAGE_DATA) {
+    guint8 channel = 0;
+    gst_rtsp_message_parse_data(message.get(), &channel);
+    const auto [data, size] = message.body();
+    if (channel == first_channel_ || channel == first_channel_ + 1)
+      packet->assign(data, data + size);
+  }
+  return ReadStatus::kOk;
+}
+
+ReadStatus RtspSession::receive(double deadline_s, std::uint8_t* data, std::size_t capacity,
+                                std::size_t* size, std::string* error) {
+  while (!interrupted_) {
+    ReadStatus status = keep_alive(error);
+    if (status != ReadStatus::kOk) return status;
+    const double left_s = deadline_s - monotonic_now_s();
+    Packet packet;
+    if (ports_) {
+      const double slice_end_s = monotonic_now_s() + std::min(left_s, kSlice_s);
+      status = ports_->receive(slice_end_s, data, capacity, size, error);
+      if (status != ReadStatus::kTimeout) return status;
+      if (readable(0)) status = next_packet(deadline_s, &packet, error);
+    } else if (!early_.empty()) {
+      packet = std::move(early_.front());
+      early_.pop_front();
+      status = ReadStatus::kOk;
+    } else {
+      status = readable(left_s) ? next_packet(deadline_s, &packet, error) : ReadStatus::kTimeout;
+    }
+    if (status != ReadStatus::kOk && status != ReadStatus::kTimeout) return status;
+    if (!packet.empty() && packet.size() <= capacity && !ports_) {
+      std::copy(packet.begin(), packet.end(), data);
+      *size = packet.size();
+      return ReadStatus::kOk;
+    }
+    if (monotonic_now_s() >= deadline_s) return ReadStatus::kTimeout;
+  }
+  return ReadStatus::kStopped;
+}
+
+}  // namespace alidade

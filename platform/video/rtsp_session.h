@@ -1,0 +1,83 @@
+#pragma once
+// RtspSession: the video of an RTSP camera (RFC 2326), its packets within the RTSP connection or by UDP,
+// with GStreamer's RTSP library. Logs in by digest or basic, follows redirections, keeps the session
+// alive. Part of RtpConnection.
+
+#include <gst/rtsp/gstrtspconnection.h>
+
+#include <atomic>
+#include <deque>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "platform/video/rtp_source.h"
+#include "platform/video/rtp_transport.h"
+
+namespace alidade {
+
+class RtspSession : public RtpTransport {
+ public:
+  // options.url without credentials; options must outlive the session.
+  explicit RtspSession(const RtpSourceOptions& options);
+  ~RtspSession() override;
+  RtspSession(const RtspSession&) = delete;
+  RtspSession& operator=(const RtspSession&) = delete;
+
+  [[nodiscard]] ReadStatus open(double deadline_s, std::string* sdp, std::string* error) override;
+  [[nodiscard]] ReadStatus receive(double deadline_s, std::uint8_t* data, std::size_t capacity,
+                                   std::size_t* size, std::string* error) override;
+  void interrupt() override;
+
+ private:
+  class Message;  // owns a GstRTSPMessage
+
+  using Packet = std::vector<std::uint8_t>;
+  struct Request {
+    GstRTSPMethod method;
+    std::string url;
+    GstRTSPHeaderField header = GST_RTSP_HDR_USER_AGENT;
+    std::string value = "alidade";
+  };
+
+  [[nodiscard]] ReadStatus connect(std::string* error);
+  [[nodiscard]] ReadStatus describe(std::string* sdp, std::string* error);
+  [[nodiscard]] ReadStatus play(const std::string& sdp, std::string* error);
+  [[nodiscard]] bool open_ports();
+  [[nodiscard]] ReadStatus ask(const Request& request, Message* answer, std::string* error);
+  [[nodiscard]] ReadStatus send(const Request& request, double deadline_s, std::string* error);
+  [[nodiscard]] bool accept_challenge(Message* answer);
+  [[nodiscard]] ReadStatus next_message(double deadline_s, Message* message, std::string* error);
+  // The next packet within the connection, if the next message is one.
+  [[nodiscard]] ReadStatus next_packet(double deadline_s, Packet* packet, std::string* error);
+  [[nodiscard]] ReadStatus keep_alive(std::string* error);
+  [[nodiscard]] bool readable(double wait_s) const;
+  void reply(Message* request);
+  [[nodiscard]] ReadStatus lost(GstRTSPResult result, std::string* error) const;
+
+  struct Unref {
+    void operator()(void* object) const { g_object_unref(object); }
+  };
+  struct FreeConnection {
+    void operator()(GstRTSPConnection* connection) const { gst_rtsp_connection_free(connection); }
+  };
+
+  const RtpSourceOptions& options_;
+  double deadline_s_ = 0;    // of open()
+  std::string url_;          // after redirections
+  std::string base_url_;     // what the description's addresses are relative to
+  std::string session_url_;  // what PLAY is for; empty: nothing to tear down
+  GstRTSPMethod ping_ = GST_RTSP_OPTIONS;
+  std::atomic<bool> interrupted_{false};
+  std::unique_ptr<GCancellable, Unref> cancellable_{g_cancellable_new()};
+  std::mutex mutex_;  // lets interrupt() see whole what of these is there
+  std::unique_ptr<GSocketConnection, Unref> socket_;
+  std::unique_ptr<GstRTSPConnection, FreeConnection> connection_;
+  std::unique_ptr<RtpPorts> ports_;  // by UDP only
+  int first_port_ = 0;               // RTP's; RTCP's is the next
+  int first_channel_ = 0;            // the same within the connection
+  std::deque<Packet> early_;         // came before the answer to PLAY
+};
+
+}  // namespace alidade

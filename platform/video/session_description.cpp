@@ -1,0 +1,44 @@
+#include "platform/video/session_description.h"
+
+#include <gst/sdp/gstsdpmessage.h>
+
+#include <cstring>
+#include <memory>
+
+namespace alidade {
+namespace {
+
+struct FreeSdp {
+  void operator()(GstSDPMessage* message) const { gst_sdp_message_free(message); }
+};
+
+std::string text(const char* value) { return value == nullptr ? "" : value; }
+
+}  // namespace
+
+std::optional<VideoDescription> find_video(const std::string& sdp) {
+  GstSDPMessage* parsed = nullptr;
+  gst_sdp_message_new(&parsed);
+  const std::unique_ptr<GstSDPMessage, FreeSdp> message(parsed);
+  if (gst_sdp_message_parse_buffer(reinterpret_cast<const guint8*>(sdp.data()),
+                                   static_cast<guint>(sdp.size()), parsed) != GST_SDP_OK) {
+    return std::nullopt;
+  }
+  for (guint i = 0; i < gst_sdp_message_medias_len(parsed); ++i) {
+    const GstSDPMedia* media = gst_sdp_message_get_media(parsed, i);
+    if (text(gst_sdp_media_get_media(media)) != "video") continue;
+    VideoDescription video;
+    const GstSDPConnection* connection = gst_sdp_media_connections_len(media) > 0
+                                             ? gst_sdp_media_get_connection(media, 0)
+                                             : gst_sdp_message_get_connection(parsed);
+    video.address = connection == nullptr ? "" : text(connection->address);
+    if (video.address.empty()) video.address = "0.0.0.0";
+    video.port = static_cast<int>(gst_sdp_media_get_port(media));
+    video.control = text(gst_sdp_media_get_attribute_val(media, "control"));
+    video.session_control = text(gst_sdp_message_get_attribute_val(parsed, "control"));
+    return video;
+  }
+  return std::nullopt;
+}
+
+}  // namespace alidade

@@ -1,0 +1,195 @@
+// Headers of RTP packets, and what they say about the ends of pictures.
+
+#include "platform/video/rtp_packet.h"
+
+#include <gtest/gtest.h>
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "platform/video/picture_ends.h"
+
+namespace alidade {
+namespace {
+
+using Bytes = std::vector<std::uint8_t>;
+
+std::optional<RtpHeader> parse(const Bytes& bytes) {
+  return parse_rtp_header(bytes.data(), bytes.size());
+}
+
+void append(Bytes* to, const Bytes& bytes) { to->insert(to->end(), bytes.begin(), bytes.end()); }
+
+// Version 2, marker, payload type 96, sequence 0x1234, timestamp 0x89ABCDEF.
+const Bytes kPlain = {0x80, 0xE0, 0x12, 0x34, 0x89, 0xAB, 0xCD, 0xEF,
+                      1,    2,    3,    4,    'd',  'a',  't',  'a'};
+
+// With two contributing sources and the extension at 2023-11-14 22:13:20.25 UTC.
+Bytes with_extension() {
+  Bytes bytes(kPlain.begin(), kPlain.begin() + 12);
+  bytes[0] = 0x92;
+  append(&bytes, {0, 0, 0, 7, 0, 0, 0, 8, 0xAB, 0xAC, 0, 3});
+  append(&bytes, {0xE8, 0xFE, 0x6F, 0x80, 0x40, 0, 0, 0, 0xA0, 5, 0, 0});
+  append(&bytes, {'d', 'a', 't', 'a'});
+  return bytes;
+}
+
+TEST(RtpPacket, TellsMarkerSequenceAndTimestamp) {
+  const auto header = parse(kPlain);
+  ASSERT_TRUE(header);
+  EXPECT_TRUE(header->marker);
+  EXPECT_EQ(header->sequence, 0x1234);
+  EXPECT_EQ(header->timestamp, 0x89ABCDEFU);
+  EXPECT_EQ(header->capture_utc_s, std::nullopt);
+  Bytes other = kPlain;
+  other[1] = 26;  // JPEG, not the last packet
+  EXPECT_FALSE(parse(other)->marker);
+}
+
+TEST(RtpPacket, ReadsTheCaptureTimeBehindContributingSources) {
+  const auto header = parse(with_extension());
+  ASSERT_TRUE(header);
+  ASSERT_TRUE(header->capture_utc_s);
+  EXPECT_EQ(*header->capture_utc_s, 1'700'000'000.25);
+}
+
+TEST(RtpPacket, CountsOnWhenNtpsSecondsWrapIn2036) {
+  Bytes bytes = with_extension();
+  for (std::size_t i = 24; i < 32; ++i) bytes[i] = i == 27 ? 1 : 0;
+  EXPECT_EQ(parse(bytes)->capture_utc_s, 4'294'967'296.0 - 2'208'988'800.0 + 1);
+}
+
+TEST(RtpPacket, GivesNoTimeThatTheSenderDoesNotSay) {
+  Bytes unknown = with_extension();
+  for (std::size_t i = 24; i < 32; ++i) unknown[i] = 0;
+  EXPECT_EQ(parse(unknown)->capture_utc_s, std::nullopt);
+  Bytes other = with_extension();
+  other[20] = 0xBE;  // another extension
+  EXPECT_EQ(parse(other)->capture_utc_s, std::nullopt);
+  Bytes shorter = with_extension();
+  shorter[23] = 2;
+  EXPECT_EQ(parse(shorter)->capture_utc_s, std::nullopt);
+}
+
+TEST(RtpPacket, TakesNoTimeFromAnExtensionThatIsCutOff) {
+  const Bytes whole = with_extension();
+  for (std::size_t size = 0; size < whole.size(); ++size) {
+    const auto header = parse_rtp_header(whole.data(), size);
+    EXPECT_EQ(header.has_value(), size >= 12) << size;
+    if (header) {
+      EXPECT_EQ(header->capture_utc_s.has_value(), size >= 36) << size;
+    }
+  }
+}
+
+TEST(RtpPacket, IsNotRtcpNorAnotherVersion) {
+  for (const int type : {200, 201, 202, 203, 204}) {
+    Bytes rtcp = kPlain;
+    rtcp[1] = static_cast<std::uint8_t>(type);
+    EXPECT_FALSE(parse(rtcp)) << type;
+  }
+  Bytes stun = kPlain;
+  stun[0] = 0;
+  EXPECT_FALSE(parse(stun));
+  EXPECT_FALSE(parse({}));
+}
+
+// Packets of pictures, whose pieces come out at once, as libavformat does in order.
+class PictureEndsInOrder : public ::testing::Test {
+ protected:
+  // One packet in, its piece out.
+  PictureEnds::Piece pass(std::uint32_t timestamp, bool marker,
+                          std::optional<double> utc_s = std::nullopt) {
+    in(timestamp, marker, utc_s);
+    return out(timestamp);
+  }
+  void in(std::uint32_t timestamp, bool marker, std::optional<double> utc_s = std::nullopt) {
+    RtpHeader header;
+    header.marker = marker;
+    header.sequence = sequence_++;
+    header.timestamp = timestamp;
+    header.capture_utc_s = utc_s;
+    ends_.packet_in(header);
+  }
+  // libavformat's stamps are 64 bits, and 700 ticks from the packets'.
+  PictureEnds::Piece out(std::uint32_t timestamp) {
+    return ends_.piece_out((std::int64_t{5} << 32) + timestamp - 700);
+  }
+  PictureEnds ends_;
+  std::uint16_t sequence_ = 65'533;  // wraps soon
+};
+
+TEST_F(PictureEndsInOrder, AreAtTheMarkersOnceOneWasSeen) {
+  EXPECT_FALSE(pass(1000, false).last);
+  EXPECT_FALSE(pass(1000, true).last) << "its beginning was not seen";
+  for (std::uint32_t picture = 2; picture < 40; ++picture) {
+    for (int i = 0; i < 4; ++i) EXPECT_FALSE(pass(1000 * picture, false).last);
+    EXPECT_TRUE(pass(1000 * picture, true).last);
+  }
+}
+
+TEST_F(PictureEndsInOrder, AreSeenAcrossTheWrapOfTimestamps) {
+  (void)pass(0xFFFF'0000, true);
+  EXPECT_TRUE(pass(0xFFFF'FF00, true).last);
+  EXPECT_FALSE(pass(0x100, false).last);
+  EXPECT_TRUE(pass(0x100, true).last);
+}
+
+TEST_F(PictureEndsInOrder, AreUnknownInAPictureThatLostAPacket) {
+  (void)pass(1000, true);
+  EXPECT_FALSE(pass(2000, false).last);
+  ++sequence_;
+  EXPECT_FALSE(pass(2000, true).last);
+  EXPECT_FALSE(pass(3000, false).last);
+  EXPECT_TRUE(pass(3000, true).last) << "the next one is whole again";
+}
+
+TEST_F(PictureEndsInOrder, AreUnknownAfterALossOfTheMarker) {
+  (void)pass(1000, true);
+  EXPECT_FALSE(pass(2000, false).last);
+  ++sequence_;
+  EXPECT_FALSE(pass(3000, false).last);
+  EXPECT_FALSE(pass(3000, true).last) << "the packet lost may have been its first";
+  EXPECT_TRUE(pass(4000, true).last);
+}
+
+TEST_F(PictureEndsInOrder, WaitForPiecesThatAreHeldBack) {
+  (void)pass(1000, true);
+  in(2000, false);
+  in(2000, true);
+  EXPECT_FALSE(out(2000).last);
+  EXPECT_TRUE(out(2000).last);
+}
+
+TEST_F(PictureEndsInOrder, AreUnknownWhereAPacketGaveNoPiece) {
+  (void)pass(1000, true);
+  in(2000, false);  // of a kind that libavformat leaves out
+  EXPECT_FALSE(pass(2000, true).last);
+  EXPECT_TRUE(pass(3000, true).last);
+}
+
+TEST_F(PictureEndsInOrder, AreNotBelievedOfASenderWithMarkersWithinPictures) {
+  (void)pass(1000, true);
+  EXPECT_TRUE(pass(2000, true).last) << "not known yet: parameter sets, say";
+  EXPECT_FALSE(pass(2000, true).last);
+  EXPECT_FALSE(pass(3000, true).last);
+  EXPECT_FALSE(pass(3000, true).last);
+}
+
+TEST_F(PictureEndsInOrder, CarryTheCaptureTimeOfAnyPacketOfThePicture) {
+  EXPECT_EQ(pass(1000, true, 5.5).capture_utc_s, 5.5);
+  EXPECT_EQ(pass(2000, false).capture_utc_s, std::nullopt);
+  EXPECT_EQ(pass(2000, false, 6.5).capture_utc_s, 6.5);
+  EXPECT_EQ(pass(2000, true).capture_utc_s, 6.5);
+  EXPECT_EQ(pass(3000, true).capture_utc_s, std::nullopt);
+}
+
+TEST(PictureEnds, KnowNothingOfPiecesWithoutPackets) {
+  PictureEnds ends;
+  EXPECT_FALSE(ends.piece_out(0).last);
+  EXPECT_FALSE(ends.piece_out(-1).last);
+}
+
+}  // namespace
+}  // namespace alidade
