@@ -1,32 +1,25 @@
 #include "platform/video/mjpeg_source.h"
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <condition_variable>
 #include <cstring>
-#include <deque>
-#include <mutex>
 #include <optional>
-#include <thread>
 #include <utility>
 
-#include "platform/system/backoff.h"
 #include "platform/system/clock.h"
 #include "platform/system/curl_handles.h"
 #include "platform/system/url.h"
 #include "platform/video/jpeg_decoder.h"
 #include "platform/video/multipart_scanner.h"
+#include "platform/video/receiving_thread.h"
 #include "platform/video/stream_copy.h"
 
 namespace alidade {
 namespace {
 
-constexpr std::size_t kQueueCapacity = 32;       // pictures: a second of video
-constexpr std::size_t kQueueBytes = 64U << 20U;  // of the pictures that wait
-constexpr long kReceiveBuffer = 128 * 1024;      // bytes read at a time
-constexpr int kDamagedInARow = 30;               // pictures: more are no accident
+constexpr long kReceiveBuffer = 128 * 1024;  // bytes read at a time
+constexpr int kDamagedInARow = 30;           // pictures: more are no accident
 constexpr long kMethods = static_cast<long>(CURLAUTH_DIGEST | CURLAUTH_BASIC);
 
 CodecParametersPtr jpeg_parameters() {
@@ -50,47 +43,24 @@ PacketPtr packet_of(const std::string& jpeg) {
 class MjpegSource::Implementation {
  public:
   explicit Implementation(const MjpegSourceOptions& options);
-  ~Implementation() {
-    stop();
-    if (thread_.joinable()) {
-      thread_.join();
-    }
-  }
-
   ReadStatus read(Frame& frame, double timeout_s);
 
-  void stop() {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      stopped_ = true;
-    }
-    changed_.notify_all();
+  void stop() { thread_.stop(); }
+  const std::string& error() const { return error_; }
+  const std::string& name() const { return name_; }
+  FrameSourceCounters counters() const { return {damaged_, thread_.dropped()}; }
+
+ private:
+  void interrupt() {
     if (multi_) {
       curl_multi_wakeup(multi_.get());
     }
   }
-
-  const std::string& error() const { return error_; }
-  const std::string& name() const { return name_; }
-  FrameSourceCounters counters() const { return {damaged_, dropped_}; }
-
- private:
-  // What the receiving thread hands to read(): a picture, or why there is none.
-  struct Event {
-    ReadStatus status = ReadStatus::kOk;
-    std::string error;
-    MultipartPart part;
-  };
-
   static std::size_t on_body(char* data, std::size_t size, std::size_t count, void* self);
   bool begin_stream();
   void take_bytes(std::string_view bytes, double arrival_s);
-  void receive();
   ReadStatus receive_connection(std::string* error);
   ReadStatus connection_end(CURLcode code, std::string* error);
-  void push_picture(MultipartPart part);
-  void drop_oldest_picture();
-  void push_report(Event event);
   ReadStatus fail(const std::string& error) {
     error_ = name_ + ": " + error;
     failed_ = true;
@@ -102,21 +72,12 @@ class MjpegSource::Implementation {
   MjpegSourceOptions options_;
   std::string name_;
 
-  // Shared by the receiving thread and read().
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<Event> queue_;           // guarded by mutex_
-  std::size_t queue_pictures_ = 0;    // guarded by mutex_
-  std::size_t queue_bytes_ = 0;       // guarded by mutex_
-  std::atomic<bool> stopped_{false};  // set under mutex_, read anywhere
   std::atomic<std::int64_t> damaged_{0};
-  std::atomic<std::int64_t> dropped_{0};
 
   // The receiving thread's own.
   char curl_error_[CURL_ERROR_SIZE] = "";
   CurlMultiPtr multi_;  // stop() wakes it up
   CurlEasyPtr easy_;
-  Backoff backoff_{options_.max_backoff_s};
   std::optional<MultipartScanner> scanner_;  // of this connection, from its first bytes on
   std::string refusal_;                      // why the answer's body was not taken
   std::int64_t discarded_ = 0;               // by the scanner, as far as counted
@@ -124,7 +85,6 @@ class MjpegSource::Implementation {
   double last_picture_s_ = 0;                // or the connection's beginning
 
   // read()'s own.
-  std::thread thread_;
   std::string error_;
   bool failed_ = false;
   bool restarted_ = true;
@@ -135,6 +95,11 @@ class MjpegSource::Implementation {
   JpegDecoder decoder_;
   CodecParametersPtr parameters_ = jpeg_parameters();
   StreamCopy copy_;
+
+  // Last: its thread uses the others.
+  ReceivingThread<MultipartPart> thread_{
+      options_.max_backoff_s, [this](std::string* error) { return receive_connection(error); },
+      [this] { interrupt(); }};
 };
 
 MjpegSource::Implementation::Implementation(const MjpegSourceOptions& options) : options_(options) {
@@ -205,73 +170,13 @@ void MjpegSource::Implementation::take_bytes(std::string_view bytes, double arri
   MultipartPart part;
   while (scanner_->next(&part)) {
     if (part.body.compare(0, 2, "\xFF\xD8") == 0) {
-      backoff_.reset();
       ++pictures_;
       last_picture_s_ = arrival_s;
-      push_picture(std::move(part));
+      const std::size_t size = part.body.size();
+      thread_.push(std::move(part), size);
     } else if (part.content_type.empty() || part.content_type.rfind("image/", 0) == 0) {
       ++damaged_;
     }  // else text between the pictures
-  }
-}
-
-void MjpegSource::Implementation::push_picture(MultipartPart part) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    queue_bytes_ += part.body.size();
-    ++queue_pictures_;
-    Event event;
-    event.part = std::move(part);
-    queue_.push_back(std::move(event));
-    while (queue_pictures_ > 1 &&
-           (queue_pictures_ > kQueueCapacity || queue_bytes_ > kQueueBytes)) {
-      drop_oldest_picture();
-    }
-  }
-  changed_.notify_all();
-}
-
-// Of reports that then follow each other, the last is enough: there are never more than pictures, and
-// one.
-void MjpegSource::Implementation::drop_oldest_picture() {
-  auto at = std::find_if(queue_.begin(), queue_.end(),
-                         [](const Event& waiting) { return waiting.status == ReadStatus::kOk; });
-  queue_bytes_ -= at->part.body.size();
-  --queue_pictures_;
-  ++dropped_;
-  at = queue_.erase(at);
-  if (at != queue_.begin() && at->status != ReadStatus::kOk) {
-    queue_.erase(at - 1);
-  }
-}
-
-void MjpegSource::Implementation::push_report(Event event) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (!queue_.empty() && queue_.back().status == event.status) {
-      queue_.pop_back();  // nobody reads: the last report is enough
-    }
-    queue_.push_back(std::move(event));
-  }
-  changed_.notify_all();
-}
-
-// The receiving thread: connects again and again.
-void MjpegSource::Implementation::receive() {
-  while (!stopped_) {
-    Event event;
-    event.status = receive_connection(&event.error);
-    if (stopped_) {
-      return;
-    }
-    const bool failed = event.status == ReadStatus::kFailed;
-    push_report(std::move(event));
-    if (failed) {
-      return;
-    }
-    std::unique_lock<std::mutex> lock(mutex_);
-    changed_.wait_for(lock, std::chrono::duration<double>(backoff_.next_s()),
-                      [this] { return stopped_.load(); });
   }
 }
 
@@ -284,7 +189,7 @@ ReadStatus MjpegSource::Implementation::receive_connection(std::string* error) {
   last_picture_s_ = monotonic_now_s();
   curl_multi_add_handle(multi_.get(), easy_.get());
   ReadStatus status = ReadStatus::kStopped;
-  while (!stopped_) {
+  while (!thread_.stopped()) {
     int running = 0;
     curl_multi_perform(multi_.get(), &running);
     int queued = 0;
@@ -331,38 +236,23 @@ ReadStatus MjpegSource::Implementation::read(Frame& frame, double timeout_s) {
       std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(
                                              std::chrono::duration<double>(timeout_s));
   if (failed_) {
-    return stopped_ ? ReadStatus::kStopped : ReadStatus::kFailed;
-  }
-  if (!thread_.joinable()) {
-    thread_ = std::thread([this] { receive(); });
+    return thread_.stopped() ? ReadStatus::kStopped : ReadStatus::kFailed;
   }
   for (;;) {
-    Event event;
-    {
-      std::unique_lock<std::mutex> lock(mutex_);
-      changed_.wait_until(lock, deadline, [this] { return stopped_ || !queue_.empty(); });
-      if (stopped_) {
-        return ReadStatus::kStopped;
-      }
-      if (queue_.empty()) {
-        return ReadStatus::kTimeout;
-      }
-      event = std::move(queue_.front());
-      queue_.pop_front();
-      if (event.status == ReadStatus::kOk) {
-        queue_bytes_ -= event.part.body.size();
-        --queue_pictures_;
-      }
+    MultipartPart part;
+    std::string error;
+    ReadStatus status = thread_.next(deadline, &part, &error);
+    if (status == ReadStatus::kFailed) {
+      return fail(error);
     }
-    if (event.status == ReadStatus::kFailed) {
-      return fail(event.error);
-    }
-    if (event.status != ReadStatus::kOk) {
-      error_ = name_ + ": " + event.error;
+    if (status == ReadStatus::kDisconnected) {
+      error_ = name_ + ": " + error;
       restarted_ = true;
-      return event.status;
     }
-    const ReadStatus status = deliver(std::move(event.part), frame);
+    if (status != ReadStatus::kOk) {
+      return status;
+    }
+    status = deliver(std::move(part), frame);
     if (status != ReadStatus::kTimeout) {
       return status;
     }

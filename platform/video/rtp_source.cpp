@@ -1,24 +1,20 @@
 #include "platform/video/rtp_source.h"
 
-#include <algorithm>
 #include <atomic>
 #include <chrono>
-#include <condition_variable>
 #include <deque>
 #include <mutex>
-#include <thread>
 #include <utility>
 
-#include "platform/system/backoff.h"
 #include "platform/system/url.h"
 #include "platform/video/luma_decoder.h"
+#include "platform/video/receiving_thread.h"
 #include "platform/video/rtp_connection.h"
 #include "platform/video/stream_copy.h"
 
 namespace alidade {
 namespace {
 
-constexpr std::size_t kQueueCapacity = 32;    // pictures: a second of video
 constexpr std::size_t kCredentials = 126;     // characters; libavformat cuts longer ones off
 constexpr std::size_t kDecoderCapacity = 16;  // pictures: the most that H.264 may hold back
 
@@ -35,67 +31,40 @@ class RtpSource::Implementation {
     check();
   }
 
-  ~Implementation() {
-    stop();
-    if (thread_.joinable()) {
-      thread_.join();
-    }
-  }
-
   ReadStatus read(Frame& frame, double timeout_s);
 
-  void stop() {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      stopped_ = true;
-      if (connection_ != nullptr) connection_->interrupt();
-    }
-    changed_.notify_all();
-  }
-
+  void stop() { thread_.stop(); }
   const std::string& error() const { return error_; }
   const std::string& name() const { return options_.url; }
-  FrameSourceCounters counters() const { return {damaged_, dropped_}; }
+  FrameSourceCounters counters() const { return {damaged_, thread_.dropped()}; }
 
  private:
-  // What the receiving thread hands to read(): a picture, or why there is none.
-  struct Event {
-    ReadStatus status = ReadStatus::kOk;
-    std::string error;
+  struct Arrived {
     AccessUnit unit;
     std::shared_ptr<const AVCodecParameters> parameters;  // of the unit's connection
   };
 
   void check();
-  void receive();
   ReadStatus receive_connection(std::string* error);
-  void push_picture(Event event);
-  void push_report(Event event);
+  void interrupt();
+  void push(Arrived arrived);
   ReadStatus fail(std::string error) {
     error_ = options_.url + ": " + std::move(error);
     failed_ = true;
     return ReadStatus::kFailed;
   }
-  ReadStatus deliver(Event event, Frame& frame);
+  ReadStatus deliver(Arrived arrived, Frame& frame);
   ReadStatus decode(AccessUnit* unit, Picture* picture);
 
   RtpSourceOptions options_;
 
-  // Shared by the receiving thread and read().
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::deque<Event> queue_;              // guarded by mutex_
-  RtpConnection* connection_ = nullptr;  // guarded by mutex_
-  std::atomic<bool> stopped_{false};     // set under mutex_, read anywhere
   std::atomic<std::int64_t> damaged_{0};
-  std::atomic<std::int64_t> dropped_{0};
 
-  // The receiving thread's own.
-  Backoff backoff_{options_.max_backoff_s};
-  bool wait_for_key_ = true;
+  std::mutex mutex_;
+  RtpConnection* connection_ = nullptr;  // guarded by mutex_
+  bool wait_for_key_ = true;             // the receiving thread's own
 
   // read()'s own.
-  std::thread thread_;
   std::string error_;
   bool failed_ = false;
   bool restarted_ = true;
@@ -107,6 +76,11 @@ class RtpSource::Implementation {
   int width_ = 0;
   int height_ = 0;
   StreamCopy copy_;
+
+  // Last: its thread uses the others.
+  ReceivingThread<Arrived> thread_{options_.max_backoff_s,
+                                   [this](std::string* error) { return receive_connection(error); },
+                                   [this] { interrupt(); }};
 };
 
 // What the options cannot mean, before any connection; leaves the URL without credentials.
@@ -141,53 +115,18 @@ void RtpSource::Implementation::check() {
   }
 }
 
-void RtpSource::Implementation::push_picture(Event event) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (queue_.size() >= kQueueCapacity) {
-      const auto is_picture = [](const Event& e) { return e.status == ReadStatus::kOk; };
-      const std::size_t before = queue_.size();
-      queue_.erase(std::remove_if(queue_.begin(), queue_.end(), is_picture), queue_.end());
-      dropped_ += static_cast<std::int64_t>(before - queue_.size());
-      wait_for_key_ = true;
-    }
-    if (wait_for_key_ && !event.unit.key) {
-      return;
-    }
-    wait_for_key_ = false;
-    queue_.push_back(std::move(event));
+// Where pictures are dropped, all are: those that follow cannot be decoded up to the next key frame.
+void RtpSource::Implementation::push(Arrived arrived) {
+  if (thread_.full()) {
+    thread_.drop_all();
+    wait_for_key_ = true;
   }
-  changed_.notify_all();
-}
-
-void RtpSource::Implementation::push_report(Event event) {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (!queue_.empty() && queue_.back().status == event.status) {
-      queue_.pop_back();  // nobody reads: the last report is enough
-    }
-    queue_.push_back(std::move(event));
+  if (wait_for_key_ && !arrived.unit.key) {
+    return;
   }
-  changed_.notify_all();
-}
-
-// The receiving thread: connects again and again.
-void RtpSource::Implementation::receive() {
-  while (!stopped_) {
-    Event event;
-    event.status = receive_connection(&event.error);
-    if (stopped_) {
-      return;
-    }
-    const bool failed = event.status == ReadStatus::kFailed;
-    push_report(std::move(event));
-    if (failed) {
-      return;
-    }
-    std::unique_lock<std::mutex> lock(mutex_);
-    changed_.wait_for(lock, std::chrono::duration<double>(backoff_.next_s()),
-                      [this] { return stopped_.load(); });
-  }
+  wait_for_key_ = false;
+  const auto bytes = static_cast<std::size_t>(arrived.unit.packet->size);
+  thread_.push(std::move(arrived), bytes);
 }
 
 // One connection from its beginning to its end.
@@ -195,21 +134,19 @@ ReadStatus RtpSource::Implementation::receive_connection(std::string* error) {
   RtpConnection connection(options_);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (stopped_) return ReadStatus::kStopped;
     connection_ = &connection;
   }
-  ReadStatus status = connection.open(error);
+  ReadStatus status = thread_.stopped() ? ReadStatus::kStopped : connection.open(error);
   wait_for_key_ = true;
   std::int64_t damaged = 0;
   while (status == ReadStatus::kOk) {
-    Event event;
-    status = connection.read(&event.unit, error);
+    Arrived arrived;
+    status = connection.read(&arrived.unit, error);
     damaged_ += connection.damaged() - damaged;
     damaged = connection.damaged();
     if (status == ReadStatus::kOk) {
-      backoff_.reset();
-      event.parameters = connection.parameters();
-      push_picture(std::move(event));
+      arrived.parameters = connection.parameters();
+      push(std::move(arrived));
     }
   }
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -217,39 +154,35 @@ ReadStatus RtpSource::Implementation::receive_connection(std::string* error) {
   return status;
 }
 
+void RtpSource::Implementation::interrupt() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (connection_ != nullptr) {
+    connection_->interrupt();
+  }
+}
+
 ReadStatus RtpSource::Implementation::read(Frame& frame, double timeout_s) {
   const auto deadline =
       std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(
                                              std::chrono::duration<double>(timeout_s));
   if (failed_) {
-    return stopped_ ? ReadStatus::kStopped : ReadStatus::kFailed;
-  }
-  if (!thread_.joinable()) {
-    thread_ = std::thread([this] { receive(); });
+    return thread_.stopped() ? ReadStatus::kStopped : ReadStatus::kFailed;
   }
   for (;;) {
-    Event event;
-    {
-      std::unique_lock<std::mutex> lock(mutex_);
-      changed_.wait_until(lock, deadline, [this] { return stopped_ || !queue_.empty(); });
-      if (stopped_) {
-        return ReadStatus::kStopped;
-      }
-      if (queue_.empty()) {
-        return ReadStatus::kTimeout;
-      }
-      event = std::move(queue_.front());
-      queue_.pop_front();
+    Arrived arrived;
+    std::string error;
+    ReadStatus status = thread_.next(deadline, &arrived, &error);
+    if (status == ReadStatus::kFailed) {
+      return fail(std::move(error));
     }
-    if (event.status == ReadStatus::kFailed) {
-      return fail(std::move(event.error));
-    }
-    if (event.status != ReadStatus::kOk) {
-      error_ = options_.url + ": " + event.error;
+    if (status == ReadStatus::kDisconnected) {
+      error_ = options_.url + ": " + error;
       restarted_ = true;
-      return event.status;
     }
-    const ReadStatus status = deliver(std::move(event), frame);
+    if (status != ReadStatus::kOk) {
+      return status;
+    }
+    status = deliver(std::move(arrived), frame);
     if (status != ReadStatus::kTimeout) {
       return status;
     }
@@ -257,10 +190,10 @@ ReadStatus RtpSource::Implementation::read(Frame& frame, double timeout_s) {
 }
 
 // Turns a picture's data into the frame; kTimeout if that cannot be done with this one.
-ReadStatus RtpSource::Implementation::deliver(Event event, Frame& frame) {
-  AccessUnit unit = std::move(event.unit);
-  if (event.parameters != parameters_) {
-    parameters_ = std::move(event.parameters);
+ReadStatus RtpSource::Implementation::deliver(Arrived arrived, Frame& frame) {
+  AccessUnit unit = std::move(arrived.unit);
+  if (arrived.parameters != parameters_) {
+    parameters_ = std::move(arrived.parameters);
     in_decoder_.clear();
     size_known_ = false;
     if (!decoder_.open(*parameters_, true)) {

@@ -1,0 +1,173 @@
+#pragma once
+// ReceivingThread: what every source that receives over a network has in common: a thread that connects
+// again and again with back-off, and a bounded queue in which its pictures, and the reports of
+// connections lost, wait for read().
+//
+// Of Picture it only needs that it can be moved. When the reader is too slow, the oldest pictures are
+// dropped and counted; of reports that then follow each other the last one stays, so memory is bounded
+// whoever reads.
+
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <condition_variable>
+#include <cstddef>
+#include <cstdint>
+#include <deque>
+#include <functional>
+#include <mutex>
+#include <string>
+#include <thread>
+#include <utility>
+
+#include "platform/system/backoff.h"
+#include "platform/video/frame_source.h"
+
+namespace alidade {
+
+template <class Picture>
+class ReceivingThread {
+ public:
+  static constexpr std::size_t kMaxPictures = 32;       // a second of video
+  static constexpr std::size_t kMaxBytes = 64U << 20U;  // of the pictures that wait
+
+  // Lives through one connection, on the receiving thread: calls push(), and returns why it ended:
+  // kDisconnected or kFailed with *error, or kStopped. interrupt ends it, from any thread.
+  using Connection = std::function<ReadStatus(std::string* error)>;
+
+  ReceivingThread(double max_backoff_s, Connection connection, std::function<void()> interrupt)
+      : backoff_(max_backoff_s),
+        connection_(std::move(connection)),
+        interrupt_(std::move(interrupt)) {}
+  ~ReceivingThread() {
+    stop();
+    if (thread_.joinable()) {
+      thread_.join();
+    }
+  }
+  ReceivingThread(const ReceivingThread&) = delete;
+  ReceivingThread& operator=(const ReceivingThread&) = delete;
+
+  // Thread-safe.
+  void stop() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      stopped_ = true;
+    }
+    changed_.notify_all();
+    interrupt_();
+  }
+  [[nodiscard]] bool stopped() const { return stopped_; }
+  [[nodiscard]] std::int64_t dropped() const { return dropped_; }
+
+  // For read(): the next picture (kOk) or report, at the latest by `deadline`. The first call starts the
+  // thread, and so with the caller's scheduling.
+  [[nodiscard]] ReadStatus next(std::chrono::steady_clock::time_point deadline, Picture* picture,
+                                std::string* error) {
+    if (!thread_.joinable() && !stopped_) {
+      thread_ = std::thread([this] { run(); });
+    }
+    std::unique_lock<std::mutex> lock(mutex_);
+    changed_.wait_until(lock, deadline, [this] { return stopped_ || !queue_.empty(); });
+    if (stopped_) {
+      return ReadStatus::kStopped;
+    }
+    if (queue_.empty()) {
+      return ReadStatus::kTimeout;
+    }
+    Event event = std::move(queue_.front());
+    remove(queue_.begin());
+    *picture = std::move(event.picture);
+    *error = std::move(event.error);
+    return event.status;
+  }
+
+  // For the connection: a picture of so many bytes has come.
+  void push(Picture picture, std::size_t bytes) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      backoff_.reset();
+      queue_.push_back({ReadStatus::kOk, "", std::move(picture), bytes});
+      bytes_ += bytes;
+      ++pictures_;
+      while (pictures_ > 1 && (pictures_ > kMaxPictures || bytes_ > kMaxBytes)) {
+        drop_oldest();
+      }
+    }
+    changed_.notify_all();
+  }
+
+  // For the connection: whether the next picture would push another one out.
+  [[nodiscard]] bool full() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    return pictures_ >= kMaxPictures;
+  }
+
+  // For the connection: drops the pictures that wait.
+  void drop_all() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    while (pictures_ > 0) {
+      drop_oldest();
+    }
+  }
+
+ private:
+  struct Event {
+    ReadStatus status;
+    std::string error;
+    Picture picture;
+    std::size_t bytes;
+  };
+  using Position = typename std::deque<Event>::iterator;
+
+  Position remove(Position at) {
+    bytes_ -= at->bytes;
+    pictures_ -= at->status == ReadStatus::kOk ? 1 : 0;
+    return queue_.erase(at);
+  }
+
+  void drop_oldest() {
+    const auto is_picture = [](const Event& event) { return event.status == ReadStatus::kOk; };
+    const Position after = remove(std::find_if(queue_.begin(), queue_.end(), is_picture));
+    ++dropped_;
+    if (after != queue_.begin() && after != queue_.end() && !is_picture(*after)) {
+      remove(after - 1);
+    }
+  }
+
+  void run() {
+    while (!stopped_) {
+      Event event{ReadStatus::kStopped, "", Picture{}, 0};
+      event.status = connection_(&event.error);
+      std::unique_lock<std::mutex> lock(mutex_);
+      if (stopped_) {
+        return;
+      }
+      const bool failed = event.status == ReadStatus::kFailed;
+      if (!queue_.empty() && queue_.back().status != ReadStatus::kOk) {
+        queue_.pop_back();  // nobody reads: the last report is enough
+      }
+      queue_.push_back(std::move(event));
+      changed_.notify_all();
+      if (failed) {
+        return;
+      }
+      changed_.wait_for(lock, std::chrono::duration<double>(backoff_.next_s()),
+                        [this] { return stopped_.load(); });
+    }
+  }
+
+  Backoff backoff_;  // the receiving thread's
+  Connection connection_;
+  std::function<void()> interrupt_;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::deque<Event> queue_;           // guarded by mutex_
+  std::size_t pictures_ = 0;          // guarded by mutex_
+  std::size_t bytes_ = 0;             // guarded by mutex_
+  std::atomic<bool> stopped_{false};  // set under mutex_, read anywhere
+  std::atomic<std::int64_t> dropped_{0};
+  std::thread thread_;  // read()'s own
+};
+
+}  // namespace alidade
