@@ -7,7 +7,9 @@
 #include <iterator>
 #include <memory>
 #include <ostream>
+#include <string>
 #include <thread>
+#include <vector>
 
 #include "platform/pan_tilt/onvif_source.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
@@ -23,42 +25,74 @@
 namespace alidade {
 namespace {
 
+// How soon a device that is away is noticed, by silence where nothing else tells.
+enum class Patience { kLong, kShort };
+
+template <class Options>
+void set_patience(Patience patience, Options* options) {
+  options->timeout_s = patience == Patience::kLong ? 4 * kDeadline_s : 0.5;
+  options->max_backoff_s = patience == Patience::kLong ? options->max_backoff_s : 0.05;
+}
+
 // A source and what it needs to live.
 struct Rig {
   virtual ~Rig() = default;
   virtual std::unique_ptr<PanTiltSource> open() = 0;
 };
 
-struct VapixRig : Rig {
-  std::unique_ptr<PanTiltSource> open() override {
-    VapixSourceOptions options;
-    options.url = server.url();
-    options.user = "user";
-    options.password = "secret";
-    options.timeout_s = kDeadline_s;
-    return std::make_unique<VapixSource>(options);
-  }
-  AxisServer server{"user", "secret", [] { return "pan=10\r\ntilt=20\r\n"; }};
+// One whose device can be taken away and given back.
+struct LiveRig : Rig {
+  explicit LiveRig(Patience with_patience) : patience(with_patience) {}
+  virtual void take_away() = 0;
+  virtual void give_back() = 0;
+  Patience patience;
 };
 
-struct OnvifRig : Rig {
+struct VapixRig : LiveRig {
+  using LiveRig::LiveRig;
+  std::unique_ptr<PanTiltSource> open() override {
+    VapixSourceOptions options;
+    options.url = url;
+    options.user = "user";
+    options.password = "secret";
+    set_patience(patience, &options);
+    return std::make_unique<VapixSource>(options);
+  }
+  void take_away() override { server.reset(); }
+  void give_back() override { server = make(port); }
+  static std::unique_ptr<AxisServer> make(int port) {
+    return std::make_unique<AxisServer>(
+        "user", "secret", [] { return "pan=10\r\ntilt=20\r\n"; }, port);
+  }
+  std::unique_ptr<AxisServer> server = make(0);
+  int port = server->port();
+  std::string url = server->url();
+};
+
+struct OnvifRig : LiveRig {
+  using LiveRig::LiveRig;
   std::unique_ptr<PanTiltSource> open() override {
     OnvifSourceOptions options;
-    options.url = server.url();
+    options.url = url;
     options.user = "user";
     options.password = "secret";
     options.pan_range = {-3, 3};
     options.tilt_range = {-1, 1};
-    options.timeout_s = kDeadline_s;
+    set_patience(patience, &options);
     return std::make_unique<OnvifSource>(options);
   }
-  OnvifServer server{[] {
+  void take_away() override { server.reset(); }
+  void give_back() override { server = make(port); }
+  static std::unique_ptr<OnvifServer> make(int port) {
     OnvifDevice device;
     device.login = OnvifDevice::Login::kToken;
     device.user = "user";
     device.password = "secret";
-    return device;
-  }()};
+    return std::make_unique<OnvifServer>(device, port);
+  }
+  std::unique_ptr<OnvifServer> server = make(0);
+  int port = server->port();
+  std::string url = server->url();
 };
 
 struct RecordingRig : Rig {
@@ -79,20 +113,30 @@ struct RecordingRig : Rig {
   bool realtime;
 };
 
-struct AskedHeadRig : Rig {
-  explicit AskedHeadRig(HeadKind kind) : rig(kind) {}
-  std::unique_ptr<PanTiltSource> open() override { return rig.open(); }
+struct AskedHeadRig : LiveRig {
+  AskedHeadRig(HeadKind kind, Patience with_patience) : LiveRig(with_patience), rig(kind) {}
+  std::unique_ptr<PanTiltSource> open() override {
+    QuerySourceOptions options = rig.options();
+    set_patience(patience, &options);
+    return rig.open(options);
+  }
+  void take_away() override { rig.server().unplug(); }
+  void give_back() override { rig.server().plug(); }
   HeadRig rig;
 };
 
+template <class AnyRig>
 struct Case {
   const char* name;
-  std::function<std::unique_ptr<Rig>()> make;
+  std::function<std::unique_ptr<AnyRig>()> make;
 };
 
-void PrintTo(const Case& which, std::ostream* out) { *out << which.name; }
+template <class AnyRig>
+void PrintTo(const Case<AnyRig>& which, std::ostream* out) {
+  *out << which.name;
+}
 
-class PanTiltSourceContract : public ::testing::TestWithParam<Case> {
+class PanTiltSourceContract : public ::testing::TestWithParam<Case<Rig>> {
  protected:
   std::unique_ptr<Rig> rig_ = GetParam().make();
   std::unique_ptr<PanTiltSource> owned_ = rig_->open();
@@ -160,24 +204,79 @@ TEST_P(PanTiltSourceContract, HasANameWithoutPassword) {
   EXPECT_EQ(source_.name().find("secret"), std::string::npos);
 }
 
-Case asked_head(const char* name, HeadKind kind) {
-  return {name, [kind] { return std::make_unique<AskedHeadRig>(kind); }};
+class LivePanTiltSourceContract : public ::testing::TestWithParam<Case<LiveRig>> {
+ protected:
+  static void expect_report(const PanTiltSource& source) {
+    const std::string error = source.error();
+    EXPECT_EQ(error.rfind(source.name() + ": ", 0), 0U) << error;
+    EXPECT_GT(error.size(), source.name().size() + 2);
+    EXPECT_EQ(error.find('\n'), std::string::npos) << error;
+    EXPECT_EQ(error.find("secret"), std::string::npos) << error;
+  }
+  std::unique_ptr<LiveRig> rig_ = GetParam().make();
+  std::unique_ptr<PanTiltSource> source_ = rig_->open();
+  PanTiltSample sample_;
+};
+
+TEST_P(LivePanTiltSourceContract, SaysThatTheDeviceWentAndComesBackWithItByItself) {
+  ASSERT_EQ(read_until(*source_, sample_, ReadStatus::kOk), ReadStatus::kOk) << source_->error();
+  EXPECT_TRUE(sample_.restarted);
+  for (int life = 0; life < 3; ++life) {
+    rig_->take_away();
+    ASSERT_EQ(read_until(*source_, sample_, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    expect_report(*source_);
+    const double last_s = sample_.latest_time_s;
+    rig_->give_back();
+    ASSERT_EQ(read_until(*source_, sample_, ReadStatus::kOk), ReadStatus::kOk) << source_->error();
+    EXPECT_TRUE(sample_.restarted);
+    EXPECT_GE(sample_.earliest_time_s, last_s);
+    EXPECT_LE(sample_.earliest_time_s, sample_.latest_time_s);
+  }
 }
 
+TEST_P(LivePanTiltSourceContract, WaitsForADeviceThatIsNotThereYet) {
+  rig_->take_away();
+  ASSERT_EQ(read_until(*source_, sample_, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  expect_report(*source_);
+  rig_->give_back();
+  ASSERT_EQ(read_until(*source_, sample_, ReadStatus::kOk), ReadStatus::kOk) << source_->error();
+  EXPECT_TRUE(sample_.restarted);
+}
+
+TEST_P(LivePanTiltSourceContract, StopsWhileTheDeviceIsAway) {
+  rig_->take_away();
+  ASSERT_EQ(read_until(*source_, sample_, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  std::thread stopper([&] { source_->stop(); });
+  EXPECT_EQ(read_until(*source_, sample_, ReadStatus::kStopped), ReadStatus::kStopped);
+  stopper.join();
+}
+
+template <class AnyRig>
+std::vector<Case<AnyRig>> live_cases(Patience patience) {
+  std::vector<Case<AnyRig>> cases = {
+      {"Vapix", [patience] { return std::make_unique<VapixRig>(patience); }},
+      {"Onvif", [patience] { return std::make_unique<OnvifRig>(patience); }}};
+  for (const HeadKind kind :
+       {HeadKind::kPelcoDSerial, HeadKind::kPelcoDTcp, HeadKind::kViscaSerial, HeadKind::kViscaTcp,
+        HeadKind::kViscaUdp, HeadKind::kViscaUdpHeader, HeadKind::kPtuSerial, HeadKind::kPtuTcp}) {
+    cases.push_back({to_string(kind),
+                     [kind, patience] { return std::make_unique<AskedHeadRig>(kind, patience); }});
+  }
+  return cases;
+}
+
+const auto name_of = [](const auto& which) { return which.param.name; };
+
+INSTANTIATE_TEST_SUITE_P(Live, PanTiltSourceContract,
+                         ::testing::ValuesIn(live_cases<Rig>(Patience::kLong)), name_of);
 INSTANTIATE_TEST_SUITE_P(
-    Sources, PanTiltSourceContract,
-    ::testing::Values(
-        Case{"Vapix", [] { return std::make_unique<VapixRig>(); }},
-        Case{"Onvif", [] { return std::make_unique<OnvifRig>(); }},
-        Case{"Recording", [] { return std::make_unique<RecordingRig>(false); }},
-        Case{"RecordingInRealTime", [] { return std::make_unique<RecordingRig>(true); }},
-        asked_head("PelcoDSerial", HeadKind::kPelcoDSerial),
-        asked_head("PelcoDTcp", HeadKind::kPelcoDTcp),
-        asked_head("ViscaSerial", HeadKind::kViscaSerial),
-        asked_head("ViscaTcp", HeadKind::kViscaTcp), asked_head("ViscaUdp", HeadKind::kViscaUdp),
-        asked_head("ViscaUdpHeader", HeadKind::kViscaUdpHeader),
-        asked_head("PtuSerial", HeadKind::kPtuSerial), asked_head("PtuTcp", HeadKind::kPtuTcp)),
-    [](const auto& which) { return which.param.name; });
+    Recording, PanTiltSourceContract,
+    ::testing::Values(Case<Rig>{"AtFullSpeed",
+                                [] { return std::make_unique<RecordingRig>(false); }},
+                      Case<Rig>{"InRealTime", [] { return std::make_unique<RecordingRig>(true); }}),
+    name_of);
+INSTANTIATE_TEST_SUITE_P(Live, LivePanTiltSourceContract,
+                         ::testing::ValuesIn(live_cases<LiveRig>(Patience::kShort)), name_of);
 
 }  // namespace
 }  // namespace alidade

@@ -1,19 +1,13 @@
-// What every FrameSource promises, run on each of them.
+// The sources that every machine can have, under the contract of FrameSource.
 
-#include <gtest/gtest.h>
+#include "test/platform/video/frame_source_contract.h"
 
-#include <atomic>
-#include <functional>
-#include <memory>
-#include <ostream>
-#include <thread>
+#include <vector>
 
 #include "platform/video/mjpeg_source.h"
 #include "platform/video/recording_frame_source.h"
 #include "platform/video/rtp_source.h"
-#include "test/platform/support/eventually.h"
 #include "test/platform/support/mjpeg_server.h"
-#include "test/platform/support/open_files.h"
 #include "test/platform/support/rtp_sender.h"
 #include "test/platform/support/rtsp_server.h"
 #include "test/support/temporary_directory.h"
@@ -21,38 +15,42 @@
 namespace alidade {
 namespace {
 
-// A source and what it needs to live.
-struct Rig {
-  virtual ~Rig() = default;
-  virtual std::unique_ptr<FrameSource> open() const = 0;
-  std::unique_ptr<FrameSource> source;
-};
+// How soon a camera that is away is noticed, by silence where nothing else tells.
+enum class Patience { kLong, kShort };
 
-struct RtspRig : Rig {
-  explicit RtspRig(const RtspStream& stream) : server(stream, "user", "secret") {
+template <class Options>
+void set_patience(Patience patience, Options* options, double short_timeout_s = 10) {
+  options->timeout_s = patience == Patience::kLong ? kDeadline_s : short_timeout_s;
+  options->max_backoff_s = patience == Patience::kLong ? options->max_backoff_s : 0.05;
+}
+
+struct RtspRig : LiveFrameSourceRig {
+  RtspRig(const RtspStream& stream, Patience patience) : server(stream, "user", "secret") {
     options.url = server.url();
     options.user = "user";
     options.password = "secret";
-    options.timeout_s = kDeadline_s;
+    set_patience(patience, &options);
     source = open();
   }
   std::unique_ptr<FrameSource> open() const override {
     return std::make_unique<RtpSource>(options);
   }
+  void take_away() override { server.kill(); }
+  void give_back() override { server.restart(); }
   RtspServer server;
   RtpSourceOptions options;
 };
 
-struct RtpRig : Rig {
-  RtpRig() {
+struct RtpRig : LiveFrameSourceRig {
+  explicit RtpRig(Patience patience) {
     const int port = free_rtp_port();
     options.url = "rtp://@:" + std::to_string(port);
-    options.timeout_s = kDeadline_s;
+    set_patience(patience, &options, 0.5);
     source = open();
     thread = std::thread([this, port] {
       RtpSender sender(RtpSender::Codec::kMjpeg, port);
       while (!over) {
-        sender.send();
+        if (!away) sender.send();
         std::this_thread::sleep_for(std::chrono::milliseconds(20));  // the camera's pace
       }
     });
@@ -64,28 +62,33 @@ struct RtpRig : Rig {
   std::unique_ptr<FrameSource> open() const override {
     return std::make_unique<RtpSource>(options);
   }
+  void take_away() override { away = true; }
+  void give_back() override { away = false; }
   RtpSourceOptions options;
   std::atomic<bool> over{false};
+  std::atomic<bool> away{false};
   std::thread thread;
 };
 
-struct MjpegRig : Rig {
-  MjpegRig() {
+struct MjpegRig : LiveFrameSourceRig {
+  explicit MjpegRig(Patience patience) {
     options.url = server.url();
     options.user = MjpegServer::kUser;
     options.password = "secret";
-    options.timeout_s = kDeadline_s;
+    set_patience(patience, &options);
     source = open();
   }
   ~MjpegRig() override { source.reset(); }  // before the server, which waits for it
   std::unique_ptr<FrameSource> open() const override {
     return std::make_unique<MjpegSource>(options);
   }
+  void take_away() override { server.hang_up = true; }
+  void give_back() override { server.hang_up = false; }
   MjpegServer server;
   MjpegSourceOptions options;
 };
 
-struct RecordingRig : Rig {
+struct RecordingRig : FrameSourceRig {
   explicit RecordingRig(bool realtime) {
     directory.write("recording.yaml", "format: 1\nwidth: 4\nheight: 2\n");
     std::string rows;
@@ -109,100 +112,29 @@ struct RecordingRig : Rig {
   RecordingFrameSourceOptions options;
 };
 
-struct Case {
-  const char* name;
-  std::function<std::unique_ptr<Rig>()> make;
-};
-
-void PrintTo(const Case& which, std::ostream* out) { *out << which.name; }
-
-class FrameSourceContract : public ::testing::TestWithParam<Case> {
- protected:
-  std::unique_ptr<Rig> rig_ = GetParam().make();
-  FrameSource& source_ = *rig_->source;
-  Frame frame_;
-};
-
-TEST_P(FrameSourceContract, NumbersItsFramesAndGivesEachItsPicture) {
-  for (int i = 0; i < 10; ++i) {
-    ASSERT_EQ(read_until(source_, frame_, ReadStatus::kOk), ReadStatus::kOk) << source_.error();
-    EXPECT_EQ(frame_.stamp.frame, i);
-    EXPECT_GT(frame_.width, 0);
-    EXPECT_GT(frame_.height, 0);
-    ASSERT_NE(frame_.luma, nullptr);
-    EXPECT_GE(frame_.stride, frame_.width);
-    EXPECT_NE(frame_.owner, nullptr);
-  }
+template <class Rig>
+std::vector<FrameSourceCase<Rig>> live_cases(Patience patience) {
+  return {{"RtspMjpeg", [patience] { return std::make_unique<RtspRig>(kMjpegStream, patience); }},
+          {"RtspH264", [patience] { return std::make_unique<RtspRig>(kH264Stream, patience); }},
+          {"Rtp", [patience] { return std::make_unique<RtpRig>(patience); }},
+          {"Mjpeg", [patience] { return std::make_unique<MjpegRig>(patience); }}};
 }
 
-TEST_P(FrameSourceContract, LosesNothingWhenAReadDoesNotWait) {
-  int frames = 0;
-  EXPECT_TRUE(eventually([&] {
-    const ReadStatus status = source_.read(frame_, 0);
-    EXPECT_TRUE(status == ReadStatus::kOk || status == ReadStatus::kTimeout) << source_.error();
-    if (status == ReadStatus::kOk) {
-      EXPECT_EQ(frame_.stamp.frame, frames++);
-    }
-    return frames == 5;
-  }));
-}
+const auto name_of = [](const auto& which) { return which.param.name; };
 
-TEST_P(FrameSourceContract, StaysStoppedWhenStoppedBeforeTheFirstRead) {
-  source_.stop();
-  source_.stop();
-  EXPECT_EQ(source_.read(frame_, kDeadline_s), ReadStatus::kStopped);
-  EXPECT_EQ(source_.read(frame_, 0), ReadStatus::kStopped);
-}
-
-TEST_P(FrameSourceContract, EndsAReadWhenAnotherThreadStopsIt) {
-  std::atomic<int> frames{0};
-  std::thread reader([&] {
-    ReadStatus status = ReadStatus::kOk;
-    while (status == ReadStatus::kOk || status == ReadStatus::kTimeout) {
-      status = source_.read(frame_, kDeadline_s);
-      ++frames;
-    }
-    // A recording at full speed may be over, or out of pictures, before the stop.
-    EXPECT_NE(status, ReadStatus::kDisconnected);
-  });
-  EXPECT_TRUE(eventually([&] { return frames > 0; }));
-  source_.stop();
-  reader.join();
-  EXPECT_EQ(source_.read(frame_, 0), ReadStatus::kStopped);
-}
-
-TEST_P(FrameSourceContract, LeaksNoFileDescriptorOverAThousandLives) {
-  rig_->source.reset();
-  const auto one_life = [&](double timeout_s) {
-    const std::unique_ptr<FrameSource> source = rig_->open();
-    const ReadStatus status = source->read(frame_, timeout_s);
-    EXPECT_NE(status, ReadStatus::kFailed) << source->error();
-    frame_ = Frame{};
-  };
-  one_life(1);  // what stays open for good
-  const auto before = open_files();
-  for (int i = 0; i < 1000; ++i) {
-    one_life(i % 250 == 0 ? 1 : 0);  // most end in the middle of connecting
-  }
-  // The rig's server, in this process, has its own ends; it notices their closing in time.
-  EXPECT_TRUE(eventually([&] { return open_files() <= before; })) << open_files() - before;
-}
-
-TEST_P(FrameSourceContract, HasANameWithoutPassword) {
-  EXPECT_FALSE(source_.name().empty());
-  EXPECT_EQ(source_.name().find("secret"), std::string::npos);
-}
-
+INSTANTIATE_TEST_SUITE_P(Network, FrameSourceContract,
+                         ::testing::ValuesIn(live_cases<FrameSourceRig>(Patience::kLong)), name_of);
 INSTANTIATE_TEST_SUITE_P(
-    Sources, FrameSourceContract,
-    ::testing::Values(Case{"RtspMjpeg", [] { return std::make_unique<RtspRig>(kMjpegStream); }},
-                      Case{"RtspH264", [] { return std::make_unique<RtspRig>(kH264Stream); }},
-                      Case{"Rtp", [] { return std::make_unique<RtpRig>(); }},
-                      Case{"Mjpeg", [] { return std::make_unique<MjpegRig>(); }},
-                      Case{"Recording", [] { return std::make_unique<RecordingRig>(false); }},
-                      Case{"RecordingInRealTime",
-                           [] { return std::make_unique<RecordingRig>(true); }}),
-    [](const auto& which) { return which.param.name; });
+    Recording, FrameSourceContract,
+    ::testing::Values(
+        FrameSourceCase<FrameSourceRig>{"AtFullSpeed",
+                                        [] { return std::make_unique<RecordingRig>(false); }},
+        FrameSourceCase<FrameSourceRig>{"InRealTime",
+                                        [] { return std::make_unique<RecordingRig>(true); }}),
+    name_of);
+INSTANTIATE_TEST_SUITE_P(Network, LiveFrameSourceContract,
+                         ::testing::ValuesIn(live_cases<LiveFrameSourceRig>(Patience::kShort)),
+                         name_of);
 
 }  // namespace
 }  // namespace alidade
