@@ -69,7 +69,7 @@ class RtspSession::Message {
     guint8* data = nullptr;
     guint size = 0;
     gst_rtsp_message_get_body(&message_, &data, &size);
-    return {data, size};
+    return {data, size == 0 ? 0 : size - 1};  // the library adds a NUL and counts it
   }
 
  private:

@@ -39,10 +39,10 @@ def free_port():
 class Process:
     """A child whose output lines are gathered by threads, so that it never blocks on a full pipe."""
 
-    def __init__(self, *arguments, **environment):
+    def __init__(self, *arguments, stdin=False, **environment):
         self.arguments = [str(a) for a in arguments]
-        self.child = subprocess.Popen(self.arguments, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True,
-                                      env={**os.environ, **environment})
+        self.child = subprocess.Popen(self.arguments, stdin=subprocess.PIPE if stdin else None, stdout=subprocess.PIPE,
+                                      stderr=subprocess.PIPE, text=True, env={**os.environ, **environment})
         self.lines, self.errors = queue.Queue(), []
         self.threads = [threading.Thread(target=self._gather_output), threading.Thread(target=self._gather_errors)]
         for thread in self.threads:
@@ -63,6 +63,11 @@ class Process:
             return self.lines.get(timeout=DEADLINE_S)
         except queue.Empty:
             raise AssertionError(f"no line within {DEADLINE_S} s from {self.arguments}\n{self.error_text()}") from None
+
+    def tell(self, line):
+        """A line to its stdin, if that was asked for."""
+        self.child.stdin.write(line + "\n")
+        self.child.stdin.flush()
 
     def error_text(self):
         return "\n".join(self.errors)
@@ -135,8 +140,9 @@ class SystemTest(unittest.TestCase):
                 process.child.wait()
             for thread in process.threads:
                 thread.join()
-            process.child.stdout.close()
-            process.child.stderr.close()
+            for pipe in (process.child.stdin, process.child.stdout, process.child.stderr):
+                if pipe is not None:
+                    pipe.close()
 
     def camera(self, **options):
         camera = Camera(self.folder, **options)

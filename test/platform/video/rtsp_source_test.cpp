@@ -6,6 +6,8 @@
 #include <cmath>
 #include <filesystem>
 #include <iterator>
+#include <set>
+#include <string>
 #include <thread>
 
 #include "platform/video/rtp_source.h"
@@ -89,6 +91,24 @@ TEST_P(RtspSource, DeliversWhitePicturesOnTheSendersClock) {
       EXPECT_NEAR(*frame.stamp.sender_utc_s, now_utc_s, 60);  // the right epoch
     }
   }
+}
+
+TEST_P(RtspSource, PutsPicturesOfManyPacketsTogether) {
+  std::string launch = GetParam().stream->launch;
+  const std::string white = "pattern=white";
+  launch.replace(launch.find(white), white.size(), "pattern=snow");
+  const RtspServer server({"/snow", launch});
+  RtpSource source(options_for(server.url(), GetParam().transport));
+  Frame frame;
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    std::set<int> greys;
+    for (int u = 0; u < frame.width; ++u) {
+      greys.insert(frame.luma[(frame.height - 1) * frame.stride + u]);
+    }
+    EXPECT_GT(greys.size(), 50U) << "the last row, from the last packet";
+  }
+  EXPECT_EQ(source.counters().damaged, 0);
 }
 
 TEST_P(RtspSource, OutlivesAKillAndARestartOfTheServer) {
