@@ -315,6 +315,22 @@ void read_live(Section& section, LiveConfig* live) {
   section.text("rtp_host", &live->rtp_host);
   section.integer("rtp_port", &live->rtp_port, kPort);
   section.path("sdp_file", &live->sdp_file);
+  const auto optional_port = [&](const char* key, std::optional<int>* port) {
+    int given = -1;
+    section.integer(key, &given, kPort);
+    if (given >= 0) *port = given;
+  };
+  optional_port("mjpeg_port", &live->mjpeg_port);
+  optional_port("onvif_port", &live->onvif_port);
+  if (live->mjpeg_port && live->codec != Codec::kMjpeg) {
+    section.fail("mjpeg_port needs codec: mjpeg");
+  }
+  using Head = LiveConfig::Head;
+  using Link = LiveConfig::Link;
+  section.choice<Head>("head", &live->head,
+                       {{"pelco_d", Head::kPelcoD}, {"visca", Head::kVisca}, {"ptu", Head::kPtu}});
+  section.choice<Link>("head_link", &live->head_link,
+                       {{"serial", Link::kSerial}, {"tcp", Link::kTcp}, {"udp", Link::kUdp}});
   section.text("user", &live->user);
   std::string variable;
   section.text("password_env", &variable);

@@ -127,6 +127,12 @@ struct LiveConfig {
   int rtp_port = 0;
   std::filesystem::path sdp_file;  // of the plain RTP stream
   std::string user, password;      // of RTSP and HTTP; empty: no login
+  // Besides: the pictures as MJPEG over HTTP, ONVIF, and a head that is asked. Ports: 0: any free one.
+  std::optional<int> mjpeg_port, onvif_port;
+  enum class Head { kNone, kPelcoD, kVisca, kPtu };
+  enum class Link { kSerial, kTcp, kUdp };
+  Head head = Head::kNone;
+  Link head_link = Link::kSerial;
 };
 
 struct Config {

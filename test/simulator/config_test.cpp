@@ -82,6 +82,8 @@ TEST_F(VirtualCameraConfig, NamesFileAndLineOfEveryMistake) {
            Mistake{"scene:\n  photos:\n    - {file: a.jpg}\n",
                    "camera.yaml:3: width_deg is missing"},
            Mistake{"scene: {photos: 3}\n", "camera.yaml:1: photos must be a list"},
+           Mistake{"live: {codec: h264, mjpeg_port: 0}\n",
+                   "camera.yaml:1: mjpeg_port needs codec: mjpeg"},
            Mistake{"live: {user: me}\n", "camera.yaml:1: user and password_env come together"},
            Mistake{"camera: {line_delay_us: 60}\n",
                    "camera.yaml:1: camera: reading out all rows (line_delay_us x height) outlasts "

@@ -6,13 +6,17 @@
 #include <cmath>
 #include <cstdio>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <vector>
 
+#include "test/platform/support/head_server.h"
+#include "test/platform/support/onvif_server.h"
 #include "test/simulator/parallel.h"
 #include "test/simulator/renderer.h"
 #include "test/simulator/servers/encoder.h"
+#include "test/simulator/servers/mjpeg_stream.h"
 #include "test/simulator/servers/vapix_server.h"
 #include "test/simulator/servers/video_server.h"
 #include "test/simulator/telemetry.h"
@@ -112,6 +116,50 @@ VideoServerOptions rtp_options(const Config& config) {
   return options;
 }
 
+std::unique_ptr<SimulatedHead> make_head(LiveConfig::Head head,
+                                         std::function<HeadPosition()> position) {
+  switch (head) {
+    case LiveConfig::Head::kPelcoD:
+      return std::make_unique<PelcoDHead>(std::move(position));
+    case LiveConfig::Head::kVisca:
+      return std::make_unique<ViscaHead>(std::move(position));
+    case LiveConfig::Head::kPtu:
+      return std::make_unique<PtuHead>(std::move(position));
+    case LiveConfig::Head::kNone:
+      break;
+  }
+  return nullptr;
+}
+
+HeadServer::Link link_of(LiveConfig::Link link) {
+  switch (link) {
+    case LiveConfig::Link::kTcp:
+      return HeadServer::Link::kTcp;
+    case LiveConfig::Link::kUdp:
+      return HeadServer::Link::kUdp;
+    case LiveConfig::Link::kSerial:
+      break;
+  }
+  return HeadServer::Link::kSerial;
+}
+
+// ONVIF in its generic space: -1..1 for half a turn of pan and a quarter of tilt either way.
+OnvifDevice onvif_device(const LiveConfig& live, const std::function<HeadPosition()>& position) {
+  OnvifDevice device;
+  device.login = live.user.empty() ? OnvifDevice::Login::kNone : OnvifDevice::Login::kToken;
+  device.user = live.user;
+  device.password = live.password;
+  device.announced_host.clear();
+  device.position = [position] {
+    const HeadPosition now = position();
+    char text[128];
+    std::snprintf(text, sizeof text, R"(<tt:PanTilt x="%.7f" y="%.7f"/><tt:Zoom x="0"/>)",
+                  now.pan_deg / 180, now.tilt_deg / 90);
+    return std::string(text);
+  };
+  return device;
+}
+
 template <class Server>
 void start(Server& server) {
   std::string error;
@@ -151,12 +199,37 @@ void serve_live(const Config& config, const std::atomic<bool>& stop) {
   vapix_options.port = config.live.http_port;
   vapix_options.user = config.live.user;
   vapix_options.password = config.live.password;
-  VapixServer vapix(vapix_options, [&](double now) {
+  std::mutex measuring;  // each server asks on threads of its own
+  const auto position_at = [&](double now) {
+    const std::lock_guard<std::mutex> lock(measuring);
     const Angles angles = telemetry.measure(now - origin - config.telemetry.latency);
-    return VapixPosition{angles.pan * kDegreesPerRadian, angles.tilt * kDegreesPerRadian, 1};
+    return HeadPosition{angles.pan * kDegreesPerRadian, angles.tilt * kDegreesPerRadian, 1};
+  };
+  const auto position = [&] { return position_at(monotonic_now()); };
+  VapixServer vapix(vapix_options, [&](double now) {
+    const HeadPosition there = position_at(now);
+    return VapixPosition{there.pan_deg, there.tilt_deg, 1};
   });
   start(vapix);
-  std::printf("ready rtsp://127.0.0.1:%d/video http://127.0.0.1:%d\n", video.port(), vapix.port());
+  std::string ready = "ready rtsp://127.0.0.1:" + std::to_string(video.port()) +
+                      "/video http://127.0.0.1:" + std::to_string(vapix.port());
+  std::optional<MjpegStream> mjpeg;
+  if (config.live.mjpeg_port) {
+    start(mjpeg.emplace(
+        MjpegStreamOptions{*config.live.mjpeg_port, config.live.user, config.live.password}));
+    ready += " mjpeg=http://127.0.0.1:" + std::to_string(mjpeg->port()) + "/mjpg/video.mjpg";
+  }
+  std::optional<OnvifServer> onvif;
+  if (config.live.onvif_port) {
+    onvif.emplace(onvif_device(config.live, position), *config.live.onvif_port);
+    ready += " onvif=" + onvif->url();
+  }
+  std::optional<HeadServer> head;
+  if (config.live.head != LiveConfig::Head::kNone) {
+    head.emplace(link_of(config.live.head_link), make_head(config.live.head, position));
+    ready += " head=" + head->address();
+  }
+  std::printf("%s\n", ready.c_str());
   std::fflush(stdout);
 
   FrameTimeline timeline(config);
@@ -170,6 +243,7 @@ void serve_live(const Config& config, const std::atomic<bool>& stop) {
     const auto& frame = frames[static_cast<std::size_t>(event.sequence) % frames.size()];
     video.push(frame.data(), frame.size(), origin + event.sender_s);
     if (rtp) rtp->push(frame.data(), frame.size(), origin + event.sender_s);
+    if (mjpeg) mjpeg->push(frame.data(), frame.size(), origin + event.sender_s);
     if (!truth) continue;
     truth->add(event, path->at(event.capture_s), origin);
     if (monotonic_now() >= next_flush) {
@@ -179,6 +253,7 @@ void serve_live(const Config& config, const std::atomic<bool>& stop) {
   }
   if (truth) truth->flush();
   if (rtp) rtp->stop();
+  if (mjpeg) mjpeg->stop();
   video.stop();
   vapix.stop();
 }

@@ -1,6 +1,6 @@
 #pragma once
-// Serves the virtual camera on real sockets: video by RTSP (and plain RTP if asked for), pan and tilt
-// by VAPIX.
+// Serves the virtual camera on real sockets: video by RTSP (and, if asked for, plain RTP and MJPEG over
+// HTTP), pan and tilt by VAPIX (and ONVIF, and Pelco-D, VISCA or PTU on a serial line, TCP or UDP).
 //
 // All is on the host's CLOCK_MONOTONIC. A frame captured at T is handed to the video server at
 // T + video latency (+ jitter), where video latency = telemetry latency - clock_offset. Stamped at
@@ -15,7 +15,8 @@
 
 namespace alidade::simulator {
 
-// Prints `ready rtsp://... http://...` on stdout once the sockets are open, then serves until the
+// Prints `ready rtsp://... http://...` on stdout once the sockets are open, with ` mjpeg=URL`,
+// ` onvif=URL` and ` head=ADDRESS` for what else there is, then serves until the
 // duration is over or `stop` is set. Writes truth.yaml and truth.csv into config.truth_dir, if given,
 // as it goes (each second). Throws ConfigError or std::runtime_error.
 void serve_live(const Config& config, const std::atomic<bool>& stop);

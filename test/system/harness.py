@@ -113,10 +113,11 @@ class Camera(Process):
         file.write_text(json.dumps(config))  # JSON is YAML
         super().__init__(SIMULATE, "-c", file, **environment)
         words = (self.line() or "").split()
-        if len(words) != 3 or words[0] != "ready":
+        if len(words) < 3 or words[0] != "ready":
             self.end(signal.SIGKILL)
             raise AssertionError(f"the virtual camera did not start: {words}\n{self.error_text()}")
-        self.video_url, self.pan_tilt_url = words[1:]
+        self.video_url, self.pan_tilt_url = words[1:3]
+        self.others = dict(word.split("=", 1) for word in words[3:])  # mjpeg, onvif, head
 
 
 class SystemTest(unittest.TestCase):
@@ -155,7 +156,7 @@ class SystemTest(unittest.TestCase):
         return process
 
     def write_config(self, camera=None, video=None, pan_tilt=None, focal_length_px=FOCAL_LENGTH_PX, **sections):
-        """Configuration of alidade for the given camera, with the truth as its calibration."""
+        """Configuration of alidade for the given camera, with the truth as its calibration; None leaves a key out."""
         config = {
             "video": {"type": "rtsp", "url": camera.video_url if camera else "", **(video or {})},
             "pan_tilt": {"type": "vapix", "url": camera.pan_tilt_url if camera else "", "rate_hz": 50,
@@ -163,6 +164,9 @@ class SystemTest(unittest.TestCase):
             "camera": {"focal_length_px": focal_length_px},
             "calibration": {"file": str(camera.truth / "truth.yaml"), "auto": False} if camera else {},
             "realtime": {"mode": "PT"}, "output": {"json": True}, **sections}
+        for section in config.values():
+            for key in [key for key, value in section.items() if value is None]:
+                del section[key]
         file = self.folder / "alidade.yaml"
         file.write_text(json.dumps(config))
         return file

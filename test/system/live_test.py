@@ -42,11 +42,13 @@ class Run(SystemTest):
         # the answers must at least be nearer to the truth than to a forgotten clock offset.
         self.assertLess(rms(errors), 2 * TELEMETRY_SIGMA_RAD + 0.5 * abs(offset) * rms(speeds))
 
-    def check_run(self, video=None, **options):
+    def check_run(self, video=None, links=lambda camera: ({}, {}), **options):
         camera = self.camera(**options)
+        other_video, other_pan_tilt = links(camera)
         user = options.get("user", "")
         login = {"user": user, "password_env": "TEST_PASSWORD"} if user else {}
-        config = self.write_config(camera, video={**login, **(video or {})}, pan_tilt=login)
+        config = self.write_config(camera, video={**login, **(video or {}), **other_video},
+                                   pan_tilt={**login, **other_pan_tilt})
         run = self.alidade("run", "-c", config, TEST_PASSWORD="right horse")
         records = self.records(run, 60)
         code, _ = run.end(signal.SIGINT)
@@ -69,6 +71,19 @@ class Run(SystemTest):
 
     def test_with_digest_login(self):
         self.check_run(user="viewer")
+
+    def test_mjpeg_over_http_and_a_head_on_a_serial_line(self):
+        def links(camera):
+            return ({"type": "mjpeg", "url": camera.others["mjpeg"]},
+                    {"type": "pelco_d", "url": None, "device": camera.others["head"], "baud": 115200})
+        self.check_run(links=links, settings={"live": {"mjpeg_port": 0, "head": "pelco_d"}})
+
+    def test_mjpeg_over_http_and_onvif_with_login(self):
+        def links(camera):
+            return ({"type": "mjpeg", "url": camera.others["mjpeg"]},
+                    {"type": "onvif", "url": camera.others["onvif"], "pan_range_deg": [-180, 180],
+                     "tilt_range_deg": [-90, 90]})
+        self.check_run(links=links, user="viewer", settings={"live": {"mjpeg_port": 0, "onvif_port": 0}})
 
     def test_survives_the_death_and_return_of_the_camera(self):
         rtsp_port, http_port = free_port(), free_port()
