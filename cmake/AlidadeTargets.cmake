@@ -17,8 +17,12 @@ target_compile_options(alidade_options INTERFACE
 if(ALIDADE_SANITIZE)
   target_compile_options(alidade_options INTERFACE
     -fsanitize=${ALIDADE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
-    -Wno-null-dereference -Wno-maybe-uninitialized -Wno-array-bounds -Wno-stringop-overflow)
+    $<$<CXX_COMPILER_ID:GNU>:-Wno-null-dereference;-Wno-maybe-uninitialized;-Wno-array-bounds;-Wno-stringop-overflow>)
   target_link_options(alidade_options INTERFACE -fsanitize=${ALIDADE_SANITIZE})
+endif()
+if(ALIDADE_FUZZ)
+  # Every library tells libFuzzer which ways its code took.
+  target_compile_options(alidade_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
 # alidade_library(model [INTERNAL] HEADERS ... SOURCES ... PUBLIC ... PRIVATE ... OPTIONS ...)
@@ -106,4 +110,36 @@ function(alidade_benchmark name)
     --benchmark_out=${PROJECT_BINARY_DIR}/benchmark-results/${name}.json
     --benchmark_out_format=json)
   set_tests_properties(${name} PROPERTIES LABELS benchmark RUN_SERIAL ON TIMEOUT 600)
+endfunction()
+
+# alidade_fuzz_target(vapix LINK alidade::platform [MUTATIONS n])
+# builds fuzz_vapix of vapix_fuzz.cpp and registers it. Under the preset `fuzz` it is linked with libFuzzer, and
+# `ctest -L fuzz` lets it search for a minute, from corpus/vapix and regressions/vapix on; what it finds worth
+# keeping goes to <build>/fuzz-corpus/vapix/, an input that fails to <build>/fuzz-artifacts/. In all other
+# builds fuzz_regressions_vapix runs those files, and n mutations of them (alidade::regression_driver).
+function(alidade_fuzz_target name)
+  cmake_parse_arguments(A "" "MUTATIONS" "LINK" ${ARGN})
+  set(inputs ${CMAKE_CURRENT_SOURCE_DIR}/corpus/${name})
+  # Globbed at each build: the first regression of a target makes its folder.
+  file(GLOB regressions CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/regressions/${name})
+  list(APPEND inputs ${regressions})
+  if(ALIDADE_FUZZ)
+    set(found ${PROJECT_BINARY_DIR}/fuzz-corpus/${name})
+    set(artifacts ${PROJECT_BINARY_DIR}/fuzz-artifacts)
+    file(MAKE_DIRECTORY ${found} ${artifacts})
+    alidade_executable(fuzz_${name} SOURCES ${name}_fuzz.cpp LINK ${A_LINK})
+    target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
+    add_test(NAME fuzz_${name}
+      COMMAND fuzz_${name} -max_total_time=60 -timeout=30 -print_final_stats=1
+        -artifact_prefix=${artifacts}/${name}- ${found} ${inputs})
+    set_tests_properties(fuzz_${name} PROPERTIES LABELS fuzz TIMEOUT 180)
+  else()
+    alidade_executable(fuzz_${name} SOURCES ${name}_fuzz.cpp LINK alidade::regression_driver ${A_LINK})
+    if(NOT A_MUTATIONS)
+      set(A_MUTATIONS 5000)
+    endif()
+    add_test(NAME fuzz_regressions_${name}
+      COMMAND fuzz_${name} --mutations=${A_MUTATIONS} ${inputs})
+    set_tests_properties(fuzz_regressions_${name} PROPERTIES TIMEOUT 120)
+  endif()
 endfunction()
