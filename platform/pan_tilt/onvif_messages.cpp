@@ -10,6 +10,8 @@
 #include <cstdlib>
 #include <pugixml.hpp>
 
+#include "platform/system/shown.h"
+
 namespace alidade {
 namespace {
 
@@ -17,14 +19,6 @@ constexpr std::size_t kShown = 120;  // bytes of a foreign text that an error re
 constexpr const char* kWss = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-";
 
 // --- text
-
-// What a terminal can show, on one line.
-std::string shown(std::string_view text) {
-  std::string line(text.substr(0, kShown));
-  std::replace_if(
-      line.begin(), line.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
-  return line;
-}
 
 std::string escaped(std::string_view text) {
   std::string xml;
@@ -158,7 +152,8 @@ pugi::xml_node load_answer(std::string_view bytes, const OnvifCall& call,
       child(load_body(bytes, document), std::string(call.name) + "Response");
   if (!answer) {
     *error = std::string("no answer to ") + call.name + " in '" +
-             shown(trimmed(bytes.substr(0, bytes.find('\n')))) + "'; is it an ONVIF service?";
+             shown(trimmed(bytes.substr(0, bytes.find('\n'))), kShown) +
+             "'; is it an ONVIF service?";
   }
   return answer;
 }
@@ -294,7 +289,7 @@ std::optional<SoapFault> parse_soap_fault(std::string_view body) {
   SoapFault result;
   const std::string_view local = local_name(what.c_str());
   result.not_authorized = local == "NotAuthorized" || local == "FailedAuthentication";
-  result.text = shown(what + (reason.empty() ? "" : ": " + reason));
+  result.text = shown(what + (reason.empty() ? "" : ": " + reason), kShown);
   return result;
 }
 
@@ -385,13 +380,12 @@ bool parse_onvif_status(std::string_view body, OnvifStatus* status, std::string*
     status->space = OnvifStatus::Space::kDegrees;
     limit = 360;
   } else {
-    *error = "the position is in the space '" + shown(space) +
+    *error = "the position is in the space '" + shown(space, kShown) +
              "'; known are PositionGenericSpace and SphericalPositionSpaceDegrees";
     return false;
   }
   if (std::abs(*pan) > limit || std::abs(*tilt) > limit) {
-    *error = "the position " + std::to_string(*pan) + ", " + std::to_string(*tilt) +
-             " is outside its space";
+    *error = "the position " + shown(*pan) + ", " + shown(*tilt) + " is outside its space";
     return false;
   }
   status->pan = *pan;

@@ -1,26 +1,20 @@
 #include "platform/pan_tilt/ptu_protocol.h"
 
-#include <algorithm>
 #include <cmath>
 #include <cstdlib>
+#include <utility>
+
+#include "platform/system/shown.h"
 
 namespace alidade {
 namespace {
 
 constexpr std::string_view kEndOfLine = "\r\n";
-constexpr std::size_t kShown = 80;  // bytes of a foreign line that an error repeats
-constexpr double kMaxSteps = 1e7;   // more than any resolution has in a turn
+constexpr std::size_t kLongestLine = 80;  // bytes
+constexpr double kMaxSteps = 1e7;         // more than any resolution has in a turn
 constexpr double kDegPerArcSecond = 1.0 / 3600;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
-// What a terminal can show.
-std::string shown(std::string_view text) {
-  std::string line(text.substr(0, kShown));
-  std::replace_if(
-      line.begin(), line.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
-  return line;
-}
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(' ');
@@ -152,7 +146,7 @@ Answer PtuProtocol::find(std::string_view bytes) {
   Answer answer;
   const std::optional<PtuLine> line = find_ptu_line(bytes);
   if (!line) {
-    if (bytes.find_first_of(kEndOfLine) != std::string_view::npos || bytes.size() > kShown) {
+    if (bytes.find_first_of(kEndOfLine) != std::string_view::npos || bytes.size() > kLongestLine) {
       answer.problem =
           "bytes come, but no answer of a PTU among them: is it this protocol and baud?";
     }

@@ -4,11 +4,12 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "platform/system/shown.h"
+
 namespace alidade {
 namespace {
 
 constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
-constexpr std::size_t kShown = 80;  // bytes of a foreign answer that an error repeats
 
 std::string_view trimmed(std::string_view text) {
   const std::size_t first = text.find_first_not_of(" \t\r");
@@ -18,12 +19,8 @@ std::string_view trimmed(std::string_view text) {
   return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
 }
 
-// What a terminal can show of the first line.
-std::string shown(std::string_view text) {
-  std::string line(trimmed(text.substr(0, text.find('\n'))).substr(0, kShown));
-  std::replace_if(
-      line.begin(), line.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
-  return line;
+std::string first_line(std::string_view text) {
+  return shown(trimmed(text.substr(0, text.find('\n'))));
 }
 
 bool parse_number(std::string_view text, double* value) {
@@ -37,7 +34,7 @@ bool parse_number(std::string_view text, double* value) {
 
 bool parse_vapix_position(std::string_view body, VapixPosition* position, std::string* error) {
   if (trimmed(body.substr(0, body.find('\n'))).substr(0, 6) == "Error:") {
-    *error = "the camera answers '" + shown(body) + "'";
+    *error = "the camera answers '" + first_line(body) + "'";
     return false;
   }
   std::optional<double> pan_deg;
@@ -60,19 +57,19 @@ bool parse_vapix_position(std::string_view body, VapixPosition* position, std::s
     }
     double value = 0;
     if (!parse_number(trimmed(line.substr(equals + 1)), &value)) {
-      *error = "'" + shown(line) + "' in the position is not a number";
+      *error = "'" + first_line(line) + "' in the position is not a number";
       return false;
     }
     *target = value;
   }
   for (const auto& [name, angle] : {std::pair("pan", &pan_deg), std::pair("tilt", &tilt_deg)}) {
     if (!*angle) {
-      *error = std::string("no ") + name + " in the answer '" + shown(body) +
+      *error = std::string("no ") + name + " in the answer '" + first_line(body) +
                "'; expected lines pan=, tilt=, zoom=";
       return false;
     }
     if (std::abs(**angle) > 360) {
-      *error = std::string(name) + " is outside -360..360 degrees: " + std::to_string(**angle);
+      *error = std::string(name) + " is outside -360..360 degrees: " + shown(**angle);
       return false;
     }
   }

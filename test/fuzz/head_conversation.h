@@ -35,22 +35,24 @@ inline void require_sound(const Answer& answer, std::string_view bytes) {
   FUZZ_REQUIRE(answer.kind == Answer::Kind::kNone);  // no other is left
 }
 
-// Ends with the input.
+// Ends with the input, or after so many pieces: each costs a search through all that has come.
 inline void converse(QueryProtocol* protocol, FuzzInput* input) {
+  int pieces = 32;
   protocol->restart();
-  while (!input->empty()) {
+  while (!input->empty() && pieces > 0) {
     const Query query = protocol->next();
     FUZZ_REQUIRE(!query.bytes.empty());
     std::string come;
     for (bool waiting = true; waiting;) {
       const unsigned piece = input->byte();
+      --pieces;
       come += input->bytes(piece & 0x7FU);
       come.erase(0, come.size() - std::min(come.size(), kMaxAnswer));
       const Answer answer = protocol->find(come);
       require_sound(answer, come);
       if (answer.kind != Answer::Kind::kNone) {
         waiting = false;
-      } else if ((piece & 0x80U) != 0 || input->empty()) {
+      } else if ((piece & 0x80U) != 0 || input->empty() || pieces <= 0) {
         static_cast<void>(protocol->give_up());
         waiting = false;
       }

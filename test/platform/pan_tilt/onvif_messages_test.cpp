@@ -92,6 +92,7 @@ TEST(OnvifStatus, SaysWhatIsWrong) {
   EXPECT_THAT(error_of(position(R"(x="nan" y="1")")), HasSubstr("not a number"));
   EXPECT_THAT(error_of(position(R"(x="1")")), HasSubstr("not a number"));
   EXPECT_THAT(error_of(position(R"(x="1.5" y="0")")), HasSubstr("outside its space"));
+  EXPECT_THAT(error_of(position(R"(x="1e300" y="0")")), HasSubstr("1e+300, 0 is outside"));
   EXPECT_THAT(error_of(position(R"(x="400" y="0" space="a/SphericalPositionSpaceDegrees")")),
               HasSubstr("outside its space"));
   EXPECT_THAT(error_of(position("x=\"1\" y=\"0\" space=\"http://vendor/Steps\n\"")),

@@ -77,6 +77,7 @@ INSTANTIATE_TEST_SUITE_P(
         Answer{"ZoomIsText", "pan=1\r\ntilt=1\r\nzoom=far\r\n", "zoom=far"},
         Answer{"PanBeyondATurn", "pan=360.1\r\ntilt=1\r\n", "pan is outside -360..360 degrees"},
         Answer{"TiltBeyondATurn", "pan=1\r\ntilt=-1e9\r\n", "tilt is outside"},
+        Answer{"FarBeyondATurn", "pan=1e300\r\ntilt=1\r\n", "-360..360 degrees: 1e+300"},
         Answer{"WebPage",
                "<html>\x01\xff<body>a very long page, a very long page, a very long "
                "page, a very long page, a very long page</body></html>\n",
