@@ -29,11 +29,17 @@ bool JpegDecoder::read_size(std::string_view jpeg, int* width, int* height) {
     error_ = "libjpeg-turbo does not start";
     return false;
   }
+  *width = 0;
+  *height = 0;
   int subsampling = 0;
   int colours = 0;
   if (tjDecompressHeader3(handle_.get(), bytes_of(jpeg), jpeg.size(), width, height, &subsampling,
                           &colours) != 0) {
     return fail(std::string("damaged JPEG picture: ") + tjGetErrorStr2(handle_.get()));
+  }
+  // Tables alone are a whole JPEG stream to the library.
+  if (*width < 1 || *height < 1) {
+    return fail("damaged JPEG picture: it has no size");
   }
   if (colours == TJCS_CMYK || colours == TJCS_YCCK) {
     return fail("the JPEG picture is in printing colours; use grey or YCbCr pictures");
@@ -56,7 +62,7 @@ bool JpegDecoder::decode(std::string_view jpeg, Picture* picture) {
   const std::shared_ptr<unsigned char> luma(new unsigned char[size],
                                             std::default_delete<unsigned char[]>());
   if (tjDecompress2(handle_.get(), bytes_of(jpeg), jpeg.size(), luma.get(), width, width, height,
-                    TJPF_GRAY, 0) != 0) {
+                    TJPF_GRAY, TJFLAG_LIMITSCANS) != 0) {
     const std::string message = tjGetErrorStr2(handle_.get());
     // "Corrupt JPEG data: 2 extraneous bytes before marker 0xd9": all rows are there.
     if (tjGetErrorCode(handle_.get()) != TJERR_WARNING ||

@@ -2,7 +2,8 @@
 // JpegDecoder: a JPEG picture to its luma plane, by libjpeg-turbo. The chroma is neither transformed
 // nor converted. Pictures without Huffman tables (as in AVI) are decoded with the standard ones.
 // A picture that is cut off or damaged is told from a whole one; excess bytes before its end marker,
-// which some cameras write, are no damage. One thread at a time; allocates each picture.
+// which some cameras write, are no damage. A picture of hundreds of scans is refused: a few forged bytes
+// must not hold the thread for minutes. One thread at a time; allocates each picture.
 
 #include <cstddef>
 #include <memory>
