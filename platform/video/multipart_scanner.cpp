@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t kMaxBoundary = 200;      // bytes of a line; RFC 2046 allows a boundary 70
 constexpr std::size_t kMaxHeaders = 8192;      // bytes of one part's headers
+constexpr std::size_t kMaxDashes = 32;         // before a boundary, with the line end before them
 constexpr std::size_t kMaxDelimiterTail = 32;  // dashes and blanks between boundary and line end
 constexpr const char* kBlanks = " \t\r\n";
 
@@ -140,12 +141,12 @@ bool MultipartScanner::learn_boundary() {
   const std::size_t end = buffer_.find('\n');
   if (end == std::string::npos) {
     if (buffer_.size() > kMaxBoundary) {
-      buffer_.resize(kMaxBoundary);  // no boundary; only its line end is still of interest
+      buffer_.assign(kMaxBoundary, ' ');  // no boundary; only its line end is still of interest
     }
     return false;
   }
   const std::string_view line = stripped(std::string_view(buffer_).substr(0, end), kBlanks);
-  const bool told = line.substr(0, 2) == "--" && line.size() < kMaxBoundary;
+  const bool told = line.substr(0, 2) == "--" && end < kMaxBoundary;
   core_ = told ? std::string(stripped(line, "-")) : "";
   if (core_.empty()) {
     drop_front(end + 1);
@@ -165,7 +166,7 @@ std::optional<MultipartScanner::Delimiter> MultipartScanner::find_delimiter() {
     }
     scan_ = at;
     std::size_t begin = at;
-    while (begin > 0 && buffer_[begin - 1] == '-') {
+    while (begin > 0 && at - begin < kMaxDashes - 2 && buffer_[begin - 1] == '-') {
       --begin;
     }
     const bool at_line_start = begin == 0 || buffer_[begin - 1] == '\n';
@@ -268,7 +269,9 @@ bool MultipartScanner::read_body() {
     end_part(*content_length_);
     return true;
   }
-  if (known_end > max_part_bytes_) {
+  // Without a delimiter the last bytes may be the beginning of one.
+  const std::size_t not_body = delimiter ? 0 : kMaxDashes + core_.size() + kMaxDelimiterTail;
+  if (known_end > max_part_bytes_ + not_body) {
     ++discarded_;
     state_ = State::kSkip;
     return true;

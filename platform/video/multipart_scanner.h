@@ -4,7 +4,7 @@
 //   --boundary CRLF  Name: value CRLF ... CRLF  picture CRLF  --boundary CRLF ...
 //
 // Bytes go in as they come, in pieces of any size. Tolerated: any number of dashes around the
-// boundary, in the declaration and in the stream; a boundary that is not declared (the first line
+// boundary, in the declaration, and many in the stream; a boundary that is not declared (the first line
 // that begins with "--" tells it); lines that end in LF alone; no line end before a delimiter; parts
 // without headers; a Content-Length that is missing or wrong.
 // A part ends at its Content-Length if a JPEG ends there, too (FF D9), and at the next delimiter
@@ -43,6 +43,9 @@ class MultipartScanner {
 
   // Parts given up because they were longer than max_part_bytes or their headers had no end.
   [[nodiscard]] std::int64_t discarded() const { return discarded_; }
+
+  // Bytes kept until more come, whole parts aside.
+  [[nodiscard]] std::size_t pending_bytes() const { return buffer_.size(); }
 
  private:
   enum class State { kLearnBoundary, kSkip, kHeaders, kBody };

@@ -202,6 +202,28 @@ TEST(MultipartScanner, GivesUpAPartThatIsTooLongAndGoesOnWithTheNext) {
   }
 }
 
+TEST(MultipartScanner, TakesAPartOfTheGreatestLengthInPiecesOfAnySize) {
+  const std::string greatest = jpeg(std::string(kMax - 4, 'x'));
+  const std::string start = "--frame\r\n\r\n";
+  const std::string stream = start + greatest + "\r\n--frame\r\n\r\n" + greatest +
+                             "y\r\n--frame\r\n\r\n" + jpeg("a") + "\r\n--frame\r\n";
+  for (std::size_t piece = 1; piece <= stream.size(); ++piece) {
+    ASSERT_EQ(bodies(stream, "frame", piece), (Bodies{greatest, jpeg("a")})) << piece;
+  }
+}
+
+TEST(MultipartScanner, LearnsTheSameBoundaryInPiecesOfAnySize) {
+  const std::string part = "--frame\r\n\r\n" + jpeg("a") + "\r\n";
+  for (const std::size_t blanks : {193, 194, 300}) {
+    const std::string stream = "--x" + std::string(blanks, ' ') + "y\r\n--no" +
+                               std::string(blanks, ' ') + "\n" + part + part;
+    const Bodies whole = bodies(stream, "");
+    for (std::size_t piece = 1; piece <= stream.size(); ++piece) {
+      ASSERT_EQ(bodies(stream, "", piece), whole) << blanks << " " << piece;
+    }
+  }
+}
+
 TEST(MultipartScanner, KeepsPartsWithinTheirCapWhateverComes) {
   std::mt19937 random(1);
   const std::vector<std::string> words{"--frame", "frame", "\r\n", "\n",       "-",
