@@ -4,6 +4,8 @@
 
 #include <memory>
 
+#include "platform/system/shown.h"
+
 namespace alidade {
 namespace {
 
@@ -34,7 +36,10 @@ bool parse_url(const std::string& text, Url* url, std::string* error) {
   const Handle handle = parsed(text);
   if (!handle) {
     const std::size_t scheme_end = text.find("://");
-    url->bare = scheme_end == std::string::npos ? text : text.substr(0, scheme_end) + "://...";
+    const std::size_t at = text.rfind('@');  // what stands before it may be a password
+    const std::string rest = at == std::string::npos ? text : "..." + text.substr(at);
+    url->bare =
+        shown(scheme_end == std::string::npos ? rest : text.substr(0, scheme_end) + "://...");
     *error =
         "not a URL; it must look like scheme://host[:port]/path, special characters of a user or "
         "password written as %XX";

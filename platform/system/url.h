@@ -7,7 +7,7 @@ namespace alidade {
 
 struct Url {
   std::string scheme;
-  std::string host;      // may be empty: rtp://@:5004
+  std::string host;      // may be empty: file:///a
   std::string port;      // empty if not given
   std::string path;      // with its leading '/', and the query
   std::string user;      // decoded

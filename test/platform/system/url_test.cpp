@@ -40,6 +40,17 @@ TEST(Url, ShowsNoPasswordOfAUrlItCannotParse) {
   EXPECT_FALSE(parse_url("rtsp://user:se@cret@camera/x", &url, &error));
   EXPECT_EQ(url.bare, "rtsp://...");
   EXPECT_THAT(error, Not(HasSubstr("cret")));
+  EXPECT_FALSE(parse_url("user:se@cret@camera/x", &url, &error));
+  EXPECT_EQ(url.bare, "...@camera/x");
+  EXPECT_FALSE(parse_url("/dev/ttyUSB0", &url, &error));
+  EXPECT_EQ(url.bare, "/dev/ttyUSB0");
+}
+
+TEST(Url, ShowsAUrlItCannotParseOnOneLine) {
+  Url url;
+  std::string error;
+  EXPECT_FALSE(parse_url("cam\nera\x1b[2J", &url, &error));
+  EXPECT_EQ(url.bare, "cam?era?[2J");
 }
 
 }  // namespace
