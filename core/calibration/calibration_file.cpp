@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "core/calibration/atomic_file.h"
+#include "core/calibration/one_line.h"
 
 namespace alidade {
 
@@ -355,10 +356,10 @@ bool parse_calibration(const std::string& text, const std::string& name, Calibra
     *calibration = Reader(YAML::Load(text)).read();
     return true;
   } catch (const Problem& problem) {
-    *error = name + ":" + std::to_string(problem.line) + ": " + problem.text;
+    *error = one_line(name + ":" + std::to_string(problem.line) + ": " + problem.text);
   } catch (const YAML::Exception& exception) {
-    *error = name + ":" + std::to_string(std::max(exception.mark.line, 0) + 1) + ": " +
-             exception.msg + "; valid YAML is needed";
+    *error = one_line(name + ":" + std::to_string(std::max(exception.mark.line, 0) + 1) + ": " +
+                      exception.msg + "; valid YAML is needed");
   }
   return false;
 }

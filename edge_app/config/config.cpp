@@ -247,6 +247,13 @@ void read_config(YamlSection& top, const std::string& path, Config* config) {
 
 }  // namespace
 
+bool parse_config(const std::string& text, const std::string& path, Config* config,
+                  std::string* error) {
+  *config = Config();
+  return parse_yaml(
+      text, path, [&](YamlSection& top) { read_config(top, path, config); }, error);
+}
+
 bool load_config(const std::string& path, Config* config, std::string* error) {
   *config = Config();
   return read_yaml_file(

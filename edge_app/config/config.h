@@ -90,7 +90,10 @@ struct Config {
   std::vector<std::string> warnings;  // FILE:LINE: ... lines for the log
 };
 
+// path stands for the file in errors, and is where relative paths start.
 // False with a line "FILE[:LINE]: KEY: what is wrong; what would be right" in *error.
+[[nodiscard]] bool parse_config(const std::string& text, const std::string& path, Config* config,
+                                std::string* error);
 [[nodiscard]] bool load_config(const std::string& path, Config* config, std::string* error);
 
 }  // namespace alidade

@@ -14,6 +14,10 @@ struct RecordingNoise : CalibrationNoise {
   std::optional<double> pan_tilt_scale_sigma;  // prior of both scales
 };
 
+// Pure: text in, noise or one line of error out. name stands for the file in errors.
+[[nodiscard]] bool parse_noise(const std::string& text, const std::string& name,
+                               RecordingNoise* noise, std::string* error);
+
 // False with a line FILE:LINE: ... in *error if directory/noise.yaml is there and malformed.
 [[nodiscard]] bool load_noise(const std::string& directory, RecordingNoise* noise,
                               std::string* error);

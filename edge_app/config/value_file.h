@@ -37,6 +37,12 @@ struct CalibrationLimits {
   std::optional<double> line_delay_s;
 };
 
+// Pure: text in, values or one line of error out. name stands for the file in errors.
+[[nodiscard]] bool parse_values(const std::string& text, const std::string& name,
+                                CalibrationValues* values, std::string* error);
+[[nodiscard]] bool parse_limits(const std::string& text, const std::string& name,
+                                CalibrationLimits* limits, std::string* error);
+
 // False with a line FILE:LINE: ... in *error if the file is there and malformed. No file: all empty.
 [[nodiscard]] bool load_values(const std::string& path, CalibrationValues* values,
                                std::string* error);

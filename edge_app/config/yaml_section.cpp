@@ -10,6 +10,8 @@
 
 #include <fmt/format.h>
 
+#include "core/calibration/one_line.h"
+
 namespace alidade {
 namespace {
 
@@ -36,6 +38,21 @@ std::optional<double> parse_number(const std::string& text) {
 
 }  // namespace
 
+bool parse_yaml(const std::string& text, const std::string& name,
+                const std::function<void(YamlSection&)>& read, std::string* error) {
+  try {
+    YamlSection top(YAML::Load(text), "", name);
+    read(top);
+    return true;
+  } catch (const ConfigError& e) {
+    *error = one_line(e.what());
+  } catch (const YAML::Exception& e) {
+    *error = one_line(fmt::format("{}:{}: not YAML: {}; check indentation, colons and quotes", name,
+                                  std::max(e.mark.line, 0) + 1, e.msg));
+  }
+  return false;
+}
+
 bool read_yaml_file(const std::string& path, const std::function<void(YamlSection&)>& read,
                     std::string* error) {
   std::ifstream file(path);
@@ -45,17 +62,7 @@ bool read_yaml_file(const std::string& path, const std::function<void(YamlSectio
     *error = path + ": cannot be read; expected a YAML file";
     return false;
   }
-  try {
-    YamlSection top(YAML::Load(text.str()), "", path);
-    read(top);
-    return true;
-  } catch (const ConfigError& e) {
-    *error = e.what();
-  } catch (const YAML::Exception& e) {
-    *error = fmt::format("{}:{}: not YAML: {}; check indentation, colons and quotes", path,
-                         e.mark.line + 1, e.msg);
-  }
-  return false;
+  return parse_yaml(text.str(), path, read, error);
 }
 
 std::string join(const std::vector<std::string>& words) {

@@ -68,8 +68,12 @@ class YamlSection {
   std::vector<std::string> asked_;
 };
 
-// Opens the file and hands its top section to `read`, which may throw ConfigError. False with one
-// line in *error if the file cannot be read, is not YAML, or `read` threw.
+// Hands the top section of a YAML text to `read`, which may throw ConfigError. False with one line in
+// *error if it is not YAML, or `read` threw. name stands for the file in errors.
+[[nodiscard]] bool parse_yaml(const std::string& text, const std::string& name,
+                              const std::function<void(YamlSection&)>& read, std::string* error);
+
+// The same for a file; one that cannot be read is an error, too.
 [[nodiscard]] bool read_yaml_file(const std::string& path,
                                   const std::function<void(YamlSection&)>& read,
                                   std::string* error);

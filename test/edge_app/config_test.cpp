@@ -57,6 +57,15 @@ TEST_F(ConfigTest, MinimalConfigurationHasTheDocumentedDefaults) {
   EXPECT_THAT(config_.warnings, IsEmpty());
 }
 
+// load() itself wants one line.
+TEST_F(ConfigTest, ErrorsStayOnOneBearableLineWhateverTheFileHolds) {
+  EXPECT_THAT(load("video: {type: \"rt\\n\\e[2Jsp\"}\npan_tilt: {}\n"),
+              HasSubstr("'rt??[2Jsp' is"));
+  EXPECT_THAT(load(std::string(kMinimal) + "\"a\\nb\": 1\n"), HasSubstr("a?b: unknown key"));
+  EXPECT_THAT(load("video: \"\\\x01\"\n"), HasSubstr("not YAML"));
+  EXPECT_LT(load("video: {type: " + std::string(100'000, 'x') + "}\npan_tilt: {}\n").size(), 1100U);
+}
+
 TEST_F(ConfigTest, RelativePathsStartAtTheConfigurationsFolder) {
   ASSERT_THAT(load(kMinimal), IsEmpty());
   EXPECT_EQ(config_.calibration.file, directory_.path() + "/calibration.yaml");

@@ -109,6 +109,12 @@ std::string with_line(int number, const std::string& line) {
   return text.replace(begin, text.find('\n', begin) - begin, line);
 }
 
+TEST(CalibrationFile, ErrorsStayOnOneLineWhateverTheFileHolds) {
+  EXPECT_THAT(refusal("format: \"1\\n\\e[2J\"\n"),
+              HasSubstr("\"1??[2J\"; a finite number is needed"));
+  EXPECT_THAT(refusal("\"form\\nat\": 1\n"), HasSubstr("unknown key form?at;"));
+}
+
 TEST(CalibrationFile, ReadsWhatAPersonWrote) {
   const Calibration calibration = parsed(kByHand);
   EXPECT_EQ(calibration.camera.width, 1920);
