@@ -9,9 +9,11 @@
 // column may be empty: not known. Unknown columns are ignored. Every line ends with a newline, so
 // that a file which was cut off in the middle of a number does not pass for a whole one.
 // Stamps are passed on as they are: equal or jumping ones are the clock filter's business.
-// On failure the functions return false and *error is one line: what, file:line, what is right.
+// On failure the functions return false and *error is one line: what, file:line, what is right. parse_...()
+// take the text itself; name stands for the file in errors.
 
 #include <cstdint>
+#include <istream>
 #include <string>
 #include <vector>
 
@@ -35,16 +37,24 @@ struct TrackPoint {
   double sigma_px = 0;
 };
 
+[[nodiscard]] bool parse_recording_info(const std::string& text, const std::string& name,
+                                        RecordingInfo* info, std::string* error);
 [[nodiscard]] bool read_recording_info(const std::string& directory, RecordingInfo* info,
                                        std::string* error);
 
+[[nodiscard]] bool parse_frames_csv(std::istream& text, const std::string& name,
+                                    std::vector<FrameStamp>* frames, std::string* error);
 [[nodiscard]] bool read_frames_csv(const std::string& directory, std::vector<FrameStamp>* frames,
                                    std::string* error);
 
+[[nodiscard]] bool parse_telemetry_csv(std::istream& text, const std::string& name,
+                                       std::vector<PanTiltSample>* samples, std::string* error);
 [[nodiscard]] bool read_telemetry_csv(const std::string& directory,
                                       std::vector<PanTiltSample>* samples, std::string* error);
 
 // Points are passed on as they are: doubled or contradicting ones are the calibration's business.
+[[nodiscard]] bool parse_tracks_csv(std::istream& text, const std::string& name,
+                                    std::vector<TrackPoint>* points, std::string* error);
 [[nodiscard]] bool read_tracks_csv(const std::string& directory, std::vector<TrackPoint>* points,
                                    std::string* error);
 

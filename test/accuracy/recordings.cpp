@@ -81,11 +81,11 @@ bool read_tables(const std::string& directory, GivenRecording* given, std::strin
   double worst = 0;
   if (!read_csv(
           directory + "/truth.csv",
-          std::array<CsvColumn, 4>{{{"frame", true, true},
-                                    {"time_s", true, false},
-                                    {"pan_rad", true, false},
-                                    {"tilt_rad", true, false}}},
-          [&](const CsvCells<4>& cells) {
+          {{"frame", true, true},
+           {"time_s", true, false},
+           {"pan_rad", true, false},
+           {"tilt_rad", true, false}},
+          [&](const CsvCells& cells) {
             const double time = *cells[1];
             time_of_frame[static_cast<std::int64_t>(*cells[0])] = time;
             const Eigen::Vector2d angle(*cells[2], *cells[3]);

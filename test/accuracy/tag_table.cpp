@@ -216,9 +216,9 @@ bool read_true_orientations(const std::string& directory,
     Vector2d angle;
   };
   std::vector<Angles> path;
-  const std::array<CsvColumn, 3> columns{
-      {{"time_s", true, false}, {"pan_rad", true, false}, {"tilt_rad", true, false}}};
-  const auto add_row = [&](const CsvCells<3>& cells) {
+  const std::vector<CsvColumn> columns{
+      {"time_s", true, false}, {"pan_rad", true, false}, {"tilt_rad", true, false}};
+  const auto add_row = [&](const CsvCells& cells) {
     path.push_back({*cells[0], {*cells[1], *cells[2]}});
     return std::string();
   };

@@ -151,9 +151,21 @@ INSTANTIATE_TEST_SUITE_P(
         Flaw{"NegativeFrame", "frame,receive_time_s\n-1,1\n", 2, "negative frame"},
         Flaw{"ShortRow", "frame,receive_time_s\n0,1\n\n1\n", 4, "fewer cells"},
         Flaw{"MissingColumn", "frame,time\n0,1\n", 1, "no column 'receive_time_s'"},
-        Flaw{"RepeatedColumn", "frame,frame,receive_time_s\n", 1, "Duplicated column"},
+        Flaw{"RepeatedColumn", "frame,frame,receive_time_s\n", 1, "column 'frame' stands twice"},
         Flaw{"Empty", "", 1, "no header line"}),
     [](const auto& flaw) { return flaw.param.name; });
+
+TEST(FramesCsv, TakesAByteOrderMarkAndBlankLines) {
+  const FramesCsv csv("\xEF\xBB\xBF \nframe,receive_time_s\n\t\n0,1\n");
+  ASSERT_TRUE(csv.ok) << csv.error;
+  EXPECT_EQ(csv.rows.size(), 1U);
+}
+
+TEST(FramesCsv, TakesANumberWithAZeroByteForNone) {
+  const FramesCsv csv(std::string("frame,receive_time_s\n0,1\0005\n", 27));
+  EXPECT_FALSE(csv.ok);
+  EXPECT_THAT(csv.error, HasSubstr("'1?5' in column receive_time_s is not a number"));
+}
 
 TEST(FramesCsv, TakesAFileThatIsCutOffInItsLastNumberForMalformed) {
   const FramesCsv csv("frame,receive_time_s\n0,1.25\n1,1.5");
