@@ -61,15 +61,4 @@ bool parse_url(const std::string& text, Url* url, std::string* error) {
   return true;
 }
 
-std::string with_credentials(const std::string& bare, const std::string& user,
-                             const std::string& password) {
-  const Handle handle = parsed(bare);
-  if (!handle || (user.empty() && password.empty())) {
-    return bare;
-  }
-  curl_url_set(handle.get(), CURLUPART_USER, user.c_str(), CURLU_URLENCODE);
-  curl_url_set(handle.get(), CURLUPART_PASSWORD, password.c_str(), CURLU_URLENCODE);
-  return part(handle, CURLUPART_URL, kAnyScheme);
-}
-
 }  // namespace alidade

@@ -18,8 +18,4 @@ struct Url {
 // False: text is no URL; *error says so, and url->bare is what of it can be shown.
 [[nodiscard]] bool parse_url(const std::string& text, Url* url, std::string* error);
 
-// bare with percent-encoded user and password put in; bare itself if both are empty.
-[[nodiscard]] std::string with_credentials(const std::string& bare, const std::string& user,
-                                           const std::string& password);
-
 }  // namespace alidade

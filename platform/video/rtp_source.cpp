@@ -15,7 +15,6 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t kCredentials = 126;     // characters; libavformat cuts longer ones off
 constexpr std::size_t kDecoderCapacity = 16;  // pictures: the most that H.264 may hold back
 
 }  // namespace
@@ -108,10 +107,6 @@ void RtpSource::Implementation::check() {
     }
   } else if (url.scheme != "rtsp") {
     (void)fail("not a video stream; the URL must be rtsp://, rtp:// or an .sdp file");
-  } else if (with_credentials(url.bare, options_.user, options_.password).size() >
-             url.bare.size() + kCredentials) {
-    (void)fail("user and password together have more than " + std::to_string(kCredentials) +
-               " characters (each special one counts as 3)");
   }
 }
 

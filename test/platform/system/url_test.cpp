@@ -22,18 +22,6 @@ TEST(Url, KeepsThePasswordApartFromWhatIsShown) {
   EXPECT_EQ(url.bare, "rtsp://camera:8554/a/b?x=1");
 }
 
-TEST(Url, PutsCredentialsBackPercentEncoded) {
-  const std::string full = with_credentials("rtsp://camera/x", "us er", "p@s:s/%");
-  EXPECT_THAT(full, HasSubstr("us%20er:"));
-  Url url;
-  std::string error;
-  ASSERT_TRUE(parse_url(full, &url, &error)) << error;
-  EXPECT_EQ(url.user, "us er");
-  EXPECT_EQ(url.password, "p@s:s/%");
-  EXPECT_EQ(url.bare, "rtsp://camera/x");
-  EXPECT_EQ(with_credentials("rtsp://camera/x", "", ""), "rtsp://camera/x");
-}
-
 TEST(Url, ShowsNoPasswordOfAUrlItCannotParse) {
   Url url;
   std::string error;
