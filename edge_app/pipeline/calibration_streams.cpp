@@ -8,6 +8,8 @@
 #include <unordered_map>
 #include <unordered_set>
 
+#include "edge_app/pipeline/stale_repeats.h"
+
 namespace alidade {
 namespace {
 
@@ -104,9 +106,18 @@ void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
   const Counts counts = count_items(
       samples, [](const PanTiltSample& sample) { return sample.sequence; },
       [](const PanTiltSample& sample) { return sample.device_time_s; });
+  const std::vector<bool> stale = find_stale_repeats(samples);
+  const auto stale_count = std::count(stale.begin(), stale.end(), true);
+  if (stale_count > 0) {
+    remarks->push_back(
+        fmt::format("telemetry.csv: {} of {} samples repeat an old angle while the head turns; "
+                    "they are left out",
+                    stale_count, samples.size()));
+  }
   double square_widths = 0;
   std::vector<double> widths;
   for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (stale[i]) continue;
     const PanTiltSample& sample = samples[i];
     const double width = sample.latest_time_s - sample.earliest_time_s;
     const double stamp = polled ? sample.latest_time_s - width / 2 : sample.latest_time_s;
@@ -117,7 +128,7 @@ void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
   CalibrationNoise& noise = input->noise;
   if (polled && square_widths > 0 && !noise.telemetry_stamp_sigma_s) {
     noise.telemetry_stamp_sigma_s =
-        std::sqrt(square_widths / static_cast<double>(samples.size()) / 12);
+        std::sqrt(square_widths / static_cast<double>(widths.size()) / 12);
   }
   if (polled && square_widths > 0) {
     // Where in the interval a device looks, it does so in every poll.

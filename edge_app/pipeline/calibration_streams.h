@@ -5,6 +5,7 @@
 //           else by their stamps. Telemetry likewise (sequence, device time); samples that were polled have
 //           no clock of their own, and were true in the middle of [earliest_time_s, receive_time_s], give or
 //           take width / sqrt(12): each by itself, and, as a device answers in its own way, all alike.
+//   repeats of an old angle while the head turned say nothing of their own time: left out (stale_repeats.h).
 //   stamps  of receipt: with a stamp sigma in the input's noise they err to both sides, otherwise they are late
 //           only, as for `run` and `replay`.
 //   restarts  A sender's clock begins anew after a reconnection: the longest part without one is used.

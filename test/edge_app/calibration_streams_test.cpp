@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <string>
 
 namespace alidade {
 namespace {
@@ -53,6 +54,25 @@ TEST(CalibrationStreams, WhatADeviceSendsByItselfHasNoInterval) {
   }
   EXPECT_EQ(Told(samples).input.noise.telemetry_common_sigma_s, 0);
   EXPECT_FALSE(Told(samples).input.noise.telemetry_stamp_sigma_s);
+}
+
+TEST(CalibrationStreams, ADeviceThatHasNotMeasuredSinceTellsNothingOfALaterTime) {
+  std::vector<PanTiltSample> samples = polled(std::vector<double>(90, 2e-3));
+  // Turns all the while, and measures at every third poll.
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    samples[i].pan_rad = std::sin(0.1 * static_cast<double>(i / 3));
+  }
+  const Told told(samples);
+  // 30 values; repeats of 3 at the ends and of 3 about the turn cannot be told.
+  EXPECT_LE(told.input.telemetry.size(), 42U);
+  for (std::size_t i = 1; i + 3 < told.input.telemetry.size(); ++i) {
+    const auto poll = static_cast<std::size_t>(std::lround(told.input.telemetry[i].stamp_s / 0.05));
+    if (told.input.telemetry[i].pan_rad != told.input.telemetry[i - 1].pan_rad) {
+      EXPECT_EQ(poll % 3, 0U);
+    }
+  }
+  ASSERT_EQ(told.remarks.size(), 1U);
+  EXPECT_NE(told.remarks[0].find("of 90 samples repeat an old angle"), std::string::npos);
 }
 
 TEST(CalibrationStreams, NothingIsNothing) {
