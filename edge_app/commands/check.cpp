@@ -1,17 +1,29 @@
-// `alidade check`: is everything that `run` needs there? Reads the configuration and the calibration,
-// tries both connections at once, and measures what no data sheet says: rates, the width of the
-// telemetry's time interval, stale repeats, the smallest step. A short report goes to stdout, what is
+// `alidade check`: is everything that `run` needs there, and does it do what `run` takes for granted? Reads the
+// configuration and the calibration, connects to video and pan/tilt at once, and measures both for some seconds. This file
+// connects, collects and prints; what the samples show is found in check/. A report and advice go to stdout, what is
 // wrong to stderr.
+//
+// Threads: video and pan/tilt are read by one each; pictures are looked at by a third, which takes the latest when it is
+// done with the one before, so that looking never makes a source drop frames. No picture is kept.
 
 #include <fmt/format.h>
+#include <unistd.h>
 
-#include <algorithm>
-#include <cmath>
+#include <chrono>
+#include <condition_variable>
 #include <cstdio>
+#include <future>
+#include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
+#include <unordered_map>
 #include <vector>
 
+#include "edge_app/check/motion_check.h"
+#include "edge_app/check/picture_check.h"
+#include "edge_app/check/telemetry_check.h"
+#include "edge_app/check/video_check.h"
 #include "edge_app/commands/command.h"
 #include "platform/system/clock.h"
 
@@ -20,113 +32,259 @@ namespace {
 
 struct CheckOptions {
   std::string config;
-  double duration_s = 3;
+  double duration_s = 10;
 };
 
-// What one connection gave.
-template <typename Item>
-struct Sampled {
-  std::vector<Item> items;
-  std::string error;  // empty: none
+// What became of one connection.
+struct Connection {
+  std::string error;  // why nothing came, or no more; empty: none
+  int losses = 0;     // after the first item
+  std::string loss;   // the last one's words
+  std::string name;
 };
 
-// Reads for duration_s from the first item on; the first may take wait_s. Ends at the first error: that
-// is what the person wants to know.
-template <typename Item, typename Source>
-Sampled<Item> sample(Source& source, double wait_s, double duration_s) {
+// Reads for duration_s from the first item on; the first may take wait_s. Until there is one, an error ends it: that is
+// what the person wants to know. Later losses are counted, and the source connects again.
+template <typename Item, typename Source, typename OnItem>
+Connection collect(Source& source, double wait_s, double duration_s, const OnItem& on_item) {
   constexpr double kReadTimeout = 0.2;  // s
-  Sampled<Item> sampled;
+  Connection connection;
+  connection.name = source.name();
+  bool any = false;
+  bool lost = false;
   double end_s = monotonic_now_s() + wait_s;
   while (monotonic_now_s() < end_s) {
     Item item;
     const ReadStatus status = source.read(item, kReadTimeout);
-    if (status == ReadStatus::kTimeout) continue;
     if (status == ReadStatus::kEnd || status == ReadStatus::kStopped) break;
-    if (status != ReadStatus::kOk) {
-      sampled.error = source.error();
+    if (status == ReadStatus::kFailed || (status == ReadStatus::kDisconnected && !any)) {
+      connection.error = source.error();
       break;
     }
-    if (sampled.items.empty()) end_s = monotonic_now_s() + duration_s;
-    sampled.items.push_back(item);
+    if (status == ReadStatus::kDisconnected) {
+      connection.losses += lost ? 0 : 1;  // what follows are attempts to connect again
+      connection.loss = source.error();
+      lost = true;
+    }
+    if (status != ReadStatus::kOk) continue;
+    if (!any) end_s = monotonic_now_s() + duration_s;
+    any = true;
+    lost = false;
+    on_item(item);
   }
-  if (sampled.items.empty() && sampled.error.empty()) {
-    sampled.error =
-        fmt::format("{}: connected, but nothing came within {:.0f} s", source.name(), wait_s);
+  if (!any && connection.error.empty()) {
+    connection.error =
+        fmt::format("{}: connected, but nothing came within {:.0f} s", connection.name, wait_s);
   }
-  return sampled;
+  return connection;
 }
 
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
+// Looks at pictures on a thread of its own.
+class PictureThread {
+ public:
+  PictureThread() : thread_([this] { work(); }) {}
+  ~PictureThread() { finish(); }
+  PictureThread(const PictureThread&) = delete;
+  PictureThread& operator=(const PictureThread&) = delete;
 
-std::string rate(std::size_t count, double first_s, double last_s) {
-  if (count < 2 || last_s <= first_s) return "one only: no rate";
-  return fmt::format("{:.2f} Hz", static_cast<double>(count - 1) / (last_s - first_s));
-}
+  // Takes the place of one that waits.
+  void offer(const Frame& frame) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    restarted_ = restarted_ || frame.stamp.restarted;
+    waiting_ = frame;
+    changed_.notify_one();
+  }
 
-// One line on video; adds to `errors` what is wrong.
-std::string report_video(const Sampled<Frame>& video, const NamedCalibration& calibration,
-                         std::vector<std::string>* errors) {
-  if (!video.error.empty()) errors->push_back(video.error);
-  if (video.items.empty()) return "failed";
-  const Frame& first = video.items.front();
-  const Frame& last = video.items.back();
-  const char* clock = last.stamp.sender_time_s ? "sender clock"
-                      : last.stamp.sequence    ? "sequence numbers"
-                                               : "arrival times only";
-  const Camera<double>& camera = calibration.calibration.camera;
-  std::string size = "no size to compare with";
-  if (camera.width > 0) {
-    const bool match = first.width == camera.width && first.height == camera.height;
-    size = match ? "as expected" : "not as expected";
-    if (!match) {
-      errors->push_back(
-          fmt::format("video: frames of {}x{} px, but {} is for {}x{} px; set the camera to the "
-                      "calibration's size or calibrate at this one",
-                      first.width, first.height, calibration.name, camera.width, camera.height));
+  // Waits until it is done with what it was offered; PictureCheck is then the caller's.
+  const PictureCheck& finish() {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      over_ = true;
+      changed_.notify_one();
+    }
+    if (thread_.joinable()) thread_.join();
+    return check_;
+  }
+
+ private:
+  void work() {
+    while (true) {
+      Frame frame;
+      bool connected = true;
+      {
+        std::unique_lock<std::mutex> lock(mutex_);
+        changed_.wait(lock, [this] { return over_ || waiting_; });
+        if (!waiting_) return;
+        frame = std::move(*waiting_);
+        waiting_.reset();
+        connected = !restarted_;
+        restarted_ = false;
+      }
+      check_.add(frame.stamp.frame, {frame.luma, frame.width, frame.height, frame.stride},
+                 connected);
     }
   }
-  return fmt::format(
-      "{}x{} px ({}), {}, {}", first.width, first.height, size,
-      rate(video.items.size(), first.stamp.receive_time_s, last.stamp.receive_time_s), clock);
-}
 
-std::string report_pan_tilt(const Sampled<PanTiltSample>& telemetry,
-                            std::vector<std::string>* errors) {
-  constexpr double kDegrees = 180 / 3.14159265358979323846;
-  if (!telemetry.error.empty()) errors->push_back(telemetry.error);
-  if (telemetry.items.empty()) return "failed";
-  const std::vector<PanTiltSample>& samples = telemetry.items;
-  std::vector<double> widths;
-  std::size_t repeats = 0;
-  double step_rad = 0;  // smallest change of an angle between two samples
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    widths.push_back(samples[i].latest_time_s - samples[i].earliest_time_s);
-    if (i == 0) continue;
-    const double pan_step = std::abs(samples[i].pan_rad - samples[i - 1].pan_rad);
-    const double tilt_step = std::abs(samples[i].tilt_rad - samples[i - 1].tilt_rad);
-    if (pan_step == 0 && tilt_step == 0) ++repeats;
-    for (const double step : {pan_step, tilt_step}) {
-      if (step > 0 && (step_rad == 0 || step < step_rad)) step_rad = step;
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  std::optional<Frame> waiting_;  // guarded by mutex_
+  bool restarted_ = false;        // guarded by mutex_: since the picture last taken
+  bool over_ = false;             // guarded by mutex_
+  PictureCheck check_;            // the thread's until it is joined
+  std::thread thread_;            // last: it uses the others
+};
+
+struct Measured {
+  Connection video;
+  Connection pan_tilt;
+  std::vector<CheckedFrame> frames;
+  std::vector<PanTiltSample> samples;
+  FrameSourceCounters counters;
+  PictureReport pictures;
+};
+
+void show_progress(const std::future<void>& done, double duration_s) {
+  const bool show = is_terminal(STDERR_FILENO);
+  const double begin_s = monotonic_now_s();
+  while (done.wait_for(std::chrono::seconds(1)) != std::future_status::ready) {
+    if (show) {
+      fmt::print(stderr, "\rmeasuring: {:.0f} of {:.0f} s ", monotonic_now_s() - begin_s,
+                 duration_s);
     }
   }
-  return fmt::format(
-      "pan {:.4f} deg, tilt {:.4f} deg, {}, time known to {:.1f} ms (median interval), {}",
-      samples.back().pan_rad * kDegrees, samples.back().tilt_rad * kDegrees,
-      rate(samples.size(), samples.front().latest_time_s, samples.back().latest_time_s),
-      1e3 * median(widths),
-      step_rad == 0
-          ? "head at rest"
-          : fmt::format("smallest step {:.5f} deg, {} of {} samples repeat the one before",
-                        step_rad * kDegrees, repeats, samples.size()));
+  if (show) fmt::print(stderr, "\r{:40}\r", "");
+}
+
+Measured measure(const Config& config, double duration_s) {
+  // s, beyond a source's own timeout: logging in, and a first key frame.
+  constexpr double kConnectSlack = 2;
+  Measured measured;
+  const auto video = make_frame_source(config.video, true);
+  const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
+  PictureThread pictures;
+  const std::future<void> frames = std::async(std::launch::async, [&] {
+    measured.video = collect<Frame>(
+        *video, config.video.timeout_s + kConnectSlack, duration_s, [&](const Frame& frame) {
+          measured.frames.push_back({frame.stamp, frame.width, frame.height, frame.decode_s});
+          pictures.offer(frame);
+        });
+  });
+  const std::future<void> samples = std::async(std::launch::async, [&] {
+    measured.pan_tilt = collect<PanTiltSample>(
+        *pan_tilt, config.pan_tilt.timeout_s + kConnectSlack, duration_s,
+        [&](const PanTiltSample& sample) { measured.samples.push_back(sample); });
+  });
+  show_progress(frames, duration_s);
+  show_progress(samples, duration_s);
+  measured.counters = video->counters();
+  measured.pictures = pictures.finish().report({measured.video.name, config.realtime.landmarks});
+  return measured;
+}
+
+// What turns an axis's sign, for this kind of device.
+std::string reverse_advice(const PanTiltConfig& pan_tilt, bool is_pan) {
+  const std::string axis = is_pan ? "pan" : "tilt";
+  switch (pan_tilt.type) {
+    case PanTiltConfig::Type::kHead: {
+      const bool positive = (is_pan ? pan_tilt.head.pan : pan_tilt.head.tilt).sign > 0;
+      const char* other = is_pan ? (positive ? "left" : "right") : (positive ? "down" : "up");
+      return fmt::format("set pan_tilt.{}_positive: {}", axis, other);
+    }
+    case PanTiltConfig::Type::kOnvif:
+      if (is_pan ? pan_tilt.pan_range_deg.has_value() : pan_tilt.tilt_range_deg.has_value()) {
+        return fmt::format("swap the two numbers of pan_tilt.{}_range_deg", axis);
+      }
+      break;
+    case PanTiltConfig::Type::kRecording:
+      return fmt::format("turn the sign of {}_rad in telemetry.csv", axis);
+    case PanTiltConfig::Type::kVapix:
+      break;
+  }
+  return "switch off what mirrors the picture in the camera's settings";
+}
+
+MotionReport motion_of(const Measured& measured, const VideoReport& video,
+                       const TelemetryReport& telemetry, const Config& config,
+                       const NamedCalibration& calibration) {
+  std::unordered_map<std::int64_t, double> time_of;
+  for (std::size_t i = 0; i < measured.frames.size(); ++i) {
+    time_of[measured.frames[i].stamp.frame] = video.time_s[i];
+  }
+  std::vector<TimedShift> shifts;
+  for (const ImageShift& shift : measured.pictures.shifts) {
+    shifts.push_back({time_of[shift.from], time_of[shift.to], shift.shift});
+  }
+  MotionNeeds needs;
+  needs.source = measured.pan_tilt.name;
+  needs.video = measured.video.name;
+  needs.image_width_px = video.width;
+  needs.focal_length_px = calibration.calibration.camera.focal_length;
+  needs.focal_length_from = calibration.calibrated ? calibration.name : "camera.focal_length_px";
+  needs.calibrated = calibration.calibrated;
+  needs.clock_offset_s = calibration.calibrated ? calibration.calibration.clock_offset : 0;
+  needs.reverse_pan = reverse_advice(config.pan_tilt, true);
+  needs.reverse_tilt = reverse_advice(config.pan_tilt, false);
+  needs.turn_picture =
+      "turn the picture by 180 degrees in the camera's settings and set camera.upside_down: true";
+  return check_motion(shifts, telemetry.fresh, needs);
+}
+
+TelemetryNeeds telemetry_needs(const Measured& measured, const Config& config,
+                               const NamedCalibration& calibration,
+                               const OrientationStepOptions& step) {
+  TelemetryNeeds needs;
+  needs.source = measured.pan_tilt.name;
+  if (!is_recording(config)) needs.rate_hz = config.pan_tilt.rate_hz;
+  needs.max_repeat_s = step.telemetry_limits.max_repeat_s;
+  needs.max_gap_s = step.telemetry_limits.max_gap_s;
+  needs.max_extrapolation_s = step.telemetry_limits.max_extrapolation_s;
+  needs.angle_sigma_rad = step.telemetry_noise.pan_tilt_sigma;
+  needs.quantum_rad = step.telemetry_noise.quantum;
+  needs.focal_length_px = calibration.calibration.camera.focal_length;
+  needs.clock_offset_s = calibration.calibrated ? calibration.calibration.clock_offset : 0;
+  needs.zoom = calibration.calibration.zoom;
+  needs.zoom_tolerance = config.calibration.zoom_tolerance;
+  needs.makes_calibrations = config.calibration.automatic;
+  needs.landmarks = config.realtime.landmarks;
+  return needs;
+}
+
+std::string rate_of(const std::optional<double>& rate_hz) {
+  return rate_hz ? fmt::format("{:.2f} Hz", *rate_hz) : "one only: no rate";
+}
+
+std::string headline(const VideoReport& video, const VideoNeeds& needs) {
+  if (video.frames == 0) return "failed";
+  const char* size = needs.width == 0  ? "no size to compare with"
+                     : video.size_fits ? "as expected"
+                                       : "not as expected";
+  const char* clock = video.clock.kind == StampKind::kSender     ? "sender clock"
+                      : video.clock.kind == StampKind::kSequence ? "sequence numbers"
+                                                                 : "arrival times only";
+  return fmt::format("{}x{} px ({}), {}, {}", video.width, video.height, size,
+                     rate_of(video.rate_hz), clock);
+}
+
+std::string headline(const TelemetryReport& telemetry) {
+  constexpr double kDegrees = 180 / kPi;
+  if (telemetry.samples == 0) return "failed";
+  return fmt::format("pan {:.4f} deg, tilt {:.4f} deg, {}", kDegrees * telemetry.pan.last,
+                     kDegrees * telemetry.tilt.last, rate_of(telemetry.rate_hz));
+}
+
+void print(const ReportLines& lines) {
+  for (const auto& [label, text] : lines) fmt::print("  {:<13}{}\n", label, text);
+}
+
+void add_connection(const Connection& connection, const char* what, Findings* findings) {
+  if (!connection.error.empty()) add_problem(findings, connection.error);
+  if (connection.losses == 0) return;
+  add_problem(findings,
+              fmt::format("{} {}: the connection was lost {} times during the check, last: {}",
+                          what, connection.name, connection.losses, connection.loss));
 }
 
 int check(const CheckOptions& options) {
-  constexpr double kConnectSlack =
-      2;  // s beyond a source's own timeout, for logging in and a first key frame
   const Config config = require_config(options.config);
   fmt::print("configuration  {}: ok\n", options.config);
   const NamedCalibration calibration = choose_calibration(config);
@@ -136,33 +294,55 @@ int check(const CheckOptions& options) {
              calibration.calibrated ? fmt::format("{}x{} px, ", camera.width, camera.height)
                                     : "not calibrated, ",
              camera.focal_length, 1e3 * calibration.calibration.clock_offset);
+  std::fflush(stdout);
 
-  const auto video_source = make_frame_source(config.video, false);
-  const auto pan_tilt_source = make_pan_tilt_source(config.pan_tilt);
-  Sampled<PanTiltSample> telemetry;
-  std::thread telemetry_thread([&] {
-    telemetry = sample<PanTiltSample>(*pan_tilt_source, config.pan_tilt.timeout_s + kConnectSlack,
-                                      options.duration_s);
-  });
-  const Sampled<Frame> video =
-      sample<Frame>(*video_source, config.video.timeout_s + kConnectSlack, options.duration_s);
-  telemetry_thread.join();
+  const Measured measured = measure(config, options.duration_s);
+  const OrientationStepOptions step = step_options(config, calibration);
+  const VideoNeeds video_needs{measured.video.name, calibration.name, camera.width, camera.height,
+                               config.realtime.landmarks};
+  const VideoReport video =
+      check_video(measured.frames, measured.counters, step.video_clock, video_needs);
+  const TelemetryReport telemetry = check_telemetry(
+      measured.samples, step.telemetry_clock, telemetry_needs(measured, config, calibration, step));
 
-  std::vector<std::string> errors;
-  fmt::print("video          {}: {}\n", video_source->name(),
-             report_video(video, calibration, &errors));
-  fmt::print("pan/tilt       {}: {}\n", pan_tilt_source->name(),
-             report_pan_tilt(telemetry, &errors));
-  for (const std::string& error : errors) fmt::print(stderr, "alidade: {}\n", error);
-  return errors.empty() ? kExitOk : kExitFailed;
+  Findings findings;
+  add_connection(measured.video, "video", &findings);
+  add_connection(measured.pan_tilt, "pan/tilt", &findings);
+  const auto add = [&findings](const Findings& more) {
+    findings.insert(findings.end(), more.begin(), more.end());
+  };
+  add(video.findings);
+  add(measured.pictures.findings);
+  add(telemetry.findings);
+  fmt::print("video          {}: {}\n", measured.video.name, headline(video, video_needs));
+  print(describe(video));
+  print(describe(measured.pictures));
+  fmt::print("pan/tilt       {}: {}\n", measured.pan_tilt.name, headline(telemetry));
+  print(describe(telemetry));
+  if (measured.pictures.pictures > 1 && !telemetry.fresh.empty()) {
+    const MotionReport motion = motion_of(measured, video, telemetry, config, calibration);
+    fmt::print("together\n");
+    print(describe(motion));
+    add(motion.findings);
+  }
+  bool ok = true;
+  for (const Finding& finding : findings) {
+    if (finding.severity == Severity::kAdvice) {
+      fmt::print("advice         {}\n", finding.text);
+      continue;
+    }
+    ok = false;
+    fmt::print(stderr, "alidade: {}\n", finding.text);
+  }
+  return ok ? kExitOk : kExitFailed;
 }
 
 }  // namespace
 
 void register_check(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<CheckOptions>();
-  CLI::App* command =
-      app.add_subcommand("check", "Validate the configuration and try each connection");
+  CLI::App* command = app.add_subcommand(
+      "check", "Validate the configuration, try each connection, and measure what comes");
   command->add_option("-c,--config", options->config, "Configuration (YAML)")->required();
   command->add_option("--duration", options->duration_s, "Seconds to measure each stream for")
       ->check(CLI::PositiveNumber)

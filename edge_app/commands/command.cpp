@@ -203,9 +203,7 @@ std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config)
 }
 
 void log_source_losses(const FrameSource& source) {
-  FrameSourceCounters counters;
-  if (const auto* rtp = dynamic_cast<const RtpSource*>(&source)) counters = rtp->counters();
-  if (const auto* mjpeg = dynamic_cast<const MjpegSource*>(&source)) counters = mjpeg->counters();
+  const FrameSourceCounters counters = source.counters();
   if (counters.damaged == 0 && counters.dropped == 0) return;
   spdlog::warn("{}: {} frames damaged, {} dropped before they were read", source.name(),
                counters.damaged, counters.dropped);

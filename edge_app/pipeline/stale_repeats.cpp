@@ -16,36 +16,42 @@ constexpr double kSmallestStep = 2e-7;  // rad
 constexpr std::size_t kLeastSteps =
     8;  // by chance 8 lie near multiples once in 0.06^-8 = 6e9 times
 
-// How well ascending gaps are multiples of q; improves q. False: they are not.
+// Whether ascending gaps are multiples of q; improves q. From gaps of a few quanta to larger ones, as q gets better: its
+// error, times their number, must stay below what counts as near.
 bool fits(const std::vector<double>& gaps, double* q) {
-  constexpr double kNear = 0.03;      // of a quantum
   constexpr double kShare = 0.95;     // of the gaps that must be near a multiple
-  constexpr double kMostSteps = 12;   // the error of q, times so many, must stay below kNear
   constexpr double kLeastUsed = 0.3;  // of all gaps
-  for (int round = 0; round < 2; ++round) {
+  struct Round {
+    double most;  // quanta of a gap
+    double near;  // quanta from a multiple
+  };
+  constexpr double kNear = 0.03;
+  for (const Round& round :
+       {Round{12, 3 * kNear}, Round{12, kNear}, Round{40, kNear}, Round{130, kNear}}) {
     std::size_t used = 0;
     std::size_t near = 0;
     double products = 0;
     double squares = 0;
     for (const double gap : gaps) {
       const double multiple = gap / *q;
-      if (multiple > kMostSteps) break;
+      if (multiple > round.most) break;
       ++used;
       const double whole = std::round(multiple);
-      if (whole < 1 || std::abs(multiple - whole) > kNear * (round == 0 ? 3 : 1)) continue;
+      if (whole < 1 || std::abs(multiple - whole) > round.near) continue;
       ++near;
       products += gap * whole;
       squares += whole * whole;
     }
-    const auto share =
-        static_cast<double>(near) / static_cast<double>(std::max<std::size_t>(used, 1));
-    if (near < kLeastSteps || share < kShare ||
-        static_cast<double>(used) < kLeastUsed * static_cast<double>(gaps.size())) {
+    if (near < kLeastSteps || static_cast<double>(near) < kShare * static_cast<double>(used)) {
       return false;
     }
     *q = products / squares;
+    if (round.near <= kNear &&
+        static_cast<double>(used) >= kLeastUsed * static_cast<double>(gaps.size())) {
+      return true;
+    }
   }
-  return true;
+  return false;
 }
 
 // Whether gaps of so many quanta occur that even motion, each poll as far as the one before, cannot be meant.

@@ -27,7 +27,7 @@
 namespace alidade {
 
 // The largest step of which differences between the angles of one axis are whole multiples, as far as the
-// data show: 19 of 20 neighbouring angles, put in order of size, lie within 3 % of a whole multiple. Printed
+// data show: of neighbouring angles, put in order of size, 19 of 20 lie within 3 % of q of a whole multiple. Printed
 // digits and single wild angles do not matter. 0: none, or too little motion to tell.
 [[nodiscard]] double angle_quantum(const std::vector<double>& angles_rad);
 

@@ -31,6 +31,9 @@ class StreamClock {
     return estimate;
   }
 
+  // What it has found so far, for reports.
+  [[nodiscard]] const ClockFilter<>& filter() const { return filter_; }
+
  private:
   enum class Kind : std::uint8_t { kNone, kSenderTime, kSequence };
 

@@ -38,6 +38,9 @@ struct Frame {
   const std::uint8_t* luma = nullptr;
   std::ptrdiff_t stride = 0;          // bytes
   std::shared_ptr<const void> owner;  // keeps luma alive
+  // What read() took to make luma of the data, waiting and queueing not included; none: not decoded,
+  // or not told.
+  std::optional<double> decode_s;
 };
 
 enum class ReadStatus {
@@ -71,6 +74,9 @@ class FrameSource {
 
   // URL without password, device or directory.
   [[nodiscard]] virtual std::string name() const = 0;
+
+  // Since the source was made; thread-safe. Zeros where the source does not count.
+  [[nodiscard]] virtual FrameSourceCounters counters() const { return {}; }
 };
 
 }  // namespace alidade

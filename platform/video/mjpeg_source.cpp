@@ -262,6 +262,7 @@ ReadStatus MjpegSource::Implementation::read(Frame& frame, double timeout_s) {
 // Turns a part into the frame; kTimeout if that cannot be done with this one.
 ReadStatus MjpegSource::Implementation::deliver(MultipartPart part, Frame& frame) {
   Picture picture;
+  const double before_s = monotonic_now_s();
   if (options_.decode ? !decoder_.decode(part.body, &picture)
                       : !decoder_.read_size(part.body, &picture.width, &picture.height)) {
     ++damaged_;
@@ -275,6 +276,7 @@ ReadStatus MjpegSource::Implementation::deliver(MultipartPart part, Frame& frame
     return ReadStatus::kDisconnected;
   }
   damaged_in_a_row_ = 0;
+  const double decode_s = monotonic_now_s() - before_s;
   if (!options_.copy_to.empty()) {
     const PacketPtr packet = packet_of(part.body);
     std::string error;
@@ -299,6 +301,9 @@ ReadStatus MjpegSource::Implementation::deliver(MultipartPart part, Frame& frame
   frame.luma = picture.luma;
   frame.stride = picture.stride;
   frame.owner = std::move(picture.owner);
+  if (options_.decode) {
+    frame.decode_s = decode_s;
+  }
   return ReadStatus::kOk;
 }
 

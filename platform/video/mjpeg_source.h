@@ -48,8 +48,7 @@ class MjpegSource : public FrameSource {
   void stop() override;
   [[nodiscard]] std::string error() const override;
   [[nodiscard]] std::string name() const override;
-
-  [[nodiscard]] FrameSourceCounters counters() const;  // thread-safe
+  [[nodiscard]] FrameSourceCounters counters() const override;
 
  private:
   class Implementation;  // keeps libcurl out of this header

@@ -6,6 +6,7 @@
 #include <mutex>
 #include <utility>
 
+#include "platform/system/clock.h"
 #include "platform/system/url.h"
 #include "platform/video/luma_decoder.h"
 #include "platform/video/receiving_thread.h"
@@ -196,6 +197,7 @@ ReadStatus RtpSource::Implementation::deliver(Arrived arrived, Frame& frame) {
     }
   }
   Picture picture;
+  const double before_s = monotonic_now_s();
   if (options_.decode || !size_known_) {
     const ReadStatus status = decode(&unit, &picture);
     if (status != ReadStatus::kOk) {
@@ -205,6 +207,7 @@ ReadStatus RtpSource::Implementation::deliver(Arrived arrived, Frame& frame) {
     width_ = picture.width;
     height_ = picture.height;
   }
+  const double decode_s = monotonic_now_s() - before_s;
   if (!options_.copy_to.empty()) {
     if (next_frame_ == 0 && !unit.key) {
       ++damaged_;  // the key frame was; a file that begins without one cannot be decoded
@@ -228,6 +231,7 @@ ReadStatus RtpSource::Implementation::deliver(Arrived arrived, Frame& frame) {
     frame.luma = picture.luma;
     frame.stride = picture.stride;
     frame.owner = std::move(picture.owner);
+    frame.decode_s = decode_s;
   }
   return ReadStatus::kOk;
 }

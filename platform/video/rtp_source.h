@@ -53,8 +53,7 @@ class RtpSource : public FrameSource {
   void stop() override;
   [[nodiscard]] std::string error() const override;
   [[nodiscard]] std::string name() const override;
-
-  [[nodiscard]] FrameSourceCounters counters() const;  // thread-safe
+  [[nodiscard]] FrameSourceCounters counters() const override;
 
  private:
   class Implementation;  // keeps libav out of this header

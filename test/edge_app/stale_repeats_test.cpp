@@ -52,6 +52,12 @@ TEST(AngleQuantum, IsTheDevicesAndNotThatOfPrintedDigits) {
   EXPECT_NEAR(angle_quantum(angles), kDegree / 51.2, 1e-3 * kDegree / 51.2);
 }
 
+TEST(AngleQuantum, IsFoundWhereAnglesLieManyStepsApart) {
+  const double quantum = 1.745e-5;
+  EXPECT_NEAR(angle_quantum(rounded(uniform(300, 10000 * quantum), quantum)), quantum,
+              1e-4 * quantum);
+}
+
 TEST(AngleQuantum, IsFoundBesideAWildAngle) {
   std::vector<double> angles = rounded(uniform(300, 0.1), 1e-3);
   angles.push_back(0.01037);

@@ -1,0 +1,80 @@
+#pragma once
+// Whether pictures show what landmarks need, and how the scene moves through them, one picture after the other: none is
+// kept.
+//
+//   light    histogram of every 8th pixel of every 8th row. Dark: grey levels up to 16, which is black in video's
+//            narrow range. Saturated: the topmost level that occurs and the one below it, if that is 230 or more: where
+//            the sensor's or the codec's range ends, whichever range it is.
+//   texture  points that the start-up tracker (core/realtime) finds and follows: the same corners, with the same demands
+//            on contrast, as those that a calibration and OE mode begin with
+//   motion   the tracker's shift of the image's centre from one picture to the next, px
+// Allocates when a picture's size changes, and for what it notes of each. One thread.
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/realtime/image_view.h"
+#include "core/realtime/start_up_tracker.h"
+#include "edge_app/check/finding.h"
+#include "edge_app/check/spread.h"
+#include "edge_app/check/video_check.h"  // ReportLines
+
+namespace alidade {
+
+// By how much what the image's centre shows moved from frame `from` to frame `to`.
+struct ImageShift {
+  std::int64_t from = 0;
+  std::int64_t to = 0;
+  Vector2<double> shift = Vector2<double>::Zero();  // px
+};
+
+struct Light {
+  double mean = 0;       // grey levels
+  double range = 0;      // grey levels, from the 1 % darkest to the 1 % brightest
+  double dark = 0;       // share of the pixels
+  double saturated = 0;  // share of the pixels
+};
+
+// Of one picture, valid().
+[[nodiscard]] Light measure_light(const ImageView& picture);
+
+struct PictureNeeds {
+  std::string source;
+  bool landmarks = true;  // OE mode; without it pictures that show nothing are advice
+};
+
+struct PictureReport {
+  std::size_t pictures = 0;
+  std::size_t without = 0;  // frames that came without a picture
+  Light light;              // medians
+  std::optional<Spread> points;
+  double noise = 0;  // of a pixel, grey levels, median
+  std::vector<ImageShift> shifts;
+  Findings findings;
+};
+
+class PictureCheck {
+ public:
+  // frame: its number; connected: nothing is known to lie between this one and the one before.
+  void add(std::int64_t frame, const ImageView& picture, bool connected);
+
+  [[nodiscard]] PictureReport report(const PictureNeeds& needs) const;
+
+ private:
+  std::unique_ptr<StartUpTracker> tracker_;
+  int width_ = 0;
+  int height_ = 0;
+  std::optional<std::int64_t> before_;  // the frame that the tracker compares with
+  std::vector<Light> lights_;
+  std::vector<double> points_;
+  std::vector<double> noise_;
+  std::vector<ImageShift> shifts_;
+  std::size_t without_ = 0;
+};
+
+[[nodiscard]] ReportLines describe(const PictureReport& report);
+
+}  // namespace alidade

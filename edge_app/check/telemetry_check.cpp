@@ -1,0 +1,303 @@
+#include "edge_app/check/telemetry_check.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/model/angle.h"
+#include "edge_app/pipeline/stale_repeats.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kDegrees = 180 / kPi;
+constexpr std::size_t kLeastChanges = 8;  // below it a median is one of accidents
+
+bool is_finite(const PanTiltSample& sample) {
+  return std::isfinite(sample.pan_rad) && std::isfinite(sample.tilt_rad) &&
+         std::isfinite(sample.earliest_time_s) && std::isfinite(sample.latest_time_s);
+}
+
+AxisReport measure_axis(const std::vector<PanTiltSample>& samples, double PanTiltSample::*angle) {
+  AxisReport axis;
+  std::vector<double> angles;
+  double unwrapped = samples.front().*angle;
+  axis.least = axis.largest = unwrapped;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    angles.push_back(samples[i].*angle);
+    if (i > 0) unwrapped += wrap_angle(samples[i].*angle - samples[i - 1].*angle);
+    axis.least = std::min(axis.least, unwrapped);
+    axis.largest = std::max(axis.largest, unwrapped);
+  }
+  axis.last = samples.back().*angle;
+  axis.quantum = angle_quantum(angles);
+  return axis;
+}
+
+// The head goes one way through the value of a run, by steps that rounding does not explain.
+bool passes(double before, double at, double after, double quantum) {
+  constexpr double kBeyondRounding = 2;  // quanta
+  constexpr double kSmallest = 2e-7;     // rad; steps of a rounding in a file are none
+  const double in = wrap_angle(at - before);
+  const double out = wrap_angle(after - at);
+  return in * out > 0 &&
+         std::min(std::abs(in), std::abs(out)) > std::max(kBeyondRounding * quantum, kSmallest);
+}
+
+void measure_turning(const std::vector<PanTiltSample>& samples, const std::vector<bool>& stale,
+                     TelemetryReport* report) {
+  const std::vector<EqualRun> runs = equal_runs(samples);
+  std::vector<double> periods;
+  std::vector<double> pan_rates;
+  std::vector<double> tilt_rates;
+  for (std::size_t i = 1; i + 1 < runs.size(); ++i) {
+    const PanTiltSample& before = samples[runs[i - 1].begin];
+    const PanTiltSample& at = samples[runs[i].begin];
+    const PanTiltSample& after = samples[runs[i + 1].begin];
+    const bool repeats = runs[i].end - runs[i].begin > 1;
+    if (at.restarted || after.restarted || (repeats && !stale[runs[i].begin + 1])) continue;
+    if (!passes(before.pan_rad, at.pan_rad, after.pan_rad, report->pan.quantum) &&
+        !passes(before.tilt_rad, at.tilt_rad, after.tilt_rad, report->tilt.quantum)) {
+      continue;
+    }
+    const double period_s = middle_time_s(after) - middle_time_s(at);
+    if (!(period_s > 0)) continue;
+    periods.push_back(period_s);
+    pan_rates.push_back(std::abs(wrap_angle(after.pan_rad - at.pan_rad)) / period_s);
+    tilt_rates.push_back(std::abs(wrap_angle(after.tilt_rad - at.tilt_rad)) / period_s);
+    report->turning += runs[i].end - runs[i].begin;
+    if (!repeats) continue;
+    report->stale += runs[i].end - runs[i].begin - 1;
+    const double held_s = middle_time_s(samples[runs[i].end - 1]) - middle_time_s(at);
+    report->longest_stale_s = std::max(report->longest_stale_s, held_s);
+    report->longest_change_s = std::max(report->longest_change_s, period_s);
+  }
+  if (periods.size() < kLeastChanges) return;
+  report->change_hz = 1 / spread_of(periods)->median;
+  report->pan.top_rate = spread_of(pan_rates)->most;
+  report->tilt.top_rate = spread_of(tilt_rates)->most;
+}
+
+// PT mode interpolates between samples and goes on beyond the newest, both for so long only.
+void judge_rate(TelemetryReport* report, const TelemetryNeeds& needs) {
+  constexpr double kMuchSlower = 0.8;
+  if (!report->interval_s || !report->rate_hz) return;
+  const double interval_s = report->interval_s->median;
+  const std::string where = "pan/tilt " + needs.source + ": ";
+  // When a frame comes, the newest sample's time is as far back as a poll and its bounds; the frame's own lies
+  // clock_offset_s later.
+  const double bounds_s = report->bounds_s ? report->bounds_s->median : 0;
+  const double age_s = report->interval_s->most + bounds_s + needs.clock_offset_s;
+  if (interval_s > needs.max_gap_s) {
+    add_problem(&report->findings,
+                fmt::format("{}one sample each {:.2f} s; angles are not told between samples more "
+                            "than {:.1f} s apart: raise pan_tilt.rate_hz",
+                            where, interval_s, needs.max_gap_s));
+  } else if (age_s > needs.max_extrapolation_s) {
+    add_problem(
+        &report->findings,
+        fmt::format("{}the newest sample is up to {:.0f} ms old when a frame asks for it, and "
+                    "realtime.max_extrapolation_s is {:.0f} ms: such frames get no angle; "
+                    "raise pan_tilt.rate_hz, or the limit",
+                    where, 1e3 * age_s, 1e3 * needs.max_extrapolation_s));
+  } else if (needs.rate_hz && *report->rate_hz < kMuchSlower * *needs.rate_hz) {
+    add_advice(
+        &report->findings,
+        fmt::format("{}{:.1f} samples a second of the {:.1f} asked for; the device answers "
+                    "after {:.1f} ms: set pan_tilt.rate_hz to what it can do, and look at the link",
+                    where, *report->rate_hz, *needs.rate_hz, 1e3 * bounds_s));
+  }
+}
+
+// TelemetryBuffer takes repeats for longer than max_repeat_s as a head at rest: if they are stale, the angle is wrong
+// by all the way that it turned meanwhile.
+void judge_repeats(TelemetryReport* report, const TelemetryNeeds& needs) {
+  constexpr double kReserve = 1.2;
+  constexpr double kRounding = 1e-6;
+  if (report->stale == 0 || report->longest_stale_s <= needs.max_repeat_s) return;
+  add_problem(
+      &report->findings,
+      fmt::format("pan/tilt {}: while the head turns it repeats an old angle for up to {:.0f} ms; "
+                  "pan_tilt.max_repeat_s is {:.0f} ms, after which that counts as rest: set "
+                  "max_repeat_s: {:.2f}",
+                  needs.source, 1e3 * report->longest_stale_s, 1e3 * needs.max_repeat_s,
+                  std::ceil(100 * kReserve * report->longest_change_s - kRounding) / 100));
+}
+
+// Rounding to q has a standard deviation of q / sqrt(12): where that exceeds the noise that run assumes, its sigmas
+// are too small unless it is told of q.
+void judge_quantum(TelemetryReport* report, const TelemetryNeeds& needs) {
+  const double quantum = std::max(report->pan.quantum, report->tilt.quantum);
+  const double limit = std::sqrt(12.0) * needs.angle_sigma_rad;
+  if (quantum > limit && needs.quantum_rad < quantum / 2) {
+    add_advice(
+        &report->findings,
+        fmt::format("pan/tilt {}: angles come in steps of {:.4f} deg, which is more than the "
+                    "assumed noise; set pan_tilt.angle_quantum_rad: {:.3g}",
+                    needs.source, kDegrees * quantum, quantum));
+  } else if (quantum > 0 && needs.quantum_rad > limit && needs.quantum_rad > 2 * quantum) {
+    add_advice(
+        &report->findings,
+        fmt::format("pan/tilt {}: angles come in steps of {:.4f} deg, finer than the configured "
+                    "pan_tilt.angle_quantum_rad: {:.3g}; set it to {:.3g}",
+                    needs.source, kDegrees * quantum, needs.quantum_rad, quantum));
+  }
+}
+
+// OE mode looks for landmarks within three sigmas of the prediction and, where that fails, within 96 px (oe_mode.cpp).
+// Uniform within its bounds, a sample's time has a sigma of width / sqrt(12).
+void judge_bounds(TelemetryReport* report, const TelemetryNeeds& needs) {
+  constexpr double kFarthest = 96;  // px
+  if (report->negative_bounds > 0) {
+    add_problem(
+        &report->findings,
+        fmt::format("pan/tilt {}: {} of {} samples end before they begin; their times cannot be "
+                    "used: look at the recording's earliest_time_s, or report it",
+                    needs.source, report->negative_bounds, report->samples));
+  }
+  const double rate = std::max(report->pan.top_rate, report->tilt.top_rate);
+  if (!report->bounds_s || !needs.landmarks) return;
+  const double error_px =
+      3 * report->bounds_s->median / std::sqrt(12.0) * rate * needs.focal_length_px;
+  if (error_px <= kFarthest) return;
+  add_advice(
+      &report->findings,
+      fmt::format("pan/tilt {}: an angle's time is known to {:.0f} ms; at {:.1f} deg/s, as the "
+                  "head turned, that is up to {:.0f} px, beyond the {:.0f} px in which OE mode "
+                  "looks for landmarks: shorten the way to the head, or turn more slowly",
+                  needs.source, 1e3 * report->bounds_s->median, kDegrees * rate, error_px,
+                  kFarthest));
+}
+
+void judge_zoom(TelemetryReport* report, const TelemetryNeeds& needs) {
+  const std::string where = "pan/tilt " + needs.source + ": ";
+  if (report->other_zoom) {
+    add_advice(
+        &report->findings,
+        fmt::format("{}the zoom changed from {} to {}; each zoom has a calibration of its own, "
+                    "none while it changes: hold it, or widen calibration.zoom_tolerance",
+                    where, *report->other_zoom, *report->zoom));
+  }
+  if (!report->zoom || !needs.zoom ||
+      std::abs(*report->zoom - *needs.zoom) <= needs.zoom_tolerance) {
+    return;
+  }
+  report->findings.push_back(
+      {needs.makes_calibrations ? Severity::kAdvice : Severity::kProblem,
+       fmt::format(
+           "{}the zoom is {}, but the calibration is for {}; set the camera's zoom back, or "
+           "calibrate at this one",
+           where, *report->zoom, *needs.zoom)});
+}
+
+std::string degrees(const AxisReport& axis, const char* name) {
+  return fmt::format("{} {:.2f} to {:.2f} deg", name, kDegrees * axis.least,
+                     kDegrees * axis.largest);
+}
+
+std::string step(const AxisReport& axis, const char* name) {
+  return axis.quantum > 0 ? fmt::format("{} {:.5f} deg", name, kDegrees * axis.quantum)
+                          : fmt::format("{} none seen", name);
+}
+
+}  // namespace
+
+TelemetryReport check_telemetry(const std::vector<PanTiltSample>& samples,
+                                const ClockFilterOptions& clock, const TelemetryNeeds& needs) {
+  TelemetryReport report;
+  report.samples = samples.size();
+  std::vector<PanTiltSample> usable;
+  std::copy_if(samples.begin(), samples.end(), std::back_inserter(usable), is_finite);
+  report.useless = samples.size() - usable.size();
+  if (report.useless > 0) {
+    add_problem(
+        &report.findings,
+        fmt::format("pan/tilt {}: {} of {} samples are no numbers; the device or its firmware "
+                    "is at fault",
+                    needs.source, report.useless, report.samples));
+  }
+  if (usable.empty()) return report;
+  std::vector<double> intervals;
+  std::vector<double> bounds;
+  std::vector<ClockedStamp> stamps;
+  for (std::size_t i = 0; i < usable.size(); ++i) {
+    const PanTiltSample& sample = usable[i];
+    if (i > 0 && !sample.restarted) {
+      intervals.push_back(sample.latest_time_s - usable[i - 1].latest_time_s);
+    }
+    bounds.push_back(sample.latest_time_s - sample.earliest_time_s);
+    if (bounds.back() < 0) ++report.negative_bounds;
+    stamps.push_back(
+        {sample.latest_time_s, sample.device_time_s, sample.sequence, sample.restarted});
+    if (!sample.zoom || !std::isfinite(*sample.zoom)) continue;
+    if (report.zoom && std::abs(*sample.zoom - *report.zoom) > needs.zoom_tolerance) {
+      report.other_zoom = report.zoom;
+    }
+    report.zoom = sample.zoom;
+  }
+  const double span_s = usable.back().latest_time_s - usable.front().latest_time_s;
+  if (span_s > 0) report.rate_hz = static_cast<double>(usable.size() - 1) / span_s;
+  report.interval_s = spread_of(intervals);
+  report.bounds_s = spread_of(bounds);
+  report.clock = check_clock(stamps, clock);
+  report.pan = measure_axis(usable, &PanTiltSample::pan_rad);
+  report.tilt = measure_axis(usable, &PanTiltSample::tilt_rad);
+  const std::vector<bool> stale = find_stale_repeats(usable);
+  measure_turning(usable, stale, &report);
+  for (std::size_t i = 0; i < usable.size(); ++i) {
+    const bool later =
+        report.fresh.empty() || middle_time_s(usable[i]) > middle_time_s(report.fresh.back());
+    if (!stale[i] && later) report.fresh.push_back(usable[i]);
+  }
+  judge_rate(&report, needs);
+  judge_repeats(&report, needs);
+  judge_quantum(&report, needs);
+  judge_bounds(&report, needs);
+  judge_zoom(&report, needs);
+  judge_clock(report.clock, "pan/tilt " + needs.source, &report.findings);
+  return report;
+}
+
+ReportLines describe(const TelemetryReport& report) {
+  ReportLines lines;
+  if (report.samples < 2 || !report.interval_s || !report.bounds_s) return lines;
+  lines.emplace_back("samples",
+                     fmt::format("{}, one each {:.1f} ms, {:.1f} (95 %), {:.1f} (worst)",
+                                 report.samples, 1e3 * report.interval_s->median,
+                                 1e3 * report.interval_s->most, 1e3 * report.interval_s->largest));
+  lines.emplace_back("time", fmt::format("known to {:.2f} ms median, {:.2f} (95 %), {:.2f} (worst)",
+                                         1e3 * report.bounds_s->median, 1e3 * report.bounds_s->most,
+                                         1e3 * report.bounds_s->largest));
+  if (report.change_hz) {
+    lines.emplace_back(
+        "changes",
+        fmt::format(
+            "{:.1f} a second while the head turns; {} of {} samples then repeat an old angle "
+            "({:.0f} %){}",
+            *report.change_hz, report.stale, report.turning,
+            100 * static_cast<double>(report.stale) / static_cast<double>(report.turning),
+            report.stale > 0 ? fmt::format(", for up to {:.0f} ms", 1e3 * report.longest_stale_s)
+                             : ""));
+  } else {
+    lines.emplace_back("changes",
+                       "not known: the head turned too little; turn it during the check");
+  }
+  lines.emplace_back("range", degrees(report.pan, "pan") + ", " + degrees(report.tilt, "tilt") +
+                                  (report.change_hz ? fmt::format(", up to {:.1f} and {:.1f} deg/s",
+                                                                  kDegrees * report.pan.top_rate,
+                                                                  kDegrees * report.tilt.top_rate)
+                                                    : ""));
+  lines.emplace_back("quantum", step(report.pan, "pan") + ", " + step(report.tilt, "tilt"));
+  if (report.zoom) {
+    lines.emplace_back("zoom", report.other_zoom ? fmt::format("{}, changed from {}", *report.zoom,
+                                                               *report.other_zoom)
+                                                 : fmt::format("{}, unchanged", *report.zoom));
+  }
+  if (report.clock.kind != StampKind::kArrival) {
+    lines.emplace_back("clock filter", describe(report.clock));
+  }
+  return lines;
+}
+
+}  // namespace alidade

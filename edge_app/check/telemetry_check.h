@@ -1,0 +1,78 @@
+#pragma once
+// What samples of a pan/tilt source show that no data sheet tells.
+//
+//   polls     the median time between two samples; the longest
+//   changes   how often the device really measures: the median time between two new values while the head turns.
+//             Known where the steps are larger than rounding (2 quanta on an axis); a head that creeps or rests does not
+//             show it.
+//   quantum   of each axis (stale_repeats.h)
+//   bounds    latest - earliest of each sample: within so much its time is known
+//   stale     repeats of an old angle while the head turned (stale_repeats.h), as a share of all samples taken while
+//             it turned; how long an angle was repeated, and when the next one came, bound what max_repeat_s has to be
+// Angles rad, times s. Pure functions; they allocate and do not throw, whatever the samples hold.
+
+#include <array>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "edge_app/check/finding.h"
+#include "edge_app/check/spread.h"
+#include "edge_app/check/video_check.h"  // ClockReport, ReportLines
+#include "platform/pan_tilt/pan_tilt_source.h"
+
+namespace alidade {
+
+struct TelemetryNeeds {
+  std::string source;
+  std::optional<double> rate_hz;      // that polls were asked for
+  double max_repeat_s = 0.1;          // TelemetryLimits
+  double max_gap_s = 0.5;             // TelemetryLimits
+  double max_extrapolation_s = 0.25;  // TelemetryLimits
+  double angle_sigma_rad = 1e-4;      // TelemetryNoise, as run will take them
+  double quantum_rad = 0;
+  double focal_length_px = 0;      // 0: unknown
+  double clock_offset_s = 0;       // images are looked up so much later
+  std::optional<double> zoom;      // that the calibration is for
+  double zoom_tolerance = 0;       // device units
+  bool makes_calibrations = true;  // run calibrates at another zoom
+  bool landmarks = true;           // OE mode
+};
+
+struct AxisReport {
+  double last = 0;   // rad
+  double least = 0;  // rad, turns counted
+  double largest = 0;
+  double quantum = 0;   // rad; 0: none found
+  double top_rate = 0;  // rad/s: 95 % of the time it turned no faster
+};
+
+struct TelemetryReport {
+  std::size_t samples = 0;
+  std::size_t useless = 0;        // not finite; looked at no further
+  std::optional<double> rate_hz;  // of the samples that came
+  std::optional<Spread> interval_s;
+  std::optional<double> change_hz;  // new values a second while the head turns
+  std::optional<Spread> bounds_s;
+  std::size_t negative_bounds = 0;  // of samples whose latest time is before their earliest
+  std::size_t turning = 0;          // samples taken while the head turned
+  std::size_t stale = 0;
+  double longest_stale_s = 0;   // from an angle's first sample to its last stale repeat
+  double longest_change_s = 0;  // from an angle's first sample to the next angle
+  AxisReport pan;
+  AxisReport tilt;
+  std::optional<double> zoom;        // last told
+  std::optional<double> other_zoom;  // that differs from it by more than the tolerance
+  ClockReport clock;
+  // Samples as the motion check takes them: finite, in order of time, fresh.
+  std::vector<PanTiltSample> fresh;
+  Findings findings;
+};
+
+[[nodiscard]] TelemetryReport check_telemetry(const std::vector<PanTiltSample>& samples,
+                                              const ClockFilterOptions& clock,
+                                              const TelemetryNeeds& needs);
+
+[[nodiscard]] ReportLines describe(const TelemetryReport& report);
+
+}  // namespace alidade
