@@ -45,6 +45,27 @@ bool passes(double before, double at, double after, double quantum) {
          std::min(std::abs(in), std::abs(out)) > std::max(kBeyondRounding * quantum, kSmallest);
 }
 
+// Whether an axis goes one way about run i: of all its ways over four runs to both sides, most lead on. Noise goes
+// to and fro.
+bool leads_on(const std::vector<PanTiltSample>& samples, const std::vector<EqualRun>& runs,
+              std::size_t i, double PanTiltSample::*angle) {
+  constexpr std::size_t kReach = 4;
+  constexpr double kMost =
+      0.7;  // of 8 ways by chance: never; of a turn that reverses within them: less
+  const std::size_t first = i - std::min(i, kReach);
+  const std::size_t last = std::min(i + kReach, runs.size() - 1);
+  if (last - first < kReach) return false;
+  double led = 0;
+  double gone = 0;
+  for (std::size_t run = first; run < last; ++run) {
+    const double way =
+        wrap_angle(samples[runs[run + 1].begin].*angle - samples[runs[run].begin].*angle);
+    led += way;
+    gone += std::abs(way);
+  }
+  return std::abs(led) >= kMost * gone;
+}
+
 void measure_turning(const std::vector<PanTiltSample>& samples, const std::vector<bool>& stale,
                      TelemetryReport* report) {
   const std::vector<EqualRun> runs = equal_runs(samples);
@@ -57,10 +78,11 @@ void measure_turning(const std::vector<PanTiltSample>& samples, const std::vecto
     const PanTiltSample& after = samples[runs[i + 1].begin];
     const bool repeats = runs[i].end - runs[i].begin > 1;
     if (at.restarted || after.restarted || (repeats && !stale[runs[i].begin + 1])) continue;
-    if (!passes(before.pan_rad, at.pan_rad, after.pan_rad, report->pan.quantum) &&
-        !passes(before.tilt_rad, at.tilt_rad, after.tilt_rad, report->tilt.quantum)) {
-      continue;
-    }
+    const bool pans = passes(before.pan_rad, at.pan_rad, after.pan_rad, report->pan.quantum) &&
+                      leads_on(samples, runs, i, &PanTiltSample::pan_rad);
+    const bool tilts = passes(before.tilt_rad, at.tilt_rad, after.tilt_rad, report->tilt.quantum) &&
+                       leads_on(samples, runs, i, &PanTiltSample::tilt_rad);
+    if (!pans && !tilts) continue;
     const double period_s = middle_time_s(after) - middle_time_s(at);
     if (!(period_s > 0)) continue;
     periods.push_back(period_s);

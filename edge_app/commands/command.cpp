@@ -53,7 +53,10 @@ NamedCalibration choose_calibration(const Config& config) {
     }
     return chosen;
   }
-  if (not_yet) spdlog::warn("{}: no calibration yet; the data sheet's camera is used", file);
+  if (not_yet) {
+    spdlog::warn("{}: no calibration yet; the data sheet's camera is used",
+                 file.empty() ? "calibration.file is not set" : file);
+  }
   NamedCalibration chosen{data_sheet_calibration(config.camera), false, "data sheet"};
   chosen.calibration.camera.width = video.width;
   chosen.calibration.camera.height = video.height;

@@ -492,7 +492,7 @@ TEST_F(CommandLineTest, CheckReportsBothStreamsAndTheSizes) {
   Result result = alidade({"check", "-c", recorded_config(), "--duration", "0.5"});
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, AllOf(HasSubstr("1920x1080 px (as expected), 25.00 Hz"),
-                                   HasSubstr("100.00 Hz"), HasSubstr("known to 2.0 ms")));
+                                   HasSubstr("100.00 Hz"), HasSubstr("known to 2.00 ms median")));
   directory_.write("calibration.yaml", head_.calibration(1280, 720));
   result = alidade({"check", "-c", recorded_config(), "--duration", "0.5"});
   EXPECT_EQ(result.exit_code, 1);

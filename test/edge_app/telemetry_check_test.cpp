@@ -7,6 +7,7 @@
 
 #include <cmath>
 #include <limits>
+#include <random>
 
 #include "core/model/angle.h"
 #include "test/edge_app/findings.h"
@@ -61,7 +62,8 @@ TEST(TelemetryCheck, MeasuresAHealthyHead) {
   EXPECT_NEAR(*report.change_hz, kRate, 1e-6);
   EXPECT_NEAR(report.bounds_s->median, 2e-3, 1e-9);
   EXPECT_EQ(report.stale, 0U);
-  EXPECT_GT(report.turning, 250U);
+  // But for 8 samples about each of up to 8 turns.
+  EXPECT_GT(report.turning, 230U);
   EXPECT_EQ(report.pan.quantum, 0);
   EXPECT_EQ(report.fresh.size(), 300U);
   // The largest rate is 0.35 + 0.21 rad/s.
@@ -96,6 +98,14 @@ TEST(TelemetryCheck, DoesNotTakeARestForAnOldAngle) {
   EXPECT_EQ(report.stale, 0U);
   EXPECT_EQ(report.pan.quantum, 0);
   EXPECT_EQ(report.pan.least, report.pan.largest);
+}
+
+TEST(TelemetryCheck, DoesNotTakeNoiseForATurn) {
+  std::mt19937 random(6);
+  std::normal_distribution<double> noise(0.3, 1e-4);
+  const TelemetryReport report = check(samples_of([&](double) { return noise(random); }));
+  EXPECT_THAT(report.findings, IsEmpty());
+  EXPECT_FALSE(report.change_hz);
 }
 
 TEST(TelemetryCheck, AdvisesToTellTheQuantum) {

@@ -141,7 +141,20 @@ class Run(SystemTest):
         check = self.alidade("check", "-c", self.write_config(camera))
         code, lines = check.end()
         self.assertEqual(code, 0, check.error_text())
-        self.assertIn(f"{IMAGE['width']}x{IMAGE['height']}", "\n".join(lines))
+        report = "\n".join(lines)
+        self.assertIn(f"{IMAGE['width']}x{IMAGE['height']}", report)
+        self.assertIn("pan sign right, tilt sign right", report)
+
+    def test_check_says_that_nobody_is_there(self):
+        camera = self.camera()
+        config = self.write_config(camera)
+        camera.end(signal.SIGKILL)
+        check = self.alidade("check", "-c", config)
+        code, lines = check.end()
+        self.assertEqual(code, 1)
+        for url in (camera.video_url, camera.pan_tilt_url):
+            self.assertTrue(any(line.startswith("alidade: ") and url in line for line in check.errors), check.error_text())
+        self.assertEqual(2, sum("failed" in line for line in lines), lines)
 
 
 class Record(SystemTest):

@@ -1,0 +1,192 @@
+// `alidade check` as a person meets it, on recordings of the virtual camera that are played at their pace: a healthy setup,
+// and what goes wrong when one is put together. The virtual camera shares no code with what is tested.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <functional>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "test/edge_app/alidade_command.h"
+#include "test/support/temporary_directory.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::Not;
+using ::testing::StartsWith;
+
+namespace fs = std::filesystem;
+
+std::string camera(const std::string& telemetry) {
+  return "seed: 5\n"
+         "duration_s: 5\n"
+         "image: {width: 320, height: 180, rate_hz: 25}\n"
+         "camera: {focal_length_px: 900, line_delay_us: 75, clock_offset_ms: -84.4}\n"
+         "path: {type: triple_cosine, amplitude: 1, period_s: 7}\n"
+         "scene: {procedural: [{width_deg: 360, height_deg: 180, projection: equirectangular}]}\n"
+         "sensor: {exposure_ms: 1, read_noise: 1.5, jpeg_quality: 90}\n"
+         "telemetry: {rate_hz: 30, sigma_rad: 5.0e-5" +
+         telemetry + "}\n";
+}
+
+void film(const TemporaryDirectory& directory, const std::string& telemetry) {
+  const std::string file = directory.write("camera.yaml", camera(telemetry));
+  const Result result = run({ALIDADE_SIMULATE, "-c", file, "-o", directory.path() + "/recording"});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+}
+
+class CheckCommand : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    healthy_ = new TemporaryDirectory;
+    film(*healthy_, "");
+  }
+  static void TearDownTestSuite() {
+    delete healthy_;
+    healthy_ = nullptr;
+  }
+  // A copy to spoil.
+  void take_healthy() {
+    fs::copy(healthy_->path() + "/recording", path("recording"), fs::copy_options::recursive);
+  }
+
+  [[nodiscard]] std::string path(const std::string& name) const {
+    return directory_.path() + "/" + name;
+  }
+
+  // Changes each row of telemetry.csv: receive_time_s, pan_rad, tilt_rad and what follows.
+  void change_telemetry(const std::function<void(std::vector<std::string>*)>& change) {
+    std::istringstream rows(directory_.read("recording/telemetry.csv"));
+    std::string line;
+    std::getline(rows, line);
+    ASSERT_THAT(line, StartsWith("receive_time_s,pan_rad,tilt_rad"));
+    std::ostringstream changed;
+    changed << line << "\n";
+    while (std::getline(rows, line)) {
+      std::vector<std::string> cells;
+      std::istringstream row(line);
+      for (std::string cell; std::getline(row, cell, ',');) cells.push_back(cell);
+      change(&cells);
+      for (std::size_t i = 0; i < cells.size(); ++i) changed << (i > 0 ? "," : "") << cells[i];
+      changed << "\n";
+    }
+    std::ofstream(path("recording/telemetry.csv")) << changed.str();
+  }
+
+  Result check(const std::string& focal_length_px = "900") {
+    return alidade({"check", "--duration", "4", "-c",
+                    directory_.write("alidade.yaml",
+                                     "video: {type: recording, directory: recording}\n"
+                                     "pan_tilt: {type: recording, directory: recording, "
+                                     "angle_sigma_rad: 5.0e-5}\n"
+                                     "camera: {focal_length_px: " +
+                                         focal_length_px + "}\n")});
+  }
+
+  TemporaryDirectory directory_;
+
+ private:
+  static TemporaryDirectory* healthy_;
+};
+
+TemporaryDirectory* CheckCommand::healthy_ = nullptr;
+
+// What is wrong, below the log: each finding is one line that says where.
+std::vector<std::string> findings(const std::string& errors) {
+  std::vector<std::string> findings;
+  std::istringstream lines(errors);
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind("alidade: ", 0) == 0) findings.push_back(line);
+  }
+  return findings;
+}
+
+TEST_F(CheckCommand, PassesAHealthySetup) {
+  take_healthy();
+  const Result result = check();
+  EXPECT_EQ(result.exit_code, 0);
+  EXPECT_THAT(findings(result.errors), IsEmpty());
+  EXPECT_THAT(result.output,
+              AllOf(HasSubstr("320x180 px"), HasSubstr("points to follow"),
+                    HasSubstr("while the head turns; 0 of "),
+                    HasSubstr("pan sign right, tilt sign right; focal length about "),
+                    Not(HasSubstr("advice"))));
+}
+
+TEST_F(CheckCommand, SaysThatTiltIsReversed) {
+  take_healthy();
+  change_telemetry([](std::vector<std::string>* cells) {
+    std::string& tilt = cells->at(2);
+    tilt = tilt.front() == '-' ? tilt.substr(1) : "-" + tilt;
+  });
+  const Result result = check();
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(findings(result.errors),
+              ElementsAre(AllOf(HasSubstr(path("recording")), HasSubstr("tilt is reversed"),
+                                HasSubstr("turn the sign of tilt_rad"))));
+  EXPECT_THAT(result.output, HasSubstr("pan sign right, tilt sign REVERSED"));
+}
+
+TEST_F(CheckCommand, SaysHowLongADeviceRepeatsOldAngles) {
+  film(directory_, ", internal_rate_hz: 5");
+  const Result result = check();
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(findings(result.errors),
+              ElementsAre(AllOf(HasSubstr("repeats an old angle for up to "),
+                                HasSubstr("set max_repeat_s: 0.2"))));
+  EXPECT_THAT(result.output, HasSubstr("changes      5.0 a second"));
+}
+
+TEST_F(CheckCommand, SaysThatADeviceNeverMeasures) {
+  take_healthy();
+  change_telemetry([](std::vector<std::string>* cells) { cells->at(1) = cells->at(2) = "0.1"; });
+  const Result result = check();
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(findings(result.errors), ElementsAre(HasSubstr("always the same angles")));
+}
+
+TEST_F(CheckCommand, SaysThatTheFocalLengthIsAnother) {
+  take_healthy();
+  const Result result = check("3000");
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(findings(result.errors),
+              ElementsAre(AllOf(StartsWith("alidade: camera.focal_length_px: "),
+                                HasSubstr("set camera.focal_length_px: 9"))));
+}
+
+TEST_F(CheckCommand, TellsALinkThatIsDead) {
+  const Result result = alidade({"check", "--duration", "1", "-c",
+                                 directory_.write("alidade.yaml",
+                                                  "video: {type: recording, directory: gone}\n"
+                                                  "pan_tilt: {type: recording, directory: lost}\n"
+                                                  "camera: {focal_length_px: 900}\n")});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(findings(result.errors),
+              ElementsAre(HasSubstr(path("gone")), HasSubstr(path("lost"))));
+  EXPECT_THAT(result.output,
+              AllOf(HasSubstr("video "), HasSubstr(": failed"), HasSubstr("pan/tilt ")));
+}
+
+TEST_F(CheckCommand, RefusesAConfigurationThatIsWrong) {
+  const Result result =
+      alidade({"check", "-c",
+               directory_.write("alidade.yaml",
+                                "video: {type: recording, directory: recording}\n"
+                                "pan_tilt: {type: recording, directory: recording, rate_hz: fast}\n"
+                                "camera: {focal_length_px: 900}\n")});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(result.errors, HasSubstr("alidade.yaml:2: "));
+  EXPECT_THAT(result.output, IsEmpty());
+}
+
+}  // namespace
+}  // namespace alidade
