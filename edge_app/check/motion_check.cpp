@@ -252,11 +252,12 @@ double image_range(const std::vector<TimedShift>& shifts) {
 }
 
 // A mount that shakes moves the picture by some pixels, too; a quarter of its width is no shaking.
-void judge_presence(MotionReport* report, double image_px, double head_px,
+void judge_presence(MotionReport* report, double image_px, double head_rad,
                     const MotionNeeds& needs) {
   const double much_px = 0.25 * needs.image_width_px;
+  const double head_px = head_rad * needs.focal_length_px;
   if (!(much_px > 0)) return;
-  if (!report->head_moved && image_px > much_px) {
+  if (head_rad == 0 && image_px > much_px) {
     add_problem(
         &report->findings,
         fmt::format("pan/tilt {}: always the same angles, while the picture moved by {:.0f} px; "
@@ -301,9 +302,9 @@ MotionReport check_motion(const std::vector<TimedShift>& shifts,
   const bool enough = 0.5 * static_cast<double>(motions.size()) >= kLeastTimes;
   report.image_moved =
       !motions.empty() && std::sqrt(squares / static_cast<double>(motions.size())) >= kMovedPx;
-  if (!enough || !report.image_moved || !report.head_moved) {
-    const double head_px = enough ? head.range() * needs.focal_length_px : 0;
-    judge_presence(&report, image_range(shifts), head_px, needs);
+  if (!enough) return report;
+  if (!report.image_moved || !report.head_moved) {
+    judge_presence(&report, image_range(shifts), head.range(), needs);
     return report;
   }
 

@@ -72,6 +72,9 @@ TEST_P(FrameSourceContract, NumbersItsFramesAndGivesEachItsPicture) {
     ASSERT_NE(frame_.luma, nullptr);
     EXPECT_GE(frame_.stride, frame_.width);
     EXPECT_NE(frame_.owner, nullptr);
+    if (frame_.decode_s) {
+      EXPECT_GT(*frame_.decode_s, 0);
+    }
   }
 }
 

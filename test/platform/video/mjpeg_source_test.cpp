@@ -110,6 +110,7 @@ TEST_P(MjpegSourceStyles, DeliversEveryPictureInOrder) {
     EXPECT_EQ(frame.width, MjpegServer::kWidth);
     EXPECT_EQ(frame.height, MjpegServer::kHeight);
     EXPECT_NEAR(grey_of(frame), MjpegServer::grey_of(i), kGreyTolerance);
+    EXPECT_TRUE(frame.decode_s);
     EXPECT_GE(frame.stamp.receive_time_s, server.sent(i).before_first_s);
     EXPECT_GE(frame.stamp.receive_time_s, last_s);
     last_s = frame.stamp.receive_time_s;
@@ -413,6 +414,7 @@ TEST(MjpegSource, CopiesThePicturesOverReconnections) {
     for (int i = 0; i < 10; ++i) {
       ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
       EXPECT_EQ(frame.luma, nullptr);
+      EXPECT_FALSE(frame.decode_s);
       EXPECT_EQ(frame.width, MjpegServer::kWidth);
       ASSERT_TRUE(writer.add_frame(frame.stamp, &error)) << error;
     }

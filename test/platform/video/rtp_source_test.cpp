@@ -103,6 +103,7 @@ TEST_P(RtpSourceWith, DeliversEveryPictureWithItsOwnStamp) {
     EXPECT_EQ(frame.width, RtpSender::kWidth);
     EXPECT_EQ(frame.height, RtpSender::kHeight);
     EXPECT_NEAR(grey_of(frame), RtpSender::grey_of(i), kGreyTolerance);
+    EXPECT_TRUE(frame.decode_s);
     EXPECT_GE(frame.stamp.receive_time_s, last.receive_time_s);
     last = frame.stamp;
   }
@@ -333,6 +334,7 @@ TEST_P(RtpSourceWith, DeliversStampsAndSizeWithoutDecoding) {
     ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
     first = i == 0 ? frame.stamp : first;
     EXPECT_EQ(frame.luma, nullptr);
+    EXPECT_FALSE(frame.decode_s);
     EXPECT_EQ(frame.width, RtpSender::kWidth);
     EXPECT_EQ(frame.height, RtpSender::kHeight);
     EXPECT_NEAR(number_of(frame, first), i, 1e-3);
