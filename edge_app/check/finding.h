@@ -20,6 +20,9 @@ struct Finding {
 
 using Findings = std::vector<Finding>;
 
+// For a person: label and text.
+using ReportLines = std::vector<std::pair<std::string, std::string>>;
+
 inline void add_problem(Findings* findings, std::string text) {
   findings->push_back({Severity::kProblem, std::move(text)});
 }

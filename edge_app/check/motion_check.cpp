@@ -190,9 +190,10 @@ void judge_signs(MotionReport* report, const MotionNeeds& needs) {
                     "pan moves the picture up and down, and tilt to the side: it is turned by a "
                     "quarter; set the camera's picture upright");
   } else if (pan && tilt) {
-    add_problem(&report->findings,
-                where + "pan and tilt are both reversed against the picture: it is upside down; " +
-                    needs.turn_picture);
+    add_problem(
+        &report->findings,
+        where + "pan and tilt are both reversed against the picture, as if it were upside down; " +
+            needs.turn_picture);
   } else if (pan) {
     add_problem(&report->findings, where +
                                        "pan is reversed: the picture shows that the camera turns "

@@ -22,7 +22,6 @@
 
 #include "core/model/linear_algebra.h"
 #include "edge_app/check/finding.h"
-#include "edge_app/check/video_check.h"  // ReportLines
 #include "platform/pan_tilt/pan_tilt_source.h"
 
 namespace alidade {

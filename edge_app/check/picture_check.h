@@ -20,7 +20,6 @@
 #include "core/realtime/start_up_tracker.h"
 #include "edge_app/check/finding.h"
 #include "edge_app/check/spread.h"
-#include "edge_app/check/video_check.h"  // ReportLines
 
 namespace alidade {
 

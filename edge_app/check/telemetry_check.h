@@ -16,9 +16,9 @@
 #include <string>
 #include <vector>
 
+#include "edge_app/check/clock_check.h"
 #include "edge_app/check/finding.h"
 #include "edge_app/check/spread.h"
-#include "edge_app/check/video_check.h"  // ClockReport, ReportLines
 #include "platform/pan_tilt/pan_tilt_source.h"
 
 namespace alidade {

@@ -5,33 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "edge_app/pipeline/stream_clock.h"
-
 namespace alidade {
 namespace {
-
-StampKind kind_of(const ClockedStamp& stamp) {
-  return stamp.sender_time_s ? StampKind::kSender
-         : stamp.sequence    ? StampKind::kSequence
-                             : StampKind::kArrival;
-}
-
-// Median slope of receive over sender times, half the stream apart: jitter of single frames does not matter.
-void measure_raw_rate(const std::vector<ClockedStamp>& stamps, ClockReport* report) {
-  constexpr std::size_t kLeastPairs = 10;
-  const std::size_t half = stamps.size() / 2;
-  std::vector<double> slopes;
-  for (std::size_t i = 0; i + half < stamps.size(); ++i) {
-    const ClockedStamp& from = stamps[i];
-    const ClockedStamp& to = stamps[i + half];
-    const double sender_s = *to.sender_time_s - *from.sender_time_s;
-    if (sender_s > 0) slopes.push_back((to.receive_time_s - from.receive_time_s) / sender_s);
-  }
-  const std::optional<Spread> slope = spread_of(slopes);
-  if (!slope || slope->count < kLeastPairs) return;
-  report->raw_rate_error = slope->median - 1;
-  report->raw_rate_sigma = slope->deviation / std::sqrt(static_cast<double>(slope->count));
-}
 
 // Sender times between two neighbours, or receive times where the sender tells none.
 std::vector<double> intervals(const std::vector<CheckedFrame>& frames) {
@@ -162,83 +137,6 @@ std::string milliseconds(const Spread& spread) {
 
 }  // namespace
 
-ClockReport check_clock(const std::vector<ClockedStamp>& stamps, const ClockFilterOptions& options,
-                        std::vector<double>* time_s) {
-  ClockReport report;
-  StreamClock clock(options);
-  std::vector<double> times;
-  std::int64_t reconnections = 0;
-  std::size_t line_since = 0;  // the item at which the filter's line last began anew
-  for (const ClockedStamp& stamp : stamps) {
-    const bool reconnected = stamp.restarted && !times.empty();
-    const std::optional<ClockEstimate> estimate =
-        clock.update(stamp.receive_time_s, stamp.sender_time_s, stamp.sequence, reconnected);
-    reconnections += reconnected ? 1 : 0;
-    if (!times.empty() && estimate && estimate->restarted) line_since = times.size();
-    times.push_back(estimate ? estimate->time_s : stamp.receive_time_s);
-    if (estimate) report.sigma_s = estimate->sigma_s;
-  }
-  const ClockFilter<>& filter = clock.filter();
-  report.kind = stamps.empty() ? StampKind::kArrival : kind_of(stamps.back());
-  if (report.kind != StampKind::kArrival) {
-    report.state = filter.state();
-    report.rate_error = report.kind == StampKind::kSender ? filter.skew() : 0;
-    report.period_s = report.kind == StampKind::kSequence ? filter.period_s() : 0;
-    report.counters = filter.counters();
-    report.counters.restarts = std::max<std::int64_t>(0, report.counters.restarts - reconnections);
-    report.floor_shift_s = filter.floor_shift_s();
-    // The last line knows more than the answers that came while it was found.
-    std::vector<double> lateness;
-    for (std::size_t i = line_since; i < stamps.size(); ++i) {
-      if (kind_of(stamps[i]) != report.kind) continue;
-      const double sender = report.kind == StampKind::kSender
-                                ? *stamps[i].sender_time_s
-                                : static_cast<double>(*stamps[i].sequence);
-      times[i] = filter.to_host(sender);
-      lateness.push_back(stamps[i].receive_time_s - times[i]);
-    }
-    report.lateness_s = spread_of(lateness);
-    const std::vector<ClockedStamp> connection(
-        stamps.begin() + static_cast<std::ptrdiff_t>(line_since), stamps.end());
-    if (report.kind == StampKind::kSender &&
-        std::all_of(connection.begin(), connection.end(),
-                    [](const ClockedStamp& stamp) { return stamp.sender_time_s.has_value(); })) {
-      measure_raw_rate(connection, &report);
-    }
-  }
-  if (time_s != nullptr) *time_s = std::move(times);
-  return report;
-}
-
-void judge_clock(const ClockReport& clock, const std::string& what, Findings* findings) {
-  // Quartz keeps 200 millionths, the filter's own limit. Half a percent is what a steady drift of the arrival by 50 ms
-  // looks like in 10 s; what is beyond it, and beyond chance, is no clock in seconds.
-  constexpr double kNoClock = 5e-3;
-  constexpr double kChance = 6;  // standard deviations
-  if (clock.raw_rate_error &&
-      std::abs(*clock.raw_rate_error) > kNoClock + kChance * clock.raw_rate_sigma) {
-    add_problem(
-        findings,
-        fmt::format("{}: the sender's clock counts {:.3g} seconds in each of the host's; its "
-                    "time stamps cannot be used: correct the camera's stream settings",
-                    what, 1 / (1 + *clock.raw_rate_error)));
-    return;
-  }
-  if (clock.counters.restarts > 0) {
-    add_problem(findings,
-                fmt::format("{}: the sender's clock jumped {} times; each time the clock "
-                            "filter begins anew: switch off what sets the camera's clock, "
-                            "or let NTP slew it",
-                            what, clock.counters.restarts));
-  }
-  if (clock.counters.floor_shifts > 0) {
-    add_advice(findings,
-               fmt::format("{}: the least delay changed by {:.1f} ms; that is flagged and not "
-                           "followed: look for a changed route or a buffer that filled up",
-                           what, 1e3 * clock.floor_shift_s));
-  }
-}
-
 VideoReport check_video(const std::vector<CheckedFrame>& frames,
                         const FrameSourceCounters& counters, const ClockFilterOptions& clock,
                         const VideoNeeds& needs) {
@@ -268,22 +166,6 @@ VideoReport check_video(const std::vector<CheckedFrame>& frames,
   judge_clock(report.clock, "video " + needs.source, &report.findings);
   judge_arrival_only(&report, needs);
   return report;
-}
-
-std::string describe(const ClockReport& clock) {
-  if (clock.kind == StampKind::kArrival) return "none: each item has the time of its arrival";
-  std::string text = clock.state == ClockState::kLocked ? "locked" : "warming up";
-  text += clock.kind == StampKind::kSender
-              ? fmt::format(", rate error {:+.0f} ppm", 1e6 * clock.rate_error)
-              : fmt::format(", period {:.3f} ms", 1e3 * clock.period_s);
-  text += fmt::format(", time known to {:.2f} ms", 1e3 * clock.sigma_s);
-  text += clock.counters.floor_shifts == 0
-              ? ", no shift"
-              : fmt::format(", {} shifts, {:+.1f} ms in all", clock.counters.floor_shifts,
-                            1e3 * clock.floor_shift_s);
-  if (clock.counters.restarts > 0) text += fmt::format(", {} restarts", clock.counters.restarts);
-  if (clock.counters.rejected > 0) text += fmt::format(", {} rejected", clock.counters.rejected);
-  return text;
 }
 
 ReportLines describe(const VideoReport& report) {

@@ -225,7 +225,9 @@ MotionReport motion_of(const Measured& measured, const VideoReport& video,
   needs.reverse_pan = reverse_advice(config.pan_tilt, true);
   needs.reverse_tilt = reverse_advice(config.pan_tilt, false);
   needs.turn_picture =
-      "turn the picture by 180 degrees in the camera's settings and set camera.upside_down: true";
+      "turn it by 180 degrees in the camera's settings and set camera.upside_down: true; if it is "
+      "upright, for pan " +
+      needs.reverse_pan + ", for tilt " + needs.reverse_tilt;
   return check_motion(shifts, telemetry.fresh, needs);
 }
 

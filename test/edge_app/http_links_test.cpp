@@ -7,6 +7,7 @@
 #include <string>
 
 #include "test/edge_app/alidade_command.h"
+#include "test/platform/support/eventually.h"
 #include "test/platform/support/mjpeg_server.h"
 #include "test/platform/support/onvif_server.h"
 #include "test/support/temporary_directory.h"
@@ -63,6 +64,17 @@ TEST_F(HttpLinks, AreMeasuredByCheck) {
   // The server's pictures come some milliseconds apart, and claim to be 40 ms apart.
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.errors, HasSubstr("time stamps cannot be used"));
+}
+
+TEST_F(HttpLinks, SayToCheckWhenTheyBreak) {
+  Process process(command({"check", "-c", config(), "--duration", "4"}));
+  ASSERT_TRUE(eventually([this] { return head_.count("GetStatus") >= 3; }));
+  head_.status = 503;
+  EXPECT_THAT(process.read_all(), HasSubstr("pan 90.0000 deg"));
+  EXPECT_EQ(process.wait(), 1);
+  EXPECT_THAT(process.errors(), HasSubstr("alidade: pan/tilt " + head_.url()));
+  EXPECT_THAT(process.errors(),
+              HasSubstr("the connection was lost 1 times during the check, last: "));
 }
 
 TEST_F(HttpLinks, GiveRecordsToRun) {
