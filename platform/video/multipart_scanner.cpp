@@ -30,6 +30,14 @@ std::string_view stripped(std::string_view text, const char* what) {
   return text.substr(first, text.find_last_not_of(what) - first + 1);
 }
 
+// The boundary without the dashes around it; empty if it is none: a boundary is printable, and so cannot be
+// taken for the end of a picture.
+std::string core_of(std::string_view boundary) {
+  const bool printable =
+      std::all_of(boundary.begin(), boundary.end(), [](char c) { return c >= ' ' && c <= '~'; });
+  return std::string(printable ? stripped(boundary, "-") : std::string_view());
+}
+
 // Digits only; empty if it is no such number or too large to matter.
 std::optional<std::size_t> parse_length(std::string_view text, std::size_t max) {
   if (text.empty()) {
@@ -91,7 +99,7 @@ bool parse_multipart_type(std::string_view content_type, std::string* boundary) 
 }
 
 MultipartScanner::MultipartScanner(std::string_view boundary, std::size_t max_part_bytes)
-    : core_(stripped(boundary, "-")),
+    : core_(core_of(boundary)),
       max_part_bytes_(max_part_bytes),
       state_(core_.empty() ? State::kLearnBoundary : State::kSkip) {}
 
@@ -147,7 +155,7 @@ bool MultipartScanner::learn_boundary() {
   }
   const std::string_view line = stripped(std::string_view(buffer_).substr(0, end), kBlanks);
   const bool told = line.substr(0, 2) == "--" && end < kMaxBoundary;
-  core_ = told ? std::string(stripped(line, "-")) : "";
+  core_ = told ? core_of(line) : "";
   if (core_.empty()) {
     drop_front(end + 1);
   } else {

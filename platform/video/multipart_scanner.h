@@ -33,7 +33,7 @@ struct MultipartPart {
 
 class MultipartScanner {
  public:
-  // boundary as declared; empty: not declared.
+  // boundary as declared; empty, or not printable: not declared.
   MultipartScanner(std::string_view boundary, std::size_t max_part_bytes);
 
   void feed(std::string_view bytes, double arrival_s);

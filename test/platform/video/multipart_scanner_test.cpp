@@ -224,6 +224,13 @@ TEST(MultipartScanner, LearnsTheSameBoundaryInPiecesOfAnySize) {
   }
 }
 
+TEST(MultipartScanner, TakesNoLineThatIsNotPrintableForABoundary) {
+  const std::string stream = "--b\xFF\xD9\n\n" + with_length(jpeg("a")) + "--frame\r\n";
+  for (const char* declared : {"", "\xFF\xD9"}) {
+    EXPECT_EQ(bodies(stream, declared), (Bodies{jpeg("a")}));
+  }
+}
+
 TEST(MultipartScanner, KeepsPartsWithinTheirCapWhateverComes) {
   std::mt19937 random(1);
   const std::vector<std::string> words{"--frame", "frame", "\r\n", "\n",       "-",
