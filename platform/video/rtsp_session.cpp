@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "platform/system/clock.h"
+#include "platform/system/shown.h"
 #include "platform/video/session_description.h"
 
 namespace alidade {
@@ -39,7 +40,7 @@ std::string resolve(const std::string& base, const std::string& control) {
 
 std::string refusal(int status, const char* reason) {
   return "the camera refuses: RTSP status " + std::to_string(status) +
-         (reason == nullptr || *reason == '\0' ? "" : std::string(" ") + reason);
+         (reason == nullptr || *reason == '\0' ? "" : " " + shown(reason));
 }
 
 }  // namespace

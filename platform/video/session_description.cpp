@@ -8,6 +8,8 @@
 namespace alidade {
 namespace {
 
+constexpr guint kLastPort = 65535;
+
 struct FreeSdp {
   void operator()(GstSDPMessage* message) const { gst_sdp_message_free(message); }
 };
@@ -33,6 +35,7 @@ std::optional<VideoDescription> find_video(const std::string& sdp) {
                                              : gst_sdp_message_get_connection(parsed);
     video.address = connection == nullptr ? "" : text(connection->address);
     if (video.address.empty()) video.address = "0.0.0.0";
+    if (gst_sdp_media_get_port(media) > kLastPort) return std::nullopt;
     video.port = static_cast<int>(gst_sdp_media_get_port(media));
     video.control = text(gst_sdp_media_get_attribute_val(media, "control"));
     video.session_control = text(gst_sdp_message_get_attribute_val(parsed, "control"));
