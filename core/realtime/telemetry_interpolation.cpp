@@ -242,8 +242,10 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
       covariance(axis, axis) += noise.quantum * noise.quantum / 12;
     }
   }
-  if (!all_finite(angle) || !all_finite(rate) || !all_finite(covariance) ||
-      !all_finite(acceleration_square)) {
+  // Samples at almost the same time give any rate, and far turns, of which rounding leaves no angle.
+  constexpr double kFarthest = 1e6;  // rad
+  if (!(std::abs(angle[0]) <= kFarthest && std::abs(angle[1]) <= kFarthest) || !all_finite(rate) ||
+      !all_finite(covariance) || !all_finite(acceleration_square)) {
     return false;
   }
   out->angle = {wrap_angle(origin.pan + angle[0]), wrap_angle(origin.tilt + angle[1])};

@@ -194,6 +194,14 @@ TEST(TelemetryBuffer, KeepsTheNewestWhenFull) {
   }
 }
 
+TEST(TelemetryBuffer, RefusesAnAngleOfMoreTurnsThanNumbersHold) {
+  TelemetryBuffer<16> buffer;
+  EXPECT_EQ(buffer.push({0, 0, 0, 0}), PushStatus::kStored);
+  EXPECT_EQ(buffer.push({1e-146, 0, 0.02, 0}), PushStatus::kStored);
+  InterpolatedPanTilt result;
+  EXPECT_EQ(buffer.query(-0.01, 0, &result), QueryStatus::kNotFinite);
+}
+
 TEST(TelemetryBuffer, RefusesWhatIsNotFinite) {
   TelemetryBuffer<8> buffer;
   for (const double bad : {static_cast<double>(NAN), kInfinity, -kInfinity}) {
