@@ -82,7 +82,9 @@ bool is_stale(const std::vector<PanTiltSample>& samples, const EqualRun* run, co
   const double out = wrap_angle(angle[2] - angle[1]);
   const double after = wrap_angle(angle[3] - angle[2]) / (time_s[3] - time_s[2]);
   if (!(before * out > 0) || !(out * after > 0)) return false;
-  const double held_s = middle_time_s(samples[run[1].end - 1]) - time_s[1];
+  // So long at least: a poll that took long may have been true at its end.
+  const double held_s =
+      samples[run[1].end - 1].earliest_time_s - samples[run[1].begin].latest_time_s;
   const double least = std::min(std::abs(before), std::abs(after)) * held_s;
   const double all = 0.5 * std::abs(before + after) * (time_s[2] - time_s[1]);
   return least > std::max(kHiddenQuanta * axis.quantum, kSmallestStep) &&

@@ -8,7 +8,7 @@
 // before and w after it (each at its first time), is stale after its first sample if on one axis
 //   the head turned one way all the while: u -> v, v -> w and what follows w have the same sign,
 //   it should have left v by more than rounding hides: the lower of the rates before and after, times
-//   (t_b - t_a), exceeds 1.5 quanta,
+//   (t_b - t_a), of which the intervals of both samples are taken off, exceeds 1.5 quanta,
 //   and did: |w - v| is at least 3/4 of what the mean of the two rates makes of the whole time from t_a to w.
 // The last tells a device that was not measured from a head that stood still and moved on: that has only
 // the last interval for w - v, which is half of the whole time or less. What cannot be told is not stale.

@@ -170,6 +170,17 @@ TEST(StaleRepeats, AreNotTheRestOfAHead) {
   EXPECT_EQ(count(find_stale_repeats(polled_pan([](double) { return 0.3; }))), 0);
 }
 
+TEST(StaleRepeats, AreNotWhatTwoLatePollsHaveInCommon) {
+  // Each third poll is late, just before the next one, and both tell what was true then.
+  auto samples = polled_pan(swing);
+  for (std::size_t i = 1; i + 1 < samples.size(); i += 3) {
+    samples[i].latest_time_s = samples[i + 1].earliest_time_s;
+    samples[i].earliest_time_s = samples[i].latest_time_s - 4e-3;
+    samples[i].pan_rad = samples[i + 1].pan_rad;
+  }
+  EXPECT_EQ(count(find_stale_repeats(samples)), 0);
+}
+
 TEST(StaleRepeats, AreFoundAmongRoundedAngles) {
   const auto samples =
       polled_pan([](double t) { return 3.4e-4 * std::round(swing(held(t, 10)) / 3.4e-4); });
