@@ -112,6 +112,9 @@ function(alidade_benchmark name)
   set_tests_properties(${name} PROPERTIES LABELS benchmark RUN_SERIAL ON TIMEOUT 600)
 endfunction()
 
+# What `ctest -L fuzz` runs.
+add_custom_target(fuzz_programs)
+
 # alidade_fuzz_target(vapix LINK alidade::platform [MUTATIONS n])
 # builds fuzz_vapix of vapix_fuzz.cpp and registers it. Under the preset `fuzz` it is linked with libFuzzer, and
 # `ctest -L fuzz` lets it search for a minute, from corpus/vapix and regressions/vapix on; what it finds worth
@@ -129,6 +132,7 @@ function(alidade_fuzz_target name)
     file(MAKE_DIRECTORY ${found} ${artifacts})
     alidade_executable(fuzz_${name} SOURCES ${name}_fuzz.cpp LINK ${A_LINK})
     target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
+    add_dependencies(fuzz_programs fuzz_${name})
     add_test(NAME fuzz_${name}
       COMMAND fuzz_${name} -max_total_time=60 -timeout=30 -print_final_stats=1
         -artifact_prefix=${artifacts}/${name}- ${found} ${inputs})
