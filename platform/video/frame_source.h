@@ -1,6 +1,6 @@
 #pragma once
-// FrameSource: one interface for every origin of video frames (RTSP, RTP, MJPEG over HTTP, recording;
-// V4L2 implements the same contract).
+// FrameSource: one interface for every origin of video frames (RTSP, RTP, MJPEG over HTTP, V4L2,
+// recording).
 //
 // A source owns its connection: it opens it, notices its loss, and opens it again with back-off.
 // read() blocks on the calling (capture) thread only; stop() may be called from any other thread

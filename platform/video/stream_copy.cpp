@@ -77,7 +77,9 @@ int StreamCopy::create(const std::string& path, const AVCodecParameters& paramet
   }
   parameters_->width = width;
   parameters_->height = height;
-  parameters_->codec_tag = 0;
+  if (parameters_->codec_id != AV_CODEC_ID_RAWVIDEO) {  // whose tag is its pixel format
+    parameters_->codec_tag = 0;
+  }
   if (parameters_->codec_id == AV_CODEC_ID_H264 && parameters_->extradata_size == 0) {
     code = fill_extradata(first, parameters_.get());
     if (code < 0) {

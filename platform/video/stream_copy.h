@@ -1,5 +1,6 @@
 #pragma once
-// StreamCopy: stores compressed pictures in a Matroska file as they are. Part of RtpSource.
+// StreamCopy: stores compressed pictures, or uncompressed grey ones, in a Matroska file as they are.
+// Part of the sources that copy.
 //
 // The file's timestamps are arrival times, milliseconds since the first picture: they go on over a
 // reconnection, whatever the sender's clock does (frames.csv holds the exact stamps).

@@ -1,0 +1,110 @@
+#pragma once
+// V4l2Device: one opening of a V4L2 capture device, from negotiation to closing: buffers that the
+// driver fills are taken out, lent and given back. Part of V4l2Source.
+//
+// Single-planar capture by mmap streaming. A buffer goes back to the driver when the last owner of what
+// hold() gave is gone, on whichever thread; a device that was closed before takes nothing back, but the
+// memory stays until then.
+// One thread opens, dequeues and closes; owners may end on any.
+
+#include <sys/types.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <vector>
+
+#include "platform/video/v4l2_mode.h"
+
+namespace alidade {
+
+class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
+ public:
+  enum class Result {
+    kOk,
+    kNothing,  // no buffer is filled
+    kLost,     // gone, busy or out of order: may be well later; see error()
+    kUnusable  // will not work as it is; see error()
+  };
+
+  struct Buffer {
+    std::uint32_t index = 0;
+    const std::uint8_t* data = nullptr;
+    std::size_t bytes = 0;
+    std::uint32_t sequence = 0;
+    std::uint32_t flags = 0;  // V4L2_BUF_FLAG_...
+    double stamp_s = 0;
+  };
+
+  V4l2Device() = default;
+  ~V4l2Device() { close(); }
+  V4l2Device(const V4l2Device&) = delete;
+  V4l2Device& operator=(const V4l2Device&) = delete;
+
+  // Opens, negotiates and starts streaming.
+  [[nodiscard]] Result open(const std::string& path, const V4l2Wish& wish);
+  void close();
+
+  // Polls readable when a buffer is filled.
+  [[nodiscard]] int fd() const { return fd_; }
+  // On kOk the next call is hold().
+  [[nodiscard]] Result dequeue(Buffer* buffer);
+  [[nodiscard]] std::shared_ptr<const void> hold(std::uint32_t index);
+  // Whether the driver can do without what is held now for as long as it takes.
+  [[nodiscard]] bool can_lend();
+
+  // What was negotiated.
+  [[nodiscard]] V4l2Format format() const { return format_; }
+  [[nodiscard]] int width() const { return width_; }    // px
+  [[nodiscard]] int height() const { return height_; }  // px
+  [[nodiscard]] std::size_t stride() const { return stride_; }
+
+  // One line without the device's name; valid after kLost and kUnusable.
+  [[nodiscard]] const std::string& error() const { return error_; }
+
+ private:
+  // Memory shared with the driver.
+  class Mapping {
+   public:
+    Mapping(void* data, std::size_t size) : data_(data), size_(size) {}
+    ~Mapping();
+    Mapping(const Mapping&) = delete;
+    Mapping& operator=(const Mapping&) = delete;
+    [[nodiscard]] const std::uint8_t* data() const {
+      return static_cast<const std::uint8_t*>(data_);
+    }
+    [[nodiscard]] std::size_t size() const { return size_; }
+
+   private:
+    void* data_;
+    std::size_t size_;
+  };
+
+  Result check_kind();
+  std::vector<V4l2Offer> offers(const V4l2Wish& wish) const;
+  std::vector<V4l2Size> sizes(std::uint32_t fourcc, const V4l2Wish& wish) const;
+  void add_rates(std::uint32_t fourcc, int width, int height, V4l2Size* size) const;
+  Result set_format(std::uint32_t fourcc, const V4l2Wish& wish);
+  Result set_rate(double rate_hz);
+  Result start();
+  void give_back(std::uint32_t index);
+  Result fail(Result result, const std::string& error);
+  Result fail_call(const char* call, int error_number);
+
+  std::string path_;
+  std::string error_;
+  V4l2Format format_ = V4l2Format::kGrey;
+  int width_ = 0;
+  int height_ = 0;
+  std::size_t stride_ = 0;  // bytes; of raw formats
+
+  // Guards fd_ against an owner that ends while the device is closed.
+  std::mutex mutex_;
+  int fd_ = -1;
+  std::size_t held_ = 0;                            // guarded by mutex_
+  std::vector<std::shared_ptr<Mapping>> mappings_;  // by index
+};
+
+}  // namespace alidade

@@ -1,0 +1,306 @@
+#include "platform/video/v4l2_source.h"
+
+#include <linux/videodev2.h>
+#include <poll.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <atomic>
+#include <cmath>
+#include <cstring>
+#include <string_view>
+#include <utility>
+
+#include "platform/system/backoff.h"
+#include "platform/system/clock.h"
+#include "platform/video/jpeg_decoder.h"
+#include "platform/video/stream_copy.h"
+#include "platform/video/v4l2_device.h"
+#include "platform/video/v4l2_stamps.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kLongestPoll_s = 3600;  // keeps milliseconds within an int
+
+std::string_view bytes_of(const V4l2Device::Buffer& buffer) {
+  return {reinterpret_cast<const char*>(buffer.data), buffer.bytes};
+}
+
+std::size_t pixels(const Picture& picture) {
+  return static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height);
+}
+
+// Of what goes into the copy: JPEG as it came, else uncompressed luma.
+CodecParametersPtr stored_parameters(bool jpeg) {
+  CodecParametersPtr parameters(avcodec_parameters_alloc());
+  parameters->codec_type = AVMEDIA_TYPE_VIDEO;
+  parameters->codec_id = jpeg ? AV_CODEC_ID_MJPEG : AV_CODEC_ID_RAWVIDEO;
+  if (!jpeg) {
+    parameters->format = AV_PIX_FMT_GRAY8;
+    parameters->codec_tag = avcodec_pix_fmt_to_codec_tag(AV_PIX_FMT_GRAY8);
+  }
+  return parameters;
+}
+
+}  // namespace
+
+class V4l2Source::Implementation {
+ public:
+  explicit Implementation(const V4l2SourceOptions& options)
+      : options_(options), stop_fd_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    silence_av_log();
+    if (stop_fd_ < 0) {
+      (void)fail("no file descriptor is left");
+    }
+  }
+  ~Implementation() {
+    close();
+    if (stop_fd_ >= 0) {
+      ::close(stop_fd_);
+    }
+  }
+
+  ReadStatus read(Frame& frame, double timeout_s);
+  void stop() {
+    stopped_ = true;
+    if (stop_fd_ >= 0) {
+      (void)::eventfd_write(stop_fd_, 1);
+    }
+  }
+  const std::string& error() const { return error_; }
+  const std::string& name() const { return options_.device; }
+  FrameSourceCounters counters() const { return {damaged_, dropped_}; }
+
+ private:
+  ReadStatus connect(double end_s);
+  ReadStatus take(Frame& frame);
+  bool take_picture(const V4l2Device::Buffer& buffer, const std::shared_ptr<const void>& held,
+                    Picture* picture);
+  bool store(const V4l2Device::Buffer& buffer, const Picture& picture, double receive_time_s,
+             std::string* error);
+  bool wait(int fd, double end_s, bool* gone);
+  void close();
+  ReadStatus lose(const std::string& error);
+  ReadStatus fail(const std::string& error) {
+    error_ = options_.device + ": " + error;
+    failed_ = true;
+    return ReadStatus::kFailed;
+  }
+
+  V4l2SourceOptions options_;
+  int stop_fd_;  // readable for good once stop() was called
+  std::atomic<bool> stopped_{false};
+  std::atomic<std::int64_t> damaged_{0};
+  std::atomic<std::int64_t> dropped_{0};
+
+  std::string error_;
+  bool failed_ = false;
+  bool worked_ = false;  // a frame has come
+  Backoff backoff_{options_.max_backoff_s};
+  double next_try_s_ = 0;
+  std::shared_ptr<V4l2Device> device_;  // null while there is no connection
+  V4l2Stamps stamps_;
+  double last_frame_s_ = 0;     // when it was delivered; or the connection's beginning
+  bool damaged_since_ = false;  // the last frame
+  bool restarted_ = true;
+  std::int64_t next_frame_ = 0;
+  JpegDecoder decoder_;
+  StreamCopy copy_;
+};
+
+void V4l2Source::Implementation::close() {
+  if (device_) {
+    device_->close();  // lent buffers keep the object
+    device_.reset();
+  }
+}
+
+ReadStatus V4l2Source::Implementation::lose(const std::string& error) {
+  close();
+  error_ = options_.device + ": " + error;
+  restarted_ = true;
+  next_try_s_ = monotonic_now_s() + backoff_.next_s();
+  return ReadStatus::kDisconnected;
+}
+
+// Until fd (if not negative) has something, or end_s, or stop(). False: it has nothing yet.
+bool V4l2Source::Implementation::wait(int fd, double end_s, bool* gone) {
+  const double left_s = std::clamp(end_s - monotonic_now_s(), 0.0, kLongestPoll_s);
+  std::array<pollfd, 2> polled = {{{stop_fd_, POLLIN, 0}, {fd, POLLIN, 0}}};
+  (void)::poll(polled.data(), polled.size(), static_cast<int>(std::ceil(1e3 * left_s)));
+  *gone = (polled[1].revents & (POLLERR | POLLHUP | POLLNVAL)) != 0;
+  return polled[1].revents != 0;
+}
+
+ReadStatus V4l2Source::Implementation::connect(double end_s) {
+  bool gone = false;
+  if (next_try_s_ > monotonic_now_s()) {
+    (void)wait(-1, std::min(end_s, next_try_s_), &gone);
+    if (stopped_) {
+      return ReadStatus::kStopped;
+    }
+    if (next_try_s_ > monotonic_now_s()) {
+      return ReadStatus::kTimeout;
+    }
+  }
+  auto device = std::make_shared<V4l2Device>();
+  const V4l2Device::Result result = device->open(options_.device, options_.wish);
+  if (result == V4l2Device::Result::kUnusable && !worked_) {
+    return fail(device->error());
+  }
+  if (result != V4l2Device::Result::kOk) {
+    return lose(device->error());
+  }
+  device_ = std::move(device);
+  stamps_ = V4l2Stamps();
+  last_frame_s_ = monotonic_now_s();
+  damaged_since_ = false;
+  return ReadStatus::kOk;
+}
+
+ReadStatus V4l2Source::Implementation::read(Frame& frame, double timeout_s) {
+  const double end_s = monotonic_now_s() + timeout_s;
+  for (;;) {
+    if (stopped_) {
+      return ReadStatus::kStopped;
+    }
+    if (failed_) {
+      return ReadStatus::kFailed;
+    }
+    if (!device_) {
+      const ReadStatus status = connect(end_s);
+      if (status != ReadStatus::kOk) {
+        return status;
+      }
+    }
+    const double silence_s = last_frame_s_ + options_.timeout_s;
+    bool gone = false;
+    if (wait(device_->fd(), std::min(end_s, silence_s), &gone)) {
+      const ReadStatus status = gone ? lose("the device is gone") : take(frame);
+      if (status != ReadStatus::kTimeout) {
+        return status;
+      }
+    }
+    const double now_s = monotonic_now_s();
+    if (now_s >= silence_s && !stopped_) {
+      return lose(std::string(damaged_since_ ? "pictures come, but no whole one" : "no picture") +
+                  " within " + std::to_string(std::lround(1e3 * options_.timeout_s)) + " ms");
+    }
+    if (now_s >= end_s && !stopped_) {
+      return ReadStatus::kTimeout;
+    }
+  }
+}
+
+// Of the next buffer; kTimeout if that is none to deliver.
+ReadStatus V4l2Source::Implementation::take(Frame& frame) {
+  V4l2Device::Buffer buffer;
+  const V4l2Device::Result result = device_->dequeue(&buffer);
+  if (result != V4l2Device::Result::kOk) {
+    return result == V4l2Device::Result::kNothing ? ReadStatus::kTimeout : lose(device_->error());
+  }
+  const std::shared_ptr<const void> held = device_->hold(buffer.index);
+  const V4l2Stamps::Stamp stamp =
+      stamps_.update(buffer.sequence, buffer.flags, buffer.stamp_s, monotonic_now_s());
+  dropped_ += stamp.lost;
+  restarted_ = restarted_ || stamp.anew;
+  if (stamp.duplicate) {
+    return ReadStatus::kTimeout;
+  }
+  Picture picture;
+  if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0 || !take_picture(buffer, held, &picture)) {
+    ++damaged_;
+    damaged_since_ = true;
+    return ReadStatus::kTimeout;
+  }
+  std::string error;
+  if (!options_.copy_to.empty() && !store(buffer, picture, stamp.receive_time_s, &error)) {
+    return fail(error);
+  }
+  frame = Frame{};
+  frame.stamp.frame = next_frame_++;
+  frame.stamp.receive_time_s = stamp.receive_time_s;
+  frame.stamp.sequence = stamp.sequence;
+  frame.stamp.restarted = std::exchange(restarted_, false);
+  frame.width = picture.width;
+  frame.height = picture.height;
+  frame.luma = picture.luma;
+  frame.stride = picture.stride;
+  frame.owner = std::move(picture.owner);
+  last_frame_s_ = monotonic_now_s();
+  damaged_since_ = false;
+  worked_ = true;
+  backoff_.reset();
+  return ReadStatus::kOk;
+}
+
+// Size and, if wanted, luma. False: the buffer does not hold a whole picture.
+bool V4l2Source::Implementation::take_picture(const V4l2Device::Buffer& buffer,
+                                              const std::shared_ptr<const void>& held,
+                                              Picture* picture) {
+  const V4l2Format format = device_->format();
+  if (format == V4l2Format::kMjpg) {
+    const std::string_view jpeg = bytes_of(buffer);
+    return options_.decode ? decoder_.decode(jpeg, picture)
+                           : decoder_.read_size(jpeg, &picture->width, &picture->height);
+  }
+  const int width = device_->width();
+  const int height = device_->height();
+  if (buffer.bytes < raw_picture_bytes(format, width, height, device_->stride())) {
+    return false;
+  }
+  picture->width = width;
+  picture->height = height;
+  if (!options_.decode) {
+    return true;
+  }
+  if (luma_step(format) == 1 && device_->can_lend()) {
+    picture->luma = buffer.data;
+    picture->stride = static_cast<std::ptrdiff_t>(device_->stride());
+    picture->owner = held;
+    return true;
+  }
+  const std::shared_ptr<std::uint8_t> luma(new std::uint8_t[pixels(*picture)],
+                                           std::default_delete<std::uint8_t[]>());
+  copy_luma(format, buffer.data, width, height, device_->stride(), luma.get());
+  picture->luma = luma.get();
+  picture->stride = width;
+  picture->owner = luma;
+  return true;
+}
+
+bool V4l2Source::Implementation::store(const V4l2Device::Buffer& buffer, const Picture& picture,
+                                       double receive_time_s, std::string* error) {
+  const V4l2Format format = device_->format();
+  const bool jpeg = format == V4l2Format::kMjpg;
+  const PacketPtr packet(av_packet_alloc());
+  const std::size_t bytes = jpeg ? buffer.bytes : pixels(picture);
+  if (!packet || av_new_packet(packet.get(), static_cast<int>(bytes)) != 0) {
+    *error = "no memory for a picture";
+    return false;
+  }
+  packet->flags |= AV_PKT_FLAG_KEY;
+  if (jpeg) {
+    std::memcpy(packet->data, buffer.data, bytes);
+  } else {
+    copy_luma(format, buffer.data, picture.width, picture.height, device_->stride(), packet->data);
+  }
+  return copy_.add(options_.copy_to, *stored_parameters(jpeg), picture.width, picture.height,
+                   *packet, receive_time_s, error);
+}
+
+V4l2Source::V4l2Source(const V4l2SourceOptions& options)
+    : implementation_(std::make_unique<Implementation>(options)) {}
+V4l2Source::~V4l2Source() = default;
+ReadStatus V4l2Source::read(Frame& frame, double timeout_s) {
+  return implementation_->read(frame, timeout_s);
+}
+void V4l2Source::stop() { implementation_->stop(); }
+std::string V4l2Source::error() const { return implementation_->error(); }
+std::string V4l2Source::name() const { return implementation_->name(); }
+FrameSourceCounters V4l2Source::counters() const { return implementation_->counters(); }
+
+}  // namespace alidade

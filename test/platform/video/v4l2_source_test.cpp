@@ -1,0 +1,106 @@
+// V4l2Source where there is no camera, and what it stores. With cameras: test/system/virtual_machine.
+
+#include "platform/video/v4l2_source.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "platform/video/recording_frame_source.h"
+#include "platform/video/stream_copy.h"
+#include "test/platform/support/eventually.h"
+#include "test/platform/support/open_files.h"
+#include "test/support/temporary_directory.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+
+V4l2SourceOptions device(const std::string& path) {
+  V4l2SourceOptions options;
+  options.device = path;
+  return options;
+}
+
+TEST(V4l2Source, WaitsForACameraThatIsNotThere) {
+  V4l2Source source(device("/dev/no-such-camera"));
+  Frame frame;
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("/dev/no-such-camera: no such device; is the camera"));
+  EXPECT_EQ(source.read(frame, 0), ReadStatus::kTimeout) << "a pause before the next try";
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+}
+
+TEST(V4l2Source, RefusesWhatIsNoCamera) {
+  const TemporaryDirectory directory;
+  const auto before = open_files();
+  for (const std::string& path : {directory.write("file", "text"), std::string("/dev/null")}) {
+    V4l2Source source(device(path));
+    Frame frame;
+    EXPECT_EQ(source.read(frame, kDeadline_s), ReadStatus::kFailed);
+    EXPECT_EQ(source.error(), path + ": is no V4L2 device; video devices are /dev/video*");
+    EXPECT_EQ(source.read(frame, 0), ReadStatus::kFailed);
+    source.stop();
+    EXPECT_EQ(source.read(frame, 0), ReadStatus::kStopped);
+  }
+  EXPECT_EQ(open_files(), before);
+}
+
+TEST(V4l2Source, StopsWhileItWaitsForTheNextTry) {
+  V4l2Source source(device("/dev/no-such-camera"));
+  Frame frame;
+  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kDisconnected);
+  std::thread reader([&] {
+    Frame later;
+    EXPECT_EQ(read_until(source, later, ReadStatus::kStopped), ReadStatus::kStopped);
+  });
+  source.stop();
+  reader.join();
+}
+
+// What V4l2Source stores of raw pictures.
+TEST(StreamCopy, StoresUncompressedLumaThatARecordingGivesBack) {
+  constexpr int kWidth = 38;
+  constexpr int kHeight = 5;
+  constexpr int kPictures = 4;
+  const TemporaryDirectory directory;
+  directory.write("recording.yaml", "format: 1\nwidth: 38\nheight: 5\n");
+  directory.write("frames.csv", "frame,receive_time_s\n0,0.5\n1,0.51\n2,0.52\n3,0.53\n");
+  const auto grey = [](int picture, int place) { return (7 * picture + place) % 256; };
+  {
+    const CodecParametersPtr parameters(avcodec_parameters_alloc());
+    parameters->codec_type = AVMEDIA_TYPE_VIDEO;
+    parameters->codec_id = AV_CODEC_ID_RAWVIDEO;
+    parameters->format = AV_PIX_FMT_GRAY8;
+    parameters->codec_tag = avcodec_pix_fmt_to_codec_tag(AV_PIX_FMT_GRAY8);
+    StreamCopy copy;
+    for (int i = 0; i < kPictures; ++i) {
+      const PacketPtr packet(av_packet_alloc());
+      ASSERT_EQ(av_new_packet(packet.get(), kWidth * kHeight), 0);
+      packet->flags |= AV_PKT_FLAG_KEY;
+      for (int place = 0; place < kWidth * kHeight; ++place) {
+        packet->data[place] = static_cast<std::uint8_t>(grey(i, place));
+      }
+      std::string error;
+      ASSERT_TRUE(copy.add(directory.path() + "/video.mkv", *parameters, kWidth, kHeight, *packet,
+                           0.5 + 0.01 * i, &error))
+          << error;
+    }
+  }
+  RecordingFrameSource recording({directory.path(), true, false});
+  Frame frame;
+  for (int i = 0; i < kPictures; ++i) {
+    ASSERT_EQ(recording.read(frame, kDeadline_s), ReadStatus::kOk) << recording.error();
+    ASSERT_EQ(frame.width, kWidth);
+    for (int place = 0; place < kWidth * kHeight; ++place) {
+      ASSERT_EQ(frame.luma[place / kWidth * frame.stride + place % kWidth], grey(i, place));
+    }
+  }
+  EXPECT_EQ(recording.read(frame, kDeadline_s), ReadStatus::kEnd);
+  EXPECT_EQ(recording.missing_frames(), 0);
+}
+
+}  // namespace
+}  // namespace alidade
