@@ -15,6 +15,7 @@
 #include "platform/video/mjpeg_source.h"
 #include "platform/video/recording_frame_source.h"
 #include "platform/video/rtp_source.h"
+#include "platform/video/v4l2_source.h"
 
 namespace alidade {
 
@@ -139,6 +140,16 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
     options.max_backoff_s = config.max_backoff_s;
     options.copy_to = copy_to;
     return std::make_unique<MjpegSource>(options);
+  }
+  if (config.type == VideoConfig::Type::kV4l2) {
+    V4l2SourceOptions options;
+    options.device = config.device;
+    options.wish = {config.pixel_format, config.width, config.height, config.rate_hz};
+    options.decode = decode;
+    options.timeout_s = config.timeout_s;
+    options.max_backoff_s = config.max_backoff_s;
+    options.copy_to = copy_to;
+    return std::make_unique<V4l2Source>(options);
   }
   RtpSourceOptions options;
   options.url = config.url;

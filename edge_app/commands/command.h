@@ -61,7 +61,7 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
                                                const std::string& copy_to = "");
 std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config);
 
-// Logs the frames that a network source received damaged or had to drop, if any.
+// Logs the frames that a live source received damaged or had to drop, if any.
 void log_source_losses(const FrameSource& source);
 
 // Recordings bear the stamps of their own clock, so that live and recorded streams cannot be mixed.

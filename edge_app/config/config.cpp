@@ -64,8 +64,8 @@ void read_login(YamlSection& section, std::string* user, std::string* password) 
 
 VideoConfig read_video(YamlSection section, const std::string& path) {
   VideoConfig video;
-  const auto type = section.choice("type", {"rtsp", "rtp", "mjpeg", "recording"}, {"v4l2"});
-  if (!type) section.fail("type", "is missing; expected one of rtsp, rtp, mjpeg, recording");
+  const auto type = section.choice("type", {"rtsp", "rtp", "mjpeg", "v4l2", "recording"});
+  if (!type) section.fail("type", "is missing; expected one of rtsp, rtp, mjpeg, v4l2, recording");
   if (*type == "recording") {
     video.type = VideoConfig::Type::kRecording;
     video.directory = path_relative_to(path, required_text(section, "directory", "my-recording"));
@@ -80,6 +80,13 @@ VideoConfig read_video(YamlSection section, const std::string& path) {
     video.type = VideoConfig::Type::kMjpeg;
     video.url = required_url(section, "http://camera/mjpg/video.mjpg", {"http://", "https://"});
     read_login(section, &video.user, &video.password);
+  } else if (*type == "v4l2") {
+    video.type = VideoConfig::Type::kV4l2;
+    video.device = path_relative_to(path, required_text(section, "device", "/dev/video0"));
+    if (const auto format = section.choice("format", {"GREY", "NV12", "YUYV", "UYVY", "MJPG"})) {
+      video.pixel_format = v4l2_format_of_name(*format);
+    }
+    video.rate_hz = section.number("rate_hz", {0.1, 1000, "Hz"}).value_or(video.rate_hz);
   } else {
     video.type = VideoConfig::Type::kRtp;
     video.url = required_text(section, "url", "camera.sdp");

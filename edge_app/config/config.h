@@ -13,19 +13,23 @@
 
 #include "edge_app/config/head_config.h"
 #include "edge_app/output/record_format.h"  // OutputFormat
+#include "platform/video/v4l2_mode.h"       // V4l2Format
 
 namespace alidade {
 
 struct VideoConfig {
-  enum class Type { kRtsp, kRtp, kMjpeg, kRecording };
+  enum class Type { kRtsp, kRtp, kMjpeg, kV4l2, kRecording };
   enum class Transport { kTcp, kUdp };
   Type type = Type::kRtsp;
   std::string url;  // rtsp: rtsp://...; mjpeg: http://...; rtp: an .sdp file or rtp://address:port
-  std::string format = "MJPG";  // rtp://address:port: MJPG or H264
-  std::string directory;        // recording
-  int width = 0;                // px, what live video must have; 0: whatever comes
-  int height = 0;               // px
-  std::string user;             // rtsp, mjpeg
+  std::string format = "MJPG";             // rtp://address:port: MJPG or H264
+  std::string directory;                   // recording
+  std::string device;                      // v4l2: /dev/video0
+  std::optional<V4l2Format> pixel_format;  // v4l2; empty: the first that fits
+  double rate_hz = 0;                      // v4l2; 0: the device's own
+  int width = 0;                           // px, what live video must have; 0: whatever comes
+  int height = 0;                          // px
+  std::string user;                        // rtsp, mjpeg
   std::string password;
   Transport transport = Transport::kTcp;  // rtsp
   double timeout_s = 3;                   // silence that counts as a loss

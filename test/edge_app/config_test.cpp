@@ -176,6 +176,30 @@ TEST_F(ConfigTest, MjpegAndOnvifSourcesAreRead) {
 }
 
 #define CAMERA "camera: {focal_length_px: 1000}\n"
+#define HEAD "pan_tilt: {type: vapix, url: http://camera}\n"
+
+TEST_F(ConfigTest, V4l2SourcesAreRead) {
+  ASSERT_THAT(load("video: {type: v4l2, device: /dev/video2, format: MJPG, width: 1280,\n"
+                   "  height: 720, rate_hz: 29.97, timeout_s: 2, max_backoff_s: 1}\n" HEAD CAMERA),
+              IsEmpty());
+  EXPECT_EQ(config_.video.type, VideoConfig::Type::kV4l2);
+  EXPECT_EQ(config_.video.device, "/dev/video2");
+  EXPECT_EQ(config_.video.pixel_format, V4l2Format::kMjpg);
+  EXPECT_EQ(config_.video.width, 1280);
+  EXPECT_EQ(config_.video.rate_hz, 29.97);
+  EXPECT_EQ(config_.video.timeout_s, 2);
+  EXPECT_EQ(config_.video.max_backoff_s, 1);
+  ASSERT_THAT(load("video: {type: v4l2, device: camera}\n" HEAD CAMERA), IsEmpty());
+  EXPECT_EQ(config_.video.device, directory_.path() + "/camera");
+  EXPECT_FALSE(config_.video.pixel_format);
+  EXPECT_EQ(config_.video.rate_hz, 0);
+}
+
+TEST_F(ConfigTest, TheExampleOfACameraOnUsbIsRead) {
+  std::string error;
+  EXPECT_TRUE(load_config(ALIDADE_USB_EXAMPLE, &config_, &error)) << error;
+}
+
 #define RTSP "video: {type: rtsp, url: rtsp://camera/stream}\n"
 
 TEST_F(ConfigTest, PelcoDHasTheProtocolsOwnUnitsAndRate) {
@@ -320,10 +344,16 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"NoVideoType", "video: {url: rtsp://camera/s}\n" PAN_TILT, ":1: video.type",
                 "is missing"},
         Mistake{"UnknownVideoType", "video: {type: film, url: x}\n" PAN_TILT, ":1: video.type",
-                "'film' is unknown; expected one of rtsp, rtp, mjpeg, recording"},
-        Mistake{"PlannedVideoType", "video: {type: v4l2, device: /dev/video0}\n" PAN_TILT,
-                ":1: video.type",
-                "'v4l2' is not available in this version; available: rtsp, rtp, mjpeg, recording"},
+                "'film' is unknown; expected one of rtsp, rtp, mjpeg, v4l2, recording"},
+        Mistake{"V4l2WithoutDevice", "video: {type: v4l2}\n" PAN_TILT, ":1: video.device",
+                "is missing; expected for example device: /dev/video0"},
+        Mistake{"UnusablePixelFormat",
+                "video: {type: v4l2, device: /dev/video0, format: RGB3}\n" PAN_TILT,
+                ":1: video.format",
+                "'RGB3' is unknown; expected one of GREY, NV12, YUYV, UYVY, MJPG"},
+        Mistake{"RateOfANetworkCamera",
+                "video: {type: rtsp, url: rtsp://c/s, rate_hz: 30}\n" PAN_TILT, ":1: video.rate_hz",
+                "unknown key"},
         Mistake{"HeadWithoutLine", VIDEO "pan_tilt: {type: pelco_d}\n", ":2: pan_tilt.device",
                 "is missing; expected for example device: /dev/ttyUSB0, or url: tcp://"},
         Mistake{"HeadOnTwoLines", VIDEO "pan_tilt: {type: ptu, device: /dev/x, url: tcp://h:1}\n",
