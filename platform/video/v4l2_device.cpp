@@ -60,6 +60,18 @@ v4l2_fract period_of(double rate_hz) {
 
 V4l2Device::Mapping::~Mapping() { ::munmap(data_, size_); }
 
+// The system puts the copy in place in one step, which a thread that reads does not notice.
+void V4l2Device::Mapping::detach() {
+  void* copy = ::mmap(nullptr, size_, PROT_READ | PROT_WRITE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0);
+  if (copy == MAP_FAILED) {
+    return;
+  }
+  std::memcpy(copy, data_, size_);
+  if (::mremap(copy, size_, size_, MREMAP_MAYMOVE | MREMAP_FIXED, data_) == MAP_FAILED) {
+    ::munmap(copy, size_);
+  }
+}
+
 V4l2Device::Result V4l2Device::fail(Result result, const std::string& error) {
   error_ = error;
   return result;
@@ -292,20 +304,19 @@ V4l2Device::Result V4l2Device::start() {
   return Result::kOk;
 }
 
-// The buffers are freed by hand: a mapping that is still lent keeps the file open, and with it, on
-// some drivers, the device occupied.
 void V4l2Device::close() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  mappings_.clear();
   if (fd_ < 0) {
     return;
   }
   int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   (void)call(fd_, VIDIOC_STREAMOFF, &type);
-  v4l2_requestbuffers none{};
-  none.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  none.memory = V4L2_MEMORY_MMAP;
-  (void)call(fd_, VIDIOC_REQBUFS, &none);
+  for (const std::shared_ptr<Mapping>& mapping : mappings_) {
+    if (mapping.use_count() > 1) {
+      mapping->detach();
+    }
+  }
+  mappings_.clear();
   ::close(std::exchange(fd_, -1));
 }
 

@@ -3,8 +3,9 @@
 // driver fills are taken out, lent and given back. Part of V4l2Source.
 //
 // Single-planar capture by mmap streaming. A buffer goes back to the driver when the last owner of what
-// hold() gave is gone, on whichever thread; a device that was closed before takes nothing back, but the
-// memory stays until then.
+// hold() gave is gone, on whichever thread. What is still held when the device closes becomes memory
+// of its own in the same place: the driver's would keep the device open, and with it, after an unplugging,
+// the number in /dev/video*.
 // One thread opens, dequeues and closes; owners may end on any.
 
 #include <sys/types.h>
@@ -76,6 +77,7 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
       return static_cast<const std::uint8_t*>(data_);
     }
     [[nodiscard]] std::size_t size() const { return size_; }
+    void detach();  // from the driver; the bytes stay
 
    private:
     void* data_;

@@ -8,9 +8,9 @@
 //   another clock (UNKNOWN, COPY), none, and one later than the moment the buffer was taken out, which
 //   cannot be an arrival, give way to that moment.
 // - Sequence: unwrapped from the kernel's 32 bits. A gap is what the driver lost or had no free buffer
-//   for; it is counted. The number of the buffer before once more means the same picture again, unless
-//   the driver has never counted: then there are no sequence numbers. A number that goes back
-//   means that the driver began anew.
+//   for; it is counted. A number that goes back means that the driver began anew. The number of the
+//   buffer before once more means the same place in time again: a duplicate. A driver that
+//   begins with several of those does not count, and has no sequence numbers until it does.
 // One thread, no allocation.
 
 #include <linux/videodev2.h>
@@ -49,28 +49,27 @@ class V4l2Stamps {
       } else if (step < 0) {
         result.anew = true;
         unwrapped_ = sequence;
-      } else if (counts_ || (stamp_s > 0 && stamp_s == last_stamp_s_)) {
-        result.duplicate = true;
       } else {
-        never_counted_ = true;
+        ++repeats_;
+        result.duplicate = counts_ || repeats_ < kRepeats;
       }
     }
     ++buffers_;
     last_ = sequence;
-    last_stamp_s_ = stamp_s;
-    if (counts_ || !never_counted_) {
+    if (counts_ || repeats_ < kRepeats) {
       result.sequence = unwrapped_;
     }
     return result;
   }
 
  private:
+  static constexpr int kRepeats = 3;
+
   std::int64_t buffers_ = 0;
   std::uint32_t last_ = 0;
-  double last_stamp_s_ = 0;
   std::int64_t unwrapped_ = 0;
-  bool counts_ = false;         // a number has once followed another one
-  bool never_counted_ = false;  // so far: the same number came with a new stamp
+  bool counts_ = false;  // a number has once followed another one
+  int repeats_ = 0;      // of a number
 };
 
 }  // namespace alidade

@@ -51,6 +51,9 @@ class LoopbackCamera {
   LoopbackCamera(const std::string& device, int width, int height, double rate_hz)
       : fd_(::open(device.c_str(), O_RDWR)) {
     check_call(fd_, device);
+    // What the device can do is what it could when it was asked last.
+    v4l2_capability capability{};
+    check_call(::ioctl(fd_, VIDIOC_QUERYCAP, &capability), device + ": VIDIOC_QUERYCAP");
     v4l2_format format{};
     format.type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
     format.fmt.pix.width = static_cast<std::uint32_t>(width);
@@ -59,18 +62,18 @@ class LoopbackCamera {
     format.fmt.pix.field = V4L2_FIELD_NONE;
     format.fmt.pix.sizeimage = static_cast<std::uint32_t>(width * height);
     check_call(::ioctl(fd_, VIDIOC_S_FMT, &format), device + ": VIDIOC_S_FMT");
+    // From now on it is a camera. Who only writes is not noticed when he goes.
+    int type = V4L2_BUF_TYPE_VIDEO_OUTPUT;
+    check_call(::ioctl(fd_, VIDIOC_STREAMON, &type), device + ": VIDIOC_STREAMON");
     std::vector<std::string> pictures;
     for (int n = 0; n < 8; ++n) {
       pictures.push_back(picture_file("mjpeg", width, height, 20 + 10 * n));
     }
-    const auto write = [this](const std::string& picture) {
-      return ::write(fd_, picture.data(), picture.size());
-    };
-    check_call(static_cast<int>(write(pictures.back())), device);  // from now on it is a camera
-    thread_ = std::thread([this, write, pictures = std::move(pictures), rate_hz] {
+    thread_ = std::thread([this, pictures = std::move(pictures), rate_hz] {
       auto next = std::chrono::steady_clock::now();
       for (std::size_t n = 0; !over_; ++n) {
-        (void)write(pictures[n % pictures.size()]);
+        const std::string& picture = pictures[n % pictures.size()];
+        (void)!::write(fd_, picture.data(), picture.size());
         next += std::chrono::nanoseconds(static_cast<std::int64_t>(1e9 / rate_hz));
         std::this_thread::sleep_until(next);  // the camera's pace
       }

@@ -42,36 +42,65 @@ V4l2SourceOptions options_of(const char* variable, V4l2Format format, int width,
   return options;
 }
 
-struct V4l2Rig : Rig {
+struct V4l2Rig : LiveFrameSourceRig {
   explicit V4l2Rig(V4l2SourceOptions its_options) : options(std::move(its_options)) {
-    if (options.wish.format == V4l2Format::kMjpg) {
-      camera = std::make_unique<LoopbackCamera>(options.device, options.wish.width,
-                                                options.wish.height, 30);
-    }
+    options.max_backoff_s = 0.05;
     source = open();
+  }
+  ~V4l2Rig() override {
+    if (keeper >= 0) {
+      ::close(keeper);
+    }
   }
   std::unique_ptr<FrameSource> open() const override {
     return std::make_unique<V4l2Source>(options);
   }
+  // A camera that vivid has unplugged comes back when the last one closes it.
+  void take_away() override {
+    keeper = ::open(options.device.c_str(), O_RDWR);
+    check_call(keeper, options.device);
+    set_control(options.device, "Disconnect", 1);
+  }
+  void give_back() override { ::close(std::exchange(keeper, -1)); }
   V4l2SourceOptions options;
+  int keeper = -1;
+};
+
+// The camera is the program that feeds the device: without it there is none, or silence.
+struct LoopbackRig : V4l2Rig {
+  explicit LoopbackRig(double timeout_s)
+      : V4l2Rig(options_of("LOOPBACK", V4l2Format::kMjpg, 320, 240, 0)) {
+    options.timeout_s = timeout_s;
+    source = open();
+    give_back();
+  }
+  void take_away() override { camera.reset(); }
+  void give_back() override {
+    camera = std::make_unique<LoopbackCamera>(options.device, 320, 240, 30);
+  }
   std::unique_ptr<LoopbackCamera> camera;
 };
 
-std::unique_ptr<Rig> webcam(V4l2Format format) {
-  return std::make_unique<V4l2Rig>(options_of("WEBCAM", format, 320, 180, 0));
+template <class Rig>
+std::vector<FrameSourceCase<Rig>> cases(double loopback_timeout_s) {
+  const auto webcam = [](V4l2Format format) {
+    return
+        [format] { return std::make_unique<V4l2Rig>(options_of("WEBCAM", format, 320, 180, 0)); };
+  };
+  return {
+      {"Grey", webcam(V4l2Format::kGrey)},
+      {"Nv12", webcam(V4l2Format::kNv12)},
+      {"Yuyv", webcam(V4l2Format::kYuyv)},
+      {"Uyvy", webcam(V4l2Format::kUyvy)},
+      {"Mjpg", [loopback_timeout_s] { return std::make_unique<LoopbackRig>(loopback_timeout_s); }}};
 }
 
+const auto name_of = [](const auto& which) { return which.param.name; };
+
 INSTANTIATE_TEST_SUITE_P(V4l2, FrameSourceContract,
-                         ::testing::Values(Case{"Grey", [] { return webcam(V4l2Format::kGrey); }},
-                                           Case{"Yuyv", [] { return webcam(V4l2Format::kYuyv); }},
-                                           Case{"Uyvy", [] { return webcam(V4l2Format::kUyvy); }},
-                                           Case{"Nv12", [] { return webcam(V4l2Format::kNv12); }},
-                                           Case{"Mjpg",
-                                                [] {
-                                                  return std::make_unique<V4l2Rig>(options_of(
-                                                      "LOOPBACK", V4l2Format::kMjpg, 320, 240, 0));
-                                                }}),
-                         [](const auto& which) { return which.param.name; });
+                         ::testing::ValuesIn(cases<FrameSourceRig>(kDeadline_s)), name_of);
+INSTANTIATE_TEST_SUITE_P(V4l2, LiveFrameSourceContract,
+                         ::testing::ValuesIn(cases<LiveFrameSourceRig>(1)), name_of);
 
 // 60 frames a second, so that little time is spent in waiting; every control back where it was.
 class V4l2Camera : public ::testing::Test {
