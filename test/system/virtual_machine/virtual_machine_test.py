@@ -60,7 +60,7 @@ def config(video, **sections):
     """JSON is YAML."""
     return json.dumps({"video": {"type": "v4l2", **video},
                        "pan_tilt": {"type": "pelco_d", "device": "/run/head", "angle_quantum_rad": 1.7e-4},
-                       "camera": {"focal_length_px": 1000}, "realtime": {"mode": "PT"}, **sections})
+                       "camera": {"focal_length_px": 1000}, **sections})
 
 
 def boot():
@@ -81,6 +81,9 @@ def boot():
         f"tests='{SHORT if LENGTH == 'short' else '*'}'\nseconds={SECONDS[LENGTH]}\n")
     (WORK / "raw.yaml").write_text(
         config({"device": "/dev/video10", "format": "GREY", "width": WIDTH, "height": HEIGHT, "rate_hz": 60}))
+    (WORK / "run.yaml").write_text(
+        config({"device": "/dev/video10", "format": "GREY", "width": WIDTH, "height": HEIGHT, "rate_hz": 15},
+               realtime={"mode": "OE"}))
     (WORK / "mjpg.yaml").write_text(config({"device": "/dev/video14", "format": "MJPG"}))
     return run(HERE / "run-machine", ARCHITECTURE, machine, system, WORK, DEADLINE_S[LENGTH]).stdout
 
@@ -176,7 +179,7 @@ class VirtualMachine(unittest.TestCase):
         self.assertGreaterEqual(len(after), 20)
         frames = [record["frame"] for record in before + after]
         self.assertEqual(frames, list(range(len(frames))))
-        answered = [record for record in before + after if record["mode"] == "PT"]
+        answered = [record for record in before + after if record["mode"] != "none"]
         self.assertGreater(len(answered), 0.8 * len(frames))
         # The head swings as head_main.cpp has it, at up to 20 degrees a second; its link is late by milliseconds.
         errors_deg = [abs(math.degrees(record["pan_rad"]) - 20 * math.sin(record["time_s"])) for record in answered]
