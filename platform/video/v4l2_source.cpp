@@ -211,11 +211,13 @@ ReadStatus V4l2Source::Implementation::take(Frame& frame) {
     return ReadStatus::kTimeout;
   }
   Picture picture;
+  const double before_s = monotonic_now_s();
   if ((buffer.flags & V4L2_BUF_FLAG_ERROR) != 0 || !take_picture(buffer, held, &picture)) {
     ++damaged_;
     damaged_since_ = true;
     return ReadStatus::kTimeout;
   }
+  const double decode_s = monotonic_now_s() - before_s;
   std::string error;
   if (!options_.copy_to.empty() && !store(buffer, picture, stamp.receive_time_s, &error)) {
     return fail(error);
@@ -230,6 +232,9 @@ ReadStatus V4l2Source::Implementation::take(Frame& frame) {
   frame.luma = picture.luma;
   frame.stride = picture.stride;
   frame.owner = std::move(picture.owner);
+  if (options_.decode) {
+    frame.decode_s = decode_s;
+  }
   last_frame_s_ = monotonic_now_s();
   damaged_since_ = false;
   worked_ = true;

@@ -47,7 +47,7 @@ class V4l2Source : public FrameSource {
   [[nodiscard]] std::string error() const override;
   [[nodiscard]] std::string name() const override;
 
-  [[nodiscard]] FrameSourceCounters counters() const;  // thread-safe
+  [[nodiscard]] FrameSourceCounters counters() const override;
 
  private:
   class Implementation;  // keeps libav and the kernel's headers out of this one

@@ -9,7 +9,7 @@
 
 #include "platform/system/clock.h"
 #include "test/edge_app/alidade_command.h"
-#include "test/platform/support/head_server.h"
+#include "test/simulator/servers/head_server.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {

@@ -9,7 +9,7 @@
 #include "test/edge_app/alidade_command.h"
 #include "test/platform/support/eventually.h"
 #include "test/platform/support/mjpeg_server.h"
-#include "test/platform/support/onvif_server.h"
+#include "test/simulator/servers/onvif_server.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {

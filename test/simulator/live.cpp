@@ -11,12 +11,12 @@
 #include <string>
 #include <vector>
 
-#include "test/platform/support/head_server.h"
-#include "test/platform/support/onvif_server.h"
 #include "test/simulator/parallel.h"
 #include "test/simulator/renderer.h"
 #include "test/simulator/servers/encoder.h"
+#include "test/simulator/servers/head_server.h"
 #include "test/simulator/servers/mjpeg_stream.h"
+#include "test/simulator/servers/onvif_server.h"
 #include "test/simulator/servers/vapix_server.h"
 #include "test/simulator/servers/video_server.h"
 #include "test/simulator/telemetry.h"

@@ -14,8 +14,8 @@
 #include <thread>
 
 #include "platform/system/clock.h"
-#include "test/platform/support/head_server.h"
 #include "test/platform/support/mjpeg_server.h"
+#include "test/simulator/servers/head_server.h"
 
 int main() {
   using alidade::LineFault;

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "platform/pan_tilt/device_clock_trial.h"
-#include "test/platform/support/digest_check.h"
+#include "test/simulator/servers/digest_check.h"
 
 namespace alidade {
 namespace {

@@ -12,8 +12,8 @@
 #include "platform/pan_tilt/onvif_messages.h"
 #include "platform/system/clock.h"
 #include "test/platform/support/eventually.h"
-#include "test/platform/support/onvif_server.h"
 #include "test/platform/support/raw_server.h"
+#include "test/simulator/servers/onvif_server.h"
 
 namespace alidade {
 namespace {

@@ -18,8 +18,8 @@
 #include "test/platform/support/axis_server.h"
 #include "test/platform/support/eventually.h"
 #include "test/platform/support/head_rig.h"
-#include "test/platform/support/onvif_server.h"
 #include "test/platform/support/open_files.h"
+#include "test/simulator/servers/onvif_server.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {

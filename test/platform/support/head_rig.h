@@ -6,7 +6,7 @@
 #include <string>
 
 #include "platform/pan_tilt/query_source.h"
-#include "test/platform/support/head_server.h"
+#include "test/simulator/servers/head_server.h"
 
 namespace alidade {
 

@@ -11,8 +11,8 @@
 #include <string>
 #include <vector>
 
-#include "test/platform/support/digest_check.h"
 #include "test/platform/support/raw_server.h"
+#include "test/simulator/servers/digest_check.h"
 
 namespace alidade {
 

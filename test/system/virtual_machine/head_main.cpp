@@ -9,7 +9,7 @@
 #include <memory>
 
 #include "platform/system/clock.h"
-#include "test/platform/support/head_server.h"
+#include "test/simulator/servers/head_server.h"
 
 int main(int count, char** arguments) {
   if (count != 2) {

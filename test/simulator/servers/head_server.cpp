@@ -1,4 +1,4 @@
-#include "test/platform/support/head_server.h"
+#include "test/simulator/servers/head_server.h"
 
 #include <arpa/inet.h>
 #include <fcntl.h>

@@ -8,7 +8,7 @@
 #include <string>
 #include <thread>
 
-#include "test/platform/support/simulated_head.h"
+#include "test/simulator/servers/simulated_head.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {

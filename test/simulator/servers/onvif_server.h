@@ -12,8 +12,8 @@
 #include <set>
 #include <string>
 
-#include "test/platform/support/digest_check.h"
-#include "test/platform/support/loopback_http_server.h"
+#include "test/simulator/servers/digest_check.h"
+#include "test/simulator/servers/loopback_http_server.h"
 
 namespace alidade {
 

@@ -1,4 +1,4 @@
-#include "test/platform/support/onvif_server.h"
+#include "test/simulator/servers/onvif_server.h"
 
 #include <time.h>
 

@@ -1,4 +1,4 @@
-#include "test/platform/support/digest_check.h"
+#include "test/simulator/servers/digest_check.h"
 
 #include <openssl/evp.h>
 

@@ -1,4 +1,4 @@
-#include "test/platform/support/simulated_head.h"
+#include "test/simulator/servers/simulated_head.h"
 
 #include <cmath>
 #include <cstdio>
