@@ -112,7 +112,7 @@ function(alidade_benchmark name)
   set_tests_properties(${name} PROPERTIES LABELS benchmark RUN_SERIAL ON TIMEOUT 600)
 endfunction()
 
-# What `ctest -L fuzz` runs.
+# What `ctest -L fuzz` runs, and all that the preset `fuzz` builds.
 add_custom_target(fuzz_programs)
 
 # alidade_fuzz_target(vapix LINK alidade::platform [MUTATIONS n])
