@@ -106,6 +106,10 @@ bool find_map(const fs::path& yaml, const std::string& text, fs::path* map, std:
   if (name.filename() != name) {
     *error = fmt::format("{}: its map {} is not a file beside it: not used", yaml.string(),
                          name.string());
+  } else if (name.extension() != kMapExtension) {
+    // What is no map is set aside: never another file that a slip named, such as the configuration.
+    *error =
+        fmt::format("{}: its map {} does not end in .bin: not used", yaml.string(), name.string());
   } else if (!is_there(path)) {
     *error = fmt::format("{}: its map {} is missing", yaml.string(), name.string());
   } else {

@@ -350,6 +350,17 @@ TEST_F(CalibrationStoreTest, AMapElsewhereIsNotLookedAt) {
   EXPECT_EQ(focal_length(again.find({})), 1000);
 }
 
+TEST_F(CalibrationStoreTest, LeavesAloneWhatANameTakesForAMap) {
+  CalibrationNotes notes;
+  notes.landmarks = "alidade.yaml";
+  std::string error;
+  ASSERT_TRUE(save_calibration(path(), some(1000).calibration, notes, &error)) << error;
+  directory_.write("alidade.yaml", "video: {}\n");
+  CalibrationStore again = store();
+  EXPECT_THAT(again.load(kWidth, kHeight), Contains(HasSubstr("does not end in .bin: not used")));
+  EXPECT_EQ(directory_.read("alidade.yaml"), "video: {}\n");
+}
+
 TEST_F(CalibrationStoreTest, WithoutLandmarksWritesNoMap) {
   put(some(1000));
   put(some(1001, {}, 0));
