@@ -22,22 +22,6 @@ constexpr long kReceiveBuffer = 128 * 1024;  // bytes read at a time
 constexpr int kDamagedInARow = 30;           // pictures: more are no accident
 constexpr long kMethods = static_cast<long>(CURLAUTH_DIGEST | CURLAUTH_BASIC);
 
-CodecParametersPtr jpeg_parameters() {
-  CodecParametersPtr parameters(avcodec_parameters_alloc());
-  parameters->codec_type = AVMEDIA_TYPE_VIDEO;
-  parameters->codec_id = AV_CODEC_ID_MJPEG;
-  return parameters;
-}
-
-PacketPtr packet_of(const std::string& jpeg) {
-  PacketPtr packet(av_packet_alloc());
-  if (packet && av_new_packet(packet.get(), static_cast<int>(jpeg.size())) == 0) {
-    std::memcpy(packet->data, jpeg.data(), jpeg.size());
-    packet->flags |= AV_PKT_FLAG_KEY;
-  }
-  return packet;
-}
-
 }  // namespace
 
 class MjpegSource::Implementation {
@@ -93,7 +77,7 @@ class MjpegSource::Implementation {
   bool sender_has_clock_ = true;
   std::optional<double> last_sender_time_s_;
   JpegDecoder decoder_;
-  CodecParametersPtr parameters_ = jpeg_parameters();
+  CodecParametersPtr parameters_ = picture_parameters(AV_CODEC_ID_MJPEG);
   StreamCopy copy_;
 
   // Last: its thread uses the others.
@@ -278,11 +262,12 @@ ReadStatus MjpegSource::Implementation::deliver(MultipartPart part, Frame& frame
   damaged_in_a_row_ = 0;
   const double decode_s = monotonic_now_s() - before_s;
   if (!options_.copy_to.empty()) {
-    const PacketPtr packet = packet_of(part.body);
+    const PacketPtr packet = make_picture_packet(part.body.size());
     std::string error;
-    if (!packet || packet->data == nullptr) {
+    if (!packet) {
       return fail("no memory for a picture");
     }
+    std::memcpy(packet->data, part.body.data(), part.body.size());
     if (!copy_.add(options_.copy_to, *parameters_, picture.width, picture.height, *packet,
                    part.first_byte_s, &error)) {
       return fail(error);

@@ -3,9 +3,6 @@
 #include <poll.h>
 
 #include <algorithm>
-#include <cerrno>
-#include <cmath>
-#include <cstring>
 #include <optional>
 #include <random>
 #include <utility>

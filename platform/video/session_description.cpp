@@ -2,7 +2,6 @@
 
 #include <gst/sdp/gstsdpmessage.h>
 
-#include <cstring>
 #include <memory>
 
 namespace alidade {

@@ -58,6 +58,26 @@ bool same_extradata(const AVCodecParameters& a, const AVCodecParameters& b) {
 
 }  // namespace
 
+CodecParametersPtr picture_parameters(AVCodecID codec) {
+  CodecParametersPtr parameters(avcodec_parameters_alloc());
+  parameters->codec_type = AVMEDIA_TYPE_VIDEO;
+  parameters->codec_id = codec;
+  if (codec == AV_CODEC_ID_RAWVIDEO) {
+    parameters->format = AV_PIX_FMT_GRAY8;
+    parameters->codec_tag = avcodec_pix_fmt_to_codec_tag(AV_PIX_FMT_GRAY8);
+  }
+  return parameters;
+}
+
+PacketPtr make_picture_packet(std::size_t bytes) {
+  PacketPtr packet(av_packet_alloc());
+  if (!packet || av_new_packet(packet.get(), static_cast<int>(bytes)) != 0) {
+    return nullptr;
+  }
+  packet->flags |= AV_PKT_FLAG_KEY;
+  return packet;
+}
+
 StreamCopy::~StreamCopy() {
   if (format_ != nullptr) {
     if (header_written_) {

@@ -6,11 +6,19 @@
 // reconnection, whatever the sender's clock does (frames.csv holds the exact stamps).
 // Clusters are closed and flushed after a second at most: a kill loses no more.
 
+#include <cstddef>
 #include <string>
 
 #include "platform/video/av_handles.h"
 
 namespace alidade {
+
+// Of pictures that no libav demuxer describes: AV_CODEC_ID_MJPEG, or AV_CODEC_ID_RAWVIDEO for 8-bit luma
+// without gaps between its rows.
+[[nodiscard]] CodecParametersPtr picture_parameters(AVCodecID codec);
+
+// Room for such a picture, each of which can be decoded by itself; null without memory.
+[[nodiscard]] PacketPtr make_picture_packet(std::size_t bytes);
 
 class StreamCopy {
  public:

@@ -33,18 +33,6 @@ std::size_t pixels(const Picture& picture) {
   return static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height);
 }
 
-// Of what goes into the copy: JPEG as it came, else uncompressed luma.
-CodecParametersPtr stored_parameters(bool jpeg) {
-  CodecParametersPtr parameters(avcodec_parameters_alloc());
-  parameters->codec_type = AVMEDIA_TYPE_VIDEO;
-  parameters->codec_id = jpeg ? AV_CODEC_ID_MJPEG : AV_CODEC_ID_RAWVIDEO;
-  if (!jpeg) {
-    parameters->format = AV_PIX_FMT_GRAY8;
-    parameters->codec_tag = avcodec_pix_fmt_to_codec_tag(AV_PIX_FMT_GRAY8);
-  }
-  return parameters;
-}
-
 }  // namespace
 
 class V4l2Source::Implementation {
@@ -108,6 +96,7 @@ class V4l2Source::Implementation {
   bool restarted_ = true;
   std::int64_t next_frame_ = 0;
   JpegDecoder decoder_;
+  CodecParametersPtr parameters_;  // of what is stored: JPEG as it came, else uncompressed luma
   StreamCopy copy_;
 };
 
@@ -155,6 +144,8 @@ ReadStatus V4l2Source::Implementation::connect(double end_s) {
     return lose(device->error());
   }
   device_ = std::move(device);
+  parameters_ = picture_parameters(device_->format() == V4l2Format::kMjpg ? AV_CODEC_ID_MJPEG
+                                                                          : AV_CODEC_ID_RAWVIDEO);
   stamps_ = V4l2Stamps();
   last_frame_s_ = monotonic_now_s();
   damaged_since_ = false;
@@ -281,20 +272,19 @@ bool V4l2Source::Implementation::store(const V4l2Device::Buffer& buffer, const P
                                        double receive_time_s, std::string* error) {
   const V4l2Format format = device_->format();
   const bool jpeg = format == V4l2Format::kMjpg;
-  const PacketPtr packet(av_packet_alloc());
   const std::size_t bytes = jpeg ? buffer.bytes : pixels(picture);
-  if (!packet || av_new_packet(packet.get(), static_cast<int>(bytes)) != 0) {
+  const PacketPtr packet = make_picture_packet(bytes);
+  if (!packet) {
     *error = "no memory for a picture";
     return false;
   }
-  packet->flags |= AV_PKT_FLAG_KEY;
   if (jpeg) {
     std::memcpy(packet->data, buffer.data, bytes);
   } else {
     copy_luma(format, buffer.data, picture.width, picture.height, device_->stride(), packet->data);
   }
-  return copy_.add(options_.copy_to, *stored_parameters(jpeg), picture.width, picture.height,
-                   *packet, receive_time_s, error);
+  return copy_.add(options_.copy_to, *parameters_, picture.width, picture.height, *packet,
+                   receive_time_s, error);
 }
 
 V4l2Source::V4l2Source(const V4l2SourceOptions& options)
