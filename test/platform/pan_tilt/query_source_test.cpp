@@ -26,6 +26,7 @@ using ::testing::Not;
 using ::testing::StartsWith;
 
 constexpr double kNever_s = 1e6;
+constexpr int kReadingsBetweenSilences = 33;  // 64 queries of two axes, see query_source.h
 constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 constexpr HeadKind kKinds[] = {
     HeadKind::kPelcoDSerial, HeadKind::kPelcoDTcp, HeadKind::kViscaSerial,
@@ -157,9 +158,17 @@ TEST_P(QuerySourceTest, LosesOnlyAnswersToALineWithFaults) {
   const HeadPosition position{-123.45, 30.5, 0x1234};
   HeadRig rig(GetParam(), [position] { return position; });
   QuerySourceOptions options = rig.options();
-  options.timeout_s = 0.4;  // an answer is given up after a quarter of it
-  rig.server().late_s = 0.12;
+  // An answer is given up after a quarter of it. Where answers have no name, one that a busy machine
+  // keeps for longer is taken for another query's: of them only the late ones here shall be so late.
+  const bool is_terse = GetParam() == HeadKind::kPtuTerseSerial;
+  options.timeout_s = is_terse ? 1.2 : 0.4;
+  rig.server().late_s = 0.3 * options.timeout_s;
   const auto source = rig.open(options);
+  const auto is_right = [&] {
+    return source->read(sample_, kDeadline_s) == ReadStatus::kOk &&
+           difference_deg(sample_.pan_rad, position.pan_deg) <= rig.quantum_deg() &&
+           difference_deg(sample_.tilt_rad, position.tilt_deg) <= rig.quantum_deg();
+  };
   for (const LineFault fault :
        {LineFault::kNoise, LineFault::kRepeated, LineFault::kUnsolicited, LineFault::kLate,
         LineFault::kMerged, LineFault::kLostByte, LineFault::kChangedByte}) {
@@ -168,7 +177,7 @@ TEST_P(QuerySourceTest, LosesOnlyAnswersToALineWithFaults) {
     rig.server().faults = 0;
     // Digits of a PTU and nibbles of VISCA have no sum, and terse answers no name.
     const bool unseen =
-        (fault == LineFault::kRepeated && GetParam() == HeadKind::kPtuTerseSerial) ||
+        (is_terse && (fault == LineFault::kRepeated || fault == LineFault::kLate)) ||
         (fault == LineFault::kChangedByte && !is_pelco_d(GetParam())) ||
         (fault == LineFault::kLostByte && is_ptu(GetParam()));
     const double end_s = monotonic_now_s() + kDeadline_s;
@@ -187,17 +196,13 @@ TEST_P(QuerySourceTest, LosesOnlyAnswersToALineWithFaults) {
     }
     EXPECT_GE(samples, 5);
     EXPECT_GE(rig.server().faults, 4);
-  }
-  // And then all is as before.
-  rig.server().fault = LineFault::kNone;
-  const auto is_right = [&] {
-    return source->read(sample_, kDeadline_s) == ReadStatus::kOk &&
-           difference_deg(sample_.pan_rad, position.pan_deg) <= rig.quantum_deg() &&
-           difference_deg(sample_.tilt_rad, position.tilt_deg) <= rig.quantum_deg();
-  };
-  EXPECT_TRUE(eventually(is_right));
-  for (int i = 0; i < 20; ++i) {
-    EXPECT_TRUE(is_right());
+    // And then all is as before, once the line has been found silent.
+    rig.server().fault = LineFault::kNone;
+    int right = 0;
+    EXPECT_TRUE(eventually([&] {
+      right = is_right() ? right + 1 : 0;
+      return right == kReadingsBetweenSilences;
+    }));
   }
 }
 
