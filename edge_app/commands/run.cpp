@@ -11,6 +11,10 @@
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/config/calibration_store.h"
+#include "edge_app/output/http_api.h"
+#include "edge_app/output/http_server.h"
+#include "edge_app/output/live_state.h"
+#include "edge_app/output/record_sinks.h"
 #include "edge_app/output/record_writer.h"
 #include "edge_app/pipeline/pipeline.h"
 
@@ -128,6 +132,19 @@ PipelineOptions pipeline_options(const Config& config, const NamedCalibration& c
   return options;
 }
 
+// Null where none is configured.
+std::unique_ptr<HttpServer> start_http(const Config& config, const HttpApiSources& sources) {
+  if (!config.output.http) return nullptr;
+  auto server = std::make_unique<HttpServer>(*config.output.http);
+  add_api_routes(server.get(), sources);
+  server->set_on_stop([live = sources.live] { live->close(); });
+  std::string error;
+  if (!server->start(&error)) throw CommandError(kExitFailed, error);
+  spdlog::info("HTTP: listening on http://{}/{}", server->address(),
+               config.output.http->token.empty() ? "" : ", with a token");
+  return server;
+}
+
 int run(const RunOptions& options) {
   const Config config = require_config(options.config);
   Calibrating calibrating;
@@ -146,7 +163,7 @@ int run(const RunOptions& options) {
   of_pipeline.step.map = std::move(map);
   of_pipeline.step.follow_points = calibrating.calibration && config.calibration.automatic;
 
-  OutputFormat format = config.output;
+  std::optional<OutputFormat> format = config.output.stdout_format;
   if (options.json) format = OutputFormat::kJson;
   if (options.csv) format = OutputFormat::kCsv;
 
@@ -155,10 +172,23 @@ int run(const RunOptions& options) {
   const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
   spdlog::info("video: {}; pan/tilt: {}", video->name(), pan_tilt->name());
   spdlog::info("real-time thread: {}", describe(of_pipeline.realtime));
-  RecordWriter writer(STDOUT_FILENO, format, "stdout");
-  Pipeline pipeline(*video, *pan_tilt, writer, calibrating.calibration.get(), of_pipeline);
+  RecordWriter writer(STDOUT_FILENO, format.value_or(OutputFormat::kJson), "stdout");
+  LiveState live;
+  RecordSinks sinks;
+  // First, so that a slow reader of stdout holds up no record that others wait for.
+  if (config.output.http) sinks.add(&live);
+  if (format) sinks.add(&writer);
+  Pipeline pipeline(*video, *pan_tilt, sinks, calibrating.calibration.get(), of_pipeline);
+  HttpApiSources sources;
+  sources.live = &live;
+  sources.summary = [&pipeline] { return pipeline.summary(); };
+  sources.version = ALIDADE_VERSION;
+  sources.camera = video->name();
+  sources.latency_measured = of_pipeline.measure_latency;
+  const auto http = start_http(config, sources);
   pipeline.start();
   static_cast<void>(signals.wait(pipeline.finished_fd(), options.duration_s));
+  if (http) http->stop();
   pipeline.stop();
 
   spdlog::info("{}", describe(pipeline.summary(), of_pipeline.measure_latency));

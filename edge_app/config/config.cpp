@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 
 #include "edge_app/config/yaml_section.h"
 
@@ -215,15 +217,96 @@ RealtimeConfig read_realtime(YamlSection section) {
   return realtime;
 }
 
-OutputFormat read_output(YamlSection section) {
-  const bool json = section.truth("json").value_or(false);
-  const bool csv = section.truth("csv").value_or(false);
-  if (section.has("http")) {
-    section.fail("http", "is not available in this version; available: json, csv (on stdout)");
+// "127.0.0.1:8080", "[::1]:8080", "name:8080"
+HttpServerOptions read_address(const YamlSection& section, const std::string& text) {
+  constexpr int kHighestPort = 65535;
+  HttpServerOptions http;
+  const std::size_t colon = text.rfind(':');
+  const std::string port = colon == std::string::npos ? "" : text.substr(colon + 1);
+  http.host = text.substr(0, colon);
+  const bool bracketed =
+      http.host.size() > 2 && http.host.front() == '[' && http.host.back() == ']';
+  if (bracketed) http.host = http.host.substr(1, http.host.size() - 2);
+  constexpr std::size_t kDigits = 5;
+  if (http.host.empty() || (!bracketed && http.host.find(':') != std::string::npos) ||
+      port.empty() || port.size() > kDigits ||
+      port.find_first_not_of("0123456789") != std::string::npos || std::stoi(port) > kHighestPort) {
+    section.fail("http", fmt::format("'{}' is not ADDRESS:PORT; expected for example "
+                                     "127.0.0.1:8080, [::1]:8080, or 0.0.0.0:8080 for all networks",
+                                     text));
   }
-  if (json && csv) section.fail("csv", "json and csv cannot both go to stdout; keep one");
+  http.port = std::stoi(port);
+  return http;
+}
+
+bool is_loopback(const std::string& host) {
+  return host == "localhost" || host == "::1" || host.compare(0, 4, "127.") == 0;
+}
+
+// The one line of a file, without the blanks around it.
+std::string read_token_file(const YamlSection& section, const std::string& file) {
+  std::ifstream in(file);
+  std::string line;
+  if (!std::getline(in, line)) {
+    section.fail("token_file", fmt::format("cannot read a line of {}; put the token there", file));
+  }
+  const char* blanks = " \t\r";
+  line.erase(0, line.find_first_not_of(blanks));
+  line.erase(line.find_last_not_of(blanks) + 1);
+  return line;
+}
+
+std::string read_token(YamlSection& section, const std::string& path) {
+  const std::optional<std::string> variable = section.text("token_env");
+  const std::optional<std::string> file = section.text("token_file");
+  if (!variable && !file) return "";
+  const char* key = variable ? "token_env" : "token_file";
+  if (!section.has("http")) section.fail(key, "stands without http; add http");
+  if (variable && file) section.fail("token_file", "and token_env exclude each other; keep one");
+  std::string token;
+  if (variable) {
+    const char* value = std::getenv(variable->c_str());
+    if (value == nullptr) {
+      section.fail(
+          key,
+          fmt::format("the environment has no variable '{}'; export it with the token", *variable));
+    }
+    token = value;
+  } else {
+    token = read_token_file(section, path_relative_to(path, *file));
+  }
+  constexpr std::size_t kShortest = 8;
+  const bool printable =
+      std::all_of(token.begin(), token.end(), [](char c) { return c > ' ' && c < 0x7f; });
+  if (token.size() < kShortest || !printable) {
+    section.fail(key, fmt::format("gives no token that can be used; expected at least {} letters, "
+                                  "digits or signs without blanks",
+                                  kShortest));
+  }
+  return token;
+}
+
+OutputConfig read_output(YamlSection section, const std::string& path,
+                         std::vector<std::string>* warnings) {
+  OutputConfig output;
+  const std::optional<bool> json = section.truth("json");
+  const bool csv = section.truth("csv").value_or(false);
+  if (json.value_or(false) && csv)
+    section.fail("csv", "json and csv cannot both go to stdout; keep one");
+  if (csv) output.stdout_format = OutputFormat::kCsv;
+  const std::string token = read_token(section, path);
+  if (const std::optional<std::string> address = section.text("http")) {
+    output.http = read_address(section, *address);
+    output.http->token = token;
+    if (token.empty() && !is_loopback(output.http->host)) {
+      warnings->push_back(section.where("http") +
+                          ": listens to other machines without a token: whoever reaches it may use "
+                          "it; set token_env or token_file, or listen on 127.0.0.1");
+    }
+    if (json && !*json && !csv) output.stdout_format.reset();
+  }
   section.finish();
-  return csv ? OutputFormat::kCsv : OutputFormat::kJson;
+  return output;
 }
 
 void read_config(YamlSection& top, const std::string& path, Config* config) {
@@ -236,7 +319,7 @@ void read_config(YamlSection& top, const std::string& path, Config* config) {
   config->camera = read_camera(top.section("camera"));
   config->calibration = read_calibration(top.section("calibration"), path);
   config->realtime = read_realtime(top.section("realtime"));
-  config->output = read_output(top.section("output"));
+  config->output = read_output(top.section("output"), path, &config->warnings);
   top.finish();
   if ((config->video.type == VideoConfig::Type::kRecording) !=
       (config->pan_tilt.type == PanTiltConfig::Type::kRecording)) {

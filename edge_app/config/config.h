@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "edge_app/config/head_config.h"
+#include "edge_app/output/http_server.h"    // HttpServerOptions
 #include "edge_app/output/record_format.h"  // OutputFormat
 #include "platform/video/v4l2_mode.h"       // V4l2Format
 
@@ -84,13 +85,18 @@ struct RealtimeConfig {
   double max_extrapolation_s = 0.25;  // how far beyond the newest telemetry an angle is stated
 };
 
+struct OutputConfig {
+  std::optional<OutputFormat> stdout_format = OutputFormat::kJson;  // empty: nothing on stdout
+  std::optional<HttpServerOptions> http;                            // empty: no server
+};
+
 struct Config {
   VideoConfig video;
   PanTiltConfig pan_tilt;
   CameraConfig camera;
   CalibrationConfig calibration;
   RealtimeConfig realtime;
-  OutputFormat output = OutputFormat::kJson;
+  OutputConfig output;
   std::vector<std::string> warnings;  // FILE:LINE: ... lines for the log
 };
 

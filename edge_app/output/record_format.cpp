@@ -9,6 +9,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr double kReferenceRow = 0;  // at which angles, rates and q hold
+
 struct Field {
   const char* name;
   Json value;
@@ -51,11 +53,19 @@ std::vector<Field> fields(const OrientationRecord& record) {
       {"orientation_sigma_rad",
        of_orientation(&Orientation::sigma_rad),
        {"orientation_sigma_rad_0", "orientation_sigma_rad_1", "orientation_sigma_rad_2"}},
+      {"orientation_covariance_rad2",
+       of_orientation(&Orientation::covariance_rad2),
+       {"orientation_covariance_rad2_0", "orientation_covariance_rad2_1",
+        "orientation_covariance_rad2_2", "orientation_covariance_rad2_3",
+        "orientation_covariance_rad2_4", "orientation_covariance_rad2_5",
+        "orientation_covariance_rad2_6", "orientation_covariance_rad2_7",
+        "orientation_covariance_rad2_8"}},
+      {"reference_row", kReferenceRow, {}},
       {"landmarks", record.landmarks, {}},
-      {"line_delay_s", record.line_delay_s, {}},
-      {"focal_length_px", record.focal_length_px, {}},
-      {"aspect", record.aspect, {}},
-      {"radial_distortion", record.radial_distortion, {}},
+      {"line_delay_s", record.camera.line_delay, {}},
+      {"focal_length_px", record.camera.focal_length, {}},
+      {"aspect", record.camera.aspect, {}},
+      {"radial_distortion", record.camera.radial_distortion, {}},
       {"latency_s", or_null(record.latency_s), {}},
   };
 }

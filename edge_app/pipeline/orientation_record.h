@@ -3,8 +3,8 @@
 //
 // Angles are TRUE angles of the mechanism (measured / scale), rad, and with the rates and q hold at
 // time_s, when row 0 was exposed; at row v both angles are
-//   angle + rate t + acceleration t^2 / 2,  t = v * line_delay_s.
-// q is R_base_from_camera; sigma is of a perturbation R * Exp(xi), xi in the camera frame.
+//   angle + rate t + acceleration t^2 / 2,  t = v * line delay.
+// q is R_base_from_camera; covariance and sigma are of a perturbation R * Exp(xi), xi in the camera frame.
 // A record without a frame (video lost) has neither frame nor time_s; one of mode `none` has no
 // orientation and its status says why. Where landmarks were looked for and the answer is telemetry's
 // (mode PT), the status says why too.
@@ -16,6 +16,7 @@
 #include <string>
 #include <type_traits>
 
+#include "edge_app/pipeline/frame_geometry.h"
 #include "edge_app/pipeline/published_calibration.h"
 
 namespace alidade {
@@ -92,21 +93,22 @@ struct OrientationRecord {
     double tilt_acceleration_rad_s2 = 0;
     std::array<double, 4> q_base_from_camera{0, 0, 0, 1};  // x, y, z, w
     std::array<double, 3> sigma_rad{};
+    std::array<double, 9> covariance_rad2{};  // row by row
+    FrameGeometry geometry;                   // for directions of its pixels
   };
 
   std::optional<std::int64_t> frame;
   std::optional<double> time_s;  // capture of row 0 on the filtered host clock
+  double time_sigma_s = 0;       // of time_s, as the clock filter has it
+  bool clock_locked = false;     // the clock filter has seen enough
   double receive_time_s = 0;     // of the frame, or of the news of the loss
   RecordMode mode = RecordMode::kNone;
   RecordStatus status = RecordStatus::kOk;
   bool calibrated = false;        // false: data-sheet values
   CalibrationReport calibration;  // what the calibration thread does and needs
   std::optional<Orientation> orientation;
-  int landmarks = 0;  // that held it: 0 but in mode OE
-  double line_delay_s = 0;
-  double focal_length_px = 0;
-  double aspect = 1;
-  double radial_distortion = 0;
+  int landmarks = 0;                // that held it: 0 but in mode OE
+  PlainCalibration camera;          // the calibration in use
   std::optional<double> latency_s;  // record made minus receive time; none in a replay
 };
 static_assert(std::is_trivially_copyable_v<OrientationRecord>);

@@ -24,6 +24,11 @@ OrientationRecord::Orientation to_record(const FrameOrientation& frame) {
     // Rounding may leave a zero variance negative.
     orientation.sigma_rad[i] = std::sqrt(std::max(frame.orientation_covariance(row, row), 0.0));
   }
+  for (std::size_t i = 0; i < orientation.covariance_rad2.size(); ++i) {
+    orientation.covariance_rad2[i] = frame.orientation_covariance(static_cast<Eigen::Index>(i / 3),
+                                                                  static_cast<Eigen::Index>(i % 3));
+  }
+  orientation.geometry = pack(frame);
   return orientation;
 }
 
@@ -148,10 +153,7 @@ bool OrientationStep::zoom_fits() const {
 OrientationRecord OrientationStep::empty_record() const {
   OrientationRecord record;
   record.calibrated = options_.calibrated && zoom_fits();
-  record.line_delay_s = options_.calibration.line_delay;
-  record.focal_length_px = options_.calibration.camera.focal_length;
-  record.aspect = options_.calibration.camera.aspect;
-  record.radial_distortion = options_.calibration.camera.radial_distortion;
+  record.camera = pack(options_.calibration);
   return record;
 }
 
@@ -191,7 +193,9 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const double telemetry_time_s = clock.time_s + calibration.clock_offset + to_middle_row_s;
   const double time_sigma_s = std::hypot(clock.sigma_s, floor_sigma_s_);
   const QueryStatus query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
-  record.status = status_of(query, clock.state == ClockState::kLocked);
+  record.time_sigma_s = time_sigma_s;
+  record.clock_locked = clock.state == ClockState::kLocked;
+  record.status = status_of(query, record.clock_locked);
   if (!zoom_fits()) {
     // Neither the lens nor the axes of another zoom are this one's.
     record.status = RecordStatus::kOtherZoom;

@@ -60,7 +60,9 @@ void Pipeline::stop() {
 }
 
 PipelineSummary Pipeline::summary() const {
+  std::unique_lock<std::mutex> lock(summary_mutex_);
   PipelineSummary summary = summary_;
+  lock.unlock();
   summary.drops = stage_.drops();
   summary.page_faults = page_faults_;
   return summary;
@@ -217,19 +219,27 @@ void Pipeline::write_output() {
 
 void Pipeline::account_way(const OutputMessage& message, double written_s) {
   if (!message.record.frame || !options_.measure_latency) return;
+  const std::lock_guard<std::mutex> lock(summary_mutex_);
   summary_.decoding.add(message.decoded_s - message.record.receive_time_s);
   summary_.waiting.add(message.taken_s - message.decoded_s);
   summary_.computing.add(message.made_s - message.taken_s);
   summary_.writing.add(written_s - message.made_s);
 }
 
-void Pipeline::account(const OutputMessage& message) {
+void Pipeline::count(const OutputMessage& message) {
+  const std::lock_guard<std::mutex> lock(summary_mutex_);
   ++summary_.records;
   if (message.record.frame) ++summary_.frames;
   if (message.record.orientation) ++summary_.with_orientation;
   if (message.record.mode == RecordMode::kOe) ++summary_.with_landmarks;
   if (message.record.frame && message.record.latency_s)
     summary_.latency.add(*message.record.latency_s);
+  if (message.events.video_clock_restarted) ++summary_.clock_restarts;
+  if (message.events.video_floor_shifted) ++summary_.floor_shifts;
+}
+
+void Pipeline::account(const OutputMessage& message) {
+  count(message);
   if (message.events.video_clock_restarted) {
     spdlog::info("{}: clock filter restarted at frame {}", video_.name(), *message.record.frame);
   }

@@ -11,7 +11,7 @@
 // A source that loses its connection is waited for; records of mode `none` are made at the loss and
 // then each second until it is back. The pipeline is finished when the video has ended, a source
 // has failed for good, or the sink takes no more; stop() ends it at any time.
-// One thread owns the pipeline and calls everything here.
+// One thread owns the pipeline and calls everything here, but for summary().
 
 #include <atomic>
 #include <cstdint>
@@ -41,6 +41,8 @@ struct PipelineOptions {
 };
 
 struct PipelineSummary {
+  std::int64_t clock_restarts = 0;
+  std::int64_t floor_shifts = 0;
   std::int64_t records = 0;
   std::int64_t frames = 0;
   std::int64_t with_orientation = 0;
@@ -75,7 +77,7 @@ class Pipeline {
 
   // After stop(): why it failed, one line; empty if it did not.
   [[nodiscard]] const std::string& error() const { return error_; }
-  // After stop().
+  // Any thread, at any time: what has come so far. page_faults: after stop().
   [[nodiscard]] PipelineSummary summary() const;
 
  private:
@@ -85,6 +87,7 @@ class Pipeline {
   void calibrate();
   void feed_calibration();
   void write_output();
+  void count(const OutputMessage& message);
   void account(const OutputMessage& message);
   void account_way(const OutputMessage& message, double written_s);
   bool push(const Frame& frame);
@@ -101,9 +104,10 @@ class Pipeline {
   std::vector<Frame> pictures_;  // capture thread: by slot, those that somebody still looks at
   std::vector<PictureSlot> free_slots_;  // capture thread
   int finished_;                         // eventfd
-  std::mutex error_mutex_;     // the first of several threads to fail is heard; not on the
-  std::string error_;          // real-time thread
-  PipelineSummary summary_;    // output thread
+  std::mutex error_mutex_;            // the first of several threads to fail is heard; not on the
+  std::string error_;                 // real-time thread
+  mutable std::mutex summary_mutex_;  // the real-time thread does not take it
+  PipelineSummary summary_;
   PageFaults page_faults_;     // real-time thread
   DropCounters drops_logged_;  // output thread
   double drops_logged_at_s_ = 0;

@@ -27,7 +27,7 @@ void judge_pixels(const VirtualDay& day, std::size_t frame, const Answer& answer
   for (std::size_t i = 0; i < judged->pixel_error_px.size(); ++i) {
     const double row = camera.height * static_cast<double>(i) / 2;
     const Eigen::Vector2d u(camera.width / 2.0, row);
-    const double t = row * answer.record.line_delay_s;
+    const double t = row * answer.record.camera.line_delay;
     const PanTilt<double> angle{orientation.pan_rad + orientation.pan_rate_rad_s * t +
                                     orientation.pan_acceleration_rad_s2 * t * t / 2,
                                 orientation.tilt_rad + orientation.tilt_rate_rad_s * t +

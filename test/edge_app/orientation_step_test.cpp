@@ -76,7 +76,7 @@ TEST(OrientationStep, LooksTheFrameUpAtItsTimePlusTheClockOffset) {
   EXPECT_EQ(record.mode, RecordMode::kPt);
   EXPECT_EQ(record.status, RecordStatus::kOk);
   EXPECT_TRUE(record.calibrated);
-  EXPECT_EQ(record.focal_length_px, 30000);
+  EXPECT_EQ(record.camera.focal_length, 30000);
   ASSERT_TRUE(record.orientation);
   EXPECT_NEAR(record.orientation->pan_rad, sweep.pan(0.7 - 0.0844), 1e-9);
   EXPECT_NEAR(record.orientation->tilt_rad, sweep.tilt(0.7 - 0.0844), 1e-9);
@@ -94,7 +94,7 @@ TEST(OrientationStep, StatesTheAngleOfRowZeroForEitherSignOfTheLineDelay) {
     const OrientationRecord record = add_frame(&step, stamp_at(0.7));
     ASSERT_TRUE(record.orientation);
     EXPECT_NEAR(record.orientation->pan_rad, sweep.pan(0.7), 1e-9);
-    EXPECT_EQ(record.line_delay_s, line_delay);
+    EXPECT_EQ(record.camera.line_delay, line_delay);
   }
 }
 

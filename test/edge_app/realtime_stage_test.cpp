@@ -271,7 +271,7 @@ TEST(RealtimeStage, TakesOverWhatIsPublishedBeforeTheNextFrame) {
   OutputMessage out;
   ASSERT_TRUE(stage->pop(out));
   EXPECT_TRUE(out.record.calibrated);
-  EXPECT_EQ(out.record.focal_length_px, 2100);
+  EXPECT_EQ(out.record.camera.focal_length, 2100);
   EXPECT_EQ(out.record.calibration.activity, CalibrationActivity::kWatching);
   const PublishedCalibration* adopted = nullptr;
   ASSERT_TRUE(stage->pop_adopted(adopted));

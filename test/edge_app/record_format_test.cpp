@@ -18,13 +18,22 @@ OrientationRecord full_record() {
   record.receive_time_s = 12345.75;
   record.mode = RecordMode::kOe;
   record.calibrated = true;
-  record.orientation = OrientationRecord::Orientation{
-      0.5, -0.25, 0.125, -0.0625, 0.03125, -0.015625, {0.5, -0.5, 0.5, 0.5}, {1e-5, 2e-5, 3e-5}};
+  record.orientation =
+      OrientationRecord::Orientation{0.5,
+                                     -0.25,
+                                     0.125,
+                                     -0.0625,
+                                     0.03125,
+                                     -0.015625,
+                                     {0.5, -0.5, 0.5, 0.5},
+                                     {1e-5, 2e-5, 3e-5},
+                                     {1e-10, 2e-12, 0, 2e-12, 4e-10, 0, 0, 0, 9e-10},
+                                     {}};
   record.landmarks = 187;
-  record.line_delay_s = -1.42e-5;
+  record.camera.line_delay = -1.42e-5;
   record.calibration = {CalibrationActivity::kWatching, CalibrationNeed::kNothing};
-  record.focal_length_px = 32008;
-  record.radial_distortion = 55.4;
+  record.camera.focal_length = 32008;
+  record.camera.radial_distortion = 55.4;
   record.latency_s = 2.5e-5;
   return record;
 }
@@ -34,7 +43,7 @@ OrientationRecord record_without_frame() {
   record.receive_time_s = 3.5;
   record.status = RecordStatus::kVideoLost;
   record.calibration = {CalibrationActivity::kCollecting, CalibrationNeed::kTilt};
-  record.focal_length_px = 1000;
+  record.camera.focal_length = 1000;
   return record;
 }
 
@@ -44,7 +53,9 @@ TEST(RecordFormat, WritesAllFieldsAsOneJsonLine) {
       R"({"frame":7,"time_s":12345.678901234,"receive_time_s":12345.75,"mode":"OE","status":"ok",)"
       R"("calibrated":true,"calibration":"watching","needs":null,"pan_rad":0.5,"tilt_rad":-0.25,"pan_rate_rad_s":0.125,"tilt_rate_rad_s":-0.0625,)"
       R"("pan_acceleration_rad_s2":0.03125,"tilt_acceleration_rad_s2":-0.015625,)"
-      R"("q_base_from_camera":[0.5,-0.5,0.5,0.5],"orientation_sigma_rad":[1e-05,2e-05,3e-05],"landmarks":187,)"
+      R"("q_base_from_camera":[0.5,-0.5,0.5,0.5],"orientation_sigma_rad":[1e-05,2e-05,3e-05],)"
+      R"("orientation_covariance_rad2":[1e-10,2e-12,0.0,2e-12,4e-10,0.0,0.0,0.0,9e-10],)"
+      R"("reference_row":0.0,"landmarks":187,)"
       R"("line_delay_s":-1.42e-05,"focal_length_px":32008.0,"aspect":1.0,"radial_distortion":55.4,)"
       R"("latency_s":2.5e-05})"
       "\n");
@@ -56,7 +67,8 @@ TEST(RecordFormat, WritesNullForWhatARecordLacks) {
       R"({"frame":null,"time_s":null,"receive_time_s":3.5,"mode":"none","status":"video lost",)"
       R"("calibrated":false,"calibration":"collecting","needs":"tilt more","pan_rad":null,"tilt_rad":null,"pan_rate_rad_s":null,"tilt_rate_rad_s":null,)"
       R"("pan_acceleration_rad_s2":null,"tilt_acceleration_rad_s2":null,)"
-      R"("q_base_from_camera":null,"orientation_sigma_rad":null,"landmarks":0,)"
+      R"("q_base_from_camera":null,"orientation_sigma_rad":null,)"
+      R"("orientation_covariance_rad2":null,"reference_row":0.0,"landmarks":0,)"
       R"("line_delay_s":0.0,"focal_length_px":1000.0,"aspect":1.0,"radial_distortion":0.0,)"
       R"("latency_s":null})"
       "\n");
@@ -68,12 +80,17 @@ TEST(RecordFormat, WritesCsvColumnsInTheOrderOfTheHeader) {
             "pan_rad,tilt_rad,pan_rate_rad_s,"
             "tilt_rate_rad_s,pan_acceleration_rad_s2,tilt_acceleration_rad_s2,"
             "q_x,q_y,q_z,q_w,orientation_sigma_rad_0,orientation_sigma_rad_1,orientation_sigma_rad_"
-            "2,landmarks,"
+            "2,orientation_covariance_rad2_0,orientation_covariance_rad2_1,"
+            "orientation_covariance_rad2_2,orientation_covariance_rad2_3,"
+            "orientation_covariance_rad2_4,orientation_covariance_rad2_5,"
+            "orientation_covariance_rad2_6,orientation_covariance_rad2_7,"
+            "orientation_covariance_rad2_8,reference_row,landmarks,"
             "line_delay_s,focal_length_px,aspect,radial_distortion,latency_s\n");
   EXPECT_EQ(
       csv_line(full_record()),
       "7,12345.678901234,12345.75,OE,ok,true,watching,,0.5,-0.25,0.125,-0.0625,0.03125,-0.015625,"
-      "0.5,-0.5,0.5,0.5,1e-05,2e-05,3e-05,187,"
+      "0.5,-0.5,0.5,0.5,1e-05,2e-05,3e-05,"
+      "1e-10,2e-12,0.0,2e-12,4e-10,0.0,0.0,0.0,9e-10,0.0,187,"
       "-1.42e-05,32008.0,1.0,55.4,2.5e-05\n");
 }
 
@@ -81,7 +98,8 @@ TEST(RecordFormat, LeavesCsvCellsEmptyForWhatARecordLacks) {
   const std::string line = csv_line(record_without_frame());
   EXPECT_EQ(
       line,
-      ",,3.5,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,0,0.0,1000.0,1.0,0.0,\n");
+      ",,3.5,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,,,,,,,,,,0.0,0,0.0,1000.0,"
+      "1.0,0.0,\n");
   const std::string header = csv_header();
   EXPECT_EQ(std::count(line.begin(), line.end(), ','),
             std::count(header.begin(), header.end(), ','));
@@ -102,7 +120,8 @@ TEST(RecordFormat, WhatIsNotFiniteHasNoValue) {
   record.latency_s = std::numeric_limits<double>::infinity();
   EXPECT_TRUE(nlohmann::json::parse(json_line(record))["receive_time_s"].is_null());
   EXPECT_EQ(csv_line(record),
-            ",,,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,0,0.0,1000.0,1.0,0.0,\n");
+            ",,,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,,,,,,,,,,0.0,0,0.0,1000.0,"
+            "1.0,0.0,\n");
 }
 
 TEST(RecordFormat, NamesTheModes) {

@@ -1,0 +1,26 @@
+#pragma once
+// The endpoints of `alidade run`, as openapi.yaml describes them: what the LiveState and the pipeline know, as
+// JSON, Server-Sent Events and Prometheus text. Handlers run on the server's threads; nothing here reaches the
+// real-time thread.
+
+#include <functional>
+#include <string>
+
+#include "edge_app/output/http_server.h"
+#include "edge_app/output/live_state.h"
+#include "edge_app/pipeline/pipeline.h"
+
+namespace alidade {
+
+struct HttpApiSources {
+  LiveState* live = nullptr;
+  std::function<PipelineSummary()> summary;
+  std::string version;
+  std::string camera;            // the video source's name, without a password
+  bool latency_measured = true;  // false for a recording
+};
+
+// Borrows *sources.live, and calls the functions, until the server has stopped.
+void add_api_routes(HttpServer* server, const HttpApiSources& sources);
+
+}  // namespace alidade

@@ -1,0 +1,204 @@
+#include "edge_app/output/live_state.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <random>
+
+#include "edge_app/output/record_format.h"
+#include "platform/system/clock.h"
+
+namespace alidade {
+namespace {
+
+std::string make_start_id() {
+  std::random_device random;
+  return fmt::format("{:08x}{:08x}", random(), random());
+}
+
+bool same(const PlainCalibration& a, const PlainCalibration& b) {
+  return a.focal_length == b.focal_length && a.aspect == b.aspect &&
+         a.radial_distortion == b.radial_distortion && a.line_delay == b.line_delay &&
+         a.pan_axis == b.pan_axis && a.tilt_axis == b.tilt_axis && a.pan_scale == b.pan_scale &&
+         a.tilt_scale == b.tilt_scale && a.clock_offset == b.clock_offset && a.zoom == b.zoom &&
+         a.covariance == b.covariance;
+}
+
+}  // namespace
+
+LiveState::LiveState(const LiveStateOptions& options)
+    : options_(options), start_id_(make_start_id()), started_s_(monotonic_now_s()) {}
+
+bool LiveState::write(const OrientationRecord& record) {
+  std::shared_ptr<const std::string> line;
+  bool followed = false;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    followed = !readers_.empty();
+  }
+  if (followed) {
+    std::string text = json_line(record);
+    text.pop_back();  // the line feed
+    line = std::make_shared<const std::string>(std::move(text));
+  }
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!newest_ || !same(newest_->camera, record.camera)) calibration_since_s_ = monotonic_now_s();
+    newest_ = record;
+    if (record.orientation) newest_oriented_ = record;
+    if (record.frame && record.time_s) keep(record);
+    add_to_history(record);
+    ++last_id_;
+    if (line == nullptr) {
+      // Nobody reads yet, or the first reader came only now: it begins with the next record.
+      lines_.clear();
+      for (Reader* reader : readers_) reader->next_ = last_id_ + 1;
+    } else {
+      lines_.push_back(std::move(line));
+      if (lines_.size() > options_.max_lines) lines_.pop_front();
+    }
+  }
+  news_.notify_all();
+  return true;
+}
+
+void LiveState::keep(const OrientationRecord& record) {
+  // Another recording, or a clock that began anew: older frames would be found at the wrong times.
+  if (!kept_.empty() && *record.time_s < *kept_.back().time_s) kept_.clear();
+  kept_.push_back(record);
+  while (kept_.size() > options_.max_kept ||
+         *kept_.front().time_s < *record.time_s - options_.kept_s)
+    kept_.pop_front();
+}
+
+void LiveState::add_to_history(const OrientationRecord& record) {
+  const double time_s = record.time_s.value_or(record.receive_time_s);
+  const auto& latency_s = record.latency_s;
+  if (!history_.empty() && time_s < history_.back().time_s) history_.clear();
+  if (!history_.empty() && time_s < history_.back().time_s + options_.history_step_s) {
+    auto& longest_s = history_.back().latency_s;
+    if (latency_s) longest_s = std::max(longest_s.value_or(0), *latency_s);
+    return;
+  }
+  HistorySample sample;
+  sample.time_s = time_s;
+  sample.mode = record.mode;
+  if (record.orientation) {
+    sample.pan_rad = record.orientation->pan_rad;
+    sample.tilt_rad = record.orientation->tilt_rad;
+  }
+  sample.landmarks = record.landmarks;
+  sample.latency_s = latency_s;
+  history_.push_back(sample);
+  while (history_.front().time_s < time_s - options_.history_s) history_.pop_front();
+}
+
+std::optional<OrientationRecord> LiveState::newest() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return newest_;
+}
+
+std::optional<OrientationRecord> LiveState::newest_oriented() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return newest_oriented_;
+}
+
+FrameSearch LiveState::find(std::int64_t frame, OrientationRecord* record) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (kept_.empty()) return FrameSearch::kNoneYet;
+  const auto found = std::find_if(kept_.rbegin(), kept_.rend(),
+                                  [frame](const auto& one) { return *one.frame == frame; });
+  if (found == kept_.rend()) return FrameSearch::kNotKept;
+  *record = *found;
+  return FrameSearch::kFound;
+}
+
+FrameSearch LiveState::find_at(double time_s, OrientationRecord* record) const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (kept_.empty()) return FrameSearch::kNoneYet;
+  const auto time_of = [this](std::size_t i) { return *kept_[i].time_s; };
+  const auto after = std::partition_point(
+      kept_.begin(), kept_.end(), [time_s](const auto& one) { return *one.time_s < time_s; });
+  auto nearest = static_cast<std::size_t>(after - kept_.begin());
+  if (nearest == kept_.size() ||
+      (nearest > 0 && time_s - time_of(nearest - 1) < time_of(nearest) - time_s))
+    --nearest;
+  double period_s = std::numeric_limits<double>::infinity();
+  if (nearest > 0) period_s = time_of(nearest) - time_of(nearest - 1);
+  if (nearest + 1 < kept_.size())
+    period_s = std::min(period_s, time_of(nearest + 1) - time_of(nearest));
+  if (kept_.size() == 1) period_s = 0;
+  if (!(std::abs(time_s - time_of(nearest)) <= period_s / 2)) return FrameSearch::kNotKept;
+  *record = kept_[nearest];
+  return FrameSearch::kFound;
+}
+
+std::vector<HistorySample> LiveState::history() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return {history_.begin(), history_.end()};
+}
+
+std::optional<double> LiveState::calibration_since_s() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!newest_) return std::nullopt;
+  return calibration_since_s_;
+}
+
+void LiveState::close() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    closed_ = true;
+  }
+  news_.notify_all();
+}
+
+std::vector<ReaderCounters> LiveState::readers() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::vector<ReaderCounters> out;
+  for (const Reader* reader : readers_) out.push_back(reader->counters_);
+  return out;
+}
+
+std::int64_t LiveState::lost_by_readers() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  std::int64_t lost = lost_by_past_readers_;
+  for (const Reader* reader : readers_) lost += reader->counters_.lost;
+  return lost;
+}
+
+LiveState::Reader::Reader(LiveState* state) : state_(state) {
+  const std::lock_guard<std::mutex> lock(state_->mutex_);
+  next_ = state_->last_id_ + 1;
+  state_->readers_.push_back(this);
+}
+
+LiveState::Reader::~Reader() {
+  const std::lock_guard<std::mutex> lock(state_->mutex_);
+  state_->readers_.remove(this);
+  state_->lost_by_past_readers_ += counters_.lost;
+}
+
+LiveState::News LiveState::Reader::wait(double timeout_s) {
+  News news;
+  LiveState& state = *state_;
+  std::unique_lock<std::mutex> lock(state.mutex_);
+  state.news_.wait_for(lock, std::chrono::duration<double>(timeout_s),
+                       [&] { return state.closed_ || state.last_id_ >= next_; });
+  news.closed = state.closed_;
+  const std::int64_t oldest = state.last_id_ - static_cast<std::int64_t>(state.lines_.size()) + 1;
+  if (next_ < oldest) {
+    news.lost = oldest - next_;
+    counters_.lost += news.lost;
+    next_ = oldest;
+  }
+  while (next_ <= state.last_id_ && news.lines.size() < kBatch) {
+    news.lines.push_back({next_, state.lines_[static_cast<std::size_t>(next_ - oldest)]});
+    ++next_;
+  }
+  counters_.records += static_cast<std::int64_t>(news.lines.size());
+  return news;
+}
+
+}  // namespace alidade

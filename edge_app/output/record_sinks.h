@@ -1,0 +1,36 @@
+#pragma once
+// RecordSinks: each record to several sinks, one after the other. The end of one is the end of all.
+
+#include <vector>
+
+#include "edge_app/pipeline/orientation_record.h"
+
+namespace alidade {
+
+class RecordSinks final : public RecordSink {
+ public:
+  // Borrowed. Before the first record.
+  void add(RecordSink* sink) { sinks_.push_back(sink); }
+
+  [[nodiscard]] bool write(const OrientationRecord& record) override {
+    for (RecordSink* sink : sinks_) {
+      if (!sink->write(record)) {
+        ended_ = sink;
+        return false;
+      }
+    }
+    return true;
+  }
+  void interrupt() override {
+    for (RecordSink* sink : sinks_) sink->interrupt();
+  }
+  [[nodiscard]] std::string error() const override {
+    return ended_ == nullptr ? "" : ended_->error();
+  }
+
+ private:
+  std::vector<RecordSink*> sinks_;
+  RecordSink* ended_ = nullptr;
+};
+
+}  // namespace alidade

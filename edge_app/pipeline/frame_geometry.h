@@ -1,0 +1,51 @@
+#pragma once
+// FrameGeometry: all that gives any pixel of a frame a direction, and back, with covariance: the numbers of a
+// FrameOrientation, and PlainCalibration those of a Calibration, as they cross the queue to the output thread by
+// value. Eigen's matrices are not trivially copyable; matrices are stored row by row here.
+// Units, frames and meaning: frame_orientation.h, calibration.h. Packing allocates nothing.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <type_traits>
+
+#include "core/realtime/frame_orientation.h"
+
+namespace alidade {
+
+struct PlainCalibration {
+  double focal_length = 0;
+  double aspect = 1;
+  double radial_distortion = 0;
+  std::int32_t width = 0;
+  std::int32_t height = 0;
+  double line_delay = 0;
+  std::array<double, 3> pan_axis{0, 0, 1};
+  std::array<double, 3> tilt_axis{0, 1, 0};
+  double pan_scale = 1;
+  double tilt_scale = 1;
+  double clock_offset = 0;
+  std::optional<double> zoom;
+  std::array<double, kParameterCount * kParameterCount> covariance{};
+};
+
+struct FrameGeometry {
+  OrientationMode mode = OrientationMode::kNone;
+  PanTilt<double> angle;  // true, not wrapped
+  PanTilt<double> rate;
+  PanTilt<double> acceleration;
+  std::array<double, 36> motion_covariance{};
+  std::array<double, 6 * kParameterCount> motion_sensitivity{};
+};
+static_assert(std::is_trivially_copyable_v<PlainCalibration> &&
+              std::is_trivially_copyable_v<FrameGeometry>);
+
+[[nodiscard]] PlainCalibration pack(const Calibration& calibration);
+[[nodiscard]] FrameGeometry pack(const FrameOrientation& frame);
+
+[[nodiscard]] Calibration unpack(const PlainCalibration& calibration);
+// What direction() and pixel() need; the other members are as in a new FrameOrientation.
+[[nodiscard]] FrameOrientation unpack(const FrameGeometry& geometry,
+                                      const PlainCalibration& calibration);
+
+}  // namespace alidade
