@@ -161,6 +161,7 @@ struct SelfCalibration::State {
   State(const SelfCalibrationOptions& o, CalibrationArchive* a) : options(o), archive(a) {}
 
   void begin_anew();
+  void begin_fresh();
   void look_for_stored();
   void judge_agreement(const FrameTracks& tracks);
   [[nodiscard]] bool zoom_fits(const std::optional<double>& wanted) const;
@@ -212,6 +213,8 @@ struct SelfCalibration::State {
   CalibrationNeed need = CalibrationNeed::kNothing;
   double last_store_s = 0;
   std::atomic<bool> cancelled{false};
+  std::atomic<bool> fresh_asked{false};
+  bool fresh_wanted = false;  // a calibration in place of the one there is
   std::string said;
   std::vector<std::string> messages;
 };
@@ -220,6 +223,11 @@ void SelfCalibration::State::say_once(const std::string& line) {
   if (line == said) return;
   said = line;
   messages.push_back(line);
+}
+
+void SelfCalibration::State::begin_fresh() {
+  begin_anew();
+  fresh_wanted = calibrated_here();
 }
 
 void SelfCalibration::State::begin_anew() {
@@ -255,6 +263,7 @@ void SelfCalibration::State::look_for_stored() {
   found->name = stored->path.empty() ? "live" : stored->path;
   messages.push_back(fmt::format("zoom {}: the calibration {} holds", *zoom, found->name));
   published = next = found;
+  fresh_wanted = false;
   doubtful = false;
   contradictions = 0;
   // Which connection it was made with is not known.
@@ -294,7 +303,7 @@ bool SelfCalibration::State::adjusting_is_due() const {
   if (!options.automatic || frames.size() < 3 || now_s < zoom_changed_s + kZoomSettles)
     return false;
   const double newest_s = frames.back().stamp.receive_time_s;
-  if (!calibrated_here()) {
+  if (!calibrated_here() || fresh_wanted) {
     return span_s() >= options.first_try_s &&
            (tries == 0 || newest_s >= last_try_s + (tries < kManyTries ? kNextTry : kSlowTry));
   }
@@ -498,10 +507,12 @@ void SelfCalibration::State::publish(const Checked& checked) {
   doubtful = false;
   contradictions = 0;
   clock_offset_known = true;
+  fresh_wanted = false;
   said.clear();
   need = CalibrationNeed::kNothing;
 }
 
+// Without what an earlier calibration says.
 void SelfCalibration::State::try_first() {
   ++tries;
   const Checked checked = adjust(nullptr);
@@ -514,8 +525,9 @@ void SelfCalibration::State::try_first() {
   if (checked.result.status == CalibrationStatus::kOneAxisOnly) {
     need = checked.refusal.rfind("pan", 0) == 0 ? CalibrationNeed::kPan : CalibrationNeed::kTilt;
   }
-  say_once(fmt::format("not calibrated yet ({}): {}", to_string(checked.result.status),
-                       checked.refusal));
+  say_once(fmt::format("{} ({}): {}",
+                       fresh_wanted ? "no fresh calibration yet" : "not calibrated yet",
+                       to_string(checked.result.status), checked.refusal));
 }
 
 void SelfCalibration::State::hold_against_published() {
@@ -580,6 +592,7 @@ void SelfCalibration::add(const FrameTracks& tracks) {
     s.begin_anew();
     s.tracker = tracks.tracker;
   }
+  if (s.fresh_asked.exchange(false)) s.begin_fresh();
   if (s.frames.empty()) {
     s.began_s = tracks.stamp.receive_time_s;
     s.last_try_s = s.began_s;
@@ -660,6 +673,12 @@ void SelfCalibration::add(const PanTiltSample& sample) {
 void SelfCalibration::video_lost() { state_->video_is_lost = true; }
 void SelfCalibration::telemetry_lost() { state_->telemetry_is_lost = true; }
 
+bool SelfCalibration::ask_for_fresh() {
+  if (!state_->options.automatic) return false;
+  state_->fresh_asked = true;
+  return true;
+}
+
 void SelfCalibration::cancel() { state_->cancelled = true; }
 
 bool SelfCalibration::due() const { return state_->storing_is_due() || state_->adjusting_is_due(); }
@@ -673,7 +692,7 @@ std::shared_ptr<const PublishedCalibration> SelfCalibration::work() {
   }
   if (s.adjusting_is_due()) {
     s.last_try_s = s.frames.back().stamp.receive_time_s;
-    if (s.calibrated_here()) {
+    if (s.calibrated_here() && !s.fresh_wanted) {
       s.hold_against_published();
     } else {
       s.try_first();
@@ -689,7 +708,7 @@ CalibrationReport SelfCalibration::report() const {
   report.activity = s.calibrated_here() ? CalibrationActivity::kWatching
                     : s.doubtful        ? CalibrationActivity::kDoubtful
                                         : CalibrationActivity::kCollecting;
-  if (s.calibrated_here()) return report;
+  if (s.calibrated_here() && !s.fresh_wanted) return report;
   if (s.video_is_lost || s.last_frame_s < s.now_s - kSilence) {
     report.need = CalibrationNeed::kVideo;
   } else if (s.telemetry_is_lost || s.last_sample_s < s.now_s - kSilence) {

@@ -64,6 +64,10 @@ class SelfCalibration {
   [[nodiscard]] std::shared_ptr<const PublishedCalibration> work();
 
   [[nodiscard]] CalibrationReport report() const;
+  // Thread-safe: asks for a calibration of the motion from now on, which takes the place of the one there is
+  // as soon as it passes the checks of a first one. False: nothing is calibrated here.
+  [[nodiscard]] bool ask_for_fresh();
+
   // Thread-safe: work() that is under way, and all later, ends soon with nothing.
   void cancel();
   // Lines for the log since the last call: what was found, why something was refused.

@@ -172,6 +172,7 @@ TEST(SelfCalibration, HearsNothingWhileItIsNotAutomatic) {
   SelfCalibration calibration(options, nullptr);
   EXPECT_THAT(feed(&calibration, s, {}), IsEmpty());
   EXPECT_EQ(calibration.report().activity, CalibrationActivity::kOff);
+  EXPECT_FALSE(calibration.ask_for_fresh());
 }
 
 struct Unsuitable {
@@ -249,6 +250,47 @@ TEST(SelfCalibration, LaterMotionRefinesWhatIsKnown) {
   const Calibration& after = refined.back().calibration->calibration;
   expect_truth(s, after);
   EXPECT_LT(after.covariance(0, 0), before.covariance(0, 0));
+}
+
+TEST(SelfCalibration, MakesAFreshCalibrationOfTheMotionSinceItWasAskedFor) {
+  const test::Simulation s = camera();
+  const SelfCalibrationOptions options = options_for(s);
+  SelfCalibration calibration(options, nullptr);
+  ASSERT_FALSE(feed(&calibration, s, {}).empty());
+  ASSERT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
+  // So little that it would only be watched, for long.
+  test::Simulation turned = s;
+  turned.pan_axis = (s.pan_axis + Eigen::Vector3d(0, 0.005, 0)).normalized();
+  EXPECT_TRUE(calibration.ask_for_fresh());
+  const auto published = feed(
+      &calibration, turned,
+      {FrameTracks::Tracker::kOe, {}, 20, false, std::numeric_limits<double>::infinity(), 1000});
+  ASSERT_FALSE(published.empty());
+  EXPECT_GE(published[0].time_s, options.first_try_s);
+  EXPECT_LT(published[0].time_s, 12);  // of motion, from when on it is held against the old one
+  expect_truth(turned, published[0].calibration->calibration);
+  EXPECT_EQ(calibration.report().need, CalibrationNeed::kNothing);
+}
+
+TEST(SelfCalibration, KeepsTheOldCalibrationUntilTheFreshOneIsThereAndSaysWhatThatNeeds) {
+  const test::Simulation s = camera();
+  SelfCalibration calibration(options_for(s), nullptr);
+  ASSERT_FALSE(feed(&calibration, s, {}).empty());
+  static_cast<void>(calibration.take_messages());
+  EXPECT_TRUE(calibration.ask_for_fresh());
+  test::Simulation still = s;
+  still.path = [](double) { return Eigen::Vector2d(0.1, 0.05); };
+  EXPECT_THAT(feed(&calibration, still,
+                   {FrameTracks::Tracker::kOe,
+                    {},
+                    20,
+                    false,
+                    std::numeric_limits<double>::infinity(),
+                    1000}),
+              IsEmpty());
+  EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
+  EXPECT_EQ(calibration.report().need, CalibrationNeed::kMotion);
+  EXPECT_THAT(calibration.take_messages(), Contains(HasSubstr("no fresh calibration yet")));
 }
 
 // Where in its interval a device answers, it does so in every poll, however many there are.
