@@ -18,6 +18,8 @@ class LatencyHistogram {
         std::ceil(std::log(std::max(seconds, kLowest) / kLowest) / std::log(kGrowth));
     ++counts_[static_cast<std::size_t>(std::min(bucket, static_cast<double>(kBuckets - 1)))];
     ++total_;
+    sum_s_ += seconds;
+    longest_s_ = std::max(longest_s_, seconds);
   }
 
   // Upper edge of the bucket that holds the quantile, s; 0 if nothing was added.
@@ -30,15 +32,28 @@ class LatencyHistogram {
       seen += counts_[bucket];
       if (static_cast<double>(seen) >= wanted) break;
     }
+    return upper_edge_s(bucket);
+  }
+
+  // 0 if nothing was added.
+  [[nodiscard]] double longest_s() const { return longest_s_; }
+  [[nodiscard]] double sum_s() const { return sum_s_; }
+  [[nodiscard]] std::int64_t total() const { return total_; }
+
+  static constexpr std::size_t kBuckets = 384;
+  [[nodiscard]] std::int64_t count(std::size_t bucket) const { return counts_[bucket]; }
+  // What a bucket holds is no longer; but for the last one, which holds all the rest.
+  [[nodiscard]] static double upper_edge_s(std::size_t bucket) {
     return kLowest * std::pow(kGrowth, static_cast<double>(bucket));
   }
 
  private:
-  static constexpr std::size_t kBuckets = 384;
   static constexpr double kLowest = 1e-6;
   static constexpr double kGrowth = 1.05;
   std::array<std::int64_t, kBuckets> counts_{};
   std::int64_t total_ = 0;
+  double sum_s_ = 0;
+  double longest_s_ = 0;
 };
 
 }  // namespace alidade

@@ -62,9 +62,14 @@ void Pipeline::stop() {
 PipelineSummary Pipeline::summary() const {
   std::unique_lock<std::mutex> lock(summary_mutex_);
   PipelineSummary summary = summary_;
+  summary.page_faults = page_faults_;
   lock.unlock();
   summary.drops = stage_.drops();
-  summary.page_faults = page_faults_;
+  if (const int thread = realtime_thread_.load(std::memory_order_acquire); thread != 0) {
+    const PageFaults now = page_faults_of(thread);
+    summary.page_faults = {std::max(0L, now.minor - faults_at_start_.minor),
+                           std::max(0L, now.major - faults_at_start_.major)};
+  }
   return summary;
 }
 
@@ -140,12 +145,16 @@ void Pipeline::run_realtime() {
   const RealtimeReport report = apply_realtime(options_.realtime);
   spdlog::log(report.warnings.empty() ? spdlog::level::info : spdlog::level::warn,
               "real-time thread: {}", report.line());
-  const PageFaults at_start = thread_page_faults();
+  faults_at_start_ = thread_page_faults();
+  realtime_thread_.store(this_thread(), std::memory_order_release);
   do {
     stage_.wait();
   } while (stage_.process());
   const PageFaults at_end = thread_page_faults();
-  page_faults_ = {at_end.minor - at_start.minor, at_end.major - at_start.major};
+  realtime_thread_.store(0, std::memory_order_release);
+  // Nothing is in a hurry any more.
+  const std::lock_guard<std::mutex> lock(summary_mutex_);
+  page_faults_ = {at_end.minor - faults_at_start_.minor, at_end.major - faults_at_start_.major};
 }
 
 void Pipeline::feed_calibration() {

@@ -77,7 +77,7 @@ class Pipeline {
 
   // After stop(): why it failed, one line; empty if it did not.
   [[nodiscard]] const std::string& error() const { return error_; }
-  // Any thread, at any time: what has come so far. page_faults: after stop().
+  // Any thread, at any time: what has come so far.
   [[nodiscard]] PipelineSummary summary() const;
 
  private:
@@ -108,8 +108,10 @@ class Pipeline {
   std::string error_;                 // real-time thread
   mutable std::mutex summary_mutex_;  // the real-time thread does not take it
   PipelineSummary summary_;
-  PageFaults page_faults_;     // real-time thread
-  DropCounters drops_logged_;  // output thread
+  PageFaults page_faults_;               // real-time thread, at its end
+  PageFaults faults_at_start_;           // real-time thread, before it says its number
+  std::atomic<int> realtime_thread_{0};  // 0: not running
+  DropCounters drops_logged_;            // output thread
   double drops_logged_at_s_ = 0;
   std::vector<std::thread> threads_;
 };

@@ -5,10 +5,14 @@
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
+#include <sys/syscall.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
+#include <fstream>
+#include <sstream>
 
 namespace alidade {
 namespace {
@@ -141,5 +145,21 @@ PageFaults thread_page_faults() {
   if (getrusage(RUSAGE_THREAD, &usage) != 0) return {};
   return {usage.ru_minflt, usage.ru_majflt};
 }
+
+PageFaults page_faults_of(int thread) {
+  std::ifstream file("/proc/self/task/" + std::to_string(thread) + "/stat");
+  std::string line;
+  std::getline(file, line);
+  // What follows the name, which is in parentheses and may hold blanks: state, six more, minflt, cminflt, majflt.
+  std::istringstream words(line.substr(std::min(line.size(), line.rfind(')') + 1)));
+  std::string skipped;
+  for (int i = 0; i < 7; ++i) words >> skipped;
+  PageFaults faults;
+  long of_children = 0;
+  words >> faults.minor >> of_children >> faults.major;
+  return words ? faults : PageFaults{};
+}
+
+int this_thread() { return static_cast<int>(::syscall(SYS_gettid)); }
 
 }  // namespace alidade

@@ -44,5 +44,8 @@ struct PageFaults {
   long major = 0;  // it had to be read
 };
 [[nodiscard]] PageFaults thread_page_faults();
+// Of another thread of this process, by its number; zeros once it has ended.
+[[nodiscard]] PageFaults page_faults_of(int thread);
+[[nodiscard]] int this_thread();
 
 }  // namespace alidade

@@ -16,6 +16,19 @@ TEST(LatencyHistogram, GivesQuantilesToFivePercent) {
   EXPECT_LE(histogram.quantile(0.99), 9.9e-3 * 1.05);
 }
 
+TEST(LatencyHistogram, CountsWhatIsNoLongerThanABucketsEdge) {
+  LatencyHistogram histogram;
+  for (const double seconds : {0.0, 1e-6, 1.04e-6, 1.06e-6, 0.02}) histogram.add(seconds);
+  EXPECT_EQ(histogram.count(0), 2);
+  EXPECT_EQ(histogram.count(1), 1);
+  EXPECT_EQ(histogram.count(2), 1);
+  EXPECT_EQ(LatencyHistogram::upper_edge_s(0), 1e-6);
+  EXPECT_NEAR(LatencyHistogram::upper_edge_s(2), 1.05 * 1.05e-6, 1e-15);
+  EXPECT_EQ(histogram.total(), 5);
+  EXPECT_NEAR(histogram.sum_s(), 0.0200031, 1e-12);
+  EXPECT_EQ(histogram.longest_s(), 0.02);
+}
+
 TEST(LatencyHistogram, KeepsValuesBeyondItsRangeInTheEndBuckets) {
   LatencyHistogram histogram;
   histogram.add(-1);
