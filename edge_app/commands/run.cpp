@@ -182,6 +182,10 @@ int run(const RunOptions& options) {
   HttpApiSources sources;
   sources.live = &live;
   sources.summary = [&pipeline] { return pipeline.summary(); };
+  sources.video_losses = [&video] { return video->counters(); };
+  sources.ask_for_calibration = [&calibrating] {
+    return calibrating.calibration && calibrating.calibration->ask_for_fresh();
+  };
   sources.version = ALIDADE_VERSION;
   sources.camera = video->name();
   sources.latency_measured = of_pipeline.measure_latency;

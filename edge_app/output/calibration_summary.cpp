@@ -7,6 +7,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "edge_app/output/calibration_json.h"
+
 namespace alidade {
 namespace {
 
@@ -123,28 +125,10 @@ std::string summary_text(const CalibrationResult& result, const CalibrationOptio
 std::string summary_json(const CalibrationResult& result, const CalibrationOptions& options,
                          const std::vector<std::pair<std::string, std::string>>& files) {
   using nlohmann::ordered_json;
-  const Calibration& c = result.calibration;
   ordered_json json;
   json["status"] = to_string(result.status);
   json["message"] = result.message;
-  ordered_json& parameters = json["calibration"];
-  const auto scalar = [&](Parameter parameter, double value) {
-    parameters[to_string(parameter)] = {{"value", value}, {"sigma", sigma_of(c, parameter)}};
-  };
-  const auto axis = [&](const char* name, const Vector3<double>& value, Parameter first) {
-    parameters[name] = {
-        {"value", {value.x(), value.y(), value.z()}},
-        {"sigma", {sigma_of(c, first), sigma_of(c, static_cast<Parameter>(index(first) + 1))}}};
-  };
-  scalar(Parameter::kFocalLength, c.camera.focal_length);
-  scalar(Parameter::kAspect, c.camera.aspect);
-  scalar(Parameter::kRadialDistortion, c.camera.radial_distortion);
-  scalar(Parameter::kLineDelay, c.line_delay);
-  axis("pan_axis", c.mechanics.pan_axis, Parameter::kPanAxis0);
-  axis("tilt_axis", c.mechanics.tilt_axis, Parameter::kTiltAxis0);
-  scalar(Parameter::kPanScale, c.mechanics.pan_scale);
-  scalar(Parameter::kTiltScale, c.mechanics.tilt_scale);
-  scalar(Parameter::kClockOffset, c.clock_offset);
+  json["calibration"] = parameters_json(result.calibration);
   for (const auto& [name, prior] : stated_priors(options)) {
     json["priors"][name] = {{"value", prior.value}, {"sigma", prior.sigma}};
   }

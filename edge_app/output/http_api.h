@@ -9,12 +9,16 @@
 #include "edge_app/output/http_server.h"
 #include "edge_app/output/live_state.h"
 #include "edge_app/pipeline/pipeline.h"
+#include "platform/video/frame_source.h"
 
 namespace alidade {
 
 struct HttpApiSources {
   LiveState* live = nullptr;
   std::function<PipelineSummary()> summary;
+  std::function<FrameSourceCounters()> video_losses;
+  // False: nothing is calibrated here.
+  std::function<bool()> ask_for_calibration;
   std::string version;
   std::string camera;            // the video source's name, without a password
   bool latency_measured = true;  // false for a recording

@@ -217,10 +217,10 @@ class Pieces final : public HttpStream {
 // As many requests as have been earned since the last, at most a second's worth.
 class RateLimit {
  public:
-  explicit RateLimit(double per_s) : per_s_(per_s), left_(per_s) {}
+  explicit RateLimit(double per_s) : per_s_(per_s), most_(std::max(1.0, per_s)), left_(most_) {}
   bool take(double now_s) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    left_ = std::min(per_s_, left_ + per_s_ * std::max(0.0, now_s - last_s_));
+    left_ = std::min(most_, left_ + per_s_ * std::max(0.0, now_s - last_s_));
     last_s_ = now_s;
     if (left_ < 1) return false;
     left_ -= 1;
@@ -230,6 +230,7 @@ class RateLimit {
  private:
   std::mutex mutex_;
   const double per_s_;
+  const double most_;
   double left_;
   double last_s_ = 0;
 };
@@ -246,8 +247,9 @@ bool is_token(const std::string& given, const std::string& token) {
 
 // "host:8080" -> "host", "[::1]:8080" -> "::1"
 std::string host_of(const std::string& header) {
-  if (!header.empty() && header.front() == '[')
-    return header.substr(1, header.find(']') == std::string::npos ? 0 : header.find(']') - 1);
+  const std::size_t closing = header.find(']');
+  if (!header.empty() && header.front() == '[' && closing != std::string::npos)
+    return header.substr(1, closing - 1);
   return header.substr(0, header.find(':'));
 }
 
@@ -367,11 +369,6 @@ class HttpServer::Impl final : public httplib::Server {
     for (const int socket : waiting_) ::close(socket);
     waiting_.clear();
     listening_.reset(-1);
-  }
-
-  [[nodiscard]] bool is_stopping() const {
-    pollfd stopping{stopping_.get(), POLLIN, 0};
-    return ::poll(&stopping, 1, 0) > 0;
   }
 
   [[nodiscard]] HttpCounters counters() const {
@@ -506,7 +503,12 @@ class HttpServer::Impl final : public httplib::Server {
       const int socket = waiting_.front();
       waiting_.pop_front();
       lock.unlock();
-      serve(socket);
+      // What is thrown beyond a handler, as where memory has run out, ends this connection and nothing else.
+      try {
+        serve(socket);
+      } catch (const std::exception& e) {
+        spdlog::error("HTTP: connection dropped: {}", e.what());
+      }
       ::close(socket);
       lock.lock();
       --connections_;
@@ -532,6 +534,9 @@ class HttpServer::Impl final : public httplib::Server {
           // Neither compressed answers nor forms and multipart bodies, which the library would take apart.
           request.headers.erase("Accept-Encoding");
           request.headers.erase("Content-Type");
+          // Without a length there is no body; the library would wait for the connection's end.
+          if (!request.has_header("Content-Length") && !request.has_header("Transfer-Encoding"))
+            request.set_header("Content-Length", "0");
         });
         serving_ = nullptr;
         break;
@@ -603,8 +608,9 @@ class HttpServer::Impl final : public httplib::Server {
 
   // A token cannot be had by a page of another site, whatever name that site takes.
   [[nodiscard]] bool host_is_trusted(const httplib::Request& request) const {
-    const std::string host = host_of(request.get_header_value("Host"));
-    return !options_.token.empty() || host.empty() || host == "localhost" ||
+    const std::string header = request.get_header_value("Host");
+    const std::string host = host_of(header);
+    return !options_.token.empty() || header.empty() || host == "localhost" ||
            host == options_.host || is_address(host);
   }
 
@@ -615,7 +621,7 @@ class HttpServer::Impl final : public httplib::Server {
       return http_error(403, "a page of another site may not ask this");
     if (request.has_header("Transfer-Encoding") ||
         request.get_header_value_count("Content-Length") != 1)
-      return http_error(411, "the request must tell its Content-Length, once");
+      return http_error(411, "the request must tell the length of its body, once");
     if (request.has_header("Content-Encoding"))
       return http_error(415, "the body must not be compressed");
     const std::string length = request.get_header_value("Content-Length");
@@ -709,7 +715,6 @@ bool HttpServer::start(std::string* error) { return impl_->start(error); }
 std::string HttpServer::address() const { return impl_->address(); }
 void HttpServer::stop() { impl_->stop(); }
 void HttpServer::set_on_stop(std::function<void()> on_stop) { impl_->on_stop = std::move(on_stop); }
-bool HttpServer::stopping() const { return impl_->is_stopping(); }
 HttpCounters HttpServer::counters() const { return impl_->counters(); }
 
 }  // namespace alidade

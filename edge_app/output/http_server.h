@@ -32,7 +32,7 @@ struct HttpLimits {
   double head_timeout_s = 5;
   double body_timeout_s = 10;
   double write_timeout_s = 10;
-  double requests_per_s = 200;
+  double requests_per_s = 500;
 };
 
 struct HttpServerOptions {
@@ -106,7 +106,6 @@ class HttpServer {
   // Ends all connections and waits for their handlers. on_stop is called first, to wake handlers that wait.
   void stop();
   void set_on_stop(std::function<void()> on_stop);
-  [[nodiscard]] bool stopping() const;
 
   [[nodiscard]] HttpCounters counters() const;
 

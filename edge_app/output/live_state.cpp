@@ -154,17 +154,27 @@ void LiveState::close() {
   news_.notify_all();
 }
 
+std::int64_t LiveState::oldest_line() const {
+  return last_id_ - static_cast<std::int64_t>(lines_.size()) + 1;
+}
+
+ReaderCounters LiveState::counters_of(const Reader& reader) const {
+  ReaderCounters counters = reader.counters_;
+  counters.lost += std::max<std::int64_t>(0, oldest_line() - reader.next_);
+  return counters;
+}
+
 std::vector<ReaderCounters> LiveState::readers() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::vector<ReaderCounters> out;
-  for (const Reader* reader : readers_) out.push_back(reader->counters_);
+  for (const Reader* reader : readers_) out.push_back(counters_of(*reader));
   return out;
 }
 
 std::int64_t LiveState::lost_by_readers() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   std::int64_t lost = lost_by_past_readers_;
-  for (const Reader* reader : readers_) lost += reader->counters_.lost;
+  for (const Reader* reader : readers_) lost += counters_of(*reader).lost;
   return lost;
 }
 
@@ -177,7 +187,7 @@ LiveState::Reader::Reader(LiveState* state) : state_(state) {
 LiveState::Reader::~Reader() {
   const std::lock_guard<std::mutex> lock(state_->mutex_);
   state_->readers_.remove(this);
-  state_->lost_by_past_readers_ += counters_.lost;
+  state_->lost_by_past_readers_ += state_->counters_of(*this).lost;
 }
 
 LiveState::News LiveState::Reader::wait(double timeout_s) {
@@ -187,7 +197,7 @@ LiveState::News LiveState::Reader::wait(double timeout_s) {
   state.news_.wait_for(lock, std::chrono::duration<double>(timeout_s),
                        [&] { return state.closed_ || state.last_id_ >= next_; });
   news.closed = state.closed_;
-  const std::int64_t oldest = state.last_id_ - static_cast<std::int64_t>(state.lines_.size()) + 1;
+  const std::int64_t oldest = state.oldest_line();
   if (next_ < oldest) {
     news.lost = oldest - next_;
     counters_.lost += news.lost;

@@ -40,7 +40,7 @@ struct HistorySample {
   std::optional<double> latency_s;  // the longest of the step
 };
 
-// What a reader has had so far.
+// What a reader has had so far; lost is also what it has not yet been told of.
 struct ReaderCounters {
   std::int64_t records = 0;
   std::int64_t lost = 0;
@@ -107,6 +107,8 @@ class LiveState final : public RecordSink {
   [[nodiscard]] std::int64_t lost_by_readers() const;
 
  private:
+  [[nodiscard]] std::int64_t oldest_line() const;  // id
+  [[nodiscard]] ReaderCounters counters_of(const Reader& reader) const;
   void keep(const OrientationRecord& record);
   void add_to_history(const OrientationRecord& record);
 

@@ -53,8 +53,48 @@ TEST_F(ConfigTest, MinimalConfigurationHasTheDocumentedDefaults) {
   EXPECT_EQ(config_.realtime.priority, 0);
   EXPECT_EQ(config_.realtime.cpu, -1);
   EXPECT_FALSE(config_.realtime.lock_memory);
-  EXPECT_EQ(config_.output, OutputFormat::kJson);
+  EXPECT_EQ(config_.output.stdout_format, OutputFormat::kJson);
+  EXPECT_FALSE(config_.output.http);
   EXPECT_THAT(config_.warnings, IsEmpty());
+}
+
+TEST_F(ConfigTest, TheHttpServerHasAnAddressAndATokenFromElsewhere) {
+  const std::string minimal = kMinimal;
+  ASSERT_THAT(load(minimal + "output: {http: '127.0.0.1:8080'}\n"), IsEmpty());
+  EXPECT_EQ(config_.output.http->host, "127.0.0.1");
+  EXPECT_EQ(config_.output.http->port, 8080);
+  EXPECT_EQ(config_.output.http->token, "");
+  EXPECT_EQ(config_.output.stdout_format, OutputFormat::kJson);
+  EXPECT_THAT(config_.warnings, IsEmpty());
+  ASSERT_THAT(load(minimal + "output: {http: '[::1]:0', json: false}\n"), IsEmpty());
+  EXPECT_EQ(config_.output.http->host, "::1");
+  EXPECT_EQ(config_.output.http->port, 0);
+  EXPECT_FALSE(config_.output.stdout_format);
+  ::setenv("ALIDADE_TEST_TOKEN", "right-horse", 1);
+  ASSERT_THAT(load(minimal + "output: {http: '0.0.0.0:80', token_env: ALIDADE_TEST_TOKEN}\n"),
+              IsEmpty());
+  EXPECT_EQ(config_.output.http->token, "right-horse");
+  EXPECT_THAT(config_.warnings, IsEmpty());
+  directory_.write("token", " other-horse \nignored\n");
+  ASSERT_THAT(load(minimal + "output: {http: 'camera:80', token_file: token, csv: true}\n"),
+              IsEmpty());
+  EXPECT_EQ(config_.output.http->token, "other-horse");
+  EXPECT_EQ(config_.output.stdout_format, OutputFormat::kCsv);
+}
+
+TEST_F(ConfigTest, WarnsOfAnHttpServerThatIsOpenToAll) {
+  ASSERT_THAT(load(std::string(kMinimal) + "output: {http: '0.0.0.0:8080'}\n"), IsEmpty());
+  ASSERT_EQ(config_.warnings.size(), 1U);
+  EXPECT_THAT(config_.warnings[0],
+              HasSubstr(":4: output.http: listens to other machines without a token"));
+}
+
+TEST_F(ConfigTest, DoesNotRepeatATokenThatIsOfNoUse) {
+  ::setenv("ALIDADE_TEST_TOKEN", "short", 1);
+  const std::string error = load(std::string(kMinimal) +
+                                 "output: {http: '127.0.0.1:0', token_env: ALIDADE_TEST_TOKEN}\n");
+  EXPECT_THAT(error, HasSubstr("gives no token that can be used"));
+  EXPECT_THAT(error, ::testing::Not(HasSubstr("short")));
 }
 
 // load() itself wants one line.
@@ -114,7 +154,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.realtime.cpu, 3);
   EXPECT_TRUE(config_.realtime.lock_memory);
   EXPECT_EQ(config_.realtime.max_extrapolation_s, 0.5);
-  EXPECT_EQ(config_.output, OutputFormat::kCsv);
+  EXPECT_EQ(config_.output.stdout_format, OutputFormat::kCsv);
 }
 
 TEST_F(ConfigTest, WidthWithoutHeightIsRefused) {
@@ -388,8 +428,26 @@ INSTANTIATE_TEST_SUITE_P(
                 ":2: pan_tilt.pan_positive", "expected one of right, left"},
         Mistake{"UnknownMode", MINIMAL "realtime: {mode: OF}\n", ":4: realtime.mode",
                 "'OF' is unknown; expected one of OE, PT"},
-        Mistake{"PlannedHttp", MINIMAL "output: {http: '127.0.0.1:8080'}\n", ":4: output.http",
-                "not available in this version"},
+        Mistake{"HttpWithoutPort", MINIMAL "output: {http: 127.0.0.1}\n", ":4: output.http",
+                "'127.0.0.1' is not ADDRESS:PORT; expected for example 127.0.0.1:8080"},
+        Mistake{"HttpWithoutAddress", MINIMAL "output: {http: ':8080'}\n", ":4: output.http",
+                "is not ADDRESS:PORT"},
+        Mistake{"HttpPortTooHigh", MINIMAL "output: {http: '127.0.0.1:65536'}\n", ":4: output.http",
+                "is not ADDRESS:PORT"},
+        Mistake{"HttpBareIpv6", MINIMAL "output: {http: '::1:8080'}\n", ":4: output.http",
+                "[::1]:8080"},
+        Mistake{"HttpUrl", MINIMAL "output: {http: 'http://127.0.0.1:8080/'}\n", ":4: output.http",
+                "is not ADDRESS:PORT"},
+        Mistake{"TokenWithoutHttp", MINIMAL "output: {token_env: HOME}\n", ":4: output.token_env",
+                "stands without http"},
+        Mistake{"TwoTokens",
+                MINIMAL "output: {http: '127.0.0.1:0', token_env: HOME, token_file: t}\n",
+                ":4: output.token_file", "keep one"},
+        Mistake{"NoTokenVariable",
+                MINIMAL "output: {http: '127.0.0.1:0', token_env: ALIDADE_TEST_UNSET}\n",
+                ":4: output.token_env", "has no variable 'ALIDADE_TEST_UNSET'"},
+        Mistake{"NoTokenFile", MINIMAL "output: {http: '127.0.0.1:0', token_file: nowhere}\n",
+                ":4: output.token_file", "cannot read a line of "},
         Mistake{"BothFormats", MINIMAL "output: {json: true, csv: true}\n", ":4: output.csv",
                 "keep one"},
         Mistake{"NoUrl", "video: {type: rtsp}\n" PAN_TILT, ":1: video.url", "is missing"},

@@ -1,0 +1,149 @@
+// The endpoints where a running camera does not lead: before the first record, without an orientation, and with a
+// client that is too slow.
+
+#include "edge_app/output/http_api.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <thread>
+
+#include "test/edge_app/http_client.h"
+
+namespace alidade {
+namespace {
+
+using nlohmann::json;
+using test::Client;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+constexpr std::size_t kLines = 4;
+
+LiveStateOptions few_lines() {
+  LiveStateOptions options;
+  options.max_lines = kLines;
+  return options;
+}
+
+class HttpApiTest : public ::testing::Test {
+ protected:
+  HttpApiTest() {
+    HttpApiSources sources;
+    sources.live = &live_;
+    sources.summary = [] { return PipelineSummary{}; };
+    sources.video_losses = [] { return FrameSourceCounters{3, 4}; };
+    sources.ask_for_calibration = [this] { return asked_ = calibrating_; };
+    sources.version = "1.2.3";
+    sources.camera = "a camera";
+    add_api_routes(&server_, sources);
+    server_.set_on_stop([this] { live_.close(); });
+    std::string error;
+    EXPECT_TRUE(server_.start(&error)) << error;
+  }
+
+  std::string ask(const std::string& method, const std::string& path, const std::string& body) {
+    Client client(server_);
+    client.send(method + " " + path + " HTTP/1.1\r\nHost: localhost\r\nContent-Length: " +
+                std::to_string(body.size()) + "\r\n\r\n" + body);
+    return client.receive();
+  }
+  std::string get(const std::string& path) { return ask("GET", path, ""); }
+  std::string post(const std::string& path, const std::string& body) {
+    return ask("POST", path, body);
+  }
+  static json body_of(const std::string& answer) {
+    return json::parse(answer.substr(answer.find("\r\n\r\n") + 4));
+  }
+
+  LiveState live_{few_lines()};
+  bool calibrating_ = false;
+  bool asked_ = false;
+  HttpServer server_{HttpServerOptions{}};
+};
+
+OrientationRecord record_without_orientation(std::int64_t frame) {
+  OrientationRecord record;
+  record.frame = frame;
+  record.time_s = 100 + 0.04 * static_cast<double>(frame);
+  record.status = RecordStatus::kTelemetryMissing;
+  return record;
+}
+
+TEST_F(HttpApiTest, BeforeTheFirstRecordThereIsNothingAndThatIsSaid) {
+  for (const char* path : {"/api/v1/orientation", "/api/v1/calibration"})
+    EXPECT_THAT(get(path), StartsWith("HTTP/1.1 404 ")) << path;
+  EXPECT_THAT(post("/api/v1/direction", R"({"pixels":[[1,2]]})"), StartsWith("HTTP/1.1 404 "));
+  EXPECT_THAT(post("/api/v1/pixel", R"({"frame":1,"directions":[[1,0,0]]})"),
+              StartsWith("HTTP/1.1 404 "));
+  const json status = body_of(get("/api/v1/status"));
+  EXPECT_EQ(status["alidade"], "1.2.3");
+  EXPECT_EQ(status["camera"], "a camera");
+  EXPECT_TRUE(status["mode"].is_null());
+  EXPECT_TRUE(status["latency_s"].is_null());
+  EXPECT_EQ(status["frames"]["damaged"], 3);
+  EXPECT_EQ(status["frames"]["not_fetched"], 4);
+  EXPECT_EQ(body_of(get("/api/v1/history"))["time_s"], json::array());
+  EXPECT_THAT(get("/metrics"), HasSubstr("\nalidade_frames_total 0\n"));
+}
+
+TEST_F(HttpApiTest, AFrameWithoutAnOrientationHasNoDirectionsAndSaysWhy) {
+  EXPECT_TRUE(live_.write(record_without_orientation(7)));
+  const std::string answer = post("/api/v1/direction", R"({"frame":7,"pixels":[[1,2]]})");
+  EXPECT_THAT(answer, StartsWith("HTTP/1.1 409 "));
+  EXPECT_EQ(body_of(answer)["error"], "frame 7 has no orientation: too little telemetry");
+  EXPECT_THAT(post("/api/v1/pixel", R"({"time_s":100.28,"directions":[[1,0,0]]})"),
+              StartsWith("HTTP/1.1 409 "));
+  EXPECT_THAT(get("/api/v1/calibration"), StartsWith("HTTP/1.1 404 "));
+}
+
+TEST_F(HttpApiTest, PassesOnThatAFreshCalibrationIsWanted) {
+  EXPECT_THAT(post("/api/v1/calibrate", ""), StartsWith("HTTP/1.1 409 "));
+  EXPECT_FALSE(asked_);
+  calibrating_ = true;
+  EXPECT_THAT(post("/api/v1/calibrate", ""), StartsWith("HTTP/1.1 202 "));
+  EXPECT_TRUE(asked_);
+}
+
+TEST_F(HttpApiTest, AClientThatIsTooSlowIsToldWhatItLost) {
+  Client client(server_);
+  client.send("GET /api/v1/stream HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  std::string text = client.receive("event: clock");
+  // Its connection takes some, then it loses the oldest.
+  std::int64_t written = 0;
+  while (live_.lost_by_readers() == 0) {
+    EXPECT_TRUE(live_.write(record_without_orientation(++written)));
+    std::this_thread::yield();
+  }
+  EXPECT_TRUE(live_.write(record_without_orientation(++written)));
+  text += client.receive("id: " + std::to_string(written) + "\n");
+  const std::string end = "\n\n";
+  if (text.compare(text.size() - end.size(), end.size(), end) != 0) text += client.receive(end);
+  std::istringstream lines(text.substr(text.find("\r\n\r\n") + 4));
+  std::int64_t last = 0;
+  std::int64_t lost = 0;
+  std::string name;
+  for (std::string line; std::getline(lines, line);) {
+    if (line.rfind("event: ", 0) == 0) name = line.substr(7);
+    if (line.rfind("id: ", 0) == 0) {
+      EXPECT_EQ(std::stoll(line.substr(4)), last + 1);
+      ++last;
+    }
+    if (line.rfind("data: ", 0) == 0 && name == "lost") {
+      const std::int64_t records = json::parse(line.substr(6))["records"];
+      EXPECT_GT(records, 0);
+      lost += records;
+      last += records;
+    }
+    if (line.rfind("data: ", 0) == 0 && name == "orientation") {
+      EXPECT_EQ(json::parse(line.substr(6))["frame"], last);
+    }
+  }
+  EXPECT_EQ(last, written);
+  EXPECT_EQ(lost, live_.lost_by_readers());
+}
+
+}  // namespace
+}  // namespace alidade
