@@ -62,6 +62,7 @@ std::vector<Field> fields(const OrientationRecord& record) {
         "orientation_covariance_rad2_8"}},
       {"reference_row", kReferenceRow, {}},
       {"landmarks", record.landmarks, {}},
+      {"residual_px", or_null(record.residual_px), {}},
       {"line_delay_s", record.camera.line_delay, {}},
       {"focal_length_px", record.camera.focal_length, {}},
       {"aspect", record.camera.aspect, {}},

@@ -107,7 +107,9 @@ struct OrientationRecord {
   bool calibrated = false;        // false: data-sheet values
   CalibrationReport calibration;  // what the calibration thread does and needs
   std::optional<Orientation> orientation;
-  int landmarks = 0;                // that held it: 0 but in mode OE
+  int landmarks = 0;  // that held it: 0 but in mode OE
+  // Root mean square of their residuals' lengths, px; none but in mode OE.
+  std::optional<double> residual_px;
   PlainCalibration camera;          // the calibration in use
   std::optional<double> latency_s;  // record made minus receive time; none in a replay
 };

@@ -50,6 +50,20 @@ RecordStatus to_record(OeStatus status) {
   return RecordStatus::kNotFinite;
 }
 
+// Of those that held the result; px.
+std::optional<double> residual_rms(const OeMode& oe) {
+  double sum = 0;
+  int count = 0;
+  for (int i = 0; i < oe.statistics().aligned; ++i) {
+    const OeObservation& seen = oe.observations()[i];
+    if (!seen.inlier) continue;
+    sum += observed_residual(seen).squaredNorm();
+    ++count;
+  }
+  if (count == 0) return std::nullopt;
+  return std::sqrt(sum / count);
+}
+
 }  // namespace
 
 OeOptions oe_options(const Camera<double>& camera) {
@@ -225,6 +239,7 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
   }
   record->mode = frame.mode == OrientationMode::kOe ? RecordMode::kOe : RecordMode::kPt;
   record->landmarks = frame.landmarks;
+  if (record->mode == RecordMode::kOe) record->residual_px = residual_rms(*oe_);
   record->orientation = to_record(frame);
 }
 
@@ -260,6 +275,32 @@ void OrientationStep::get_tracks(FrameTracks* tracks) const {
     for (int i = 0; statistics.status == OeStatus::kOk && i < statistics.aligned; ++i) {
       const OeObservation& seen = oe_->observations()[i];
       if (const auto sigma = track_sigma(seen)) add(seen.id, seen.u, *sigma);
+    }
+  }
+}
+
+void OrientationStep::get_landmarks(FrameLandmarks* landmarks) const {
+  landmarks->kind = FrameLandmarks::Kind::kNone;
+  landmarks->count = 0;
+  const auto add = [landmarks](const Vector2<double>& u, const Vector2<double>& residual,
+                               bool used) {
+    if (landmarks->count == FrameLandmarks::kMaxSeen) return;
+    landmarks->seen[static_cast<std::size_t>(landmarks->count++)] = {
+        static_cast<float>(u.x()), static_cast<float>(u.y()), static_cast<float>(residual.x()),
+        static_cast<float>(residual.y()), used};
+  };
+  if (tracks_.tracker == FrameTracks::Tracker::kStartUp) {
+    landmarks->kind = FrameLandmarks::Kind::kPoints;
+    for (int i = 0; i < start_up_->observation_count(); ++i) {
+      add(start_up_->observations()[i].u, Vector2<double>::Zero(), true);
+    }
+  } else if (tracks_.tracker == FrameTracks::Tracker::kOe &&
+             oe_->statistics().status == OeStatus::kOk) {
+    landmarks->kind = FrameLandmarks::Kind::kLandmarks;
+    for (int i = 0; i < oe_->statistics().aligned; ++i) {
+      const OeObservation& seen = oe_->observations()[i];
+      const Vector2<double> residual = observed_residual(seen);
+      add(seen.u - residual, residual, seen.inlier);
     }
   }
 }

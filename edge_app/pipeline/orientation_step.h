@@ -28,6 +28,7 @@
 #include "core/realtime/start_up_tracker.h"
 #include "core/realtime/telemetry_buffer.h"
 #include "edge_app/pipeline/calibration_feed.h"
+#include "edge_app/pipeline/frame_landmarks.h"
 #include "edge_app/pipeline/orientation_record.h"
 #include "edge_app/pipeline/pending_frames.h"
 #include "edge_app/pipeline/published_calibration.h"
@@ -85,6 +86,8 @@ class OrientationStep {
   void maintain();
   // What the frame last added, and maintained, has for the calibration thread.
   void get_tracks(FrameTracks* tracks) const;
+  // The same for people to look at.
+  void get_landmarks(FrameLandmarks* landmarks) const;
   // Takes over another calibration with its map, between two frames.
   void adopt(const PublishedCalibration& published);
   // The record in place of frames while there is no connection to the video source.

@@ -26,7 +26,7 @@ Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink
       sink_(sink),
       calibration_(calibration),
       options_(options),
-      stage_(options.step, options.measure_latency, calibration != nullptr),
+      stage_(options.step, options.measure_latency, calibration != nullptr, options.tap),
       pictures_(kPictureSlots),
       finished_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (finished_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
@@ -44,6 +44,7 @@ void Pipeline::start() {
   // The consumers first, so that nothing is dropped at the start.
   threads_.emplace_back(&Pipeline::write_output, this);
   if (calibration_ != nullptr) threads_.emplace_back(&Pipeline::calibrate, this);
+  if (options_.tap != nullptr) threads_.emplace_back(&PictureTap::run, options_.tap);
   threads_.emplace_back(&Pipeline::run_realtime, this);
   threads_.emplace_back(&Pipeline::read_telemetry, this);
   threads_.emplace_back(&Pipeline::capture, this);

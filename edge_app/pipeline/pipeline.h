@@ -7,6 +7,7 @@
 //   calibration thread  SelfCalibration, with the lowest priority: tracks and telemetry in, a calibration
 //                     with its map out, which the real-time thread takes over between two frames
 //   output thread     queue -> sink; logs what the real-time thread may not log; counts
+//   tap thread        PictureTap: small pictures, for those who ask; only if there is a tap
 //
 // A source that loses its connection is waited for; records of mode `none` are made at the loss and
 // then each second until it is back. The pipeline is finished when the video has ended, a source
@@ -38,6 +39,7 @@ struct PipelineOptions {
   int height = 0;
   std::string calibration_name;
   bool measure_latency = true;  // false for a recording, whose stamps are of another clock
+  PictureTap* tap = nullptr;    // borrowed like the sources; null: nobody asks for pictures
 };
 
 struct PipelineSummary {

@@ -15,8 +15,9 @@ void touch(Queue* queue) {
 
 }  // namespace
 
-RealtimeStage::RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed)
-    : step_(options), measure_latency_(measure_latency), feed_wanted_(feed) {
+RealtimeStage::RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed,
+                             PictureTap* tap)
+    : step_(options), measure_latency_(measure_latency), feed_wanted_(feed), tap_(tap) {
   // Those that the real-time thread fills.
   touch<OutputMessage>(&output_queue_);
   touch<FeedFrame>(&feed_frames_);
@@ -85,6 +86,7 @@ void RealtimeStage::process_frame(const VideoMessage& message) {
   step_.maintain();
   bool lent = false;
   if (feed_wanted_) feed(message, &lent);
+  if (tap_ != nullptr && !lent) tap(message, &lent);
   if (message.slot != kNoPicture && !lent) returned_.push(message.slot);
 }
 
@@ -97,6 +99,16 @@ void RealtimeStage::feed(const VideoMessage& message, bool* lent) {
   *lent = feed_frames_.push(feed_frame_) && lend;
   if (lend && !*lent) picture_wanted_.store(true, std::memory_order_relaxed);
   feed_.post();
+}
+
+void RealtimeStage::tap(const VideoMessage& message, bool* lent) {
+  const bool can_lend = message.picture.valid() && message.slot != kNoPicture;
+  if (!can_lend || !tap_->take_wish()) return;
+  tapped_frame_.frame = message.stamp.frame;
+  tapped_frame_.picture = message.picture;
+  tapped_frame_.slot = message.slot;
+  step_.get_landmarks(&tapped_frame_.landmarks);
+  *lent = tap_->push(tapped_frame_);
 }
 
 bool RealtimeStage::process() noexcept {
@@ -124,6 +136,7 @@ bool RealtimeStage::process() noexcept {
     output_ended_.store(true, std::memory_order_release);
     output_.post();
     feed_.post();
+    if (tap_ != nullptr) tap_->end();
   }
   return !ended;
 }

@@ -5,9 +5,10 @@
 //   telemetry thread   --TelemetryMessage------>  | process() | --PictureSlot----> capture thread
 //   calibration thread --PublishedCalibration-->  |           | --FeedFrame,
 //                                                 |           |   PanTiltSample--> calibration thread
+//   PictureTap         --a wish---------------->  |           | --TappedFrame----> PictureTap
 //
 // Pictures stay where the decoder put them: a frame occupies a slot of the capture thread, and whoever had the
-// picture last, this thread or the calibration thread, gives the slot back.
+// picture last, this thread, the calibration thread or the tap, gives the slot back.
 // Each queue has one producer and one consumer, a fixed capacity and fixed-size messages. A full
 // queue drops the new message and counts it; nobody waits for anybody. process() allocates nothing,
 // takes no lock, logs nothing and throws nothing; what it writes the constructor has touched.
@@ -18,13 +19,11 @@
 #include <type_traits>
 
 #include "edge_app/pipeline/orientation_step.h"
+#include "edge_app/pipeline/picture_slot.h"
+#include "edge_app/pipeline/picture_tap.h"
 #include "edge_app/pipeline/semaphore.h"
 
 namespace alidade {
-
-using PictureSlot = std::int32_t;
-inline constexpr PictureSlot kNoPicture = -1;
-inline constexpr PictureSlot kPictureSlots = 32;
 
 struct VideoMessage {
   enum class Kind : std::uint8_t { kFrame, kLost };
@@ -76,12 +75,14 @@ struct DropCounters {
 class RealtimeStage {
  public:
   // measure_latency: receive times are of this host's running clock (not of a recording).
-  // feed: there is a calibration thread.
-  RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed);
+  // feed: there is a calibration thread. tap: borrowed; null: nobody asks for pictures.
+  RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed,
+                PictureTap* tap = nullptr);
 
   // Capture thread: a slot that nobody needs any more, one after the other.
   bool pop_returned(PictureSlot& slot) {
-    return returned_.pop(slot) || returned_by_calibration_.pop(slot);
+    return returned_.pop(slot) || returned_by_calibration_.pop(slot) ||
+           (tap_ != nullptr && tap_->pop_returned(slot));
   }
   // Capture thread. False: the queue is full, the message and its slot are refused.
   bool push(const VideoMessage& message);
@@ -126,6 +127,7 @@ class RealtimeStage {
   void adopt_published();
   void process_frame(const VideoMessage& message);
   void feed(const VideoMessage& message, bool* lent);
+  void tap(const VideoMessage& message, bool* lent);
   void emit(const OutputMessage& message);
 
   static constexpr std::size_t kPublished = 4;
@@ -147,7 +149,8 @@ class RealtimeStage {
   std::atomic<bool> picture_wanted_{false};
   std::atomic<bool> video_lost_{false};
   std::atomic<bool> telemetry_lost_{false};
-  FeedFrame feed_frame_;  // real-time thread: too large for its stack
+  FeedFrame feed_frame_;      // real-time thread: too large for its stack
+  TappedFrame tapped_frame_;  // likewise
   Semaphore feed_;
   Semaphore input_;
   Semaphore output_;
@@ -163,6 +166,7 @@ class RealtimeStage {
   OrientationStep step_;
   bool measure_latency_;
   bool feed_wanted_;
+  PictureTap* tap_;
 };
 
 }  // namespace alidade

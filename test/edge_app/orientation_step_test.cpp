@@ -573,6 +573,53 @@ TEST_F(OeStepTest, TellsTheCalibrationThreadWhatItSaw) {
   EXPECT_EQ(tracks.count, 0);
 }
 
+TEST_F(OeStepTest, ShowsLandmarksWithTheResidualsThatTheRecordSumsUp) {
+  build_map();
+  const OrientationRecord record = add(scene_.picture());
+  ASSERT_TRUE(record.residual_px);
+  FrameLandmarks landmarks;
+  step_.get_landmarks(&landmarks);
+  EXPECT_EQ(landmarks.kind, FrameLandmarks::Kind::kLandmarks);
+  ASSERT_GT(landmarks.count, 20);
+  double sum = 0;
+  int used = 0;
+  for (int i = 0; i < landmarks.count; ++i) {
+    const SeenLandmark& seen = landmarks.seen[static_cast<std::size_t>(i)];
+    EXPECT_TRUE(seen.u_px > 0 && seen.u_px < Scene::kWidth && seen.v_px > 0 &&
+                seen.v_px < Scene::kHeight);
+    if (!seen.used) continue;
+    ++used;
+    sum += double{seen.du_px} * seen.du_px + double{seen.dv_px} * seen.dv_px;
+  }
+  EXPECT_EQ(used, record.landmarks);
+  EXPECT_NEAR(*record.residual_px, std::sqrt(sum / used), 1e-4);  // the picture shows floats
+  EXPECT_LT(*record.residual_px, 0.5);
+}
+
+TEST_F(OeStepTest, ShowsNoLandmarksWhereTheyDidNotHold) {
+  build_map();
+  FrameLandmarks landmarks;
+  for (const ImageView& picture : {ImageView{}, scene_.picture(30)}) {
+    const OrientationRecord record = add(picture);
+    ASSERT_EQ(record.mode, RecordMode::kPt);
+    EXPECT_FALSE(record.residual_px);
+    step_.get_landmarks(&landmarks);
+    EXPECT_EQ(landmarks.kind, FrameLandmarks::Kind::kNone);
+    EXPECT_EQ(landmarks.count, 0);
+  }
+}
+
+TEST(FrameLandmarks, TheResidualOnAnEdgeIsTheOneAcrossIt) {
+  const Vector2<double> along = Vector2<double>(3, 4) / 5;
+  const Vector2<double> across(-along.y(), along.x());
+  OeObservation seen;
+  seen.residual = 0.2 * across + 3 * along;
+  seen.covariance = 1e-3 * across * across.transpose();
+  EXPECT_EQ(observed_residual(seen), seen.residual);
+  seen.covariance += kUnobservedVariance * along * along.transpose();
+  EXPECT_LT((observed_residual(seen) - 0.2 * across).norm(), 1e-4);
+}
+
 TEST_F(OeStepTest, WithoutACalibrationItFollowsPointsAndAnswersFromTelemetry) {
   OrientationStepOptions uncalibrated = options();
   uncalibrated.calibrated = false;
@@ -591,6 +638,11 @@ TEST_F(OeStepTest, WithoutACalibrationItFollowsPointsAndAnswersFromTelemetry) {
   EXPECT_FALSE(record.calibrated);
   EXPECT_EQ(tracks.tracker, FrameTracks::Tracker::kStartUp);
   EXPECT_GT(tracks.count, 20);
+  FrameLandmarks landmarks;
+  step.get_landmarks(&landmarks);
+  EXPECT_EQ(landmarks.kind, FrameLandmarks::Kind::kPoints);
+  EXPECT_EQ(landmarks.count, tracks.count);
+  EXPECT_EQ(landmarks.seen[0].u_px, tracks.points[0].u_px);
 }
 
 // d was found with the least delay of one connection; another one's may differ by milliseconds.

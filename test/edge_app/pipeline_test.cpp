@@ -8,6 +8,9 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <atomic>
+#include <memory>
+#include <thread>
 
 #include "platform/system/clock.h"
 #include "test/edge_app/scripted_sources.h"
@@ -219,6 +222,47 @@ TEST_F(PipelineTest, SaysFromTheFirstRecordOnWhetherItCalibrates) {
               automatic ? CalibrationActivity::kCollecting : CalibrationActivity::kOff);
     pipeline.stop();
   }
+}
+
+TEST_F(PipelineTest, ShowsAPictureToWhoAsksAndLetsGoOfItAtTheEnd) {
+  constexpr std::size_t kWidth = 1280;
+  constexpr std::size_t kHeight = 720;
+  const auto luma = std::make_shared<std::vector<std::uint8_t>>(kWidth * kHeight, 128);
+  PictureTap tap(std::chrono::milliseconds(0));
+  PipelineOptions options = options_for_tests();
+  options.tap = &tap;
+  {
+    Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options);
+    pipeline.start();
+    std::atomic<bool> seen{false};
+    std::thread viewer([&] {
+      for (std::int64_t last = -1; last < 5;) {
+        const auto picture = tap.ask(std::chrono::seconds(60));
+        ASSERT_NE(picture, nullptr);
+        EXPECT_GT(picture->frame, last);
+        EXPECT_FALSE(picture->jpeg.empty());
+        EXPECT_EQ(picture->width, 1280);
+        last = picture->frame;
+      }
+      seen = true;
+      while (tap.ask(std::chrono::seconds(60)) != nullptr) {
+      }
+    });
+    while (!seen && !HasFailure()) {
+      Frame pushed = frame();
+      pushed.width = kWidth;
+      pushed.height = kHeight;
+      pushed.stride = kWidth;
+      pushed.luma = luma->data();
+      pushed.owner = luma;
+      const std::size_t records = sink_.records().size();
+      video_.push(pushed);
+      sink_.wait_until([&](const auto& so_far) { return so_far.size() > records; });
+    }
+    pipeline.stop();
+    viewer.join();
+  }
+  EXPECT_EQ(luma.use_count(), 1);
 }
 
 TEST_F(PipelineTest, StopEndsSourcesThatGiveNothing) {

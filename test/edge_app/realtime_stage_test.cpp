@@ -279,10 +279,45 @@ TEST(RealtimeStage, TakesOverWhatIsPublishedBeforeTheNextFrame) {
   EXPECT_FALSE(stage->pop_adopted(adopted));
 }
 
-// Following points, taking over a calibration with a map, OE mode, another zoom and back: all without allocating.
+TEST(RealtimeStage, LendsTheTapWhatItAskedForUnlessTheCalibrationThreadHasIt) {
+  const Scene scene;
+  PictureTap tap;
+  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true, &tap);
+  const auto process = [&](int frame) {
+    stage->push(picture_message(scene, frame, frame));
+    EXPECT_TRUE(stage->process());
+  };
+  const auto returned = [&] {
+    PictureSlot slot = kNoPicture;
+    return stage->pop_returned(slot) ? slot : kNoPicture;
+  };
+  process(0);
+  EXPECT_EQ(returned(), 0) << "nobody asked";
+  EXPECT_EQ(tap.ask(std::chrono::milliseconds(0)), nullptr);
+  stage->want_picture();
+  process(1);
+  EXPECT_EQ(returned(), kNoPicture) << "with the calibration thread";
+  process(2);
+  EXPECT_EQ(returned(), kNoPicture) << "with the tap";
+  process(3);
+  EXPECT_EQ(returned(), 3) << "one wish, one picture";
+  stage->end_input();
+  EXPECT_FALSE(stage->process());
+  tap.run();
+  EXPECT_EQ(returned(), 2);
+  const auto picture = tap.of_frame(2);
+  ASSERT_NE(picture, nullptr);
+  EXPECT_EQ(picture->landmarks.kind, FrameLandmarks::Kind::kPoints);
+  EXPECT_GT(picture->landmarks.count, 20);
+}
+
+// Following points, taking over a calibration with a map, OE mode, another zoom and back, somebody who looks at it: all
+// without allocating.
 TEST(RealtimeStage, AllocatesNothingWhileCalibrationsComeAndGo) {
   const Scene scene;
-  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);
+  PictureTap tap(std::chrono::milliseconds(0));
+  std::thread tap_thread(&PictureTap::run, &tap);
+  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true, &tap);
   PublishedCalibration calibrated;
   calibrated.calibration = options_with_pictures().calibration;
   calibrated.calibrated = true;
@@ -305,8 +340,13 @@ TEST(RealtimeStage, AllocatesNothingWhileCalibrationsComeAndGo) {
       if (i == 110) published = stage->publish(&withdrawn);
       EXPECT_TRUE(published);
       if (i % 7 == 0) stage->want_picture();
+      const bool looked_at = i == 20 || i == 101;
+      if (looked_at) {
+        EXPECT_EQ(tap.ask(std::chrono::milliseconds(0)), nullptr);
+      }
       stage->push(picture_message(scene, i % 2, 0));
       EXPECT_TRUE(stage->process());
+      while (looked_at && tap.of_frame(i % 2) == nullptr) std::this_thread::yield();
       while (stage->pop(out)) oe += out.record.mode == RecordMode::kOe ? 1 : 0;
       while (stage->pop(fed)) {
         followed += fed.tracks.tracker == FrameTracks::Tracker::kStartUp ? 1 : 0;
@@ -323,6 +363,10 @@ TEST(RealtimeStage, AllocatesNothingWhileCalibrationsComeAndGo) {
   }
   EXPECT_GT(oe, 50);
   EXPECT_GE(followed, 50 + 20 + 19);
+  tap.end();
+  tap_thread.join();
+  EXPECT_EQ(tap.of_frame(0)->landmarks.kind, FrameLandmarks::Kind::kPoints);
+  EXPECT_EQ(tap.of_frame(1)->landmarks.kind, FrameLandmarks::Kind::kLandmarks);
 }
 
 }  // namespace

@@ -30,6 +30,7 @@ OrientationRecord full_record() {
                                      {1e-10, 2e-12, 0, 2e-12, 4e-10, 0, 0, 0, 9e-10},
                                      {}};
   record.landmarks = 187;
+  record.residual_px = 0.0625;
   record.camera.line_delay = -1.42e-5;
   record.calibration = {CalibrationActivity::kWatching, CalibrationNeed::kNothing};
   record.camera.focal_length = 32008;
@@ -55,7 +56,7 @@ TEST(RecordFormat, WritesAllFieldsAsOneJsonLine) {
       R"("pan_acceleration_rad_s2":0.03125,"tilt_acceleration_rad_s2":-0.015625,)"
       R"("q_base_from_camera":[0.5,-0.5,0.5,0.5],"orientation_sigma_rad":[1e-05,2e-05,3e-05],)"
       R"("orientation_covariance_rad2":[1e-10,2e-12,0.0,2e-12,4e-10,0.0,0.0,0.0,9e-10],)"
-      R"("reference_row":0.0,"landmarks":187,)"
+      R"("reference_row":0.0,"landmarks":187,"residual_px":0.0625,)"
       R"("line_delay_s":-1.42e-05,"focal_length_px":32008.0,"aspect":1.0,"radial_distortion":55.4,)"
       R"("latency_s":2.5e-05})"
       "\n");
@@ -68,7 +69,7 @@ TEST(RecordFormat, WritesNullForWhatARecordLacks) {
       R"("calibrated":false,"calibration":"collecting","needs":"tilt more","pan_rad":null,"tilt_rad":null,"pan_rate_rad_s":null,"tilt_rate_rad_s":null,)"
       R"("pan_acceleration_rad_s2":null,"tilt_acceleration_rad_s2":null,)"
       R"("q_base_from_camera":null,"orientation_sigma_rad":null,)"
-      R"("orientation_covariance_rad2":null,"reference_row":0.0,"landmarks":0,)"
+      R"("orientation_covariance_rad2":null,"reference_row":0.0,"landmarks":0,"residual_px":null,)"
       R"("line_delay_s":0.0,"focal_length_px":1000.0,"aspect":1.0,"radial_distortion":0.0,)"
       R"("latency_s":null})"
       "\n");
@@ -84,13 +85,13 @@ TEST(RecordFormat, WritesCsvColumnsInTheOrderOfTheHeader) {
             "orientation_covariance_rad2_2,orientation_covariance_rad2_3,"
             "orientation_covariance_rad2_4,orientation_covariance_rad2_5,"
             "orientation_covariance_rad2_6,orientation_covariance_rad2_7,"
-            "orientation_covariance_rad2_8,reference_row,landmarks,"
+            "orientation_covariance_rad2_8,reference_row,landmarks,residual_px,"
             "line_delay_s,focal_length_px,aspect,radial_distortion,latency_s\n");
   EXPECT_EQ(
       csv_line(full_record()),
       "7,12345.678901234,12345.75,OE,ok,true,watching,,0.5,-0.25,0.125,-0.0625,0.03125,-0.015625,"
       "0.5,-0.5,0.5,0.5,1e-05,2e-05,3e-05,"
-      "1e-10,2e-12,0.0,2e-12,4e-10,0.0,0.0,0.0,9e-10,0.0,187,"
+      "1e-10,2e-12,0.0,2e-12,4e-10,0.0,0.0,0.0,9e-10,0.0,187,0.0625,"
       "-1.42e-05,32008.0,1.0,55.4,2.5e-05\n");
 }
 
@@ -98,7 +99,7 @@ TEST(RecordFormat, LeavesCsvCellsEmptyForWhatARecordLacks) {
   const std::string line = csv_line(record_without_frame());
   EXPECT_EQ(
       line,
-      ",,3.5,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,,,,,,,,,,0.0,0,0.0,1000.0,"
+      ",,3.5,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,,,,,,,,,,0.0,0,,0.0,1000.0,"
       "1.0,0.0,\n");
   const std::string header = csv_header();
   EXPECT_EQ(std::count(line.begin(), line.end(), ','),
@@ -120,7 +121,7 @@ TEST(RecordFormat, WhatIsNotFiniteHasNoValue) {
   record.latency_s = std::numeric_limits<double>::infinity();
   EXPECT_TRUE(nlohmann::json::parse(json_line(record))["receive_time_s"].is_null());
   EXPECT_EQ(csv_line(record),
-            ",,,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,,,,,,,,,,0.0,0,0.0,1000.0,"
+            ",,,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,,,,,,,,,,0.0,0,,0.0,1000.0,"
             "1.0,0.0,\n");
 }
 

@@ -9,7 +9,7 @@ from harness import (CLOCK_OFFSET_MS, FOCAL_LENGTH_PX, IMAGE, LINE_DELAY_US, Pro
                      TELEMETRY_SIGMA_RAD, Truth, free_port, rms, wait_until)
 
 FIELDS = {"frame", "time_s", "receive_time_s", "mode", "calibrated", "pan_rad", "tilt_rad", "pan_rate_rad_s",
-          "tilt_rate_rad_s", "pan_acceleration_rad_s2", "tilt_acceleration_rad_s2", "q_base_from_camera", "orientation_sigma_rad", "landmarks", "line_delay_s",
+          "tilt_rate_rad_s", "pan_acceleration_rad_s2", "tilt_acceleration_rad_s2", "q_base_from_camera", "orientation_sigma_rad", "landmarks", "residual_px", "line_delay_s",
           "focal_length_px", "aspect", "radial_distortion", "latency_s"}
 
 
