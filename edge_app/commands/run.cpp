@@ -16,6 +16,7 @@
 #include "edge_app/output/live_state.h"
 #include "edge_app/output/record_sinks.h"
 #include "edge_app/output/record_writer.h"
+#include "edge_app/output/status_page.h"
 #include "edge_app/pipeline/pipeline.h"
 
 namespace alidade {
@@ -133,11 +134,16 @@ PipelineOptions pipeline_options(const Config& config, const NamedCalibration& c
 }
 
 // Null where none is configured.
-std::unique_ptr<HttpServer> start_http(const Config& config, const HttpApiSources& sources) {
+std::unique_ptr<HttpServer> start_http(const Config& config, const HttpApiSources& sources,
+                                       PictureTap* tap) {
   if (!config.output.http) return nullptr;
   auto server = std::make_unique<HttpServer>(*config.output.http);
   add_api_routes(server.get(), sources);
-  server->set_on_stop([live = sources.live] { live->close(); });
+  add_status_page(server.get(), tap);
+  server->set_on_stop([live = sources.live, tap] {
+    live->close();
+    tap->close();
+  });
   std::string error;
   if (!server->start(&error)) throw CommandError(kExitFailed, error);
   spdlog::info("HTTP: listening on http://{}/{}", server->address(),
@@ -178,6 +184,8 @@ int run(const RunOptions& options) {
   // First, so that a slow reader of stdout holds up no record that others wait for.
   if (config.output.http) sinks.add(&live);
   if (format) sinks.add(&writer);
+  PictureTap tap;
+  if (config.output.http) of_pipeline.tap = &tap;
   Pipeline pipeline(*video, *pan_tilt, sinks, calibrating.calibration.get(), of_pipeline);
   HttpApiSources sources;
   sources.live = &live;
@@ -189,7 +197,7 @@ int run(const RunOptions& options) {
   sources.version = ALIDADE_VERSION;
   sources.camera = video->name();
   sources.latency_measured = of_pipeline.measure_latency;
-  const auto http = start_http(config, sources);
+  const auto http = start_http(config, sources, &tap);
   pipeline.start();
   static_cast<void>(signals.wait(pipeline.finished_fd(), options.duration_s));
   if (http) http->stop();

@@ -54,6 +54,10 @@ void PictureTap::run() {
       returned_.push(frame.slot);
     }
   }
+  close();
+}
+
+void PictureTap::close() {
   const std::lock_guard<std::mutex> lock(mutex_);
   closed_ = true;
   made_.notify_all();

@@ -54,10 +54,13 @@ class PictureTap {
   explicit PictureTap(std::chrono::milliseconds interval = kInterval);
 
   // Any thread but the real-time one. The newest picture, if it is not older than the interval; else the next one, which
-  // is waited for. Null: none came within the time given, or end() was called.
+  // is waited for. Null: none came within the time given, or close() was called.
   [[nodiscard]] std::shared_ptr<const LivePicture> ask(std::chrono::milliseconds patience);
   // Any thread but the real-time one. One of the last kKept pictures; null: it is not among them.
   [[nodiscard]] std::shared_ptr<const LivePicture> of_frame(std::int64_t frame) const;
+
+  // Any thread but the real-time one: nobody waits any more, now or later.
+  void close();
 
   // Real-time thread. True: the next frame with a picture is wanted, and whoever was told so has to push one.
   bool take_wish() { return wanted_.exchange(false, std::memory_order_relaxed); }
@@ -66,7 +69,7 @@ class PictureTap {
   // Real-time thread: nothing will follow.
   void end();
 
-  // Tap thread: makes pictures until end().
+  // Tap thread: makes pictures until end(), and closes.
   void run();
 
   // Capture thread: a slot that is no longer looked at, one after the other.

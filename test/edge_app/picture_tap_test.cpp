@@ -142,6 +142,14 @@ TEST_F(PictureTapTest, TheEndWakesWhoWaits) {
   EXPECT_EQ(tap.ask(hours(1)), nullptr) << "who asks later does not wait at all";
 }
 
+TEST_F(PictureTapTest, WhoWaitsIsLetGoWhenItIsClosed) {
+  PictureTap tap;
+  std::thread asker([&] { EXPECT_EQ(tap.ask(hours(1)), nullptr); });
+  while (!tap.take_wish()) std::this_thread::yield();
+  tap.close();
+  asker.join();
+}
+
 TEST_F(PictureTapTest, WhatFindsNoRoomIsRefusedAndTheWishStands) {
   PictureTap tap;
   EXPECT_TRUE(tap.push(frame(0)));

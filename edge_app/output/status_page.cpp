@@ -1,0 +1,99 @@
+#include "edge_app/output/status_page.h"
+
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+#include "edge_app/pipeline/small_picture.h"
+
+namespace alidade {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+// A frame of a slow camera comes within it.
+constexpr std::chrono::seconds kPatience{1};
+
+ServerResponse no_picture() {
+  return http_error(503, "no picture: the video is away, or none is decoded (realtime.mode: PT)");
+}
+
+ServerResponse page() {
+  ServerResponse response;
+  response.type = "text/html; charset=utf-8";
+  response.body = kStatusPage;
+  response.headers = {{"Content-Security-Policy", kStatusPagePolicy},
+                      {"Cache-Control", "no-cache"},
+                      {"Referrer-Policy", "no-referrer"}};
+  return response;
+}
+
+ServerResponse picture_of_now(PictureTap* tap) {
+  const auto picture = tap->ask(kPatience);
+  if (picture == nullptr || picture->jpeg.empty()) return no_picture();
+  ServerResponse response;
+  response.type = "image/jpeg";
+  response.body = picture->jpeg;
+  response.headers = {{"X-Alidade-Frame", std::to_string(picture->frame)},
+                      {"Cache-Control", "no-store"}};
+  return response;
+}
+
+ServerResponse overlay(PictureTap* tap, const ServerRequest& request) {
+  std::shared_ptr<const LivePicture> picture;
+  if (const auto wanted = request.parameter("frame")) {
+    constexpr std::size_t kDigits = 18;
+    if (wanted->empty() || wanted->size() > kDigits ||
+        wanted->find_first_not_of("0123456789") != std::string::npos) {
+      return http_error(400, "frame must be a frame's number");
+    }
+    picture = tap->of_frame(std::stoll(*wanted));
+    if (picture == nullptr)
+      return http_error(404, "that frame is not among the last that were shown");
+  } else {
+    picture = tap->ask(kPatience);
+    if (picture == nullptr) return no_picture();
+  }
+  ServerResponse response;
+  response.body = overlay_json(*picture);
+  response.headers = {{"Cache-Control", "no-store"}};
+  return response;
+}
+
+// To a thousandth of a pixel.
+double rounded(float px) { return std::round(1000.0 * px) / 1000; }
+
+}  // namespace
+
+std::string overlay_json(const LivePicture& picture) {
+  Json landmarks = Json::array();
+  Json points = Json::array();
+  for (int i = 0; i < picture.landmarks.count; ++i) {
+    const SeenLandmark& seen = picture.landmarks.seen[static_cast<std::size_t>(i)];
+    if (picture.landmarks.kind == FrameLandmarks::Kind::kPoints) {
+      points.push_back({rounded(seen.u_px), rounded(seen.v_px)});
+    } else {
+      landmarks.push_back({{"u", rounded(seen.u_px)},
+                           {"v", rounded(seen.v_px)},
+                           {"du", rounded(seen.du_px)},
+                           {"dv", rounded(seen.dv_px)},
+                           {"used", seen.used}});
+    }
+  }
+  const Json object{{"frame", picture.frame},
+                    {"width", picture.width},
+                    {"height", picture.height},
+                    {"scale", shrinking_factor(picture.width, PictureTap::kMaxWidth)},
+                    {"landmarks", std::move(landmarks)},
+                    {"points", std::move(points)}};
+  return object.dump() + "\n";
+}
+
+void add_status_page(HttpServer* server, PictureTap* tap) {
+  server->get("/", HttpAccess::kOpen, [](const ServerRequest&) { return page(); });
+  server->get("/api/v1/picture", HttpAccess::kToken,
+              [tap](const ServerRequest&) { return picture_of_now(tap); });
+  server->get("/api/v1/overlay", HttpAccess::kToken,
+              [tap](const ServerRequest& request) { return overlay(tap, request); });
+}
+
+}  // namespace alidade
