@@ -1,0 +1,193 @@
+#!/usr/bin/env python3
+"""The status page of `alidade run` in a real browser: what it shows, what a click says, and what it does when the
+program goes away and comes back."""
+import json
+import os
+import re
+import signal
+import unittest
+import urllib.request
+
+from selenium import webdriver
+from selenium.webdriver import ActionChains, Keys
+from selenium.webdriver.chrome.options import Options
+from selenium.webdriver.chrome.service import Service
+from selenium.webdriver.common.by import By
+
+from harness import CLOCK_OFFSET_MS, DEADLINE_S, SystemTest, free_port, wait_until
+
+SETTINGS = {
+    "image": {"width": 640, "height": 480, "rate_hz": 10},
+    "camera": {"focal_length_px": 10669.3, "radial_distortion": 55.4, "line_delay_us": -32.0,
+               "clock_offset_ms": CLOCK_OFFSET_MS},
+    "sensor": {"exposure_ms": 1, "read_noise": 1, "jpeg_quality": 90},
+}
+TOKEN = "right-horse"
+# What a browser says of a server that is not there or wants a token: it is what these tests do to it.
+EXPECTED_ERRORS = re.compile(r"ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_EMPTY_RESPONSE|ERR_INCOMPLETE_CHUNKED_ENCODING"
+                             r"|status of 401")
+
+
+class StatusPage(SystemTest):
+    def setUp(self):
+        super().setUp()
+        options = Options()
+        for argument in ("--headless=new", "--no-sandbox", "--disable-dev-shm-usage", "--disable-gpu",
+                         "--window-size=1280,900"):
+            options.add_argument(argument)
+        options.set_capability("goog:loggingPrefs", {"browser": "ALL"})
+        self.browser = webdriver.Chrome(service=Service(os.environ["CHROMIUM_DRIVER"]), options=options)
+        self.addCleanup(self.browser.quit)
+        self.browser.set_script_timeout(DEADLINE_S)
+
+    def start(self, config, **environment):
+        """`alidade run`; gives back the process and the page's address, once it listens."""
+        run = self.alidade("run", "-c", config, **environment)
+
+        def address():
+            self.assertIsNone(run.child.poll(), run.error_text())
+            return re.search(r"listening on (http://[\d.]+:\d+/)", run.error_text())
+        wait_until(address, "the address of the page in the log")
+        return run, address().group(1)
+
+    def config(self, camera, mode="OE", **output):
+        image = SETTINGS["image"]
+        return self.write_config(camera, video={"width": image["width"], "height": image["height"]},
+                                 focal_length_px=SETTINGS["camera"]["focal_length_px"], realtime={"mode": mode},
+                                 output={"json": True, "http": "127.0.0.1:0", **output})
+
+    def text(self, name):
+        return self.browser.execute_script("return document.getElementById(arguments[0]).textContent", name)
+
+    def wait_for_text(self, name, pattern):
+        wait_until(lambda: re.search(pattern, self.text(name)), f"{pattern!r} in #{name}, where {self.text(name)!r} is")
+        return self.text(name)
+
+    def assert_no_errors(self, expected=None):
+        for entry in self.browser.get_log("browser"):
+            if expected is None or not expected.search(entry["message"]):
+                self.assertNotIn(entry["level"], ("SEVERE", "WARNING"), entry["message"])
+
+    def colours(self):
+        """Of the picture's canvas: how many grey levels there are, and how many pixels of the landmarks' green."""
+        return self.browser.execute_script("""
+            const canvas = document.getElementById('picture');
+            const copy = new OffscreenCanvas(canvas.width, canvas.height).getContext('2d', {willReadFrequently: true});
+            copy.drawImage(canvas, 0, 0);
+            const {data} = copy.getImageData(0, 0, canvas.width, canvas.height);
+            const greys = new Set();
+            let green = 0;
+            for (let i = 0; i < data.length; i += 4) {
+              const [r, g, b] = [data[i], data[i + 1], data[i + 2]];
+              if (r === g && g === b) greys.add(r);
+              if (g > 220 && r < 100 && b < 160) ++green;
+            }
+            return [greys.size, green];""")
+
+    def pointed(self):
+        """What the page says of the pixel last chosen, to all digits; None: nothing yet."""
+        said = self.browser.execute_script("return {...document.getElementById('pointing').dataset}")
+        return {name: float(value) for name, value in said.items()} or None
+
+    def assert_direction_is_the_interfaces(self, said, address):
+        question = {"frame": int(said["frame"]), "pixels": [[said["u"], said["v"]]]}
+        request = urllib.request.Request(address + "api/v1/direction", json.dumps(question).encode(),
+                                         {"Content-Type": "application/json"})
+        with urllib.request.urlopen(request, timeout=DEADLINE_S) as answer:
+            direction = json.load(answer)["directions"][0]
+        self.assertEqual(said["azimuth"], direction["azimuth_rad"])
+        self.assertEqual(said["elevation"], direction["elevation_rad"])
+        self.assertEqual(said["sigma"], direction["sigma_rad"])
+
+    def test_shows_what_goes_on_and_the_direction_of_a_click(self):
+        _, address = self.start(self.config(self.camera(settings=SETTINGS)))
+        self.browser.get(address)
+        self.wait_for_text("link", "^live$")
+        self.wait_for_text("mode", "^OE$")
+        self.wait_for_text("seen", r"frame \d+: [1-9]\d+ landmarks used")
+        wait_until(lambda: self.colours()[0] > 30 and self.colours()[1] > 300, "a picture with landmarks")
+        before = self.text("pan"), self.text("seen")
+        wait_until(lambda: self.text("pan") != before[0] and self.text("seen") != before[1], "an update")
+        self.wait_for_text("pan-caption", r"Pan: now .*°, from .* to ")
+        self.wait_for_text("residual-caption", r"Residual: now 0\.\d+ px")
+        self.wait_for_text("latency-caption", r"p50 \d.* p90 .* p99 ")
+        self.wait_for_text("calibration", r"Focal length10669\.3\spx")
+        self.wait_for_text("camera", r"rtsp://127\.0\.0\.1")
+        self.wait_for_text("health", r"Frames[1-9]")
+
+        picture = self.browser.find_element(By.ID, "picture")
+        ActionChains(self.browser).move_to_element_with_offset(picture, 100, -50).click().perform()
+        wait_until(self.pointed, "a direction")
+        clicked = self.pointed()
+        self.assert_direction_is_the_interfaces(clicked, address)
+        scale = SETTINGS["image"]["width"] / picture.size["width"]
+        self.assertAlmostEqual(clicked["u"], SETTINGS["image"]["width"] / 2 + 100 * scale, delta=2)
+        self.assertAlmostEqual(clicked["v"], SETTINGS["image"]["height"] / 2 - 50 * scale, delta=2)
+        self.assertRegex(self.text("azimuth"), r"^−?\d+\.\d{5}°$")
+        self.assertRegex(self.text("sigma"), r"rad$")
+
+        picture.send_keys(Keys.ARROW_LEFT, Keys.ARROW_UP, Keys.ENTER)
+        wait_until(lambda: self.pointed()["u"] != clicked["u"], "the direction under the cross")
+        step = SETTINGS["image"]["width"] / 100
+        self.assertAlmostEqual(self.pointed()["u"], SETTINGS["image"]["width"] / 2 - step)
+        self.assertAlmostEqual(self.pointed()["v"], SETTINGS["image"]["height"] / 2 - step)
+        self.assert_direction_is_the_interfaces(self.pointed(), address)
+        self.assert_no_errors()
+
+    def test_says_that_the_program_is_gone_and_follows_the_next_one(self):
+        camera = self.camera(settings=SETTINGS)
+        config = self.config(camera, http=f"127.0.0.1:{free_port()}")
+        run, address = self.start(config)
+        self.browser.get(address)
+        self.wait_for_text("seen", r"frame \d+: .*used")
+        run.end(signal.SIGKILL)
+        self.wait_for_text("link", r"disconnected: data is \d+ s old")
+        wait_until(lambda: "grayscale(1)" in self.browser.find_element(By.ID, "mode").find_element(
+            By.XPATH, "ancestor::*[contains(@class, 'live')]").value_of_css_property("filter"), "grey data")
+        first_id = self.browser.execute_script("return startId")
+        _, again = self.start(config)
+        self.assertEqual(again, address)
+        self.wait_for_text("link", "^live$")
+        self.assertNotEqual(self.browser.execute_script("return startId"), first_id)
+        self.wait_for_text("seen", r"frame \d+: .*used")
+        self.assert_no_errors(EXPECTED_ERRORS)
+
+    def test_asks_for_the_token_and_keeps_it_for_this_tab(self):
+        _, address = self.start(self.config(self.camera(settings=SETTINGS), token_env="TEST_TOKEN"),
+                                TEST_TOKEN=TOKEN)
+        self.browser.get(address)
+        field = self.browser.find_element(By.ID, "token")
+        wait_until(field.is_displayed, "the question for the token")
+        field.send_keys("wrong-horse", Keys.ENTER)
+        self.wait_for_text("login-error", "refused")
+        wait_until(field.is_displayed, "the question for the token, again")
+        field.send_keys(TOKEN, Keys.ENTER)
+        self.wait_for_text("link", "^live$")
+        self.wait_for_text("seen", r"frame \d+: ")
+        self.browser.refresh()
+        self.wait_for_text("link", "^live$")
+        self.assertFalse(self.browser.find_element(By.ID, "login").is_displayed())
+        self.assertEqual(self.browser.execute_script("return [localStorage.length, document.cookie, location.href]"),
+                         [0, "", address])
+        self.assert_no_errors(EXPECTED_ERRORS)
+
+    def test_fits_a_phone_and_says_why_there_is_no_picture(self):
+        self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
+            "width": 390, "height": 844, "deviceScaleFactor": 3, "mobile": True})
+        _, address = self.start(self.config(self.camera(settings=SETTINGS), mode="PT"))
+        self.browser.get(address)
+        self.wait_for_text("link", "^live$")
+        self.wait_for_text("mode", "^PT$")
+        self.wait_for_text("seen", "^no picture: ")
+        self.wait_for_text("calibration", "Focal length")
+        self.assertEqual(self.browser.execute_script("return [innerWidth, document.documentElement.scrollWidth]"),
+                         [390, 390])
+        too_wide = self.browser.execute_script("""
+            return [...document.querySelectorAll('body *')].filter((one) => !one.classList.contains('unseen') &&
+              (one.getBoundingClientRect().right > innerWidth || one.getBoundingClientRect().left < 0)).map((one) => one.id || one.tagName)""")
+        self.assertEqual(too_wide, [])
+        self.assert_no_errors(re.compile("status of 503"))
+
+
+if __name__ == "__main__":
+    unittest.main()
