@@ -111,7 +111,8 @@ ServerResponse orientation(const HttpApiSources& sources) {
 
 ServerResponse history(const HttpApiSources& sources) {
   Json columns;
-  for (const char* name : {"time_s", "mode", "pan_rad", "tilt_rad", "landmarks", "latency_s"})
+  for (const char* name :
+       {"time_s", "mode", "pan_rad", "tilt_rad", "landmarks", "residual_px", "latency_s"})
     columns[name] = Json::array();
   for (const HistorySample& sample : sources.live->history()) {
     columns["time_s"].push_back(sample.time_s);
@@ -119,6 +120,7 @@ ServerResponse history(const HttpApiSources& sources) {
     columns["pan_rad"].push_back(or_null(sample.pan_rad));
     columns["tilt_rad"].push_back(or_null(sample.tilt_rad));
     columns["landmarks"].push_back(sample.landmarks);
+    columns["residual_px"].push_back(or_null(sample.residual_px));
     columns["latency_s"].push_back(or_null(sample.latency_s));
   }
   return json_response(columns);
@@ -321,6 +323,10 @@ void add_record_metrics(const OrientationRecord& newest, MetricsText* out) {
     out->add(std::int64_t{newest.mode == mode}, {{"mode", to_string(mode)}});
   out->gauge("alidade_landmarks", "Landmarks that held the newest record");
   out->add(std::int64_t{newest.landmarks});
+  if (newest.residual_px) {
+    out->gauge("alidade_residual_pixels", "Root mean square of their residuals' lengths");
+    out->add(*newest.residual_px);
+  }
   if (newest.orientation) {
     constexpr std::array<const char*, 3> kAxes = {"right", "down", "forward"};
     out->gauge("alidade_orientation_sigma_radians",

@@ -90,6 +90,7 @@ void LiveState::add_to_history(const OrientationRecord& record) {
     sample.tilt_rad = record.orientation->tilt_rad;
   }
   sample.landmarks = record.landmarks;
+  sample.residual_px = record.residual_px;
   sample.latency_s = latency_s;
   history_.push_back(sample);
   while (history_.front().time_s < time_s - options_.history_s) history_.pop_front();

@@ -37,6 +37,7 @@ struct HistorySample {
   std::optional<double> pan_rad;
   std::optional<double> tilt_rad;
   int landmarks = 0;
+  std::optional<double> residual_px;
   std::optional<double> latency_s;  // the longest of the step
 };
 

@@ -125,6 +125,7 @@ TEST(LiveState, ThinsTheHistoryOutAndKeepsTheLongestLatency) {
   for (std::int64_t frame = 0; frame < 2500; ++frame) {  // 100 s
     OrientationRecord one = record(frame);
     if (frame == 2404) one.latency_s = 0.5;  // one step begins with frame 2403
+    if (frame < 2400) one.residual_px = 0.0625;
     EXPECT_TRUE(state.write(one));
   }
   const std::vector<HistorySample> history = state.history();
@@ -136,6 +137,8 @@ TEST(LiveState, ThinsTheHistoryOutAndKeepsTheLongestLatency) {
   double longest_s = 0;
   for (const HistorySample& sample : history) longest_s = std::max(longest_s, *sample.latency_s);
   EXPECT_EQ(longest_s, 0.5);
+  EXPECT_EQ(history.front().residual_px, 0.0625);
+  EXPECT_FALSE(history.back().residual_px);
   EXPECT_TRUE(state.write(lost(250)));
   EXPECT_FALSE(state.history().back().pan_rad);
   EXPECT_EQ(state.history().back().mode, RecordMode::kNone);

@@ -129,7 +129,11 @@ class Http(SystemTest):
                                    realtime={"mode": mode}, **sections)
         run = self.alidade("run", "-c", config, TEST_TOKEN=TOKEN)
         api = Api(run)
-        wait_until(lambda: (api.ask("api/v1/status").json()["frames"]["pt"] > 1), "an orientation")
+
+        def oriented():
+            frames = api.ask("api/v1/status").json()["frames"]
+            return frames["oe"] + frames["pt"] > 1
+        wait_until(oriented, "an orientation")
         return run, api
 
     def end(self, run):
@@ -239,6 +243,29 @@ class Http(SystemTest):
             self.assertGreater(values["alidade_stage_duration_seconds_count", (("stage", stage),)], 1)
         self.assertGreater(values["process_resident_memory_bytes", ()], 1e6)
         self.assertEqual(api.ask("metrics", token=None).status, 401)
+        self.end(run)
+
+    def test_shows_a_picture_and_what_was_seen_in_it(self):
+        run, api = self.start(mode="OE")
+        picture = api.ask("api/v1/picture")
+        self.assertEqual((picture.status, picture.headers["Content-Type"]), (200, "image/jpeg"))
+        self.assertEqual(picture.body[:2], b"\xff\xd8")
+        frame = int(picture.headers["X-Alidade-Frame"])
+        for which, status in ((f"?frame={frame}", 200), ("", 200), ("?frame=x", 400), (f"?frame={10**9}", 404)):
+            overlay = api.ask("api/v1/overlay" + which)
+            self.assertEqual(overlay.status, status)
+            check(overlay.json(), self.described("/api/v1/overlay", "get", status))
+            if status == 200:
+                self.assertEqual([overlay.json()[name] for name in ("width", "height", "scale")], [IMAGE["width"], IMAGE["height"], 1])
+                self.assertGreaterEqual(overlay.json()["frame"], frame)
+        for path in ("/api/v1/picture", "/api/v1/overlay"):
+            self.check_answer(api, path, 401, token=None)
+        self.end(run)
+
+    def test_says_that_there_is_no_picture_where_none_is_decoded(self):
+        run, api = self.start(mode="PT")
+        for path in ("/api/v1/picture", "/api/v1/overlay"):
+            self.assertIn("mode: PT", self.check_answer(api, path, 503)["error"])
         self.end(run)
 
     def parse_metrics(self, text):
