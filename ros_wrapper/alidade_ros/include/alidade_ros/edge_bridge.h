@@ -1,0 +1,119 @@
+#pragma once
+// EdgeBridge: the node and the nodelet. A client of one edge executable's HTTP API that publishes what it
+// says, in ROS conventions, with capture times as stamps. Topics, services, parameters: README.md.
+//
+// Threads: the event stream's publishes records; a second one asks once a second for status and, when it
+// changed, the calibration, updates the diagnostics, and looks whether the master still knows this node.
+// roscpp registers with a master once: after the master's restart all topics and services are advertised
+// anew. Services are called on the spinner's threads and wait for the edge at most ten seconds.
+// Lock order: ports_mutex_, then mutex_. Service callbacks never take ports_mutex_, since taking a service
+// down waits for them.
+
+#include <alidade_msgs/Calibrate.h>
+#include <alidade_msgs/DirectionToPixel.h>
+#include <alidade_msgs/PixelToDirection.h>
+#include <alidade_msgs/Status.h>
+#include <ros/ros.h>
+
+#include <condition_variable>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+#include <thread>
+
+#include "alidade_ros/clock_map.h"
+#include "alidade_ros/conversions.h"
+#include "alidade_ros/event_stream.h"
+#include "alidade_ros/http_client.h"
+#include "alidade_ros/record.h"
+
+namespace diagnostic_updater {
+class DiagnosticStatusWrapper;
+}
+
+namespace alidade_ros {
+
+struct BridgeOptions {
+  EdgeAddress edge;
+  FrameNames names;
+  bool publish_tf = true;
+  int tf_rows = 3;           // transforms a frame
+  double time_offset_s = 0;  // added to every stamp
+};
+
+// From a node's private parameters. Throws std::invalid_argument with one line that names the parameter.
+[[nodiscard]] BridgeOptions read_options(const ros::NodeHandle& private_handle);
+
+class EdgeBridge {
+ public:
+  EdgeBridge(const ros::NodeHandle& handle, const ros::NodeHandle& private_handle,
+             const BridgeOptions& options);
+  ~EdgeBridge();
+  EdgeBridge(const EdgeBridge&) = delete;
+  EdgeBridge& operator=(const EdgeBridge&) = delete;
+
+ private:
+  struct Ports;
+
+  void advertise();
+  [[nodiscard]] bool master_forgot_us() const;
+
+  void on_hello(const Hello& hello);
+  void on_clock(const ClockPair& pair);
+  void on_record(const Record& record, std::uint64_t number);
+  void on_disconnected(const std::string& error);
+  void publish_camera_info();
+  void publish_status();
+
+  void poll();
+  void poll_status();
+  void poll_calibration();
+  void wake_poll();
+
+  void diagnose_connection(diagnostic_updater::DiagnosticStatusWrapper& status);
+  void diagnose_orientation(diagnostic_updater::DiagnosticStatusWrapper& status);
+
+  bool pixel_to_direction(alidade_msgs::PixelToDirection::Request& request,
+                          alidade_msgs::PixelToDirection::Response& response);
+  bool direction_to_pixel(alidade_msgs::DirectionToPixel::Request& request,
+                          alidade_msgs::DirectionToPixel::Response& response);
+  bool calibrate(alidade_msgs::Calibrate::Request& request,
+                 alidade_msgs::Calibrate::Response& response);
+
+  [[nodiscard]] ClockMap clock() const;
+
+  ros::NodeHandle handle_;
+  ros::NodeHandle private_handle_;
+  const BridgeOptions options_;
+  HttpClient client_;
+  EventStream stream_;
+
+  std::mutex ports_mutex_;
+  std::unique_ptr<Ports> ports_;  // guarded by ports_mutex_, and what the next three hold
+  std::optional<sensor_msgs::CameraInfo> camera_info_;
+  std::optional<alidade_msgs::Calibration> calibration_;
+  std::optional<alidade_msgs::Status> status_;
+
+  mutable std::mutex mutex_;  // guards the rest
+  ClockMap clock_;
+  Hello hello_;
+  bool connected_ = false;
+  std::string error_ = "not connected yet";
+  std::optional<Record> newest_;
+  ros::Time newest_stamp_;
+  Axes axes_;
+  int width_ = 0;  // px; 0: not known yet
+  int height_ = 0;
+  std::string status_json_;
+  bool calibration_is_old_ = true;
+  std::uint64_t diagnosed_records_ = 0;
+  ros::WallTime diagnosed_at_;
+  bool wake_ = false;
+  bool ending_ = false;
+  std::condition_variable changed_;
+
+  std::thread poll_thread_;
+};
+
+}  // namespace alidade_ros

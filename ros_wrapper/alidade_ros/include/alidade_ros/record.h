@@ -1,0 +1,83 @@
+#pragma once
+// Record and friends: what the edge executable's HTTP API says, as structs in its own conventions.
+//
+// Base forward-right-down, camera right-down-forward, pan positive right, tilt positive up, the centre of
+// the top-left pixel at (0.5, 0.5); SI. The field names and their meaning are those of the API; a value
+// that is null there has none here. Pure: text in, value or one line of error out. Unknown fields are
+// ignored, so that an older node understands a newer edge.
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <nlohmann/json.hpp>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "alidade_ros/clock_map.h"
+
+namespace alidade_ros {
+
+struct Record {
+  struct Orientation {
+    double pan_rad = 0;
+    double tilt_rad = 0;
+    double pan_rate_rad_s = 0;
+    double tilt_rate_rad_s = 0;
+    double pan_acceleration_rad_s2 = 0;
+    double tilt_acceleration_rad_s2 = 0;
+    std::array<double, 4> q_base_from_camera{0, 0, 0, 1};  // x, y, z, w
+    std::array<double, 9> covariance_rad2{};               // row-major, of xi in R * Exp(xi)
+  };
+
+  std::optional<std::int64_t> frame;
+  std::optional<double> time_s;
+  double receive_time_s = 0;
+  std::optional<double> latency_s;
+  std::string mode;  // OE, PT, none
+  std::string status;
+  bool calibrated = false;
+  std::string calibration;
+  std::string needs;  // empty: nothing
+  double reference_row = 0;
+  std::optional<Orientation> orientation;
+  int landmarks = 0;
+  std::optional<double> residual_px;
+  double line_delay_s = 0;
+  double focal_length_px = 0;
+  double aspect = 1;
+  double radial_distortion = 0;
+};
+
+// The event `hello` of the stream.
+struct Hello {
+  std::string version;
+  std::string start;
+  ClockPair clock;
+};
+
+// What of a calibration is more than text to the node.
+struct CalibrationValues {
+  int width = 0;
+  int height = 0;
+  double focal_length = 0;
+  double aspect = 1;
+  double radial_distortion = 0;
+  double line_delay = 0;
+  std::array<double, 3> pan_axis{0, 0, 1};
+  std::array<double, 3> tilt_axis{0, 1, 0};
+  double pan_scale = 1;
+  double tilt_scale = 1;
+  double clock_offset = 0;
+  std::optional<double> zoom;
+  std::vector<std::string> names;
+  std::vector<double> covariance;  // row-major over names; empty: not told
+};
+
+[[nodiscard]] bool parse_record(const std::string& json, Record* record, std::string* error);
+[[nodiscard]] bool parse_hello(const std::string& json, Hello* hello, std::string* error);
+[[nodiscard]] bool parse_clock_pair(const std::string& json, ClockPair* pair, std::string* error);
+[[nodiscard]] bool parse_calibration(const std::string& json, CalibrationValues* values,
+                                     std::string* error);
+
+}  // namespace alidade_ros

@@ -1,0 +1,112 @@
+#include "alidade_ros/record.h"
+
+namespace alidade_ros {
+namespace {
+
+using Json = nlohmann::json;
+
+// Absent and null are the same: no value.
+template <typename T>
+std::optional<T> optional_of(const Json& object, const char* name) {
+  const auto found = object.find(name);
+  if (found == object.end() || found->is_null()) return std::nullopt;
+  return found->get<T>();
+}
+
+template <typename Read>
+bool parse(const std::string& text, const char* what, std::string* error, const Read& read) {
+  try {
+    read(Json::parse(text));
+    return true;
+  } catch (const Json::exception& e) {
+    *error = std::string("the edge's ") + what + " cannot be understood: " + e.what();
+    return false;
+  }
+}
+
+ClockPair clock_pair(const Json& json) {
+  return {json.at("monotonic_s").get<double>(), json.at("wall_s").get<double>(),
+          json.at("bracket_s").get<double>()};
+}
+
+// A parameter of the calibration; null or absent: the default stays.
+template <typename T>
+void read_value(const Json& calibration, const char* name, T* value) {
+  const auto found = calibration.find(name);
+  if (found != calibration.end() && found->is_object()) *value = found->at("value").get<T>();
+}
+
+}  // namespace
+
+bool parse_record(const std::string& text, Record* record, std::string* error) {
+  return parse(text, "record", error, [&](const Json& json) {
+    Record r;
+    r.frame = optional_of<std::int64_t>(json, "frame");
+    r.time_s = optional_of<double>(json, "time_s");
+    r.receive_time_s = json.at("receive_time_s").get<double>();
+    r.latency_s = optional_of<double>(json, "latency_s");
+    r.mode = json.at("mode").get<std::string>();
+    r.status = json.at("status").get<std::string>();
+    r.calibrated = json.at("calibrated").get<bool>();
+    r.calibration = json.at("calibration").get<std::string>();
+    r.needs = optional_of<std::string>(json, "needs").value_or("");
+    r.reference_row = optional_of<double>(json, "reference_row").value_or(0);
+    r.landmarks = json.at("landmarks").get<int>();
+    r.residual_px = optional_of<double>(json, "residual_px");
+    r.line_delay_s = json.at("line_delay_s").get<double>();
+    r.focal_length_px = json.at("focal_length_px").get<double>();
+    r.aspect = json.at("aspect").get<double>();
+    r.radial_distortion = json.at("radial_distortion").get<double>();
+    if (r.mode != "none") {
+      Record::Orientation& o = r.orientation.emplace();
+      o.pan_rad = json.at("pan_rad").get<double>();
+      o.tilt_rad = json.at("tilt_rad").get<double>();
+      o.pan_rate_rad_s = json.at("pan_rate_rad_s").get<double>();
+      o.tilt_rate_rad_s = json.at("tilt_rate_rad_s").get<double>();
+      o.pan_acceleration_rad_s2 = json.at("pan_acceleration_rad_s2").get<double>();
+      o.tilt_acceleration_rad_s2 = json.at("tilt_acceleration_rad_s2").get<double>();
+      o.q_base_from_camera = json.at("q_base_from_camera").get<std::array<double, 4>>();
+      o.covariance_rad2 = json.at("orientation_covariance_rad2").get<std::array<double, 9>>();
+    }
+    *record = r;
+  });
+}
+
+bool parse_hello(const std::string& text, Hello* hello, std::string* error) {
+  return parse(text, "greeting", error, [&](const Json& json) {
+    *hello = {json.at("alidade").get<std::string>(), json.at("start").get<std::string>(),
+              clock_pair(json)};
+  });
+}
+
+bool parse_clock_pair(const std::string& text, ClockPair* pair, std::string* error) {
+  return parse(text, "clock", error, [&](const Json& json) { *pair = clock_pair(json); });
+}
+
+bool parse_calibration(const std::string& text, CalibrationValues* values, std::string* error) {
+  return parse(text, "calibration", error, [&](const Json& json) {
+    CalibrationValues v;
+    v.width = json.at("image").at("width").get<int>();
+    v.height = json.at("image").at("height").get<int>();
+    v.focal_length = json.at("focal_length").at("value").get<double>();
+    read_value(json, "aspect", &v.aspect);
+    read_value(json, "radial_distortion", &v.radial_distortion);
+    read_value(json, "line_delay", &v.line_delay);
+    read_value(json, "pan_axis", &v.pan_axis);
+    read_value(json, "tilt_axis", &v.tilt_axis);
+    read_value(json, "pan_scale", &v.pan_scale);
+    read_value(json, "tilt_scale", &v.tilt_scale);
+    read_value(json, "clock_offset", &v.clock_offset);
+    v.zoom = optional_of<double>(json, "zoom");
+    const auto covariance = json.find("covariance");
+    if (covariance != json.end() && covariance->is_object()) {
+      v.names = covariance->at("names").get<std::vector<std::string>>();
+      for (const auto& row : covariance->at("matrix").get<std::vector<std::vector<double>>>()) {
+        v.covariance.insert(v.covariance.end(), row.begin(), row.end());
+      }
+    }
+    *values = v;
+  });
+}
+
+}  // namespace alidade_ros
