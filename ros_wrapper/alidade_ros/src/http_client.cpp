@@ -62,12 +62,11 @@ std::string error_of(const std::string& url, long status, const std::string& bod
 }  // namespace
 
 std::string wrong_with(const EdgeAddress& address) {
-  const bool http = address.url.rfind("http://", 0) == 0 || address.url.rfind("https://", 0) == 0;
-  if (!http) return "url: \"" + address.url + "\" must begin with http:// or https://";
-  const std::string rest = address.url.substr(address.url.find("//") + 2);
-  if (rest.find('@') != std::string::npos) {
+  if (address.url.find('@') != std::string::npos) {
     return "url: must hold neither user nor password; use token_env or token_file";
   }
+  const bool http = address.url.rfind("http://", 0) == 0 || address.url.rfind("https://", 0) == 0;
+  if (!http) return "url: \"" + address.url + "\" must begin with http:// or https://";
   if (!address.token_env.empty() && !address.token_file.empty()) {
     return "token_env and token_file exclude each other";
   }
