@@ -13,7 +13,7 @@ namespace alidade_ros {
 namespace {
 
 constexpr std::size_t kMaxAnswerBytes = 16 << 20;
-constexpr long kRequestTimeoutMs = 10000;
+constexpr double kRequestTimeoutS = 10;  // of silence
 constexpr int kStopPollMs = 100;
 
 // CURL and CURLM are both void.
@@ -76,6 +76,8 @@ std::string wrong_with(const EdgeAddress& address) {
 // One exchange, on a connection of its own.
 class HttpClient::Transfer {
  public:
+  using Clock = std::chrono::steady_clock;
+
   Transfer(const HttpClient& client, const std::string& path)
       : client_(client),
         url_(client.address_.url + path),
@@ -104,16 +106,22 @@ class HttpClient::Transfer {
 
   CURL* easy() { return easy_.get(); }
 
-  // False from on_bytes ends the transfer.
-  void run(std::function<bool(const char*, std::size_t)> on_bytes) {
+  // False from on_bytes ends the transfer; so does silence for longer than silence_timeout_s.
+  void run(double silence_timeout_s, std::function<bool(const char*, std::size_t)> on_bytes) {
     if (!error_.empty()) return;
     on_bytes_ = std::move(on_bytes);
+    heard_at_ = Clock::now();
+    const std::chrono::duration<double> patience(silence_timeout_s);
     curl_easy_setopt(easy_.get(), CURLOPT_HTTPHEADER, headers_.get());
     curl_multi_add_handle(multi_.get(), easy_.get());
     int running = 1;
     while (running > 0 && !client_.stopped()) {
       curl_multi_perform(multi_.get(), &running);
       if (running > 0) curl_multi_poll(multi_.get(), nullptr, 0, kStopPollMs, nullptr);
+      if (Clock::now() - heard_at_ > patience) {
+        error_ = url_ + ": silent for " + std::to_string(std::lround(silence_timeout_s)) + " s";
+        return;
+      }
     }
     if (client_.stopped()) {
       error_ = "stopped";
@@ -139,6 +147,7 @@ class HttpClient::Transfer {
  private:
   static std::size_t write(char* bytes, std::size_t size, std::size_t count, void* self) {
     auto& transfer = *static_cast<Transfer*>(self);
+    transfer.heard_at_ = Clock::now();
     if (transfer.on_bytes_(bytes, size * count)) return size * count;
     transfer.ended_by_reader_ = true;
     return 0;
@@ -151,6 +160,7 @@ class HttpClient::Transfer {
   std::unique_ptr<curl_slist, ListDeleter> headers_;
   char error_text_[CURL_ERROR_SIZE] = {};
   std::function<bool(const char*, std::size_t)> on_bytes_;
+  Clock::time_point heard_at_;
   bool ended_by_reader_ = false;
   std::string error_;
 };
@@ -164,7 +174,6 @@ HttpClient::~HttpClient() = default;
 
 HttpClient::Answer HttpClient::request(const std::string& path, const std::string* json) {
   Transfer transfer(*this, path);
-  curl_easy_setopt(transfer.easy(), CURLOPT_TIMEOUT_MS, kRequestTimeoutMs);
   if (json != nullptr) {
     transfer.add_header("Content-Type: application/json");
     curl_easy_setopt(transfer.easy(), CURLOPT_POSTFIELDSIZE_LARGE,
@@ -172,7 +181,7 @@ HttpClient::Answer HttpClient::request(const std::string& path, const std::strin
     curl_easy_setopt(transfer.easy(), CURLOPT_POSTFIELDS, json->c_str());
   }
   Answer answer;
-  transfer.run([&answer](const char* bytes, std::size_t size) {
+  transfer.run(kRequestTimeoutS, [&answer](const char* bytes, std::size_t size) {
     answer.body.append(bytes, size);
     return answer.body.size() <= kMaxAnswerBytes;
   });
@@ -195,11 +204,8 @@ std::string HttpClient::stream(const std::string& path,
                                const std::function<bool(const char*, std::size_t)>& on_bytes) {
   Transfer transfer(*this, path);
   transfer.add_header("Accept: text/event-stream");
-  curl_easy_setopt(transfer.easy(), CURLOPT_LOW_SPEED_LIMIT, 1L);
-  curl_easy_setopt(transfer.easy(), CURLOPT_LOW_SPEED_TIME,
-                   std::lround(address_.silence_timeout_s));
   std::string refusal;
-  transfer.run([&](const char* bytes, std::size_t size) {
+  transfer.run(address_.silence_timeout_s, [&](const char* bytes, std::size_t size) {
     if (transfer.status() == 200) return on_bytes(bytes, size);
     refusal.append(bytes, size);
     return refusal.size() < kMaxAnswerBytes;

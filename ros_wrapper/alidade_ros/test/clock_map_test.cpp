@@ -7,7 +7,7 @@
 namespace alidade_ros {
 namespace {
 
-constexpr double kOffset = 1.7e9;      // wall - monotonic
+constexpr double kOffset = 1.7e9;     // wall - monotonic
 constexpr double kRounding = 1.5e-6;  // of a wall time in a double, and the map's allowance for it
 
 // The wall clock was read somewhere within the bracket.

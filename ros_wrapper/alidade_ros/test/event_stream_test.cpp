@@ -33,30 +33,32 @@ std::string record(int number) {
 class FakeEdge {
  public:
   explicit FakeEdge(std::vector<std::string> texts) : texts_(std::move(texts)) {
-    server_.Get("/api/v1/stream", [this](const httplib::Request& request, httplib::Response& response) {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      authorization_ = request.get_header_value("Authorization");
-      const std::size_t connection = connections_++;
-      if (connection < refusals_) {
-        response.status = 503;
-        response.set_content("{\"error\":\"too many streams\"}", "application/json");
-        return;
-      }
-      const std::size_t index = connection - refusals_;
-      const bool last = index + 1 >= texts_.size();
-      const std::string text = texts_[std::min(index, texts_.size() - 1)];
-      response.set_chunked_content_provider(
-          "text/event-stream", [this, text, last](std::size_t sent, httplib::DataSink& sink) {
-            if (sent < text.size()) return sink.write(text.data() + sent, text.size() - sent);
-            if (last) {
-              wait_for_end();
-            } else {
-              sink.done();
-            }
-            return !last;
-          });
-    });
-    server_.Post("/api/v1/direction", [](const httplib::Request& request, httplib::Response& response) {
+    server_.Get(
+        "/api/v1/stream", [this](const httplib::Request& request, httplib::Response& response) {
+          const std::lock_guard<std::mutex> lock(mutex_);
+          authorization_ = request.get_header_value("Authorization");
+          const std::size_t connection = connections_++;
+          if (connection < refusals_) {
+            response.status = 503;
+            response.set_content("{\"error\":\"too many streams\"}", "application/json");
+            return;
+          }
+          const std::size_t index = connection - refusals_;
+          const bool last = index + 1 >= texts_.size();
+          const std::string text = texts_[std::min(index, texts_.size() - 1)];
+          response.set_chunked_content_provider(
+              "text/event-stream", [this, text, last](std::size_t sent, httplib::DataSink& sink) {
+                if (sent < text.size()) return sink.write(text.data() + sent, text.size() - sent);
+                if (last) {
+                  wait_for_end();
+                } else {
+                  sink.done();
+                }
+                return !last;
+              });
+        });
+    server_.Post("/api/v1/direction", [](const httplib::Request& request,
+                                         httplib::Response& response) {
       response.status = request.body == "{}" ? 200 : 400;
       response.set_content(request.body == "{}" ? "{\"ok\":1}" : "{\"error\":\"pixels: missing\"}",
                            "application/json");
@@ -125,8 +127,8 @@ class Follower {
   // Waits until this many words came; empty if they do not within a generous time.
   std::vector<std::string> words(std::size_t count) {
     std::unique_lock<std::mutex> lock(mutex_);
-    const bool came = changed_.wait_for(lock, std::chrono::seconds(60),
-                                        [&] { return words_.size() >= count; });
+    const bool came =
+        changed_.wait_for(lock, std::chrono::seconds(60), [&] { return words_.size() >= count; });
     EXPECT_TRUE(came);
     return words_;
   }
