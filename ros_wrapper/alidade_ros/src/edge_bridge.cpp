@@ -7,7 +7,6 @@
 
 #include <chrono>
 #include <cmath>
-#include <nlohmann/json.hpp>
 #include <stdexcept>
 #include <utility>
 
@@ -214,7 +213,7 @@ void EdgeBridge::on_record(const Record& record, std::uint64_t number) {
     newest_ = record;
     newest_stamp_ = stamp;
     if (record.calibrated) axes = axes_;
-    height = height_;
+    if (size_) height = size_->height;
   }
   {
     const std::lock_guard<std::mutex> lock(ports_mutex_);
@@ -239,8 +238,8 @@ void EdgeBridge::publish_camera_info() {
   sensor_msgs::CameraInfo info;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
-    if (!newest_ || width_ <= 0) return;
-    info = camera_info(*newest_, width_, height_, newest_stamp_, options_.names);
+    if (!newest_ || !size_) return;
+    info = camera_info(*newest_, size_->width, size_->height, newest_stamp_, options_.names);
   }
   const std::lock_guard<std::mutex> lock(ports_mutex_);
   if (camera_info_ && same_lens(*camera_info_, info)) return;
@@ -313,14 +312,15 @@ void EdgeBridge::poll_status() {
     ROS_WARN_THROTTLE(30, "%s", answer.error.c_str());
     return;
   }
-  const auto json = nlohmann::json::parse(answer.body, nullptr, false);
+  std::optional<ImageSize> size;
+  std::string error;
+  if (!parse_image_size(answer.body, &size, &error)) {
+    ROS_WARN_THROTTLE(30, "%s", error.c_str());
+    return;
+  }
   const std::lock_guard<std::mutex> lock(mutex_);
   status_json_ = answer.body;
-  if (json.is_object() && json.contains("image")) {
-    const auto& image = json["image"];
-    width_ = image.value("width", 0);
-    height_ = image.value("height", 0);
-  }
+  if (size) size_ = size;
 }
 
 void EdgeBridge::poll_calibration() {

@@ -1,5 +1,7 @@
 #include "alidade_ros/record.h"
 
+#include <nlohmann/json.hpp>
+
 namespace alidade_ros {
 namespace {
 
@@ -81,6 +83,15 @@ bool parse_hello(const std::string& text, Hello* hello, std::string* error) {
 
 bool parse_clock_pair(const std::string& text, ClockPair* pair, std::string* error) {
   return parse(text, "clock", error, [&](const Json& json) { *pair = clock_pair(json); });
+}
+
+bool parse_image_size(const std::string& text, std::optional<ImageSize>* size, std::string* error) {
+  return parse(text, "status", error, [&](const Json& json) {
+    const auto width = optional_of<int>(json.at("image"), "width");
+    const auto height = optional_of<int>(json.at("image"), "height");
+    size->reset();
+    if (width && height) *size = ImageSize{*width, *height};
+  });
 }
 
 bool parse_calibration(const std::string& text, CalibrationValues* values, std::string* error) {

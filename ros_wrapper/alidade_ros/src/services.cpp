@@ -125,6 +125,7 @@ bool pixel_answer(const std::string& json, const ClockMap& clock,
       } else {
         pixel.stamp = stamp_of(item, clock);
         pixel.pixel = ros_from_pixel(item.at("pixel").at(0), item.at("pixel").at(1));
+        pixel.inside = item.at("inside").get<bool>();
         read_covariance(item.at("covariance_px2"), &pixel);
       }
       response->pixels.push_back(pixel);

@@ -64,6 +64,18 @@ TEST(Record, TheGreetingTellsTheRunAndTheClock) {
   EXPECT_EQ(hello.clock.wall_s, 1.7e9);
 }
 
+TEST(Record, StatusTellsTheSizeOnceThereIsAFrame) {
+  std::optional<ImageSize> size;
+  std::string error;
+  ASSERT_TRUE(parse_image_size(R"({"image":{"width":160,"height":96}})", &size, &error)) << error;
+  ASSERT_TRUE(size);
+  EXPECT_EQ(size->width, 160);
+  EXPECT_EQ(size->height, 96);
+  ASSERT_TRUE(parse_image_size(R"({"image":{"width":null,"height":null}})", &size, &error));
+  EXPECT_FALSE(size);
+  EXPECT_FALSE(parse_image_size("{}", &size, &error));
+}
+
 TEST(Record, CalibrationHasValuesAndCovariance) {
   CalibrationValues values;
   std::string error;

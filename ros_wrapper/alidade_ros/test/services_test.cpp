@@ -73,12 +73,13 @@ TEST(Services, AnswerInTheConventionsOfRos) {
   alidade_msgs::DirectionToPixel::Response inverse;
   ASSERT_TRUE(pixel_answer(
       R"({"frame":7,"time_s":12.5,"mode":"OE","pixels":[
-          {"direction":[0.6,0.64,-0.48],"pixel":[100.5,50.5],"time_s":12.75,"covariance_px2":[[1,2],[3,4]]},
+          {"direction":[0.6,0.64,-0.48],"pixel":[100.5,50.5],"inside":true,"time_s":12.75,"covariance_px2":[[1,2],[3,4]]},
           {"direction":[-1,0,0],"error":"behind the camera"}]})",
       clock_with_offset(), &inverse, &error))
       << error;
   ASSERT_EQ(inverse.pixels.size(), 2U);
   EXPECT_EQ(inverse.pixels[0].pixel.u, 100);
+  EXPECT_TRUE(inverse.pixels[0].inside);
   EXPECT_EQ(inverse.pixels[0].direction.z, 0.48);
   EXPECT_EQ(inverse.pixels[1].error, "behind the camera");
   EXPECT_EQ(inverse.mode, 2);

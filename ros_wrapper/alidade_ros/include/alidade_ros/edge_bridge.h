@@ -103,8 +103,7 @@ class EdgeBridge {
   std::optional<Record> newest_;
   ros::Time newest_stamp_;
   Axes axes_;
-  int width_ = 0;  // px; 0: not known yet
-  int height_ = 0;
+  std::optional<ImageSize> size_;
   std::string status_json_;
   bool calibration_is_old_ = true;
   std::uint64_t diagnosed_records_ = 0;

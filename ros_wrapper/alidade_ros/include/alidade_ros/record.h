@@ -8,8 +8,6 @@
 
 #include <array>
 #include <cstdint>
-#include <limits>
-#include <nlohmann/json.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -56,6 +54,11 @@ struct Hello {
   ClockPair clock;
 };
 
+struct ImageSize {
+  int width = 0;   // px
+  int height = 0;  // px
+};
+
 // What of a calibration is more than text to the node.
 struct CalibrationValues {
   int width = 0;
@@ -77,6 +80,9 @@ struct CalibrationValues {
 [[nodiscard]] bool parse_record(const std::string& json, Record* record, std::string* error);
 [[nodiscard]] bool parse_hello(const std::string& json, Hello* hello, std::string* error);
 [[nodiscard]] bool parse_clock_pair(const std::string& json, ClockPair* pair, std::string* error);
+// From the edge's status; none before its first frame.
+[[nodiscard]] bool parse_image_size(const std::string& json, std::optional<ImageSize>* size,
+                                    std::string* error);
 [[nodiscard]] bool parse_calibration(const std::string& json, CalibrationValues* values,
                                      std::string* error);
 
