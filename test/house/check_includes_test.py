@@ -31,6 +31,11 @@ class CheckIncludes(unittest.TestCase):
         code, output = check({"core/realtime/a.h": '#include "core/model/b.h"\n#include <Eigen/Core>\n'})
         self.assertEqual(code, 0, output)
 
+    def test_accepts_the_include_folder_of_a_catkin_package(self):
+        code, output = check({"ros_wrapper/alidade_ros/src/a.cpp":
+                              '#include "alidade_ros/a.h"\n#include <alidade_msgs/Status.h>\n'})
+        self.assertEqual(code, 0, output)
+
     def test_rejects_wrong_arrows(self):
         for path, line in (
                 ("core/model/a.h", '#include "core/realtime/b.h"'),
@@ -42,6 +47,9 @@ class CheckIncludes(unittest.TestCase):
                 ("edge_app/pipeline/a.cpp", '#include "test/support/guard.h"'),
                 ("test/simulator/a.cpp", '#include "core/model/camera.h"'),
                 ("ros_wrapper/a.cpp", '#include "core/model/camera.h"'),
+                ("ros_wrapper/alidade_ros/src/a.cpp", "#include <platform/recording/recording.h>"),
+                ("ros_wrapper/alidade_ros/test/a.cpp", '#include "edge_app/output/live_state.h"'),
+                ("ros_wrapper/alidade_ros/src/a.cpp", "#include <Eigen/Core>"),
                 ("core/model/a.h", '#include "neighbour.h"')):
             with self.subTest(path=path, line=line):
                 code, output = check({path: "#pragma once\n" + line + "\n"})
