@@ -52,11 +52,12 @@ std::string describe(const PipelineSummary& summary, bool latency_measured) {
           : "latency not measured on a recording";
   return fmt::format(
       "{} frames; {} records: OE {}, PT {}, none {}; {}; dropped by full queues: {} frames, {} "
-      "telemetry samples, {} records; page faults of the real-time thread: {} minor, {} major",
+      "telemetry samples, {} records; {} pictures too late; page faults of the real-time thread: "
+      "{} minor, {} major",
       summary.frames, summary.records, summary.with_landmarks,
       summary.with_orientation - summary.with_landmarks, summary.records - summary.with_orientation,
       latency, summary.drops.frames, summary.drops.telemetry, summary.drops.records,
-      summary.page_faults.minor, summary.page_faults.major);
+      summary.drops.late_pictures, summary.page_faults.minor, summary.page_faults.major);
 }
 
 // What calibrates a camera while it runs; empty where nothing is to be calibrated.

@@ -234,7 +234,8 @@ ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
   out["dropped"] = {{"frames", summary.drops.frames},
                     {"telemetry", summary.drops.telemetry},
                     {"records", summary.drops.records},
-                    {"unheard", summary.drops.unheard}};
+                    {"unheard", summary.drops.unheard},
+                    {"late_pictures", summary.drops.late_pictures}};
   out["video_clock"] = {{"locked", newest && newest->clock_locked},
                         {"sigma_s", newest && newest->time_s ? Json(newest->time_sigma_s) : Json()},
                         {"restarts", summary.clock_restarts},
@@ -371,6 +372,7 @@ ServerResponse metrics(const HttpApiSources& sources, const HttpServer& server) 
   out.add(summary.drops.telemetry, {{"queue", "telemetry"}});
   out.add(summary.drops.records, {{"queue", "records"}});
   out.add(summary.drops.unheard, {{"queue", "calibration"}});
+  out.add(summary.drops.late_pictures, {{"queue", "pictures"}});
   out.counter("alidade_video_clock_restarts_total", "Starts of the video's clock filter anew");
   out.add(summary.clock_restarts);
   out.counter("alidade_video_clock_floor_shifts_total", "Steps of the video's least delay");

@@ -35,6 +35,7 @@ enum class RecordStatus : std::uint8_t {
   kTooFewLandmarks,       // mode PT: too few landmarks held
   kContradiction,         // mode PT: landmarks and telemetry exclude each other
   kBadImage,              // mode PT: no picture, or one that is not of the calibration's size
+  kPictureTooLate,        // mode PT: others waited behind the frame, which went without its picture
   kOtherZoom,             // no calibration for the zoom that the pan/tilt source reports
   kNotFinite              // a stamp is not a finite number
 };
@@ -75,6 +76,8 @@ constexpr const char* to_string(RecordStatus status) {
       return "landmarks contradict telemetry";
     case RecordStatus::kBadImage:
       return "no usable picture";
+    case RecordStatus::kPictureTooLate:
+      return "picture too late";
     case RecordStatus::kOtherZoom:
       return "no calibration for this zoom";
     case RecordStatus::kNotFinite:

@@ -84,6 +84,8 @@ class OrientationStep {
   // For when the record is out: upkeep of the landmark map with the frame last added, or the following of
   // points through it.
   void maintain();
+  // In OE mode, for now.
+  [[nodiscard]] bool finds_landmarks() const { return oe_ && options_.calibrated && zoom_fits(); }
   // What the frame last added, and maintained, has for the calibration thread.
   void get_tracks(FrameTracks* tracks) const;
   // The same for people to look at.
@@ -102,7 +104,6 @@ class OrientationStep {
   [[nodiscard]] RecordStatus status_of(QueryStatus query, bool clock_locked) const;
   // False: there is a calibration, but not for the zoom that the pan/tilt source reports.
   [[nodiscard]] bool zoom_fits() const;
-  [[nodiscard]] bool finds_landmarks() const { return oe_ && options_.calibrated && zoom_fits(); }
   void tell_pending_frames();
   // Completes a record that has its time and telemetry's status; measured: null if there is none.
   void orient(const InterpolatedPanTilt* measured, const ImageView& picture,

@@ -13,6 +13,9 @@ void touch(Queue* queue) {
   queue->reset();
 }
 
+// How long a picture may have waited while others wait behind it.
+constexpr double kPatienceS = 0.1;
+
 }  // namespace
 
 RealtimeStage::RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed,
@@ -74,11 +77,24 @@ void RealtimeStage::adopt_published() {
   }
 }
 
-void RealtimeStage::process_frame(const VideoMessage& message) {
+bool RealtimeStage::is_late(const VideoMessage& message, double now_s) const {
+  return measure_latency_ && step_.finds_landmarks() && message.picture.valid() &&
+         now_s - message.decoded_s > kPatienceS && video_queue_.read_available() > 0;
+}
+
+void RealtimeStage::process_frame(const VideoMessage& received) {
   OutputMessage out;
-  out.decoded_s = message.decoded_s;
+  out.decoded_s = received.decoded_s;
   out.taken_s = monotonic_now_s();
+  VideoMessage message = received;
+  const bool late = is_late(received, out.taken_s);
+  if (late) {
+    message.picture = {};
+    late_pictures_.fetch_add(1, std::memory_order_relaxed);
+  }
   out.record = step_.add_frame(message.stamp, message.picture, &out.events);
+  if (late && out.record.status == RecordStatus::kBadImage)
+    out.record.status = RecordStatus::kPictureTooLate;
   out.record.calibration = report_.load(std::memory_order_relaxed);
   out.made_s = monotonic_now_s();
   if (measure_latency_) out.record.latency_s = out.made_s - out.record.receive_time_s;
@@ -150,7 +166,7 @@ DropCounters RealtimeStage::drops() const {
   return {dropped_frames_.load(std::memory_order_relaxed),
           dropped_telemetry_.load(std::memory_order_relaxed),
           dropped_records_.load(std::memory_order_relaxed),
-          unheard_.load(std::memory_order_relaxed)};
+          unheard_.load(std::memory_order_relaxed), late_pictures_.load(std::memory_order_relaxed)};
 }
 
 }  // namespace alidade

@@ -10,7 +10,9 @@
 // Pictures stay where the decoder put them: a frame occupies a slot of the capture thread, and whoever had the
 // picture last, this thread, the calibration thread or the tap, gives the slot back.
 // Each queue has one producer and one consumer, a fixed capacity and fixed-size messages. A full
-// queue drops the new message and counts it; nobody waits for anybody. process() allocates nothing,
+// queue drops the new message and counts it; nobody waits for anybody. In OE mode a live frame that has waited for
+// long while others wait behind it goes without its picture: where the processor cannot keep up, some records are
+// telemetry's, and none is seconds late. process() allocates nothing,
 // takes no lock, logs nothing and throws nothing; what it writes the constructor has touched.
 
 #include <atomic>
@@ -69,6 +71,8 @@ struct DropCounters {
   std::int64_t records = 0;
   // Frames and samples that the calibration thread was too busy to hear of: no loss for the records.
   std::int64_t unheard = 0;
+  // Pictures that nobody looked at, so that the frames behind them need not wait.
+  std::int64_t late_pictures = 0;
   [[nodiscard]] std::int64_t total() const { return frames + telemetry + records; }
 };
 
@@ -125,7 +129,8 @@ class RealtimeStage {
  private:
   void drain_telemetry();
   void adopt_published();
-  void process_frame(const VideoMessage& message);
+  [[nodiscard]] bool is_late(const VideoMessage& message, double now_s) const;
+  void process_frame(const VideoMessage& received);
   void feed(const VideoMessage& message, bool* lent);
   void tap(const VideoMessage& message, bool* lent);
   void emit(const OutputMessage& message);
@@ -163,6 +168,7 @@ class RealtimeStage {
   std::atomic<std::int64_t> dropped_telemetry_{0};
   std::atomic<std::int64_t> dropped_records_{0};
   std::atomic<std::int64_t> unheard_{0};
+  std::atomic<std::int64_t> late_pictures_{0};
   OrientationStep step_;
   bool measure_latency_;
   bool feed_wanted_;
