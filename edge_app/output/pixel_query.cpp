@@ -126,7 +126,10 @@ Json as_json(const Vector2<double>& v) { return {v.x(), v.y()}; }
 Json as_json(const Vector3<double>& v) { return {v.x(), v.y(), v.z()}; }
 
 Json head(const OrientationRecord& record) {
-  return {{"frame", *record.frame}, {"time_s", *record.time_s}, {"mode", to_string(record.mode)}};
+  return {{"frame", *record.frame},
+          {"time_s", *record.time_s},
+          {"mode", to_string(record.mode)},
+          {"calibrated", record.calibrated}};
 }
 
 Matrix2<double> pixel_noise(const FrameOrientation& frame, const Vector2<double>& u,

@@ -4,6 +4,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
+#include <sched.h>
+#include <sys/resource.h>
 
 #include <condition_variable>
 #include <mutex>
@@ -40,6 +43,10 @@ class HttpServerTest : public ::testing::Test {
     });
     server_->post("/echo", HttpAccess::kToken, 100,
                   [](const ServerRequest& request) { return plain("echo " + request.body); });
+    server_->get("/scheduling", HttpAccess::kOpen, [](const ServerRequest&) {
+      return plain("policy " + std::to_string(::sched_getscheduler(0)) + ", nice " +
+                   std::to_string(::getpriority(PRIO_PROCESS, 0)));
+    });
     server_->get("/throw", HttpAccess::kOpen, [](const ServerRequest&) -> ServerResponse {
       throw std::runtime_error("secret");
     });
@@ -248,6 +255,19 @@ TEST_F(HttpServerTest, StoppingEndsStreamsAndSilentAndStalledConnections) {
   server_->stop();
   EXPECT_EQ(waiting.receive(), "");
   EXPECT_EQ(silent.receive(), "");
+}
+
+// Whatever the thread that starts it runs as.
+TEST_F(HttpServerTest, ItsThreadsRunAtTheNormalPolicyAndNiced) {
+  std::thread starter([this] {
+    sched_param parameters{};
+    parameters.sched_priority = 1;
+    // Where that is not permitted there is less to inherit.
+    static_cast<void>(::pthread_setschedparam(::pthread_self(), SCHED_FIFO, &parameters));
+    start();
+  });
+  starter.join();
+  EXPECT_THAT(get("/scheduling"), EndsWith("\r\n\r\npolicy 0, nice 10"));
 }
 
 TEST_F(HttpServerTest, APageOfAnotherSiteCannotPost) {

@@ -59,6 +59,7 @@ OrientationRecord record() {
   out.frame = 7;
   out.time_s = kTime;
   out.mode = RecordMode::kOe;
+  out.calibrated = true;
   out.camera = pack(calibration());
   out.orientation.emplace();
   out.orientation->geometry = pack(frame());
@@ -121,6 +122,7 @@ TEST(PixelQuery, AnswersAtThePixelsOwnRowTime) {
   EXPECT_EQ(answer["frame"], 7);
   EXPECT_EQ(answer["time_s"], kTime);
   EXPECT_EQ(answer["mode"], "OE");
+  EXPECT_EQ(answer["calibrated"], true);
   const json& directions = answer["directions"];
   ASSERT_EQ(directions.size(), 3u);
   for (const json& one : directions) {
