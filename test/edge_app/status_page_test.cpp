@@ -71,6 +71,10 @@ TEST_F(StatusPageTest, ThePageIsOpenAndMayLoadNothingFromElsewhere) {
   EXPECT_EQ(policy.find("default-src 'none'; "), 0U);
   EXPECT_NE(policy.find("script-src 'sha256-"), std::string::npos);
   EXPECT_EQ(policy.find("unsafe"), std::string::npos);
+  for (const char* unsafe :
+       {"innerHTML", "outerHTML", "insertAdjacent", "document.write", "eval("}) {
+    EXPECT_EQ(std::string(kStatusPage).find(unsafe), std::string::npos) << unsafe;
+  }
   // The name of SVG's namespace in the icon is the only one.
   std::string page = kStatusPage;
   const std::string space = "http://www.w3.org/2000/svg";
