@@ -372,7 +372,9 @@ ServerResponse metrics(const HttpApiSources& sources, const HttpServer& server) 
   out.add(summary.drops.telemetry, {{"queue", "telemetry"}});
   out.add(summary.drops.records, {{"queue", "records"}});
   out.add(summary.drops.unheard, {{"queue", "calibration"}});
-  out.add(summary.drops.late_pictures, {{"queue", "pictures"}});
+  out.counter("alidade_late_pictures_total",
+              "Pictures not looked at, so that the frames behind them need not wait");
+  out.add(summary.drops.late_pictures);
   out.counter("alidade_video_clock_restarts_total", "Starts of the video's clock filter anew");
   out.add(summary.clock_restarts);
   out.counter("alidade_video_clock_floor_shifts_total", "Steps of the video's least delay");
