@@ -204,6 +204,12 @@ class StatusPage(SystemTest):
         self.wait_for_text("mode", "^PT$")
         self.wait_for_text("seen", "^no picture: ")
         self.wait_for_text("calibration", "Focal length")
+        # The longest there can be: all of its sigmas are known.
+        self.browser.execute_script("showCalibration(arguments[0])", {
+            "focal_length": {"value": 10669.123, "sigma": 0.77}, "line_delay": {"value": -3.2e-5, "sigma": 1.7e-9},
+            "pan_axis": {"value": [-0.012044, -0.000047, 1], "sigma": [5.9e-5, 4e-5]},
+            "tilt_axis": {"value": [-0.00009, 1, -0.014056], "sigma": [1.2e-6, 6.9e-7]},
+            "pan_scale": {"value": 1, "sigma": 1.2e-8}, "clock_offset": {"value": -0.0844, "sigma": 8.2e-5}})
         self.assertEqual(self.browser.execute_script("return [innerWidth, document.documentElement.scrollWidth]"),
                          [390, 390])
         too_wide = self.browser.execute_script("""
