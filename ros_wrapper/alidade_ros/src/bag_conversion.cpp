@@ -293,20 +293,25 @@ BagCounts recording_to_bag(const std::string& directory, const std::string& bag_
 
   if (std::filesystem::exists(bag_path)) fail(bag_path + " exists already; name another bag");
   rosbag::Bag bag(bag_path, rosbag::bagmode::Write);
-  for (const RecordedSample& sample : tables.samples) {
-    sensor_msgs::JointState message;
-    message.header.stamp = moved(header_time(sample, device_offset));
-    message.name = {or_default(options.pan_joint, "pan_joint"),
-                    or_default(options.tilt_joint, "tilt_joint")};
-    message.position = {options.pan_sign * sample.pan_rad, options.tilt_sign * sample.tilt_rad};
-    if (sample.zoom) {
-      message.name.push_back("zoom");
-      message.position.push_back(*sample.zoom);
+  // In the order of their times, as a reader of the bag will want them.
+  const auto write_samples_before = [&](double receive_time_s) {
+    for (; counts.samples < tables.samples.size(); ++counts.samples) {
+      const RecordedSample& sample = tables.samples[counts.samples];
+      if (sample.receive_time_s >= receive_time_s) return;
+      sensor_msgs::JointState message;
+      message.header.stamp = moved(header_time(sample, device_offset));
+      message.name = {or_default(options.pan_joint, "pan_joint"),
+                      or_default(options.tilt_joint, "tilt_joint")};
+      message.position = {options.pan_sign * sample.pan_rad, options.tilt_sign * sample.tilt_rad};
+      if (sample.zoom) {
+        message.name.push_back("zoom");
+        message.position.push_back(*sample.zoom);
+      }
+      bag.write(joint_topic, moved(sample.receive_time_s), message);
     }
-    bag.write(joint_topic, moved(sample.receive_time_s), message);
-    ++counts.samples;
-  }
+  };
   read_pictures(directory, tables, [&](const RecordedFrame& frame, const Bytes& bytes) {
+    write_samples_before(frame.receive_time_s);
     std_msgs::Header header;
     header.stamp = moved(header_time(frame, sender_offset));
     const auto type = picture_type(bytes);
@@ -329,6 +334,7 @@ BagCounts recording_to_bag(const std::string& directory, const std::string& bag_
     }
     ++counts.frames;
   });
+  write_samples_before(std::numeric_limits<double>::infinity());
   bag.close();
   counts.frames_without = tables.frames.size() - counts.frames;
   return counts;

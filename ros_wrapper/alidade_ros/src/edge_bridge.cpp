@@ -118,6 +118,7 @@ EdgeBridge::~EdgeBridge() {
   changed_.notify_all();
   stream_.stop();
   poll_thread_.join();
+  ports_.reset();  // waits for service callbacks, which use what is destroyed before it otherwise
 }
 
 void EdgeBridge::advertise() {

@@ -95,7 +95,7 @@ class EdgeBridge {
   std::optional<alidade_msgs::Calibration> calibration_;
   std::optional<alidade_msgs::Status> status_;
 
-  mutable std::mutex mutex_;  // guards the rest
+  mutable std::mutex mutex_;  // guards the next
   ClockMap clock_;
   Hello hello_;
   bool connected_ = false;
@@ -106,12 +106,12 @@ class EdgeBridge {
   std::optional<ImageSize> size_;
   std::string status_json_;
   bool calibration_is_old_ = true;
-  std::uint64_t diagnosed_records_ = 0;
-  ros::WallTime diagnosed_at_;
   bool wake_ = false;
   bool ending_ = false;
   std::condition_variable changed_;
 
+  std::uint64_t diagnosed_records_ = 0;  // of the poll thread alone, as is the next
+  ros::WallTime diagnosed_at_;
   std::thread poll_thread_;
 };
 
