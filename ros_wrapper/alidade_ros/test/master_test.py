@@ -29,8 +29,12 @@ class Master(RosTest):
         node = self.start("rosrun", "alidade_ros", "alidade_node", f"_url:={edge.url}")
         rospy.init_node("master_test")
         before = Inbox("/frame_orientation", FrameOrientation)
-        known = Inbox("/calibration", Calibration).wait_for(lambda m: True, "the calibration")
+        calibrations = Inbox("/calibration", Calibration)
+        known = calibrations.wait_for(lambda m: True, "the calibration")
         before.wait_for(lambda m: m.mode != 0, "an orientation")
+        # Connections outlive the master: these must not be what the later ones hear by.
+        before.subscriber.unregister()
+        calibrations.subscriber.unregister()
 
         master.end(signal.SIGKILL)
         self.start_master()
