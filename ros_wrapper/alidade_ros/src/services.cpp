@@ -48,6 +48,7 @@ void read_frame(const Json& answer, const ClockMap& clock, Response* response) {
   response->frame = answer.at("frame").get<std::int64_t>();
   response->stamp = stamp_of(answer, clock);
   response->mode = mode_number(answer.at("mode").get<std::string>());
+  response->calibrated = answer.at("calibrated").get<bool>();
 }
 
 template <typename Read>

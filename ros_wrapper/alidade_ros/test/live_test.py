@@ -27,8 +27,8 @@ SCALARS = {  # field of the message: field of the record, factor
     "reference_row": ("reference_row", 1), "pan": ("pan_rad", -1), "tilt": ("tilt_rad", -1),
     "pan_rate": ("pan_rate_rad_s", -1), "tilt_rate": ("tilt_rate_rad_s", -1),
     "pan_acceleration": ("pan_acceleration_rad_s2", -1), "tilt_acceleration": ("tilt_acceleration_rad_s2", -1),
-    "landmarks": ("landmarks", 1), "line_delay": ("line_delay_s", 1), "focal_length": ("focal_length_px", 1),
-    "aspect": ("aspect", 1), "radial_distortion": ("radial_distortion", 1)}
+    "landmarks": ("landmarks", 1), "residual": ("residual_px", 1), "line_delay": ("line_delay_s", 1),
+    "focal_length": ("focal_length_px", 1), "aspect": ("aspect", 1), "radial_distortion": ("radial_distortion", 1)}
 
 
 def conjugate_rotate(q, v):
@@ -162,7 +162,7 @@ class Live(RosTest):
             at=PixelToDirectionRequest.FRAME, frame=message.frame, pixel_sigma=0.1,
             pixels=[Pixel(u=u - 0.5, v=v - 0.5) for u, v in pixels]))
         self.assertTrue(said.success, said.error)
-        self.assertEqual((said.frame, said.mode), (message.frame, message.mode))
+        self.assertEqual((said.frame, said.mode, said.calibrated), (message.frame, message.mode, True))
         self.assertAlmostEqual((said.stamp - message.header.stamp).to_sec(), 0, delta=CLOCK_S)
         for a, b, pixel in zip(said.directions, told["directions"], pixels):
             x, y, z = b["direction"]

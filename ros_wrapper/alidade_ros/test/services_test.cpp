@@ -51,13 +51,14 @@ TEST(Services, AnswerInTheConventionsOfRos) {
   alidade_msgs::PixelToDirection::Response response;
   std::string error;
   ASSERT_TRUE(direction_answer(
-      R"({"frame":7,"time_s":12.5,"mode":"PT","directions":[
+      R"({"frame":7,"time_s":12.5,"mode":"PT","calibrated":true,"directions":[
           {"pixel":[0.5,0.5],"time_s":12.75,"direction":[0.6,0.64,-0.48],"azimuth_rad":9,"elevation_rad":9,
            "covariance":[[1,2],[3,4]],"basis":[[0,1,0],[0,0,1]],"sigma_rad":0.5},
           {"pixel":[1,2],"error":"beyond the lens"}]})",
       clock_with_offset(), &response, &error))
       << error;
   EXPECT_EQ(response.frame, 7);
+  EXPECT_TRUE(response.calibrated);
   EXPECT_EQ(response.stamp, ros_time(1012.5));
   ASSERT_EQ(response.directions.size(), 2U);
   const alidade_msgs::PixelDirection& d = response.directions[0];
@@ -72,7 +73,7 @@ TEST(Services, AnswerInTheConventionsOfRos) {
 
   alidade_msgs::DirectionToPixel::Response inverse;
   ASSERT_TRUE(pixel_answer(
-      R"({"frame":7,"time_s":12.5,"mode":"OE","pixels":[
+      R"({"frame":7,"time_s":12.5,"mode":"OE","calibrated":false,"pixels":[
           {"direction":[0.6,0.64,-0.48],"pixel":[100.5,50.5],"inside":true,"time_s":12.75,"covariance_px2":[[1,2],[3,4]]},
           {"direction":[-1,0,0],"error":"behind the camera"}]})",
       clock_with_offset(), &inverse, &error))
@@ -83,6 +84,7 @@ TEST(Services, AnswerInTheConventionsOfRos) {
   EXPECT_EQ(inverse.pixels[0].direction.z, 0.48);
   EXPECT_EQ(inverse.pixels[1].error, "behind the camera");
   EXPECT_EQ(inverse.mode, 2);
+  EXPECT_FALSE(inverse.calibrated);
 }
 
 TEST(Services, RejectAnAnswerThatMakesNoSense) {
