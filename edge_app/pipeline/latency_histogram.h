@@ -22,7 +22,7 @@ class LatencyHistogram {
     longest_s_ = std::max(longest_s_, seconds);
   }
 
-  // Upper edge of the bucket that holds the quantile, s; 0 if nothing was added.
+  // Upper edge of the bucket that holds the quantile, s, but no more than the longest; 0 if nothing was added.
   [[nodiscard]] double quantile(double fraction) const {
     if (total_ == 0) return 0;
     const double wanted = fraction * static_cast<double>(total_);
@@ -32,7 +32,7 @@ class LatencyHistogram {
       seen += counts_[bucket];
       if (static_cast<double>(seen) >= wanted) break;
     }
-    return upper_edge_s(bucket);
+    return std::min(upper_edge_s(bucket), std::max(longest_s_, kLowest));
   }
 
   // 0 if nothing was added.

@@ -16,6 +16,15 @@ TEST(LatencyHistogram, GivesQuantilesToFivePercent) {
   EXPECT_LE(histogram.quantile(0.99), 9.9e-3 * 1.05);
 }
 
+TEST(LatencyHistogram, NoQuantileIsLongerThanTheLongest) {
+  LatencyHistogram histogram;
+  for (int i = 1; i <= 100; ++i) {
+    histogram.add(1.7e-4 * i);
+    EXPECT_LE(histogram.quantile(0.99), histogram.longest_s());
+    EXPECT_GE(histogram.quantile(1), histogram.longest_s());
+  }
+}
+
 TEST(LatencyHistogram, CountsWhatIsNoLongerThanABucketsEdge) {
   LatencyHistogram histogram;
   for (const double seconds : {0.0, 1e-6, 1.04e-6, 1.06e-6, 0.02}) histogram.add(seconds);
