@@ -19,7 +19,7 @@ OrientationRecord record(std::int64_t frame, double period_s = 0.04) {
   out.time_s = 100 + static_cast<double>(frame) * period_s;
   out.receive_time_s = *out.time_s + 0.01;
   out.mode = RecordMode::kPt;
-  out.orientation.emplace();
+  out.orientation = OrientationRecord::Orientation{};
   out.orientation->pan_rad = static_cast<double>(frame);
   out.latency_s = 1e-3;
   return out;

@@ -61,7 +61,7 @@ OrientationRecord record() {
   out.mode = RecordMode::kOe;
   out.calibrated = true;
   out.camera = pack(calibration());
-  out.orientation.emplace();
+  out.orientation = OrientationRecord::Orientation{};
   out.orientation->geometry = pack(frame());
   return out;
 }

@@ -21,7 +21,7 @@ OrientationRecord record() {
   out.time_s = 1;
   out.mode = RecordMode::kOe;
   out.camera = pack(calibration);
-  out.orientation.emplace();
+  out.orientation = OrientationRecord::Orientation{};
   out.orientation->geometry = pack(frame);
   return out;
 }
