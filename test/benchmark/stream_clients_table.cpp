@@ -4,8 +4,8 @@
 //
 // A frame counts from when the capture thread has it to its record: waiting, waking up and computing. Turns of both
 // conditions alternate, so that other load of the machine meets both; frames count from when all clients have come, or
-// gone. The ratio of the 99 % quantiles is given with the interval that chance leaves in 95 % of cases, from turns drawn
-// again; it fails if even its lower end is above 1.2.
+// gone. The ratio of the 99 % quantiles is given with the interval that chance leaves in 95 % of cases, from pairs of
+// turns drawn again; it fails if even its lower end is above 1.2.
 // Usage: stream_clients_table [FILE.json]; stream_clients_table --clients PORT is the clients' process.
 
 #include <arpa/inet.h>
@@ -52,8 +52,8 @@ constexpr double kSpeed = 2;  // times that of the TurningCamera, which has 30 f
 constexpr int kSamplesPerFrame = 2;
 constexpr double kAngleSigma = 1e-5;  // rad
 constexpr std::size_t kWarmUp = 180;  // frames
-constexpr std::size_t kTurns = 20;    // half of them with clients
-constexpr std::size_t kTurnFrames = 180;
+constexpr std::size_t kTurns = 40;    // half of them with clients
+constexpr std::size_t kTurnFrames = 150;
 constexpr std::size_t kDraws = 1000;
 constexpr int kPriority = 60;
 constexpr double kAllowed = 1.2;  // ratio of the quantiles; chance may not explain more
@@ -317,8 +317,10 @@ nlohmann::json run() {
     Turns with_again;
     Turns without_again;
     for (std::size_t turn = 0; turn < kTurns / 2; ++turn) {
-      with_again.push_back(with[any(random)]);
-      without_again.push_back(without[any(random)]);
+      // Neighbours in time stay together: they met the same other load.
+      const std::size_t pair = any(random);
+      with_again.push_back(with[pair]);
+      without_again.push_back(without[pair]);
     }
     drawn.push_back(p99_ratio(with_again, without_again));
   }
