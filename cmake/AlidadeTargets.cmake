@@ -72,7 +72,8 @@ add_custom_target(threaded_programs)
 
 # alidade_test(camera_test SOURCES camera_test.cpp LINK alidade::model [LABELS ...] [TIMEOUT s]
 #              [ARGUMENTS ...] [DEPENDS target...])
-# builds a GoogleTest program and registers each of its tests with ctest.
+# builds a GoogleTest program and registers each of its tests with ctest. With a sanitizer, those labelled statistics or
+# films are neither built nor run.
 function(alidade_test name)
   cmake_parse_arguments(A "" "TIMEOUT" "SOURCES;LINK;LABELS;ARGUMENTS;DEPENDS" ${ARGN})
   if(NOT ALIDADE_BUILD_TESTS)
@@ -89,6 +90,11 @@ function(alidade_test name)
   endif()
   if(A_DEPENDS)
     add_dependencies(${name} ${A_DEPENDS})
+  endif()
+  # Repetition, and films of hundreds of pictures: what runs a thousand times there, other tests run instrumented.
+  if(ALIDADE_SANITIZE AND ("statistics" IN_LIST A_LABELS OR "films" IN_LIST A_LABELS))
+    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
+    return()
   endif()
   if("threads" IN_LIST A_LABELS)
     add_dependencies(threaded_programs ${name})
