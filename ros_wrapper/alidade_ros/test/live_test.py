@@ -136,9 +136,10 @@ class Live(RosTest):
 
         self.assert_tf_projects_as_the_api_does(answers, tf, info)
 
-        healthy = diagnostics.wait_for(
-            lambda m: any(s.name.endswith("alidade: edge connection") and s.level == 0 for s in m.status), "health")
-        self.assertTrue(any(s.name.endswith("alidade: orientation") for s in healthy.status))
+        # The updater says "Node starting up" of each task alone, before it says anything of both.
+        diagnostics.wait_for(
+            lambda m: any(s.name.endswith("alidade: edge connection") and s.message == "connected" for s in m.status)
+            and any(s.name.endswith("alidade: orientation") for s in m.status), "health")
         # Nothing is to be calibrated here, and the edge says so.
         refused = rospy.ServiceProxy("/calibrate", Calibrate)()
         self.assertFalse(refused.success)
