@@ -56,6 +56,46 @@ TYPED_TEST(Sampling, GradientIsTheDerivativeOfTheValue) {
   }
 }
 
+// Sixteen taps one after the other, in double precision.
+template <class Kernel>
+double plain_sample(const ImageView& image, double u, double v) {
+  constexpr int kTaps = Kernel::kTaps;
+  TapPlace place;
+  EXPECT_EQ(find_taps<kTaps>(image, u, v, 1, 1, &place), SampleStatus::kOk);
+  const auto across = Kernel::taps(place.t_u);
+  const auto down = Kernel::taps(place.t_v);
+  double value = 0;
+  for (int j = 0; j < kTaps; ++j) {
+    for (int i = 0; i < kTaps; ++i)
+      value += static_cast<double>(down.weight[j]) * across.weight[i] *
+               image.row(place.row + j)[place.column + i];
+  }
+  return value;
+}
+
+template <class Kernel>
+class VectorSampling : public testing::Test {};
+using FourTaps = testing::Types<CatmullRom, CubicSpline>;
+TYPED_TEST_SUITE(VectorSampling, FourTaps);
+
+TYPED_TEST(VectorSampling, EqualsTheScalarSumToTheRoundingOfFloats) {
+  std::mt19937_64 random(4);
+  const Pixels pixels = make_pixels(
+      24, 24, [&](const Vector2<double>&) { return std::uniform_int_distribution<int>(0, 255)(random); },
+      0, &random);
+  // Seven products and sums of floats, each off by half a unit in the last place at most, of terms whose
+  // magnitudes add up to 255 times 1.25 squared at most, the kernels' largest sum of absolute weights.
+  constexpr double kBound = 8 * 0.5 * std::numeric_limits<float>::epsilon() * 255 * 1.25 * 1.25;
+  std::uniform_real_distribution<double> place(2, 21);
+  for (int k = 0; k < 20000; ++k) {
+    const double u = place(random);
+    const double v = place(random);
+    float value = 0;
+    ASSERT_EQ(sample<TypeParam>(pixels.view, u, v, &value), SampleStatus::kOk);
+    ASSERT_NEAR(value, plain_sample<TypeParam>(pixels.view, u, v), kBound) << u << ", " << v;
+  }
+}
+
 TYPED_TEST(Sampling, RefusesPointsWhoseTapsLeaveTheImage) {
   std::mt19937_64 random(3);
   const Pixels pixels = make_pixels(

@@ -90,10 +90,10 @@ def boot():
 
 def cross_build():
     """Cross-builds the programs; their folder, and the system that they run in."""
-    system = TOP / "build/sysroot-arm64-edge"
-    build = TOP / "build/arm64-edge"
-    for command in ((TOP / "toolchains/make-sysroot", "arm64", "edge"),
-                    ("cmake", "-S", TOP, "--preset", "arm64-edge"),
+    system = TOP / "build/sysroot-arm64"
+    build = TOP / "build/arm64"
+    for command in ((TOP / "toolchains/make-sysroot", "arm64"),
+                    ("cmake", "-S", TOP, "--preset", "arm64"),
                     ("cmake", "--build", build, "--target", "virtual_machine_programs")):
         done = run(*command)
         if done.returncode != 0:
