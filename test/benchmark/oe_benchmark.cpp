@@ -34,12 +34,8 @@
 #include <vector>
 
 #include "core/model/camera.h"
-#include "core/realtime/coarse_alignment.h"
 #include "core/realtime/oe_mode.h"
-#include "core/realtime/orientation_solve.h"
-#include "core/realtime/patch_alignment.h"
-#include "core/realtime/pyramid.h"
-#include "core/realtime/view_projection.h"
+#include "test/benchmark/oe_stages.h"
 #include "test/benchmark/turning_camera.h"
 
 namespace alidade::benchmarks {
@@ -177,22 +173,13 @@ class Way {
 
 class Oe : public Way {
  public:
-  Oe(TurningCamera* camera, int points) : Way("oe", camera), mode_(options(*camera, points)) {
+  Oe(TurningCamera* camera, int points)
+      : Way("oe", camera), mode_(measured_options(camera->calibration().camera, points)) {
     mode_.reset(camera->calibration());
   }
   [[nodiscard]] const OeMode& mode() const { return mode_; }
 
  private:
-  static OeOptions options(const TurningCamera& camera, int points) {
-    const Camera<double>& c = camera.calibration().camera;
-    OeOptions options;
-    options.max_width = c.width;
-    options.max_height = c.height;
-    options.max_used = points;
-    options.cell_size_px = std::sqrt(c.width * c.height / (2.5 * points));  // more than are used
-    return options;
-  }
-
   void process(int k) override {
     const InterpolatedPanTilt telemetry = camera_.telemetry(k);
     FrameOrientation frame;
@@ -209,146 +196,22 @@ class Oe : public Way {
   OeMode mode_;
 };
 
-// From telemetry to the motion's correction, like OeMode::process(), but with all patches prepared and
-// landmarks projected once, where it does so before and after coarse alignment.
 class Stages : public Way {
  public:
   Stages(TurningCamera* camera, const OeMode* mode, int points)
       : Way("stage", camera),
-        mode_(*mode),
-        pyramid_(camera->calibration().camera.width, camera->calibration().camera.height, kOctaves),
-        slots_(static_cast<std::size_t>(mode->map().capacity())),
-        points_(static_cast<std::size_t>(points)) {}
+        stages_(camera->calibration(), mode, points,
+                [this](const char* part, const std::function<void()>& work) {
+                  record(part, milliseconds(work));
+                }) {}
 
  private:
-  static constexpr int kOctaves = 6;
-  static constexpr int kFirstCoarse = 2;
-  static constexpr std::size_t kCoarse = 40;  // of each octave
-
-  struct Seen {
-    const Landmark* landmark;
-    Vector2<double> u;
-  };
-
   void process(int k) override {
-    const Calibration& calibration = camera_.calibration();
-    const Camera<double>& c = calibration.camera;
-    const LandmarkMap& map = mode_.map();
-    const PanTilt<double> offset = mode_.statistics().map_offset;
-    const InterpolatedPanTilt telemetry = camera_.telemetry(k);
-    FrameMotion<double> motion{telemetry.angle, telemetry.rate, 0.5 * c.height};
-    motion.angle.pan -= offset.pan;
-    motion.angle.tilt -= offset.tilt;
-
-    record("pyramid", milliseconds([&] {
-             if (pyramid_.build(camera_.view(k), kOctaves) != PyramidStatus::kOk) std::abort();
-           }));
-    seen_.clear();
-    record("project", milliseconds([&] {
-             const ViewProjection view(calibration, motion);
-             const double cosine =
-                 std::cos(1.3 * std::atan(std::hypot(c.width, c.height) / 2 / c.focal_length));
-             const int near = map.find(view.optical_axis(), cosine, slots_.data(), map.capacity());
-             for (int i = 0; i < near; ++i) {
-               const Landmark& landmark = map.at(slots_[static_cast<std::size_t>(i)]);
-               const double border = std::ldexp(8, landmark.octave);
-               Vector2<double> u;
-               if (view.project(landmark.d, &u) && u.x() >= border && u.y() >= border &&
-                   u.x() <= c.width - border && u.y() <= c.height - border) {
-                 seen_.push_back({&landmark, u});
-               }
-             }
-           }));
-    prepare_patches(ViewProjection(calibration, motion));
-    const PanTilt<double> predicted = motion.angle;
-    record(
-        "coarse", milliseconds([&] {
-          CoarseAlignment aligned;
-          if (align_coarsely(pyramid_, coarse_.data(), static_cast<int>(coarse_.size()), {},
-                             &aligned)) {
-            motion.angle = {predicted.pan + aligned.angle.x(), predicted.tilt + aligned.angle.y()};
-          }
-        }));
-    record("align", milliseconds([&] { align_landmarks(ViewProjection(calibration, motion)); }));
-    MotionPrior prior;
-    prior.has_telemetry = true;
-    prior.telemetry.head<2>() = predicted.vector() - motion.angle.vector();
-    prior.telemetry_covariance = telemetry.covariance;
-    prior.motion_information.diagonal().tail<2>().setConstant(0.1);
-    SolvedMotion solved;
-    record("solve", milliseconds([&] {
-             benchmark::DoNotOptimize(solve_orientation(
-                 found_.data(), static_cast<int>(found_.size()), prior, {}, c.width, c.height,
-                 0.5 * c.height * calibration.line_delay, &solved));
-           }));
-    record_answer(k, solved.inliers,
-                  [](const Vector2<double>&, Vector3<double>*) { return false; });
+    const int inliers = stages_.run(camera_.view(k), camera_.telemetry(k));
+    record_answer(k, inliers, [](const Vector2<double>&, Vector3<double>*) { return false; });
   }
 
-  // Coarse ones from the coarsest octave down, up to kCoarse of each, and as many fine ones as asked for.
-  void prepare_patches(const ViewProjection& view) {
-    patches_.clear();
-    coarse_.clear();
-    fine_.clear();
-    patches_.reserve(seen_.size());
-    for (int octave = kOctaves - 1; octave >= 0; --octave) {
-      std::size_t taken = 0;
-      for (const Seen& seen : seen_) {
-        const Landmark& landmark = *seen.landmark;
-        SeenDirection direction;
-        const bool enough = octave >= kFirstCoarse ? taken == kCoarse : fine_.size() == points_;
-        if (landmark.octave != octave || enough || !view.project(landmark.d, &direction)) continue;
-        const Matrix2<double> J =
-            std::ldexp(1, -octave) * direction.J_d * tangent_basis(landmark.d);
-        patches_.emplace_back();
-        if (!is_usable(prepare(landmark.picture(), Vector2<double>::Constant(kReferenceCentre),
-                               landmark.J_pixel_tangent * J.inverse(), 1, &patches_.back()))) {
-          patches_.pop_back();
-          continue;
-        }
-        ++taken;
-        if (octave >= kFirstCoarse) {
-          coarse_.push_back({&patches_.back(), octave, direction.u, direction.J_angle});
-        } else {
-          fine_.push_back({&landmark, &patches_.back()});
-        }
-      }
-    }
-  }
-
-  void align_landmarks(const ViewProjection& view) {
-    found_.clear();
-    for (const auto& [landmark, patch] : fine_) {
-      SeenDirection seen;
-      Alignment alignment;
-      const double to_octave = std::ldexp(1, -landmark->octave);
-      if (!view.project(landmark->d, &seen) ||
-          align(*patch, pyramid_.octave(landmark->octave), to_octave * seen.u, {}, &alignment) !=
-              AlignmentStatus::kConverged) {
-        continue;
-      }
-      const Matrix2<double> J = seen.J_d * tangent_basis(landmark->d);
-      FoundLandmark found;
-      found.u = alignment.position / to_octave;
-      found.residual = found.u - seen.u;
-      found.J_angle = seen.J_angle;
-      found.time_s = seen.time_s;
-      found.covariance =
-          alignment.covariance / (to_octave * to_octave) + J * landmark->covariance * J.transpose();
-      found.shared_covariance = landmark->shared_covariance;
-      found_.push_back(found);
-    }
-  }
-
-  const OeMode& mode_;
-  Pyramid pyramid_;
-  std::vector<int> slots_;
-  std::size_t points_;
-  std::vector<Seen> seen_;
-  std::vector<ReferencePatch> patches_;
-  std::vector<CoarsePatch> coarse_;
-  std::vector<std::pair<const Landmark*, const ReferencePatch*>> fine_;
-  std::vector<FoundLandmark> found_;
+  OeStages stages_;
 };
 
 // As many of the best corners as asked for, spread over the picture.
