@@ -29,7 +29,13 @@ OeStages::OeStages(const Calibration& calibration, const OeMode* mode, int point
       measure_(std::move(measure)),
       pyramid_(calibration.camera.width, calibration.camera.height, kOctaves),
       slots_(static_cast<std::size_t>(mode->map().capacity())),
-      points_(static_cast<std::size_t>(points)) {}
+      points_(static_cast<std::size_t>(points)) {
+  seen_.reserve(slots_.size());
+  patches_.reserve(slots_.size());
+  coarse_.reserve(kOctaves * kCoarse);
+  fine_.reserve(points_);
+  found_.reserve(points_);
+}
 
 int OeStages::run(const ImageView& picture, const InterpolatedPanTilt& telemetry) {
   const Camera<double>& c = calibration_.camera;
@@ -87,7 +93,6 @@ void OeStages::prepare_patches(const ViewProjection& view) {
   patches_.clear();
   coarse_.clear();
   fine_.clear();
-  patches_.reserve(seen_.size());
   for (int octave = kOctaves - 1; octave >= 0; --octave) {
     std::size_t taken = 0;
     for (const Seen& seen : seen_) {

@@ -15,18 +15,13 @@
 #include <spawn.h>
 #include <sys/socket.h>
 #include <sys/wait.h>
-#include <time.h>
 #include <unistd.h>
 
 #include <algorithm>
 #include <array>
 #include <atomic>
-#include <cmath>
 #include <cstdio>
-#include <cstring>
-#include <fstream>
 #include <mutex>
-#include <nlohmann/json.hpp>
 #include <random>
 #include <string>
 #include <vector>
@@ -37,6 +32,8 @@
 #include "edge_app/output/record_sinks.h"
 #include "edge_app/pipeline/pipeline.h"
 #include "platform/system/clock.h"
+#include "test/benchmark/latency_report.h"
+#include "test/benchmark/paced_sources.h"
 #include "test/benchmark/turning_camera.h"
 
 extern char** environ;
@@ -48,79 +45,13 @@ constexpr int kClients = 20;
 constexpr int kStalled = 5;
 constexpr int kHeight = 720;
 constexpr int kPictures = 75;
-constexpr double kSpeed = 2;  // times that of the TurningCamera, which has 30 frames/s
-constexpr int kSamplesPerFrame = 2;
-constexpr double kAngleSigma = 1e-5;  // rad
+constexpr double kSpeed = 2;          // times that of the TurningCamera, which has 30 frames/s
 constexpr std::size_t kWarmUp = 180;  // frames
 constexpr std::size_t kTurns = 40;    // half of them with clients
 constexpr std::size_t kTurnFrames = 150;
 constexpr std::size_t kDraws = 1000;
 constexpr int kPriority = 60;
 constexpr double kAllowed = 1.2;  // ratio of the quantiles; chance may not explain more
-
-void sleep_until(double due_s) {
-  timespec due{static_cast<time_t>(due_s), 0};
-  due.tv_nsec = static_cast<long>(1e9 * (due_s - static_cast<double>(due.tv_sec)));
-  while (clock_nanosleep(CLOCK_MONOTONIC, TIMER_ABSTIME, &due, nullptr) != 0) {
-  }
-}
-
-// The camera's streams at its pace. Frames are stamped when read() returns, as if their last packet came then.
-class PacedVideo final : public FrameSource {
- public:
-  PacedVideo(const TurningCamera& camera, double start_s) : camera_(camera), start_s_(start_s) {}
-  ReadStatus read(Frame& frame, double) override {
-    if (stopped_) return ReadStatus::kStopped;
-    sleep_until(start_s_ + camera_.time_s(next_) / kSpeed);
-    const ImageView view = camera_.view(next_);
-    frame = {};
-    frame.stamp.frame = next_;
-    frame.stamp.sequence = next_++;
-    frame.width = view.width;
-    frame.height = view.height;
-    frame.luma = view.luma;
-    frame.stride = view.stride;
-    frame.stamp.receive_time_s = monotonic_now_s();
-    return ReadStatus::kOk;
-  }
-  void stop() override { stopped_ = true; }
-  [[nodiscard]] std::string error() const override { return ""; }
-  [[nodiscard]] std::string name() const override { return "turning camera"; }
-
- private:
-  const TurningCamera& camera_;
-  double start_s_;
-  int next_ = 0;
-  std::atomic<bool> stopped_{false};
-};
-
-class PacedPanTilt final : public PanTiltSource {
- public:
-  PacedPanTilt(const TurningCamera& camera, double start_s) : camera_(camera), start_s_(start_s) {}
-  ReadStatus read(PanTiltSample& sample, double) override {
-    if (stopped_) return ReadStatus::kStopped;
-    const double time_s = next_ * camera_.time_s(1) / kSamplesPerFrame;
-    sleep_until(start_s_ + time_s / kSpeed);
-    const PanTilt<double> angle = camera_.angle(time_s);
-    sample = {};
-    sample.sequence = next_++;
-    sample.earliest_time_s = sample.latest_time_s = monotonic_now_s();
-    sample.pan_rad = angle.pan + noise_(random_);
-    sample.tilt_rad = angle.tilt + noise_(random_);
-    return ReadStatus::kOk;
-  }
-  void stop() override { stopped_ = true; }
-  [[nodiscard]] std::string error() const override { return ""; }
-  [[nodiscard]] std::string name() const override { return "turning camera's head"; }
-
- private:
-  const TurningCamera& camera_;
-  double start_s_;
-  int next_ = 0;
-  std::mt19937 random_{1};
-  std::normal_distribution<double> noise_{0, kAngleSigma};
-  std::atomic<bool> stopped_{false};
-};
 
 // Latencies of the turn that goes on.
 class Recorder final : public RecordSink {
@@ -222,12 +153,6 @@ class Clients {
   int end_ = -1;
 };
 
-double quantile(std::vector<double> values, double fraction) {
-  std::sort(values.begin(), values.end());
-  return values[static_cast<std::size_t>(
-      std::lround(fraction * static_cast<double>(values.size() - 1)))];
-}
-
 using Turns = std::vector<std::vector<double>>;
 
 std::vector<double> all_of(const Turns& turns) {
@@ -240,33 +165,20 @@ double p99_ratio(const Turns& with, const Turns& without) {
   return quantile(all_of(with), 0.99) / quantile(all_of(without), 0.99);
 }
 
-nlohmann::json report(const char* name, const Turns& turns) {
-  const std::vector<double> all = all_of(turns);
-  nlohmann::json row;
-  row["frames"] = all.size();
-  std::printf("| %s | %zu |", name, all.size());
-  for (const auto& [key, fraction] : {std::pair("p50_ms", 0.5), std::pair("p90_ms", 0.9),
-                                      std::pair("p99_ms", 0.99), std::pair("max_ms", 1.0)}) {
-    row[key] = 1e3 * quantile(all, fraction);
-    std::printf(" %.3f |", row[key].get<double>());
-  }
-  std::printf("\n");
-  return row;
-}
-
-nlohmann::json run() {
+// False: no server.
+bool run(LatencyReport* report) {
   const TurningCamera camera(kHeight, kPictures);
   PipelineOptions options;
   options.step.calibration = camera.calibration();
   options.step.calibration.line_delay /= kSpeed;
   options.step.calibrated = true;
-  options.step.telemetry_noise.pan_tilt_sigma = kAngleSigma;
+  options.step.telemetry_noise.pan_tilt_sigma = kPacedSigma;
   options.step.oe = oe_options(camera.calibration().camera);
   options.realtime = {kPriority, -1, true};
 
   const double start_s = monotonic_now_s() + 1;
-  PacedVideo video(camera, start_s);
-  PacedPanTilt pan_tilt(camera, start_s);
+  PacedVideo video(camera, start_s, kSpeed);
+  PacedPanTilt pan_tilt(camera, start_s, kSpeed);
   LiveState live;
   Recorder recorder;
   RecordSinks sinks;
@@ -284,7 +196,7 @@ nlohmann::json run() {
   std::string error;
   if (!server.start(&error)) {
     std::fprintf(stderr, "%s\n", error.c_str());
-    return {};
+    return false;
   }
   const std::string port = server.address().substr(server.address().rfind(':') + 1);
   const auto wait_for_streams = [&server](int count) {
@@ -296,13 +208,20 @@ nlohmann::json run() {
   recorder.take(kWarmUp);
   Turns with;
   Turns without;
+  ThreadUse with_use;
+  ThreadUse without_use;
+  const int realtime_thread = fifo_thread();
   const int oe_before = recorder.oe();
   for (std::size_t turn = 0; turn < kTurns / 2; ++turn) {
+    const ThreadUse before = use_of(realtime_thread);
     without.push_back(recorder.take(kTurnFrames));
+    without_use += use_of(realtime_thread) - before;
     {
       const Clients clients(port);
       wait_for_streams(kClients);
+      const ThreadUse between = use_of(realtime_thread);
       with.push_back(recorder.take(kTurnFrames));
+      with_use += use_of(realtime_thread) - between;
     }
     wait_for_streams(0);
   }
@@ -325,12 +244,12 @@ nlohmann::json run() {
     drawn.push_back(p99_ratio(with_again, without_again));
   }
 
-  std::printf("| clients | frames | p50 ms | p90 | p99 | max |\n|---|---|---|---|---|---|\n");
-  nlohmann::json out;
+  report->add("no clients", all_of(without), without_use);
+  report->add("20 clients, 5 of them stalled", all_of(with), with_use);
+  report->print();
+  nlohmann::json& out = report->context();
   out["clients"] = kClients;
   out["stalled"] = kStalled;
-  out["without"] = report("none", without);
-  out["with"] = report("20, 5 of them stalled", with);
   out["oe_frames"] = oe;
   out["p99_ratio"] = p99_ratio(with, without);
   out["p99_ratio_95_percent"] = {quantile(drawn, 0.025), quantile(drawn, 0.975)};
@@ -338,11 +257,10 @@ nlohmann::json run() {
   out["records_dropped"] = summary.drops.total();
   out["p99_ratio_allowed"] = kAllowed;
   out["records_lost_by_clients"] = live.lost_by_readers();
-  out["page_faults"] = summary.page_faults.minor + summary.page_faults.major;
   std::printf("p99 with / without: %.3f (95 %%: %.3f to %.3f); %d frames in OE mode; dropped %d\n",
               p99_ratio(with, without), quantile(drawn, 0.025), quantile(drawn, 0.975), oe,
               static_cast<int>(summary.drops.total()));
-  return out;
+  return true;
 }
 
 }  // namespace
@@ -351,16 +269,8 @@ nlohmann::json run() {
 int main(int argc, char** argv) {
   if (argc == 3 && std::string(argv[1]) == "--clients")
     return alidade::benchmarks::be_clients(static_cast<std::uint16_t>(std::stoi(argv[2])));
-  const nlohmann::json report = alidade::benchmarks::run();
-  if (report.is_null()) return 1;
-  if (argc > 1) {
-    std::ofstream file(argv[1]);
-    file << report.dump(2) << '\n';
-    if (!file) {
-      std::fprintf(stderr, "cannot write %s\n", argv[1]);
-      return 1;
-    }
-  }
-  const double least = report["p99_ratio_95_percent"][0];
+  alidade::benchmarks::LatencyReport report("stream_clients");
+  if (!alidade::benchmarks::run(&report) || (argc > 1 && !report.write(argv[1]))) return 1;
+  const double least = report.json()["context"]["p99_ratio_95_percent"][0];
   return least > alidade::benchmarks::kAllowed ? 1 : 0;
 }
