@@ -53,12 +53,23 @@ class Compares(unittest.TestCase):
         self.assertNotIn("slower", lines[2])
         self.assertIn("they take four runs of each", "".join(lines))
 
-    def test_shows_a_difference_by_chance_as_seldom_as_it_says(self):
-        # 400 comparisons of a build with itself: beyond four standard deviations above 5 % is no chance.
-        shown = sum("slower" in line or "faster" in line for seed in range(400)
-                    for line in history.compared(noisy("a", 5, 1e-6, 2 * seed), noisy("a", 5, 1e-6, 2 * seed + 1), "")[2:3])
-        self.assertLess(shown, 400 * 0.05 + 4 * (400 * 0.05 * 0.95) ** 0.5)
-        self.assertGreater(shown, 0)
+    def test_interval_misses_the_truth_as_seldom_as_it_says(self):
+        # A build against itself, 1000 times: beyond four standard deviations from the exact share is no chance.
+        source = random.Random(1)
+        missed = 0
+        for _ in range(1000):
+            before, after = ([source.lognormvariate(0, 0.03) for _ in range(5)] for _ in range(2))
+            _, least, most = history.ratio_of(before, after)
+            missed += least > 1 or most < 1
+        share = 8 / 252  # of all orders of five and five values: those with two or fewer pairs the other way round, twice
+        self.assertLess(abs(missed - 1000 * share), 4 * (1000 * share * (1 - share)) ** 0.5)
+
+    def test_does_not_speak_of_small_differences(self):
+        source = random.Random(1)
+        before, after = ([run(name, pt=p50_s * source.lognormvariate(0, 1e-4)) for _ in range(5)] for name, p50_s in (("a", 1e-6), ("b", 1.01e-6)))
+        line = history.compared(before, after, "")[2]
+        self.assertRegex(line, r"\| 1\.010 \(1\.010 to 1\.010\)")
+        self.assertNotIn("slower", line)
 
     def test_interval_is_exact(self):
         # By counting: in how many of all orders of 5 and 5 values is the u-th ratio from the end on the wrong side?
