@@ -1,10 +1,12 @@
 // `alidade run`: live orientation of each frame, by a camera that calibrates itself. The threads are the
-// Pipeline's; this one waits for a signal, the end of the time asked for, or the end of the pipeline.
+// Pipeline's; this one waits for a signal, the end of the time asked for, or the end of the pipeline, and meanwhile
+// tells systemd that they live.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -18,6 +20,8 @@
 #include "edge_app/output/record_writer.h"
 #include "edge_app/output/status_page.h"
 #include "edge_app/pipeline/pipeline.h"
+#include "platform/system/clock.h"
+#include "platform/system/service_manager.h"
 
 namespace alidade {
 namespace {
@@ -152,6 +156,69 @@ std::unique_ptr<HttpServer> start_http(const Config& config, const HttpApiSource
   return server;
 }
 
+// What `systemctl status` shows of the time between two summaries.
+std::string describe(const PipelineSummary& before, const PipelineSummary& now, double period_s) {
+  const auto records = now.records - before.records;
+  const auto with_orientation = now.with_orientation - before.with_orientation;
+  const auto with_landmarks = now.with_landmarks - before.with_landmarks;
+  return fmt::format("{:.1f} frames a second; records of the last {:.0f} s: OE {}, PT {}, none {}",
+                     static_cast<double>(now.frames - before.frames) / period_s, period_s,
+                     with_landmarks, with_orientation - with_landmarks, records - with_orientation);
+}
+
+// Tells a service manager, once a period, what goes on, and that the process lives as long as records get through. A
+// camera that is gone is no reason to be killed; a thread that hangs is, and so is a reader of stdout that stalls.
+class LifeReport {
+ public:
+  LifeReport(const ServiceManager& manager, Pipeline* pipeline)
+      : manager_(manager), pipeline_(*pipeline) {
+    pipeline_.ask_for_pulse();
+  }
+
+  [[nodiscard]] double period_s() const {
+    return manager_.is_there() ? std::min(kStatusPeriod, manager_.alive_period_s())
+                               : std::numeric_limits<double>::infinity();
+  }
+
+  void tell() {
+    const bool lives = pipeline_.pulse_is_answered();
+    if (lives) {
+      manager_.alive();
+      pipeline_.ask_for_pulse();
+    } else if (lived_) {
+      spdlog::error(
+          "no record gets through: the reader of stdout stalls, or a thread hangs; systemd is no "
+          "longer told that this process lives");
+    }
+    lived_ = lives;
+    const double now_s = monotonic_now_s();
+    if (now_s < status_s_ + kStatusPeriod) return;
+    const PipelineSummary summary = pipeline_.summary();
+    manager_.status(describe(status_, summary, now_s - status_s_));
+    status_ = summary;
+    status_s_ = now_s;
+  }
+
+ private:
+  static constexpr double kStatusPeriod = 10;  // s
+  const ServiceManager& manager_;
+  Pipeline& pipeline_;
+  bool lived_ = true;
+  PipelineSummary status_;
+  double status_s_ = monotonic_now_s();
+};
+
+// Waits for a signal, the end of the pipeline, or the end of the time asked for.
+void wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport* report,
+                      double duration_s) {
+  const double end_s = monotonic_now_s() + duration_s;
+  for (double left_s = duration_s; left_s > 0; left_s = end_s - monotonic_now_s()) {
+    const double wait_s = std::min(left_s, report->period_s());
+    if (signals->wait(pipeline.finished_fd(), wait_s) != StopSignals::Event::kTimeout) return;
+    report->tell();
+  }
+}
+
 int run(const RunOptions& options) {
   const Config config = require_config(options.config);
   Calibrating calibrating;
@@ -200,7 +267,11 @@ int run(const RunOptions& options) {
   sources.latency_measured = of_pipeline.measure_latency;
   const auto http = start_http(config, sources, &tap);
   pipeline.start();
-  static_cast<void>(signals.wait(pipeline.finished_fd(), options.duration_s));
+  const ServiceManager manager;
+  manager.ready();
+  LifeReport report(manager, &pipeline);
+  wait_for_the_end(&signals, pipeline, &report, options.duration_s);
+  manager.stopping();
   if (http) http->stop();
   pipeline.stop();
 

@@ -212,6 +212,7 @@ void Pipeline::write_output() {
     last = stage_.output_ended();
     OutputMessage message;
     while (stage_.pop(message)) {
+      stage_.answer_pulse();
       account(message);
       if (!open) continue;
       open = sink_.write(message.record);
@@ -223,6 +224,7 @@ void Pipeline::write_output() {
         fail(sink_.error());
       }
     }
+    stage_.answer_pulse();
   }
   finish();
 }

@@ -74,6 +74,12 @@ class Pipeline {
   // A descriptor that polls readable once the pipeline is finished.
   [[nodiscard]] int finished_fd() const { return finished_; }
 
+  // Whether records could get through: a sign of life goes the way of a record, through the real-time thread and the
+  // output thread. Neither waits for a camera or a head, so that only a thread that hangs, or a sink that takes
+  // nothing, leaves it unanswered.
+  void ask_for_pulse() { stage_.ask_for_pulse(); }
+  [[nodiscard]] bool pulse_is_answered() const { return stage_.pulse_is_answered(); }
+
   // Ends the threads and waits for them; records on their way are still written.
   void stop();
 

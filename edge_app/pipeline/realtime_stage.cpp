@@ -135,6 +135,7 @@ bool RealtimeStage::process() noexcept {
   while (video_queue_.pop(message)) {
     drain_telemetry();
     adopt_published();
+    pass_on_pulse();
     const bool is_frame = message.kind == VideoMessage::Kind::kFrame;
     video_lost_.store(!is_frame, std::memory_order_relaxed);
     if (is_frame) {
@@ -148,6 +149,7 @@ bool RealtimeStage::process() noexcept {
     emit(out);
     feed_.post();
   }
+  pass_on_pulse();
   if (ended) {
     output_ended_.store(true, std::memory_order_release);
     output_.post();
@@ -160,6 +162,28 @@ bool RealtimeStage::process() noexcept {
 void RealtimeStage::emit(const OutputMessage& message) {
   if (!output_queue_.push(message)) dropped_records_.fetch_add(1, std::memory_order_relaxed);
   output_.post();
+}
+
+void RealtimeStage::ask_for_pulse() {
+  pulse_asked_.fetch_add(1, std::memory_order_release);
+  input_.post();
+}
+
+void RealtimeStage::pass_on_pulse() {
+  const std::uint32_t asked = pulse_asked_.load(std::memory_order_acquire);
+  if (asked == pulse_passed_on_.load(std::memory_order_relaxed)) return;
+  pulse_passed_on_.store(asked, std::memory_order_release);
+  output_.post();
+}
+
+void RealtimeStage::answer_pulse() {
+  pulse_answered_.store(pulse_passed_on_.load(std::memory_order_acquire),
+                        std::memory_order_release);
+}
+
+bool RealtimeStage::pulse_is_answered() const {
+  return pulse_answered_.load(std::memory_order_acquire) ==
+         pulse_asked_.load(std::memory_order_acquire);
 }
 
 DropCounters RealtimeStage::drops() const {

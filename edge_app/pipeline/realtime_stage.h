@@ -123,6 +123,14 @@ class RealtimeStage {
   bool pop_adopted(const PublishedCalibration*& calibration) { return adopted_.pop(calibration); }
   void report(CalibrationReport report) { report_.store(report, std::memory_order_relaxed); }
 
+  // Any thread: asks for a sign of life. It goes the way of a record: the real-time thread passes it on between two
+  // frames, and the output thread answers it between two records.
+  void ask_for_pulse();
+  // Output thread.
+  void answer_pulse();
+  // Any thread: whether the last one asked for is answered.
+  [[nodiscard]] bool pulse_is_answered() const;
+
   // Any thread.
   [[nodiscard]] DropCounters drops() const;
 
@@ -131,6 +139,7 @@ class RealtimeStage {
   void adopt_published();
   [[nodiscard]] bool is_late(const VideoMessage& message, double now_s) const;
   void process_frame(const VideoMessage& received);
+  void pass_on_pulse();
   void feed(const VideoMessage& message, bool* lent);
   void tap(const VideoMessage& message, bool* lent);
   void emit(const OutputMessage& message);
@@ -163,6 +172,10 @@ class RealtimeStage {
   // push and read with acquire before the queue is emptied, so nothing pushed earlier is missed.
   std::atomic<bool> input_ended_{false};
   std::atomic<bool> output_ended_{false};
+  // Counted up by who asks; a thread that hangs hands no number on.
+  std::atomic<std::uint32_t> pulse_asked_{0};
+  std::atomic<std::uint32_t> pulse_passed_on_{0};
+  std::atomic<std::uint32_t> pulse_answered_{0};
   // Statistics only: relaxed, each written by one thread.
   std::atomic<std::int64_t> dropped_frames_{0};
   std::atomic<std::int64_t> dropped_telemetry_{0};

@@ -14,6 +14,7 @@
 
 #include "platform/system/clock.h"
 #include "test/edge_app/scripted_sources.h"
+#include "test/platform/support/eventually.h"
 #include "test/support/fresh_memory.h"
 
 namespace alidade {
@@ -271,6 +272,33 @@ TEST_F(PipelineTest, StopEndsSourcesThatGiveNothing) {
   pipeline.stop();
   EXPECT_TRUE(sink_.records().empty());
   EXPECT_EQ(pipeline.error(), "");
+}
+
+TEST_F(PipelineTest, LivesWithoutCameraAndHeadAndNotWithAReaderThatStalls) {
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options_for_tests());
+  const auto lives = [&] { return pipeline.pulse_is_answered(); };
+  pipeline.start();
+  pipeline.ask_for_pulse();
+  EXPECT_TRUE(eventually(lives)) << "before anything has come";
+  video_.push(ReadStatus::kDisconnected, "rtsp://camera/stream: refused");
+  pan_tilt_.push(ReadStatus::kDisconnected, "http://camera: refused");
+  wait_for(RecordStatus::kVideoLost);
+  pipeline.ask_for_pulse();
+  EXPECT_TRUE(eventually(lives)) << "while both are lost";
+
+  sink_.hold(true);
+  video_.push(frame());
+  ASSERT_TRUE(eventually([&] { return pipeline.summary().frames > 0; }));
+  pipeline.ask_for_pulse();
+  // The real-time thread has long passed it on when it has filled the queue of records.
+  ASSERT_TRUE(eventually([&] {
+    for (int i = 0; i < 100; ++i) video_.push(frame());
+    return pipeline.summary().drops.records > 0;
+  }));
+  EXPECT_FALSE(lives()) << "while no record is taken";
+  sink_.hold(false);
+  EXPECT_TRUE(eventually(lives)) << "once records are taken again";
+  pipeline.stop();
 }
 
 TEST_F(PipelineTest, StopEndsAPipelineWhoseReaderHasStalled) {

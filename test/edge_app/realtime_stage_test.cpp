@@ -74,6 +74,20 @@ TEST(RealtimeStage, EndsBehindTheLastMessage) {
   EXPECT_EQ(count_records(stage.get()), 1);
 }
 
+TEST(RealtimeStage, PassesOnThePulseThatBothThreadsMustAnswer) {
+  const auto stage = make_stage();
+  stage->ask_for_pulse();
+  stage->answer_pulse();
+  EXPECT_FALSE(stage->pulse_is_answered()) << "the real-time thread hangs";
+  EXPECT_TRUE(stage->process());
+  EXPECT_FALSE(stage->pulse_is_answered()) << "the output thread hangs";
+  stage->wait_output();
+  stage->answer_pulse();
+  EXPECT_TRUE(stage->pulse_is_answered());
+  stage->ask_for_pulse();
+  EXPECT_FALSE(stage->pulse_is_answered()) << "an old answer is none";
+}
+
 // Every kind of message, fed by two other threads as in the pipeline, while the guard watches this one. The
 // feeders take turns, so that each frame has its telemetry however they are scheduled.
 TEST(RealtimeStage, AllocatesNothing) {
