@@ -1,0 +1,290 @@
+#!/usr/bin/env python3
+"""The Debian packages: what is in them, and what happens when they are installed into a bare Debian 12.
+
+    package_test.py Contents ARCHITECTURE DIR                 their files, fields, lintian
+    package_test.py Installed ARCHITECTURE DIR SIMULATE       a root of that architecture: install, run, remove, purge
+
+ARCHITECTURE is Debian's name (amd64, arm64, armhf), DIR holds the packages, SIMULATE is this machine's
+alidade-simulate, which makes the recording. Another architecture than this machine's runs under qemu-user, which is
+registered in a user namespace of its own: the machine's settings stay as they are. That takes root and Linux 6.7.
+"""
+import hashlib
+import json
+import os
+import pathlib
+import re
+import shutil
+import stat
+import subprocess
+import sys
+import tempfile
+import unittest
+
+ARCHITECTURE, PACKAGES, SIMULATE = "", pathlib.Path(), ""
+PROJECT = pathlib.Path(__file__).resolve().parents[2]
+NATIVE = subprocess.run(["dpkg", "--print-architecture"], check=True, capture_output=True, text=True).stdout.strip()
+TRIPLETS = {"amd64": "x86_64-linux-gnu", "arm64": "aarch64-linux-gnu", "armhf": "arm-linux-gnueabihf"}
+EMULATORS = {"amd64": "x86_64", "arm64": "aarch64", "armhf": "arm"}
+FRAMES = 50
+WANTED = "/etc/systemd/system/multi-user.target.wants/alidade.service"
+
+
+def output_of(*command, **options):
+    done = subprocess.run([str(c) for c in command], capture_output=True, text=True, check=False, **options)
+    if done.returncode != 0:
+        raise AssertionError(f"{command}: exit code {done.returncode}\n{done.stdout}{done.stderr}")
+    return done.stdout
+
+
+def package(name):
+    found = sorted(PACKAGES.glob(f"{name}_*_{ARCHITECTURE}.deb"))
+    assert len(found) == 1, f"{PACKAGES} has {len(found)} packages {name} for {ARCHITECTURE}; one is to be there"
+    return found[0]
+
+
+def field(name, which):
+    return output_of("dpkg-deb", "--field", package(name), which).strip()
+
+
+def dependencies():
+    """Names alone: mmdebstrap gets them from the archive, and dpkg looks at the versions."""
+    return [one.split()[0] for one in field("alidade", "Depends").split(", ")]
+
+
+class Contents(unittest.TestCase):
+    def unpacked(self, name):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        output_of("dpkg-deb", "--extract", package(name), folder.name)
+        return pathlib.Path(folder.name)
+
+    def test_the_program_comes_with_all_that_belongs_to_it(self):
+        root = self.unpacked("alidade")
+        files = {str(f.relative_to(root)) for f in root.rglob("*") if f.is_file()}
+        examples = {f"usr/share/doc/alidade/examples/{f.name}" for f in (PROJECT / "edge_app/examples").glob("*.yaml")}
+        self.assertGreaterEqual(len(examples), 4)
+        self.assertEqual(files, examples | {
+            "etc/alidade/alidade.yaml", "lib/systemd/system/alidade.service", "lib/udev/rules.d/60-alidade.rules",
+            "usr/bin/alidade", "usr/share/doc/alidade/changelog.gz", "usr/share/doc/alidade/copyright",
+            "usr/share/man/man1/alidade.1.gz"})
+
+    def test_the_libraries_come_with_every_header_and_the_cmake_package(self):
+        root = self.unpacked("alidade-dev")
+        files = {str(f.relative_to(root)) for f in root.rglob("*") if f.is_file()}
+        folder = f"usr/lib/{TRIPLETS[ARCHITECTURE]}"
+        libraries = {f for f in files if f.endswith(".a")}
+        self.assertEqual(libraries, {f"{folder}/libalidade_{name}.a"
+                                     for name in ("calibration", "pipeline", "platform", "realtime")})
+        self.assertLessEqual({f"{folder}/cmake/alidade/alidade{name}.cmake"
+                              for name in ("Config", "ConfigVersion", "Targets", "Targets-release")}, files)
+        for header in ("core/model/camera.h", "core/realtime/oe_mode.h", "platform/system/clock.h"):
+            self.assertIn(f"usr/include/alidade/{header}", files)
+        known = ("usr/include/alidade/", f"{folder}/", "usr/share/doc/alidade-dev/")
+        self.assertEqual([f for f in files if not f.startswith(known)], [])
+
+    def test_no_file_names_the_folder_it_was_built_in(self):
+        for name in ("alidade", "alidade-dev"):
+            for file in self.unpacked(name).rglob("*"):
+                if file.is_file() and file.suffix != ".a":
+                    self.assertNotIn(os.fsencode(PROJECT) + b"/", file.read_bytes(), file)
+
+    def test_fields_say_what_it_is(self):
+        for name in ("alidade", "alidade-dev"):
+            self.assertEqual(field(name, "Architecture"), ARCHITECTURE)
+            lines = field(name, "Description").splitlines()
+            self.assertLess(len(lines[0]), 80)
+            self.assertGreater(len(lines), 2)
+        depends = field("alidade", "Depends")
+        for needed in ("adduser", "libc6 (>=", "libavformat59 (>=", "libcurl4 (>=", "libsystemd0"):
+            self.assertIn(needed, depends)
+        self.assertEqual(field("alidade", "Version"), field("alidade-dev", "Version"))
+
+    def test_libraries_depend_on_the_packages_of_all_they_link(self):
+        root = self.unpacked("alidade-dev")
+        targets = next(root.rglob("alidadeTargets.cmake")).read_text(encoding="utf-8")
+        linked = set(re.findall(r"LINK_ONLY:([a-z][\w.-]*)>", targets))
+        self.assertIn("avformat", linked)
+        if ARCHITECTURE != NATIVE:
+            self.skipTest("this machine's packages have the files of its own architecture")
+        waiting = re.findall(r"[a-z][a-z0-9.+-]+", re.sub(r"\(.*?\)", "", field("alidade-dev", "Depends")))
+        known = set()
+        while waiting:
+            known.add(name := waiting.pop())
+            depends = subprocess.run(["dpkg-query", "-W", "-f", "${Depends}", name], capture_output=True, text=True,
+                                     check=False).stdout
+            waiting += set(re.findall(r"[a-z][a-z0-9.+-]+", re.sub(r"\(.*?\)|:any", "", depends))) - known
+        for library in linked:
+            owner = output_of("dpkg", "-S", f"/usr/lib/{TRIPLETS[NATIVE]}/lib{library}.so").split(":")[0]
+            self.assertIn(owner, known, f"-l{library}")
+
+    def test_systemd_understands_the_unit(self):
+        root = self.unpacked("alidade")
+        unit = root / "lib/systemd/system/alidade.service"
+        text = unit.read_text(encoding="utf-8")
+        self.assertIn("=/usr/bin/alidade run ", text)
+        unit.write_text(text.replace("=/usr/bin/", f"={root}/usr/bin/"), encoding="utf-8")
+        done = subprocess.run(["systemd-analyze", "verify", "--man=no", "--recursive-errors=no", unit],
+                              capture_output=True, text=True, check=False)
+        self.assertEqual((done.returncode, done.stdout + done.stderr), (0, ""))
+        # Out of 10; what a service needs that uses devices, the network and real-time priorities.
+        output_of("systemd-analyze", "security", "--offline=true", "--threshold=25", unit)
+
+    def test_lintian_finds_no_error(self):
+        done = subprocess.run(["lintian", "--fail-on", "error,warning", "--allow-root", package("alidade"), package("alidade-dev")],
+                              capture_output=True, text=True, check=False)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+
+
+class Installed(unittest.TestCase):
+    """Makes the root, and does the rest (`inside`) in it while mmdebstrap's apt can be used for it."""
+
+    def test_is_installed_runs_and_goes_without_a_trace(self):
+        with tempfile.TemporaryDirectory() as folder:
+            recording = pathlib.Path(folder, "recording")
+            camera = pathlib.Path(folder, "camera.yaml")
+            camera.write_text(json.dumps({
+                "seed": 1, "duration_s": FRAMES / 25, "image": {"width": 160, "height": 96, "rate_hz": 25},
+                "camera": {"focal_length_px": 2667.5, "line_delay_us": -60.0},
+                "path": {"type": "triple_cosine", "period_s": 10},
+                "scene": {"procedural": [{"azimuth_deg": 0, "elevation_deg": 0, "width_deg": 16, "height_deg": 8}]},
+                "telemetry": {"sigma_rad": 5e-5}}), encoding="utf-8")
+            output_of(SIMULATE, "-c", camera, "-o", recording)
+            sources = [file for folder in ("/etc/apt", "/etc/apt/sources.list.d")
+                       for file in sorted(pathlib.Path(folder).glob("*.*"))
+                       if file.suffix in (".list", ".sources") and "debian" in file.read_text(encoding="utf-8").lower()]
+            self.assertTrue(sources, "no Debian package source in /etc/apt")
+            # The root's path is the hook's last argument.
+            hook = [sys.executable, "-B", __file__, "inside", ARCHITECTURE, PACKAGES, recording]
+            mode = "root" if os.geteuid() == 0 else "unshare"
+            command = ["mmdebstrap", f"--mode={mode}", "--variant=apt", f"--architectures={ARCHITECTURE}",
+                       "--components=main", "--format=null", f"--include={','.join(dependencies())}", '--aptopt=APT::Install-Recommends "false"',
+                       '--aptopt=Acquire::Retries "3"',
+                       "--customize-hook=" + " ".join(str(word) for word in hook) + ' "$1"', "bookworm", "/dev/null", *sources]
+            code, text = run_here(command) if ARCHITECTURE == NATIVE else run_emulated(command)
+        print(text)
+        self.assertEqual(code, 0)
+        self.assertIn("\nall done inside\n", text)
+
+
+def run_here(command):
+    done = subprocess.run([str(c) for c in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, check=False)
+    return done.returncode, done.stdout
+
+
+def run_emulated(command):
+    """In namespaces of its own, where qemu-user is what runs the architecture's programs."""
+    registration = f"/usr/lib/binfmt.d/qemu-{EMULATORS[ARCHITECTURE]}.conf"
+    # The inner shell is root there; the outer one began before there was a root.
+    inner = ["unshare", "--user", "--mount", "--pid", "--fork", "--kill-child",
+             "sh", "-c", 'echo ready && read -r _ && exec "$@"', "sh",
+             "sh", "-c", f"mount -t proc proc /proc && mount -t binfmt_misc binfmt_misc /proc/sys/fs/binfmt_misc && "
+             f'cat {registration} > /proc/sys/fs/binfmt_misc/register && exec "$@"', "sh"]
+    with subprocess.Popen([*inner, *(str(c) for c in command)], stdin=subprocess.PIPE, stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, text=True) as child:
+        if child.stdout.readline() != "ready\n":
+            raise AssertionError("no user namespace here: run this test as root on a kernel that has them")
+        for kind in ("uid", "gid"):
+            pathlib.Path(f"/proc/{child.pid}/{kind}_map").write_text("0 0 65536", encoding="ascii")
+        text, _ = child.communicate("go\n")
+    return child.returncode, text
+
+
+# What an installation of any package changes.
+BOOKKEEPING = ("/var/lib/dpkg/", "/var/log/", "/var/cache/", "/var/lib/apt/", "/tmp/", "/proc/", "/sys/", "/dev/", "/run/")
+
+
+def snapshot(root):
+    """Path -> kind, mode, owner and content of all in the root."""
+    found = {}
+    for folder, folders, files in os.walk(root):
+        folders[:] = [f for f in folders
+                      if not f"{folder}/{f}/"[len(root):].startswith(BOOKKEEPING) and not os.path.ismount(f"{folder}/{f}")]
+        for name in folders + files:
+            path = f"{folder}/{name}"
+            shown = path[len(root):]
+            # adduser keeps the last version of passwd, group and shadow as passwd-, ...
+            if shown.startswith(BOOKKEEPING) or re.fullmatch(r"/etc/(passwd|group|g?shadow|sub[ug]id)-", shown):
+                continue
+            status = os.lstat(path)
+            content = ""
+            if stat.S_ISREG(status.st_mode):
+                content = hashlib.sha256(pathlib.Path(path).read_bytes()).hexdigest()
+            elif stat.S_ISLNK(status.st_mode):
+                content = os.readlink(path)
+            found[shown] = (oct(status.st_mode), status.st_uid, status.st_gid, content)
+    return found
+
+
+def inside(root, recording):
+    """The hook: everything that is done to the root."""
+    def chroot(*command, code=0):
+        done = subprocess.run(["chroot", root, *command], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
+                              env={"PATH": "/usr/sbin:/usr/bin:/sbin:/bin", "DEBIAN_FRONTEND": "noninteractive"})
+        print("#", *command, f"-> {done.returncode}\n{done.stdout}{done.stderr}", flush=True)
+        assert done.returncode == code, f"{command}: exit code {done.returncode}, {code} was expected"
+        return done.stdout + done.stderr
+
+    def there(path):
+        return os.path.lexists(root + path)
+
+    shutil.copy(package("alidade"), f"{root}/tmp/alidade.deb")
+    shutil.copytree(recording, f"{root}/tmp/recording")
+    before = snapshot(root)
+
+    chroot("dpkg", "--install", "/tmp/alidade.deb")
+    assert chroot("alidade", "--version") == f"alidade {field('alidade', 'Version')}\n"
+    assert chroot("dpkg", "--verify", "alidade") == ""
+    assert set(chroot("id", "-nG", "alidade").split()) == {"alidade", "video", "dialout"}
+    assert chroot("stat", "-c", "%U:%G %a", "/var/lib/alidade") == "alidade:alidade 750\n"
+
+    report = chroot("alidade", "check", "-c", "/etc/alidade/alidade.yaml", "--duration", "1", code=1)
+    assert "/etc/alidade/alidade.yaml: ok" in report
+    assert re.search(r"^video .*: failed$", report, re.M) and re.search(r"^pan/tilt .*: failed$", report, re.M)
+    for url in ("rtsp://camera/axis-media/media.amp", "http://camera/"):
+        assert f"alidade: {url}: " in report
+
+    chroot("alidade", "replay", "/tmp/recording", "--calibration", "/tmp/recording/truth.yaml", "--mode", "OE")
+    rows = pathlib.Path(root, "tmp/recording/alidade/orientation.csv").read_text(encoding="utf-8").splitlines()
+    assert len(rows) == 1 + FRAMES, len(rows)
+    oe = sum(",OE," in row for row in rows)
+    assert oe > FRAMES / 2, f"{oe} records of OE mode"
+
+    # Again, over a configuration that somebody has changed: it stays.
+    configuration = pathlib.Path(root, "etc/alidade/alidade.yaml")
+    changed = configuration.read_text(encoding="utf-8") + "# ours\n"
+    configuration.write_text(changed, encoding="utf-8")
+    pathlib.Path(root, "var/lib/alidade/calibration.yaml").write_text("a calibration\n", encoding="utf-8")
+    chroot("dpkg", "--install", "/tmp/alidade.deb")
+    assert configuration.read_text(encoding="utf-8") == changed
+
+    # Enabled by systemd's own tool, which needs no systemd in there.
+    assert not there(WANTED)
+    output_of("systemctl", f"--root={root}", "enable", "alidade.service")
+    assert there(WANTED)
+
+    # Removed: what somebody has written stays, and its owner.
+    chroot("dpkg", "--remove", "alidade")
+    left = {path for path in snapshot(root).keys() - before.keys()}
+    assert left == {"/etc/alidade", "/etc/alidade/alidade.yaml", "/var/lib/alidade", "/var/lib/alidade/calibration.yaml",
+                    "/var/lib/systemd/deb-systemd-helper-enabled/alidade.service.dsh-also",
+                    WANTED, os.path.dirname(WANTED)}, left
+    chroot("id", "alidade")
+
+    chroot("dpkg", "--purge", "alidade")
+    after = snapshot(root)
+    # systemctl made its folder, not the package.
+    after.pop(os.path.dirname(WANTED), None)
+    differing = {path for path in before.keys() | after.keys() if before.get(path) != after.get(path)}
+    assert not differing, differing
+
+    print("\nall done inside\n", flush=True)
+
+
+if __name__ == "__main__":
+    what, ARCHITECTURE, folder, *more = sys.argv[1:]
+    PACKAGES = pathlib.Path(folder).resolve()
+    if what == "inside":
+        inside(more[1], more[0])
+    else:
+        SIMULATE = more[0] if more else ""
+        unittest.main(argv=[sys.argv[0], "-v", what])
