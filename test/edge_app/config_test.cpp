@@ -240,6 +240,15 @@ TEST_F(ConfigTest, TheExampleOfACameraOnUsbIsRead) {
   EXPECT_TRUE(load_config(ALIDADE_USB_EXAMPLE, &config_, &error)) << error;
 }
 
+// The service may write nowhere else, and its stdout is the journal.
+TEST_F(ConfigTest, TheExampleOfTheServiceIsReadAndKeepsToItsOwnFolder) {
+  std::string error;
+  ASSERT_TRUE(load_config(ALIDADE_SERVICE_EXAMPLE, &config_, &error)) << error;
+  EXPECT_EQ(config_.calibration.file, "/var/lib/alidade/calibration.yaml");
+  EXPECT_FALSE(config_.output.stdout_format);
+  EXPECT_TRUE(config_.output.http);
+}
+
 #define RTSP "video: {type: rtsp, url: rtsp://camera/stream}\n"
 
 TEST_F(ConfigTest, PelcoDHasTheProtocolsOwnUnitsAndRate) {

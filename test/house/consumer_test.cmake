@@ -1,5 +1,5 @@
-# Installs the build into a fresh prefix, then configures, builds and runs consumer/ against it.
-foreach(folder prefix build)
+# Installs the build BUILD, or unpacks the Debian package alidade-dev in PACKAGES, into a fresh prefix, then configures, builds and runs consumer/ against it.
+foreach(folder unpacked prefix build)
   file(REMOVE_RECURSE ${WORK}/${folder})
 endforeach()
 function(run)
@@ -9,7 +9,14 @@ function(run)
     message(FATAL_ERROR "${command}\nexit ${code}\n${output}")
   endif()
 endfunction()
-run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/prefix)
+if(PACKAGES)
+  file(GLOB package ${PACKAGES}/alidade-dev_*.deb)
+  file(MAKE_DIRECTORY ${WORK})
+  run(dpkg-deb --extract ${package} ${WORK}/unpacked)
+  file(RENAME ${WORK}/unpacked/usr ${WORK}/prefix)
+else()
+  run(${CMAKE_COMMAND} --install ${BUILD} --prefix ${WORK}/prefix)
+endif()
 run(${CMAKE_COMMAND} -S ${SOURCE} -B ${WORK}/build -G ${GENERATOR}
     -DCMAKE_PREFIX_PATH=${WORK}/prefix -DALIDADE_VERSION=${VERSION})
 run(${CMAKE_COMMAND} --build ${WORK}/build)
