@@ -70,9 +70,14 @@ endfunction()
 # Everything that the thread sanitizer is worth building for: the tests labelled `threads`.
 add_custom_target(threaded_programs)
 
+# What another processor can make different, and qemu-user can run: the tests labelled `processor`. Those that start
+# programs of the other processor or need pseudo-terminals cannot run there.
+add_custom_target(processor_programs)
+
 # alidade_test(camera_test SOURCES camera_test.cpp LINK alidade::model [LABELS ...] [TIMEOUT s]
 #              [ARGUMENTS ...] [DEPENDS target...])
-# builds a GoogleTest program and registers each of its tests with ctest. With a sanitizer, those labelled statistics or
+# builds a GoogleTest program and registers each of its tests with ctest, with the labels and those of the folder,
+# ALIDADE_TEST_LABELS. With a sanitizer, those labelled statistics or
 # films are neither built nor run.
 function(alidade_test name)
   cmake_parse_arguments(A "" "TIMEOUT" "SOURCES;LINK;LABELS;ARGUMENTS;DEPENDS" ${ARGN})
@@ -95,6 +100,10 @@ function(alidade_test name)
   if(ALIDADE_SANITIZE AND ("statistics" IN_LIST A_LABELS OR "films" IN_LIST A_LABELS))
     set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
     return()
+  endif()
+  list(APPEND A_LABELS ${ALIDADE_TEST_LABELS})
+  if("processor" IN_LIST A_LABELS)
+    add_dependencies(processor_programs ${name})
   endif()
   if("threads" IN_LIST A_LABELS)
     add_dependencies(threaded_programs ${name})
@@ -155,6 +164,7 @@ function(alidade_fuzz_target name)
     endif()
     add_test(NAME fuzz_regressions_${name}
       COMMAND fuzz_${name} --mutations=${A_MUTATIONS} ${inputs})
-    set_tests_properties(fuzz_regressions_${name} PROPERTIES TIMEOUT 120)
+    set_tests_properties(fuzz_regressions_${name} PROPERTIES TIMEOUT 120 LABELS processor)
+    add_dependencies(processor_programs fuzz_${name})
   endif()
 endfunction()

@@ -21,6 +21,7 @@
 #include "edge_app/output/status_page.h"
 #include "edge_app/pipeline/pipeline.h"
 #include "platform/system/clock.h"
+#include "platform/system/realtime.h"
 #include "platform/system/service_manager.h"
 
 namespace alidade {
@@ -242,6 +243,8 @@ int run(const RunOptions& options) {
   if (options.csv) format = OutputFormat::kCsv;
 
   StopSignals signals;
+  if (config.realtime.lock_memory && !use_small_stacks())
+    spdlog::warn("threads have stacks of the usual size, all of which is locked");
   const auto video = make_frame_source(config.video, config.realtime.landmarks);
   const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
   spdlog::info("video: {}; pan/tilt: {}", video->name(), pan_tilt->name());

@@ -128,19 +128,12 @@ MapState map_video(const std::string& directory, const CalibrationResult& result
     chosen.frames.push_back({frame.frame, frame.time_s, {}});
     times[frame.frame] = frame.time_s;
   }
-  std::vector<std::vector<std::uint8_t>> pictures;
   std::vector<Keyframe> keyframes;
   std::vector<std::string> said_before;
-  for_each_picture(
-      directory, chosen, progress, &said_before, [&](std::int64_t frame, const ImageView& image) {
-        std::vector<std::uint8_t> picture;
-        for (int row = 0; row < image.height; ++row) {
-          picture.insert(picture.end(), image.row(row), image.row(row) + image.width);
-        }
-        pictures.push_back(std::move(picture));
-        keyframes.push_back(
-            {times.at(frame), {pictures.back().data(), image.width, image.height, image.width}});
-      });
+  for_each_picture(directory, chosen, progress, &said_before,
+                   [&](std::int64_t frame, const ImageView& image) {
+                     keyframes.push_back({times.at(frame), std::make_shared<PackedPicture>(image)});
+                   });
   return map_from_keyframes(result, keyframes);
 }
 

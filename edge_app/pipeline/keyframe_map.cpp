@@ -104,13 +104,16 @@ MapState map_from_keyframes(const CalibrationResult& result,
   OeMode mode(options);
   mode.reset(result.calibration);
   double tilt = 0;
+  std::vector<std::uint8_t> pixels;
   for (const Keyframe& keyframe : keyframes) {
     const double middle_s = keyframe.time_s + to_middle_s;
     InterpolatedPanTilt prediction = predict(result, middle_s, kSigmaPx);
     prediction.acceleration_sigma = acceleration_sigma;
     FrameOrientation orientation;
+    const ImageView picture =
+        keyframe.picture == nullptr ? ImageView{} : keyframe.picture->unpack(&pixels);
     // Whatever the status: maintain() knows what to do with such a frame.
-    static_cast<void>(mode.process(keyframe.picture, keyframe.time_s, &prediction, &orientation));
+    static_cast<void>(mode.process(picture, keyframe.time_s, &prediction, &orientation));
     mode.maintain();
     tilt += result.trajectory.position(middle_s).tilt / static_cast<double>(keyframes.size());
   }

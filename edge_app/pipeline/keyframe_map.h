@@ -10,18 +10,20 @@
 // Angles rad, times s on the image clock.
 // Pure; allocates; some 10 ms a keyframe. Not for the real-time thread.
 
+#include <memory>
 #include <vector>
 
 #include "core/calibration/calibrate.h"
-#include "core/realtime/image_view.h"
 #include "core/realtime/map_state.h"
 #include "core/realtime/telemetry_interpolation.h"
+#include "edge_app/pipeline/packed_picture.h"
 
 namespace alidade {
 
 struct Keyframe {
   double time_s = 0;  // of row 0
-  ImageView picture;  // of the calibration's size; another is passed over
+  // Of the calibration's size; another, or none, is passed over.
+  std::shared_ptr<const PackedPicture> picture;
 };
 
 // In order of time, within the trajectory's span. An empty map if none can be used.

@@ -187,10 +187,12 @@ void Pipeline::calibrate() {
                  lent.end());
     }
     CalibrationReport report = calibration_->report();
-    if (calibration_->due()) stage_.report({CalibrationActivity::kAdjusting, report.need});
+    const bool due = calibration_->due();
+    if (due) stage_.report({CalibrationActivity::kAdjusting, report.need});
     if (auto published = calibration_->work()) {
       if (stage_.publish(published.get())) lent.push_back(std::move(published));
     }
+    if (due) return_freed_memory();
     report = calibration_->report();
     stage_.report(report);
     for (const std::string& line : calibration_->take_messages())

@@ -57,8 +57,7 @@ struct KeptPicture {
   std::int64_t frame;
   double receive_time_s;
   double pan, tilt;  // rad, as measured last before it
-  int width, height;
-  std::vector<std::uint8_t> pixels;
+  std::shared_ptr<const PackedPicture> picture;
 };
 
 struct Checked {
@@ -473,9 +472,7 @@ MapState SelfCalibration::State::make_map(const CalibrationResult& result) const
   for (const KeptPicture& picture : pictures) {
     const auto time = time_of.find(picture.frame);
     if (time == time_of.end()) continue;
-    keyframes.push_back(
-        {time->second, ImageView{picture.pixels.data(), picture.width, picture.height,
-                                 static_cast<std::ptrdiff_t>(picture.width)}});
+    keyframes.push_back({time->second, picture.picture});
   }
   return map_from_keyframes(result, keyframes);
 }
@@ -635,20 +632,8 @@ void SelfCalibration::add_keyframe(const ImageView& picture) {
   }
   if (s.pictures.size() >= s.options.max_keyframes) s.pictures.erase(s.pictures.begin());
   const FrameStamp& stamp = s.frames.back().stamp;
-  KeptPicture kept{stamp.frame,
-                   stamp.receive_time_s,
-                   s.last_angle.pan,
-                   s.last_angle.tilt,
-                   picture.width,
-                   picture.height,
-                   {}};
-  kept.pixels.resize(static_cast<std::size_t>(picture.width) *
-                     static_cast<std::size_t>(picture.height));
-  for (int row = 0; row < picture.height; ++row) {
-    std::copy_n(picture.row(row), picture.width,
-                kept.pixels.data() + static_cast<std::ptrdiff_t>(row) * picture.width);
-  }
-  s.pictures.push_back(std::move(kept));
+  s.pictures.push_back({stamp.frame, stamp.receive_time_s, s.last_angle.pan, s.last_angle.tilt,
+                        std::make_shared<PackedPicture>(picture)});
 }
 
 void SelfCalibration::add(const PanTiltSample& sample) {

@@ -1,5 +1,6 @@
 #include "platform/system/realtime.h"
 
+#include <limits.h>
 #include <malloc.h>
 #include <pthread.h>
 #include <sched.h>
@@ -9,10 +10,14 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cerrno>
+#include <cstdint>
 #include <cstring>
 #include <fstream>
 #include <sstream>
+#include <utility>
 
 namespace alidade {
 namespace {
@@ -54,6 +59,46 @@ void set_processor(int cpu, RealtimeReport* report) {
   }
 }
 
+std::atomic<bool> freed_memory_is_kept{false};
+
+// Whether a mapping, a line of /proc/self/maps, is brought in as a whole: heap and stacks, and code and data that
+// the real-time thread may use.
+bool is_brought_in(const std::string& permissions, const std::string& path,
+                   const std::string& program) {
+  if (permissions[0] != 'r') return false;
+  if (path.empty() || path[0] == '[') return permissions.compare(1, 3, "w-p") == 0;
+  if (path == program) return true;
+  const std::string name = path.substr(path.rfind('/') + 1);
+  for (const char* library : {"libc.so", "libm.so", "libstdc++.so", "libgcc_s.so", "ld-linux"}) {
+    if (name.compare(0, std::strlen(library), library) == 0) return true;
+  }
+  return false;
+}
+
+// What there is now is locked as it is touched, but for what is brought in; what comes later is brought in.
+bool lock_all() {
+  if (mlockall(MCL_CURRENT | MCL_ONFAULT) != 0) return false;
+  std::array<char, PATH_MAX> program{};
+  if (readlink("/proc/self/exe", program.data(), program.size() - 1) < 0) return false;
+  std::ifstream maps("/proc/self/maps");
+  std::vector<std::pair<std::uintptr_t, std::uintptr_t>> ranges;
+  for (std::string line; std::getline(maps, line);) {
+    std::istringstream words(line);
+    std::uintptr_t begin = 0, end = 0;
+    char dash = 0;
+    std::string permissions, offset, device, inode, path;
+    words >> std::hex >> begin >> dash >> end >> permissions >> offset >> device >> inode >> path;
+    if (permissions.size() == 4 && is_brought_in(permissions, path, program.data()))
+      ranges.emplace_back(begin, end);
+  }
+  // A mapping may have gone since, a thread's stack say: then there is nothing to lock.
+  for (const auto& [begin, end] : ranges) {
+    if (mlock(reinterpret_cast<const void*>(begin), end - begin) != 0 && errno != ENOMEM)
+      return false;
+  }
+  return mlockall(MCL_FUTURE) == 0;
+}
+
 void lock_memory(RealtimeReport* report) {
   if (memory_lock_is_limited()) {
     report->warnings.emplace_back(
@@ -62,8 +107,9 @@ void lock_memory(RealtimeReport* report) {
     return;
   }
   // First, so that what malloc has is locked once and stays.
+  freed_memory_is_kept = true;
   const bool kept = mallopt(M_TRIM_THRESHOLD, -1) == 1 && mallopt(M_MMAP_MAX, 0) == 1;
-  if (mlockall(MCL_CURRENT | MCL_FUTURE) != 0) {
+  if (!lock_all()) {
     report->warnings.push_back(std::string("memory is not locked (") + std::strerror(errno) + ")");
     return;
   }
@@ -120,6 +166,19 @@ RealtimeReport apply_realtime(const RealtimeOptions& options) {
   if (options.lock_memory) lock_memory(&report);
   prefault_stack(&report);
   return report;
+}
+
+bool use_small_stacks() {
+  pthread_attr_t attributes;
+  if (pthread_attr_init(&attributes) != 0) return false;
+  const bool set = pthread_attr_setstacksize(&attributes, kThreadStack) == 0 &&
+                   pthread_setattr_default_np(&attributes) == 0;
+  pthread_attr_destroy(&attributes);
+  return set;
+}
+
+void return_freed_memory() {
+  if (!freed_memory_is_kept) malloc_trim(0);
 }
 
 std::string set_lowest_priority() {

@@ -15,7 +15,9 @@ struct RealtimeOptions {
   int priority = 0;  // SCHED_FIFO priority 1..99; 0 leaves the normal scheduling
   int cpu = -1;      // processor to run on; -1: any
   // Locks all memory of the process, now and later, and keeps malloc from returning it to the kernel
-  // and from fetching large blocks one by one: fresh memory is a page fault.
+  // and from fetching large blocks one by one: fresh memory is a page fault. Heap and stacks, now and later, this
+  // program and the C and C++ libraries are brought in; what else was linked with other libraries, a hundred MB of
+  // codecs, is kept once it was used.
   bool lock_memory = false;
 };
 
@@ -33,6 +35,15 @@ struct RealtimeReport {
 // Allocates.
 inline constexpr std::size_t kPrefaultedStack = std::size_t{256} << 10;  // bytes
 [[nodiscard]] RealtimeReport apply_realtime(const RealtimeOptions& options);
+
+// Stacks of threads that are started from now on are of this size: locked memory holds all of each, of which glibc's
+// default is 8 MB. Returns whether it could be had.
+inline constexpr std::size_t kThreadStack = std::size_t{2} << 20;  // bytes
+[[nodiscard]] bool use_small_stacks();
+
+// Gives memory that was freed back to the kernel, unless the process keeps it (lock_memory). Allocation by other
+// threads waits meanwhile: for a thread that has just freed megabytes.
+void return_freed_memory();
 
 // Lets the calling thread run only when no other wants to (SCHED_IDLE, else the highest nice value), whatever
 // the thread that started it runs as. Returns one line if it could not be had; empty = granted.

@@ -87,17 +87,22 @@ class KeyframeMap : public ::testing::Test {
     std::vector<Keyframe> out;
     for (int i = 0; i < count; ++i) {
       const double time_s = (i + 0.5) * kDuration / count;
-      pictures_.push_back(renderer_.render(time_s, i));
-      out.push_back({time_s, {pictures_.back().data(), kWidth, kHeight, kWidth}});
+      picture_ = renderer_.render(time_s, i);
+      out.push_back({time_s, packed(kHeight)});
     }
     return out;
+  }
+
+  // Of the picture rendered last, the first rows.
+  [[nodiscard]] std::shared_ptr<PackedPicture> packed(int rows) const {
+    return std::make_shared<PackedPicture>(ImageView{picture_.data(), kWidth, rows, kWidth});
   }
 
   simulator::Config config_;
   std::unique_ptr<simulator::Path> path_;
   simulator::Renderer renderer_;
   CalibrationResult result_;
-  std::vector<std::vector<std::uint8_t>> pictures_;
+  std::vector<std::uint8_t> picture_;
 };
 
 TEST_F(KeyframeMap, PutsAnotherOeModeIntoTheBaseFrameInItsFirstFrame) {
@@ -141,10 +146,11 @@ TEST_F(KeyframeMap, PutsAnotherOeModeIntoTheBaseFrameInItsFirstFrame) {
 TEST_F(KeyframeMap, PassesOverPicturesThatAreNoneOrOfAnotherSize) {
   std::vector<Keyframe> some = keyframes(3);
   const std::size_t landmarks = map_from_keyframes(result_, some).landmarks.size();
-  some.push_back({kDuration, {}});
-  some.push_back({kDuration, {pictures_[0].data(), kWidth, kHeight - 1, kWidth}});
+  some.push_back({kDuration, nullptr});
+  some.push_back({kDuration, std::make_shared<PackedPicture>()});
+  some.push_back({kDuration, packed(kHeight - 1)});
   EXPECT_EQ(map_from_keyframes(result_, some).landmarks.size(), landmarks);
-  EXPECT_TRUE(map_from_keyframes(result_, {some[3], some[4]}).landmarks.empty());
+  EXPECT_TRUE(map_from_keyframes(result_, {some[3], some[4], some[5]}).landmarks.empty());
   EXPECT_TRUE(map_from_keyframes(result_, {}).landmarks.empty());
 }
 

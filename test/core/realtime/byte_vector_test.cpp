@@ -92,8 +92,7 @@ TEST(ByteVector, LoadsAndStoresSixteenBytesAtAnyAddressAndNoMore) {
     const Bytes bytes = bytes_of(load<ByteVector>(at));
     EXPECT_TRUE(std::equal(bytes.begin(), bytes.end(), at));
     store(broadcast(7), at);
-    for (std::size_t i = 0; i < offset; ++i)
-      EXPECT_EQ(at[i], i < kByteLanes ? 7 : i + offset);
+    for (std::size_t i = 0; i < offset; ++i) EXPECT_EQ(at[i], i < kByteLanes ? 7 : i + offset);
   }
 }
 

@@ -60,7 +60,7 @@ TYPED_TEST(Sampling, GradientIsTheDerivativeOfTheValue) {
 template <class Kernel>
 double plain_sample(const ImageView& image, double u, double v) {
   constexpr int kTaps = Kernel::kTaps;
-  TapPlace place;
+  TapPlace place{};
   EXPECT_EQ(find_taps<kTaps>(image, u, v, 1, 1, &place), SampleStatus::kOk);
   const auto across = Kernel::taps(place.t_u);
   const auto down = Kernel::taps(place.t_v);
@@ -81,8 +81,9 @@ TYPED_TEST_SUITE(VectorSampling, FourTaps);
 TYPED_TEST(VectorSampling, EqualsTheScalarSumToTheRoundingOfFloats) {
   std::mt19937_64 random(4);
   const Pixels pixels = make_pixels(
-      24, 24, [&](const Vector2<double>&) { return std::uniform_int_distribution<int>(0, 255)(random); },
-      0, &random);
+      24, 24,
+      [&](const Vector2<double>&) { return std::uniform_real_distribution<>(0, 255)(random); }, 0,
+      &random);
   // Seven products and sums of floats, each off by half a unit in the last place at most, of terms whose
   // magnitudes add up to 255 times 1.25 squared at most, the kernels' largest sum of absolute weights.
   constexpr double kBound = 8 * 0.5 * std::numeric_limits<float>::epsilon() * 255 * 1.25 * 1.25;

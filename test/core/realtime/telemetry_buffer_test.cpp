@@ -402,7 +402,8 @@ TEST(TelemetryBuffer, NeverGivesAnythingButAFiniteResult) {
                                     1e9,    -1e9,      1e300,  -1e300,    1.7e308, -1.7e308,
                                     -1e-12, kInfinity, NAN,    -kInfinity};
   const auto any = [&](double scale) {
-    return random() % 8 == 0 ? hard[random() % hard.size()] : scale * uniform(random);
+    return random() % 8 == 0 ? hard[static_cast<std::size_t>(random() % hard.size())]
+                             : scale * uniform(random);
   };
   int results = 0;
   for (int round = 0; round < 300; ++round) {

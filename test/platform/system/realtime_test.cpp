@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+extern "C" {
+#include <libavcodec/avcodec.h>
+}
 #include <pthread.h>
 #include <sched.h>
 #include <sys/resource.h>
@@ -9,9 +12,13 @@
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
+#include <atomic>
 #include <cstdlib>
+#include <fstream>
 #include <functional>
 #include <memory>
+#include <sstream>
 #include <string>
 #include <thread>
 #include <vector>
@@ -198,6 +205,72 @@ TEST(ApplyRealtime, LockedMemoryIsThereBeforeItIsTouched) {
     return faults_of_touching(memory.data(), memory.size()) == 0 ? kGood : 3;
   });
   if (result == kNotPermitted) GTEST_SKIP() << "not permitted to lock memory";
+  EXPECT_EQ(result, kGood);
+}
+
+// kB, of the code of libraries whose path has name: mapped, and in memory for this process.
+struct CodeSize {
+  long mapped = 0, resident = 0;
+};
+CodeSize code_of(const std::string& name) {
+  std::ifstream maps("/proc/self/smaps");
+  CodeSize sum;
+  bool wanted = false;
+  for (std::string line; std::getline(maps, line);) {
+    std::istringstream words(line);
+    std::string key;
+    long size = 0;
+    words >> key >> size;
+    if (line.find(" r-xp ") != std::string::npos || key.find('-') != std::string::npos)
+      wanted = line.find(" r-xp ") != std::string::npos && line.find(name) != std::string::npos;
+    if (wanted && key == "Size:") sum.mapped += size;
+    if (wanted && key == "Rss:") sum.resident += size;
+  }
+  return sum;
+}
+
+TEST(ApplyRealtime, BringsInTheCodeOfTheProgramAndNotOfAllLibraries) {
+  if (!kOwnMemoryOnly) GTEST_SKIP() << "the sanitizer touches memory too";
+  const int result = in_child([] {
+    if (avcodec_version() == 0) return 4;
+    RealtimeOptions options;
+    options.lock_memory = true;
+    if (!apply_realtime(options).warnings.empty()) return kNotPermitted;
+    for (const char* name : {"/libc.so", "/libstdc++.so", "platform_system_test"}) {
+      const CodeSize code = code_of(name);
+      if (code.mapped == 0 || code.resident != code.mapped) return 1;
+    }
+    // Megabytes of codecs, of which this program calls nothing else.
+    const CodeSize codecs = code_of("/libavcodec.so");
+    if (codecs.mapped == 0) return 2;
+    return codecs.resident < codecs.mapped / 2 ? kGood : 3;
+  });
+  if (result == kNotPermitted) GTEST_SKIP() << "not permitted to lock memory";
+  EXPECT_EQ(result, kGood);
+}
+
+TEST(UseSmallStacks, HoldsForThreadsStartedLater) {
+  const int result = in_child([] {
+    if (!use_small_stacks()) return 1;
+    // More threads at a time than glibc keeps stacks of ended ones for.
+    std::array<std::size_t, 16> sizes{};
+    std::array<std::thread, 16> threads;
+    std::atomic<bool> all_started{false};
+    for (std::size_t i = 0; i < threads.size(); ++i) {
+      threads[i] = std::thread([&, i] {
+        pthread_attr_t attributes;
+        void* lowest = nullptr;
+        if (pthread_getattr_np(pthread_self(), &attributes) == 0) {
+          pthread_attr_getstack(&attributes, &lowest, &sizes[i]);
+          pthread_attr_destroy(&attributes);
+        }
+        while (!all_started) std::this_thread::yield();
+      });
+    }
+    all_started = true;
+    for (std::thread& thread : threads) thread.join();
+    return sizes.back() == kThreadStack ? kGood : 2;
+  });
   EXPECT_EQ(result, kGood);
 }
 
