@@ -153,11 +153,13 @@ class Installed(unittest.TestCase):
                        for file in sorted(pathlib.Path(folder).glob("*.*"))
                        if file.suffix in (".list", ".sources") and "debian" in file.read_text(encoding="utf-8").lower()]
             self.assertTrue(sources, "no Debian package source in /etc/apt")
+            # Natively, udev too, which reads the rules; elsewhere nothing that alidade does not need.
+            include = dependencies() + (["udev"] if ARCHITECTURE == NATIVE else [])
             # The root's path is the hook's last argument.
             hook = [sys.executable, "-B", __file__, "inside", ARCHITECTURE, PACKAGES, recording]
             mode = "root" if os.geteuid() == 0 else "unshare"
             command = ["mmdebstrap", f"--mode={mode}", "--variant=apt", f"--architectures={ARCHITECTURE}",
-                       "--components=main", "--format=null", f"--include={','.join(dependencies())}", '--aptopt=APT::Install-Recommends "false"',
+                       "--components=main", "--format=null", f"--include={','.join(include)}", '--aptopt=APT::Install-Recommends "false"',
                        '--aptopt=Acquire::Retries "3"',
                        "--customize-hook=" + " ".join(str(word) for word in hook) + ' "$1"', "bookworm", "/dev/null", *sources]
             code, text = run_here(command) if ARCHITECTURE == NATIVE else run_emulated(command)
@@ -236,6 +238,10 @@ def inside(root, recording):
     assert chroot("dpkg", "--verify", "alidade") == ""
     assert set(chroot("id", "-nG", "alidade").split()) == {"alidade", "video", "dialout"}
     assert chroot("stat", "-c", "%U:%G %a", "/var/lib/alidade") == "alidade:alidade 750\n"
+
+    if ARCHITECTURE == NATIVE:
+        rules = [line for line in chroot("udevadm", "test", "/sys/class/net/lo").splitlines() if "60-alidade.rules" in line]
+        assert len(rules) == 1 and rules[0].startswith("Reading rules file: "), rules
 
     report = chroot("alidade", "check", "-c", "/etc/alidade/alidade.yaml", "--duration", "1", code=1)
     assert "/etc/alidade/alidade.yaml: ok" in report
