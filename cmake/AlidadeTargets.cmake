@@ -87,6 +87,10 @@ function(alidade_test name)
   if(NOT A_TIMEOUT)
     set(A_TIMEOUT 120)
   endif()
+  # An emulator is slower by ten to twenty times.
+  if(CMAKE_CROSSCOMPILING)
+    math(EXPR A_TIMEOUT "5 * ${A_TIMEOUT}")
+  endif()
   alidade_executable(${name} SOURCES ${A_SOURCES} LINK ${A_LINK} GTest::gmock GTest::gtest GTest::gtest_main)
   # The product is what shall have no undefined behaviour: looking for it in tests too would double the time
   # that they take to compile. Headers without a library have their tests only.

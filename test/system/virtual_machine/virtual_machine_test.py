@@ -45,6 +45,18 @@ ARCHITECTURE, LENGTH, BUILD = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3]
 MACHINES = TOP / "build/virtual_machine"
 WORK = MACHINES / f"{ARCHITECTURE}-{LENGTH}"
 ALIDADE = BUILD / "edge_app/alidade"
+SIMULATE = BUILD / "test/simulator/alidade-simulate"
+
+# A camera to calibrate; JSON is YAML.
+FILM = {"seed": 3, "duration_s": 8, "image": {"width": 320, "height": 180, "rate_hz": 25},
+        "camera": {"focal_length_px": 900, "radial_distortion": 1.7, "line_delay_us": 75,
+                   "pan_axis_mrad": [-12, 5], "tilt_axis_mrad": [-4, 14], "clock_offset_ms": -84.4},
+        "path": {"type": "triple_cosine", "amplitude": 1, "period_s": 7},
+        "sensor": {"exposure_ms": 1, "read_noise": 1.5, "jpeg_quality": 90},
+        "telemetry": {"rate_hz": 50, "sigma_rad": 2e-4},
+        "timing": {"image_jitter": {"sigma_ms": 0.3}, "telemetry_jitter": {"sigma_ms": 0.3}},
+        "scene": {"procedural": [{"width_deg": 360, "height_deg": 180, "projection": "equirectangular"}]}}
+MOST_RESIDENT_MB = 80
 
 
 def run(*command):
@@ -84,6 +96,15 @@ def boot():
     (WORK / "run.yaml").write_text(
         config({"device": "/dev/video10", "format": "GREY", "width": WIDTH, "height": HEIGHT, "rate_hz": 15},
                realtime={"mode": "OE"}))
+    if LENGTH == "long":
+        (WORK / "full.yaml").write_text(CALIBRATION % (1920, 1080))
+        (WORK / "memory.yaml").write_text(
+            config({"device": "/dev/video14", "format": "MJPG"}, realtime={"mode": "OE"},
+                   calibration={"file": "full.yaml", "auto": False}))
+        (WORK / "camera.yaml").write_text(json.dumps(FILM))
+        made = run(SIMULATE, "-c", WORK / "camera.yaml", "-o", WORK / "film")
+        if made.returncode != 0:
+            sys.exit(f"no film to calibrate from:\n{made.stdout}")
     (WORK / "mjpg.yaml").write_text(config({"device": "/dev/video14", "format": "MJPG"}))
     return run(HERE / "run-machine", ARCHITECTURE, machine, system, WORK, DEADLINE_S[LENGTH]).stdout
 
@@ -189,6 +210,31 @@ class VirtualMachine(unittest.TestCase):
         self.assertLess(statistics.median(errors_deg), 2)
         print(f"measured: run: {len(frames)} frames, {len(answered)} answered, median error of pan "
               f"{statistics.median(errors_deg):.3f} deg, " + next(line for line in errors.splitlines() if "latency" in line))
+
+    def test_full_hd_in_oe_mode_takes_little_memory(self):
+        if LENGTH != "long":
+            self.skipTest("in long runs only")
+        output, errors = self.step("memory")
+        records = [json.loads(line) for line in output.splitlines()]
+        self.assertGreater(sum(record["mode"] == "OE" for record in records), 20, errors[-2000:])
+        status = dict(line.split(":") for line in text("memory.status").splitlines())
+        kb = {name: int(value.split()[0]) for name, value in status.items()}
+        print("measured: memory at 1920x1080 in OE mode: " + ", ".join(f"{name} {n / 1024:.1f} MiB" for name, n in kb.items()))
+        self.assertLess(kb["VmHWM"] * 1024, MOST_RESIDENT_MB * 1e6)
+
+    def test_calibrates_as_this_machine_does(self):
+        if LENGTH != "long":
+            self.skipTest("in long runs only")
+        output, _ = self.step("calibrate")
+        there = json.loads(output)["calibration"]
+        done = subprocess.run([ALIDADE, "calibrate", WORK / "film", "-o", WORK / "calibrated_here", "--json"],
+                              stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        here = json.loads(done.stdout)["calibration"]
+        for name in ("focal_length", "radial_distortion", "line_delay", "clock_offset"):
+            difference = abs(there[name]["value"] - here[name]["value"]) / here[name]["sigma"]
+            print(f"measured: calibrate: {name} differs by {difference:.1e} sigmas from this machine's")
+            self.assertLess(difference, 0.1)
 
 
 if __name__ == "__main__":
