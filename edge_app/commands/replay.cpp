@@ -10,6 +10,7 @@
 
 #include <algorithm>
 #include <cerrno>
+#include <cstddef>
 #include <cstdio>
 #include <filesystem>
 #include <limits>
@@ -182,7 +183,7 @@ class Summary {
     std::string line =
         fmt::format("{} frames: OE {}, PT {}, none {}", frames_, oe, pt_, frames_ - oe - pt_);
     if (!landmarks_.empty()) {
-      const auto middle = landmarks_.begin() + oe / 2;
+      const auto middle = landmarks_.begin() + static_cast<std::ptrdiff_t>(oe / 2);
       std::nth_element(landmarks_.begin(), middle, landmarks_.end());
       line += fmt::format("; {} landmarks (median)", *middle);
     }
