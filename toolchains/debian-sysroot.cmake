@@ -31,8 +31,8 @@ foreach(kind EXE SHARED MODULE)
     "-Wl,-rpath-link,${TARGET_SYSROOT}/usr/lib/${triplet}:${TARGET_SYSROOT}/lib/${triplet}")
 endforeach()
 
-# The build folder, too: there catkin puts the configuration files of packages that are being built.
-set(CMAKE_FIND_ROOT_PATH "${TARGET_SYSROOT}" "${CMAKE_BINARY_DIR}")
+# -DCMAKE_FIND_ROOT_PATH=DIR adds a folder: catkin's, with the configuration files of packages that are being built.
+list(PREPEND CMAKE_FIND_ROOT_PATH "${TARGET_SYSROOT}")
 set(CMAKE_FIND_ROOT_PATH_MODE_PROGRAM NEVER)
 set(CMAKE_FIND_ROOT_PATH_MODE_LIBRARY ONLY)
 set(CMAKE_FIND_ROOT_PATH_MODE_INCLUDE ONLY)

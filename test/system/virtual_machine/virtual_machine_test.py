@@ -56,7 +56,10 @@ FILM = {"seed": 3, "duration_s": 8, "image": {"width": 320, "height": 180, "rate
         "telemetry": {"rate_hz": 50, "sigma_rad": 2e-4},
         "timing": {"image_jitter": {"sigma_ms": 0.3}, "telemetry_jitter": {"sigma_ms": 0.3}},
         "scene": {"procedural": [{"width_deg": 360, "height_deg": 180, "projection": "equirectangular"}]}}
-MOST_RESIDENT_MB = 80
+FULL_FILM = {**FILM, "duration_s": 4, "image": {"width": 1920, "height": 1080, "rate_hz": 10},
+             "camera": {"focal_length_px": 5400, "line_delay_us": 15}}
+# Of the process's own; pages of libraries are shared, and the kernel takes them back.
+MOST_MEMORY_MB = 80
 
 
 def run(*command):
@@ -97,14 +100,12 @@ def boot():
         config({"device": "/dev/video10", "format": "GREY", "width": WIDTH, "height": HEIGHT, "rate_hz": 15},
                realtime={"mode": "OE"}))
     if LENGTH == "long":
-        (WORK / "full.yaml").write_text(CALIBRATION % (1920, 1080))
-        (WORK / "memory.yaml").write_text(
-            config({"device": "/dev/video14", "format": "MJPG"}, realtime={"mode": "OE"},
-                   calibration={"file": "full.yaml", "auto": False}))
-        (WORK / "camera.yaml").write_text(json.dumps(FILM))
-        made = run(SIMULATE, "-c", WORK / "camera.yaml", "-o", WORK / "film")
-        if made.returncode != 0:
-            sys.exit(f"no film to calibrate from:\n{made.stdout}")
+        film("film", FILM)
+        film("full", FULL_FILM)
+        recording = {"type": "recording", "directory": "full"}
+        (WORK / "memory.yaml").write_text(json.dumps({
+            "video": recording, "pan_tilt": recording, "realtime": {"mode": "OE"},
+            "calibration": {"file": "full/truth.yaml", "auto": False}}))
     (WORK / "mjpg.yaml").write_text(config({"device": "/dev/video14", "format": "MJPG"}))
     return run(HERE / "run-machine", ARCHITECTURE, machine, system, WORK, DEADLINE_S[LENGTH]).stdout
 
@@ -120,6 +121,13 @@ def cross_build():
         if done.returncode != 0:
             sys.exit(f"{command} failed:\n{done.stdout[-5000:]}")
     return build, system
+
+
+def film(name, camera):
+    (WORK / f"{name}.camera.yaml").write_text(json.dumps(camera))
+    made = run(SIMULATE, "-c", WORK / f"{name}.camera.yaml", "-o", WORK / name)
+    if made.returncode != 0:
+        sys.exit(f"no film {name}:\n{made.stdout}")
 
 
 def text(name):
@@ -220,7 +228,7 @@ class VirtualMachine(unittest.TestCase):
         status = dict(line.split(":") for line in text("memory.status").splitlines())
         kb = {name: int(value.split()[0]) for name, value in status.items()}
         print("measured: memory at 1920x1080 in OE mode: " + ", ".join(f"{name} {n / 1024:.1f} MiB" for name, n in kb.items()))
-        self.assertLess(kb["VmHWM"] * 1024, MOST_RESIDENT_MB * 1e6)
+        self.assertLess(kb["RssAnon"] * 1024, MOST_MEMORY_MB * 1e6)
 
     def test_calibrates_as_this_machine_does(self):
         if LENGTH != "long":
