@@ -59,14 +59,15 @@ bool inflate_all(const std::vector<std::uint8_t>& from, std::vector<std::uint8_t
 
 PackedPicture::PackedPicture(const ImageView& picture)
     : width_(picture.width), height_(picture.height) {
-  std::vector<std::uint8_t> rows;
-  rows.reserve(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
+  std::vector<std::uint8_t> pixels;
+  pixels.reserve(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   for (int row = 0; row < height_; ++row)
-    rows.insert(rows.end(), picture.row(row), picture.row(row) + width_);
-  std::vector<std::uint8_t> differences = rows;
-  to_differences(&differences);
+    pixels.insert(pixels.end(), picture.row(row), picture.row(row) + width_);
+  to_differences(&pixels);
+  if (deflate_all(pixels, &bytes_) && bytes_.size() < pixels.size()) return;
   // As large as before means: as it was.
-  if (!deflate_all(differences, &bytes_) || bytes_.size() >= rows.size()) bytes_ = std::move(rows);
+  to_values(&pixels);
+  bytes_ = std::move(pixels);
 }
 
 ImageView PackedPicture::unpack(std::vector<std::uint8_t>* pixels) const {

@@ -13,21 +13,10 @@ import subprocess
 import sys
 import unittest
 
-SKIPPED = 77
-FOCAL_LENGTH_PX = 900
-CAMERA = {
-    "seed": 3, "duration_s": 8, "image": {"width": 320, "height": 180, "rate_hz": 25},
-    "camera": {"focal_length_px": FOCAL_LENGTH_PX, "radial_distortion": 1.7, "line_delay_us": 75,
-               "pan_axis_mrad": [-12, 5], "tilt_axis_mrad": [-4, 14], "clock_offset_ms": -84.4},
-    "path": {"type": "triple_cosine", "amplitude": 1, "period_s": 7},
-    "sensor": {"exposure_ms": 1, "read_noise": 1.5, "jpeg_quality": 90},
-    "telemetry": {"rate_hz": 50, "sigma_rad": 2e-4},
-    "timing": {"image_jitter": {"sigma_ms": 0.3}, "telemetry_jitter": {"sigma_ms": 0.3}},
-    "scene": {"procedural": [{"width_deg": 360, "height_deg": 180, "projection": "equirectangular"}]},
-}
-# What a calibration holds beside its numbers: when and where it was made.
-UNCOMPARED = {"created", "date", "host", "software"}
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from calibration_film import FILM, FOCAL_LENGTH_PX, sigmas_apart  # noqa: E402
 
+SKIPPED = 77
 NATIVE, SIMULATE, WORK = pathlib.Path(sys.argv[1]), pathlib.Path(sys.argv[2]), pathlib.Path(sys.argv[3])
 EMULATED = sys.argv[4:]
 PROGRAMS = {"native": [NATIVE], "emulated": EMULATED}
@@ -46,8 +35,7 @@ def differences(a, b, where=""):
         if a.keys() != b.keys():
             raise AssertionError(f"{where}: {sorted(a)} and {sorted(b)}")
         for key in a:
-            if key not in UNCOMPARED:
-                yield from differences(a[key], b[key], f"{where}.{key}")
+            yield from differences(a[key], b[key], f"{where}.{key}")
     elif isinstance(a, list):
         if len(a) != len(b):
             raise AssertionError(f"{where}: {len(a)} and {len(b)} values")
@@ -76,11 +64,11 @@ class OtherProcessor(unittest.TestCase):
     def setUpClass(cls):
         shutil.rmtree(WORK, ignore_errors=True)
         WORK.mkdir(parents=True)
-        (WORK / "camera.yaml").write_text(json.dumps(CAMERA))  # JSON is YAML
+        (WORK / "camera.yaml").write_text(json.dumps(FILM))  # JSON is YAML
         cls.film = WORK / "film"
         run(SIMULATE, "-c", WORK / "camera.yaml", "-o", cls.film)
         # The points that one machine's tracker found, for both.
-        run(NATIVE, "calibrate", cls.film, "-o", WORK / "from-video-native", "--json")
+        cls.from_video = json.loads(run(NATIVE, "calibrate", cls.film, "-o", WORK / "from-video-native", "--json"))
         cls.tracked = WORK / "tracked"
         cls.tracked.mkdir()
         for file in cls.film.iterdir():
@@ -96,7 +84,7 @@ class OtherProcessor(unittest.TestCase):
             out = run(*program, "replay", self.film, "--mode", mode, "--json", "--calibration", self.calibration,
                       "-o", WORK / f"{mode}-{name}")
             records[name] = [json.loads(line) for line in out.splitlines()]
-        self.assertEqual(len(records["native"]), CAMERA["duration_s"] * CAMERA["image"]["rate_hz"])
+        self.assertEqual(len(records["native"]), FILM["duration_s"] * FILM["image"]["rate_hz"])
         self.assertEqual(len(records["native"]), len(records["emulated"]))
         return list(zip(records["native"], records["emulated"]))
 
@@ -128,11 +116,8 @@ class OtherProcessor(unittest.TestCase):
         self.assertLess(worst, 1e-3)
 
     def test_calibration_from_video_is_the_same_within_its_sigma(self):
-        run(*EMULATED, "calibrate", self.film, "-o", WORK / "from-video-emulated", "--json")
-        import yaml
-        a, b = (yaml.safe_load((WORK / f"from-video-{name}/calibration.yaml").read_text()) for name in PROGRAMS)
-        for name in ("focal_length", "radial_distortion", "line_delay", "clock_offset"):
-            difference = abs(a[name]["value"] - b[name]["value"]) / a[name]["sigma"]
+        emulated = json.loads(run(*EMULATED, "calibrate", self.film, "-o", WORK / "from-video-emulated", "--json"))
+        for name, difference in sigmas_apart(self.from_video, emulated):
             print(f"measured: calibration from video: {name} differs by {difference:.1e} sigmas")
             # What differs is the rounding of tracked points: a thousandth of a pixel of a tenth.
             self.assertLess(difference, 0.1)

@@ -16,6 +16,9 @@ import sys
 import unittest
 
 HERE = pathlib.Path(__file__).resolve().parent
+sys.path.insert(0, str(HERE.parent))
+from calibration_film import FILM, sigmas_apart  # noqa: E402
+
 TOP = HERE.parents[2]
 SKIPPED = 77
 WIDTH, HEIGHT = 320, 180
@@ -47,15 +50,7 @@ WORK = MACHINES / f"{ARCHITECTURE}-{LENGTH}"
 ALIDADE = BUILD / "edge_app/alidade"
 SIMULATE = BUILD / "test/simulator/alidade-simulate"
 
-# A camera to calibrate; JSON is YAML.
-FILM = {"seed": 3, "duration_s": 8, "image": {"width": 320, "height": 180, "rate_hz": 25},
-        "camera": {"focal_length_px": 900, "radial_distortion": 1.7, "line_delay_us": 75,
-                   "pan_axis_mrad": [-12, 5], "tilt_axis_mrad": [-4, 14], "clock_offset_ms": -84.4},
-        "path": {"type": "triple_cosine", "amplitude": 1, "period_s": 7},
-        "sensor": {"exposure_ms": 1, "read_noise": 1.5, "jpeg_quality": 90},
-        "telemetry": {"rate_hz": 50, "sigma_rad": 2e-4},
-        "timing": {"image_jitter": {"sigma_ms": 0.3}, "telemetry_jitter": {"sigma_ms": 0.3}},
-        "scene": {"procedural": [{"width_deg": 360, "height_deg": 180, "projection": "equirectangular"}]}}
+# The same camera with larger pictures.
 FULL_FILM = {**FILM, "duration_s": 4, "image": {"width": 1920, "height": 1080, "rate_hz": 10},
              "camera": {"focal_length_px": 5400, "line_delay_us": 15}}
 MOST_RESIDENT_MB = 80
@@ -233,13 +228,10 @@ class VirtualMachine(unittest.TestCase):
         if LENGTH != "long":
             self.skipTest("in long runs only")
         output, _ = self.step("calibrate")
-        there = json.loads(output)["calibration"]
         done = subprocess.run([ALIDADE, "calibrate", WORK / "film", "-o", WORK / "calibrated_here", "--json"],
                               stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
         self.assertEqual(done.returncode, 0, done.stderr)
-        here = json.loads(done.stdout)["calibration"]
-        for name in ("focal_length", "radial_distortion", "line_delay", "clock_offset"):
-            difference = abs(there[name]["value"] - here[name]["value"]) / here[name]["sigma"]
+        for name, difference in sigmas_apart(json.loads(done.stdout), json.loads(output)):
             print(f"measured: calibrate: {name} differs by {difference:.1e} sigmas from this machine's")
             self.assertLess(difference, 0.1)
 
