@@ -86,6 +86,8 @@ class OrientationStep {
   void maintain();
   // In OE mode, for now.
   [[nodiscard]] bool finds_landmarks() const { return oe_ && options_.calibrated && zoom_fits(); }
+  // In OE mode, or following points.
+  [[nodiscard]] bool looks_at_pictures() const { return finds_landmarks() || start_up_; }
   // What the frame last added, and maintained, has for the calibration thread.
   void get_tracks(FrameTracks* tracks) const;
   // The same for people to look at.

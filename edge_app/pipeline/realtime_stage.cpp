@@ -78,7 +78,7 @@ void RealtimeStage::adopt_published() {
 }
 
 bool RealtimeStage::is_late(const VideoMessage& message, double now_s) const {
-  return measure_latency_ && step_.finds_landmarks() && message.picture.valid() &&
+  return measure_latency_ && step_.looks_at_pictures() && message.picture.valid() &&
          now_s - message.decoded_s > kPatienceS && video_queue_.read_available() > 0;
 }
 

@@ -215,6 +215,8 @@ VideoMessage picture_message(const Scene& scene, int frame, PictureSlot slot) {
   message.stamp.sequence = frame;
   message.picture = scene.picture(frame);
   message.slot = slot;
+  // Not late, however slow the machine.
+  message.decoded_s = monotonic_now_s() + 1e3;
   return message;
 }
 
@@ -325,38 +327,43 @@ TEST(RealtimeStage, LendsTheTapWhatItAskedForUnlessTheCalibrationThreadHasIt) {
   EXPECT_GT(picture->landmarks.count, 20);
 }
 
-// Frames that come faster than they can be looked at: the last one is looked at, and those that it waited for are not.
+// Frames that come faster than they can be looked at, in OE mode or while points are followed: the last one is looked
+// at, and those that it waited for are not.
 TEST(RealtimeStage, LooksAtNoLatePictureThatOthersWaitBehind) {
   const Scene scene;
   for (const bool live : {true, false}) {
-    OrientationStepOptions options = options_with_pictures();
-    options.calibrated = true;
-    const auto stage = std::make_unique<RealtimeStage>(options, live, false);
-    for (int i = -4; i <= 0; ++i) {
-      TelemetryMessage sample = sample_message(1e-4 * i);
-      sample.sample.earliest_time_s += 0.02 * i;
-      sample.sample.latest_time_s += 0.02 * i;
-      stage->push(sample);
-    }
-    for (int frame = 0; frame < 4; ++frame) {
-      VideoMessage message = picture_message(scene, frame, frame);
-      // The second came only just now.
-      message.decoded_s = monotonic_now_s() - (frame == 1 ? -1e3 : 1e3);
-      stage->push(message);
-    }
-    EXPECT_TRUE(stage->process());
-    EXPECT_EQ(stage->drops().late_pictures, live ? 2 : 0);
-    EXPECT_EQ(stage->drops().total(), 0) << "no frame is lost by it";
-    OutputMessage out;
-    for (int frame = 0; frame < 4; ++frame) {
-      ASSERT_TRUE(stage->pop(out));
-      EXPECT_EQ(out.record.status == RecordStatus::kPictureTooLate,
-                live && (frame == 0 || frame == 2))
-          << frame;
-      EXPECT_NE(out.record.mode, RecordMode::kNone) << frame;
-      PictureSlot slot = kNoPicture;
-      ASSERT_TRUE(stage->pop_returned(slot));
-      EXPECT_EQ(slot, frame);
+    for (const bool calibrated : {true, false}) {
+      SCOPED_TRACE(testing::Message() << "live " << live << ", calibrated " << calibrated);
+      OrientationStepOptions options = options_with_pictures();
+      options.calibrated = calibrated;
+      const auto stage = std::make_unique<RealtimeStage>(options, live, true);
+      for (int i = -4; i <= 0; ++i) {
+        TelemetryMessage sample = sample_message(1e-4 * i);
+        sample.sample.earliest_time_s += 0.02 * i;
+        sample.sample.latest_time_s += 0.02 * i;
+        stage->push(sample);
+      }
+      for (int frame = 0; frame < 4; ++frame) {
+        VideoMessage message = picture_message(scene, frame, frame);
+        if (frame != 1) message.decoded_s = monotonic_now_s() - 1e3;
+        stage->push(message);
+      }
+      EXPECT_TRUE(stage->process());
+      EXPECT_EQ(stage->drops().late_pictures, live ? 2 : 0);
+      EXPECT_EQ(stage->drops().total(), 0) << "no frame is lost by it";
+      OutputMessage out;
+      for (int frame = 0; frame < 4; ++frame) {
+        const bool late = live && (frame == 0 || frame == 2);
+        ASSERT_TRUE(stage->pop(out));
+        EXPECT_EQ(out.record.status == RecordStatus::kPictureTooLate, late && calibrated) << frame;
+        EXPECT_NE(out.record.mode, RecordMode::kNone) << frame;
+        FeedFrame fed;
+        ASSERT_TRUE(stage->pop(fed));
+        EXPECT_EQ(fed.tracks.tracker == FrameTracks::Tracker::kNone, late) << frame;
+        PictureSlot slot = kNoPicture;
+        ASSERT_TRUE(stage->pop_returned(slot));
+        EXPECT_EQ(slot, frame);
+      }
     }
   }
 }
