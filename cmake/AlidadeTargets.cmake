@@ -139,13 +139,14 @@ endfunction()
 # What `ctest -L fuzz` runs, and all that the preset `fuzz` builds.
 add_custom_target(fuzz_programs)
 
-# alidade_fuzz_target(vapix LINK alidade::platform [MUTATIONS n])
+# alidade_fuzz_target(vapix LINK alidade::platform [MUTATIONS n] [LONGEST bytes])
 # builds fuzz_vapix of vapix_fuzz.cpp and registers it. Under the preset `fuzz` it is linked with libFuzzer, and
 # `ctest -L fuzz` lets it search for a minute, from corpus/vapix and regressions/vapix on; what it finds worth
-# keeping goes to <build>/fuzz-corpus/vapix/, an input that fails to <build>/fuzz-artifacts/. In all other
-# builds fuzz_regressions_vapix runs those files, and n mutations of them (alidade::regression_driver).
+# keeping goes to <build>/fuzz-corpus/vapix/, an input that fails to <build>/fuzz-artifacts/; ten million inputs
+# of no more bytes than that (1024) are `ctest --preset fuzz-long`. In all other builds fuzz_regressions_vapix
+# runs those files, and n mutations of them (alidade::regression_driver).
 function(alidade_fuzz_target name)
-  cmake_parse_arguments(A "" "MUTATIONS" "LINK" ${ARGN})
+  cmake_parse_arguments(A "" "MUTATIONS;LONGEST" "LINK" ${ARGN})
   set(inputs ${CMAKE_CURRENT_SOURCE_DIR}/corpus/${name})
   # Globbed at each build: the first regression of a target makes its folder.
   file(GLOB regressions CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/regressions/${name})
@@ -157,10 +158,17 @@ function(alidade_fuzz_target name)
     alidade_executable(fuzz_${name} SOURCES ${name}_fuzz.cpp LINK ${A_LINK})
     target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
     add_dependencies(fuzz_programs fuzz_${name})
-    add_test(NAME fuzz_${name}
-      COMMAND fuzz_${name} -max_total_time=60 -timeout=30 -print_final_stats=1
-        -artifact_prefix=${artifacts}/${name}- ${found} ${inputs})
+    set(search fuzz_${name} -timeout=30 -print_final_stats=1 -artifact_prefix=${artifacts}/${name}-)
+    add_test(NAME fuzz_${name} COMMAND ${search} -max_total_time=60 ${found} ${inputs})
     set_tests_properties(fuzz_${name} PROPERTIES LABELS fuzz TIMEOUT 180)
+    if(NOT A_LONGEST)
+      set(A_LONGEST 1024)
+    endif()
+    add_test(NAME fuzz_${name}_ten_million
+      COMMAND ${search} -runs=10000000 -max_len=${A_LONGEST} ${found} ${inputs})
+    # A fifth faster; an input that fails tells more when it is run again without.
+    set_tests_properties(fuzz_${name}_ten_million PROPERTIES LABELS "fuzz;slow" TIMEOUT 10800
+      ENVIRONMENT ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=16)
   else()
     alidade_executable(fuzz_${name} SOURCES ${name}_fuzz.cpp LINK alidade::regression_driver ${A_LINK})
     if(NOT A_MUTATIONS)
