@@ -86,6 +86,21 @@ Range plausible_range(Parameter parameter) {
   }
 }
 
+// Of one standard deviation, in the unit of the value.
+double largest_sigma(Parameter parameter) {
+  switch (parameter) {
+    case Parameter::kPanAxis0:
+    case Parameter::kPanAxis1:
+    case Parameter::kTiltAxis0:
+    case Parameter::kTiltAxis1:
+      return 1;
+    default: {
+      const Range range = plausible_range(parameter);
+      return range.most - range.least;
+    }
+  }
+}
+
 class Reader {
  public:
   explicit Reader(const YAML::Node& root) : root_(root) {}
@@ -192,10 +207,9 @@ class Reader {
     return values;
   }
 
-  // sigma, from 0 on, no larger than `most`.
-  void set_sigma(const YAML::Node& node, const std::string& name, double sigma, double most,
+  void set_sigma(const YAML::Node& node, const std::string& name, double sigma,
                  Parameter parameter) {
-    if (sigma < 0 || sigma > most) {
+    if (sigma < 0 || sigma > largest_sigma(parameter)) {
       fail(node,
            name + ".sigma is " + short_text(sigma) +
                "; one standard deviation, in the unit of the value (axes: radians), is needed");
@@ -215,8 +229,7 @@ class Reader {
       fail(node, name + " is " + node.Scalar() + "; give " + range.hint);
     }
     if (entry["sigma"]) {
-      set_sigma(entry["sigma"], name, number(entry["sigma"], name + ".sigma"),
-                range.most - range.least, parameter);
+      set_sigma(entry["sigma"], name, number(entry["sigma"], name + ".sigma"), parameter);
     }
     return value;
   }
@@ -242,7 +255,7 @@ class Reader {
       const YAML::Node sigma = entry["sigma"];
       const std::vector<double> pair = numbers(sigma, name + ".sigma", 2);
       for (int i = 0; i < 2; ++i) {
-        set_sigma(sigma, name, pair[static_cast<std::size_t>(i)], 1,
+        set_sigma(sigma, name, pair[static_cast<std::size_t>(i)],
                   static_cast<Parameter>(index(first) + i));
       }
     }
@@ -275,6 +288,13 @@ class Reader {
         fail(matrix, std::string("covariance.matrix has the negative variance ") +
                          short_text(cov(i, i)) + " of " + to_string(static_cast<Parameter>(i)) +
                          "; 0 stands for exact");
+      }
+      const auto parameter = static_cast<Parameter>(i);
+      if (std::sqrt(cov(i, i)) > largest_sigma(parameter)) {
+        fail(matrix, std::string("covariance.matrix says that sigma of ") + to_string(parameter) +
+                         " is " + short_text(std::sqrt(cov(i, i))) +
+                         "; the square of one standard deviation, in the unit of the value (axes: "
+                         "radians), is needed");
       }
     }
     check_positive(matrix);

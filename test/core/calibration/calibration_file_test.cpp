@@ -291,6 +291,9 @@ TEST(CalibrationFile, RefusesAFaultyCovariance) {
   EXPECT_EQ(good.covariance(3, 3), 7e-8 * 7e-8) << "a parameter without a row keeps its sigma";
 
   EXPECT_THAT(refusal(with(two, "[[576, 1.2], [1.3, 0.0121]]")), HasSubstr("not symmetric"));
+  EXPECT_THAT(refusal(with("[line_delay, pan_axis_0]", "[[1, 0], [0, 1e-8]]")),
+              HasSubstr("sigma of line_delay is 1; the square of"));
+  EXPECT_THAT(refusal(with("[pan_axis_0]", "[[1.1]]")), HasSubstr("sigma of pan_axis_0 is 1.04"));
   EXPECT_THAT(refusal(with(two, "[[-576, 0], [0, 0.0121]]")), HasSubstr("negative variance -576"));
   EXPECT_THAT(refusal(with(two, "[[576, 2.7], [2.7, 0.0121]]")),
               HasSubstr("not positive semidefinite"));
