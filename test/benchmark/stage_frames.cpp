@@ -4,7 +4,6 @@
 #include <cstdio>
 #include <fstream>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <string>
 #include <vector>
 
@@ -15,7 +14,6 @@ namespace alidade::benchmarks {
 namespace {
 
 constexpr int kFrames = 40;  // a round of the camera
-constexpr int kQuality = 85;
 
 RecordedFrames recorded(TurningCamera* camera) {
   RecordedFrames out;
@@ -30,12 +28,7 @@ RecordedFrames recorded(TurningCamera* camera) {
 }
 
 bool write_jpeg(const cv::Mat& picture, const std::string& name) {
-  // Colours, as cameras send them, though grey ones.
-  const std::vector<cv::Mat> channels(3, picture);
-  cv::Mat colour;
-  cv::merge(channels, colour);
-  std::vector<std::uint8_t> jpeg;
-  cv::imencode(".jpg", colour, jpeg, {cv::IMWRITE_JPEG_QUALITY, kQuality});
+  const std::vector<std::uint8_t> jpeg = jpeg_of(picture);
   std::ofstream file(name, std::ios::binary);
   file.write(reinterpret_cast<const char*>(jpeg.data()), static_cast<std::streamsize>(jpeg.size()));
   return static_cast<bool>(file.flush());

@@ -145,4 +145,14 @@ InterpolatedPanTilt TurningCamera::telemetry(int k) {
   return at;
 }
 
+std::vector<std::uint8_t> jpeg_of(const cv::Mat& picture) {
+  constexpr int kQuality = 85;
+  const std::vector<cv::Mat> channels(3, picture);
+  cv::Mat colour;
+  cv::merge(channels, colour);
+  std::vector<std::uint8_t> jpeg;
+  cv::imencode(".jpg", colour, jpeg, {cv::IMWRITE_JPEG_QUALITY, kQuality});
+  return jpeg;
+}
+
 }  // namespace alidade::benchmarks

@@ -8,6 +8,7 @@
 // Truth is evaluated at each row's own time. Pictures are made by the constructor; OpenCV's
 // remap places pixels to 1/64 px.
 
+#include <cstdint>
 #include <opencv2/core.hpp>
 #include <vector>
 
@@ -48,5 +49,8 @@ class TurningCamera {
   cv::RNG random_;
   std::vector<cv::Mat> pictures_;
 };
+
+// As cameras send it: with colours, though grey ones, of quality 85.
+[[nodiscard]] std::vector<std::uint8_t> jpeg_of(const cv::Mat& picture);
 
 }  // namespace alidade::benchmarks
