@@ -1,24 +1,45 @@
-// link_devices: a camera that sends MJPEG over HTTP at 25 Hz, and a Pelco-D head that moves, on a serial
-// line (a pseudo-terminal). Prints "ready URL DEVICE"; each line of stdin is what the line has from then
-// on: unplugged, or a fault of HeadServer by its name (none, noise, lost_byte, changed_byte, merged,
+// link_devices HEAD LINK: a camera that sends MJPEG over HTTP at 25 Hz, and a head (pelco_d, visca, ptu) that
+// moves, on a line (serial, which is a pseudo-terminal, tcp, udp). At t of CLOCK_MONOTONIC its pan is 20 cos(t/2)
+// degrees to the right, its tilt 10 cos(t/3) up. Prints "ready URL ADDRESS"; each line of stdin is what the
+// line has from then on: unplugged, or a fault of HeadServer by its name (none, noise, lost_byte, changed_byte, merged,
 // repeated, unsolicited, late, silence, babble). Ends with stdin.
 
 #include <atomic>
 #include <chrono>
 #include <cmath>
-#include <cstdio>
+#include <functional>
 #include <iostream>
 #include <map>
 #include <memory>
 #include <string>
 #include <thread>
+#include <utility>
 
 #include "platform/system/clock.h"
 #include "test/platform/support/mjpeg_server.h"
 #include "test/simulator/servers/head_server.h"
 
-int main() {
+namespace {
+
+using Position = std::function<alidade::HeadPosition()>;
+
+std::unique_ptr<alidade::SimulatedHead> head_named(const std::string& name, bool datagrams,
+                                                   const Position& position) {
+  if (name == "pelco_d") return std::make_unique<alidade::PelcoDHead>(position);
+  if (name == "ptu") return std::make_unique<alidade::PtuHead>(position);
+  if (name != "visca") return nullptr;
+  auto visca = std::make_unique<alidade::ViscaHead>(position);
+  visca->header = datagrams;
+  return visca;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
   using alidade::LineFault;
+  using Link = alidade::HeadServer::Link;
+  const std::map<std::string, Link> links = {
+      {"serial", Link::kSerial}, {"tcp", Link::kTcp}, {"udp", Link::kUdp}};
   const std::map<std::string, LineFault> faults = {
       {"none", LineFault::kNone},
       {"noise", LineFault::kNoise},
@@ -31,14 +52,20 @@ int main() {
       {"silence", LineFault::kSilence},
       {"babble", LineFault::kBabble},
   };
-  alidade::MjpegServer camera;
-  camera.allowed = 0;
-  const auto position = [] {
+  const Position position = [] {
     const double t = alidade::monotonic_now_s();
     return alidade::HeadPosition{20 * std::cos(t / 2), 10 * std::cos(t / 3), 0};
   };
-  alidade::HeadServer head(alidade::HeadServer::Link::kSerial,
-                           std::make_unique<alidade::PelcoDHead>(position));
+  const auto link = links.find(argc == 3 ? argv[2] : "");
+  auto its_head =
+      link == links.end() ? nullptr : head_named(argv[1], link->second == Link::kUdp, position);
+  if (!its_head) {
+    std::cerr << "usage: link_devices pelco_d|visca|ptu serial|tcp|udp\n";
+    return 2;
+  }
+  alidade::HeadServer head(link->second, std::move(its_head));
+  alidade::MjpegServer camera;
+  camera.allowed = 0;
 
   std::atomic<bool> over{false};
   std::thread shutter([&] {
