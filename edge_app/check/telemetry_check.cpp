@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "core/model/angle.h"
+#include "core/realtime/telemetry_buffer.h"
 #include "edge_app/pipeline/stale_repeats.h"
 
 namespace alidade {
@@ -101,16 +102,37 @@ void measure_turning(const std::vector<PanTiltSample>& samples, const std::vecto
   report->tilt.top_rate = spread_of(tilt_rates)->most;
 }
 
+std::optional<Spread> ages_of(const std::vector<PanTiltSample>& samples,
+                              const std::vector<double>& delivered_s, const TelemetryNeeds& needs) {
+  TelemetryLimits limits;
+  limits.max_gap_s = needs.max_gap_s;
+  limits.max_extrapolation_s = needs.max_extrapolation_s;
+  limits.max_repeat_s = needs.max_repeat_s;
+  TelemetryBuffer<16> buffer(TelemetryNoise(), limits);
+  std::vector<double> ages;
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    if (samples[i].restarted) buffer.clear();
+    if (const auto newest_s = buffer.newest_time()) ages.push_back(delivered_s[i] - *newest_s);
+    TelemetrySample sample;
+    sample.time_s = (samples[i].earliest_time_s + samples[i].latest_time_s) / 2;
+    sample.pan = samples[i].pan_rad;
+    sample.tilt = samples[i].tilt_rad;
+    // What it refuses is no angle known.
+    static_cast<void>(buffer.push(sample));
+  }
+  return spread_of(ages);
+}
+
 // PT mode interpolates between samples and goes on beyond the newest, both for so long only.
 void judge_rate(TelemetryReport* report, const TelemetryNeeds& needs) {
   constexpr double kMuchSlower = 0.8;
+  constexpr double kReserve = 1.2;
   if (!report->interval_s || !report->rate_hz) return;
   const double interval_s = report->interval_s->median;
   const std::string where = "pan/tilt " + needs.source + ": ";
-  // When a frame comes, the newest sample's time is as far back as a poll and its bounds; the frame's own lies
-  // clock_offset_s later.
   const double bounds_s = report->bounds_s ? report->bounds_s->median : 0;
-  const double age_s = report->interval_s->most + bounds_s + needs.clock_offset_s;
+  // An image is looked up clock_offset_s later.
+  const double age_s = (report->age_s ? report->age_s->most : 0) + needs.clock_offset_s;
   if (interval_s > needs.max_gap_s) {
     add_problem(&report->findings,
                 fmt::format("{}one sample each {:.2f} s; angles are not told between samples more "
@@ -119,10 +141,12 @@ void judge_rate(TelemetryReport* report, const TelemetryNeeds& needs) {
   } else if (age_s > needs.max_extrapolation_s) {
     add_problem(
         &report->findings,
-        fmt::format("{}the newest sample is up to {:.0f} ms old when a frame asks for it, and "
+        fmt::format("{}the newest angle known is up to {:.0f} ms old when a frame asks for it "
+                    "(pan_tilt.max_repeat_s, {:.0f} ms, is part of it while the head rests), and "
                     "realtime.max_extrapolation_s is {:.0f} ms: such frames get no angle; "
-                    "raise pan_tilt.rate_hz, or the limit",
-                    where, 1e3 * age_s, 1e3 * needs.max_extrapolation_s));
+                    "set it to {:.2f}, or raise pan_tilt.rate_hz",
+                    where, 1e3 * age_s, 1e3 * needs.max_repeat_s, 1e3 * needs.max_extrapolation_s,
+                    kReserve * age_s + 0.005));
   } else if (needs.rate_hz && *report->rate_hz < kMuchSlower * *needs.rate_hz) {
     add_advice(
         &report->findings,
@@ -226,9 +250,11 @@ std::string step(const AxisReport& axis, const char* name) {
 }  // namespace
 
 TelemetryReport check_telemetry(const std::vector<PanTiltSample>& samples,
+                                const std::vector<double>& delivered_s,
                                 const ClockFilterOptions& clock, const TelemetryNeeds& needs) {
   TelemetryReport report;
   report.samples = samples.size();
+  report.age_s = ages_of(samples, delivered_s, needs);
   std::vector<PanTiltSample> usable;
   std::copy_if(samples.begin(), samples.end(), std::back_inserter(usable), is_finite);
   report.useless = samples.size() - usable.size();

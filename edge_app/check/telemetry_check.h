@@ -2,6 +2,8 @@
 // What samples of a pan/tilt source show that no data sheet tells.
 //
 //   polls     the median time between two samples; the longest
+//   age       how far back the newest angle known lies at worst, just before the next sample is delivered; while
+//             the head rests, a repeat is known to be true only up to max_repeat_s before (TelemetryBuffer)
 //   changes   how often the device really measures: the median time between two new values while the head turns.
 //             Known where the steps are larger than rounding (2 quanta on an axis); a head that creeps or rests does not
 //             show it.
@@ -54,6 +56,7 @@ struct TelemetryReport {
   std::optional<Spread> interval_s;
   std::optional<double> change_hz;  // new values a second while the head turns
   std::optional<Spread> bounds_s;
+  std::optional<Spread> age_s;
   std::size_t negative_bounds = 0;  // of samples whose latest time is before their earliest
   std::size_t turning = 0;          // samples taken while the head turned
   std::size_t stale = 0;
@@ -69,7 +72,9 @@ struct TelemetryReport {
   Findings findings;
 };
 
+// delivered_s: when each sample came from its source, on the clock of its times.
 [[nodiscard]] TelemetryReport check_telemetry(const std::vector<PanTiltSample>& samples,
+                                              const std::vector<double>& delivered_s,
                                               const ClockFilterOptions& clock,
                                               const TelemetryNeeds& needs);
 

@@ -139,6 +139,7 @@ struct Measured {
   Connection pan_tilt;
   std::vector<CheckedFrame> frames;
   std::vector<PanTiltSample> samples;
+  std::vector<double> delivered_s;  // each of them
   FrameSourceCounters counters;
   PictureReport pictures;
 };
@@ -172,7 +173,12 @@ Measured measure(const Config& config, double duration_s) {
   const std::future<void> samples = std::async(std::launch::async, [&] {
     measured.pan_tilt = collect<PanTiltSample>(
         *pan_tilt, config.pan_tilt.timeout_s + kConnectSlack, duration_s,
-        [&](const PanTiltSample& sample) { measured.samples.push_back(sample); });
+        [&](const PanTiltSample& sample) {
+          measured.samples.push_back(sample);
+          // A recording's times are of another clock.
+          const bool live = config.pan_tilt.type != PanTiltConfig::Type::kRecording;
+          measured.delivered_s.push_back(live ? monotonic_now_s() : sample.latest_time_s);
+        });
   });
   show_progress(frames, duration_s);
   show_progress(samples, duration_s);
@@ -304,8 +310,9 @@ int check(const CheckOptions& options) {
                                config.realtime.landmarks};
   const VideoReport video =
       check_video(measured.frames, measured.counters, step.video_clock, video_needs);
-  const TelemetryReport telemetry = check_telemetry(
-      measured.samples, step.telemetry_clock, telemetry_needs(measured, config, calibration, step));
+  const TelemetryReport telemetry =
+      check_telemetry(measured.samples, measured.delivered_s, step.telemetry_clock,
+                      telemetry_needs(measured, config, calibration, step));
 
   Findings findings;
   add_connection(measured.video, "video", &findings);

@@ -15,6 +15,7 @@
 namespace alidade {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -51,8 +52,12 @@ TelemetryNeeds needs() {
 }
 
 TelemetryReport check(const std::vector<PanTiltSample>& samples,
-                      const TelemetryNeeds& needed = needs()) {
-  return check_telemetry(samples, ClockFilterOptions(), needed);
+                      const TelemetryNeeds& needed = needs(), double held_back_s = 0) {
+  std::vector<double> delivered_s;
+  for (const PanTiltSample& sample : samples) {
+    delivered_s.push_back(sample.latest_time_s + held_back_s);
+  }
+  return check_telemetry(samples, delivered_s, ClockFilterOptions(), needed);
 }
 
 TEST(TelemetryCheck, MeasuresAHealthyHead) {
@@ -145,6 +150,20 @@ TEST(TelemetryCheck, SaysThatSamplesAreTooFarApart) {
   needed.rate_hz = 3;
   EXPECT_THAT(problems(check(every(10), needed).findings),
               ElementsAre(HasSubstr("max_extrapolation_s is 250 ms")));
+  // So are those that are held back, or that a head at rest repeats.
+  needed.rate_hz = 6;
+  EXPECT_THAT(check(every(5), needed).findings, IsEmpty());
+  EXPECT_THAT(
+      problems(check(every(5), needed, 0.09).findings),
+      ElementsAre(AllOf(HasSubstr("max_extrapolation_s is 250 ms"), HasSubstr("set it to 0.31"))));
+  std::vector<PanTiltSample> at_rest = every(5);
+  for (PanTiltSample& sample : at_rest) sample.pan_rad = 0.1;
+  EXPECT_THAT(problems(check(at_rest, needed).findings),
+              ElementsAre(HasSubstr("known is up to 268 ms old")));
+  needed.max_repeat_s = 0.05;
+  EXPECT_THAT(check(at_rest, needed).findings, IsEmpty());
+  needed = needs();
+  needed.rate_hz = 3;
   // Images that come late are looked up in samples that are there.
   needed.clock_offset_s = -0.15;
   EXPECT_THAT(check(every(10), needed).findings, IsEmpty());
