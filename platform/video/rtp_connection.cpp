@@ -85,9 +85,16 @@ RtpConnection::RtpConnection(const RtpSourceOptions& options) : options_(options
 RtpConnection::~RtpConnection() { avformat_close_input(&format_); }
 
 ReadStatus RtpConnection::nothing_received(std::string* error) const {
-  char text[64];
-  std::snprintf(text, sizeof text, "nothing received for %g s", options_.timeout_s);
+  char text[128];
+  // The same words each time, so that a log need not repeat them.
+  std::snprintf(text, sizeof text,
+                arrival_s_ > last_picture_s_ ? "packets came, but no whole picture for %g s"
+                                             : "nothing received for %g s",
+                options_.timeout_s);
   *error = text;
+  if (arrival_s_ > 0 && !any_picture_ && options_.url.rfind("rtp://", 0) == 0) {
+    *error += "; is what comes " + options_.format + "?";
+  }
   return ReadStatus::kDisconnected;
 }
 
@@ -134,6 +141,7 @@ ReadStatus RtpConnection::open_demuxer(const std::string& sdp, std::string* erro
   packets_->max_packet_size = kMaxPacket;
   packets_->direct = AVIO_FLAG_DIRECT;
   format_->pb = packets_.get();
+  last_picture_s_ = monotonic_now_s();
   return prepare(error);
 }
 
@@ -141,9 +149,13 @@ ReadStatus RtpConnection::open_demuxer(const std::string& sdp, std::string* erro
 int RtpConnection::next_packet(void* self, std::uint8_t* data, int capacity) {
   auto* connection = static_cast<RtpConnection*>(self);
   std::size_t size = 0;
-  connection->transport_status_ = connection->transport_->receive(
-      monotonic_now_s() + connection->options_.timeout_s, data, static_cast<std::size_t>(capacity),
-      &size, &connection->transport_error_);
+  const double deadline_s = connection->last_picture_s_ + connection->options_.timeout_s;
+  // Where packets come without end, no wait does.
+  connection->transport_status_ =
+      monotonic_now_s() > deadline_s
+          ? ReadStatus::kTimeout
+          : connection->transport_->receive(deadline_s, data, static_cast<std::size_t>(capacity),
+                                            &size, &connection->transport_error_);
   if (connection->transport_status_ != ReadStatus::kOk) return AVERROR_EXIT;
   connection->arrival_s_ = monotonic_now_s();
   if (const auto header = parse_rtp_header(data, size)) connection->ends_.packet_in(*header);
@@ -241,6 +253,8 @@ bool RtpConnection::append(AccessUnit* piece) {
 ReadStatus RtpConnection::read(AccessUnit* unit, std::string* error) {
   const ReadStatus status = read_picture(unit, error);
   if (status != ReadStatus::kOk) return status;
+  last_picture_s_ = monotonic_now_s();
+  any_picture_ = true;
   const AVPacket& packet = *unit->packet;
   if (packet.pts != AV_NOPTS_VALUE) {
     unit->sender_time_s = static_cast<double>(packet.pts) * av_q2d(format_->streams[0]->time_base);

@@ -6,7 +6,8 @@
 // libavformat's parser is switched off: it gives a picture out, and so stamps it, only with the next
 // one's first packet. Pieces of one RTP timestamp are put together here instead, up to the picture's
 // marker (picture_ends.h).
-// Blocks; a wait ends with interrupt() or after timeout_s without a packet.
+// Blocks; a wait ends with interrupt() or after timeout_s without a whole picture: reports of a camera
+// whose encoder hangs, or packets of another stream, are no sign of life.
 
 #include <cstdint>
 #include <memory>
@@ -75,7 +76,9 @@ class RtpConnection {
   // What ended the last wait for a packet, if it was no packet.
   ReadStatus transport_status_ = ReadStatus::kOk;
   std::string transport_error_;
-  double arrival_s_ = 0;  // of the last packet
+  double arrival_s_ = 0;       // of the last packet
+  double last_picture_s_ = 0;  // when it was whole; or the connection's beginning
+  bool any_picture_ = false;
   PictureEnds ends_;
   std::shared_ptr<const AVCodecParameters> parameters_;
   CodecContextPtr parser_context_;

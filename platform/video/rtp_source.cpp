@@ -2,6 +2,7 @@
 
 #include <atomic>
 #include <chrono>
+#include <cstdio>
 #include <deque>
 #include <mutex>
 #include <utility>
@@ -45,9 +46,10 @@ class RtpSource::Implementation {
   };
 
   void check();
+  void wait_for_key();
   ReadStatus receive_connection(std::string* error);
   void interrupt();
-  void push(Arrived arrived);
+  [[nodiscard]] ReadStatus push(Arrived arrived, std::string* error);
   ReadStatus fail(std::string error) {
     error_ = options_.url + ": " + std::move(error);
     failed_ = true;
@@ -62,7 +64,10 @@ class RtpSource::Implementation {
 
   std::mutex mutex_;
   RtpConnection* connection_ = nullptr;  // guarded by mutex_
-  bool wait_for_key_ = true;             // the receiving thread's own
+
+  // The receiving thread's own.
+  bool wait_for_key_ = true;
+  double waiting_since_s_ = 0;
 
   // read()'s own.
   std::string error_;
@@ -112,17 +117,32 @@ void RtpSource::Implementation::check() {
 }
 
 // Where pictures are dropped, all are: those that follow cannot be decoded up to the next key frame.
-void RtpSource::Implementation::push(Arrived arrived) {
+ReadStatus RtpSource::Implementation::push(Arrived arrived, std::string* error) {
   if (thread_.full()) {
     thread_.drop_all();
-    wait_for_key_ = true;
+    wait_for_key();
   }
   if (wait_for_key_ && !arrived.unit.key) {
-    return;
+    if (monotonic_now_s() - waiting_since_s_ < options_.key_frame_timeout_s) {
+      return ReadStatus::kOk;
+    }
+    char text[128];
+    std::snprintf(text, sizeof text,
+                  "pictures came, but no key frame for %g s; set a shorter interval of key frames "
+                  "(GOP) in the camera",
+                  options_.key_frame_timeout_s);
+    *error = text;
+    return ReadStatus::kDisconnected;
   }
   wait_for_key_ = false;
   const auto bytes = static_cast<std::size_t>(arrived.unit.packet->size);
   thread_.push(std::move(arrived), bytes);
+  return ReadStatus::kOk;
+}
+
+void RtpSource::Implementation::wait_for_key() {
+  wait_for_key_ = true;
+  waiting_since_s_ = monotonic_now_s();
 }
 
 // One connection from its beginning to its end.
@@ -133,7 +153,7 @@ ReadStatus RtpSource::Implementation::receive_connection(std::string* error) {
     connection_ = &connection;
   }
   ReadStatus status = thread_.stopped() ? ReadStatus::kStopped : connection.open(error);
-  wait_for_key_ = true;
+  wait_for_key();
   std::int64_t damaged = 0;
   while (status == ReadStatus::kOk) {
     Arrived arrived;
@@ -142,7 +162,7 @@ ReadStatus RtpSource::Implementation::receive_connection(std::string* error) {
     damaged = connection.damaged();
     if (status == ReadStatus::kOk) {
       arrived.parameters = connection.parameters();
-      push(std::move(arrived));
+      status = push(std::move(arrived), error);
     }
   }
   const std::lock_guard<std::mutex> lock(mutex_);

@@ -12,9 +12,12 @@
 // - A frame is delivered when its last packet is here. An H.264 frame with lost or overtaking packets,
 //   a connection's first one, and each one of a sender that sets markers within pictures is delivered
 //   when the next one begins.
-// - Frames before the first key frame, damaged and undecodable frames are skipped and counted. When
-//   the reader is too slow, what waits is dropped and counted; what comes up to the next
-//   key frame, which cannot be decoded any more, is not counted.
+// - Damaged and undecodable frames are skipped and counted. When the reader is too slow, what waits is
+//   dropped and counted. What comes before the next key frame, then and at a connection's beginning,
+//   cannot be decoded and is not counted.
+// - A connection without a whole picture for timeout_s is lost, whatever packets come. Pictures that a
+//   key frame must precede count as life: cameras that save bits set key frames up to 40 s apart, and
+//   plain RTP is joined at any moment between two. So key_frame_timeout_s bounds that wait.
 // - Luma is the decoder's plane 0, without copy or conversion.
 // - copy_to: each delivered frame's data is also stored, not re-encoded, in that Matroska file, in
 //   which a kill loses at most the last second. The file goes on over reconnections.
@@ -36,8 +39,10 @@ struct RtpSourceOptions {
   std::string password;
   std::string format = "MJPG";            // rtp:// only: MJPG or H264
   Transport transport = Transport::kTcp;  // rtsp:// only: RTP interleaved with RTSP, or in UDP
-  bool decode = true;        // false: Frame::luma stays null, only the first frame is decoded
-  double timeout_s = 3;      // without a packet for so long, the connection counts as lost
+  bool decode = true;    // false: Frame::luma stays null, only the first frame is decoded
+  double timeout_s = 3;  // without a whole picture for so long, the connection counts as lost
+  // The same without a key frame, while one is waited for and other pictures come.
+  double key_frame_timeout_s = 60;
   double max_backoff_s = 5;  // longest pause between two tries
   std::string copy_to;       // video.mkv to copy the stream into; empty: none
 };

@@ -30,6 +30,12 @@ int bound_socket(int port) {
   return fd;
 }
 
+void append(RtpRelay::Packet* packet, std::uint32_t word) {
+  for (const unsigned shift : {24U, 16U, 8U, 0U}) {
+    packet->push_back(static_cast<std::uint8_t>(word >> shift));
+  }
+}
+
 }  // namespace
 
 RtpRelay::RtpRelay(int to_port) : port_(free_rtp_port()), to_port_(to_port) {
@@ -58,15 +64,23 @@ void RtpRelay::forward(const std::function<void(Packets&)>& change) {
   }
 }
 
+void RtpRelay::report(std::uint64_t ntp, std::uint32_t timestamp) {
+  Packet packet = {0x80, 200, 0, 6, 0, 0, 0, 7};
+  append(&packet, static_cast<std::uint32_t>(ntp >> 32U));
+  append(&packet, static_cast<std::uint32_t>(ntp));
+  for (const std::uint32_t word : {timestamp, 1U, 1U}) append(&packet, word);
+  const sockaddr_in address = loopback(to_port_ + 1);
+  (void)::sendto(rtcp_fd_, packet.data(), packet.size(), 0,
+                 reinterpret_cast<const sockaddr*>(&address), sizeof address);
+}
+
 RtpRelay::Packet with_capture_time(const RtpRelay::Packet& packet, double utc_s) {
   const auto seconds = static_cast<std::uint32_t>(std::floor(utc_s) + 2'208'988'800.0);
   const auto sixteenths = static_cast<std::uint32_t>(16 * (utc_s - std::floor(utc_s)));
   RtpRelay::Packet changed(packet.begin(), packet.begin() + 12);
   changed[0] |= 0x10U;
   for (const std::uint32_t word : {0xABAC'0003U, seconds, sixteenths << 28U, 0U}) {
-    for (const unsigned shift : {24U, 16U, 8U, 0U}) {
-      changed.push_back(static_cast<std::uint8_t>(word >> shift));
-    }
+    append(&changed, word);
   }
   changed.insert(changed.end(), packet.begin() + 12, packet.end());
   return changed;

@@ -1,7 +1,7 @@
 #pragma once
 // RtpRelay: stands between an RtpSender and a receiver on the loopback, and does to its packets what
-// networks and cameras do: leaves out, exchanges, repeats, adds the extension 0xABAC. Without a thread:
-// forward() passes on what has come.
+// networks and cameras do: leaves out, exchanges, repeats, adds the extension 0xABAC, and reports of its
+// own. Without a thread: forward() passes on what has come.
 
 #include <cstdint>
 #include <functional>
@@ -23,6 +23,9 @@ class RtpRelay {
 
   // What has come since (RTP only), changed by `change`.
   void forward(const std::function<void(Packets&)>& change = [](Packets&) {});
+
+  // Sends an RTCP sender report of these times: 64 bits of NTP, the timestamp that RTP has then.
+  void report(std::uint64_t ntp, std::uint32_t timestamp);
 
  private:
   int fd_;

@@ -24,6 +24,7 @@
 namespace alidade {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -321,6 +322,73 @@ TEST_P(RtpSourceWith, ReportsThatNothingComesAnyMore) {
   EXPECT_EQ(source.error(),
             "rtp://0.0.0.0:" + std::to_string(port_) + "/: nothing received for 0.1 s");
   EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+}
+
+TEST_P(RtpSourceWith, ReportsThatPacketsOfAnotherFormatComeOnly) {
+  options_.timeout_s = 0.3;
+  RtpSource source(options_);
+  listen(source, port_);
+  RtpSender sender(GetParam() == Codec::kMjpeg ? Codec::kH264 : Codec::kMjpeg, port_);
+  Frame frame;
+  ASSERT_EQ(next(source, sender, frame), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), AllOf(HasSubstr("packets came, but no whole picture for 0.3 s"),
+                                    HasSubstr("is what comes " + options_.format + "?")));
+}
+
+TEST_P(RtpSourceWith, ReportsThatOnlyReportsComeAnyMore) {
+  options_.timeout_s = 1;
+  RtpSource source(options_);
+  listen(source, port_);
+  RtpRelay relay(port_);
+  RtpSender sender(GetParam(), port_);
+  Frame frame;
+  ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+  EXPECT_TRUE(eventually([&] {
+    relay.report(0, 90'000);
+    return source.read(frame, 0.02) == ReadStatus::kDisconnected;
+  }));
+  EXPECT_THAT(source.error(), HasSubstr(": packets came, but no whole picture for 1 s"));
+  EXPECT_THAT(source.error(), Not(HasSubstr("?"))) << "the format was right";
+}
+
+TEST(RtpSourceKeyFrames, MayComeSlowerThanATimeoutWhileOtherPicturesCome) {
+  const int port = free_rtp_port();
+  RtpSourceOptions options = options_for(port, Codec::kH264);
+  options.timeout_s = 1;
+  RtpSource source(options);
+  listen(source, port);
+  RtpRelay relay(port);
+  RtpSender sender(Codec::kH264, relay.port());
+  const auto pass = [&](bool with_key_frames) {
+    const bool key = sender.sent() % 10 == 0;
+    sender.send();
+    relay.forward([&](RtpRelay::Packets& packets) {
+      if (key && !with_key_frames) packets.clear();
+    });
+  };
+  Frame frame;
+  const double end_s = monotonic_now_s() + 2 * options.timeout_s;
+  while (monotonic_now_s() < end_s) {
+    pass(false);
+    ASSERT_EQ(source.read(frame, 0.02), ReadStatus::kTimeout) << source.error();
+  }
+  EXPECT_TRUE(eventually([&] {
+    pass(true);
+    return source.read(frame, 0.02) == ReadStatus::kOk;
+  }));
+}
+
+TEST(RtpSourceKeyFrames, AreNotWaitedForWithoutEnd) {
+  const int port = free_rtp_port();
+  RtpSourceOptions options = options_for(port, Codec::kH264);
+  options.key_frame_timeout_s = 0;
+  RtpSender sender(Codec::kH264, port);
+  sender.send();
+  RtpSource source(options);
+  listen(source, port);
+  Frame frame;
+  EXPECT_EQ(next(source, sender, frame), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("pictures came, but no key frame for 0 s; set a shorter"));
 }
 
 TEST_P(RtpSourceWith, DeliversStampsAndSizeWithoutDecoding) {
