@@ -158,6 +158,7 @@ int RtpConnection::next_packet(void* self, std::uint8_t* data, int capacity) {
                                             &size, &connection->transport_error_);
   if (connection->transport_status_ != ReadStatus::kOk) return AVERROR_EXIT;
   connection->arrival_s_ = monotonic_now_s();
+  connection->timestamps_.move(data, size);
   if (const auto header = parse_rtp_header(data, size)) connection->ends_.packet_in(*header);
   return static_cast<int>(size);
 }

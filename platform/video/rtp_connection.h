@@ -79,6 +79,7 @@ class RtpConnection {
   double arrival_s_ = 0;       // of the last packet
   double last_picture_s_ = 0;  // when it was whole; or the connection's beginning
   bool any_picture_ = false;
+  BearableTimestamps timestamps_;
   PictureEnds ends_;
   std::shared_ptr<const AVCodecParameters> parameters_;
   CodecContextPtr parser_context_;

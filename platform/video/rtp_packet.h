@@ -1,6 +1,7 @@
 #pragma once
 // The header of an RTP packet (RFC 3550, 5.1), as far as a picture's end and capture time stand in it:
-// libavformat takes the packets apart and tells neither. Bytes in, value or nothing out; no allocation.
+// libavformat takes the packets apart and tells neither. And what libavformat cannot bear in it.
+// Bytes in, value or nothing out; no allocation.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,5 +20,17 @@ struct RtpHeader {
 
 // Nothing for RTCP and for what is no RTP packet.
 [[nodiscard]] std::optional<RtpHeader> parse_rtp_header(const std::uint8_t* data, std::size_t size);
+
+// Keeps two timestamps from libavformat. A first one of 0 it takes for "none yet", and gives the second
+// picture the first one's stamp again: then all are moved by a second, and those of the sender's
+// reports with them. The largest it takes for "unknown": one tick less comes in its place.
+class BearableTimestamps {
+ public:
+  // Each RTP and RTCP packet of a connection, in the order of arrival.
+  void move(std::uint8_t* data, std::size_t size);
+
+ private:
+  std::optional<std::uint32_t> shift_;
+};
 
 }  // namespace alidade

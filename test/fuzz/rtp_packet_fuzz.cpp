@@ -32,6 +32,22 @@ std::optional<RtpHeader> parse_soundly(const std::string& packet) {
   return header;
 }
 
+// Moving changes nothing but the time stamp.
+void move_soundly(BearableTimestamps& timestamps, const std::string& packet) {
+  std::string moved = packet;
+  timestamps.move(reinterpret_cast<std::uint8_t*>(moved.data()), moved.size());
+  const auto before = parse(packet);
+  const auto after = parse(moved);
+  FUZZ_REQUIRE(before.has_value() == after.has_value());
+  FUZZ_REQUIRE(!before || (before->marker == after->marker && before->sequence == after->sequence &&
+                           before->capture_utc_s == after->capture_utc_s));
+  if (before) {
+    const std::uint32_t shift = after->timestamp - before->timestamp;
+    FUZZ_REQUIRE(shift == 0 || shift == 90'000 || after->timestamp == 0xFFFF'FFFE);
+    FUZZ_REQUIRE(shift != 0 || moved == packet);
+  }
+}
+
 }  // namespace
 }  // namespace alidade
 
@@ -39,6 +55,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace alidade;
   FuzzInput input(data, size);
   PictureEnds ends;
+  BearableTimestamps timestamps;
   int markers = 0;
   int last_pieces = 0;
   while (!input.empty()) {
@@ -50,9 +67,13 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       const PictureEnds::Piece piece = ends.piece_out(pts);
       last_pieces += piece.last ? 1 : 0;
       FUZZ_REQUIRE(last_pieces <= markers);
-    } else if (const auto header = parse_soundly(std::string(input.bytes(what)))) {
-      ends.packet_in(*header);
-      markers += header->marker ? 1 : 0;
+    } else {
+      const std::string packet(input.bytes(what));
+      move_soundly(timestamps, packet);
+      if (const auto header = parse_soundly(packet)) {
+        ends.packet_in(*header);
+        markers += header->marker ? 1 : 0;
+      }
     }
   }
   return 0;

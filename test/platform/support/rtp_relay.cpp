@@ -36,6 +36,12 @@ void append(RtpRelay::Packet* packet, std::uint32_t word) {
   }
 }
 
+std::uint32_t timestamp_of(const RtpRelay::Packet& packet) {
+  std::uint32_t value = 0;
+  for (std::size_t i = 4; i < 8; ++i) value = value << 8U | packet[i];
+  return value;
+}
+
 }  // namespace
 
 RtpRelay::RtpRelay(int to_port) : port_(free_rtp_port()), to_port_(to_port) {
@@ -54,7 +60,11 @@ void RtpRelay::forward(const std::function<void(Packets&)>& change) {
   for (;;) {
     const ssize_t size = ::recv(fd_, buffer, sizeof buffer, MSG_DONTWAIT);
     if (size < 0) break;
-    packets.emplace_back(buffer, buffer + size);
+    const Packet packet(buffer, buffer + size);
+    if (!shift_) shift_ = first_ ? *first_ - timestamp_of(packet) : 0;
+    packets.emplace_back(packet.begin(), packet.begin() + 4);
+    append(&packets.back(), timestamp_of(packet) + *shift_);
+    packets.back().insert(packets.back().end(), packet.begin() + 8, packet.end());
   }
   change(packets);
   const sockaddr_in address = loopback(to_port_);

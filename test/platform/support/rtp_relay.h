@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <vector>
 
 namespace alidade {
@@ -21,6 +22,10 @@ class RtpRelay {
 
   int port() const { return port_; }  // for the sender
 
+  // The first packet that is forwarded gets this timestamp, and those after it by as much another one:
+  // the sender begins at a random one.
+  void begin_at(std::uint32_t timestamp) { first_ = timestamp; }
+
   // What has come since (RTP only), changed by `change`.
   void forward(const std::function<void(Packets&)>& change = [](Packets&) {});
 
@@ -32,6 +37,8 @@ class RtpRelay {
   int rtcp_fd_;
   int port_;
   int to_port_;
+  std::optional<std::uint32_t> first_;
+  std::optional<std::uint32_t> shift_;
 };
 
 // The packet with the extension of the time (Unix seconds; multiples of 1/16 are exact).

@@ -87,7 +87,7 @@ RtpSender::RtpSender(Codec codec, int port, double first_time_s)
 
   const std::string url = "rtp://127.0.0.1:" + std::to_string(port) + "?pkt_size=1200";
   check(avformat_alloc_output_context2(&format_, nullptr, "rtp", url.c_str()));
-  format_->flags |= AVFMT_FLAG_BITEXACT;  // RTP timestamps begin at zero, not at a random number
+  format_->flags |= AVFMT_FLAG_BITEXACT;  // sequence numbers begin at zero, not at a random one
   // Lets the RTCP reports say that first_time_s is now.
   format_->start_time_realtime = began_utc_us_ - std::llround(1e6 * first_time_s);
   AVStream* stream = avformat_new_stream(format_, nullptr);

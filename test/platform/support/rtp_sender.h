@@ -1,6 +1,6 @@
 #pragma once
 // RtpSender: sends numbered pictures as plain RTP to a port of the loopback (libavformat's muxer), each
-// when the test says. Picture n is of one grey, grey_of(n), and has the timestamp first_time_s + n/30.
+// when the test says. Picture n is of one grey, grey_of(n), and has the timestamp first_time_s + n/30, from a random zero on.
 
 #include <cstdint>
 #include <ostream>
@@ -19,7 +19,7 @@ class RtpSender {
   static constexpr double kPeriod_s = 1.0 / 30;
   static int grey_of(std::int64_t n) { return 40 + static_cast<int>(n * 7 % 160); }
 
-  // first_time_s > 0. H.264 has a key frame every 10 pictures and its parameter sets in band.
+  // H.264 has a key frame every 10 pictures and its parameter sets in band.
   RtpSender(Codec codec, int port, double first_time_s = 1);
   ~RtpSender();
   RtpSender(const RtpSender&) = delete;

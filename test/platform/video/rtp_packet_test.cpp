@@ -95,6 +95,84 @@ TEST(RtpPacket, IsNotRtcpNorAnotherVersion) {
   EXPECT_FALSE(parse({}));
 }
 
+// A sender report that says NTP 1.0 at this timestamp, and a description behind it.
+Bytes report(std::uint8_t high, std::uint8_t low) {
+  return {0x80, 200, 0, 6, 0, 0, 0, 7, 0,    0,   0, 1, 0, 0, 0, 0, high, 0, 0, low,
+          0,    0,   0, 1, 0, 0, 0, 1, 0x81, 202, 0, 2, 0, 0, 0, 7, 1,    0, 0, 0};
+}
+
+Bytes at_timestamp(std::uint8_t each_byte) {
+  Bytes packet = kPlain;
+  for (std::size_t i = 4; i < 8; ++i) packet[i] = each_byte;
+  return packet;
+}
+
+TEST(BearableTimestamps, AreMovedByASecondWhereTheFirstIsZero) {
+  BearableTimestamps timestamps;
+  Bytes packet = at_timestamp(0);
+  const Bytes first = packet;
+  timestamps.move(packet.data(), packet.size());
+  EXPECT_EQ(parse(packet)->timestamp, 90'000U);
+  EXPECT_EQ(Bytes(packet.begin() + 8, packet.end()), Bytes(first.begin() + 8, first.end()));
+  Bytes next = kPlain;
+  timestamps.move(next.data(), next.size());
+  EXPECT_EQ(parse(next)->timestamp, 0x89ABCDEFU + 90'000U);
+  Bytes before_wrap = at_timestamp(0xFF);
+  timestamps.move(before_wrap.data(), before_wrap.size());
+  EXPECT_EQ(parse(before_wrap)->timestamp, 89'999U);
+  Bytes rtcp = report(0, 1);
+  Bytes moved = rtcp;
+  moved[17] = 0x01;  // 90'001
+  moved[18] = 0x5F;
+  moved[19] = 0x91;
+  timestamps.move(rtcp.data(), rtcp.size());
+  EXPECT_EQ(rtcp, moved);
+}
+
+TEST(BearableTimestamps, CountFromAReportThatComesBeforeThePictures) {
+  BearableTimestamps timestamps;
+  Bytes rtcp = report(0, 0);
+  timestamps.move(rtcp.data(), rtcp.size());
+  EXPECT_NE(rtcp, report(0, 0));
+  Bytes packet = kPlain;
+  timestamps.move(packet.data(), packet.size());
+  EXPECT_EQ(parse(packet)->timestamp, 0x89ABCDEFU + 90'000U);
+}
+
+TEST(BearableTimestamps, AreLeftAloneWhereTheyBeginElsewhere) {
+  BearableTimestamps timestamps;
+  Bytes packet = kPlain;
+  timestamps.move(packet.data(), packet.size());
+  EXPECT_EQ(packet, kPlain);
+  Bytes rtcp = report(0, 0);
+  timestamps.move(rtcp.data(), rtcp.size());
+  EXPECT_EQ(rtcp, report(0, 0));
+}
+
+TEST(BearableTimestamps, AreNeverTheLargest) {
+  BearableTimestamps timestamps;
+  for (const int i : {0, 1}) {
+    Bytes packet = at_timestamp(0xFF);
+    timestamps.move(packet.data(), packet.size());
+    EXPECT_EQ(parse(packet)->timestamp, 0xFFFF'FFFEU) << i;
+  }
+}
+
+TEST(BearableTimestamps, AreNotSoughtInWhatIsCutOffOrOfAnotherKind) {
+  for (std::size_t size = 0; size < 20; ++size) {
+    BearableTimestamps timestamps;
+    Bytes rtcp = report(0, 0);
+    timestamps.move(rtcp.data(), size);
+    EXPECT_EQ(rtcp, report(0, 0)) << size;
+  }
+  BearableTimestamps timestamps;
+  Bytes receiver = report(0, 0);
+  receiver[1] = 201;
+  const Bytes before = receiver;
+  timestamps.move(receiver.data(), receiver.size());
+  EXPECT_EQ(receiver, before);
+}
+
 // Packets of pictures, whose pieces come out at once, as libavformat does in order.
 class PictureEndsInOrder : public ::testing::Test {
  protected:

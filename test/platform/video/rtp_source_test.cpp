@@ -12,6 +12,7 @@
 #include <memory>
 #include <set>
 #include <thread>
+#include <tuple>
 #include <vector>
 
 #include "platform/recording/recording_writer.h"
@@ -164,26 +165,58 @@ TEST_P(RtpSourceWith, ReadsASessionDescription) {
   EXPECT_EQ(frame.width, RtpSender::kWidth);
 }
 
-TEST_P(RtpSourceWith, UnwrapsTimestampsAndPassesUtcOnAcrossTheWrap) {
-  constexpr double kWrap_s = 4294967296.0 / 90'000;
-  RtpSource source(options_);
-  listen(source, port_);
-  RtpSender sender(GetParam(), port_, kWrap_s - 20 * RtpSender::kPeriod_s);
+// Sends picture after picture through the relay until the source gives the next one.
+bool next(RtpSource& source, RtpSender& sender, RtpRelay& relay, Frame& frame) {
+  return eventually([&] {
+    sender.send();
+    relay.forward();
+    return source.read(frame, 0.02) == ReadStatus::kOk;
+  });
+}
+
+class RtpSourceTimestamps : public ::testing::TestWithParam<std::tuple<Codec, std::int64_t, bool>> {
+};
+
+constexpr std::int64_t kWrap = std::int64_t{1} << 32;
+
+INSTANTIATE_TEST_SUITE_P(FirstTimestamps, RtpSourceTimestamps,
+                         ::testing::Combine(::testing::Values(Codec::kMjpeg, Codec::kH264),
+                                            ::testing::Values(0, 90'000, kWrap - 60'000,
+                                                              kWrap - 60'001),
+                                            ::testing::Bool()));
+
+TEST_P(RtpSourceTimestamps, AreUnwrappedAndGiveUtcFromTheFirstReportOn) {
+  const auto [codec, first_timestamp, report_first] = GetParam();
+  const int port = free_rtp_port();
+  RtpSource source(options_for(port, codec));
+  listen(source, port);
+  RtpRelay relay(port);
+  relay.begin_at(static_cast<std::uint32_t>(first_timestamp));
+  RtpSender sender(codec, relay.port());
+  const double began_utc_s = std::floor(sender.began_utc_s());
+  const auto report = [&] {
+    relay.report(static_cast<std::uint64_t>(began_utc_s + 2'208'988'800.0) << 32U,
+                 static_cast<std::uint32_t>(first_timestamp));
+  };
+  if (report_first) report();
   FrameStamp first;
   int with_utc = 0;
   for (int i = 0; i < 40; ++i) {
     Frame frame;
-    ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+    ASSERT_TRUE(next(source, sender, relay, frame)) << source.error();
     first = i == 0 ? frame.stamp : first;
+    EXPECT_EQ(frame.stamp.frame, i);
+    EXPECT_NEAR(grey_of(frame), RtpSender::grey_of(i), kGreyTolerance);
     ASSERT_TRUE(frame.stamp.sender_time_s);
     EXPECT_NEAR(number_of(frame, first), i, 1e-3);
     if (frame.stamp.sender_utc_s) {
-      // The sender's report calls its own beginning picture 0.
-      EXPECT_NEAR(*frame.stamp.sender_utc_s - sender.began_utc_s(), i * RtpSender::kPeriod_s, 2e-3);
+      EXPECT_NEAR(*frame.stamp.sender_utc_s - began_utc_s, i * RtpSender::kPeriod_s, 2e-3);
       ++with_utc;
     }
+    if (i == 5) report();
   }
-  EXPECT_GE(with_utc, 30);  // some before the wrap, all after it
+  EXPECT_GE(with_utc, 25) << "of them some before a wrap, all after it";
+  EXPECT_EQ(source.counters().damaged, 0);
 }
 
 TEST_P(RtpSourceWith, TakesTheCaptureTimeFromTheOnvifExtension) {
