@@ -292,7 +292,8 @@ bool RtpConnection::inspect(AccessUnit* unit) {
 
 // libavformat adds to each packet what the latest RTCP report says about its timestamp, but without
 // unwrapping: between a wrap and the next report the time is one wrap (13 h) off, which shows as long as
-// the camera's clock and ours agree to some minutes.
+// the camera's clock and ours agree to some minutes. A sender without a clock reports 0, or the time
+// since it began: the high bit of NTP's seconds is not set (RFC 3550, 6.4.1).
 std::optional<double> RtpConnection::utc(const AVPacket& packet) const {
   const auto* reference = reinterpret_cast<const AVProducerReferenceTime*>(
       av_packet_get_side_data(&packet, AV_PKT_DATA_PRFT, nullptr));
@@ -300,7 +301,9 @@ std::optional<double> RtpConnection::utc(const AVPacket& packet) const {
     return std::nullopt;
   }
   constexpr double kAgreement_s = 600;
+  constexpr double kHighBit_s = -61'505'152;  // Unix time, in 1968
   const double utc_s = 1e-6 * static_cast<double>(reference->wallclock);
+  if (utc_s < kHighBit_s) return std::nullopt;
   const double wrap_s = 4294967296.0 * av_q2d(format_->streams[0]->time_base);
   const double ahead_s = utc_s - 1e-6 * static_cast<double>(av_gettime());
   const double wraps = std::round(ahead_s / wrap_s);

@@ -219,6 +219,22 @@ TEST_P(RtpSourceTimestamps, AreUnwrappedAndGiveUtcFromTheFirstReportOn) {
   EXPECT_EQ(source.counters().damaged, 0);
 }
 
+TEST_P(RtpSourceWith, GivesNoUtcOfReportsOfASenderWithoutAClock) {
+  RtpSource source(options_);
+  listen(source, port_);
+  RtpRelay relay(port_);
+  RtpSender sender(GetParam(), relay.port());
+  // Unknown, and the time since the sender began (RFC 3550, 6.4.1).
+  for (const std::uint64_t ntp : {std::uint64_t{0}, std::uint64_t{86'400} << 32U}) {
+    for (int i = 0; i < 10; ++i) {
+      Frame frame;
+      relay.report(ntp, 90'000);
+      ASSERT_TRUE(next(source, sender, relay, frame)) << source.error();
+      EXPECT_EQ(frame.stamp.sender_utc_s, std::nullopt);
+    }
+  }
+}
+
 TEST_P(RtpSourceWith, TakesTheCaptureTimeFromTheOnvifExtension) {
   RtpSource source(options_);
   listen(source, port_);
