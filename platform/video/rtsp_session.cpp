@@ -63,6 +63,14 @@ class RtspSession::Message {
     gst_rtsp_message_get_header(&message_, field, &value, 0);
     return value == nullptr ? "" : value;
   }
+  // The library makes a list one header an item, where the field may be a list.
+  bool lists(GstRTSPHeaderField field, const char* item) {
+    gchar* value = nullptr;
+    for (int i = 0; gst_rtsp_message_get_header(&message_, field, &value, i) == GST_RTSP_OK; ++i) {
+      if (std::string(value).find(item) != std::string::npos) return true;
+    }
+    return false;
+  }
   std::pair<const std::uint8_t*, std::size_t> body() {
     guint8* data = nullptr;
     guint size = 0;
@@ -161,9 +169,7 @@ ReadStatus RtspSession::describe(std::string* sdp, std::string* error) {
   Message options;
   ReadStatus status = ask({GST_RTSP_OPTIONS, url_}, &options, error);
   if (status != ReadStatus::kOk) return status;
-  if (options.header(GST_RTSP_HDR_PUBLIC).find("GET_PARAMETER") != std::string::npos) {
-    ping_ = GST_RTSP_GET_PARAMETER;
-  }
+  if (options.lists(GST_RTSP_HDR_PUBLIC, "GET_PARAMETER")) ping_ = GST_RTSP_GET_PARAMETER;
   Message answer;
   status = ask({GST_RTSP_DESCRIBE, url_, GST_RTSP_HDR_ACCEPT, "application/sdp"}, &answer, error);
   if (status != ReadStatus::kOk) return status;
@@ -332,6 +338,11 @@ void RtspSession::reply(Message* request) {
 ReadStatus RtspSession::keep_alive(std::string* error) {
   if (gst_rtsp_connection_next_timeout_usec(connection_.get()) > 0) return ReadStatus::kOk;
   gst_rtsp_connection_reset_timeout(connection_.get());
+  pinged_again_ = false;
+  return ping(error);
+}
+
+ReadStatus RtspSession::ping(std::string* error) {
   return send({ping_, session_url_}, monotonic_now_s() + options_.timeout_s, error);
 }
 
@@ -347,8 +358,11 @@ ReadStatus RtspSession::next_packet(double deadline_s, Packet* packet, std::stri
   if (message.type() == GST_RTSP_MESSAGE_REQUEST) {
     reply(&message);
   } else if (message.type() == GST_RTSP_MESSAGE_RESPONSE) {
-    // To a ping. Digest's number used once may have run out.
-    if (message.status() == GST_RTSP_STS_UNAUTHORIZED) (void)accept_challenge(&message);
+    // To a ping. Digest's number used once may have run out: the session would, too, before the next.
+    if (message.status() == GST_RTSP_STS_UNAUTHORIZED && accept_challenge(&message) &&
+        !std::exchange(pinged_again_, true)) {
+      return ping(error);
+    }
   } else if (message.type() == GST_RTSP_MESSAGE_DATA) {
     guint8 channel = 0;
     gst_rtsp_message_parse_data(message.get(), &channel);
@@ -367,6 +381,12 @@ ReadStatus RtspSession::receive(double deadline_s, std::uint8_t* data, std::size
     const double left_s = deadline_s - monotonic_now_s();
     Packet packet;
     if (ports_) {
+      // Video leaves no silence in which to read what the camera says.
+      if (monotonic_now_s() >= next_look_s_) {
+        next_look_s_ = monotonic_now_s() + kSlice_s;
+        // One that closes this connection and sends on may do so: below, silence is the end.
+        if (readable(0)) (void)next_packet(deadline_s, &packet, error);
+      }
       const double slice_end_s = monotonic_now_s() + std::min(left_s, kSlice_s);
       status = ports_->receive(slice_end_s, data, capacity, size, error);
       if (status != ReadStatus::kTimeout) return status;

@@ -52,6 +52,7 @@ class RtspSession : public RtpTransport {
   // The next packet within the connection, if the next message is one.
   [[nodiscard]] ReadStatus next_packet(double deadline_s, Packet* packet, std::string* error);
   [[nodiscard]] ReadStatus keep_alive(std::string* error);
+  [[nodiscard]] ReadStatus ping(std::string* error);
   [[nodiscard]] bool readable(double wait_s) const;
   void reply(Message* request);
   [[nodiscard]] ReadStatus lost(GstRTSPResult result, std::string* error) const;
@@ -69,6 +70,8 @@ class RtspSession : public RtpTransport {
   std::string base_url_;     // what the description's addresses are relative to
   std::string session_url_;  // what PLAY is for; empty: nothing to tear down
   GstRTSPMethod ping_ = GST_RTSP_OPTIONS;
+  bool pinged_again_ = false;  // with a new login
+  double next_look_s_ = 0;     // by UDP: for what the camera says
   std::atomic<bool> interrupted_{false};
   std::unique_ptr<GCancellable, Unref> cancellable_{g_cancellable_new()};
   std::mutex mutex_;  // lets interrupt() see whole what of these is there

@@ -1,0 +1,179 @@
+// RtpSource with RTSP: a server that does what cameras do and the real server does not.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <string>
+
+#include "platform/system/clock.h"
+#include "platform/video/rtp_source.h"
+#include "test/platform/support/eventually.h"
+#include "test/platform/support/scripted_rtsp_server.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+
+using Transport = RtpSourceOptions::Transport;
+
+RtpSourceOptions options_for(const ScriptedRtspServer& server,
+                             Transport transport = Transport::kTcp) {
+  RtpSourceOptions options;
+  options.url = server.url();
+  options.transport = transport;
+  options.timeout_s = 10;
+  options.max_backoff_s = 0.01;
+  return options;
+}
+
+// Reads on, without a loss, until the condition holds.
+template <class Condition>
+void read_while_waiting(RtpSource& source, Condition condition) {
+  Frame frame;
+  const double end_s = monotonic_now_s() + kDeadline_s;
+  while (!condition()) {
+    ASSERT_LT(monotonic_now_s(), end_s);
+    const ReadStatus status = source.read(frame, 0.05);
+    ASSERT_TRUE(status == ReadStatus::kOk || status == ReadStatus::kTimeout) << source.error();
+  }
+}
+
+class RtspSessionBy : public ::testing::TestWithParam<Transport> {};
+
+INSTANTIATE_TEST_SUITE_P(Transports, RtspSessionBy,
+                         ::testing::Values(Transport::kTcp, Transport::kUdp), [](const auto& way) {
+                           return way.param == Transport::kTcp ? "Tcp" : "Udp";
+                         });
+
+TEST_P(RtspSessionBy, FollowsARedirection) {
+  const ScriptedRtspServer there;
+  const ScriptedRtspServer here([&](const RtspRequest& request, RtspAnswer* answer) {
+    if (request.method != "DESCRIBE") return;
+    *answer = {"302 Moved Temporarily", "Location: " + there.url() + "\r\n", "", "", false};
+  });
+  RtpSource source(options_for(here, GetParam()));
+  Frame frame;
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  EXPECT_EQ(here.count("SETUP"), 0);
+  EXPECT_EQ(there.count("PLAY"), 1);
+}
+
+TEST_P(RtspSessionBy, PingsByGetParameterWhereTheCameraOffersIt) {
+  const ScriptedRtspServer server;
+  RtpSource source(options_for(server, GetParam()));
+  read_while_waiting(source, [&] { return server.count("GET_PARAMETER", "Session: 1") >= 2; });
+  EXPECT_EQ(server.count("OPTIONS"), 1);
+}
+
+TEST_P(RtspSessionBy, PingsByOptionsWhereTheCameraOffersNothingElse) {
+  const ScriptedRtspServer server([](const RtspRequest& request, RtspAnswer* answer) {
+    if (request.method == "OPTIONS") answer->headers = "Public: OPTIONS, DESCRIBE, SETUP, PLAY\r\n";
+  });
+  RtpSource source(options_for(server, GetParam()));
+  read_while_waiting(source, [&] { return server.count("OPTIONS", "Session: 1") >= 2; });
+  EXPECT_EQ(server.count("GET_PARAMETER"), 0);
+}
+
+// The ping comes after 3 s; without another one before 5.5 s the camera would end the session.
+TEST_P(RtspSessionBy, PingsAgainWhenTheLoginRanOut) {
+  std::atomic<int> nonce{1};
+  std::atomic<int> pings{0};
+  std::atomic<double> last_let_in_s{monotonic_now_s()};
+  ScriptedRtspServer server([&](const RtspRequest& request, RtspAnswer* answer) {
+    const std::string current = "nonce=\"n" + std::to_string(nonce) + "\"";
+    if (request.text.find(current) == std::string::npos) {
+      *answer = {"401 Unauthorized",
+                 "WWW-Authenticate: Digest realm=\"r\", " + current + ", stale=true\r\n", "", "",
+                 false};
+      return;
+    }
+    last_let_in_s = monotonic_now_s();
+    pings += request.method == "GET_PARAMETER" ? 1 : 0;
+    nonce += request.method == "PLAY" ? 1 : 0;
+    if (request.method == "SETUP") {
+      answer->headers.replace(answer->headers.find("timeout=2"), 9, "timeout=4");
+    }
+  });
+  RtpSourceOptions options = options_for(server, GetParam());
+  options.user = "user";
+  options.password = "secret";
+  RtpSource source(options);
+  read_while_waiting(source, [&] {
+    if (monotonic_now_s() > last_let_in_s + 5.5) server.hang_up = true;
+    return pings >= 1;
+  });
+}
+
+TEST_P(RtspSessionBy, AnswersTheCamerasOwnRequests) {
+  ScriptedRtspServer server([](const RtspRequest& request, RtspAnswer* answer) {
+    if (request.method == "SETUP") answer->before = "OPTIONS * RTSP/1.0\r\nCSeq: 76\r\n\r\n";
+  });
+  server.ask = true;
+  RtpSource source(options_for(server, GetParam()));
+  read_while_waiting(source, [&] { return server.count("RTSP/1.0", "CSeq: 77") == 1; });
+  EXPECT_EQ(server.count("RTSP/1.0", "RTSP/1.0 200 OK"), 2);
+  EXPECT_EQ(server.count("RTSP/1.0", "CSeq: 76"), 1);
+}
+
+TEST_P(RtspSessionBy, SaysWhichTransportTheCameraRefuses) {
+  const ScriptedRtspServer server([](const RtspRequest& request, RtspAnswer* answer) {
+    if (request.method == "SETUP") answer->status = "461 Unsupported Transport";
+  });
+  RtpSource source(options_for(server, GetParam()));
+  Frame frame;
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source.error(),
+              HasSubstr(GetParam() == Transport::kTcp ? "by TCP (461); set transport: udp"
+                                                      : "by UDP (461); set transport: tcp"));
+}
+
+TEST_P(RtspSessionBy, SaysThatTheCameraHungUp) {
+  ScriptedRtspServer server;
+  RtpSource source(options_for(server, GetParam()));
+  Frame frame;
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  server.hang_up = true;
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("the camera closed the connection"));
+}
+
+TEST(RtspSession, GoesOnByUdpWhileACameraThatHungUpSends) {
+  ScriptedRtspServer server;
+  RtpSource source(options_for(server, Transport::kUdp));
+  Frame frame;
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  server.stop_speaking = true;
+  int frames = 0;
+  read_while_waiting(source, [&] { return !server.stop_speaking && ++frames > 60; });
+}
+
+TEST(RtspSession, GivesUpRedirectionsInACircle) {
+  std::string url;
+  const ScriptedRtspServer server([&url](const RtspRequest& request, RtspAnswer* answer) {
+    if (request.method != "DESCRIBE") return;
+    const std::string other = request.text.find("/other") == std::string::npos ? "/other" : "";
+    *answer = {"301 Moved", "Location: " + url + other + "\r\n", "", "", false};
+  });
+  url = server.url();
+  RtpSource source(options_for(server));
+  Frame frame;
+  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("more than 5 redirections"));
+}
+
+TEST(RtspSession, KeepsThePacketsThatComeBeforeTheAnswerToPlay) {
+  const ScriptedRtspServer server([](const RtspRequest& request, RtspAnswer* answer) {
+    answer->pictures_before = request.method == "PLAY";
+  });
+  RtpSource source(options_for(server));
+  Frame frame;
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    EXPECT_NEAR(frame.luma[0], RtpSender::grey_of(i), 3);
+  }
+}
+
+}  // namespace
+}  // namespace alidade
