@@ -68,6 +68,7 @@ class RtpSource::Implementation {
   // The receiving thread's own.
   bool wait_for_key_ = true;
   double waiting_since_s_ = 0;
+  bool worked_ = false;  // a connection before this one has brought pictures
 
   // read()'s own.
   std::string error_;
@@ -155,6 +156,7 @@ ReadStatus RtpSource::Implementation::receive_connection(std::string* error) {
   ReadStatus status = thread_.stopped() ? ReadStatus::kStopped : connection.open(error);
   wait_for_key();
   std::int64_t damaged = 0;
+  bool works = false;
   while (status == ReadStatus::kOk) {
     Arrived arrived;
     status = connection.read(&arrived.unit, error);
@@ -163,8 +165,12 @@ ReadStatus RtpSource::Implementation::receive_connection(std::string* error) {
     if (status == ReadStatus::kOk) {
       arrived.parameters = connection.parameters();
       status = push(std::move(arrived), error);
+      works = works || !wait_for_key_;
     }
   }
+  // A camera that boots may refuse for a while what it is good for.
+  if (status == ReadStatus::kFailed && worked_) status = ReadStatus::kDisconnected;
+  worked_ = worked_ || works;
   const std::lock_guard<std::mutex> lock(mutex_);
   connection_ = nullptr;
   return status;

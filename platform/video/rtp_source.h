@@ -22,6 +22,10 @@
 // - copy_to: each delivered frame's data is also stored, not re-encoded, in that Matroska file, in
 //   which a kill loses at most the last second. The file goes on over reconnections.
 // Streams with B-frames are refused: they come out of order and late.
+// kDisconnected: refused, not there, no such stream, no pictures. kFailed: no password or a wrong one, no
+// video, another codec, B-frames, a transport that the camera does not send by; after a connection that
+// brought pictures these, too, are kDisconnected, as a camera that boots may be all that for a moment.
+// An unusable URL, a copy that cannot be written and pictures without luma are always kFailed.
 
 #include <cstdint>
 #include <memory>

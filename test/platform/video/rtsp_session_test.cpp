@@ -175,5 +175,81 @@ TEST(RtspSession, KeepsThePacketsThatComeBeforeTheAnswerToPlay) {
   }
 }
 
+struct Refusal {
+  const char* name;
+  const char* method;
+  RtspAnswer answer;
+  const char* says;
+};
+
+void PrintTo(const Refusal& refusal, std::ostream* out) { *out << refusal.name; }
+
+class RtspSessionOfACameraThatBoots : public ::testing::TestWithParam<Refusal> {
+ protected:
+  // From which connection up to which one it refuses.
+  void refuse(int first, int last, ScriptedRtspServer::Script* script) const {
+    *script = [first, last, refusal = GetParam()](const RtspRequest& request, RtspAnswer* answer) {
+      if (request.method == refusal.method && request.connection >= first &&
+          request.connection <= last) {
+        *answer = refusal.answer;
+      }
+    };
+  }
+};
+
+const char* const kNoVideo = "v=0\r\no=- 1 1 IN IP4 127.0.0.1\r\ns=x\r\nt=0 0\r\n";
+const char* const kVp8 =
+    "v=0\r\no=- 1 1 IN IP4 127.0.0.1\r\ns=x\r\nt=0 0\r\n"
+    "m=video 0 RTP/AVP 96\r\na=rtpmap:96 VP8/90000\r\na=control:track1\r\n";
+
+INSTANTIATE_TEST_SUITE_P(
+    Refusals, RtspSessionOfACameraThatBoots,
+    ::testing::Values(Refusal{"NoVideo",
+                              "DESCRIBE",
+                              {"200 OK", "", kNoVideo, "", false},
+                              "there is no video in this stream"},
+                      Refusal{"AnotherCodec",
+                              "DESCRIBE",
+                              {"200 OK", "", kVp8, "", false},
+                              "the video is vp8; set the camera to MJPEG or H.264"},
+                      Refusal{"Login",
+                              "OPTIONS",
+                              {"401 Unauthorized", "", "", "", false},
+                              "the camera wants a user and a password (401)"},
+                      Refusal{"Transport",
+                              "SETUP",
+                              {"461 Unsupported Transport", "", "", "", false},
+                              "does not send RTP by TCP (461)"}),
+    [](const auto& which) { return which.param.name; });
+
+TEST_P(RtspSessionOfACameraThatBoots, IsTriedAgainOnceItWorked) {
+  ScriptedRtspServer::Script script;
+  refuse(2, 3, &script);
+  ScriptedRtspServer server(script);
+  RtpSource source(options_for(server));
+  Frame frame;
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  server.hang_up = true;
+  ASSERT_EQ(read_until(source, frame,
+                       [&](ReadStatus status) {
+                         return status == ReadStatus::kDisconnected &&
+                                source.error().find(GetParam().says) != std::string::npos;
+                       }),
+            ReadStatus::kDisconnected)
+      << source.error();
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  EXPECT_TRUE(frame.stamp.restarted);
+}
+
+TEST_P(RtspSessionOfACameraThatBoots, FailsForGoodIfItNeverWorked) {
+  ScriptedRtspServer::Script script;
+  refuse(1, 1000, &script);
+  const ScriptedRtspServer server(script);
+  RtpSource source(options_for(server));
+  Frame frame;
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source.error(), HasSubstr(GetParam().says));
+}
+
 }  // namespace
 }  // namespace alidade
