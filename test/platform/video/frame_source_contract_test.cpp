@@ -25,8 +25,10 @@ void set_patience(Patience patience, Options* options, double short_timeout_s = 
 }
 
 struct RtspRig : LiveFrameSourceRig {
-  RtspRig(const RtspStream& stream, Patience patience) : server(stream, "user", "secret") {
+  RtspRig(const RtspStream& stream, RtpSourceOptions::Transport transport, Patience patience)
+      : server(stream, "user", "secret") {
     options.url = server.url();
+    options.transport = transport;
     options.user = "user";
     options.password = "secret";
     set_patience(patience, &options);
@@ -114,8 +116,15 @@ struct RecordingRig : FrameSourceRig {
 
 template <class Rig>
 std::vector<FrameSourceCase<Rig>> live_cases(Patience patience) {
-  return {{"RtspMjpeg", [patience] { return std::make_unique<RtspRig>(kMjpegStream, patience); }},
-          {"RtspH264", [patience] { return std::make_unique<RtspRig>(kH264Stream, patience); }},
+  using Transport = RtpSourceOptions::Transport;
+  const auto rtsp = [patience](const RtspStream& stream, Transport transport) {
+    return [&stream, transport, patience] {
+      return std::make_unique<RtspRig>(stream, transport, patience);
+    };
+  };
+  return {{"RtspMjpeg", rtsp(kMjpegStream, Transport::kTcp)},
+          {"RtspH264", rtsp(kH264Stream, Transport::kTcp)},
+          {"RtspUdp", rtsp(kH264Stream, Transport::kUdp)},
           {"Rtp", [patience] { return std::make_unique<RtpRig>(patience); }},
           {"Mjpeg", [patience] { return std::make_unique<MjpegRig>(patience); }}};
 }
