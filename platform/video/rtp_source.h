@@ -16,8 +16,8 @@
 //   dropped and counted. What comes before the next key frame, then and at a connection's beginning,
 //   cannot be decoded and is not counted.
 // - A connection without a whole picture for timeout_s is lost, whatever packets come. Pictures that a
-//   key frame must precede count as life: cameras that save bits set key frames up to 40 s apart, and
-//   plain RTP is joined at any moment between two. So key_frame_timeout_s bounds that wait.
+//   key frame must precede count as life: cameras that save bits set key frames many seconds apart,
+//   and plain RTP is joined at any moment between two. So key_frame_timeout_s bounds that wait.
 // - Luma is the decoder's plane 0, without copy or conversion.
 // - copy_to: each delivered frame's data is also stored, not re-encoded, in that Matroska file, in
 //   which a kill loses at most the last second. The file goes on over reconnections.
