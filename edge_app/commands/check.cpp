@@ -190,23 +190,15 @@ Measured measure(const Config& config, double duration_s) {
 // What turns an axis's sign, for this kind of device.
 std::string reverse_advice(const PanTiltConfig& pan_tilt, bool is_pan) {
   const std::string axis = is_pan ? "pan" : "tilt";
-  switch (pan_tilt.type) {
-    case PanTiltConfig::Type::kHead: {
-      const bool positive = (is_pan ? pan_tilt.head.pan : pan_tilt.head.tilt).sign > 0;
-      const char* other = is_pan ? (positive ? "left" : "right") : (positive ? "down" : "up");
-      return fmt::format("set pan_tilt.{}_positive: {}", axis, other);
-    }
-    case PanTiltConfig::Type::kOnvif:
-      if (is_pan ? pan_tilt.pan_range_deg.has_value() : pan_tilt.tilt_range_deg.has_value()) {
-        return fmt::format("swap the two numbers of pan_tilt.{}_range_deg", axis);
-      }
-      break;
-    case PanTiltConfig::Type::kRecording:
-      return fmt::format("turn the sign of {}_rad in telemetry.csv", axis);
-    case PanTiltConfig::Type::kVapix:
-      break;
+  if (pan_tilt.type == PanTiltConfig::Type::kRecording) {
+    return fmt::format("turn the sign of {}_rad in telemetry.csv", axis);
   }
-  return "switch off what mirrors the picture in the camera's settings";
+  const bool positive = (is_pan ? pan_tilt.axes.pan : pan_tilt.axes.tilt).sign > 0;
+  const char* other = is_pan ? (positive ? "left" : "right") : (positive ? "down" : "up");
+  return fmt::format(
+      "set pan_tilt.{}_positive: {}, or switch off what mirrors the picture in the camera's "
+      "settings",
+      axis, other);
 }
 
 MotionReport motion_of(const Measured& measured, const VideoReport& video,

@@ -181,6 +181,8 @@ std::unique_ptr<PanTiltSource> make_onvif_source(const PanTiltConfig& config) {
   options.profile = config.profile;
   options.pan_range = radians(config.pan_range_deg);
   options.tilt_range = radians(config.tilt_range_deg);
+  options.pan = config.axes.pan;
+  options.tilt = config.axes.tilt;
   options.rate_hz = config.rate_hz;
   options.timeout_s = config.timeout_s;
   options.max_backoff_s = config.max_backoff_s;
@@ -198,8 +200,8 @@ std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config)
   if (config.type == PanTiltConfig::Type::kHead) {
     QuerySourceOptions options;
     options.link = config.head.link;
-    options.pan = config.head.pan;
-    options.tilt = config.head.tilt;
+    options.pan = config.axes.pan;
+    options.tilt = config.axes.tilt;
     options.rate_hz = config.rate_hz;
     options.timeout_s = config.timeout_s;
     options.max_backoff_s = config.max_backoff_s;
@@ -210,6 +212,8 @@ std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config)
   options.user = config.user;
   options.password = config.password;
   options.camera = config.camera;
+  options.pan = config.axes.pan;
+  options.tilt = config.axes.tilt;
   options.rate_hz = config.rate_hz;
   options.timeout_s = config.timeout_s;
   options.max_backoff_s = config.max_backoff_s;

@@ -160,6 +160,7 @@ PanTiltConfig read_pan_tilt(YamlSection section, const std::string& path) {
       pan_tilt.type = PanTiltConfig::Type::kHead;
       pan_tilt.head = read_head(section, *type, path, &pan_tilt.rate_hz);
     }
+    pan_tilt.axes = read_axes(section, *type);
     pan_tilt.timeout_s = section.number("timeout_s", kSeconds).value_or(pan_tilt.timeout_s);
     pan_tilt.max_backoff_s =
         section.number("max_backoff_s", kSeconds).value_or(pan_tilt.max_backoff_s);

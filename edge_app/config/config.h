@@ -42,12 +42,13 @@ struct PanTiltConfig {
   Type type = Type::kVapix;
   std::string url;        // vapix, onvif
   HeadConfig head;        // pelco_d, visca, ptu
+  AxisMappings axes;      // not of a recording
   std::string directory;  // recording
   std::string user;
   std::string password;
   int camera = 0;       // VAPIX camera number; 0 leaves it out of the query
   std::string profile;  // onvif: token; empty: the device's first with PTZ
-  // onvif: the angles at -1 and 1 of the generic space; positive right and up.
+  // onvif: the angles at -1 and 1 of the generic space.
   std::optional<std::array<double, 2>> pan_range_deg;
   std::optional<std::array<double, 2>> tilt_range_deg;
   double rate_hz = 30;  // onvif: 10 unless given

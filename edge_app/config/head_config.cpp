@@ -100,23 +100,26 @@ PtuOptions read_ptu(YamlSection& section) {
 
 }  // namespace
 
+AxisMappings read_axes(YamlSection& section, const std::string& type) {
+  const bool is_unknown = type == "visca" || type == "ptu";
+  const auto usual = [&](const char* way) {
+    return is_unknown ? std::nullopt : std::optional<std::string>(way);
+  };
+  return {read_axis(section, "pan", "right", "left", usual("right")),
+          read_axis(section, "tilt", "up", "down", usual(type == "pelco_d" ? "down" : "up"))};
+}
+
 HeadConfig read_head(YamlSection& section, const std::string& type, const std::string& config_path,
                      double* rate_hz) {
   HeadConfig head;
   head.link = read_link(section, config_path);
-  std::optional<std::string> usual_pan;
-  std::optional<std::string> usual_tilt;
   if (type == "pelco_d") {
     head.protocol = read_pelco_d(section);
-    usual_pan = "right";
-    usual_tilt = "down";
   } else if (type == "visca") {
     head.protocol = read_visca(section, head.link);
   } else {
     head.protocol = read_ptu(section);
   }
-  head.pan = read_axis(section, "pan", "right", "left", usual_pan);
-  head.tilt = read_axis(section, "tilt", "up", "down", usual_tilt);
 
   const std::optional<double> wanted_hz = section.number("rate_hz", {0.1, 1000, "Hz"});
   *rate_hz = wanted_hz.value_or(*rate_hz);

@@ -19,9 +19,15 @@ namespace alidade {
 struct HeadConfig {
   std::variant<PelcoDOptions, ViscaOptions, PtuOptions> protocol;
   ByteLinkOptions link;
+};
+
+// Sections' keys pan_positive, pan_zero_deg, tilt_positive, tilt_zero_deg. Which way counts as positive is required unless
+// the kind of device (a value of pan_tilt.type) says it. Throws ConfigError.
+struct AxisMappings {
   AxisMapping pan;
   AxisMapping tilt;
 };
+AxisMappings read_axes(YamlSection& section, const std::string& type);
 
 // type: pelco_d, visca or ptu. *rate_hz: the default; then what is configured, or the default as far
 // as the line carries it. Throws ConfigError.

@@ -264,6 +264,8 @@ ReadStatus HttpPollingSource::Implementation::finish_request(CURLcode code, PanT
       break;
   }
   *sample = taken;
+  sample->pan_rad = mapped_rad(taken.pan_rad, options_.pan);
+  sample->tilt_rad = mapped_rad(taken.tilt_rad, options_.tilt);
   sample->earliest_time_s = given.earliest_time_s;
   sample->latest_time_s = given.latest_time_s;
   sample->restarted = std::exchange(restarted_, false);

@@ -16,6 +16,7 @@
 #include <string>
 #include <vector>
 
+#include "platform/pan_tilt/axis_mapping.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/system/url.h"
 
@@ -59,6 +60,8 @@ struct HttpPollingOptions {
   std::string name;  // of the source: the URL without password
   std::string user;
   std::string password;
+  AxisMapping pan;  // of what the conversation takes from an answer
+  AxisMapping tilt;
   double rate_hz = 30;
   double timeout_s = 1;         // for one request
   double max_backoff_s = 5;     // longest pause between two tries

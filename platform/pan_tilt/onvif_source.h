@@ -33,6 +33,8 @@ struct OnvifSourceOptions {
   std::string profile;  // token; empty: the device's first profile with PTZ
   std::optional<OnvifRange> pan_range;
   std::optional<OnvifRange> tilt_range;
+  AxisMapping pan;  // of the angle, after the range
+  AxisMapping tilt;
   double rate_hz = 10;
   double timeout_s = 1;      // for one request
   double max_backoff_s = 5;  // longest pause between two tries

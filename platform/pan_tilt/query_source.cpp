@@ -15,10 +15,6 @@ constexpr int kTriesPerTimeout = 4;
 constexpr int kMaxStaleChunks = 64;
 constexpr int kAskedBetweenSilences = 64;
 
-double mapped_rad(double angle_deg, const AxisMapping& mapping) {
-  return wrap_to_half_turn(mapping.sign * (angle_deg - mapping.zero_deg) * kRadPerDeg);
-}
-
 }  // namespace
 
 QuerySource::QuerySource(std::unique_ptr<QueryProtocol> protocol, const QuerySourceOptions& options)
@@ -212,8 +208,8 @@ bool QuerySource::take_bytes(const std::string& bytes, double now_s, PanTiltSamp
 
 bool QuerySource::take_reading(const Answer& answer, double earliest_s, double latest_s,
                                PanTiltSample* sample) {
-  const double pan_rad = mapped_rad(answer.pan_deg, options_.pan);
-  const double tilt_rad = mapped_rad(answer.tilt_deg, options_.tilt);
+  const double pan_rad = mapped_rad(answer.pan_deg * kRadPerDeg, options_.pan);
+  const double tilt_rad = mapped_rad(answer.tilt_deg * kRadPerDeg, options_.tilt);
   std::optional<PairedReading> paired;
   switch (answer.kind) {
     case Answer::Kind::kPan:

@@ -20,6 +20,7 @@
 #include <string>
 #include <vector>
 
+#include "platform/pan_tilt/axis_mapping.h"
 #include "platform/pan_tilt/axis_pairing.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/pan_tilt/query_protocol.h"
@@ -27,11 +28,6 @@
 #include "platform/system/byte_link.h"
 
 namespace alidade {
-
-struct AxisMapping {
-  double sign = 1;      // -1: the device counts to the left, or down
-  double zero_deg = 0;  // what the device says where the angle is 0
-};
 
 struct QuerySourceOptions {
   ByteLinkOptions link;

@@ -56,6 +56,8 @@ HttpPollingPlan plan_of(const VapixSourceOptions& given) {
   HttpPollingPlan plan;
   plan.options.user = given.user;
   plan.options.password = given.password;
+  plan.options.pan = given.pan;
+  plan.options.tilt = given.tilt;
   plan.options.rate_hz = given.rate_hz;
   plan.options.timeout_s = given.timeout_s;
   plan.options.max_backoff_s = given.max_backoff_s;

@@ -17,6 +17,8 @@ struct VapixSourceOptions {
   std::string user;  // these go before what the URL may hold
   std::string password;
   int camera = 0;  // video channel of a device with several, 1, 2, ...; 0: not named in the request
+  AxisMapping pan;   // VAPIX counts to the right
+  AxisMapping tilt;  // and up
   double rate_hz = 30;
   double timeout_s = 1;      // for one poll
   double max_backoff_s = 5;  // longest pause between two tries

@@ -215,6 +215,25 @@ TEST_F(ConfigTest, MjpegAndOnvifSourcesAreRead) {
   EXPECT_FALSE(config_.pan_tilt.pan_range_deg);
 }
 
+TEST_F(ConfigTest, CamerasCountToTheRightAndUpUnlessToldOtherwise) {
+  for (const std::string type : {"vapix", "onvif"}) {
+    const auto load_with = [&](const std::string& keys) {
+      return load("video: {type: mjpeg, url: 'http://camera/v'}\npan_tilt: {type: " + type +
+                  ", url: http://camera" + keys + "}\ncamera: {focal_length_px: 1000}\n");
+    };
+    ASSERT_THAT(load_with(""), IsEmpty());
+    EXPECT_EQ(config_.pan_tilt.axes.pan.sign, 1);
+    EXPECT_EQ(config_.pan_tilt.axes.tilt.sign, 1);
+    EXPECT_EQ(config_.pan_tilt.axes.tilt.zero_deg, 0);
+    ASSERT_THAT(load_with(", pan_positive: left, pan_zero_deg: 90, tilt_positive: down"),
+                IsEmpty());
+    EXPECT_EQ(config_.pan_tilt.axes.pan.sign, -1);
+    EXPECT_EQ(config_.pan_tilt.axes.pan.zero_deg, 90);
+    EXPECT_EQ(config_.pan_tilt.axes.tilt.sign, -1);
+    EXPECT_THAT(load_with(", tilt_positive: left"), HasSubstr("expected one of up, down"));
+  }
+}
+
 #define CAMERA "camera: {focal_length_px: 1000}\n"
 #define HEAD "pan_tilt: {type: vapix, url: http://camera}\n"
 
@@ -257,8 +276,8 @@ TEST_F(ConfigTest, PelcoDHasTheProtocolsOwnUnitsAndRate) {
   EXPECT_EQ(pan_tilt.type, PanTiltConfig::Type::kHead);
   EXPECT_EQ(pan_tilt.head.link.address, "/dev/ttyUSB0");
   EXPECT_EQ(pan_tilt.head.link.baud, 9600);
-  EXPECT_EQ(pan_tilt.head.pan.sign, 1);
-  EXPECT_EQ(pan_tilt.head.tilt.sign, -1);
+  EXPECT_EQ(pan_tilt.axes.pan.sign, 1);
+  EXPECT_EQ(pan_tilt.axes.tilt.sign, -1);
   EXPECT_EQ(pan_tilt.rate_hz, 30);
   const auto& pelco_d = std::get<PelcoDOptions>(pan_tilt.head.protocol);
   EXPECT_EQ(pelco_d.address, 1);
@@ -269,9 +288,9 @@ TEST_F(ConfigTest, PelcoDHasTheProtocolsOwnUnitsAndRate) {
                         "  read_zoom: true}\n" CAMERA),
               IsEmpty());
   EXPECT_EQ(config_.pan_tilt.head.link.address, directory_.path() + "/line");
-  EXPECT_EQ(config_.pan_tilt.head.pan.sign, -1);
-  EXPECT_EQ(config_.pan_tilt.head.pan.zero_deg, 90);
-  EXPECT_EQ(config_.pan_tilt.head.tilt.sign, 1);
+  EXPECT_EQ(config_.pan_tilt.axes.pan.sign, -1);
+  EXPECT_EQ(config_.pan_tilt.axes.pan.zero_deg, 90);
+  EXPECT_EQ(config_.pan_tilt.axes.tilt.sign, 1);
   EXPECT_NEAR(config_.pan_tilt.rate_hz, 2400.0 / 280, 1e-9);
   EXPECT_EQ(std::get<PelcoDOptions>(config_.pan_tilt.head.protocol).address, 3);
   EXPECT_TRUE(std::get<PelcoDOptions>(config_.pan_tilt.head.protocol).read_zoom);
@@ -295,7 +314,7 @@ TEST_F(ConfigTest, ViscaAndPtuAreRead) {
   const auto& ptu = std::get<PtuOptions>(config_.pan_tilt.head.protocol);
   EXPECT_FALSE(ptu.verbose);
   EXPECT_FALSE(ptu.pan_deg_per_step);
-  EXPECT_EQ(config_.pan_tilt.head.pan.sign, -1);
+  EXPECT_EQ(config_.pan_tilt.axes.pan.sign, -1);
   EXPECT_STREQ(make_protocol(config_.pan_tilt.head)->name(), "PTU");
 }
 

@@ -12,10 +12,6 @@ bool is_within(double value, double low, double high) { return value >= low && v
 void require_sound_head(const HeadConfig& head) {
   FUZZ_REQUIRE(make_protocol(head) != nullptr);
   FUZZ_REQUIRE(!head.link.address.empty() && is_baud(head.link.baud));
-  for (const AxisMapping& axis : {head.pan, head.tilt}) {
-    FUZZ_REQUIRE(axis.sign == 1 || axis.sign == -1);
-    FUZZ_REQUIRE(is_within(axis.zero_deg, -360, 360));
-  }
 }
 
 void require_sound(const Config& config) {
@@ -27,6 +23,10 @@ void require_sound(const Config& config) {
   const PanTiltConfig& pan_tilt = config.pan_tilt;
   FUZZ_REQUIRE(is_within(pan_tilt.rate_hz, 0.1, 1000) && is_within(pan_tilt.camera, 0, 64));
   FUZZ_REQUIRE(is_within(pan_tilt.timeout_s, 0.1, 3600));
+  for (const AxisMapping& axis : {pan_tilt.axes.pan, pan_tilt.axes.tilt}) {
+    FUZZ_REQUIRE(axis.sign == 1 || axis.sign == -1);
+    FUZZ_REQUIRE(is_within(axis.zero_deg, -360, 360));
+  }
   FUZZ_REQUIRE(is_within(pan_tilt.angle_sigma_rad.value_or(0), 0, 0.1));
   FUZZ_REQUIRE(is_within(pan_tilt.angle_quantum_rad, 0, 0.1));
   FUZZ_REQUIRE(is_within(pan_tilt.max_repeat_s, 0, 10));

@@ -102,6 +102,22 @@ TEST(OnvifSource, TakesDegreesAsTheyAre) {
   EXPECT_EQ(server.count("GetProfiles"), 0);
 }
 
+TEST(OnvifSource, TurnsSignAndZeroOfEachAxis) {
+  OnvifDevice device;
+  device.position = [] { return R"(<tt:PanTilt x="0.5" y="-0.25"/>)"; };
+  const OnvifServer server(device);
+  OnvifSourceOptions options = options_for(server);
+  options.pan_range = OnvifRange{-180 * kRadPerDeg, 180 * kRadPerDeg};
+  options.tilt_range = OnvifRange{-90 * kRadPerDeg, 90 * kRadPerDeg};
+  options.pan = {1, -10};
+  options.tilt = {-1, 0};
+  OnvifSource source(options);
+  PanTiltSample sample;
+  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  EXPECT_NEAR(sample.pan_rad, 100 * kRadPerDeg, 1e-12);
+  EXPECT_NEAR(sample.tilt_rad, 22.5 * kRadPerDeg, 1e-12);
+}
+
 TEST(OnvifSource, SaysThatTheGenericSpaceNeedsRanges) {
   const OnvifServer server;
   OnvifSourceOptions options = options_for(server);
@@ -123,7 +139,7 @@ TEST(OnvifSource, FindsTheServicesWhateverTheDeviceCallsItself) {
       OnvifSource source(options_for(server.url() + "/onvif/device_service"));
       PanTiltSample sample;
       ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
-      EXPECT_DOUBLE_EQ(sample.pan_rad, kPi);
+      EXPECT_DOUBLE_EQ(sample.pan_rad, -kPi);
     }
   }
 }

@@ -66,6 +66,18 @@ TEST(VapixSource, NamesTheVideoChannelIfThereAreSeveral) {
   EXPECT_EQ(server.last_query(), "/axis-cgi/com/ptz.cgi?query=position&camera=2");
 }
 
+TEST(VapixSource, TurnsSignAndZeroOfEachAxis) {
+  AxisServer server("", "", [] { return "pan=-170.5\ntilt=20\n"; });
+  VapixSourceOptions options = options_for(server.url());
+  options.pan = {-1, 20};
+  options.tilt = {1, 5};
+  VapixSource source(options);
+  PanTiltSample sample;
+  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  EXPECT_NEAR(sample.pan_rad, (190.5 - 360) * kRadPerDeg, 1e-12) << "beyond half a turn";
+  EXPECT_NEAR(sample.tilt_rad, 15 * kRadPerDeg, 1e-12);
+}
+
 // The server notes the moment at which it looks at its angle, and answers with that moment.
 TEST(VapixSource, GivesAnIntervalThatHoldsTheMomentOfTheMeasurement) {
   double origin_s = monotonic_now_s();
