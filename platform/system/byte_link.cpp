@@ -56,6 +56,11 @@ std::string reason(int error) {
   return ::strerror_r(error, buffer, sizeof buffer);
 }
 
+// The same of a serial line, which answers so once its plug is pulled.
+std::string line_reason(int error) {
+  return error == EIO || error == ENXIO ? "the line is gone: unplugged?" : reason(error);
+}
+
 bool is_device(const std::string& address) { return address.find("://") == std::string::npos; }
 
 // On false url->bare is what can be shown.
@@ -164,6 +169,10 @@ LinkStatus ByteLink::open_serial() {
   }
   termios line{};
   if (::tcgetattr(fd_, &line) != 0) {
+    const int code = errno;
+    if (code != ENOTTY && code != EINVAL) {
+      return lost(line_reason(code));
+    }
     static_cast<void>(lost("is not a serial line; expected one such as /dev/ttyUSB0"));
     return LinkStatus::kUnusable;
   }
@@ -179,7 +188,7 @@ LinkStatus ByteLink::open_serial() {
   termios taken{};
   if (::cfsetspeed(&line, speed) != 0 || ::tcsetattr(fd_, TCSANOW, &line) != 0 ||
       ::tcgetattr(fd_, &taken) != 0) {
-    return lost("does not take its settings: " + reason(errno));
+    return lost("does not take its settings: " + line_reason(errno));
   }
   // tcsetattr() succeeds if it could do any of it.
   if (::cfgetospeed(&taken) != speed) {
@@ -286,9 +295,7 @@ LinkStatus ByteLink::receive(std::string* bytes, double timeout_s) {
                                                        : "the device closed the connection");
   }
   const int code = errno;
-  return lost(kind_ == Kind::kSerial && (code == EIO || code == ENXIO)
-                  ? "the line is gone: unplugged?"
-                  : reason(code));
+  return lost(kind_ == Kind::kSerial ? line_reason(code) : reason(code));
 }
 
 }  // namespace alidade
