@@ -5,8 +5,9 @@
 // Angles are radians as the device measures them (scale and axes are the calibration's business),
 // turned into the axes of the model: pan positive to the right (about base z, down), tilt positive
 // upwards (about base y, right). Times are seconds of the host's CLOCK_MONOTONIC. A polled value
-// was true at some moment of [earliest_time_s, latest_time_s]. Like FrameSource, a source
-// reconnects by itself; read() blocks its own thread only, stop() ends it.
+// was true at some moment of [earliest_time_s, latest_time_s]. A sample may exist later than that: one
+// paired from readings of one axis at a time comes half a cycle after its tilt (AxisPairing). Like
+// FrameSource, a source reconnects by itself; read() blocks its own thread only, stop() ends it.
 
 #include <cstdint>
 #include <optional>
@@ -18,7 +19,8 @@ namespace alidade {
 
 struct PanTiltSample {
   double earliest_time_s = 0;  // request sent (or, for a stream, the same as latest_time_s)
-  double latest_time_s = 0;    // first byte of the answer received: the "receive time"
+  double latest_time_s =
+      0;  // first byte of the answer received, of a paired sample the tilt's, or later
   double pan_rad = 0;
   double tilt_rad = 0;
   std::optional<double> zoom;           // device units

@@ -41,7 +41,8 @@ class PelcoDProtocol : public QueryProtocol {
   [[nodiscard]] Query next() override;
   [[nodiscard]] Answer find(std::string_view bytes) override;
   [[nodiscard]] std::string give_up() override { return {}; }
-  [[nodiscard]] bool answers_name_queries() const override { return true; }
+  void doubt() override {}  // an answer names its axis
+  [[nodiscard]] bool is_of_datagrams() const override { return false; }
   [[nodiscard]] int polls_per_reading() const override { return 2; }
   [[nodiscard]] int bytes_per_reading() const override { return 28; }
 

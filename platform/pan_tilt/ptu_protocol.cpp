@@ -86,6 +86,8 @@ std::optional<PtuLine> find_ptu_line(std::string_view bytes) {
 void PtuProtocol::restart() {
   asked_ = Asked::kFeedback;
   begun_ = false;
+  fence_next_ = false;
+  since_fence_ = 0;
   step_heard_ = 0;
   pan_deg_per_step_ = options_.pan_deg_per_step.value_or(0);
   tilt_deg_per_step_ = options_.tilt_deg_per_step.value_or(0);
@@ -113,14 +115,40 @@ void PtuProtocol::advance() {
     case Asked::kTilt:
       asked_ = Asked::kPan;
       return;
+    case Asked::kFence:
+      asked_ = behind_fence_;
+      advance();
+      return;
+  }
+}
+
+void PtuProtocol::ask_fence_next(bool of_number) {
+  fence_next_ = true;
+  fence_is_number_ = of_number;
+}
+
+void PtuProtocol::doubt() {
+  if (!options_.verbose) {
+    ask_fence_next(false);
   }
 }
 
 Query PtuProtocol::next() {
+  if (!options_.verbose && since_fence_ >= kQueriesPerFence) {
+    ask_fence_next(false);
+  }
+  if (fence_next_) {
+    fence_next_ = false;
+    since_fence_ = 0;
+    behind_fence_ = asked_ == Asked::kFence ? behind_fence_ : asked_;
+    asked_ = Asked::kFence;
+    return {fence_is_number_ ? "PP " : "CI ", false};
+  }
   if (begun_) {
     advance();
   }
   begun_ = true;
+  ++since_fence_;
   switch (asked_) {
     case Asked::kFeedback:
       return {options_.verbose ? "FV " : "FT ", false};
@@ -135,12 +163,19 @@ Query PtuProtocol::next() {
     case Asked::kPan:
       return {"PP "};
     case Asked::kTilt:
+    case Asked::kFence:
       break;
   }
   return {"TP "};
 }
 
-std::string PtuProtocol::give_up() { return " "; }
+std::string PtuProtocol::give_up() {
+  if (asked_ != Asked::kFence) {
+    ask_fence_next(asked_ == Asked::kFeedback || asked_ == Asked::kEcho ||
+                   asked_ == Asked::kImmediate);
+  }
+  return " ";
+}
 
 Answer PtuProtocol::find(std::string_view bytes) {
   Answer answer;
@@ -156,7 +191,7 @@ Answer PtuProtocol::find(std::string_view bytes) {
   if (line->kind == PtuLine::Kind::kError) {
     // Limits are reported without being asked ("!P", "!T"): they answer nothing.
     if (line->words.size() > 2) {
-      answer.kind = Answer::Kind::kRefused;
+      answer.kind = asked_ == Asked::kFence ? Answer::Kind::kDone : Answer::Kind::kRefused;
     }
     answer.problem = "the device answers '! " + line->words + "'";
     return answer;
@@ -174,10 +209,16 @@ Answer PtuProtocol::find(std::string_view bytes) {
         if (line->number == step_heard_) {
           (asked_ == Asked::kPanStep ? pan_deg_per_step_ : tilt_deg_per_step_) =
               line->number * kDegPerArcSecond;
+          step_heard_ = 0;
+          ask_fence_next(false);
+        } else {
+          step_heard_ = line->number;
         }
-        step_heard_ = line->number;
         answer.kind = Answer::Kind::kDone;
       }
+      return answer;
+    case Asked::kFence:
+      answer.kind = number == fence_is_number_ ? Answer::Kind::kDone : Answer::Kind::kNone;
       return answer;
     case Asked::kPan:
     case Asked::kTilt:

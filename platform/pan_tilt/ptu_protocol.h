@@ -6,9 +6,10 @@
 // unless the configuration states the degrees per step, then PP and TP in turn.
 //
 // Answer N need not belong to query N. A verbose answer names its axis and must name the one asked. A
-// terse one does not: a surplus line makes a pan of a tilt until the line is next found silent. After a
-// query without answer a space ends what the device may have half received, QuerySource waits for
-// silence, and the other axis is asked next. A digit lost on the way is noticed in neither.
+// terse one does not, nor does that to PR and TR. After a query without answer a space ends what the device
+// may have half received; then CI (whose answer has no number) is asked as a fence (see query_protocol.h),
+// or PP where the query was such a command, and the other axis is next. CI also stands between the
+// resolutions and what follows them. A digit lost on the way is not noticed.
 
 #include <optional>
 
@@ -43,20 +44,26 @@ class PtuProtocol : public QueryProtocol {
   [[nodiscard]] Query next() override;
   [[nodiscard]] Answer find(std::string_view bytes) override;
   [[nodiscard]] std::string give_up() override;
-  [[nodiscard]] bool answers_name_queries() const override { return options_.verbose; }
+  void doubt() override;
+  [[nodiscard]] bool is_of_datagrams() const override { return false; }
   [[nodiscard]] int polls_per_reading() const override { return 2; }
   // "PP " and "* -12345\r\n", or "* Current Pan position is -12345\r\n", and the tilt's.
   [[nodiscard]] int bytes_per_reading() const override { return options_.verbose ? 75 : 26; }
 
  private:
-  enum class Asked { kFeedback, kEcho, kImmediate, kPanStep, kTiltStep, kPan, kTilt };
+  enum class Asked { kFeedback, kEcho, kImmediate, kPanStep, kTiltStep, kPan, kTilt, kFence };
 
   void advance();
+  void ask_fence_next(bool of_number);
 
   PtuOptions options_;
   Asked asked_ = Asked::kFeedback;
-  bool begun_ = false;     // a query of this connection has been sent
-  double step_heard_ = 0;  // arc seconds, in the latest answer about it
+  bool begun_ = false;  // a query of this connection has been sent
+  bool fence_next_ = false;
+  bool fence_is_number_ = false;
+  int since_fence_ = 0;                    // queries
+  Asked behind_fence_ = Asked::kFeedback;  // asked before it
+  double step_heard_ = 0;                  // arc seconds, in the latest answer about it
   double pan_deg_per_step_ = 0;
   double tilt_deg_per_step_ = 0;
 };

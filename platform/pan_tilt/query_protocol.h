@@ -5,7 +5,10 @@
 // One query is under way at a time. next() gives it; find() looks for its answer in all bytes that
 // have come since it was sent (at most kMaxAnswer; a device that babbles loses the oldest). What is
 // no answer to it (noise, half frames, echoes, late answers to another query, unsolicited lines) is
-// passed over. give_up() tells that no answer came.
+// passed over. give_up() tells that no answer came: it may still come. Only with a number in it would it
+// then differ from the answer to the same query asked again. So next() asks something else first, whose
+// answer looks different, a fence: heads answer in order, and once the fence is answered, nothing older
+// is under way. find() still knows the answer to what was given up, until next().
 //
 // Angles are degrees as the device counts them; signs and zeros are QuerySource's.
 
@@ -51,8 +54,11 @@ class QueryProtocol {
   // Bytes that bring the device back to the start of a command; mostly none.
   [[nodiscard]] virtual std::string give_up() = 0;
 
-  // Whether a late answer is known from the answer to the query under way.
-  [[nodiscard]] virtual bool answers_name_queries() const = 0;
+  // Bytes came that nobody asked for. Where it matters next() asks a fence, as also after every
+  // kQueriesPerFence queries: one answer too many makes each answer that of the query before.
+  virtual void doubt() = 0;
+  // Whether each datagram is to be searched alone (over UDP), not together with those before it.
+  [[nodiscard]] virtual bool is_of_datagrams() const = 0;
 
   // Of one reading of pan and tilt: polls, and bytes of queries and answers together.
   [[nodiscard]] virtual int polls_per_reading() const = 0;
@@ -71,5 +77,7 @@ class QueryProtocol {
 
 // With the zoom asked too, every so many readings bring it.
 constexpr int kReadingsPerZoom = 10;
+
+constexpr int kQueriesPerFence = 64;
 
 }  // namespace alidade

@@ -1,6 +1,7 @@
 #include "platform/pan_tilt/query_source.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "platform/system/clock.h"
@@ -12,8 +13,11 @@ constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 constexpr double kQuietBytes = 10;  // times of a byte without one are silence
 constexpr double kLeastQuiet_s = 0.02;
 constexpr int kTriesPerTimeout = 4;
+constexpr double kWireTimes = 2;  // of query and answer, for a head that answers
+constexpr double kLeastAnswer_s = 0.05;
+constexpr double kLeastLatest_s = 1;
+constexpr int kGivenUpOfALostHead = 3;
 constexpr int kMaxStaleChunks = 64;
-constexpr int kAskedBetweenSilences = 64;
 
 }  // namespace
 
@@ -32,6 +36,11 @@ QuerySource::QuerySource(std::unique_ptr<QueryProtocol> protocol, const QuerySou
                              : options.rate_hz;
   poll_period_s_ = 1 / (rate_hz * protocol_->polls_per_reading());
   quiet_time_s_ = std::max(kLeastQuiet_s, kQuietBytes * byte_time_s);
+  const double wire_s =
+      byte_time_s * protocol_->bytes_per_reading() / protocol_->polls_per_reading();
+  answer_time_s_ =
+      std::max(options.timeout_s / kTriesPerTimeout, kWireTimes * wire_s + kLeastAnswer_s);
+  latest_time_s_ = std::max(kLeastLatest_s, kTriesPerTimeout * answer_time_s_);
 }
 
 void QuerySource::stop() {
@@ -87,6 +96,7 @@ ReadStatus QuerySource::act(double now_s) {
       return disconnect("no connection in time; is the host there?");
     case State::kSettling:
       state_ = State::kIdle;
+      open_ = open_ > 1 ? 0 : open_;
       return ReadStatus::kOk;
     case State::kIdle:
       return ask(now_s);
@@ -100,14 +110,17 @@ void QuerySource::settle(double now_s) {
   state_ = State::kSettling;
   asked_ = 0;
   quiet_s_ = now_s + quiet_time_s_;
-  until_s_ = now_s + options_.timeout_s / kTriesPerTimeout;
+  until_s_ = now_s + answer_time_s_;
+  if (open_ > 1) {
+    quiet_s_ = until_s_ = std::max(quiet_s_, open_since_s_ + latest_time_s_);
+  }
 }
 
 ReadStatus QuerySource::ask(double now_s) {
   // What is still in the buffers came before the query and is no answer to it.
   std::string stale;
   LinkStatus status = link_.receive(&stale, 0);
-  bool surplus = status == LinkStatus::kOk;
+  const bool surplus = status == LinkStatus::kOk;
   for (int i = 0; i < kMaxStaleChunks && status == LinkStatus::kOk; ++i) {
     status = link_.receive(&stale, 0);
   }
@@ -117,14 +130,15 @@ ReadStatus QuerySource::ask(double now_s) {
   if (status == LinkStatus::kLost) {
     return disconnect(link_.error());
   }
-  // One answer too many, unseen so far, would make each answer that of the query before.
-  surplus = surplus || (!protocol_->answers_name_queries() && asked_ >= kAskedBetweenSilences);
   if (surplus && asked_ > 0) {
+    protocol_->doubt();
     settle(now_s);
     return ReadStatus::kOk;
   }
   const Query query = protocol_->next();
   ++asked_;
+  refused_ = false;
+  late_awaited_ = false;
   received_.clear();
   arrivals_s_.clear();
   sent_s_ = monotonic_now_s();
@@ -135,7 +149,7 @@ ReadStatus QuerySource::ask(double now_s) {
     due_s_ = std::max(due_s_ + poll_period_s_, now_s);
   }
   state_ = State::kAsked;
-  until_s_ = sent_s_ + options_.timeout_s / kTriesPerTimeout;
+  until_s_ = sent_s_ + answer_time_s_;
   return ReadStatus::kOk;
 }
 
@@ -145,13 +159,13 @@ ReadStatus QuerySource::give_up(double now_s) {
     some_answered_ = false;
   }
   ++given_up_;
-  if (given_up_ >= kTriesPerTimeout && now_s - failing_since_s_ >= options_.timeout_s) {
-    const std::string silence =
-        some_answered_
-            ? std::string(": not every query is answered; does the head tell both pan and tilt?")
-            : std::string("; check power, wiring, address and baud or port");
-    return disconnect(problem_.empty() ? std::string("no answer of ") + protocol_->name() + silence
-                                       : problem_);
+  if (open_ == 0) {
+    open_since_s_ = sent_s_;
+  }
+  ++open_;
+  late_awaited_ = !refused_;
+  if (given_up_ >= kGivenUpOfALostHead && now_s - failing_since_s_ >= options_.timeout_s) {
+    return disconnect(what_came());
   }
   pairing_.reset();
   const std::string bytes = protocol_->give_up();
@@ -162,19 +176,35 @@ ReadStatus QuerySource::give_up(double now_s) {
   return ReadStatus::kOk;
 }
 
-// True: *sample is filled.
-bool QuerySource::take_bytes(const std::string& bytes, double now_s, PanTiltSample* sample) {
-  if (state_ == State::kSettling) {
-    quiet_s_ = now_s + quiet_time_s_;
-    return false;
+std::string QuerySource::what_came() const {
+  if (late_s_ > 0) {
+    return "an answer came " + std::to_string(std::lround(1e3 * late_s_)) +
+           " ms after its query, later than " + std::to_string(std::lround(1e3 * answer_time_s_)) +
+           " ms; raise pan_tilt.timeout_s";
   }
-  if (state_ == State::kIdle && asked_ > 0) {
+  if (!problem_.empty()) {
+    return problem_;
+  }
+  return std::string("no answer of ") + protocol_->name() +
+         (some_answered_ ? ": not every query is answered; does the head tell both pan and tilt?"
+                         : "; check power, wiring, address and baud or port");
+}
+
+// The line should fall silent; or the answer to a query that was given up comes after all.
+void QuerySource::listen(const std::string& bytes, double now_s) {
+  if (late_awaited_ && find(bytes, now_s).kind != Answer::Kind::kNone) {
+    late_awaited_ = false;
+    late_s_ = std::max(late_s_, now_s - sent_s_);
+    open_ = 0;
     settle(now_s);
+  } else if (open_ < 2) {
+    quiet_s_ = now_s + quiet_time_s_;
   }
-  if (state_ != State::kAsked) {
-    return false;
-  }
-  if (link_.is_datagram()) {
+}
+
+// Among all bytes since the query.
+Answer QuerySource::find(const std::string& bytes, double now_s) {
+  if (link_.is_datagram() && protocol_->is_of_datagrams()) {
     received_.clear();
     arrivals_s_.clear();
   }
@@ -186,15 +216,33 @@ bool QuerySource::take_bytes(const std::string& bytes, double now_s, PanTiltSamp
     arrivals_s_.erase(arrivals_s_.begin(),
                       arrivals_s_.begin() + static_cast<std::ptrdiff_t>(excess));
   }
-  const Answer answer = protocol_->find(received_);
+  return protocol_->find(received_);
+}
+
+// True: *sample is filled.
+bool QuerySource::take_bytes(const std::string& bytes, double now_s, PanTiltSample* sample) {
+  if (state_ == State::kSettling || (state_ == State::kIdle && late_awaited_)) {
+    listen(bytes, now_s);
+    return false;
+  }
+  if (state_ == State::kIdle && asked_ > 0) {
+    protocol_->doubt();
+    settle(now_s);
+  }
+  if (state_ != State::kAsked) {
+    return false;
+  }
+  const Answer answer = find(bytes, now_s);
   if (!answer.problem.empty()) {
     problem_ = answer.problem;
   }
   if (answer.kind == Answer::Kind::kNone) {
     return false;
   }
+  open_ = 0;
   if (answer.kind == Answer::Kind::kRefused) {
     until_s_ = now_s;  // given up at once
+    refused_ = true;
     return false;
   }
   state_ = State::kIdle;
@@ -241,6 +289,7 @@ bool QuerySource::take_reading(const Answer& answer, double earliest_s, double l
   sample->restarted = std::exchange(restarted_, false);
   backoff_.reset();
   given_up_ = 0;
+  late_s_ = 0;
   return true;
 }
 
@@ -267,6 +316,9 @@ ReadStatus QuerySource::read(PanTiltSample& sample, double timeout_s) {
           zoom_.reset();
           problem_.clear();
           given_up_ = 0;
+          late_s_ = 0;
+          late_awaited_ = false;
+          open_ = open_ > 0 ? 2 : 0;  // what was asked before is answered on a new connection, too
           due_s_ = now_s;
           settle(now_s);
         } else if (take_bytes(bytes, now_s, &sample)) {

@@ -4,13 +4,16 @@
 // Polls lie on a grid of rate_hz, or of what a serial line can carry if that is less. One query is under
 // way at a time: an answer later than that shifts the grid, for a head that cannot keep up is asked as
 // often as it answers. What an answer tells was true between the sending of the query and the answer's
-// first byte. A query without answer is given up after a quarter of timeout_s. Then, after bytes that
-// nobody asked for, and now and then where answers do not name their query, the source waits until the
-// line is silent, so that no late or surplus answer is taken for the next one, at least not for long.
-// Protocols that give one axis at a time yield a sample for each tilt, with the pan of the same moment
-// (AxisPairing). Signs and zeros turn what the device counts into the axes of the model, in [-pi, pi).
+// first byte. A query without answer is given up after a quarter of timeout_s, or twice what query and
+// answer take on the wire and 50 ms if that is longer. Its answer may still come, and must not be taken for
+// that of a later query: the protocol asks next what is answered differently, and an answer to that shows
+// that nothing older is under way, for heads answer in order. If it is not answered either, the source
+// listens until four times that time, at least 1 s, has passed since the first of the two was sent: an
+// answer later than that can be taken for another's. Protocols that give one axis at a time yield a sample
+// for each tilt, with the pan of the same moment (AxisPairing). Signs and zeros turn what the device counts
+// into the axes of the model, in [-pi, pi).
 //
-// kDisconnected: no link, or no sample within timeout_s and four queries given up; error() says what
+// kDisconnected: no link, or no sample within timeout_s and three queries given up; error() says what
 // came instead. The link is then closed and opened again after a growing pause. kFailed: an address or a
 // device that can never work. read() talks on the calling thread; it allocates.
 
@@ -51,7 +54,7 @@ class QuerySource : public PanTiltSource {
   enum class State {
     kClosed,    // until due_s_
     kOpening,   // until until_s_
-    kSettling,  // waits for silence: until until_s_, or until quiet_s_ if that is earlier
+    kSettling,  // listens: until until_s_, or until quiet_s_ if that is earlier
     kIdle,      // until due_s_
     kAsked      // until until_s_
   };
@@ -61,6 +64,9 @@ class QuerySource : public PanTiltSource {
   ReadStatus ask(double now_s);
   ReadStatus give_up(double now_s);
   void settle(double now_s);
+  void listen(const std::string& bytes, double now_s);
+  Answer find(const std::string& bytes, double now_s);
+  [[nodiscard]] std::string what_came() const;
   bool take_bytes(const std::string& bytes, double now_s, PanTiltSample* sample);
   bool take_reading(const Answer& answer, double earliest_s, double latest_s,
                     PanTiltSample* sample);
@@ -72,6 +78,8 @@ class QuerySource : public PanTiltSource {
   ByteLink link_;
   double poll_period_s_ = 0;
   double quiet_time_s_ = 0;
+  double answer_time_s_ = 0;  // a query without an answer for so long is given up
+  double latest_time_s_ = 0;  // no answer comes so long after its query
   Backoff backoff_;
   std::string error_;
   bool failed_ = false;
@@ -85,6 +93,11 @@ class QuerySource : public PanTiltSource {
   int given_up_ = 0;            // queries since the latest sample
   double failing_since_s_ = 0;  // when the first of them was sent
   bool some_answered_ = false;  // since then
+  int open_ = 0;                // queries in a row without answers, which may still come
+  double open_since_s_ = 0;     // when the first of them was sent
+  bool refused_ = false;        // the latest query, by an answer
+  bool late_awaited_ = false;   // the answer to the latest query, which was given up
+  double late_s_ = 0;           // how long an answer took that was given up; 0: none did
   bool restarted_ = true;
   std::string problem_;  // what came instead of a reading, lately
 

@@ -146,7 +146,10 @@ const char* visca_error_text(int code) {
 void ViscaProtocol::restart() {
   numbered_ = false;
   sequence_ = 0;
+  fence_next_ = !options_.header;  // a line keeps what another program asked
+  since_fence_ = 0;
   turn_ = 0;
+  heard_length_ = 0;
   answer_length_ = 0;
   asked_ = Asked::kPosition;
 }
@@ -157,24 +160,30 @@ Query ViscaProtocol::next() {
     sequence_ = 0;
     return {with_header(kControl, 0, std::string(kBeginNumbering)), false};
   }
-  if (options_.read_zoom && turn_ == 0 && asked_ != Asked::kZoom) {
+  const bool was_zoom = asked_ == Asked::kZoom || asked_ == Asked::kFence;
+  if (fence_next_ || (!options_.header && since_fence_ >= kQueriesPerFence)) {
+    asked_ = Asked::kFence;
+  } else if (options_.read_zoom && turn_ == 0 && !was_zoom) {
     asked_ = Asked::kZoom;
   } else {
     asked_ = Asked::kPosition;
     turn_ = (turn_ + 1) % kReadingsPerZoom;
   }
+  fence_next_ = false;
+  since_fence_ = asked_ == Asked::kPosition ? since_fence_ + 1 : 0;
   std::string query(1, static_cast<char>(0x80 + options_.address));
-  query += asked_ == Asked::kZoom ? "\x09\x04\x47\xFF" : "\x09\x06\x12\xFF";
+  query += asked_ == Asked::kPosition ? "\x09\x06\x12\xFF" : "\x09\x04\x47\xFF";
   if (options_.header) {
     return {with_header(kInquiry, ++sequence_, query)};
   }
-  return {query};
+  return {query, asked_ != Asked::kFence};
 }
 
 std::string ViscaProtocol::give_up() {
   if (asked_ == Asked::kNumbering) {
     numbered_ = true;  // a device that does not answer control datagrams is asked all the same
   }
+  fence_next_ = !options_.header && asked_ == Asked::kPosition;
   return {};
 }
 
@@ -220,17 +229,20 @@ Answer ViscaProtocol::find_in_payload(std::string_view bytes) {
   }
   answer.begin = frame->begin;
   if (frame->kind == ViscaFrame::Kind::kError) {
-    answer.kind = Answer::Kind::kRefused;
+    // A fence has done its work also where the device does not know the zoom.
+    answer.kind = asked_ == Asked::kFence ? Answer::Kind::kDone : Answer::Kind::kRefused;
     char code[8];
     std::snprintf(code, sizeof code, "%02X", static_cast<unsigned>(frame->error));
     answer.problem = std::string("the device answers '") + visca_error_text(frame->error) +
                      "' (error " + code + ")";
-  } else if (frame->kind == ViscaFrame::Kind::kZoom && asked_ == Asked::kZoom) {
-    answer.kind = Answer::Kind::kZoom;
+  } else if (frame->kind == ViscaFrame::Kind::kZoom && asked_ != Asked::kPosition) {
+    answer.kind = options_.read_zoom ? Answer::Kind::kZoom : Answer::Kind::kDone;
     answer.zoom = frame->zoom;
   } else if (frame->kind == ViscaFrame::Kind::kPosition && asked_ == Asked::kPosition) {
-    const bool as_before = frame->length == answer_length_;
-    answer_length_ = frame->length;
+    if (answer_length_ == 0 && frame->length == heard_length_) {
+      answer_length_ = heard_length_;
+    }
+    heard_length_ = frame->length;
     answer.pan_deg = frame->pan * options_.pan_deg_per_step;
     answer.tilt_deg = frame->tilt * options_.tilt_deg_per_step;
     if (!is_within_a_turn(answer.pan_deg) || !is_within_a_turn(answer.tilt_deg)) {
@@ -238,7 +250,7 @@ Answer ViscaProtocol::find_in_payload(std::string_view bytes) {
       answer.problem = "a position of " + std::to_string(frame->pan) + ", " +
                        std::to_string(frame->tilt) +
                        " steps is more than a turn; are the degrees per step right?";
-    } else if (!as_before) {
+    } else if (frame->length != answer_length_) {
       answer.kind = Answer::Kind::kRefused;
       answer.problem = "positions of changing length: noise on the line";
     } else {

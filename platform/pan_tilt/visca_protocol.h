@@ -5,9 +5,10 @@
 // Pan and tilt are asked at once, 8x 09 06 12 FF -> y0 50 nibbles FF (y = x + 8), one nibble of two's
 // complement a byte: 4+4 (11 bytes), 5+4 (12) or 5+5 (13). Zoom: 8x 09 04 47 FF -> y0 50 0p 0q 0r 0s FF.
 // Errors: y0 6z ee FF. FF ends every frame and stands nowhere else. There is no checksum: a nibble lost
-// on the way turns 5+4 into 4+4, so an answer counts only if it is as long as the one before; a changed
-// nibble is not noticed. Without the header a late answer cannot be told from the next one; QuerySource
-// waits for silence before it asks again.
+// on the way turns 5+4 into 4+4, so a length counts once it came twice, and then no other does; a changed
+// nibble is not noticed. Without the header a late position cannot be told from the next one: before it is
+// asked again, and first of all, the zoom is asked as a fence (see query_protocol.h). Its answer, or an
+// error, looks different.
 //
 // With the header, sequence numbers match answers to queries; the numbering begins anew (control type)
 // with each connection and when the device complains of it.
@@ -61,21 +62,25 @@ class ViscaProtocol : public QueryProtocol {
   [[nodiscard]] Query next() override;
   [[nodiscard]] Answer find(std::string_view bytes) override;
   [[nodiscard]] std::string give_up() override;
-  [[nodiscard]] bool answers_name_queries() const override { return options_.header; }
+  void doubt() override { fence_next_ = !options_.header; }
+  [[nodiscard]] bool is_of_datagrams() const override { return options_.header; }
   [[nodiscard]] int polls_per_reading() const override { return 1; }
   [[nodiscard]] int bytes_per_reading() const override { return 18; }
 
  private:
-  enum class Asked { kNumbering, kPosition, kZoom };
+  enum class Asked { kNumbering, kFence, kPosition, kZoom };
 
   [[nodiscard]] Answer find_in_payload(std::string_view bytes);
 
   ViscaOptions options_;
   Asked asked_ = Asked::kPosition;
-  bool numbered_ = false;          // the numbering of the header has begun, or been tried
-  std::uint32_t sequence_ = 0;     // of the latest query
+  bool numbered_ = false;       // the numbering of the header has begun, or been tried
+  std::uint32_t sequence_ = 0;  // of the latest query
+  bool fence_next_ = false;
+  int since_fence_ = 0;            // positions
   int turn_ = 0;                   // readings since the zoom
-  std::size_t answer_length_ = 0;  // of the latest position
+  std::size_t heard_length_ = 0;   // of the latest position
+  std::size_t answer_length_ = 0;  // of this device's; 0: not yet known
 };
 
 }  // namespace alidade

@@ -5,6 +5,7 @@
 
 #include <ostream>
 #include <random>
+#include <utility>
 
 namespace alidade {
 namespace {
@@ -92,13 +93,14 @@ std::string start(PtuProtocol& protocol, bool steps) {
     EXPECT_EQ(protocol.find("*\r\n").kind, Answer::Kind::kDone);
   }
   if (steps) {
-    for (const char* query : {"PR ", "PR ", "TR ", "TR "}) {
+    for (const auto& [query, answer] : {std::pair("PR ", "* 36.0 seconds arc per position\r\n"),
+                                        {"PR ", "* 36.0 seconds arc per position\r\n"},
+                                        {"CI ", "*\r\n"},
+                                        {"TR ", "* 18.0 seconds arc per position\r\n"},
+                                        {"TR ", "* 18.0 seconds arc per position\r\n"},
+                                        {"CI ", "*\r\n"}}) {
       EXPECT_EQ(protocol.next().bytes, query);
-      EXPECT_EQ(protocol
-                    .find(query[0] == 'P' ? "* 36.0 seconds arc per position\r\n"
-                                          : "* 18.0 seconds arc per position\r\n")
-                    .kind,
-                Answer::Kind::kDone);
+      EXPECT_EQ(protocol.find(answer).kind, Answer::Kind::kDone);
     }
   }
   return protocol.next().bytes;
@@ -164,11 +166,81 @@ TEST(PtuProtocol, RefusesMoreThanATurn) {
   EXPECT_THAT(protocol.find("* -361\r\n").problem, HasSubstr("-361 steps is more than a turn"));
 }
 
-TEST(PtuProtocol, AsksTheOtherAxisAfterASpaceWhenNoAnswerCame) {
+TEST(PtuProtocol, AsksTheOtherAxisAfterASpaceAndAFenceWhenNoAnswerCame) {
   PtuProtocol protocol({false, 0.05, 0.1});
   EXPECT_EQ(start(protocol, false), "PP ");
   EXPECT_EQ(protocol.give_up(), " ");
+  const Query fence = protocol.next();
+  EXPECT_EQ(fence.bytes, "CI ");
+  EXPECT_FALSE(fence.paced);
+  EXPECT_EQ(protocol.find("* 100\r\n").kind, Answer::Kind::kNone);  // the late answer
+  EXPECT_EQ(protocol.find("* 100\r\n*\r\n").kind, Answer::Kind::kDone);
   EXPECT_EQ(protocol.next().bytes, "TP ");
+}
+
+TEST(PtuProtocol, TakesAnErrorForTheAnswerToAFence) {
+  PtuProtocol protocol({false, 0.05, 0.1});
+  start(protocol, false);
+  static_cast<void>(protocol.give_up());
+  EXPECT_EQ(protocol.next().bytes, "CI ");
+  EXPECT_EQ(protocol.find("! Illegal command entered\r\n").kind, Answer::Kind::kDone);
+}
+
+TEST(PtuProtocol, AsksAPositionAsTheFenceBehindACommand) {
+  PtuProtocol protocol({false, 0.05, 0.1});
+  protocol.restart();
+  EXPECT_EQ(protocol.next().bytes, "FT ");
+  EXPECT_EQ(protocol.give_up(), " ");
+  EXPECT_EQ(protocol.next().bytes, "PP ");
+  EXPECT_EQ(protocol.find("*\r\n").kind, Answer::Kind::kNone);
+  EXPECT_EQ(protocol.find("*\r\n* 100\r\n").kind, Answer::Kind::kDone);
+  EXPECT_EQ(protocol.next().bytes, "ED ");
+}
+
+TEST(PtuProtocol, AsksNoFenceTwiceInARow) {
+  PtuProtocol protocol({false, 0.05, 0.1});
+  start(protocol, false);
+  static_cast<void>(protocol.give_up());
+  EXPECT_EQ(protocol.next().bytes, "CI ");
+  static_cast<void>(protocol.give_up());
+  EXPECT_EQ(protocol.next().bytes, "TP ");
+}
+
+TEST(PtuProtocol, AsksAFenceNowAndThenAndInDoubtWhereAnswersDoNotNameTheirAxis) {
+  for (const bool verbose : {false, true}) {
+    PtuProtocol protocol({verbose, 0.05, 0.1});
+    std::string query = start(protocol, false);
+    int fences = 0;
+    for (int i = 0; i < 3 * kQueriesPerFence; ++i) {
+      query = protocol.next().bytes;
+      fences += query == "CI " ? 1 : 0;
+    }
+    EXPECT_EQ(fences, verbose ? 0 : 3);
+    protocol.doubt();
+    EXPECT_EQ(protocol.next().bytes == "CI ", !verbose);
+  }
+}
+
+// A second answer to PR, for which nobody asked, stands for that to TR.
+TEST(PtuProtocol, DoesNotTakeTheStepOfPanForThatOfTilt) {
+  PtuProtocol protocol({true, {}, {}});
+  start(protocol, false);  // the first PR
+  const std::string pan = "* 36.0 seconds arc per position\r\n";
+  const std::string tilt = "* 18.0 seconds arc per position\r\n";
+  static_cast<void>(protocol.find(pan));
+  for (const auto& [query, answer] : {std::pair("PR ", pan),
+                                      {"CI ", "*\r\n"},
+                                      {"TR ", pan},
+                                      {"TR ", tilt},
+                                      {"TR ", tilt},
+                                      {"CI ", "*\r\n"}}) {
+    EXPECT_EQ(protocol.next().bytes, query);
+    EXPECT_EQ(protocol.find(answer).kind, Answer::Kind::kDone);
+  }
+  EXPECT_EQ(protocol.next().bytes, "PP ");
+  EXPECT_DOUBLE_EQ(protocol.find("* Current Pan position is 100\r\n").pan_deg, 1);
+  EXPECT_EQ(protocol.next().bytes, "TP ");
+  EXPECT_DOUBLE_EQ(protocol.find("* Current Tilt position is 100\r\n").tilt_deg, 0.5);
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <iterator>
 #include <thread>
+#include <tuple>
 
 #include "platform/pan_tilt/pelco_d_protocol.h"
 #include "platform/pan_tilt/ptu_protocol.h"
@@ -29,9 +30,10 @@ constexpr double kNever_s = 1e6;
 constexpr int kReadingsBetweenSilences = 33;  // 64 queries of two axes, see query_source.h
 constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 constexpr HeadKind kKinds[] = {
-    HeadKind::kPelcoDSerial, HeadKind::kPelcoDTcp, HeadKind::kViscaSerial,
-    HeadKind::kViscaTcp,     HeadKind::kViscaUdp,  HeadKind::kViscaUdpHeader,
-    HeadKind::kPtuSerial,    HeadKind::kPtuTcp,    HeadKind::kPtuTerseSerial};
+    HeadKind::kPelcoDSerial,   HeadKind::kPelcoDTcp,      HeadKind::kPelcoDUdp,
+    HeadKind::kViscaSerial,    HeadKind::kViscaTcp,       HeadKind::kViscaUdp,
+    HeadKind::kViscaUdpHeader, HeadKind::kPtuSerial,      HeadKind::kPtuTcp,
+    HeadKind::kPtuUdp,         HeadKind::kPtuTerseSerial, HeadKind::kPtuTerseTcp};
 
 double difference_deg(double a_rad, double b_deg) {
   return std::abs(std::remainder(a_rad / kRadPerDeg - b_deg, 360));
@@ -67,30 +69,63 @@ TEST_P(QuerySourceTest, DeliversPositionsInTheAxesOfTheModel) {
 }
 
 // The head notes the moment at which it looks at its angles, and answers with that moment.
-TEST_P(QuerySourceTest, GivesAnIntervalThatHoldsTheMomentOfTheMeasurement) {
-  constexpr double kRate = 10;  // deg/s
+struct TurningHead {
+  static constexpr double kRate = 10;  // deg/s
   const double origin_s = monotonic_now_s();
-  HeadRig rig(GetParam(), [origin_s] {
-    const double angle_deg = kRate * (monotonic_now_s() - origin_s);
-    return HeadPosition{std::remainder(angle_deg + 170, 360), std::remainder(angle_deg, 90), 1};
-  });
-  const auto source = rig.open();
-  // Half a step by rounding; where both axes repeat, the head turned by less than a step of the tilt.
-  const double slack_s = 1.5 * rig.quantum_deg() / kRate;
+  HeadRig rig;
+
+  explicit TurningHead(HeadKind kind)
+      : rig(kind, [start_s = origin_s] {
+          const double angle_deg = kRate * (monotonic_now_s() - start_s);
+          return HeadPosition{std::remainder(angle_deg + 170, 360), std::remainder(angle_deg, 90),
+                              1};
+        }) {}
+
+  void expect_true_within_its_interval(const PanTiltSample& sample) const {
+    EXPECT_GE(sample.pan_rad, -180 * kRadPerDeg);
+    EXPECT_LT(sample.pan_rad, 180 * kRadPerDeg);
+    const double middle_s = (sample.earliest_time_s + sample.latest_time_s) / 2;
+    const double half_s = (sample.latest_time_s - sample.earliest_time_s) / 2;
+    const double angle_deg = kRate * (middle_s - origin_s);
+    // Half a step by rounding; where both axes repeat, it turned by less than a step of the tilt.
+    const double slack_s = 1.5 * rig.quantum_deg() / kRate;
+    EXPECT_LE(difference_deg(sample.pan_rad, angle_deg + 170) / kRate, half_s + slack_s);
+    const double tilt_error_deg = std::remainder(sample.tilt_rad / kRadPerDeg - angle_deg, 90);
+    EXPECT_LE(std::abs(tilt_error_deg) / kRate, half_s + slack_s);
+  }
+};
+
+TEST_P(QuerySourceTest, GivesAnIntervalThatHoldsTheMomentOfTheMeasurement) {
+  TurningHead head(GetParam());
+  const auto source = head.rig.open();
   double last_s = 0;
   for (int i = 0; i < 100; ++i) {
     ASSERT_EQ(source->read(sample_, kDeadline_s), ReadStatus::kOk) << source->error();
     EXPECT_GE(sample_.latest_time_s, last_s);
-    EXPECT_GE(sample_.pan_rad, -180 * kRadPerDeg);
-    EXPECT_LT(sample_.pan_rad, 180 * kRadPerDeg);
-    const double middle_s = (sample_.earliest_time_s + sample_.latest_time_s) / 2;
-    const double half_s = (sample_.latest_time_s - sample_.earliest_time_s) / 2;
-    const double angle_deg = kRate * (middle_s - origin_s);
-    EXPECT_LE(difference_deg(sample_.pan_rad, angle_deg + 170) / kRate, half_s + slack_s);
-    const double tilt_error_deg = std::remainder(sample_.tilt_rad / kRadPerDeg - angle_deg, 90);
-    EXPECT_LE(std::abs(tilt_error_deg) / kRate, half_s + slack_s);
+    head.expect_true_within_its_interval(sample_);
     last_s = sample_.latest_time_s;
   }
+}
+
+// Late by more than the source waits, of a head that takes its time, over a link that keeps packets back.
+TEST_P(QuerySourceTest, TakesNoLateAnswerForThatOfALaterQuery) {
+  TurningHead head(GetParam());
+  head.rig.server().answer_s = 0.012;
+  head.rig.server().nagle = true;
+  head.rig.server().late_s = 0.13;
+  QuerySourceOptions options = head.rig.options();
+  options.timeout_s = 0.4;
+  const auto source = head.rig.open(options);
+  ASSERT_EQ(read_until(*source, sample_, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  head.rig.server().fault = LineFault::kLate;
+  int samples = 0;
+  EXPECT_TRUE(eventually([&] {
+    if (source->read(sample_, kDeadline_s) == ReadStatus::kOk) {
+      head.expect_true_within_its_interval(sample_);
+      ++samples;
+    }
+    return samples >= 5 && head.rig.server().faults >= 4;
+  }));
 }
 
 TEST_P(QuerySourceTest, AppliesSignAndZeroOfEachAxis) {
@@ -142,6 +177,24 @@ TEST_P(QuerySourceTest, ReportsSilenceAndComesBackByItself) {
   EXPECT_TRUE(sample_.restarted);
 }
 
+TEST_P(QuerySourceTest, SaysThatAllAnswersComeTooLate) {
+  HeadRig rig(GetParam());
+  rig.server().answer_s = 0.16;
+  QuerySourceOptions options = rig.options();
+  options.timeout_s = 0.4;
+  const auto source = rig.open(options);
+  ReadStatus status = ReadStatus::kOk;
+  for (int i = 0; i < 3; ++i) {
+    status = read_until(*source, sample_, [](ReadStatus is) {
+      return is == ReadStatus::kOk || is == ReadStatus::kDisconnected;
+    });
+    ASSERT_EQ(status, ReadStatus::kDisconnected);
+    EXPECT_THAT(source->error(), HasSubstr("later than 100 ms; raise pan_tilt.timeout_s"));
+  }
+  rig.server().answer_s = 0;
+  ASSERT_EQ(read_until(*source, sample_, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+}
+
 TEST_P(QuerySourceTest, ReportsBabbleAndComesBackByItself) {
   HeadRig rig(GetParam());
   QuerySourceOptions options = rig.options();
@@ -158,10 +211,7 @@ TEST_P(QuerySourceTest, LosesOnlyAnswersToALineWithFaults) {
   const HeadPosition position{-123.45, 30.5, 0x1234};
   HeadRig rig(GetParam(), [position] { return position; });
   QuerySourceOptions options = rig.options();
-  // An answer is given up after a quarter of it. Where answers have no name, one that a busy machine
-  // keeps for longer is taken for another query's: of them only the late ones here shall be so late.
-  const bool is_terse = GetParam() == HeadKind::kPtuTerseSerial;
-  options.timeout_s = is_terse ? 1.2 : 0.4;
+  options.timeout_s = 0.4;
   rig.server().late_s = 0.3 * options.timeout_s;
   const auto source = rig.open(options);
   const auto is_right = [&] {
@@ -176,10 +226,9 @@ TEST_P(QuerySourceTest, LosesOnlyAnswersToALineWithFaults) {
     rig.server().fault = fault;
     rig.server().faults = 0;
     // Digits of a PTU and nibbles of VISCA have no sum, and terse answers no name.
-    const bool unseen =
-        (is_terse && (fault == LineFault::kRepeated || fault == LineFault::kLate)) ||
-        (fault == LineFault::kChangedByte && !is_pelco_d(GetParam())) ||
-        (fault == LineFault::kLostByte && is_ptu(GetParam()));
+    const bool unseen = (is_terse(GetParam()) && fault == LineFault::kRepeated) ||
+                        (fault == LineFault::kChangedByte && !is_pelco_d(GetParam())) ||
+                        (fault == LineFault::kLostByte && is_ptu(GetParam()));
     const double end_s = monotonic_now_s() + kDeadline_s;
     int samples = 0;
     while ((samples < 5 || rig.server().faults < 4) && monotonic_now_s() < end_s) {
@@ -324,6 +373,32 @@ TEST(QuerySource, SaysWhatAnswersInPlaceOfTheHead) {
   EXPECT_THAT(error_of(std::make_unique<ViscaProtocol>(ViscaOptions{}), HeadServer::Link::kTcp,
                        std::make_unique<PtuHead>(position)),
               AnyOf(HasSubstr("no answer of VISCA"), HasSubstr("bytes come")));
+}
+
+// Servers of serial lines send what has come when they feel like it.
+TEST(QuerySource, PutsAnAnswerInTwoDatagramsTogether) {
+  for (const HeadKind kind : {HeadKind::kPelcoDUdp, HeadKind::kPtuUdp, HeadKind::kViscaUdp}) {
+    HeadRig rig(kind);
+    rig.server().in_two = true;
+    const auto source = rig.open();
+    PanTiltSample sample;
+    EXPECT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << to_string(kind);
+  }
+}
+
+// Shorter than a quarter of the time that an answer takes on the wire.
+TEST(QuerySource, WaitsForWhatTheLineCarriesWhateverTheTimeOut) {
+  for (const auto& [kind, baud, answer_s] : {std::tuple(HeadKind::kPelcoDSerial, 2400, 0.058),
+                                             std::tuple(HeadKind::kPtuSerial, 1200, 0.32)}) {
+    HeadRig rig(kind);
+    rig.server().answer_s = answer_s;
+    QuerySourceOptions options = rig.options();
+    options.link.baud = baud;
+    options.timeout_s = 0.02;
+    const auto source = rig.open(options);
+    PanTiltSample sample;
+    EXPECT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
+  }
 }
 
 TEST(QuerySource, SurvivesConnectionsThatAreReset) {

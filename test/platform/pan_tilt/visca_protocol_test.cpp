@@ -129,9 +129,21 @@ ViscaOptions options() {
 const std::string kEleven = bytes_of({0x90, 0x50, 0, 2, 0, 0, 0xF, 0xF, 7, 0, 0xFF});
 const std::string kTwelve = bytes_of({0x90, 0x50, 0, 0, 2, 0, 0, 0xF, 0xF, 7, 0, 0xFF});
 
-TEST(ViscaProtocol, BelievesALengthThatComesTwice) {
-  ViscaProtocol protocol(options());
+const std::string kZoomQuery = bytes_of({0x81, 0x09, 0x04, 0x47, 0xFF});
+const std::string kZoomAnswer = bytes_of({0x90, 0x50, 1, 2, 3, 4, 0xFF});
+
+// Answers the first fence.
+void start(ViscaProtocol& protocol) {
   protocol.restart();
+  const Query fence = protocol.next();
+  EXPECT_EQ(fence.bytes, kZoomQuery);
+  EXPECT_FALSE(fence.paced);
+  EXPECT_EQ(protocol.find(kZoomAnswer).kind, Answer::Kind::kDone);
+}
+
+TEST(ViscaProtocol, BelievesALengthThatComesTwiceAndThenNoOther) {
+  ViscaProtocol protocol(options());
+  start(protocol);
   EXPECT_EQ(protocol.next().bytes, bytes_of({0x81, 0x09, 0x06, 0x12, 0xFF}));
   EXPECT_EQ(protocol.find(kTwelve).kind, Answer::Kind::kRefused);
   static_cast<void>(protocol.next());
@@ -143,13 +155,58 @@ TEST(ViscaProtocol, BelievesALengthThatComesTwice) {
   std::string damaged = kTwelve;
   damaged.erase(3, 1);
   EXPECT_EQ(protocol.find(damaged).kind, Answer::Kind::kRefused);
-  EXPECT_EQ(protocol.find(kTwelve).kind, Answer::Kind::kRefused);
+  EXPECT_EQ(protocol.find(damaged).kind, Answer::Kind::kRefused);
   EXPECT_EQ(protocol.find(kTwelve).kind, Answer::Kind::kPanTilt);
+}
+
+TEST(ViscaProtocol, AsksTheZoomAsAFenceWhenNoPositionCame) {
+  ViscaProtocol protocol(options());
+  start(protocol);
+  static_cast<void>(protocol.next());
+  EXPECT_EQ(protocol.give_up(), "");
+  EXPECT_EQ(protocol.next().bytes, kZoomQuery);
+  EXPECT_EQ(protocol.find(kEleven).kind, Answer::Kind::kNone);  // the late answer
+  EXPECT_EQ(protocol.find(kEleven + kZoomAnswer).kind, Answer::Kind::kDone);
+  EXPECT_EQ(protocol.next().bytes, bytes_of({0x81, 0x09, 0x06, 0x12, 0xFF}));
+}
+
+TEST(ViscaProtocol, TakesAnErrorForTheAnswerToAFence) {
+  ViscaProtocol protocol(options());
+  start(protocol);
+  static_cast<void>(protocol.next());
+  EXPECT_EQ(protocol.give_up(), "");
+  EXPECT_EQ(protocol.next().bytes, kZoomQuery);
+  EXPECT_EQ(protocol.find(bytes_of({0x90, 0x60, 0x02, 0xFF})).kind, Answer::Kind::kDone);
+}
+
+TEST(ViscaProtocol, AsksNoFenceTwiceInARow) {
+  for (const bool read_zoom : {false, true}) {
+    ViscaOptions zooming = options();
+    zooming.read_zoom = read_zoom;
+    ViscaProtocol protocol(zooming);
+    protocol.restart();
+    EXPECT_EQ(protocol.next().bytes, kZoomQuery);
+    EXPECT_EQ(protocol.give_up(), "");
+    EXPECT_EQ(protocol.next().bytes, bytes_of({0x81, 0x09, 0x06, 0x12, 0xFF}));
+  }
+}
+
+TEST(ViscaProtocol, AsksAFenceNowAndThenAndInDoubt) {
+  ViscaProtocol protocol(options());
+  start(protocol);
+  int fences = 0;
+  for (int i = 0; i < 3 * (kQueriesPerFence + 1); ++i) {
+    fences += protocol.next().bytes == kZoomQuery ? 1 : 0;
+  }
+  EXPECT_EQ(fences, 3);
+  static_cast<void>(protocol.next());
+  protocol.doubt();
+  EXPECT_EQ(protocol.next().bytes, kZoomQuery);
 }
 
 TEST(ViscaProtocol, RepeatsTheDevicesError) {
   ViscaProtocol protocol(options());
-  protocol.restart();
+  start(protocol);
   static_cast<void>(protocol.next());
   const Answer answer = protocol.find(bytes_of({0x90, 0x60, 0x41, 0xFF}));
   EXPECT_EQ(answer.kind, Answer::Kind::kRefused);
@@ -160,7 +217,7 @@ TEST(ViscaProtocol, RefusesMoreThanATurn) {
   ViscaOptions coarse = options();
   coarse.pan_deg_per_step = 1;
   ViscaProtocol protocol(coarse);
-  protocol.restart();
+  start(protocol);
   static_cast<void>(protocol.next());
   EXPECT_THAT(protocol.find(kEleven).problem, HasSubstr("are the degrees per step right?"));
 }

@@ -13,9 +13,12 @@ HeadServer::Link link_of(HeadKind kind) {
     case HeadKind::kPelcoDTcp:
     case HeadKind::kViscaTcp:
     case HeadKind::kPtuTcp:
+    case HeadKind::kPtuTerseTcp:
       return HeadServer::Link::kTcp;
+    case HeadKind::kPelcoDUdp:
     case HeadKind::kViscaUdp:
     case HeadKind::kViscaUdpHeader:
+    case HeadKind::kPtuUdp:
       return HeadServer::Link::kUdp;
     default:
       return HeadServer::Link::kSerial;
@@ -46,6 +49,8 @@ const char* to_string(HeadKind kind) {
       return "PelcoDSerial";
     case HeadKind::kPelcoDTcp:
       return "PelcoDTcp";
+    case HeadKind::kPelcoDUdp:
+      return "PelcoDUdp";
     case HeadKind::kViscaSerial:
       return "ViscaSerial";
     case HeadKind::kViscaTcp:
@@ -58,19 +63,28 @@ const char* to_string(HeadKind kind) {
       return "PtuSerial";
     case HeadKind::kPtuTcp:
       return "PtuTcp";
+    case HeadKind::kPtuUdp:
+      return "PtuUdp";
     case HeadKind::kPtuTerseSerial:
       return "PtuTerseSerial";
+    case HeadKind::kPtuTerseTcp:
+      return "PtuTerseTcp";
   }
   return "";
 }
 
 bool is_pelco_d(HeadKind kind) {
-  return kind == HeadKind::kPelcoDSerial || kind == HeadKind::kPelcoDTcp;
+  return kind == HeadKind::kPelcoDSerial || kind == HeadKind::kPelcoDTcp ||
+         kind == HeadKind::kPelcoDUdp;
 }
 
 bool is_ptu(HeadKind kind) {
-  return kind == HeadKind::kPtuSerial || kind == HeadKind::kPtuTcp ||
-         kind == HeadKind::kPtuTerseSerial;
+  return kind == HeadKind::kPtuSerial || kind == HeadKind::kPtuTcp || kind == HeadKind::kPtuUdp ||
+         is_terse(kind);
+}
+
+bool is_terse(HeadKind kind) {
+  return kind == HeadKind::kPtuTerseSerial || kind == HeadKind::kPtuTerseTcp;
 }
 
 HeadRig::HeadRig(HeadKind kind, std::function<HeadPosition()> position)
@@ -96,7 +110,7 @@ std::unique_ptr<QueryProtocol> HeadRig::protocol() const {
   }
   if (is_ptu(kind_)) {
     PtuOptions options;
-    options.verbose = kind_ != HeadKind::kPtuTerseSerial;
+    options.verbose = !is_terse(kind_);
     return std::make_unique<PtuProtocol>(options);
   }
   ViscaOptions options;

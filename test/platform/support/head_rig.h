@@ -13,18 +13,22 @@ namespace alidade {
 enum class HeadKind {
   kPelcoDSerial,
   kPelcoDTcp,
+  kPelcoDUdp,
   kViscaSerial,
   kViscaTcp,
   kViscaUdp,
   kViscaUdpHeader,
   kPtuSerial,
   kPtuTcp,
-  kPtuTerseSerial
+  kPtuUdp,
+  kPtuTerseSerial,
+  kPtuTerseTcp
 };
 
 const char* to_string(HeadKind kind);
 bool is_pelco_d(HeadKind kind);
 bool is_ptu(HeadKind kind);
+bool is_terse(HeadKind kind);
 
 class HeadRig {
  public:

@@ -114,6 +114,12 @@ std::string HeadServer::receive() {
 }
 
 void HeadServer::send(const std::string& bytes) {
+  const std::size_t middle = in_two ? bytes.size() / 2 : 0;
+  send_piece(bytes.substr(0, middle));
+  send_piece(bytes.substr(middle));
+}
+
+void HeadServer::send_piece(const std::string& bytes) {
   if (bytes.empty()) {
     return;
   }
@@ -137,6 +143,7 @@ std::string HeadServer::noise() {
 }
 
 void HeadServer::answer(const std::string& reply) {
+  static_cast<void>(is_pulled(answer_s));
   const LineFault now = fault;
   const bool always = now == LineFault::kSilence || now == LineFault::kBabble ||
                       now == LineFault::kRepeated || now == LineFault::kUnsolicited;
@@ -192,7 +199,7 @@ void HeadServer::serve() {
         return;
       }
       line_ = ::accept4(listener_, nullptr, nullptr, SOCK_CLOEXEC);
-      const int on = 1;
+      const int on = nagle ? 0 : 1;
       ::setsockopt(line_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
     }
     for (std::string bytes = receive(); !bytes.empty(); bytes = receive()) {

@@ -44,8 +44,11 @@ class HeadServer {
   // Of each answer (silence, babble, repeats, lines of its own) or of one in four.
   std::atomic<LineFault> fault{LineFault::kNone};
   std::atomic<double> late_s{0.2};
-  std::atomic<int> queries{0};  // that the head took
-  std::atomic<int> faults{0};   // that were done
+  std::atomic<double> answer_s{0};  // that the head takes for each answer
+  std::atomic<bool> nagle{false};   // TCP keeps small packets back, as where nobody thought of it
+  std::atomic<bool> in_two{false};  // each answer comes in two pieces: of UDP, two datagrams
+  std::atomic<int> queries{0};      // that the head took
+  std::atomic<int> faults{0};       // that were done
 
  private:
   void open_serial();
@@ -54,6 +57,7 @@ class HeadServer {
   std::string receive();
   void answer(const std::string& reply);
   void send(const std::string& bytes);
+  void send_piece(const std::string& bytes);
   std::string noise();
   bool wait(int fd) const;
   bool is_pulled(double seconds) const;
