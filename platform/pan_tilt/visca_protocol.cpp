@@ -15,6 +15,7 @@ constexpr std::uint16_t kControl = 0x0200;
 constexpr std::uint16_t kControlReply = 0x0201;
 constexpr std::string_view kBeginNumbering("\x01", 1);
 constexpr std::string_view kWrongNumber("\x0F\x01", 2);
+constexpr std::string_view kWrongMessage("\x0F\x02", 2);
 
 unsigned byte_at(std::string_view bytes, std::size_t i) {
   return static_cast<std::uint8_t>(bytes[i]);
@@ -198,14 +199,20 @@ Answer ViscaProtocol::find(std::string_view bytes) {
         bytes.empty() ? "" : "datagrams come without a VISCA header; would header: false be right?";
     return answer;
   }
-  if (header->type == kControlReply) {
-    if (asked_ == Asked::kNumbering && header->payload == kBeginNumbering) {
+  // Sony's tables list the errors among the control commands; devices send either type.
+  if (header->type == kControlReply || header->type == kControl) {
+    const std::string_view error = header->payload.substr(0, kWrongNumber.size());
+    if (asked_ == Asked::kNumbering && header->type == kControlReply &&
+        header->payload == kBeginNumbering) {
       numbered_ = true;
       answer.kind = Answer::Kind::kDone;
-    } else if (header->payload.substr(0, kWrongNumber.size()) == kWrongNumber) {
+    } else if (error == kWrongNumber) {
       numbered_ = false;
       answer.kind = Answer::Kind::kRefused;
       answer.problem = "the device finds the sequence number wrong";
+    } else if (error == kWrongMessage) {
+      answer.kind = Answer::Kind::kRefused;
+      answer.problem = "the device finds the type of the message wrong";
     }
     return answer;
   }

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <iterator>
@@ -373,6 +374,29 @@ TEST(QuerySource, SaysWhatAnswersInPlaceOfTheHead) {
   EXPECT_THAT(error_of(std::make_unique<ViscaProtocol>(ViscaOptions{}), HeadServer::Link::kTcp,
                        std::make_unique<PtuHead>(position)),
               AnyOf(HasSubstr("no answer of VISCA"), HasSubstr("bytes come")));
+}
+
+// As after a loss of power, which nothing else tells over UDP.
+TEST(QuerySource, BeginsTheNumberingAnewWithEitherTypeOfError) {
+  for (const bool error_is_reply : {false, true}) {
+    auto head = std::make_unique<ViscaHead>([] { return HeadPosition{}; });
+    head->header = true;
+    head->error_is_reply = error_is_reply;
+    std::atomic<bool>& forgets = head->forgets_numbering;
+    HeadServer server(HeadServer::Link::kUdp, std::move(head));
+    ViscaOptions visca;
+    visca.header = true;
+    visca.pan_deg_per_step = visca.tilt_deg_per_step = 1 / 51.2;
+    QuerySourceOptions options = options_for(server.address());
+    options.timeout_s = 4 * kDeadline_s;
+    QuerySource source(std::make_unique<ViscaProtocol>(visca), options);
+    PanTiltSample sample;
+    ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+    forgets = true;
+    EXPECT_TRUE(eventually([&] {
+      return source.read(sample, kDeadline_s) == ReadStatus::kOk && !forgets;
+    })) << source.error();
+  }
 }
 
 // Servers of serial lines send what has come when they feel like it.

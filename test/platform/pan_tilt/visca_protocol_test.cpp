@@ -276,11 +276,26 @@ TEST_F(ViscaWithHeader, TakesOnlyTheAnswerWithTheNumberOfTheQuery) {
 }
 
 TEST_F(ViscaWithHeader, BeginsTheNumberingAnewWhenTheDeviceComplains) {
+  for (const int type : {0x0200, 0x0201}) {
+    begin_numbering();
+    static_cast<void>(protocol_->next());
+    EXPECT_EQ(protocol_->find(datagram(type, 1, "\x0F\x01")).kind, Answer::Kind::kRefused);
+    EXPECT_EQ(protocol_->give_up(), "");
+  }
   begin_numbering();
-  static_cast<void>(protocol_->next());
-  EXPECT_EQ(protocol_->find(datagram(0x0201, 1, "\x0F\x01")).kind, Answer::Kind::kRefused);
-  EXPECT_EQ(protocol_->give_up(), "");
-  begin_numbering();
+}
+
+TEST_F(ViscaWithHeader, RepeatsThatTheDeviceFindsTheMessageWrong) {
+  for (const int type : {0x0200, 0x0201}) {
+    protocol_->restart();
+    begin_numbering();
+    static_cast<void>(protocol_->next());
+    const Answer answer = protocol_->find(datagram(type, 1, "\x0F\x02"));
+    EXPECT_EQ(answer.kind, Answer::Kind::kRefused);
+    EXPECT_EQ(answer.problem, "the device finds the type of the message wrong");
+    EXPECT_EQ(protocol_->give_up(), "");
+    EXPECT_EQ(protocol_->next().bytes, datagram(0x0110, 2, "\x81\x09\x06\x12\xFF"));
+  }
 }
 
 TEST_F(ViscaWithHeader, DoesWithoutAnAnswerToTheNumbering) {

@@ -90,14 +90,15 @@ std::vector<std::string> ViscaHead::take(const std::string& bytes) {
     const std::string sequence = bytes.substr(4, 4);
     if (byte_at(bytes, 0) == 2) {
       last_sequence_ = 0;
+      forgets_numbering = false;
       return {bytes_of({2, 1, 0, 1}) + sequence + "\x01"};
     }
     unsigned number = 0;
     for (std::size_t i = 4; i < 8; ++i) {
       number = number * 256 + static_cast<unsigned>(byte_at(bytes, i));
     }
-    if (number <= last_sequence_) {
-      return {bytes_of({2, 1, 0, 2}) + sequence + "\x0F\x01"};
+    if (number <= last_sequence_ || forgets_numbering) {
+      return {bytes_of({2, error_is_reply ? 1 : 0, 0, 2}) + sequence + "\x0F\x01"};
     }
     last_sequence_ = number;
     const std::string reply = reply_to(bytes.substr(8));

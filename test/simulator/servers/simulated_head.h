@@ -3,6 +3,7 @@
 // without the code that it tests: bytes of a master in, bytes of the head out. No I/O: head_server.h
 // puts it on a line.
 
+#include <atomic>
 #include <functional>
 #include <memory>
 #include <string>
@@ -50,8 +51,10 @@ struct ViscaHead : SimulatedHead {
   double steps_per_deg = 51.2;
   int pan_nibbles = 4;
   int tilt_nibbles = 4;
-  bool header = false;  // of the datagrams
-  int error = 0;        // code that answers every query; 0: none
+  bool header = false;          // of the datagrams
+  bool error_is_reply = false;  // of type 0201 rather than 0200: about a sequence number
+  std::atomic<bool> forgets_numbering{false};  // until it is begun anew
+  int error = 0;                               // code that answers every query; 0: none
 
  private:
   std::string reply_to(const std::string& query) const;
