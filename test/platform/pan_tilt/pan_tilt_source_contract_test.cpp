@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <filesystem>
 #include <functional>
 #include <iterator>
@@ -40,12 +41,25 @@ struct Rig {
   virtual std::unique_ptr<PanTiltSource> open() = 0;
 };
 
-// One whose device can be taken away and given back.
+// One whose device can be taken away and given back, and be silent from the beginning.
 struct LiveRig : Rig {
   explicit LiveRig(Patience with_patience) : patience(with_patience) {}
   virtual void take_away() = 0;
   virtual void give_back() = 0;
+  virtual void fall_silent() = 0;
+  virtual bool is_asked() = 0;  // at least once
   Patience patience;
+};
+
+// Keeps the answers of a server back.
+struct Silence {
+  std::string let_through(const std::string& answer) {
+    is_asked = true;
+    eventually([this] { return !on; });
+    return answer;
+  }
+  std::atomic<bool> on{false};
+  std::atomic<bool> is_asked{false};
 };
 
 struct VapixRig : LiveRig {
@@ -58,12 +72,16 @@ struct VapixRig : LiveRig {
     set_patience(patience, &options);
     return std::make_unique<VapixSource>(options);
   }
+  ~VapixRig() override { silence.on = false; }
   void take_away() override { server.reset(); }
   void give_back() override { server = make(port); }
-  static std::unique_ptr<AxisServer> make(int port) {
+  void fall_silent() override { silence.on = true; }
+  bool is_asked() override { return silence.is_asked; }
+  std::unique_ptr<AxisServer> make(int at_port) {
     return std::make_unique<AxisServer>(
-        "user", "secret", [] { return "pan=10\r\ntilt=20\r\n"; }, port);
+        "user", "secret", [this] { return silence.let_through("pan=10\r\ntilt=20\r\n"); }, at_port);
   }
+  Silence silence;
   std::unique_ptr<AxisServer> server = make(0);
   int port = server->port();
   std::string url = server->url();
@@ -81,15 +99,20 @@ struct OnvifRig : LiveRig {
     set_patience(patience, &options);
     return std::make_unique<OnvifSource>(options);
   }
+  ~OnvifRig() override { silence.on = false; }
   void take_away() override { server.reset(); }
   void give_back() override { server = make(port); }
-  static std::unique_ptr<OnvifServer> make(int port) {
+  void fall_silent() override { silence.on = true; }
+  bool is_asked() override { return silence.is_asked; }
+  std::unique_ptr<OnvifServer> make(int at_port) {
     OnvifDevice device;
+    device.position = [this, answer = device.position] { return silence.let_through(answer()); };
     device.login = OnvifDevice::Login::kToken;
     device.user = "user";
     device.password = "secret";
-    return std::make_unique<OnvifServer>(device, port);
+    return std::make_unique<OnvifServer>(device, at_port);
   }
+  Silence silence;
   std::unique_ptr<OnvifServer> server = make(0);
   int port = server->port();
   std::string url = server->url();
@@ -122,6 +145,8 @@ struct AskedHeadRig : LiveRig {
   }
   void take_away() override { rig.server().unplug(); }
   void give_back() override { rig.server().plug(); }
+  void fall_silent() override { rig.server().fault = LineFault::kSilence; }
+  bool is_asked() override { return rig.server().queries > 0; }
   HeadRig rig;
 };
 
@@ -251,14 +276,29 @@ TEST_P(LivePanTiltSourceContract, StopsWhileTheDeviceIsAway) {
   stopper.join();
 }
 
+// So patient that only stop() can end the read.
+class SilentPanTiltSourceContract : public LivePanTiltSourceContract {};
+
+TEST_P(SilentPanTiltSourceContract, EndsAReadThatWaitsForAnAnswer) {
+  rig_->fall_silent();
+  std::thread stopper([&] {
+    EXPECT_TRUE(eventually([&] { return rig_->is_asked(); }));
+    source_->stop();
+  });
+  EXPECT_EQ(source_->read(sample_, 4 * kDeadline_s), ReadStatus::kStopped);
+  stopper.join();
+  EXPECT_EQ(source_->read(sample_, 0), ReadStatus::kStopped);
+}
+
 template <class AnyRig>
 std::vector<Case<AnyRig>> live_cases(Patience patience) {
   std::vector<Case<AnyRig>> cases = {
       {"Vapix", [patience] { return std::make_unique<VapixRig>(patience); }},
       {"Onvif", [patience] { return std::make_unique<OnvifRig>(patience); }}};
   for (const HeadKind kind :
-       {HeadKind::kPelcoDSerial, HeadKind::kPelcoDTcp, HeadKind::kViscaSerial, HeadKind::kViscaTcp,
-        HeadKind::kViscaUdp, HeadKind::kViscaUdpHeader, HeadKind::kPtuSerial, HeadKind::kPtuTcp}) {
+       {HeadKind::kPelcoDSerial, HeadKind::kPelcoDTcp, HeadKind::kPelcoDUdp, HeadKind::kViscaSerial,
+        HeadKind::kViscaTcp, HeadKind::kViscaUdp, HeadKind::kViscaUdpHeader, HeadKind::kPtuSerial,
+        HeadKind::kPtuTcp, HeadKind::kPtuUdp, HeadKind::kPtuTerseSerial}) {
     cases.push_back({to_string(kind),
                      [kind, patience] { return std::make_unique<AskedHeadRig>(kind, patience); }});
   }
@@ -277,6 +317,8 @@ INSTANTIATE_TEST_SUITE_P(
     name_of);
 INSTANTIATE_TEST_SUITE_P(Live, LivePanTiltSourceContract,
                          ::testing::ValuesIn(live_cases<LiveRig>(Patience::kShort)), name_of);
+INSTANTIATE_TEST_SUITE_P(Live, SilentPanTiltSourceContract,
+                         ::testing::ValuesIn(live_cases<LiveRig>(Patience::kLong)), name_of);
 
 }  // namespace
 }  // namespace alidade
