@@ -13,6 +13,7 @@
 namespace alidade {
 namespace {
 
+constexpr const char* kNoCurl = "libcurl does not start";
 constexpr long kMethod = static_cast<long>(CURLAUTH_DIGEST);
 
 struct HeaderListCleanup {
@@ -73,6 +74,7 @@ class HttpPollingSource::Implementation {
  private:
   static std::size_t on_header(char* data, std::size_t size, std::size_t count, void* self);
   static std::size_t on_body(char* data, std::size_t size, std::size_t count, void* self);
+  bool make_handle();
   void start_request(double now_s);
   bool request_is_over(CURLcode* code);
   HttpAnswer answer() const;
@@ -89,7 +91,8 @@ class HttpPollingSource::Implementation {
 
   char curl_error_[CURL_ERROR_SIZE] = "";
   CurlMultiPtr multi_;
-  CurlEasyPtr easy_;  // one for all requests: it keeps the connection and the digest's nonce
+  CurlEasyPtr easy_;        // one for all requests: it keeps the connection and the digest's nonce
+  bool logged_in_ = false;  // the nonce was good
 
   double period_s_;
   double due_s_ = 0;     // when the next poll is to be sent
@@ -121,16 +124,22 @@ HttpPollingSource::Implementation::Implementation(HttpPollingPlan plan)
     return;
   }
   multi_ = make_curl_multi();
+  if (!multi_ || !make_handle()) {
+    (void)fail(kNoCurl);
+  }
+}
+
+bool HttpPollingSource::Implementation::make_handle() {
   easy_ = make_http_handle(options_.user, options_.password, kMethod, curl_error_);
-  if (!multi_ || !easy_) {
-    (void)fail("libcurl does not start");
-    return;
+  if (!easy_) {
+    return false;
   }
   curl_easy_setopt(easy_.get(), CURLOPT_TIMEOUT_MS, std::lround(1e3 * options_.timeout_s));
   curl_easy_setopt(easy_.get(), CURLOPT_HEADERFUNCTION, &Implementation::on_header);
   curl_easy_setopt(easy_.get(), CURLOPT_HEADERDATA, this);
   curl_easy_setopt(easy_.get(), CURLOPT_WRITEFUNCTION, &Implementation::on_body);
   curl_easy_setopt(easy_.get(), CURLOPT_WRITEDATA, this);
+  return true;
 }
 
 std::size_t HttpPollingSource::Implementation::on_header(char* data, std::size_t size,
@@ -248,6 +257,16 @@ ReadStatus HttpPollingSource::Implementation::finish_request(CURLcode code, PanT
                                                : curl_easy_strerror(code));
   }
   const HttpAnswer given = answer();
+  if (given.status == 401 && std::exchange(logged_in_, false)) {
+    // A camera that has restarted does not know the nonces it gave, and where it does not call them stale
+    // libcurl believes that the password is wrong: once more, without them.
+    if (!make_handle()) {
+      return fail(kNoCurl);
+    }
+    ask_on_ = true;
+    return ReadStatus::kTimeout;
+  }
+  logged_in_ = logged_in_ || (request_.digest && !options_.user.empty() && given.status != 401);
   PanTiltSample taken;
   std::string error;
   switch (conversation_->take(given, &taken, &error)) {

@@ -20,6 +20,7 @@ namespace {
 
 constexpr long kReceiveBuffer = 128 * 1024;  // bytes read at a time
 constexpr int kDamagedInARow = 30;           // pictures: more are no accident
+constexpr const char* kNoCurl = "libcurl does not start";
 constexpr long kMethods = static_cast<long>(CURLAUTH_DIGEST | CURLAUTH_BASIC);
 
 }  // namespace
@@ -41,6 +42,7 @@ class MjpegSource::Implementation {
     }
   }
   static std::size_t on_body(char* data, std::size_t size, std::size_t count, void* self);
+  bool make_handle();
   bool begin_stream();
   void take_bytes(std::string_view bytes, double arrival_s);
   ReadStatus receive_connection(std::string* error);
@@ -60,8 +62,8 @@ class MjpegSource::Implementation {
 
   // The receiving thread's own.
   char curl_error_[CURL_ERROR_SIZE] = "";
-  CurlMultiPtr multi_;  // stop() wakes it up
-  CurlEasyPtr easy_;
+  CurlMultiPtr multi_;                       // stop() wakes it up
+  CurlEasyPtr easy_;                         // of this connection
   std::optional<MultipartScanner> scanner_;  // of this connection, from its first bytes on
   std::string refusal_;                      // why the answer's body was not taken
   std::int64_t discarded_ = 0;               // by the scanner, as far as counted
@@ -105,15 +107,21 @@ MjpegSource::Implementation::Implementation(const MjpegSourceOptions& options) :
     options_.password = url.password;
   }
   multi_ = make_curl_multi();
-  easy_ = make_http_handle(options_.user, options_.password, kMethods, curl_error_);
-  if (!multi_ || !easy_) {
-    (void)fail("libcurl does not start");
-    return;
+  if (!multi_) {
+    (void)fail(kNoCurl);
   }
-  curl_easy_setopt(easy_.get(), CURLOPT_URL, url.bare.c_str());
+}
+
+bool MjpegSource::Implementation::make_handle() {
+  easy_ = make_http_handle(options_.user, options_.password, kMethods, curl_error_);
+  if (!easy_) {
+    return false;
+  }
+  curl_easy_setopt(easy_.get(), CURLOPT_URL, name_.c_str());
   curl_easy_setopt(easy_.get(), CURLOPT_BUFFERSIZE, kReceiveBuffer);
   curl_easy_setopt(easy_.get(), CURLOPT_WRITEFUNCTION, &Implementation::on_body);
   curl_easy_setopt(easy_.get(), CURLOPT_WRITEDATA, this);
+  return true;
 }
 
 std::size_t MjpegSource::Implementation::on_body(char* data, std::size_t size, std::size_t count,
@@ -164,8 +172,13 @@ void MjpegSource::Implementation::take_bytes(std::string_view bytes, double arri
   }
 }
 
-// One connection from its beginning to its end.
+// One connection from its beginning to its end. Each logs in anew: a camera that has restarted does not know
+// the nonces it gave, and where it does not call them stale libcurl believes that the password is wrong.
 ReadStatus MjpegSource::Implementation::receive_connection(std::string* error) {
+  if (!make_handle()) {
+    *error = kNoCurl;
+    return ReadStatus::kDisconnected;
+  }
   scanner_.reset();
   refusal_.clear();
   curl_error_[0] = '\0';

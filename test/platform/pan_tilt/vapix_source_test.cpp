@@ -115,6 +115,24 @@ TEST(VapixSource, LogsInOnceAndKeepsItsConnection) {
   EXPECT_EQ(server.connections(), 1U);
 }
 
+TEST(VapixSource, LogsInAgainWhenTheCameraHasForgottenItsNonces) {
+  AxisServer server("user", "secret", [] { return position(1); });
+  VapixSourceOptions options = options_for(server.url());
+  options.user = "user";
+  options.password = "secret";
+  VapixSource source(options);
+  PanTiltSample sample;
+  for (int life = 0; life < 3; ++life) {
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+      EXPECT_EQ(sample.restarted, life == 0 && i == 0);
+    }
+    server.renew_nonce();
+  }
+  EXPECT_EQ(server.refusals,
+            5);  // one at first; then the old nonce's, and one that gives a new one
+}
+
 TEST(VapixSource, TakesUserAndPasswordOutOfTheUrl) {
   AxisServer server("user", "sec@ret", [] { return position(1); });
   VapixSource source(

@@ -29,6 +29,7 @@ class AxisServer {
   std::atomic<int> status{200};  // of a position request that is let through
   std::atomic<int> refusals{0};  // answers 401
   std::atomic<int> polls{0};     // answers to position requests that were let through
+  void renew_nonce() { check_.renew_nonce(); }  // as if it had restarted
   std::string last_query() const;
   std::size_t connections() const;
 

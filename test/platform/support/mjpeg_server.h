@@ -45,6 +45,8 @@ class MjpegServer {
   static constexpr const char* kUser = "us er";
   static constexpr const char* kPassword = "se:cr\"et";
 
+  void renew_nonce() { check_.renew_nonce(); }  // as if it had restarted
+
   // Host times just before the first byte of picture n was handed to the socket and, with
   // pause_in_part, the others.
   struct Sent {

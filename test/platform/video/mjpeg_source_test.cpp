@@ -174,6 +174,22 @@ TEST_P(MjpegSourceLogin, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
   EXPECT_THAT(anonymous.error(), HasSubstr("wants a user and a password (401)"));
 }
 
+TEST_P(MjpegSourceLogin, LogsInAgainWhenTheCameraHasForgottenItsNonces) {
+  MjpegServer server({}, GetParam());
+  MjpegSourceOptions options = options_for(server.url());
+  options.user = MjpegServer::kUser;
+  options.password = MjpegServer::kPassword;
+  MjpegSource source(options);
+  Frame frame;
+  for (int life = 0; life < 3; ++life) {
+    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    server.hang_up = true;
+    ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    server.renew_nonce();
+    server.hang_up = false;
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Methods, MjpegSourceLogin,
                          ::testing::Values(Login::kBasic, Login::kDigestMd5, Login::kDigestSha256),
                          [](const auto& which) { return name_of(which.param); });

@@ -10,7 +10,6 @@ namespace alidade {
 namespace {
 
 constexpr const char* kRealm = "AXIS_TEST";
-constexpr const char* kNonce = "0123456789abcdef";
 
 std::string digest_of(const EVP_MD* kind, const std::string& text) {
   unsigned char digest[EVP_MAX_MD_SIZE];
@@ -29,17 +28,27 @@ std::string hexadecimal(const std::string& bytes) {
   return hex;
 }
 
+int next_nonce() {
+  static std::atomic<int> next{0};
+  return next++;
+}
+
 }  // namespace
 
 DigestCheck::DigestCheck(std::string user, std::string password, Algorithm algorithm)
-    : user_(std::move(user)), password_(std::move(password)), algorithm_(algorithm) {}
+    : user_(std::move(user)),
+      password_(std::move(password)),
+      algorithm_(algorithm),
+      nonce_(next_nonce()) {}
+
+void DigestCheck::renew_nonce() { nonce_ = next_nonce(); }
 
 std::string DigestCheck::hash(const std::string& text) const {
   return hexadecimal(digest_of(algorithm_ == Algorithm::kMd5 ? EVP_md5() : EVP_sha256(), text));
 }
 
 std::string DigestCheck::challenge() const {
-  return std::string("Digest realm=\"") + kRealm + "\", nonce=\"" + kNonce +
+  return std::string("Digest realm=\"") + kRealm + "\", nonce=\"" + nonce() +
          "\", algorithm=" + (algorithm_ == Algorithm::kMd5 ? "MD5" : "SHA-256") + ", qop=\"auth\"";
 }
 
@@ -59,8 +68,9 @@ bool DigestCheck::accepts(const std::string& method, const std::string& target,
   }
   const std::string secret = hash(user_ + ":" + kRealm + ":" + password_);
   const std::string what = hash(method + ":" + field["uri"]);
-  return field["username"] == user_ && field["nonce"] == kNonce && field["uri"] == target &&
-         field["response"] == hash(secret + ":" + kNonce + ":" + field["nc"] + ":" +
+  const std::string expected = nonce();
+  return field["username"] == user_ && field["nonce"] == expected && field["uri"] == target &&
+         field["response"] == hash(secret + ":" + expected + ":" + field["nc"] + ":" +
                                    field["cnonce"] + ":auth:" + what);
 }
 

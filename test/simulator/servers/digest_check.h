@@ -1,7 +1,9 @@
 #pragma once
 // DigestCheck: the server's side of HTTP digest authentication with qop=auth (RFC 7616), and of basic
-// (RFC 7617): written from the RFCs, with OpenSSL's hashes.
+// (RFC 7617): written from the RFCs, with OpenSSL's hashes. Like many a camera it knows one nonce, and does not
+// say of another one that it is stale.
 
+#include <atomic>
 #include <string>
 
 namespace alidade {
@@ -13,6 +15,9 @@ class DigestCheck {
   // user empty: everybody is let in.
   DigestCheck(std::string user, std::string password, Algorithm algorithm = Algorithm::kMd5);
 
+  // Thread-safe: as a camera that restarts; the nonce so far is refused.
+  void renew_nonce();
+
   // The value of WWW-Authenticate.
   std::string challenge() const;
 
@@ -22,10 +27,12 @@ class DigestCheck {
 
  private:
   std::string hash(const std::string& text) const;
+  std::string nonce() const { return "0123456789abcdef" + std::to_string(nonce_); }
 
   std::string user_;
   std::string password_;
   Algorithm algorithm_;
+  std::atomic<int> nonce_;  // none is used twice in a process
 };
 
 // Whether the header is that of basic authentication with this user and password.

@@ -47,8 +47,9 @@ class OnvifServer {
   std::atomic<int> status{200};
   void set_fault(const std::string& code, const std::string& reason);
 
-  int count(const std::string& call) const;  // answered requests
-  std::atomic<int> refusals{0};              // 401 and NotAuthorized
+  void renew_nonce() { digest_.renew_nonce(); }  // as if it had restarted
+  int count(const std::string& call) const;      // answered requests
+  std::atomic<int> refusals{0};                  // 401 and NotAuthorized
   std::string last_profile() const;
   std::size_t connections() const;
 
