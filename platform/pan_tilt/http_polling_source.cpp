@@ -99,6 +99,7 @@ class HttpPollingSource::Implementation {
   bool ask_on_ = false;  // the next request does not wait for that
   Backoff backoff_;
   bool restarted_ = true;
+  bool worked_ = false;  // a sample has come
 
   // The request under way.
   bool under_way_ = false;
@@ -271,7 +272,11 @@ ReadStatus HttpPollingSource::Implementation::finish_request(CURLcode code, PanT
   std::string error;
   switch (conversation_->take(given, &taken, &error)) {
     case HttpConversation::Outcome::kFailed:
-      return fail(error);
+      if (!worked_) {
+        return fail(error);
+      }
+      conversation_->reset();
+      return disconnect(error);
     case HttpConversation::Outcome::kDisconnected:
       return disconnect(error);
     case HttpConversation::Outcome::kAskOn:
@@ -288,6 +293,7 @@ ReadStatus HttpPollingSource::Implementation::finish_request(CURLcode code, PanT
   sample->earliest_time_s = given.earliest_time_s;
   sample->latest_time_s = given.latest_time_s;
   sample->restarted = std::exchange(restarted_, false);
+  worked_ = true;
   backoff_.reset();
   return ReadStatus::kOk;
 }

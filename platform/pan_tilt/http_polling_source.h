@@ -9,7 +9,8 @@
 // in two pieces may hold the second back for the 40 ms of a delayed acknowledgement: that limits
 // the rate, not the interval. kDisconnected: unreachable, timed out, or what the conversation
 // takes for such; the next try comes after a growing pause. kFailed: unusable URL, or what the
-// conversation takes for good. read() runs the transfer on the calling thread; it allocates.
+// conversation takes for good, said only until the first sample has come: a device that starts again may
+// refuse for a moment. read() runs the transfer on the calling thread; it allocates.
 
 #include <memory>
 #include <optional>
@@ -45,14 +46,14 @@ class HttpConversation {
     kAskOn,         // the next request follows at once
     kNothing,       // no sample; the next request is paced
     kDisconnected,  // *error says why; next_request() begins anew after a pause
-    kFailed         // *error says why
+    kFailed         // *error says why; as kDisconnected once there has been a sample
   };
 
   virtual ~HttpConversation() = default;
   // now_s: host CLOCK_MONOTONIC.
   virtual HttpRequest next_request(double now_s) = 0;
   virtual Outcome take(const HttpAnswer& answer, PanTiltSample* sample, std::string* error) = 0;
-  // A request got no answer: begin anew.
+  // A request got no answer, or what had worked has failed: begin anew.
   virtual void reset() = 0;
 };
 

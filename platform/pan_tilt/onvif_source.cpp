@@ -59,7 +59,7 @@ class OnvifConversation : public HttpConversation {
     reset();
     return Outcome::kDisconnected;
   }
-  Outcome not_authorized(const std::string& why, std::string* error);
+  Outcome not_authorized(const std::string& why, std::string* error) const;
   Outcome take_clock(const HttpAnswer& answer);
   Outcome take_status(const HttpAnswer& answer, PanTiltSample* sample, std::string* error);
 
@@ -71,7 +71,6 @@ class OnvifConversation : public HttpConversation {
 
   Step step_ = Step::kClock;
   bool digest_ = false;                        // log in by HTTP digest, not by a token
-  bool authorized_ = false;                    // the login has been accepted
   std::optional<double> device_minus_host_s_;  // the device's Unix time less the host's monotonic
   OnvifServices services_;
   std::string profile_;
@@ -149,7 +148,6 @@ HttpConversation::Outcome OnvifConversation::take(const HttpAnswer& answer, PanT
       if (!parse_onvif_profile(answer.body, &profile_, error)) {
         return disconnected();
       }
-      authorized_ = true;
       step_ = Step::kStatus;
       return Outcome::kAskOn;
     case Step::kClock:
@@ -159,18 +157,11 @@ HttpConversation::Outcome OnvifConversation::take(const HttpAnswer& answer, PanT
   return take_status(answer, sample, error);
 }
 
-// A login that was good before may suffer from a clock that was set since: once it is tried anew.
 HttpConversation::Outcome OnvifConversation::not_authorized(const std::string& why,
-                                                            std::string* error) {
-  if (user_.empty()) {
-    *error = "the device wants a user and a password (" + why + ")";
-    return Outcome::kFailed;
-  }
-  if (std::exchange(authorized_, false)) {
-    *error = "the device does not accept the login any more (" + why + ")";
-    return disconnected();
-  }
-  *error = "wrong user or password (" + why + "); ONVIF may have users of its own in the device";
+                                                            std::string* error) const {
+  *error = user_.empty() ? "the device wants a user and a password (" + why + ")"
+                         : "wrong user or password (" + why +
+                               "); ONVIF may have users of its own in the device";
   return Outcome::kFailed;
 }
 
@@ -193,7 +184,6 @@ HttpConversation::Outcome OnvifConversation::take_status(const HttpAnswer& answe
   if (!parse_onvif_status(answer.body, &status, error)) {
     return disconnected();
   }
-  authorized_ = true;
   if (status.space == OnvifStatus::Space::kDegrees) {
     sample->pan_rad = kRadPerDeg * status.pan;
     sample->tilt_rad = kRadPerDeg * status.tilt;

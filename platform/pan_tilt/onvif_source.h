@@ -11,7 +11,8 @@
 // - device_time_s: UtcTime as Unix time, if it changes sensibly (device_clock_trial.h). The first
 //   answers of a source's life are withheld until that is known: all its samples have it, or none.
 // kDisconnected: unreachable, timed out, a SOAP fault, HTTP status other than 200, an answer that is
-// no position. kFailed: wrong user or password, generic space without ranges, unusable URL.
+// no position. kFailed: unusable URL; until the first sample also wrong user or password, generic space
+// without ranges. Later a refused login may be that of a device whose clock was set.
 
 #include <optional>
 #include <string>

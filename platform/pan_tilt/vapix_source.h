@@ -3,8 +3,8 @@
 //   GET /axis-cgi/com/ptz.cgi?query=position[&camera=N]
 // over one kept HTTP connection with digest authentication (one 401 in total, not one a poll).
 // Pace, stamps and threads: http_polling_source.h. kDisconnected: unreachable, timed out, HTTP
-// status other than 200, an `Error:` answer, an answer that is not a position. kFailed: wrong user
-// or password (401), unusable URL.
+// status other than 200, an `Error:` answer, an answer that is not a position. kFailed: unusable
+// URL; until the first sample also wrong user or password (401).
 
 #include <string>
 

@@ -68,6 +68,7 @@ class MjpegSource::Implementation {
   std::string refusal_;                      // why the answer's body was not taken
   std::int64_t discarded_ = 0;               // by the scanner, as far as counted
   std::int64_t pictures_ = 0;                // of this connection
+  bool worked_ = false;                      // a picture has come, of any connection
   double last_picture_s_ = 0;                // or the connection's beginning
 
   // read()'s own.
@@ -163,6 +164,7 @@ void MjpegSource::Implementation::take_bytes(std::string_view bytes, double arri
   while (scanner_->next(&part)) {
     if (part.body.compare(0, 2, "\xFF\xD8") == 0) {
       ++pictures_;
+      worked_ = true;
       last_picture_s_ = arrival_s;
       const std::size_t size = part.body.size();
       thread_.push(std::move(part), size);
@@ -213,7 +215,7 @@ ReadStatus MjpegSource::Implementation::connection_end(CURLcode code, std::strin
   curl_easy_getinfo(easy_.get(), CURLINFO_RESPONSE_CODE, &status);
   if (status == 401) {
     *error = login_error(easy_.get(), options_.user, kMethods);
-    return ReadStatus::kFailed;
+    return worked_ ? ReadStatus::kDisconnected : ReadStatus::kFailed;
   }
   if (!refusal_.empty()) {
     *error = refusal_;

@@ -15,7 +15,8 @@
 // - copy_to: each delivered picture is also stored as it came in that Matroska file, in which a kill
 //   loses at most the last second. The file goes on over reconnections.
 // kDisconnected: unreachable, no whole picture for timeout_s, HTTP status other than 200, an answer
-// that is no multipart stream. kFailed: wrong user or password (401), unusable URL.
+// that is no multipart stream. kFailed: unusable URL, copy_to cannot be written; wrong user or password
+// (401), said only until the first picture has come, as a camera that starts again may refuse for a moment.
 
 #include <cstddef>
 #include <cstdint>

@@ -133,6 +133,24 @@ TEST(VapixSource, LogsInAgainWhenTheCameraHasForgottenItsNonces) {
             5);  // one at first; then the old nonce's, and one that gives a new one
 }
 
+TEST(VapixSource, TriesOnWhenACameraThatHasWorkedRefuses) {
+  AxisServer server("user", "secret", [] { return position(1); });
+  VapixSourceOptions options = options_for(server.url());
+  options.user = "user";
+  options.password = "secret";
+  VapixSource source(options);
+  PanTiltSample sample;
+  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  server.refuse = true;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_EQ(source.error(), server.url() + "/: wrong user or password (401)");
+  }
+  server.refuse = false;
+  ASSERT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  EXPECT_TRUE(sample.restarted);
+}
+
 TEST(VapixSource, TakesUserAndPasswordOutOfTheUrl) {
   AxisServer server("user", "sec@ret", [] { return position(1); });
   VapixSource source(

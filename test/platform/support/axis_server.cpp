@@ -30,7 +30,7 @@ void AxisServer::serve_position(const httplib::Request& request, httplib::Respon
     last_query_ = request.target;
     client_ports_.insert(request.remote_port);
   }
-  if (!check_.accepts("GET", request.target, request.get_header_value("Authorization"))) {
+  if (refuse || !check_.accepts("GET", request.target, request.get_header_value("Authorization"))) {
     ++refusals;
     response.status = 401;
     response.set_header("WWW-Authenticate", check_.challenge());

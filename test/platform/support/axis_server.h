@@ -26,9 +26,10 @@ class AxisServer {
   int port() const { return server_.port(); }
   std::string url() const { return server_.url(); }
 
-  std::atomic<int> status{200};  // of a position request that is let through
-  std::atomic<int> refusals{0};  // answers 401
-  std::atomic<int> polls{0};     // answers to position requests that were let through
+  std::atomic<int> status{200};     // of a position request that is let through
+  std::atomic<bool> refuse{false};  // whatever the login
+  std::atomic<int> refusals{0};     // answers 401
+  std::atomic<int> polls{0};        // answers to position requests that were let through
   void renew_nonce() { check_.renew_nonce(); }  // as if it had restarted
   std::string last_query() const;
   std::size_t connections() const;

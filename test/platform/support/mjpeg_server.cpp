@@ -37,9 +37,9 @@ bool MjpegServer::let_in(int fd) {
   std::string request;
   while (server_.read_request(fd, &request)) {
     const std::string given = header_of(request, "Authorization");
-    if (login_ == Login::kNone ||
-        (login_ == Login::kBasic ? accepts_basic(kUser, kPassword, given)
-                                 : check_.accepts("GET", "/video.cgi?x=y", given))) {
+    if (!refuse && (login_ == Login::kNone ||
+                    (login_ == Login::kBasic ? accepts_basic(kUser, kPassword, given)
+                                             : check_.accepts("GET", "/video.cgi?x=y", given)))) {
       return true;
     }
     ++refusals;

@@ -57,6 +57,7 @@ class MjpegServer {
 
   std::atomic<int> refusals{0};                // answers 401
   std::atomic<std::int64_t> allowed{1 << 30};  // pictures before it pauses
+  std::atomic<bool> refuse{false};             // whatever the login
   std::atomic<bool> hang_up{false};            // ends the connection before the next picture
 
  private:

@@ -190,6 +190,26 @@ TEST_P(MjpegSourceLogin, LogsInAgainWhenTheCameraHasForgottenItsNonces) {
   }
 }
 
+TEST_P(MjpegSourceLogin, TriesOnWhenACameraThatHasWorkedRefuses) {
+  MjpegServer server({}, GetParam());
+  MjpegSourceOptions options = options_for(server.url());
+  options.user = MjpegServer::kUser;
+  options.password = MjpegServer::kPassword;
+  MjpegSource source(options);
+  Frame frame;
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  server.refuse = true;
+  server.hang_up = true;
+  for (int i = 0; i < 4; ++i) {
+    ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  }
+  EXPECT_EQ(source.error(), server.url() + ": wrong user or password (401)");
+  server.hang_up = false;
+  server.refuse = false;
+  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  EXPECT_TRUE(frame.stamp.restarted);
+}
+
 INSTANTIATE_TEST_SUITE_P(Methods, MjpegSourceLogin,
                          ::testing::Values(Login::kBasic, Login::kDigestMd5, Login::kDigestSha256),
                          [](const auto& which) { return name_of(which.param); });
