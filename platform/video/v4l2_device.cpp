@@ -81,9 +81,9 @@ V4l2Device::Result V4l2Device::fail_call(const char* what, int error_number) {
   switch (error_number) {
     case EACCES:
     case EPERM:
-      return fail(Result::kUnusable, "permission denied; the user must be in the group " +
-                                         group_of(path_) + " (usermod -aG " + group_of(path_) +
-                                         " USER, then log in again)");
+      return fail(Result::kDenied, "permission denied; the user must be in the group " +
+                                       group_of(path_) + " (usermod -aG " + group_of(path_) +
+                                       " USER, then log in again)");
     case EBUSY:
       return fail(Result::kLost,
                   "busy: another program uses it; end that one (fuser -v " + path_ + " names it)");

@@ -27,6 +27,7 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
     kOk,
     kNothing,  // no buffer is filled
     kLost,     // gone, busy or out of order: may be well later; see error()
+    kDenied,  // no permission; for a moment also to a device that has just been plugged in; see error()
     kUnusable  // will not work as it is; see error()
   };
 
@@ -62,7 +63,7 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
   [[nodiscard]] int height() const { return height_; }  // px
   [[nodiscard]] std::size_t stride() const { return stride_; }
 
-  // One line without the device's name; valid after kLost and kUnusable.
+  // One line without the device's name; valid after kLost, kDenied and kUnusable.
   [[nodiscard]] const std::string& error() const { return error_; }
 
  private:

@@ -87,6 +87,7 @@ class V4l2Source::Implementation {
   std::string error_;
   bool failed_ = false;
   bool worked_ = false;  // a frame has come
+  bool lost_ = false;    // kDisconnected has been said
   Backoff backoff_{options_.max_backoff_s};
   double next_try_s_ = 0;
   std::shared_ptr<V4l2Device> device_;  // null while there is no connection
@@ -111,6 +112,7 @@ ReadStatus V4l2Source::Implementation::lose(const std::string& error) {
   close();
   error_ = options_.device + ": " + error;
   restarted_ = true;
+  lost_ = true;
   next_try_s_ = monotonic_now_s() + backoff_.next_s();
   return ReadStatus::kDisconnected;
 }
@@ -137,7 +139,9 @@ ReadStatus V4l2Source::Implementation::connect(double end_s) {
   }
   auto device = std::make_shared<V4l2Device>();
   const V4l2Device::Result result = device->open(options_.device, options_.wish);
-  if (result == V4l2Device::Result::kUnusable && !worked_) {
+  const bool for_good =
+      result == V4l2Device::Result::kUnusable || (result == V4l2Device::Result::kDenied && !lost_);
+  if (for_good && !worked_) {
     return fail(device->error());
   }
   if (result != V4l2Device::Result::kOk) {

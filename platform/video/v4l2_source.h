@@ -15,7 +15,8 @@
 //   uncompressed luma. The file goes on over reconnections.
 // kDisconnected: unplugged, busy, not there, silent for timeout_s. kFailed: no permission, no capture
 // device, not the format, size and rate wanted; said only until the first frame has come, as a device
-// that is plugged in again may be all that for a moment.
+// that is plugged in again may be all that for a moment. No permission counts only at the first try: a
+// device that is plugged in later gets its group a moment after its name.
 
 #include <cstdint>
 #include <memory>

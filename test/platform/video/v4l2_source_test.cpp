@@ -4,6 +4,8 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
+#include <unistd.h>
 
 #include <thread>
 
@@ -46,6 +48,51 @@ TEST(V4l2Source, RefusesWhatIsNoCamera) {
     EXPECT_EQ(source.read(frame, 0), ReadStatus::kStopped);
   }
   EXPECT_EQ(open_files(), before);
+}
+
+// root may open everything.
+class AsNobody {
+ public:
+  AsNobody() {
+    constexpr uid_t kNobody = 65534;
+    EXPECT_TRUE(::geteuid() != 0 || ::seteuid(kNobody) == 0);
+  }
+  ~AsNobody() { EXPECT_EQ(::seteuid(::getuid()), 0); }
+};
+
+TEST(V4l2Source, TriesOnWhenADeviceThatComesLaterHasNoRightsYet) {
+  const TemporaryDirectory directory;
+  ASSERT_EQ(::chmod(directory.path().c_str(), 0755), 0);
+  V4l2SourceOptions options = device(directory.path() + "/video0");
+  options.max_backoff_s = 0.01;
+  V4l2Source source(options);
+  Frame frame;
+  const auto read = [&](ReadStatus wanted) {
+    const AsNobody nobody;
+    return read_until(source, frame, wanted);
+  };
+  ASSERT_EQ(read(ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source.error(), HasSubstr("no such device"));
+  directory.write("video0", "text");
+  ASSERT_EQ(::chmod(options.device.c_str(), 0), 0);
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_EQ(read(ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_THAT(source.error(), HasSubstr("permission denied"));
+  }
+  ASSERT_EQ(::chmod(options.device.c_str(), 0666), 0);
+  ASSERT_EQ(read(ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source.error(), HasSubstr("is no V4L2 device")) << "it has been opened";
+}
+
+TEST(V4l2Source, FailsAtOnceOnADeviceThatItMayNotOpen) {
+  const TemporaryDirectory directory;
+  ASSERT_EQ(::chmod(directory.path().c_str(), 0755), 0);
+  V4l2Source source(device(directory.write("video0", "text")));
+  ASSERT_EQ(::chmod(source.name().c_str(), 0), 0);
+  Frame frame;
+  const AsNobody nobody;
+  EXPECT_EQ(source.read(frame, kDeadline_s), ReadStatus::kFailed);
+  EXPECT_THAT(source.error(), HasSubstr("permission denied; the user must be in the group"));
 }
 
 TEST(V4l2Source, StopsWhileItWaitsForTheNextTry) {
