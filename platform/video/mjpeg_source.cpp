@@ -1,5 +1,6 @@
 #include "platform/video/mjpeg_source.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -20,6 +21,9 @@ namespace {
 
 constexpr long kReceiveBuffer = 128 * 1024;  // bytes read at a time
 constexpr int kDamagedInARow = 30;           // pictures: more are no accident
+// Each part without a later time stamp makes the sender's clock more doubtful, each one with it less.
+constexpr int kDoubtOfABadStamp = 100;
+constexpr int kMostDoubt = 2 * kDoubtOfABadStamp;
 constexpr const char* kNoCurl = "libcurl does not start";
 constexpr long kMethods = static_cast<long>(CURLAUTH_DIGEST | CURLAUTH_BASIC);
 
@@ -53,7 +57,7 @@ class MjpegSource::Implementation {
     return ReadStatus::kFailed;
   }
   ReadStatus deliver(MultipartPart part, Frame& frame);
-  std::optional<double> sender_time(const MultipartPart& part);
+  void stamp_sender_time(const MultipartPart& part, FrameStamp* stamp);
 
   MjpegSourceOptions options_;
   std::string name_;
@@ -77,8 +81,8 @@ class MjpegSource::Implementation {
   bool restarted_ = true;
   std::int64_t next_frame_ = 0;
   int damaged_in_a_row_ = 0;
-  bool sender_has_clock_ = true;
-  std::optional<double> last_sender_time_s_;
+  int clock_doubt_ = 0;  // above kMostDoubt: none for the rest of the connection
+  std::optional<double> last_sender_time_s_;  // of this connection
   JpegDecoder decoder_;
   CodecParametersPtr parameters_ = picture_parameters(AV_CODEC_ID_MJPEG);
   StreamCopy copy_;
@@ -292,10 +296,7 @@ ReadStatus MjpegSource::Implementation::deliver(MultipartPart part, Frame& frame
   frame.stamp.frame = next_frame_++;
   frame.stamp.receive_time_s = part.first_byte_s;
   frame.stamp.restarted = std::exchange(restarted_, false);
-  if (frame.stamp.restarted) {
-    last_sender_time_s_.reset();
-  }
-  frame.stamp.sender_time_s = sender_time(part);
+  stamp_sender_time(part, &frame.stamp);
   frame.width = picture.width;
   frame.height = picture.height;
   frame.luma = picture.luma;
@@ -307,11 +308,24 @@ ReadStatus MjpegSource::Implementation::deliver(MultipartPart part, Frame& frame
   return ReadStatus::kOk;
 }
 
-std::optional<double> MjpegSource::Implementation::sender_time(const MultipartPart& part) {
-  sender_has_clock_ = sender_has_clock_ && part.timestamp_s &&
-                      (!last_sender_time_s_ || *part.timestamp_s > *last_sender_time_s_);
-  last_sender_time_s_ = part.timestamp_s;
-  return sender_has_clock_ ? part.timestamp_s : std::nullopt;
+// A step back cannot be a part that was overtaken: the stream keeps their order.
+void MjpegSource::Implementation::stamp_sender_time(const MultipartPart& part, FrameStamp* stamp) {
+  if (stamp->restarted) {
+    clock_doubt_ = 0;
+    last_sender_time_s_.reset();
+  }
+  if (clock_doubt_ > kMostDoubt) {
+    return;
+  }
+  const bool back =
+      part.timestamp_s && last_sender_time_s_ && *part.timestamp_s < *last_sender_time_s_;
+  const bool stands = !part.timestamp_s || part.timestamp_s == last_sender_time_s_;
+  clock_doubt_ = back || stands ? clock_doubt_ + kDoubtOfABadStamp : std::max(0, clock_doubt_ - 1);
+  if (stands || clock_doubt_ > kMostDoubt) {
+    return;
+  }
+  stamp->sender_time_s = last_sender_time_s_ = part.timestamp_s;
+  stamp->restarted = stamp->restarted || back;
 }
 
 MjpegSource::MjpegSource(const MjpegSourceOptions& options)

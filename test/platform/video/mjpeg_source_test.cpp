@@ -61,9 +61,9 @@ std::string stream_head(const std::string& type = "multipart/x-mixed-replace;bou
   return "HTTP/1.1 200 OK\r\nContent-Type: " + type + "\r\n\r\n";
 }
 
-std::string part(const std::string& body) {
+std::string part(const std::string& body, const std::string& headers = "") {
   return "--b\r\nContent-Type: image/jpeg\r\nContent-Length: " + std::to_string(body.size()) +
-         "\r\n\r\n" + body + "\r\n";
+         "\r\n" + headers + "\r\n" + body + "\r\n";
 }
 
 struct Style {
@@ -246,6 +246,72 @@ TEST(MjpegSource, ForgetsASendersClockThatStands) {
     ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
     EXPECT_EQ(frame.stamp.sender_time_s.has_value(), i == 0);
   }
+}
+
+// What becomes of the parts' stamps; negative: none.
+class MjpegSourceClock : public ::testing::Test {
+ protected:
+  // Of one connection after another.
+  void send(std::vector<std::vector<double>> connections) { connections_ = std::move(connections); }
+  Frame read() {
+    if (!source_) {
+      source_ = std::make_unique<MjpegSource>(options_for(server_));
+    }
+    Frame frame;
+    EXPECT_EQ(read_until(*source_, frame, ReadStatus::kOk), ReadStatus::kOk) << source_->error();
+    return frame;
+  }
+  void expect(const std::vector<double>& times) {
+    for (std::size_t i = 0; i < times.size(); ++i) {
+      EXPECT_EQ(read().stamp.sender_time_s.value_or(-1), times[i]) << i;
+    }
+  }
+
+ private:
+  void serve(int fd) {
+    if (!server_.read_request(fd) || next_ == connections_.size()) {
+      return;
+    }
+    RawServer::send(fd, stream_head());
+    for (const double stamp : connections_[next_++]) {
+      RawServer::send(
+          fd, part(jpeg_, stamp < 0 ? "" : "X-Timestamp: " + std::to_string(stamp) + "\r\n"));
+    }
+  }
+  std::vector<std::vector<double>> connections_;
+  std::size_t next_ = 0;
+  std::string jpeg_ = MjpegServer::picture(0);
+  RawServer server_{[this](int fd) { serve(fd); }};
+  std::unique_ptr<MjpegSource> source_;  // before the server, which waits for it
+};
+
+TEST_F(MjpegSourceClock, BeginsAnewWhereItIsSetBack) {
+  send({{100, 100.5, 100.25, 100.75}, {50, 50.5}});
+  for (const bool restarted : {true, false, true, false, true, false}) {
+    const FrameStamp stamp = read().stamp;
+    EXPECT_TRUE(stamp.sender_time_s);
+    EXPECT_EQ(stamp.restarted, restarted) << stamp.frame;
+  }
+}
+
+TEST_F(MjpegSourceClock, IsNotGivenUpForAPartWithoutANewStamp) {
+  send({{1, -1, 3, 3, 5, 6}});
+  expect({1, -1, 3, -1, 5, 6});
+}
+
+TEST_F(MjpegSourceClock, IsForgottenUntilTheNextConnectionWhereItStands) {
+  send({{1, 1, 1, 1, 5, 6}, {1, -1, -1, -1, 5, 6}, {1, 2}});
+  expect({1, -1, -1, -1, -1, -1, 1, -1, -1, -1, -1, -1, 1, 2});
+}
+
+TEST_F(MjpegSourceClock, IsForgottenWhereItRunsBackwards) {
+  send({{9, 8, 7, 6, 7, 8}});
+  expect({9, 8, 7, -1, -1, -1});
+}
+
+TEST_F(MjpegSourceClock, IsForgottenWhereItIsCoarserThanTheFrames) {
+  send({{1, 1, 2, 2, 3, 3, 4, 4}});
+  expect({1, -1, 2, -1, 3, -1, -1, -1});
 }
 
 TEST(MjpegSource, ReportsRefusedConnectionsAndTriesAgainUntilTheCameraIsThere) {
