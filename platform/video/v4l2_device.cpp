@@ -58,6 +58,32 @@ v4l2_fract period_of(double rate_hz) {
 
 }  // namespace
 
+std::string v4l2_call_error(const char* what, int error_number, const std::string& path) {
+  switch (error_number) {
+    case EACCES:
+    case EPERM: {
+      const std::string group = group_of(path);
+      return "permission denied; the user must be in the group " + group + " (usermod -aG " +
+             group + " USER, then log in again)";
+    }
+    case EBUSY:
+      return "busy: another program uses it; end that one (fuser -v " + path + " names it)";
+    case ENOENT:
+    case ENODEV:
+    case ENXIO:
+      return "no such device; is the camera plugged in? (ls /dev/video* lists what is)";
+    case ENOSPC:
+      return "the USB bus has no bandwidth left; use a smaller size or rate, MJPG, or a port on "
+             "another bus (lsusb -t)";
+    case ENOLINK:
+    case ENOLCK:
+      return "no usable signal at the input; is its source on and connected? (on CSI: are the "
+             "links set? media-ctl -p)";
+    default:
+      return std::string(what) + ": " + reason(error_number);
+  }
+}
+
 V4l2Device::Mapping::~Mapping() { ::munmap(data_, size_); }
 
 // The system puts the copy in place in one step, which a thread that reads does not notice.
@@ -78,23 +104,8 @@ V4l2Device::Result V4l2Device::fail(Result result, const std::string& error) {
 }
 
 V4l2Device::Result V4l2Device::fail_call(const char* what, int error_number) {
-  switch (error_number) {
-    case EACCES:
-    case EPERM:
-      return fail(Result::kDenied, "permission denied; the user must be in the group " +
-                                       group_of(path_) + " (usermod -aG " + group_of(path_) +
-                                       " USER, then log in again)");
-    case EBUSY:
-      return fail(Result::kLost,
-                  "busy: another program uses it; end that one (fuser -v " + path_ + " names it)");
-    case ENOENT:
-    case ENODEV:
-    case ENXIO:
-      return fail(Result::kLost,
-                  "no such device; is the camera plugged in? (ls /dev/video* lists what is)");
-    default:
-      return fail(Result::kLost, std::string(what) + ": " + reason(error_number));
-  }
+  return fail(error_number == EACCES || error_number == EPERM ? Result::kDenied : Result::kLost,
+              v4l2_call_error(what, error_number, path_));
 }
 
 V4l2Device::Result V4l2Device::open(const std::string& path, const V4l2Wish& wish) {

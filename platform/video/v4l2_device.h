@@ -21,6 +21,10 @@
 
 namespace alidade {
 
+// What a call that failed with this errno means for the person: one line without the device's name.
+[[nodiscard]] std::string v4l2_call_error(const char* what, int error_number,
+                                          const std::string& path);
+
 class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
  public:
   enum class Result {
@@ -94,7 +98,7 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
   Result start();
   void give_back(std::uint32_t index);
   Result fail(Result result, const std::string& error);
-  Result fail_call(const char* call, int error_number);
+  Result fail_call(const char* what, int error_number);
 
   std::string path_;
   std::string error_;

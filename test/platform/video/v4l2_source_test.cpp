@@ -7,10 +7,12 @@
 #include <sys/stat.h>
 #include <unistd.h>
 
+#include <cerrno>
 #include <thread>
 
 #include "platform/video/recording_frame_source.h"
 #include "platform/video/stream_copy.h"
+#include "platform/video/v4l2_device.h"
 #include "test/platform/support/eventually.h"
 #include "test/platform/support/open_files.h"
 #include "test/support/temporary_directory.h"
@@ -105,6 +107,17 @@ TEST(V4l2Source, StopsWhileItWaitsForTheNextTry) {
   });
   source.stop();
   reader.join();
+}
+
+TEST(V4l2Device, SaysInTheUsersWordsWhatTheKernelMeans) {
+  const auto error = [](int number) { return v4l2_call_error("VIDIOC_STREAMON", number, "/v"); };
+  EXPECT_THAT(error(ENOSPC), HasSubstr("the USB bus has no bandwidth left; use a smaller size"));
+  EXPECT_THAT(error(ENOLINK), HasSubstr("no usable signal at the input"));
+  EXPECT_EQ(error(ENOLCK), error(ENOLINK));
+  EXPECT_THAT(error(EBUSY), HasSubstr("fuser -v /v names it"));
+  EXPECT_THAT(error(ENODEV), HasSubstr("is the camera plugged in?"));
+  EXPECT_THAT(error(EACCES), HasSubstr("the user must be in the group video"));
+  EXPECT_EQ(error(EIO), "VIDIOC_STREAMON: Input/output error");
 }
 
 // What V4l2Source stores of raw pictures.
