@@ -1,7 +1,12 @@
 #pragma once
 // Waiting for events: everything that a test waits for comes within kDeadline_s, or the test fails.
 
+#include <sys/types.h>
+
 #include <chrono>
+#include <fstream>
+#include <sstream>
+#include <string>
 #include <thread>
 
 #include "platform/system/clock.h"
@@ -41,6 +46,23 @@ bool eventually(Condition condition) {
     std::this_thread::sleep_for(std::chrono::milliseconds(2));
   }
   return true;
+}
+
+// Waits until a thread of this process waits, and is woken by nothing for a hundred looks.
+inline bool falls_asleep(pid_t thread) {
+  std::string before;
+  int alike = 0;
+  return eventually([&] {
+    std::ostringstream text;
+    text << std::ifstream("/proc/self/task/" + std::to_string(thread) + "/status").rdbuf();
+    const std::string status = text.str();
+    const std::size_t at = status.find("voluntary_ctxt_switches");
+    const std::string wakings = at == std::string::npos ? "" : status.substr(at);
+    const bool asleep = status.find("State:\tS") != std::string::npos;
+    alike = asleep && wakings == before ? alike + 1 : 0;
+    before = wakings;
+    return alike >= 100;
+  });
 }
 
 }  // namespace alidade

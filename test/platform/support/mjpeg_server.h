@@ -43,7 +43,7 @@ class MjpegServer {
     return "http://127.0.0.1:" + std::to_string(port()) + "/video.cgi?x=y";
   }
   static constexpr const char* kUser = "us er";
-  static constexpr const char* kPassword = "se:cr\"et";
+  static constexpr const char* kPassword = "secret:\"x";
 
   void renew_nonce() { check_.renew_nonce(); }  // as if it had restarted
 

@@ -36,6 +36,9 @@ void RtspServer::kill() {
   }
 }
 
+void RtspServer::freeze() { ::kill(child_, SIGSTOP); }
+void RtspServer::thaw() { ::kill(child_, SIGCONT); }
+
 void RtspServer::restart() {
   kill();
   int ends[2];

@@ -28,6 +28,8 @@ class RtspServer {
 
   void kill();     // as a power failure would
   void restart();  // on the same port
+  void freeze();   // keeps its connections, and says nothing on them
+  void thaw();
 
  private:
   RtspStream stream_;

@@ -2,6 +2,7 @@
 // What every FrameSource promises: the suite, for one program to instantiate with its sources.
 
 #include <gtest/gtest.h>
+#include <unistd.h>
 
 #include <atomic>
 #include <functional>
@@ -23,11 +24,12 @@ struct FrameSourceRig {
   std::unique_ptr<FrameSource> source;
 };
 
-// One whose camera can be taken away and given back, also in the middle of connecting. Its source gives
-// up after a short silence and pauses shortly.
+// One whose camera can be taken away and given back, also in the middle of connecting, and made silent while
+// it stays connected.
 struct LiveFrameSourceRig : FrameSourceRig {
   virtual void take_away() = 0;
   virtual void give_back() = 0;
+  virtual void set_silent(bool silent) = 0;
 };
 
 template <class Rig>
@@ -48,6 +50,7 @@ class FrameSourceContract : public ::testing::TestWithParam<FrameSourceCase<Fram
   Frame frame_;
 };
 
+// Sources that give up after a short silence and pause shortly.
 class LiveFrameSourceContract
     : public ::testing::TestWithParam<FrameSourceCase<LiveFrameSourceRig>> {
  protected:
@@ -62,6 +65,17 @@ class LiveFrameSourceContract
   FrameSource& source_ = *rig_->source;
   Frame frame_;
 };
+
+// The same that take any silence.
+class PatientFrameSourceContract
+    : public ::testing::TestWithParam<FrameSourceCase<LiveFrameSourceRig>> {
+ protected:
+  std::unique_ptr<LiveFrameSourceRig> rig_ = GetParam().make();
+  FrameSource& source_ = *rig_->source;
+  Frame frame_;
+};
+
+constexpr double kForever_s = 1e6;
 
 TEST_P(FrameSourceContract, NumbersItsFramesAndGivesEachItsPicture) {
   for (int i = 0; i < 10; ++i) {
@@ -134,6 +148,43 @@ TEST_P(FrameSourceContract, LeaksNoFileDescriptorOverAThousandLives) {
 TEST_P(FrameSourceContract, HasANameWithoutPassword) {
   EXPECT_FALSE(source_.name().empty());
   EXPECT_EQ(source_.name().find("secret"), std::string::npos);
+}
+
+TEST_P(PatientFrameSourceContract, StampsFramesAsTheyComeByTheHostsClock) {
+  const double begin_s = monotonic_now_s();
+  double first_s = 0;
+  double last_s = begin_s;
+  for (int i = 0; i < 10; ++i) {
+    ASSERT_EQ(read_until(source_, frame_, ReadStatus::kOk), ReadStatus::kOk) << source_.error();
+    EXPECT_GE(frame_.stamp.receive_time_s, last_s) << i;  // one piece of a stream may hold two
+    EXPECT_LE(frame_.stamp.receive_time_s, monotonic_now_s());
+    last_s = frame_.stamp.receive_time_s;
+    first_s = i == 0 ? last_s : first_s;
+  }
+  EXPECT_GT(last_s, first_s);
+}
+
+TEST_P(PatientFrameSourceContract, EndsAReadOfASilentCameraWhenAnotherThreadStopsIt) {
+  ASSERT_EQ(read_until(source_, frame_, ReadStatus::kOk), ReadStatus::kOk) << source_.error();
+  rig_->set_silent(true);
+  std::atomic<pid_t> reader_id{0};
+  std::atomic<bool> over{false};
+  std::thread reader([&] {
+    reader_id = ::gettid();
+    ReadStatus status = ReadStatus::kOk;
+    while (status == ReadStatus::kOk) {
+      status = source_.read(frame_, kForever_s);
+    }
+    EXPECT_EQ(status, ReadStatus::kStopped);
+    over = true;
+  });
+  EXPECT_TRUE(eventually([&] { return reader_id != 0; }));
+  EXPECT_TRUE(falls_asleep(reader_id));
+  source_.stop();
+  // In vain: nothing can end the reader, so its thread ends the program.
+  ASSERT_TRUE(eventually([&] { return over.load(); })) << "stop() does not wake what waits";
+  reader.join();
+  rig_->set_silent(false);
 }
 
 TEST_P(LiveFrameSourceContract, SaysThatTheCameraWentAndComesBackWithItByItself) {

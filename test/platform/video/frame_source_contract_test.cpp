@@ -16,12 +16,14 @@ namespace alidade {
 namespace {
 
 // How soon a camera that is away is noticed, by silence where nothing else tells.
-enum class Patience { kLong, kShort };
+enum class Patience { kForever, kLong, kShort };
 
 template <class Options>
 void set_patience(Patience patience, Options* options, double short_timeout_s = 10) {
-  options->timeout_s = patience == Patience::kLong ? kDeadline_s : short_timeout_s;
-  options->max_backoff_s = patience == Patience::kLong ? options->max_backoff_s : 0.05;
+  options->timeout_s = patience == Patience::kForever ? kForever_s
+                       : patience == Patience::kLong  ? kDeadline_s
+                                                      : short_timeout_s;
+  options->max_backoff_s = patience == Patience::kShort ? 0.05 : options->max_backoff_s;
 }
 
 struct RtspRig : LiveFrameSourceRig {
@@ -39,6 +41,7 @@ struct RtspRig : LiveFrameSourceRig {
   }
   void take_away() override { server.kill(); }
   void give_back() override { server.restart(); }
+  void set_silent(bool silent) override { silent ? server.freeze() : server.thaw(); }
   RtspServer server;
   RtpSourceOptions options;
 };
@@ -66,6 +69,7 @@ struct RtpRig : LiveFrameSourceRig {
   }
   void take_away() override { away = true; }
   void give_back() override { away = false; }
+  void set_silent(bool silent) override { away = silent; }
   RtpSourceOptions options;
   std::atomic<bool> over{false};
   std::atomic<bool> away{false};
@@ -76,7 +80,7 @@ struct MjpegRig : LiveFrameSourceRig {
   explicit MjpegRig(Patience patience) {
     options.url = server.url();
     options.user = MjpegServer::kUser;
-    options.password = "secret";
+    options.password = MjpegServer::kPassword;
     set_patience(patience, &options);
     source = open();
   }
@@ -86,7 +90,8 @@ struct MjpegRig : LiveFrameSourceRig {
   }
   void take_away() override { server.hang_up = true; }
   void give_back() override { server.hang_up = false; }
-  MjpegServer server;
+  void set_silent(bool silent) override { server.allowed = silent ? 0 : 1 << 30; }
+  MjpegServer server{{}, MjpegServer::Login::kDigestMd5};
   MjpegSourceOptions options;
 };
 
@@ -143,6 +148,9 @@ INSTANTIATE_TEST_SUITE_P(
     name_of);
 INSTANTIATE_TEST_SUITE_P(Network, LiveFrameSourceContract,
                          ::testing::ValuesIn(live_cases<LiveFrameSourceRig>(Patience::kShort)),
+                         name_of);
+INSTANTIATE_TEST_SUITE_P(Network, PatientFrameSourceContract,
+                         ::testing::ValuesIn(live_cases<LiveFrameSourceRig>(Patience::kForever)),
                          name_of);
 
 }  // namespace

@@ -35,11 +35,11 @@ std::string device(const char* variable) {
 }
 
 V4l2SourceOptions options_of(const char* variable, V4l2Format format, int width, int height,
-                             double rate_hz) {
+                             double rate_hz, double timeout_s = kDeadline_s) {
   V4l2SourceOptions options;
   options.device = device(variable);
   options.wish = {format, width, height, rate_hz};
-  options.timeout_s = kDeadline_s;
+  options.timeout_s = timeout_s;
   return options;
 }
 
@@ -63,6 +63,9 @@ struct V4l2Rig : LiveFrameSourceRig {
     set_control(options.device, "Disconnect", 1);
   }
   void give_back() override { ::close(std::exchange(keeper, -1)); }
+  void set_silent(bool silent) override {
+    set_control(options.device, "Percentage of Dropped Buffers", silent ? 100 : 0);
+  }
   V4l2SourceOptions options;
   int keeper = -1;
 };
@@ -70,23 +73,23 @@ struct V4l2Rig : LiveFrameSourceRig {
 // The camera is the program that feeds the device: without it there is none, or silence.
 struct LoopbackRig : V4l2Rig {
   explicit LoopbackRig(double timeout_s)
-      : V4l2Rig(options_of("LOOPBACK", V4l2Format::kMjpg, 320, 240, 0)) {
-    options.timeout_s = timeout_s;
-    source = open();
+      : V4l2Rig(options_of("LOOPBACK", V4l2Format::kMjpg, 320, 240, 0, timeout_s)) {
     give_back();
   }
   void take_away() override { camera.reset(); }
   void give_back() override {
     camera = std::make_unique<LoopbackCamera>(options.device, 320, 240, 30);
   }
+  void set_silent(bool silent) override { camera->silent = silent; }
   std::unique_ptr<LoopbackCamera> camera;
 };
 
 template <class Rig>
-std::vector<FrameSourceCase<Rig>> cases(double loopback_timeout_s) {
-  const auto webcam = [](V4l2Format format) {
-    return
-        [format] { return std::make_unique<V4l2Rig>(options_of("WEBCAM", format, 320, 180, 0)); };
+std::vector<FrameSourceCase<Rig>> cases(double webcam_timeout_s, double loopback_timeout_s) {
+  const auto webcam = [webcam_timeout_s](V4l2Format format) {
+    return [=] {
+      return std::make_unique<V4l2Rig>(options_of("WEBCAM", format, 320, 180, 0, webcam_timeout_s));
+    };
   };
   return {
       {"Grey", webcam(V4l2Format::kGrey)},
@@ -99,9 +102,13 @@ std::vector<FrameSourceCase<Rig>> cases(double loopback_timeout_s) {
 const auto name_of = [](const auto& which) { return which.param.name; };
 
 INSTANTIATE_TEST_SUITE_P(V4l2, FrameSourceContract,
-                         ::testing::ValuesIn(cases<FrameSourceRig>(kDeadline_s)), name_of);
+                         ::testing::ValuesIn(cases<FrameSourceRig>(kDeadline_s, kDeadline_s)),
+                         name_of);
 INSTANTIATE_TEST_SUITE_P(V4l2, LiveFrameSourceContract,
-                         ::testing::ValuesIn(cases<LiveFrameSourceRig>(1)), name_of);
+                         ::testing::ValuesIn(cases<LiveFrameSourceRig>(kDeadline_s, 1)), name_of);
+INSTANTIATE_TEST_SUITE_P(V4l2, PatientFrameSourceContract,
+                         ::testing::ValuesIn(cases<LiveFrameSourceRig>(kForever_s, kForever_s)),
+                         name_of);
 
 // 60 frames a second, so that little time is spent in waiting; every control back where it was.
 class V4l2Camera : public ::testing::Test {
