@@ -5,8 +5,7 @@
 // A source owns its connection: it opens it, notices its loss, and opens it again with back-off.
 // read() blocks on the calling (capture) thread only; stop() may be called from any other thread
 // and makes a blocked read() return soon. Times are seconds of the host's CLOCK_MONOTONIC, taken
-// when the last packet of the frame arrived, never after decoding. Not for the real-time thread:
-// read() allocates and waits.
+// when the frame arrived, never after decoding. Not for the real-time thread: read() allocates and waits.
 
 #include <cstddef>
 #include <cstdint>
@@ -19,8 +18,8 @@ namespace alidade {
 // When and in which order a frame came. Fixed size: crosses queues by value.
 struct FrameStamp {
   std::int64_t frame = 0;  // 0, 1, 2, ... of the frames this source delivered
-  // host CLOCK_MONOTONIC at the arrival of the frame's last packet (of its first byte where the
-  // source says so)
+  // host CLOCK_MONOTONIC at the arrival of the frame's last packet (of its first byte, or as the driver
+  // stamped it, where the source says so)
   double receive_time_s = 0;
   std::optional<double> sender_time_s;   // capture time on the sender's clock, unwrapped, any epoch
   std::optional<double> sender_utc_s;    // the same as Unix time, once RTCP or the like has told it
@@ -49,7 +48,9 @@ enum class ReadStatus {
   kDisconnected,  // connection lost or refused; the next read() tries again; see error()
   kEnd,           // a recording is over
   kStopped,       // stop() was called
-  kFailed         // will never work (no such file, wrong password, unknown codec); see error()
+  // Will never work (no such file, wrong password, unknown codec); see error(). What a camera answers counts so
+  // only until its first item: later it is kDisconnected.
+  kFailed
 };
 
 // What a source that receives and decodes on its own could not deliver.
