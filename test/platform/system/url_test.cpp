@@ -34,6 +34,15 @@ TEST(Url, ShowsNoPasswordOfAUrlItCannotParse) {
   EXPECT_EQ(url.bare, "/dev/ttyUSB0");
 }
 
+TEST(Url, RefusesAnAddressWhoseZoneLooksLikeAUser) {
+  Url url;
+  std::string error;
+  EXPECT_TRUE(parse_url("rtsp://user:se@[fe80::1%25eth0]:554/x", &url, &error)) << error;
+  EXPECT_EQ(url.user, "user");
+  EXPECT_FALSE(parse_url("rtsp://ev@[0::%ev@[0::%00]:4/", &url, &error));
+  EXPECT_EQ(url.bare, "rtsp://...");
+}
+
 TEST(Url, ShowsAUrlItCannotParseOnOneLine) {
   Url url;
   std::string error;
