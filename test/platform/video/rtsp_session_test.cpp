@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <atomic>
+#include <future>
 #include <string>
 
 #include "platform/system/clock.h"
@@ -150,13 +151,14 @@ TEST(RtspSession, GoesOnByUdpWhileACameraThatHungUpSends) {
 }
 
 TEST(RtspSession, GivesUpRedirectionsInACircle) {
-  std::string url;
-  const ScriptedRtspServer server([&url](const RtspRequest& request, RtspAnswer* answer) {
+  std::promise<std::string> known;
+  const std::shared_future<std::string> url = known.get_future().share();
+  const ScriptedRtspServer server([url](const RtspRequest& request, RtspAnswer* answer) {
     if (request.method != "DESCRIBE") return;
     const std::string other = request.text.find("/other") == std::string::npos ? "/other" : "";
-    *answer = {"301 Moved", "Location: " + url + other + "\r\n", "", "", false};
+    *answer = {"301 Moved", "Location: " + url.get() + other + "\r\n", "", "", false};
   });
-  url = server.url();
+  known.set_value(server.url());
   RtpSource source(options_for(server));
   Frame frame;
   EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
