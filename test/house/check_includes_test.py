@@ -31,6 +31,15 @@ class CheckIncludes(unittest.TestCase):
         code, output = check({"core/realtime/a.h": '#include "core/model/b.h"\n#include <Eigen/Core>\n'})
         self.assertEqual(code, 0, output)
 
+    def test_accepts_the_arrows_between_floors(self):
+        code, output = check({"core/realtime/oe_mode/a.h": '#include "core/realtime/image/b.h"\n'
+                                                           '#include "core/realtime/telemetry/b.h"\n'
+                                                           '#include "core/realtime/pt_mode.h"\n',
+                              "core/realtime/start_up/a.h": '#include "core/realtime/image/b.h"\n',
+                              "core/realtime/pt_mode.h": '#include "core/realtime/telemetry/b.h"\n',
+                              "edge_app/a.h": '#include "core/realtime/oe_mode/a.h"\n'})
+        self.assertEqual(code, 0, output)
+
     def test_accepts_the_include_folder_of_a_catkin_package(self):
         code, output = check({"ros_wrapper/alidade_ros/src/a.cpp":
                               '#include "alidade_ros/a.h"\n#include <alidade_msgs/Status.h>\n'})
@@ -42,6 +51,14 @@ class CheckIncludes(unittest.TestCase):
                 ("core/realtime/a.h", '#include "core/calibration/b.h"'),
                 ("core/realtime/a.h", "#include <mutex>"),
                 ("core/realtime/a.h", "#include <opencv2/core.hpp>"),
+                ("core/realtime/image/a.h", '#include "core/realtime/telemetry/b.h"'),
+                ("core/realtime/image/a.h", '#include "core/realtime/frame_orientation.h"'),
+                ("core/realtime/telemetry/a.h", '#include "core/realtime/image/b.h"'),
+                ("core/realtime/oe_mode/a.h", '#include "core/realtime/start_up/b.h"'),
+                ("core/realtime/start_up/a.h", '#include "core/realtime/oe_mode/b.h"'),
+                ("core/realtime/start_up/a.h", '#include "core/realtime/telemetry/b.h"'),
+                ("core/realtime/pt_mode.h", '#include "core/realtime/oe_mode/b.h"'),
+                ("core/realtime/image/a.h", "#include <mutex>"),
                 ("core/calibration/a.cpp", '#include "platform/system/clock.h"'),
                 ("platform/video/a.cpp", '#include "core/model/camera.h"'),
                 ("edge_app/pipeline/a.cpp", '#include "test/support/guard.h"'),
