@@ -1,4 +1,4 @@
-#include "platform/recording/recording_writer.h"
+#include "platform/storage/recording_writer.h"
 
 #include <fcntl.h>
 #include <unistd.h>

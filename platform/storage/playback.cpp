@@ -1,4 +1,4 @@
-#include "platform/recording/playback.h"
+#include "platform/storage/playback.h"
 
 #include <algorithm>
 #include <chrono>
@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "platform/recording/recording.h"
+#include "platform/storage/recording.h"
 #include "platform/system/clock.h"
 
 namespace alidade {

@@ -1,4 +1,4 @@
-#include "platform/recording/csv_reader.h"
+#include "platform/storage/csv_reader.h"
 
 #include <algorithm>
 #include <cerrno>

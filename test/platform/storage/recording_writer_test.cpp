@@ -1,4 +1,4 @@
-#include "platform/recording/recording_writer.h"
+#include "platform/storage/recording_writer.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,7 +10,7 @@
 #include <iterator>
 #include <thread>
 
-#include "platform/recording/recording.h"
+#include "platform/storage/recording.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {

@@ -1,4 +1,4 @@
-#include "platform/recording/recording.h"
+#include "platform/storage/recording.h"
 
 #include <yaml-cpp/yaml.h>
 
@@ -7,7 +7,7 @@
 #include <sstream>
 #include <vector>
 
-#include "platform/recording/csv_reader.h"
+#include "platform/storage/csv_reader.h"
 #include "platform/system/shown.h"
 
 namespace alidade {

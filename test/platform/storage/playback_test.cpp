@@ -1,4 +1,4 @@
-#include "platform/recording/playback.h"
+#include "platform/storage/playback.h"
 
 #include <gtest/gtest.h>
 

@@ -17,8 +17,8 @@
 #include <string>
 #include <vector>
 
-#include "platform/pan_tilt/pan_tilt_source.h"
-#include "platform/video/frame_source.h"
+#include "platform/streams/frame.h"
+#include "platform/streams/pan_tilt_sample.h"
 
 namespace alidade {
 

@@ -8,7 +8,7 @@
 #include <optional>
 #include <string>
 
-#include "platform/video/frame_source.h"  // ReadStatus
+#include "platform/streams/read_status.h"
 
 namespace alidade {
 

@@ -1,4 +1,4 @@
-#include "platform/recording/recording.h"
+#include "platform/storage/recording.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
