@@ -313,9 +313,9 @@ RecordStatus OrientationStep::status_of(QueryStatus query, bool clock_locked) co
     case QueryStatus::kEmpty:
     case QueryStatus::kOneSample:
       return telemetry_lost_ ? RecordStatus::kTelemetryLost : RecordStatus::kTelemetryMissing;
-    case QueryStatus::kTooNew:
+    case QueryStatus::kTelemetryTooOld:
       return telemetry_lost_ ? RecordStatus::kTelemetryLost : RecordStatus::kTelemetryTooOld;
-    case QueryStatus::kTooOld:
+    case QueryStatus::kBeforeTelemetry:
       return RecordStatus::kFrameBeforeTelemetry;
     case QueryStatus::kGap:
       return RecordStatus::kTelemetryGap;
