@@ -12,7 +12,7 @@
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
-#include "edge_app/config/calibration_store.h"
+#include "edge_app/storage/calibration_store.h"
 #include "edge_app/output/http_api.h"
 #include "edge_app/output/http_server.h"
 #include "edge_app/output/live_state.h"
