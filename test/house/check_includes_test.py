@@ -46,6 +46,12 @@ class CheckIncludes(unittest.TestCase):
                 code, output = check({f"platform/{room}/a.cpp": f'#include "platform/{used}/b.h"\n'})
                 self.assertEqual(code, 0, output)
 
+    def test_lets_commands_join_the_rooms_of_the_program(self):
+        code, output = check({"edge_app/commands/a.cpp": "".join(
+            f'#include "edge_app/{room}/a.h"\n'
+            for room in ("commands", "pipeline", "check", "storage", "output", "config"))})
+        self.assertEqual(code, 0, output)
+
     def test_accepts_the_include_folder_of_a_catkin_package(self):
         code, output = check({"ros_wrapper/alidade_ros/src/a.cpp":
                               '#include "alidade_ros/a.h"\n#include <alidade_msgs/Status.h>\n'})
@@ -74,6 +80,12 @@ class CheckIncludes(unittest.TestCase):
                 ("platform/streams/a.h", '#include "platform/system/clock.h"'),
                 ("platform/streams/a.h", "#include <Eigen/Core>"),
                 ("edge_app/pipeline/a.cpp", '#include "test/support/guard.h"'),
+                ("edge_app/pipeline/a.h", '#include "edge_app/storage/calibration_store.h"'),
+                ("edge_app/check/a.h", '#include "edge_app/output/metrics.h"'),
+                ("edge_app/output/a.cpp", '#include "edge_app/config/config.h"'),
+                ("edge_app/storage/a.cpp", '#include "edge_app/config/yaml_section.h"'),
+                ("edge_app/config/a.cpp", '#include "edge_app/commands/command.h"'),
+                ("edge_app/commands/a.cpp", "#include <opencv2/core.hpp>"),
                 ("test/simulator/a.cpp", '#include "core/model/camera.h"'),
                 ("ros_wrapper/a.cpp", '#include "core/model/camera.h"'),
                 ("ros_wrapper/alidade_ros/src/a.cpp", "#include <platform/storage/recording.h>"),

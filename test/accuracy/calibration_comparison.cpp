@@ -1,4 +1,4 @@
-#include "edge_app/commands/calibration_comparison.h"
+#include "test/accuracy/calibration_comparison.h"
 
 #include <fmt/format.h>
 
@@ -8,9 +8,8 @@
 #include <optional>
 
 #include "core/model/direction.h"
-#include "edge_app/commands/command.h"
 
-namespace alidade {
+namespace alidade::test {
 namespace {
 
 struct Scalar {
@@ -116,21 +115,15 @@ std::string judged(const std::vector<double>& values, double statistic, double d
 
 }  // namespace
 
-ComparedRun load_known_values(const std::string& directory) {
+bool load_known_values(const std::string& directory, ComparedRun* run, std::string* error) {
   const std::filesystem::path path(directory);
-  ComparedRun run;
-  run.name = directory;
-  std::string error;
-  if (!load_values((path / "truth.yaml").string(), &run.truth, &error) ||
-      !load_values((path / "peer.yaml").string(), &run.peer, &error) ||
-      !load_limits((path / "limit.yaml").string(), &run.limits, &error)) {
-    throw CommandError(kExitUsage, error);
-  }
-  return run;
+  run->name = directory;
+  return load_values((path / "truth.yaml").string(), &run->truth, error) &&
+         load_values((path / "peer.yaml").string(), &run->peer, error) &&
+         load_limits((path / "limit.yaml").string(), &run->limits, error);
 }
 
-std::string CalibrationComparison::add(const ComparedRun& known, const CalibrationResult& result) {
-  const Calibration& c = result.calibration;
+std::string CalibrationComparison::add(const ComparedRun& known, const Calibration& c) {
   ++runs_;
   std::string text =
       fmt::format("{}\n  {:<18}{:>16}{:>11}{:>16}{:>16}{:>11}{:>11}{:>11}{:>11}\n", known.name, "",
@@ -239,4 +232,4 @@ std::string CalibrationComparison::statistics() const {
   return text;
 }
 
-}  // namespace alidade
+}  // namespace alidade::test

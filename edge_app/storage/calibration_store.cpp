@@ -1,4 +1,4 @@
-#include "edge_app/config/calibration_store.h"
+#include "edge_app/storage/calibration_store.h"
 
 #include <fmt/format.h>
 #include <yaml-cpp/yaml.h>
@@ -13,7 +13,7 @@
 #include <utility>
 
 #include "core/calibration/atomic_file.h"
-#include "edge_app/config/map_file.h"
+#include "edge_app/storage/map_file.h"
 
 namespace alidade {
 namespace {

@@ -1,5 +1,5 @@
 #pragma once
-// StreamClock: the capture time of each item of one stream, from what the stream tells: its sender's
+// CaptureClock: the capture time of each item of one stream, from what the stream tells: its sender's
 // clock, else its sequence numbers, through a ClockFilter. A stream that tells neither has no clock
 // and its caller takes the receive time. Begins anew at a reconnection, and if the stream changes
 // what it tells. Fixed memory, no allocation, one thread.
@@ -11,9 +11,9 @@
 
 namespace alidade {
 
-class StreamClock {
+class CaptureClock {
  public:
-  explicit StreamClock(const ClockFilterOptions& options) : filter_(options) {}
+  explicit CaptureClock(const ClockFilterOptions& options) : filter_(options) {}
 
   // Empty without a sender time and a sequence number.
   std::optional<ClockEstimate> update(double receive_time_s, std::optional<double> sender_time_s,

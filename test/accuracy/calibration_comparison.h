@@ -9,10 +9,10 @@
 #include <string>
 #include <vector>
 
-#include "core/calibration/calibrate.h"
+#include "core/model/calibration.h"
 #include "edge_app/config/value_file.h"
 
-namespace alidade {
+namespace alidade::test {
 
 struct ComparedRun {
   std::string name;
@@ -21,13 +21,14 @@ struct ComparedRun {
   CalibrationLimits limits;
 };
 
-// Throws CommandError.
-ComparedRun load_known_values(const std::string& directory);
+// What a recording's folder holds of them. False with one line in *error if a file is malformed.
+[[nodiscard]] bool load_known_values(const std::string& directory, ComparedRun* run,
+                                     std::string* error);
 
 class CalibrationComparison {
  public:
   // The run as text.
-  std::string add(const ComparedRun& known, const CalibrationResult& result);
+  std::string add(const ComparedRun& known, const Calibration& estimate);
   void add_failure(const std::string& message) { failures_.push_back(message); }
 
   // The tables at the end.
@@ -51,4 +52,4 @@ class CalibrationComparison {
   std::vector<std::string> failures_;
 };
 
-}  // namespace alidade
+}  // namespace alidade::test
