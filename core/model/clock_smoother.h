@@ -1,13 +1,13 @@
 #pragma once
-// The clock filter for a whole recording: every item is judged by what came before and after it,
-// so its time is better known than the online filter can know it. Same model, options and flags as
-// clock_filter.h, whose online run finds the bad items, restarts and floor shifts; then every
+// smooth_clock(): ClockFilter's task for a whole recording. Every item is judged by what came before and after it,
+// so its time is better known than the filter can know it. Same model, options and flags as
+// clock_filter.h, which runs first and finds the bad items, restarts and steps of the minimum delay; then every
 // stretch of the recording gets the line of the window around it:
 //   kOneSided   Bayesian lower line (lower_line.h) over window_s.
 //   kSymmetric  least squares with Huber weights over the window at which noise and wander of the
-//               skew balance: noise^2 / (item rate * window) = skew_wander^2 * window^3 / 140.
-// floor_shifted marks the first item on the new floor (online: the item that proved it).
-// Rejected items keep what the online filter said. Allocates nothing: the caller lends all arrays.
+//               skew balance: noise^2 / (item rate * window) = skew_wander^2 * window^3 / 140 (docs/clocks.md).
+// delay_stepped marks the first item with the new minimum delay (in the filter: the item that proved it).
+// Rejected items keep what the filter said. Allocates nothing: the caller lends all arrays.
 
 #include <algorithm>
 #include <array>
@@ -25,10 +25,10 @@ namespace internal {
 
 // Smooths one recording; `sender(i)` is the sender time or count of item i.
 template <class Sender>
-class OfflineClock {
+class ClockSmoother {
  public:
-  OfflineClock(const ClockFilterOptions& options, const ClockRatePrior& prior, Sender sender,
-               const double* receive, std::size_t n, ClockEstimate* estimates, double* scratch)
+  ClockSmoother(const ClockFilterOptions& options, const ClockRatePrior& prior, Sender sender,
+                const double* receive, std::size_t n, ClockEstimate* estimates, double* scratch)
       : options_(options),
         prior_(prior),
         sender_(sender),
@@ -58,7 +58,7 @@ class OfflineClock {
         continue;
       }
       y_[i] = receive_[i] - shift;
-      estimate.sigma_s = filter.floor_shift_sigma_s();  // until smooth() adds the line's
+      estimate.sigma_s = filter.delay_shift_sigma_s();  // until smooth() adds the line's
       if (estimate.state == ClockState::kWarmingUp) {
         estimate.time_s = y_[i];
       } else if (judge_after == kNever) {
@@ -72,10 +72,10 @@ class OfflineClock {
         }
         judge_after = std::numeric_limits<double>::infinity();
       }
-      if (estimate.floor_shifted) {
-        const double step = filter.floor_shift_s() - shift;
+      if (estimate.delay_stepped) {
+        const double step = filter.delay_shift_s() - shift;
         shift += step;
-        back_date_shift(begin, i, step, filter.floor_shift_since_s());
+        back_date_step(begin, i, step, filter.delay_shift_since_s());
       }
       rate_ = filter.period_s();
       noise_ = filter.jitter_s();
@@ -94,13 +94,13 @@ class OfflineClock {
   // May item i teach? time_s holds the best line so far.
   bool usable(std::size_t i) const {
     return !estimates_[i].rejected &&
-           !(one_sided() && y_[i] < estimates_[i].time_s - options_.floor_shift_s);
+           !(one_sided() && y_[i] < estimates_[i].time_s - options_.min_delay_step_s);
   }
 
-  // The floor stepped at receive time `since`, as item `last` proved.
-  void back_date_shift(std::size_t begin, std::size_t last, double step, double since) {
+  // The minimum delay stepped at receive time `since`, as item `last` proved.
+  void back_date_step(std::size_t begin, std::size_t last, double step, double since) {
     const double sigma = estimates_[last].sigma_s;
-    estimates_[last].floor_shifted = false;
+    estimates_[last].delay_stepped = false;
     std::size_t first = last;
     for (std::size_t j = last + 1; j-- > begin;) {
       if (estimates_[j].rejected) {
@@ -112,10 +112,10 @@ class OfflineClock {
       } else if (step > 0 || receive_[j] < since - options_.settle_s / 10) {
         break;
       }
-      // Before a fall the last items may belong to either floor: raised they do no harm.
+      // Before a fall the last items may have either minimum delay: raised they do no harm.
       y_[j] -= step;
     }
-    estimates_[first].floor_shifted = true;
+    estimates_[first].delay_stepped = true;
   }
 
   void smooth(std::size_t begin, std::size_t end) {
@@ -289,7 +289,7 @@ class OfflineClock {
   const double* receive_;
   const std::size_t n_;
   ClockEstimate* estimates_;
-  double* y_;  // receive times on the first floor
+  double* y_;  // receive times, steps of the minimum delay taken out
   double rate_ = 1;
   double noise_ = 0;
   double anchor_sender_ = 0;
@@ -299,114 +299,26 @@ class OfflineClock {
 }  // namespace internal
 
 // estimates[i] for item i of n, in order of arrival; scratch: room for n values.
-inline void filter_clock_offline(const ClockFilterOptions& options, const double* receive_time_s,
-                                 const double* sender_time_s, std::size_t n,
-                                 ClockEstimate* estimates, double* scratch) {
+inline void smooth_clock(const ClockFilterOptions& options, const double* receive_time_s,
+                         const double* sender_time_s, std::size_t n, ClockEstimate* estimates,
+                         double* scratch) {
   const auto sender = [sender_time_s](std::size_t i) { return sender_time_s[i]; };
-  internal::OfflineClock<decltype(sender)> clock(options, sender_rate_prior(options), sender,
-                                                 receive_time_s, n, estimates, scratch);
+  internal::ClockSmoother<decltype(sender)> clock(options, sender_rate_prior(options), sender,
+                                                  receive_time_s, n, estimates, scratch);
   clock.run([&](auto& filter, std::size_t i) {
     return filter.update(receive_time_s[i], sender_time_s[i]);
   });
 }
 
-inline void filter_clock_offline(const ClockFilterOptions& options, const double* receive_time_s,
-                                 const std::int64_t* sequence, std::size_t n,
-                                 ClockEstimate* estimates, double* scratch) {
+inline void smooth_clock(const ClockFilterOptions& options, const double* receive_time_s,
+                         const std::int64_t* sequence, std::size_t n, ClockEstimate* estimates,
+                         double* scratch) {
   const auto count = [sequence](std::size_t i) { return static_cast<double>(sequence[i]); };
-  internal::OfflineClock<decltype(count)> clock(options, sequence_rate_prior(options), count,
-                                                receive_time_s, n, estimates, scratch);
+  internal::ClockSmoother<decltype(count)> clock(options, sequence_rate_prior(options), count,
+                                                 receive_time_s, n, estimates, scratch);
   clock.run([&](auto& filter, std::size_t i) {
     return filter.update_sequence(receive_time_s[i], sequence[i]);
   });
-}
-
-namespace internal {
-
-constexpr std::size_t kItemsAhead = 12;
-
-// late[j]: periods by which item j of the next n comes later than if nothing were lost or doubled.
-// Fits a piecewise constant to it (L1, each step has its price; back by at most one, a duplicate)
-// and returns its value at item 0: so noise of half a period in single items does no harm.
-inline double periods_skipped(const std::array<double, kItemsAhead>& late, std::size_t n,
-                              double price) {
-  std::array<double, kItemsAhead + 1> value{};  // candidates; the first is "no step"
-  for (std::size_t j = 0; j < n; ++j) {
-    value[j + 1] = std::round(late[j]);
-  }
-  // Dynamic programme from the far end; cost[v]: of items j, j + 1, ... with value[v] at item j.
-  std::array<double, kItemsAhead + 1> cost{};
-  for (std::size_t j = n; j-- > 0;) {
-    if (j + 1 < n) {
-      std::array<double, kItemsAhead + 1> with_step = cost;
-      for (std::size_t from = 0; from <= n; ++from) {
-        for (std::size_t to = 0; to <= n; ++to) {
-          if (value[to] >= value[from] - 1) {
-            with_step[from] = std::min(with_step[from], cost[to] + price);
-          }
-        }
-      }
-      cost = with_step;
-    }
-    for (std::size_t v = 0; v <= n; ++v) {
-      cost[v] += std::abs(late[j] - value[v]);
-    }
-  }
-  std::size_t best = 0;
-  for (std::size_t v = 1; v <= n; ++v) {
-    const double penalty = value[v] == 0 ? 0 : price;
-    if (value[v] >= -1 && cost[v] + penalty < cost[best] + (value[best] == 0 ? 0 : price)) {
-      best = v;
-    }
-  }
-  return value[best];
-}
-
-}  // namespace internal
-
-// Counts for a recording without them: which multiple of the period lies between neighbouring
-// items. Losses are gaps, a duplicate repeats its count. Good for noise up to a sixth of a period
-// (sigma); the period may be off by 1 %: it is tracked. False if period_s or a receive time is
-// unusable.
-[[nodiscard]] inline bool infer_sequence(const double* receive_time_s, std::size_t n,
-                                         double period_s, std::int64_t* sequence) {
-  constexpr double kTracking = 1.0 / 16;
-  constexpr double kMostSkipped = 1e12;
-  if (!(period_s > 0) || !std::isfinite(period_s)) {
-    return false;
-  }
-  for (std::size_t i = 0; i < n; ++i) {
-    if (!std::isfinite(receive_time_s[i])) {
-      return false;
-    }
-  }
-  double period = period_s;
-  double noise = 0.1;                              // mean deviation, periods
-  double phase = n > 0 ? receive_time_s[0] : 0.0;  // smoothed time of the last count
-  for (std::size_t i = 0; i < n; ++i) {
-    if (i == 0) {
-      sequence[0] = 0;
-      continue;
-    }
-    std::array<double, internal::kItemsAhead> late{};
-    const std::size_t ahead = std::min(late.size(), n - i);
-    for (std::size_t j = 0; j < ahead; ++j) {
-      late[j] = (receive_time_s[i + j] - phase) / period - static_cast<double>(j + 1);
-    }
-    const double counts =
-        internal::periods_skipped(late, ahead, std::clamp(3 * noise, 0.2, 0.75)) + 1;
-    if (counts > kMostSkipped) {
-      return false;
-    }
-    sequence[i] = sequence[i - 1] + static_cast<std::int64_t>(counts);
-    const double expected = phase + counts * period;
-    const double error = std::clamp(receive_time_s[i] - expected, -period / 2, period / 2);
-    const double gain = std::max(1 / static_cast<double>(i + 1), kTracking);
-    noise += kTracking * (std::abs(error) / period - noise);
-    phase = expected + gain * error;
-    period = std::clamp(period + gain * gain / 4 * error, 0.99 * period_s, 1.01 * period_s);
-  }
-  return true;
 }
 
 }  // namespace alidade

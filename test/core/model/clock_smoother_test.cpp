@@ -1,4 +1,4 @@
-#include "core/model/clock_filter_offline.h"
+#include "core/model/clock_smoother.h"
 
 #include <gtest/gtest.h>
 
@@ -37,17 +37,17 @@ struct Recording {
     sender.push_back(sender_time);
     sequence.push_back(count);
   }
-  void filter(const ClockFilterOptions& options) {
+  void smooth(const ClockFilterOptions& options) {
     std::vector<double> scratch(host.size());
     estimates.resize(host.size());
-    filter_clock_offline(options, receive.data(), sender.data(), host.size(), estimates.data(),
-                         scratch.data());
+    smooth_clock(options, receive.data(), sender.data(), host.size(), estimates.data(),
+                 scratch.data());
   }
-  void filter_sequence(const ClockFilterOptions& options) {
+  void smooth_sequence(const ClockFilterOptions& options) {
     std::vector<double> scratch(host.size());
     estimates.resize(host.size());
-    filter_clock_offline(options, receive.data(), sequence.data(), host.size(), estimates.data(),
-                         scratch.data());
+    smooth_clock(options, receive.data(), sequence.data(), host.size(), estimates.data(),
+                 scratch.data());
   }
   double rms() const {
     double sum = 0;
@@ -70,9 +70,9 @@ struct Recording {
     }
     return sum / static_cast<double>(host.size());
   }
-  int floor_shifts() const {
+  int delay_steps() const {
     int count = 0;
-    for (const ClockEstimate& estimate : estimates) count += estimate.floor_shifted ? 1 : 0;
+    for (const ClockEstimate& estimate : estimates) count += estimate.delay_stepped ? 1 : 0;
     return count;
   }
 };
@@ -96,7 +96,7 @@ ClockFilterOptions symmetric() {
   return options;
 }
 
-TEST(ClockFilterOffline, AnswersZeroOneAndTwoItems) {
+TEST(ClockSmoother, AnswersZeroOneAndTwoItems) {
   for (const ClockJitter jitter : {ClockJitter::kOneSided, ClockJitter::kSymmetric}) {
     ClockFilterOptions options;
     options.jitter = jitter;
@@ -106,9 +106,9 @@ TEST(ClockFilterOffline, AnswersZeroOneAndTwoItems) {
         const double t = 0.04 * static_cast<double>(i);
         recording.add(100 + t, 100 + t, 5 + t, static_cast<std::int64_t>(i));
       }
-      recording.filter(options);
+      recording.smooth(options);
       EXPECT_LE(recording.worst(), options.expected_jitter_s);
-      recording.filter_sequence(options);
+      recording.smooth_sequence(options);
       EXPECT_LE(recording.worst(), 2 * options.expected_jitter_s);
       for (const ClockEstimate& estimate : recording.estimates) {
         EXPECT_GT(estimate.sigma_s, 0);
@@ -120,7 +120,7 @@ TEST(ClockFilterOffline, AnswersZeroOneAndTwoItems) {
 
 // The paper's simulated streams: white noise around exact multiples of an unknown period. A line
 // through n items leaves noise sqrt(2 / n) on average: n = 180 gives a tenth.
-TEST(ClockFilterOffline, StraightLineThroughAShortRecordingIsEfficientAndHonest) {
+TEST(ClockSmoother, StraightLineThroughAShortRecordingIsEfficientAndHonest) {
   for (const double sigma_s : {0.1e-3, 1e-3, 5e-3}) {
     double squares = 0;
     double normalised = 0;
@@ -128,7 +128,7 @@ TEST(ClockFilterOffline, StraightLineThroughAShortRecordingIsEfficientAndHonest)
     std::size_t items = 0;
     for (unsigned seed = 1; seed <= kRuns; ++seed) {
       Recording recording = record(seed, 20, 10, gaussian(sigma_s), 0.1);
-      recording.filter_sequence(symmetric());
+      recording.smooth_sequence(symmetric());
       squares += recording.rms() * recording.rms() / kRuns;
       normalised += recording.anees() / kRuns;
       items += recording.host.size();
@@ -140,16 +140,16 @@ TEST(ClockFilterOffline, StraightLineThroughAShortRecordingIsEfficientAndHonest)
   }
 }
 
-TEST(ClockFilterOffline, NominalPeriodWithSigmaIsUsedAndNotTrustedTooFar) {
+TEST(ClockSmoother, NominalPeriodWithSigmaIsUsedAndNotTrustedTooFar) {
   ClockFilterOptions options = symmetric();
   options.nominal_period_s = 0.05 * 1.002;  // off by one sigma
   options.nominal_period_sigma_s = 1e-4;
   Recording recording = record(1, 20, 10, gaussian(1e-3));
-  recording.filter_sequence(options);
+  recording.smooth_sequence(options);
   EXPECT_LT(recording.rms(), 0.3e-3);
 }
 
-TEST(ClockFilterOffline, BeatsTheOnlineFilter) {
+TEST(ClockSmoother, BeatsTheFilter) {
   for (const ClockJitter jitter : {ClockJitter::kOneSided, ClockJitter::kSymmetric}) {
     ClockFilterOptions options;
     options.jitter = jitter;
@@ -158,7 +158,7 @@ TEST(ClockFilterOffline, BeatsTheOnlineFilter) {
     for (unsigned seed = 1; seed <= 5; ++seed) {
       Recording recording = record(
           seed, 25, 400, jitter == ClockJitter::kOneSided ? exponential(4e-3) : gaussian(5e-3));
-      recording.filter(options);
+      recording.smooth(options);
       ClockFilter<> filter(options);
       for (std::size_t i = 0; i < recording.host.size(); ++i) {
         const ClockEstimate estimate = filter.update(recording.receive[i], recording.sender[i]);
@@ -173,39 +173,39 @@ TEST(ClockFilterOffline, BeatsTheOnlineFilter) {
 }
 
 // Unlike online, a growing skew leaves no lag: what remains is the bend within a quarter window.
-TEST(ClockFilterOffline, FollowsADriftingSkewWithoutLag) {
+TEST(ClockSmoother, FollowsADriftingSkewWithoutLag) {
   Recording recording = record(3, 25, 1800, exponential(1e-3), 0, 0, 50e-6 / 3600);
-  recording.filter({});
+  recording.smooth({});
   EXPECT_LT(recording.rms(), 5e-6);
   Recording noisy = record(3, 25, 1800, gaussian(5e-3), 0, 0, 50e-6 / 3600);
-  noisy.filter(symmetric());
+  noisy.smooth(symmetric());
   EXPECT_LT(noisy.rms(), 0.2e-3);
   EXPECT_LT(noisy.anees(), 2.5);
 }
 
-TEST(ClockFilterOffline, OneSidedSigmaIsHonest) {
+TEST(ClockSmoother, OneSidedSigmaIsHonest) {
   double normalised = 0;
   constexpr int kRuns = 100;
   for (unsigned seed = 1; seed <= kRuns; ++seed) {
     Recording recording = record(seed, 25, 20, exponential(4e-3));
-    recording.filter({});
+    recording.smooth({});
     normalised += recording.anees() / kRuns;
   }
   EXPECT_GT(normalised, 0.5);
   EXPECT_LT(normalised, 2.0);
 }
 
-TEST(ClockFilterOffline, DatesFloorShiftsBackAndKeepsTheLine) {
+TEST(ClockSmoother, DatesStepsOfTheMinimumDelayBackAndKeepsTheLine) {
   for (unsigned seed = 1; seed <= 10; ++seed) {
     Recording recording = record(seed, 25, 400, [](Random& random, double t) {
       return std::exponential_distribution<double>(250)(random) +
              (t >= 120 && t < 260 ? 8e-3 : 0.0);
     });
-    recording.filter({});
+    recording.smooth({});
     SCOPED_TRACE(testing::Message() << "seed " << seed);
-    EXPECT_EQ(recording.floor_shifts(), 2);
+    EXPECT_EQ(recording.delay_steps(), 2);
     for (std::size_t i = 0; i < recording.host.size(); ++i) {
-      if (recording.estimates[i].floor_shifted) {
+      if (recording.estimates[i].delay_stepped) {
         const double t = recording.sender[i] - 1e9;
         EXPECT_LT(std::min(std::abs(t - 120), std::abs(t - 260)), 6) << t;
       }
@@ -214,7 +214,7 @@ TEST(ClockFilterOffline, DatesFloorShiftsBackAndKeepsTheLine) {
   }
 }
 
-TEST(ClockFilterOffline, GivesEachRestartItsOwnLine) {
+TEST(ClockSmoother, GivesEachRestartItsOwnLine) {
   for (const ClockJitter jitter : {ClockJitter::kOneSided, ClockJitter::kSymmetric}) {
     ClockFilterOptions options;
     options.jitter = jitter;
@@ -223,7 +223,7 @@ TEST(ClockFilterOffline, GivesEachRestartItsOwnLine) {
     for (std::size_t i = 1000; i < recording.sender.size(); ++i) {
       recording.sender[i] -= i < 2000 ? 5e8 : 1e8;
     }
-    recording.filter(options);
+    recording.smooth(options);
     std::vector<std::size_t> restarted, rejected;
     for (std::size_t i = 0; i < recording.estimates.size(); ++i) {
       if (recording.estimates[i].restarted) restarted.push_back(i);
@@ -239,16 +239,16 @@ TEST(ClockFilterOffline, GivesEachRestartItsOwnLine) {
   }
 }
 
-TEST(ClockFilterOffline, EarlyOutliersDoNotBendTheLine) {
+TEST(ClockSmoother, EarlyOutliersDoNotBendTheLine) {
   Recording recording = record(6, 25, 200, [](Random& random, double t) {
     const bool stray = t == 1 || t == 50 || t == 120;
     return std::exponential_distribution<double>(250)(random) - (stray ? 0.3 : 0.0);
   });
-  recording.filter({});
+  recording.smooth({});
   EXPECT_LT(recording.worst(), 0.2e-3);
 }
 
-TEST(ClockFilterOffline, NeverAnswersNanWhateverItIsFed) {
+TEST(ClockSmoother, NeverAnswersNanWhateverItIsFed) {
   const double ugly[] = {0.0,
                          -1.0,
                          1e9,
@@ -267,77 +267,12 @@ TEST(ClockFilterOffline, NeverAnswersNanWhateverItIsFed) {
       recording.add(0, tame ? 100 + 0.04 * i : ugly[random() % std::size(ugly)],
                     tame ? 0.04 * i : ugly[random() % std::size(ugly)], i);
     }
-    recording.filter(options);
+    recording.smooth(options);
     for (const ClockEstimate& estimate : recording.estimates) {
       ASSERT_TRUE(std::isfinite(estimate.time_s) && std::isfinite(estimate.sigma_s)) << round;
       ASSERT_GT(estimate.sigma_s, 0) << round;
     }
   }
-}
-
-// ---- infer_sequence ----
-
-// Counts up to a constant: where does the inferred count slip against the true one?
-int slips(const std::vector<std::int64_t>& inferred, const std::vector<std::int64_t>& truth) {
-  int count = 0;
-  for (std::size_t i = 1; i < truth.size(); ++i) {
-    count += inferred[i] - inferred[i - 1] != truth[i] - truth[i - 1] ? 1 : 0;
-  }
-  return count;
-}
-
-TEST(InferSequence, FindsLossesDuplicatesAndOutages) {
-  for (unsigned seed = 1; seed <= 20; ++seed) {
-    Random random(seed);
-    std::uniform_real_distribution<double> uniform(0, 1);
-    std::normal_distribution<double> noise(0, 1.5e-3);
-    std::vector<double> receive;
-    std::vector<std::int64_t> truth;
-    for (std::int64_t i = 0; i < 2000; ++i) {
-      if (i > 0 && (uniform(random) < 0.1 || (i > 900 && i < 1400))) continue;
-      for (int copies = uniform(random) < 0.01 ? 2 : 1; copies > 0; --copies) {
-        receive.push_back(1e5 + 0.02 * static_cast<double>(i) + noise(random));
-        truth.push_back(i);
-      }
-    }
-    std::vector<std::int64_t> inferred(receive.size());
-    // 0.05 % off: more than that and an outage of 500 periods could not be counted.
-    ASSERT_TRUE(infer_sequence(receive.data(), receive.size(), 0.02 * 1.0005, inferred.data()));
-    EXPECT_EQ(slips(inferred, truth), 0) << "seed " << seed;
-  }
-}
-
-TEST(InferSequence, NoiseOfASixthOfAPeriodIsNoLoss) {
-  for (unsigned seed = 1; seed <= 20; ++seed) {
-    Recording recording = record(seed, 50, 40, gaussian(0.02 / 6));
-    std::vector<std::int64_t> inferred(recording.receive.size());
-    ASSERT_TRUE(
-        infer_sequence(recording.receive.data(), inferred.size(), 0.02 * 1.001, inferred.data()));
-    EXPECT_EQ(slips(inferred, recording.sequence), 0) << "seed " << seed;
-  }
-}
-
-TEST(InferSequence, TracksAPeriodThatIsOffByAPercent) {
-  Recording recording = record(1, 30, 60, gaussian(1e-3), 0.05);
-  std::vector<std::int64_t> inferred(recording.receive.size());
-  for (const double factor : {0.99, 1.01}) {
-    ASSERT_TRUE(
-        infer_sequence(recording.receive.data(), inferred.size(), factor / 30, inferred.data()));
-    EXPECT_EQ(slips(inferred, recording.sequence), 0) << factor;
-  }
-}
-
-TEST(InferSequence, RefusesWhatItCannotCount) {
-  const double times[] = {1.0, 1.04, 1e300};
-  const double broken[] = {1.0, std::numeric_limits<double>::quiet_NaN()};
-  std::int64_t sequence[3] = {};
-  EXPECT_TRUE(infer_sequence(times, 0, 0.04, sequence));
-  EXPECT_TRUE(infer_sequence(times, 2, 0.04, sequence));
-  EXPECT_EQ(sequence[1], 1);
-  EXPECT_FALSE(infer_sequence(times, 3, 0.04, sequence));
-  EXPECT_FALSE(infer_sequence(broken, 2, 0.04, sequence));
-  EXPECT_FALSE(infer_sequence(times, 2, 0.0, sequence));
-  EXPECT_FALSE(infer_sequence(times, 2, -0.04, sequence));
 }
 
 }  // namespace
