@@ -1,5 +1,5 @@
 #pragma once
-// HttpPollingSource: a PanTiltSource that asks a device again and again over one kept HTTP
+// open_http_polling(): a PanTiltSource that asks a device again and again over one kept HTTP
 // connection (libcurl). What is asked and what the answers mean is an HttpConversation's business,
 // which has no I/O of its own.
 //
@@ -77,24 +77,7 @@ struct HttpPollingPlan {
   std::string error;  // why no request can ever be made; empty: none
 };
 
-class HttpPollingSource : public PanTiltSource {
- public:
-  ~HttpPollingSource() override;
-  HttpPollingSource(const HttpPollingSource&) = delete;
-  HttpPollingSource& operator=(const HttpPollingSource&) = delete;
-
-  [[nodiscard]] ReadStatus read(PanTiltSample& sample, double timeout_s) override;
-  void stop() override;
-  [[nodiscard]] std::string error() const override;
-  [[nodiscard]] std::string name() const override;
-
- protected:
-  explicit HttpPollingSource(HttpPollingPlan plan);
-
- private:
-  class Implementation;  // keeps libcurl out of this header
-  std::unique_ptr<Implementation> implementation_;
-};
+[[nodiscard]] std::unique_ptr<PanTiltSource> open_http_polling(HttpPollingPlan plan);
 
 // The parts of an http or https URL. Takes user and password out of it where options have none, and
 // puts its bare form into options->name. Empty, or what is wrong.

@@ -234,6 +234,8 @@ HttpPollingPlan plan_of(const OnvifSourceOptions& given) {
 
 }  // namespace
 
-OnvifSource::OnvifSource(const OnvifSourceOptions& options) : HttpPollingSource(plan_of(options)) {}
+std::unique_ptr<PanTiltSource> open_onvif(const OnvifSourceOptions& options) {
+  return open_http_polling(plan_of(options));
+}
 
 }  // namespace alidade

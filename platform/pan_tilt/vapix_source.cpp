@@ -74,6 +74,8 @@ HttpPollingPlan plan_of(const VapixSourceOptions& given) {
 
 }  // namespace
 
-VapixSource::VapixSource(const VapixSourceOptions& options) : HttpPollingSource(plan_of(options)) {}
+std::unique_ptr<PanTiltSource> open_vapix(const VapixSourceOptions& options) {
+  return open_http_polling(plan_of(options));
+}
 
 }  // namespace alidade
