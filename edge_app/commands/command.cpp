@@ -179,11 +179,17 @@ Options polling_options(const PanTiltConfig& config) {
   return options;
 }
 
-std::unique_ptr<PanTiltSource> make_vapix_source(const PanTiltConfig& config) {
-  auto options = polling_options<VapixSourceOptions>(config);
+template <class Options>
+Options http_options(const PanTiltConfig& config) {
+  auto options = polling_options<Options>(config);
   options.url = config.url;
   options.user = config.user;
   options.password = config.password;
+  return options;
+}
+
+std::unique_ptr<PanTiltSource> make_vapix_source(const PanTiltConfig& config) {
+  auto options = http_options<VapixSourceOptions>(config);
   options.camera = config.camera;
   return open_vapix(options);
 }
@@ -194,10 +200,7 @@ std::unique_ptr<PanTiltSource> make_onvif_source(const PanTiltConfig& config) {
     return deg ? std::optional<OnvifRange>({kRadians * deg->front(), kRadians * deg->back()})
                : std::nullopt;
   };
-  auto options = polling_options<OnvifSourceOptions>(config);
-  options.url = config.url;
-  options.user = config.user;
-  options.password = config.password;
+  auto options = http_options<OnvifSourceOptions>(config);
   options.profile = config.profile;
   options.pan_range = radians(config.pan_range_deg);
   options.tilt_range = radians(config.tilt_range_deg);

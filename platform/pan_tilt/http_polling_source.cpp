@@ -314,9 +314,9 @@ ReadStatus HttpPollingSource::read(PanTiltSample& sample, double timeout_s) {
 
 }  // namespace
 
-std::string take_http_url(const std::string& text, Url* url, HttpPollingOptions* options) {
+std::string take_http_url(Url* url, HttpPollingOptions* options) {
   std::string error;
-  const bool is_url = parse_url(text, url, &error);
+  const bool is_url = parse_url(options->url, url, &error);
   options->name = url->bare;
   if (!is_url) {
     return error;

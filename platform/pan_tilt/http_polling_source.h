@@ -57,15 +57,20 @@ class HttpConversation {
   virtual void reset() = 0;
 };
 
-struct HttpPollingOptions {
-  std::string name;  // of the source: the URL without password
-  std::string user;
+// What the user says about any device that is polled.
+struct HttpDeviceOptions {
+  std::string url;   // http://host[:port] or https://...
+  std::string user;  // these go before what the URL may hold
   std::string password;
-  AxisMapping pan;  // of what the conversation takes from an answer
+  AxisMapping pan;  // of the angle that is taken from an answer
   AxisMapping tilt;
   double rate_hz = 30;
-  double timeout_s = 1;         // for one request
-  double max_backoff_s = 5;     // longest pause between two tries
+  double timeout_s = 1;      // for one request
+  double max_backoff_s = 5;  // longest pause between two tries
+};
+
+struct HttpPollingOptions : HttpDeviceOptions {
+  std::string name;             // of the source: the URL without password
   std::size_t max_body = 4096;  // bytes of an answer
   std::string expected;         // what an answer is: "a camera's position"
 };
@@ -79,9 +84,8 @@ struct HttpPollingPlan {
 
 [[nodiscard]] std::unique_ptr<PanTiltSource> open_http_polling(HttpPollingPlan plan);
 
-// The parts of an http or https URL. Takes user and password out of it where options have none, and
-// puts its bare form into options->name. Empty, or what is wrong.
-[[nodiscard]] std::string take_http_url(const std::string& text, Url* url,
-                                        HttpPollingOptions* options);
+// The parts of options->url. Takes user and password out of it where options have none, and puts its bare
+// form into options->name. Empty, or what is wrong.
+[[nodiscard]] std::string take_http_url(Url* url, HttpPollingOptions* options);
 
 }  // namespace alidade

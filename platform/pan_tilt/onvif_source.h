@@ -28,18 +28,13 @@ struct OnvifRange {
   double at_plus_one_rad = 0;
 };
 
-struct OnvifSourceOptions {
-  std::string url;   // http://host[:port][/onvif/device_service]
-  std::string user;  // these go before what the URL may hold
-  std::string password;
+// url: http://host[:port][/onvif/device_service]. pan and tilt: of the angle, after the range.
+struct OnvifSourceOptions : HttpDeviceOptions {
+  OnvifSourceOptions() { rate_hz = 10; }  // SOAP is work for a camera
+
   std::string profile;  // token; empty: the device's first profile with PTZ
   std::optional<OnvifRange> pan_range;
   std::optional<OnvifRange> tilt_range;
-  AxisMapping pan;  // of the angle, after the range
-  AxisMapping tilt;
-  double rate_hz = 10;
-  double timeout_s = 1;      // for one request
-  double max_backoff_s = 5;  // longest pause between two tries
 };
 
 [[nodiscard]] std::unique_ptr<PanTiltSource> open_onvif(const OnvifSourceOptions& options);

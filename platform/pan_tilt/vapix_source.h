@@ -13,16 +13,9 @@
 
 namespace alidade {
 
-struct VapixSourceOptions {
-  std::string url;   // http://host[:port] or https://...
-  std::string user;  // these go before what the URL may hold
-  std::string password;
+// VAPIX counts to the right and up.
+struct VapixSourceOptions : HttpDeviceOptions {
   int camera = 0;  // video channel of a device with several, 1, 2, ...; 0: not named in the request
-  AxisMapping pan;   // VAPIX counts to the right
-  AxisMapping tilt;  // and up
-  double rate_hz = 30;
-  double timeout_s = 1;      // for one poll
-  double max_backoff_s = 5;  // longest pause between two tries
 };
 
 [[nodiscard]] std::unique_ptr<PanTiltSource> open_vapix(const VapixSourceOptions& options);
