@@ -9,7 +9,6 @@
 namespace alidade {
 namespace {
 
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 constexpr double kQuietBytes = 10;  // times of a byte without one are silence
 constexpr double kLeastQuiet_s = 0.02;
 constexpr int kTriesPerTimeout = 4;
