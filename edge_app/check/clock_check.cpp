@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "edge_app/pipeline/stream_clock.h"
+#include "edge_app/pipeline/capture_clock.h"
 
 namespace alidade {
 namespace {
@@ -38,7 +38,7 @@ void measure_raw_rate(const std::vector<ClockedStamp>& stamps, ClockReport* repo
 ClockReport check_clock(const std::vector<ClockedStamp>& stamps, const ClockFilterOptions& options,
                         std::vector<double>* time_s) {
   ClockReport report;
-  StreamClock clock(options);
+  CaptureClock clock(options);
   std::vector<double> times;
   std::int64_t reconnections = 0;
   std::size_t line_since = 0;  // the item at which the filter's line last began anew

@@ -9,8 +9,8 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "core/calibration/calibration_file.h"
-#include "platform/recording/csv_reader.h"
+#include "edge_app/storage/calibration_file.h"
+#include "platform/storage/csv_reader.h"
 #include "test/accuracy/statistics.h"
 
 namespace alidade::test {

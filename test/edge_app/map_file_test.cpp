@@ -1,4 +1,4 @@
-#include "edge_app/config/map_file.h"
+#include "edge_app/storage/map_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -9,7 +9,7 @@
 #include <limits>
 #include <random>
 
-#include "core/calibration/calibration_file.h"
+#include "edge_app/storage/calibration_file.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {
