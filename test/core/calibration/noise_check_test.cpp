@@ -91,7 +91,7 @@ TEST(Repetition, LeavesOutliersOut) {
 // Mean of ratio^2 over many draws of all that is noise, the prior's mean among it: each has a standard deviation of
 // sqrt(2 / redundancy). The check counts as unknown what the prior decides, trace(covariance * information): it is added.
 TEST(NoiseRatios, AreOneInTheMeanWhereTheNoiseIsAsStated) {
-  constexpr int kRuns = 200;
+  constexpr int kRuns = 400;
   constexpr double kPriorSigma = 1e-3;
   test::AdjustmentScene scene = test::make_adjustment_scene();
   scene.priors.information.setConstant(1 / (kPriorSigma * kPriorSigma));
