@@ -42,7 +42,8 @@ Tracks make_tracks(std::size_t landmarks, std::size_t length, double correlation
       before = white;
     }
     for (std::size_t i = 0; i < length; ++i) {
-      tracks.data.observations.push_back({static_cast<int>(l), static_cast<int>(i), {}, 1, true});
+      tracks.data.observations.push_back(
+          {static_cast<int>(l), static_cast<int>(i), Vector2<double>::Zero(), 1, true});
       LinearisedResidual residual;
       residual.valid = true;
       residual.error = errors[i] - mean;
