@@ -12,8 +12,6 @@
 #include <filesystem>
 #include <system_error>
 
-#include "core/calibration/atomic_file.h"
-#include "core/calibration/calibration_file.h"
 #include "edge_app/commands/calibration_input.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
@@ -21,7 +19,9 @@
 #include "edge_app/output/calibration_report.h"
 #include "edge_app/output/calibration_summary.h"
 #include "edge_app/pipeline/calibration_streams.h"
+#include "edge_app/storage/calibration_file.h"
 #include "edge_app/storage/map_file.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {

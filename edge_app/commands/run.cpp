@@ -12,7 +12,6 @@
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
-#include "edge_app/storage/calibration_store.h"
 #include "edge_app/output/http_api.h"
 #include "edge_app/output/http_server.h"
 #include "edge_app/output/live_state.h"
@@ -20,6 +19,7 @@
 #include "edge_app/output/record_writer.h"
 #include "edge_app/output/status_page.h"
 #include "edge_app/pipeline/pipeline.h"
+#include "edge_app/storage/calibration_store.h"
 #include "platform/system/clock.h"
 #include "platform/system/realtime.h"
 #include "platform/system/service_manager.h"
