@@ -5,7 +5,7 @@
 #include <string>
 
 #include "core/calibration/calibrate.h"
-#include "core/realtime/map_state.h"
+#include "core/realtime/oe_mode/map_state.h"
 #include "edge_app/commands/calibration_input.h"
 #include "edge_app/commands/stop_signals.h"
 

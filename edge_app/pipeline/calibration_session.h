@@ -16,7 +16,7 @@
 #include "core/calibration/calibrate.h"
 #include "core/calibration/held_out.h"
 #include "core/model/camera.h"
-#include "core/realtime/image_view.h"
+#include "core/realtime/image/image_view.h"
 #include "edge_app/pipeline/calibration_feed.h"
 #include "edge_app/pipeline/keyframe_map.h"
 #include "edge_app/pipeline/packed_picture.h"

@@ -4,8 +4,8 @@
 
 #include <optional>
 
-#include "core/realtime/oe_mode.h"
-#include "core/realtime/start_up_tracker.h"
+#include "core/realtime/oe_mode/oe_mode.h"
+#include "core/realtime/start_up/start_up_tracker.h"
 #include "edge_app/pipeline/calibration_feed.h"
 #include "edge_app/pipeline/frame_landmarks.h"
 

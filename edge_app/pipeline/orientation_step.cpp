@@ -129,13 +129,13 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
               .update(stamp.receive_time_s, stamp.sender_time_s, stamp.sequence, stamp.restarted)
               .value_or(clock);
   events->video_clock_restarted = clock.restarted;
-  events->video_floor_shifted = clock.floor_shifted;
-  if (clock.restarted || clock.floor_shifted) floor_sigma_s_ = options_.floor_sigma_s;
+  events->video_floor_shifted = clock.delay_stepped;
+  if (clock.restarted || clock.delay_stepped) floor_sigma_s_ = options_.floor_sigma_s;
   picture_ = picture;
   tracks_.stamp = stamp;
   tracks_.time_s = clock.time_s;
   tracks_.clock_restarted = clock.restarted;
-  tracks_.floor_shifted = clock.floor_shifted;
+  tracks_.floor_shifted = clock.delay_stepped;
   tracks_.tracker = FrameTracks::Tracker::kNone;
 
   OrientationRecord record = empty_record();

@@ -1,7 +1,7 @@
 #include "edge_app/pipeline/record_status.h"
 
-#include "core/realtime/oe_mode.h"
-#include "core/realtime/telemetry_buffer.h"
+#include "core/realtime/oe_mode/oe_mode.h"
+#include "core/realtime/telemetry/telemetry_buffer.h"
 
 namespace alidade {
 

@@ -20,7 +20,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
-#include "core/realtime/image_view.h"
+#include "core/realtime/image/image_view.h"
 #include "edge_app/pipeline/calibration_archive.h"
 #include "edge_app/pipeline/calibration_feed.h"
 #include "edge_app/pipeline/calibration_session.h"

@@ -17,7 +17,7 @@
 //                 3 f64   d_b, unit direction in the base
 //                 3 f64   cov_d: xx, xy, yy in tangent_basis(d_b), rad^2; the calibration taken as exact
 //                 u32     observations
-//              m times 464 bytes, see Landmark in core/realtime/landmark_map.h:
+//              m times 464 bytes, see Landmark in core/realtime/oe_mode/landmark_map.h:
 //                 u32     octave, 0 to 7
 //                 3 f64   d, unit direction in the map's frame
 //                 3 f64   covariance: xx, xy, yy, rad^2
@@ -40,7 +40,7 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/model/calibration.h"
-#include "core/realtime/map_state.h"
+#include "core/realtime/oe_mode/map_state.h"
 
 namespace alidade {
 
