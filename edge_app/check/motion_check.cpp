@@ -15,7 +15,7 @@ constexpr double kMoved_px = 2;     // rms over a baseline
 constexpr double kLeastTimes = 8;   // baselines without overlap
 constexpr double kExplained = 0.8;  // of an axis's motion
 constexpr double kUnlike = 0.8;     // what the other sign may explain, of what this one does
-constexpr double kLeastHeadRange_rad = 1e-3;  // rad; less turns no image visibly
+constexpr double kLeastHeadRange_rad = 1e-3;  // less turns no image visibly
 
 AxisVerdict judge_axis(const MotionSearch& search, std::size_t best, std::size_t axis) {
   const MotionFit& fit = search.fits[best];
@@ -88,9 +88,9 @@ void judge_scale(MotionReport* report, const MotionNeeds& needs) {
 
 // The search's steps and the samples' age leave some 20 ms open; three times that is another link's delay.
 void judge_offset(MotionReport* report, const MotionNeeds& needs) {
-  constexpr double kFar = 0.06;  // s
+  constexpr double kFar_s = 0.06;
   if (!needs.calibrated || !report->clock_offset_s ||
-      std::abs(*report->clock_offset_s - needs.clock_offset_s) < kFar) {
+      std::abs(*report->clock_offset_s - needs.clock_offset_s) < kFar_s) {
     return;
   }
   add_advice(

@@ -91,7 +91,7 @@ void judge_resolution(TelemetryReport* report, const TelemetryNeeds& needs) {
 // OE mode looks for landmarks within three sigmas of the prediction and, where that fails, within 96 px (oe_mode.cpp).
 // Uniform within its bounds, a sample's time has a sigma of width / sqrt(12).
 void judge_bounds(TelemetryReport* report, const TelemetryNeeds& needs) {
-  constexpr double kFarthest = 96;  // px
+  constexpr double kFarthest_px = 96;
   if (report->negative_bounds > 0) {
     add_problem(
         &report->findings,
@@ -103,14 +103,14 @@ void judge_bounds(TelemetryReport* report, const TelemetryNeeds& needs) {
   if (!report->bounds_s || !needs.landmarks) return;
   const double error_px =
       3 * report->bounds_s->median / std::sqrt(12.0) * rate * needs.focal_length_px;
-  if (error_px <= kFarthest) return;
+  if (error_px <= kFarthest_px) return;
   add_advice(
       &report->findings,
       fmt::format("pan/tilt {}: an angle's time is known to {:.0f} ms; at {:.1f} deg/s, as the "
                   "head turned, that is up to {:.0f} px, beyond the {:.0f} px in which OE mode "
                   "looks for landmarks: shorten the way to the head, or turn more slowly",
                   needs.source, 1e3 * report->bounds_s->median, kDegrees * rate, error_px,
-                  kFarthest));
+                  kFarthest_px));
 }
 
 void judge_zoom(TelemetryReport* report, const TelemetryNeeds& needs) {

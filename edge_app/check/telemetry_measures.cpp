@@ -14,12 +14,12 @@ constexpr std::size_t kLeastChanges = 8;  // below it a median is one of acciden
 
 // The head goes one way through the value of a run, by steps that rounding does not explain.
 bool passes(double before, double at, double after, double resolution) {
-  constexpr double kBeyondRounding = 2;  // steps
-  constexpr double kSmallest = 2e-7;     // rad; steps of a rounding in a file are none
+  constexpr double kBeyondRounding = 2;   // steps
+  constexpr double kSmallest_rad = 2e-7;  // steps of a rounding in a file are none
   const double in = wrap_angle(at - before);
   const double out = wrap_angle(after - at);
-  return in * out > 0 &&
-         std::min(std::abs(in), std::abs(out)) > std::max(kBeyondRounding * resolution, kSmallest);
+  return in * out > 0 && std::min(std::abs(in), std::abs(out)) >
+                             std::max(kBeyondRounding * resolution, kSmallest_rad);
 }
 
 // Whether an axis goes one way about run i: of all its ways over four runs to both sides, most lead on. Noise goes

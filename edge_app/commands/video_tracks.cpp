@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 constexpr int kPoints = 250;  // in a frame
 // Of a first trajectory's angles. It stands for measurements that OE mode weighs against what it sees, so
 // it claims no more than it must to predict the picture.
-constexpr double kFirstSigmaPx = 1;
+constexpr double kFirstSigma_px = 1;
 
 // use(frame, luma) for each picture of the input's frames, in the order of the recording.
 template <class Use>
@@ -104,7 +104,7 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
         const auto time = times.find(frame);
         if (time == times.end()) return;  // no telemetry accompanies it
         const InterpolatedPanTilt prediction =
-            predict(estimate, time->second + to_middle_s, kFirstSigmaPx);
+            predict(estimate, time->second + to_middle_s, kFirstSigma_px);
         FrameOrientation orientation;
         const OeStatus status = mode.process(image, time->second, &prediction, &orientation);
         for (int i = 0; status == OeStatus::kOk && i < mode.statistics().aligned; ++i) {

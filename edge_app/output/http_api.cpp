@@ -236,7 +236,7 @@ ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
   out["video_clock"] = {{"locked", newest && newest->clock_locked},
                         {"sigma_s", newest && newest->time_s ? Json(newest->time_sigma_s) : Json()},
                         {"restarts", summary.clock_restarts},
-                        {"floor_shifts", summary.floor_shifts}};
+                        {"floor_shifts", summary.delay_steps}};
   out["latency_s"] = sources.latency_measured ? quantiles(summary.latency) : Json();
   if (sources.latency_measured) {
     out["stages_s"] = {{"decoding", quantiles(summary.decoding)},

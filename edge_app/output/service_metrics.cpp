@@ -133,7 +133,7 @@ std::string service_metrics(const HttpApiSources& sources, const HttpCounters& h
   out.counter("alidade_video_clock_restarts_total", "Starts of the video's clock filter anew");
   out.add(summary.clock_restarts);
   out.counter("alidade_video_clock_floor_shifts_total", "Steps of the video's least delay");
-  out.add(summary.floor_shifts);
+  out.add(summary.delay_steps);
   out.counter("alidade_realtime_page_faults_total",
               "Page faults of the real-time thread after its start-up");
   out.add(std::int64_t{summary.page_faults.minor}, {{"kind", "minor"}});

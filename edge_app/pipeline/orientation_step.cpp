@@ -38,9 +38,9 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
 OrientationStep::Telemetry OrientationStep::empty_telemetry(bool filtered) const {
   // Filtered times share the error of their line; polled ones have each an error of its own, which a
   // bound beyond every stamp's sigma says.
-  constexpr double kAllOwn = 1e3;  // s
+  constexpr double kAllOwn_s = 1e3;
   TelemetryNoise noise = options_.telemetry_noise;
-  if (!filtered) noise.period_sigma_s = kAllOwn;
+  if (!filtered) noise.period_sigma_s = kAllOwn_s;
   return Telemetry(noise, options_.telemetry_limits);
 }
 
@@ -93,7 +93,7 @@ void OrientationStep::adopt(const PublishedCalibration& published) {
   options_.calibration = published.calibration;
   options_.calibrated = published.calibrated;
   zoom_at_adoption_ = zoom_;
-  floor_sigma_s_ = 0;
+  minimum_delay_sigma_s_ = 0;
   pending_.clear();
   if (oe_) oe_->reset(published.calibration, published.map);
 }
@@ -129,13 +129,14 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
               .update(stamp.receive_time_s, stamp.sender_time_s, stamp.sequence, stamp.restarted)
               .value_or(clock);
   events->video_clock_restarted = clock.restarted;
-  events->video_floor_shifted = clock.delay_stepped;
-  if (clock.restarted || clock.delay_stepped) floor_sigma_s_ = options_.floor_sigma_s;
+  events->video_delay_stepped = clock.delay_stepped;
+  if (clock.restarted || clock.delay_stepped)
+    minimum_delay_sigma_s_ = options_.minimum_delay_sigma_s;
   picture_ = picture;
   tracks_.stamp = stamp;
   tracks_.time_s = clock.time_s;
   tracks_.clock_restarted = clock.restarted;
-  tracks_.floor_shifted = clock.delay_stepped;
+  tracks_.delay_stepped = clock.delay_stepped;
   tracks_.tracker = FrameTracks::Tracker::kNone;
 
   OrientationRecord record = empty_record();
@@ -146,7 +147,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const double to_middle_row_s = calibration.line_delay * (0.5 * calibration.camera.height);
   InterpolatedPanTilt measured;
   const double telemetry_time_s = clock.time_s + calibration.clock_offset + to_middle_row_s;
-  const double time_sigma_s = std::hypot(clock.sigma_s, floor_sigma_s_);
+  const double time_sigma_s = std::hypot(clock.sigma_s, minimum_delay_sigma_s_);
   const QueryStatus query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
   if (const auto newest_s = telemetry_.newest_time())
     record.telemetry_age_s = telemetry_time_s - *newest_s;

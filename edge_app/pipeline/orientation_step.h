@@ -57,7 +57,7 @@ struct OrientationStepOptions {
   // With OE mode: follow points as long as there is no calibration.
   bool follow_points = false;
   double zoom_tolerance = 0;  // device units within which the calibration holds
-  double floor_sigma_s =
+  double minimum_delay_sigma_s =
       5e-3;  // by how much a new connection's least delay differs, one standard deviation
 };
 
@@ -67,7 +67,7 @@ struct OrientationStepOptions {
 // What a frame brought to light, for the log.
 struct StepEvents {
   bool video_clock_restarted = false;
-  bool video_floor_shifted = false;  // the least delay stepped: flagged, not followed
+  bool video_delay_stepped = false;  // the least delay stepped: flagged, not followed
 };
 
 class OrientationStep {
@@ -85,7 +85,7 @@ class OrientationStep {
   // For when the record is out: upkeep of the landmark map with the frame last added, or the following of
   // points through it.
   void maintain();
-  // In OE mode, for now.
+  // In OE mode, with the calibration and the zoom of this moment.
   [[nodiscard]] bool finds_landmarks() const { return oe_ && options_.calibrated && zoom_fits(); }
   // In OE mode, or following points.
   [[nodiscard]] bool looks_at_pictures() const { return finds_landmarks() || start_up_; }
@@ -120,7 +120,7 @@ class OrientationStep {
   std::unique_ptr<StartUpTracker> start_up_;  // null: nobody wants its points
   std::optional<double> zoom_;                // as last reported
   std::optional<double> zoom_at_adoption_;    // that a calibration without zoom is for
-  double floor_sigma_s_ = 0;
+  double minimum_delay_sigma_s_ = 0;
   ImageView picture_;                // of the frame last added, until it is maintained
   FrameTracks tracks_;               // of the frame last added, but for its points
   bool telemetry_filtered_ = false;  // times in telemetry_ come from telemetry_clock_

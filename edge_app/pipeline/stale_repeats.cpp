@@ -12,7 +12,7 @@ namespace alidade {
 namespace {
 
 // Steps of a rounding in a file, or of arithmetic, are none of the device's.
-constexpr double kSmallestStep = 2e-7;  // rad
+constexpr double kSmallestStep_rad = 2e-7;
 constexpr std::size_t kLeastSteps =
     8;  // by chance 8 lie near multiples once in 0.06^-8 = 6e9 times
 
@@ -87,7 +87,7 @@ bool is_stale(const std::vector<PanTiltSample>& samples, const EqualRun* run, co
       samples[run[1].end - 1].earliest_time_s - samples[run[1].begin].latest_time_s;
   const double least = std::min(std::abs(before), std::abs(after)) * held_s;
   const double all = 0.5 * std::abs(before + after) * (time_s[2] - time_s[1]);
-  return least > std::max(kHiddenSteps * axis.resolution, kSmallestStep) &&
+  return least > std::max(kHiddenSteps * axis.resolution, kSmallestStep_rad) &&
          std::abs(out) >= kExplained * all;
 }
 
@@ -108,7 +108,7 @@ double device_resolution(const std::vector<double>& angles_rad) {
   std::sort(sorted.begin(), sorted.end());
   std::vector<double> gaps;
   for (std::size_t i = 1; i < sorted.size(); ++i) {
-    if (sorted[i] - sorted[i - 1] > kSmallestStep) gaps.push_back(sorted[i] - sorted[i - 1]);
+    if (sorted[i] - sorted[i - 1] > kSmallestStep_rad) gaps.push_back(sorted[i] - sorted[i - 1]);
   }
   if (gaps.size() < kLeastSteps) return 0;
   std::sort(gaps.begin(), gaps.end());
@@ -118,7 +118,7 @@ double device_resolution(const std::vector<double>& angles_rad) {
     const double base = gaps[static_cast<std::size_t>(share * static_cast<double>(gaps.size()))];
     for (int parts = 1; parts <= kMostParts; ++parts) {
       double q = base / parts;
-      if (q > resolution && q > kSmallestStep && fits(gaps, &q))
+      if (q > resolution && q > kSmallestStep_rad && fits(gaps, &q))
         resolution = std::max(resolution, q);
     }
   }
