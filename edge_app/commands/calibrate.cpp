@@ -20,6 +20,7 @@
 #include "edge_app/output/calibration_report.h"
 #include "edge_app/output/calibration_summary.h"
 #include "edge_app/storage/map_file.h"
+#include "platform/storage/recording.h"
 
 namespace alidade {
 namespace {
@@ -89,7 +90,7 @@ CalibrationJob load_job(const std::string& recording, const CalibrateOptions& op
 
 // The format of a recording's tracks.csv.
 std::string tracks_text(const std::vector<CalibrationObservation>& observations) {
-  std::string text = "frame,landmark,u_px,v_px,sigma_px\n";
+  std::string text = tracks_csv_columns() + "\n";
   for (const CalibrationObservation& seen : observations) {
     text += fmt::format("{},{},{:.4f},{:.4f},{:.4f}\n", seen.frame, seen.landmark, seen.u_px,
                         seen.v_px, seen.sigma_px);

@@ -4,6 +4,7 @@
 #include <time.h>
 
 #include <algorithm>
+#include <array>
 #include <limits>
 #include <nlohmann/json.hpp>
 
@@ -106,18 +107,25 @@ ServerResponse orientation(const HttpApiSources& sources) {
 }
 
 ServerResponse history(const HttpApiSources& sources) {
+  using Sample = const HistorySample&;
+  struct Column {
+    const char* name;
+    Json (*value)(Sample);
+  };
+  static constexpr std::array<Column, 7> kColumns = {
+      {{"time_s", [](Sample s) { return Json(s.time_s); }},
+       {"mode", [](Sample s) { return Json(to_string(s.mode)); }},
+       {"pan_rad", [](Sample s) { return or_null(s.pan_rad); }},
+       {"tilt_rad", [](Sample s) { return or_null(s.tilt_rad); }},
+       {"landmarks", [](Sample s) { return Json(s.landmarks); }},
+       {"residual_px", [](Sample s) { return or_null(s.residual_px); }},
+       {"latency_s", [](Sample s) { return or_null(s.latency_s); }}}};
+  const auto samples = sources.live->history();
   Json columns;
-  for (const char* name :
-       {"time_s", "mode", "pan_rad", "tilt_rad", "landmarks", "residual_px", "latency_s"})
-    columns[name] = Json::array();
-  for (const HistorySample& sample : sources.live->history()) {
-    columns["time_s"].push_back(sample.time_s);
-    columns["mode"].push_back(to_string(sample.mode));
-    columns["pan_rad"].push_back(or_null(sample.pan_rad));
-    columns["tilt_rad"].push_back(or_null(sample.tilt_rad));
-    columns["landmarks"].push_back(sample.landmarks);
-    columns["residual_px"].push_back(or_null(sample.residual_px));
-    columns["latency_s"].push_back(or_null(sample.latency_s));
+  for (const Column& column : kColumns) {
+    Json values = Json::array();
+    for (const HistorySample& sample : samples) values.push_back(column.value(sample));
+    columns[column.name] = std::move(values);
   }
   return json_response(columns);
 }
