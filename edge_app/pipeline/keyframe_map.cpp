@@ -40,8 +40,8 @@ double samples_worth_one(const std::vector<double>& errors) {
 }  // namespace
 
 InterpolatedPanTilt predict(const CalibrationResult& result, double time_s, double sigma_px) {
-  constexpr double kHalfSpan = 0.02;  // s, over which the acceleration is taken
-  constexpr double kRenewal = 0.5;    // s, about a segment of the trajectory
+  constexpr double kHalfSpan = 0.02;          // s, over which the acceleration is taken
+  constexpr double kCorrelationTime_s = 0.5;  // s, about a segment of the trajectory
   const TrajectorySpline& trajectory = result.trajectory;
   const Mechanics<double>& mechanics = result.calibration.mechanics;
   const Vector2<double> scale(mechanics.pan_scale, mechanics.tilt_scale);
@@ -58,10 +58,10 @@ InterpolatedPanTilt predict(const CalibrationResult& result, double time_s, doub
       of_rate * of_rate;
   out.acceleration = {scale.x() * (after.pan - before.pan) / (2 * kHalfSpan),
                       scale.y() * (after.tilt - before.tilt) / (2 * kHalfSpan)};
-  out.acceleration_square =
-      out.acceleration.vector().cwiseAbs2().array() + of_rate * of_rate / (kRenewal * kRenewal);
+  out.acceleration_square = out.acceleration.vector().cwiseAbs2().array() +
+                            of_rate * of_rate / (kCorrelationTime_s * kCorrelationTime_s);
   out.samples = kInterpolationWindow;
-  out.renewal_s = kRenewal;
+  out.correlation_time_s = kCorrelationTime_s;
   return out;
 }
 
@@ -100,7 +100,7 @@ MapState map_from_keyframes(const CalibrationResult& result,
   const double to_middle_s = result.calibration.line_delay * camera.height / 2;
   const double acceleration_sigma = kAccelerationSigmaPxPerS2 / camera.focal_length;
   OeOptions options = oe_options(camera);
-  options.max_new = options.max_landmarks;  // a view is there once only
+  options.maker.max_new = options.max_landmarks;  // a view is there once only
   OeMode mode(options);
   mode.reset(result.calibration);
   double tilt = 0;
@@ -119,11 +119,11 @@ MapState map_from_keyframes(const CalibrationResult& result,
   }
   MapState map = mode.map_state();
   map.offset_covariance += tie_covariance(result);
-  map.bend_tilt = tilt;
+  map.shear_tilt = tilt;
   const double rate_sigma = kRatePerAngle * kSigmaPx / camera.focal_length;
-  for (Matrix3<double>& bend : map.bend_covariance) {
-    bend.setZero();
-    bend.diagonal() << 0, rate_sigma * rate_sigma, acceleration_sigma * acceleration_sigma;
+  for (Matrix3<double>& shear : map.shear_covariance) {
+    shear.setZero();
+    shear.diagonal() << 0, rate_sigma * rate_sigma, acceleration_sigma * acceleration_sigma;
   }
   return map;
 }

@@ -30,7 +30,6 @@
 #include "edge_app/pipeline/calibration_feed.h"
 #include "edge_app/pipeline/frame_landmarks.h"
 #include "edge_app/pipeline/orientation_record.h"
-#include "edge_app/pipeline/pending_frames.h"
 #include "edge_app/pipeline/published_calibration.h"
 #include "edge_app/pipeline/stream_clock.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
@@ -106,7 +105,8 @@ class OrientationStep {
   [[nodiscard]] RecordStatus status_of(QueryStatus query, bool clock_locked) const;
   // False: there is a calibration, but not for the zoom that the pan/tilt source reports.
   [[nodiscard]] bool zoom_fits() const;
-  void tell_pending_frames();
+  // Frames that extrapolated telemetry answered, and that telemetry encloses by this sample.
+  void settle_pending_frames();
   // Completes a record that has its time and telemetry's status; measured: null if there is none.
   void orient(const InterpolatedPanTilt* measured, const ImageView& picture,
               OrientationRecord* record);
@@ -115,7 +115,6 @@ class OrientationStep {
   StreamClock video_clock_;
   StreamClock telemetry_clock_;
   Telemetry telemetry_;
-  PendingFrames pending_;                     // of OE mode
   std::unique_ptr<OeMode> oe_;                // null: PT mode
   std::unique_ptr<StartUpTracker> start_up_;  // null: nobody wants its points
   std::optional<double> zoom_;                // as last reported
