@@ -77,7 +77,7 @@ TelemetryNeeds telemetry_needs(const Measured& measured, const Config& config,
   needs.max_gap_s = step.telemetry_limits.max_gap_s;
   needs.max_extrapolation_s = step.telemetry_limits.max_extrapolation_s;
   needs.angle_sigma_rad = step.telemetry_noise.pan_tilt_sigma;
-  needs.resolution_rad = step.telemetry_noise.quantum;
+  needs.resolution_rad = step.telemetry_noise.resolution;
   needs.focal_length_px = calibration.calibration.camera.focal_length;
   needs.clock_offset_s = calibration.calibrated ? calibration.calibration.clock_offset : 0;
   needs.zoom = calibration.calibration.zoom;

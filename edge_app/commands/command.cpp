@@ -87,7 +87,7 @@ OrientationStepOptions step_options(const Config& config, const NamedCalibration
   OrientationStepOptions options = step_options(RecordingNoise{}, calibration);
   TelemetryNoise& noise = options.telemetry_noise;
   noise.pan_tilt_sigma = config.pan_tilt.angle_sigma_rad.value_or(noise.pan_tilt_sigma);
-  noise.quantum = config.pan_tilt.angle_quantum_rad;
+  noise.resolution = config.pan_tilt.angle_quantum_rad;
   noise.acceleration_sigma = config.pan_tilt.acceleration_sigma_rad_s2;
   options.telemetry_limits.max_repeat_s = config.pan_tilt.max_repeat_s;
   options.telemetry_limits.max_extrapolation_s = config.realtime.max_extrapolation_s;

@@ -93,8 +93,8 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
   OeOptions options;
   options.max_width = input.width;
   options.max_height = input.height;
-  options.max_used = kPoints;
-  options.cell_size_px = std::sqrt(static_cast<double>(input.width) * input.height / kPoints);
+  options.search.choice.max_used = kPoints;
+  options.maker.cell_size_px = std::sqrt(static_cast<double>(input.width) * input.height / kPoints);
   OeMode mode(options);
   mode.reset(estimate.calibration);
   const double to_middle_s = estimate.calibration.line_delay * input.height / 2;

@@ -61,7 +61,7 @@ InterpolatedPanTilt predict(const CalibrationResult& result, double time_s, doub
   out.acceleration_square = out.acceleration.vector().cwiseAbs2().array() +
                             of_rate * of_rate / (kCorrelationTime_s * kCorrelationTime_s);
   out.samples = kInterpolationWindow;
-  out.renewal_s = kCorrelationTime_s;
+  out.correlation_time_s = kCorrelationTime_s;
   return out;
 }
 
@@ -100,7 +100,7 @@ MapState map_from_keyframes(const CalibrationResult& result,
   const double to_middle_s = result.calibration.line_delay * camera.height / 2;
   const double acceleration_sigma = kAccelerationSigmaPxPerS2 / camera.focal_length;
   OeOptions options = oe_options(camera);
-  options.max_new = options.max_landmarks;  // a view is there once only
+  options.maker.max_new = options.max_landmarks;  // a view is there once only
   OeMode mode(options);
   mode.reset(result.calibration);
   double tilt = 0;
@@ -119,11 +119,11 @@ MapState map_from_keyframes(const CalibrationResult& result,
   }
   MapState map = mode.map_state();
   map.offset_covariance += tie_covariance(result);
-  map.bend_tilt = tilt;
+  map.shear_tilt = tilt;
   const double rate_sigma = kRatePerAngle * kSigma_px / camera.focal_length;
-  for (Matrix3<double>& bend : map.bend_covariance) {
-    bend.setZero();
-    bend.diagonal() << 0, rate_sigma * rate_sigma, acceleration_sigma * acceleration_sigma;
+  for (Matrix3<double>& shear : map.shear_covariance) {
+    shear.setZero();
+    shear.diagonal() << 0, rate_sigma * rate_sigma, acceleration_sigma * acceleration_sigma;
   }
   return map;
 }

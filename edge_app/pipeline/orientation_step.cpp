@@ -12,7 +12,7 @@ OeOptions oe_options(const Camera<double>& camera) {
   OeOptions options;
   options.max_width = camera.width;
   options.max_height = camera.height;
-  options.cell_size_px = std::min(options.cell_size_px, camera.width / kLeastColumns);
+  options.maker.cell_size_px = std::min(options.maker.cell_size_px, camera.width / kLeastColumns);
   return options;
 }
 
@@ -51,7 +51,7 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   if (sample.restarted || filtered != telemetry_filtered_ || (clock && clock->restarted)) {
     telemetry_ = empty_telemetry(filtered);
     telemetry_filtered_ = filtered;
-    pending_.clear();
+    if (oe_) oe_->forget_pending();
   }
   telemetry_lost_ = false;
   if (sample.zoom) {
@@ -73,17 +73,17 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   // What the buffer refuses (a duplicate, a value that is not finite) it counts, and the records'
   // sigma says the rest.
   static_cast<void>(telemetry_.push(timed));
-  tell_pending_frames();
+  settle_pending_frames();
 }
 
-void OrientationStep::tell_pending_frames() {
-  while (const auto frame = pending_.take(
-             telemetry_.newest_time().value_or(-std::numeric_limits<double>::infinity()))) {
-    InterpolatedPanTilt measured;
-    if (telemetry_.query(frame->telemetry_time_s, frame->time_sigma_s, &measured) ==
-        QueryStatus::kOk) {
-      oe_->add_late_telemetry(frame->frame_time_s, measured);
-    }
+void OrientationStep::settle_pending_frames() {
+  const std::optional<double> newest_s = telemetry_.newest_time();
+  if (!oe_ || !newest_s) return;
+  TelemetryLookUp look_up;
+  while (oe_->pending(*newest_s, &look_up)) {
+    InterpolatedPanTilt late;
+    const QueryStatus query = telemetry_.query(look_up.time_s, look_up.time_sigma_s, &late);
+    oe_->settle_pending(query == QueryStatus::kOk ? &late : nullptr);
   }
 }
 
@@ -94,7 +94,6 @@ void OrientationStep::adopt(const PublishedCalibration& published) {
   options_.calibrated = published.calibrated;
   zoom_at_adoption_ = zoom_;
   minimum_delay_sigma_s_ = 0;
-  pending_.clear();
   if (oe_) oe_->reset(published.calibration, published.map);
 }
 
@@ -160,9 +159,6 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
     return record;
   }
   orient(has_result(query) ? &measured : nullptr, picture, &record);
-  if (query == QueryStatus::kExtrapolated && finds_landmarks()) {
-    pending_.add({clock.time_s, telemetry_time_s, time_sigma_s});
-  }
   return record;
 }
 

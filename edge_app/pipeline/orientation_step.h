@@ -32,7 +32,6 @@
 #include "edge_app/pipeline/capture_clock.h"
 #include "edge_app/pipeline/frame_landmarks.h"
 #include "edge_app/pipeline/orientation_record.h"
-#include "edge_app/pipeline/pending_frames.h"
 #include "edge_app/pipeline/published_calibration.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
@@ -106,7 +105,8 @@ class OrientationStep {
   [[nodiscard]] OrientationRecord empty_record() const;
   // False: there is a calibration, but not for the zoom that the pan/tilt source reports.
   [[nodiscard]] bool zoom_fits() const;
-  void tell_pending_frames();
+  // Frames that extrapolated telemetry answered, and that telemetry encloses by this sample.
+  void settle_pending_frames();
   // Completes a record that has its time and telemetry's status; measured: null if there is none.
   void orient(const InterpolatedPanTilt* measured, const ImageView& picture,
               OrientationRecord* record);
@@ -115,7 +115,6 @@ class OrientationStep {
   CaptureClock video_clock_;
   CaptureClock telemetry_clock_;
   Telemetry telemetry_;
-  PendingFrames pending_;                     // of OE mode
   std::unique_ptr<OeMode> oe_;                // null: PT mode
   std::unique_ptr<StartUpTracker> start_up_;  // null: nobody wants its points
   std::optional<double> zoom_;                // as last reported

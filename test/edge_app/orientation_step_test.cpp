@@ -404,7 +404,7 @@ class OeStepTest : public ::testing::Test {
     options.follow_points = true;
     options.zoom_tolerance = 1;
     options.oe.emplace();
-    options.oe->cell_size_px = 30;  // so that there are coarse landmarks too
+    options.oe->maker.cell_size_px = 30;  // so that there are coarse landmarks too
     return options;
   }
   OeStepTest() {
