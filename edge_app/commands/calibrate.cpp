@@ -11,16 +11,16 @@
 #include <filesystem>
 #include <system_error>
 
-#include "core/calibration/atomic_file.h"
-#include "core/calibration/calibration_file.h"
 #include "edge_app/commands/calibration_input.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/commands/visible_calibration.h"
 #include "edge_app/output/calibration_report.h"
 #include "edge_app/output/calibration_summary.h"
+#include "edge_app/storage/calibration_file.h"
 #include "edge_app/storage/map_file.h"
 #include "platform/storage/recording.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {

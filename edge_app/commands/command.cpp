@@ -7,7 +7,7 @@
 #include <array>
 #include <filesystem>
 
-#include "core/calibration/calibration_file.h"
+#include "edge_app/storage/calibration_file.h"
 #include "platform/pan_tilt/onvif_source.h"
 #include "platform/pan_tilt/query_source.h"
 #include "platform/pan_tilt/recording_pan_tilt_source.h"

@@ -20,6 +20,7 @@
 #include "edge_app/output/record_writer.h"
 #include "edge_app/output/status_page.h"
 #include "edge_app/pipeline/pipeline.h"
+#include "edge_app/storage/calibration_store.h"
 #include "platform/system/clock.h"
 #include "platform/system/realtime.h"
 #include "platform/system/service_manager.h"

@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "core/calibration/calibration_file.h"
+#include "core/calibration/calibration_text.h"
 #include "core/model/calibration.h"
 #include "core/realtime/oe_mode/map_state.h"
 

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <limits>
 
-#include "core/calibration/atomic_file.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 

@@ -10,7 +10,7 @@
 #include <tuple>
 #include <vector>
 
-#include "core/calibration/calibration_file.h"
+#include "edge_app/storage/calibration_file.h"
 #include "platform/video/recording_frame_source.h"
 #include "test/accuracy/tag_table.h"
 

@@ -2,6 +2,7 @@
 // permissions and power cuts leave.
 
 #include "edge_app/storage/calibration_store.h"
+#include "edge_app/storage/calibration_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -9,7 +9,7 @@
 #include <limits>
 #include <random>
 
-#include "core/calibration/calibration_file.h"
+#include "edge_app/storage/calibration_file.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {

@@ -1,17 +1,13 @@
-#include "core/calibration/calibration_file.h"
+#include "core/calibration/calibration_text.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/stat.h>
 
 #include <Eigen/Core>
 #include <cstring>
-#include <filesystem>
 #include <limits>
 #include <locale>
 #include <random>
-
-#include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {
@@ -109,13 +105,13 @@ std::string with_line(int number, const std::string& line) {
   return text.replace(begin, text.find('\n', begin) - begin, line);
 }
 
-TEST(CalibrationFile, ErrorsStayOnOneLineWhateverTheFileHolds) {
+TEST(CalibrationText, ErrorsStayOnOneLineWhateverTheFileHolds) {
   EXPECT_THAT(refusal("format: \"1\\n\\e[2J\"\n"),
               HasSubstr("\"1??[2J\"; a finite number is needed"));
   EXPECT_THAT(refusal("\"form\\nat\": 1\n"), HasSubstr("unknown key form?at;"));
 }
 
-TEST(CalibrationFile, ReadsWhatAPersonWrote) {
+TEST(CalibrationText, ReadsWhatAPersonWrote) {
   const Calibration calibration = parsed(kByHand);
   EXPECT_EQ(calibration.camera.width, 1920);
   EXPECT_EQ(calibration.camera.height, 1080);
@@ -134,27 +130,27 @@ TEST(CalibrationFile, ReadsWhatAPersonWrote) {
   EXPECT_EQ(calibration.covariance, expected);
 }
 
-TEST(CalibrationFile, MakesARoundedAxisAUnitVector) {
+TEST(CalibrationText, MakesARoundedAxisAUnitVector) {
   const Calibration calibration = parsed(kByHand);
   EXPECT_NEAR(calibration.mechanics.pan_axis.norm(), 1, 1e-15);
   EXPECT_NEAR(calibration.mechanics.tilt_axis.norm(), 1, 1e-15);
 }
 
-TEST(CalibrationFile, AspectMayBeAbsent) { EXPECT_EQ(parsed(with_line(4, "")).camera.aspect, 1); }
+TEST(CalibrationText, AspectMayBeAbsent) { EXPECT_EQ(parsed(with_line(4, "")).camera.aspect, 1); }
 
-TEST(CalibrationFile, AcceptsQualityAndLandmarks) {
+TEST(CalibrationText, AcceptsQualityAndLandmarks) {
   EXPECT_EQ(parsed(std::string(kByHand) + "quality: {rms_px: 0.3, frames: 500}\n" +
                    "landmarks: map.bin\nzoom: 12.5\n")
                 .zoom,
             12.5);
 }
 
-TEST(CalibrationFile, RoundTripIsExactToTheBit) {
+TEST(CalibrationText, RoundTripIsExactToTheBit) {
   expect_same_bits(parsed(format_calibration(paper_calibration())), paper_calibration());
   expect_same_bits(parsed(format_calibration(parsed(kByHand))), parsed(kByHand));
 }
 
-TEST(CalibrationFile, RoundTripIsExactForAnyNumber) {
+TEST(CalibrationText, RoundTripIsExactForAnyNumber) {
   std::mt19937_64 generator(4);
   std::uniform_real_distribution<double> exponent(-300, 11);
   int checked = 0;
@@ -169,7 +165,7 @@ TEST(CalibrationFile, RoundTripIsExactForAnyNumber) {
   EXPECT_EQ(checked, 200);
 }
 
-TEST(CalibrationFile, WritesNumbersAsAPersonWould) {
+TEST(CalibrationText, WritesNumbersAsAPersonWould) {
   const std::string text = format_calibration(parsed(kByHand));
   EXPECT_THAT(text, HasSubstr("radial_distortion: {value: 55.4, sigma: 0.11}"));
   EXPECT_THAT(text, HasSubstr("telemetry clock = image clock + clock_offset"));
@@ -182,7 +178,7 @@ class GermanNumbers : public std::numpunct<char> {
   std::string do_grouping() const override { return "\3"; }
 };
 
-TEST(CalibrationFile, DoesNotDependOnTheLocale) {
+TEST(CalibrationText, DoesNotDependOnTheLocale) {
   const std::string text = format_calibration(paper_calibration());
   const std::locale before =
       std::locale::global(std::locale(std::locale::classic(), new GermanNumbers));
@@ -199,7 +195,7 @@ struct Fault {
   const char* complaint;
 };
 
-TEST(CalibrationFile, RefusesAFaultyLineWithItsNumberAndARemedy) {
+TEST(CalibrationText, RefusesAFaultyLineWithItsNumberAndARemedy) {
   const Fault faults[] = {
       {1, "format: 2", "reads format 1"},
       {1, "format: one", "format is \"one\"; a finite number"},
@@ -258,7 +254,7 @@ TEST(CalibrationFile, RefusesAFaultyLineWithItsNumberAndARemedy) {
   EXPECT_EQ(refused, 43);
 }
 
-TEST(CalibrationFile, NamesEveryMissingKey) {
+TEST(CalibrationText, NamesEveryMissingKey) {
   int refused = 0;
   for (const int line : {1, 2, 3, 5, 6, 7, 8, 9, 10, 11}) {
     const std::string text = kByHand;
@@ -272,14 +268,14 @@ TEST(CalibrationFile, NamesEveryMissingKey) {
   EXPECT_EQ(refused, 10);
 }
 
-TEST(CalibrationFile, RefusesWhatIsNoCalibration) {
+TEST(CalibrationText, RefusesWhatIsNoCalibration) {
   for (const char* text :
        {"", "hello", "- 1\n- 2", "{{{", "\x01\x02", "&a [*a, *a]", "format: 1"}) {
     EXPECT_THAT(refusal(text), StartsWith("test.yaml:1: "));
   }
 }
 
-TEST(CalibrationFile, RefusesAFaultyCovariance) {
+TEST(CalibrationText, RefusesAFaultyCovariance) {
   const auto with = [](const std::string& names, const std::string& matrix) {
     return std::string(kByHand) + "covariance:\n  names: " + names + "\n  matrix: " + matrix;
   };
@@ -312,78 +308,7 @@ TEST(CalibrationFile, RefusesAFaultyCovariance) {
               StartsWith("test.yaml:12: covariance.matrix is missing"));
 }
 
-TEST(CalibrationFile, SavesAndLoads) {
-  const TemporaryDirectory folder;
-  const std::string path = folder.path() + "/calibration.yaml";
-  std::string error;
-  ASSERT_TRUE(save_calibration(path, paper_calibration(), &error)) << error;
-  Calibration calibration;
-  ASSERT_TRUE(load_calibration(path, &calibration, &error)) << error;
-  expect_same_bits(calibration, paper_calibration());
-}
-
-TEST(CalibrationFile, SaveReplacesTheOldFileAndLeavesNothingElse) {
-  const TemporaryDirectory folder;
-  const std::string path = folder.write("calibration.yaml", "old");
-  std::string error;
-  ASSERT_TRUE(save_calibration(path, paper_calibration(), &error)) << error;
-  EXPECT_EQ(folder.read("calibration.yaml"), format_calibration(paper_calibration()));
-  struct stat status {};
-  ASSERT_EQ(::stat(path.c_str(), &status), 0);
-  EXPECT_EQ(status.st_mode & 0777, 0644u) << "others may read it";
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
-}
-
-TEST(CalibrationFile, SaveRefusesWhatLoadWouldRefuseAndKeepsTheOldFile) {
-  const TemporaryDirectory folder;
-  const std::string path = folder.write("calibration.yaml", "old");
-  const double nan = std::numeric_limits<double>::quiet_NaN();
-  int refused = 0;
-  const auto expect_refused = [&](const Calibration& calibration, const char* complaint) {
-    std::string error;
-    EXPECT_FALSE(save_calibration(path, calibration, &error));
-    EXPECT_THAT(error, HasSubstr(complaint));
-    EXPECT_THAT(error, StartsWith("refused to write " + path));
-    EXPECT_EQ(folder.read("calibration.yaml"), "old");
-    ++refused;
-  };
-  Calibration bad = paper_calibration();
-  bad.camera.focal_length = nan;
-  expect_refused(bad, "focal_length is \"nan\"");
-  bad = paper_calibration();
-  bad.covariance(3, 5) = nan;
-  expect_refused(bad, "covariance.matrix");
-  bad = paper_calibration();
-  bad.covariance(0, 0) = -1;
-  expect_refused(bad, "focal_length.sigma");
-  bad = paper_calibration();
-  bad.mechanics.pan_axis *= 2;
-  expect_refused(bad, "a unit vector is needed");
-  bad = paper_calibration();
-  bad.camera.width = 0;
-  expect_refused(bad, "image.width");
-  EXPECT_EQ(refused, 5);
-  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 1);
-}
-
-TEST(CalibrationFile, SaysWhyAFileCannotBeReadOrWritten) {
-  const TemporaryDirectory folder;
-  Calibration calibration;
-  std::string error;
-  EXPECT_FALSE(load_calibration(folder.path() + "/none.yaml", &calibration, &error));
-  EXPECT_EQ(error, folder.path() + "/none.yaml: cannot be read: No such file or directory");
-  EXPECT_FALSE(load_calibration(folder.path(), &calibration, &error));
-  EXPECT_THAT(error, HasSubstr("cannot be read: Is a directory"));
-  EXPECT_FALSE(load_calibration(folder.write("empty.yaml", ""), &calibration, &error));
-  EXPECT_THAT(error, HasSubstr("empty.yaml:1: not a calibration"));
-  EXPECT_FALSE(save_calibration(folder.path() + "/no/x.yaml", paper_calibration(), &error));
-  EXPECT_THAT(error, HasSubstr("cannot be written: No such file or directory"));
-  EXPECT_FALSE(save_calibration(folder.path(), paper_calibration(), &error));
-  EXPECT_THAT(error, HasSubstr("cannot be written: "));
-  EXPECT_FALSE(std::filesystem::exists(folder.path() + ".yaml"));
-}
-
-TEST(CalibrationFile, TellsPeopleOfTheRunAndReadsBackWithoutIt) {
+TEST(CalibrationText, TellsPeopleOfTheRunAndReadsBackWithoutIt) {
   CalibrationNotes notes;
   notes.quality.emplace();
   notes.quality->pixel_sigma_ratio = 1.25;

@@ -1,4 +1,4 @@
-#include "core/calibration/stream_clock.h"
+#include "core/calibration/clock_line.h"
 
 #include <algorithm>
 #include <cmath>
@@ -89,7 +89,7 @@ std::vector<double> count_ticks(const std::vector<double>& stamp, std::optional<
 
 }  // namespace
 
-ClockLine fit_clock(const ClockInput& input) {
+ClockLine fit_clock_line(const ClockInput& input) {
   ClockLine result;
   const std::size_t count = input.stamp_s.size();
   result.time_s = input.stamp_s;

@@ -36,6 +36,6 @@ struct ClockLine {
   int lost = 0;
 };
 
-[[nodiscard]] ClockLine fit_clock(const ClockInput& input);
+[[nodiscard]] ClockLine fit_clock_line(const ClockInput& input);
 
 }  // namespace alidade::internal

@@ -1,4 +1,4 @@
-#include "core/calibration/atomic_file.h"
+#include "platform/system/whole_file.h"
 
 #include <fcntl.h>
 #include <sys/stat.h>

@@ -1,65 +1,17 @@
-#include "core/calibration/calibration_file.h"
-
-#include <yaml-cpp/yaml.h>
-
 #include <Eigen/Eigenvalues>
-#include <algorithm>
 #include <cmath>
-#include <initializer_list>
-#include <iomanip>
-#include <locale>
-#include <optional>
-#include <set>
-#include <sstream>
+#include <cstddef>
+#include <string>
+#include <utility>
 #include <vector>
 
-#include "core/calibration/atomic_file.h"
-#include "core/calibration/one_line.h"
+#include "core/calibration/calibration_text.h"
+#include "core/calibration/number_text.h"
+#include "core/calibration/strict_yaml.h"
 
 namespace alidade {
 
 namespace {
-
-// What is wrong, and in which line, from 1. Never leaves this file.
-struct Problem {
-  int line;
-  std::string text;
-};
-
-[[noreturn]] void fail(const YAML::Node& node, const std::string& text) {
-  throw Problem{std::max(node.Mark().line, 0) + 1, text};
-}
-
-// Text and number are converted in the classic locale, whatever the program's.
-std::string number_text(double value, int digits) {
-  std::ostringstream stream;
-  stream.imbue(std::locale::classic());
-  stream << std::setprecision(digits) << value;
-  return stream.str();
-}
-
-std::optional<double> number_of(const std::string& text) {
-  std::istringstream stream(text);
-  stream.imbue(std::locale::classic());
-  double value = 0;
-  if (stream >> value && stream.peek() == std::istringstream::traits_type::eof() &&
-      std::isfinite(value)) {
-    return value;
-  }
-  return std::nullopt;
-}
-
-// The shortest text that reads back as the same bits: 55.4 rather than 55.399999999999999.
-std::string exact_text(double value) {
-  for (int digits = 15; digits < 17; ++digits) {
-    std::string text = number_text(value, digits);
-    if (number_of(text) == value) return text;
-  }
-  return number_text(value, 17);
-}
-
-// For messages: as many digits as a person would write.
-std::string short_text(double value) { return number_text(value, 6); }
 
 struct Range {
   double least;
@@ -103,7 +55,7 @@ double largest_sigma(Parameter parameter) {
 
 class Reader {
  public:
-  explicit Reader(const YAML::Node& root) : root_(root) {}
+  Reader(YAML::Node root, std::string name) : root_(std::move(root)), name_(std::move(name)) {}
 
   Calibration read() {
     if (!root_.IsMap()) fail(root_, "not a calibration; start with `format: 1`");
@@ -149,27 +101,26 @@ class Reader {
   }
 
  private:
-  static void check_keys(const YAML::Node& map, std::initializer_list<const char*> known,
-                         const std::string& prefix) {
-    std::set<std::string> seen;
-    for (const auto& entry : map) {
-      if (!entry.first.IsScalar()) fail(entry.first, "a key is not a word; write `name: value`");
-      const std::string& key = entry.first.Scalar();
-      if (!seen.insert(key).second) {
-        fail(entry.first, prefix + key + " stands here a second time; keep one");
-      }
-      bool is_known = false;
-      std::string names;
-      for (const char* name : known) {
-        is_known = is_known || key == name;
-        if (!names.empty()) names += ", ";
-        names += name;
-      }
-      if (!is_known) fail(entry.first, "unknown key " + prefix + key + "; known are " + names);
+  [[noreturn]] void fail(const YAML::Node& node, const std::string& text) const {
+    throw YamlError(name_ + ":" + std::to_string(line_of(node).value_or(1)) + ": " + text);
+  }
+
+  void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
+                  const std::string& prefix) const {
+    const auto found = find_faulty_key(map, known);
+    if (!found) return;
+    switch (found->fault) {
+      case KeyFault::kNoWord:
+        fail(found->key, "a key is not a word; write `name: value`");
+      case KeyFault::kDoubled:
+        fail(found->key, prefix + found->key.Scalar() + " stands here a second time; keep one");
+      case KeyFault::kUnknown:
+        fail(found->key,
+             "unknown key " + prefix + found->key.Scalar() + "; known are " + join(known));
     }
   }
 
-  static YAML::Node required(const YAML::Node& map, const char* key, const std::string& prefix) {
+  YAML::Node required(const YAML::Node& map, const char* key, const std::string& prefix) const {
     if (!map.IsMap()) {
       fail(map, prefix.substr(0, prefix.size() - 1) + " is not a map; write {" + key + ": ...}");
     }
@@ -178,7 +129,7 @@ class Reader {
     return node;
   }
 
-  static double number(const YAML::Node& node, const std::string& name) {
+  double number(const YAML::Node& node, const std::string& name) const {
     if (node.IsScalar()) {
       const std::optional<double> value = number_of(node.Scalar());
       if (value) return *value;
@@ -187,7 +138,7 @@ class Reader {
     fail(node, name + " is not a single value; a finite number is needed");
   }
 
-  static int pixels(const YAML::Node& image, const char* key) {
+  int pixels(const YAML::Node& image, const char* key) const {
     const std::string name = std::string("image.") + key;
     const YAML::Node node = required(image, key, "image.");
     const double value = number(node, name);
@@ -197,8 +148,8 @@ class Reader {
     return static_cast<int>(value);
   }
 
-  static std::vector<double> numbers(const YAML::Node& node, const std::string& name,
-                                     std::size_t count) {
+  std::vector<double> numbers(const YAML::Node& node, const std::string& name,
+                              std::size_t count) const {
     if (!node.IsSequence() || node.size() != count) {
       fail(node, name + " is not a list of " + std::to_string(count) + " numbers; write [x, ...]");
     }
@@ -262,7 +213,7 @@ class Reader {
     return axis;
   }
 
-  static void check_entry(const YAML::Node& entry, const std::string& name) {
+  void check_entry(const YAML::Node& entry, const std::string& name) const {
     if (!entry.IsMap()) fail(entry, name + " is not a map; write {value: ..., sigma: ...}");
     check_keys(entry, {"value", "sigma"}, name + ".");
   }
@@ -308,7 +259,7 @@ class Reader {
     }
   }
 
-  static std::vector<int> covariance_rows(const YAML::Node& names) {
+  std::vector<int> covariance_rows(const YAML::Node& names) const {
     if (!names.IsSequence()) fail(names, "covariance.names is not a list; write [name, ...]");
     std::vector<int> rows;
     for (const YAML::Node& name : names) {
@@ -364,6 +315,7 @@ class Reader {
   };
 
   const YAML::Node root_;
+  const std::string name_;
   Calibration calibration_;
   std::vector<Sigma> sigmas_;
 };
@@ -372,136 +324,9 @@ class Reader {
 
 bool parse_calibration(const std::string& text, const std::string& name, Calibration* calibration,
                        std::string* error) {
-  try {
-    *calibration = Reader(YAML::Load(text)).read();
-    return true;
-  } catch (const Problem& problem) {
-    *error = one_line(name + ":" + std::to_string(problem.line) + ": " + problem.text);
-  } catch (const YAML::Exception& exception) {
-    *error = one_line(name + ":" + std::to_string(std::max(exception.mark.line, 0) + 1) + ": " +
-                      exception.msg + "; valid YAML is needed");
-  }
-  return false;
-}
-
-namespace {
-
-void write_quality(const CalibrationNotes& notes, YAML::Emitter* out) {
-  const CalibrationQuality& quality = *notes.quality;
-  const auto number = [out](const char* name, double value, const char* comment) {
-    *out << YAML::Key << name << YAML::Value << short_text(value) << YAML::Comment(comment);
-  };
-  const auto count = [out](const char* name, int value) {
-    *out << YAML::Key << name << YAML::Value << value;
-  };
-  const auto texts = [out](const char* name, const std::vector<std::string>& lines) {
-    if (lines.empty()) return;
-    *out << YAML::Key << name << YAML::Value << YAML::BeginSeq;
-    for (const std::string& line : lines) *out << YAML::DoubleQuoted << line;
-    *out << YAML::EndSeq;
-  };
-  *out << YAML::Key << "quality" << YAML::Value << YAML::BeginMap;
-  number("pixel_sigma_ratio", quality.pixel_sigma_ratio, "residuals / stated noise");
-  number("repetition", quality.repetition, "observations of a landmark that count as one");
-  number("telemetry_sigma_ratio", quality.telemetry_sigma_ratio, "residuals / assumed noise");
-  number("mean_reprojection_error_px", quality.mean_reprojection_error_px, "px");
-  number("motion_correlation", quality.motion_correlation, "image motion and telemetry");
-  count("frames", quality.frames);
-  count("observations", quality.observations);
-  count("landmarks", quality.landmarks);
-  count("telemetry", quality.telemetry);
-  number("condition", quality.condition, "of the parameters' correlation matrix");
-  *out << YAML::Key << "weakest_direction" << YAML::Value << YAML::DoubleQuoted
-       << quality.weakest_direction;
-  *out << YAML::Key << "priors" << YAML::Value << YAML::BeginMap;
-  for (const auto& [name, prior] : notes.priors) {
-    *out << YAML::Key << name << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "value"
-         << YAML::Value << exact_text(prior.value) << YAML::Key << "sigma" << YAML::Value
-         << exact_text(prior.sigma) << YAML::EndMap;
-  }
-  *out << YAML::EndMap;
-  texts("excluded", notes.excluded);
-  texts("advice", quality.advice);
-  *out << YAML::EndMap;
-}
-
-}  // namespace
-
-std::string format_calibration(const Calibration& calibration, const CalibrationNotes& notes) {
-  YAML::Emitter out;
-  const auto& cov = calibration.covariance;
-  const auto sigma = [&cov](Parameter parameter) {
-    return exact_text(std::sqrt(cov(index(parameter), index(parameter))));
-  };
-  const auto write_scalar = [&](Parameter parameter, double value, const char* comment) {
-    out << YAML::Key << to_string(parameter) << YAML::Value << YAML::Flow << YAML::BeginMap
-        << YAML::Key << "value" << YAML::Value << exact_text(value) << YAML::Key << "sigma"
-        << YAML::Value << sigma(parameter) << YAML::EndMap << YAML::Comment(comment);
-  };
-  const auto write_axis = [&](const char* name, const Vector3<double>& axis, Parameter first,
-                              const char* comment) {
-    out << YAML::Key << name << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "value"
-        << YAML::Value << YAML::BeginSeq;
-    for (int i = 0; i < 3; ++i) out << exact_text(axis[i]);
-    out << YAML::EndSeq << YAML::Key << "sigma" << YAML::Value << YAML::BeginSeq << sigma(first)
-        << sigma(static_cast<Parameter>(index(first) + 1)) << YAML::EndSeq << YAML::EndMap
-        << YAML::Comment(comment);
-  };
-
-  out << YAML::BeginMap;
-  out << YAML::Key << "format" << YAML::Value << 1;
-  out << YAML::Key << "image" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "width"
-      << YAML::Value << std::to_string(calibration.camera.width) << YAML::Key << "height"
-      << YAML::Value << std::to_string(calibration.camera.height) << YAML::EndMap;
-  write_scalar(Parameter::kFocalLength, calibration.camera.focal_length, "px");
-  write_scalar(Parameter::kAspect, calibration.camera.aspect, "f_v / f_u");
-  write_scalar(Parameter::kRadialDistortion, calibration.camera.radial_distortion,
-               "u = f x (1 + k |x|^2) + centre");
-  write_scalar(Parameter::kLineDelay, calibration.line_delay, "s/row");
-  write_axis("pan_axis", calibration.mechanics.pan_axis, Parameter::kPanAxis0,
-             "unit vector in the base: forward, right, down; sigma in rad");
-  write_axis("tilt_axis", calibration.mechanics.tilt_axis, Parameter::kTiltAxis0,
-             "unit vector in the base; sigma in rad");
-  write_scalar(Parameter::kPanScale, calibration.mechanics.pan_scale, "measured / true angle");
-  write_scalar(Parameter::kTiltScale, calibration.mechanics.tilt_scale, "measured / true angle");
-  write_scalar(Parameter::kClockOffset, calibration.clock_offset,
-               "s; telemetry clock = image clock + clock_offset");
-  if (calibration.zoom) out << YAML::Key << "zoom" << YAML::Value << exact_text(*calibration.zoom);
-  if (!cov.isZero(0)) {
-    out << YAML::Key << "covariance" << YAML::Value << YAML::BeginMap << YAML::Key << "names"
-        << YAML::Value << YAML::Flow << YAML::BeginSeq;
-    for (int i = 0; i < kParameterCount; ++i) out << to_string(static_cast<Parameter>(i));
-    out << YAML::EndSeq << YAML::Key << "matrix" << YAML::Value << YAML::BeginSeq;
-    for (int i = 0; i < kParameterCount; ++i) {
-      out << YAML::Flow << YAML::BeginSeq;
-      for (int j = 0; j < kParameterCount; ++j) out << exact_text(cov(i, j));
-      out << YAML::EndSeq;
-    }
-    out << YAML::EndSeq << YAML::EndMap;
-  }
-  if (notes.quality) write_quality(notes, &out);
-  if (!notes.landmarks.empty()) {
-    out << YAML::Key << "landmarks" << YAML::Value << YAML::DoubleQuoted << notes.landmarks;
-  }
-  out << YAML::EndMap;
-  return std::string(out.c_str()) + "\n";
-}
-
-bool load_calibration(const std::string& path, Calibration* calibration, std::string* error) {
-  std::string text;
-  return read_file(path, &text, error) && parse_calibration(text, path, calibration, error);
-}
-
-bool save_calibration(const std::string& path, const Calibration& calibration, std::string* error) {
-  return save_calibration(path, calibration, {}, error);
-}
-
-bool save_calibration(const std::string& path, const Calibration& calibration,
-                      const CalibrationNotes& notes, std::string* error) {
-  const std::string text = format_calibration(calibration, notes);
-  Calibration as_read;
-  if (!parse_calibration(text, "refused to write " + path, &as_read, error)) return false;
-  return write_file_atomically(path, text, error);
+  return read_yaml(
+      text, name, {"", "; valid YAML is needed"},
+      [&](const YAML::Node& root) { *calibration = Reader(root, name).read(); }, error);
 }
 
 }  // namespace alidade

@@ -13,14 +13,14 @@
 // All else is strict: an unknown, missing or doubled key, text for a number, a number that is not
 // finite or betrays another unit is an error in one line, `file:line: what; what would be right`.
 // Reading back what was written gives the same bits.
-// Not for the real-time thread: allocates, reads and writes files. No shared state.
+// Pure: no file is touched (edge_app/storage/calibration_file.h does). Allocates; no shared state.
 
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "core/calibration/calibrate.h"
+#include "core/calibration/calibration_types.h"
 #include "core/model/calibration.h"
 
 namespace alidade {
@@ -33,20 +33,10 @@ struct CalibrationNotes {
   std::string landmarks;                                         // side file's name; empty: none
 };
 
-// Pure: text in, calibration or error out. name stands for the file in errors.
+// Text in, calibration or error out. name stands for the file in errors.
 [[nodiscard]] bool parse_calibration(const std::string& text, const std::string& name,
                                      Calibration* calibration, std::string* error);
 [[nodiscard]] std::string format_calibration(const Calibration& calibration,
                                              const CalibrationNotes& notes = {});
-
-[[nodiscard]] bool load_calibration(const std::string& path, Calibration* calibration,
-                                    std::string* error);
-
-// Atomic: a reader, or a power cut, meets the old file or the new one, never half of one. A
-// calibration that load_calibration() would refuse is refused here.
-[[nodiscard]] bool save_calibration(const std::string& path, const Calibration& calibration,
-                                    const CalibrationNotes& notes, std::string* error);
-[[nodiscard]] bool save_calibration(const std::string& path, const Calibration& calibration,
-                                    std::string* error);
 
 }  // namespace alidade
