@@ -314,23 +314,24 @@ TEST_F(HttpServerTest, AHandlerWithoutAnAnswerIsAskedAgainUntilItHasOne) {
   EXPECT_GT(asked_, 1);
 }
 
-// As many as may be connected wait for an answer, and follow: nobody else notices.
+// Whether for an answer, for news or for their own request.
 TEST_F(HttpServerTest, ThoseWhoWaitTakeNoThread) {
   late_s_ = 1e4;
+  constexpr int kEach = 100;
   options_.limits.max_connections = 1000;
-  options_.limits.max_streams = 300;
+  options_.limits.max_streams = kEach;
   start();
   std::vector<std::unique_ptr<Client>> clients;
-  for (int i = 0; i < 300; ++i) {
+  for (int i = 0; i < kEach; ++i) {
     for (const char* path : {"/late", "/wait"}) {
       clients.push_back(std::make_unique<Client>(*server_));
       clients.back()->send(std::string("GET ") + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
     }
     clients.push_back(std::make_unique<Client>(*server_));
   }
-  wait_until([this] { return server_->counters().connections == 900; });
-  wait_until([this] { return server_->counters().streams == 300; });
-  wait_until([this] { return asked_ >= 300; });
+  wait_until([this] { return server_->counters().connections == 3 * kEach; });
+  wait_until([this] { return server_->counters().streams == kEach; });
+  wait_until([this] { return asked_ >= kEach; });
   EXPECT_THAT(get("/open"), StartsWith("HTTP/1.1 200 "));
   const auto threads = std::distance(std::filesystem::directory_iterator("/proc/self/task"), {});
   EXPECT_LT(threads, 10);
