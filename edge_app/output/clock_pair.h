@@ -7,8 +7,8 @@
 namespace alidade {
 
 struct ClockPair {
-  double monotonic_s = 0;  // CLOCK_MONOTONIC
-  double wall_s = 0;       // CLOCK_REALTIME: since 1970
+  double monotonic_s = 0;                                      // CLOCK_MONOTONIC
+  double wall_s = 0;                                           // CLOCK_REALTIME: since 1970
   double bracket_s = std::numeric_limits<double>::infinity();  // they are no further apart
 };
 

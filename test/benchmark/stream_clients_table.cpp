@@ -26,8 +26,8 @@
 #include <string>
 #include <vector>
 
-#include "edge_app/output/http_api.h"
 #include "edge_app/output/http/http_server.h"
+#include "edge_app/output/http_api.h"
 #include "edge_app/output/live_state.h"
 #include "edge_app/output/record_sinks.h"
 #include "edge_app/pipeline/pipeline.h"

@@ -81,9 +81,8 @@ class HttpServerTest : public ::testing::Test {
     server_->get("/throw", HttpAccess::kOpen, [](const ServerRequest&) -> ServerResponse {
       throw std::runtime_error("secret");
     });
-    server_->get("/flood", HttpAccess::kOpen, [](const ServerRequest&) {
-      return endless(std::make_unique<Flood>());
-    });
+    server_->get("/flood", HttpAccess::kOpen,
+                 [](const ServerRequest&) { return endless(std::make_unique<Flood>()); });
     server_->get("/wait", HttpAccess::kOpen, [this](const ServerRequest&) {
       return endless(std::make_unique<Words>(&words_));
     });

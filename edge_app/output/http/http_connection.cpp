@@ -76,11 +76,11 @@ HttpConnection::~HttpConnection() {
 
 void HttpConnection::begin() {
   within(service_.limits.head_timeout_s, &HttpConnection::stop_reading);
-  asio::async_read_until(
-      socket_, asio::dynamic_buffer(received_, service_.limits.max_head_bytes), "\r\n\r\n",
-      [self = shared_from_this()](const Error& error, std::size_t size) {
-        self->take_head(error, size);
-      });
+  asio::async_read_until(socket_, asio::dynamic_buffer(received_, service_.limits.max_head_bytes),
+                         "\r\n\r\n",
+                         [self = shared_from_this()](const Error& error, std::size_t size) {
+                           self->take_head(error, size);
+                         });
 }
 
 void HttpConnection::take_head(const Error& error, std::size_t size) {
@@ -217,15 +217,14 @@ void HttpConnection::send(std::string text, Step then) {
 void HttpConnection::send_rest() {
   within(std::min(service_.limits.write_timeout_s, answer_deadline_s_ - monotonic_now_s()),
          &HttpConnection::drop_stalled);
-  socket_.async_write_some(
-      asio::buffer(sending_) + sent_,
-      [self = shared_from_this()](const Error& error, std::size_t count) {
-        if (error) return self->drop();
-        self->sent_ += count;
-        if (self->sent_ < self->sending_.size()) return self->send_rest();
-        self->without_deadline();
-        ((*self).*(self->after_sending_))();
-      });
+  socket_.async_write_some(asio::buffer(sending_) + sent_,
+                           [self = shared_from_this()](const Error& error, std::size_t count) {
+                             if (error) return self->drop();
+                             self->sent_ += count;
+                             if (self->sent_ < self->sending_.size()) return self->send_rest();
+                             self->without_deadline();
+                             ((*self).*(self->after_sending_))();
+                           });
 }
 
 void HttpConnection::within(double time_s, Step late) {

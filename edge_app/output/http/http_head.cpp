@@ -48,9 +48,8 @@ void parse_query(std::string_view query, HttpHead* head) {
     query.remove_prefix(std::min(end + 1, query.size()));
     if (pair.empty()) continue;
     const std::size_t equals = std::min(pair.find('='), pair.size());
-    head->parameters.emplace_back(
-        decoded(pair.substr(0, equals), true),
-        decoded(pair.substr(std::min(equals + 1, pair.size())), true));
+    head->parameters.emplace_back(decoded(pair.substr(0, equals), true),
+                                  decoded(pair.substr(std::min(equals + 1, pair.size())), true));
   }
 }
 
@@ -115,9 +114,8 @@ bool parse_http_head(std::string_view text, HttpHead* head, ServerResponse* refu
   head->authorization = text_of(http::field::authorization);
   head->transfer_encoding = fields.count(http::field::transfer_encoding) > 0;
   head->content_encoding = fields.count(http::field::content_encoding) > 0;
-  head->expects_continue =
-      fields.version() > 10 &&
-      boost::algorithm::iequals(text_of(http::field::expect), "100-continue");
+  head->expects_continue = fields.version() > 10 &&
+                           boost::algorithm::iequals(text_of(http::field::expect), "100-continue");
   return true;
 }
 

@@ -12,8 +12,8 @@
 namespace alidade {
 
 struct HttpHead {
-  std::string method;  // one that RFC 9110 or 5789 names
-  std::string path;    // decoded, without the query
+  std::string method;                                           // one that RFC 9110 or 5789 names
+  std::string path;                                             // decoded, without the query
   std::vector<std::pair<std::string, std::string>> parameters;  // of the query, decoded
   std::string host;
   std::string origin;

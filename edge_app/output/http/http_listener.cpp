@@ -36,9 +36,7 @@ int make_event() {
   return descriptor;
 }
 
-void close_on_exec(int descriptor) {
-  static_cast<void>(::fcntl(descriptor, F_SETFD, FD_CLOEXEC));
-}
+void close_on_exec(int descriptor) { static_cast<void>(::fcntl(descriptor, F_SETFD, FD_CLOEXEC)); }
 
 // Without waiting; a client that does not take it goes without.
 void refuse(Tcp::socket* socket) {

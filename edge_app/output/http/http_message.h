@@ -15,7 +15,8 @@ struct ServerRequest {
   std::string path;  // decoded
   std::string body;
   std::vector<std::pair<std::string, std::string>> parameters;  // of the query, decoded
-  double waited_s = 0;  // since the request was complete; more than 0 if the handler was asked before
+  double waited_s =
+      0;  // since the request was complete; more than 0 if the handler was asked before
 
   [[nodiscard]] std::optional<std::string> parameter(const std::string& name) const;
 };
