@@ -13,8 +13,8 @@
 #include "edge_app/commands/live_calibration.h"
 #include "edge_app/commands/run_report.h"
 #include "edge_app/commands/stop_signals.h"
+#include "edge_app/output/http/http_server.h"
 #include "edge_app/output/http_api.h"
-#include "edge_app/output/http_server.h"
 #include "edge_app/output/live_state.h"
 #include "edge_app/output/record_sinks.h"
 #include "edge_app/output/record_writer.h"
@@ -63,10 +63,6 @@ std::unique_ptr<HttpServer> start_http(const Config& config, const HttpApiSource
   auto server = std::make_unique<HttpServer>(*config.output.http);
   add_api_routes(server.get(), sources);
   add_status_page(server.get(), tap);
-  server->set_on_stop([live = sources.live, tap] {
-    live->close();
-    tap->close();
-  });
   std::string error;
   if (!server->start(&error)) throw CommandError(kExitFailed, error);
   spdlog::info("HTTP: listening on http://{}/{}", server->address(),

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "edge_app/config/head_config.h"
-#include "edge_app/output/http_server.h"    // HttpServerOptions
+#include "edge_app/output/http/http_options.h"
 #include "edge_app/output/record_format.h"  // OutputFormat
 #include "platform/video/v4l2_mode.h"       // V4l2Format
 
