@@ -33,26 +33,26 @@ void for_each_picture(const std::string& directory, const CalibrationInput& inpu
                       const VideoProgress& progress, std::vector<std::string>* remarks, Use use) {
   std::unordered_set<std::int64_t> wanted;
   for (const CalibrationFrame& frame : input.frames) wanted.insert(frame.frame);
-  RecordingFrameSource video({directory, true, false});
+  const auto video = open_recorded_frames({directory, true, false});
   std::size_t done = 0;
   for (;;) {
     Frame frame;
-    const ReadStatus status = video.read(frame, std::numeric_limits<double>::infinity());
+    const ReadStatus status = video->read(frame, std::numeric_limits<double>::infinity());
     if (status == ReadStatus::kEnd) break;
-    if (status != ReadStatus::kOk) throw CommandError(kExitFailed, video.error());
+    if (status != ReadStatus::kOk) throw CommandError(kExitFailed, video->error());
     if (wanted.count(frame.stamp.frame) == 0) continue;
     use(frame.stamp.frame, ImageView{frame.luma, frame.width, frame.height, frame.stride});
     progress(static_cast<double>(++done) / static_cast<double>(wanted.size()));
   }
   if (done == 0)
     throw CommandError(kExitFailed, directory + ": no picture of its video can be read");
-  if (video.damaged_frames() > 0) {
+  if (video->damaged_frames() > 0) {
     remarks->push_back(
-        fmt::format("video: {} pictures could not be decoded", video.damaged_frames()));
+        fmt::format("video: {} pictures could not be decoded", video->damaged_frames()));
   }
-  if (video.missing_frames() > 0) {
+  if (video->missing_frames() > 0) {
     remarks->push_back(
-        fmt::format("video: ends {} frames before frames.csv does", video.missing_frames()));
+        fmt::format("video: ends {} frames before frames.csv does", video->missing_frames()));
   }
 }
 

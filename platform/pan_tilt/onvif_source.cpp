@@ -211,17 +211,11 @@ HttpConversation::Outcome OnvifConversation::take_status(const HttpAnswer& answe
 
 HttpPollingPlan plan_of(const OnvifSourceOptions& given) {
   HttpPollingPlan plan;
-  plan.options.user = given.user;
-  plan.options.password = given.password;
-  plan.options.pan = given.pan;
-  plan.options.tilt = given.tilt;
-  plan.options.rate_hz = given.rate_hz;
-  plan.options.timeout_s = given.timeout_s;
-  plan.options.max_backoff_s = given.max_backoff_s;
+  static_cast<HttpDeviceOptions&>(plan.options) = given;
   plan.options.max_body = kMaxBody;
   plan.options.expected = "an ONVIF answer";
   Url url;
-  plan.error = take_http_url(given.url, &url, &plan.options);
+  plan.error = take_http_url(&url, &plan.options);
   if (url.path == "/") {
     url.path = "/onvif/device_service";
     url.bare.pop_back();
@@ -234,6 +228,8 @@ HttpPollingPlan plan_of(const OnvifSourceOptions& given) {
 
 }  // namespace
 
-OnvifSource::OnvifSource(const OnvifSourceOptions& options) : HttpPollingSource(plan_of(options)) {}
+std::unique_ptr<PanTiltSource> open_onvif(const OnvifSourceOptions& options) {
+  return open_http_polling(plan_of(options));
+}
 
 }  // namespace alidade
