@@ -1,16 +1,12 @@
 """A copy of the tree with all mutants in it, built once."""
 import os
-import pathlib
-import shutil
 import subprocess
 
 from .catalogue import ListError
 from .instrument import HEADER, HEADER_NAME, instrumented
 
 CONFIGURATION = ["-G", "Ninja", "-DCMAKE_BUILD_TYPE=Release", "-DALIDADE_BUILD_BENCHMARKS=OFF", "-DALIDADE_BUILD_EXPERIMENTS=OFF",
-                 "-DALIDADE_BUILD_VIRTUAL_MACHINE=OFF", "-DALIDADE_BUILD_ROS=OFF",
-                 # A header that is included first spoils precompiled ones.
-                 "-DCMAKE_DISABLE_PRECOMPILE_HEADERS=ON"]
+                 "-DALIDADE_BUILD_VIRTUAL_MACHINE=OFF", "-DALIDADE_BUILD_ROS=OFF"]
 
 
 class BuildError(Exception):
@@ -37,9 +33,13 @@ def write_if_changed(file, content, mode=0o644):
 
 
 class Tree:
+    """The copy, with the mutants of one list in it."""
+
     def __init__(self, source, work, mutants):
         self.source, self.mutants = source, mutants
-        self.tree, self.build = work / "tree", work / "build"
+        self.tree = work / "tree"
+        # As the preset has it below the repository: where there is a cache of compiled files, most are in it.
+        self.build = self.tree / "build/release"
 
     def mutants_of(self, name):
         return [mutant for mutant in self.mutants if mutant.file == name]
@@ -71,7 +71,8 @@ class Tree:
         write_if_changed(self.tree / HEADER_NAME, HEADER.encode())
         wanted = {*names, HEADER_NAME}
         for file in self.tree.rglob("*"):
-            if file.is_file() and file.relative_to(self.tree).as_posix() not in wanted:
+            name = file.relative_to(self.tree).as_posix()
+            if not name.startswith("build/") and file.is_file() and name not in wanted:
                 file.unlink()
 
     def write_one(self, name, rebuilt=None):
@@ -89,9 +90,3 @@ class Tree:
             said = (done.stdout + done.stderr).splitlines()
             errors = [line for line in said if "error" in line or "multiple target" in line.lower()]
             raise BuildError("\n".join(["the copy does not build", *(errors or said[-40:])]))
-
-
-def empty_folder(path):
-    shutil.rmtree(path, ignore_errors=True)
-    pathlib.Path(path).mkdir(parents=True)
-    return path

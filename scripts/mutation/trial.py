@@ -43,7 +43,8 @@ class Programs:
         except (ValueError, KeyError):
             raise TrialError(f"ctest does not list the tests of {build}: {shown.stderr.strip()[-400:]}") from None
         self.prepared = set()
-        self.scratch = pathlib.Path(build).parent
+        self.scratch = pathlib.Path(build, "scratch")
+        self.scratch.mkdir(exist_ok=True)
 
     def entry(self, program):
         for entry in self.entries:
