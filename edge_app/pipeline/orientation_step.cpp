@@ -7,6 +7,7 @@
 #include "edge_app/pipeline/frame_observations.h"
 
 namespace alidade {
+
 OeOptions oe_options(const Camera<double>& camera) {
   constexpr double kLeastColumns = 24;
   OeOptions options;
