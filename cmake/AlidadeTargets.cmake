@@ -194,7 +194,7 @@ function(alidade_fuzz_target name)
     set_property(GLOBAL APPEND PROPERTY ALIDADE_FUZZ_LIBRARIES ${A_LINK})
     set_property(GLOBAL APPEND_STRING PROPERTY ALIDADE_FUZZ_ROWS "    {\"${name}\", fuzz_${name}, ${A_MUTATIONS}},\n")
     set_property(GLOBAL APPEND_STRING PROPERTY ALIDADE_FUZZ_DECLARATIONS
-      "extern \"C\" int fuzz_${name}(const std::uint8_t* data, std::size_t size)\;\n")
+      "extern \"C\" int fuzz_${name}(const std::uint8_t* data, std::size_t size);\n")
     return()
   endif()
   set(inputs ${CMAKE_CURRENT_SOURCE_DIR}/corpus/${name})
