@@ -47,10 +47,15 @@ class Programs:
         self.scratch.mkdir(exist_ok=True)
 
     def entry(self, program):
-        for entry in self.entries:
-            if pathlib.Path(entry.get("command", [""])[0]).name == program:
-                return entry
+        named = [entry for entry in self.entries if pathlib.Path(entry.get("command", [""])[0]).name == program]
+        for entry in sorted(named, key=lambda entry: entry["name"] != program):
+            return entry
         raise TrialError(f"{program}: ctest knows no such test program; the lists in test/mutants name it")
+
+    def filter(self, program):
+        """Which of its tests ctest runs under the program's name; others are for longer nights."""
+        given = [word for word in self.entry(program)["command"] if word.startswith("--gtest_filter=")]
+        return given[-1].split("=", 1)[1] if given and self.entry(program)["name"] == program else "*"
 
     def properties(self, entry):
         return {item["name"]: item["value"] for item in entry.get("properties", [])}
@@ -59,7 +64,7 @@ class Programs:
         entry = self.entry(program)
         properties = self.properties(entry)
         self.prepare(properties.get("FIXTURES_REQUIRED", []))
-        words = [word for word in entry["command"] if not word.startswith(("--gtest_filter", "--gtest_also"))]
+        words = [word for word in entry["command"] if not word.startswith("--gtest_")]
         return words + arguments, self.environment(properties, mutant), properties.get("WORKING_DIRECTORY", ".")
 
     def environment(self, properties, mutant):
@@ -79,7 +84,7 @@ class Programs:
                     raise TrialError(f"{entry['name']} fails, and tests need what it makes")
 
     def run(self, program, cases, mutant, limit_s, stop_at_first=True):
-        """Runs the named tests of a program, all with "*"."""
+        """Runs the tests of a program that a filter of gtest's form takes."""
         arguments = [f"--gtest_filter={cases}", "--gtest_color=no"] + (["--gtest_fail_fast"] if stop_at_first else [])
         words, environment, folder = self.start(program, arguments, mutant)
         with tempfile.TemporaryDirectory(prefix="run-", dir=self.scratch) as scratch:
@@ -148,7 +153,7 @@ class Baseline:
         stamp = self.stamp(program)
         if self.kept.get(program, {}).get("stamp") != stamp:
             say(f"without a mutant: {program}")
-            outcome = self.programs.run(program, "*", None, 3600, stop_at_first=False)
+            outcome = self.programs.run(program, self.programs.filter(program), None, 3600, stop_at_first=False)
             again = outcome
             for _ in range(2):
                 if again.noticed and again.failed:
