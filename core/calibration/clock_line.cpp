@@ -5,7 +5,6 @@
 #include <cstddef>
 
 #include "core/calibration/median.h"
-
 #include "core/model/lower_line.h"
 
 namespace alidade::internal {
@@ -62,11 +61,11 @@ Line fit_line(const std::vector<double>& n, const std::vector<double>& stamp,
 
 // Standard deviation of white noise on the stamps by their second differences, which a steady clock does not reach.
 double white_noise(const std::vector<double>& stamp) {
-  std::vector<double> bend;
+  std::vector<double> second_differences;
   for (std::size_t i = 2; i < stamp.size(); ++i) {
-    bend.push_back(std::abs(stamp[i] - 2 * stamp[i - 1] + stamp[i - 2]));
+    second_differences.push_back(std::abs(stamp[i] - 2 * stamp[i - 1] + stamp[i - 2]));
   }
-  return 1.4826 * median(bend) / std::sqrt(6.0);
+  return 1.4826 * median(second_differences) / std::sqrt(6.0);
 }
 
 // Counts ticks along the stamps, each from the line through those before; gaps become whole periods.
@@ -147,15 +146,15 @@ ClockLine fit_clock_line(const ClockInput& input) {
                                   ? 4 * *input.period_sigma_s + 6 * sigma / std::sqrt(line.spread)
                                   : 20 * sigma / std::sqrt(line.spread);
     std::vector<std::uint16_t> hull(count);
-    // The mean height above the floor is the scale of an exponential delay.
-    const LineEstimate floor =
+    // The mean height above the least delay is the scale of an exponential one.
+    const LineEstimate lower =
         fit_lower_line(n.data(), input.stamp_s.data(), std::min<std::size_t>(count, 65535),
                        std::max(-lowest, 1e-9), line.period - half_range, line.period + half_range,
                        line.middle, hull.data());
-    line.offset = floor.value;
-    line.period = floor.slope;
-    result.offset_sigma_s = std::sqrt(floor.var_value);
-    result.period_sigma_s = std::sqrt(floor.var_slope);
+    line.offset = lower.value;
+    line.period = lower.slope;
+    result.offset_sigma_s = std::sqrt(lower.var_value);
+    result.period_sigma_s = std::sqrt(lower.var_slope);
   } else {
     if (has_period)
       line = fit_line(n, input.stamp_s, input.period_s, sigma * sigma * prior_information);

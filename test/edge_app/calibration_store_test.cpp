@@ -13,6 +13,7 @@
 #include <filesystem>
 #include <set>
 
+#include "edge_app/storage/calibration_file.h"
 #include "edge_app/storage/map_file.h"
 #include "test/support/temporary_directory.h"
 

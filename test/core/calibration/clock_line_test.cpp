@@ -75,10 +75,10 @@ TEST(ClockLine, KnowsAPlainCountEvenIfJitterReorders) {
   EXPECT_NEAR(line.period_s, kPeriod, 5 * line.period_sigma_s);
 }
 
-TEST(ClockLine, TakesTheFloorOfOneSidedDelays) {
+TEST(ClockLine, TakesTheLeastOfOneSidedDelays) {
   const ClockLine line = fit_clock_line(ticks(200, 2e-3, 6, 0, true));
   ASSERT_TRUE(line.steady);
-  // The floor, not the mean 2 ms above; known far better than the mean would be.
+  // The least, not the mean 2 ms above; known far better than the mean would be.
   EXPECT_NEAR(line.time_s[100], kStart + kPeriod * 100, 6 * line.offset_sigma_s);
   EXPECT_LT(line.offset_sigma_s, 1e-4);
 }

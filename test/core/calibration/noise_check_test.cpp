@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
@@ -87,12 +88,13 @@ TEST(Repetition, LeavesOutliersOut) {
   EXPECT_LT(repetition(tracks.data, 2000, tracks.at), 1.2);
 }
 
-// Mean of ratio^2 over many draws of the noise: each has a standard deviation of sqrt(2 / redundancy).
+// Mean of ratio^2 over many draws of all that is noise, the prior's mean among it: each has a standard deviation of
+// sqrt(2 / redundancy). The check counts as unknown what the prior decides, trace(covariance * information): it is added.
 TEST(NoiseRatios, AreOneInTheMeanWhereTheNoiseIsAsStated) {
-  constexpr int kRuns = 200;
+  constexpr int kRuns = 400;
+  constexpr double kPriorSigma = 1e-3;
   test::AdjustmentScene scene = test::make_adjustment_scene();
-  // What the data leave open a prior must not decide: it would be counted as unknown.
-  scene.priors.information.setConstant(1e-6);
+  scene.priors.information.setConstant(1 / (kPriorSigma * kPriorSigma));
   // Every other frame, and poor telemetry: the observations decide most of the trajectory, and its share of their
   // redundancy shows.
   auto& observations = scene.data.observations;
@@ -100,10 +102,11 @@ TEST(NoiseRatios, AreOneInTheMeanWhereTheNoiseIsAsStated) {
                                     [](const auto& o) { return o.frame % 2 != 0; }),
                      observations.end());
   for (auto& sample : scene.data.telemetry) sample.sigma *= 5;
+  const int unknowns = 2 * scene.state.trajectory.control_points() + kGlobalCount;
   Random random(11);
   std::normal_distribution<double> noise;
-  double pixel = 0;
-  double telemetry = 0;
+  double pixel_excess = 0;  // of the squares over what the check expects, and of the latter the sum
+  double telemetry_excess = 0;
   double pixel_redundancy = 0;
   double telemetry_redundancy = 0;
   double shared_unknowns = 0;
@@ -115,26 +118,32 @@ TEST(NoiseRatios, AreOneInTheMeanWhereTheNoiseIsAsStated) {
     for (auto& sample : data.telemetry) {
       sample.measured += sample.sigma.cwiseProduct(Vector2<double>(noise(random), noise(random)));
     }
-    Adjustment adjustment(data, scene.priors, scene.fixed);
+    Eigen::VectorXd drawn = Eigen::VectorXd::Zero(unknowns);
+    for (int i = unknowns - kGlobalCount; i < unknowns; ++i) drawn[i] = kPriorSigma * noise(random);
+    AdjustmentPriors priors = scene.priors;
+    apply_step(drawn, {}, &priors.mean);
+    Adjustment adjustment(data, priors, scene.fixed);
     AdjustmentState state = scene.state;
     Linearisation at;
     GlobalMatrix covariance;
     double telemetry_unknowns = 0;
-    ASSERT_TRUE(adjustment.minimise({}, 30, 1e-3, &state, &at));
+    ASSERT_TRUE(adjustment.minimise({}, 50, 1e-3, &state, &at));
     ASSERT_TRUE(adjustment.covariance(at, &covariance, &telemetry_unknowns));
+    const double prior_unknowns = covariance.trace() / (kPriorSigma * kPriorSigma);
     const NoiseRatios ratios = noise_ratios(data, state, at, telemetry_unknowns);
     ASSERT_TRUE(ratios.known());
-    pixel += ratios.pixel.ratio * ratios.pixel.ratio / kRuns;
-    telemetry += ratios.telemetry.ratio * ratios.telemetry.ratio / kRuns;
-    pixel_redundancy = ratios.pixel.redundancy;
-    telemetry_redundancy = ratios.telemetry.redundancy;
-    shared_unknowns = 2 * state.trajectory.control_points() + kGlobalCount - telemetry_unknowns;
+    const double ratio2 = ratios.pixel.ratio * ratios.pixel.ratio;
+    pixel_excess += (ratio2 - 1) * ratios.pixel.redundancy - prior_unknowns;
+    pixel_redundancy += ratios.pixel.redundancy + prior_unknowns;
+    telemetry_excess +=
+        (ratios.telemetry.ratio * ratios.telemetry.ratio - 1) * ratios.telemetry.redundancy;
+    telemetry_redundancy += ratios.telemetry.redundancy;
+    shared_unknowns += unknowns - telemetry_unknowns - prior_unknowns;
   }
-  const double pixel_chance = 4.5 * std::sqrt(2 / (pixel_redundancy * kRuns));
-  EXPECT_NEAR(pixel, 1, pixel_chance);
-  EXPECT_NEAR(telemetry, 1, 4.5 * std::sqrt(2 / (telemetry_redundancy * kRuns)));
+  EXPECT_NEAR(pixel_excess, 0, 4.5 * std::sqrt(2 * pixel_redundancy));
+  EXPECT_NEAR(telemetry_excess, 0, 4.5 * std::sqrt(2 * telemetry_redundancy));
   // The bound is tight enough to tell the unknowns that the observations decide.
-  EXPECT_GT(shared_unknowns / pixel_redundancy, 1.5 * pixel_chance);
+  EXPECT_GT(shared_unknowns, 2 * 4.5 * std::sqrt(2 * pixel_redundancy));
 }
 
 TEST(NoiseRatios, ContradictOnlyBeyondFourStandardDeviations) {
