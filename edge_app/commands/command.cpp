@@ -72,14 +72,14 @@ Calibration data_sheet_calibration(const CameraConfig& camera) {
   calibration.line_delay = camera.upside_down ? -camera.line_delay_s : camera.line_delay_s;
   // What is not measured is nominal: axes as well mounted as PTCEE takes them to be, and the
   // difference between two network links.
-  constexpr double kAxisSigma = 0.05;        // rad
-  constexpr double kClockOffsetSigma = 0.1;  // s
+  constexpr double kAxisSigma_rad = 0.05;
+  constexpr double kClockOffsetSigma_s = 0.1;
   for (const Parameter axis :
        {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
-    calibration.covariance(index(axis), index(axis)) = kAxisSigma * kAxisSigma;
+    calibration.covariance(index(axis), index(axis)) = kAxisSigma_rad * kAxisSigma_rad;
   }
   calibration.covariance(index(Parameter::kClockOffset), index(Parameter::kClockOffset)) =
-      kClockOffsetSigma * kClockOffsetSigma;
+      kClockOffsetSigma_s * kClockOffsetSigma_s;
   return calibration;
 }
 
@@ -87,7 +87,7 @@ OrientationStepOptions step_options(const Config& config, const NamedCalibration
   OrientationStepOptions options = step_options(RecordingNoise{}, calibration);
   TelemetryNoise& noise = options.telemetry_noise;
   noise.pan_tilt_sigma = config.pan_tilt.angle_sigma_rad.value_or(noise.pan_tilt_sigma);
-  noise.quantum = config.pan_tilt.angle_quantum_rad;
+  noise.resolution = config.pan_tilt.angle_quantum_rad;
   noise.acceleration_sigma = config.pan_tilt.acceleration_sigma_rad_s2;
   options.telemetry_limits.max_repeat_s = config.pan_tilt.max_repeat_s;
   options.telemetry_limits.max_extrapolation_s = config.realtime.max_extrapolation_s;

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "edge_app/config/pan_tilt_config.h"
-#include "edge_app/output/http_server.h"    // HttpServerOptions
+#include "edge_app/output/http/http_options.h"
 #include "edge_app/output/record_format.h"  // OutputFormat
 #include "platform/video/v4l2_mode.h"       // V4l2Format
 

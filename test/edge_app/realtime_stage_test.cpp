@@ -205,7 +205,7 @@ OrientationStepOptions options_with_pictures() {
   OrientationStepOptions options;
   options.calibration.camera = {2000, 1, 0, Scene::kWidth, Scene::kHeight};
   options.oe.emplace();
-  options.oe->cell_size_px = 20;
+  options.oe->maker.cell_size_px = 20;
   options.follow_points = true;
   return options;
 }
@@ -256,20 +256,18 @@ TEST(RealtimeStage, APictureThatFindsNoRoomIsNotLent) {
     EXPECT_TRUE(stage->process());
   };
   for (int frame = 0; frame < kRoom; ++frame) process(frame, kNoPicture);
-  EXPECT_EQ(stage->drops().unheard, 0) << "the queue is just full";
   stage->want_picture();
   process(kRoom, 7);
   PictureSlot slot = kNoPicture;
   ASSERT_TRUE(stage->pop_returned(slot)) << "nobody else would give it back";
   EXPECT_EQ(slot, 7);
-  EXPECT_EQ(stage->drops().unheard, 1);
   FeedFrame fed;
   int heard = 0;
   while (stage->pop(fed)) {
     ++heard;
     EXPECT_EQ(fed.slot, kNoPicture);
   }
-  EXPECT_EQ(heard, kRoom);
+  EXPECT_EQ(heard, kRoom) << "the queue was just full";
   // With room again, the next picture is lent without another wish.
   process(kRoom + 1, 8);
   ASSERT_TRUE(stage->pop(fed));

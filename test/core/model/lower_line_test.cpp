@@ -137,6 +137,57 @@ TEST(LowerLine, StaysFiniteWhereTheDensityUnderflowsAndWherePointsAreCollinear) 
   }
 }
 
+TEST(LowerLine, TellsElsewhereWhatAFitMadeThereTells) {
+  const Points points = exponential_points(5, 40, 0.3);
+  const LineEstimate here = fit(points, 0.3, 1.1, 1.3, 1.0);
+  for (const double at : {-3.0, 0.0, 4.5}) {
+    const LineEstimate there = fit(points, 0.3, 1.1, 1.3, at);
+    EXPECT_NEAR(here.value_at(at), there.value, 1e-12) << at;
+    EXPECT_NEAR(here.variance_at(at), there.var_value, 1e-12) << at;
+  }
+}
+
+// Moments of exp(rate t) over [0, width], summed.
+TEST(LowerLine, MomentsHaveNoStepWhereTheirSeriesTakesOver) {
+  constexpr double kWidth = 2;
+  for (const double u : {0.9e-3, 0.999e-3, 1.001e-3, 1.1e-3, 0.5}) {
+    for (const double sign : {1.0, -1.0}) {
+      const double rate = sign * u / kWidth;
+      double mass = 0, first = 0, second = 0;
+      constexpr int kSteps = 10000;
+      for (int i = 0; i < kSteps; ++i) {
+        const double t = kWidth * (i + 0.5) / kSteps;
+        const double density = std::exp(rate * t) * kWidth / kSteps;
+        mass += density;
+        first += t * density;
+        second += t * t * density;
+      }
+      const internal::TruncatedExponential piece(rate, kWidth);
+      const double peak = rate > 0 ? std::exp(rate * kWidth) : 1;
+      const double mean = first / mass;
+      EXPECT_NEAR(piece.mass, mass / peak, 1e-6 * kWidth) << u;
+      EXPECT_NEAR(piece.mean, mean, 1e-6 * kWidth) << u;
+      EXPECT_NEAR(piece.variance, second / mass - mean * mean, 1e-6 * kWidth) << u;
+    }
+  }
+}
+
+// Milliseconds in, milliseconds out: the guess's weight and the data's add up to one.
+TEST(LowerLine, DelayScaleIsOfTheUnitOfTheDelays) {
+  const Points points = exponential_points(6, 64, 1.0);
+  const auto scale_in = [&](double unit) {
+    std::vector<double> y(points.y);
+    std::vector<double> scratch(y.size());
+    for (double& value : y) value *= unit;
+    LineEstimate floor;
+    floor.value = 3 * unit;
+    floor.slope = 1.2 * unit;
+    return delay_scale(points.x.data(), y.data(), y.size(), floor, 1e-9 * unit, 0.2 * unit,
+                       scratch.data());
+  };
+  EXPECT_NEAR(scale_in(1e3) / scale_in(1), 1e3, 1e-9);
+}
+
 TEST(LowerLine, DelayScaleIgnoresHeavyTails) {
   std::mt19937_64 random(4);
   std::exponential_distribution<double> delay(1.0);

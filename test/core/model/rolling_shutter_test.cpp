@@ -254,6 +254,28 @@ TEST(RollingShutter, NoRowSeesWhatMovesDownAsFastAsTheReadOut) {
   EXPECT_EQ(refused, 2);
 }
 
+// Even where the search for a row would lead far away, behind the camera or to a row of another moment.
+TEST(RollingShutter, NoRowIsAllThatIsSaidOfWhatOutrunsTheReadOut) {
+  Setting setting = paper_setting();
+  setting.line_delay = 14.2e-6;
+  for (const double tilt_rate : {2.5, 3.0, 10.0, 300.0}) {
+    for (const double tilt_acceleration : {0.0, -1e3, -1e5}) {
+      setting.motion.rate = {0.1, tilt_rate};
+      setting.motion.acceleration = {0, tilt_acceleration};
+      for (int place = 0; place < 25; ++place) {
+        const Vec2 u(setting.camera.width * (place % 5) / 4.0,
+                     setting.camera.height * (place / 5) / 4.0);
+        Vec3 d_c;
+        ASSERT_EQ(unproject(setting.camera, u, &d_c), ProjectionStatus::kOk);
+        const Vec3 d = R_base_from_camera(setting.mechanics, setting.motion.angle) * d_c;
+        Vec2 seen;
+        EXPECT_EQ(setting.project(d, &seen), ProjectionStatus::kNoRow)
+            << tilt_rate << ' ' << tilt_acceleration << ' ' << u.transpose();
+      }
+    }
+  }
+}
+
 TEST(RollingShutter, PassesOnTheCamerasRefusals) {
   const Setting setting = paper_setting();
   Vec2 u;

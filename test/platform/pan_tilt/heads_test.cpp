@@ -66,7 +66,7 @@ TEST_P(EveryHead, IsFuzzedAndDocumented) {
   EXPECT_THAT(text_of("test/fuzz/README.md"), HasSubstr("| `" + key + "` |"));
   EXPECT_THAT(text_of("platform/pan_tilt/README.md"), HasSubstr("`" + key + "_protocol`"));
   EXPECT_THAT(text_of("test/simulator/README.md"), HasSubstr("`" + key + "`"));
-  EXPECT_THAT(text_of("edge_app/README.md"), HasSubstr(" " + key + " |"));
+  EXPECT_THAT(text_of("edge_app/config/README.md"), HasSubstr(" " + key + " |"));
   std::istringstream example(text_of("edge_app/examples/head_on_a_line.yaml"));
   std::string line;
   while (std::getline(example, line) && line.rfind("  type: pelco_d", 0) != 0) {
