@@ -12,7 +12,6 @@
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
-#include "edge_app/config/calibration_store.h"
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/http_api.h"
 #include "edge_app/output/live_state.h"
@@ -20,6 +19,7 @@
 #include "edge_app/output/record_writer.h"
 #include "edge_app/output/status_page.h"
 #include "edge_app/pipeline/pipeline.h"
+#include "edge_app/storage/calibration_store.h"
 #include "platform/system/clock.h"
 #include "platform/system/realtime.h"
 #include "platform/system/service_manager.h"
@@ -216,6 +216,17 @@ void wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport
   }
 }
 
+// A repeated angle is trusted up to max_repeat_s before it only (telemetry_buffer.h): while the head rests, the newest
+// angle known is at least as old.
+void warn_of_limits(const TelemetryLimits& limits) {
+  if (limits.max_repeat_s < limits.max_extrapolation_s) return;
+  spdlog::warn(
+      "pan_tilt.max_repeat_s ({:.0f} ms) is not below realtime.max_extrapolation_s ({:.0f} ms): "
+      "while the head rests and repeats its angle, records say \"{}\"",
+      1e3 * limits.max_repeat_s, 1e3 * limits.max_extrapolation_s,
+      to_string(RecordStatus::kTelemetryTooOld));
+}
+
 int run(const RunOptions& options) {
   const Config config = require_config(options.config);
   Calibrating calibrating;
@@ -231,6 +242,7 @@ int run(const RunOptions& options) {
   }
   spdlog::info("calibration: {}", calibration.name);
   PipelineOptions of_pipeline = pipeline_options(config, calibration);
+  warn_of_limits(of_pipeline.step.telemetry_limits);
   of_pipeline.step.map = std::move(map);
   of_pipeline.step.follow_points = calibrating.calibration && config.calibration.automatic;
 
