@@ -9,6 +9,7 @@
 #include <limits>
 
 #include "core/calibration/atomic_file.h"
+#include "core/realtime/oe_mode/landmark_map.h"
 
 namespace alidade {
 

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "core/calibration/calibration_file.h"
+#include "core/realtime/oe_mode/landmark_map.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {
