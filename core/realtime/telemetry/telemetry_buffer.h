@@ -63,11 +63,11 @@ enum class QueryStatus {
   kOk,
   kExtrapolated,  // a result, but outside the samples
   kEmpty,
-  kOneSample,  // no rate
-  kTooOld,     // further before the oldest sample than may be extrapolated
-  kTooNew,     // further after the newest sample than may be extrapolated
-  kGap,        // the samples around this time are too far apart
-  kNotFinite   // the time is not finite, its sigma is not one, or the result cannot be represented
+  kOneSample,        // no rate
+  kBeforeTelemetry,  // further before the oldest sample than may be extrapolated
+  kTelemetryTooOld,  // further after the newest sample than max_extrapolation_s
+  kGap,              // the samples around this time are too far apart
+  kNotFinite         // the time is not finite, its sigma is not one, or the result cannot be represented
 };
 
 [[nodiscard]] constexpr bool has_result(QueryStatus status) {
@@ -84,9 +84,9 @@ enum class QueryStatus {
       return "no telemetry sample yet";
     case QueryStatus::kOneSample:
       return "only one telemetry sample yet";
-    case QueryStatus::kTooOld:
+    case QueryStatus::kBeforeTelemetry:
       return "older than the oldest telemetry sample";
-    case QueryStatus::kTooNew:
+    case QueryStatus::kTelemetryTooOld:
       return "too far beyond the newest telemetry sample";
     case QueryStatus::kGap:
       return "in a gap of the telemetry";
@@ -132,8 +132,8 @@ class TelemetryBuffer {
     if (size_ == 1) return QueryStatus::kOneSample;
     const double oldest = knot(0).time_s;
     const double newest = knot(size_ - 1).time_s;
-    if (time_s < oldest - limits_.max_extrapolation_s) return QueryStatus::kTooOld;
-    if (time_s > newest + limits_.max_extrapolation_s) return QueryStatus::kTooNew;
+    if (time_s < oldest - limits_.max_extrapolation_s) return QueryStatus::kBeforeTelemetry;
+    if (time_s > newest + limits_.max_extrapolation_s) return QueryStatus::kTelemetryTooOld;
 
     const std::size_t before = segment(time_s);
     if (!connected(before) && !knot(before + 1).held) return QueryStatus::kGap;

@@ -106,7 +106,7 @@ TEST(ShearCorrection, GivesTheLandmarksThatARightMotionWouldHaveGiven) {
   for (double v = 5; v < 270; v += 33) {
     for (double u = 10; u < 480; u += 60) {
       Landmark landmark;
-      Vector3<double> d;
+      Vector3<double> d = Vector3<double>::Zero();
       int slot = -1;
       ASSERT_EQ(rolling_shutter_unproject(calibration.camera, calibration.mechanics,
                                           calibration.line_delay, wrong, {u, v}, &landmark.d),
@@ -153,7 +153,7 @@ class ShearedFrames : public testing::Test {
 };
 
 TEST_F(ShearedFrames, TellTheRateThatTheMapGotWrong) {
-  const Vector2<double> wrong_rate(0.7 * kRateSigma, -1.3 * kRateSigma);
+  const Vector2<double> wrong_rate(1.2 * kRateSigma, -1.9 * kRateSigma);
   const Vector2<double> wrong_acceleration(0.05, -0.04);
   begin();
   for (int k = 0; k < 5; ++k) {

@@ -237,8 +237,8 @@ TEST(TelemetryBuffer, GoesOnBeyondItsEndsForAStatedTime) {
       ASSERT_EQ(buffer.query(t, 0, &result), QueryStatus::kExtrapolated) << t;
       expect_steady(result, mount, t);
     }
-    EXPECT_EQ(buffer.query(newest + 0.201, 0, &result), QueryStatus::kTooNew);
-    EXPECT_EQ(buffer.query(-0.201, 0, &result), QueryStatus::kTooOld);
+    EXPECT_EQ(buffer.query(newest + 0.201, 0, &result), QueryStatus::kTelemetryTooOld);
+    EXPECT_EQ(buffer.query(-0.201, 0, &result), QueryStatus::kBeforeTelemetry);
   }
 }
 
