@@ -38,7 +38,7 @@ struct TelemetryLimits {
   double max_extrapolation_s = 0.25;  // before the oldest and after the newest sample
   double max_repeat_s = 0.1;          // 0 = the device measures afresh for every poll
 
-  // False and one line in *error (if not null) when a value makes no sense.
+  // False and one line in *error (if not null) when a value is not valid.
   [[nodiscard]] bool validate(const char** error = nullptr) const {
     const auto not_negative = [](double v) { return std::isfinite(v) && v >= 0; };
     const char* problem = nullptr;
@@ -67,7 +67,7 @@ enum class QueryStatus {
   kBeforeTelemetry,  // further before the oldest sample than may be extrapolated
   kTelemetryTooOld,  // further after the newest sample than max_extrapolation_s
   kGap,              // the samples around this time are too far apart
-  kNotFinite         // the time is not finite, its sigma is not one, or the result cannot be represented
+  kNotFinite  // the time is not finite, its sigma is not one, or the result cannot be represented
 };
 
 [[nodiscard]] constexpr bool has_result(QueryStatus status) {
