@@ -67,56 +67,95 @@ function(alidade_executable name)
   target_include_directories(${name} PRIVATE ${PROJECT_SOURCE_DIR})
 endfunction()
 
-# Everything that the thread sanitizer is worth building for: the tests labelled `threads`.
-add_custom_target(threaded_programs)
+# What test programs share, compiled once: GoogleTest and Eigen are most of what each test file includes.
+if(ALIDADE_BUILD_TESTS AND NOT ALIDADE_FUZZ)
+  add_library(alidade_test_prelude OBJECT ${PROJECT_SOURCE_DIR}/test/support/prelude.cpp)
+  target_link_libraries(alidade_test_prelude PRIVATE alidade_options Eigen3::Eigen GTest::gmock GTest::gtest)
+  # As executables are compiled, which use it.
+  set_target_properties(alidade_test_prelude PROPERTIES POSITION_INDEPENDENT_CODE OFF)
+  target_compile_options(alidade_test_prelude PRIVATE -fPIE)
+  # The product is what shall have no undefined behaviour: looking for it in tests, too, would double their compilation.
+  if(ALIDADE_SANITIZE MATCHES undefined)
+    target_compile_options(alidade_test_prelude PRIVATE -fno-sanitize=undefined)
+  endif()
+  target_precompile_headers(alidade_test_prelude PRIVATE
+    <gmock/gmock.h> <gtest/gtest.h> <Eigen/Dense> <chrono> <filesystem> <fstream> <functional> <map> <random> <sstream> <string> <thread> <vector>)
+endif()
 
-# What another processor can make different, and qemu-user can run: the tests labelled `processor`. Those that start
-# programs of the other processor or need pseudo-terminals cannot run there.
+# All test programs that another processor can run; what `cmake --build` of an ARM preset builds.
 add_custom_target(processor_programs)
 
-# alidade_test(camera_test SOURCES camera_test.cpp LINK alidade::model [LABELS ...] [TIMEOUT s]
-#              [ARGUMENTS ...] [DEPENDS target...])
-# builds a GoogleTest program and registers each of its tests with ctest, with the labels and those of the folder,
-# ALIDADE_TEST_LABELS. With a sanitizer, those labelled statistics or
-# films are neither built nor run.
+# alidade_test(core_model_test SOURCES camera_test.cpp ... LINK alidade::model [options])
+# builds the GoogleTest program of a room and registers it with ctest as one entry of that name.
+#   SUPPORT     sources without tests of their own
+#   THREADED    those of SOURCES that a thread-sanitized build has: what shares memory between threads. None: no program there
+#   NATIVE      those of SOURCES that do not run under an emulated processor (programs are started, pseudo-terminals,
+#               libraries that the sysroot lacks), with NATIVE_SUPPORT and NATIVE_LINK; `NATIVE ALL`: the whole program
+#   THOROUGH    patterns of cases that only `scripts/test all` runs: entry NAME.thorough, with the label thorough
+#   UNSANITIZED patterns of cases from which a sanitizer learns nothing that others do not show it: repetition, long films
+#   DEFINITIONS, DEPENDS, LABELS, TIMEOUT (s), RESOURCE_LOCK
 function(alidade_test name)
-  cmake_parse_arguments(A "" "TIMEOUT" "SOURCES;LINK;LABELS;ARGUMENTS;DEPENDS" ${ARGN})
+  cmake_parse_arguments(A "" "TIMEOUT;RESOURCE_LOCK"
+    "SOURCES;SUPPORT;LINK;THREADED;NATIVE;NATIVE_SUPPORT;NATIVE_LINK;THOROUGH;UNSANITIZED;DEFINITIONS;DEPENDS;LABELS" ${ARGN})
   if(NOT ALIDADE_BUILD_TESTS)
     return()
   endif()
-  if(NOT A_TIMEOUT)
-    set(A_TIMEOUT 120)
+  if(ALIDADE_SANITIZE STREQUAL "thread")
+    set(A_SOURCES ${A_THREADED})
   endif()
-  # An emulator is slower by ten to twenty times.
   if(CMAKE_CROSSCOMPILING)
-    math(EXPR A_TIMEOUT "5 * ${A_TIMEOUT}")
+    if("ALL" IN_LIST A_NATIVE)
+      return()
+    endif()
+    list(REMOVE_ITEM A_SOURCES ${A_NATIVE} "")
+  else()
+    list(APPEND A_SUPPORT ${A_NATIVE_SUPPORT})
+    list(APPEND A_LINK ${A_NATIVE_LINK})
   endif()
-  alidade_executable(${name} SOURCES ${A_SOURCES} LINK ${A_LINK} GTest::gmock GTest::gtest GTest::gtest_main)
-  # The product is what shall have no undefined behaviour: looking for it in tests too would double the time
-  # that they take to compile. Headers without a library have their tests only.
-  if(ALIDADE_SANITIZE MATCHES undefined AND NOT "alidade::model" IN_LIST A_LINK)
+  if(NOT A_SOURCES)
+    return()
+  endif()
+  alidade_executable(${name} SOURCES ${A_SOURCES} ${A_SUPPORT}
+    LINK ${A_LINK} Eigen3::Eigen GTest::gmock GTest::gtest GTest::gtest_main)
+  target_compile_definitions(${name} PRIVATE ${A_DEFINITIONS})
+  # Headers without a library have their tests only, which are then compiled as the product is.
+  if(NOT ALIDADE_SANITIZE MATCHES undefined)
+    target_precompile_headers(${name} REUSE_FROM alidade_test_prelude)
+  elseif(NOT "alidade::model" IN_LIST A_LINK)
+    target_precompile_headers(${name} REUSE_FROM alidade_test_prelude)
     target_compile_options(${name} PRIVATE -fno-sanitize=undefined)
   endif()
   if(A_DEPENDS)
     add_dependencies(${name} ${A_DEPENDS})
   endif()
-  # Repetition, and films of hundreds of pictures: what runs a thousand times there, other tests run instrumented.
-  if(ALIDADE_SANITIZE AND ("statistics" IN_LIST A_LABELS OR "films" IN_LIST A_LABELS))
-    set_target_properties(${name} PROPERTIES EXCLUDE_FROM_ALL ON)
-    return()
+  add_dependencies(processor_programs ${name})
+
+  set(left_out)
+  if(ALIDADE_SANITIZE)
+    set(left_out ${A_UNSANITIZED})
   endif()
-  list(APPEND A_LABELS ${ALIDADE_TEST_LABELS})
-  if("processor" IN_LIST A_LABELS)
-    add_dependencies(processor_programs ${name})
+  string(REPLACE ";" ":" thorough "${A_THOROUGH}")
+  string(REPLACE ";" ":" left_out "${left_out}")
+  alidade_register_cases(${name} ${name} "*-${thorough}:${left_out}" "${A_LABELS}")
+  if(A_THOROUGH)
+    alidade_register_cases(${name} ${name}.thorough "${thorough}-${left_out}" "thorough;${A_LABELS}")
   endif()
-  if("threads" IN_LIST A_LABELS)
-    add_dependencies(threaded_programs ${name})
+endfunction()
+
+# One entry of ctest for the cases of a program that the filter leaves. Takes TIMEOUT and RESOURCE_LOCK from alidade_test.
+function(alidade_register_cases program name filter labels)
+  if(NOT A_TIMEOUT)
+    set(A_TIMEOUT 300)
   endif()
-  include(GoogleTest)
-  # Values of parameters stay out of the names: printed bytes of a struct differ from run to run.
-  gtest_discover_tests(${name} DISCOVERY_MODE PRE_TEST DISCOVERY_TIMEOUT 60 NO_PRETTY_VALUES
-    EXTRA_ARGS ${A_ARGUMENTS}
-    PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${A_LABELS}")
+  # An emulator is slower by ten to twenty times, a sanitizer by two to five.
+  if(CMAKE_CROSSCOMPILING OR ALIDADE_SANITIZE)
+    math(EXPR A_TIMEOUT "5 * ${A_TIMEOUT}")
+  endif()
+  add_test(NAME ${name} COMMAND ${program} --gtest_brief=1 --gtest_filter=${filter})
+  set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${labels}")
+  if(A_RESOURCE_LOCK)
+    set_tests_properties(${name} PROPERTIES RESOURCE_LOCK ${A_RESOURCE_LOCK})
+  endif()
 endfunction()
 
 # alidade_benchmark(pt_mode_benchmark SOURCES ... LINK ...)
@@ -140,43 +179,64 @@ endfunction()
 add_custom_target(fuzz_programs)
 
 # alidade_fuzz_target(vapix LINK alidade::platform [MUTATIONS n] [LONGEST bytes])
-# builds fuzz_vapix of vapix_fuzz.cpp and registers it. Under the preset `fuzz` it is linked with libFuzzer, and
-# `ctest -L fuzz` lets it search for a minute, from corpus/vapix and regressions/vapix on; what it finds worth
+# declares the target of vapix_fuzz.cpp. Under the preset `fuzz` it is a program of its own, fuzz_vapix, linked with
+# libFuzzer: `ctest -L fuzz` lets it search for a minute, from corpus/vapix and regressions/vapix on; what it finds worth
 # keeping goes to <build>/fuzz-corpus/vapix/, an input that fails to <build>/fuzz-artifacts/; ten million inputs
-# of no more bytes than that (1024) are `ctest --preset fuzz-long`. In all other builds fuzz_regressions_vapix
-# runs those files, and n mutations of them (alidade::regression_driver).
+# of no more bytes than that (1024) are `ctest --preset fuzz-long`. In all other builds it is a part of the program that
+# alidade_fuzz_regressions() makes, which runs those files and n mutations of them (5000).
 function(alidade_fuzz_target name)
   cmake_parse_arguments(A "" "MUTATIONS;LONGEST" "LINK" ${ARGN})
+  if(NOT A_MUTATIONS)
+    set(A_MUTATIONS 5000)
+  endif()
+  if(NOT ALIDADE_FUZZ)
+    set_property(GLOBAL APPEND PROPERTY ALIDADE_FUZZ_TARGETS ${name})
+    set_property(GLOBAL APPEND PROPERTY ALIDADE_FUZZ_LIBRARIES ${A_LINK})
+    set_property(GLOBAL APPEND_STRING PROPERTY ALIDADE_FUZZ_ROWS "    {\"${name}\", fuzz_${name}, ${A_MUTATIONS}},\n")
+    set_property(GLOBAL APPEND_STRING PROPERTY ALIDADE_FUZZ_DECLARATIONS
+      "extern \"C\" int fuzz_${name}(const std::uint8_t* data, std::size_t size);\n")
+    return()
+  endif()
   set(inputs ${CMAKE_CURRENT_SOURCE_DIR}/corpus/${name})
   # Globbed at each build: the first regression of a target makes its folder.
   file(GLOB regressions CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/regressions/${name})
   list(APPEND inputs ${regressions})
-  if(ALIDADE_FUZZ)
-    set(found ${PROJECT_BINARY_DIR}/fuzz-corpus/${name})
-    set(artifacts ${PROJECT_BINARY_DIR}/fuzz-artifacts)
-    file(MAKE_DIRECTORY ${found} ${artifacts})
-    alidade_executable(fuzz_${name} SOURCES ${name}_fuzz.cpp LINK ${A_LINK})
-    target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
-    add_dependencies(fuzz_programs fuzz_${name})
-    set(search fuzz_${name} -timeout=30 -print_final_stats=1 -artifact_prefix=${artifacts}/${name}-)
-    add_test(NAME fuzz_${name} COMMAND ${search} -max_total_time=60 ${found} ${inputs})
-    set_tests_properties(fuzz_${name} PROPERTIES LABELS fuzz TIMEOUT 180)
-    if(NOT A_LONGEST)
-      set(A_LONGEST 1024)
-    endif()
-    add_test(NAME fuzz_${name}_ten_million
-      COMMAND ${search} -runs=10000000 -max_len=${A_LONGEST} ${found} ${inputs})
-    # A fifth faster; an input that fails tells more when it is run again without.
-    set_tests_properties(fuzz_${name}_ten_million PROPERTIES LABELS "fuzz;slow" TIMEOUT 10800
-      ENVIRONMENT ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=16)
-  else()
-    alidade_executable(fuzz_${name} SOURCES ${name}_fuzz.cpp LINK alidade::regression_driver ${A_LINK})
-    if(NOT A_MUTATIONS)
-      set(A_MUTATIONS 5000)
-    endif()
-    add_test(NAME fuzz_regressions_${name}
-      COMMAND fuzz_${name} --mutations=${A_MUTATIONS} ${inputs})
-    set_tests_properties(fuzz_regressions_${name} PROPERTIES TIMEOUT 120 LABELS processor)
-    add_dependencies(processor_programs fuzz_${name})
+  set(found ${PROJECT_BINARY_DIR}/fuzz-corpus/${name})
+  set(artifacts ${PROJECT_BINARY_DIR}/fuzz-artifacts)
+  file(MAKE_DIRECTORY ${found} ${artifacts})
+  alidade_executable(fuzz_${name} SOURCES ${name}_fuzz.cpp LINK ${A_LINK})
+  target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
+  add_dependencies(fuzz_programs fuzz_${name})
+  set(search fuzz_${name} -timeout=30 -print_final_stats=1 -artifact_prefix=${artifacts}/${name}-)
+  add_test(NAME fuzz_${name} COMMAND ${search} -max_total_time=60 ${found} ${inputs})
+  set_tests_properties(fuzz_${name} PROPERTIES LABELS fuzz TIMEOUT 180)
+  if(NOT A_LONGEST)
+    set(A_LONGEST 1024)
   endif()
+  add_test(NAME fuzz_${name}_ten_million
+    COMMAND ${search} -runs=10000000 -max_len=${A_LONGEST} ${found} ${inputs})
+  # A fifth faster; an input that fails tells more when it is run again without.
+  set_tests_properties(fuzz_${name}_ten_million PROPERTIES LABELS "fuzz;slow" TIMEOUT 10800
+    ENVIRONMENT ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=16)
+endfunction()
+
+# The program fuzz_regressions of all targets declared so far, and planted_defect_fuzz.cpp, which proves that it bites.
+function(alidade_fuzz_regressions)
+  get_property(targets GLOBAL PROPERTY ALIDADE_FUZZ_TARGETS)
+  get_property(libraries GLOBAL PROPERTY ALIDADE_FUZZ_LIBRARIES)
+  list(REMOVE_DUPLICATES libraries)
+  get_property(ALIDADE_FUZZ_ROWS GLOBAL PROPERTY ALIDADE_FUZZ_ROWS)
+  get_property(ALIDADE_FUZZ_DECLARATIONS GLOBAL PROPERTY ALIDADE_FUZZ_DECLARATIONS)
+  configure_file(regression_targets.h.in test/fuzz/regression_targets.h @ONLY)
+  set(sources regression_driver.cpp)
+  foreach(target IN LISTS targets ITEMS planted_defect)
+    set_source_files_properties(${target}_fuzz.cpp PROPERTIES
+      COMPILE_DEFINITIONS LLVMFuzzerTestOneInput=fuzz_${target})
+    list(APPEND sources ${target}_fuzz.cpp)
+  endforeach()
+  alidade_executable(fuzz_regressions SOURCES ${sources} LINK ${libraries})
+  target_include_directories(fuzz_regressions PRIVATE ${CMAKE_CURRENT_BINARY_DIR})
+  add_test(NAME fuzz_regressions COMMAND fuzz_regressions --all ${CMAKE_CURRENT_SOURCE_DIR})
+  set_tests_properties(fuzz_regressions PROPERTIES TIMEOUT 900)
+  add_dependencies(processor_programs fuzz_regressions)
 endfunction()

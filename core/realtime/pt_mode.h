@@ -13,7 +13,7 @@
 
 #include "core/model/calibration.h"
 #include "core/realtime/frame_orientation.h"
-#include "core/realtime/telemetry_buffer.h"
+#include "core/realtime/telemetry/telemetry_buffer.h"
 
 namespace alidade {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "edge_app/pipeline/stream_clock.h"
+#include "edge_app/pipeline/capture_clock.h"
 
 namespace alidade {
 namespace {
@@ -38,7 +38,7 @@ void measure_raw_rate(const std::vector<ClockedStamp>& stamps, ClockReport* repo
 ClockReport check_clock(const std::vector<ClockedStamp>& stamps, const ClockFilterOptions& options,
                         std::vector<double>* time_s) {
   ClockReport report;
-  StreamClock clock(options);
+  CaptureClock clock(options);
   std::vector<double> times;
   std::int64_t reconnections = 0;
   std::size_t line_since = 0;  // the item at which the filter's line last began anew
@@ -59,7 +59,7 @@ ClockReport check_clock(const std::vector<ClockedStamp>& stamps, const ClockFilt
     report.period_s = report.kind == StampKind::kSequence ? filter.period_s() : 0;
     report.counters = filter.counters();
     report.counters.restarts = std::max<std::int64_t>(0, report.counters.restarts - reconnections);
-    report.floor_shift_s = filter.floor_shift_s();
+    report.floor_shift_s = filter.delay_shift_s();
     // The last line knows more than the answers that came while it was found.
     std::vector<double> lateness;
     for (std::size_t i = line_since; i < stamps.size(); ++i) {
@@ -104,7 +104,7 @@ void judge_clock(const ClockReport& clock, const std::string& what, Findings* fi
                             "or let NTP slew it",
                             what, clock.counters.restarts));
   }
-  if (clock.counters.floor_shifts > 0) {
+  if (clock.counters.delay_steps > 0) {
     add_advice(findings,
                fmt::format("{}: the least delay changed by {:.1f} ms; that is flagged and not "
                            "followed: look for a changed route or a buffer that filled up",
@@ -119,9 +119,9 @@ std::string describe(const ClockReport& clock) {
               ? fmt::format(", rate error {:+.0f} ppm", 1e6 * clock.rate_error)
               : fmt::format(", period {:.3f} ms", 1e3 * clock.period_s);
   text += fmt::format(", time known to {:.2f} ms", 1e3 * clock.sigma_s);
-  text += clock.counters.floor_shifts == 0
+  text += clock.counters.delay_steps == 0
               ? ", no shift"
-              : fmt::format(", {} shifts, {:+.1f} ms in all", clock.counters.floor_shifts,
+              : fmt::format(", {} shifts, {:+.1f} ms in all", clock.counters.delay_steps,
                             1e3 * clock.floor_shift_s);
   if (clock.counters.restarts > 0) text += fmt::format(", {} restarts", clock.counters.restarts);
   if (clock.counters.rejected > 0) text += fmt::format(", {} rejected", clock.counters.rejected);

@@ -1,5 +1,5 @@
 #pragma once
-// What a stream's stamps are worth: the pipeline's own clock filter (stream_clock.h) run over them, and what its line
+// What a stream's stamps are worth: the pipeline's own clock filter (capture_clock.h) run over them, and what its line
 // leaves over.
 //
 //   lateness  of an item: its receive time less the filter's last line at its sender's time (or count)

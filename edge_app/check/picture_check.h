@@ -16,8 +16,8 @@
 #include <string>
 #include <vector>
 
-#include "core/realtime/image_view.h"
-#include "core/realtime/start_up_tracker.h"
+#include "core/realtime/image/image_view.h"
+#include "core/realtime/start_up/start_up_tracker.h"
 #include "edge_app/check/finding.h"
 #include "edge_app/check/spread.h"
 

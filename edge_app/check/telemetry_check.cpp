@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "core/model/angle.h"
-#include "core/realtime/telemetry_buffer.h"
+#include "core/realtime/telemetry/telemetry_buffer.h"
 #include "edge_app/pipeline/stale_repeats.h"
 
 namespace alidade {

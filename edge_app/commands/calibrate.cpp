@@ -1,6 +1,6 @@
 // `alidade calibrate`: from the tracks or the video, and the telemetry, of a recording to its calibration,
-// its landmarks and a report; `--compare`: many recordings against what is known of them. A calibration
-// that is not good enough is not written, so that it cannot replace one that is.
+// its landmarks and a report. A calibration that is not good enough is not written, so that it cannot replace one
+// that is.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -14,15 +14,14 @@
 
 #include "core/calibration/atomic_file.h"
 #include "core/calibration/calibration_file.h"
-#include "edge_app/commands/calibration_comparison.h"
 #include "edge_app/commands/calibration_input.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/commands/video_tracks.h"
-#include "edge_app/config/map_file.h"
 #include "edge_app/output/calibration_report.h"
 #include "edge_app/output/calibration_summary.h"
 #include "edge_app/pipeline/calibration_streams.h"
+#include "edge_app/storage/map_file.h"
 
 namespace alidade {
 namespace {
@@ -32,9 +31,8 @@ namespace fs = std::filesystem;
 constexpr double kShareOfLooking = 0.9;  // of the time that tracks and adjustment take
 
 struct CalibrateOptions {
-  std::vector<std::string> recordings;
+  std::string recording;  // its directory
   std::string directory;  // empty: <recording>/alidade
-  bool compare = false;
   bool json = false;
   int passes = 2;  // of finding tracks in the video
   // VALUE or VALUE,SIGMA; "free"; empty: as the estimator has it.
@@ -237,7 +235,7 @@ class OutputDirectory {
 };
 
 int calibrate_recording(const CalibrateOptions& options) {
-  const std::string& recording = options.recordings.front();
+  const std::string& recording = options.recording;
   StopSignals signals;
   CalibrationJob job = load_job(recording, options);
   const CalibrationResult result = calibrate_job(recording, options.passes, &job, &signals);
@@ -288,42 +286,6 @@ int calibrate_recording(const CalibrateOptions& options) {
   return kExitOk;
 }
 
-int compare_recordings(const CalibrateOptions& options) {
-  StopSignals signals;
-  CalibrationComparison comparison;
-  for (const std::string& recording : options.recordings) {
-    try {
-      CalibrationJob job = load_job(recording, options);
-      const ComparedRun known = load_known_values(recording);
-      const CalibrationResult result = calibrate_job(recording, options.passes, &job, &signals);
-      if (!result.ok()) {
-        throw CommandError(kExitFailed, fmt::format("{}: {}: {}", recording,
-                                                    to_string(result.status), result.message));
-      }
-      fmt::print("{}", comparison.add(known, result));
-    } catch (const CommandError& failure) {
-      // Usage that no recording can mend, and a cancelled run, end all.
-      if (signals.wait(-1, 0) == StopSignals::Event::kSignal) throw;
-      comparison.add_failure(failure.what());
-      fmt::print("{}\n\n", failure.what());
-    }
-    std::fflush(stdout);
-  }
-  fmt::print("{}", comparison.statistics());
-  return comparison.failures() == 0 ? kExitOk : kExitFailed;
-}
-
-int run_calibrate(const CalibrateOptions& options) {
-  if (!options.compare && options.recordings.size() > 1) {
-    throw CommandError(kExitUsage, "calibrate: one recording at a time; use --compare for many");
-  }
-  if (options.compare && (options.json || !options.directory.empty())) {
-    throw CommandError(kExitUsage,
-                       "calibrate --compare: writes no files and no JSON; leave out -o and --json");
-  }
-  return options.compare ? compare_recordings(options) : calibrate_recording(options);
-}
-
 }  // namespace
 
 void register_calibrate(CLI::App& app, int* exit_code) {
@@ -332,15 +294,10 @@ void register_calibrate(CLI::App& app, int* exit_code) {
       app.add_subcommand("calibrate",
                          "Calibrate from a recording's video (or tracks.csv) and telemetry; writes "
                          "calibration.yaml, map.bin and report.html");
-  command
-      ->add_option("recording", options->recordings,
-                   "Directory of the recording (--compare: of each)")
-      ->required();
+  command->add_option("recording", options->recording, "Directory of the recording")->required();
   command->add_option("-o,--output", options->directory,
                       "Directory for the results (default: DIR/alidade)");
   command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
-  command->add_flag("--compare", options->compare,
-                    "Many recordings: estimate, truth.yaml and peer.yaml side by side, statistics");
   command
       ->add_option(
           "--passes", options->passes,
@@ -362,7 +319,7 @@ void register_calibrate(CLI::App& app, int* exit_code) {
                    "noise.yaml's pan_tilt_scale_sigma, or 1e-8)")
       ->check(CLI::Range(0.0, 1.0))
       ->group(group);
-  command->callback([options, exit_code] { *exit_code = run_calibrate(*options); });
+  command->callback([options, exit_code] { *exit_code = calibrate_recording(*options); });
 }
 
 }  // namespace alidade

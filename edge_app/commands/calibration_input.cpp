@@ -10,7 +10,7 @@
 #include "edge_app/commands/video_tracks.h"
 #include "edge_app/config/noise_file.h"
 #include "edge_app/pipeline/calibration_streams.h"
-#include "platform/recording/recording.h"
+#include "platform/storage/recording.h"
 
 namespace alidade {
 namespace {

@@ -20,7 +20,7 @@
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/pipeline/read_loop.h"
-#include "platform/recording/recording_writer.h"
+#include "platform/storage/recording_writer.h"
 
 namespace alidade {
 namespace {

@@ -25,7 +25,7 @@
 #include "edge_app/output/record_writer.h"
 #include "edge_app/pipeline/latency_histogram.h"
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
-#include "platform/recording/recording.h"
+#include "platform/storage/recording.h"
 #include "platform/system/clock.h"
 #include "platform/video/recording_frame_source.h"
 

@@ -10,8 +10,8 @@
 #include <unordered_set>
 #include <utility>
 
-#include "core/realtime/oe_mode.h"
-#include "core/realtime/start_up_tracker.h"
+#include "core/realtime/oe_mode/oe_mode.h"
+#include "core/realtime/start_up/start_up_tracker.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/pipeline/calibration_feed.h"
 #include "edge_app/pipeline/keyframe_map.h"

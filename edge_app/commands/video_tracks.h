@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
-#include "core/realtime/map_state.h"
+#include "core/realtime/oe_mode/map_state.h"
 
 namespace alidade {
 

@@ -213,6 +213,7 @@ ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
   using Record = OrientationRecord;
   out["mode"] = of_newest([](const Record& r) { return to_string(r.mode); });
   out["status"] = of_newest([](const Record& r) { return to_string(r.status); });
+  out["telemetry_age_s"] = of_newest([](const Record& r) { return or_null(r.telemetry_age_s); });
   out["landmarks"] = of_newest([](const Record& r) { return r.landmarks; });
   out["image"] = {{"width", of_newest([](const Record& r) { return r.camera.width; })},
                   {"height", of_newest([](const Record& r) { return r.camera.height; })}};
@@ -334,6 +335,11 @@ void add_record_metrics(const OrientationRecord& newest, MetricsText* out) {
                "Standard deviation of the newest orientation about the camera's axes");
     for (std::size_t i = 0; i < kAxes.size(); ++i)
       out->add(newest.orientation->sigma_rad[i], {{"axis", kAxes[i]}});
+  }
+  if (newest.telemetry_age_s) {
+    out->gauge("alidade_telemetry_age_seconds",
+               "How far the newest frame lies beyond the newest telemetry sample");
+    out->add(*newest.telemetry_age_s);
   }
   out->gauge("alidade_video_clock_locked", "1: the video's clock filter knows its line");
   out->add(std::int64_t{newest.clock_locked});

@@ -68,6 +68,7 @@ std::vector<Field> fields(const OrientationRecord& record) {
       {"aspect", record.camera.aspect, {}},
       {"radial_distortion", record.camera.radial_distortion, {}},
       {"latency_s", or_null(record.latency_s), {}},
+      {"telemetry_age_s", or_null(record.telemetry_age_s), {}},
   };
 }
 

@@ -7,7 +7,7 @@
 
 #include "core/calibration/calibration_file.h"
 #include "core/model/calibration.h"
-#include "core/realtime/map_state.h"
+#include "core/realtime/oe_mode/map_state.h"
 
 namespace alidade {
 

@@ -8,8 +8,8 @@
 #include <optional>
 #include <type_traits>
 
-#include "core/realtime/oe_mode.h"
-#include "core/realtime/patch_alignment.h"
+#include "core/realtime/image/patch_alignment.h"
+#include "core/realtime/oe_mode/oe_mode.h"
 #include "platform/video/frame_source.h"
 
 namespace alidade {

@@ -11,8 +11,8 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "core/realtime/oe_mode.h"
-#include "core/realtime/patch_alignment.h"
+#include "core/realtime/image/patch_alignment.h"
+#include "core/realtime/oe_mode/oe_mode.h"
 
 namespace alidade {
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <cmath>
 
-#include "core/realtime/oe_mode.h"
+#include "core/realtime/oe_mode/oe_mode.h"
 #include "edge_app/pipeline/orientation_step.h"
 
 namespace alidade {

@@ -14,8 +14,8 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
-#include "core/realtime/map_state.h"
-#include "core/realtime/telemetry_interpolation.h"
+#include "core/realtime/oe_mode/map_state.h"
+#include "core/realtime/telemetry/telemetry_interpolation.h"
 #include "edge_app/pipeline/packed_picture.h"
 
 namespace alidade {

@@ -18,73 +18,9 @@
 
 #include "edge_app/pipeline/frame_geometry.h"
 #include "edge_app/pipeline/published_calibration.h"
+#include "edge_app/pipeline/record_status.h"
 
 namespace alidade {
-
-enum class RecordMode : std::uint8_t { kNone, kPt, kOe };
-
-enum class RecordStatus : std::uint8_t {
-  kOk,
-  kClockWarmingUp,    // mode PT or OE: too few frames since the (re)start to know their times well
-  kVideoLost,         // no connection to the video source
-  kTelemetryLost,     // no connection to the pan/tilt source, and its last sample is too old
-  kTelemetryMissing,  // fewer than two usable samples so far
-  kTelemetryTooOld,   // the frame lies further beyond the newest sample than may be extrapolated
-  kTelemetryGap,      // the samples around the frame lie too far apart
-  kFrameBeforeTelemetry,  // the frame is older than the oldest sample kept
-  kTooFewLandmarks,       // mode PT: too few landmarks held
-  kContradiction,         // mode PT: landmarks and telemetry exclude each other
-  kBadImage,              // mode PT: no picture, or one that is not of the calibration's size
-  kPictureTooLate,        // mode PT: others waited behind the frame, which went without its picture
-  kOtherZoom,             // no calibration for the zoom that the pan/tilt source reports
-  kNotFinite              // a stamp is not a finite number
-};
-
-constexpr const char* to_string(RecordMode mode) {
-  switch (mode) {
-    case RecordMode::kNone:
-      return "none";
-    case RecordMode::kPt:
-      return "PT";
-    case RecordMode::kOe:
-      return "OE";
-  }
-  return "unknown mode";
-}
-
-constexpr const char* to_string(RecordStatus status) {
-  switch (status) {
-    case RecordStatus::kOk:
-      return "ok";
-    case RecordStatus::kClockWarmingUp:
-      return "clock filter warming up";
-    case RecordStatus::kVideoLost:
-      return "video lost";
-    case RecordStatus::kTelemetryLost:
-      return "telemetry lost";
-    case RecordStatus::kTelemetryMissing:
-      return "too little telemetry";
-    case RecordStatus::kTelemetryTooOld:
-      return "telemetry too old";
-    case RecordStatus::kTelemetryGap:
-      return "gap in telemetry";
-    case RecordStatus::kFrameBeforeTelemetry:
-      return "frame before telemetry";
-    case RecordStatus::kTooFewLandmarks:
-      return "too few landmarks";
-    case RecordStatus::kContradiction:
-      return "landmarks contradict telemetry";
-    case RecordStatus::kBadImage:
-      return "no usable picture";
-    case RecordStatus::kPictureTooLate:
-      return "picture too late";
-    case RecordStatus::kOtherZoom:
-      return "no calibration for this zoom";
-    case RecordStatus::kNotFinite:
-      return "not finite";
-  }
-  return "unknown status";
-}
 
 struct OrientationRecord {
   struct Orientation {
@@ -113,10 +49,16 @@ struct OrientationRecord {
   int landmarks = 0;  // that held it: 0 but in mode OE
   // Root mean square of their residuals' lengths, px; none but in mode OE.
   std::optional<double> residual_px;
-  PlainCalibration camera;          // the calibration in use
+  PlainCalibration camera;  // the calibration in use
+  // How far the frame's middle row, looked up at time_s + clock offset, lies beyond the newest telemetry sample, s: what
+  // max_extrapolation_s bounds. Negative: samples enclose it. None without a sample.
+  std::optional<double> telemetry_age_s;
   std::optional<double> latency_s;  // record made minus receive time; none in a replay
 };
 static_assert(std::is_trivially_copyable_v<OrientationRecord>);
+
+// Of row 0, angles wrapped to [-pi, pi), w of the quaternion >= 0.
+[[nodiscard]] OrientationRecord::Orientation orientation_of(const FrameOrientation& frame);
 
 // Where records go. Called by one thread (output), but for interrupt().
 class RecordSink {

@@ -4,68 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "edge_app/pipeline/frame_observations.h"
+
 namespace alidade {
-namespace {
-
-OrientationRecord::Orientation to_record(const FrameOrientation& frame) {
-  OrientationRecord::Orientation orientation;
-  orientation.pan_rad = wrap_angle(frame.angle.pan);
-  orientation.tilt_rad = wrap_angle(frame.angle.tilt);
-  orientation.pan_rate_rad_s = frame.rate.pan;
-  orientation.tilt_rate_rad_s = frame.rate.tilt;
-  orientation.pan_acceleration_rad_s2 = frame.acceleration.pan;
-  orientation.tilt_acceleration_rad_s2 = frame.acceleration.tilt;
-  // q and -q are one rotation: the one with w >= 0 is written.
-  const Eigen::Quaterniond q = frame.quaternion();
-  const double sign = q.w() < 0 ? -1 : 1;
-  orientation.q_base_from_camera = {sign * q.x(), sign * q.y(), sign * q.z(), sign * q.w()};
-  for (std::size_t i = 0; i < orientation.sigma_rad.size(); ++i) {
-    const auto row = static_cast<Eigen::Index>(i);
-    // Rounding may leave a zero variance negative.
-    orientation.sigma_rad[i] = std::sqrt(std::max(frame.orientation_covariance(row, row), 0.0));
-  }
-  for (std::size_t i = 0; i < orientation.covariance_rad2.size(); ++i) {
-    orientation.covariance_rad2[i] = frame.orientation_covariance(static_cast<Eigen::Index>(i / 3),
-                                                                  static_cast<Eigen::Index>(i % 3));
-  }
-  orientation.geometry = pack(frame);
-  return orientation;
-}
-
-// Why the answer is telemetry's, if it is.
-RecordStatus to_record(OeStatus status) {
-  switch (status) {
-    case OeStatus::kOk:
-      return RecordStatus::kOk;
-    case OeStatus::kTooFew:
-      return RecordStatus::kTooFewLandmarks;
-    case OeStatus::kContradiction:
-      return RecordStatus::kContradiction;
-    case OeStatus::kBadImage:
-      return RecordStatus::kBadImage;
-    case OeStatus::kNoPrediction:
-    case OeStatus::kNotFinite:
-      break;
-  }
-  return RecordStatus::kNotFinite;
-}
-
-// Of those that held the result; px.
-std::optional<double> residual_rms(const OeMode& oe) {
-  double sum = 0;
-  int count = 0;
-  for (int i = 0; i < oe.statistics().aligned; ++i) {
-    const OeObservation& seen = oe.observations()[i];
-    if (!seen.inlier) continue;
-    sum += observed_residual(seen).squaredNorm();
-    ++count;
-  }
-  if (count == 0) return std::nullopt;
-  return std::sqrt(sum / count);
-}
-
-}  // namespace
-
 OeOptions oe_options(const Camera<double>& camera) {
   constexpr double kLeastColumns = 24;
   OeOptions options;
@@ -188,13 +129,13 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
               .update(stamp.receive_time_s, stamp.sender_time_s, stamp.sequence, stamp.restarted)
               .value_or(clock);
   events->video_clock_restarted = clock.restarted;
-  events->video_floor_shifted = clock.floor_shifted;
-  if (clock.restarted || clock.floor_shifted) floor_sigma_s_ = options_.floor_sigma_s;
+  events->video_floor_shifted = clock.delay_stepped;
+  if (clock.restarted || clock.delay_stepped) floor_sigma_s_ = options_.floor_sigma_s;
   picture_ = picture;
   tracks_.stamp = stamp;
   tracks_.time_s = clock.time_s;
   tracks_.clock_restarted = clock.restarted;
-  tracks_.floor_shifted = clock.floor_shifted;
+  tracks_.floor_shifted = clock.delay_stepped;
   tracks_.tracker = FrameTracks::Tracker::kNone;
 
   OrientationRecord record = empty_record();
@@ -207,9 +148,11 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const double telemetry_time_s = clock.time_s + calibration.clock_offset + to_middle_row_s;
   const double time_sigma_s = std::hypot(clock.sigma_s, floor_sigma_s_);
   const QueryStatus query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
+  if (const auto newest_s = telemetry_.newest_time())
+    record.telemetry_age_s = telemetry_time_s - *newest_s;
   record.time_sigma_s = time_sigma_s;
   record.clock_locked = clock.state == ClockState::kLocked;
-  record.status = status_of(query, record.clock_locked);
+  record.status = status_of_telemetry(query, telemetry_lost_, record.clock_locked);
   if (!zoom_fits()) {
     // Neither the lens nor the axes of another zoom are this one's.
     record.status = RecordStatus::kOtherZoom;
@@ -228,7 +171,8 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
   if (finds_landmarks()) {
     const OeStatus status = oe_->process(picture, *record->time_s, measured, &frame);
     // That the frame's time is not yet known well, sigma says too.
-    if (measured != nullptr && status != OeStatus::kOk) record->status = to_record(status);
+    if (measured != nullptr && status != OeStatus::kOk)
+      record->status = status_of_landmarks(status);
   } else if (measured != nullptr) {
     // Where this fails the frame stays without orientation.
     static_cast<void>(pt_orientation(options_.calibration, *record->time_s, *measured, &frame));
@@ -240,7 +184,7 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
   record->mode = frame.mode == OrientationMode::kOe ? RecordMode::kOe : RecordMode::kPt;
   record->landmarks = frame.landmarks;
   if (record->mode == RecordMode::kOe) record->residual_px = residual_rms(*oe_);
-  record->orientation = to_record(frame);
+  record->orientation = orientation_of(frame);
 }
 
 void OrientationStep::maintain() {
@@ -256,73 +200,17 @@ void OrientationStep::maintain() {
 
 void OrientationStep::get_tracks(FrameTracks* tracks) const {
   *tracks = tracks_;
-  const auto add = [tracks](std::uint32_t landmark, const Vector2<double>& u, double sigma) {
-    if (tracks->count == FrameTracks::kMaxPoints) return;
-    tracks->points[static_cast<std::size_t>(tracks->count++)] = {
-        landmark, static_cast<float>(u.x()), static_cast<float>(u.y()), static_cast<float>(sigma)};
-  };
   tracks->count = 0;
-  if (tracks_.tracker == FrameTracks::Tracker::kStartUp) {
-    tracks->looked_for = start_up_->statistics().looked_for;
-    for (int i = 0; i < start_up_->observation_count(); ++i) {
-      const TrackObservation& seen = start_up_->observations()[i];
-      add(seen.landmark, seen.u, seen.sigma);
-    }
-  } else if (tracks_.tracker == FrameTracks::Tracker::kOe) {
-    const OeStatistics& statistics = oe_->statistics();
-    tracks->oe_status = statistics.status;
-    tracks->looked_for = statistics.looked_for;
-    for (int i = 0; statistics.status == OeStatus::kOk && i < statistics.aligned; ++i) {
-      const OeObservation& seen = oe_->observations()[i];
-      if (const auto sigma = track_sigma(seen)) add(seen.id, seen.u, *sigma);
-    }
-  }
+  if (tracks_.tracker == FrameTracks::Tracker::kStartUp) alidade::get_tracks(*start_up_, tracks);
+  if (tracks_.tracker == FrameTracks::Tracker::kOe) alidade::get_tracks(*oe_, tracks);
 }
 
 void OrientationStep::get_landmarks(FrameLandmarks* landmarks) const {
   landmarks->kind = FrameLandmarks::Kind::kNone;
   landmarks->count = 0;
-  const auto add = [landmarks](const Vector2<double>& u, const Vector2<double>& residual,
-                               bool used) {
-    if (landmarks->count == FrameLandmarks::kMaxSeen) return;
-    landmarks->seen[static_cast<std::size_t>(landmarks->count++)] = {
-        static_cast<float>(u.x()), static_cast<float>(u.y()), static_cast<float>(residual.x()),
-        static_cast<float>(residual.y()), used};
-  };
-  if (tracks_.tracker == FrameTracks::Tracker::kStartUp) {
-    landmarks->kind = FrameLandmarks::Kind::kPoints;
-    for (int i = 0; i < start_up_->observation_count(); ++i) {
-      add(start_up_->observations()[i].u, Vector2<double>::Zero(), true);
-    }
-  } else if (tracks_.tracker == FrameTracks::Tracker::kOe &&
-             oe_->statistics().status == OeStatus::kOk) {
-    landmarks->kind = FrameLandmarks::Kind::kLandmarks;
-    for (int i = 0; i < oe_->statistics().aligned; ++i) {
-      const OeObservation& seen = oe_->observations()[i];
-      const Vector2<double> residual = observed_residual(seen);
-      add(seen.u - residual, residual, seen.inlier);
-    }
-  }
-}
-
-RecordStatus OrientationStep::status_of(QueryStatus query, bool clock_locked) const {
-  switch (query) {
-    case QueryStatus::kOk:
-    case QueryStatus::kExtrapolated:
-      return clock_locked ? RecordStatus::kOk : RecordStatus::kClockWarmingUp;
-    case QueryStatus::kEmpty:
-    case QueryStatus::kOneSample:
-      return telemetry_lost_ ? RecordStatus::kTelemetryLost : RecordStatus::kTelemetryMissing;
-    case QueryStatus::kTooNew:
-      return telemetry_lost_ ? RecordStatus::kTelemetryLost : RecordStatus::kTelemetryTooOld;
-    case QueryStatus::kTooOld:
-      return RecordStatus::kFrameBeforeTelemetry;
-    case QueryStatus::kGap:
-      return RecordStatus::kTelemetryGap;
-    case QueryStatus::kNotFinite:
-      break;
-  }
-  return RecordStatus::kNotFinite;
+  if (tracks_.tracker == FrameTracks::Tracker::kStartUp)
+    alidade::get_landmarks(*start_up_, landmarks);
+  if (tracks_.tracker == FrameTracks::Tracker::kOe) alidade::get_landmarks(*oe_, landmarks);
 }
 
 }  // namespace alidade

@@ -5,9 +5,10 @@
 // A frame's time: sender clock, else sequence numbers, through the video's clock filter; without
 // both the receive time as it is. A sample's time likewise; without both it is the middle of
 // [earliest, latest], sigma = width / sqrt(12), each sample with an error of its own.
-// The frame is looked up in the telemetry at time + d at once (pt_mode.h): if it lies beyond the
-// newest sample the angle is extrapolated, with growing sigma, for as long as the limits permit;
-// nothing waits for a later sample. When later samples enclose it, OE mode's map learns from them.
+// The frame's middle row is looked up in the telemetry at time + d at once (telemetry_buffer.h): if it lies beyond
+// the newest sample the angle is extrapolated, with growing sigma, for max_extrapolation_s, and beyond that there is
+// none: "telemetry too old" (record_status.h). Nothing waits for a later sample. When later samples enclose the frame,
+// OE mode's map learns from them.
 // In OE mode (oe_mode.h) landmarks of the frame's picture join in; the same telemetry is the prior.
 // The record is PT's, and its status says why, where they do not hold; it is OE's also where
 // telemetry is missing but landmarks carry the orientation on (its status then names what is missing).
@@ -22,17 +23,17 @@
 
 #include "core/model/calibration.h"
 #include "core/model/clock_filter.h"
-#include "core/realtime/image_view.h"
-#include "core/realtime/oe_mode.h"
+#include "core/realtime/image/image_view.h"
+#include "core/realtime/oe_mode/oe_mode.h"
 #include "core/realtime/pt_mode.h"
-#include "core/realtime/start_up_tracker.h"
-#include "core/realtime/telemetry_buffer.h"
+#include "core/realtime/start_up/start_up_tracker.h"
+#include "core/realtime/telemetry/telemetry_buffer.h"
 #include "edge_app/pipeline/calibration_feed.h"
+#include "edge_app/pipeline/capture_clock.h"
 #include "edge_app/pipeline/frame_landmarks.h"
 #include "edge_app/pipeline/orientation_record.h"
 #include "edge_app/pipeline/pending_frames.h"
 #include "edge_app/pipeline/published_calibration.h"
-#include "edge_app/pipeline/stream_clock.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
 
@@ -103,7 +104,6 @@ class OrientationStep {
 
   [[nodiscard]] Telemetry empty_telemetry(bool filtered) const;
   [[nodiscard]] OrientationRecord empty_record() const;
-  [[nodiscard]] RecordStatus status_of(QueryStatus query, bool clock_locked) const;
   // False: there is a calibration, but not for the zoom that the pan/tilt source reports.
   [[nodiscard]] bool zoom_fits() const;
   void tell_pending_frames();
@@ -112,8 +112,8 @@ class OrientationStep {
               OrientationRecord* record);
 
   OrientationStepOptions options_;
-  StreamClock video_clock_;
-  StreamClock telemetry_clock_;
+  CaptureClock video_clock_;
+  CaptureClock telemetry_clock_;
   Telemetry telemetry_;
   PendingFrames pending_;                     // of OE mode
   std::unique_ptr<OeMode> oe_;                // null: PT mode

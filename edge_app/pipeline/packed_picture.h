@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/realtime/image_view.h"
+#include "core/realtime/image/image_view.h"
 
 namespace alidade {
 

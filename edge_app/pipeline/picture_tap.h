@@ -21,7 +21,7 @@
 #include <string>
 #include <type_traits>
 
-#include "core/realtime/image_view.h"
+#include "core/realtime/image/image_view.h"
 #include "edge_app/pipeline/frame_landmarks.h"
 #include "edge_app/pipeline/picture_slot.h"
 #include "edge_app/pipeline/semaphore.h"

@@ -15,7 +15,8 @@
 namespace alidade {
 namespace {
 
-constexpr double kDropLogInterval = 1;  // s
+constexpr double kDropLogInterval_s = 1;
+constexpr double kOldTelemetryLogInterval_s = 60;
 
 }  // namespace
 
@@ -252,8 +253,22 @@ void Pipeline::count(const OutputMessage& message) {
   if (message.events.video_floor_shifted) ++summary_.floor_shifts;
 }
 
+// Nothing else in the log tells why such records have no orientation: both connections are there.
+void Pipeline::log_old_telemetry(const OrientationRecord& record) {
+  if (record.status != RecordStatus::kTelemetryTooOld || !record.telemetry_age_s) return;
+  const double now_s = monotonic_now_s();
+  if (now_s < old_telemetry_logged_at_s_ + kOldTelemetryLogInterval_s) return;
+  spdlog::warn(
+      "{}: {} at frame {}: it lies {:.0f} ms beyond the newest sample, and "
+      "realtime.max_extrapolation_s is {:.0f} ms; `alidade check` tells how old samples are",
+      pan_tilt_.name(), to_string(record.status), *record.frame, 1e3 * *record.telemetry_age_s,
+      1e3 * options_.step.telemetry_limits.max_extrapolation_s);
+  old_telemetry_logged_at_s_ = now_s;
+}
+
 void Pipeline::account(const OutputMessage& message) {
   count(message);
+  log_old_telemetry(message.record);
   if (message.events.video_clock_restarted) {
     spdlog::info("{}: clock filter restarted at frame {}", video_.name(), *message.record.frame);
   }
@@ -263,7 +278,7 @@ void Pipeline::account(const OutputMessage& message) {
   }
   const DropCounters drops = stage_.drops();
   const double now_s = monotonic_now_s();
-  if (drops.total() == drops_logged_.total() || now_s < drops_logged_at_s_ + kDropLogInterval)
+  if (drops.total() == drops_logged_.total() || now_s < drops_logged_at_s_ + kDropLogInterval_s)
     return;
   spdlog::warn("queues full: {} frames, {} telemetry samples, {} records dropped so far",
                drops.frames, drops.telemetry, drops.records);

@@ -97,6 +97,7 @@ class Pipeline {
   void write_output();
   void count(const OutputMessage& message);
   void account(const OutputMessage& message);
+  void log_old_telemetry(const OrientationRecord& record);
   void account_way(const OutputMessage& message, double written_s);
   bool push(const Frame& frame);
   bool check_size(const Frame& frame);
@@ -121,6 +122,7 @@ class Pipeline {
   std::atomic<int> realtime_thread_{0};  // 0: not running
   DropCounters drops_logged_;            // output thread
   double drops_logged_at_s_ = 0;
+  double old_telemetry_logged_at_s_ = -1e9;  // output thread
   std::vector<std::thread> threads_;
 };
 

@@ -7,7 +7,7 @@
 #include <string>
 
 #include "core/model/calibration.h"
-#include "core/realtime/map_state.h"
+#include "core/realtime/oe_mode/map_state.h"
 
 namespace alidade {
 

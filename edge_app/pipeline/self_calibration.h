@@ -13,31 +13,50 @@
 //
 // Allocates; work() takes seconds. One thread.
 
-#include <cstdint>
-#include <deque>
+#include <atomic>
 #include <memory>
 #include <optional>
 #include <string>
 #include <vector>
 
 #include "core/calibration/calibrate.h"
-#include "core/realtime/image_view.h"
+#include "core/realtime/image/image_view.h"
 #include "edge_app/pipeline/calibration_archive.h"
 #include "edge_app/pipeline/calibration_feed.h"
+#include "edge_app/pipeline/calibration_session.h"
+#include "edge_app/pipeline/calibration_watch.h"
 #include "edge_app/pipeline/published_calibration.h"
+#include "edge_app/pipeline/session_calibration.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 
 namespace alidade {
+
+// When something is tried: seconds, of data where it says so, else between two tries.
+struct CalibrationSchedule {
+  double first_try_s = 6;          // of data
+  double next_try_s = 1.5;         // of new data
+  int many_tries = 20;             // in vain, after which ...
+  double slow_try_s = 5;           // ... so much new data is awaited
+  double watch_window_s = 12;      // of data for a calibration that is held against another
+  double first_watch_s = 12;       // doubling up to ...
+  double longest_watch_s = 600;    // ... this
+  double store_retry_s = 60;       // what a full disk did not take
+  double zoom_arrives_s = 0.1;     // without a change: it does not just pass by
+  double zoom_settles_s = 0.5;     // before anything is adjusted
+  double silence_s = 2;            // without a frame or sample, while the other stream goes on
+  double worth_publishing = 0.75;  // of a parameter's sigma, to which a refinement must bring one
+};
 
 struct SelfCalibrationOptions {
   Calibration data_sheet;         // with the image size; what holds without a calibration
   CalibrationOptions adjustment;  // priors of a first calibration
   CalibrationNoise noise;
   double zoom_tolerance = 0;  // device units within which a calibration holds
-  double first_try_s = 6;     // of data
-  double window_s = 40;       // the data kept, at most
-  std::size_t max_frames = 1500;
-  std::size_t max_keyframes = 16;
+  SessionLimits session;
+  CalibrationSchedule schedule;
+  CalibrationChecks checks;
+  ContradictionOptions contradiction;
+  DisagreementOptions disagreement;
   bool automatic = true;  // false: stored calibrations only
 };
 
@@ -45,10 +64,9 @@ class SelfCalibration {
  public:
   // archive: borrowed; null: nothing is kept.
   SelfCalibration(const SelfCalibrationOptions& options, CalibrationArchive* archive);
-  ~SelfCalibration();
 
   // What the real-time thread begins with: the stored calibration, or the data sheet's.
-  [[nodiscard]] std::shared_ptr<const PublishedCalibration> first();
+  [[nodiscard]] std::shared_ptr<const PublishedCalibration> first() const { return published_; }
 
   void add(const FrameTracks& tracks);
   // True: the picture of the frame last added is wanted as a keyframe, see add_keyframe().
@@ -74,8 +92,53 @@ class SelfCalibration {
   [[nodiscard]] std::vector<std::string> take_messages();
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  void begin_anew();
+  void begin_fresh();
+  void look_for_stored();
+  void judge_agreement(const FrameTracks& tracks);
+  [[nodiscard]] bool zoom_fits(const std::optional<double>& wanted) const;
+  [[nodiscard]] bool is_calibrated_here() const;
+  [[nodiscard]] bool storing_is_due() const;
+  [[nodiscard]] bool adjusting_is_due() const;
+  // known: what is published, as prior; null: from the data alone.
+  [[nodiscard]] SessionCalibration adjust(const Calibration* known) const;
+  void try_first();
+  void hold_against_published();
+  void publish(const SessionCalibration& checked);
+  void say_once(const std::string& line);
+
+  SelfCalibrationOptions options_;
+  CalibrationArchive* archive_;
+
+  CalibrationSession session_;
+  FrameTracks::Tracker tracker_ = FrameTracks::Tracker::kNone;  // of the session's points
+  double began_s_ = 0;                                          // the session's first frame
+  double last_try_s_ = 0;
+  int tries_ = 0;
+
+  std::optional<double> zoom_;
+  double zoom_changed_s_ = -1e9;
+  double now_s_ = 0;  // the latest receive time of either stream
+  double last_frame_s_ = 0;
+  double last_sample_s_ = 0;
+  bool video_is_lost_ = false;
+  bool telemetry_is_lost_ = false;
+
+  std::shared_ptr<const PublishedCalibration> published_;
+  std::shared_ptr<const PublishedCalibration> next_;  // to be published
+  bool clock_offset_known_ = true;  // since the publication the frames' clock went on
+  bool doubtful_ = false;
+  ContradictionJudge contradiction_;
+  DisagreementJudge disagreement_;
+  double watch_interval_s_;
+
+  CalibrationNeed need_ = CalibrationNeed::kNothing;
+  double last_store_s_ = 0;
+  std::atomic<bool> cancelled_{false};
+  std::atomic<bool> fresh_asked_{false};
+  bool fresh_wanted_ = false;  // a calibration in place of the one there is
+  std::string said_;
+  std::vector<std::string> messages_;
 };
 
 }  // namespace alidade

@@ -6,7 +6,7 @@
 
 #include <string>
 
-#include "core/realtime/image_view.h"
+#include "core/realtime/image/image_view.h"
 
 namespace alidade {
 

@@ -2,8 +2,8 @@
 
 #include <vector>
 
-#include "platform/recording/playback.h"
-#include "platform/recording/recording.h"
+#include "platform/storage/playback.h"
+#include "platform/storage/recording.h"
 
 namespace alidade {
 

@@ -4,54 +4,15 @@
 //
 // A source owns its connection: it opens it, notices its loss, and opens it again with back-off.
 // read() blocks on the calling (capture) thread only; stop() may be called from any other thread
-// and makes a blocked read() return soon. Times are seconds of the host's CLOCK_MONOTONIC, taken
-// when the frame arrived, never after decoding. Not for the real-time thread: read() allocates and waits.
+// and makes a blocked read() return soon. Not for the real-time thread: read() allocates and waits.
 
-#include <cstddef>
 #include <cstdint>
-#include <memory>
-#include <optional>
 #include <string>
 
+#include "platform/streams/frame.h"
+#include "platform/streams/read_status.h"
+
 namespace alidade {
-
-// When and in which order a frame came. Fixed size: crosses queues by value.
-struct FrameStamp {
-  std::int64_t frame = 0;  // 0, 1, 2, ... of the frames this source delivered
-  // host CLOCK_MONOTONIC at the arrival of the frame's last packet (of its first byte, or as the driver
-  // stamped it, where the source says so)
-  double receive_time_s = 0;
-  std::optional<double> sender_time_s;   // capture time on the sender's clock, unwrapped, any epoch
-  std::optional<double> sender_utc_s;    // the same as Unix time, once RTCP or the like has told it
-  std::optional<std::int64_t> sequence;  // sender's count of frames, unwrapped; a gap is a loss
-  bool restarted =
-      false;  // first frame after a (re)connection: sender clock and sequence begin anew
-};
-
-// One frame: its stamp and, if decoded, its luma plane.
-struct Frame {
-  FrameStamp stamp;
-  int width = 0;   // px
-  int height = 0;  // px
-  // 8-bit luma, row v starts at luma + v * stride; null if the source was told not to decode.
-  const std::uint8_t* luma = nullptr;
-  std::ptrdiff_t stride = 0;          // bytes
-  std::shared_ptr<const void> owner;  // keeps luma alive
-  // What read() took to make luma of the data, waiting and queueing not included; none: not decoded,
-  // or not told.
-  std::optional<double> decode_s;
-};
-
-enum class ReadStatus {
-  kOk,            // the item is valid
-  kTimeout,       // nothing came within the time given; the connection is believed good
-  kDisconnected,  // connection lost or refused; the next read() tries again; see error()
-  kEnd,           // a recording is over
-  kStopped,       // stop() was called
-  // Will never work (no such file, wrong password, unknown codec); see error(). What a camera answers counts so
-  // only until its first item: later it is kDisconnected.
-  kFailed
-};
 
 // What a source that receives and decodes on its own could not deliver.
 struct FrameSourceCounters {

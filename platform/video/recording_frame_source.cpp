@@ -10,8 +10,8 @@
 #include <utility>
 #include <vector>
 
-#include "platform/recording/playback.h"
-#include "platform/recording/recording.h"
+#include "platform/storage/playback.h"
+#include "platform/storage/recording.h"
 #include "platform/video/luma_decoder.h"
 
 namespace alidade {

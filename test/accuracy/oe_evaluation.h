@@ -15,7 +15,7 @@
 #include <opencv2/core.hpp>
 #include <vector>
 
-#include "core/realtime/oe_mode.h"
+#include "core/realtime/oe_mode/oe_mode.h"
 #include "test/accuracy/oe_recordings.h"
 #include "test/accuracy/rendered_recording.h"
 #include "test/accuracy/statistics.h"

@@ -2,7 +2,7 @@
 
 #include <opencv2/imgproc.hpp>
 
-#include "core/realtime/patch_alignment.h"
+#include "core/realtime/image/patch_alignment.h"
 
 namespace alidade::test {
 namespace {

@@ -4,7 +4,7 @@
 
 #include <opencv2/core.hpp>
 
-#include "core/realtime/oe_mode.h"
+#include "core/realtime/oe_mode/oe_mode.h"
 
 namespace alidade::test {
 

@@ -19,9 +19,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 
-#include "core/realtime/fast_corners.h"
-#include "core/realtime/image_noise.h"
-#include "core/realtime/patch_alignment.h"
+#include "core/realtime/image/fast_corners.h"
+#include "core/realtime/image/image_noise.h"
+#include "core/realtime/image/patch_alignment.h"
 
 namespace alidade::test {
 namespace {

@@ -6,8 +6,8 @@
 #include <filesystem>
 #include <map>
 
-#include "platform/recording/csv_reader.h"
-#include "platform/recording/recording.h"
+#include "platform/storage/csv_reader.h"
+#include "platform/storage/recording.h"
 
 namespace alidade::test {
 namespace {

@@ -1,5 +1,5 @@
 #pragma once
-// Simulated recordings that others made, from folders: the recording format (platform/recording) with
+// Simulated recordings that others made, from folders: the recording format (platform/storage) with
 //   tracks.csv   frame,landmark,u_px,v_px,sigma_px        noise.yaml   what is known of the noise
 //   truth.yaml, truth.csv (frame,time_s,pan_rad,tilt_rad) the truth
 //   peer.yaml    what another program estimated           limit.yaml   its bound (may be absent)

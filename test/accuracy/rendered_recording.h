@@ -17,8 +17,8 @@
 #include <vector>
 
 #include "core/model/calibration.h"
-#include "core/realtime/image_view.h"
-#include "core/realtime/telemetry_buffer.h"
+#include "core/realtime/image/image_view.h"
+#include "core/realtime/telemetry/telemetry_buffer.h"
 #include "test/simulator/renderer.h"
 
 namespace alidade::test {

@@ -11,8 +11,8 @@
 #include <optional>
 #include <vector>
 
-#include "core/realtime/fast_corners.h"
-#include "core/realtime/patch_alignment.h"
+#include "core/realtime/image/fast_corners.h"
+#include "core/realtime/image/patch_alignment.h"
 #include "core/realtime/pt_mode.h"
 #include "test/accuracy/oe_experiments.h"
 #include "test/support/temporary_directory.h"

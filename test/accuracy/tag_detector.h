@@ -11,7 +11,7 @@
 #include <memory>
 #include <optional>
 
-#include "core/realtime/image_view.h"
+#include "core/realtime/image/image_view.h"
 
 namespace alidade::test {
 

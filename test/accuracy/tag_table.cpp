@@ -10,7 +10,7 @@
 #include <optional>
 
 #include "core/calibration/calibration_file.h"
-#include "platform/recording/csv_reader.h"
+#include "platform/storage/csv_reader.h"
 #include "test/accuracy/statistics.h"
 
 namespace alidade::test {

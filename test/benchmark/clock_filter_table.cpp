@@ -19,7 +19,7 @@
 #include <vector>
 
 #include "core/model/clock_filter.h"
-#include "core/model/clock_filter_offline.h"
+#include "core/model/clock_smoother.h"
 
 namespace {
 
@@ -187,10 +187,10 @@ nlohmann::json run(const Scenario& scenario) {
   std::vector<ClockEstimate> estimates(n);
   std::vector<double> scratch(n);
   if (scenario.counted) {
-    alidade::filter_clock_offline(options, recording.receive.data(), recording.sequence.data(), n,
+    alidade::smooth_clock(options, recording.receive.data(), recording.sequence.data(), n,
                                   estimates.data(), scratch.data());
   } else {
-    alidade::filter_clock_offline(options, recording.receive.data(), recording.sender.data(), n,
+    alidade::smooth_clock(options, recording.receive.data(), recording.sender.data(), n,
                                   estimates.data(), scratch.data());
   }
   double restarted_at = 0;
@@ -228,7 +228,7 @@ nlohmann::json run(const Scenario& scenario) {
                         {"offline_sd_ms", offline.sd() * 1e3},
                         {"offline_anees", offline.normalised / offline.n},
                         {"restarts", filter.counters().restarts},
-                        {"floor_shifts", filter.counters().floor_shifts}};
+                        {"floor_shifts", filter.counters().delay_steps}};
   for (std::size_t age = 0; age < kAges.size(); ++age) {
     row["young"].push_back({{"age_s", kAges[age]},
                             {"rms_ms", young[age].rms() * 1e3},

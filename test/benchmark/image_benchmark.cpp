@@ -16,9 +16,9 @@
 #include <string>
 #include <vector>
 
-#include "core/realtime/fast_corners.h"
-#include "core/realtime/patch_alignment.h"
-#include "core/realtime/pyramid.h"
+#include "core/realtime/image/fast_corners.h"
+#include "core/realtime/image/patch_alignment.h"
+#include "core/realtime/image/pyramid.h"
 
 namespace alidade {
 namespace {

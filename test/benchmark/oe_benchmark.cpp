@@ -34,7 +34,7 @@
 #include <vector>
 
 #include "core/model/camera.h"
-#include "core/realtime/oe_mode.h"
+#include "core/realtime/oe_mode/oe_mode.h"
 #include "test/benchmark/oe_stages.h"
 #include "test/benchmark/turning_camera.h"
 

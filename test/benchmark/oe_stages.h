@@ -13,12 +13,12 @@
 #include <utility>
 #include <vector>
 
-#include "core/realtime/coarse_alignment.h"
-#include "core/realtime/oe_mode.h"
-#include "core/realtime/orientation_solve.h"
-#include "core/realtime/patch_alignment.h"
-#include "core/realtime/pyramid.h"
-#include "core/realtime/view_projection.h"
+#include "core/realtime/image/patch_alignment.h"
+#include "core/realtime/image/pyramid.h"
+#include "core/realtime/oe_mode/coarse_alignment.h"
+#include "core/realtime/oe_mode/oe_mode.h"
+#include "core/realtime/oe_mode/orientation_solve.h"
+#include "core/realtime/oe_mode/view_projection.h"
 
 namespace alidade::benchmarks {
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "core/model/calibration.h"
-#include "core/realtime/image_view.h"
-#include "core/realtime/telemetry_interpolation.h"
+#include "core/realtime/image/image_view.h"
+#include "core/realtime/telemetry/telemetry_interpolation.h"
 
 namespace alidade::benchmarks {
 

@@ -27,7 +27,7 @@
 #include <vector>
 
 #include "core/model/clock_filter.h"
-#include "core/realtime/oe_mode.h"
+#include "core/realtime/oe_mode/oe_mode.h"
 #include "core/realtime/pt_mode.h"
 #include "test/benchmark/oe_stages.h"
 #include "test/benchmark/paper_camera.h"

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "core/realtime/oe_mode.h"
+#include "core/realtime/oe_mode/oe_mode.h"
 #include "core/realtime/pt_mode.h"
 #include "platform/system/clock.h"
 #include "test/benchmark/latency_report.h"

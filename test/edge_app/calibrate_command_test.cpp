@@ -16,7 +16,7 @@
 #include <vector>
 
 #include "core/calibration/calibration_file.h"
-#include "edge_app/config/map_file.h"
+#include "edge_app/storage/map_file.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/edge_app/recording_files.h"
 #include "test/support/temporary_directory.h"
@@ -365,8 +365,6 @@ TEST_F(CalibrateCommand, BadOptionsAreOneLineAndExitCodeTwo) {
                                                     {path(), "--focal-length", "-4000"},
                                                     {path(), "--line-delay", "nan"},
                                                     {path(), "--scale-sigma", "2"},
-                                                    {path(), "--compare", "--json"},
-                                                    {path(), "--compare", "-o", "x"},
                                                     {path("none")}}) {
     const Result result = calibrate_command(arguments);
     EXPECT_EQ(result.exit_code, 2) << ::testing::PrintToString(arguments);
@@ -388,42 +386,6 @@ TEST_F(CalibrateCommand, EndsCleanlyWhenInterrupted) {
   EXPECT_EQ(process.wait(), 1);
   EXPECT_THAT(process.errors(), EndsWith(path() + ": calibration interrupted; nothing stored\n"));
   EXPECT_FALSE(fs::exists(path("alidade")));
-}
-
-TEST(CalibrateCompare, ShowsEachRunAndTheStatisticsAndGoesOnAfterAFailure) {
-  const TemporaryDirectory first;
-  const TemporaryDirectory second;
-  const TemporaryDirectory broken;
-  const test::Simulation simulation;
-  for (const TemporaryDirectory* directory : {&first, &second}) {
-    test::write_recording(*directory, test::simulate(simulation));
-    test::write_truth(*directory, simulation);
-  }
-  first.write("peer.yaml", "focal_length: {value: 4004, sigma: 2}\n");
-  first.write("limit.yaml", "focal_length_rel: 0.001\n");
-  const Result result = run(
-      {ALIDADE_EXECUTABLE, "calibrate", "--compare", first.path(), broken.path(), second.path()});
-  EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.output,
-              AllOf(HasSubstr(first.path() + "\n"), HasSubstr(second.path() + "\n"),
-                    HasSubstr("3 recordings: 2 calibrated, 1 failed\n"),
-                    HasSubstr("  failed: " + broken.path() + "/recording.yaml: cannot be read")));
-  // The peer's error is 4 px, its NEES 4, of a limit of 4 px.
-  EXPECT_THAT(result.output,
-              ::testing::ContainsRegex("focal_length, 1e-6 of it +peer +1 +1e\\+03 +1 \\[0.03, "
-                                       "2.24\\] +4 \\[0.00, 5.02\\]"));
-  EXPECT_THAT(result.output, ::testing::ContainsRegex("focal_length, 1e-6 of it +ours +2 "));
-  EXPECT_THAT(result.output, Not(::testing::ContainsRegex("clock_offset, ms +peer")));
-  EXPECT_FALSE(fs::exists(first.path() + "/alidade"));
-}
-
-TEST(CalibrateCompare, OfGoodRunsEndsWell) {
-  const TemporaryDirectory directory;
-  const test::Simulation simulation;
-  test::write_recording(directory, test::simulate(simulation));
-  const Result result = run({ALIDADE_EXECUTABLE, "calibrate", "--compare", directory.path()});
-  EXPECT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.output, HasSubstr("1 recordings: 1 calibrated, 0 failed"));
 }
 
 }  // namespace

@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "core/calibration/calibration_file.h"
-#include "edge_app/config/calibration_store.h"
+#include "edge_app/storage/calibration_store.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/support/temporary_directory.h"
 
@@ -162,11 +162,11 @@ TEST_F(CalibrateVideo, StoresTheTracksItUsed) {
   EXPECT_FALSE(fs::exists(from_tracks + "/tracks.csv"));
 }
 
-TEST_F(CalibrateVideo, CompareTakesPicturesToo) {
+TEST_F(CalibrateVideo, TakesPicturesInPlaceOfAVideo) {
   film(directory_, camera(std::string(kTexture) + "recording: {images: pgm}\n"), "pictures");
-  const Result result = calibrate_command({"--compare", "--passes", "1", path("pictures")});
+  const Result result = calibrate_command({"--passes", "1", path("pictures")});
   EXPECT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.output, HasSubstr("1 recordings: 1 calibrated, 0 failed"));
+  EXPECT_TRUE(fs::exists(path("pictures/alidade/calibration.yaml")));
 }
 
 TEST_F(CalibrateVideo, RefusesAVideoWithoutTexture) {

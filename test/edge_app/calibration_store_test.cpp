@@ -1,7 +1,7 @@
 // The calibrations of a camera on disk: what is found again, what is set aside, and what a full disk, missing
 // permissions and power cuts leave.
 
-#include "edge_app/config/calibration_store.h"
+#include "edge_app/storage/calibration_store.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,7 +12,7 @@
 #include <filesystem>
 #include <set>
 
-#include "edge_app/config/map_file.h"
+#include "edge_app/storage/map_file.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {

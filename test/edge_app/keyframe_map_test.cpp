@@ -11,7 +11,7 @@
 #include <random>
 #include <vector>
 
-#include "core/realtime/oe_mode.h"
+#include "core/realtime/oe_mode/oe_mode.h"
 #include "test/simulator/renderer.h"
 #include "test/support/frame_errors.h"
 #include "test/support/mountains.h"

@@ -1,4 +1,4 @@
-#include "edge_app/config/map_file.h"
+#include "edge_app/storage/map_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

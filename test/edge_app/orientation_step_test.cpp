@@ -181,10 +181,36 @@ TEST(OrientationStep, ExtrapolatesWithGrowingSigmaAndThenRefuses) {
     EXPECT_GT(record.orientation->sigma_rad[1], sigma);
     sigma = record.orientation->sigma_rad[1];
   }
-  EXPECT_EQ(add_frame(&step, stamp_at(1.3)).status, RecordStatus::kTelemetryTooOld);
+  const OrientationRecord refused = add_frame(&step, stamp_at(1.3));
+  EXPECT_EQ(refused.status, RecordStatus::kTelemetryTooOld);
+  ASSERT_TRUE(refused.telemetry_age_s);
+  EXPECT_NEAR(*refused.telemetry_age_s, 0.3, 1e-9) << "by so much too old";
   step.telemetry_lost();
   EXPECT_EQ(add_frame(&step, stamp_at(1.3)).status, RecordStatus::kTelemetryLost);
   EXPECT_EQ(add_frame(&step, stamp_at(1.2)).status, RecordStatus::kOk);
+}
+
+// What max_extrapolation_s bounds: the middle row's lookup, beyond the newest angle that is known.
+TEST(OrientationStep, SaysHowFarAFrameLiesBeyondTheNewestSample) {
+  OrientationStepOptions options = options_without_offsets();
+  options.calibration.clock_offset = -0.05;
+  options.calibration.line_delay = 2e-5;
+  options.telemetry_limits.max_repeat_s = 0.1;
+  OrientationStep step(options);
+  EXPECT_FALSE(add_frame(&step, stamp_at(0)).telemetry_age_s);
+  const Sweep sweep;
+  sweep.feed(&step, 0, 1);
+  const double to_middle_row_s = 540 * 2e-5;
+  EXPECT_NEAR(*add_frame(&step, stamp_at(1.2)).telemetry_age_s, 0.15 + to_middle_row_s, 1e-9);
+  EXPECT_NEAR(*add_frame(&step, stamp_at(0.7)).telemetry_age_s, -0.35 + to_middle_row_s, 1e-9);
+  // A head at rest repeats its angle, which is known to be true max_repeat_s before the last repeat.
+  PanTiltSample rest = sweep.sample(1);
+  for (int i = 1; i <= 25; ++i) {
+    rest.earliest_time_s += 0.02;
+    rest.latest_time_s += 0.02;
+    step.add_telemetry(rest);
+  }
+  EXPECT_NEAR(*add_frame(&step, stamp_at(1.5)).telemetry_age_s, 0.1 - 0.05 + to_middle_row_s, 1e-9);
 }
 
 TEST(OrientationStep, RefusesFramesFromBeforeTheTelemetryAndInItsGaps) {
@@ -552,6 +578,31 @@ TEST_F(OeStepTest, AnotherZoomHasNoOrientationUntilItsCalibrationComes) {
   EXPECT_TRUE(record.calibrated);
 }
 
+// What is not said to be for a zoom is for the one at which it was taken over.
+TEST_F(OeStepTest, ACalibrationWithoutZoomIsForTheOneOfItsAdoption) {
+  const auto mode_at = [&](double zoom) {
+    PanTiltSample sample;
+    sample.earliest_time_s = sample.latest_time_s = 0.08 * frame_ - 0.005;
+    sample.pan_rad = rest_.pan_0;
+    sample.tilt_rad = rest_.tilt_0;
+    sample.zoom = zoom;
+    step_.add_telemetry(sample);
+    return add(scene_.picture()).mode;
+  };
+  PublishedCalibration published;
+  published.calibration = options().calibration;
+  published.calibrated = true;
+  build_map();
+  EXPECT_NE(mode_at(100), RecordMode::kNone);
+  for (const double zoom : {200.0, 300.0, 100.0}) {
+    EXPECT_EQ(mode_at(zoom), RecordMode::kNone) << zoom;
+    step_.adopt(published);
+    EXPECT_NE(mode_at(zoom), RecordMode::kNone) << zoom;
+    EXPECT_EQ(mode_at(zoom + 50), RecordMode::kNone) << zoom;
+    EXPECT_NE(mode_at(zoom), RecordMode::kNone) << zoom;
+  }
+}
+
 TEST_F(OeStepTest, TellsTheCalibrationThreadWhatItSaw) {
   build_map();
   FrameTracks tracks;
@@ -594,6 +645,44 @@ TEST_F(OeStepTest, ShowsLandmarksWithTheResidualsThatTheRecordSumsUp) {
   EXPECT_EQ(used, record.landmarks);
   EXPECT_NEAR(*record.residual_px, std::sqrt(sum / used), 1e-4);  // the picture shows floats
   EXPECT_LT(*record.residual_px, 0.5);
+}
+
+// A person looks at both: the cross where the landmark is expected, and the residual from there to where it was found.
+TEST_F(OeStepTest, ShowsLandmarksWhereTheyAreExpectedAndResidualsFromThere) {
+  build_map();
+  // Noise of one grey level moves what is found by hundredths of a pixel.
+  std::vector<std::uint8_t> noisy(static_cast<std::size_t>(Scene::kWidth) * Scene::kHeight);
+  std::mt19937 random(23);
+  std::uniform_int_distribution<int> noise(-2, 2);
+  const ImageView clean = scene_.picture();
+  for (int v = 0; v < Scene::kHeight; ++v) {
+    for (int u = 0; u < Scene::kWidth; ++u) {
+      noisy[static_cast<std::size_t>(v * Scene::kWidth + u)] = static_cast<std::uint8_t>(
+          clean.luma[static_cast<std::ptrdiff_t>(v) * clean.stride + u] + noise(random));
+    }
+  }
+  ASSERT_EQ(add({noisy.data(), Scene::kWidth, Scene::kHeight, Scene::kWidth}).mode,
+            RecordMode::kOe);
+  FrameTracks tracks;
+  step_.get_tracks(&tracks);
+  FrameLandmarks landmarks;
+  step_.get_landmarks(&landmarks);
+  ASSERT_GT(tracks.count, 20);
+  double largest = 0;
+  for (int i = 0; i < tracks.count; ++i) {
+    const TrackedPoint& found = tracks.points[static_cast<std::size_t>(i)];
+    double nearest = std::numeric_limits<double>::infinity();
+    for (int j = 0; j < landmarks.count; ++j) {
+      const SeenLandmark& seen = landmarks.seen[static_cast<std::size_t>(j)];
+      const double distance =
+          std::hypot(seen.u_px + seen.du_px - found.u_px, seen.v_px + seen.dv_px - found.v_px);
+      if (distance >= nearest) continue;
+      nearest = distance;
+      largest = std::max(largest, std::hypot(double{seen.du_px}, double{seen.dv_px}));
+    }
+    EXPECT_LT(nearest, 2e-4) << "as floats have it, point " << i;
+  }
+  EXPECT_GT(largest, 0.01) << "residuals that could be told from none";
 }
 
 TEST_F(OeStepTest, ShowsNoLandmarksWhereTheyDidNotHold) {

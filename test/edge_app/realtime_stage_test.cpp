@@ -246,6 +246,38 @@ TEST(RealtimeStage, GivesEachPictureBackOnceAndLendsTheOneThatIsWanted) {
   EXPECT_EQ(slot, 0);
 }
 
+// The calibration thread is busy: what it cannot be told of it cannot give back, and its wish stands.
+TEST(RealtimeStage, APictureThatFindsNoRoomIsNotLent) {
+  constexpr int kRoom = 256;
+  const Scene scene;
+  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);
+  const auto process = [&](int frame, PictureSlot slot) {
+    stage->push(picture_message(scene, frame, slot));
+    EXPECT_TRUE(stage->process());
+  };
+  for (int frame = 0; frame < kRoom; ++frame) process(frame, kNoPicture);
+  EXPECT_EQ(stage->drops().unheard, 0) << "the queue is just full";
+  stage->want_picture();
+  process(kRoom, 7);
+  PictureSlot slot = kNoPicture;
+  ASSERT_TRUE(stage->pop_returned(slot)) << "nobody else would give it back";
+  EXPECT_EQ(slot, 7);
+  EXPECT_EQ(stage->drops().unheard, 1);
+  FeedFrame fed;
+  int heard = 0;
+  while (stage->pop(fed)) {
+    ++heard;
+    EXPECT_EQ(fed.slot, kNoPicture);
+  }
+  EXPECT_EQ(heard, kRoom);
+  // With room again, the next picture is lent without another wish.
+  process(kRoom + 1, 8);
+  ASSERT_TRUE(stage->pop(fed));
+  EXPECT_EQ(fed.slot, 8);
+  EXPECT_TRUE(fed.picture.valid());
+  EXPECT_FALSE(stage->pop_returned(slot));
+}
+
 TEST(RealtimeStage, TellsTheCalibrationThreadOfTracksSamplesAndLosses) {
   const Scene scene;
   const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);

@@ -58,19 +58,6 @@ inline void write_noise(const TemporaryDirectory& directory, const CalibrationNo
   directory.write("noise.yaml", text.str());
 }
 
-inline void write_truth(const TemporaryDirectory& directory, const Simulation& s) {
-  std::ostringstream text;
-  text.precision(17);
-  text << "focal_length: {value: " << s.focal_length << "}\naspect: {value: " << s.aspect
-       << "}\nradial_distortion: {value: " << s.radial_distortion
-       << "}\nline_delay: {value: " << s.line_delay << "}\nclock_offset: {value: " << s.clock_offset
-       << "}\npan_axis: {value: [" << s.pan_axis[0] << ", " << s.pan_axis[1] << ", "
-       << s.pan_axis[2] << "]}\ntilt_axis: {value: [" << s.tilt_axis[0] << ", " << s.tilt_axis[1]
-       << ", " << s.tilt_axis[2] << "]}\npan_scale: {value: " << s.pan_scale
-       << "}\ntilt_scale: {value: " << s.tilt_scale << "}\n";
-  directory.write("truth.yaml", text.str());
-}
-
 inline void write_recording(const TemporaryDirectory& directory, const CalibrationInput& input) {
   directory.write("recording.yaml", "format: 1\nwidth: " + std::to_string(input.width) +
                                         "\nheight: " + std::to_string(input.height) + "\n");

@@ -86,6 +86,7 @@ struct Feed {
   double contradicting_from_s = std::numeric_limits<double>::infinity();
   std::int64_t first_frame = 0;
   double poll_s = 0;  // so long before its stamp a sample was asked for; 0: it came by itself
+  bool delay_steps = false;  // with the first frame the least delay of the video is another one
 };
 
 std::vector<Published> feed(SelfCalibration* calibration, const test::Simulation& s,
@@ -120,6 +121,7 @@ std::vector<Published> feed(SelfCalibration* calibration, const test::Simulation
     tracks.time_s = tracks.stamp.receive_time_s;
     tracks.tracker = how.tracker;
     tracks.clock_restarted = tracks.stamp.restarted = how.restarts && frame.frame == 0;
+    tracks.floor_shifted = how.delay_steps && frame.frame == 0;
     tracks.oe_status =
         frame.stamp_s >= how.contradicting_from_s ? OeStatus::kContradiction : OeStatus::kOk;
     for (const TrackedPoint& point : points[frame.frame]) {
@@ -157,7 +159,7 @@ TEST(SelfCalibration, BeginsWithTheDataSheetAndPublishesOnceTheMotionSuffices) {
   const auto published = feed(&calibration, s, {});
   ASSERT_FALSE(published.empty());
   EXPECT_TRUE(published[0].calibration->calibrated);
-  EXPECT_GE(published[0].time_s, options.first_try_s);
+  EXPECT_GE(published[0].time_s, options.schedule.first_try_s);
   expect_truth(s, published[0].calibration->calibration);
   EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
   EXPECT_EQ(calibration.report().need, CalibrationNeed::kNothing);
@@ -266,7 +268,7 @@ TEST(SelfCalibration, MakesAFreshCalibrationOfTheMotionSinceItWasAskedFor) {
       &calibration, turned,
       {FrameTracks::Tracker::kOe, {}, 20, false, std::numeric_limits<double>::infinity(), 1000});
   ASSERT_FALSE(published.empty());
-  EXPECT_GE(published[0].time_s, options.first_try_s);
+  EXPECT_GE(published[0].time_s, options.schedule.first_try_s);
   EXPECT_LT(published[0].time_s, 12);  // of motion, from when on it is held against the old one
   expect_truth(turned, published[0].calibration->calibration);
   EXPECT_EQ(calibration.report().need, CalibrationNeed::kNothing);
@@ -369,6 +371,24 @@ TEST(SelfCalibration, FindsTheClockOffsetOfANewConnection) {
   expect_truth(reconnected, published[0].calibration->calibration);
 }
 
+// A video whose least delay steps has another clock offset from then on, as after a reconnection.
+TEST(SelfCalibration, FindsTheClockOffsetAfterAStepOfTheDelay) {
+  const test::Simulation s = camera();
+  SelfCalibration calibration(options_for(s), nullptr);
+  ASSERT_FALSE(feed(&calibration, s, {}).empty());
+  test::Simulation later = s;
+  later.clock_offset += 0.004;
+  later.duration_s = 16;
+  Feed how;
+  how.tracker = FrameTracks::Tracker::kOe;
+  how.from_s = 20;
+  how.first_frame = 1000;
+  how.delay_steps = true;
+  const auto published = feed(&calibration, later, how);
+  ASSERT_EQ(published.size(), 1U);
+  expect_truth(later, published[0].calibration->calibration);
+}
+
 TEST(SelfCalibration, KeepsOneCalibrationForEachZoom) {
   const test::Simulation wide = camera();
   test::Simulation narrow = camera();
@@ -439,7 +459,7 @@ TEST(SelfCalibration, CancelledItPublishesNothingMore) {
 TEST(SelfCalibration, TakesKeyframesWhereItHasNone) {
   const test::Simulation s = camera();
   SelfCalibrationOptions options = options_for(s);
-  options.max_keyframes = 3;
+  options.session.max_keyframes = 3;
   SelfCalibration calibration(options, nullptr);
   EXPECT_FALSE(calibration.wants_keyframe()) << "no frame to take one of";
   PanTiltSample sample;

@@ -3,7 +3,7 @@
 
 #include <zlib.h>
 
-#include "edge_app/config/map_file.h"
+#include "edge_app/storage/map_file.h"
 #include "test/fuzz/fuzz_target.h"
 
 namespace alidade {

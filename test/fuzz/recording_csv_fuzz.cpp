@@ -3,7 +3,7 @@
 
 #include <sstream>
 
-#include "platform/recording/recording.h"
+#include "platform/storage/recording.h"
 #include "test/fuzz/fuzz_target.h"
 
 namespace alidade {

@@ -1,9 +1,11 @@
-// Runs a fuzz target without libFuzzer, the same way each time:
-//   fuzz_NAME [--mutations=N] FOLDER...
-// each file of the folders as it is (README.md aside), then N inputs (2000) made of them: bytes changed,
+// Runs fuzz targets without libFuzzer, the same way each time:
+//   fuzz_regressions TARGET [--mutations=N] FOLDER...
+// each file of the folders as it is (README.md aside), then N inputs (the target's own number) made of them: bytes changed,
 // taken out, put in, doubled, taken over from another file. The target runs in a child process, one input
 // after another; where the child dies or stands still, this one says at which input, keeps the input as
-// crash-NAME in the working directory, and ends with 1. No file at all is an error, too (2).
+// crash-TARGET in the working directory, and ends with 1. No file at all is an error, too (2).
+//   fuzz_regressions --all DIR
+// every target with DIR/corpus/TARGET and, where it is there, DIR/regressions/TARGET; ends with the worst of their codes.
 
 #include <sys/mman.h>
 #include <sys/wait.h>
@@ -22,6 +24,7 @@
 #include <vector>
 
 #include "test/fuzz/fuzz_target.h"
+#include "test/fuzz/regression_targets.h"
 
 namespace alidade {
 namespace {
@@ -112,41 +115,31 @@ struct Progress {
 };
 static_assert(std::atomic<std::size_t>::is_always_lock_free, "two processes share it");
 
-void run(const std::vector<Seed>& inputs, Progress* progress) {
+void run(const FuzzTarget& target, const std::vector<Seed>& inputs, Progress* progress) {
   for (const Seed& input : inputs) {
     ::alarm(kPatience_s);
     // A copy of its own size, so that reading beyond the end is seen.
     const std::vector<std::uint8_t> bytes(input.bytes.begin(), input.bytes.end());
-    static_cast<void>(LLVMFuzzerTestOneInput(bytes.data(), bytes.size()));
+    static_cast<void>(target.one_input(bytes.data(), bytes.size()));
     ++progress->done;
   }
 }
 
-int report(const std::string& program, const Seed& input, int status) {
-  const std::string kept = "crash-" + fs::path(program).filename().string();
+int report(const FuzzTarget& target, const Seed& input, int status) {
+  const std::string kept = std::string("crash-") + target.name;
   std::ofstream(kept, std::ios::binary) << input.bytes;
-  std::cerr << program << ": "
+  std::cerr << target.name << ": "
             << (WIFSIGNALED(status) ? "signal " + std::to_string(WTERMSIG(status))
                                     : "exit " + std::to_string(WEXITSTATUS(status)))
             << " at " << input.name << ", kept as " << kept << '\n';
   return 1;
 }
 
-int main_of(const std::vector<std::string>& arguments) {
-  std::size_t mutations = 2000;
-  std::vector<std::string> folders;
-  for (std::size_t i = 1; i < arguments.size(); ++i) {
-    constexpr std::string_view kOption = "--mutations=";
-    if (arguments[i].rfind(kOption, 0) == 0) {
-      mutations = std::stoul(arguments[i].substr(kOption.size()));
-    } else {
-      folders.push_back(arguments[i]);
-    }
-  }
+int run_in_child(const FuzzTarget& target, std::size_t mutations, const std::vector<std::string>& folders) {
   std::vector<Seed> inputs = read_seeds(folders);
   const std::size_t files = inputs.size();
   if (files == 0) {
-    std::cerr << arguments[0] << ": no input; give folders with files\n";
+    std::cerr << target.name << ": no input; give folders with files\n";
     return 2;
   }
   const std::vector<Seed> seeds = inputs;
@@ -166,17 +159,53 @@ int main_of(const std::vector<std::string>& arguments) {
     return 2;
   }
   if (child == 0) {
-    run(inputs, progress);
+    run(target, inputs, progress);
     std::exit(0);  // not _exit: the leak sanitizer looks at the end
   }
   int status = 0;
   while (::waitpid(child, &status, 0) < 0 && errno == EINTR) {
   }
-  if (status != 0) {
-    return report(arguments[0], inputs[std::min(progress->done.load(), inputs.size() - 1)], status);
-  }
-  std::cout << files << " files and " << mutations << " mutations of them\n";
+  const std::size_t done = progress->done.load();
+  ::munmap(shared, sizeof(Progress));
+  if (status != 0) return report(target, inputs[std::min(done, inputs.size() - 1)], status);
+  std::cout << target.name << ": " << files << " files and " << mutations << " mutations of them" << std::endl;
   return 0;
+}
+
+int run_all(const fs::path& directory) {
+  int worst = 0;
+  for (const FuzzTarget& target : kRegressionTargets) {
+    std::vector<std::string> folders{directory / "corpus" / target.name};
+    if (fs::is_directory(directory / "regressions" / target.name)) {
+      folders.push_back(directory / "regressions" / target.name);
+    }
+    worst = std::max(worst, run_in_child(target, target.mutations, folders));
+  }
+  return worst;
+}
+
+int main_of(const std::vector<std::string>& arguments) {
+  if (arguments.size() == 3 && arguments[1] == "--all") return run_all(arguments[2]);
+  const std::string name = arguments.size() < 2 ? "" : arguments[1];
+  const FuzzTarget* target = name == kPlantedDefect.name ? &kPlantedDefect : nullptr;
+  for (const FuzzTarget& known : kRegressionTargets) {
+    if (name == known.name) target = &known;
+  }
+  if (target == nullptr) {
+    std::cerr << "fuzz_regressions: '" << name << "' is no target; use: fuzz_regressions --all DIR | TARGET FOLDER...\n";
+    return 2;
+  }
+  std::size_t mutations = target->mutations;
+  std::vector<std::string> folders;
+  for (std::size_t i = 2; i < arguments.size(); ++i) {
+    constexpr std::string_view kOption = "--mutations=";
+    if (arguments[i].rfind(kOption, 0) == 0) {
+      mutations = std::stoul(arguments[i].substr(kOption.size()));
+    } else {
+      folders.push_back(arguments[i]);
+    }
+  }
+  return run_in_child(*target, mutations, folders);
 }
 
 }  // namespace

@@ -22,7 +22,7 @@ class RegressionDriver : public ::testing::Test {
   ~RegressionDriver() override { std::filesystem::current_path(before_); }
 
   int run(const std::vector<std::string>& arguments) {
-    std::vector<std::string> command{PLANTED_DEFECT_PROGRAM};
+    std::vector<std::string> command{FUZZ_REGRESSIONS, "planted_defect"};
     command.insert(command.end(), arguments.begin(), arguments.end());
     Process process(command);
     output_ = process.read_all();
@@ -41,7 +41,7 @@ TEST_F(RegressionDriver, PassesWhatDoesNotFail) {
   directory_.write("corpus/harmless", "other");
   directory_.write("corpus/empty", "");
   EXPECT_EQ(run({"--mutations=50", "corpus"}), 0) << errors_;
-  EXPECT_EQ(output_, "2 files and 50 mutations of them\n");
+  EXPECT_EQ(output_, "planted_defect: 2 files and 50 mutations of them\n");
 }
 
 TEST_F(RegressionDriver, FindsAFileThatFails) {
@@ -49,17 +49,17 @@ TEST_F(RegressionDriver, FindsAFileThatFails) {
   directory_.write("regressions/defect", "bad and more");
   EXPECT_EQ(run({"--mutations=0", "corpus", "regressions"}), 1);
   EXPECT_THAT(errors_, HasSubstr("signal 6 at regressions/defect, kept as crash-"));
-  EXPECT_EQ(directory_.read("crash-fuzz_planted_defect"), "bad and more");
+  EXPECT_EQ(directory_.read("crash-planted_defect"), "bad and more");
 }
 
 TEST_F(RegressionDriver, FindsAMutationThatFailsTheSameOneEachTime) {
   directory_.write("corpus/near", "bid");
-  EXPECT_EQ(run({"corpus"}), 1);
+  EXPECT_EQ(run({"--mutations=2000", "corpus"}), 1);
   EXPECT_THAT(errors_, HasSubstr("signal 6 at mutation "));
   EXPECT_THAT(errors_, HasSubstr("of corpus/near"));
-  EXPECT_THAT(directory_.read("crash-fuzz_planted_defect"), StartsWith("bad"));
+  EXPECT_THAT(directory_.read("crash-planted_defect"), StartsWith("bad"));
   const std::string first = errors_;
-  EXPECT_EQ(run({"corpus"}), 1);
+  EXPECT_EQ(run({"--mutations=2000", "corpus"}), 1);
   EXPECT_EQ(errors_, first);
 }
 

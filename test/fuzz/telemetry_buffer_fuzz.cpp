@@ -1,7 +1,7 @@
 // Telemetry of any times and angles, and questions for any time: an answer is finite, its angles are
 // wrapped, and its variances are none below 0. An input is a list of samples, each followed by a question.
 
-#include "core/realtime/telemetry_buffer.h"
+#include "core/realtime/telemetry/telemetry_buffer.h"
 #include "test/fuzz/stamps.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

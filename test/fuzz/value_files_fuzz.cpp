@@ -3,7 +3,7 @@
 
 #include "edge_app/config/noise_file.h"
 #include "edge_app/config/value_file.h"
-#include "platform/recording/recording.h"
+#include "platform/storage/recording.h"
 #include "test/fuzz/fuzz_target.h"
 
 namespace alidade {

@@ -1,4 +1,5 @@
-# Installs the build BUILD, or unpacks the Debian package alidade-dev in PACKAGES, into a fresh prefix, then configures, builds and runs consumer/ against it.
+# Installs the build BUILD, or unpacks the Debian package alidade-dev in PACKAGES, into a fresh prefix, then configures and builds
+# the project SOURCE (consumer/ or headers/) against it, and runs its PROGRAM, if it has one.
 foreach(folder unpacked prefix build)
   file(REMOVE_RECURSE ${WORK}/${folder})
 endforeach()
@@ -20,4 +21,6 @@ endif()
 run(${CMAKE_COMMAND} -S ${SOURCE} -B ${WORK}/build -G ${GENERATOR}
     -DCMAKE_PREFIX_PATH=${WORK}/prefix -DALIDADE_VERSION=${VERSION})
 run(${CMAKE_COMMAND} --build ${WORK}/build)
-run(${WORK}/build/consumer)
+if(PROGRAM)
+  run(${WORK}/build/${PROGRAM})
+endif()

@@ -141,13 +141,13 @@ TEST(ClockFilter, AnswersFromTheFirstItemWithTheExpectedJitter) {
     EXPECT_NEAR(estimate.time_s, 100.0, options.expected_jitter_s);
     EXPECT_NEAR(estimate.sigma_s, options.expected_jitter_s, 1e-6);
     EXPECT_EQ(estimate.state, ClockState::kWarmingUp);
-    EXPECT_FALSE(estimate.rejected || estimate.restarted || estimate.floor_shifted);
+    EXPECT_FALSE(estimate.rejected || estimate.restarted || estimate.delay_stepped);
     const ClockEstimate second = filter.update(100.04, 5.04);
     EXPECT_NEAR(second.time_s, 100.04, options.expected_jitter_s);
   }
 }
 
-// The floor of n exponential delays of mean tau is known to tau / n, a line's end about four times
+// The least of n exponential delays of mean tau is known to tau / n, a line's end about four times
 // worse than its middle: with tau = 4 ms and 60 s at 25 Hz, 2.7 us and 11 us.
 TEST(ClockFilter, OneSidedJitterOfFourMillisecondsBecomesTenMicroseconds) {
   Score score;
@@ -270,7 +270,7 @@ TEST(ClockFilter, FollowsASkewThatDriftsByFiftyPpmInAnHour) {
   EXPECT_LT(one_sided.rms(), 20e-6);
   EXPECT_LT(one_sided.anees(), 2.5);
   EXPECT_NEAR(filter.skew(), 50e-6, 2e-6);
-  EXPECT_EQ(filter.counters().floor_shifts, 0);
+  EXPECT_EQ(filter.counters().delay_steps, 0);
 
   stream.delay = gaussian(5e-3);
   Score both_sided;
@@ -305,7 +305,7 @@ TEST(ClockFilter, BurstsOfFiftyFiveMillisecondsLeaveTenMicroseconds) {
   });
   EXPECT_GT(raw.rms(), 40e-3);
   EXPECT_LT(score.rms(), 25e-6);
-  EXPECT_EQ(filter.counters().floor_shifts, 0);
+  EXPECT_EQ(filter.counters().delay_steps, 0);
   EXPECT_EQ(filter.counters().restarts, 0);
 }
 
@@ -354,9 +354,9 @@ TEST(ClockFilter, NominalPeriodHelpsAYoungCountedStream) {
   EXPECT_LT(rms[1], 0.7 * rms[0]);
 }
 
-// ---- floor shifts ----
+// ---- steps of the minimum delay ----
 
-TEST(ClockFilter, FlagsAFloorThatRisesAndKeepsTheLine) {
+TEST(ClockFilter, FlagsAMinimumDelayThatRisesAndKeepsTheLine) {
   for (unsigned seed = 1; seed <= 5; ++seed) {
     Stream stream;
     stream.delay = stepping(4e-3, 8e-3, 120, kInf);
@@ -367,7 +367,7 @@ TEST(ClockFilter, FlagsAFloorThatRisesAndKeepsTheLine) {
     // Half an hour on: the line is held, not left behind.
     stream.play(seed, 1920, [&](double t, double host, double receive, std::int64_t) {
       const ClockEstimate estimate = filter.update(receive, stream.sender_start_s + t);
-      if (estimate.floor_shifted) {
+      if (estimate.delay_stepped) {
         ++flags;
         flagged_at = t;
       }
@@ -375,17 +375,17 @@ TEST(ClockFilter, FlagsAFloorThatRisesAndKeepsTheLine) {
     });
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     EXPECT_EQ(flags, 1);
-    EXPECT_EQ(filter.counters().floor_shifts, 1);
+    EXPECT_EQ(filter.counters().delay_steps, 1);
     EXPECT_GT(flagged_at, 120);
     EXPECT_LT(flagged_at, 120 + 2 * ClockFilterOptions{}.settle_s);
-    EXPECT_NEAR(filter.floor_shift_since_s(), stream.host(120), 6);
-    EXPECT_NEAR(filter.floor_shift_s(), 8e-3, 5 * filter.floor_shift_sigma_s());
-    EXPECT_LT(filter.floor_shift_sigma_s(), 50e-6);
+    EXPECT_NEAR(filter.delay_shift_since_s(), stream.host(120), 6);
+    EXPECT_NEAR(filter.delay_shift_s(), 8e-3, 5 * filter.delay_shift_sigma_s());
+    EXPECT_LT(filter.delay_shift_sigma_s(), 50e-6);
     EXPECT_LT(score.worst, 0.3e-3);
   }
 }
 
-TEST(ClockFilter, FlagsAFloorThatFallsAndKeepsTheLine) {
+TEST(ClockFilter, FlagsAMinimumDelayThatFallsAndKeepsTheLine) {
   for (unsigned seed = 1; seed <= 20; ++seed) {
     Stream stream;
     stream.delay = stepping(4e-3, -8e-3, 120, kInf);
@@ -397,13 +397,13 @@ TEST(ClockFilter, FlagsAFloorThatFallsAndKeepsTheLine) {
       if (t > 60) score.add(estimate, host);
     });
     SCOPED_TRACE(testing::Message() << "seed " << seed);
-    EXPECT_EQ(filter.counters().floor_shifts, 1);
-    EXPECT_NEAR(filter.floor_shift_s(), -8e-3, 5 * filter.floor_shift_sigma_s());
+    EXPECT_EQ(filter.counters().delay_steps, 1);
+    EXPECT_NEAR(filter.delay_shift_s(), -8e-3, 5 * filter.delay_shift_sigma_s());
     EXPECT_LT(score.worst, 0.3e-3);
   }
 }
 
-TEST(ClockFilter, FloorThatComesAndGoesForAnHourLeavesTheLineWhereItWas) {
+TEST(ClockFilter, AStepThatComesAndGoesForAnHourLeavesTheLineWhereItWas) {
   Stream stream;
   stream.delay = [](Random& random, double t) {
     return std::exponential_distribution<double>(250)(random) +
@@ -415,12 +415,12 @@ TEST(ClockFilter, FloorThatComesAndGoesForAnHourLeavesTheLineWhereItWas) {
     const ClockEstimate estimate = filter.update(receive, stream.sender_start_s + t);
     if (t > 60) score.add(estimate, host);
   });
-  EXPECT_EQ(filter.counters().floor_shifts, 11);
+  EXPECT_EQ(filter.counters().delay_steps, 11);
   EXPECT_LT(score.worst, 0.4e-3);
   EXPECT_LT(score.anees(), 4);
 }
 
-TEST(ClockFilter, FollowsAFloorThatFallsWhileWarmingUp) {
+TEST(ClockFilter, FollowsAMinimumDelayThatFallsWhileWarmingUp) {
   Stream stream;
   stream.delay = stepping(4e-3, 50e-3, 0, 3);  // a backlog at the start
   ClockFilter<> filter;
@@ -429,7 +429,7 @@ TEST(ClockFilter, FollowsAFloorThatFallsWhileWarmingUp) {
     const ClockEstimate estimate = filter.update(receive, stream.sender_start_s + t);
     if (t > 5) score.add(estimate, host);
   });
-  EXPECT_EQ(filter.counters().floor_shifts, 0);
+  EXPECT_EQ(filter.counters().delay_steps, 0);
   EXPECT_LT(score.worst, 1e-3);
 }
 
@@ -444,7 +444,7 @@ TEST(ClockFilter, RecoversFromAnEarlyStampInTheWarmUp) {
     const ClockEstimate estimate = filter.update(receive, stream.sender_start_s + t);
     if (t > 30) score.add(estimate, host);
   });
-  EXPECT_EQ(filter.counters().floor_shifts, 0);
+  EXPECT_EQ(filter.counters().delay_steps, 0);
   EXPECT_LT(score.worst, 0.2e-3);
 }
 
@@ -461,7 +461,7 @@ TEST(ClockFilter, StrayEarlyStampsDoNotMoveALockedLine) {
     const ClockEstimate estimate = filter.update(receive, stream.sender_start_s + t);
     if (t > 60) score.add(estimate, host);
   });
-  EXPECT_EQ(filter.counters().floor_shifts, 0);
+  EXPECT_EQ(filter.counters().delay_steps, 0);
   EXPECT_LT(score.worst, 0.3e-3);
 }
 
@@ -493,7 +493,7 @@ TEST_P(ClockFilterRestart, IsDetectedAtTheThirdItemAndFlaggedOnce) {
     EXPECT_EQ(filter.counters().restarts, 1);
     EXPECT_EQ(filter.counters().rejected, 2);
     EXPECT_EQ(filter.state(), ClockState::kLocked);
-    // The symmetric line passes above the floor by the mean delay of 4 ms.
+    // The symmetric line passes above the minimum delay by the mean of 4 ms.
     EXPECT_LT(score.worst, jitter == ClockJitter::kSymmetric ? 10e-3 : 1e-3);
   }
 }
@@ -531,6 +531,38 @@ TEST(ClockFilter, CallersRestartIsFlaggedOnTheNextItem) {
   EXPECT_NEAR(first.time_s, 500.0, 10e-3);
   EXPECT_FALSE(filter.update(500.04, 3.04).restarted);
   EXPECT_EQ(filter.counters().restarts, 1);
+}
+
+// What a step had made uncertain, and all else, goes with the old line.
+TEST(ClockFilter, AnswersAfterARestartLikeAFreshOne) {
+  for (const ClockJitter jitter : {ClockJitter::kOneSided, ClockJitter::kSymmetric}) {
+    ClockFilterOptions options;
+    options.jitter = jitter;
+    Stream before;
+    before.delay = stepping(4e-3, 8e-3, 60, 1e9);
+    ClockFilter<> restarted(options);
+    before.play(11, 120, [&](double t, double, double receive, std::int64_t) {
+      restarted.update(receive, before.sender_start_s + t);
+    });
+    if (jitter == ClockJitter::kOneSided) {
+      ASSERT_EQ(restarted.counters().delay_steps, 1);
+      ASSERT_GT(restarted.delay_shift_sigma_s(), 0);
+    }
+    restarted.restart();
+    EXPECT_EQ(restarted.delay_shift_s(), 0);
+    EXPECT_EQ(restarted.delay_shift_sigma_s(), 0);
+    ClockFilter<> fresh(options);
+    Stream after;
+    after.host_start_s = 3e5;
+    after.play(12, 90, [&](double t, double, double receive, std::int64_t) {
+      const ClockEstimate a = restarted.update(receive, after.sender_start_s + t);
+      const ClockEstimate b = fresh.update(receive, after.sender_start_s + t);
+      ASSERT_EQ(a.time_s, b.time_s) << t;
+      ASSERT_EQ(a.sigma_s, b.sigma_s) << t;
+      ASSERT_EQ(a.state, b.state) << t;
+      ASSERT_EQ(a.delay_stepped, b.delay_stepped) << t;
+    });
+  }
 }
 
 TEST(ClockFilter, SingleWildStampsAreRejectedAndAnsweredFromTheReceiveTime) {

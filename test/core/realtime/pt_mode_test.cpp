@@ -324,8 +324,8 @@ TEST(PtMode, SaysWhyThereIsNoOrientation) {
   ASSERT_EQ(telemetry.push({0, 0, 0, 0}), PushStatus::kStored);
   EXPECT_EQ(pt_orientation(calibration, telemetry, 0, 0, &frame), QueryStatus::kOneSample);
   ASSERT_EQ(telemetry.push({0.1, 0, 0.1, 0}), PushStatus::kStored);
-  EXPECT_EQ(pt_orientation(calibration, telemetry, 5, 0, &frame), QueryStatus::kTooNew);
-  EXPECT_EQ(pt_orientation(calibration, telemetry, -5, 0, &frame), QueryStatus::kTooOld);
+  EXPECT_EQ(pt_orientation(calibration, telemetry, 5, 0, &frame), QueryStatus::kTelemetryTooOld);
+  EXPECT_EQ(pt_orientation(calibration, telemetry, -5, 0, &frame), QueryStatus::kBeforeTelemetry);
   EXPECT_EQ(pt_orientation(calibration, telemetry, NAN, 0, &frame), QueryStatus::kNotFinite);
   EXPECT_EQ(frame.mode, OrientationMode::kNone) << "nothing was written";
   EXPECT_EQ(pt_orientation(calibration, telemetry, -0.1, 0, &frame), QueryStatus::kExtrapolated);

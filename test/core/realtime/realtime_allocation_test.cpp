@@ -8,14 +8,14 @@
 #include <random>
 #include <vector>
 
-#include "core/realtime/fast_corners.h"
-#include "core/realtime/landmark_map.h"
-#include "core/realtime/oe_mode.h"
-#include "core/realtime/patch_alignment.h"
+#include "core/realtime/image/fast_corners.h"
+#include "core/realtime/image/patch_alignment.h"
+#include "core/realtime/image/pyramid.h"
+#include "core/realtime/oe_mode/landmark_map.h"
+#include "core/realtime/oe_mode/oe_mode.h"
 #include "core/realtime/pt_mode.h"
-#include "core/realtime/pyramid.h"
-#include "core/realtime/start_up_tracker.h"
-#include "test/core/realtime/analytic_image.h"
+#include "core/realtime/start_up/start_up_tracker.h"
+#include "test/core/realtime/image/analytic_image.h"
 #include "test/support/allocation_guard.h"
 
 namespace alidade::test {

@@ -1,5 +1,6 @@
-// A program outside the repository: telemetry in, direction of a pixel out.
+// A program outside the repository: telemetry in, direction of a pixel out; OE mode and its map by themselves.
 #include <core/calibration/calibration_file.h>
+#include <core/realtime/oe_mode/oe_mode.h>
 #include <core/realtime/pt_mode.h>
 
 #include <cmath>
@@ -22,5 +23,13 @@ int main() {
   if (orientation.direction({640.0, 360.0}, &direction) != alidade::ProjectionStatus::kOk) return 3;
   const double pan = std::atan2(direction.y(), direction.x());
   std::printf("pan %.6f rad\n", pan);
-  return std::abs(pan - 0.09) < 1e-9 ? 0 : 4;
+  if (!(std::abs(pan - 0.09) < 1e-9)) return 4;
+
+  alidade::OeOptions options;
+  options.max_width = 1280;
+  options.max_height = 720;
+  alidade::OeMode oe_mode(options);
+  oe_mode.reset(calibration);
+  const alidade::MapState map = oe_mode.map_state();
+  return map.landmarks.empty() ? 0 : 5;
 }

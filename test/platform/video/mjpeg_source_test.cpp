@@ -13,7 +13,7 @@
 #include <thread>
 #include <vector>
 
-#include "platform/recording/recording_writer.h"
+#include "platform/storage/recording_writer.h"
 #include "platform/video/jpeg_decoder.h"
 #include "platform/video/recording_frame_source.h"
 #include "test/platform/support/eventually.h"

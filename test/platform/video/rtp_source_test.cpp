@@ -15,7 +15,7 @@
 #include <tuple>
 #include <vector>
 
-#include "platform/recording/recording_writer.h"
+#include "platform/storage/recording_writer.h"
 #include "platform/video/recording_frame_source.h"
 #include "test/platform/support/eventually.h"
 #include "test/platform/support/rtp_relay.h"

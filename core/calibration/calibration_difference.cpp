@@ -1,0 +1,68 @@
+#include "core/calibration/calibration_difference.h"
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+
+#include "core/model/direction.h"
+
+namespace alidade {
+namespace {
+
+constexpr int kCount = static_cast<int>(kComparedParameters.size());
+
+using Compared = Eigen::Matrix<double, kCount, 1>;
+using ComparedCovariance = Eigen::Matrix<double, kCount, kCount>;
+
+// b - a, by Parameter.
+Eigen::Matrix<double, kParameterCount, 1> difference(const Calibration& a, const Calibration& b) {
+  Eigen::Matrix<double, kParameterCount, 1> d = Eigen::Matrix<double, kParameterCount, 1>::Zero();
+  d[index(Parameter::kFocalLength)] = b.camera.focal_length - a.camera.focal_length;
+  d[index(Parameter::kRadialDistortion)] = b.camera.radial_distortion - a.camera.radial_distortion;
+  d[index(Parameter::kLineDelay)] = b.line_delay - a.line_delay;
+  d.segment<2>(index(Parameter::kPanAxis0)) =
+      direction_minus(b.mechanics.pan_axis, a.mechanics.pan_axis);
+  d.segment<2>(index(Parameter::kTiltAxis0)) =
+      direction_minus(b.mechanics.tilt_axis, a.mechanics.tilt_axis);
+  d[index(Parameter::kClockOffset)] = b.clock_offset - a.clock_offset;
+  return d;
+}
+
+}  // namespace
+
+double parameter_sigma(const Calibration& calibration, Parameter parameter) {
+  return std::sqrt(std::max(0.0, calibration.covariance(index(parameter), index(parameter))));
+}
+
+double difference_chi_square(const Calibration& a, const Calibration& b, bool with_clock_offset) {
+  const auto d = difference(a, b);
+  ComparedCovariance covariance;
+  Compared x;
+  for (int i = 0; i < kCount; ++i) {
+    const int row = index(kComparedParameters[static_cast<std::size_t>(i)]);
+    x[i] = d[row];
+    for (int j = 0; j < kCount; ++j) {
+      const int column = index(kComparedParameters[static_cast<std::size_t>(j)]);
+      covariance(i, j) = a.covariance(row, column) + b.covariance(row, column);
+    }
+  }
+  if (!with_clock_offset) {
+    covariance.row(kCount - 1).setZero();
+    covariance.col(kCount - 1).setZero();
+    covariance(kCount - 1, kCount - 1) = 1;
+    x[kCount - 1] = 0;
+  }
+  // In units of the sigmas, as the parameters' own differ by many orders of magnitude.
+  const Compared scale = covariance.diagonal().cwiseSqrt().cwiseMax(1e-300).cwiseInverse();
+  const ComparedCovariance correlation = scale.asDiagonal() * covariance * scale.asDiagonal();
+  const Compared normalised = scale.cwiseProduct(x);
+  return normalised.dot(correlation.inverse() * normalised);
+}
+
+bool is_sharper(const Calibration& after, const Calibration& before, double share) {
+  return std::any_of(kComparedParameters.begin(), kComparedParameters.end(), [&](Parameter p) {
+    return parameter_sigma(after, p) < share * parameter_sigma(before, p);
+  });
+}
+
+}  // namespace alidade

@@ -1,0 +1,134 @@
+#pragma once
+// OneSidedClock: the line of a stream whose items are never early, for ClockFilter, which says what an item is.
+//
+// The line is the lower envelope of a sliding window. It contains the minimum delay; where that steps (MinimumDelayStep),
+// the step is subtracted from all later receive times and the line goes on, with a variance that grows by the
+// step's. Steps that begin before the lock move the line instead: only what came since counts then.
+// Fixed memory, trivially copyable, no allocation, no exceptions. All times are host seconds.
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <optional>
+
+#include "core/model/clock_types.h"
+#include "core/model/lower_envelope.h"
+#include "core/model/minimum_delay_step.h"
+
+namespace alidade::internal {
+
+template <std::size_t Capacity>
+class OneSidedClock {
+ public:
+  explicit OneSidedClock(const ClockFilterOptions& options)
+      : options_(options), envelope_(options), steps_(options) {}
+
+  // A new line, which begins at this item.
+  void start(double receive_s, const ClockRatePrior& prior) {
+    restart();
+    anchor_receive_s_ = receive_s;
+    delay_s_ = options_.expected_jitter_s;
+    envelope_.start(prior);
+  }
+
+  // Takes back what steps did to the line, which answers no more until start().
+  void restart() {
+    shift_s_ = shift_variance_ = 0;
+    locked_ = false;
+    steps_.restart();
+  }
+
+  // The line will not move by itself any more: steps of the minimum delay can be told from it.
+  void lock(double receive_s) {
+    locked_ = true;
+    locked_since_s_ = bound_since_s_ = receive_s;
+    envelope_.lock();
+  }
+
+  // True if this item proves that the minimum delay stepped.
+  bool learn(const ClockItem& item) {
+    const double receive = item.receive_s;
+    const double y = item.y - shift_s_;
+    const double residual = y - line().value_at(item.x);
+    const double gate = std::max(options_.min_delay_step_s, kGate * item.sigma_s);
+    const bool early = locked_ && residual < -gate;
+    delay_s_ += (std::clamp(residual, 0.0, 10 * delay_s_) - delay_s_) / 100;
+
+    if (residual < gate) {
+      steps_.end_late_run();
+    }
+    if (const std::optional<DelayStep> step = steps_.judge(receive)) {
+      if (locked_ && step->since_s >= locked_since_s_) {
+        subtract(*step);
+        if (item.newer) {
+          envelope_.insert(receive, item.x, item.y - shift_s_);
+        }
+        return true;
+      }
+      // An early item in the warm-up had dragged the line down.
+      envelope_.forget_before(step->since_s - anchor_receive_s_ - shift_s_);
+    }
+    if (residual >= gate) {
+      steps_.add_late(receive, residual);
+    }
+    if (early && !steps_.suspects_fall()) {
+      envelope_.drop_unsettled(receive);  // the youngest may have the new minimum delay
+    }
+    if (early || steps_.suspects_fall()) {
+      steps_.add_after_early(receive, residual, early);
+    }
+    // While a fall is being judged nothing may pull the line down.
+    if (item.newer && (!steps_.suspects_fall() || residual >= 0)) {
+      envelope_.insert(receive, item.x, y);
+    }
+    if (locked_ && receive - bound_since_s_ >= options_.window_s && !steps_.suspects_any()) {
+      bound_since_s_ = receive;
+      envelope_.bound_rate();
+    }
+    return false;
+  }
+
+  [[nodiscard]] const LineEstimate& line() const { return envelope_.line(); }
+  // By how much the item is later than the line says.
+  [[nodiscard]] double residual(const ClockItem& item) const {
+    return item.y - shift_s_ - line().value_at(item.x);
+  }
+  // The host time of an item by its receive time alone.
+  [[nodiscard]] double without_line(double receive_s) const {
+    return receive_s - shift_s_ - delay_s_;
+  }
+  // Mean delay above the minimum.
+  [[nodiscard]] double jitter_s() const { return delay_s_; }
+  // Host time that the line remembers.
+  [[nodiscard]] double memory_s() const { return envelope_.memory_s(); }
+
+  // Sum of the steps, what they have made uncertain (s^2), and the receive time since which the last holds.
+  [[nodiscard]] double shift_s() const { return shift_s_; }
+  [[nodiscard]] double shift_variance() const { return shift_variance_; }
+  [[nodiscard]] double shift_since_s() const { return shift_since_s_; }
+
+ private:
+  static constexpr double kGate = 6;  // sigmas that no honest item leaves on the early side
+
+  // The true line goes on: what changes is the minimum delay.
+  void subtract(const DelayStep& step) {
+    envelope_.subtract_from(step.since_s - anchor_receive_s_ - shift_s_, step.step_s);
+    shift_s_ += step.step_s;
+    shift_since_s_ = step.since_s;
+    shift_variance_ += step.sigma_s * step.sigma_s;
+  }
+
+  ClockFilterOptions options_;
+  LowerEnvelope<Capacity> envelope_;
+  MinimumDelayStep steps_;
+  double anchor_receive_s_ = 0;
+  double delay_s_ = 0;
+  bool locked_ = false;
+  double locked_since_s_ = 0;
+  double bound_since_s_ = 0;  // when the rate was bounded last
+  double shift_s_ = 0;
+  double shift_variance_ = 0;
+  double shift_since_s_ = 0;
+};
+
+}  // namespace alidade::internal

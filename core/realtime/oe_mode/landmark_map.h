@@ -1,0 +1,132 @@
+#pragma once
+// LandmarkMap: far points that the camera can recognise: a direction each, a small picture of it, and how
+// well both have served (PTCEE section V-A, Fig. 6).
+//
+// Directions are unit vectors in the map's frame, which follows the base frame but for an offset that
+// OeMode knows. The unit sphere is divided into cells of about equal size: rings of constant
+// latitude, each cut into as many cells as its circumference has room for. Cells of octave l are 2^l
+// times as wide as those of octave 0, up to a largest size, and hold at most one landmark of that
+// octave (PTCEE V-A).
+// A full map replaces its least useful landmark, see worth(), by a new one.
+// All memory is taken by the constructor; nothing else allocates, waits or throws. One thread.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/model/calibration.h"
+#include "core/model/linear_algebra.h"
+#include "core/realtime/image/reference_image.h"
+
+namespace alidade {
+
+// How often it was looked for and found.
+struct LandmarkStatistics {
+  std::uint32_t seen = 0;     // frames in which it was looked for
+  std::uint32_t matched = 0;  // frames in which it was found and agreed with the others
+  std::uint16_t missed_in_a_row = 0;
+  std::uint32_t last_frame = 0;  // count of frames when it was last looked for
+  // Mean square of the normalised residual when matched, running: 1 if its covariances are right.
+  float residual_square = 1;
+};
+
+using LandmarkSensitivity = Matrix<float, 2, kParameterCount>;
+
+struct Landmark {
+  std::uint32_t id = 0;                          // never given twice
+  std::uint8_t octave = 0;                       // of the pyramid its picture was taken from
+  Vector3<double> d = Vector3<double>::UnitX();  // unit, in the map's frame
+  // rad^2, of d in tangent_basis(d): its own part, independent of other landmarks' ...
+  Matrix2<double> covariance = Matrix2<double>::Zero();
+  // ... and rad^2 of (pan, tilt) of the frame that it came from, shared by all made there.
+  Matrix2<double> shared_covariance = Matrix2<double>::Zero();
+  // Of d in tangent_basis(d): all that was made with the calibration shares its errors.
+  LandmarkSensitivity sensitivity = LandmarkSensitivity::Zero();
+  // d(reference pixel, px of its octave) / d(tangent_basis(d) coordinates, rad), as the camera saw
+  // it then, rolling shutter and distortion included.
+  Matrix2<double> J_pixel_tangent = Matrix2<double>::Identity();
+  ReferencePixels pixels{};
+  LandmarkStatistics statistics;
+
+  [[nodiscard]] ImageView picture() const { return view_of(pixels); }
+};
+
+enum class InsertStatus {
+  kOk,
+  kCellTaken,  // by a landmark of this octave
+  kFull,       // and none is worth less than a new one
+  kBad         // direction not finite or not of unit length, or octave out of range
+};
+
+class LandmarkMap {
+ public:
+  static constexpr int kMaxOctaves = 8;
+  static constexpr double kMaxCellSize = 0.5;  // rad
+
+  // capacity: at least 1. cell_size: rad, of octave 0, in [1e-6, 0.5]; what is outside is taken as
+  // the nearest. A landmark costs about 600 bytes.
+  LandmarkMap(int capacity, double cell_size, double largest_cell_size = kMaxCellSize);
+  LandmarkMap(const LandmarkMap&) = delete;
+  LandmarkMap& operator=(const LandmarkMap&) = delete;
+
+  // Forgets all landmarks, but not which ids were given; cells have a new size.
+  void clear(double cell_size, double largest_cell_size = kMaxCellSize);
+
+  [[nodiscard]] int capacity() const;
+  [[nodiscard]] int size() const;
+  [[nodiscard]] double cell_size() const;
+  [[nodiscard]] std::size_t memory_bytes() const;
+  // Landmarks that had to go for new ones, since clear().
+  [[nodiscard]] std::int64_t replaced() const;
+
+  // Slots: 0 to capacity() - 1; one stays with its landmark until that is retired or replaced.
+  [[nodiscard]] bool occupied(int slot) const;
+  [[nodiscard]] const Landmark& at(int slot) const;          // occupied(slot)
+  [[nodiscard]] LandmarkStatistics& statistics(int slot);    // occupied(slot)
+  [[nodiscard]] LandmarkSensitivity& sensitivity(int slot);  // occupied(slot)
+
+  // On kOk it has a new id, a slot and fresh statistics, last looked for now (count of frames).
+  [[nodiscard]] InsertStatus insert(const Landmark& landmark, std::uint32_t now, int* slot);
+  void retire(int slot);  // occupied(slot)
+
+  // A better direction, a few pixels from the old one; the cell stays that of the first. One that
+  // is not finite or not of unit length is ignored.
+  void refine(int slot, const Vector3<double>& d, const Matrix2<double>& covariance);
+
+  // Whether a landmark of this octave has d's cell.
+  [[nodiscard]] bool cell_taken(const Vector3<double>& d, int octave) const;
+
+  // Slots of all landmarks within an angle of a direction, in ascending order; at most `capacity` of
+  // them are written. Returns how many there are: none for a direction or angle that is not finite.
+  [[nodiscard]] int find(const Vector3<double>& centre, double cosine_of_angle, int* slots,
+                         int capacity) const;
+
+  // Of use, 0 to 1: a landmark that is found when looked for, and not long forgotten; what was found
+  // often is forgotten later. A new one has 1/2 for a second of frames, so that others made soon
+  // after do not drive it out.
+  [[nodiscard]] double worth(int slot, std::uint32_t now) const;
+
+ private:
+  using Key = std::uint64_t;  // of a cell, octave included
+
+  [[nodiscard]] Key cell_of(const Vector3<double>& d, int octave) const;
+  [[nodiscard]] std::size_t home(Key key) const;      // where the search for it begins
+  [[nodiscard]] std::size_t position(Key key) const;  // where it is, or the gap where it would be
+  [[nodiscard]] int slot_of_least_worth(std::uint32_t now) const;
+  void place(int slot, const Vector3<double>& d);  // where find() looks for it
+
+  std::vector<Landmark> landmarks_;       // by slot
+  std::vector<Key> cells_;                // by slot
+  std::vector<float> x_, y_, z_;          // by slot; free ones are far from the sphere
+  std::vector<int> free_;                 // slots, the next to give last; size_ of them are not
+  std::vector<int> table_;                // slots by cell, or kNone: linear probing
+  std::array<int, kMaxOctaves> rings_{};  // from pole to pole
+  double cell_size_ = 0;
+  int size_ = 0;
+  int end_ = 0;  // no slot from here on is in use
+  std::uint32_t last_id_ = 0;
+  std::int64_t replaced_ = 0;
+};
+
+}  // namespace alidade

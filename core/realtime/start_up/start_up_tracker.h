@@ -1,0 +1,139 @@
+#pragma once
+// StartUpTracker: keypoint tracks from the video of a camera that nobody has calibrated, for the first
+// calibration (PTCEE section V-A). Neither focal length nor distortion, read-out, mount or telemetry are
+// asked for: a wrong one can therefore do no harm.
+//
+//   1 the whole picture's shift since the frame before, to 2^l px, by comparing all shifts of a small octave
+//   2 the motion of the points, coarse to fine, as one smooth function of the place (smooth_flow.h)
+//   3 each point against its picture in the frame where it was found, so that nothing drifts, warped
+//     by the gradients of the motion since then (patch_alignment.h)
+//   4 points that contradict the others' motion are not believed
+//   5 new points, FAST corners, where there are none
+//
+// An observation tells where a landmark appears: pixels, as in CONVENTIONS.md. Its covariance is what differs from
+// one observation to the next, by the noise of its own frame; what all observations of a landmark have
+// in common, the noise of its reference picture, moves the landmark instead.
+// A point that leaves the image, or is not found in two frames running, ends; should it come back, it is
+// a new landmark. Frames without anything in common with the one before end all points.
+// Follows shifts of up to a third of the image between frames. Fixed memory, taken by the constructor;
+// nothing else allocates, waits or throws. One thread.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "core/model/linear_algebra.h"
+#include "core/realtime/image/fast_corners.h"
+#include "core/realtime/image/image_view.h"
+#include "core/realtime/image/pyramid.h"
+#include "core/realtime/image/reference_image.h"
+#include "core/realtime/start_up/smooth_flow.h"
+
+namespace alidade {
+
+struct StartUpOptions {
+  int width = 1920;                    // px, of every frame
+  int height = 1080;                   // px
+  int max_points = 250;                // followed at a time
+  std::uint8_t corner_threshold = 10;  // of FAST, grey levels; more where noise asks for it
+};
+
+struct TrackObservation {
+  std::uint32_t landmark = 0;                            // never given twice
+  Vector2<double> u = Vector2<double>::Zero();           // px
+  Matrix2<double> covariance = Matrix2<double>::Zero();  // px^2
+  double sigma = 0;                                      // px, sqrt(trace / 2)
+};
+
+enum class StartUpStatus {
+  kOk,
+  kBegun,    // no points to follow: all are new
+  kLost,     // the points were not found; the next frame is compared with the same one as this
+  kBlank,    // nothing to follow and nothing new
+  kBadImage  // none, or of another size than the constructor was told, or that was below 64 x 32 px
+};
+
+struct StartUpStatistics {
+  StartUpStatus status = StartUpStatus::kBlank;
+  int looked_for = 0;  // points expected inside the image
+  int found = 0;       // that alignment found
+  int believed = 0;    // that agreed with the others
+  int ended = 0;
+  int begun = 0;
+  Vector2<double> shift = Vector2<double>::Zero();  // px since the frame before, image centre
+  double noise = 0;                                 // of a pixel, grey levels
+};
+
+class StartUpTracker {
+ public:
+  explicit StartUpTracker(const StartUpOptions& options);
+  StartUpTracker(const StartUpTracker&) = delete;
+  StartUpTracker& operator=(const StartUpTracker&) = delete;
+
+  // The image need not outlive the call.
+  [[nodiscard]] StartUpStatus process(const ImageView& image);
+
+  // Of the frame last processed.
+  [[nodiscard]] const TrackObservation* observations() const { return observations_.data(); }
+  [[nodiscard]] int observation_count() const { return observation_count_; }
+  [[nodiscard]] const StartUpStatistics& statistics() const { return statistics_; }
+
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  static constexpr int kReferenceOctaves = 2;  // points are corners of octave 0 or 1
+
+  struct Point {
+    std::uint32_t landmark;
+    int octave;
+    int misses;                   // in a row
+    Vector2<double> u;            // px, in the frame compared with
+    Matrix2<double> J_now_first;  // d(px now) / d(px in the frame where it was found)
+    Vector2<double> predicted;    // px, in this frame
+    Vector2<double> found;        // px, in this frame, if is_found
+    Vector2<double> deviation;    // px, from the smooth motion: a sum that forgets
+    Matrix2<double> covariance;
+    float noise;  // grey levels, of a pixel of this frame
+    bool is_found;
+    ReferencePixels pixels;
+  };
+  // A frame without its octave 0, which belongs to the caller.
+  struct Frame {
+    Frame(int width, int height, int octaves);
+    Pyramid pyramid;
+    std::vector<std::int16_t> detail;  // the last octave without its coarse brightness
+  };
+
+  void make_detail(Frame* frame) const;
+  [[nodiscard]] bool find_shift(const Frame& before, const Frame& now,
+                                Vector2<double>* shift) const;
+  [[nodiscard]] bool follow(const Frame& before, const Frame& now);
+  void align_with_first(const Frame& now);
+  void estimate_noise(const Frame& now);
+  void end_points();
+  void begin_points(const Frame& now);
+  void observe(const Point& point, const Matrix2<double>& covariance);
+
+  StartUpOptions options_;
+  int octaves_;
+  std::array<Frame, 2> frames_;
+  int current_ = 0;  // the other is the frame before
+  bool have_before_ = false;
+  int lost_frames_ = 0;
+  SmoothFlow flow_;
+  std::vector<Point> points_;  // the first point_count_
+  int point_count_ = 0;
+  std::vector<FlowSample> samples_;
+  double spacing_;  // px, of new points
+  std::array<FastGrid, kReferenceOctaves> corners_of_octave_;
+  std::vector<FastCorner> corners_;
+  std::vector<float> scratch_;  // for medians
+  std::array<double, kReferenceOctaves> noise_{};
+  std::uint32_t next_landmark_ = 0;
+  std::vector<TrackObservation> observations_;
+  int observation_count_ = 0;
+  StartUpStatistics statistics_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,71 @@
+#pragma once
+// What says that a published calibration is no longer the camera's: small judges with a memory of their own.
+// Seconds of the host's clock. Allocates little. One thread.
+
+#include <algorithm>
+#include <cstddef>
+#include <deque>
+#include <utility>
+
+namespace alidade {
+
+// Calibrations of later motion, each held against the published one.
+struct ContradictionOptions {
+  // Chi-square of the difference (calibration_difference.h): 99.9 % of those of 8 numbers lie below 26, and sigmas may
+  // be 1.5 times too small.
+  double least_chi_square = 60;
+  int believed_after = 2;  // in a row: one may be chance
+};
+
+class ContradictionJudge {
+ public:
+  enum class Verdict { kAgrees, kContradicts, kBelieved };
+
+  explicit ContradictionJudge(const ContradictionOptions& options = {}) : options_(options) {}
+
+  Verdict judge(double chi_square) {
+    if (!(chi_square > options_.least_chi_square)) {
+      in_a_row_ = 0;
+      return Verdict::kAgrees;
+    }
+    return ++in_a_row_ >= options_.believed_after ? Verdict::kBelieved : Verdict::kContradicts;
+  }
+  void restart() { in_a_row_ = 0; }
+
+ private:
+  ContradictionOptions options_;
+  int in_a_row_ = 0;
+};
+
+// Frames in which landmarks contradict telemetry: in half of those of some seconds, and the calibration is withdrawn.
+struct DisagreementOptions {
+  double span_s = 8;
+  double share = 0.5;             // of the frames
+  std::size_t least_frames = 40;  // that tell anything
+};
+
+class DisagreementJudge {
+ public:
+  explicit DisagreementJudge(const DisagreementOptions& options = {}) : options_(options) {}
+
+  // True: withdraw it. Times in order.
+  bool judge(double time_s, bool contradicted) {
+    frames_.emplace_back(time_s, contradicted);
+    while (frames_.front().first < time_s - options_.span_s) frames_.pop_front();
+    const auto all = static_cast<double>(frames_.size());
+    return frames_.size() >= options_.least_frames &&
+           static_cast<double>(contradicted_frames()) >= options_.share * all;
+  }
+  [[nodiscard]] std::size_t frames() const { return frames_.size(); }
+  [[nodiscard]] std::size_t contradicted_frames() const {
+    return static_cast<std::size_t>(std::count_if(frames_.begin(), frames_.end(),
+                                                  [](const auto& frame) { return frame.second; }));
+  }
+  void restart() { frames_.clear(); }
+
+ private:
+  DisagreementOptions options_;
+  std::deque<std::pair<double, bool>> frames_;  // time, whether landmarks contradicted telemetry
+};
+
+}  // namespace alidade

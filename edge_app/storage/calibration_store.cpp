@@ -1,0 +1,307 @@
+#include "edge_app/storage/calibration_store.h"
+
+#include <fmt/format.h>
+#include <yaml-cpp/yaml.h>
+#include <zlib.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <system_error>
+#include <utility>
+
+#include "core/calibration/atomic_file.h"
+#include "edge_app/storage/map_file.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+constexpr const char* kExtension = ".yaml";
+
+bool is_there(const fs::path& path) {
+  std::error_code error;
+  return fs::symlink_status(path, error).type() != fs::file_type::not_found;
+}
+
+fs::path folder_of(const fs::path& file) {
+  return file.has_parent_path() ? file.parent_path() : fs::path(".");
+}
+
+bool begins_with(const std::string& text, const std::string& begin) {
+  return text.compare(0, begin.size(), begin) == 0;
+}
+
+bool ends_with(const std::string& text, const std::string& end) {
+  return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
+}
+
+// Names in a folder, in order. False and the reason if it cannot be read.
+bool list(const fs::path& folder, std::vector<std::string>* names, std::string* error) {
+  std::error_code failure;
+  fs::directory_iterator at(folder, failure);
+  for (; !failure && at != fs::directory_iterator(); at.increment(failure)) {
+    names->push_back(at->path().filename().string());
+  }
+  std::sort(names->begin(), names->end());
+  if (failure) *error = folder.string() + ": cannot be read: " + failure.message();
+  return !failure;
+}
+
+// The maps that were written for a yaml, the current one and those that a power cut left behind.
+constexpr const char* kMapMark = ".map-";
+constexpr const char* kMapExtension = ".bin";
+
+// Other content, other name. (The checksum of all, with the file's own at its end, would be the same for all.)
+fs::path map_path(const fs::path& yaml, const std::string& content) {
+  const auto check = static_cast<std::uint32_t>(
+      crc32_z(0, reinterpret_cast<const unsigned char*>(content.data()), content.size() - 4));
+  return folder_of(yaml) /
+         fmt::format("{}{}{:08x}{}", yaml.stem().string(), kMapMark, check, kMapExtension);
+}
+
+std::vector<fs::path> maps_of(const fs::path& yaml) {
+  constexpr std::size_t kDigits = 8;
+  const std::string begin = yaml.stem().string() + kMapMark;
+  std::vector<std::string> names;
+  std::string ignored;
+  static_cast<void>(list(folder_of(yaml), &names, &ignored));
+  std::vector<fs::path> maps;
+  for (const std::string& name : names) {
+    if (begins_with(name, begin) && ends_with(name, kMapExtension) &&
+        name.size() == begin.size() + kDigits + std::strlen(kMapExtension)) {
+      maps.push_back(folder_of(yaml) / name);
+    }
+  }
+  return maps;
+}
+
+// Says what was done with a file that is of no use: moved to a name of its own where that is possible.
+std::string set_aside(const fs::path& path) {
+  fs::path aside = path.string() + ".damaged";
+  for (int i = 1; is_there(aside); ++i) aside = fmt::format("{}.damaged.{}", path.string(), i);
+  std::error_code error;
+  fs::rename(path, aside, error);
+  if (error) return "not used; cannot be set aside: " + error.message();
+  return "set aside as " + aside.filename().string();
+}
+
+// With the maps of a calibration, which another one would otherwise replace.
+std::string set_aside_with_maps(const fs::path& yaml) {
+  for (const fs::path& map : maps_of(yaml)) static_cast<void>(set_aside(map));
+  return set_aside(yaml);
+}
+
+// The map that a calibration names, which was parsed before; an empty path if it names none. False with a
+// line if it names none that is there.
+bool find_map(const fs::path& yaml, const std::string& text, fs::path* map, std::string* error) {
+  map->clear();
+  const YAML::Node root = YAML::Load(text);
+  const fs::path name = root["landmarks"] ? root["landmarks"].Scalar() : "";
+  if (name.empty()) return true;
+  const fs::path path = folder_of(yaml) / name;
+  if (name.filename() != name) {
+    *error = fmt::format("{}: its map {} is not a file beside it: not used", yaml.string(),
+                         name.string());
+  } else if (name.extension() != kMapExtension) {
+    // What is no map is set aside: never another file that a slip named, such as the configuration.
+    *error =
+        fmt::format("{}: its map {} does not end in .bin: not used", yaml.string(), name.string());
+  } else if (!is_there(path)) {
+    *error = fmt::format("{}: its map {} is missing", yaml.string(), name.string());
+  } else {
+    *map = path;
+  }
+  return !map->empty();
+}
+
+void load_map_beside(const fs::path& yaml, const std::string& text, StoredCalibration* stored,
+                     std::vector<std::string>* lines) {
+  fs::path path;
+  MapContent content;
+  std::string error;
+  if (!find_map(yaml, text, &path, &error)) {
+    lines->push_back(error);
+  } else if (!path.empty() && !load_map(path.string(), stored->calibration, &content, &error)) {
+    lines->push_back(fmt::format("{}; {}", error, set_aside(path)));
+  }
+  stored->map = std::move(content.map);
+}
+
+std::string zoom_text(std::optional<double> zoom) {
+  return zoom ? fmt::format("zoom {}", *zoom) : "any zoom";
+}
+
+}  // namespace
+
+CalibrationStore::CalibrationStore(std::string file, double zoom_tolerance)
+    : file_(std::move(file)), zoom_tolerance_(std::max(zoom_tolerance, 0.0)) {}
+
+std::vector<std::string> CalibrationStore::load(int width, int height) {
+  entries_.clear();
+  std::vector<std::string> lines;
+  const fs::path file(file_);
+  const fs::path folder = folder_of(file);
+  if (!is_there(folder)) return lines;
+  std::vector<std::string> names;
+  std::string unreadable;
+  if (!list(folder, &names, &unreadable)) lines.push_back(unreadable);
+  std::vector<fs::path> files;
+  if (is_there(file)) files.push_back(file);
+  const std::string begin = file.stem().string() + ".zoom-";
+  for (const std::string& name : names) {
+    if (name != file.filename() && begins_with(name, begin) && ends_with(name, kExtension)) {
+      files.push_back(folder / name);
+    }
+  }
+  for (const fs::path& path : files) load_file(path.string(), width, height, &lines);
+  return lines;
+}
+
+void CalibrationStore::load_file(const std::string& path, int width, int height,
+                                 std::vector<std::string>* lines) {
+  std::error_code ignored;
+  if (!fs::is_regular_file(path, ignored)) {
+    lines->push_back(path + ": not a file: not used");
+    return;
+  }
+  StoredCalibration stored;
+  stored.path = path;
+  std::string text;
+  std::string error;
+  if (!read_file(path, &text, &error) ||
+      !parse_calibration(text, path, &stored.calibration, &error)) {
+    lines->push_back(fmt::format("{}; {}", error, set_aside_with_maps(path)));
+    return;
+  }
+  const Camera<double>& camera = stored.calibration.camera;
+  if ((width > 0 && camera.width != width) || (height > 0 && camera.height != height)) {
+    lines->push_back(fmt::format("{}: for pictures of {}x{} px, but these have {}x{}; {}", path,
+                                 camera.width, camera.height, width, height,
+                                 set_aside_with_maps(path)));
+    return;
+  }
+  const std::optional<double>& zoom = stored.calibration.zoom;
+  for (const Entry& entry : entries_) {
+    if (entry.stored.calibration.zoom == zoom) {
+      lines->push_back(
+          fmt::format("{}: for {}, as {} is: not used", path, zoom_text(zoom), entry.stored.path));
+      return;
+    }
+  }
+  load_map_beside(path, text, &stored, lines);
+  lines->push_back(fmt::format("{}: calibration for {}, {} landmarks", path, zoom_text(zoom),
+                               stored.map.landmarks.size()));
+  entries_.push_back({std::move(stored), false});
+}
+
+std::optional<std::size_t> CalibrationStore::nearest(std::optional<double> zoom) const {
+  std::optional<std::size_t> best;
+  double least = std::numeric_limits<double>::infinity();
+  for (std::size_t i = 0; i < entries_.size(); ++i) {
+    const std::optional<double>& its = entries_[i].stored.calibration.zoom;
+    if (its.has_value() != zoom.has_value()) continue;
+    const double distance = zoom ? std::abs(*zoom - *its) : 0;
+    if (distance <= zoom_tolerance_ && distance < least) {
+      least = distance;
+      best = i;
+    }
+  }
+  return best;
+}
+
+const StoredCalibration* CalibrationStore::find(std::optional<double> zoom) const {
+  std::optional<std::size_t> found = nearest(zoom);
+  if (!found && zoom) found = nearest(std::nullopt);
+  if (!found && !zoom && entries_.size() == 1) found = 0;
+  return found ? &entries_[*found].stored : nullptr;
+}
+
+bool CalibrationStore::save(const StoredCalibration& calibration, std::string* error) {
+  const std::optional<std::size_t> same = nearest(calibration.calibration.zoom);
+  const std::size_t at = same.value_or(entries_.size());
+  if (!same) entries_.emplace_back();
+  Entry& entry = entries_[at];
+  const std::string path = same ? entry.stored.path : "";
+  entry = {calibration, true};
+  entry.stored.path = path;
+  return write(&entry, error);
+}
+
+bool CalibrationStore::has_pending() const {
+  return std::any_of(entries_.begin(), entries_.end(),
+                     [](const Entry& entry) { return entry.pending; });
+}
+
+bool CalibrationStore::save_pending(std::string* error) {
+  bool all = true;
+  for (Entry& entry : entries_) {
+    std::string problem;
+    if (!entry.pending || write(&entry, &problem)) continue;
+    if (all) *error = problem;
+    all = false;
+  }
+  return all;
+}
+
+// A name for a new file that no other calibration has: what a file holds counts, not how it is called.
+std::string CalibrationStore::free_path(std::optional<double> zoom) const {
+  const fs::path file(file_);
+  const fs::path begin = folder_of(file) / file.stem();
+  const std::string named =
+      fmt::format("{}.zoom-{}", begin.string(), zoom ? fmt::format("{}", *zoom) : "any");
+  std::string path = zoom ? named + kExtension : file_;
+  const auto taken = [&] {
+    return std::any_of(entries_.begin(), entries_.end(),
+                       [&](const Entry& entry) { return entry.stored.path == path; });
+  };
+  for (int i = 1; taken(); ++i) path = fmt::format("{}-{}{}", named, i, kExtension);
+  return path;
+}
+
+// The map comes first, under a name of its own, then the calibration that names it, then the old map goes:
+// whatever comes between, the calibration on disk has its map beside it.
+bool CalibrationStore::write(Entry* entry, std::string* error) {
+  StoredCalibration& stored = entry->stored;
+  const fs::path path = stored.path.empty() ? free_path(stored.calibration.zoom) : stored.path;
+  std::error_code failure;
+  fs::create_directories(folder_of(path), failure);
+  if (failure) {
+    *error = folder_of(path).string() + ": cannot be made: " + failure.message();
+    return false;
+  }
+  fs::path map;
+  bool map_is_new = false;
+  std::string map_flaw;
+  stored.notes.landmarks.clear();
+  if (!stored.map.landmarks.empty()) {
+    const MapContent content{{}, stored.map};
+    const std::string bytes = format_map(content, stored.calibration);
+    map = map_path(path, bytes);
+    map_is_new = !is_there(map);
+    MapContent as_read;
+    if (!parse_map(bytes, "refused to write " + map.string(), stored.calibration, &as_read,
+                   &map_flaw)) {
+      map.clear();
+    } else if (!write_file_atomically(map.string(), bytes, error)) {
+      return false;
+    }
+    stored.notes.landmarks = map.filename().string();
+  }
+  if (!save_calibration(path.string(), stored.calibration, stored.notes, error)) {
+    if (map_is_new && !map.empty()) fs::remove(map, failure);
+    return false;
+  }
+  stored.path = path.string();
+  entry->pending = false;
+  for (const fs::path& old : maps_of(path)) {
+    if (old != map) fs::remove(old, failure);
+  }
+  if (!map_flaw.empty()) *error = map_flaw;
+  return map_flaw.empty();
+}
+
+}  // namespace alidade

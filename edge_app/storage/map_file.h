@@ -1,0 +1,68 @@
+#pragma once
+// map.bin: what one calibration knows of the scene, beside its calibration.yaml: the points that were
+// adjusted with it, and the map for OE mode. Little-endian, packed:
+//   offset 0   8 bytes  "ALIDMAP\n"
+//          8   u32      format version, 3
+//         12   u32      calibration_check() of the calibration it belongs to
+//         16   u64      number of points n
+//         24   u64      number of landmarks m
+//         32   2 f64    offset of the map: pan, tilt, rad, base minus map
+//         48   3 f64    its covariance: xx, xy, yy, rad^2
+//         72   6 f64    covariance of pan's bend: upper half, by rows, of (angle, rate, acceleration)
+//        120   6 f64    of tilt's
+//        168   f64      the tilt that the bend is told for, rad
+//        176   22 f64   sensitivity of the offset: by rows pan, tilt, in the order of Parameter
+//        352   n times 60 bytes:
+//                 i64     point's name in the tracks
+//                 3 f64   d_b, unit direction in the base
+//                 3 f64   cov_d: xx, xy, yy in tangent_basis(d_b), rad^2; the calibration taken as exact
+//                 u32     observations
+//              m times 464 bytes, see Landmark in core/realtime/oe_mode/landmark_map.h:
+//                 u32     octave, 0 to 7
+//                 3 f64   d, unit direction in the map's frame
+//                 3 f64   covariance: xx, xy, yy, rad^2
+//                 3 f64   shared covariance, likewise
+//                 22 f32  sensitivity, by rows
+//                 4 f64   J_pixel_tangent, by rows
+//                 256 u8  picture, by rows
+//                 u32     frames in which it was looked for
+//                 u32     frames in which it was found, no more than those
+//                 f32     mean square of the normalised residual
+//        end   u32      CRC-32 of everything before
+// A later version may change anything after the version. Earlier ones, without sensitivities, are refused.
+// A map is of use only with the calibration it was made with: its directions carry that one's errors,
+// so another's is refused.
+// Not for the real-time thread: allocates, reads and writes files. No shared state.
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "core/calibration/calibrate.h"
+#include "core/model/calibration.h"
+#include "core/realtime/oe_mode/map_state.h"
+
+namespace alidade {
+
+struct MapContent {
+  std::vector<CalibrationLandmark> points;
+  MapState map;
+};
+
+// CRC-32 of the parameters' values, which calibration.yaml keeps bit by bit.
+[[nodiscard]] std::uint32_t calibration_check(const Calibration& calibration);
+
+// Pure: bytes in, content or one line of error out. name stands for the file in errors.
+[[nodiscard]] bool parse_map(const std::string& bytes, const std::string& name,
+                             const Calibration& calibration, MapContent* content,
+                             std::string* error);
+[[nodiscard]] std::string format_map(const MapContent& content, const Calibration& calibration);
+
+[[nodiscard]] bool load_map(const std::string& path, const Calibration& calibration,
+                            MapContent* content, std::string* error);
+
+// Atomic. What load_map() would refuse is refused here.
+[[nodiscard]] bool save_map(const std::string& path, const MapContent& content,
+                            const Calibration& calibration, std::string* error);
+
+}  // namespace alidade

@@ -1,0 +1,61 @@
+#pragma once
+// Reads the tables of a recording, a directory:
+//   recording.yaml   format: 1, width, height (px), free-form notes
+//   frames.csv       frame,receive_time_s[,sender_time_s][,sender_utc_s][,sequence][,restarted]
+//   telemetry.csv    receive_time_s,pan_rad,tilt_rad[,zoom][,device_time_s][,sequence]
+//                    [,earliest_time_s][,restarted]
+//   tracks.csv       frame,landmark,u_px,v_px,sigma_px   (in place of, or beside, the video)
+// Times are seconds of one clock (of the recording host), angles radians. A cell of an optional
+// column may be empty: not known. Unknown columns are ignored. Every line ends with a newline, so
+// that a file which was cut off in the middle of a number does not pass for a whole one.
+// Stamps are passed on as they are: equal or jumping ones are the clock filter's business.
+// On failure the functions return false and *error is one line: what, file:line, what is right. parse_...()
+// take the text itself; name stands for the file in errors.
+
+#include <cstdint>
+#include <istream>
+#include <string>
+#include <vector>
+
+#include "platform/streams/frame.h"
+#include "platform/streams/pan_tilt_sample.h"
+
+namespace alidade {
+
+struct RecordingInfo {
+  int width = 0;   // px
+  int height = 0;  // px
+  std::string notes;
+};
+
+// A landmark as one frame saw it; u right, v down, the centre of the top-left pixel at (0.5, 0.5).
+struct TrackPoint {
+  std::int64_t frame = 0;
+  std::int64_t landmark = 0;
+  double u_px = 0;
+  double v_px = 0;
+  double sigma_px = 0;
+};
+
+[[nodiscard]] bool parse_recording_info(const std::string& text, const std::string& name,
+                                        RecordingInfo* info, std::string* error);
+[[nodiscard]] bool read_recording_info(const std::string& directory, RecordingInfo* info,
+                                       std::string* error);
+
+[[nodiscard]] bool parse_frames_csv(std::istream& text, const std::string& name,
+                                    std::vector<FrameStamp>* frames, std::string* error);
+[[nodiscard]] bool read_frames_csv(const std::string& directory, std::vector<FrameStamp>* frames,
+                                   std::string* error);
+
+[[nodiscard]] bool parse_telemetry_csv(std::istream& text, const std::string& name,
+                                       std::vector<PanTiltSample>* samples, std::string* error);
+[[nodiscard]] bool read_telemetry_csv(const std::string& directory,
+                                      std::vector<PanTiltSample>* samples, std::string* error);
+
+// Points are passed on as they are: doubled or contradicting ones are the calibration's business.
+[[nodiscard]] bool parse_tracks_csv(std::istream& text, const std::string& name,
+                                    std::vector<TrackPoint>* points, std::string* error);
+[[nodiscard]] bool read_tracks_csv(const std::string& directory, std::vector<TrackPoint>* points,
+                                   std::string* error);
+
+}  // namespace alidade

@@ -1,0 +1,138 @@
+#include "platform/storage/recording_writer.h"
+
+#include <fcntl.h>
+#include <unistd.h>
+#include <yaml-cpp/yaml.h>
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+#include <system_error>
+
+namespace alidade {
+namespace {
+
+std::string text(double number) {
+  char buffer[32];
+  std::snprintf(buffer, sizeof buffer, "%.17g", number);
+  return buffer;
+}
+
+std::string text(const std::optional<double>& number) { return number ? text(*number) : ""; }
+
+std::string text(const std::optional<std::int64_t>& number) {
+  return number ? std::to_string(*number) : "";
+}
+
+std::string failure(const std::string& path, int code) {
+  return "cannot write " + path + ": " + std::strerror(code);
+}
+
+bool write_all(int fd, const std::string& bytes) {
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t count = ::write(fd, bytes.data() + done, bytes.size() - done);
+    if (count < 0 && errno != EINTR) {
+      return false;
+    }
+    done += count > 0 ? static_cast<std::size_t>(count) : 0;
+  }
+  return true;
+}
+
+}  // namespace
+
+RecordingWriter::~RecordingWriter() {
+  for (const Table* table : {&frames_, &telemetry_}) {
+    if (table->fd >= 0) {
+      ::close(table->fd);
+    }
+  }
+}
+
+bool RecordingWriter::create(Table* table, const std::string& first_line, std::string* error) {
+  table->fd = ::open(table->path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
+  if (table->fd < 0) {
+    *error = errno == EEXIST ? table->path + " exists already; record into another directory"
+                             : failure(table->path, errno);
+    return false;
+  }
+  return append(*table, first_line, error);
+}
+
+bool RecordingWriter::append(const Table& table, const std::string& line, std::string* error) {
+  const off_t before = ::lseek(table.fd, 0, SEEK_CUR);
+  if (before >= 0 && write_all(table.fd, line)) {
+    return true;
+  }
+  *error = failure(table.path, errno);
+  // No half row stays behind.
+  if (before >= 0 && ::ftruncate(table.fd, before) == 0) {
+    ::lseek(table.fd, before, SEEK_SET);
+  }
+  return false;
+}
+
+bool RecordingWriter::open(const std::string& directory, int width, int height,
+                           const std::string& notes, std::string* error) {
+  std::error_code code;
+  std::filesystem::create_directories(directory, code);
+  if (code) {
+    *error = "cannot make " + directory + ": " + code.message();
+    return false;
+  }
+  frames_.path = directory + "/frames.csv";
+  telemetry_.path = directory + "/telemetry.csv";
+  if (!create(&frames_, "frame,receive_time_s,sender_time_s,sender_utc_s,sequence,restarted\n",
+              error) ||
+      !create(&telemetry_,
+              "receive_time_s,pan_rad,tilt_rad,zoom,device_time_s,sequence,earliest_time_s,"
+              "restarted\n",
+              error)) {
+    return false;
+  }
+  YAML::Emitter yaml;
+  yaml << YAML::BeginMap << YAML::Key << "format" << YAML::Value << 1 << YAML::Key << "width"
+       << YAML::Value << width << YAML::Key << "height" << YAML::Value << height;
+  if (!notes.empty()) {
+    yaml << YAML::Key << "notes" << YAML::Value << YAML::DoubleQuoted << notes;
+  }
+  yaml << YAML::EndMap;
+  Table info{directory + "/recording.yaml", -1};
+  const bool written = create(&info, std::string(yaml.c_str()) + "\n", error);
+  if (info.fd >= 0) {
+    ::close(info.fd);
+  }
+  return written;
+}
+
+bool RecordingWriter::add_frame(const FrameStamp& stamp, std::string* error) {
+  return append(frames_,
+                std::to_string(stamp.frame) + "," + text(stamp.receive_time_s) + "," +
+                    text(stamp.sender_time_s) + "," + text(stamp.sender_utc_s) + "," +
+                    text(stamp.sequence) + "," + (stamp.restarted ? "1" : "0") + "\n",
+                error);
+}
+
+bool RecordingWriter::add_telemetry(const PanTiltSample& sample, std::string* error) {
+  return append(telemetry_,
+                text(sample.latest_time_s) + "," + text(sample.pan_rad) + "," +
+                    text(sample.tilt_rad) + "," + text(sample.zoom) + "," +
+                    text(sample.device_time_s) + "," + text(sample.sequence) + "," +
+                    text(sample.earliest_time_s) + "," + (sample.restarted ? "1" : "0") + "\n",
+                error);
+}
+
+bool RecordingWriter::flush(std::string* error) {
+  for (const Table* table : {&frames_, &telemetry_}) {
+    if (::fsync(table->fd) != 0) {
+      *error = failure(table->path, errno);
+      return false;
+    }
+  }
+  return true;
+}
+
+}  // namespace alidade

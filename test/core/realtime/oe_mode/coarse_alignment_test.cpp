@@ -1,0 +1,250 @@
+// Coarse alignment from starts that are wrong by up to 60 px in any direction of a 1920x1080 picture.
+
+#include "core/realtime/oe_mode/coarse_alignment.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <complex>
+#include <limits>
+#include <random>
+#include <vector>
+
+namespace alidade::test {
+namespace {
+
+constexpr int kWidth = 1920;
+constexpr int kHeight = 1080;
+constexpr int kMargin = 80;  // px, by which a view may be moved in its picture
+constexpr int kOctaves = 6;
+constexpr int kFinest = 2;
+constexpr int kPatches = 24;  // of each octave
+
+// Waves with periods from 10 to 800 px, as many of each octave, so that all octaves have contrast.
+std::vector<float> texture(std::uint64_t seed) {
+  constexpr int kColumns = kWidth + 2 * kMargin;
+  constexpr int kRows = kHeight + 2 * kMargin;
+  std::mt19937_64 random(seed);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  std::vector<float> grey(static_cast<std::size_t>(kColumns) * kRows, 128.0F);
+  for (int wave = 0; wave < 40; ++wave) {
+    const double number = 2 * kPi / (10 * std::pow(80.0, uniform(random)));
+    const double direction = 2 * kPi * uniform(random);
+    const double phase = 2 * kPi * uniform(random);
+    const std::complex<float> step(std::polar(1.0, number * std::cos(direction)));
+    for (int v = 0; v < kRows; ++v) {
+      std::complex<float> at(std::polar(4.5, phase + number * std::sin(direction) * v));
+      float* row = grey.data() + static_cast<std::ptrdiff_t>(v) * kColumns;
+      for (int u = 0; u < kColumns; ++u) {
+        row[u] += at.real();
+        at = {at.real() * step.real() - at.imag() * step.imag(),
+              at.real() * step.imag() + at.imag() * step.real()};
+      }
+    }
+  }
+  return grey;
+}
+
+class Picture {
+ public:
+  Picture(const std::vector<float>& grey, double gain, std::uint64_t seed) : pixels_(grey.size()) {
+    std::mt19937_64 random(seed);
+    std::normal_distribution<float> noise(0, 2);
+    for (std::size_t i = 0; i < grey.size(); ++i) {
+      const float value = 128 + static_cast<float>(gain) * (grey[i] - 128) + noise(random);
+      pixels_[i] = static_cast<std::uint8_t>(std::lround(std::clamp(value, 0.0F, 255.0F)));
+    }
+  }
+
+  // What is at u without a shift is at u + shift.
+  [[nodiscard]] ImageView view(int shift_u = 0, int shift_v = 0) const {
+    constexpr int kStride = kWidth + 2 * kMargin;
+    return {pixels_.data() + (kMargin - shift_v) * kStride + kMargin - shift_u, kWidth, kHeight,
+            kStride};
+  }
+
+  // Hides a strip of the view by what another one shows there.
+  void cover(int shift_u, int shift_v, int from_u, int to_u, const Picture& other) {
+    const ImageView target = view(shift_u, shift_v);
+    const ImageView source = other.view();
+    for (int v = 0; v < kHeight; ++v) {
+      std::uint8_t* to = pixels_.data() + (target.row(v) - pixels_.data());
+      std::copy(source.row(v) + from_u, source.row(v) + to_u, to + from_u);
+    }
+  }
+
+ private:
+  std::vector<std::uint8_t> pixels_;
+};
+
+class CoarseAlignmentTest : public testing::Test {
+ protected:
+  // Descending octaves, positions all over where a patch stays in the image.
+  void SetUp() override {
+    J_angle_ << -20000, 800, 500, 19000;
+    Pyramid pyramid(kWidth, kHeight, kOctaves);
+    ASSERT_EQ(pyramid.build(reference_.view(), kOctaves), PyramidStatus::kOk);
+    std::mt19937_64 random(3);
+    std::uniform_real_distribution<double> uniform(0, 1);
+    references_.reserve(kPatches * kOctaves);
+    for (int octave = kOctaves - 1; octave >= kFinest; --octave) {
+      const double border = border_of(octave);
+      for (int taken = 0; taken < kPatches;) {
+        const double u = border + (kWidth - 2 * border) * uniform(random);
+        const Vector2<double> at(u, border + (kHeight - 2 * border) * uniform(random));
+        ReferencePatch patch;
+        if (prepare(pyramid.octave(octave), std::ldexp(1.0, -octave) * at,
+                    Matrix2<double>::Identity(), 1, &patch) != PrepareStatus::kOk) {
+          continue;
+        }
+        references_.push_back(patch);
+        patches_.push_back({&references_.back(), octave, at, J_angle_});
+        ++taken;
+      }
+    }
+  }
+
+  static double border_of(int octave) { return std::ldexp(6.5, octave) + 65; }
+
+  // True and the remaining error in px.
+  bool align(const ImageView& image, const CoarseOptions& options, const Vector2<double>& shift,
+             double* error_px, CoarseAlignment* out) {
+    EXPECT_EQ(pyramid_.build(image, kOctaves), PyramidStatus::kOk);
+    const bool ok =
+        align_coarsely(pyramid_, patches_.data(), static_cast<int>(patches_.size()), options, out);
+    *error_px = (J_angle_ * out->angle - shift).norm();
+    return ok;
+  }
+
+  void expect_recovered(const Picture& picture, double radius, double search_px,
+                        double least_found) {
+    for (int i = 0; i < 12; ++i) {
+      const double turn = 2 * kPi * (i + 0.3) / 12;
+      const int du = static_cast<int>(std::lround(radius * std::cos(turn)));
+      const int dv = static_cast<int>(std::lround(radius * std::sin(turn)));
+      CoarseOptions options;
+      options.search_px = search_px;
+      CoarseAlignment out;
+      double error_px = 0;
+      ASSERT_TRUE(align(picture.view(du, dv), options, {du, dv}, &error_px, &out))
+          << du << ' ' << dv << ", found " << out.found;
+      EXPECT_LT(error_px, 1) << du << ' ' << dv;
+      EXPECT_GE(out.found, least_found) << du << ' ' << dv;
+      EXPECT_EQ(out.patches, kPatches);
+    }
+  }
+
+  const std::vector<float> grey_ = texture(1);
+  const Picture reference_{grey_, 1, 1};
+  Matrix2<double> J_angle_;  // px/rad
+  std::vector<ReferencePatch> references_;
+  std::vector<CoarsePatch> patches_;
+  Pyramid pyramid_{kWidth, kHeight, kOctaves};
+};
+
+TEST_F(CoarseAlignmentTest, FindsItsWayFromTheReachOfTheCoarsestOctave) {
+  const Picture same(grey_, 1, 2);
+  for (const double radius : {0.0, 5.0, 20.0, 40.0}) {
+    SCOPED_TRACE(radius);
+    expect_recovered(same, radius, 0, 0.95);
+  }
+}
+
+TEST_F(CoarseAlignmentTest, FindsItsWayFromSixtyPixelsBySearching) {
+  const Picture same(grey_, 1, 2);
+  for (const double radius : {0.0, 20.0, 60.0}) {
+    SCOPED_TRACE(radius);
+    expect_recovered(same, radius, 60, 0.95);
+  }
+}
+
+TEST_F(CoarseAlignmentTest, DoesNotMindBrightness) {
+  for (const double gain : {0.5, 2.0}) {
+    SCOPED_TRACE(gain);
+    const Picture changed(grey_, gain, 2);
+    expect_recovered(changed, 30, 0, 0.95);
+    expect_recovered(changed, 60, 60, 0.95);
+  }
+}
+
+TEST_F(CoarseAlignmentTest, DoesNotMindWhatHidesThirtyPercent) {
+  const Picture other(texture(2), 1, 4);
+  for (const double radius : {0.0, 30.0, 60.0}) {
+    for (int i = 0; i < 6; ++i) {
+      const double turn = 2 * kPi * (i + 0.3) / 6;
+      const int du = static_cast<int>(std::lround(radius * std::cos(turn)));
+      const int dv = static_cast<int>(std::lround(radius * std::sin(turn)));
+      // Each octave has its patches in a strip of its own width; 30 % of the coarsest's are hidden.
+      const auto from = static_cast<int>(border_of(kOctaves - 1));
+      const int to = from + (kWidth - 2 * from) * 3 / 10;
+      Picture covered(grey_, 1, 2);
+      covered.cover(du, dv, 0, to, other);
+      CoarseOptions options;
+      options.search_px = radius > 40 ? radius : 0;
+      CoarseAlignment out;
+      double error_px = 0;
+      ASSERT_TRUE(align(covered.view(du, dv), options, {du, dv}, &error_px, &out))
+          << du << ' ' << dv << ", found " << out.found;
+      EXPECT_LT(error_px, 1) << du << ' ' << dv;
+      EXPECT_LT(out.found, 0.85);
+      EXPECT_GT(out.found, 0.5);
+    }
+  }
+}
+
+TEST_F(CoarseAlignmentTest, FindsNothingWhereNothingIsAlike) {
+  const std::vector<std::uint8_t> blank(static_cast<std::size_t>(kWidth) * kHeight, 90);
+  const Picture other(texture(2), 1, 4);
+  const Picture noise(std::vector<float>(grey_.size(), 128.0F), 1, 5);
+  const ImageView images[] = {{blank.data(), kWidth, kHeight, kWidth}, other.view(), noise.view()};
+  for (const ImageView& image : images) {
+    for (const double search_px : {0.0, 60.0}) {
+      CoarseOptions options;
+      options.search_px = search_px;
+      CoarseAlignment out;
+      double error_px = 0;
+      EXPECT_FALSE(align(image, options, {0, 0}, &error_px, &out));
+      EXPECT_LT(out.found, 0.4);
+      EXPECT_TRUE(all_finite(out.angle));
+    }
+  }
+}
+
+TEST_F(CoarseAlignmentTest, NeedsAFewPatchesInTheImage) {
+  ASSERT_EQ(pyramid_.build(reference_.view(), kOctaves), PyramidStatus::kOk);
+  CoarseAlignment out;
+  EXPECT_FALSE(align_coarsely(pyramid_, nullptr, 0, {}, &out));
+  EXPECT_FALSE(align_coarsely(pyramid_, patches_.data(), 4, {}, &out));
+  EXPECT_TRUE(align_coarsely(pyramid_, patches_.data(), 5, {}, &out));
+  // One octave alone is enough.
+  const CoarsePatch* finest = patches_.data() + static_cast<std::ptrdiff_t>(patches_.size()) - 5;
+  EXPECT_TRUE(align_coarsely(pyramid_, finest, 5, {}, &out));
+  EXPECT_EQ(out.patches, 5);
+
+  const double kNaN = std::numeric_limits<double>::quiet_NaN();
+  for (const double away : {-3000.0, 1e9, 1e300, kNaN}) {
+    for (const double search_px : {0.0, 60.0}) {
+      std::vector<CoarsePatch> moved = patches_;
+      for (CoarsePatch& patch : moved) patch.u.x() += away;
+      CoarseOptions options;
+      options.search_px = search_px;
+      EXPECT_FALSE(
+          align_coarsely(pyramid_, moved.data(), static_cast<int>(moved.size()), options, &out));
+      EXPECT_TRUE(all_finite(out.angle));
+    }
+  }
+  // A mount that moves nothing in the image.
+  std::vector<CoarsePatch> still = patches_;
+  for (CoarsePatch& patch : still) patch.J_angle.setZero();
+  for (const double search_px : {0.0, 60.0}) {
+    CoarseOptions options;
+    options.search_px = search_px;
+    (void)align_coarsely(pyramid_, still.data(), static_cast<int>(still.size()), options, &out);
+    EXPECT_TRUE(all_finite(out.angle)) << search_px;
+  }
+}
+
+}  // namespace
+}  // namespace alidade::test

@@ -1,0 +1,472 @@
+// The covariance of an interpolated angle and rate is what the errors are, and the cubic is worth its
+// while. Errors are normalised: e^T cov^-1 e / n has mean 1 and variance 2/n for an honest n x n
+// covariance, so a mean over N independent runs lies within 4 sqrt(2 / (n N)) of 1 but for 1 in 16,000.
+
+#include "core/realtime/telemetry/telemetry_interpolation.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <random>
+
+#include "core/realtime/telemetry/telemetry_buffer.h"
+
+namespace alidade {
+namespace {
+
+class MeanNormalisedError {
+ public:
+  template <int kSize>
+  void add(const Matrix<double, kSize, 1>& error, const Matrix<double, kSize, kSize>& covariance) {
+    sum_ += error.dot(covariance.ldlt().solve(error)) / kSize;
+    ++runs_;
+    tolerance_factor_ = 4 * std::sqrt(2.0 / kSize);
+  }
+  [[nodiscard]] double mean() const { return sum_ / runs_; }
+  [[nodiscard]] double tolerance() const { return tolerance_factor_ / std::sqrt(runs_); }
+
+ private:
+  double sum_ = 0;
+  double runs_ = 0;
+  double tolerance_factor_ = 0;
+};
+
+Vector4<double> error_of(const InterpolatedPanTilt& result, const PanTilt<double>& angle,
+                         const PanTilt<double>& rate) {
+  Vector4<double> error;
+  error << minus(result.angle, angle), result.rate.vector() - rate.vector();
+  return error;
+}
+
+// The paper's path at a field of view of 3.4 degrees: three times as wide, as high, 10 s a loop.
+struct PaperPath {
+  static constexpr double kSpeed = 2 * 3.14159265358979323846 / 10;
+  static PanTilt<double> angle(double t) {
+    return {0.09 * std::cos(kSpeed * t), 0.017 * std::sin(3 * kSpeed * t)};
+  }
+  static PanTilt<double> rate(double t) {
+    return {-0.09 * kSpeed * std::sin(kSpeed * t), 0.017 * 3 * kSpeed * std::cos(3 * kSpeed * t)};
+  }
+};
+
+TEST(TelemetryInterpolation, OfTwoSamplesHasTheCovarianceOfThePaper) {
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = 3e-5;
+  noise.period_sigma_s = 1e-4;
+  noise.acceleration_sigma = 0;
+  const double stamp_sigma = 2e-3;
+  const double frame_sigma = 1e-3;
+  TelemetryBuffer<8> buffer(noise);
+  ASSERT_EQ(buffer.push({0, stamp_sigma, 0.1, 0.2}), PushStatus::kStored);
+  ASSERT_EQ(buffer.push({0.03, stamp_sigma, 0.13, 0.19}), PushStatus::kStored);
+  const Vector2<double> w(1, -1.0 / 3);
+  for (const double l : {0.0, 0.25, 0.5, 0.9, 1.0}) {
+    InterpolatedPanTilt result;
+    ASSERT_EQ(buffer.query(0.03 * l, frame_sigma, &result), QueryStatus::kOk);
+    // PTCEE 25, except that the period's variance is shared by both stamps: 1/2 (1 - l)^2 + 1/2 l^2
+    // of it belongs to the samples' own errors and 1/2 is taken out of the common one.
+    const double period_variance = 1e-8;
+    const double angle_part = ((1 - l) * (1 - l) + l * l) * 9e-10;
+    const double time_part = frame_sigma * frame_sigma + stamp_sigma * stamp_sigma -
+                             period_variance / 2 +
+                             ((1 - l) * (1 - l) + l * l) * period_variance / 2;
+    const Matrix2<double> expected =
+        angle_part * Matrix2<double>::Identity() + time_part * w * w.transpose();
+    EXPECT_LT((result.covariance.topLeftCorner<2, 2>() - expected).norm(), 1e-9 * expected.norm());
+  }
+}
+
+struct StampNoise {
+  double sigma;         // of a stamp
+  double period_sigma;  // of the time between two stamps
+  double frame_sigma;
+};
+
+// One simulated look-up: a steady motion, `samples` samples of it at rate_hz with noise, and a query
+// `beyond` seconds after the newest sample, or inside the samples if that is negative.
+struct Trial {
+  double rate_hz;
+  double angle_sigma;
+  StampNoise stamps;
+  int samples;
+  double beyond;
+};
+
+class SteadyTrial : public testing::TestWithParam<Trial> {};
+
+TEST_P(SteadyTrial, CovarianceIsHonest) {
+  const Trial trial = GetParam();
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = trial.angle_sigma;
+  noise.period_sigma_s = trial.stamps.period_sigma;
+  noise.acceleration_sigma = 0;
+  const double own_sigma = trial.stamps.period_sigma / std::sqrt(2);
+  // Raw stamps share nothing: rounding must not make that a negative number.
+  const double shared_sigma =
+      std::sqrt(std::max(0.0, trial.stamps.sigma * trial.stamps.sigma - own_sigma * own_sigma));
+  std::mt19937_64 random(4);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(-1, 1);
+  MeanNormalisedError all;
+  MeanNormalisedError angles;
+  MeanNormalisedError rates;
+  const int runs = 3000;
+  for (int run = 0; run < runs; ++run) {
+    const PanTilt<double> start{4 * uniform(random), 4 * uniform(random)};
+    const PanTilt<double> rate{0.05 * uniform(random), 0.05 * uniform(random)};
+    const auto truth = [&](double t) {
+      return PanTilt<double>{start.pan + rate.pan * t, start.tilt + rate.tilt * t};
+    };
+    TelemetryBuffer<32> buffer(noise);
+    const double shared = shared_sigma * normal(random);
+    double newest = 0;
+    for (int i = 0; i < trial.samples; ++i) {
+      const double time = i / trial.rate_hz;
+      const PanTilt<double> angle = truth(time);
+      newest = time + shared + own_sigma * normal(random);
+      ASSERT_EQ(
+          buffer.push({newest, trial.stamps.sigma, angle.pan + trial.angle_sigma * normal(random),
+                       angle.tilt + trial.angle_sigma * normal(random)}),
+          PushStatus::kStored);
+    }
+    const double last = (trial.samples - 1) / trial.rate_hz;
+    const double time =
+        trial.beyond < 0 ? last * (0.5 + 0.4 * uniform(random)) : newest - shared + trial.beyond;
+    const double frame_error = trial.stamps.frame_sigma * normal(random);
+    InterpolatedPanTilt result;
+    ASSERT_TRUE(has_result(buffer.query(time + frame_error, trial.stamps.frame_sigma, &result)));
+    const Vector4<double> error = error_of(result, truth(time), rate);
+    all.add<4>(error, result.covariance);
+    angles.add<2>(error.head<2>(), result.covariance.topLeftCorner<2, 2>());
+    rates.add<2>(error.tail<2>(), result.covariance.bottomRightCorner<2, 2>());
+  }
+  // Curvature that noise feigns makes the covariance somewhat larger than the errors.
+  const double excess = trial.samples == 2 ? 0 : 0.2;
+  for (const MeanNormalisedError* error : {&all, &angles, &rates}) {
+    EXPECT_LT(error->mean(), 1 + error->tolerance());
+    EXPECT_GT(error->mean(), 1 - error->tolerance() - excess);
+  }
+}
+
+constexpr StampNoise kExactStamps{0, 0, 0};
+constexpr StampNoise kFilteredStamps{1e-3, 50e-6, 1e-3};
+const StampNoise kRawStamps{1e-3, std::sqrt(2) * 1e-3, 0};
+
+INSTANTIATE_TEST_SUITE_P(
+    Telemetry, SteadyTrial,
+    testing::Values(Trial{30, 3e-5, kExactStamps, 2, -1}, Trial{30, 3e-5, kFilteredStamps, 2, -1},
+                    Trial{30, 3e-5, kRawStamps, 2, -1}, Trial{30, 3e-5, kFilteredStamps, 2, 0.05},
+                    Trial{30, 3e-5, kFilteredStamps, 5, -1}, Trial{30, 3e-5, kExactStamps, 20, -1},
+                    Trial{30, 3e-5, kFilteredStamps, 20, -1}, Trial{30, 3e-5, kRawStamps, 20, -1},
+                    Trial{100, 1e-4, kFilteredStamps, 20, -1},
+                    Trial{30, 1e-5, kFilteredStamps, 20, 0.001},
+                    Trial{30, 3e-5, kFilteredStamps, 20, 0.05}));
+
+// From rest to some ten quanta a sample.
+TEST(TelemetryInterpolation, CountsTheRoundingOfTheDevice) {
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = 0;
+  noise.quantum = 2e-4;
+  noise.period_sigma_s = 0;
+  TelemetryLimits limits;
+  limits.max_repeat_s = 0;
+  std::mt19937_64 random(5);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  for (const double top_rate : {0.0, 4e-4, 8e-4, 1.6e-3, 3e-3, 6e-3, 0.1}) {
+    double sum = 0;
+    const int runs = 2000;
+    for (int run = 0; run < runs; ++run) {
+      TelemetryBuffer<32> buffer(noise, limits);
+      const double start = uniform(random);
+      const double rate = top_rate * uniform(random);
+      for (int i = 0; i < 20; ++i) {
+        const double pan = noise.quantum * std::round((start + rate * i / 30) / noise.quantum);
+        ASSERT_EQ(buffer.push({i / 30.0, 0, pan, 0}), PushStatus::kStored);
+      }
+      const double time = (8 + 4 * uniform(random)) / 30;
+      InterpolatedPanTilt result;
+      ASSERT_EQ(buffer.query(time, 0, &result), QueryStatus::kOk);
+      const double error = result.angle.pan - start - rate * time;
+      sum += error * error / result.covariance(0, 0);
+    }
+    // Never less than the errors are, and not far more.
+    EXPECT_LT(sum / runs, 1.1) << top_rate;
+    EXPECT_GT(sum / runs, 0.4) << top_rate;
+  }
+}
+
+// What the fit is for, and what it costs: the paper's path, its rates and its noise.
+TEST(TelemetryInterpolation, IsBetterThanTheStraightLineOnThePapersPath) {
+  std::mt19937_64 random(6);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(0, 10);
+  const double half_readout = 540 * 14.2e-6;
+  for (const double rate_hz : {30.0, 50.0, 100.0}) {
+    for (const double sigma : {1e-5, 1e-4}) {
+      TelemetryNoise noise;
+      noise.pan_tilt_sigma = sigma;
+      noise.period_sigma_s = 0;
+      MeanNormalisedError honest;
+      double line_square = 0;
+      double square = 0;
+      double line_edge_square = 0;
+      double edge_square = 0;
+      const int runs = 3000;
+      for (int run = 0; run < runs; ++run) {
+        TelemetryBuffer<32> buffer(noise);
+        const double start = uniform(random);
+        std::array<PanTilt<double>, 20> measured;
+        for (int i = 0; i < 20; ++i) {
+          const PanTilt<double> angle = PaperPath::angle(start + i / rate_hz);
+          PanTilt<double>& sample = measured[static_cast<std::size_t>(i)];
+          sample = {angle.pan + sigma * normal(random), angle.tilt + sigma * normal(random)};
+          ASSERT_EQ(buffer.push({i / rate_hz, 0, sample.pan, sample.tilt}), PushStatus::kStored);
+        }
+        const double l = uniform(random) / 10;
+        InterpolatedPanTilt result;
+        ASSERT_EQ(buffer.query((9 + l) / rate_hz, 0, &result), QueryStatus::kOk);
+        const Vector2<double> line_rate = minus(measured[10], measured[9]) * rate_hz;
+        const PanTilt<double> line = plus(measured[9], Vector2<double>(line_rate * l / rate_hz));
+
+        const double time = start + (9 + l) / rate_hz;
+        const PanTilt<double> truth = PaperPath::angle(time);
+        const PanTilt<double> edge = PaperPath::angle(time + half_readout);
+        honest.add<4>(error_of(result, truth, PaperPath::rate(time)), result.covariance);
+        square += minus(result.angle, truth).squaredNorm();
+        line_square += minus(line, truth).squaredNorm();
+        edge_square +=
+            (minus(result.angle, edge) + half_readout * result.rate.vector()).squaredNorm();
+        line_edge_square += (minus(line, edge) + half_readout * line_rate).squaredNorm();
+      }
+      EXPECT_LT(std::sqrt(square / line_square), 0.8) << rate_hz << " Hz, " << sigma;
+      EXPECT_LT(std::sqrt(edge_square / line_edge_square), 0.8) << rate_hz << " Hz, " << sigma;
+      EXPECT_NEAR(honest.mean(), 1, honest.tolerance() + 0.1) << rate_hz << " Hz, " << sigma;
+    }
+  }
+}
+
+// The mount starts, runs and stops again with an acceleration that the samples cannot resolve.
+TEST(TelemetryInterpolation, OwnsUpToTheErrorsOfAJerk) {
+  std::mt19937_64 random(7);
+  std::normal_distribution<double> normal;
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const double acceleration = 1;
+  const double top_rate = 0.3;
+  const double ramp = top_rate / acceleration;
+  // Starts at 0.
+  const auto truth = [&](double t) {
+    if (t < 0) return PanTilt<double>{0, 0};
+    const double pan = t < ramp ? acceleration * t * t / 2
+                                : acceleration * ramp * ramp / 2 + top_rate * (t - ramp);
+    return PanTilt<double>{pan, -pan};
+  };
+  for (const double rate_hz : {30.0, 100.0}) {
+    for (const double sigma : {1e-5, 1e-4}) {
+      TelemetryNoise noise;
+      noise.pan_tilt_sigma = sigma;
+      noise.period_sigma_s = 0;
+      double sum = 0;
+      const int runs = 3000;
+      for (int run = 0; run < runs; ++run) {
+        TelemetryBuffer<128> buffer(noise);
+        const double phase = uniform(random) / rate_hz;
+        for (double t = phase - 0.5; t < 1; t += 1 / rate_hz) {
+          const PanTilt<double> angle = truth(t);
+          ASSERT_EQ(buffer.push({t, 0, angle.pan + sigma * normal(random),
+                                 angle.tilt + sigma * normal(random)}),
+                    PushStatus::kStored);
+        }
+        const double time = -0.2 + 0.7 * uniform(random);
+        InterpolatedPanTilt result;
+        ASSERT_EQ(buffer.query(time, 0, &result), QueryStatus::kOk);
+        const Vector2<double> error = minus(result.angle, truth(time));
+        sum += error.dot(result.covariance.topLeftCorner<2, 2>().ldlt().solve(error)) / 2;
+      }
+      EXPECT_LT(sum / runs, 2) << rate_hz << " Hz, " << sigma;
+    }
+  }
+}
+
+// Beyond the newest sample nobody has seen the mount: what it did in the seconds before is what it may do.
+// Errors of pan and tilt in standard deviations, at all times from the newest sample on to 80 ms after it.
+struct Extrapolation {
+  double mean_square = 0;
+  double largest = 0;
+};
+
+template <typename Truth>
+Extrapolation extrapolate(double rate_hz, double sigma, double from_s, double to_s,
+                          const Truth& truth) {
+  constexpr double kBeyond = 0.08;  // s
+  std::mt19937_64 random(9);
+  std::normal_distribution<double> normal;
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = sigma;
+  noise.period_sigma_s = 0;
+  TelemetryBuffer<1024> buffer(noise);
+  Extrapolation out;
+  int count = 0;
+  for (int i = 0; i < to_s * rate_hz; ++i) {
+    const double time = i / rate_hz;
+    const PanTilt<double> angle = truth(time);
+    EXPECT_EQ(buffer.push({time, 0, angle.pan + sigma * normal(random),
+                           angle.tilt + sigma * normal(random)}),
+              PushStatus::kStored);
+    if (time < from_s) continue;
+    for (const double beyond : {0.25 * kBeyond, 0.5 * kBeyond, 0.75 * kBeyond, kBeyond}) {
+      InterpolatedPanTilt result;
+      EXPECT_EQ(buffer.query(time + beyond, 0, &result), QueryStatus::kExtrapolated);
+      EXPECT_TRUE(result.extrapolated);
+      const Vector2<double> sigmas =
+          minus(result.angle, truth(time + beyond))
+              .cwiseQuotient(result.covariance.diagonal().head<2>().cwiseSqrt());
+      out.mean_square += sigmas.squaredNorm() / 2;
+      out.largest = std::max(out.largest, sigmas.cwiseAbs().maxCoeff());
+      ++count;
+    }
+  }
+  out.mean_square /= count;
+  return out;
+}
+
+// The paper's path with the fields of view of three cameras, at the paper's speed and twice that.
+TEST(TelemetryInterpolation, LearnsFromAFastMountWhatToExpectBeyondTheNewestSample) {
+  for (const double field : {0.06, 0.35, 0.87}) {
+    for (const double period : {10.0, 5.0}) {
+      const auto truth = [&](double t) {
+        const double angle = 2 * kPi * t / period;
+        const double scale = field / (2 * kPi);
+        return PanTilt<double>{9 * scale * std::sin(angle), -3 * scale * std::cos(3 * angle)};
+      };
+      for (const double rate_hz : {20.0, 50.0}) {
+        for (const double sigma : {1e-5, 1e-4}) {
+          SCOPED_TRACE(testing::Message()
+                       << field << " rad, " << period << " s, " << rate_hz << " Hz, " << sigma);
+          const Extrapolation e = extrapolate(rate_hz, sigma, 3, 3 + 2 * period, truth);
+          // Peaks of a sine stand sqrt(2) above its mean square, the fourth root of its mean fourth power
+          // is 1.11 times that; the floor is more than the slowest does.
+          EXPECT_LT(e.mean_square, 1.1);
+          EXPECT_GT(e.mean_square, field < 0.1 ? 0.1 : 0.4);
+          EXPECT_LT(e.largest, 5);
+        }
+      }
+    }
+  }
+}
+
+// A mount that stops within a sample: the first time nobody could know, and then it is known. Errors in
+// the 80 ms after a stop are no normal ones; before, they were up to 250 sigmas.
+TEST(TelemetryInterpolation, RemembersThatTheMountStopsAtOnce) {
+  constexpr double kRate = 0.3;  // rad/s
+  constexpr double kMoves = 2;   // s
+  constexpr double kRests = 1;   // s
+  const auto truth = [&](double t) {
+    const double round = std::floor(t / (kMoves + kRests));
+    const double pan = kRate * (round * kMoves + std::min(t - round * (kMoves + kRests), kMoves));
+    return PanTilt<double>{pan, -pan};
+  };
+  for (const double rate_hz : {20.0, 50.0}) {
+    for (const double sigma : {1e-5, 1e-4}) {
+      const Extrapolation e = extrapolate(rate_hz, sigma, kMoves + kRests + 1, 20, truth);
+      EXPECT_LT(e.mean_square, 3) << rate_hz << " Hz, " << sigma;
+      EXPECT_LT(e.largest, 20) << rate_hz << " Hz, " << sigma;
+    }
+  }
+}
+
+// Whatever a mean over a long time is made of, white samples h apart leave sigma^2 h / T in it: so must the
+// answers, each worth its renewal.
+TEST(TelemetryInterpolation, AnAnswerIsWorthItsRenewal) {
+  std::mt19937_64 random(8);
+  std::normal_distribution<double> normal;
+  const double sigma = 3e-5;
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = sigma;
+  noise.period_sigma_s = 0;
+  noise.acceleration_sigma = 0;
+  for (const double rate_hz : {30.0, 100.0}) {
+    double mean_square = 0;
+    double expected = 0;
+    const int runs = 400;
+    const int kSamples = 120;
+    for (int run = 0; run < runs; ++run) {
+      TelemetryBuffer<256> buffer(noise);
+      for (int i = 0; i < kSamples; ++i) {
+        const double time = i / rate_hz;
+        ASSERT_EQ(buffer.push({time, 0, 0.1 * time + sigma * normal(random),
+                               -0.2 * time + sigma * normal(random)}),
+                  PushStatus::kStored);
+      }
+      // Away from the ends, whose windows are lopsided.
+      const double from = 10 / rate_hz;
+      const double to = (kSamples - 11) / rate_hz;
+      const int queries = 4 * (kSamples - 21);
+      Vector2<double> mean = Vector2<double>::Zero();
+      double worth = 0;
+      int white = 0;
+      for (int i = 0; i < queries; ++i) {
+        const double time = from + (to - from) * (i + 0.5) / queries;
+        InterpolatedPanTilt result;
+        ASSERT_EQ(buffer.query(time, 0, &result), QueryStatus::kOk);
+        mean += Vector2<double>(result.angle.pan - 0.1 * time, result.angle.tilt + 0.2 * time) /
+                queries;
+        ASSERT_GT(result.renewal_s, 0.9 / rate_hz);
+        ASSERT_LE(result.renewal_s, 1);
+        // Where noise feigns an acceleration the answer is worth less, rightly or not.
+        if (result.acceleration_square.norm() > 0) continue;
+        ASSERT_LT(result.renewal_s, 8.1 / rate_hz);
+        worth += result.covariance(0, 0) * result.renewal_s;
+        ++white;
+      }
+      mean_square += mean.squaredNorm() / 2 / runs;
+      ASSERT_GT(white, queries / 2);
+      expected += worth / white / (to - from) / runs;
+    }
+    // Four standard deviations of a mean of squares, and the ends, a hundredth; the covariance holds
+    // curvature besides, which noise feigns.
+    const double tolerance = 4 * std::sqrt(2.0 / (2 * runs)) + 0.01;
+    EXPECT_NEAR(mean_square / (sigma * sigma / rate_hz / ((kSamples - 21) / rate_hz)), 1,
+                tolerance);
+    EXPECT_LT(mean_square, (1 + tolerance) * expected);
+    EXPECT_GT(mean_square, (1 - tolerance - 0.2) * expected);
+  }
+}
+
+TEST(TelemetryInterpolation, TwoSamplesAreWorthOneAtASampleAndTwoBetween) {
+  TelemetryNoise noise;
+  noise.period_sigma_s = 0;
+  noise.acceleration_sigma = 0;
+  TelemetryBuffer<8> buffer(noise);
+  ASSERT_EQ(buffer.push({1, 0, 0, 0}), PushStatus::kStored);
+  ASSERT_EQ(buffer.push({1.04, 0, 0.001, 0.002}), PushStatus::kStored);
+  InterpolatedPanTilt result;
+  ASSERT_EQ(buffer.query(1.02, 0, &result), QueryStatus::kOk);
+  EXPECT_EQ(result.samples, 2);
+  EXPECT_NEAR(result.renewal_s, 0.08, 1e-9);
+  ASSERT_EQ(buffer.query(1.04, 0, &result), QueryStatus::kOk);
+  EXPECT_NEAR(result.renewal_s, 0.04, 1e-9);
+}
+
+TEST(TelemetryInterpolation, WhatClockAndAccelerationDoStaysAlikeForLong) {
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = 1e-6;
+  noise.acceleration_sigma = 10;
+  TelemetryBuffer<8> buffer(noise);
+  ASSERT_EQ(buffer.push({1, 0, 0, 0}), PushStatus::kStored);
+  ASSERT_EQ(buffer.push({1.04, 0, 0.001, 0.002}), PushStatus::kStored);
+  InterpolatedPanTilt result;
+  ASSERT_EQ(buffer.query(1.1, 0, &result), QueryStatus::kExtrapolated);
+  EXPECT_NEAR(result.renewal_s, 1, 0.01);
+  noise.acceleration_sigma = 0;
+  TelemetryBuffer<8> late(noise);
+  ASSERT_EQ(late.push({1, 0, 0, 0}), PushStatus::kStored);
+  ASSERT_EQ(late.push({1.04, 0, 0.1, 0.2}), PushStatus::kStored);
+  ASSERT_EQ(late.query(1.02, 1e-2, &result), QueryStatus::kOk);
+  EXPECT_NEAR(result.renewal_s, 1, 0.01);
+}
+
+}  // namespace
+}  // namespace alidade

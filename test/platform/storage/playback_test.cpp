@@ -1,0 +1,49 @@
+#include "platform/storage/playback.h"
+
+#include <gtest/gtest.h>
+
+#include <thread>
+
+#include "test/support/temporary_directory.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kNever_s = 1e6;
+
+TEST(Playback, LetsEverythingOutAtOnceAtFullSpeed) {
+  Playback playback("", false);
+  EXPECT_EQ(playback.wait_until_due(0, 0), ReadStatus::kOk);
+  EXPECT_EQ(playback.wait_until_due(kNever_s, 0), ReadStatus::kOk);
+}
+
+TEST(Playback, HoldsAnItemBackUntilItIsDue) {
+  const TemporaryDirectory directory;
+  directory.write("frames.csv", "frame,receive_time_s\n0,100\n1,1000100\n");
+  Playback playback(directory.path(), true);
+  EXPECT_EQ(playback.wait_until_due(100, 0), ReadStatus::kOk);
+  EXPECT_EQ(playback.wait_until_due(100.05, kNever_s), ReadStatus::kOk);
+  EXPECT_EQ(playback.wait_until_due(100 + kNever_s, 0.01), ReadStatus::kTimeout);
+}
+
+TEST(Playback, CountsFromTheFirstStampOfFramesAndTelemetry) {
+  const TemporaryDirectory directory;
+  directory.write("frames.csv", "frame,receive_time_s\n0,1000100\n");
+  directory.write("telemetry.csv", "receive_time_s,pan_rad,tilt_rad\n100,0,0\n");
+  Playback playback(directory.path(), true);
+  EXPECT_EQ(playback.wait_until_due(100 + kNever_s, 0), ReadStatus::kTimeout);
+  EXPECT_EQ(playback.wait_until_due(100, 0), ReadStatus::kOk);
+}
+
+TEST(Playback, EndsAWaitWhenItIsStopped) {
+  const TemporaryDirectory directory;
+  directory.write("frames.csv", "frame,receive_time_s\n0,100\n");
+  Playback playback(directory.path(), true);
+  std::thread stopper([&playback] { playback.stop(); });
+  EXPECT_EQ(playback.wait_until_due(100 + kNever_s, kNever_s), ReadStatus::kStopped);
+  stopper.join();
+  EXPECT_TRUE(playback.stopped());
+}
+
+}  // namespace
+}  // namespace alidade
