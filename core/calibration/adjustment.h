@@ -1,132 +1,29 @@
 #pragma once
-// Bundle adjustment of one calibration: Levenberg-Marquardt on exact Jacobians, landmarks
-// eliminated first. It minimises, over the parameters, the trajectory and the landmarks,
-//   sum rho(|A^-1 (u - pi(R(p(t + v l))^T d_b))|^2 / sigma_px^2)         one observation (u, v)
-// + sum rho(|wrap(measured - scale p(t'))|^2 / sigma_rad^2)              one telemetry sample
-// + priors,        t' = t_telemetry - shift + drift (t_telemetry - reference).
-// A is the row-time effect of (Oth 18 to 21): A^-1 e is the Newton step from the observed row
-// (PTCEE 42) to the row at which the landmark is seen, so the residual is u minus the full
-// rolling-shutter projection, with white noise of sigma_px. Derivatives hold A fixed, at the observed row: the
-// noise of v then shifts the line delay by some hundredths of its sigma (bounded in ceres_adjustment_test).
-// Parameters are scaled so that every lens is equally easy: log f, log alpha, k (R / f)^2 (R: half the
-// image's diagonal, px), read-out time l h; changes are local (direction.h for axes and landmarks).
-// The normal equations are formed here and not by Ceres, against which the tests hold them: Ceres takes three
+// Bundle adjustment of one calibration: Levenberg-Marquardt on the exact Jacobians of linearisation.h, landmarks
+// eliminated first.
+// The normal equations are solved here and not by Ceres, against which the tests hold them: Ceres takes three
 // times as long for the same minimum (adjustment_benchmark), and what knots, noise and covariance need of the
 // reduced normal matrix falls out. Landmarks tie distant times together on a path that returns, so the matrix left
 // over the control points is dense.
-// Angles in rad, times in s on the image clock. Allocates; one object for each thread.
+// Allocates; one object for each thread.
 
 #include <Eigen/Core>
 #include <array>
-#include <cstddef>
-#include <limits>
 #include <vector>
 
-#include "core/calibration/trajectory_spline.h"
-#include "core/model/calibration.h"
+#include "core/calibration/linearisation.h"
 
 namespace alidade::internal {
-
-// Local parameters: those of Parameter, scaled as above, and the drift between the two clocks.
-inline constexpr int kDrift = kParameterCount;
-inline constexpr int kGlobalCount = kParameterCount + 1;
-// The first ones act on observations.
-inline constexpr int kCameraCount = 8;
-
-using GlobalVector = Eigen::Matrix<double, kGlobalCount, 1>;
-using GlobalMatrix = Eigen::Matrix<double, kGlobalCount, kGlobalCount>;
-
-struct AdjustmentObservation {
-  int landmark = 0;
-  int frame = 0;
-  Vector2<double> u;
-  double sigma = 1;  // px
-  bool used = true;  // false: an outlier
-};
-
-struct AdjustmentTelemetry {
-  double time_s = 0;  // on the telemetry clock
-  Vector2<double> measured;
-  Vector2<double> sigma = Vector2<double>::Ones();  // rad; infinite: nothing is said of this axis
-  // Whether the residual of each axis tells how large the noise is: a rounding error does not.
-  std::array<bool, 2> is_noise = {true, true};
-  bool used = true;
-};
-
-struct AdjustmentData {
-  std::vector<double> frame_time_s;
-  std::vector<AdjustmentObservation> observations;  // sorted by landmark, then frame
-  std::vector<AdjustmentTelemetry> telemetry;       // sorted by time
-  double reference_s = 0;                           // where the drift has no effect
-};
-
-struct AdjustmentState {
-  Camera<double> camera;  // radial_distortion is unused here, see below
-  double distortion = 0;  // k (R / f)^2
-  double readout_s = 0;   // line delay times height
-  Mechanics<double> mechanics;
-  double shift_s = 0;
-  double drift = 0;
-  TrajectorySpline trajectory;
-  // In the frame of the camera when the mount stands at the anchor: an axis that turns takes them along,
-  // else far from zero pan every change of an axis would be a large change of all landmarks.
-  PanTilt<double> anchor;
-  std::vector<Vector3<double>> landmarks;
-
-  [[nodiscard]] double half_diagonal() const;
-  [[nodiscard]] Camera<double> physical_camera() const;
-  [[nodiscard]] double line_delay() const { return readout_s / camera.height; }
-};
-
-// A Gaussian prior on each local parameter: information 0 = none. For the axes, in the tangent basis of
-// the prior's own axes.
-struct AdjustmentPriors {
-  AdjustmentState mean;  // its trajectory and landmarks are unused
-  GlobalVector information = GlobalVector::Zero();
-};
-
-// Cauchy: rho(x) = c^2 log(1 + x / c^2). Infinite scales give least squares.
-struct LossScales {
-  double pixel = std::numeric_limits<double>::infinity();
-  double telemetry = std::numeric_limits<double>::infinity();
-};
-
-// What the current state makes of one observation or sample: e and its derivative by (pan, tilt), both
-// in units of sigma and times the square root of the robust weight.
-struct LinearisedResidual {
-  double time_s = 0;
-  int segment = 0;
-  bool valid = false;
-  Vector2<double> error;
-  Matrix2<double> J_angle;
-};
-
-struct Linearisation {
-  double cost = 0;    // sum of rho
-  bool valid = true;  // every used observation has a projection
-  std::vector<LinearisedResidual> observations;
-  std::vector<LinearisedResidual> telemetry;
-
-  // Normal equations H x = g: control points (two rows each), then the parameters. Lower triangle.
-  Eigen::MatrixXd H;
-  Eigen::MatrixXd H_telemetry;  // the telemetry's part of H
-  Eigen::VectorXd g;
-  // Landmarks: H_ll, g_l, and rows of H_cl for the touched control points and the camera.
-  std::vector<Matrix2<double>> H_landmark;
-  std::vector<Vector2<double>> g_landmark;
-  std::vector<std::size_t> touched_begin;  // into the two below; one more than landmarks
-  std::vector<int> touched;
-  std::vector<Matrix2<double>> H_touched;
-  std::vector<Eigen::Matrix<double, kCameraCount, 2>> H_camera;
-};
 
 class Adjustment {
  public:
   Adjustment(const AdjustmentData& data, const AdjustmentPriors& priors,
              const std::array<bool, kGlobalCount>& fixed)
-      : data_(data), priors_(priors), fixed_(fixed) {}
+      : lineariser_(data, priors, fixed), fixed_(fixed) {}
 
-  void linearise(const AdjustmentState& state, const LossScales& loss, Linearisation* out);
+  void linearise(const AdjustmentState& state, const LossScales& loss, Linearisation* out) {
+    lineariser_.linearise(state, loss, out);
+  }
 
   // H x = g with the landmarks eliminated and every diagonal element of H multiplied by 1 + damping. False if
   // H is not positive definite.
@@ -147,14 +44,9 @@ class Adjustment {
   [[nodiscard]] int steps_taken() const { return steps_taken_; }
 
  private:
-  void add_observations(const AdjustmentState& state, const LossScales& loss, Linearisation* out);
-  void add_telemetry(const AdjustmentState& state, const LossScales& loss, Linearisation* out);
-  void add_priors(const AdjustmentState& state, Linearisation* out) const;
-  void fix_parameters(Linearisation* out) const;
   [[nodiscard]] bool reduce(const Linearisation& linearisation, double damping);
 
-  const AdjustmentData& data_;
-  AdjustmentPriors priors_;
+  Lineariser lineariser_;
   std::array<bool, kGlobalCount> fixed_;
   int steps_taken_ = 0;
   // What served last: a few steps at a time must get as far as many at once.
@@ -162,11 +54,6 @@ class Adjustment {
 
   Eigen::MatrixXd reduced_;
   Eigen::VectorXd reduced_g_;
-  std::vector<Matrix2<double>> touched_buffer_;
-  std::vector<char> is_touched_;
 };
-
-void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_landmark,
-                AdjustmentState* state);
 
 }  // namespace alidade::internal

@@ -10,7 +10,7 @@
 
 #include <vector>
 
-#include "core/calibration/adjustment.h"
+#include "core/calibration/linearisation.h"
 
 namespace alidade::internal {
 

@@ -9,9 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "core/calibration/adjustment.h"
-#include "core/calibration/calibrate.h"
-#include "core/calibration/initialization.h"
+#include "core/calibration/calibration_types.h"
+#include "core/calibration/motion_match.h"
 
 namespace alidade::internal {
 

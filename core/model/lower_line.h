@@ -2,7 +2,7 @@
 // The line below a cloud of points whose errors are never negative.
 //
 // Points (x_i, y_i), x strictly increasing, obey y_i = h + b x_i + e_i with e_i >= 0 and a density
-// near zero of 1/scale (exponential, or anything that looks so close to its floor). With b uniform
+// near zero of 1/scale (exponential, or anything that looks so close to its minimum). With b uniform
 // in [slope_min, slope_max] and a flat prior on h the posterior is
 //   p(h, b) ~ exp(n (h + b mean(x)) / scale)   where   h + b x_i <= y_i for all i,
 // whose mode is the linear programme "highest line below all points". Only the lower convex hull
@@ -153,7 +153,7 @@ inline LineEstimate fit_lower_line(const double* x, const double* y, std::size_t
 }
 
 // Scale of the delays from their residuals above the lowest point, seen along a fitted line: a low
-// quantile, since what counts is the density next to the floor (heavy tails do not), but not of
+// quantile, since what counts is the density next to the minimum (heavy tails do not), but not of
 // fewer than a handful of points. `least` keeps it positive; `guess` weighs as much as two points.
 // residual: room for n values.
 inline double delay_scale(const double* x, const double* y, std::size_t n, const LineEstimate& line,

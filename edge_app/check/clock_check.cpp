@@ -59,7 +59,7 @@ ClockReport check_clock(const std::vector<ClockedStamp>& stamps, const ClockFilt
     report.period_s = report.kind == StampKind::kSequence ? filter.period_s() : 0;
     report.counters = filter.counters();
     report.counters.restarts = std::max<std::int64_t>(0, report.counters.restarts - reconnections);
-    report.floor_shift_s = filter.delay_shift_s();
+    report.delay_shift_s = filter.delay_shift_s();
     // The last line knows more than the answers that came while it was found.
     std::vector<double> lateness;
     for (std::size_t i = line_since; i < stamps.size(); ++i) {
@@ -108,7 +108,7 @@ void judge_clock(const ClockReport& clock, const std::string& what, Findings* fi
     add_advice(findings,
                fmt::format("{}: the least delay changed by {:.1f} ms; that is flagged and not "
                            "followed: look for a changed route or a buffer that filled up",
-                           what, 1e3 * clock.floor_shift_s));
+                           what, 1e3 * clock.delay_shift_s));
   }
 }
 
@@ -122,7 +122,7 @@ std::string describe(const ClockReport& clock) {
   text += clock.counters.delay_steps == 0
               ? ", no shift"
               : fmt::format(", {} shifts, {:+.1f} ms in all", clock.counters.delay_steps,
-                            1e3 * clock.floor_shift_s);
+                            1e3 * clock.delay_shift_s);
   if (clock.counters.restarts > 0) text += fmt::format(", {} restarts", clock.counters.restarts);
   if (clock.counters.rejected > 0) text += fmt::format(", {} rejected", clock.counters.rejected);
   return text;

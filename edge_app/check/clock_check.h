@@ -28,7 +28,7 @@ struct ClockReport {
   double period_s = 0;     // of a count, by the filter
   double sigma_s = 0;      // of the line at the last item
   ClockCounters counters;  // restarts at a reconnection not included
-  double floor_shift_s = 0;
+  double delay_shift_s = 0;
   std::optional<Spread> lateness_s;
   // The same rate without the filter's prior, with its standard deviation: what a broken clock shows.
   std::optional<double> raw_rate_error;
@@ -48,7 +48,7 @@ struct ClockedStamp {
                                       const ClockFilterOptions& options,
                                       std::vector<double>* time_s = nullptr);
 
-// `what`: "video URL". A clock that cannot be one, or that jumps, is a problem; a floor that shifts, advice.
+// `what`: "video URL". A clock that cannot be one, or that jumps, is a problem; a minimum delay that shifts, advice.
 void judge_clock(const ClockReport& clock, const std::string& what, Findings* findings);
 
 [[nodiscard]] std::string describe(const ClockReport& clock);

@@ -1,37 +1,27 @@
 #pragma once
-// Whether pan and tilt turn the picture the way they say: signs, focal length and clock offset, roughly, from the
+// Whether pan and tilt turn the image the way they say: signs, focal length and clock offset, roughly, from the
 // image's motion against the telemetry's.
 //
-// Over about 0.3 s the image's centre moves by (-f cos(tilt) dpan, f dtilt): the scene to the left when the camera turns
-// right, down when it turns up. With m the motions seen in the video, px, p those predicted with f = 1 at a clock offset d:
-//   s_a(d)   = sum(m_a p_a) / sum(p_a^2)              scale of axis a: f, or -f where its sign is wrong
-//   c(d)     = sum over axes of sum(m_a p_a)^2 / sum(p_a^2), over sum(m^2)    share of the motion that is explained
-// d is where c is largest, with each combination of signs by itself. A sign is told only with evidence:
+// The clock offset is where most of the image's motion is explained (motion_fit.h), with each combination of signs by
+// itself. A sign is told only with evidence:
 //   the axis moved the image by 2 px rms over those 0.3 s (the tracker errs by a tenth of that),
 //   in eight such times or more, of which
 //   at least 80 % is explained with this sign, and no offset searched explains 4/5 of that with the other:
 //   an even swing fits half a period later as well with the sign reversed, and tells nothing.
-// Image motion that follows the other axis better than its own is a picture that is turned by a quarter.
-// A picture that moves by a quarter of its width while the head reports one angle, or stands still while the head reports
+// Image motion that follows the other axis better than its own is an image that is turned by a quarter.
+// An image that moves by a quarter of its width while the head reports one angle, or stands still while the head reports
 // as much, is not of this head, or the head does not measure.
-// Nominal axes and small distortion at the centre: good to some percent. Radians, seconds, px. Pure; allocates.
+// Good to some percent. Radians, seconds, px. Pure; allocates.
 
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "core/model/linear_algebra.h"
 #include "edge_app/check/finding.h"
+#include "edge_app/check/motion_fit.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 
 namespace alidade {
-
-// The image's motion between two frames that follow each other.
-struct TimedShift {
-  double from_s = 0;  // image clock
-  double to_s = 0;
-  Vector2<double> shift = Vector2<double>::Zero();  // px
-};
 
 struct MotionNeeds {
   std::string source;          // of pan and tilt

@@ -16,7 +16,7 @@ double median_of(const std::vector<double>& values) {
 }
 
 // A picture in which 98 % of the pixels lie within so few grey levels shows nothing: corners need
-// contrasts of 10 (OeOptions::corner_threshold).
+// contrasts of 10 (LandmarkMakerOptions::corner_threshold).
 constexpr double kNothing = 10;
 
 void judge(PictureReport* report, const PictureNeeds& needs) {

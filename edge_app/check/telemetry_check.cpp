@@ -6,121 +6,17 @@
 #include <cmath>
 
 #include "core/model/angle.h"
-#include "core/realtime/telemetry/telemetry_buffer.h"
+#include "edge_app/check/telemetry_measures.h"
 #include "edge_app/pipeline/stale_repeats.h"
 
 namespace alidade {
 namespace {
 
 constexpr double kDegrees = 180 / kPi;
-constexpr std::size_t kLeastChanges = 8;  // below it a median is one of accidents
 
 bool is_finite(const PanTiltSample& sample) {
   return std::isfinite(sample.pan_rad) && std::isfinite(sample.tilt_rad) &&
          std::isfinite(sample.earliest_time_s) && std::isfinite(sample.latest_time_s);
-}
-
-AxisReport measure_axis(const std::vector<PanTiltSample>& samples, double PanTiltSample::*angle) {
-  AxisReport axis;
-  std::vector<double> angles;
-  double unwrapped = samples.front().*angle;
-  axis.least = axis.largest = unwrapped;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    angles.push_back(samples[i].*angle);
-    if (i > 0) unwrapped += wrap_angle(samples[i].*angle - samples[i - 1].*angle);
-    axis.least = std::min(axis.least, unwrapped);
-    axis.largest = std::max(axis.largest, unwrapped);
-  }
-  axis.last = samples.back().*angle;
-  axis.quantum = angle_quantum(angles);
-  return axis;
-}
-
-// The head goes one way through the value of a run, by steps that rounding does not explain.
-bool passes(double before, double at, double after, double quantum) {
-  constexpr double kBeyondRounding = 2;  // quanta
-  constexpr double kSmallest = 2e-7;     // rad; steps of a rounding in a file are none
-  const double in = wrap_angle(at - before);
-  const double out = wrap_angle(after - at);
-  return in * out > 0 &&
-         std::min(std::abs(in), std::abs(out)) > std::max(kBeyondRounding * quantum, kSmallest);
-}
-
-// Whether an axis goes one way about run i: of all its ways over four runs to both sides, most lead on. Noise goes
-// to and fro.
-bool leads_on(const std::vector<PanTiltSample>& samples, const std::vector<EqualRun>& runs,
-              std::size_t i, double PanTiltSample::*angle) {
-  constexpr std::size_t kReach = 4;
-  constexpr double kMost =
-      0.7;  // of 8 ways by chance: never; of a turn that reverses within them: less
-  const std::size_t first = i - std::min(i, kReach);
-  const std::size_t last = std::min(i + kReach, runs.size() - 1);
-  if (last - first < kReach) return false;
-  double led = 0;
-  double gone = 0;
-  for (std::size_t run = first; run < last; ++run) {
-    const double way =
-        wrap_angle(samples[runs[run + 1].begin].*angle - samples[runs[run].begin].*angle);
-    led += way;
-    gone += std::abs(way);
-  }
-  return std::abs(led) >= kMost * gone;
-}
-
-void measure_turning(const std::vector<PanTiltSample>& samples, const std::vector<bool>& stale,
-                     TelemetryReport* report) {
-  const std::vector<EqualRun> runs = equal_runs(samples);
-  std::vector<double> periods;
-  std::vector<double> pan_rates;
-  std::vector<double> tilt_rates;
-  for (std::size_t i = 1; i + 1 < runs.size(); ++i) {
-    const PanTiltSample& before = samples[runs[i - 1].begin];
-    const PanTiltSample& at = samples[runs[i].begin];
-    const PanTiltSample& after = samples[runs[i + 1].begin];
-    const bool repeats = runs[i].end - runs[i].begin > 1;
-    if (at.restarted || after.restarted || (repeats && !stale[runs[i].begin + 1])) continue;
-    const bool pans = passes(before.pan_rad, at.pan_rad, after.pan_rad, report->pan.quantum) &&
-                      leads_on(samples, runs, i, &PanTiltSample::pan_rad);
-    const bool tilts = passes(before.tilt_rad, at.tilt_rad, after.tilt_rad, report->tilt.quantum) &&
-                       leads_on(samples, runs, i, &PanTiltSample::tilt_rad);
-    if (!pans && !tilts) continue;
-    const double period_s = middle_time_s(after) - middle_time_s(at);
-    if (!(period_s > 0)) continue;
-    periods.push_back(period_s);
-    pan_rates.push_back(std::abs(wrap_angle(after.pan_rad - at.pan_rad)) / period_s);
-    tilt_rates.push_back(std::abs(wrap_angle(after.tilt_rad - at.tilt_rad)) / period_s);
-    report->turning += runs[i].end - runs[i].begin;
-    if (!repeats) continue;
-    report->stale += runs[i].end - runs[i].begin - 1;
-    const double held_s = middle_time_s(samples[runs[i].end - 1]) - middle_time_s(at);
-    report->longest_stale_s = std::max(report->longest_stale_s, held_s);
-    report->longest_change_s = std::max(report->longest_change_s, period_s);
-  }
-  if (periods.size() < kLeastChanges) return;
-  report->change_hz = 1 / spread_of(periods)->median;
-  report->pan.top_rate = spread_of(pan_rates)->most;
-  report->tilt.top_rate = spread_of(tilt_rates)->most;
-}
-
-std::optional<Spread> ages_of(const std::vector<PanTiltSample>& samples,
-                              const std::vector<double>& delivered_s, const TelemetryNeeds& needs) {
-  TelemetryLimits limits;
-  limits.max_gap_s = needs.max_gap_s;
-  limits.max_extrapolation_s = needs.max_extrapolation_s;
-  limits.max_repeat_s = needs.max_repeat_s;
-  TelemetryBuffer<16> buffer(TelemetryNoise(), limits);
-  std::vector<double> ages;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    if (samples[i].restarted) buffer.clear();
-    if (const auto newest_s = buffer.newest_time()) ages.push_back(delivered_s[i] - *newest_s);
-    TelemetrySample sample;
-    sample.time_s = (samples[i].earliest_time_s + samples[i].latest_time_s) / 2;
-    sample.pan = samples[i].pan_rad;
-    sample.tilt = samples[i].tilt_rad;
-    // What it refuses is no angle known.
-    static_cast<void>(buffer.push(sample));
-  }
-  return spread_of(ages);
 }
 
 // PT mode interpolates between samples and goes on beyond the newest, both for so long only.
@@ -173,28 +69,29 @@ void judge_repeats(TelemetryReport* report, const TelemetryNeeds& needs) {
 
 // Rounding to q has a standard deviation of q / sqrt(12): where that exceeds the noise that run assumes, its sigmas
 // are too small unless it is told of q.
-void judge_quantum(TelemetryReport* report, const TelemetryNeeds& needs) {
-  const double quantum = std::max(report->pan.quantum, report->tilt.quantum);
+void judge_resolution(TelemetryReport* report, const TelemetryNeeds& needs) {
+  const double resolution = std::max(report->pan.resolution, report->tilt.resolution);
   const double limit = std::sqrt(12.0) * needs.angle_sigma_rad;
-  if (quantum > limit && needs.quantum_rad < quantum / 2) {
+  if (resolution > limit && needs.resolution_rad < resolution / 2) {
     add_advice(
         &report->findings,
         fmt::format("pan/tilt {}: angles come in steps of {:.4f} deg, which is more than the "
                     "assumed noise; set pan_tilt.angle_quantum_rad: {:.3g}",
-                    needs.source, kDegrees * quantum, quantum));
-  } else if (quantum > 0 && needs.quantum_rad > limit && needs.quantum_rad > 2 * quantum) {
+                    needs.source, kDegrees * resolution, resolution));
+  } else if (resolution > 0 && needs.resolution_rad > limit &&
+             needs.resolution_rad > 2 * resolution) {
     add_advice(
         &report->findings,
         fmt::format("pan/tilt {}: angles come in steps of {:.4f} deg, finer than the configured "
                     "pan_tilt.angle_quantum_rad: {:.3g}; set it to {:.3g}",
-                    needs.source, kDegrees * quantum, needs.quantum_rad, quantum));
+                    needs.source, kDegrees * resolution, needs.resolution_rad, resolution));
   }
 }
 
 // OE mode looks for landmarks within three sigmas of the prediction and, where that fails, within 96 px (oe_mode.cpp).
 // Uniform within its bounds, a sample's time has a sigma of width / sqrt(12).
 void judge_bounds(TelemetryReport* report, const TelemetryNeeds& needs) {
-  constexpr double kFarthest = 96;  // px
+  constexpr double kFarthest_px = 96;
   if (report->negative_bounds > 0) {
     add_problem(
         &report->findings,
@@ -206,14 +103,14 @@ void judge_bounds(TelemetryReport* report, const TelemetryNeeds& needs) {
   if (!report->bounds_s || !needs.landmarks) return;
   const double error_px =
       3 * report->bounds_s->median / std::sqrt(12.0) * rate * needs.focal_length_px;
-  if (error_px <= kFarthest) return;
+  if (error_px <= kFarthest_px) return;
   add_advice(
       &report->findings,
       fmt::format("pan/tilt {}: an angle's time is known to {:.0f} ms; at {:.1f} deg/s, as the "
                   "head turned, that is up to {:.0f} px, beyond the {:.0f} px in which OE mode "
                   "looks for landmarks: shorten the way to the head, or turn more slowly",
                   needs.source, 1e3 * report->bounds_s->median, kDegrees * rate, error_px,
-                  kFarthest));
+                  kFarthest_px));
 }
 
 void judge_zoom(TelemetryReport* report, const TelemetryNeeds& needs) {
@@ -243,8 +140,8 @@ std::string degrees(const AxisReport& axis, const char* name) {
 }
 
 std::string step(const AxisReport& axis, const char* name) {
-  return axis.quantum > 0 ? fmt::format("{} {:.5f} deg", name, kDegrees * axis.quantum)
-                          : fmt::format("{} none seen", name);
+  return axis.resolution > 0 ? fmt::format("{} {:.5f} deg", name, kDegrees * axis.resolution)
+                             : fmt::format("{} none seen", name);
 }
 
 }  // namespace
@@ -300,7 +197,7 @@ TelemetryReport check_telemetry(const std::vector<PanTiltSample>& samples,
   }
   judge_rate(&report, needs);
   judge_repeats(&report, needs);
-  judge_quantum(&report, needs);
+  judge_resolution(&report, needs);
   judge_bounds(&report, needs);
   judge_zoom(&report, needs);
   judge_clock(report.clock, "pan/tilt " + needs.source, &report.findings);

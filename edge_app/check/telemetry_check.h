@@ -5,9 +5,9 @@
 //   age       how far back the newest angle known lies at worst, just before the next sample is delivered; while
 //             the head rests, a repeat is known to be true only up to max_repeat_s before (TelemetryBuffer)
 //   changes   how often the device really measures: the median time between two new values while the head turns.
-//             Known where the steps are larger than rounding (2 quanta on an axis); a head that creeps or rests does not
+//             Known where the steps are larger than rounding (2 steps on an axis); a head that creeps or rests does not
 //             show it.
-//   quantum   of each axis (stale_repeats.h)
+//   resolution  of each axis (stale_repeats.h)
 //   bounds    latest - earliest of each sample: within so much its time is known
 //   stale     repeats of an old angle while the head turned (stale_repeats.h), as a share of all samples taken while
 //             it turned; how long an angle was repeated, and when the next one came, bound what max_repeat_s has to be
@@ -32,7 +32,7 @@ struct TelemetryNeeds {
   double max_gap_s = 0.5;             // TelemetryLimits
   double max_extrapolation_s = 0.25;  // TelemetryLimits
   double angle_sigma_rad = 1e-4;      // TelemetryNoise, as run will take them
-  double quantum_rad = 0;
+  double resolution_rad = 0;
   double focal_length_px = 0;      // 0: unknown
   double clock_offset_s = 0;       // images are looked up so much later
   std::optional<double> zoom;      // that the calibration is for
@@ -45,8 +45,8 @@ struct AxisReport {
   double last = 0;   // rad
   double least = 0;  // rad, turns counted
   double largest = 0;
-  double quantum = 0;   // rad; 0: none found
-  double top_rate = 0;  // rad/s: 95 % of the time it turned no faster
+  double resolution = 0;  // rad; 0: none found
+  double top_rate = 0;    // rad/s: 95 % of the time it turned no faster
 };
 
 struct TelemetryReport {

@@ -38,7 +38,7 @@ std::optional<std::int64_t> lost_frames(const std::vector<CheckedFrame>& frames,
                                         const std::vector<double>& intervals,
                                         const std::optional<Spread>& interval) {
   constexpr double kMostLost = 1e6;
-  constexpr double kJump = 1;  // s; a clock that steps by more loses no frames (ClockFilterOptions)
+  constexpr double kJump_s = 1;  // a clock that steps by more loses no frames (ClockFilterOptions)
   const bool grid = interval && on_grid(intervals, interval->median);
   std::int64_t lost = 0;
   bool told = false;
@@ -52,7 +52,8 @@ std::optional<std::int64_t> lost_frames(const std::vector<CheckedFrame>& frames,
     } else if (grid && now.sender_time_s && before.sender_time_s) {
       const double sender_s = *now.sender_time_s - *before.sender_time_s;
       const double received_s = now.receive_time_s - before.receive_time_s;
-      step = std::abs(sender_s - received_s) < kJump ? std::round(sender_s / interval->median) : 1;
+      step =
+          std::abs(sender_s - received_s) < kJump_s ? std::round(sender_s / interval->median) : 1;
     } else {
       continue;
     }
@@ -117,9 +118,9 @@ void judge_decoding(VideoReport* report, const VideoNeeds& needs) {
 // Without a clock the filter cannot tell late from slow: a frame's time is wrong by what its arrival scatters. OE mode
 // corrects that where landmarks hold; PT mode's angle is wrong by rate times scatter.
 void judge_arrival_only(VideoReport* report, const VideoNeeds& needs) {
-  constexpr double kLeastScatter = 1e-3;  // s: what a clock's line leaves over on a bad day
+  constexpr double kLeastScatter_s = 1e-3;  // what a clock's line leaves over on a bad day
   if (report->clock.kind != StampKind::kArrival || !report->interval_s ||
-      report->interval_s->deviation < kLeastScatter) {
+      report->interval_s->deviation < kLeastScatter_s) {
     return;
   }
   add_advice(

@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
@@ -12,23 +11,21 @@
 #include <filesystem>
 #include <system_error>
 
-#include "core/calibration/atomic_file.h"
-#include "core/calibration/calibration_file.h"
 #include "edge_app/commands/calibration_input.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
-#include "edge_app/commands/video_tracks.h"
+#include "edge_app/commands/visible_calibration.h"
 #include "edge_app/output/calibration_report.h"
 #include "edge_app/output/calibration_summary.h"
-#include "edge_app/pipeline/calibration_streams.h"
+#include "edge_app/storage/calibration_file.h"
 #include "edge_app/storage/map_file.h"
+#include "platform/storage/recording.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {
 
 namespace fs = std::filesystem;
-
-constexpr double kShareOfLooking = 0.9;  // of the time that tracks and adjustment take
 
 struct CalibrateOptions {
   std::string recording;  // its directory
@@ -91,111 +88,9 @@ CalibrationJob load_job(const std::string& recording, const CalibrateOptions& op
   return job;
 }
 
-// What is done on a terminal; the first SIGINT or SIGTERM cancels at the next step, the second ends the process
-// as usual.
-class VisibleProgress {
- public:
-  VisibleProgress(const std::string& name, StopSignals* signals) : name_(name), signals_(signals) {}
-  VisibleProgress(const VisibleProgress&) = delete;
-  VisibleProgress& operator=(const VisibleProgress&) = delete;
-  ~VisibleProgress() {
-    if (show_) fmt::print(stderr, "\r\033[K");
-  }
-
-  // What show() is told from now on is the part of the whole from `begin` to `end`.
-  void set_part(double begin, double end) {
-    begin_ = begin;
-    end_ = end;
-  }
-  // False: cancelled.
-  bool show(double done, const char* what) {
-    const double percent = 100 * (begin_ + done * (end_ - begin_));
-    if (show_) fmt::print(stderr, "\r\033[K{}: {:3.0f} % {}", name_, percent, what);
-    return signals_->wait(-1, 0) != StopSignals::Event::kSignal;
-  }
-  [[nodiscard]] CommandError cancelled() const {
-    return {kExitFailed, name_ + ": calibration interrupted; nothing stored"};
-  }
-
- private:
-  const std::string& name_;
-  StopSignals* signals_;
-  bool show_ = is_terminal(STDERR_FILENO);
-  double begin_ = 0;
-  double end_ = 1;
-};
-
-// `begin` of the part is done already.
-CalibrationResult calibrate_visibly(CalibrationJob* job, double begin, VisibleProgress* progress) {
-  job->options.progress = [begin, progress](double done, const char* what) {
-    return progress->show(begin + (1 - begin) * done, what);
-  };
-  CalibrationResult result = calibrate(job->input, job->options);
-  if (result.status == CalibrationStatus::kCancelled) throw progress->cancelled();
-  return result;
-}
-
-// Finds tracks, without or with a first estimate, and calibrates with them.
-CalibrationResult calibrate_video(const std::string& recording, const CalibrationResult* estimate,
-                                  CalibrationJob* job, std::vector<std::string>* remarks,
-                                  VisibleProgress* progress) {
-  const VideoProgress look = [progress, estimate](double done) {
-    const char* what = estimate == nullptr ? "following points in the video"
-                                           : "following points again, with the estimated camera";
-    // Looking at the video takes nearly all of the time.
-    if (!progress->show(kShareOfLooking * done, what)) throw progress->cancelled();
-  };
-  VideoTracks tracks = estimate == nullptr ? track_video(recording, job->input, look)
-                                           : track_video(recording, job->input, *estimate, look);
-  *remarks = std::move(tracks.remarks);
-  job->input.observations = choose_tracks(tracks.observations);
-  return calibrate_visibly(job, kShareOfLooking, progress);
-}
-
-CalibrationResult calibrate_job(const std::string& recording, int passes, CalibrationJob* job,
-                                StopSignals* signals) {
-  VisibleProgress progress(recording, signals);
-  if (!job->tracks_from_video) return calibrate_visibly(job, 0, &progress);
-  std::vector<std::string> remarks;
-  progress.set_part(0, passes > 1 ? 0.5 : 1);
-  CalibrationResult first = calibrate_video(recording, nullptr, job, &remarks, &progress);
-  if (job->input.observations.empty()) {
-    throw CommandError(
-        kExitFailed,
-        fmt::format(
-            "{}: no point of the video could be followed through {} frames; film a far scene "
-            "with texture, lit and in focus, that stays in view for that long",
-            recording, kMinSightings));
-  }
-  const bool usable = first.ok() || first.status == CalibrationStatus::kWeak;
-  if (passes > 1 && usable) {
-    const std::vector<CalibrationObservation> first_tracks = job->input.observations;
-    progress.set_part(0.5, 1);
-    CalibrationResult second = calibrate_video(recording, &first, job, &remarks, &progress);
-    if (second.ok() || !first.ok()) {
-      first = std::move(second);
-    } else {
-      job->input.observations = first_tracks;
-      remarks.push_back(fmt::format(
-          "the second look at the video led to no calibration ({}: {}); this is the first one's",
-          to_string(second.status), second.message));
-    }
-  }
-  job->remarks.insert(job->remarks.end(), remarks.begin(), remarks.end());
-  return first;
-}
-
-MapState map_visibly(const std::string& recording, const CalibrationResult& result,
-                     StopSignals* signals) {
-  VisibleProgress progress(recording, signals);
-  return map_video(recording, result, [&progress](double done) {
-    if (!progress.show(done, "looking at some pictures for the map")) throw progress.cancelled();
-  });
-}
-
 // The format of a recording's tracks.csv.
 std::string tracks_text(const std::vector<CalibrationObservation>& observations) {
-  std::string text = "frame,landmark,u_px,v_px,sigma_px\n";
+  std::string text = tracks_csv_columns() + "\n";
   for (const CalibrationObservation& seen : observations) {
     text += fmt::format("{},{},{:.4f},{:.4f},{:.4f}\n", seen.frame, seen.landmark, seen.u_px,
                         seen.v_px, seen.sigma_px);

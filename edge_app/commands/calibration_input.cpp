@@ -39,7 +39,7 @@ CalibrationJob load_calibration_job(const std::string& directory) {
   const auto require = [](bool ok, const std::string& error) {
     if (!ok) throw CommandError(kExitUsage, error);
   };
-  const auto require_file = [&](const char* name, const char* why) {
+  const auto require_file = [&](const char* name, const std::string& why) {
     require(fs::exists(fs::path(directory) / name),
             fmt::format("{}: no {} in it; {}", directory, name, why));
   };
@@ -53,8 +53,9 @@ CalibrationJob load_calibration_job(const std::string& directory) {
   job.tracks_from_video = !fs::exists(fs::path(directory) / "tracks.csv") && has_video(directory);
   if (!job.tracks_from_video) {
     require_file("tracks.csv",
-                 "a calibration needs keypoint tracks (frame,landmark,u_px,v_px,sigma_px), or the "
-                 "video (video.mkv or frames/) to find them in");
+                 fmt::format("a calibration needs keypoint tracks ({}), or the video (video.mkv or "
+                             "frames/) to find them in",
+                             tracks_csv_columns()));
   }
   job.input.width = info.width;
   job.input.height = info.height;

@@ -1,31 +1,21 @@
 // `alidade check`: is everything that `run` needs there, and does it do what `run` takes for granted? Reads the
-// configuration and the calibration, connects to video and pan/tilt at once, and measures both for some seconds. This file
-// connects, collects and prints; what the samples show is found in check/. A report and advice go to stdout, what is
-// wrong to stderr.
-//
-// Threads: video and pan/tilt are read by one each; pictures are looked at by a third, which takes the latest when it is
-// done with the one before, so that looking never makes a source drop frames. No picture is kept.
+// configuration and the calibration, connects to video and pan/tilt at once, and measures both for some seconds
+// (check_measurement.h). What the samples show is found in check/; this file asks and prints. A report and advice go to
+// stdout, what is wrong to stderr.
 
 #include <fmt/format.h>
-#include <unistd.h>
 
-#include <chrono>
-#include <condition_variable>
 #include <cstdio>
-#include <future>
-#include <mutex>
 #include <optional>
 #include <string>
-#include <thread>
 #include <unordered_map>
 #include <vector>
 
 #include "edge_app/check/motion_check.h"
-#include "edge_app/check/picture_check.h"
 #include "edge_app/check/telemetry_check.h"
 #include "edge_app/check/video_check.h"
+#include "edge_app/commands/check_measurement.h"
 #include "edge_app/commands/command.h"
-#include "platform/system/clock.h"
 
 namespace alidade {
 namespace {
@@ -34,158 +24,6 @@ struct CheckOptions {
   std::string config;
   double duration_s = 10;
 };
-
-// What became of one connection.
-struct Connection {
-  std::string error;  // why nothing came, or no more; empty: none
-  int losses = 0;     // after the first item
-  std::string loss;   // the last one's words
-  std::string name;
-};
-
-// Reads for duration_s from the first item on; the first may take wait_s. Until there is one, an error ends it: that is
-// what the person wants to know. Later losses are counted, and the source connects again.
-template <typename Item, typename Source, typename OnItem>
-Connection collect(Source& source, double wait_s, double duration_s, const OnItem& on_item) {
-  constexpr double kReadTimeout = 0.2;  // s
-  Connection connection;
-  connection.name = source.name();
-  bool any = false;
-  bool lost = false;
-  double end_s = monotonic_now_s() + wait_s;
-  while (monotonic_now_s() < end_s) {
-    Item item;
-    const ReadStatus status = source.read(item, kReadTimeout);
-    if (status == ReadStatus::kEnd || status == ReadStatus::kStopped) break;
-    if (status == ReadStatus::kFailed || (status == ReadStatus::kDisconnected && !any)) {
-      connection.error = source.error();
-      break;
-    }
-    if (status == ReadStatus::kDisconnected) {
-      connection.losses += lost ? 0 : 1;  // what follows are attempts to connect again
-      connection.loss = source.error();
-      lost = true;
-    }
-    if (status != ReadStatus::kOk) continue;
-    if (!any) end_s = monotonic_now_s() + duration_s;
-    any = true;
-    lost = false;
-    on_item(item);
-  }
-  if (!any && connection.error.empty()) {
-    connection.error =
-        fmt::format("{}: connected, but nothing came within {:.0f} s", connection.name, wait_s);
-  }
-  return connection;
-}
-
-// Looks at pictures on a thread of its own.
-class PictureThread {
- public:
-  PictureThread() : thread_([this] { work(); }) {}
-  ~PictureThread() { finish(); }
-  PictureThread(const PictureThread&) = delete;
-  PictureThread& operator=(const PictureThread&) = delete;
-
-  // Takes the place of one that waits.
-  void offer(const Frame& frame) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    restarted_ = restarted_ || frame.stamp.restarted;
-    waiting_ = frame;
-    changed_.notify_one();
-  }
-
-  // Waits until it is done with what it was offered; PictureCheck is then the caller's.
-  const PictureCheck& finish() {
-    {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      over_ = true;
-      changed_.notify_one();
-    }
-    if (thread_.joinable()) thread_.join();
-    return check_;
-  }
-
- private:
-  void work() {
-    while (true) {
-      Frame frame;
-      bool connected = true;
-      {
-        std::unique_lock<std::mutex> lock(mutex_);
-        changed_.wait(lock, [this] { return over_ || waiting_; });
-        if (!waiting_) return;
-        frame = std::move(*waiting_);
-        waiting_.reset();
-        connected = !restarted_;
-        restarted_ = false;
-      }
-      check_.add(frame.stamp.frame, {frame.luma, frame.width, frame.height, frame.stride},
-                 connected);
-    }
-  }
-
-  std::mutex mutex_;
-  std::condition_variable changed_;
-  std::optional<Frame> waiting_;  // guarded by mutex_
-  bool restarted_ = false;        // guarded by mutex_: since the picture last taken
-  bool over_ = false;             // guarded by mutex_
-  PictureCheck check_;            // the thread's until it is joined
-  std::thread thread_;            // last: it uses the others
-};
-
-struct Measured {
-  Connection video;
-  Connection pan_tilt;
-  std::vector<CheckedFrame> frames;
-  std::vector<PanTiltSample> samples;
-  std::vector<double> delivered_s;  // each of them
-  FrameSourceCounters counters;
-  PictureReport pictures;
-};
-
-void show_progress(const std::future<void>& done, double duration_s) {
-  const bool show = is_terminal(STDERR_FILENO);
-  const double begin_s = monotonic_now_s();
-  while (done.wait_for(std::chrono::seconds(1)) != std::future_status::ready) {
-    if (show) {
-      fmt::print(stderr, "\rmeasuring: {:.0f} of {:.0f} s ", monotonic_now_s() - begin_s,
-                 duration_s);
-    }
-  }
-  if (show) fmt::print(stderr, "\r{:40}\r", "");
-}
-
-Measured measure(const Config& config, double duration_s) {
-  // s, beyond a source's own timeout: logging in, and a first key frame.
-  constexpr double kConnectSlack = 2;
-  Measured measured;
-  const auto video = make_frame_source(config.video, true);
-  const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
-  PictureThread pictures;
-  const std::future<void> frames = std::async(std::launch::async, [&] {
-    measured.video = collect<Frame>(
-        *video, config.video.timeout_s + kConnectSlack, duration_s, [&](const Frame& frame) {
-          measured.frames.push_back({frame.stamp, frame.width, frame.height, frame.decode_s});
-          pictures.offer(frame);
-        });
-  });
-  const std::future<void> samples = std::async(std::launch::async, [&] {
-    measured.pan_tilt = collect<PanTiltSample>(
-        *pan_tilt, config.pan_tilt.timeout_s + kConnectSlack, duration_s,
-        [&](const PanTiltSample& sample) {
-          measured.samples.push_back(sample);
-          // A recording's times are of another clock.
-          const bool live = config.pan_tilt.type != PanTiltConfig::Type::kRecording;
-          measured.delivered_s.push_back(live ? monotonic_now_s() : sample.latest_time_s);
-        });
-  });
-  show_progress(frames, duration_s);
-  show_progress(samples, duration_s);
-  measured.counters = video->counters();
-  measured.pictures = pictures.finish().report({measured.video.name, config.realtime.landmarks});
-  return measured;
-}
 
 // What turns an axis's sign, for this kind of device.
 std::string reverse_advice(const PanTiltConfig& pan_tilt, bool is_pan) {
@@ -239,7 +77,7 @@ TelemetryNeeds telemetry_needs(const Measured& measured, const Config& config,
   needs.max_gap_s = step.telemetry_limits.max_gap_s;
   needs.max_extrapolation_s = step.telemetry_limits.max_extrapolation_s;
   needs.angle_sigma_rad = step.telemetry_noise.pan_tilt_sigma;
-  needs.quantum_rad = step.telemetry_noise.quantum;
+  needs.resolution_rad = step.telemetry_noise.resolution;
   needs.focal_length_px = calibration.calibration.camera.focal_length;
   needs.clock_offset_s = calibration.calibrated ? calibration.calibration.clock_offset : 0;
   needs.zoom = calibration.calibration.zoom;

@@ -7,7 +7,7 @@
 #include <array>
 #include <filesystem>
 
-#include "core/calibration/calibration_file.h"
+#include "edge_app/storage/calibration_file.h"
 #include "platform/pan_tilt/onvif_source.h"
 #include "platform/pan_tilt/query_source.h"
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
@@ -72,14 +72,14 @@ Calibration data_sheet_calibration(const CameraConfig& camera) {
   calibration.line_delay = camera.upside_down ? -camera.line_delay_s : camera.line_delay_s;
   // What is not measured is nominal: axes as well mounted as PTCEE takes them to be, and the
   // difference between two network links.
-  constexpr double kAxisSigma = 0.05;        // rad
-  constexpr double kClockOffsetSigma = 0.1;  // s
+  constexpr double kAxisSigma_rad = 0.05;
+  constexpr double kClockOffsetSigma_s = 0.1;
   for (const Parameter axis :
        {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
-    calibration.covariance(index(axis), index(axis)) = kAxisSigma * kAxisSigma;
+    calibration.covariance(index(axis), index(axis)) = kAxisSigma_rad * kAxisSigma_rad;
   }
   calibration.covariance(index(Parameter::kClockOffset), index(Parameter::kClockOffset)) =
-      kClockOffsetSigma * kClockOffsetSigma;
+      kClockOffsetSigma_s * kClockOffsetSigma_s;
   return calibration;
 }
 
@@ -87,7 +87,7 @@ OrientationStepOptions step_options(const Config& config, const NamedCalibration
   OrientationStepOptions options = step_options(RecordingNoise{}, calibration);
   TelemetryNoise& noise = options.telemetry_noise;
   noise.pan_tilt_sigma = config.pan_tilt.angle_sigma_rad.value_or(noise.pan_tilt_sigma);
-  noise.quantum = config.pan_tilt.angle_quantum_rad;
+  noise.resolution = config.pan_tilt.angle_quantum_rad;
   noise.acceleration_sigma = config.pan_tilt.acceleration_sigma_rad_s2;
   options.telemetry_limits.max_repeat_s = config.pan_tilt.max_repeat_s;
   options.telemetry_limits.max_extrapolation_s = config.realtime.max_extrapolation_s;
@@ -127,8 +127,7 @@ OrientationStepOptions step_options(const RecordingNoise& noise,
 std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,
                                                const std::string& copy_to) {
   if (config.type == VideoConfig::Type::kRecording) {
-    return std::make_unique<RecordingFrameSource>(
-        RecordingFrameSourceOptions{config.directory, decode, true});
+    return open_recorded_frames(RecordingFrameSourceOptions{config.directory, decode, true});
   }
   if (config.type == VideoConfig::Type::kMjpeg) {
     MjpegSourceOptions options;
@@ -139,7 +138,7 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
     options.timeout_s = config.timeout_s;
     options.max_backoff_s = config.max_backoff_s;
     options.copy_to = copy_to;
-    return std::make_unique<MjpegSource>(options);
+    return open_mjpeg(options);
   }
   if (config.type == VideoConfig::Type::kV4l2) {
     V4l2SourceOptions options;
@@ -149,7 +148,7 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
     options.timeout_s = config.timeout_s;
     options.max_backoff_s = config.max_backoff_s;
     options.copy_to = copy_to;
-    return std::make_unique<V4l2Source>(options);
+    return open_v4l2(options);
   }
   RtpSourceOptions options;
   options.url = config.url;
@@ -163,10 +162,37 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
   options.timeout_s = config.timeout_s;
   options.max_backoff_s = config.max_backoff_s;
   options.copy_to = copy_to;
-  return std::make_unique<RtpSource>(options);
+  return open_rtp(options);
 }
 
 namespace {
+
+// What the options of all polled sources have in common.
+template <class Options>
+Options polling_options(const PanTiltConfig& config) {
+  Options options;
+  options.pan = config.axes.pan;
+  options.tilt = config.axes.tilt;
+  options.rate_hz = config.rate_hz;
+  options.timeout_s = config.timeout_s;
+  options.max_backoff_s = config.max_backoff_s;
+  return options;
+}
+
+template <class Options>
+Options http_options(const PanTiltConfig& config) {
+  auto options = polling_options<Options>(config);
+  options.url = config.url;
+  options.user = config.user;
+  options.password = config.password;
+  return options;
+}
+
+std::unique_ptr<PanTiltSource> make_vapix_source(const PanTiltConfig& config) {
+  auto options = http_options<VapixSourceOptions>(config);
+  options.camera = config.camera;
+  return open_vapix(options);
+}
 
 std::unique_ptr<PanTiltSource> make_onvif_source(const PanTiltConfig& config) {
   const auto radians = [](const std::optional<std::array<double, 2>>& deg) {
@@ -174,50 +200,33 @@ std::unique_ptr<PanTiltSource> make_onvif_source(const PanTiltConfig& config) {
     return deg ? std::optional<OnvifRange>({kRadians * deg->front(), kRadians * deg->back()})
                : std::nullopt;
   };
-  OnvifSourceOptions options;
-  options.url = config.url;
-  options.user = config.user;
-  options.password = config.password;
+  auto options = http_options<OnvifSourceOptions>(config);
   options.profile = config.profile;
   options.pan_range = radians(config.pan_range_deg);
   options.tilt_range = radians(config.tilt_range_deg);
-  options.pan = config.axes.pan;
-  options.tilt = config.axes.tilt;
-  options.rate_hz = config.rate_hz;
-  options.timeout_s = config.timeout_s;
-  options.max_backoff_s = config.max_backoff_s;
-  return std::make_unique<OnvifSource>(options);
+  return open_onvif(options);
+}
+
+std::unique_ptr<PanTiltSource> make_head_source(const PanTiltConfig& config) {
+  auto options = polling_options<QuerySourceOptions>(config);
+  options.link = config.head.link;
+  return std::make_unique<QuerySource>(make_protocol(config.head.protocol), options);
 }
 
 }  // namespace
 
 std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config) {
-  if (config.type == PanTiltConfig::Type::kRecording) {
-    return std::make_unique<RecordingPanTiltSource>(
-        RecordingPanTiltSourceOptions{config.directory, true});
+  switch (config.type) {
+    case PanTiltConfig::Type::kVapix:
+      return make_vapix_source(config);
+    case PanTiltConfig::Type::kOnvif:
+      return make_onvif_source(config);
+    case PanTiltConfig::Type::kHead:
+      return make_head_source(config);
+    case PanTiltConfig::Type::kRecording:
+      break;
   }
-  if (config.type == PanTiltConfig::Type::kOnvif) return make_onvif_source(config);
-  if (config.type == PanTiltConfig::Type::kHead) {
-    QuerySourceOptions options;
-    options.link = config.head.link;
-    options.pan = config.axes.pan;
-    options.tilt = config.axes.tilt;
-    options.rate_hz = config.rate_hz;
-    options.timeout_s = config.timeout_s;
-    options.max_backoff_s = config.max_backoff_s;
-    return std::make_unique<QuerySource>(make_protocol(config.head), options);
-  }
-  VapixSourceOptions options;
-  options.url = config.url;
-  options.user = config.user;
-  options.password = config.password;
-  options.camera = config.camera;
-  options.pan = config.axes.pan;
-  options.tilt = config.axes.tilt;
-  options.rate_hz = config.rate_hz;
-  options.timeout_s = config.timeout_s;
-  options.max_backoff_s = config.max_backoff_s;
-  return std::make_unique<VapixSource>(options);
+  return open_recorded_pan_tilt({config.directory, true});
 }
 
 void log_source_losses(const FrameSource& source) {

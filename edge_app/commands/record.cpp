@@ -169,14 +169,14 @@ class Recorder {
 };
 
 void wait_with_progress(StopSignals& signals, const Recorder& recorder, double duration_s) {
-  constexpr double kProgressPeriod = 1;  // s
+  constexpr double kProgressPeriod_s = 1;
   const bool show = is_terminal(STDERR_FILENO);
   const double start_s = monotonic_now_s();
   const double end_s = start_s + duration_s;
   while (true) {
     const double left_s = end_s - monotonic_now_s();
     const auto event =
-        signals.wait(recorder.finished_fd(), show ? std::min(left_s, kProgressPeriod) : left_s);
+        signals.wait(recorder.finished_fd(), show ? std::min(left_s, kProgressPeriod_s) : left_s);
     if (show) {
       fmt::print(stderr, "\r{:.0f} s: {} frames, {} telemetry samples ",
                  monotonic_now_s() - start_s, recorder.frames(), recorder.samples());

@@ -120,8 +120,9 @@ bool has_pictures(const std::string& recording) {
 // The pictures of a recording whose frames are counted by another source: some frames may have none.
 class Pictures {
  public:
-  explicit Pictures(const std::string& recording) : source_({recording, true, false}) {
-    next_ = next<Frame>(source_);
+  explicit Pictures(const std::string& recording)
+      : source_(open_recorded_frames({recording, true, false})) {
+    next_ = next<Frame>(*source_);
     if (!next_) {
       throw CommandError(kExitFailed, recording + ": none of its pictures can be decoded");
     }
@@ -133,13 +134,13 @@ class Pictures {
     if (next_ && next_->stamp.frame == stamp.frame &&
         next_->stamp.receive_time_s == stamp.receive_time_s) {
       frame = std::move(next_);
-      next_ = next<Frame>(source_);
+      next_ = next<Frame>(*source_);
     }
     return frame;
   }
 
  private:
-  RecordingFrameSource source_;
+  std::unique_ptr<RecordingFrameSource> source_;
   std::optional<Frame> next_;
 };
 
@@ -213,8 +214,8 @@ int replay(const ReplayOptions& options) {
   OrientationStep step(of_step);
 
   StopSignals signals;
-  RecordingFrameSource video({options.recording, false, false});
-  RecordingPanTiltSource pan_tilt({options.recording, false});
+  const auto video = open_recorded_frames({options.recording, false, false});
+  const auto pan_tilt = open_recorded_pan_tilt({options.recording, false});
   OrientationFile file(options.directory.empty()
                            ? (fs::path(options.recording) / "alidade").string()
                            : options.directory);
@@ -227,8 +228,8 @@ int replay(const ReplayOptions& options) {
   const double start_s = monotonic_now_s();
   std::optional<double> first_s;
   Summary summary;
-  std::optional<PanTiltSample> sample = next<PanTiltSample>(pan_tilt);
-  while (const std::optional<Frame> frame = next<Frame>(video)) {
+  std::optional<PanTiltSample> sample = next<PanTiltSample>(*pan_tilt);
+  while (const std::optional<Frame> frame = next<Frame>(*video)) {
     const FrameStamp& stamp = frame->stamp;
     if (!first_s) first_s = stamp.receive_time_s;
     // A live frame is due when it was received; stamps that jump back are due at once.
@@ -238,7 +239,7 @@ int replay(const ReplayOptions& options) {
       throw CommandError(kExitFailed, options.recording + ": replay interrupted; nothing stored");
     }
     for (; sample && sample->latest_time_s <= stamp.receive_time_s;
-         sample = next<PanTiltSample>(pan_tilt)) {
+         sample = next<PanTiltSample>(*pan_tilt)) {
       step.add_telemetry(*sample);
     }
     const std::optional<Frame> picture = pictures ? pictures->of(stamp) : std::nullopt;

@@ -7,19 +7,20 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <cmath>
 #include <limits>
 
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/live_calibration.h"
+#include "edge_app/commands/run_report.h"
 #include "edge_app/commands/stop_signals.h"
-#include "edge_app/storage/calibration_store.h"
+#include "edge_app/output/http/http_server.h"
 #include "edge_app/output/http_api.h"
-#include "edge_app/output/http_server.h"
 #include "edge_app/output/live_state.h"
 #include "edge_app/output/record_sinks.h"
 #include "edge_app/output/record_writer.h"
 #include "edge_app/output/status_page.h"
 #include "edge_app/pipeline/pipeline.h"
+#include "edge_app/storage/calibration_store.h"
 #include "platform/system/clock.h"
 #include "platform/system/realtime.h"
 #include "platform/system/service_manager.h"
@@ -42,90 +43,6 @@ std::string describe(const RealtimeOptions& options) {
       options.lock_memory ? "locked" : "not locked");
 }
 
-std::string describe(const PipelineSummary& summary, bool latency_measured) {
-  const auto quantiles = [](const LatencyHistogram& histogram) {
-    return fmt::format("{:.3f}/{:.3f}", 1e3 * histogram.quantile(0.5),
-                       1e3 * histogram.quantile(0.99));
-  };
-  const std::string latency =
-      latency_measured
-          ? fmt::format(
-                "latency p50/p99 {} ms, of this decoding {}, waiting {}, computing {}; then "
-                "writing {}",
-                quantiles(summary.latency), quantiles(summary.decoding), quantiles(summary.waiting),
-                quantiles(summary.computing), quantiles(summary.writing))
-          : "latency not measured on a recording";
-  return fmt::format(
-      "{} frames; {} records: OE {}, PT {}, none {}; {}; dropped by full queues: {} frames, {} "
-      "telemetry samples, {} records; {} pictures too late; page faults of the real-time thread: "
-      "{} minor, {} major",
-      summary.frames, summary.records, summary.with_landmarks,
-      summary.with_orientation - summary.with_landmarks, summary.records - summary.with_orientation,
-      latency, summary.drops.frames, summary.drops.telemetry, summary.drops.records,
-      summary.drops.late_pictures, summary.page_faults.minor, summary.page_faults.major);
-}
-
-// What calibrates a camera while it runs; empty where nothing is to be calibrated.
-struct Calibrating {
-  std::unique_ptr<CalibrationStore> store;
-  std::unique_ptr<SelfCalibration> calibration;
-};
-
-// Begins with the stored calibration, else with the data sheet. path: of the configuration.
-Calibrating begin_calibrating(const Config& config, const std::string& path) {
-  Calibrating result;
-  SelfCalibrationOptions options;
-  const int width = config.video.width;
-  const int height = config.video.height;
-  if (!config.calibration.file.empty()) {
-    result.store = std::make_unique<CalibrationStore>(config.calibration.file,
-                                                      config.calibration.zoom_tolerance);
-    for (const std::string& line : result.store->load(width, height))
-      spdlog::info("calibration: {}", line);
-  }
-  const StoredCalibration* stored =
-      result.store == nullptr ? nullptr : result.store->find(std::nullopt);
-  if (result.store != nullptr && result.store->empty() && !config.calibration.automatic) {
-    throw CommandError(
-        kExitUsage,
-        fmt::format("{}: calibration.file {} holds no calibration that can be used, and "
-                    "calibration.auto is false; name one, or set calibration.auto: true",
-                    path, config.calibration.file));
-  }
-  if (config.camera.focal_length_px) {
-    options.data_sheet = data_sheet_calibration(config.camera);
-  } else if (stored != nullptr) {
-    CameraConfig camera;
-    camera.focal_length_px = stored->calibration.camera.focal_length;
-    options.data_sheet = data_sheet_calibration(camera);
-  } else {
-    throw CommandError(
-        kExitUsage,
-        fmt::format(
-            "{}: camera.focal_length_px is missing: {} holds no calibration to begin with, and the "
-            "first one begins with the data sheet's; give it, or name a calibration in "
-            "calibration.file",
-            path, config.calibration.file));
-  }
-  Camera<double>& camera = options.data_sheet.camera;
-  camera.width = stored == nullptr ? width : stored->calibration.camera.width;
-  camera.height = stored == nullptr ? height : stored->calibration.camera.height;
-  if (camera.width == 0) {
-    throw CommandError(
-        kExitUsage, path +
-                        ": video.width and video.height are missing: without a calibration, OE "
-                        "mode needs the size of the picture; give them, or set realtime.mode: PT");
-  }
-  if (config.pan_tilt.angle_sigma_rad) {
-    options.noise.pan_tilt_sigma_rad = std::hypot(
-        *config.pan_tilt.angle_sigma_rad, config.pan_tilt.angle_quantum_rad / std::sqrt(12.0));
-  }
-  options.zoom_tolerance = config.calibration.zoom_tolerance;
-  options.automatic = config.calibration.automatic;
-  result.calibration = std::make_unique<SelfCalibration>(options, result.store.get());
-  return result;
-}
-
 PipelineOptions pipeline_options(const Config& config, const NamedCalibration& calibration) {
   PipelineOptions options;
   options.step = step_options(config, calibration);
@@ -146,68 +63,12 @@ std::unique_ptr<HttpServer> start_http(const Config& config, const HttpApiSource
   auto server = std::make_unique<HttpServer>(*config.output.http);
   add_api_routes(server.get(), sources);
   add_status_page(server.get(), tap);
-  server->set_on_stop([live = sources.live, tap] {
-    live->close();
-    tap->close();
-  });
   std::string error;
   if (!server->start(&error)) throw CommandError(kExitFailed, error);
   spdlog::info("HTTP: listening on http://{}/{}", server->address(),
                config.output.http->token.empty() ? "" : ", with a token");
   return server;
 }
-
-// What `systemctl status` shows of the time between two summaries.
-std::string describe(const PipelineSummary& before, const PipelineSummary& now, double period_s) {
-  const auto records = now.records - before.records;
-  const auto with_orientation = now.with_orientation - before.with_orientation;
-  const auto with_landmarks = now.with_landmarks - before.with_landmarks;
-  return fmt::format("{:.1f} frames a second; records of the last {:.0f} s: OE {}, PT {}, none {}",
-                     static_cast<double>(now.frames - before.frames) / period_s, period_s,
-                     with_landmarks, with_orientation - with_landmarks, records - with_orientation);
-}
-
-// Tells a service manager, once a period, what goes on, and that the process lives as long as records get through. A
-// camera that is gone is no reason to be killed; a thread that hangs is, and so is a reader of stdout that stalls.
-class LifeReport {
- public:
-  LifeReport(const ServiceManager& manager, Pipeline* pipeline)
-      : manager_(manager), pipeline_(*pipeline) {
-    pipeline_.ask_for_pulse();
-  }
-
-  [[nodiscard]] double period_s() const {
-    return manager_.is_there() ? std::min(kStatusPeriod, manager_.alive_period_s())
-                               : std::numeric_limits<double>::infinity();
-  }
-
-  void tell() {
-    const bool lives = pipeline_.pulse_is_answered();
-    if (lives) {
-      manager_.alive();
-      pipeline_.ask_for_pulse();
-    } else if (lived_) {
-      spdlog::error(
-          "no record gets through: the reader of stdout stalls, or a thread hangs; systemd is no "
-          "longer told that this process lives");
-    }
-    lived_ = lives;
-    const double now_s = monotonic_now_s();
-    if (now_s < status_s_ + kStatusPeriod) return;
-    const PipelineSummary summary = pipeline_.summary();
-    manager_.status(describe(status_, summary, now_s - status_s_));
-    status_ = summary;
-    status_s_ = now_s;
-  }
-
- private:
-  static constexpr double kStatusPeriod = 10;  // s
-  const ServiceManager& manager_;
-  Pipeline& pipeline_;
-  bool lived_ = true;
-  PipelineSummary status_;
-  double status_s_ = monotonic_now_s();
-};
 
 // Waits for a signal, the end of the pipeline, or the end of the time asked for.
 void wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport* report,

@@ -28,11 +28,11 @@ StopSignals::~StopSignals() {
 }
 
 StopSignals::Event StopSignals::wait(int descriptor, double timeout_s) {
-  constexpr double kLongestPoll = 3600;  // s; poll() counts milliseconds in an int
+  constexpr double kLongestPoll_s = 3600;  // poll() counts milliseconds in an int
   const double deadline_s = monotonic_now_s() + timeout_s;
   while (true) {
     pollfd descriptors[] = {{descriptor_, POLLIN, 0}, {descriptor, POLLIN, 0}};
-    const double left_s = std::clamp(deadline_s - monotonic_now_s(), 0.0, kLongestPoll);
+    const double left_s = std::clamp(deadline_s - monotonic_now_s(), 0.0, kLongestPoll_s);
     const int ready = ::poll(descriptors, 2, static_cast<int>(std::ceil(left_s * 1e3)));
     if (ready < 0 && errno != EINTR) {
       throw std::system_error(errno, std::generic_category(), "poll");

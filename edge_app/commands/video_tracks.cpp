@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 constexpr int kPoints = 250;  // in a frame
 // Of a first trajectory's angles. It stands for measurements that OE mode weighs against what it sees, so
 // it claims no more than it must to predict the picture.
-constexpr double kFirstSigmaPx = 1;
+constexpr double kFirstSigma_px = 1;
 
 // use(frame, luma) for each picture of the input's frames, in the order of the recording.
 template <class Use>
@@ -33,26 +33,26 @@ void for_each_picture(const std::string& directory, const CalibrationInput& inpu
                       const VideoProgress& progress, std::vector<std::string>* remarks, Use use) {
   std::unordered_set<std::int64_t> wanted;
   for (const CalibrationFrame& frame : input.frames) wanted.insert(frame.frame);
-  RecordingFrameSource video({directory, true, false});
+  const auto video = open_recorded_frames({directory, true, false});
   std::size_t done = 0;
   for (;;) {
     Frame frame;
-    const ReadStatus status = video.read(frame, std::numeric_limits<double>::infinity());
+    const ReadStatus status = video->read(frame, std::numeric_limits<double>::infinity());
     if (status == ReadStatus::kEnd) break;
-    if (status != ReadStatus::kOk) throw CommandError(kExitFailed, video.error());
+    if (status != ReadStatus::kOk) throw CommandError(kExitFailed, video->error());
     if (wanted.count(frame.stamp.frame) == 0) continue;
     use(frame.stamp.frame, ImageView{frame.luma, frame.width, frame.height, frame.stride});
     progress(static_cast<double>(++done) / static_cast<double>(wanted.size()));
   }
   if (done == 0)
     throw CommandError(kExitFailed, directory + ": no picture of its video can be read");
-  if (video.damaged_frames() > 0) {
+  if (video->damaged_frames() > 0) {
     remarks->push_back(
-        fmt::format("video: {} pictures could not be decoded", video.damaged_frames()));
+        fmt::format("video: {} pictures could not be decoded", video->damaged_frames()));
   }
-  if (video.missing_frames() > 0) {
+  if (video->missing_frames() > 0) {
     remarks->push_back(
-        fmt::format("video: ends {} frames before frames.csv does", video.missing_frames()));
+        fmt::format("video: ends {} frames before frames.csv does", video->missing_frames()));
   }
 }
 
@@ -93,8 +93,8 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
   OeOptions options;
   options.max_width = input.width;
   options.max_height = input.height;
-  options.max_used = kPoints;
-  options.cell_size_px = std::sqrt(static_cast<double>(input.width) * input.height / kPoints);
+  options.search.choice.max_used = kPoints;
+  options.maker.cell_size_px = std::sqrt(static_cast<double>(input.width) * input.height / kPoints);
   OeMode mode(options);
   mode.reset(estimate.calibration);
   const double to_middle_s = estimate.calibration.line_delay * input.height / 2;
@@ -104,7 +104,7 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
         const auto time = times.find(frame);
         if (time == times.end()) return;  // no telemetry accompanies it
         const InterpolatedPanTilt prediction =
-            predict(estimate, time->second + to_middle_s, kFirstSigmaPx);
+            predict(estimate, time->second + to_middle_s, kFirstSigma_px);
         FrameOrientation orientation;
         const OeStatus status = mode.process(image, time->second, &prediction, &orientation);
         for (int i = 0; status == OeStatus::kOk && i < mode.statistics().aligned; ++i) {

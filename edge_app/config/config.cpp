@@ -4,65 +4,15 @@
 
 #include <algorithm>
 #include <cstdlib>
-#include <filesystem>
 #include <fstream>
 
+#include "edge_app/config/link_keys.h"
 #include "edge_app/config/yaml_section.h"
 
 namespace alidade {
 namespace {
 
-namespace fs = std::filesystem;
-
-constexpr NumberRange kSeconds{0.1, 3600, "s"};
-constexpr NumberRange kAngle{0, 0.1, "rad"};
 constexpr NumberRange kPixels{1, 65536, "px"};
-
-std::string path_relative_to(const std::string& config_path, const std::string& path) {
-  return (fs::path(config_path).parent_path() / path).string();
-}
-
-std::string required_text(YamlSection& section, const std::string& key,
-                          const std::string& example) {
-  const std::optional<std::string> value = section.text(key);
-  if (!value) section.fail(key, "is missing; expected for example " + key + ": " + example);
-  return *value;
-}
-
-// An address with one of the given schemes and without a user or password in it.
-std::string required_url(YamlSection& section, const std::string& example,
-                         const std::vector<std::string>& schemes) {
-  const std::string url = required_text(section, "url", example);
-  bool known = false;
-  std::string rest;
-  for (const std::string& scheme : schemes) {
-    if (url.rfind(scheme, 0) != 0) continue;
-    known = true;
-    rest = url.substr(scheme.size());
-  }
-  if (!known || rest.empty() || rest[0] == '/') {
-    section.fail("url", "is not an address that starts with " + join(schemes) +
-                            "; expected for example " + example);
-  }
-  if (rest.substr(0, rest.find('/')).find('@') != std::string::npos) {
-    section.fail("url", "holds a user or password; give them as user and password_env");
-  }
-  return url;
-}
-
-void read_login(YamlSection& section, std::string* user, std::string* password) {
-  *user = section.text("user").value_or("");
-  const std::optional<std::string> variable = section.text("password_env");
-  if (!variable) return;
-  if (user->empty()) section.fail("password_env", "stands without a user; add user");
-  const char* value = std::getenv(variable->c_str());
-  if (value == nullptr) {
-    section.fail("password_env",
-                 fmt::format("the environment has no variable '{}'; export it with the password",
-                             *variable));
-  }
-  *password = value;
-}
 
 VideoConfig read_video(YamlSection section, const std::string& path) {
   VideoConfig video;
@@ -109,76 +59,6 @@ VideoConfig read_video(YamlSection section, const std::string& path) {
   }
   section.finish();
   return video;
-}
-
-// The angles at both ends of a device's own scale, of which none may be the other.
-std::optional<std::array<double, 2>> read_range(YamlSection& section, const std::string& key) {
-  const auto ends = section.numbers(key, 2, {-360, 360, "deg"});
-  if (!ends) return std::nullopt;
-  if (ends->front() == ends->back()) {
-    section.fail(key, "spans no angle; give the angles at -1 and at 1");
-  }
-  return std::array<double, 2>{ends->front(), ends->back()};
-}
-
-void read_onvif(YamlSection& section, PanTiltConfig* pan_tilt) {
-  pan_tilt->type = PanTiltConfig::Type::kOnvif;
-  pan_tilt->profile = section.text("profile").value_or("");
-  pan_tilt->pan_range_deg = read_range(section, "pan_range_deg");
-  pan_tilt->tilt_range_deg = read_range(section, "tilt_range_deg");
-  if (pan_tilt->pan_range_deg.has_value() != pan_tilt->tilt_range_deg.has_value()) {
-    section.fail(pan_tilt->pan_range_deg ? "tilt_range_deg" : "pan_range_deg",
-                 "is missing; give pan_range_deg and tilt_range_deg, or neither");
-  }
-  pan_tilt->rate_hz = 10;  // SOAP is work for a camera
-}
-
-PanTiltConfig read_pan_tilt(YamlSection section, const std::string& path) {
-  PanTiltConfig pan_tilt;
-  const auto type =
-      section.choice("type", {"vapix", "onvif", "pelco_d", "visca", "ptu", "recording"}, {});
-  if (!type) {
-    section.fail("type",
-                 "is missing; expected one of vapix, onvif, pelco_d, visca, ptu, recording");
-  }
-  if (*type == "recording") {
-    pan_tilt.type = PanTiltConfig::Type::kRecording;
-    pan_tilt.directory =
-        path_relative_to(path, required_text(section, "directory", "my-recording"));
-  } else {
-    if (*type == "vapix" || *type == "onvif") {
-      pan_tilt.url = required_url(section, "http://camera", {"http://", "https://"});
-      read_login(section, &pan_tilt.user, &pan_tilt.password);
-      if (*type == "onvif") {
-        read_onvif(section, &pan_tilt);
-      } else {
-        pan_tilt.camera =
-            section.integer("camera", {1, 64, "camera number"}).value_or(pan_tilt.camera);
-      }
-      pan_tilt.rate_hz = section.number("rate_hz", {0.1, 1000, "Hz"}).value_or(pan_tilt.rate_hz);
-    } else {
-      pan_tilt.type = PanTiltConfig::Type::kHead;
-      pan_tilt.head = read_head(section, *type, path, &pan_tilt.rate_hz);
-    }
-    pan_tilt.axes = read_axes(section, *type);
-    pan_tilt.timeout_s = section.number("timeout_s", kSeconds).value_or(pan_tilt.timeout_s);
-    pan_tilt.max_backoff_s =
-        section.number("max_backoff_s", kSeconds).value_or(pan_tilt.max_backoff_s);
-  }
-  pan_tilt.angle_sigma_rad = section.number("angle_sigma_rad", kAngle);
-  pan_tilt.angle_quantum_rad =
-      section.number("angle_quantum_rad", kAngle).value_or(pan_tilt.angle_quantum_rad);
-  if (pan_tilt.angle_sigma_rad == 0.0 && pan_tilt.angle_quantum_rad == 0) {
-    section.fail("angle_sigma_rad",
-                 "no head measures without error; give a sigma or angle_quantum_rad above 0");
-  }
-  pan_tilt.acceleration_sigma_rad_s2 =
-      section.number("acceleration_sigma_rad_s2", {0, 1000, "rad/s^2"})
-          .value_or(pan_tilt.acceleration_sigma_rad_s2);
-  pan_tilt.max_repeat_s =
-      section.number("max_repeat_s", {0, 10, "s"}).value_or(pan_tilt.max_repeat_s);
-  section.finish();
-  return pan_tilt;
 }
 
 CameraConfig read_camera(YamlSection section) {
@@ -310,16 +190,39 @@ OutputConfig read_output(YamlSection section, const std::string& path,
   return output;
 }
 
+// While the head rests, the newest angle that is known is max_repeat_s old (core/realtime, TelemetryBuffer).
+void check_ages(const Config& config, const YamlSection& pan_tilt, const YamlSection& realtime) {
+  const double repeat_s = config.pan_tilt.max_repeat_s;
+  const double extrapolation_s = config.realtime.max_extrapolation_s;
+  if (repeat_s == 0 || repeat_s < extrapolation_s) return;
+  const std::string why = "so that a head at rest has no angle that is new enough; expected ";
+  if (pan_tilt.has("max_repeat_s")) {
+    pan_tilt.fail(
+        "max_repeat_s",
+        fmt::format("is {} s, no less than realtime.max_extrapolation_s ({} s), {}less, or "
+                    "a longer max_extrapolation_s",
+                    repeat_s, extrapolation_s, why));
+  }
+  realtime.fail(
+      "max_extrapolation_s",
+      fmt::format("is {} s, no more than pan_tilt.max_repeat_s ({} s), {}more, or a shorter "
+                  "max_repeat_s",
+                  extrapolation_s, repeat_s, why));
+}
+
 void read_config(YamlSection& top, const std::string& path, Config* config) {
   for (const char* required : {"video", "pan_tilt"}) {
     if (!top.has(required))
       throw ConfigError(path + ": section '" + required + "' is missing; add it");
   }
   config->video = read_video(top.section("video"), path);
-  config->pan_tilt = read_pan_tilt(top.section("pan_tilt"), path);
+  const YamlSection pan_tilt = top.section("pan_tilt");
+  config->pan_tilt = read_pan_tilt(pan_tilt, path);
   config->camera = read_camera(top.section("camera"));
   config->calibration = read_calibration(top.section("calibration"), path);
-  config->realtime = read_realtime(top.section("realtime"));
+  const YamlSection realtime = top.section("realtime");
+  config->realtime = read_realtime(realtime);
+  check_ages(*config, pan_tilt, realtime);
   config->output = read_output(top.section("output"), path, &config->warnings);
   top.finish();
   if ((config->video.type == VideoConfig::Type::kRecording) !=

@@ -6,13 +6,12 @@
 // the file: `password_env` names the variable. Relative paths are relative to the file's folder.
 // Reading touches nothing but the file and the environment: no connection is tried.
 
-#include <array>
 #include <optional>
 #include <string>
 #include <vector>
 
-#include "edge_app/config/head_config.h"
-#include "edge_app/output/http_server.h"    // HttpServerOptions
+#include "edge_app/config/pan_tilt_config.h"
+#include "edge_app/output/http/http_options.h"
 #include "edge_app/output/record_format.h"  // OutputFormat
 #include "platform/video/v4l2_mode.h"       // V4l2Format
 
@@ -35,30 +34,6 @@ struct VideoConfig {
   Transport transport = Transport::kTcp;  // rtsp
   double timeout_s = 3;                   // silence that counts as a loss
   double max_backoff_s = 5;               // longest pause between two attempts
-};
-
-struct PanTiltConfig {
-  enum class Type { kVapix, kOnvif, kHead, kRecording };
-  Type type = Type::kVapix;
-  std::string url;        // vapix, onvif
-  HeadConfig head;        // pelco_d, visca, ptu
-  AxisMappings axes;      // not of a recording
-  std::string directory;  // recording
-  std::string user;
-  std::string password;
-  int camera = 0;       // VAPIX camera number; 0 leaves it out of the query
-  std::string profile;  // onvif: token; empty: the device's first with PTZ
-  // onvif: the angles at -1 and 1 of the generic space.
-  std::optional<std::array<double, 2>> pan_range_deg;
-  std::optional<std::array<double, 2>> tilt_range_deg;
-  double rate_hz = 30;  // onvif: 10 unless given
-  double timeout_s = 1;
-  double max_backoff_s = 5;
-  std::optional<double> angle_sigma_rad;   // white noise of one measured angle
-  double angle_quantum_rad = 0;            // step of the encoder or of its print-out
-  double acceleration_sigma_rad_s2 = 0.1;  // to expect of the head where samples do not show it
-  double max_repeat_s =
-      0.1;  // longest time between two measurements of the device; 0: each answer is fresh
 };
 
 // The data sheet's camera: used as long as there is no calibration.

@@ -46,16 +46,15 @@ ByteLinkOptions read_link(YamlSection& section, const std::string& config_path) 
 
 // positive, negative: the words for the two ways an axis can count.
 AxisMapping read_axis(YamlSection& section, const std::string& axis, const std::string& positive,
-                      const std::string& negative, const std::optional<std::string>& usual) {
+                      const std::string& negative, const std::optional<double>& usual_sign) {
   AxisMapping mapping;
   const std::string key = axis + "_positive";
-  std::optional<std::string> way = section.choice(key, {positive, negative});
-  if (!way) way = usual;
-  mapping.sign = required(section, key, way,
-                          fmt::format("{} or {}: where the head turns while its {} grows", positive,
-                                      negative, axis)) == positive
-                     ? 1
-                     : -1;
+  const std::optional<std::string> way = section.choice(key, {positive, negative});
+  const std::optional<double> sign =
+      way ? std::optional(*way == positive ? 1.0 : -1.0) : usual_sign;
+  mapping.sign = required(
+      section, key, sign,
+      fmt::format("{} or {}: where the head turns while its {} grows", positive, negative, axis));
   mapping.zero_deg =
       section.number(axis + "_zero_deg", {-360, 360, "deg"}).value_or(mapping.zero_deg);
   return mapping;
@@ -98,34 +97,36 @@ PtuOptions read_ptu(YamlSection& section) {
   return options;
 }
 
-}  // namespace
-
-AxisMappings read_axes(YamlSection& section, const std::string& type) {
-  const bool is_unknown = type == "visca" || type == "ptu";
-  const auto usual = [&](const char* way) {
-    return is_unknown ? std::nullopt : std::optional<std::string>(way);
-  };
-  return {read_axis(section, "pan", "right", "left", usual("right")),
-          read_axis(section, "tilt", "up", "down", usual(type == "pelco_d" ? "down" : "up"))};
+HeadOptions read_protocol(YamlSection& section, HeadType type, const ByteLinkOptions& link) {
+  switch (type) {
+    case HeadType::kPelcoD:
+      return read_pelco_d(section);
+    case HeadType::kVisca:
+      return read_visca(section, link);
+    case HeadType::kPtu:
+      break;
+  }
+  return read_ptu(section);
 }
 
-HeadConfig read_head(YamlSection& section, const std::string& type, const std::string& config_path,
+}  // namespace
+
+AxisMappings read_axes(YamlSection& section, const UsualSigns& usual) {
+  return {read_axis(section, "pan", "right", "left", usual.pan),
+          read_axis(section, "tilt", "up", "down", usual.tilt)};
+}
+
+HeadConfig read_head(YamlSection& section, HeadType type, const std::string& config_path,
                      double* rate_hz) {
   HeadConfig head;
   head.link = read_link(section, config_path);
-  if (type == "pelco_d") {
-    head.protocol = read_pelco_d(section);
-  } else if (type == "visca") {
-    head.protocol = read_visca(section, head.link);
-  } else {
-    head.protocol = read_ptu(section);
-  }
+  head.protocol = read_protocol(section, type, head.link);
 
   const std::optional<double> wanted_hz = section.number("rate_hz", {0.1, 1000, "Hz"});
   *rate_hz = wanted_hz.value_or(*rate_hz);
   const double byte_time_s = wire_time_of_byte_s(head.link);
   if (byte_time_s > 0) {
-    const double most_hz = ceiling_hz(*make_protocol(head), byte_time_s);
+    const double most_hz = ceiling_hz(*make_protocol(head.protocol), byte_time_s);
     if (wanted_hz && *wanted_hz > most_hz) {
       section.fail("rate_hz",
                    fmt::format("{} Hz is more than the line carries at {} baud; expected "
@@ -135,16 +136,6 @@ HeadConfig read_head(YamlSection& section, const std::string& type, const std::s
     *rate_hz = std::min(*rate_hz, most_hz);
   }
   return head;
-}
-
-std::unique_ptr<QueryProtocol> make_protocol(const HeadConfig& head) {
-  if (const auto* pelco_d = std::get_if<PelcoDOptions>(&head.protocol)) {
-    return std::make_unique<PelcoDProtocol>(*pelco_d);
-  }
-  if (const auto* visca = std::get_if<ViscaOptions>(&head.protocol)) {
-    return std::make_unique<ViscaProtocol>(*visca);
-  }
-  return std::make_unique<PtuProtocol>(std::get<PtuOptions>(head.protocol));
 }
 
 }  // namespace alidade

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -10,47 +9,31 @@
 
 #include <fmt/format.h>
 
-#include "core/calibration/one_line.h"
+#include "core/calibration/number_text.h"
 
 namespace alidade {
 namespace {
 
 std::string place(const std::string& file, const YAML::Node& node) {
-  // yaml-cpp counts from 0 and gives -1 for a node that is not in the file.
-  const int line = node.Mark().line;
-  return line < 0 ? file : fmt::format("{}:{}", file, line + 1);
+  const std::optional<int> line = line_of(node);
+  return line ? fmt::format("{}:{}", file, *line) : file;
 }
 
 bool contains(const std::vector<std::string>& words, const std::string& word) {
   return std::find(words.begin(), words.end(), word) != words.end();
 }
 
-// Strictly a decimal number from the first to the last character.
-std::optional<double> parse_number(const std::string& text) {
-  if (text.empty() || text.find_first_not_of("0123456789+-.eE") != std::string::npos) {
-    return std::nullopt;
-  }
-  char* end = nullptr;
-  const double value = std::strtod(text.c_str(), &end);
-  if (*end != '\0' || !std::isfinite(value)) return std::nullopt;
-  return value;
-}
-
 }  // namespace
 
 bool parse_yaml(const std::string& text, const std::string& name,
                 const std::function<void(YamlSection&)>& read, std::string* error) {
-  try {
-    YamlSection top(YAML::Load(text), "", name);
-    read(top);
-    return true;
-  } catch (const ConfigError& e) {
-    *error = one_line(e.what());
-  } catch (const YAML::Exception& e) {
-    *error = one_line(fmt::format("{}:{}: not YAML: {}; check indentation, colons and quotes", name,
-                                  std::max(e.mark.line, 0) + 1, e.msg));
-  }
-  return false;
+  return read_yaml(
+      text, name, {"not YAML: ", "; check indentation, colons and quotes"},
+      [&](const YAML::Node& root) {
+        YamlSection top(root, "", name);
+        read(top);
+      },
+      error);
 }
 
 bool read_yaml_file(const std::string& path, const std::function<void(YamlSection&)>& read,
@@ -65,12 +48,6 @@ bool read_yaml_file(const std::string& path, const std::function<void(YamlSectio
   return parse_yaml(text.str(), path, read, error);
 }
 
-std::string join(const std::vector<std::string>& words) {
-  std::string joined;
-  for (const std::string& word : words) joined += (joined.empty() ? "" : ", ") + word;
-  return joined;
-}
-
 YamlSection::YamlSection(const YAML::Node& node, std::string name, std::string file)
     : node_(node), name_(std::move(name)), file_(std::move(file)) {
   if (!node_.IsDefined() || node_.IsNull()) {
@@ -82,18 +59,13 @@ YamlSection::YamlSection(const YAML::Node& node, std::string name, std::string f
     throw ConfigError(
         fmt::format("{}: {}: expected a mapping of keys to values", place(file_, node_), title));
   }
-  std::vector<std::string> seen;
-  for (const auto& entry : node_) {
-    if (!entry.first.IsScalar()) {
-      throw ConfigError(
-          fmt::format("{}: {}: a key must be a plain word", place(file_, entry.first), title));
-    }
-    if (contains(seen, entry.first.Scalar())) {
-      throw ConfigError(fmt::format("{}: {}: key '{}' stands twice; keep one",
-                                    place(file_, entry.first), title, entry.first.Scalar()));
-    }
-    seen.push_back(entry.first.Scalar());
-  }
+  const std::optional<FaultyKey> found = find_faulty_key(node_);
+  if (!found) return;
+  const std::string at = place(file_, found->key);
+  throw ConfigError(
+      found->fault == KeyFault::kNoWord
+          ? fmt::format("{}: {}: a key must be a plain word", at, title)
+          : fmt::format("{}: {}: key '{}' stands twice; keep one", at, title, found->key.Scalar()));
 }
 
 std::optional<YAML::Node> YamlSection::find(const std::string& key) const {
@@ -143,7 +115,7 @@ std::optional<double> YamlSection::number(const std::string& key, const NumberRa
       fmt::format("a plain number from {} to {} ({})", range.low, range.high, range.unit);
   const std::optional<std::string> value = scalar(key, expected, true);
   if (!value) return std::nullopt;
-  const std::optional<double> number = parse_number(*value);
+  const std::optional<double> number = number_of(*value);
   if (!number || *number < range.low || *number > range.high) {
     fail(key, fmt::format("'{}' is not {}", *value, expected));
   }
@@ -161,7 +133,7 @@ std::optional<std::vector<double>> YamlSection::numbers(const std::string& key, 
   std::vector<double> values;
   for (const YAML::Node& item : *list) {
     const std::optional<double> value =
-        item.IsScalar() ? parse_number(item.Scalar()) : std::optional<double>();
+        item.IsScalar() ? number_of(item.Scalar()) : std::optional<double>();
     if (!value || *value < range.low || *value > range.high) fail(key, "expected " + expected);
     values.push_back(*value);
   }

@@ -1,5 +1,5 @@
 #pragma once
-// One mapping of a YAML configuration, read strictly.
+// One mapping of a YAML configuration, read strictly (core/calibration/strict_yaml.h), and asked for its values.
 //
 // Each reader (text, number, ...) takes the key's value out and checks its type and range; finish()
 // then rejects every key that no reader asked for. All complaints are ConfigError with one line
@@ -12,15 +12,14 @@
 
 #include <functional>
 #include <optional>
-#include <stdexcept>
 #include <string>
 #include <vector>
 
+#include "core/calibration/strict_yaml.h"
+
 namespace alidade {
 
-struct ConfigError : std::runtime_error {
-  using std::runtime_error::runtime_error;
-};
+using ConfigError = YamlError;
 
 // Inclusive limits of a number and its unit for the message ("px", "s", "1").
 struct NumberRange {
@@ -77,8 +76,5 @@ class YamlSection {
 [[nodiscard]] bool read_yaml_file(const std::string& path,
                                   const std::function<void(YamlSection&)>& read,
                                   std::string* error);
-
-// "a, b, c"
-std::string join(const std::vector<std::string>& words);
 
 }  // namespace alidade

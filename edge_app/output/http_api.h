@@ -6,7 +6,7 @@
 #include <functional>
 #include <string>
 
-#include "edge_app/output/http_server.h"
+#include "edge_app/output/http/http_server.h"
 #include "edge_app/output/live_state.h"
 #include "edge_app/pipeline/pipeline.h"
 #include "platform/video/frame_source.h"
@@ -24,7 +24,8 @@ struct HttpApiSources {
   bool latency_measured = true;  // false for a recording
 };
 
-// Borrows *sources.live, and calls the functions, until the server has stopped.
+// Borrows *sources.live, and calls the functions, until the server has stopped. Every record wakes the server: that must
+// exist as long as there are records, stopped or not.
 void add_api_routes(HttpServer* server, const HttpApiSources& sources);
 
 }  // namespace alidade

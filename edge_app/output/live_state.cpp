@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <random>
 
@@ -60,7 +59,7 @@ bool LiveState::write(const OrientationRecord& record) {
       if (lines_.size() > options_.max_lines) lines_.pop_front();
     }
   }
-  news_.notify_all();
+  if (followed) on_news_();
   return true;
 }
 
@@ -147,14 +146,6 @@ std::optional<double> LiveState::calibration_since_s() const {
   return calibration_since_s_;
 }
 
-void LiveState::close() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    closed_ = true;
-  }
-  news_.notify_all();
-}
-
 std::int64_t LiveState::oldest_line() const {
   return last_id_ - static_cast<std::int64_t>(lines_.size()) + 1;
 }
@@ -191,13 +182,10 @@ LiveState::Reader::~Reader() {
   state_->lost_by_past_readers_ += state_->counters_of(*this).lost;
 }
 
-LiveState::News LiveState::Reader::wait(double timeout_s) {
+LiveState::News LiveState::Reader::take() {
   News news;
   LiveState& state = *state_;
-  std::unique_lock<std::mutex> lock(state.mutex_);
-  state.news_.wait_for(lock, std::chrono::duration<double>(timeout_s),
-                       [&] { return state.closed_ || state.last_id_ >= next_; });
-  news.closed = state.closed_;
+  const std::lock_guard<std::mutex> lock(state.mutex_);
   const std::int64_t oldest = state.oldest_line();
   if (next_ < oldest) {
     news.lost = oldest - next_;

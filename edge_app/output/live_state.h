@@ -7,15 +7,16 @@
 // write() is the output thread's: it formats, takes a lock for microseconds and never waits for a reader. All
 // else may be called by any thread. Bounded memory: about 3 kB a record kept, 1.5 kB a line.
 
-#include <condition_variable>
 #include <cstdint>
 #include <deque>
+#include <functional>
 #include <limits>
 #include <list>
 #include <memory>
 #include <mutex>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "edge_app/pipeline/orientation_record.h"
@@ -71,8 +72,8 @@ class LiveState final : public RecordSink {
   [[nodiscard]] const std::string& start_id() const { return start_id_; }
   [[nodiscard]] double started_s() const { return started_s_; }
 
-  // Ends all waiting, now and later.
-  void close();
+  // Before the first record. Called by write() when there is something to take for a reader; must not wait.
+  void set_on_news(std::function<void()> on_news) { on_news_ = std::move(on_news); }
 
   // What came for a reader since it last asked.
   struct News {
@@ -82,7 +83,6 @@ class LiveState final : public RecordSink {
       std::shared_ptr<const std::string> json;
     };
     std::vector<Line> lines;  // oldest first; at most kBatch
-    bool closed = false;
   };
   static constexpr std::size_t kBatch = 16;
 
@@ -93,8 +93,7 @@ class LiveState final : public RecordSink {
     ~Reader();
     Reader(const Reader&) = delete;
     Reader& operator=(const Reader&) = delete;
-    // Waits for the next record, but no longer than timeout_s.
-    [[nodiscard]] News wait(double timeout_s);
+    [[nodiscard]] News take();
 
    private:
     friend class LiveState;
@@ -117,9 +116,9 @@ class LiveState final : public RecordSink {
   const std::string start_id_;
   const double started_s_;
 
+  std::function<void()> on_news_ = [] {};
+
   mutable std::mutex mutex_;
-  std::condition_variable news_;
-  bool closed_ = false;
   std::optional<OrientationRecord> newest_;
   std::optional<OrientationRecord> newest_oriented_;
   double calibration_since_s_ = 0;

@@ -17,8 +17,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr int kDeepest = 3;            // {"pixels": [[u, v]]}
-constexpr double kLargestSigma = 1e3;  // px
+constexpr int kDeepest = 3;  // {"pixels": [[u, v]]}
+constexpr double kLargestSigma_px = 1e3;
 
 // Deeper documents would take a hundred bytes for each of their own.
 bool is_shallow(const std::string& text) {
@@ -159,9 +159,9 @@ bool parse_direction_query(const std::string& body, DirectionQuery* query, std::
   const auto sigma = object.find("pixel_sigma_px");
   if (sigma == object.end()) return true;
   const bool good =
-      sigma->is_number() && sigma->get<double>() >= 0 && sigma->get<double>() <= kLargestSigma;
+      sigma->is_number() && sigma->get<double>() >= 0 && sigma->get<double>() <= kLargestSigma_px;
   if (!good) {
-    *error = fmt::format("pixel_sigma_px must be a number from 0 to {}", kLargestSigma);
+    *error = fmt::format("pixel_sigma_px must be a number from 0 to {}", kLargestSigma_px);
     return false;
   }
   query->pixel_sigma_px = sigma->get<double>();

@@ -1,7 +1,10 @@
 #include "edge_app/output/status_page.h"
 
+#include <chrono>
 #include <cmath>
+#include <memory>
 #include <nlohmann/json.hpp>
+#include <optional>
 
 #include "edge_app/pipeline/small_picture.h"
 
@@ -11,7 +14,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 // A frame of a slow camera comes within it.
-constexpr std::chrono::seconds kPatience{1};
+constexpr double kPatienceS = 1;
+constexpr std::chrono::milliseconds kWithoutWaiting{0};
 
 ServerResponse no_picture() {
   return http_error(503, "no picture: the video is away, or none is decoded (realtime.mode: PT)");
@@ -27,8 +31,9 @@ ServerResponse page() {
   return response;
 }
 
-ServerResponse picture_of_now(PictureTap* tap) {
-  const auto picture = tap->ask(kPatience);
+std::optional<ServerResponse> picture(PictureTap* tap, const ServerRequest& request) {
+  const auto picture = tap->ask(kWithoutWaiting);
+  if (picture == nullptr && request.waited_s < kPatienceS) return std::nullopt;
   if (picture == nullptr || picture->jpeg.empty()) return no_picture();
   ServerResponse response;
   response.type = "image/jpeg";
@@ -38,7 +43,7 @@ ServerResponse picture_of_now(PictureTap* tap) {
   return response;
 }
 
-ServerResponse overlay(PictureTap* tap, const ServerRequest& request) {
+std::optional<ServerResponse> overlay(PictureTap* tap, const ServerRequest& request) {
   std::shared_ptr<const LivePicture> picture;
   if (const auto wanted = request.parameter("frame")) {
     constexpr std::size_t kDigits = 18;
@@ -50,7 +55,8 @@ ServerResponse overlay(PictureTap* tap, const ServerRequest& request) {
     if (picture == nullptr)
       return http_error(404, "that frame is not among the last that were shown");
   } else {
-    picture = tap->ask(kPatience);
+    picture = tap->ask(kWithoutWaiting);
+    if (picture == nullptr && request.waited_s < kPatienceS) return std::nullopt;
     if (picture == nullptr) return no_picture();
   }
   ServerResponse response;
@@ -91,7 +97,7 @@ std::string overlay_json(const LivePicture& picture) {
 void add_status_page(HttpServer* server, PictureTap* tap) {
   server->get("/", HttpAccess::kOpen, [](const ServerRequest&) { return page(); });
   server->get("/api/v1/picture", HttpAccess::kToken,
-              [tap](const ServerRequest&) { return picture_of_now(tap); });
+              [tap](const ServerRequest& request) { return picture(tap, request); });
   server->get("/api/v1/overlay", HttpAccess::kToken,
               [tap](const ServerRequest& request) { return overlay(tap, request); });
 }

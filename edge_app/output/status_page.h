@@ -9,7 +9,7 @@
 
 #include <string>
 
-#include "edge_app/output/http_server.h"
+#include "edge_app/output/http/http_server.h"
 #include "edge_app/pipeline/picture_tap.h"
 
 namespace alidade {

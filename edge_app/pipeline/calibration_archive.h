@@ -5,7 +5,7 @@
 #include <optional>
 #include <string>
 
-#include "core/calibration/calibration_file.h"
+#include "core/calibration/calibration_text.h"
 #include "core/model/calibration.h"
 #include "core/realtime/oe_mode/map_state.h"
 
@@ -28,7 +28,7 @@ class CalibrationArchive {
 
   // Keeps it in memory in any case, in place of the one for its zoom, within the tolerance; its `path` is
   // ignored. False with one line if it could not be written (disk full, no permission): what was stored before
-  // stays stored, and save_pending() tries again. False too if the map makes no sense: the calibration is then
+  // stays stored, and save_pending() tries again. False too if the map is not valid: the calibration is then
   // stored without it, and nothing is pending.
   [[nodiscard]] virtual bool save(const StoredCalibration& calibration, std::string* error) = 0;
   [[nodiscard]] virtual bool has_pending() const = 0;

@@ -35,7 +35,7 @@ struct FrameTracks {
   double time_s = 0;  // filtered capture time of row 0, as in the record
   Tracker tracker = Tracker::kNone;
   bool clock_restarted = false;                  // the frame clock began anew with this frame
-  bool floor_shifted = false;                    // the least delay of the video stepped
+  bool delay_stepped = false;                    // the least delay of the video stepped
   OeStatus oe_status = OeStatus::kNoPrediction;  // kOe
   int looked_for = 0;                            // points expected in the picture
   int count = 0;

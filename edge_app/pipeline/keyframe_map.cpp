@@ -11,7 +11,7 @@ namespace alidade {
 namespace {
 
 // Of the trajectory about a keyframe, where the adjustment's knots are too few for the motion.
-constexpr double kSigmaPx = 0.2;
+constexpr double kSigma_px = 0.2;
 constexpr double kRatePerAngle = 20;  // 1/s
 constexpr double kAccelerationSigmaPxPerS2 = 80;
 
@@ -40,15 +40,15 @@ double samples_worth_one(const std::vector<double>& errors) {
 }  // namespace
 
 InterpolatedPanTilt predict(const CalibrationResult& result, double time_s, double sigma_px) {
-  constexpr double kHalfSpan = 0.02;  // s, over which the acceleration is taken
-  constexpr double kRenewal = 0.5;    // s, about a segment of the trajectory
+  constexpr double kHalfSpan_s = 0.02;        // over which the acceleration is taken
+  constexpr double kCorrelationTime_s = 0.5;  // about a segment of the trajectory
   const TrajectorySpline& trajectory = result.trajectory;
   const Mechanics<double>& mechanics = result.calibration.mechanics;
   const Vector2<double> scale(mechanics.pan_scale, mechanics.tilt_scale);
   const PanTilt<double> angle = trajectory.position(time_s);
   const PanTilt<double> rate = trajectory.rate(time_s);
-  const PanTilt<double> before = trajectory.rate(time_s - kHalfSpan);
-  const PanTilt<double> after = trajectory.rate(time_s + kHalfSpan);
+  const PanTilt<double> before = trajectory.rate(time_s - kHalfSpan_s);
+  const PanTilt<double> after = trajectory.rate(time_s + kHalfSpan_s);
   InterpolatedPanTilt out;
   out.angle = {wrap_angle(scale.x() * angle.pan), wrap_angle(scale.y() * angle.tilt)};
   out.rate = {scale.x() * rate.pan, scale.y() * rate.tilt};
@@ -56,12 +56,12 @@ InterpolatedPanTilt predict(const CalibrationResult& result, double time_s, doub
   const double of_rate = kRatePerAngle * of_angle;
   out.covariance.diagonal() << of_angle * of_angle, of_angle * of_angle, of_rate * of_rate,
       of_rate * of_rate;
-  out.acceleration = {scale.x() * (after.pan - before.pan) / (2 * kHalfSpan),
-                      scale.y() * (after.tilt - before.tilt) / (2 * kHalfSpan)};
-  out.acceleration_square =
-      out.acceleration.vector().cwiseAbs2().array() + of_rate * of_rate / (kRenewal * kRenewal);
+  out.acceleration = {scale.x() * (after.pan - before.pan) / (2 * kHalfSpan_s),
+                      scale.y() * (after.tilt - before.tilt) / (2 * kHalfSpan_s)};
+  out.acceleration_square = out.acceleration.vector().cwiseAbs2().array() +
+                            of_rate * of_rate / (kCorrelationTime_s * kCorrelationTime_s);
   out.samples = kInterpolationWindow;
-  out.renewal_s = kRenewal;
+  out.correlation_time_s = kCorrelationTime_s;
   return out;
 }
 
@@ -100,14 +100,14 @@ MapState map_from_keyframes(const CalibrationResult& result,
   const double to_middle_s = result.calibration.line_delay * camera.height / 2;
   const double acceleration_sigma = kAccelerationSigmaPxPerS2 / camera.focal_length;
   OeOptions options = oe_options(camera);
-  options.max_new = options.max_landmarks;  // a view is there once only
+  options.maker.max_new = options.max_landmarks;  // a view is there once only
   OeMode mode(options);
   mode.reset(result.calibration);
   double tilt = 0;
   std::vector<std::uint8_t> pixels;
   for (const Keyframe& keyframe : keyframes) {
     const double middle_s = keyframe.time_s + to_middle_s;
-    InterpolatedPanTilt prediction = predict(result, middle_s, kSigmaPx);
+    InterpolatedPanTilt prediction = predict(result, middle_s, kSigma_px);
     prediction.acceleration_sigma = acceleration_sigma;
     FrameOrientation orientation;
     const ImageView picture =
@@ -119,11 +119,11 @@ MapState map_from_keyframes(const CalibrationResult& result,
   }
   MapState map = mode.map_state();
   map.offset_covariance += tie_covariance(result);
-  map.bend_tilt = tilt;
-  const double rate_sigma = kRatePerAngle * kSigmaPx / camera.focal_length;
-  for (Matrix3<double>& bend : map.bend_covariance) {
-    bend.setZero();
-    bend.diagonal() << 0, rate_sigma * rate_sigma, acceleration_sigma * acceleration_sigma;
+  map.shear_tilt = tilt;
+  const double rate_sigma = kRatePerAngle * kSigma_px / camera.focal_length;
+  for (Matrix3<double>& shear : map.shear_covariance) {
+    shear.setZero();
+    shear.diagonal() << 0, rate_sigma * rate_sigma, acceleration_sigma * acceleration_sigma;
   }
   return map;
 }

@@ -6,7 +6,7 @@
 //              cov = 2 max(1, ratio)^2 tau / sum(1 / sigma^2)      for each axis
 //            sigma as the calibration used it, ratio of the residuals to it, tau = 1 + 2 sum of the residuals'
 //            autocorrelations: samples whose errors repeat each other count as one. The 2 is for safety.
-//   bend     how far the trajectory's rates and accelerations may be wrong
+//   shear    how far the trajectory's rates and accelerations may be wrong
 // Angles rad, times s on the image clock.
 // Pure; allocates; some 10 ms a keyframe. Not for the real-time thread.
 

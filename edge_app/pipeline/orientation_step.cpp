@@ -7,12 +7,13 @@
 #include "edge_app/pipeline/frame_observations.h"
 
 namespace alidade {
+
 OeOptions oe_options(const Camera<double>& camera) {
   constexpr double kLeastColumns = 24;
   OeOptions options;
   options.max_width = camera.width;
   options.max_height = camera.height;
-  options.cell_size_px = std::min(options.cell_size_px, camera.width / kLeastColumns);
+  options.maker.cell_size_px = std::min(options.maker.cell_size_px, camera.width / kLeastColumns);
   return options;
 }
 
@@ -38,9 +39,9 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
 OrientationStep::Telemetry OrientationStep::empty_telemetry(bool filtered) const {
   // Filtered times share the error of their line; polled ones have each an error of its own, which a
   // bound beyond every stamp's sigma says.
-  constexpr double kAllOwn = 1e3;  // s
+  constexpr double kAllOwn_s = 1e3;
   TelemetryNoise noise = options_.telemetry_noise;
-  if (!filtered) noise.period_sigma_s = kAllOwn;
+  if (!filtered) noise.period_sigma_s = kAllOwn_s;
   return Telemetry(noise, options_.telemetry_limits);
 }
 
@@ -51,7 +52,7 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   if (sample.restarted || filtered != telemetry_filtered_ || (clock && clock->restarted)) {
     telemetry_ = empty_telemetry(filtered);
     telemetry_filtered_ = filtered;
-    pending_.clear();
+    if (oe_) oe_->forget_pending();
   }
   telemetry_lost_ = false;
   if (sample.zoom) {
@@ -73,17 +74,17 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   // What the buffer refuses (a duplicate, a value that is not finite) it counts, and the records'
   // sigma says the rest.
   static_cast<void>(telemetry_.push(timed));
-  tell_pending_frames();
+  settle_pending_frames();
 }
 
-void OrientationStep::tell_pending_frames() {
-  while (const auto frame = pending_.take(
-             telemetry_.newest_time().value_or(-std::numeric_limits<double>::infinity()))) {
-    InterpolatedPanTilt measured;
-    if (telemetry_.query(frame->telemetry_time_s, frame->time_sigma_s, &measured) ==
-        QueryStatus::kOk) {
-      oe_->add_late_telemetry(frame->frame_time_s, measured);
-    }
+void OrientationStep::settle_pending_frames() {
+  const std::optional<double> newest_s = telemetry_.newest_time();
+  if (!oe_ || !newest_s) return;
+  TelemetryLookUp look_up;
+  while (oe_->pending(*newest_s, &look_up)) {
+    InterpolatedPanTilt late;
+    const QueryStatus query = telemetry_.query(look_up.time_s, look_up.time_sigma_s, &late);
+    oe_->settle_pending(query == QueryStatus::kOk ? &late : nullptr);
   }
 }
 
@@ -93,8 +94,7 @@ void OrientationStep::adopt(const PublishedCalibration& published) {
   options_.calibration = published.calibration;
   options_.calibrated = published.calibrated;
   zoom_at_adoption_ = zoom_;
-  floor_sigma_s_ = 0;
-  pending_.clear();
+  minimum_delay_sigma_s_ = 0;
   if (oe_) oe_->reset(published.calibration, published.map);
 }
 
@@ -129,13 +129,14 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
               .update(stamp.receive_time_s, stamp.sender_time_s, stamp.sequence, stamp.restarted)
               .value_or(clock);
   events->video_clock_restarted = clock.restarted;
-  events->video_floor_shifted = clock.delay_stepped;
-  if (clock.restarted || clock.delay_stepped) floor_sigma_s_ = options_.floor_sigma_s;
+  events->video_delay_stepped = clock.delay_stepped;
+  if (clock.restarted || clock.delay_stepped)
+    minimum_delay_sigma_s_ = options_.minimum_delay_sigma_s;
   picture_ = picture;
   tracks_.stamp = stamp;
   tracks_.time_s = clock.time_s;
   tracks_.clock_restarted = clock.restarted;
-  tracks_.floor_shifted = clock.delay_stepped;
+  tracks_.delay_stepped = clock.delay_stepped;
   tracks_.tracker = FrameTracks::Tracker::kNone;
 
   OrientationRecord record = empty_record();
@@ -146,7 +147,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const double to_middle_row_s = calibration.line_delay * (0.5 * calibration.camera.height);
   InterpolatedPanTilt measured;
   const double telemetry_time_s = clock.time_s + calibration.clock_offset + to_middle_row_s;
-  const double time_sigma_s = std::hypot(clock.sigma_s, floor_sigma_s_);
+  const double time_sigma_s = std::hypot(clock.sigma_s, minimum_delay_sigma_s_);
   const QueryStatus query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
   if (const auto newest_s = telemetry_.newest_time())
     record.telemetry_age_s = telemetry_time_s - *newest_s;
@@ -159,9 +160,6 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
     return record;
   }
   orient(has_result(query) ? &measured : nullptr, picture, &record);
-  if (query == QueryStatus::kExtrapolated && finds_landmarks()) {
-    pending_.add({clock.time_s, telemetry_time_s, time_sigma_s});
-  }
   return record;
 }
 

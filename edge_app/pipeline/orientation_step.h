@@ -32,7 +32,6 @@
 #include "edge_app/pipeline/capture_clock.h"
 #include "edge_app/pipeline/frame_landmarks.h"
 #include "edge_app/pipeline/orientation_record.h"
-#include "edge_app/pipeline/pending_frames.h"
 #include "edge_app/pipeline/published_calibration.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
@@ -57,7 +56,7 @@ struct OrientationStepOptions {
   // With OE mode: follow points as long as there is no calibration.
   bool follow_points = false;
   double zoom_tolerance = 0;  // device units within which the calibration holds
-  double floor_sigma_s =
+  double minimum_delay_sigma_s =
       5e-3;  // by how much a new connection's least delay differs, one standard deviation
 };
 
@@ -67,7 +66,7 @@ struct OrientationStepOptions {
 // What a frame brought to light, for the log.
 struct StepEvents {
   bool video_clock_restarted = false;
-  bool video_floor_shifted = false;  // the least delay stepped: flagged, not followed
+  bool video_delay_stepped = false;  // the least delay stepped: flagged, not followed
 };
 
 class OrientationStep {
@@ -85,7 +84,7 @@ class OrientationStep {
   // For when the record is out: upkeep of the landmark map with the frame last added, or the following of
   // points through it.
   void maintain();
-  // In OE mode, for now.
+  // In OE mode, with the calibration and the zoom of this moment.
   [[nodiscard]] bool finds_landmarks() const { return oe_ && options_.calibrated && zoom_fits(); }
   // In OE mode, or following points.
   [[nodiscard]] bool looks_at_pictures() const { return finds_landmarks() || start_up_; }
@@ -106,7 +105,8 @@ class OrientationStep {
   [[nodiscard]] OrientationRecord empty_record() const;
   // False: there is a calibration, but not for the zoom that the pan/tilt source reports.
   [[nodiscard]] bool zoom_fits() const;
-  void tell_pending_frames();
+  // Frames that extrapolated telemetry answered, and that telemetry encloses by this sample.
+  void settle_pending_frames();
   // Completes a record that has its time and telemetry's status; measured: null if there is none.
   void orient(const InterpolatedPanTilt* measured, const ImageView& picture,
               OrientationRecord* record);
@@ -115,12 +115,11 @@ class OrientationStep {
   CaptureClock video_clock_;
   CaptureClock telemetry_clock_;
   Telemetry telemetry_;
-  PendingFrames pending_;                     // of OE mode
   std::unique_ptr<OeMode> oe_;                // null: PT mode
   std::unique_ptr<StartUpTracker> start_up_;  // null: nobody wants its points
   std::optional<double> zoom_;                // as last reported
   std::optional<double> zoom_at_adoption_;    // that a calibration without zoom is for
-  double floor_sigma_s_ = 0;
+  double minimum_delay_sigma_s_ = 0;
   ImageView picture_;                // of the frame last added, until it is maintained
   FrameTracks tracks_;               // of the frame last added, but for its points
   bool telemetry_filtered_ = false;  // times in telemetry_ come from telemetry_clock_

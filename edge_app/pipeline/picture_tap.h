@@ -59,7 +59,7 @@ class PictureTap {
   // Any thread but the real-time one. One of the last kKept pictures; null: it is not among them.
   [[nodiscard]] std::shared_ptr<const LivePicture> of_frame(std::int64_t frame) const;
 
-  // Any thread but the real-time one: nobody waits any more, now or later.
+  // Any thread but the real-time one: nobody waits, from this moment on.
   void close();
 
   // Real-time thread. True: the next frame with a picture is wanted, and whoever was told so has to push one.
@@ -72,7 +72,7 @@ class PictureTap {
   // Tap thread: makes pictures until end(), and closes.
   void run();
 
-  // Capture thread: a slot that is no longer looked at, one after the other.
+  // Capture thread: a slot that nobody looks at, one after the other.
   bool pop_returned(PictureSlot& slot) { return returned_.pop(slot); }
 
  private:

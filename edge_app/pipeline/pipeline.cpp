@@ -154,7 +154,7 @@ void Pipeline::run_realtime() {
   } while (stage_.process());
   const PageFaults at_end = thread_page_faults();
   realtime_thread_.store(0, std::memory_order_release);
-  // Nothing is in a hurry any more.
+  // Nothing is in a hurry here.
   const std::lock_guard<std::mutex> lock(summary_mutex_);
   page_faults_ = {at_end.minor - faults_at_start_.minor, at_end.major - faults_at_start_.major};
 }
@@ -250,7 +250,7 @@ void Pipeline::count(const OutputMessage& message) {
   if (message.record.frame && message.record.latency_s)
     summary_.latency.add(*message.record.latency_s);
   if (message.events.video_clock_restarted) ++summary_.clock_restarts;
-  if (message.events.video_floor_shifted) ++summary_.floor_shifts;
+  if (message.events.video_delay_stepped) ++summary_.delay_steps;
 }
 
 // Nothing else in the log tells why such records have no orientation: both connections are there.
@@ -272,7 +272,7 @@ void Pipeline::account(const OutputMessage& message) {
   if (message.events.video_clock_restarted) {
     spdlog::info("{}: clock filter restarted at frame {}", video_.name(), *message.record.frame);
   }
-  if (message.events.video_floor_shifted) {
+  if (message.events.video_delay_stepped) {
     spdlog::warn("{}: the least delay of the video stepped at frame {}; not followed",
                  video_.name(), *message.record.frame);
   }

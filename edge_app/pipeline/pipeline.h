@@ -44,7 +44,7 @@ struct PipelineOptions {
 
 struct PipelineSummary {
   std::int64_t clock_restarts = 0;
-  std::int64_t floor_shifts = 0;
+  std::int64_t delay_steps = 0;
   std::int64_t records = 0;
   std::int64_t frames = 0;
   std::int64_t with_orientation = 0;

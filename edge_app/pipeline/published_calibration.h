@@ -1,6 +1,6 @@
 #pragma once
 // PublishedCalibration: what the calibration thread hands to the real-time thread: a calibration and the map
-// made with it, as one object that nobody changes any more. CalibrationReport: what the calibration thread
+// made with it, as one object that is never changed. CalibrationReport: what the calibration thread
 // is doing and what it needs, for records and log.
 
 #include <cstdint>

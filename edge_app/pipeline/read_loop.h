@@ -17,14 +17,14 @@ namespace alidade {
 // and then each second until the next item. Returns the source's error if it failed for good.
 template <typename Item, typename Source, typename OnItem, typename OnLoss>
 std::string read_to_the_end(Source& source, const OnItem& on_item, const OnLoss& on_loss) {
-  constexpr double kReadTimeout = 0.2;  // s; bounds how late a notice of a loss can be
-  constexpr double kNoticePeriod = 1;   // s
+  constexpr double kReadTimeout_s = 0.2;  // bounds how late a notice of a loss can be
+  constexpr double kNoticePeriod_s = 1;
   bool lost = false;
   double next_notice_s = 0;
   std::string said;
   Item item;
   while (true) {
-    switch (source.read(item, kReadTimeout)) {
+    switch (source.read(item, kReadTimeout_s)) {
       case ReadStatus::kOk:
         if (lost) spdlog::info("{}: connected again", source.name());
         lost = false;
@@ -51,7 +51,7 @@ std::string read_to_the_end(Source& source, const OnItem& on_item, const OnLoss&
     const double now = monotonic_now_s();
     if (lost && now >= next_notice_s) {
       on_loss(now);
-      next_notice_s = now + kNoticePeriod;
+      next_notice_s = now + kNoticePeriod_s;
     }
   }
 }

@@ -14,7 +14,7 @@ void touch(Queue* queue) {
 }
 
 // How long a picture may have waited while others wait behind it.
-constexpr double kPatienceS = 0.1;
+constexpr double kPatience_s = 0.1;
 
 }  // namespace
 
@@ -79,7 +79,7 @@ void RealtimeStage::adopt_published() {
 
 bool RealtimeStage::is_late(const VideoMessage& message, double now_s) const {
   return measure_latency_ && step_.looks_at_pictures() && message.picture.valid() &&
-         now_s - message.decoded_s > kPatienceS && video_queue_.read_available() > 0;
+         now_s - message.decoded_s > kPatience_s && video_queue_.read_available() > 0;
 }
 
 void RealtimeStage::process_frame(const VideoMessage& received) {

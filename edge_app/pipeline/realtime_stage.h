@@ -83,7 +83,7 @@ class RealtimeStage {
   RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed,
                 PictureTap* tap = nullptr);
 
-  // Capture thread: a slot that nobody needs any more, one after the other.
+  // Capture thread: a slot that nobody needs, one after the other.
   bool pop_returned(PictureSlot& slot) {
     return returned_.pop(slot) || returned_by_calibration_.pop(slot) ||
            (tap_ != nullptr && tap_->pop_returned(slot));

@@ -9,6 +9,7 @@
 // What a person reads of each, and what to do: edge_app/README.md.
 
 #include <array>
+#include <cstddef>
 #include <cstdint>
 
 namespace alidade {

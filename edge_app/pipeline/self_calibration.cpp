@@ -254,7 +254,7 @@ void SelfCalibration::add(const FrameTracks& tracks) {
   last_frame_s_ = tracks.stamp.receive_time_s;
   video_is_lost_ = false;
   // The clock offset of the frames before is not that of the frames to come.
-  if (tracks.clock_restarted || tracks.floor_shifted) {
+  if (tracks.clock_restarted || tracks.delay_stepped) {
     if (!session_.empty()) begin_anew();
     if (is_calibrated_here()) clock_offset_known_ = false;
   }

@@ -12,18 +12,18 @@ namespace alidade {
 namespace {
 
 // Steps of a rounding in a file, or of arithmetic, are none of the device's.
-constexpr double kSmallestStep = 2e-7;  // rad
+constexpr double kSmallestStep_rad = 2e-7;
 constexpr std::size_t kLeastSteps =
     8;  // by chance 8 lie near multiples once in 0.06^-8 = 6e9 times
 
-// Whether ascending gaps are multiples of q; improves q. From gaps of a few quanta to larger ones, as q gets better: its
+// Whether ascending gaps are multiples of q; improves q. From gaps of a few steps to larger ones, as q gets better: its
 // error, times their number, must stay below what counts as near.
 bool fits(const std::vector<double>& gaps, double* q) {
   constexpr double kShare = 0.95;     // of the gaps that must be near a multiple
   constexpr double kLeastUsed = 0.3;  // of all gaps
   struct Round {
-    double most;  // quanta of a gap
-    double near;  // quanta from a multiple
+    double most;  // steps of a gap
+    double near;  // steps from a multiple
   };
   constexpr double kNear = 0.03;
   for (const Round& round :
@@ -54,7 +54,7 @@ bool fits(const std::vector<double>& gaps, double* q) {
   return false;
 }
 
-// Whether gaps of so many quanta occur that even motion, each poll as far as the one before, cannot be meant.
+// Whether gaps of so many steps occur that even motion, each poll as far as the one before, cannot be meant.
 bool vary(const std::vector<double>& gaps, double q) {
   std::map<std::int64_t, std::size_t> counts;
   std::size_t most = 0;
@@ -64,12 +64,12 @@ bool vary(const std::vector<double>& gaps, double q) {
 
 struct Axis {
   double PanTiltSample::*angle;
-  double quantum;
+  double resolution;
 };
 
 // The run before, the run itself and two after it; see the header.
 bool is_stale(const std::vector<PanTiltSample>& samples, const EqualRun* run, const Axis& axis) {
-  constexpr double kHiddenQuanta = 1.5;
+  constexpr double kHiddenSteps = 1.5;
   constexpr double kExplained = 0.75;
   std::array<double, 4> time_s{};
   std::array<double, 4> angle{};
@@ -87,20 +87,20 @@ bool is_stale(const std::vector<PanTiltSample>& samples, const EqualRun* run, co
       samples[run[1].end - 1].earliest_time_s - samples[run[1].begin].latest_time_s;
   const double least = std::min(std::abs(before), std::abs(after)) * held_s;
   const double all = 0.5 * std::abs(before + after) * (time_s[2] - time_s[1]);
-  return least > std::max(kHiddenQuanta * axis.quantum, kSmallestStep) &&
+  return least > std::max(kHiddenSteps * axis.resolution, kSmallestStep_rad) &&
          std::abs(out) >= kExplained * all;
 }
 
-double quantum_of(const std::vector<PanTiltSample>& samples, double PanTiltSample::*angle) {
+double resolution_of(const std::vector<PanTiltSample>& samples, double PanTiltSample::*angle) {
   std::vector<double> angles;
   angles.reserve(samples.size());
   for (const PanTiltSample& sample : samples) angles.push_back(sample.*angle);
-  return angle_quantum(angles);
+  return device_resolution(angles);
 }
 
 }  // namespace
 
-double angle_quantum(const std::vector<double>& angles_rad) {
+double device_resolution(const std::vector<double>& angles_rad) {
   constexpr int kMostParts = 6;  // the smallest gap seen may be so many quanta
   std::vector<double> sorted;
   std::copy_if(angles_rad.begin(), angles_rad.end(), std::back_inserter(sorted),
@@ -108,22 +108,23 @@ double angle_quantum(const std::vector<double>& angles_rad) {
   std::sort(sorted.begin(), sorted.end());
   std::vector<double> gaps;
   for (std::size_t i = 1; i < sorted.size(); ++i) {
-    if (sorted[i] - sorted[i - 1] > kSmallestStep) gaps.push_back(sorted[i] - sorted[i - 1]);
+    if (sorted[i] - sorted[i - 1] > kSmallestStep_rad) gaps.push_back(sorted[i] - sorted[i - 1]);
   }
   if (gaps.size() < kLeastSteps) return 0;
   std::sort(gaps.begin(), gaps.end());
-  double quantum = 0;
+  double resolution = 0;
   // The smallest gap may be a wild angle's: then one of the next ones tells.
   for (const double share : {0.0, 0.02, 0.05, 0.1, 0.2}) {
     const double base = gaps[static_cast<std::size_t>(share * static_cast<double>(gaps.size()))];
     for (int parts = 1; parts <= kMostParts; ++parts) {
       double q = base / parts;
-      if (q > quantum && q > kSmallestStep && fits(gaps, &q)) quantum = std::max(quantum, q);
+      if (q > resolution && q > kSmallestStep_rad && fits(gaps, &q))
+        resolution = std::max(resolution, q);
     }
   }
-  // A head that turns evenly gives even steps without any quantum, but never the same angle twice.
+  // A head that turns evenly gives even steps without any resolution, but never the same angle twice.
   const bool recur = 10 * (sorted.size() - gaps.size() - 1) >= sorted.size();
-  return quantum > 0 && (recur || vary(gaps, quantum)) ? quantum : 0;
+  return resolution > 0 && (recur || vary(gaps, resolution)) ? resolution : 0;
 }
 
 std::vector<EqualRun> equal_runs(const std::vector<PanTiltSample>& samples) {
@@ -143,8 +144,8 @@ std::vector<bool> find_stale_repeats(const std::vector<PanTiltSample>& samples) 
   const std::vector<EqualRun> runs = equal_runs(samples);
   if (runs.size() < kLeastSteps || runs.size() == samples.size()) return stale;
   const std::array<Axis, 2> axes = {
-      {{&PanTiltSample::pan_rad, quantum_of(samples, &PanTiltSample::pan_rad)},
-       {&PanTiltSample::tilt_rad, quantum_of(samples, &PanTiltSample::tilt_rad)}}};
+      {{&PanTiltSample::pan_rad, resolution_of(samples, &PanTiltSample::pan_rad)},
+       {&PanTiltSample::tilt_rad, resolution_of(samples, &PanTiltSample::tilt_rad)}}};
   for (std::size_t i = 1; i + 2 < runs.size(); ++i) {
     const auto begins_anew = [&](std::size_t run) { return samples[runs[run].begin].restarted; };
     if (runs[i].end - runs[i].begin < 2 || begins_anew(i) || begins_anew(i + 1) ||

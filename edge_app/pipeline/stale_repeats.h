@@ -8,7 +8,7 @@
 // before and w after it (each at its first time), is stale after its first sample if on one axis
 //   the head turned one way all the while: u -> v, v -> w and what follows w have the same sign,
 //   it should have left v by more than rounding hides: the lower of the rates before and after, times
-//   (t_b - t_a), of which the intervals of both samples are taken off, exceeds 1.5 quanta,
+//   (t_b - t_a), of which the intervals of both samples are taken off, exceeds 1.5 resolutions,
 //   and did: |w - v| is at least 3/4 of what the mean of the two rates makes of the whole time from t_a to w.
 // The last tells a device that was not measured from a head that stood still and moved on: that has only
 // the last interval for w - v, which is half of the whole time or less. What cannot be told is not stale.
@@ -28,8 +28,9 @@ namespace alidade {
 
 // The largest step of which differences between the angles of one axis are whole multiples, as far as the
 // data show: of neighbouring angles, put in order of size, 19 of 20 lie within 3 % of q of a whole multiple. Printed
-// digits and single wild angles do not matter. 0: none, or too little motion to tell.
-[[nodiscard]] double angle_quantum(const std::vector<double>& angles_rad);
+// digits and single wild angles do not matter. 0: none, or too little motion to tell. (The calibration's own,
+// core/calibration/initialization.h, asks more: that every step of an axis is a whole multiple.)
+[[nodiscard]] double device_resolution(const std::vector<double>& angles_rad);
 
 // For each sample, in order of time. A sample that begins anew after a reconnection repeats nothing.
 [[nodiscard]] std::vector<bool> find_stale_repeats(const std::vector<PanTiltSample>& samples);

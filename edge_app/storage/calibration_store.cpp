@@ -12,8 +12,9 @@
 #include <system_error>
 #include <utility>
 
-#include "core/calibration/atomic_file.h"
+#include "edge_app/storage/calibration_file.h"
 #include "edge_app/storage/map_file.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {

@@ -8,7 +8,7 @@
 #include <cstring>
 #include <limits>
 
-#include "core/calibration/atomic_file.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 
@@ -178,11 +178,11 @@ const char* flaw_of(const Landmark& landmark) {
 
 const char* flaw_of(const MapState& map) {
   const bool finite = map.offset.vector().allFinite() && map.offset_covariance.allFinite() &&
-                      map.offset_sensitivity.allFinite() && map.bend_covariance[0].allFinite() &&
-                      map.bend_covariance[1].allFinite() && std::isfinite(map.bend_tilt);
+                      map.offset_sensitivity.allFinite() && map.shear_covariance[0].allFinite() &&
+                      map.shear_covariance[1].allFinite() && std::isfinite(map.shear_tilt);
   if (!finite) return kNotFinite;
-  if (!is_positive(map.offset_covariance) || !is_positive(map.bend_covariance[0]) ||
-      !is_positive(map.bend_covariance[1])) {
+  if (!is_positive(map.offset_covariance) || !is_positive(map.shear_covariance[0]) ||
+      !is_positive(map.shear_covariance[1])) {
     return kNotPositive;
   }
   return "";
@@ -259,8 +259,8 @@ std::string format_map(const MapContent& content, const Calibration& calibration
   out.f64(map.offset.pan);
   out.f64(map.offset.tilt);
   out.symmetric(map.offset_covariance);
-  for (const Matrix3<double>& bend : map.bend_covariance) out.symmetric(bend);
-  out.f64(map.bend_tilt);
+  for (const Matrix3<double>& shear : map.shear_covariance) out.symmetric(shear);
+  out.f64(map.shear_tilt);
   out.sensitivity(map.offset_sensitivity);
   for (const CalibrationLandmark& point : content.points) write(point, &out);
   for (const Landmark& landmark : map.landmarks) write(landmark, &out);
@@ -308,8 +308,8 @@ bool parse_map(const std::string& bytes, const std::string& name, const Calibrat
   map.offset.pan = in.f64();
   map.offset.tilt = in.f64();
   in.symmetric(&map.offset_covariance);
-  for (Matrix3<double>& bend : map.bend_covariance) in.symmetric(&bend);
-  map.bend_tilt = in.f64();
+  for (Matrix3<double>& shear : map.shear_covariance) in.symmetric(&shear);
+  map.shear_tilt = in.f64();
   in.sensitivity(&map.offset_sensitivity);
   std::string flaw = flaw_of(map);
   if (!flaw.empty()) return refuse("its frame " + flaw);

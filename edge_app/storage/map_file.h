@@ -8,9 +8,9 @@
 //         24   u64      number of landmarks m
 //         32   2 f64    offset of the map: pan, tilt, rad, base minus map
 //         48   3 f64    its covariance: xx, xy, yy, rad^2
-//         72   6 f64    covariance of pan's bend: upper half, by rows, of (angle, rate, acceleration)
+//         72   6 f64    covariance of pan's shear: upper half, by rows, of (angle, rate, acceleration)
 //        120   6 f64    of tilt's
-//        168   f64      the tilt that the bend is told for, rad
+//        168   f64      the tilt that the shear is told for, rad
 //        176   22 f64   sensitivity of the offset: by rows pan, tilt, in the order of Parameter
 //        352   n times 60 bytes:
 //                 i64     point's name in the tracks

@@ -32,44 +32,26 @@ HeaderListPtr header_list(const std::vector<std::string>& headers) {
   return list;
 }
 
-}  // namespace
-
-std::string take_http_url(const std::string& text, Url* url, HttpPollingOptions* options) {
-  std::string error;
-  const bool is_url = parse_url(text, url, &error);
-  options->name = url->bare;
-  if (!is_url) {
-    return error;
-  }
-  if (options->user.empty() && options->password.empty()) {
-    options->user = url->user;
-    options->password = url->password;
-  }
-  return url->scheme == "http" || url->scheme == "https"
-             ? ""
-             : "the URL must be http://host[:port] or https://host[:port]";
-}
-
-class HttpPollingSource::Implementation {
+class HttpPollingSource : public PanTiltSource {
  public:
-  explicit Implementation(HttpPollingPlan plan);
-  ~Implementation() {
+  explicit HttpPollingSource(HttpPollingPlan plan);
+  ~HttpPollingSource() override {
     if (under_way_) {
       curl_multi_remove_handle(multi_.get(), easy_.get());
     }
   }
 
-  ReadStatus read(PanTiltSample& sample, double timeout_s);
+  ReadStatus read(PanTiltSample& sample, double timeout_s) override;
 
-  void stop() {
+  void stop() override {
     stopped_ = true;
     if (multi_) {
       curl_multi_wakeup(multi_.get());
     }
   }
 
-  const std::string& error() const { return error_; }
-  const std::string& name() const { return options_.name; }
+  std::string error() const override { return error_; }
+  std::string name() const override { return options_.name; }
 
  private:
   static std::size_t on_header(char* data, std::size_t size, std::size_t count, void* self);
@@ -111,7 +93,7 @@ class HttpPollingSource::Implementation {
   std::string body_;
 };
 
-HttpPollingSource::Implementation::Implementation(HttpPollingPlan plan)
+HttpPollingSource::HttpPollingSource(HttpPollingPlan plan)
     : options_(std::move(plan.options)),
       conversation_(std::move(plan.conversation)),
       period_s_(1 / options_.rate_hz),
@@ -130,22 +112,22 @@ HttpPollingSource::Implementation::Implementation(HttpPollingPlan plan)
   }
 }
 
-bool HttpPollingSource::Implementation::make_handle() {
+bool HttpPollingSource::make_handle() {
   easy_ = make_http_handle(options_.user, options_.password, kMethod, curl_error_);
   if (!easy_) {
     return false;
   }
   curl_easy_setopt(easy_.get(), CURLOPT_TIMEOUT_MS, std::lround(1e3 * options_.timeout_s));
-  curl_easy_setopt(easy_.get(), CURLOPT_HEADERFUNCTION, &Implementation::on_header);
+  curl_easy_setopt(easy_.get(), CURLOPT_HEADERFUNCTION, &HttpPollingSource::on_header);
   curl_easy_setopt(easy_.get(), CURLOPT_HEADERDATA, this);
-  curl_easy_setopt(easy_.get(), CURLOPT_WRITEFUNCTION, &Implementation::on_body);
+  curl_easy_setopt(easy_.get(), CURLOPT_WRITEFUNCTION, &HttpPollingSource::on_body);
   curl_easy_setopt(easy_.get(), CURLOPT_WRITEDATA, this);
   return true;
 }
 
-std::size_t HttpPollingSource::Implementation::on_header(char* data, std::size_t size,
-                                                         std::size_t count, void* self) {
-  auto* poll = static_cast<Implementation*>(self);
+std::size_t HttpPollingSource::on_header(char* data, std::size_t size, std::size_t count,
+                                         void* self) {
+  auto* poll = static_cast<HttpPollingSource*>(self);
   const std::size_t bytes = size * count;
   if (std::string_view(data, bytes).substr(0, 5) == "HTTP/") {
     poll->previous_answer_s_ = poll->answer_s_;
@@ -155,9 +137,9 @@ std::size_t HttpPollingSource::Implementation::on_header(char* data, std::size_t
   return bytes;
 }
 
-std::size_t HttpPollingSource::Implementation::on_body(char* data, std::size_t size,
-                                                       std::size_t count, void* self) {
-  auto* poll = static_cast<Implementation*>(self);
+std::size_t HttpPollingSource::on_body(char* data, std::size_t size, std::size_t count,
+                                       void* self) {
+  auto* poll = static_cast<HttpPollingSource*>(self);
   const std::size_t bytes = size * count;
   if (poll->body_.size() + bytes > poll->options_.max_body) {
     return 0;  // ends the transfer with CURLE_WRITE_ERROR
@@ -166,13 +148,13 @@ std::size_t HttpPollingSource::Implementation::on_body(char* data, std::size_t s
   return bytes;
 }
 
-ReadStatus HttpPollingSource::Implementation::fail(const std::string& error) {
+ReadStatus HttpPollingSource::fail(const std::string& error) {
   error_ = options_.name + ": " + error;
   failed_ = true;
   return ReadStatus::kFailed;
 }
 
-ReadStatus HttpPollingSource::Implementation::disconnect(const std::string& error) {
+ReadStatus HttpPollingSource::disconnect(const std::string& error) {
   error_ = options_.name + ": " + error;
   restarted_ = true;
   ask_on_ = false;
@@ -180,7 +162,7 @@ ReadStatus HttpPollingSource::Implementation::disconnect(const std::string& erro
   return ReadStatus::kDisconnected;
 }
 
-void HttpPollingSource::Implementation::start_request(double now_s) {
+void HttpPollingSource::start_request(double now_s) {
   if (!std::exchange(ask_on_, false)) {
     // The next point of the grid that lies ahead.
     due_s_ = due_s_ == 0
@@ -210,7 +192,7 @@ void HttpPollingSource::Implementation::start_request(double now_s) {
   curl_multi_add_handle(multi_.get(), easy_.get());
 }
 
-bool HttpPollingSource::Implementation::request_is_over(CURLcode* code) {
+bool HttpPollingSource::request_is_over(CURLcode* code) {
   int running = 0;
   curl_multi_perform(multi_.get(), &running);
   int queued = 0;
@@ -224,7 +206,7 @@ bool HttpPollingSource::Implementation::request_is_over(CURLcode* code) {
   return true;
 }
 
-HttpAnswer HttpPollingSource::Implementation::answer() const {
+HttpAnswer HttpPollingSource::answer() const {
   HttpAnswer answer;
   curl_easy_getinfo(easy_.get(), CURLINFO_RESPONSE_CODE, &answer.status);
   if (answer.status == 401) {
@@ -248,7 +230,7 @@ HttpAnswer HttpPollingSource::Implementation::answer() const {
   return answer;
 }
 
-ReadStatus HttpPollingSource::Implementation::finish_request(CURLcode code, PanTiltSample* sample) {
+ReadStatus HttpPollingSource::finish_request(CURLcode code, PanTiltSample* sample) {
   if (code != CURLE_OK) {
     conversation_->reset();
     return disconnect(code == CURLE_WRITE_ERROR
@@ -298,7 +280,7 @@ ReadStatus HttpPollingSource::Implementation::finish_request(CURLcode code, PanT
   return ReadStatus::kOk;
 }
 
-ReadStatus HttpPollingSource::Implementation::read(PanTiltSample& sample, double timeout_s) {
+ReadStatus HttpPollingSource::read(PanTiltSample& sample, double timeout_s) {
   const double deadline_s = monotonic_now_s() + timeout_s;
   for (;;) {
     if (stopped_) {
@@ -330,14 +312,26 @@ ReadStatus HttpPollingSource::Implementation::read(PanTiltSample& sample, double
   }
 }
 
-HttpPollingSource::HttpPollingSource(HttpPollingPlan plan)
-    : implementation_(std::make_unique<Implementation>(std::move(plan))) {}
-HttpPollingSource::~HttpPollingSource() = default;
-ReadStatus HttpPollingSource::read(PanTiltSample& sample, double timeout_s) {
-  return implementation_->read(sample, timeout_s);
+}  // namespace
+
+std::string take_http_url(Url* url, HttpPollingOptions* options) {
+  std::string error;
+  const bool is_url = parse_url(options->url, url, &error);
+  options->name = url->bare;
+  if (!is_url) {
+    return error;
+  }
+  if (options->user.empty() && options->password.empty()) {
+    options->user = url->user;
+    options->password = url->password;
+  }
+  return url->scheme == "http" || url->scheme == "https"
+             ? ""
+             : "the URL must be http://host[:port] or https://host[:port]";
 }
-void HttpPollingSource::stop() { implementation_->stop(); }
-std::string HttpPollingSource::error() const { return implementation_->error(); }
-std::string HttpPollingSource::name() const { return implementation_->name(); }
+
+std::unique_ptr<PanTiltSource> open_http_polling(HttpPollingPlan plan) {
+  return std::make_unique<HttpPollingSource>(std::move(plan));
+}
 
 }  // namespace alidade

@@ -1,5 +1,5 @@
 #pragma once
-// HttpPollingSource: a PanTiltSource that asks a device again and again over one kept HTTP
+// open_http_polling(): a PanTiltSource that asks a device again and again over one kept HTTP
 // connection (libcurl). What is asked and what the answers mean is an HttpConversation's business,
 // which has no I/O of its own.
 //
@@ -57,15 +57,20 @@ class HttpConversation {
   virtual void reset() = 0;
 };
 
-struct HttpPollingOptions {
-  std::string name;  // of the source: the URL without password
-  std::string user;
+// What the user says about any device that is polled.
+struct HttpDeviceOptions {
+  std::string url;   // http://host[:port] or https://...
+  std::string user;  // these go before what the URL may hold
   std::string password;
-  AxisMapping pan;  // of what the conversation takes from an answer
+  AxisMapping pan;  // of the angle that is taken from an answer
   AxisMapping tilt;
   double rate_hz = 30;
-  double timeout_s = 1;         // for one request
-  double max_backoff_s = 5;     // longest pause between two tries
+  double timeout_s = 1;      // for one request
+  double max_backoff_s = 5;  // longest pause between two tries
+};
+
+struct HttpPollingOptions : HttpDeviceOptions {
+  std::string name;             // of the source: the URL without password
   std::size_t max_body = 4096;  // bytes of an answer
   std::string expected;         // what an answer is: "a camera's position"
 };
@@ -77,28 +82,10 @@ struct HttpPollingPlan {
   std::string error;  // why no request can ever be made; empty: none
 };
 
-class HttpPollingSource : public PanTiltSource {
- public:
-  ~HttpPollingSource() override;
-  HttpPollingSource(const HttpPollingSource&) = delete;
-  HttpPollingSource& operator=(const HttpPollingSource&) = delete;
+[[nodiscard]] std::unique_ptr<PanTiltSource> open_http_polling(HttpPollingPlan plan);
 
-  [[nodiscard]] ReadStatus read(PanTiltSample& sample, double timeout_s) override;
-  void stop() override;
-  [[nodiscard]] std::string error() const override;
-  [[nodiscard]] std::string name() const override;
-
- protected:
-  explicit HttpPollingSource(HttpPollingPlan plan);
-
- private:
-  class Implementation;  // keeps libcurl out of this header
-  std::unique_ptr<Implementation> implementation_;
-};
-
-// The parts of an http or https URL. Takes user and password out of it where options have none, and
-// puts its bare form into options->name. Empty, or what is wrong.
-[[nodiscard]] std::string take_http_url(const std::string& text, Url* url,
-                                        HttpPollingOptions* options);
+// The parts of options->url. Takes user and password out of it where options have none, and puts its bare
+// form into options->name. Empty, or what is wrong.
+[[nodiscard]] std::string take_http_url(Url* url, HttpPollingOptions* options);
 
 }  // namespace alidade

@@ -7,13 +7,15 @@
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
-#include <cstdlib>
 #include <pugixml.hpp>
 
 #include "platform/system/shown.h"
+#include "platform/system/text.h"
 
 namespace alidade {
 namespace {
+
+constexpr std::string_view kBlanks = " \t\r\n";
 
 constexpr std::size_t kShown = 120;  // bytes of a foreign text that an error repeats
 constexpr const char* kWss = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-";
@@ -38,25 +40,6 @@ std::string escaped(std::string_view text) {
     }
   }
   return xml;
-}
-
-std::string_view trimmed(std::string_view text) {
-  constexpr const char* kBlanks = " \t\r\n";
-  const std::size_t first = text.find_first_not_of(kBlanks);
-  if (first == std::string_view::npos) {
-    return {};
-  }
-  return text.substr(first, text.find_last_not_of(kBlanks) - first + 1);
-}
-
-std::optional<double> parse_number(std::string_view text) {
-  const std::string copy(trimmed(text));  // strtod needs the terminating null
-  char* end = nullptr;
-  const double value = std::strtod(copy.c_str(), &end);
-  if (end == copy.c_str() || *end != '\0' || !std::isfinite(value)) {
-    return std::nullopt;
-  }
-  return value;
 }
 
 // Exactly `digits` decimal digits at the front of *text, which are taken off.
@@ -132,10 +115,12 @@ pugi::xml_node descendant(pugi::xml_node node, std::initializer_list<std::string
   return node;
 }
 
-std::string text_of(const pugi::xml_node& node) { return std::string(trimmed(node.child_value())); }
+std::string text_of(const pugi::xml_node& node) {
+  return std::string(trimmed(node.child_value(), kBlanks));
+}
 
 std::optional<double> attribute(const pugi::xml_node& node, const char* name) {
-  return parse_number(node.attribute(name).value());
+  return parse_number(trimmed(node.attribute(name).value(), kBlanks));
 }
 
 pugi::xml_node load_body(std::string_view bytes, pugi::xml_document* document) {
@@ -152,7 +137,7 @@ pugi::xml_node load_answer(std::string_view bytes, const OnvifCall& call,
       child(load_body(bytes, document), std::string(call.name) + "Response");
   if (!answer) {
     *error = std::string("no answer to ") + call.name + " in '" +
-             shown(trimmed(bytes.substr(0, bytes.find('\n'))), kShown) +
+             shown(trimmed(bytes.substr(0, bytes.find('\n')), kBlanks), kShown) +
              "'; is it an ONVIF service?";
   }
   return answer;
@@ -188,7 +173,7 @@ std::string security_header(const OnvifLogin& login) {
 }  // namespace
 
 std::optional<double> parse_xml_time(std::string_view text) {
-  text = trimmed(text);
+  text = trimmed(text, kBlanks);
   Civil civil;
   const auto field = [&text](int* value, std::size_t digits, char before) {
     if (before != '\0' && !take_character(&text, before)) {
@@ -302,7 +287,8 @@ bool parse_onvif_clock(std::string_view body, double* utc_s, std::string* error)
   const pugi::xml_node utc = descendant(answer, {"SystemDateAndTime", "UTCDateTime"});
   bool whole = true;
   const auto number = [&](const char* part, const char* name) {
-    const std::optional<double> value = parse_number(descendant(utc, {part, name}).child_value());
+    const std::optional<double> value =
+        parse_number(trimmed(descendant(utc, {part, name}).child_value(), kBlanks));
     whole = whole && value && std::abs(*value) < 1e4;
     return whole ? static_cast<int>(*value) : 0;
   };

@@ -10,7 +10,6 @@
 namespace alidade {
 namespace {
 
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 constexpr std::size_t kMaxBody = 256 * 1024;  // bytes; many long profiles
 constexpr std::size_t kNonceBytes = 16;
 
@@ -185,8 +184,8 @@ HttpConversation::Outcome OnvifConversation::take_status(const HttpAnswer& answe
     return disconnected();
   }
   if (status.space == OnvifStatus::Space::kDegrees) {
-    sample->pan_rad = kRadPerDeg * status.pan;
-    sample->tilt_rad = kRadPerDeg * status.tilt;
+    sample->pan_rad = kRadPerDegree * status.pan;
+    sample->tilt_rad = kRadPerDegree * status.tilt;
   } else if (options_.pan_range && options_.tilt_range) {
     sample->pan_rad = mapped(status.pan, *options_.pan_range);
     sample->tilt_rad = mapped(status.tilt, *options_.tilt_range);
@@ -211,17 +210,11 @@ HttpConversation::Outcome OnvifConversation::take_status(const HttpAnswer& answe
 
 HttpPollingPlan plan_of(const OnvifSourceOptions& given) {
   HttpPollingPlan plan;
-  plan.options.user = given.user;
-  plan.options.password = given.password;
-  plan.options.pan = given.pan;
-  plan.options.tilt = given.tilt;
-  plan.options.rate_hz = given.rate_hz;
-  plan.options.timeout_s = given.timeout_s;
-  plan.options.max_backoff_s = given.max_backoff_s;
+  static_cast<HttpDeviceOptions&>(plan.options) = given;
   plan.options.max_body = kMaxBody;
   plan.options.expected = "an ONVIF answer";
   Url url;
-  plan.error = take_http_url(given.url, &url, &plan.options);
+  plan.error = take_http_url(&url, &plan.options);
   if (url.path == "/") {
     url.path = "/onvif/device_service";
     url.bare.pop_back();
@@ -234,6 +227,8 @@ HttpPollingPlan plan_of(const OnvifSourceOptions& given) {
 
 }  // namespace
 
-OnvifSource::OnvifSource(const OnvifSourceOptions& options) : HttpPollingSource(plan_of(options)) {}
+std::unique_ptr<PanTiltSource> open_onvif(const OnvifSourceOptions& options) {
+  return open_http_polling(plan_of(options));
+}
 
 }  // namespace alidade

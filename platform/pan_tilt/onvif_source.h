@@ -1,5 +1,5 @@
 #pragma once
-// OnvifSource: polls an ONVIF device for its pan, tilt and zoom (PTZ service, GetStatus) over one
+// open_onvif(): polls an ONVIF device for its pan, tilt and zoom (PTZ service, GetStatus) over one
 // kept HTTP connection. Pace, stamps and threads: http_polling_source.h.
 //
 // At each (re)connection it asks for the device's clock (if it has to log in), for its services
@@ -14,6 +14,7 @@
 // no position. kFailed: unusable URL; until the first sample also wrong user or password, generic space
 // without ranges. Later a refused login may be that of a device whose clock was set.
 
+#include <memory>
 #include <optional>
 #include <string>
 
@@ -27,23 +28,15 @@ struct OnvifRange {
   double at_plus_one_rad = 0;
 };
 
-struct OnvifSourceOptions {
-  std::string url;   // http://host[:port][/onvif/device_service]
-  std::string user;  // these go before what the URL may hold
-  std::string password;
+// url: http://host[:port][/onvif/device_service]. pan and tilt: of the angle, after the range.
+struct OnvifSourceOptions : HttpDeviceOptions {
+  OnvifSourceOptions() { rate_hz = 10; }  // SOAP is work for a camera
+
   std::string profile;  // token; empty: the device's first profile with PTZ
   std::optional<OnvifRange> pan_range;
   std::optional<OnvifRange> tilt_range;
-  AxisMapping pan;  // of the angle, after the range
-  AxisMapping tilt;
-  double rate_hz = 10;
-  double timeout_s = 1;      // for one request
-  double max_backoff_s = 5;  // longest pause between two tries
 };
 
-class OnvifSource : public HttpPollingSource {
- public:
-  explicit OnvifSource(const OnvifSourceOptions& options);
-};
+[[nodiscard]] std::unique_ptr<PanTiltSource> open_onvif(const OnvifSourceOptions& options);
 
 }  // namespace alidade

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "platform/system/shown.h"
+#include "platform/system/text.h"
 
 namespace alidade {
 namespace {
@@ -16,13 +17,6 @@ constexpr double kDegPerArcSecond = 1.0 / 3600;
 
 bool is_digit(char c) { return c >= '0' && c <= '9'; }
 
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(' ');
-  return first == std::string_view::npos
-             ? std::string_view()
-             : text.substr(first, text.find_last_not_of(' ') - first + 1);
-}
-
 // A line without its end. None: no line of a PTU.
 std::optional<PtuLine> parse_line(std::string_view line) {
   const std::size_t sign = line.find_last_of("*!");
@@ -31,14 +25,14 @@ std::optional<PtuLine> parse_line(std::string_view line) {
   }
   PtuLine parsed;
   parsed.begin = sign;
-  const std::string_view rest = trimmed(line.substr(sign + 1));
+  const std::string_view rest = trimmed(line.substr(sign + 1), " ");
   if (line[sign] == '!') {
     parsed.kind = PtuLine::Kind::kError;
     parsed.words = shown(rest);
     return parsed;
   }
   const std::size_t digit = rest.find_first_of("0123456789+-.");
-  std::string words(trimmed(rest.substr(0, digit)));
+  std::string words(trimmed(rest.substr(0, digit), " "));
   for (char& c : words) {
     if (c != ' ' && !(c >= 'a' && c <= 'z') && !(c >= 'A' && c <= 'Z')) {
       return std::nullopt;

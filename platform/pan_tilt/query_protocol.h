@@ -5,10 +5,19 @@
 // One query is under way at a time. next() gives it; find() looks for its answer in all bytes that
 // have come since it was sent (at most kMaxAnswer; a device that babbles loses the oldest). What is
 // no answer to it (noise, half frames, echoes, late answers to another query, unsolicited lines) is
-// passed over. give_up() tells that no answer came: it may still come. Only with a number in it would it
-// then differ from the answer to the same query asked again. So next() asks something else first, whose
-// answer looks different, a fence: heads answer in order, and once the fence is answered, nothing older
-// is under way. find() still knows the answer to what was given up, until next().
+// passed over.
+//
+// The fence. give_up() tells that no answer came: it may still come. Unless answers bear the number of
+// their query, it would then look like the answer to the same query asked again. So next() asks something
+// else first, whose answer looks different, a fence: heads answer in order, and once the fence is answered,
+// nothing older is under way. find() still knows the answer to what was given up, until next().
+// - Queries in turn, answers that name theirs (Pelco-D: pan, tilt): the next in turn is the fence.
+// - A single query for the position: anything else that the head answers and that moves nothing, be it
+//   asked for nothing but that (VISCA: the zoom) or a command of which only the acknowledgement counts
+//   (PTU: CI). A refusal answers a fence, too (Answer::Kind::kDone).
+// - Numbered queries (VISCA with header): no fence is needed, the numbers differ.
+// A head with one query, no numbers, and silence about all else cannot be asked: its late answers would be
+// taken for later ones.
 //
 // Angles are degrees as the device counts them; signs and zeros are QuerySource's.
 
@@ -49,9 +58,10 @@ class QueryProtocol {
 
   [[nodiscard]] virtual const char* name() const = 0;
   virtual void restart() = 0;  // a new connection: nothing is known of the device
+  // Never without bytes: an answer is waited for after each. After give_up() other bytes than before it.
   [[nodiscard]] virtual Query next() = 0;
   [[nodiscard]] virtual Answer find(std::string_view bytes) = 0;
-  // Bytes that bring the device back to the start of a command; mostly none.
+  // Bytes that bring the device back to the start of a command and that it does not answer; mostly none.
   [[nodiscard]] virtual std::string give_up() = 0;
 
   // Bytes came that nobody asked for. Where it matters next() asks a fence, as also after every

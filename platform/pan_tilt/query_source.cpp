@@ -9,7 +9,6 @@
 namespace alidade {
 namespace {
 
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 constexpr double kQuietBytes = 10;  // times of a byte without one are silence
 constexpr double kLeastQuiet_s = 0.02;
 constexpr int kTriesPerTimeout = 4;
@@ -256,8 +255,8 @@ bool QuerySource::take_bytes(const std::string& bytes, double now_s, PanTiltSamp
 
 bool QuerySource::take_reading(const Answer& answer, double earliest_s, double latest_s,
                                PanTiltSample* sample) {
-  const double pan_rad = mapped_rad(answer.pan_deg * kRadPerDeg, options_.pan);
-  const double tilt_rad = mapped_rad(answer.tilt_deg * kRadPerDeg, options_.tilt);
+  const double pan_rad = mapped_rad(answer.pan_deg * kRadPerDegree, options_.pan);
+  const double tilt_rad = mapped_rad(answer.tilt_deg * kRadPerDegree, options_.tilt);
   std::optional<PairedReading> paired;
   switch (answer.kind) {
     case Answer::Kind::kPan:

@@ -7,12 +7,14 @@
 
 namespace alidade {
 
-class RecordingPanTiltSource::Implementation {
+namespace {
+
+class RecordingPanTiltSource : public PanTiltSource {
  public:
-  explicit Implementation(const RecordingPanTiltSourceOptions& options)
+  explicit RecordingPanTiltSource(const RecordingPanTiltSourceOptions& options)
       : directory_(options.directory), playback_(options.directory, options.realtime) {}
 
-  ReadStatus read(PanTiltSample& sample, double timeout_s) {
+  ReadStatus read(PanTiltSample& sample, double timeout_s) override {
     if (playback_.stopped()) {
       return ReadStatus::kStopped;
     }
@@ -33,9 +35,9 @@ class RecordingPanTiltSource::Implementation {
     return status;
   }
 
-  void stop() { playback_.stop(); }
-  const std::string& error() const { return error_; }
-  const std::string& name() const { return directory_; }
+  void stop() override { playback_.stop(); }
+  std::string error() const override { return error_; }
+  std::string name() const override { return directory_; }
 
  private:
   std::string directory_;
@@ -47,14 +49,11 @@ class RecordingPanTiltSource::Implementation {
   std::size_t next_ = 0;
 };
 
-RecordingPanTiltSource::RecordingPanTiltSource(const RecordingPanTiltSourceOptions& options)
-    : implementation_(std::make_unique<Implementation>(options)) {}
-RecordingPanTiltSource::~RecordingPanTiltSource() = default;
-ReadStatus RecordingPanTiltSource::read(PanTiltSample& sample, double timeout_s) {
-  return implementation_->read(sample, timeout_s);
+}  // namespace
+
+std::unique_ptr<PanTiltSource> open_recorded_pan_tilt(
+    const RecordingPanTiltSourceOptions& options) {
+  return std::make_unique<RecordingPanTiltSource>(options);
 }
-void RecordingPanTiltSource::stop() { implementation_->stop(); }
-std::string RecordingPanTiltSource::error() const { return implementation_->error(); }
-std::string RecordingPanTiltSource::name() const { return implementation_->name(); }
 
 }  // namespace alidade

@@ -1,5 +1,5 @@
 #pragma once
-// RecordingPanTiltSource: the telemetry.csv of a recording (recording.h), at full speed or at the
+// open_recorded_pan_tilt(): the telemetry.csv of a recording (recording.h), at full speed or at the
 // pace of its receive times. Without column earliest_time_s, a sample's interval is its receive
 // time alone.
 
@@ -16,21 +16,7 @@ struct RecordingPanTiltSourceOptions {
   bool realtime = false;
 };
 
-class RecordingPanTiltSource : public PanTiltSource {
- public:
-  explicit RecordingPanTiltSource(const RecordingPanTiltSourceOptions& options);
-  ~RecordingPanTiltSource() override;
-  RecordingPanTiltSource(const RecordingPanTiltSource&) = delete;
-  RecordingPanTiltSource& operator=(const RecordingPanTiltSource&) = delete;
-
-  [[nodiscard]] ReadStatus read(PanTiltSample& sample, double timeout_s) override;
-  void stop() override;
-  [[nodiscard]] std::string error() const override;
-  [[nodiscard]] std::string name() const override;
-
- private:
-  class Implementation;
-  std::unique_ptr<Implementation> implementation_;
-};
+[[nodiscard]] std::unique_ptr<PanTiltSource> open_recorded_pan_tilt(
+    const RecordingPanTiltSourceOptions& options);
 
 }  // namespace alidade

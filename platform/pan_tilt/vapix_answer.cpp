@@ -2,38 +2,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstdlib>
 
+#include "platform/pan_tilt/axis_mapping.h"
 #include "platform/system/shown.h"
+#include "platform/system/text.h"
 
 namespace alidade {
 namespace {
 
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
-
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t\r");
-  if (first == std::string_view::npos) {
-    return {};
-  }
-  return text.substr(first, text.find_last_not_of(" \t\r") - first + 1);
-}
+constexpr std::string_view kBlanks = " \t\r";
 
 std::string first_line(std::string_view text) {
-  return shown(trimmed(text.substr(0, text.find('\n'))));
-}
-
-bool parse_number(std::string_view text, double* value) {
-  const std::string copy(text);  // strtod needs the terminating null
-  char* end = nullptr;
-  *value = std::strtod(copy.c_str(), &end);
-  return end != copy.c_str() && *end == '\0' && std::isfinite(*value);
+  return shown(trimmed(text.substr(0, text.find('\n')), kBlanks));
 }
 
 }  // namespace
 
 bool parse_vapix_position(std::string_view body, VapixPosition* position, std::string* error) {
-  if (trimmed(body.substr(0, body.find('\n'))).substr(0, 6) == "Error:") {
+  if (trimmed(body.substr(0, body.find('\n')), kBlanks).substr(0, 6) == "Error:") {
     *error = "the camera answers '" + first_line(body) + "'";
     return false;
   }
@@ -47,7 +33,7 @@ bool parse_vapix_position(std::string_view body, VapixPosition* position, std::s
     if (equals == std::string_view::npos) {
       continue;
     }
-    const std::string_view key = trimmed(line.substr(0, equals));
+    const std::string_view key = trimmed(line.substr(0, equals), kBlanks);
     std::optional<double>* target = key == "pan"    ? &pan_deg
                                     : key == "tilt" ? &tilt_deg
                                     : key == "zoom" ? &zoom
@@ -55,12 +41,11 @@ bool parse_vapix_position(std::string_view body, VapixPosition* position, std::s
     if (target == nullptr) {
       continue;
     }
-    double value = 0;
-    if (!parse_number(trimmed(line.substr(equals + 1)), &value)) {
+    *target = parse_number(trimmed(line.substr(equals + 1), kBlanks));
+    if (!*target) {
       *error = "'" + first_line(line) + "' in the position is not a number";
       return false;
     }
-    *target = value;
   }
   for (const auto& [name, angle] : {std::pair("pan", &pan_deg), std::pair("tilt", &tilt_deg)}) {
     if (!*angle) {
@@ -73,8 +58,8 @@ bool parse_vapix_position(std::string_view body, VapixPosition* position, std::s
       return false;
     }
   }
-  position->pan_rad = *pan_deg * kRadPerDeg;
-  position->tilt_rad = *tilt_deg * kRadPerDeg;
+  position->pan_rad = *pan_deg * kRadPerDegree;
+  position->tilt_rad = *tilt_deg * kRadPerDegree;
   position->zoom = zoom;
   return true;
 }

@@ -54,17 +54,11 @@ std::string position_url(const Url& url, int camera) {
 
 HttpPollingPlan plan_of(const VapixSourceOptions& given) {
   HttpPollingPlan plan;
-  plan.options.user = given.user;
-  plan.options.password = given.password;
-  plan.options.pan = given.pan;
-  plan.options.tilt = given.tilt;
-  plan.options.rate_hz = given.rate_hz;
-  plan.options.timeout_s = given.timeout_s;
-  plan.options.max_backoff_s = given.max_backoff_s;
+  static_cast<HttpDeviceOptions&>(plan.options) = given;
   plan.options.max_body = kMaxBody;
   plan.options.expected = "a camera's position";
   Url url;
-  plan.error = take_http_url(given.url, &url, &plan.options);
+  plan.error = take_http_url(&url, &plan.options);
   if (plan.error.empty() && url.path != "/") {
     plan.error = "the URL must be http://host[:port] or https://host[:port], without a path";
   }
@@ -74,6 +68,8 @@ HttpPollingPlan plan_of(const VapixSourceOptions& given) {
 
 }  // namespace
 
-VapixSource::VapixSource(const VapixSourceOptions& options) : HttpPollingSource(plan_of(options)) {}
+std::unique_ptr<PanTiltSource> open_vapix(const VapixSourceOptions& options) {
+  return open_http_polling(plan_of(options));
+}
 
 }  // namespace alidade

@@ -1,32 +1,23 @@
 #pragma once
-// VapixSource: polls an Axis camera for its pan, tilt and zoom:
+// open_vapix(): polls an Axis camera for its pan, tilt and zoom:
 //   GET /axis-cgi/com/ptz.cgi?query=position[&camera=N]
 // over one kept HTTP connection with digest authentication (one 401 in total, not one a poll).
 // Pace, stamps and threads: http_polling_source.h. kDisconnected: unreachable, timed out, HTTP
 // status other than 200, an `Error:` answer, an answer that is not a position. kFailed: unusable
 // URL; until the first sample also wrong user or password (401).
 
+#include <memory>
 #include <string>
 
 #include "platform/pan_tilt/http_polling_source.h"
 
 namespace alidade {
 
-struct VapixSourceOptions {
-  std::string url;   // http://host[:port] or https://...
-  std::string user;  // these go before what the URL may hold
-  std::string password;
+// VAPIX counts to the right and up.
+struct VapixSourceOptions : HttpDeviceOptions {
   int camera = 0;  // video channel of a device with several, 1, 2, ...; 0: not named in the request
-  AxisMapping pan;   // VAPIX counts to the right
-  AxisMapping tilt;  // and up
-  double rate_hz = 30;
-  double timeout_s = 1;      // for one poll
-  double max_backoff_s = 5;  // longest pause between two tries
 };
 
-class VapixSource : public HttpPollingSource {
- public:
-  explicit VapixSource(const VapixSourceOptions& options);
-};
+[[nodiscard]] std::unique_ptr<PanTiltSource> open_vapix(const VapixSourceOptions& options);
 
 }  // namespace alidade

@@ -10,16 +10,12 @@
 #include <string_view>
 
 #include "platform/system/shown.h"
+#include "platform/system/text.h"
 
 namespace alidade {
 namespace {
 
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t");
-  return first == std::string_view::npos
-             ? std::string_view()
-             : text.substr(first, text.find_last_not_of(" \t") - first + 1);
-}
+constexpr std::string_view kBlanks = " \t";
 
 // The line without its line feed. False at the end of the text; *cut_off: the last line has no line feed.
 bool next_line(std::istream& text, std::string* line, bool* cut_off) {
@@ -37,7 +33,7 @@ void split(std::string_view line, std::vector<std::string_view>* cells) {
   cells->clear();
   for (std::size_t begin = 0; begin <= line.size();) {
     const std::size_t end = std::min(line.find(',', begin), line.size());
-    cells->push_back(trimmed(line.substr(begin, end - begin)));
+    cells->push_back(trimmed(line.substr(begin, end - begin), kBlanks));
     begin = end + 1;
   }
 }
@@ -113,7 +109,7 @@ bool parse_csv(std::istream& text, const std::string& name, const std::vector<Cs
     if (number == 1 && line.compare(0, kByteOrderMark.size(), kByteOrderMark) == 0) {
       line.erase(0, kByteOrderMark.size());
     }
-    if (trimmed(line).empty()) {
+    if (trimmed(line, kBlanks).empty()) {
       continue;
     }
     split(line, &texts);

@@ -153,6 +153,13 @@ bool parse_tracks_csv(std::istream& text, const std::string& name, std::vector<T
   return parse_csv(text, name, kTrackColumns, add_to(points), error);
 }
 
+std::string tracks_csv_columns() {
+  std::string columns;
+  for (const CsvColumn& column : kTrackColumns)
+    columns.append(columns.empty() ? "" : ",").append(column.name);
+  return columns;
+}
+
 bool read_tracks_csv(const std::string& directory, std::vector<TrackPoint>* points,
                      std::string* error) {
   points->clear();

@@ -55,6 +55,8 @@ struct TrackPoint {
 // Points are passed on as they are: doubled or contradicting ones are the calibration's business.
 [[nodiscard]] bool parse_tracks_csv(std::istream& text, const std::string& name,
                                     std::vector<TrackPoint>* points, std::string* error);
+// The columns that they read, separated by commas: the first line of what writes tracks.csv.
+[[nodiscard]] std::string tracks_csv_columns();
 [[nodiscard]] bool read_tracks_csv(const std::string& directory, std::vector<TrackPoint>* points,
                                    std::string* error);
 

@@ -44,17 +44,9 @@ bool write_all(int fd, const std::string& bytes) {
 
 }  // namespace
 
-RecordingWriter::~RecordingWriter() {
-  for (const Table* table : {&frames_, &telemetry_}) {
-    if (table->fd >= 0) {
-      ::close(table->fd);
-    }
-  }
-}
-
 bool RecordingWriter::create(Table* table, const std::string& first_line, std::string* error) {
-  table->fd = ::open(table->path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644);
-  if (table->fd < 0) {
+  table->file.reset(::open(table->path.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0644));
+  if (!table->file.is_open()) {
     *error = errno == EEXIST ? table->path + " exists already; record into another directory"
                              : failure(table->path, errno);
     return false;
@@ -63,14 +55,14 @@ bool RecordingWriter::create(Table* table, const std::string& first_line, std::s
 }
 
 bool RecordingWriter::append(const Table& table, const std::string& line, std::string* error) {
-  const off_t before = ::lseek(table.fd, 0, SEEK_CUR);
-  if (before >= 0 && write_all(table.fd, line)) {
+  const off_t before = ::lseek(table.file.get(), 0, SEEK_CUR);
+  if (before >= 0 && write_all(table.file.get(), line)) {
     return true;
   }
   *error = failure(table.path, errno);
   // No half row stays behind.
-  if (before >= 0 && ::ftruncate(table.fd, before) == 0) {
-    ::lseek(table.fd, before, SEEK_SET);
+  if (before >= 0 && ::ftruncate(table.file.get(), before) == 0) {
+    ::lseek(table.file.get(), before, SEEK_SET);
   }
   return false;
 }
@@ -100,12 +92,8 @@ bool RecordingWriter::open(const std::string& directory, int width, int height,
     yaml << YAML::Key << "notes" << YAML::Value << YAML::DoubleQuoted << notes;
   }
   yaml << YAML::EndMap;
-  Table info{directory + "/recording.yaml", -1};
-  const bool written = create(&info, std::string(yaml.c_str()) + "\n", error);
-  if (info.fd >= 0) {
-    ::close(info.fd);
-  }
-  return written;
+  Table info{directory + "/recording.yaml", {}};
+  return create(&info, std::string(yaml.c_str()) + "\n", error);
 }
 
 bool RecordingWriter::add_frame(const FrameStamp& stamp, std::string* error) {
@@ -127,7 +115,7 @@ bool RecordingWriter::add_telemetry(const PanTiltSample& sample, std::string* er
 
 bool RecordingWriter::flush(std::string* error) {
   for (const Table* table : {&frames_, &telemetry_}) {
-    if (::fsync(table->fd) != 0) {
+    if (::fsync(table->file.get()) != 0) {
       *error = failure(table->path, errno);
       return false;
     }

@@ -8,16 +8,12 @@
 
 #include "platform/streams/frame.h"
 #include "platform/streams/pan_tilt_sample.h"
+#include "platform/system/file_descriptor.h"
 
 namespace alidade {
 
 class RecordingWriter {
  public:
-  RecordingWriter() = default;
-  ~RecordingWriter();
-  RecordingWriter(const RecordingWriter&) = delete;
-  RecordingWriter& operator=(const RecordingWriter&) = delete;
-
   // Makes the directory if need be; refuses one that already holds a recording's tables.
   [[nodiscard]] bool open(const std::string& directory, int width, int height,
                           const std::string& notes, std::string* error);
@@ -32,7 +28,7 @@ class RecordingWriter {
  private:
   struct Table {
     std::string path;
-    int fd = -1;
+    FileDescriptor file;
   };
   [[nodiscard]] static bool create(Table* table, const std::string& first_line, std::string* error);
   [[nodiscard]] static bool append(const Table& table, const std::string& text, std::string* error);

@@ -85,9 +85,9 @@ double wire_time_of_byte_s(const ByteLinkOptions& options) {
 bool is_baud(int baud) { return speed_code(baud) != B0; }
 
 ByteLink::ByteLink(const ByteLinkOptions& options)
-    : options_(options), stop_fd_(::eventfd(0, EFD_CLOEXEC)) {
+    : options_(options), stop_(::eventfd(0, EFD_CLOEXEC)) {
   const std::string& address = options_.address;
-  if (stop_fd_ < 0) {
+  if (!stop_.is_open()) {
     error_ = "no event descriptor: " + reason(errno);
     return;
   }
@@ -117,23 +117,9 @@ ByteLink::ByteLink(const ByteLinkOptions& options)
   port_ = url.port;
 }
 
-ByteLink::~ByteLink() {
-  close();
-  if (stop_fd_ >= 0) {
-    ::close(stop_fd_);
-  }
-}
-
-void ByteLink::close() {
-  if (fd_ >= 0) {
-    ::close(fd_);
-    fd_ = -1;
-  }
-}
-
 void ByteLink::stop() {
-  if (stop_fd_ >= 0) {
-    static_cast<void>(::eventfd_write(stop_fd_, 1));
+  if (stop_.is_open()) {
+    static_cast<void>(::eventfd_write(stop_.get(), 1));
   }
 }
 
@@ -158,8 +144,8 @@ LinkStatus ByteLink::open() {
 }
 
 LinkStatus ByteLink::open_serial() {
-  fd_ = ::open(options_.address.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC);
-  if (fd_ < 0) {
+  line_.reset(::open(options_.address.c_str(), O_RDWR | O_NOCTTY | O_NONBLOCK | O_CLOEXEC));
+  if (!line_.is_open()) {
     // All of these may pass: the device is plugged in, its rights are set a moment later.
     const int code = errno;
     return lost(reason(code) + (code == ENOENT || code == ENXIO ? "; is it plugged in?"
@@ -168,7 +154,7 @@ LinkStatus ByteLink::open_serial() {
                                     : ""));
   }
   termios line{};
-  if (::tcgetattr(fd_, &line) != 0) {
+  if (::tcgetattr(line_.get(), &line) != 0) {
     const int code = errno;
     if (code != ENOTTY && code != EINVAL) {
       return lost(line_reason(code));
@@ -176,7 +162,7 @@ LinkStatus ByteLink::open_serial() {
     static_cast<void>(lost("is not a serial line; expected one such as /dev/ttyUSB0"));
     return LinkStatus::kUnusable;
   }
-  if (::flock(fd_, LOCK_EX | LOCK_NB) != 0) {
+  if (::flock(line_.get(), LOCK_EX | LOCK_NB) != 0) {
     return lost("is in use by another program; end that one first");
   }
   const speed_t speed = speed_code(options_.baud);
@@ -186,8 +172,8 @@ LinkStatus ByteLink::open_serial() {
   line.c_cc[VMIN] = 1;  // a read of nothing is then EAGAIN, and 0 is the end of the line
   line.c_cc[VTIME] = 0;
   termios taken{};
-  if (::cfsetspeed(&line, speed) != 0 || ::tcsetattr(fd_, TCSANOW, &line) != 0 ||
-      ::tcgetattr(fd_, &taken) != 0) {
+  if (::cfsetspeed(&line, speed) != 0 || ::tcsetattr(line_.get(), TCSANOW, &line) != 0 ||
+      ::tcgetattr(line_.get(), &taken) != 0) {
     return lost("does not take its settings: " + line_reason(errno));
   }
   // tcsetattr() succeeds if it could do any of it.
@@ -195,7 +181,7 @@ LinkStatus ByteLink::open_serial() {
     static_cast<void>(lost("does not take " + std::to_string(options_.baud) + " baud"));
     return LinkStatus::kUnusable;
   }
-  static_cast<void>(::tcflush(fd_, TCIOFLUSH));
+  static_cast<void>(::tcflush(line_.get(), TCIOFLUSH));
   return LinkStatus::kOk;
 }
 
@@ -219,16 +205,16 @@ LinkStatus ByteLink::open_socket() {
   for (std::size_t skipped = tries_++ % count; skipped > 0; --skipped) {
     chosen = chosen->ai_next;
   }
-  fd_ = ::socket(chosen->ai_family, chosen->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC,
-                 chosen->ai_protocol);
-  if (fd_ < 0) {
+  line_.reset(::socket(chosen->ai_family, chosen->ai_socktype | SOCK_NONBLOCK | SOCK_CLOEXEC,
+                       chosen->ai_protocol));
+  if (!line_.is_open()) {
     return lost(reason(errno));
   }
   const int on = 1;
   if (kind_ == Kind::kTcp) {
-    static_cast<void>(::setsockopt(fd_, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on));
+    static_cast<void>(::setsockopt(line_.get(), IPPROTO_TCP, TCP_NODELAY, &on, sizeof on));
   }
-  if (::connect(fd_, chosen->ai_addr, chosen->ai_addrlen) != 0 && errno != EINPROGRESS) {
+  if (::connect(line_.get(), chosen->ai_addr, chosen->ai_addrlen) != 0 && errno != EINPROGRESS) {
     return lost(reason(errno));
   }
   return LinkStatus::kOk;
@@ -244,7 +230,7 @@ LinkStatus ByteLink::finish_open(double timeout_s) {
   }
   int code = 0;
   socklen_t size = sizeof code;
-  if (::getsockopt(fd_, SOL_SOCKET, SO_ERROR, &code, &size) != 0 || code != 0) {
+  if (::getsockopt(line_.get(), SOL_SOCKET, SO_ERROR, &code, &size) != 0 || code != 0) {
     return lost(reason(code));
   }
   return LinkStatus::kOk;
@@ -252,7 +238,7 @@ LinkStatus ByteLink::finish_open(double timeout_s) {
 
 LinkStatus ByteLink::wait(short events, double timeout_s) {
   const double milliseconds = std::ceil(1e3 * std::clamp(timeout_s, 0.0, kLongestWait_s));
-  std::array<pollfd, 2> waited = {{{stop_fd_, POLLIN, 0}, {fd_, events, 0}}};
+  std::array<pollfd, 2> waited = {{{stop_.get(), POLLIN, 0}, {line_.get(), events, 0}}};
   const int ready = ::poll(waited.data(), waited.size(), static_cast<int>(milliseconds));
   if (ready > 0 && waited[0].revents != 0) {
     return LinkStatus::kStopped;
@@ -262,8 +248,8 @@ LinkStatus ByteLink::wait(short events, double timeout_s) {
 
 LinkStatus ByteLink::send(std::string_view bytes) {
   const ssize_t sent = kind_ == Kind::kSerial
-                           ? ::write(fd_, bytes.data(), bytes.size())
-                           : ::send(fd_, bytes.data(), bytes.size(), MSG_NOSIGNAL);
+                           ? ::write(line_.get(), bytes.data(), bytes.size())
+                           : ::send(line_.get(), bytes.data(), bytes.size(), MSG_NOSIGNAL);
   if (sent < 0 && errno != EAGAIN) {
     return lost(reason(errno));
   }
@@ -280,7 +266,7 @@ LinkStatus ByteLink::receive(std::string* bytes, double timeout_s) {
     return status;
   }
   char buffer[kChunk];
-  const ssize_t count = ::read(fd_, buffer, sizeof buffer);
+  const ssize_t count = ::read(line_.get(), buffer, sizeof buffer);
   if (count > 0) {
     bytes->assign(buffer, static_cast<std::size_t>(count));
     return LinkStatus::kOk;

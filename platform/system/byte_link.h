@@ -12,6 +12,8 @@
 #include <string>
 #include <string_view>
 
+#include "platform/system/file_descriptor.h"
+
 namespace alidade {
 
 struct ByteLinkOptions {
@@ -40,14 +42,13 @@ enum class LinkStatus {
 class ByteLink {
  public:
   explicit ByteLink(const ByteLinkOptions& options);
-  ~ByteLink();
   ByteLink(const ByteLink&) = delete;
   ByteLink& operator=(const ByteLink&) = delete;
 
   // Begins to open, or says why not. On kOk finish_open() is next.
   [[nodiscard]] LinkStatus open();
   [[nodiscard]] LinkStatus finish_open(double timeout_s);
-  void close();
+  void close() { line_.reset(); }
 
   // The bytes are few: what the system does not take at once counts as a lost link.
   [[nodiscard]] LinkStatus send(std::string_view bytes);
@@ -75,8 +76,8 @@ class ByteLink {
   std::string host_;
   std::string port_;
   std::size_t tries_ = 0;
-  int fd_ = -1;
-  int stop_fd_ = -1;
+  FileDescriptor line_;  // or socket
+  FileDescriptor stop_;  // readable for good once stop() was called
   std::string error_;
 };
 

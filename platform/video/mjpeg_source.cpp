@@ -27,17 +27,15 @@ constexpr int kMostDoubt = 2 * kDoubtOfABadStamp;
 constexpr const char* kNoCurl = "libcurl does not start";
 constexpr long kMethods = static_cast<long>(CURLAUTH_DIGEST | CURLAUTH_BASIC);
 
-}  // namespace
-
-class MjpegSource::Implementation {
+class MjpegSource : public FrameSource {
  public:
-  explicit Implementation(const MjpegSourceOptions& options);
-  ReadStatus read(Frame& frame, double timeout_s);
+  explicit MjpegSource(const MjpegSourceOptions& options);
+  ReadStatus read(Frame& frame, double timeout_s) override;
 
-  void stop() { thread_.stop(); }
-  const std::string& error() const { return error_; }
-  const std::string& name() const { return name_; }
-  FrameSourceCounters counters() const { return {damaged_, thread_.dropped()}; }
+  void stop() override { thread_.stop(); }
+  std::string error() const override { return error_; }
+  std::string name() const override { return name_; }
+  FrameSourceCounters counters() const override { return {damaged_, thread_.dropped()}; }
 
  private:
   void interrupt() {
@@ -93,7 +91,7 @@ class MjpegSource::Implementation {
       [this] { interrupt(); }};
 };
 
-MjpegSource::Implementation::Implementation(const MjpegSourceOptions& options) : options_(options) {
+MjpegSource::MjpegSource(const MjpegSourceOptions& options) : options_(options) {
   silence_av_log();
   Url url;
   std::string error;
@@ -117,21 +115,20 @@ MjpegSource::Implementation::Implementation(const MjpegSourceOptions& options) :
   }
 }
 
-bool MjpegSource::Implementation::make_handle() {
+bool MjpegSource::make_handle() {
   easy_ = make_http_handle(options_.user, options_.password, kMethods, curl_error_);
   if (!easy_) {
     return false;
   }
   curl_easy_setopt(easy_.get(), CURLOPT_URL, name_.c_str());
   curl_easy_setopt(easy_.get(), CURLOPT_BUFFERSIZE, kReceiveBuffer);
-  curl_easy_setopt(easy_.get(), CURLOPT_WRITEFUNCTION, &Implementation::on_body);
+  curl_easy_setopt(easy_.get(), CURLOPT_WRITEFUNCTION, &MjpegSource::on_body);
   curl_easy_setopt(easy_.get(), CURLOPT_WRITEDATA, this);
   return true;
 }
 
-std::size_t MjpegSource::Implementation::on_body(char* data, std::size_t size, std::size_t count,
-                                                 void* self) {
-  auto* source = static_cast<Implementation*>(self);
+std::size_t MjpegSource::on_body(char* data, std::size_t size, std::size_t count, void* self) {
+  auto* source = static_cast<MjpegSource*>(self);
   const double arrival_s = monotonic_now_s();
   const std::size_t bytes = size * count;
   long status = 0;
@@ -146,7 +143,7 @@ std::size_t MjpegSource::Implementation::on_body(char* data, std::size_t size, s
   return bytes;
 }
 
-bool MjpegSource::Implementation::begin_stream() {
+bool MjpegSource::begin_stream() {
   const char* type = nullptr;
   curl_easy_getinfo(easy_.get(), CURLINFO_CONTENT_TYPE, &type);
   std::string boundary;
@@ -161,7 +158,7 @@ bool MjpegSource::Implementation::begin_stream() {
   return true;
 }
 
-void MjpegSource::Implementation::take_bytes(std::string_view bytes, double arrival_s) {
+void MjpegSource::take_bytes(std::string_view bytes, double arrival_s) {
   scanner_->feed(bytes, arrival_s);
   damaged_ += scanner_->discarded() - std::exchange(discarded_, scanner_->discarded());
   MultipartPart part;
@@ -180,7 +177,7 @@ void MjpegSource::Implementation::take_bytes(std::string_view bytes, double arri
 
 // One connection from its beginning to its end. Each logs in anew: a camera that has restarted does not know
 // the nonces it gave, and where it does not call them stale libcurl believes that the password is wrong.
-ReadStatus MjpegSource::Implementation::receive_connection(std::string* error) {
+ReadStatus MjpegSource::receive_connection(std::string* error) {
   if (!make_handle()) {
     *error = kNoCurl;
     return ReadStatus::kDisconnected;
@@ -214,7 +211,7 @@ ReadStatus MjpegSource::Implementation::receive_connection(std::string* error) {
   return status;
 }
 
-ReadStatus MjpegSource::Implementation::connection_end(CURLcode code, std::string* error) {
+ReadStatus MjpegSource::connection_end(CURLcode code, std::string* error) {
   long status = 0;
   curl_easy_getinfo(easy_.get(), CURLINFO_RESPONSE_CODE, &status);
   if (status == 401) {
@@ -234,7 +231,7 @@ ReadStatus MjpegSource::Implementation::connection_end(CURLcode code, std::strin
   return ReadStatus::kDisconnected;
 }
 
-ReadStatus MjpegSource::Implementation::read(Frame& frame, double timeout_s) {
+ReadStatus MjpegSource::read(Frame& frame, double timeout_s) {
   const auto deadline =
       std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(
                                              std::chrono::duration<double>(timeout_s));
@@ -263,7 +260,7 @@ ReadStatus MjpegSource::Implementation::read(Frame& frame, double timeout_s) {
 }
 
 // Turns a part into the frame; kTimeout if that cannot be done with this one.
-ReadStatus MjpegSource::Implementation::deliver(MultipartPart part, Frame& frame) {
+ReadStatus MjpegSource::deliver(MultipartPart part, Frame& frame) {
   Picture picture;
   const double before_s = monotonic_now_s();
   if (options_.decode ? !decoder_.decode(part.body, &picture)
@@ -309,7 +306,7 @@ ReadStatus MjpegSource::Implementation::deliver(MultipartPart part, Frame& frame
 }
 
 // A step back cannot be a part that was overtaken: the stream keeps their order.
-void MjpegSource::Implementation::stamp_sender_time(const MultipartPart& part, FrameStamp* stamp) {
+void MjpegSource::stamp_sender_time(const MultipartPart& part, FrameStamp* stamp) {
   if (stamp->restarted) {
     clock_doubt_ = 0;
     last_sender_time_s_.reset();
@@ -328,15 +325,10 @@ void MjpegSource::Implementation::stamp_sender_time(const MultipartPart& part, F
   stamp->restarted = stamp->restarted || back;
 }
 
-MjpegSource::MjpegSource(const MjpegSourceOptions& options)
-    : implementation_(std::make_unique<Implementation>(options)) {}
-MjpegSource::~MjpegSource() = default;
-ReadStatus MjpegSource::read(Frame& frame, double timeout_s) {
-  return implementation_->read(frame, timeout_s);
+}  // namespace
+
+std::unique_ptr<FrameSource> open_mjpeg(const MjpegSourceOptions& options) {
+  return std::make_unique<MjpegSource>(options);
 }
-void MjpegSource::stop() { implementation_->stop(); }
-std::string MjpegSource::error() const { return implementation_->error(); }
-std::string MjpegSource::name() const { return implementation_->name(); }
-FrameSourceCounters MjpegSource::counters() const { return implementation_->counters(); }
 
 }  // namespace alidade

@@ -1,5 +1,5 @@
 #pragma once
-// MjpegSource: JPEG pictures one after another in the answer to one HTTP request
+// open_mjpeg(): JPEG pictures one after another in the answer to one HTTP request
 // (multipart/x-mixed-replace; libcurl, multipart_scanner.h, libjpeg-turbo), with HTTP digest or basic
 // authentication.
 //
@@ -40,22 +40,6 @@ struct MjpegSourceOptions {
   std::string copy_to;                         // video.mkv to copy the pictures into; empty: none
 };
 
-class MjpegSource : public FrameSource {
- public:
-  explicit MjpegSource(const MjpegSourceOptions& options);
-  ~MjpegSource() override;
-  MjpegSource(const MjpegSource&) = delete;
-  MjpegSource& operator=(const MjpegSource&) = delete;
-
-  [[nodiscard]] ReadStatus read(Frame& frame, double timeout_s) override;
-  void stop() override;
-  [[nodiscard]] std::string error() const override;
-  [[nodiscard]] std::string name() const override;
-  [[nodiscard]] FrameSourceCounters counters() const override;
-
- private:
-  class Implementation;  // keeps libcurl out of this header
-  std::unique_ptr<Implementation> implementation_;
-};
+[[nodiscard]] std::unique_ptr<FrameSource> open_mjpeg(const MjpegSourceOptions& options);
 
 }  // namespace alidade

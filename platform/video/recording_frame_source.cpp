@@ -25,28 +25,26 @@ struct ImageType {
 constexpr std::array<ImageType, 3> kImageTypes = {
     {{".png", AV_CODEC_ID_PNG}, {".jpg", AV_CODEC_ID_MJPEG}, {".pgm", AV_CODEC_ID_PGM}}};
 
-}  // namespace
-
-class RecordingFrameSource::Implementation {
+class FramesOnDisk : public RecordingFrameSource {
  public:
-  explicit Implementation(const RecordingFrameSourceOptions& options)
+  explicit FramesOnDisk(const RecordingFrameSourceOptions& options)
       : options_(options), playback_(options.directory, options.realtime) {
     silence_av_log();
   }
 
-  ~Implementation() { avformat_close_input(&video_); }
+  ~FramesOnDisk() override { avformat_close_input(&video_); }
 
-  ReadStatus read(Frame& frame, double timeout_s);
-  void stop() { playback_.stop(); }
-  const std::string& error() const { return error_; }
-  const std::string& name() const { return options_.directory; }
-  std::int64_t damaged_frames() const { return damaged_; }
-  std::int64_t missing_frames() const {
+  ReadStatus read(Frame& frame, double timeout_s) override;
+  void stop() override { playback_.stop(); }
+  std::string error() const override { return error_; }
+  std::string name() const override { return options_.directory; }
+  std::int64_t damaged_frames() const override { return damaged_; }
+  std::int64_t missing_frames() const override {
     return static_cast<std::int64_t>(stamps_.size()) - static_cast<std::int64_t>(row_);
   }
 
  private:
-  using NextFrame = ReadStatus (Implementation::*)(Frame* frame);
+  using NextFrame = ReadStatus (FramesOnDisk::*)(Frame* frame);
 
   ReadStatus load();
   ReadStatus open_video(const std::string& path);
@@ -67,7 +65,7 @@ class RecordingFrameSource::Implementation {
   bool loaded_ = false;
   RecordingInfo info_;
   std::vector<FrameStamp> stamps_;
-  NextFrame next_frame_ = &Implementation::next_stamp;
+  NextFrame next_frame_ = &FramesOnDisk::next_stamp;
   std::size_t row_ = 0;         // the first row of stamps_ that is neither delivered nor skipped
   std::optional<Frame> ready_;  // decoded, waiting until it is due
   std::int64_t damaged_ = 0;
@@ -84,7 +82,7 @@ class RecordingFrameSource::Implementation {
   AVCodecID image_codec_ = AV_CODEC_ID_NONE;
 };
 
-ReadStatus RecordingFrameSource::Implementation::load() {
+ReadStatus FramesOnDisk::load() {
   const std::string& directory = options_.directory;
   if (!read_recording_info(directory, &info_, &error_) ||
       !read_frames_csv(directory, &stamps_, &error_)) {
@@ -95,11 +93,11 @@ ReadStatus RecordingFrameSource::Implementation::load() {
   }
   std::error_code ignored;
   if (std::filesystem::exists(directory + "/video.mkv", ignored)) {
-    next_frame_ = &Implementation::next_in_video;
+    next_frame_ = &FramesOnDisk::next_in_video;
     return open_video(directory + "/video.mkv");
   }
   if (std::filesystem::is_directory(directory + "/frames", ignored)) {
-    next_frame_ = &Implementation::next_image;
+    next_frame_ = &FramesOnDisk::next_image;
     return ReadStatus::kOk;
   }
   if (std::filesystem::exists(directory + "/tracks.csv", ignored)) {
@@ -108,7 +106,7 @@ ReadStatus RecordingFrameSource::Implementation::load() {
   return fail(directory + ": no pictures; a recording holds video.mkv, frames/ or tracks.csv");
 }
 
-ReadStatus RecordingFrameSource::Implementation::open_video(const std::string& path) {
+ReadStatus FramesOnDisk::open_video(const std::string& path) {
   int code = avformat_open_input(&video_, path.c_str(), nullptr, nullptr);
   if (code >= 0) {
     code = avformat_find_stream_info(video_, nullptr);  // how far pictures are out of order
@@ -126,7 +124,7 @@ ReadStatus RecordingFrameSource::Implementation::open_video(const std::string& p
   return ReadStatus::kOk;
 }
 
-ReadStatus RecordingFrameSource::Implementation::next_stamp(Frame* frame) {
+ReadStatus FramesOnDisk::next_stamp(Frame* frame) {
   if (row_ == stamps_.size()) {
     return ReadStatus::kEnd;
   }
@@ -138,7 +136,7 @@ ReadStatus RecordingFrameSource::Implementation::next_stamp(Frame* frame) {
 }
 
 // Gives the decoder one more packet, at the end of the file once nothing; false: it had that already.
-bool RecordingFrameSource::Implementation::feed_decoder() {
+bool FramesOnDisk::feed_decoder() {
   if (drained_) {
     return false;
   }
@@ -164,7 +162,7 @@ bool RecordingFrameSource::Implementation::feed_decoder() {
 
 // A decoder gives pictures in the order of their timestamps, so a picture's place is the number of
 // packets with an earlier one, also after some that gave no picture.
-ReadStatus RecordingFrameSource::Implementation::next_in_video(Frame* frame) {
+ReadStatus FramesOnDisk::next_in_video(Frame* frame) {
   for (;;) {
     Picture picture;
     const LumaDecoder::Result result = decoder_.receive(&picture);
@@ -191,7 +189,7 @@ ReadStatus RecordingFrameSource::Implementation::next_in_video(Frame* frame) {
   }
 }
 
-ReadStatus RecordingFrameSource::Implementation::next_image(Frame* frame) {
+ReadStatus FramesOnDisk::next_image(Frame* frame) {
   while (row_ < stamps_.size()) {
     const FrameStamp& stamp = stamps_[row_++];
     char number[24];
@@ -235,8 +233,7 @@ ReadStatus RecordingFrameSource::Implementation::next_image(Frame* frame) {
   return ReadStatus::kEnd;
 }
 
-ReadStatus RecordingFrameSource::Implementation::finish(const Picture& picture,
-                                                        const FrameStamp& stamp, Frame* frame) {
+ReadStatus FramesOnDisk::finish(const Picture& picture, const FrameStamp& stamp, Frame* frame) {
   if (picture.width != info_.width || picture.height != info_.height) {
     return fail(options_.directory + "/recording.yaml: the size is given as " +
                 std::to_string(info_.width) + "x" + std::to_string(info_.height) + ", frame " +
@@ -253,7 +250,7 @@ ReadStatus RecordingFrameSource::Implementation::finish(const Picture& picture,
   return ReadStatus::kOk;
 }
 
-ReadStatus RecordingFrameSource::Implementation::read(Frame& frame, double timeout_s) {
+ReadStatus FramesOnDisk::read(Frame& frame, double timeout_s) {
   if (playback_.stopped()) {
     return ReadStatus::kStopped;
   }
@@ -276,20 +273,11 @@ ReadStatus RecordingFrameSource::Implementation::read(Frame& frame, double timeo
   return due;
 }
 
-RecordingFrameSource::RecordingFrameSource(const RecordingFrameSourceOptions& options)
-    : implementation_(std::make_unique<Implementation>(options)) {}
-RecordingFrameSource::~RecordingFrameSource() = default;
-ReadStatus RecordingFrameSource::read(Frame& frame, double timeout_s) {
-  return implementation_->read(frame, timeout_s);
-}
-void RecordingFrameSource::stop() { implementation_->stop(); }
-std::string RecordingFrameSource::error() const { return implementation_->error(); }
-std::string RecordingFrameSource::name() const { return implementation_->name(); }
-std::int64_t RecordingFrameSource::damaged_frames() const {
-  return implementation_->damaged_frames();
-}
-std::int64_t RecordingFrameSource::missing_frames() const {
-  return implementation_->missing_frames();
+}  // namespace
+
+std::unique_ptr<RecordingFrameSource> open_recorded_frames(
+    const RecordingFrameSourceOptions& options) {
+  return std::make_unique<FramesOnDisk>(options);
 }
 
 }  // namespace alidade

@@ -1,5 +1,5 @@
 #pragma once
-// RecordingFrameSource: the frames of a recording (recording.h), at full speed or at the pace of
+// open_recorded_frames(): the frames of a recording (recording.h), at full speed or at the pace of
 // their receive times. Stamps, frame numbers included, are those of frames.csv.
 //
 // Pictures come from video.mkv (row k of frames.csv belongs to picture k) or from
@@ -26,22 +26,11 @@ struct RecordingFrameSourceOptions {
 
 class RecordingFrameSource : public FrameSource {
  public:
-  explicit RecordingFrameSource(const RecordingFrameSourceOptions& options);
-  ~RecordingFrameSource() override;
-  RecordingFrameSource(const RecordingFrameSource&) = delete;
-  RecordingFrameSource& operator=(const RecordingFrameSource&) = delete;
-
-  [[nodiscard]] ReadStatus read(Frame& frame, double timeout_s) override;
-  void stop() override;
-  [[nodiscard]] std::string error() const override;
-  [[nodiscard]] std::string name() const override;
-
-  [[nodiscard]] std::int64_t damaged_frames() const;
-  [[nodiscard]] std::int64_t missing_frames() const;  // valid after kEnd
-
- private:
-  class Implementation;  // keeps libav out of this header
-  std::unique_ptr<Implementation> implementation_;
+  [[nodiscard]] virtual std::int64_t damaged_frames() const = 0;
+  [[nodiscard]] virtual std::int64_t missing_frames() const = 0;  // valid after kEnd
 };
+
+[[nodiscard]] std::unique_ptr<RecordingFrameSource> open_recorded_frames(
+    const RecordingFrameSourceOptions& options);
 
 }  // namespace alidade

@@ -19,11 +19,9 @@ namespace {
 
 constexpr std::size_t kDecoderCapacity = 16;  // pictures: the most that H.264 may hold back
 
-}  // namespace
-
-class RtpSource::Implementation {
+class RtpSource : public FrameSource {
  public:
-  explicit Implementation(const RtpSourceOptions& options) : options_(options) {
+  explicit RtpSource(const RtpSourceOptions& options) : options_(options) {
     silence_av_log();
     // The form "any interface" that libcurl takes for no URL.
     if (options_.url.rfind("rtp://@:", 0) == 0) {
@@ -32,12 +30,12 @@ class RtpSource::Implementation {
     check();
   }
 
-  ReadStatus read(Frame& frame, double timeout_s);
+  ReadStatus read(Frame& frame, double timeout_s) override;
 
-  void stop() { thread_.stop(); }
-  const std::string& error() const { return error_; }
-  const std::string& name() const { return options_.url; }
-  FrameSourceCounters counters() const { return {damaged_, thread_.dropped()}; }
+  void stop() override { thread_.stop(); }
+  std::string error() const override { return error_; }
+  std::string name() const override { return options_.url; }
+  FrameSourceCounters counters() const override { return {damaged_, thread_.dropped()}; }
 
  private:
   struct Arrived {
@@ -90,7 +88,7 @@ class RtpSource::Implementation {
 };
 
 // What the options cannot mean, before any connection; leaves the URL without credentials.
-void RtpSource::Implementation::check() {
+void RtpSource::check() {
   if (options_.url.find("://") == std::string::npos) {
     return;  // an SDP file: libavformat says whether it can be used
   }
@@ -118,7 +116,7 @@ void RtpSource::Implementation::check() {
 }
 
 // Where pictures are dropped, all are: those that follow cannot be decoded up to the next key frame.
-ReadStatus RtpSource::Implementation::push(Arrived arrived, std::string* error) {
+ReadStatus RtpSource::push(Arrived arrived, std::string* error) {
   if (thread_.full()) {
     thread_.drop_all();
     wait_for_key();
@@ -141,13 +139,13 @@ ReadStatus RtpSource::Implementation::push(Arrived arrived, std::string* error) 
   return ReadStatus::kOk;
 }
 
-void RtpSource::Implementation::wait_for_key() {
+void RtpSource::wait_for_key() {
   wait_for_key_ = true;
   waiting_since_s_ = monotonic_now_s();
 }
 
 // One connection from its beginning to its end.
-ReadStatus RtpSource::Implementation::receive_connection(std::string* error) {
+ReadStatus RtpSource::receive_connection(std::string* error) {
   RtpConnection connection(options_);
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -176,14 +174,14 @@ ReadStatus RtpSource::Implementation::receive_connection(std::string* error) {
   return status;
 }
 
-void RtpSource::Implementation::interrupt() {
+void RtpSource::interrupt() {
   const std::lock_guard<std::mutex> lock(mutex_);
   if (connection_ != nullptr) {
     connection_->interrupt();
   }
 }
 
-ReadStatus RtpSource::Implementation::read(Frame& frame, double timeout_s) {
+ReadStatus RtpSource::read(Frame& frame, double timeout_s) {
   const auto deadline =
       std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::nanoseconds>(
                                              std::chrono::duration<double>(timeout_s));
@@ -212,7 +210,7 @@ ReadStatus RtpSource::Implementation::read(Frame& frame, double timeout_s) {
 }
 
 // Turns a picture's data into the frame; kTimeout if that cannot be done with this one.
-ReadStatus RtpSource::Implementation::deliver(Arrived arrived, Frame& frame) {
+ReadStatus RtpSource::deliver(Arrived arrived, Frame& frame) {
   AccessUnit unit = std::move(arrived.unit);
   if (arrived.parameters != parameters_) {
     parameters_ = std::move(arrived.parameters);
@@ -264,7 +262,7 @@ ReadStatus RtpSource::Implementation::deliver(Arrived arrived, Frame& frame) {
 
 // A decoder may hold a picture back: *unit becomes the one that belongs to the picture that came out.
 // kTimeout if none came.
-ReadStatus RtpSource::Implementation::decode(AccessUnit* unit, Picture* picture) {
+ReadStatus RtpSource::decode(AccessUnit* unit, Picture* picture) {
   if (!decoder_.send(unit->packet.get())) {
     ++damaged_;
     return ReadStatus::kTimeout;
@@ -292,15 +290,10 @@ ReadStatus RtpSource::Implementation::decode(AccessUnit* unit, Picture* picture)
   return ReadStatus::kOk;
 }
 
-RtpSource::RtpSource(const RtpSourceOptions& options)
-    : implementation_(std::make_unique<Implementation>(options)) {}
-RtpSource::~RtpSource() = default;
-ReadStatus RtpSource::read(Frame& frame, double timeout_s) {
-  return implementation_->read(frame, timeout_s);
+}  // namespace
+
+std::unique_ptr<FrameSource> open_rtp(const RtpSourceOptions& options) {
+  return std::make_unique<RtpSource>(options);
 }
-void RtpSource::stop() { implementation_->stop(); }
-std::string RtpSource::error() const { return implementation_->error(); }
-std::string RtpSource::name() const { return implementation_->name(); }
-FrameSourceCounters RtpSource::counters() const { return implementation_->counters(); }
 
 }  // namespace alidade

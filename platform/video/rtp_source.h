@@ -1,5 +1,5 @@
 #pragma once
-// RtpSource: MJPEG or H.264 video over RTSP or plain RTP (libavformat, libavcodec).
+// open_rtp(): MJPEG or H.264 video over RTSP or plain RTP (libavformat, libavcodec).
 //
 // url is one of: rtsp://host[:port]/path; the name of an .sdp file; rtp://@:port or
 // rtp://group:port (then `format` says what comes).
@@ -51,22 +51,6 @@ struct RtpSourceOptions {
   std::string copy_to;       // video.mkv to copy the stream into; empty: none
 };
 
-class RtpSource : public FrameSource {
- public:
-  explicit RtpSource(const RtpSourceOptions& options);
-  ~RtpSource() override;
-  RtpSource(const RtpSource&) = delete;
-  RtpSource& operator=(const RtpSource&) = delete;
-
-  [[nodiscard]] ReadStatus read(Frame& frame, double timeout_s) override;
-  void stop() override;
-  [[nodiscard]] std::string error() const override;
-  [[nodiscard]] std::string name() const override;
-  [[nodiscard]] FrameSourceCounters counters() const override;
-
- private:
-  class Implementation;  // keeps libav out of this header
-  std::unique_ptr<Implementation> implementation_;
-};
+[[nodiscard]] std::unique_ptr<FrameSource> open_rtp(const RtpSourceOptions& options);
 
 }  // namespace alidade

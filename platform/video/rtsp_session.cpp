@@ -9,6 +9,7 @@
 
 #include "platform/system/clock.h"
 #include "platform/system/shown.h"
+#include "platform/video/rtsp_message.h"
 #include "platform/video/session_description.h"
 
 namespace alidade {
@@ -42,52 +43,12 @@ std::string refusal(int status, const char* reason) {
 
 }  // namespace
 
-class RtspSession::Message {
- public:
-  Message() { gst_rtsp_message_init(&message_); }
-  ~Message() { gst_rtsp_message_unset(&message_); }
-  Message(const Message&) = delete;
-  Message& operator=(const Message&) = delete;
-
-  GstRTSPMessage* get() { return &message_; }
-  // For a function that fills it anew.
-  GstRTSPMessage* cleared() {
-    gst_rtsp_message_unset(&message_);
-    return &message_;
-  }
-  GstRTSPMsgType type() { return gst_rtsp_message_get_type(&message_); }
-  int status() const { return message_.type_data.response.code; }
-  const char* reason() const { return message_.type_data.response.reason; }
-  std::string header(GstRTSPHeaderField field) {
-    gchar* value = nullptr;
-    gst_rtsp_message_get_header(&message_, field, &value, 0);
-    return value == nullptr ? "" : value;
-  }
-  // The library makes a list one header an item, where the field may be a list.
-  bool lists(GstRTSPHeaderField field, const char* item) {
-    gchar* value = nullptr;
-    for (int i = 0; gst_rtsp_message_get_header(&message_, field, &value, i) == GST_RTSP_OK; ++i) {
-      if (std::string(value).find(item) != std::string::npos) return true;
-    }
-    return false;
-  }
-  std::pair<const std::uint8_t*, std::size_t> body() {
-    guint8* data = nullptr;
-    guint size = 0;
-    gst_rtsp_message_get_body(&message_, &data, &size);
-    return {data, size == 0 ? 0 : size - 1};  // the library adds a NUL and counts it
-  }
-
- private:
-  GstRTSPMessage message_{};
-};
-
 RtspSession::RtspSession(const RtpSourceOptions& options) : options_(options), url_(options.url) {}
 
 RtspSession::~RtspSession() {
   if (connection_ && !session_url_.empty()) {
     gst_rtsp_connection_flush(connection_.get(), FALSE);
-    Message goodbye;
+    RtspMessage goodbye;
     gst_rtsp_message_init_request(goodbye.cleared(), GST_RTSP_TEARDOWN, session_url_.c_str());
     gst_rtsp_connection_send_usec(connection_.get(), goodbye.get(),
                                   microseconds_until(monotonic_now_s() + kGoodbye_s));
@@ -166,11 +127,11 @@ ReadStatus RtspSession::connect(std::string* error) {
 
 // kOk with another url_ than before: redirected.
 ReadStatus RtspSession::describe(std::string* sdp, std::string* error) {
-  Message options;
+  RtspMessage options;
   ReadStatus status = ask({GST_RTSP_OPTIONS, url_}, &options, error);
   if (status != ReadStatus::kOk) return status;
   if (options.lists(GST_RTSP_HDR_PUBLIC, "GET_PARAMETER")) ping_ = GST_RTSP_GET_PARAMETER;
-  Message answer;
+  RtspMessage answer;
   status = ask({GST_RTSP_DESCRIBE, url_, GST_RTSP_HDR_ACCEPT, "application/sdp"}, &answer, error);
   if (status != ReadStatus::kOk) return status;
   const int code = answer.status();
@@ -206,7 +167,7 @@ ReadStatus RtspSession::play(const std::string& sdp, std::string* error) {
   const std::string ports = std::to_string(first_port_) + "-" + std::to_string(first_port_ + 1);
   const std::string wanted =
       by_tcp ? "RTP/AVP/TCP;unicast;interleaved=0-1" : "RTP/AVP;unicast;client_port=" + ports;
-  Message answer;
+  RtspMessage answer;
   ReadStatus status =
       ask({GST_RTSP_SETUP, resolve(base_url_, video->control), GST_RTSP_HDR_TRANSPORT, wanted},
           &answer, error);
@@ -255,7 +216,7 @@ bool RtspSession::open_ports() {
 }
 
 ReadStatus RtspSession::send(const Request& request, double deadline_s, std::string* error) {
-  Message message;
+  RtspMessage message;
   gst_rtsp_message_init_request(message.cleared(), request.method, request.url.c_str());
   gst_rtsp_message_add_header(message.get(), request.header, request.value.c_str());
   const GstRTSPResult result = gst_rtsp_connection_send_usec(connection_.get(), message.get(),
@@ -264,7 +225,7 @@ ReadStatus RtspSession::send(const Request& request, double deadline_s, std::str
 }
 
 // Sends the request, logs in if that is wanted, and waits for the answer.
-ReadStatus RtspSession::ask(const Request& request, Message* answer, std::string* error) {
+ReadStatus RtspSession::ask(const Request& request, RtspMessage* answer, std::string* error) {
   for (bool logged_in = false;;) {
     ReadStatus status = send(request, deadline_s_, error);
     while (status == ReadStatus::kOk) {
@@ -295,7 +256,7 @@ ReadStatus RtspSession::ask(const Request& request, Message* answer, std::string
 }
 
 // From here on GStreamer's library adds the login to each request.
-bool RtspSession::accept_challenge(Message* answer) {
+bool RtspSession::accept_challenge(RtspMessage* answer) {
   GstRTSPAuthCredential** offered =
       gst_rtsp_message_parse_auth_credentials(answer->get(), GST_RTSP_HDR_WWW_AUTHENTICATE);
   const GstRTSPAuthCredential* best = nullptr;
@@ -321,15 +282,15 @@ bool RtspSession::accept_challenge(Message* answer) {
   return accepted;
 }
 
-ReadStatus RtspSession::next_message(double deadline_s, Message* message, std::string* error) {
+ReadStatus RtspSession::next_message(double deadline_s, RtspMessage* message, std::string* error) {
   const GstRTSPResult result = gst_rtsp_connection_receive_usec(
       connection_.get(), message->cleared(), microseconds_until(deadline_s));
   return result == GST_RTSP_OK ? ReadStatus::kOk : lost(result, error);
 }
 
 // Cameras ask whether we are still there.
-void RtspSession::reply(Message* request) {
-  Message answer;
+void RtspSession::reply(RtspMessage* request) {
+  RtspMessage answer;
   gst_rtsp_message_init_response(answer.cleared(), GST_RTSP_STS_OK, "OK", request->get());
   gst_rtsp_connection_send_usec(connection_.get(), answer.get(),
                                 microseconds_until(monotonic_now_s() + kGoodbye_s));
@@ -352,7 +313,7 @@ bool RtspSession::readable(double wait_s) const {
 }
 
 ReadStatus RtspSession::next_packet(double deadline_s, Packet* packet, std::string* error) {
-  Message message;
+  RtspMessage message;
   const ReadStatus status = next_message(deadline_s, &message, error);
   if (status != ReadStatus::kOk) return status;
   if (message.type() == GST_RTSP_MESSAGE_REQUEST) {

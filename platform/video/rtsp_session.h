@@ -17,6 +17,8 @@
 
 namespace alidade {
 
+class RtspMessage;
+
 class RtspSession : public RtpTransport {
  public:
   // options.url without credentials; options must outlive the session.
@@ -31,8 +33,6 @@ class RtspSession : public RtpTransport {
   void interrupt() override;
 
  private:
-  class Message;  // owns a GstRTSPMessage
-
   using Packet = std::vector<std::uint8_t>;
   struct Request {
     GstRTSPMethod method;
@@ -45,16 +45,17 @@ class RtspSession : public RtpTransport {
   [[nodiscard]] ReadStatus describe(std::string* sdp, std::string* error);
   [[nodiscard]] ReadStatus play(const std::string& sdp, std::string* error);
   [[nodiscard]] bool open_ports();
-  [[nodiscard]] ReadStatus ask(const Request& request, Message* answer, std::string* error);
+  [[nodiscard]] ReadStatus ask(const Request& request, RtspMessage* answer, std::string* error);
   [[nodiscard]] ReadStatus send(const Request& request, double deadline_s, std::string* error);
-  [[nodiscard]] bool accept_challenge(Message* answer);
-  [[nodiscard]] ReadStatus next_message(double deadline_s, Message* message, std::string* error);
+  [[nodiscard]] bool accept_challenge(RtspMessage* answer);
+  [[nodiscard]] ReadStatus next_message(double deadline_s, RtspMessage* message,
+                                        std::string* error);
   // The next packet within the connection, if the next message is one.
   [[nodiscard]] ReadStatus next_packet(double deadline_s, Packet* packet, std::string* error);
   [[nodiscard]] ReadStatus keep_alive(std::string* error);
   [[nodiscard]] ReadStatus ping(std::string* error);
   [[nodiscard]] bool readable(double wait_s) const;
-  void reply(Message* request);
+  void reply(RtspMessage* request);
   [[nodiscard]] ReadStatus lost(GstRTSPResult result, std::string* error) const;
 
   struct Unref {

@@ -110,11 +110,10 @@ V4l2Device::Result V4l2Device::fail_call(const char* what, int error_number) {
 
 V4l2Device::Result V4l2Device::open(const std::string& path, const V4l2Wish& wish) {
   path_ = path;
-  const int fd = ::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC);
-  if (fd < 0) {
+  device_.reset(::open(path.c_str(), O_RDWR | O_NONBLOCK | O_CLOEXEC));
+  if (!device_.is_open()) {
     return fail_call("cannot be opened", errno);
   }
-  fd_ = fd;
   Result result = check_kind();
   std::string error;
   if (result == Result::kOk) {
@@ -135,7 +134,7 @@ V4l2Device::Result V4l2Device::open(const std::string& path, const V4l2Wish& wis
 
 V4l2Device::Result V4l2Device::check_kind() {
   v4l2_capability capability{};
-  if (call(fd_, VIDIOC_QUERYCAP, &capability) < 0) {
+  if (call(device_.get(), VIDIOC_QUERYCAP, &capability) < 0) {
     return errno == ENOTTY || errno == EINVAL
                ? fail(Result::kUnusable, "is no V4L2 device; video devices are /dev/video*")
                : fail_call("VIDIOC_QUERYCAP", errno);
@@ -167,7 +166,7 @@ void V4l2Device::add_rates(std::uint32_t fourcc, int width, int height, V4l2Size
   interval.pixel_format = fourcc;
   interval.width = static_cast<std::uint32_t>(width);
   interval.height = static_cast<std::uint32_t>(height);
-  for (; call(fd_, VIDIOC_ENUM_FRAMEINTERVALS, &interval) == 0; ++interval.index) {
+  for (; call(device_.get(), VIDIOC_ENUM_FRAMEINTERVALS, &interval) == 0; ++interval.index) {
     if (interval.type == V4L2_FRMIVAL_TYPE_DISCRETE) {
       const double rate_hz = frequency(interval.discrete);
       size->rates.push_back({rate_hz, rate_hz});
@@ -182,7 +181,7 @@ std::vector<V4l2Size> V4l2Device::sizes(std::uint32_t fourcc, const V4l2Wish& wi
   std::vector<V4l2Size> sizes;
   v4l2_frmsizeenum entry{};
   entry.pixel_format = fourcc;
-  for (; call(fd_, VIDIOC_ENUM_FRAMESIZES, &entry) == 0; ++entry.index) {
+  for (; call(device_.get(), VIDIOC_ENUM_FRAMESIZES, &entry) == 0; ++entry.index) {
     V4l2Size size;
     if (entry.type == V4L2_FRMSIZE_TYPE_DISCRETE) {
       size.least_width = size.greatest_width = static_cast<int>(entry.discrete.width);
@@ -209,7 +208,7 @@ std::vector<V4l2Offer> V4l2Device::offers(const V4l2Wish& wish) const {
   std::vector<V4l2Offer> offers;
   v4l2_fmtdesc entry{};
   entry.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  for (; call(fd_, VIDIOC_ENUM_FMT, &entry) == 0; ++entry.index) {
+  for (; call(device_.get(), VIDIOC_ENUM_FMT, &entry) == 0; ++entry.index) {
     offers.push_back({entry.pixelformat, sizes(entry.pixelformat, wish)});
   }
   return offers;
@@ -218,7 +217,7 @@ std::vector<V4l2Offer> V4l2Device::offers(const V4l2Wish& wish) const {
 V4l2Device::Result V4l2Device::set_format(std::uint32_t fourcc, const V4l2Wish& wish) {
   v4l2_format format{};
   format.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  if (call(fd_, VIDIOC_G_FMT, &format) < 0) {
+  if (call(device_.get(), VIDIOC_G_FMT, &format) < 0) {
     return fail_call("VIDIOC_G_FMT", errno);
   }
   v4l2_pix_format& picture = format.fmt.pix;
@@ -230,7 +229,7 @@ V4l2Device::Result V4l2Device::set_format(std::uint32_t fourcc, const V4l2Wish& 
     picture.width = static_cast<std::uint32_t>(wish.width);
     picture.height = static_cast<std::uint32_t>(wish.height);
   }
-  if (call(fd_, VIDIOC_S_FMT, &format) < 0) {
+  if (call(device_.get(), VIDIOC_S_FMT, &format) < 0) {
     return fail_call("VIDIOC_S_FMT", errno);
   }
   width_ = static_cast<int>(picture.width);
@@ -261,11 +260,11 @@ V4l2Device::Result V4l2Device::set_rate(double rate_hz) {
   v4l2_streamparm parameters{};
   parameters.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   parameters.parm.capture.timeperframe = period_of(rate_hz);
-  if (call(fd_, VIDIOC_S_PARM, &parameters) < 0 && errno != ENOTTY && errno != EINVAL) {
+  if (call(device_.get(), VIDIOC_S_PARM, &parameters) < 0 && errno != ENOTTY && errno != EINVAL) {
     return fail_call("VIDIOC_S_PARM", errno);
   }
   parameters.parm.capture.timeperframe = {};
-  const bool told = call(fd_, VIDIOC_G_PARM, &parameters) == 0 &&
+  const bool told = call(device_.get(), VIDIOC_G_PARM, &parameters) == 0 &&
                     parameters.parm.capture.timeperframe.denominator > 0;
   if (!told) {
     return fail(Result::kUnusable, "does not tell its rate; leave rate_hz out");
@@ -287,7 +286,7 @@ V4l2Device::Result V4l2Device::start() {
   request.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   request.memory = V4L2_MEMORY_MMAP;
   request.count = kBuffers;
-  if (call(fd_, VIDIOC_REQBUFS, &request) < 0) {
+  if (call(device_.get(), VIDIOC_REQBUFS, &request) < 0) {
     return fail_call("VIDIOC_REQBUFS", errno);
   }
   for (std::uint32_t index = 0; index < request.count; ++index) {
@@ -295,21 +294,21 @@ V4l2Device::Result V4l2Device::start() {
     buffer.type = request.type;
     buffer.memory = request.memory;
     buffer.index = index;
-    if (call(fd_, VIDIOC_QUERYBUF, &buffer) < 0) {
+    if (call(device_.get(), VIDIOC_QUERYBUF, &buffer) < 0) {
       return fail_call("VIDIOC_QUERYBUF", errno);
     }
-    void* data =
-        ::mmap(nullptr, buffer.length, PROT_READ | PROT_WRITE, MAP_SHARED, fd_, buffer.m.offset);
+    void* data = ::mmap(nullptr, buffer.length, PROT_READ | PROT_WRITE, MAP_SHARED, device_.get(),
+                        buffer.m.offset);
     if (data == MAP_FAILED) {
       return fail_call("mmap", errno);
     }
     mappings_.push_back(std::make_shared<Mapping>(data, buffer.length));
-    if (call(fd_, VIDIOC_QBUF, &buffer) < 0) {
+    if (call(device_.get(), VIDIOC_QBUF, &buffer) < 0) {
       return fail_call("VIDIOC_QBUF", errno);
     }
   }
   int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  if (call(fd_, VIDIOC_STREAMON, &type) < 0) {
+  if (call(device_.get(), VIDIOC_STREAMON, &type) < 0) {
     return fail_call("VIDIOC_STREAMON", errno);
   }
   return Result::kOk;
@@ -317,25 +316,25 @@ V4l2Device::Result V4l2Device::start() {
 
 void V4l2Device::close() {
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (fd_ < 0) {
+  if (!device_.is_open()) {
     return;
   }
   int type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
-  (void)call(fd_, VIDIOC_STREAMOFF, &type);
+  (void)call(device_.get(), VIDIOC_STREAMOFF, &type);
   for (const std::shared_ptr<Mapping>& mapping : mappings_) {
     if (mapping.use_count() > 1) {
       mapping->detach();
     }
   }
   mappings_.clear();
-  ::close(std::exchange(fd_, -1));
+  device_.reset();
 }
 
 V4l2Device::Result V4l2Device::dequeue(Buffer* buffer) {
   v4l2_buffer filled{};
   filled.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   filled.memory = V4L2_MEMORY_MMAP;
-  if (call(fd_, VIDIOC_DQBUF, &filled) < 0) {
+  if (call(device_.get(), VIDIOC_DQBUF, &filled) < 0) {
     return errno == EAGAIN ? Result::kNothing : fail_call("VIDIOC_DQBUF", errno);
   }
   if (filled.index >= mappings_.size()) {
@@ -356,14 +355,14 @@ V4l2Device::Result V4l2Device::dequeue(Buffer* buffer) {
 void V4l2Device::give_back(std::uint32_t index) {
   const std::lock_guard<std::mutex> lock(mutex_);
   --held_;
-  if (fd_ < 0) {
+  if (!device_.is_open()) {
     return;
   }
   v4l2_buffer buffer{};
   buffer.type = V4L2_BUF_TYPE_VIDEO_CAPTURE;
   buffer.memory = V4L2_MEMORY_MMAP;
   buffer.index = index;
-  (void)call(fd_, VIDIOC_QBUF, &buffer);
+  (void)call(device_.get(), VIDIOC_QBUF, &buffer);
 }
 
 std::shared_ptr<const void> V4l2Device::hold(std::uint32_t index) {

@@ -17,6 +17,7 @@
 #include <string>
 #include <vector>
 
+#include "platform/system/file_descriptor.h"
 #include "platform/video/v4l2_mode.h"
 
 namespace alidade {
@@ -54,7 +55,7 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
   void close();
 
   // Polls readable when a buffer is filled.
-  [[nodiscard]] int fd() const { return fd_; }
+  [[nodiscard]] int fd() const { return device_.get(); }
   // On kOk the next call is hold().
   [[nodiscard]] Result dequeue(Buffer* buffer);
   [[nodiscard]] std::shared_ptr<const void> hold(std::uint32_t index);
@@ -107,9 +108,9 @@ class V4l2Device : public std::enable_shared_from_this<V4l2Device> {
   int height_ = 0;
   std::size_t stride_ = 0;  // bytes; of raw formats
 
-  // Guards fd_ against an owner that ends while the device is closed.
+  // Guards device_ against an owner that ends while the device is closed.
   std::mutex mutex_;
-  int fd_ = -1;
+  FileDescriptor device_;
   std::size_t held_ = 0;                            // guarded by mutex_
   std::vector<std::shared_ptr<Mapping>> mappings_;  // by index
 };

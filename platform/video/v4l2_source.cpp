@@ -3,7 +3,6 @@
 #include <linux/videodev2.h>
 #include <poll.h>
 #include <sys/eventfd.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -15,6 +14,7 @@
 
 #include "platform/system/backoff.h"
 #include "platform/system/clock.h"
+#include "platform/system/file_descriptor.h"
 #include "platform/video/jpeg_decoder.h"
 #include "platform/video/stream_copy.h"
 #include "platform/video/v4l2_device.h"
@@ -33,34 +33,27 @@ std::size_t pixels(const Picture& picture) {
   return static_cast<std::size_t>(picture.width) * static_cast<std::size_t>(picture.height);
 }
 
-}  // namespace
-
-class V4l2Source::Implementation {
+class V4l2Source : public FrameSource {
  public:
-  explicit Implementation(const V4l2SourceOptions& options)
-      : options_(options), stop_fd_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  explicit V4l2Source(const V4l2SourceOptions& options)
+      : options_(options), stop_event_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
     silence_av_log();
-    if (stop_fd_ < 0) {
+    if (!stop_event_.is_open()) {
       (void)fail("no file descriptor is left");
     }
   }
-  ~Implementation() {
-    close();
-    if (stop_fd_ >= 0) {
-      ::close(stop_fd_);
-    }
-  }
+  ~V4l2Source() override { close(); }
 
-  ReadStatus read(Frame& frame, double timeout_s);
-  void stop() {
+  ReadStatus read(Frame& frame, double timeout_s) override;
+  void stop() override {
     stopped_ = true;
-    if (stop_fd_ >= 0) {
-      (void)::eventfd_write(stop_fd_, 1);
+    if (stop_event_.is_open()) {
+      (void)::eventfd_write(stop_event_.get(), 1);
     }
   }
-  const std::string& error() const { return error_; }
-  const std::string& name() const { return options_.device; }
-  FrameSourceCounters counters() const { return {damaged_, dropped_}; }
+  std::string error() const override { return error_; }
+  std::string name() const override { return options_.device; }
+  FrameSourceCounters counters() const override { return {damaged_, dropped_}; }
 
  private:
   ReadStatus connect(double end_s);
@@ -79,7 +72,7 @@ class V4l2Source::Implementation {
   }
 
   V4l2SourceOptions options_;
-  int stop_fd_;  // readable for good once stop() was called
+  FileDescriptor stop_event_;  // readable for good once stop() was called
   std::atomic<bool> stopped_{false};
   std::atomic<std::int64_t> damaged_{0};
   std::atomic<std::int64_t> dropped_{0};
@@ -101,14 +94,14 @@ class V4l2Source::Implementation {
   StreamCopy copy_;
 };
 
-void V4l2Source::Implementation::close() {
+void V4l2Source::close() {
   if (device_) {
     device_->close();  // lent buffers keep the object
     device_.reset();
   }
 }
 
-ReadStatus V4l2Source::Implementation::lose(const std::string& error) {
+ReadStatus V4l2Source::lose(const std::string& error) {
   close();
   error_ = options_.device + ": " + error;
   restarted_ = true;
@@ -118,15 +111,15 @@ ReadStatus V4l2Source::Implementation::lose(const std::string& error) {
 }
 
 // Until fd (if not negative) has something, or end_s, or stop(). False: it has nothing yet.
-bool V4l2Source::Implementation::wait(int fd, double end_s, bool* gone) {
+bool V4l2Source::wait(int fd, double end_s, bool* gone) {
   const double left_s = std::clamp(end_s - monotonic_now_s(), 0.0, kLongestPoll_s);
-  std::array<pollfd, 2> polled = {{{stop_fd_, POLLIN, 0}, {fd, POLLIN, 0}}};
+  std::array<pollfd, 2> polled = {{{stop_event_.get(), POLLIN, 0}, {fd, POLLIN, 0}}};
   (void)::poll(polled.data(), polled.size(), static_cast<int>(std::ceil(1e3 * left_s)));
   *gone = (polled[1].revents & (POLLERR | POLLHUP | POLLNVAL)) != 0;
   return polled[1].revents != 0;
 }
 
-ReadStatus V4l2Source::Implementation::connect(double end_s) {
+ReadStatus V4l2Source::connect(double end_s) {
   bool gone = false;
   if (next_try_s_ > monotonic_now_s()) {
     (void)wait(-1, std::min(end_s, next_try_s_), &gone);
@@ -156,7 +149,7 @@ ReadStatus V4l2Source::Implementation::connect(double end_s) {
   return ReadStatus::kOk;
 }
 
-ReadStatus V4l2Source::Implementation::read(Frame& frame, double timeout_s) {
+ReadStatus V4l2Source::read(Frame& frame, double timeout_s) {
   const double end_s = monotonic_now_s() + timeout_s;
   for (;;) {
     if (stopped_) {
@@ -191,7 +184,7 @@ ReadStatus V4l2Source::Implementation::read(Frame& frame, double timeout_s) {
 }
 
 // Of the next buffer; kTimeout if that is none to deliver.
-ReadStatus V4l2Source::Implementation::take(Frame& frame) {
+ReadStatus V4l2Source::take(Frame& frame) {
   V4l2Device::Buffer buffer;
   const V4l2Device::Result result = device_->dequeue(&buffer);
   if (result != V4l2Device::Result::kOk) {
@@ -238,9 +231,8 @@ ReadStatus V4l2Source::Implementation::take(Frame& frame) {
 }
 
 // Size and, if wanted, luma. False: the buffer does not hold a whole picture.
-bool V4l2Source::Implementation::take_picture(const V4l2Device::Buffer& buffer,
-                                              const std::shared_ptr<const void>& held,
-                                              Picture* picture) {
+bool V4l2Source::take_picture(const V4l2Device::Buffer& buffer,
+                              const std::shared_ptr<const void>& held, Picture* picture) {
   const V4l2Format format = device_->format();
   if (format == V4l2Format::kMjpg) {
     const std::string_view jpeg = bytes_of(buffer);
@@ -272,8 +264,8 @@ bool V4l2Source::Implementation::take_picture(const V4l2Device::Buffer& buffer,
   return true;
 }
 
-bool V4l2Source::Implementation::store(const V4l2Device::Buffer& buffer, const Picture& picture,
-                                       double receive_time_s, std::string* error) {
+bool V4l2Source::store(const V4l2Device::Buffer& buffer, const Picture& picture,
+                       double receive_time_s, std::string* error) {
   const V4l2Format format = device_->format();
   const bool jpeg = format == V4l2Format::kMjpg;
   const std::size_t bytes = jpeg ? buffer.bytes : pixels(picture);
@@ -291,15 +283,10 @@ bool V4l2Source::Implementation::store(const V4l2Device::Buffer& buffer, const P
                    receive_time_s, error);
 }
 
-V4l2Source::V4l2Source(const V4l2SourceOptions& options)
-    : implementation_(std::make_unique<Implementation>(options)) {}
-V4l2Source::~V4l2Source() = default;
-ReadStatus V4l2Source::read(Frame& frame, double timeout_s) {
-  return implementation_->read(frame, timeout_s);
+}  // namespace
+
+std::unique_ptr<FrameSource> open_v4l2(const V4l2SourceOptions& options) {
+  return std::make_unique<V4l2Source>(options);
 }
-void V4l2Source::stop() { implementation_->stop(); }
-std::string V4l2Source::error() const { return implementation_->error(); }
-std::string V4l2Source::name() const { return implementation_->name(); }
-FrameSourceCounters V4l2Source::counters() const { return implementation_->counters(); }
 
 }  // namespace alidade

@@ -1,5 +1,5 @@
 #pragma once
-// V4l2Source: a camera on this machine: USB (UVC), CSI, frame grabbers; any single-planar V4L2 capture
+// open_v4l2(): a camera on this machine: USB (UVC), CSI, frame grabbers; any single-planar V4L2 capture
 // device (v4l2_device.h), with GREY, NV12, YUYV, UYVY or MJPG pictures.
 //
 // No thread of its own: the kernel stamps and queues, read() takes out and decodes.
@@ -36,23 +36,6 @@ struct V4l2SourceOptions {
   std::string copy_to;       // video.mkv to store the pictures in; empty: none
 };
 
-class V4l2Source : public FrameSource {
- public:
-  explicit V4l2Source(const V4l2SourceOptions& options);
-  ~V4l2Source() override;
-  V4l2Source(const V4l2Source&) = delete;
-  V4l2Source& operator=(const V4l2Source&) = delete;
-
-  [[nodiscard]] ReadStatus read(Frame& frame, double timeout_s) override;
-  void stop() override;
-  [[nodiscard]] std::string error() const override;
-  [[nodiscard]] std::string name() const override;
-
-  [[nodiscard]] FrameSourceCounters counters() const override;
-
- private:
-  class Implementation;  // keeps libav and the kernel's headers out of this one
-  std::unique_ptr<Implementation> implementation_;
-};
+[[nodiscard]] std::unique_ptr<FrameSource> open_v4l2(const V4l2SourceOptions& options);
 
 }  // namespace alidade

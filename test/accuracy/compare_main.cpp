@@ -12,7 +12,7 @@
 #include <string>
 #include <vector>
 
-#include "core/calibration/calibration_file.h"
+#include "edge_app/storage/calibration_file.h"
 #include "test/accuracy/calibration_comparison.h"
 
 int main(int argc, char** argv) {

@@ -58,7 +58,7 @@ Answer EnduranceConsumer::add(const FrameStamp& stamp, const ImageView& picture)
   answer.calibration = calibration_;
   step_.maintain();
   if (events.video_clock_restarted) messages_.emplace_back("the video's clock began anew");
-  if (events.video_floor_shifted) messages_.emplace_back("the least delay of the video stepped");
+  if (events.video_delay_stepped) messages_.emplace_back("the least delay of the video stepped");
   if (!calibrating_) return answer;
 
   FeedFrame frame;

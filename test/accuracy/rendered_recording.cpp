@@ -60,7 +60,7 @@ Config without_noise(Config config) {
 TelemetryNoise telemetry_noise(const Config& config) {
   TelemetryNoise noise;
   noise.pan_tilt_sigma = config.telemetry.sigma;
-  noise.quantum = config.telemetry.quantum;
+  noise.resolution = config.telemetry.quantum;
   noise.period_sigma_s = 0;
   // rad/s^2: what the paths here do, which are told in fields of view.
   noise.acceleration_sigma = 2 * simulator::horizontal_field_of_view(config);

@@ -10,7 +10,7 @@
 #include <tuple>
 #include <vector>
 
-#include "core/calibration/calibration_file.h"
+#include "edge_app/storage/calibration_file.h"
 #include "platform/video/recording_frame_source.h"
 #include "test/accuracy/tag_table.h"
 
@@ -29,14 +29,14 @@ struct Options {
 };
 
 bool find_tags(const Options& options, std::vector<TagSighting>* sightings, std::string* error) {
-  RecordingFrameSource video({options.recording, true, false});
+  const auto video = open_recorded_frames({options.recording, true, false});
   TagDetector detector(options.tag);
   Frame frame;
   for (;;) {
-    const ReadStatus status = video.read(frame, std::numeric_limits<double>::infinity());
+    const ReadStatus status = video->read(frame, std::numeric_limits<double>::infinity());
     if (status == ReadStatus::kEnd) return true;
     if (status != ReadStatus::kOk) {
-      *error = video.error();
+      *error = video->error();
       return false;
     }
     const auto corners = detector.find({frame.luma, frame.width, frame.height, frame.stride});

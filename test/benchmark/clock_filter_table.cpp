@@ -188,10 +188,10 @@ nlohmann::json run(const Scenario& scenario) {
   std::vector<double> scratch(n);
   if (scenario.counted) {
     alidade::smooth_clock(options, recording.receive.data(), recording.sequence.data(), n,
-                                  estimates.data(), scratch.data());
+                          estimates.data(), scratch.data());
   } else {
     alidade::smooth_clock(options, recording.receive.data(), recording.sender.data(), n,
-                                  estimates.data(), scratch.data());
+                          estimates.data(), scratch.data());
   }
   double restarted_at = 0;
   for (std::size_t i = 0; i < n; ++i) {

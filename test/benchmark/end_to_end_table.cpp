@@ -297,8 +297,8 @@ int main(int argc, char** argv) {
     const RtpPictures sender(timetable, camera.calibration().camera);
     RtpSourceOptions options;
     options.url = sender.url();
-    RtpSource video(options);
-    measure("rtp", &video, camera, start_s, heard, &report);
+    const auto video = open_rtp(options);
+    measure("rtp", video.get(), camera, start_s, heard, &report);
   }
   {
     const double start_s = monotonic_now_s();
@@ -306,8 +306,8 @@ int main(int argc, char** argv) {
     const HttpSender sender(timetable);
     MjpegSourceOptions options;
     options.url = sender.url();
-    MjpegSource video(options);
-    measure("http", &video, camera, start_s, heard, &report);
+    const auto video = open_mjpeg(options);
+    measure("http", video.get(), camera, start_s, heard, &report);
   }
   report.print();
   for (const char* link : {"rtp", "http"}) {

@@ -26,8 +26,8 @@
 #include <string>
 #include <vector>
 
+#include "edge_app/output/http/http_server.h"
 #include "edge_app/output/http_api.h"
-#include "edge_app/output/http_server.h"
 #include "edge_app/output/live_state.h"
 #include "edge_app/output/record_sinks.h"
 #include "edge_app/pipeline/pipeline.h"
@@ -192,7 +192,6 @@ bool run(LatencyReport* report) {
   sources.video_losses = [&video] { return video.counters(); };
   sources.ask_for_calibration = [] { return false; };
   add_api_routes(&server, sources);
-  server.set_on_stop([&live] { live.close(); });
   std::string error;
   if (!server.start(&error)) {
     std::fprintf(stderr, "%s\n", error.c_str());

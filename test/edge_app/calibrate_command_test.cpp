@@ -15,7 +15,7 @@
 #include <string>
 #include <vector>
 
-#include "core/calibration/calibration_file.h"
+#include "edge_app/storage/calibration_file.h"
 #include "edge_app/storage/map_file.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/edge_app/recording_files.h"

@@ -10,7 +10,7 @@
 #include <string>
 #include <vector>
 
-#include "core/calibration/calibration_file.h"
+#include "edge_app/storage/calibration_file.h"
 #include "edge_app/storage/calibration_store.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/support/temporary_directory.h"

@@ -2,6 +2,7 @@
 // permissions and power cuts leave.
 
 #include "edge_app/storage/calibration_store.h"
+#include "edge_app/storage/calibration_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,6 +13,7 @@
 #include <filesystem>
 #include <set>
 
+#include "edge_app/storage/calibration_file.h"
 #include "edge_app/storage/map_file.h"
 #include "test/support/temporary_directory.h"
 

@@ -282,7 +282,7 @@ TEST_F(ConfigTest, PelcoDHasTheProtocolsOwnUnitsAndRate) {
   const auto& pelco_d = std::get<PelcoDOptions>(pan_tilt.head.protocol);
   EXPECT_EQ(pelco_d.address, 1);
   EXPECT_EQ(pelco_d.tilt_deg_per_step, 0.01);
-  EXPECT_STREQ(make_protocol(pan_tilt.head)->name(), "Pelco-D");
+  EXPECT_STREQ(make_protocol(pan_tilt.head.protocol)->name(), "Pelco-D");
   ASSERT_THAT(load(RTSP "pan_tilt: {type: pelco_d, device: line, baud: 2400, address: 3,\n"
                         "  tilt_positive: up, pan_positive: left, pan_zero_deg: 90,\n"
                         "  read_zoom: true}\n" CAMERA),
@@ -307,7 +307,7 @@ TEST_F(ConfigTest, ViscaAndPtuAreRead) {
   EXPECT_EQ(visca.pan_deg_per_step, 0.0042);
   EXPECT_EQ(visca.tilt_deg_per_step, 0.00195);
   EXPECT_EQ(config_.pan_tilt.rate_hz, 100);
-  EXPECT_STREQ(make_protocol(config_.pan_tilt.head)->name(), "VISCA");
+  EXPECT_STREQ(make_protocol(config_.pan_tilt.head.protocol)->name(), "VISCA");
   ASSERT_THAT(load(RTSP "pan_tilt: {type: ptu, url: 'tcp://10.0.0.2:4000', feedback: terse,\n"
                         "  pan_positive: left, tilt_positive: up}\n" CAMERA),
               IsEmpty());
@@ -315,7 +315,40 @@ TEST_F(ConfigTest, ViscaAndPtuAreRead) {
   EXPECT_FALSE(ptu.verbose);
   EXPECT_FALSE(ptu.pan_deg_per_step);
   EXPECT_EQ(config_.pan_tilt.axes.pan.sign, -1);
-  EXPECT_STREQ(make_protocol(config_.pan_tilt.head)->name(), "PTU");
+  EXPECT_STREQ(make_protocol(config_.pan_tilt.head.protocol)->name(), "PTU");
+}
+
+// Each head of the table, with the keys that it may require.
+TEST_F(ConfigTest, EveryHeadIsReadAndUnusualSignsAreRequired) {
+  for (const Head& head : kHeads) {
+    const auto error_with = [&](const char* signs) {
+      return load(std::string(RTSP "pan_tilt: {type: ") + head.key +
+                  ", url: 'tcp://10.0.0.2:4000', pan_deg_per_step: 0.01, tilt_deg_per_step: 0.01" +
+                  signs + "}\n" CAMERA);
+    };
+    ASSERT_THAT(error_with(", pan_positive: left, tilt_positive: down"), IsEmpty()) << head.key;
+    EXPECT_EQ(config_.pan_tilt.head.protocol.index(), static_cast<std::size_t>(head.type));
+    EXPECT_EQ(config_.pan_tilt.axes.pan.sign, -1);
+    EXPECT_EQ(config_.pan_tilt.axes.tilt.sign, -1);
+    const std::string error = error_with("");
+    if (head.signs.pan && head.signs.tilt) {
+      EXPECT_THAT(error, IsEmpty());
+      EXPECT_EQ(config_.pan_tilt.axes.pan.sign, head.signs.pan);
+      EXPECT_EQ(config_.pan_tilt.axes.tilt.sign, head.signs.tilt);
+    } else {
+      EXPECT_THAT(error, HasSubstr("_positive: is missing")) << head.key;
+    }
+  }
+}
+
+// 0: each answer of the device is fresh, so nothing ages while the head rests.
+TEST_F(ConfigTest, FreshAnswersGoWithAnyExtrapolation) {
+  EXPECT_THAT(load(RTSP "pan_tilt: {type: vapix, url: http://camera, max_repeat_s: 0}\n" CAMERA
+                        "realtime: {max_extrapolation_s: 0}\n"),
+              IsEmpty());
+  EXPECT_THAT(load(RTSP "pan_tilt: {type: vapix, url: http://camera, max_repeat_s: 0.3}\n" CAMERA
+                        "realtime: {max_extrapolation_s: 0.5}\n"),
+              IsEmpty());
 }
 
 TEST_F(ConfigTest, TheExampleOfHeadsIsRead) {
@@ -454,6 +487,20 @@ INSTANTIATE_TEST_SUITE_P(
                 "is missing; expected right or left: where the head turns while its pan grows"},
         Mistake{"SignIsANumber", VIDEO "pan_tilt: {type: ptu, device: /dev/x, pan_positive: -1}\n",
                 ":2: pan_tilt.pan_positive", "expected one of right, left"},
+        Mistake{
+            "UnknownPanTiltType", VIDEO "pan_tilt: {type: pelco_p}\n", ":2: pan_tilt.type",
+            "'pelco_p' is unknown; expected one of vapix, onvif, pelco_d, visca, ptu, recording"},
+        Mistake{"NoPanTiltType", VIDEO "pan_tilt: {url: http://camera}\n", ":2: pan_tilt.type",
+                "is missing; expected one of vapix, onvif, pelco_d, visca, ptu, recording"},
+        Mistake{"RepeatsLongerThanExtrapolation",
+                VIDEO
+                "pan_tilt: {type: vapix, url: http://camera,\n  max_repeat_s: 0.25}\n" CALIBRATION,
+                ":3: pan_tilt.max_repeat_s",
+                "is 0.25 s, no less than realtime.max_extrapolation_s (0.25 s)"},
+        Mistake{"ExtrapolationShorterThanRepeats",
+                MINIMAL "realtime: {max_extrapolation_s: 0.05}\n",
+                ":4: realtime.max_extrapolation_s",
+                "is 0.05 s, no more than pan_tilt.max_repeat_s (0.1 s)"},
         Mistake{"UnknownMode", MINIMAL "realtime: {mode: OF}\n", ":4: realtime.mode",
                 "'OF' is unknown; expected one of OE, PT"},
         Mistake{"HttpWithoutPort", MINIMAL "output: {http: 127.0.0.1}\n", ":4: output.http",

@@ -39,7 +39,6 @@ class HttpApiTest : public ::testing::Test {
     sources.version = "1.2.3";
     sources.camera = "a camera";
     add_api_routes(&server_, sources);
-    server_.set_on_stop([this] { live_.close(); });
     std::string error;
     EXPECT_TRUE(server_.start(&error)) << error;
   }

@@ -10,7 +10,7 @@
 #include <array>
 #include <string>
 
-#include "edge_app/output/http_server.h"
+#include "edge_app/output/http/http_server.h"
 
 namespace alidade::test {
 
@@ -33,6 +33,9 @@ class Client {
   void send(const std::string& text) {
     static_cast<void>(::send(socket_, text.data(), text.size(), MSG_NOSIGNAL));
   }
+
+  // It will send nothing more.
+  void end() { ::shutdown(socket_, SHUT_WR); }
 
   // All up to the end of the connection, or until `enough` was seen.
   std::string receive(const std::string& enough = "") {

@@ -1,6 +1,6 @@
 // The server against clients that behave, and against those that do not: over real sockets.
 
-#include "edge_app/output/http_server.h"
+#include "edge_app/output/http/http_server.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,11 +8,16 @@
 #include <sched.h>
 #include <sys/resource.h>
 
-#include <condition_variable>
-#include <mutex>
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <iterator>
+#include <memory>
 #include <stdexcept>
 #include <string>
 #include <thread>
+#include <vector>
 
 #include "test/edge_app/http_client.h"
 
@@ -33,6 +38,32 @@ ServerResponse plain(const std::string& body) {
   return response;
 }
 
+ServerResponse endless(std::unique_ptr<HttpStream> stream) {
+  ServerResponse response;
+  response.type = "text/event-stream";
+  response.stream = std::move(stream);
+  return response;
+}
+
+class Flood final : public HttpStream {
+ public:
+  void next(std::string* piece) override { piece->append(4096, 'x'); }
+};
+
+// "begun", and then what has been said since.
+class Words final : public HttpStream {
+ public:
+  explicit Words(std::atomic<int>* said) : said_(*said) {}
+  void next(std::string* piece) override {
+    if (told_ < 0) *piece += "begun\n";
+    for (told_ = std::max(told_, 0); told_ < said_; ++told_) *piece += "word\n";
+  }
+
+ private:
+  std::atomic<int>& said_;
+  int told_ = -1;
+};
+
 class HttpServerTest : public ::testing::Test {
  protected:
   void start() {
@@ -50,31 +81,17 @@ class HttpServerTest : public ::testing::Test {
     server_->get("/throw", HttpAccess::kOpen, [](const ServerRequest&) -> ServerResponse {
       throw std::runtime_error("secret");
     });
-    server_->get("/flood", HttpAccess::kOpen, [](const ServerRequest&) {
-      ServerResponse response;
-      response.type = "text/event-stream";
-      response.stream = [](HttpStream& out) {
-        const std::string piece(4096, 'x');
-        while (out.write(piece)) {
-        }
-      };
-      return response;
-    });
+    server_->get("/flood", HttpAccess::kOpen,
+                 [](const ServerRequest&) { return endless(std::make_unique<Flood>()); });
     server_->get("/wait", HttpAccess::kOpen, [this](const ServerRequest&) {
-      ServerResponse response;
-      response.type = "text/event-stream";
-      response.stream = [this](HttpStream& out) {
-        if (!out.write("begun\n")) return;
-        std::unique_lock<std::mutex> lock(mutex_);
-        wake_.wait(lock, [this] { return stopping_; });
-      };
-      return response;
+      return endless(std::make_unique<Words>(&words_));
     });
-    server_->set_on_stop([this] {
-      const std::lock_guard<std::mutex> lock(mutex_);
-      stopping_ = true;
-      wake_.notify_all();
-    });
+    server_->get("/late", HttpAccess::kOpen,
+                 [this](const ServerRequest& request) -> std::optional<ServerResponse> {
+                   ++asked_;
+                   if (request.waited_s < late_s_) return std::nullopt;
+                   return plain("late");
+                 });
     std::string error;
     ASSERT_TRUE(server_->start(&error)) << error;
   }
@@ -94,6 +111,14 @@ class HttpServerTest : public ::testing::Test {
                std::to_string(body.size()) + "\r\n" + headers + "\r\n" + body);
   }
 
+  // Each by itself: when the server has answered somebody who came later, it has taken the byte.
+  void send_bytes(Client* client, const std::string& text) {
+    for (const char byte : text) {
+      client->send(std::string(1, byte));
+      EXPECT_THAT(get("/open"), StartsWith("HTTP/1.1 200 "));
+    }
+  }
+
   // Waits for an event; the test's own time-out is the deadline.
   template <typename Condition>
   static void wait_until(const Condition& condition) {
@@ -101,9 +126,9 @@ class HttpServerTest : public ::testing::Test {
   }
 
   HttpServerOptions options_;
-  std::mutex mutex_;
-  std::condition_variable wake_;
-  bool stopping_ = false;
+  std::atomic<int> words_{0};
+  std::atomic<int> asked_{0};
+  double late_s_ = 0;
   std::unique_ptr<HttpServer> server_;
 };
 
@@ -179,6 +204,156 @@ TEST_F(HttpServerTest, DropsABodyThatIsLate) {
   start();
   EXPECT_THAT(ask("POST /echo HTTP/1.1\r\nHost: localhost\r\nContent-Length: 50\r\n\r\nshort"),
               StartsWith("HTTP/1.1 400 "));
+}
+
+// Wherever a head is cut, its end is found.
+TEST_F(HttpServerTest, TakesAHeadByteByByte) {
+  start();
+  for (const std::string headers : {"Host: localhost\r\n", ""}) {
+    Client client(*server_);
+    send_bytes(&client, "GET /closed?name=slow HTTP/1.1\r\n" + headers + "\r\n");
+    EXPECT_THAT(client.receive(), AllOf(StartsWith("HTTP/1.1 200 "), EndsWith("closed slow")));
+  }
+}
+
+TEST_F(HttpServerTest, AHeadThatDripsIsLateAllTheSame) {
+  options_.limits.head_timeout_s = 0.1;
+  start();
+  Client client(*server_);
+  std::atomic<bool> answered{false};
+  std::thread dripping([&] {
+    client.send("GET /open HTTP/1.1\r\nX: ");
+    while (!answered) {
+      client.send("x");
+      std::this_thread::yield();
+    }
+  });
+  // It may be that the limit of its size is met first.
+  EXPECT_THAT(client.receive("\r\n\r\n"), ::testing::ContainsRegex("^HTTP/1.1 4(08|31) "));
+  answered = true;
+  dripping.join();
+}
+
+TEST_F(HttpServerTest, TakesABodyByteByByte) {
+  start();
+  Client client(*server_);
+  client.send("POST /echo HTTP/1.1\r\nHost: localhost\r\nContent-Length: 20\r\n\r\n01234");
+  send_bytes(&client, "56789abcdefghij");
+  EXPECT_THAT(client.receive(), EndsWith("\r\n\r\necho 0123456789abcdefghij"));
+}
+
+TEST_F(HttpServerTest, SaysThatABodyMayComeOnlyWhereItIsWanted) {
+  start();
+  const std::string head = "POST /echo HTTP/1.1\r\nHost: localhost\r\nExpect: 100-continue\r\n";
+  Client client(*server_);
+  client.send(head + "Content-Length: 5\r\n\r\n");
+  EXPECT_EQ(client.receive("\r\n\r\n"), "HTTP/1.1 100 Continue\r\n\r\n");
+  client.send("hello");
+  EXPECT_THAT(client.receive(), AllOf(StartsWith("HTTP/1.1 200 "), EndsWith("echo hello")));
+  EXPECT_THAT(ask(head + "Content-Length: 101\r\n\r\n"), StartsWith("HTTP/1.1 413 "));
+  // Who does not wait for it is not told.
+  EXPECT_THAT(ask(head + "Content-Length: 5\r\n\r\nhello"), StartsWith("HTTP/1.1 200 "));
+}
+
+TEST_F(HttpServerTest, AClientThatHasSaidAllMayCloseItsHalf) {
+  start();
+  Client client(*server_);
+  client.send("GET /open HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  client.end();
+  EXPECT_THAT(client.receive(), EndsWith("\r\n\r\nopen"));
+  Client follower(*server_);
+  follower.send("GET /wait HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  follower.end();
+  follower.receive("begun\n");
+  ++words_;
+  server_->wake();
+  EXPECT_EQ(follower.receive("word\n"), "word\n");
+  Client cut(*server_);
+  cut.send("GET /open HTTP/1.1\r\nHost:");
+  cut.end();
+  EXPECT_EQ(cut.receive(), "");
+  Client short_of(*server_);
+  short_of.send("POST /echo HTTP/1.1\r\nHost: localhost\r\nContent-Length: 50\r\n\r\nshort");
+  short_of.end();
+  EXPECT_THAT(short_of.receive(), StartsWith("HTTP/1.1 400 "));
+}
+
+TEST_F(HttpServerTest, HeadHasTheHeadersOfGetAndNoBody) {
+  start();
+  EXPECT_THAT(ask("HEAD /open HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+              AllOf(StartsWith("HTTP/1.1 200 OK\r\n"), HasSubstr("Content-Length: 4\r\n"),
+                    HasSubstr("Content-Type: text/plain\r\n"), EndsWith("\r\n\r\n")));
+  EXPECT_THAT(ask("HEAD /flood HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+              AllOf(StartsWith("HTTP/1.1 200 OK\r\n"), EndsWith("\r\n\r\n")));
+  EXPECT_THAT(ask("HEAD /nothing HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+              AllOf(StartsWith("HTTP/1.1 404 "), EndsWith("\r\n\r\n")));
+  EXPECT_EQ(server_->counters().streams, 0);
+}
+
+TEST_F(HttpServerTest, OtherMethodsAreNotAllowedAndUnknownOnesNotUnderstood) {
+  start();
+  for (const char* method : {"PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "CONNECT", "POST"}) {
+    EXPECT_THAT(ask(std::string(method) + " /open HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+                AllOf(StartsWith("HTTP/1.1 405 "), HasSubstr("Allow: GET\r\n")))
+        << method;
+  }
+  for (const char* method : {"BREW", "get", "G@T", ""}) {
+    EXPECT_THAT(ask(std::string(method) + " /open HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+                StartsWith("HTTP/1.1 400 "))
+        << method;
+  }
+}
+
+TEST_F(HttpServerTest, AHandlerWithoutAnAnswerIsAskedAgainUntilItHasOne) {
+  late_s_ = 0.05;
+  start();
+  Client client(*server_);
+  client.send("GET /late HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  EXPECT_THAT(client.receive(), EndsWith("\r\n\r\nlate"));
+  EXPECT_GT(asked_, 1);
+}
+
+// Whether for an answer, for news or for their own request.
+TEST_F(HttpServerTest, ThoseWhoWaitTakeNoThread) {
+  late_s_ = 1e4;
+  constexpr int kEach = 100;
+  options_.limits.max_connections = 1000;
+  options_.limits.max_streams = kEach;
+  start();
+  std::vector<std::unique_ptr<Client>> clients;
+  for (int i = 0; i < kEach; ++i) {
+    for (const char* path : {"/late", "/wait"}) {
+      clients.push_back(std::make_unique<Client>(*server_));
+      clients.back()->send(std::string("GET ") + path + " HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    }
+    clients.push_back(std::make_unique<Client>(*server_));
+  }
+  wait_until([this] { return server_->counters().connections == 3 * kEach; });
+  wait_until([this] { return server_->counters().streams == kEach; });
+  wait_until([this] { return asked_ >= kEach; });
+  EXPECT_THAT(get("/open"), StartsWith("HTTP/1.1 200 "));
+  const auto threads = std::distance(std::filesystem::directory_iterator("/proc/self/task"), {});
+  EXPECT_LT(threads, 10);
+  server_->stop();
+  EXPECT_EQ(server_->counters().connections, 0);
+}
+
+TEST_F(HttpServerTest, AnEndlessAnswerGoesOnWhenItIsWoken) {
+  start();
+  std::vector<std::unique_ptr<Client>> clients;
+  for (int i = 0; i < 5; ++i) {
+    clients.push_back(std::make_unique<Client>(*server_));
+    clients.back()->send("GET /wait HTTP/1.1\r\nHost: localhost\r\n\r\n");
+    clients.back()->receive("begun\n");
+  }
+  for (int i = 0; i < 100; ++i) {
+    ++words_;
+    server_->wake();
+    for (const auto& client : clients) EXPECT_EQ(client->receive("word\n"), "word\n");
+  }
+  server_->stop();
+  server_->wake();  // nobody is left, and nothing happens
+  EXPECT_EQ(clients[0]->receive(), "");
 }
 
 TEST_F(HttpServerTest, RefusesConnectionsBeyondTheLimitAndServesAgainAfterThem) {
@@ -330,7 +505,6 @@ TEST_F(HttpServerTest, AnswersTheFirstOfPipelinedRequestsAndCloses) {
   EXPECT_EQ(answer.find("HTTP/1.1", 1), std::string::npos);
 }
 
-// The library matches it with a pattern that recurses once a character.
 TEST_F(HttpServerTest, IgnoresALongRange) {
   start();
   std::string ranges = "Range: bytes=0-0";

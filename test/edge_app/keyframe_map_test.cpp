@@ -115,7 +115,7 @@ TEST_F(KeyframeMap, PutsAnotherOeModeIntoTheBaseFrameInItsFirstFrame) {
   OeOptions options;
   options.max_width = kWidth;
   options.max_height = kHeight;
-  options.cell_size_px = 20;
+  options.maker.cell_size_px = 20;
   double worst_px = 0;
   double worst_square = 0;
   for (int i = 0; i < 20; ++i) {

@@ -161,14 +161,13 @@ TEST(LiveState, AReaderGetsEveryRecordAfterItCameOnceAndInOrder) {
   write(&state, 1, 5);
   LiveState::Reader reader(&state);
   write(&state, 6, 7);
-  LiveState::News news = reader.wait(60);
+  LiveState::News news = reader.take();
   EXPECT_THAT(ids(news), ElementsAre(6, 7));
   EXPECT_EQ(*news.lines[0].json + "\n", json_line(record(6)));
   EXPECT_EQ(news.lost, 0);
-  EXPECT_FALSE(news.closed);
-  EXPECT_TRUE(reader.wait(0).lines.empty());
+  EXPECT_TRUE(reader.take().lines.empty());
   write(&state, 8, 8);
-  EXPECT_THAT(ids(reader.wait(60)), ElementsAre(8));
+  EXPECT_THAT(ids(reader.take()), ElementsAre(8));
 }
 
 TEST(LiveState, ASlowReaderLosesTheOldestAndIsToldHowMany) {
@@ -179,13 +178,13 @@ TEST(LiveState, ASlowReaderLosesTheOldestAndIsToldHowMany) {
   LiveState::Reader quick(&state);
   for (std::int64_t frame = 1; frame <= 10; ++frame) {
     write(&state, frame, frame);
-    EXPECT_THAT(ids(quick.wait(60)), ElementsAre(frame));
+    EXPECT_THAT(ids(quick.take()), ElementsAre(frame));
   }
   EXPECT_EQ(state.lost_by_readers(), 6);
-  const LiveState::News news = slow.wait(60);
+  const LiveState::News news = slow.take();
   EXPECT_EQ(news.lost, 6);
   EXPECT_THAT(ids(news), ElementsAre(7, 8, 9, 10));
-  EXPECT_EQ(slow.wait(0).lost, 0);
+  EXPECT_EQ(slow.take().lost, 0);
   ASSERT_EQ(state.readers().size(), 2u);
   EXPECT_EQ(state.readers()[0].lost, 6);
   EXPECT_EQ(state.readers()[0].records, 4);
@@ -201,7 +200,7 @@ TEST(LiveState, LossesOfReadersThatLeftStillCount) {
   {
     LiveState::Reader reader(&state);
     write(&state, 1, 3);
-    EXPECT_EQ(reader.wait(60).lost, 2);
+    EXPECT_EQ(reader.take().lost, 2);
   }
   EXPECT_TRUE(state.readers().empty());
   EXPECT_EQ(state.lost_by_readers(), 2);
@@ -211,9 +210,9 @@ TEST(LiveState, AReaderTakesMuchThatWaitsInSeveralBatches) {
   LiveState state;
   LiveState::Reader reader(&state);
   write(&state, 1, 40);
-  EXPECT_EQ(reader.wait(60).lines.size(), LiveState::kBatch);
-  EXPECT_EQ(reader.wait(60).lines.size(), LiveState::kBatch);
-  const LiveState::News rest = reader.wait(60);
+  EXPECT_EQ(reader.take().lines.size(), LiveState::kBatch);
+  EXPECT_EQ(reader.take().lines.size(), LiveState::kBatch);
+  const LiveState::News rest = reader.take();
   EXPECT_EQ(rest.lines.size(), 40 - 2 * LiveState::kBatch);
   EXPECT_EQ(rest.lines.back().id, 40);
 }
@@ -233,7 +232,7 @@ TEST(LiveState, ReadersOnOtherThreadsMissNothingThatTheyAreNotToldOf) {
       ++ready;
       std::int64_t last = 0;
       while (last < kRecords) {
-        const LiveState::News news = reader.wait(60);
+        const LiveState::News news = reader.take();
         last += news.lost;
         missed[i] += news.lost;
         for (const auto& line : news.lines) EXPECT_EQ(line.id, ++last);
@@ -247,13 +246,22 @@ TEST(LiveState, ReadersOnOtherThreadsMissNothingThatTheyAreNotToldOf) {
   for (std::size_t i = 0; i < received.size(); ++i) EXPECT_EQ(received[i] + missed[i], kRecords);
 }
 
-TEST(LiveState, ClosingWakesReaders) {
+TEST(LiveState, TellsOfNewsOnceARecordIsThereForAReader) {
   LiveState state;
+  int told = 0;
+  std::size_t taken = 0;
+  LiveState::Reader* following = nullptr;
+  state.set_on_news([&] {
+    ++told;
+    taken += following->take().lines.size();
+  });
+  write(&state, 1, 3);
+  EXPECT_EQ(told, 0) << "nobody follows";
   LiveState::Reader reader(&state);
-  std::thread closer([&state] { state.close(); });
-  EXPECT_TRUE(reader.wait(1e6).closed);
-  closer.join();
-  EXPECT_TRUE(reader.wait(1e6).closed);
+  following = &reader;
+  write(&state, 4, 8);
+  EXPECT_EQ(told, 5);
+  EXPECT_EQ(taken, 5U);
 }
 
 class Counting final : public RecordSink {

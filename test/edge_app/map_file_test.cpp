@@ -9,7 +9,7 @@
 #include <limits>
 #include <random>
 
-#include "core/calibration/calibration_file.h"
+#include "edge_app/storage/calibration_file.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {
@@ -82,8 +82,8 @@ MapContent some_content(int points, int landmarks) {
   }
   map.offset = {1e-3 / 3, -1e-4 / 3};
   map.offset_covariance = random.covariance<2>(1e-12);
-  for (Matrix3<double>& bend : map.bend_covariance) bend = random.covariance<3>(1e-8);
-  map.bend_tilt = -0.1 / 3;
+  for (Matrix3<double>& shear : map.shear_covariance) shear = random.covariance<3>(1e-8);
+  map.shear_tilt = -0.1 / 3;
   for (int i = 0; i < map.offset_sensitivity.size(); ++i) {
     map.offset_sensitivity(i) = random.normal();
   }
@@ -115,9 +115,9 @@ TEST(MapFile, ReadsBackTheSameBits) {
   const MapState& map = read.map;
   EXPECT_EQ(map.offset.vector(), written.map.offset.vector());
   EXPECT_EQ(map.offset_covariance, written.map.offset_covariance);
-  EXPECT_EQ(map.bend_covariance[0], written.map.bend_covariance[0]);
-  EXPECT_EQ(map.bend_covariance[1], written.map.bend_covariance[1]);
-  EXPECT_EQ(map.bend_tilt, written.map.bend_tilt);
+  EXPECT_EQ(map.shear_covariance[0], written.map.shear_covariance[0]);
+  EXPECT_EQ(map.shear_covariance[1], written.map.shear_covariance[1]);
+  EXPECT_EQ(map.shear_tilt, written.map.shear_tilt);
   EXPECT_EQ(map.offset_sensitivity, written.map.offset_sensitivity);
   ASSERT_EQ(map.landmarks.size(), written.map.landmarks.size());
   for (std::size_t i = 0; i < map.landmarks.size(); ++i) {
@@ -286,13 +286,13 @@ TEST(MapFile, RefusesLandmarksThatMakeNoSense) {
 TEST(MapFile, RefusesAFrameThatMakesNoSense) {
   expect_refused([](MapContent* c) { c->map.offset.tilt = kNan; }, "its frame has a number");
   expect_refused([](MapContent* c) { c->map.offset_covariance(0, 0) = -1; }, "not positive");
-  expect_refused([](MapContent* c) { c->map.bend_tilt = HUGE_VAL; }, "not finite");
+  expect_refused([](MapContent* c) { c->map.shear_tilt = HUGE_VAL; }, "not finite");
   expect_refused([](MapContent* c) { c->map.offset_sensitivity(1, 10) = kNan; }, "not finite");
-  expect_refused([](MapContent* c) { c->map.bend_covariance[0](0, 2) = kNan; }, "not finite");
-  expect_refused([](MapContent* c) { c->map.bend_covariance[1](1, 2) = 1; }, "not positive");
+  expect_refused([](MapContent* c) { c->map.shear_covariance[0](0, 2) = kNan; }, "not finite");
+  expect_refused([](MapContent* c) { c->map.shear_covariance[1](1, 2) = 1; }, "not positive");
   // Each two of the three may be so, but not all three.
   expect_refused(
-      [](MapContent* c) { c->map.bend_covariance[1] << 1, 0.9, 0.9, 0.9, 1, -0.9, 0.9, -0.9, 1; },
+      [](MapContent* c) { c->map.shear_covariance[1] << 1, 0.9, 0.9, 0.9, 1, -0.9, 0.9, -0.9, 1; },
       "not positive");
 }
 

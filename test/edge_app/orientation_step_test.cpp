@@ -404,7 +404,7 @@ class OeStepTest : public ::testing::Test {
     options.follow_points = true;
     options.zoom_tolerance = 1;
     options.oe.emplace();
-    options.oe->cell_size_px = 30;  // so that there are coarse landmarks too
+    options.oe->maker.cell_size_px = 30;  // so that there are coarse landmarks too
     return options;
   }
   OeStepTest() {
@@ -756,7 +756,7 @@ TEST_F(OeStepTest, ANewConnectionsDelayIsLessSureUntilACalibrationOfIt) {
   };
   const double before = sigma(0, false);
   const double after = sigma(100, true);
-  const double expected = moving.floor_sigma_s * std::abs(sweep.pan_rate);
+  const double expected = moving.minimum_delay_sigma_s * std::abs(sweep.pan_rate);
   EXPECT_NEAR(std::sqrt(after * after - before * before), expected, 0.1 * expected);
   PublishedCalibration published;
   published.calibration = moving.calibration;

@@ -205,7 +205,7 @@ OrientationStepOptions options_with_pictures() {
   OrientationStepOptions options;
   options.calibration.camera = {2000, 1, 0, Scene::kWidth, Scene::kHeight};
   options.oe.emplace();
-  options.oe->cell_size_px = 20;
+  options.oe->maker.cell_size_px = 20;
   options.follow_points = true;
   return options;
 }

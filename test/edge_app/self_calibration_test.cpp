@@ -121,7 +121,7 @@ std::vector<Published> feed(SelfCalibration* calibration, const test::Simulation
     tracks.time_s = tracks.stamp.receive_time_s;
     tracks.tracker = how.tracker;
     tracks.clock_restarted = tracks.stamp.restarted = how.restarts && frame.frame == 0;
-    tracks.floor_shifted = how.delay_steps && frame.frame == 0;
+    tracks.delay_stepped = how.delay_steps && frame.frame == 0;
     tracks.oe_status =
         frame.stamp_s >= how.contradicting_from_s ? OeStatus::kContradiction : OeStatus::kOk;
     for (const TrackedPoint& point : points[frame.frame]) {

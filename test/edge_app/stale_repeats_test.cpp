@@ -31,7 +31,7 @@ std::vector<double> uniform(int count, double range) {
 TEST(AngleQuantum, IsFoundInWholeStepsOfAnySize) {
   for (const double deg : {1 / 51.2, 0.01, 1 / 14.4, 185.1428 / 3600}) {
     const double quantum = deg * kDegree;
-    EXPECT_NEAR(angle_quantum(rounded(uniform(300, 300 * quantum), quantum)), quantum,
+    EXPECT_NEAR(device_resolution(rounded(uniform(300, 300 * quantum), quantum)), quantum,
                 1e-6 * quantum)
         << deg;
   }
@@ -41,7 +41,7 @@ TEST(AngleQuantum, IsNotTheSmallestDifferenceWhereThatIsSeveralSteps) {
   // Differences of 2 and 3 steps only.
   std::vector<double> angles = {0};
   for (int i = 0; i < 40; ++i) angles.push_back(angles.back() + (i % 3 == 0 ? 3e-3 : 2e-3));
-  EXPECT_NEAR(angle_quantum(angles), 1e-3, 1e-9);
+  EXPECT_NEAR(device_resolution(angles), 1e-3, 1e-9);
 }
 
 TEST(AngleQuantum, IsTheDevicesAndNotThatOfPrintedDigits) {
@@ -49,34 +49,34 @@ TEST(AngleQuantum, IsTheDevicesAndNotThatOfPrintedDigits) {
   std::vector<double> angles = rounded(uniform(300, 5), 1 / 51.2);
   angles = rounded(angles, 1e-4);
   for (double& angle : angles) angle *= kDegree;
-  EXPECT_NEAR(angle_quantum(angles), kDegree / 51.2, 1e-3 * kDegree / 51.2);
+  EXPECT_NEAR(device_resolution(angles), kDegree / 51.2, 1e-3 * kDegree / 51.2);
 }
 
 TEST(AngleQuantum, IsFoundWhereAnglesLieManyStepsApart) {
   const double quantum = 1.745e-5;
-  EXPECT_NEAR(angle_quantum(rounded(uniform(300, 10000 * quantum), quantum)), quantum,
+  EXPECT_NEAR(device_resolution(rounded(uniform(300, 10000 * quantum), quantum)), quantum,
               1e-4 * quantum);
 }
 
 TEST(AngleQuantum, IsFoundBesideAWildAngle) {
   std::vector<double> angles = rounded(uniform(300, 0.1), 1e-3);
   angles.push_back(0.01037);
-  EXPECT_NEAR(angle_quantum(angles), 1e-3, 1e-6);
+  EXPECT_NEAR(device_resolution(angles), 1e-3, 1e-6);
 }
 
 TEST(AngleQuantum, IsZeroWithoutWholeSteps) {
-  EXPECT_EQ(angle_quantum(uniform(300, 0.1)), 0);
-  EXPECT_EQ(angle_quantum({}), 0);
-  EXPECT_EQ(angle_quantum({1}), 0);
-  EXPECT_EQ(angle_quantum(std::vector<double>(100, 0.5)), 0);
-  EXPECT_EQ(angle_quantum({0, 0.1, 0.2}), 0);  // three angles show nothing
-  EXPECT_EQ(angle_quantum(std::vector<double>(20, kNan)), 0);
+  EXPECT_EQ(device_resolution(uniform(300, 0.1)), 0);
+  EXPECT_EQ(device_resolution({}), 0);
+  EXPECT_EQ(device_resolution({1}), 0);
+  EXPECT_EQ(device_resolution(std::vector<double>(100, 0.5)), 0);
+  EXPECT_EQ(device_resolution({0, 0.1, 0.2}), 0);  // three angles show nothing
+  EXPECT_EQ(device_resolution(std::vector<double>(20, kNan)), 0);
 }
 
 TEST(AngleQuantum, IsNotTheWayBetweenTwoPollsOfAnEvenTurn) {
   std::vector<double> angles;
   for (int i = 0; i < 200; ++i) angles.push_back(0.004 * i);
-  EXPECT_EQ(angle_quantum(angles), 0);
+  EXPECT_EQ(device_resolution(angles), 0);
 }
 
 // Polled at 30 Hz for 10 s; angle(t) is what the device said at t.

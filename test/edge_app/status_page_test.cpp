@@ -11,6 +11,8 @@
 #include <thread>
 #include <vector>
 
+#include "edge_app/pipeline/record_status.h"
+
 namespace alidade {
 namespace {
 
@@ -82,6 +84,13 @@ TEST_F(StatusPageTest, ThePageIsOpenAndMayLoadNothingFromElsewhere) {
   page.erase(page.find(space), space.size());
   EXPECT_EQ(page.find("http:"), std::string::npos);
   EXPECT_EQ(page.find("https:"), std::string::npos);
+}
+
+TEST(StatusPage, SaysInWordsWhatEachStatusMeans) {
+  const std::string page = kStatusPage;
+  for (const RecordStatus status : kRecordStatuses)
+    EXPECT_NE(page.find(std::string("\n  '") + to_string(status) + "': '"), std::string::npos)
+        << to_string(status);
 }
 
 TEST_F(StatusPageTest, APictureAndItsOverlayBelongToOneFrame) {

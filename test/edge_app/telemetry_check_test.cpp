@@ -69,7 +69,7 @@ TEST(TelemetryCheck, MeasuresAHealthyHead) {
   EXPECT_EQ(report.stale, 0U);
   // But for 8 samples about each of up to 8 turns.
   EXPECT_GT(report.turning, 230U);
-  EXPECT_EQ(report.pan.quantum, 0);
+  EXPECT_EQ(report.pan.resolution, 0);
   EXPECT_EQ(report.fresh.size(), 300U);
   // The largest rate is 0.35 + 0.21 rad/s.
   EXPECT_LT(report.pan.top_rate, 0.56);
@@ -101,7 +101,7 @@ TEST(TelemetryCheck, DoesNotTakeARestForAnOldAngle) {
   EXPECT_FALSE(report.change_hz);
   EXPECT_EQ(report.turning, 0U);
   EXPECT_EQ(report.stale, 0U);
-  EXPECT_EQ(report.pan.quantum, 0);
+  EXPECT_EQ(report.pan.resolution, 0);
   EXPECT_EQ(report.pan.least, report.pan.largest);
 }
 
@@ -119,12 +119,12 @@ TEST(TelemetryCheck, AdvisesToTellTheQuantum) {
       samples_of([](double t) { return kQuantum * std::round(swing(t) / kQuantum); });
   TelemetryNeeds needed = needs();
   needed.angle_sigma_rad = 5e-5;
-  EXPECT_NEAR(check(samples, needed).pan.quantum, kQuantum, 1e-9);
+  EXPECT_NEAR(check(samples, needed).pan.resolution, kQuantum, 1e-9);
   EXPECT_THAT(advice(check(samples, needed).findings),
               ElementsAre(HasSubstr("angle_quantum_rad: 0.00034")));
-  needed.quantum_rad = kQuantum;
+  needed.resolution_rad = kQuantum;
   EXPECT_THAT(check(samples, needed).findings, IsEmpty());
-  needed.quantum_rad = 1e-2;
+  needed.resolution_rad = 1e-2;
   EXPECT_THAT(advice(check(samples, needed).findings), ElementsAre(HasSubstr("set it to 0.00034")));
 }
 

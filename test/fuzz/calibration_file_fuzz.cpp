@@ -1,6 +1,6 @@
 // calibration.yaml: what is read is written as a text that is read as the same bits.
 
-#include "core/calibration/calibration_file.h"
+#include "core/calibration/calibration_text.h"
 #include "test/fuzz/fuzz_target.h"
 
 namespace alidade {

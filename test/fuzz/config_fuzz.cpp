@@ -10,7 +10,7 @@ namespace {
 bool is_within(double value, double low, double high) { return value >= low && value <= high; }
 
 void require_sound_head(const HeadConfig& head) {
-  FUZZ_REQUIRE(make_protocol(head) != nullptr);
+  FUZZ_REQUIRE(make_protocol(head.protocol) != nullptr);
   FUZZ_REQUIRE(!head.link.address.empty() && is_baud(head.link.baud));
 }
 

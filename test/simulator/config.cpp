@@ -325,10 +325,10 @@ void read_live(Section& section, LiveConfig* live) {
   if (live->mjpeg_port && live->codec != Codec::kMjpeg) {
     section.fail("mjpeg_port needs codec: mjpeg");
   }
-  using Head = LiveConfig::Head;
   using Link = LiveConfig::Link;
-  section.choice<Head>("head", &live->head,
-                       {{"pelco_d", Head::kPelcoD}, {"visca", Head::kVisca}, {"ptu", Head::kPtu}});
+  std::vector<std::pair<const char*, std::optional<HeadModel>>> heads;
+  for (const NamedHeadModel& named : kHeadModels) heads.emplace_back(named.name, named.model);
+  section.choice<std::optional<HeadModel>>("head", &live->head, heads);
   section.choice<Link>("head_link", &live->head_link,
                        {{"serial", Link::kSerial}, {"tcp", Link::kTcp}, {"udp", Link::kUdp}});
   section.text("user", &live->user);

@@ -13,6 +13,8 @@
 #include <string>
 #include <vector>
 
+#include "test/simulator/servers/simulated_head.h"
+
 namespace alidade::simulator {
 
 // The text is one line: file:line: what was wrong and what would be right.
@@ -129,9 +131,8 @@ struct LiveConfig {
   std::string user, password;      // of RTSP and HTTP; empty: no login
   // Besides: the pictures as MJPEG over HTTP, ONVIF, and a head that is asked. Ports: 0: any free one.
   std::optional<int> mjpeg_port, onvif_port;
-  enum class Head { kNone, kPelcoD, kVisca, kPtu };
   enum class Link { kSerial, kTcp, kUdp };
-  Head head = Head::kNone;
+  std::optional<HeadModel> head;
   Link head_link = Link::kSerial;
 };
 

@@ -116,21 +116,6 @@ VideoServerOptions rtp_options(const Config& config) {
   return options;
 }
 
-std::unique_ptr<SimulatedHead> make_head(LiveConfig::Head head,
-                                         std::function<HeadPosition()> position) {
-  switch (head) {
-    case LiveConfig::Head::kPelcoD:
-      return std::make_unique<PelcoDHead>(std::move(position));
-    case LiveConfig::Head::kVisca:
-      return std::make_unique<ViscaHead>(std::move(position));
-    case LiveConfig::Head::kPtu:
-      return std::make_unique<PtuHead>(std::move(position));
-    case LiveConfig::Head::kNone:
-      break;
-  }
-  return nullptr;
-}
-
 HeadServer::Link link_of(LiveConfig::Link link) {
   switch (link) {
     case LiveConfig::Link::kTcp:
@@ -225,8 +210,8 @@ void serve_live(const Config& config, const std::atomic<bool>& stop) {
     ready += " onvif=" + onvif->url();
   }
   std::optional<HeadServer> head;
-  if (config.live.head != LiveConfig::Head::kNone) {
-    head.emplace(link_of(config.live.head_link), make_head(config.live.head, position));
+  if (config.live.head) {
+    head.emplace(link_of(config.live.head_link), make_simulated_head(*config.live.head, position));
     ready += " head=" + head->address();
   }
   std::printf("%s\n", ready.c_str());

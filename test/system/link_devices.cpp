@@ -1,4 +1,4 @@
-// link_devices HEAD LINK: a camera that sends MJPEG over HTTP at 25 Hz, and a head (pelco_d, visca, ptu) that
+// link_devices HEAD LINK: a camera that sends MJPEG over HTTP at 25 Hz, and a head (one of kHeadModels) that
 // moves, on a line (serial, which is a pseudo-terminal, tcp, udp). At t of CLOCK_MONOTONIC its pan is 20 cos(t/2)
 // degrees to the right, its tilt 10 cos(t/3) up. Prints "ready URL ADDRESS"; each line of stdin is what the
 // line has from then on: unplugged, or a fault of HeadServer by its name (none, noise, lost_byte, changed_byte, merged,
@@ -23,14 +23,16 @@ namespace {
 
 using Position = std::function<alidade::HeadPosition()>;
 
+// VISCA in datagrams has its header. Null: no head is called so.
 std::unique_ptr<alidade::SimulatedHead> head_named(const std::string& name, bool datagrams,
                                                    const Position& position) {
-  if (name == "pelco_d") return std::make_unique<alidade::PelcoDHead>(position);
-  if (name == "ptu") return std::make_unique<alidade::PtuHead>(position);
-  if (name != "visca") return nullptr;
-  auto visca = std::make_unique<alidade::ViscaHead>(position);
-  visca->header = datagrams;
-  return visca;
+  for (const alidade::NamedHeadModel& named : alidade::kHeadModels) {
+    if (named.name != name) continue;
+    auto head = make_simulated_head(named.model, position);
+    if (auto* visca = dynamic_cast<alidade::ViscaHead*>(head.get())) visca->header = datagrams;
+    return head;
+  }
+  return nullptr;
 }
 
 }  // namespace
@@ -60,7 +62,9 @@ int main(int argc, char** argv) {
   auto its_head =
       link == links.end() ? nullptr : head_named(argv[1], link->second == Link::kUdp, position);
   if (!its_head) {
-    std::cerr << "usage: link_devices pelco_d|visca|ptu serial|tcp|udp\n";
+    std::cerr << "usage: link_devices HEAD serial|tcp|udp; heads:";
+    for (const auto& named : alidade::kHeadModels) std::cerr << ' ' << named.name;
+    std::cerr << '\n';
     return 2;
   }
   alidade::HeadServer head(link->second, std::move(its_head));

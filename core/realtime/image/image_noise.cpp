@@ -29,4 +29,23 @@ double image_noise(const ImageView& image, float* scratch, int capacity) {
   return std::max(*quarter / (kQuarter * kGain), kRounding);
 }
 
+bool RunningNoiseOptions::validate(const char** error) const {
+  const char* problem = nullptr;
+  if (!(memory >= 0 && memory <= 1)) problem = "memory must be 0 to 1";
+  if (samples < 1) problem = "samples must be at least 1";
+  if (!(expected > 0)) problem = "expected must be positive";
+  if (error != nullptr && problem != nullptr) *error = problem;
+  return problem == nullptr;
+}
+
+RunningNoise::RunningNoise(const RunningNoiseOptions& options)
+    : options_(options), sigma_(options.expected) {
+  scratch_.resize(static_cast<std::size_t>(std::max(options.samples, 1)));
+}
+
+void RunningNoise::learn(const ImageView& image, bool first) {
+  const double now = image_noise(image, scratch_.data(), static_cast<int>(scratch_.size()));
+  sigma_ += (first ? 1 : options_.memory) * (now - sigma_);
+}
+
 }  // namespace alidade

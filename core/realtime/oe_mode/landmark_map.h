@@ -1,6 +1,5 @@
 #pragma once
-// LandmarkMap: far points that the camera can recognise: a direction each, a small picture of it, and how
-// well both have served (PTCEE section V-A, Fig. 6).
+// LandmarkMap: the landmarks that the camera can recognise, by slot and by place (PTCEE section V-A, Fig. 6).
 //
 // Directions are unit vectors in the map's frame, which follows the base frame but for an offset that
 // OeMode knows. The unit sphere is divided into cells of about equal size: rings of constant
@@ -15,42 +14,10 @@
 #include <cstdint>
 #include <vector>
 
-#include "core/model/calibration.h"
 #include "core/model/linear_algebra.h"
-#include "core/realtime/image/reference_image.h"
+#include "core/realtime/oe_mode/landmark.h"
 
 namespace alidade {
-
-// How often it was looked for and found.
-struct LandmarkStatistics {
-  std::uint32_t seen = 0;     // frames in which it was looked for
-  std::uint32_t matched = 0;  // frames in which it was found and agreed with the others
-  std::uint16_t missed_in_a_row = 0;
-  std::uint32_t last_frame = 0;  // count of frames when it was last looked for
-  // Mean square of the normalised residual when matched, running: 1 if its covariances are right.
-  float residual_square = 1;
-};
-
-using LandmarkSensitivity = Matrix<float, 2, kParameterCount>;
-
-struct Landmark {
-  std::uint32_t id = 0;                          // never given twice
-  std::uint8_t octave = 0;                       // of the pyramid its picture was taken from
-  Vector3<double> d = Vector3<double>::UnitX();  // unit, in the map's frame
-  // rad^2, of d in tangent_basis(d): its own part, independent of other landmarks' ...
-  Matrix2<double> covariance = Matrix2<double>::Zero();
-  // ... and rad^2 of (pan, tilt) of the frame that it came from, shared by all made there.
-  Matrix2<double> shared_covariance = Matrix2<double>::Zero();
-  // Of d in tangent_basis(d): all that was made with the calibration shares its errors.
-  LandmarkSensitivity sensitivity = LandmarkSensitivity::Zero();
-  // d(reference pixel, px of its octave) / d(tangent_basis(d) coordinates, rad), as the camera saw
-  // it then, rolling shutter and distortion included.
-  Matrix2<double> J_pixel_tangent = Matrix2<double>::Identity();
-  ReferencePixels pixels{};
-  LandmarkStatistics statistics;
-
-  [[nodiscard]] ImageView picture() const { return view_of(pixels); }
-};
 
 enum class InsertStatus {
   kOk,

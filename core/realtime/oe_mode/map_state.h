@@ -8,7 +8,7 @@
 
 #include "core/model/angle.h"
 #include "core/model/linear_algebra.h"
-#include "core/realtime/oe_mode/landmark_map.h"
+#include "core/realtime/oe_mode/landmark.h"
 
 namespace alidade {
 
@@ -17,9 +17,14 @@ struct MapState {
   PanTilt<double> offset;           // rad, base minus map
   Matrix2<double> offset_covariance = Matrix2<double>::Zero();  // rad^2
   Sensitivity<2> offset_sensitivity = Sensitivity<2>::Zero();
-  // Of (angle, rate, acceleration) of pan, of tilt: how far the map may be bent, see oe_mode.cpp ...
-  std::array<Matrix3<double>, 2> bend_covariance{Matrix3<double>::Zero(), Matrix3<double>::Zero()};
-  double bend_tilt = 0;  // rad, ... for a frame that looks at this tilt
+  // Of (angle, rate, acceleration) of pan, of tilt: how far the map may be sheared, see map_shear.h ...
+  std::array<Matrix3<double>, 2> shear_covariance{Matrix3<double>::Zero(), Matrix3<double>::Zero()};
+  double shear_tilt = 0;  // rad, ... for a frame that looks at this tilt
 };
+
+// Whether an OeMode can go on with it: all but the landmarks, of which each is judged by itself.
+[[nodiscard]] bool is_valid(const MapState& map);
+// Direction and octave are judged where it is inserted into a map.
+[[nodiscard]] bool is_valid(const Landmark& landmark);
 
 }  // namespace alidade

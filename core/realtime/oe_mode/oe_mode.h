@@ -2,48 +2,44 @@
 // OE mode: a frame's orientation from telemetry and from landmarks seen in the frame, to a few hundredths
 // of a pixel (PTCEE sections V-A, V-C).
 //
-//   process()   1 predict pan and tilt from telemetry (and, without it, from the frames before)
-//               2 coarse alignment over pan and tilt, coarse to fine (PTCEE 30, 31)
-//               3 project the map's landmarks with rolling shutter, align each patch (PTCEE 32, 33)
-//               4 solve angle, rate and acceleration of pan and tilt, and the offset of map against
-//                 telemetry, robustly, with telemetry as prior (PTCEE 35)
-//   maintain()  after the answer is out: refines and retires landmarks, and makes new ones where
-//               cells are empty (PTCEE 36)
+//   process()   1 predict pan and tilt from telemetry, or, without it, from the    motion_prediction.h
+//                 frame before
+//               2 coarse alignment over pan and tilt, coarse to fine (PTCEE 30, 31)  landmark_search.h
+//               3 choose landmarks of the map, project them with rolling shutter,    landmark_search.h
+//                 align each patch (PTCEE 32, 33)
+//               4 solve angle, rate and acceleration of pan and tilt, and the        orientation_solve.h
+//                 offset of map against telemetry, robustly, with telemetry as
+//                 prior (PTCEE 35); where few hold, 3 and 4 once more, from
+//                 where the frame before leads to
+//               5 answer, and learn the map's offset                                 map_offset_filter.h
+//   maintain()  after the answer is out, from the frame's result (processed_frame.h):
+//               6 refine and retire landmarks (PTCEE 36)                             map_upkeep.h
+//               7 straighten the map by what neighbouring frames tell                map_shear.h
+//               8 make landmarks where cells are empty                               landmark_maker.h
 //
 // One estimator for OE and PT: without landmarks the solution is telemetry's, with its covariance. Where
 // landmarks contradict telemetry beyond what both claim, the answer is telemetry's with a covariance
 // that covers both, and the mode is PT.
 // How map, offset and answer follow the calibration they were found with is carried along (Sensitivity),
 // and what its covariance makes of that is in the answer's.
-// The map begins empty, in the frame that the first telemetry gave it, or as another OeMode left it. Its
-// offset from the base frame (pan, tilt) is estimated from all telemetry since.
-// What was handed over is believed as far as pictures bear it out: a map that telemetry contradicts is
+// The map begins empty, in the frame that the first telemetry gave it, or as another OeMode left it.
+// What was handed over is believed as far as images bear it out: a map that telemetry contradicts is
 // forgotten after 50 frames, as is, after 50 frames that show other things, what should be in view of it.
 // Fixed memory, taken by the constructor; nothing else allocates, waits or throws. One thread.
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
-#include <memory>
 
 #include "core/model/calibration.h"
 #include "core/realtime/frame_orientation.h"
 #include "core/realtime/image/image_view.h"
 #include "core/realtime/oe_mode/landmark_map.h"
 #include "core/realtime/oe_mode/map_state.h"
+#include "core/realtime/oe_mode/oe_options.h"
+#include "core/realtime/oe_mode/processed_frame.h"
 #include "core/realtime/telemetry/telemetry_interpolation.h"
 
 namespace alidade {
-
-struct OeOptions {
-  int max_width = 1920;      // px
-  int max_height = 1080;     // px
-  int max_landmarks = 4096;  // in the map
-  int max_used = 200;        // aligned in a frame; at most kMaxUsed
-  double cell_size_px = 80;  // of the map's cells, px of a landmark's octave at the image's centre
-  int max_new = 100;         // landmarks that one maintain() may make; all, in an empty view
-  std::uint8_t corner_threshold = 10;  // of FAST, grey levels
-};
 
 enum class OeStatus {
   kOk,             // orientation from landmarks and telemetry
@@ -54,64 +50,64 @@ enum class OeStatus {
   kNotFinite       // nothing is written
 };
 
-// One landmark in one frame.
-struct OeObservation {
-  int slot = 0;          // of the map
-  std::uint32_t id = 0;  // of the landmark
-  int octave = 0;
-  Vector2<double> u = Vector2<double>::Zero();           // px of the image, where it was found
-  Matrix2<double> covariance = Matrix2<double>::Zero();  // px^2, of u
-  Vector2<double> residual = Vector2<double>::Zero();  // px, found minus predicted by the solution
-  bool inlier = false;
-};
-
 struct OeStatistics {
   OeStatus status = OeStatus::kNoPrediction;
-  int visible = 0;             // landmarks of the map that the prediction puts into the image
-  int looked_for = 0;          // of these, up to max_used
-  int aligned = 0;             // found by patch alignment
-  int inliers = 0;             // that agree with the solution
+  int fine_visible =
+      0;  // fine landmarks of the map (octaves.h) that the prediction puts into the image
+  int looked_for = 0;          // of these, chosen (landmark_choice.h)
+  int aligned = 0;             // of these, found by patch alignment
+  int inliers = 0;             // of these, in agreement with the solution
   double coarse_shift_px = 0;  // by which coarse alignment moved the prediction, image centre
   PanTilt<double> map_offset;  // rad, base minus map
-  Matrix2<double> map_offset_covariance = Matrix2<double>::Zero();
+  Matrix2<double> map_offset_covariance = Matrix2<double>::Zero();  // rad^2
+};
+
+// What telemetry is to be asked for again.
+struct TelemetryLookUp {
+  double time_s = 0;        // telemetry clock
+  double time_sigma_s = 0;  // one standard deviation
 };
 
 class OeMode {
  public:
-  static constexpr int kMaxUsed = 1024;
-  static constexpr std::size_t kRemembered = 32;
-
+  // options: valid, but that max_used and cell_size_px outside their ranges are taken as the nearest inside.
   explicit OeMode(const OeOptions& options);
-  ~OeMode();
   OeMode(const OeMode&) = delete;
   OeMode& operator=(const OeMode&) = delete;
 
   // Begins anew: empty map, nothing remembered. Real-time safe.
   void reset(const Calibration& calibration);
   // The same, but with this map, made with this calibration, by this mount without a restart that
-  // moved its zero; it is in OE mode in its first frame. Landmarks that make no sense, or that there is
-  // no room for, are left out; a map whose offset makes no sense is none. Real-time safe: 0.3 us a landmark.
+  // moved its zero; it is in OE mode in its first frame. Landmarks that are not valid, or that there is
+  // no room for, are left out; a map that is not valid is none. Real-time safe: 0.3 us a landmark.
   void reset(const Calibration& calibration, const MapState& map);
 
   // frame_time_s: t0, row 0 on the image clock. at_middle_row: telemetry at t0 + clock_offset +
   // line_delay * height / 2, null if there is none. The image must outlive the maintain() that
   // follows. *out is written with every status but kNoPrediction and kNotFinite.
-  // Extrapolated telemetry is a prior for this frame only: the map's offset learns nothing from it.
+  // Extrapolated telemetry is a prior for this frame only: the map's offset learns nothing from it, and the
+  // frame is pending.
   [[nodiscard]] OeStatus process(const ImageView& image, double frame_time_s,
                                  const InterpolatedPanTilt* at_middle_row, FrameOrientation* out);
-
-  // Telemetry, now interpolated, for one of the latest kRemembered frames, which extrapolated telemetry
-  // answered: the map's offset learns from it. A frame that is not remembered, or was told already, is
-  // ignored. Where such telemetry contradicts landmarks, so do the frames that follow it.
-  void add_late_telemetry(double frame_time_s, const InterpolatedPanTilt& at_middle_row);
 
   // Map upkeep with the frame last processed; does nothing where that had no sure orientation.
   void maintain();
 
+  // Late telemetry. True, and what telemetry is to be asked for, if a frame is pending and telemetry up to
+  // newest_sample_s (telemetry clock) encloses its time: the oldest of up to MapOffsetFilter::kMaxPending.
+  [[nodiscard]] bool pending(double newest_sample_s, TelemetryLookUp* look_up) const;
+  // Telemetry's answer for that frame; null: it has none. The map's offset learns from it, unless it is
+  // extrapolated, and the frame is pending no more. Where such telemetry contradicts landmarks, so do the frames
+  // that follow it.
+  void settle_pending(const InterpolatedPanTilt* late);
+  // Telemetry's clock began anew: nobody can be asked for what was.
+  void forget_pending();
+
   // Of the frame last processed.
-  [[nodiscard]] const OeStatistics& statistics() const;
-  [[nodiscard]] const OeObservation* observations() const;  // statistics().aligned of them
-  [[nodiscard]] const LandmarkMap& map() const;
+  [[nodiscard]] const OeStatistics& statistics() const { return statistics_; }
+  // statistics().aligned of them, residuals and inliers by the solution; without one, by the prediction.
+  [[nodiscard]] const OeObservation* observations() const { return search_.observations().data(); }
+  [[nodiscard]] const LandmarkMap& map() const { return map_; }
 
   // For another OeMode, or for the next start. Allocates: not for the real-time thread.
   [[nodiscard]] MapState map_state() const;
@@ -119,8 +115,54 @@ class OeMode {
   [[nodiscard]] std::size_t memory_bytes() const;
 
  private:
-  struct State;
-  std::unique_ptr<State> state_;
+  struct Solution {
+    SolveStatus status = SolveStatus::kTooFew;
+    FrameMotion<double> motion;  // about which it was linearised, map's frame
+    SolvedMotion solved;
+  };
+
+  [[nodiscard]] SearchedFrame searched() const { return {calibration_, map_, pyramid_, octaves_}; }
+  void begin_frame(const ImageView& image, double frame_time_s,
+                   const InterpolatedPanTilt* telemetry);
+  OeStatus finish(OeStatus status) { return statistics_.status = status; }
+  [[nodiscard]] bool build_pyramid(const ImageView& image);
+  [[nodiscard]] Solution solve_about(const FrameMotion<double>& motion,
+                                     const PredictedMotion& predicted);
+  [[nodiscard]] Solution find_and_solve(const PredictedMotion& predicted,
+                                        const LandmarkSearch::Coarse& coarse, double sigma_px);
+  void add_pending(const Vector2<double>& angle, const Matrix2<double>& covariance,
+                   const Matrix2<double>& shared_covariance, const Sensitivity<2>& sensitivity);
+  OeStatus answer_without_landmarks(const PredictedMotion& predicted, const Solution& solution,
+                                    FrameOrientation* out);
+  OeStatus answer_with_landmarks(const PredictedMotion& predicted, const Solution& solution,
+                                 FrameOrientation* out);
+
+  void doubt_map();
+  void begin_map();
+  void straighten_map();
+  void clear_landmarks();
+  void forget_map();
+
+  OeOptions options_;
+  Calibration calibration_;
+  bool ready_ = false;        // there is room for the calibration's images
+  std::uint32_t frames_ = 0;  // count
+
+  Pyramid pyramid_;  // of the frame last looked at
+  Octaves octaves_;
+  RunningNoise noise_;
+  LandmarkMap map_;
+  MotionPrediction prediction_;
+  LandmarkSearch search_;
+  MapOffsetFilter offset_;
+  MapShear shear_;
+  MapUpkeep upkeep_;
+  LandmarkMaker maker_;
+  VisibleLandmarks in_view_;  // of maintain()
+  double share_of_new_ = 0;   // of the landmarks in view, made by the maintain() before
+
+  OeStatistics statistics_;
+  ProcessedFrame frame_;  // process() writes it, maintain() uses it up
 };
 
 }  // namespace alidade

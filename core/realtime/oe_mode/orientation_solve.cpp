@@ -17,13 +17,6 @@ constexpr int kMinInliers = 3;               // for 6 unknowns, whatever the lim
 constexpr double kChiSquare2Median = 1.386;  // of 2 degrees of freedom
 constexpr double kChiSquare2Gate = 13.8;     // 99.9 %
 
-Matrix2<double> inverse_of(const Matrix2<double>& symmetric) {
-  const double determinant = symmetric(0, 0) * symmetric(1, 1) - symmetric(0, 1) * symmetric(0, 1);
-  Matrix2<double> inverse;
-  inverse << symmetric(1, 1), -symmetric(0, 1), -symmetric(0, 1), symmetric(0, 0);
-  return inverse / determinant;
-}
-
 double median(double* values, int count) {
   double* middle = values + count / 2;
   std::nth_element(values, middle, values + count);
@@ -218,19 +211,6 @@ double neighbours_inflation(const Problem& problem, const FoundLandmark* landmar
 }
 
 }  // namespace
-
-bool MapOffset::learn(const Vector2<double>& innovation,
-                      const Matrix2<double>& innovation_covariance,
-                      const Sensitivity<2>& innovation_sensitivity, double max_chi_square) {
-  const Matrix2<double> information = inverse_of(innovation_covariance + covariance);
-  if (!(innovation.dot(information * innovation) < max_chi_square)) return false;
-  const Matrix2<double> gain = covariance * information;
-  value += gain * innovation;
-  sensitivity += gain * innovation_sensitivity;
-  covariance = (covariance - gain * covariance).eval();
-  covariance = symmetric(covariance);
-  return true;
-}
 
 SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionPrior& prior,
                               const SolveLimits& limits, double width, double height,

@@ -20,25 +20,9 @@
 
 #include "core/model/angle.h"
 #include "core/model/calibration.h"
-#include "core/model/linear_algebra.h"
+#include "core/realtime/oe_mode/covariance.h"
 
 namespace alidade {
-
-using Vector6 = Matrix<double, 6, 1>;
-using Matrix6 = Matrix<double, 6, 6>;
-
-// x is (angle, rate, acceleration) of pan and tilt, or their changes, a column each.
-template <int kColumns>
-[[nodiscard]] Matrix<double, 2, kColumns> angle_at(const Matrix<double, 6, kColumns>& x, double t) {
-  return x.template topRows<2>() + t * x.template middleRows<2>(2) +
-         (0.5 * t * t) * x.template bottomRows<2>();
-}
-
-// Without what rounding makes of a covariance.
-template <int kSize>
-[[nodiscard]] Matrix<double, kSize, kSize> symmetric(const Matrix<double, kSize, kSize>& m) {
-  return 0.5 * (m + m.transpose());
-}
 
 // One landmark that was found.
 struct FoundLandmark {
@@ -99,18 +83,6 @@ struct SolveLimits {
   double max_contradiction = 36;  // chi-square
   double max_scale = 30;  // by which residuals may exceed what is claimed, standard deviations
   double min_half_readout_s = 1e-3;
-};
-
-// What is known of g, rad and rad^2, and what an innovation with this covariance, apart from g's, adds to it
-// (Kalman). False, and nothing changes, where the innovation lies beyond max_chi_square.
-struct MapOffset {
-  Vector2<double> value = Vector2<double>::Zero();
-  Matrix2<double> covariance = Matrix2<double>::Zero();
-  Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
-
-  [[nodiscard]] bool learn(const Vector2<double>& innovation,
-                           const Matrix2<double>& innovation_covariance,
-                           const Sensitivity<2>& innovation_sensitivity, double max_chi_square);
 };
 
 // width, height: px, of the image; half_readout_s: scale of the rows' times.

@@ -67,7 +67,7 @@ enum class QueryStatus {
   kBeforeTelemetry,  // further before the oldest sample than may be extrapolated
   kTelemetryTooOld,  // further after the newest sample than max_extrapolation_s
   kGap,              // the samples around this time are too far apart
-  kNotFinite         // the time is not finite, its sigma is not one, or the result cannot be represented
+  kNotFinite  // the time is not finite, its sigma is not one, or the result cannot be represented
 };
 
 [[nodiscard]] constexpr bool has_result(QueryStatus status) {

@@ -33,7 +33,7 @@ struct Weights {
 
 // What one sample's angle is worth, without the errors of its time.
 double angle_variance(const TelemetryNoise& noise) {
-  return noise.pan_tilt_sigma * noise.pan_tilt_sigma + noise.quantum * noise.quantum / 12;
+  return noise.pan_tilt_sigma * noise.pan_tilt_sigma + noise.resolution * noise.resolution / 12;
 }
 
 // PTCEE 22 to 24, for a time between the two knots.
@@ -132,11 +132,11 @@ bool TelemetryNoise::validate(const char** error) const {
   const auto not_negative = [](double v) { return std::isfinite(v) && v >= 0; };
   const char* problem = nullptr;
   if (!not_negative(pan_tilt_sigma)) problem = "pan_tilt_sigma must not be negative";
-  if (!not_negative(quantum)) problem = "quantum must not be negative";
+  if (!not_negative(resolution)) problem = "resolution must not be negative";
   if (!not_negative(period_sigma_s)) problem = "period_sigma_s must not be negative";
   if (!not_negative(acceleration_sigma)) problem = "acceleration_sigma must not be negative";
-  if (problem == nullptr && pan_tilt_sigma == 0 && quantum == 0) {
-    problem = "one of pan_tilt_sigma and quantum must be positive";
+  if (problem == nullptr && pan_tilt_sigma == 0 && resolution == 0) {
+    problem = "one of pan_tilt_sigma and resolution must be positive";
   }
   if (error != nullptr && problem != nullptr) *error = problem;
   return problem == nullptr;
@@ -236,10 +236,10 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
     }
   }
   for (int axis = 0; axis < 2; ++axis) {
-    // All samples of an axis that moves less than a quantum are rounded alike: averaging them does
+    // All samples of an axis that moves less than a step are rounded alike: averaging them does
     // not help.
-    if (std::abs(rate[axis]) * span_s < noise.quantum) {
-      covariance(axis, axis) += noise.quantum * noise.quantum / 12;
+    if (std::abs(rate[axis]) * span_s < noise.resolution) {
+      covariance(axis, axis) += noise.resolution * noise.resolution / 12;
     }
   }
   // Samples at almost the same time give any rate, and far turns, of which rounding leaves no angle.
@@ -248,6 +248,8 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
       !all_finite(covariance) || !all_finite(acceleration_square)) {
     return false;
   }
+  out->time_s = time_s;
+  out->time_sigma_s = time_sigma_s;
   out->angle = {wrap_angle(origin.pan + angle[0]), wrap_angle(origin.tilt + angle[1])};
   out->rate = {rate[0], rate[1]};
   out->covariance = covariance;
@@ -257,14 +259,14 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
   // White samples h apart tell sigma^2 h in a unit of time, whatever answers are made of them. What the
   // clock and an unknown acceleration do stays alike for longer than neighbouring samples last.
   constexpr double kLasting = 1;  // s
-  const double white_renewal_s = span_s / (count - 1) / by_angle(0, 0);
-  out->renewal_s = 0;
+  const double white_time_s = span_s / (count - 1) / by_angle(0, 0);
+  out->correlation_time_s = 0;
   for (int axis = 0; axis < 2; ++axis) {
     const double white = by_angle(0, 0) * variance;
     const double lasting = shared_time_variance * rate[axis] * rate[axis] +
                            effect[0] * effect[0] * acceleration_square[axis];
-    out->renewal_s = std::max(out->renewal_s,
-                              (white * white_renewal_s + lasting * kLasting) / (white + lasting));
+    out->correlation_time_s = std::max(
+        out->correlation_time_s, (white * white_time_s + lasting * kLasting) / (white + lasting));
   }
   return true;
 }

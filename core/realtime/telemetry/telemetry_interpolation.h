@@ -24,7 +24,7 @@ namespace alidade {
 
 struct TelemetryNoise {
   double pan_tilt_sigma = 1e-4;   // rad, white noise of one measured angle
-  double quantum = 0;             // rad, smallest step of a measured angle; 0 = none
+  double resolution = 0;          // rad, smallest step of a measured angle; 0 = none
   double period_sigma_s = 50e-6;  // s, of the time between two neighbouring samples
   // rad/s^2, acceleration to expect of either axis where the samples do not show it: beside a jerk, and
   // with too few samples. Beyond the newest sample the least to expect; 0: the mount keeps its rate. One
@@ -46,8 +46,10 @@ struct TelemetryKnot {
 };
 
 struct InterpolatedPanTilt {
-  PanTilt<double> angle;  // rad, measured units, wrapped
-  PanTilt<double> rate;   // rad/s, measured units
+  double time_s = 0;        // that was asked for, telemetry clock
+  double time_sigma_s = 0;  // of it, one standard deviation
+  PanTilt<double> angle;    // rad, measured units, wrapped
+  PanTilt<double> rate;     // rad/s, measured units
   // Of (pan, tilt, pan rate, tilt rate).
   Matrix4<double> covariance = Matrix4<double>::Zero();
   // (rad/s^2)^2, expected square of the acceleration (pan, tilt) about this time.
@@ -60,7 +62,7 @@ struct InterpolatedPanTilt {
   // s, after which the error of the angle is another: the same samples answer for a while, and what the
   // clock or an unknown acceleration does lasts for about a second. So much time is worth one
   // independent answer.
-  double renewal_s = 0;
+  double correlation_time_s = 0;
 };
 
 // What acceleration to expect of a mount that goes on as it did: the fourth root of the mean fourth power of

@@ -11,7 +11,8 @@
 #include <vector>
 
 #include "core/calibration/adjustment.h"
-#include "core/calibration/initialization.h"
+#include "core/calibration/start_values.h"
+#include "core/calibration/telemetry_fit.h"
 #include "test/support/simulated_recording.h"
 
 namespace alidade::test {

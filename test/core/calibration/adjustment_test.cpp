@@ -4,72 +4,13 @@
 
 #include <cmath>
 
-#include "core/model/rolling_shutter.h"
+#include "test/core/calibration/adjustment_scene.h"
 
 namespace alidade::internal {
 namespace {
 
-// A state, and data that it explains exactly: every observation is the solved rolling-shutter projection.
-struct Scene {
-  AdjustmentState state;
-  AdjustmentData data;
-  AdjustmentPriors priors;
-  std::array<bool, kGlobalCount> fixed{};
-};
-
-Scene make_scene() {
-  Scene scene;
-  AdjustmentState& s = scene.state;
-  s.camera = {3000, 1.02, 0, 1920, 1080};
-  s.distortion = 0.02;
-  s.readout_s = 0.02;
-  s.mechanics.pan_axis = Vector3<double>(0.03, -0.01, 1).normalized();
-  s.mechanics.tilt_axis = Vector3<double>(-0.02, 1, 0.04).normalized();
-  s.mechanics.pan_scale = 1.01;
-  s.mechanics.tilt_scale = 0.98;
-  s.shift_s = 0.03;
-  s.drift = 1e-4;
-  s.trajectory = TrajectorySpline({0, 0.5, 0.7, 1.2, 2});
-  for (int i = 0; i < s.trajectory.control_points(); ++i) {
-    s.trajectory.control_point(i) = {0.6 + 0.08 * std::sin(1.1 * i), 0.05 * std::cos(1.3 * i)};
-  }
-  s.anchor = {0.6, 0.0};
-  const Matrix3<double> R_base_from_anchor = R_base_from_camera(s.mechanics, s.anchor);
-  for (int i = 0; i < 40; ++i) {
-    s.landmarks.push_back(
-        Vector3<double>(0.3 * std::sin(2.1 * i), 0.2 * std::cos(1.7 * i), 1).normalized());
-  }
-  for (int f = 0; f < 12; ++f) scene.data.frame_time_s.push_back(0.1 + 0.15 * f);
-  for (int l = 0; l < 40; ++l) {
-    const Vector3<double> d_b = R_base_from_anchor * s.landmarks[static_cast<std::size_t>(l)];
-    for (int f = 0; f < 12; ++f) {
-      // The spline is no constant rate: expand about the row that is found, until it stays.
-      const double t0 = scene.data.frame_time_s[static_cast<std::size_t>(f)];
-      Vector2<double> u(960, 540);
-      bool seen = true;
-      for (int pass = 0; pass < 20 && seen; ++pass) {
-        const double t = t0 + u.y() * s.line_delay();
-        const FrameMotion<double> motion{s.trajectory.position(t), s.trajectory.rate(t), u.y()};
-        seen = rolling_shutter_project(s.physical_camera(), s.mechanics, s.line_delay(), motion,
-                                       d_b, &u) == ProjectionStatus::kOk;
-      }
-      if (!seen || u.x() < 0 || u.x() > 1920 || u.y() < 0 || u.y() > 1080) continue;
-      scene.data.observations.push_back({l, f, u, 0.3, true});
-    }
-  }
-  const Vector2<double> scale(s.mechanics.pan_scale, s.mechanics.tilt_scale);
-  scene.data.reference_s = 1;
-  for (int i = 0; i < 60; ++i) {
-    const double t = 0.04 + 0.032 * i;
-    const double image_time = t - s.shift_s + s.drift * (t - scene.data.reference_s);
-    scene.data.telemetry.push_back({t,
-                                    scale.cwiseProduct(s.trajectory.position(image_time).vector()),
-                                    Vector2<double>(1e-4, 2e-4)});
-  }
-  scene.priors.mean = s;
-  scene.priors.information.setConstant(100);
-  return scene;
-}
+using test::AdjustmentScene;
+using test::make_adjustment_scene;
 
 // The normal equations of landmarks and all, as one dense vector: control points, parameters, landmarks.
 Eigen::VectorXd full_gradient(const Linearisation& at) {
@@ -92,7 +33,7 @@ AdjustmentState moved(const AdjustmentState& state, const Eigen::VectorXd& x, Ei
 }
 
 TEST(Adjustment, ResidualIsThatOfTheSolvedRollingShutterProjection) {
-  const Scene scene = make_scene();
+  const AdjustmentScene scene = make_adjustment_scene();
   Adjustment adjustment(scene.data, scene.priors, scene.fixed);
   Linearisation at;
   adjustment.linearise(scene.state, {}, &at);
@@ -105,7 +46,7 @@ TEST(Adjustment, ResidualIsThatOfTheSolvedRollingShutterProjection) {
 }
 
 TEST(Adjustment, NormalMatrixIsTheDerivativeOfItsGradientAtThePerfectFit) {
-  const Scene scene = make_scene();
+  const AdjustmentScene scene = make_adjustment_scene();
   Adjustment adjustment(scene.data, scene.priors, scene.fixed);
   Linearisation at;
   adjustment.linearise(scene.state, {}, &at);
@@ -143,7 +84,7 @@ TEST(Adjustment, NormalMatrixIsTheDerivativeOfItsGradientAtThePerfectFit) {
 }
 
 TEST(Adjustment, EliminatingLandmarksGivesTheSolutionOfTheWholeSystem) {
-  Scene scene = make_scene();
+  AdjustmentScene scene = make_adjustment_scene();
   for (std::size_t i = 0; i < scene.data.observations.size(); ++i) {
     scene.data.observations[i].u += 0.3 * Vector2<double>(std::sin(7.0 * static_cast<double>(i)),
                                                           std::cos(3.0 * static_cast<double>(i)));
@@ -172,7 +113,7 @@ TEST(Adjustment, EliminatingLandmarksGivesTheSolutionOfTheWholeSystem) {
 }
 
 TEST(Adjustment, ConvergesFromFarAwayAndHoldsWhatIsFixed) {
-  Scene scene = make_scene();
+  AdjustmentScene scene = make_adjustment_scene();
   scene.fixed[static_cast<std::size_t>(index(Parameter::kAspect))] = true;
   scene.priors.information.setConstant(0);
   scene.priors.information[index(Parameter::kPanScale)] = 1e16;

@@ -164,8 +164,8 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
   options.max_width = kWidth;
   options.max_height = kHeight;
   options.max_landmarks = 64;
-  options.max_used = 16;
-  options.cell_size_px = 16;
+  options.search.choice.max_used = 16;
+  options.maker.cell_size_px = 16;
   OeMode oe(options);
   FrameOrientation frame;
   int in_oe = 0;
@@ -190,6 +190,7 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
     const double radius = kRadius / kFocalLength;
     const double rate = 2 * kPi * 25 / kPictures;
     InterpolatedPanTilt telemetry;
+    telemetry.time_s = k / 25.0;
     telemetry.angle = {radius * std::cos(turn_of(k)), -radius * std::sin(turn_of(k))};
     telemetry.rate = {-radius * rate * std::sin(turn_of(k)), -radius * rate * std::cos(turn_of(k))};
     telemetry.covariance.diagonal() << 1e-9, 1e-9, 1e-7, 1e-7;
@@ -203,7 +204,12 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
     without += status != OeStatus::kOk ? 1 : 0;
     oe.maintain();
     telemetry.extrapolated = false;
-    if (k % 6 == 0) oe.add_late_telemetry(k / 25.0, telemetry);
+    if (k % 6 == 0) {
+      TelemetryLookUp look_up;
+      while (oe.pending(k / 25.0, &look_up)) {
+        oe.settle_pending(look_up.time_s == telemetry.time_s ? &telemetry : nullptr);
+      }
+    }
     if (k == kFrames / 4) oe.reset(calibration, good);
     if (k == kFrames / 2) oe.reset(calibration);
     if (k == kFrames * 3 / 4) oe.reset(calibration, bad);

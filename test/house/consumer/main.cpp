@@ -1,5 +1,5 @@
 // A program outside the repository: telemetry in, direction of a pixel out; OE mode and its map by themselves.
-#include <core/calibration/calibration_file.h>
+#include <core/calibration/calibration_text.h>
 #include <core/realtime/oe_mode/oe_mode.h>
 #include <core/realtime/pt_mode.h>
 

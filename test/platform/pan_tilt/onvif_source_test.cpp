@@ -1,4 +1,4 @@
-// OnvifSource with an ONVIF camera in this process (onvif_server.h), and with servers that misbehave.
+// ONVIF with an ONVIF camera in this process (onvif_server.h), and with servers that misbehave.
 
 #include "platform/pan_tilt/onvif_source.h"
 
@@ -67,15 +67,15 @@ OnvifDevice device_at(const std::string& position) {
 
 TEST(OnvifSource, MapsTheGenericSpaceByItsRanges) {
   const OnvifServer server;
-  OnvifSource source(options_for(server));
+  const auto source = open_onvif(options_for(server));
   PanTiltSample sample;
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_DOUBLE_EQ(sample.pan_rad, kPi / 2);
   EXPECT_DOUBLE_EQ(sample.tilt_rad, kPi / 8);
   EXPECT_EQ(sample.zoom, 0.125);
   EXPECT_FALSE(sample.device_time_s);
   EXPECT_TRUE(sample.restarted);
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_FALSE(sample.restarted);
   EXPECT_EQ(server.last_profile(), "turning&1");
   EXPECT_EQ(server.count("GetSystemDateAndTime"), 0);  // nothing to log in for
@@ -92,9 +92,9 @@ TEST(OnvifSource, TakesDegreesAsTheyAre) {
   options.pan_range.reset();
   options.tilt_range.reset();
   options.profile = "mine";
-  OnvifSource source(options);
+  const auto source = open_onvif(options);
   PanTiltSample sample;
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_DOUBLE_EQ(sample.pan_rad, -170.5 * kRadPerDeg);
   EXPECT_DOUBLE_EQ(sample.tilt_rad, 20 * kRadPerDeg);
   EXPECT_FALSE(sample.zoom);
@@ -111,9 +111,9 @@ TEST(OnvifSource, TurnsSignAndZeroOfEachAxis) {
   options.tilt_range = OnvifRange{-90 * kRadPerDeg, 90 * kRadPerDeg};
   options.pan = {1, -10};
   options.tilt = {-1, 0};
-  OnvifSource source(options);
+  const auto source = open_onvif(options);
   PanTiltSample sample;
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_NEAR(sample.pan_rad, 100 * kRadPerDeg, 1e-12);
   EXPECT_NEAR(sample.tilt_rad, 22.5 * kRadPerDeg, 1e-12);
 }
@@ -122,10 +122,10 @@ TEST(OnvifSource, SaysThatTheGenericSpaceNeedsRanges) {
   const OnvifServer server;
   OnvifSourceOptions options = options_for(server);
   options.pan_range.reset();
-  OnvifSource source(options);
+  const auto source = open_onvif(options);
   PanTiltSample sample;
-  EXPECT_EQ(read_until(source, sample, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source.error(), HasSubstr("pan_range_deg"));
+  EXPECT_EQ(read_until(*source, sample, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source->error(), HasSubstr("pan_range_deg"));
 }
 
 TEST(OnvifSource, FindsTheServicesWhateverTheDeviceCallsItself) {
@@ -136,9 +136,9 @@ TEST(OnvifSource, FindsTheServicesWhateverTheDeviceCallsItself) {
       device.prefix = prefix;
       device.position = [] { return R"(<tt:PanTilt y="0" x="1"/>)"; };
       const OnvifServer server(device);
-      OnvifSource source(options_for(server.url() + "/onvif/device_service"));
+      const auto source = open_onvif(options_for(server.url() + "/onvif/device_service"));
       PanTiltSample sample;
-      ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+      ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
       EXPECT_DOUBLE_EQ(sample.pan_rad, -kPi);
     }
   }
@@ -151,10 +151,10 @@ TEST_P(OnvifSourceLogin, LogsInOnTheDevicesClockAndKeepsItsConnection) {
   for (const double offset_s : {0.0, 86400.0 * 365, -1.5e9}) {
     OnvifServer server(device);
     server.clock_offset_s = offset_s;
-    OnvifSource source(options_for(server, device));
+    const auto source = open_onvif(options_for(server, device));
     PanTiltSample sample;
     for (int i = 0; i < 20; ++i) {
-      ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+      ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
     }
     EXPECT_EQ(server.refusals, GetParam() == Login::kToken ? 0 : 1);
     EXPECT_EQ(server.count("GetStatus"), 20);
@@ -166,27 +166,27 @@ TEST_P(OnvifSourceLogin, LogsInWhereEvenTheClockNeedsIt) {
   OnvifDevice device = device_with(GetParam());
   device.clock_needs_login = true;
   const OnvifServer server(device);
-  OnvifSource source(options_for(server, device));
+  const auto source = open_onvif(options_for(server, device));
   PanTiltSample sample;
-  EXPECT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  EXPECT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
 }
 
 TEST_P(OnvifSourceLogin, OutlivesARestartOfTheDevice) {
   const OnvifDevice device = device_with(GetParam());
   auto server = std::make_unique<OnvifServer>(device);
   const int port = server->port();
-  OnvifSource source(options_for(*server, device));
+  const auto source = open_onvif(options_for(*server, device));
   PanTiltSample sample;
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   server->renew_nonce();
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_FALSE(sample.restarted);
   server.reset();
   for (int i = 0; i < 3; ++i) {
-    ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    ASSERT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
   }
   server = std::make_unique<OnvifServer>(device, port);
-  ASSERT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(read_until(*source, sample, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   EXPECT_TRUE(sample.restarted);
 }
 
@@ -195,32 +195,32 @@ TEST_P(OnvifSourceLogin, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
   const OnvifServer server(device);
   OnvifSourceOptions options = options_for(server, device);
   options.password = "guess";
-  OnvifSource source(options);
+  const auto source = open_onvif(options);
   PanTiltSample sample;
-  EXPECT_EQ(read_until(source, sample, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source.error(), AllOf(StartsWith(server.url() + "/: wrong user or password"),
-                                    Not(HasSubstr("guess"))));
-  EXPECT_EQ(source.read(sample, 0), ReadStatus::kFailed);
+  EXPECT_EQ(read_until(*source, sample, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source->error(), AllOf(StartsWith(server.url() + "/: wrong user or password"),
+                                     Not(HasSubstr("guess"))));
+  EXPECT_EQ(source->read(sample, 0), ReadStatus::kFailed);
   EXPECT_EQ(server.count("GetStatus"), 0);
 
-  OnvifSource anonymous(options_for(server));
-  EXPECT_EQ(read_until(anonymous, sample, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(anonymous.error(), HasSubstr("wants a user and a password"));
+  const auto anonymous = open_onvif(options_for(server));
+  EXPECT_EQ(read_until(*anonymous, sample, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(anonymous->error(), HasSubstr("wants a user and a password"));
 }
 
 TEST_P(OnvifSourceLogin, TriesOnWhenADeviceThatHasWorkedRefuses) {
   const OnvifDevice device = device_with(GetParam());
   OnvifServer server(device);
-  OnvifSource source(options_for(server, device));
+  const auto source = open_onvif(options_for(server, device));
   PanTiltSample sample;
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   server.password_changed = true;
   for (int i = 0; i < 3; ++i) {
-    ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-    EXPECT_THAT(source.error(), HasSubstr("wrong user or password"));
+    ASSERT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_THAT(source->error(), HasSubstr("wrong user or password"));
   }
   server.password_changed = false;
-  ASSERT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(read_until(*source, sample, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   EXPECT_TRUE(sample.restarted);
 }
 
@@ -235,12 +235,12 @@ INSTANTIATE_TEST_SUITE_P(Methods, OnvifSourceLogin,
 TEST(OnvifSource, FollowsADeviceWhoseClockIsSet) {
   const OnvifDevice device = device_with(Login::kToken);
   OnvifServer server(device);
-  OnvifSource source(options_for(server, device));
+  const auto source = open_onvif(options_for(server, device));
   PanTiltSample sample;
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   server.clock_offset_s = 3600;
-  EXPECT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  ASSERT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  EXPECT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  ASSERT_EQ(read_until(*source, sample, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   EXPECT_TRUE(sample.restarted);
 }
 
@@ -253,11 +253,11 @@ TEST(OnvifSource, GivesAnIntervalThatHoldsTheMomentOfTheMeasurement) {
            "\" y=\"0\"/>";
   };
   const OnvifServer server(device);
-  OnvifSource source(options_for(server, device));
+  const auto source = open_onvif(options_for(server, device));
   double last_s = 0;
   for (int i = 0; i < 100; ++i) {
     PanTiltSample sample;
-    ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
     const double measured_s = origin_s + 100 * sample.pan_rad / kPi;
     constexpr double kDigit_s = 1e-4;  // the answer's resolution
     EXPECT_LE(sample.earliest_time_s, measured_s + kDigit_s);
@@ -272,11 +272,11 @@ TEST(OnvifSource, GivesEachSampleTheDevicesTimeIfItChangesSensibly) {
   OnvifDevice device;
   device.utc_time = [&answers] { return xml_time(1.8e9 + 0.005 * ++answers); };
   const OnvifServer server(device);
-  OnvifSource source(options_for(server));
+  const auto source = open_onvif(options_for(server));
   PanTiltSample sample;
   double last_s = 0;
   for (int i = 0; i < 10; ++i) {
-    ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
     EXPECT_EQ(sample.restarted, i == 0);
     ASSERT_TRUE(sample.device_time_s);
     EXPECT_GT(*sample.device_time_s, last_s);
@@ -289,31 +289,31 @@ TEST(OnvifSource, GivesNoDeviceTimeThatStands) {
   OnvifDevice device;
   device.utc_time = [] { return "2026-01-01T00:00:00Z"; };
   const OnvifServer server(device);
-  OnvifSource source(options_for(server));
+  const auto source = open_onvif(options_for(server));
   PanTiltSample sample;
   for (int i = 0; i < 3; ++i) {
-    ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
     EXPECT_FALSE(sample.device_time_s);
   }
 }
 
 TEST(OnvifSource, ReportsFaultsAndHttpErrorsAndRecovers) {
   OnvifServer server;
-  OnvifSource source(options_for(server));
+  const auto source = open_onvif(options_for(server));
   PanTiltSample sample;
   server.set_fault("ter:NoProfile", "The profile token does not exist");
-  EXPECT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("the device answers GetStatus with 'ter:NoProfile: The "
-                                        "profile token does not exist'"));
+  EXPECT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("the device answers GetStatus with 'ter:NoProfile: The "
+                                         "profile token does not exist'"));
   server.set_fault("", "");
-  EXPECT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk);
+  EXPECT_EQ(read_until(*source, sample, ReadStatus::kOk), ReadStatus::kOk);
   for (const int status : {404, 500, 503}) {
     server.status = status;
-    EXPECT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-    EXPECT_THAT(source.error(),
+    EXPECT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_THAT(source->error(),
                 HasSubstr("HTTP status " + std::to_string(status) + " for GetStatus"));
     server.status = 200;
-    EXPECT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk);
+    EXPECT_EQ(read_until(*source, sample, ReadStatus::kOk), ReadStatus::kOk);
     EXPECT_TRUE(sample.restarted);
   }
 }
@@ -321,9 +321,9 @@ TEST(OnvifSource, ReportsFaultsAndHttpErrorsAndRecovers) {
 TEST(OnvifSource, FailsAtOnceOnAUrlItCannotUse) {
   PanTiltSample sample;
   for (const char* url : {"http://user:se@cret@camera", "camera", "ftp://camera", ""}) {
-    OnvifSource source(options_for(url));
-    EXPECT_EQ(source.read(sample, 0), ReadStatus::kFailed) << url;
-    EXPECT_THAT(source.error(), AllOf(HasSubstr("://"), Not(HasSubstr("cret"))));
+    const auto source = open_onvif(options_for(url));
+    EXPECT_EQ(source->read(sample, 0), ReadStatus::kFailed) << url;
+    EXPECT_THAT(source->error(), AllOf(HasSubstr("://"), Not(HasSubstr("cret"))));
   }
 }
 
@@ -344,12 +344,12 @@ TEST(OnvifSource, SurvivesAnswersThatBreakOrMeanNothing) {
       }
     }
   });
-  OnvifSource source(options_for(url_of(server)));
+  const auto source = open_onvif(options_for(url_of(server)));
   PanTiltSample sample;
   std::string errors;
   for (int i = 0; i < 10; ++i) {
-    ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-    errors += source.error() + "\n";
+    ASSERT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    errors += source->error() + "\n";
   }
   EXPECT_THAT(errors, HasSubstr("no answer to GetCapabilities in '<html>'"));
   EXPECT_THAT(errors, HasSubstr("longer than 262144 bytes: not an ONVIF answer"));
@@ -366,21 +366,21 @@ TEST(OnvifSource, GivesUpAnAnswerWhoseBodyIsTooSlow) {
   });
   OnvifSourceOptions options = options_for(url_of(server));
   options.timeout_s = 0.1;
-  OnvifSource source(options);
+  const auto source = open_onvif(options);
   PanTiltSample sample;
-  EXPECT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("timed out"));
+  EXPECT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("timed out"));
 }
 
 TEST(OnvifSource, StopEndsARequestThatIsNotAnswered) {
   RawServer server([&server](int fd) { server.stay_silent(fd); });
-  OnvifSource source(options_for(url_of(server)));
+  const auto source = open_onvif(options_for(url_of(server)));
   std::thread stopper([&] {
     eventually([&] { return server.connections() > 0; });
-    source.stop();
+    source->stop();
   });
   PanTiltSample sample;
-  EXPECT_EQ(source.read(sample, kNever_s), ReadStatus::kStopped);
+  EXPECT_EQ(source->read(sample, kNever_s), ReadStatus::kStopped);
   stopper.join();
 }
 

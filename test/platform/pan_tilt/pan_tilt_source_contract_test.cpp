@@ -70,7 +70,7 @@ struct VapixRig : LiveRig {
     options.user = "user";
     options.password = "secret";
     set_patience(patience, &options);
-    return std::make_unique<VapixSource>(options);
+    return open_vapix(options);
   }
   ~VapixRig() override { silence.on = false; }
   void take_away() override { server.reset(); }
@@ -97,7 +97,7 @@ struct OnvifRig : LiveRig {
     options.pan_range = {-3, 3};
     options.tilt_range = {-1, 1};
     set_patience(patience, &options);
-    return std::make_unique<OnvifSource>(options);
+    return open_onvif(options);
   }
   ~OnvifRig() override { silence.on = false; }
   void take_away() override { server.reset(); }
@@ -130,7 +130,7 @@ struct RecordingRig : Rig {
     RecordingPanTiltSourceOptions options;
     options.directory = directory.path();
     options.realtime = realtime;
-    return std::make_unique<RecordingPanTiltSource>(options);
+    return open_recorded_pan_tilt(options);
   }
   TemporaryDirectory directory;
   bool realtime;
@@ -295,10 +295,7 @@ std::vector<Case<AnyRig>> live_cases(Patience patience) {
   std::vector<Case<AnyRig>> cases = {
       {"Vapix", [patience] { return std::make_unique<VapixRig>(patience); }},
       {"Onvif", [patience] { return std::make_unique<OnvifRig>(patience); }}};
-  for (const HeadKind kind :
-       {HeadKind::kPelcoDSerial, HeadKind::kPelcoDTcp, HeadKind::kPelcoDUdp, HeadKind::kViscaSerial,
-        HeadKind::kViscaTcp, HeadKind::kViscaUdp, HeadKind::kViscaUdpHeader, HeadKind::kPtuSerial,
-        HeadKind::kPtuTcp, HeadKind::kPtuUdp, HeadKind::kPtuTerseSerial}) {
+  for (const HeadKind kind : all_head_kinds()) {
     cases.push_back({to_string(kind),
                      [kind, patience] { return std::make_unique<AskedHeadRig>(kind, patience); }});
   }

@@ -3,12 +3,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <iterator>
+#include <mutex>
 #include <thread>
 #include <tuple>
+#include <vector>
 
 #include "platform/pan_tilt/pelco_d_protocol.h"
 #include "platform/pan_tilt/ptu_protocol.h"
@@ -30,11 +33,6 @@ using ::testing::StartsWith;
 constexpr double kNever_s = 1e6;
 constexpr int kReadingsBetweenSilences = 33;  // 64 queries of two axes, see query_source.h
 constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
-constexpr HeadKind kKinds[] = {
-    HeadKind::kPelcoDSerial,   HeadKind::kPelcoDTcp,      HeadKind::kPelcoDUdp,
-    HeadKind::kViscaSerial,    HeadKind::kViscaTcp,       HeadKind::kViscaUdp,
-    HeadKind::kViscaUdpHeader, HeadKind::kPtuSerial,      HeadKind::kPtuTcp,
-    HeadKind::kPtuUdp,         HeadKind::kPtuTerseSerial, HeadKind::kPtuTerseTcp};
 
 double difference_deg(double a_rad, double b_deg) {
   return std::abs(std::remainder(a_rad / kRadPerDeg - b_deg, 360));
@@ -50,7 +48,7 @@ class QuerySourceTest : public ::testing::TestWithParam<HeadKind> {
   PanTiltSample sample_;
 };
 
-INSTANTIATE_TEST_SUITE_P(Heads, QuerySourceTest, ::testing::ValuesIn(kKinds),
+INSTANTIATE_TEST_SUITE_P(Heads, QuerySourceTest, ::testing::ValuesIn(all_head_kinds()),
                          [](const auto& tested) { return to_string(tested.param); });
 
 TEST_P(QuerySourceTest, DeliversPositionsInTheAxesOfTheModel) {
@@ -58,12 +56,14 @@ TEST_P(QuerySourceTest, DeliversPositionsInTheAxesOfTheModel) {
        {HeadPosition{-123.45, 30.5, 0x1234}, HeadPosition{123.45, -30.5, 0x1234},
         HeadPosition{0, 0, 0x1234}}) {
     HeadRig rig(GetParam(), [&] { return position; });
+    const auto zoom =
+        abilities_of(GetParam()).tells_zoom ? std::optional<double>(0x1234) : std::nullopt;
     const auto source = rig.open();
     for (int i = 0; i < 30; ++i) {
       ASSERT_EQ(source->read(sample_, kDeadline_s), ReadStatus::kOk) << source->error();
-      EXPECT_LE(difference_deg(sample_.pan_rad, position.pan_deg), rig.quantum_deg());
-      EXPECT_LE(difference_deg(sample_.tilt_rad, position.tilt_deg), rig.quantum_deg());
-      EXPECT_EQ(sample_.zoom, is_ptu(GetParam()) ? std::nullopt : std::optional<double>(0x1234));
+      EXPECT_LE(difference_deg(sample_.pan_rad, position.pan_deg), rig.step_deg());
+      EXPECT_LE(difference_deg(sample_.tilt_rad, position.tilt_deg), rig.step_deg());
+      EXPECT_EQ(sample_.zoom, zoom);
       EXPECT_EQ(sample_.restarted, i == 0);
     }
   }
@@ -89,7 +89,7 @@ struct TurningHead {
     const double half_s = (sample.latest_time_s - sample.earliest_time_s) / 2;
     const double angle_deg = kRate * (middle_s - origin_s);
     // Half a step by rounding; where both axes repeat, it turned by less than a step of the tilt.
-    const double slack_s = 1.5 * rig.quantum_deg() / kRate;
+    const double slack_s = 1.5 * rig.step_deg() / kRate;
     EXPECT_LE(difference_deg(sample.pan_rad, angle_deg + 170) / kRate, half_s + slack_s);
     const double tilt_error_deg = std::remainder(sample.tilt_rad / kRadPerDeg - angle_deg, 90);
     EXPECT_LE(std::abs(tilt_error_deg) / kRate, half_s + slack_s);
@@ -139,10 +139,9 @@ TEST_P(QuerySourceTest, AppliesSignAndZeroOfEachAxis) {
   ASSERT_EQ(source->read(sample_, kDeadline_s), ReadStatus::kOk) << source->error();
   const double counted_pan = -options.pan.sign * -123.45;
   const double counted_tilt = options.tilt.sign * 30.5;
-  EXPECT_LE(difference_deg(sample_.pan_rad, options.pan.sign * (counted_pan - 10)),
-            rig.quantum_deg());
+  EXPECT_LE(difference_deg(sample_.pan_rad, options.pan.sign * (counted_pan - 10)), rig.step_deg());
   EXPECT_LE(difference_deg(sample_.tilt_rad, options.tilt.sign * (counted_tilt + 20)),
-            rig.quantum_deg());
+            rig.step_deg());
 }
 
 TEST_P(QuerySourceTest, OutlivesUnpluggingAndComesBackByItself) {
@@ -217,8 +216,8 @@ TEST_P(QuerySourceTest, LosesOnlyAnswersToALineWithFaults) {
   const auto source = rig.open(options);
   const auto is_right = [&] {
     return source->read(sample_, kDeadline_s) == ReadStatus::kOk &&
-           difference_deg(sample_.pan_rad, position.pan_deg) <= rig.quantum_deg() &&
-           difference_deg(sample_.tilt_rad, position.tilt_deg) <= rig.quantum_deg();
+           difference_deg(sample_.pan_rad, position.pan_deg) <= rig.step_deg() &&
+           difference_deg(sample_.tilt_rad, position.tilt_deg) <= rig.step_deg();
   };
   for (const LineFault fault :
        {LineFault::kNoise, LineFault::kRepeated, LineFault::kUnsolicited, LineFault::kLate,
@@ -226,10 +225,10 @@ TEST_P(QuerySourceTest, LosesOnlyAnswersToALineWithFaults) {
     SCOPED_TRACE(static_cast<int>(fault));
     rig.server().fault = fault;
     rig.server().faults = 0;
-    // Digits of a PTU and nibbles of VISCA have no sum, and terse answers no name.
-    const bool unseen = (is_terse(GetParam()) && fault == LineFault::kRepeated) ||
-                        (fault == LineFault::kChangedByte && !is_pelco_d(GetParam())) ||
-                        (fault == LineFault::kLostByte && is_ptu(GetParam()));
+    const HeadAbilities abilities = abilities_of(GetParam());
+    const bool unseen = (fault == LineFault::kRepeated && !abilities.shows_repeats) ||
+                        (fault == LineFault::kChangedByte && !abilities.shows_changed_bytes) ||
+                        (fault == LineFault::kLostByte && !abilities.shows_lost_bytes);
     const double end_s = monotonic_now_s() + kDeadline_s;
     int samples = 0;
     while ((samples < 5 || rig.server().faults < 4) && monotonic_now_s() < end_s) {
@@ -240,8 +239,8 @@ TEST_P(QuerySourceTest, LosesOnlyAnswersToALineWithFaults) {
       }
       ++samples;
       if (!unseen) {
-        EXPECT_LE(difference_deg(sample_.pan_rad, position.pan_deg), rig.quantum_deg());
-        EXPECT_LE(difference_deg(sample_.tilt_rad, position.tilt_deg), rig.quantum_deg());
+        EXPECT_LE(difference_deg(sample_.pan_rad, position.pan_deg), rig.step_deg());
+        EXPECT_LE(difference_deg(sample_.tilt_rad, position.tilt_deg), rig.step_deg());
       }
     }
     EXPECT_GE(samples, 5);
@@ -408,6 +407,67 @@ TEST(QuerySource, PutsAnAnswerInTwoDatagramsTogether) {
     PanTiltSample sample;
     EXPECT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << to_string(kind);
   }
+}
+
+// However slowly the rest comes: the last byte would make the interval as long as the line is slow.
+TEST(QuerySource, EndsTheIntervalWithTheFirstByteOfTheAnswer) {
+  for (const HeadKind kind : {HeadKind::kPelcoDSerial, HeadKind::kViscaTcp, HeadKind::kPtuSerial}) {
+    HeadRig rig(kind);
+    rig.server().in_two = true;
+    rig.server().between_s = 0.1;
+    const auto source = rig.open();
+    PanTiltSample sample;
+    double shortest_s = kNever_s;  // on a busy machine both pieces may be found at once
+    for (int i = 0; i < 5; ++i) {
+      ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
+      shortest_s = std::min(shortest_s, sample.latest_time_s - sample.earliest_time_s);
+    }
+    EXPECT_LT(shortest_s, rig.server().between_s) << to_string(kind);
+  }
+}
+
+TEST(QuerySource, ForgetsTheZoomWithTheConnection) {
+  auto head = std::make_unique<PelcoDHead>([] { return HeadPosition{10, 20, 7}; });
+  PelcoDHead& its_head = *head;
+  HeadServer server(HeadServer::Link::kTcp, std::move(head));
+  PelcoDOptions with_zoom;
+  with_zoom.read_zoom = true;
+  QuerySource source(std::make_unique<PelcoDProtocol>(with_zoom), options_for(server.address()));
+  PanTiltSample sample;
+  ASSERT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  EXPECT_EQ(sample.zoom, 7);
+  server.unplug();
+  ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  its_head.knows_zoom = false;  // another lens
+  server.plug();
+  ASSERT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  EXPECT_TRUE(sample.restarted);
+  EXPECT_EQ(sample.zoom, std::nullopt);
+}
+
+// The answers to them may come on the new connection; nothing would tell them from those to new queries.
+TEST(QuerySource, AsksNothingOnANewConnectionWhileOldQueriesMayBeAnswered) {
+  std::mutex mutex;
+  std::vector<double> asked_s;  // as the head takes the queries
+  HeadServer server(HeadServer::Link::kUdp, std::make_unique<PelcoDHead>([&] {
+                      const std::lock_guard<std::mutex> lock(mutex);
+                      asked_s.push_back(monotonic_now_s());
+                      return HeadPosition{};
+                    }));
+  server.fault = LineFault::kSilence;
+  QuerySource source(std::make_unique<PelcoDProtocol>(PelcoDOptions{}),
+                     options_for(server.address()));
+  const auto count = [&] {
+    const std::lock_guard<std::mutex> lock(mutex);
+    return asked_s.size();
+  };
+  PanTiltSample sample;
+  ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  ASSERT_TRUE(eventually([&] { return count() == 3; }));  // a lost head has left three unanswered
+  ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  ASSERT_GT(count(), 3U);
+  // 1 s after the last of them was sent, which the head may have taken a little later.
+  EXPECT_GT(asked_s[3] - asked_s[2], 0.5);
 }
 
 // Shorter than a quarter of the time that an answer takes on the wire.

@@ -44,14 +44,14 @@ std::string url_of(const RawServer& server) {
 
 TEST(VapixSource, DeliversPositionsInRadians) {
   AxisServer server("", "", [] { return position(12.5); });
-  VapixSource source(options_for(server.url()));
+  const auto source = open_vapix(options_for(server.url()));
   PanTiltSample sample;
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_DOUBLE_EQ(sample.pan_rad, 12.5 * kRadPerDeg);
   EXPECT_DOUBLE_EQ(sample.tilt_rad, -1.5 * kRadPerDeg);
   EXPECT_EQ(sample.zoom, 900);
   EXPECT_TRUE(sample.restarted);
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_FALSE(sample.restarted);
   EXPECT_EQ(server.last_query(), "/axis-cgi/com/ptz.cgi?query=position");
 }
@@ -60,9 +60,9 @@ TEST(VapixSource, NamesTheVideoChannelIfThereAreSeveral) {
   AxisServer server("", "", [] { return position(0); });
   VapixSourceOptions options = options_for(server.url() + "/");
   options.camera = 2;
-  VapixSource source(options);
+  const auto source = open_vapix(options);
   PanTiltSample sample;
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_EQ(server.last_query(), "/axis-cgi/com/ptz.cgi?query=position&camera=2");
 }
 
@@ -71,9 +71,9 @@ TEST(VapixSource, TurnsSignAndZeroOfEachAxis) {
   VapixSourceOptions options = options_for(server.url());
   options.pan = {-1, 20};
   options.tilt = {1, 5};
-  VapixSource source(options);
+  const auto source = open_vapix(options);
   PanTiltSample sample;
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_NEAR(sample.pan_rad, (190.5 - 360) * kRadPerDeg, 1e-12) << "beyond half a turn";
   EXPECT_NEAR(sample.tilt_rad, 15 * kRadPerDeg, 1e-12);
 }
@@ -86,11 +86,11 @@ TEST(VapixSource, GivesAnIntervalThatHoldsTheMomentOfTheMeasurement) {
   VapixSourceOptions options = options_for(server.url());
   options.user = "user";
   options.password = "secret";
-  VapixSource source(options);
+  const auto source = open_vapix(options);
   double last_s = 0;
   for (int i = 0; i < 200; ++i) {
     PanTiltSample sample;
-    ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
     const double measured_s = origin_s + sample.pan_rad / kRadPerDeg;
     constexpr double kDigit_s = 1e-6;  // the answer's resolution
     EXPECT_LE(sample.earliest_time_s, measured_s + kDigit_s);
@@ -105,10 +105,10 @@ TEST(VapixSource, LogsInOnceAndKeepsItsConnection) {
   VapixSourceOptions options = options_for(server.url());
   options.user = "us er";
   options.password = "p@ss:w\"ord/%";
-  VapixSource source(options);
+  const auto source = open_vapix(options);
   PanTiltSample sample;
   for (int i = 0; i < 50; ++i) {
-    ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   }
   EXPECT_EQ(server.refusals, 1);
   EXPECT_EQ(server.polls, 50);
@@ -120,11 +120,11 @@ TEST(VapixSource, LogsInAgainWhenTheCameraHasForgottenItsNonces) {
   VapixSourceOptions options = options_for(server.url());
   options.user = "user";
   options.password = "secret";
-  VapixSource source(options);
+  const auto source = open_vapix(options);
   PanTiltSample sample;
   for (int life = 0; life < 3; ++life) {
     for (int i = 0; i < 3; ++i) {
-      ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+      ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
       EXPECT_EQ(sample.restarted, life == 0 && i == 0);
     }
     server.renew_nonce();
@@ -138,26 +138,26 @@ TEST(VapixSource, TriesOnWhenACameraThatHasWorkedRefuses) {
   VapixSourceOptions options = options_for(server.url());
   options.user = "user";
   options.password = "secret";
-  VapixSource source(options);
+  const auto source = open_vapix(options);
   PanTiltSample sample;
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   server.refuse = true;
   for (int i = 0; i < 3; ++i) {
-    ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-    EXPECT_EQ(source.error(), server.url() + "/: wrong user or password (401)");
+    ASSERT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_EQ(source->error(), server.url() + "/: wrong user or password (401)");
   }
   server.refuse = false;
-  ASSERT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(read_until(*source, sample, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   EXPECT_TRUE(sample.restarted);
 }
 
 TEST(VapixSource, TakesUserAndPasswordOutOfTheUrl) {
   AxisServer server("user", "sec@ret", [] { return position(1); });
-  VapixSource source(
-      options_for("http://user:sec%40ret@127.0.0.1:" + std::to_string(server.port())));
+  const auto source =
+      open_vapix(options_for("http://user:sec%40ret@127.0.0.1:" + std::to_string(server.port())));
   PanTiltSample sample;
-  EXPECT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
-  EXPECT_EQ(source.name(), server.url() + "/");
+  EXPECT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
+  EXPECT_EQ(source->name(), server.url() + "/");
 }
 
 TEST(VapixSource, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
@@ -165,16 +165,16 @@ TEST(VapixSource, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
   VapixSourceOptions options = options_for(server.url());
   options.user = "user";
   options.password = "guess";
-  VapixSource source(options);
+  const auto source = open_vapix(options);
   PanTiltSample sample;
-  EXPECT_EQ(read_until(source, sample, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_EQ(source.error(), server.url() + "/: wrong user or password (401)");
-  EXPECT_EQ(source.read(sample, 0), ReadStatus::kFailed);
+  EXPECT_EQ(read_until(*source, sample, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_EQ(source->error(), server.url() + "/: wrong user or password (401)");
+  EXPECT_EQ(source->read(sample, 0), ReadStatus::kFailed);
   EXPECT_EQ(server.polls, 0);
 
-  VapixSource anonymous(options_for(server.url()));
-  EXPECT_EQ(read_until(anonymous, sample, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(anonymous.error(), HasSubstr("the camera wants a user and a password (401)"));
+  const auto anonymous = open_vapix(options_for(server.url()));
+  EXPECT_EQ(read_until(*anonymous, sample, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(anonymous->error(), HasSubstr("the camera wants a user and a password (401)"));
 }
 
 TEST(VapixSource, SaysThatACameraOffersNoDigest) {
@@ -188,34 +188,35 @@ TEST(VapixSource, SaysThatACameraOffersNoDigest) {
   VapixSourceOptions options = options_for(url_of(server));
   options.user = "user";
   options.password = "secret";
-  VapixSource source(options);
+  const auto source = open_vapix(options);
   PanTiltSample sample;
-  EXPECT_EQ(read_until(source, sample, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source.error(), HasSubstr("does not offer HTTP digest"));
+  EXPECT_EQ(read_until(*source, sample, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source->error(), HasSubstr("does not offer HTTP digest"));
 }
 
 TEST(VapixSource, FailsAtOnceOnAUrlItCannotUse) {
   PanTiltSample sample;
   for (const char* url : {"http://user:se@cret@camera", "camera", "ftp://camera",
                           "http://camera/axis-cgi/com/ptz.cgi", ""}) {
-    VapixSource source(options_for(url));
-    EXPECT_EQ(source.read(sample, 0), ReadStatus::kFailed) << url;
-    EXPECT_THAT(source.error(), AllOf(HasSubstr("://"), Not(HasSubstr("cret"))));
+    const auto source = open_vapix(options_for(url));
+    EXPECT_EQ(source->read(sample, 0), ReadStatus::kFailed) << url;
+    EXPECT_THAT(source->error(), AllOf(HasSubstr("://"), Not(HasSubstr("cret"))));
   }
 }
 
 TEST(VapixSource, ReportsRefusedConnectionsAndTriesAgainUntilTheCameraIsThere) {
   const int port = unused_port();
-  VapixSource source(options_for("http://user:secret@127.0.0.1:" + std::to_string(port)));
+  const auto source =
+      open_vapix(options_for("http://user:secret@127.0.0.1:" + std::to_string(port)));
   PanTiltSample sample;
   for (int i = 0; i < 3; ++i) {
-    ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-    EXPECT_THAT(source.error(), AllOf(StartsWith("http://127.0.0.1:" + std::to_string(port)),
-                                      Not(HasSubstr("secret"))));
+    ASSERT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_THAT(source->error(), AllOf(StartsWith("http://127.0.0.1:" + std::to_string(port)),
+                                       Not(HasSubstr("secret"))));
   }
   AxisServer server(
       "", "", [] { return position(1); }, port);
-  EXPECT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk);
+  EXPECT_EQ(read_until(*source, sample, ReadStatus::kOk), ReadStatus::kOk);
   EXPECT_TRUE(sample.restarted);
 }
 
@@ -225,50 +226,50 @@ TEST(VapixSource, OutlivesARestartOfTheCamera) {
   VapixSourceOptions options = options_for(server->url());
   options.user = "user";
   options.password = "secret";
-  VapixSource source(options);
+  const auto source = open_vapix(options);
   PanTiltSample sample;
   for (int i = 0; i < 5; ++i) {
-    ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   }
   server.reset();
-  EXPECT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
   server = std::make_unique<AxisServer>(
       "user", "secret", [] { return position(2); }, port);
-  ASSERT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk);
+  ASSERT_EQ(read_until(*source, sample, ReadStatus::kOk), ReadStatus::kOk);
   EXPECT_TRUE(sample.restarted);
   EXPECT_DOUBLE_EQ(sample.pan_rad, 2 * kRadPerDeg);
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk);
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk);
   EXPECT_FALSE(sample.restarted);
 }
 
 TEST(VapixSource, ReportsHttpErrorsAndRecovers) {
   AxisServer server("", "", [] { return position(1); });
-  VapixSource source(options_for(server.url()));
+  const auto source = open_vapix(options_for(server.url()));
   PanTiltSample sample;
   for (const int status : {404, 500, 302}) {
     server.status = status;
-    EXPECT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-    EXPECT_THAT(source.error(), HasSubstr("HTTP status " + std::to_string(status)));
+    EXPECT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_THAT(source->error(), HasSubstr("HTTP status " + std::to_string(status)));
     server.status = 200;
-    EXPECT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk);
+    EXPECT_EQ(read_until(*source, sample, ReadStatus::kOk), ReadStatus::kOk);
     EXPECT_TRUE(sample.restarted);
   }
 }
 
 TEST(VapixSource, RecognisesAnErrorInAnAnswerOfStatus200) {
   AxisServer server("", "", [] { return "Error: PTZ is off\r\n"; });
-  VapixSource source(options_for(server.url()));
+  const auto source = open_vapix(options_for(server.url()));
   PanTiltSample sample;
-  EXPECT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("the camera answers 'Error: PTZ is off'"));
+  EXPECT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("the camera answers 'Error: PTZ is off'"));
 }
 
 TEST(VapixSource, RefusesAnAnswerTooLongForAPosition) {
   AxisServer server("", "", [] { return std::string(100'000, 'x'); });
-  VapixSource source(options_for(server.url()));
+  const auto source = open_vapix(options_for(server.url()));
   PanTiltSample sample;
-  EXPECT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("longer than 4096 bytes"));
+  EXPECT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("longer than 4096 bytes"));
 }
 
 TEST(VapixSource, SurvivesConnectionsThatBreakAtAnyPoint) {
@@ -289,11 +290,11 @@ TEST(VapixSource, SurvivesConnectionsThatBreakAtAnyPoint) {
     }
     RawServer::send(fd, "HTTP/1.1 200 OK\r\nConnection: close\r\n\r\n" + position(4));
   });
-  VapixSource source(options_for(url_of(server)));
+  const auto source = open_vapix(options_for(url_of(server)));
   PanTiltSample sample;
   int lost = 0;
   for (int good = 0; good < 3;) {
-    const ReadStatus status = source.read(sample, kDeadline_s);
+    const ReadStatus status = source->read(sample, kDeadline_s);
     ASSERT_TRUE(status == ReadStatus::kOk || status == ReadStatus::kDisconnected);
     good += status == ReadStatus::kOk ? 1 : 0;
     lost += status == ReadStatus::kDisconnected ? 1 : 0;
@@ -312,12 +313,12 @@ TEST(VapixSource, StampsTheFirstBytesOfAnAnswerThatComesInPieces) {
       RawServer::send(fd, "pan=1\ntilt=1");
     }
   });
-  VapixSource source(options_for(url_of(server)));
+  const auto source = open_vapix(options_for(url_of(server)));
   PanTiltSample sample;
-  EXPECT_EQ(source.read(sample, 0.02), ReadStatus::kTimeout);
-  EXPECT_EQ(source.read(sample, 0.02), ReadStatus::kTimeout);
+  EXPECT_EQ(source->read(sample, 0.02), ReadStatus::kTimeout);
+  EXPECT_EQ(source->read(sample, 0.02), ReadStatus::kTimeout);
   send_body = true;
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_LT(sample.latest_time_s, body_sent_s);
   EXPECT_LE(sample.earliest_time_s, sample.latest_time_s);
 }
@@ -326,64 +327,64 @@ TEST(VapixSource, GivesUpAPollThatIsNotAnswered) {
   RawServer server([&server](int fd) { server.stay_silent(fd); });
   VapixSourceOptions options = options_for(url_of(server));
   options.timeout_s = 0.05;
-  VapixSource source(options);
+  const auto source = open_vapix(options);
   PanTiltSample sample;
-  EXPECT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("timed out"));
+  EXPECT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("timed out"));
 }
 
 TEST(VapixSource, NeverPollsFasterThanAsked) {
   AxisServer server("", "", [] { return position(1); });
   VapixSourceOptions options = options_for(server.url());
   options.rate_hz = 100;
-  VapixSource source(options);
+  const auto source = open_vapix(options);
   const double before_s = monotonic_now_s();
   PanTiltSample sample;
   for (int i = 0; i <= 20; ++i) {
-    ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   }
   EXPECT_GT(sample.latest_time_s - before_s, 0.2);
 }
 
 TEST(VapixSource, LeaksNoFileDescriptorOverManyReconnections) {
   RawServer server([](int fd) { RawServer::reset(fd); });
-  VapixSource source(options_for(url_of(server)));
+  const auto source = open_vapix(options_for(url_of(server)));
   PanTiltSample sample;
   const auto open_files = [] {
     return std::distance(std::filesystem::directory_iterator("/proc/self/fd"),
                          std::filesystem::directory_iterator());
   };
-  ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  ASSERT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
   const auto before = open_files();
   for (int i = 0; i < 100; ++i) {
-    ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    ASSERT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
   }
   EXPECT_LE(open_files(), before + 2);  // one connection at each end may be under way
 }
 
 TEST(VapixSource, StopEndsAPollThatIsNotAnswered) {
   RawServer server([&server](int fd) { server.stay_silent(fd); });
-  VapixSource source(options_for(url_of(server)));
+  const auto source = open_vapix(options_for(url_of(server)));
   std::thread stopper([&] {
     eventually([&] { return server.connections() > 0; });
-    source.stop();
+    source->stop();
   });
   PanTiltSample sample;
-  EXPECT_EQ(source.read(sample, kNever_s), ReadStatus::kStopped);
+  EXPECT_EQ(source->read(sample, kNever_s), ReadStatus::kStopped);
   stopper.join();
 }
 
 TEST(VapixSource, StopEndsAPause) {
   VapixSourceOptions options = options_for("http://127.0.0.1:" + std::to_string(unused_port()));
   options.max_backoff_s = kNever_s;
-  VapixSource source(options);
+  const auto source = open_vapix(options);
   PanTiltSample sample;
-  ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kDisconnected);
-  std::thread stopper([&] { source.stop(); });
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kDisconnected);
+  std::thread stopper([&] { source->stop(); });
   // Pauses double from 0.25 s on, so that the source sleeps most of the time.
   ReadStatus status = ReadStatus::kDisconnected;
   while (status == ReadStatus::kDisconnected) {
-    status = source.read(sample, kNever_s);
+    status = source->read(sample, kNever_s);
   }
   EXPECT_EQ(status, ReadStatus::kStopped);
   stopper.join();

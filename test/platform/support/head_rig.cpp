@@ -1,128 +1,129 @@
 #include "test/platform/support/head_rig.h"
 
-#include "platform/pan_tilt/pelco_d_protocol.h"
-#include "platform/pan_tilt/ptu_protocol.h"
-#include "platform/pan_tilt/visca_protocol.h"
+#include <algorithm>
+
 #include "test/platform/support/eventually.h"
 
 namespace alidade {
 namespace {
 
-HeadServer::Link link_of(HeadKind kind) {
-  switch (kind) {
-    case HeadKind::kPelcoDTcp:
-    case HeadKind::kViscaTcp:
-    case HeadKind::kPtuTcp:
-    case HeadKind::kPtuTerseTcp:
-      return HeadServer::Link::kTcp;
-    case HeadKind::kPelcoDUdp:
-    case HeadKind::kViscaUdp:
-    case HeadKind::kViscaUdpHeader:
-    case HeadKind::kPtuUdp:
-      return HeadServer::Link::kUdp;
-    default:
-      return HeadServer::Link::kSerial;
-  }
+constexpr double kViscaStep_deg = 1 / 51.2;
+
+std::unique_ptr<SimulatedHead> visca_head(const HeadKindRow& row,
+                                          std::function<HeadPosition()> position) {
+  auto head = std::make_unique<ViscaHead>(std::move(position));
+  head->header = row.header;
+  head->pan_nibbles = row.link == HeadServer::Link::kSerial ? 5 : 4;
+  return head;
 }
 
-std::unique_ptr<SimulatedHead> head_of(HeadKind kind, std::function<HeadPosition()> position) {
+std::unique_ptr<SimulatedHead> simulated_head(HeadKind kind,
+                                              std::function<HeadPosition()> position) {
   if (!position) {
     position = [] { return HeadPosition{-123.45, 30.5, 0x1234}; };
   }
-  if (is_pelco_d(kind)) {
-    return std::make_unique<PelcoDHead>(std::move(position));
+  const HeadKindRow& row = row_of(kind);
+  switch (row.type) {
+    case HeadType::kPelcoD:
+      return std::make_unique<PelcoDHead>(std::move(position));
+    case HeadType::kVisca:
+      return visca_head(row, std::move(position));
+    case HeadType::kPtu:
+      break;
   }
-  if (is_ptu(kind)) {
-    return std::make_unique<PtuHead>(std::move(position));
+  return std::make_unique<PtuHead>(std::move(position));
+}
+
+// Which way the simulated head counts.
+UsualSigns signs_of(HeadType type) {
+  switch (type) {
+    case HeadType::kPelcoD:
+      return {1, -1};
+    case HeadType::kVisca:
+      return {1, 1};
+    case HeadType::kPtu:
+      break;
   }
-  auto head = std::make_unique<ViscaHead>(std::move(position));
-  head->header = kind == HeadKind::kViscaUdpHeader;
-  head->pan_nibbles = kind == HeadKind::kViscaSerial ? 5 : 4;
-  return head;
+  return {-1, 1};
 }
 
 }  // namespace
 
-const char* to_string(HeadKind kind) {
-  switch (kind) {
-    case HeadKind::kPelcoDSerial:
-      return "PelcoDSerial";
-    case HeadKind::kPelcoDTcp:
-      return "PelcoDTcp";
-    case HeadKind::kPelcoDUdp:
-      return "PelcoDUdp";
-    case HeadKind::kViscaSerial:
-      return "ViscaSerial";
-    case HeadKind::kViscaTcp:
-      return "ViscaTcp";
-    case HeadKind::kViscaUdp:
-      return "ViscaUdp";
-    case HeadKind::kViscaUdpHeader:
-      return "ViscaUdpHeader";
-    case HeadKind::kPtuSerial:
-      return "PtuSerial";
-    case HeadKind::kPtuTcp:
-      return "PtuTcp";
-    case HeadKind::kPtuUdp:
-      return "PtuUdp";
-    case HeadKind::kPtuTerseSerial:
-      return "PtuTerseSerial";
-    case HeadKind::kPtuTerseTcp:
-      return "PtuTerseTcp";
+const HeadKindRow& row_of(HeadKind kind) { return kHeadKinds[static_cast<std::size_t>(kind)]; }
+
+const char* to_string(HeadKind kind) { return row_of(kind).name; }
+
+std::array<HeadKind, kHeadKinds.size()> all_head_kinds() {
+  std::array<HeadKind, kHeadKinds.size()> kinds{};
+  std::transform(kHeadKinds.begin(), kHeadKinds.end(), kinds.begin(),
+                 [](const HeadKindRow& row) { return row.kind; });
+  return kinds;
+}
+
+HeadAbilities abilities_of(HeadKind kind) {
+  const HeadKindRow& row = row_of(kind);
+  switch (row.type) {
+    case HeadType::kPelcoD:
+      return {true, true, true, true};
+    case HeadType::kVisca:
+      return {true, false, true, true};
+    case HeadType::kPtu:
+      break;
   }
-  return "";
-}
-
-bool is_pelco_d(HeadKind kind) {
-  return kind == HeadKind::kPelcoDSerial || kind == HeadKind::kPelcoDTcp ||
-         kind == HeadKind::kPelcoDUdp;
-}
-
-bool is_ptu(HeadKind kind) {
-  return kind == HeadKind::kPtuSerial || kind == HeadKind::kPtuTcp || kind == HeadKind::kPtuUdp ||
-         is_terse(kind);
-}
-
-bool is_terse(HeadKind kind) {
-  return kind == HeadKind::kPtuTerseSerial || kind == HeadKind::kPtuTerseTcp;
+  return {false, false, false, !row.terse};
 }
 
 HeadRig::HeadRig(HeadKind kind, std::function<HeadPosition()> position)
     : kind_(kind),
-      server_(std::make_unique<HeadServer>(link_of(kind), head_of(kind, std::move(position)))) {}
+      server_(std::make_unique<HeadServer>(row_of(kind).link,
+                                           simulated_head(kind, std::move(position)))) {}
 
 QuerySourceOptions HeadRig::options() const {
+  const UsualSigns signs = signs_of(row_of(kind_).type);
   QuerySourceOptions options;
   options.link = {server_->address(), 115200};
   options.rate_hz = 1000;
   options.timeout_s = 4 * kDeadline_s;
   options.max_backoff_s = 0.01;
-  options.tilt.sign = is_pelco_d(kind_) ? -1 : 1;
-  options.pan.sign = is_ptu(kind_) ? -1 : 1;
+  options.pan.sign = *signs.pan;
+  options.tilt.sign = *signs.tilt;
   return options;
 }
 
-std::unique_ptr<QueryProtocol> HeadRig::protocol() const {
-  if (is_pelco_d(kind_)) {
-    PelcoDOptions options;
-    options.read_zoom = true;
-    return std::make_unique<PelcoDProtocol>(options);
+HeadOptions HeadRig::protocol_options() const {
+  const HeadKindRow& row = row_of(kind_);
+  switch (row.type) {
+    case HeadType::kPelcoD: {
+      PelcoDOptions options;
+      options.read_zoom = true;
+      return options;
+    }
+    case HeadType::kVisca: {
+      ViscaOptions options;
+      options.header = row.header;
+      options.pan_deg_per_step = kViscaStep_deg;
+      options.tilt_deg_per_step = kViscaStep_deg;
+      options.read_zoom = true;
+      return options;
+    }
+    case HeadType::kPtu:
+      break;
   }
-  if (is_ptu(kind_)) {
-    PtuOptions options;
-    options.verbose = !is_terse(kind_);
-    return std::make_unique<PtuProtocol>(options);
-  }
-  ViscaOptions options;
-  options.header = kind_ == HeadKind::kViscaUdpHeader;
-  options.pan_deg_per_step = 1 / 51.2;
-  options.tilt_deg_per_step = 1 / 51.2;
-  options.read_zoom = true;
-  return std::make_unique<ViscaProtocol>(options);
+  PtuOptions options;
+  options.verbose = !row.terse;
+  return options;
 }
 
-double HeadRig::quantum_deg() const {
-  return is_pelco_d(kind_) ? 0.01 : is_ptu(kind_) ? PtuHead::kPanArcSeconds / 3600 : 1 / 51.2;
+double HeadRig::step_deg() const {
+  switch (row_of(kind_).type) {
+    case HeadType::kPelcoD:
+      return 0.01;
+    case HeadType::kVisca:
+      return kViscaStep_deg;
+    case HeadType::kPtu:
+      break;
+  }
+  return PtuHead::kPanArcSeconds / 3600;
 }
 
 }  // namespace alidade

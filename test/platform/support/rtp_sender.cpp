@@ -63,7 +63,7 @@ bool rtp_port_taken(int port) {
   return taken;
 }
 
-RtpSender::RtpSender(Codec codec, int port, double first_time_s)
+RtpSender::RtpSender(Codec codec, int port, double first_time_s, int packet_bytes)
     : first_time_s_(first_time_s), began_utc_us_(av_gettime()) {
   const bool mjpeg = codec == Codec::kMjpeg;
   const AVCodec* encoder = avcodec_find_encoder_by_name(mjpeg ? "mjpeg" : "libx264");
@@ -85,7 +85,8 @@ RtpSender::RtpSender(Codec codec, int port, double first_time_s)
   }
   check(avcodec_open2(encoder_.get(), encoder, nullptr));
 
-  const std::string url = "rtp://127.0.0.1:" + std::to_string(port) + "?pkt_size=1200";
+  const std::string url =
+      "rtp://127.0.0.1:" + std::to_string(port) + "?pkt_size=" + std::to_string(packet_bytes);
   check(avformat_alloc_output_context2(&format_, nullptr, "rtp", url.c_str()));
   format_->flags |= AVFMT_FLAG_BITEXACT;  // sequence numbers begin at zero, not at a random one
   // Lets the RTCP reports say that first_time_s is now.

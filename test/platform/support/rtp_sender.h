@@ -20,7 +20,7 @@ class RtpSender {
   static int grey_of(std::int64_t n) { return 40 + static_cast<int>(n * 7 % 160); }
 
   // H.264 has a key frame every 10 pictures and its parameter sets in band.
-  RtpSender(Codec codec, int port, double first_time_s = 1);
+  RtpSender(Codec codec, int port, double first_time_s = 1, int packet_bytes = 1200);
   ~RtpSender();
   RtpSender(const RtpSender&) = delete;
   RtpSender& operator=(const RtpSender&) = delete;

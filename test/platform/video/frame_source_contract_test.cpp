@@ -36,9 +36,7 @@ struct RtspRig : LiveFrameSourceRig {
     set_patience(patience, &options);
     source = open();
   }
-  std::unique_ptr<FrameSource> open() const override {
-    return std::make_unique<RtpSource>(options);
-  }
+  std::unique_ptr<FrameSource> open() const override { return open_rtp(options); }
   void take_away() override { server.kill(); }
   void give_back() override { server.restart(); }
   void set_silent(bool silent) override { silent ? server.freeze() : server.thaw(); }
@@ -64,9 +62,7 @@ struct RtpRig : LiveFrameSourceRig {
     over = true;
     thread.join();
   }
-  std::unique_ptr<FrameSource> open() const override {
-    return std::make_unique<RtpSource>(options);
-  }
+  std::unique_ptr<FrameSource> open() const override { return open_rtp(options); }
   void take_away() override { away = true; }
   void give_back() override { away = false; }
   void set_silent(bool silent) override { away = silent; }
@@ -85,9 +81,7 @@ struct MjpegRig : LiveFrameSourceRig {
     source = open();
   }
   ~MjpegRig() override { source.reset(); }  // before the server, which waits for it
-  std::unique_ptr<FrameSource> open() const override {
-    return std::make_unique<MjpegSource>(options);
-  }
+  std::unique_ptr<FrameSource> open() const override { return open_mjpeg(options); }
   void take_away() override { server.hang_up = true; }
   void give_back() override { server.hang_up = false; }
   void set_silent(bool silent) override { server.allowed = silent ? 0 : 1 << 30; }
@@ -112,9 +106,7 @@ struct RecordingRig : FrameSourceRig {
     options.realtime = realtime;
     source = open();
   }
-  std::unique_ptr<FrameSource> open() const override {
-    return std::make_unique<RecordingFrameSource>(options);
-  }
+  std::unique_ptr<FrameSource> open() const override { return open_recorded_frames(options); }
   TemporaryDirectory directory;
   RecordingFrameSourceOptions options;
 };

@@ -1,4 +1,4 @@
-// MjpegSource with a camera in this process, each of whose pictures tells its number by its grey
+// MJPEG over HTTP with a camera in this process, each of whose pictures tells its number by its grey
 // (mjpeg_server.h), and with servers that misbehave.
 
 #include "platform/video/mjpeg_source.h"
@@ -99,11 +99,11 @@ class MjpegSourceStyles : public ::testing::TestWithParam<Style> {};
 
 TEST_P(MjpegSourceStyles, DeliversEveryPictureInOrder) {
   const MjpegServer server(GetParam().style);
-  MjpegSource source(options_for(server.url()));
+  const auto source = open_mjpeg(options_for(server.url()));
   Frame frame;
   double last_s = 0;
   for (int i = 0; i < 20; ++i) {
-    ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk) << source->error();
     EXPECT_EQ(frame.stamp.frame, i);
     EXPECT_EQ(frame.stamp.restarted, i == 0);
     EXPECT_FALSE(frame.stamp.sender_time_s);
@@ -115,8 +115,8 @@ TEST_P(MjpegSourceStyles, DeliversEveryPictureInOrder) {
     EXPECT_GE(frame.stamp.receive_time_s, last_s);
     last_s = frame.stamp.receive_time_s;
   }
-  EXPECT_EQ(source.counters().damaged, 0);
-  EXPECT_EQ(source.counters().dropped, 0);
+  EXPECT_EQ(source->counters().damaged, 0);
+  EXPECT_EQ(source->counters().dropped, 0);
 }
 
 INSTANTIATE_TEST_SUITE_P(Cameras, MjpegSourceStyles, ::testing::ValuesIn(styles()),
@@ -126,11 +126,11 @@ TEST(MjpegSource, StampsTheFirstByteOfAPictureThatComesSlowly) {
   MjpegStyle style;
   style.pause_in_part = true;
   const MjpegServer server(style);
-  MjpegSource source(options_for(server.url()));
+  const auto source = open_mjpeg(options_for(server.url()));
   Frame frame;
   int early = 0;
   for (int i = 0; i < 10; ++i) {
-    ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk) << source->error();
     EXPECT_GE(frame.stamp.receive_time_s, server.sent(i).before_first_s);
     early += frame.stamp.receive_time_s < server.sent(i).before_rest_s ? 1 : 0;
   }
@@ -151,10 +151,10 @@ TEST_P(MjpegSourceLogin, LogsIn) {
   MjpegSourceOptions options = options_for(server.url());
   options.user = MjpegServer::kUser;
   options.password = MjpegServer::kPassword;
-  MjpegSource source(options);
+  const auto source = open_mjpeg(options);
   Frame frame;
   for (int i = 0; i < 3; ++i) {
-    ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk) << source->error();
   }
   EXPECT_EQ(server.refusals, 1);
 }
@@ -163,15 +163,15 @@ TEST_P(MjpegSourceLogin, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
   const MjpegServer server({}, GetParam());
   Frame frame;
   {
-    MjpegSource source(options_for(
+    const auto source = open_mjpeg(options_for(
         "http://us%20er:guess@127.0.0.1:" + std::to_string(server.port()) + "/video.cgi?x=y"));
-    EXPECT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
-    EXPECT_EQ(source.error(), server.url() + ": wrong user or password (401)");
-    EXPECT_EQ(source.read(frame, 0), ReadStatus::kFailed);
+    EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+    EXPECT_EQ(source->error(), server.url() + ": wrong user or password (401)");
+    EXPECT_EQ(source->read(frame, 0), ReadStatus::kFailed);
   }  // and its connection: the server has one at a time
-  MjpegSource anonymous(options_for(server.url()));
-  EXPECT_EQ(read_until(anonymous, frame, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(anonymous.error(), HasSubstr("wants a user and a password (401)"));
+  const auto anonymous = open_mjpeg(options_for(server.url()));
+  EXPECT_EQ(read_until(*anonymous, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(anonymous->error(), HasSubstr("wants a user and a password (401)"));
 }
 
 TEST_P(MjpegSourceLogin, LogsInAgainWhenTheCameraHasForgottenItsNonces) {
@@ -179,12 +179,12 @@ TEST_P(MjpegSourceLogin, LogsInAgainWhenTheCameraHasForgottenItsNonces) {
   MjpegSourceOptions options = options_for(server.url());
   options.user = MjpegServer::kUser;
   options.password = MjpegServer::kPassword;
-  MjpegSource source(options);
+  const auto source = open_mjpeg(options);
   Frame frame;
   for (int life = 0; life < 3; ++life) {
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
     server.hang_up = true;
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
     server.renew_nonce();
     server.hang_up = false;
   }
@@ -195,18 +195,18 @@ TEST_P(MjpegSourceLogin, TriesOnWhenACameraThatHasWorkedRefuses) {
   MjpegSourceOptions options = options_for(server.url());
   options.user = MjpegServer::kUser;
   options.password = MjpegServer::kPassword;
-  MjpegSource source(options);
+  const auto source = open_mjpeg(options);
   Frame frame;
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   server.refuse = true;
   server.hang_up = true;
   for (int i = 0; i < 4; ++i) {
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
   }
-  EXPECT_EQ(source.error(), server.url() + ": wrong user or password (401)");
+  EXPECT_EQ(source->error(), server.url() + ": wrong user or password (401)");
   server.hang_up = false;
   server.refuse = false;
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   EXPECT_TRUE(frame.stamp.restarted);
 }
 
@@ -217,9 +217,9 @@ INSTANTIATE_TEST_SUITE_P(Methods, MjpegSourceLogin,
 TEST(MjpegSource, FailsAtOnceOnAUrlItCannotUse) {
   Frame frame;
   for (const char* url : {"http://user:se@cret@camera/", "camera", "rtsp://camera/", ""}) {
-    MjpegSource source(options_for(url));
-    EXPECT_EQ(source.read(frame, 0), ReadStatus::kFailed) << url;
-    EXPECT_THAT(source.error(), AllOf(HasSubstr("://"), Not(HasSubstr("cret"))));
+    const auto source = open_mjpeg(options_for(url));
+    EXPECT_EQ(source->read(frame, 0), ReadStatus::kFailed) << url;
+    EXPECT_THAT(source->error(), AllOf(HasSubstr("://"), Not(HasSubstr("cret"))));
   }
 }
 
@@ -227,10 +227,10 @@ TEST(MjpegSource, TakesTheSendersClockWhileItAdvances) {
   MjpegStyle style;
   style.timestamp_step_s = 0.04;
   const MjpegServer server(style);
-  MjpegSource source(options_for(server.url()));
+  const auto source = open_mjpeg(options_for(server.url()));
   Frame frame;
   for (int i = 0; i < 5; ++i) {
-    ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk) << source->error();
     ASSERT_TRUE(frame.stamp.sender_time_s);
     EXPECT_NEAR(*frame.stamp.sender_time_s, 1000 + 0.04 * i, 1e-6);
   }
@@ -240,10 +240,10 @@ TEST(MjpegSource, ForgetsASendersClockThatStands) {
   MjpegStyle style;
   style.timestamp_step_s = 0;
   const MjpegServer server(style);
-  MjpegSource source(options_for(server.url()));
+  const auto source = open_mjpeg(options_for(server.url()));
   Frame frame;
   for (int i = 0; i < 5; ++i) {
-    ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk) << source->error();
     EXPECT_EQ(frame.stamp.sender_time_s.has_value(), i == 0);
   }
 }
@@ -255,7 +255,7 @@ class MjpegSourceClock : public ::testing::Test {
   void send(std::vector<std::vector<double>> connections) { connections_ = std::move(connections); }
   Frame read() {
     if (!source_) {
-      source_ = std::make_unique<MjpegSource>(options_for(server_));
+      source_ = open_mjpeg(options_for(server_));
     }
     Frame frame;
     EXPECT_EQ(read_until(*source_, frame, ReadStatus::kOk), ReadStatus::kOk) << source_->error();
@@ -282,7 +282,7 @@ class MjpegSourceClock : public ::testing::Test {
   std::size_t next_ = 0;
   std::string jpeg_ = MjpegServer::picture(0);
   RawServer server_{[this](int fd) { serve(fd); }};
-  std::unique_ptr<MjpegSource> source_;  // before the server, which waits for it
+  std::unique_ptr<FrameSource> source_;  // before the server, which waits for it
 };
 
 TEST_F(MjpegSourceClock, BeginsAnewWhereItIsSetBack) {
@@ -316,22 +316,23 @@ TEST_F(MjpegSourceClock, IsForgottenWhereItIsCoarserThanTheFrames) {
 
 TEST(MjpegSource, ReportsRefusedConnectionsAndTriesAgainUntilTheCameraIsThere) {
   MjpegServer server;
-  MjpegSource lost(options_for("http://user:secret@127.0.0.1:" + std::to_string(unused_port())));
+  const auto lost =
+      open_mjpeg(options_for("http://user:secret@127.0.0.1:" + std::to_string(unused_port())));
   Frame frame;
   for (int i = 0; i < 3; ++i) {
-    ASSERT_EQ(read_until(lost, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-    EXPECT_THAT(lost.error(), AllOf(StartsWith("http://127.0.0.1:"), HasSubstr("connect"),
-                                    Not(HasSubstr("secret"))));
+    ASSERT_EQ(read_until(*lost, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_THAT(lost->error(), AllOf(StartsWith("http://127.0.0.1:"), HasSubstr("connect"),
+                                     Not(HasSubstr("secret"))));
   }
-  MjpegSource source(options_for(server.url()));
-  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+  const auto source = open_mjpeg(options_for(server.url()));
+  ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk) << source->error();
   server.hang_up = true;
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("ended the stream"));
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("ended the stream"));
   server.hang_up = false;
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk);
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk);
   EXPECT_TRUE(frame.stamp.restarted);
-  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk);
+  ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk);
   EXPECT_FALSE(frame.stamp.restarted);
 }
 
@@ -353,11 +354,11 @@ TEST(MjpegSource, SaysWhatTheAnswerIsInPlaceOfAStream) {
                                 "\r\nContent-Length: 5\r\nConnection: close\r\n\r\nhello");
       }
     });
-    MjpegSource source(options_for(server));
+    const auto source = open_mjpeg(options_for(server));
     Frame frame;
     for (int i = 0; i < 2; ++i) {
-      ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-      EXPECT_THAT(source.error(), HasSubstr(answer.error));
+      ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+      EXPECT_THAT(source->error(), HasSubstr(answer.error));
     }
   }
 }
@@ -384,11 +385,11 @@ TEST(MjpegSource, SurvivesConnectionsThatBreakAtAnyPoint) {
       RawServer::send(fd, part(jpeg));
     }
   });
-  MjpegSource source(options_for(server));
+  const auto source = open_mjpeg(options_for(server));
   Frame frame;
   int lost = 0;
   for (int good = 0; good < 3;) {
-    const ReadStatus status = source.read(frame, kDeadline_s);
+    const ReadStatus status = source->read(frame, kDeadline_s);
     ASSERT_TRUE(status == ReadStatus::kOk || status == ReadStatus::kDisconnected);
     if (status == ReadStatus::kOk) {
       EXPECT_TRUE(frame.stamp.restarted);
@@ -398,7 +399,7 @@ TEST(MjpegSource, SurvivesConnectionsThatBreakAtAnyPoint) {
     }
   }
   EXPECT_GE(lost, 3);  // reports that follow each other become one
-  EXPECT_EQ(source.counters().damaged, 0);
+  EXPECT_EQ(source->counters().damaged, 0);
 }
 
 TEST(MjpegSource, SkipsAndCountsDamagedPicturesAndPassesOverText) {
@@ -418,12 +419,12 @@ TEST(MjpegSource, SkipsAndCountsDamagedPicturesAndPassesOverText) {
   });
   MjpegSourceOptions options = options_for(server);
   options.max_picture_bytes = 50'000;
-  MjpegSource source(options);
+  const auto source = open_mjpeg(options);
   Frame frame;
-  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_EQ(frame.stamp.frame, 0);
   EXPECT_NEAR(grey_of(frame), MjpegServer::grey_of(3), kGreyTolerance);
-  EXPECT_EQ(source.counters().damaged, 4);
+  EXPECT_EQ(source->counters().damaged, 4);
 }
 
 TEST(MjpegSource, ReportsPicturesThatAreAllDamaged) {
@@ -436,21 +437,21 @@ TEST(MjpegSource, ReportsPicturesThatAreAllDamaged) {
       }
     }
   });
-  MjpegSource source(options_for(server));
+  const auto source = open_mjpeg(options_for(server));
   Frame frame;
-  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("30 pictures in a row cannot be used"));
-  EXPECT_THAT(source.error(), HasSubstr("damaged JPEG"));
+  ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("30 pictures in a row cannot be used"));
+  EXPECT_THAT(source->error(), HasSubstr("damaged JPEG"));
 }
 
 TEST(MjpegSource, GivesUpAConnectionWithoutAnAnswer) {
   RawServer server([&server](int fd) { server.stay_silent(fd); });
   MjpegSourceOptions options = options_for(server);
   options.timeout_s = 0.05;
-  MjpegSource source(options);
+  const auto source = open_mjpeg(options);
   Frame frame;
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("no answer within 50 ms"));
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("no answer within 50 ms"));
 }
 
 TEST(MjpegSource, GivesUpAStreamInWhichNoPictureEnds) {
@@ -463,19 +464,19 @@ TEST(MjpegSource, GivesUpAStreamInWhichNoPictureEnds) {
   });
   MjpegSourceOptions options = options_for(server);
   options.timeout_s = 0.2;
-  MjpegSource source(options);
+  const auto source = open_mjpeg(options);
   Frame frame;
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("no whole picture within 200 ms"));
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("no whole picture within 200 ms"));
 }
 
 TEST(MjpegSource, DropsTheOldestPicturesWhenTheReaderIsSlow) {
   const MjpegServer server;
-  MjpegSource source(options_for(server.url()));
+  const auto source = open_mjpeg(options_for(server.url()));
   Frame frame;
-  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk);
-  ASSERT_TRUE(eventually([&] { return source.counters().dropped >= 10; }));
-  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk);
+  ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk);
+  ASSERT_TRUE(eventually([&] { return source->counters().dropped >= 10; }));
+  ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk);
   EXPECT_EQ(frame.stamp.frame, 1);
   EXPECT_GE(frame.stamp.receive_time_s, server.sent(11).before_first_s);
 }
@@ -487,13 +488,13 @@ TEST(MjpegSource, KeepsABoundedNumberOfPicturesAndReportsWhenNobodyReads) {
       RawServer::send(fd, stream_head() + part(jpeg));
     }
   });
-  MjpegSource source(options_for(server));
+  const auto source = open_mjpeg(options_for(server));
   Frame frame;
-  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
-  ASSERT_TRUE(eventually([&] { return source.counters().dropped >= 100; }));
+  ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk) << source->error();
+  ASSERT_TRUE(eventually([&] { return source->counters().dropped >= 100; }));
   ReadStatus before = ReadStatus::kOk;
   for (int i = 0; i < 20; ++i) {  // all from the queue
-    const ReadStatus status = source.read(frame, kDeadline_s);
+    const ReadStatus status = source->read(frame, kDeadline_s);
     ASSERT_TRUE(status == ReadStatus::kOk || status == ReadStatus::kDisconnected);
     EXPECT_TRUE(status == ReadStatus::kOk || before == ReadStatus::kOk) << "two reports in a row";
     EXPECT_TRUE(status != ReadStatus::kOk || i == 0 || frame.stamp.restarted);
@@ -511,10 +512,10 @@ TEST(MjpegSource, CopiesThePicturesOverReconnections) {
   options.decode = false;
   options.copy_to = directory.path() + "/video.mkv";
   {
-    MjpegSource source(options);
+    const auto source = open_mjpeg(options);
     Frame frame;
     for (int i = 0; i < 10; ++i) {
-      ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kOk) << source.error();
+      ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk) << source->error();
       EXPECT_EQ(frame.luma, nullptr);
       EXPECT_FALSE(frame.decode_s);
       EXPECT_EQ(frame.width, MjpegServer::kWidth);
@@ -522,50 +523,50 @@ TEST(MjpegSource, CopiesThePicturesOverReconnections) {
     }
     server.hang_up = true;
     ASSERT_TRUE(eventually([&] {
-      const ReadStatus status = source.read(frame, 0);
+      const ReadStatus status = source->read(frame, 0);
       if (status == ReadStatus::kOk) {
         EXPECT_TRUE(writer.add_frame(frame.stamp, &error)) << error;
       }
       return status == ReadStatus::kDisconnected;
     }));
     server.hang_up = false;
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk);
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk);
     ASSERT_TRUE(writer.add_frame(frame.stamp, &error)) << error;
   }
   RecordingFrameSourceOptions recorded;
   recorded.directory = directory.path();
-  RecordingFrameSource recording(recorded);
+  const auto recording = open_recorded_frames(recorded);
   Frame frame;
   int frames = 0;
-  for (; recording.read(frame, 0) == ReadStatus::kOk; ++frames) {
+  for (; recording->read(frame, 0) == ReadStatus::kOk; ++frames) {
     EXPECT_NEAR(grey_of(frame), MjpegServer::grey_of(frames), kGreyTolerance);
   }
   EXPECT_GE(frames, 11);
-  EXPECT_EQ(recording.missing_frames(), 0);
+  EXPECT_EQ(recording->missing_frames(), 0);
 }
 
 TEST(MjpegSource, StopEndsAReadThatGetsNoAnswer) {
   RawServer server([&server](int fd) { server.stay_silent(fd); });
-  MjpegSource source(options_for(server));
+  const auto source = open_mjpeg(options_for(server));
   std::thread stopper([&] {
     eventually([&] { return server.connections() > 0; });
-    source.stop();
+    source->stop();
   });
   Frame frame;
-  EXPECT_EQ(source.read(frame, kNever_s), ReadStatus::kStopped);
+  EXPECT_EQ(source->read(frame, kNever_s), ReadStatus::kStopped);
   stopper.join();
 }
 
 TEST(MjpegSource, StopEndsAPause) {
   MjpegSourceOptions options = options_for("http://127.0.0.1:" + std::to_string(unused_port()));
   options.max_backoff_s = kNever_s;
-  MjpegSource source(options);
+  const auto source = open_mjpeg(options);
   Frame frame;
-  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kDisconnected);
-  std::thread stopper([&] { source.stop(); });
+  ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kDisconnected);
+  std::thread stopper([&] { source->stop(); });
   ReadStatus status = ReadStatus::kDisconnected;
   while (status == ReadStatus::kDisconnected) {
-    status = source.read(frame, kNever_s);
+    status = source->read(frame, kNever_s);
   }
   EXPECT_EQ(status, ReadStatus::kStopped);
   stopper.join();

@@ -39,27 +39,27 @@ struct Recording {
   }
 
   std::vector<int> greys_until_end() const {
-    RecordingFrameSource source(options());
+    const auto source = open_recorded_frames(options());
     Frame frame;
     std::vector<int> greys;
-    while (source.read(frame, 0) == ReadStatus::kOk) {
+    while (source->read(frame, 0) == ReadStatus::kOk) {
       greys.push_back(frame.luma[15 * frame.stride + 31]);
       EXPECT_EQ(frame.stamp.sequence, 7 * frame.stamp.frame);
     }
-    EXPECT_EQ(source.read(frame, 0), ReadStatus::kEnd) << source.error();
+    EXPECT_EQ(source->read(frame, 0), ReadStatus::kEnd) << source->error();
     return greys;
   }
 
   std::string error() const {
-    RecordingFrameSource source(options());
+    const auto source = open_recorded_frames(options());
     Frame frame;
     ReadStatus status = ReadStatus::kOk;
     while (status == ReadStatus::kOk) {
-      status = source.read(frame, 0);
+      status = source->read(frame, 0);
     }
     EXPECT_EQ(status, ReadStatus::kFailed);
-    EXPECT_EQ(source.read(frame, 0), ReadStatus::kFailed);
-    return source.error();
+    EXPECT_EQ(source->read(frame, 0), ReadStatus::kFailed);
+    return source->error();
   }
 
   TemporaryDirectory directory;
@@ -97,17 +97,17 @@ TEST(RecordingFrameSource, EndsWhereACutOffVideoEndsAndTellsHowManyFramesAreMiss
   const std::string path = recording.directory.path() + "/video.mkv";
   write_video(path, 32, 16, 20, 0);
   std::filesystem::resize_file(path, std::filesystem::file_size(path) * 2 / 3);
-  RecordingFrameSource source(recording.options());
+  const auto source = open_recorded_frames(recording.options());
   Frame frame;
   std::int64_t frames = 0;
-  while (source.read(frame, 0) == ReadStatus::kOk) {
+  while (source->read(frame, 0) == ReadStatus::kOk) {
     EXPECT_NEAR(frame.luma[0], 10 * static_cast<int>(frames) + 20, 3);
     ++frames;
   }
-  EXPECT_EQ(source.read(frame, 0), ReadStatus::kEnd) << source.error();
+  EXPECT_EQ(source->read(frame, 0), ReadStatus::kEnd) << source->error();
   EXPECT_GT(frames, 0);
   EXPECT_LT(frames, 20);
-  EXPECT_EQ(frames + source.missing_frames() + source.damaged_frames(), 20);
+  EXPECT_EQ(frames + source->missing_frames() + source->damaged_frames(), 20);
 }
 
 TEST(RecordingFrameSource, EndsWithTheTableWhenTheVideoIsLonger) {
@@ -123,26 +123,26 @@ TEST(RecordingFrameSource, SkipsAndCountsAPictureThatCannotBeDecoded) {
   recording.directory.write("frames/000001.jpg", jpeg.substr(0, jpeg.size() / 2));
   recording.directory.write("frames/000002.jpg", "");
   recording.directory.write("frames/000003.jpg", jpeg);
-  RecordingFrameSource source(recording.options());
+  const auto source = open_recorded_frames(recording.options());
   Frame frame;
-  ASSERT_EQ(source.read(frame, 0), ReadStatus::kOk) << source.error();
-  ASSERT_EQ(source.read(frame, 0), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(source->read(frame, 0), ReadStatus::kOk) << source->error();
+  ASSERT_EQ(source->read(frame, 0), ReadStatus::kOk) << source->error();
   EXPECT_EQ(frame.stamp.frame, 3);
-  EXPECT_EQ(source.read(frame, 0), ReadStatus::kEnd);
-  EXPECT_EQ(source.damaged_frames(), 2);
+  EXPECT_EQ(source->read(frame, 0), ReadStatus::kEnd);
+  EXPECT_EQ(source->damaged_frames(), 2);
 }
 
 TEST(RecordingFrameSource, YieldsStampsAloneFromTracksOrWhenNotToDecode) {
   const Recording recording(3);
   recording.directory.write("tracks.csv", "frame,landmark,u_px,v_px,sigma_px\n");
-  RecordingFrameSource tracks(recording.options());
+  const auto tracks = open_recorded_frames(recording.options());
   std::filesystem::create_directory(recording.directory.path() + "/frames");
   RecordingFrameSourceOptions options = recording.options();
   options.decode = false;
-  RecordingFrameSource pictures(options);
-  for (RecordingFrameSource* source : {&tracks, &pictures}) {
+  const auto pictures = open_recorded_frames(options);
+  for (RecordingFrameSource* source : {tracks.get(), pictures.get()}) {
     Frame frame;
-    if (source == &tracks) {
+    if (source == tracks.get()) {
       std::filesystem::remove(recording.directory.path() + "/frames");
     }
     for (int i = 0; i < 3; ++i) {
@@ -200,14 +200,14 @@ TEST(RecordingFrameSource, KeepsThePaceOfTheRecordingWhenAskedToAndStops) {
   recording.directory.write("tracks.csv", "frame,landmark,u_px,v_px,sigma_px\n");
   RecordingFrameSourceOptions options = recording.options();
   options.realtime = true;
-  RecordingFrameSource source(options);
+  const auto source = open_recorded_frames(options);
   Frame frame;
-  ASSERT_EQ(source.read(frame, 0), ReadStatus::kOk) << source.error();
-  ASSERT_EQ(source.read(frame, kNever_s), ReadStatus::kOk);
+  ASSERT_EQ(source->read(frame, 0), ReadStatus::kOk) << source->error();
+  ASSERT_EQ(source->read(frame, kNever_s), ReadStatus::kOk);
   EXPECT_EQ(frame.stamp.receive_time_s, 100.02);
-  EXPECT_EQ(source.read(frame, 0.01), ReadStatus::kTimeout);
-  std::thread stopper([&source] { source.stop(); });
-  EXPECT_EQ(source.read(frame, kNever_s), ReadStatus::kStopped);
+  EXPECT_EQ(source->read(frame, 0.01), ReadStatus::kTimeout);
+  std::thread stopper([&source] { source->stop(); });
+  EXPECT_EQ(source->read(frame, kNever_s), ReadStatus::kStopped);
   stopper.join();
 }
 

@@ -1,4 +1,4 @@
-// RtpSource with plain RTP: a sender in this process, each of whose pictures tells its number by its
+// Plain RTP: a sender in this process, each of whose pictures tells its number by its
 // grey (rtp_sender.h).
 
 #include "platform/video/rtp_source.h"
@@ -43,14 +43,14 @@ RtpSourceOptions options_for(int port, Codec codec) {
 }
 
 // From here on no packet is lost.
-void listen(RtpSource& source, int port) {
+void listen(FrameSource& source, int port) {
   Frame frame;
   ASSERT_EQ(source.read(frame, 0), ReadStatus::kTimeout);
   ASSERT_TRUE(eventually([port] { return rtp_port_taken(port); }));
 }
 
 // Sends until the source says something.
-ReadStatus next(RtpSource& source, RtpSender& sender, Frame& frame) {
+ReadStatus next(FrameSource& source, RtpSender& sender, Frame& frame) {
   const double end_s = monotonic_now_s() + kDeadline_s;
   ReadStatus status = ReadStatus::kTimeout;
   while (status == ReadStatus::kTimeout && monotonic_now_s() < end_s) {
@@ -88,14 +88,14 @@ INSTANTIATE_TEST_SUITE_P(Codecs, RtpSourceWith, ::testing::Values(Codec::kMjpeg,
                          ::testing::PrintToStringParamName());
 
 TEST_P(RtpSourceWith, DeliversEveryPictureWithItsOwnStamp) {
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   RtpSender sender(GetParam(), port_);
   FrameStamp first;
   FrameStamp last;
   for (int i = 0; i < 40; ++i) {
     Frame frame;
-    ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
     first = i == 0 ? frame.stamp : first;
     EXPECT_EQ(frame.stamp.frame, i);
     EXPECT_EQ(frame.stamp.restarted, i == 0);
@@ -109,31 +109,31 @@ TEST_P(RtpSourceWith, DeliversEveryPictureWithItsOwnStamp) {
     EXPECT_GE(frame.stamp.receive_time_s, last.receive_time_s);
     last = frame.stamp;
   }
-  EXPECT_EQ(source.counters().damaged, 0);
-  EXPECT_EQ(source.counters().dropped, 0);
+  EXPECT_EQ(source->counters().damaged, 0);
+  EXPECT_EQ(source->counters().dropped, 0);
 }
 
 TEST_P(RtpSourceWith, DeliversAPictureWithoutWaitingForTheNext) {
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   RtpSender sender(GetParam(), port_);
   Frame frame;
   // Where an H.264 stream begins, only the second picture shows that the first was whole.
-  ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
   while (frame.stamp.frame + 1 < sender.sent()) {
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   }
   for (int i = 0; i < 30; ++i) {
     sender.send();
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
     EXPECT_EQ(frame.stamp.frame + 1, sender.sent());
     EXPECT_NEAR(grey_of(frame), RtpSender::grey_of(frame.stamp.frame), kGreyTolerance);
   }
 }
 
 TEST_P(RtpSourceWith, StampsAPictureOnItsOwnArrival) {
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   RtpSender sender(GetParam(), port_);
   std::vector<double> sent_s;
   int on_time = 0;
@@ -141,7 +141,7 @@ TEST_P(RtpSourceWith, StampsAPictureOnItsOwnArrival) {
     Frame frame;
     sent_s.push_back(monotonic_now_s());
     sender.send();
-    if (source.read(frame, 0.05) == ReadStatus::kOk) {
+    if (source->read(frame, 0.05) == ReadStatus::kOk) {
       const auto number = static_cast<std::size_t>(frame.stamp.frame);
       ASSERT_LT(number, sent_s.size());
       EXPECT_GE(frame.stamp.receive_time_s, sent_s[number]);
@@ -158,15 +158,15 @@ TEST_P(RtpSourceWith, ReadsASessionDescription) {
   directory.write("camera.sdp", sender.sdp());
   options_.url = directory.path() + "/camera.sdp";
   options_.format.clear();
-  RtpSource source(options_);
-  EXPECT_EQ(source.name(), options_.url);
+  const auto source = open_rtp(options_);
+  EXPECT_EQ(source->name(), options_.url);
   Frame frame;
-  EXPECT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+  EXPECT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
   EXPECT_EQ(frame.width, RtpSender::kWidth);
 }
 
 // Sends picture after picture through the relay until the source gives the next one.
-bool next(RtpSource& source, RtpSender& sender, RtpRelay& relay, Frame& frame) {
+bool next(FrameSource& source, RtpSender& sender, RtpRelay& relay, Frame& frame) {
   return eventually([&] {
     sender.send();
     relay.forward();
@@ -188,8 +188,8 @@ INSTANTIATE_TEST_SUITE_P(FirstTimestamps, RtpSourceTimestamps,
 TEST_P(RtpSourceTimestamps, AreUnwrappedAndGiveUtcFromTheFirstReportOn) {
   const auto [codec, first_timestamp, report_first] = GetParam();
   const int port = free_rtp_port();
-  RtpSource source(options_for(port, codec));
-  listen(source, port);
+  const auto source = open_rtp(options_for(port, codec));
+  listen(*source, port);
   RtpRelay relay(port);
   relay.begin_at(static_cast<std::uint32_t>(first_timestamp));
   RtpSender sender(codec, relay.port());
@@ -203,7 +203,7 @@ TEST_P(RtpSourceTimestamps, AreUnwrappedAndGiveUtcFromTheFirstReportOn) {
   int with_utc = 0;
   for (int i = 0; i < 40; ++i) {
     Frame frame;
-    ASSERT_TRUE(next(source, sender, relay, frame)) << source.error();
+    ASSERT_TRUE(next(*source, sender, relay, frame)) << source->error();
     first = i == 0 ? frame.stamp : first;
     EXPECT_EQ(frame.stamp.frame, i);
     EXPECT_NEAR(grey_of(frame), RtpSender::grey_of(i), kGreyTolerance);
@@ -216,12 +216,12 @@ TEST_P(RtpSourceTimestamps, AreUnwrappedAndGiveUtcFromTheFirstReportOn) {
     if (i == 5) report();
   }
   EXPECT_GE(with_utc, 25) << "of them some before a wrap, all after it";
-  EXPECT_EQ(source.counters().damaged, 0);
+  EXPECT_EQ(source->counters().damaged, 0);
 }
 
 TEST_P(RtpSourceWith, GivesNoUtcOfReportsOfASenderWithoutAClock) {
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   RtpRelay relay(port_);
   RtpSender sender(GetParam(), relay.port());
   // Unknown, and the time since the sender began (RFC 3550, 6.4.1).
@@ -229,15 +229,15 @@ TEST_P(RtpSourceWith, GivesNoUtcOfReportsOfASenderWithoutAClock) {
     for (int i = 0; i < 10; ++i) {
       Frame frame;
       relay.report(ntp, 90'000);
-      ASSERT_TRUE(next(source, sender, relay, frame)) << source.error();
+      ASSERT_TRUE(next(*source, sender, relay, frame)) << source->error();
       EXPECT_EQ(frame.stamp.sender_utc_s, std::nullopt);
     }
   }
 }
 
 TEST_P(RtpSourceWith, TakesTheCaptureTimeFromTheOnvifExtension) {
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   RtpRelay relay(port_);
   RtpSender sender(GetParam(), relay.port());
   for (int i = 0; i < 20;) {
@@ -248,7 +248,7 @@ TEST_P(RtpSourceWith, TakesTheCaptureTimeFromTheOnvifExtension) {
           with_capture_time(packets.front(), 1.7e9 + static_cast<double>(number) / 16);
     });
     Frame frame;
-    while (source.read(frame, 0.05) == ReadStatus::kOk) {
+    while (source->read(frame, 0.05) == ReadStatus::kOk) {
       EXPECT_EQ(frame.stamp.sender_utc_s, 1.7e9 + i / 16.0);
       EXPECT_NEAR(grey_of(frame), RtpSender::grey_of(i++), kGreyTolerance);
     }
@@ -256,8 +256,8 @@ TEST_P(RtpSourceWith, TakesTheCaptureTimeFromTheOnvifExtension) {
 }
 
 TEST_P(RtpSourceWith, PutsPacketsInOrderThatOvertookEachOther) {
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   RtpRelay relay(port_);
   RtpSender sender(GetParam(), relay.port());
   int frames = 0;
@@ -275,12 +275,44 @@ TEST_P(RtpSourceWith, PutsPacketsInOrderThatOvertookEachOther) {
       });
     }
     Frame frame;
-    while (source.read(frame, 0.02) == ReadStatus::kOk) {
+    while (source->read(frame, 0.02) == ReadStatus::kOk) {
       EXPECT_NEAR(grey_of(frame), RtpSender::grey_of(frames++), kGreyTolerance);
     }
   }
   EXPECT_GT(overtaken, 5);
-  EXPECT_EQ(source.counters().damaged, 0);
+  EXPECT_EQ(source->counters().damaged, 0);
+}
+
+// However long before it the first ones came: an encoder may send each slice as soon as it is made.
+TEST(RtpSourceSlices, LetAPictureBeStampedOnTheArrivalOfItsLastPacket) {
+  constexpr int kSmallPacket = 40;  // bytes: several for each picture
+  const int port = free_rtp_port();
+  const auto source = open_rtp(options_for(port, Codec::kH264));
+  listen(*source, port);
+  RtpRelay relay(port);
+  RtpSender sender(Codec::kH264, relay.port(), 1, kSmallPacket);
+  Frame frame;
+  for (int i = 0; i < 5; ++i) {
+    ASSERT_TRUE(next(*source, sender, relay, frame)) << source->error();
+  }
+  while (frame.stamp.frame + 1 < sender.sent()) {
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  }
+  for (int i = 0; i < 5; ++i) {
+    sender.send();
+    RtpRelay::Packet last;
+    relay.forward([&last](RtpRelay::Packets& packets) {
+      ASSERT_GE(packets.size(), 2U);
+      last = packets.back();
+      packets.pop_back();
+    });
+    ASSERT_EQ(source->read(frame, 0.05), ReadStatus::kTimeout);
+    const double before_the_last_s = monotonic_now_s();
+    relay.forward([&last](RtpRelay::Packets& packets) { packets = {last}; });
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+    EXPECT_EQ(frame.stamp.frame + 1, sender.sent());
+    EXPECT_GE(frame.stamp.receive_time_s, before_the_last_s);
+  }
 }
 
 TEST_P(RtpSourceWith, BeginsAtAKeyFrame) {
@@ -288,49 +320,49 @@ TEST_P(RtpSourceWith, BeginsAtAKeyFrame) {
   for (int i = 0; i < 3; ++i) {
     sender.send();
   }
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   Frame frame;
-  ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
   const int number = GetParam() == Codec::kMjpeg ? 3 : 10;
   EXPECT_NEAR(grey_of(frame), RtpSender::grey_of(number), kGreyTolerance);
   EXPECT_EQ(frame.stamp.frame, 0);
-  EXPECT_EQ(source.counters().damaged, 0);
+  EXPECT_EQ(source->counters().damaged, 0);
 }
 
 TEST_P(RtpSourceWith, SkipsAndCountsADamagedPicture) {
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   RtpSender sender(GetParam(), port_);
   Frame frame;
-  ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
   const FrameStamp first = frame.stamp;
   const std::int64_t damaged = sender.sent();
   sender.send(GetParam() == Codec::kMjpeg ? 0.9 : 0.6);  // JPEG: within the picture, not its header
   std::set<std::int64_t> numbers;
   for (int i = 0; i < 25; ++i) {
-    ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
     numbers.insert(std::llround(number_of(frame, first)));
   }
   EXPECT_EQ(numbers.count(damaged), 0U);
-  EXPECT_GE(source.counters().damaged, 1);
+  EXPECT_GE(source->counters().damaged, 1);
   EXPECT_EQ(frame.stamp.frame, 25);
 }
 
 TEST_P(RtpSourceWith, DropsWhatASlowReaderLeavesAndGoesOnAtAKeyFrame) {
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   RtpSender sender(GetParam(), port_);
   Frame frame;
-  ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
   const FrameStamp first = frame.stamp;
   ASSERT_TRUE(eventually([&] {
     sender.send();
-    return source.counters().dropped > 0;
+    return source->counters().dropped > 0;
   }));
   std::int64_t last = -1;
   for (int i = 1; i <= 60; ++i) {
-    ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
     EXPECT_EQ(frame.stamp.frame, i);
     const std::int64_t number = std::llround(number_of(frame, first));
     EXPECT_GT(number, last);
@@ -341,71 +373,71 @@ TEST_P(RtpSourceWith, DropsWhatASlowReaderLeavesAndGoesOnAtAKeyFrame) {
 
 TEST_P(RtpSourceWith, BeginsAnewWithAnotherSender) {
   options_.timeout_s = 1;
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   Frame frame;
   {
     RtpSender sender(GetParam(), port_);
     for (int i = 0; i < 5; ++i) {
-      ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+      ASSERT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
     }
   }
   RtpSender sender(GetParam(), port_, 1000);
   ReadStatus status = ReadStatus::kOk;
   while (status == ReadStatus::kOk) {
-    status = next(source, sender, frame);
+    status = next(*source, sender, frame);
   }
   ASSERT_EQ(status, ReadStatus::kDisconnected);
   const std::int64_t frames = frame.stamp.frame;
-  ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
   EXPECT_TRUE(frame.stamp.restarted);
   EXPECT_EQ(frame.stamp.frame, frames + 1);
 }
 
 TEST_P(RtpSourceWith, ReportsThatNothingComesAnyMore) {
   options_.timeout_s = 0.1;
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   Frame frame;
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_EQ(source.error(),
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_EQ(source->error(),
             "rtp://0.0.0.0:" + std::to_string(port_) + "/: nothing received for 0.1 s");
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
 }
 
 TEST_P(RtpSourceWith, ReportsThatPacketsOfAnotherFormatComeOnly) {
   options_.timeout_s = 0.3;
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   RtpSender sender(GetParam() == Codec::kMjpeg ? Codec::kH264 : Codec::kMjpeg, port_);
   Frame frame;
-  ASSERT_EQ(next(source, sender, frame), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), AllOf(HasSubstr("packets came, but no whole picture for 0.3 s"),
-                                    HasSubstr("is what comes " + options_.format + "?")));
+  ASSERT_EQ(next(*source, sender, frame), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), AllOf(HasSubstr("packets came, but no whole picture for 0.3 s"),
+                                     HasSubstr("is what comes " + options_.format + "?")));
 }
 
 TEST_P(RtpSourceWith, ReportsThatOnlyReportsComeAnyMore) {
   options_.timeout_s = 1;
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   RtpRelay relay(port_);
   RtpSender sender(GetParam(), port_);
   Frame frame;
-  ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
   EXPECT_TRUE(eventually([&] {
     relay.report(0, 90'000);
-    return source.read(frame, 0.02) == ReadStatus::kDisconnected;
+    return source->read(frame, 0.02) == ReadStatus::kDisconnected;
   }));
-  EXPECT_THAT(source.error(), HasSubstr(": packets came, but no whole picture for 1 s"));
-  EXPECT_THAT(source.error(), Not(HasSubstr("?"))) << "the format was right";
+  EXPECT_THAT(source->error(), HasSubstr(": packets came, but no whole picture for 1 s"));
+  EXPECT_THAT(source->error(), Not(HasSubstr("?"))) << "the format was right";
 }
 
 TEST(RtpSourceKeyFrames, MayComeSlowerThanATimeoutWhileOtherPicturesCome) {
   const int port = free_rtp_port();
   RtpSourceOptions options = options_for(port, Codec::kH264);
   options.timeout_s = 1;
-  RtpSource source(options);
-  listen(source, port);
+  const auto source = open_rtp(options);
+  listen(*source, port);
   RtpRelay relay(port);
   RtpSender sender(Codec::kH264, relay.port());
   const auto pass = [&](bool with_key_frames) {
@@ -419,11 +451,11 @@ TEST(RtpSourceKeyFrames, MayComeSlowerThanATimeoutWhileOtherPicturesCome) {
   const double end_s = monotonic_now_s() + 2 * options.timeout_s;
   while (monotonic_now_s() < end_s) {
     pass(false);
-    ASSERT_EQ(source.read(frame, 0.02), ReadStatus::kTimeout) << source.error();
+    ASSERT_EQ(source->read(frame, 0.02), ReadStatus::kTimeout) << source->error();
   }
   EXPECT_TRUE(eventually([&] {
     pass(true);
-    return source.read(frame, 0.02) == ReadStatus::kOk;
+    return source->read(frame, 0.02) == ReadStatus::kOk;
   }));
 }
 
@@ -433,22 +465,22 @@ TEST(RtpSourceKeyFrames, AreNotWaitedForWithoutEnd) {
   options.key_frame_timeout_s = 0;
   RtpSender sender(Codec::kH264, port);
   sender.send();
-  RtpSource source(options);
-  listen(source, port);
+  const auto source = open_rtp(options);
+  listen(*source, port);
   Frame frame;
-  EXPECT_EQ(next(source, sender, frame), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("pictures came, but no key frame for 0 s; set a shorter"));
+  EXPECT_EQ(next(*source, sender, frame), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("pictures came, but no key frame for 0 s; set a shorter"));
 }
 
 TEST_P(RtpSourceWith, DeliversStampsAndSizeWithoutDecoding) {
   options_.decode = false;
-  RtpSource source(options_);
-  listen(source, port_);
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
   RtpSender sender(GetParam(), port_);
   FrameStamp first;
   for (int i = 0; i < 20; ++i) {
     Frame frame;
-    ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
     first = i == 0 ? frame.stamp : first;
     EXPECT_EQ(frame.luma, nullptr);
     EXPECT_FALSE(frame.decode_s);
@@ -459,7 +491,7 @@ TEST_P(RtpSourceWith, DeliversStampsAndSizeWithoutDecoding) {
 }
 
 TEST_P(RtpSourceWith, KeepsAPictureAliveBeyondItself) {
-  auto source = std::make_unique<RtpSource>(options_);
+  auto source = open_rtp(options_);
   listen(*source, port_);
   RtpSender sender(GetParam(), port_);
   std::vector<Frame> frames(10);
@@ -478,19 +510,19 @@ void expect_recording(const std::string& directory, const std::vector<double>& g
                       std::size_t may_be_missing) {
   RecordingFrameSourceOptions options;
   options.directory = directory;
-  RecordingFrameSource recording(options);
+  const auto recording = open_recorded_frames(options);
   Frame frame;
   std::size_t i = 0;
-  while (recording.read(frame, 0) == ReadStatus::kOk) {
+  while (recording->read(frame, 0) == ReadStatus::kOk) {
     ASSERT_LT(i, greys.size());
     EXPECT_EQ(frame.stamp.frame, static_cast<std::int64_t>(i));
     EXPECT_NEAR(grey_of(frame), greys[i], kGreyTolerance);
     ++i;
   }
-  ASSERT_EQ(recording.read(frame, 0), ReadStatus::kEnd) << recording.error();
+  ASSERT_EQ(recording->read(frame, 0), ReadStatus::kEnd) << recording->error();
   EXPECT_GE(i + may_be_missing, greys.size());
-  EXPECT_EQ(recording.missing_frames(), static_cast<std::int64_t>(greys.size() - i));
-  EXPECT_EQ(recording.damaged_frames(), 0);
+  EXPECT_EQ(recording->missing_frames(), static_cast<std::int64_t>(greys.size() - i));
+  EXPECT_EQ(recording->damaged_frames(), 0);
 }
 
 class RtpSourceCopy : public RtpSourceWith {
@@ -514,12 +546,12 @@ TEST_P(RtpSourceCopy, HoldsTheFramesDeliveredAlsoAfterAKill) {
   std::string error;
   std::vector<double> greys;
   {
-    RtpSource source(options_);
-    listen(source, port_);
+    const auto source = open_rtp(options_);
+    listen(*source, port_);
     RtpSender sender(GetParam(), port_);
     for (int i = 0; i < 40; ++i) {
       Frame frame;
-      ASSERT_EQ(next(source, sender, frame), ReadStatus::kOk) << source.error();
+      ASSERT_EQ(next(*source, sender, frame), ReadStatus::kOk) << source->error();
       ASSERT_TRUE(writer_.add_frame(frame.stamp, &error)) << error;
       greys.push_back(RtpSender::grey_of(i));
     }
@@ -533,19 +565,19 @@ TEST_P(RtpSourceCopy, GoesOnOverAReconnection) {
   std::string error;
   std::vector<double> greys;
   {
-    RtpSource source(options_);
-    listen(source, port_);
+    const auto source = open_rtp(options_);
+    listen(*source, port_);
     auto sender = std::make_unique<RtpSender>(GetParam(), port_);
     int connections = 0;
     while (greys.size() < 40) {
       Frame frame;
-      const ReadStatus status = next(source, *sender, frame);
+      const ReadStatus status = next(*source, *sender, frame);
       if (status == ReadStatus::kOk) {
         ASSERT_TRUE(writer_.add_frame(frame.stamp, &error)) << error;
         greys.push_back(grey_of(frame));
         connections += frame.stamp.restarted ? 1 : 0;
       } else {
-        ASSERT_EQ(status, ReadStatus::kDisconnected) << source.error();
+        ASSERT_EQ(status, ReadStatus::kDisconnected) << source->error();
       }
       if (greys.size() == 20) {
         sender = std::make_unique<RtpSender>(GetParam(), port_, 1000 * (connections + 1));
@@ -561,13 +593,13 @@ TEST(RtpSourceCopyFailure, EndsTheSourceWithTheReason) {
   const TemporaryDirectory directory;
   RtpSourceOptions options = options_for(port, Codec::kMjpeg);
   options.copy_to = directory.path() + "/nowhere/video.mkv";
-  RtpSource source(options);
-  listen(source, port);
+  const auto source = open_rtp(options);
+  listen(*source, port);
   RtpSender sender(Codec::kMjpeg, port);
   Frame frame;
-  EXPECT_EQ(next(source, sender, frame), ReadStatus::kFailed);
-  EXPECT_THAT(source.error(), HasSubstr("cannot write " + options.copy_to + ": No such file"));
-  EXPECT_EQ(source.read(frame, 0), ReadStatus::kFailed);
+  EXPECT_EQ(next(*source, sender, frame), ReadStatus::kFailed);
+  EXPECT_THAT(source->error(), HasSubstr("cannot write " + options.copy_to + ": No such file"));
+  EXPECT_EQ(source->read(frame, 0), ReadStatus::kFailed);
 }
 
 TEST(RtpSourceOptions, ThatCannotWorkFailAtOnceAndShowNoPassword) {
@@ -590,28 +622,28 @@ TEST(RtpSourceOptions, ThatCannotWorkFailAtOnceAndShowNoPassword) {
     RtpSourceOptions options;
     options.url = which.url;
     options.format = which.format;
-    RtpSource source(options);
+    const auto source = open_rtp(options);
     Frame frame;
-    EXPECT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed) << which.url;
-    EXPECT_THAT(source.error(), HasSubstr(which.says));
-    EXPECT_THAT(source.error() + source.name(), Not(HasSubstr("cret")));
-    EXPECT_EQ(source.read(frame, 0), ReadStatus::kFailed);
+    EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed) << which.url;
+    EXPECT_THAT(source->error(), HasSubstr(which.says));
+    EXPECT_THAT(source->error() + source->name(), Not(HasSubstr("cret")));
+    EXPECT_EQ(source->read(frame, 0), ReadStatus::kFailed);
   }
 }
 
 TEST(RtpSourceReconnection, LeaksNoFileDescriptor) {
   RtpSourceOptions options = options_for(free_rtp_port(), Codec::kMjpeg);
   options.timeout_s = 0.001;
-  RtpSource source(options);
+  const auto source = open_rtp(options);
   Frame frame;
   const auto open_files = [] {
     return std::distance(std::filesystem::directory_iterator("/proc/self/fd"),
                          std::filesystem::directory_iterator());
   };
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
   const auto before = open_files();
   for (int i = 0; i < 100; ++i) {
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
   }
   EXPECT_LE(open_files(),
             before + 3);  // a connection may be open: two sockets and a resolver's file
@@ -621,13 +653,13 @@ TEST(RtpSourceStop, EndsAReadThatWaitsForPackets) {
   const int port = free_rtp_port();
   RtpSourceOptions options = options_for(port, Codec::kMjpeg);
   options.timeout_s = kNever_s;
-  RtpSource source(options);
+  const auto source = open_rtp(options);
   std::thread stopper([&] {
     eventually([&] { return rtp_port_taken(port); });
-    source.stop();
+    source->stop();
   });
   Frame frame;
-  EXPECT_EQ(source.read(frame, kNever_s), ReadStatus::kStopped);
+  EXPECT_EQ(source->read(frame, kNever_s), ReadStatus::kStopped);
   stopper.join();
 }
 
@@ -635,13 +667,13 @@ TEST(RtpSourceStop, EndsAPause) {
   RtpSourceOptions options = options_for(free_rtp_port(), Codec::kMjpeg);
   options.timeout_s = 0.001;
   options.max_backoff_s = kNever_s;
-  RtpSource source(options);
+  const auto source = open_rtp(options);
   Frame frame;
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  std::thread stopper([&] { source.stop(); });
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  std::thread stopper([&] { source->stop(); });
   ReadStatus status = ReadStatus::kDisconnected;
   while (status == ReadStatus::kDisconnected) {
-    status = source.read(frame, kNever_s);
+    status = source->read(frame, kNever_s);
   }
   EXPECT_EQ(status, ReadStatus::kStopped);
   stopper.join();

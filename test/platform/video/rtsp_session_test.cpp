@@ -1,4 +1,4 @@
-// RtpSource with RTSP: a server that does what cameras do and the real server does not.
+// RTSP: a server that does what cameras do and the real server does not.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -31,7 +31,7 @@ RtpSourceOptions options_for(const ScriptedRtspServer& server,
 
 // Reads on, without a loss, until the condition holds.
 template <class Condition>
-void read_while_waiting(RtpSource& source, Condition condition) {
+void read_while_waiting(FrameSource& source, Condition condition) {
   Frame frame;
   const double end_s = monotonic_now_s() + kDeadline_s;
   while (!condition()) {
@@ -54,17 +54,17 @@ TEST_P(RtspSessionBy, FollowsARedirection) {
     if (request.method != "DESCRIBE") return;
     *answer = {"302 Moved Temporarily", "Location: " + there.url() + "\r\n", "", "", false};
   });
-  RtpSource source(options_for(here, GetParam()));
+  const auto source = open_rtp(options_for(here, GetParam()));
   Frame frame;
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   EXPECT_EQ(here.count("SETUP"), 0);
   EXPECT_EQ(there.count("PLAY"), 1);
 }
 
 TEST_P(RtspSessionBy, PingsByGetParameterWhereTheCameraOffersIt) {
   const ScriptedRtspServer server;
-  RtpSource source(options_for(server, GetParam()));
-  read_while_waiting(source, [&] { return server.count("GET_PARAMETER", "Session: 1") >= 2; });
+  const auto source = open_rtp(options_for(server, GetParam()));
+  read_while_waiting(*source, [&] { return server.count("GET_PARAMETER", "Session: 1") >= 2; });
   EXPECT_EQ(server.count("OPTIONS"), 1);
 }
 
@@ -72,8 +72,8 @@ TEST_P(RtspSessionBy, PingsByOptionsWhereTheCameraOffersNothingElse) {
   const ScriptedRtspServer server([](const RtspRequest& request, RtspAnswer* answer) {
     if (request.method == "OPTIONS") answer->headers = "Public: OPTIONS, DESCRIBE, SETUP, PLAY\r\n";
   });
-  RtpSource source(options_for(server, GetParam()));
-  read_while_waiting(source, [&] { return server.count("OPTIONS", "Session: 1") >= 2; });
+  const auto source = open_rtp(options_for(server, GetParam()));
+  read_while_waiting(*source, [&] { return server.count("OPTIONS", "Session: 1") >= 2; });
   EXPECT_EQ(server.count("GET_PARAMETER"), 0);
 }
 
@@ -100,8 +100,8 @@ TEST_P(RtspSessionBy, PingsAgainWhenTheLoginRanOut) {
   RtpSourceOptions options = options_for(server, GetParam());
   options.user = "user";
   options.password = "secret";
-  RtpSource source(options);
-  read_while_waiting(source, [&] {
+  const auto source = open_rtp(options);
+  read_while_waiting(*source, [&] {
     if (monotonic_now_s() > last_let_in_s + 5.5) server.hang_up = true;
     return pings >= 1;
   });
@@ -112,8 +112,8 @@ TEST_P(RtspSessionBy, AnswersTheCamerasOwnRequests) {
     if (request.method == "SETUP") answer->before = "OPTIONS * RTSP/1.0\r\nCSeq: 76\r\n\r\n";
   });
   server.ask = true;
-  RtpSource source(options_for(server, GetParam()));
-  read_while_waiting(source, [&] { return server.count("RTSP/1.0", "CSeq: 77") == 1; });
+  const auto source = open_rtp(options_for(server, GetParam()));
+  read_while_waiting(*source, [&] { return server.count("RTSP/1.0", "CSeq: 77") == 1; });
   EXPECT_EQ(server.count("RTSP/1.0", "RTSP/1.0 200 OK"), 2);
   EXPECT_EQ(server.count("RTSP/1.0", "CSeq: 76"), 1);
 }
@@ -122,32 +122,32 @@ TEST_P(RtspSessionBy, SaysWhichTransportTheCameraRefuses) {
   const ScriptedRtspServer server([](const RtspRequest& request, RtspAnswer* answer) {
     if (request.method == "SETUP") answer->status = "461 Unsupported Transport";
   });
-  RtpSource source(options_for(server, GetParam()));
+  const auto source = open_rtp(options_for(server, GetParam()));
   Frame frame;
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source.error(),
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source->error(),
               HasSubstr(GetParam() == Transport::kTcp ? "by TCP (461); set transport: udp"
                                                       : "by UDP (461); set transport: tcp"));
 }
 
 TEST_P(RtspSessionBy, SaysThatTheCameraHungUp) {
   ScriptedRtspServer server;
-  RtpSource source(options_for(server, GetParam()));
+  const auto source = open_rtp(options_for(server, GetParam()));
   Frame frame;
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   server.hang_up = true;
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("the camera closed the connection"));
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("the camera closed the connection"));
 }
 
 TEST(RtspSession, GoesOnByUdpWhileACameraThatHungUpSends) {
   ScriptedRtspServer server;
-  RtpSource source(options_for(server, Transport::kUdp));
+  const auto source = open_rtp(options_for(server, Transport::kUdp));
   Frame frame;
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   server.stop_speaking = true;
   int frames = 0;
-  read_while_waiting(source, [&] { return !server.stop_speaking && ++frames > 60; });
+  read_while_waiting(*source, [&] { return !server.stop_speaking && ++frames > 60; });
 }
 
 TEST(RtspSession, GivesUpRedirectionsInACircle) {
@@ -159,20 +159,20 @@ TEST(RtspSession, GivesUpRedirectionsInACircle) {
     *answer = {"301 Moved", "Location: " + url.get() + other + "\r\n", "", "", false};
   });
   known.set_value(server.url());
-  RtpSource source(options_for(server));
+  const auto source = open_rtp(options_for(server));
   Frame frame;
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("more than 5 redirections"));
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("more than 5 redirections"));
 }
 
 TEST(RtspSession, KeepsThePacketsThatComeBeforeTheAnswerToPlay) {
   const ScriptedRtspServer server([](const RtspRequest& request, RtspAnswer* answer) {
     answer->pictures_before = request.method == "PLAY";
   });
-  RtpSource source(options_for(server));
+  const auto source = open_rtp(options_for(server));
   Frame frame;
   for (int i = 0; i < 5; ++i) {
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
     EXPECT_NEAR(frame.luma[0], RtpSender::grey_of(i), 3);
   }
 }
@@ -228,18 +228,18 @@ TEST_P(RtspSessionOfACameraThatBoots, IsTriedAgainOnceItWorked) {
   ScriptedRtspServer::Script script;
   refuse(2, 3, &script);
   ScriptedRtspServer server(script);
-  RtpSource source(options_for(server));
+  const auto source = open_rtp(options_for(server));
   Frame frame;
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   server.hang_up = true;
-  ASSERT_EQ(read_until(source, frame,
+  ASSERT_EQ(read_until(*source, frame,
                        [&](ReadStatus status) {
                          return status == ReadStatus::kDisconnected &&
-                                source.error().find(GetParam().says) != std::string::npos;
+                                source->error().find(GetParam().says) != std::string::npos;
                        }),
             ReadStatus::kDisconnected)
-      << source.error();
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+      << source->error();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   EXPECT_TRUE(frame.stamp.restarted);
 }
 
@@ -247,10 +247,10 @@ TEST_P(RtspSessionOfACameraThatBoots, FailsForGoodIfItNeverWorked) {
   ScriptedRtspServer::Script script;
   refuse(1, 1000, &script);
   const ScriptedRtspServer server(script);
-  RtpSource source(options_for(server));
+  const auto source = open_rtp(options_for(server));
   Frame frame;
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source.error(), HasSubstr(GetParam().says));
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source->error(), HasSubstr(GetParam().says));
 }
 
 }  // namespace

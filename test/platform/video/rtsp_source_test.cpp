@@ -1,4 +1,4 @@
-// RtpSource with RTSP: a real server (gst-rtsp-server) that is killed and started again.
+// RTSP: a real server (gst-rtsp-server) that is killed and started again.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -58,14 +58,14 @@ INSTANTIATE_TEST_SUITE_P(Ways, RtspSource,
                          [](const auto& way) { return way.param.name; });
 
 TEST_P(RtspSource, DeliversWhitePicturesOnTheSendersClock) {
-  RtpSource source(options_);
+  const auto source = open_rtp(options_);
   double last_s = -1;
   double utc_offset_s = 0;
   bool utc_known = false;
   int frames = 0;
   while (frames < 30 || !utc_known) {
     Frame frame;
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
     EXPECT_EQ(frame.stamp.frame, frames++);
     ASSERT_EQ(frame.width, 320);
     ASSERT_EQ(frame.height, 240);
@@ -98,38 +98,38 @@ TEST_P(RtspSource, PutsPicturesOfManyPacketsTogether) {
   const std::string white = "pattern=white";
   launch.replace(launch.find(white), white.size(), "pattern=snow");
   const RtspServer server({"/snow", launch});
-  RtpSource source(options_for(server.url(), GetParam().transport));
+  const auto source = open_rtp(options_for(server.url(), GetParam().transport));
   Frame frame;
   for (int i = 0; i < 10; ++i) {
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
     std::set<int> greys;
     for (int u = 0; u < frame.width; ++u) {
       greys.insert(frame.luma[(frame.height - 1) * frame.stride + u]);
     }
     EXPECT_GT(greys.size(), 50U) << "the last row, from the last packet";
   }
-  EXPECT_EQ(source.counters().damaged, 0);
+  EXPECT_EQ(source->counters().damaged, 0);
 }
 
 TEST_P(RtspSource, OutlivesAKillAndARestartOfTheServer) {
-  RtpSource source(options_);
+  const auto source = open_rtp(options_);
   Frame frame;
   for (int i = 0; i < 5; ++i) {
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   }
   const std::int64_t before = frame.stamp.frame;
   server_.kill();
   ReadStatus status = ReadStatus::kOk;
   while (status == ReadStatus::kOk || status == ReadStatus::kTimeout) {
-    status = source.read(frame, kDeadline_s);
+    status = source->read(frame, kDeadline_s);
   }
   ASSERT_EQ(status, ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), StartsWith(server_.url() + ": "));
+  EXPECT_THAT(source->error(), StartsWith(server_.url() + ": "));
   server_.restart();
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   EXPECT_TRUE(frame.stamp.restarted);
   EXPECT_GT(frame.stamp.frame, before);
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   EXPECT_FALSE(frame.stamp.restarted);
 }
 
@@ -138,43 +138,43 @@ TEST(RtspSourceLogin, TakesAPasswordOfAnyCharacters) {
   RtpSourceOptions options = options_for(server.url());
   options.user = "user";
   options.password = "p@s/w%rd? &x";
-  RtpSource source(options);
+  const auto source = open_rtp(options);
   Frame frame;
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
 }
 
 TEST(RtspSourceLogin, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
   const RtspServer server(kMjpegStream, "user", "secret");
   RtpSourceOptions options = options_for(server.url());
   options.url.replace(0, 7, "rtsp://user:guess@");
-  RtpSource source(options);
+  const auto source = open_rtp(options);
   Frame frame;
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_EQ(source.error(), server.url() + ": wrong user or password (401)");
-  EXPECT_EQ(source.name(), server.url());
-  EXPECT_EQ(source.read(frame, 0), ReadStatus::kFailed);
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_EQ(source->error(), server.url() + ": wrong user or password (401)");
+  EXPECT_EQ(source->name(), server.url());
+  EXPECT_EQ(source->read(frame, 0), ReadStatus::kFailed);
 
-  RtpSource anonymous(options_for(server.url()));
-  EXPECT_EQ(read_until(anonymous, frame, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(anonymous.error(), HasSubstr("the camera wants a user and a password (401)"));
+  const auto anonymous = open_rtp(options_for(server.url()));
+  EXPECT_EQ(read_until(*anonymous, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(anonymous->error(), HasSubstr("the camera wants a user and a password (401)"));
 }
 
 TEST(RtspSourceErrors, NameAStreamThatIsNotThere) {
   const RtspServer server(kMjpegStream);
-  RtpSource source(options_for(server.url() + "/none"));
+  const auto source = open_rtp(options_for(server.url() + "/none"));
   Frame frame;
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("/none: no such stream on this camera (404)"));
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("/none: no such stream on this camera (404)"));
 }
 
 TEST(RtspSourceErrors, NameARefusedConnectionAndTryAgain) {
   RtpSourceOptions options =
       options_for("rtsp://user:secret@127.0.0.1:" + std::to_string(unused_port()) + "/x");
-  RtpSource source(options);
+  const auto source = open_rtp(options);
   Frame frame;
   for (int i = 0; i < 3; ++i) {
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-    EXPECT_THAT(source.error(), AllOf(HasSubstr("Connection refused"), Not(HasSubstr("secret"))));
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_THAT(source->error(), AllOf(HasSubstr("Connection refused"), Not(HasSubstr("secret"))));
   }
 }
 
@@ -183,29 +183,29 @@ TEST(RtspSourceErrors, NameASilentServer) {
   RtpSourceOptions options =
       options_for("rtsp://127.0.0.1:" + std::to_string(server.port()) + "/x");
   options.timeout_s = 0.2;
-  RtpSource source(options);
+  const auto source = open_rtp(options);
   Frame frame;
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("nothing received for 0.2 s"));
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("nothing received for 0.2 s"));
 }
 
 TEST(RtspSourceErrors, NameACodecThatIsNotSupported) {
   const RtspServer server(
       {"/vp8", std::string(kWhitePictures) + "vp8enc deadline=1 ! rtpvp8pay name=pay0 pt=96"});
-  RtpSource source(options_for(server.url()));
+  const auto source = open_rtp(options_for(server.url()));
   Frame frame;
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source.error(), HasSubstr("the video is vp8; set the camera to MJPEG or H.264"));
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source->error(), HasSubstr("the video is vp8; set the camera to MJPEG or H.264"));
 }
 
 TEST(RtspSourceErrors, NameAStreamWithoutVideo) {
   const RtspServer server({"/sound",
                            "audiotestsrc is-live=true ! alawenc ! "
                            "rtppcmapay name=pay0 pt=8"});
-  RtpSource source(options_for(server.url()));
+  const auto source = open_rtp(options_for(server.url()));
   Frame frame;
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source.error(), HasSubstr("there is no video in this stream"));
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source->error(), HasSubstr("there is no video in this stream"));
 }
 
 TEST(RtspSourceErrors, NameBFrames) {
@@ -215,23 +215,23 @@ TEST(RtspSourceErrors, NameBFrames) {
        "video/x-raw,format=I420,width=320,height=240,framerate=30/1 ! "
        "x264enc bframes=2 b-adapt=false rc-lookahead=0 key-int-max=30 ! "
        "video/x-h264,profile=main ! rtph264pay config-interval=1 name=pay0 pt=96"});
-  RtpSource source(options_for(server.url()));
+  const auto source = open_rtp(options_for(server.url()));
   Frame frame;
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source.error(), HasSubstr("B-frames"));
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source->error(), HasSubstr("B-frames"));
 }
 
 TEST(RtspSourceStream, KeepsTheVideosClockWhenThereIsSoundToo) {
   const RtspServer server(
       {"/both",
        kMjpegStream.launch + " audiotestsrc is-live=true ! alawenc ! rtppcmapay name=pay1 pt=8"});
-  RtpSource source(options_for(server.url()));
+  const auto source = open_rtp(options_for(server.url()));
   Frame frame;
   bool utc_known = false;
   double last_s = -1;
   int after_report = 0;
   while (after_report < 10) {
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
     if (last_s >= 0) {
       EXPECT_GT(*frame.stamp.sender_time_s, last_s);
       EXPECT_LT(*frame.stamp.sender_time_s, last_s + 1000);
@@ -247,13 +247,13 @@ TEST(RtspSourceStop, EndsAConnectionThatIsNotAnswered) {
   RtpSourceOptions options =
       options_for("rtsp://127.0.0.1:" + std::to_string(server.port()) + "/x");
   options.timeout_s = kNever_s;
-  RtpSource source(options);
+  const auto source = open_rtp(options);
   std::thread stopper([&] {
     eventually([&] { return server.connections() > 0; });
-    source.stop();
+    source->stop();
   });
   Frame frame;
-  EXPECT_EQ(source.read(frame, kNever_s), ReadStatus::kStopped);
+  EXPECT_EQ(source->read(frame, kNever_s), ReadStatus::kStopped);
   stopper.join();
 }
 
@@ -262,16 +262,16 @@ TEST(RtspSourceStop, LeaksNoFileDescriptorOverManyReconnections) {
   RtpSourceOptions options =
       options_for("rtsp://127.0.0.1:" + std::to_string(server.port()) + "/x");
   options.max_backoff_s = 0.001;
-  RtpSource source(options);
+  const auto source = open_rtp(options);
   Frame frame;
   const auto open_files = [] {
     return std::distance(std::filesystem::directory_iterator("/proc/self/fd"),
                          std::filesystem::directory_iterator());
   };
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
   const auto before = open_files();
   for (int i = 0; i < 100; ++i) {
-    ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
   }
   EXPECT_LE(open_files(), before + 3);  // a connection may be under way at both ends
 }

@@ -1,4 +1,4 @@
-// V4l2Source where there is no camera, and what it stores. With cameras: test/system/virtual_machine.
+// V4L2 where there is no camera, and what it stores. With cameras: test/system/virtual_machine.
 
 #include "platform/video/v4l2_source.h"
 
@@ -29,25 +29,25 @@ V4l2SourceOptions device(const std::string& path) {
 }
 
 TEST(V4l2Source, WaitsForACameraThatIsNotThere) {
-  V4l2Source source(device("/dev/no-such-camera"));
+  const auto source = open_v4l2(device("/dev/no-such-camera"));
   Frame frame;
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("/dev/no-such-camera: no such device; is the camera"));
-  EXPECT_EQ(source.read(frame, 0), ReadStatus::kTimeout) << "a pause before the next try";
-  EXPECT_EQ(read_until(source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("/dev/no-such-camera: no such device; is the camera"));
+  EXPECT_EQ(source->read(frame, 0), ReadStatus::kTimeout) << "a pause before the next try";
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
 }
 
 TEST(V4l2Source, RefusesWhatIsNoCamera) {
   const TemporaryDirectory directory;
   const auto before = open_files();
   for (const std::string& path : {directory.write("file", "text"), std::string("/dev/null")}) {
-    V4l2Source source(device(path));
+    const auto source = open_v4l2(device(path));
     Frame frame;
-    EXPECT_EQ(source.read(frame, kDeadline_s), ReadStatus::kFailed);
-    EXPECT_EQ(source.error(), path + ": is no V4L2 device; video devices are /dev/video*");
-    EXPECT_EQ(source.read(frame, 0), ReadStatus::kFailed);
-    source.stop();
-    EXPECT_EQ(source.read(frame, 0), ReadStatus::kStopped);
+    EXPECT_EQ(source->read(frame, kDeadline_s), ReadStatus::kFailed);
+    EXPECT_EQ(source->error(), path + ": is no V4L2 device; video devices are /dev/video*");
+    EXPECT_EQ(source->read(frame, 0), ReadStatus::kFailed);
+    source->stop();
+    EXPECT_EQ(source->read(frame, 0), ReadStatus::kStopped);
   }
   EXPECT_EQ(open_files(), before);
 }
@@ -67,45 +67,45 @@ TEST(V4l2Source, TriesOnWhenADeviceThatComesLaterHasNoRightsYet) {
   ASSERT_EQ(::chmod(directory.path().c_str(), 0755), 0);
   V4l2SourceOptions options = device(directory.path() + "/video0");
   options.max_backoff_s = 0.01;
-  V4l2Source source(options);
+  const auto source = open_v4l2(options);
   Frame frame;
   const auto read = [&](ReadStatus wanted) {
     const AsNobody nobody;
-    return read_until(source, frame, wanted);
+    return read_until(*source, frame, wanted);
   };
   ASSERT_EQ(read(ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("no such device"));
+  EXPECT_THAT(source->error(), HasSubstr("no such device"));
   directory.write("video0", "text");
   ASSERT_EQ(::chmod(options.device.c_str(), 0), 0);
   for (int i = 0; i < 2; ++i) {
     ASSERT_EQ(read(ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-    EXPECT_THAT(source.error(), HasSubstr("permission denied"));
+    EXPECT_THAT(source->error(), HasSubstr("permission denied"));
   }
   ASSERT_EQ(::chmod(options.device.c_str(), 0666), 0);
   ASSERT_EQ(read(ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source.error(), HasSubstr("is no V4L2 device")) << "it has been opened";
+  EXPECT_THAT(source->error(), HasSubstr("is no V4L2 device")) << "it has been opened";
 }
 
 TEST(V4l2Source, FailsAtOnceOnADeviceThatItMayNotOpen) {
   const TemporaryDirectory directory;
   ASSERT_EQ(::chmod(directory.path().c_str(), 0755), 0);
-  V4l2Source source(device(directory.write("video0", "text")));
-  ASSERT_EQ(::chmod(source.name().c_str(), 0), 0);
+  const auto source = open_v4l2(device(directory.write("video0", "text")));
+  ASSERT_EQ(::chmod(source->name().c_str(), 0), 0);
   Frame frame;
   const AsNobody nobody;
-  EXPECT_EQ(source.read(frame, kDeadline_s), ReadStatus::kFailed);
-  EXPECT_THAT(source.error(), HasSubstr("permission denied; the user must be in the group"));
+  EXPECT_EQ(source->read(frame, kDeadline_s), ReadStatus::kFailed);
+  EXPECT_THAT(source->error(), HasSubstr("permission denied; the user must be in the group"));
 }
 
 TEST(V4l2Source, StopsWhileItWaitsForTheNextTry) {
-  V4l2Source source(device("/dev/no-such-camera"));
+  const auto source = open_v4l2(device("/dev/no-such-camera"));
   Frame frame;
-  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kDisconnected);
+  ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kDisconnected);
   std::thread reader([&] {
     Frame later;
-    EXPECT_EQ(read_until(source, later, ReadStatus::kStopped), ReadStatus::kStopped);
+    EXPECT_EQ(read_until(*source, later, ReadStatus::kStopped), ReadStatus::kStopped);
   });
-  source.stop();
+  source->stop();
   reader.join();
 }
 
@@ -120,7 +120,7 @@ TEST(V4l2Device, SaysInTheUsersWordsWhatTheKernelMeans) {
   EXPECT_EQ(error(EIO), "VIDIOC_STREAMON: Input/output error");
 }
 
-// What V4l2Source stores of raw pictures.
+// What open_v4l2() stores of raw pictures.
 TEST(StreamCopy, StoresUncompressedLumaThatARecordingGivesBack) {
   constexpr int kWidth = 38;
   constexpr int kHeight = 5;
@@ -149,17 +149,17 @@ TEST(StreamCopy, StoresUncompressedLumaThatARecordingGivesBack) {
           << error;
     }
   }
-  RecordingFrameSource recording({directory.path(), true, false});
+  const auto recording = open_recorded_frames({directory.path(), true, false});
   Frame frame;
   for (int i = 0; i < kPictures; ++i) {
-    ASSERT_EQ(recording.read(frame, kDeadline_s), ReadStatus::kOk) << recording.error();
+    ASSERT_EQ(recording->read(frame, kDeadline_s), ReadStatus::kOk) << recording->error();
     ASSERT_EQ(frame.width, kWidth);
     for (int place = 0; place < kWidth * kHeight; ++place) {
       ASSERT_EQ(frame.luma[place / kWidth * frame.stride + place % kWidth], grey(i, place));
     }
   }
-  EXPECT_EQ(recording.read(frame, kDeadline_s), ReadStatus::kEnd);
-  EXPECT_EQ(recording.missing_frames(), 0);
+  EXPECT_EQ(recording->read(frame, kDeadline_s), ReadStatus::kEnd);
+  EXPECT_EQ(recording->missing_frames(), 0);
 }
 
 }  // namespace

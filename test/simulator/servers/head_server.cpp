@@ -116,6 +116,9 @@ std::string HeadServer::receive() {
 void HeadServer::send(const std::string& bytes) {
   const std::size_t middle = in_two ? bytes.size() / 2 : 0;
   send_piece(bytes.substr(0, middle));
+  if (middle > 0 && between_s > 0) {
+    static_cast<void>(is_pulled(between_s));
+  }
   send_piece(bytes.substr(middle));
 }
 

@@ -44,11 +44,12 @@ class HeadServer {
   // Of each answer (silence, babble, repeats, lines of its own) or of one in four.
   std::atomic<LineFault> fault{LineFault::kNone};
   std::atomic<double> late_s{0.2};
-  std::atomic<double> answer_s{0};  // that the head takes for each answer
-  std::atomic<bool> nagle{false};   // TCP keeps small packets back, as where nobody thought of it
-  std::atomic<bool> in_two{false};  // each answer comes in two pieces: of UDP, two datagrams
-  std::atomic<int> queries{0};      // that the head took
-  std::atomic<int> faults{0};       // that were done
+  std::atomic<double> answer_s{0};   // that the head takes for each answer
+  std::atomic<bool> nagle{false};    // TCP keeps small packets back, as where nobody thought of it
+  std::atomic<bool> in_two{false};   // each answer comes in two pieces: of UDP, two datagrams
+  std::atomic<double> between_s{0};  // these two
+  std::atomic<int> queries{0};       // that the head took
+  std::atomic<int> faults{0};        // that were done
 
  private:
   void open_serial();

@@ -43,7 +43,7 @@ std::vector<std::string> PelcoDHead::take(const std::string& bytes) {
     const long to = byte_at(received_, 1);
     const long command = byte_at(received_, 3);
     received_.erase(0, 7);
-    if (to != address || (command == 0x53 && !knows_tilt) ||
+    if (to != address || (command == 0x53 && !knows_tilt) || (command == 0x55 && !knows_zoom) ||
         (command != 0x51 && command != 0x53 && command != 0x55)) {
       continue;
     }
@@ -160,6 +160,19 @@ std::vector<std::string> PtuHead::take(const std::string& bytes) {
     received_.clear();
   }
   return replies;
+}
+
+std::unique_ptr<SimulatedHead> make_simulated_head(HeadModel model,
+                                                   std::function<HeadPosition()> position) {
+  switch (model) {
+    case HeadModel::kPelcoD:
+      return std::make_unique<PelcoDHead>(std::move(position));
+    case HeadModel::kVisca:
+      return std::make_unique<ViscaHead>(std::move(position));
+    case HeadModel::kPtu:
+      break;
+  }
+  return std::make_unique<PtuHead>(std::move(position));
 }
 
 }  // namespace alidade

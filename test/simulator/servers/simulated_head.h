@@ -3,6 +3,7 @@
 // without the code that it tests: bytes of a master in, bytes of the head out. No I/O: head_server.h
 // puts it on a line.
 
+#include <array>
 #include <atomic>
 #include <functional>
 #include <memory>
@@ -40,6 +41,7 @@ struct PelcoDHead : SimulatedHead {
   std::string unsolicited() override;
   int address;
   bool knows_tilt = true;  // a query that a head does not know gets no answer
+  bool knows_zoom = true;
 };
 
 struct ViscaHead : SimulatedHead {
@@ -76,5 +78,18 @@ struct PtuHead : SimulatedHead {
   bool terse_ = false;
   bool echo_ = true;
 };
+
+// The heads by the names that configurations and command lines give them, which are those of pan_tilt.type.
+enum class HeadModel { kPelcoD, kVisca, kPtu };
+struct NamedHeadModel {
+  const char* name;
+  HeadModel model;
+};
+inline constexpr std::array<NamedHeadModel, 3> kHeadModels = {
+    {{"pelco_d", HeadModel::kPelcoD}, {"visca", HeadModel::kVisca}, {"ptu", HeadModel::kPtu}}};
+
+// As it comes out of its box.
+std::unique_ptr<SimulatedHead> make_simulated_head(HeadModel model,
+                                                   std::function<HeadPosition()> position);
 
 }  // namespace alidade

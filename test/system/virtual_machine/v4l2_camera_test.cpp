@@ -1,4 +1,4 @@
-// V4l2Source on cameras of the kernel: the contract of all sources, and what only V4L2 has. Runs in the
+// V4L2 on cameras of the kernel: the contract of all sources, and what only V4L2 has. Runs in the
 // virtual machine, where the script has loaded
 //   $WEBCAM     vivid, webcam input         $HDMI      vivid, HDMI input, 720p at 60 Hz
 //   $OUTPUT     vivid, an output            $PLANES    vivid, multi-planar capture
@@ -53,9 +53,7 @@ struct V4l2Rig : LiveFrameSourceRig {
       ::close(keeper);
     }
   }
-  std::unique_ptr<FrameSource> open() const override {
-    return std::make_unique<V4l2Source>(options);
-  }
+  std::unique_ptr<FrameSource> open() const override { return open_v4l2(options); }
   // A camera that vivid has unplugged comes back when the last one closes it.
   void take_away() override {
     keeper = ::open(options.device.c_str(), O_RDWR);
@@ -121,13 +119,13 @@ class V4l2Camera : public ::testing::Test {
     set_control(options_.device, "Percentage of Dropped Buffers", 0);
     set_control(options_.device, "Wrap Sequence Number", 0);
   }
-  void open() { source_ = std::make_unique<V4l2Source>(options_); }
+  void open() { source_ = open_v4l2(options_); }
   ReadStatus read() { return read_until(*source_, frame_, ReadStatus::kOk); }
 
   static constexpr int kEndOfFrame = 0;
   static constexpr int kStartOfExposure = 1;
   V4l2SourceOptions options_ = options_of("WEBCAM", V4l2Format::kGrey, 320, 180, 60);
-  std::unique_ptr<V4l2Source> source_;
+  std::unique_ptr<FrameSource> source_;
   Frame frame_;
 };
 
@@ -322,13 +320,13 @@ TEST_F(V4l2Camera, SaysWhatTheDeviceOffers) {
 TEST_F(V4l2Camera, SaysThatAnotherProgramHasTheDevice) {
   open();
   ASSERT_EQ(read(), ReadStatus::kOk) << source_->error();
-  V4l2Source second(options_);
+  const auto second = open_v4l2(options_);
   Frame frame;
-  EXPECT_EQ(second.read(frame, kDeadline_s), ReadStatus::kDisconnected);
-  EXPECT_THAT(second.error(), HasSubstr(": busy: another program uses it; end that one"));
+  EXPECT_EQ(second->read(frame, kDeadline_s), ReadStatus::kDisconnected);
+  EXPECT_THAT(second->error(), HasSubstr(": busy: another program uses it; end that one"));
   source_.reset();
   frame_ = Frame{};
-  EXPECT_EQ(read_until(second, frame, ReadStatus::kOk), ReadStatus::kOk) << second.error();
+  EXPECT_EQ(read_until(*second, frame, ReadStatus::kOk), ReadStatus::kOk) << second->error();
 }
 
 TEST_F(V4l2Camera, SaysWhichGroupMayOpenTheDevice) {
@@ -346,10 +344,10 @@ TEST(V4l2Devices, SayThatTheyAreNoCamera) {
   const auto error = [](const std::string& path) {
     V4l2SourceOptions options;
     options.device = path;
-    V4l2Source source(options);
+    const auto source = open_v4l2(options);
     Frame frame;
-    EXPECT_EQ(source.read(frame, kDeadline_s), ReadStatus::kFailed);
-    return source.error();
+    EXPECT_EQ(source->read(frame, kDeadline_s), ReadStatus::kFailed);
+    return source->error();
   };
   EXPECT_THAT(error(device("OUTPUT")), HasSubstr(": is no capture device (driver vivid)"));
   EXPECT_THAT(error(device("PLANES")), HasSubstr(": is a multi-planar device (driver vivid)"));
@@ -357,15 +355,15 @@ TEST(V4l2Devices, SayThatTheyAreNoCamera) {
 
 TEST(V4l2Devices, OfALoopbackWaitForItsWriter) {
   const V4l2SourceOptions options = options_of("LOOPBACK", V4l2Format::kMjpg, 320, 240, 0);
-  V4l2Source source(options);
+  const auto source = open_v4l2(options);
   Frame frame;
-  ASSERT_EQ(source.read(frame, kDeadline_s), ReadStatus::kDisconnected);
-  EXPECT_THAT(source.error(), HasSubstr("no program writes pictures to this loopback device yet"));
+  ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("no program writes pictures to this loopback device yet"));
   const LoopbackCamera camera(options.device, 320, 240, 30);
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   // Its stamps are of no known clock.
   const double before_s = monotonic_now_s();
-  ASSERT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   EXPECT_LE(frame.stamp.receive_time_s, monotonic_now_s());
   EXPECT_GE(frame.stamp.receive_time_s, before_s);
   const int grey = frame.luma[0];
@@ -402,14 +400,14 @@ Throughput of_the_driver(const V4l2SourceOptions& options) {
 
 Throughput of_the_source(const V4l2SourceOptions& options) {
   Throughput result;
-  V4l2Source source(options);
+  const auto source = open_v4l2(options);
   Frame frame;
   for (const double end_s = monotonic_now_s() + kDuration_s; monotonic_now_s() < end_s;) {
-    EXPECT_EQ(read_until(source, frame, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+    EXPECT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
     ++result.frames;
   }
-  EXPECT_EQ(source.counters().damaged, 0);
-  result.lost = source.counters().dropped;
+  EXPECT_EQ(source->counters().damaged, 0);
+  result.lost = source->counters().dropped;
   return result;
 }
 

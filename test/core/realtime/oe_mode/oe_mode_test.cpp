@@ -37,7 +37,7 @@ OeOptions small_options() {
   options.max_width = kWidth;
   options.max_height = kHeight;
   options.max_landmarks = 2000;
-  options.cell_size_px = 24;
+  options.maker.cell_size_px = 24;
   return options;
 }
 
@@ -83,6 +83,7 @@ class VirtualCamera {
     const simulator::Angles after = path_->at(t + h);
     const auto noise = [&](double sigma) { return sigma * normal_(random_); };
     InterpolatedPanTilt out;
+    out.time_s = time_s(k);  // no clock offset, as of row 0
     out.angle = {now.pan + noise(sigmas.angle), now.tilt + noise(sigmas.angle)};
     out.rate = {(after.pan - before.pan) / (2 * h) + noise(sigmas.rate),
                 (after.tilt - before.tilt) / (2 * h) + noise(sigmas.rate)};
@@ -113,7 +114,7 @@ class VirtualCamera {
     out.covariance.topLeftCorner<2, 2>().diagonal().array() +=
         beyond_s * beyond_s * out.covariance(2, 2);
     out.extrapolated = true;
-    out.renewal_s = 1;
+    out.correlation_time_s = 1;
     return out;
   }
 
@@ -560,8 +561,8 @@ TEST_F(OeModeOnFrames, TellsWhatEachAnswerRestsOn) {
     EXPECT_EQ(s.status, OeStatus::kOk);
     EXPECT_LE(s.inliers, s.aligned);
     EXPECT_LE(s.aligned, s.looked_for);
-    EXPECT_LE(s.looked_for, std::min(s.visible, small_options().max_used));
-    EXPECT_LE(s.visible, oe_.map().size());
+    EXPECT_LE(s.looked_for, std::min(s.fine_visible, small_options().search.choice.max_used));
+    EXPECT_LE(s.fine_visible, oe_.map().size());
     EXPECT_EQ(s.inliers, frame_.landmarks);
     int inliers = 0;
     std::vector<std::uint32_t> ids;
@@ -590,7 +591,7 @@ TEST_F(OeModeOnFrames, TellsWhatEachAnswerRestsOn) {
 TEST(OeMode, NeitherFillsItsMapNorUsesMoreThanItMay) {
   OeOptions options = small_options();
   options.max_landmarks = 150;
-  options.max_used = 25;
+  options.search.choice.max_used = 25;
   VirtualCamera camera;
   OeMode oe(options);
   oe.reset(camera.calibration());
@@ -638,10 +639,15 @@ class LateTelemetry : public OeModeOnFrames {
     return oe_.process(camera_.image(k), VirtualCamera::time_s(k), &telemetry_, &frame_);
   }
 
+  // Samples that reach frame k: it is settled, and so are those before it, with nothing.
   void tell(int k, double off_px = 0) {
-    InterpolatedPanTilt late = camera_.telemetry(k);
-    late.angle.pan += off_px * kPixel;
-    oe_.add_late_telemetry(VirtualCamera::time_s(k), late);
+    TelemetryLookUp look_up;
+    while (oe_.pending(VirtualCamera::time_s(k), &look_up)) {
+      const bool is_k = look_up.time_s == VirtualCamera::time_s(k);
+      InterpolatedPanTilt late = camera_.telemetry(k);
+      late.angle.pan += off_px * kPixel;
+      oe_.settle_pending(is_k ? &late : nullptr);
+    }
   }
 
   // Frames [from, to), all in OE but the very first.
@@ -687,13 +693,26 @@ TEST_F(LateTelemetry, IsNotReplacedByWhatWasExtrapolated) {
   }
   EXPECT_GE(offset_covariance()(0, 0), before(0, 0));
   EXPECT_GE(offset_covariance()(1, 1), before(1, 1));
-  // All the time it may be told.
+  // All wait for it.
   for (int k = 18; k < 40; ++k) tell(k);
   EXPECT_LT(offset_covariance()(0, 0), before(0, 0) / 1.5);
   run_late(42, 45);
 }
 
-TEST_F(LateTelemetry, IsIgnoredWhereItBelongsToNoFrame) {
+TEST_F(LateTelemetry, IsAskedForOnceWhenItEnclosesTheFrame) {
+  run_late(0, 20);
+  const double time_s = VirtualCamera::time_s(18);
+  TelemetryLookUp look_up;
+  EXPECT_FALSE(oe_.pending(time_s - 1e-4, &look_up));
+  ASSERT_TRUE(oe_.pending(time_s, &look_up));
+  EXPECT_EQ(look_up.time_s, time_s);
+  tell(18);
+  EXPECT_FALSE(oe_.pending(time_s, &look_up));
+  ASSERT_TRUE(oe_.pending(VirtualCamera::time_s(19), &look_up));
+  EXPECT_EQ(look_up.time_s, VirtualCamera::time_s(19));
+}
+
+TEST_F(LateTelemetry, TeachesNothingWhereThereIsNone) {
   run_late(0, 20);
   tell(18);
   const MapState before = oe_.map_state();
@@ -702,22 +721,33 @@ TEST_F(LateTelemetry, IsIgnoredWhereItBelongsToNoFrame) {
     EXPECT_EQ(now.offset.vector(), before.offset.vector());
     EXPECT_EQ(now.offset_covariance, before.offset_covariance);
   };
-  tell(18);   // again
-  tell(100);  // not yet
-  InterpolatedPanTilt late = camera_.telemetry(19);
-  oe_.add_late_telemetry(VirtualCamera::time_s(19) + 1e-4, late);
-  const double kNaN = std::numeric_limits<double>::quiet_NaN();
-  oe_.add_late_telemetry(kNaN, late);
-  oe_.add_late_telemetry(-std::numeric_limits<double>::infinity(), late);
-  oe_.add_late_telemetry(VirtualCamera::time_s(19), camera_.extrapolated(19, kBeyond));
+  TelemetryLookUp look_up;
+  const auto pending = [&](int k) { return oe_.pending(VirtualCamera::time_s(k), &look_up); };
+  InterpolatedPanTilt late = camera_.telemetry(18);
+  oe_.settle_pending(nullptr);  // frame 19
+  EXPECT_FALSE(pending(19));
+  oe_.settle_pending(&late);  // nobody waits
   expect_unchanged();
-  late.angle.tilt = kNaN;
-  oe_.add_late_telemetry(VirtualCamera::time_s(19), late);
-  expect_unchanged();
-  // Of a map that is gone.
   ASSERT_EQ(process_extrapolated(20), OeStatus::kOk);
+  ASSERT_TRUE(pending(20));
+  late = camera_.extrapolated(20, kBeyond);
+  oe_.settle_pending(&late);
+  EXPECT_FALSE(pending(20));
+  oe_.maintain();
+  ASSERT_EQ(process_extrapolated(21), OeStatus::kOk);
+  late = camera_.telemetry(21);
+  late.angle.tilt = std::numeric_limits<double>::quiet_NaN();
+  const MapState last = oe_.map_state();
+  oe_.settle_pending(&late);
+  EXPECT_EQ(oe_.map_state().offset.vector(), last.offset.vector());
+  EXPECT_EQ(oe_.map_state().offset_covariance, last.offset_covariance);
+  // Of a clock that is gone, and of a map that is gone.
+  ASSERT_EQ(process_extrapolated(22), OeStatus::kOk);
+  oe_.forget_pending();
+  EXPECT_FALSE(pending(22));
+  ASSERT_EQ(process_extrapolated(23), OeStatus::kOk);
   oe_.reset(camera_.calibration());
-  tell(20);
+  EXPECT_FALSE(pending(23));
   EXPECT_EQ(offset_covariance(), (Matrix2<double>::Zero()));
 }
 
@@ -795,8 +825,8 @@ TEST_F(HandedOverMap, IsThatMapAgainWhenItIsToldAtOnce) {
   const MapState again = other_.map_state();
   EXPECT_EQ(again.offset.vector(), map.offset.vector());
   EXPECT_EQ(again.offset_covariance, map.offset_covariance);
-  EXPECT_EQ(again.bend_covariance, map.bend_covariance);
-  EXPECT_EQ(again.bend_tilt, map.bend_tilt);
+  EXPECT_EQ(again.shear_covariance, map.shear_covariance);
+  EXPECT_EQ(again.shear_tilt, map.shear_tilt);
   // Refined directions may have got into a neighbour's cell: one of the two stays.
   EXPECT_GE(again.landmarks.size(), map.landmarks.size() * 98 / 100);
   std::size_t next = 0;
@@ -857,8 +887,8 @@ TEST_F(HandedOverMap, LosesWhatMakesNoSense) {
       [&](MapState* m) { m->offset.pan = kNaN; },
       [&](MapState* m) { m->offset_covariance(0, 0) = kNaN; },
       [&](MapState* m) { m->offset_covariance(1, 1) = -1; },
-      [&](MapState* m) { m->bend_covariance[1](2, 2) = kNaN; },
-      [&](MapState* m) { m->bend_tilt = kNaN; },
+      [&](MapState* m) { m->shear_covariance[1](2, 2) = kNaN; },
+      [&](MapState* m) { m->shear_tilt = kNaN; },
       [&](MapState* m) { m->landmarks.clear(); }};
   for (const auto& damage : hopeless) {
     map = good;
@@ -988,11 +1018,11 @@ TEST_F(OeModeOnFrames, DisplacesNothingFarAwayByAccelerations) {
   for (Landmark& landmark : far) landmark.d = up * landmark.d;
   map.landmarks.insert(map.landmarks.end(), far.begin(), far.end());
   constexpr double kAcceleration = 0.5;  // rad/s^2: found again and again, as with few landmarks
-  for (Matrix3<double>& bend : map.bend_covariance) {
-    bend.setZero();
-    bend(2, 2) = kAcceleration * kAcceleration;
+  for (Matrix3<double>& shear : map.shear_covariance) {
+    shear.setZero();
+    shear(2, 2) = kAcceleration * kAcceleration;
   }
-  map.bend_tilt = frame_.angle.tilt;
+  map.shear_tilt = frame_.angle.tilt;
   oe_.reset(camera_.calibration(), map);
   std::map<std::uint32_t, Vector3<double>> before;
   for (const Landmark& landmark : oe_.map_state().landmarks) before[landmark.id] = landmark.d;

@@ -408,7 +408,7 @@ TEST(TelemetryBuffer, NeverGivesAnythingButAFiniteResult) {
   int results = 0;
   for (int round = 0; round < 300; ++round) {
     TelemetryNoise noise;
-    noise.quantum = round % 3 == 0 ? 1e-3 : 0;
+    noise.resolution = round % 3 == 0 ? 1e-3 : 0;
     TelemetryLimits limits;
     limits.max_gap_s = round % 5 == 0 ? 1e308 : 0.5;
     limits.max_repeat_s = round % 2 == 0 ? 0 : 0.05;
@@ -443,7 +443,7 @@ TEST(TelemetryNoise, ValidatesItself) {
   EXPECT_STREQ(error, "pan_tilt_sigma must not be negative");
   noise.pan_tilt_sigma = 0;
   EXPECT_FALSE(noise.validate(&error)) << "no noise at all";
-  noise.quantum = 1e-4;
+  noise.resolution = 1e-4;
   EXPECT_TRUE(noise.validate(&error));
   noise.period_sigma_s = NAN;
   EXPECT_FALSE(noise.validate(&error));

@@ -169,7 +169,7 @@ INSTANTIATE_TEST_SUITE_P(
 TEST(TelemetryInterpolation, CountsTheRoundingOfTheDevice) {
   TelemetryNoise noise;
   noise.pan_tilt_sigma = 0;
-  noise.quantum = 2e-4;
+  noise.resolution = 2e-4;
   noise.period_sigma_s = 0;
   TelemetryLimits limits;
   limits.max_repeat_s = 0;
@@ -183,7 +183,8 @@ TEST(TelemetryInterpolation, CountsTheRoundingOfTheDevice) {
       const double start = uniform(random);
       const double rate = top_rate * uniform(random);
       for (int i = 0; i < 20; ++i) {
-        const double pan = noise.quantum * std::round((start + rate * i / 30) / noise.quantum);
+        const double pan =
+            noise.resolution * std::round((start + rate * i / 30) / noise.resolution);
         ASSERT_EQ(buffer.push({i / 30.0, 0, pan, 0}), PushStatus::kStored);
       }
       const double time = (8 + 4 * uniform(random)) / 30;
@@ -378,8 +379,8 @@ TEST(TelemetryInterpolation, RemembersThatTheMountStopsAtOnce) {
 }
 
 // Whatever a mean over a long time is made of, white samples h apart leave sigma^2 h / T in it: so must the
-// answers, each worth its renewal.
-TEST(TelemetryInterpolation, AnAnswerIsWorthItsRenewal) {
+// answers, each worth its correlation time.
+TEST(TelemetryInterpolation, AnAnswerIsWorthItsCorrelationTime) {
   std::mt19937_64 random(8);
   std::normal_distribution<double> normal;
   const double sigma = 3e-5;
@@ -413,12 +414,12 @@ TEST(TelemetryInterpolation, AnAnswerIsWorthItsRenewal) {
         ASSERT_EQ(buffer.query(time, 0, &result), QueryStatus::kOk);
         mean += Vector2<double>(result.angle.pan - 0.1 * time, result.angle.tilt + 0.2 * time) /
                 queries;
-        ASSERT_GT(result.renewal_s, 0.9 / rate_hz);
-        ASSERT_LE(result.renewal_s, 1);
+        ASSERT_GT(result.correlation_time_s, 0.9 / rate_hz);
+        ASSERT_LE(result.correlation_time_s, 1);
         // Where noise feigns an acceleration the answer is worth less, rightly or not.
         if (result.acceleration_square.norm() > 0) continue;
-        ASSERT_LT(result.renewal_s, 8.1 / rate_hz);
-        worth += result.covariance(0, 0) * result.renewal_s;
+        ASSERT_LT(result.correlation_time_s, 8.1 / rate_hz);
+        worth += result.covariance(0, 0) * result.correlation_time_s;
         ++white;
       }
       mean_square += mean.squaredNorm() / 2 / runs;
@@ -445,9 +446,9 @@ TEST(TelemetryInterpolation, TwoSamplesAreWorthOneAtASampleAndTwoBetween) {
   InterpolatedPanTilt result;
   ASSERT_EQ(buffer.query(1.02, 0, &result), QueryStatus::kOk);
   EXPECT_EQ(result.samples, 2);
-  EXPECT_NEAR(result.renewal_s, 0.08, 1e-9);
+  EXPECT_NEAR(result.correlation_time_s, 0.08, 1e-9);
   ASSERT_EQ(buffer.query(1.04, 0, &result), QueryStatus::kOk);
-  EXPECT_NEAR(result.renewal_s, 0.04, 1e-9);
+  EXPECT_NEAR(result.correlation_time_s, 0.04, 1e-9);
 }
 
 TEST(TelemetryInterpolation, WhatClockAndAccelerationDoStaysAlikeForLong) {
@@ -459,13 +460,13 @@ TEST(TelemetryInterpolation, WhatClockAndAccelerationDoStaysAlikeForLong) {
   ASSERT_EQ(buffer.push({1.04, 0, 0.001, 0.002}), PushStatus::kStored);
   InterpolatedPanTilt result;
   ASSERT_EQ(buffer.query(1.1, 0, &result), QueryStatus::kExtrapolated);
-  EXPECT_NEAR(result.renewal_s, 1, 0.01);
+  EXPECT_NEAR(result.correlation_time_s, 1, 0.01);
   noise.acceleration_sigma = 0;
   TelemetryBuffer<8> late(noise);
   ASSERT_EQ(late.push({1, 0, 0, 0}), PushStatus::kStored);
   ASSERT_EQ(late.push({1.04, 0, 0.1, 0.2}), PushStatus::kStored);
   ASSERT_EQ(late.query(1.02, 1e-2, &result), QueryStatus::kOk);
-  EXPECT_NEAR(result.renewal_s, 1, 0.01);
+  EXPECT_NEAR(result.correlation_time_s, 1, 0.01);
 }
 
 }  // namespace

@@ -1,0 +1,83 @@
+#include "core/calibration/calibration_types.h"
+
+#include <cmath>
+
+namespace alidade {
+
+bool CalibrationOptions::validate(std::string* error) const {
+  const char* problem = nullptr;
+  const auto check = [&problem](const CalibrationPrior& prior, bool positive, const char* what) {
+    if (!std::isfinite(prior.value) || !std::isfinite(prior.sigma) || prior.sigma < 0 ||
+        (positive && prior.value <= 0)) {
+      problem = what;
+    }
+  };
+  if (focal_length)
+    check(*focal_length, true, "the prior of the focal length needs a value > 0, sigma >= 0");
+  if (aspect) check(*aspect, true, "the prior of the aspect needs a value > 0, sigma >= 0");
+  if (radial_distortion)
+    check(*radial_distortion, false, "the prior of the distortion needs sigma >= 0");
+  if (line_delay) check(*line_delay, false, "the prior of the line delay needs sigma >= 0");
+  if (clock_offset) check(*clock_offset, false, "the prior of the clock offset needs sigma >= 0");
+  check(pan_scale, true, "the prior of the pan scale needs a value > 0, sigma >= 0");
+  check(tilt_scale, true, "the prior of the tilt scale needs a value > 0, sigma >= 0");
+  if (!(pan_axis.norm() > 0.5) || !(tilt_axis.norm() > 0.5) || !(pan_axis.norm() < 2) ||
+      !(tilt_axis.norm() < 2)) {
+    problem = "the axes must be unit vectors";
+  }
+  if (!(axis_sigma_rad >= 0)) problem = "axis_sigma_rad must not be negative";
+  if (!(clock_offset_search_s > 0)) problem = "clock_offset_search_s must be positive";
+  if (!(first_knot_spacing_s > 0)) problem = "first_knot_spacing_s must be positive";
+  if (problem != nullptr && error != nullptr) *error = problem;
+  return problem == nullptr;
+}
+
+std::vector<std::string> CalibrationExclusions::describe() const {
+  std::vector<std::string> lines;
+  const auto add = [&lines](int count, const char* what) {
+    if (count > 0) lines.push_back(std::to_string(count) + " " + what);
+  };
+  add(frames_not_finite, "frames whose stamp is no number");
+  add(frames_duplicate, "frames named before");
+  add(frames_without_telemetry, "frames outside the telemetry's time span");
+  add(observations_not_finite, "observations that are no numbers");
+  add(observations_bad_sigma, "observations whose sigma is not positive");
+  add(observations_outside_image, "observations outside the image");
+  add(observations_duplicate, "observations of a landmark seen twice in one frame");
+  add(observations_unknown_frame, "observations in frames without a stamp");
+  add(observations_of_single_landmarks, "observations of landmarks seen only once");
+  add(observations_outliers, "observations that are outliers");
+  add(telemetry_not_finite, "telemetry samples that are no numbers");
+  add(telemetry_duplicate, "telemetry samples that repeat a sequence number or stamp");
+  add(telemetry_outliers, "telemetry samples that are outliers");
+  add(telemetry_unused, "telemetry samples before or after the video");
+  return lines;
+}
+
+const char* to_string(CalibrationStatus status) {
+  switch (status) {
+    case CalibrationStatus::kOk:
+      return "ok";
+    case CalibrationStatus::kBadInput:
+      return "bad input";
+    case CalibrationStatus::kNoMotion:
+      return "no motion";
+    case CalibrationStatus::kOneAxisOnly:
+      return "one axis only";
+    case CalibrationStatus::kConstantVelocity:
+      return "constant velocity";
+    case CalibrationStatus::kTooFewLandmarks:
+      return "too few landmarks";
+    case CalibrationStatus::kTelemetryMismatch:
+      return "telemetry does not fit the video";
+    case CalibrationStatus::kNotConverged:
+      return "not converged";
+    case CalibrationStatus::kWeak:
+      return "too uncertain";
+    case CalibrationStatus::kCancelled:
+      return "cancelled";
+  }
+  return "unknown status";
+}
+
+}  // namespace alidade

@@ -1,0 +1,214 @@
+#pragma once
+// What calibrate() takes and gives: input, options, and a result that says what it rests on.
+// Angles rad, times s, pixels as in camera.h. Telemetry clock = image clock + clock_offset. Plain values.
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "core/calibration/trajectory_spline.h"
+#include "core/model/calibration.h"
+
+namespace alidade {
+
+struct CalibrationFrame {
+  std::int64_t frame = 0;                // name of the frame in the observations
+  double stamp_s = 0;                    // of row 0, jitter included
+  std::optional<std::int64_t> sequence;  // counts lost frames too
+};
+
+struct CalibrationObservation {
+  std::int64_t frame = 0;
+  std::int64_t landmark = 0;
+  double u_px = 0;
+  double v_px = 0;
+  double sigma_px = 0;
+};
+
+struct CalibrationTelemetry {
+  double stamp_s = 0;  // telemetry clock
+  double pan_rad = 0;
+  double tilt_rad = 0;
+  std::optional<std::int64_t> sequence;
+};
+
+// What is not given is estimated from the data.
+struct CalibrationNoise {
+  std::optional<double> image_stamp_sigma_s;
+  std::optional<double> image_period_s;
+  std::optional<double> image_period_sigma_s;
+  std::optional<double> telemetry_stamp_sigma_s;
+  std::optional<double> telemetry_period_s;
+  std::optional<double> telemetry_period_sigma_s;
+  std::optional<double> pan_tilt_sigma_rad;
+  // Of an error that all telemetry stamps have in common, on top of the above: no number of samples
+  // averages it out of the clock offset. s
+  double telemetry_common_sigma_s = 0;
+};
+
+struct CalibrationInput {
+  int width = 0;   // px
+  int height = 0;  // px
+  std::vector<CalibrationFrame> frames;
+  std::vector<CalibrationObservation> observations;
+  std::vector<CalibrationTelemetry> telemetry;
+  CalibrationNoise noise;
+};
+
+// sigma 0: known exactly.
+struct CalibrationPrior {
+  double value = 0;
+  double sigma = 0;
+};
+
+// How the stamps of a stream err.
+enum class StampNoise {
+  kSymmetric,  // zero mean
+  kOneSided,   // never early: network, software
+  kOwnTimes    // polled: each sample was taken about when its stamp says, no steady clock behind it
+};
+
+struct CalibrationOptions {
+  std::optional<CalibrationPrior> focal_length;  // px
+  std::optional<CalibrationPrior> aspect = CalibrationPrior{1, 0};
+  std::optional<CalibrationPrior> radial_distortion;
+  std::optional<CalibrationPrior> line_delay;    // s/row
+  std::optional<CalibrationPrior> clock_offset;  // s
+  CalibrationPrior pan_scale = {1, 1e-8};
+  CalibrationPrior tilt_scale = {1, 1e-8};
+  Vector3<double> pan_axis = Vector3<double>::UnitZ();
+  Vector3<double> tilt_axis = Vector3<double>::UnitY();
+  double axis_sigma_rad = 0.05;  // each tangent component
+
+  StampNoise image_stamps = StampNoise::kSymmetric;
+  StampNoise telemetry_stamps = StampNoise::kSymmetric;
+  double clock_offset_search_s =
+      1;  // half the range searched first; widened if the best is at its edge
+  double first_knot_spacing_s = 0.5;
+  int max_knots = 2000;
+
+  // Called between steps with 0 to 1 and a few words; false stops.
+  std::function<bool(double, const char*)> progress;
+
+  // False and one line in *error (if not null) when a value is out of its range.
+  [[nodiscard]] bool validate(std::string* error = nullptr) const;
+};
+
+enum class CalibrationStatus {
+  kOk,
+  kBadInput,          // nothing to compute with; message says what is wrong
+  kNoMotion,          // too little for anything
+  kOneAxisOnly,       // pan only or tilt only
+  kConstantVelocity,  // clock offset and line delay unknown
+  kTooFewLandmarks,
+  kTelemetryMismatch,  // telemetry does not describe the video's motion
+  kNotConverged,
+  kWeak,      // solved, but a parameter is too uncertain to be published
+  kCancelled  // by progress()
+};
+
+[[nodiscard]] const char* to_string(CalibrationStatus status);
+
+// One stream's clock as a line through its stamps.
+struct StreamTiming {
+  bool steady = false;  // false: the stamps do not fit a steady period and are used as they are
+  double period_s = 0;
+  double period_sigma_s = 0;
+  double offset_sigma_s = 0;  // of the line at its middle
+  double stamp_sigma_s = 0;
+  int lost = 0;  // gaps in the sequence
+};
+
+// What was left out, and why: never silently.
+struct CalibrationExclusions {
+  int frames_not_finite = 0;
+  int frames_duplicate = 0;
+  int frames_without_telemetry = 0;  // outside the telemetry's span
+  int observations_not_finite = 0;
+  int observations_bad_sigma = 0;
+  int observations_outside_image = 0;
+  int observations_duplicate = 0;
+  int observations_unknown_frame = 0;
+  int observations_of_single_landmarks = 0;  // a landmark seen once says nothing
+  int observations_outliers = 0;
+  int telemetry_not_finite = 0;
+  int telemetry_duplicate = 0;
+  int telemetry_outliers = 0;
+  int telemetry_unused = 0;  // before or after the video
+
+  // One line for each kind that occurred.
+  [[nodiscard]] std::vector<std::string> describe() const;
+};
+
+struct CalibrationLandmark {
+  std::int64_t landmark = 0;
+  Vector3<double> d_b;
+  // rad^2, in tangent_basis(d_b): of the landmark's own observations, camera and trajectory given.
+  Matrix2<double> covariance = Matrix2<double>::Zero();
+  int observations = 0;
+};
+
+struct FrameResult {
+  std::int64_t frame = 0;
+  double time_s = 0;      // image clock, row 0
+  PanTilt<double> angle;  // true angles at that time
+  PanTilt<double> rate;
+};
+
+// Standardised residuals: unit variance if the stated noise is right.
+struct ObservationResidual {
+  std::size_t observation = 0;  // index into the input
+  Vector2<double> error_px;
+  bool outlier = false;
+};
+// With angles of a coarse resolution there is one more for each change of a reading, at the middle of the two times:
+// half-way between them the angle passed then. It has NaN for an axis that did not change.
+struct TelemetryResidual {
+  std::size_t sample = 0;  // index into the input
+  double time_s = 0;       // image clock
+  Vector2<double> error_rad;
+  Vector2<double> sigma_rad;  // as used; infinite where the error is a rounding's and no noise
+  bool outlier = false;
+};
+
+struct CalibrationQuality {
+  double pixel_sigma_ratio = 0;      // residual / stated noise, redundancy accounted for
+  double telemetry_sigma_ratio = 0;  // likewise
+  // How many observations of a landmark in neighbouring frames are worth one, as their errors repeat each other:
+  // the sigmas account for it. 1: they are independent.
+  double repetition = 1;
+  double mean_reprojection_error_px = 0;
+  int frames = 0;
+  int observations = 0;
+  int landmarks = 0;
+  int telemetry = 0;
+  int steps = 0;
+  double motion_correlation = 0;  // between image motion and telemetry, at the start
+  // Of the parameters' correlation matrix: largest over smallest eigenvalue, and the direction in words.
+  double condition = 0;
+  std::string weakest_direction;
+  // kWeak: clock offset or read-out are among what is too uncertain; changes of speed would help.
+  bool weak_in_time = false;
+  std::vector<std::string> advice;  // what motion or knowledge would help; also with kOk
+};
+
+struct CalibrationResult {
+  CalibrationStatus status = CalibrationStatus::kBadInput;
+  std::string message;      // plain words: what is wrong and what would help; with kOk a summary
+  Calibration calibration;  // meaningful with kOk and, for diagnosis, kWeak
+  StreamTiming image_timing;
+  StreamTiming telemetry_timing;
+  TrajectorySpline trajectory;  // image clock
+  std::vector<CalibrationLandmark> landmarks;
+  std::vector<FrameResult> frames;
+  std::vector<ObservationResidual> observation_residuals;
+  std::vector<TelemetryResidual> telemetry_residuals;
+  CalibrationExclusions exclusions;
+  CalibrationQuality quality;
+
+  [[nodiscard]] bool ok() const { return status == CalibrationStatus::kOk; }
+};
+
+}  // namespace alidade

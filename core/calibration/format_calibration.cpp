@@ -1,0 +1,115 @@
+#include <yaml-cpp/yaml.h>
+
+#include <cmath>
+#include <string>
+#include <vector>
+
+#include "core/calibration/calibration_text.h"
+#include "core/calibration/number_text.h"
+
+namespace alidade {
+
+namespace {
+
+void write_quality(const CalibrationNotes& notes, YAML::Emitter* out) {
+  const CalibrationQuality& quality = *notes.quality;
+  const auto number = [out](const char* name, double value, const char* comment) {
+    *out << YAML::Key << name << YAML::Value << short_text(value) << YAML::Comment(comment);
+  };
+  const auto count = [out](const char* name, int value) {
+    *out << YAML::Key << name << YAML::Value << value;
+  };
+  const auto texts = [out](const char* name, const std::vector<std::string>& lines) {
+    if (lines.empty()) return;
+    *out << YAML::Key << name << YAML::Value << YAML::BeginSeq;
+    for (const std::string& line : lines) *out << YAML::DoubleQuoted << line;
+    *out << YAML::EndSeq;
+  };
+  *out << YAML::Key << "quality" << YAML::Value << YAML::BeginMap;
+  number("pixel_sigma_ratio", quality.pixel_sigma_ratio, "residuals / stated noise");
+  number("repetition", quality.repetition, "observations of a landmark that count as one");
+  number("telemetry_sigma_ratio", quality.telemetry_sigma_ratio, "residuals / assumed noise");
+  number("mean_reprojection_error_px", quality.mean_reprojection_error_px, "px");
+  number("motion_correlation", quality.motion_correlation, "image motion and telemetry");
+  count("frames", quality.frames);
+  count("observations", quality.observations);
+  count("landmarks", quality.landmarks);
+  count("telemetry", quality.telemetry);
+  number("condition", quality.condition, "of the parameters' correlation matrix");
+  *out << YAML::Key << "weakest_direction" << YAML::Value << YAML::DoubleQuoted
+       << quality.weakest_direction;
+  *out << YAML::Key << "priors" << YAML::Value << YAML::BeginMap;
+  for (const auto& [name, prior] : notes.priors) {
+    *out << YAML::Key << name << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "value"
+         << YAML::Value << exact_text(prior.value) << YAML::Key << "sigma" << YAML::Value
+         << exact_text(prior.sigma) << YAML::EndMap;
+  }
+  *out << YAML::EndMap;
+  texts("excluded", notes.excluded);
+  texts("advice", quality.advice);
+  *out << YAML::EndMap;
+}
+
+}  // namespace
+
+std::string format_calibration(const Calibration& calibration, const CalibrationNotes& notes) {
+  YAML::Emitter out;
+  const auto& cov = calibration.covariance;
+  const auto sigma = [&cov](Parameter parameter) {
+    return exact_text(std::sqrt(cov(index(parameter), index(parameter))));
+  };
+  const auto write_scalar = [&](Parameter parameter, double value, const char* comment) {
+    out << YAML::Key << to_string(parameter) << YAML::Value << YAML::Flow << YAML::BeginMap
+        << YAML::Key << "value" << YAML::Value << exact_text(value) << YAML::Key << "sigma"
+        << YAML::Value << sigma(parameter) << YAML::EndMap << YAML::Comment(comment);
+  };
+  const auto write_axis = [&](const char* name, const Vector3<double>& axis, Parameter first,
+                              const char* comment) {
+    out << YAML::Key << name << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "value"
+        << YAML::Value << YAML::BeginSeq;
+    for (int i = 0; i < 3; ++i) out << exact_text(axis[i]);
+    out << YAML::EndSeq << YAML::Key << "sigma" << YAML::Value << YAML::BeginSeq << sigma(first)
+        << sigma(static_cast<Parameter>(index(first) + 1)) << YAML::EndSeq << YAML::EndMap
+        << YAML::Comment(comment);
+  };
+
+  out << YAML::BeginMap;
+  out << YAML::Key << "format" << YAML::Value << 1;
+  out << YAML::Key << "image" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key << "width"
+      << YAML::Value << std::to_string(calibration.camera.width) << YAML::Key << "height"
+      << YAML::Value << std::to_string(calibration.camera.height) << YAML::EndMap;
+  write_scalar(Parameter::kFocalLength, calibration.camera.focal_length, "px");
+  write_scalar(Parameter::kAspect, calibration.camera.aspect, "f_v / f_u");
+  write_scalar(Parameter::kRadialDistortion, calibration.camera.radial_distortion,
+               "u = f x (1 + k |x|^2) + centre");
+  write_scalar(Parameter::kLineDelay, calibration.line_delay, "s/row");
+  write_axis("pan_axis", calibration.mechanics.pan_axis, Parameter::kPanAxis0,
+             "unit vector in the base: forward, right, down; sigma in rad");
+  write_axis("tilt_axis", calibration.mechanics.tilt_axis, Parameter::kTiltAxis0,
+             "unit vector in the base; sigma in rad");
+  write_scalar(Parameter::kPanScale, calibration.mechanics.pan_scale, "measured / true angle");
+  write_scalar(Parameter::kTiltScale, calibration.mechanics.tilt_scale, "measured / true angle");
+  write_scalar(Parameter::kClockOffset, calibration.clock_offset,
+               "s; telemetry clock = image clock + clock_offset");
+  if (calibration.zoom) out << YAML::Key << "zoom" << YAML::Value << exact_text(*calibration.zoom);
+  if (!cov.isZero(0)) {
+    out << YAML::Key << "covariance" << YAML::Value << YAML::BeginMap << YAML::Key << "names"
+        << YAML::Value << YAML::Flow << YAML::BeginSeq;
+    for (int i = 0; i < kParameterCount; ++i) out << to_string(static_cast<Parameter>(i));
+    out << YAML::EndSeq << YAML::Key << "matrix" << YAML::Value << YAML::BeginSeq;
+    for (int i = 0; i < kParameterCount; ++i) {
+      out << YAML::Flow << YAML::BeginSeq;
+      for (int j = 0; j < kParameterCount; ++j) out << exact_text(cov(i, j));
+      out << YAML::EndSeq;
+    }
+    out << YAML::EndSeq << YAML::EndMap;
+  }
+  if (notes.quality) write_quality(notes, &out);
+  if (!notes.landmarks.empty()) {
+    out << YAML::Key << "landmarks" << YAML::Value << YAML::DoubleQuoted << notes.landmarks;
+  }
+  out << YAML::EndMap;
+  return std::string(out.c_str()) + "\n";
+}
+
+}  // namespace alidade

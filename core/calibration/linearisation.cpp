@@ -1,0 +1,351 @@
+#include "core/calibration/linearisation.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace alidade::internal {
+
+namespace {
+
+using CameraJacobian = Eigen::Matrix<double, 2, kCameraCount>;
+
+// Row velocity of the image beyond which a landmark meets the read-out in no definite row.
+constexpr double kMaxRowSlope = 0.9;
+
+struct ObservationModel {
+  const Camera<double> camera;
+  const Mechanics<double>& mechanics;
+  const double line_delay;
+  const double distortion_unit;  // k = distortion * unit
+  Matrix3<double> R_base_from_anchor;
+  Matrix<double, 3, 4> J_xi_axes_anchor;
+
+  explicit ObservationModel(const AdjustmentState& state)
+      : camera(state.physical_camera()),
+        mechanics(state.mechanics),
+        line_delay(state.line_delay()),
+        distortion_unit(std::pow(state.camera.focal_length / state.half_diagonal(), 2)) {
+    J_xi_axes_anchor.setZero();
+    R_base_from_anchor =
+        R_base_from_camera(state.mechanics, state.anchor, nullptr, &J_xi_axes_anchor);
+  }
+
+  struct Landmark {
+    Vector3<double> d_b;
+    Matrix<double, 3, 2> J_db_landmark;
+    Matrix<double, 3, 4> J_db_axes;
+  };
+  [[nodiscard]] Landmark turn(const Vector3<double>& d_anchor) const {
+    return {R_base_from_anchor * d_anchor, R_base_from_anchor * tangent_basis(d_anchor),
+            -R_base_from_anchor * (skew(d_anchor) * J_xi_axes_anchor)};
+  }
+
+  struct Result {
+    Vector2<double> error;
+    Matrix2<double> J_angle;  // of the projection, like the following
+    Matrix2<double> J_landmark;
+    CameraJacobian J_camera;
+  };
+
+  // In units of sigma.
+  [[nodiscard]] bool evaluate(const AdjustmentObservation& observation,
+                              const PanTilt<double>& angle, const PanTilt<double>& rate,
+                              const Landmark& landmark, Result* out) const {
+    Matrix<double, 3, 2> J_xi_angle;
+    Matrix<double, 3, 4> J_xi_axes;
+    const Matrix3<double> R = R_base_from_camera(mechanics, angle, &J_xi_angle, &J_xi_axes);
+    const Vector3<double> d_c = R.transpose() * landmark.d_b;
+    Vector2<double> u;
+    Matrix<double, 2, 3> J_u_dc;
+    Matrix<double, 2, 3> J_u_camera;
+    if (project(camera, d_c, &u, &J_u_dc, &J_u_camera) != ProjectionStatus::kOk) return false;
+    const Matrix<double, 2, 3> J_u_xi = J_u_dc * skew(d_c);
+    const Matrix2<double> J_u_angle = J_u_xi * J_xi_angle;
+    const Vector2<double> J_u_time = J_u_angle * rate.vector();
+    const Vector2<double> J_u_row = J_u_time * line_delay;
+    if (J_u_row.y() > kMaxRowSlope) return false;
+
+    Matrix2<double> whiten;  // A^-1 / sigma
+    whiten << 1, J_u_row.x() / (1 - J_u_row.y()), 0, 1 / (1 - J_u_row.y());
+    whiten /= observation.sigma;
+    out->error = whiten * (observation.u - u);
+    out->J_angle = whiten * J_u_angle;
+    const Matrix<double, 2, 3> J_u_db = J_u_dc * R.transpose();
+    out->J_landmark = whiten * (J_u_db * landmark.J_db_landmark);
+    CameraJacobian J;
+    J.col(0) =
+        camera.focal_length * J_u_camera.col(0) + 2 * camera.radial_distortion * J_u_camera.col(2);
+    J.col(1) = camera.aspect * J_u_camera.col(1);
+    J.col(2) = distortion_unit * J_u_camera.col(2);
+    J.col(3) = J_u_time * (observation.u.y() / camera.height);
+    J.rightCols<4>() = J_u_xi * J_xi_axes + J_u_db * landmark.J_db_axes;
+    out->J_camera = whiten * J;
+    return true;
+  }
+};
+
+struct RobustCost {
+  double cost;
+  double weight;
+};
+
+RobustCost robust_cost(double squared_error, double scale) {
+  if (std::isinf(scale)) return {squared_error, 1};
+  const double c = scale * scale;
+  return {c * std::log1p(squared_error / c), 1 / (1 + squared_error / c)};
+}
+
+// What an observation without a projection costs: it must not pay to lose one.
+constexpr double kLostSquaredError = 1e10;
+
+// H's block of four control points: J^T J (x) w w^T, lower triangle.
+void add_control_points(const TrajectorySpline::Basis& basis, const Matrix2<double>& J_squared,
+                        Eigen::MatrixXd* H) {
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j <= i; ++j) {
+      H->block<2, 2>(2 * (basis.segment + i), 2 * (basis.segment + j)) +=
+          basis.weight[i] * basis.weight[j] * J_squared;
+    }
+  }
+}
+
+}  // namespace
+
+double AdjustmentState::half_diagonal() const {
+  return 0.5 * std::hypot(camera.width, camera.height);
+}
+
+Camera<double> AdjustmentState::physical_camera() const {
+  Camera<double> physical = camera;
+  physical.radial_distortion = distortion * std::pow(camera.focal_length / half_diagonal(), 2);
+  return physical;
+}
+
+void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_landmark,
+                AdjustmentState* state) {
+  const int control_points = state->trajectory.control_points();
+  for (int i = 0; i < control_points; ++i) {
+    state->trajectory.control_point(i) += x.segment<2>(2 * i);
+  }
+  const GlobalVector global = x.tail<kGlobalCount>();
+  state->camera.focal_length *= std::exp(global[index(Parameter::kFocalLength)]);
+  state->camera.aspect *= std::exp(global[index(Parameter::kAspect)]);
+  state->distortion += global[index(Parameter::kRadialDistortion)];
+  state->readout_s += global[index(Parameter::kLineDelay)];
+  Mechanics<double>& mechanics = state->mechanics;
+  mechanics.pan_axis = direction_plus<double>(
+      mechanics.pan_axis, Vector2<double>(global.segment<2>(index(Parameter::kPanAxis0))));
+  mechanics.tilt_axis = direction_plus<double>(
+      mechanics.tilt_axis, Vector2<double>(global.segment<2>(index(Parameter::kTiltAxis0))));
+  mechanics.pan_scale += global[index(Parameter::kPanScale)];
+  mechanics.tilt_scale += global[index(Parameter::kTiltScale)];
+  state->shift_s += global[index(Parameter::kClockOffset)];
+  state->drift += global[kDrift];
+  for (std::size_t i = 0; i < x_landmark.size(); ++i) {
+    state->landmarks[i] = direction_plus<double>(state->landmarks[i], x_landmark[i]).normalized();
+  }
+  mechanics.pan_axis.normalize();
+  mechanics.tilt_axis.normalize();
+}
+
+void Lineariser::linearise(const AdjustmentState& state, const LossScales& loss,
+                           Linearisation* out) {
+  const int size = 2 * state.trajectory.control_points() + kGlobalCount;
+  out->cost = 0;
+  out->valid = true;
+  out->H.setZero(size, size);
+  out->g.setZero(size);
+  add_observations(state, loss, out);
+  add_telemetry(state, loss, out);
+  add_priors(state, out);
+  fix_parameters(out);
+}
+
+void Lineariser::add_observations(const AdjustmentState& state, const LossScales& loss,
+                                  Linearisation* out) {
+  const ObservationModel model(state);
+  const TrajectorySpline& trajectory = state.trajectory;
+  const int camera_row = 2 * trajectory.control_points();
+  const std::size_t landmarks = state.landmarks.size();
+  out->observations.resize(data_.observations.size());
+  out->H_landmark.assign(landmarks, Matrix2<double>::Zero());
+  out->g_landmark.assign(landmarks, Vector2<double>::Zero());
+  out->H_camera.assign(landmarks, Eigen::Matrix<double, kCameraCount, 2>::Zero());
+  out->touched.clear();
+  out->H_touched.clear();
+  out->touched_begin.assign(1, 0);
+  touched_buffer_.assign(static_cast<std::size_t>(trajectory.control_points()),
+                         Matrix2<double>::Zero());
+  is_touched_.assign(static_cast<std::size_t>(trajectory.control_points()), false);
+
+  Eigen::Matrix<double, kCameraCount, kCameraCount> H_cc;
+  H_cc.setZero();
+  Eigen::Matrix<double, kCameraCount, 1> g_c;
+  g_c.setZero();
+  std::vector<int> touched_now;
+  std::size_t next = 0;
+  for (std::size_t l = 0; l < landmarks; ++l) {
+    const ObservationModel::Landmark landmark = model.turn(state.landmarks[l]);
+    int segment = 0;
+    for (; next < data_.observations.size() &&
+           data_.observations[next].landmark == static_cast<int>(l);
+         ++next) {
+      const AdjustmentObservation& observation = data_.observations[next];
+      LinearisedResidual& residual = out->observations[next];
+      residual.valid = false;
+      const double time = data_.frame_time_s[static_cast<std::size_t>(observation.frame)] +
+                          observation.u.y() * model.line_delay;
+      const TrajectorySpline::Basis basis = trajectory.basis(time, segment);
+      segment = basis.segment;
+      ObservationModel::Result result;
+      if (!model.evaluate(observation, trajectory.position(basis), trajectory.rate(basis), landmark,
+                          &result)) {
+        if (!observation.used) continue;
+        out->cost += robust_cost(kLostSquaredError, loss.pixel).cost;
+        if (std::isinf(loss.pixel)) out->valid = false;
+        continue;
+      }
+      const RobustCost robust = robust_cost(result.error.squaredNorm(), loss.pixel);
+      const double root = std::sqrt(robust.weight);
+      residual = {time, segment, true, root * result.error, root * result.J_angle};
+      if (!observation.used) continue;
+      out->cost += robust.cost;
+
+      const Matrix2<double> Jt_angle = robust.weight * result.J_angle.transpose();
+      const Matrix2<double> Jt_landmark = robust.weight * result.J_landmark.transpose();
+      const Vector2<double> g_angle = Jt_angle * result.error;
+      add_control_points(basis, Jt_angle * result.J_angle, &out->H);
+      const Eigen::Matrix<double, kCameraCount, 2> H_ca = (Jt_angle * result.J_camera).transpose();
+      const Matrix2<double> H_al = Jt_angle * result.J_landmark;
+      for (int i = 0; i < 4; ++i) {
+        const int point = segment + i;
+        const double w = basis.weight[i];
+        out->g.segment<2>(2 * point) += w * g_angle;
+        out->H.block<kCameraCount, 2>(camera_row, 2 * point) += w * H_ca;
+        touched_buffer_[static_cast<std::size_t>(point)] += w * H_al;
+        if (!is_touched_[static_cast<std::size_t>(point)]) {
+          is_touched_[static_cast<std::size_t>(point)] = true;
+          touched_now.push_back(point);
+        }
+      }
+      const Eigen::Matrix<double, kCameraCount, 2> Jt_camera =
+          robust.weight * result.J_camera.transpose();
+      H_cc.noalias() += Jt_camera * result.J_camera;
+      g_c.noalias() += Jt_camera * result.error;
+      out->H_landmark[l] += Jt_landmark * result.J_landmark;
+      out->g_landmark[l] += Jt_landmark * result.error;
+      out->H_camera[l] += (Jt_landmark * result.J_camera).transpose();
+    }
+    std::sort(touched_now.begin(), touched_now.end());
+    for (const int point : touched_now) {
+      out->touched.push_back(point);
+      out->H_touched.push_back(touched_buffer_[static_cast<std::size_t>(point)]);
+      touched_buffer_[static_cast<std::size_t>(point)].setZero();
+      is_touched_[static_cast<std::size_t>(point)] = false;
+    }
+    touched_now.clear();
+    out->touched_begin.push_back(out->touched.size());
+  }
+  out->H.block<kCameraCount, kCameraCount>(camera_row, camera_row) += H_cc;
+  out->g.segment<kCameraCount>(camera_row) += g_c;
+}
+
+void Lineariser::add_telemetry(const AdjustmentState& state, const LossScales& loss,
+                               Linearisation* out) {
+  const TrajectorySpline& trajectory = state.trajectory;
+  const int global_row = 2 * trajectory.control_points();
+  const Vector2<double> scale(state.mechanics.pan_scale, state.mechanics.tilt_scale);
+  Eigen::MatrixXd& H = out->H_telemetry;
+  H.setZero(out->H.rows(), out->H.cols());
+  out->telemetry.resize(data_.telemetry.size());
+  int segment = 0;
+  for (std::size_t i = 0; i < data_.telemetry.size(); ++i) {
+    const AdjustmentTelemetry& sample = data_.telemetry[i];
+    const double since_reference = sample.time_s - data_.reference_s;
+    const double time = sample.time_s - state.shift_s + state.drift * since_reference;
+    const TrajectorySpline::Basis basis = trajectory.basis(time, segment);
+    segment = basis.segment;
+    const Vector2<double> angle = trajectory.position(basis).vector();
+    const Vector2<double> rate = trajectory.rate(basis).vector();
+    const Vector2<double> predicted = scale.cwiseProduct(angle);
+    const Vector2<double> error(wrap_angle(sample.measured[0] - predicted[0]) / sample.sigma[0],
+                                wrap_angle(sample.measured[1] - predicted[1]) / sample.sigma[1]);
+    const RobustCost robust = robust_cost(error.squaredNorm(), loss.telemetry);
+    const double root = std::sqrt(robust.weight);
+    const Vector2<double> slope = scale.cwiseQuotient(sample.sigma);
+    out->telemetry[i] = {time, segment, true, root * error,
+                         Matrix2<double>((root * slope).asDiagonal())};
+    if (!sample.used) continue;
+    out->cost += robust.cost;
+
+    // Columns pan scale, tilt scale, shift, drift.
+    Eigen::Matrix<double, 2, 4> J;
+    J << angle[0], 0, -scale[0] * rate[0], scale[0] * rate[0] * since_reference,  //
+        0, angle[1], -scale[1] * rate[1], scale[1] * rate[1] * since_reference;
+    J = (sample.sigma.cwiseInverse().asDiagonal() * J).eval();
+    const Matrix2<double> J_squared =
+        robust.weight * Matrix2<double>(slope.cwiseAbs2().asDiagonal());
+    add_control_points(basis, J_squared, &H);
+    const Eigen::Matrix<double, 4, 2> H_pa = robust.weight * J.transpose() * slope.asDiagonal();
+    for (int k = 0; k < 4; ++k) {
+      const int point = basis.segment + k;
+      out->g.segment<2>(2 * point) += basis.weight[k] * robust.weight * slope.cwiseProduct(error);
+      H.block<4, 2>(global_row + kCameraCount, 2 * point) += basis.weight[k] * H_pa;
+    }
+    H.block<4, 4>(global_row + kCameraCount, global_row + kCameraCount) +=
+        robust.weight * J.transpose() * J;
+    out->g.segment<4>(global_row + kCameraCount) += robust.weight * J.transpose() * error;
+  }
+  out->H += H;
+}
+
+void Lineariser::add_priors(const AdjustmentState& state, Linearisation* out) const {
+  const AdjustmentState& mean = priors_.mean;
+  // error = prior - state, J = d state / d step
+  GlobalVector error;
+  GlobalMatrix J = GlobalMatrix::Identity();
+  error[index(Parameter::kFocalLength)] =
+      std::log(mean.camera.focal_length / state.camera.focal_length);
+  error[index(Parameter::kAspect)] = std::log(mean.camera.aspect / state.camera.aspect);
+  // Of k itself, not of its scaled form.
+  const double f_ratio = state.camera.focal_length / mean.camera.focal_length;
+  error[index(Parameter::kRadialDistortion)] =
+      mean.distortion - state.distortion * f_ratio * f_ratio;
+  J(index(Parameter::kRadialDistortion), index(Parameter::kRadialDistortion)) = f_ratio * f_ratio;
+  J(index(Parameter::kRadialDistortion), index(Parameter::kFocalLength)) =
+      2 * state.distortion * f_ratio * f_ratio;
+  error[index(Parameter::kLineDelay)] = mean.readout_s - state.readout_s;
+  const auto add_axis = [&](const Vector3<double>& axis, const Vector3<double>& prior, int first) {
+    Matrix<double, 2, 3> J_change_axis;
+    error.segment<2>(first) = -direction_minus<double>(axis, prior, &J_change_axis);
+    J.block<2, 2>(first, first) = J_change_axis * tangent_basis(axis);
+  };
+  add_axis(state.mechanics.pan_axis, mean.mechanics.pan_axis, index(Parameter::kPanAxis0));
+  add_axis(state.mechanics.tilt_axis, mean.mechanics.tilt_axis, index(Parameter::kTiltAxis0));
+  error[index(Parameter::kPanScale)] = mean.mechanics.pan_scale - state.mechanics.pan_scale;
+  error[index(Parameter::kTiltScale)] = mean.mechanics.tilt_scale - state.mechanics.tilt_scale;
+  error[index(Parameter::kClockOffset)] = mean.shift_s - state.shift_s;
+  error[kDrift] = mean.drift - state.drift;
+
+  const GlobalMatrix JtW = J.transpose() * priors_.information.asDiagonal();
+  out->H.bottomRightCorner<kGlobalCount, kGlobalCount>() += JtW * J;
+  out->g.tail<kGlobalCount>() += JtW * error;
+  out->cost += error.dot(priors_.information.cwiseProduct(error));
+}
+
+void Lineariser::fix_parameters(Linearisation* out) const {
+  const auto first = out->H.rows() - kGlobalCount;
+  for (int i = 0; i < kGlobalCount; ++i) {
+    if (!fixed_[static_cast<std::size_t>(i)]) continue;
+    out->H.row(first + i).setZero();
+    out->H.col(first + i).setZero();
+    out->H(first + i, first + i) = 1;
+    out->H_telemetry.row(first + i).setZero();
+    out->H_telemetry.col(first + i).setZero();
+    out->g[first + i] = 0;
+    if (i >= kCameraCount) continue;
+    for (auto& H_camera : out->H_camera) H_camera.row(i).setZero();
+  }
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,125 @@
+#include "core/calibration/motion_match.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+
+#include "core/calibration/median.h"
+
+namespace alidade::internal {
+
+std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baseline_s) {
+  struct Seen {
+    int landmark;
+    Vector2<double> u;
+  };
+  const std::size_t frames = data.frame_time_s.size();
+  std::vector<std::vector<Seen>> seen(frames);
+  for (const auto& o : data.observations) {  // by landmark, so each frame's list is sorted
+    seen[static_cast<std::size_t>(o.frame)].push_back({o.landmark, o.u});
+  }
+  constexpr std::size_t kMinShared = 3;
+  std::vector<Vector2<double>> position(frames, Vector2<double>::Zero());
+  std::vector<int> chain(frames, 0);
+  std::vector<double> du;
+  std::vector<double> dv;
+  // A frame in which nothing was looked for says nothing of the motion, not even that it broke off.
+  std::size_t before = 0;
+  for (std::size_t i = 1; i < frames; ++i) {
+    if (seen[i].empty()) continue;
+    du.clear();
+    dv.clear();
+    auto a = seen[before].begin();
+    for (const Seen& b : seen[i]) {
+      while (a != seen[before].end() && a->landmark < b.landmark) ++a;
+      if (a == seen[before].end()) break;
+      if (a->landmark != b.landmark) continue;
+      du.push_back(b.u.x() - a->u.x());
+      dv.push_back(b.u.y() - a->u.y());
+    }
+    const bool linked = du.size() >= kMinShared;
+    chain[i] = chain[before] + (linked ? 0 : 1);
+    if (linked) position[i] = position[before] + Vector2<double>(median(du), median(dv));
+    before = i;
+  }
+  std::vector<ImageMotion> motion;
+  std::size_t to = 0;
+  for (std::size_t from = 0; from < frames; ++from) {
+    while (to < frames && data.frame_time_s[to] < data.frame_time_s[from] + baseline_s) ++to;
+    if (to == frames) break;
+    if (seen[from].empty() || seen[to].empty() || chain[from] != chain[to]) continue;
+    motion.push_back(
+        {data.frame_time_s[from], data.frame_time_s[to], position[to] - position[from]});
+  }
+  return motion;
+}
+
+MotionMatch match_motion(const std::vector<ImageMotion>& motion, const TrajectorySpline& telemetry,
+                         double centre_s, double half_range_s) {
+  // The telemetry on a grid: every candidate needs it at all frames.
+  constexpr double kGridStep = 2e-3;
+  const int grid_size = static_cast<int>((telemetry.end_s() - telemetry.begin_s()) / kGridStep) + 1;
+  std::vector<Vector2<double>> grid;
+  grid.reserve(static_cast<std::size_t>(grid_size));
+  int segment = 0;
+  for (int i = 0; i < grid_size; ++i) {
+    const auto basis = telemetry.basis(telemetry.begin_s() + i * kGridStep, segment);
+    segment = basis.segment;
+    grid.push_back(telemetry.position(basis).vector());
+  }
+  const auto look_up = [&](double time, Vector2<double>* angle) {
+    const double place = (time - telemetry.begin_s()) / kGridStep;
+    if (!(place >= 0) || place >= grid_size - 1) return false;
+    const auto i = static_cast<std::size_t>(place);
+    const double share = place - static_cast<double>(i);
+    *angle = (1 - share) * grid[i] + share * grid[i + 1];
+    return true;
+  };
+  const auto evaluate = [&](double shift) {
+    MotionMatch match;
+    match.shift_s = shift;
+    Vector2<double> mp = Vector2<double>::Zero();
+    Vector2<double> mm = Vector2<double>::Zero();
+    Vector2<double> pp = Vector2<double>::Zero();
+    std::size_t used = 0;
+    for (const ImageMotion& m : motion) {
+      Vector2<double> from;
+      Vector2<double> to;
+      if (!look_up(m.from_s + shift, &from) || !look_up(m.to_s + shift, &to)) continue;
+      const Vector2<double> p(-std::cos(0.5 * (from[1] + to[1])) * (to[0] - from[0]),
+                              to[1] - from[1]);
+      mp += m.shift.cwiseProduct(p);
+      mm += m.shift.cwiseAbs2();
+      pp += p.cwiseAbs2();
+      ++used;
+    }
+    // A candidate that leaves most of the video without telemetry is no match.
+    if (2 * used < motion.size()) return match;
+    const auto normalised = [](double ab, double aa, double bb) {
+      return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : 0.0;
+    };
+    match.correlation = normalised(mp.sum(), mm.sum(), pp.sum());
+    match.focal_length = pp.sum() > 0 ? mp.sum() / pp.sum() : 0;
+    return match;
+  };
+
+  MotionMatch best;
+  const auto search = [&](double centre, double half_range, int steps) {
+    int best_step = 0;
+    for (int i = -steps; i <= steps; ++i) {
+      const MotionMatch match = evaluate(centre + half_range * i / steps);
+      if (match.correlation <= best.correlation) continue;
+      best = match;
+      best_step = i;
+    }
+    return best_step;
+  };
+  const int steps = std::max(10, static_cast<int>(half_range_s / 0.02));
+  const int at = search(centre_s, half_range_s, steps);
+  best.at_edge = std::abs(at) == steps;
+  for (double range = half_range_s / steps; range > 1e-4; range /= 5)
+    search(best.shift_s, range, 5);
+  return best;
+}
+
+}  // namespace alidade::internal

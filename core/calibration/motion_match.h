@@ -1,0 +1,36 @@
+#pragma once
+// Clock offset and focal length from motion alone, without a guess: over some 0.5 s the image moves by
+//   (-f cos(tilt) dpan, f dtilt).
+// d is where the median motion of the tracks correlates best with the telemetry's, f is the ratio there. Medians and
+// the normalised correlation need neither a guess of f nor clean tracks. Small tilt and nominal axes are
+// assumed: good to some percent, which the robust adjustment removes. Allocates.
+
+#include <vector>
+
+#include "core/calibration/linearisation.h"
+
+namespace alidade::internal {
+
+// The median motion of the tracks from one frame to another.
+struct ImageMotion {
+  double from_s = 0;
+  double to_s = 0;
+  Vector2<double> shift;  // px
+};
+
+// Over baselines of about baseline_s, along chains of frames that share landmarks.
+[[nodiscard]] std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baseline_s);
+
+struct MotionMatch {
+  double shift_s = 0;  // telemetry time = image time + shift_s
+  double focal_length = 0;
+  double correlation = 0;  // of the motions, 1 = perfect
+  bool at_edge = false;    // of the range that was searched
+};
+
+// The best shift within half_range_s of centre_s, to 0.1 ms.
+[[nodiscard]] MotionMatch match_motion(const std::vector<ImageMotion>& motion,
+                                       const TrajectorySpline& telemetry, double centre_s,
+                                       double half_range_s);
+
+}  // namespace alidade::internal

@@ -1,0 +1,172 @@
+#include "core/calibration/staged_adjustment.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "core/calibration/knot_choice.h"
+#include "core/calibration/median.h"
+#include "core/calibration/noise_check.h"
+#include "core/calibration/rounded_telemetry.h"
+
+namespace alidade::internal {
+
+namespace {
+
+// Both components of an error together; a Gaussian one exceeds this once in 10,000.
+const double kOutlierSquaredError = 2 * std::log(1e4);
+// Cauchy scale (sigmas) of the robust adjustment.
+constexpr double kRobustScale = 3;
+
+double median_error(const std::vector<LinearisedResidual>& residuals) {
+  std::vector<double> errors;
+  for (const auto& r : residuals) {
+    if (r.valid) errors.push_back(r.error.norm());
+  }
+  return errors.empty() ? 1.0 : median(std::move(errors));
+}
+
+}  // namespace
+
+StagedAdjustment::StagedAdjustment(const StartValues& start, const TelemetryNoise& noise,
+                                   int max_knots, SelectedInput* selected)
+    : selected_(selected),
+      noise_(noise),
+      max_knots_(max_knots),
+      doubt_(start.doubt),
+      adjustment_(selected->data, start.prior.priors, start.prior.fixed) {
+  adjusted_.state = start.state;
+}
+
+void StagedAdjustment::adjust_robustly() {
+  settled_ = settle_robustly();
+  if (settled_ && noise_.resolution_rad > 0) {
+    replace_rounded_telemetry();
+    settled_ = settle_robustly();
+  }
+  adjustment_.linearise(adjusted_.state, {}, &adjusted_.at);
+  mark_outliers();
+}
+
+StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
+  quality->pixel_sigma_ratio = 1;
+  quality->telemetry_sigma_ratio = 1;
+  bool converged = settled_;
+  for (int pass = 0; converged && pass < 4; ++pass) {
+    converged = settle_on_inliers();
+    if (!converged) break;
+    if (!adjustment_.covariance(adjusted_.at, &adjusted_.covariance, &telemetry_unknowns_)) {
+      return {CalibrationStatus::kWeak,
+              "the data leave a combination of parameters open: move both axes, at changing speed, "
+              "over a good part of the image"};
+    }
+    if (!correct_noise(quality)) break;
+  }
+  quality->steps = adjustment_.steps_taken();
+  if (!converged) {
+    return {CalibrationStatus::kNotConverged,
+            "the adjustment does not converge: the model does not describe these data; are the "
+            "image's size and the tracks those of one zoom?" +
+                doubt_};
+  }
+  return allow_for_repetition(quality);
+}
+
+bool StagedAdjustment::settle_robustly() {
+  LossScales loss;
+  adjustment_.linearise(adjusted_.state, {1e6, 1e6}, &adjusted_.at);
+  bool settled = false;
+  for (int round = 0; round < 20; ++round) {
+    loss.pixel = std::max(kRobustScale, 2 * median_error(adjusted_.at.observations));
+    loss.telemetry = std::max(kRobustScale, 2 * median_error(adjusted_.at.telemetry));
+    settled = adjustment_.minimise(loss, 3, 1.0, &adjusted_.state, &adjusted_.at);
+    if (split_knots()) continue;
+    if (settled && loss.pixel == kRobustScale) return true;
+  }
+  return settled;
+}
+
+bool StagedAdjustment::settle_on_inliers() {
+  for (int round = 0; round < 8; ++round) {
+    if (!adjustment_.minimise({}, 20, 1e-4, &adjusted_.state, &adjusted_.at)) return false;
+    if (split_knots()) continue;
+    if (!mark_outliers()) return true;
+  }
+  return true;
+}
+
+// True if the residuals asked for knots and got them.
+bool StagedAdjustment::split_knots() {
+  TrajectorySpline& trajectory = adjusted_.state.trajectory;
+  const KnotChoice choice = choose_knots(selected_->data, trajectory, adjusted_.at);
+  if (choice.split.empty() ||
+      trajectory.segments() + static_cast<int>(choice.split.size()) >= max_knots_) {
+    return false;
+  }
+  trajectory = trajectory.split(choice.split);
+  return true;
+}
+
+void StagedAdjustment::replace_rounded_telemetry() {
+  std::vector<std::size_t> source;
+  auto& telemetry = selected_->data.telemetry;
+  telemetry = add_crossings(telemetry, noise_.resolution_rad, noise_.white_sigma_rad,
+                            adjusted_.state.trajectory, adjusted_.state.shift_s, &source);
+  for (std::size_t& sample : source) sample = selected_->telemetry_index[sample];
+  selected_->telemetry_index = std::move(source);
+}
+
+// Outlier or not by the residuals at hand; true if any changed.
+bool StagedAdjustment::mark_outliers() {
+  const Linearisation& at = adjusted_.at;
+  AdjustmentData& data = selected_->data;
+  bool changed = false;
+  const auto mark = [&changed](bool used, bool* flag) {
+    changed = changed || used != *flag;
+    *flag = used;
+  };
+  for (std::size_t i = 0; i < data.observations.size(); ++i) {
+    const auto& residual = at.observations[i];
+    mark(residual.valid && residual.error.squaredNorm() <= kOutlierSquaredError,
+         &data.observations[i].used);
+  }
+  for (std::size_t i = 0; i < data.telemetry.size(); ++i) {
+    mark(at.telemetry[i].error.squaredNorm() <= kOutlierSquaredError, &data.telemetry[i].used);
+  }
+  return changed;
+}
+
+// Residuals that contradict the stated noise are believed. True if anything changed.
+bool StagedAdjustment::correct_noise(CalibrationQuality* quality) {
+  AdjustmentData& data = selected_->data;
+  const NoiseRatios ratios = noise_ratios(data, adjusted_.state, adjusted_.at, telemetry_unknowns_);
+  if (!ratios.known()) return false;
+  if (ratios.pixel.contradicts()) {
+    for (auto& o : data.observations) o.sigma *= ratios.pixel.ratio;
+    quality->pixel_sigma_ratio *= ratios.pixel.ratio;
+  }
+  if (ratios.telemetry.contradicts()) {
+    for (auto& sample : data.telemetry) sample.sigma *= ratios.telemetry.ratio;
+    quality->telemetry_sigma_ratio *= ratios.telemetry.ratio;
+  }
+  return ratios.pixel.contradicts() || ratios.telemetry.contradicts();
+}
+
+StageStatus StagedAdjustment::allow_for_repetition(CalibrationQuality* quality) {
+  constexpr double kChance = 1.1;
+  AdjustmentData& data = selected_->data;
+  quality->repetition =
+      std::max(1.0, repetition(data, adjusted_.state.landmarks.size(), adjusted_.at));
+  if (quality->repetition < kChance) return {};
+  for (auto& o : data.observations) o.sigma *= std::sqrt(quality->repetition);
+  if (!adjustment_.minimise({}, 20, 1e-4, &adjusted_.state, &adjusted_.at) ||
+      !adjustment_.covariance(adjusted_.at, &adjusted_.covariance, &telemetry_unknowns_)) {
+    return {CalibrationStatus::kNotConverged,
+            "the adjustment does not converge with errors that repeat from frame to frame"};
+  }
+  return {};
+}
+
+}  // namespace alidade::internal

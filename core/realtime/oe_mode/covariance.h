@@ -1,0 +1,66 @@
+#pragma once
+// What the estimators of OE mode share about motions and covariances.
+// A motion is the vector (pan, tilt, pan rate, tilt rate, pan acceleration, tilt acceleration): rad, rad/s,
+// rad/s^2. Pure functions; no allocation.
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/model/linear_algebra.h"
+
+namespace alidade {
+
+using Vector6 = Matrix<double, 6, 1>;
+using Matrix6 = Matrix<double, 6, 6>;
+
+// Angles at t seconds after the motion's reference row; x is a motion or changes of one, a column each.
+template <int kColumns>
+[[nodiscard]] Matrix<double, 2, kColumns> angle_at(const Matrix<double, 6, kColumns>& x, double t) {
+  return x.template topRows<2>() + t * x.template middleRows<2>(2) +
+         (0.5 * t * t) * x.template bottomRows<2>();
+}
+
+// Without what rounding makes of a covariance.
+template <int kSize>
+[[nodiscard]] Matrix<double, kSize, kSize> symmetric(const Matrix<double, kSize, kSize>& m) {
+  return 0.5 * (m + m.transpose());
+}
+
+// Of a symmetric matrix; only the upper triangle is read. Not finite where m is singular.
+[[nodiscard]] inline Matrix2<double> inverse_of(const Matrix2<double>& m) {
+  const double determinant = m(0, 0) * m(1, 1) - m(0, 1) * m(0, 1);
+  Matrix2<double> inverse;
+  inverse << m(1, 1), -m(0, 1), -m(0, 1), m(0, 0);
+  return inverse / determinant;
+}
+
+// Of (rate, acceleration) of one axis: 0 is pan, 1 is tilt.
+[[nodiscard]] inline Matrix2<double> rate_covariance(const Matrix6& motion, int axis) {
+  Matrix2<double> out;
+  out << motion(2 + axis, 2 + axis), motion(2 + axis, 4 + axis), motion(4 + axis, 2 + axis),
+      motion(4 + axis, 4 + axis);
+  return out;
+}
+
+// Whether all principal minors of order 1 and 2 allow it: what these let pass of a 3x3 harms nothing.
+template <int kSize>
+[[nodiscard]] bool is_covariance(const Matrix<double, kSize, kSize>& m) {
+  constexpr double kRounding = 1e-9;
+  for (int i = 0; i < kSize; ++i) {
+    for (int j = 0; j < kSize; ++j) {
+      const double bound = m(i, i) * m(j, j) * (1 + kRounding);
+      if (!(m(i, i) >= 0) || !(m(i, j) * m(i, j) <= bound)) return false;
+    }
+  }
+  return all_finite(m);
+}
+
+// By which factor to inflate the variance of a measurement that was used elapsed_s ago already, if its error
+// has that correlation time: so many measurements together are then worth one per correlation time. At least
+// 1; correlation_time_s >= 0; infinite elapsed_s: never used.
+[[nodiscard]] inline double variance_inflation(double correlation_time_s, double elapsed_s) {
+  constexpr double kLeastElapsed_s = 1e-3;
+  return std::max(1.0, correlation_time_s / std::max(std::abs(elapsed_s), kLeastElapsed_s));
+}
+
+}  // namespace alidade

@@ -1,0 +1,82 @@
+#pragma once
+// LandmarkMaker: new landmarks from a frame whose motion is known: FAST corners in cells of the image that
+// show none yet (PTCEE 36).
+//
+// Cells of octave l are cell_size_px * min(2^l, largest_cells) wide, px of the image. Fine octaves are searched
+// cell by cell, each time from another one on, so that a budget reaches all in turn; of the coarse ones, one is
+// searched as a whole each time. A view with few landmarks takes all it can at once.
+// Memory is taken by the constructor; nothing else allocates, waits or throws. One thread.
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "core/model/calibration.h"
+#include "core/realtime/image/fast_corners.h"
+#include "core/realtime/image/pyramid.h"
+#include "core/realtime/oe_mode/landmark_map.h"
+#include "core/realtime/oe_mode/octaves.h"
+#include "core/realtime/oe_mode/processed_frame.h"
+#include "core/realtime/oe_mode/visible_landmarks.h"
+
+namespace alidade {
+
+struct LandmarkMakerOptions {
+  double cell_size_px = 80;  // of octave 0 at the image's centre, >= 16
+  double largest_cells = 3;  // times cell_size_px, >= 1: the cells of coarse octaves
+  int max_new = 100;         // landmarks that one call may make, where the view is not empty
+  int empty_view = 50;       // landmarks; with fewer a view is empty
+  std::uint8_t corner_threshold = 10;  // of FAST, grey levels
+  double textured =
+      0.25;  // of the cells of the first coarse octave, in [0, 1]: so many show a corner
+
+  // False and one line in *error (if not null) when a value is not valid.
+  [[nodiscard]] bool validate(const char** error = nullptr) const;
+};
+
+class LandmarkMaker {
+ public:
+  // options: valid, but that cell_size_px may be smaller than the least. max_width, max_height: px.
+  LandmarkMaker(const LandmarkMakerOptions& options, const OctaveOptions& octaves, int max_width,
+                int max_height);
+  LandmarkMaker(const LandmarkMaker&) = delete;
+  LandmarkMaker& operator=(const LandmarkMaker&) = delete;
+
+  // frame.motion is that of the image in the pyramid; visible: landmarks of the map that it shows. Returns
+  // the share of landmarks in view that is new, 0 to 1.
+  double make(const Calibration& calibration, const Pyramid& pyramid, const Octaves& octaves,
+              const ProcessedFrame& frame, const std::vector<VisibleLandmark>& visible,
+              LandmarkMap* map);
+
+  // Whether the image has something to show.
+  [[nodiscard]] bool is_textured(const Pyramid& pyramid, const Octaves& octaves);
+
+  // rad, for LandmarkMap::clear().
+  [[nodiscard]] double cell_size(const Camera<double>& camera) const {
+    return options_.cell_size_px / camera.focal_length;
+  }
+  [[nodiscard]] double largest_cell_size(const Camera<double>& camera) const {
+    return options_.largest_cells * options_.cell_size_px / camera.focal_length;
+  }
+
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  struct View;
+
+  [[nodiscard]] double cell_px(int octave) const;
+  [[nodiscard]] int corner_cell(int octave) const;
+  [[nodiscard]] int cells(int size_px, int octave) const;
+  // In one octave, no more than budget; how many were made.
+  int make_coarse(const View& view, int octave, int budget);
+  int make_fine(const View& view, int octave, int budget);
+  [[nodiscard]] std::uint8_t& cell_at(const View& view, int octave, const Vector2<double>& u);
+  [[nodiscard]] bool make_one(const View& view, const FastCorner& corner, int octave) const;
+
+  LandmarkMakerOptions options_;
+  std::vector<std::unique_ptr<FastGrid>> grids_;  // by octave
+  std::vector<std::uint8_t> cell_taken_;          // of the image, at one octave
+  std::vector<FastCorner> corners_;
+};
+
+}  // namespace alidade

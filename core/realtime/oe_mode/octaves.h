@@ -1,0 +1,79 @@
+#pragma once
+// Octaves: which octaves of the image pyramid OE mode uses, and what can be seen in each.
+// Octave l has pixels 2^l as wide as the image's. Below first_coarse landmarks are fine: aligned one by one;
+// from there on they are coarse: aligned together, over pan and tilt. Plain value; no allocation.
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/model/camera.h"
+#include "core/model/linear_algebra.h"
+#include "core/realtime/image/patch_alignment.h"
+#include "core/realtime/image/pyramid.h"
+
+namespace alidade {
+
+struct OctaveOptions {
+  int first_coarse = 2;      // octave, 1 to Pyramid::kMaxOctaves - 1
+  int least_height_px = 32;  // of the coarsest octave: high enough for several patches
+  double least_noise = 0.3;  // grey levels, > 0: rounding's, which no averaging takes down
+  double least_contrast =
+      1.5;  // times an octave's noise, > 0.5: noise alone shows 0.5, see prepare()
+
+  // False and one line in *error (if not null) when a value is not valid.
+  [[nodiscard]] bool validate(const char** error = nullptr) const {
+    const char* problem = nullptr;
+    if (!(least_contrast > 0.5)) problem = "least_contrast must be above 0.5";
+    if (!(least_noise > 0)) problem = "least_noise must be positive";
+    if (least_height_px < kPatchSize) problem = "least_height_px must hold a patch";
+    if (first_coarse < 1 || first_coarse >= Pyramid::kMaxOctaves)
+      problem = "first_coarse must be 1 to 7";
+    if (error != nullptr && problem != nullptr) *error = problem;
+    return problem == nullptr;
+  }
+};
+
+class Octaves {
+ public:
+  explicit Octaves(const OctaveOptions& options) : options_(options) {}
+
+  // For images of that height, px.
+  void reset(int height_px) {
+    count_ = 1;
+    while (count_ < Pyramid::kMaxOctaves && height_px >> count_ >= options_.least_height_px) {
+      ++count_;
+    }
+  }
+  // Of the image's own pixels, one standard deviation, grey levels.
+  void set_noise(double sigma) { noise_sigma_ = sigma; }
+
+  [[nodiscard]] int count() const { return count_; }
+  [[nodiscard]] int first_coarse() const { return options_.first_coarse; }
+  [[nodiscard]] bool is_coarse(int octave) const { return octave >= options_.first_coarse; }
+  [[nodiscard]] double noise_sigma() const { return noise_sigma_; }
+
+  // Grey levels, of one octave's pixels: averaging takes it down, rounding remains.
+  [[nodiscard]] double noise(int octave) const {
+    return std::max(std::ldexp(noise_sigma_, -octave), options_.least_noise);
+  }
+  // Grey levels per pixel, as prepare() wants it: below that a patch's covariance is too small.
+  [[nodiscard]] double least_contrast(int octave) const {
+    return options_.least_contrast * noise(octave);
+  }
+
+ private:
+  OctaveOptions options_;
+  int count_ = 1;
+  double noise_sigma_ = 0;
+};
+
+// Whether all of a patch of this octave about pixel u of the image is in the image.
+[[nodiscard]] inline bool holds_patch(const Camera<double>& camera, const Vector2<double>& u,
+                                      int octave) {
+  constexpr double kMargin_px = 2.5;  // of the octave: the taps around the outermost points
+  const double border_px = std::ldexp(0.5 * kPatchSize + kMargin_px, octave);
+  return u.x() >= border_px && u.y() >= border_px && u.x() <= camera.width - border_px &&
+         u.y() <= camera.height - border_px;
+}
+
+}  // namespace alidade

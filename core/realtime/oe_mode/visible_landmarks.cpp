@@ -1,0 +1,54 @@
+#include "core/realtime/oe_mode/visible_landmarks.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/model/camera.h"
+#include "core/realtime/oe_mode/octaves.h"
+
+namespace alidade {
+
+VisibleLandmarks::VisibleLandmarks(int capacity) {
+  slots_.resize(static_cast<std::size_t>(capacity));
+  visible_.reserve(slots_.size());
+}
+
+void VisibleLandmarks::reset(const Calibration& calibration, double cone_margin) {
+  const Camera<double>& camera = calibration.camera;
+  const double w = camera.width;
+  const double h = camera.height;
+  double cone = 0;  // rad, from the optical axis to the farthest corner
+  for (const Vector2<double>& corner : {Vector2<double>(0, 0), Vector2<double>(w, 0),
+                                        Vector2<double>(0, h), Vector2<double>(w, h)}) {
+    Vector3<double> d_c;
+    // A corner beyond the distortion's limit sees nothing: the cone to it may be anything.
+    const bool seen = unproject(camera, corner, &d_c) == ProjectionStatus::kOk;
+    cone = std::max(cone, seen ? std::acos(std::min(1.0, d_c.z())) : kPi / 2);
+  }
+  cosine_of_cone_ = std::cos(std::min(kPi, cone_margin * cone));
+  visible_.clear();
+}
+
+const std::vector<VisibleLandmark>& VisibleLandmarks::find(const Calibration& calibration,
+                                                           const LandmarkMap& map,
+                                                           const ViewProjection& view) {
+  visible_.clear();
+  const int near = map.find(view.optical_axis(), cosine_of_cone_, slots_.data(), map.capacity());
+  for (int i = 0; i < near; ++i) {
+    const int slot = slots_[static_cast<std::size_t>(i)];
+    const Landmark& landmark = map.at(slot);
+    Vector2<double> u;
+    if (!view.project_roughly(landmark.d, &u) ||
+        !holds_patch(calibration.camera, u, landmark.octave)) {
+      continue;
+    }
+    visible_.push_back({slot, landmark.octave, u});
+  }
+  return visible_;
+}
+
+std::size_t VisibleLandmarks::memory_bytes() const {
+  return slots_.size() * sizeof(int) + visible_.capacity() * sizeof(VisibleLandmark);
+}
+
+}  // namespace alidade

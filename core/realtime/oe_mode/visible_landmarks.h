@@ -1,0 +1,42 @@
+#pragma once
+// VisibleLandmarks: the landmarks of the map that a predicted view puts into the image, of all octaves.
+// Memory is taken by the constructor; nothing else allocates. One thread.
+
+#include <vector>
+
+#include "core/model/calibration.h"
+#include "core/realtime/oe_mode/landmark_map.h"
+#include "core/realtime/oe_mode/view_projection.h"
+
+namespace alidade {
+
+struct VisibleLandmark {
+  int slot;           // of the map
+  int octave;         // of the landmark
+  Vector2<double> u;  // px of the image, predicted, to a pixel or so
+};
+
+class VisibleLandmarks {
+ public:
+  // capacity: of the map.
+  explicit VisibleLandmarks(int capacity);
+
+  // cone_margin: room for what the camera turns while it reads out, and for a wrong prediction, times the
+  // angle from the optical axis to the farthest corner.
+  void reset(const Calibration& calibration, double cone_margin);
+
+  // In ascending order of slots; valid until the next call.
+  const std::vector<VisibleLandmark>& find(const Calibration& calibration, const LandmarkMap& map,
+                                           const ViewProjection& view);
+  // As find() left it.
+  [[nodiscard]] const std::vector<VisibleLandmark>& latest() const { return visible_; }
+
+  [[nodiscard]] std::size_t memory_bytes() const;
+
+ private:
+  double cosine_of_cone_ = 1;
+  std::vector<int> slots_;
+  std::vector<VisibleLandmark> visible_;
+};
+
+}  // namespace alidade

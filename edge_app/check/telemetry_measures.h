@@ -1,0 +1,28 @@
+#pragma once
+// The numbers of a TelemetryReport that need more than counting: each axis, the samples taken while the head turned, and
+// the age of the newest angle known. What they mean: telemetry_check.h. Pure; allocates.
+
+#include <optional>
+#include <vector>
+
+#include "edge_app/check/spread.h"
+#include "edge_app/check/telemetry_check.h"
+#include "platform/pan_tilt/pan_tilt_source.h"
+
+namespace alidade {
+
+// Needs a sample; all finite. Without the top rate.
+[[nodiscard]] AxisReport measure_axis(const std::vector<PanTiltSample>& samples,
+                                      double PanTiltSample::*angle);
+
+// change_hz, the top rates, turning, stale and how long repeats lasted. stale: find_stale_repeats(samples). Needs the
+// axes' resolutions in *report.
+void measure_turning(const std::vector<PanTiltSample>& samples, const std::vector<bool>& stale,
+                     TelemetryReport* report);
+
+// Just before each sample was delivered, how far back the newest angle known lay, as the real-time step knows it.
+[[nodiscard]] std::optional<Spread> ages_of(const std::vector<PanTiltSample>& samples,
+                                            const std::vector<double>& delivered_s,
+                                            const TelemetryNeeds& needs);
+
+}  // namespace alidade

@@ -1,0 +1,39 @@
+#pragma once
+// What `alidade check` collects from both links for some seconds.
+//
+// Threads: video and pan/tilt are read by one each; images are looked at by a third, which takes the latest when it is
+// done with the one before, so that looking never makes a source drop frames. No image is kept.
+
+#include <string>
+#include <vector>
+
+#include "edge_app/check/picture_check.h"
+#include "edge_app/check/video_check.h"
+#include "edge_app/config/config.h"
+#include "platform/pan_tilt/pan_tilt_source.h"
+#include "platform/video/frame_source.h"
+
+namespace alidade {
+
+// What became of one connection.
+struct Connection {
+  std::string error;  // why nothing came, or no more; empty: none
+  int losses = 0;     // after the first item
+  std::string loss;   // the last one's words
+  std::string name;
+};
+
+struct Measured {
+  Connection video;
+  Connection pan_tilt;
+  std::vector<CheckedFrame> frames;
+  std::vector<PanTiltSample> samples;
+  std::vector<double> delivered_s;  // each of them
+  FrameSourceCounters counters;
+  PictureReport pictures;
+};
+
+// Each stream for duration_s from its first item on. Shows its progress on a terminal.
+[[nodiscard]] Measured measure(const Config& config, double duration_s);
+
+}  // namespace alidade

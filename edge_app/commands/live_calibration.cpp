@@ -1,0 +1,66 @@
+#include "edge_app/commands/live_calibration.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <cmath>
+
+#include "edge_app/commands/command.h"
+
+namespace alidade {
+
+Calibrating begin_calibrating(const Config& config, const std::string& path) {
+  Calibrating result;
+  SelfCalibrationOptions options;
+  const int width = config.video.width;
+  const int height = config.video.height;
+  if (!config.calibration.file.empty()) {
+    result.store = std::make_unique<CalibrationStore>(config.calibration.file,
+                                                      config.calibration.zoom_tolerance);
+    for (const std::string& line : result.store->load(width, height))
+      spdlog::info("calibration: {}", line);
+  }
+  const StoredCalibration* stored =
+      result.store == nullptr ? nullptr : result.store->find(std::nullopt);
+  if (result.store != nullptr && result.store->empty() && !config.calibration.automatic) {
+    throw CommandError(
+        kExitUsage,
+        fmt::format("{}: calibration.file {} holds no calibration that can be used, and "
+                    "calibration.auto is false; name one, or set calibration.auto: true",
+                    path, config.calibration.file));
+  }
+  if (config.camera.focal_length_px) {
+    options.data_sheet = data_sheet_calibration(config.camera);
+  } else if (stored != nullptr) {
+    CameraConfig camera;
+    camera.focal_length_px = stored->calibration.camera.focal_length;
+    options.data_sheet = data_sheet_calibration(camera);
+  } else {
+    throw CommandError(
+        kExitUsage,
+        fmt::format(
+            "{}: camera.focal_length_px is missing: {} holds no calibration to begin with, and the "
+            "first one begins with the data sheet's; give it, or name a calibration in "
+            "calibration.file",
+            path, config.calibration.file));
+  }
+  Camera<double>& camera = options.data_sheet.camera;
+  camera.width = stored == nullptr ? width : stored->calibration.camera.width;
+  camera.height = stored == nullptr ? height : stored->calibration.camera.height;
+  if (camera.width == 0) {
+    throw CommandError(
+        kExitUsage, path +
+                        ": video.width and video.height are missing: without a calibration, OE "
+                        "mode needs the size of the picture; give them, or set realtime.mode: PT");
+  }
+  if (config.pan_tilt.angle_sigma_rad) {
+    options.noise.pan_tilt_sigma_rad = std::hypot(
+        *config.pan_tilt.angle_sigma_rad, config.pan_tilt.angle_quantum_rad / std::sqrt(12.0));
+  }
+  options.zoom_tolerance = config.calibration.zoom_tolerance;
+  options.automatic = config.calibration.automatic;
+  result.calibration = std::make_unique<SelfCalibration>(options, result.store.get());
+  return result;
+}
+
+}  // namespace alidade

@@ -1,0 +1,80 @@
+#include "edge_app/commands/run_report.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <limits>
+
+#include "platform/system/clock.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kStatusPeriod_s = 10;
+
+// What `systemctl status` shows of the time between two summaries.
+std::string describe(const PipelineSummary& before, const PipelineSummary& now, double period_s) {
+  const auto records = now.records - before.records;
+  const auto with_orientation = now.with_orientation - before.with_orientation;
+  const auto with_landmarks = now.with_landmarks - before.with_landmarks;
+  return fmt::format("{:.1f} frames a second; records of the last {:.0f} s: OE {}, PT {}, none {}",
+                     static_cast<double>(now.frames - before.frames) / period_s, period_s,
+                     with_landmarks, with_orientation - with_landmarks, records - with_orientation);
+}
+
+}  // namespace
+
+std::string describe(const PipelineSummary& summary, bool latency_measured) {
+  const auto quantiles = [](const LatencyHistogram& histogram) {
+    return fmt::format("{:.3f}/{:.3f}", 1e3 * histogram.quantile(0.5),
+                       1e3 * histogram.quantile(0.99));
+  };
+  const std::string latency =
+      latency_measured
+          ? fmt::format(
+                "latency p50/p99 {} ms, of this decoding {}, waiting {}, computing {}; then "
+                "writing {}",
+                quantiles(summary.latency), quantiles(summary.decoding), quantiles(summary.waiting),
+                quantiles(summary.computing), quantiles(summary.writing))
+          : "latency not measured on a recording";
+  return fmt::format(
+      "{} frames; {} records: OE {}, PT {}, none {}; {}; dropped by full queues: {} frames, {} "
+      "telemetry samples, {} records; {} pictures too late; page faults of the real-time thread: "
+      "{} minor, {} major",
+      summary.frames, summary.records, summary.with_landmarks,
+      summary.with_orientation - summary.with_landmarks, summary.records - summary.with_orientation,
+      latency, summary.drops.frames, summary.drops.telemetry, summary.drops.records,
+      summary.drops.late_pictures, summary.page_faults.minor, summary.page_faults.major);
+}
+
+LifeReport::LifeReport(const ServiceManager& manager, Pipeline* pipeline)
+    : manager_(manager), pipeline_(*pipeline), status_s_(monotonic_now_s()) {
+  pipeline_.ask_for_pulse();
+}
+
+double LifeReport::period_s() const {
+  return manager_.is_there() ? std::min(kStatusPeriod_s, manager_.alive_period_s())
+                             : std::numeric_limits<double>::infinity();
+}
+
+void LifeReport::tell() {
+  const bool lives = pipeline_.pulse_is_answered();
+  if (lives) {
+    manager_.alive();
+    pipeline_.ask_for_pulse();
+  } else if (lived_) {
+    spdlog::error(
+        "no record gets through: the reader of stdout stalls, or a thread hangs; systemd is no "
+        "longer told that this process lives");
+  }
+  lived_ = lives;
+  const double now_s = monotonic_now_s();
+  if (now_s < status_s_ + kStatusPeriod_s) return;
+  const PipelineSummary summary = pipeline_.summary();
+  manager_.status(describe(status_, summary, now_s - status_s_));
+  status_ = summary;
+  status_s_ = now_s;
+}
+
+}  // namespace alidade

@@ -1,0 +1,57 @@
+#include "edge_app/config/link_keys.h"
+
+#include <fmt/format.h>
+
+#include <cstdlib>
+#include <filesystem>
+
+namespace alidade {
+
+namespace fs = std::filesystem;
+
+std::string path_relative_to(const std::string& config_path, const std::string& path) {
+  return (fs::path(config_path).parent_path() / path).string();
+}
+
+std::string required_text(YamlSection& section, const std::string& key,
+                          const std::string& example) {
+  const std::optional<std::string> value = section.text(key);
+  if (!value) section.fail(key, "is missing; expected for example " + key + ": " + example);
+  return *value;
+}
+
+std::string required_url(YamlSection& section, const std::string& example,
+                         const std::vector<std::string>& schemes) {
+  const std::string url = required_text(section, "url", example);
+  bool known = false;
+  std::string rest;
+  for (const std::string& scheme : schemes) {
+    if (url.rfind(scheme, 0) != 0) continue;
+    known = true;
+    rest = url.substr(scheme.size());
+  }
+  if (!known || rest.empty() || rest[0] == '/') {
+    section.fail("url", "is not an address that starts with " + join(schemes) +
+                            "; expected for example " + example);
+  }
+  if (rest.substr(0, rest.find('/')).find('@') != std::string::npos) {
+    section.fail("url", "holds a user or password; give them as user and password_env");
+  }
+  return url;
+}
+
+void read_login(YamlSection& section, std::string* user, std::string* password) {
+  *user = section.text("user").value_or("");
+  const std::optional<std::string> variable = section.text("password_env");
+  if (!variable) return;
+  if (user->empty()) section.fail("password_env", "stands without a user; add user");
+  const char* value = std::getenv(variable->c_str());
+  if (value == nullptr) {
+    section.fail("password_env",
+                 fmt::format("the environment has no variable '{}'; export it with the password",
+                             *variable));
+  }
+  *password = value;
+}
+
+}  // namespace alidade

@@ -1,0 +1,122 @@
+#include "edge_app/config/pan_tilt_config.h"
+
+#include <algorithm>
+#include <vector>
+
+#include "edge_app/config/link_keys.h"
+
+namespace alidade {
+namespace {
+
+constexpr NumberRange kAngle{0, 0.1, "rad"};
+
+// The angles at both ends of a device's own scale, of which none may be the other.
+std::optional<std::array<double, 2>> read_range(YamlSection& section, const std::string& key) {
+  const auto ends = section.numbers(key, 2, {-360, 360, "deg"});
+  if (!ends) return std::nullopt;
+  if (ends->front() == ends->back()) {
+    section.fail(key, "spans no angle; give the angles at -1 and at 1");
+  }
+  return std::array<double, 2>{ends->front(), ends->back()};
+}
+
+void read_onvif(YamlSection& section, PanTiltConfig* pan_tilt) {
+  pan_tilt->profile = section.text("profile").value_or("");
+  pan_tilt->pan_range_deg = read_range(section, "pan_range_deg");
+  pan_tilt->tilt_range_deg = read_range(section, "tilt_range_deg");
+  if (pan_tilt->pan_range_deg.has_value() != pan_tilt->tilt_range_deg.has_value()) {
+    section.fail(pan_tilt->pan_range_deg ? "tilt_range_deg" : "pan_range_deg",
+                 "is missing; give pan_range_deg and tilt_range_deg, or neither");
+  }
+  pan_tilt->rate_hz = 10;  // SOAP is work for a camera
+}
+
+// A value of pan_tilt.type.
+struct PanTiltType {
+  std::string key;
+  PanTiltConfig::Type type;
+  std::optional<HeadType> head;  // of kHead
+};
+
+std::vector<PanTiltType> pan_tilt_types() {
+  using Type = PanTiltConfig::Type;
+  std::vector<PanTiltType> types = {{"vapix", Type::kVapix, {}}, {"onvif", Type::kOnvif, {}}};
+  for (const Head& head : kHeads) types.push_back({head.key, Type::kHead, head.type});
+  types.push_back({"recording", Type::kRecording, {}});
+  return types;
+}
+
+PanTiltType read_pan_tilt_type(YamlSection& section) {
+  const std::vector<PanTiltType> types = pan_tilt_types();
+  std::vector<std::string> keys;
+  for (const PanTiltType& type : types) keys.push_back(type.key);
+  const std::optional<std::string> key = section.choice("type", keys);
+  if (!key) section.fail("type", "is missing; expected one of " + join(keys));
+  return *std::find_if(types.begin(), types.end(),
+                       [&](const PanTiltType& type) { return type.key == *key; });
+}
+
+// What all devices have that are asked over HTTP.
+void read_http_device(YamlSection& section, PanTiltConfig* pan_tilt) {
+  pan_tilt->url = required_url(section, "http://camera", {"http://", "https://"});
+  read_login(section, &pan_tilt->user, &pan_tilt->password);
+}
+
+// The keys of the type alone.
+void read_device(YamlSection& section, const PanTiltType& type, const std::string& path,
+                 PanTiltConfig* pan_tilt) {
+  constexpr NumberRange kRate{0.1, 1000, "Hz"};
+  switch (type.type) {
+    case PanTiltConfig::Type::kVapix:
+      read_http_device(section, pan_tilt);
+      pan_tilt->camera =
+          section.integer("camera", {1, 64, "camera number"}).value_or(pan_tilt->camera);
+      pan_tilt->rate_hz = section.number("rate_hz", kRate).value_or(pan_tilt->rate_hz);
+      pan_tilt->axes = read_axes(section, kRightAndUp);
+      return;
+    case PanTiltConfig::Type::kOnvif:
+      read_http_device(section, pan_tilt);
+      read_onvif(section, pan_tilt);
+      pan_tilt->rate_hz = section.number("rate_hz", kRate).value_or(pan_tilt->rate_hz);
+      pan_tilt->axes = read_axes(section, kRightAndUp);
+      return;
+    case PanTiltConfig::Type::kHead:
+      pan_tilt->head = read_head(section, *type.head, path, &pan_tilt->rate_hz);
+      pan_tilt->axes = read_axes(section, head_of(*type.head).signs);
+      return;
+    case PanTiltConfig::Type::kRecording:
+      pan_tilt->directory =
+          path_relative_to(path, required_text(section, "directory", "my-recording"));
+      return;
+  }
+}
+
+}  // namespace
+
+PanTiltConfig read_pan_tilt(YamlSection section, const std::string& path) {
+  PanTiltConfig pan_tilt;
+  const PanTiltType type = read_pan_tilt_type(section);
+  pan_tilt.type = type.type;
+  read_device(section, type, path, &pan_tilt);
+  if (type.type != PanTiltConfig::Type::kRecording) {
+    pan_tilt.timeout_s = section.number("timeout_s", kSeconds).value_or(pan_tilt.timeout_s);
+    pan_tilt.max_backoff_s =
+        section.number("max_backoff_s", kSeconds).value_or(pan_tilt.max_backoff_s);
+  }
+  pan_tilt.angle_sigma_rad = section.number("angle_sigma_rad", kAngle);
+  pan_tilt.angle_quantum_rad =
+      section.number("angle_quantum_rad", kAngle).value_or(pan_tilt.angle_quantum_rad);
+  if (pan_tilt.angle_sigma_rad == 0.0 && pan_tilt.angle_quantum_rad == 0) {
+    section.fail("angle_sigma_rad",
+                 "no head measures without error; give a sigma or angle_quantum_rad above 0");
+  }
+  pan_tilt.acceleration_sigma_rad_s2 =
+      section.number("acceleration_sigma_rad_s2", {0, 1000, "rad/s^2"})
+          .value_or(pan_tilt.acceleration_sigma_rad_s2);
+  pan_tilt.max_repeat_s =
+      section.number("max_repeat_s", {0, 10, "s"}).value_or(pan_tilt.max_repeat_s);
+  section.finish();
+  return pan_tilt;
+}
+
+}  // namespace alidade

@@ -1,0 +1,3 @@
+// Boost.Asio, compiled once (BOOST_ASIO_SEPARATE_COMPILATION) for all files that use it.
+
+#include <boost/asio/impl/src.hpp>

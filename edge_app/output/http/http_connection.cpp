@@ -1,0 +1,265 @@
+#include "edge_app/output/http/http_connection.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <boost/asio/buffer.hpp>
+#include <boost/asio/post.hpp>
+#include <boost/asio/read.hpp>
+#include <boost/asio/read_until.hpp>
+#include <boost/beast/http/status.hpp>
+#include <chrono>
+#include <limits>
+#include <utility>
+
+#include "platform/system/clock.h"
+
+namespace alidade {
+namespace {
+
+namespace asio = boost::asio;
+
+constexpr double kAskAgainS = 0.01;  // a handler that has no answer yet
+constexpr double kSayAgainS = 0.5;   // an endless answer that has nothing to say
+constexpr double kCancelAgainS = 0.05;
+constexpr double kWholeAnswerS = 60;  // the longest that one finite answer may take
+constexpr double kLingerS = 1;        // for what a client is still sending after its answer
+constexpr std::size_t kLingerBytes = std::size_t{256} << 10;
+constexpr std::size_t kLingerPiece = 4096;
+constexpr char kContinue[] = "HTTP/1.1 100 Continue\r\n\r\n";
+
+bool has_header(const ServerResponse& response, const char* name) {
+  return std::any_of(response.headers.begin(), response.headers.end(),
+                     [name](const auto& header) { return header.first == name; });
+}
+
+std::string head_of(const ServerResponse& response) {
+  namespace http = boost::beast::http;
+  const auto status = static_cast<unsigned>(response.status);
+  const auto reason = http::obsolete_reason(http::int_to_status(status));
+  std::string text = fmt::format(
+      "HTTP/1.1 {} {}\r\nContent-Type: {}\r\nConnection: close\r\n"
+      "X-Content-Type-Options: nosniff\r\n",
+      status, std::string(reason.data(), reason.size()), response.type);
+  for (const auto& [name, value] : response.headers) text += fmt::format("{}: {}\r\n", name, value);
+  if (!has_header(response, "Cache-Control")) text += "Cache-Control: no-store\r\n";
+  if (!response.stream) text += fmt::format("Content-Length: {}\r\n", response.body.size());
+  return text + "\r\n";
+}
+
+void log_failure(const char* what) { spdlog::error("HTTP: {}", what); }
+
+// What a handler throws is told to the log, not to the client.
+std::optional<ServerResponse> call(const HttpHandler& handler, const ServerRequest& request) {
+  try {
+    return handler(request);
+  } catch (const std::exception& e) {
+    log_failure(e.what());
+  } catch (...) {
+    log_failure("unknown failure");
+  }
+  return http_error(500, "internal error; see the log");
+}
+
+}  // namespace
+
+HttpConnection::HttpConnection(asio::ip::tcp::socket socket, const HttpService& service)
+    : socket_(std::move(socket)), timer_(socket_.get_executor()), service_(service) {
+  ++service_.tally.connections;
+}
+
+HttpConnection::~HttpConnection() {
+  if (service_.streams.erase(this) > 0) --service_.tally.streams;
+  --service_.tally.connections;
+}
+
+void HttpConnection::begin() {
+  within(service_.limits.head_timeout_s, &HttpConnection::stop_reading);
+  asio::async_read_until(socket_, asio::dynamic_buffer(received_, service_.limits.max_head_bytes),
+                         "\r\n\r\n",
+                         [self = shared_from_this()](const Error& error, std::size_t size) {
+                           self->take_head(error, size);
+                         });
+}
+
+void HttpConnection::take_head(const Error& error, std::size_t size) {
+  without_deadline();
+  if (error == asio::error::not_found) {
+    ++service_.tally.refused;
+    return answer(http_error(431, "the request's head is too large"));
+  }
+  if (error) {
+    if (!late_ || received_.empty()) return drop();
+    ++service_.tally.refused;
+    return answer(http_error(408, "the request did not come in time"));
+  }
+  late_ = false;
+  ++service_.tally.requests;
+  ServerResponse refusal;
+  if (!parse_http_head(std::string_view(received_).substr(0, size), &head_, &refusal))
+    return answer(std::move(refusal));
+  route_ = service_.gate.admit(head_, monotonic_now_s(), &refusal);
+  if (route_ == nullptr) return answer(std::move(refusal));
+  std::size_t length = 0;
+  if (head_.method == "POST" && !body_length(head_, route_->max_body, &length, &refusal))
+    return answer(std::move(refusal));
+  request_.method = head_.method;
+  request_.path = head_.path;
+  request_.parameters = std::move(head_.parameters);
+  request_.body = received_.substr(size, length);
+  body_came_ = request_.body.size();
+  request_.body.resize(length);
+  if (head_.expects_continue && body_came_ < length)
+    return send(kContinue, &HttpConnection::read_body);
+  read_body();
+}
+
+void HttpConnection::read_body() {
+  if (body_came_ == request_.body.size()) return take_body(Error());
+  within(service_.limits.body_timeout_s, &HttpConnection::stop_reading);
+  asio::async_read(
+      socket_, asio::buffer(&request_.body[body_came_], request_.body.size() - body_came_),
+      [self = shared_from_this()](const Error& error, std::size_t) { self->take_body(error); });
+}
+
+void HttpConnection::take_body(const Error& error) {
+  without_deadline();
+  if (error) {
+    return answer(http_error(400, late_ ? "the request's body did not come in time"
+                                        : "the request's body is shorter than it said"));
+  }
+  complete_s_ = monotonic_now_s();
+  ask_handler();
+}
+
+void HttpConnection::ask_handler() {
+  without_deadline();
+  asio::post(service_.handlers, [self = shared_from_this()]() mutable {
+    HttpConnection& asking = *self;
+    auto response = call(asking.route_->handler, asking.request_);
+    asio::post(asking.socket_.get_executor(),
+               [self = std::move(self), response = std::move(response)]() mutable {
+                 self->take_answer(std::move(response));
+               });
+  });
+}
+
+void HttpConnection::take_answer(std::optional<ServerResponse> response) {
+  if (response) return answer(std::move(*response));
+  request_.waited_s = monotonic_now_s() - complete_s_;
+  within(kAskAgainS, &HttpConnection::ask_handler);
+}
+
+void HttpConnection::answer(ServerResponse response) {
+  const bool head_only = head_.method == "HEAD";
+  if (response.stream && service_.tally.streams >= service_.limits.max_streams) {
+    ++service_.tally.refused;
+    response = http_error(503, "too many streams");
+  }
+  std::string text = head_of(response);
+  answer_deadline_s_ = monotonic_now_s() + kWholeAnswerS;
+  if (response.stream && !head_only) {
+    stream_ = std::move(response.stream);
+    service_.streams.insert(this);
+    ++service_.tally.streams;
+    answer_deadline_s_ = std::numeric_limits<double>::infinity();
+    return send(std::move(text), &HttpConnection::say_more);
+  }
+  if (!head_only) text += response.body;
+  send(std::move(text), &HttpConnection::linger);
+}
+
+void HttpConnection::say_more() {
+  std::string piece = std::move(sending_);
+  piece.clear();
+  try {
+    stream_->next(&piece);
+  } catch (const std::exception& e) {
+    log_failure(e.what());
+    return drop();
+  }
+  silent_ = piece.empty();
+  if (silent_) return within(kSayAgainS, &HttpConnection::say_more);
+  send(std::move(piece), &HttpConnection::say_more);
+}
+
+void HttpConnection::wake() {
+  if (silent_) say_more();
+}
+
+// Lets a client that is still sending read its answer: closing at once would reset the connection.
+void HttpConnection::linger() {
+  Error error;
+  socket_.shutdown(asio::ip::tcp::socket::shutdown_send, error);
+  if (error) return drop();
+  within(kLingerS, &HttpConnection::drop);
+  received_.resize(kLingerPiece);
+  discard();
+}
+
+void HttpConnection::discard() {
+  socket_.async_read_some(asio::buffer(received_),
+                          [self = shared_from_this()](const Error& error, std::size_t count) {
+                            self->discarded_ += count;
+                            if (error || self->discarded_ >= kLingerBytes) return self->drop();
+                            self->discard();
+                          });
+}
+
+void HttpConnection::send(std::string text, Step then) {
+  sending_ = std::move(text);
+  sent_ = 0;
+  after_sending_ = then;
+  send_rest();
+}
+
+void HttpConnection::send_rest() {
+  within(std::min(service_.limits.write_timeout_s, answer_deadline_s_ - monotonic_now_s()),
+         &HttpConnection::drop_stalled);
+  socket_.async_write_some(asio::buffer(sending_) + sent_,
+                           [self = shared_from_this()](const Error& error, std::size_t count) {
+                             if (error) return self->drop();
+                             self->sent_ += count;
+                             if (self->sent_ < self->sending_.size()) return self->send_rest();
+                             self->without_deadline();
+                             ((*self).*(self->after_sending_))();
+                           });
+}
+
+void HttpConnection::within(double time_s, Step late) {
+  using Clock = asio::steady_timer::clock_type;
+  timer_.expires_after(
+      std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(time_s)));
+  timer_.async_wait([self = shared_from_this(), late](const Error& error) {
+    // One that was set anew has not expired, even if this call was already on its way.
+    if (error || self->timer_.expiry() > Clock::now()) return;
+    ((*self).*late)();
+  });
+}
+
+void HttpConnection::without_deadline() {
+  timer_.expires_at(asio::steady_timer::time_point::max());
+}
+
+// Again and again until the read says so: one that pauses between two pieces is not met.
+void HttpConnection::stop_reading() {
+  late_ = true;
+  Error ignored;
+  socket_.cancel(ignored);
+  within(kCancelAgainS, &HttpConnection::stop_reading);
+}
+
+void HttpConnection::drop_stalled() {
+  ++service_.tally.stalled;
+  drop();
+}
+
+// Ends whatever is under way, and with it the last that keeps this alive.
+void HttpConnection::drop() {
+  without_deadline();
+  Error ignored;
+  socket_.close(ignored);
+}
+
+}  // namespace alidade

@@ -1,0 +1,95 @@
+#pragma once
+// HttpConnection: one client, from its first byte to the last that it takes. Stage after stage, one operation under way
+// and one deadline at a time:
+//
+//   head --> gate --> body --> handler --> answer --> linger --> closed
+//
+// A refusal is an answer, too. An endless answer is asked for more whenever all was taken, until the client is gone.
+// Network thread but for the handler, which runs on a handlers' thread while the connection does nothing else.
+
+#include <boost/asio/io_context.hpp>
+#include <boost/asio/ip/tcp.hpp>
+#include <boost/asio/steady_timer.hpp>
+#include <cstddef>
+#include <memory>
+#include <optional>
+#include <set>
+#include <string>
+
+#include "edge_app/output/http/http_gate.h"
+#include "edge_app/output/http/http_head.h"
+#include "edge_app/output/http/http_message.h"
+#include "edge_app/output/http/http_options.h"
+
+namespace alidade {
+
+class HttpConnection;
+
+// What the connections of a server share.
+struct HttpService {
+  const HttpLimits& limits;
+  HttpGate& gate;
+  HttpTally& tally;
+  boost::asio::io_context& handlers;
+  std::set<HttpConnection*>& streams;  // those whose answer is endless
+};
+
+class HttpConnection final : public std::enable_shared_from_this<HttpConnection> {
+ public:
+  HttpConnection(boost::asio::ip::tcp::socket socket, const HttpService& service);
+  ~HttpConnection();
+  HttpConnection(const HttpConnection&) = delete;
+  HttpConnection& operator=(const HttpConnection&) = delete;
+
+  // Once; it keeps itself alive from then on.
+  void begin();
+  // An endless answer may have more to say.
+  void wake();
+
+ private:
+  using Error = boost::system::error_code;
+  using Step = void (HttpConnection::*)();
+
+  void take_head(const Error& error, std::size_t size);
+  void read_body();
+  void take_body(const Error& error);
+  void ask_handler();
+  void take_answer(std::optional<ServerResponse> response);
+  void answer(ServerResponse response);
+  void say_more();
+  void linger();
+  void discard();
+
+  // Sends, then goes on with the step.
+  void send(std::string text, Step then);
+  void send_rest();
+
+  // Calls the step unless the next deadline is set before; one at a time.
+  void within(double time_s, Step late);
+  void without_deadline();
+  void stop_reading();
+  void drop_stalled();
+  void drop();
+
+  boost::asio::ip::tcp::socket socket_;
+  boost::asio::steady_timer timer_;
+  const HttpService service_;
+
+  std::string received_;  // the head, and what came with it
+  bool late_ = false;     // a read was ended by its deadline
+  HttpHead head_;
+  const HttpRoute* route_ = nullptr;
+  ServerRequest request_;
+  std::size_t body_came_ = 0;
+  double complete_s_ = 0;  // when the request was
+
+  std::string sending_;
+  std::size_t sent_ = 0;
+  Step after_sending_ = nullptr;
+  double answer_deadline_s_ = 0;
+  std::unique_ptr<HttpStream> stream_;
+  bool silent_ = false;  // an endless answer that has nothing to say
+  std::size_t discarded_ = 0;
+};
+
+}  // namespace alidade

@@ -1,0 +1,122 @@
+#include "edge_app/output/http/http_gate.h"
+
+#include <algorithm>
+#include <boost/asio/ip/address.hpp>
+#include <string_view>
+#include <utility>
+
+namespace alidade {
+namespace {
+
+// Looks at all of what was given, wherever it first differs.
+bool is_token(std::string_view given, const std::string& token) {
+  std::size_t difference = given.size() ^ token.size();
+  for (std::size_t i = 0; i < given.size(); ++i) {
+    difference |= static_cast<std::size_t>(static_cast<unsigned char>(given[i]) ^
+                                           static_cast<unsigned char>(token[i % token.size()]));
+  }
+  return difference == 0;
+}
+
+// "host:8080" -> "host", "[::1]:8080" -> "::1"
+std::string host_of(const std::string& field) {
+  const std::size_t closing = field.find(']');
+  if (!field.empty() && field.front() == '[' && closing != std::string::npos)
+    return field.substr(1, closing - 1);
+  return field.substr(0, field.find(':'));
+}
+
+bool is_address(const std::string& host) {
+  boost::system::error_code error;
+  boost::asio::ip::make_address(host, error);
+  return !error && host.find('%') == std::string::npos;
+}
+
+}  // namespace
+
+HttpCounters HttpTally::now() const {
+  HttpCounters out;
+  out.requests = requests;
+  out.refused = refused;
+  out.unauthorized = unauthorized;
+  out.stalled = stalled;
+  out.connections = connections;
+  out.streams = streams;
+  return out;
+}
+
+RateLimit::RateLimit(double per_s) : per_s_(per_s), most_(std::max(1.0, per_s)), left_(most_) {}
+
+bool RateLimit::take(double now_s) {
+  left_ = std::min(most_, left_ + per_s_ * std::max(0.0, now_s - last_s_));
+  last_s_ = now_s;
+  if (left_ < 1) return false;
+  left_ -= 1;
+  return true;
+}
+
+HttpGate::HttpGate(const HttpServerOptions& options, HttpTally* tally)
+    : token_(options.token),
+      own_host_(options.host),
+      rate_(options.limits.requests_per_s),
+      tally_(*tally) {}
+
+void HttpGate::add(const std::string& method, const std::string& path, HttpRoute route) {
+  routes_[path][method] = std::move(route);
+}
+
+const HttpRoute* HttpGate::admit(const HttpHead& head, double now_s, ServerResponse* refusal) {
+  const HttpRoute* route = nullptr;
+  auto error = check(head, now_s, &route);
+  if (!error) return route;
+  *refusal = std::move(*error);
+  return nullptr;
+}
+
+std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s,
+                                              const HttpRoute** route) {
+  if (!rate_.take(now_s)) {
+    ++tally_.refused;
+    return http_error(429, "too many requests; ask less often");
+  }
+  if (!host_is_trusted(head))
+    return http_error(403, "the Host header names another machine; use an address, or set a token");
+  const auto path = routes_.find(head.path);
+  if (path == routes_.end()) return http_error(404, "no such path; see /api/v1/openapi.yaml");
+  const auto found = path->second.find(head.method == "HEAD" ? "GET" : head.method);
+  if (found == path->second.end()) {
+    ServerResponse error = http_error(405, "no such method here; see /api/v1/openapi.yaml");
+    std::string allowed;
+    for (const auto& [method, ignored] : path->second)
+      allowed += (allowed.empty() ? "" : ", ") + method;
+    error.headers.emplace_back("Allow", allowed);
+    return error;
+  }
+  *route = &found->second;
+  if (found->second.access == HttpAccess::kToken && !has_token(head)) {
+    ++tally_.unauthorized;
+    ServerResponse error = http_error(401, "this needs the header `Authorization: Bearer TOKEN`");
+    error.headers.emplace_back("WWW-Authenticate", "Bearer");
+    return error;
+  }
+  if (head.method == "POST" && !head.origin.empty() && head.origin != "http://" + head.host)
+    return http_error(403, "a page of another site may not ask this");
+  return std::nullopt;
+}
+
+bool HttpGate::has_token(const HttpHead& head) const {
+  if (token_.empty()) return true;
+  constexpr std::string_view kScheme = "Bearer ";
+  const std::string_view given = head.authorization;
+  return given.substr(0, kScheme.size()) == kScheme &&
+         is_token(given.substr(kScheme.size()), token_);
+}
+
+// A token cannot be had by a page of another site, whatever name that site takes.
+bool HttpGate::host_is_trusted(const HttpHead& head) const {
+  const std::string host = host_of(head.host);
+  return !token_.empty() || head.host.empty() || host == "localhost" || host == own_host_ ||
+         is_address(host);
+}
+
+}  // namespace alidade

@@ -1,0 +1,140 @@
+#include "edge_app/output/http/http_head.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <boost/algorithm/string/classification.hpp>
+#include <boost/algorithm/string/predicate.hpp>
+#include <boost/algorithm/string/trim.hpp>
+#include <boost/asio/buffer.hpp>
+#include <boost/beast/http/empty_body.hpp>
+#include <boost/beast/http/parser.hpp>
+#include <limits>
+
+namespace alidade {
+namespace {
+
+namespace http = boost::beast::http;
+
+constexpr std::string_view kLineEnd = "\r\n";
+
+int hex_digit(char c) {
+  if (c >= '0' && c <= '9') return c - '0';
+  if (c >= 'a' && c <= 'f') return c - 'a' + 10;
+  if (c >= 'A' && c <= 'F') return c - 'A' + 10;
+  return -1;
+}
+
+// %41 is A; a % before anything else stands for itself. In a query + is a space.
+std::string decoded(std::string_view text, bool in_query) {
+  std::string out;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    const bool is_code = text[i] == '%' && i + 2 < text.size() && hex_digit(text[i + 1]) >= 0 &&
+                         hex_digit(text[i + 2]) >= 0;
+    if (is_code) {
+      out += static_cast<char>(16 * hex_digit(text[i + 1]) + hex_digit(text[i + 2]));
+      i += 2;
+    } else {
+      out += in_query && text[i] == '+' ? ' ' : text[i];
+    }
+  }
+  return out;
+}
+
+void parse_query(std::string_view query, HttpHead* head) {
+  while (!query.empty()) {
+    const std::size_t end = std::min(query.find('&'), query.size());
+    const std::string_view pair = query.substr(0, end);
+    query.remove_prefix(std::min(end + 1, query.size()));
+    if (pair.empty()) continue;
+    const std::size_t equals = std::min(pair.find('='), pair.size());
+    head->parameters.emplace_back(decoded(pair.substr(0, equals), true),
+                                  decoded(pair.substr(std::min(equals + 1, pair.size())), true));
+  }
+}
+
+// From the text, as the library only says that it does not like them.
+std::vector<std::string> content_lengths(std::string_view text) {
+  constexpr std::string_view kName = "content-length:";
+  std::vector<std::string> out;
+  for (std::size_t begin = text.find(kLineEnd); begin != std::string_view::npos;
+       begin = text.find(kLineEnd, begin + kLineEnd.size())) {
+    std::string_view line = text.substr(begin + kLineEnd.size());
+    line = line.substr(0, line.find(kLineEnd));
+    if (!boost::algorithm::istarts_with(line, kName)) continue;
+    out.emplace_back(line.substr(kName.size()));
+    boost::algorithm::trim_if(out.back(), boost::algorithm::is_any_of(" \t"));
+  }
+  return out;
+}
+
+// Why the length of the body cannot be known. Neither is there then a place where it ends.
+std::optional<ServerResponse> length_refusal(const HttpHead& head) {
+  if (head.transfer_encoding || head.content_lengths.size() > 1)
+    return http_error(411, "the request must tell the length of its body, once");
+  if (head.content_encoding) return http_error(415, "the body must not be compressed");
+  if (!head.content_lengths.empty() &&
+      (head.content_lengths[0].empty() ||
+       head.content_lengths[0].find_first_not_of("0123456789") != std::string::npos))
+    return http_error(400, "Content-Length is not a number");
+  return std::nullopt;
+}
+
+}  // namespace
+
+bool parse_http_head(std::string_view text, HttpHead* head, ServerResponse* refusal) {
+  *head = HttpHead();
+  head->content_lengths = content_lengths(text);
+  http::request_parser<http::empty_body> parser;
+  parser.skip(true);  // the body is not its matter
+  parser.header_limit(std::numeric_limits<std::uint32_t>::max());
+  boost::beast::error_code error;
+  parser.put(boost::asio::const_buffer(text.data(), text.size()), error);
+  if (error == http::error::bad_content_length || error == http::error::bad_transfer_encoding) {
+    head->transfer_encoding = error == http::error::bad_transfer_encoding;
+    *refusal = length_refusal(*head).value_or(http_error(413, "the body is too large"));
+    return false;
+  }
+  if (error || parser.get().method() == http::verb::unknown) {
+    *refusal = http_error(400, "malformed request");
+    return false;
+  }
+  const auto& fields = parser.get();
+  const auto text_of = [&fields](http::field name) {
+    const auto value = fields[name];
+    return std::string(value.data(), value.size());
+  };
+  const std::string_view target(fields.target().data(), fields.target().size());
+  const std::size_t end = std::min(target.find('?'), target.size());
+  head->method = std::string(fields.method_string().data(), fields.method_string().size());
+  head->path = decoded(target.substr(0, end), false);
+  parse_query(target.substr(std::min(end + 1, target.size())), head);
+  head->host = text_of(http::field::host);
+  head->origin = text_of(http::field::origin);
+  head->authorization = text_of(http::field::authorization);
+  head->transfer_encoding = fields.count(http::field::transfer_encoding) > 0;
+  head->content_encoding = fields.count(http::field::content_encoding) > 0;
+  head->expects_continue = fields.version() > 10 &&
+                           boost::algorithm::iequals(text_of(http::field::expect), "100-continue");
+  return true;
+}
+
+bool body_length(const HttpHead& head, std::size_t max_body, std::size_t* length,
+                 ServerResponse* refusal) {
+  *length = 0;
+  if (auto error = length_refusal(head)) {
+    *refusal = std::move(*error);
+    return false;
+  }
+  if (head.content_lengths.empty()) return true;
+  const std::string& digits = head.content_lengths[0];
+  constexpr std::size_t kDigits = 9;
+  if (digits.size() > kDigits || std::stoul(digits) > max_body) {
+    *refusal = http_error(413, fmt::format("the body is too large; at most {} bytes", max_body));
+    return false;
+  }
+  *length = std::stoul(digits);
+  return true;
+}
+
+}  // namespace alidade

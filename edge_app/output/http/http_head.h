@@ -1,0 +1,34 @@
+#pragma once
+// HttpHead: what the head of a request says, as far as it matters here. Pure: bytes in, value or refusal out.
+
+#include <optional>
+#include <string>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "edge_app/output/http/http_message.h"
+
+namespace alidade {
+
+struct HttpHead {
+  std::string method;                                           // one that RFC 9110 or 5789 names
+  std::string path;                                             // decoded, without the query
+  std::vector<std::pair<std::string, std::string>> parameters;  // of the query, decoded
+  std::string host;
+  std::string origin;
+  std::string authorization;
+  std::vector<std::string> content_lengths;  // as they stand, one a field
+  bool transfer_encoding = false;
+  bool content_encoding = false;
+  bool expects_continue = false;
+};
+
+// text: all up to and with the blank line. False: *refusal is the answer.
+[[nodiscard]] bool parse_http_head(std::string_view text, HttpHead* head, ServerResponse* refusal);
+
+// The length of the body that the head states, at most max_body bytes. False: *refusal is the answer.
+[[nodiscard]] bool body_length(const HttpHead& head, std::size_t max_body, std::size_t* length,
+                               ServerResponse* refusal);
+
+}  // namespace alidade

@@ -1,0 +1,63 @@
+#pragma once
+// HttpServer: routes and handlers behind a door that hostile or broken clients cannot hold open.
+//
+//   one request a connection; one thread for all connections, two for the handlers; a connection beyond
+//   max_connections is answered 503 at once.
+//   head    must be complete within head_timeout_s, in max_head_bytes, else 408, 431
+//   body    of a POST must state its length, up to the route's limit, and come within body_timeout_s, else 411, 413, 400;
+//           any other request's is not read
+//   answer  a client that takes nothing for write_timeout_s is dropped
+//   rate    requests_per_s with as many at once, of all clients together, else 429
+//   token   if one is set, routes that are not open want `Authorization: Bearer TOKEN`, else 401; compared in
+//           a time that does not tell how much of it was right; never logged
+//   pages of other sites   a POST whose Origin is not this server is refused (403); so is, without a token, a Host
+//           that is a name other than localhost (DNS rebinding)
+// Every error is JSON, {"error": "one line"}. Threads run at the normal scheduling policy, niced.
+
+#include <memory>
+#include <string>
+
+#include "edge_app/output/http/http_gate.h"
+#include "edge_app/output/http/http_message.h"
+#include "edge_app/output/http/http_options.h"
+#include "edge_app/output/http/niced_threads.h"
+
+namespace alidade {
+
+class HttpListener;
+
+class HttpServer {
+ public:
+  explicit HttpServer(const HttpServerOptions& options);
+  ~HttpServer();
+  HttpServer(const HttpServer&) = delete;
+  HttpServer& operator=(const HttpServer&) = delete;
+
+  // Before start(). A route is an exact path; HEAD is answered as GET is.
+  void get(const std::string& path, HttpAccess access, HttpHandler handler);
+  void post(const std::string& path, HttpAccess access, std::size_t max_body, HttpHandler handler);
+
+  // Binds and listens; once. False with one line in *error.
+  [[nodiscard]] bool start(std::string* error);
+  // After start(): "127.0.0.1:8080", with the port that was found.
+  [[nodiscard]] const std::string& address() const { return address_; }
+
+  // Any thread, as long as the server exists: endless answers may have more to say. Takes no lock and waits for nobody.
+  void wake();
+
+  // Ends all connections, and waits for handlers that run.
+  void stop();
+
+  // Any thread.
+  [[nodiscard]] HttpCounters counters() const { return tally_.now(); }
+
+ private:
+  const HttpServerOptions options_;
+  HttpTally tally_;
+  HttpGate gate_;
+  std::string address_;
+  std::unique_ptr<HttpListener> listener_;
+  NicedThreads threads_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,30 @@
+#pragma once
+// RecordEvents: the records of a LiveState as Server-Sent Events, for one client (GET /api/v1/stream).
+//
+//   hello first, clock every few seconds, orientation for each record, lost where the client was too slow, a comment
+//   line when nothing else came for a while
+
+#include <string>
+
+#include "edge_app/output/http/http_message.h"
+#include "edge_app/output/live_state.h"
+
+namespace alidade {
+
+class RecordEvents final : public HttpStream {
+ public:
+  // Borrows *live.
+  RecordEvents(LiveState* live, std::string version);
+
+  void next(std::string* piece) override;
+
+ private:
+  LiveState& live_;
+  const std::string version_;
+  LiveState::Reader reader_;
+  bool greeted_ = false;
+  double clock_due_s_ = 0;  // the first at once
+  double said_s_ = 0;       // when something was said
+};
+
+}  // namespace alidade

@@ -1,0 +1,193 @@
+// The report's sections on where the camera went: the trajectory, the clocks, the landmarks.
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <unordered_map>
+
+#include "edge_app/output/report_page.h"
+
+namespace alidade::report {
+
+void trajectory(ReportPage& page) {
+  page.add("<h2>Trajectory</h2>\n");
+  const TrajectorySpline& spline = page.result().trajectory;
+  const Mechanics<double>& mechanics = page.result().calibration.mechanics;
+  std::vector<double> knots;
+  for (int i = 0; i <= spline.segments(); ++i) knots.push_back(spline.knot(i) - page.start_s());
+  for (int axis = 0; axis < 2; ++axis) {
+    const char* name = axis == 0 ? "pan" : "tilt";
+    const char* colour = axis == 0 ? "a" : "b";
+    const double scale = axis == 0 ? mechanics.pan_scale : mechanics.tilt_scale;
+    double low = std::numeric_limits<double>::infinity();
+    double high = -low;
+    std::vector<PlotPoint> curve;
+    constexpr int kSteps = 1200;
+    for (int i = 0; i <= kSteps; ++i) {
+      const double time = spline.begin_s() + (spline.end_s() - spline.begin_s()) * i / kSteps;
+      const double angle = spline.position(time).vector()[axis] * kDegrees;
+      curve.push_back({time - page.start_s(), angle});
+      low = std::min(low, angle);
+      high = std::max(high, angle);
+    }
+    std::vector<PlotPoint> samples;
+    std::vector<PlotPoint> good;
+    std::vector<PlotPoint> bad;
+    std::vector<double> magnitudes;
+    for (const TelemetryResidual& residual : page.result().telemetry_residuals) {
+      // The error is of the measured angle, scale times the true one, whatever the wrapping.
+      const double error = residual.error_rad[axis];
+      if (!std::isfinite(error)) continue;
+      const double time = residual.time_s - page.start_s();
+      const double angle =
+          (spline.position(residual.time_s).vector()[axis] + error / scale) * kDegrees;
+      samples.push_back({time, angle});
+      (residual.outlier ? bad : good).push_back({time, kMilli * error});
+      if (!residual.outlier) magnitudes.push_back(std::abs(kMilli * error));
+    }
+    widen(&low, &high);
+    SvgPlot plot(kWide_px, 196, page.time_axis(), {low, high, fmt::format("{}, deg", name)});
+    plot.ticks(knots, "ink");
+    plot.dots(samples, "faint", 4);
+    plot.line(curve, colour);
+    page.figure(
+        fmt::format("<b>{}</b> \u2013 line: the adjusted spline; grey: telemetry; strokes on "
+                    "the time axis: {} knots",
+                    axis == 0 ? "Pan" : "Tilt", knots.size()),
+        plot, std::string(name) + " over time");
+    const double range = symmetric_range(magnitudes, 1);
+    SvgPlot difference(kWide_px, 160, page.time_axis(),
+                       {-range, range, fmt::format("{} error, mrad", name)});
+    difference.level(0);
+    difference.dots(good, colour);
+    difference.dots(bad, "bad", 4);
+    page.figure(
+        fmt::format("<b>Telemetry minus spline, {}</b> \u2013 RMS {:.3f} mrad{}", name,
+                    root_mean_square(magnitudes),
+                    bad.empty()
+                        ? ""
+                        : "; <span class=\"key bad\"></span>outliers, left out (at the edge "
+                          "if beyond)"),
+        difference, std::string(name) + " telemetry minus spline");
+  }
+}
+
+void timing(ReportPage& page) {
+  page.add(
+      "<h2>Clocks</h2>\n<div class=\"scroll\"><table>\n<thead><tr><th>stream</th><th>period, ms"
+      "</th><th>its sigma, ms</th><th>sigma of a stamp, ms</th><th>sigma of the line, ms</th>"
+      "<th>lost</th><th>stamps are taken as</th></tr></thead>\n<tbody>\n");
+  const auto row = [&page](const char* name, const StreamTiming& timing, StampNoise noise) {
+    page.add(
+        "<tr><td>{}</td><td>{:.6f}</td><td>{:.2g}</td><td>{:.3g}</td><td>{:.2g}</td><td>{}</td>"
+        "<td>{}</td></tr>\n",
+        name, kMilli * timing.period_s, kMilli * timing.period_sigma_s,
+        kMilli * timing.stamp_sigma_s, kMilli * timing.offset_sigma_s, timing.lost,
+        !timing.steady                    ? "they are: no steady clock"
+        : noise == StampNoise::kSymmetric ? "scattering to both sides"
+                                          : "late only");
+  };
+  row("image", page.result().image_timing, page.report().options.image_stamps);
+  row("telemetry", page.result().telemetry_timing, page.report().options.telemetry_stamps);
+  page.add("</tbody>\n</table></div>\n<div class=\"pair\">\n");
+
+  std::unordered_map<std::int64_t, double> stamp_of;
+  for (const CalibrationFrame& frame : page.report().input.frames) {
+    stamp_of.emplace(frame.frame, frame.stamp_s);
+  }
+  std::vector<PlotPoint> image;
+  for (const FrameResult& frame : page.result().frames) {
+    image.push_back(
+        {frame.time_s - page.start_s(), kMilli * (stamp_of[frame.frame] - frame.time_s)});
+  }
+  std::vector<PlotPoint> telemetry;
+  std::optional<std::size_t> shown;
+  for (const TelemetryResidual& residual : page.result().telemetry_residuals) {
+    // A change of a coarse reading stands behind its sample, and is no stamp.
+    if (shown == residual.sample) continue;
+    shown = residual.sample;
+    const double line = residual.time_s + page.result().calibration.clock_offset;
+    telemetry.push_back({residual.time_s - page.start_s(),
+                         kMilli * (page.report().input.telemetry[residual.sample].stamp_s - line)});
+  }
+  const auto plot_stream = [&](const char* name, const char* colour,
+                               const std::vector<PlotPoint>& points, const StreamTiming& timing) {
+    double low = 0;
+    double high = 0;
+    for (const PlotPoint& point : points) {
+      low = std::min(low, point.y);
+      high = std::max(high, point.y);
+    }
+    widen(&low, &high);
+    SvgPlot plot(kHalf_px, 240, page.time_axis(), {low, high, "stamp - line, ms"});
+    plot.band(std::max(low, -2 * kMilli * timing.stamp_sigma_s),
+              std::min(high, 2 * kMilli * timing.stamp_sigma_s));
+    plot.level(0);
+    plot.dots(points, colour, 3);
+    page.figure(fmt::format("<b>Stamps of {}</b> \u2013 minus the times of its steady clock; grey: "
+                            "\u00b12 sigma",
+                            name),
+                plot, std::string("timing residuals of ") + name);
+  };
+  plot_stream("the image", "a", image, page.result().image_timing);
+  plot_stream("the telemetry", "b", telemetry, page.result().telemetry_timing);
+  page.add("</div>\n");
+}
+
+void landmarks(ReportPage& page) {
+  const Mechanics<double>& mechanics = page.result().calibration.mechanics;
+  std::vector<PlotPoint> path;
+  double reference = 0;
+  const auto place = [&reference](const Vector3<double>& d) {
+    const double azimuth = reference + wrap_angle(std::atan2(d.y(), d.x()) - reference);
+    return PlotPoint{azimuth * kDegrees, -std::asin(std::clamp(d.z(), -1.0, 1.0)) * kDegrees};
+  };
+  for (const FrameResult& frame : page.result().frames) {
+    const Vector3<double> axis = R_base_from_camera(mechanics, frame.angle).col(2);
+    path.push_back(place(axis));
+    reference = path.back().x / kDegrees;  // follows the camera around
+  }
+  double low_x = path.front().x;
+  double high_x = low_x;
+  double low_y = path.front().y;
+  double high_y = low_y;
+  const auto include = [&](const PlotPoint& point) {
+    low_x = std::min(low_x, point.x);
+    high_x = std::max(high_x, point.x);
+    low_y = std::min(low_y, point.y);
+    high_y = std::max(high_y, point.y);
+  };
+  for (const PlotPoint& point : path) include(point);
+  reference = 0.5 * (low_x + high_x) / kDegrees;
+  std::vector<PlotPoint> often;
+  std::vector<PlotPoint> seldom;
+  constexpr int kOften = 10;
+  for (const CalibrationLandmark& landmark : page.result().landmarks) {
+    const PlotPoint point = place(landmark.d_b);
+    include(point);
+    (landmark.observations >= kOften ? often : seldom).push_back(point);
+  }
+  widen(&low_x, &high_x);
+  widen(&low_y, &high_y);
+  // The same scale both ways, in a plane of bearable height.
+  const double plane = kWide_px - SvgPlot::kLeft - SvgPlot::kRight;
+  const double plane_height = std::clamp(plane * (high_y - low_y) / (high_x - low_x), 180.0, 560.0);
+  const double scale = std::min(plane / (high_x - low_x), plane_height / (high_y - low_y));
+  const double x_air = 0.5 * (plane / scale - (high_x - low_x));
+  const double y_air = 0.5 * (plane_height / scale - (high_y - low_y));
+  SvgPlot plot(kWide_px, static_cast<int>(plane_height) + SvgPlot::kTop + SvgPlot::kBottom,
+               {low_x - x_air, high_x + x_air, "azimuth (right), deg"},
+               {low_y - y_air, high_y + y_air, "elevation (up), deg"});
+  plot.dots(seldom, "b", 3.4);
+  plot.dots(often, "a", 3.4);
+  plot.line(path, "ink");
+  page.add("<h2>Landmarks</h2>\n");
+  page.figure(
+      fmt::format("<b>Map in the base</b> \u2013 <span class=\"key a\"></span>seen {} times or "
+                  "more, <span class=\"key b\"></span>less often; line: the optical axis",
+                  kOften),
+      plot, "map of the landmarks");
+}
+
+}  // namespace alidade::report

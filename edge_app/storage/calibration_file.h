@@ -1,0 +1,22 @@
+#pragma once
+// calibration.yaml on disk; what it says: core/calibration/calibration_text.h. Not for the real-time thread. No shared
+// state.
+
+#include <string>
+
+#include "core/calibration/calibration_text.h"
+
+namespace alidade {
+
+// False leaves one line in *error: `path: cannot be read: why`, or what is wrong in which line.
+[[nodiscard]] bool load_calibration(const std::string& path, Calibration* calibration,
+                                    std::string* error);
+
+// Atomic: a reader, or a power cut, meets the old file or the new one, never half of one. A
+// calibration that load_calibration() would refuse is refused here.
+[[nodiscard]] bool save_calibration(const std::string& path, const Calibration& calibration,
+                                    const CalibrationNotes& notes, std::string* error);
+[[nodiscard]] bool save_calibration(const std::string& path, const Calibration& calibration,
+                                    std::string* error);
+
+}  // namespace alidade

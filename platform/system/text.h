@@ -1,0 +1,30 @@
+#pragma once
+// Pieces of foreign text: blanks taken off, numbers read.
+
+#include <cmath>
+#include <cstddef>
+#include <cstdlib>
+#include <optional>
+#include <string>
+#include <string_view>
+
+namespace alidade {
+
+// text without what of `blanks` stands at its ends.
+[[nodiscard]] inline std::string_view trimmed(std::string_view text, std::string_view blanks) {
+  const std::size_t first = text.find_first_not_of(blanks);
+  return first == std::string_view::npos
+             ? std::string_view()
+             : text.substr(first, text.find_last_not_of(blanks) - first + 1);
+}
+
+// As strtod reads it. None: text is no number as a whole, or not a finite one.
+[[nodiscard]] inline std::optional<double> parse_number(std::string_view text) {
+  const std::string copy(text);  // strtod needs the terminating null
+  char* end = nullptr;
+  const double value = std::strtod(copy.c_str(), &end);
+  return end != copy.c_str() && *end == '\0' && std::isfinite(value) ? std::optional(value)
+                                                                     : std::nullopt;
+}
+
+}  // namespace alidade

@@ -1,0 +1,53 @@
+#pragma once
+// RtspMessage: owns a message of GStreamer's RTSP library, and reads out of it what RtspSession needs.
+
+#include <gst/rtsp/gstrtspmessage.h>
+
+#include <cstddef>
+#include <cstdint>
+#include <string>
+#include <utility>
+
+namespace alidade {
+
+class RtspMessage {
+ public:
+  RtspMessage() { gst_rtsp_message_init(&message_); }
+  ~RtspMessage() { gst_rtsp_message_unset(&message_); }
+  RtspMessage(const RtspMessage&) = delete;
+  RtspMessage& operator=(const RtspMessage&) = delete;
+
+  GstRTSPMessage* get() { return &message_; }
+  // For a function that fills it anew.
+  GstRTSPMessage* cleared() {
+    gst_rtsp_message_unset(&message_);
+    return &message_;
+  }
+  GstRTSPMsgType type() { return gst_rtsp_message_get_type(&message_); }
+  int status() const { return message_.type_data.response.code; }
+  const char* reason() const { return message_.type_data.response.reason; }
+  std::string header(GstRTSPHeaderField field) {
+    gchar* value = nullptr;
+    gst_rtsp_message_get_header(&message_, field, &value, 0);
+    return value == nullptr ? "" : value;
+  }
+  // The library makes a list one header an item, where the field may be a list.
+  bool lists(GstRTSPHeaderField field, const char* item) {
+    gchar* value = nullptr;
+    for (int i = 0; gst_rtsp_message_get_header(&message_, field, &value, i) == GST_RTSP_OK; ++i) {
+      if (std::string(value).find(item) != std::string::npos) return true;
+    }
+    return false;
+  }
+  std::pair<const std::uint8_t*, std::size_t> body() {
+    guint8* data = nullptr;
+    guint size = 0;
+    gst_rtsp_message_get_body(&message_, &data, &size);
+    return {data, size == 0 ? 0 : size - 1};  // the library adds a NUL and counts it
+  }
+
+ private:
+  GstRTSPMessage message_{};
+};
+
+}  // namespace alidade

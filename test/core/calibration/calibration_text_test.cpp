@@ -1,0 +1,335 @@
+#include "core/calibration/calibration_text.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <Eigen/Core>
+#include <cstring>
+#include <limits>
+#include <locale>
+#include <random>
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+// The paper's calibration with numbers that decimals cannot hold.
+Calibration paper_calibration() {
+  Calibration calibration;
+  calibration.camera = {32008 + 1 / 3.0, 1 - 1e-16, 55.4, 1920, 1080};
+  calibration.line_delay = -14.2e-6;
+  calibration.mechanics.pan_axis = Vector3<double>(-0.012, 0.001, 1).normalized();
+  calibration.mechanics.tilt_axis = Vector3<double>(0.002, 1, 0.014).normalized();
+  calibration.mechanics.pan_scale = 1.0 / 0.97;
+  calibration.mechanics.tilt_scale = 1.06;
+  calibration.clock_offset = -84.4e-3;
+  calibration.zoom = 1234.1;
+  std::mt19937_64 generator(3);
+  std::normal_distribution<double> normal;
+  ParameterCovariance<double> factor;
+  for (int i = 0; i < kParameterCount; ++i) {
+    for (int j = 0; j < kParameterCount; ++j) factor(i, j) = normal(generator);
+  }
+  Matrix<double, kParameterCount, 1> sigmas;
+  sigmas << 24, 0, 0.11, 7e-8, 1e-4, 2e-4, 3e-4, 1e-4, 0.07, 0.06, 1e-3;
+  const ParameterCovariance<double> cov =
+      sigmas.asDiagonal() * (factor * factor.transpose()) * sigmas.asDiagonal() / kParameterCount;
+  calibration.covariance = (cov + cov.transpose()) / 2;
+  return calibration;
+}
+
+// EXPECT_EQ takes -0 for 0; the file must not.
+bool same_bits(double a, double b) { return std::memcmp(&a, &b, sizeof a) == 0; }
+
+template <class Derived>
+bool same_bits(const Eigen::MatrixBase<Derived>& a, const Eigen::MatrixBase<Derived>& b) {
+  for (int i = 0; i < a.rows(); ++i) {
+    for (int j = 0; j < a.cols(); ++j) {
+      if (!same_bits(a(i, j), b(i, j))) return false;
+    }
+  }
+  return true;
+}
+
+void expect_same_bits(const Calibration& a, const Calibration& b) {
+  EXPECT_TRUE(same_bits(a.camera.focal_length, b.camera.focal_length));
+  EXPECT_TRUE(same_bits(a.camera.aspect, b.camera.aspect));
+  EXPECT_TRUE(same_bits(a.camera.radial_distortion, b.camera.radial_distortion));
+  EXPECT_EQ(a.camera.width, b.camera.width);
+  EXPECT_EQ(a.camera.height, b.camera.height);
+  EXPECT_TRUE(same_bits(a.line_delay, b.line_delay));
+  EXPECT_TRUE(same_bits(a.mechanics.pan_axis, b.mechanics.pan_axis));
+  EXPECT_TRUE(same_bits(a.mechanics.tilt_axis, b.mechanics.tilt_axis));
+  EXPECT_TRUE(same_bits(a.mechanics.pan_scale, b.mechanics.pan_scale));
+  EXPECT_TRUE(same_bits(a.mechanics.tilt_scale, b.mechanics.tilt_scale));
+  EXPECT_TRUE(same_bits(a.clock_offset, b.clock_offset));
+  EXPECT_EQ(a.zoom, b.zoom);
+  EXPECT_TRUE(same_bits(a.covariance, b.covariance));
+}
+
+Calibration parsed(const std::string& text) {
+  Calibration calibration;
+  std::string error;
+  EXPECT_TRUE(parse_calibration(text, "test.yaml", &calibration, &error)) << error;
+  return calibration;
+}
+
+std::string refusal(const std::string& text) {
+  Calibration calibration;
+  std::string error;
+  EXPECT_FALSE(parse_calibration(text, "test.yaml", &calibration, &error)) << text;
+  EXPECT_EQ(error.find('\n'), std::string::npos) << "one line: " << error;
+  return error;
+}
+
+// As a person writes it. Each fault below replaces one line.
+const char* const kByHand =
+    "format: 1\n"
+    "image: {width: 1920, height: 1080}\n"
+    "focal_length: {value: 32008, sigma: 24}\n"
+    "aspect: {value: 1}\n"
+    "radial_distortion: {value: 55.4, sigma: 0.11}\n"
+    "line_delay: {value: -14.2e-6, sigma: 7e-8}\n"
+    "pan_axis: {value: [-0.011999, 0, 0.999928], sigma: [1e-4, 2e-4]}\n"
+    "tilt_axis: {value: [0, 0.999902, 0.013999]}\n"
+    "pan_scale: {value: 1}\n"
+    "tilt_scale: {value: 1}\n"
+    "clock_offset: {value: -84.4e-3, sigma: 1e-3}\n";
+
+std::string with_line(int number, const std::string& line) {
+  std::string text = kByHand;
+  std::size_t begin = 0;
+  for (int i = 1; i < number; ++i) begin = text.find('\n', begin) + 1;
+  return text.replace(begin, text.find('\n', begin) - begin, line);
+}
+
+TEST(CalibrationText, ErrorsStayOnOneLineWhateverTheFileHolds) {
+  EXPECT_THAT(refusal("format: \"1\\n\\e[2J\"\n"),
+              HasSubstr("\"1??[2J\"; a finite number is needed"));
+  EXPECT_THAT(refusal("\"form\\nat\": 1\n"), HasSubstr("unknown key form?at;"));
+}
+
+TEST(CalibrationText, ReadsWhatAPersonWrote) {
+  const Calibration calibration = parsed(kByHand);
+  EXPECT_EQ(calibration.camera.width, 1920);
+  EXPECT_EQ(calibration.camera.height, 1080);
+  EXPECT_EQ(calibration.camera.focal_length, 32008);
+  EXPECT_EQ(calibration.camera.radial_distortion, 55.4);
+  EXPECT_EQ(calibration.line_delay, -14.2e-6);
+  EXPECT_EQ(calibration.clock_offset, -84.4e-3);
+  EXPECT_FALSE(calibration.zoom);
+  ParameterCovariance<double> expected = ParameterCovariance<double>::Zero();
+  expected(index(Parameter::kFocalLength), index(Parameter::kFocalLength)) = 24.0 * 24;
+  expected(index(Parameter::kRadialDistortion), index(Parameter::kRadialDistortion)) = 0.11 * 0.11;
+  expected(index(Parameter::kLineDelay), index(Parameter::kLineDelay)) = 7e-8 * 7e-8;
+  expected(index(Parameter::kPanAxis0), index(Parameter::kPanAxis0)) = 1e-4 * 1e-4;
+  expected(index(Parameter::kPanAxis1), index(Parameter::kPanAxis1)) = 2e-4 * 2e-4;
+  expected(index(Parameter::kClockOffset), index(Parameter::kClockOffset)) = 1e-3 * 1e-3;
+  EXPECT_EQ(calibration.covariance, expected);
+}
+
+TEST(CalibrationText, MakesARoundedAxisAUnitVector) {
+  const Calibration calibration = parsed(kByHand);
+  EXPECT_NEAR(calibration.mechanics.pan_axis.norm(), 1, 1e-15);
+  EXPECT_NEAR(calibration.mechanics.tilt_axis.norm(), 1, 1e-15);
+}
+
+TEST(CalibrationText, AspectMayBeAbsent) { EXPECT_EQ(parsed(with_line(4, "")).camera.aspect, 1); }
+
+TEST(CalibrationText, AcceptsQualityAndLandmarks) {
+  EXPECT_EQ(parsed(std::string(kByHand) + "quality: {rms_px: 0.3, frames: 500}\n" +
+                   "landmarks: map.bin\nzoom: 12.5\n")
+                .zoom,
+            12.5);
+}
+
+TEST(CalibrationText, RoundTripIsExactToTheBit) {
+  expect_same_bits(parsed(format_calibration(paper_calibration())), paper_calibration());
+  expect_same_bits(parsed(format_calibration(parsed(kByHand))), parsed(kByHand));
+}
+
+TEST(CalibrationText, RoundTripIsExactForAnyNumber) {
+  std::mt19937_64 generator(4);
+  std::uniform_real_distribution<double> exponent(-300, 11);
+  int checked = 0;
+  for (int i = 0; i < 200; ++i) {
+    Calibration calibration = paper_calibration();
+    calibration.camera.radial_distortion = std::pow(10, exponent(generator));
+    calibration.line_delay = -0.0;
+    calibration.zoom = -calibration.camera.radial_distortion;
+    expect_same_bits(parsed(format_calibration(calibration)), calibration);
+    ++checked;
+  }
+  EXPECT_EQ(checked, 200);
+}
+
+TEST(CalibrationText, WritesNumbersAsAPersonWould) {
+  const std::string text = format_calibration(parsed(kByHand));
+  EXPECT_THAT(text, HasSubstr("radial_distortion: {value: 55.4, sigma: 0.11}"));
+  EXPECT_THAT(text, HasSubstr("telemetry clock = image clock + clock_offset"));
+}
+
+class GermanNumbers : public std::numpunct<char> {
+ protected:
+  char do_decimal_point() const override { return ','; }
+  char do_thousands_sep() const override { return '.'; }
+  std::string do_grouping() const override { return "\3"; }
+};
+
+TEST(CalibrationText, DoesNotDependOnTheLocale) {
+  const std::string text = format_calibration(paper_calibration());
+  const std::locale before =
+      std::locale::global(std::locale(std::locale::classic(), new GermanNumbers));
+  const std::string german = format_calibration(paper_calibration());
+  const Calibration calibration = parsed(text);
+  std::locale::global(before);
+  EXPECT_EQ(german, text);
+  expect_same_bits(calibration, paper_calibration());
+}
+
+struct Fault {
+  int line;
+  const char* text;
+  const char* complaint;
+};
+
+TEST(CalibrationText, RefusesAFaultyLineWithItsNumberAndARemedy) {
+  const Fault faults[] = {
+      {1, "format: 2", "reads format 1"},
+      {1, "format: one", "format is \"one\"; a finite number"},
+      {2, "image: {width: 0, height: 1080}", "image.width is 0; a whole number of pixels"},
+      {2, "image: {width: 1920.5, height: 1080}", "a whole number of pixels"},
+      {2, "image: {width: 1920, height: -1}", "image.height is -1"},
+      {2, "image: {width: 1920}", "image.height is missing"},
+      {2, "image: 1920x1080", "image is not a map"},
+      {2, "image: {width: 1920, height: 1080, depth: 8}", "unknown key image.depth"},
+      {3, "focal_length: {value: -32008, sigma: 24}", "focal_length is -32008; give pixels"},
+      {3, "focal_length: {value: 0}", "give pixels, more than 0"},
+      {3, "focal_length: {value: 129}", "not millimetres"},
+      {3, "focal_length: {value: long}", "focal_length is \"long\"; a finite number"},
+      {3, "focal_length: {value: 32008px}", "a finite number"},
+      {3, "focal_length: {value: 32,008}", "known are value, sigma"},
+      {3, "focal_length: {value: .inf}", "a finite number"},
+      {3, "focal_length: {value: nan}", "a finite number"},
+      {3, "focal_length: {value: 1e999}", "a finite number"},
+      {3, "focal_length: {value: }", "is not a single value"},
+      {3, "focal_length: 32008", "write {value: ..., sigma: ...}"},
+      {3, "focal_length: {sigma: 24}", "focal_length.value is missing"},
+      {3, "focal_length: {value: 32008, sigma: -24}", "focal_length.sigma is -24"},
+      {3, "focal_length: {value: 32008, sigma: .nan}", "a finite number"},
+      {3, "focal_length: {value: 32008, value: 32009}", "focal_length.value stands here a second"},
+      {3, "focal_length: {value: 32008, stddev: 24}", "unknown key focal_length.stddev"},
+      {3, "focal_lenght: {value: 32008}", "unknown key focal_lenght; known are format"},
+      {4, "aspect: {value: 16}", "a ratio near 1"},
+      {5, "radial_distortion: {value: [1, 2]}", "is not a single value"},
+      {6, "line_delay: {value: 14}", "line_delay is 14; give seconds a row; 14 microseconds"},
+      {6, "line_delay: {value: -14.2e-6, sigma: 0.07}", "in the unit of the value"},
+      {7, "pan_axis: {value: [0, 0, 1.1]}", "has length 1.1; a unit vector"},
+      {7, "pan_axis: {value: [0, 0, 0]}", "has length 0; a unit vector"},
+      {7, "pan_axis: {value: [0, 0, -1]}", "more than 60 degrees from its nominal [0, 0, 1]"},
+      {7, "pan_axis: {value: [0, 1, 0]}", "more than 60 degrees"},
+      {7, "pan_axis: {value: [0, 1]}", "a list of 3 numbers"},
+      {7, "pan_axis: {value: 0.7}", "a list of 3 numbers"},
+      {7, "pan_axis: {value: [0, 0, one]}", "pan_axis is \"one\"; a finite number"},
+      {7, "pan_axis: {value: [0, 0, 1], sigma: 0.1}", "a list of 2 numbers"},
+      {7, "pan_axis: {value: [0, 0, 1], sigma: [0.1, 2]}", "radians"},
+      {8, "tilt_axis: {value: [1, 0, 0]}", "more than 60 degrees from its nominal [0, 1, 0]"},
+      {9, "pan_scale: {value: 57.3}", "measured angle / true angle, near 1"},
+      {10, "tilt_scale: {value: -1}", "near 1"},
+      {11, "clock_offset: {value: -84.4, sigma: 1}", "84 milliseconds are 84e-3"},
+      {11, "clock_offset: {value: 0", "valid YAML"},
+  };
+  int refused = 0;
+  for (const Fault& fault : faults) {
+    const std::string error = refusal(with_line(fault.line, fault.text));
+    // YAML finds an open bracket where the file ends.
+    const int line = std::string(fault.text) == "clock_offset: {value: 0" ? 12 : fault.line;
+    EXPECT_THAT(error, StartsWith("test.yaml:" + std::to_string(line) + ": "));
+    EXPECT_THAT(error, HasSubstr(fault.complaint));
+    EXPECT_THAT(error, HasSubstr("; ")) << "says what would be right";
+    ++refused;
+  }
+  EXPECT_EQ(refused, 43);
+}
+
+TEST(CalibrationText, NamesEveryMissingKey) {
+  int refused = 0;
+  for (const int line : {1, 2, 3, 5, 6, 7, 8, 9, 10, 11}) {
+    const std::string text = kByHand;
+    std::size_t begin = 0;
+    for (int i = 1; i < line; ++i) begin = text.find('\n', begin) + 1;
+    const std::string key = text.substr(begin, text.find(':', begin) - begin);
+    EXPECT_EQ(refusal(with_line(line, "")), "test.yaml:" + std::to_string(line == 1 ? 2 : 1) +
+                                                ": " + key + " is missing; add it");
+    ++refused;
+  }
+  EXPECT_EQ(refused, 10);
+}
+
+TEST(CalibrationText, RefusesWhatIsNoCalibration) {
+  for (const char* text :
+       {"", "hello", "- 1\n- 2", "{{{", "\x01\x02", "&a [*a, *a]", "format: 1"}) {
+    EXPECT_THAT(refusal(text), StartsWith("test.yaml:1: "));
+  }
+}
+
+TEST(CalibrationText, RefusesAFaultyCovariance) {
+  const auto with = [](const std::string& names, const std::string& matrix) {
+    return std::string(kByHand) + "covariance:\n  names: " + names + "\n  matrix: " + matrix;
+  };
+  const std::string two = "[focal_length, radial_distortion]";
+  const Calibration good = parsed(with(two, "[[576, 1.2], [1.2, 0.0121]]"));
+  EXPECT_EQ(good.covariance(0, 2), 1.2);
+  EXPECT_EQ(good.covariance(2, 0), 1.2);
+  EXPECT_EQ(good.covariance(2, 2), 0.0121);
+  EXPECT_EQ(good.covariance(3, 3), 7e-8 * 7e-8) << "a parameter without a row keeps its sigma";
+
+  EXPECT_THAT(refusal(with(two, "[[576, 1.2], [1.3, 0.0121]]")), HasSubstr("not symmetric"));
+  EXPECT_THAT(refusal(with("[line_delay, pan_axis_0]", "[[1, 0], [0, 1e-8]]")),
+              HasSubstr("sigma of line_delay is 1; the square of"));
+  EXPECT_THAT(refusal(with("[pan_axis_0]", "[[1.1]]")), HasSubstr("sigma of pan_axis_0 is 1.04"));
+  EXPECT_THAT(refusal(with(two, "[[-576, 0], [0, 0.0121]]")), HasSubstr("negative variance -576"));
+  EXPECT_THAT(refusal(with(two, "[[576, 2.7], [2.7, 0.0121]]")),
+              HasSubstr("not positive semidefinite"));
+  EXPECT_THAT(refusal(with("[focal_length, aspect]", "[[576, 1e-9], [1e-9, 0]]")),
+              HasSubstr("covariance.matrix ties focal_length to aspect"));
+  EXPECT_THAT(refusal(with(two, "[[577, 0], [0, 0.0122]]")),
+              HasSubstr("sigma of radial_distortion is 0.11, its covariance says 0.110454"));
+  EXPECT_THAT(refusal(with(two, "[[576, 0]]")), HasSubstr("a row for each of the 2 names"));
+  EXPECT_THAT(refusal(with(two, "[[576], [0, 1]]")), HasSubstr("a list of 2 numbers"));
+  EXPECT_THAT(refusal(with(two, "[[576, x], [0, 1]]")), HasSubstr("a finite number"));
+  EXPECT_THAT(refusal(with("[focal_length, focal]", "[[576, 0], [0, 1]]")),
+              HasSubstr("unknown name"));
+  EXPECT_THAT(refusal(with("[aspect, aspect]", "[[0, 0], [0, 0]]")), HasSubstr("aspect twice"));
+  EXPECT_THAT(refusal(with("focal_length", "[[576]]")), HasSubstr("names is not a list"));
+  EXPECT_THAT(refusal(std::string(kByHand) + "covariance: {names: [aspect]}\n"),
+              StartsWith("test.yaml:12: covariance.matrix is missing"));
+}
+
+TEST(CalibrationText, TellsPeopleOfTheRunAndReadsBackWithoutIt) {
+  CalibrationNotes notes;
+  notes.quality.emplace();
+  notes.quality->pixel_sigma_ratio = 1.25;
+  notes.quality->landmarks = 567;
+  notes.quality->weakest_direction = "focal_length up: with \"pan_scale\" up";
+  notes.quality->advice = {"turn: a whole circle", "#2"};
+  notes.excluded = {"2 observations that are outliers"};
+  notes.priors = {{"aspect", {1, 0}}, {"pan_scale", {1, 1e-8}}};
+  notes.landmarks = "map.bin";
+  const std::string text = format_calibration(paper_calibration(), notes);
+  for (const char* part :
+       {"quality:", "pixel_sigma_ratio: 1.25", "landmarks: 567",
+        "pan_scale: {value: 1, sigma: 1e-08}", "\"2 observations that are outliers\"", "\"#2\"",
+        "landmarks: \"map.bin\""}) {
+    EXPECT_THAT(text, HasSubstr(part));
+  }
+  Calibration read;
+  std::string error;
+  ASSERT_TRUE(parse_calibration(text, "test", &read, &error)) << error;
+  expect_same_bits(read, paper_calibration());
+}
+
+}  // namespace
+}  // namespace alidade

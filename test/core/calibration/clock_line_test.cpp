@@ -1,0 +1,111 @@
+#include "core/calibration/clock_line.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+namespace alidade::internal {
+namespace {
+
+constexpr double kPeriod = 0.04;
+constexpr double kStart = 12.5;
+
+ClockInput ticks(int count, double sigma, std::uint64_t seed, double lost = 0, bool late = false,
+                 bool numbered = true) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> normal;
+  std::exponential_distribution<double> exponential;
+  std::uniform_real_distribution<double> uniform(0, 1);
+  ClockInput input;
+  for (int i = 0; i < count; ++i) {
+    const double noise = sigma * (late ? exponential(random) : normal(random));
+    if (uniform(random) < lost) continue;
+    input.stamp_s.push_back(kStart + kPeriod * i + noise);
+    input.sequence.emplace_back();
+    if (numbered) input.sequence.back() = i;
+  }
+  input.one_sided = late;
+  return input;
+}
+
+TEST(ClockLine, IsWithinItsOwnSigmas) {
+  double offset_nees = 0;
+  double period_nees = 0;
+  constexpr int kRuns = 200;
+  for (int run = 0; run < kRuns; ++run) {
+    const ClockLine line = fit_clock_line(ticks(200, 2e-3, static_cast<std::uint64_t>(run + 1)));
+    ASSERT_TRUE(line.steady);
+    double error = 0;
+    for (int i = 0; i < 200; ++i) {
+      error += (line.time_s[static_cast<std::size_t>(i)] - kStart - kPeriod * i) / 200;
+    }
+    offset_nees += std::pow(error / line.offset_sigma_s, 2) / kRuns;
+    period_nees += std::pow((line.period_s - kPeriod) / line.period_sigma_s, 2) / kRuns;
+  }
+  // Chi-square with 200 degrees of freedom: 1 +- 0.1, at four standard deviations.
+  EXPECT_NEAR(offset_nees, 1, 0.4);
+  EXPECT_NEAR(period_nees, 1, 0.4);
+}
+
+TEST(ClockLine, LeansOnTheMeasuredPeriodWhereItIsBetter) {
+  ClockInput input = ticks(20, 2e-3, 5);
+  const ClockLine alone = fit_clock_line(input);
+  input.period_s = kPeriod;
+  input.period_sigma_s = 1e-6;
+  const ClockLine joined = fit_clock_line(input);
+  EXPECT_LT(joined.period_sigma_s, 1.01e-6);
+  EXPECT_GT(alone.period_sigma_s, 1e-5);
+  EXPECT_NEAR(joined.period_s, kPeriod, 4e-6);
+}
+
+TEST(ClockLine, CountsLostTicksWithoutNumbers) {
+  const ClockInput input = ticks(300, 2e-3, 3, 0.2, false, false);
+  const ClockLine line = fit_clock_line(input);
+  ASSERT_TRUE(line.steady);
+  EXPECT_NEAR(line.period_s, kPeriod, 5 * line.period_sigma_s);
+  EXPECT_GT(line.lost, 30);
+}
+
+TEST(ClockLine, KnowsAPlainCountEvenIfJitterReorders) {
+  const ClockInput input = ticks(400, 0.02, 4, 0, false, false);
+  const ClockLine line = fit_clock_line(input);
+  ASSERT_TRUE(line.steady);
+  EXPECT_EQ(line.lost, 0);
+  EXPECT_NEAR(line.period_s, kPeriod, 5 * line.period_sigma_s);
+}
+
+TEST(ClockLine, TakesTheLeastOfOneSidedDelays) {
+  const ClockLine line = fit_clock_line(ticks(200, 2e-3, 6, 0, true));
+  ASSERT_TRUE(line.steady);
+  // The least, not the mean 2 ms above; known far better than the mean would be.
+  EXPECT_NEAR(line.time_s[100], kStart + kPeriod * 100, 6 * line.offset_sigma_s);
+  EXPECT_LT(line.offset_sigma_s, 1e-4);
+}
+
+TEST(ClockLine, IgnoresStallsOfTheStampingProgram) {
+  ClockInput input = ticks(200, 1e-3, 7);
+  for (std::size_t i = 0; i < 200; i += 17) input.stamp_s[i] += 0.5;
+  const ClockLine line = fit_clock_line(input);
+  EXPECT_NEAR(line.time_s[100], kStart + kPeriod * 100,
+              5 * line.offset_sigma_s + 5 * 50 * line.period_sigma_s);
+  EXPECT_LT(line.stamp_sigma_s, 1.3e-3);
+}
+
+TEST(ClockLine, SaysWhenStampsFitNoSteadyClock) {
+  std::mt19937_64 random(8);
+  std::uniform_real_distribution<double> uniform(0.01, 0.09);
+  ClockInput input;
+  double t = 0;
+  for (int i = 0; i < 300; ++i) {
+    t += uniform(random);
+    input.stamp_s.push_back(t);
+    input.sequence.emplace_back();
+  }
+  const ClockLine line = fit_clock_line(input);
+  EXPECT_FALSE(line.steady);
+  EXPECT_EQ(line.time_s, input.stamp_s);
+}
+
+}  // namespace
+}  // namespace alidade::internal
