@@ -93,9 +93,10 @@ add_custom_target(processor_programs)
 #               libraries that the sysroot lacks), with NATIVE_SUPPORT and NATIVE_LINK; `NATIVE ALL`: the whole program
 #   THOROUGH    patterns of cases that only `scripts/test all` runs: entry NAME.thorough, with the label thorough
 #   UNSANITIZED patterns of cases from which a sanitizer learns nothing that others do not show it: repetition, long films
+#   SHARDS      how many processes share the cases, for a room whose tests mostly wait
 #   DEFINITIONS, DEPENDS, LABELS, TIMEOUT (s), RESOURCE_LOCK
 function(alidade_test name)
-  cmake_parse_arguments(A "" "TIMEOUT;RESOURCE_LOCK"
+  cmake_parse_arguments(A "" "TIMEOUT;RESOURCE_LOCK;SHARDS"
     "SOURCES;SUPPORT;LINK;THREADED;NATIVE;NATIVE_SUPPORT;NATIVE_LINK;THOROUGH;UNSANITIZED;DEFINITIONS;DEPENDS;LABELS" ${ARGN})
   if(NOT ALIDADE_BUILD_TESTS)
     return()
@@ -142,7 +143,7 @@ function(alidade_test name)
   endif()
 endfunction()
 
-# One entry of ctest for the cases of a program that the filter leaves. Takes TIMEOUT and RESOURCE_LOCK from alidade_test.
+# One entry of ctest for the cases of a program that the filter leaves. Takes TIMEOUT, RESOURCE_LOCK and SHARDS from alidade_test.
 function(alidade_register_cases program name filter labels)
   if(NOT A_TIMEOUT)
     set(A_TIMEOUT 300)
@@ -151,7 +152,12 @@ function(alidade_register_cases program name filter labels)
   if(CMAKE_CROSSCOMPILING OR ALIDADE_SANITIZE)
     math(EXPR A_TIMEOUT "5 * ${A_TIMEOUT}")
   endif()
-  add_test(NAME ${name} COMMAND ${program} --gtest_brief=1 --gtest_filter=${filter})
+  set(command ${program})
+  if(A_SHARDS AND NOT CMAKE_CROSSCOMPILING)
+    find_program(SYSTEM_PYTHON3 NAMES python3 PATHS /usr/bin NO_DEFAULT_PATH REQUIRED)
+    set(command ${SYSTEM_PYTHON3} -B ${PROJECT_SOURCE_DIR}/test/support/run_shards.py ${A_SHARDS} $<TARGET_FILE:${program}>)
+  endif()
+  add_test(NAME ${name} COMMAND ${command} --gtest_brief=1 --gtest_filter=${filter})
   set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${labels}")
   if(A_RESOURCE_LOCK)
     set_tests_properties(${name} PROPERTIES RESOURCE_LOCK ${A_RESOURCE_LOCK})

@@ -1,9 +1,8 @@
 #pragma once
 // Bundle adjustment of one calibration: Levenberg-Marquardt on the exact Jacobians of linearisation.h, landmarks
 // eliminated first.
-// The normal equations are solved here and not by Ceres, against which the tests hold them: Ceres takes three
-// times as long for the same minimum (adjustment_benchmark), and what knots, noise and covariance need of the
-// reduced normal matrix falls out. Landmarks tie distant times together on a path that returns, so the matrix left
+// The normal equations are solved here and not by Ceres, against which the tests hold them: Ceres takes longer for the
+// same minimum (docs/measurements.md), and what knots, noise and covariance need of the reduced normal matrix falls out. Landmarks tie distant times together on a path that returns, so the matrix left
 // over the control points is dense.
 // Allocates; one object for each thread.
 

@@ -57,18 +57,19 @@ std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baselin
 MotionMatch match_motion(const std::vector<ImageMotion>& motion, const TrajectorySpline& telemetry,
                          double centre_s, double half_range_s) {
   // The telemetry on a grid: every candidate needs it at all frames.
-  constexpr double kGridStep = 2e-3;
-  const int grid_size = static_cast<int>((telemetry.end_s() - telemetry.begin_s()) / kGridStep) + 1;
+  constexpr double kGridStep_s = 2e-3;
+  const int grid_size =
+      static_cast<int>((telemetry.end_s() - telemetry.begin_s()) / kGridStep_s) + 1;
   std::vector<Vector2<double>> grid;
   grid.reserve(static_cast<std::size_t>(grid_size));
   int segment = 0;
   for (int i = 0; i < grid_size; ++i) {
-    const auto basis = telemetry.basis(telemetry.begin_s() + i * kGridStep, segment);
+    const auto basis = telemetry.basis(telemetry.begin_s() + i * kGridStep_s, segment);
     segment = basis.segment;
     grid.push_back(telemetry.position(basis).vector());
   }
   const auto look_up = [&](double time, Vector2<double>* angle) {
-    const double place = (time - telemetry.begin_s()) / kGridStep;
+    const double place = (time - telemetry.begin_s()) / kGridStep_s;
     if (!(place >= 0) || place >= grid_size - 1) return false;
     const auto i = static_cast<std::size_t>(place);
     const double share = place - static_cast<double>(i);

@@ -10,7 +10,7 @@ namespace alidade::internal {
 
 double angle_resolution(const std::vector<AdjustmentTelemetry>& telemetry) {
   // Steps of a rounding in the file, or of the arithmetic, are none of the device's.
-  constexpr double kSmallest = 2e-7;  // rad
+  constexpr double kSmallest_rad = 2e-7;  // rad
   double resolution = 0;
   for (int axis = 0; axis < 2; ++axis) {
     std::vector<double> angles;
@@ -19,11 +19,11 @@ double angle_resolution(const std::vector<AdjustmentTelemetry>& telemetry) {
     std::vector<double> steps;
     for (std::size_t i = 1; i < angles.size(); ++i) {
       const double step = angles[i] - angles[i - 1];
-      if (step > 1e-3 * kSmallest) steps.push_back(step);
+      if (step > 1e-3 * kSmallest_rad) steps.push_back(step);
     }
     if (steps.empty()) continue;
     const double smallest = *std::min_element(steps.begin(), steps.end());
-    if (smallest < kSmallest) continue;
+    if (smallest < kSmallest_rad) continue;
     const auto whole = [smallest](double step) {
       return std::abs(step / smallest - std::round(step / smallest)) < 0.02;
     };

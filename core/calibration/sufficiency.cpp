@@ -10,15 +10,15 @@ namespace alidade::internal {
 namespace {
 
 // Limits of use. An error of the clock offset shows at the mount's rate, one of the others over half an image.
-constexpr double kMinImageMotion = 5;          // px in half a second
-constexpr double kMinCorrelation = 0.6;        // of image motion and telemetry
-constexpr double kMinTravelShare = 0.03;       // of the image's width, of each axis
-constexpr double kMinRateVariation = 0.05;     // of the rate
-constexpr double kMaxFieldOfViewRatio = 0.2;   // least focal length / width: 136 deg
-constexpr double kMaxFocalLengthError = 0.05;  // relative
-constexpr double kMaxClockOffsetError = 0.01;  // s
-constexpr double kMaxReadoutError = 5e-3;      // s from the first to the last row
-constexpr double kMaxDistortionError = 0.02;   // of the distance from the centre, in the corner
+constexpr double kMinImageMotion_px = 5;         // px in half a second
+constexpr double kMinCorrelation = 0.6;          // of image motion and telemetry
+constexpr double kMinTravelShare = 0.03;         // of the image's width, of each axis
+constexpr double kMinRateVariation = 0.05;       // of the rate
+constexpr double kMaxFieldOfViewRatio = 0.2;     // least focal length / width: 136 deg
+constexpr double kMaxFocalLengthError = 0.05;    // relative
+constexpr double kMaxClockOffsetError_s = 0.01;  // s
+constexpr double kMaxReadoutError_s = 5e-3;      // s from the first to the last row
+constexpr double kMaxDistortionError = 0.02;     // of the distance from the centre, in the corner
 
 std::string text(const char* format, double a, double b = 0) {
   char buffer[320];
@@ -107,7 +107,7 @@ CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
   }
   double largest_shift = 0;
   for (const ImageMotion& m : motion) largest_shift = std::max(largest_shift, m.shift.norm());
-  if (largest_shift < kMinImageMotion) {
+  if (largest_shift < kMinImageMotion_px) {
     *why = text(
         "the image moves by no more than %.1f px in half a second: pan and tilt while recording, "
         "best along a figure that crosses the field of view in some seconds",
@@ -183,14 +183,14 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
         text("focal length known to %.1f %% only: move farther on both axes", 100 * f_error));
   }
   const double d_error = sigma(c, Parameter::kClockOffset);
-  if (d_error > kMaxClockOffsetError) {
+  if (d_error > kMaxClockOffsetError_s) {
     reasons.push_back(
         text("clock offset known to %.1f ms only (largest rate %.3f rad/s): change speed and "
              "direction more and faster",
              1e3 * d_error, motion.largest_rate.norm()));
   }
   const double readout_error = sigma(c, Parameter::kLineDelay) * c.camera.height;
-  if (readout_error > kMaxReadoutError) {
+  if (readout_error > kMaxReadoutError_s) {
     reasons.push_back(
         text("read-out known to %.1f ms only: move faster while the image is read out",
              1e3 * readout_error));
@@ -210,7 +210,8 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
                        " rests on its prior: a larger range of the other axis would show it");
     }
   }
-  result->quality.weak_in_time = d_error > kMaxClockOffsetError || readout_error > kMaxReadoutError;
+  result->quality.weak_in_time =
+      d_error > kMaxClockOffsetError_s || readout_error > kMaxReadoutError_s;
   if (reasons.empty()) {
     result->status = CalibrationStatus::kOk;
     result->message =

@@ -8,6 +8,7 @@
 #include <cstring>
 #include <limits>
 
+#include "core/realtime/oe_mode/landmark_map.h"
 #include "platform/system/whole_file.h"
 
 namespace alidade {

@@ -7,7 +7,7 @@
 
 namespace alidade {
 
-inline constexpr double kRadPerDegree = 3.14159265358979323846 / 180;
+inline constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 
 struct AxisMapping {
   double sign = 1;      // -1: the device counts the other way
@@ -25,7 +25,7 @@ inline constexpr UsualSigns kSignsOfTheMaker{std::nullopt, std::nullopt};
 
 // angle_rad: any finite angle as the device tells it. In [-pi, pi).
 [[nodiscard]] inline double mapped_rad(double angle_rad, const AxisMapping& mapping) {
-  return wrap_to_half_turn(mapping.sign * (angle_rad - mapping.zero_deg * kRadPerDegree));
+  return wrap_to_half_turn(mapping.sign * (angle_rad - mapping.zero_deg * kRadPerDeg));
 }
 
 }  // namespace alidade

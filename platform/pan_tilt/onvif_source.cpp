@@ -184,8 +184,8 @@ HttpConversation::Outcome OnvifConversation::take_status(const HttpAnswer& answe
     return disconnected();
   }
   if (status.space == OnvifStatus::Space::kDegrees) {
-    sample->pan_rad = kRadPerDegree * status.pan;
-    sample->tilt_rad = kRadPerDegree * status.tilt;
+    sample->pan_rad = kRadPerDeg * status.pan;
+    sample->tilt_rad = kRadPerDeg * status.tilt;
   } else if (options_.pan_range && options_.tilt_range) {
     sample->pan_rad = mapped(status.pan, *options_.pan_range);
     sample->tilt_rad = mapped(status.tilt, *options_.tilt_range);

@@ -255,8 +255,8 @@ bool QuerySource::take_bytes(const std::string& bytes, double now_s, PanTiltSamp
 
 bool QuerySource::take_reading(const Answer& answer, double earliest_s, double latest_s,
                                PanTiltSample* sample) {
-  const double pan_rad = mapped_rad(answer.pan_deg * kRadPerDegree, options_.pan);
-  const double tilt_rad = mapped_rad(answer.tilt_deg * kRadPerDegree, options_.tilt);
+  const double pan_rad = mapped_rad(answer.pan_deg * kRadPerDeg, options_.pan);
+  const double tilt_rad = mapped_rad(answer.tilt_deg * kRadPerDeg, options_.tilt);
   std::optional<PairedReading> paired;
   switch (answer.kind) {
     case Answer::Kind::kPan:

@@ -58,8 +58,8 @@ bool parse_vapix_position(std::string_view body, VapixPosition* position, std::s
       return false;
     }
   }
-  position->pan_rad = *pan_deg * kRadPerDegree;
-  position->tilt_rad = *tilt_deg * kRadPerDegree;
+  position->pan_rad = *pan_deg * kRadPerDeg;
+  position->tilt_rad = *tilt_deg * kRadPerDeg;
   position->zoom = zoom;
   return true;
 }

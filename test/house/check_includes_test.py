@@ -72,6 +72,7 @@ class CheckIncludes(unittest.TestCase):
                 ("core/realtime/pt_mode.h", '#include "core/realtime/oe_mode/b.h"'),
                 ("core/realtime/image/a.h", "#include <mutex>"),
                 ("core/calibration/a.cpp", '#include "platform/system/clock.h"'),
+                ("core/calibration/a.cpp", "#include <fstream>"),
                 ("platform/video/a.cpp", '#include "core/model/camera.h"'),
                 ("platform/video/a.cpp", '#include "platform/pan_tilt/pan_tilt_source.h"'),
                 ("platform/pan_tilt/a.cpp", '#include "platform/video/frame_source.h"'),

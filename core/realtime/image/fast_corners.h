@@ -1,5 +1,5 @@
 #pragma once
-// FastGrid: FAST-9 corners that spread over the picture, at most one a cell (PTCEE section V-A, 49).
+// FastGrid: FAST-9 corners that spread over the image, at most one a cell (PTCEE section V-A, 49).
 //
 // A pixel is a corner if 9 neighbouring pixels of the 16 on the circle of radius 3 around it are all
 // brighter, or all darker, than it by more than the threshold. Its score is the largest threshold for

@@ -1,5 +1,5 @@
 #pragma once
-// The noise of a picture, from the picture alone: standard deviation of white noise, in grey levels, by the
+// The noise of an image, from the image alone: standard deviation of white noise, in grey levels, by the
 // second differences of the smoothest quarter of a sample of its pixels (Immerkaer 1996, made robust).
 // Where all is textured it is too large. Never below what rounding to whole grey levels makes.
 // Pure; no allocation.

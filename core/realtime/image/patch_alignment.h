@@ -1,5 +1,5 @@
 #pragma once
-// Patch alignment: where a small reference picture lies in an image, to a few hundredths of a pixel, with
+// Patch alignment: where a small reference image lies in an image, to a few hundredths of a pixel, with
 // covariance (PTCEE 33; inverse compositional after Baker and Matthews, with gain and offset).
 //
 //   image(u + x) = gain * reference(centre + A x) + offset + slope . x + noise   for the kPatchSize^2 points x,
@@ -53,7 +53,7 @@ enum class PrepareStatus {
   kOk,
   kEdge,        // contrast in one direction only
   kTooFlat,     // contrast in none
-  kOutOfImage,  // needs pixels that the reference picture does not have
+  kOutOfImage,  // needs pixels that the reference image does not have
   kNotFinite    // A
 };
 

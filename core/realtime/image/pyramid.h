@@ -1,12 +1,12 @@
 #pragma once
-// Pyramid: a picture at half, quarter, ... size, each octave the mean of 2x2 pixels of the one before,
+// Pyramid: an image at half, quarter, ... size, each octave the mean of 2x2 pixels of the one before,
 // rounded to the nearest grey level (halves up).
 //
 //   octave l has floor(width / 2^l) x floor(height / 2^l) pixels; a last odd column or row is left out.
-//   A point u of the picture lies at u / 2^l of octave l, exactly, because pixel (i, j) covers
+//   A point u of the image lies at u / 2^l of octave l, exactly, because pixel (i, j) covers
 //   [i, i+1] x [j, j+1] with its centre at (i + 0.5, j + 0.5).
 //
-// Octave 0 is the picture itself and is not copied: the caller's memory must outlive the use of it.
+// Octave 0 is the image itself and is not copied: the caller's memory must outlive the use of it.
 // White noise of sigma grey levels becomes about sigma / 2^l, and each octave's rounding adds a
 // standard deviation of 0.3 and, upwards, 1/8 of a grey level to the mean.
 // All memory is taken by the constructor; build() allocates nothing, waits for nothing.
@@ -29,7 +29,7 @@ class Pyramid {
  public:
   static constexpr int kMaxOctaves = 8;
 
-  // For pictures up to max_width x max_height and up to max_octaves, octave 0 among them; larger
+  // For images up to max_width x max_height and up to max_octaves, octave 0 among them; larger
   // and smaller numbers of octaves than 1 to kMaxOctaves are taken as these.
   Pyramid(int max_width, int max_height, int max_octaves);
   Pyramid(const Pyramid&) = delete;

@@ -103,11 +103,13 @@ FrameMotion<double> MotionPrediction::last_carried_on(double frame_time_s) const
 }
 
 void MotionPrediction::remember(double frame_time_s, const FrameMotion<double>& motion,
-                                const Matrix6& covariance, const Sensitivity<6>& sensitivity) {
+                                const Matrix6& covariance, const Matrix2<double>& shared_covariance,
+                                const Sensitivity<6>& sensitivity) {
   has_last_ = true;
   last_time_s_ = frame_time_s;
   last_motion_ = motion;
   last_covariance_ = covariance;
+  last_covariance_.topLeftCorner<2, 2>() += shared_covariance;
   last_sensitivity_ = sensitivity;
 }
 

@@ -65,9 +65,10 @@ class MotionPrediction {
   // The frame before, carried on to this one with its acceleration; follows(frame_time_s).
   [[nodiscard]] FrameMotion<double> last_carried_on(double frame_time_s) const;
 
-  // covariance: of motion, shared errors of the landmarks included.
+  // covariance: of motion, by the frame's own noise; shared_covariance: rad^2, of its angles, by what the
+  // landmarks share.
   void remember(double frame_time_s, const FrameMotion<double>& motion, const Matrix6& covariance,
-                const Sensitivity<6>& sensitivity);
+                const Matrix2<double>& shared_covariance, const Sensitivity<6>& sensitivity);
   // The same motion, as the corrected map shows it.
   void correct(const FrameMotion<double>& motion) { last_motion_ = motion; }
 

@@ -279,9 +279,8 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
          predicted.prior.telemetry_sensitivity.topRows<2>() - solved.sensitivity.topRows<2>()}));
   }
   offset_.note_answer(frame_.time_s);
-  Matrix6 with_shared = solved.frame_covariance;
-  with_shared.topLeftCorner<2, 2>() += solved.shared_covariance;
-  prediction_.remember(frame_.time_s, motion, with_shared, solved.sensitivity);
+  prediction_.remember(frame_.time_s, motion, solved.frame_covariance, solved.shared_covariance,
+                       solved.sensitivity);
   statistics_.map_offset = {offset.value.x(), offset.value.y()};
   statistics_.map_offset_covariance = offset.covariance;
   statistics_.inliers = solved.inliers;

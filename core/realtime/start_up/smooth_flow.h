@@ -4,7 +4,7 @@
 //
 //   moved(x, y) = sum over i + j <= 3 of c_ij x^i y^j,   (x, y) = (u - centre) / (width / 2)
 //
-// A turning camera moves a picture without parallax: whatever its focal length, its distortion and its
+// A turning camera moves an image without parallax: whatever its focal length, its distortion and its
 // rolling shutter, the motion is smooth over the image, and a polynomial holds it without knowing any of
 // them. With a field of 60 degrees and k r^2 = 7 % in the corners, at 77 px a frame: to 0.2 px.
 // Terms have priors in proportion to the motion, so that few or bunched samples bend nothing.

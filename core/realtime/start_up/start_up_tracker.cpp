@@ -218,7 +218,7 @@ void StartUpTracker::align_with_first(const Frame& now) {
     Point& point = points_[static_cast<std::size_t>(i)];
     const double scale = std::ldexp(1.0, point.octave);
     const ImageView& image = now.pyramid.octave(point.octave);
-    const ImageView picture = view_of(point.pixels);
+    const ImageView first = view_of(point.pixels);
     point.predicted = point.u + flow_.at(point.u);
     point.is_found = false;
     const Matrix2<double> J =
@@ -228,7 +228,7 @@ void StartUpTracker::align_with_first(const Frame& now) {
       continue;
     }
     ++statistics_.looked_for;
-    if (prepare(picture, {kReferenceCentre, kReferenceCentre}, J.inverse(), 0.5 * kLeastContrast,
+    if (prepare(first, {kReferenceCentre, kReferenceCentre}, J.inverse(), 0.5 * kLeastContrast,
                 &reference) != PrepareStatus::kOk) {
       continue;
     }
@@ -241,7 +241,7 @@ void StartUpTracker::align_with_first(const Frame& now) {
     if (status != AlignmentStatus::kConverged) continue;
     point.is_found = true;
     point.found = scale * alignment.position;
-    // The noise of both pictures stands in the alignment's covariance: that of this frame is left.
+    // The noise of both images stands in the alignment's covariance: that of this frame is left.
     const double own = 1 / (1 + alignment.gain * alignment.gain);
     point.covariance = own * scale * scale * alignment.covariance;
     point.noise = static_cast<float>(std::sqrt(own) * alignment.noise_sigma);

@@ -3,16 +3,16 @@
 // calibration (PTCEE section V-A). Neither focal length nor distortion, read-out, mount or telemetry are
 // asked for: a wrong one can therefore do no harm.
 //
-//   1 the whole picture's shift since the frame before, to 2^l px, by comparing all shifts of a small octave
+//   1 the whole image's shift since the frame before, to 2^l px, by comparing all shifts of a small octave
 //   2 the motion of the points, coarse to fine, as one smooth function of the place (smooth_flow.h)
-//   3 each point against its picture in the frame where it was found, so that nothing drifts, warped
+//   3 each point against its image in the frame where it was found, so that nothing drifts, warped
 //     by the gradients of the motion since then (patch_alignment.h)
 //   4 points that contradict the others' motion are not believed
 //   5 new points, FAST corners, where there are none
 //
 // An observation tells where a landmark appears: pixels, as in CONVENTIONS.md. Its covariance is what differs from
 // one observation to the next, by the noise of its own frame; what all observations of a landmark have
-// in common, the noise of its reference picture, moves the landmark instead.
+// in common, the noise of its reference image, moves the landmark instead.
 // A point that leaves the image, or is not found in two frames running, ends; should it come back, it is
 // a new landmark. Frames without anything in common with the one before end all points.
 // Follows shifts of up to a third of the image between frames. Fixed memory, taken by the constructor;

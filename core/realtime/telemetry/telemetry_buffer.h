@@ -38,7 +38,7 @@ struct TelemetryLimits {
   double max_extrapolation_s = 0.25;  // before the oldest and after the newest sample
   double max_repeat_s = 0.1;          // 0 = the device measures afresh for every poll
 
-  // False and one line in *error (if not null) when a value makes no sense.
+  // False and one line in *error (if not null) when a value is not valid.
   [[nodiscard]] bool validate(const char** error = nullptr) const {
     const auto not_negative = [](double v) { return std::isfinite(v) && v >= 0; };
     const char* problem = nullptr;

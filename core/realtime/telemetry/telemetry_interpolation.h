@@ -31,7 +31,7 @@ struct TelemetryNoise {
   // standard deviation.
   double acceleration_sigma = 0.1;
 
-  // False and one line in *error (if not null) when a value makes no sense.
+  // False and one line in *error (if not null) when a value is not valid.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 

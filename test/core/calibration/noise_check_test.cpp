@@ -42,7 +42,8 @@ Tracks make_tracks(std::size_t landmarks, std::size_t length, double correlation
       before = white;
     }
     for (std::size_t i = 0; i < length; ++i) {
-      tracks.data.observations.push_back({static_cast<int>(l), static_cast<int>(i), {}, 1, true});
+      tracks.data.observations.push_back(
+          {static_cast<int>(l), static_cast<int>(i), Vector2<double>::Zero(), 1, true});
       LinearisedResidual residual;
       residual.valid = true;
       residual.error = errors[i] - mean;
@@ -53,17 +54,17 @@ Tracks make_tracks(std::size_t landmarks, std::size_t length, double correlation
   return tracks;
 }
 
-// What the mean of a track is uncertain by, against independent errors, is 1 + 2 rho (1 - 1/n). The estimate is off by
-// chance: two lags are summed at most, each known to 1 / sqrt(pairs of both components), and weighs 2. And by what the
-// mean takes out beyond that of independent errors: for each lag, 2 rho / n.
+// What the mean of a track is uncertain by, against independent errors, is 1 + 2 rho (1 - 1/n). The estimate sums one lag,
+// weighs it by 2 and knows it to 1 / sqrt(pairs of both components), at most 1.5 times that squared as neighbouring
+// products correlate. It is low by what the mean takes out beyond that of independent errors, 2 rho / n.
 TEST(Repetition, IsTheInflationOfATracksMean) {
   constexpr std::size_t kLandmarks = 4000;
   constexpr std::size_t kLength = 20;
   for (const double rho : {0.1, 0.3, 0.45}) {
     const Tracks tracks = make_tracks(kLandmarks, kLength, rho, 3);
     const double truth = 1 + 2 * rho * (1 - 1.0 / kLength);
-    const double chance = 2 * std::sqrt(2.0 / (2.0 * kLandmarks * (kLength - 1)));
-    const double mean_taken = 2 * 2 * 2 * rho / kLength;
+    const double chance = 2 * std::sqrt(1.5 / (2.0 * kLandmarks * (kLength - 1)));
+    const double mean_taken = 2 * 2 * rho / kLength;
     const double found = repetition(tracks.data, kLandmarks, tracks.at);
     EXPECT_LT(found, truth + 4.5 * chance) << rho;
     EXPECT_GT(found, truth - 4.5 * chance - mean_taken) << rho;

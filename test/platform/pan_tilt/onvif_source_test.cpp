@@ -27,7 +27,6 @@ using Login = OnvifDevice::Login;
 
 constexpr double kNever_s = 1e6;
 constexpr double kPi = 3.14159265358979323846;
-constexpr double kRadPerDeg = kPi / 180;
 
 OnvifSourceOptions options_for(const std::string& url) {
   OnvifSourceOptions options;

@@ -32,7 +32,6 @@ using ::testing::StartsWith;
 
 constexpr double kNever_s = 1e6;
 constexpr int kReadingsBetweenSilences = 33;  // 64 queries of two axes, see query_source.h
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 
 double difference_deg(double a_rad, double b_deg) {
   return std::abs(std::remainder(a_rad / kRadPerDeg - b_deg, 360));

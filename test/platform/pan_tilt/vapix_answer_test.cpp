@@ -5,14 +5,14 @@
 
 #include <ostream>
 
+#include "platform/pan_tilt/axis_mapping.h"
+
 namespace alidade {
 namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
-
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 
 TEST(VapixAnswer, TurnsDegreesIntoRadians) {
   VapixPosition position;

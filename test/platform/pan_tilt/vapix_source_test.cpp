@@ -23,7 +23,6 @@ using ::testing::Not;
 using ::testing::StartsWith;
 
 constexpr double kNever_s = 1e6;
-constexpr double kRadPerDeg = 3.14159265358979323846 / 180;
 
 VapixSourceOptions options_for(const std::string& url) {
   VapixSourceOptions options;

@@ -10,6 +10,7 @@
 #include <cmath>
 #include <limits>
 
+#include "core/realtime/image/sampling.h"
 #include "test/core/realtime/image/analytic_image.h"
 
 namespace alidade::test {
@@ -75,6 +76,73 @@ Vector2<double> random_shift(std::mt19937_64* random) {
   std::uniform_real_distribution<double> uniform(0, 1);
   const double u = uniform(*random);
   return {u, uniform(*random)};
+}
+
+// Correlation of blurred white noise between points k px apart, averaged over the fraction of a pixel.
+double correlation_of_blur(int k) {
+  constexpr int kFractions = 64;
+  double sum = 0;
+  for (int n = 0; n < kFractions; ++n) {
+    const auto taps = CubicSpline::taps(static_cast<float>((n + 0.5) / kFractions));
+    for (int i = 0; i + k < 4; ++i) {
+      sum += static_cast<double>(taps.weight[static_cast<std::size_t>(i)]) *
+             static_cast<double>(taps.weight[static_cast<std::size_t>(i + k)]) / kFractions;
+    }
+  }
+  return sum;
+}
+
+// The position is a weighted sum J of the image's points, whose noise has the correlation R: J R J^T.
+TEST(PatchAlignment, CovarianceIsThatOfItsWeights) {
+  std::mt19937_64 random(21);
+  double largest_share = 0;
+  for (int n = 0; n < 60; ++n) {
+    const AnalyticImage texture(&random);
+    const Pixels image = make_pixels(kSize, kSize, texture, 0, &random);
+    ReferencePatch patch;
+    if (prepare(image.view, kCentre, kIdentity, kMinContrast, &patch) != PrepareStatus::kOk) {
+      continue;
+    }
+    Matrix2<double> expected = Matrix2<double>::Zero();
+    for (int j = 0; j < kPatchSize * kPatchSize; ++j) {
+      for (int i = 0; i < kPatchSize * kPatchSize; ++i) {
+        const int across = std::abs(i % kPatchSize - j % kPatchSize);
+        const int down = std::abs(i / kPatchSize - j / kPatchSize);
+        if (across > 3 || down > 3) continue;
+        const double R = correlation_of_blur(across) * correlation_of_blur(down);
+        const Vector2<double> J_i(patch.to_u.data()[i], patch.to_v.data()[i]);
+        const Vector2<double> J_j(patch.to_u.data()[j], patch.to_v.data()[j]);
+        expected += R * J_i * J_j.transpose();
+      }
+    }
+    const Matrix2<double> error = patch.unit_covariance.cast<double>() - expected;
+    EXPECT_LT(error.cwiseAbs().maxCoeff(), 0.01 * expected.trace());
+    largest_share = std::max(largest_share, std::abs(expected(0, 1)) / expected.trace());
+  }
+  EXPECT_GT(largest_share, 0.1) << "textures that lean";
+}
+
+// Two images were rounded to whole grey levels, the reference then taken times the gain.
+TEST(PatchAlignment, ClaimsNoLessNoiseThanRoundingOfBothImagesMakes) {
+  std::mt19937_64 random(22);
+  for (const double gain : {0.4, 1.0, 2.5}) {
+    double least = 1e9;
+    for (int n = 0; n < 60; ++n) {
+      Change change;
+      change.shift = random_shift(&random);
+      change.gain = gain;
+      change.amplitude = 4;
+      Statistics statistics;
+      Alignment alignment;
+      try_once(change, 0, &random, &statistics, &alignment);
+      if (statistics.count == 0) continue;
+      const double rounding = (1 + alignment.gain * alignment.gain) / 12;
+      const double claimed = alignment.noise_sigma * alignment.noise_sigma / rounding;
+      EXPECT_GT(claimed, 1 - 1e-6) << gain;
+      least = std::min(least, claimed);
+    }
+    EXPECT_NEAR(least, 1, 1e-6) << gain;
+  }
 }
 
 TEST(PatchAlignment, HasNoBiasAtAnyFractionOfAPixel) {

@@ -433,6 +433,20 @@ TEST(LandmarkMap, WorthFallsWithMissesAndWithTimeButNotForASecond) {
   EXPECT_EQ(map.worth(slot, 9), map.worth(slot, std::numeric_limits<std::uint32_t>::max()));
 }
 
+TEST(LandmarkMap, WorthFallsWithAgeWhereTheCountOfFramesWrapsAsItDoesElsewhere) {
+  LandmarkMap map(4, 0.1);
+  int slot = -1;
+  ASSERT_EQ(map.insert(landmark_at(Vector3<double>::UnitX()), 0, &slot), InsertStatus::kOk);
+  for (const std::uint32_t age : {20U, 200U, 2000U, 20000U}) {
+    map.statistics(slot).last_frame = 1000;
+    const double expected = map.worth(slot, 1000 + age);
+    for (const std::uint32_t before : {1U, 10U, 150U}) {
+      map.statistics(slot).last_frame = 0U - before;
+      EXPECT_EQ(map.worth(slot, age - before), expected) << age << " frames, " << before;
+    }
+  }
+}
+
 // Directions of a coarse grid, so that cells are often the same; few buckets, so that entries of the
 // hash table collide.
 TEST(LandmarkMap, AgreesWithAPlainModelOverManyInsertionsAndRetirements) {

@@ -14,6 +14,7 @@
 #include <random>
 #include <vector>
 
+#include "core/realtime/oe_mode/map_offset_filter.h"
 #include "core/realtime/oe_mode/view_projection.h"
 
 namespace alidade::test {
@@ -607,6 +608,54 @@ TEST(OrientationSolve, SensitivityIsHowTheSolutionFollowsTheCalibration) {
       EXPECT_LT((solved.offset_correction_sensitivity.col(j) - of_offset).norm(),
                 1e-6 * of_offset.norm() + 1e-18);
       EXPECT_EQ(of_offset.norm() > 0, has_telemetry);
+    }
+  }
+}
+
+// The same where landmarks contradict their claims, and count so much less beside what is known without them.
+TEST(OrientationSolve, SensitivityHoldsWhereLandmarksAreLessSureThanTheyClaim) {
+  for (const bool has_telemetry : {true, false}) {
+    World world;
+    world.has_telemetry = has_telemetry;
+    world.understated = 5;
+    SolveLimits limits;
+    limits.max_scale = 3;
+    Simulation simulation(33);
+    // In few parts of the image: inflation is then the limit, and does not follow the residuals.
+    std::vector<Vector2<double>> positions;
+    for (int i = 0; i < 120; ++i) {
+      positions.emplace_back(simulation.uniform(100, 380), simulation.uniform(200, 700));
+    }
+    Frame frame = simulation.frame(world, positions);
+    Vector6 sigma;
+    sigma << 3e-5, 3e-5, 1e-2, 1e-2, kAccelerationSigma, kAccelerationSigma;
+    frame.prior.motion_information.diagonal() = sigma.cwiseAbs2().cwiseInverse();
+    frame.prior.motion = frame.x;
+    for (FoundLandmark& landmark : frame.landmarks) {
+      for (int i = 0; i < landmark.sensitivity.size(); ++i) {
+        landmark.sensitivity(i) = simulation.normal(kNoise);
+      }
+    }
+    SolvedMotion solved;
+    ASSERT_EQ(frame.solve(world, &solved, limits), SolveStatus::kOk);
+    ASSERT_EQ(solved.inflation, 9);
+    constexpr double kStep = 1e-3;
+    for (int j = 0; j < kParameterCount; ++j) {
+      const auto with = [&](double change) {
+        Frame changed = frame;
+        for (FoundLandmark& landmark : changed.landmarks) {
+          landmark.residual += change * landmark.sensitivity.col(j);
+        }
+        SolvedMotion out;
+        EXPECT_EQ(changed.solve(world, &out, limits), SolveStatus::kOk);
+        EXPECT_EQ(out.inliers, solved.inliers);
+        EXPECT_EQ(out.inflation, 9);
+        return out;
+      };
+      const Vector6 numeric = (with(kStep).correction - with(-kStep).correction) / (2 * kStep);
+      EXPECT_GT(numeric.norm(), 0);
+      EXPECT_LT((solved.sensitivity.col(j) - numeric).cwiseQuotient(sigma).norm(),
+                1e-6 * numeric.cwiseQuotient(sigma).norm());
     }
   }
 }

@@ -331,6 +331,65 @@ TEST(StartUpTracker, EndsPointsOnAnObjectTooSlowToContradictFromFrameToFrame) {
   EXPECT_LT(run.errors.drift_px, 0.1);
 }
 
+// So slow that no frame's motion shows it, but the sum of some does.
+TEST(StartUpTracker, EndsPointsThatDriftAFifthOfAPixelAFrame) {
+  sim::Config config = camera(60, 0.07);
+  config.scene.moving.push_back(moving_object(config, 20, 0.72));
+  const Tracked run = track(
+      config,
+      [](double) {
+        return sim::Angles{0.1, 0.1};
+      },
+      24);
+  EXPECT_GT(run.errors.observations, 2000);
+  // By 4.6 px in these frames; on a tenth of the view.
+  EXPECT_LT(run.errors.wrong, 0.03);
+}
+
+// An image so smooth that only octave 1 has corners: a pixel there is two of the image.
+TEST(StartUpTracker, KnowsThePositionsOfPointsOfOctaveOneInPixelsOfTheImage) {
+  std::mt19937_64 random(9);
+  const AnalyticImage texture(&random, 7);
+  constexpr double kStretch = 5;
+  StartUpOptions options;
+  options.width = kWidth;
+  options.height = kHeight;
+  StartUpTracker tracker(options);
+  std::map<std::uint32_t, std::vector<std::pair<Vector2d, Matrix2<double>>>> tracks;
+  for (int k = 0; k < 12; ++k) {
+    const Vector2d shift(0.7 * k, -0.4 * k);
+    const Pixels image = make_pixels(
+        kWidth, kHeight, [&](const Vector2d& u) { return texture((u + shift) / kStretch); }, 2,
+        &random);
+    static_cast<void>(tracker.process(image.view));
+    for (int i = 0; i < tracker.observation_count(); ++i) {
+      const TrackObservation& seen = tracker.observations()[i];
+      tracks[seen.landmark].emplace_back(seen.u + shift, seen.covariance);
+    }
+  }
+  double squares = 0;
+  double freedom = 0;
+  for (const auto& [landmark, sights] : tracks) {
+    if (sights.size() < 4) continue;
+    Matrix2<double> information = Matrix2<double>::Zero();
+    Vector2d sum = Vector2d::Zero();
+    // The first is its reference's, without an error of its own.
+    for (std::size_t i = 1; i < sights.size(); ++i) {
+      information += sights[i].second.inverse();
+      sum += sights[i].second.inverse() * sights[i].first;
+    }
+    const Vector2d mean = information.inverse() * sum;
+    for (std::size_t i = 1; i < sights.size(); ++i) {
+      const Vector2d error = sights[i].first - mean;
+      squares += error.dot(sights[i].second.inverse() * error);
+    }
+    freedom += 2.0 * static_cast<double>(sights.size() - 2);
+  }
+  EXPECT_GT(freedom, 200);
+  EXPECT_GT(squares / freedom, 0.7);
+  EXPECT_LT(squares / freedom, 1.4);
+}
+
 TEST(StartUpTracker, KeepsItsPointsThroughAStepOfBrightness) {
   sim::Config config = camera(20, 0.07);
   config.sensor.brightness_steps.push_back({10 * kFrame - 0.01, 0.5});

@@ -307,6 +307,36 @@ TEST(TelemetryBuffer, DoesNotTakeAStaleRepeatForAStandstill) {
   }
 }
 
+// A device measures at any phase between two polls: how old its new value is on average is what the covariance says.
+TEST(TelemetryBuffer, KnowsTheMeanSquareOfTheAgeOfAValueThatEndsRepeats) {
+  constexpr double kPoll_s = 0.02;
+  constexpr double kMeasured_s = 0.4;
+  constexpr double kRate = 0.3;  // rad/s
+  TelemetryLimits limits;
+  limits.max_repeat_s = 0.5;
+  TelemetryNoise noise = quiet();
+  noise.acceleration_sigma = 0;
+  double squares = 0;
+  double variances = 0;
+  constexpr int kPhases = 100;
+  for (int i = 0; i < kPhases; ++i) {
+    const double age_s = kPoll_s * (i + 0.5) / kPhases;
+    TelemetryBuffer<8> buffer(noise, limits);
+    for (double t = 0; t < kMeasured_s - kPoll_s / 2; t += kPoll_s) {
+      static_cast<void>(buffer.push({t, 0, 0, 0}));
+    }
+    const double true_pan = kRate * kMeasured_s;
+    expect_stored(buffer, {kMeasured_s, 0, true_pan - kRate * age_s, 0});
+    InterpolatedPanTilt result;
+    ASSERT_EQ(buffer.query(kMeasured_s, 0, &result), QueryStatus::kOk);
+    const double error = result.angle.pan - true_pan;
+    squares += error * error;
+    variances += result.covariance(0, 0);
+  }
+  // The rate is found from stamps that are off by the same ages: 5 % at most.
+  EXPECT_NEAR(variances / squares, 1, 0.1);
+}
+
 TEST(TelemetryBuffer, BelievesInAStandstillThatLasts) {
   TelemetryLimits limits;
   limits.max_repeat_s = 0.1;

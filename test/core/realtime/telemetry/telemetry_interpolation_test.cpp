@@ -358,6 +358,54 @@ TEST(TelemetryInterpolation, LearnsFromAFastMountWhatToExpectBeyondTheNewestSamp
   }
 }
 
+// What a mount does now counts, and not what it did five seconds ago: it is expected to be able to come to rest within
+// a second from the rate it has.
+TEST(ExpectedAcceleration, IsWhatBringsTheLatestRateToRest) {
+  constexpr double kRate = 0.2;           // rad/s
+  constexpr double kAcceleration = 0.05;  // rad/s^2: four seconds from one to the other
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = 1e-6;
+  noise.acceleration_sigma = 1e-3;
+  for (const bool starts : {true, false}) {
+    ExpectedAcceleration expected(noise, 0.1);
+    for (int i = 0; i < 50; ++i) {
+      const double ago_s = 0.1 * i;
+      const double from_newest = kRate * ago_s - kAcceleration * ago_s * ago_s / 2;
+      const double ramped = ago_s < 4 ? from_newest : kRate * 4 - kAcceleration * 8;
+      const double from_rest = kAcceleration * std::min(ago_s, 4.0) * std::min(ago_s, 4.0) / 2 +
+                               kRate * std::max(ago_s - 4, 0.0);
+      const double pan = starts ? -ramped : -from_rest;
+      expected.add({100 - ago_s, pan, 0, 0, 0, false});
+    }
+    const double square = expected.square().x();
+    if (starts) {
+      EXPECT_GT(square, 0.9 * kRate * kRate);
+    } else {
+      EXPECT_LT(square, 2 * kAcceleration * kAcceleration);
+    }
+    EXPECT_LT(expected.square().y(), 1e-5);
+  }
+}
+
+// The error that neighbouring stamps share may be the larger one's whichever comes first.
+TEST(TelemetryInterpolation, TakesTheLargerOfTwoSharedErrors) {
+  TelemetryNoise noise;
+  noise.acceleration_sigma = 0;
+  constexpr double kRate = 0.5;  // rad/s
+  const auto variance_with = [&](double first, double second) {
+    const TelemetryKnot knots[] = {{1.0, 0, 0, first, 0, false},
+                                   {1.1, 0.1 * kRate, 0, second, 0, false}};
+    InterpolatedPanTilt out;
+    EXPECT_TRUE(interpolate(noise, knots, 2, 0, 1.03, 0, Vector2<double>::Zero(), &out));
+    return out.covariance(0, 0);
+  };
+  const double large = 1e-4;  // s^2
+  const double small = 1e-6;
+  EXPECT_EQ(variance_with(large, small), variance_with(small, large));
+  EXPECT_EQ(variance_with(large, small), variance_with(large, large));
+  EXPECT_NEAR(variance_with(large, small) - variance_with(0, 0), kRate * kRate * large, 1e-12);
+}
+
 // A mount that stops within a sample: the first time nobody could know, and then it is known. Errors in
 // the 80 ms after a stop are no normal ones; before, they were up to 250 sigmas.
 TEST(TelemetryInterpolation, RemembersThatTheMountStopsAtOnce) {

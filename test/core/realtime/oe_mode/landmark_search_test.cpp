@@ -1,0 +1,102 @@
+// Finding landmarks from a prediction that is off, and what it makes of views that show none.
+
+#include "core/realtime/oe_mode/landmark_search.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "test/core/realtime/oe_mode/textured_scene.h"
+
+namespace alidade::test {
+namespace {
+
+class SearchedScene : public testing::Test {
+ protected:
+  SearchedScene() {
+    search_.reset(scene_.calibration_);
+    LandmarkMaker maker(TexturedScene::maker_options(), OctaveOptions{}, TexturedScene::kWidth,
+                        TexturedScene::kHeight);
+    scene_.look({0, 0});
+    static_cast<void>(scene_.make_landmarks(&maker, {0, 0}));
+  }
+
+  [[nodiscard]] SearchedFrame frame() const {
+    return {scene_.calibration_, scene_.map_, scene_.pyramid_, scene_.octaves_};
+  }
+
+  TexturedScene scene_;
+  LandmarkSearch search_{LandmarkSearchOptions{}, scene_.map_.capacity()};
+};
+
+TEST_F(SearchedScene, MovesAPredictionToWhereCoarseLandmarksFit) {
+  const Vector2<double> at(5.3, -3.7);
+  scene_.look(at);
+  for (const Vector2<double>& off : {Vector2<double>(0, 0), {4, 3}, {-9, 14}}) {
+    const LandmarkSearch::Coarse coarse =
+        search_.align_coarse(frame(), TexturedScene::motion_at(at + off), off.norm());
+    ASSERT_TRUE(coarse.aligned) << off.transpose();
+    const Vector2<double> left =
+        coarse.motion.angle.vector() - TexturedScene::motion_at(at).angle.vector();
+    EXPECT_LT(left.norm(), 0.3 * TexturedScene::kPixel) << off.transpose();
+    EXPECT_NEAR(coarse.shift_px, off.norm(), 0.3);
+  }
+}
+
+TEST_F(SearchedScene, FindsFineLandmarksWhereTheyAre) {
+  const Vector2<double> at(5.3, -3.7);
+  scene_.look(at);
+  const LandmarkSearch::Fine fine =
+      search_.align_fine(frame(), TexturedScene::motion_at(at + Vector2<double>(0.5, 0.2)));
+  EXPECT_GT(fine.looked_for, 50);
+  EXPECT_GE(fine.visible, fine.looked_for);
+  EXPECT_GT(fine.aligned, 0.9 * fine.looked_for);
+  ASSERT_EQ(search_.found().size(), static_cast<std::size_t>(fine.aligned));
+  ASSERT_EQ(search_.observations().size(), search_.found().size());
+  ASSERT_EQ(search_.J_tangent().size(), search_.found().size());
+  // Residuals less what the prediction was off by are as large as said.
+  Vector6 correction = Vector6::Zero();
+  correction.head<2>() = -TexturedScene::kPixel * Vector2<double>(0.5, 0.2);
+  for (FoundLandmark& found : search_.found()) found.inlier = true;
+  search_.conclude(correction);
+  double squares = 0;
+  for (std::size_t i = 0; i < search_.found().size(); ++i) {
+    const OeObservation& seen = search_.observations()[i];
+    EXPECT_EQ(seen.slot, search_.observations()[i].slot);
+    EXPECT_EQ(seen.id, scene_.map_.at(seen.slot).id);
+    EXPECT_TRUE(seen.inlier);
+    squares += seen.residual.dot(search_.found()[i].covariance.inverse() * seen.residual) / 2;
+  }
+  EXPECT_LT(squares / fine.aligned, 2);
+  EXPECT_GT(squares / fine.aligned, 0.3);
+}
+
+TEST_F(SearchedScene, FindsNothingWhereThereIsNothing) {
+  scene_.look_at_nothing();
+  const LandmarkSearch::Coarse coarse =
+      search_.align_coarse(frame(), TexturedScene::motion_at({0, 0}), 1);
+  EXPECT_FALSE(coarse.aligned);
+  EXPECT_EQ(coarse.shift_px, 0);
+  EXPECT_EQ(coarse.motion.angle.pan, 0) << "as predicted";
+  const LandmarkSearch::Fine fine = search_.align_fine(frame(), coarse.motion);
+  EXPECT_GT(fine.looked_for, 50);
+  EXPECT_EQ(fine.aligned, 0);
+}
+
+TEST_F(SearchedScene, UsesNoMoreThanItMay) {
+  LandmarkSearchOptions options;
+  options.choice.max_used = 20;
+  LandmarkSearch search(options, scene_.map_.capacity());
+  search.reset(scene_.calibration_);
+  const LandmarkSearch::Fine fine = search.align_fine(frame(), TexturedScene::motion_at({0, 0}));
+  EXPECT_EQ(fine.looked_for, 20);
+  EXPECT_GT(fine.visible, 20);
+  EXPECT_EQ(search.chosen().size(), 20U);
+  search.clear();
+  EXPECT_TRUE(search.chosen().empty());
+  EXPECT_TRUE(search.found().empty());
+  EXPECT_TRUE(search.coarse().empty());
+}
+
+}  // namespace
+}  // namespace alidade::test
