@@ -69,7 +69,7 @@ struct DropCounters {
   std::int64_t frames = 0;
   std::int64_t telemetry = 0;
   std::int64_t records = 0;
-  // Frames and samples that the calibration thread was too busy to hear of: no loss for the records.
+  // Samples that the calibration thread was too busy to hear of: no loss for the records.
   std::int64_t unheard = 0;
   // Pictures that nobody looked at, so that the frames behind them need not wait.
   std::int64_t late_pictures = 0;
