@@ -47,9 +47,12 @@ class Programs:
         self.scratch.mkdir(exist_ok=True)
 
     def entry(self, program):
-        named = [entry for entry in self.entries if pathlib.Path(entry.get("command", [""])[0]).name == program]
+        """Its entry, with the command from the program on: what ctest puts before it only shares out the waiting."""
+        named = [entry for entry in self.entries if any(pathlib.Path(word).name == program for word in entry.get("command", []))]
         for entry in sorted(named, key=lambda entry: entry["name"] != program):
-            return entry
+            words = entry["command"]
+            begin = [pathlib.Path(word).name for word in words].index(program)
+            return {**entry, "command": words[begin:]}
         raise TrialError(f"{program}: ctest knows no such test program; the lists in test/mutants name it")
 
     def filter(self, program):
@@ -88,6 +91,7 @@ class Programs:
         arguments = [f"--gtest_filter={cases}", "--gtest_color=no"] + (["--gtest_fail_fast"] if stop_at_first else [])
         words, environment, folder = self.start(program, arguments, mutant)
         with tempfile.TemporaryDirectory(prefix="run-", dir=self.scratch) as scratch:
+            os.chmod(scratch, 0o755)  # tests become nobody now and then
             output = pathlib.Path(scratch, "output")
             with output.open("wb") as file:
                 process = subprocess.Popen(words, env={**environment, "TMPDIR": scratch}, cwd=folder, stdout=file,
