@@ -9,7 +9,6 @@
 #include <limits>
 #include <random>
 
-#include "core/calibration/calibration_file.h"
 #include "core/realtime/oe_mode/landmark_map.h"
 #include "edge_app/storage/calibration_file.h"
 #include "test/support/temporary_directory.h"

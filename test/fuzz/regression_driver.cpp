@@ -135,7 +135,8 @@ int report(const FuzzTarget& target, const Seed& input, int status) {
   return 1;
 }
 
-int run_in_child(const FuzzTarget& target, std::size_t mutations, const std::vector<std::string>& folders) {
+int run_in_child(const FuzzTarget& target, std::size_t mutations,
+                 const std::vector<std::string>& folders) {
   std::vector<Seed> inputs = read_seeds(folders);
   const std::size_t files = inputs.size();
   if (files == 0) {
@@ -168,7 +169,8 @@ int run_in_child(const FuzzTarget& target, std::size_t mutations, const std::vec
   const std::size_t done = progress->done.load();
   ::munmap(shared, sizeof(Progress));
   if (status != 0) return report(target, inputs[std::min(done, inputs.size() - 1)], status);
-  std::cout << target.name << ": " << files << " files and " << mutations << " mutations of them" << std::endl;
+  std::cout << target.name << ": " << files << " files and " << mutations << " mutations of them"
+            << std::endl;
   return 0;
 }
 
@@ -192,7 +194,8 @@ int main_of(const std::vector<std::string>& arguments) {
     if (name == known.name) target = &known;
   }
   if (target == nullptr) {
-    std::cerr << "fuzz_regressions: '" << name << "' is no target; use: fuzz_regressions --all DIR | TARGET FOLDER...\n";
+    std::cerr << "fuzz_regressions: '" << name
+              << "' is no target; use: fuzz_regressions --all DIR | TARGET FOLDER...\n";
     return 2;
   }
   std::size_t mutations = target->mutations;

@@ -101,7 +101,7 @@ TEST(InputSelection, RefusesWhatIsTooLittleOrInAnotherUnit) {
   EXPECT_THAT(refusal([](auto* i) {
                 for (auto& o : i->observations) o.landmark %= 7;
               }),
-              HasSubstr("only 0 landmarks"));
+              HasSubstr("only 4 landmarks"));
 }
 
 }  // namespace

@@ -53,12 +53,6 @@ TEST(MotionMatch, FindsClockOffsetAndFocalLengthWithoutAGuess) {
   EXPECT_NEAR(match.focal_length, kFocalLength, 0.01 * kFocalLength);
 }
 
-TEST(MotionMatch, SaysThatTheBestShiftLiesAtTheEdgeOfItsSearch) {
-  const MotionMatch match = match_motion(image_motion(tracks(), 0.5), telemetry(), 0, 0.2);
-  EXPECT_TRUE(match.at_edge);
-  EXPECT_NEAR(match.shift_s, 0.2, 0.02);
-}
-
 // A third of the tracks is wild: the median does not see them.
 TEST(MotionMatch, MediansDoNotSeeWildTracks) {
   AdjustmentData data = tracks();
