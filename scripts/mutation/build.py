@@ -1,5 +1,6 @@
 """A copy of the tree with all mutants in it, built once."""
 import os
+import re
 import subprocess
 
 from .catalogue import ListError
@@ -88,5 +89,5 @@ class Tree:
         done = subprocess.run([str(word) for word in command], capture_output=True, text=True, check=False)
         if done.returncode != 0:
             said = (done.stdout + done.stderr).splitlines()
-            errors = [line for line in said if "error" in line or "multiple target" in line.lower()]
+            errors = [line for line in said if re.search(r"\berror\b:? ", line, re.I) and "ccache" not in line]
             raise BuildError("\n".join(["the copy does not build", *(errors or said[-40:])]))

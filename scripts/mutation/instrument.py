@@ -31,8 +31,9 @@ NUMBER = re.compile(r"(?<![\w.])(?:\d[\d']*\.?\d*|\.\d+)(?:[eE][-+]?\d+)?[fFuUlL
 
 
 def pattern_of(text):
-    """Line breaks and indentation belong to clang-format, not to the mutant."""
-    return re.compile(r"\s+".join(re.escape(word) for word in text.split()))
+    """Line breaks and indentation belong to clang-format, not to the mutant; half a name is none."""
+    words = r"\s+".join(re.escape(word) for word in text.split())
+    return re.compile((r"\b" if re.match(r"\w", text.strip()) else "") + words + (r"\b" if re.search(r"\w$", text.strip()) else ""))
 
 
 def one_match(text, wanted, what, mutant):

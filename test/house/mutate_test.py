@@ -173,6 +173,12 @@ class Instrument(unittest.TestCase):
     def test_finds_an_original_over_line_ends_and_by_what_it_is_within(self):
         self.assertEqual(self.text_of("f(a +\n  b); g(a + b)", ("a + b", "b", "f(a + b)")), "f((M0 ? (b) : (a +\n  b))); g(a + b)")
 
+    def test_takes_no_part_of_a_name_for_the_original(self):
+        self.assertEqual(self.text_of("x = pan_deg * per; y = pan_deg;", ("pan_deg", "tilt_deg", "y = pan_deg;")),
+                         "x = pan_deg * per; y = (M0 ? (tilt_deg) : (pan_deg));")
+        self.assertEqual(self.text_of("x = a * per_turn; y = a * per;", ("a * per", "per", "")),
+                         "x = a * per_turn; y = (M0 ? (per) : (a * per));")
+
     def test_refuses_brackets_that_would_change_the_original(self):
         for text, original in (("x = a - b + c;", "b + c"), ("x = -a * b;", "a * b"), ("x = a + b * c;", "a + b"),
                                ("x = y * a + b;", "a + b"), ("x = p.a + b;", "a + b"), ("x = !a == b;", "a == b"),
