@@ -88,6 +88,9 @@ endif()
 # All test programs that another processor can run; what `cmake --build` of an ARM preset builds.
 add_custom_target(processor_programs)
 
+# All that the tests without the label `thorough` need: what suites with sanitizers build.
+add_custom_target(quick_programs)
+
 # alidade_test(core_model_test SOURCES camera_test.cpp ... LINK alidade::model [options])
 # builds the GoogleTest program of a room and registers it with ctest as one entry of that name.
 #   SUPPORT     sources without tests of their own
@@ -135,6 +138,9 @@ function(alidade_test name)
     add_dependencies(${name} ${A_DEPENDS})
   endif()
   add_dependencies(processor_programs ${name})
+  if(NOT "thorough" IN_LIST A_LABELS)
+    add_dependencies(quick_programs ${name})
+  endif()
 
   set(left_out)
   if(ALIDADE_SANITIZE)
@@ -250,4 +256,5 @@ function(alidade_fuzz_regressions)
   add_test(NAME fuzz_regressions COMMAND fuzz_regressions --all ${CMAKE_CURRENT_SOURCE_DIR})
   set_tests_properties(fuzz_regressions PROPERTIES TIMEOUT 900)
   add_dependencies(processor_programs fuzz_regressions)
+  add_dependencies(quick_programs fuzz_regressions)
 endfunction()
