@@ -81,17 +81,6 @@ void wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport
   }
 }
 
-// A repeated angle is trusted up to max_repeat_s before it only (telemetry_buffer.h): while the head rests, the newest
-// angle known is at least as old.
-void warn_of_limits(const TelemetryLimits& limits) {
-  if (limits.max_repeat_s < limits.max_extrapolation_s) return;
-  spdlog::warn(
-      "pan_tilt.max_repeat_s ({:.0f} ms) is not below realtime.max_extrapolation_s ({:.0f} ms): "
-      "while the head rests and repeats its angle, records say \"{}\"",
-      1e3 * limits.max_repeat_s, 1e3 * limits.max_extrapolation_s,
-      to_string(RecordStatus::kTelemetryTooOld));
-}
-
 int run(const RunOptions& options) {
   const Config config = require_config(options.config);
   Calibrating calibrating;
@@ -107,7 +96,6 @@ int run(const RunOptions& options) {
   }
   spdlog::info("calibration: {}", calibration.name);
   PipelineOptions of_pipeline = pipeline_options(config, calibration);
-  warn_of_limits(of_pipeline.step.telemetry_limits);
   of_pipeline.step.map = std::move(map);
   of_pipeline.step.follow_points = calibrating.calibration && config.calibration.automatic;
 

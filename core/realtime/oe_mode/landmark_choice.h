@@ -2,7 +2,8 @@
 // LandmarkChoice: which of the visible fine landmarks are aligned in a frame. This is the one place that
 // decides it: to choose otherwise, change choose().
 //
-// Up to max_used visible fine landmarks: all of them, in their order. Where there are more: the image is
+// Up to max_used visible fine landmarks: all of them, in their order; the choice begins where there are more (with the
+// defaults, from images of 1280x720 on). Then the image is
 // divided into columns x rows parts, of each part the most reliable landmark comes first, parts in strides, so
 // that a small max_used is spread over the image too; what room is left goes to the others in their order.
 // Reliable is what was found when it was looked for (rule of succession), halved for each octave further up,
@@ -22,7 +23,8 @@ struct LandmarkChoiceOptions {
   static constexpr int kMaxUsed = 1024;  // as many as the solution has room for
 
   int max_used = 200;  // landmarks, 1 to kMaxUsed
-  int columns = 20;    // parts of the image, of which each has its most reliable landmark chosen
+  // Parts of the image. Where more of them than max_used have a landmark, the last of the strides get none.
+  int columns = 20;
   int rows = 12;
 
   // False and one line in *error (if not null) when a value is not valid.
