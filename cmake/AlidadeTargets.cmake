@@ -100,9 +100,10 @@ add_custom_target(quick_programs)
 #   THOROUGH    patterns of cases that only `scripts/test all` runs: entry NAME.thorough, with the label thorough
 #   UNSANITIZED patterns of cases from which a sanitizer learns nothing that others do not show it: repetition, long films
 #   SHARDS      how many processes share the cases, for a room whose tests mostly wait
+#   COST        seconds, of a room that takes long: ctest starts the dearest first, so that none is left over at the end
 #   DEFINITIONS, DEPENDS, LABELS, TIMEOUT (s), RESOURCE_LOCK
 function(alidade_test name)
-  cmake_parse_arguments(A "" "TIMEOUT;RESOURCE_LOCK;SHARDS"
+  cmake_parse_arguments(A "" "TIMEOUT;RESOURCE_LOCK;SHARDS;COST"
     "SOURCES;SUPPORT;LINK;THREADED;NATIVE;NATIVE_SUPPORT;NATIVE_LINK;THOROUGH;UNSANITIZED;DEFINITIONS;DEPENDS;LABELS" ${ARGN})
   if(NOT ALIDADE_BUILD_TESTS)
     return()
@@ -154,7 +155,8 @@ function(alidade_test name)
   endif()
 endfunction()
 
-# One entry of ctest for the cases of a program that the filter leaves. Takes TIMEOUT, RESOURCE_LOCK and SHARDS from alidade_test.
+# One entry of ctest for the cases of a program that the filter leaves. Takes TIMEOUT, RESOURCE_LOCK, SHARDS and
+# COST from alidade_test.
 function(alidade_register_cases program name filter labels)
   if(NOT A_TIMEOUT)
     set(A_TIMEOUT 300)
@@ -170,6 +172,9 @@ function(alidade_register_cases program name filter labels)
   endif()
   add_test(NAME ${name} COMMAND ${command} --gtest_brief=1 --gtest_filter=${filter})
   set_tests_properties(${name} PROPERTIES TIMEOUT ${A_TIMEOUT} LABELS "${labels}")
+  if(A_COST)
+    set_tests_properties(${name} PROPERTIES COST ${A_COST})
+  endif()
   if(A_RESOURCE_LOCK)
     set_tests_properties(${name} PROPERTIES RESOURCE_LOCK ${A_RESOURCE_LOCK})
   endif()
