@@ -100,6 +100,14 @@ class Programs:
             return read_outcome(output.read_text(errors="replace"), process, late)
 
 
+def is_stopped(pid):
+    """Whether a signal has put the process to sleep."""
+    try:
+        return pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "T"
+    except OSError:
+        return False
+
+
 def wait(process, limit_s):
     """Waits, and ends the program with all that it started when its time is over. Returns whether it was."""
     end = time.monotonic() + limit_s
@@ -111,6 +119,8 @@ def wait(process, limit_s):
             process.returncode = os.waitstatus_to_exitcode(status)
             process.cpu_s = usage.ru_utime + usage.ru_stime
             break
+        if is_stopped(process.pid):
+            end += pause  # somebody holds it, not the mutant
         if not late and time.monotonic() > end:
             late = True
             os.killpg(process.pid, signal.SIGKILL)
