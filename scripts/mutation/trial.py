@@ -207,14 +207,16 @@ class Verdict:
 
 
 class Judge:
-    def __init__(self, programs, baseline, budget_s):
-        self.programs, self.baseline, self.budget_s = programs, baseline, budget_s
+    def __init__(self, programs, baseline, budget_s, likely_only=False):
+        self.programs, self.baseline, self.budget_s, self.likely_only = programs, baseline, budget_s, likely_only
 
     def steps(self, mutant):
         """What to run, likeliest first: (program, its tests)."""
         own = [(program, self.baseline.cases(program, mutant.filter)) for program in mutant.tests + mutant.then]
         likely = [(program, cases) for program, cases in own if cases] if mutant.filter != "*" else []
         yield from likely
+        if likely and self.likely_only:
+            return
         tried = {program: set(cases) for program, cases in likely}
         spent = 0
         for program in mutant.tests + mutant.then:
