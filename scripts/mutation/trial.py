@@ -100,6 +100,14 @@ class Programs:
             return read_outcome(output.read_text(errors="replace"), process, late)
 
 
+def is_stopped(pid):
+    """Whether a signal has put the process to sleep."""
+    try:
+        return pathlib.Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] == "T"
+    except OSError:
+        return False
+
+
 def wait(process, limit_s):
     """Waits, and ends the program with all that it started when its time is over. Returns whether it was."""
     end = time.monotonic() + limit_s
@@ -111,6 +119,8 @@ def wait(process, limit_s):
             process.returncode = os.waitstatus_to_exitcode(status)
             process.cpu_s = usage.ru_utime + usage.ru_stime
             break
+        if is_stopped(process.pid):
+            end += pause  # somebody holds it, not the mutant
         if not late and time.monotonic() > end:
             late = True
             os.killpg(process.pid, signal.SIGKILL)
@@ -197,14 +207,16 @@ class Verdict:
 
 
 class Judge:
-    def __init__(self, programs, baseline, budget_s):
-        self.programs, self.baseline, self.budget_s = programs, baseline, budget_s
+    def __init__(self, programs, baseline, budget_s, likely_only=False):
+        self.programs, self.baseline, self.budget_s, self.likely_only = programs, baseline, budget_s, likely_only
 
     def steps(self, mutant):
         """What to run, likeliest first: (program, its tests)."""
         own = [(program, self.baseline.cases(program, mutant.filter)) for program in mutant.tests + mutant.then]
         likely = [(program, cases) for program, cases in own if cases] if mutant.filter != "*" else []
         yield from likely
+        if likely and self.likely_only:
+            return
         tried = {program: set(cases) for program, cases in likely}
         spent = 0
         for program in mutant.tests + mutant.then:

@@ -88,6 +88,26 @@ TEST(AxisPairing, KeepsStaleRepeatsAsTheyAre) {
   EXPECT_EQ(last, wrap_to_half_turn(3));
 }
 
+// A pan that stands still does not make a stair of the next step while tilt is measured afresh.
+TEST(AxisPairing, InterpolatesWhereOneAxisRepeatsAndTheOtherDoesNot) {
+  AxisPairing pairing;
+  static_cast<void>(pairing.add_pan({0, 0, 1}));
+  pairing.add_tilt({1, 1, 5});
+  static_cast<void>(pairing.add_pan({2, 2, 1}));
+  pairing.add_tilt({3, 3, 6});
+  const auto paired = pairing.add_pan({4, 4, 2});
+  ASSERT_TRUE(paired);
+  EXPECT_DOUBLE_EQ(paired->pan_rad, 1.5);
+}
+
+TEST(AxisPairing, UsesATiltOnce) {
+  AxisPairing pairing;
+  static_cast<void>(pairing.add_pan({0, 0, 1}));
+  pairing.add_tilt({1, 1, 5});
+  EXPECT_TRUE(pairing.add_pan({2, 2, 1}));
+  EXPECT_FALSE(pairing.add_pan({4, 4, 1}));
+}
+
 TEST(AxisPairing, DoesNotInterpolateOverAGap) {
   AxisPairing pairing;
   static_cast<void>(pairing.add_pan({0, 0, 1}));

@@ -92,6 +92,7 @@ TEST(OnvifStatus, SaysWhatIsWrong) {
   EXPECT_THAT(error_of(position(R"(x="nan" y="1")")), HasSubstr("not a number"));
   EXPECT_THAT(error_of(position(R"(x="1")")), HasSubstr("not a number"));
   EXPECT_THAT(error_of(position(R"(x="1.5" y="0")")), HasSubstr("outside its space"));
+  EXPECT_THAT(error_of(position(R"(x="0" y="-1.5")")), HasSubstr("outside its space"));
   EXPECT_THAT(error_of(position(R"(x="1e300" y="0")")), HasSubstr("1e+300, 0 is outside"));
   EXPECT_THAT(error_of(position(R"(x="400" y="0" space="a/SphericalPositionSpaceDegrees")")),
               HasSubstr("outside its space"));
@@ -297,6 +298,20 @@ TEST(DeviceClockTrial, TakesClocksThatAdvanceInFractionsOfSeconds) {
   EXPECT_EQ(verdict_on([](double t) { return Time(std::floor(7 + t)); }), Verdict::kUseless);
   EXPECT_EQ(verdict_on([](double t) { return Time(7.5 - t); }), Verdict::kUseless);
   EXPECT_EQ(verdict_on([](double t) { return Time(7.5 + 100 * t); }), Verdict::kUseless);
+}
+
+TEST(DeviceClockTrial, TakesNoClockThatFallsBehind) {
+  DeviceClockTrial trial;
+  EXPECT_EQ(trial.add(7.5, 100), Verdict::kOpen);
+  EXPECT_EQ(trial.add(7.75, 101.5), Verdict::kUseless);
+}
+
+// One that tells milliseconds tells a whole second now and then.
+TEST(DeviceClockTrial, TakesAClockThatOnceToldAFraction) {
+  DeviceClockTrial trial;
+  EXPECT_EQ(trial.add(7.5, 100), Verdict::kOpen);
+  EXPECT_EQ(trial.add(8.0, 100.5), Verdict::kOpen);
+  EXPECT_EQ(trial.add(9.0, 101.5), Verdict::kUseful);
 }
 
 }  // namespace

@@ -150,6 +150,27 @@ TEST(PelcoDProtocol, PassesOverTheAnswerToAnotherQuery) {
   EXPECT_EQ(protocol.find(answer_of(1, kPanAnswer, 1)).kind, Answer::Kind::kNone);
 }
 
+TEST(PelcoDProtocol, LooksForNoAnswerInsideAnother) {
+  const std::string answer = answer_of(1, kPanAnswer, 0xFF01);
+  // With the answer's last three bytes, these would be another one.
+  const std::string noise = bytes_of({0x59, 0x00, 0x05, 0x01 + 0x5A + 0x59 + 0x05});
+  ASSERT_TRUE(find(answer.substr(4) + noise));
+  const auto found = find(answer + noise);
+  ASSERT_TRUE(found);
+  EXPECT_EQ(found->value, 0xFF01);
+}
+
+TEST(PelcoDProtocol, KnowsTheStepsOfEachAxis) {
+  PelcoDOptions options;
+  options.pan_deg_per_step = 0.01;
+  options.tilt_deg_per_step = 0.02;
+  PelcoDProtocol protocol(options);
+  static_cast<void>(protocol.next());
+  EXPECT_DOUBLE_EQ(protocol.find(answer_of(1, kPanAnswer, 1000)).pan_deg, 10);
+  static_cast<void>(protocol.next());
+  EXPECT_DOUBLE_EQ(protocol.find(answer_of(1, kTiltAnswer, 1000)).tilt_deg, 20);
+}
+
 TEST(PelcoDProtocol, RefusesMoreThanATurn) {
   PelcoDProtocol protocol({});
   static_cast<void>(protocol.next());

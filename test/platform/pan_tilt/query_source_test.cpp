@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <iterator>
@@ -442,6 +443,53 @@ TEST(QuerySource, ForgetsTheZoomWithTheConnection) {
   ASSERT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk) << source.error();
   EXPECT_TRUE(sample.restarted);
   EXPECT_EQ(sample.zoom, std::nullopt);
+}
+
+// A tilt that waits for its pan is forgotten with the connection.
+TEST(QuerySource, PairsNothingAcrossTwoConnections) {
+  std::atomic<int> asked = 0;
+  HeadServer server(HeadServer::Link::kTcp, std::make_unique<PelcoDHead>([&] {
+                      ++asked;
+                      return HeadPosition{10, 20, 7};
+                    }));
+  QuerySourceOptions options = options_for(server.address());
+  options.rate_hz = 5;
+  QuerySource source(std::make_unique<PelcoDProtocol>(PelcoDOptions{}), options);
+  PanTiltSample sample;
+  ASSERT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  const int at_pan = asked;
+  while (asked == at_pan) ASSERT_EQ(source.read(sample, 0.01), ReadStatus::kTimeout);
+  ASSERT_EQ(source.read(sample, 0.02), ReadStatus::kTimeout);
+  server.unplug();
+  ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  const double plugged_s = monotonic_now_s();
+  server.plug();
+  ASSERT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  EXPECT_GT(sample.earliest_time_s, plugged_s);
+}
+
+// Whether a reading takes one query or two, and whoever did not read for a while.
+TEST(QuerySource, ReadsAtTheRateThatIsAskedFor) {
+  for (const HeadKind kind : {HeadKind::kPelcoDTcp, HeadKind::kViscaTcp}) {
+    HeadRig rig(kind);
+    constexpr double kPeriod_s = 0.05;
+    QuerySourceOptions options = rig.options();
+    options.rate_hz = 1 / kPeriod_s;
+    const auto source = rig.open(options);
+    PanTiltSample sample;
+    ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
+    std::this_thread::sleep_for(std::chrono::duration<double>(8 * kPeriod_s));
+    ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
+    const double first_s = sample.latest_time_s;
+    double shortest_s = kNever_s;
+    for (int i = 0; i < 6; ++i) {
+      const double before_s = sample.latest_time_s;
+      ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
+      shortest_s = std::min(shortest_s, sample.latest_time_s - before_s);
+    }
+    EXPECT_GT(sample.latest_time_s - first_s, 4 * kPeriod_s) << to_string(kind) << ": no burst";
+    EXPECT_LT(shortest_s, 1.5 * kPeriod_s) << to_string(kind);
+  }
 }
 
 // The answers to them may come on the new connection; nothing would tell them from those to new queries.

@@ -159,6 +159,26 @@ TEST(ViscaProtocol, BelievesALengthThatComesTwiceAndThenNoOther) {
   EXPECT_EQ(protocol.find(kTwelve).kind, Answer::Kind::kPanTilt);
 }
 
+TEST(ViscaProtocol, BelievesNoLengthThatADamagedFirstPositionHas) {
+  ViscaProtocol protocol(options());
+  start(protocol);
+  static_cast<void>(protocol.next());
+  EXPECT_EQ(protocol.find(kEleven).kind, Answer::Kind::kRefused);
+  EXPECT_EQ(protocol.find(kTwelve).kind, Answer::Kind::kRefused);
+  EXPECT_EQ(protocol.find(kTwelve).kind, Answer::Kind::kPanTilt);
+}
+
+// Another device may answer on a new connection.
+TEST(ViscaProtocol, LearnsTheLengthAnewAfterARestart) {
+  ViscaProtocol protocol(options());
+  for (const std::string& position : {kTwelve, kEleven}) {
+    start(protocol);
+    static_cast<void>(protocol.next());
+    EXPECT_EQ(protocol.find(position).kind, Answer::Kind::kRefused);
+    EXPECT_EQ(protocol.find(position).kind, Answer::Kind::kPanTilt);
+  }
+}
+
 TEST(ViscaProtocol, AsksTheZoomAsAFenceWhenNoPositionCame) {
   ViscaProtocol protocol(options());
   start(protocol);
@@ -312,6 +332,7 @@ TEST(ViscaHeaderTest, RefusesDatagramsOfAnotherLengthThanTheySay) {
   EXPECT_EQ(header->sequence, 0xFFFFFFFF);
   EXPECT_EQ(header->payload, kEleven);
   EXPECT_FALSE(parse_visca_header(whole + "x"));
+  EXPECT_FALSE(parse_visca_header(bytes_of({1, 0x11, 0, 0, 0, 0, 0, 7}))) << "no payload";
   for (std::size_t size = 0; size < whole.size(); ++size) {
     EXPECT_FALSE(parse_visca_header(whole.substr(0, size)));
   }

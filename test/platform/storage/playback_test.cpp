@@ -2,7 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
 #include <thread>
+#include <utility>
 
 #include "test/support/temporary_directory.h"
 
@@ -27,12 +29,15 @@ TEST(Playback, HoldsAnItemBackUntilItIsDue) {
 }
 
 TEST(Playback, CountsFromTheFirstStampOfFramesAndTelemetry) {
-  const TemporaryDirectory directory;
-  directory.write("frames.csv", "frame,receive_time_s\n0,1000100\n");
-  directory.write("telemetry.csv", "receive_time_s,pan_rad,tilt_rad\n100,0,0\n");
-  Playback playback(directory.path(), true);
-  EXPECT_EQ(playback.wait_until_due(100 + kNever_s, 0), ReadStatus::kTimeout);
-  EXPECT_EQ(playback.wait_until_due(100, 0), ReadStatus::kOk);
+  for (const auto& [frame, sample] : {std::pair("1000100", "100"), std::pair("100", "1000100")}) {
+    const TemporaryDirectory directory;
+    directory.write("frames.csv", std::string("frame,receive_time_s\n0,") + frame + "\n");
+    directory.write("telemetry.csv",
+                    std::string("receive_time_s,pan_rad,tilt_rad\n") + sample + ",0,0\n");
+    Playback playback(directory.path(), true);
+    EXPECT_EQ(playback.wait_until_due(100 + kNever_s, 0), ReadStatus::kTimeout);
+    EXPECT_EQ(playback.wait_until_due(100, 0), ReadStatus::kOk);
+  }
 }
 
 TEST(Playback, EndsAWaitWhenItIsStopped) {

@@ -148,6 +148,8 @@ INSTANTIATE_TEST_SUITE_P(
         Flaw{"EmptyRequiredCell", "frame,receive_time_s\n0,\n", 2, "'' in column receive_time_s"},
         Flaw{"TextForOptionalNumber", "frame,receive_time_s,sequence\n0,1,x\n", 2, "'x'"},
         Flaw{"FractionalFrame", "frame,receive_time_s\n0.5,1\n", 2, "not a whole number"},
+        Flaw{"BeyondWholeNumbers", "frame,receive_time_s\n9007199254740994,1\n", 2,
+             "'9007199254740994' in column frame is not a whole number"},
         Flaw{"NegativeFrame", "frame,receive_time_s\n-1,1\n", 2, "negative frame"},
         Flaw{"ShortRow", "frame,receive_time_s\n0,1\n\n1\n", 4, "fewer cells"},
         Flaw{"MissingColumn", "frame,time\n0,1\n", 1, "no column 'receive_time_s'"},

@@ -202,6 +202,22 @@ TEST(MultipartScanner, GivesUpAPartThatIsTooLongAndGoesOnWithTheNext) {
   }
 }
 
+TEST(MultipartScanner, GivesUpHeadersWithoutEnd) {
+  MultipartScanner scanner("frame", kMax);
+  scanner.feed("--frame\r\n", 0);
+  for (int i = 0; i < 2000; ++i) scanner.feed("X: yyyyyy\r\n", 0);
+  EXPECT_EQ(scanner.discarded(), 1);
+  scanner.feed("\r\n" + jpeg("lost") + "\r\n" + with_length(jpeg("a")), 0);
+  const auto parts = taken(scanner);
+  ASSERT_EQ(parts.size(), 1U);
+  EXPECT_EQ(parts[0].body, jpeg("a"));
+}
+
+TEST(MultipartScanner, TakesNoBoundaryWithinALine) {
+  const std::string body = jpeg("a frame\r\nof a -frame\n");
+  EXPECT_EQ(bodies("--frame\r\n\r\n" + body + "\r\n--frame\r\n"), Bodies{body});
+}
+
 TEST(MultipartScanner, TakesAPartOfTheGreatestLengthInPiecesOfAnySize) {
   const std::string greatest = jpeg(std::string(kMax - 4, 'x'));
   const std::string start = "--frame\r\n\r\n";

@@ -84,7 +84,7 @@ TEST(RtpPacket, TakesNoTimeFromAnExtensionThatIsCutOff) {
 }
 
 TEST(RtpPacket, IsNotRtcpNorAnotherVersion) {
-  for (const int type : {200, 201, 202, 203, 204}) {
+  for (const int type : {192, 200, 201, 202, 203, 204, 223}) {
     Bytes rtcp = kPlain;
     rtcp[1] = static_cast<std::uint8_t>(type);
     EXPECT_FALSE(parse(rtcp)) << type;
@@ -229,6 +229,13 @@ TEST_F(PictureEndsInOrder, AreUnknownAfterALossOfTheMarker) {
   ++sequence_;
   EXPECT_FALSE(pass(3000, false).last);
   EXPECT_FALSE(pass(3000, true).last) << "the packet lost may have been its first";
+  EXPECT_TRUE(pass(4000, true).last);
+}
+
+TEST_F(PictureEndsInOrder, AreUnknownAfterAPictureWithoutAMarker) {
+  (void)pass(1000, true);
+  EXPECT_FALSE(pass(2000, false).last);
+  EXPECT_FALSE(pass(3000, true).last) << "this sender's markers are no ends";
   EXPECT_TRUE(pass(4000, true).last);
 }
 
