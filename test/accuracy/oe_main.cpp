@@ -28,7 +28,7 @@ int main(int argc, char** argv) {
   app.add_option("--seconds", options.size.duration_s, "of a recording")
       ->check(CLI::Range(2.0, 60.0));
   app.add_option("--max-chosen", options.oe.search.choice.max_chosen,
-                 "landmarks aligned in a frame")
+                 "landmarks looked for in a frame")
       ->check(CLI::Range(1, alidade::LandmarkChoiceOptions::kMaxChosen));
   app.add_option("--telemetry-sigma", options.telemetry_sigma_px, "px of a picture 1920 wide")
       ->check(CLI::PositiveNumber);

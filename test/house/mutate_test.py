@@ -107,6 +107,11 @@ class PlantedMutants(unittest.TestCase):
         self.assertEqual(code, 0, output + errors)
         self.assertIn("2 mutants: 1 killed (50 %), 1 survived (1 of them explained)", output)
 
+        code, output, errors = project.mutate("--list", "--only", "shape.h")
+        self.assertEqual(len(output.splitlines()), 8, output + errors)
+        code, output, errors = project.mutate("--list", "--only", "form.h")
+        self.assertIn("form.h: neither a mutant nor a list nor a file", errors)
+
         # One that dies though the list says why it lives is a mistake, too.
         code, output, errors = project.mutate("--only", "explained-away")
         self.assertEqual(code, 1, output + errors)
