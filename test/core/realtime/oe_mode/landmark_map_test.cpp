@@ -129,7 +129,7 @@ TEST(LandmarkMap, KeepsWhatItIsGivenWithANewIdAndFreshStatistics) {
   landmark.shared_covariance << 5, 0, 0, 6;
   landmark.J_pixel_tangent << 7, 8, 9, 10;
   landmark.pixels[100] = 11;
-  landmark.statistics.seen = 12;
+  landmark.statistics.looked_for = 12;
   int slot = -1;
   ASSERT_EQ(map.insert(landmark, 1000, &slot), InsertStatus::kOk);
   ASSERT_TRUE(map.occupied(slot));
@@ -141,7 +141,7 @@ TEST(LandmarkMap, KeepsWhatItIsGivenWithANewIdAndFreshStatistics) {
   EXPECT_EQ(kept.J_pixel_tangent, landmark.J_pixel_tangent);
   EXPECT_EQ(kept.pixels, landmark.pixels);
   EXPECT_NE(kept.id, 77U);
-  EXPECT_EQ(kept.statistics.seen, 0U);
+  EXPECT_EQ(kept.statistics.looked_for, 0U);
   EXPECT_EQ(kept.statistics.last_frame, 1000U);
 }
 
@@ -346,7 +346,7 @@ TEST(LandmarkMap, FullMapOfUsefulLandmarksKeepsThem) {
   EXPECT_EQ(map.insert(landmark_at(anywhere(&random), 3), 0, &slot), InsertStatus::kFull);
   EXPECT_EQ(map.insert(landmark_at(anywhere(&random), 3), 1, &slot), InsertStatus::kFull);
   for (int i = 0; i < 50; ++i) {
-    map.statistics(i).seen = 100;
+    map.statistics(i).looked_for = 100;
     map.statistics(i).matched = 95;
     map.statistics(i).last_frame = 100;
   }
@@ -362,7 +362,7 @@ TEST(LandmarkMap, FullMapGivesUpTheLeastUseful) {
   ASSERT_EQ(map.size(), 50);
   constexpr std::uint32_t kNow = 1000;
   for (int i = 0; i < 50; ++i) {
-    map.statistics(i).seen = 100;
+    map.statistics(i).looked_for = 100;
     map.statistics(i).matched = 90;
     map.statistics(i).last_frame = kNow;
   }
@@ -398,8 +398,8 @@ TEST(LandmarkMap, FullMapForgetsWhatWasSeenLongAgoForWhatIsSeenNow) {
     const InsertStatus status = map.insert(landmark_at(d), frame, &slot);
     ASSERT_NE(status, InsertStatus::kFull) << frame;
     for (int i = 0; i < map.capacity(); ++i) {
-      if (!map.occupied(i) || map.statistics(i).seen >= 30) continue;
-      ++map.statistics(i).seen;
+      if (!map.occupied(i) || map.statistics(i).looked_for >= 30) continue;
+      ++map.statistics(i).looked_for;
       ++map.statistics(i).matched;
       map.statistics(i).last_frame = frame;
     }
@@ -416,7 +416,7 @@ TEST(LandmarkMap, WorthFallsWithMissesAndWithTimeButNotForASecond) {
   EXPECT_EQ(map.worth(slot, 120), fresh);
   EXPECT_LT(map.worth(slot, 200), fresh);
   EXPECT_EQ(map.worth(slot, 90), fresh);  // a frame before: no time has passed
-  map.statistics(slot).seen = 10;
+  map.statistics(slot).looked_for = 10;
   map.statistics(slot).matched = 10;
   const double good = map.worth(slot, 100);
   EXPECT_GT(good, fresh);
@@ -424,7 +424,7 @@ TEST(LandmarkMap, WorthFallsWithMissesAndWithTimeButNotForASecond) {
   EXPECT_LT(map.worth(slot, 100), good);
   map.statistics(slot).matched = 1;
   EXPECT_LT(map.worth(slot, 100), fresh);
-  map.statistics(slot).seen = 1000;
+  map.statistics(slot).looked_for = 1000;
   map.statistics(slot).matched = 1000;
   EXPECT_GT(map.worth(slot, 400), 3 * good * 30 / 300);  // often found, later forgotten
   EXPECT_LE(map.worth(slot, 100), 1);
