@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "core/model/one_sided_clock.h"
 #include "test/support/allocation_guard.h"
 
 namespace alidade {
@@ -431,6 +432,22 @@ TEST(ClockFilter, FollowsAMinimumDelayThatFallsWhileWarmingUp) {
   });
   EXPECT_EQ(filter.counters().delay_steps, 0);
   EXPECT_LT(score.worst, 1e-3);
+}
+
+// What began before the lock is no step of a locked line: there was no sure minimum delay to keep.
+TEST(OneSidedClock, MovesToAMinimumDelayThatRoseJustBeforeTheLock) {
+  internal::OneSidedClock<256> clock{ClockFilterOptions{}};
+  clock.start(0, {1, 200e-6});
+  for (int i = 0; i < 60 * 25; ++i) {
+    const double t = i / 25.0;
+    const double jitter_s = 0.2e-3 * (3 * i % 7);
+    const double receive = t + jitter_s + (t < 19.9 ? 0 : 20e-3);
+    EXPECT_FALSE(clock.learn({receive, t, receive, 1e-4, true})) << t;
+    if (i == 20 * 25) clock.lock(receive);
+    if (t > 35) EXPECT_NEAR(clock.line().value_at(t), t + 20e-3, 0.1e-3);
+  }
+  EXPECT_EQ(clock.shift_s(), 0);
+  EXPECT_EQ(clock.shift_variance(), 0);
 }
 
 TEST(ClockFilter, RecoversFromAnEarlyStampInTheWarmUp) {
