@@ -92,24 +92,30 @@ TEST(Adjustment, EliminatingLandmarksGivesTheSolutionOfTheWholeSystem) {
   Adjustment adjustment(scene.data, scene.priors, scene.fixed);
   Linearisation at;
   adjustment.linearise(scene.state, {}, &at);
-  Eigen::VectorXd x;
-  std::vector<Vector2<double>> x_landmark;
-  ASSERT_TRUE(adjustment.solve(at, 0, &x, &x_landmark));
-  // Put back into the normal equations.
-  const Eigen::MatrixXd H = at.H.selfadjointView<Eigen::Lower>();
-  Eigen::VectorXd left = H * x;
-  double scale = at.g.cwiseAbs().maxCoeff();
-  for (std::size_t l = 0; l < x_landmark.size(); ++l) {
-    Vector2<double> row = at.H_landmark[l] * x_landmark[l];
-    for (std::size_t i = at.touched_begin[l]; i < at.touched_begin[l + 1]; ++i) {
-      left.segment<2>(2 * at.touched[i]) += at.H_touched[i] * x_landmark[l];
-      row += at.H_touched[i].transpose() * x.segment<2>(2 * at.touched[i]);
+  for (const double damping : {0.0, 0.5}) {
+    SCOPED_TRACE(damping);
+    Eigen::VectorXd x;
+    std::vector<Vector2<double>> x_landmark;
+    ASSERT_TRUE(adjustment.solve(at, damping, &x, &x_landmark));
+    // Put back into the normal equations, every diagonal element of which is damped.
+    Eigen::MatrixXd H = at.H.selfadjointView<Eigen::Lower>();
+    H.diagonal() *= 1 + damping;
+    Eigen::VectorXd left = H * x;
+    const double scale = at.g.cwiseAbs().maxCoeff();
+    for (std::size_t l = 0; l < x_landmark.size(); ++l) {
+      Matrix2<double> H_landmark = at.H_landmark[l];
+      H_landmark.diagonal() *= 1 + damping;
+      Vector2<double> row = H_landmark * x_landmark[l];
+      for (std::size_t i = at.touched_begin[l]; i < at.touched_begin[l + 1]; ++i) {
+        left.segment<2>(2 * at.touched[i]) += at.H_touched[i] * x_landmark[l];
+        row += at.H_touched[i].transpose() * x.segment<2>(2 * at.touched[i]);
+      }
+      left.segment<kCameraCount>(x.size() - kGlobalCount) += at.H_camera[l] * x_landmark[l];
+      row += at.H_camera[l].transpose() * x.segment<kCameraCount>(x.size() - kGlobalCount);
+      EXPECT_LE((row - at.g_landmark[l]).norm(), 1e-9 * scale);
     }
-    left.segment<kCameraCount>(x.size() - kGlobalCount) += at.H_camera[l] * x_landmark[l];
-    row += at.H_camera[l].transpose() * x.segment<kCameraCount>(x.size() - kGlobalCount);
-    EXPECT_LE((row - at.g_landmark[l]).norm(), 1e-9 * scale);
+    EXPECT_LE((left - at.g).norm(), 1e-9 * scale);
   }
-  EXPECT_LE((left - at.g).norm(), 1e-9 * scale);
 }
 
 TEST(Adjustment, ConvergesFromFarAwayAndHoldsWhatIsFixed) {
