@@ -208,6 +208,11 @@ add_custom_target(fuzz_programs)
 # alidade_fuzz_regressions() makes, which runs those files and n mutations of them (5000).
 function(alidade_fuzz_target name)
   cmake_parse_arguments(A "" "MUTATIONS;LONGEST" "LINK" ${ARGN})
+  file(GLOB seeds CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/corpus/${name}/*)
+  if(NOT seeds)
+    message(FATAL_ERROR "${CMAKE_CURRENT_SOURCE_DIR}/corpus/${name} is empty: a fuzz target begins with examples")
+  endif()
+  set_property(GLOBAL APPEND PROPERTY ALIDADE_FUZZ_SOURCES ${name}_fuzz.cpp)
   if(NOT A_MUTATIONS)
     set(A_MUTATIONS 5000)
   endif()
@@ -240,6 +245,20 @@ function(alidade_fuzz_target name)
   # A fifth faster; an input that fails tells more when it is run again without.
   set_tests_properties(fuzz_${name}_ten_million PROPERTIES LABELS "fuzz;slow" TIMEOUT 10800
     ENVIRONMENT ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=16)
+endfunction()
+
+# Every *_fuzz.cpp here is of a target that has been declared, or is one of those named: none lies about unbuilt.
+function(alidade_require_fuzz_targets)
+  get_property(declared GLOBAL PROPERTY ALIDADE_FUZZ_SOURCES)
+  set(others ${ARGN})
+  list(TRANSFORM others APPEND _fuzz.cpp)
+  file(GLOB found RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_fuzz.cpp)
+  foreach(file IN LISTS found)
+    if(NOT file IN_LIST declared AND NOT file IN_LIST others)
+      message(FATAL_ERROR "${CMAKE_CURRENT_SOURCE_DIR}/${file} is of no target: declare it in CMakeLists.txt, or its head in "
+        "platform/pan_tilt/heads.h")
+    endif()
+  endforeach()
 endfunction()
 
 # The program fuzz_regressions of all targets declared so far, and planted_defect_fuzz.cpp, which proves that it bites.
