@@ -80,8 +80,8 @@ set(CPACK_COMPONENT_EDGE_DESCRIPTION
 Gives, for every video frame and in real time, the orientation of a cheap
 pan-tilt-zoom camera and the direction of any pixel, each with an honest
 uncertainty. It listens to video (RTSP, MJPEG, V4L2) and to pan and tilt
-telemetry (VAPIX, ONVIF, Pelco-D, VISCA, FLIR PTU), and calibrates itself
-while the camera moves.
+telemetry (VAPIX, ONVIF, heads on a serial line, TCP or UDP), and calibrates
+itself while the camera moves.
 
 This is the program, and a systemd service that runs it. On armhf it needs a
 processor with NEON.")
