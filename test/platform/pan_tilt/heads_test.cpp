@@ -64,14 +64,15 @@ TEST_P(EveryHead, HasAKindOverEachLink) {
 
 TEST_P(EveryHead, IsDocumentedForTheUser) {
   const std::string key = GetParam().key;
-  EXPECT_THAT(text_of("edge_app/config/README.md"), HasSubstr(" " + key + " |"));
+  EXPECT_THAT(text_of("edge_app/config/README.md"), HasSubstr(" " + key + " |"))
+      << "the table of keys";
   std::istringstream example(text_of("edge_app/examples/head_on_a_line.yaml"));
   std::string line;
   for (const char* begin : {"pan_tilt:", "  type: "}) {
     while (std::getline(example, line) && line.rfind(begin, 0) != 0) {
     }
   }
-  EXPECT_THAT(line, HasSubstr(" " + key));
+  EXPECT_THAT(line, HasSubstr(" " + key)) << "head_on_a_line.yaml";
 }
 
 // A head of a kind, asked without a line: each answer comes whole and at once.
@@ -214,8 +215,8 @@ TEST_P(EveryHeadKind, FindsNothingInNoBytes) {
 TEST_P(EveryHeadKind, TellsTheSimulatedHeadsPositionInTheAxesOfTheModel) {
   EXPECT_EQ(head_.options.index(), static_cast<std::size_t>(head_.type));
   const UsualSigns& usual = head_of(head_.type).signs;
-  EXPECT_EQ(usual.pan.value_or(head_.pan_sign), head_.pan_sign);
-  EXPECT_EQ(usual.tilt.value_or(head_.tilt_sign), head_.tilt_sign);
+  EXPECT_EQ(usual.pan.value_or(head_.pan_sign), head_.pan_sign) << "kHeads and its device";
+  EXPECT_EQ(usual.tilt.value_or(head_.tilt_sign), head_.tilt_sign) << "kHeads and its device";
   double worst_deg = 0;
   for (int i = -40; i <= 40; ++i) {
     const HeadPosition position{4.4321 * i, 2.1234 * i, 0x1234};
@@ -223,7 +224,7 @@ TEST_P(EveryHeadKind, TellsTheSimulatedHeadsPositionInTheAxesOfTheModel) {
     for (int n = 0; n < 4; ++n) {
       const Conversation::Turn turn = conversation.reading();
       ASSERT_TRUE(Conversation::is_reading(turn.answer))
-          << "the simulated head is not understood: " << turn.answer.problem;
+          << "its device in kHeadModels is not understood: " << turn.answer.problem;
       EXPECT_LT(turn.answer.begin, turn.reply.size());
       worst_deg = std::max(worst_deg, conversation.error_deg(turn.answer));
     }
@@ -266,9 +267,9 @@ TEST_P(EveryHeadKind, ShowsOfABadLineWhatItsRowSays) {
   const auto repeat = [](const std::string& before, const std::string& /*reply*/) {
     return std::vector<std::string>{before};
   };
-  EXPECT_EQ(!is_forged_by(changed_bytes), head_.abilities.shows_changed_bytes);
-  EXPECT_EQ(!is_forged_by(lost_bytes), head_.abilities.shows_lost_bytes);
-  EXPECT_EQ(!is_forged_by(repeat), head_.abilities.shows_repeats);
+  EXPECT_EQ(!is_forged_by(changed_bytes), head_.abilities.shows_changed_bytes) << "a bit changed";
+  EXPECT_EQ(!is_forged_by(lost_bytes), head_.abilities.shows_lost_bytes) << "a byte lost";
+  EXPECT_EQ(!is_forged_by(repeat), head_.abilities.shows_repeats) << "the answer before";
 }
 
 class EveryHeadOnASerialLine : public EveryHeadKind {};
