@@ -2,6 +2,7 @@
 // receive time is known when the frame is answered, and nothing later is. So the answer is what
 // a live step would have given, and the same in each replay.
 // In OE mode pictures are decoded besides; a frame whose picture cannot be is answered from telemetry.
+// It reads no configuration: how long telemetry holds is the default of TelemetryLimits.
 
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -280,6 +281,13 @@ void register_replay(CLI::App& app, int* exit_code) {
   command->add_flag("--realtime", options->realtime, "At the pace of the recording");
   CLI::Option* json = command->add_flag("--json", options->json, "Also on stdout, as JSON Lines");
   command->add_flag("--csv", options->csv, "Also on stdout, as CSV")->excludes(json);
+  const TelemetryLimits limits;
+  command->footer(fmt::format(
+      "No configuration is read: telemetry is extrapolated for {} s, and a repeated angle trusted "
+      "until {} s before the repetition, whatever realtime.max_extrapolation_s and "
+      "pan_tilt.max_repeat_s were. With those of a configuration: alidade run, with video and "
+      "pan_tilt of type recording.",
+      limits.max_extrapolation_s, limits.max_repeat_s));
   command->callback([options, exit_code] { *exit_code = replay(*options); });
 }
 
