@@ -25,18 +25,40 @@ if(ALIDADE_FUZZ)
   target_compile_options(alidade_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
-# alidade_library(model [INTERNAL] HEADERS ... SOURCES ... PUBLIC ... PRIVATE ... OPTIONS ...)
+# alidade_prelude(edge_app HEADERS <Eigen/Dense> ... LINK ... OPTIONS ...)
+# compiles once what most sources of the libraries with `PRELUDE edge_app` include; OPTIONS are those of the libraries. Each
+# source includes what it needs nevertheless: builds with sanitizers and for other processors have no prelude, and show it.
+function(alidade_prelude name)
+  cmake_parse_arguments(A "" "" "HEADERS;LINK;OPTIONS" ${ARGN})
+  if(ALIDADE_SANITIZE OR ALIDADE_FUZZ OR CMAKE_CROSSCOMPILING)
+    return()
+  endif()
+  add_library(alidade_${name}_prelude OBJECT ${PROJECT_SOURCE_DIR}/cmake/prelude.cpp)
+  target_link_libraries(alidade_${name}_prelude PRIVATE alidade_options ${A_LINK})
+  target_compile_options(alidade_${name}_prelude PRIVATE ${A_OPTIONS})
+  target_precompile_headers(alidade_${name}_prelude PRIVATE ${A_HEADERS})
+  set_property(GLOBAL PROPERTY ALIDADE_PRELUDE_LINKS_${name} ${A_LINK})
+endfunction()
+
+# alidade_library(model [INTERNAL] [PRELUDE name] HEADERS ... SOURCES ... PUBLIC ... PRIVATE ... OPTIONS ...)
 # makes target alidade_model and alias alidade::model. Without SOURCES it is header-only.
 # PUBLIC and PRIVATE name what it links; OPTIONS are compile options for its own sources.
 # INTERNAL: not part of the installed package.
 function(alidade_library name)
-  cmake_parse_arguments(A "INTERNAL" "" "HEADERS;SOURCES;PUBLIC;PRIVATE;OPTIONS" ${ARGN})
+  cmake_parse_arguments(A "INTERNAL" "PRELUDE" "HEADERS;SOURCES;PUBLIC;PRIVATE;OPTIONS" ${ARGN})
   set(target alidade_${name})
   if(A_SOURCES)
     add_library(${target} STATIC ${A_SOURCES} ${A_HEADERS})
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:alidade_options> ${A_PRIVATE})
     target_compile_options(${target} PRIVATE ${A_OPTIONS})
+    if(TARGET alidade_${A_PRELUDE}_prelude)
+      target_precompile_headers(${target} REUSE_FROM alidade_${A_PRELUDE}_prelude)
+      # The compiler takes a prelude only where the same macros are defined.
+      get_property(links GLOBAL PROPERTY ALIDADE_PRELUDE_LINKS_${A_PRELUDE})
+      list(TRANSFORM links REPLACE "(.+)" "$<BUILD_INTERFACE:\\1>")
+      target_link_libraries(${target} PRIVATE ${links})
+    endif()
   else()
     add_library(${target} INTERFACE)
     set(scope INTERFACE)
@@ -72,7 +94,7 @@ set(ALIDADE_TEST_OPTIONS $<$<CONFIG:Release>:-O1>)
 
 # What test programs share, compiled once: GoogleTest and Eigen are most of what each test file includes.
 if(ALIDADE_BUILD_TESTS AND NOT ALIDADE_FUZZ)
-  add_library(alidade_test_prelude OBJECT ${PROJECT_SOURCE_DIR}/test/support/prelude.cpp)
+  add_library(alidade_test_prelude OBJECT ${PROJECT_SOURCE_DIR}/cmake/prelude.cpp)
   target_link_libraries(alidade_test_prelude PRIVATE alidade_options Eigen3::Eigen GTest::gmock GTest::gtest)
   # As the test programs are compiled, which use it.
   set_target_properties(alidade_test_prelude PROPERTIES POSITION_INDEPENDENT_CODE OFF)

@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <system_error>
 
+#include "edge_app/commands/calibrate.h"
 #include "edge_app/commands/calibration_input.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/stop_signals.h"
@@ -26,20 +27,6 @@ namespace alidade {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct CalibrateOptions {
-  std::string recording;  // its directory
-  std::string directory;  // empty: <recording>/alidade
-  bool json = false;
-  int passes = 2;  // of finding tracks in the video
-  // VALUE or VALUE,SIGMA; "free"; empty: as the estimator has it.
-  std::string focal_length;
-  std::string aspect;
-  std::string radial_distortion;
-  std::string line_delay;
-  std::string clock_offset;
-  std::optional<double> scale_sigma;
-};
 
 // Leaves *prior as it is if text is empty.
 void set_prior(const char* option, const std::string& text, const char* unit,
@@ -129,6 +116,8 @@ class OutputDirectory {
   std::vector<std::pair<std::string, std::string>> files_;
 };
 
+}  // namespace
+
 int calibrate_recording(const CalibrateOptions& options) {
   const std::string& recording = options.recording;
   StopSignals signals;
@@ -179,42 +168,6 @@ int calibrate_recording(const CalibrateOptions& options) {
                                                 result.message));
   }
   return kExitOk;
-}
-
-}  // namespace
-
-void register_calibrate(CLI::App& app, int* exit_code) {
-  auto options = std::make_shared<CalibrateOptions>();
-  CLI::App* command =
-      app.add_subcommand("calibrate",
-                         "Calibrate from a recording's video (or tracks.csv) and telemetry; writes "
-                         "calibration.yaml, map.bin and report.html");
-  command->add_option("recording", options->recording, "Directory of the recording")->required();
-  command->add_option("-o,--output", options->directory,
-                      "Directory for the results (default: DIR/alidade)");
-  command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
-  command
-      ->add_option(
-          "--passes", options->passes,
-          "Video without tracks.csv: look once (1), or again with the estimated camera (2)")
-      ->check(CLI::Range(1, 2))
-      ->capture_default_str();
-  const char* group = "What is known beforehand: VALUE (exact), VALUE,SIGMA, or free";
-  const auto add_prior = [&](const char* name, std::string* text, const char* help) {
-    command->add_option(name, *text, help)->group(group)->type_name("PRIOR");
-  };
-  add_prior("--focal-length", &options->focal_length, "px (default: free)");
-  add_prior("--aspect", &options->aspect, "f_v / f_u (default: 1, square pixels)");
-  add_prior("--radial-distortion", &options->radial_distortion, "(default: free)");
-  add_prior("--line-delay", &options->line_delay, "s/row (default: free)");
-  add_prior("--clock-offset", &options->clock_offset, "s (default: free)");
-  command
-      ->add_option("--scale-sigma", options->scale_sigma,
-                   "How well measured angles are known to be true angles, relative (default: "
-                   "noise.yaml's pan_tilt_scale_sigma, or 1e-8)")
-      ->check(CLI::Range(0.0, 1.0))
-      ->group(group);
-  command->callback([options, exit_code] { *exit_code = calibrate_recording(*options); });
 }
 
 }  // namespace alidade

@@ -14,16 +14,12 @@
 #include "edge_app/check/motion_check.h"
 #include "edge_app/check/telemetry_check.h"
 #include "edge_app/check/video_check.h"
+#include "edge_app/commands/check.h"
 #include "edge_app/commands/check_measurement.h"
 #include "edge_app/commands/command.h"
 
 namespace alidade {
 namespace {
-
-struct CheckOptions {
-  std::string config;
-  double duration_s = 10;
-};
 
 // What turns an axis's sign, for this kind of device.
 std::string reverse_advice(const PanTiltConfig& pan_tilt, bool is_pan) {
@@ -122,7 +118,9 @@ void add_connection(const Connection& connection, const char* what, Findings* fi
                           what, connection.name, connection.losses, connection.loss));
 }
 
-int check(const CheckOptions& options) {
+}  // namespace
+
+int check_links(const CheckOptions& options) {
   const Config config = require_config(options.config);
   fmt::print("configuration  {}: ok\n", options.config);
   const NamedCalibration calibration = choose_calibration(config);
@@ -174,19 +172,6 @@ int check(const CheckOptions& options) {
     fmt::print(stderr, "alidade: {}\n", finding.text);
   }
   return ok ? kExitOk : kExitFailed;
-}
-
-}  // namespace
-
-void register_check(CLI::App& app, int* exit_code) {
-  auto options = std::make_shared<CheckOptions>();
-  CLI::App* command = app.add_subcommand(
-      "check", "Validate the configuration, try each connection, and measure what comes");
-  command->add_option("-c,--config", options->config, "Configuration (YAML)")->required();
-  command->add_option("--duration", options->duration_s, "Seconds to measure each stream for")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
-  command->callback([options, exit_code] { *exit_code = check(*options); });
 }
 
 }  // namespace alidade

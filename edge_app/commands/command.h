@@ -1,9 +1,6 @@
 #pragma once
 // What the sub-commands share: exit codes, the one-line failure, and the way from a configuration to
-// sources and to the options of a real-time step. One file a sub-command registers itself with the
-// parser and stores its exit code.
-
-#include <CLI/CLI.hpp>
+// sources and to the options of a real-time step.
 
 #include <memory>
 #include <optional>
@@ -26,12 +23,6 @@ struct CommandError : std::runtime_error {
       : std::runtime_error(line), exit_code(code) {}
   ExitCode exit_code;
 };
-
-void register_run(CLI::App& app, int* exit_code);
-void register_record(CLI::App& app, int* exit_code);
-void register_replay(CLI::App& app, int* exit_code);
-void register_calibrate(CLI::App& app, int* exit_code);
-void register_check(CLI::App& app, int* exit_code);
 
 // Loads it and logs its warnings; throws CommandError.
 Config require_config(const std::string& path);

@@ -18,6 +18,7 @@
 #include <thread>
 
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/record.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/pipeline/read_loop.h"
 #include "platform/storage/recording_writer.h"
@@ -26,12 +27,6 @@ namespace alidade {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct RecordOptions {
-  std::string config;
-  std::string directory;
-  double duration_s = std::numeric_limits<double>::infinity();
-};
 
 // Refuses a directory that holds a recording already, so that none is ever overwritten.
 void prepare_directory(const std::string& directory) {
@@ -187,7 +182,9 @@ void wait_with_progress(StopSignals& signals, const Recorder& recorder, double d
   }
 }
 
-int record(const RecordOptions& options) {
+}  // namespace
+
+int record_streams(const RecordOptions& options) {
   const Config config = require_config(options.config);
   if (is_recording(config)) {
     throw CommandError(
@@ -211,20 +208,6 @@ int record(const RecordOptions& options) {
   log_source_losses(*video);
   if (!error.empty()) throw CommandError(kExitFailed, error);
   return kExitOk;
-}
-
-}  // namespace
-
-void register_record(CLI::App& app, int* exit_code) {
-  auto options = std::make_shared<RecordOptions>();
-  CLI::App* command = app.add_subcommand(
-      "record", "Store the live streams as a recording (video copied, not re-encoded)");
-  command->add_option("-c,--config", options->config, "Configuration (YAML)")->required();
-  command->add_option("-o,--output", options->directory, "Directory of the new recording")
-      ->required();
-  command->add_option("--duration", options->duration_s, "End after so many seconds")
-      ->check(CLI::PositiveNumber);
-  command->callback([options, exit_code] { *exit_code = record(*options); });
 }
 
 }  // namespace alidade

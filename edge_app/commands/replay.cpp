@@ -21,6 +21,7 @@
 #include <vector>
 
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/replay.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/config/noise_file.h"
 #include "edge_app/output/record_writer.h"
@@ -34,16 +35,6 @@ namespace alidade {
 namespace {
 
 namespace fs = std::filesystem;
-
-struct ReplayOptions {
-  std::string recording;
-  std::string directory;    // empty: <recording>/alidade
-  std::string calibration;  // empty: <recording>/alidade/calibration.yaml
-  std::string mode;         // "OE", "PT"; empty: OE if there are pictures
-  bool realtime = false;
-  bool json = false;
-  bool csv = false;
-};
 
 // The records' file, which has its name only when it is whole.
 class OrientationFile {
@@ -200,7 +191,9 @@ class Summary {
   LatencyHistogram step_s_;
 };
 
-int replay(const ReplayOptions& options) {
+}  // namespace
+
+int replay_recording(const ReplayOptions& options) {
   std::string error;
   RecordingInfo info;
   if (!read_recording_info(options.recording, &info, &error))
@@ -261,34 +254,6 @@ int replay(const ReplayOptions& options) {
   file.complete();
   spdlog::info("{}: {}", file.path(), summary.line());
   return kExitOk;
-}
-
-}  // namespace
-
-void register_replay(CLI::App& app, int* exit_code) {
-  auto options = std::make_shared<ReplayOptions>();
-  CLI::App* command = app.add_subcommand(
-      "replay", "Run the real-time modes over a recording; writes orientation.csv");
-  command->add_option("recording", options->recording, "Directory of the recording")->required();
-  command->add_option("-o,--output", options->directory,
-                      "Directory for orientation.csv (default: DIR/alidade)");
-  command->add_option("--calibration", options->calibration,
-                      "Calibration (default: DIR/alidade/calibration.yaml)");
-  command
-      ->add_option("--mode", options->mode,
-                   "OE or PT (default: OE if the recording has pictures, PT if not)")
-      ->check(CLI::IsMember({"OE", "PT"}));
-  command->add_flag("--realtime", options->realtime, "At the pace of the recording");
-  CLI::Option* json = command->add_flag("--json", options->json, "Also on stdout, as JSON Lines");
-  command->add_flag("--csv", options->csv, "Also on stdout, as CSV")->excludes(json);
-  const TelemetryLimits limits;
-  command->footer(fmt::format(
-      "No configuration is read: telemetry is extrapolated for {} s, and a repeated angle trusted "
-      "until {} s before the repetition, whatever realtime.max_extrapolation_s and "
-      "pan_tilt.max_repeat_s were. With those of a configuration: alidade run, with video and "
-      "pan_tilt of type recording.",
-      limits.max_extrapolation_s, limits.max_repeat_s));
-  command->callback([options, exit_code] { *exit_code = replay(*options); });
 }
 
 }  // namespace alidade

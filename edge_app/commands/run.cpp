@@ -11,6 +11,7 @@
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/live_calibration.h"
+#include "edge_app/commands/run.h"
 #include "edge_app/commands/run_report.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/output/http/http_server.h"
@@ -27,13 +28,6 @@
 
 namespace alidade {
 namespace {
-
-struct RunOptions {
-  std::string config;
-  double duration_s = std::numeric_limits<double>::infinity();
-  bool json = false;
-  bool csv = false;
-};
 
 std::string describe(const RealtimeOptions& options) {
   return fmt::format(
@@ -81,7 +75,9 @@ void wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport
   }
 }
 
-int run(const RunOptions& options) {
+}  // namespace
+
+int run_live(const RunOptions& options) {
   const Config config = require_config(options.config);
   Calibrating calibrating;
   NamedCalibration calibration;
@@ -145,21 +141,6 @@ int run(const RunOptions& options) {
     spdlog::warn("{} records not taken by a stalled reader at the end", writer.dropped());
   if (!pipeline.error().empty()) throw CommandError(kExitFailed, pipeline.error());
   return kExitOk;
-}
-
-}  // namespace
-
-void register_run(CLI::App& app, int* exit_code) {
-  auto options = std::make_shared<RunOptions>();
-  CLI::App* command =
-      app.add_subcommand("run", "Live: an orientation for each video frame, on stdout");
-  command->add_option("-c,--config", options->config, "Configuration (YAML)")->required();
-  command->add_option("--duration", options->duration_s, "End after so many seconds")
-      ->check(CLI::PositiveNumber);
-  CLI::Option* json =
-      command->add_flag("--json", options->json, "JSON Lines, whatever the configuration says");
-  command->add_flag("--csv", options->csv, "CSV, whatever the configuration says")->excludes(json);
-  command->callback([options, exit_code] { *exit_code = run(*options); });
 }
 
 }  // namespace alidade

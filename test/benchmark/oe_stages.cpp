@@ -4,6 +4,8 @@
 #include <cstdlib>
 #include <utility>
 
+#include "core/realtime/oe_mode/view_projection.h"
+
 namespace alidade::benchmarks {
 
 OeOptions measured_options(const Camera<double>& camera, int points) {

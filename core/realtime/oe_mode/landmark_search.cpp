@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/model/direction.h"
+#include "core/realtime/oe_mode/view_projection.h"
 
 namespace alidade {
 

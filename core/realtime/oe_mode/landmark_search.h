@@ -21,10 +21,12 @@
 #include "core/realtime/oe_mode/landmark_map.h"
 #include "core/realtime/oe_mode/octaves.h"
 #include "core/realtime/oe_mode/orientation_solve.h"
-#include "core/realtime/oe_mode/view_projection.h"
 #include "core/realtime/oe_mode/visible_landmarks.h"
 
 namespace alidade {
+
+struct SeenDirection;
+class ViewProjection;
 
 struct LandmarkSearchOptions {
   LandmarkChoiceOptions choice;

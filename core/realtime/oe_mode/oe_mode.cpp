@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/realtime/oe_mode/view_projection.h"
 #include "core/realtime/pt_mode.h"
 
 namespace alidade {

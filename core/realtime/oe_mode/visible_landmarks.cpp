@@ -5,6 +5,7 @@
 
 #include "core/model/camera.h"
 #include "core/realtime/oe_mode/octaves.h"
+#include "core/realtime/oe_mode/view_projection.h"
 
 namespace alidade {
 

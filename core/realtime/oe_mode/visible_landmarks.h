@@ -6,9 +6,10 @@
 
 #include "core/model/calibration.h"
 #include "core/realtime/oe_mode/landmark_map.h"
-#include "core/realtime/oe_mode/view_projection.h"
 
 namespace alidade {
+
+class ViewProjection;
 
 struct VisibleLandmark {
   int slot;           // of the map

@@ -1,0 +1,26 @@
+#pragma once
+// `alidade calibrate`. Its options bear the names of the command line (command_line.cpp), checked there.
+
+#include <optional>
+#include <string>
+
+namespace alidade {
+
+struct CalibrateOptions {
+  std::string recording;  // its directory
+  std::string directory;  // empty: <recording>/alidade
+  bool json = false;
+  int passes = 2;  // of finding tracks in the video
+  // VALUE or VALUE,SIGMA; "free"; empty: as the estimator has it.
+  std::string focal_length;
+  std::string aspect;
+  std::string radial_distortion;
+  std::string line_delay;
+  std::string clock_offset;
+  std::optional<double> scale_sigma;
+};
+
+// The calibration from a recording. Returns the exit code; throws CommandError.
+[[nodiscard]] int calibrate_recording(const CalibrateOptions& options);
+
+}  // namespace alidade

@@ -1,0 +1,21 @@
+#pragma once
+// `alidade replay`. Its options bear the names of the command line (command_line.cpp), checked there.
+
+#include <string>
+
+namespace alidade {
+
+struct ReplayOptions {
+  std::string recording;
+  std::string directory;    // empty: <recording>/alidade
+  std::string calibration;  // empty: <recording>/alidade/calibration.yaml
+  std::string mode;         // "OE", "PT"; empty: OE if there are pictures
+  bool realtime = false;
+  bool json = false;
+  bool csv = false;
+};
+
+// The real-time modes over a recording. Returns the exit code; throws CommandError.
+[[nodiscard]] int replay_recording(const ReplayOptions& options);
+
+}  // namespace alidade
