@@ -120,7 +120,8 @@ add_custom_target(quick_programs)
 #   NATIVE      those of SOURCES that do not run under an emulated processor (programs are started, pseudo-terminals,
 #               libraries that the sysroot lacks), with NATIVE_SUPPORT and NATIVE_LINK; `NATIVE ALL`: the whole program
 #   THOROUGH    patterns of cases that only `scripts/test all` runs: entry NAME.thorough, with the label thorough
-#   UNSANITIZED patterns of cases from which a sanitizer learns nothing that others do not show it: repetition, long films
+#   UNSANITIZED patterns of cases from which a sanitizer learns nothing that others do not show it: repetition, long films.
+#               Under an emulated processor they are THOROUGH
 #   SHARDS      how many processes share the cases, for a room whose tests mostly wait
 #   COST        seconds, of a room that takes long: ctest starts the dearest first, so that none is left over at the end
 #   DEFINITIONS, DEPENDS, LABELS, TIMEOUT (s), RESOURCE_LOCK
@@ -168,6 +169,8 @@ function(alidade_test name)
   set(left_out)
   if(ALIDADE_SANITIZE)
     set(left_out ${A_UNSANITIZED})
+  elseif(CMAKE_CROSSCOMPILING)
+    list(APPEND A_THOROUGH ${A_UNSANITIZED})
   endif()
   string(REPLACE ";" ":" thorough "${A_THOROUGH}")
   string(REPLACE ";" ":" left_out "${left_out}")

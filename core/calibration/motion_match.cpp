@@ -116,10 +116,10 @@ MotionMatch match_motion(const std::vector<ImageMotion>& motion, const Trajector
     return best_step;
   };
   const int steps = std::max(10, static_cast<int>(half_range_s / 0.02));
-  const int at = search(centre_s, half_range_s, steps);
-  best.at_edge = std::abs(at) == steps;
+  const bool at_edge = std::abs(search(centre_s, half_range_s, steps)) == steps;
   for (double range = half_range_s / steps; range > 1e-4; range /= 5)
     search(best.shift_s, range, 5);
+  best.at_edge = at_edge;
   return best;
 }
 

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <memory>
 #include <unordered_map>
 #include <unordered_set>
 #include <utility>
@@ -15,6 +16,7 @@
 #include "edge_app/commands/command.h"
 #include "edge_app/pipeline/calibration_feed.h"
 #include "edge_app/pipeline/keyframe_map.h"
+#include "edge_app/pipeline/orientation_step.h"
 #include "platform/video/recording_frame_source.h"
 
 namespace alidade {
@@ -93,10 +95,12 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
   OeOptions options;
   options.max_width = input.width;
   options.max_height = input.height;
-  options.search.choice.max_used = kPoints;
-  options.maker.cell_size_px = std::sqrt(static_cast<double>(input.width) * input.height / kPoints);
-  OeMode mode(options);
-  mode.reset(estimate.calibration);
+  options.search.choice.max_chosen = kPoints;
+  options.maker.cell_size_px =
+      std::max(LandmarkMakerOptions::kLeastCellSize_px,
+               std::sqrt(static_cast<double>(input.width) * input.height / kPoints));
+  const std::unique_ptr<OeMode> mode = make_oe_mode(options);
+  mode->reset(estimate.calibration);
   const double to_middle_s = estimate.calibration.line_delay * input.height / 2;
   VideoTracks tracks;
   for_each_picture(
@@ -106,13 +110,13 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
         const InterpolatedPanTilt prediction =
             predict(estimate, time->second + to_middle_s, kFirstSigma_px);
         FrameOrientation orientation;
-        const OeStatus status = mode.process(image, time->second, &prediction, &orientation);
-        for (int i = 0; status == OeStatus::kOk && i < mode.statistics().aligned; ++i) {
-          const OeObservation& seen = mode.observations()[i];
-          if (const auto sigma = track_sigma(seen))
-            tracks.observations.push_back({frame, seen.id, seen.u.x(), seen.u.y(), *sigma});
+        const OeStatus status = mode->process(image, time->second, &prediction, &orientation);
+        for (int i = 0; status == OeStatus::kOk && i < mode->statistics().found; ++i) {
+          const OeObservation& found = mode->observations()[i];
+          if (const auto sigma = track_sigma(found))
+            tracks.observations.push_back({frame, found.id, found.u.x(), found.u.y(), *sigma});
         }
-        mode.maintain();
+        mode->maintain();
       });
   return tracks;
 }

@@ -203,9 +203,9 @@ std::string direction_answer(const OrientationRecord& record, const DirectionQue
     } else {
       if (query.pixel_sigma_px > 0) cov += pixel_noise(frame, u, d_b, query.pixel_sigma_px);
       const Matrix<double, 3, 2> basis = tangent_basis(d_b);
-      const double largest =
-          Eigen::SelfAdjointEigenSolver<Matrix2<double>>(cov, Eigen::EigenvaluesOnly)
-              .eigenvalues()[1];
+      const double largest = Eigen::SelfAdjointEigenSolver<Matrix2<double>>()
+                                 .computeDirect(cov, Eigen::EigenvaluesOnly)
+                                 .eigenvalues()[1];
       item["time_s"] = *record.time_s + u.y() * record.camera.line_delay;
       item["direction"] = as_json(d_b);
       item["azimuth_rad"] = std::atan2(d_b.y(), d_b.x());

@@ -74,15 +74,15 @@ std::string overlay_json(const LivePicture& picture) {
   Json landmarks = Json::array();
   Json points = Json::array();
   for (int i = 0; i < picture.landmarks.count; ++i) {
-    const SeenLandmark& seen = picture.landmarks.seen[static_cast<std::size_t>(i)];
+    const FramePoint& found = picture.landmarks.found[static_cast<std::size_t>(i)];
     if (picture.landmarks.kind == FrameLandmarks::Kind::kPoints) {
-      points.push_back({rounded(seen.u_px), rounded(seen.v_px)});
+      points.push_back({rounded(found.u_px), rounded(found.v_px)});
     } else {
-      landmarks.push_back({{"u", rounded(seen.u_px)},
-                           {"v", rounded(seen.v_px)},
-                           {"du", rounded(seen.du_px)},
-                           {"dv", rounded(seen.dv_px)},
-                           {"used", seen.used}});
+      landmarks.push_back({{"u", rounded(found.u_px)},
+                           {"v", rounded(found.v_px)},
+                           {"du", rounded(found.du_px)},
+                           {"dv", rounded(found.dv_px)},
+                           {"used", found.inlier}});
     }
   }
   const Json object{{"frame", picture.frame},

@@ -10,6 +10,7 @@
 
 #include "core/realtime/image/patch_alignment.h"
 #include "core/realtime/oe_mode/oe_mode.h"
+#include "edge_app/pipeline/frame_landmarks.h"
 #include "platform/video/frame_source.h"
 
 namespace alidade {
@@ -22,8 +23,6 @@ struct TrackedPoint {
 };
 
 struct FrameTracks {
-  static constexpr int kMaxPoints = 256;
-
   // Landmarks of different trackers have nothing in common.
   enum class Tracker : std::uint8_t {
     kNone,     // no picture
@@ -39,15 +38,15 @@ struct FrameTracks {
   OeStatus oe_status = OeStatus::kNoPrediction;  // kOe
   int looked_for = 0;                            // points expected in the picture
   int count = 0;
-  std::array<TrackedPoint, kMaxPoints> points;  // the first `count`
+  std::array<TrackedPoint, kMaxFramePoints> points;  // the first `count`
 };
 static_assert(std::is_trivially_copyable_v<FrameTracks>);
 
 // px, of a component, of an observation that a calibration can use; empty for outliers, and for edges, whose
 // open direction one sigma for both components cannot tell of.
-[[nodiscard]] inline std::optional<double> track_sigma(const OeObservation& seen) {
-  const double trace = seen.covariance.trace();
-  if (!seen.inlier || trace >= kUnobservedVariance) return std::nullopt;
+[[nodiscard]] inline std::optional<double> track_sigma(const OeObservation& found) {
+  const double trace = found.covariance.trace();
+  if (!found.inlier || trace >= kUnobservedVariance) return std::nullopt;
   // What all observations of a landmark have in common, about half, moves the landmark instead.
   return std::sqrt(0.25 * trace);
 }

@@ -16,17 +16,18 @@
 
 namespace alidade {
 
-struct SeenLandmark {
+// Of one frame, that the real-time thread hands on; what is found beyond that is left out.
+inline constexpr int kMaxFramePoints = 256;
+
+struct FramePoint {
   float u_px = 0;
   float v_px = 0;
   float du_px = 0;
   float dv_px = 0;
-  bool used = false;  // false: an outlier
+  bool inlier = false;
 };
 
 struct FrameLandmarks {
-  static constexpr int kMaxSeen = 256;
-
   enum class Kind : std::uint8_t {
     kNone,      // nothing was looked for, or nothing held
     kPoints,    // u and v only
@@ -34,16 +35,16 @@ struct FrameLandmarks {
   };
   Kind kind = Kind::kNone;
   int count = 0;
-  std::array<SeenLandmark, kMaxSeen> seen{};  // the first `count`
+  std::array<FramePoint, kMaxFramePoints> found{};  // the first `count`
 };
 static_assert(std::is_trivially_copyable_v<FrameLandmarks>);
 
 // px, the part of a residual that was observed. An edge's covariance is that of its open direction but for a
 // ten-thousandth: cov / trace projects on that direction.
-[[nodiscard]] inline Vector2<double> observed_residual(const OeObservation& seen) {
-  const double trace = seen.covariance.trace();
-  if (trace < kUnobservedVariance) return seen.residual;
-  return seen.residual - seen.covariance * seen.residual / trace;
+[[nodiscard]] inline Vector2<double> observed_residual(const OeObservation& found) {
+  const double trace = found.covariance.trace();
+  if (trace < kUnobservedVariance) return found.residual;
+  return found.residual - found.covariance * found.residual / trace;
 }
 
 }  // namespace alidade

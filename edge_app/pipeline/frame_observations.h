@@ -12,15 +12,15 @@
 namespace alidade {
 
 // Set points, their count, looked_for and oe_status; the rest stays. More than there is room for are left out.
-void get_tracks(const StartUpTracker& seen, FrameTracks* tracks);
+void get_tracks(const StartUpTracker& tracker, FrameTracks* tracks);
 // Without an answer from landmarks (status not kOk) no points.
-void get_tracks(const OeMode& seen, FrameTracks* tracks);
+void get_tracks(const OeMode& mode, FrameTracks* tracks);
 
-void get_landmarks(const StartUpTracker& seen, FrameLandmarks* landmarks);
+void get_landmarks(const StartUpTracker& tracker, FrameLandmarks* landmarks);
 // Each where the solution expects it, with its residual.
-void get_landmarks(const OeMode& seen, FrameLandmarks* landmarks);
+void get_landmarks(const OeMode& mode, FrameLandmarks* landmarks);
 
 // px, root mean square of the lengths of the residuals that held the result; none where nothing held one.
-[[nodiscard]] std::optional<double> residual_rms(const OeMode& seen);
+[[nodiscard]] std::optional<double> residual_rms(const OeMode& mode);
 
 }  // namespace alidade

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <memory>
 
 #include "core/realtime/oe_mode/oe_mode.h"
 #include "edge_app/pipeline/orientation_step.h"
@@ -101,8 +102,8 @@ MapState map_from_keyframes(const CalibrationResult& result,
   const double acceleration_sigma = kAccelerationSigmaPxPerS2 / camera.focal_length;
   OeOptions options = oe_options(camera);
   options.maker.max_new = options.max_landmarks;  // a view is there once only
-  OeMode mode(options);
-  mode.reset(result.calibration);
+  const std::unique_ptr<OeMode> mode = make_oe_mode(options);
+  mode->reset(result.calibration);
   double tilt = 0;
   std::vector<std::uint8_t> pixels;
   for (const Keyframe& keyframe : keyframes) {
@@ -113,11 +114,11 @@ MapState map_from_keyframes(const CalibrationResult& result,
     const ImageView picture =
         keyframe.picture == nullptr ? ImageView{} : keyframe.picture->unpack(&pixels);
     // Whatever the status: maintain() knows what to do with such a frame.
-    static_cast<void>(mode.process(picture, keyframe.time_s, &prediction, &orientation));
-    mode.maintain();
+    static_cast<void>(mode->process(picture, keyframe.time_s, &prediction, &orientation));
+    mode->maintain();
     tilt += result.trajectory.position(middle_s).tilt / static_cast<double>(keyframes.size());
   }
-  MapState map = mode.map_state();
+  MapState map = mode->map_state();
   map.offset_covariance += tie_covariance(result);
   map.shear_tilt = tilt;
   const double rate_sigma = kRatePerAngle * kSigma_px / camera.focal_length;

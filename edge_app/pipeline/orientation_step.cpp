@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <stdexcept>
+#include <string>
 
 #include "edge_app/pipeline/frame_observations.h"
 
@@ -13,8 +15,16 @@ OeOptions oe_options(const Camera<double>& camera) {
   OeOptions options;
   options.max_width = camera.width;
   options.max_height = camera.height;
-  options.maker.cell_size_px = std::min(options.maker.cell_size_px, camera.width / kLeastColumns);
+  options.maker.cell_size_px =
+      std::max(LandmarkMakerOptions::kLeastCellSize_px,
+               std::min(options.maker.cell_size_px, camera.width / kLeastColumns));
   return options;
+}
+
+std::unique_ptr<OeMode> make_oe_mode(const OeOptions& options) {
+  const char* error = nullptr;
+  if (!options.validate(&error)) throw std::invalid_argument(std::string("OE mode: ") + error);
+  return std::make_unique<OeMode>(options);
 }
 
 OrientationStep::OrientationStep(const OrientationStepOptions& options)
@@ -26,13 +36,13 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
   OeOptions oe = *options.oe;
   oe.max_width = options.calibration.camera.width;
   oe.max_height = options.calibration.camera.height;
-  oe_ = std::make_unique<OeMode>(oe);
+  oe_ = make_oe_mode(oe);
   oe_->reset(options.calibration, options.map);
   if (!options.follow_points) return;
   StartUpOptions start_up;
   start_up.width = oe.max_width;
   start_up.height = oe.max_height;
-  start_up.max_points = FrameTracks::kMaxPoints;
+  start_up.max_points = kMaxFramePoints;
   start_up_ = std::make_unique<StartUpTracker>(start_up);
 }
 

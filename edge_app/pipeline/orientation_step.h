@@ -60,8 +60,11 @@ struct OrientationStepOptions {
       5e-3;  // by how much a new connection's least delay differs, one standard deviation
 };
 
-// OE mode for a camera's pictures: small ones have as many landmarks as large ones, closer together.
+// OE mode for a camera's pictures: small ones have as many landmarks as large ones, closer together. Valid for
+// every size.
 [[nodiscard]] OeOptions oe_options(const Camera<double>& camera);
+// Throws std::invalid_argument, whose one line names the option, if one is not valid.
+[[nodiscard]] std::unique_ptr<OeMode> make_oe_mode(const OeOptions& options);
 
 // What a frame brought to light, for the log.
 struct StepEvents {
@@ -71,6 +74,7 @@ struct StepEvents {
 
 class OrientationStep {
  public:
+  // Throws as make_oe_mode() does.
   explicit OrientationStep(const OrientationStepOptions& options);
 
   void add_telemetry(const PanTiltSample& sample);

@@ -172,7 +172,7 @@ const char* flaw_of(const Landmark& landmark) {
   if (!std::isnormal(landmark.J_pixel_tangent.determinant())) {
     return "has a picture of no extent";
   }
-  if (statistics.matched > statistics.seen) return "was found more often than looked for";
+  if (statistics.matched > statistics.looked_for) return "was found more often than looked for";
   if (statistics.residual_square < 0) return "has a negative square";
   return "";
 }
@@ -214,7 +214,7 @@ void write(const Landmark& landmark, Writer* out) {
     const char byte = static_cast<char>(pixel);
     out->text(&byte, 1);
   }
-  out->u32(landmark.statistics.seen);
+  out->u32(landmark.statistics.looked_for);
   out->u32(landmark.statistics.matched);
   out->f32(landmark.statistics.residual_square);
 }
@@ -228,7 +228,7 @@ void read(Cursor* in, Landmark* landmark) {
   in->sensitivity(&landmark->sensitivity);
   for (int i = 0; i < 4; ++i) landmark->J_pixel_tangent(i / 2, i % 2) = in->f64();
   for (std::uint8_t& pixel : landmark->pixels) pixel = in->u8();
-  landmark->statistics.seen = in->u32();
+  landmark->statistics.looked_for = in->u32();
   landmark->statistics.matched = in->u32();
   landmark->statistics.residual_square = in->f32();
 }

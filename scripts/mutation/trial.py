@@ -1,6 +1,5 @@
 """Runs test programs with one mutant switched on, and tells whether they notice."""
 import dataclasses
-import fnmatch
 import hashlib
 import json
 import os
@@ -12,6 +11,7 @@ import tempfile
 import time
 
 from .instrument import VARIABLE
+from .suites import takes
 
 SLOWDOWN = 5  # times its normal time: a test that takes longer hangs
 GRACE_S = 20  # and this besides: other programs run on this machine
@@ -179,10 +179,7 @@ class Baseline:
 
     def cases(self, program, wanted):
         """Names of the program's tests that a filter of gtest's form takes."""
-        take, _, leave = wanted.partition("-")
-        return [name for name in self.kept[program]["seconds"]
-                if any(fnmatch.fnmatchcase(name, one) for one in (take or "*").split(":"))
-                and not (leave and any(fnmatch.fnmatchcase(name, one) for one in leave.split(":")))]
+        return [name for name in self.kept[program]["seconds"] if takes(wanted, name)]
 
     def seconds(self, program, cases):
         return sum(self.kept[program]["seconds"][name] for name in cases)

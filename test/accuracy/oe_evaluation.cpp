@@ -118,7 +118,7 @@ bool compare(const FrameOrientation& estimate, const FrameTruth& truth, double f
 class LandmarkTruth {
  public:
   void add(const RenderedRecording& recording, int frame, const OeMode& oe) {
-    for (int i = 0; i < oe.statistics().aligned; ++i) {
+    for (int i = 0; i < oe.statistics().found; ++i) {
       const OeObservation& observation = oe.observations()[i];
       Octave& octave = octaves_.at(static_cast<std::size_t>(observation.octave));
       ++octave.observations;

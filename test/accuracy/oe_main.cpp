@@ -27,8 +27,9 @@ int main(int argc, char** argv) {
       ->check(CLI::PositiveNumber);
   app.add_option("--seconds", options.size.duration_s, "of a recording")
       ->check(CLI::Range(2.0, 60.0));
-  app.add_option("--max-used", options.oe.search.choice.max_used, "landmarks aligned in a frame")
-      ->check(CLI::Range(1, alidade::LandmarkChoiceOptions::kMaxUsed));
+  app.add_option("--max-chosen", options.oe.search.choice.max_chosen,
+                 "landmarks looked for in a frame")
+      ->check(CLI::Range(1, alidade::LandmarkChoiceOptions::kMaxChosen));
   app.add_option("--telemetry-sigma", options.telemetry_sigma_px, "px of a picture 1920 wide")
       ->check(CLI::PositiveNumber);
   app.add_flag("--small", small, "480x270 pictures, in place of 1920x1080 (960x540: robustness)");

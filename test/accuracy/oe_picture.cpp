@@ -22,7 +22,7 @@ cv::Point fixed_point(const Eigen::Vector2d& u) {
 cv::Mat draw_landmarks(const cv::Mat& image, const OeMode& oe) {
   cv::Mat picture;
   cv::cvtColor(image, picture, cv::COLOR_GRAY2BGR);
-  for (int i = 0; i < oe.statistics().aligned; ++i) {
+  for (int i = 0; i < oe.statistics().found; ++i) {
     const OeObservation& observation = oe.observations()[i];
     const cv::Scalar colour = observation.inlier ? cv::Scalar(0, 220, 0) : cv::Scalar(0, 0, 255);
     const int radius = (kPatchSize / 2) << observation.octave;

@@ -228,7 +228,7 @@ nlohmann::json run(const Scenario& scenario) {
                         {"offline_sd_ms", offline.sd() * 1e3},
                         {"offline_anees", offline.normalised / offline.n},
                         {"restarts", filter.counters().restarts},
-                        {"floor_shifts", filter.counters().delay_steps}};
+                        {"delay_steps", filter.counters().delay_steps}};
   for (std::size_t age = 0; age < kAges.size(); ++age) {
     row["young"].push_back({{"age_s", kAges[age]},
                             {"rms_ms", young[age].rms() * 1e3},
@@ -289,7 +289,7 @@ int main(int argc, char** argv) {
   nlohmann::json report;
   std::printf(
       "| stream | raw sd ms | bias ms | sd ms | max ms | ANEES | offline sd ms | ANEES "
-      "| restarts | floor shifts | rms ms after 1 s | 2 s | 5 s | 10 s |\n"
+      "| restarts | delay steps | rms ms after 1 s | 2 s | 5 s | 10 s |\n"
       "|---|---|---|---|---|---|---|---|---|---|---|---|---|---|\n");
   for (const Scenario& scenario : scenarios()) {
     const nlohmann::json row = run(scenario);
@@ -297,7 +297,7 @@ int main(int argc, char** argv) {
                 scenario.name.c_str(), row["raw_sd_ms"].get<double>(), row["bias_ms"].get<double>(),
                 row["sd_ms"].get<double>(), row["max_ms"].get<double>(), row["anees"].get<double>(),
                 row["offline_sd_ms"].get<double>(), row["offline_anees"].get<double>(),
-                row["restarts"].get<int>(), row["floor_shifts"].get<int>());
+                row["restarts"].get<int>(), row["delay_steps"].get<int>());
     for (const nlohmann::json& young : row["young"]) {
       std::printf(" %.3f |", young["rms_ms"].get<double>());
     }

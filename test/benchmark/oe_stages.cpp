@@ -12,7 +12,7 @@ OeOptions measured_options(const Camera<double>& camera, int points) {
   OeOptions options;
   options.max_width = camera.width;
   options.max_height = camera.height;
-  options.search.choice.max_used = points;
+  options.search.choice.max_chosen = points;
   options.maker.cell_size_px = std::sqrt(camera.width * camera.height / (2.5 * points));
   return options;
 }

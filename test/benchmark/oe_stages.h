@@ -1,6 +1,6 @@
 #pragma once
 // OeStages: OeMode::process() one stage after the other, by the same classes, on the map that an OeMode has
-// made: the same landmarks are seen, chosen, aligned and solved for. Each stage is run once, where process()
+// made: the same landmarks are visible, chosen, found and solved for. Each stage is run once, where process()
 // finds the visible landmarks before and after coarse alignment, and may look twice: the stages' sum is a
 // little less than the whole.
 //
@@ -20,7 +20,7 @@
 
 namespace alidade::benchmarks {
 
-// OE mode for images of a size with so many landmarks used: the map has some more than are used.
+// OE mode for images of a size with so many landmarks chosen: the map has some more than that in view.
 [[nodiscard]] OeOptions measured_options(const Camera<double>& camera, int points);
 
 class OeStages {

@@ -76,7 +76,7 @@ MapContent some_content(int points, int landmarks) {
     }
     landmark.J_pixel_tangent << 4000 + random.normal(), random.normal(), random.normal(), 4000;
     for (std::uint8_t& pixel : landmark.pixels) pixel = static_cast<std::uint8_t>(random.byte());
-    landmark.statistics.seen = 10 + static_cast<std::uint32_t>(i);
+    landmark.statistics.looked_for = 10 + static_cast<std::uint32_t>(i);
     landmark.statistics.matched = 10;
     landmark.statistics.residual_square = 1.1F;
     map.landmarks.push_back(landmark);
@@ -131,7 +131,7 @@ TEST(MapFile, ReadsBackTheSameBits) {
     EXPECT_EQ(is.sensitivity, was.sensitivity);
     EXPECT_EQ(is.J_pixel_tangent, was.J_pixel_tangent);
     EXPECT_EQ(is.pixels, was.pixels);
-    EXPECT_EQ(is.statistics.seen, was.statistics.seen);
+    EXPECT_EQ(is.statistics.looked_for, was.statistics.looked_for);
     EXPECT_EQ(is.statistics.matched, was.statistics.matched);
     EXPECT_EQ(is.statistics.residual_square, was.statistics.residual_square);
   }

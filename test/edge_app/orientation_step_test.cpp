@@ -10,6 +10,7 @@
 #include <cstdint>
 #include <limits>
 #include <random>
+#include <stdexcept>
 #include <vector>
 
 #include "test/support/allocation_guard.h"
@@ -635,12 +636,12 @@ TEST_F(OeStepTest, ShowsLandmarksWithTheResidualsThatTheRecordSumsUp) {
   double sum = 0;
   int used = 0;
   for (int i = 0; i < landmarks.count; ++i) {
-    const SeenLandmark& seen = landmarks.seen[static_cast<std::size_t>(i)];
-    EXPECT_TRUE(seen.u_px > 0 && seen.u_px < Scene::kWidth && seen.v_px > 0 &&
-                seen.v_px < Scene::kHeight);
-    if (!seen.used) continue;
+    const FramePoint& found = landmarks.found[static_cast<std::size_t>(i)];
+    EXPECT_TRUE(found.u_px > 0 && found.u_px < Scene::kWidth && found.v_px > 0 &&
+                found.v_px < Scene::kHeight);
+    if (!found.inlier) continue;
     ++used;
-    sum += double{seen.du_px} * seen.du_px + double{seen.dv_px} * seen.dv_px;
+    sum += double{found.du_px} * found.du_px + double{found.dv_px} * found.dv_px;
   }
   EXPECT_EQ(used, record.landmarks);
   EXPECT_NEAR(*record.residual_px, std::sqrt(sum / used), 1e-4);  // the picture shows floats
@@ -673,7 +674,7 @@ TEST_F(OeStepTest, ShowsLandmarksWhereTheyAreExpectedAndResidualsFromThere) {
     const TrackedPoint& found = tracks.points[static_cast<std::size_t>(i)];
     double nearest = std::numeric_limits<double>::infinity();
     for (int j = 0; j < landmarks.count; ++j) {
-      const SeenLandmark& seen = landmarks.seen[static_cast<std::size_t>(j)];
+      const FramePoint& seen = landmarks.found[static_cast<std::size_t>(j)];
       const double distance =
           std::hypot(seen.u_px + seen.du_px - found.u_px, seen.v_px + seen.dv_px - found.v_px);
       if (distance >= nearest) continue;
@@ -701,12 +702,37 @@ TEST_F(OeStepTest, ShowsNoLandmarksWhereTheyDidNotHold) {
 TEST(FrameLandmarks, TheResidualOnAnEdgeIsTheOneAcrossIt) {
   const Vector2<double> along = Vector2<double>(3, 4) / 5;
   const Vector2<double> across(-along.y(), along.x());
-  OeObservation seen;
-  seen.residual = 0.2 * across + 3 * along;
-  seen.covariance = 1e-3 * across * across.transpose();
-  EXPECT_EQ(observed_residual(seen), seen.residual);
-  seen.covariance += kUnobservedVariance * along * along.transpose();
-  EXPECT_LT((observed_residual(seen) - 0.2 * across).norm(), 1e-4);
+  OeObservation found;
+  found.residual = 0.2 * across + 3 * along;
+  found.covariance = 1e-3 * across * across.transpose();
+  EXPECT_EQ(observed_residual(found), found.residual);
+  found.covariance += kUnobservedVariance * along * along.transpose();
+  EXPECT_LT((observed_residual(found) - 0.2 * across).norm(), 1e-4);
+}
+
+TEST(OrientationStep, RefusesOptionsOfOeModeThatAreNotValid) {
+  OrientationStepOptions options;
+  options.calibration.camera = {2000, 1, 0, 640, 480};
+  options.oe = oe_options(options.calibration.camera);
+  EXPECT_NO_THROW(OrientationStep{options});
+  options.oe->search.choice.max_chosen = 0;
+  try {
+    const OrientationStep step(options);
+    ADD_FAILURE() << "a step that may look for no landmark";
+  } catch (const std::invalid_argument& error) {
+    EXPECT_STREQ(error.what(), "OE mode: max_chosen must be 1 to 1024");
+  }
+}
+
+TEST(OrientationStep, HasValidOptionsOfOeModeForImagesOfEverySize) {
+  for (int width = 1; width < 10000; width = width * 3 / 2 + 1) {
+    const OeOptions options = oe_options({2000, 1, 0, width, (width + 1) / 2});
+    const char* error = "";
+    EXPECT_TRUE(options.validate(&error)) << width << ": " << error;
+    EXPECT_EQ(options.max_width, width);
+  }
+  EXPECT_EQ(oe_options({2000, 1, 0, 1920, 1080}).maker.cell_size_px, 80);
+  EXPECT_EQ(oe_options({2000, 1, 0, 960, 540}).maker.cell_size_px, 40);
 }
 
 TEST_F(OeStepTest, WithoutACalibrationItFollowsPointsAndAnswersFromTelemetry) {
@@ -731,7 +757,7 @@ TEST_F(OeStepTest, WithoutACalibrationItFollowsPointsAndAnswersFromTelemetry) {
   step.get_landmarks(&landmarks);
   EXPECT_EQ(landmarks.kind, FrameLandmarks::Kind::kPoints);
   EXPECT_EQ(landmarks.count, tracks.count);
-  EXPECT_EQ(landmarks.seen[0].u_px, tracks.points[0].u_px);
+  EXPECT_EQ(landmarks.found[0].u_px, tracks.points[0].u_px);
 }
 
 // d was found with the least delay of one connection; another one's may differ by milliseconds.

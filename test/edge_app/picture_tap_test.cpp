@@ -27,7 +27,7 @@ class PictureTapTest : public ::testing::Test {
     tapped.slot = static_cast<PictureSlot>(number % kPictureSlots);
     tapped.landmarks.kind = FrameLandmarks::Kind::kLandmarks;
     tapped.landmarks.count = 1;
-    tapped.landmarks.seen[0] = {100, 200, 0.5F, -0.25F, true};
+    tapped.landmarks.found[0] = {100, 200, 0.5F, -0.25F, true};
     return tapped;
   }
   // What the real-time thread does; without waiting for anybody.
@@ -72,7 +72,7 @@ TEST_F(PictureTapTest, GivesTheNextFrameSmallWithItsLandmarksAndTheSlotBack) {
   EXPECT_EQ(picture->height, 540);
   EXPECT_EQ(picture->jpeg.substr(0, 2), "\xff\xd8");
   EXPECT_EQ(picture->landmarks.count, 1);
-  EXPECT_EQ(picture->landmarks.seen[0].du_px, 0.5F);
+  EXPECT_EQ(picture->landmarks.found[0].du_px, 0.5F);
   PictureSlot slot = kNoPicture;
   ASSERT_TRUE(tap.pop_returned(slot));
   EXPECT_EQ(slot, 7);

@@ -125,7 +125,7 @@ std::vector<Published> feed(SelfCalibration* calibration, const test::Simulation
     tracks.oe_status =
         frame.stamp_s >= how.contradicting_from_s ? OeStatus::kContradiction : OeStatus::kOk;
     for (const TrackedPoint& point : points[frame.frame]) {
-      if (tracks.count == FrameTracks::kMaxPoints) break;
+      if (tracks.count == kMaxFramePoints) break;
       tracks.points[static_cast<std::size_t>(tracks.count++)] = point;
     }
     tracks.looked_for = tracks.count;

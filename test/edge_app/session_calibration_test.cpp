@@ -53,7 +53,7 @@ CalibrationSession session_of(const test::Simulation& s, double held_out_factor)
     tracks.stamp.sequence = frame.sequence;
     const bool held_out = CalibrationSession::is_held_out(place++);
     for (TrackedPoint point : points[frame.frame]) {
-      if (tracks.count == FrameTracks::kMaxPoints) break;
+      if (tracks.count == kMaxFramePoints) break;
       if (held_out) point.sigma_px *= static_cast<float>(held_out_factor);
       tracks.points[static_cast<std::size_t>(tracks.count++)] = point;
     }

@@ -23,8 +23,8 @@ TappedFrame tapped_frame(const std::vector<std::uint8_t>& luma, FrameLandmarks::
   tapped.slot = 3;
   tapped.landmarks.kind = kind;
   tapped.landmarks.count = 2;
-  tapped.landmarks.seen[0] = {100.12345F, 200, 0.0625F, -0.25F, true};
-  tapped.landmarks.seen[1] = {1000, 700.5F, 3, 4, false};
+  tapped.landmarks.found[0] = {100.12345F, 200, 0.0625F, -0.25F, true};
+  tapped.landmarks.found[1] = {1000, 700.5F, 3, 4, false};
   return tapped;
 }
 

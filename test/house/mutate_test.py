@@ -12,7 +12,7 @@ import unittest
 TOP = pathlib.Path(__file__).resolve().parents[2]
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(TOP / "scripts"))
-from mutation import catalogue, instrument  # noqa: E402: the path is set above
+from mutation import catalogue, instrument, suites  # noqa: E402: the path is set above
 
 CMAKE = """
 cmake_minimum_required(VERSION 3.18)
@@ -107,6 +107,11 @@ class PlantedMutants(unittest.TestCase):
         self.assertEqual(code, 0, output + errors)
         self.assertIn("2 mutants: 1 killed (50 %), 1 survived (1 of them explained)", output)
 
+        code, output, errors = project.mutate("--list", "--only", "shape.h")
+        self.assertEqual(len(output.splitlines()), 8, output + errors)
+        code, output, errors = project.mutate("--list", "--only", "form.h")
+        self.assertIn("form.h: neither a mutant nor a list nor a file", errors)
+
         # One that dies though the list says why it lives is a mistake, too.
         code, output, errors = project.mutate("--only", "explained-away")
         self.assertEqual(code, 1, output + errors)
@@ -146,9 +151,62 @@ class Lists(unittest.TestCase):
                                (("shape.h:", "form.h:"), "code has 0 files form.h")):
             self.assertIn(said, self.error_of(replaced))
 
+    def test_name_a_filter_that_takes_no_test(self):
+        self.assertIn("planted.yaml: filter Surface.* takes no test of planted_test (killed, left-out, hangs",
+                      self.error_of(("filter: Area.*", "filter: Area.*:Surface.*")))
+        self.assertIn("planted_tests: no CMakeLists.txt has such a program",
+                      self.error_of(("tests: [planted_test]", "tests: [planted_tests]")))
+
     def test_of_this_tree_fit_its_code(self):
         done = subprocess.run([sys.executable, TOP / "scripts/mutate", "--check"], capture_output=True, text=True, check=False)
         self.assertEqual(done.returncode, 0, done.stderr)
+
+
+class Sources(unittest.TestCase):
+    """Of tests: what gtest will call them."""
+
+    def test_of_a_program_are_those_of_its_command(self):
+        with tempfile.TemporaryDirectory() as folder:
+            top = pathlib.Path(folder)
+            (top / "room").mkdir()
+            (top / "room/CMakeLists.txt").write_text("""
+set(sources a_test.cpp b_test.cpp)  # of one
+if(MORE)
+  list(APPEND sources c_test.cpp)
+endif()
+alidade_test(one_test SOURCES ${sources} ${unknown}
+  SUPPORT ${PROJECT_SOURCE_DIR}/support.cpp
+  DEFINITIONS FILE="$<TARGET_FILE:other>")
+set(sources d_test.cpp)
+alidade_test(other_test SOURCES ${sources} missing_test.cpp)
+""")
+            for name in "abcd":
+                (top / f"room/{name}_test.cpp").write_text(f'#include "test/shared.h"\nTEST({name.upper()}, Works) {{}}\n')
+            (top / "test").mkdir()
+            (top / "test/shared.h").write_text("TEST(Shared, Works) {}\n")
+            found = suites.Suites(top, ["room/CMakeLists.txt", "README.md"])
+            self.assertEqual(found.tests("one_test"), ["A.Works", "B.Works", "C.Works", "Shared.Works"])
+            self.assertEqual(found.tests("other_test"), ["D.Works", "Shared.Works"])
+            with self.assertRaises(catalogue.ListError):
+                found.tests("third_test")
+
+    def test_with_parameters_and_types_have_long_names(self):
+        text = """
+TEST_F(Plain, Works) {
+TEST_P(Each,
+       Works) {
+INSTANTIATE_TEST_SUITE_P(
+    Some, Each, testing::Values(1));
+INSTANTIATE_TEST_SUITE_P(More, Each, testing::Values(2));
+TYPED_TEST(Typed, Works) {
+TEST_P(Forgotten, Works) {
+// TEST(Comment, IsNone)
+"""
+        names = list(suites.tests_in(text))
+        self.assertEqual(names, ["Plain.Works", "Some/Each.Works/0", "More/Each.Works/0", "Typed/0.Works"])
+        for wanted, taken in (("*", names), ("Each.*", []), ("*/Each.*", names[1:3]), ("Typed/*", names[3:]),
+                              ("Plain.*:More/*", [names[0], names[2]]), ("*-*/*", names[:1]), ("-Plain.*", names[1:])):
+            self.assertEqual([name for name in names if suites.takes(wanted, name)], taken, wanted)
 
 
 class Instrument(unittest.TestCase):

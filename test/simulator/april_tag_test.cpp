@@ -140,8 +140,10 @@ Line line_through(const std::vector<Vector2d>& points) {
   for (const Vector2d& point : points) mean += point / static_cast<double>(points.size());
   Eigen::Matrix2d scatter = Eigen::Matrix2d::Zero();
   for (const Vector2d& point : points) scatter += (point - mean) * (point - mean).transpose();
-  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(scatter);
-  return {mean, solver.eigenvectors().col(1)};
+  return {
+      mean,
+      Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d>().computeDirect(scatter).eigenvectors().col(
+          1)};
 }
 
 Vector2d crossing(const Line& a, const Line& b) {

@@ -8,8 +8,6 @@
 namespace alidade {
 namespace {
 
-constexpr int kMaxPatches = 256;  // of one octave; more are not looked at
-
 struct Group {
   const CoarsePatch* patches;
   int count;
@@ -77,7 +75,7 @@ bool common_step(const Group& group, const CoarseOptions& options, Vector2<doubl
     Matrix2<double> information;
     Matrix2<double> J;
   };
-  std::array<Term, kMaxPatches> terms;
+  std::array<Term, kMaxCoarsePatches> terms;
   int count = 0;
   for (int i = 0; i < group.count; ++i) {
     PatchStep step;
@@ -130,8 +128,8 @@ bool align_coarsely(const Pyramid& pyramid, const CoarsePatch* patches, int coun
     const int octave = patches[begin].octave;
     int end = begin;
     while (end < count && patches[end].octave == octave) ++end;
-    const Group group{patches + begin, std::min(end - begin, kMaxPatches), pyramid.octave(octave),
-                      std::ldexp(1.0, -octave)};
+    const Group group{patches + begin, std::min(end - begin, kMaxCoarsePatches),
+                      pyramid.octave(octave), std::ldexp(1.0, -octave)};
     begin = end;
     if (group.count < options.min_patches) continue;
     if (!searched) out->angle = search(group, options.search_px);

@@ -15,6 +15,9 @@
 
 namespace alidade {
 
+// Of one octave; more are not looked at.
+inline constexpr int kMaxCoarsePatches = 256;
+
 struct CoarsePatch {
   const ReferencePatch* reference = nullptr;
   int octave = 0;           // < Pyramid::octaves()

@@ -10,10 +10,11 @@
 
 namespace alidade {
 
-// How often it was looked for and found.
+// How it has served, over all frames that held: fine ones were looked for when they were chosen, and matched when
+// they were inliers (landmark_search.h); coarse ones when they were compared, and looked alike.
 struct LandmarkStatistics {
-  std::uint32_t seen = 0;     // frames in which it was looked for
-  std::uint32_t matched = 0;  // frames in which it was found and agreed with the others
+  std::uint32_t looked_for = 0;  // frames
+  std::uint32_t matched = 0;     // of these
   std::uint16_t missed_in_a_row = 0;
   std::uint32_t last_frame = 0;  // count of frames when it was last looked for
   // Mean square of the normalised residual when matched, running: 1 if its covariances are right.

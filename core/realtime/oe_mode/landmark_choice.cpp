@@ -7,43 +7,41 @@ namespace alidade {
 namespace {
 
 constexpr int kNone = -1;
-constexpr int kMaxParts = 96;  // in each direction
 // From one part to the next: a prime above kMaxParts, so that it divides no number of parts and all are met.
 constexpr std::size_t kStride = 97;
+static_assert(kStride > LandmarkChoiceOptions::kMaxParts);
 
 double reliability(const VisibleLandmark& visible, const LandmarkMap& map) {
   const LandmarkStatistics& s = map.at(visible.slot).statistics;
-  return std::ldexp((s.matched + 1.0) / (s.seen + 2.0), -visible.octave);
+  return std::ldexp((s.matched + 1.0) / (s.looked_for + 2.0), -visible.octave);
 }
 
 }  // namespace
 
 bool LandmarkChoiceOptions::validate(const char** error) const {
+  static_assert(kMaxChosen == 1024 && kMaxParts == 96, "as the messages say");
   const char* problem = nullptr;
   if (rows < 1 || rows > kMaxParts) problem = "rows must be 1 to 96";
   if (columns < 1 || columns > kMaxParts) problem = "columns must be 1 to 96";
-  if (max_used < 1 || max_used > kMaxUsed) problem = "max_used must be 1 to 1024";
+  if (max_chosen < 1 || max_chosen > kMaxChosen) problem = "max_chosen must be 1 to 1024";
   if (error != nullptr && problem != nullptr) *error = problem;
   return problem == nullptr;
 }
 
 LandmarkChoice::LandmarkChoice(const LandmarkChoiceOptions& options, int max_visible)
     : options_(options) {
-  options_.max_used = std::clamp(options.max_used, 1, LandmarkChoiceOptions::kMaxUsed);
-  options_.columns = std::clamp(options.columns, 1, kMaxParts);
-  options_.rows = std::clamp(options.rows, 1, kMaxParts);
-  chosen_.reserve(static_cast<std::size_t>(options_.max_used));
+  chosen_.reserve(static_cast<std::size_t>(options_.max_chosen));
   best_.resize(static_cast<std::size_t>(options_.columns * options_.rows));
   taken_.resize(static_cast<std::size_t>(max_visible));
 }
 
 void LandmarkChoice::clear() {
   chosen_.clear();
-  candidates_ = 0;
+  fine_visible_ = 0;
 }
 
 void LandmarkChoice::take(const std::vector<VisibleLandmark>& visible, std::size_t i) {
-  if (taken_[i] != 0 || static_cast<int>(chosen_.size()) == options_.max_used) return;
+  if (taken_[i] != 0 || static_cast<int>(chosen_.size()) == options_.max_chosen) return;
   chosen_.push_back(visible[i]);
   taken_[i] = 1;
 }
@@ -53,8 +51,8 @@ const std::vector<VisibleLandmark>& LandmarkChoice::choose(
     const Camera<double>& camera) {
   clear();
   std::fill_n(taken_.begin(), visible.size(), std::uint8_t{0});
-  for (const VisibleLandmark& v : visible) candidates_ += octaves.is_coarse(v.octave) ? 0 : 1;
-  if (candidates_ > options_.max_used) {
+  for (const VisibleLandmark& v : visible) fine_visible_ += octaves.is_coarse(v.octave) ? 0 : 1;
+  if (fine_visible_ > options_.max_chosen) {
     std::fill(best_.begin(), best_.end(), kNone);
     for (std::size_t i = 0; i < visible.size(); ++i) {
       const VisibleLandmark& candidate = visible[i];

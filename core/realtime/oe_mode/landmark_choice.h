@@ -1,12 +1,12 @@
 #pragma once
-// LandmarkChoice: which of the visible fine landmarks are aligned in a frame. This is the one place that
-// decides it: to choose otherwise, change choose().
+// LandmarkChoice: which of the visible fine landmarks are looked for in a frame. This is the one place that
+// decides it: to choose otherwise, change choose(). README.md of this folder says what such a change touches.
 //
-// Up to max_used visible fine landmarks: all of them, in their order; the choice begins where there are more (with the
-// defaults, from images of 1280x720 on). Then the image is
-// divided into columns x rows parts, of each part the most reliable landmark comes first, parts in strides, so
-// that a small max_used is spread over the image too; what room is left goes to the others in their order.
-// Reliable is what was found when it was looked for (rule of succession), halved for each octave further up,
+// Up to max_chosen visible fine landmarks: all of them, in their order; preferences begin where there are more (with
+// the defaults, from images of 1280x720 on). Then the image is divided into columns x rows parts, of each part the
+// most reliable landmark comes first, parts in strides, so that a small max_chosen is spread over the image too;
+// what room is left goes to the others in their order.
+// Reliable is what matched when it was looked for (rule of succession), halved for each octave further up,
 // which sees half as sharply.
 // Memory is taken by the constructor; nothing else allocates. One thread.
 
@@ -15,15 +15,18 @@
 
 #include "core/model/camera.h"
 #include "core/realtime/oe_mode/octaves.h"
+#include "core/realtime/oe_mode/orientation_solve.h"
 #include "core/realtime/oe_mode/visible_landmarks.h"
 
 namespace alidade {
 
 struct LandmarkChoiceOptions {
-  static constexpr int kMaxUsed = 1024;  // as many as the solution has room for
+  static constexpr int kMaxChosen = kMaxFoundLandmarks;  // as the solution has room for
+  static constexpr int kMaxParts = 96;                   // in each direction
 
-  int max_used = 200;  // landmarks, 1 to kMaxUsed
-  // Parts of the image. Where more of them than max_used have a landmark, the last of the strides get none.
+  int max_chosen = 200;  // landmarks, 1 to kMaxChosen
+  // Parts of the image, 1 to kMaxParts. Where more of them than max_chosen have a landmark, the last of the strides
+  // get none.
   int columns = 20;
   int rows = 12;
 
@@ -33,7 +36,7 @@ struct LandmarkChoiceOptions {
 
 class LandmarkChoice {
  public:
-  // max_visible: of visible landmarks. Options that are not valid are replaced by the nearest that are.
+  // options: valid. max_visible: of visible landmarks.
   LandmarkChoice(const LandmarkChoiceOptions& options, int max_visible);
 
   // Valid until the next call; visible is not changed.
@@ -44,7 +47,7 @@ class LandmarkChoice {
   [[nodiscard]] const std::vector<VisibleLandmark>& chosen() const { return chosen_; }
   void clear();
   // How many visible fine landmarks choose() had the choice of.
-  [[nodiscard]] int candidates() const { return candidates_; }
+  [[nodiscard]] int fine_visible() const { return fine_visible_; }
 
   [[nodiscard]] const LandmarkChoiceOptions& options() const { return options_; }
   [[nodiscard]] std::size_t memory_bytes() const;
@@ -53,7 +56,7 @@ class LandmarkChoice {
   void take(const std::vector<VisibleLandmark>& visible, std::size_t i);
 
   LandmarkChoiceOptions options_;
-  int candidates_ = 0;
+  int fine_visible_ = 0;
   std::vector<VisibleLandmark> chosen_;
   std::vector<int> best_;            // index of visible, by part of the image; kNone
   std::vector<std::uint8_t> taken_;  // by index of visible

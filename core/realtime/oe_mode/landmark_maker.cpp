@@ -11,7 +11,6 @@
 namespace alidade {
 namespace {
 
-constexpr double kLeastCell_px = 16;
 constexpr int kLeastCornerCell_px = 8;  // of FastGrid
 constexpr int kCornerBorder_px = 3;     // where FastGrid finds nothing
 constexpr int kNoLimit = std::numeric_limits<int>::max();
@@ -34,7 +33,8 @@ bool LandmarkMakerOptions::validate(const char** error) const {
   if (empty_view < 0) problem = "empty_view must not be negative";
   if (max_new < 0) problem = "max_new must not be negative";
   if (!(largest_cells >= 1)) problem = "largest_cells must be at least 1";
-  if (!(cell_size_px >= kLeastCell_px)) problem = "cell_size_px must be at least 16";
+  static_assert(kLeastCellSize_px == 16, "as the message says");
+  if (!(cell_size_px >= kLeastCellSize_px)) problem = "cell_size_px must be at least 16";
   if (error != nullptr && problem != nullptr) *error = problem;
   return problem == nullptr;
 }
@@ -42,7 +42,6 @@ bool LandmarkMakerOptions::validate(const char** error) const {
 LandmarkMaker::LandmarkMaker(const LandmarkMakerOptions& options, const OctaveOptions& octaves,
                              int max_width, int max_height)
     : options_(options) {
-  options_.cell_size_px = std::max(options.cell_size_px, kLeastCell_px);
   cell_taken_.resize(static_cast<std::size_t>(cells(max_width, 0) * cells(max_height, 0)));
   int most_corners = 0;
   for (int octave = 0; octave < Pyramid::kMaxOctaves; ++octave) {

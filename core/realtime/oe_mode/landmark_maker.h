@@ -22,7 +22,9 @@
 namespace alidade {
 
 struct LandmarkMakerOptions {
-  double cell_size_px = 80;  // of octave 0 at the image's centre, >= 16
+  static constexpr double kLeastCellSize_px = 16;
+
+  double cell_size_px = 80;  // of octave 0 at the image's centre, >= kLeastCellSize_px
   double largest_cells = 3;  // times cell_size_px, >= 1: the cells of coarse octaves
   int max_new = 100;         // landmarks that one call may make, where the view is not empty
   int empty_view = 50;       // landmarks; with fewer a view is empty
@@ -36,7 +38,7 @@ struct LandmarkMakerOptions {
 
 class LandmarkMaker {
  public:
-  // options: valid, but that cell_size_px may be smaller than the least. max_width, max_height: px.
+  // options: valid. max_width, max_height: px.
   LandmarkMaker(const LandmarkMakerOptions& options, const OctaveOptions& octaves, int max_width,
                 int max_height);
   LandmarkMaker(const LandmarkMaker&) = delete;

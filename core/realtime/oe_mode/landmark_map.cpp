@@ -25,7 +25,7 @@ double worth_of(const LandmarkStatistics& statistics, std::uint32_t now) {
   constexpr double kLongest = 4;  // times kMemory, of what was found often
   constexpr double kOften = 30;   // frames
   const double matched = statistics.matched;
-  const double rate = (matched + 1) / (std::max<double>(statistics.seen, matched) + 2);
+  const double rate = (matched + 1) / (std::max<double>(statistics.looked_for, matched) + 2);
   const double memory = kMemory * (1 + (kLongest - 1) * matched / (matched + kOften));
   // Counts of frames may wrap.
   const auto age = static_cast<double>(static_cast<std::int32_t>(now - statistics.last_frame));

@@ -17,19 +17,21 @@ bool LandmarkSearchOptions::validate(const char** error) const {
   if (!(fine_warp_tolerance > 0) || !(coarse_warp_tolerance > 0)) {
     problem = "warp tolerances must be positive";
   }
-  if (coarse_patches < 1) problem = "coarse_patches must be at least 1";
+  if (coarse_patches < 1 || coarse_patches > kMaxCoarsePatches) {
+    static_assert(kMaxCoarsePatches == 256, "as the message says");
+    problem = "coarse_patches must be 1 to 256";
+  }
   if (error != nullptr && problem != nullptr) *error = problem;
   return problem == nullptr && choice.validate(error);
 }
 
 LandmarkSearch::LandmarkSearch(const LandmarkSearchOptions& options, int capacity)
     : options_(options), visible_(capacity), choice_(options.choice, capacity) {
-  options_.choice = choice_.options();
   prepared_.resize(static_cast<std::size_t>(capacity));
-  const auto used = static_cast<std::size_t>(options_.choice.max_used);
-  found_.reserve(used);
-  observations_.reserve(used);
-  J_tangent_.reserve(used);
+  const auto chosen = static_cast<std::size_t>(options_.choice.max_chosen);
+  found_.reserve(chosen);
+  observations_.reserve(chosen);
+  J_tangent_.reserve(chosen);
   const auto most = static_cast<std::size_t>(options_.coarse_patches) * Pyramid::kMaxOctaves;
   coarse_.reserve(most);
   coarse_slots_.reserve(most);
@@ -72,7 +74,7 @@ LandmarkSearch::Fine LandmarkSearch::align_fine(const SearchedFrame& frame,
   find_visible(frame, view);
   choose_fine(frame);
   fit_fine(frame, view);
-  return {choice_.candidates(), static_cast<int>(choice_.chosen().size()),
+  return {choice_.fine_visible(), static_cast<int>(choice_.chosen().size()),
           static_cast<int>(found_.size())};
 }
 

@@ -1,12 +1,15 @@
 #pragma once
 // LandmarkSearch: finds the map's landmarks in a frame, from a predicted motion.
 //
-//   1 which landmarks are visible                          visible_landmarks.h
-//   2 coarse octaves: a first few of each, together        coarse_alignment.h (PTCEE 30, 31)
-//     move the prediction over pan and tilt
-//   3 fine octaves: which of them are aligned              landmark_choice.h
-//   4 each chosen one is projected with rolling shutter and aligned by itself (PTCEE 32, 33)
+//   1 visible  landmarks that the motion puts into the image   visible_landmarks.h
+//   2          of the coarse octaves the first few of each,    coarse_alignment.h (PTCEE 30, 31)
+//              together, move the prediction over pan and tilt
+//   3 chosen   of the visible fine ones: they are looked for   landmark_choice.h
+//   4 found    of the chosen: projected with rolling shutter,
+//              each aligned by itself (PTCEE 32, 33)
+//     inliers  of the found: in agreement with the solution    orientation_solve.h
 //
+// Each word is the name of its stage, in lists and counts alike.
 // A landmark's patch is kept as this view shows it, and prepared again when the view has changed enough.
 // Memory is taken by the constructor; nothing else allocates, waits or throws. One thread.
 
@@ -30,7 +33,7 @@ class ViewProjection;
 
 struct LandmarkSearchOptions {
   LandmarkChoiceOptions choice;
-  int coarse_patches = 40;  // of each coarse octave, at least 1
+  int coarse_patches = 40;  // of each coarse octave, 1 to kMaxCoarsePatches
   // As the reference was seen; a patch is prepared again when an element of its warp changed by this, > 0.
   float fine_warp_tolerance = 0.02F;
   float coarse_warp_tolerance = 0.04F;
@@ -64,7 +67,7 @@ struct SearchedFrame {
 
 class LandmarkSearch {
  public:
-  // capacity: of the map. Options of choice are clamped; the others must be valid.
+  // options: valid. capacity: of the map.
   LandmarkSearch(const LandmarkSearchOptions& options, int capacity);
   LandmarkSearch(const LandmarkSearch&) = delete;
   LandmarkSearch& operator=(const LandmarkSearch&) = delete;
@@ -83,9 +86,9 @@ class LandmarkSearch {
                                     const FrameMotion<double>& predicted, double sigma_px);
 
   struct Fine {
-    int visible = 0;     // fine landmarks that `motion` puts into the image
-    int looked_for = 0;  // of these, chosen
-    int aligned = 0;     // of these, found
+    int visible = 0;  // fine landmarks only
+    int chosen = 0;   // of these
+    int found = 0;    // of these
   };
   // Finds fine landmarks about where `motion` sees them: found() and observations().
   Fine align_fine(const SearchedFrame& frame, const FrameMotion<double>& motion);
@@ -109,7 +112,7 @@ class LandmarkSearch {
   [[nodiscard]] const std::vector<OeObservation>& observations() const { return observations_; }
   // Of found(), one each: d u / d landmark's tangent coordinates, px/rad.
   [[nodiscard]] const std::vector<Matrix2<double>>& J_tangent() const { return J_tangent_; }
-  // That were looked for; found() are a part of them, in their order.
+  // found() are a part of them, in their order.
   [[nodiscard]] const std::vector<VisibleLandmark>& chosen() const { return choice_.chosen(); }
   // Coarse landmarks of the latest search, and their slots.
   [[nodiscard]] const std::vector<CoarsePatch>& coarse() const { return coarse_; }

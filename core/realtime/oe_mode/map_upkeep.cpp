@@ -40,7 +40,7 @@ void MapUpkeep::note_lost(bool contradiction, bool missed) {
 void MapUpkeep::mark(std::uint32_t frame, int slot, bool matched, double residual_square,
                      LandmarkMap* map) const {
   LandmarkStatistics& s = map->statistics(slot);
-  ++s.seen;
+  ++s.looked_for;
   s.last_frame = frame;
   if (matched) {
     ++s.matched;
@@ -50,8 +50,8 @@ void MapUpkeep::mark(std::uint32_t frame, int slot, bool matched, double residua
   } else {
     ++s.missed_in_a_row;
   }
-  const bool unreliable = s.seen >= static_cast<std::uint32_t>(options_.probation) &&
-                          s.matched < options_.least_matched * s.seen;
+  const bool unreliable = s.looked_for >= static_cast<std::uint32_t>(options_.probation) &&
+                          s.matched < options_.least_matched * s.looked_for;
   if (s.missed_in_a_row >= options_.max_misses || unreliable) map->retire(slot);
 }
 

@@ -52,8 +52,8 @@ void OeMode::reset(const Calibration& calibration, const MapState& map) {
       continue;
     }
     LandmarkStatistics& known = map_.statistics(slot);
-    known.matched = std::min(landmark.statistics.matched, landmark.statistics.seen);
-    known.seen = landmark.statistics.seen;
+    known.matched = std::min(landmark.statistics.matched, landmark.statistics.looked_for);
+    known.looked_for = landmark.statistics.looked_for;
   }
   if (map_.size() == 0) return;
   offset_.reset({map.offset.vector(), symmetric(map.offset_covariance), map.offset_sensitivity});
@@ -159,8 +159,8 @@ OeMode::Solution OeMode::solve_about(const FrameMotion<double>& motion,
                                      const PredictedMotion& predicted) {
   const LandmarkSearch::Fine fine = search_.align_fine(searched(), motion);
   statistics_.fine_visible = fine.visible;
-  statistics_.looked_for = fine.looked_for;
-  statistics_.aligned = fine.aligned;
+  statistics_.chosen = fine.chosen;
+  statistics_.found = fine.found;
   MotionPrior prior = predicted.prior;
   prior.offset_covariance = offset_.offset().covariance;
   prior.motion.tail<2>() = predicted.motion.acceleration.vector() - motion.acceleration.vector();
@@ -173,7 +173,7 @@ OeMode::Solution OeMode::solve_about(const FrameMotion<double>& motion,
   Solution out;
   out.motion = motion;
   const Camera<double>& camera = calibration_.camera;
-  out.status = solve_orientation(search_.found().data(), fine.aligned, prior, SolveLimits{},
+  out.status = solve_orientation(search_.found().data(), fine.found, prior, SolveLimits{},
                                  camera.width, camera.height,
                                  calibration_.line_delay * (0.5 * camera.height), &out.solved);
   return out;
@@ -186,18 +186,18 @@ OeMode::Solution OeMode::find_and_solve(const PredictedMotion& predicted,
   if (coarse.aligned || sigma_px < look.nearby_px) first = solve_about(coarse.motion, predicted);
   const bool doubtful = first.status == SolveStatus::kTooFew ||
                         (first.status == SolveStatus::kOk &&
-                         first.solved.inliers < look.least_held * statistics_.looked_for);
+                         first.solved.inliers < look.least_held * statistics_.chosen);
   if (!doubtful || !prediction_.follows(frame_.time_s)) return first;
   // A second look, where the motion before leads to.
-  const int looked_for = statistics_.looked_for;
+  const int chosen = statistics_.chosen;
   const Solution second = solve_about(prediction_.last_carried_on(frame_.time_s), predicted);
   if (second.status == SolveStatus::kOk && second.solved.inliers >= look.least_held_again &&
-      second.solved.inliers >= look.least_held * statistics_.looked_for) {
+      second.solved.inliers >= look.least_held * statistics_.chosen) {
     return second;
   }
   // No better: landmarks are to be as the first look found them.
   if (first.status == SolveStatus::kOk) first = solve_about(first.motion, predicted);
-  statistics_.looked_for = looked_for;
+  statistics_.chosen = chosen;
   return first;
 }
 
@@ -211,7 +211,7 @@ OeStatus OeMode::answer_without_landmarks(const PredictedMotion& predicted,
   frame_.shared_covariance = predicted.offset_covariance;
   frame_.sensitivity = predicted.sensitivity;
   // Where no landmark was to be expected, telemetry may place new ones.
-  const bool new_view = has_telemetry && statistics_.looked_for < options_.look.few &&
+  const bool new_view = has_telemetry && statistics_.chosen < options_.look.few &&
                         static_cast<int>(search_.coarse().size()) < options_.look.few_coarse;
   frame_.use = new_view ? MapUse::kNewView : MapUse::kLost;
   upkeep_.note_lost(contradiction,

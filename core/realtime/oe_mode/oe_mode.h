@@ -52,11 +52,11 @@ enum class OeStatus {
 
 struct OeStatistics {
   OeStatus status = OeStatus::kNoPrediction;
-  int fine_visible =
-      0;  // fine landmarks of the map (octaves.h) that the prediction puts into the image
-  int looked_for = 0;          // of these, chosen (landmark_choice.h)
-  int aligned = 0;             // of these, found by patch alignment
-  int inliers = 0;             // of these, in agreement with the solution
+  // Landmarks by stage, see landmark_search.h; each a part of those before.
+  int fine_visible = 0;        // of the fine octaves (octaves.h), in the image
+  int chosen = 0;              // and looked for
+  int found = 0;               // by patch alignment
+  int inliers = 0;             // in agreement with the solution
   double coarse_shift_px = 0;  // by which coarse alignment moved the prediction, image centre
   PanTilt<double> map_offset;  // rad, base minus map
   Matrix2<double> map_offset_covariance = Matrix2<double>::Zero();  // rad^2
@@ -70,7 +70,7 @@ struct TelemetryLookUp {
 
 class OeMode {
  public:
-  // options: valid, but that max_used and cell_size_px outside their ranges are taken as the nearest inside.
+  // options: valid.
   explicit OeMode(const OeOptions& options);
   OeMode(const OeMode&) = delete;
   OeMode& operator=(const OeMode&) = delete;
@@ -105,7 +105,7 @@ class OeMode {
 
   // Of the frame last processed.
   [[nodiscard]] const OeStatistics& statistics() const { return statistics_; }
-  // statistics().aligned of them, residuals and inliers by the solution; without one, by the prediction.
+  // statistics().found of them, residuals and inliers by the solution; without one, by the prediction.
   [[nodiscard]] const OeObservation* observations() const { return search_.observations().data(); }
   [[nodiscard]] const LandmarkMap& map() const { return map_; }
 

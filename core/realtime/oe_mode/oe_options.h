@@ -17,12 +17,12 @@ struct LookOptions {
   // px, at the image's centre: where coarse octaves fit nowhere, fine landmarks are worth a look only if the
   // prediction is that sure, one standard deviation.
   double nearby_px = 2;
-  // Texture that repeats can hold the coarse octaves elsewhere: where fewer hold than this share of those
-  // looked for, 0 to 1, there is a second look, where the motion before leads to.
+  // Texture that repeats can hold the coarse octaves elsewhere: where a smaller share of the chosen landmarks than
+  // this are inliers, 0 to 1, there is a second look, where the motion before leads to.
   double least_held = 0.6;
-  int least_held_again =
-      40;  // landmarks; fewer agree by chance too, and the second look is no better
-  // Landmarks that were looked for, and coarse ones in view: with fewer of both a view is new to the map.
+  // Inliers; fewer agree by chance too, and the second look is no better.
+  int least_held_again = 40;
+  // Chosen landmarks, and visible coarse ones: with fewer of both a view is new to the map.
   int few = 10;
   int few_coarse = 5;
 

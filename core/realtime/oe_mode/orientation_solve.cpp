@@ -11,8 +11,6 @@ namespace {
 using Matrix8 = Matrix<double, 8, 8>;
 using Vector8 = Matrix<double, 8, 1>;
 
-// More are not looked at; OeMode gives fewer.
-constexpr int kMaxLandmarks = 1024;
 constexpr int kMinInliers = 3;               // for 6 unknowns, whatever the limits say
 constexpr double kChiSquare2Median = 1.386;  // of 2 degrees of freedom
 constexpr double kChiSquare2Gate = 13.8;     // 99.9 %
@@ -112,7 +110,7 @@ class Problem {
   FoundLandmark* landmarks_;
   int count_;
   double unit_s_;
-  std::array<Term, kMaxLandmarks> terms_;
+  std::array<Term, kMaxFoundLandmarks> terms_;
 };
 
 // Telemetry and prior in scaled units.
@@ -161,8 +159,8 @@ Vector6 solve_without_angles(const Problem& problem, const ScaledPrior& prior,
 
 // What most landmarks say about the angles alone.
 Vector2<double> middle_of_landmarks(const FoundLandmark* landmarks, int count) {
-  std::array<double, kMaxLandmarks> pan;
-  std::array<double, kMaxLandmarks> tilt;
+  std::array<double, kMaxFoundLandmarks> pan;
+  std::array<double, kMaxFoundLandmarks> tilt;
   for (int i = 0; i < count; ++i) {
     const Vector2<double> angle = landmarks[i].J_angle.inverse() * landmarks[i].residual;
     pan[static_cast<std::size_t>(i)] = angle.x();
@@ -172,7 +170,7 @@ Vector2<double> middle_of_landmarks(const FoundLandmark* landmarks, int count) {
 }
 
 double median_square(const Problem& problem, const Vector6& x) {
-  std::array<double, kMaxLandmarks> squares;
+  std::array<double, kMaxFoundLandmarks> squares;
   for (int i = 0; i < problem.count(); ++i) {
     squares[static_cast<std::size_t>(i)] = problem.normalised_square(i, x);
   }
@@ -215,7 +213,7 @@ double neighbours_inflation(const Problem& problem, const FoundLandmark* landmar
 SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionPrior& prior,
                               const SolveLimits& limits, double width, double height,
                               double half_readout_s, SolvedMotion* out) {
-  count = std::min(count, kMaxLandmarks);
+  count = std::min(count, kMaxFoundLandmarks);
   if (count < std::max(limits.min_inliers, kMinInliers)) return SolveStatus::kTooFew;
   const double unit_s = std::max(std::abs(half_readout_s), limits.min_half_readout_s);
   const Problem problem(landmarks, count, unit_s);
@@ -226,7 +224,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   x.head<2>() = middle_of_landmarks(landmarks, count);
   const double max_square = limits.max_scale * limits.max_scale;
   double scale_square = 1;
-  std::array<double, kMaxLandmarks> weights;
+  std::array<double, kMaxFoundLandmarks> weights;
   constexpr int kRobustSteps = 6;
   for (int step = 0; step < kRobustSteps; ++step) {
     // The scale that half of the landmarks show; a shrinking one lets few capture the rest.

@@ -24,6 +24,9 @@
 
 namespace alidade {
 
+// Of one frame; more are not looked at.
+inline constexpr int kMaxFoundLandmarks = 1024;
+
 // One landmark that was found.
 struct FoundLandmark {
   Vector2<double> u;           // px, where

@@ -53,6 +53,16 @@ TEST(MotionMatch, FindsClockOffsetAndFocalLengthWithoutAGuess) {
   EXPECT_NEAR(match.focal_length, kFocalLength, 0.01 * kFocalLength);
 }
 
+// The best there is grows beyond the range, also where it is looked for more finely.
+TEST(MotionMatch, SaysWhereTheRangeCutsItOff) {
+  const auto motion = image_motion(tracks(), 0.5);
+  for (const double range : {0.1, 0.2, 0.3}) {
+    EXPECT_TRUE(match_motion(motion, telemetry(), 0, range).at_edge) << range;
+    EXPECT_TRUE(match_motion(motion, telemetry(), 2 * kShift, range).at_edge) << range;
+    EXPECT_FALSE(match_motion(motion, telemetry(), kShift - 0.05, range).at_edge) << range;
+  }
+}
+
 // A third of the tracks is wild: the median does not see them.
 TEST(MotionMatch, MediansDoNotSeeWildTracks) {
   AdjustmentData data = tracks();

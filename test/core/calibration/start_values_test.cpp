@@ -47,6 +47,17 @@ TEST(StartValues, AreCloseWithoutAGuess) {
   for (const auto& d : state.landmarks) EXPECT_NEAR(d.norm(), 1, 1e-12);
 }
 
+TEST(StartValues, FindAClockOffsetBeyondTheRangeThatIsSearchedFirst) {
+  test::Simulation s = small_simulation();
+  s.clock_offset = -0.4;
+  CalibrationOptions options;
+  options.clock_offset_search_s = 0.1;
+  const Started started(test::simulate(s), options);
+  ASSERT_TRUE(started.status.ok()) << started.status.message;
+  EXPECT_FALSE(started.motion.match.at_edge);
+  EXPECT_NEAR(started.start.state.shift_s, s.clock_offset, 0.02);
+}
+
 // Half of the telemetry is missing: frames, observations and samples that are left have each other.
 TEST(StartValues, LeaveOutWhatTheOtherStreamDoesNotAccompany) {
   const test::Simulation s = small_simulation();

@@ -164,7 +164,7 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
   options.max_width = kWidth;
   options.max_height = kHeight;
   options.max_landmarks = 64;
-  options.search.choice.max_used = 16;
+  options.search.choice.max_chosen = 16;
   options.maker.cell_size_px = 16;
   OeMode oe(options);
   FrameOrientation frame;

@@ -5,7 +5,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <cmath>
 #include <limits>
@@ -282,8 +281,7 @@ TEST(PatchAlignment, KnowsAnEdgeOnlyAcrossIt) {
       EXPECT_NEAR(along.dot(moved), 0, sigma > 0 ? 0.1 : 0.02) << normal;
       EXPECT_LT(across.dot(alignment.covariance * across), 0.1 * 0.1 + 0.3);
       EXPECT_GT(along.dot(alignment.covariance * along), 0.99 * kUnobservedVariance);
-      const Eigen::SelfAdjointEigenSolver<Matrix2<double>> solver(alignment.covariance);
-      EXPECT_GT(solver.eigenvalues()[0], 0);
+      EXPECT_GT(alignment.covariance.determinant(), 0);
     }
   }
 }

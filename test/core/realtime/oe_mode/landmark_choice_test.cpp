@@ -1,4 +1,4 @@
-// Which landmarks are aligned: all where there is room, else the most reliable of each part of the image.
+// Which landmarks are chosen: all where there is room, else the most reliable of each part of the image.
 
 #include "core/realtime/oe_mode/landmark_choice.h"
 
@@ -7,7 +7,10 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
+#include <random>
 #include <set>
+#include <utility>
 #include <vector>
 
 namespace alidade::test {
@@ -19,15 +22,15 @@ class ChosenLandmarks : public testing::Test {
   static constexpr int kWidth = 1000;
   static constexpr int kHeight = 600;
 
-  // seen: how often it was looked for; matched: found. Returns its slot.
-  int add(const Vector2<double>& u, int octave, int seen = 0, int matched = 0) {
+  // looked_for, matched: how often. Returns its slot.
+  int add(const Vector2<double>& u, int octave, int looked_for = 0, int matched = 0) {
     Landmark landmark;
-    const double azimuth = 0.01 * static_cast<double>(visible_.size());
+    const double azimuth = 0.004 * static_cast<double>(visible_.size());
     landmark.d = {std::cos(azimuth), std::sin(azimuth), 0};
     landmark.octave = static_cast<std::uint8_t>(octave);
     int slot = -1;
     EXPECT_EQ(map_.insert(landmark, 1, &slot), InsertStatus::kOk);
-    map_.statistics(slot).seen = static_cast<std::uint32_t>(seen);
+    map_.statistics(slot).looked_for = static_cast<std::uint32_t>(looked_for);
     map_.statistics(slot).matched = static_cast<std::uint32_t>(matched);
     visible_.push_back({slot, octave, u});
     return slot;
@@ -39,21 +42,21 @@ class ChosenLandmarks : public testing::Test {
     for (const VisibleLandmark& v : choice.choose(visible_, map_, octaves_, camera_)) {
       slots.push_back(v.slot);
     }
-    candidates_ = choice.candidates();
+    fine_visible_ = choice.fine_visible();
     return slots;
   }
 
   static LandmarkChoiceOptions at_most(int used) {
     LandmarkChoiceOptions options;
-    options.max_used = used;
+    options.max_chosen = used;
     return options;
   }
 
   Camera<double> camera_{1000, 1, 0, kWidth, kHeight};
-  LandmarkMap map_{500, 1e-3};
+  LandmarkMap map_{2000, 4e-4};
   Octaves octaves_{OctaveOptions{}};
   std::vector<VisibleLandmark> visible_;
-  int candidates_ = 0;
+  int fine_visible_ = 0;
 };
 
 TEST_F(ChosenLandmarks, AreAllFineOnesInTheirOrderWhereThereIsRoom) {
@@ -64,7 +67,7 @@ TEST_F(ChosenLandmarks, AreAllFineOnesInTheirOrderWhereThereIsRoom) {
     if (octave < 2) fine.push_back(slot);
   }
   EXPECT_THAT(choose(at_most(static_cast<int>(fine.size()))), testing::ElementsAreArray(fine));
-  EXPECT_EQ(candidates_, static_cast<int>(fine.size()));
+  EXPECT_EQ(fine_visible_, static_cast<int>(fine.size()));
   EXPECT_EQ(visible_.size(), 30U) << "what is visible stays as it is";
   for (const VisibleLandmark& v : visible_) EXPECT_GE(v.slot, 0);
 }
@@ -85,7 +88,7 @@ TEST_F(ChosenLandmarks, AreTheMostReliableOfEachPartFirstWhereThereIsNoRoomForAl
   }
   const std::vector<int> chosen = choose(options);
   EXPECT_EQ(std::set<int>(chosen.begin(), chosen.end()), best);
-  EXPECT_EQ(candidates_, 18);
+  EXPECT_EQ(fine_visible_, 18);
 }
 
 TEST_F(ChosenLandmarks, FillTheRoomThatIsLeftWithTheOthersAndTakeNoneTwice) {
@@ -112,6 +115,48 @@ TEST_F(ChosenLandmarks, OfASmallNumberAreSpreadOverTheImage) {
   }
   EXPECT_EQ(chosen.size(), 24U);
   EXPECT_EQ(quarters.size(), 4U);
+}
+
+// As they are by default, in an image full of landmarks: no more than there is room for, no part of the image twice,
+// all of the image alike, and of each part the one that served best.
+TEST_F(ChosenLandmarks, OfAFullImageAreAsManyAsMayBeOneOfAPartTheMostReliableThere) {
+  const LandmarkChoiceOptions options;
+  std::mt19937_64 random(4);
+  std::uniform_real_distribution<double> uniform(0, 1);
+  const auto part_of = [&](const Vector2<double>& u) {
+    return std::pair(static_cast<int>(u.x() * options.columns / kWidth),
+                     static_cast<int>(u.y() * options.rows / kHeight));
+  };
+  constexpr int kLookedFor = 20;
+  std::map<std::pair<int, int>, double> best;  // of each part
+  std::map<int, std::pair<Vector2<double>, double>> all;
+  for (int i = 0; i < 1500; ++i) {
+    const Vector2<double> u(kWidth * uniform(random), kHeight * uniform(random));
+    const int octave = static_cast<int>(3 * uniform(random));
+    const int matched = static_cast<int>((kLookedFor + 1) * uniform(random));
+    const int slot = add(u, octave, kLookedFor, matched);
+    if (octave == 2) continue;
+    const double worth = (matched + 1.0) / (octave == 0 ? 1 : 2);
+    all[slot] = {u, worth};
+    best[part_of(u)] = std::max(best[part_of(u)], worth);
+  }
+  const std::vector<int> chosen = choose(options);
+  ASSERT_EQ(chosen.size(), static_cast<std::size_t>(options.max_chosen));
+  EXPECT_EQ(fine_visible_, static_cast<int>(all.size()));
+  ASSERT_GT(best.size(), chosen.size()) << "parts that have a landmark";
+  std::set<std::pair<int, int>> parts;
+  std::map<std::pair<int, int>, int> in_twentieths;  // of the image, 5 columns and 4 rows
+  for (const int slot : chosen) {
+    ASSERT_EQ(all.count(slot), 1U);
+    const auto& [u, worth] = all[slot];
+    EXPECT_TRUE(parts.insert(part_of(u)).second) << "no part twice";
+    EXPECT_EQ(worth, best[part_of(u)]) << "the most reliable of its part";
+    ++in_twentieths[{static_cast<int>(u.x() * 5 / kWidth), static_cast<int>(u.y() * 4 / kHeight)}];
+  }
+  ASSERT_EQ(in_twentieths.size(), 20U);
+  for (const auto& [place, count] : in_twentieths) {
+    EXPECT_GE(count, 7) << "of 12 parts, at column " << place.first << ", row " << place.second;
+  }
 }
 
 TEST_F(ChosenLandmarks, AreAllButOneWhereThereIsRoomForAllButOneInAnyNumberOfParts) {

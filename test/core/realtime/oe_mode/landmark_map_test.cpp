@@ -129,7 +129,7 @@ TEST(LandmarkMap, KeepsWhatItIsGivenWithANewIdAndFreshStatistics) {
   landmark.shared_covariance << 5, 0, 0, 6;
   landmark.J_pixel_tangent << 7, 8, 9, 10;
   landmark.pixels[100] = 11;
-  landmark.statistics.seen = 12;
+  landmark.statistics.looked_for = 12;
   int slot = -1;
   ASSERT_EQ(map.insert(landmark, 1000, &slot), InsertStatus::kOk);
   ASSERT_TRUE(map.occupied(slot));
@@ -141,7 +141,7 @@ TEST(LandmarkMap, KeepsWhatItIsGivenWithANewIdAndFreshStatistics) {
   EXPECT_EQ(kept.J_pixel_tangent, landmark.J_pixel_tangent);
   EXPECT_EQ(kept.pixels, landmark.pixels);
   EXPECT_NE(kept.id, 77U);
-  EXPECT_EQ(kept.statistics.seen, 0U);
+  EXPECT_EQ(kept.statistics.looked_for, 0U);
   EXPECT_EQ(kept.statistics.last_frame, 1000U);
 }
 
@@ -245,6 +245,8 @@ TEST(LandmarkMap, AzimuthOfPlusAndMinusPiIsOneCell) {
 }
 
 TEST(LandmarkMap, FindsExactlyWhatASearchOfEverythingFinds) {
+  // Three products and two sums, which a processor may fuse, or not: here and there in its own way.
+  constexpr double kRounding = 5 * std::numeric_limits<double>::epsilon();
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> exponent(-5, 0.49);
   std::size_t found = 0;
@@ -268,17 +270,23 @@ TEST(LandmarkMap, FindsExactlyWhatASearchOfEverythingFinds) {
       }
       for (const auto& centre : centres) {
         std::vector<double> cosines = {1, 0, -1, -0.999, std::cos(std::pow(10, exponent(random)))};
-        // Exactly on the limit, where rounding to float decides wrongly half of the times.
+        // So near the limit that rounding to float decides wrongly half of the times, and on it.
         for (int i = 0; i < 5; ++i) {
           const int slot = static_cast<int>(random() % capacity);
           if (!map.occupied(slot)) continue;
-          cosines.push_back(std::clamp(centre.normalized().dot(map.at(slot).d), -1.0, 1.0));
+          for (const double beside : {-1e-14, 0.0, 1e-14}) {
+            const double cosine = centre.normalized().dot(map.at(slot).d) + beside;
+            cosines.push_back(std::clamp(cosine, -1.0, 1.0));
+          }
         }
         for (const double cosine : cosines) {
-          const auto expected = cosine <= -1 ? plain_find(map, centre, -2)
-                                             : plain_find(map, centre.normalized(), cosine);
+          const bool all = cosine <= -1;
+          const auto surely = plain_find(map, centre.normalized(), all ? -2 : cosine + kRounding);
+          const auto perhaps = plain_find(map, centre.normalized(), all ? -2 : cosine - kRounding);
           const auto slots = find(map, centre, cosine);
-          ASSERT_EQ(slots, expected) << "cosine " << cosine << ", centre " << centre.transpose();
+          ASSERT_TRUE(std::includes(slots.begin(), slots.end(), surely.begin(), surely.end()) &&
+                      std::includes(perhaps.begin(), perhaps.end(), slots.begin(), slots.end()))
+              << "cosine " << cosine << ", centre " << centre.transpose();
           found += slots.size();
           ++searches;
         }
@@ -346,7 +354,7 @@ TEST(LandmarkMap, FullMapOfUsefulLandmarksKeepsThem) {
   EXPECT_EQ(map.insert(landmark_at(anywhere(&random), 3), 0, &slot), InsertStatus::kFull);
   EXPECT_EQ(map.insert(landmark_at(anywhere(&random), 3), 1, &slot), InsertStatus::kFull);
   for (int i = 0; i < 50; ++i) {
-    map.statistics(i).seen = 100;
+    map.statistics(i).looked_for = 100;
     map.statistics(i).matched = 95;
     map.statistics(i).last_frame = 100;
   }
@@ -362,7 +370,7 @@ TEST(LandmarkMap, FullMapGivesUpTheLeastUseful) {
   ASSERT_EQ(map.size(), 50);
   constexpr std::uint32_t kNow = 1000;
   for (int i = 0; i < 50; ++i) {
-    map.statistics(i).seen = 100;
+    map.statistics(i).looked_for = 100;
     map.statistics(i).matched = 90;
     map.statistics(i).last_frame = kNow;
   }
@@ -398,8 +406,8 @@ TEST(LandmarkMap, FullMapForgetsWhatWasSeenLongAgoForWhatIsSeenNow) {
     const InsertStatus status = map.insert(landmark_at(d), frame, &slot);
     ASSERT_NE(status, InsertStatus::kFull) << frame;
     for (int i = 0; i < map.capacity(); ++i) {
-      if (!map.occupied(i) || map.statistics(i).seen >= 30) continue;
-      ++map.statistics(i).seen;
+      if (!map.occupied(i) || map.statistics(i).looked_for >= 30) continue;
+      ++map.statistics(i).looked_for;
       ++map.statistics(i).matched;
       map.statistics(i).last_frame = frame;
     }
@@ -416,7 +424,7 @@ TEST(LandmarkMap, WorthFallsWithMissesAndWithTimeButNotForASecond) {
   EXPECT_EQ(map.worth(slot, 120), fresh);
   EXPECT_LT(map.worth(slot, 200), fresh);
   EXPECT_EQ(map.worth(slot, 90), fresh);  // a frame before: no time has passed
-  map.statistics(slot).seen = 10;
+  map.statistics(slot).looked_for = 10;
   map.statistics(slot).matched = 10;
   const double good = map.worth(slot, 100);
   EXPECT_GT(good, fresh);
@@ -424,7 +432,7 @@ TEST(LandmarkMap, WorthFallsWithMissesAndWithTimeButNotForASecond) {
   EXPECT_LT(map.worth(slot, 100), good);
   map.statistics(slot).matched = 1;
   EXPECT_LT(map.worth(slot, 100), fresh);
-  map.statistics(slot).seen = 1000;
+  map.statistics(slot).looked_for = 1000;
   map.statistics(slot).matched = 1000;
   EXPECT_GT(map.worth(slot, 400), 3 * good * 30 / 300);  // often found, later forgotten
   EXPECT_LE(map.worth(slot, 100), 1);

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <set>
+#include <utility>
 
 #include "test/core/realtime/oe_mode/textured_scene.h"
 
@@ -48,10 +50,10 @@ TEST_F(SearchedScene, FindsFineLandmarksWhereTheyAre) {
   scene_.look(at);
   const LandmarkSearch::Fine fine =
       search_.align_fine(frame(), TexturedScene::motion_at(at + Vector2<double>(0.5, 0.2)));
-  EXPECT_GT(fine.looked_for, 50);
-  EXPECT_GE(fine.visible, fine.looked_for);
-  EXPECT_GT(fine.aligned, 0.9 * fine.looked_for);
-  ASSERT_EQ(search_.found().size(), static_cast<std::size_t>(fine.aligned));
+  EXPECT_GT(fine.chosen, 50);
+  EXPECT_GE(fine.visible, fine.chosen);
+  EXPECT_GT(fine.found, 0.9 * fine.chosen);
+  ASSERT_EQ(search_.found().size(), static_cast<std::size_t>(fine.found));
   ASSERT_EQ(search_.observations().size(), search_.found().size());
   ASSERT_EQ(search_.J_tangent().size(), search_.found().size());
   // Residuals less what the prediction was off by are as large as said.
@@ -61,14 +63,13 @@ TEST_F(SearchedScene, FindsFineLandmarksWhereTheyAre) {
   search_.conclude(correction);
   double squares = 0;
   for (std::size_t i = 0; i < search_.found().size(); ++i) {
-    const OeObservation& seen = search_.observations()[i];
-    EXPECT_EQ(seen.slot, search_.observations()[i].slot);
-    EXPECT_EQ(seen.id, scene_.map_.at(seen.slot).id);
-    EXPECT_TRUE(seen.inlier);
-    squares += seen.residual.dot(search_.found()[i].covariance.inverse() * seen.residual) / 2;
+    const OeObservation& found = search_.observations()[i];
+    EXPECT_EQ(found.id, scene_.map_.at(found.slot).id);
+    EXPECT_TRUE(found.inlier);
+    squares += found.residual.dot(search_.found()[i].covariance.inverse() * found.residual) / 2;
   }
-  EXPECT_LT(squares / fine.aligned, 2);
-  EXPECT_GT(squares / fine.aligned, 0.3);
+  EXPECT_LT(squares / fine.found, 2);
+  EXPECT_GT(squares / fine.found, 0.3);
 }
 
 TEST_F(SearchedScene, FindsNothingWhereThereIsNothing) {
@@ -79,19 +80,34 @@ TEST_F(SearchedScene, FindsNothingWhereThereIsNothing) {
   EXPECT_EQ(coarse.shift_px, 0);
   EXPECT_EQ(coarse.motion.angle.pan, 0) << "as predicted";
   const LandmarkSearch::Fine fine = search_.align_fine(frame(), coarse.motion);
-  EXPECT_GT(fine.looked_for, 50);
-  EXPECT_EQ(fine.aligned, 0);
+  EXPECT_GT(fine.chosen, 50);
+  EXPECT_EQ(fine.found, 0);
 }
 
-TEST_F(SearchedScene, UsesNoMoreThanItMay) {
+// Every other landmark has served well: of each part of the image such a one is looked for, and found.
+TEST_F(SearchedScene, LooksForNoMoreThanItMayAndForTheReliableOfAllTheImage) {
   LandmarkSearchOptions options;
-  options.choice.max_used = 20;
+  options.choice.max_chosen = 6;
+  options.choice.columns = 3;
+  options.choice.rows = 2;
   LandmarkSearch search(options, scene_.map_.capacity());
   search.reset(scene_.calibration_);
+  for (int slot = 0; slot < scene_.map_.size(); ++slot) {
+    scene_.map_.statistics(slot).looked_for = 100;
+    scene_.map_.statistics(slot).matched = slot % 2 == 1 ? 100 : 10;
+  }
   const LandmarkSearch::Fine fine = search.align_fine(frame(), TexturedScene::motion_at({0, 0}));
-  EXPECT_EQ(fine.looked_for, 20);
-  EXPECT_GT(fine.visible, 20);
-  EXPECT_EQ(search.chosen().size(), 20U);
+  EXPECT_EQ(fine.chosen, 6);
+  EXPECT_EQ(fine.found, 6);
+  EXPECT_GT(fine.visible, 10 * 6);
+  ASSERT_EQ(search.chosen().size(), 6U);
+  std::set<std::pair<int, int>> parts;
+  for (const VisibleLandmark& chosen : search.chosen()) {
+    EXPECT_EQ(chosen.slot % 2, 1);
+    parts.insert({static_cast<int>(chosen.u.x() * 3 / TexturedScene::kWidth),
+                  static_cast<int>(chosen.u.y() * 2 / TexturedScene::kHeight)});
+  }
+  EXPECT_EQ(parts.size(), 6U);
   search.clear();
   EXPECT_TRUE(search.chosen().empty());
   EXPECT_TRUE(search.found().empty());

@@ -521,7 +521,7 @@ TEST_F(OeModeOnFrames, AnswersAlikeAgainAndAfterAReset) {
     VirtualCamera camera;
     oe->reset(camera.calibration());
     EXPECT_EQ(oe->map().size(), 0);
-    EXPECT_EQ(oe->statistics().aligned, 0);
+    EXPECT_EQ(oe->statistics().found, 0);
     EXPECT_EQ(oe->statistics().status, OeStatus::kNoPrediction);
     std::vector<Answer> answers;
     for (int k = 0; k < 40; ++k) {
@@ -559,14 +559,14 @@ TEST_F(OeModeOnFrames, TellsWhatEachAnswerRestsOn) {
     ASSERT_EQ(process(k), OeStatus::kOk);
     const OeStatistics& s = oe_.statistics();
     EXPECT_EQ(s.status, OeStatus::kOk);
-    EXPECT_LE(s.inliers, s.aligned);
-    EXPECT_LE(s.aligned, s.looked_for);
-    EXPECT_LE(s.looked_for, std::min(s.fine_visible, small_options().search.choice.max_used));
+    EXPECT_LE(s.inliers, s.found);
+    EXPECT_LE(s.found, s.chosen);
+    EXPECT_LE(s.chosen, std::min(s.fine_visible, small_options().search.choice.max_chosen));
     EXPECT_LE(s.fine_visible, oe_.map().size());
     EXPECT_EQ(s.inliers, frame_.landmarks);
     int inliers = 0;
     std::vector<std::uint32_t> ids;
-    for (int i = 0; i < s.aligned; ++i) {
+    for (int i = 0; i < s.found; ++i) {
       const OeObservation& seen = oe_.observations()[i];
       inliers += seen.inlier ? 1 : 0;
       ASSERT_TRUE(oe_.map().occupied(seen.slot));
@@ -591,7 +591,7 @@ TEST_F(OeModeOnFrames, TellsWhatEachAnswerRestsOn) {
 TEST(OeMode, NeitherFillsItsMapNorUsesMoreThanItMay) {
   OeOptions options = small_options();
   options.max_landmarks = 150;
-  options.search.choice.max_used = 25;
+  options.search.choice.max_chosen = 25;
   VirtualCamera camera;
   OeMode oe(options);
   oe.reset(camera.calibration());
@@ -602,8 +602,8 @@ TEST(OeMode, NeitherFillsItsMapNorUsesMoreThanItMay) {
     const OeStatus status =
         oe.process(camera.image(k), VirtualCamera::time_s(k), &telemetry, &frame);
     in_oe += status == OeStatus::kOk ? 1 : 0;
-    EXPECT_LE(oe.statistics().looked_for, 25);
-    EXPECT_LE(oe.statistics().aligned, 25);
+    EXPECT_LE(oe.statistics().chosen, 25);
+    EXPECT_LE(oe.statistics().found, 25);
     EXPECT_LE(frame.landmarks, 25);
     expect_honest(camera, k, frame);
     oe.maintain();
@@ -998,7 +998,7 @@ TEST(OeMode, GoesOnBesideAMapThatIsNotInViewAndFindsItAgain) {
   for (int k = 50; k < 200; ++k) {
     EXPECT_EQ(process(k), k == 50 ? OeStatus::kTooFew : OeStatus::kOk) << k;
     found = 0;
-    for (int i = 0; i < oe.statistics().aligned; ++i) {
+    for (int i = 0; i < oe.statistics().found; ++i) {
       const OeObservation& seen = oe.observations()[i];
       found += seen.inlier && old.count(seen.id) > 0 ? 1 : 0;
     }

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/SVD>
+#include <Eigen/Eigenvalues>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -19,7 +19,9 @@ namespace {
 constexpr double kRowTolerance = 1e-4;  // px, of ViewProjection's row
 
 double norm_of(const Matrix<double, 2, 3>& J) {
-  return Eigen::JacobiSVD<Matrix<double, 2, 3>>(J).singularValues()[0];
+  return std::sqrt(Eigen::SelfAdjointEigenSolver<Matrix2<double>>()
+                       .computeDirect(J * J.transpose(), Eigen::EigenvaluesOnly)
+                       .eigenvalues()[1]);
 }
 
 struct View {
