@@ -89,7 +89,7 @@ set(CPACK_DEBIAN_LIBRARIES_PACKAGE_NAME alidade-dev)
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_SECTION libdevel)
 # What the CMake package finds, and what its static libraries link.
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_DEPENDS
-  "libavcodec-dev, libavformat-dev, libavutil-dev, libboost-dev, libcurl4-openssl-dev, libeigen3-dev, libfmt-dev, libgstreamer-plugins-base1.0-dev, libpugixml-dev, libspdlog-dev, libssl-dev, libsystemd-dev, libturbojpeg0-dev, libyaml-cpp-dev")
+  "libavcodec-dev, libavformat-dev, libavutil-dev, libboost-dev, libcurl4-openssl-dev, libeigen3-dev, libfmt-dev, libgstreamer-plugins-base1.0-dev, libpugixml-dev, libspdlog-dev, libssl-dev, libswscale-dev, libsystemd-dev, libturbojpeg0-dev, libyaml-cpp-dev")
 set(CPACK_COMPONENT_LIBRARIES_DESCRIPTION
   "direction sensor made of a pan-tilt-zoom camera (libraries)
 Headers, static libraries and a CMake package of Alidade, for programs that
