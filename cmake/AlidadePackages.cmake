@@ -80,8 +80,8 @@ set(CPACK_COMPONENT_EDGE_DESCRIPTION
 Gives, for every video frame and in real time, the orientation of a cheap
 pan-tilt-zoom camera and the direction of any pixel, each with an honest
 uncertainty. It listens to video (RTSP, MJPEG, V4L2) and to pan and tilt
-telemetry (VAPIX, ONVIF, Pelco-D, VISCA, FLIR PTU), and calibrates itself
-while the camera moves.
+telemetry (VAPIX, ONVIF, heads on a serial line, TCP or UDP), and calibrates
+itself while the camera moves.
 
 This is the program, and a systemd service that runs it. On armhf it needs a
 processor with NEON.")
@@ -89,7 +89,7 @@ set(CPACK_DEBIAN_LIBRARIES_PACKAGE_NAME alidade-dev)
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_SECTION libdevel)
 # What the CMake package finds, and what its static libraries link.
 set(CPACK_DEBIAN_LIBRARIES_PACKAGE_DEPENDS
-  "libavcodec-dev, libavformat-dev, libavutil-dev, libboost-dev, libcurl4-openssl-dev, libeigen3-dev, libfmt-dev, libgstreamer-plugins-base1.0-dev, libpugixml-dev, libspdlog-dev, libssl-dev, libsystemd-dev, libturbojpeg0-dev, libyaml-cpp-dev")
+  "libavcodec-dev, libavformat-dev, libavutil-dev, libboost-dev, libcurl4-openssl-dev, libeigen3-dev, libfmt-dev, libgstreamer-plugins-base1.0-dev, libpugixml-dev, libspdlog-dev, libssl-dev, libswscale-dev, libsystemd-dev, libturbojpeg0-dev, libyaml-cpp-dev")
 set(CPACK_COMPONENT_LIBRARIES_DESCRIPTION
   "direction sensor made of a pan-tilt-zoom camera (libraries)
 Headers, static libraries and a CMake package of Alidade, for programs that

@@ -120,7 +120,8 @@ add_custom_target(quick_programs)
 #   NATIVE      those of SOURCES that do not run under an emulated processor (programs are started, pseudo-terminals,
 #               libraries that the sysroot lacks), with NATIVE_SUPPORT and NATIVE_LINK; `NATIVE ALL`: the whole program
 #   THOROUGH    patterns of cases that only `scripts/test all` runs: entry NAME.thorough, with the label thorough
-#   UNSANITIZED patterns of cases from which a sanitizer learns nothing that others do not show it: repetition, long films
+#   UNSANITIZED patterns of cases from which a sanitizer learns nothing that others do not show it: repetition, long films.
+#               Under an emulated processor they are THOROUGH
 #   SHARDS      how many processes share the cases, for a room whose tests mostly wait
 #   COST        seconds, of a room that takes long: ctest starts the dearest first, so that none is left over at the end
 #   DEFINITIONS, DEPENDS, LABELS, TIMEOUT (s), RESOURCE_LOCK
@@ -168,6 +169,8 @@ function(alidade_test name)
   set(left_out)
   if(ALIDADE_SANITIZE)
     set(left_out ${A_UNSANITIZED})
+  elseif(CMAKE_CROSSCOMPILING)
+    list(APPEND A_THOROUGH ${A_UNSANITIZED})
   endif()
   string(REPLACE ";" ":" thorough "${A_THOROUGH}")
   string(REPLACE ";" ":" left_out "${left_out}")
@@ -230,6 +233,11 @@ add_custom_target(fuzz_programs)
 # alidade_fuzz_regressions() makes, which runs those files and n mutations of them (5000).
 function(alidade_fuzz_target name)
   cmake_parse_arguments(A "" "MUTATIONS;LONGEST" "LINK" ${ARGN})
+  file(GLOB seeds CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/corpus/${name}/*)
+  if(NOT seeds)
+    message(FATAL_ERROR "${CMAKE_CURRENT_SOURCE_DIR}/corpus/${name} is empty: a fuzz target begins with examples")
+  endif()
+  set_property(GLOBAL APPEND PROPERTY ALIDADE_FUZZ_SOURCES ${name}_fuzz.cpp)
   if(NOT A_MUTATIONS)
     set(A_MUTATIONS 5000)
   endif()
@@ -262,6 +270,20 @@ function(alidade_fuzz_target name)
   # A fifth faster; an input that fails tells more when it is run again without.
   set_tests_properties(fuzz_${name}_ten_million PROPERTIES LABELS "fuzz;slow" TIMEOUT 10800
     ENVIRONMENT ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=16)
+endfunction()
+
+# Every *_fuzz.cpp here is of a target that has been declared, or is one of those named: none lies about unbuilt.
+function(alidade_require_fuzz_targets)
+  get_property(declared GLOBAL PROPERTY ALIDADE_FUZZ_SOURCES)
+  set(others ${ARGN})
+  list(TRANSFORM others APPEND _fuzz.cpp)
+  file(GLOB found RELATIVE ${CMAKE_CURRENT_SOURCE_DIR} CONFIGURE_DEPENDS ${CMAKE_CURRENT_SOURCE_DIR}/*_fuzz.cpp)
+  foreach(file IN LISTS found)
+    if(NOT file IN_LIST declared AND NOT file IN_LIST others)
+      message(FATAL_ERROR "${CMAKE_CURRENT_SOURCE_DIR}/${file} is of no target: declare it in CMakeLists.txt, or its head in "
+        "platform/pan_tilt/heads.h")
+    endif()
+  endforeach()
 endfunction()
 
 # The program fuzz_regressions of all targets declared so far, and planted_defect_fuzz.cpp, which proves that it bites.

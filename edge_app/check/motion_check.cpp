@@ -172,6 +172,12 @@ MotionReport check_motion(const std::vector<TimedShift>& shifts,
   }
   report.pan = judge_axis(search, best, 0);
   report.tilt = judge_axis(search, best, 1);
+  // At an offset that is none, the head looks reversed by chance.
+  const bool doubtful =
+      !search.sure || report.pan == AxisVerdict::kUnclear || report.tilt == AxisVerdict::kUnclear;
+  for (AxisVerdict* verdict : {&report.pan, &report.tilt}) {
+    if (doubtful && *verdict == AxisVerdict::kReversed) *verdict = AxisVerdict::kUnclear;
+  }
   double mp = 0;
   double pp = 0;
   for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -179,7 +185,7 @@ MotionReport check_motion(const std::vector<TimedShift>& shifts,
     mp += std::abs(search.fits[best].own[axis].mp);
     pp += search.fits[best].own[axis].pp;
   }
-  if (pp > 0) {
+  if (pp > 0 && search.sure) {
     report.focal_length_px = mp / pp;
     report.clock_offset_s = search.offsets[best];
   }

@@ -7,7 +7,8 @@
 //   the axis moved the image by 2 px rms over those 0.3 s (the tracker errs by a tenth of that),
 //   in eight such times or more, of which
 //   at least 80 % is explained with this sign, and no offset searched explains 4/5 of that with the other:
-//   an even swing fits half a period later as well with the sign reversed, and tells nothing.
+//   an even swing fits half a period later as well with the sign reversed, and tells nothing;
+// and that an axis is reversed, only where the search is sure (MotionSearch) and the other axis is understood if it moved.
 // Image motion that follows the other axis better than its own is an image that is turned by a quarter.
 // An image that moves by a quarter of its width while the head reports one angle, or stands still while the head reports
 // as much, is not of this head, or the head does not measure.
@@ -49,10 +50,11 @@ struct MotionReport {
   AxisVerdict tilt = AxisVerdict::kNotMoved;
   bool image_moved = false;
   bool head_moved = false;
-  bool quarter_turn = false;              // pan moves the image up or down, tilt to the side
-  std::optional<double> focal_length_px;  // of the axes whose sign is told
-  std::optional<double> clock_offset_s;   // known to some 20 ms
-  double explained = 0;                   // share of the image's motion
+  bool quarter_turn = false;  // pan moves the image up or down, tilt to the side
+  std::optional<double>
+      focal_length_px;                   // of the axes whose sign is told, where the search is sure
+  std::optional<double> clock_offset_s;  // known to some 20 ms
+  double explained = 0;                  // share of the image's motion
   Findings findings;
 };
 

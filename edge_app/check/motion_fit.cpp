@@ -10,8 +10,9 @@ namespace alidade {
 namespace {
 
 constexpr double kBaseline_s = 0.3;
-constexpr double kSearch_s = 1;  // to both sides
 constexpr double kStep_s = 0.01;
+constexpr int kFirstSteps = 100;       // to both sides
+constexpr double kWell = 0.9;          // of the motion
 constexpr double kLargestGap_s = 0.5;  // between samples: TelemetryLimits
 
 MotionFit fit_at(const std::vector<TimedShift>& motions, const HeadPath& head, double offset_s) {
@@ -129,12 +130,23 @@ double crossed(const MotionFit& fit) {
 
 MotionSearch::MotionSearch(const std::vector<TimedShift>& motions, const HeadPath& head,
                            double around_s, double least_times) {
-  for (double offset = -kSearch_s; offset <= kSearch_s + kStep_s / 2; offset += kStep_s) {
-    const MotionFit at = fit_at(motions, head, around_s + offset);
-    // Motions overlap by half.
-    if (0.5 * static_cast<double>(at.used) < least_times) continue;
-    offsets.push_back(around_s + offset);
-    fits.push_back(at);
+  // Motions overlap by half.
+  const double least = std::max(2 * least_times, 0.5 * static_cast<double>(motions.size()));
+  const auto score = [](const MotionFit& fit) { return explained(fit, {0, 0}); };
+  std::size_t covered = 0;
+  for (int steps = kFirstSteps;; steps *= 2) {
+    offsets.clear();
+    fits.clear();
+    for (int i = -steps; i <= steps; ++i) {
+      const MotionFit fit = fit_at(motions, head, around_s + i * kStep_s);
+      if (static_cast<double>(fit.used) < least) continue;
+      offsets.push_back(around_s + i * kStep_s);
+      fits.push_back(fit);
+    }
+    const std::size_t at = best(score);
+    sure = at > 0 && at + 1 < fits.size() && score(fits[at]) >= kWell;
+    if (sure || fits.size() == covered) return;
+    covered = fits.size();
   }
 }
 

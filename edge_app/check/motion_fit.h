@@ -69,14 +69,18 @@ struct MotionFit {
 // The same with each axis of the image against the other axis of the head: an image turned by a quarter.
 [[nodiscard]] double crossed(const MotionFit& fit);
 
-// Fits at clock offsets around one, as far as calibrate() searches first.
+// Fits at clock offsets around one: a second to both sides, and twice as far each time as long as none explains the motion
+// well, or the best lies at an end. As calibrate() does, but that one looks at the ends only.
 struct MotionSearch {
-  // Offsets at which fewer than least_times baselines without overlap are covered are left out.
+  // Offsets at which less than half of the motions, or fewer than least_times baselines without overlap, are covered
+  // are left out.
   MotionSearch(const std::vector<TimedShift>& motions, const HeadPath& head, double around_s,
                double least_times);
 
-  std::vector<double> offsets;  // s
+  std::vector<double> offsets;  // s, ascending
   std::vector<MotionFit> fits;
+  bool sure =
+      false;  // the motion is explained well, and not at an end, beyond which it may be explained better
 
   // Index of the best; the first of equals.
   template <typename Score>

@@ -37,12 +37,13 @@ void judge_rate(TelemetryReport* report, const TelemetryNeeds& needs) {
   } else if (age_s > needs.max_extrapolation_s) {
     add_problem(
         &report->findings,
-        fmt::format("{}the newest angle known is up to {:.0f} ms old when a frame asks for it "
-                    "(pan_tilt.max_repeat_s, {:.0f} ms, is part of it while the head rests), and "
-                    "realtime.max_extrapolation_s is {:.0f} ms: such frames get no angle; "
-                    "set it to {:.2f}, or raise pan_tilt.rate_hz",
-                    where, 1e3 * age_s, 1e3 * needs.max_repeat_s, 1e3 * needs.max_extrapolation_s,
-                    kReserve * age_s + 0.005));
+        fmt::format(
+            "{}the newest angle known is up to {:.0f} ms old (95 %) when a frame asks for it "
+            "(pan_tilt.max_repeat_s, {:.0f} ms, is part of it while the head rests), and "
+            "realtime.max_extrapolation_s is {:.0f} ms: such frames get no angle; "
+            "set it to {:.2f}, or raise pan_tilt.rate_hz",
+            where, 1e3 * age_s, 1e3 * needs.max_repeat_s, 1e3 * needs.max_extrapolation_s,
+            kReserve * age_s + 0.005));
   } else if (needs.rate_hz && *report->rate_hz < kMuchSlower * *needs.rate_hz) {
     add_advice(
         &report->findings,
@@ -214,6 +215,13 @@ ReportLines describe(const TelemetryReport& report) {
   lines.emplace_back("time", fmt::format("known to {:.2f} ms median, {:.2f} (95 %), {:.2f} (worst)",
                                          1e3 * report.bounds_s->median, 1e3 * report.bounds_s->most,
                                          1e3 * report.bounds_s->largest));
+  if (report.age_s) {
+    lines.emplace_back(
+        "age", fmt::format("of the newest angle known, as the next one comes: {:.1f} ms median, "
+                           "{:.1f} (95 %), {:.1f} (worst)",
+                           1e3 * report.age_s->median, 1e3 * report.age_s->most,
+                           1e3 * report.age_s->largest));
+  }
   if (report.change_hz) {
     lines.emplace_back(
         "changes",

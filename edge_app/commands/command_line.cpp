@@ -56,6 +56,12 @@ void add_replay(CLI::App& app, int* exit_code) {
   command->add_flag("--realtime", options->realtime, "At the pace of the recording");
   CLI::Option* json = command->add_flag("--json", options->json, "Also on stdout, as JSON Lines");
   command->add_flag("--csv", options->csv, "Also on stdout, as CSV")->excludes(json);
+  command->footer(
+      "Reads no configuration: how long telemetry is extrapolated and a repeated angle trusted is "
+      "the default of "
+      "realtime.max_extrapolation_s and pan_tilt.max_repeat_s, whatever they were live. With those "
+      "of a configuration: "
+      "alidade run, with video and pan_tilt of type recording.");
   command->callback([options, exit_code] { *exit_code = replay_recording(*options); });
 }
 

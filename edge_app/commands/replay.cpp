@@ -2,6 +2,7 @@
 // receive time is known when the frame is answered, and nothing later is. So the answer is what
 // a live step would have given, and the same in each replay.
 // In OE mode pictures are decoded besides; a frame whose picture cannot be is answered from telemetry.
+// It reads no configuration: how long telemetry holds is the default of TelemetryLimits.
 
 #include <fcntl.h>
 #include <fmt/format.h>

@@ -196,18 +196,19 @@ void check_ages(const Config& config, const YamlSection& pan_tilt, const YamlSec
   const double extrapolation_s = config.realtime.max_extrapolation_s;
   if (repeat_s == 0 || repeat_s < extrapolation_s) return;
   const std::string why = "so that a head at rest has no angle that is new enough; expected ";
+  const std::string right_repeat =
+      extrapolation_s > 0 ? fmt::format("less than {}", extrapolation_s) : "0";
   if (pan_tilt.has("max_repeat_s")) {
-    pan_tilt.fail(
-        "max_repeat_s",
-        fmt::format("is {} s, no less than realtime.max_extrapolation_s ({} s), {}less, or "
-                    "a longer max_extrapolation_s",
-                    repeat_s, extrapolation_s, why));
+    pan_tilt.fail("max_repeat_s",
+                  fmt::format("is {} s, no less than realtime.max_extrapolation_s ({} s), {}{}, or "
+                              "realtime.max_extrapolation_s more than {}",
+                              repeat_s, extrapolation_s, why, right_repeat, repeat_s));
   }
   realtime.fail(
       "max_extrapolation_s",
-      fmt::format("is {} s, no more than pan_tilt.max_repeat_s ({} s), {}more, or a shorter "
-                  "max_repeat_s",
-                  extrapolation_s, repeat_s, why));
+      fmt::format("is {} s, no more than pan_tilt.max_repeat_s ({} s), {}more than {}, or "
+                  "pan_tilt.max_repeat_s {}",
+                  extrapolation_s, repeat_s, why, repeat_s, right_repeat));
 }
 
 void read_config(YamlSection& top, const std::string& path, Config* config) {

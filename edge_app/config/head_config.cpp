@@ -104,9 +104,9 @@ HeadOptions read_protocol(YamlSection& section, HeadType type, const ByteLinkOpt
     case HeadType::kVisca:
       return read_visca(section, link);
     case HeadType::kPtu:
-      break;
+      return read_ptu(section);
   }
-  return read_ptu(section);
+  section.fail("type", "is no head on a line");
 }
 
 }  // namespace

@@ -1,8 +1,7 @@
 #pragma once
 // The part of section pan_tilt that describes a head on a serial line, TCP or UDP: protocol, line, and
 // what the device counts. Nothing about the head is guessed: where makers differ (degrees per step,
-// which way counts as positive, the header of VISCA's datagrams) a key is required; what a protocol
-// or the device itself says (Pelco-D's hundredths of a degree, a PTU's resolution) is the default.
+// which way counts as positive) a key is required; what a protocol or the device itself says is the default.
 
 #include <string>
 

@@ -14,7 +14,7 @@ struct PanTiltConfig {
   enum class Type { kVapix, kOnvif, kHead, kRecording };
   Type type = Type::kVapix;
   std::string url;        // vapix, onvif
-  HeadConfig head;        // pelco_d, visca, ptu
+  HeadConfig head;        // a key of kHeads
   AxisMappings axes;      // not of a recording
   std::string directory;  // recording
   std::string user;

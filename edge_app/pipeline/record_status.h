@@ -25,9 +25,8 @@ enum class RecordStatus : std::uint8_t {
   kVideoLost,         // no connection to the video source
   kTelemetryLost,     // no connection to the pan/tilt source, and its last sample is too old
   kTelemetryMissing,  // fewer than two usable samples so far
-  // The frame lies more than TelemetryLimits::max_extrapolation_s beyond the newest sample; by how much says
-  // OrientationRecord::telemetry_age_s. The source answers too seldom or too late, or says the same angle for long
-  // (a repeat is trusted up to max_repeat_s before it only: telemetry_buffer.h).
+  // The frame lies more than TelemetryLimits::max_extrapolation_s beyond the newest angle that is trusted; by how much
+  // says OrientationRecord::telemetry_age_s. What decides it, and which key to change: edge_app/config/README.md.
   kTelemetryTooOld,
   kTelemetryGap,          // the samples around the frame lie too far apart
   kFrameBeforeTelemetry,  // the frame is older than the oldest sample kept

@@ -5,7 +5,7 @@
 // between the readings before and after it. With the middles t0 and t2 and half widths h0 and h2 of
 // the pan readings' intervals and t1, h1 of the tilt's, w = (t1 - t0) / (t2 - t0):
 //   pan = pan0 + w wrap(pan2 - pan0), interval t1 -+ max(h1, (1 - w) h0 + w h2).
-// Without it pan and tilt would be apart by half a cycle: 15 ms with Pelco-D at 9600 baud, more than any
+// Without it pan and tilt would be apart by half a cycle: 15 ms at 34 Hz, more than any
 // clock offset can repair. The price is that a sample comes half a cycle later. Where both axes repeat
 // the reading before, the head is at rest or the device has not measured since: the sample repeats, too.
 //

@@ -1,7 +1,7 @@
 #pragma once
-// The heads that QuerySource can ask, each with one row. Configuration, tests' rig and fuzz targets take
-// their lists from here, and a switch over HeadType or a visit of HeadOptions that lacks one does not
-// compile. How to add a head: README.md of this folder.
+// The heads that QuerySource can ask, each with one row. Sources, configuration, tests, fuzz targets and soak
+// take their lists from here; a switch over HeadType or a visit of HeadOptions that lacks one does not
+// compile, and CMake names a file that one lacks. How to add a head: README.md of this folder.
 
 #include <array>
 #include <cstddef>
@@ -25,11 +25,11 @@ using HeadOptions = std::variant<PelcoDOptions, ViscaOptions, PtuOptions>;
 
 struct Head {
   HeadType type;
-  const char* key;   // pan_tilt.type of the configuration; <key>_protocol.h, <key>_fuzz.cpp
+  const char* key;   // pan_tilt.type of the configuration; KEY_protocol.h, KEY_fuzz.cpp
   UsualSigns signs;  // as the protocol defines them
 };
 
-// test/fuzz/CMakeLists.txt reads these lines, too.
+// cmake/AlidadeHeads.cmake reads these lines, too: one a head.
 inline constexpr std::array<Head, std::variant_size_v<HeadOptions>> kHeads = {{
     {HeadType::kPelcoD, "pelco_d", {1, -1}},
     {HeadType::kVisca, "visca", kSignsOfTheMaker},

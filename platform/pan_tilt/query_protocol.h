@@ -1,6 +1,6 @@
 #pragma once
 // QueryProtocol: what a pan/tilt head is asked and how its answers are found among the bytes that
-// come: Pelco-D, VISCA, FLIR PTU. No I/O, no clock, no exceptions; QuerySource does the talking.
+// come; the protocols are those of heads.h. No I/O, no clock, no exceptions; QuerySource does the talking.
 //
 // One query is under way at a time. next() gives it; find() looks for its answer in all bytes that
 // have come since it was sent (at most kMaxAnswer; a device that babbles loses the oldest). What is
@@ -48,7 +48,7 @@ struct Answer {
   double pan_deg = 0;
   double tilt_deg = 0;
   double zoom = 0;        // device units
-  std::size_t begin = 0;  // index of the answer's first byte
+  std::size_t begin = 0;  // index of the answer's first byte, below the number of bytes searched
   std::string problem;    // what the device said, or what is wrong with what came; may be empty
 };
 
@@ -60,6 +60,7 @@ class QueryProtocol {
   virtual void restart() = 0;  // a new connection: nothing is known of the device
   // Never without bytes: an answer is waited for after each. After give_up() other bytes than before it.
   [[nodiscard]] virtual Query next() = 0;
+  // A reading lies within a turn, and begins with one of the bytes. None in no bytes.
   [[nodiscard]] virtual Answer find(std::string_view bytes) = 0;
   // Bytes that bring the device back to the start of a command and that it does not answer; mostly none.
   [[nodiscard]] virtual std::string give_up() = 0;

@@ -215,7 +215,13 @@ Answer QuerySource::find(const std::string& bytes, double now_s) {
     arrivals_s_.erase(arrivals_s_.begin(),
                       arrivals_s_.begin() + static_cast<std::ptrdiff_t>(excess));
   }
-  return protocol_->find(received_);
+  Answer answer = protocol_->find(received_);
+  if (answer.kind != Answer::Kind::kNone && answer.begin >= received_.size()) {
+    answer = {};
+    answer.problem = std::string(protocol_->name()) +
+                     " takes an answer from where no byte has come: a defect of this program";
+  }
+  return answer;
 }
 
 // True: *sample is filled.

@@ -4,6 +4,7 @@
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
+#include <libswscale/swscale.h>
 }
 
 #include <memory>
@@ -18,6 +19,7 @@ struct AvDeleter {
   void operator()(AVCodecParameters* parameters) const { avcodec_parameters_free(&parameters); }
   void operator()(AVCodecParserContext* parser) const { av_parser_close(parser); }
   void operator()(AVIOContext* io) const { avio_close(io); }
+  void operator()(SwsContext* scaler) const { sws_freeContext(scaler); }
 };
 
 using PacketPtr = std::unique_ptr<AVPacket, AvDeleter>;
@@ -25,6 +27,7 @@ using FramePtr = std::unique_ptr<AVFrame, AvDeleter>;
 using CodecContextPtr = std::unique_ptr<AVCodecContext, AvDeleter>;
 using CodecParametersPtr = std::unique_ptr<AVCodecParameters, AvDeleter>;
 using AvioPtr = std::unique_ptr<AVIOContext, AvDeleter>;
+using ScalerPtr = std::unique_ptr<SwsContext, AvDeleter>;
 using ParserPtr = std::unique_ptr<AVCodecParserContext, AvDeleter>;
 
 inline std::string av_error_text(int code) {

@@ -51,8 +51,31 @@ bool LumaDecoder::send(const AVPacket* packet) {
   return avcodec_send_packet(context_.get(), packet) >= 0;
 }
 
+FramePtr LumaDecoder::as_grey(const AVFrame& frame) {
+  const auto format = static_cast<AVPixelFormat>(frame.format);
+  scaler_.reset(sws_getCachedContext(scaler_.release(), frame.width, frame.height, format,
+                                     frame.width, frame.height, AV_PIX_FMT_GRAY8,
+                                     SWS_POINT | SWS_ACCURATE_RND, nullptr, nullptr, nullptr));
+  FramePtr grey(av_frame_alloc());
+  if (scaler_ && grey) {
+    grey->format = AV_PIX_FMT_GRAY8;
+    grey->width = frame.width;
+    grey->height = frame.height;
+    grey->pts = frame.pts;
+    if (av_frame_get_buffer(grey.get(), 0) >= 0 &&
+        sws_scale(scaler_.get(), frame.data, frame.linesize, 0, frame.height, grey->data,
+                  grey->linesize) == frame.height) {
+      return grey;
+    }
+  }
+  const char* name = av_get_pix_fmt_name(format);
+  error_ = std::string("pixel format ") + (name != nullptr ? name : "unknown") +
+           " cannot be converted to grey; use grey, 8-bit YUV or RGB pictures";
+  return nullptr;
+}
+
 LumaDecoder::Result LumaDecoder::receive(Picture* picture) {
-  const std::shared_ptr<AVFrame> frame(av_frame_alloc(), AvDeleter());
+  std::shared_ptr<AVFrame> frame(av_frame_alloc(), AvDeleter());
   const int code = avcodec_receive_frame(context_.get(), frame.get());
   if (code == AVERROR(EAGAIN) || code == AVERROR_EOF) {
     return Result::kNone;
@@ -60,11 +83,11 @@ LumaDecoder::Result LumaDecoder::receive(Picture* picture) {
   if (code < 0 || frame->decode_error_flags != 0 || (frame->flags & AV_FRAME_FLAG_CORRUPT) != 0) {
     return Result::kDamaged;
   }
-  const AVPixFmtDescriptor* format = av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame->format));
-  if (!has_luma_plane(format)) {
-    error_ = std::string("pixel format ") + (format != nullptr ? format->name : "unknown") +
-             " has no 8-bit luma plane; use grey or 8-bit YUV pictures";
-    return Result::kUnsupported;
+  if (!has_luma_plane(av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame->format)))) {
+    frame = as_grey(*frame);
+    if (!frame) {
+      return Result::kUnsupported;
+    }
   }
   picture->width = frame->width;
   picture->height = frame->height;

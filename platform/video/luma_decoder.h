@@ -2,7 +2,8 @@
 // LumaDecoder: compressed pictures in, 8-bit luma planes out, by libavcodec.
 //
 // The luma plane is the decoder's own plane 0 (grey, any 8-bit YUV 4xx, NV12), neither copied nor
-// converted; the picture's owner keeps it alive. Other pixel formats are refused.
+// converted; the picture's owner keeps it alive. Other pixel formats (RGB, palettes, more bits) become grey by
+// libswscale, which costs a copy.
 // Runs on the caller's thread only: frame threads would add frames of delay. One thread at a time.
 
 #include <cstddef>
@@ -29,7 +30,7 @@ class LumaDecoder {
     kPicture,
     kNone,        // nothing more until the next packet
     kDamaged,     // a picture that is incomplete; others may follow
-    kUnsupported  // no 8-bit luma plane: see error()
+    kUnsupported  // cannot be converted to grey: see error()
   };
 
   // low_delay: never hold a picture back to put it in order.
@@ -45,7 +46,11 @@ class LumaDecoder {
   [[nodiscard]] const std::string& error() const { return error_; }
 
  private:
+  // Null and error_ where there is no conversion.
+  FramePtr as_grey(const AVFrame& frame);
+
   CodecContextPtr context_;
+  ScalerPtr scaler_;  // made for the first picture that needs it
   std::string error_;
 };
 

@@ -218,6 +218,8 @@ ReadStatus FramesOnDisk::next_image(Frame* frame) {
     LumaDecoder::Result result = LumaDecoder::Result::kNone;
     if (av_new_packet(packet.get(), static_cast<int>(bytes.size())) == 0) {
       std::copy(bytes.begin(), bytes.end(), packet->data);
+      // Without it the PNG decoder adds each picture to the one before.
+      packet->flags |= AV_PKT_FLAG_KEY;
       if (!bytes.empty() && decoder_.send(packet.get())) {
         result = decoder_.receive(&picture);
       }

@@ -37,6 +37,10 @@ def sources_of(top, cmake_lists):
                 variables[first] = words
             elif command == "list" and first == "APPEND" and words:
                 variables.setdefault(words[0], []).extend(words[1:])
+            elif command == "alidade_files_of_heads":
+                # CMake refuses a file of that form which is of no head.
+                prefix, suffix = (word.strip('"') for word in words)
+                variables[first] = sorted(str(file.relative_to(folder)) for file in folder.glob(f"{prefix}*{suffix}"))
             elif command in ("alidade_test", "add_executable"):
                 files = [folder / word.replace("${PROJECT_SOURCE_DIR}", str(top)) for word in words if word.endswith(".cpp")]
                 programs.setdefault(first, []).extend(file for file in files if file.is_file())

@@ -4,11 +4,13 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdio>
 #include <memory>
 #include <string>
 
 #include "platform/system/clock.h"
 #include "test/edge_app/alidade_command.h"
+#include "test/platform/support/head_kinds.h"
 #include "test/simulator/servers/head_server.h"
 #include "test/support/temporary_directory.h"
 
@@ -29,21 +31,26 @@ Result check(const std::string& pan_tilt, const std::string& duration_s = "0.5")
                                       pan_tilt + "}\ncamera: {focal_length_px: 1000}\n")});
 }
 
-TEST(HeadCommand, ChecksAPelcoDHead) {
-  const HeadServer server(HeadServer::Link::kSerial, std::make_unique<PelcoDHead>(position));
-  const Result result = check("type: pelco_d, device: " + server.address());
-  EXPECT_THAT(result.output,
-              HasSubstr(server.address() + ": pan -120.0000 deg, tilt 30.0000 deg, "));
-}
+class CheckedHead : public ::testing::TestWithParam<HeadKind> {};
 
-TEST(HeadCommand, ChecksAViscaHead) {
-  const HeadServer server(HeadServer::Link::kUdp, std::make_unique<ViscaHead>(position));
-  const Result result = check(
-      "type: visca, header: false, pan_positive: right, tilt_positive: up, "
-      "pan_deg_per_step: 0.01953125, tilt_deg_per_step: 0.01953125, url: '" +
-      server.address() + "'");
-  EXPECT_THAT(result.output,
-              HasSubstr(server.address() + ": pan -120.0000 deg, tilt 30.0000 deg, "));
+INSTANTIATE_TEST_SUITE_P(Heads, CheckedHead, ::testing::ValuesIn(last_kinds_in_turn()),
+                         [](const auto& tested) { return tested.param.name(); });
+
+// With nothing but the keys that its configuration requires.
+TEST_P(CheckedHead, IsFoundWhereItIs) {
+  const HeadServer server(GetParam().link, simulated_head(GetParam(), position));
+  const Result result = check(settings_of(GetParam(), server.address()) + signs_of(GetParam()));
+  const std::string headline = server.address() + ": pan ";
+  const std::size_t begin = result.output.find(headline);
+  ASSERT_NE(begin, std::string::npos) << result.output << result.errors;
+  double pan_deg = 0;
+  double tilt_deg = 0;
+  ASSERT_EQ(std::sscanf(result.output.c_str() + begin + headline.size(), "%lf deg, tilt %lf deg, ",
+                        &pan_deg, &tilt_deg),
+            2);
+  const double rounding_deg = GetParam().head->step_deg / 2 + 1e-4;
+  EXPECT_NEAR(pan_deg, position().pan_deg, rounding_deg);
+  EXPECT_NEAR(tilt_deg, position().tilt_deg, rounding_deg);
 }
 
 TEST(HeadCommand, MeasuresAHeadThatTurns) {
@@ -63,15 +70,6 @@ TEST(HeadCommand, MeasuresAHeadThatTurns) {
   EXPECT_THAT(result.output, HasSubstr("advice         pan/tilt " + server.address() +
                                        ": angles come in steps of 0.0195 deg"));
   EXPECT_THAT(result.output, HasSubstr("angle_quantum_rad: 0.000341"));
-}
-
-TEST(HeadCommand, ChecksAPtu) {
-  const HeadServer server(HeadServer::Link::kTcp, std::make_unique<PtuHead>(position));
-  const Result result =
-      check("type: ptu, pan_positive: left, tilt_positive: up, url: '" + server.address() + "'");
-  // 2333 steps of 185.1428 and 1167 of 92.5714 seconds of arc.
-  EXPECT_THAT(result.output,
-              HasSubstr(server.address() + ": pan -119.9828 deg, tilt 30.0086 deg, "));
 }
 
 TEST(HeadCommand, SaysWhatASilentHeadNeeds) {

@@ -34,7 +34,8 @@ struct Scene {
   MotionNeeds needs;
 
   template <typename Path>
-  explicit Scene(const Path& path, const Vector2<double>& signs = {1, 1}, double start = 0) {
+  explicit Scene(const Path& path, const Vector2<double>& signs = {1, 1}, double start = 0,
+                 double offset = kOffset) {
     std::mt19937 random(2);
     std::normal_distribution<double> noise(0, 0.1);
     for (int i = 0; i < 250; ++i) {
@@ -48,7 +49,7 @@ struct Scene {
     }
     for (int i = -30; i < 330; ++i) {
       PanTiltSample sample;
-      sample.earliest_time_s = sample.latest_time_s = i / 30.0 + kOffset;
+      sample.earliest_time_s = sample.latest_time_s = i / 30.0 + offset;
       const Vector2<double> angle = path(i / 30.0).cwiseProduct(signs);
       sample.pan_rad = wrap_angle(start + angle[0]);
       sample.tilt_rad = wrap_angle(angle[1]);
@@ -74,6 +75,30 @@ TEST(MotionCheck, FindsSignsFocalLengthAndOffset) {
   EXPECT_NEAR(*report.focal_length_px, kFocalLength, 0.02 * kFocalLength);
   EXPECT_NEAR(*report.clock_offset_s, kOffset, 0.011);
   EXPECT_THAT(report.findings, IsEmpty());
+}
+
+TEST(MotionCheck, FindsThemWhereVideoIsLateBySeconds) {
+  for (const double offset : {-3.1, -1.74, -1.2, -1.0, 1.01, 2.2}) {
+    const MotionReport report = Scene(wander, {1, 1}, 0, offset).check();
+    EXPECT_EQ(report.pan, AxisVerdict::kRight) << offset;
+    EXPECT_EQ(report.tilt, AxisVerdict::kRight) << offset;
+    EXPECT_NEAR(report.focal_length_px.value_or(0), kFocalLength, 0.02 * kFocalLength) << offset;
+    EXPECT_NEAR(report.clock_offset_s.value_or(0), offset, 0.011) << offset;
+    EXPECT_THAT(report.findings, IsEmpty()) << offset;
+  }
+}
+
+// Later than the video is long: whatever fits then fits by chance.
+TEST(MotionCheck, ClaimsNothingWhereTheOffsetCannotBeFound) {
+  for (const double offset : {-9.0, -7.5, -6.0, 6.0, 7.5, 9.0, 40.0}) {
+    for (const double phase : {0.0, 1.0, 2.0, 3.0}) {
+      const auto later = [&](double t) { return wander(t + phase); };
+      const MotionReport report = Scene(later, {1, 1}, 0, offset).check();
+      EXPECT_NE(report.pan, AxisVerdict::kReversed) << offset << " " << phase;
+      EXPECT_NE(report.tilt, AxisVerdict::kReversed) << offset << " " << phase;
+      EXPECT_THAT(report.findings, IsEmpty()) << offset << " " << phase;
+    }
+  }
 }
 
 TEST(MotionCheck, FindsThemAcrossHalfATurn) {

@@ -16,9 +16,11 @@ namespace alidade {
 namespace {
 
 using ::testing::AllOf;
+using ::testing::Contains;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Pair;
 
 constexpr double kRate = 30;  // Hz
 constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
@@ -66,6 +68,10 @@ TEST(TelemetryCheck, MeasuresAHealthyHead) {
   EXPECT_NEAR(*report.rate_hz, kRate, 1e-6);
   EXPECT_NEAR(*report.change_hz, kRate, 1e-6);
   EXPECT_NEAR(report.bounds_s->median, 2e-3, 1e-9);
+  // From the middle of one sample's interval to the coming of the next sample.
+  EXPECT_NEAR(report.age_s->largest, 1 / kRate + 1e-3, 1e-9);
+  EXPECT_THAT(describe(report),
+              Contains(Pair("age", HasSubstr("34.3 ms median, 34.3 (95 %), 34.3 (worst)"))));
   EXPECT_EQ(report.stale, 0U);
   // But for 8 samples about each of up to 8 turns.
   EXPECT_GT(report.turning, 230U);
@@ -159,7 +165,7 @@ TEST(TelemetryCheck, SaysThatSamplesAreTooFarApart) {
   std::vector<PanTiltSample> at_rest = every(5);
   for (PanTiltSample& sample : at_rest) sample.pan_rad = 0.1;
   EXPECT_THAT(problems(check(at_rest, needed).findings),
-              ElementsAre(HasSubstr("known is up to 268 ms old")));
+              ElementsAre(HasSubstr("known is up to 268 ms old (95 %)")));
   needed.max_repeat_s = 0.05;
   EXPECT_THAT(check(at_rest, needed).findings, IsEmpty());
   needed = needs();

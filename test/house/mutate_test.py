@@ -179,7 +179,10 @@ alidade_test(one_test SOURCES ${sources} ${unknown}
   DEFINITIONS FILE="$<TARGET_FILE:other>")
 set(sources d_test.cpp)
 alidade_test(other_test SOURCES ${sources} missing_test.cpp)
+alidade_files_of_heads(protocols "" _protocol_test.cpp)
+alidade_test(heads_test SOURCES ${protocols})
 """)
+            (top / "room/foo_protocol_test.cpp").write_text("TEST(Foo, Works) {}\n")
             for name in "abcd":
                 (top / f"room/{name}_test.cpp").write_text(f'#include "test/shared.h"\nTEST({name.upper()}, Works) {{}}\n')
             (top / "test").mkdir()
@@ -187,6 +190,7 @@ alidade_test(other_test SOURCES ${sources} missing_test.cpp)
             found = suites.Suites(top, ["room/CMakeLists.txt", "README.md"])
             self.assertEqual(found.tests("one_test"), ["A.Works", "B.Works", "C.Works", "Shared.Works"])
             self.assertEqual(found.tests("other_test"), ["D.Works", "Shared.Works"])
+            self.assertEqual(found.tests("heads_test"), ["Foo.Works"])
             with self.assertRaises(catalogue.ListError):
                 found.tests("third_test")
 

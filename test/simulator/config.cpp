@@ -326,9 +326,9 @@ void read_live(Section& section, LiveConfig* live) {
     section.fail("mjpeg_port needs codec: mjpeg");
   }
   using Link = LiveConfig::Link;
-  std::vector<std::pair<const char*, std::optional<HeadModel>>> heads;
-  for (const NamedHeadModel& named : kHeadModels) heads.emplace_back(named.name, named.model);
-  section.choice<std::optional<HeadModel>>("head", &live->head, heads);
+  std::vector<std::pair<const char*, const HeadModel*>> heads;
+  for (const HeadModel& model : kHeadModels) heads.emplace_back(model.name, &model);
+  section.choice<const HeadModel*>("head", &live->head, heads);
   section.choice<Link>("head_link", &live->head_link,
                        {{"serial", Link::kSerial}, {"tcp", Link::kTcp}, {"udp", Link::kUdp}});
   section.text("user", &live->user);

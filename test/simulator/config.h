@@ -132,7 +132,7 @@ struct LiveConfig {
   // Besides: the pictures as MJPEG over HTTP, ONVIF, and a head that is asked. Ports: 0: any free one.
   std::optional<int> mjpeg_port, onvif_port;
   enum class Link { kSerial, kTcp, kUdp };
-  std::optional<HeadModel> head;
+  const HeadModel* head = nullptr;  // of kHeadModels; null: none
   Link head_link = Link::kSerial;
 };
 

@@ -211,7 +211,7 @@ void serve_live(const Config& config, const std::atomic<bool>& stop) {
   }
   std::optional<HeadServer> head;
   if (config.live.head) {
-    head.emplace(link_of(config.live.head_link), make_simulated_head(*config.live.head, position));
+    head.emplace(link_of(config.live.head_link), config.live.head->make(position));
     ready += " head=" + head->address();
   }
   std::printf("%s\n", ready.c_str());

@@ -1,6 +1,6 @@
 #pragma once
 // Serves the virtual camera on real sockets: video by RTSP (and, if asked for, plain RTP and MJPEG over
-// HTTP), pan and tilt by VAPIX (and ONVIF, and Pelco-D, VISCA or PTU on a serial line, TCP or UDP).
+// HTTP), pan and tilt by VAPIX (and ONVIF, and as a head on a serial line, TCP or UDP).
 //
 // All is on the host's CLOCK_MONOTONIC. A frame captured at T is handed to the video server at
 // T + video latency (+ jitter), where video latency = telemetry latency - clock_offset. Stamped at

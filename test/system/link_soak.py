@@ -1,9 +1,9 @@
 #!/usr/bin/env python3
 """Edge executables on links with a fault every few seconds: `link_soak.py [seconds]` (1800).
 
-RTSP and HTTP from the virtual camera, MJPEG over HTTP and Pelco-D on a serial line from link_devices, in a run of more
-than a minute also VISCA by UDP and FLIR PTU by TCP; the network links go through a proxy that resets, falls silent,
-puts in garbage and refuses. After each fault the records must be good again within what the configuration gives a
+RTSP and HTTP from the virtual camera, MJPEG over HTTP and a head on a serial line from link_devices, in a run of more
+than a minute all the heads that there are, over UDP and TCP, too; the network links go through a proxy that resets, falls
+silent, puts in garbage and refuses. After each fault the records must be good again within what the configuration gives a
 source to notice and to try again; while a link is away the records must say so; no angle may be further from the truth
 than its sigma allows; what a process uses must not grow; and it must end as it should.
 """
@@ -15,6 +15,7 @@ import pathlib
 import random
 import signal
 import statistics
+import subprocess
 import sys
 import threading
 import time
@@ -93,10 +94,6 @@ class Link:
 
 # Faults by which nothing passes while they last.
 CUTS = {"silence", "unplug", "unplugged", "babble"}
-HEAD_FAULTS = ("unplugged", "silence", "babble", "noise", "lost_byte", "changed_byte", "merged", "repeated",
-               "unsolicited", "late")
-# PTU's lines have no check sum: with a digit less or another one they tell another angle.
-FORGES_ANGLES = {"ptu": {"lost_byte", "changed_byte"}}
 
 
 def angles_of_link_devices(time_s):
@@ -134,43 +131,42 @@ class LinkSoak(SystemTest):
         return proxy, parts._replace(netloc=f"127.0.0.1:{proxy.port}").geturl()
 
     def edge(self, name, video, pan_tilt, true_angles=None, late_s=0, calibration=None):
+        """pan_tilt: the keys of that section that tell which head it is and where, as text."""
         wait = {"timeout_s": TIMEOUT_S, "max_backoff_s": MAX_BACKOFF_S}
         file = self.folder / f"{name}.yaml"
-        file.write_text(json.dumps({
-            "video": {**video, **wait}, "pan_tilt": {"angle_sigma_rad": 1e-4, "rate_hz": 50, **pan_tilt, **wait},
-            "camera": {"focal_length_px": 2667}, "realtime": {"mode": "PT"}, "output": {"json": True},
-            "calibration": {"auto": False, **(calibration or {})}}))
+        sections = {
+            "video": {**video, **wait}, "camera": {"focal_length_px": 2667}, "realtime": {"mode": "PT"},
+            "output": {"json": True}, "calibration": {"auto": False, **(calibration or {})}}
+        lines = [f"{section}: {json.dumps(keys)}" for section, keys in sections.items()]
+        of_every_source = json.dumps({"angle_sigma_rad": 1e-4, "rate_hz": 50, **wait})[1:-1]
+        file.write_text("\n".join([*lines, f"pan_tilt: {{{pan_tilt}, {of_every_source}}}", ""]))
         return Edge(name, self.alidade("run", "-c", file), true_angles, late_s)
 
     def links_of_virtual_camera(self):
         self.virtual_camera = self.camera()
         video, video_url = self.through_proxy(self.virtual_camera.video_url)
         head, head_url = self.through_proxy(self.virtual_camera.pan_tilt_url)
-        edge = self.edge("rtsp", {"type": "rtsp", "url": video_url}, {"type": "vapix", "url": head_url},
+        edge = self.edge("rtsp", {"type": "rtsp", "url": video_url}, f"type: vapix, url: '{head_url}'",
                          late_s=0.1, calibration={"file": str(self.virtual_camera.truth / "truth.yaml")})
         return [proxied_link("rtsp", edge, video, VIDEO_LOST), proxied_link("vapix", edge, head, TELEMETRY_LOST)]
 
-    def links_of_devices(self, head, line, pan_tilt):
-        devices = Process(os.environ["LINK_DEVICES"], head, line, stdin=True)
+    def links_of_devices(self, head, faults):
+        """head: a kind that link_devices knows, faults: those that cost answers only."""
+        devices = Process(os.environ["LINK_DEVICES"], head, stdin=True)
         self.processes.append(devices)
-        _, url, address = devices.line().split()
+        _, url, settings = devices.line().split(maxsplit=2)
         video, video_url = self.through_proxy(url)
-        address = {"device": address} if line == "serial" else {"url": address}
-        edge = self.edge(head, {"type": "mjpeg", "url": video_url},
-                         {"type": head, **address, **pan_tilt},
-                         angles_of_link_devices)
-        faults = {fault: lambda fault=fault: devices.tell(fault)
-                  for fault in HEAD_FAULTS if fault not in FORGES_ANGLES.get(head, ())}
+        edge = self.edge(head, {"type": "mjpeg", "url": video_url}, settings, angles_of_link_devices)
+        faults = {fault: lambda fault=fault: devices.tell(fault) for fault in faults}
         return [proxied_link(f"mjpeg beside {head}", edge, video, VIDEO_LOST),
                 Link(head, edge, faults, lambda: devices.tell("none"), TELEMETRY_LOST)]
 
     def links(self):
-        links = self.links_of_virtual_camera() + self.links_of_devices("pelco_d", "serial", {"baud": 115200})
-        if SECONDS > 60:
-            links += self.links_of_devices("visca", "udp", {
-                "header": True, "pan_positive": "right", "tilt_positive": "up",
-                "pan_deg_per_step": 1 / 51.2, "tilt_deg_per_step": 1 / 51.2})
-            links += self.links_of_devices("ptu", "tcp", {"pan_positive": "left", "tilt_positive": "up"})
+        links = self.links_of_virtual_camera()
+        kinds = subprocess.run([os.environ["LINK_DEVICES"]], capture_output=True, text=True, check=True).stdout.splitlines()
+        for kind in kinds if SECONDS > 60 else kinds[:1]:
+            head, *faults = kind.split()
+            links += self.links_of_devices(head, faults)
         return links
 
     def wait_good(self, edge, moment, seconds, what):

@@ -137,7 +137,7 @@ struct RecordingRig : Rig {
 };
 
 struct AskedHeadRig : LiveRig {
-  AskedHeadRig(HeadKind kind, Patience with_patience) : LiveRig(with_patience), rig(kind) {}
+  AskedHeadRig(const HeadKind& kind, Patience with_patience) : LiveRig(with_patience), rig(kind) {}
   std::unique_ptr<PanTiltSource> open() override {
     QuerySourceOptions options = rig.options();
     set_patience(patience, &options);
@@ -152,7 +152,7 @@ struct AskedHeadRig : LiveRig {
 
 template <class AnyRig>
 struct Case {
-  const char* name;
+  std::string name;
   std::function<std::unique_ptr<AnyRig>()> make;
 };
 
@@ -295,9 +295,9 @@ std::vector<Case<AnyRig>> live_cases(Patience patience) {
   std::vector<Case<AnyRig>> cases = {
       {"Vapix", [patience] { return std::make_unique<VapixRig>(patience); }},
       {"Onvif", [patience] { return std::make_unique<OnvifRig>(patience); }}};
-  for (const HeadKind kind : all_head_kinds()) {
-    cases.push_back({to_string(kind),
-                     [kind, patience] { return std::make_unique<AskedHeadRig>(kind, patience); }});
+  for (const HeadKind& kind : all_head_kinds()) {
+    cases.push_back(
+        {kind.name(), [kind, patience] { return std::make_unique<AskedHeadRig>(kind, patience); }});
   }
   return cases;
 }

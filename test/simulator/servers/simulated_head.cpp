@@ -162,17 +162,4 @@ std::vector<std::string> PtuHead::take(const std::string& bytes) {
   return replies;
 }
 
-std::unique_ptr<SimulatedHead> make_simulated_head(HeadModel model,
-                                                   std::function<HeadPosition()> position) {
-  switch (model) {
-    case HeadModel::kPelcoD:
-      return std::make_unique<PelcoDHead>(std::move(position));
-    case HeadModel::kVisca:
-      return std::make_unique<ViscaHead>(std::move(position));
-    case HeadModel::kPtu:
-      break;
-  }
-  return std::make_unique<PtuHead>(std::move(position));
-}
-
 }  // namespace alidade

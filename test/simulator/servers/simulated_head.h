@@ -1,5 +1,5 @@
 #pragma once
-// SimulatedHead: the device's side of Pelco-D, VISCA and PTU, written from the protocols' manuals and
+// SimulatedHead: the device's side of the heads on a line, written from the protocols' manuals and
 // without the code that it tests: bytes of a master in, bytes of the head out. No I/O: head_server.h
 // puts it on a line.
 
@@ -8,6 +8,7 @@
 #include <functional>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 namespace alidade {
@@ -79,17 +80,19 @@ struct PtuHead : SimulatedHead {
   bool echo_ = true;
 };
 
-// The heads by the names that configurations and command lines give them, which are those of pan_tilt.type.
-enum class HeadModel { kPelcoD, kVisca, kPtu };
-struct NamedHeadModel {
-  const char* name;
-  HeadModel model;
+// A head as it comes out of its box.
+struct HeadModel {
+  const char* name;  // that configurations and command lines give it: pan_tilt.type
+  std::unique_ptr<SimulatedHead> (*make)(std::function<HeadPosition()> position);
 };
-inline constexpr std::array<NamedHeadModel, 3> kHeadModels = {
-    {{"pelco_d", HeadModel::kPelcoD}, {"visca", HeadModel::kVisca}, {"ptu", HeadModel::kPtu}}};
 
-// As it comes out of its box.
-std::unique_ptr<SimulatedHead> make_simulated_head(HeadModel model,
-                                                   std::function<HeadPosition()> position);
+template <class Head>
+std::unique_ptr<SimulatedHead> make_head(std::function<HeadPosition()> position) {
+  return std::make_unique<Head>(std::move(position));
+}
+
+inline constexpr std::array kHeadModels = {HeadModel{"pelco_d", make_head<PelcoDHead>},
+                                           HeadModel{"visca", make_head<ViscaHead>},
+                                           HeadModel{"ptu", make_head<PtuHead>}};
 
 }  // namespace alidade

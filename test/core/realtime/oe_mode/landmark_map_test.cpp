@@ -245,6 +245,8 @@ TEST(LandmarkMap, AzimuthOfPlusAndMinusPiIsOneCell) {
 }
 
 TEST(LandmarkMap, FindsExactlyWhatASearchOfEverythingFinds) {
+  // Three products and two sums, which a processor may fuse, or not: here and there in its own way.
+  constexpr double kRounding = 5 * std::numeric_limits<double>::epsilon();
   std::mt19937_64 random(3);
   std::uniform_real_distribution<double> exponent(-5, 0.49);
   std::size_t found = 0;
@@ -268,17 +270,23 @@ TEST(LandmarkMap, FindsExactlyWhatASearchOfEverythingFinds) {
       }
       for (const auto& centre : centres) {
         std::vector<double> cosines = {1, 0, -1, -0.999, std::cos(std::pow(10, exponent(random)))};
-        // Exactly on the limit, where rounding to float decides wrongly half of the times.
+        // So near the limit that rounding to float decides wrongly half of the times, and on it.
         for (int i = 0; i < 5; ++i) {
           const int slot = static_cast<int>(random() % capacity);
           if (!map.occupied(slot)) continue;
-          cosines.push_back(std::clamp(centre.normalized().dot(map.at(slot).d), -1.0, 1.0));
+          for (const double beside : {-1e-14, 0.0, 1e-14}) {
+            const double cosine = centre.normalized().dot(map.at(slot).d) + beside;
+            cosines.push_back(std::clamp(cosine, -1.0, 1.0));
+          }
         }
         for (const double cosine : cosines) {
-          const auto expected = cosine <= -1 ? plain_find(map, centre, -2)
-                                             : plain_find(map, centre.normalized(), cosine);
+          const bool all = cosine <= -1;
+          const auto surely = plain_find(map, centre.normalized(), all ? -2 : cosine + kRounding);
+          const auto perhaps = plain_find(map, centre.normalized(), all ? -2 : cosine - kRounding);
           const auto slots = find(map, centre, cosine);
-          ASSERT_EQ(slots, expected) << "cosine " << cosine << ", centre " << centre.transpose();
+          ASSERT_TRUE(std::includes(slots.begin(), slots.end(), surely.begin(), surely.end()) &&
+                      std::includes(perhaps.begin(), perhaps.end(), slots.begin(), slots.end()))
+              << "cosine " << cosine << ", centre " << centre.transpose();
           found += slots.size();
           ++searches;
         }
