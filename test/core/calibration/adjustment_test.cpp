@@ -45,6 +45,130 @@ TEST(Adjustment, ResidualIsThatOfTheSolvedRollingShutterProjection) {
   EXPECT_LE(at.cost, 1e-12);
 }
 
+// The image moves by a tenth of a row and more while one row is read.
+TEST(Adjustment, ResidualIsHowFarTheImageLiesFromItsOwnProjection) {
+  AdjustmentScene scene = make_adjustment_scene(0.5);
+  ASSERT_GT(scene.data.observations.size(), 200u);
+  const Vector2<double> moved_px(0.02, 0.03);
+  for (auto& observation : scene.data.observations) observation.u += moved_px;
+  Adjustment adjustment(scene.data, scene.priors, scene.fixed);
+  Linearisation at;
+  adjustment.linearise(scene.state, {}, &at);
+  for (const auto& residual : at.observations) {
+    ASSERT_TRUE(residual.valid);
+    EXPECT_LE((0.3 * residual.error - moved_px).norm(), 1e-4);
+  }
+}
+
+TEST(Adjustment, ResidualOfTelemetryGoesTheShortWayRound) {
+  AdjustmentScene scene = make_adjustment_scene();
+  for (auto& sample : scene.data.telemetry) sample.measured += Vector2<double>(-2 * kPi, 2 * kPi);
+  Adjustment adjustment(scene.data, scene.priors, scene.fixed);
+  Linearisation at;
+  adjustment.linearise(scene.state, {}, &at);
+  for (const auto& residual : at.telemetry) EXPECT_LE(residual.error.norm(), 1e-8);
+}
+
+// rho(x) = c^2 log(1 + x / c^2), and its derivative as weight.
+TEST(Adjustment, RobustCostIsThatOfCauchy) {
+  AdjustmentScene scene = make_adjustment_scene();
+  for (std::size_t i = 0; i < scene.data.observations.size(); ++i) {
+    scene.data.observations[i].u.x() += 0.01 * static_cast<double>(i);
+  }
+  for (std::size_t i = 0; i < scene.data.telemetry.size(); ++i) {
+    scene.data.telemetry[i].measured.x() += 1e-5 * static_cast<double>(i);
+  }
+  Adjustment adjustment(scene.data, scene.priors, scene.fixed);
+  Linearisation plain;
+  adjustment.linearise(scene.state, {}, &plain);
+  Linearisation robust;
+  adjustment.linearise(scene.state, {2, 3}, &robust);
+  double cost = 0;
+  const auto check = [&cost](const std::vector<LinearisedResidual>& all,
+                             const std::vector<LinearisedResidual>& weighted, double scale) {
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const double x = all[i].error.squaredNorm() / (scale * scale);
+      cost += scale * scale * std::log(1 + x);
+      EXPECT_LE((weighted[i].error - all[i].error / std::sqrt(1 + x)).norm(), 1e-12);
+    }
+  };
+  check(plain.observations, robust.observations, 2);
+  check(plain.telemetry, robust.telemetry, 3);
+  EXPECT_NEAR(robust.cost, cost, 1e-9 * cost);
+}
+
+TEST(Adjustment, ItDoesNotPayToLoseAnObservation) {
+  AdjustmentScene scene = make_adjustment_scene();
+  const LossScales loss{2, 3};
+  Adjustment adjustment(scene.data, scene.priors, scene.fixed);
+  Linearisation seen;
+  Linearisation lost;
+  AdjustmentState wrong = scene.state;
+  wrong.landmarks[0] = Vector3<double>(0.5, 0, 1).normalized();  // a field of view off
+  adjustment.linearise(wrong, loss, &seen);
+  wrong.landmarks[0] = -scene.state.landmarks[0];  // behind the camera
+  adjustment.linearise(wrong, loss, &lost);
+  EXPECT_TRUE(lost.valid);
+  EXPECT_GT(lost.cost, seen.cost);
+  adjustment.linearise(wrong, {}, &lost);
+  EXPECT_FALSE(lost.valid);
+}
+
+// At a state that explains the data only the priors pull.
+TEST(Adjustment, GradientOfThePriorsIsTheDerivativeOfTheirCost) {
+  AdjustmentScene scene = make_adjustment_scene();
+  AdjustmentState& mean = scene.priors.mean;
+  mean.camera.focal_length *= 1.1;
+  mean.camera.aspect *= 0.97;
+  mean.distortion += 0.1;
+  mean.readout_s += 0.01;
+  mean.mechanics.pan_axis = Vector3<double>(0.5, -0.4, 1).normalized();
+  mean.mechanics.tilt_axis = Vector3<double>(0.3, 1, -0.4).normalized();
+  mean.mechanics.pan_scale += 0.2;
+  mean.mechanics.tilt_scale -= 0.1;
+  mean.shift_s += 0.02;
+  mean.drift -= 0.3;
+  scene.priors.information.setConstant(1e6);
+  Adjustment adjustment(scene.data, scene.priors, scene.fixed);
+  Linearisation at;
+  adjustment.linearise(scene.state, {}, &at);
+  const Eigen::Index size = at.g.size();
+  const Eigen::Index total = size + 2 * static_cast<Eigen::Index>(scene.state.landmarks.size());
+  for (int i = 0; i < kGlobalCount; ++i) {
+    constexpr double kStep = 1e-6;
+    Eigen::VectorXd x = Eigen::VectorXd::Zero(total);
+    Linearisation plus;
+    Linearisation minus;
+    x[size - kGlobalCount + i] = kStep;
+    adjustment.linearise(moved(scene.state, x, size), {}, &plus);
+    x[size - kGlobalCount + i] = -kStep;
+    adjustment.linearise(moved(scene.state, x, size), {}, &minus);
+    const double gradient = at.g[size - kGlobalCount + i];
+    EXPECT_NEAR(-2 * gradient, (plus.cost - minus.cost) / (2 * kStep), 1e-3 * std::abs(gradient))
+        << i;
+  }
+}
+
+TEST(Adjustment, WhatIsFixedIsNoUnknownOfTheTelemetry) {
+  AdjustmentScene scene = make_adjustment_scene();
+  GlobalMatrix covariance;
+  double all = 0;
+  double without_fixed = 0;
+  const auto unknowns = [&](double* telemetry_unknowns) {
+    Adjustment adjustment(scene.data, scene.priors, scene.fixed);
+    Linearisation at;
+    adjustment.linearise(scene.state, {}, &at);
+    EXPECT_TRUE(adjustment.covariance(at, &covariance, telemetry_unknowns));
+  };
+  unknowns(&all);
+  for (const Parameter p : {Parameter::kPanScale, Parameter::kTiltScale, Parameter::kClockOffset}) {
+    scene.fixed[static_cast<std::size_t>(index(p))] = true;
+  }
+  unknowns(&without_fixed);
+  EXPECT_GT(without_fixed, 0);
+  EXPECT_LT(without_fixed, all + 1e-6);
+}
+
 TEST(Adjustment, NormalMatrixIsTheDerivativeOfItsGradientAtThePerfectFit) {
   const AdjustmentScene scene = make_adjustment_scene();
   Adjustment adjustment(scene.data, scene.priors, scene.fixed);

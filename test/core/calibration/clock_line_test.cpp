@@ -48,6 +48,16 @@ TEST(ClockLine, IsWithinItsOwnSigmas) {
   EXPECT_NEAR(period_nees, 1, 0.4);
 }
 
+TEST(ClockLine, FindsTheNoiseOfFewStampsWithoutBias) {
+  constexpr int kRuns = 2000;
+  double square = 0;
+  for (std::uint64_t run = 1; run <= kRuns; ++run) {
+    square += std::pow(fit_clock_line(ticks(20, 2e-3, run)).stamp_sigma_s, 2) / kRuns;
+  }
+  // Chi-square with 18 degrees of freedom, 2000 times: +- 0.75 %.
+  EXPECT_NEAR(square / (2e-3 * 2e-3), 1, 0.04);
+}
+
 TEST(ClockLine, LeansOnTheMeasuredPeriodWhereItIsBetter) {
   ClockInput input = ticks(20, 2e-3, 5);
   const ClockLine alone = fit_clock_line(input);
@@ -65,6 +75,27 @@ TEST(ClockLine, CountsLostTicksWithoutNumbers) {
   ASSERT_TRUE(line.steady);
   EXPECT_NEAR(line.period_s, kPeriod, 5 * line.period_sigma_s);
   EXPECT_GT(line.lost, 30);
+}
+
+// The step that it leaves in the residuals is no larger than twice the jitter.
+TEST(ClockLine, CountsASingleLostTickInJitterOfASixthOfAPeriod) {
+  ClockInput input = ticks(200, 0, 1, 0, false, false);
+  std::mt19937_64 random(9);
+  std::uniform_real_distribution<double> jitter(-0.3 * kPeriod, 0.3 * kPeriod);
+  for (double& stamp : input.stamp_s) stamp += jitter(random);
+  input.stamp_s.erase(input.stamp_s.begin() + 100);
+  input.sequence.pop_back();
+  const ClockLine line = fit_clock_line(input);
+  ASSERT_TRUE(line.steady);
+  EXPECT_EQ(line.lost, 1);
+}
+
+TEST(ClockLine, TakesNoCountFromNumbersThatRepeat) {
+  ClockInput input = ticks(200, 2e-3, 10);
+  for (std::size_t i = 0; i < 200; ++i) input.sequence[i] = static_cast<std::int64_t>(i / 2);
+  const ClockLine line = fit_clock_line(input);
+  EXPECT_NEAR(line.period_s, kPeriod, 5 * line.period_sigma_s);
+  EXPECT_EQ(line.lost, 0);
 }
 
 TEST(ClockLine, KnowsAPlainCountEvenIfJitterReorders) {

@@ -53,6 +53,23 @@ TEST(MotionMatch, FindsClockOffsetAndFocalLengthWithoutAGuess) {
   EXPECT_NEAR(match.focal_length, kFocalLength, 0.01 * kFocalLength);
 }
 
+// 60 degrees up the image moves by half of the way in pan.
+TEST(MotionMatch, PanMovesTheImageByTheCosineOfTheTilt) {
+  TrajectorySpline high = telemetry();
+  for (int i = 0; i < high.control_points(); ++i) high.control_point(i)[1] += kPi / 3;
+  std::vector<ImageMotion> motion;
+  for (double t = 1; t < 10; t += 0.1) {
+    const PanTilt<double> from = high.position(t + kShift);
+    const PanTilt<double> to = high.position(t + 0.2 + kShift);
+    const double width = std::cos(0.5 * (from.tilt + to.tilt));
+    motion.push_back(
+        {t,
+         t + 0.2,
+         {-kFocalLength * width * (to.pan - from.pan), kFocalLength * (to.tilt - from.tilt)}});
+  }
+  EXPECT_NEAR(match_motion(motion, high, 0, 1).focal_length, kFocalLength, 1e-3 * kFocalLength);
+}
+
 // The best there is grows beyond the range, also where it is looked for more finely.
 TEST(MotionMatch, SaysWhereTheRangeCutsItOff) {
   const auto motion = image_motion(tracks(), 0.5);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "test/core/calibration/adjustment_scene.h"
 #include "test/support/simulated_recording.h"
 
 namespace alidade::internal {
@@ -87,6 +88,21 @@ TEST(StartValues, LeaveOutWhatTheOtherStreamDoesNotAccompany) {
                   started.motion.match.shift_s,
               5 - 0.01);
   }
+}
+
+// Each where the mount looked when its row was exposed: the read-out lasts half a second here.
+TEST(StartValues, LandmarksLieWhereTheirRowsSawThem) {
+  const test::AdjustmentScene scene = test::make_adjustment_scene(0.5);
+  AdjustmentState state = scene.state;
+  for (auto& landmark : state.landmarks) landmark.setZero();
+  initialise_landmarks(scene.data, &state);
+  int seen = 0;
+  for (const auto& observation : scene.data.observations) {
+    const auto l = static_cast<std::size_t>(observation.landmark);
+    EXPECT_LE((state.landmarks[l] - scene.state.landmarks[l]).norm(), 1e-9) << l;
+    ++seen;
+  }
+  EXPECT_GT(seen, 200);
 }
 
 TEST(PriorKnowledge, HoldsWhatIsExactAndScalesWhatIsNot) {

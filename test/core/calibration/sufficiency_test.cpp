@@ -114,14 +114,15 @@ TrajectorySpline turning(double amplitude) {
   return spline;
 }
 
-CalibrationStatus status_at(double amplitude, double correlation = 0.99) {
+CalibrationStatus status_at(double amplitude, double correlation = 0.99,
+                            double focal_length = 2000) {
   CalibrationInput input;
   input.width = 1920;
   input.height = 1080;
   const std::vector<ImageMotion> motion(5, {0, 0.5, {50, 30}});
   MotionMatch match;
   match.correlation = correlation;
-  match.focal_length = 2000;
+  match.focal_length = focal_length;
   std::string why;
   return check_motion(motion, turning(amplitude), match, input, &why);
 }
@@ -137,6 +138,12 @@ TEST(CheckMotion, NeedsARateThatVariesByATwentieth) {
 TEST(CheckMotion, NeedsTelemetryThatDescribesTheVideo) {
   EXPECT_EQ(status_at(0.5, 0.59), CalibrationStatus::kTelemetryMismatch);
   EXPECT_EQ(status_at(0.5, 0.61), CalibrationStatus::kOk);
+}
+
+// A fifth of the width: 136 degrees.
+TEST(CheckMotion, RefusesAFieldOfViewThatNoLensHas) {
+  EXPECT_EQ(status_at(0.5, 0.99, 0.199 * 1920), CalibrationStatus::kBadInput);
+  EXPECT_EQ(status_at(0.5, 0.99, 0.201 * 1920), CalibrationStatus::kOk);
 }
 
 TEST(MeasureMotion, FindsRangeAndRates) {
