@@ -13,6 +13,7 @@
 #include <stdexcept>
 #include <vector>
 
+#include "edge_app/pipeline/frame_observations.h"
 #include "test/support/allocation_guard.h"
 
 namespace alidade {
@@ -139,6 +140,22 @@ TEST(OrientationStep, QuaternionTurnsCameraAxesIntoTheBase) {
   EXPECT_GE(w, 0);
 }
 
+// A quaternion and its negative are the same orientation.
+TEST(OrientationStep, OfTwoQuaternionsWritesTheOneWithoutANegativeScalar) {
+  for (int i = -6; i <= 6; ++i) {
+    for (const double tilt : {-1.2, 0.0, 1.2}) {
+      OrientationStep step(options_without_offsets());
+      Sweep sweep;
+      sweep.pan_0 = 0.5 * i;
+      sweep.tilt_0 = tilt;
+      sweep.feed(&step, 0, 0.1);
+      const OrientationRecord record = add_frame(&step, stamp_at(0.05));
+      ASSERT_TRUE(record.orientation);
+      EXPECT_GE(record.orientation->q_base_from_camera[3], 0) << sweep.pan_0 << ", " << tilt;
+    }
+  }
+}
+
 TEST(OrientationStep, GoesOnSmoothlyAcrossTheSeamOfThePanAngle) {
   OrientationStep step(options_without_offsets());
   Sweep sweep;
@@ -222,6 +239,25 @@ TEST(OrientationStep, RefusesFramesFromBeforeTheTelemetryAndInItsGaps) {
   EXPECT_EQ(add_frame(&step, stamp_at(9)).status, RecordStatus::kFrameBeforeTelemetry);
   EXPECT_EQ(add_frame(&step, stamp_at(13)).status, RecordStatus::kTelemetryGap);
   EXPECT_EQ(add_frame(&step, stamp_at(15.5)).status, RecordStatus::kOk);
+}
+
+// The error of a time that is anywhere in the interval with equal odds.
+TEST(OrientationStep, APolledIntervalCountsAsItsStandardDeviation) {
+  const auto sigma = [](double width_s, double stamp_sigma_s) {
+    OrientationStepOptions options = options_without_offsets();
+    options.telemetry_stamp_sigma_s = stamp_sigma_s;
+    OrientationStep step(options);
+    for (int i = 0; i < 20; ++i) {
+      PanTiltSample sample = Sweep{}.sample(0.02 * i);
+      sample.earliest_time_s = 0.02 * i - width_s / 2;
+      sample.latest_time_s = 0.02 * i + width_s / 2;
+      step.add_telemetry(sample);
+    }
+    return add_frame(&step, stamp_at(0.2)).orientation.value().sigma_rad[1];
+  };
+  const double expected = sigma(0, 0.018 / std::sqrt(12.0));
+  EXPECT_GT(expected, 1.1 * sigma(0, 0.005 / std::sqrt(12.0)));
+  EXPECT_NEAR(sigma(0.018, 1), expected, 1e-6 * expected);
 }
 
 TEST(OrientationStep, ForgetsTelemetryFromBeforeAReconnection) {
@@ -356,8 +392,8 @@ class Scene {
   static constexpr int kHeight = 480;
 
   // Blocks of 64, 16 and 8 px of random brightness, softened by the mean of 3 x 3 px.
-  Scene() : luma_(static_cast<std::size_t>(kStride * kHeight)) {
-    std::mt19937 random(22);
+  explicit Scene(unsigned seed = 22) : luma_(static_cast<std::size_t>(kStride * kHeight)) {
+    std::mt19937 random(seed);
     std::uniform_int_distribution<int> level(-30, 30);
     std::vector<int> sum(luma_.size(), 128);
     for (const int block : {64, 16, 8}) {
@@ -627,7 +663,17 @@ TEST_F(OeStepTest, TellsTheCalibrationThreadWhatItSaw) {
 
 TEST_F(OeStepTest, ShowsLandmarksWithTheResidualsThatTheRecordSumsUp) {
   build_map();
-  const OrientationRecord record = add(scene_.picture());
+  // Something that moves by itself, in a third of the picture, is found and does not hold the result.
+  std::vector<std::uint8_t> partly_moved(static_cast<std::size_t>(Scene::kWidth) * Scene::kHeight);
+  for (int v = 0; v < Scene::kHeight; ++v) {
+    for (int u = 0; u < Scene::kWidth; ++u) {
+      const ImageView seen = scene_.picture(3 * u > 2 * Scene::kWidth ? 2 : 0);
+      partly_moved[static_cast<std::size_t>(v * Scene::kWidth + u)] =
+          seen.luma[static_cast<std::ptrdiff_t>(v) * seen.stride + u];
+    }
+  }
+  const OrientationRecord record =
+      add({partly_moved.data(), Scene::kWidth, Scene::kHeight, Scene::kWidth});
   ASSERT_TRUE(record.residual_px);
   FrameLandmarks landmarks;
   step_.get_landmarks(&landmarks);
@@ -644,6 +690,7 @@ TEST_F(OeStepTest, ShowsLandmarksWithTheResidualsThatTheRecordSumsUp) {
     sum += double{found.du_px} * found.du_px + double{found.dv_px} * found.dv_px;
   }
   EXPECT_EQ(used, record.landmarks);
+  EXPECT_LT(used, landmarks.count);
   EXPECT_NEAR(*record.residual_px, std::sqrt(sum / used), 1e-4);  // the picture shows floats
   EXPECT_LT(*record.residual_px, 0.5);
 }
@@ -758,6 +805,62 @@ TEST_F(OeStepTest, WithoutACalibrationItFollowsPointsAndAnswersFromTelemetry) {
   EXPECT_EQ(landmarks.kind, FrameLandmarks::Kind::kPoints);
   EXPECT_EQ(landmarks.count, tracks.count);
   EXPECT_EQ(landmarks.found[0].u_px, tracks.points[0].u_px);
+}
+
+TEST(FrameTracks, TakesAsManyPointsAsThereIsRoomFor) {
+  StartUpOptions options;
+  options.width = Scene::kWidth;
+  options.height = Scene::kHeight;
+  options.max_points = 2 * kMaxFramePoints;
+  StartUpTracker tracker(options);
+  const Scene scene;
+  for (int i = 0; i < 3; ++i) static_cast<void>(tracker.process(scene.picture()));
+  ASSERT_GT(tracker.observation_count(), kMaxFramePoints);
+  FrameTracks tracks;
+  get_tracks(tracker, &tracks);
+  EXPECT_EQ(tracks.count, kMaxFramePoints);
+}
+
+// Its memory may be another picture's by then.
+TEST_F(OeStepTest, LooksAtAPictureOnce) {
+  OrientationStepOptions uncalibrated = options();
+  uncalibrated.calibrated = false;
+  OrientationStep step(uncalibrated);
+  FrameTracks tracks;
+  for (int i = 0; i < 3; ++i) {
+    StepEvents events;
+    static_cast<void>(step.add_frame(stamp_at(0.08 * i, i), scene_.picture(5 * i), &events));
+    step.maintain();
+  }
+  step.get_tracks(&tracks);
+  const int count = tracks.count;
+  ASSERT_GT(count, 20);
+  const auto first = tracks.points[0].u_px;
+  scene_ = Scene(23);
+  for (int i = 0; i < 5; ++i) step.maintain();
+  step.get_tracks(&tracks);
+  EXPECT_EQ(tracks.count, count);
+  EXPECT_EQ(tracks.points[0].u_px, first);
+}
+
+// The line's error and that of the least delay below it.
+TEST_F(OeStepTest, TheTimesSigmaIsThatOfTwoIndependentErrors) {
+  const auto sigma_after_a_reconnection = [](double minimum_delay_sigma_s) {
+    OrientationStepOptions options = OeStepTest::options();
+    options.minimum_delay_sigma_s = minimum_delay_sigma_s;
+    OrientationStep step(options);
+    OrientationRecord record;
+    for (int i = 0; i < 10; ++i) {
+      FrameStamp stamp = stamp_at(0.08 * i, i);
+      stamp.sequence = i;
+      stamp.restarted = i == 9;
+      record = add_frame(&step, stamp);
+    }
+    return record.time_sigma_s;
+  };
+  const double of_the_line = sigma_after_a_reconnection(0);
+  const double of_both = sigma_after_a_reconnection(0.8 * of_the_line);
+  EXPECT_NEAR(of_both, of_the_line * std::hypot(1.0, 0.8), 1e-9 * of_the_line);
 }
 
 // d was found with the least delay of one connection; another one's may differ by milliseconds.
