@@ -79,6 +79,15 @@ TEST(AngleQuantum, IsNotTheWayBetweenTwoPollsOfAnEvenTurn) {
   EXPECT_EQ(device_resolution(angles), 0);
 }
 
+TEST(AngleQuantum, IsTheStepOfAnEvenTurnWhereATenthOfTheAnglesRecur) {
+  std::vector<double> angles;
+  for (int i = 0; i < 19; ++i) angles.push_back(0.004 * i);
+  angles.push_back(angles.back());
+  EXPECT_EQ(device_resolution(angles), 0) << "one of twenty";
+  angles[0] = angles[1];
+  EXPECT_NEAR(device_resolution(angles), 0.004, 1e-9) << "two of twenty";
+}
+
 // Polled at 30 Hz for 10 s; angle(t) is what the device said at t.
 template <typename Pan, typename Tilt>
 std::vector<PanTiltSample> polled(const Pan& pan, const Tilt& tilt) {
@@ -117,6 +126,40 @@ TEST(StaleRepeats, AreWhatADeviceRepeatsBetweenItsMeasurements) {
   for (std::size_t i = 0; i < stale.size(); ++i) {
     EXPECT_FALSE(stale[i] && samples[i].pan_rad != samples[i - 1].pan_rad) << i;
   }
+}
+
+// An even turn of 0.01 rad a poll, of which polls 151 to 153 repeat poll 150, where it is at |held_rad|.
+std::vector<PanTiltSample> with_one_run(double held_rad) {
+  auto samples = polled_pan([](double t) { return 0.3 * t; });
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const double after = i > 150 && i < 154 ? 0.0 : 0.01 * (static_cast<double>(i) - 150);
+    samples[i].pan_rad = std::remainder(held_rad + after, 360 * kDegree);
+  }
+  return samples;
+}
+
+TEST(StaleRepeats, AreTheSameAcrossTheSeam) {
+  for (const double before_the_seam : {0.005, 0.025, 1.0}) {
+    EXPECT_EQ(count(find_stale_repeats(with_one_run(180 * kDegree - before_the_seam))), 3);
+  }
+}
+
+// Until it turned round it may have stood, and moved on only then.
+TEST(StaleRepeats, AreNotToldWhereTheHeadTurnsBack) {
+  auto samples = with_one_run(0.5);
+  for (std::size_t i = 155; i < 300; ++i) samples[i].pan_rad = samples[i - 1].pan_rad - 0.01;
+  EXPECT_EQ(count(find_stale_repeats(samples)), 0);
+}
+
+TEST(StaleRepeats, AreNotToldAcrossAReconnection) {
+  for (const std::size_t anew : {150u, 154u, 155u}) {
+    auto samples = with_one_run(0.5);
+    samples[anew].restarted = true;
+    EXPECT_EQ(count(find_stale_repeats(samples)), 0) << anew;
+  }
+  auto samples = with_one_run(0.5);
+  samples[156].restarted = true;
+  EXPECT_EQ(count(find_stale_repeats(samples)), 3) << "after all that tells";
 }
 
 TEST(StaleRepeats, ShowOnEitherAxis) {
