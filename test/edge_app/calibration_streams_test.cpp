@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <optional>
 #include <string>
+#include <vector>
 
 namespace alidade {
 namespace {
@@ -73,6 +75,96 @@ TEST(CalibrationStreams, ADeviceThatHasNotMeasuredSinceTellsNothingOfALaterTime)
   }
   ASSERT_EQ(told.remarks.size(), 1U);
   EXPECT_NE(told.remarks[0].find("of 90 samples repeat an old angle"), std::string::npos);
+}
+
+TEST(CalibrationStreams, AStatedSigmaOfPolledTelemetryStands) {
+  CalibrationInput input;
+  input.noise.telemetry_stamp_sigma_s = 7e-3;
+  CalibrationOptions options;
+  std::vector<std::string> remarks;
+  add_telemetry(polled({2e-3, 1e-3, 5e-3}), &input, &options, &remarks);
+  EXPECT_EQ(input.noise.telemetry_stamp_sigma_s, 7e-3);
+}
+
+TEST(CalibrationStreams, PolledTelemetryGoesOnOverAReconnection) {
+  std::vector<PanTiltSample> samples = polled({2e-3, 1e-3, 5e-3});
+  samples[1].restarted = true;
+  EXPECT_EQ(Told(samples).input.telemetry.size(), 3U);
+  for (PanTiltSample& sample : samples) sample.device_time_s = sample.latest_time_s;
+  const Told sent(samples);
+  EXPECT_EQ(sent.input.telemetry.size(), 2U) << "a device's clock may begin anew";
+  EXPECT_EQ(sent.remarks.size(), 1U);
+}
+
+// Frames 0, 1, ... of these sender times.
+std::vector<FrameStamp> sent_at(const std::vector<double>& sender_times_s) {
+  std::vector<FrameStamp> stamps;
+  for (const double time_s : sender_times_s) {
+    FrameStamp stamp;
+    stamp.frame = static_cast<std::int64_t>(stamps.size());
+    stamp.sender_time_s = time_s;
+    stamps.push_back(stamp);
+  }
+  return stamps;
+}
+
+std::vector<CalibrationFrame> frames_of(std::vector<FrameStamp> stamps) {
+  CalibrationInput input;
+  CalibrationOptions options;
+  std::vector<std::string> remarks;
+  add_frames(std::move(stamps), &input, &options, &remarks);
+  return input.frames;
+}
+
+std::vector<std::optional<std::int64_t>> counts_of(const std::vector<double>& sender_times_s) {
+  std::vector<std::optional<std::int64_t>> counts;
+  for (const CalibrationFrame& frame : frames_of(sent_at(sender_times_s))) {
+    counts.push_back(frame.sequence);
+  }
+  return counts;
+}
+
+TEST(CalibrationStreams, OfEqualPartsBetweenReconnectionsTheFirstIsUsed) {
+  std::vector<FrameStamp> stamps = sent_at({0, 1, 2, 3, 4, 5, 6, 7});
+  for (const std::size_t anew : {2u, 5u}) stamps[anew].restarted = true;
+  const std::vector<CalibrationFrame> frames = frames_of(stamps);
+  ASSERT_EQ(frames.size(), 3U);
+  EXPECT_EQ(frames[0].frame, 2);
+}
+
+TEST(CalibrationStreams, AGapInTheSendersTimesIsOneInTheCount) {
+  using Counts = std::vector<std::optional<std::int64_t>>;
+  EXPECT_EQ(counts_of({0, 0.1, 0.2, 0.5, 0.6, 0.7}), (Counts{0, 1, 2, 5, 6, 7}));
+}
+
+TEST(CalibrationStreams, TimesBesideTheirGridAreNotCounted) {
+  const std::vector<std::optional<std::int64_t>> none(7);
+  EXPECT_NE(counts_of({0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6}), none);
+  EXPECT_NE(counts_of({0, 0.1, 0.2, 0.3 + 0.024, 0.4, 0.5, 0.6}), none);
+  EXPECT_NE(counts_of({0, 0.1, 0.2, 0.3 - 0.024, 0.4, 0.5, 0.6}), none);
+  EXPECT_EQ(counts_of({0, 0.1, 0.2, 0.3 + 0.026, 0.4, 0.5, 0.6}), none) << "after its place";
+  EXPECT_EQ(counts_of({0, 0.1, 0.2, 0.3 - 0.026, 0.4, 0.5, 0.6}), none) << "before its place";
+}
+
+// |sightings| of each landmark, the first of which moves farthest.
+std::vector<CalibrationObservation> tracks_of(const std::vector<int>& sightings) {
+  std::vector<CalibrationObservation> all;
+  for (std::size_t l = 0; l < sightings.size(); ++l) {
+    for (int f = 0; f < sightings[l]; ++f) {
+      all.push_back({f, static_cast<std::int64_t>(l), f * (10.0 - static_cast<double>(l)), 0, 0.3});
+    }
+  }
+  return all;
+}
+
+TEST(CalibrationStreams, ATrackOfJustEnoughSightingsIsUsed) {
+  EXPECT_EQ(choose_tracks(tracks_of({kMinSightings - 1, kMinSightings}), 100).size(),
+            static_cast<std::size_t>(kMinSightings));
+}
+
+TEST(CalibrationStreams, AsManyObservationsAsAllowedAreUsed) {
+  EXPECT_EQ(choose_tracks(tracks_of({10, 10, 10}), 20).size(), 20U);
+  EXPECT_EQ(choose_tracks(tracks_of({10, 10, 10}), 19).size(), 10U);
 }
 
 TEST(CalibrationStreams, NothingIsNothing) {
