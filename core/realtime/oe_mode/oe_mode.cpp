@@ -190,7 +190,7 @@ OeMode::Solution OeMode::find_and_solve(const PredictedMotion& predicted,
   if (!doubtful || !prediction_.follows(frame_.time_s)) return first;
   // A second look, where the motion before leads to.
   const int chosen = statistics_.chosen;
-  const Solution second = solve_about(prediction_.last_carried_on(frame_.time_s), predicted);
+  Solution second = solve_about(prediction_.last_carried_on(frame_.time_s), predicted);
   if (second.status == SolveStatus::kOk && second.solved.inliers >= look.least_held_again &&
       second.solved.inliers >= look.least_held * statistics_.chosen) {
     return second;
