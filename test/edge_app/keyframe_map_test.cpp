@@ -176,6 +176,34 @@ TEST_F(KeyframeMap, IsTiedLessWellByErrorsThatRepeatThemselves) {
   EXPECT_LT(repeated, 20 * white);
 }
 
+TEST_F(KeyframeMap, IsTiedOnEachAxisByTheErrorsOfItsOwn) {
+  const double white = tie_covariance(result_)(0, 0);
+  for (std::size_t i = 0; i < kSamples; ++i) {
+    result_.telemetry_residuals[i].error_rad[1] =
+        result_.telemetry_residuals[i / 8 * 8].error_rad[1];
+  }
+  EXPECT_EQ(tie_covariance(result_)(0, 0), white);
+  EXPECT_GT(tie_covariance(result_)(1, 1), 5 * white);
+}
+
+// Control points of a parabola are on a parabola; the sum of a B-spline's weights is 1.
+TEST_F(KeyframeMap, PredictsTheTrajectorysOwnAcceleration) {
+  constexpr double kKnots_s = 0.1;
+  constexpr double kAcceleration = 0.3;  // rad/s^2, true
+  std::vector<double> knots;
+  for (int i = 0; i <= 10; ++i) knots.push_back(kKnots_s * i);
+  result_.trajectory = TrajectorySpline(knots);
+  for (int i = 0; i < result_.trajectory.control_points(); ++i) {
+    const double t = kKnots_s * (i - 1);
+    result_.trajectory.control_point(i) =
+        Vector2<double>(0.5 * kAcceleration * t * t, -0.25 * kAcceleration * t * t);
+  }
+  result_.calibration.mechanics.pan_scale = 1.1;
+  const InterpolatedPanTilt predicted = predict(result_, 0.47, 1);
+  EXPECT_NEAR(predicted.acceleration.pan, 1.1 * kAcceleration, 1e-9);
+  EXPECT_NEAR(predicted.acceleration.tilt, -0.5 * kAcceleration, 1e-9);
+}
+
 TEST_F(KeyframeMap, IsTiedLessWellByErrorsLargerThanStated) {
   const double white = tie_covariance(result_)(1, 1);
   result_.telemetry_residuals = residuals(3 * kPixel, kPixel);

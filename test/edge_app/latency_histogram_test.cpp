@@ -16,6 +16,13 @@ TEST(LatencyHistogram, GivesQuantilesToFivePercent) {
   EXPECT_LE(histogram.quantile(0.99), 9.9e-3 * 1.05);
 }
 
+TEST(LatencyHistogram, AQuantileThatABucketJustReachesLiesInIt) {
+  LatencyHistogram histogram;
+  for (const double seconds : {1e-3, 0.1}) histogram.add(seconds);
+  EXPECT_LE(histogram.quantile(0.5), 1.05e-3);
+  EXPECT_GE(histogram.quantile(0.51), 0.1);
+}
+
 TEST(LatencyHistogram, NoQuantileIsLongerThanTheLongest) {
   LatencyHistogram histogram;
   for (int i = 1; i <= 100; ++i) {
@@ -44,6 +51,8 @@ TEST(LatencyHistogram, KeepsValuesBeyondItsRangeInTheEndBuckets) {
   EXPECT_EQ(histogram.quantile(0.5), 1e-6);
   for (int i = 0; i < 3; ++i) histogram.add(1e9);
   EXPECT_GT(histogram.quantile(0.5), 100);
+  EXPECT_EQ(histogram.count(LatencyHistogram::kBuckets - 1), 3);
+  EXPECT_EQ(histogram.total(), 4);
 }
 
 }  // namespace

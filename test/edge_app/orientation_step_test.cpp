@@ -757,6 +757,19 @@ TEST(FrameLandmarks, TheResidualOnAnEdgeIsTheOneAcrossIt) {
   EXPECT_LT((observed_residual(found) - 0.2 * across).norm(), 1e-4);
 }
 
+// Half of a landmark's variance moves the landmark instead; half of the rest is a component's.
+TEST(FrameTracks, AnObservationsSigmaIsThatOfAComponentAndOutliersHaveNone) {
+  OeObservation found;
+  found.inlier = true;
+  found.covariance << 0.09, 0.01, 0.01, 0.07;
+  EXPECT_NEAR(track_sigma(found).value(), 0.2, 1e-12);
+  found.inlier = false;
+  EXPECT_FALSE(track_sigma(found));
+  found.inlier = true;
+  found.covariance(0, 0) += kUnobservedVariance;
+  EXPECT_FALSE(track_sigma(found)) << "an edge";
+}
+
 TEST(OrientationStep, RefusesOptionsOfOeModeThatAreNotValid) {
   OrientationStepOptions options;
   options.calibration.camera = {2000, 1, 0, 640, 480};

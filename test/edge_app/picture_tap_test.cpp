@@ -109,10 +109,11 @@ TEST_F(PictureTapTest, ManyWhoAskAtOnceShareTheirPictures) {
 
 TEST_F(PictureTapTest, KeepsTheLastPicturesByTheirFrames) {
   constexpr auto kKept = static_cast<std::int64_t>(PictureTap::kKept);
+  constexpr std::int64_t kServed = 2 * kKept + 1;  // one is let go at a time
   PictureTap tap(kNow);
   std::thread tap_thread(&PictureTap::run, &tap);
-  std::thread realtime([&] { serve(&tap, 2 * kKept, frame(0)); });
-  for (std::int64_t i = 1; i <= 2 * kKept; ++i) {
+  std::thread realtime([&] { serve(&tap, kServed, frame(0)); });
+  for (std::int64_t i = 1; i <= kServed; ++i) {
     const auto picture = tap.ask(seconds(60));
     ASSERT_NE(picture, nullptr);
     EXPECT_EQ(picture->frame, i);
@@ -121,12 +122,12 @@ TEST_F(PictureTapTest, KeepsTheLastPicturesByTheirFrames) {
     }
   }
   realtime.join();
-  EXPECT_EQ(tap.of_frame(kKept), nullptr);
-  for (std::int64_t i = kKept + 1; i <= 2 * kKept; ++i) {
+  EXPECT_EQ(tap.of_frame(kServed - kKept), nullptr);
+  for (std::int64_t i = kServed - kKept + 1; i <= kServed; ++i) {
     ASSERT_NE(tap.of_frame(i), nullptr);
     EXPECT_EQ(tap.of_frame(i)->frame, i);
   }
-  EXPECT_EQ(tap.of_frame(2 * kKept + 1), nullptr);
+  EXPECT_EQ(tap.of_frame(kServed + 1), nullptr);
   tap.end();
   tap_thread.join();
 }

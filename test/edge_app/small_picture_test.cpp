@@ -46,6 +46,20 @@ TEST(SmallPicture, IsNoWiderThanAskedFor) {
   }
 }
 
+TEST(SmallPicture, RoundsMeansToTheNearestLevel) {
+  for (const int third : {100, 101}) {
+    std::vector<std::uint8_t>
+        pixels;  // of each four 100, 100, `third` and 101: a mean of 100.25 or 100.5
+    for (int v = 0; v < 96; ++v) {
+      for (int u = 0; u < 160; ++u) pixels.push_back(v % 2 == 0 ? 100 : u % 2 == 0 ? third : 101);
+    }
+    const Picture small = decoded(small_jpeg({pixels.data(), 160, 96, 160}, 80));
+    for (int v = 0; v < small.height; ++v) {
+      for (int u = 0; u < small.width; ++u) ASSERT_EQ(small.luma[v * small.stride + u], third);
+    }
+  }
+}
+
 TEST(SmallPicture, ShowsTheMeanOfThePixelsInThePlaceOfEach) {
   // 32 px are 8 of the small picture: its blocks are JPEG's, so that little is lost.
   const std::vector<std::uint8_t> pixels = chequer(1920, 1088, 32);
