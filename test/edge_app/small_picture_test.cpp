@@ -48,10 +48,10 @@ TEST(SmallPicture, IsNoWiderThanAskedFor) {
 
 TEST(SmallPicture, RoundsMeansToTheNearestLevel) {
   for (const int third : {100, 101}) {
-    std::vector<std::uint8_t>
-        pixels;  // of each four 100, 100, `third` and 101: a mean of 100.25 or 100.5
-    for (int v = 0; v < 96; ++v) {
-      for (int u = 0; u < 160; ++u) pixels.push_back(v % 2 == 0 ? 100 : u % 2 == 0 ? third : 101);
+    // Of each four px 100, 100, `third` and 101: a mean of 100.25 or 100.5.
+    std::vector<std::uint8_t> pixels(160 * 96, 100);
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      if (i / 160 % 2 == 1) pixels[i] = static_cast<std::uint8_t>(i % 2 == 0 ? third : 101);
     }
     const Picture small = decoded(small_jpeg({pixels.data(), 160, 96, 160}, 80));
     for (int v = 0; v < small.height; ++v) {

@@ -444,7 +444,9 @@ TEST(OneSidedClock, MovesToAMinimumDelayThatRoseJustBeforeTheLock) {
     const double receive = t + jitter_s + (t < 19.9 ? 0 : 20e-3);
     EXPECT_FALSE(clock.learn({receive, t, receive, 1e-4, true})) << t;
     if (i == 20 * 25) clock.lock(receive);
-    if (t > 35) EXPECT_NEAR(clock.line().value_at(t), t + 20e-3, 0.1e-3);
+    if (t > 35) {
+      EXPECT_NEAR(clock.line().value_at(t), t + 20e-3, 0.1e-3);
+    }
   }
   EXPECT_EQ(clock.shift_s(), 0);
   EXPECT_EQ(clock.shift_variance(), 0);
