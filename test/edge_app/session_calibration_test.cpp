@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <map>
 
 #include "test/support/simulated_recording.h"
@@ -28,15 +29,18 @@ test::Simulation session_camera() {
 }
 
 // held_out_factor: of the sigmas that the tracker states in the frames that are held out.
-CalibrationSession session_of(const test::Simulation& s, double held_out_factor) {
+// polled_width_s: of the interval in which each angle was asked for; 0: numbered by the device.
+CalibrationSession session_of(const test::Simulation& s, double held_out_factor,
+                              double polled_width_s = 0) {
   const CalibrationInput input = test::simulate(s);
   CalibrationSession session{SessionLimits()};
   for (const CalibrationTelemetry& from : input.telemetry) {
     PanTiltSample sample;
-    sample.earliest_time_s = sample.latest_time_s = from.stamp_s;
+    sample.earliest_time_s = from.stamp_s - polled_width_s / 2;
+    sample.latest_time_s = from.stamp_s + polled_width_s / 2;
     sample.pan_rad = from.pan_rad;
     sample.tilt_rad = from.tilt_rad;
-    sample.sequence = from.sequence;
+    if (polled_width_s == 0) sample.sequence = from.sequence;
     session.add(sample);
   }
   std::map<std::int64_t, std::vector<TrackedPoint>> points;
@@ -122,6 +126,33 @@ TEST(SessionCalibration, WhatIsKnownMakesItSharper) {
   ASSERT_THAT(refined.refusal, IsEmpty());
   const int f = index(Parameter::kFocalLength);
   EXPECT_LT(refined.result.calibration.covariance(f, f), first.result.calibration.covariance(f, f));
+}
+
+// The known offset errs by it as much as the new data do, and so says the more of the rest.
+TEST(SessionCalibration, WhatAllPollsHaveInCommonDoesNotWeakenAKnownClockOffset) {
+  constexpr double kWidth_s = 0.02;
+  const test::Simulation s = session_camera();
+  const CalibrationSession session = session_of(s, 1, kWidth_s);
+  const int d = index(Parameter::kClockOffset);
+  Calibration known = calibrate_session(session, session_options(s), nullptr).result.calibration;
+  known.covariance(d, d) = kWidth_s * kWidth_s / 12;  // no more than what is common
+  const auto refined = [&](double moved_s) {
+    Calibration moved = known;
+    moved.clock_offset += moved_s;
+    const KnownCalibration prior{moved, true};
+    return calibrate_session(session, session_options(s), &prior);
+  };
+  constexpr double kMoved_s = 1e-3;
+  const SessionCalibration later = refined(kMoved_s);
+  const double share =
+      (later.result.calibration.clock_offset - refined(-kMoved_s).result.calibration.clock_offset) /
+      (2 * kMoved_s);
+  // Of the known offset a fifth of the sigma is taken to be its own, at least.
+  const double known_variance =
+      std::pow(session_options(s).prior_inflation * 0.2, 2) * known.covariance(d, d);
+  const double variance = (later.result.calibration.covariance(d, d) - kWidth_s * kWidth_s / 12) /
+                          std::pow(excess_of(later), 2);
+  EXPECT_NEAR(share, variance / known_variance, 0.3 * share);
 }
 
 TEST(SessionCalibration, EndsSoonWhenItIsCancelled) {
