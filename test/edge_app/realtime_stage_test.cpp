@@ -303,6 +303,17 @@ TEST(RealtimeStage, TellsTheCalibrationThreadOfTracksSamplesAndLosses) {
   EXPECT_TRUE(stage->telemetry_is_lost());
 }
 
+// The telemetry queue holds 1024, that of the calibration thread, which does not listen, 4096.
+TEST(RealtimeStage, CountsTheSamplesThatTheCalibrationThreadDoesNotHear) {
+  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);
+  for (int filling = 0; filling < 5; ++filling) {
+    for (int i = 0; i < 1024; ++i) stage->push(sample_message(0.001 * i));
+    EXPECT_TRUE(stage->process());
+  }
+  EXPECT_EQ(stage->drops().telemetry, 0);
+  EXPECT_EQ(stage->drops().unheard, 5 * 1024 - 4096);
+}
+
 TEST(RealtimeStage, TakesOverWhatIsPublishedBeforeTheNextFrame) {
   const Scene scene;
   const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);

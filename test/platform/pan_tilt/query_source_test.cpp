@@ -501,7 +501,8 @@ TEST(QuerySource, ReadsAtTheRateThatIsAskedFor) {
     for (int i = 0; i < 6; ++i) {
       const double before_s = sample.latest_time_s;
       ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
-      shortest_s = std::min(shortest_s, sample.latest_time_s - before_s);
+      // The first one may still end what was asked before the pause.
+      if (i > 0) shortest_s = std::min(shortest_s, sample.latest_time_s - before_s);
     }
     EXPECT_GT(sample.latest_time_s - first_s, 4 * kPeriod_s) << kind.name() << ": no burst";
     EXPECT_LT(shortest_s, 1.5 * kPeriod_s) << kind.name();
