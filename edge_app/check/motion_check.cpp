@@ -54,7 +54,7 @@ void judge_signs(MotionReport* report, const MotionNeeds& needs) {
     add_problem(
         &report->findings,
         where + "pan and tilt are both reversed against the picture, as if it were upside down; " +
-            needs.turn_picture);
+            needs.turn_image);
   } else if (pan) {
     add_problem(&report->findings, where +
                                        "pan is reversed: the picture shows that the camera turns "
@@ -101,7 +101,7 @@ void judge_offset(MotionReport* report, const MotionNeeds& needs) {
                   1e3 * *report->clock_offset_s));
 }
 
-// A mount that shakes moves the picture by some pixels, too; a quarter of its width is no shaking.
+// A mount that shakes moves the image by some pixels, too; a quarter of its width is no shaking.
 void judge_presence(MotionReport* report, double image_px, double head_rad,
                     const MotionNeeds& needs) {
   const double much_px = 0.25 * needs.image_width_px;

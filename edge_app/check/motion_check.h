@@ -26,7 +26,7 @@ namespace alidade {
 
 struct MotionNeeds {
   std::string source;          // of pan and tilt
-  std::string video;           // of the picture
+  std::string video;           // of the image
   int image_width_px = 0;      // 0: unknown
   double focal_length_px = 0;  // 0: unknown
   std::string focal_length_from;
@@ -35,7 +35,7 @@ struct MotionNeeds {
   // What turns a sign where it is configured: "set pan_tilt.tilt_positive: down".
   std::string reverse_pan;
   std::string reverse_tilt;
-  std::string turn_picture;  // by 180 degrees
+  std::string turn_image;  // by 180 degrees
 };
 
 enum class AxisVerdict {

@@ -101,11 +101,11 @@ void judge_losses(VideoReport* report, const VideoNeeds& needs) {
         "look at the link between camera and machine, and at the camera's own load");
 }
 
-// The capture thread decodes one picture after the other: what takes longer than a period piles up. A fifth is
-// kept for pictures that are harder than those of a few seconds.
+// The capture thread decodes one image after the other: what takes longer than a period piles up. A fifth is
+// kept for images that are harder than those of a few seconds.
 void judge_decoding(VideoReport* report, const VideoNeeds& needs) {
   constexpr double kBusy = 0.8;
-  if (!needs.pictures || !report->decode_s || !report->rate_hz) return;
+  if (!needs.images || !report->decode_s || !report->rate_hz) return;
   const double busy = report->decode_s->median * *report->rate_hz;
   if (busy <= kBusy) return;
   add_problem(

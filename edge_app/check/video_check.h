@@ -21,7 +21,7 @@
 
 namespace alidade {
 
-// A frame without its picture.
+// A frame without its image.
 struct CheckedFrame {
   FrameStamp stamp;
   int width = 0;
@@ -34,7 +34,7 @@ struct VideoNeeds {
   std::string calibration_name;  // what the size below is of
   int width = 0;                 // px; 0: any
   int height = 0;
-  bool pictures = true;  // OE mode: each frame has to be decoded in time
+  bool images = true;  // OE mode: each frame has to be decoded in time
 };
 
 struct VideoReport {

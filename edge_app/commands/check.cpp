@@ -43,7 +43,7 @@ MotionReport motion_of(const Measured& measured, const VideoReport& video,
     time_of[measured.frames[i].stamp.frame] = video.time_s[i];
   }
   std::vector<TimedShift> shifts;
-  for (const ImageShift& shift : measured.pictures.shifts) {
+  for (const ImageShift& shift : measured.images.shifts) {
     shifts.push_back({time_of[shift.from], time_of[shift.to], shift.shift});
   }
   MotionNeeds needs;
@@ -56,7 +56,7 @@ MotionReport motion_of(const Measured& measured, const VideoReport& video,
   needs.clock_offset_s = calibration.calibrated ? calibration.calibration.clock_offset : 0;
   needs.reverse_pan = reverse_advice(config.pan_tilt, true);
   needs.reverse_tilt = reverse_advice(config.pan_tilt, false);
-  needs.turn_picture =
+  needs.turn_image =
       "turn it by 180 degrees in the camera's settings and set camera.upside_down: true; if it is "
       "upright, for pan " +
       needs.reverse_pan + ", for tilt " + needs.reverse_tilt;
@@ -149,14 +149,14 @@ int check_links(const CheckOptions& options) {
     findings.insert(findings.end(), more.begin(), more.end());
   };
   add(video.findings);
-  add(measured.pictures.findings);
+  add(measured.images.findings);
   add(telemetry.findings);
   fmt::print("video          {}: {}\n", measured.video.name, headline(video, video_needs));
   print(describe(video));
-  print(describe(measured.pictures));
+  print(describe(measured.images));
   fmt::print("pan/tilt       {}: {}\n", measured.pan_tilt.name, headline(telemetry));
   print(describe(telemetry));
-  if (measured.pictures.pictures > 1 && !telemetry.fresh.empty()) {
+  if (measured.images.images > 1 && !telemetry.fresh.empty()) {
     const MotionReport motion = motion_of(measured, video, telemetry, config, calibration);
     fmt::print("together\n");
     print(describe(motion));

@@ -53,13 +53,13 @@ Connection collect(Source& source, double wait_s, double duration_s, const OnIte
   return connection;
 }
 
-// Looks at pictures on a thread of its own.
-class PictureThread {
+// Looks at images on a thread of its own.
+class ImageThread {
  public:
-  PictureThread() : thread_([this] { work(); }) {}
-  ~PictureThread() { finish(); }
-  PictureThread(const PictureThread&) = delete;
-  PictureThread& operator=(const PictureThread&) = delete;
+  ImageThread() : thread_([this] { work(); }) {}
+  ~ImageThread() { finish(); }
+  ImageThread(const ImageThread&) = delete;
+  ImageThread& operator=(const ImageThread&) = delete;
 
   // Takes the place of one that waits.
   void offer(const Frame& frame) {
@@ -69,8 +69,8 @@ class PictureThread {
     changed_.notify_one();
   }
 
-  // Waits until it is done with what it was offered; PictureCheck is then the caller's.
-  const PictureCheck& finish() {
+  // Waits until it is done with what it was offered; ImageCheck is then the caller's.
+  const ImageCheck& finish() {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
       over_ = true;
@@ -102,9 +102,9 @@ class PictureThread {
   std::mutex mutex_;
   std::condition_variable changed_;
   std::optional<Frame> waiting_;  // guarded by mutex_
-  bool restarted_ = false;        // guarded by mutex_: since the picture last taken
+  bool restarted_ = false;        // guarded by mutex_: since the image last taken
   bool over_ = false;             // guarded by mutex_
-  PictureCheck check_;            // the thread's until it is joined
+  ImageCheck check_;              // the thread's until it is joined
   std::thread thread_;            // last: it uses the others
 };
 
@@ -128,12 +128,12 @@ Measured measure(const Config& config, double duration_s) {
   Measured measured;
   const auto video = make_frame_source(config.video, true);
   const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
-  PictureThread pictures;
+  ImageThread images;
   const std::future<void> frames = std::async(std::launch::async, [&] {
     measured.video = collect<Frame>(
         *video, config.video.timeout_s + kConnectSlack, duration_s, [&](const Frame& frame) {
           measured.frames.push_back({frame.stamp, frame.width, frame.height, frame.decode_s});
-          pictures.offer(frame);
+          images.offer(frame);
         });
   });
   const std::future<void> samples = std::async(std::launch::async, [&] {
@@ -149,7 +149,7 @@ Measured measure(const Config& config, double duration_s) {
   show_progress(frames, duration_s);
   show_progress(samples, duration_s);
   measured.counters = video->counters();
-  measured.pictures = pictures.finish().report({measured.video.name, config.realtime.landmarks});
+  measured.images = images.finish().report({measured.video.name, config.realtime.landmarks});
   return measured;
 }
 

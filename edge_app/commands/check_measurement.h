@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "edge_app/check/picture_check.h"
+#include "edge_app/check/image_check.h"
 #include "edge_app/check/video_check.h"
 #include "edge_app/config/config.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
@@ -30,7 +30,7 @@ struct Measured {
   std::vector<PanTiltSample> samples;
   std::vector<double> delivered_s;  // each of them
   FrameSourceCounters counters;
-  PictureReport pictures;
+  ImageReport images;
 };
 
 // Each stream for duration_s from its first item on. Shows its progress on a terminal.

@@ -47,7 +47,7 @@ OrientationStepOptions step_options(const Config& config, const NamedCalibration
 OrientationStepOptions step_options(const RecordingNoise& noise,
                                     const NamedCalibration& calibration);
 
-// decode: with pictures. copy_to: a file for the video stream; empty: none.
+// decode: with images. copy_to: a file for the video stream; empty: none.
 std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,
                                                const std::string& copy_to = "");
 std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config);

@@ -1,7 +1,7 @@
 // `alidade replay`: the real-time step over a recording, on one thread: telemetry up to a frame's
 // receive time is known when the frame is answered, and nothing later is. So the answer is what
 // a live step would have given, and the same in each replay.
-// In OE mode pictures are decoded besides; a frame whose picture cannot be is answered from telemetry.
+// In OE mode images are decoded besides; a frame whose image cannot be is answered from telemetry.
 // It reads no configuration: how long telemetry holds is the default of TelemetryLimits.
 
 #include <fcntl.h>
@@ -103,16 +103,16 @@ std::optional<Item> next(Source& source) {
   throw CommandError(kExitFailed, source.error());
 }
 
-bool has_pictures(const std::string& recording) {
+bool has_images(const std::string& recording) {
   std::error_code ignored;
   return fs::exists(fs::path(recording) / "video.mkv", ignored) ||
          fs::is_directory(fs::path(recording) / "frames", ignored);
 }
 
-// The pictures of a recording whose frames are counted by another source: some frames may have none.
-class Pictures {
+// The images of a recording whose frames are counted by another source: some frames may have none.
+class Images {
  public:
-  explicit Pictures(const std::string& recording)
+  explicit Images(const std::string& recording)
       : source_(open_recorded_frames({recording, true, false})) {
     next_ = next<Frame>(*source_);
     if (!next_) {
@@ -120,7 +120,7 @@ class Pictures {
     }
   }
 
-  // The picture of the frame with this stamp, none if it is missing. Asked once for each frame, in order.
+  // The image of the frame with this stamp, none if it is missing. Asked once for each frame, in order.
   std::optional<Frame> of(const FrameStamp& stamp) {
     std::optional<Frame> frame;
     if (next_ && next_->stamp.frame == stamp.frame &&
@@ -136,19 +136,19 @@ class Pictures {
   std::optional<Frame> next_;
 };
 
-// The pictures for OE mode; null: PT mode.
-std::unique_ptr<Pictures> open_pictures(const ReplayOptions& options) {
+// The images for OE mode; null: PT mode.
+std::unique_ptr<Images> open_images(const ReplayOptions& options) {
   const std::string& recording = options.recording;
   const bool demanded = options.mode == "OE";
   if (options.mode == "PT") return nullptr;
-  if (!has_pictures(recording)) {
+  if (!has_images(recording)) {
     if (!demanded) return nullptr;
     throw CommandError(kExitUsage, recording +
                                        ": has no pictures (video.mkv or frames/), which OE mode "
                                        "needs; use --mode PT");
   }
   try {
-    return std::make_unique<Pictures>(recording);
+    return std::make_unique<Images>(recording);
   } catch (const CommandError& error) {
     if (demanded) throw;
     spdlog::warn("{}; replayed in PT mode", error.what());
@@ -156,9 +156,9 @@ std::unique_ptr<Pictures> open_pictures(const ReplayOptions& options) {
   }
 }
 
-ImageView view_of(const std::optional<Frame>& picture) {
-  if (!picture) return {};
-  return {picture->luma, picture->width, picture->height, picture->stride};
+ImageView view_of(const std::optional<Frame>& image) {
+  if (!image) return {};
+  return {image->luma, image->width, image->height, image->stride};
 }
 
 // What the last line tells.
@@ -202,9 +202,9 @@ int replay_recording(const ReplayOptions& options) {
   check_size(info, calibration, options.recording);
   RecordingNoise noise;
   if (!load_noise(options.recording, &noise, &error)) throw CommandError(kExitFailed, error);
-  const std::unique_ptr<Pictures> pictures = open_pictures(options);
+  const std::unique_ptr<Images> images = open_images(options);
   OrientationStepOptions of_step = step_options(noise, calibration);
-  if (pictures) of_step.oe = oe_options(calibration.calibration.camera);
+  if (images) of_step.oe = oe_options(calibration.calibration.camera);
   OrientationStep step(of_step);
 
   StopSignals signals;
@@ -236,10 +236,10 @@ int replay_recording(const ReplayOptions& options) {
          sample = next<PanTiltSample>(*pan_tilt)) {
       step.add_telemetry(*sample);
     }
-    const std::optional<Frame> picture = pictures ? pictures->of(stamp) : std::nullopt;
+    const std::optional<Frame> image = images ? images->of(stamp) : std::nullopt;
     StepEvents events;
     const double before_s = monotonic_now_s();
-    const OrientationRecord record = step.add_frame(stamp, view_of(picture), &events);
+    const OrientationRecord record = step.add_frame(stamp, view_of(image), &events);
     summary.add(record, monotonic_now_s() - before_s);
     file.write(record);
     if (out && !out->write(record)) {

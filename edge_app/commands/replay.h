@@ -9,7 +9,7 @@ struct ReplayOptions {
   std::string recording;
   std::string directory;    // empty: <recording>/alidade
   std::string calibration;  // empty: <recording>/alidade/calibration.yaml
-  std::string mode;         // "OE", "PT"; empty: OE if there are pictures
+  std::string mode;         // "OE", "PT"; empty: OE if there are images
   bool realtime = false;
   bool json = false;
   bool csv = false;

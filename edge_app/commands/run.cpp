@@ -52,7 +52,7 @@ PipelineOptions pipeline_options(const Config& config, const NamedCalibration& c
 
 // Null where none is configured.
 std::unique_ptr<HttpServer> start_http(const Config& config, const HttpApiSources& sources,
-                                       PictureTap* tap) {
+                                       ImageTap* tap) {
   if (!config.output.http) return nullptr;
   auto server = std::make_unique<HttpServer>(*config.output.http);
   add_api_routes(server.get(), sources);
@@ -112,7 +112,7 @@ int run_live(const RunOptions& options) {
   // First, so that a slow reader of stdout holds up no record that others wait for.
   if (config.output.http) sinks.add(&live);
   if (format) sinks.add(&writer);
-  PictureTap tap;
+  ImageTap tap;
   if (config.output.http) of_pipeline.tap = &tap;
   Pipeline pipeline(*video, *pan_tilt, sinks, calibrating.calibration.get(), of_pipeline);
   HttpApiSources sources;

@@ -45,7 +45,7 @@ std::string describe(const PipelineSummary& summary, bool latency_measured) {
       summary.frames, summary.records, summary.with_landmarks,
       summary.with_orientation - summary.with_landmarks, summary.records - summary.with_orientation,
       latency, summary.drops.frames, summary.drops.telemetry, summary.drops.records,
-      summary.drops.late_pictures, summary.page_faults.minor, summary.page_faults.major);
+      summary.drops.late_images, summary.page_faults.minor, summary.page_faults.major);
 }
 
 LifeReport::LifeReport(const ServiceManager& manager, Pipeline* pipeline)

@@ -26,13 +26,13 @@ namespace fs = std::filesystem;
 
 constexpr int kPoints = 250;  // in a frame
 // Of a first trajectory's angles. It stands for measurements that OE mode weighs against what it sees, so
-// it claims no more than it must to predict the picture.
+// it claims no more than it must to predict the image.
 constexpr double kFirstSigma_px = 1;
 
-// use(frame, luma) for each picture of the input's frames, in the order of the recording.
+// use(frame, luma) for each image of the input's frames, in the order of the recording.
 template <class Use>
-void for_each_picture(const std::string& directory, const CalibrationInput& input,
-                      const VideoProgress& progress, std::vector<std::string>* remarks, Use use) {
+void for_each_image(const std::string& directory, const CalibrationInput& input,
+                    const VideoProgress& progress, std::vector<std::string>* remarks, Use use) {
   std::unordered_set<std::int64_t> wanted;
   for (const CalibrationFrame& frame : input.frames) wanted.insert(frame.frame);
   const auto video = open_recorded_frames({directory, true, false});
@@ -73,7 +73,7 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
   options.max_points = kPoints;
   StartUpTracker tracker(options);
   VideoTracks tracks;
-  for_each_picture(
+  for_each_image(
       directory, input, progress, &tracks.remarks, [&](std::int64_t frame, const ImageView& image) {
         if (tracker.process(image) == StartUpStatus::kBadImage) {
           throw CommandError(
@@ -103,7 +103,7 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
   mode->reset(estimate.calibration);
   const double to_middle_s = estimate.calibration.line_delay * input.height / 2;
   VideoTracks tracks;
-  for_each_picture(
+  for_each_image(
       directory, input, progress, &tracks.remarks, [&](std::int64_t frame, const ImageView& image) {
         const auto time = times.find(frame);
         if (time == times.end()) return;  // no telemetry accompanies it
@@ -134,10 +134,10 @@ MapState map_video(const std::string& directory, const CalibrationResult& result
   }
   std::vector<Keyframe> keyframes;
   std::vector<std::string> said_before;
-  for_each_picture(directory, chosen, progress, &said_before,
-                   [&](std::int64_t frame, const ImageView& image) {
-                     keyframes.push_back({times.at(frame), std::make_shared<PackedPicture>(image)});
-                   });
+  for_each_image(directory, chosen, progress, &said_before,
+                 [&](std::int64_t frame, const ImageView& image) {
+                   keyframes.push_back({times.at(frame), std::make_shared<PackedImage>(image)});
+                 });
   return map_from_keyframes(result, keyframes);
 }
 

@@ -6,7 +6,7 @@
 // And the map that belongs to the calibration that came of it.
 // Pixels as in CONVENTIONS.md; sigma_px is that of a component, sqrt(trace of covariance / 2), of what
 // differs between the observations of one landmark.
-// Reads the whole video; throws CommandError (no or unreadable pictures, or of another size than
+// Reads the whole video; throws CommandError (no or unreadable images, or of another size than
 // recording.yaml says). Runs on the caller's thread.
 
 #include <functional>
@@ -36,7 +36,7 @@ using VideoProgress = std::function<void(double done)>;
                                       const CalibrationResult& estimate,
                                       const VideoProgress& progress);
 
-// Of up to kMaxKeyframes pictures, spread over the calibrated frames.
+// Of up to kMaxKeyframes images, spread over the calibrated frames.
 inline constexpr std::size_t kMaxKeyframes = 24;
 [[nodiscard]] MapState map_video(const std::string& directory, const CalibrationResult& result,
                                  const VideoProgress& progress);

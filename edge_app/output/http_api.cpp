@@ -179,7 +179,7 @@ ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
                     {"telemetry", summary.drops.telemetry},
                     {"records", summary.drops.records},
                     {"unheard", summary.drops.unheard},
-                    {"late_pictures", summary.drops.late_pictures}};
+                    {"late_pictures", summary.drops.late_images}};
   out["video_clock"] = {{"locked", newest && newest->clock_locked},
                         {"sigma_s", newest && newest->time_s ? Json(newest->time_sigma_s) : Json()},
                         {"restarts", summary.clock_restarts},

@@ -129,7 +129,7 @@ std::string service_metrics(const HttpApiSources& sources, const HttpCounters& h
   out.add(summary.drops.unheard, {{"queue", "calibration"}});
   out.counter("alidade_late_pictures_total",
               "Pictures not looked at, so that the frames behind them need not wait");
-  out.add(summary.drops.late_pictures);
+  out.add(summary.drops.late_images);
   out.counter("alidade_video_clock_restarts_total", "Starts of the video's clock filter anew");
   out.add(summary.clock_restarts);
   out.counter("alidade_video_clock_floor_shifts_total", "Steps of the video's least delay");

@@ -6,7 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
-#include "edge_app/pipeline/small_picture.h"
+#include "edge_app/pipeline/small_image.h"
 
 namespace alidade {
 namespace {
@@ -17,7 +17,7 @@ using Json = nlohmann::ordered_json;
 constexpr double kPatienceS = 1;
 constexpr std::chrono::milliseconds kWithoutWaiting{0};
 
-ServerResponse no_picture() {
+ServerResponse no_image() {
   return http_error(503, "no picture: the video is away, or none is decoded (realtime.mode: PT)");
 }
 
@@ -31,36 +31,36 @@ ServerResponse page() {
   return response;
 }
 
-std::optional<ServerResponse> picture(PictureTap* tap, const ServerRequest& request) {
-  const auto picture = tap->ask(kWithoutWaiting);
-  if (picture == nullptr && request.waited_s < kPatienceS) return std::nullopt;
-  if (picture == nullptr || picture->jpeg.empty()) return no_picture();
+std::optional<ServerResponse> image(ImageTap* tap, const ServerRequest& request) {
+  const auto image = tap->ask(kWithoutWaiting);
+  if (image == nullptr && request.waited_s < kPatienceS) return std::nullopt;
+  if (image == nullptr || image->jpeg.empty()) return no_image();
   ServerResponse response;
   response.type = "image/jpeg";
-  response.body = picture->jpeg;
-  response.headers = {{"X-Alidade-Frame", std::to_string(picture->frame)},
+  response.body = image->jpeg;
+  response.headers = {{"X-Alidade-Frame", std::to_string(image->frame)},
                       {"Cache-Control", "no-store"}};
   return response;
 }
 
-std::optional<ServerResponse> overlay(PictureTap* tap, const ServerRequest& request) {
-  std::shared_ptr<const LivePicture> picture;
+std::optional<ServerResponse> overlay(ImageTap* tap, const ServerRequest& request) {
+  std::shared_ptr<const LiveImage> image;
   if (const auto wanted = request.parameter("frame")) {
     constexpr std::size_t kDigits = 18;
     if (wanted->empty() || wanted->size() > kDigits ||
         wanted->find_first_not_of("0123456789") != std::string::npos) {
       return http_error(400, "frame must be a frame's number");
     }
-    picture = tap->of_frame(std::stoll(*wanted));
-    if (picture == nullptr)
+    image = tap->of_frame(std::stoll(*wanted));
+    if (image == nullptr)
       return http_error(404, "that frame is not among the last that were shown");
   } else {
-    picture = tap->ask(kWithoutWaiting);
-    if (picture == nullptr && request.waited_s < kPatienceS) return std::nullopt;
-    if (picture == nullptr) return no_picture();
+    image = tap->ask(kWithoutWaiting);
+    if (image == nullptr && request.waited_s < kPatienceS) return std::nullopt;
+    if (image == nullptr) return no_image();
   }
   ServerResponse response;
-  response.body = overlay_json(*picture);
+  response.body = overlay_json(*image);
   response.headers = {{"Cache-Control", "no-store"}};
   return response;
 }
@@ -70,12 +70,12 @@ double rounded(float px) { return std::round(1000.0 * px) / 1000; }
 
 }  // namespace
 
-std::string overlay_json(const LivePicture& picture) {
+std::string overlay_json(const LiveImage& image) {
   Json landmarks = Json::array();
   Json points = Json::array();
-  for (int i = 0; i < picture.landmarks.count; ++i) {
-    const FramePoint& found = picture.landmarks.found[static_cast<std::size_t>(i)];
-    if (picture.landmarks.kind == FrameLandmarks::Kind::kPoints) {
+  for (int i = 0; i < image.landmarks.count; ++i) {
+    const FramePoint& found = image.landmarks.found[static_cast<std::size_t>(i)];
+    if (image.landmarks.kind == FrameLandmarks::Kind::kPoints) {
       points.push_back({rounded(found.u_px), rounded(found.v_px)});
     } else {
       landmarks.push_back({{"u", rounded(found.u_px)},
@@ -85,19 +85,19 @@ std::string overlay_json(const LivePicture& picture) {
                            {"used", found.inlier}});
     }
   }
-  const Json object{{"frame", picture.frame},
-                    {"width", picture.width},
-                    {"height", picture.height},
-                    {"scale", shrinking_factor(picture.width, PictureTap::kMaxWidth)},
+  const Json object{{"frame", image.frame},
+                    {"width", image.width},
+                    {"height", image.height},
+                    {"scale", shrinking_factor(image.width, ImageTap::kMaxWidth)},
                     {"landmarks", std::move(landmarks)},
                     {"points", std::move(points)}};
   return object.dump() + "\n";
 }
 
-void add_status_page(HttpServer* server, PictureTap* tap) {
+void add_status_page(HttpServer* server, ImageTap* tap) {
   server->get("/", HttpAccess::kOpen, [](const ServerRequest&) { return page(); });
   server->get("/api/v1/picture", HttpAccess::kToken,
-              [tap](const ServerRequest& request) { return picture(tap, request); });
+              [tap](const ServerRequest& request) { return image(tap, request); });
   server->get("/api/v1/overlay", HttpAccess::kToken,
               [tap](const ServerRequest& request) { return overlay(tap, request); });
 }

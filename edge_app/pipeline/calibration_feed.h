@@ -25,7 +25,7 @@ struct TrackedPoint {
 struct FrameTracks {
   // Landmarks of different trackers have nothing in common.
   enum class Tracker : std::uint8_t {
-    kNone,     // no picture
+    kNone,     // no image
     kStartUp,  // StartUpTracker: the camera is not calibrated
     kOe        // OeMode
   };
@@ -36,7 +36,7 @@ struct FrameTracks {
   bool clock_restarted = false;                  // the frame clock began anew with this frame
   bool delay_stepped = false;                    // the least delay of the video stepped
   OeStatus oe_status = OeStatus::kNoPrediction;  // kOe
-  int looked_for = 0;                            // points expected in the picture
+  int looked_for = 0;                            // points expected in the image
   int count = 0;
   std::array<TrackedPoint, kMaxFramePoints> points;  // the first `count`
 };

@@ -10,7 +10,7 @@ namespace alidade {
 
 void CalibrationSession::clear() {
   frames_.clear();
-  pictures_.clear();
+  images_.clear();
 }
 
 double CalibrationSession::span_s() const {
@@ -35,11 +35,10 @@ void CalibrationSession::add(const FrameTracks& tracks) {
          telemetry_.front().latest_time_s < oldest_s - limits_.telemetry_margin_s) {
     telemetry_.pop_front();
   }
-  pictures_.erase(std::remove_if(pictures_.begin(), pictures_.end(),
-                                 [oldest_s](const KeptPicture& picture) {
-                                   return picture.receive_time_s < oldest_s;
-                                 }),
-                  pictures_.end());
+  images_.erase(std::remove_if(
+                    images_.begin(), images_.end(),
+                    [oldest_s](const KeptImage& image) { return image.receive_time_s < oldest_s; }),
+                images_.end());
 }
 
 void CalibrationSession::add(const PanTiltSample& sample) {
@@ -52,17 +51,17 @@ void CalibrationSession::add(const PanTiltSample& sample) {
 bool CalibrationSession::wants_keyframe(const Camera<double>& camera) const {
   if (frames_.empty() || telemetry_.empty()) return false;
   const double apart = limits_.keyframes_apart * camera.width / camera.focal_length;
-  return std::all_of(pictures_.begin(), pictures_.end(), [&](const KeptPicture& picture) {
-    const double pan = wrap_angle(picture.pan - last_angle_.pan) * std::cos(picture.tilt);
-    return std::hypot(pan, picture.tilt - last_angle_.tilt) > apart;
+  return std::all_of(images_.begin(), images_.end(), [&](const KeptImage& image) {
+    const double pan = wrap_angle(image.pan - last_angle_.pan) * std::cos(image.tilt);
+    return std::hypot(pan, image.tilt - last_angle_.tilt) > apart;
   });
 }
 
-void CalibrationSession::add_keyframe(const ImageView& picture) {
-  if (pictures_.size() >= limits_.max_keyframes) pictures_.erase(pictures_.begin());
+void CalibrationSession::add_keyframe(const ImageView& image) {
+  if (images_.size() >= limits_.max_keyframes) images_.erase(images_.begin());
   const FrameStamp& stamp = frames_.back().stamp;
-  pictures_.push_back({stamp.frame, stamp.receive_time_s, last_angle_.pan, last_angle_.tilt,
-                       std::make_shared<PackedPicture>(picture)});
+  images_.push_back({stamp.frame, stamp.receive_time_s, last_angle_.pan, last_angle_.tilt,
+                     std::make_shared<PackedImage>(image)});
 }
 
 std::vector<FrameStamp> CalibrationSession::stamps() const {
@@ -118,10 +117,10 @@ FrameTimes CalibrationSession::frame_times(const CalibrationResult& result) cons
 std::vector<Keyframe> CalibrationSession::keyframes(const CalibrationResult& result) const {
   const FrameTimes time_of = frame_times(result);
   std::vector<Keyframe> keyframes;
-  for (const KeptPicture& picture : pictures_) {
-    const auto time = time_of.find(picture.frame);
+  for (const KeptImage& image : images_) {
+    const auto time = time_of.find(image.frame);
     if (time == time_of.end()) continue;
-    keyframes.push_back({time->second, picture.picture});
+    keyframes.push_back({time->second, image.image});
   }
   return keyframes;
 }

@@ -1,6 +1,6 @@
 #pragma once
 // CalibrationSession: what was seen of one camera at one zoom through one connection, in bounded memory: stamps and
-// tracks of the frames, telemetry, and some pictures (keyframes). What is older than the limits is forgotten.
+// tracks of the frames, telemetry, and some images (keyframes). What is older than the limits is forgotten.
 //
 // Every tenth frame is held out: a calibration of the session does not use it, and is tried on it. Its time then lies
 // between its neighbours', as its sender's clock or its count has it.
@@ -19,7 +19,7 @@
 #include "core/realtime/image/image_view.h"
 #include "edge_app/pipeline/calibration_feed.h"
 #include "edge_app/pipeline/keyframe_map.h"
-#include "edge_app/pipeline/packed_picture.h"
+#include "edge_app/pipeline/packed_image.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 
 namespace alidade {
@@ -37,16 +37,16 @@ class CalibrationSession {
  public:
   explicit CalibrationSession(const SessionLimits& limits) : limits_(limits) {}
 
-  // Forgets frames and pictures. Telemetry stays: it is of the same head.
+  // Forgets frames and images. Telemetry stays: it is of the same head.
   void clear();
 
   void add(const FrameTracks& tracks);
   // One that begins a new connection (restarted) makes those before it forgotten.
   void add(const PanTiltSample& sample);
-  // Whether the head points where no picture was taken yet. False without frames or telemetry.
+  // Whether the head points where no image was taken yet. False without frames or telemetry.
   [[nodiscard]] bool wants_keyframe(const Camera<double>& camera) const;
-  // The picture of the frame last added; copied. Takes the place of the oldest where there are enough. Needs a frame.
-  void add_keyframe(const ImageView& picture);
+  // The image of the frame last added; copied. Takes the place of the oldest where there are enough. Needs a frame.
+  void add_keyframe(const ImageView& image);
 
   [[nodiscard]] bool empty() const { return frames_.empty(); }
   [[nodiscard]] std::size_t frames() const { return frames_.size(); }
@@ -71,17 +71,17 @@ class CalibrationSession {
     FrameStamp stamp;
     std::vector<TrackedPoint> points;
   };
-  struct KeptPicture {
+  struct KeptImage {
     std::int64_t frame;
     double receive_time_s;
     double pan, tilt;  // rad, as measured last before it
-    std::shared_ptr<const PackedPicture> picture;
+    std::shared_ptr<const PackedImage> image;
   };
 
   SessionLimits limits_;
   std::deque<KeptFrame> frames_;
   std::deque<PanTiltSample> telemetry_;
-  std::vector<KeptPicture> pictures_;
+  std::vector<KeptImage> images_;
   PanTilt<double> last_angle_;
 };
 

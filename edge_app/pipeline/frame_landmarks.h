@@ -4,7 +4,7 @@
 //   landmark   of OE mode: where the solution expects it, and its residual: found minus expected
 //   point      of an uncalibrated camera: where it was found; nothing is expected
 //
-// px of the full picture (CONVENTIONS.md). On an edge a landmark is found across it only: its residual has no
+// px of the full image (CONVENTIONS.md). On an edge a landmark is found across it only: its residual has no
 // part along it. Fixed size and trivially copyable: crosses a queue by value.
 
 #include <array>

@@ -111,10 +111,10 @@ MapState map_from_keyframes(const CalibrationResult& result,
     InterpolatedPanTilt prediction = predict(result, middle_s, kSigma_px);
     prediction.acceleration_sigma = acceleration_sigma;
     FrameOrientation orientation;
-    const ImageView picture =
-        keyframe.picture == nullptr ? ImageView{} : keyframe.picture->unpack(&pixels);
+    const ImageView image =
+        keyframe.image == nullptr ? ImageView{} : keyframe.image->unpack(&pixels);
     // Whatever the status: maintain() knows what to do with such a frame.
-    static_cast<void>(mode->process(picture, keyframe.time_s, &prediction, &orientation));
+    static_cast<void>(mode->process(image, keyframe.time_s, &prediction, &orientation));
     mode->maintain();
     tilt += result.trajectory.position(middle_s).tilt / static_cast<double>(keyframes.size());
   }

@@ -1,5 +1,5 @@
 #pragma once
-// The map that belongs to a calibration, from some pictures of the recording it was made of.
+// The map that belongs to a calibration, from some images of the recording it was made of.
 //   pass     OeMode over the keyframes, with the trajectory in place of telemetry: what they show goes
 //            where the trajectory says, to a fraction of a pixel, in the base frame
 //   offset   what ties trajectory and map to the base frame is telemetry's noise, averaged over the recording:
@@ -16,14 +16,14 @@
 #include "core/calibration/calibrate.h"
 #include "core/realtime/oe_mode/map_state.h"
 #include "core/realtime/telemetry/telemetry_interpolation.h"
-#include "edge_app/pipeline/packed_picture.h"
+#include "edge_app/pipeline/packed_image.h"
 
 namespace alidade {
 
 struct Keyframe {
   double time_s = 0;  // of row 0
   // Of the calibration's size; another, or none, is passed over.
-  std::shared_ptr<const PackedPicture> picture;
+  std::shared_ptr<const PackedImage> image;
 };
 
 // In order of time, within the trajectory's span. An empty map if none can be used.

@@ -129,7 +129,7 @@ OrientationRecord OrientationStep::video_lost(double now_s) const {
   return record;
 }
 
-OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const ImageView& picture,
+OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const ImageView& image,
                                              StepEvents* events) {
   ClockEstimate clock;
   clock.time_s = stamp.receive_time_s;
@@ -142,7 +142,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   events->video_delay_stepped = clock.delay_stepped;
   if (clock.restarted || clock.delay_stepped)
     minimum_delay_sigma_s_ = options_.minimum_delay_sigma_s;
-  picture_ = picture;
+  image_ = image;
   tracks_.stamp = stamp;
   tracks_.time_s = clock.time_s;
   tracks_.clock_restarted = clock.restarted;
@@ -169,15 +169,15 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
     record.status = RecordStatus::kOtherZoom;
     return record;
   }
-  orient(has_result(query) ? &measured : nullptr, picture, &record);
+  orient(has_result(query) ? &measured : nullptr, image, &record);
   return record;
 }
 
-void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageView& picture,
+void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageView& image,
                              OrientationRecord* record) {
   FrameOrientation frame;
   if (finds_landmarks()) {
-    const OeStatus status = oe_->process(picture, *record->time_s, measured, &frame);
+    const OeStatus status = oe_->process(image, *record->time_s, measured, &frame);
     // That the frame's time is not yet known well, sigma says too.
     if (measured != nullptr && status != OeStatus::kOk)
       record->status = status_of_landmarks(status);
@@ -198,12 +198,12 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
 void OrientationStep::maintain() {
   if (finds_landmarks()) {
     oe_->maintain();
-    if (picture_.valid()) tracks_.tracker = FrameTracks::Tracker::kOe;
-  } else if (start_up_ && picture_.valid()) {
-    if (start_up_->process(picture_) != StartUpStatus::kBadImage)
+    if (image_.valid()) tracks_.tracker = FrameTracks::Tracker::kOe;
+  } else if (start_up_ && image_.valid()) {
+    if (start_up_->process(image_) != StartUpStatus::kBadImage)
       tracks_.tracker = FrameTracks::Tracker::kStartUp;
   }
-  picture_ = {};
+  image_ = {};
 }
 
 void OrientationStep::get_tracks(FrameTracks* tracks) const {

@@ -9,7 +9,7 @@
 // the newest sample the angle is extrapolated, with growing sigma, for max_extrapolation_s, and beyond that there is
 // none: "telemetry too old" (record_status.h). Nothing waits for a later sample. When later samples enclose the frame,
 // OE mode's map learns from them.
-// In OE mode (oe_mode.h) landmarks of the frame's picture join in; the same telemetry is the prior.
+// In OE mode (oe_mode.h) landmarks of the frame's image join in; the same telemetry is the prior.
 // The record is PT's, and its status says why, where they do not hold; it is OE's also where
 // telemetry is missing but landmarks carry the orientation on (its status then names what is missing).
 // While there is no calibration for the camera, or none for the zoom that the pan/tilt source reports, points
@@ -49,7 +49,7 @@ struct OrientationStepOptions {
   // period_sigma_s holds for filtered times only.
   TelemetryNoise telemetry_noise;
   TelemetryLimits telemetry_limits;
-  // OE mode, for pictures of the calibration's size, which replaces max_width and max_height; none: PT.
+  // OE mode, for images of the calibration's size, which replaces max_width and max_height; none: PT.
   std::optional<OeOptions> oe;
   // The map OE mode begins with.
   MapState map;
@@ -60,7 +60,7 @@ struct OrientationStepOptions {
       5e-3;  // by how much a new connection's least delay differs, one standard deviation
 };
 
-// OE mode for a camera's pictures: small ones have as many landmarks as large ones, closer together. Valid for
+// OE mode for a camera's images: small ones have as many landmarks as large ones, closer together. Valid for
 // every size.
 [[nodiscard]] OeOptions oe_options(const Camera<double>& camera);
 // Throws std::invalid_argument, whose one line names the option, if one is not valid.
@@ -81,17 +81,16 @@ class OrientationStep {
   // The connection to the pan/tilt source was lost; the next sample ends that.
   void telemetry_lost();
 
-  // picture: one that is not valid() stands for none; PT mode looks at none. It must outlive the
+  // image: one that is not valid() stands for none; PT mode looks at none. It must outlive the
   // maintain() that follows.
-  OrientationRecord add_frame(const FrameStamp& stamp, const ImageView& picture,
-                              StepEvents* events);
+  OrientationRecord add_frame(const FrameStamp& stamp, const ImageView& image, StepEvents* events);
   // For when the record is out: upkeep of the landmark map with the frame last added, or the following of
   // points through it.
   void maintain();
   // In OE mode, with the calibration and the zoom of this moment.
   [[nodiscard]] bool finds_landmarks() const { return oe_ && options_.calibrated && zoom_fits(); }
   // In OE mode, or following points.
-  [[nodiscard]] bool looks_at_pictures() const { return finds_landmarks() || start_up_; }
+  [[nodiscard]] bool looks_at_images() const { return finds_landmarks() || start_up_; }
   // What the frame last added, and maintained, has for the calibration thread.
   void get_tracks(FrameTracks* tracks) const;
   // The same for people to look at.
@@ -112,7 +111,7 @@ class OrientationStep {
   // Frames that extrapolated telemetry answered, and that telemetry encloses by this sample.
   void settle_pending_frames();
   // Completes a record that has its time and telemetry's status; measured: null if there is none.
-  void orient(const InterpolatedPanTilt* measured, const ImageView& picture,
+  void orient(const InterpolatedPanTilt* measured, const ImageView& image,
               OrientationRecord* record);
 
   OrientationStepOptions options_;
@@ -124,7 +123,7 @@ class OrientationStep {
   std::optional<double> zoom_;                // as last reported
   std::optional<double> zoom_at_adoption_;    // that a calibration without zoom is for
   double minimum_delay_sigma_s_ = 0;
-  ImageView picture_;                // of the frame last added, until it is maintained
+  ImageView image_;                  // of the frame last added, until it is maintained
   FrameTracks tracks_;               // of the frame last added, but for its points
   bool telemetry_filtered_ = false;  // times in telemetry_ come from telemetry_clock_
   bool telemetry_lost_ = false;

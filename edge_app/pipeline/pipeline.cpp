@@ -28,10 +28,10 @@ Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink
       calibration_(calibration),
       options_(options),
       stage_(options.step, options.measure_latency, calibration != nullptr, options.tap),
-      pictures_(kPictureSlots),
+      images_(kImageSlots),
       finished_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (finished_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
-  for (PictureSlot slot = 0; slot < kPictureSlots; ++slot) free_slots_.push_back(slot);
+  for (ImageSlot slot = 0; slot < kImageSlots; ++slot) free_slots_.push_back(slot);
   // Records made before the calibration thread first wakes say it too.
   if (calibration_ != nullptr) stage_.report(calibration_->report());
 }
@@ -45,7 +45,7 @@ void Pipeline::start() {
   // The consumers first, so that nothing is dropped at the start.
   threads_.emplace_back(&Pipeline::write_output, this);
   if (calibration_ != nullptr) threads_.emplace_back(&Pipeline::calibrate, this);
-  if (options_.tap != nullptr) threads_.emplace_back(&PictureTap::run, options_.tap);
+  if (options_.tap != nullptr) threads_.emplace_back(&ImageTap::run, options_.tap);
   threads_.emplace_back(&Pipeline::run_realtime, this);
   threads_.emplace_back(&Pipeline::read_telemetry, this);
   threads_.emplace_back(&Pipeline::capture, this);
@@ -98,22 +98,22 @@ bool Pipeline::check_size(const Frame& frame) {
   return false;
 }
 
-// The picture stays where it is until its slot comes back; a frame whose picture finds no slot goes without.
+// The image stays where it is until its slot comes back; a frame whose image finds no slot goes without.
 bool Pipeline::push(const Frame& frame) {
-  for (PictureSlot slot = kNoPicture; stage_.pop_returned(slot);) {
-    pictures_[static_cast<std::size_t>(slot)] = Frame();
+  for (ImageSlot slot = kNoImageSlot; stage_.pop_returned(slot);) {
+    images_[static_cast<std::size_t>(slot)] = Frame();
     free_slots_.push_back(slot);
   }
   VideoMessage message;
   message.stamp = frame.stamp;
   if (frame.luma != nullptr && !free_slots_.empty()) {
     message.slot = free_slots_.back();
-    message.picture = {frame.luma, frame.width, frame.height, frame.stride};
+    message.image = {frame.luma, frame.width, frame.height, frame.stride};
     free_slots_.pop_back();
-    pictures_[static_cast<std::size_t>(message.slot)] = frame;
+    images_[static_cast<std::size_t>(message.slot)] = frame;
   }
   message.decoded_s = monotonic_now_s();
-  if (!stage_.push(message) && message.slot != kNoPicture) free_slots_.push_back(message.slot);
+  if (!stage_.push(message) && message.slot != kNoImageSlot) free_slots_.push_back(message.slot);
   return true;
 }
 
@@ -163,11 +163,11 @@ void Pipeline::feed_calibration() {
   for (PanTiltSample sample; stage_.pop(sample);) calibration_->add(sample);
   for (FeedFrame frame; stage_.pop(frame);) {
     calibration_->add(frame.tracks);
-    if (frame.slot != kNoPicture) {
-      calibration_->add_keyframe(frame.picture);
+    if (frame.slot != kNoImageSlot) {
+      calibration_->add_keyframe(frame.image);
       stage_.give_back(frame.slot);
     } else if (calibration_->wants_keyframe()) {
-      stage_.want_picture();
+      stage_.want_image();
     }
   }
   if (stage_.video_is_lost()) calibration_->video_lost();

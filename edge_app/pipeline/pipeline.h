@@ -7,7 +7,7 @@
 //   calibration thread  SelfCalibration, with the lowest priority: tracks and telemetry in, a calibration
 //                     with its map out, which the real-time thread takes over between two frames
 //   output thread     queue -> sink; logs what the real-time thread may not log; counts
-//   tap thread        PictureTap: small pictures, for those who ask; only if there is a tap
+//   tap thread        ImageTap: small images, for those who ask; only if there is a tap
 //
 // A source that loses its connection is waited for; records of mode `none` are made at the loss and
 // then each second until it is back. The pipeline is finished when the video has ended, a source
@@ -39,7 +39,7 @@ struct PipelineOptions {
   int height = 0;
   std::string calibration_name;
   bool measure_latency = true;  // false for a recording, whose stamps are of another clock
-  PictureTap* tap = nullptr;    // borrowed like the sources; null: nobody asks for pictures
+  ImageTap* tap = nullptr;      // borrowed like the sources; null: nobody asks for images
 };
 
 struct PipelineSummary {
@@ -110,12 +110,12 @@ class Pipeline {
   SelfCalibration* calibration_;
   PipelineOptions options_;
   RealtimeStage stage_;
-  std::vector<Frame> pictures_;  // capture thread: by slot, those that somebody still looks at
-  std::vector<PictureSlot> free_slots_;  // capture thread
-  int finished_;                         // eventfd
-  std::mutex error_mutex_;            // the first of several threads to fail is heard; not on the
-  std::string error_;                 // real-time thread
-  mutable std::mutex summary_mutex_;  // the real-time thread does not take it
+  std::vector<Frame> images_;  // capture thread: by slot, those that somebody still looks at
+  std::vector<ImageSlot> free_slots_;  // capture thread
+  int finished_;                       // eventfd
+  std::mutex error_mutex_;             // the first of several threads to fail is heard; not on the
+  std::string error_;                  // real-time thread
+  mutable std::mutex summary_mutex_;   // the real-time thread does not take it
   PipelineSummary summary_;
   PageFaults page_faults_;               // real-time thread, at its end
   PageFaults faults_at_start_;           // real-time thread, before it says its number

@@ -13,19 +13,19 @@ void touch(Queue* queue) {
   queue->reset();
 }
 
-// How long a picture may have waited while others wait behind it.
+// How long an image may have waited while others wait behind it.
 constexpr double kPatience_s = 0.1;
 
 }  // namespace
 
 RealtimeStage::RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed,
-                             PictureTap* tap)
+                             ImageTap* tap)
     : step_(options), measure_latency_(measure_latency), feed_wanted_(feed), tap_(tap) {
   // Those that the real-time thread fills.
   touch<OutputMessage>(&output_queue_);
   touch<FeedFrame>(&feed_frames_);
   touch<PanTiltSample>(&feed_samples_);
-  touch<PictureSlot>(&returned_);
+  touch<ImageSlot>(&returned_);
   touch<const PublishedCalibration*>(&adopted_);
 }
 
@@ -78,7 +78,7 @@ void RealtimeStage::adopt_published() {
 }
 
 bool RealtimeStage::is_late(const VideoMessage& message, double now_s) const {
-  return measure_latency_ && step_.looks_at_pictures() && message.picture.valid() &&
+  return measure_latency_ && step_.looks_at_images() && message.image.valid() &&
          now_s - message.decoded_s > kPatience_s && video_queue_.read_available() > 0;
 }
 
@@ -89,12 +89,12 @@ void RealtimeStage::process_frame(const VideoMessage& received) {
   VideoMessage message = received;
   const bool late = is_late(received, out.taken_s);
   if (late) {
-    message.picture = {};
-    late_pictures_.fetch_add(1, std::memory_order_relaxed);
+    message.image = {};
+    late_images_.fetch_add(1, std::memory_order_relaxed);
   }
-  out.record = step_.add_frame(message.stamp, message.picture, &out.events);
+  out.record = step_.add_frame(message.stamp, message.image, &out.events);
   if (late && out.record.status == RecordStatus::kBadImage)
-    out.record.status = RecordStatus::kPictureTooLate;
+    out.record.status = RecordStatus::kImageTooLate;
   out.record.calibration = report_.load(std::memory_order_relaxed);
   out.made_s = monotonic_now_s();
   if (measure_latency_) out.record.latency_s = out.made_s - out.record.receive_time_s;
@@ -103,25 +103,25 @@ void RealtimeStage::process_frame(const VideoMessage& received) {
   bool lent = false;
   if (feed_wanted_) feed(message, &lent);
   if (tap_ != nullptr && !lent) tap(message, &lent);
-  if (message.slot != kNoPicture && !lent) returned_.push(message.slot);
+  if (message.slot != kNoImageSlot && !lent) returned_.push(message.slot);
 }
 
 void RealtimeStage::feed(const VideoMessage& message, bool* lent) {
   step_.get_tracks(&feed_frame_.tracks);
-  const bool lend = message.picture.valid() && message.slot != kNoPicture &&
-                    picture_wanted_.exchange(false, std::memory_order_relaxed);
-  feed_frame_.picture = lend ? message.picture : ImageView{};
-  feed_frame_.slot = lend ? message.slot : kNoPicture;
+  const bool lend = message.image.valid() && message.slot != kNoImageSlot &&
+                    image_wanted_.exchange(false, std::memory_order_relaxed);
+  feed_frame_.image = lend ? message.image : ImageView{};
+  feed_frame_.slot = lend ? message.slot : kNoImageSlot;
   *lent = feed_frames_.push(feed_frame_) && lend;
-  if (lend && !*lent) picture_wanted_.store(true, std::memory_order_relaxed);
+  if (lend && !*lent) image_wanted_.store(true, std::memory_order_relaxed);
   feed_.post();
 }
 
 void RealtimeStage::tap(const VideoMessage& message, bool* lent) {
-  const bool can_lend = message.picture.valid() && message.slot != kNoPicture;
+  const bool can_lend = message.image.valid() && message.slot != kNoImageSlot;
   if (!can_lend || !tap_->take_wish()) return;
   tapped_frame_.frame = message.stamp.frame;
-  tapped_frame_.picture = message.picture;
+  tapped_frame_.image = message.image;
   tapped_frame_.slot = message.slot;
   step_.get_landmarks(&tapped_frame_.landmarks);
   *lent = tap_->push(tapped_frame_);
@@ -190,7 +190,7 @@ DropCounters RealtimeStage::drops() const {
   return {dropped_frames_.load(std::memory_order_relaxed),
           dropped_telemetry_.load(std::memory_order_relaxed),
           dropped_records_.load(std::memory_order_relaxed),
-          unheard_.load(std::memory_order_relaxed), late_pictures_.load(std::memory_order_relaxed)};
+          unheard_.load(std::memory_order_relaxed), late_images_.load(std::memory_order_relaxed)};
 }
 
 }  // namespace alidade

@@ -2,16 +2,16 @@
 // RealtimeStage: the queues around the real-time thread, and what that thread does when woken.
 //
 //   capture thread     --VideoMessage---------->  |           | --OutputMessage--> output thread
-//   telemetry thread   --TelemetryMessage------>  | process() | --PictureSlot----> capture thread
+//   telemetry thread   --TelemetryMessage------>  | process() | --ImageSlot----> capture thread
 //   calibration thread --PublishedCalibration-->  |           | --FeedFrame,
 //                                                 |           |   PanTiltSample--> calibration thread
-//   PictureTap         --a wish---------------->  |           | --TappedFrame----> PictureTap
+//   ImageTap         --a wish---------------->  |           | --TappedFrame----> ImageTap
 //
-// Pictures stay where the decoder put them: a frame occupies a slot of the capture thread, and whoever had the
-// picture last, this thread, the calibration thread or the tap, gives the slot back.
+// Images stay where the decoder put them: a frame occupies a slot of the capture thread, and whoever had the
+// image last, this thread, the calibration thread or the tap, gives the slot back.
 // Each queue has one producer and one consumer, a fixed capacity and fixed-size messages. A full
 // queue drops the new message and counts it; nobody waits for anybody. In OE mode a live frame that has waited for
-// long while others wait behind it goes without its picture: where the processor cannot keep up, some records are
+// long while others wait behind it goes without its image: where the processor cannot keep up, some records are
 // telemetry's, and none is seconds late. process() allocates nothing,
 // takes no lock, logs nothing and throws nothing; what it writes the constructor has touched.
 
@@ -20,9 +20,9 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "edge_app/pipeline/image_slot.h"
+#include "edge_app/pipeline/image_tap.h"
 #include "edge_app/pipeline/orientation_step.h"
-#include "edge_app/pipeline/picture_slot.h"
-#include "edge_app/pipeline/picture_tap.h"
 #include "edge_app/pipeline/semaphore.h"
 
 namespace alidade {
@@ -30,9 +30,9 @@ namespace alidade {
 struct VideoMessage {
   enum class Kind : std::uint8_t { kFrame, kLost };
   Kind kind = Kind::kFrame;
-  FrameStamp stamp;   // kFrame
-  ImageView picture;  // kFrame; not valid() if nobody looks at pictures
-  PictureSlot slot = kNoPicture;
+  FrameStamp stamp;  // kFrame
+  ImageView image;   // kFrame; not valid() if nobody looks at images
+  ImageSlot slot = kNoImageSlot;
   double decoded_s = 0;  // host time when the frame was pushed
   double time_s = 0;     // kLost: host time of the news
 };
@@ -55,8 +55,8 @@ struct OutputMessage {
 // For the calibration thread.
 struct FeedFrame {
   FrameTracks tracks;
-  ImageView picture;  // lent with its slot, if one was wanted
-  PictureSlot slot = kNoPicture;
+  ImageView image;  // lent with its slot, if one was wanted
+  ImageSlot slot = kNoImageSlot;
 };
 
 static_assert(std::is_trivially_copyable_v<VideoMessage> &&
@@ -71,20 +71,20 @@ struct DropCounters {
   std::int64_t records = 0;
   // Samples that the calibration thread was too busy to hear of: no loss for the records.
   std::int64_t unheard = 0;
-  // Pictures that nobody looked at, so that the frames behind them need not wait.
-  std::int64_t late_pictures = 0;
+  // Images that nobody looked at, so that the frames behind them need not wait.
+  std::int64_t late_images = 0;
   [[nodiscard]] std::int64_t total() const { return frames + telemetry + records; }
 };
 
 class RealtimeStage {
  public:
   // measure_latency: receive times are of this host's running clock (not of a recording).
-  // feed: there is a calibration thread. tap: borrowed; null: nobody asks for pictures.
+  // feed: there is a calibration thread. tap: borrowed; null: nobody asks for images.
   RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed,
-                PictureTap* tap = nullptr);
+                ImageTap* tap = nullptr);
 
   // Capture thread: a slot that nobody needs, one after the other.
-  bool pop_returned(PictureSlot& slot) {
+  bool pop_returned(ImageSlot& slot) {
     return returned_.pop(slot) || returned_by_calibration_.pop(slot) ||
            (tap_ != nullptr && tap_->pop_returned(slot));
   }
@@ -114,9 +114,9 @@ class RealtimeStage {
   [[nodiscard]] bool telemetry_is_lost() const {
     return telemetry_lost_.load(std::memory_order_relaxed);
   }
-  void give_back(PictureSlot slot) { returned_by_calibration_.push(slot); }
-  // The next frame's picture is wanted.
-  void want_picture() { picture_wanted_.store(true, std::memory_order_relaxed); }
+  void give_back(ImageSlot slot) { returned_by_calibration_.push(slot); }
+  // The next frame's image is wanted.
+  void want_image() { image_wanted_.store(true, std::memory_order_relaxed); }
   // The real-time thread takes it over between two frames. It lives on until pop_adopted() gives it back. False:
   // too many wait already.
   bool publish(const PublishedCalibration* calibration);
@@ -148,8 +148,8 @@ class RealtimeStage {
   boost::lockfree::spsc_queue<VideoMessage, boost::lockfree::capacity<256>> video_queue_;
   boost::lockfree::spsc_queue<TelemetryMessage, boost::lockfree::capacity<1024>> telemetry_queue_;
   boost::lockfree::spsc_queue<OutputMessage, boost::lockfree::capacity<1024>> output_queue_;
-  boost::lockfree::spsc_queue<PictureSlot, boost::lockfree::capacity<2 * kPictureSlots>> returned_;
-  boost::lockfree::spsc_queue<PictureSlot, boost::lockfree::capacity<2 * kPictureSlots>>
+  boost::lockfree::spsc_queue<ImageSlot, boost::lockfree::capacity<2 * kImageSlots>> returned_;
+  boost::lockfree::spsc_queue<ImageSlot, boost::lockfree::capacity<2 * kImageSlots>>
       returned_by_calibration_;
   boost::lockfree::spsc_queue<FeedFrame, boost::lockfree::capacity<256>> feed_frames_;
   boost::lockfree::spsc_queue<PanTiltSample, boost::lockfree::capacity<4096>> feed_samples_;
@@ -160,7 +160,7 @@ class RealtimeStage {
       adopted_;
   std::atomic<CalibrationReport> report_{CalibrationReport{}};
   static_assert(std::atomic<CalibrationReport>::is_always_lock_free);
-  std::atomic<bool> picture_wanted_{false};
+  std::atomic<bool> image_wanted_{false};
   std::atomic<bool> video_lost_{false};
   std::atomic<bool> telemetry_lost_{false};
   FeedFrame feed_frame_;      // real-time thread: too large for its stack
@@ -181,11 +181,11 @@ class RealtimeStage {
   std::atomic<std::int64_t> dropped_telemetry_{0};
   std::atomic<std::int64_t> dropped_records_{0};
   std::atomic<std::int64_t> unheard_{0};
-  std::atomic<std::int64_t> late_pictures_{0};
+  std::atomic<std::int64_t> late_images_{0};
   OrientationStep step_;
   bool measure_latency_;
   bool feed_wanted_;
-  PictureTap* tap_;
+  ImageTap* tap_;
 };
 
 }  // namespace alidade

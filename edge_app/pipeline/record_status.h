@@ -5,7 +5,7 @@
 //   TelemetryBuffer::query()   how the frame lies to the telemetry samples (QueryStatus)
 //   OeMode::process()          whether landmarks held (OeStatus); for frames that telemetry has an answer for
 //   OrientationStep            zoom, loss of the video
-//   RealtimeStage              pictures that came too late to be looked at
+//   RealtimeStage              images that came too late to be looked at
 // What a person reads of each, and what to do: edge_app/README.md.
 
 #include <array>
@@ -33,7 +33,7 @@ enum class RecordStatus : std::uint8_t {
   kTooFewLandmarks,       // mode PT: too few landmarks held
   kContradiction,         // mode PT: landmarks and telemetry exclude each other
   kBadImage,              // mode PT: no image, or one that is not of the calibration's size
-  kPictureTooLate,        // mode PT: others waited behind the frame, which went without its image
+  kImageTooLate,          // mode PT: others waited behind the frame, which went without its image
   kOtherZoom,             // no calibration for the zoom that the pan/tilt source reports
   kNotFinite              // a stamp is not a finite number
 };
@@ -50,7 +50,7 @@ inline constexpr std::array<RecordStatus, 14> kRecordStatuses = {
     RecordStatus::kTooFewLandmarks,
     RecordStatus::kContradiction,
     RecordStatus::kBadImage,
-    RecordStatus::kPictureTooLate,
+    RecordStatus::kImageTooLate,
     RecordStatus::kOtherZoom,
     RecordStatus::kNotFinite};
 static_assert(static_cast<std::size_t>(kRecordStatuses.back()) + 1 == kRecordStatuses.size());
@@ -98,7 +98,7 @@ constexpr const char* to_string(RecordStatus status) {
       return "landmarks contradict telemetry";
     case RecordStatus::kBadImage:
       return "no usable picture";
-    case RecordStatus::kPictureTooLate:
+    case RecordStatus::kImageTooLate:
       return "picture too late";
     case RecordStatus::kOtherZoom:
       return "no calibration for this zoom";

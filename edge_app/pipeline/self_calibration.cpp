@@ -276,13 +276,13 @@ bool SelfCalibration::wants_keyframe() const {
   return options_.automatic && session_.wants_keyframe(published_->calibration.camera);
 }
 
-void SelfCalibration::add_keyframe(const ImageView& picture) {
+void SelfCalibration::add_keyframe(const ImageView& image) {
   const Camera<double>& camera = options_.data_sheet.camera;
-  if (session_.empty() || !picture.valid() || picture.width != camera.width ||
-      picture.height != camera.height) {
+  if (session_.empty() || !image.valid() || image.width != camera.width ||
+      image.height != camera.height) {
     return;
   }
-  session_.add_keyframe(picture);
+  session_.add_keyframe(image);
 }
 
 void SelfCalibration::add(const PanTiltSample& sample) {

@@ -2,7 +2,7 @@
 // SelfCalibration: what the calibration thread does with what the real-time thread tells it. Pure: no thread, no
 // clock of its own, no files but through the CalibrationArchive it is given; a simulation runs it step by step.
 //
-//   collects   tracks, telemetry and some pictures (keyframes) of the latest motion, in bounded memory;
+//   collects   tracks, telemetry and some images (keyframes) of the latest motion, in bounded memory;
 //              anew after a reconnection, a change of zoom, or a restart of the tracker
 //   adjusts    calibrate() as soon as more data promises more than the last try: frames held out are
 //              predicted, and residuals, sufficiency and hold-out decide whether it is published
@@ -69,9 +69,9 @@ class SelfCalibration {
   [[nodiscard]] std::shared_ptr<const PublishedCalibration> first() const { return published_; }
 
   void add(const FrameTracks& tracks);
-  // True: the picture of the frame last added is wanted as a keyframe, see add_keyframe().
+  // True: the image of the frame last added is wanted as a keyframe, see add_keyframe().
   [[nodiscard]] bool wants_keyframe() const;
-  void add_keyframe(const ImageView& picture);  // copies it
+  void add_keyframe(const ImageView& image);  // copies it
   void add(const PanTiltSample& sample);
   void video_lost();      // the next frame ends that
   void telemetry_lost();  // the next sample ends that

@@ -24,7 +24,7 @@
 //                 3 f64   shared covariance, likewise
 //                 22 f32  sensitivity, by rows
 //                 4 f64   J_pixel_tangent, by rows
-//                 256 u8  picture, by rows
+//                 256 u8  image, by rows
 //                 u32     frames in which it was looked for
 //                 u32     frames in which it was found, no more than those
 //                 f32     mean square of the normalised residual

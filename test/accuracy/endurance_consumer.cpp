@@ -50,10 +50,10 @@ void EnduranceConsumer::add(const PanTiltSample& sample) {
   calibrate(sample.latest_time_s);
 }
 
-Answer EnduranceConsumer::add(const FrameStamp& stamp, const ImageView& picture) {
+Answer EnduranceConsumer::add(const FrameStamp& stamp, const ImageView& image) {
   StepEvents events;
   Answer answer;
-  answer.record = step_.add_frame(stamp, picture, &events);
+  answer.record = step_.add_frame(stamp, image, &events);
   answer.record.calibration = report_;
   answer.calibration = calibration_;
   step_.maintain();
@@ -63,8 +63,8 @@ Answer EnduranceConsumer::add(const FrameStamp& stamp, const ImageView& picture)
 
   FeedFrame frame;
   step_.get_tracks(&frame.tracks);
-  if (std::exchange(picture_wanted_, false)) {
-    frame.picture.assign(picture.luma, picture.luma + width_ * height_);
+  if (std::exchange(image_wanted_, false)) {
+    frame.image.assign(image.luma, image.luma + width_ * height_);
   }
   waiting_.emplace_back(std::move(frame));
   calibrate(stamp.receive_time_s);
@@ -89,10 +89,10 @@ void EnduranceConsumer::feed(const Feed& feed) {
   } else {
     const auto& frame = std::get<FeedFrame>(feed);
     calibrating_->add(frame.tracks);
-    if (!frame.picture.empty()) {
-      calibrating_->add_keyframe({frame.picture.data(), width_, height_, width_});
+    if (!frame.image.empty()) {
+      calibrating_->add_keyframe({frame.image.data(), width_, height_, width_});
     } else if (calibrating_->wants_keyframe()) {
-      picture_wanted_ = true;
+      image_wanted_ = true;
     }
   }
 }

@@ -1,6 +1,6 @@
 #pragma once
 // EnduranceConsumer: what `alidade run` does with the events of its links, on one thread and in their order,
-// so that a virtual day takes as long as its pictures take to render: the real-time stage's step and, if
+// so that a virtual day takes as long as its images take to render: the real-time stage's step and, if
 // wanted, the calibration thread's work beside it.
 //
 // An adjustment takes kAdjustingTime of the day, whatever it takes here: what it is made of is what had come
@@ -47,7 +47,7 @@ class EnduranceConsumer {
                     const std::optional<SelfCalibrationOptions>& calibrating);
 
   void add(const PanTiltSample& sample);
-  [[nodiscard]] Answer add(const FrameStamp& stamp, const ImageView& picture);
+  [[nodiscard]] Answer add(const FrameStamp& stamp, const ImageView& image);
   void telemetry_lost();
   void video_lost(double now_s);
 
@@ -63,7 +63,7 @@ class EnduranceConsumer {
  private:
   struct FeedFrame {
     FrameTracks tracks;
-    std::vector<std::uint8_t> picture;  // empty: none was wanted
+    std::vector<std::uint8_t> image;  // empty: none was wanted
   };
   enum class Loss { kVideo, kTelemetry };
   using Feed = std::variant<PanTiltSample, FeedFrame, Loss>;
@@ -80,7 +80,7 @@ class EnduranceConsumer {
   std::deque<Feed> waiting_;  // for the calibration
   double busy_until_s_ = 0;
   std::shared_ptr<const PublishedCalibration> outcome_;  // of the adjustment under way
-  bool picture_wanted_ = false;
+  bool image_wanted_ = false;
   CalibrationReport report_;  // as the records tell it
   CalibrationReport said_;
   int published_ = 0;

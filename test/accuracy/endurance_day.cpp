@@ -17,7 +17,7 @@ using simulator::PatchConfig;
 constexpr double kTwoPi = 6.28318530717958647692;
 constexpr double kDegree = kTwoPi / 360;
 
-// The two ends of the zoom, for a picture 480 wide: 20 and 8 degrees.
+// The two ends of the zoom, for an image 480 wide: 20 and 8 degrees.
 struct ZoomEnd {
   double focal_length;  // px of 480
   double radial_distortion;
@@ -44,7 +44,7 @@ constexpr double kLeastRest = 0.3;    // s
 constexpr double kPanRange = 18 * kDegree;
 constexpr double kTiltRange = 6 * kDegree;
 constexpr double kTopSpeed = 7 * kDegree;       // rad/s: 0.9 narrow fields a second
-constexpr double kSteadySpeed = 0.8 * kDegree;  // above what counts as no motion in small pictures
+constexpr double kSteadySpeed = 0.8 * kDegree;  // above what counts as no motion in small images
 
 Eigen::Matrix3d rotation(const Eigen::Vector3d& turn) {
   const double angle = turn.norm();
@@ -477,7 +477,7 @@ Calibration VirtualDay::calibration(std::size_t frame) const {
   return calibration;
 }
 
-void VirtualDay::render(std::size_t frame, std::uint8_t* picture) const {
+void VirtualDay::render(std::size_t frame, std::uint8_t* image) const {
   // Where in a pixel, and when in the exposure, its four samples lie.
   constexpr std::array<std::array<double, 2>, 4> kPoints{
       {{0.125, 0.375}, {-0.375, 0.125}, {0.375, -0.125}, {-0.125, -0.375}}};
@@ -510,7 +510,7 @@ void VirtualDay::render(std::size_t frame, std::uint8_t* picture) const {
       const float normal = noise_[random & 0xffffU];
       random >>= 16;
       const float grey = 255 * signal[column] + static_cast<float>(kReadNoise) * normal + 0.5F;
-      *picture++ = static_cast<std::uint8_t>(std::clamp(grey, 0.0F, 255.0F));
+      *image++ = static_cast<std::uint8_t>(std::clamp(grey, 0.0F, 255.0F));
     }
   }
 }

@@ -70,7 +70,7 @@ struct DayPlan {
 };
 
 [[nodiscard]] DayPlan hour_plan(DayPlan::Bump::Kind bump);
-// Fewer and smaller pictures.
+// Fewer and smaller images.
 void make_coarse(DayPlan* plan);
 // Everything that the hour has, within two and a half minutes.
 [[nodiscard]] DayPlan small_day_plan();
@@ -112,7 +112,7 @@ class VirtualDay {
   [[nodiscard]] std::vector<DayMark> marks() const;
 
   // width x height bytes, row after row.
-  void render(std::size_t frame, std::uint8_t* picture) const;
+  void render(std::size_t frame, std::uint8_t* image) const;
 
   // Truth about a frame. time_s is the capture of row coordinate 0, true time.
   [[nodiscard]] double time(std::size_t frame) const { return captures_[frame].time_s; }

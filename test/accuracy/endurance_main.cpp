@@ -77,10 +77,10 @@ EnduranceConsumer make_consumer(const VirtualDay& day, bool known) {
   return {step, calibrating};
 }
 
-// The pictures of a day, some frames ahead.
-class Pictures {
+// The images of a day, some frames ahead.
+class Images {
  public:
-  Pictures(const VirtualDay& day, std::size_t threads)
+  Images(const VirtualDay& day, std::size_t threads)
       : day_(day),
         threads_(threads),
         size_(static_cast<std::size_t>(day.plan().width * day.plan().height)),
@@ -89,8 +89,8 @@ class Pictures {
   // Asked for frame after frame.
   ImageView of(std::size_t frame) {
     if (frame % kBatch == 0) render(frame);
-    const std::uint8_t* picture = bytes_.data() + frame % kBatch * size_;
-    return {picture, day_.plan().width, day_.plan().height, day_.plan().width};
+    const std::uint8_t* image = bytes_.data() + frame % kBatch * size_;
+    return {image, day_.plan().width, day_.plan().height, day_.plan().width};
   }
 
  private:
@@ -141,7 +141,7 @@ DayPlan plan_of(const Options& options) {
 template <class Look>
 void live(const VirtualDay& day, std::size_t threads, EnduranceConsumer* consumer,
           const Look& look) {
-  Pictures pictures(day, threads);
+  Images images(day, threads);
   for (const DayEvent& event : day.events()) {
     switch (event.kind) {
       case DayEvent::Kind::kSample:
@@ -154,7 +154,7 @@ void live(const VirtualDay& day, std::size_t threads, EnduranceConsumer* consume
         consumer->video_lost(event.host_time_s);
         break;
       case DayEvent::Kind::kFrame:
-        look(event.index, consumer->add(day.frames()[event.index], pictures.of(event.index)));
+        look(event.index, consumer->add(day.frames()[event.index], images.of(event.index)));
         break;
     }
     for (const std::string& message : consumer->take_messages()) {

@@ -63,12 +63,12 @@ TEST(VirtualDay, BumpOfTheBaseLeavesTheAxesAndBumpOfTheCameraTurnsThem) {
   }
 }
 
-TEST(VirtualDay, ShowsAnotherPictureAtOnceWhenItsBaseIsBumped) {
+TEST(VirtualDay, ShowsAnotherImageAtOnceWhenItsBaseIsBumped) {
   DayPlan plan = short_plan(2);
   plan.motion = DayPlan::Motion::kAtRest;
   plan.bumps = {{DayPlan::Bump::Kind::kBase, 1, 5e-3}};
   const VirtualDay day(plan, ALIDADE_TEST_DATA);
-  const auto picture = [&](double time) {
+  const auto image = [&](double time) {
     std::vector<std::uint8_t> bytes(static_cast<std::size_t>(plan.width * plan.height));
     day.render(frame_at(day, time), bytes.data());
     return bytes;
@@ -79,11 +79,11 @@ TEST(VirtualDay, ShowsAnotherPictureAtOnceWhenItsBaseIsBumped) {
     for (std::size_t i = 0; i < a.size(); ++i) sum += std::abs(int{a[i]} - int{b[i]});
     return sum / static_cast<double>(a.size());
   };
-  const auto before = picture(0.2);
-  const double noise = difference(before, picture(0.6));
+  const auto before = image(0.2);
+  const double noise = difference(before, image(0.6));
   // Two draws of 2 grey levels and of rounding: sqrt(2) * sqrt(4 + 1/12) * 0.798 = 2.28 in the mean.
   EXPECT_NEAR(noise, 2.28, 0.2);
-  EXPECT_GT(difference(before, picture(1.5)), 2 * noise);
+  EXPECT_GT(difference(before, image(1.5)), 2 * noise);
 }
 
 TEST(VirtualDay, SendersClockDriftsAndBeginsAnewWithAnotherLatencyAfterALoss) {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <ostream>
 
-#include "test/accuracy/oe_picture.h"
+#include "test/accuracy/oe_image.h"
 
 namespace alidade::test {
 namespace {
@@ -323,19 +323,19 @@ void run_oe_robustness(const OeExperimentOptions& options, Report* report, nlohm
   report->add(table);
 }
 
-cv::Mat picture_of(const OeExperimentOptions& options, int frame) {
+cv::Mat image_of(const OeExperimentOptions& options, int frame) {
   const std::vector<RecordingPlan> plans = plans_of(options);
   if (plans.empty()) return {};
   const RenderedRecording recording(plans.front().name, plans.front().config, options.cache);
   EvaluationOptions how;
   how.oe = options.oe;
-  cv::Mat picture;
+  cv::Mat image;
   how.look = [&](int number, const cv::Mat& image, const OeMode& oe) {
-    if (number == frame) picture = draw_landmarks(image, oe);
+    if (number == frame) image = draw_landmarks(image, oe);
   };
   const Evaluation evaluation = evaluate(recording, recording.images(FrameNoise::kSensorAndJpeg),
                                          recording.calibration(), how);
-  return picture;
+  return image;
 }
 
 }  // namespace alidade::test

@@ -21,7 +21,7 @@ struct OeExperimentOptions {
   std::vector<Scene> scenes;
   RecordingSize size;
   double fields_per_second = 1;
-  double telemetry_sigma_px = 1;  // of a picture 1920 wide
+  double telemetry_sigma_px = 1;  // of an image 1920 wide
   OeOptions oe;
   bool warm = false;
   bool details = false;
@@ -36,6 +36,6 @@ void run_oe_accuracy(const OeExperimentOptions& options, Report* report, nlohman
 void run_oe_robustness(const OeExperimentOptions& options, Report* report, nlohmann::json* frames);
 
 // A frame of the first recording, with its landmarks; empty if there is no such frame.
-[[nodiscard]] cv::Mat picture_of(const OeExperimentOptions& options, int frame);
+[[nodiscard]] cv::Mat image_of(const OeExperimentOptions& options, int frame);
 
 }  // namespace alidade::test

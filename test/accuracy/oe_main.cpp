@@ -8,7 +8,7 @@
 #include <opencv2/imgcodecs.hpp>
 
 #include "test/accuracy/oe_experiments.h"
-#include "test/accuracy/oe_picture.h"
+#include "test/accuracy/oe_image.h"
 
 int main(int argc, char** argv) {
   using namespace alidade::test;
@@ -19,7 +19,7 @@ int main(int argc, char** argv) {
   bool small = false;
   std::filesystem::path photo;
   std::string json;
-  std::pair<int, std::string> picture{-1, ""};
+  std::pair<int, std::string> image{-1, ""};
   app.add_option("--cache", options.cache, "keep rendered frames in this folder");
   app.add_option("--photo", photo, "the third scene; generated if not given");
   app.add_option("--only", options.only, "recordings whose names contain this");
@@ -37,7 +37,7 @@ int main(int argc, char** argv) {
   app.add_flag("--details", options.details, "errors by octave, row, speed and acceleration");
   app.add_flag("--robustness", robustness,
                "what goes wrong in life, in place of the accuracy table");
-  app.add_option("--picture", picture, "FRAME FILE: of the first recording, with its landmarks");
+  app.add_option("--picture", image, "FRAME FILE: of the first recording, with its landmarks");
   app.add_option("--json", json, "also write tables and every frame to this file");
   try {
     app.parse(argc, argv);
@@ -60,10 +60,10 @@ int main(int argc, char** argv) {
   Report report(std::cout);
   nlohmann::json frames;
   try {
-    if (picture.first >= 0) {
-      const cv::Mat drawn = picture_of(options, picture.first);
-      if (drawn.empty() || !cv::imwrite(picture.second, drawn)) {
-        std::cerr << "alidade_oe_accuracy: no frame " << picture.first << ", or " << picture.second
+    if (image.first >= 0) {
+      const cv::Mat drawn = image_of(options, image.first);
+      if (drawn.empty() || !cv::imwrite(image.second, drawn)) {
+        std::cerr << "alidade_oe_accuracy: no frame " << image.first << ", or " << image.second
                   << " cannot be written\n";
         return 2;
       }

@@ -3,7 +3,7 @@
 // distortion in the corners, axes off by 12 and 14 mrad), its own and two rougher paths at up to one
 // field of view a second, exposure 2 ms, noise of 2 grey levels, JPEG quality 85.
 //
-// Of smaller pictures the field of view, the time to read one out, and so the motion in fields of view,
+// Of smaller images the field of view, the time to read one out, and so the motion in fields of view,
 // stay as they are. The path repeats after the recording, so that this may be seen twice in a row.
 // Telemetry: 40 Hz, white noise of one pixel of 1920.
 
@@ -33,7 +33,7 @@ struct RecordingSize {
   double duration_s = 7;
 };
 
-// Of a picture of 1080 rows; others are read out in as much time.
+// Of an image of 1080 rows; others are read out in as much time.
 inline constexpr double kLineDelays[] = {-14.2e-6, 0.0, 25e-6};
 
 [[nodiscard]] simulator::Config camera_on_path(const Scene& scene, simulator::PathConfig::Type path,

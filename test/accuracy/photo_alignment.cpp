@@ -30,21 +30,20 @@ constexpr int kFewest = 25;
 constexpr double kBound = 0.3;  // px, of the median
 
 struct Photo {
-  cv::Mat picture;
+  cv::Mat image;
   std::vector<cv::KeyPoint> points;
   cv::Mat descriptors;
 
   [[nodiscard]] ImageView view() const {
-    return {picture.data, picture.cols, picture.rows, static_cast<std::ptrdiff_t>(picture.step[0])};
+    return {image.data, image.cols, image.rows, static_cast<std::ptrdiff_t>(image.step[0])};
   }
 };
 
 Photo read_photo(const std::filesystem::path& file) {
   Photo photo;
-  photo.picture = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
-  if (photo.picture.empty()) throw std::runtime_error(file.string() + ": is no picture");
-  cv::SIFT::create()->detectAndCompute(photo.picture, cv::noArray(), photo.points,
-                                       photo.descriptors);
+  photo.image = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
+  if (photo.image.empty()) throw std::runtime_error(file.string() + ": is no picture");
+  cv::SIFT::create()->detectAndCompute(photo.image, cv::noArray(), photo.points, photo.descriptors);
   return photo;
 }
 
@@ -85,7 +84,7 @@ void compare(const Photo& from, const Photo& to, Differences* out) {
   if (found.empty()) return;
   const Matrix3<double>& H = found[0];
   ++out->pairs;
-  FastGrid grid(from.picture.cols, from.picture.rows, 12);
+  FastGrid grid(from.image.cols, from.image.rows, 12);
   std::vector<FastCorner> corners(static_cast<std::size_t>(grid.max_cells()));
   std::vector<float> scratch(2000);
   const double noise = image_noise(from.view(), scratch.data(), static_cast<int>(scratch.size()));
@@ -98,8 +97,7 @@ void compare(const Photo& from, const Photo& to, Differences* out) {
     const Vector2<double> expected = projected.hnormalized();
     // A patch's width from the border: beyond it the other photo has nothing to show.
     if (projected.z() <= 0 || expected.minCoeff() < kPatchSize ||
-        expected.x() > to.picture.cols - kPatchSize ||
-        expected.y() > to.picture.rows - kPatchSize) {
+        expected.x() > to.image.cols - kPatchSize || expected.y() > to.image.rows - kPatchSize) {
       continue;
     }
     const Matrix2<double> J =

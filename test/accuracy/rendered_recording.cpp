@@ -25,7 +25,7 @@ using simulator::PatchConfig;
 constexpr double kTelemetryMargin = 1;
 
 // All that a noise-free frame depends on.
-std::string picture_key(const Config& config) {
+std::string image_key(const Config& config) {
   std::ostringstream key;
   key << std::setprecision(17);
   const auto add = [&key](auto... values) { ((key << values << ' '), ...); };
@@ -109,7 +109,7 @@ RenderedRecording::RenderedRecording(std::string name, const Config& config,
   }
   if (cache.empty()) return;
   std::ostringstream folder;
-  folder << name_ << '-' << std::hex << std::hash<std::string>{}(picture_key(config));
+  folder << name_ << '-' << std::hex << std::hash<std::string>{}(image_key(config));
   cache_ = cache / folder.str();
   std::filesystem::create_directories(cache_);
 }
@@ -126,7 +126,7 @@ cv::Mat RenderedRecording::rendered(int frame) const {
   std::vector<std::uint8_t> pixels = renderer_->render(time(frame), frame);
   const cv::Mat image(config_.image.height, config_.image.width, CV_8U, pixels.data());
   if (!cache_.empty()) {
-    // Under another name first: whoever stops in between leaves no half picture.
+    // Under another name first: whoever stops in between leaves no half image.
     const std::string unfinished = file + ".part.pgm";
     if (!cv::imwrite(unfinished, image)) {
       throw std::runtime_error(unfinished + ": cannot be written");

@@ -1,5 +1,5 @@
 // Do rendered frames show what their truth says, to the hundredth of a pixel, and does telemetry say what
-// the mount does? Small pictures: 480x270.
+// the mount does? Small images: 480x270.
 
 #include "test/accuracy/rendered_recording.h"
 

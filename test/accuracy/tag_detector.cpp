@@ -12,7 +12,7 @@ namespace alidade::test {
 namespace {
 
 constexpr double kEnlarged = 4;
-constexpr float kCoarse = 3;  // the whole picture is searched at a third of its size: tags of 40 px
+constexpr float kCoarse = 3;  // the whole image is searched at a third of its size: tags of 40 px
 // Round the corners: white that the library needs, and room for what enlarging does at a border.
 constexpr double kMargin = 12;  // px
 
@@ -30,9 +30,9 @@ struct TagDetector::Library {
   Library(const Library&) = delete;
   Library& operator=(const Library&) = delete;
 
-  std::optional<TagCorners> find(const cv::Mat& picture, float decimate) const {
+  std::optional<TagCorners> find(const cv::Mat& image, float decimate) const {
     detector->quad_decimate = decimate;
-    image_u8_t view{picture.cols, picture.rows, static_cast<int>(picture.step), picture.data};
+    image_u8_t view{image.cols, image.rows, static_cast<int>(image.step), image.data};
     zarray_t* found = apriltag_detector_detect(detector, &view);
     std::optional<TagCorners> corners;
     for (int i = 0; i < zarray_size(found); ++i) {
@@ -57,11 +57,11 @@ TagDetector::TagDetector(int tag) : library_(std::make_unique<Library>(tag)) {}
 
 TagDetector::~TagDetector() = default;
 
-std::optional<TagCorners> TagDetector::find(const ImageView& picture) {
-  // The library's type has no const; it does not write into the picture.
-  const cv::Mat whole(picture.height, picture.width, CV_8U,
-                      const_cast<std::uint8_t*>(picture.luma),  // NOLINT
-                      static_cast<std::size_t>(picture.stride));
+std::optional<TagCorners> TagDetector::find(const ImageView& image) {
+  // The library's type has no const; it does not write into the image.
+  const cv::Mat whole(image.height, image.width, CV_8U,
+                      const_cast<std::uint8_t*>(image.luma),  // NOLINT
+                      static_cast<std::size_t>(image.stride));
   const std::optional<TagCorners> roughly = library_->find(whole, kCoarse);
   if (!roughly) return std::nullopt;
   Eigen::AlignedBox2d box;

@@ -1,8 +1,8 @@
 #pragma once
-// Finds one AprilTag in a picture: the four corners of its black square, to a few hundredths of a pixel.
+// Finds one AprilTag in an image: the four corners of its black square, to a few hundredths of a pixel.
 //
 // The library rounds to whole pixels where it samples along an edge, which alone makes errors of 0.05 px.
-// So the tag is looked for in the whole picture first, and then once more in its surroundings,
+// So the tag is looked for in the whole image first, and then once more in its surroundings,
 // enlarged (april_tag_test.cpp measures what remains: 0.006 px without noise).
 // Its edges are taken as straight lines, in order round the square. Pixels as in CONVENTIONS.md. Allocates.
 
@@ -24,8 +24,8 @@ class TagDetector {
   TagDetector(const TagDetector&) = delete;
   TagDetector& operator=(const TagDetector&) = delete;
 
-  // Empty: not in the picture, or too near to its border.
-  [[nodiscard]] std::optional<TagCorners> find(const ImageView& picture);
+  // Empty: not in the image, or too near to its border.
+  [[nodiscard]] std::optional<TagCorners> find(const ImageView& image);
 
  private:
   struct Library;

@@ -119,7 +119,7 @@ bool scatter_of(const std::vector<TagSighting>& sightings, const std::vector<Tag
       const auto centre = seen != nullptr ? centre_of(sighting.corners, *seen) : std::nullopt;
       if (!centre) break;
       of_rows.push_back(*centre);
-      // A turn about the camera's x axis moves the picture along v, one about y along u.
+      // A turn about the camera's x axis moves the image along v, one about y along u.
       const double f = frame->camera.focal_length;
       told.push_back(
           Vector2d(f * seen->sigma_rad.y(), f * frame->camera.aspect * seen->sigma_rad.x())

@@ -10,7 +10,7 @@
 // factor by which the mode's focal length is wrong: scatter is told here in true pixels of one camera.
 // The centre is where the diagonals cross, of the directions of the four corners, each at the time of its
 // own row: neither distortion nor rolling shutter shifts it. The common frame is the one that sees the tag nearest to
-// the middle of the picture. Every row is judged on the same frames: those where all have an orientation.
+// the middle of the image. Every row is judged on the same frames: those where all have an orientation.
 // A row made from the truth shows the detector's own noise.
 // Records of other processes on the same stream are matched by time_s, which frame clocks
 // on one host give alike to about a millisecond. Pixels, frames, units: CONVENTIONS.md.

@@ -236,10 +236,10 @@ TEST(TagDetector, FindsTheTagWhereTheVirtualCameraShowsIt) {
   config.scene.photos.push_back(tag);
   const auto path = simulator::make_path(config);
   const simulator::Renderer renderer(config, *path);
-  const std::vector<std::uint8_t> picture = renderer.render(0, 0);
+  const std::vector<std::uint8_t> image = renderer.render(0, 0);
 
   const auto corners = test::TagDetector(0).find(
-      {picture.data(), config.image.width, config.image.height, config.image.width});
+      {image.data(), config.image.width, config.image.height, config.image.width});
   ASSERT_TRUE(corners.has_value());
   // At rest, forward, without distortion: tangents times f. The diagonals cross in the middle of the photo.
   RecordedOrientation at;
@@ -253,7 +253,7 @@ TEST(TagDetector, FindsTheTagWhereTheVirtualCameraShowsIt) {
   EXPECT_NEAR((corners->at(1) - corners->at(0)).norm(), 64, 0.2);
   EXPECT_FALSE(
       test::TagDetector(1)
-          .find({picture.data(), config.image.width, config.image.height, config.image.width})
+          .find({image.data(), config.image.width, config.image.height, config.image.width})
           .has_value());
 }
 

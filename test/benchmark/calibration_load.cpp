@@ -28,7 +28,7 @@ VideoMessage Streams::frame(int k) const {
   message.stamp.frame = k;
   message.stamp.sequence = k;
   message.stamp.receive_time_s = time_s(k);
-  message.picture = camera_.view(k);
+  message.image = camera_.view(k);
   return message;
 }
 
@@ -64,7 +64,7 @@ Heard::Heard(const TurningCamera& camera) : camera_(camera) {
       step.add_telemetry(samples_.back());
     }
     const VideoMessage message = streams.frame(k);
-    static_cast<void>(step.add_frame(message.stamp, message.picture, &events));
+    static_cast<void>(step.add_frame(message.stamp, message.image, &events));
     step.maintain();
     tracks_.emplace_back();
     step.get_tracks(&tracks_.back());

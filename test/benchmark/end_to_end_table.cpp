@@ -1,9 +1,9 @@
-// Latency from a picture's arrival to its record written, through all of `alidade run` that a frame passes: the
+// Latency from an image's arrival to its record written, through all of `alidade run` that a frame passes: the
 // link's own thread, decoding, queues, OE mode, the record as a line of JSON. 1280x720 at 30 frames/s, recorded
-// pictures sent on time over the loopback, once as RTP and once as MJPEG over HTTP, each with and without a
+// images sent on time over the loopback, once as RTP and once as MJPEG over HTTP, each with and without a
 // calibration that computes beside it at the lowest priority, in turns, so that other load of the machine meets both.
 //
-//   rtp   from the arrival of the picture's last packet
+//   rtp   from the arrival of the image's last packet
 //   http  from the arrival of its first byte
 //
 // The real-time thread is scheduled as on a device where that is permitted; page faults and switches are its own.
@@ -43,7 +43,7 @@ namespace alidade::benchmarks {
 namespace {
 
 constexpr int kHeight = 720;
-constexpr int kPictures = 75;
+constexpr int kImages = 75;
 constexpr int kQuality = 85;
 constexpr std::size_t kWarmUp = 90;     // frames
 constexpr std::size_t kCounted = 1500;  // frames, at least, of each condition
@@ -56,7 +56,7 @@ using Jpegs = std::vector<std::vector<std::uint8_t>>;
 Jpegs encoded(const TurningCamera& camera) {
   Jpegs out;
   for (int k = 0; k < camera.frames(); ++k) {
-    const std::vector<cv::Mat> channels(3, camera.picture(k));
+    const std::vector<cv::Mat> channels(3, camera.image(k));
     cv::Mat colour;
     cv::merge(channels, colour);
     cv::imencode(".jpg", colour, out.emplace_back(), {cv::IMWRITE_JPEG_QUALITY, kQuality});
@@ -70,13 +70,13 @@ void require(bool ok, const char* what) {
   std::exit(1);
 }
 
-// The recorded pictures, each at its time.
+// The recorded images, each at its time.
 class Timetable {
  public:
   Timetable(const TurningCamera& camera, const Jpegs& jpegs, double start_s)
       : camera_(camera), jpegs_(jpegs), start_s_(start_s) {}
 
-  // The first picture that is not over yet.
+  // The first image that is not over yet.
   [[nodiscard]] int next() const {
     return static_cast<int>(
         std::ceil(std::max(0.0, monotonic_now_s() - start_s_) / camera_.time_s(1)));
@@ -117,9 +117,9 @@ class HttpSender {
   RawServer server_{[this](int fd) { serve(fd); }};
 };
 
-class RtpPictures {
+class RtpImages {
  public:
-  RtpPictures(const Timetable& timetable, const Camera<double>& camera)
+  RtpImages(const Timetable& timetable, const Camera<double>& camera)
       : timetable_(timetable), port_(free_rtp_port()) {
     const std::string url = "rtp://127.0.0.1:" + std::to_string(port_) + "?pkt_size=1400";
     require(avformat_alloc_output_context2(&format_, nullptr, "rtp", url.c_str()) >= 0,
@@ -136,15 +136,15 @@ class RtpPictures {
             "no RTP to the loopback");
     thread_ = std::thread([this] { send(); });
   }
-  ~RtpPictures() {
+  ~RtpImages() {
     stopped_ = true;
     thread_.join();
     av_write_trailer(format_);
     avio_closep(&format_->pb);
     avformat_free_context(format_);
   }
-  RtpPictures(const RtpPictures&) = delete;
-  RtpPictures& operator=(const RtpPictures&) = delete;
+  RtpImages(const RtpImages&) = delete;
+  RtpImages& operator=(const RtpImages&) = delete;
   [[nodiscard]] std::string url() const { return "rtp://@:" + std::to_string(port_); }
 
  private:
@@ -224,7 +224,7 @@ nlohmann::json parts_of(const LatencyHistogram& histogram) {
           {"max_s", histogram.longest_s()}};
 }
 
-// Through a link that delivers the pictures of a camera that began to turn at start_s.
+// Through a link that delivers the images of a camera that began to turn at start_s.
 void measure(const std::string& link, FrameSource* video, const TurningCamera& camera,
              double start_s, const Heard& heard, LatencyReport* report) {
   PipelineOptions options;
@@ -287,14 +287,14 @@ int main(int argc, char** argv) {
   using namespace alidade::benchmarks;
   cv::setNumThreads(1);
   silence_av_log();
-  const TurningCamera camera(kHeight, kPictures);
+  const TurningCamera camera(kHeight, kImages);
   const Jpegs jpegs = encoded(camera);
   const Heard heard(camera);
   LatencyReport report("end_to_end");
   {
     const double start_s = monotonic_now_s();
     const Timetable timetable(camera, jpegs, start_s);
-    const RtpPictures sender(timetable, camera.calibration().camera);
+    const RtpImages sender(timetable, camera.calibration().camera);
     RtpSourceOptions options;
     options.url = sender.url();
     const auto video = open_rtp(options);

@@ -1,7 +1,7 @@
-// What looking at a picture costs, beside OpenCV's way on the same picture in the same run, one thread
+// What looking at an image costs, beside OpenCV's way on the same image in the same run, one thread
 // each: the pyramid beside buildPyramid and INTER_AREA, corners in cells beside FAST with non-maximum
 // suppression, the alignment of 200 patches beside pyramidal Lucas-Kanade on the same 200 points. Times are
-// for one picture, or for all points. Statistics are over repetitions: median and p99 of their means.
+// for one image, or for all points. Statistics are over repetitions: median and p99 of their means.
 
 #include <benchmark/benchmark.h>
 
@@ -30,8 +30,8 @@ constexpr std::size_t kPoints = 200;
 constexpr double kShiftU = 0.4;  // px
 constexpr double kShiftV = 0.3;
 
-ImageView view_of(const cv::Mat& picture) {
-  return {picture.data, picture.cols, picture.rows, static_cast<std::ptrdiff_t>(picture.step)};
+ImageView view_of(const cv::Mat& image) {
+  return {image.data, image.cols, image.rows, static_cast<std::ptrdiff_t>(image.step)};
 }
 
 // A photo at the size of a frame, moved, with noise of 2 grey levels.
@@ -42,41 +42,41 @@ cv::Mat frame(int height, double shift_u, double shift_v) {
   const int width = height * 16 / 9;
   const double scale = static_cast<double>(width) / photo.cols;
   const cv::Matx23d warp(scale, 0, shift_u, 0, scale, shift_v);
-  cv::Mat picture;
-  cv::warpAffine(photo, picture, warp, {width, height}, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
+  cv::Mat image;
+  cv::warpAffine(photo, image, warp, {width, height}, cv::INTER_CUBIC, cv::BORDER_REPLICATE);
   std::mt19937_64 random(1 + static_cast<unsigned>(shift_u * 100));
   std::normal_distribution<double> noise(0, 2);
   for (int v = 0; v < height; ++v) {
     for (int u = 0; u < width; ++u) {
-      auto& pixel = picture.at<uchar>(v, u);
+      auto& pixel = image.at<uchar>(v, u);
       pixel = cv::saturate_cast<uchar>(pixel + noise(random));
     }
   }
-  return picture;
+  return image;
 }
 
 void BM_Pyramid(benchmark::State& state) {
-  const cv::Mat picture = frame(static_cast<int>(state.range(0)), 0, 0);
-  Pyramid pyramid(picture.cols, picture.rows, kOctaves);
+  const cv::Mat image = frame(static_cast<int>(state.range(0)), 0, 0);
+  Pyramid pyramid(image.cols, image.rows, kOctaves);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(pyramid.build(view_of(picture), kOctaves));
+    benchmark::DoNotOptimize(pyramid.build(view_of(image), kOctaves));
     benchmark::ClobberMemory();
   }
 }
 
 void BM_OpenCvPyramid(benchmark::State& state) {
-  const cv::Mat picture = frame(static_cast<int>(state.range(0)), 0, 0);
+  const cv::Mat image = frame(static_cast<int>(state.range(0)), 0, 0);
   std::vector<cv::Mat> pyramid;
   for (auto _ : state) {
-    cv::buildPyramid(picture, pyramid, kOctaves - 1);
+    cv::buildPyramid(image, pyramid, kOctaves - 1);
     benchmark::ClobberMemory();
   }
 }
 
 void BM_OpenCvResizeArea(benchmark::State& state) {
-  const cv::Mat picture = frame(static_cast<int>(state.range(0)), 0, 0);
+  const cv::Mat image = frame(static_cast<int>(state.range(0)), 0, 0);
   std::vector<cv::Mat> pyramid(kOctaves);
-  pyramid[0] = picture;
+  pyramid[0] = image;
   for (auto _ : state) {
     for (std::size_t l = 1; l < kOctaves; ++l) {
       const cv::Size half(pyramid[l - 1].cols / 2, pyramid[l - 1].rows / 2);
@@ -87,39 +87,39 @@ void BM_OpenCvResizeArea(benchmark::State& state) {
 }
 
 void BM_FastGrid(benchmark::State& state) {
-  const cv::Mat picture = frame(static_cast<int>(state.range(0)), 0, 0);
-  FastGrid grid(picture.cols, picture.rows, kCell);
+  const cv::Mat image = frame(static_cast<int>(state.range(0)), 0, 0);
+  FastGrid grid(image.cols, image.rows, kCell);
   std::vector<FastCorner> corners(static_cast<std::size_t>(grid.max_cells()));
   FastResult result;
   for (auto _ : state) {
-    result = grid.detect(view_of(picture), kThreshold, corners.data(), grid.max_cells());
+    result = grid.detect(view_of(image), kThreshold, corners.data(), grid.max_cells());
     benchmark::ClobberMemory();
   }
   state.counters["corners"] = result.count;
 }
 
 void BM_OpenCvFast(benchmark::State& state) {
-  const cv::Mat picture = frame(static_cast<int>(state.range(0)), 0, 0);
+  const cv::Mat image = frame(static_cast<int>(state.range(0)), 0, 0);
   std::vector<cv::KeyPoint> corners;
   for (auto _ : state) {
-    cv::FAST(picture, corners, kThreshold, true, cv::FastFeatureDetector::TYPE_9_16);
+    cv::FAST(image, corners, kThreshold, true, cv::FastFeatureDetector::TYPE_9_16);
     benchmark::ClobberMemory();
   }
   state.counters["corners"] = static_cast<double>(corners.size());
 }
 
-std::vector<Vector2<double>> points_of(const cv::Mat& picture) {
-  FastGrid grid(picture.cols, picture.rows, kCell);
+std::vector<Vector2<double>> points_of(const cv::Mat& image) {
+  FastGrid grid(image.cols, image.rows, kCell);
   std::vector<FastCorner> corners(static_cast<std::size_t>(grid.max_cells()));
   const FastResult result =
-      grid.detect(view_of(picture), kThreshold, corners.data(), grid.max_cells());
+      grid.detect(view_of(image), kThreshold, corners.data(), grid.max_cells());
   std::vector<Vector2<double>> points;
   ReferencePatch reference;
   for (int i = 0; i < result.count && points.size() < kPoints; ++i) {
     const FastCorner& corner = corners[static_cast<std::size_t>(i)];
     const Vector2<double> point(corner.u + 0.5, corner.v + 0.5);
-    if (std::min({point.x(), point.y(), picture.cols - point.x(), picture.rows - point.y()}) > 20 &&
-        prepare(view_of(picture), point, Matrix2<double>::Identity(), 4, &reference) ==
+    if (std::min({point.x(), point.y(), image.cols - point.x(), image.rows - point.y()}) > 20 &&
+        prepare(view_of(image), point, Matrix2<double>::Identity(), 4, &reference) ==
             PrepareStatus::kOk) {
       points.push_back(point);
     }
@@ -135,12 +135,12 @@ double rms(const std::vector<double>& squares) {
 }
 
 void prepare_patches(benchmark::State& state, const Matrix2<double>& A) {
-  const cv::Mat picture = frame(1080, 0, 0);
-  const auto points = points_of(picture);
+  const cv::Mat image = frame(1080, 0, 0);
+  const auto points = points_of(image);
   ReferencePatch reference;
   for (auto _ : state) {
     for (const auto& point : points) {
-      benchmark::DoNotOptimize(prepare(view_of(picture), point, A, 4, &reference));
+      benchmark::DoNotOptimize(prepare(view_of(image), point, A, 4, &reference));
       benchmark::DoNotOptimize(reference);
     }
   }

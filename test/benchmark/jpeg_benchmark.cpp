@@ -1,5 +1,5 @@
-// What a JPEG picture to its luma plane costs, beside libjpeg-turbo called plainly: one handle and one plane for all
-// pictures, no check of the header. In turns, picture by picture; ratio_to_turbojpeg is the median of the ratios.
+// What a JPEG image to its luma plane costs, beside libjpeg-turbo called plainly: one handle and one plane for all
+// images, no check of the header. In turns, image by image; ratio_to_turbojpeg is the median of the ratios.
 
 #include <benchmark/benchmark.h>
 #include <turbojpeg.h>
@@ -29,17 +29,17 @@ double median(std::vector<double> values) {
 
 void BM_JpegToLuma(benchmark::State& state) {
   const TurningCamera camera(static_cast<int>(state.range(0)), 1);
-  const cv::Mat& picture = camera.picture(0);
-  const std::vector<std::uint8_t> jpeg = jpeg_of(picture);
+  const cv::Mat& image = camera.image(0);
+  const std::vector<std::uint8_t> jpeg = jpeg_of(image);
   const std::string_view bytes(reinterpret_cast<const char*>(jpeg.data()), jpeg.size());
   JpegDecoder decoder;
   Picture decoded;
   const tjhandle plain = tjInitDecompress();
-  std::vector<std::uint8_t> luma(picture.total());
+  std::vector<std::uint8_t> luma(image.total());
   std::vector<double> ratios;
   for (auto _ : state) {
     const Clock::time_point begin = Clock::now();
-    if (tjDecompress2(plain, jpeg.data(), jpeg.size(), luma.data(), picture.cols, 0, picture.rows,
+    if (tjDecompress2(plain, jpeg.data(), jpeg.size(), luma.data(), image.cols, 0, image.rows,
                       TJPF_GRAY, 0) != 0) {
       std::abort();
     }

@@ -1,4 +1,4 @@
-// What a frame's orientation from the picture costs, beside two ways to have it from OpenCV, on the same
+// What a frame's orientation from the image costs, beside two ways to have it from OpenCV, on the same
 // frames in the same run, one thread each, in turns of some frames so that all meet the same load:
 //   oe            OeMode::process() with N landmarks, and maintain(), which may come later
 //   stage         what process() is made of, by the same public functions, on the map that oe made
@@ -7,7 +7,7 @@
 //   orb           N ORB features matched by brute force to the N of the nearest of five key frames (the
 //                 map), homography by RANSAC, after Lisanti, Masi, Pernici and Del Bimbo's mapping
 // Lucas-Kanade is told the mount's rate, for the rolling shutter; a homography bends by itself, but ORB
-// crowds its features where contrast is, and the corners of the picture hang free.
+// crowds its features where contrast is, and the corners of the image hang free.
 // Times are those of the thread on its core: what other programs take does not count. ratio: median over
 // the median of process(). error: of the turn from one frame to the next against truth, RMS over
 // frames, over centre and corners and over u and v; held: landmarks that hold a frame's answer, on
@@ -57,7 +57,7 @@ double milliseconds(Work&& work) {
   return now_ms() - begin;
 }
 
-// Only the pictures of one size are held at a time.
+// Only the images of one size are held at a time.
 TurningCamera& camera_of(int height) {
   static std::unique_ptr<TurningCamera> camera;
   if (camera == nullptr || camera->calibration().camera.height != height) {
@@ -214,7 +214,7 @@ class Stages : public Way {
   OeStages stages_;
 };
 
-// As many of the best corners as asked for, spread over the picture.
+// As many of the best corners as asked for, spread over the image.
 std::vector<cv::Point2f> spread(std::vector<cv::KeyPoint>* corners, int count,
                                 const cv::Size& size) {
   constexpr int kBorder = 12;
@@ -279,11 +279,11 @@ class LucasKanade : public Way {
     const Calibration& calibration = camera_.calibration();
     const cv::Size window(21, 21);
     const InterpolatedPanTilt telemetry = camera_.telemetry(k);
-    const cv::Mat& picture = camera_.picture(k);
+    const cv::Mat& image = camera_.image(k);
     const Vector3<double> w =
         angular_velocity(calibration.mechanics, telemetry.angle, telemetry.rate);
     const double flow_ms = milliseconds([&] {
-      cv::buildOpticalFlowPyramid(picture, pyramid_, window, kLevels);
+      cv::buildOpticalFlowPyramid(image, pyramid_, window, kLevels);
       if (from_.empty()) return;
       cv::calcOpticalFlowPyrLK(pyramid_before_, pyramid_, from_, to_, found_, cv::noArray(), window,
                                kLevels);
@@ -301,8 +301,8 @@ class LucasKanade : public Way {
       R_ = fit_rotation(base_, seen_, kHuberPx / calibration.camera.focal_length, &inliers);
     });
     const double fast_ms = milliseconds([&] {
-      cv::FAST(picture, corners_, kThreshold, true, cv::FastFeatureDetector::TYPE_9_16);
-      from_ = spread(&corners_, points_, picture.size());
+      cv::FAST(image, corners_, kThreshold, true, cv::FastFeatureDetector::TYPE_9_16);
+      from_ = spread(&corners_, points_, image.size());
     });
     std::swap(pyramid_, pyramid_before_);
     w_ = w;
@@ -340,7 +340,7 @@ class Orb : public Way {
  public:
   Orb(TurningCamera* camera, int points) : Way("orb", camera), orb_(cv::ORB::create(points)) {
     for (std::size_t i = 0; i < map_.size(); ++i) {
-      orb_->detectAndCompute(camera->picture(static_cast<int>(i) * kSpacing), cv::noArray(),
+      orb_->detectAndCompute(camera->image(static_cast<int>(i) * kSpacing), cv::noArray(),
                              map_[i].points, map_[i].descriptors);
     }
   }
@@ -361,7 +361,7 @@ class Orb : public Way {
     const int key_index = (k + kFrames - 1) % kFrames / kSpacing;
     const KeyFrame& key = map_[static_cast<std::size_t>(key_index)];
     const double features_ms = milliseconds(
-        [&] { orb_->detectAndCompute(camera_.picture(k), cv::noArray(), corners_, descriptors_); });
+        [&] { orb_->detectAndCompute(camera_.image(k), cv::noArray(), corners_, descriptors_); });
     const double matching_ms = milliseconds([&] {
       matches_.clear();  // knnMatch appends
       matcher_.knnMatch(descriptors_, key.descriptors, matches_, 2);

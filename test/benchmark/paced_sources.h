@@ -1,5 +1,5 @@
 #pragma once
-// A TurningCamera's pictures and telemetry at its own pace, for a Pipeline without a link.
+// A TurningCamera's images and telemetry at its own pace, for a Pipeline without a link.
 
 #include <atomic>
 #include <random>

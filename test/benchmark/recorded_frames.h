@@ -1,5 +1,5 @@
 #pragma once
-// RecordedFrames: pictures of a TurningCamera with its telemetry in a file, so that a program without
+// RecordedFrames: images of a TurningCamera with its telemetry in a file, so that a program without
 // OpenCV, on another processor or in an emulator, gets the very same.
 // The file is for the machine that made it and for others of its byte order; it is not kept.
 

@@ -239,11 +239,10 @@ void cost_jpeg(const std::string& file_name, const std::string& stage, Meter* me
   bytes << file.rdbuf();
   const std::string jpeg = bytes.str();
   JpegDecoder decoder;
-  Picture picture;
-  require(decoder.decode(jpeg, &picture), "the JPEG picture cannot be decoded");
+  Picture image;
+  require(decoder.decode(jpeg, &image), "the JPEG picture cannot be decoded");
   meter->begin();
-  for (int i = 0; i < 3; ++i)
-    meter->measure(stage, 1, [&] { keep(decoder.decode(jpeg, &picture)); });
+  for (int i = 0; i < 3; ++i) meter->measure(stage, 1, [&] { keep(decoder.decode(jpeg, &image)); });
   meter->end();
 }
 #endif

@@ -1,4 +1,4 @@
-// Writes what stage_cost works on: the frames of oe_benchmark, and one of them as a JPEG picture.
+// Writes what stage_cost works on: the frames of oe_benchmark, and one of them as a JPEG image.
 // Usage: stage_frames FOLDER
 
 #include <cstdio>
@@ -19,16 +19,16 @@ RecordedFrames recorded(TurningCamera* camera) {
   RecordedFrames out;
   out.calibration = camera->calibration();
   for (int k = 0; k < camera->frames(); ++k) {
-    const cv::Mat& picture = camera->picture(k);
+    const cv::Mat& image = camera->image(k);
     out.frames.push_back({camera->time_s(k),
                           camera->telemetry(k),
-                          {picture.begin<std::uint8_t>(), picture.end<std::uint8_t>()}});
+                          {image.begin<std::uint8_t>(), image.end<std::uint8_t>()}});
   }
   return out;
 }
 
-bool write_jpeg(const cv::Mat& picture, const std::string& name) {
-  const std::vector<std::uint8_t> jpeg = jpeg_of(picture);
+bool write_jpeg(const cv::Mat& image, const std::string& name) {
+  const std::vector<std::uint8_t> jpeg = jpeg_of(image);
   std::ofstream file(name, std::ios::binary);
   file.write(reinterpret_cast<const char*>(jpeg.data()), static_cast<std::streamsize>(jpeg.size()));
   return static_cast<bool>(file.flush());
@@ -49,7 +49,7 @@ int main(int argc, char** argv) {
     const std::string size = std::to_string(height);
     TurningCamera camera(height, kFrames);
     if (!write_frames(recorded(&camera), folder + "/frames-" + size) ||
-        !write_jpeg(camera.picture(0), folder + "/picture-" + size + ".jpg")) {
+        !write_jpeg(camera.image(0), folder + "/picture-" + size + ".jpg")) {
       std::fprintf(
           stderr,
           "%s: cannot write the frames of %d lines there; name a folder with 200 MB of room\n",

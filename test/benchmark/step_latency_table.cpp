@@ -37,7 +37,7 @@ namespace alidade::benchmarks {
 namespace {
 
 constexpr int kHeight = 720;
-constexpr int kPictures = 75;           // a round of the camera
+constexpr int kImages = 75;             // a round of the camera
 constexpr int kWarmUp = 90;             // frames until the map is full
 constexpr std::size_t kCounted = 1000;  // frames, at least, of each condition
 constexpr double kLongest = 150;        // s, of counting
@@ -183,7 +183,7 @@ void add(const std::string& name, const Condition& condition, LatencyReport* rep
 
 // False: no frame came while the calibration computed.
 bool run(const RealtimeOptions& options, LatencyReport* report) {
-  const TurningCamera camera(kHeight, kPictures);
+  const TurningCamera camera(kHeight, kImages);
   const Heard heard(camera);
   CalibrationThread calibration(heard);
   LiveStage live(camera, options);

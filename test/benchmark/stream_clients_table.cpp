@@ -44,7 +44,7 @@ namespace {
 constexpr int kClients = 20;
 constexpr int kStalled = 5;
 constexpr int kHeight = 720;
-constexpr int kPictures = 75;
+constexpr int kImages = 75;
 constexpr double kSpeed = 2;          // times that of the TurningCamera, which has 30 frames/s
 constexpr std::size_t kWarmUp = 180;  // frames
 constexpr std::size_t kTurns = 40;    // half of them with clients
@@ -167,7 +167,7 @@ double p99_ratio(const Turns& with, const Turns& without) {
 
 // False: no server.
 bool run(LatencyReport* report) {
-  const TurningCamera camera(kHeight, kPictures);
+  const TurningCamera camera(kHeight, kImages);
   PipelineOptions options;
   options.step.calibration = camera.calibration();
   options.step.calibration.line_delay /= kSpeed;

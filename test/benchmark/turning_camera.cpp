@@ -19,14 +19,14 @@ constexpr double kAngleSigma = 1e-4;       // rad: half a pixel of 1080 lines
 constexpr double kRateSigma = 1e-3;        // rad/s
 
 cv::Mat photo(const char* name) {
-  cv::Mat picture = cv::imread(std::string(ALIDADE_TEST_DATA) + "/" + name, cv::IMREAD_GRAYSCALE);
-  if (picture.empty()) std::abort();
-  return picture;
+  cv::Mat image = cv::imread(std::string(ALIDADE_TEST_DATA) + "/" + name, cv::IMREAD_GRAYSCALE);
+  if (image.empty()) std::abort();
+  return image;
 }
 
-cv::Mat mirrored(const cv::Mat& picture) {
+cv::Mat mirrored(const cv::Mat& image) {
   cv::Mat mirror;
-  cv::flip(picture, mirror, 1);
+  cv::flip(image, mirror, 1);
   return mirror;
 }
 
@@ -56,12 +56,12 @@ TurningCamera::TurningCamera(int height, int frames) : period_s_(frames / kFrame
   const cv::Mat scene = scene_for(height);
   cv::Mat noise(height, camera.width, CV_16S);
   for (int k = 0; k < frames; ++k) {
-    cv::Mat picture;
-    expose(scene, k).convertTo(picture, CV_16S);
+    cv::Mat image;
+    expose(scene, k).convertTo(image, CV_16S);
     random_.fill(noise, cv::RNG::NORMAL, 0, kNoise);
-    picture += noise;
-    pictures_.emplace_back();
-    picture.convertTo(pictures_.back(), CV_8U);
+    image += noise;
+    images_.emplace_back();
+    image.convertTo(images_.back(), CV_8U);
   }
 }
 
@@ -84,17 +84,17 @@ cv::Mat TurningCamera::expose(const cv::Mat& scene, int k) const {
       to[u].y = static_cast<float>(0.5 * scene.rows + scale * d.z() - 0.5);
     }
   }
-  cv::Mat picture;
-  cv::remap(scene, picture, map, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REFLECT);
-  return picture;
+  cv::Mat image;
+  cv::remap(scene, image, map, cv::noArray(), cv::INTER_CUBIC, cv::BORDER_REFLECT);
+  return image;
 }
 
-const cv::Mat& TurningCamera::picture(int k) const {
-  return pictures_[static_cast<std::size_t>(k) % pictures_.size()];
+const cv::Mat& TurningCamera::image(int k) const {
+  return images_[static_cast<std::size_t>(k) % images_.size()];
 }
 
 ImageView TurningCamera::view(int k) const {
-  const cv::Mat& p = picture(k);
+  const cv::Mat& p = image(k);
   return {p.data, p.cols, p.rows, static_cast<std::ptrdiff_t>(p.step)};
 }
 
@@ -145,9 +145,9 @@ InterpolatedPanTilt TurningCamera::telemetry(int k) {
   return at;
 }
 
-std::vector<std::uint8_t> jpeg_of(const cv::Mat& picture) {
+std::vector<std::uint8_t> jpeg_of(const cv::Mat& image) {
   constexpr int kQuality = 85;
-  const std::vector<cv::Mat> channels(3, picture);
+  const std::vector<cv::Mat> channels(3, image);
   cv::Mat colour;
   cv::merge(channels, colour);
   std::vector<std::uint8_t> jpeg;

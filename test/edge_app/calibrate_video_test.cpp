@@ -162,7 +162,7 @@ TEST_F(CalibrateVideo, StoresTheTracksItUsed) {
   EXPECT_FALSE(fs::exists(from_tracks + "/tracks.csv"));
 }
 
-TEST_F(CalibrateVideo, TakesPicturesInPlaceOfAVideo) {
+TEST_F(CalibrateVideo, TakesImagesInPlaceOfAVideo) {
   film(directory_, camera(std::string(kTexture) + "recording: {images: pgm}\n"), "pictures");
   const Result result = calibrate_command({"--passes", "1", path("pictures")});
   EXPECT_EQ(result.exit_code, 0) << result.errors;

@@ -268,7 +268,7 @@ TEST_F(CommandLineTest, RunWithoutCalibratingTakesCalibrationsOfSeveralZooms) {
 }
 
 // What the error recommends.
-TEST_F(CommandLineTest, RunInPtModeNeedsNoSizeOfThePicture) {
+TEST_F(CommandLineTest, RunInPtModeNeedsNoSizeOfTheImage) {
   const std::string config =
       live_config("", "camera: {focal_length_px: 30000}\nrealtime: {mode: PT}\n");
   const Result result = alidade({"run", "-c", config, "--duration", "0.1"});
@@ -386,7 +386,7 @@ TEST_F(CommandLineTest, ReplayWithoutACalibrationSaysWhatToDo) {
   EXPECT_THAT(result.errors, HasSubstr("--calibration FILE"));
 }
 
-TEST_F(CommandLineTest, ReplayInOeModeRefusesARecordingWithoutPictures) {
+TEST_F(CommandLineTest, ReplayInOeModeRefusesARecordingWithoutImages) {
   head_.record(directory_, 5);
   directory_.write("alidade/calibration.yaml", head_.calibration());
   const Result result = alidade({"replay", directory_.path(), "--mode", "OE"});

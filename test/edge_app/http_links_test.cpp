@@ -61,7 +61,7 @@ TEST_F(HttpLinks, AreMeasuredByCheck) {
                                    HasSubstr("pan 90.0000 deg, tilt -22.5000 deg"),
                                    HasSubstr("decoding"), HasSubstr("the head turned too little"),
                                    HasSubstr("advice         video")));  // all is of one grey
-  // The server's pictures come some milliseconds apart, and claim to be 40 ms apart.
+  // The server's images come some milliseconds apart, and claim to be 40 ms apart.
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.errors, HasSubstr("time stamps cannot be used"));
 }

@@ -87,22 +87,22 @@ class KeyframeMap : public ::testing::Test {
     std::vector<Keyframe> out;
     for (int i = 0; i < count; ++i) {
       const double time_s = (i + 0.5) * kDuration / count;
-      picture_ = renderer_.render(time_s, i);
+      image_ = renderer_.render(time_s, i);
       out.push_back({time_s, packed(kHeight)});
     }
     return out;
   }
 
-  // Of the picture rendered last, the first rows.
-  [[nodiscard]] std::shared_ptr<PackedPicture> packed(int rows) const {
-    return std::make_shared<PackedPicture>(ImageView{picture_.data(), kWidth, rows, kWidth});
+  // Of the image rendered last, the first rows.
+  [[nodiscard]] std::shared_ptr<PackedImage> packed(int rows) const {
+    return std::make_shared<PackedImage>(ImageView{image_.data(), kWidth, rows, kWidth});
   }
 
   simulator::Config config_;
   std::unique_ptr<simulator::Path> path_;
   simulator::Renderer renderer_;
   CalibrationResult result_;
-  std::vector<std::uint8_t> picture_;
+  std::vector<std::uint8_t> image_;
 };
 
 TEST_F(KeyframeMap, PutsAnotherOeModeIntoTheBaseFrameInItsFirstFrame) {
@@ -125,11 +125,11 @@ TEST_F(KeyframeMap, PutsAnotherOeModeIntoTheBaseFrameInItsFirstFrame) {
     InterpolatedPanTilt telemetry = predict(result_, time_s + to_middle_s, 3);
     telemetry.angle.pan += 3 * kPixel;
     telemetry.angle.tilt -= 3 * kPixel;
-    const std::vector<std::uint8_t> picture = renderer_.render(time_s, 100 + i);
+    const std::vector<std::uint8_t> image = renderer_.render(time_s, 100 + i);
     OeMode mode(options);
     mode.reset(result_.calibration, map);
     FrameOrientation frame;
-    ASSERT_EQ(mode.process({picture.data(), kWidth, kHeight, kWidth}, time_s, &telemetry, &frame),
+    ASSERT_EQ(mode.process({image.data(), kWidth, kHeight, kWidth}, time_s, &telemetry, &frame),
               OeStatus::kOk)
         << time_s;
     double px = 0;
@@ -143,11 +143,11 @@ TEST_F(KeyframeMap, PutsAnotherOeModeIntoTheBaseFrameInItsFirstFrame) {
   EXPECT_LT(worst_px, 0.1);
 }
 
-TEST_F(KeyframeMap, PassesOverPicturesThatAreNoneOrOfAnotherSize) {
+TEST_F(KeyframeMap, PassesOverImagesThatAreNoneOrOfAnotherSize) {
   std::vector<Keyframe> some = keyframes(3);
   const std::size_t landmarks = map_from_keyframes(result_, some).landmarks.size();
   some.push_back({kDuration, nullptr});
-  some.push_back({kDuration, std::make_shared<PackedPicture>()});
+  some.push_back({kDuration, std::make_shared<PackedImage>()});
   some.push_back({kDuration, packed(kHeight - 1)});
   EXPECT_EQ(map_from_keyframes(result_, some).landmarks.size(), landmarks);
   EXPECT_TRUE(map_from_keyframes(result_, {some[3], some[4], some[5]}).landmarks.empty());

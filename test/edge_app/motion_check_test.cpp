@@ -62,7 +62,7 @@ struct Scene {
     needs.focal_length_from = "camera.focal_length_px";
     needs.reverse_pan = "REVERSE PAN";
     needs.reverse_tilt = "REVERSE TILT";
-    needs.turn_picture = "TURN";
+    needs.turn_image = "TURN";
   }
 
   [[nodiscard]] MotionReport check() const { return check_motion(shifts, samples, needs); }
@@ -120,7 +120,7 @@ TEST(MotionCheck, SaysWhichAxisIsReversedAndWhatToSet) {
   EXPECT_THAT(problems(Scene(wander, {-1, -1}).check().findings), ElementsAre(HasSubstr("TURN")));
 }
 
-TEST(MotionCheck, FindsAPictureTurnedByAQuarter) {
+TEST(MotionCheck, FindsAImageTurnedByAQuarter) {
   Scene scene(wander);
   for (TimedShift& shift : scene.shifts) shift.shift = {shift.shift[1], -shift.shift[0]};
   const MotionReport report = scene.check();
@@ -165,7 +165,7 @@ TEST(MotionCheck, TellsNothingOfAnEvenSwing) {
   EXPECT_THAT(describe(report).front().second, HasSubstr("at changing speed"));
 }
 
-TEST(MotionCheck, TellsNothingOfAPictureThatGoesItsOwnWay) {
+TEST(MotionCheck, TellsNothingOfAImageThatGoesItsOwnWay) {
   Scene scene(wander);
   std::mt19937 random(5);
   std::normal_distribution<double> jump(0, 20);
@@ -189,7 +189,7 @@ TEST(MotionCheck, NoticesAHeadThatReportsOneAngleForEver) {
   EXPECT_THAT(problems(scene.check().findings), ElementsAre(HasSubstr("always the same angles")));
 }
 
-TEST(MotionCheck, NoticesAPictureThatStandsStill) {
+TEST(MotionCheck, NoticesAImageThatStandsStill) {
   Scene scene(wander);
   for (TimedShift& shift : scene.shifts) shift.shift.setZero();
   EXPECT_THAT(problems(scene.check().findings), ElementsAre(HasSubstr("the picture stands still")));

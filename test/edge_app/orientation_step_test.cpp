@@ -385,7 +385,7 @@ TEST(OrientationStep, FiltersTheStampsOfNumberedTelemetry) {
   EXPECT_LT(std::sqrt(square / frames), 1e-3);
 }
 
-// A textured picture of which a camera at rest sees the same part in each frame.
+// A textured image of which a camera at rest sees the same part in each frame.
 class Scene {
  public:
   static constexpr int kWidth = 640;
@@ -418,7 +418,7 @@ class Scene {
   }
 
   // What a camera turned to the right by so many px sees.
-  [[nodiscard]] ImageView picture(int right_px = 0) const {
+  [[nodiscard]] ImageView image(int right_px = 0) const {
     return {luma_.data() + right_px, kWidth, kHeight, kStride};
   }
 
@@ -449,16 +449,16 @@ class OeStepTest : public ::testing::Test {
     rest_.tilt_rate = 0;
   }
 
-  OrientationRecord add(const ImageView& picture, bool with_telemetry = true) {
+  OrientationRecord add(const ImageView& image, bool with_telemetry = true) {
     const double t = 0.08 * frame_;
     if (with_telemetry) rest_.feed(&step_, t, t + 0.07);
     StepEvents events;
-    const OrientationRecord record = step_.add_frame(stamp_at(t, frame_++), picture, &events);
+    const OrientationRecord record = step_.add_frame(stamp_at(t, frame_++), image, &events);
     step_.maintain();
     return record;
   }
   void build_map() {
-    for (int i = 0; i < 10; ++i) static_cast<void>(add(scene_.picture()));
+    for (int i = 0; i < 10; ++i) static_cast<void>(add(scene_.image()));
   }
 
   Scene scene_;
@@ -468,13 +468,13 @@ class OeStepTest : public ::testing::Test {
 };
 
 TEST_F(OeStepTest, BeginsWithTelemetryAndThenHoldsToLandmarks) {
-  const OrientationRecord first = add(scene_.picture());
+  const OrientationRecord first = add(scene_.image());
   EXPECT_EQ(first.mode, RecordMode::kPt);
   EXPECT_EQ(first.status, RecordStatus::kTooFewLandmarks);
   EXPECT_EQ(first.landmarks, 0);
   EXPECT_EQ(first.orientation->pan_acceleration_rad_s2, 0);
   for (int i = 0; i < 10; ++i) {
-    const OrientationRecord record = add(scene_.picture());
+    const OrientationRecord record = add(scene_.image());
     EXPECT_EQ(record.mode, RecordMode::kOe) << i;
     EXPECT_EQ(record.status, RecordStatus::kOk) << i;
     EXPECT_GE(record.landmarks, 10) << i;
@@ -493,7 +493,7 @@ TEST_F(OeStepTest, LearnsFromTelemetryThatComesAfterTheAnswer) {
     const double t = 0.08 * i;
     rest_.feed(&step_, t - 0.1, t - 0.03);
     StepEvents events;
-    const OrientationRecord record = step_.add_frame(stamp_at(t, i), scene_.picture(), &events);
+    const OrientationRecord record = step_.add_frame(stamp_at(t, i), scene_.image(), &events);
     step_.maintain();
     ASSERT_TRUE(record.orientation) << i;
     if (i > 1) {
@@ -506,32 +506,32 @@ TEST_F(OeStepTest, LearnsFromTelemetryThatComesAfterTheAnswer) {
   EXPECT_LT(last_sigma, 0.4e-4);
 }
 
-TEST_F(OeStepTest, AnswersFromTelemetryAndSaysWhyWhereThePictureDoesNotHelp) {
+TEST_F(OeStepTest, AnswersFromTelemetryAndSaysWhyWhereTheImageDoesNotHelp) {
   build_map();
   const std::vector<std::uint8_t> covered(static_cast<std::size_t>(Scene::kWidth) * Scene::kHeight,
                                           30);
   struct Case {
     const char* name;
-    ImageView picture;
+    ImageView image;
     RecordStatus status;
   };
   for (const Case& c :
        {Case{"none", ImageView{}, RecordStatus::kBadImage},
         Case{"too small",
-             {scene_.picture().luma, Scene::kWidth - 2, Scene::kHeight, scene_.picture().stride},
+             {scene_.image().luma, Scene::kWidth - 2, Scene::kHeight, scene_.image().stride},
              RecordStatus::kBadImage},
         Case{"covered",
              {covered.data(), Scene::kWidth, Scene::kHeight, Scene::kWidth},
              RecordStatus::kTooFewLandmarks},
         // 30 px are 15 mrad, where telemetry is sure of 0.1 mrad.
-        Case{"turned", scene_.picture(30), RecordStatus::kContradiction}}) {
-    const OrientationRecord record = add(c.picture);
+        Case{"turned", scene_.image(30), RecordStatus::kContradiction}}) {
+    const OrientationRecord record = add(c.image);
     EXPECT_EQ(record.mode, RecordMode::kPt) << c.name;
     EXPECT_STREQ(to_string(record.status), to_string(c.status)) << c.name;
     EXPECT_EQ(record.landmarks, 0) << c.name;
     ASSERT_TRUE(record.orientation) << c.name;
     EXPECT_NEAR(record.orientation->pan_rad, rest_.pan_0, 1e-9) << c.name;
-    EXPECT_EQ(add(scene_.picture()).mode, RecordMode::kOe) << c.name;
+    EXPECT_EQ(add(scene_.image()).mode, RecordMode::kOe) << c.name;
   }
 }
 
@@ -539,7 +539,7 @@ TEST_F(OeStepTest, LandmarksCarryOnWhereTelemetryIsMissing) {
   build_map();
   step_.telemetry_lost();
   OrientationRecord record;
-  for (int i = 0; i < 10; ++i) record = add(scene_.picture(), false);
+  for (int i = 0; i < 10; ++i) record = add(scene_.image(), false);
   EXPECT_EQ(record.mode, RecordMode::kOe);
   EXPECT_EQ(record.status, RecordStatus::kTelemetryLost);
   EXPECT_GE(record.landmarks, 10);
@@ -563,7 +563,7 @@ TEST_F(OeStepTest, StatesTheTimeOfAFrameAsPtModeDoes) {
     FrameStamp stamp = stamp_at(t, i);
     stamp.sequence = i;
     StepEvents events;
-    const OrientationRecord record = step_.add_frame(stamp, scene_.picture(), &events);
+    const OrientationRecord record = step_.add_frame(stamp, scene_.image(), &events);
     EXPECT_EQ(record.time_s, pt.add_frame(stamp, ImageView{}, &events).time_s);
     step_.maintain();
   }
@@ -573,9 +573,9 @@ TEST_F(OeStepTest, AllocatesNothingAfterItsConstruction) {
   const test::AllocationGuard guard;
   int oe = 0;
   for (int i = 0; i < 40; ++i) {
-    // New landmarks, lost ones, none, and pictures that contradict telemetry.
-    const ImageView picture = i % 10 == 9 ? ImageView{} : scene_.picture(i % 10 == 8 ? 30 : 0);
-    if (add(picture, i % 5 != 4).mode == RecordMode::kOe) ++oe;
+    // New landmarks, lost ones, none, and images that contradict telemetry.
+    const ImageView image = i % 10 == 9 ? ImageView{} : scene_.image(i % 10 == 8 ? 30 : 0);
+    if (add(image, i % 5 != 4).mode == RecordMode::kOe) ++oe;
   }
   EXPECT_EQ(guard.count(), 0);
   EXPECT_GT(oe, 20);
@@ -592,11 +592,11 @@ TEST_F(OeStepTest, AnotherZoomHasNoOrientationUntilItsCalibrationComes) {
     step_.add_telemetry(sample);
   };
   report_zoom(100);
-  EXPECT_EQ(add(scene_.picture()).mode, RecordMode::kOe) << "the zoom it has been at all along";
+  EXPECT_EQ(add(scene_.image()).mode, RecordMode::kOe) << "the zoom it has been at all along";
   report_zoom(100.9);
-  EXPECT_EQ(add(scene_.picture()).mode, RecordMode::kOe) << "within the tolerance";
+  EXPECT_EQ(add(scene_.image()).mode, RecordMode::kOe) << "within the tolerance";
   report_zoom(102);
-  OrientationRecord record = add(scene_.picture());
+  OrientationRecord record = add(scene_.image());
   EXPECT_EQ(record.mode, RecordMode::kNone);
   EXPECT_EQ(record.status, RecordStatus::kOtherZoom);
   EXPECT_FALSE(record.calibrated);
@@ -609,8 +609,8 @@ TEST_F(OeStepTest, AnotherZoomHasNoOrientationUntilItsCalibrationComes) {
   published.calibration.zoom = 102;
   published.calibrated = true;
   step_.adopt(published);
-  static_cast<void>(add(scene_.picture()));
-  record = add(scene_.picture());
+  static_cast<void>(add(scene_.image()));
+  record = add(scene_.image());
   EXPECT_EQ(record.mode, RecordMode::kOe);
   EXPECT_TRUE(record.calibrated);
 }
@@ -624,7 +624,7 @@ TEST_F(OeStepTest, ACalibrationWithoutZoomIsForTheOneOfItsAdoption) {
     sample.tilt_rad = rest_.tilt_0;
     sample.zoom = zoom;
     step_.add_telemetry(sample);
-    return add(scene_.picture()).mode;
+    return add(scene_.image()).mode;
   };
   PublishedCalibration published;
   published.calibration = options().calibration;
@@ -663,11 +663,11 @@ TEST_F(OeStepTest, TellsTheCalibrationThreadWhatItSaw) {
 
 TEST_F(OeStepTest, ShowsLandmarksWithTheResidualsThatTheRecordSumsUp) {
   build_map();
-  // Something that moves by itself, in a third of the picture, is found and does not hold the result.
+  // Something that moves by itself, in a third of the image, is found and does not hold the result.
   std::vector<std::uint8_t> partly_moved(static_cast<std::size_t>(Scene::kWidth) * Scene::kHeight);
   for (int v = 0; v < Scene::kHeight; ++v) {
     for (int u = 0; u < Scene::kWidth; ++u) {
-      const ImageView seen = scene_.picture(3 * u > 2 * Scene::kWidth ? 2 : 0);
+      const ImageView seen = scene_.image(3 * u > 2 * Scene::kWidth ? 2 : 0);
       partly_moved[static_cast<std::size_t>(v * Scene::kWidth + u)] =
           seen.luma[static_cast<std::ptrdiff_t>(v) * seen.stride + u];
     }
@@ -691,7 +691,7 @@ TEST_F(OeStepTest, ShowsLandmarksWithTheResidualsThatTheRecordSumsUp) {
   }
   EXPECT_EQ(used, record.landmarks);
   EXPECT_LT(used, landmarks.count);
-  EXPECT_NEAR(*record.residual_px, std::sqrt(sum / used), 1e-4);  // the picture shows floats
+  EXPECT_NEAR(*record.residual_px, std::sqrt(sum / used), 1e-4);  // the image shows floats
   EXPECT_LT(*record.residual_px, 0.5);
 }
 
@@ -702,7 +702,7 @@ TEST_F(OeStepTest, ShowsLandmarksWhereTheyAreExpectedAndResidualsFromThere) {
   std::vector<std::uint8_t> noisy(static_cast<std::size_t>(Scene::kWidth) * Scene::kHeight);
   std::mt19937 random(23);
   std::uniform_int_distribution<int> noise(-2, 2);
-  const ImageView clean = scene_.picture();
+  const ImageView clean = scene_.image();
   for (int v = 0; v < Scene::kHeight; ++v) {
     for (int u = 0; u < Scene::kWidth; ++u) {
       noisy[static_cast<std::size_t>(v * Scene::kWidth + u)] = static_cast<std::uint8_t>(
@@ -736,8 +736,8 @@ TEST_F(OeStepTest, ShowsLandmarksWhereTheyAreExpectedAndResidualsFromThere) {
 TEST_F(OeStepTest, ShowsNoLandmarksWhereTheyDidNotHold) {
   build_map();
   FrameLandmarks landmarks;
-  for (const ImageView& picture : {ImageView{}, scene_.picture(30)}) {
-    const OrientationRecord record = add(picture);
+  for (const ImageView& image : {ImageView{}, scene_.image(30)}) {
+    const OrientationRecord record = add(image);
     ASSERT_EQ(record.mode, RecordMode::kPt);
     EXPECT_FALSE(record.residual_px);
     step_.get_landmarks(&landmarks);
@@ -805,7 +805,7 @@ TEST_F(OeStepTest, WithoutACalibrationItFollowsPointsAndAnswersFromTelemetry) {
     const double t = 0.08 * i;
     rest_.feed(&step, t, t + 0.07);
     StepEvents events;
-    record = step.add_frame(stamp_at(t, i), scene_.picture(), &events);
+    record = step.add_frame(stamp_at(t, i), scene_.image(), &events);
     step.maintain();
     step.get_tracks(&tracks);
   }
@@ -827,22 +827,22 @@ TEST(FrameTracks, TakesAsManyPointsAsThereIsRoomFor) {
   options.max_points = 2 * kMaxFramePoints;
   StartUpTracker tracker(options);
   const Scene scene;
-  for (int i = 0; i < 3; ++i) static_cast<void>(tracker.process(scene.picture()));
+  for (int i = 0; i < 3; ++i) static_cast<void>(tracker.process(scene.image()));
   ASSERT_GT(tracker.observation_count(), kMaxFramePoints);
   FrameTracks tracks;
   get_tracks(tracker, &tracks);
   EXPECT_EQ(tracks.count, kMaxFramePoints);
 }
 
-// Its memory may be another picture's by then.
-TEST_F(OeStepTest, LooksAtAPictureOnce) {
+// Its memory may be another image's by then.
+TEST_F(OeStepTest, LooksAtAnImageOnce) {
   OrientationStepOptions uncalibrated = options();
   uncalibrated.calibrated = false;
   OrientationStep step(uncalibrated);
   FrameTracks tracks;
   for (int i = 0; i < 3; ++i) {
     StepEvents events;
-    static_cast<void>(step.add_frame(stamp_at(0.08 * i, i), scene_.picture(5 * i), &events));
+    static_cast<void>(step.add_frame(stamp_at(0.08 * i, i), scene_.image(5 * i), &events));
     step.maintain();
   }
   step.get_tracks(&tracks);

@@ -147,7 +147,7 @@ TEST_F(PipelineTest, GivesAnOrientationFromTheTelemetryOfItsTime) {
   EXPECT_EQ(pipeline.error(), "");
 }
 
-// A picture that nobody has touched is a page fault a page to the thread that looks at it first.
+// An image that nobody has touched is a page fault a page to the thread that looks at it first.
 TEST_F(PipelineTest, CountsThePageFaultsOfTheRealtimeThread) {
   constexpr std::size_t kPage = 4096;
   PipelineOptions options = options_for_tests();
@@ -157,20 +157,20 @@ TEST_F(PipelineTest, CountsThePageFaultsOfTheRealtimeThread) {
   options.step.calibrated = false;
   options.step.oe = OeOptions();
   options.step.follow_points = true;  // whatever is known of the camera's angle
-  const test::FreshMemory picture(static_cast<std::size_t>(camera.width) *
-                                  static_cast<std::size_t>(camera.height));
+  const test::FreshMemory image(static_cast<std::size_t>(camera.width) *
+                                static_cast<std::size_t>(camera.height));
   Frame unseen = frame();
   unseen.width = camera.width;
   unseen.height = camera.height;
   unseen.stride = camera.width;
-  unseen.luma = reinterpret_cast<const std::uint8_t*>(picture.data());
+  unseen.luma = reinterpret_cast<const std::uint8_t*>(image.data());
   Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options);
   pipeline.start();
   video_.push(unseen);
   video_.push(ReadStatus::kEnd);
   ASSERT_TRUE(finished(pipeline));
   pipeline.stop();
-  EXPECT_GE(pipeline.summary().page_faults.minor, static_cast<long>(picture.size() / kPage));
+  EXPECT_GE(pipeline.summary().page_faults.minor, static_cast<long>(image.size() / kPage));
 }
 
 TEST_F(PipelineTest, SaysNoneWhileTheVideoIsAwayAndGoesOnWhenItIsBack) {
@@ -225,11 +225,11 @@ TEST_F(PipelineTest, SaysFromTheFirstRecordOnWhetherItCalibrates) {
   }
 }
 
-TEST_F(PipelineTest, ShowsAPictureToWhoAsksAndLetsGoOfItAtTheEnd) {
+TEST_F(PipelineTest, ShowsAImageToWhoAsksAndLetsGoOfItAtTheEnd) {
   constexpr std::size_t kWidth = 1280;
   constexpr std::size_t kHeight = 720;
   const auto luma = std::make_shared<std::vector<std::uint8_t>>(kWidth * kHeight, 128);
-  PictureTap tap(std::chrono::milliseconds(0));
+  ImageTap tap(std::chrono::milliseconds(0));
   PipelineOptions options = options_for_tests();
   options.tap = &tap;
   {
@@ -238,12 +238,12 @@ TEST_F(PipelineTest, ShowsAPictureToWhoAsksAndLetsGoOfItAtTheEnd) {
     std::atomic<bool> seen{false};
     std::thread viewer([&] {
       for (std::int64_t last = -1; last < 5;) {
-        const auto picture = tap.ask(std::chrono::seconds(60));
-        ASSERT_NE(picture, nullptr);
-        EXPECT_GT(picture->frame, last);
-        EXPECT_FALSE(picture->jpeg.empty());
-        EXPECT_EQ(picture->width, 1280);
-        last = picture->frame;
+        const auto image = tap.ask(std::chrono::seconds(60));
+        ASSERT_NE(image, nullptr);
+        EXPECT_GT(image->frame, last);
+        EXPECT_FALSE(image->jpeg.empty());
+        EXPECT_EQ(image->width, 1280);
+        last = image->frame;
       }
       seen = true;
       while (tap.ask(std::chrono::seconds(60)) != nullptr) {

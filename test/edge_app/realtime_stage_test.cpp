@@ -190,7 +190,7 @@ class Scene {
       }
     }
   }
-  [[nodiscard]] ImageView picture(int frame) const {
+  [[nodiscard]] ImageView image(int frame) const {
     const int shift = frame % 64;
     return {pixels_.data() + shift * kSide + shift, kWidth, kHeight, kSide};
   }
@@ -201,7 +201,7 @@ class Scene {
   std::vector<std::uint8_t> pixels_;
 };
 
-OrientationStepOptions options_with_pictures() {
+OrientationStepOptions options_with_images() {
   OrientationStepOptions options;
   options.calibration.camera = {2000, 1, 0, Scene::kWidth, Scene::kHeight};
   options.oe.emplace();
@@ -210,32 +210,32 @@ OrientationStepOptions options_with_pictures() {
   return options;
 }
 
-VideoMessage picture_message(const Scene& scene, int frame, PictureSlot slot) {
+VideoMessage image_message(const Scene& scene, int frame, ImageSlot slot) {
   VideoMessage message = frame_message(frame);
   message.stamp.sequence = frame;
-  message.picture = scene.picture(frame);
+  message.image = scene.image(frame);
   message.slot = slot;
   // Not late, however slow the machine.
   message.decoded_s = monotonic_now_s() + 1e3;
   return message;
 }
 
-TEST(RealtimeStage, GivesEachPictureBackOnceAndLendsTheOneThatIsWanted) {
+TEST(RealtimeStage, GivesEachImageBackOnceAndLendsTheOneThatIsWanted) {
   const Scene scene;
-  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);
-  for (PictureSlot slot = 0; slot < 3; ++slot) stage->push(picture_message(scene, slot, slot));
-  stage->want_picture();
+  const auto stage = std::make_unique<RealtimeStage>(options_with_images(), true, true);
+  for (ImageSlot slot = 0; slot < 3; ++slot) stage->push(image_message(scene, slot, slot));
+  stage->want_image();
   EXPECT_TRUE(stage->process());
   FeedFrame fed;
   ASSERT_TRUE(stage->pop(fed));
   EXPECT_EQ(fed.slot, 0) << "the first frame after the wish";
-  EXPECT_TRUE(fed.picture.valid());
+  EXPECT_TRUE(fed.image.valid());
   EXPECT_EQ(fed.tracks.stamp.frame, 0);
   for (int i = 0; i < 2; ++i) {
     ASSERT_TRUE(stage->pop(fed));
-    EXPECT_EQ(fed.slot, kNoPicture) << "one wish, one picture";
+    EXPECT_EQ(fed.slot, kNoImageSlot) << "one wish, one picture";
   }
-  PictureSlot slot = kNoPicture;
+  ImageSlot slot = kNoImageSlot;
   ASSERT_TRUE(stage->pop_returned(slot));
   EXPECT_EQ(slot, 1);
   ASSERT_TRUE(stage->pop_returned(slot));
@@ -247,41 +247,41 @@ TEST(RealtimeStage, GivesEachPictureBackOnceAndLendsTheOneThatIsWanted) {
 }
 
 // The calibration thread is busy: what it cannot be told of it cannot give back, and its wish stands.
-TEST(RealtimeStage, APictureThatFindsNoRoomIsNotLent) {
+TEST(RealtimeStage, AImageThatFindsNoRoomIsNotLent) {
   constexpr int kRoom = 256;
   const Scene scene;
-  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);
-  const auto process = [&](int frame, PictureSlot slot) {
-    stage->push(picture_message(scene, frame, slot));
+  const auto stage = std::make_unique<RealtimeStage>(options_with_images(), true, true);
+  const auto process = [&](int frame, ImageSlot slot) {
+    stage->push(image_message(scene, frame, slot));
     EXPECT_TRUE(stage->process());
   };
-  for (int frame = 0; frame < kRoom; ++frame) process(frame, kNoPicture);
-  stage->want_picture();
+  for (int frame = 0; frame < kRoom; ++frame) process(frame, kNoImageSlot);
+  stage->want_image();
   process(kRoom, 7);
-  PictureSlot slot = kNoPicture;
+  ImageSlot slot = kNoImageSlot;
   ASSERT_TRUE(stage->pop_returned(slot)) << "nobody else would give it back";
   EXPECT_EQ(slot, 7);
   FeedFrame fed;
   int heard = 0;
   while (stage->pop(fed)) {
     ++heard;
-    EXPECT_EQ(fed.slot, kNoPicture);
+    EXPECT_EQ(fed.slot, kNoImageSlot);
   }
   EXPECT_EQ(heard, kRoom) << "the queue was just full";
-  // With room again, the next picture is lent without another wish.
+  // With room again, the next image is lent without another wish.
   process(kRoom + 1, 8);
   ASSERT_TRUE(stage->pop(fed));
   EXPECT_EQ(fed.slot, 8);
-  EXPECT_TRUE(fed.picture.valid());
+  EXPECT_TRUE(fed.image.valid());
   EXPECT_FALSE(stage->pop_returned(slot));
 }
 
 TEST(RealtimeStage, TellsTheCalibrationThreadOfTracksSamplesAndLosses) {
   const Scene scene;
-  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);
+  const auto stage = std::make_unique<RealtimeStage>(options_with_images(), true, true);
   stage->push(sample_message(0.25));
-  stage->push(picture_message(scene, 0, kNoPicture));
-  stage->push(picture_message(scene, 1, kNoPicture));
+  stage->push(image_message(scene, 0, kNoImageSlot));
+  stage->push(image_message(scene, 1, kNoImageSlot));
   EXPECT_TRUE(stage->process());
   PanTiltSample sample;
   ASSERT_TRUE(stage->pop(sample));
@@ -305,7 +305,7 @@ TEST(RealtimeStage, TellsTheCalibrationThreadOfTracksSamplesAndLosses) {
 
 // The telemetry queue holds 1024, that of the calibration thread, which does not listen, 4096.
 TEST(RealtimeStage, CountsTheSamplesThatTheCalibrationThreadDoesNotHear) {
-  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);
+  const auto stage = std::make_unique<RealtimeStage>(options_with_images(), true, true);
   for (int filling = 0; filling < 5; ++filling) {
     for (int i = 0; i < 1024; ++i) stage->push(sample_message(0.001 * i));
     EXPECT_TRUE(stage->process());
@@ -316,14 +316,14 @@ TEST(RealtimeStage, CountsTheSamplesThatTheCalibrationThreadDoesNotHear) {
 
 TEST(RealtimeStage, TakesOverWhatIsPublishedBeforeTheNextFrame) {
   const Scene scene;
-  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true);
+  const auto stage = std::make_unique<RealtimeStage>(options_with_images(), true, true);
   PublishedCalibration published;
-  published.calibration = options_with_pictures().calibration;
+  published.calibration = options_with_images().calibration;
   published.calibration.camera.focal_length = 2100;
   published.calibrated = true;
   stage->report({CalibrationActivity::kWatching, CalibrationNeed::kNothing});
   ASSERT_TRUE(stage->publish(&published));
-  stage->push(picture_message(scene, 0, kNoPicture));
+  stage->push(image_message(scene, 0, kNoImageSlot));
   EXPECT_TRUE(stage->process());
   OutputMessage out;
   ASSERT_TRUE(stage->pop(out));
@@ -338,44 +338,44 @@ TEST(RealtimeStage, TakesOverWhatIsPublishedBeforeTheNextFrame) {
 
 TEST(RealtimeStage, LendsTheTapWhatItAskedForUnlessTheCalibrationThreadHasIt) {
   const Scene scene;
-  PictureTap tap;
-  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true, &tap);
+  ImageTap tap;
+  const auto stage = std::make_unique<RealtimeStage>(options_with_images(), true, true, &tap);
   const auto process = [&](int frame) {
-    stage->push(picture_message(scene, frame, frame));
+    stage->push(image_message(scene, frame, frame));
     EXPECT_TRUE(stage->process());
   };
   const auto returned = [&] {
-    PictureSlot slot = kNoPicture;
-    return stage->pop_returned(slot) ? slot : kNoPicture;
+    ImageSlot slot = kNoImageSlot;
+    return stage->pop_returned(slot) ? slot : kNoImageSlot;
   };
   process(0);
   EXPECT_EQ(returned(), 0) << "nobody asked";
   EXPECT_EQ(tap.ask(std::chrono::milliseconds(0)), nullptr);
-  stage->want_picture();
+  stage->want_image();
   process(1);
-  EXPECT_EQ(returned(), kNoPicture) << "with the calibration thread";
+  EXPECT_EQ(returned(), kNoImageSlot) << "with the calibration thread";
   process(2);
-  EXPECT_EQ(returned(), kNoPicture) << "with the tap";
+  EXPECT_EQ(returned(), kNoImageSlot) << "with the tap";
   process(3);
   EXPECT_EQ(returned(), 3) << "one wish, one picture";
   stage->end_input();
   EXPECT_FALSE(stage->process());
   tap.run();
   EXPECT_EQ(returned(), 2);
-  const auto picture = tap.of_frame(2);
-  ASSERT_NE(picture, nullptr);
-  EXPECT_EQ(picture->landmarks.kind, FrameLandmarks::Kind::kPoints);
-  EXPECT_GT(picture->landmarks.count, 20);
+  const auto image = tap.of_frame(2);
+  ASSERT_NE(image, nullptr);
+  EXPECT_EQ(image->landmarks.kind, FrameLandmarks::Kind::kPoints);
+  EXPECT_GT(image->landmarks.count, 20);
 }
 
 // Frames that come faster than they can be looked at, in OE mode or while points are followed: the last one is looked
 // at, and those that it waited for are not.
-TEST(RealtimeStage, LooksAtNoLatePictureThatOthersWaitBehind) {
+TEST(RealtimeStage, LooksAtNoLateImageThatOthersWaitBehind) {
   const Scene scene;
   for (const bool live : {true, false}) {
     for (const bool calibrated : {true, false}) {
       SCOPED_TRACE(testing::Message() << "live " << live << ", calibrated " << calibrated);
-      OrientationStepOptions options = options_with_pictures();
+      OrientationStepOptions options = options_with_images();
       options.calibrated = calibrated;
       const auto stage = std::make_unique<RealtimeStage>(options, live, true);
       for (int i = -4; i <= 0; ++i) {
@@ -385,23 +385,23 @@ TEST(RealtimeStage, LooksAtNoLatePictureThatOthersWaitBehind) {
         stage->push(sample);
       }
       for (int frame = 0; frame < 4; ++frame) {
-        VideoMessage message = picture_message(scene, frame, frame);
+        VideoMessage message = image_message(scene, frame, frame);
         if (frame != 1) message.decoded_s = monotonic_now_s() - 1e3;
         stage->push(message);
       }
       EXPECT_TRUE(stage->process());
-      EXPECT_EQ(stage->drops().late_pictures, live ? 2 : 0);
+      EXPECT_EQ(stage->drops().late_images, live ? 2 : 0);
       EXPECT_EQ(stage->drops().total(), 0) << "no frame is lost by it";
       OutputMessage out;
       for (int frame = 0; frame < 4; ++frame) {
         const bool late = live && (frame == 0 || frame == 2);
         ASSERT_TRUE(stage->pop(out));
-        EXPECT_EQ(out.record.status == RecordStatus::kPictureTooLate, late && calibrated) << frame;
+        EXPECT_EQ(out.record.status == RecordStatus::kImageTooLate, late && calibrated) << frame;
         EXPECT_NE(out.record.mode, RecordMode::kNone) << frame;
         FeedFrame fed;
         ASSERT_TRUE(stage->pop(fed));
         EXPECT_EQ(fed.tracks.tracker == FrameTracks::Tracker::kNone, late) << frame;
-        PictureSlot slot = kNoPicture;
+        ImageSlot slot = kNoImageSlot;
         ASSERT_TRUE(stage->pop_returned(slot));
         EXPECT_EQ(slot, frame);
       }
@@ -413,11 +413,11 @@ TEST(RealtimeStage, LooksAtNoLatePictureThatOthersWaitBehind) {
 // without allocating.
 TEST(RealtimeStage, AllocatesNothingWhileCalibrationsComeAndGo) {
   const Scene scene;
-  PictureTap tap(std::chrono::milliseconds(0));
-  std::thread tap_thread(&PictureTap::run, &tap);
-  const auto stage = std::make_unique<RealtimeStage>(options_with_pictures(), true, true, &tap);
+  ImageTap tap(std::chrono::milliseconds(0));
+  std::thread tap_thread(&ImageTap::run, &tap);
+  const auto stage = std::make_unique<RealtimeStage>(options_with_images(), true, true, &tap);
   PublishedCalibration calibrated;
-  calibrated.calibration = options_with_pictures().calibration;
+  calibrated.calibration = options_with_images().calibration;
   calibrated.calibrated = true;
   calibrated.map.landmarks.resize(500);
   PublishedCalibration withdrawn;
@@ -437,22 +437,22 @@ TEST(RealtimeStage, AllocatesNothingWhileCalibrationsComeAndGo) {
       if (i == 50 || i == 130) published = stage->publish(&calibrated);
       if (i == 110) published = stage->publish(&withdrawn);
       EXPECT_TRUE(published);
-      if (i % 7 == 0) stage->want_picture();
+      if (i % 7 == 0) stage->want_image();
       const bool looked_at = i == 20 || i == 101;
       if (looked_at) {
         EXPECT_EQ(tap.ask(std::chrono::milliseconds(0)), nullptr);
       }
-      stage->push(picture_message(scene, i % 2, 0));
+      stage->push(image_message(scene, i % 2, 0));
       EXPECT_TRUE(stage->process());
       while (looked_at && tap.of_frame(i % 2) == nullptr) std::this_thread::yield();
       while (stage->pop(out)) oe += out.record.mode == RecordMode::kOe ? 1 : 0;
       while (stage->pop(fed)) {
         followed += fed.tracks.tracker == FrameTracks::Tracker::kStartUp ? 1 : 0;
-        if (fed.slot != kNoPicture) stage->give_back(fed.slot);
+        if (fed.slot != kNoImageSlot) stage->give_back(fed.slot);
       }
       while (stage->pop(sample)) {
       }
-      for (PictureSlot slot = kNoPicture; stage->pop_returned(slot);) {
+      for (ImageSlot slot = kNoImageSlot; stage->pop_returned(slot);) {
       }
       for (const PublishedCalibration* adopted = nullptr; stage->pop_adopted(adopted);) {
       }

@@ -1,4 +1,4 @@
-// `alidade replay` on pictures that the virtual camera rendered, with its truth.
+// `alidade replay` on images that the virtual camera rendered, with its truth.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -145,7 +145,7 @@ TEST_F(ReplayVideoTest, GivesTheSameBytesAgain) {
   EXPECT_EQ(again.output, once);
 }
 
-TEST_F(ReplayVideoTest, AnswersFramesWithoutAPictureFromTelemetry) {
+TEST_F(ReplayVideoTest, AnswersFramesWithoutAImageFromTelemetry) {
   const std::string copy = copy_of_recording();
   // As after a kill of the recorder.
   fs::resize_file(copy + "/video.mkv", fs::file_size(copy + "/video.mkv") / 2);

@@ -466,14 +466,14 @@ TEST(SelfCalibration, TakesKeyframesWhereItHasNone) {
   FrameTracks tracks;
   tracks.tracker = FrameTracks::Tracker::kStartUp;
   const std::vector<std::uint8_t> pixels(static_cast<std::size_t>(s.width * s.height), 128);
-  const ImageView picture{pixels.data(), s.width, s.height, s.width};
+  const ImageView image{pixels.data(), s.width, s.height, s.width};
   for (int i = 0; i < 6; ++i) {
     sample.pan_rad = i;  // far apart, with a field of view of half a radian
     calibration.add(sample);
     tracks.stamp.frame = i;
     calibration.add(tracks);
     EXPECT_TRUE(calibration.wants_keyframe()) << i;
-    calibration.add_keyframe(picture);
+    calibration.add_keyframe(image);
     EXPECT_FALSE(calibration.wants_keyframe()) << "one of this view is enough";
   }
 }

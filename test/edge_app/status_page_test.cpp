@@ -1,4 +1,4 @@
-// The page and its pictures as a client of the server meets them.
+// The page and its images as a client of the server meets them.
 
 #include "edge_app/output/status_page.h"
 
@@ -19,7 +19,7 @@ namespace {
 TappedFrame tapped_frame(const std::vector<std::uint8_t>& luma, FrameLandmarks::Kind kind) {
   TappedFrame tapped;
   tapped.frame = 41;
-  tapped.picture = {luma.data(), 1280, 720, 1280};
+  tapped.image = {luma.data(), 1280, 720, 1280};
   tapped.slot = 3;
   tapped.landmarks.kind = kind;
   tapped.landmarks.count = 2;
@@ -56,8 +56,8 @@ class StatusPageTest : public ::testing::Test {
   }
 
   std::vector<std::uint8_t> luma_ = std::vector<std::uint8_t>(1280 * 720, 100);
-  PictureTap tap_{std::chrono::hours(1)};
-  std::thread tap_thread_{&PictureTap::run, &tap_};
+  ImageTap tap_{std::chrono::hours(1)};
+  std::thread tap_thread_{&ImageTap::run, &tap_};
   std::unique_ptr<HttpServer> server_;
   std::unique_ptr<httplib::Client> client_;
 };
@@ -93,15 +93,15 @@ TEST(StatusPage, SaysInWordsWhatEachStatusMeans) {
         << to_string(status);
 }
 
-TEST_F(StatusPageTest, APictureAndItsOverlayBelongToOneFrame) {
+TEST_F(StatusPageTest, AImageAndItsOverlayBelongToOneFrame) {
   std::thread realtime = show(FrameLandmarks::Kind::kLandmarks);
-  const auto picture = client_->Get("/api/v1/picture");
+  const auto image = client_->Get("/api/v1/picture");
   realtime.join();
-  ASSERT_TRUE(picture);
-  EXPECT_EQ(picture->status, 200);
-  EXPECT_EQ(picture->get_header_value("Content-Type"), "image/jpeg");
-  EXPECT_EQ(picture->get_header_value("X-Alidade-Frame"), "41");
-  EXPECT_EQ(picture->body, tap_.of_frame(41)->jpeg);
+  ASSERT_TRUE(image);
+  EXPECT_EQ(image->status, 200);
+  EXPECT_EQ(image->get_header_value("Content-Type"), "image/jpeg");
+  EXPECT_EQ(image->get_header_value("X-Alidade-Frame"), "41");
+  EXPECT_EQ(image->body, tap_.of_frame(41)->jpeg);
   for (const char* path : {"/api/v1/overlay?frame=41", "/api/v1/overlay"}) {
     const auto overlay = client_->Get(path);
     ASSERT_TRUE(overlay);
@@ -124,7 +124,7 @@ TEST_F(StatusPageTest, PointsHaveNoResiduals) {
   EXPECT_EQ(object["points"].dump(), "[[100.123,200.0],[1000.0,700.5]]");
 }
 
-TEST_F(StatusPageTest, SaysWhyThereIsNoPicture) {
+TEST_F(StatusPageTest, SaysWhyThereIsNoImage) {
   for (const char* path : {"/api/v1/picture", "/api/v1/overlay"}) {
     const auto answer = client_->Get(path);
     ASSERT_TRUE(answer);
@@ -144,7 +144,7 @@ TEST_F(StatusPageTest, RefusesFramesThatAreNoneOrNotKept) {
     EXPECT_EQ(status(frame), 400) << frame;
 }
 
-TEST_F(StatusPageTest, ThePictureWantsTheToken) {
+TEST_F(StatusPageTest, TheImageWantsTheToken) {
   httplib::Client anybody("http://" + server_->address());
   for (const char* path : {"/api/v1/picture", "/api/v1/overlay"}) {
     const auto answer = anybody.Get(path);

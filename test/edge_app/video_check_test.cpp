@@ -110,7 +110,7 @@ TEST(VideoCheck, SaysThatTheMachineIsTooSlow) {
   EXPECT_THAT(problems(check(frames).findings),
               ElementsAre(HasSubstr("decoding takes 36.0 ms of the 40.0 ms between frames")));
   VideoNeeds pt = needs();
-  pt.pictures = false;
+  pt.images = false;
   EXPECT_THAT(check_video(frames, {}, ClockFilterOptions(), pt).findings, IsEmpty());
 }
 

@@ -62,7 +62,7 @@ TEST(RealtimeAllocation, PtModeAllocatesNothing) {
   EXPECT_EQ(pixels, directions);
 }
 
-TEST(RealtimeAllocation, LookingAtPicturesAllocatesNothing) {
+TEST(RealtimeAllocation, LookingAtImagesAllocatesNothing) {
   std::mt19937_64 random(1);
   const AnalyticImage texture(&random, 10);
   const Pixels pixels = make_pixels(320, 200, texture, 2, &random);
@@ -112,14 +112,14 @@ TEST(RealtimeAllocation, LandmarkMapAllocatesNothing) {
   EXPECT_GT(found, 2000);
 }
 
-// A picture that moves, a lost one now and then, and one of nothing.
+// An image that moves, a lost one now and then, and one of nothing.
 TEST(RealtimeAllocation, TrackingFromTheStartAllocatesNothing) {
   std::mt19937_64 random(1);
   const AnalyticImage texture(&random, 10);
-  std::vector<Pixels> pictures;
+  std::vector<Pixels> images;
   for (int i = 0; i < 8; ++i) {
     const Vector2<double> shift(3.2 * i, 1.7 * (i % 3));
-    pictures.push_back(make_pixels(
+    images.push_back(make_pixels(
         320, 200, [&](const Vector2<double>& at) { return texture(at + shift); }, 2, &random));
   }
   const Pixels blank = make_pixels(
@@ -130,7 +130,7 @@ TEST(RealtimeAllocation, TrackingFromTheStartAllocatesNothing) {
   const AllocationGuard guard;
   for (std::size_t i = 0; i < 200; ++i) {
     const bool is_blank = i % 20 == 7 || i % 50 > 47;
-    const StartUpStatus status = tracker.process(is_blank ? blank.view : pictures[i % 8].view);
+    const StartUpStatus status = tracker.process(is_blank ? blank.view : images[i % 8].view);
     observations += tracker.observation_count();
     lost += status == StartUpStatus::kLost;
   }
@@ -143,7 +143,7 @@ TEST(RealtimeAllocation, TrackingFromTheStartAllocatesNothing) {
 TEST(RealtimeAllocation, OeModeAllocatesNothing) {
   constexpr int kWidth = 128;
   constexpr int kHeight = 128;
-  constexpr int kPictures = 20;
+  constexpr int kImages = 20;
   constexpr double kFocalLength = 20000;  // px
   constexpr double kRadius = 8;           // px
   Calibration calibration;
@@ -151,12 +151,12 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
   calibration.line_delay = 20e-6;
   std::mt19937_64 random(2);
   const AnalyticImage texture(&random, 8);
-  std::vector<Pixels> pictures;
-  const auto turn_of = [](int k) { return 2 * kPi * (k % kPictures) / kPictures; };
-  for (int k = 0; k < kPictures; ++k) {
+  std::vector<Pixels> images;
+  const auto turn_of = [](int k) { return 2 * kPi * (k % kImages) / kImages; };
+  for (int k = 0; k < kImages; ++k) {
     const Vector2<double> shift =
         kRadius * Vector2<double>(std::cos(turn_of(k)), std::sin(turn_of(k)));
-    pictures.push_back(make_pixels(
+    images.push_back(make_pixels(
         kWidth, kHeight, [&](const Vector2<double>& at) { return texture(at + shift); }, 2,
         &random));
   }
@@ -176,7 +176,7 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
   InterpolatedPanTilt first;
   first.angle = {kRadius / kFocalLength, 0};
   first.covariance.diagonal() << 1e-9, 1e-9, 1e-7, 1e-7;
-  (void)oe.process(pictures[0].view, 0, &first, &frame);
+  (void)oe.process(images[0].view, 0, &first, &frame);
   oe.maintain();
   const MapState good = oe.map_state();
   MapState bad = good;
@@ -188,16 +188,16 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
   oe.reset(calibration);
   for (int k = 0; k < kFrames; ++k) {
     const double radius = kRadius / kFocalLength;
-    const double rate = 2 * kPi * 25 / kPictures;
+    const double rate = 2 * kPi * 25 / kImages;
     InterpolatedPanTilt telemetry;
     telemetry.time_s = k / 25.0;
     telemetry.angle = {radius * std::cos(turn_of(k)), -radius * std::sin(turn_of(k))};
     telemetry.rate = {-radius * rate * std::sin(turn_of(k)), -radius * rate * std::cos(turn_of(k))};
     telemetry.covariance.diagonal() << 1e-9, 1e-9, 1e-7, 1e-7;
     telemetry.extrapolated = k % 3 == 0;
-    // Now and then no telemetry or no picture.
+    // Now and then no telemetry or no image.
     const ImageView image =
-        k % 1000 == 500 ? ImageView{} : pictures[static_cast<std::size_t>(k % kPictures)].view;
+        k % 1000 == 500 ? ImageView{} : images[static_cast<std::size_t>(k % kImages)].view;
     const OeStatus status =
         oe.process(image, k / 25.0, k % 100 == 50 ? nullptr : &telemetry, &frame);
     in_oe += status == OeStatus::kOk ? 1 : 0;

@@ -1,5 +1,5 @@
 #pragma once
-// A picture that is known between its pixels: a sum of waves with periods from 6 to 40 px, of random
+// An image that is known between its pixels: a sum of waves with periods from 6 to 40 px, of random
 // direction and phase. Pixels are point samples of it, rounded, with or without noise.
 
 #include <algorithm>

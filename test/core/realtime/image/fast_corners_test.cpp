@@ -14,43 +14,42 @@
 namespace alidade::test {
 namespace {
 
-struct Picture {
+struct Image {
   std::vector<std::uint8_t> memory;
   ImageView view;
 };
 
-Picture grey(int width, int height, int level, int padding = 0) {
-  Picture picture;
+Image grey(int width, int height, int level, int padding = 0) {
+  Image image;
   const std::ptrdiff_t stride = width + padding;
-  picture.memory.assign(static_cast<std::size_t>(stride * height),
-                        static_cast<std::uint8_t>(level));
-  picture.view = {picture.memory.data(), width, height, stride};
-  return picture;
+  image.memory.assign(static_cast<std::size_t>(stride * height), static_cast<std::uint8_t>(level));
+  image.view = {image.memory.data(), width, height, stride};
+  return image;
 }
 
-void paint(Picture* picture, int u0, int v0, int u1, int v1, int level) {
+void paint(Image* image, int u0, int v0, int u1, int v1, int level) {
   for (int v = v0; v < v1; ++v) {
     for (int u = u0; u < u1; ++u) {
-      picture->memory[static_cast<std::size_t>(v * picture->view.stride + u)] =
+      image->memory[static_cast<std::size_t>(v * image->view.stride + u)] =
           static_cast<std::uint8_t>(level);
     }
   }
 }
 
 // Blobs of every size: corners, edges, flat parts.
-Picture blobs(int width, int height, int padding, std::uint64_t seed) {
+Image blobs(int width, int height, int padding, std::uint64_t seed) {
   std::mt19937_64 random(seed);
-  Picture picture = grey(width, height, 128, padding);
+  Image image = grey(width, height, 128, padding);
   const auto pick = [&](int below) {
     return static_cast<int>(random() % static_cast<unsigned>(below));
   };
   for (int i = 0; i < width * height / 60; ++i) {
     const int u = pick(width);
     const int v = pick(height);
-    paint(&picture, u, v, std::min(width, u + 1 + pick(12)), std::min(height, v + 1 + pick(12)),
+    paint(&image, u, v, std::min(width, u + 1 + pick(12)), std::min(height, v + 1 + pick(12)),
           pick(256));
   }
-  return picture;
+  return image;
 }
 
 // Counts neighbours in a row for every threshold: not how the code under test does it.
@@ -124,11 +123,10 @@ std::map<Place, int> corners_of(const ImageView& image, int cell, int threshold)
 TEST(FastCorners, EqualThePlainDefinitionForEverySizeCellAndThreshold) {
   std::size_t corners = 0;
   for (int width = 22; width < 75; width += 1) {
-    const Picture picture =
-        blobs(width, 7 + width % 41, width % 5, static_cast<std::uint64_t>(width));
+    const Image image = blobs(width, 7 + width % 41, width % 5, static_cast<std::uint64_t>(width));
     for (const int cell : {8, 17, 32, 100}) {
-      const auto expected = plain_corners(picture.view, cell, width % 60);
-      EXPECT_EQ(corners_of(picture.view, cell, width % 60), expected) << width << ' ' << cell;
+      const auto expected = plain_corners(image.view, cell, width % 60);
+      EXPECT_EQ(corners_of(image.view, cell, width % 60), expected) << width << ' ' << cell;
       corners += expected.size();
     }
   }
@@ -136,12 +134,12 @@ TEST(FastCorners, EqualThePlainDefinitionForEverySizeCellAndThreshold) {
 }
 
 TEST(FastCorners, ScoreIsTheLargestThresholdThatStillGivesACornerPlusOne) {
-  const Picture picture = blobs(60, 60, 3, 7);
+  const Image image = blobs(60, 60, 3, 7);
   int positive = 0;
   for (int v = 3; v < 57; ++v) {
     for (int u = 3; u < 57; ++u) {
-      ASSERT_EQ(fast_score(picture.view, u, v), plain_score(picture.view, u, v));
-      positive += fast_score(picture.view, u, v) > 0;
+      ASSERT_EQ(fast_score(image.view, u, v), plain_score(image.view, u, v));
+      positive += fast_score(image.view, u, v) > 0;
     }
   }
   EXPECT_GT(positive, 300);
@@ -149,9 +147,9 @@ TEST(FastCorners, ScoreIsTheLargestThresholdThatStillGivesACornerPlusOne) {
 
 TEST(FastCorners, StandOnTheFourCornersOfASquareAndNowhereOnItsEdges) {
   for (const auto& [square, ground] : {std::pair(200, 60), std::pair(60, 200)}) {
-    Picture picture = grey(64, 64, ground);
-    paint(&picture, 20, 22, 41, 43, square);
-    const auto corners = corners_of(picture.view, 8, 20);
+    Image image = grey(64, 64, ground);
+    paint(&image, 20, 22, 41, 43, square);
+    const auto corners = corners_of(image.view, 8, 20);
     ASSERT_GE(corners.size(), 4U);
     for (const auto& corner : corners) {
       const auto [v, u] = corner.first;
@@ -162,41 +160,41 @@ TEST(FastCorners, StandOnTheFourCornersOfASquareAndNowhereOnItsEdges) {
   }
 }
 
-TEST(FastCorners, AreNotFoundOnFlatPicturesStraightEdgesAndBelowTheThreshold) {
+TEST(FastCorners, AreNotFoundOnFlatImagesStraightEdgesAndBelowTheThreshold) {
   EXPECT_TRUE(corners_of(grey(100, 50, 77).view, 16, 0).empty());
-  Picture edge = grey(100, 50, 50);
+  Image edge = grey(100, 50, 50);
   paint(&edge, 40, 0, 100, 50, 200);
   EXPECT_TRUE(corners_of(edge.view, 16, 0).empty());
-  Picture faint = grey(100, 50, 100);
+  Image faint = grey(100, 50, 100);
   paint(&faint, 40, 20, 60, 40, 110);
   EXPECT_TRUE(corners_of(faint.view, 16, 10).empty());
   EXPECT_FALSE(corners_of(faint.view, 16, 9).empty());
 }
 
 TEST(FastCorners, FindsCornersAsNearToTheBorderAsTheCircleAllows) {
-  Picture picture = grey(40, 30, 0);
+  Image image = grey(40, 30, 0);
   for (const Place& place : {Place(3, 3), Place(3, 36), Place(26, 3), Place(26, 36)}) {
-    paint(&picture, place.second, place.first, place.second + 1, place.first + 1, 255);
+    paint(&image, place.second, place.first, place.second + 1, place.first + 1, 255);
   }
   const std::map<Place, int> expected = {
       {{3, 3}, 255}, {{3, 36}, 255}, {{26, 3}, 255}, {{26, 36}, 255}};
-  EXPECT_EQ(corners_of(picture.view, 8, 20), expected);
+  EXPECT_EQ(corners_of(image.view, 8, 20), expected);
 }
 
 TEST(FastCorners, TellsHowManyFoundNoRoom) {
-  const Picture picture = blobs(200, 100, 0, 9);
+  const Image image = blobs(200, 100, 0, 9);
   FastGrid grid(200, 100, 16);
   std::vector<FastCorner> all(static_cast<std::size_t>(grid.max_cells()));
-  const FastResult whole = grid.detect(picture.view, 10, all.data(), grid.max_cells());
+  const FastResult whole = grid.detect(image.view, 10, all.data(), grid.max_cells());
   ASSERT_GT(whole.count, 20);
   std::vector<FastCorner> some(20);
-  const FastResult part = grid.detect(picture.view, 10, some.data(), 20);
+  const FastResult part = grid.detect(image.view, 10, some.data(), 20);
   EXPECT_EQ(part.status, FastStatus::kOverflow);
   EXPECT_EQ(part.count, 20);
   EXPECT_EQ(part.dropped, whole.count - 20);
 }
 
-TEST(FastCorners, RefusesPicturesItCannotSearch) {
+TEST(FastCorners, RefusesImagesItCannotSearch) {
   std::vector<std::uint8_t> memory(100 * 100);
   FastGrid grid(60, 50, 16);
   const auto status = [&](const ImageView& view) {

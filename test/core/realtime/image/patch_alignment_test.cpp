@@ -1,5 +1,5 @@
-// Patch alignment on pictures that are known exactly between their pixels: bias, covariance, gain and
-// offset, warps, borders, pictures without corners.
+// Patch alignment on images that are known exactly between their pixels: bias, covariance, gain and
+// offset, warps, borders, images without corners.
 
 #include "core/realtime/image/patch_alignment.h"
 
@@ -177,7 +177,7 @@ TEST(PatchAlignment, ErrorsAreAsLargeAsTheCovarianceSays) {
   EXPECT_NEAR(statistics.rms(), std::sqrt(statistics.variances / statistics.count),
               0.05 * statistics.rms());
   EXPECT_LT(statistics.bias(), 4 * statistics.rms() / std::sqrt(statistics.count));
-  // Both pictures' noise and rounding; the averaged correlation is 5 % too large.
+  // Both images' noise and rounding; the averaged correlation is 5 % too large.
   const double truth = 2 * (2 * 2 + 1.0 / 12);
   EXPECT_NEAR(statistics.noise_variances / statistics.count, 1.05 * truth, 0.05 * truth);
 }
@@ -300,7 +300,7 @@ TEST(PatchAlignment, RefusesReferencesWithoutContrast) {
   // A displacement of a ramp is an offset.
   const auto ramp = [](const Vector2<double>& at) { return 3 * at.x() + 2 * at.y(); };
   EXPECT_EQ(prepared(ramp, 0), PrepareStatus::kTooFlat);
-  // Without a demand on contrast, too, no picture is divided by zero.
+  // Without a demand on contrast, too, no image is divided by zero.
   const Pixels pixels = make_pixels(kSize, kSize, flat, 0, &random);
   EXPECT_EQ(prepare(pixels.view, kCentre, kIdentity, 0, &reference), PrepareStatus::kTooFlat);
 }
@@ -380,7 +380,7 @@ TEST(PatchAlignment, SaysWhyItFoundNothing) {
   }
   EXPECT_GT(unlike, 0);
   EXPECT_GT(moved_too_far, 0);
-  // Pictures that have nothing to do with each other: with waves this long, one in
+  // Images that have nothing to do with each other: with waves this long, one in
   // twenty looks alike somewhere within max_move.
   EXPECT_LT(found, (unlike + moved_too_far + not_converged + found) / 10);
 }

@@ -1,5 +1,5 @@
 // Corners and alignment on photos. OpenCV reads the photos, is a second opinion on FAST, and moves them:
-// by turning the phases of their Fourier transform, which interpolates with every pixel of the picture.
+// by turning the phases of their Fourier transform, which interpolates with every pixel of the image.
 
 #include <gtest/gtest.h>
 
@@ -24,8 +24,8 @@ namespace {
 
 constexpr double kMinContrast = 4;
 
-ImageView view_of(const cv::Mat& picture) {
-  return {picture.data, picture.cols, picture.rows, static_cast<std::ptrdiff_t>(picture.step)};
+ImageView view_of(const cv::Mat& image) {
+  return {image.data, image.cols, image.rows, static_cast<std::ptrdiff_t>(image.step)};
 }
 
 // The largest length up to n without prime factors above five.
@@ -96,11 +96,11 @@ TEST_P(Photo, HasTheCornersThatOpenCvFinds) {
   }
 }
 
-// The same picture seen `shift` px further right and down.
-cv::Mat moved(const cv::Mat& picture, const Vector2<double>& shift) {
+// The same image seen `shift` px further right and down.
+cv::Mat moved(const cv::Mat& image, const Vector2<double>& shift) {
   cv::Mat transform;
   cv::Mat real;
-  picture.convertTo(real, CV_64F);
+  image.convertTo(real, CV_64F);
   cv::dft(real, transform, cv::DFT_COMPLEX_OUTPUT);
   const auto frequency = [](int i, int n) {
     return 2 * CV_PI * static_cast<double>(i <= n / 2 ? i : i - n) / n;
@@ -119,13 +119,13 @@ cv::Mat moved(const cv::Mat& picture, const Vector2<double>& shift) {
   return result;
 }
 
-cv::Mat rounded(const cv::Mat& picture, double sigma, std::mt19937_64* random) {
+cv::Mat rounded(const cv::Mat& image, double sigma, std::mt19937_64* random) {
   std::normal_distribution<double> normal(0, 1);
-  cv::Mat result(picture.size(), CV_8U);
-  for (int j = 0; j < picture.rows; ++j) {
-    for (int i = 0; i < picture.cols; ++i) {
+  cv::Mat result(image.size(), CV_8U);
+  for (int j = 0; j < image.rows; ++j) {
+    for (int i = 0; i < image.cols; ++i) {
       const double noise = sigma > 0 ? sigma * normal(*random) : 0;
-      result.at<uchar>(j, i) = cv::saturate_cast<uchar>(picture.at<double>(j, i) + noise);
+      result.at<uchar>(j, i) = cv::saturate_cast<uchar>(image.at<double>(j, i) + noise);
     }
   }
   return result;

@@ -10,19 +10,19 @@
 namespace alidade::test {
 namespace {
 
-struct Picture {
+struct Image {
   std::vector<std::uint8_t> memory;
   ImageView view;
 };
 
-Picture random_picture(int width, int height, int padding, std::mt19937_64* random) {
+Image random_image(int width, int height, int padding, std::mt19937_64* random) {
   std::uniform_int_distribution<int> grey(0, 255);
-  Picture picture;
+  Image image;
   const std::ptrdiff_t stride = width + padding;
-  picture.memory.resize(static_cast<std::size_t>(stride * height));
-  for (auto& pixel : picture.memory) pixel = static_cast<std::uint8_t>(grey(*random));
-  picture.view = {picture.memory.data(), width, height, stride};
-  return picture;
+  image.memory.resize(static_cast<std::size_t>(stride * height));
+  for (auto& pixel : image.memory) pixel = static_cast<std::uint8_t>(grey(*random));
+  image.view = {image.memory.data(), width, height, stride};
+  return image;
 }
 
 int mean_of_square(const ImageView& in, int u, int v) {
@@ -57,20 +57,20 @@ TEST(Pyramid, EqualsTheScalarReferenceForEverySizeAndStride) {
   int compared = 0;
   for (int width = 1; width <= 131; ++width) {
     for (const int padding : {0, 1, 13}) {
-      const Picture picture = random_picture(width, 5 + width % 33, padding, &random);
-      ASSERT_EQ(pyramid.build(picture.view, 4), PyramidStatus::kOk);
+      const Image image = random_image(width, 5 + width % 33, padding, &random);
+      ASSERT_EQ(pyramid.build(image.view, 4), PyramidStatus::kOk);
       compared += expect_octaves_follow(pyramid);
     }
   }
   EXPECT_GT(compared, 100000);
 }
 
-TEST(Pyramid, TakesAPictureThatIsStoredBottomUp) {
+TEST(Pyramid, TakesAImageThatIsStoredBottomUp) {
   std::mt19937_64 random(2);
-  Picture picture = random_picture(50, 30, 7, &random);
-  picture.view = {picture.view.row(29), 50, 30, -picture.view.stride};
+  Image image = random_image(50, 30, 7, &random);
+  image.view = {image.view.row(29), 50, 30, -image.view.stride};
   Pyramid pyramid(50, 30, 3);
-  ASSERT_EQ(pyramid.build(picture.view, 3), PyramidStatus::kOk);
+  ASSERT_EQ(pyramid.build(image.view, 3), PyramidStatus::kOk);
   EXPECT_EQ(expect_octaves_follow(pyramid), 25 * 15 + 12 * 7);
 }
 
@@ -89,7 +89,7 @@ TEST(Pyramid, KeepsExtremesAndRoundsHalvesUp) {
 }
 
 // The centre of mass of a bright spot lies at u / 2^l of every octave.
-TEST(Pyramid, PutsAPointOfThePictureAtItsCoordinatesOverTwoToTheOctave) {
+TEST(Pyramid, PutsAPointOfTheImageAtItsCoordinatesOverTwoToTheOctave) {
   for (int at = 16; at < 32; ++at) {
     std::vector<std::uint8_t> memory(64 * 64, 0);
     for (int v = at; v < at + 16; ++v) {

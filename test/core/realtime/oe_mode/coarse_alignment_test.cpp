@@ -1,4 +1,4 @@
-// Coarse alignment from starts that are wrong by up to 60 px in any direction of a 1920x1080 picture.
+// Coarse alignment from starts that are wrong by up to 60 px in any direction of a 1920x1080 image.
 
 #include "core/realtime/oe_mode/coarse_alignment.h"
 
@@ -17,7 +17,7 @@ namespace {
 
 constexpr int kWidth = 1920;
 constexpr int kHeight = 1080;
-constexpr int kMargin = 80;  // px, by which a view may be moved in its picture
+constexpr int kMargin = 80;  // px, by which a view may be moved in its image
 constexpr int kOctaves = 6;
 constexpr int kFinest = 2;
 constexpr int kPatches = 24;  // of each octave
@@ -47,9 +47,9 @@ std::vector<float> texture(std::uint64_t seed) {
   return grey;
 }
 
-class Picture {
+class Image {
  public:
-  Picture(const std::vector<float>& grey, double gain, std::uint64_t seed) : pixels_(grey.size()) {
+  Image(const std::vector<float>& grey, double gain, std::uint64_t seed) : pixels_(grey.size()) {
     std::mt19937_64 random(seed);
     std::normal_distribution<float> noise(0, 2);
     for (std::size_t i = 0; i < grey.size(); ++i) {
@@ -66,7 +66,7 @@ class Picture {
   }
 
   // Hides a strip of the view by what another one shows there.
-  void cover(int shift_u, int shift_v, int from_u, int to_u, const Picture& other) {
+  void cover(int shift_u, int shift_v, int from_u, int to_u, const Image& other) {
     const ImageView target = view(shift_u, shift_v);
     const ImageView source = other.view();
     for (int v = 0; v < kHeight; ++v) {
@@ -118,8 +118,7 @@ class CoarseAlignmentTest : public testing::Test {
     return ok;
   }
 
-  void expect_recovered(const Picture& picture, double radius, double search_px,
-                        double least_found) {
+  void expect_recovered(const Image& image, double radius, double search_px, double least_found) {
     for (int i = 0; i < 12; ++i) {
       const double turn = 2 * kPi * (i + 0.3) / 12;
       const int du = static_cast<int>(std::lround(radius * std::cos(turn)));
@@ -128,7 +127,7 @@ class CoarseAlignmentTest : public testing::Test {
       options.search_px = search_px;
       CoarseAlignment out;
       double error_px = 0;
-      ASSERT_TRUE(align(picture.view(du, dv), options, {du, dv}, &error_px, &out))
+      ASSERT_TRUE(align(image.view(du, dv), options, {du, dv}, &error_px, &out))
           << du << ' ' << dv << ", found " << out.found;
       EXPECT_LT(error_px, 1) << du << ' ' << dv;
       EXPECT_GE(out.found, least_found) << du << ' ' << dv;
@@ -137,7 +136,7 @@ class CoarseAlignmentTest : public testing::Test {
   }
 
   const std::vector<float> grey_ = texture(1);
-  const Picture reference_{grey_, 1, 1};
+  const Image reference_{grey_, 1, 1};
   Matrix2<double> J_angle_;  // px/rad
   std::vector<ReferencePatch> references_;
   std::vector<CoarsePatch> patches_;
@@ -145,7 +144,7 @@ class CoarseAlignmentTest : public testing::Test {
 };
 
 TEST_F(CoarseAlignmentTest, FindsItsWayFromTheReachOfTheCoarsestOctave) {
-  const Picture same(grey_, 1, 2);
+  const Image same(grey_, 1, 2);
   for (const double radius : {0.0, 5.0, 20.0, 40.0}) {
     SCOPED_TRACE(radius);
     expect_recovered(same, radius, 0, 0.95);
@@ -153,7 +152,7 @@ TEST_F(CoarseAlignmentTest, FindsItsWayFromTheReachOfTheCoarsestOctave) {
 }
 
 TEST_F(CoarseAlignmentTest, FindsItsWayFromSixtyPixelsBySearching) {
-  const Picture same(grey_, 1, 2);
+  const Image same(grey_, 1, 2);
   for (const double radius : {0.0, 20.0, 60.0}) {
     SCOPED_TRACE(radius);
     expect_recovered(same, radius, 60, 0.95);
@@ -163,14 +162,14 @@ TEST_F(CoarseAlignmentTest, FindsItsWayFromSixtyPixelsBySearching) {
 TEST_F(CoarseAlignmentTest, DoesNotMindBrightness) {
   for (const double gain : {0.5, 2.0}) {
     SCOPED_TRACE(gain);
-    const Picture changed(grey_, gain, 2);
+    const Image changed(grey_, gain, 2);
     expect_recovered(changed, 30, 0, 0.95);
     expect_recovered(changed, 60, 60, 0.95);
   }
 }
 
 TEST_F(CoarseAlignmentTest, DoesNotMindWhatHidesThirtyPercent) {
-  const Picture other(texture(2), 1, 4);
+  const Image other(texture(2), 1, 4);
   for (const double radius : {0.0, 30.0, 60.0}) {
     for (int i = 0; i < 6; ++i) {
       const double turn = 2 * kPi * (i + 0.3) / 6;
@@ -179,7 +178,7 @@ TEST_F(CoarseAlignmentTest, DoesNotMindWhatHidesThirtyPercent) {
       // Each octave has its patches in a strip of its own width; 30 % of the coarsest's are hidden.
       const auto from = static_cast<int>(border_of(kOctaves - 1));
       const int to = from + (kWidth - 2 * from) * 3 / 10;
-      Picture covered(grey_, 1, 2);
+      Image covered(grey_, 1, 2);
       covered.cover(du, dv, 0, to, other);
       CoarseOptions options;
       options.search_px = radius > 40 ? radius : 0;
@@ -196,8 +195,8 @@ TEST_F(CoarseAlignmentTest, DoesNotMindWhatHidesThirtyPercent) {
 
 TEST_F(CoarseAlignmentTest, FindsNothingWhereNothingIsAlike) {
   const std::vector<std::uint8_t> blank(static_cast<std::size_t>(kWidth) * kHeight, 90);
-  const Picture other(texture(2), 1, 4);
-  const Picture noise(std::vector<float>(grey_.size(), 128.0F), 1, 5);
+  const Image other(texture(2), 1, 4);
+  const Image noise(std::vector<float>(grey_.size(), 128.0F), 1, 5);
   const ImageView images[] = {{blank.data(), kWidth, kHeight, kWidth}, other.view(), noise.view()};
   for (const ImageView& image : images) {
     for (const double search_px : {0.0, 60.0}) {

@@ -69,9 +69,9 @@ class VirtualCamera {
 
   // Of frame k; lives as long as the camera.
   [[nodiscard]] ImageView image(int k) {
-    std::vector<std::uint8_t>& picture = pictures_[k];
-    if (picture.empty()) picture = renderer_.render(time_s(k), k);
-    return {picture.data(), kWidth, kHeight, kWidth};
+    std::vector<std::uint8_t>& image = images_[k];
+    if (image.empty()) image = renderer_.render(time_s(k), k);
+    return {image.data(), kWidth, kHeight, kWidth};
   }
 
   [[nodiscard]] InterpolatedPanTilt telemetry(int k, const Sigmas& sigmas = {},
@@ -131,7 +131,7 @@ class VirtualCamera {
   std::unique_ptr<simulator::Path> path_;
   simulator::Renderer renderer_;
   Calibration calibration_;
-  std::map<int, std::vector<std::uint8_t>> pictures_;
+  std::map<int, std::vector<std::uint8_t>> images_;
   std::mt19937_64 random_{1};
   std::normal_distribution<double> normal_;
 };
@@ -231,7 +231,7 @@ TEST_F(OeModeOnFrames, BeginsWithNothingAndIsInOeFromTheSecondFrameOn) {
   EXPECT_LT(std::sqrt(turns / (kFrames - 2)), 0.1);
 }
 
-// The same pictures and the same telemetry, by one calibration and by another.
+// The same images and the same telemetry, by one calibration and by another.
 TEST_F(OeModeOnFrames, FollowsTheCalibrationAsItsSensitivitySays) {
   constexpr int kFrames = 40;
   std::vector<InterpolatedPanTilt> telemetry;
@@ -282,15 +282,15 @@ TEST_F(OeModeOnFrames, KnowsTheBaseBetterTheLongerItSeesTelemetry) {
   EXPECT_LT(sigma, std::sqrt(covariance(0, 0)) / 4);
 }
 
-TEST_F(OeModeOnFrames, IsTelemetryAloneWhereThePictureShowsNothing) {
+TEST_F(OeModeOnFrames, IsTelemetryAloneWhereTheImageShowsNothing) {
   start(20);
   std::mt19937_64 random(2);
-  std::vector<std::uint8_t> picture(static_cast<std::size_t>(kWidth) * kHeight);
-  const ImageView view{picture.data(), kWidth, kHeight, kWidth};
+  std::vector<std::uint8_t> image(static_cast<std::size_t>(kWidth) * kHeight);
+  const ImageView view{image.data(), kWidth, kHeight, kWidth};
   int k = 20;
   for (const int kind : {0, 1, 2, 3}) {
     for (int i = 0; i < 10; ++i, ++k) {
-      for (std::uint8_t& pixel : picture) {
+      for (std::uint8_t& pixel : image) {
         const auto noise = static_cast<std::uint8_t>(random() % 7);
         if (kind == 0) pixel = 0;
         if (kind == 1) pixel = 255;
@@ -426,7 +426,7 @@ TEST_F(OeModeOnFrames, WritesNothingWithoutPrediction) {
   expect_back(44);
 }
 
-TEST_F(OeModeOnFrames, AnswersWithTelemetryWhereThePictureIsNone) {
+TEST_F(OeModeOnFrames, AnswersWithTelemetryWhereTheImageIsNone) {
   start(10);
   const ImageView good = camera_.image(10);
   const ImageView bad[] = {{},
@@ -487,7 +487,7 @@ TEST_F(OeModeOnFrames, SurvivesRepeatedAndDisorderedTimes) {
   run(27, 30);
 }
 
-TEST_F(OeModeOnFrames, TakesPicturesBottomUpAndWithPadding) {
+TEST_F(OeModeOnFrames, TakesImagesBottomUpAndWithPadding) {
   OeMode other(small_options());
   other.reset(camera_.calibration());
   constexpr int kStride = kWidth + 13;
@@ -869,7 +869,7 @@ TEST_F(HandedOverMap, LosesWhatMakesNoSense) {
       [&](Landmark* l) { l->d *= 1.01; },
       [&](Landmark* l) { l->d.setZero(); },
       [&](Landmark* l) { l->octave = 200; },
-      [&](Landmark* l) { l->octave = 5; },  // the picture is too low for that
+      [&](Landmark* l) { l->octave = 5; },  // the image is too low for that
       [&](Landmark* l) { l->covariance(0, 1) = kNaN; },
       [&](Landmark* l) { l->covariance(1, 1) *= -1; },
       [&](Landmark* l) { l->shared_covariance(1, 1) = -1; },
@@ -910,7 +910,7 @@ TEST_F(HandedOverMap, IsCutWhereThereIsNoRoom) {
 }
 
 // Only what should be in view is given up: the rest may be right.
-TEST_F(HandedOverMap, IsForgottenWhereThePictureShowsSomethingElse) {
+TEST_F(HandedOverMap, IsForgottenWhereTheImageShowsSomethingElse) {
   start(30);
   other_.reset(camera_.calibration(), oe_.map_state());
   std::mt19937_64 random(3);

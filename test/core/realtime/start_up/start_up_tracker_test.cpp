@@ -243,13 +243,13 @@ TEST_P(UnknownLens, TracksStayOnTheirScenePointsWithinTheirCovariances) {
   EXPECT_GT(errors.observations, 2000);
   EXPECT_GT(errors.length, 8);
   EXPECT_EQ(errors.wrong, 0);
-  // Noise of 2 grey levels: README.md has 0.049 px for two noisy pictures, so 0.035 px for one.
+  // Noise of 2 grey levels: README.md has 0.049 px for two noisy images, so 0.035 px for one.
   EXPECT_LT(errors.rms, 0.05);
   EXPECT_GT(errors.normalised, 0.8);
   EXPECT_LT(errors.normalised, 1.25);
   // The mean of so many would have a standard deviation of 0.0007 px were they independent.
   EXPECT_LT(errors.mean.norm(), 0.004);
-  // Against the first picture always: the end of a track is as good as its beginning. Means of five, twice.
+  // Against the first image always: the end of a track is as good as its beginning. Means of five, twice.
   EXPECT_LT(errors.drift_px, 0.05);
 }
 
@@ -276,8 +276,8 @@ TEST(StartUpTracker, FollowsThreeFieldsOfViewASecond) {
   EXPECT_LT(run.errors.wrong, 0.001);
 }
 
-// The camera looks 70 degrees up: panning turns the picture about a point close to it.
-TEST(StartUpTracker, FollowsAPictureThatTurns) {
+// The camera looks 70 degrees up: panning turns the image about a point close to it.
+TEST(StartUpTracker, FollowsAImageThatTurns) {
   sim::Config config = camera(40, 0.07);
   config.scene.photos.clear();
   const auto level = swing(40, 2);
@@ -402,7 +402,7 @@ TEST(StartUpTracker, KeepsItsPointsThroughAStepOfBrightness) {
   EXPECT_LT(run.errors.wrong, 0.001);
 }
 
-TEST(StartUpTracker, BridgesOneFrameWithoutPictureAndBeginsAnewAfterMore) {
+TEST(StartUpTracker, BridgesOneFrameWithoutImageAndBeginsAnewAfterMore) {
   sim::Config config = camera(20, 0.07);
   config.sensor.covered.push_back({5 * kFrame - 0.01, 5 * kFrame + 0.01});
   config.sensor.covered.push_back({10 * kFrame - 0.01, 13 * kFrame + 0.01});
@@ -420,7 +420,7 @@ TEST(StartUpTracker, BridgesOneFrameWithoutPictureAndBeginsAnewAfterMore) {
   EXPECT_EQ(run.errors.wrong, 0);
 }
 
-// Frames of one analytic picture that moves by a known amount.
+// Frames of one analytic image that moves by a known amount.
 std::vector<Pixels> moving_waves(int width, int height, int frames) {
   std::mt19937_64 random(5);
   const AnalyticImage waves(&random);
@@ -488,7 +488,7 @@ TEST(StartUpTracker, TakesAnyStride) {
   EXPECT_GT(compared, 200);
 }
 
-TEST(StartUpTracker, RefusesWhatIsNoPictureOfItsSize) {
+TEST(StartUpTracker, RefusesWhatIsNoImageOfItsSize) {
   StartUpTracker tracker({320, 200});
   const std::vector<Pixels> pixels = moving_waves(320, 200, 2);
   EXPECT_EQ(tracker.process({}), StartUpStatus::kBadImage);
@@ -502,7 +502,7 @@ TEST(StartUpTracker, RefusesWhatIsNoPictureOfItsSize) {
   EXPECT_GT(tracker.observation_count(), 50);
 }
 
-TEST(StartUpTracker, DoesWithoutPointsInPicturesOfNothing) {
+TEST(StartUpTracker, DoesWithoutPointsInImagesOfNothing) {
   for (const auto& [width, height] : {std::pair{0, 0}, {1, 1}, {63, 40}, {64, 32}, {400, 40}}) {
     SCOPED_TRACE(width);
     StartUpTracker tracker({width, height});

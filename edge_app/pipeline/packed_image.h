@@ -1,5 +1,5 @@
 #pragma once
-// A picture kept for later, without loss, in about half of its size: each pixel's difference to the one before it in its
+// An image kept for later, without loss, in about half of its size: each pixel's difference to the one before it in its
 // row, by zlib. Allocates; some 20 ms for 1920x1080. Not for the real-time thread.
 
 #include <cstdint>
@@ -9,11 +9,11 @@
 
 namespace alidade {
 
-class PackedPicture {
+class PackedImage {
  public:
-  PackedPicture() = default;
-  // A copy of a valid picture of any stride. Where there is no memory for zlib, the picture is kept as it is.
-  explicit PackedPicture(const ImageView& picture);
+  PackedImage() = default;
+  // A copy of a valid image of any stride. Where there is no memory for zlib, the image is kept as it is.
+  explicit PackedImage(const ImageView& image);
 
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }

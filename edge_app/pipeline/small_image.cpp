@@ -1,4 +1,4 @@
-#include "edge_app/pipeline/small_picture.h"
+#include "edge_app/pipeline/small_image.h"
 
 #include <turbojpeg.h>
 
@@ -20,11 +20,11 @@ struct Release {
 
 int shrinking_factor(int width, int max_width) { return (width + max_width - 1) / max_width; }
 
-std::string small_jpeg(const ImageView& picture, int max_width) {
-  if (!picture.valid()) return "";
-  const int factor = shrinking_factor(picture.width, max_width);
-  const int width = picture.width / factor;
-  const int height = picture.height / factor;
+std::string small_jpeg(const ImageView& image, int max_width) {
+  if (!image.valid()) return "";
+  const int factor = shrinking_factor(image.width, max_width);
+  const int width = image.width / factor;
+  const int height = image.height / factor;
   if (width == 0 || height == 0) return "";
   const int area = factor * factor;
   std::vector<std::uint8_t> pixels;
@@ -33,7 +33,7 @@ std::string small_jpeg(const ImageView& picture, int max_width) {
   for (int row = 0; row < height; ++row) {
     sums.assign(sums.size(), area / 2);
     for (int i = 0; i < factor; ++i) {
-      const std::uint8_t* pixel = picture.row(row * factor + i);
+      const std::uint8_t* pixel = image.row(row * factor + i);
       for (int& sum : sums) {
         for (int j = 0; j < factor; ++j) sum += *pixel++;
       }

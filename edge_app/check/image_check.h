@@ -1,5 +1,5 @@
 #pragma once
-// Whether pictures show what landmarks need, and how the scene moves through them, one picture after the other: none is
+// Whether images show what landmarks need, and how the scene moves through them, one image after the other: none is
 // kept.
 //
 //   light    histogram of every 8th pixel of every 8th row. Dark: grey levels up to 16, which is black in video's
@@ -7,8 +7,8 @@
 //            the sensor's or the codec's range ends, whichever range it is.
 //   texture  points that the start-up tracker (core/realtime) finds and follows: the same corners, with the same demands
 //            on contrast, as those that a calibration and OE mode begin with
-//   motion   the tracker's shift of the image's centre from one picture to the next, px
-// Allocates when a picture's size changes, and for what it notes of each. One thread.
+//   motion   the tracker's shift of the image's centre from one image to the next, px
+// Allocates when an image's size changes, and for what it notes of each. One thread.
 
 #include <cstdint>
 #include <memory>
@@ -37,17 +37,17 @@ struct Light {
   double saturated = 0;  // share of the pixels
 };
 
-// Of one picture, valid().
-[[nodiscard]] Light measure_light(const ImageView& picture);
+// Of one image, valid().
+[[nodiscard]] Light measure_light(const ImageView& image);
 
-struct PictureNeeds {
+struct ImageNeeds {
   std::string source;
-  bool landmarks = true;  // OE mode; without it pictures that show nothing are advice
+  bool landmarks = true;  // OE mode; without it images that show nothing are advice
 };
 
-struct PictureReport {
-  std::size_t pictures = 0;
-  std::size_t without = 0;  // frames that came without a picture
+struct ImageReport {
+  std::size_t images = 0;
+  std::size_t without = 0;  // frames that came without an image
   Light light;              // medians
   std::optional<Spread> points;
   double noise = 0;  // of a pixel, grey levels, median
@@ -55,12 +55,12 @@ struct PictureReport {
   Findings findings;
 };
 
-class PictureCheck {
+class ImageCheck {
  public:
   // frame: its number; connected: nothing is known to lie between this one and the one before.
-  void add(std::int64_t frame, const ImageView& picture, bool connected);
+  void add(std::int64_t frame, const ImageView& image, bool connected);
 
-  [[nodiscard]] PictureReport report(const PictureNeeds& needs) const;
+  [[nodiscard]] ImageReport report(const ImageNeeds& needs) const;
 
  private:
   std::unique_ptr<StartUpTracker> tracker_;
@@ -74,6 +74,6 @@ class PictureCheck {
   std::size_t without_ = 0;
 };
 
-[[nodiscard]] ReportLines describe(const PictureReport& report);
+[[nodiscard]] ReportLines describe(const ImageReport& report);
 
 }  // namespace alidade

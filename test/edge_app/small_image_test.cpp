@@ -1,6 +1,6 @@
-// A picture made small: sizes, means, and pictures of which there is nothing to show.
+// An image made small: sizes, means, and images of which there is nothing to show.
 
-#include "edge_app/pipeline/small_picture.h"
+#include "edge_app/pipeline/small_image.h"
 
 #include <gtest/gtest.h>
 
@@ -26,12 +26,12 @@ std::vector<std::uint8_t> chequer(int width, int height, int block) {
 
 Picture decoded(const std::string& jpeg) {
   JpegDecoder decoder;
-  Picture picture;
-  EXPECT_TRUE(decoder.decode(jpeg, &picture)) << decoder.error();
-  return picture;
+  Picture image;
+  EXPECT_TRUE(decoder.decode(jpeg, &image)) << decoder.error();
+  return image;
 }
 
-TEST(SmallPicture, IsNoWiderThanAskedFor) {
+TEST(SmallImage, IsNoWiderThanAskedFor) {
   struct Size {
     int width, height, small_width, small_height;
   };
@@ -46,7 +46,7 @@ TEST(SmallPicture, IsNoWiderThanAskedFor) {
   }
 }
 
-TEST(SmallPicture, RoundsMeansToTheNearestLevel) {
+TEST(SmallImage, RoundsMeansToTheNearestLevel) {
   for (const int third : {100, 101}) {
     // Of each four px 100, 100, `third` and 101: a mean of 100.25 or 100.5.
     std::vector<std::uint8_t> pixels(160 * 96, 100);
@@ -60,8 +60,8 @@ TEST(SmallPicture, RoundsMeansToTheNearestLevel) {
   }
 }
 
-TEST(SmallPicture, ShowsTheMeanOfThePixelsInThePlaceOfEach) {
-  // 32 px are 8 of the small picture: its blocks are JPEG's, so that little is lost.
+TEST(SmallImage, ShowsTheMeanOfThePixelsInThePlaceOfEach) {
+  // 32 px are 8 of the small image: its blocks are JPEG's, so that little is lost.
   const std::vector<std::uint8_t> pixels = chequer(1920, 1088, 32);
   const Picture small = decoded(small_jpeg({pixels.data(), 1920, 1088, 1920}, 480));
   for (int v = 0; v < small.height; ++v) {
@@ -77,7 +77,7 @@ TEST(SmallPicture, ShowsTheMeanOfThePixelsInThePlaceOfEach) {
   for (int u = 0; u < mean.width; ++u) EXPECT_EQ(mean.luma[u], 120);
 }
 
-TEST(SmallPicture, FollowsANegativeStride) {
+TEST(SmallImage, FollowsANegativeStride) {
   std::vector<std::uint8_t> pixels(16 * 16, 40);
   pixels.insert(pixels.end(), 16 * 16, 200);
   const Picture small = decoded(small_jpeg({pixels.data() + 16 * 31, 16, 32, -16}, 480));
@@ -85,7 +85,7 @@ TEST(SmallPicture, FollowsANegativeStride) {
   EXPECT_NEAR(small.luma[31 * small.stride], 40, 3);
 }
 
-TEST(SmallPicture, IsEmptyWhereThereIsNothingToShow) {
+TEST(SmallImage, IsEmptyWhereThereIsNothingToShow) {
   const std::vector<std::uint8_t> pixels(1000, 0);
   EXPECT_EQ(small_jpeg(ImageView{}, 480), "");
   EXPECT_EQ(small_jpeg({pixels.data(), 1000, 1, 1000}, 480), "")

@@ -1,4 +1,4 @@
-#include "edge_app/pipeline/packed_picture.h"
+#include "edge_app/pipeline/packed_image.h"
 
 #include <zlib.h>
 
@@ -57,12 +57,11 @@ bool inflate_all(const std::vector<std::uint8_t>& from, std::vector<std::uint8_t
 
 }  // namespace
 
-PackedPicture::PackedPicture(const ImageView& picture)
-    : width_(picture.width), height_(picture.height) {
+PackedImage::PackedImage(const ImageView& image) : width_(image.width), height_(image.height) {
   std::vector<std::uint8_t> pixels;
   pixels.reserve(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   for (int row = 0; row < height_; ++row)
-    pixels.insert(pixels.end(), picture.row(row), picture.row(row) + width_);
+    pixels.insert(pixels.end(), image.row(row), image.row(row) + width_);
   to_differences(&pixels);
   if (deflate_all(pixels, &bytes_) && bytes_.size() < pixels.size()) return;
   // As large as before means: as it was.
@@ -70,7 +69,7 @@ PackedPicture::PackedPicture(const ImageView& picture)
   bytes_ = std::move(pixels);
 }
 
-ImageView PackedPicture::unpack(std::vector<std::uint8_t>* pixels) const {
+ImageView PackedImage::unpack(std::vector<std::uint8_t>* pixels) const {
   pixels->resize(static_cast<std::size_t>(width_) * static_cast<std::size_t>(height_));
   if (bytes_.size() == pixels->size()) {
     std::copy(bytes_.begin(), bytes_.end(), pixels->begin());

@@ -1,4 +1,4 @@
-#include "test/accuracy/oe_picture.h"
+#include "test/accuracy/oe_image.h"
 
 #include <opencv2/imgproc.hpp>
 
@@ -20,19 +20,19 @@ cv::Point fixed_point(const Eigen::Vector2d& u) {
 }  // namespace
 
 cv::Mat draw_landmarks(const cv::Mat& image, const OeMode& oe) {
-  cv::Mat picture;
-  cv::cvtColor(image, picture, cv::COLOR_GRAY2BGR);
+  cv::Mat image;
+  cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
   for (int i = 0; i < oe.statistics().found; ++i) {
     const OeObservation& observation = oe.observations()[i];
     const cv::Scalar colour = observation.inlier ? cv::Scalar(0, 220, 0) : cv::Scalar(0, 0, 255);
     const int radius = (kPatchSize / 2) << observation.octave;
-    cv::circle(picture, fixed_point(observation.u), radius << kShift, colour, kThickness,
-               cv::LINE_AA, kShift);
-    cv::line(picture, fixed_point(observation.u),
+    cv::circle(image, fixed_point(observation.u), radius << kShift, colour, kThickness, cv::LINE_AA,
+               kShift);
+    cv::line(image, fixed_point(observation.u),
              fixed_point(observation.u + kMagnification * observation.residual), colour, kThickness,
              cv::LINE_AA, kShift);
   }
-  return picture;
+  return image;
 }
 
 }  // namespace alidade::test

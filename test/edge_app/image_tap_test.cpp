@@ -1,7 +1,7 @@
-// Pictures for those who ask: none without a wish, one wish for all who ask at once, no more than one an interval, and
+// Images for those who ask: none without a wish, one wish for all who ask at once, no more than one an interval, and
 // nobody waits for ever.
 
-#include "edge_app/pipeline/picture_tap.h"
+#include "edge_app/pipeline/image_tap.h"
 
 #include <gtest/gtest.h>
 
@@ -18,20 +18,20 @@ using std::chrono::seconds;
 
 constexpr milliseconds kNow{0};
 
-class PictureTapTest : public ::testing::Test {
+class ImageTapTest : public ::testing::Test {
  protected:
   [[nodiscard]] TappedFrame frame(std::int64_t number) const {
     TappedFrame tapped;
     tapped.frame = number;
-    tapped.picture = {luma_.data(), 960, 540, 960};
-    tapped.slot = static_cast<PictureSlot>(number % kPictureSlots);
+    tapped.image = {luma_.data(), 960, 540, 960};
+    tapped.slot = static_cast<ImageSlot>(number % kImageSlots);
     tapped.landmarks.kind = FrameLandmarks::Kind::kLandmarks;
     tapped.landmarks.count = 1;
     tapped.landmarks.found[0] = {100, 200, 0.5F, -0.25F, true};
     return tapped;
   }
   // What the real-time thread does; without waiting for anybody.
-  static void serve(PictureTap* tap, std::int64_t frames, const TappedFrame& prototype) {
+  static void serve(ImageTap* tap, std::int64_t frames, const TappedFrame& prototype) {
     TappedFrame tapped = prototype;
     for (std::int64_t served = 0; served < frames;) {
       if (!tap->take_wish()) {
@@ -47,8 +47,8 @@ class PictureTapTest : public ::testing::Test {
   std::vector<std::uint8_t> luma_ = std::vector<std::uint8_t>(960 * 540, 100);
 };
 
-TEST_F(PictureTapTest, WantsNothingUntilSomebodyAsksAndThenOne) {
-  PictureTap tap;
+TEST_F(ImageTapTest, WantsNothingUntilSomebodyAsksAndThenOne) {
+  ImageTap tap;
   EXPECT_FALSE(tap.take_wish());
   EXPECT_EQ(tap.ask(kNow), nullptr);
   EXPECT_EQ(tap.ask(kNow), nullptr);
@@ -58,67 +58,67 @@ TEST_F(PictureTapTest, WantsNothingUntilSomebodyAsksAndThenOne) {
   EXPECT_FALSE(tap.take_wish()) << "it is still on its way";
 }
 
-TEST_F(PictureTapTest, GivesTheNextFrameSmallWithItsLandmarksAndTheSlotBack) {
-  PictureTap tap;
-  std::thread tap_thread(&PictureTap::run, &tap);
+TEST_F(ImageTapTest, GivesTheNextFrameSmallWithItsLandmarksAndTheSlotBack) {
+  ImageTap tap;
+  std::thread tap_thread(&ImageTap::run, &tap);
   std::thread realtime([&] { serve(&tap, 1, frame(7)); });
-  const auto picture = tap.ask(seconds(60));
+  const auto image = tap.ask(seconds(60));
   realtime.join();
   tap.end();
   tap_thread.join();
-  ASSERT_NE(picture, nullptr);
-  EXPECT_EQ(picture->frame, 8);
-  EXPECT_EQ(picture->width, 960);
-  EXPECT_EQ(picture->height, 540);
-  EXPECT_EQ(picture->jpeg.substr(0, 2), "\xff\xd8");
-  EXPECT_EQ(picture->landmarks.count, 1);
-  EXPECT_EQ(picture->landmarks.found[0].du_px, 0.5F);
-  PictureSlot slot = kNoPicture;
+  ASSERT_NE(image, nullptr);
+  EXPECT_EQ(image->frame, 8);
+  EXPECT_EQ(image->width, 960);
+  EXPECT_EQ(image->height, 540);
+  EXPECT_EQ(image->jpeg.substr(0, 2), "\xff\xd8");
+  EXPECT_EQ(image->landmarks.count, 1);
+  EXPECT_EQ(image->landmarks.found[0].du_px, 0.5F);
+  ImageSlot slot = kNoImageSlot;
   ASSERT_TRUE(tap.pop_returned(slot));
   EXPECT_EQ(slot, 7);
   EXPECT_FALSE(tap.pop_returned(slot));
 }
 
-TEST_F(PictureTapTest, GivesTheSamePictureAgainWithinTheInterval) {
-  PictureTap tap(hours(1));
-  std::thread tap_thread(&PictureTap::run, &tap);
+TEST_F(ImageTapTest, GivesTheSameImageAgainWithinTheInterval) {
+  ImageTap tap(hours(1));
+  std::thread tap_thread(&ImageTap::run, &tap);
   std::thread realtime([&] { serve(&tap, 1, frame(0)); });
-  const auto picture = tap.ask(seconds(60));
+  const auto image = tap.ask(seconds(60));
   realtime.join();
-  ASSERT_NE(picture, nullptr);
-  for (int i = 0; i < 100; ++i) EXPECT_EQ(tap.ask(kNow), picture);
+  ASSERT_NE(image, nullptr);
+  for (int i = 0; i < 100; ++i) EXPECT_EQ(tap.ask(kNow), image);
   EXPECT_FALSE(tap.take_wish());
   tap.end();
   tap_thread.join();
 }
 
-TEST_F(PictureTapTest, ManyWhoAskAtOnceShareTheirPictures) {
+TEST_F(ImageTapTest, ManyWhoAskAtOnceShareTheirImages) {
   constexpr int kAskers = 8;
-  PictureTap tap(hours(1));
-  std::thread tap_thread(&PictureTap::run, &tap);
-  std::vector<std::shared_ptr<const LivePicture>> got(kAskers);
+  ImageTap tap(hours(1));
+  std::thread tap_thread(&ImageTap::run, &tap);
+  std::vector<std::shared_ptr<const LiveImage>> got(kAskers);
   std::vector<std::thread> askers;
-  for (auto& picture : got) askers.emplace_back([&] { picture = tap.ask(seconds(60)); });
+  for (auto& image : got) askers.emplace_back([&] { image = tap.ask(seconds(60)); });
   serve(&tap, 1, frame(0));
   for (std::thread& asker : askers) asker.join();
   tap.end();
   tap_thread.join();
   ASSERT_NE(got[0], nullptr);
-  for (const auto& picture : got) EXPECT_EQ(picture, got[0]);
+  for (const auto& image : got) EXPECT_EQ(image, got[0]);
 }
 
-TEST_F(PictureTapTest, KeepsTheLastPicturesByTheirFrames) {
-  constexpr auto kKept = static_cast<std::int64_t>(PictureTap::kKept);
+TEST_F(ImageTapTest, KeepsTheLastImagesByTheirFrames) {
+  constexpr auto kKept = static_cast<std::int64_t>(ImageTap::kKept);
   constexpr std::int64_t kServed = 2 * kKept + 1;  // one is let go at a time
-  PictureTap tap(kNow);
-  std::thread tap_thread(&PictureTap::run, &tap);
+  ImageTap tap(kNow);
+  std::thread tap_thread(&ImageTap::run, &tap);
   std::thread realtime([&] { serve(&tap, kServed, frame(0)); });
   for (std::int64_t i = 1; i <= kServed; ++i) {
-    const auto picture = tap.ask(seconds(60));
-    ASSERT_NE(picture, nullptr);
-    EXPECT_EQ(picture->frame, i);
+    const auto image = tap.ask(seconds(60));
+    ASSERT_NE(image, nullptr);
+    EXPECT_EQ(image->frame, i);
     // As the capture thread does.
-    for (PictureSlot slot = kNoPicture; tap.pop_returned(slot);) {
+    for (ImageSlot slot = kNoImageSlot; tap.pop_returned(slot);) {
     }
   }
   realtime.join();
@@ -132,9 +132,9 @@ TEST_F(PictureTapTest, KeepsTheLastPicturesByTheirFrames) {
   tap_thread.join();
 }
 
-TEST_F(PictureTapTest, TheEndWakesWhoWaits) {
-  PictureTap tap;
-  std::thread tap_thread(&PictureTap::run, &tap);
+TEST_F(ImageTapTest, TheEndWakesWhoWaits) {
+  ImageTap tap;
+  std::thread tap_thread(&ImageTap::run, &tap);
   std::thread asker([&] { EXPECT_EQ(tap.ask(hours(1)), nullptr); });
   while (!tap.take_wish()) std::this_thread::yield();
   tap.end();
@@ -143,16 +143,16 @@ TEST_F(PictureTapTest, TheEndWakesWhoWaits) {
   EXPECT_EQ(tap.ask(hours(1)), nullptr) << "who asks later does not wait at all";
 }
 
-TEST_F(PictureTapTest, WhoWaitsIsLetGoWhenItIsClosed) {
-  PictureTap tap;
+TEST_F(ImageTapTest, WhoWaitsIsLetGoWhenItIsClosed) {
+  ImageTap tap;
   std::thread asker([&] { EXPECT_EQ(tap.ask(hours(1)), nullptr); });
   while (!tap.take_wish()) std::this_thread::yield();
   tap.close();
   asker.join();
 }
 
-TEST_F(PictureTapTest, WhatFindsNoRoomIsRefusedAndTheWishStands) {
-  PictureTap tap;
+TEST_F(ImageTapTest, WhatFindsNoRoomIsRefusedAndTheWishStands) {
+  ImageTap tap;
   EXPECT_TRUE(tap.push(frame(0)));
   EXPECT_TRUE(tap.push(frame(1)));
   EXPECT_FALSE(tap.take_wish());

@@ -1,4 +1,4 @@
-#include "edge_app/check/picture_check.h"
+#include "edge_app/check/image_check.h"
 
 #include <fmt/format.h>
 
@@ -15,15 +15,15 @@ double median_of(const std::vector<double>& values) {
   return spread ? spread->median : 0;
 }
 
-// A picture in which 98 % of the pixels lie within so few grey levels shows nothing: corners need
+// An image in which 98 % of the pixels lie within so few grey levels shows nothing: corners need
 // contrasts of 10 (LandmarkMakerOptions::corner_threshold).
 constexpr double kNothing = 10;
 
-void judge(PictureReport* report, const PictureNeeds& needs) {
+void judge(ImageReport* report, const ImageNeeds& needs) {
   // OE mode takes a view with fewer landmarks than 10 as unknown, and one with fewer than 50 as poor (oe_mode.cpp).
   constexpr double kTooFewPoints = 10;
   constexpr double kFewPoints = 50;
-  // A corner in what is saturated does not exist; a third of the picture lost is worth another exposure.
+  // A corner in what is saturated does not exist; a third of the image lost is worth another exposure.
   constexpr double kMuchSaturated = 1.0 / 3;
   const Severity severity = needs.landmarks ? Severity::kProblem : Severity::kAdvice;
   const auto add = [&](Severity as, const std::string& text) {
@@ -59,16 +59,16 @@ void judge(PictureReport* report, const PictureNeeds& needs) {
 
 }  // namespace
 
-Light measure_light(const ImageView& picture) {
+Light measure_light(const ImageView& image) {
   constexpr int kStep = 8;
   constexpr int kDark = 16;
   constexpr int kLeastTop = 230;
   std::array<std::size_t, 256> histogram{};
   std::size_t count = 0;
-  for (int v = 0; v < picture.height; v += kStep) {
-    const std::uint8_t* row = picture.row(v);
-    for (int u = 0; u < picture.width; u += kStep) ++histogram[row[u]];
-    count += static_cast<std::size_t>((picture.width + kStep - 1) / kStep);
+  for (int v = 0; v < image.height; v += kStep) {
+    const std::uint8_t* row = image.row(v);
+    for (int u = 0; u < image.width; u += kStep) ++histogram[row[u]];
+    count += static_cast<std::size_t>((image.width + kStep - 1) / kStep);
   }
   Light light;
   const auto all = static_cast<double>(count);
@@ -93,22 +93,22 @@ Light measure_light(const ImageView& picture) {
   return light;
 }
 
-void PictureCheck::add(std::int64_t frame, const ImageView& picture, bool connected) {
-  if (!picture.valid()) {
+void ImageCheck::add(std::int64_t frame, const ImageView& image, bool connected) {
+  if (!image.valid()) {
     ++without_;
     return;
   }
-  lights_.push_back(measure_light(picture));
-  if (!tracker_ || picture.width != width_ || picture.height != height_) {
-    width_ = picture.width;
-    height_ = picture.height;
+  lights_.push_back(measure_light(image));
+  if (!tracker_ || image.width != width_ || image.height != height_) {
+    width_ = image.width;
+    height_ = image.height;
     StartUpOptions options;
     options.width = width_;
     options.height = height_;
     tracker_ = std::make_unique<StartUpTracker>(options);
     before_.reset();
   }
-  const StartUpStatus status = tracker_->process(picture);
+  const StartUpStatus status = tracker_->process(image);
   if (status == StartUpStatus::kBadImage) return;
   points_.push_back(tracker_->observation_count());
   noise_.push_back(tracker_->statistics().noise);
@@ -119,9 +119,9 @@ void PictureCheck::add(std::int64_t frame, const ImageView& picture, bool connec
   before_ = frame;
 }
 
-PictureReport PictureCheck::report(const PictureNeeds& needs) const {
-  PictureReport report;
-  report.pictures = lights_.size();
+ImageReport ImageCheck::report(const ImageNeeds& needs) const {
+  ImageReport report;
+  report.images = lights_.size();
   report.without = without_;
   report.shifts = shifts_;
   const auto median_light = [&](double Light::*member) {
@@ -133,7 +133,7 @@ PictureReport PictureCheck::report(const PictureNeeds& needs) const {
                   median_light(&Light::dark), median_light(&Light::saturated)};
   report.points = spread_of(points_);
   report.noise = median_of(noise_);
-  if (report.pictures == 0 && report.without > 0) {
+  if (report.images == 0 && report.without > 0) {
     add_advice(&report.findings,
                "video " + needs.source +
                    ": no pictures that could be looked at: neither calibration nor "
@@ -144,8 +144,8 @@ PictureReport PictureCheck::report(const PictureNeeds& needs) const {
   return report;
 }
 
-ReportLines describe(const PictureReport& report) {
-  if (report.pictures == 0) return {};
+ReportLines describe(const ImageReport& report) {
+  if (report.images == 0) return {};
   return {
       {"picture",
        fmt::format("brightness {:.0f} %, {:.1f} % dark, {:.1f} % saturated, noise {:.1f} of 255; "
