@@ -329,13 +329,13 @@ cv::Mat image_of(const OeExperimentOptions& options, int frame) {
   const RenderedRecording recording(plans.front().name, plans.front().config, options.cache);
   EvaluationOptions how;
   how.oe = options.oe;
-  cv::Mat image;
+  cv::Mat drawn;
   how.look = [&](int number, const cv::Mat& image, const OeMode& oe) {
-    if (number == frame) image = draw_landmarks(image, oe);
+    if (number == frame) drawn = draw_landmarks(image, oe);
   };
   const Evaluation evaluation = evaluate(recording, recording.images(FrameNoise::kSensorAndJpeg),
                                          recording.calibration(), how);
-  return image;
+  return drawn;
 }
 
 }  // namespace alidade::test

@@ -20,19 +20,19 @@ cv::Point fixed_point(const Eigen::Vector2d& u) {
 }  // namespace
 
 cv::Mat draw_landmarks(const cv::Mat& image, const OeMode& oe) {
-  cv::Mat image;
-  cv::cvtColor(image, image, cv::COLOR_GRAY2BGR);
+  cv::Mat drawn;
+  cv::cvtColor(image, drawn, cv::COLOR_GRAY2BGR);
   for (int i = 0; i < oe.statistics().found; ++i) {
     const OeObservation& observation = oe.observations()[i];
     const cv::Scalar colour = observation.inlier ? cv::Scalar(0, 220, 0) : cv::Scalar(0, 0, 255);
     const int radius = (kPatchSize / 2) << observation.octave;
-    cv::circle(image, fixed_point(observation.u), radius << kShift, colour, kThickness, cv::LINE_AA,
+    cv::circle(drawn, fixed_point(observation.u), radius << kShift, colour, kThickness, cv::LINE_AA,
                kShift);
-    cv::line(image, fixed_point(observation.u),
+    cv::line(drawn, fixed_point(observation.u),
              fixed_point(observation.u + kMagnification * observation.residual), colour, kThickness,
              cv::LINE_AA, kShift);
   }
-  return image;
+  return drawn;
 }
 
 }  // namespace alidade::test
