@@ -107,6 +107,19 @@ if(ALIDADE_BUILD_TESTS AND NOT ALIDADE_FUZZ)
     <gmock/gmock.h> <gtest/gtest.h> <Eigen/Dense> <chrono> <filesystem> <fstream> <functional> <map> <random> <sstream> <string> <thread> <vector>)
 endif()
 
+# alidade_find_opencv(libraries core imgproc)
+# appends these modules to the variable, and finds OPENCV_INCLUDE_DIR. The modules alone: Debian keeps OpenCVConfig.cmake in
+# libopencv-dev, which brings in all of them.
+function(alidade_find_opencv libraries)
+  find_path(OPENCV_INCLUDE_DIR opencv2/core.hpp PATH_SUFFIXES opencv4 REQUIRED)
+  foreach(module IN LISTS ARGN)
+    string(TOUPPER OPENCV_${module} library)
+    find_library(${library} opencv_${module} REQUIRED)
+    list(APPEND ${libraries} ${${library}})
+  endforeach()
+  set(${libraries} ${${libraries}} PARENT_SCOPE)
+endfunction()
+
 # All test programs that another processor can run; what `cmake --build` of an ARM preset builds.
 add_custom_target(processor_programs)
 
