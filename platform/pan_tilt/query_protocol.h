@@ -47,9 +47,10 @@ struct Answer {
   Kind kind = Kind::kNone;
   double pan_deg = 0;
   double tilt_deg = 0;
-  double zoom = 0;        // device units
+  double zoom = 0;        // device units, 0 to 65535
   std::size_t begin = 0;  // index of the answer's first byte, below the number of bytes searched
-  std::string problem;    // what the device said, or what is wrong with what came; may be empty
+  // What the device said, or what is wrong with what came: one line of less than 200 bytes. Never empty of kRefused.
+  std::string problem;
 };
 
 class QueryProtocol {
