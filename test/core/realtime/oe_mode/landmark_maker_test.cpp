@@ -9,6 +9,7 @@
 
 #include "core/model/direction.h"
 #include "test/core/realtime/oe_mode/textured_scene.h"
+#include "test/core/realtime/pixel_truth.h"
 #include "test/support/parameter_changes.h"
 
 namespace alidade::test {
@@ -81,17 +82,14 @@ TEST_F(MadeLandmarks, NeedATexture) {
 TEST_F(MadeLandmarks, LieWhereTheirImagesDo) {
   scene_.look({0, 0});
   static_cast<void>(scene_.make_landmarks(&maker_, {0, 0}));
-  const FrameMotion<double> motion = TexturedScene::motion_at({0, 0});
+  const ViewProjection view(scene_.calibration_, TexturedScene::motion_at({0, 0}));
   for (int slot = 0; slot < scene_.map_.size(); ++slot) {
     const Landmark& landmark = scene_.map_.at(slot);
     const double scale = std::ldexp(1.0, landmark.octave);
     // Octave px, of a direction that is a little off.
     const auto pixel_of = [&](const Vector2<double>& off) {
       Vector2<double> u = Vector2<double>::Zero();
-      EXPECT_EQ(rolling_shutter_project(scene_.calibration_.camera, scene_.calibration_.mechanics,
-                                        scene_.calibration_.line_delay, motion,
-                                        direction_plus<double>(landmark.d, off), &u),
-                ProjectionStatus::kOk);
+      EXPECT_TRUE(view.project(direction_plus<double>(landmark.d, off), &u));
       return Vector2<double>(u / scale);
     };
     const Vector2<double> u = pixel_of({0, 0});
@@ -159,23 +157,24 @@ TEST_F(MadeLandmarks, ShareWhatTheFrameDoesNotKnow) {
     EXPECT_EQ(landmark.shared_covariance, (Matrix2<double>() << 9, 3, 3, 10).finished());
     Vector2<double> u;
     ASSERT_TRUE(ViewProjection(calibration, frame.motion).project(landmark.d, &u));
-    const auto direction_with = [&](const ParameterVector& e) {
-      const Calibration changed = plus(calibration, e);
-      const Vector6 x = frame.sensitivity * e;
-      FrameMotion<double> motion = frame.motion;
-      motion.angle = {motion.angle.pan + x[0], motion.angle.tilt + x[1]};
-      motion.rate = {motion.rate.pan + x[2], motion.rate.tilt + x[3]};
-      Vector3<double> d = Vector3<double>::Zero();
-      EXPECT_EQ(rolling_shutter_unproject(changed.camera, changed.mechanics, changed.line_delay,
-                                          motion, u, &d),
-                ProjectionStatus::kOk);
-      return d;
+    const auto direction_with = [&](int j, double change) -> Vector3<double> {
+      const Calibration changed = plus(calibration, change * ParameterVector::Unit(j));
+      const Camera<double>& camera = changed.camera;
+      const Vector6 x = change * frame.sensitivity.col(j);
+      const auto path = [&](double t) {
+        return Vector2<double>(
+            frame.motion.angle.pan + x[0] + t * (frame.motion.rate.pan + x[2]),
+            frame.motion.angle.tilt + x[1] + t * (frame.motion.rate.tilt + x[3]));
+      };
+      return true_direction({camera.focal_length, camera.aspect, camera.radial_distortion,
+                             camera.width, camera.height, changed.line_delay,
+                             changed.mechanics.pan_axis, changed.mechanics.tilt_axis},
+                            path, -frame.motion.reference_row * changed.line_delay, u);
     };
     for (int j = 0; j < kParameterCount; ++j) {
-      const ParameterVector e = steps[j] * ParameterVector::Unit(j);
-      const Vector2<double> numeric =
-          tangent_basis(landmark.d).transpose() * (direction_with(e) - direction_with(-e)) / 2;
-      const Vector2<double> told = landmark.sensitivity.cast<double>().col(j) * steps[j];
+      const Vector3<double> moved = direction_with(j, steps[j]) - direction_with(j, -steps[j]);
+      const Vector2<double> numeric = tangent_basis(landmark.d).transpose() * moved / 2;
+      const Vector2<double> told = steps[j] * landmark.sensitivity.col(j).cast<double>();
       EXPECT_LT((told - numeric).norm(), 2e-3 * TexturedScene::kPixel + 2e-3 * numeric.norm()) << j;
     }
   }

@@ -172,7 +172,7 @@ TEST_F(KeptMap, FollowsTheCalibrationAsTheFrameDoes) {
     const int slot = search_.observations()[i].slot;
     const Vector2<double> by_angle = search_.found()[i].J_angle * rate;
     const Vector2<double> by_direction =
-        search_.J_tangent()[i] * scene_.map_.at(slot).sensitivity.cast<double>().col(kParameter);
+        search_.J_tangent()[i] * scene_.map_.at(slot).sensitivity.col(kParameter).cast<double>();
     EXPECT_GT(by_angle.norm(), 30);
     EXPECT_LT((by_angle + by_direction).norm(), 1e-3 * by_angle.norm());
   }

@@ -129,21 +129,20 @@ TEST_F(PredictedFrame, ByTelemetryFollowsTheCalibrationAsItsSensitivitySays) {
   telemetry.covariance.setIdentity();
   MapOffset offset;
   offset.sensitivity = any_sensitivity<2>();
-  const auto angle_with = [&](const ParameterVector& e) {
+  const auto angle_with = [&](int j, double change) {
+    const ParameterVector e = change * ParameterVector::Unit(j);
     const double later_s = e[index(Parameter::kClockOffset)] +
                            e[index(Parameter::kLineDelay)] * calibration.camera.height / 2;
     InterpolatedPanTilt told = telemetry;
     told.angle = {told.angle.pan + later_s * told.rate.pan,
                   told.angle.tilt + later_s * told.rate.tilt};
     MapOffset learnt = offset;
-    learnt.value += offset.sensitivity * e;
+    learnt.value += change * offset.sensitivity.col(j);
     return prediction_.by_telemetry(plus(calibration, e), told, learnt, 1).motion.angle.vector();
   };
   const PredictedMotion out = prediction_.by_telemetry(calibration, telemetry, offset, 1);
   for (int j = 0; j < kParameterCount; ++j) {
-    ParameterVector e = ParameterVector::Zero();
-    e[j] = 1e-6;
-    const Vector2<double> numeric = (angle_with(e) - angle_with(-e)) / 2e-6;
+    const Vector2<double> numeric = (angle_with(j, 1e-6) - angle_with(j, -1e-6)) / 2e-6;
     EXPECT_LT((out.sensitivity.col(j).head<2>() - numeric).norm(), 1e-6) << j;
     EXPECT_EQ(out.prior.telemetry_sensitivity.col(j).head<2>(), out.sensitivity.col(j).head<2>());
   }
@@ -152,16 +151,14 @@ TEST_F(PredictedFrame, ByTelemetryFollowsTheCalibrationAsItsSensitivitySays) {
 // The frame before, as one calibration found it and as another.
 TEST_F(PredictedFrame, ByTheFrameBeforeFollowsTheCalibrationAsItsSensitivitySays) {
   const Sensitivity<6> sensitivity = any_sensitivity<6>();
-  const auto predicted_with = [&](const ParameterVector& e) {
-    const Vector6 x = sensitivity * e;
+  const auto predicted_with = [&](const Vector6& x) {
     const FrameMotion<double> seen{{0.1 + x[0], 0.2 + x[1]}, {0.3 + x[2], -0.1 + x[3]}, 135};
     prediction_.remember(5, seen, Matrix6::Identity(), Matrix2<double>::Zero(), sensitivity);
     return prediction_.by_last_frame(5.3);
   };
-  const PredictedMotion out = predicted_with(ParameterVector::Zero());
+  const PredictedMotion out = predicted_with(Vector6::Zero());
   for (int j = 0; j < kParameterCount; ++j) {
-    const ParameterVector e = ParameterVector::Unit(j);
-    const FrameMotion<double> changed = predicted_with(e).motion;
+    const FrameMotion<double> changed = predicted_with(sensitivity.col(j)).motion;
     Vector4<double> difference;
     difference << changed.angle.vector() - out.motion.angle.vector(),
         changed.rate.vector() - out.motion.rate.vector();
