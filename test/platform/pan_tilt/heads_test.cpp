@@ -212,8 +212,11 @@ TEST_P(EveryHeadKind, AsksAFenceInDoubtAndNowAndThenWhereRepeatsDoNotShow) {
   const auto is_fence = [&] { return !Conversation::is_reading(conversation.next().answer); };
   for (int lead = 0; lead < kQueriesPerFence; lead += 7) {
     for (int i = 0; i < lead; ++i) conversation.next();
+    conversation.reading();
     conversation.doubt();
     EXPECT_TRUE(is_fence()) << lead << " queries later";
+    conversation.doubt();
+    EXPECT_FALSE(is_fence()) << "one fence is enough";
   }
   int without_fence = 0;
   for (int i = 0; i < 4 * kQueriesPerFence; ++i) {
