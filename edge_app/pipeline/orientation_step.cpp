@@ -29,9 +29,13 @@ std::unique_ptr<OeMode> make_oe_mode(const OeOptions& options) {
 
 OrientationStep::OrientationStep(const OrientationStepOptions& options)
     : options_(options),
-      video_clock_(options.video_clock),
+      video_clock_(options.video_clock, options.video_stamp_sigma_s, options.wait_for_pace),
       telemetry_clock_(options.telemetry_clock),
-      telemetry_(empty_telemetry(false)) {
+      telemetry_(empty_telemetry(false)),
+      // A stored calibration was made with another connection.
+      minimum_delay_sigma_s_(options.wait_for_pace && options.calibrated
+                                 ? options.minimum_delay_sigma_s
+                                 : 0) {
   if (!options.oe) return;
   OeOptions oe = *options.oe;
   oe.max_width = options.calibration.camera.width;
@@ -131,13 +135,8 @@ OrientationRecord OrientationStep::video_lost(double now_s) const {
 
 OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const ImageView& image,
                                              StepEvents* events) {
-  ClockEstimate clock;
-  clock.time_s = stamp.receive_time_s;
-  clock.sigma_s = options_.video_stamp_sigma_s;
-  clock.state = ClockState::kLocked;
-  clock = video_clock_
-              .update(stamp.receive_time_s, stamp.sender_time_s, stamp.sequence, stamp.restarted)
-              .value_or(clock);
+  const FrameTime frame_time = video_clock_.update(stamp);
+  const ClockEstimate& clock = frame_time.clock;
   events->video_clock_restarted = clock.restarted;
   events->video_delay_stepped = clock.delay_stepped;
   if (clock.restarted || clock.delay_stepped)
@@ -145,14 +144,20 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   image_ = image;
   tracks_.stamp = stamp;
   tracks_.time_s = clock.time_s;
+  tracks_.time_is_of_use = frame_time.of_use;
   tracks_.clock_restarted = clock.restarted;
   tracks_.delay_stepped = clock.delay_stepped;
   tracks_.tracker = FrameTracks::Tracker::kNone;
 
   OrientationRecord record = empty_record();
   record.frame = stamp.frame;
-  record.time_s = clock.time_s;
   record.receive_time_s = stamp.receive_time_s;
+  if (!frame_time.known) {
+    record.status = RecordStatus::kTimeUnknown;
+    if (finds_landmarks()) image_ = {};  // the map would learn from an angle of another time
+    return record;
+  }
+  record.time_s = clock.time_s;
   const Calibration& calibration = options_.calibration;
   const double to_middle_row_s = calibration.line_delay * (0.5 * calibration.camera.height);
   InterpolatedPanTilt measured;

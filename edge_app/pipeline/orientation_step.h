@@ -3,7 +3,8 @@
 // come. One way for the live pipeline and for a replay; pure: no thread, no clock of its own.
 //
 // A frame's time: sender clock, else sequence numbers, through the video's clock filter; without
-// both the receive time as it is. A sample's time likewise; without both it is the middle of
+// both the receive time as it is. Where it may have waited for nobody knows how long (frame_clock.h), it has no
+// time, and no orientation: "picture time unknown". A sample's time likewise; without both it is the middle of
 // [earliest, latest], sigma = width / sqrt(12), each sample with an error of its own.
 // The frame's middle row is looked up in the telemetry at time + d at once (telemetry_buffer.h): if it lies beyond
 // the newest sample the angle is extrapolated, with growing sigma, for max_extrapolation_s, and beyond that there is
@@ -30,6 +31,7 @@
 #include "core/realtime/telemetry/telemetry_buffer.h"
 #include "edge_app/pipeline/calibration_feed.h"
 #include "edge_app/pipeline/capture_clock.h"
+#include "edge_app/pipeline/frame_clock.h"
 #include "edge_app/pipeline/frame_landmarks.h"
 #include "edge_app/pipeline/orientation_record.h"
 #include "edge_app/pipeline/published_calibration.h"
@@ -41,6 +43,8 @@ namespace alidade {
 struct OrientationStepOptions {
   Calibration calibration;
   bool calibrated = false;  // passed on to the records
+  // Frames are live: they may have waited before they were received.
+  bool wait_for_pace = false;
   ClockFilterOptions video_clock;
   ClockFilterOptions telemetry_clock;
   // One standard deviation of a receive time that has to do for the time itself, s.
@@ -115,7 +119,7 @@ class OrientationStep {
               OrientationRecord* record);
 
   OrientationStepOptions options_;
-  CaptureClock video_clock_;
+  FrameClock video_clock_;
   CaptureClock telemetry_clock_;
   Telemetry telemetry_;
   std::unique_ptr<OeMode> oe_;                // null: PT mode
