@@ -30,12 +30,12 @@ namespace alidade {
 class ArrivalPace {
  public:
   static constexpr double kBacklog_s = 0.1;  // longer waits are no jitter
+  static constexpr double kLeastHalf_s = 0.25;
 
   // The stretch of items that shows the pace.
   struct Shown {
     std::size_t first = 0;  // of the items kept
     double least_s = 0;     // its least receive - sender
-    double half_s = 0;
   };
 
   void restart() {
@@ -58,12 +58,13 @@ class ArrivalPace {
     greatest_s_ = std::max(greatest_s_, receive_s - sender_s);
   }
 
-  // By the items up to the last one; none: not shown, or no more.
-  [[nodiscard]] std::optional<Shown> shown() const {
+  // By the items up to the last one; none: not shown, or no more. In windows with halves of least_half_s or more.
+  [[nodiscard]] std::optional<Shown> shown(double least_half_s = kLeastHalf_s) const {
     if (size_ < 2 * kLeastItems) return std::nullopt;
     const double now_s = item(size_ - 1).receive_s;
     double half_s = kLeastHalf_s;
     for (int i = 0; i < kWindows && item(0).receive_s <= now_s - 2 * half_s; ++i, half_s *= 2) {
+      if (half_s < least_half_s) continue;
       const Half young = half(size_, now_s - half_s);
       const Half old = half(young.first, now_s - 2 * half_s);
       if (!young.stands() || !old.stands()) continue;
@@ -71,7 +72,7 @@ class ArrivalPace {
       const double least_s = std::min(young.least_s, old.least_s);
       if (std::abs(young.least_s - old.least_s) > tolerance_s) continue;
       if (i == 0 && saw_backlog(least_s)) continue;
-      return Shown{old.first, least_s, half_s};
+      return Shown{old.first, least_s};
     }
     return std::nullopt;
   }
@@ -89,8 +90,7 @@ class ArrivalPace {
  private:
   static constexpr std::size_t kItems = 128;
   static constexpr std::size_t kLeastItems = 2;  // in a half
-  static constexpr double kLeastHalf_s = 0.25;
-  static constexpr int kWindows = 6;  // up to 8 s
+  static constexpr int kWindows = 6;             // up to 8 s
   static constexpr double kSame_s = 2e-3;
   static constexpr double kNear_s = 5e-3;
   static constexpr double kOvertaken_s = 1;

@@ -30,8 +30,10 @@ namespace alidade {
 
 struct FrameTime {
   ClockEstimate clock;
-  bool known = true;     // false: clock.time_s may be late by any time
-  bool of_use = true;    // false: nor will it be known later, when the pace or the line is
+  bool known = true;   // false: clock.time_s may be late by any time
+  bool of_use = true;  // false: nor will it be known later, when the pace or the line is
+  double delay_shift_s =
+      0;  // steps of the least delay, which the receive time contains and the line does not
 };
 
 class FrameClock {
@@ -45,24 +47,8 @@ class FrameClock {
         receipts_(stamp_sigma_s) {}
 
   FrameTime update(const FrameStamp& stamp) {
-    if (!wait_for_pace_) return {ask_clock(stamp, stamp.restarted), true, true};
-    Kind kind = stamp.sender_time_s ? Kind::kSenderTime
-                : stamp.sequence    ? Kind::kSequence
-                                    : Kind::kNothing;
-    const bool finite = std::isfinite(stamp.receive_time_s) &&
-                        (!stamp.sender_time_s || std::isfinite(*stamp.sender_time_s));
-    const bool begins = stamp.restarted || kind_ == Kind::kNew;
-    // A part of a stream with stamps that has none is no other stream yet.
-    if (!finite || (!begins && kind != kind_ && ++strange_ < kStrangeInARow)) {
-      return unusable(stamp);
-    }
-    const bool anew = kind_ != Kind::kNew && (begins || kind != kind_);
-    strange_ = 0;
-    if (begins || kind != kind_) begin(kind);
-    FrameTime time = kind == Kind::kNothing ? by_receipt(stamp)
-                     : waiting_             ? wait(stamp)
-                                            : by_line(stamp);
-    time.clock.restarted = time.clock.restarted || (anew && kind != Kind::kNothing);
+    FrameTime time = judge(stamp);
+    if (!waiting_ && kind_ != Kind::kNothing) time.delay_shift_s = clock_.filter().delay_shift_s();
     return time;
   }
 
@@ -70,8 +56,33 @@ class FrameClock {
   enum class Kind : std::uint8_t { kNew, kSenderTime, kSequence, kNothing };
 
   static constexpr int kStrangeInARow = 3;
-  static constexpr double kEarly_s = 0.02;  // beyond what the least delay of a new connection may differ by
-  static constexpr double kStoodStill_s = 0.5;  // half a window at the pace, late
+  static constexpr double kEarly_s =
+      0.02;  // beyond what the least delay of a new connection may differ by
+  static constexpr double kStoodStill_s = 0.5;  // half of the window at the pace that tells
+
+  FrameTime judge(const FrameStamp& stamp) {
+    if (!wait_for_pace_) return {ask_clock(stamp, stamp.restarted)};
+    const Kind kind = stamp.sender_time_s ? Kind::kSenderTime
+                      : stamp.sequence    ? Kind::kSequence
+                                          : Kind::kNothing;
+    const bool finite = std::isfinite(stamp.receive_time_s) &&
+                        (!stamp.sender_time_s || std::isfinite(*stamp.sender_time_s));
+    begins_ = begins_ || stamp.restarted;
+    // A part of a stream with stamps that has none is no other stream yet.
+    if (!finite || (!begins_ && kind != kind_ && ++strange_ < kStrangeInARow)) {
+      return unusable(stamp);
+    }
+    const bool begins = begins_ || kind != kind_;
+    const bool anew = begins && kind_ != Kind::kNew;
+    strange_ = 0;
+    begins_ = false;
+    if (begins) begin(kind);
+    FrameTime time = kind == Kind::kNothing ? by_receipt(stamp)
+                     : waiting_             ? wait(stamp)
+                                            : by_line(stamp);
+    time.clock.restarted = time.clock.restarted || (anew && kind != Kind::kNothing);
+    return time;
+  }
 
   // The estimate without any of the above.
   ClockEstimate ask_clock(const FrameStamp& stamp, bool anew) {
@@ -123,7 +134,8 @@ class FrameClock {
     const bool backlog = pace_.saw_backlog(shown->least_s);
     FrameTime time;
     for (std::size_t i = backlog ? shown->first : 0; i < pace_.size(); ++i) {
-      time.clock = *clock_.update(pace_.receive_s(i), pace_.sender_s(i), std::nullopt, line_begins_);
+      time.clock =
+          *clock_.update(pace_.receive_s(i), pace_.sender_s(i), std::nullopt, line_begins_);
       if (line_begins_) line_since_s_ = pace_.receive_s(i);
       line_begins_ = false;
     }
@@ -139,9 +151,10 @@ class FrameClock {
     const bool by_count = kind_ == Kind::kSequence;
     const bool young = !line_begins_ && filter.state() == ClockState::kWarmingUp &&
                        stamp.receive_time_s < line_since_s_ + settle_s_;
-    const double before_s =
-        by_count ? 0 : stamp.receive_time_s - filter.to_host(*stamp.sender_time_s);
-    if (!by_count && young && before_s < -kEarly_s) return begin_again(stamp);
+    const double before_s = by_count ? 0
+                                     : stamp.receive_time_s - filter.delay_shift_s() -
+                                           filter.to_host(*stamp.sender_time_s);
+    if (young && before_s < -kEarly_s) return begin_again(stamp);
     time.clock = ask_clock(stamp, line_begins_);
     if (line_begins_) line_since_s_ = stamp.receive_time_s;
     line_begins_ = false;
@@ -155,7 +168,7 @@ class FrameClock {
   // All that the stream has shown so far was of a backlog, or of another clock.
   FrameTime begin_again(const FrameStamp& stamp) {
     begin(kind_);
-    FrameTime time = waiting_ ? wait(stamp) : FrameTime{ask_clock(stamp, true), true, true};
+    FrameTime time = waiting_ ? wait(stamp) : FrameTime{ask_clock(stamp, true)};
     line_begins_ = waiting_;
     time.clock.restarted = true;
     return time;
@@ -174,8 +187,7 @@ class FrameClock {
     if (runs_on_) return;
     time->known = false;
     pace_.add(stamp.receive_time_s, time->clock.time_s);
-    const auto shown = pace_.shown();
-    if (shown && shown->half_s >= kStoodStill_s) *time = begin_again(stamp);
+    if (pace_.shown(kStoodStill_s)) *time = begin_again(stamp);
   }
 
   double stamp_sigma_s_;
@@ -185,12 +197,13 @@ class FrameClock {
   ReceiptClock receipts_;
   ArrivalPace pace_;  // of a stream that waits, or of late frames
   Kind kind_ = Kind::kNew;
+  bool begins_ = true;    // with the next usable frame
   int strange_ = 0;       // stamps of another kind in a row
   bool waiting_ = false;  // for the pace
   bool line_begins_ = true;
   double line_since_s_ = 0;  // receive time
-  bool late_ = false;     // the last frame, by more than jitter
-  bool runs_on_ = false;  // the sender's clock, while its items wait; as seen on any connection
+  bool late_ = false;        // the last frame, by more than jitter
+  bool runs_on_ = false;     // the sender's clock, while its items wait; as seen on any connection
 };
 
 }  // namespace alidade

@@ -33,9 +33,8 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
       telemetry_clock_(options.telemetry_clock),
       telemetry_(empty_telemetry(false)),
       // A stored calibration was made with another connection.
-      minimum_delay_sigma_s_(options.wait_for_pace && options.calibrated
-                                 ? options.minimum_delay_sigma_s
-                                 : 0) {
+      minimum_delay_sigma_s_(
+          options.wait_for_pace && options.calibrated ? options.minimum_delay_sigma_s : 0) {
   if (!options.oe) return;
   OeOptions oe = *options.oe;
   oe.max_width = options.calibration.camera.width;
@@ -59,6 +58,18 @@ OrientationStep::Telemetry OrientationStep::empty_telemetry(bool filtered) const
   return Telemetry(noise, options_.telemetry_limits);
 }
 
+// A stall leaves a question, or its answer, lying about for long; when in that time the answer was true nobody
+// knows, nor, as it gives the rate, how fast the head turned.
+bool OrientationStep::is_stalled_poll(double width_s) {
+  constexpr double kNoStall_s = 0.1;
+  constexpr double kTimesTheUsual = 2.5;
+  constexpr double kGrowth = 1.25;  // of the usual, a poll: a device may be slow, or become slow
+  const bool stalled = width_s > std::max(kNoStall_s, kTimesTheUsual * usual_poll_s_);
+  usual_poll_s_ = width_s < usual_poll_s_ ? usual_poll_s_ + (width_s - usual_poll_s_) / 4
+                                          : std::min(width_s, kGrowth * usual_poll_s_);
+  return stalled;
+}
+
 void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   const std::optional<ClockEstimate> clock = telemetry_clock_.update(
       sample.latest_time_s, sample.device_time_s, sample.sequence, sample.restarted);
@@ -78,6 +89,8 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   timed.pan = sample.pan_rad;
   timed.tilt = sample.tilt_rad;
   const double width_s = sample.latest_time_s - sample.earliest_time_s;
+  const bool line_holds = clock && clock->state == ClockState::kLocked;
+  if (is_stalled_poll(width_s) && !line_holds) return;
   if (clock) {
     timed.time_s = clock->time_s;
     timed.time_sigma_s = clock->sigma_s;
@@ -143,6 +156,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
     minimum_delay_sigma_s_ = options_.minimum_delay_sigma_s;
   image_ = image;
   tracks_.stamp = stamp;
+  tracks_.stamp.receive_time_s -= frame_time.delay_shift_s;  // as if the delay had not stepped
   tracks_.time_s = clock.time_s;
   tracks_.time_is_of_use = frame_time.of_use;
   tracks_.clock_restarted = clock.restarted;

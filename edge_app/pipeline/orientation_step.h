@@ -5,7 +5,8 @@
 // A frame's time: sender clock, else sequence numbers, through the video's clock filter; without
 // both the receive time as it is. Where it may have waited for nobody knows how long (frame_clock.h), it has no
 // time, and no orientation: "picture time unknown". A sample's time likewise; without both it is the middle of
-// [earliest, latest], sigma = width / sqrt(12), each sample with an error of its own.
+// [earliest, latest], sigma = width / sqrt(12), each sample with an error of its own; what took far longer than usual, by a
+// stall, is left out.
 // The frame's middle row is looked up in the telemetry at time + d at once (telemetry_buffer.h): if it lies beyond
 // the newest sample the angle is extrapolated, with growing sigma, for max_extrapolation_s, and beyond that there is
 // none: "telemetry too old" (record_status.h). Nothing waits for a later sample. When later samples enclose the frame,
@@ -112,6 +113,7 @@ class OrientationStep {
   [[nodiscard]] OrientationRecord empty_record() const;
   // False: there is a calibration, but not for the zoom that the pan/tilt source reports.
   [[nodiscard]] bool zoom_fits() const;
+  [[nodiscard]] bool is_stalled_poll(double width_s);
   // Frames that extrapolated telemetry answered, and that telemetry encloses by this sample.
   void settle_pending_frames();
   // Completes a record that has its time and telemetry's status; measured: null if there is none.
@@ -131,6 +133,7 @@ class OrientationStep {
   FrameTracks tracks_;               // of the frame last added, but for its points
   bool telemetry_filtered_ = false;  // times in telemetry_ come from telemetry_clock_
   bool telemetry_lost_ = false;
+  double usual_poll_s_ = 0.05;  // from a question to its answer
 };
 
 }  // namespace alidade

@@ -3,19 +3,21 @@
 // received, and that is how young they can be at most.
 //
 // Pictures come one a period, so the count of those that came, times the period, is a clock that can only be slow (by
-// what was lost). Held against it the arrivals show their pace (ArrivalPace) and how late each is: what waited for L
+// what was lost). Held against it the arrivals show their pace (ArrivalPace), and each how late it is: what waited for L
 // more than those before may be old by up to L, or be fresh behind a loss. An item is
 //   known           while L is at most kLongest_s: its time is the middle of what is possible, and sigma covers it;
 //   of unknown age  beyond, until the count comes up with the arrivals (all that waited has come, none was lost), or
 //                   the arrivals show the pace (the rest was lost).
-// The period is learnt from a stretch of even arrivals, the first time in kFirst_s. A known one, also of the connection
-// before, gives way to a slower one after kSlower_s, to a faster one after kAnew_s of even arrivals: a backlog that comes
-// evenly for so long looks like a faster camera, and shows when the true pace follows.
+// The first period is the slope, by least squares, of kFirst_s of even arrivals, not faster than kFastest_s; by n items with
+// delays of standard deviation s it is known to sqrt(12) s / n^(3/2). Later ones are of the least delays at the ends of
+// a longer stretch. A period gives way, also after a reconnection, to a slower one after kFirst_s, to a faster one after
+// kAnew_s of even arrivals: until then those look like a backlog, and a backlog that comes evenly for longer looks like
+// a faster camera.
 // Fixed memory, no allocation, one thread. Seconds of the host's clock.
 
 #include <algorithm>
 #include <cmath>
-#include <optional>
+#include <cstddef>
 
 #include "core/model/arrival_pace.h"
 
@@ -36,9 +38,8 @@ class ReceiptClock {
 
   // Of the connection. The period of the one before is remembered.
   void restart() {
-    began_ = shown_ = known_ = false;
-    pace_.restart();
-    even_.restart();
+    began_ = paced_ = known_ = false;
+    arrivals_.restart();
   }
 
   // receive_time_s: finite.
@@ -46,12 +47,9 @@ class ReceiptClock {
     if (!began_) {
       began_ = true;
       unknown_since_s_ = receive_time_s;
-      count_s_ = items_ = 0;
+      count_ = 0;
     }
-    count_s_ += period_s_;
-    items_ += 1;
-    even_.add(receive_time_s, items_);
-    if (period_s_ > 0) pace_.add(receive_time_s, count_s_);
+    arrivals_.add(receive_time_s, ++count_);
     if (!known_) learn_period(receive_time_s);
     const Answer answer = hold_against_pace(receive_time_s);
     if (known_ && !answer.known) unknown_since_s_ = receive_time_s;
@@ -61,79 +59,113 @@ class ReceiptClock {
 
  private:
   static constexpr double kPunctual_s = 0.01;
-  static constexpr double kFirst_s = 0.5;
-  static constexpr double kSlower_s = 1;
-  static constexpr double kAnew_s = 3;
+  static constexpr double kFirst_s = 1;
+  static constexpr double kAnew_s = 10;
+  static constexpr double kFastest_s = 1.0 / 70;  // period
   static constexpr double kSlower = 1.02;
   static constexpr double kLeastIntervals = 4;
-  static constexpr double kSteadyItems = 50;
+  static constexpr double kEnoughItems = 100;  // for a period
+  static constexpr double kManyItems = 1000;
 
   Answer hold_against_pace(double receive_time_s) {
     const Answer unknown{receive_time_s, stamp_sigma_s_, false};
     if (!(period_s_ > 0)) return unknown;
-    const double over_s = receive_time_s - count_s_;
-    if (const auto shown = pace_.shown()) {
-      if (!shown_ || shown->least_s > level_s_ + kPunctual_s) begin_stretch(receive_time_s);
-      level_s_ = shown->least_s;
-      shown_ = true;
-      refine(receive_time_s);
-    } else if (shown_ && over_s < level_s_ - kPunctual_s) {
-      shown_ = false;  // faster than the pace: what came before had waited, or the camera is another
+    const ArrivalPace pace = paced(0, period_s_);
+    if (const auto shown = pace.shown()) {
+      const double fresh_s = shown->least_s + pace.sender_s(pace.size() - 1);
+      if (!paced_ || fresh_s > expected_s() + kPunctual_s) {
+        paced_ = true;
+        first_fresh_s_ = fresh_s;
+        first_fresh_count_ = count_;
+      }
+      fresh_s_ = fresh_s;
+      fresh_count_ = count_;
+      refine_period();
+    } else if (paced_ && receive_time_s < expected_s() - kPunctual_s) {
+      paced_ =
+          false;  // faster than the pace: what came before had waited, or the camera is another
     }
-    const double late_s = std::max(0.0, over_s - level_s_ - kPunctual_s);
-    if (!shown_ || late_s > kLongest_s) return unknown;
-    return {receive_time_s - late_s / 2, std::hypot(stamp_sigma_s_, late_s / std::sqrt(12.0)), true};
+    if (!paced_) return unknown;
+    const double late_s = std::max(0.0, receive_time_s - expected_s() - kPunctual_s);
+    if (late_s > kLongest_s) return unknown;
+    const double drift_s = period_sigma_s_ * (count_ - fresh_count_);
+    return {receive_time_s - late_s / 2,
+            std::hypot(stamp_sigma_s_, late_s / std::sqrt(12.0), drift_s), true};
+  }
+
+  static double double_of(std::size_t n) { return static_cast<double>(n); }
+
+  // When the item last added would have come at the latest, were it fresh and none lost.
+  [[nodiscard]] double expected_s() const { return fresh_s_ + period_s_ * (count_ - fresh_count_); }
+
+  // The arrivals from the given one on, with a clock of this period.
+  [[nodiscard]] ArrivalPace paced(std::size_t from, double period_s) const {
+    ArrivalPace pace;
+    for (std::size_t i = from; i < arrivals_.size(); ++i) {
+      pace.add(arrivals_.receive_s(i), arrivals_.sender_s(i) * period_s);
+    }
+    return pace;
   }
 
   // A period from the last arrivals alone, if they are even. A backlog is never slower than the pace.
   void learn_period(double receive_time_s) {
     const bool first = !(period_s_ > 0);
     const double unknown_s = receive_time_s - unknown_since_s_;
-    const double span_s = first ? kFirst_s : kSlower_s;
-    if (unknown_s < span_s) return;
-    std::size_t from = even_.size() - 1;
-    while (from > 0 && receive_time_s - even_.receive_s(from) < span_s) --from;
-    const auto intervals = static_cast<double>(even_.size() - 1 - from);
+    if (unknown_s < kFirst_s) return;
+    std::size_t from = arrivals_.size() - 1;
+    while (from > 0 && receive_time_s - arrivals_.receive_s(from) < kFirst_s) --from;
+    const double intervals = double_of(arrivals_.size() - 1 - from);
     if (intervals < kLeastIntervals) return;
-    const double period_s = (receive_time_s - even_.receive_s(from)) / intervals;
+    const double period_s = slope_since(from);
+    if (!(period_s > (first ? kFastest_s : 0))) return;
     if (!first && period_s < kSlower * period_s_ && unknown_s < kAnew_s) return;
-    ArrivalPace pace;
-    for (std::size_t i = from; i < even_.size(); ++i) {
-      pace.add(even_.receive_s(i), static_cast<double>(i - from) * period_s);
-    }
-    if (!pace.shown()) return;
+    if (!paced(from, period_s).shown()) return;
+    set_period(period_s, intervals + 1);
+    paced_ = false;
+  }
+
+  // By the least delays at both ends: what comes late between them does no harm.
+  void refine_period() {
+    const double items = fresh_count_ - first_fresh_count_;
+    if (items < std::min(period_items_, kEnoughItems)) return;
+    set_period((fresh_s_ - first_fresh_s_) / items, items);
+    if (items < kManyItems) return;
+    first_fresh_s_ = fresh_s_;
+    first_fresh_count_ = fresh_count_;
+  }
+
+  void set_period(double period_s, double items) {
     period_s_ = period_s;
-    pace_ = pace;
-    count_s_ = intervals * period_s;
-    shown_ = false;
+    period_items_ = items;
+    period_sigma_s_ = std::sqrt(12.0) * stamp_sigma_s_ / (items * std::sqrt(items));
   }
 
-  void begin_stretch(double receive_time_s) {
-    stretch_s_ = receive_time_s;
-    stretch_items_ = items_;
-  }
-
-  // The longer the stretch, the better the period.
-  void refine(double receive_time_s) {
-    const double items = items_ - stretch_items_;
-    if (items < kSteadyItems) return;
-    period_s_ = (receive_time_s - stretch_s_) / items;
-    if (items >= 20 * kSteadyItems) begin_stretch(receive_time_s);
+  // Of the arrivals over their count, by least squares.
+  [[nodiscard]] double slope_since(std::size_t from) const {
+    const double n = double_of(arrivals_.size() - from);
+    const double middle = (n - 1) / 2;
+    const double since_s = arrivals_.receive_s(from);
+    double sum = 0;
+    for (std::size_t i = from; i < arrivals_.size(); ++i) {
+      sum += (double_of(i - from) - middle) * (arrivals_.receive_s(i) - since_s);
+    }
+    return sum * 12 / (n * (n * n - 1));
   }
 
   double stamp_sigma_s_;
-  ArrivalPace pace_;  // by count and period
-  ArrivalPace even_;  // by count alone
+  ArrivalPace arrivals_;  // over their count
+  double count_ = 0;
   bool began_ = false;
-  bool shown_ = false;  // level_s_ is known
+  bool paced_ = false;  // fresh_s_ is known
   bool known_ = false;  // the last item was
   double unknown_since_s_ = 0;
   double period_s_ = 0;  // 0: not known
-  double count_s_ = 0;
-  double items_ = 0;
-  double level_s_ = 0;  // receive - count of a fresh item
-  double stretch_s_ = 0;
-  double stretch_items_ = 0;
+  double period_sigma_s_ = 0;
+  double period_items_ = 0;   // that it is from
+  double fresh_s_ = 0;        // arrival of a fresh item with the least delay
+  double fresh_count_ = 0;    // its count
+  double first_fresh_s_ = 0;  // the same at the beginning of the stretch that the period is from
+  double first_fresh_count_ = 0;
 };
 
 }  // namespace alidade
