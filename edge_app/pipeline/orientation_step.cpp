@@ -59,12 +59,17 @@ OrientationStep::Telemetry OrientationStep::empty_telemetry(bool filtered) const
 }
 
 // A stall leaves a question, or its answer, lying about for long; when in that time the answer was true nobody
-// knows, nor, as it gives the rate, how fast the head turned.
-bool OrientationStep::is_stalled_poll(double width_s) {
-  constexpr double kNoStall_s = 0.1;
+// knows, nor how fast the head turned, where it is one of the first two, which give the rate.
+bool OrientationStep::is_stalled_poll(const PanTiltSample& sample) {
+  const double width_s = sample.latest_time_s - sample.earliest_time_s;
+  const std::optional<double> newest_s = telemetry_.newest_time();
+  const bool begins =
+      telemetry_.size() < 2 ||
+      sample.latest_time_s > newest_s.value_or(0) + options_.telemetry_limits.max_gap_s;
+  const double longest_s = begins ? 0.02 : 0.1;
   constexpr double kTimesTheUsual = 2.5;
   constexpr double kGrowth = 1.25;  // of the usual, a poll: a device may be slow, or become slow
-  const bool stalled = width_s > std::max(kNoStall_s, kTimesTheUsual * usual_poll_s_);
+  const bool stalled = width_s > std::max(longest_s, kTimesTheUsual * usual_poll_s_);
   usual_poll_s_ = width_s < usual_poll_s_ ? usual_poll_s_ + (width_s - usual_poll_s_) / 4
                                           : std::min(width_s, kGrowth * usual_poll_s_);
   return stalled;
@@ -90,7 +95,7 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   timed.tilt = sample.tilt_rad;
   const double width_s = sample.latest_time_s - sample.earliest_time_s;
   const bool line_holds = clock && clock->state == ClockState::kLocked;
-  if (is_stalled_poll(width_s) && !line_holds) return;
+  if (options_.wait_for_pace && is_stalled_poll(sample) && !line_holds) return;
   if (clock) {
     timed.time_s = clock->time_s;
     timed.time_sigma_s = clock->sigma_s;

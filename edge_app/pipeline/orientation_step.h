@@ -44,7 +44,7 @@ namespace alidade {
 struct OrientationStepOptions {
   Calibration calibration;
   bool calibrated = false;  // passed on to the records
-  // Frames are live: they may have waited before they were received.
+  // Frames and telemetry are live: they may have waited before they were received.
   bool wait_for_pace = false;
   ClockFilterOptions video_clock;
   ClockFilterOptions telemetry_clock;
@@ -113,7 +113,7 @@ class OrientationStep {
   [[nodiscard]] OrientationRecord empty_record() const;
   // False: there is a calibration, but not for the zoom that the pan/tilt source reports.
   [[nodiscard]] bool zoom_fits() const;
-  [[nodiscard]] bool is_stalled_poll(double width_s);
+  [[nodiscard]] bool is_stalled_poll(const PanTiltSample& sample);
   // Frames that extrapolated telemetry answered, and that telemetry encloses by this sample.
   void settle_pending_frames();
   // Completes a record that has its time and telemetry's status; measured: null if there is none.
@@ -133,7 +133,7 @@ class OrientationStep {
   FrameTracks tracks_;               // of the frame last added, but for its points
   bool telemetry_filtered_ = false;  // times in telemetry_ come from telemetry_clock_
   bool telemetry_lost_ = false;
-  double usual_poll_s_ = 0.05;  // from a question to its answer
+  double usual_poll_s_ = 0.01;  // from a question to its answer
 };
 
 }  // namespace alidade

@@ -25,7 +25,7 @@ namespace alidade {
 
 class ReceiptClock {
  public:
-  static constexpr double kLongest_s = 0.1;
+  static constexpr double kLongest_s = 0.05;  // within which a head hardly changes its rate
 
   struct Answer {
     double time_s = 0;
@@ -60,7 +60,7 @@ class ReceiptClock {
  private:
   static constexpr double kPunctual_s = 0.01;
   static constexpr double kFirst_s = 1;
-  static constexpr double kAnew_s = 10;
+  static constexpr double kAnew_s = 30;
   static constexpr double kFastest_s = 1.0 / 70;  // period
   static constexpr double kSlower = 1.02;
   static constexpr double kLeastIntervals = 4;

@@ -103,8 +103,9 @@ TEST_F(FrameClockTest, TheLineHoldsForWhatWaitsOnceTheSendersClockWasSeenToRunOn
   for (const double stall_s : {15.0, 20.0}) {
     for (int i = 0; i < 25; ++i) {
       const double t = stall_s + kPeriod_s * i;
-      const FrameTime time = add(t, std::max(t, stall_s + 1 + 1e-3 * i));
-      const bool late = t < stall_s + 0.88;
+      const double received_s = stall_s + 1 + 1e-3 * i;
+      const FrameTime time = add(t, received_s);
+      const bool late = received_s > t + ArrivalPace::kBacklog_s;
       EXPECT_EQ(time.known, stall_s == 20 || !late) << t;
       EXPECT_NEAR(time.clock.time_s, t, 1e-3) << t;
     }
@@ -202,8 +203,8 @@ TEST_F(ReceiptClockTest, WhereSomeWereLostThePaceTells) {
 TEST_F(ReceiptClockTest, AnotherRateIsLearntSoonerIfItIsSlower) {
   play(0, 10);
   EXPECT_GE(play(10, 20, 0.1), 80);
-  EXPECT_EQ(play(20, 29), 0);
-  EXPECT_GE(play(29, 40), 200);
+  EXPECT_LE(play(20, 49), 1);
+  EXPECT_GE(play(49, 60), 200);
 }
 
 TEST_F(ReceiptClockTest, RemembersThePeriodOverAReconnection) {
