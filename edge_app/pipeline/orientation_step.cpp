@@ -68,7 +68,7 @@ bool OrientationStep::is_stalled_poll(const PanTiltSample& sample) {
       sample.latest_time_s > newest_s.value_or(0) + options_.telemetry_limits.max_gap_s;
   const double longest_s = begins ? 0.02 : 0.1;
   constexpr double kTimesTheUsual = 2.5;
-  constexpr double kGrowth = 1.25;  // of the usual, a poll: a device may be slow, or become slow
+  constexpr double kGrowth = 1.5;  // of the usual, a poll: a device may be slow, or become slow
   const bool stalled = width_s > std::max(longest_s, kTimesTheUsual * usual_poll_s_);
   usual_poll_s_ = width_s < usual_poll_s_ ? usual_poll_s_ + (width_s - usual_poll_s_) / 4
                                           : std::min(width_s, kGrowth * usual_poll_s_);
