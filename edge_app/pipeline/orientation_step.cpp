@@ -173,7 +173,8 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   record.receive_time_s = stamp.receive_time_s;
   if (!frame_time.known) {
     record.status = RecordStatus::kTimeUnknown;
-    if (finds_landmarks()) image_ = {};  // the map would learn from an angle of another time
+    if (finds_landmarks())
+      image_ = ImageView{};  // the map would learn from an angle of another time
     return record;
   }
   record.time_s = clock.time_s;

@@ -96,6 +96,20 @@ TEST(ArrivalPace, IsNotShownByABacklogThatComesInPieces) {
   }
 }
 
+// Two pieces of a backlog pass the same age by chance.
+TEST(ArrivalPace, IsNotShownByAMomentOnTheWayDown) {
+  constexpr double kApart_s = 1e-3;
+  constexpr int kPassing = 14;  // item of the second piece
+  const double pause_s = kPeriod_s + kPassing * (kPeriod_s - kApart_s);
+  ArrivalPace pace;
+  pace.restart();
+  pace.add(3.5, kOrigin_s - 0.4);
+  for (int i = 0; i < 10 + 2 * kPassing; ++i) {
+    pace.add(4 + kApart_s * i + (i < 10 ? 0 : pause_s - kApart_s), kOrigin_s + kPeriod_s * i);
+    EXPECT_FALSE(pace.shown()) << i;
+  }
+}
+
 TEST(ArrivalPace, ShownItemsAreThoseBehindTheBacklog) {
   ArrivalPace pace;
   pace.restart();
