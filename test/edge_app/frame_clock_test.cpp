@@ -7,7 +7,7 @@
 #include <cmath>
 #include <cstdint>
 #include <limits>
-#include <vector>
+#include <optional>
 
 namespace alidade {
 namespace {
@@ -96,6 +96,18 @@ TEST_F(FrameClockTest, ABacklogAfterAReconnectionHasNoTimeAndLeavesNoTrace) {
   }
   EXPECT_EQ(restarts, 1);
   EXPECT_LE(unknown, 27);
+}
+
+// Where only few frames show the pace, those of the backlog would be the better part of the line's.
+TEST_F(FrameClockTest, TheSigmaOfASlowStreamIsOfTheFramesBehindTheBacklog) {
+  for (int i = 0; i < 60; ++i) EXPECT_FALSE(add(0.1 * i, 6 + 2e-3 * i).known);
+  std::optional<double> first_sigma_s;
+  for (int i = 62; i < 120; ++i) {
+    const FrameTime time = add(0.1 * i, 0.1 * i);
+    if (time.known && !first_sigma_s) first_sigma_s = time.clock.sigma_s;
+  }
+  ASSERT_TRUE(first_sigma_s);
+  EXPECT_LT(*first_sigma_s, ClockFilterOptions{}.expected_jitter_s);
 }
 
 TEST_F(FrameClockTest, TheLineHoldsForWhatWaitsOnceTheSendersClockWasSeenToRunOn) {
