@@ -27,10 +27,10 @@ endif()
 
 # alidade_prelude(edge_app HEADERS <Eigen/Dense> ... LINK ... OPTIONS ...)
 # compiles once what most sources of the libraries with `PRELUDE edge_app` include; OPTIONS are those of the libraries. Each
-# source includes what it needs nevertheless: builds with sanitizers and for other processors have no prelude, and show it.
+# source includes what it needs nevertheless: the build for fuzzing has neither preludes nor sources compiled as one, and shows it.
 function(alidade_prelude name)
   cmake_parse_arguments(A "" "" "HEADERS;LINK;OPTIONS" ${ARGN})
-  if(ALIDADE_SANITIZE OR ALIDADE_FUZZ OR CMAKE_CROSSCOMPILING)
+  if(ALIDADE_FUZZ)
     return()
   endif()
   add_library(alidade_${name}_prelude OBJECT ${PROJECT_SOURCE_DIR}/cmake/prelude.cpp)
@@ -40,18 +40,30 @@ function(alidade_prelude name)
   set_property(GLOBAL PROPERTY ALIDADE_PRELUDE_LINKS_${name} ${A_LINK})
 endfunction()
 
-# alidade_library(model [INTERNAL] [PRELUDE name] HEADERS ... SOURCES ... PUBLIC ... PRIVATE ... OPTIONS ...)
+# alidade_unity(target)
+# compiles up to eight sources of the target as one, which halves what edge_app costs: half of that is what its sources include.
+# Names in anonymous namespaces must then differ within a room. The presets `dev` and `fuzz` compile each source by itself.
+function(alidade_unity target)
+  if(ALIDADE_UNITY)
+    set_target_properties(${target} PROPERTIES UNITY_BUILD ON UNITY_BUILD_BATCH_SIZE 8)
+  endif()
+endfunction()
+
+# alidade_library(model [INTERNAL] [UNITY] [PRELUDE name] HEADERS ... SOURCES ... PUBLIC ... PRIVATE ... OPTIONS ...)
 # makes target alidade_model and alias alidade::model. Without SOURCES it is header-only.
 # PUBLIC and PRIVATE name what it links; OPTIONS are compile options for its own sources.
-# INTERNAL: not part of the installed package.
+# INTERNAL: not part of the installed package. UNITY: see alidade_unity.
 function(alidade_library name)
-  cmake_parse_arguments(A "INTERNAL" "PRELUDE" "HEADERS;SOURCES;PUBLIC;PRIVATE;OPTIONS" ${ARGN})
+  cmake_parse_arguments(A "INTERNAL;UNITY" "PRELUDE" "HEADERS;SOURCES;PUBLIC;PRIVATE;OPTIONS" ${ARGN})
   set(target alidade_${name})
   if(A_SOURCES)
     add_library(${target} STATIC ${A_SOURCES} ${A_HEADERS})
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:alidade_options> ${A_PRIVATE})
     target_compile_options(${target} PRIVATE ${A_OPTIONS})
+    if(A_UNITY)
+      alidade_unity(${target})
+    endif()
     if(TARGET alidade_${A_PRELUDE}_prelude)
       target_precompile_headers(${target} REUSE_FROM alidade_${A_PRELUDE}_prelude)
       # The compiler takes a prelude only where the same macros are defined.
@@ -137,9 +149,10 @@ add_custom_target(quick_programs)
 #               Under an emulated processor they are THOROUGH
 #   SHARDS      how many processes share the cases, for a room whose tests mostly wait
 #   COST        seconds, of a room that takes long: ctest starts the dearest first, so that none is left over at the end
+#   UNITY       see alidade_unity
 #   DEFINITIONS, DEPENDS, LABELS, TIMEOUT (s), RESOURCE_LOCK
 function(alidade_test name)
-  cmake_parse_arguments(A "" "TIMEOUT;RESOURCE_LOCK;SHARDS;COST"
+  cmake_parse_arguments(A "UNITY" "TIMEOUT;RESOURCE_LOCK;SHARDS;COST"
     "SOURCES;SUPPORT;LINK;THREADED;NATIVE;NATIVE_SUPPORT;NATIVE_LINK;THOROUGH;UNSANITIZED;DEFINITIONS;DEPENDS;LABELS" ${ARGN})
   if(NOT ALIDADE_BUILD_TESTS)
     return()
@@ -162,6 +175,9 @@ function(alidade_test name)
   alidade_executable(${name} SOURCES ${A_SOURCES} ${A_SUPPORT}
     LINK ${A_LINK} Eigen3::Eigen GTest::gmock GTest::gtest GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE ${A_DEFINITIONS})
+  if(A_UNITY)
+    alidade_unity(${name})
+  endif()
   # GCC 12 reports it inside inlined library code.
   target_compile_options(${name} PRIVATE ${ALIDADE_TEST_OPTIONS} $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   # Headers without a library have their tests only, which are then compiled as the product is.

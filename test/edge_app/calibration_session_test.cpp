@@ -4,10 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include "core/model/trigonometry.h"
+
 namespace alidade {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 class CalibrationSessionTest : public ::testing::Test {
  protected:

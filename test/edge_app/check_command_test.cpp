@@ -26,7 +26,7 @@ using ::testing::StartsWith;
 
 namespace fs = std::filesystem;
 
-std::string camera(const std::string& telemetry) {
+std::string camera_with(const std::string& telemetry) {
   return "seed: 5\n"
          "duration_s: 5\n"
          "image: {width: 320, height: 180, rate_hz: 25}\n"
@@ -39,7 +39,7 @@ std::string camera(const std::string& telemetry) {
 }
 
 void film(const TemporaryDirectory& directory, const std::string& telemetry) {
-  const std::string file = directory.write("camera.yaml", camera(telemetry));
+  const std::string file = directory.write("camera.yaml", camera_with(telemetry));
   const Result result = run({ALIDADE_SIMULATE, "-c", file, "-o", directory.path() + "/recording"});
   ASSERT_EQ(result.exit_code, 0) << result.errors;
 }

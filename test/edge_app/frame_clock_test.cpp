@@ -12,7 +12,7 @@
 namespace alidade {
 namespace {
 
-constexpr double kPeriod_s = 0.04;
+constexpr double kInterval_s = 0.04;
 
 // A stream of 25 Hz whose sender's clock is 90 s ahead of the host's.
 class FrameClockTest : public testing::Test {
@@ -27,7 +27,7 @@ class FrameClockTest : public testing::Test {
   // Fresh frames; the number of them that are known.
   int play(double from_s, double to_s, bool restarted = false) {
     int known = 0;
-    for (double t = from_s; t < to_s - 1e-6; t += kPeriod_s) {
+    for (double t = from_s; t < to_s - 1e-6; t += kInterval_s) {
       const FrameTime time = add(t, t, restarted && t == from_s);
       known += time.known ? 1 : 0;
       if (time.known) {
@@ -47,8 +47,8 @@ TEST_F(FrameClockTest, ARecordingIsAnsweredFromTheFirstFrameOn) {
   CaptureClock plain{ClockFilterOptions{}};
   for (int i = 0; i < 100; ++i) {
     FrameStamp stamp;
-    stamp.receive_time_s = kPeriod_s * i;
-    stamp.sender_time_s = 90 + kPeriod_s * i;
+    stamp.receive_time_s = kInterval_s * i;
+    stamp.sender_time_s = 90 + kInterval_s * i;
     const FrameTime time = clock.update(stamp);
     EXPECT_TRUE(time.known && time.of_use);
     EXPECT_EQ(time.clock.time_s,
@@ -60,7 +60,7 @@ TEST_F(FrameClockTest, WaitsForThePaceAndThenKnowsWhatItWouldHaveKnown) {
   CaptureClock plain{ClockFilterOptions{}};
   int unknown = 0;
   for (int i = 0; i < 100; ++i) {
-    const double t = kPeriod_s * i;
+    const double t = kInterval_s * i;
     const FrameTime time = add(t, t);
     const auto expected = plain.update(t, t + 90, std::nullopt, false);
     unknown += time.known ? 0 : 1;
@@ -78,14 +78,14 @@ TEST_F(FrameClockTest, ABacklogAfterAReconnectionHasNoTimeAndLeavesNoTrace) {
   play(0, 20);
   sender_ahead_s_ = 5000;
   for (int i = 0; i < 100; ++i) {
-    const FrameTime time = add(20 + kPeriod_s * i, 27 + 2e-3 * i, i == 0);
+    const FrameTime time = add(20 + kInterval_s * i, 27 + 2e-3 * i, i == 0);
     EXPECT_FALSE(time.known) << i;
     EXPECT_EQ(time.clock.restarted, i == 0);
   }
   // A second at the pace; the frames behind the backlog begin another line than those in it.
   int restarts = 0;
   int unknown = 0;
-  for (double t = 27.2; t < 32; t += kPeriod_s) {
+  for (double t = 27.2; t < 32; t += kInterval_s) {
     const FrameTime time = add(t, t);
     restarts += time.clock.restarted ? 1 : 0;
     unknown += time.known ? 0 : 1;
@@ -114,7 +114,7 @@ TEST_F(FrameClockTest, TheLineHoldsForWhatWaitsOnceTheSendersClockWasSeenToRunOn
   play(0, 15);
   for (const double stall_s : {15.0, 20.0}) {
     for (int i = 0; i < 25; ++i) {
-      const double t = stall_s + kPeriod_s * i;
+      const double t = stall_s + kInterval_s * i;
       const double received_s = stall_s + 1 + 1e-3 * i;
       const FrameTime time = add(t, received_s);
       const bool late = received_s > t + ArrivalPace::kBacklog_s;
@@ -130,7 +130,7 @@ TEST_F(FrameClockTest, ASenderThatStoodStillWithItsClockBeginsAnew) {
   sender_ahead_s_ -= 2;
   int unknown = 0;
   bool restarted = false;
-  for (double t = 17; t < 24; t += kPeriod_s) {
+  for (double t = 17; t < 24; t += kInterval_s) {
     const FrameTime time = add(t, t);
     unknown += time.known ? 0 : 1;
     restarted = restarted || time.clock.restarted;
@@ -143,7 +143,7 @@ TEST_F(FrameClockTest, ASenderThatStoodStillWithItsClockBeginsAnew) {
 }
 
 TEST_F(FrameClockTest, AFrameBeforeAYoungLineTellsThatAllBeforeHadWaited) {
-  for (double t = 0; t < 2; t += kPeriod_s) add(t, t + 0.3);
+  for (double t = 0; t < 2; t += kInterval_s) add(t, t + 0.3);
   const FrameTime time = add(2, 2);
   EXPECT_FALSE(time.known);
   EXPECT_TRUE(time.clock.restarted);
@@ -172,7 +172,7 @@ TEST_F(FrameClockTest, ARestartIsNotForgottenOverAFrameThatCannotBeUsed) {
 
 class ReceiptClockTest : public testing::Test {
  protected:
-  int play(double from_s, double to_s, double period_s = kPeriod_s) {
+  int play(double from_s, double to_s, double period_s = kInterval_s) {
     int known = 0;
     for (double t = from_s; t < to_s - 1e-6; t += period_s) {
       const ReceiptClock::Answer answer = clock_.update(t);
@@ -194,7 +194,7 @@ TEST_F(ReceiptClockTest, KnowsAfterASecond) {
 TEST_F(ReceiptClockTest, WhatWaitedIsOfUnknownAgeUntilAllHasCome) {
   play(0, 10);
   for (int i = 0; i < 25; ++i) {
-    const double captured_s = 10 + kPeriod_s * i;
+    const double captured_s = 10 + kInterval_s * i;
     const double late_s = 11 + 1e-3 * i - captured_s;
     const ReceiptClock::Answer answer = clock_.update(11 + 1e-3 * i);
     if (answer.known) {

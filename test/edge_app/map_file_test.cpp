@@ -11,6 +11,7 @@
 
 #include "core/realtime/oe_mode/landmark_map.h"
 #include "edge_app/storage/calibration_file.h"
+#include "test/support/not_a_number.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {
@@ -26,7 +27,7 @@ constexpr std::size_t kChecksumSize = 4;
 constexpr std::size_t kPoints = 16;     // where their number stands
 constexpr std::size_t kLandmarks = 24;  // likewise
 
-Calibration some_calibration() {
+Calibration map_calibration() {
   Calibration calibration;
   calibration.camera = {4000 + 1 / 3.0, 1, -0.3, 1920, 1080};
   calibration.line_delay = 1e-6 / 3;
@@ -92,16 +93,16 @@ MapContent some_content(int points, int landmarks) {
 }
 
 bool parse(const std::string& bytes, MapContent* content, std::string* error) {
-  return parse_map(bytes, "map.bin", some_calibration(), content, error);
+  return parse_map(bytes, "map.bin", map_calibration(), content, error);
 }
 
 std::string some_bytes(int points, int landmarks) {
-  return format_map(some_content(points, landmarks), some_calibration());
+  return format_map(some_content(points, landmarks), map_calibration());
 }
 
 TEST(MapFile, ReadsBackTheSameBits) {
   const MapContent written = some_content(7, 9);
-  const std::string bytes = format_map(written, some_calibration());
+  const std::string bytes = format_map(written, map_calibration());
   EXPECT_EQ(bytes.size(), kHeaderSize + 7 * kPointSize + 9 * kLandmarkSize + kChecksumSize);
   MapContent read;
   std::string error;
@@ -135,13 +136,13 @@ TEST(MapFile, ReadsBackTheSameBits) {
     EXPECT_EQ(is.statistics.matched, was.statistics.matched);
     EXPECT_EQ(is.statistics.residual_square, was.statistics.residual_square);
   }
-  EXPECT_EQ(format_map(read, some_calibration()), bytes);
+  EXPECT_EQ(format_map(read, map_calibration()), bytes);
 }
 
 TEST(MapFile, HoldsNothingToo) {
   MapContent read = some_content(1, 1);
   std::string error;
-  ASSERT_TRUE(parse(format_map({}, some_calibration()), &read, &error)) << error;
+  ASSERT_TRUE(parse(format_map({}, map_calibration()), &read, &error)) << error;
   EXPECT_TRUE(read.points.empty());
   EXPECT_TRUE(read.map.landmarks.empty());
 }
@@ -216,7 +217,7 @@ TEST(MapFile, SaysWhichVersionItCannotRead) {
 }
 
 TEST(MapFile, RefusesTheMapOfAnotherCalibration) {
-  Calibration other = some_calibration();
+  Calibration other = map_calibration();
   other.line_delay = std::nextafter(other.line_delay, 1);
   MapContent read;
   std::string error;
@@ -226,7 +227,7 @@ TEST(MapFile, RefusesTheMapOfAnotherCalibration) {
 
 TEST(MapFile, FitsItsCalibrationAfterThatOneWasStoredAndRead) {
   const TemporaryDirectory directory;
-  const Calibration calibration = some_calibration();
+  const Calibration calibration = map_calibration();
   std::string error;
   ASSERT_TRUE(save_calibration(directory.path() + "/calibration.yaml", calibration, &error))
       << error;
@@ -240,15 +241,13 @@ TEST(MapFile, FitsItsCalibrationAfterThatOneWasStoredAndRead) {
   EXPECT_EQ(content.map.landmarks.size(), 4U);
 }
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 // The checksum fits: only the number is wrong.
 void expect_refused(void (*spoil)(MapContent*), const char* why) {
   MapContent content = some_content(2, 2);
   spoil(&content);
   MapContent read;
   std::string error;
-  EXPECT_FALSE(parse(format_map(content, some_calibration()), &read, &error)) << why;
+  EXPECT_FALSE(parse(format_map(content, map_calibration()), &read, &error)) << why;
   EXPECT_THAT(error, HasSubstr(why));
 }
 
@@ -314,11 +313,11 @@ TEST(MapFile, SavingReplacesTheOldFileWholeAndLeavesNothingElse) {
   const TemporaryDirectory directory;
   const std::string path = directory.write("map.bin", "old");
   std::string error;
-  ASSERT_TRUE(save_map(path, some_content(2, 2), some_calibration(), &error)) << error;
+  ASSERT_TRUE(save_map(path, some_content(2, 2), map_calibration(), &error)) << error;
   EXPECT_EQ(directory.read("map.bin"), some_bytes(2, 2));
   MapContent spoilt = some_content(2, 2);
   spoilt.points[0].d_b.setZero();
-  EXPECT_FALSE(save_map(path, spoilt, some_calibration(), &error));
+  EXPECT_FALSE(save_map(path, spoilt, map_calibration(), &error));
   EXPECT_EQ(directory.read("map.bin"), some_bytes(2, 2));
   const auto files = std::filesystem::directory_iterator(directory.path());
   EXPECT_EQ(std::distance(begin(files), end(files)), 1);
@@ -328,12 +327,12 @@ TEST(MapFile, NamesTheFileThatCannotBeReadOrWritten) {
   const TemporaryDirectory directory;
   MapContent content;
   std::string error;
-  EXPECT_FALSE(load_map(directory.path() + "/none", some_calibration(), &content, &error));
+  EXPECT_FALSE(load_map(directory.path() + "/none", map_calibration(), &content, &error));
   EXPECT_THAT(error, StartsWith(directory.path() + "/none: cannot be read: No such file"));
-  EXPECT_FALSE(load_map(directory.path(), some_calibration(), &content, &error));
+  EXPECT_FALSE(load_map(directory.path(), map_calibration(), &content, &error));
   EXPECT_THAT(error, StartsWith(directory.path() + ": "));
   const std::string nowhere = directory.path() + "/none/map.bin";
-  EXPECT_FALSE(save_map(nowhere, some_content(1, 1), some_calibration(), &error));
+  EXPECT_FALSE(save_map(nowhere, some_content(1, 1), map_calibration(), &error));
   EXPECT_THAT(error, StartsWith(nowhere + ": cannot be written: No such file"));
 }
 

@@ -6,11 +6,11 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <limits>
 #include <random>
 
 #include "core/model/angle.h"
 #include "test/edge_app/findings.h"
+#include "test/support/not_a_number.h"
 
 namespace alidade {
 namespace {
@@ -202,7 +202,6 @@ TEST(MotionCheck, BearsHardlyAnythingAndNonsense) {
   EXPECT_THAT(check_motion({}, scene.samples, scene.needs).findings, IsEmpty());
   EXPECT_THAT(check_motion({scene.shifts[0]}, {scene.samples[0]}, scene.needs).findings, IsEmpty());
   Scene spoilt(wander);
-  constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
   for (std::size_t i = 0; i < 250; i += 50) {
     spoilt.shifts[i].shift[0] = kNan;
     spoilt.samples[i].tilt_rad = kNan;

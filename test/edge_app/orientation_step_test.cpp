@@ -13,13 +13,12 @@
 #include <stdexcept>
 #include <vector>
 
+#include "core/model/trigonometry.h"
 #include "edge_app/pipeline/frame_observations.h"
 #include "test/support/allocation_guard.h"
 
 namespace alidade {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 OrientationStepOptions options_without_offsets() {
   OrientationStepOptions options;

@@ -27,7 +27,7 @@ namespace fs = std::filesystem;
 using Rows = std::vector<std::map<std::string, std::string>>;
 
 constexpr int kFrames = 100;
-constexpr double kFocalLength = 8002;  // px
+constexpr double kLongFocalLength = 8002;  // px
 
 // The paper's camera at a quarter of its size; telemetry errs by 1.6 px.
 constexpr const char* kCamera =
@@ -83,7 +83,7 @@ class ReplayVideoTest : public ::testing::Test {
     std::vector<double> errors;
     for (std::size_t i = 13; i < rows.size(); ++i) {
       EXPECT_EQ(rows[i].at("frame"), truth.at(i).at("frame"));
-      errors.push_back(kFocalLength *
+      errors.push_back(kLongFocalLength *
                        (std::stod(rows[i].at(angle)) - std::stod(truth.at(i).at(angle))));
     }
     double mean = 0;

@@ -6,14 +6,14 @@
 
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <random>
+
+#include "test/support/not_a_number.h"
 
 namespace alidade {
 namespace {
 
 constexpr double kDegree = 3.14159265358979323846 / 180;
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 
 std::vector<double> rounded(std::vector<double> angles, double quantum) {
   for (double& angle : angles) angle = quantum * std::round(angle / quantum);

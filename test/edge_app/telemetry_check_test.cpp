@@ -11,6 +11,7 @@
 
 #include "core/model/angle.h"
 #include "test/edge_app/findings.h"
+#include "test/support/not_a_number.h"
 
 namespace alidade {
 namespace {
@@ -23,8 +24,6 @@ using ::testing::IsEmpty;
 using ::testing::Pair;
 
 constexpr double kRate = 30;  // Hz
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 double swing(double t) { return 0.5 * std::sin(0.7 * t) + 0.1 * std::sin(2.1 * t); }
 double held(double t, double rate_hz) { return std::floor(t * rate_hz + 1e-6) / rate_hz; }
 

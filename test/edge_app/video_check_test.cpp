@@ -10,6 +10,7 @@
 #include <random>
 
 #include "test/edge_app/findings.h"
+#include "test/support/not_a_number.h"
 
 namespace alidade {
 namespace {
@@ -19,8 +20,6 @@ using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
 constexpr double kPeriod = 0.04;
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
-
 // 10 s at 25 Hz whose packets are up to 5 ms late, as the camera's own clock saw them.
 std::vector<CheckedFrame> stream(int count = 250) {
   std::mt19937 random(1);
@@ -40,15 +39,15 @@ std::vector<CheckedFrame> stream(int count = 250) {
   return frames;
 }
 
-VideoNeeds needs() { return {"rtsp://camera", "calibration.yaml", 640, 360, true}; }
+VideoNeeds video_needs() { return {"rtsp://camera", "calibration.yaml", 640, 360, true}; }
 
-VideoReport check(const std::vector<CheckedFrame>& frames,
-                  const FrameSourceCounters& counters = {}) {
-  return check_video(frames, counters, ClockFilterOptions(), needs());
+VideoReport checked(const std::vector<CheckedFrame>& frames,
+                    const FrameSourceCounters& counters = {}) {
+  return check_video(frames, counters, ClockFilterOptions(), video_needs());
 }
 
 TEST(VideoCheck, MeasuresAHealthyStream) {
-  const VideoReport report = check(stream());
+  const VideoReport report = checked(stream());
   EXPECT_THAT(report.findings, IsEmpty());
   EXPECT_TRUE(report.size_fits);
   // The first and the last frame are late by up to 5 ms.
@@ -69,7 +68,7 @@ TEST(VideoCheck, CountsLossesByTheSendersClock) {
   std::vector<CheckedFrame> frames = stream();
   frames.erase(frames.begin() + 100, frames.begin() + 103);
   frames.erase(frames.begin() + 50);
-  const VideoReport report = check(frames);
+  const VideoReport report = checked(frames);
   EXPECT_EQ(report.lost, 4);
   EXPECT_THAT(advice(report.findings), ElementsAre(HasSubstr("4 of 250 frames never came")));
   EXPECT_THAT(problems(report.findings), IsEmpty());
@@ -81,7 +80,7 @@ TEST(VideoCheck, CountsLossesBySequence) {
     frame.stamp.sequence = 2 * frame.stamp.frame;  // each second one is missing
     frame.stamp.sender_time_s.reset();
   }
-  const VideoReport report = check(frames);
+  const VideoReport report = checked(frames);
   EXPECT_EQ(report.clock.kind, StampKind::kSequence);
   EXPECT_EQ(report.lost, 249);
   EXPECT_THAT(problems(report.findings), ElementsAre(HasSubstr("249 of 499 frames never came")));
@@ -91,25 +90,25 @@ TEST(VideoCheck, CountsLossesBySequence) {
 TEST(VideoCheck, CannotTellLossesWithoutAGrid) {
   std::vector<CheckedFrame> frames = stream();
   for (CheckedFrame& frame : frames) frame.stamp.sender_time_s.reset();
-  EXPECT_FALSE(check(frames).lost);
+  EXPECT_FALSE(checked(frames).lost);
   frames = stream();
   for (std::size_t i = 0; i < frames.size(); i += 2) *frames[i].stamp.sender_time_s += 0.015;
-  EXPECT_FALSE(check(frames).lost);
+  EXPECT_FALSE(checked(frames).lost);
 }
 
 TEST(VideoCheck, TellsDroppedFramesFromThoseThatNeverCame) {
   std::vector<CheckedFrame> frames = stream();
   frames.erase(frames.begin() + 100, frames.begin() + 140);
-  const VideoReport report = check(frames, {0, 40});
+  const VideoReport report = checked(frames, {0, 40});
   EXPECT_THAT(problems(report.findings), ElementsAre(HasSubstr("40 of 250 frames were dropped")));
 }
 
 TEST(VideoCheck, SaysThatTheMachineIsTooSlow) {
   std::vector<CheckedFrame> frames = stream();
   for (CheckedFrame& frame : frames) frame.decode_s = 0.036;
-  EXPECT_THAT(problems(check(frames).findings),
+  EXPECT_THAT(problems(checked(frames).findings),
               ElementsAre(HasSubstr("decoding takes 36.0 ms of the 40.0 ms between frames")));
-  VideoNeeds pt = needs();
+  VideoNeeds pt = video_needs();
   pt.images = false;
   EXPECT_THAT(check_video(frames, {}, ClockFilterOptions(), pt).findings, IsEmpty());
 }
@@ -117,7 +116,7 @@ TEST(VideoCheck, SaysThatTheMachineIsTooSlow) {
 TEST(VideoCheck, SaysThatTheSizeIsAnother) {
   std::vector<CheckedFrame> frames = stream();
   frames.front().width = 1280;
-  EXPECT_THAT(problems(check(frames).findings),
+  EXPECT_THAT(problems(checked(frames).findings),
               ElementsAre(HasSubstr("1280x360 px, but calibration.yaml is for 640x360 px")));
 }
 
@@ -125,7 +124,7 @@ TEST(VideoCheck, SaysThatAClockIsNone) {
   std::vector<CheckedFrame> frames = stream();
   for (CheckedFrame& frame : frames)
     frame.stamp.sender_time_s = 0.09 * static_cast<double>(frame.stamp.frame);
-  EXPECT_THAT(problems(check(frames).findings),
+  EXPECT_THAT(problems(checked(frames).findings),
               ElementsAre(HasSubstr("counts 2.25 seconds in each of the host's")));
 }
 
@@ -136,14 +135,14 @@ TEST(VideoCheck, TakesAnyQuartzForAClock) {
       frame.stamp.sender_time_s =
           1e5 + kPeriod * (1 + 1e-6 * ppm) * static_cast<double>(frame.stamp.frame);
     }
-    EXPECT_THAT(check(frames).findings, IsEmpty()) << ppm;
+    EXPECT_THAT(checked(frames).findings, IsEmpty()) << ppm;
   }
 }
 
 TEST(VideoCheck, SaysThatTheClockJumped) {
   std::vector<CheckedFrame> frames = stream();
   for (std::size_t i = 125; i < frames.size(); ++i) *frames[i].stamp.sender_time_s += 3600;
-  const VideoReport report = check(frames);
+  const VideoReport report = checked(frames);
   EXPECT_EQ(report.clock.counters.restarts, 1);
   EXPECT_THAT(problems(report.findings), ElementsAre(HasSubstr("clock jumped 1 times")));
 }
@@ -152,7 +151,7 @@ TEST(VideoCheck, DoesNotTakeAReconnectionForAJumpOrALoss) {
   std::vector<CheckedFrame> frames = stream();
   for (std::size_t i = 125; i < frames.size(); ++i) *frames[i].stamp.sender_time_s += 3600;
   frames[125].stamp.restarted = true;
-  const VideoReport report = check(frames);
+  const VideoReport report = checked(frames);
   EXPECT_EQ(report.clock.counters.restarts, 0);
   EXPECT_EQ(report.lost, 0);
   EXPECT_THAT(report.findings, IsEmpty());
@@ -164,25 +163,25 @@ TEST(VideoCheck, AdvisesAgainstTimesOfArrivalOnly) {
     frame.stamp.sender_time_s.reset();
     frame.stamp.receive_time_s += frame.stamp.frame % 3 == 0 ? 0.01 : 0;
   }
-  EXPECT_THAT(advice(check(frames).findings), ElementsAre(HasSubstr("no sender's clock")));
+  EXPECT_THAT(advice(checked(frames).findings), ElementsAre(HasSubstr("no sender's clock")));
 }
 
 TEST(VideoCheck, BearsHardlyAnything) {
-  EXPECT_THAT(check({}).findings, IsEmpty());
-  EXPECT_THAT(describe(check({})), IsEmpty());
+  EXPECT_THAT(checked({}).findings, IsEmpty());
+  EXPECT_THAT(describe(checked({})), IsEmpty());
   for (const int count : {1, 2, 3}) {
-    const VideoReport report = check(stream(count));
+    const VideoReport report = checked(stream(count));
     EXPECT_THAT(report.findings, IsEmpty()) << count;
     EXPECT_EQ(report.time_s.size(), static_cast<std::size_t>(count));
     static_cast<void>(describe(report));
   }
-  EXPECT_FALSE(check(stream(1)).rate_hz);
+  EXPECT_FALSE(checked(stream(1)).rate_hz);
 }
 
 TEST(VideoCheck, BearsStampsThatMakeNoSense) {
   std::vector<CheckedFrame> equal = stream();
   for (CheckedFrame& frame : equal) frame.stamp = FrameStamp();
-  EXPECT_FALSE(check(equal).rate_hz);
+  EXPECT_FALSE(checked(equal).rate_hz);
   std::vector<CheckedFrame> wild = stream();
   for (std::size_t i = 0; i < wild.size(); ++i) {
     FrameStamp& stamp = wild[i].stamp;
@@ -193,7 +192,7 @@ TEST(VideoCheck, BearsStampsThatMakeNoSense) {
     if (i % 17 == 0) stamp.sequence = std::numeric_limits<std::int64_t>::max();
     if (i % 19 == 0) wild[i].decode_s = kNan;
   }
-  const VideoReport report = check(wild);
+  const VideoReport report = checked(wild);
   EXPECT_EQ(report.frames, 250U);
   EXPECT_EQ(report.time_s.size(), 250U);
   static_cast<void>(describe(report));
