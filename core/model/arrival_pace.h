@@ -32,7 +32,7 @@ class ArrivalPace {
   static constexpr double kBacklog_s = 0.1;  // longer waits are no jitter
   static constexpr double kLeastHalf_s = 0.25;
 
-  // The stretch of items that shows the pace.
+  // The stretch of items that shows the pace, without what was left of a backlog.
   struct Shown {
     std::size_t first = 0;  // of the items kept
     double least_s = 0;     // its least receive - sender
@@ -72,7 +72,9 @@ class ArrivalPace {
       const double least_s = std::min(young.least_s, old.least_s);
       if (std::abs(young.least_s - old.least_s) > tolerance_s) continue;
       if (i == 0 && saw_backlog(least_s)) continue;
-      return Shown{old.first, least_s};
+      std::size_t first = old.first;
+      while (item(first).receive_s - item(first).sender_s > least_s + kBacklog_s) ++first;
+      return Shown{first, least_s};
     }
     return std::nullopt;
   }
