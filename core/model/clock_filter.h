@@ -18,7 +18,8 @@
 //                one-sided only: for settle_s every item stays above the line, or some come before
 //                it, by more than min_delay_step_s and by a steady amount. Flagged once and subtracted
 //                from all later receive times, so the line goes on for as long as it takes; its
-//                sigma grows by what the step is uncertain. While warming up, the line moves there.
+//                sigma grows by what the step is uncertain. While warming up the line moves where it falls,
+//                and keeps where it rises, unless an early item had dragged it down.
 // Lost items are gaps in sender; repeated and reordered items are answered and teach nothing.
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread. Beyond PTCEE 20, 21.
 

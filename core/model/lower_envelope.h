@@ -12,6 +12,7 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
 
 #include "core/model/clock_types.h"
 #include "core/model/lower_line.h"
@@ -33,11 +34,20 @@ class LowerEnvelope {
     scale_ = options_.expected_jitter_s;
     line_ = {0, 0, prior.rate, scale_ * scale_, 0, prior.half_range * prior.half_range / 3};
     slots_ = 0;
+    held_from_ = kNever;
     slot_width_ = 0;  // at first each item has its own
     locked_ = false;
   }
 
   void lock() { locked_ = true; }
+
+  // From now on what lies at host time y or later does not count, until release(), if enough lies before.
+  void hold(double y) {
+    if (held_from_ < kNever || (slots_ >= kLeastHeld && y_[kLeastHeld - 1] < y)) {
+      held_from_ = y;
+    }
+  }
+  void release() { held_from_ = kNever; }
 
   [[nodiscard]] const LineEstimate& line() const { return line_; }
   // Host time that the slots span.
@@ -105,6 +115,9 @@ class LowerEnvelope {
   }
 
  private:
+  static constexpr double kNever = std::numeric_limits<double>::infinity();
+  static constexpr std::size_t kLeastHeld = 16;
+
   // Joins the slots in pairs until they span the window, then drops the oldest.
   void make_room() {
     const double widest = options_.window_s / Capacity;
@@ -127,6 +140,9 @@ class LowerEnvelope {
 
   [[nodiscard]] std::size_t settled_slots() const {
     std::size_t n = slots_;
+    while (n > 1 && y_[n - 1] >= held_from_) {
+      --n;
+    }
     if (locked_) {
       const double limit = y_[slots_ - 1] - options_.settle_s / 10;
       while (n > 1 && y_[n - 1] > limit) {
@@ -149,6 +165,7 @@ class LowerEnvelope {
   ClockRatePrior prior_{1, 0};
   LineEstimate line_;
   bool locked_ = false;
+  double held_from_ = kNever;
 
   // Lowest item of each time slot, oldest first.
   std::array<double, Capacity> x_{};

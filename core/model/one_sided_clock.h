@@ -3,7 +3,9 @@
 //
 // The line is the lower envelope of a sliding window. It contains the minimum delay; where that steps (MinimumDelayStep),
 // the step is subtracted from all later receive times and the line goes on, with a variance that grows by the
-// step's. Steps that begin before the lock move the line instead: only what came since counts then.
+// step's. While a rise is suspected the late items do not count, or they would tilt a line whose rate is not yet known.
+// A line that fewer than kLeastOnLine items have come down to is an early item's that dragged it down: it moves
+// instead, and only what came since counts then.
 // Fixed memory, trivially copyable, no allocation, no exceptions. All times are host seconds.
 
 #include <algorithm>
@@ -27,7 +29,7 @@ class OneSidedClock {
   void start(double receive_s, const ClockRatePrior& prior) {
     restart();
     anchor_receive_s_ = receive_s;
-    delay_s_ = options_.expected_jitter_s;
+    delay_s_ = usual_delay_s_ = options_.expected_jitter_s;
     envelope_.start(prior);
   }
 
@@ -35,13 +37,14 @@ class OneSidedClock {
   void restart() {
     shift_s_ = shift_variance_ = 0;
     locked_ = false;
+    on_line_ = 0;
     steps_.restart();
   }
 
   // The line will not move by itself any more: steps of the minimum delay can be told from it.
   void lock(double receive_s) {
     locked_ = true;
-    locked_since_s_ = bound_since_s_ = receive_s;
+    bound_since_s_ = receive_s;
     envelope_.lock();
   }
 
@@ -50,16 +53,23 @@ class OneSidedClock {
     const double receive = item.receive_s;
     const double y = item.y - shift_s_;
     const double residual = y - line().value_at(item.x);
-    const double gate = std::max(options_.min_delay_step_s, kGate * item.sigma_s);
+    // The sigma of a held line grows; what is late must not come down to the line by that.
+    const double sigma =
+        steps_.suspects_rise() ? std::min(item.sigma_s, sigma_on_line_s_) : item.sigma_s;
+    const double gate = std::max(options_.min_delay_step_s, kGate * sigma);
     const bool early = locked_ && residual < -gate;
     delay_s_ += (std::clamp(residual, 0.0, 10 * delay_s_) - delay_s_) / 100;
 
     if (residual < gate) {
       steps_.end_late_run();
+      on_line_ = early ? on_line_ : residual < -gate ? 1 : on_line_ + 1;
     }
-    if (const std::optional<DelayStep> step = steps_.judge(receive)) {
-      if (locked_ && step->since_s >= locked_since_s_) {
-        subtract(*step);
+    const bool held = steps_.suspects_rise() && on_line_ >= kLeastOnLine;
+    const double rate_sigma = held ? std::sqrt(line().var_slope) / line().slope : 0;
+    if (const std::optional<DelayStep> step = steps_.judge(receive, rate_sigma)) {
+      envelope_.release();
+      if (step->step_s < 0 || on_line_ >= kLeastOnLine) {
+        subtract(*step, item.sigma_s);
         if (item.newer) {
           envelope_.insert(receive, item.x, item.y - shift_s_);
         }
@@ -70,6 +80,15 @@ class OneSidedClock {
     }
     if (residual >= gate) {
       steps_.add_late(receive, residual);
+      steps_.suspect(receive, residual, usual_delay_s_);
+    } else {
+      usual_delay_s_ = delay_s_;
+      sigma_on_line_s_ = item.sigma_s;
+    }
+    if (steps_.suspects_rise() && on_line_ >= kLeastOnLine) {
+      envelope_.hold(steps_.suspected_since_s() - anchor_receive_s_ - shift_s_);
+    } else {
+      envelope_.release();
     }
     if (early && !steps_.suspects_fall()) {
       envelope_.drop_unsettled(receive);  // the youngest may have the new minimum delay
@@ -80,6 +99,9 @@ class OneSidedClock {
     // While a fall is being judged nothing may pull the line down.
     if (item.newer && (!steps_.suspects_fall() || residual >= 0)) {
       envelope_.insert(receive, item.x, y);
+      if (line().value_at(item.x) < y - residual - gate) {
+        on_line_ = 0;
+      }
     }
     if (locked_ && receive - bound_since_s_ >= options_.window_s && !steps_.suspects_any()) {
       bound_since_s_ = receive;
@@ -109,13 +131,16 @@ class OneSidedClock {
 
  private:
   static constexpr double kGate = 6;  // sigmas that no honest item leaves on the early side
+  static constexpr double kLeastOnLine = 3;
 
   // The true line goes on: what changes is the minimum delay.
-  void subtract(const DelayStep& step) {
+  void subtract(const DelayStep& step, double line_sigma_s) {
     envelope_.subtract_from(step.since_s - anchor_receive_s_ - shift_s_, step.step_s);
     shift_s_ += step.step_s;
     shift_since_s_ = step.since_s;
-    shift_variance_ += step.sigma_s * step.sigma_s;
+    // A held line is extrapolated to where the step is measured.
+    shift_variance_ =
+        std::max(shift_variance_, line_sigma_s * line_sigma_s) + step.sigma_s * step.sigma_s;
   }
 
   ClockFilterOptions options_;
@@ -123,8 +148,11 @@ class OneSidedClock {
   MinimumDelayStep steps_;
   double anchor_receive_s_ = 0;
   double delay_s_ = 0;
+  // When an item last came down to the line:
+  double usual_delay_s_ = 0;    // delay_s_
+  double sigma_on_line_s_ = 0;  // of the line
   bool locked_ = false;
-  double locked_since_s_ = 0;
+  double on_line_ = 0;        // items that came down to the line since one dragged it down
   double bound_since_s_ = 0;  // when the rate was bounded last
   double shift_s_ = 0;
   double shift_variance_ = 0;

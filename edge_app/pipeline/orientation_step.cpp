@@ -29,9 +29,12 @@ std::unique_ptr<OeMode> make_oe_mode(const OeOptions& options) {
 
 OrientationStep::OrientationStep(const OrientationStepOptions& options)
     : options_(options),
-      video_clock_(options.video_clock),
+      video_clock_(options.video_clock, options.video_stamp_sigma_s, options.wait_for_pace),
       telemetry_clock_(options.telemetry_clock),
-      telemetry_(empty_telemetry(false)) {
+      telemetry_(empty_telemetry(false)),
+      // A stored calibration was made with another connection.
+      minimum_delay_sigma_s_(
+          options.wait_for_pace && options.calibrated ? options.minimum_delay_sigma_s : 0) {
   if (!options.oe) return;
   OeOptions oe = *options.oe;
   oe.max_width = options.calibration.camera.width;
@@ -55,6 +58,23 @@ OrientationStep::Telemetry OrientationStep::empty_telemetry(bool filtered) const
   return Telemetry(noise, options_.telemetry_limits);
 }
 
+// A stall leaves a question, or its answer, lying about for long; when in that time the answer was true nobody
+// knows, nor how fast the head turned, where it is one of the first two, which give the rate.
+bool OrientationStep::is_stalled_poll(const PanTiltSample& sample) {
+  const double width_s = sample.latest_time_s - sample.earliest_time_s;
+  const std::optional<double> newest_s = telemetry_.newest_time();
+  const bool begins =
+      telemetry_.size() < 2 ||
+      sample.latest_time_s > newest_s.value_or(0) + options_.telemetry_limits.max_gap_s;
+  const double longest_s = begins ? 0.02 : 0.1;
+  constexpr double kTimesTheUsual = 2.5;
+  constexpr double kGrowth = 1.5;  // of the usual, a poll: a device may be slow, or become slow
+  const bool stalled = width_s > std::max(longest_s, kTimesTheUsual * usual_poll_s_);
+  usual_poll_s_ = width_s < usual_poll_s_ ? usual_poll_s_ + (width_s - usual_poll_s_) / 4
+                                          : std::min(width_s, kGrowth * usual_poll_s_);
+  return stalled;
+}
+
 void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   const std::optional<ClockEstimate> clock = telemetry_clock_.update(
       sample.latest_time_s, sample.device_time_s, sample.sequence, sample.restarted);
@@ -74,6 +94,8 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   timed.pan = sample.pan_rad;
   timed.tilt = sample.tilt_rad;
   const double width_s = sample.latest_time_s - sample.earliest_time_s;
+  const bool line_holds = clock && clock->state == ClockState::kLocked;
+  if (options_.wait_for_pace && is_stalled_poll(sample) && !line_holds) return;
   if (clock) {
     timed.time_s = clock->time_s;
     timed.time_sigma_s = clock->sigma_s;
@@ -131,28 +153,31 @@ OrientationRecord OrientationStep::video_lost(double now_s) const {
 
 OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const ImageView& image,
                                              StepEvents* events) {
-  ClockEstimate clock;
-  clock.time_s = stamp.receive_time_s;
-  clock.sigma_s = options_.video_stamp_sigma_s;
-  clock.state = ClockState::kLocked;
-  clock = video_clock_
-              .update(stamp.receive_time_s, stamp.sender_time_s, stamp.sequence, stamp.restarted)
-              .value_or(clock);
+  const FrameTime frame_time = video_clock_.update(stamp);
+  const ClockEstimate& clock = frame_time.clock;
   events->video_clock_restarted = clock.restarted;
   events->video_delay_stepped = clock.delay_stepped;
   if (clock.restarted || clock.delay_stepped)
     minimum_delay_sigma_s_ = options_.minimum_delay_sigma_s;
   image_ = image;
   tracks_.stamp = stamp;
+  tracks_.stamp.receive_time_s -= frame_time.delay_shift_s;  // as if the delay had not stepped
   tracks_.time_s = clock.time_s;
+  tracks_.time_is_of_use = frame_time.of_use;
   tracks_.clock_restarted = clock.restarted;
   tracks_.delay_stepped = clock.delay_stepped;
   tracks_.tracker = FrameTracks::Tracker::kNone;
 
   OrientationRecord record = empty_record();
   record.frame = stamp.frame;
-  record.time_s = clock.time_s;
   record.receive_time_s = stamp.receive_time_s;
+  if (!frame_time.known) {
+    record.status = RecordStatus::kTimeUnknown;
+    if (finds_landmarks())
+      image_ = ImageView{};  // the map would learn from an angle of another time
+    return record;
+  }
+  record.time_s = clock.time_s;
   const Calibration& calibration = options_.calibration;
   const double to_middle_row_s = calibration.line_delay * (0.5 * calibration.camera.height);
   InterpolatedPanTilt measured;

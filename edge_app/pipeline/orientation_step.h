@@ -3,8 +3,10 @@
 // come. One way for the live pipeline and for a replay; pure: no thread, no clock of its own.
 //
 // A frame's time: sender clock, else sequence numbers, through the video's clock filter; without
-// both the receive time as it is. A sample's time likewise; without both it is the middle of
-// [earliest, latest], sigma = width / sqrt(12), each sample with an error of its own.
+// both the receive time as it is. Where it may have waited for nobody knows how long (frame_clock.h), it has no
+// time, and no orientation: "picture time unknown". A sample's time likewise; without both it is the middle of
+// [earliest, latest], sigma = width / sqrt(12), each sample with an error of its own; what took far longer than usual, by a
+// stall, is left out.
 // The frame's middle row is looked up in the telemetry at time + d at once (telemetry_buffer.h): if it lies beyond
 // the newest sample the angle is extrapolated, with growing sigma, for max_extrapolation_s, and beyond that there is
 // none: "telemetry too old" (record_status.h). Nothing waits for a later sample. When later samples enclose the frame,
@@ -30,6 +32,7 @@
 #include "core/realtime/telemetry/telemetry_buffer.h"
 #include "edge_app/pipeline/calibration_feed.h"
 #include "edge_app/pipeline/capture_clock.h"
+#include "edge_app/pipeline/frame_clock.h"
 #include "edge_app/pipeline/frame_landmarks.h"
 #include "edge_app/pipeline/orientation_record.h"
 #include "edge_app/pipeline/published_calibration.h"
@@ -41,6 +44,8 @@ namespace alidade {
 struct OrientationStepOptions {
   Calibration calibration;
   bool calibrated = false;  // passed on to the records
+  // Frames and telemetry are live: they may have waited before they were received.
+  bool wait_for_pace = false;
   ClockFilterOptions video_clock;
   ClockFilterOptions telemetry_clock;
   // One standard deviation of a receive time that has to do for the time itself, s.
@@ -108,6 +113,7 @@ class OrientationStep {
   [[nodiscard]] OrientationRecord empty_record() const;
   // False: there is a calibration, but not for the zoom that the pan/tilt source reports.
   [[nodiscard]] bool zoom_fits() const;
+  [[nodiscard]] bool is_stalled_poll(const PanTiltSample& sample);
   // Frames that extrapolated telemetry answered, and that telemetry encloses by this sample.
   void settle_pending_frames();
   // Completes a record that has its time and telemetry's status; measured: null if there is none.
@@ -115,7 +121,7 @@ class OrientationStep {
               OrientationRecord* record);
 
   OrientationStepOptions options_;
-  CaptureClock video_clock_;
+  FrameClock video_clock_;
   CaptureClock telemetry_clock_;
   Telemetry telemetry_;
   std::unique_ptr<OeMode> oe_;                // null: PT mode
@@ -127,6 +133,7 @@ class OrientationStep {
   FrameTracks tracks_;               // of the frame last added, but for its points
   bool telemetry_filtered_ = false;  // times in telemetry_ come from telemetry_clock_
   bool telemetry_lost_ = false;
+  double usual_poll_s_ = 0.01;  // from a question to its answer
 };
 
 }  // namespace alidade

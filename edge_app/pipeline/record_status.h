@@ -4,6 +4,7 @@
 // A status comes from one of these:
 //   TelemetryBuffer::query()   how the frame lies to the telemetry samples (QueryStatus)
 //   OeMode::process()          whether landmarks held (OeStatus); for frames that telemetry has an answer for
+//   FrameClock                 whether the frame's time is known
 //   OrientationStep            zoom, loss of the video
 //   RealtimeStage              images that came too late to be looked at
 // What a person reads of each, and what to do: edge_app/README.md.
@@ -22,6 +23,7 @@ enum class RecordMode : std::uint8_t { kNone, kPt, kOe };
 enum class RecordStatus : std::uint8_t {
   kOk,
   kClockWarmingUp,    // mode PT or OE: too few frames since the (re)start to know their times well
+  kTimeUnknown,       // the frame may have waited for nobody knows how long (FrameClock)
   kVideoLost,         // no connection to the video source
   kTelemetryLost,     // no connection to the pan/tilt source, and its last angle is too old
   kTelemetryMissing,  // fewer than two usable samples so far
@@ -38,9 +40,10 @@ enum class RecordStatus : std::uint8_t {
   kNotFinite              // a stamp is not a finite number
 };
 
-inline constexpr std::array<RecordStatus, 14> kRecordStatuses = {
+inline constexpr std::array<RecordStatus, 15> kRecordStatuses = {
     RecordStatus::kOk,
     RecordStatus::kClockWarmingUp,
+    RecordStatus::kTimeUnknown,
     RecordStatus::kVideoLost,
     RecordStatus::kTelemetryLost,
     RecordStatus::kTelemetryMissing,
@@ -80,6 +83,8 @@ constexpr const char* to_string(RecordStatus status) {
       return "ok";
     case RecordStatus::kClockWarmingUp:
       return "clock filter warming up";
+    case RecordStatus::kTimeUnknown:
+      return "picture time unknown";
     case RecordStatus::kVideoLost:
       return "video lost";
     case RecordStatus::kTelemetryLost:

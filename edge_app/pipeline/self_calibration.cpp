@@ -259,7 +259,7 @@ void SelfCalibration::add(const FrameTracks& tracks) {
     if (is_calibrated_here()) clock_offset_known_ = false;
   }
   judge_agreement(tracks);
-  if (tracks.tracker == FrameTracks::Tracker::kNone) return;
+  if (tracks.tracker == FrameTracks::Tracker::kNone || !tracks.time_is_of_use) return;
   if (tracks.tracker != tracker_) {
     begin_anew();
     tracker_ = tracks.tracker;

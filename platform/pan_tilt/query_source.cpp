@@ -245,6 +245,12 @@ bool QuerySource::take_bytes(const std::string& bytes, double now_s, PanTiltSamp
     return false;
   }
   open_ = 0;
+  if (std::exchange(first_is_old_, false)) {
+    protocol_->doubt();
+    pairing_.reset();
+    settle(now_s);
+    return false;
+  }
   if (answer.kind == Answer::Kind::kRefused) {
     until_s_ = now_s;  // given up at once
     refused_ = true;
@@ -323,6 +329,7 @@ ReadStatus QuerySource::read(PanTiltSample& sample, double timeout_s) {
           given_up_ = 0;
           late_s_ = 0;
           late_awaited_ = false;
+          first_is_old_ = open_ > 0;
           open_ = open_ > 0 ? 2 : 0;  // what was asked before is answered on a new connection, too
           due_s_ = now_s;
           settle(now_s);

@@ -9,7 +9,9 @@
 // that of a later query: the protocol asks next what is answered differently, and an answer to that shows
 // that nothing older is under way, for heads answer in order. If it is not answered either, the source
 // listens until four times that time, at least 1 s, has passed since the first of the two was sent: an
-// answer later than that can be taken for another's. Protocols that give one axis at a time yield a sample
+// answer later than that can be taken for another's. A converter that stood still for longer hands such a one to the
+// next connection: where queries were open at the end of the one before, the first answer is thrown away, and those
+// that come behind it as they find no query. Protocols that give one axis at a time yield a sample
 // for each tilt, with the pan of the same moment (AxisPairing). Signs and zeros turn what the device counts
 // into the axes of the model, in [-pi, pi).
 //
@@ -96,6 +98,7 @@ class QuerySource : public PanTiltSource {
   int open_ = 0;                // queries in a row without answers, which may still come
   double open_since_s_ = 0;     // when the first of them was sent
   bool refused_ = false;        // the latest query, by an answer
+  bool first_is_old_ = false;   // the next answer may be that of a query of the connection before
   bool late_awaited_ = false;   // the answer to the latest query, which was given up
   double late_s_ = 0;           // how long an answer took that was given up; 0: none did
   bool restarted_ = true;

@@ -3,6 +3,7 @@
 import json
 import pathlib
 import signal
+import time
 import unittest
 
 from harness import (CLOCK_OFFSET_MS, FOCAL_LENGTH_PX, IMAGE, LINE_DELAY_US, Process, SIMULATE, SystemTest,
@@ -102,6 +103,33 @@ class Run(SystemTest):
         code, _ = run.end(signal.SIGTERM)
         self.assertEqual(code, 0, run.error_text())
         self.assert_angles_are_true(after, second)
+
+    def test_claims_no_orientation_until_the_time_of_a_picture_is_known(self):
+        camera = self.camera(settings={"live": {"mjpeg_port": 0}})
+        all_claimed = []
+        for video in ({}, {"transport": "udp"}, {"type": "mjpeg", "url": camera.others["mjpeg"]}):
+            with self.subTest(video=video):
+                run = self.alidade("run", "-c", self.write_config(
+                    camera, video={"timeout_s": 2, "max_backoff_s": 0.2, **video}, pan_tilt={"max_backoff_s": 0.2}))
+                self.records(run, 50)
+                for stopped_s in (0.7, 4):
+                    camera.child.send_signal(signal.SIGSTOP)
+                    time.sleep(stopped_s)
+                    camera.child.send_signal(signal.SIGCONT)
+                    continued_s = time.monotonic()
+                    records = []
+                    while not records or records[-1]["receive_time_s"] < continued_s + 4:
+                        records.append(json.loads(run.line()))
+                    after = [r for r in records if r["frame"] is not None and r["receive_time_s"] > continued_s]
+                    claimed = [r for r in after if r["mode"] == "PT"]
+                    self.assertLess(claimed[0]["receive_time_s"], after[0]["receive_time_s"] + 3)
+                    if stopped_s > 2:
+                        self.assertEqual(after[0]["status"], "picture time unknown")
+                        self.assertIsNone(after[0]["time_s"])
+                    all_claimed += claimed
+                code, _ = run.end(signal.SIGTERM)
+                self.assertEqual(code, 0, run.error_text())
+        self.assert_angles_are_true(all_claimed, camera)
 
     def test_says_that_the_password_is_wrong(self):
         camera = self.camera(user="viewer")

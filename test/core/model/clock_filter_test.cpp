@@ -434,17 +434,38 @@ TEST(ClockFilter, FollowsAMinimumDelayThatFallsWhileWarmingUp) {
   EXPECT_LT(score.worst, 1e-3);
 }
 
-// What began before the lock is no step of a locked line: there was no sure minimum delay to keep.
-TEST(OneSidedClock, MovesToAMinimumDelayThatRoseJustBeforeTheLock) {
+// A calibration's clock offset may hold for a line from its first seconds on.
+TEST(ClockFilter, KeepsTheLineOverAMinimumDelayThatRisesWhileWarmingUp) {
+  for (const double step_s : {8e-3, 20e-3}) {
+    for (const double at_s : {2.0, 5.0, 7.0, 9.9}) {
+      for (unsigned seed = 1; seed <= 5; ++seed) {
+        SCOPED_TRACE(testing::Message() << step_s << " s at " << at_s << ", seed " << seed);
+        Stream stream;
+        stream.delay = stepping(4e-3, step_s, at_s, kInf);
+        ClockFilter<> filter;
+        stream.play(seed, 120, [&](double t, double host, double receive, std::int64_t) {
+          const ClockEstimate estimate = filter.update(receive, stream.sender_start_s + t);
+          // Until the rise is suspected the line follows some late items: settle_s / 20 at max_skew.
+          const double tilt_s = 0.5 * 200e-6;
+          EXPECT_LT(std::abs(estimate.time_s - host), 5 * estimate.sigma_s + tilt_s) << t;
+        });
+        EXPECT_EQ(filter.counters().delay_steps, 1);
+        EXPECT_NEAR(filter.delay_shift_s(), step_s, 5 * filter.delay_shift_sigma_s());
+      }
+    }
+  }
+}
+
+// A line that the others did not come down to is no minimum delay that rose.
+TEST(OneSidedClock, MovesToTheOtherItemsWhereOneHadDraggedItDown) {
   internal::OneSidedClock<256> clock{ClockFilterOptions{}};
   clock.start(0, {1, 200e-6});
   for (int i = 0; i < 60 * 25; ++i) {
     const double t = i / 25.0;
-    const double jitter_s = 0.2e-3 * (3 * i % 7);
-    const double receive = t + jitter_s + (t < 19.9 ? 0 : 20e-3);
+    const double receive = t + 0.2e-3 * (3 * i % 7) + (i == 20 * 25 - 1 ? 0 : 20e-3);
     EXPECT_FALSE(clock.learn({receive, t, receive, 1e-4, true})) << t;
     if (i == 20 * 25) clock.lock(receive);
-    if (t > 35) {
+    if (t > 40) {
       EXPECT_NEAR(clock.line().value_at(t), t + 20e-3, 0.1e-3);
     }
   }

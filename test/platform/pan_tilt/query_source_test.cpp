@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cmath>
@@ -532,6 +533,35 @@ TEST(QuerySource, AsksNothingOnANewConnectionWhileOldQueriesMayBeAnswered) {
   ASSERT_GT(count(), 3U);
   // 1 s after the last of them was sent, which the head may have taken a little later.
   EXPECT_GT(asked_s[3] - asked_s[2], 0.5);
+}
+
+// A converter between network and line stood still: the answer that it has kept is of long ago.
+TEST(QuerySource, ThrowsAwayAnAnswerKeptFromTheConnectionBefore) {
+  PelcoDHead before([] { return HeadPosition{10, 20, 0}; });
+  PelcoDHead now([] { return HeadPosition{30, 40, 0}; });
+  std::atomic<int> connections = 0;
+  RawServer server([&](int fd) {
+    const bool stands = ++connections == 1;
+    bool first = true;
+    std::array<char, 64> bytes{};
+    for (ssize_t n = 0; (n = ::recv(fd, bytes.data(), bytes.size(), 0)) > 0;) {
+      if (stands) continue;
+      const std::string query(bytes.data(), static_cast<std::size_t>(n));
+      std::vector<std::string> answers;
+      if (std::exchange(first, false)) answers = before.take(query);
+      for (const std::string& answer : now.take(query)) answers.push_back(answer);
+      for (const std::string& answer : answers) {
+        static_cast<void>(::send(fd, answer.data(), answer.size(), MSG_NOSIGNAL));
+      }
+    }
+  });
+  QuerySource source(std::make_unique<PelcoDProtocol>(PelcoDOptions{}),
+                     options_for("tcp://127.0.0.1:" + std::to_string(server.port())));
+  PanTiltSample sample;
+  ASSERT_EQ(read_until(source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  ASSERT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  EXPECT_LT(difference_deg(sample.pan_rad, 30), 0.1);
+  source.stop();
 }
 
 // Query and answer take longer on the wire than a quarter of the time-out, and the head as long again.

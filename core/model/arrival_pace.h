@@ -1,0 +1,147 @@
+#pragma once
+// ArrivalPace: do the items of a stream come at their sender's pace, or are they a backlog?
+//
+//   receive_i - sender_i = constant + delay_i + age_i
+//
+// Behind a stall (a relay, a network or a process that stood still) items wait, and then come faster than they were
+// sent: receive - sender falls until the last that waited is here. What it will fall to nobody knows while it falls, so
+// nobody knows the age of an item. The pace is shown by two neighbouring halves of a window: the least
+// receive - sender of the one is that of the other, and neither is a single item's. Minima, as delays are only ever too
+// long; that they agree to tolerance is asked for at both sides, as one that rises is a new stall.
+//   tolerance  kSame_s, or 3 standard deviations of the least of a half's n delays, were they exponential: their mean
+//              above the least, divided by n. A steady fall by D between the halves has a mean of D / 2 above the
+//              least, so 3 D / (2 n), and is no pace for any D beyond kSame_s: at the shortest window a backlog that
+//              is worked off 0.8 % faster than it grows.
+//   windows    kLeastHalf_s and its doubles, so that slow streams and delays with a rhythm (key frames) have theirs.
+//              Where a backlog was seen, from the double on: what remains of it may come more slowly.
+// A stream that is late by a constant cannot be told from a network with that delay.
+// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are seconds.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <type_traits>
+
+namespace alidade {
+
+class ArrivalPace {
+ public:
+  static constexpr double kBacklog_s = 0.1;  // longer waits are no jitter
+  static constexpr double kLeastHalf_s = 0.25;
+
+  // The stretch of items that shows the pace, without what was left of a backlog.
+  struct Shown {
+    std::size_t first = 0;  // of the items kept
+    double least_s = 0;     // its least receive - sender
+  };
+
+  void restart() {
+    size_ = begin_ = 0;
+    greatest_s_ = -std::numeric_limits<double>::infinity();
+  }
+
+  // Finite values. An item that was overtaken teaches nothing; one that is far back is of another clock.
+  void add(double receive_s, double sender_s) {
+    if (size_ > 0 && !(sender_s > item(size_ - 1).sender_s)) {
+      if (sender_s > item(size_ - 1).sender_s - kOvertaken_s) return;
+      restart();
+    }
+    if (size_ == kItems) {
+      begin_ = (begin_ + 1) % kItems;
+      --size_;
+    }
+    items_[(begin_ + size_) % kItems] = {receive_s, sender_s};
+    ++size_;
+    greatest_s_ = std::max(greatest_s_, receive_s - sender_s);
+  }
+
+  // By the items up to the last one; none: not shown, or no more. In windows with halves of least_half_s or more.
+  [[nodiscard]] std::optional<Shown> shown(double least_half_s = kLeastHalf_s) const {
+    if (size_ < 2 * kLeastItems) return std::nullopt;
+    const double now_s = item(size_ - 1).receive_s;
+    double half_s = kLeastHalf_s;
+    for (int i = 0; i < kWindows && item(0).receive_s <= now_s - 2 * half_s; ++i, half_s *= 2) {
+      if (half_s < least_half_s) continue;
+      const Half young = half(size_, now_s - half_s);
+      const Half old = half(young.first, now_s - 2 * half_s);
+      if (!young.stands() || !old.stands()) continue;
+      const double tolerance_s = std::max(kSame_s, 3 * std::max(young.spread_s(), old.spread_s()));
+      const double least_s = std::min(young.least_s, old.least_s);
+      if (std::abs(young.least_s - old.least_s) > tolerance_s) continue;
+      if (i == 0 && saw_backlog(least_s)) continue;
+      std::size_t first = old.first;
+      while (item(first).receive_s - item(first).sender_s > least_s + kBacklog_s) ++first;
+      return Shown{first, least_s};
+    }
+    return std::nullopt;
+  }
+
+  // Has an item since the restart waited for longer than those of this level?
+  [[nodiscard]] bool saw_backlog(double least_s) const {
+    return greatest_s_ > least_s + kBacklog_s;
+  }
+
+  // The latest items, oldest first.
+  [[nodiscard]] std::size_t size() const { return size_; }
+  [[nodiscard]] double receive_s(std::size_t i) const { return item(i).receive_s; }
+  [[nodiscard]] double sender_s(std::size_t i) const { return item(i).sender_s; }
+
+ private:
+  static constexpr std::size_t kItems = 128;
+  static constexpr std::size_t kLeastItems = 2;  // in a half
+  static constexpr int kWindows = 6;             // up to 8 s
+  static constexpr double kSame_s = 2e-3;
+  static constexpr double kNear_s = 5e-3;
+  static constexpr double kOvertaken_s = 1;
+
+  struct Item {
+    double receive_s;
+    double sender_s;
+  };
+  struct Half {
+    std::size_t first = 0;
+    std::size_t items = 0;
+    double least_s = std::numeric_limits<double>::infinity();
+    double second_s = std::numeric_limits<double>::infinity();  // the least but one
+    double sum_s = 0;
+
+    // Standard deviation of the least, were the delays exponential.
+    [[nodiscard]] double spread_s() const {
+      const auto n = static_cast<double>(items);
+      return (sum_s / n - least_s) / n;
+    }
+    // Not a moment on the way down.
+    [[nodiscard]] bool stands() const {
+      return items >= kLeastItems && second_s - least_s <= std::max(kNear_s, spread_s());
+    }
+  };
+
+  [[nodiscard]] const Item& item(std::size_t i) const { return items_[(begin_ + i) % kItems]; }
+
+  // The items before `end` that were received at since_s or later.
+  [[nodiscard]] Half half(std::size_t end, double since_s) const {
+    Half half;
+    half.first = end;
+    while (half.first > 0 && item(half.first - 1).receive_s >= since_s) {
+      --half.first;
+      ++half.items;
+      const double level_s = item(half.first).receive_s - item(half.first).sender_s;
+      half.sum_s += level_s;
+      half.second_s = std::min(half.second_s, std::max(half.least_s, level_s));
+      half.least_s = std::min(half.least_s, level_s);
+    }
+    return half;
+  }
+
+  std::array<Item, kItems> items_{};
+  std::size_t begin_ = 0;
+  std::size_t size_ = 0;
+  double greatest_s_ = -std::numeric_limits<double>::infinity();  // receive - sender
+};
+
+static_assert(std::is_trivially_copyable_v<ArrivalPace>);
+
+}  // namespace alidade

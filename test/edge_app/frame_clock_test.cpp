@@ -1,0 +1,233 @@
+// Which live frames have a time. Streams without jitter; stall_test.cpp has it.
+
+#include "edge_app/pipeline/frame_clock.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+
+namespace alidade {
+namespace {
+
+constexpr double kInterval_s = 0.04;
+
+// A stream of 25 Hz whose sender's clock is 90 s ahead of the host's.
+class FrameClockTest : public testing::Test {
+ protected:
+  FrameTime add(double captured_s, double received_s, bool restarted = false) {
+    FrameStamp stamp;
+    stamp.receive_time_s = received_s;
+    stamp.restarted = restarted;
+    if (has_sender_) stamp.sender_time_s = captured_s + sender_ahead_s_;
+    return clock_.update(stamp);
+  }
+  // Fresh frames; the number of them that are known.
+  int play(double from_s, double to_s, bool restarted = false) {
+    int known = 0;
+    for (double t = from_s; t < to_s - 1e-6; t += kInterval_s) {
+      const FrameTime time = add(t, t, restarted && t == from_s);
+      known += time.known ? 1 : 0;
+      if (time.known) {
+        EXPECT_NEAR(time.clock.time_s, t, 5 * time.clock.sigma_s) << t;
+      }
+    }
+    return known;
+  }
+
+  double sender_ahead_s_ = 90;
+  bool has_sender_ = true;
+  FrameClock clock_{ClockFilterOptions{}, 5e-3, true};
+};
+
+TEST_F(FrameClockTest, ARecordingIsAnsweredFromTheFirstFrameOn) {
+  FrameClock clock(ClockFilterOptions{}, 5e-3, false);
+  CaptureClock plain{ClockFilterOptions{}};
+  for (int i = 0; i < 100; ++i) {
+    FrameStamp stamp;
+    stamp.receive_time_s = kInterval_s * i;
+    stamp.sender_time_s = 90 + kInterval_s * i;
+    const FrameTime time = clock.update(stamp);
+    EXPECT_TRUE(time.known && time.of_use);
+    EXPECT_EQ(time.clock.time_s,
+              plain.update(stamp.receive_time_s, stamp.sender_time_s, std::nullopt, false)->time_s);
+  }
+}
+
+TEST_F(FrameClockTest, WaitsForThePaceAndThenKnowsWhatItWouldHaveKnown) {
+  CaptureClock plain{ClockFilterOptions{}};
+  int unknown = 0;
+  for (int i = 0; i < 100; ++i) {
+    const double t = kInterval_s * i;
+    const FrameTime time = add(t, t);
+    const auto expected = plain.update(t, t + 90, std::nullopt, false);
+    unknown += time.known ? 0 : 1;
+    EXPECT_TRUE(time.of_use);
+    EXPECT_FALSE(time.clock.restarted);
+    if (time.known) {
+      EXPECT_EQ(time.clock.time_s, expected->time_s) << i;
+      EXPECT_EQ(time.clock.sigma_s, expected->sigma_s) << i;
+    }
+  }
+  EXPECT_EQ(unknown, 13);  // half a second
+}
+
+TEST_F(FrameClockTest, ABacklogAfterAReconnectionHasNoTimeAndLeavesNoTrace) {
+  play(0, 20);
+  sender_ahead_s_ = 5000;
+  for (int i = 0; i < 100; ++i) {
+    const FrameTime time = add(20 + kInterval_s * i, 27 + 2e-3 * i, i == 0);
+    EXPECT_FALSE(time.known) << i;
+    EXPECT_EQ(time.clock.restarted, i == 0);
+  }
+  // A second at the pace; the frames behind the backlog begin another line than those in it.
+  int restarts = 0;
+  int unknown = 0;
+  for (double t = 27.2; t < 32; t += kInterval_s) {
+    const FrameTime time = add(t, t);
+    restarts += time.clock.restarted ? 1 : 0;
+    unknown += time.known ? 0 : 1;
+    if (time.known) {
+      EXPECT_NEAR(time.clock.time_s, t, 5 * time.clock.sigma_s);
+      EXPECT_LT(time.clock.sigma_s, 3e-3);
+    }
+  }
+  EXPECT_EQ(restarts, 1);
+  EXPECT_LE(unknown, 27);
+}
+
+// Where only few frames show the pace, those of the backlog would be the better part of the line's.
+TEST_F(FrameClockTest, TheSigmaOfASlowStreamIsOfTheFramesBehindTheBacklog) {
+  for (int i = 0; i < 60; ++i) EXPECT_FALSE(add(0.1 * i, 6 + 2e-3 * i).known);
+  std::optional<double> first_sigma_s;
+  for (int i = 62; i < 120; ++i) {
+    const FrameTime time = add(0.1 * i, 0.1 * i);
+    if (time.known && !first_sigma_s) first_sigma_s = time.clock.sigma_s;
+  }
+  ASSERT_TRUE(first_sigma_s);
+  EXPECT_LT(*first_sigma_s, ClockFilterOptions{}.expected_jitter_s);
+}
+
+TEST_F(FrameClockTest, TheLineHoldsForWhatWaitsOnceTheSendersClockWasSeenToRunOn) {
+  play(0, 15);
+  for (const double stall_s : {15.0, 20.0}) {
+    for (int i = 0; i < 25; ++i) {
+      const double t = stall_s + kInterval_s * i;
+      const double received_s = stall_s + 1 + 1e-3 * i;
+      const FrameTime time = add(t, received_s);
+      const bool late = received_s > t + ArrivalPace::kBacklog_s;
+      EXPECT_EQ(time.known, stall_s == 20 || !late) << t;
+      EXPECT_NEAR(time.clock.time_s, t, 1e-3) << t;
+    }
+    EXPECT_EQ(play(stall_s + 1, stall_s + 5), 100);
+  }
+}
+
+TEST_F(FrameClockTest, ASenderThatStoodStillWithItsClockBeginsAnew) {
+  play(0, 15);
+  sender_ahead_s_ -= 2;
+  int unknown = 0;
+  bool restarted = false;
+  for (double t = 17; t < 24; t += kInterval_s) {
+    const FrameTime time = add(t, t);
+    unknown += time.known ? 0 : 1;
+    restarted = restarted || time.clock.restarted;
+    if (time.known) {
+      EXPECT_NEAR(time.clock.time_s, t, 5 * time.clock.sigma_s) << t;
+    }
+  }
+  EXPECT_TRUE(restarted);
+  EXPECT_LT(unknown, 45);
+}
+
+TEST_F(FrameClockTest, AFrameBeforeAYoungLineTellsThatAllBeforeHadWaited) {
+  for (double t = 0; t < 2; t += kInterval_s) add(t, t + 0.3);
+  const FrameTime time = add(2, 2);
+  EXPECT_FALSE(time.known);
+  EXPECT_TRUE(time.clock.restarted);
+  EXPECT_GE(play(2.04, 5), 60);
+}
+
+TEST_F(FrameClockTest, AStampOfAnotherKindIsLeftOutUntilTheThirdInARow) {
+  play(0, 5);
+  has_sender_ = false;
+  EXPECT_FALSE(add(5, 5).known);
+  has_sender_ = true;
+  EXPECT_EQ(play(5.04, 6), 24);
+  EXPECT_FALSE(add(6, std::numeric_limits<double>::quiet_NaN()).known);
+  EXPECT_EQ(play(6.04, 7), 24);
+  has_sender_ = false;
+  // From the third on it learns a period, for a second.
+  EXPECT_GE(play(7, 12), 90);
+}
+
+TEST_F(FrameClockTest, ARestartIsNotForgottenOverAFrameThatCannotBeUsed) {
+  play(0, 5);
+  sender_ahead_s_ = -400;
+  EXPECT_FALSE(add(5, std::numeric_limits<double>::infinity(), true).known);
+  EXPECT_TRUE(add(5.04, 5.04).clock.restarted);
+}
+
+class ReceiptClockTest : public testing::Test {
+ protected:
+  int play(double from_s, double to_s, double period_s = kInterval_s) {
+    int known = 0;
+    for (double t = from_s; t < to_s - 1e-6; t += period_s) {
+      const ReceiptClock::Answer answer = clock_.update(t);
+      known += answer.known ? 1 : 0;
+      if (answer.known) {
+        EXPECT_NEAR(answer.time_s, t, 5 * answer.sigma_s) << t;
+      }
+    }
+    return known;
+  }
+  ReceiptClock clock_{5e-3};
+};
+
+TEST_F(ReceiptClockTest, KnowsAfterASecond) {
+  EXPECT_EQ(play(0, 1), 0);
+  EXPECT_GE(play(1, 5), 98);
+}
+
+TEST_F(ReceiptClockTest, WhatWaitedIsOfUnknownAgeUntilAllHasCome) {
+  play(0, 10);
+  for (int i = 0; i < 25; ++i) {
+    const double captured_s = 10 + kInterval_s * i;
+    const double late_s = 11 + 1e-3 * i - captured_s;
+    const ReceiptClock::Answer answer = clock_.update(11 + 1e-3 * i);
+    if (answer.known) {
+      EXPECT_LT(late_s, ReceiptClock::kLongest_s + 0.02);
+      EXPECT_NEAR(answer.time_s, captured_s, 5 * answer.sigma_s);
+    }
+  }
+  EXPECT_EQ(play(11.02, 15), 100);
+}
+
+TEST_F(ReceiptClockTest, WhereSomeWereLostThePaceTells) {
+  play(0, 10);
+  EXPECT_FALSE(clock_.update(11).known);
+  EXPECT_FALSE(clock_.update(11.001).known);
+  EXPECT_GE(play(11.04, 15), 70);
+}
+
+TEST_F(ReceiptClockTest, AnotherRateIsLearntSoonerIfItIsSlower) {
+  play(0, 10);
+  EXPECT_GE(play(10, 20, 0.1), 80);
+  EXPECT_LE(play(20, 49), 1);
+  EXPECT_GE(play(49, 60), 200);
+}
+
+TEST_F(ReceiptClockTest, RemembersThePeriodOverAReconnection) {
+  play(0, 10);
+  clock_.restart();
+  // Evenly, and as fast as a camera of 60 Hz.
+  for (int i = 0; i < 120; ++i) {
+    EXPECT_FALSE(clock_.update(15 + i / 60.0).known) << i;
+  }
+  EXPECT_GE(play(17, 20), 45);
+}
+
+}  // namespace
+}  // namespace alidade
