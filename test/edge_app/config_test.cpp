@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <string>
 
+#include "edge_app/config/nearest_word.h"
 #include "edge_app/config/noise_file.h"
 #include "test/platform/support/head_kinds.h"
 #include "test/support/temporary_directory.h"
@@ -599,6 +600,22 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"ZoomIsNotFixed", MINIMAL "camera: {zoom: auto}\n", ":4: camera.zoom",
                 "expected one of fixed"}),
     [](const ::testing::TestParamInfo<Mistake>& tested) { return std::string(tested.param.name); });
+
+TEST(NearestWord, ForgivesOneSlipInThreeLetters) {
+  const std::vector<std::string> known = {"run", "record", "replay", "calibrate", "check"};
+  for (const auto& [typed, meant] :
+       {std::pair("rnu", "run"), std::pair("rum", "run"), std::pair("runn", "run"),
+        std::pair("recrod", "record"), std::pair("calibarte", "calibrate"),
+        std::pair("calbrat", "calibrate"), std::pair("relpay", "replay")}) {
+    EXPECT_EQ(nearest_word(typed, known), std::optional<std::string>(meant)) << typed;
+  }
+  for (const char* typed : {"", "r", "fly", "rut2", "calib", "checkers-board"}) {
+    EXPECT_EQ(nearest_word(typed, known), std::nullopt) << typed;
+  }
+  EXPECT_EQ(nearest_word("rep", {"red", "reps"}), "red") << "the first of those as near";
+  EXPECT_EQ(did_you_mean("rnu", known), "; did you mean run?");
+  EXPECT_EQ(did_you_mean("fly", known), "");
+}
 
 TEST(NoiseFile, IsOptional) {
   const TemporaryDirectory directory;
