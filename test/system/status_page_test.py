@@ -176,6 +176,29 @@ class StatusPage(SystemTest):
         self.wait_for_text("seen", r"frame \d+: .*used")
         self.assert_no_errors_but(f"{LATE}|{AWAY}")
 
+    def test_says_which_link_is_lost_and_why_and_that_it_is_back(self):
+        ports = {"rtsp_port": free_port(), "http_port": free_port()}
+        camera = self.camera(settings=SETTINGS, **ports)
+        _, address = self.start(self.config(camera))
+        self.browser.get(address)
+        self.wait_for_text("link", "^live$")
+        self.wait_for_text("health", r"Video link[\d.]+ a second; newest now; back again 0 times"
+                                     r"Pan/tilt link[\d.]+ a second; newest now; back again 0 times")
+        camera.end(signal.SIGKILL)
+        self.wait_for_text("link", "^video lost$")
+        self.assertEqual(self.browser.execute_script("return document.body.dataset.link"), "lost")
+        self.wait_for_text("mode", "^none$")
+        self.wait_for_text("why", r"There is no connection to the video: rtsp://127\.0\.0\.1:\d+/.*refused")
+        self.wait_for_text("health", r"Pan/tilt linkhttp://127\.0\.0\.1:\d+/.*; newest \d+ s old")
+        for width in (1280, 390):
+            self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
+                "width": width, "height": 844, "deviceScaleFactor": 1, "mobile": width < 500})
+            self.assertEqual(self.browser.execute_script("return document.documentElement.scrollWidth > innerWidth"), False, width)
+        self.camera(settings=SETTINGS, seed=2, **ports)
+        self.wait_for_text("link", "^live$")
+        self.wait_for_text("health", r"Video link[\d.]+ a second; newest now; back again 1 times")
+        self.assert_no_errors_but(LATE)
+
     def test_asks_for_the_token_and_keeps_it_for_this_tab(self):
         _, address = self.start(self.config(self.camera(settings=SETTINGS), token_env="TEST_TOKEN"),
                                 TEST_TOKEN=TOKEN)
