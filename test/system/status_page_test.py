@@ -30,6 +30,19 @@ LATE = r"/api/v1/picture.*status of 503|/api/v1/(direction|pixel).*status of (40
 AWAY = r"ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_EMPTY_RESPONSE|ERR_INCOMPLETE_CHUNKED_ENCODING|status of 401"
 
 
+# What is drawn on a canvas as text, and what of it does not fit into it.
+TELL_CLIPPED_TEXT = """
+    window.drawn = new Set();
+    window.clipped = new Set();
+    const draw = CanvasRenderingContext2D.prototype.fillText;
+    CanvasRenderingContext2D.prototype.fillText = function (text, u, v) {
+      const size = this.measureText(text);
+      drawn.add(text);
+      if (u - size.actualBoundingBoxLeft < 0 || u + size.actualBoundingBoxRight > this.canvas.clientWidth) clipped.add(text);
+      return draw.call(this, text, u, v);
+    };"""
+
+
 class StatusPage(SystemTest):
     def setUp(self):
         super().setUp()
@@ -221,6 +234,7 @@ class StatusPage(SystemTest):
     def test_fits_a_phone_and_says_why_there_is_no_picture(self):
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
             "width": 390, "height": 844, "deviceScaleFactor": 3, "mobile": True})
+        self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": TELL_CLIPPED_TEXT})
         _, address = self.start(self.config(self.camera(settings=SETTINGS), mode="PT"))
         self.browser.get(address)
         self.wait_for_text("link", "^live$")
@@ -239,6 +253,8 @@ class StatusPage(SystemTest):
             return [...document.querySelectorAll('body *')].filter((one) => !one.classList.contains('unseen') &&
               (one.getBoundingClientRect().right > innerWidth || one.getBoundingClientRect().left < 0)).map((one) => one.id || one.tagName)""")
         self.assertEqual(too_wide, [])
+        self.assertEqual(self.browser.execute_script("return [...clipped]"), [])
+        self.assertGreater(self.browser.execute_script("return drawn.size"), 10)
         self.assert_no_errors_but(LATE)
 
 
