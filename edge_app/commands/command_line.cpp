@@ -127,6 +127,7 @@ void add_check(CLI::App& app, int* exit_code) {
   command->add_option("--duration", options->duration_s, "Seconds to measure each stream for")
       ->check(is_duration)
       ->capture_default_str();
+  command->add_flag("--json", options->json, "The report on stdout as one line of JSON");
   command->callback([options, exit_code] { *exit_code = check_links(*options); });
 }
 
