@@ -30,7 +30,7 @@ endif()
 # source includes what it needs nevertheless: the build for fuzzing has neither preludes nor sources compiled as one, and shows it.
 function(alidade_prelude name)
   cmake_parse_arguments(A "" "" "HEADERS;LINK;OPTIONS" ${ARGN})
-  if(ALIDADE_SANITIZE OR ALIDADE_FUZZ OR CMAKE_CROSSCOMPILING)
+  if(ALIDADE_FUZZ)
     return()
   endif()
   add_library(alidade_${name}_prelude OBJECT ${PROJECT_SOURCE_DIR}/cmake/prelude.cpp)

@@ -86,7 +86,7 @@ void add_record_metrics(const OrientationRecord& newest, MetricsText* out) {
   }
   if (newest.telemetry_age_s) {
     out->gauge("alidade_telemetry_age_seconds",
-               "How far the newest frame lies beyond the newest telemetry sample");
+               "How far the newest frame lies beyond the newest trusted angle of telemetry");
     out->add(*newest.telemetry_age_s);
   }
   out->gauge("alidade_video_clock_locked", "1: the video's clock filter knows its line");

@@ -36,7 +36,7 @@ struct FrameTracks {
   bool clock_restarted = false;                  // the frame clock began anew with this frame
   bool delay_stepped = false;                    // the least delay of the video stepped
   OeStatus oe_status = OeStatus::kNoPrediction;  // kOe
-  int looked_for = 0;                            // points expected in the image
+  int looked_for = 0;                            // landmarks chosen, or points expected
   int count = 0;
   std::array<TrackedPoint, kMaxFramePoints> points;  // the first `count`
 };

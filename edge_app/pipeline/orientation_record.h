@@ -50,7 +50,7 @@ struct OrientationRecord {
   // Root mean square of their residuals' lengths, px; none but in mode OE.
   std::optional<double> residual_px;
   PlainCalibration camera;  // the calibration in use
-  // How far the frame's middle row, looked up at time_s + clock offset, lies beyond the newest telemetry sample, s: what
+  // How far the frame's middle row, looked up at time_s + clock offset, lies beyond the newest trusted angle of telemetry, s: what
   // max_extrapolation_s bounds. Negative: samples enclose it. None without a sample.
   std::optional<double> telemetry_age_s;
   std::optional<double> latency_s;  // record made minus receive time; none in a replay

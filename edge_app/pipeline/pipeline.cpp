@@ -257,7 +257,7 @@ void Pipeline::count(const OutputMessage& message) {
   if (message.events.video_delay_stepped) ++summary_.delay_steps;
 }
 
-// Nothing else in the log tells why such records have none of telemetry: both connections are there.
+// Nothing else in the log tells why such records have no angle of telemetry: no connection is known to be lost.
 void Pipeline::log_old_telemetry(const OrientationRecord& record) {
   if (record.status != RecordStatus::kTelemetryTooOld || !record.telemetry_age_s) return;
   const double now_s = monotonic_now_s();
@@ -265,7 +265,7 @@ void Pipeline::log_old_telemetry(const OrientationRecord& record) {
   spdlog::warn(
       "{}: {} at frame {}: it lies {:.0f} ms beyond the newest angle that is trusted, and "
       "realtime.max_extrapolation_s is {:.0f} ms; raise it or pan_tilt.rate_hz, or lower "
-      "pan_tilt.max_repeat_s",
+      "pan_tilt.max_repeat_s as far as `alidade check` allows",
       pan_tilt_.name(), to_string(record.status), *record.frame, 1e3 * *record.telemetry_age_s,
       1e3 * options_.step.telemetry_limits.max_extrapolation_s);
   old_telemetry_logged_at_s_ = now_s;

@@ -23,7 +23,7 @@ enum class RecordStatus : std::uint8_t {
   kOk,
   kClockWarmingUp,    // mode PT or OE: too few frames since the (re)start to know their times well
   kVideoLost,         // no connection to the video source
-  kTelemetryLost,     // no connection to the pan/tilt source, and its last sample is too old
+  kTelemetryLost,     // no connection to the pan/tilt source, and its last angle is too old
   kTelemetryMissing,  // fewer than two usable samples so far
   // The frame lies more than TelemetryLimits::max_extrapolation_s beyond the newest angle that is trusted; by how much
   // says OrientationRecord::telemetry_age_s. What decides it, and which key to change: edge_app/config/README.md.

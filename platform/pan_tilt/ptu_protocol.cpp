@@ -122,7 +122,8 @@ void PtuProtocol::ask_fence_next(bool of_number) {
 }
 
 void PtuProtocol::doubt() {
-  if (!options_.verbose) {
+  const bool behind_fence = asked_ == Asked::kFence && !fence_is_number_;
+  if (!options_.verbose && !behind_fence) {
     ask_fence_next(false);
   }
 }

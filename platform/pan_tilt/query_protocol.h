@@ -47,9 +47,10 @@ struct Answer {
   Kind kind = Kind::kNone;
   double pan_deg = 0;
   double tilt_deg = 0;
-  double zoom = 0;        // device units
+  double zoom = 0;        // device units, 0 to 65535
   std::size_t begin = 0;  // index of the answer's first byte, below the number of bytes searched
-  std::string problem;    // what the device said, or what is wrong with what came; may be empty
+  // What the device said, or what is wrong with what came: one line of less than 200 bytes. Never empty of kRefused.
+  std::string problem;
 };
 
 class QueryProtocol {
@@ -66,7 +67,9 @@ class QueryProtocol {
   [[nodiscard]] virtual std::string give_up() = 0;
 
   // Bytes came that nobody asked for. Where it matters next() asks a fence, as also after every
-  // kQueriesPerFence queries: one answer too many makes each answer that of the query before.
+  // kQueriesPerFence queries: one answer too many makes each answer that of the query before. Not behind
+  // a fence that was answered: what comes then is younger than it, and where each answer comes twice
+  // fence would follow upon fence.
   virtual void doubt() = 0;
   // Whether each datagram is to be searched alone (over UDP), not together with those before it.
   [[nodiscard]] virtual bool is_of_datagrams() const = 0;

@@ -16,7 +16,7 @@ struct LandmarkStatistics {
   std::uint32_t looked_for = 0;  // frames
   std::uint32_t matched = 0;     // of these
   std::uint16_t missed_in_a_row = 0;
-  std::uint32_t last_frame = 0;  // count of frames when it was last looked for
+  std::uint32_t last_frame = 0;  // count of frames when made or last looked for; 0: handed over
   // Mean square of the normalised residual when matched, running: 1 if its covariances are right.
   float residual_square = 1;
 };

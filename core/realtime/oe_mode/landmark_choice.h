@@ -2,10 +2,9 @@
 // LandmarkChoice: which of the visible fine landmarks are looked for in a frame. This is the one place that
 // decides it: to choose otherwise, change choose(). README.md of this folder says what such a change touches.
 //
-// Up to max_chosen visible fine landmarks: all of them, in their order; preferences begin where there are more (with
-// the defaults, from images of 1280x720 on). Then the image is divided into columns x rows parts, of each part the
+// Up to max_chosen visible fine landmarks: all of them, in their order; preferences begin where there are more. Then the image is divided into columns x rows parts, of each part the
 // most reliable landmark comes first, parts in strides, so that a small max_chosen is spread over the image too;
-// what room is left goes to the others in their order.
+// what room is left goes to the others in their order. The same inputs give the same choice: it is made anew within a frame.
 // Reliable is what matched when it was looked for (rule of succession), halved for each octave further up,
 // which sees half as sharply.
 // Memory is taken by the constructor; nothing else allocates. One thread.
@@ -25,8 +24,8 @@ struct LandmarkChoiceOptions {
   static constexpr int kMaxParts = 96;                   // in each direction
 
   int max_chosen = 200;  // landmarks, 1 to kMaxChosen
-  // Parts of the image, 1 to kMaxParts. Where more of them than max_chosen have a landmark, the last of the strides
-  // get none.
+  // Parts of the image, 1 to kMaxParts. Where more of them than max_chosen have a landmark, some get none, spread over
+  // the image.
   int columns = 20;
   int rows = 12;
 

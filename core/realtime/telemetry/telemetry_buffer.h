@@ -35,7 +35,7 @@ struct TelemetrySample {
 
 struct TelemetryLimits {
   double max_gap_s = 0.5;             // no answer between samples further apart
-  double max_extrapolation_s = 0.25;  // before the oldest and after the newest sample
+  double max_extrapolation_s = 0.25;  // before the oldest sample and after the newest trusted angle
   double max_repeat_s = 0.1;          // 0 = the device measures afresh for every poll
 
   // False and one line in *error (if not null) when a value is not valid.
@@ -65,7 +65,7 @@ enum class QueryStatus {
   kEmpty,
   kOneSample,        // no rate
   kBeforeTelemetry,  // further before the oldest sample than may be extrapolated
-  kTelemetryTooOld,  // further after the newest sample than max_extrapolation_s
+  kTelemetryTooOld,  // further after the newest trusted angle than max_extrapolation_s
   kGap,              // the samples around this time are too far apart
   kNotFinite  // the time is not finite, its sigma is not one, or the result cannot be represented
 };
@@ -168,6 +168,7 @@ class TelemetryBuffer {
   }
 
   [[nodiscard]] std::size_t size() const { return size_; }
+  // Of the newest trusted angle: the newest sample's, or of stale repeats max_repeat_s before the last of them.
   [[nodiscard]] std::optional<double> newest_time() const {
     if (size_ == 0) return std::nullopt;
     return knot(size_ - 1).time_s;

@@ -301,9 +301,12 @@ TEST(PtMode, TurnsTheMeasuredCovarianceIntoTheTrueOneAtRow0) {
 }
 
 TEST(PtMode, AddsWhatAnAccelerationDoesToTheRows) {
-  const Calibration calibration = simple_calibration(-50e-6);
+  Calibration calibration = simple_calibration(-50e-6);
+  calibration.mechanics.pan_scale = 1.5;
+  calibration.mechanics.tilt_scale = 0.5;
   InterpolatedPanTilt measured;
-  measured.acceleration_square = {4, 9};
+  // As measured: true ones of 2 and 3 rad/s^2.
+  measured.acceleration_square = {4 * 1.5 * 1.5, 9 * 0.5 * 0.5};
   FrameOrientation frame;
   ASSERT_TRUE(pt_orientation(calibration, 0, measured, &frame));
   double mean = 0;
@@ -314,6 +317,33 @@ TEST(PtMode, AddsWhatAnAccelerationDoesToTheRows) {
   }
   EXPECT_NEAR(frame.motion_covariance(0, 0), 4 * mean, 1e-3 * mean);
   EXPECT_NEAR(frame.motion_covariance(1, 1), 9 * mean, 1e-3 * mean);
+}
+
+// The same telemetry by one calibration and by another, at all rows of the frame.
+TEST(PtMode, FollowsClockOffsetAndLineDelayAsItsSensitivitySays) {
+  TelemetryBuffer<32> telemetry;
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_EQ(telemetry.push({0.05 * i, 0, 0.3 * 0.05 * i, -0.1 * 0.05 * i}), PushStatus::kStored);
+  }
+  const Calibration calibration = simple_calibration(50e-6);
+  const auto angle_with = [&](Parameter parameter, double change, FrameOrientation* frame) {
+    Calibration changed = calibration;
+    if (parameter == Parameter::kLineDelay) changed.line_delay += change;
+    if (parameter == Parameter::kClockOffset) changed.clock_offset += change;
+    EXPECT_EQ(pt_orientation(changed, telemetry, 0.2, 0, frame), QueryStatus::kOk);
+    return frame->angle.vector();
+  };
+  for (const Parameter parameter : {Parameter::kLineDelay, Parameter::kClockOffset}) {
+    const double step = parameter == Parameter::kLineDelay ? 1e-6 : 1e-3;
+    FrameOrientation frame;
+    const Vector2<double> numeric =
+        (angle_with(parameter, step, &frame) - angle_with(parameter, -step, &frame)) / (2 * step);
+    angle_with(parameter, 0, &frame);
+    const Vector2<double> told = frame.motion_sensitivity.col(index(parameter)).head<2>();
+    EXPECT_LT((told - numeric).norm(), 1e-6) << to_string(parameter);
+    EXPECT_EQ(numeric.norm() > 0.1, parameter == Parameter::kClockOffset)
+        << "row 0 is looked up at its own time";
+  }
 }
 
 TEST(PtMode, SaysWhyThereIsNoOrientation) {

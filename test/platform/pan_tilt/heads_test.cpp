@@ -96,6 +96,7 @@ class Conversation {
   Conversation& operator=(const Conversation&) = delete;
 
   void turn_to(const HeadPosition& position) { position_ = position; }
+  void doubt() { protocol_->doubt(); }
 
   // The head's reply, without looking for the answer in it.
   Turn ask() {
@@ -201,6 +202,26 @@ TEST_P(EveryHeadKind, AsksSomethingElseAfterAQueryWithoutAnAnswer) {
     const std::string unanswered = protocol_->next().bytes;
     static_cast<void>(protocol_->give_up());
     EXPECT_NE(protocol_->next().bytes, unanswered) << "query " << before;
+  }
+}
+
+// One answer too many would make each answer that of the query before, for ever.
+TEST_P(EveryHeadKind, AsksAFenceInDoubtAndNowAndThenWhereRepeatsDoNotShow) {
+  if (head_.abilities.shows_repeats) return;
+  Conversation conversation(GetParam());
+  const auto is_fence = [&] { return !Conversation::is_reading(conversation.next().answer); };
+  for (int lead = 0; lead < kQueriesPerFence; lead += 7) {
+    for (int i = 0; i < lead; ++i) conversation.next();
+    conversation.reading();
+    conversation.doubt();
+    EXPECT_TRUE(is_fence()) << lead << " queries later";
+    conversation.doubt();
+    EXPECT_FALSE(is_fence()) << "one fence is enough";
+  }
+  int without_fence = 0;
+  for (int i = 0; i < 4 * kQueriesPerFence; ++i) {
+    without_fence = is_fence() ? 0 : without_fence + 1;
+    ASSERT_LE(without_fence, kQueriesPerFence);
   }
 }
 

@@ -32,7 +32,7 @@ using ::testing::Not;
 using ::testing::StartsWith;
 
 constexpr double kNever_s = 1e6;
-constexpr int kReadingsBetweenSilences = 33;  // 64 queries of two axes, see query_source.h
+constexpr int kReadingsBetweenFences = kQueriesPerFence / 2 + 1;  // each axis asked by itself
 
 double difference_deg(double a_rad, double b_deg) {
   return std::abs(std::remainder(a_rad / kRadPerDeg - b_deg, 360));
@@ -265,7 +265,7 @@ TEST_P(LineWithFaults, CostsAnswersOnly) {
     int right = 0;
     EXPECT_TRUE(eventually([&] {
       right = is_right() ? right + 1 : 0;
-      return right == kReadingsBetweenSilences;
+      return right == kReadingsBetweenFences;
     }));
   }
 }

@@ -28,7 +28,7 @@ struct HeadVariant {
   HeadType type{};   // that of its head in kHeads
   std::string name;  // of test cases, before the link's
   std::vector<HeadServer::Link> links;
-  HeadOptions options;   // for the simulated head; with the zoom, if it tells it
+  HeadOptions options;   // of its protocol; with the zoom, if it tells it
   std::string settings;  // the same without the zoom, as keys of the configuration: "a: 1, b: 2"
   // Which way the simulated head counts: 1 to the right and up, -1 to the left and down.
   double pan_sign = 0;

@@ -182,6 +182,23 @@ TEST(PatchAlignment, ErrorsAreAsLargeAsTheCovarianceSays) {
   EXPECT_NEAR(statistics.noise_variances / statistics.count, 1.05 * truth, 0.05 * truth);
 }
 
+// At half the contrast the same noise moves the patch twice as far.
+TEST(PatchAlignment, ErrorsAreAsLargeAsTheCovarianceSaysAtAnyContrast) {
+  for (const double gain : {0.5, 1.5}) {
+    std::mt19937_64 random(23);
+    Statistics statistics;
+    for (int n = 0; n < 400; ++n) {
+      Change change;
+      change.shift = random_shift(&random);
+      change.gain = gain;
+      try_once(change, 1, &random, &statistics);
+    }
+    ASSERT_GT(statistics.count, 80);
+    const double sigma = std::sqrt(4 * kNoiseFreedom / (kNoiseFreedom - 4) / statistics.count);
+    EXPECT_NEAR(statistics.anees(), 2, 4 * sigma + 0.05 * 2) << gain;
+  }
+}
+
 TEST(PatchAlignment, GainAndOffsetChangeNothingAndAreReported) {
   for (const double gain : {0.5, 0.75, 1.0, 1.25, 1.5}) {
     for (const double offset : {-20.0, 0.0, 20.0}) {
@@ -249,6 +266,54 @@ TEST(PatchAlignment, FollowsRotationScaleAndShearThatTheCallerKnows) {
     EXPECT_LT(statistics.bias(), 0.01) << A;
     EXPECT_LT(statistics.rms(), 0.03) << A;
   }
+}
+
+// A quarter turn takes pixels to pixels: what the caller turns is the patch of the turned image.
+TEST(PatchAlignment, PreparesAWarpedReferenceAsTheImageThatShowsItSo) {
+  Matrix2<double> turn;
+  turn << 0, -1, 1, 0;
+  std::mt19937_64 random(24);
+  int compared = 0;
+  for (int n = 0; n < 20; ++n) {
+    const AnalyticImage texture(&random);
+    const auto turned_texture = [&](const Vector2<double>& at) {
+      return texture(kCentre + turn * (at - kCentre));
+    };
+    const Pixels plain = make_pixels(kSize, kSize, texture, 0, &random);
+    const Pixels turned = make_pixels(kSize, kSize, turned_texture, 0, &random);
+    ReferencePatch warped;
+    ReferencePatch expected;
+    if (prepare(plain.view, kCentre, turn, kMinContrast, &warped) != PrepareStatus::kOk) continue;
+    ASSERT_EQ(prepare(turned.view, kCentre, kIdentity, kMinContrast, &expected),
+              PrepareStatus::kOk);
+    const auto expect_same = [](const auto& a, const auto& b) {
+      EXPECT_LT((a - b).matrix().norm(), 1e-3F * b.matrix().norm());
+    };
+    expect_same(warped.value, expected.value);
+    expect_same(warped.to_u, expected.to_u);
+    expect_same(warped.to_v, expected.to_v);
+    expect_same(warped.unit_covariance, expected.unit_covariance);
+    ++compared;
+  }
+  EXPECT_GT(compared, 5);
+}
+
+TEST(PatchAlignment, GoesAsFarAsItMayAndNoFarther) {
+  std::mt19937_64 random(25);
+  const AnalyticImage texture(&random);
+  const Pixels pixels = make_pixels(kSize, kSize, texture, 0, &random);
+  ReferencePatch reference;
+  ASSERT_TRUE(is_usable(prepare(pixels.view, kCentre, kIdentity, 0.1, &reference)));
+  Alignment alignment;
+  const auto from = [&](double away, double max_move) {
+    AlignmentLimits limits;
+    limits.max_move = max_move;
+    return align(reference, pixels.view, kCentre + Vector2<double>(away, 0), limits, &alignment);
+  };
+  EXPECT_EQ(from(0.6, 0.5), AlignmentStatus::kMovedTooFar);
+  EXPECT_EQ(from(0.6, 0.8), AlignmentStatus::kConverged);
+  EXPECT_EQ(from(1.3, 1.2), AlignmentStatus::kMovedTooFar);
+  EXPECT_EQ(from(1.3, 1.5), AlignmentStatus::kConverged);
 }
 
 // A smooth step at angle `normal` through the centre.

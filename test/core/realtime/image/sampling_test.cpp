@@ -113,6 +113,7 @@ TYPED_TEST(Sampling, RefusesPointsWhoseTapsLeaveTheImage) {
     EXPECT_EQ(status(beyond, 3.5), SampleStatus::kOutsideMargin) << beyond;
     EXPECT_EQ(status(4.5, beyond), SampleStatus::kOutsideMargin) << beyond;
   }
+  EXPECT_EQ(status(4.5, 7 - margin + 1e-6), SampleStatus::kOutsideMargin);
 }
 
 // By how much a wave of a given period seems displaced when a kernel looks at it at a fraction of a pixel:

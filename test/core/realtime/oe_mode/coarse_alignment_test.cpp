@@ -8,9 +8,13 @@
 #include <algorithm>
 #include <cmath>
 #include <complex>
+#include <deque>
+#include <functional>
 #include <limits>
 #include <random>
 #include <vector>
+
+#include "test/core/realtime/image/analytic_image.h"
 
 namespace alidade::test {
 namespace {
@@ -243,6 +247,129 @@ TEST_F(CoarseAlignmentTest, NeedsAFewPatchesInTheImage) {
     (void)align_coarsely(pyramid_, still.data(), static_cast<int>(still.size()), options, &out);
     EXPECT_TRUE(all_finite(out.angle)) << search_px;
   }
+}
+
+// Some patches of a small image that is known between its pixels; what each of them shows next is chosen freely.
+class CoarsePatches : public testing::Test {
+ protected:
+  static constexpr int kSmallWidth = 240;
+  static constexpr int kSmallHeight = 120;
+  static constexpr int kColumns = 9;
+  static constexpr int kRows = 3;
+  static constexpr double kPxPerRad = 1000;
+  using Grey = std::function<double(const Vector2<double>&)>;
+
+  // Patches all over the image, column by column, of one octave.
+  void prepare_patches(const Grey& grey, int octave = 0) {
+    const Pixels pixels = make_pixels(kSmallWidth, kSmallHeight, grey, 0, &random_);
+    ASSERT_EQ(pyramid_.build(pixels.view, 2), PyramidStatus::kOk);
+    for (int column = 0; column < kColumns; ++column) {
+      for (int row = 0; row < kRows; ++row) {
+        ReferencePatch& reference = references_.emplace_back();
+        const Vector2<double> u(24 + 24 * column, 30 + 30 * row);
+        ASSERT_TRUE(is_usable(prepare(pyramid_.octave(octave), std::ldexp(1.0, -octave) * u,
+                                      Matrix2<double>::Identity(), 1, &reference)));
+        patches_.push_back({&reference, octave, u, kPxPerRad * Matrix2<double>::Identity()});
+      }
+    }
+  }
+
+  bool align(const Grey& grey, const CoarseOptions& options = {}) {
+    const Pixels pixels = make_pixels(kSmallWidth, kSmallHeight, grey, 0, &random_);
+    EXPECT_EQ(pyramid_.build(pixels.view, 2), PyramidStatus::kOk);
+    return align_coarsely(pyramid_, patches_.data(), static_cast<int>(patches_.size()), options,
+                          &out_);
+  }
+  [[nodiscard]] Vector2<double> moved_px() const { return kPxPerRad * out_.angle; }
+
+  // Of waves with this wave number to the side, rad/px, or its negative.
+  Grey waves_of(double across, double most_down) {
+    std::vector<Vector3<double>> waves;
+    std::uniform_real_distribution<double> uniform(-1, 1);
+    for (int i = 0; i < 12; ++i) {
+      waves.emplace_back(i % 2 == 0 ? across : -across, most_down * uniform(random_),
+                         kPi * uniform(random_));
+    }
+    return [waves](const Vector2<double>& at) {
+      double sum = 128;
+      for (const Vector3<double>& wave : waves) {
+        sum += 9 * std::cos(wave.x() * at.x() + wave.y() * at.y() + wave.z());
+      }
+      return sum;
+    };
+  }
+
+  std::mt19937_64 random_{12};
+  AnalyticImage texture_{&random_};
+  Pyramid pyramid_{kSmallWidth, kSmallHeight, 2};
+  std::deque<ReferencePatch> references_;
+  std::vector<CoarsePatch> patches_;
+  CoarseAlignment out_;
+};
+
+// The border between two parts of the image, px: left of it lie so many columns of patches.
+double border_after(int columns) { return 24 * columns + 12; }
+
+TEST_F(CoarsePatches, OutsideTheImageAreNeitherFoundNorMissed) {
+  prepare_patches(texture_);
+  for (std::size_t i = 0; i < patches_.size(); i += 2) patches_[i].u.x() -= 500;
+  EXPECT_TRUE(align(texture_));
+  EXPECT_EQ(out_.patches, kColumns * kRows / 2);
+  EXPECT_EQ(out_.found, 1);
+}
+
+TEST_F(CoarsePatches, OfAnOctaveWithTooFewInTheImageHaveNoSay) {
+  prepare_patches(texture_, 1);
+  const int coarse = static_cast<int>(patches_.size());
+  prepare_patches(texture_, 0);
+  for (std::size_t i = static_cast<std::size_t>(coarse) + 4; i < patches_.size(); ++i) {
+    patches_[i].u.x() -= 500;
+  }
+  EXPECT_TRUE(align(texture_));
+  EXPECT_EQ(out_.patches, coarse);
+  EXPECT_EQ(out_.found, 1);
+}
+
+// Half a wave away the image is its own negative, to the pixel; where it belongs, it lies between two steps of
+// the search.
+TEST_F(CoarsePatches, AreNotFoundWhereTheirNegativesAre) {
+  const Grey texture = waves_of(kPi / 7, 0.5);
+  prepare_patches(texture);
+  CoarseOptions options;
+  options.search_px = 10;
+  EXPECT_TRUE(align([&](const Vector2<double>& at) { return texture(at - Vector2<double>(1, 0)); },
+                    options));
+  EXPECT_LT((moved_px() - Vector2<double>(1, 0)).norm(), 0.1);
+}
+
+// Five columns of nine are shown as their negatives, and displaced the other way.
+TEST_F(CoarsePatches, AreNotPulledByThoseOfTurnedContrast) {
+  prepare_patches(texture_);
+  const Vector2<double> shift(1, 0);
+  EXPECT_TRUE(align([&](const Vector2<double>& at) {
+    return at.x() < border_after(4) ? texture_(at - shift) : 256 - texture_(at + shift);
+  }));
+  EXPECT_LT((moved_px() - shift).norm(), 0.1);
+  EXPECT_NEAR(out_.found, 4.0 / 9, 0.01);
+}
+
+// Three columns of nine move by themselves.
+TEST_F(CoarsePatches, AreNotPulledByThoseThatMoveByThemselves) {
+  prepare_patches(texture_);
+  EXPECT_TRUE(align([&](const Vector2<double>& at) {
+    return at.x() < border_after(3) ? texture_(at - Vector2<double>(1.2, 0)) : texture_(at);
+  }));
+  // Their mean would be 0.4 px.
+  EXPECT_LT(moved_px().norm(), 0.2);
+}
+
+// A fifth of a wave away the tangent promises three times the way: beyond half a wave all is turned round.
+TEST_F(CoarsePatches, FindTheirWayFromWhereTheLinearisationPromisesTooMuch) {
+  const Grey texture = waves_of(2 * kPi / 12, 0.1);
+  prepare_patches(texture);
+  const Vector2<double> shift(2.5, 0);
+  EXPECT_TRUE(align([&](const Vector2<double>& at) { return texture(at - shift); }));
+  EXPECT_LT((moved_px() - shift).norm(), 0.1);
 }
 
 }  // namespace

@@ -394,6 +394,8 @@ TEST(LandmarkMap, FullMapGivesUpTheLeastUseful) {
   EXPECT_EQ(given, order);
   int slot = -1;
   EXPECT_EQ(map.insert(landmark_at(anywhere(&random), 3), kNow, &slot), InsertStatus::kFull);
+  map.clear(1e-3);
+  EXPECT_EQ(map.replaced(), 0) << "since then";
 }
 
 // A camera that turns on and on makes landmarks for ever; the map must follow it.
@@ -439,6 +441,18 @@ TEST(LandmarkMap, WorthFallsWithMissesAndWithTimeButNotForASecond) {
   // The count of frames wraps.
   map.statistics(slot).last_frame = std::numeric_limits<std::uint32_t>::max();
   EXPECT_EQ(map.worth(slot, 9), map.worth(slot, std::numeric_limits<std::uint32_t>::max()));
+}
+
+// However often it was found: after twice four times the shortest memory half its worth is gone.
+TEST(LandmarkMap, ForgetsEvenWhatWasFoundAThousandTimes) {
+  LandmarkMap map(4, 0.1);
+  int slot = -1;
+  ASSERT_EQ(map.insert(landmark_at(Vector3<double>::UnitX()), 0, &slot), InsertStatus::kOk);
+  for (const std::uint32_t found : {100U, 1000U, 100000U}) {
+    map.statistics(slot).looked_for = found;
+    map.statistics(slot).matched = found;
+    EXPECT_LE(map.worth(slot, 2 * 4 * 30), 0.5 * map.worth(slot, 0)) << found;
+  }
 }
 
 TEST(LandmarkMap, WorthFallsWithAgeWhereTheCountOfFramesWrapsAsItDoesElsewhere) {

@@ -8,7 +8,9 @@
 #include <set>
 #include <utility>
 
+#include "core/model/direction.h"
 #include "test/core/realtime/oe_mode/textured_scene.h"
+#include "test/support/parameter_changes.h"
 
 namespace alidade::test {
 namespace {
@@ -112,6 +114,91 @@ TEST_F(SearchedScene, LooksForNoMoreThanItMayAndForTheReliableOfAllTheImage) {
   EXPECT_TRUE(search.chosen().empty());
   EXPECT_TRUE(search.found().empty());
   EXPECT_TRUE(search.coarse().empty());
+}
+
+// A landmark of a coarser octave is aligned in that octave's pixels: in the image's they are 2^l as wide.
+TEST_F(SearchedScene, TellsPositionsInPixelsOfTheImageWhateverTheOctave) {
+  const Vector2<double> at(5.3, -3.7);
+  scene_.look(at);
+  static_cast<void>(search_.align_fine(frame(), TexturedScene::motion_at(at)));
+  int coarser = 0;
+  for (const OeObservation& seen : search_.observations()) {
+    const double scale = std::ldexp(1.0, seen.octave);
+    ReferencePatch patch;
+    ASSERT_TRUE(is_usable(prepare(scene_.map_.at(seen.slot).image(),
+                                  Vector2<double>::Constant(kReferenceCentre),
+                                  Matrix2<double>::Identity(), 1, &patch)));
+    Alignment alignment;
+    ASSERT_EQ(align(patch, scene_.pyramid_.octave(seen.octave), seen.u / scale, {}, &alignment),
+              AlignmentStatus::kConverged);
+    EXPECT_LT((scale * alignment.position - seen.u).norm(), 0.01 * scale);
+    const Matrix2<double> expected = scale * scale * alignment.covariance;
+    EXPECT_LT((seen.covariance - expected).norm(), 0.02 * expected.norm());
+    coarser += seen.octave > 0 ? 1 : 0;
+  }
+  EXPECT_GT(coarser, 10);
+}
+
+TEST_F(SearchedScene, AddsWhatTheLandmarksThemselvesAreUncertainBy) {
+  constexpr double kUncertain = 2;  // px
+  const Matrix2<double> covariance =
+      std::pow(kUncertain * TexturedScene::kPixel, 2) * Matrix2<double>::Identity();
+  for (int slot = 0; slot < scene_.map_.size(); ++slot) {
+    scene_.map_.refine(slot, scene_.map_.at(slot).d, covariance);
+  }
+  static_cast<void>(search_.align_fine(frame(), TexturedScene::motion_at({0, 0})));
+  ASSERT_GT(search_.found().size(), 50U);
+  for (std::size_t i = 0; i < search_.found().size(); ++i) {
+    const Matrix2<double> added =
+        search_.found()[i].covariance - search_.observations()[i].covariance;
+    const Matrix2<double> expected = kUncertain * kUncertain * Matrix2<double>::Identity();
+    EXPECT_LT((added - expected).norm(), 1e-3 * expected.norm());
+  }
+}
+
+// Where a landmark is expected by one calibration and by another, each with the direction that it gave it.
+TEST_F(SearchedScene, ResidualsFollowTheCalibrationAsTheirSensitivitySays) {
+  const ParameterVector steps = parameter_steps(scene_.calibration_.camera);
+  for (int slot = 0; slot < scene_.map_.size(); ++slot) {
+    for (int j = 0; j < kParameterCount; ++j) {
+      const Vector2<double> moved(std::sin(1 + slot + 3 * j), std::cos(slot + 5 * j));
+      scene_.map_.sensitivity(slot).col(j) =
+          (TexturedScene::kPixel * moved / steps[j]).cast<float>();
+    }
+  }
+  const FrameMotion<double> motion = TexturedScene::motion_at({0, 0});
+  static_cast<void>(search_.align_fine(frame(), motion));
+  ASSERT_GT(search_.found().size(), 50U);
+  for (std::size_t i = 0; i < search_.found().size(); ++i) {
+    const Landmark& landmark = scene_.map_.at(search_.observations()[i].slot);
+    const auto expected_with = [&](int j, double change) {
+      const Calibration changed = plus(scene_.calibration_, change * ParameterVector::Unit(j));
+      const Vector2<double> moved = change * landmark.sensitivity.col(j).cast<double>();
+      Vector2<double> u = Vector2<double>::Zero();
+      EXPECT_TRUE(
+          ViewProjection(changed, motion).project(direction_plus<double>(landmark.d, moved), &u));
+      return u;
+    };
+    for (int j = 0; j < kParameterCount; ++j) {
+      const Vector2<double> numeric =
+          (expected_with(j, steps[j]) - expected_with(j, -steps[j])) / 2;
+      const Vector2<double> told = steps[j] * search_.found()[i].sensitivity.col(j);
+      EXPECT_LT((told + numeric).norm(), 1e-3 + 1e-3 * numeric.norm()) << j;
+    }
+  }
+}
+
+// A search may find what only looks alike: within reach of the coarsest octave there is none.
+TEST_F(SearchedScene, SearchesNothingWhereThePredictionIsSure) {
+  LandmarkSearchOptions options;
+  options.wide_search_px = 0;
+  LandmarkSearch search(options, scene_.map_.capacity());
+  search.reset(scene_.calibration_);
+  const Vector2<double> off(8, 8);  // two of the coarsest octave's pixels each way
+  const double reach_px =
+      std::ldexp(options.coarse_reach_px, scene_.pyramid_.octaves() - 1) / options.search_sigmas;
+  EXPECT_FALSE(search.align_coarse(frame(), TexturedScene::motion_at(off), 0.9 * reach_px).aligned);
+  EXPECT_TRUE(search.align_coarse(frame(), TexturedScene::motion_at(off), 1.1 * reach_px).aligned);
 }
 
 }  // namespace

@@ -189,6 +189,80 @@ TEST(MapOffsetFilter, IsContradictedByLateTelemetryUntilAFrameAgrees) {
   EXPECT_FALSE(filter.contradicted());
 }
 
+// Frames 40 ms apart for ten seconds, whose landmarks share an error for as long: worth two answers.
+TEST(MapOffsetFilter, CountsWhatNeighbouringFramesShareOnce) {
+  MapOffsetFilter filter{MapOffsetOptions{}};
+  filter.reset(unknown_offset());
+  constexpr double kShared = 1e-6;  // rad^2
+  OffsetInnovation innovation;
+  innovation.covariance = 1e-16 * Matrix2<double>::Identity();
+  innovation.shared_covariance = kShared * Matrix2<double>::Identity();
+  for (int i = 0; i <= 250; ++i) ASSERT_TRUE(filter.learn(0.04 * i, innovation));
+  EXPECT_NEAR(filter.offset().covariance(0, 0), kShared / 2, 0.01 * kShared);
+}
+
+// The same for a second of frames whose telemetry came late, with one error all the time.
+TEST(MapOffsetFilter, CountsTheSameTelemetryOnceAlsoWhereItComesLate) {
+  MapOffsetFilter filter{MapOffsetOptions{}};
+  filter.reset(unknown_offset());
+  const InterpolatedPanTilt late = telemetry_of({0, 0}, 1, false);
+  for (int i = 0; i <= 25; ++i) {
+    filter.add_pending(pending_frame(0.04 * i, {0, 0}));
+    filter.settle_oldest(any_calibration(), &late);
+  }
+  EXPECT_NEAR(filter.offset().covariance(0, 0), kTelemetrySigma * kTelemetrySigma / 2,
+              0.01 * kTelemetrySigma * kTelemetrySigma);
+}
+
+TEST(MapOffsetFilter, LearnsFromLateTelemetryInTrueAngles) {
+  Calibration calibration = any_calibration();
+  calibration.mechanics.pan_scale = 2;
+  calibration.mechanics.tilt_scale = 0.5;
+  MapOffsetFilter filter{MapOffsetOptions{}};
+  filter.reset(unknown_offset());
+  filter.add_pending(pending_frame(1, {0.01, 0.02}));
+  const InterpolatedPanTilt late = telemetry_of({0.03, 0.015}, 0, false);
+  filter.settle_oldest(calibration, &late);
+  const double variance = kTelemetrySigma * kTelemetrySigma;
+  EXPECT_NEAR(filter.offset().value.x(), 0.03 / 2 - 0.01, 1e-6);
+  EXPECT_NEAR(filter.offset().value.y(), 0.015 / 0.5 - 0.02, 1e-6);
+  EXPECT_NEAR(filter.offset().covariance(0, 0), variance / 4, 1e-4 * variance);
+  EXPECT_NEAR(filter.offset().covariance(1, 1), variance * 4, 1e-4 * variance);
+}
+
+TEST(MapOffsetFilter, LearnsNothingFromTelemetryThatIsExtrapolatedStill) {
+  MapOffsetFilter filter{MapOffsetOptions{}};
+  filter.reset(unknown_offset());
+  filter.add_pending(pending_frame(1, {0, 0}));
+  const InterpolatedPanTilt late = telemetry_of({1e-3, 0}, 0, true);
+  EXPECT_EQ(filter.enclosed(std::nextafter(101.0, 0)), nullptr);
+  EXPECT_NE(filter.enclosed(101), nullptr) << "a sample at its very time";
+  filter.settle_oldest(any_calibration(), &late);
+  EXPECT_EQ(filter.offset().value, (Vector2<double>(0, 0)));
+  EXPECT_EQ(filter.offset().covariance, unknown_offset().covariance);
+  EXPECT_EQ(filter.pending(), 0U);
+}
+
+TEST(MapOffsetFilter, IsAsNewAfterAReset) {
+  MapOffsetFilter filter{MapOffsetOptions{}};
+  MapOffset known;
+  known.covariance = 1e-12 * Matrix2<double>::Identity();
+  filter.reset(known);
+  ASSERT_TRUE(filter.learn(1, innovation_of({0, 0})));
+  filter.note_answer(1);
+  for (const double t : {1.0, 2.0}) filter.add_pending(pending_frame(t, {0, 0}));
+  const InterpolatedPanTilt wrong = telemetry_of({20 * kTelemetrySigma, 0}, 0, false);
+  filter.settle_oldest(any_calibration(), &wrong);
+  ASSERT_TRUE(filter.contradicted());
+  filter.reset();
+  EXPECT_FALSE(filter.contradicted());
+  EXPECT_EQ(filter.pending(), 0U);
+  EXPECT_EQ(filter.offset().covariance.norm(), 0);
+  for (const bool extrapolated : {true, false}) {
+    EXPECT_EQ(filter.inflation(telemetry_of({}, 1, extrapolated), 1.01), 1) << extrapolated;
+  }
+}
+
 TEST(MapOffsetFilter, TakesTheShortWayRound) {
   MapOffsetFilter filter{MapOffsetOptions{}};
   filter.reset(unknown_offset());

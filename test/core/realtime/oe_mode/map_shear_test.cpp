@@ -171,13 +171,44 @@ TEST_F(ShearedFrames, TellTheRateThatTheMapGotWrong) {
   for (int axis = 0; axis < 2; ++axis) {
     const double sigma = std::sqrt(shear_.covariances()[static_cast<std::size_t>(axis)](1, 1));
     EXPECT_LT(std::abs(correction->rate[axis] - wrong_rate[axis]), 4 * sigma);
+    EXPECT_NEAR(correction->acceleration[axis], wrong_acceleration[axis], 0.01);
   }
   EXPECT_LT(shear_.covariances()[0](1, 1), before / 100);
   // The frames that it knows are straight now: there is nothing left to correct.
+  const double known = shear_.covariances()[0](1, 1);
   const auto again = shear_.correct();
   ASSERT_TRUE(again);
+  EXPECT_LE(shear_.covariances()[0](1, 1), known) << "no reason to doubt it";
   EXPECT_LT(again->rate.norm(), 0.02 * wrong_rate.norm());
   EXPECT_FALSE(again->crooked);
+}
+
+// Far from where the map began a wrong rate has made a wrong angle, too: the offset goes back with the landmarks.
+TEST_F(ShearedFrames, TellWhatTheWrongRateHasMadeOfTheAngleOnTheWay) {
+  constexpr double kWay = 0.3;  // rad, upwards
+  Matrix6 covariance = first_covariance();
+  covariance.diagonal().tail<2>().setConstant(1e-8);
+  const Vector2<double> begun = angle(0) - Vector2<double>(0, kWay);
+  shear_.begin(motion_of(begun, rate(0), acceleration()), covariance);
+  const Vector2<double> wrong_rate(1.2 * kRateSigma, -0.9 * kRateSigma);
+  for (int k = 0; k < 12; ++k) add(k, wrong_rate, {0, 0});
+  const auto correction = shear_.correct();
+  ASSERT_TRUE(correction);
+  // Rows count downwards.
+  const double t = -sheared_calibration().line_delay * 1500 * (correction->tilt - begun.y());
+  EXPECT_LT(t, -0.02);
+  EXPECT_LT((correction->angle - t * wrong_rate).norm(), 0.05 * std::abs(t) * wrong_rate.norm());
+}
+
+// Half of the landmarks with an error of their own share half of it with the map.
+TEST_F(ShearedFrames, TakeOverTheirShareOfAFramesErrors) {
+  shear_.inherit(0.5, first_covariance());
+  const MapShear::Covariances& found = shear_.covariances();
+  for (const Matrix3<double>& shear : found) {
+    EXPECT_NEAR(shear(1, 1), kRateSigma * kRateSigma / 4, 1e-15);
+    EXPECT_NEAR(shear(2, 2), kAccelerationSigma * kAccelerationSigma / 4, 1e-15);
+    EXPECT_EQ(shear(0, 0), 0);
+  }
 }
 
 TEST_F(ShearedFrames, AreNotBelievedWhereTheyTellMoreThanCanBe) {

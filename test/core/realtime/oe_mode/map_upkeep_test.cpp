@@ -5,7 +5,10 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <algorithm>
+#include <map>
 #include <set>
+#include <vector>
 
 #include "test/core/realtime/oe_mode/textured_scene.h"
 
@@ -37,6 +40,19 @@ class KeptMap : public testing::Test {
   void keep() {
     upkeep_.refine(frame_, search_, &scene_.map_);
     upkeep_.judge_coarse(scene_.calibration_, scene_.pyramid_, frame_, search_, &scene_.map_);
+  }
+
+  void expect_little_is_learnt() {
+    std::map<int, Landmark> before;
+    for (const OeObservation& seen : search_.observations()) {
+      before[seen.slot] = scene_.map_.at(seen.slot);
+    }
+    ASSERT_GT(before.size(), 50U);
+    keep();
+    for (const auto& [slot, landmark] : before) {
+      EXPECT_GT(scene_.map_.at(slot).covariance.trace(), 0.99 * landmark.covariance.trace());
+      EXPECT_LT((scene_.map_.at(slot).d - landmark.d).norm(), 1e-3 * TexturedScene::kPixel);
+    }
   }
 
   TexturedScene scene_;
@@ -122,6 +138,58 @@ TEST_F(KeptMap, LosesOnlyWhatNoFrameOfItsOwnHasProven) {
     EXPECT_EQ(scene_.map_.occupied(slot), slot % 2 == 1 || slot == 4) << slot;
   }
   EXPECT_FALSE(upkeep_.has_unproven({{1, 0, {1, 1}}}, scene_.map_));
+}
+
+// What a frame says is no better than its own orientation ...
+TEST_F(KeptMap, LearnsLittleFromAFrameThatHardlyKnowsWhereItLooks) {
+  see({0, 0});
+  frame_.covariance.topLeftCorner<2, 2>().setIdentity();  // rad^2
+  expect_little_is_learnt();
+}
+
+// ... and than its landmarks agree with each other.
+TEST_F(KeptMap, LearnsLittleFromAFrameWhoseLandmarksContradictEachOther) {
+  see({0, 0});
+  frame_.inflation = 1e6;
+  expect_little_is_learnt();
+}
+
+// Of a landmark that nobody knew, all is as the frame shows it: where the frame's angles follow the calibration, its
+// direction does, so that it stays where it was found.
+TEST_F(KeptMap, FollowsTheCalibrationAsTheFrameDoes) {
+  constexpr int kParameter = index(Parameter::kClockOffset);  // moves nothing but angles
+  for (int slot = 0; slot < scene_.map_.size(); ++slot) {
+    scene_.map_.refine(slot, scene_.map_.at(slot).d, Matrix2<double>::Identity());
+    scene_.map_.sensitivity(slot).setZero();
+  }
+  see({0, 0});
+  const Vector2<double> rate = TexturedScene::kPixel * Vector2<double>(30, -20);
+  frame_.sensitivity.setZero();
+  frame_.sensitivity.col(kParameter).head<2>() = rate;
+  ASSERT_GT(search_.found().size(), 50U);
+  keep();
+  for (std::size_t i = 0; i < search_.found().size(); ++i) {
+    const int slot = search_.observations()[i].slot;
+    const Vector2<double> by_angle = search_.found()[i].J_angle * rate;
+    const Vector2<double> by_direction =
+        search_.J_tangent()[i] * scene_.map_.at(slot).sensitivity.col(kParameter).cast<double>();
+    EXPECT_GT(by_angle.norm(), 30);
+    EXPECT_LT((by_angle + by_direction).norm(), 1e-3 * by_angle.norm());
+  }
+}
+
+TEST_F(KeptMap, GivesUpCoarseLandmarksThatLookLikeSomethingElse) {
+  see({0, 0});
+  const std::vector<int> coarse = search_.coarse_slots();
+  ASSERT_GT(coarse.size(), 5U);
+  scene_.look({3000, 2000});
+  for (int i = 0; i < MapUpkeepOptions{}.max_misses; ++i) {
+    see({0, 0});
+    keep();
+  }
+  const auto left = std::count_if(coarse.begin(), coarse.end(),
+                                  [&](int slot) { return scene_.map_.occupied(slot); });
+  EXPECT_LT(left, static_cast<std::ptrdiff_t>(coarse.size()) / 2);
 }
 
 }  // namespace

@@ -8,6 +8,8 @@
 #include <cmath>
 #include <random>
 
+#include "test/support/parameter_changes.h"
+
 namespace alidade::test {
 namespace {
 
@@ -108,10 +110,68 @@ TEST_F(PredictedFrame, ByTheFrameBeforeHasTheErrorsThatItClaims) {
   EXPECT_NEAR(squares_of_angles / kRuns, 1, 4 * std::sqrt(2.0 / (2 * kRuns)));
 }
 
+// A sensitivity of no meaning, different for each element.
+template <int kRows>
+Sensitivity<kRows> any_sensitivity() {
+  Sensitivity<kRows> out;
+  for (int i = 0; i < kRows; ++i) {
+    for (int j = 0; j < kParameterCount; ++j) out(i, j) = 0.1 * std::sin(1 + 3 * i + 7 * j);
+  }
+  return out;
+}
+
+// The same telemetry by one calibration and by another, with the offset that each has learnt.
+TEST_F(PredictedFrame, ByTelemetryFollowsTheCalibrationAsItsSensitivitySays) {
+  const Calibration calibration = scaled_calibration();
+  InterpolatedPanTilt telemetry;
+  telemetry.angle = {0.101, -0.098};
+  telemetry.rate = {0.202, 0.049};
+  telemetry.covariance.setIdentity();
+  MapOffset offset;
+  offset.sensitivity = any_sensitivity<2>();
+  const auto angle_with = [&](int j, double change) {
+    const ParameterVector e = change * ParameterVector::Unit(j);
+    const double later_s = e[index(Parameter::kClockOffset)] +
+                           e[index(Parameter::kLineDelay)] * calibration.camera.height / 2;
+    InterpolatedPanTilt told = telemetry;
+    told.angle = {told.angle.pan + later_s * told.rate.pan,
+                  told.angle.tilt + later_s * told.rate.tilt};
+    MapOffset learnt = offset;
+    learnt.value += change * offset.sensitivity.col(j);
+    return prediction_.by_telemetry(plus(calibration, e), told, learnt, 1).motion.angle.vector();
+  };
+  const PredictedMotion out = prediction_.by_telemetry(calibration, telemetry, offset, 1);
+  for (int j = 0; j < kParameterCount; ++j) {
+    const Vector2<double> numeric = (angle_with(j, 1e-6) - angle_with(j, -1e-6)) / 2e-6;
+    EXPECT_LT((out.sensitivity.col(j).head<2>() - numeric).norm(), 1e-6) << j;
+    EXPECT_EQ(out.prior.telemetry_sensitivity.col(j).head<2>(), out.sensitivity.col(j).head<2>());
+  }
+}
+
+// The frame before, as one calibration found it and as another.
+TEST_F(PredictedFrame, ByTheFrameBeforeFollowsTheCalibrationAsItsSensitivitySays) {
+  const Sensitivity<6> sensitivity = any_sensitivity<6>();
+  const auto predicted_with = [&](const Vector6& x) {
+    const FrameMotion<double> seen{{0.1 + x[0], 0.2 + x[1]}, {0.3 + x[2], -0.1 + x[3]}, 135};
+    prediction_.remember(5, seen, Matrix6::Identity(), Matrix2<double>::Zero(), sensitivity);
+    return prediction_.by_last_frame(5.3);
+  };
+  const PredictedMotion out = predicted_with(Vector6::Zero());
+  for (int j = 0; j < kParameterCount; ++j) {
+    const FrameMotion<double> changed = predicted_with(sensitivity.col(j)).motion;
+    Vector4<double> difference;
+    difference << changed.angle.vector() - out.motion.angle.vector(),
+        changed.rate.vector() - out.motion.rate.vector();
+    EXPECT_LT((out.sensitivity.col(j).head<4>() - difference).norm(), 1e-12) << j;
+  }
+}
+
 TEST_F(PredictedFrame, IsCarriedOnAtConstantAcceleration) {
   const FrameMotion<double> from{{0.1, 0.2}, {0.3, 0.4}, 135, {0.5, -0.6}};
   const FrameMotion<double> to = carried_on(from, 0.2);
   EXPECT_NEAR(to.angle.pan, 0.1 + 0.06 + 0.01, 1e-15);
+  EXPECT_NEAR(to.angle.tilt, 0.2 + 0.08 - 0.012, 1e-15);
+  EXPECT_NEAR(to.rate.pan, 0.3 + 0.1, 1e-15);
   EXPECT_NEAR(to.rate.tilt, 0.4 - 0.12, 1e-15);
   EXPECT_EQ(to.acceleration.pan, 0);
   EXPECT_EQ(to.reference_row, 135);

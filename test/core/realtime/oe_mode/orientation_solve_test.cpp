@@ -333,6 +333,45 @@ TEST(OrientationSolve, RefusesTooFew) {
             SolveStatus::kOk);
 }
 
+// A fifth agrees, and the rest lies far away on all sides.
+TEST(OrientationSolve, RefusesTooSmallAShareOfAll) {
+  World world;
+  world.landmarks = 100;
+  Simulation simulation(17);
+  Frame frame = simulation.frame(world);
+  for (std::size_t i = 0; i < frame.landmarks.size(); ++i) {
+    if (i % 5 == 0) continue;
+    const double away = simulation.uniform(300, 900);
+    frame.landmarks[i].residual += away * Vector2<double>(i % 5 < 3 ? 1 : -1, i % 2 == 0 ? 1 : -1);
+  }
+  SolvedMotion solved;
+  EXPECT_EQ(frame.solve(world, &solved), SolveStatus::kTooFew);
+  SolveLimits limits;
+  limits.min_inlier_share = 0.15;
+  EXPECT_EQ(frame.solve(world, &solved, limits), SolveStatus::kOk);
+  EXPECT_EQ(solved.inliers, 20);
+}
+
+// Better than claimed is as good as claimed: also where nothing is left over.
+TEST(OrientationSolve, DoesNotMindLandmarksThatLieExactlyWhereTheyWereExpected) {
+  for (const bool has_telemetry : {true, false}) {
+    World world;
+    world.has_telemetry = has_telemetry;
+    Simulation simulation(18);
+    Frame frame = simulation.frame(world);
+    Frame exact = frame;
+    for (FoundLandmark& landmark : exact.landmarks) landmark.residual.setZero();
+    SolvedMotion as_claimed;
+    SolvedMotion solved;
+    ASSERT_EQ(frame.solve(world, &as_claimed), SolveStatus::kOk);
+    ASSERT_EQ(exact.solve(world, &solved), SolveStatus::kOk);
+    EXPECT_EQ(solved.inliers, world.landmarks);
+    EXPECT_EQ(solved.inflation, 1);
+    EXPECT_LE(solved.covariance(0, 0), 1.0001 * as_claimed.covariance(0, 0));
+    EXPECT_GT(solved.covariance(0, 0), 0.5 * as_claimed.covariance(0, 0));
+  }
+}
+
 // Landmarks that hardly agree are as good as noise that large: telemetry stays what it was.
 TEST(OrientationSolve, BelievesLittleOfLandmarksThatAgreeOnNothing) {
   World world;

@@ -308,6 +308,29 @@ TEST(ViewProjection, RoughlyIsWithinAPixelAtHalfAFieldOfViewASecond) {
   }
 }
 
+// Turning one way the image runs along with the rows, and faster than they are read out: the pixels where a
+// direction is seen on its own row lie the wrong way from the middle. The other way it meets them, once.
+TEST(ViewProjection, HasNoPixelWhereTheImageOutrunsTheReadOut) {
+  View view;
+  view.calibration.camera = {3000, 1, 0, 640, 480};
+  view.calibration.line_delay = 50e-6;
+  int outrun = 0;
+  for (const double rate : {-10.0, 10.0}) {
+    view.motion = {{0, 0}, {0, rate}, 240};
+    const ViewProjection projection(view.calibration, view.motion);
+    for (const double v : {200.0, 230.0, 270.0}) {
+      const Vector3<double> d(1, 0, (v - 240) / 3000);
+      const bool is_outrun = view.per_row(d.normalized(), 240).y() >= 1;
+      Vector2<double> u;
+      SeenDirection seen;
+      EXPECT_EQ(projection.project(d.normalized(), &u), !is_outrun) << rate << ' ' << v;
+      EXPECT_EQ(projection.project(d.normalized(), &seen), !is_outrun) << rate << ' ' << v;
+      outrun += is_outrun ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(outrun, 3);
+}
+
 TEST(ViewProjection, RefusesWhatTheCameraDoesNotSee) {
   for_all_views([&](const View& view, const NamedCamera& named) {
     const ViewProjection projection(view.calibration, view.motion);

@@ -433,6 +433,116 @@ std::vector<Pixels> moving_waves(int width, int height, int frames) {
   return result;
 }
 
+// Of one frame: where each landmark is seen, and how well.
+std::map<std::uint32_t, TrackObservation> seen_by(const StartUpTracker& tracker) {
+  std::map<std::uint32_t, TrackObservation> out;
+  for (int i = 0; i < tracker.observation_count(); ++i) {
+    out[tracker.observations()[i].landmark] = tracker.observations()[i];
+  }
+  return out;
+}
+
+int in_both(const std::map<std::uint32_t, TrackObservation>& a,
+            const std::map<std::uint32_t, TrackObservation>& b) {
+  return static_cast<int>(
+      std::count_if(a.begin(), a.end(), [&](const auto& seen) { return b.count(seen.first) > 0; }));
+}
+
+// By more than a quarter of the image from one frame to the next, under a light that stays where it is.
+TEST(StartUpTracker, FollowsALargeShiftUnderALightThatStays) {
+  constexpr int kW = 320;
+  constexpr int kH = 200;
+  std::mt19937_64 random(6);
+  const AnalyticImage waves(&random, 4);
+  StartUpTracker tracker({kW, kH});
+  const Vector2d step(88, -24);
+  std::map<std::uint32_t, TrackObservation> before;
+  for (int k = 0; k < 3; ++k) {
+    const auto grey = [&](const Vector2d& at) {
+      const Vector2d from_centre((at.x() - 0.5 * kW) / kW, (at.y() - 0.5 * kH) / kW);
+      return waves(0.5 * (at - k * step)) + 60 - 400 * from_centre.squaredNorm();
+    };
+    const Pixels image = make_pixels(kW, kH, grey, 1, &random);
+    const StartUpStatus status = tracker.process(image.view);
+    const auto now = seen_by(tracker);
+    if (k > 0) {
+      EXPECT_EQ(status, StartUpStatus::kOk) << k;
+      EXPECT_LT((tracker.statistics().shift - step).norm(), 1) << k;
+      EXPECT_GT(in_both(before, now), 15) << k;
+    }
+    before = now;
+  }
+}
+
+// The noise of a frame, from what two noisy images have left over; a new point is as uncertain as one that is found.
+TEST(StartUpTracker, KnowsTheNoiseOfOneFrame) {
+  for (const double sigma : {0.7, 4.0}) {
+    std::mt19937_64 random(7);
+    const AnalyticImage waves(&random, 8);
+    StartUpTracker tracker({320, 200});
+    std::map<std::uint32_t, TrackObservation> before;
+    std::map<std::uint32_t, TrackObservation> begun;  // in the frame before, of those seen there
+    std::vector<double> ratios;                       // of a point's first variance to its second
+    double noise = 0;
+    constexpr int kFrames = 8;
+    for (int k = 0; k < kFrames; ++k) {
+      const Vector2d shift(7.3 * k, -4.1 * k);
+      const Pixels image = make_pixels(
+          320, 200, [&](const Vector2d& at) { return waves(at - shift); }, sigma, &random);
+      (void)tracker.process(image.view);
+      const auto now = seen_by(tracker);
+      for (const auto& [landmark, first] : begun) {
+        if (now.count(landmark) == 0) continue;
+        ratios.push_back(first.covariance.trace() / now.at(landmark).covariance.trace());
+      }
+      begun.clear();
+      if (k > 0) noise += tracker.statistics().noise / (kFrames - 1);
+      for (const auto& [landmark, seen] : now) {
+        if (k > 0 && before.count(landmark) == 0) begun[landmark] = seen;
+      }
+      before = now;
+    }
+    // With what rounding adds; what is left over tells up to 10 % too much.
+    const double expected = std::sqrt(sigma * sigma + 1.0 / 12);
+    EXPECT_NEAR(noise, 1.05 * expected, 0.1 * expected) << sigma;
+    ASSERT_GT(ratios.size(), 30U);
+    std::nth_element(ratios.begin(), ratios.begin() + ratios.size() / 2, ratios.end());
+    // Student's factor, 30 / 28, and the median of a variance that is estimated from 30 values.
+    EXPECT_NEAR(ratios[ratios.size() / 2], 1, 0.2) << sigma;
+  }
+}
+
+// Something passes before a part of the image, and once more: two misses, but not in a row.
+TEST(StartUpTracker, KeepsPointsThatAreHiddenNowAndThen) {
+  constexpr int kHidden = 80;  // px, the left part
+  std::mt19937_64 random(8);
+  const AnalyticImage waves(&random);
+  StartUpTracker tracker({320, 200});
+  std::map<std::uint32_t, TrackObservation> before;
+  for (int k = 0; k < 8; ++k) {
+    const Vector2d shift(0.4 * k, 0.3 * k);
+    const bool hides = k == 3 || k == 5;
+    const auto grey = [&](const Vector2d& at) {
+      return hides && at.x() < kHidden ? 100 : waves(at - shift);
+    };
+    (void)tracker.process(make_pixels(320, 200, grey, 1, &random).view);
+    auto now = seen_by(tracker);
+    for (auto seen = now.begin(); seen != now.end();) {
+      seen = seen->second.u.x() < kHidden - 15 ? std::next(seen) : now.erase(seen);
+    }
+    if (k == 2) {
+      before = now;
+      EXPECT_GT(before.size(), 8U);
+    }
+    if (hides) {
+      EXPECT_EQ(in_both(before, now), 0) << k;
+    }
+    if (k == 7) {
+      EXPECT_GT(in_both(before, now), 0.7 * static_cast<double>(before.size()));
+    }
+  }
+}
+
 TEST(StartUpTracker, NeverGivesANameTwice) {
   StartUpTracker tracker({240, 160});
   std::map<std::uint32_t, int> last_seen;

@@ -280,6 +280,49 @@ TEST(TelemetryBuffer, RefusesToBridgeAGap) {
   expect_steady(result, mount, 1.02);
 }
 
+TEST(TelemetryBuffer, BridgesWhatIsJustNoGap) {
+  TelemetryLimits limits;
+  limits.max_gap_s = 0.5;
+  TelemetryBuffer<8> buffer(quiet(), limits);
+  expect_stored(buffer, {1, 0, 0.1, 0});
+  expect_stored(buffer, {1.5, 0, 0.2, 0});
+  InterpolatedPanTilt result;
+  ASSERT_EQ(buffer.query(1.25, 0, &result), QueryStatus::kOk);
+  EXPECT_NEAR(result.angle.pan, 0.15, 1e-12);
+}
+
+// Before a gap and after it are two motions that know nothing of each other.
+TEST(TelemetryBuffer, AnswersOnOneSideOfAGapAsIfTheOtherWereNotThere) {
+  const auto wild = [](double t) { return TelemetrySample{t, 0, 0.2 * std::sin(9 * t), 0}; };
+  const SteadyMount mount{1, 1, 0.01, 0.1};
+  TelemetryNoise noise = quiet();
+  noise.acceleration_sigma = 1e-3;
+  TelemetryBuffer<64> before(noise);
+  TelemetryBuffer<64> after(noise);
+  TelemetryBuffer<64> both(noise);
+  for (int i = 0; i < 20; ++i) {
+    expect_stored(before, wild(0.04 * i));
+    expect_stored(both, wild(0.04 * i));
+  }
+  for (int i = 0; i < 20; ++i) {
+    expect_stored(after, mount.at(2 + 0.04 * i));
+    expect_stored(both, mount.at(2 + 0.04 * i));
+  }
+  const auto expect_same = [&](const TelemetryBuffer<64>& side, double t, QueryStatus status) {
+    InterpolatedPanTilt alone;
+    InterpolatedPanTilt result;
+    ASSERT_EQ(side.query(t, 0, &alone), status) << t;
+    ASSERT_EQ(both.query(t, 0, &result), status) << t;
+    EXPECT_EQ(result.samples, alone.samples) << t;
+    EXPECT_EQ(result.angle.vector(), alone.angle.vector()) << t;
+    EXPECT_EQ(result.rate.vector(), alone.rate.vector()) << t;
+    EXPECT_EQ(result.covariance, alone.covariance) << t;
+  };
+  for (const double t : {0.75, 0.7}) expect_same(before, t, QueryStatus::kOk);
+  for (const double t : {2.01, 2.1}) expect_same(after, t, QueryStatus::kOk);
+  expect_same(after, 2.9, QueryStatus::kExtrapolated);
+}
+
 // A device that measures at 10 Hz, polled at 33 Hz while the mount turns.
 TEST(TelemetryBuffer, DoesNotTakeAStaleRepeatForAStandstill) {
   const SteadyMount mount{0, 0, 0.3, -0.2};
@@ -371,6 +414,38 @@ TEST(TelemetryBuffer, BelievesInAStandstillThatLasts) {
   EXPECT_NEAR(result.rate.pan, 0.3, 1e-9);
   ASSERT_EQ(buffer.query(10, 0, &result), QueryStatus::kOk);
   EXPECT_EQ(result.rate.pan, 0);
+}
+
+// A repeat on its way for long says nothing that later ones did not say.
+TEST(TelemetryBuffer, TakesNothingBackForARepeatThatComesLate) {
+  TelemetryLimits limits;
+  limits.max_repeat_s = 0.1;
+  TelemetryBuffer<16> in_order(quiet(), limits);
+  TelemetryBuffer<16> with_late(quiet(), limits);
+  for (TelemetryBuffer<16>* buffer : {&in_order, &with_late}) {
+    for (const double t : {0.0, 0.2, 0.4}) expect_stored(*buffer, {t, 0, 0.1, 0});
+    if (buffer == &with_late) {
+      EXPECT_EQ(buffer->push({0.25, 0, 0.1, 0}), PushStatus::kStaleRepeat);
+    }
+    expect_stored(*buffer, {0.45, 0, 0.2, 0});
+  }
+  EXPECT_EQ(with_late.size(), in_order.size());
+  InterpolatedPanTilt a;
+  InterpolatedPanTilt b;
+  ASSERT_EQ(in_order.query(0.44, 0, &a), QueryStatus::kOk);
+  ASSERT_EQ(with_late.query(0.44, 0, &b), QueryStatus::kOk);
+  EXPECT_EQ(a.angle.vector(), b.angle.vector());
+  EXPECT_EQ(a.covariance, b.covariance);
+}
+
+// At the limit itself the repeat would stand where the value already is.
+TEST(TelemetryBuffer, KeepsOneSampleOfOneTimeWhereARepeatIsAsOldAsItMayBe) {
+  TelemetryLimits limits;
+  limits.max_repeat_s = 0.25;
+  TelemetryBuffer<8> buffer(quiet(), limits);
+  expect_stored(buffer, {1, 0, 0.1, 0});
+  EXPECT_EQ(buffer.push({1.25, 0, 0.1, 0}), PushStatus::kStaleRepeat);
+  EXPECT_EQ(buffer.size(), 1U);
 }
 
 TEST(TelemetryBuffer, DoesNotTakeTheSameValueAfterALongSilenceForAStandstill) {

@@ -79,6 +79,60 @@ TEST(TelemetryInterpolation, OfTwoSamplesHasTheCovarianceOfThePaper) {
   }
 }
 
+// Times of samples on a constant acceleration, with a noise that is next to nothing.
+template <std::size_t kCount>
+std::array<TelemetryKnot, kCount> accelerated(const std::array<double, kCount>& times,
+                                              double acceleration) {
+  std::array<TelemetryKnot, kCount> knots{};
+  for (std::size_t i = 0; i < kCount; ++i) {
+    const double t = times[i];
+    knots[i] = {t, acceleration * t * t / 2, 0, 0, 0, false};
+  }
+  return knots;
+}
+
+// A mount that accelerates as expected misses the straight line by one standard deviation, in angle and rate
+// together: between the two samples and beyond them.
+TEST(TelemetryInterpolation, LineMissesTheExpectedAccelerationByItsCovariance) {
+  constexpr double kAcceleration = 2;  // rad/s^2
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = 1e-9;
+  noise.acceleration_sigma = kAcceleration;
+  const auto knots = accelerated<2>({-0.03, 0.05}, kAcceleration);
+  for (const double t : {-0.01, 0.02, 0.03, 0.07, 0.12}) {
+    InterpolatedPanTilt out;
+    ASSERT_TRUE(interpolate(noise, knots.data(), 2, 0, t, 0, Vector2<double>::Zero(), &out));
+    const Vector2<double> error(kAcceleration * t * t / 2 - out.angle.pan,
+                                kAcceleration * t - out.rate.pan);
+    const Matrix2<double> expected = error * error.transpose();
+    Matrix2<double> claimed;
+    claimed << out.covariance(0, 0), out.covariance(0, 2), out.covariance(2, 0),
+        out.covariance(2, 2);
+    // Rates of angles known to 1e-9 rad.
+    EXPECT_LT((claimed - expected).norm(), 1e-4 * expected.norm()) << t;
+    EXPECT_NEAR(claimed(0, 0), expected(0, 0), 1e-4 * expected(0, 0)) << t;
+  }
+}
+
+// Whichever neighbours the answer rests on, at uneven steps: they show the acceleration that is there.
+TEST(TelemetryInterpolation, FindsTheAccelerationThatItsSamplesShow) {
+  constexpr double kAcceleration = 2;  // rad/s^2
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = 1e-9;
+  noise.acceleration_sigma = 0;
+  const auto square_of = [&](const auto& knots, int before, double t) {
+    InterpolatedPanTilt out;
+    EXPECT_TRUE(interpolate(noise, knots.data(), static_cast<int>(knots.size()), before, t, 0,
+                            Vector2<double>::Zero(), &out));
+    return out.acceleration_square.x();
+  };
+  const auto three = accelerated<3>({0.0, 0.03, 0.08}, kAcceleration);
+  EXPECT_NEAR(square_of(three, 0, 0.01), kAcceleration * kAcceleration, 1e-3);
+  EXPECT_NEAR(square_of(three, 1, 0.05), kAcceleration * kAcceleration, 1e-3);
+  const auto eight = accelerated<8>({0.0, 0.03, 0.08, 0.1, 0.13, 0.18, 0.2, 0.23}, kAcceleration);
+  EXPECT_NEAR(square_of(eight, 3, 0.11), kAcceleration * kAcceleration, 1e-3);
+}
+
 struct StampNoise {
   double sigma;         // of a stamp
   double period_sigma;  // of the time between two stamps
@@ -385,6 +439,22 @@ TEST(ExpectedAcceleration, IsWhatBringsTheLatestRateToRest) {
     }
     EXPECT_LT(expected.square().y(), 1e-5);
   }
+}
+
+// The faster the mount turns, the more acceleration a stamp feigns that is off.
+TEST(ExpectedAcceleration, DoesNotTakeErrorsOfStampsForAccelerations) {
+  constexpr double kRate = 4;       // rad/s
+  constexpr double kOwn = 1e-3;     // s, of each stamp
+  constexpr double kPeriod = 0.02;  // s
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = 1e-9;
+  ExpectedAcceleration expected(noise, kPeriod);
+  for (int i = 0; i < 3; ++i) {
+    const double ago_s = kPeriod * i;
+    const double off_s = i == 1 ? kOwn : 0;
+    expected.add({10 - ago_s + off_s, -kRate * ago_s, 0, 0, kOwn * kOwn, false});
+  }
+  EXPECT_NEAR(expected.square().x(), kRate * kRate, 1e-9) << "what brings it to rest, and no more";
 }
 
 // The error that neighbouring stamps share may be the larger one's whichever comes first.
