@@ -178,7 +178,8 @@ std::optional<std::string> YamlSection::choice(const std::string& key,
   fail(key, contains(planned, *value)
                 ? fmt::format("'{}' is not available in this version; available: {}", *value,
                               join(available))
-                : fmt::format("'{}' is unknown; expected one of {}", *value, join(available)));
+                : fmt::format("'{}' is unknown; expected one of {}{}", *value, join(available),
+                              did_you_mean(*value, available)));
 }
 
 YamlSection YamlSection::section(const std::string& key) {

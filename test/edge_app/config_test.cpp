@@ -459,6 +459,8 @@ INSTANTIATE_TEST_SUITE_P(
                 "set calibration.file or camera.focal_length_px"},
         Mistake{"NoVideoType", "video: {url: rtsp://camera/s}\n" PAN_TILT, ":1: video.type",
                 "is missing"},
+        Mistake{"MistypedVideoType", "video: {type: rstp, url: x}\n" PAN_TILT, ":1: video.type",
+                "v4l2, recording; did you mean rtsp?"},
         Mistake{"UnknownVideoType", "video: {type: film, url: x}\n" PAN_TILT, ":1: video.type",
                 "'film' is unknown; expected one of rtsp, rtp, mjpeg, v4l2, recording"},
         Mistake{"V4l2WithoutDevice", "video: {type: v4l2}\n" PAN_TILT, ":1: video.device",
