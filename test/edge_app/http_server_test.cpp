@@ -463,6 +463,17 @@ TEST_F(HttpServerTest, APageOfAnotherSiteCanAskNothing) {
   EXPECT_THAT(get("/closed", "Origin: http://localhost\r\n"), StartsWith("HTTP/1.1 200 "));
 }
 
+TEST_F(HttpServerTest, BehindAProxyWithTlsThePageWithTheTokenMayAsk) {
+  options_.token = "right-horse";
+  start();
+  const auto post_from = [this](const std::string& origin) {
+    return ask("POST /echo HTTP/1.1\r\nHost: camera.example\r\nOrigin: " + origin +
+               "\r\nAuthorization: Bearer right-horse\r\nContent-Length: 1\r\n\r\nx");
+  };
+  EXPECT_THAT(post_from("https://camera.example"), StartsWith("HTTP/1.1 200 "));
+  EXPECT_THAT(post_from("https://evil.example"), StartsWith("HTTP/1.1 403 "));
+}
+
 TEST_F(HttpServerTest, WithoutATokenAHostThatIsAForeignNameIsRefused) {
   start();
   const auto ask_as = [this](const std::string& host, const std::string& headers = "") {
