@@ -255,7 +255,10 @@ TEST(RealtimeStage, AImageThatFindsNoRoomIsNotLent) {
     stage->push(image_message(scene, frame, slot));
     EXPECT_TRUE(stage->process());
   };
-  for (int frame = 0; frame < kRoom; ++frame) process(frame, kNoImageSlot);
+  for (int frame = 0; frame < kRoom; ++frame) {  // without images, which would be searched
+    stage->push(frame_message(frame));
+    EXPECT_TRUE(stage->process());
+  }
   stage->want_image();
   process(kRoom, 7);
   ImageSlot slot = kNoImageSlot;
