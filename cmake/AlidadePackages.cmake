@@ -26,6 +26,9 @@ foreach(file alidade.1 changelog)
 endforeach()
 
 install(FILES ${packages_dir}/alidade.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
+# Found there by its name: the program's.
+install(FILES ${packaging}/alidade.bash-completion DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
+  RENAME alidade COMPONENT runtime)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/edge_app/examples/ DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/alidade/examples
   COMPONENT runtime FILES_MATCHING PATTERN "*.yaml")
 # What only a package may lay down: `cmake --install` leaves the system's own folders alone.

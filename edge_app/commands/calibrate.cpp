@@ -2,12 +2,14 @@
 // its landmarks and a report. A calibration that is not good enough is not written, so that it cannot replace one
 // that is.
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <cmath>
 #include <cstdio>
 #include <cstdlib>
+#include <ctime>
 #include <filesystem>
 #include <system_error>
 
@@ -139,7 +141,10 @@ int calibrate_recording(const CalibrateOptions& options) {
   OutputDirectory directory(options.directory, recording);
   directory.add("report", "report.html", [&](const std::string& path, std::string* error) {
     return write_file_atomically(
-        path, calibration_report({recording, job.input, job.options, result, job.remarks}), error);
+        path,
+        calibration_report({recording, job.input, job.options, result, job.remarks, ALIDADE_VERSION,
+                            fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)))}),
+        error);
   });
   if (job.tracks_from_video) {
     directory.add("tracks", "tracks.csv", [&](const std::string& path, std::string* error) {

@@ -15,6 +15,7 @@
 #include "edge_app/check/telemetry_check.h"
 #include "edge_app/check/video_check.h"
 #include "edge_app/commands/check.h"
+#include "edge_app/commands/check_json.h"
 #include "edge_app/commands/check_measurement.h"
 #include "edge_app/commands/command.h"
 
@@ -118,22 +119,45 @@ void add_connection(const Connection& connection, const char* what, Findings* fi
                           what, connection.name, connection.losses, connection.loss));
 }
 
-}  // namespace
+// The report and what would help on stdout; what is wrong on stderr.
+void print_report(const CheckReport& report, const VideoNeeds& video_needs) {
+  const Measured& measured = report.measured;
+  fmt::print("video          {}: {}\n", measured.video.name, headline(report.video, video_needs));
+  print(describe(report.video));
+  print(describe(measured.images));
+  fmt::print("pan/tilt       {}: {}\n", measured.pan_tilt.name, headline(report.telemetry));
+  print(describe(report.telemetry));
+  if (report.motion) {
+    fmt::print("together\n");
+    print(describe(*report.motion));
+  }
+  for (const Finding& finding : report.findings) {
+    if (finding.severity == Severity::kAdvice) fmt::print("advice         {}\n", finding.text);
+  }
+}
 
-int check_links(const CheckOptions& options) {
-  const Config config = require_config(options.config);
-  fmt::print("configuration  {}: ok\n", options.config);
-  const NamedCalibration calibration = choose_calibration(config);
+// What is known before anything was measured.
+void print_beginning(const std::string& configuration, const NamedCalibration& calibration) {
   const Camera<double>& camera = calibration.calibration.camera;
+  fmt::print("configuration  {}: ok\n", configuration);
   fmt::print("calibration    {}: {}focal length {:.1f} px, clock offset {:.1f} ms\n",
              calibration.name,
              calibration.calibrated ? fmt::format("{}x{} px, ", camera.width, camera.height)
                                     : "not calibrated, ",
              camera.focal_length, 1e3 * calibration.calibration.clock_offset);
   std::fflush(stdout);
+}
+
+}  // namespace
+
+int check_links(const CheckOptions& options) {
+  const Config config = require_config(options.config);
+  const NamedCalibration calibration = choose_calibration(config);
+  if (!options.json) print_beginning(options.config, calibration);
 
   const Measured measured = measure(config, options.duration_s);
   const OrientationStepOptions step = step_options(config, calibration);
+  const Camera<double>& camera = calibration.calibration.camera;
   const VideoNeeds video_needs{measured.video.name, calibration.name, camera.width, camera.height,
                                config.realtime.landmarks};
   const VideoReport video =
@@ -142,36 +166,28 @@ int check_links(const CheckOptions& options) {
       check_telemetry(measured.samples, measured.delivered_s, step.telemetry_clock,
                       telemetry_needs(measured, config, calibration, step));
 
-  Findings findings;
-  add_connection(measured.video, "video", &findings);
-  add_connection(measured.pan_tilt, "pan/tilt", &findings);
-  const auto add = [&findings](const Findings& more) {
-    findings.insert(findings.end(), more.begin(), more.end());
+  CheckReport report{options.config, calibration, measured, video, telemetry, {}, {}};
+  add_connection(measured.video, "video", &report.findings);
+  add_connection(measured.pan_tilt, "pan/tilt", &report.findings);
+  const auto add = [&report](const Findings& more) {
+    report.findings.insert(report.findings.end(), more.begin(), more.end());
   };
   add(video.findings);
   add(measured.images.findings);
   add(telemetry.findings);
-  fmt::print("video          {}: {}\n", measured.video.name, headline(video, video_needs));
-  print(describe(video));
-  print(describe(measured.images));
-  fmt::print("pan/tilt       {}: {}\n", measured.pan_tilt.name, headline(telemetry));
-  print(describe(telemetry));
   if (measured.images.images > 1 && !telemetry.fresh.empty()) {
-    const MotionReport motion = motion_of(measured, video, telemetry, config, calibration);
-    fmt::print("together\n");
-    print(describe(motion));
-    add(motion.findings);
+    report.motion = motion_of(measured, video, telemetry, config, calibration);
+    add(report.motion->findings);
   }
-  bool ok = true;
-  for (const Finding& finding : findings) {
-    if (finding.severity == Severity::kAdvice) {
-      fmt::print("advice         {}\n", finding.text);
-      continue;
-    }
-    ok = false;
-    fmt::print(stderr, "alidade: {}\n", finding.text);
+  if (options.json) {
+    std::fputs(check_json(report).c_str(), stdout);
+  } else {
+    print_report(report, video_needs);
   }
-  return ok ? kExitOk : kExitFailed;
+  for (const Finding& finding : report.findings) {
+    if (finding.severity == Severity::kProblem) fmt::print(stderr, "alidade: {}\n", finding.text);
+  }
+  return is_ok(report.findings) ? kExitOk : kExitFailed;
 }
 
 }  // namespace alidade

@@ -8,6 +8,7 @@ namespace alidade {
 struct CheckOptions {
   std::string config;
   double duration_s = 10;
+  bool json = false;
 };
 
 // What is configured, and what its links send. Returns the exit code; throws CommandError.

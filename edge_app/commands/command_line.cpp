@@ -1,19 +1,39 @@
 #include "edge_app/commands/command_line.h"
 
+#include <fmt/format.h>
+
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <cstdio>
 #include <memory>
+#include <optional>
 #include <string>
+#include <vector>
 
+#include "core/calibration/number_text.h"
 #include "edge_app/commands/calibrate.h"
 #include "edge_app/commands/check.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/record.h"
 #include "edge_app/commands/replay.h"
 #include "edge_app/commands/run.h"
+#include "edge_app/config/nearest_word.h"
 
 namespace alidade {
 namespace {
+
+// Validators: what is wrong with a value, nothing if it is right. Those of the library for numbers tell their limits to
+// the last of 300 digits.
+std::string is_duration(const std::string& text) {
+  const std::optional<double> value = number_of(text);
+  return value && *value > 0 ? "" : fmt::format("'{}' is not a number of seconds above 0", text);
+}
+std::string is_share(const std::string& text) {
+  const std::optional<double> value = number_of(text);
+  return value && *value >= 0 && *value <= 1
+             ? ""
+             : fmt::format("'{}' is not a number from 0 to 1", text);
+}
 
 void add_run(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<RunOptions>();
@@ -21,7 +41,7 @@ void add_run(CLI::App& app, int* exit_code) {
       app.add_subcommand("run", "Live: an orientation for each video frame, on stdout");
   command->add_option("-c,--config", options->config, "Configuration (YAML)")->required();
   command->add_option("--duration", options->duration_s, "End after so many seconds")
-      ->check(CLI::PositiveNumber);
+      ->check(is_duration);
   CLI::Option* json =
       command->add_flag("--json", options->json, "JSON Lines, whatever the configuration says");
   command->add_flag("--csv", options->csv, "CSV, whatever the configuration says")->excludes(json);
@@ -36,7 +56,7 @@ void add_record(CLI::App& app, int* exit_code) {
   command->add_option("-o,--output", options->directory, "Directory of the new recording")
       ->required();
   command->add_option("--duration", options->duration_s, "End after so many seconds")
-      ->check(CLI::PositiveNumber);
+      ->check(is_duration);
   command->callback([options, exit_code] { *exit_code = record_streams(*options); });
 }
 
@@ -94,7 +114,7 @@ void add_calibrate(CLI::App& app, int* exit_code) {
       ->add_option("--scale-sigma", options->scale_sigma,
                    "How well measured angles are known to be true angles, relative (default: "
                    "noise.yaml's pan_tilt_scale_sigma, or 1e-8)")
-      ->check(CLI::Range(0.0, 1.0))
+      ->check(is_share)
       ->group(group);
   command->callback([options, exit_code] { *exit_code = calibrate_recording(*options); });
 }
@@ -105,9 +125,61 @@ void add_check(CLI::App& app, int* exit_code) {
       "check", "Validate the configuration, try each connection, and measure what comes");
   command->add_option("-c,--config", options->config, "Configuration (YAML)")->required();
   command->add_option("--duration", options->duration_s, "Seconds to measure each stream for")
-      ->check(CLI::PositiveNumber)
+      ->check(is_duration)
       ->capture_default_str();
+  command->add_flag("--json", options->json, "The report on stdout as one line of JSON");
   command->callback([options, exit_code] { *exit_code = check_links(*options); });
+}
+
+std::vector<std::string> command_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
+  return names;
+}
+
+std::vector<std::string> option_names(const CLI::App& app) {
+  std::vector<std::string> names;
+  for (const CLI::Option* option : app.get_options()) {
+    for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    for (const std::string& name : option->get_snames()) names.push_back("-" + name);
+  }
+  return names;
+}
+
+// The first word that is no command, or no option of the one that was chosen. The library asks first whether all that is
+// required is there, and what was mistyped is not.
+std::string unknown_word(const CLI::App& app, const std::vector<std::string>& words) {
+  const std::vector<std::string> unknown = app.remaining(true);
+  const std::vector<CLI::App*> chosen = app.get_subcommands();
+  for (const std::string& word : words) {
+    if (std::find(unknown.begin(), unknown.end(), word) == unknown.end()) continue;
+    if (word.size() > 1 && word.front() == '-') {
+      std::vector<std::string> known = option_names(app);
+      for (const CLI::App* command : chosen) {
+        const std::vector<std::string> more = option_names(*command);
+        known.insert(known.end(), more.begin(), more.end());
+      }
+      const std::string name = word.substr(0, word.find('='));
+      return fmt::format("unknown option '{}'{}", name, did_you_mean(name, known));
+    }
+    if (!chosen.empty()) continue;
+    const std::vector<std::string> known = command_names(app);
+    return nearest_word(word, known)
+               ? fmt::format("unknown command '{}'{}", word, did_you_mean(word, known))
+               : fmt::format("unknown command '{}'; expected one of {}", word,
+                             fmt::join(known, ", "));
+  }
+  return "";
+}
+
+// One line: what is wrong, and where to read what would be right.
+std::string usage_error(const CLI::App& app, const std::vector<std::string>& words,
+                        const CLI::ParseError& error) {
+  std::string what = unknown_word(app, words);
+  if (what.empty()) what = error.what();
+  const std::vector<CLI::App*> chosen = app.get_subcommands();
+  return fmt::format("{}; see alidade {}--help", what,
+                     chosen.empty() ? "" : chosen.front()->get_name() + " ");
 }
 
 }  // namespace
@@ -130,7 +202,8 @@ int run_command_line(int argc, char** argv) {
     if (e.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
       return app.exit(e);  // --help, --version
     }
-    std::fprintf(stderr, "alidade: %s; see alidade --help\n", e.what());
+    const std::string line = usage_error(app, {argv + 1, argv + argc}, e);
+    std::fprintf(stderr, "alidade: %s\n", line.c_str());
     return kExitUsage;
   } catch (const CommandError& e) {
     std::fprintf(stderr, "alidade: %s\n", e.what());

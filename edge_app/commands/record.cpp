@@ -119,7 +119,8 @@ class Recorder {
       ++frames_;
       return true;
     };
-    const std::string error = read_to_the_end<Frame>(video_, on_frame, [](double) {});
+    LinkWatch watch;  // nobody asks it
+    const std::string error = read_to_the_end<Frame>(video_, &watch, on_frame, [](double) {});
     if (!error.empty()) fail(error);
   }
 
@@ -136,7 +137,9 @@ class Recorder {
       }
       return true;
     };
-    const std::string error = read_to_the_end<PanTiltSample>(pan_tilt_, on_sample, [](double) {});
+    LinkWatch watch;  // nobody asks it
+    const std::string error =
+        read_to_the_end<PanTiltSample>(pan_tilt_, &watch, on_sample, [](double) {});
     if (!error.empty()) fail(error);
   }
 

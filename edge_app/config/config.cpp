@@ -17,7 +17,7 @@ constexpr NumberRange kPixels{1, 65536, "px"};
 VideoConfig read_video(YamlSection section, const std::string& path) {
   VideoConfig video;
   const auto type = section.choice("type", {"rtsp", "rtp", "mjpeg", "v4l2", "recording"});
-  if (!type) section.fail("type", "is missing; expected one of rtsp, rtp, mjpeg, v4l2, recording");
+  if (!type) section.fail_missing("type", "expected one of rtsp, rtp, mjpeg, v4l2, recording");
   if (*type == "recording") {
     video.type = VideoConfig::Type::kRecording;
     video.directory = path_relative_to(path, required_text(section, "directory", "my-recording"));
@@ -212,20 +212,25 @@ void check_ages(const Config& config, const YamlSection& pan_tilt, const YamlSec
 }
 
 void read_config(YamlSection& top, const std::string& path, Config* config) {
+  const YamlSection video = top.section("video");
+  const YamlSection pan_tilt = top.section("pan_tilt");
+  const YamlSection camera = top.section("camera");
+  const YamlSection calibration = top.section("calibration");
+  const YamlSection realtime = top.section("realtime");
+  const YamlSection output = top.section("output");
+  // Before one is missed: it may be there, mistyped.
+  top.finish();
   for (const char* required : {"video", "pan_tilt"}) {
     if (!top.has(required))
       throw ConfigError(path + ": section '" + required + "' is missing; add it");
   }
-  config->video = read_video(top.section("video"), path);
-  const YamlSection pan_tilt = top.section("pan_tilt");
+  config->video = read_video(video, path);
   config->pan_tilt = read_pan_tilt(pan_tilt, path);
-  config->camera = read_camera(top.section("camera"));
-  config->calibration = read_calibration(top.section("calibration"), path);
-  const YamlSection realtime = top.section("realtime");
+  config->camera = read_camera(camera);
+  config->calibration = read_calibration(calibration, path);
   config->realtime = read_realtime(realtime);
   check_ages(*config, pan_tilt, realtime);
-  config->output = read_output(top.section("output"), path, &config->warnings);
-  top.finish();
+  config->output = read_output(output, path, &config->warnings);
   if ((config->video.type == VideoConfig::Type::kRecording) !=
       (config->pan_tilt.type == PanTiltConfig::Type::kRecording)) {
     throw ConfigError(

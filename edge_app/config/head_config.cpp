@@ -15,7 +15,7 @@ constexpr NumberRange kDegPerStep{1e-6, 10, "deg"};
 template <typename Value>
 Value required(const YamlSection& section, const std::string& key,
                const std::optional<Value>& value, const std::string& what) {
-  if (!value) section.fail(key, "is missing; expected " + what);
+  if (!value) section.fail_missing(key, "expected " + what);
   return *value;
 }
 

@@ -16,7 +16,7 @@ std::string path_relative_to(const std::string& config_path, const std::string& 
 std::string required_text(YamlSection& section, const std::string& key,
                           const std::string& example) {
   const std::optional<std::string> value = section.text(key);
-  if (!value) section.fail(key, "is missing; expected for example " + key + ": " + example);
+  if (!value) section.fail_missing(key, "expected for example " + key + ": " + example);
   return *value;
 }
 

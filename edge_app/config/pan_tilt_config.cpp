@@ -51,7 +51,7 @@ PanTiltType read_pan_tilt_type(YamlSection& section) {
   std::vector<std::string> keys;
   for (const PanTiltType& type : types) keys.push_back(type.key);
   const std::optional<std::string> key = section.choice("type", keys);
-  if (!key) section.fail("type", "is missing; expected one of " + join(keys));
+  if (!key) section.fail_missing("type", "expected one of " + join(keys));
   return *std::find_if(types.begin(), types.end(),
                        [&](const PanTiltType& type) { return type.key == *key; });
 }

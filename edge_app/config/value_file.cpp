@@ -13,7 +13,7 @@ std::optional<StatedValue> stated_value(YamlSection& top, const char* name,
   if (!top.has(name)) return std::nullopt;
   YamlSection section = top.section(name);
   const std::optional<double> value = section.number("value", range);
-  if (!value) section.fail("value", "is missing; write {value: ..., sigma: ...}");
+  if (!value) section.fail_missing("value", "write {value: ..., sigma: ...}");
   StatedValue stated{*value, section.number("sigma", {0, range.high - range.low, range.unit})};
   section.finish();
   return stated;
@@ -23,7 +23,7 @@ std::optional<Vector3<double>> axis(YamlSection& top, const char* name) {
   if (!top.has(name)) return std::nullopt;
   YamlSection section = top.section(name);
   const auto value = section.numbers("value", 3, {-1.001, 1.001, "1"});
-  if (!value) section.fail("value", "is missing; write {value: [x, y, z]}");
+  if (!value) section.fail_missing("value", "write {value: [x, y, z]}");
   static_cast<void>(section.numbers("sigma", 2, {0, 1, "rad"}));
   section.finish();
   const Vector3<double> axis((*value)[0], (*value)[1], (*value)[2]);

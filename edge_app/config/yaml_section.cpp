@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "core/calibration/number_text.h"
+#include "edge_app/config/nearest_word.h"
 
 namespace alidade {
 namespace {
@@ -83,11 +84,25 @@ std::string YamlSection::where(const std::string& key) const {
   for (const auto& entry : node_) {
     if (entry.first.Scalar() == key) at = place(file_, entry.first);
   }
-  return fmt::format("{}: {}{}{}", at, name_, name_.empty() ? "" : ".", key);
+  return fmt::format("{}: {}", at, path_of(key));
+}
+
+std::string YamlSection::path_of(const std::string& key) const {
+  return name_.empty() ? key : name_ + "." + key;
 }
 
 void YamlSection::fail(const std::string& key, const std::string& what) const {
   throw ConfigError(where(key) + ": " + what);
+}
+
+void YamlSection::fail_missing(const std::string& key, const std::string& expected) const {
+  for (const auto& entry : node_) {
+    const std::string& other = entry.first.Scalar();
+    if (!contains(asked_, other) && nearest_word(other, {key})) {
+      fail(other, "unknown key" + did_you_mean(other, {key}));
+    }
+  }
+  fail(key, "is missing; " + expected);
 }
 
 std::optional<std::string> YamlSection::scalar(const std::string& key, const std::string& expected,
@@ -163,22 +178,21 @@ std::optional<std::string> YamlSection::choice(const std::string& key,
   fail(key, contains(planned, *value)
                 ? fmt::format("'{}' is not available in this version; available: {}", *value,
                               join(available))
-                : fmt::format("'{}' is unknown; expected one of {}", *value, join(available)));
+                : fmt::format("'{}' is unknown; expected one of {}{}", *value, join(available),
+                              did_you_mean(*value, available)));
 }
 
 YamlSection YamlSection::section(const std::string& key) {
   asked_.push_back(key);
   const std::optional<YAML::Node> value = find(key);
-  return YamlSection(value ? *value : YAML::Node(), name_.empty() ? key : name_ + "." + key, file_);
+  return YamlSection(value ? *value : YAML::Node(), path_of(key), file_);
 }
 
 void YamlSection::finish() const {
   for (const auto& entry : node_) {
     const std::string key = entry.first.Scalar();
     if (contains(asked_, key)) continue;
-    throw ConfigError(fmt::format("{}: {}{}{}: unknown key; known here: {}",
-                                  place(file_, entry.first), name_, name_.empty() ? "" : ".", key,
-                                  join(asked_)));
+    fail(key, "unknown key; known here: " + join(asked_) + did_you_mean(key, asked_));
   }
 }
 

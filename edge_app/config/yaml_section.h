@@ -54,9 +54,12 @@ class YamlSection {
   // "FILE:LINE: SECTION.KEY", of the section itself if it lacks the key.
   [[nodiscard]] std::string where(const std::string& key) const;
   [[noreturn]] void fail(const std::string& key, const std::string& what) const;
+  // For a key that there must be: "is missing; EXPECTED". Where it was only mistyped, that is what is said.
+  [[noreturn]] void fail_missing(const std::string& key, const std::string& expected) const;
 
  private:
   [[nodiscard]] std::optional<YAML::Node> find(const std::string& key) const;
+  [[nodiscard]] std::string path_of(const std::string& key) const;  // SECTION.KEY
   // The value as a scalar's text. `expected` completes "expected ...".
   std::optional<std::string> scalar(const std::string& key, const std::string& expected,
                                     bool plain);

@@ -38,18 +38,24 @@ th, td { padding: 5px 18px 5px 0; border-bottom: 1px solid var(--rule); white-sp
 .matrix thead th { text-align: center; white-space: normal; vertical-align: bottom; }
 figure { margin: 14px 0; } figcaption { color: var(--soft); font-size: 13.5px; margin: 0 0 4px; }
 figcaption b { color: var(--ink); }
-.pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(420px, 1fr)); gap: 0 20px; }
+.pair { display: grid; grid-template-columns: repeat(auto-fit, minmax(min(420px, 100%), 1fr)); gap: 0 20px; }
 svg { display: block; width: 100%; height: auto; font-size: 12px; font-variant-numeric: tabular-nums; }
 svg text { fill: var(--soft); } svg .name { fill: var(--ink); font-size: 12.5px; }
 svg .grid { stroke: var(--rule); } svg .frame { stroke: var(--soft); fill: none; }
 svg .dots { fill: none; stroke-linecap: round; stroke-opacity: .75; }
 svg .line { fill: none; stroke-width: 1.4; stroke-linejoin: round; }
-svg .band { fill: var(--soft); fill-opacity: .14; } svg .level { stroke: var(--soft); }
+svg .band { fill: var(--soft); fill-opacity: .14; } svg .gap { fill: var(--soft); fill-opacity: .22; }
+svg .level { stroke: var(--soft); }
 svg .a { stroke: var(--a); } svg .b { stroke: var(--b); } svg .bad { stroke: var(--bad); }
 svg .ink { stroke: var(--ink); } svg .faint { stroke: var(--soft); stroke-opacity: .7; }
 svg .area { stroke: none; } svg .area.a { fill: var(--a); } svg .area.b { fill: var(--b); }
 .key { display: inline-block; width: 10px; height: 10px; border-radius: 5px; margin: 0 4px 0 8px; }
 .key.a { background: var(--a); } .key.b { background: var(--b); } .key.bad { background: var(--bad); }
+.plot { overflow-x: auto; }
+/* A wide plot is moved sideways in its frame rather than squeezed until nobody can read it. */
+@media (max-width: 700px) { main { padding: 18px 12px 36px; } svg.wide { width: 820px; font-size: 14px; }
+  svg.wide .name { font-size: 14.5px; } svg.half, svg.half .name { font-size: 16px; }
+  th, td { padding-right: 10px; } .facts { grid-template-columns: 1fr 1fr; } }
 )";
 
 void list(ReportPage& page, const char* title, const std::vector<std::string>& lines) {
@@ -59,6 +65,14 @@ void list(ReportPage& page, const char* title, const std::vector<std::string>& l
   page.add("</ul>\n");
 }
 
+void origin(ReportPage& page) {
+  const CalibrationReportInput& report = page.report();
+  const std::vector<FrameResult>& frames = report.result.frames;
+  page.add("<p class=\"soft\">alidade {}, {}; pictures of {}\u00d7{} px, {:.1f} s</p>\n",
+           escape_html(report.version), escape_html(report.date), report.input.width,
+           report.input.height, frames.back().time_s - frames.front().time_s);
+}
+
 void verdict(ReportPage& page) {
   const CalibrationQuality& q = page.result().quality;
   page.add("<div class=\"verdict{}\"><strong>{}</strong><p>{}</p></div>\n",
@@ -66,10 +80,13 @@ void verdict(ReportPage& page) {
            page.result().ok() ? "Calibrated" : "Too uncertain: no calibration was written",
            escape_html(page.result().message));
   page.add("<ul class=\"facts\">\n");
-  const auto fact = [&page](const std::string& number, const char* what) {
+  const auto fact = [&page](const std::string& number, const std::string& what) {
     page.add("<li><b>{}</b>{}</li>\n", number, what);
   };
-  fact(fmt::format("{}", q.frames), "frames");
+  const std::size_t used = page.result().frames.size();
+  const std::size_t frames = page.report().input.frames.size();
+  fact(fmt::format("{}", used),
+       used == frames ? "frames, all there are" : fmt::format("frames used, of {}", frames));
   fact(fmt::format("{}", q.observations), "observations");
   fact(fmt::format("{}", q.landmarks), "landmarks");
   fact(fmt::format("{}", q.telemetry), "telemetry samples");
@@ -79,7 +96,9 @@ void verdict(ReportPage& page) {
   fact(fmt::format("{}", page.result().trajectory.segments() + 1), "spline knots");
   page.add("</ul>\n");
   list(page, "What would help", q.advice);
-  list(page, "Left out", page.result().exclusions.describe());
+  std::vector<std::string> left_out = unused_frames(page);
+  for (const std::string& line : page.result().exclusions.describe()) left_out.push_back(line);
+  list(page, "Left out", left_out);
   list(page, "About the recording", page.report().remarks);
 }
 
@@ -139,6 +158,7 @@ void correlations(ReportPage& page) {
 
 std::string calibration_report(const CalibrationReportInput& report) {
   report::ReportPage page(report);
+  report::origin(page);
   report::verdict(page);
   report::parameters(page);
   report::correlations(page);

@@ -16,6 +16,8 @@ struct CalibrationReportInput {
   const CalibrationOptions& options;
   const CalibrationResult& result;  // with a trajectory: kOk or kWeak
   std::vector<std::string> remarks;
+  std::string version;  // of the program
+  std::string date;     // and time of the report, with its zone
 };
 
 std::string calibration_report(const CalibrationReportInput& report);

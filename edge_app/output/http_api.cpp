@@ -141,6 +141,14 @@ Json quantiles(const LatencyHistogram& histogram) {
           {"max", histogram.longest_s()}};
 }
 
+Json link_json(const LinkHealth& link) {
+  return {{"connected", link.connected},
+          {"reason", link.reason.empty() ? Json() : Json(link.reason)},
+          {"reconnections", link.reconnections},
+          {"age_s", or_null(link.age_s)},
+          {"rate_hz", or_null(link.rate_hz)}};
+}
+
 ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
   const PipelineSummary summary = sources.summary();
   const FrameSourceCounters losses = sources.video_losses();
@@ -175,6 +183,8 @@ ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
                    {"none", summary.records - summary.with_orientation},
                    {"damaged", losses.damaged},
                    {"not_fetched", losses.dropped}};
+  out["links"] = {{"video", link_json(summary.video_link)},
+                  {"pan_tilt", link_json(summary.pan_tilt_link)}};
   out["dropped"] = {{"frames", summary.drops.frames},
                     {"telemetry", summary.drops.telemetry},
                     {"records", summary.drops.records},

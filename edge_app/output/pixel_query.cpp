@@ -68,12 +68,11 @@ bool parse_frame(const Json& object, FrameChoice* which, std::string* error) {
     return false;
   }
   if (frame != object.end()) {
-    const bool fits = frame->is_number_integer() &&
-                      (!frame->is_number_unsigned() ||
-                       frame->get<std::uint64_t>() <=
-                           static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max()));
+    const bool fits = frame->is_number_unsigned() &&
+                      frame->get<std::uint64_t>() <=
+                          static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
     if (!fits) {
-      *error = "frame must be an integer";
+      *error = "frame must be an integer, 0 or more";
       return false;
     }
     which->frame = frame->get<std::int64_t>();

@@ -22,12 +22,12 @@ void trajectory(ReportPage& page) {
     const double scale = axis == 0 ? mechanics.pan_scale : mechanics.tilt_scale;
     double low = std::numeric_limits<double>::infinity();
     double high = -low;
-    std::vector<PlotPoint> curve;
+    std::vector<TimedPoint> curve;
     constexpr int kSteps = 1200;
     for (int i = 0; i <= kSteps; ++i) {
       const double time = spline.begin_s() + (spline.end_s() - spline.begin_s()) * i / kSteps;
       const double angle = spline.position(time).vector()[axis] * kDegrees;
-      curve.push_back({time - page.start_s(), angle});
+      curve.push_back({time - page.start_s(), {time - page.start_s(), angle}});
       low = std::min(low, angle);
       high = std::max(high, angle);
     }
@@ -48,17 +48,19 @@ void trajectory(ReportPage& page) {
     }
     widen(&low, &high);
     SvgPlot plot(kWide_px, 196, page.time_axis(), {low, high, fmt::format("{}, deg", name)});
+    page.shade_gaps(&plot);
     plot.ticks(knots, "ink");
     plot.dots(samples, "faint", 4);
-    plot.line(curve, colour);
+    page.line_between_gaps(curve, colour, &plot);
     page.figure(
         fmt::format("<b>{}</b> \u2013 line: the adjusted spline; grey: telemetry; strokes on "
-                    "the time axis: {} knots",
-                    axis == 0 ? "Pan" : "Tilt", knots.size()),
+                    "the time axis: {} knots{}",
+                    axis == 0 ? "Pan" : "Tilt", knots.size(), page.gap_note()),
         plot, std::string(name) + " over time");
     const double range = symmetric_range(magnitudes, 1);
     SvgPlot difference(kWide_px, 160, page.time_axis(),
                        {-range, range, fmt::format("{} error, mrad", name)});
+    page.shade_gaps(&difference);
     difference.level(0);
     difference.dots(good, colour);
     difference.dots(bad, "bad", 4);
@@ -137,7 +139,7 @@ void timing(ReportPage& page) {
 
 void landmarks(ReportPage& page) {
   const Mechanics<double>& mechanics = page.result().calibration.mechanics;
-  std::vector<PlotPoint> path;
+  std::vector<TimedPoint> path;
   double reference = 0;
   const auto place = [&reference](const Vector3<double>& d) {
     const double azimuth = reference + wrap_angle(std::atan2(d.y(), d.x()) - reference);
@@ -145,12 +147,12 @@ void landmarks(ReportPage& page) {
   };
   for (const FrameResult& frame : page.result().frames) {
     const Vector3<double> axis = R_base_from_camera(mechanics, frame.angle).col(2);
-    path.push_back(place(axis));
-    reference = path.back().x / kDegrees;  // follows the camera around
+    path.push_back({frame.time_s - page.start_s(), place(axis)});
+    reference = path.back().point.x / kDegrees;  // follows the camera around
   }
-  double low_x = path.front().x;
+  double low_x = path.front().point.x;
   double high_x = low_x;
-  double low_y = path.front().y;
+  double low_y = path.front().point.y;
   double high_y = low_y;
   const auto include = [&](const PlotPoint& point) {
     low_x = std::min(low_x, point.x);
@@ -158,7 +160,7 @@ void landmarks(ReportPage& page) {
     low_y = std::min(low_y, point.y);
     high_y = std::max(high_y, point.y);
   };
-  for (const PlotPoint& point : path) include(point);
+  for (const TimedPoint& at : path) include(at.point);
   reference = 0.5 * (low_x + high_x) / kDegrees;
   std::vector<PlotPoint> often;
   std::vector<PlotPoint> seldom;
@@ -181,11 +183,12 @@ void landmarks(ReportPage& page) {
                {low_y - y_air, high_y + y_air, "elevation (up), deg"});
   plot.dots(seldom, "b", 3.4);
   plot.dots(often, "a", 3.4);
-  plot.line(path, "ink");
+  page.line_between_gaps(path, "ink", &plot);
   page.add("<h2>Landmarks</h2>\n");
   page.figure(
       fmt::format("<b>Map in the base</b> \u2013 <span class=\"key a\"></span>seen {} times or "
-                  "more, <span class=\"key b\"></span>less often; line: the optical axis",
+                  "more, <span class=\"key b\"></span>less often; line: the optical axis, where "
+                  "frames were used",
                   kOften),
       plot, "map of the landmarks");
 }

@@ -21,10 +21,19 @@ inline constexpr int kHalf_px = 510;   // one of two side by side
 inline constexpr double kDegrees = 180 / kPi;
 inline constexpr double kMilli = 1e3;  // s -> ms, rad -> mrad
 
+struct Span {
+  double begin_s = 0;
+  double end_s = 0;
+};
+
+struct TimedPoint {
+  double time_s = 0;  // since the first frame
+  PlotPoint point;
+};
+
 class ReportPage {
  public:
-  explicit ReportPage(const CalibrationReportInput& report)
-      : report_(report), start_s_(report.result.frames.front().time_s) {}
+  explicit ReportPage(const CalibrationReportInput& report);
 
   template <class... Values>
   void add(fmt::format_string<Values...> format, Values&&... values) {
@@ -32,13 +41,24 @@ class ReportPage {
   }
   // caption is HTML; label what the plot shows, for those who cannot see it.
   void figure(const std::string& caption, const SvgPlot& plot, const std::string& label) {
-    add("<figure><figcaption>{}</figcaption>\n{}</figure>\n", caption, plot.svg(label));
+    add("<figure><figcaption>{}</figcaption>\n<div class=\"plot\">{}</div></figure>\n", caption,
+        plot.svg(label));
   }
 
   [[nodiscard]] const CalibrationReportInput& report() const { return report_; }
   [[nodiscard]] const CalibrationResult& result() const { return report_.result; }
   // Of the first frame, image clock: times are shown since then.
   [[nodiscard]] double start_s() const { return start_s_; }
+  // Spans of time between two frames in which no frame was used, since start_s().
+  [[nodiscard]] const std::vector<Span>& gaps() const { return gaps_; }
+  // Shades the gaps of a plot over time; what its caption says of that.
+  void shade_gaps(SvgPlot* plot) const;
+  [[nodiscard]] std::string gap_note() const {
+    return gaps_.empty() ? "" : "; grey columns: no frame was used";
+  }
+  // A line through points in order of time, cut where they lie in a gap or on both sides of one.
+  void line_between_gaps(const std::vector<TimedPoint>& points, const char* colour,
+                         SvgPlot* plot) const;
   [[nodiscard]] PlotAxis time_axis() const {
     const TrajectorySpline& spline = result().trajectory;
     return {spline.begin_s() - start_s_, spline.end_s() - start_s_,
@@ -54,9 +74,12 @@ class ReportPage {
  private:
   const CalibrationReportInput& report_;
   double start_s_;
+  std::vector<Span> gaps_;
   std::string body_;
 };
 
+// Which frames were not used and why, a line for each reason. report_frames.cpp
+std::vector<std::string> unused_frames(const ReportPage& page);
 // report_residuals.cpp
 void residuals(ReportPage& page);
 // report_motion.cpp

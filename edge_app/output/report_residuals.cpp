@@ -34,14 +34,15 @@ void residuals_over_time(ReportPage& page) {
   for (int i = 0; i < 2; ++i) {
     SvgPlot plot(kWide_px, 196, page.time_axis(),
                  {-range, range, i == 0 ? "error in u, px" : "error in v, px"});
+    page.shade_gaps(&plot);
     plot.band(-2 * sigma, 2 * sigma);
     plot.level(0);
     plot.dots(good[i], "a", 1.8);
     plot.dots(bad[i], "bad", 4);
     page.figure(
         fmt::format("<b>Image residuals over time, {}</b> \u2013 measured minus predicted; "
-                    "grey: \u00b12 sigma{}",
-                    i == 0 ? "u" : "v",
+                    "grey: \u00b12 sigma{}{}",
+                    i == 0 ? "u" : "v", page.gap_note(),
                     bad[i].empty() ? ""
                                    : "; <span class=\"key bad\"></span>outliers, left out (at "
                                      "the edge if beyond)"),
@@ -102,8 +103,8 @@ void residuals_over_image(ReportPage& page) {
       fmt::format("<b>Image residuals over the image</b> \u2013 strokes: mean of a cell, the "
                   "longest is {:.3f} px; colour: its RMS, "
                   "<span class=\"key a\"></span>below and <span class=\"key b\"></span>above "
-                  "the noise",
-                  longest),
+                  "the noise; empty: fewer than {} observations",
+                  longest, kFewest),
       plot, "residuals over the image");
 }
 
@@ -156,12 +157,14 @@ void histograms(ReportPage& page) {
                                       200, 320);
   SvgPlot plot(kHalf_px, plane_height + SvgPlot::kTop + SvgPlot::kBottom,
                {-kReach, kReach, "residual / its sigma"}, {0, 1.08 * highest, "density"});
-  plot.line(gaussian, "faint");
-  plot.line(telemetry_outline, "b");
-  plot.line(image_outline, "a");
+  if (!image.empty() || !telemetry.empty()) plot.line(gaussian, "faint");
+  if (!telemetry.empty()) plot.line(telemetry_outline, "b");
+  if (!image.empty()) plot.line(image_outline, "a");
   page.figure(
-      "<b>Distribution</b> \u2013 <span class=\"key a\"></span>image (u and v), "
-      "<span class=\"key b\"></span>telemetry (pan and tilt), grey: the unit Gaussian",
+      fmt::format(
+          "<b>Distribution</b> \u2013 <span class=\"key a\"></span>image (u and v){}, "
+          "<span class=\"key b\"></span>telemetry (pan and tilt){}, grey: the unit Gaussian",
+          image.empty() ? ": no data" : "", telemetry.empty() ? ": no data" : ""),
       plot, "histogram of normalised residuals");
 }
 

@@ -98,6 +98,23 @@ void add_record_metrics(const OrientationRecord& newest, MetricsText* out) {
   }
 }
 
+void add_link_metrics(const PipelineSummary& summary, MetricsText* out) {
+  const std::array<std::pair<const char*, const LinkHealth*>, 2> links = {
+      {{"video", &summary.video_link}, {"pan_tilt", &summary.pan_tilt_link}}};
+  out->gauge("alidade_link_connected", "1: the link stands; 0: lost, refused or not there yet");
+  for (const auto& [name, link] : links) out->add(std::int64_t{link->connected}, {{"link", name}});
+  out->counter("alidade_link_reconnections_total", "Times that a lost link came back");
+  for (const auto& [name, link] : links) out->add(link->reconnections, {{"link", name}});
+  out->gauge("alidade_link_last_sample_age_seconds", "Since a link's last frame or sample came");
+  for (const auto& [name, link] : links) {
+    if (link->age_s) out->add(*link->age_s, {{"link", name}});
+  }
+  out->gauge("alidade_link_rate_hertz", "Frames or samples a second that come over a link");
+  for (const auto& [name, link] : links) {
+    if (link->rate_hz) out->add(*link->rate_hz, {{"link", name}});
+  }
+}
+
 }  // namespace
 
 std::string service_metrics(const HttpApiSources& sources, const HttpCounters& http) {
@@ -121,6 +138,7 @@ std::string service_metrics(const HttpApiSources& sources, const HttpCounters& h
   out.counter("alidade_frames_lost_total", "Frames lost before they were read, by reason");
   out.add(losses.damaged, {{"reason", "damaged"}});
   out.add(losses.dropped, {{"reason", "not_fetched"}});
+  add_link_metrics(summary, &out);
   out.counter("alidade_queue_dropped_total",
               "Messages lost to full queues; those to the calibration cost no record");
   out.add(summary.drops.frames, {{"queue", "frames"}});

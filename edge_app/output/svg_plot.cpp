@@ -17,26 +17,35 @@ struct Ticks {
   int decimals = 0;
 };
 
-// About `wanted` round numbers from low to high.
+// An axis is read from the distance of two labels; one with a label in its middle needs one on either side.
+constexpr std::size_t kFewestTicks = 3;
+
+std::vector<double> multiples(double step, double low, double high) {
+  std::vector<double> at;
+  const double first = std::ceil(low / step - 1e-9);
+  for (double n = first; n * step <= high + 1e-9 * step; n += 1) at.push_back(n * step);
+  return at;
+}
+
+// About `wanted` round numbers from low to high, and never fewer than kFewestTicks.
 Ticks round_ticks(double low, double high, int wanted) {
   const double rough = (high - low) / wanted;
   const double power = std::pow(10, std::floor(std::log10(rough)));
-  double step = 10 * power;
-  for (const double factor : {1.0, 2.0, 5.0}) {
-    if (rough <= factor * power) {
-      step = factor * power;
-      break;
-    }
-  }
   Ticks ticks;
-  ticks.decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(step) - 1e-9)), 0, 12);
-  const double first = std::ceil(low / step - 1e-9);
-  for (double n = first; n * step <= high + 1e-9 * step; n += 1) ticks.at.push_back(n * step);
+  for (const double factor : {10.0, 5.0, 2.0, 1.0, 0.5}) {
+    const double step = factor * power;
+    ticks.at = multiples(step, low, high);
+    ticks.decimals = std::clamp(static_cast<int>(std::ceil(-std::log10(step) - 1e-9)), 0, 12);
+    if (step < 2 * rough && ticks.at.size() >= kFewestTicks) break;
+  }
   return ticks;
 }
 
 std::string tick_label(double value, int decimals) {
-  std::string text = fmt::format("{:.{}f}", value, decimals);
+  constexpr int kMostDecimals = 5;  // that the margin has room for
+  const double unit = std::pow(10, decimals);
+  std::string text = decimals > kMostDecimals ? fmt::format("{:g}", std::round(value * unit) / unit)
+                                              : fmt::format("{:.{}f}", value, decimals);
   if (std::strtod(text.c_str(), nullptr) == 0 && text.front() == '-') text.erase(0, 1);
   if (text.front() == '-') text.replace(0, 1, "\u2212");
   return text;
@@ -92,6 +101,7 @@ void SvgPlot::dots(const std::vector<PlotPoint>& points, const char* colour, dou
                    static_cast<int>(std::lround(2 * py(point.y))));
   }
   if (places.empty()) return;
+  has_data_ = true;
   const std::size_t stride = (places.size() + kMaxDots - 1) / kMaxDots;
   body_ += fmt::format("<path class=\"dots {}\" stroke-width=\"{}\" d=\"", colour, diameter);
   std::size_t i = 0;
@@ -102,6 +112,8 @@ void SvgPlot::dots(const std::vector<PlotPoint>& points, const char* colour, dou
 }
 
 void SvgPlot::line(const std::vector<PlotPoint>& points, const char* colour) {
+  if (points.empty()) return;
+  has_data_ = true;
   std::string path;
   for (const PlotPoint& point : points) {
     path += fmt::format("{}{:.1f} {:.1f}", path.empty() ? 'M' : 'L', px(point.x), py(point.y));
@@ -123,6 +135,14 @@ void SvgPlot::band(double low, double high) {
                   kLeft, top, width_ - kLeft - kRight, std::abs(py(low) - py(high)));
 }
 
+void SvgPlot::shade(double from, double to) {
+  const double left = px(std::clamp(from, x_.low, x_.high));
+  const double right = px(std::clamp(to, x_.low, x_.high));
+  body_ +=
+      fmt::format("<rect class=\"gap\" x=\"{:.1f}\" y=\"{}\" width=\"{:.1f}\" height=\"{}\"/>\n",
+                  left, kTop, right - left, height_ - kTop - kBottom);
+}
+
 void SvgPlot::level(double y) {
   body_ +=
       fmt::format("<path class=\"level\" d=\"M{} {:.1f}H{}\"/>\n", kLeft, py(y), width_ - kRight);
@@ -130,6 +150,7 @@ void SvgPlot::level(double y) {
 
 void SvgPlot::rectangle(const PlotPoint& from, const PlotPoint& to, const char* colour,
                         double opacity) {
+  has_data_ = true;
   body_ += fmt::format(
       "<rect class=\"area {}\" fill-opacity=\"{:.2f}\" x=\"{:.1f}\" y=\"{:.1f}\" "
       "width=\"{:.1f}\" height=\"{:.1f}\"/>\n",
@@ -175,11 +196,17 @@ std::string SvgPlot::axes() const {
 }
 
 std::string SvgPlot::svg(const std::string& label) const {
+  const std::string nothing =
+      has_data_ ? ""
+                : fmt::format(
+                      "<text class=\"name\" x=\"{}\" y=\"{}\" text-anchor=\"middle\">no data"
+                      "</text>\n",
+                      (kLeft + width_ - kRight) / 2, (kTop + height_ - kBottom) / 2 - 8);
   return fmt::format(
-      "<svg viewBox=\"0 0 {0} {1}\" role=\"img\" aria-label=\"{2}\">\n{3}{4}"
+      "<svg class=\"{9}\" viewBox=\"0 0 {0} {1}\" role=\"img\" aria-label=\"{2}\">\n{3}{4}{10}"
       "<path class=\"frame\" d=\"M{5} {6}V{7}H{8}\"/>\n</svg>\n",
       width_, height_, escape_html(label), axes(), body_, kLeft, kTop, height_ - kBottom,
-      width_ - kRight);
+      width_ - kRight, width_ >= kWide ? "wide" : "half", nothing);
 }
 
 }  // namespace alidade

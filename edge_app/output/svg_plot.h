@@ -2,7 +2,8 @@
 // SvgPlot: one diagram as an <svg> element for a page that defines the colours (class names a, b, bad,
 // soft as `--a` etc.). Axes with round ticks, names with units; series are drawn in the order in which
 // they are added. Points beyond the vertical range stand on its edge; points that cover each other are
-// drawn once, and of very many each n-th. Pure; allocates.
+// drawn once, and of very many each n-th. A plot to which no dot, line or rectangle was added says "no data". The element's
+// class is `wide` or `half`, for narrow screens. Pure; allocates.
 
 #include <string>
 #include <vector>
@@ -33,6 +34,8 @@ class SvgPlot {
   void arrow(const PlotPoint& from, const PlotPoint& to);
   // From `low` to `high` over the whole width.
   void band(double low, double high);
+  // From `from` to `to` over the whole height: where there is nothing to show.
+  void shade(double from, double to);
   void level(double y);
   void rectangle(const PlotPoint& from, const PlotPoint& to, const char* colour, double opacity);
   // Short strokes on the x axis.
@@ -50,6 +53,7 @@ class SvgPlot {
   static constexpr int kRight = 14;
   static constexpr int kTop = 10;
   static constexpr int kBottom = 44;
+  static constexpr int kWide = 600;  // from here on a plot is `wide`
 
  private:
   [[nodiscard]] double px(double x) const;
@@ -62,6 +66,7 @@ class SvgPlot {
   PlotAxis y_;
   bool y_down_;
   std::string body_;
+  bool has_data_ = false;
 };
 
 }  // namespace alidade

@@ -67,6 +67,9 @@ PipelineSummary Pipeline::summary() const {
   summary.page_faults = page_faults_;
   lock.unlock();
   summary.drops = stage_.drops();
+  const double now_s = monotonic_now_s();
+  summary.video_link = video_watch_.now(now_s);
+  summary.pan_tilt_link = pan_tilt_watch_.now(now_s);
   if (const int thread = realtime_thread_.load(std::memory_order_acquire); thread != 0) {
     const PageFaults now = page_faults_of(thread);
     summary.page_faults = {std::max(0L, now.minor - faults_at_start_.minor),
@@ -125,7 +128,7 @@ void Pipeline::capture() {
     message.time_s = now_s;
     stage_.push(message);
   };
-  const std::string error = read_to_the_end<Frame>(video_, on_frame, on_loss);
+  const std::string error = read_to_the_end<Frame>(video_, &video_watch_, on_frame, on_loss);
   if (!error.empty()) fail(error);
   stage_.end_input();
 }
@@ -138,7 +141,8 @@ void Pipeline::read_telemetry() {
   const auto on_loss = [this](double) {
     stage_.push(TelemetryMessage{TelemetryMessage::Kind::kLost, {}});
   };
-  const std::string error = read_to_the_end<PanTiltSample>(pan_tilt_, on_sample, on_loss);
+  const std::string error =
+      read_to_the_end<PanTiltSample>(pan_tilt_, &pan_tilt_watch_, on_sample, on_loss);
   if (!error.empty()) fail(error);
 }
 

@@ -23,6 +23,7 @@
 #include <vector>
 
 #include "edge_app/pipeline/latency_histogram.h"
+#include "edge_app/pipeline/link_watch.h"
 #include "edge_app/pipeline/realtime_stage.h"
 #include "edge_app/pipeline/self_calibration.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
@@ -58,6 +59,8 @@ struct PipelineSummary {
   LatencyHistogram computing;
   LatencyHistogram writing;
   PageFaults page_faults;  // of the real-time thread, after its start-up
+  LinkHealth video_link;
+  LinkHealth pan_tilt_link;
 };
 
 class Pipeline {
@@ -110,6 +113,8 @@ class Pipeline {
   SelfCalibration* calibration_;
   PipelineOptions options_;
   RealtimeStage stage_;
+  LinkWatch video_watch_;
+  LinkWatch pan_tilt_watch_;
   std::vector<Frame> images_;  // capture thread: by slot, those that somebody still looks at
   std::vector<ImageSlot> free_slots_;  // capture thread
   int finished_;                       // eventfd

@@ -8,15 +8,17 @@
 #include <limits>
 #include <string>
 
+#include "edge_app/pipeline/link_watch.h"
 #include "platform/system/clock.h"
 #include "platform/video/frame_source.h"  // ReadStatus
 
 namespace alidade {
 
 // Item: Frame or PanTiltSample. on_item(item) returns false to end. on_loss(now_s) is called at a loss
-// and then each second until the next item. Returns the source's error if it failed for good.
+// and then each second until the next item. *watch is told of all that. Returns the source's error if it failed for good.
 template <typename Item, typename Source, typename OnItem, typename OnLoss>
-std::string read_to_the_end(Source& source, const OnItem& on_item, const OnLoss& on_loss) {
+std::string read_to_the_end(Source& source, LinkWatch* watch, const OnItem& on_item,
+                            const OnLoss& on_loss) {
   constexpr double kReadTimeout_s = 0.2;  // bounds how late a notice of a loss can be
   constexpr double kNoticePeriod_s = 1;
   bool lost = false;
@@ -29,6 +31,7 @@ std::string read_to_the_end(Source& source, const OnItem& on_item, const OnLoss&
         if (lost) spdlog::info("{}: connected again", source.name());
         lost = false;
         said.clear();
+        watch->item(monotonic_now_s());
         if (!on_item(item)) return "";
         break;
       case ReadStatus::kDisconnected:
@@ -37,6 +40,7 @@ std::string read_to_the_end(Source& source, const OnItem& on_item, const OnLoss&
           said = source.error();
           spdlog::warn("{}; trying again", said);
         }
+        watch->lost(said);
         if (!lost) next_notice_s = -std::numeric_limits<double>::infinity();
         lost = true;
         break;

@@ -218,6 +218,8 @@ void SelfCalibration::try_first() {
     publish(checked);
     return;
   }
+  // The program ends: nobody is to do anything about it.
+  if (checked.result.status == CalibrationStatus::kCancelled) return;
   need_ = need_of(checked);
   say_once(fmt::format("{} ({}): {}",
                        fresh_wanted_ ? "no fresh calibration yet" : "not calibrated yet",

@@ -5,7 +5,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <cmath>
 
 #include "edge_app/output/svg_plot.h"
 #include "test/support/simulated_recording.h"
@@ -21,7 +24,8 @@ struct Calibrated {
     result = calibrate(input, options);
   }
   [[nodiscard]] std::string report(const std::string& name = "recording") const {
-    return calibration_report({name, input, options, result, remarks});
+    return calibration_report(
+        {name, input, options, result, remarks, "1.2.3", "2026-03-01 12:00 UTC"});
   }
   CalibrationInput input;
   CalibrationOptions options;
@@ -48,6 +52,44 @@ TEST(CalibrationReport, HoldsVerdictTablesAndEveryPlot) {
     EXPECT_THAT(page, HasSubstr(part));
   }
   EXPECT_EQ(count(page, "<svg"), 11U);
+}
+
+TEST(CalibrationReport, SaysWhatMadeItWhenAndOfWhichPictures) {
+  const Calibrated run{test::Simulation()};
+  const std::string page = run.report();
+  EXPECT_THAT(page,
+              HasSubstr("alidade 1.2.3, 2026-03-01 12:00 UTC; pictures of 1920\u00d71080 px"));
+  EXPECT_THAT(page, HasSubstr("frames, all there are"));
+  EXPECT_THAT(page, Not(HasSubstr("class=\"gap\"")));
+}
+
+// Two seconds without a point, and one frame whose only point is an outlier.
+TEST(CalibrationReport, ShowsAndExplainsFramesThatWereNotUsed) {
+  Calibrated run{test::Simulation()};
+  std::vector<FrameResult>& used = run.result.frames;
+  const double begin_s = used[60].time_s;
+  const double end_s = used[90].time_s;
+  const std::int64_t first = used[61].frame;
+  const std::int64_t last = used[89].frame;
+  used.erase(used.begin() + 120);
+  used.erase(used.begin() + 61, used.begin() + 90);
+  std::vector<CalibrationObservation>& seen = run.input.observations;
+  for (CalibrationObservation& one : seen) {
+    if (one.frame >= first && one.frame <= last) one.frame = -1;  // of no frame that there is
+  }
+  const std::string page = run.report();
+  EXPECT_THAT(page, HasSubstr(fmt::format("frames used, of {}", run.input.frames.size())));
+  EXPECT_THAT(page, HasSubstr("<li>29 frames in which no point was followed"));
+  EXPECT_THAT(page, HasSubstr("<li>1 frames of whose points none was used"));
+  EXPECT_THAT(page, HasSubstr(fmt::format("<li>no frame from {:.2f} to {:.2f} s",
+                                          begin_s - used[0].time_s, end_s - used[0].time_s)));
+  // Errors in u and v, pan and tilt, and theirs.
+  EXPECT_EQ(count(page, "class=\"gap\""), 6U);
+  // Both trajectories and the optical axis go around the gap and not across it.
+  EXPECT_EQ(count(page, "<path class=\"line a\" d=\"M"), 3U) << "pan in two pieces, a histogram";
+  EXPECT_EQ(count(page, "<path class=\"line ink\" d=\"M") -
+                count(Calibrated{test::Simulation()}.report(), "<path class=\"line ink\" d=\"M"),
+            1U);
 }
 
 TEST(CalibrationReport, LoadsNothingAndRunsNothing) {
@@ -143,6 +185,35 @@ TEST(SvgPlot, LabelsItsAxesWithRoundNumbersAndUnits) {
   for (const char* part : {">0.00<", ">0.05<", ">0.10<", "angle &lt;1&gt;, rad", "a &amp; b"}) {
     EXPECT_THAT(svg, HasSubstr(part));
   }
+}
+
+// Numbers on an axis, by the labels along y: they stand at the right end of their place.
+std::size_t labels_of_y(const SvgPlot& plot) { return count(plot.svg(""), "text-anchor=\"end\">"); }
+
+TEST(SvgPlot, EveryAxisHasThreeLabelsOrMoreAndRoomForThem) {
+  for (const int height : {140, 160, 196, 240}) {
+    for (double reach = 1e-4; reach < 1e4; reach *= 1.07) {
+      const SvgPlot plot(1040, height, {0, 10, "x"}, {-reach, reach, "y"});
+      EXPECT_GE(labels_of_y(plot), 3U) << height << " px, " << reach;
+      EXPECT_LE(labels_of_y(plot), static_cast<std::size_t>(height) / 16) << reach;
+    }
+  }
+  const std::string svg = SvgPlot(1040, 196, {0, 10, "x"}, {-0.48, 0.48, "y"}).svg("");
+  for (const char* label : {">\u22120.4<", ">\u22120.2<", ">0.0<", ">0.2<", ">0.4<"}) {
+    EXPECT_THAT(svg, HasSubstr(label));
+  }
+  EXPECT_THAT(SvgPlot(400, 200, {0, 10, "x"}, {-3e-7, 3e-7, "y"}).svg(""), HasSubstr(">2e-07<"));
+}
+
+TEST(SvgPlot, SaysThatThereIsNothingToShow) {
+  SvgPlot plot(200, 100, {0, 10, "x"}, {-1, 1, "y"});
+  plot.level(0);
+  plot.band(-0.5, 0.5);
+  plot.dots({{std::nan(""), 1}, {11, 0}}, "a");
+  plot.line({}, "a");
+  EXPECT_THAT(plot.svg(""), HasSubstr(">no data<"));
+  plot.dots({{5, 0}}, "a");
+  EXPECT_THAT(plot.svg(""), Not(HasSubstr("no data")));
 }
 
 TEST(SvgPlot, DrawsDotsThatCoverEachOtherOnce) {

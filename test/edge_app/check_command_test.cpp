@@ -7,6 +7,7 @@
 #include <filesystem>
 #include <fstream>
 #include <functional>
+#include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
 #include <vector>
@@ -82,14 +83,18 @@ class CheckCommand : public ::testing::Test {
     std::ofstream(path("recording/telemetry.csv")) << changed.str();
   }
 
-  Result check(const std::string& focal_length_px = "900") {
-    return alidade({"check", "--duration", "4", "-c",
-                    directory_.write("alidade.yaml",
-                                     "video: {type: recording, directory: recording}\n"
-                                     "pan_tilt: {type: recording, directory: recording, "
-                                     "angle_sigma_rad: 5.0e-5}\n"
-                                     "camera: {focal_length_px: " +
-                                         focal_length_px + "}\n")});
+  Result check(const std::string& focal_length_px = "900",
+               const std::vector<std::string>& more = {}) {
+    std::vector<std::string> arguments = {
+        "check", "--duration", "4", "-c",
+        directory_.write("alidade.yaml",
+                         "video: {type: recording, directory: recording}\n"
+                         "pan_tilt: {type: recording, directory: recording, "
+                         "angle_sigma_rad: 5.0e-5}\n"
+                         "camera: {focal_length_px: " +
+                             focal_length_px + "}\n")};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return alidade(arguments);
   }
 
   TemporaryDirectory directory_;
@@ -120,6 +125,34 @@ TEST_F(CheckCommand, PassesAHealthySetup) {
                     HasSubstr("while the head turns; 0 of "),
                     HasSubstr("pan sign right, tilt sign right; focal length about "),
                     Not(HasSubstr("advice"))));
+}
+
+TEST_F(CheckCommand, TellsProgramsTheSameAsOneLineOfJson) {
+  take_healthy();
+  change_telemetry([](std::vector<std::string>* cells) {
+    (*cells)[2] = std::to_string(-std::stod((*cells)[2]));
+  });
+  const Result result = check("900", {"--json"});
+  EXPECT_EQ(result.exit_code, 1) << result.output;
+  EXPECT_EQ(result.output.find('\n'), result.output.size() - 1) << result.output;
+  const auto json = nlohmann::json::parse(result.output);
+  EXPECT_EQ(json["ok"], false);
+  EXPECT_EQ(json["configuration"], path("alidade.yaml"));
+  EXPECT_EQ(json["calibration"]["focal_length_px"], 900.0);
+  EXPECT_EQ(json["video"]["width"], 320);
+  EXPECT_NEAR(json["video"]["rate_hz"], 25, 0.5);
+  EXPECT_TRUE(json["video"]["error"].is_null());
+  EXPECT_GT(json["video"]["pictures"]["points"], 10);
+  EXPECT_NEAR(json["pan_tilt"]["rate_hz"], 30, 1);
+  EXPECT_EQ(json["motion"]["pan_sign"], "right");
+  EXPECT_EQ(json["motion"]["tilt_sign"], "reversed");
+  std::vector<std::string> problems;
+  for (const auto& finding : json["findings"]) {
+    if (finding["severity"] == "problem")
+      problems.push_back("alidade: " + finding["text"].get<std::string>());
+  }
+  EXPECT_EQ(problems, findings(result.errors));
+  EXPECT_THAT(problems, ElementsAre(HasSubstr("tilt is reversed")));
 }
 
 TEST_F(CheckCommand, SaysThatTiltIsReversed) {

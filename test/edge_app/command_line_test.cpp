@@ -170,6 +170,42 @@ TEST(CommandLine, BadUsageIsOneLineAndExitCodeTwo) {
   }
 }
 
+// In one short line, whatever the value, and before what else is missing.
+TEST(CommandLine, NamesWhatWasMistypedAndWhatIsNearest) {
+  struct Slip {
+    std::vector<std::string> arguments;
+    const char* line;
+  };
+  const char* not_above_0 = "is not a number of seconds above 0; see alidade run --help";
+  for (const auto& [arguments, line] : {
+           Slip{{"rnu"}, "unknown command 'rnu'; did you mean run?; see alidade --help"},
+           Slip{{"chekc", "-c", "x"}, "unknown command 'chekc'; did you mean check?; see"},
+           Slip{{"fly"},
+                "unknown command 'fly'; expected one of run, record, replay, calibrate, check; "
+                "see alidade --help"},
+           Slip{{"run", "--confg", "x"},
+                "unknown option '--confg'; did you mean --config?; see alidade run --help"},
+           Slip{{"run", "-c", "x", "--duraton=3"},
+                "unknown option '--duraton'; did you mean --duration?; see"},
+           Slip{{"check", "-c", "x", "--duraton", "-3"},
+                "unknown option '--duraton'; did you mean --duration?; see"},
+           Slip{{"run", "-c", "x", "--wholly-new"}, "unknown option '--wholly-new'; see"},
+           Slip{{"run"}, "--config is required; see alidade run --help"},
+           Slip{{"replay", "x", "y"}, "The following argument was not expected: y; see"},
+           Slip{{"run", "-c", "x", "--duration", "-1"}, not_above_0},
+           Slip{{"run", "-c", "x", "--duration", "0"}, not_above_0},
+           Slip{{"run", "-c", "x", "--duration", "nan"}, not_above_0},
+           Slip{{"run", "-c", "x", "--duration", "10s"}, not_above_0},
+           Slip{{"calibrate", "x", "--scale-sigma", "2"}, "'2' is not a number from 0 to 1; see"},
+       }) {
+    const Result result = alidade(arguments);
+    EXPECT_EQ(result.exit_code, 2) << result.errors;
+    EXPECT_THAT(result.errors, HasSubstr(line));
+    EXPECT_LT(result.errors.size(), 120U) << result.errors;
+    EXPECT_EQ(result.errors.find('\n'), result.errors.size() - 1) << result.errors;
+  }
+}
+
 class CommandLineTest : public ::testing::Test {
  protected:
   // A configuration of recorded streams, which needs no camera.

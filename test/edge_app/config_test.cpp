@@ -8,6 +8,7 @@
 #include <cstdlib>
 #include <string>
 
+#include "edge_app/config/nearest_word.h"
 #include "edge_app/config/noise_file.h"
 #include "test/platform/support/head_kinds.h"
 #include "test/support/temporary_directory.h"
@@ -435,6 +436,16 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"SectionIsAWord", MINIMAL "camera: wide\n", ":4: camera", "expected a mapping"},
         Mistake{"UnknownSection", MINIMAL "audio: {}\n", ":4: audio",
                 "unknown key; known here: video,"},
+        Mistake{"MistypedSection", "vidoe: {type: rtsp, url: rtsp://camera/s}\n" PAN_TILT,
+                ":1: vidoe", "output; did you mean video?"},
+        Mistake{"UnknownSectionWhereOneIsMissing", VIDEO "head: {type: vapix}\n", ":2: head",
+                "unknown key; known here: video, pan_tilt"},
+        Mistake{"MistypedType", "video: {tpye: rtsp, url: rtsp://camera/s}\n" PAN_TILT,
+                ":1: video.tpye", "unknown key; did you mean type?"},
+        Mistake{"MistypedUrl", "video: {type: rtsp, ulr: rtsp://camera/s}\n" PAN_TILT,
+                ":1: video.ulr", "unknown key; did you mean url?"},
+        Mistake{"MistypedKey", MINIMAL "camera: {focal_lenght_px: 30}\n",
+                ":4: camera.focal_lenght_px", "; did you mean focal_length_px?"},
         Mistake{"UnknownKey", MINIMAL "camera:\n  focal_length_mm: 30\n",
                 ":5: camera.focal_length_mm", "unknown key; known here: focal_length_px"},
         Mistake{"KeyOfAnotherType",
@@ -448,6 +459,8 @@ INSTANTIATE_TEST_SUITE_P(
                 "set calibration.file or camera.focal_length_px"},
         Mistake{"NoVideoType", "video: {url: rtsp://camera/s}\n" PAN_TILT, ":1: video.type",
                 "is missing"},
+        Mistake{"MistypedVideoType", "video: {type: rstp, url: x}\n" PAN_TILT, ":1: video.type",
+                "v4l2, recording; did you mean rtsp?"},
         Mistake{"UnknownVideoType", "video: {type: film, url: x}\n" PAN_TILT, ":1: video.type",
                 "'film' is unknown; expected one of rtsp, rtp, mjpeg, v4l2, recording"},
         Mistake{"V4l2WithoutDevice", "video: {type: v4l2}\n" PAN_TILT, ":1: video.device",
@@ -599,6 +612,22 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"ZoomIsNotFixed", MINIMAL "camera: {zoom: auto}\n", ":4: camera.zoom",
                 "expected one of fixed"}),
     [](const ::testing::TestParamInfo<Mistake>& tested) { return std::string(tested.param.name); });
+
+TEST(NearestWord, ForgivesOneSlipInThreeLetters) {
+  const std::vector<std::string> known = {"run", "record", "replay", "calibrate", "check"};
+  for (const auto& [typed, meant] :
+       {std::pair("rnu", "run"), std::pair("rum", "run"), std::pair("runn", "run"),
+        std::pair("recrod", "record"), std::pair("calibarte", "calibrate"),
+        std::pair("calbrat", "calibrate"), std::pair("relpay", "replay")}) {
+    EXPECT_EQ(nearest_word(typed, known), std::optional<std::string>(meant)) << typed;
+  }
+  for (const char* typed : {"", "r", "fly", "rut2", "calib", "checkers-board"}) {
+    EXPECT_EQ(nearest_word(typed, known), std::nullopt) << typed;
+  }
+  EXPECT_EQ(nearest_word("rep", {"red", "reps"}), "red") << "the first of those as near";
+  EXPECT_EQ(did_you_mean("rnu", known), "; did you mean run?");
+  EXPECT_EQ(did_you_mean("fly", known), "");
+}
 
 TEST(NoiseFile, IsOptional) {
   const TemporaryDirectory directory;

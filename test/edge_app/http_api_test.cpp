@@ -18,6 +18,7 @@ namespace {
 using nlohmann::json;
 using test::Client;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 constexpr std::size_t kLines = 4;
@@ -33,7 +34,7 @@ class HttpApiTest : public ::testing::Test {
   HttpApiTest() {
     HttpApiSources sources;
     sources.live = &live_;
-    sources.summary = [] { return PipelineSummary{}; };
+    sources.summary = [this] { return summary_; };
     sources.video_losses = [] { return FrameSourceCounters{3, 4}; };
     sources.ask_for_calibration = [this] { return asked_ = calibrating_; };
     sources.version = "1.2.3";
@@ -58,6 +59,7 @@ class HttpApiTest : public ::testing::Test {
   }
 
   LiveState live_{few_lines()};
+  PipelineSummary summary_;
   bool calibrating_ = false;
   bool asked_ = false;
   HttpServer server_{HttpServerOptions{}};
@@ -86,6 +88,29 @@ TEST_F(HttpApiTest, BeforeTheFirstRecordThereIsNothingAndThatIsSaid) {
   EXPECT_EQ(status["frames"]["not_fetched"], 4);
   EXPECT_EQ(body_of(get("/api/v1/history"))["time_s"], json::array());
   EXPECT_THAT(get("/metrics"), HasSubstr("\nalidade_frames_total 0\n"));
+}
+
+TEST_F(HttpApiTest, SaysHowEachLinkDoes) {
+  const json unknown = body_of(get("/api/v1/status"))["links"]["video"];
+  EXPECT_EQ(unknown, json::parse(R"({"connected": false, "reason": null, "reconnections": 0,
+                                     "age_s": null, "rate_hz": null})"));
+  EXPECT_THAT(get("/metrics"), Not(HasSubstr("alidade_link_rate_hertz{")));
+  summary_.video_link = {false, "rtsp://camera: refused", 2, 7.5, 0.125};
+  summary_.pan_tilt_link = {true, "", 0, 0.25, 30.0};
+  const json links = body_of(get("/api/v1/status"))["links"];
+  EXPECT_EQ(links["video"], json::parse(R"({"connected": false, "reason": "rtsp://camera: refused",
+                            "reconnections": 2, "age_s": 7.5, "rate_hz": 0.125})"));
+  EXPECT_EQ(links["pan_tilt"],
+            json::parse(R"({"connected": true, "reason": null, "reconnections": 0, "age_s": 0.25,
+                            "rate_hz": 30.0})"));
+  const std::string metrics = get("/metrics");
+  for (const char* line :
+       {"alidade_link_connected{link=\"video\"} 0", "alidade_link_connected{link=\"pan_tilt\"} 1",
+        "alidade_link_reconnections_total{link=\"video\"} 2",
+        "alidade_link_last_sample_age_seconds{link=\"video\"} 7.5",
+        "alidade_link_rate_hertz{link=\"pan_tilt\"} 30"}) {
+    EXPECT_THAT(metrics, HasSubstr(std::string("\n") + line + "\n"));
+  }
 }
 
 TEST_F(HttpApiTest, AFrameWithoutAnOrientationHasNoDirectionsAndSaysWhy) {

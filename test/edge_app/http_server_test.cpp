@@ -290,14 +290,19 @@ TEST_F(HttpServerTest, HeadHasTheHeadersOfGetAndNoBody) {
   EXPECT_EQ(server_->counters().streams, 0);
 }
 
-TEST_F(HttpServerTest, OtherMethodsAreNotAllowedAndUnknownOnesNotUnderstood) {
+TEST_F(HttpServerTest, OtherMethodsAreNotAllowedAndThoseThatAreAreNamed) {
   start();
   for (const char* method : {"PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "CONNECT", "POST"}) {
     EXPECT_THAT(ask(std::string(method) + " /open HTTP/1.1\r\nHost: localhost\r\n\r\n"),
-                AllOf(StartsWith("HTTP/1.1 405 "), HasSubstr("Allow: GET\r\n")))
+                AllOf(StartsWith("HTTP/1.1 405 "), HasSubstr("Allow: GET, HEAD\r\n")))
         << method;
   }
-  for (const char* method : {"BREW", "get", "G@T", ""}) {
+  for (const char* method : {"QUERY", "BREW", "get"}) {
+    EXPECT_THAT(ask(std::string(method) + " /echo HTTP/1.1\r\nHost: localhost\r\n\r\n"),
+                AllOf(StartsWith("HTTP/1.1 405 "), HasSubstr("Allow: POST\r\n")))
+        << method;
+  }
+  for (const char* method : {"G@T", ""}) {
     EXPECT_THAT(ask(std::string(method) + " /open HTTP/1.1\r\nHost: localhost\r\n\r\n"),
                 StartsWith("HTTP/1.1 400 "))
         << method;
@@ -445,11 +450,28 @@ TEST_F(HttpServerTest, ItsThreadsRunAtTheNormalPolicyAndNiced) {
   EXPECT_THAT(get("/scheduling"), EndsWith("\r\n\r\npolicy 0, nice 10"));
 }
 
-TEST_F(HttpServerTest, APageOfAnotherSiteCannotPost) {
+TEST_F(HttpServerTest, APageOfAnotherSiteCanAskNothing) {
   start();
-  EXPECT_THAT(post("x", "Origin: http://evil.example\r\n"), StartsWith("HTTP/1.1 403 "));
-  EXPECT_THAT(post("x", "Origin: null\r\n"), StartsWith("HTTP/1.1 403 "));
+  for (const char* foreign : {"http://evil.example", "https://localhost", "http://localhost:1",
+                              "http://localhost.evil.example", "null"}) {
+    const std::string origin = std::string("Origin: ") + foreign + "\r\n";
+    EXPECT_THAT(post("x", origin), StartsWith("HTTP/1.1 403 ")) << foreign;
+    EXPECT_THAT(get("/closed", origin), StartsWith("HTTP/1.1 403 ")) << foreign;
+    EXPECT_THAT(get("/open", origin), StartsWith("HTTP/1.1 403 ")) << foreign;
+  }
   EXPECT_THAT(post("x", "Origin: http://localhost\r\n"), StartsWith("HTTP/1.1 200 "));
+  EXPECT_THAT(get("/closed", "Origin: http://localhost\r\n"), StartsWith("HTTP/1.1 200 "));
+}
+
+TEST_F(HttpServerTest, BehindAProxyWithTlsThePageWithTheTokenMayAsk) {
+  options_.token = "right-horse";
+  start();
+  const auto post_from = [this](const std::string& origin) {
+    return ask("POST /echo HTTP/1.1\r\nHost: camera.example\r\nOrigin: " + origin +
+               "\r\nAuthorization: Bearer right-horse\r\nContent-Length: 1\r\n\r\nx");
+  };
+  EXPECT_THAT(post_from("https://camera.example"), StartsWith("HTTP/1.1 200 "));
+  EXPECT_THAT(post_from("https://evil.example"), StartsWith("HTTP/1.1 403 "));
 }
 
 TEST_F(HttpServerTest, WithoutATokenAHostThatIsAForeignNameIsRefused) {

@@ -182,7 +182,14 @@ TEST_F(PipelineTest, SaysNoneWhileTheVideoIsAwayAndGoesOnWhenItIsBack) {
   const OrientationRecord lost = wait_for(RecordStatus::kVideoLost, 2);
   EXPECT_EQ(lost.mode, RecordMode::kNone);
   EXPECT_FALSE(lost.frame);
+  const LinkHealth away = pipeline.summary().video_link;
+  EXPECT_FALSE(away.connected);
+  EXPECT_EQ(away.reason, video_.error());
+  EXPECT_EQ(away.reconnections, 0);
+  EXPECT_TRUE(pipeline.summary().pan_tilt_link.connected);
   const OrientationRecord back = push_until(RecordStatus::kOk);
+  EXPECT_TRUE(pipeline.summary().video_link.connected);
+  EXPECT_EQ(pipeline.summary().video_link.reconnections, 1);
   EXPECT_TRUE(back.orientation);
   EXPECT_FALSE(finished_now(pipeline));
   pipeline.stop();

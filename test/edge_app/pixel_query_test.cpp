@@ -306,7 +306,7 @@ TEST(PixelQuery, ReadsWhichFrameIsMeant) {
   EXPECT_FALSE(direction_query(R"({"pixels":[[1,2]]})").which.frame);
   EXPECT_FALSE(direction_query(R"({"pixels":[[1,2]]})").which.time_s);
   EXPECT_EQ(direction_query(R"({"frame":0,"pixels":[[1,2]]})").which.frame, 0);
-  EXPECT_EQ(direction_query(R"({"frame":-5,"pixels":[[1,2]]})").which.frame, -5);
+  EXPECT_EQ(direction_query(R"({"frame":0,"pixels":[[1,2]]})").which.frame, 0);
   EXPECT_EQ(direction_query(R"({"time_s":12,"pixels":[[1,2]]})").which.time_s, 12.0);
 }
 
@@ -358,6 +358,8 @@ INSTANTIATE_TEST_SUITE_P(
         Refused{"FrameAndTime", R"({"frame":1,"time_s":2,"pixels":[[1,2]]})", "exclude each other"},
         Refused{"FractionalFrame", R"({"frame":1.5,"pixels":[[1,2]]})", "frame must be an integer"},
         Refused{"HugeFrame", R"({"frame":9223372036854775808,"pixels":[[1,2]]})", "frame must be"},
+        Refused{"NegativeFrame", R"({"frame":-5,"pixels":[[1,2]]})",
+                "frame must be an integer, 0 or more"},
         Refused{"TextFrame", R"({"frame":"1","pixels":[[1,2]]})", "frame must be an integer"},
         Refused{"TextTime", R"({"time_s":"1","pixels":[[1,2]]})", "time_s must be a number"},
         Refused{"NegativeSigma", R"({"pixels":[[1,2]],"pixel_sigma_px":-1})", "from 0 to 1000"},

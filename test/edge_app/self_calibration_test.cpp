@@ -5,8 +5,12 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <pthread.h>
+#include <time.h>
 
+#include <functional>
 #include <map>
+#include <thread>
 
 #include "test/support/simulated_recording.h"
 
@@ -15,8 +19,10 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::Contains;
+using ::testing::Each;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 
 // In memory; refuses to store on demand, as a full disk does.
 class MemoryArchive final : public CalibrationArchive {
@@ -87,6 +93,7 @@ struct Feed {
   std::int64_t first_frame = 0;
   double poll_s = 0;  // so long before its stamp a sample was asked for; 0: it came by itself
   bool delay_steps = false;  // with the first frame the least delay of the video is another one
+  std::function<void()> before_adjusting = {};
 };
 
 std::vector<Published> feed(SelfCalibration* calibration, const test::Simulation& s,
@@ -130,6 +137,7 @@ std::vector<Published> feed(SelfCalibration* calibration, const test::Simulation
     }
     tracks.looked_for = tracks.count;
     calibration->add(tracks);
+    if (how.before_adjusting && calibration->due()) how.before_adjusting();
     if (auto news = calibration->work()) published.push_back({news, frame.stamp_s});
   }
   return published;
@@ -454,6 +462,33 @@ TEST(SelfCalibration, CancelledItPublishesNothingMore) {
   calibration.cancel();
   EXPECT_THAT(feed(&calibration, s, {}), IsEmpty());
   EXPECT_FALSE(calibration.due());
+}
+
+// A program that ends while it computes a calibration has failed at nothing.
+TEST(SelfCalibration, CancelledWhileItAdjustsItDoesNotSayThatItFailed) {
+  const test::Simulation s = camera();
+  SelfCalibration calibration(options_for(s), nullptr);
+  clockid_t own_clock{};
+  ASSERT_EQ(::pthread_getcpuclockid(::pthread_self(), &own_clock), 0);
+  const auto computed_s = [own_clock] {
+    timespec time{};
+    ::clock_gettime(own_clock, &time);
+    return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+  };
+  std::thread cancelling;
+  Feed how;
+  how.before_adjusting = [&] {
+    if (cancelling.joinable()) return;
+    // It takes a hundred times as long.
+    cancelling = std::thread([&, until_s = computed_s() + 1e-3] {
+      while (computed_s() < until_s) std::this_thread::yield();
+      calibration.cancel();
+    });
+  };
+  feed(&calibration, s, how);
+  ASSERT_TRUE(cancelling.joinable());
+  cancelling.join();
+  EXPECT_THAT(calibration.take_messages(), Each(Not(HasSubstr("cancelled"))));
 }
 
 TEST(SelfCalibration, TakesKeyframesWhereItHasNone) {

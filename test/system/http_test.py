@@ -197,6 +197,37 @@ class Http(SystemTest):
             self.check_answer(api, path, 401, {}, token=None)
         self.end(run)
 
+    def test_describes_what_it_refuses(self):
+        run, api = self.start()
+        pixels, directions = {"pixels": [[80, 48]]}, {"directions": [[1, 0, 0]]}
+        for path, bodies in {
+                "/api/v1/direction": (
+                    pixels, {**pixels, "frame": 0}, {**pixels, "time_s": -1.5}, {**pixels, "pixel_sigma_px": 1000},
+                    {}, [], {"pixels": []}, {"pixels": [[1]]}, {"pixels": [[1, 2, 3]]}, {"pixels": [["1", 2]]},
+                    {"pixels": [[1, 2]] * 1001}, {**pixels, "frame": -1}, {**pixels, "frame": 1.5}, {**pixels, "frame": "1"},
+                    {**pixels, "frame": None}, {**pixels, "frame": 1, "time_s": 1}, {**pixels, "pixel_sigma_px": -1},
+                    {**pixels, "pixel_sigma_px": 1001}, {**pixels, "sigma": 1}, {**pixels, **directions}),
+                "/api/v1/pixel": (
+                    directions, {"directions": [[0, 0, -1e-300]]}, {**directions, "time_s": 0}, {"directions": [[0, 0, 0]]},
+                    {"directions": [[1, 0, 0], [0, 0, 1e-320]]}, {"directions": [[1, 0]]}, {**directions, "frame": -1},
+                    {**directions, "pixel_sigma_px": 1})}.items():
+            schema = DESCRIPTION["paths"][path]["post"]["requestBody"]["content"]["application/json"]["schema"]
+            validator = jsonschema.Draft7Validator({**SCHEMAS, "allOf": [schema]})
+            for body in bodies:
+                with self.subTest(path=path, body=str(body)[:80]):
+                    self.assertEqual(api.ask(path.lstrip("/"), body).status != 400, validator.is_valid(body))
+        for path, operations in DESCRIPTION["paths"].items():
+            known = {method.upper() for method in operations}
+            for method in {"POST", "PUT", "DELETE", "PATCH", "OPTIONS", "TRACE", "QUERY", "BREW"} - known:
+                with self.subTest(path=path, method=method):
+                    answer = api.ask(path.lstrip("/"), method=method)
+                    self.assertEqual(answer.status, 405)
+                    self.assertEqual(set(answer.headers["Allow"].split(", ")), known | ({"HEAD"} if "GET" in known else set()))
+            for operation in operations.values():
+                self.assertIn("default", operation["responses"])
+        self.assertEqual(api.ask("api/v1/status", headers={"Origin": "http://evil.example"}).status, 403)
+        self.end(run)
+
     def test_streams_every_record_once_as_on_stdout(self):
         run, api = self.start()
         client, file = api.follow()

@@ -30,6 +30,19 @@ LATE = r"/api/v1/picture.*status of 503|/api/v1/(direction|pixel).*status of (40
 AWAY = r"ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_EMPTY_RESPONSE|ERR_INCOMPLETE_CHUNKED_ENCODING|status of 401"
 
 
+# What is drawn on a canvas as text, and what of it does not fit into it.
+TELL_CLIPPED_TEXT = """
+    window.drawn = new Set();
+    window.clipped = new Set();
+    const draw = CanvasRenderingContext2D.prototype.fillText;
+    CanvasRenderingContext2D.prototype.fillText = function (text, u, v) {
+      const size = this.measureText(text);
+      drawn.add(text);
+      if (u - size.actualBoundingBoxLeft < 0 || u + size.actualBoundingBoxRight > this.canvas.clientWidth) clipped.add(text);
+      return draw.call(this, text, u, v);
+    };"""
+
+
 class StatusPage(SystemTest):
     def setUp(self):
         super().setUp()
@@ -176,6 +189,29 @@ class StatusPage(SystemTest):
         self.wait_for_text("seen", r"frame \d+: .*used")
         self.assert_no_errors_but(f"{LATE}|{AWAY}")
 
+    def test_says_which_link_is_lost_and_why_and_that_it_is_back(self):
+        ports = {"rtsp_port": free_port(), "http_port": free_port()}
+        camera = self.camera(settings=SETTINGS, **ports)
+        _, address = self.start(self.config(camera))
+        self.browser.get(address)
+        self.wait_for_text("link", "^live$")
+        self.wait_for_text("health", r"Video link[\d.]+ a second; newest now; back again 0 times"
+                                     r"Pan/tilt link[\d.]+ a second; newest now; back again 0 times")
+        camera.end(signal.SIGKILL)
+        self.wait_for_text("link", "^video lost$")
+        self.assertEqual(self.browser.execute_script("return document.body.dataset.link"), "lost")
+        self.wait_for_text("mode", "^none$")
+        self.wait_for_text("why", r"There is no connection to the video: rtsp://127\.0\.0\.1:\d+/.*refused")
+        self.wait_for_text("health", r"Pan/tilt linkhttp://127\.0\.0\.1:\d+/.*; newest \d+ s old")
+        for width in (1280, 390):
+            self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
+                "width": width, "height": 844, "deviceScaleFactor": 1, "mobile": width < 500})
+            self.assertEqual(self.browser.execute_script("return document.documentElement.scrollWidth > innerWidth"), False, width)
+        self.camera(settings=SETTINGS, seed=2, **ports)
+        self.wait_for_text("link", "^live$")
+        self.wait_for_text("health", r"Video link[\d.]+ a second; newest now; back again 1 times")
+        self.assert_no_errors_but(LATE)
+
     def test_asks_for_the_token_and_keeps_it_for_this_tab(self):
         _, address = self.start(self.config(self.camera(settings=SETTINGS), token_env="TEST_TOKEN"),
                                 TEST_TOKEN=TOKEN)
@@ -198,6 +234,7 @@ class StatusPage(SystemTest):
     def test_fits_a_phone_and_says_why_there_is_no_picture(self):
         self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
             "width": 390, "height": 844, "deviceScaleFactor": 3, "mobile": True})
+        self.browser.execute_cdp_cmd("Page.addScriptToEvaluateOnNewDocument", {"source": TELL_CLIPPED_TEXT})
         _, address = self.start(self.config(self.camera(settings=SETTINGS), mode="PT"))
         self.browser.get(address)
         self.wait_for_text("link", "^live$")
@@ -216,6 +253,8 @@ class StatusPage(SystemTest):
             return [...document.querySelectorAll('body *')].filter((one) => !one.classList.contains('unseen') &&
               (one.getBoundingClientRect().right > innerWidth || one.getBoundingClientRect().left < 0)).map((one) => one.id || one.tagName)""")
         self.assertEqual(too_wide, [])
+        self.assertEqual(self.browser.execute_script("return [...clipped]"), [])
+        self.assertGreater(self.browser.execute_script("return drawn.size"), 10)
         self.assert_no_errors_but(LATE)
 
 

@@ -81,6 +81,8 @@ std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s
   }
   if (!host_is_trusted(head))
     return http_error(403, "the Host header names another machine; use an address, or set a token");
+  // A browser would not let that page see the answer; asking costs us work all the same, and streams their places.
+  if (!origin_is_own(head)) return http_error(403, "a page of another site may not ask this");
   const auto path = routes_.find(head.path);
   if (path == routes_.end()) return http_error(404, "no such path; see /api/v1/openapi.yaml");
   const auto found = path->second.find(head.method == "HEAD" ? "GET" : head.method);
@@ -88,7 +90,7 @@ std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s
     ServerResponse error = http_error(405, "no such method here; see /api/v1/openapi.yaml");
     std::string allowed;
     for (const auto& [method, ignored] : path->second)
-      allowed += (allowed.empty() ? "" : ", ") + method;
+      allowed += (allowed.empty() ? "" : ", ") + (method == "GET" ? "GET, HEAD" : method);
     error.headers.emplace_back("Allow", allowed);
     return error;
   }
@@ -99,8 +101,6 @@ std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s
     error.headers.emplace_back("WWW-Authenticate", "Bearer");
     return error;
   }
-  if (head.method == "POST" && !head.origin.empty() && head.origin != "http://" + head.host)
-    return http_error(403, "a page of another site may not ask this");
   return std::nullopt;
 }
 
@@ -110,6 +110,12 @@ bool HttpGate::has_token(const HttpHead& head) const {
   const std::string_view given = head.authorization;
   return given.substr(0, kScheme.size()) == kScheme &&
          is_token(given.substr(kScheme.size()), token_);
+}
+
+// Behind a proxy with TLS the page is of https; with a token it is no matter who else has that name.
+bool HttpGate::origin_is_own(const HttpHead& head) const {
+  return head.origin.empty() || head.origin == "http://" + head.host ||
+         (!token_.empty() && head.origin == "https://" + head.host);
 }
 
 // A token cannot be had by a page of another site, whatever name that site takes.

@@ -73,6 +73,7 @@ class HttpGate {
   [[nodiscard]] std::optional<ServerResponse> check(const HttpHead& head, double now_s,
                                                     const HttpRoute** route);
   [[nodiscard]] bool has_token(const HttpHead& head) const;
+  [[nodiscard]] bool origin_is_own(const HttpHead& head) const;
   [[nodiscard]] bool host_is_trusted(const HttpHead& head) const;
 
   const std::string token_;

@@ -95,7 +95,7 @@ bool parse_http_head(std::string_view text, HttpHead* head, ServerResponse* refu
     *refusal = length_refusal(*head).value_or(http_error(413, "the body is too large"));
     return false;
   }
-  if (error || parser.get().method() == http::verb::unknown) {
+  if (error) {
     *refusal = http_error(400, "malformed request");
     return false;
   }

@@ -10,7 +10,8 @@
 //   rate    requests_per_s with as many at once, of all clients together, else 429
 //   token   if one is set, routes that are not open want `Authorization: Bearer TOKEN`, else 401; compared in
 //           a time that does not tell how much of it was right; never logged
-//   pages of other sites   a POST whose Origin is not this server is refused (403); so is, without a token, a Host
+//   method  another than the path's is answered 405, with those that it has in Allow
+//   pages of other sites   a request whose Origin is not this server is refused (403); so is, without a token, a Host
 //           that is a name other than localhost (DNS rebinding)
 // Every error is JSON, {"error": "one line"}. Threads run at the normal scheduling policy, niced.
 

@@ -1,0 +1,139 @@
+#include "edge_app/commands/check_json.h"
+
+#include <algorithm>
+#include <cmath>
+#include <nlohmann/json.hpp>
+
+namespace alidade {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+template <typename T>
+Json known(const std::optional<T>& value) {
+  return value ? Json(*value) : Json();
+}
+
+Json as_json(const std::optional<Spread>& spread) {
+  if (!spread) return nullptr;
+  return {{"median", spread->median}, {"most", spread->most}, {"largest", spread->largest}};
+}
+
+Json as_json(const Connection& connection) {
+  return {{"name", connection.name},
+          {"error", connection.error.empty() ? Json() : Json(connection.error)},
+          {"losses", connection.losses}};
+}
+
+Json as_json(const ClockReport& clock) {
+  const char* kind = clock.kind == StampKind::kSender     ? "sender"
+                     : clock.kind == StampKind::kSequence ? "sequence"
+                                                          : "arrival";
+  return {{"stamps", kind},
+          {"locked", clock.state == ClockState::kLocked},
+          {"sigma_s", clock.sigma_s},
+          {"lateness_s", as_json(clock.lateness_s)}};
+}
+
+Json as_json(const AxisReport& axis) {
+  return {{"last_rad", axis.last},
+          {"least_rad", axis.least},
+          {"largest_rad", axis.largest},
+          {"resolution_rad", axis.resolution > 0 ? Json(axis.resolution) : Json()}};
+}
+
+const char* name_of(AxisVerdict verdict) {
+  switch (verdict) {
+    case AxisVerdict::kNotMoved:
+      return "not moved";
+    case AxisVerdict::kUnclear:
+      return "not clear";
+    case AxisVerdict::kRight:
+      return "right";
+    case AxisVerdict::kReversed:
+      return "reversed";
+  }
+  return "";
+}
+
+Json video_json(const CheckReport& report) {
+  const VideoReport& video = report.video;
+  const ImageReport& images = report.measured.images;
+  const bool any = video.frames > 0;
+  Json json = as_json(report.measured.video);
+  json.update({{"frames", video.frames},
+               {"width", any ? Json(video.width) : Json()},
+               {"height", any ? Json(video.height) : Json()},
+               {"size_fits", any ? Json(video.size_fits) : Json()},
+               {"rate_hz", known(video.rate_hz)},
+               {"interval_s", as_json(video.interval_s)},
+               {"lost", known(video.lost)},
+               {"damaged", video.counters.damaged},
+               {"dropped", video.counters.dropped},
+               {"decode_s", as_json(video.decode_s)},
+               {"clock", any ? as_json(video.clock) : Json()}});
+  json["pictures"] = {{"looked_at", images.images},
+                      {"mean_level", images.images > 0 ? Json(images.light.mean) : Json()},
+                      {"noise_level", images.images > 0 ? Json(images.noise) : Json()},
+                      {"points", images.points ? Json(images.points->median) : Json()}};
+  return json;
+}
+
+Json pan_tilt_json(const CheckReport& report) {
+  const TelemetryReport& telemetry = report.telemetry;
+  const bool any = telemetry.samples > 0;
+  Json json = as_json(report.measured.pan_tilt);
+  json.update({{"samples", telemetry.samples},
+               {"rate_hz", known(telemetry.rate_hz)},
+               {"interval_s", as_json(telemetry.interval_s)},
+               {"time_bounds_s", as_json(telemetry.bounds_s)},
+               {"age_s", as_json(telemetry.age_s)},
+               {"change_hz", known(telemetry.change_hz)},
+               {"stale", telemetry.stale},
+               {"pan", any ? as_json(telemetry.pan) : Json()},
+               {"tilt", any ? as_json(telemetry.tilt) : Json()},
+               {"zoom", known(telemetry.zoom)}});
+  return json;
+}
+
+Json motion_json(const std::optional<MotionReport>& motion) {
+  if (!motion) return nullptr;
+  return {{"pan_sign", name_of(motion->pan)},
+          {"tilt_sign", name_of(motion->tilt)},
+          {"image_moved", motion->image_moved},
+          {"head_moved", motion->head_moved},
+          {"focal_length_px", known(motion->focal_length_px)},
+          {"clock_offset_s", known(motion->clock_offset_s)}};
+}
+
+}  // namespace
+
+bool is_ok(const Findings& findings) {
+  return std::none_of(findings.begin(), findings.end(), [](const Finding& finding) {
+    return finding.severity == Severity::kProblem;
+  });
+}
+
+std::string check_json(const CheckReport& report) {
+  const Calibration& calibration = report.calibration.calibration;
+  Json json{{"alidade", ALIDADE_VERSION},
+            {"ok", is_ok(report.findings)},
+            {"configuration", report.configuration}};
+  json["calibration"] = {{"name", report.calibration.name},
+                         {"calibrated", report.calibration.calibrated},
+                         {"focal_length_px", calibration.camera.focal_length},
+                         {"clock_offset_s", calibration.clock_offset}};
+  json["video"] = video_json(report);
+  json["pan_tilt"] = pan_tilt_json(report);
+  json["motion"] = motion_json(report.motion);
+  json["findings"] = Json::array();
+  for (const Finding& finding : report.findings) {
+    json["findings"].push_back(
+        {{"severity", finding.severity == Severity::kProblem ? "problem" : "advice"},
+         {"text", finding.text}});
+  }
+  // A file's name may be no UTF-8.
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+}  // namespace alidade

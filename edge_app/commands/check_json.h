@@ -1,0 +1,32 @@
+#pragma once
+// What `alidade check` found, for programs: the numbers of its report and every finding as one line of JSON. Names bear
+// their units; what is not known is null. README.md lists the keys. Pure; allocates.
+
+#include <optional>
+#include <string>
+
+#include "edge_app/check/motion_check.h"
+#include "edge_app/check/telemetry_check.h"
+#include "edge_app/check/video_check.h"
+#include "edge_app/commands/check_measurement.h"
+#include "edge_app/commands/command.h"
+
+namespace alidade {
+
+struct CheckReport {
+  std::string configuration;  // the file
+  const NamedCalibration& calibration;
+  const Measured& measured;
+  const VideoReport& video;
+  const TelemetryReport& telemetry;
+  std::optional<MotionReport> motion;  // where there are pictures and samples
+  Findings findings;                   // of all of them
+};
+
+// No finding is a problem.
+[[nodiscard]] bool is_ok(const Findings& findings);
+
+// With its line feed.
+[[nodiscard]] std::string check_json(const CheckReport& report);
+
+}  // namespace alidade

@@ -1,0 +1,98 @@
+// The report's page itself, and which frames of the recording it shows: those that were used, and the gaps between them.
+
+#include <cmath>
+#include <cstdint>
+#include <unordered_set>
+
+#include "edge_app/output/report_page.h"
+
+namespace alidade::report {
+namespace {
+
+// Between neighbours of the frames used, where they are clearly farther apart than usual.
+std::vector<Span> gaps_between(const std::vector<FrameResult>& frames, double start_s) {
+  constexpr double kUsual = 3.5;  // periods: a frame lost here and there is no gap
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < frames.size(); ++i) {
+    intervals.push_back(frames[i].time_s - frames[i - 1].time_s);
+  }
+  if (intervals.empty()) return {};
+  std::vector<double> sorted = intervals;
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  std::vector<Span> gaps;
+  for (std::size_t i = 0; i < intervals.size(); ++i) {
+    if (intervals[i] <= kUsual * *middle) continue;
+    gaps.push_back({frames[i].time_s - start_s, frames[i + 1].time_s - start_s});
+  }
+  return gaps;
+}
+
+}  // namespace
+
+ReportPage::ReportPage(const CalibrationReportInput& report)
+    : report_(report),
+      start_s_(report.result.frames.front().time_s),
+      gaps_(gaps_between(report.result.frames, start_s_)) {}
+
+void ReportPage::shade_gaps(SvgPlot* plot) const {
+  for (const Span& gap : gaps_) plot->shade(gap.begin_s, gap.end_s);
+}
+
+void ReportPage::line_between_gaps(const std::vector<TimedPoint>& points, const char* colour,
+                                   SvgPlot* plot) const {
+  std::vector<PlotPoint> piece;
+  const auto end_piece = [&] {
+    // A line of one point shows nothing.
+    if (piece.size() == 1) plot->dots(piece, colour);
+    if (piece.size() > 1) plot->line(piece, colour);
+    piece.clear();
+  };
+  std::size_t next = 0;  // the first gap that does not end before the point
+  for (const TimedPoint& at : points) {
+    for (; next < gaps_.size() && gaps_[next].end_s <= at.time_s; ++next) end_piece();
+    if (next < gaps_.size() && at.time_s > gaps_[next].begin_s) continue;
+    piece.push_back(at.point);
+  }
+  end_piece();
+}
+
+std::vector<std::string> unused_frames(const ReportPage& page) {
+  std::unordered_set<std::int64_t> known;
+  for (const FrameResult& frame : page.result().frames) known.insert(frame.frame);
+  std::unordered_set<std::int64_t> observed;
+  for (const CalibrationObservation& seen : page.report().input.observations) {
+    observed.insert(seen.frame);
+  }
+  int without_points = 0;
+  int left_out = 0;
+  for (const CalibrationFrame& frame : page.report().input.frames) {
+    // Those without a stamp and those named before are told of with the exclusions.
+    if (!std::isfinite(frame.stamp_s) || !known.insert(frame.frame).second) continue;
+    ++(observed.count(frame.frame) != 0 ? left_out : without_points);
+  }
+  std::vector<std::string> lines;
+  if (without_points > 0) {
+    lines.push_back(fmt::format(
+        "{} frames in which no point was followed: too plain, too blurred, or not decoded",
+        without_points));
+  }
+  if (left_out > 0) {
+    lines.push_back(fmt::format(
+        "{} frames of whose points none was used: outliers, seen in no other frame, or outside the "
+        "telemetry's time span",
+        left_out));
+  }
+  for (const Span& gap : page.gaps()) {
+    constexpr std::size_t kMost = 8;  // lines
+    if (lines.size() == kMost) {
+      lines.emplace_back("and in further gaps, grey in the plots over time");
+      break;
+    }
+    lines.push_back(fmt::format("no frame from {:.2f} to {:.2f} s: grey in the plots over time",
+                                gap.begin_s, gap.end_s));
+  }
+  return lines;
+}
+
+}  // namespace alidade::report

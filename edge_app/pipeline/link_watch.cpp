@@ -1,0 +1,51 @@
+#include "edge_app/pipeline/link_watch.h"
+
+#include <algorithm>
+
+namespace alidade {
+
+void LinkWatch::item(double now_s) {
+  const double last_s = last_s_.load(std::memory_order_relaxed);
+  if (fresh_) {
+    if (last_s >= 0) reconnections_.fetch_add(1, std::memory_order_relaxed);
+    fresh_ = false;
+    intervals_ = 0;
+    interval_s_.store(-1, std::memory_order_relaxed);
+  } else {
+    intervals_ = std::min(intervals_ + 1, kMemory);
+    const double mean_s = intervals_ == 1 ? 0 : interval_s_.load(std::memory_order_relaxed);
+    interval_s_.store(mean_s + (now_s - last_s - mean_s) / intervals_, std::memory_order_relaxed);
+  }
+  last_s_.store(now_s, std::memory_order_relaxed);
+  connected_.store(true, std::memory_order_release);
+}
+
+void LinkWatch::lost(const std::string& reason) {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    reason_ = reason;
+  }
+  fresh_ = true;
+  connected_.store(false, std::memory_order_release);
+}
+
+LinkHealth LinkWatch::now(double now_s) const {
+  LinkHealth status;
+  status.connected = connected_.load(std::memory_order_acquire);
+  status.reconnections = reconnections_.load(std::memory_order_relaxed);
+  const double last_s = last_s_.load(std::memory_order_relaxed);
+  if (last_s >= 0) {
+    const double age_s = std::max(0.0, now_s - last_s);
+    status.age_s = age_s;
+    const double interval_s = std::max(interval_s_.load(std::memory_order_relaxed), age_s);
+    if (interval_s_.load(std::memory_order_relaxed) >= 0 && interval_s > 0)
+      status.rate_hz = 1 / interval_s;
+  }
+  if (!status.connected) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    status.reason = reason_;
+  }
+  return status;
+}
+
+}  // namespace alidade
