@@ -20,7 +20,8 @@ using ::testing::HasSubstr;
 
 class HttpLinks : public ::testing::Test {
  protected:
-  HttpLinks() {
+  explicit HttpLinks(const MjpegStyle& style = style_at_another_pace())
+      : video_(style, MjpegServer::Login::kDigestSha256) {
     ::setenv("ALIDADE_TEST_VIDEO_PASSWORD", MjpegServer::kPassword, 1);
     ::setenv("ALIDADE_TEST_HEAD_PASSWORD", device_.password.c_str(), 1);
   }
@@ -31,7 +32,8 @@ class HttpLinks : public ::testing::Test {
     return device;
   }
 
-  static MjpegStyle style_with_clock() {
+  // Pictures come faster than their time stamps say.
+  static MjpegStyle style_at_another_pace() {
     MjpegStyle style;
     style.timestamp_step_s = 0.04;
     return style;
@@ -50,7 +52,7 @@ class HttpLinks : public ::testing::Test {
   }
 
   const OnvifDevice device_ = device_with_login();
-  MjpegServer video_{style_with_clock(), MjpegServer::Login::kDigestSha256};
+  MjpegServer video_;
   OnvifServer head_{device_};
   TemporaryDirectory directory_;
 };
@@ -77,7 +79,18 @@ TEST_F(HttpLinks, SayToCheckWhenTheyBreak) {
               HasSubstr("the connection was lost 1 times during the check, last: "));
 }
 
-TEST_F(HttpLinks, GiveRecordsToRun) {
+class HttpLinksInTime : public HttpLinks {
+ protected:
+  HttpLinksInTime() : HttpLinks(style_in_time()) {}
+
+  static MjpegStyle style_in_time() {
+    MjpegStyle style;
+    style.timestamps_run = true;
+    return style;
+  }
+};
+
+TEST_F(HttpLinksInTime, GiveRecordsToRun) {
   Process process(command({"run", "-c", config(), "--json"}));
   std::string line = process.read_line();
   while (!line.empty() && line.find("\"mode\":\"PT\"") == std::string::npos) {

@@ -74,9 +74,11 @@ bool MjpegServer::send_picture(int fd) {
   if (style_.length) {
     part += "Content-Length: " + std::to_string(body.size()) + "\r\n";
   }
-  if (style_.timestamp_step_s) {
-    part += "X-Timestamp: " +
-            std::to_string(1000 + static_cast<double>(next_) * *style_.timestamp_step_s) + "\r\n";
+  if (style_.timestamps_run || style_.timestamp_step_s) {
+    const double timestamp_s = style_.timestamps_run
+                                   ? monotonic_now_s()
+                                   : 1000 + static_cast<double>(next_) * *style_.timestamp_step_s;
+    part += "X-Timestamp: " + std::to_string(timestamp_s) + "\r\n";
   }
   part += "\r\n" + body + style_.after;
   if (!RawServer::send(fd, style_.before)) {

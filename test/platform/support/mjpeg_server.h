@@ -23,8 +23,9 @@ struct MjpegStyle {
   std::string headers = "Content-Type: image/jpeg\r\n";  // of each part, besides those below
   bool length = true;                                    // Content-Length
   std::optional<double> timestamp_step_s;                // X-Timestamp grows so; none without
-  std::string after = "\r\n";                            // each part
-  bool pause_in_part = false;  // waits between the first byte of a part and the rest
+  bool timestamps_run = false;  // X-Timestamp is the time of sending, instead
+  std::string after = "\r\n";   // each part
+  bool pause_in_part = false;   // waits between the first byte of a part and the rest
 };
 
 class MjpegServer {
