@@ -4,15 +4,12 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "edge_app/output/or_null.h"
+
 namespace alidade {
 namespace {
 
 using Json = nlohmann::ordered_json;
-
-template <typename T>
-Json known(const std::optional<T>& value) {
-  return value ? Json(*value) : Json();
-}
 
 Json as_json(const std::optional<Spread>& spread) {
   if (!spread) return nullptr;
@@ -65,9 +62,9 @@ Json video_json(const CheckReport& report) {
                {"width", any ? Json(video.width) : Json()},
                {"height", any ? Json(video.height) : Json()},
                {"size_fits", any ? Json(video.size_fits) : Json()},
-               {"rate_hz", known(video.rate_hz)},
+               {"rate_hz", or_null(video.rate_hz)},
                {"interval_s", as_json(video.interval_s)},
-               {"lost", known(video.lost)},
+               {"lost", or_null(video.lost)},
                {"damaged", video.counters.damaged},
                {"dropped", video.counters.dropped},
                {"decode_s", as_json(video.decode_s)},
@@ -84,15 +81,15 @@ Json pan_tilt_json(const CheckReport& report) {
   const bool any = telemetry.samples > 0;
   Json json = as_json(report.measured.pan_tilt);
   json.update({{"samples", telemetry.samples},
-               {"rate_hz", known(telemetry.rate_hz)},
+               {"rate_hz", or_null(telemetry.rate_hz)},
                {"interval_s", as_json(telemetry.interval_s)},
                {"time_bounds_s", as_json(telemetry.bounds_s)},
                {"age_s", as_json(telemetry.age_s)},
-               {"change_hz", known(telemetry.change_hz)},
+               {"change_hz", or_null(telemetry.change_hz)},
                {"stale", telemetry.stale},
                {"pan", any ? as_json(telemetry.pan) : Json()},
                {"tilt", any ? as_json(telemetry.tilt) : Json()},
-               {"zoom", known(telemetry.zoom)}});
+               {"zoom", or_null(telemetry.zoom)}});
   return json;
 }
 
@@ -102,8 +99,8 @@ Json motion_json(const std::optional<MotionReport>& motion) {
           {"tilt_sign", name_of(motion->tilt)},
           {"image_moved", motion->image_moved},
           {"head_moved", motion->head_moved},
-          {"focal_length_px", known(motion->focal_length_px)},
-          {"clock_offset_s", known(motion->clock_offset_s)}};
+          {"focal_length_px", or_null(motion->focal_length_px)},
+          {"clock_offset_s", or_null(motion->clock_offset_s)}};
 }
 
 }  // namespace

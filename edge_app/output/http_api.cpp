@@ -10,6 +10,7 @@
 #include "edge_app/output/calibration_json.h"
 #include "edge_app/output/clock_pair.h"
 #include "edge_app/output/openapi.h"
+#include "edge_app/output/or_null.h"
 #include "edge_app/output/pixel_query.h"
 #include "edge_app/output/record_events.h"
 #include "edge_app/output/record_format.h"
@@ -32,11 +33,6 @@ ServerResponse text_response(const char* type, std::string body) {
   response.type = type;
   response.body = std::move(body);
   return response;
-}
-
-template <typename T>
-Json or_null(const std::optional<T>& value) {
-  return value ? Json(*value) : Json();
 }
 
 ServerResponse orientation(const HttpApiSources& sources) {

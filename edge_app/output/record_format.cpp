@@ -4,6 +4,8 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "edge_app/output/or_null.h"
+
 namespace alidade {
 namespace {
 
@@ -16,11 +18,6 @@ struct Field {
   Json value;
   std::vector<const char*> columns;  // CSV columns of an array; empty: one column, of the same name
 };
-
-template <typename T>
-Json or_null(const std::optional<T>& value) {
-  return value ? Json(*value) : Json();
-}
 
 std::vector<Field> fields(const OrientationRecord& record) {
   // A member of the orientation, null where there is none.

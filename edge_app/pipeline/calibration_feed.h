@@ -32,8 +32,8 @@ struct FrameTracks {
 
   FrameStamp stamp;
   double time_s = 0;  // filtered capture time of row 0, as in the record
-  bool time_is_of_use =
-      true;  // false: the stamp says too little of the time, and later ones will not tell
+  // False: the stamp says too little of the time, and later ones will not tell.
+  bool time_is_of_use = true;
   Tracker tracker = Tracker::kNone;
   bool clock_restarted = false;                  // the frame clock began anew with this frame
   bool delay_stepped = false;                    // the least delay of the video stepped

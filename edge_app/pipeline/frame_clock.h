@@ -32,8 +32,8 @@ struct FrameTime {
   ClockEstimate clock;
   bool known = true;   // false: clock.time_s may be late by any time
   bool of_use = true;  // false: nor will it be known later, when the pace or the line is
-  double delay_shift_s =
-      0;  // steps of the least delay, which the receive time contains and the line does not
+  // Steps of the least delay, which the receive time contains and the line does not.
+  double delay_shift_s = 0;
 };
 
 class FrameClock {
@@ -56,8 +56,7 @@ class FrameClock {
   enum class Kind : std::uint8_t { kNew, kSenderTime, kSequence, kNothing };
 
   static constexpr int kStrangeInARow = 3;
-  static constexpr double kEarly_s =
-      0.02;  // beyond what the least delay of a new connection may differ by
+  static constexpr double kEarly_s = 0.02;      // the least delay of a connection differs by less
   static constexpr double kStoodStill_s = 0.5;  // half of the window at the pace that tells
 
   FrameTime judge(const FrameStamp& stamp) {

@@ -30,22 +30,22 @@ void LinkWatch::lost(const std::string& reason) {
 }
 
 LinkHealth LinkWatch::now(double now_s) const {
-  LinkHealth status;
-  status.connected = connected_.load(std::memory_order_acquire);
-  status.reconnections = reconnections_.load(std::memory_order_relaxed);
+  LinkHealth health;
+  health.connected = connected_.load(std::memory_order_acquire);
+  health.reconnections = reconnections_.load(std::memory_order_relaxed);
   const double last_s = last_s_.load(std::memory_order_relaxed);
   if (last_s >= 0) {
     const double age_s = std::max(0.0, now_s - last_s);
-    status.age_s = age_s;
-    const double interval_s = std::max(interval_s_.load(std::memory_order_relaxed), age_s);
-    if (interval_s_.load(std::memory_order_relaxed) >= 0 && interval_s > 0)
-      status.rate_hz = 1 / interval_s;
+    health.age_s = age_s;
+    const double interval_s = interval_s_.load(std::memory_order_relaxed);
+    const double longer_s = std::max(interval_s, age_s);
+    if (interval_s >= 0 && longer_s > 0) health.rate_hz = 1 / longer_s;
   }
-  if (!status.connected) {
+  if (!health.connected) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    status.reason = reason_;
+    health.reason = reason_;
   }
-  return status;
+  return health;
 }
 
 }  // namespace alidade

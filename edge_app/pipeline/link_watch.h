@@ -17,8 +17,8 @@ namespace alidade {
 
 struct LinkHealth {
   bool connected = false;  // items come, or may: nothing is known to be wrong since the last
-  std::string
-      reason;  // why there is no connection, one line; empty while it stands or was not tried yet
+  // Why there is no connection, one line; empty while it stands or was not tried yet.
+  std::string reason;
   std::int64_t reconnections = 0;
   std::optional<double> age_s;    // since the last item; empty before the first
   std::optional<double> rate_hz;  // empty before the second item of a connection

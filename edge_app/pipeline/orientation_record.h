@@ -5,8 +5,8 @@
 // time_s, when row 0 was exposed; at row v both angles are
 //   angle + rate t + acceleration t^2 / 2,  t = v * line delay.
 // q is R_base_from_camera; covariance and sigma are of a perturbation R * Exp(xi), xi in the camera frame.
-// A record without a frame (video lost) has neither frame nor time_s, one of a frame that may have waited no time_s; one of mode `none` has no
-// orientation and its status says why. Where landmarks were looked for and the answer is telemetry's
+// A record without a frame (video lost) has neither frame nor time_s, one of a frame that may have waited no time_s; one of
+// mode `none` has no orientation and its status says why. Where landmarks were looked for and the answer is telemetry's
 // (mode PT), the status says why too.
 // Fixed size and trivially copyable: crosses the queue to the output thread by value.
 

@@ -66,7 +66,7 @@ bool OrientationStep::is_stalled_poll(const PanTiltSample& sample) {
   const bool begins =
       telemetry_.size() < 2 ||
       sample.latest_time_s > newest_s.value_or(0) + options_.telemetry_limits.max_gap_s;
-  const double longest_s = begins ? 0.02 : 0.1;
+  const double longest_s = begins ? 0.02 : 0.1;  // no stall is shorter
   constexpr double kTimesTheUsual = 2.5;
   constexpr double kGrowth = 1.5;  // of the usual, a poll: a device may be slow, or become slow
   const bool stalled = width_s > std::max(longest_s, kTimesTheUsual * usual_poll_s_);
@@ -173,8 +173,8 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   record.receive_time_s = stamp.receive_time_s;
   if (!frame_time.known) {
     record.status = RecordStatus::kTimeUnknown;
-    if (finds_landmarks())
-      image_ = ImageView{};  // the map would learn from an angle of another time
+    // The map would learn from an angle of another time.
+    if (finds_landmarks()) image_ = ImageView{};
     return record;
   }
   record.time_s = clock.time_s;

@@ -82,8 +82,8 @@ class ReceiptClock {
       fresh_count_ = count_;
       refine_period();
     } else if (paced_ && receive_time_s < expected_s() - kPunctual_s) {
-      paced_ =
-          false;  // faster than the pace: what came before had waited, or the camera is another
+      // Faster than the pace: what came before had waited, or the camera is another.
+      paced_ = false;
     }
     if (!paced_) return unknown;
     const double late_s = std::max(0.0, receive_time_s - expected_s() - kPunctual_s);

@@ -122,8 +122,7 @@ void PtuProtocol::ask_fence_next(bool of_number) {
 }
 
 void PtuProtocol::doubt() {
-  const bool behind_fence = asked_ == Asked::kFence && !fence_is_number_;
-  if (!options_.verbose && !behind_fence) {
+  if (!options_.verbose) {
     ask_fence_next(false);
   }
 }

@@ -67,9 +67,7 @@ class QueryProtocol {
   [[nodiscard]] virtual std::string give_up() = 0;
 
   // Bytes came that nobody asked for. Where it matters next() asks a fence, as also after every
-  // kQueriesPerFence queries: one answer too many makes each answer that of the query before. Not behind
-  // a fence that was answered: what comes then is younger than it, and where each answer comes twice
-  // fence would follow upon fence.
+  // kQueriesPerFence queries: one answer too many makes each answer that of the query before.
   virtual void doubt() = 0;
   // Whether each datagram is to be searched alone (over UDP), not together with those before it.
   [[nodiscard]] virtual bool is_of_datagrams() const = 0;

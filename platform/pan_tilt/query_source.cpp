@@ -115,6 +115,15 @@ void QuerySource::settle(double now_s) {
   }
 }
 
+// Bytes came that nobody asked for. Those behind a fence that a doubt asked for are younger than all before it and raise
+// no other: where each answer comes twice, fence would follow upon fence.
+void QuerySource::doubt(double now_s) {
+  const bool behind_fence = fenced_ && asked_ == 1;
+  if (!behind_fence) protocol_->doubt();
+  fenced_ = !behind_fence;
+  settle(now_s);
+}
+
 ReadStatus QuerySource::ask(double now_s) {
   // What is still in the buffers came before the query and is no answer to it.
   std::string stale;
@@ -130,8 +139,7 @@ ReadStatus QuerySource::ask(double now_s) {
     return disconnect(link_.error());
   }
   if (surplus && asked_ > 0) {
-    protocol_->doubt();
-    settle(now_s);
+    doubt(now_s);
     return ReadStatus::kOk;
   }
   const Query query = protocol_->next();
@@ -167,6 +175,7 @@ ReadStatus QuerySource::give_up(double now_s) {
     return disconnect(what_came());
   }
   pairing_.reset();
+  fenced_ = false;
   const std::string bytes = protocol_->give_up();
   if (!bytes.empty() && link_.send(bytes) != LinkStatus::kOk) {
     return disconnect(link_.error());
@@ -230,10 +239,7 @@ bool QuerySource::take_bytes(const std::string& bytes, double now_s, PanTiltSamp
     listen(bytes, now_s);
     return false;
   }
-  if (state_ == State::kIdle && asked_ > 0) {
-    protocol_->doubt();
-    settle(now_s);
-  }
+  if (state_ == State::kIdle && asked_ > 0) doubt(now_s);
   if (state_ != State::kAsked) {
     return false;
   }
@@ -246,9 +252,8 @@ bool QuerySource::take_bytes(const std::string& bytes, double now_s, PanTiltSamp
   }
   open_ = 0;
   if (std::exchange(first_is_old_, false)) {
-    protocol_->doubt();
     pairing_.reset();
-    settle(now_s);
+    doubt(now_s);
     return false;
   }
   if (answer.kind == Answer::Kind::kRefused) {
@@ -329,6 +334,7 @@ ReadStatus QuerySource::read(PanTiltSample& sample, double timeout_s) {
           given_up_ = 0;
           late_s_ = 0;
           late_awaited_ = false;
+          fenced_ = false;
           first_is_old_ = open_ > 0;
           open_ = open_ > 0 ? 2 : 0;  // what was asked before is answered on a new connection, too
           due_s_ = now_s;

@@ -66,6 +66,7 @@ class QuerySource : public PanTiltSource {
   ReadStatus ask(double now_s);
   ReadStatus give_up(double now_s);
   void settle(double now_s);
+  void doubt(double now_s);
   void listen(const std::string& bytes, double now_s);
   Answer find(const std::string& bytes, double now_s);
   [[nodiscard]] std::string what_came() const;
@@ -98,6 +99,7 @@ class QuerySource : public PanTiltSource {
   int open_ = 0;                // queries in a row without answers, which may still come
   double open_since_s_ = 0;     // when the first of them was sent
   bool refused_ = false;        // the latest query, by an answer
+  bool fenced_ = false;         // a doubt was told to the protocol, whose next query is a fence
   bool first_is_old_ = false;   // the next answer may be that of a query of the connection before
   bool late_awaited_ = false;   // the answer to the latest query, which was given up
   double late_s_ = 0;           // how long an answer took that was given up; 0: none did

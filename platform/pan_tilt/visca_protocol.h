@@ -62,7 +62,7 @@ class ViscaProtocol : public QueryProtocol {
   [[nodiscard]] Query next() override;
   [[nodiscard]] Answer find(std::string_view bytes) override;
   [[nodiscard]] std::string give_up() override;
-  void doubt() override { fence_next_ = !options_.header && asked_ == Asked::kPosition; }
+  void doubt() override { fence_next_ = !options_.header; }
   [[nodiscard]] bool is_of_datagrams() const override { return options_.header; }
   [[nodiscard]] int polls_per_reading() const override { return 1; }
   [[nodiscard]] int bytes_per_reading() const override { return 18; }

@@ -6,6 +6,7 @@
 #include <random>
 
 #include "test/support/hard_values.h"
+#include "test/support/not_a_number.h"
 #include "test/support/numeric_jacobian.h"
 
 namespace alidade {
@@ -19,7 +20,6 @@ using Vec2 = Vector2<double>;
 using Vec3 = Vector3<double>;
 
 constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST(Camera, ProjectsByItsDefinition) {

@@ -12,6 +12,7 @@
 
 #include "core/model/one_sided_clock.h"
 #include "test/support/allocation_guard.h"
+#include "test/support/not_a_number.h"
 
 namespace alidade {
 namespace {
@@ -19,7 +20,6 @@ namespace {
 using Random = std::mt19937_64;
 using Delay = std::function<double(Random&, double)>;
 
-constexpr double kNan = std::numeric_limits<double>::quiet_NaN();
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
 Delay exponential(double mean_s) {

@@ -215,7 +215,6 @@ TEST_P(EveryHeadKind, AsksAFenceInDoubtAndNowAndThenWhereRepeatsDoNotShow) {
     conversation.reading();
     conversation.doubt();
     EXPECT_TRUE(is_fence()) << lead << " queries later";
-    conversation.doubt();
     EXPECT_FALSE(is_fence()) << "one fence is enough";
   }
   int without_fence = 0;

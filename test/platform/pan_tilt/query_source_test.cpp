@@ -226,6 +226,18 @@ std::vector<HeadKind> other_kinds() {
 INSTANTIATE_TEST_SUITE_P(Heads, LineWithFaults, ::testing::ValuesIn(last_kinds_in_turn()), name_of);
 INSTANTIATE_TEST_SUITE_P(OtherHeads, LineWithFaults, ::testing::ValuesIn(other_kinds()), name_of);
 
+// Over UDP the second answer then waits behind each first one, that to a fence, too.
+TEST_P(LineWithFaults, GivesReadingsWhereEachAnswerComesTwiceAndIsReadLate) {
+  HeadRig rig(GetParam());
+  const auto source = rig.open();
+  rig.server().fault = LineFault::kRepeated;
+  int samples = 0;
+  EXPECT_TRUE(eventually([&] {
+    samples += source->read(sample_, 0) == ReadStatus::kOk ? 1 : 0;
+    return samples == 5;
+  }));
+}
+
 TEST_P(LineWithFaults, CostsAnswersOnly) {
   const HeadPosition position{-123.45, 30.5, 0x1234};
   HeadRig rig(GetParam(), [position] { return position; });

@@ -77,6 +77,16 @@ Vector2<double> random_shift(std::mt19937_64* random) {
   return {u, uniform(*random)};
 }
 
+// The change with so many random shifts, one texture each.
+Statistics tried(Change change, int times, double sigma, std::mt19937_64* random) {
+  Statistics statistics;
+  for (int n = 0; n < times; ++n) {
+    change.shift = random_shift(random);
+    try_once(change, sigma, random, &statistics);
+  }
+  return statistics;
+}
+
 // Correlation of blurred white noise between points k px apart, averaged over the fraction of a pixel.
 double correlation_of_blur(int k) {
   constexpr int kFractions = 64;
@@ -165,12 +175,7 @@ TEST(PatchAlignment, HasNoBiasAtAnyFractionOfAPixel) {
 // noise estimated here, where the reference lies on whole pixels, 5 % too large.
 TEST(PatchAlignment, ErrorsAreAsLargeAsTheCovarianceSays) {
   std::mt19937_64 random(2);
-  Statistics statistics;
-  for (int n = 0; n < 1600; ++n) {
-    Change change;
-    change.shift = random_shift(&random);
-    try_once(change, 2, &random, &statistics);
-  }
+  const Statistics statistics = tried({}, 1600, 2, &random);
   ASSERT_GT(statistics.count, 750);
   const double sigma = std::sqrt(4 * kNoiseFreedom / (kNoiseFreedom - 4) / statistics.count);
   EXPECT_NEAR(statistics.anees(), 2, 4 * sigma + 0.05 * 2);
@@ -186,13 +191,9 @@ TEST(PatchAlignment, ErrorsAreAsLargeAsTheCovarianceSays) {
 TEST(PatchAlignment, ErrorsAreAsLargeAsTheCovarianceSaysAtAnyContrast) {
   for (const double gain : {0.5, 1.5}) {
     std::mt19937_64 random(23);
-    Statistics statistics;
-    for (int n = 0; n < 400; ++n) {
-      Change change;
-      change.shift = random_shift(&random);
-      change.gain = gain;
-      try_once(change, 1, &random, &statistics);
-    }
+    Change change;
+    change.gain = gain;
+    const Statistics statistics = tried(change, 400, 1, &random);
     ASSERT_GT(statistics.count, 80);
     const double sigma = std::sqrt(4 * kNoiseFreedom / (kNoiseFreedom - 4) / statistics.count);
     EXPECT_NEAR(statistics.anees(), 2, 4 * sigma + 0.05 * 2) << gain;
@@ -231,13 +232,9 @@ TEST(PatchAlignment, SlopeOfTheLightMovesNothing) {
   for (const Vector2<double>& slope :
        {Vector2<double>(1, 0), Vector2<double>(0, -1), Vector2<double>(2, 2)}) {
     std::mt19937_64 random(9);
-    Statistics statistics;
-    for (int n = 0; n < 200; ++n) {
-      Change change;
-      change.shift = random_shift(&random);
-      change.slope = slope;
-      try_once(change, 0, &random, &statistics);
-    }
+    Change change;
+    change.slope = slope;
+    const Statistics statistics = tried(change, 200, 0, &random);
     ASSERT_GT(statistics.count, 50);
     EXPECT_LT(statistics.bias(), 0.01) << slope.transpose();
     EXPECT_LT(statistics.rms(), 0.02) << slope.transpose();
@@ -255,13 +252,9 @@ TEST(PatchAlignment, FollowsRotationScaleAndShearThatTheCallerKnows) {
       shear,    shear.transpose(),    0.95 * rotation * shear};
   std::mt19937_64 random(4);
   for (const Matrix2<double>& A : warps) {
-    Statistics statistics;
-    for (int n = 0; n < 300; ++n) {
-      Change change;
-      change.shift = random_shift(&random);
-      change.A = A;
-      try_once(change, 0, &random, &statistics);
-    }
+    Change change;
+    change.A = A;
+    const Statistics statistics = tried(change, 300, 0, &random);
     ASSERT_GT(statistics.count, 50);
     EXPECT_LT(statistics.bias(), 0.01) << A;
     EXPECT_LT(statistics.rms(), 0.03) << A;

@@ -1,0 +1,14 @@
+#pragma once
+// A value that may be unknown, as JSON has it. Pure.
+
+#include <nlohmann/json.hpp>
+#include <optional>
+
+namespace alidade {
+
+template <typename T>
+nlohmann::ordered_json or_null(const std::optional<T>& value) {
+  return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json();
+}
+
+}  // namespace alidade
