@@ -27,10 +27,12 @@ struct Frame {
   FrameStamp stamp;
   int width = 0;   // px
   int height = 0;  // px
-  // 8-bit luma, row v starts at luma + v * stride; null if the source was told not to decode.
+  // 8-bit luma, row v starts at luma + v * stride; null if the source was told not to decode, and while it cannot: what the
+  // picture is coded from was lost, up to the next key frame.
   const std::uint8_t* luma = nullptr;
   std::ptrdiff_t stride = 0;          // bytes
   std::shared_ptr<const void> owner;  // keeps luma alive
+  bool interlaced = false;  // coded as two fields: every other row may be of another moment
   // What read() took to make luma of the data, waiting and queueing not included; none: not decoded,
   // or not told.
   std::optional<double> decode_s;

@@ -4,6 +4,8 @@ extern "C" {
 #include <libavutil/pixdesc.h>
 }
 
+#include <algorithm>
+
 namespace alidade {
 namespace {
 
@@ -15,6 +17,12 @@ bool has_luma_plane(const AVPixFmtDescriptor* format) {
 }
 
 }  // namespace
+
+std::optional<CodedBy> coded_by(AVCodecID codec) {
+  if (codec == AV_CODEC_ID_H264) return CodedBy::kH264;
+  if (codec == AV_CODEC_ID_HEVC) return CodedBy::kH265;
+  return std::nullopt;
+}
 
 bool LumaDecoder::open(const AVCodecParameters& parameters, bool low_delay) {
   context_.reset();
@@ -28,10 +36,22 @@ bool LumaDecoder::open(const AVCodecParameters& parameters, bool low_delay) {
   if (context_) {
     code = avcodec_parameters_to_context(context_.get(), &parameters);
   }
+  coded_by_ = coded_by(parameters.codec_id);
+  low_delay_ = low_delay;
+  if (code >= 0 && coded_by_ && low_delay) {
+    const auto changed = without_reordering(*coded_by_, context_->extradata,
+                                            static_cast<std::size_t>(context_->extradata_size));
+    // It is shorter: zeros stand for fewer bits.
+    if (changed && changed->size() <= static_cast<std::size_t>(context_->extradata_size)) {
+      std::copy(changed->begin(), changed->end(), context_->extradata);
+      context_->extradata_size = static_cast<int>(changed->size());
+    }
+  }
   if (code >= 0) {
     context_->thread_count = 1;
     if (low_delay) {
       context_->flags |= AV_CODEC_FLAG_LOW_DELAY;
+      context_->has_b_frames = 0;
     }
     if (codec->id == AV_CODEC_ID_MJPEG) {
       // Otherwise a cut off picture passes for a whole one.
@@ -44,11 +64,46 @@ bool LumaDecoder::open(const AVCodecParameters& parameters, bool low_delay) {
     context_.reset();
     return false;
   }
+  beginning_ = coded_by_.has_value();
+  begun_ = false;
   return true;
 }
 
+void LumaDecoder::flush() {
+  avcodec_flush_buffers(context_.get());
+  beginning_ = coded_by_.has_value();
+  begun_ = false;
+}
+
+// libav's decoder of H.264 waits by itself, that of H.265 does not.
+void LumaDecoder::begin(const AVPacket& packet) {
+  const CodedPicture coded =
+      look_at(*coded_by_, packet.data, static_cast<std::size_t>(packet.size));
+  const bool waits = coded_by_ == CodedBy::kH265 && !coded.needs_no_other;
+  not_right_ = waits ? coded.right_after.value_or(0) : 0;
+  begun_ = true;
+}
+
+// The packet, with parameter sets that forbid what open() was told; null where it says nothing else.
+PacketPtr LumaDecoder::in_decoding_order(const AVPacket& packet) const {
+  if (!coded_by_ || !low_delay_) return nullptr;
+  const auto changed =
+      without_reordering(*coded_by_, packet.data, static_cast<std::size_t>(packet.size));
+  if (!changed) return nullptr;
+  PacketPtr copy(av_packet_alloc());
+  if (!copy || av_new_packet(copy.get(), static_cast<int>(changed->size())) < 0 ||
+      av_packet_copy_props(copy.get(), &packet) < 0) {
+    return nullptr;
+  }
+  std::copy(changed->begin(), changed->end(), copy->data);
+  return copy;
+}
+
 bool LumaDecoder::send(const AVPacket* packet) {
-  return avcodec_send_packet(context_.get(), packet) >= 0;
+  if (packet == nullptr) return avcodec_send_packet(context_.get(), nullptr) >= 0;
+  if (coded_by_ && !begun_) begin(*packet);
+  const PacketPtr changed = in_decoding_order(*packet);
+  return avcodec_send_packet(context_.get(), changed ? changed.get() : packet) >= 0;
 }
 
 FramePtr LumaDecoder::as_grey(const AVFrame& frame) {
@@ -83,6 +138,11 @@ LumaDecoder::Result LumaDecoder::receive(Picture* picture) {
   if (code < 0 || frame->decode_error_flags != 0 || (frame->flags & AV_FRAME_FLAG_CORRUPT) != 0) {
     return Result::kDamaged;
   }
+  if (not_right_ > 0) {
+    --not_right_;
+    return receive(picture);
+  }
+  beginning_ = false;
   if (!has_luma_plane(av_pix_fmt_desc_get(static_cast<AVPixelFormat>(frame->format)))) {
     frame = as_grey(*frame);
     if (!frame) {
@@ -94,6 +154,7 @@ LumaDecoder::Result LumaDecoder::receive(Picture* picture) {
   picture->luma = frame->data[0];
   picture->stride = frame->linesize[0];
   picture->pts = frame->pts;
+  picture->interlaced = frame->interlaced_frame != 0;
   picture->owner = frame;
   return Result::kPicture;
 }

@@ -4,14 +4,17 @@
 // The luma plane is the decoder's own plane 0 (grey, any 8-bit YUV 4xx, NV12), neither copied nor
 // converted; the picture's owner keeps it alive. Other pixel formats (RGB, palettes, more bits) become grey by
 // libswscale, which costs a copy.
+// Of H.264 and H.265 that begin at a recovery point (open(), flush()), nothing comes until all of the picture is right.
 // Runs on the caller's thread only: frame threads would add frames of delay. One thread at a time.
 
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "platform/video/av_handles.h"
+#include "platform/video/coded_picture.h"
 
 namespace alidade {
 
@@ -21,8 +24,12 @@ struct Picture {
   const std::uint8_t* luma = nullptr;
   std::ptrdiff_t stride = 0;          // bytes
   std::int64_t pts = AV_NOPTS_VALUE;  // of the packet it came from
+  bool interlaced = false;            // coded as two fields, or of a frame's two fields
   std::shared_ptr<const void> owner;
 };
+
+// Empty: pictures coded each by itself, or by another codec.
+[[nodiscard]] std::optional<CodedBy> coded_by(AVCodecID codec);
 
 class LumaDecoder {
  public:
@@ -33,7 +40,8 @@ class LumaDecoder {
     kUnsupported  // cannot be converted to grey: see error()
   };
 
-  // low_delay: never hold a picture back to put it in order.
+  // low_delay: never hold a picture back to put it in order, whatever the stream's parameter sets allow for. Data of H.264
+  // and H.265 has to be Annex B then.
   [[nodiscard]] bool open(const AVCodecParameters& parameters, bool low_delay);
 
   // One whole picture, or null for "no more will come". False: the data cannot be decoded.
@@ -42,15 +50,28 @@ class LumaDecoder {
   // The next picture that is ready; call until kNone.
   [[nodiscard]] Result receive(Picture* picture);
 
+  // Forgets all pictures: what comes next begins anew.
+  void flush();
+
+  // H.264 and H.265: no picture has come since open() or flush().
+  [[nodiscard]] bool is_beginning() const { return beginning_; }
+
   // One line; valid after open() failed and after kUnsupported.
   [[nodiscard]] const std::string& error() const { return error_; }
 
  private:
   // Null and error_ where there is no conversion.
   FramePtr as_grey(const AVFrame& frame);
+  [[nodiscard]] PacketPtr in_decoding_order(const AVPacket& packet) const;
+  void begin(const AVPacket& packet);
 
   CodecContextPtr context_;
   ScalerPtr scaler_;  // made for the first picture that needs it
+  std::optional<CodedBy> coded_by_;
+  bool low_delay_ = false;
+  bool beginning_ = false;
+  bool begun_ = false;  // a picture was sent since open() or flush()
+  int not_right_ = 0;   // pictures to come before the first that is
   std::string error_;
 };
 

@@ -248,6 +248,7 @@ ReadStatus FramesOnDisk::finish(const Picture& picture, const FrameStamp& stamp,
   frame->height = picture.height;
   frame->luma = picture.luma;
   frame->stride = picture.stride;
+  frame->interlaced = picture.interlaced;
   frame->owner = picture.owner;
   return ReadStatus::kOk;
 }
