@@ -43,7 +43,7 @@ VideoConfig read_video(YamlSection section, const std::string& path) {
     video.type = VideoConfig::Type::kRtp;
     video.url = required_text(section, "url", "camera.sdp");
     if (video.url.rfind("rtp://", 0) == 0) {
-      video.format = section.choice("format", {"MJPG", "H264"}).value_or(video.format);
+      video.format = section.choice("format", {"MJPG", "H264", "H265"}).value_or(video.format);
     } else {
       video.url = path_relative_to(path, video.url);
     }

@@ -22,7 +22,7 @@ struct VideoConfig {
   enum class Transport { kTcp, kUdp };
   Type type = Type::kRtsp;
   std::string url;  // rtsp: rtsp://...; mjpeg: http://...; rtp: an .sdp file or rtp://address:port
-  std::string format = "MJPG";             // rtp://address:port: MJPG or H264
+  std::string format = "MJPG";             // rtp://address:port: MJPG, H264 or H265
   std::string directory;                   // recording
   std::string device;                      // v4l2: /dev/video0
   std::optional<V4l2Format> pixel_format;  // v4l2; empty: the first that fits

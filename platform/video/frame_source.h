@@ -37,6 +37,10 @@ class FrameSource {
   // URL without password, device or directory.
   [[nodiscard]] virtual std::string name() const = 0;
 
+  // One line for the person: what is waited for though the connection stands, since when, and what would shorten it. Empty:
+  // nothing, or not for long. Thread-safe.
+  [[nodiscard]] virtual std::string waiting() const { return ""; }
+
   // Since the source was made; thread-safe. Zeros where the source does not count.
   [[nodiscard]] virtual FrameSourceCounters counters() const { return {}; }
 };

@@ -5,32 +5,81 @@
 namespace alidade {
 
 void PictureEnds::packet_in(const RtpHeader& header) {
+  const auto after = [](std::uint16_t a, std::uint16_t b) {
+    return static_cast<std::int16_t>(static_cast<std::uint16_t>(a - b)) > 0;
+  };
   const bool follows = last_ && header.sequence == static_cast<std::uint16_t>(last_->sequence + 1U);
-  if (!last_ || last_->timestamp != header.timestamp) {
+  Picture* known = find(header.timestamp);
+  if (known == nullptr) {
     latest_ = (latest_ + 1) % pictures_.size();
-    pictures_[latest_] = Picture{};
-    pictures_[latest_].timestamp = header.timestamp;
-    pictures_[latest_].in_order = last_ && last_->marker;
+    known = &pictures_[latest_];
+    *known = Picture{};
+    known->timestamp = header.timestamp;
+    known->in_order = last_ && last_->marker;
   }
-  Picture& picture = pictures_[latest_];
+  Picture& picture = *known;
   markers_within_ = markers_within_ || (picture.ended && follows);
   picture.in_order = picture.in_order && follows;
   picture.ended = header.marker;
+  picture.late = picture.late || (last_ && !after(header.sequence, last_->sequence));
   ++picture.packets;
+  if (picture.new_packets == 0 || after(picture.first, header.sequence)) {
+    picture.first = header.sequence;
+  }
+  if (picture.new_packets == 0 || after(header.sequence, picture.last)) {
+    picture.last = header.sequence;
+    picture.last_is_marked = header.marker;
+  }
+  ++picture.new_packets;
   if (header.capture_utc_s) picture.capture_utc_s = header.capture_utc_s;
   last_ = header;
 }
 
-PictureEnds::Piece PictureEnds::piece_out(std::int64_t pts) {
+PictureEnds::Picture* PictureEnds::find(std::uint32_t timestamp) {
+  const auto found =
+      std::find_if(pictures_.begin(), pictures_.end(), [timestamp](const Picture& picture) {
+        return picture.packets > 0 && picture.timestamp == timestamp;
+      });
+  return found == pictures_.end() ? nullptr : &*found;
+}
+
+PictureEnds::Picture* PictureEnds::find_piece(std::int64_t pts) {
   const auto ticks = static_cast<std::uint32_t>(static_cast<std::uint64_t>(pts));
   if (!zero_) zero_ = pictures_[latest_].timestamp - ticks;  // nothing waits in libavformat yet
-  const auto found = std::find_if(pictures_.begin(), pictures_.end(), [&](const Picture& picture) {
-    return picture.packets > 0 && picture.timestamp == ticks + *zero_;
+  return find(ticks + *zero_);
+}
+
+PictureEnds::Piece PictureEnds::piece_out(std::int64_t pts) {
+  Picture* const picture = find_piece(pts);
+  if (picture == nullptr) return {};
+  ++picture->pieces;
+  ++picture->new_pieces;
+  const bool complete = picture->in_order && picture->ended && picture->pieces == picture->packets;
+  return {complete && !markers_within_, picture->capture_utc_s};
+}
+
+// The last packet that came is not the picture's last for sure: neither is it marked, nor did the next picture's first
+// come behind it.
+bool PictureEnds::lost_its_end(const Picture& picture) const {
+  if (picture.last_is_marked && !markers_within_) return false;
+  const auto next = static_cast<std::uint16_t>(picture.last + 1U);
+  return std::none_of(pictures_.begin(), pictures_.end(), [next](const Picture& other) {
+    return other.new_packets > 0 && other.first == next;
   });
-  if (found == pictures_.end()) return {};
-  ++found->pieces;
-  const bool complete = found->in_order && found->ended && found->pieces == found->packets;
-  return {complete && !markers_within_, found->capture_utc_s};
+}
+
+PictureEnds::Loss PictureEnds::loss_of(std::int64_t pts) {
+  Picture* const picture = find_piece(pts);
+  if (picture == nullptr || picture->new_packets == 0) return {true, true};
+  const int span = static_cast<std::uint16_t>(picture->last - picture->first) + 1;
+  // libavformat drops what comes too late; what came in order and gave no piece, it had no use for.
+  const bool given_out = picture->new_pieces == picture->new_packets || !picture->late;
+  const Loss loss{span != picture->new_packets || !given_out || lost_its_end(*picture),
+                  next_sequence_ && picture->first != *next_sequence_};
+  next_sequence_ = static_cast<std::uint16_t>(picture->last + 1U);
+  picture->new_packets = 0;
+  picture->new_pieces = 0;
+  return loss;
 }
 
 }  // namespace alidade

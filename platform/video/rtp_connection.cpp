@@ -15,6 +15,7 @@ extern "C" {
 
 #include "platform/system/clock.h"
 #include "platform/system/url.h"
+#include "platform/video/luma_decoder.h"
 #include "platform/video/rtsp_session.h"
 
 namespace alidade {
@@ -26,9 +27,9 @@ constexpr int kMaxDescription = 16'384;  // bytes that libavformat reads
 
 // The description that a sender of plain RTP does not send.
 std::string sdp_of(const Url& url, const std::string& format) {
-  const bool h264 = format == "H264";
+  const bool jpeg = format == "MJPG";
   return "v=0\nc=IN IP4 " + url.host + "\nt=0 0\nm=video " + url.port + " RTP/AVP " +
-         (h264 ? "96\na=rtpmap:96 H264/90000\n" : "26\n");
+         (jpeg ? "26\n" : "96\na=rtpmap:96 " + format + "/90000\n");
 }
 
 bool read_text(const std::string& path, std::string* text, std::string* error) {
@@ -170,19 +171,20 @@ ReadStatus RtpConnection::prepare(std::string* error) {
     return ReadStatus::kFailed;
   }
   const AVCodecParameters& found = *format_->streams[0]->codecpar;
-  if (found.codec_id != AV_CODEC_ID_MJPEG && found.codec_id != AV_CODEC_ID_H264) {
+  coded_by_ = coded_by(found.codec_id);
+  if (found.codec_id != AV_CODEC_ID_MJPEG && !coded_by_) {
     *error = std::string("the video is ") + avcodec_get_name(found.codec_id) +
-             "; set the camera to MJPEG or H.264";
+             "; set the camera to MJPEG, H.264 or H.265";
     return ReadStatus::kFailed;
   }
   const std::shared_ptr<AVCodecParameters> copy(avcodec_parameters_alloc(), AvDeleter());
   avcodec_parameters_copy(copy.get(), &found);
   parameters_ = copy;
-  if (found.codec_id == AV_CODEC_ID_H264) {
+  if (coded_by_) {
     parser_.reset(av_parser_init(found.codec_id));
     parser_context_.reset(avcodec_alloc_context3(avcodec_find_decoder(found.codec_id)));
     if (!parser_ || !parser_context_) {
-      *error = "this libavcodec has no H.264 parser";
+      *error = std::string("this libavcodec has no parser of ") + avcodec_get_name(found.codec_id);
       return ReadStatus::kFailed;
     }
     avcodec_parameters_to_context(parser_context_.get(), &found);
@@ -192,7 +194,7 @@ ReadStatus RtpConnection::prepare(std::string* error) {
 }
 
 ReadStatus RtpConnection::read_picture(AccessUnit* unit, std::string* error) {
-  const bool in_pieces = parameters_->codec_id == AV_CODEC_ID_H264;
+  const bool in_pieces = coded_by_.has_value();
   while (!grown_) {
     AccessUnit piece;
     piece.packet.reset(av_packet_alloc());
@@ -266,27 +268,41 @@ ReadStatus RtpConnection::read(AccessUnit* unit, std::string* error) {
     return ReadStatus::kDisconnected;
   }
   if (!inspect(unit)) {
-    *error = "the H.264 stream has B-frames, which come late; switch them off in the camera";
+    *error = std::string("the ") + (coded_by_ == CodedBy::kH264 ? "H.264" : "H.265") +
+             " stream has B-frames, which come late; switch them off in the camera";
     return ReadStatus::kFailed;
   }
   return ReadStatus::kOk;
 }
 
-// Finds key frames; false for a B-frame.
+// Finds key frames and losses; false for a B-frame. B-slices of H.265 may be without one: what counts is that they are to
+// be seen before a picture that came earlier.
 bool RtpConnection::inspect(AccessUnit* unit) {
   unit->key = true;
-  if (parser_) {
+  bool at_once = true;  // nothing of what comes then is coded from what came before
+  if (coded_by_) {
     const AVPacket& packet = *unit->packet;
+    const std::size_t bytes = static_cast<std::size_t>(packet.size);
+    const CodedPicture coded = look_at(*coded_by_, packet.data, bytes);
+    if (packet.pts != AV_NOPTS_VALUE) {
+      const PictureEnds::Loss loss = ends_.loss_of(packet.pts);
+      unit->whole = !loss.within;
+      unit->follows = !loss.before;
+    }
     std::uint8_t* data = nullptr;
     int size = 0;
     av_parser_parse2(parser_.get(), parser_context_.get(), &data, &size, packet.data, packet.size,
                      packet.pts, packet.dts, packet.pos);
-    unit->key = parser_->key_frame == 1;
-    if (parser_->pict_type == AV_PICTURE_TYPE_B) {
+    unit->key = coded.has_beginning &&
+                (coded.needs_no_other || coded.right_after || parser_->key_frame == 1);
+    at_once = coded.needs_no_other || coded.right_after == 0;
+    const bool overtaken = parser_->output_picture_number < last_output_number_;
+    last_output_number_ = parser_->output_picture_number;
+    if (parser_->pict_type == AV_PICTURE_TYPE_B && (coded_by_ == CodedBy::kH264 || overtaken)) {
       return false;
     }
   }
-  unit->packet->flags = unit->key ? AV_PKT_FLAG_KEY : 0;
+  unit->packet->flags = unit->key && at_once ? AV_PKT_FLAG_KEY : 0;
   return true;
 }
 

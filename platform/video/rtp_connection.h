@@ -5,7 +5,7 @@
 // A transport brings the packets, libavformat takes them apart (its SDP demuxer with custom I/O).
 // libavformat's parser is switched off: it gives a picture out, and so stamps it, only with the next
 // one's first packet. Pieces of one RTP timestamp are put together here instead, up to the picture's
-// marker (picture_ends.h).
+// marker (picture_ends.h). H.264 and H.265 alike.
 // Blocks; a wait ends with interrupt() or after timeout_s without a whole picture: reports of a camera
 // whose encoder hangs, or packets of another stream, are no sign of life.
 
@@ -15,6 +15,7 @@
 #include <string>
 
 #include "platform/video/av_handles.h"
+#include "platform/video/coded_picture.h"
 #include "platform/video/picture_ends.h"
 #include "platform/video/rtp_source.h"
 #include "platform/video/rtp_transport.h"
@@ -26,7 +27,9 @@ struct AccessUnit {
   double receive_time_s = 0;  // CLOCK_MONOTONIC
   std::optional<double> sender_time_s;
   std::optional<double> sender_utc_s;
-  bool key = false;
+  bool key = false;     // decoding can begin with it: a key frame or a recovery point
+  bool whole = true;    // nothing of it was lost
+  bool follows = true;  // nothing was lost between it and the picture before
 };
 
 class RtpConnection {
@@ -82,10 +85,12 @@ class RtpConnection {
   BearableTimestamps timestamps_;
   PictureEnds ends_;
   std::shared_ptr<const AVCodecParameters> parameters_;
+  std::optional<CodedBy> coded_by_;  // empty: by itself, as JPEG is
   CodecContextPtr parser_context_;
   ParserPtr parser_;
-  AccessUnit growing_;  // H.264: the picture whose pieces are arriving
-  bool grown_ = false;  // and its last one came
+  int last_output_number_ = 0;  // of the picture before, in the order in which they are to be seen
+  AccessUnit growing_;          // H.264, H.265: the picture whose pieces are arriving
+  bool grown_ = false;          // and its last one came
   std::optional<double> last_sender_time_s_;
   double last_receive_time_s_ = 0;
   std::int64_t damaged_ = 0;

@@ -1,7 +1,9 @@
 #include "platform/video/rtp_source.h"
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <cmath>
 #include <cstdio>
 #include <deque>
 #include <mutex>
@@ -18,6 +20,11 @@ namespace alidade {
 namespace {
 
 constexpr std::size_t kDecoderCapacity = 16;  // pictures: the most that H.264 may hold back
+constexpr double kWorthSaying_s = 3;          // most cameras send a key frame more often
+
+void begin_waiting(std::atomic<double>* since_s) {
+  if (*since_s < 0) *since_s = monotonic_now_s();
+}
 
 class RtpSource : public FrameSource {
  public:
@@ -36,6 +43,7 @@ class RtpSource : public FrameSource {
   std::string error() const override { return error_; }
   std::string name() const override { return options_.url; }
   FrameSourceCounters counters() const override { return {damaged_, thread_.dropped()}; }
+  std::string waiting() const override;
 
  private:
   struct Arrived {
@@ -44,28 +52,33 @@ class RtpSource : public FrameSource {
   };
 
   void check();
-  void wait_for_key();
   ReadStatus receive_connection(std::string* error);
   void interrupt();
-  [[nodiscard]] ReadStatus push(Arrived arrived, std::string* error);
+  void push(Arrived arrived);
   ReadStatus fail(std::string error) {
     error_ = options_.url + ": " + std::move(error);
     failed_ = true;
     return ReadStatus::kFailed;
   }
   ReadStatus deliver(Arrived arrived, Frame& frame);
+  [[nodiscard]] bool can_be_decoded(const AccessUnit& unit);
   ReadStatus decode(AccessUnit* unit, Picture* picture);
+  void spoil();
 
   RtpSourceOptions options_;
 
   std::atomic<std::int64_t> damaged_{0};
+
+  // Since when pictures come that a key frame must precede, by CLOCK_MONOTONIC; < 0: they need not wait. At a connection's
+  // beginning (and where a slow reader left pictures), and after a loss.
+  std::atomic<double> no_first_key_since_s_{-1};
+  std::atomic<double> no_key_after_loss_since_s_{-1};
 
   std::mutex mutex_;
   RtpConnection* connection_ = nullptr;  // guarded by mutex_
 
   // The receiving thread's own.
   bool wait_for_key_ = true;
-  double waiting_since_s_ = 0;
   bool worked_ = false;  // a connection before this one has brought pictures
 
   // read()'s own.
@@ -75,6 +88,7 @@ class RtpSource : public FrameSource {
   std::int64_t next_frame_ = 0;
   std::shared_ptr<const AVCodecParameters> parameters_;
   LumaDecoder decoder_;
+  bool spoilt_ = false;  // what later pictures are coded from is lost or damaged
   std::deque<AccessUnit> in_decoder_;
   bool size_known_ = false;  // of this connection's pictures
   int width_ = 0;
@@ -107,8 +121,9 @@ void RtpSource::check() {
   if (url.scheme == "rtp") {
     if (url.port.empty()) {
       (void)fail("no port; write rtp://@:PORT or rtp://GROUP:PORT");
-    } else if (options_.format != "MJPG" && options_.format != "H264") {
-      (void)fail("unknown format '" + options_.format + "'; plain RTP needs MJPG or H264");
+    } else if (options_.format != "MJPG" && options_.format != "H264" &&
+               options_.format != "H265") {
+      (void)fail("unknown format '" + options_.format + "'; plain RTP needs MJPG, H264 or H265");
     }
   } else if (url.scheme != "rtsp") {
     (void)fail("not a video stream; the URL must be rtsp://, rtp:// or an .sdp file");
@@ -116,32 +131,35 @@ void RtpSource::check() {
 }
 
 // Where pictures are dropped, all are: those that follow cannot be decoded up to the next key frame.
-ReadStatus RtpSource::push(Arrived arrived, std::string* error) {
+void RtpSource::push(Arrived arrived) {
   if (thread_.full()) {
     thread_.drop_all();
-    wait_for_key();
+    wait_for_key_ = true;
   }
   if (wait_for_key_ && !arrived.unit.key) {
-    if (monotonic_now_s() - waiting_since_s_ < options_.key_frame_timeout_s) {
-      return ReadStatus::kOk;
-    }
-    char text[128];
-    std::snprintf(text, sizeof text,
-                  "pictures came, but no key frame for %g s; set a shorter interval of key frames "
-                  "(GOP) in the camera",
-                  options_.key_frame_timeout_s);
-    *error = text;
-    return ReadStatus::kDisconnected;
+    begin_waiting(&no_first_key_since_s_);
+    return;
   }
-  wait_for_key_ = false;
+  // The decoder has had nothing that leads up to it.
+  if (std::exchange(wait_for_key_, false)) arrived.unit.follows = false;
+  no_first_key_since_s_ = -1;
   const auto bytes = static_cast<std::size_t>(arrived.unit.packet->size);
   thread_.push(std::move(arrived), bytes);
-  return ReadStatus::kOk;
 }
 
-void RtpSource::wait_for_key() {
-  wait_for_key_ = true;
-  waiting_since_s_ = monotonic_now_s();
+std::string RtpSource::waiting() const {
+  const double now_s = monotonic_now_s();
+  double waited_s = 0;
+  for (const double since_s : {no_first_key_since_s_.load(), no_key_after_loss_since_s_.load()}) {
+    if (since_s >= 0) waited_s = std::max(waited_s, now_s - since_s);
+  }
+  if (waited_s < kWorthSaying_s) return "";
+  char text[128];
+  std::snprintf(text, sizeof text,
+                "waiting for a key frame since %.0f s; set a shorter interval of key frames (GOP) "
+                "in the camera",
+                std::floor(waited_s));
+  return options_.url + ": " + text;
 }
 
 // One connection from its beginning to its end.
@@ -152,7 +170,7 @@ ReadStatus RtpSource::receive_connection(std::string* error) {
     connection_ = &connection;
   }
   ReadStatus status = thread_.stopped() ? ReadStatus::kStopped : connection.open(error);
-  wait_for_key();
+  wait_for_key_ = true;
   std::int64_t damaged = 0;
   bool works = false;
   while (status == ReadStatus::kOk) {
@@ -162,10 +180,11 @@ ReadStatus RtpSource::receive_connection(std::string* error) {
     damaged = connection.damaged();
     if (status == ReadStatus::kOk) {
       arrived.parameters = connection.parameters();
-      status = push(std::move(arrived), error);
+      push(std::move(arrived));
       works = works || !wait_for_key_;
     }
   }
+  no_first_key_since_s_ = -1;
   // A camera that boots may refuse for a while what it is good for.
   if (status == ReadStatus::kFailed && worked_) status = ReadStatus::kDisconnected;
   worked_ = worked_ || works;
@@ -198,6 +217,7 @@ ReadStatus RtpSource::read(Frame& frame, double timeout_s) {
     if (status == ReadStatus::kDisconnected) {
       error_ = options_.url + ": " + error;
       restarted_ = true;
+      no_key_after_loss_since_s_ = -1;
     }
     if (status != ReadStatus::kOk) {
       return status;
@@ -216,32 +236,30 @@ ReadStatus RtpSource::deliver(Arrived arrived, Frame& frame) {
     parameters_ = std::move(arrived.parameters);
     in_decoder_.clear();
     size_known_ = false;
+    spoilt_ = false;
     if (!decoder_.open(*parameters_, true)) {
       return fail(decoder_.error());
     }
   }
   Picture picture;
   const double before_s = monotonic_now_s();
-  if (options_.decode || !size_known_) {
-    const ReadStatus status = decode(&unit, &picture);
-    if (status != ReadStatus::kOk) {
-      return status;
+  const bool copies = !options_.copy_to.empty();
+  if (options_.decode || copies || !size_known_) {
+    const bool decodable = can_be_decoded(unit);
+    if (!decodable && (copies || !unit.whole)) return ReadStatus::kTimeout;
+    if (decodable && (options_.decode || !size_known_)) {
+      const ReadStatus status = decode(&unit, &picture);
+      if (status == ReadStatus::kFailed) return status;
+      const bool begins = !spoilt_ && decoder_.is_beginning();
+      if (status != ReadStatus::kOk && (copies || !begins)) return status;
     }
-    size_known_ = true;
-    width_ = picture.width;
-    height_ = picture.height;
   }
+  if (!size_known_) return ReadStatus::kTimeout;
   const double decode_s = monotonic_now_s() - before_s;
-  if (!options_.copy_to.empty()) {
-    if (next_frame_ == 0 && !unit.key) {
-      ++damaged_;  // the key frame was; a file that begins without one cannot be decoded
-      return ReadStatus::kTimeout;
-    }
-    std::string error;
-    if (!copy_.add(options_.copy_to, *parameters_, width_, height_, *unit.packet,
-                   unit.receive_time_s, &error)) {
-      return fail(std::move(error));
-    }
+  std::string error;
+  if (copies && !copy_.add(options_.copy_to, *parameters_, width_, height_, *unit.packet,
+                           unit.receive_time_s, &error)) {
+    return fail(std::move(error));
   }
   frame = Frame{};
   frame.stamp.frame = next_frame_++;
@@ -251,32 +269,68 @@ ReadStatus RtpSource::deliver(Arrived arrived, Frame& frame) {
   frame.stamp.restarted = std::exchange(restarted_, false);
   frame.width = width_;
   frame.height = height_;
-  if (options_.decode) {
+  if (options_.decode && picture.luma != nullptr) {
     frame.luma = picture.luma;
     frame.stride = picture.stride;
     frame.owner = std::move(picture.owner);
     frame.decode_s = decode_s;
+    frame.interlaced = picture.interlaced;
   }
   return ReadStatus::kOk;
 }
 
+// Whether the picture came whole, and all that it is coded from. After a loss that is so from the next one on at which
+// decoding can begin; in a copy, whose readers know nothing of the loss, at once.
+bool RtpSource::can_be_decoded(const AccessUnit& unit) {
+  if (!unit.whole) ++damaged_;
+  if (!unit.whole || !unit.follows) spoil();
+  if (!spoilt_) return true;
+  const bool begins =
+      options_.copy_to.empty() ? unit.key : (unit.packet->flags & AV_PKT_FLAG_KEY) != 0;
+  if (!unit.whole || !begins) return false;
+  decoder_.flush();
+  in_decoder_.clear();
+  spoilt_ = false;
+  if (!options_.decode && size_known_) no_key_after_loss_since_s_ = -1;
+  return true;
+}
+
+// What comes cannot be decoded for want of what came before.
+void RtpSource::spoil() {
+  spoilt_ = true;
+  begin_waiting(&no_key_after_loss_since_s_);
+}
+
 // A decoder may hold a picture back: *unit becomes the one that belongs to the picture that came out.
-// kTimeout if none came.
+// kTimeout if none came; *unit is the same then if decoding has only begun.
 ReadStatus RtpSource::decode(AccessUnit* unit, Picture* picture) {
-  if (!decoder_.send(unit->packet.get())) {
+  const bool others_need_it = coded_by(parameters_->codec_id).has_value();
+  bool damaged = !decoder_.send(unit->packet.get());
+  LumaDecoder::Result result = LumaDecoder::Result::kNone;
+  if (!damaged) {
+    in_decoder_.push_back(std::move(*unit));
+    do {
+      result = decoder_.receive(picture);
+      damaged = damaged || result == LumaDecoder::Result::kDamaged;
+    } while (result == LumaDecoder::Result::kDamaged);
+    if (result == LumaDecoder::Result::kUnsupported) return fail(decoder_.error());
+    damaged = damaged && others_need_it;
+  }
+  if (damaged) {
     ++damaged_;
+    if (others_need_it) {
+      in_decoder_.clear();
+      spoil();
+    }
     return ReadStatus::kTimeout;
   }
-  in_decoder_.push_back(std::move(*unit));
-  LumaDecoder::Result result = LumaDecoder::Result::kDamaged;
-  while (result == LumaDecoder::Result::kDamaged) {
-    result = decoder_.receive(picture);
-  }
-  if (result == LumaDecoder::Result::kUnsupported) {
-    return fail(decoder_.error());
+  const bool came = result == LumaDecoder::Result::kPicture;
+  if (!came && decoder_.is_beginning()) {
+    *unit = std::move(in_decoder_.back());
+    in_decoder_.clear();
+    return ReadStatus::kTimeout;
   }
   // What lies before the picture's own packet gave no picture.
-  const bool came = result == LumaDecoder::Result::kPicture;
   while (!in_decoder_.empty() && (came ? in_decoder_.front().packet->pts != picture->pts
                                        : in_decoder_.size() > kDecoderCapacity)) {
     in_decoder_.pop_front();
@@ -287,6 +341,10 @@ ReadStatus RtpSource::decode(AccessUnit* unit, Picture* picture) {
   }
   *unit = std::move(in_decoder_.front());
   in_decoder_.pop_front();
+  size_known_ = true;
+  width_ = picture->width;
+  height_ = picture->height;
+  no_key_after_loss_since_s_ = -1;
   return ReadStatus::kOk;
 }
 

@@ -11,7 +11,7 @@ extern "C" {
 namespace alidade {
 namespace {
 
-// Matroska wants H.264's parameter sets in its header; where the sender's description lacks them, the
+// Matroska wants H.264's and H.265's parameter sets in its header; where the sender's description lacks them, the
 // first key frame holds them.
 int fill_extradata(const AVPacket& key_frame, AVCodecParameters* parameters) {
   AVBSFContext* filter = nullptr;
@@ -100,7 +100,9 @@ int StreamCopy::create(const std::string& path, const AVCodecParameters& paramet
   if (parameters_->codec_id != AV_CODEC_ID_RAWVIDEO) {  // whose tag is its pixel format
     parameters_->codec_tag = 0;
   }
-  if (parameters_->codec_id == AV_CODEC_ID_H264 && parameters_->extradata_size == 0) {
+  const bool has_sets =
+      parameters_->codec_id == AV_CODEC_ID_H264 || parameters_->codec_id == AV_CODEC_ID_HEVC;
+  if (has_sets && parameters_->extradata_size == 0) {
     code = fill_extradata(first, parameters_.get());
     if (code < 0) {
       return code;

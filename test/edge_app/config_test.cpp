@@ -174,11 +174,11 @@ TEST_F(ConfigTest, RecordingAndRtpSourcesAreRead) {
               IsEmpty());
   EXPECT_EQ(config_.video.directory, directory_.path() + "/tour");
   EXPECT_EQ(config_.pan_tilt.directory, "/tour");
-  ASSERT_THAT(load("video: {type: rtp, url: 'rtp://@:5004', format: H264}\n"
+  ASSERT_THAT(load("video: {type: rtp, url: 'rtp://@:5004', format: H265}\n"
                    "pan_tilt: {type: vapix, url: http://camera}\n"
                    "camera: {focal_length_px: 1000}\n"),
               IsEmpty());
-  EXPECT_EQ(config_.video.format, "H264");
+  EXPECT_EQ(config_.video.format, "H265");
   ASSERT_THAT(load("video: {type: rtp, url: camera.sdp}\n"
                    "pan_tilt: {type: vapix, url: http://camera}\n"
                    "camera: {focal_length_px: 1000}\n"),

@@ -67,6 +67,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       const PictureEnds::Piece piece = ends.piece_out(pts);
       last_pieces += piece.last ? 1 : 0;
       FUZZ_REQUIRE(last_pieces <= markers);
+      if (piece.last) {
+        (void)ends.loss_of(pts);
+        FUZZ_REQUIRE(ends.loss_of(pts).within);  // nothing has come of it since
+      }
     } else {
       const std::string packet(input.bytes(what));
       move_soundly(timestamps, packet);

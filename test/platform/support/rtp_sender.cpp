@@ -66,7 +66,10 @@ bool rtp_port_taken(int port) {
 RtpSender::RtpSender(Codec codec, int port, double first_time_s, int packet_bytes)
     : first_time_s_(first_time_s), began_utc_us_(av_gettime()) {
   const bool mjpeg = codec == Codec::kMjpeg;
-  const AVCodec* encoder = avcodec_find_encoder_by_name(mjpeg ? "mjpeg" : "libx264");
+  const bool h265 = codec == Codec::kH265;
+  const AVCodec* encoder = avcodec_find_encoder_by_name(mjpeg  ? "mjpeg"
+                                                        : h265 ? "libx265"
+                                                               : "libx264");
   encoder_.reset(avcodec_alloc_context3(encoder));
   encoder_->width = kWidth;
   encoder_->height = kHeight;
@@ -82,6 +85,11 @@ RtpSender::RtpSender(Codec codec, int port, double first_time_s, int packet_byte
   } else {
     av_opt_set(encoder_->priv_data, "preset", "ultrafast", 0);
     av_opt_set(encoder_->priv_data, "tune", "zerolatency", 0);
+    if (h265) {
+      av_opt_set(encoder_->priv_data, "x265-params",
+                 "log-level=none:repeat-headers=1:open-gop=0:scenecut=0:pools=none:frame-threads=1",
+                 0);
+    }
   }
   check(avcodec_open2(encoder_.get(), encoder, nullptr));
 
@@ -110,7 +118,7 @@ RtpSender::~RtpSender() {
   avformat_free_context(format_);
 }
 
-void RtpSender::send(double fraction) {
+void RtpSender::send(double fraction, const std::string& nal_units) {
   check(av_frame_make_writable(picture_.get()));
   for (int plane = 0; plane < 3; ++plane) {
     const int rows = plane == 0 ? kHeight : kHeight / 2;
@@ -122,6 +130,12 @@ void RtpSender::send(double fraction) {
   const PacketPtr packet(av_packet_alloc());
   check(avcodec_receive_packet(encoder_.get(), packet.get()));
   av_shrink_packet(packet.get(), static_cast<int>(fraction * packet->size));
+  if (!nal_units.empty()) {
+    const int picture = packet->size;
+    check(av_grow_packet(packet.get(), static_cast<int>(nal_units.size())));
+    std::memmove(packet->data + nal_units.size(), packet->data, static_cast<std::size_t>(picture));
+    std::memcpy(packet->data, nal_units.data(), nal_units.size());
+  }
   packet->pts = std::llround(90'000 * (first_time_s_ + static_cast<double>(next_) * kPeriod_s));
   packet->dts = packet->pts;
   packet->stream_index = 0;

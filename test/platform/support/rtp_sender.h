@@ -12,21 +12,21 @@ namespace alidade {
 
 class RtpSender {
  public:
-  enum class Codec { kMjpeg, kH264 };
+  enum class Codec { kMjpeg, kH264, kH265 };
 
   static constexpr int kWidth = 160;
   static constexpr int kHeight = 120;
   static constexpr double kPeriod_s = 1.0 / 30;
   static int grey_of(std::int64_t n) { return 40 + static_cast<int>(n * 7 % 160); }
 
-  // H.264 has a key frame every 10 pictures and its parameter sets in band.
+  // H.264 and H.265 have a key frame every 10 pictures and their parameter sets in band.
   RtpSender(Codec codec, int port, double first_time_s = 1, int packet_bytes = 1200);
   ~RtpSender();
   RtpSender(const RtpSender&) = delete;
   RtpSender& operator=(const RtpSender&) = delete;
 
-  // Sends the next picture, cut off after this fraction of its bytes.
-  void send(double fraction = 1);
+  // Sends the next picture, cut off after this fraction of its bytes, behind these NAL units (with start codes).
+  void send(double fraction = 1, const std::string& nal_units = "");
 
   // What its RTCP reports give as Unix time of picture 0.
   double began_utc_s() const { return 1e-6 * static_cast<double>(began_utc_us_); }
@@ -46,7 +46,9 @@ class RtpSender {
 };
 
 inline void PrintTo(const RtpSender::Codec& codec, std::ostream* out) {
-  *out << (codec == RtpSender::Codec::kMjpeg ? "Mjpeg" : "H264");
+  *out << (codec == RtpSender::Codec::kMjpeg  ? "Mjpeg"
+           : codec == RtpSender::Codec::kH264 ? "H264"
+                                              : "H265");
 }
 
 // An even UDP port of the loopback that is free, and the one after it, too.

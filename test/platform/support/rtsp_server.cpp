@@ -22,6 +22,11 @@ const RtspStream kH264Stream{"/h264",
                              std::string(kWhitePictures) +
                                  "x264enc tune=zerolatency speed-preset=ultrafast key-int-max=10 ! "
                                  "rtph264pay config-interval=1 name=pay0 pt=96"};
+const RtspStream kH265Stream{"/h265",
+                             std::string(kWhitePictures) +
+                                 "x265enc tune=zerolatency speed-preset=ultrafast key-int-max=10 "
+                                 "option-string=log-level=none:pools=none:frame-threads=1 ! "
+                                 "rtph265pay config-interval=1 name=pay0 pt=96"};
 
 RtspServer::RtspServer(RtspStream stream, std::string user, std::string password)
     : stream_(std::move(stream)), user_(std::move(user)), password_(std::move(password)) {

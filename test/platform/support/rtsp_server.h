@@ -12,10 +12,11 @@ struct RtspStream {
   std::string launch;  // GStreamer pipeline
 };
 
-// Test pictures of 320x240 at 30 Hz, all white (luma 235), and MJPEG or H.264 of them.
+// Test pictures of 320x240 at 30 Hz, all white (luma 235), and MJPEG, H.264 or H.265 of them.
 extern const char* const kWhitePictures;
 extern const RtspStream kMjpegStream;
 extern const RtspStream kH264Stream;
+extern const RtspStream kH265Stream;
 
 class RtspServer {
  public:

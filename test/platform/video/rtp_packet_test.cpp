@@ -270,6 +270,103 @@ TEST_F(PictureEndsInOrder, CarryTheCaptureTimeOfAnyPacketOfThePicture) {
   EXPECT_EQ(pass(3000, true).capture_utc_s, std::nullopt);
 }
 
+// What was lost of pictures, in the order in which they are asked about.
+class PictureLosses : public PictureEndsInOrder {
+ protected:
+  // Pairs of within and before.
+  using Said = std::pair<bool, bool>;
+  Said loss_of(std::uint32_t timestamp) {
+    const PictureEnds::Loss loss = ends_.loss_of((std::int64_t{5} << 32) + timestamp - 700);
+    return {loss.within, loss.before};
+  }
+  // Two packets and the loss.
+  Said picture(std::uint32_t timestamp) {
+    (void)pass(timestamp, false);
+    (void)pass(timestamp, true);
+    return loss_of(timestamp);
+  }
+};
+
+TEST_F(PictureLosses, AreNoneInOrder) {
+  for (std::uint32_t i = 1; i < 40; ++i) EXPECT_EQ(picture(1000 * i), Said(false, false)) << i;
+}
+
+TEST_F(PictureLosses, AreWithinWhereAPacketOfThePictureIsMissing) {
+  (void)picture(1000);
+  (void)pass(2000, false);
+  ++sequence_;
+  (void)pass(2000, true);
+  EXPECT_EQ(loss_of(2000), Said(true, false));
+  EXPECT_EQ(picture(3000), Said(false, false)) << "the next came whole";
+}
+
+TEST_F(PictureLosses, AreWithinWhereTheLastPacketIsMissing) {
+  (void)picture(1000);
+  (void)pass(2000, false);
+  ++sequence_;
+  (void)pass(3000, false);  // shows that 2000 is over
+  EXPECT_EQ(loss_of(2000), Said(true, false));
+  (void)pass(3000, true);
+  EXPECT_EQ(loss_of(3000), Said(false, true));
+}
+
+TEST_F(PictureLosses, AreBeforeAPictureWhereOthersAreMissing) {
+  (void)picture(1000);
+  sequence_ = static_cast<std::uint16_t>(sequence_ + 2);
+  EXPECT_EQ(picture(3000), Said(false, true));
+  EXPECT_EQ(picture(4000), Said(false, false));
+}
+
+TEST_F(PictureLosses, AreNoneOfASenderWithoutMarkers) {
+  for (std::uint32_t i = 1; i < 10; ++i) {
+    (void)pass(1000 * i, false);
+    if (i > 1) {
+      EXPECT_EQ(loss_of(1000 * (i - 1)), Said(false, false)) << i;
+    }
+    (void)pass(1000 * i, false);
+  }
+}
+
+TEST_F(PictureLosses, AreNoneWherePacketsOvertookAndAllCameOut) {
+  (void)picture(1000);
+  ++sequence_;
+  in(2000, true);
+  sequence_ = static_cast<std::uint16_t>(sequence_ - 2);
+  in(2000, false);
+  (void)out(2000);
+  (void)out(2000);
+  EXPECT_EQ(loss_of(2000), Said(false, false));
+}
+
+TEST_F(PictureLosses, AreWithinWhereAPacketCameTooLateForLibavformat) {
+  (void)picture(1000);
+  ++sequence_;
+  in(2000, true);
+  (void)out(2000);
+  sequence_ = static_cast<std::uint16_t>(sequence_ - 2);
+  in(2000, false);
+  EXPECT_EQ(loss_of(2000), Said(true, false));
+}
+
+TEST_F(PictureLosses, AreNoneWhereAPacketInOrderGaveNoPiece) {
+  (void)picture(1000);
+  in(2000, false);
+  (void)pass(2000, true);
+  EXPECT_EQ(loss_of(2000), Said(false, false));
+}
+
+TEST_F(PictureLosses, AreNoneBetweenTheHalvesOfAPictureWithAMarkerInIt) {
+  (void)pass(1000, true);
+  (void)pass(2000, true);
+  EXPECT_EQ(loss_of(2000), Said(false, false)) << "not known yet to be a half";
+  (void)pass(2000, true);
+  (void)pass(3000, true);
+  EXPECT_EQ(loss_of(2000), Said(false, false));
+  (void)pass(3000, true);
+  (void)pass(4000, true);
+  EXPECT_EQ(loss_of(3000), Said(false, false));
+}
+
 TEST(PictureEnds, KnowNothingOfPiecesWithoutPackets) {
   PictureEnds ends;
   EXPECT_FALSE(ends.piece_out(0).last);

@@ -54,7 +54,9 @@ INSTANTIATE_TEST_SUITE_P(Ways, RtspSource,
                          ::testing::Values(Way{"MjpegTcp", &kMjpegStream, Transport::kTcp},
                                            Way{"MjpegUdp", &kMjpegStream, Transport::kUdp},
                                            Way{"H264Tcp", &kH264Stream, Transport::kTcp},
-                                           Way{"H264Udp", &kH264Stream, Transport::kUdp}),
+                                           Way{"H264Udp", &kH264Stream, Transport::kUdp},
+                                           Way{"H265Tcp", &kH265Stream, Transport::kTcp},
+                                           Way{"H265Udp", &kH265Stream, Transport::kUdp}),
                          [](const auto& way) { return way.param.name; });
 
 TEST_P(RtspSource, DeliversWhitePicturesOnTheSendersClock) {
@@ -195,7 +197,8 @@ TEST(RtspSourceErrors, NameACodecThatIsNotSupported) {
   const auto source = open_rtp(options_for(server.url()));
   Frame frame;
   EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source->error(), HasSubstr("the video is vp8; set the camera to MJPEG or H.264"));
+  EXPECT_THAT(source->error(),
+              HasSubstr("the video is vp8; set the camera to MJPEG, H.264 or H.265"));
 }
 
 TEST(RtspSourceErrors, NameAStreamWithoutVideo) {
@@ -209,16 +212,26 @@ TEST(RtspSourceErrors, NameAStreamWithoutVideo) {
 }
 
 TEST(RtspSourceErrors, NameBFrames) {
-  const RtspServer server(
-      {"/b",
-       "videotestsrc is-live=true pattern=ball ! "
-       "video/x-raw,format=I420,width=320,height=240,framerate=30/1 ! "
-       "x264enc bframes=2 b-adapt=false rc-lookahead=0 key-int-max=30 ! "
-       "video/x-h264,profile=main ! rtph264pay config-interval=1 name=pay0 pt=96"});
-  const auto source = open_rtp(options_for(server.url()));
-  Frame frame;
-  EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source->error(), HasSubstr("B-frames"));
+  const std::string pictures =
+      "videotestsrc is-live=true pattern=ball ! "
+      "video/x-raw,format=I420,width=320,height=240,framerate=30/1 ! ";
+  const struct {
+    const char* encoder;
+    const char* says;
+  } cases[] = {{"x264enc bframes=2 b-adapt=false rc-lookahead=0 key-int-max=30 ! "
+                "video/x-h264,profile=main ! rtph264pay config-interval=1 name=pay0 pt=96",
+                "the H.264 stream has B-frames"},
+               {"x265enc speed-preset=ultrafast key-int-max=30 "
+                "option-string=log-level=none:bframes=2:b-adapt=0:rc-lookahead=3 ! "
+                "rtph265pay config-interval=1 name=pay0 pt=96",
+                "the H.265 stream has B-frames"}};
+  for (const auto& which : cases) {
+    const RtspServer server({"/b", pictures + which.encoder});
+    const auto source = open_rtp(options_for(server.url()));
+    Frame frame;
+    EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+    EXPECT_THAT(source->error(), HasSubstr(which.says));
+  }
 }
 
 TEST(RtspSourceStream, KeepsTheVideosClockWhenThereIsSoundToo) {
