@@ -159,6 +159,7 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
   options.transport = config.transport == VideoConfig::Transport::kUdp
                           ? RtpSourceOptions::Transport::kUdp
                           : RtpSourceOptions::Transport::kTcp;
+  options.certificate_file = config.certificate_file;
   options.decode = decode;
   options.timeout_s = config.timeout_s;
   options.max_backoff_s = config.max_backoff_s;

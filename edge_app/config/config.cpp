@@ -23,10 +23,18 @@ VideoConfig read_video(YamlSection section, const std::string& path) {
     video.directory = path_relative_to(path, required_text(section, "directory", "my-recording"));
   } else if (*type == "rtsp") {
     video.type = VideoConfig::Type::kRtsp;
-    video.url = required_url(section, "rtsp://camera/stream", {"rtsp://"});
+    video.url = required_url(section, "rtsp://camera/stream", {"rtsp://", "rtsps://"});
     read_login(section, &video.user, &video.password);
+    const bool by_tls = video.url.rfind("rtsps://", 0) == 0;
     if (section.choice("transport", {"tcp", "udp"}).value_or("tcp") == "udp") {
+      if (by_tls) {
+        section.fail("transport", "udp does not go with rtsps://; leave it out, or set tcp");
+      }
       video.transport = VideoConfig::Transport::kUdp;
+    }
+    if (const auto file = section.text("certificate_file")) {
+      if (!by_tls) section.fail("certificate_file", "is for rtsps:// only");
+      video.certificate_file = path_relative_to(path, *file);
     }
   } else if (*type == "mjpeg") {
     video.type = VideoConfig::Type::kMjpeg;

@@ -21,7 +21,8 @@ struct VideoConfig {
   enum class Type { kRtsp, kRtp, kMjpeg, kV4l2, kRecording };
   enum class Transport { kTcp, kUdp };
   Type type = Type::kRtsp;
-  std::string url;  // rtsp: rtsp://...; mjpeg: http://...; rtp: an .sdp file or rtp://address:port
+  std::string
+      url;  // rtsp: rtsp://... or rtsps://...; mjpeg: http://...; rtp: an .sdp file or rtp://address:port
   std::string format = "MJPG";             // rtp://address:port: MJPG, H264 or H265
   std::string directory;                   // recording
   std::string device;                      // v4l2: /dev/video0
@@ -32,6 +33,7 @@ struct VideoConfig {
   std::string user;                        // rtsp, mjpeg
   std::string password;
   Transport transport = Transport::kTcp;  // rtsp
+  std::string certificate_file;           // rtsps://; empty: the system's
   double timeout_s = 3;                   // silence that counts as a loss
   double max_backoff_s = 5;               // longest pause between two attempts
 };

@@ -127,8 +127,9 @@ ReadStatus RtpConnection::open_demuxer(const std::string& sdp, std::string* erro
   av_dict_set(&dictionary, "sdp_flags", "custom_io", 0);
   av_dict_set(&dictionary, "allowed_media_types", "video", 0);
   // Within a connection nothing comes out of order.
-  const bool by_tcp = options_.url.rfind("rtsp://", 0) == 0 &&
-                      options_.transport == RtpSourceOptions::Transport::kTcp;
+  const bool by_rtsp =
+      options_.url.rfind("rtsp://", 0) == 0 || options_.url.rfind("rtsps://", 0) == 0;
+  const bool by_tcp = by_rtsp && options_.transport == RtpSourceOptions::Transport::kTcp;
   if (by_tcp) av_dict_set(&dictionary, "reorder_queue_size", "0", 0);
   const int code = avformat_open_input(&format_, "", av_find_input_format("sdp"), &dictionary);
   av_dict_free(&dictionary);

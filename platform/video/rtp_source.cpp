@@ -125,8 +125,12 @@ void RtpSource::check() {
                options_.format != "H265") {
       (void)fail("unknown format '" + options_.format + "'; plain RTP needs MJPG, H264 or H265");
     }
+  } else if (url.scheme == "rtsps") {
+    if (options_.transport == RtpSourceOptions::Transport::kUdp) {
+      (void)fail("over TLS the pictures come within the connection; set transport: tcp");
+    }
   } else if (url.scheme != "rtsp") {
-    (void)fail("not a video stream; the URL must be rtsp://, rtp:// or an .sdp file");
+    (void)fail("not a video stream; the URL must be rtsp://, rtsps://, rtp:// or an .sdp file");
   }
 }
 

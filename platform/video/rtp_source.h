@@ -26,8 +26,8 @@
 //   which a kill loses at most the last second. The file goes on over reconnections.
 // Streams with B-frames are refused: they come out of order and late. Such as only allow for them are not, nor do their
 // pictures wait for any.
-// kDisconnected: refused, not there, no such stream, no pictures. kFailed: no password or a wrong one, no
-// video, another codec, B-frames, a transport that the camera does not send by; after a connection that
+// kDisconnected: refused, not there, no such stream, no pictures. kFailed: no password or a wrong one, a
+// certificate that is not trusted, no video, another codec, B-frames, a transport that the camera does not send by; after a connection that
 // brought pictures these, too, are kDisconnected, as a camera that boots may be all that for a moment.
 // An unusable URL, a copy that cannot be written and pictures without luma are always kFailed.
 
@@ -46,8 +46,12 @@ struct RtpSourceOptions {
   std::string user;  // these go before what the URL may hold
   std::string password;
   std::string format = "MJPG";            // rtp:// only: MJPG, H264 or H265
-  Transport transport = Transport::kTcp;  // rtsp:// only: RTP interleaved with RTSP, or in UDP
-  bool decode = true;        // false: Frame::luma stays null, only the first frame is decoded
+  Transport transport = Transport::kTcp;  // rtsp:// only: RTP interleaved with RTSP, or in UDP;
+                                          // rtsps:// knows the first only
+  bool decode = true;  // false: Frame::luma stays null, only the first frame is decoded
+  // rtsps:// only: PEM file that holds the camera's own certificate, or its authority's, in place of the system's. What is
+  // the camera's own is taken whatever name and dates stand in it.
+  std::string certificate_file;
   double timeout_s = 3;      // without a whole picture for so long, the connection counts as lost
   double max_backoff_s = 5;  // longest pause between two tries
   std::string copy_to;       // video.mkv to copy the stream into; empty: none

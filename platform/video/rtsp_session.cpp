@@ -16,6 +16,7 @@ namespace alidade {
 namespace {
 
 constexpr int kRtspPort = 554;
+constexpr int kRtspsPort = 322;
 constexpr int kRedirections = 5;
 constexpr int kPortTries = 100;
 constexpr double kGoodbye_s = 0.5;  // given to TEARDOWN, so that the camera frees the session
@@ -39,6 +40,30 @@ std::string resolve(const std::string& base, const std::string& control) {
 std::string refusal(int status, const char* reason) {
   return "the camera refuses: RTSP status " + std::to_string(status) +
          (reason == nullptr || *reason == '\0' ? "" : " " + shown(reason));
+}
+
+std::string text_of(GError* failure) {
+  const std::string text = failure == nullptr ? "" : failure->message;
+  g_clear_error(&failure);
+  return text;
+}
+
+// Faults for which no authority vouches; the last where one of the same name has another key.
+constexpr int kUnknown = G_TLS_CERTIFICATE_UNKNOWN_CA | G_TLS_CERTIFICATE_GENERIC_ERROR;
+
+// What is wrong with a certificate, the worst first.
+std::string fault_of(int faults, const std::string& file) {
+  if ((faults & kUnknown) != 0) {
+    return file.empty() ? "no authority that is known here has signed it"
+                        : "it is neither in " + file + " nor signed by what is";
+  }
+  if ((faults & G_TLS_CERTIFICATE_BAD_IDENTITY) != 0) return "it is for another name";
+  if ((faults & G_TLS_CERTIFICATE_EXPIRED) != 0) return "it has expired, by this machine's clock";
+  if ((faults & G_TLS_CERTIFICATE_NOT_ACTIVATED) != 0) {
+    return "it is not valid yet, by this machine's clock";
+  }
+  if ((faults & G_TLS_CERTIFICATE_REVOKED) != 0) return "it was revoked";
+  return "it cannot be relied on";
 }
 
 }  // namespace
@@ -98,31 +123,105 @@ ReadStatus RtspSession::connect(std::string* error) {
     return ReadStatus::kFailed;
   }
   const std::unique_ptr<GstRTSPUrl, void (*)(GstRTSPUrl*)> url(parsed, &gst_rtsp_url_free);
+  const bool by_tls = (parsed->transports & GST_RTSP_LOWER_TRANS_TLS) != 0;
+  if (parsed->port == 0) {
+    parsed->port = static_cast<guint16>(by_tls ? kRtspsPort : kRtspPort);
+  }
+  return by_tls ? connect_by_tls(*parsed, error) : connect_plainly(*parsed, error);
+}
+
+ReadStatus RtspSession::connect_plainly(const GstRTSPUrl& url, std::string* error) {
   const std::unique_ptr<GSocketClient, Unref> client(g_socket_client_new());
   // In whole seconds, rounded up; 0 would be for ever.
   const double left_s = std::clamp(deadline_s_ - monotonic_now_s(), 0.0, kLongest_s);
   g_socket_client_set_timeout(client.get(), 1 + static_cast<guint>(left_s));
   g_socket_client_set_enable_proxy(client.get(), FALSE);
-  const auto port = static_cast<guint16>(parsed->port == 0 ? kRtspPort : parsed->port);
   GError* failure = nullptr;
   std::unique_ptr<GSocketConnection, Unref> socket(g_socket_client_connect_to_host(
-      client.get(), parsed->host, port, cancellable_.get(), &failure));
+      client.get(), url.host, url.port, cancellable_.get(), &failure));
   if (!socket) {
-    *error = failure->message;
-    g_error_free(failure);
+    *error = text_of(failure);
     return interrupted_ ? ReadStatus::kStopped : ReadStatus::kDisconnected;
   }
   GSocket* plain = g_socket_connection_get_socket(socket.get());
   g_socket_set_timeout(plain, 0);  // each wait has its own
   GstRTSPConnection* connection = nullptr;
   const GstRTSPResult result =
-      gst_rtsp_connection_create_from_socket(plain, parsed->host, port, nullptr, &connection);
+      gst_rtsp_connection_create_from_socket(plain, url.host, url.port, nullptr, &connection);
   if (result != GST_RTSP_OK) return lost(result, error);
   const std::lock_guard<std::mutex> lock(mutex_);
   connection_.reset(connection);
   socket_ = std::move(socket);
   if (interrupted_) gst_rtsp_connection_flush(connection, TRUE);
   return ReadStatus::kOk;
+}
+
+// By GStreamer's own way to connect: it takes no socket on which TLS is spoken.
+ReadStatus RtspSession::connect_by_tls(const GstRTSPUrl& url, std::string* error) {
+  if (g_tls_backend_supports_tls(g_tls_backend_get_default()) == FALSE) {
+    *error = "this machine has no TLS for RTSP; install the package glib-networking";
+    return ReadStatus::kFailed;
+  }
+  GstRTSPConnection* connection = nullptr;
+  const GstRTSPResult made = gst_rtsp_connection_create(&url, &connection);
+  if (made != GST_RTSP_OK) return lost(made, error);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    connection_.reset(connection);
+    socket_.reset();
+    if (interrupted_) gst_rtsp_connection_flush(connection, TRUE);
+  }
+  if (!options_.certificate_file.empty()) {
+    GError* failure = nullptr;
+    const std::unique_ptr<GTlsDatabase, Unref> known(
+        g_tls_file_database_new(options_.certificate_file.c_str(), &failure));
+    if (!known) {
+      *error = options_.certificate_file + ": no certificates in PEM form: " + text_of(failure);
+      return ReadStatus::kFailed;
+    }
+    gst_rtsp_connection_set_tls_database(connection, known.get());
+  }
+  certificate_faults_ = 0;
+  gst_rtsp_connection_set_accept_certificate_func(connection, &RtspSession::accept_certificate,
+                                                  this, nullptr);
+  const GstRTSPResult result =
+      gst_rtsp_connection_connect_usec(connection, microseconds_until(deadline_s_));
+  return result == GST_RTSP_OK ? ReadStatus::kOk : no_tls(url, result, error);
+}
+
+// Asked about a certificate that did not pass.
+gboolean RtspSession::accept_certificate(GTlsConnection* /*tls*/, GTlsCertificate* certificate,
+                                         GTlsCertificateFlags faults, gpointer self) {
+  auto* session = static_cast<RtspSession*>(self);
+  GList* own = session->options_.certificate_file.empty()
+                   ? nullptr
+                   : g_tls_certificate_list_new_from_file(
+                         session->options_.certificate_file.c_str(), nullptr);
+  const bool is_own = g_list_find_custom(own, certificate, [](gconstpointer a, gconstpointer b) {
+                        auto* one = static_cast<GTlsCertificate*>(const_cast<gpointer>(a));
+                        auto* other = static_cast<GTlsCertificate*>(const_cast<gpointer>(b));
+                        return g_tls_certificate_is_same(one, other) != FALSE ? 0 : 1;
+                      }) != nullptr;
+  g_list_free_full(own, &g_object_unref);
+  if (!is_own) session->certificate_faults_ = static_cast<int>(faults);
+  return is_own ? TRUE : FALSE;
+}
+
+// Why there is no connection: GStreamer's library does not say.
+ReadStatus RtspSession::no_tls(const GstRTSPUrl& url, GstRTSPResult result, std::string* error) {
+  if (certificate_faults_ != 0) {
+    *error = "the camera's certificate is refused: " +
+             fault_of(certificate_faults_, options_.certificate_file) +
+             "; if it is the camera's, save it as a PEM file and set certificate_file";
+    // This machine's clock may not be set yet.
+    constexpr int kForGood = kUnknown | G_TLS_CERTIFICATE_BAD_IDENTITY;
+    return (certificate_faults_ & kForGood) != 0 ? ReadStatus::kFailed : ReadStatus::kDisconnected;
+  }
+  if (interrupted_ || result == GST_RTSP_ETIMEOUT) return lost(result, error);
+  const ReadStatus plainly = connect_plainly(url, error);
+  if (plainly != ReadStatus::kOk) return plainly;
+  *error = "the camera answers, but speaks no TLS there; is it the port of rtsp://?";
+  return ReadStatus::kDisconnected;
 }
 
 // kOk with another url_ than before: redirected.
@@ -308,7 +407,17 @@ ReadStatus RtspSession::ping(std::string* error) {
 }
 
 bool RtspSession::readable(double wait_s) const {
-  pollfd waiting{g_socket_get_fd(g_socket_connection_get_socket(socket_.get())), POLLIN, 0};
+  if (!socket_) {
+    // What came with the last packet waits within TLS, where poll() does not see it.
+    GTlsConnection* tls = gst_rtsp_connection_get_tls(connection_.get(), nullptr);
+    GInputStream* input = tls == nullptr ? nullptr : g_io_stream_get_input_stream(G_IO_STREAM(tls));
+    if (input != nullptr && G_IS_POLLABLE_INPUT_STREAM(input) &&
+        g_pollable_input_stream_is_readable(G_POLLABLE_INPUT_STREAM(input)) != FALSE) {
+      return true;
+    }
+  }
+  GSocket* const socket = gst_rtsp_connection_get_read_socket(connection_.get());
+  pollfd waiting{g_socket_get_fd(socket), POLLIN, 0};
   return ::poll(&waiting, 1, static_cast<int>(1e3 * std::clamp(wait_s, 0.0, kSlice_s))) > 0;
 }
 

@@ -1,6 +1,6 @@
 #pragma once
 // RtspSession: the video of an RTSP camera (RFC 2326), its packets within the RTSP connection or by UDP,
-// with GStreamer's RTSP library. Logs in by digest or basic, follows redirections, keeps the session
+// with GStreamer's RTSP library; over TLS (rtsps://), by GLib's, only within. Logs in by digest or basic, follows redirections, keeps the session
 // alive. Part of RtpConnection.
 
 #include <gst/rtsp/gstrtspconnection.h>
@@ -42,6 +42,11 @@ class RtspSession : public RtpTransport {
   };
 
   [[nodiscard]] ReadStatus connect(std::string* error);
+  [[nodiscard]] ReadStatus connect_plainly(const GstRTSPUrl& url, std::string* error);
+  [[nodiscard]] ReadStatus connect_by_tls(const GstRTSPUrl& url, std::string* error);
+  [[nodiscard]] ReadStatus no_tls(const GstRTSPUrl& url, GstRTSPResult result, std::string* error);
+  static gboolean accept_certificate(GTlsConnection* tls, GTlsCertificate* certificate,
+                                     GTlsCertificateFlags faults, gpointer self);
   [[nodiscard]] ReadStatus describe(std::string* sdp, std::string* error);
   [[nodiscard]] ReadStatus play(const std::string& sdp, std::string* error);
   [[nodiscard]] bool open_ports();
@@ -76,12 +81,13 @@ class RtspSession : public RtpTransport {
   std::atomic<bool> interrupted_{false};
   std::unique_ptr<GCancellable, Unref> cancellable_{g_cancellable_new()};
   std::mutex mutex_;  // lets interrupt() see whole what of these is there
-  std::unique_ptr<GSocketConnection, Unref> socket_;
+  std::unique_ptr<GSocketConnection, Unref> socket_;  // null over TLS: it is the connection's
   std::unique_ptr<GstRTSPConnection, FreeConnection> connection_;
   std::unique_ptr<RtpPorts> ports_;  // by UDP only
   int first_port_ = 0;               // RTP's; RTCP's is the next
   int first_channel_ = 0;            // the same within the connection
   std::deque<Packet> early_;         // came before the answer to PLAY
+  int certificate_faults_ = 0;       // GTlsCertificateFlags of the certificate that was refused
 };
 
 }  // namespace alidade

@@ -186,6 +186,15 @@ TEST_F(ConfigTest, RecordingAndRtpSourcesAreRead) {
   EXPECT_EQ(config_.video.url, directory_.path() + "/camera.sdp");
 }
 
+TEST_F(ConfigTest, RtspOverTlsIsRead) {
+  ASSERT_THAT(load("video: {type: rtsp, url: 'rtsps://camera/s', certificate_file: camera.pem}\n"
+                   "pan_tilt: {type: vapix, url: http://camera}\n"
+                   "camera: {focal_length_px: 1000}\n"),
+              IsEmpty());
+  EXPECT_EQ(config_.video.url, "rtsps://camera/s");
+  EXPECT_EQ(config_.video.certificate_file, directory_.path() + "/camera.pem");
+}
+
 TEST_F(ConfigTest, MjpegAndOnvifSourcesAreRead) {
   ::setenv("ALIDADE_TEST_PASSWORD", "secret", 1);
   const std::string login = "user: eve, password_env: ALIDADE_TEST_PASSWORD";
@@ -469,6 +478,11 @@ INSTANTIATE_TEST_SUITE_P(
                 "video: {type: v4l2, device: /dev/video0, format: RGB3}\n" PAN_TILT,
                 ":1: video.format",
                 "'RGB3' is unknown; expected one of GREY, NV12, YUYV, UYVY, MJPG"},
+        Mistake{"UdpOverTls", "video: {type: rtsp, url: rtsps://c/s, transport: udp}\n" PAN_TILT,
+                ":1: video.transport", "udp does not go with rtsps://"},
+        Mistake{"CertificateWithoutTls",
+                "video: {type: rtsp, url: rtsp://c/s, certificate_file: c.pem}\n" PAN_TILT,
+                ":1: video.certificate_file", "is for rtsps:// only"},
         Mistake{"RateOfANetworkCamera",
                 "video: {type: rtsp, url: rtsp://c/s, rate_hz: 30}\n" PAN_TILT, ":1: video.rate_hz",
                 "unknown key"},

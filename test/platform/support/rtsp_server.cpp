@@ -28,8 +28,12 @@ const RtspStream kH265Stream{"/h265",
                                  "option-string=log-level=none:pools=none:frame-threads=1 ! "
                                  "rtph265pay config-interval=1 name=pay0 pt=96"};
 
-RtspServer::RtspServer(RtspStream stream, std::string user, std::string password)
-    : stream_(std::move(stream)), user_(std::move(user)), password_(std::move(password)) {
+RtspServer::RtspServer(RtspStream stream, std::string user, std::string password,
+                       std::string certificate)
+    : stream_(std::move(stream)),
+      user_(std::move(user)),
+      password_(std::move(password)),
+      certificate_(std::move(certificate)) {
   restart();
 }
 
@@ -51,7 +55,8 @@ void RtspServer::restart() {
     throw std::runtime_error("no pipe");
   }
   std::vector<std::string> arguments = {RTSP_SERVER_PROGRAM, std::to_string(port_), user_,
-                                        password_,           stream_.path,          stream_.launch};
+                                        password_,           certificate_,          stream_.path,
+                                        stream_.launch};
   std::vector<char*> pointers;
   for (std::string& argument : arguments) {
     pointers.push_back(argument.data());

@@ -20,12 +20,17 @@ extern const RtspStream kH265Stream;
 
 class RtspServer {
  public:
-  explicit RtspServer(RtspStream stream, std::string user = "", std::string password = "");
+  // certificate: PEM file with it and its key, for RTSP over TLS.
+  explicit RtspServer(RtspStream stream, std::string user = "", std::string password = "",
+                      std::string certificate = "");
   ~RtspServer() { kill(); }
   RtspServer(const RtspServer&) = delete;
   RtspServer& operator=(const RtspServer&) = delete;
 
-  std::string url() const { return "rtsp://127.0.0.1:" + std::to_string(port_) + stream_.path; }
+  std::string url() const {
+    return (certificate_.empty() ? "rtsp" : "rtsps") + std::string("://127.0.0.1:") +
+           std::to_string(port_) + stream_.path;
+  }
 
   void kill();     // as a power failure would
   void restart();  // on the same port
@@ -36,6 +41,7 @@ class RtspServer {
   RtspStream stream_;
   std::string user_;
   std::string password_;
+  std::string certificate_;
   int port_ = 0;
   pid_t child_ = -1;
 };

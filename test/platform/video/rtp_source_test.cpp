@@ -741,6 +741,7 @@ TEST(RtpSourceOptions, ThatCannotWorkFailAtOnceAndShowNoPassword) {
   } cases[] = {
       {"rtsp://user:se@cret@camera/x", "MJPG", "rtsp://...: not a URL"},
       {"http://user:secret@camera/x", "MJPG", "http://camera/x: not a video stream"},
+      {"rtsps://camera/x", "UDP", "rtsps://camera/x: over TLS the pictures come within the"},
       {"rtp://@:5004", "HEVC", "unknown format 'HEVC'; plain RTP needs MJPG, H264 or H265"},
       {"rtp://239.1.1.1", "MJPG", "no port"},
       {directory.path() + "/none.sdp", "", "none.sdp: no usable SDP description: No such file"},
@@ -751,6 +752,7 @@ TEST(RtpSourceOptions, ThatCannotWorkFailAtOnceAndShowNoPassword) {
     RtpSourceOptions options;
     options.url = which.url;
     options.format = which.format;
+    if (which.format == "UDP") options.transport = RtpSourceOptions::Transport::kUdp;
     const auto source = open_rtp(options);
     Frame frame;
     EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed) << which.url;

@@ -14,6 +14,8 @@
 #include "test/platform/support/eventually.h"
 #include "test/platform/support/raw_server.h"
 #include "test/platform/support/rtsp_server.h"
+#include "test/platform/support/test_certificate.h"
+#include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {
@@ -159,6 +161,129 @@ TEST(RtspSourceLogin, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
   const auto anonymous = open_rtp(options_for(server.url()));
   EXPECT_EQ(read_until(*anonymous, frame, ReadStatus::kFailed), ReadStatus::kFailed);
   EXPECT_THAT(anonymous->error(), HasSubstr("the camera wants a user and a password (401)"));
+}
+
+// A camera that speaks TLS, with a certificate that it signed itself.
+class RtspSourceOverTls : public ::testing::Test {
+ protected:
+  RtpSourceOptions options(const std::string& certificate) const {
+    RtpSourceOptions result = options_for(server_.url());
+    result.certificate_file = certificate.empty() ? "" : directory_.path() + "/" + certificate;
+    return result;
+  }
+  // Writes NAME (the certificate) and its key together as NAME.pair.
+  std::string write_certificate(const std::string& name, const std::string& host, int days) const {
+    const TestCertificate made = make_certificate(host, days);
+    directory_.write(name, made.certificate);
+    directory_.write(name + ".pair", made.certificate + made.key);
+    return directory_.path() + "/" + name + ".pair";
+  }
+  void expect_pictures(const RtpSourceOptions& of) const {
+    const auto source = open_rtp(of);
+    Frame frame;
+    for (int i = 0; i < 10; ++i) {
+      ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+      EXPECT_EQ(frame.stamp.frame, i);
+      EXPECT_NEAR(frame.luma[0], 235, 3);
+    }
+    EXPECT_EQ(source->counters().damaged, 0);
+  }
+
+  TemporaryDirectory directory_;
+  RtspServer server_{kH265Stream, "", "", write_certificate("camera.pem", "127.0.0.1", 1)};
+};
+
+TEST_F(RtspSourceOverTls, TrustsTheCertificateThatItIsGiven) {
+  expect_pictures(options("camera.pem"));
+}
+
+TEST_F(RtspSourceOverTls, TrustsTheCamerasOwnWhateverNameAndDatesStandInIt) {
+  const RtspServer other(kMjpegStream, "user", "secret",
+                         write_certificate("old.pem", "camera.example", -1));
+  RtpSourceOptions of = options("old.pem");
+  of.url = other.url();
+  of.user = "user";
+  of.password = "secret";
+  expect_pictures(of);
+}
+
+TEST_F(RtspSourceOverTls, GivesEachPictureAsItComes) {
+  const auto source = open_rtp(options("camera.pem"));
+  Frame frame;
+  // One record of TLS may hold several packets: none waits in it for the next.
+  for (int i = 0; i < 60; ++i) {
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+    EXPECT_EQ(frame.stamp.frame, i);
+  }
+  EXPECT_EQ(source->counters().dropped, 0);
+}
+
+TEST_F(RtspSourceOverTls, RefusesACertificateThatNobodyKnows) {
+  (void)write_certificate("same_name.pem", "127.0.0.1", 1);
+  (void)write_certificate("other_name.pem", "camera.example", 1);
+  for (const char* known : {"", "same_name.pem", "other_name.pem"}) {
+    const RtpSourceOptions of = options(known);
+    const auto source = open_rtp(of);
+    Frame frame;
+    EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+    const std::string why =
+        of.certificate_file.empty()
+            ? "no authority that is known here has signed it"
+            : "it is neither in " + of.certificate_file + " nor signed by what is";
+    EXPECT_EQ(source->error(),
+              server_.url() + ": the camera's certificate is refused: " + why +
+                  "; if it is the camera's, save it as a PEM file and set certificate_file");
+  }
+}
+
+TEST_F(RtspSourceOverTls, NamesAFileWithoutCertificates) {
+  directory_.write("empty.pem", "no certificate");
+  for (const char* name : {"empty.pem", "none.pem"}) {
+    const auto source = open_rtp(options(name));
+    Frame frame;
+    EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+    EXPECT_THAT(source->error(), HasSubstr(std::string(name) + ": no certificates in PEM form"));
+  }
+}
+
+TEST_F(RtspSourceOverTls, NamesAServerWithoutTlsAndOneThatIsNotThere) {
+  const RtspServer plain(kMjpegStream);
+  RtpSourceOptions of = options("camera.pem");
+  of.url = "rtsps" + plain.url().substr(4);
+  Frame frame;
+  const auto without = open_rtp(of);
+  EXPECT_EQ(read_until(*without, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(without->error(), HasSubstr("the camera answers, but speaks no TLS there"));
+  of.url = "rtsps://127.0.0.1:" + std::to_string(unused_port()) + "/x";
+  const auto refused = open_rtp(of);
+  EXPECT_EQ(read_until(*refused, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(refused->error(), HasSubstr("Connection refused"));
+}
+
+TEST_F(RtspSourceOverTls, OutlivesAKillAndARestartOfTheServer) {
+  const auto source = open_rtp(options("camera.pem"));
+  Frame frame;
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  server_.kill();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  server_.restart();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  EXPECT_TRUE(frame.stamp.restarted);
+}
+
+TEST_F(RtspSourceOverTls, StopsWhileNobodyAnswersItsGreeting) {
+  RawServer server([&server](int fd) { server.stay_silent(fd); });
+  RtpSourceOptions of = options("camera.pem");
+  of.url = "rtsps://127.0.0.1:" + std::to_string(server.port()) + "/x";
+  of.timeout_s = kNever_s;
+  const auto source = open_rtp(of);
+  std::thread stopper([&] {
+    eventually([&] { return server.connections() > 0; });
+    source->stop();
+  });
+  Frame frame;
+  EXPECT_EQ(source->read(frame, kNever_s), ReadStatus::kStopped);
+  stopper.join();
 }
 
 TEST(RtspSourceErrors, NameAStreamThatIsNotThere) {
