@@ -75,6 +75,13 @@ void judge_size(VideoReport* report, const VideoNeeds& needs) {
                   needs.height));
 }
 
+void judge_coding(VideoReport* report, const VideoNeeds& needs,
+                  const std::vector<CheckedFrame>& frames) {
+  const bool interlaced = std::any_of(frames.begin(), frames.end(),
+                                      [](const CheckedFrame& frame) { return frame.interlaced; });
+  if (interlaced) add_problem(&report->findings, "video " + needs.source + ": " + kInterlaced);
+}
+
 // Each frame that is lost is an answer that does not come, and a step of the landmarks that is twice as long. One
 // in ten is no accident on a link that fits its stream.
 void judge_losses(VideoReport* report, const VideoNeeds& needs) {
@@ -162,6 +169,7 @@ VideoReport check_video(const std::vector<CheckedFrame>& frames,
   report.decode_s = spread_of(decoding);
   report.clock = check_clock(stamps, clock, &report.time_s);
   judge_size(&report, needs);
+  judge_coding(&report, needs, frames);
   judge_losses(&report, needs);
   judge_decoding(&report, needs);
   judge_clock(report.clock, "video " + needs.source, &report.findings);

@@ -27,6 +27,7 @@ struct CheckedFrame {
   int width = 0;
   int height = 0;
   std::optional<double> decode_s;
+  bool interlaced = false;  // its coding
 };
 
 struct VideoNeeds {

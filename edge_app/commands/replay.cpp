@@ -131,6 +131,8 @@ class Images {
     return frame;
   }
 
+  [[nodiscard]] std::vector<std::string> remarks() const { return source_->remarks(); }
+
  private:
   std::unique_ptr<RecordingFrameSource> source_;
   std::optional<Frame> next_;
@@ -251,6 +253,9 @@ int replay_recording(const ReplayOptions& options) {
       fmt::print(stderr, "\r{} frames ", summary.frames());
   }
   if (progress) fmt::print(stderr, "\r");
+  if (images) {
+    for (const std::string& remark : images->remarks()) spdlog::warn("{}", remark);
+  }
   file.complete();
   spdlog::info("{}: {}", file.path(), summary.line());
   return kExitOk;

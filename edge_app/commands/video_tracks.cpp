@@ -48,6 +48,7 @@ void for_each_image(const std::string& directory, const CalibrationInput& input,
   }
   if (done == 0)
     throw CommandError(kExitFailed, directory + ": no picture of its video can be read");
+  for (const std::string& remark : video->remarks()) remarks->push_back(remark);
   if (video->damaged_frames() > 0) {
     remarks->push_back(
         fmt::format("video: {} pictures could not be decoded", video->damaged_frames()));

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cerrno>
 #include <system_error>
+#include <utility>
 
 #include "edge_app/pipeline/read_loop.h"
 #include "platform/system/clock.h"
@@ -103,6 +104,9 @@ bool Pipeline::check_size(const Frame& frame) {
 
 // The image stays where it is until its slot comes back; a frame whose image finds no slot goes without.
 bool Pipeline::push(const Frame& frame) {
+  if (frame.interlaced && !std::exchange(interlaced_logged_, true)) {
+    spdlog::warn("{}: {}", video_.name(), kInterlaced);
+  }
   for (ImageSlot slot = kNoImageSlot; stage_.pop_returned(slot);) {
     images_[static_cast<std::size_t>(slot)] = Frame();
     free_slots_.push_back(slot);

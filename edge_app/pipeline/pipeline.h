@@ -113,6 +113,7 @@ class Pipeline {
   SelfCalibration* calibration_;
   PipelineOptions options_;
   RealtimeStage stage_;
+  bool interlaced_logged_ = false;  // capture thread
   LinkWatch video_watch_;
   LinkWatch pan_tilt_watch_;
   std::vector<Frame> images_;  // capture thread: by slot, those that somebody still looks at

@@ -9,6 +9,12 @@
 
 namespace alidade {
 
+// What a person is told of interlaced frames.
+inline constexpr const char* kInterlaced =
+    "the video is interlaced: every other row is of another moment, half a frame apart, which no "
+    "camera model here knows; set "
+    "the camera to progressive";
+
 // When and in which order a frame came. Fixed size: crosses queues by value.
 struct FrameStamp {
   std::int64_t frame = 0;  // 0, 1, 2, ... of the frames this source delivered

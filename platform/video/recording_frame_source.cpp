@@ -42,6 +42,7 @@ class FramesOnDisk : public RecordingFrameSource {
   std::int64_t missing_frames() const override {
     return static_cast<std::int64_t>(stamps_.size()) - static_cast<std::int64_t>(row_);
   }
+  std::vector<std::string> remarks() const override;
 
  private:
   using NextFrame = ReadStatus (FramesOnDisk::*)(Frame* frame);
@@ -52,6 +53,7 @@ class FramesOnDisk : public RecordingFrameSource {
   ReadStatus next_in_video(Frame* frame);
   ReadStatus next_image(Frame* frame);
   bool feed_decoder();
+  [[nodiscard]] bool rows_are_in_order();
   ReadStatus finish(const Picture& picture, const FrameStamp& stamp, Frame* frame);
   ReadStatus fail(const std::string& error) {
     error_ = error;
@@ -77,6 +79,10 @@ class FramesOnDisk : public RecordingFrameSource {
   bool drained_ = false;
   std::int64_t packets_ = 0;
   std::set<std::int64_t> in_decoder_;  // timestamps of packets whose picture has not come
+  std::int64_t last_pts_ = AV_NOPTS_VALUE;
+  bool has_b_frames_ = false;  // a packet came behind one whose picture was taken later
+
+  bool interlaced_ = false;  // the coding of one of the pictures
 
   // frames/
   AVCodecID image_codec_ = AV_CODEC_ID_NONE;
@@ -155,9 +161,42 @@ bool FramesOnDisk::feed_decoder() {
     packet->pts = packets_;
   }
   ++packets_;
+  has_b_frames_ =
+      has_b_frames_ || packet->pts < last_pts_;  // the first one's is the least there is
+  last_pts_ = packet->pts;
   in_decoder_.insert(packet->pts);
   (void)decoder_.send(packet.get());  // an undecodable one is noticed when the next picture comes
   return true;
+}
+
+// Of a video with B-frames: rows that were written as packets came are not those of the pictures in the order in which they
+// were taken. Their sender_time_s then steps back, by less than that of a sender that began anew.
+bool FramesOnDisk::rows_are_in_order() {
+  constexpr double kMostReordering_s = 1;
+  const auto steps_back = [](const FrameStamp& a, const FrameStamp& b) {
+    return a.sender_time_s && b.sender_time_s &&
+           *b.sender_time_s<*a.sender_time_s&& * b.sender_time_s> * a.sender_time_s -
+               kMostReordering_s;
+  };
+  if (std::adjacent_find(stamps_.begin(), stamps_.end(), steps_back) == stamps_.end()) return true;
+  error_ =
+      options_.directory +
+      "/frames.csv: sender_time_s steps back, and video.mkv has B-frames: rows in the order in "
+      "which packets came do not belong to its pictures; sort them by sender_time_s, or record "
+      "without B-frames";
+  return false;
+}
+
+std::vector<std::string> FramesOnDisk::remarks() const {
+  std::vector<std::string> remarks;
+  if (has_b_frames_) {
+    remarks.push_back(options_.directory +
+                      "/video.mkv has B-frames: row k of frames.csv has to be that of the k-th "
+                      "picture taken; where rows were written as packets came, stamps are wrong by "
+                      "some frames: record without B-frames");
+  }
+  if (interlaced_) remarks.push_back(options_.directory + ": " + kInterlaced);
+  return remarks;
 }
 
 // A decoder gives pictures in the order of their timestamps, so a picture's place is the number of
@@ -174,6 +213,7 @@ ReadStatus FramesOnDisk::next_in_video(Frame* frame) {
       row_ = std::min(row_ + in_decoder_.size(), stamps_.size());
       return ReadStatus::kEnd;
     }
+    if (has_b_frames_ && !rows_are_in_order()) return ReadStatus::kFailed;
     if (result == LumaDecoder::Result::kPicture) {
       const auto end = in_decoder_.upper_bound(picture.pts);
       const auto places = static_cast<std::size_t>(std::distance(in_decoder_.begin(), end));
@@ -249,6 +289,7 @@ ReadStatus FramesOnDisk::finish(const Picture& picture, const FrameStamp& stamp,
   frame->luma = picture.luma;
   frame->stride = picture.stride;
   frame->interlaced = picture.interlaced;
+  interlaced_ = interlaced_ || picture.interlaced;
   frame->owner = picture.owner;
   return ReadStatus::kOk;
 }

@@ -64,6 +64,13 @@ TEST(VideoCheck, MeasuresAHealthyStream) {
   EXPECT_NEAR(report.time_s[200] - report.time_s[100], 100 * kPeriod, 1e-4);
 }
 
+TEST(VideoCheck, TellsInterlacedCoding) {
+  std::vector<CheckedFrame> frames = stream();
+  frames[3].interlaced = true;
+  EXPECT_THAT(problems(checked(frames).findings),
+              ElementsAre(HasSubstr("rtsp://camera: the video is interlaced")));
+}
+
 TEST(VideoCheck, CountsLossesByTheSendersClock) {
   std::vector<CheckedFrame> frames = stream();
   frames.erase(frames.begin() + 100, frames.begin() + 103);

@@ -1,5 +1,9 @@
 #include "test/platform/support/picture_files.h"
 
+extern "C" {
+#include <libavutil/opt.h>
+}
+
 #include <cstring>
 #include <stdexcept>
 
@@ -58,6 +62,8 @@ void write_video(const std::string& path, int width, int height, int pictures, i
   encoder->max_b_frames = b_frames;
   encoder->gop_size = 10;
   encoder->flags |= AV_CODEC_FLAG_GLOBAL_HEADER;
+  // Not as few as it thinks fit.
+  av_opt_set(encoder->priv_data, "x264-params", "b-adapt=0:scenecut=0", 0);
   check(avcodec_open2(encoder.get(), encoder->codec, nullptr));
   AVFormatContext* file = nullptr;
   check(avformat_alloc_output_context2(&file, nullptr, "matroska", path.c_str()));

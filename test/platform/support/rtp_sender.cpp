@@ -17,7 +17,7 @@ extern "C" {
 namespace alidade {
 namespace {
 
-void check(int code) {
+void must(int code) {
   if (code < 0) {
     throw std::runtime_error(av_error_text(code));
   }
@@ -91,25 +91,25 @@ RtpSender::RtpSender(Codec codec, int port, double first_time_s, int packet_byte
                  0);
     }
   }
-  check(avcodec_open2(encoder_.get(), encoder, nullptr));
+  must(avcodec_open2(encoder_.get(), encoder, nullptr));
 
   const std::string url =
       "rtp://127.0.0.1:" + std::to_string(port) + "?pkt_size=" + std::to_string(packet_bytes);
-  check(avformat_alloc_output_context2(&format_, nullptr, "rtp", url.c_str()));
+  must(avformat_alloc_output_context2(&format_, nullptr, "rtp", url.c_str()));
   format_->flags |= AVFMT_FLAG_BITEXACT;  // sequence numbers begin at zero, not at a random one
   // Lets the RTCP reports say that first_time_s is now.
   format_->start_time_realtime = began_utc_us_ - std::llround(1e6 * first_time_s);
   AVStream* stream = avformat_new_stream(format_, nullptr);
-  check(avcodec_parameters_from_context(stream->codecpar, encoder_.get()));
+  must(avcodec_parameters_from_context(stream->codecpar, encoder_.get()));
   stream->time_base = {1, 90'000};
-  check(avio_open(&format_->pb, url.c_str(), AVIO_FLAG_WRITE));
-  check(avformat_write_header(format_, nullptr));
+  must(avio_open(&format_->pb, url.c_str(), AVIO_FLAG_WRITE));
+  must(avformat_write_header(format_, nullptr));
 
   picture_.reset(av_frame_alloc());
   picture_->width = kWidth;
   picture_->height = kHeight;
   picture_->format = encoder_->pix_fmt;
-  check(av_frame_get_buffer(picture_.get(), 0));
+  must(av_frame_get_buffer(picture_.get(), 0));
 }
 
 RtpSender::~RtpSender() {
@@ -119,34 +119,34 @@ RtpSender::~RtpSender() {
 }
 
 void RtpSender::send(double fraction, const std::string& nal_units) {
-  check(av_frame_make_writable(picture_.get()));
+  must(av_frame_make_writable(picture_.get()));
   for (int plane = 0; plane < 3; ++plane) {
     const int rows = plane == 0 ? kHeight : kHeight / 2;
     std::memset(picture_->data[plane], plane == 0 ? grey_of(next_) : 128,
                 static_cast<std::size_t>(picture_->linesize[plane] * rows));
   }
   picture_->pts = next_;
-  check(avcodec_send_frame(encoder_.get(), picture_.get()));
+  must(avcodec_send_frame(encoder_.get(), picture_.get()));
   const PacketPtr packet(av_packet_alloc());
-  check(avcodec_receive_packet(encoder_.get(), packet.get()));
+  must(avcodec_receive_packet(encoder_.get(), packet.get()));
   av_shrink_packet(packet.get(), static_cast<int>(fraction * packet->size));
   if (!nal_units.empty()) {
     const int picture = packet->size;
-    check(av_grow_packet(packet.get(), static_cast<int>(nal_units.size())));
+    must(av_grow_packet(packet.get(), static_cast<int>(nal_units.size())));
     std::memmove(packet->data + nal_units.size(), packet->data, static_cast<std::size_t>(picture));
     std::memcpy(packet->data, nal_units.data(), nal_units.size());
   }
   packet->pts = std::llround(90'000 * (first_time_s_ + static_cast<double>(next_) * kPeriod_s));
   packet->dts = packet->pts;
   packet->stream_index = 0;
-  check(av_write_frame(format_, packet.get()));
+  must(av_write_frame(format_, packet.get()));
   ++next_;
 }
 
 std::string RtpSender::sdp() const {
   char text[2048];
   AVFormatContext* sessions[] = {format_};
-  check(av_sdp_create(sessions, 1, text, sizeof text));
+  must(av_sdp_create(sessions, 1, text, sizeof text));
   return text;
 }
 

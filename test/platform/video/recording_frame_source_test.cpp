@@ -92,6 +92,50 @@ TEST(RecordingFrameSource, KeepsRowsAndPicturesTogetherInAVideoWithReorderedFram
   }
 }
 
+// Its remarks when it was read to its end.
+std::vector<std::string> remarks_of(const Recording& recording) {
+  const auto source = open_recorded_frames(recording.options());
+  Frame frame;
+  while (source->read(frame, 0) == ReadStatus::kOk) {
+  }
+  return source->remarks();
+}
+
+TEST(RecordingFrameSource, RemarksOnBFramesAndOnNothingElse) {
+  const Recording recording(20);
+  write_video(recording.directory.path() + "/video.mkv", 32, 16, 20, 0);
+  EXPECT_THAT(remarks_of(recording), ElementsAre());
+  write_video(recording.directory.path() + "/video.mkv", 32, 16, 20, 3);
+  EXPECT_THAT(remarks_of(recording),
+              ElementsAre(AllOf(HasSubstr(recording.directory.path() + "/video.mkv has B-frames"),
+                                HasSubstr("row k of frames.csv has to be"))));
+}
+
+TEST(RecordingFrameSource, RefusesRowsInTheOrderOfPacketsBesideBFrames) {
+  const Recording recording(0);
+  // Row by row the sender's time of an I, a P and the B-frames between; and the same in order.
+  std::string as_they_came = "frame,receive_time_s,sender_time_s\n";
+  std::string in_order = as_they_came;
+  const int order[] = {0, 4, 1, 2, 3, 8, 5, 6, 7};
+  for (int i = 0; i < 9; ++i) {
+    const auto row = [i](int time) {
+      return std::to_string(i) + "," + std::to_string(100 + 0.04 * i) + "," +
+             std::to_string(7 + 0.04 * time) + "\n";
+    };
+    as_they_came += row(order[i]);
+    in_order += row(i);
+  }
+  write_video(recording.directory.path() + "/video.mkv", 32, 16, 9, 3);
+  recording.directory.write("frames.csv", as_they_came);
+  EXPECT_THAT(recording.error(), HasSubstr("/frames.csv: sender_time_s steps back, and video.mkv"));
+  recording.directory.write("frames.csv", in_order);
+  EXPECT_EQ(remarks_of(recording).size(), 1U);
+  // Without B-frames rows may be of a sender that began anew.
+  write_video(recording.directory.path() + "/video.mkv", 32, 16, 9, 0);
+  recording.directory.write("frames.csv", as_they_came);
+  EXPECT_THAT(remarks_of(recording), ElementsAre());
+}
+
 TEST(RecordingFrameSource, EndsWhereACutOffVideoEndsAndTellsHowManyFramesAreMissing) {
   const Recording recording(20);
   const std::string path = recording.directory.path() + "/video.mkv";
