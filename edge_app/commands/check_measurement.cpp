@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <atomic>
 #include <chrono>
 #include <condition_variable>
 #include <future>
@@ -12,22 +13,36 @@
 #include <utility>
 
 #include "edge_app/commands/command.h"
+#include "edge_app/pipeline/read_loop.h"
 #include "platform/system/clock.h"
 
 namespace alidade {
 namespace {
 
-// Reads for duration_s from the first item on; the first may take wait_s. Until there is one, an error ends it: that is
-// what the person wants to know. Later losses are counted, and the source connects again.
+// Reads for duration_s from the first item on; the first may take wait_s, and as long as the source knows what it waits
+// for. Until there is one, an error ends it: that is what the person wants to know. Later losses are counted, and the source
+// connects again. *waits: there is no item yet, but the source waits; other_waits: that of the other link.
 template <typename Item, typename Source, typename OnItem>
-Connection collect(Source& source, double wait_s, double duration_s, const OnItem& on_item) {
+Connection collect(Source& source, double wait_s, double duration_s, std::atomic<bool>* waits,
+                   const std::atomic<bool>& other_waits, const OnItem& on_item) {
   constexpr double kReadTimeout_s = 0.2;
   Connection connection;
   connection.name = source.name();
   bool any = false;
   bool lost = false;
+  WaitingLog waiting_log;
   double end_s = monotonic_now_s() + wait_s;
   while (monotonic_now_s() < end_s) {
+    const double now_s = monotonic_now_s();
+    const std::string waiting = any ? "" : waiting_of(source);
+    waiting_log.say(waiting, now_s);
+    *waits = !waiting.empty();
+    if (!waiting.empty()) {
+      connection.waited = waiting;
+      end_s = now_s + wait_s;
+    }
+    // So that there is a time at which both were read.
+    if (any && other_waits) end_s = now_s + duration_s;
     Item item;
     const ReadStatus status = source.read(item, kReadTimeout_s);
     if (status == ReadStatus::kEnd || status == ReadStatus::kStopped) break;
@@ -46,6 +61,7 @@ Connection collect(Source& source, double wait_s, double duration_s, const OnIte
     lost = false;
     on_item(item);
   }
+  *waits = false;
   if (!any && connection.error.empty()) {
     connection.error =
         fmt::format("{}: connected, but nothing came within {:.0f} s", connection.name, wait_s);
@@ -123,23 +139,27 @@ void show_progress(const std::future<void>& done, double duration_s) {
 }  // namespace
 
 Measured measure(const Config& config, double duration_s) {
-  // s, beyond a source's own timeout: logging in, and a first key frame.
-  constexpr double kConnectSlack = 2;
+  // s, beyond a source's own timeout: logging in, and a first key frame; longer than it takes a source to say that it waits.
+  constexpr double kConnectSlack = 4;
   Measured measured;
   const auto video = make_frame_source(config.video, true);
   const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
   ImageThread images;
+  std::atomic<bool> video_waits{false};
+  std::atomic<bool> pan_tilt_waits{false};
   const std::future<void> frames = std::async(std::launch::async, [&] {
-    measured.video = collect<Frame>(
-        *video, config.video.timeout_s + kConnectSlack, duration_s, [&](const Frame& frame) {
-          measured.frames.push_back({frame.stamp, frame.width, frame.height, frame.decode_s});
-          images.offer(frame);
-        });
+    measured.video =
+        collect<Frame>(*video, config.video.timeout_s + kConnectSlack, duration_s, &video_waits,
+                       pan_tilt_waits, [&](const Frame& frame) {
+                         measured.frames.push_back({frame.stamp, frame.width, frame.height,
+                                                    frame.decode_s, frame.interlaced});
+                         if (frame.luma != nullptr) images.offer(frame);
+                       });
   });
   const std::future<void> samples = std::async(std::launch::async, [&] {
     measured.pan_tilt = collect<PanTiltSample>(
-        *pan_tilt, config.pan_tilt.timeout_s + kConnectSlack, duration_s,
-        [&](const PanTiltSample& sample) {
+        *pan_tilt, config.pan_tilt.timeout_s + kConnectSlack, duration_s, &pan_tilt_waits,
+        video_waits, [&](const PanTiltSample& sample) {
           measured.samples.push_back(sample);
           // A recording's times are of another clock.
           const bool live = config.pan_tilt.type != PanTiltConfig::Type::kRecording;

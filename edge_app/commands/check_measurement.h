@@ -20,6 +20,8 @@ struct Connection {
   std::string error;  // why nothing came, or no more; empty: none
   int losses = 0;     // after the first item
   std::string loss;   // the last one's words
+  // What the source waited for last, though the connection stood, before its first item; empty: nothing.
+  std::string waited;
   std::string name;
 };
 
@@ -33,7 +35,8 @@ struct Measured {
   ImageReport images;
 };
 
-// Each stream for duration_s from its first item on. Shows its progress on a terminal.
+// Each stream for duration_s from its first item on. A video that waits for a key frame is waited for, which is said on
+// stderr; pan/tilt is read meanwhile. Shows its progress on a terminal.
 [[nodiscard]] Measured measure(const Config& config, double duration_s);
 
 }  // namespace alidade

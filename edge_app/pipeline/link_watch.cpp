@@ -29,6 +29,11 @@ void LinkWatch::lost(const std::string& reason) {
   connected_.store(false, std::memory_order_release);
 }
 
+void LinkWatch::waiting(const std::string& reason) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  waiting_ = reason;
+}
+
 LinkHealth LinkWatch::now(double now_s) const {
   LinkHealth health;
   health.connected = connected_.load(std::memory_order_acquire);
@@ -41,8 +46,10 @@ LinkHealth LinkWatch::now(double now_s) const {
     const double longer_s = std::max(interval_s, age_s);
     if (interval_s >= 0 && longer_s > 0) health.rate_hz = 1 / longer_s;
   }
-  if (!health.connected) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (!waiting_.empty()) {
+    health.reason = waiting_;
+  } else if (!health.connected) {
     health.reason = reason_;
   }
   return health;

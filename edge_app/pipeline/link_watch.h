@@ -4,7 +4,7 @@
 //
 //   rate   1 / mean interval between the items of the last kMemory, however they are bunched; no more than 1 / age, so that
 //          it falls when nothing comes
-// The reading thread tells it: item() takes no lock, lost() one for the length of a string. now() may be called by any
+// The reading thread tells it: item() takes no lock, lost() and waiting() one for the length of a string. now() may be called by any
 // thread. Times are seconds of the host's CLOCK_MONOTONIC.
 
 #include <atomic>
@@ -17,7 +17,8 @@ namespace alidade {
 
 struct LinkHealth {
   bool connected = false;  // items come, or may: nothing is known to be wrong since the last
-  // Why there is no connection, one line; empty while it stands or was not tried yet.
+  // Why there is no connection, or what is waited for though it stands, one line; empty while all is well, and as long as
+  // it was not tried.
   std::string reason;
   std::int64_t reconnections = 0;
   std::optional<double> age_s;    // since the last item; empty before the first
@@ -32,6 +33,8 @@ class LinkWatch {
   void item(double now_s);
   // Reading thread. The connection was lost or refused, or a further attempt failed.
   void lost(const std::string& reason);
+  // Reading thread. What the source waits for though its connection stands (FrameSource::waiting); empty: nothing.
+  void waiting(const std::string& reason);
 
   [[nodiscard]] LinkHealth now(double now_s) const;
 
@@ -43,7 +46,8 @@ class LinkWatch {
   int intervals_ = 0;                   // reading thread: that interval_s_ is the mean of
   bool fresh_ = true;                   // reading thread: the next item is its connection's first
   mutable std::mutex mutex_;
-  std::string reason_;  // guarded by mutex_
+  std::string reason_;   // guarded by mutex_
+  std::string waiting_;  // guarded by mutex_
 };
 
 }  // namespace alidade

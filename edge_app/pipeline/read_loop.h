@@ -1,18 +1,49 @@
 #pragma once
 // read_to_the_end: what a capture or telemetry thread does with its source, from the first item to the
-// last, over losses of the connection. Logs each loss and return. Allocates and waits: never on the
-// real-time thread.
+// last, over losses of the connection. Logs each loss and return, and what a source waits for though its connection stands.
+// Allocates and waits: never on the real-time thread.
 
 #include <spdlog/spdlog.h>
 
 #include <limits>
 #include <string>
+#include <type_traits>
 
 #include "edge_app/pipeline/link_watch.h"
 #include "platform/system/clock.h"
 #include "platform/video/frame_source.h"  // ReadStatus
 
 namespace alidade {
+
+// What the source waits for; telemetry has nothing to wait for.
+template <typename Source>
+std::string waiting_of(const Source& source) {
+  if constexpr (std::is_base_of_v<FrameSource, Source>) {
+    return source.waiting();
+  } else {
+    return "";
+  }
+}
+
+// Says what is waited for: at once, and then ever more rarely, as it may last.
+class WaitingLog {
+ public:
+  void say(const std::string& waiting, double now_s) {
+    if (waiting.empty()) {
+      pause_s_ = kFirstPause_s;
+      next_s_ = 0;
+    } else if (now_s >= next_s_) {
+      spdlog::warn("{}", waiting);
+      next_s_ = now_s + pause_s_;
+      pause_s_ *= 2;
+    }
+  }
+
+ private:
+  static constexpr double kFirstPause_s = 10;
+  double pause_s_ = kFirstPause_s;
+  double next_s_ = 0;
+};
 
 // Item: Frame or PanTiltSample. on_item(item) returns false to end. on_loss(now_s) is called at a loss
 // and then each second until the next item. *watch is told of all that. Returns the source's error if it failed for good.
@@ -24,6 +55,8 @@ std::string read_to_the_end(Source& source, LinkWatch* watch, const OnItem& on_i
   bool lost = false;
   double next_notice_s = 0;
   std::string said;
+  std::string waited;
+  WaitingLog waiting_log;
   Item item;
   while (true) {
     switch (source.read(item, kReadTimeout_s)) {
@@ -53,6 +86,10 @@ std::string read_to_the_end(Source& source, LinkWatch* watch, const OnItem& on_i
         return "";
     }
     const double now = monotonic_now_s();
+    const std::string waiting = waiting_of(source);
+    if (waiting != waited) watch->waiting(waiting);
+    waited = waiting;
+    waiting_log.say(waiting, now);
     if (lost && now >= next_notice_s) {
       on_loss(now);
       next_notice_s = now + kNoticePeriod_s;

@@ -4,15 +4,21 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
+#include <chrono>
 #include <filesystem>
 #include <fstream>
 #include <functional>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "test/edge_app/alidade_command.h"
+#include "test/platform/support/eventually.h"
+#include "test/platform/support/rtp_relay.h"
+#include "test/platform/support/rtp_sender.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {
@@ -125,6 +131,39 @@ TEST_F(CheckCommand, PassesAHealthySetup) {
                     HasSubstr("while the head turns; 0 of "),
                     HasSubstr("pan sign right, tilt sign right; focal length about "),
                     Not(HasSubstr("advice"))));
+}
+
+// Longer than a connection is given without a picture.
+TEST_F(CheckCommand, WaitsForAKeyFrameForAsLongAsItTakesAndSaysSo) {
+  constexpr double kWithout_s = 5.5;
+  const int port = free_rtp_port();
+  std::atomic<bool> over{false};
+  std::thread camera([&] {
+    ASSERT_TRUE(eventually([port] { return rtp_port_taken(port); }));
+    const double begin_s = monotonic_now_s();
+    RtpRelay relay(port);
+    RtpSender sender(RtpSender::Codec::kH264, relay.port());
+    while (!over) {
+      const bool key = sender.sent() % 10 == 0;
+      sender.send();
+      relay.forward([&](RtpRelay::Packets& packets) {
+        if (key && monotonic_now_s() < begin_s + kWithout_s) packets.clear();
+      });
+      std::this_thread::sleep_for(std::chrono::milliseconds(33));  // the camera's pace
+    }
+  });
+  const std::string file = directory_.write(
+      "alidade.yaml",
+      "video: {type: rtp, url: 'rtp://@:" + std::to_string(port) +
+          "', format: H264, timeout_s: 1, width: 160, height: 120}\n" +
+          "pan_tilt: {type: vapix, url: 'http://127.0.0.1:1'}\ncamera: {focal_length_px: 900}\n");
+  const Result result = alidade({"check", "--duration", "1", "-c", file});
+  over = true;
+  camera.join();
+  EXPECT_THAT(result.errors, HasSubstr("waiting for a key frame since 3 s; set a shorter"));
+  EXPECT_THAT(result.output,
+              AllOf(HasSubstr("160x120 px"), HasSubstr("advice         rtp://0.0.0.0"),
+                    HasSubstr("waiting for a key frame since 5 s")));
 }
 
 TEST_F(CheckCommand, TellsProgramsTheSameAsOneLineOfJson) {

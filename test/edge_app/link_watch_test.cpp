@@ -43,6 +43,22 @@ TEST(LinkWatch, TheRateFallsWhileNothingComes) {
   EXPECT_NEAR(*watch.now(4.9).rate_hz, 0.25, 1e-6);
 }
 
+TEST(LinkWatch, SaysWhatIsWaitedForWhetherItStandsOrNot) {
+  LinkWatch watch;
+  watch.lost("refused");
+  watch.waiting("waiting for a key frame since 3 s");
+  EXPECT_EQ(watch.now(1).reason, "waiting for a key frame since 3 s");
+  EXPECT_FALSE(watch.now(1).connected);
+  watch.waiting("");
+  EXPECT_EQ(watch.now(1).reason, "refused");
+  watch.item(2);
+  watch.waiting("waiting for a key frame since 4 s");
+  EXPECT_EQ(watch.now(2).reason, "waiting for a key frame since 4 s");
+  EXPECT_TRUE(watch.now(2).connected);
+  watch.waiting("");
+  EXPECT_EQ(watch.now(2).reason, "");
+}
+
 TEST(LinkWatch, SaysWhyThereIsNoConnectionUntilThereIs) {
   LinkWatch watch;
   watch.lost("refused");
