@@ -359,6 +359,45 @@ TEST(RtspSourceErrors, NameBFrames) {
   }
 }
 
+// A relay that takes the camera's stream apart and sends it on, and begins where that is.
+TEST(RtspSourceStream, ComesThroughARelay) {
+  const struct {
+    const RtspStream& stream;
+    const char* relay;
+  } cases[] = {{kH264Stream, "rtph264depay ! rtph264pay config-interval=-1 name=pay0 pt=96"},
+               {kH265Stream, "rtph265depay ! rtph265pay config-interval=-1 name=pay0 pt=96"}};
+  for (const auto& which : cases) {
+    RtspServer camera(which.stream);
+    const RtspServer relay({"/relay", "rtspsrc latency=0 protocols=tcp location=" + camera.url() +
+                                          " ! " + which.relay});
+    const auto source = open_rtp(options_for(relay.url()));
+    Frame frame;
+    for (int i = 0; i < 30; ++i) {
+      ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+      EXPECT_EQ(frame.stamp.frame, i);
+      ASSERT_NE(frame.luma, nullptr);
+      EXPECT_NEAR(frame.luma[0], 235, 3);
+    }
+    EXPECT_EQ(source->counters().damaged, 0);
+  }
+}
+
+TEST(RtspSourceStream, TellsInterlacedCoding) {
+  for (const bool interlaced : {false, true}) {
+    const RtspServer server(
+        {"/fields", std::string(kWhitePictures) +
+                        (interlaced ? "capssetter caps=video/x-raw,interlace-mode=interleaved ! "
+                                      "x264enc interlaced=true "
+                                    : "x264enc ") +
+                        "tune=zerolatency speed-preset=ultrafast key-int-max=10 ! "
+                        "rtph264pay config-interval=1 name=pay0 pt=96"});
+    const auto source = open_rtp(options_for(server.url()));
+    Frame frame;
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+    EXPECT_EQ(frame.interlaced, interlaced);
+  }
+}
+
 TEST(RtspSourceStream, KeepsTheVideosClockWhenThereIsSoundToo) {
   const RtspServer server(
       {"/both",
