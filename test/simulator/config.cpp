@@ -311,7 +311,8 @@ void read_live(Section& section, LiveConfig* live) {
   using Codec = LiveConfig::Codec;
   section.integer("rtsp_port", &live->rtsp_port, kPort);
   section.integer("http_port", &live->http_port, kPort);
-  section.choice<Codec>("codec", &live->codec, {{"mjpeg", Codec::kMjpeg}, {"h264", Codec::kH264}});
+  section.choice<Codec>("codec", &live->codec,
+                        {{"mjpeg", Codec::kMjpeg}, {"h264", Codec::kH264}, {"h265", Codec::kH265}});
   section.text("rtp_host", &live->rtp_host);
   section.integer("rtp_port", &live->rtp_port, kPort);
   section.path("sdp_file", &live->sdp_file);

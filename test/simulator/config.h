@@ -122,7 +122,7 @@ struct RecordingConfig {
 };
 
 struct LiveConfig {
-  enum class Codec { kMjpeg, kH264 };
+  enum class Codec { kMjpeg, kH264, kH265 };
   int rtsp_port = 0, http_port = 0;  // 0: any free one
   Codec codec = Codec::kMjpeg;
   std::string rtp_host;  // if set, plain RTP is sent there besides RTSP

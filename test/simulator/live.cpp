@@ -66,11 +66,14 @@ std::vector<std::vector<std::uint8_t>> encoded_frames(const Config& config,
                                                       const std::atomic<bool>& stop) {
   const int width = config.image.width;
   const int height = config.image.height;
-  const bool h264 = config.live.codec == LiveConfig::Codec::kH264;
-  H264Encoder encoder;
+  const bool jpeg = config.live.codec == LiveConfig::Codec::kMjpeg;
+  const auto standard = config.live.codec == LiveConfig::Codec::kH265
+                            ? VideoEncoder::Standard::kH265
+                            : VideoEncoder::Standard::kH264;
+  VideoEncoder encoder;
   std::string error;
-  if (h264 && !encoder.open(width, height, config.image.rate_hz, &error)) {
-    throw std::runtime_error("H.264: " + error);
+  if (!jpeg && !encoder.open(standard, width, height, config.image.rate_hz, &error)) {
+    throw std::runtime_error(error);
   }
   std::vector<std::vector<std::uint8_t>> frames(count);
   const Progress progress("rendering frame", count);
@@ -81,13 +84,13 @@ std::vector<std::vector<std::uint8_t>> encoded_frames(const Config& config,
       auto& frame = frames[start + i];
       frame = renderer.render(static_cast<double>(start + i) / config.image.rate_hz,
                               static_cast<std::int64_t>(start + i));
-      if (!h264) {
+      if (jpeg) {
         frame = encode_jpeg(frame.data(), width, height, width, config.sensor.jpeg_quality);
       }
     });
     for (std::size_t i = start; i < start + size; ++i) {
       // The first frame begins the loop anew each time round, so nothing may precede it.
-      if (h264) frames[i] = encoder.encode(frames[i].data(), width, i == 0);
+      if (!jpeg) frames[i] = encoder.encode(frames[i].data(), width, i == 0);
       if (frames[i].empty()) throw std::runtime_error("a frame could not be encoded");
     }
     progress.show(start + size);
@@ -99,7 +102,9 @@ VideoServerOptions video_options(const Config& config) {
   VideoServerOptions options;
   options.port = config.live.rtsp_port;
   options.codec = config.live.codec == LiveConfig::Codec::kH264 ? VideoServerOptions::Codec::kH264
-                                                                : VideoServerOptions::Codec::kMjpeg;
+                  : config.live.codec == LiveConfig::Codec::kH265
+                      ? VideoServerOptions::Codec::kH265
+                      : VideoServerOptions::Codec::kMjpeg;
   options.width = config.image.width;
   options.height = config.image.height;
   options.rate_hz = config.image.rate_hz;

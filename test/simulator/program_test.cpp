@@ -112,7 +112,7 @@ TEST(VirtualCameraProgram, FailsWithExitCodeOneIfItCannotWrite) {
 }
 
 TEST(VirtualCameraProgram, ServesVideoAndPanTiltWithTheTruthUntilItIsStopped) {
-  for (const char* codec : {"mjpeg", "h264"}) {
+  for (const char* codec : {"mjpeg", "h264", "h265"}) {
     const TemporaryDirectory directory;
     Child child(
         {"-c", directory.write("camera.yaml",

@@ -70,6 +70,9 @@ class Run(SystemTest):
     def test_h264_over_udp(self):
         self.check_run(codec="h264", video={"transport": "udp"})
 
+    def test_h265_over_tcp(self):
+        self.check_run(codec="h265")
+
     def test_with_digest_login(self):
         self.check_run(user="viewer")
 

@@ -38,7 +38,7 @@ struct PacketDeleter {
 };
 
 bool fail(std::string* error, const std::string& reason) {
-  *error = "H.264 encoder: " + reason;
+  *error = "video encoder: " + reason;
   return false;
 }
 
@@ -72,24 +72,27 @@ std::vector<std::uint8_t> encode_jpeg(const std::uint8_t* gray, int width, int h
   return {bytes, bytes + size};
 }
 
-struct H264Encoder::Codec {
+struct VideoEncoder::Codec {
   std::unique_ptr<AVCodecContext, CodecDeleter> context;
   std::unique_ptr<AVFrame, FrameDeleter> frame;
   std::unique_ptr<AVPacket, PacketDeleter> packet;
 };
 
-H264Encoder::H264Encoder() = default;
-H264Encoder::~H264Encoder() = default;
+VideoEncoder::VideoEncoder() = default;
+VideoEncoder::~VideoEncoder() = default;
 
-bool H264Encoder::open(int width, int height, double rate_hz, std::string* error) {
+bool VideoEncoder::open(Standard standard, int width, int height, double rate_hz,
+                        std::string* error) {
   codec_.reset();
   if (width <= 0 || height <= 0 || width % 2 != 0 || height % 2 != 0) {
     return fail(error, "width and height must be even and positive, not " + std::to_string(width) +
                            "x" + std::to_string(height));
   }
   if (!(rate_hz > 0)) return fail(error, "the frame rate must be positive");
-  const AVCodec* encoder = avcodec_find_encoder_by_name("libx264");
-  if (encoder == nullptr) return fail(error, "this libavcodec has no libx264");
+  const bool h265 = standard == Standard::kH265;
+  const std::string name = h265 ? "libx265" : "libx264";
+  const AVCodec* encoder = avcodec_find_encoder_by_name(name.c_str());
+  if (encoder == nullptr) return fail(error, "this libavcodec has no " + name);
 
   auto codec = std::make_unique<Codec>();
   codec->context.reset(avcodec_alloc_context3(encoder));
@@ -112,6 +115,10 @@ bool H264Encoder::open(int width, int height, double rate_hz, std::string* error
   av_opt_set(context.priv_data, "tune", "zerolatency", 0);
   av_opt_set(context.priv_data, "crf", "20", 0);
   av_opt_set(context.priv_data, "forced-idr", "1", 0);
+  if (h265) {
+    av_opt_set(context.priv_data, "x265-params",
+               "log-level=none:repeat-headers=1:open-gop=0:scenecut=0", 0);
+  }
   int status = avcodec_open2(&context, encoder, nullptr);
   if (status < 0) return fail(error, av_error(status));
 
@@ -132,8 +139,8 @@ bool H264Encoder::open(int width, int height, double rate_hz, std::string* error
   return true;
 }
 
-std::vector<std::uint8_t> H264Encoder::encode(const std::uint8_t* gray, std::ptrdiff_t stride,
-                                              bool force_idr) {
+std::vector<std::uint8_t> VideoEncoder::encode(const std::uint8_t* gray, std::ptrdiff_t stride,
+                                               bool force_idr) {
   if (!codec_) return {};
   AVFrame& frame = *codec_->frame;
   if (av_frame_make_writable(&frame) < 0) return {};

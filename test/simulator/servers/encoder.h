@@ -2,11 +2,11 @@
 // The virtual camera's encoders: one 8-bit grey picture in, one encoded picture out.
 //
 // encode_jpeg makes what RFC 2435 can carry: baseline, standard Huffman tables, YUV 4:2:0 (type 1)
-// with grey chroma. H264Encoder makes Annex B access units without delay (no B frames, no
-// look-ahead): the picture that went in comes out of the same call. An IDR with SPS and PPS begins
+// with grey chroma. VideoEncoder makes Annex B access units of H.264 or H.265 without delay (no B frames,
+// no look-ahead): the picture that went in comes out of the same call. An IDR with parameter sets begins
 // every second of frames, so a viewer can join within a second. Luma is full range (0..255) in
 // both. Row v of the picture starts at gray + v * stride (bytes). Both allocate. encode_jpeg may be
-// called from any thread; an H264Encoder belongs to one at a time.
+// called from any thread; an VideoEncoder belongs to one at a time.
 
 #include <cstddef>
 #include <cstdint>
@@ -20,15 +20,18 @@ namespace alidade {
 [[nodiscard]] std::vector<std::uint8_t> encode_jpeg(const std::uint8_t* gray, int width, int height,
                                                     std::ptrdiff_t stride, int quality);
 
-class H264Encoder {
+class VideoEncoder {
  public:
-  H264Encoder();
-  ~H264Encoder();
-  H264Encoder(const H264Encoder&) = delete;
-  H264Encoder& operator=(const H264Encoder&) = delete;
+  enum class Standard { kH264, kH265 };
+
+  VideoEncoder();
+  ~VideoEncoder();
+  VideoEncoder(const VideoEncoder&) = delete;
+  VideoEncoder& operator=(const VideoEncoder&) = delete;
 
   // width and height must be even (4:2:0). On failure says why in *error.
-  [[nodiscard]] bool open(int width, int height, double rate_hz, std::string* error);
+  [[nodiscard]] bool open(Standard standard, int width, int height, double rate_hz,
+                          std::string* error);
 
   // One access unit; empty only if the encoder failed. force_idr starts a new sequence here.
   [[nodiscard]] std::vector<std::uint8_t> encode(const std::uint8_t* gray, std::ptrdiff_t stride,

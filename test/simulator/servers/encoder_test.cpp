@@ -28,12 +28,17 @@ double mean_difference(const std::uint8_t* a, std::ptrdiff_t stride_a, const std
   return sum / (kWidth * kHeight);
 }
 
+using Standard = VideoEncoder::Standard;
+
+constexpr Standard kStandards[] = {Standard::kH264, Standard::kH265};
+
 // The types of the NAL units of an Annex B access unit.
-std::vector<int> nal_types(const std::vector<std::uint8_t>& access_unit) {
+std::vector<int> nal_types(Standard standard, const std::vector<std::uint8_t>& access_unit) {
   std::vector<int> types;
   for (std::size_t i = 3; i < access_unit.size(); ++i) {
     if (access_unit[i - 3] == 0 && access_unit[i - 2] == 0 && access_unit[i - 1] == 1) {
-      types.push_back(access_unit[i] & 0x1f);
+      types.push_back(standard == Standard::kH265 ? access_unit[i] >> 1 & 0x3f
+                                                  : access_unit[i] & 0x1f);
     }
   }
   return types;
@@ -43,9 +48,14 @@ bool has(const std::vector<int>& types, int type) {
   return std::find(types.begin(), types.end(), type) != types.end();
 }
 
-constexpr int kIdr = 5;
-constexpr int kSps = 7;
-constexpr int kPps = 8;
+struct NalTypes {
+  int idr;
+  int sps;
+  int pps;
+};
+constexpr NalTypes types_of(Standard standard) {
+  return standard == Standard::kH265 ? NalTypes{19, 33, 34} : NalTypes{5, 7, 8};
+}
 
 TEST(EncodeJpeg, MakesABaselineFrameInYuv420ThatDecodesToThePicture) {
   const auto picture = numbered_picture(kWidth, kHeight, 1234);
@@ -92,11 +102,19 @@ TEST(EncodeJpeg, GivesNothingForAnImpossiblePicture) {
   EXPECT_TRUE(encode_jpeg(&pixel, 1, 1, 1, 101).empty());
 }
 
-TEST(H264Encoder, GivesEachPictureBackWithoutDelay) {
-  H264Encoder encoder;
+class VideoEncoderOf : public testing::TestWithParam<Standard> {};
+
+INSTANTIATE_TEST_SUITE_P(Standards, VideoEncoderOf, testing::ValuesIn(kStandards),
+                         [](const auto& standard) {
+                           return standard.param == Standard::kH265 ? "H265" : "H264";
+                         });
+
+TEST_P(VideoEncoderOf, GivesEachPictureBackWithoutDelay) {
+  VideoEncoder encoder;
   std::string error;
-  ASSERT_TRUE(encoder.open(kWidth, kHeight, 25, &error)) << error;
-  AVCodecContext* decoder = avcodec_alloc_context3(avcodec_find_decoder(AV_CODEC_ID_H264));
+  ASSERT_TRUE(encoder.open(GetParam(), kWidth, kHeight, 25, &error)) << error;
+  AVCodecContext* decoder = avcodec_alloc_context3(
+      avcodec_find_decoder(GetParam() == Standard::kH265 ? AV_CODEC_ID_HEVC : AV_CODEC_ID_H264));
   decoder->flags |= AV_CODEC_FLAG_LOW_DELAY;
   decoder->thread_count = 1;
   ASSERT_EQ(avcodec_open2(decoder, nullptr, nullptr), 0);
@@ -118,29 +136,33 @@ TEST(H264Encoder, GivesEachPictureBackWithoutDelay) {
   avcodec_free_context(&decoder);
 }
 
-TEST(H264Encoder, BeginsEverySecondAndEveryForcedPictureWithAnIdrAndItsParameters) {
+TEST_P(VideoEncoderOf, BeginsEverySecondAndEveryForcedPictureWithAnIdrAndItsParameters) {
   constexpr int kRate = 10;
   constexpr int kForced = 13;
-  H264Encoder encoder;
+  const NalTypes nal = types_of(GetParam());
+  VideoEncoder encoder;
   std::string error;
-  ASSERT_TRUE(encoder.open(kWidth, kHeight, kRate, &error)) << error;
+  ASSERT_TRUE(encoder.open(GetParam(), kWidth, kHeight, kRate, &error)) << error;
   for (int number = 0; number < 30; ++number) {
     const auto picture = numbered_picture(kWidth, kHeight, number);
-    const auto types = nal_types(encoder.encode(picture.data(), kWidth, number == kForced));
+    const auto types =
+        nal_types(GetParam(), encoder.encode(picture.data(), kWidth, number == kForced));
     // A forced IDR begins a new second.
     const bool idr = number < kForced ? number % kRate == 0 : (number - kForced) % kRate == 0;
-    EXPECT_EQ(has(types, kIdr), idr) << "picture " << number;
-    EXPECT_EQ(has(types, kSps), idr) << "picture " << number;
-    EXPECT_EQ(has(types, kPps), idr) << "picture " << number;
+    EXPECT_EQ(has(types, nal.idr) || (GetParam() == Standard::kH265 && has(types, nal.idr + 1)),
+              idr)
+        << "picture " << number;
+    EXPECT_EQ(has(types, nal.sps), idr) << "picture " << number;
+    EXPECT_EQ(has(types, nal.pps), idr) << "picture " << number;
   }
 }
 
-TEST(H264Encoder, RefusesOddSizesAndNoRate) {
-  H264Encoder encoder;
+TEST(VideoEncoder, RefusesOddSizesAndNoRate) {
+  VideoEncoder encoder;
   std::string error;
-  EXPECT_FALSE(encoder.open(161, 120, 25, &error));
+  EXPECT_FALSE(encoder.open(Standard::kH264, 161, 120, 25, &error));
   EXPECT_NE(error.find("161x120"), std::string::npos) << error;
-  EXPECT_FALSE(encoder.open(160, 120, 0, &error));
+  EXPECT_FALSE(encoder.open(Standard::kH265, 160, 120, 0, &error));
   EXPECT_NE(error.find("frame rate"), std::string::npos) << error;
   EXPECT_TRUE(encoder.encode(nullptr, 0, false).empty());
 }

@@ -53,18 +53,24 @@ std::string launch_line_of(const VideoServerOptions& options) {
     return source + "image/jpeg" + size +
            " ! rtpjpegpay name=pay0 pt=26 mtu=1400 perfect-rtptime=false";
   }
+  if (options.codec == VideoServerOptions::Codec::kH265) {
+    return source + "video/x-h265,stream-format=byte-stream,alignment=au" + size +
+           " ! rtph265pay name=pay0 pt=96 mtu=1400 config-interval=-1 perfect-rtptime=false";
+  }
   return source + "video/x-h264,stream-format=byte-stream,alignment=au" + size +
          " ! rtph264pay name=pay0 pt=96 mtu=1400 config-interval=-1 perfect-rtptime=false";
 }
 
 // Whether the first slice of an Annex B access unit is of an IDR picture.
-bool is_idr(const std::uint8_t* data, std::size_t size) {
-  constexpr unsigned kNonIdrSlice = 1;
-  constexpr unsigned kIdrSlice = 5;
+bool is_idr(VideoServerOptions::Codec codec, const std::uint8_t* data, std::size_t size) {
+  const bool h265 = codec == VideoServerOptions::Codec::kH265;
   for (std::size_t i = 3; i < size; ++i) {
     if (data[i - 3] != 0 || data[i - 2] != 0 || data[i - 1] != 1) continue;
-    const unsigned type = data[i] & 0x1fU;
-    if (type >= kNonIdrSlice && type <= kIdrSlice) return type == kIdrSlice;
+    // H.265: slices are all types below 32, IDR is 19 and 20; H.264: 1 to 5, and 5.
+    const unsigned type = h265 ? data[i] >> 1U & 0x3fU : data[i] & 0x1fU;
+    if (h265 ? type < 32 : type >= 1 && type <= 5) {
+      return h265 ? type == 19 || type == 20 : type == 5;
+    }
   }
   return false;
 }
@@ -123,7 +129,8 @@ void FrameInput::push(const std::uint8_t* data, std::size_t size, double capture
     wait_for_key_frame_ = true;
     return;
   }
-  if (wait_for_key_frame_ && codec_ == VideoServerOptions::Codec::kH264 && !is_idr(data, size)) {
+  if (wait_for_key_frame_ && codec_ != VideoServerOptions::Codec::kMjpeg &&
+      !is_idr(codec_, data, size)) {
     return;
   }
   wait_for_key_frame_ = false;

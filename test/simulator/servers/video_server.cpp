@@ -275,12 +275,14 @@ class RtpPusher {
 
   bool write_sdp(std::string* error) const {
     if (options_.sdp_file.empty()) return true;
-    const bool jpeg = options_.codec == Codec::kMjpeg;
-    // H.264 carries its parameter sets in the stream: the SDP need not repeat them.
+    // H.264 and H.265 carry their parameter sets in the stream: the SDP need not repeat them.
     const std::unique_ptr<GstCaps, CapsUnref> caps(gst_caps_from_string(
-        jpeg ? "application/x-rtp,media=video,payload=26,clock-rate=90000,encoding-name=JPEG"
-             : "application/x-rtp,media=video,payload=96,clock-rate=90000,encoding-name=H264,"
-               "packetization-mode=(string)1"));
+        options_.codec == Codec::kMjpeg
+            ? "application/x-rtp,media=video,payload=26,clock-rate=90000,encoding-name=JPEG"
+        : options_.codec == Codec::kH265
+            ? "application/x-rtp,media=video,payload=96,clock-rate=90000,encoding-name=H265"
+            : "application/x-rtp,media=video,payload=96,clock-rate=90000,encoding-name=H264,"
+              "packetization-mode=(string)1"));
     GstSDPMessage* sdp = nullptr;
     gst_sdp_message_new(&sdp);
     const std::unique_ptr<GstSDPMessage, SdpFree> owner(sdp);

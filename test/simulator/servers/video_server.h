@@ -24,7 +24,7 @@ struct VideoServerOptions {
   std::string address = "127.0.0.1";
   int port = 0;  // of RTSP; 0 = any free one, see VideoServer::port()
   std::string path = "/video";
-  enum class Codec { kMjpeg, kH264 };
+  enum class Codec { kMjpeg, kH264, kH265 };
   Codec codec = Codec::kMjpeg;
   int width = 0;       // px
   int height = 0;      // px
@@ -52,9 +52,9 @@ class VideoServer {
   // The RTSP port listened on; 0 before start() and with plain RTP.
   [[nodiscard]] int port() const;
 
-  // Sends one frame, a JPEG as of encode_jpeg or an H.264 access unit, to every client that plays.
+  // Sends one frame, a JPEG as of encode_jpeg or an access unit of VideoEncoder, to every client that plays.
   // Discarded if nobody plays, or if the network is so slow that frames pile up inside the server;
-  // after a gap H.264 goes on with the next IDR. capture_time_s is of CLOCK_MONOTONIC.
+  // after a gap H.264 and H.265 go on with the next IDR. capture_time_s is of CLOCK_MONOTONIC.
   void push(const std::uint8_t* data, std::size_t size, double capture_time_s);
 
   // RTSP connections open now.
