@@ -5,7 +5,9 @@
 #include <gtest/gtest.h>
 
 #include <deque>
+#include <string>
 #include <utility>
+#include <vector>
 
 namespace alidade {
 namespace {

@@ -213,7 +213,7 @@ INSTANTIATE_TEST_SUITE_P(
                       Refusal{"AnotherCodec",
                               "DESCRIBE",
                               {"200 OK", "", kVp8, "", false},
-                              "the video is vp8; set the camera to MJPEG or H.264"},
+                              "the video is vp8; set the camera to MJPEG, H.264 or H.265"},
                       Refusal{"Login",
                               "OPTIONS",
                               {"401 Unauthorized", "", "", "", false},
