@@ -42,33 +42,10 @@ std::string refusal(int status, const char* reason) {
          (reason == nullptr || *reason == '\0' ? "" : " " + shown(reason));
 }
 
-std::string text_of(GError* failure) {
-  const std::string text = failure == nullptr ? "" : failure->message;
-  g_clear_error(&failure);
-  return text;
-}
-
-// Faults for which no authority vouches; the last where one of the same name has another key.
-constexpr int kUnknown = G_TLS_CERTIFICATE_UNKNOWN_CA | G_TLS_CERTIFICATE_GENERIC_ERROR;
-
-// What is wrong with a certificate, the worst first.
-std::string fault_of(int faults, const std::string& file) {
-  if ((faults & kUnknown) != 0) {
-    return file.empty() ? "no authority that is known here has signed it"
-                        : "it is neither in " + file + " nor signed by what is";
-  }
-  if ((faults & G_TLS_CERTIFICATE_BAD_IDENTITY) != 0) return "it is for another name";
-  if ((faults & G_TLS_CERTIFICATE_EXPIRED) != 0) return "it has expired, by this machine's clock";
-  if ((faults & G_TLS_CERTIFICATE_NOT_ACTIVATED) != 0) {
-    return "it is not valid yet, by this machine's clock";
-  }
-  if ((faults & G_TLS_CERTIFICATE_REVOKED) != 0) return "it was revoked";
-  return "it cannot be relied on";
-}
-
 }  // namespace
 
-RtspSession::RtspSession(const RtpSourceOptions& options) : options_(options), url_(options.url) {}
+RtspSession::RtspSession(const RtpSourceOptions& options)
+    : options_(options), url_(options.url), tls_(options.certificate_file) {}
 
 RtspSession::~RtspSession() {
   if (connection_ && !session_url_.empty()) {
@@ -140,7 +117,8 @@ ReadStatus RtspSession::connect_plainly(const GstRTSPUrl& url, std::string* erro
   std::unique_ptr<GSocketConnection, Unref> socket(g_socket_client_connect_to_host(
       client.get(), url.host, url.port, cancellable_.get(), &failure));
   if (!socket) {
-    *error = text_of(failure);
+    *error = failure->message;
+    g_error_free(failure);
     return interrupted_ ? ReadStatus::kStopped : ReadStatus::kDisconnected;
   }
   GSocket* plain = g_socket_connection_get_socket(socket.get());
@@ -158,10 +136,6 @@ ReadStatus RtspSession::connect_plainly(const GstRTSPUrl& url, std::string* erro
 
 // By GStreamer's own way to connect: it takes no socket on which TLS is spoken.
 ReadStatus RtspSession::connect_by_tls(const GstRTSPUrl& url, std::string* error) {
-  if (g_tls_backend_supports_tls(g_tls_backend_get_default()) == FALSE) {
-    *error = "this machine has no TLS for RTSP; install the package glib-networking";
-    return ReadStatus::kFailed;
-  }
   GstRTSPConnection* connection = nullptr;
   const GstRTSPResult made = gst_rtsp_connection_create(&url, &connection);
   if (made != GST_RTSP_OK) return lost(made, error);
@@ -171,55 +145,17 @@ ReadStatus RtspSession::connect_by_tls(const GstRTSPUrl& url, std::string* error
     socket_.reset();
     if (interrupted_) gst_rtsp_connection_flush(connection, TRUE);
   }
-  if (!options_.certificate_file.empty()) {
-    GError* failure = nullptr;
-    const std::unique_ptr<GTlsDatabase, Unref> known(
-        g_tls_file_database_new(options_.certificate_file.c_str(), &failure));
-    if (!known) {
-      *error = options_.certificate_file + ": no certificates in PEM form: " + text_of(failure);
-      return ReadStatus::kFailed;
-    }
-    gst_rtsp_connection_set_tls_database(connection, known.get());
-  }
-  certificate_faults_ = 0;
-  gst_rtsp_connection_set_accept_certificate_func(connection, &RtspSession::accept_certificate,
-                                                  this, nullptr);
+  ReadStatus status = tls_.prepare(connection, error);
+  if (status != ReadStatus::kOk) return status;
   const GstRTSPResult result =
       gst_rtsp_connection_connect_usec(connection, microseconds_until(deadline_s_));
-  return result == GST_RTSP_OK ? ReadStatus::kOk : no_tls(url, result, error);
-}
-
-// Asked about a certificate that did not pass.
-gboolean RtspSession::accept_certificate(GTlsConnection* /*tls*/, GTlsCertificate* certificate,
-                                         GTlsCertificateFlags faults, gpointer self) {
-  auto* session = static_cast<RtspSession*>(self);
-  GList* own = session->options_.certificate_file.empty()
-                   ? nullptr
-                   : g_tls_certificate_list_new_from_file(
-                         session->options_.certificate_file.c_str(), nullptr);
-  const bool is_own = g_list_find_custom(own, certificate, [](gconstpointer a, gconstpointer b) {
-                        auto* one = static_cast<GTlsCertificate*>(const_cast<gpointer>(a));
-                        auto* other = static_cast<GTlsCertificate*>(const_cast<gpointer>(b));
-                        return g_tls_certificate_is_same(one, other) != FALSE ? 0 : 1;
-                      }) != nullptr;
-  g_list_free_full(own, &g_object_unref);
-  if (!is_own) session->certificate_faults_ = static_cast<int>(faults);
-  return is_own ? TRUE : FALSE;
-}
-
-// Why there is no connection: GStreamer's library does not say.
-ReadStatus RtspSession::no_tls(const GstRTSPUrl& url, GstRTSPResult result, std::string* error) {
-  if (certificate_faults_ != 0) {
-    *error = "the camera's certificate is refused: " +
-             fault_of(certificate_faults_, options_.certificate_file) +
-             "; if it is the camera's, save it as a PEM file and set certificate_file";
-    // This machine's clock may not be set yet.
-    constexpr int kForGood = kUnknown | G_TLS_CERTIFICATE_BAD_IDENTITY;
-    return (certificate_faults_ & kForGood) != 0 ? ReadStatus::kFailed : ReadStatus::kDisconnected;
-  }
+  if (result == GST_RTSP_OK) return ReadStatus::kOk;
+  status = tls_.refusal(error);
+  if (status != ReadStatus::kOk) return status;
   if (interrupted_ || result == GST_RTSP_ETIMEOUT) return lost(result, error);
-  const ReadStatus plainly = connect_plainly(url, error);
-  if (plainly != ReadStatus::kOk) return plainly;
+  // GStreamer's library does not say why.
+  status = connect_plainly(url, error);
+  if (status != ReadStatus::kOk) return status;
   *error = "the camera answers, but speaks no TLS there; is it the port of rtsp://?";
   return ReadStatus::kDisconnected;
 }
@@ -407,15 +343,7 @@ ReadStatus RtspSession::ping(std::string* error) {
 }
 
 bool RtspSession::readable(double wait_s) const {
-  if (!socket_) {
-    // What came with the last packet waits within TLS, where poll() does not see it.
-    GTlsConnection* tls = gst_rtsp_connection_get_tls(connection_.get(), nullptr);
-    GInputStream* input = tls == nullptr ? nullptr : g_io_stream_get_input_stream(G_IO_STREAM(tls));
-    if (input != nullptr && G_IS_POLLABLE_INPUT_STREAM(input) &&
-        g_pollable_input_stream_is_readable(G_POLLABLE_INPUT_STREAM(input)) != FALSE) {
-      return true;
-    }
-  }
+  if (!socket_ && RtspTls::holds_data(connection_.get())) return true;
   GSocket* const socket = gst_rtsp_connection_get_read_socket(connection_.get());
   pollfd waiting{g_socket_get_fd(socket), POLLIN, 0};
   return ::poll(&waiting, 1, static_cast<int>(1e3 * std::clamp(wait_s, 0.0, kSlice_s))) > 0;

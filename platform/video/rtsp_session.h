@@ -1,7 +1,7 @@
 #pragma once
 // RtspSession: the video of an RTSP camera (RFC 2326), its packets within the RTSP connection or by UDP,
-// with GStreamer's RTSP library; over TLS (rtsps://), by GLib's, only within. Logs in by digest or basic, follows redirections, keeps the session
-// alive. Part of RtpConnection.
+// with GStreamer's RTSP library; over TLS (rtsps://) only within (rtsp_tls.h). Logs in by digest or basic,
+// follows redirections, keeps the session alive. Part of RtpConnection.
 
 #include <gst/rtsp/gstrtspconnection.h>
 
@@ -14,6 +14,7 @@
 
 #include "platform/video/rtp_source.h"
 #include "platform/video/rtp_transport.h"
+#include "platform/video/rtsp_tls.h"
 
 namespace alidade {
 
@@ -44,9 +45,6 @@ class RtspSession : public RtpTransport {
   [[nodiscard]] ReadStatus connect(std::string* error);
   [[nodiscard]] ReadStatus connect_plainly(const GstRTSPUrl& url, std::string* error);
   [[nodiscard]] ReadStatus connect_by_tls(const GstRTSPUrl& url, std::string* error);
-  [[nodiscard]] ReadStatus no_tls(const GstRTSPUrl& url, GstRTSPResult result, std::string* error);
-  static gboolean accept_certificate(GTlsConnection* tls, GTlsCertificate* certificate,
-                                     GTlsCertificateFlags faults, gpointer self);
   [[nodiscard]] ReadStatus describe(std::string* sdp, std::string* error);
   [[nodiscard]] ReadStatus play(const std::string& sdp, std::string* error);
   [[nodiscard]] bool open_ports();
@@ -71,8 +69,9 @@ class RtspSession : public RtpTransport {
   };
 
   const RtpSourceOptions& options_;
-  double deadline_s_ = 0;    // of open()
-  std::string url_;          // after redirections
+  double deadline_s_ = 0;  // of open()
+  std::string url_;        // after redirections
+  RtspTls tls_;
   std::string base_url_;     // what the description's addresses are relative to
   std::string session_url_;  // what PLAY is for; empty: nothing to tear down
   GstRTSPMethod ping_ = GST_RTSP_OPTIONS;
@@ -87,7 +86,6 @@ class RtspSession : public RtpTransport {
   int first_port_ = 0;               // RTP's; RTCP's is the next
   int first_channel_ = 0;            // the same within the connection
   std::deque<Packet> early_;         // came before the answer to PLAY
-  int certificate_faults_ = 0;       // GTlsCertificateFlags of the certificate that was refused
 };
 
 }  // namespace alidade

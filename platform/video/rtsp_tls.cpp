@@ -1,0 +1,85 @@
+#include "platform/video/rtsp_tls.h"
+
+#include <memory>
+
+namespace alidade {
+namespace {
+
+struct Unref {
+  void operator()(void* object) const { g_object_unref(object); }
+};
+
+// Faults for which no authority vouches; the last where one of the same name has another key.
+constexpr int kUnknown = G_TLS_CERTIFICATE_UNKNOWN_CA | G_TLS_CERTIFICATE_GENERIC_ERROR;
+
+// What is wrong with a certificate, the worst first.
+std::string fault_of(int faults, const std::string& file) {
+  if ((faults & kUnknown) != 0) {
+    return file.empty() ? "no authority that is known here has signed it"
+                        : "it is neither in " + file + " nor signed by what is";
+  }
+  if ((faults & G_TLS_CERTIFICATE_BAD_IDENTITY) != 0) return "it is for another name";
+  if ((faults & G_TLS_CERTIFICATE_EXPIRED) != 0) return "it has expired, by this machine's clock";
+  if ((faults & G_TLS_CERTIFICATE_NOT_ACTIVATED) != 0) {
+    return "it is not valid yet, by this machine's clock";
+  }
+  if ((faults & G_TLS_CERTIFICATE_REVOKED) != 0) return "it was revoked";
+  return "it cannot be relied on";
+}
+
+}  // namespace
+
+ReadStatus RtspTls::prepare(GstRTSPConnection* connection, std::string* error) {
+  if (g_tls_backend_supports_tls(g_tls_backend_get_default()) == FALSE) {
+    *error = "this machine has no TLS for RTSP; install the package glib-networking";
+    return ReadStatus::kFailed;
+  }
+  if (!certificate_file_.empty()) {
+    GError* failure = nullptr;
+    const std::unique_ptr<GTlsDatabase, Unref> known(
+        g_tls_file_database_new(certificate_file_.c_str(), &failure));
+    if (!known) {
+      *error = certificate_file_ + ": no certificates in PEM form: " + failure->message;
+      g_error_free(failure);
+      return ReadStatus::kFailed;
+    }
+    gst_rtsp_connection_set_tls_database(connection, known.get());
+  }
+  faults_ = 0;
+  gst_rtsp_connection_set_accept_certificate_func(connection, &RtspTls::accept, this, nullptr);
+  return ReadStatus::kOk;
+}
+
+// Asked about a certificate that did not pass.
+gboolean RtspTls::accept(GTlsConnection* /*tls*/, GTlsCertificate* certificate,
+                         GTlsCertificateFlags faults, gpointer self) {
+  auto* tls = static_cast<RtspTls*>(self);
+  const std::string& file = tls->certificate_file_;
+  GList* own = file.empty() ? nullptr : g_tls_certificate_list_new_from_file(file.c_str(), nullptr);
+  const bool is_own = g_list_find_custom(own, certificate, [](gconstpointer a, gconstpointer b) {
+                        auto* one = static_cast<GTlsCertificate*>(const_cast<gpointer>(a));
+                        auto* other = static_cast<GTlsCertificate*>(const_cast<gpointer>(b));
+                        return g_tls_certificate_is_same(one, other) != FALSE ? 0 : 1;
+                      }) != nullptr;
+  g_list_free_full(own, &g_object_unref);
+  if (!is_own) tls->faults_ = static_cast<int>(faults);
+  return is_own ? TRUE : FALSE;
+}
+
+ReadStatus RtspTls::refusal(std::string* error) const {
+  if (faults_ == 0) return ReadStatus::kOk;
+  *error = "the camera's certificate is refused: " + fault_of(faults_, certificate_file_) +
+           "; if it is the camera's, save it as a PEM file and set certificate_file";
+  // This machine's clock may not be set yet.
+  constexpr int kForGood = kUnknown | G_TLS_CERTIFICATE_BAD_IDENTITY;
+  return (faults_ & kForGood) != 0 ? ReadStatus::kFailed : ReadStatus::kDisconnected;
+}
+
+bool RtspTls::holds_data(GstRTSPConnection* connection) {
+  GTlsConnection* tls = gst_rtsp_connection_get_tls(connection, nullptr);
+  GInputStream* input = tls == nullptr ? nullptr : g_io_stream_get_input_stream(G_IO_STREAM(tls));
+  return input != nullptr && G_IS_POLLABLE_INPUT_STREAM(input) &&
+         g_pollable_input_stream_is_readable(G_POLLABLE_INPUT_STREAM(input)) != FALSE;
+}
+
+}  // namespace alidade

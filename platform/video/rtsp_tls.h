@@ -1,0 +1,38 @@
+#pragma once
+// RtspTls: what RTSP over TLS (rtsps://) asks of a connection of GStreamer's RTSP library, beside RTSP itself: whose
+// certificate is trusted, and what waits within TLS. Part of RtspSession.
+
+#include <gst/rtsp/gstrtspconnection.h>
+
+#include <string>
+#include <utility>
+
+#include "platform/video/frame_source.h"
+
+namespace alidade {
+
+class RtspTls {
+ public:
+  // As RtpSourceOptions::certificate_file.
+  explicit RtspTls(std::string certificate_file) : certificate_file_(std::move(certificate_file)) {}
+  RtspTls(const RtspTls&) = delete;
+  RtspTls& operator=(const RtspTls&) = delete;
+
+  // Before it connects; the connection must not do that after this object's end. kFailed: *error is one line.
+  [[nodiscard]] ReadStatus prepare(GstRTSPConnection* connection, std::string* error);
+
+  // Why it could not connect, if the certificate was refused: then *error is one line. kOk: it was not.
+  [[nodiscard]] ReadStatus refusal(std::string* error) const;
+
+  // Whether something waits within TLS, where poll() on the socket does not see it.
+  [[nodiscard]] static bool holds_data(GstRTSPConnection* connection);
+
+ private:
+  static gboolean accept(GTlsConnection* tls, GTlsCertificate* certificate,
+                         GTlsCertificateFlags faults, gpointer self);
+
+  std::string certificate_file_;
+  int faults_ = 0;  // GTlsCertificateFlags of the certificate that was refused
+};
+
+}  // namespace alidade
