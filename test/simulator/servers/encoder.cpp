@@ -117,7 +117,7 @@ bool VideoEncoder::open(Standard standard, int width, int height, double rate_hz
   av_opt_set(context.priv_data, "forced-idr", "1", 0);
   if (h265) {
     av_opt_set(context.priv_data, "x265-params",
-               "log-level=none:repeat-headers=1:open-gop=0:scenecut=0", 0);
+               "log-level=none:repeat-headers=1:open-gop=0:scenecut=0:pools=none", 0);
   }
   int status = avcodec_open2(&context, encoder, nullptr);
   if (status < 0) return fail(error, av_error(status));
