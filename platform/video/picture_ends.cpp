@@ -68,6 +68,22 @@ bool PictureEnds::lost_its_end(const Picture& picture) const {
   });
 }
 
+// What came in order between the picture asked about before and this one is of a kind that libavformat has no use for, as
+// packets that repair others: it is not lost.
+bool PictureEnds::lost_before(const Picture& picture) const {
+  if (!next_sequence_) return false;
+  const auto behind_the_last = [this](std::uint16_t sequence) {
+    return static_cast<int>(static_cast<std::uint16_t>(sequence - *next_sequence_));
+  };
+  const int between = behind_the_last(picture.first);
+  int came = 0;
+  for (const Picture& other : pictures_) {
+    const bool is_between = other.new_packets > 0 && behind_the_last(other.first) < between;
+    if (is_between && !other.late) came += other.new_packets;
+  }
+  return came != between;
+}
+
 PictureEnds::Loss PictureEnds::loss_of(std::int64_t pts) {
   Picture* const picture = find_piece(pts);
   if (picture == nullptr || picture->new_packets == 0) return {true, true};
@@ -75,10 +91,11 @@ PictureEnds::Loss PictureEnds::loss_of(std::int64_t pts) {
   // libavformat drops what comes too late; what came in order and gave no piece, it had no use for.
   const bool given_out = picture->new_pieces == picture->new_packets || !picture->late;
   const Loss loss{span != picture->new_packets || !given_out || lost_its_end(*picture),
-                  next_sequence_ && picture->first != *next_sequence_};
+                  lost_before(*picture)};
   next_sequence_ = static_cast<std::uint16_t>(picture->last + 1U);
   picture->new_packets = 0;
   picture->new_pieces = 0;
+  picture->late = false;
   return loss;
 }
 

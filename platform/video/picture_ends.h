@@ -59,6 +59,7 @@ class PictureEnds {
 
   [[nodiscard]] Picture* find(std::uint32_t timestamp);
   [[nodiscard]] bool lost_its_end(const Picture& picture) const;
+  [[nodiscard]] bool lost_before(const Picture& picture) const;
   [[nodiscard]] Picture* find_piece(std::int64_t pts);
 
   std::array<Picture, 16> pictures_;  // the latest; more than wait in libavformat for a late packet

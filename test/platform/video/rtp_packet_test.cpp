@@ -317,6 +317,17 @@ TEST_F(PictureLosses, AreBeforeAPictureWhereOthersAreMissing) {
   EXPECT_EQ(picture(4000), Said(false, false));
 }
 
+TEST_F(PictureLosses, AreNoneWherePacketsOfAnotherKindCameBetween) {
+  (void)picture(1000);
+  in(1500, false);  // none of these gives a piece
+  in(1500, false);
+  in(1600, true);
+  EXPECT_EQ(picture(2000), Said(false, false));
+  in(2500, false);
+  ++sequence_;
+  EXPECT_EQ(picture(3000), Said(false, true)) << "one of them is lost";
+}
+
 TEST_F(PictureLosses, AreNoneOfASenderWithoutMarkers) {
   for (std::uint32_t i = 1; i < 10; ++i) {
     (void)pass(1000 * i, false);
