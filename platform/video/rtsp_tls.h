@@ -4,6 +4,7 @@
 
 #include <gst/rtsp/gstrtspconnection.h>
 
+#include <atomic>
 #include <string>
 #include <utility>
 
@@ -32,7 +33,8 @@ class RtspTls {
                          GTlsCertificateFlags faults, gpointer self);
 
   std::string certificate_file_;
-  int faults_ = 0;  // GTlsCertificateFlags of the certificate that was refused
+  // GTlsCertificateFlags of the certificate that was refused. GLib asks on a thread of its own.
+  std::atomic<int> faults_{0};
 };
 
 }  // namespace alidade
