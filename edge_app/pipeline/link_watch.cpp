@@ -22,7 +22,7 @@ void LinkWatch::item(double now_s) {
 
 void LinkWatch::lost(const std::string& reason) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const std::lock_guard<PriorityMutex> lock(mutex_);
     reason_ = reason;
   }
   fresh_ = true;
@@ -42,7 +42,7 @@ LinkHealth LinkWatch::now(double now_s) const {
     if (interval_s >= 0 && longer_s > 0) health.rate_hz = 1 / longer_s;
   }
   if (!health.connected) {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const std::lock_guard<PriorityMutex> lock(mutex_);
     health.reason = reason_;
   }
   return health;
