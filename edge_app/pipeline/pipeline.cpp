@@ -241,10 +241,14 @@ void Pipeline::write_output() {
     OutputMessage message;
     while (stage_.pop(message)) {
       stage_.answer_pulse();
-      account(message);
-      if (!open) continue;
-      open = sink_.write(message.record);
-      account_way(message, monotonic_now_s());
+      count(message);
+      const bool was_open = open;
+      if (open) open = sink_.write(message.record);
+      const double written_s = monotonic_now_s();
+      // Nobody waits for what is logged.
+      log_events(message);
+      if (!was_open) continue;
+      account_way(message, written_s);
       if (open) continue;
       if (sink_.error().empty()) {
         finish();
@@ -292,8 +296,7 @@ void Pipeline::log_old_telemetry(const OrientationRecord& record) {
   old_telemetry_logged_at_s_ = now_s;
 }
 
-void Pipeline::account(const OutputMessage& message) {
-  count(message);
+void Pipeline::log_events(const OutputMessage& message) {
   log_old_telemetry(message.record);
   if (message.events.video_clock_restarted) {
     spdlog::info("{}: clock filter restarted at frame {}", video_.name(), *message.record.frame);

@@ -104,7 +104,7 @@ class Pipeline {
   void feed_calibration();
   void write_output();
   void count(const OutputMessage& message);
-  void account(const OutputMessage& message);
+  void log_events(const OutputMessage& message);
   void log_old_telemetry(const OrientationRecord& record);
   void account_way(const OutputMessage& message, double written_s);
   bool push(const Frame& frame);

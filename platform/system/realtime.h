@@ -42,7 +42,7 @@ struct RealtimeReport {
 // memory is a page fault. Brought in are all data that there are, this program and the C and C++ libraries; what comes later stays
 // once it was touched. Of the other libraries, a hundred MB of codecs, nothing is kept but what is used from now on: what the loader
 // alone has needed is let go. Before other threads are started, so that none of their stacks is brought in as a whole.
-inline constexpr std::size_t kFetchedAlone = std::size_t{1} << 20;  // bytes
+inline constexpr std::size_t kFetchedAlone = std::size_t{512} << 10;  // bytes
 [[nodiscard]] RealtimeReport lock_process_memory();
 
 // Applies the options to the calling thread and touches kPrefaultedStack of its stack, if it has that much.

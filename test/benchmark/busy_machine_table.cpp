@@ -20,6 +20,7 @@
 #include <opencv2/core.hpp>
 #include <string>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "edge_app/pipeline/pipeline.h"
@@ -170,6 +171,13 @@ void measure_telemetry_only(const TurningCamera& camera, const std::string& row,
   writer.write_to(nullptr);
   report->add(row, counted, use_of(realtime_thread) - before);
   pipeline.stop();
+  const PipelineSummary summary = pipeline.summary();
+  nlohmann::json& context = report->context()[row];
+  for (const auto& [part, histogram] :
+       {std::pair{"pushed", &summary.decoding}, std::pair{"waiting", &summary.waiting},
+        std::pair{"computing", &summary.computing}, std::pair{"writing", &summary.writing}}) {
+    context[part] = parts_of(*histogram);
+  }
 }
 
 class Judge {

@@ -33,12 +33,6 @@ constexpr std::size_t kCounted = 1500;  // frames, at least, of each condition
 constexpr double kLongest = 150;        // s, of counting on one link
 constexpr int kPriority = 60;
 
-nlohmann::json parts_of(const LatencyHistogram& histogram) {
-  return {{"p50_s", histogram.quantile(0.5)},
-          {"p99_s", histogram.quantile(0.99)},
-          {"max_s", histogram.longest_s()}};
-}
-
 // Through a link that delivers the images of a camera that began to turn at start_s.
 void measure(const std::string& link, FrameSource* video, const TurningCamera& camera,
              double start_s, const Heard& heard, LatencyReport* report) {

@@ -13,6 +13,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <mutex>
+#include <nlohmann/json.hpp>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <string>
@@ -20,6 +21,7 @@
 #include <vector>
 
 #include "edge_app/output/record_writer.h"
+#include "edge_app/pipeline/latency_histogram.h"
 #include "platform/system/clock.h"
 #include "platform/system/priority_mutex.h"
 #include "platform/system/realtime.h"
@@ -204,5 +206,12 @@ class TimedWriter final : public RecordSink {
   std::vector<double>* target_ = nullptr;
   int oe_ = 0;
 };
+
+// Of a record's way, for the context of a report.
+inline nlohmann::json parts_of(const LatencyHistogram& histogram) {
+  return {{"p50_s", histogram.quantile(0.5)},
+          {"p99_s", histogram.quantile(0.99)},
+          {"max_s", histogram.longest_s()}};
+}
 
 }  // namespace alidade::benchmarks
