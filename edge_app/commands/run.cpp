@@ -139,7 +139,8 @@ int run_live(const RunOptions& options) {
   spdlog::info("{}", describe(pipeline.summary(), of_pipeline.measure_latency));
   log_source_losses(*video);
   if (writer.dropped() > 0)
-    spdlog::warn("{} records not written, as the reader of stdout did not take them", writer.dropped());
+    spdlog::warn("{} records not written, as the reader of stdout did not take them",
+                 writer.dropped());
   if (!pipeline.error().empty()) throw CommandError(kExitFailed, pipeline.error());
   return kExitOk;
 }

@@ -16,7 +16,7 @@
 namespace alidade {
 namespace {
 
-constexpr double kReferenceRow = 0;  // at which angles, rates and q hold
+constexpr double kReferenceRow = 0;         // at which angles, rates and q hold
 constexpr std::size_t kLongestLine = 2048;  // bytes that most lines do not exceed
 
 template <std::size_t kSize>

@@ -28,10 +28,11 @@ struct SessionLimits {
   double window_s = 40;  // of frames
   std::size_t max_frames = 1500;
   std::size_t max_keyframes = 16;
-  std::size_t max_keyframe_bytes = std::size_t{10} << 20;  // of all, packed: 8 of 1080 lines; one stays in any case
-  std::size_t max_samples = 20000;  // of telemetry; without frames nothing else bounds it
-  double telemetry_margin_s = 2;    // kept before the first frame: the clock offset may be so large
-  double keyframes_apart = 0.3;     // of the field of view
+  std::size_t max_keyframe_bytes = std::size_t{10}
+                                   << 20;  // of all, packed: 8 of 1080 lines; one stays in any case
+  std::size_t max_samples = 20000;         // of telemetry; without frames nothing else bounds it
+  double telemetry_margin_s = 2;  // kept before the first frame: the clock offset may be so large
+  double keyframes_apart = 0.3;   // of the field of view
 };
 
 class CalibrationSession {

@@ -12,8 +12,8 @@
 namespace alidade {
 
 struct RealtimeOptions {
-  int priority = 0;  // SCHED_FIFO priority 1..99; 0 leaves the normal scheduling
-  int cpu = -1;      // processor to run on; -1: any
+  int priority = 0;          // SCHED_FIFO priority 1..99; 0 leaves the normal scheduling
+  int cpu = -1;              // processor to run on; -1: any
   bool lock_memory = false;  // lock_process_memory(), first
 };
 

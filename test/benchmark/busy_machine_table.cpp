@@ -183,8 +183,8 @@ void measure_telemetry_only(const TurningCamera& camera, const std::string& row,
 class Judge {
  public:
   void expect(bool holds, const std::string& row, const char* what, double value, double limit) {
-    std::printf("%s %s: %s %.4g, limit %.4g\n", holds ? "holds" : "FAILS", row.c_str(), what,
-                value, limit);
+    std::printf("%s %s: %s %.4g, limit %.4g\n", holds ? "holds" : "FAILS", row.c_str(), what, value,
+                limit);
     all_hold_ = all_hold_ && holds;
   }
   [[nodiscard]] bool all_hold() const { return all_hold_; }
@@ -207,7 +207,8 @@ void measure(Link link, const TurningCamera& camera, const Jpegs& jpegs, Latency
     nlohmann::json& context = report->context()[row];
     context["oe_frames"] = condition.oe;
     context["dropped"] = condition.dropped;
-    context["cpu_s_per_frame"] = condition.cpu_s / static_cast<double>(condition.latencies_s.size());
+    context["cpu_s_per_frame"] =
+        condition.cpu_s / static_cast<double>(condition.latencies_s.size());
   };
   tell(name + "/priority", with);
   tell(name + "/normal", without);

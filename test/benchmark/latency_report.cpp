@@ -94,8 +94,8 @@ int fifo_thread(int priority) {
   for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
     const int thread = std::stoi(task.path().filename().string());
     sched_param parameters{};
-    if (::sched_getscheduler(thread) != SCHED_FIFO ||
-        ::sched_getparam(thread, &parameters) != 0 || parameters.sched_priority != priority) {
+    if (::sched_getscheduler(thread) != SCHED_FIFO || ::sched_getparam(thread, &parameters) != 0 ||
+        parameters.sched_priority != priority) {
       continue;
     }
     if (found >= 0) return -1;

@@ -10,7 +10,8 @@ inline constexpr int kCacheLine = 64;  // bytes; where lines are longer some are
 // The line that holds this address.
 inline void ask_ahead(const void* address) {
   constexpr int kRead = 0;
-  constexpr int kOfUseForLong = 2;  // into the second cache: the first is too small to hold it until then
+  constexpr int kOfUseForLong =
+      2;  // into the second cache: the first is too small to hold it until then
   __builtin_prefetch(address, kRead, kOfUseForLong);
 }
 

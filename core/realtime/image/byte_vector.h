@@ -73,15 +73,15 @@ template <class Word>
 }
 
 [[nodiscard]] inline FloatVector low_floats(ShortVector shorts) {
-  return __builtin_convertvector(reinterpret_cast<IntVector>(shuffle<0, 8, 1, 9, 2, 10, 3, 11>(
-                                     shorts, ShortVector{})),
-                                 FloatVector);
+  return __builtin_convertvector(
+      reinterpret_cast<IntVector>(shuffle<0, 8, 1, 9, 2, 10, 3, 11>(shorts, ShortVector{})),
+      FloatVector);
 }
 
 [[nodiscard]] inline FloatVector high_floats(ShortVector shorts) {
-  return __builtin_convertvector(reinterpret_cast<IntVector>(shuffle<4, 12, 5, 13, 6, 14, 7, 15>(
-                                     shorts, ShortVector{})),
-                                 FloatVector);
+  return __builtin_convertvector(
+      reinterpret_cast<IntVector>(shuffle<4, 12, 5, 13, 6, 14, 7, 15>(shorts, ShortVector{})),
+      FloatVector);
 }
 
 }  // namespace internal

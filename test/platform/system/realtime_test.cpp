@@ -5,8 +5,8 @@
 extern "C" {
 #include <libavcodec/avcodec.h>
 }
-#include <pthread.h>
 #include <fcntl.h>
+#include <pthread.h>
 #include <sched.h>
 #include <sys/mman.h>
 #include <sys/resource.h>
@@ -265,8 +265,8 @@ TEST(LockProcessMemory, LetsGoOfFilesThatNobodyNeedsAnyMore) {
   const std::string name = directory.write("tables", std::string(kSize, 'x'));
   const int result = in_child([&] {
     const FileDescriptor file(::open(name.c_str(), O_RDONLY | O_CLOEXEC));
-    const auto* const tables = static_cast<const char*>(
-        ::mmap(nullptr, kSize, PROT_READ, MAP_PRIVATE, file.get(), 0));
+    const auto* const tables =
+        static_cast<const char*>(::mmap(nullptr, kSize, PROT_READ, MAP_PRIVATE, file.get(), 0));
     if (tables == MAP_FAILED) return 1;
     const auto is_whole = [&] {
       return std::count(tables, tables + kSize, 'x') == static_cast<std::ptrdiff_t>(kSize);
