@@ -1,6 +1,7 @@
 #include "edge_app/pipeline/link_watch.h"
 
 #include <algorithm>
+#include <mutex>
 
 namespace alidade {
 
