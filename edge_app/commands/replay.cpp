@@ -49,7 +49,7 @@ class OrientationFile {
                                           std::generic_category().message(errno) +
                                           "; give a directory that can be written with -o");
     }
-    writer_.emplace(descriptor_, OutputFormat::kCsv, path_.string());
+    writer_.emplace(descriptor_, OutputFormat::kCsv, path_.string(), RecordWriter::Stalled::kWait);
   }
   ~OrientationFile() {
     ::close(descriptor_);
@@ -217,7 +217,8 @@ int replay_recording(const ReplayOptions& options) {
                            : options.directory);
   std::optional<RecordWriter> out;
   if (options.json || options.csv) {
-    out.emplace(STDOUT_FILENO, options.json ? OutputFormat::kJson : OutputFormat::kCsv, "stdout");
+    out.emplace(STDOUT_FILENO, options.json ? OutputFormat::kJson : OutputFormat::kCsv, "stdout",
+                RecordWriter::Stalled::kWait);
   }
 
   const bool progress = is_terminal(STDERR_FILENO);

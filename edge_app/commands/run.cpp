@@ -100,16 +100,17 @@ int run_live(const RunOptions& options) {
   if (options.csv) format = OutputFormat::kCsv;
 
   StopSignals signals;
-  if (config.realtime.lock_memory && !use_small_stacks())
-    spdlog::warn("threads have stacks of the usual size, all of which is locked");
   const auto video = make_frame_source(config.video, config.realtime.landmarks);
   const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
   spdlog::info("video: {}; pan/tilt: {}", video->name(), pan_tilt->name());
   spdlog::info("real-time thread: {}", describe(of_pipeline.realtime));
-  RecordWriter writer(STDOUT_FILENO, format.value_or(OutputFormat::kJson), "stdout");
+  // A recording's records come as fast as they are taken, and none is to be missing.
+  const auto stalled =
+      is_recording(config) ? RecordWriter::Stalled::kWait : RecordWriter::Stalled::kDrop;
+  RecordWriter writer(STDOUT_FILENO, format.value_or(OutputFormat::kJson), "stdout", stalled);
   LiveState live;
   RecordSinks sinks;
-  // First, so that a slow reader of stdout holds up no record that others wait for.
+  // First: these are there at once.
   if (config.output.http) sinks.add(&live);
   if (format) sinks.add(&writer);
   ImageTap tap;
@@ -138,7 +139,8 @@ int run_live(const RunOptions& options) {
   spdlog::info("{}", describe(pipeline.summary(), of_pipeline.measure_latency));
   log_source_losses(*video);
   if (writer.dropped() > 0)
-    spdlog::warn("{} records not taken by a stalled reader at the end", writer.dropped());
+    spdlog::warn("{} records not written, as the reader of stdout did not take them",
+                 writer.dropped());
   if (!pipeline.error().empty()) throw CommandError(kExitFailed, pipeline.error());
   return kExitOk;
 }

@@ -65,8 +65,8 @@ void LifeReport::tell() {
     pipeline_.ask_for_pulse();
   } else if (lived_) {
     spdlog::error(
-        "no record gets through: the reader of stdout stalls, or a thread hangs; systemd is no "
-        "longer told that this process lives");
+        "no record gets through: a thread hangs; systemd is no longer told that this process "
+        "lives");
   }
   lived_ = lives;
   const double now_s = monotonic_now_s();

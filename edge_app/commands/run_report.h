@@ -12,7 +12,7 @@ namespace alidade {
 [[nodiscard]] std::string describe(const PipelineSummary& summary, bool latency_measured);
 
 // Tells a service manager, once a period, what goes on, and that the process lives as long as records get through. A
-// camera that is gone is no reason to be killed; a thread that hangs is, and so is a reader of stdout that stalls.
+// camera that is gone is no reason to be killed; a thread that hangs is.
 class LifeReport {
  public:
   // Borrows both.

@@ -57,7 +57,7 @@ struct CalibrationConfig {
 
 struct RealtimeConfig {
   bool landmarks = true;  // mode OE; false: PT, and nothing is calibrated
-  int priority = 0;       // SCHED_FIFO priority; 0 leaves the scheduler alone
+  int priority = 0;       // SCHED_FIFO priority, see priority_of(); 0 leaves the scheduler alone
   int cpu = -1;           // -1: any
   bool lock_memory = false;
   double max_extrapolation_s = 0.25;  // how far beyond the newest telemetry an angle is stated

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <mutex>
 #include <random>
 
 #include "edge_app/output/record_format.h"
@@ -34,7 +35,7 @@ bool LiveState::write(const OrientationRecord& record) {
   std::shared_ptr<const std::string> line;
   bool followed = false;
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const std::lock_guard<PriorityMutex> lock(mutex_);
     followed = !readers_.empty();
   }
   if (followed) {
@@ -43,7 +44,7 @@ bool LiveState::write(const OrientationRecord& record) {
     line = std::make_shared<const std::string>(std::move(text));
   }
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const std::lock_guard<PriorityMutex> lock(mutex_);
     if (!newest_ || !same(newest_->camera, record.camera)) calibration_since_s_ = monotonic_now_s();
     newest_ = record;
     if (record.orientation) newest_oriented_ = record;
@@ -96,17 +97,17 @@ void LiveState::add_to_history(const OrientationRecord& record) {
 }
 
 std::optional<OrientationRecord> LiveState::newest() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<PriorityMutex> lock(mutex_);
   return newest_;
 }
 
 std::optional<OrientationRecord> LiveState::newest_oriented() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<PriorityMutex> lock(mutex_);
   return newest_oriented_;
 }
 
 FrameSearch LiveState::find(std::int64_t frame, OrientationRecord* record) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<PriorityMutex> lock(mutex_);
   if (kept_.empty()) return FrameSearch::kNoneYet;
   const auto found = std::find_if(kept_.rbegin(), kept_.rend(),
                                   [frame](const auto& one) { return *one.frame == frame; });
@@ -116,7 +117,7 @@ FrameSearch LiveState::find(std::int64_t frame, OrientationRecord* record) const
 }
 
 FrameSearch LiveState::find_at(double time_s, OrientationRecord* record) const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<PriorityMutex> lock(mutex_);
   if (kept_.empty()) return FrameSearch::kNoneYet;
   const auto time_of = [this](std::size_t i) { return *kept_[i].time_s; };
   const auto after = std::partition_point(
@@ -136,12 +137,12 @@ FrameSearch LiveState::find_at(double time_s, OrientationRecord* record) const {
 }
 
 std::vector<HistorySample> LiveState::history() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<PriorityMutex> lock(mutex_);
   return {history_.begin(), history_.end()};
 }
 
 std::optional<double> LiveState::calibration_since_s() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<PriorityMutex> lock(mutex_);
   if (!newest_) return std::nullopt;
   return calibration_since_s_;
 }
@@ -157,27 +158,27 @@ ReaderCounters LiveState::counters_of(const Reader& reader) const {
 }
 
 std::vector<ReaderCounters> LiveState::readers() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<PriorityMutex> lock(mutex_);
   std::vector<ReaderCounters> out;
   for (const Reader* reader : readers_) out.push_back(counters_of(*reader));
   return out;
 }
 
 std::int64_t LiveState::lost_by_readers() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<PriorityMutex> lock(mutex_);
   std::int64_t lost = lost_by_past_readers_;
   for (const Reader* reader : readers_) lost += counters_of(*reader).lost;
   return lost;
 }
 
 LiveState::Reader::Reader(LiveState* state) : state_(state) {
-  const std::lock_guard<std::mutex> lock(state_->mutex_);
+  const std::lock_guard<PriorityMutex> lock(state_->mutex_);
   next_ = state_->last_id_ + 1;
   state_->readers_.push_back(this);
 }
 
 LiveState::Reader::~Reader() {
-  const std::lock_guard<std::mutex> lock(state_->mutex_);
+  const std::lock_guard<PriorityMutex> lock(state_->mutex_);
   state_->readers_.remove(this);
   state_->lost_by_past_readers_ += state_->counters_of(*this).lost;
 }
@@ -185,7 +186,7 @@ LiveState::Reader::~Reader() {
 LiveState::News LiveState::Reader::take() {
   News news;
   LiveState& state = *state_;
-  const std::lock_guard<std::mutex> lock(state.mutex_);
+  const std::lock_guard<PriorityMutex> lock(state.mutex_);
   const std::int64_t oldest = state.oldest_line();
   if (next_ < oldest) {
     news.lost = oldest - next_;

@@ -13,13 +13,13 @@
 #include <limits>
 #include <list>
 #include <memory>
-#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "edge_app/pipeline/orientation_record.h"
+#include "platform/system/priority_mutex.h"
 
 namespace alidade {
 
@@ -118,7 +118,7 @@ class LiveState final : public RecordSink {
 
   std::function<void()> on_news_ = [] {};
 
-  mutable std::mutex mutex_;
+  mutable PriorityMutex mutex_;  // the output thread writes before those who read
   std::optional<OrientationRecord> newest_;
   std::optional<OrientationRecord> newest_oriented_;
   double calibration_since_s_ = 0;

@@ -1,112 +1,220 @@
 #include "edge_app/output/record_format.h"
 
-#include <cmath>
-#include <nlohmann/json.hpp>
-#include <vector>
+#include <fmt/compile.h>
+#include <fmt/format.h>
 
-#include "edge_app/output/or_null.h"
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <iterator>
+#include <optional>
+#include <string_view>
+#include <type_traits>
+#include <utility>
 
 namespace alidade {
 namespace {
 
-using Json = nlohmann::ordered_json;
+constexpr double kReferenceRow = 0;         // at which angles, rates and q hold
+constexpr std::size_t kLongestLine = 2048;  // bytes that most lines do not exceed
 
-constexpr double kReferenceRow = 0;  // at which angles, rates and q hold
+template <std::size_t kSize>
+using Columns = std::array<const char*, kSize>;
+constexpr Columns<4> kQ = {"q_x", "q_y", "q_z", "q_w"};
+constexpr Columns<3> kSigma = {"orientation_sigma_rad_0", "orientation_sigma_rad_1",
+                               "orientation_sigma_rad_2"};
+constexpr Columns<9> kCovariance = {
+    "orientation_covariance_rad2_0", "orientation_covariance_rad2_1",
+    "orientation_covariance_rad2_2", "orientation_covariance_rad2_3",
+    "orientation_covariance_rad2_4", "orientation_covariance_rad2_5",
+    "orientation_covariance_rad2_6", "orientation_covariance_rad2_7",
+    "orientation_covariance_rad2_8"};
 
-struct Field {
-  const char* name;
-  Json value;
-  std::vector<const char*> columns;  // CSV columns of an array; empty: one column, of the same name
+// All fields in their order, each to line.add(name, value) or line.add(name, columns, values).
+template <class Line>
+void add_fields(const OrientationRecord& record, Line* line) {
+  using Orientation = OrientationRecord::Orientation;
+  // A member of the orientation, if there is one.
+  const auto of_orientation = [&record](auto member) {
+    using Member = std::decay_t<decltype(std::declval<Orientation>().*member)>;
+    return record.orientation ? std::optional<Member>((*record.orientation).*member) : std::nullopt;
+  };
+  line->add("frame", record.frame);
+  line->add("time_s", record.time_s);
+  line->add("receive_time_s", record.receive_time_s);
+  line->add("mode", std::string_view(to_string(record.mode)));
+  line->add("status", std::string_view(to_string(record.status)));
+  line->add("calibrated", record.calibrated);
+  line->add("calibration", std::string_view(to_string(record.calibration.activity)));
+  std::optional<std::string_view> needs;
+  if (record.calibration.need != CalibrationNeed::kNothing)
+    needs = to_string(record.calibration.need);
+  line->add("needs", needs);
+  line->add("pan_rad", of_orientation(&Orientation::pan_rad));
+  line->add("tilt_rad", of_orientation(&Orientation::tilt_rad));
+  line->add("pan_rate_rad_s", of_orientation(&Orientation::pan_rate_rad_s));
+  line->add("tilt_rate_rad_s", of_orientation(&Orientation::tilt_rate_rad_s));
+  line->add("pan_acceleration_rad_s2", of_orientation(&Orientation::pan_acceleration_rad_s2));
+  line->add("tilt_acceleration_rad_s2", of_orientation(&Orientation::tilt_acceleration_rad_s2));
+  line->add("q_base_from_camera", kQ, of_orientation(&Orientation::q_base_from_camera));
+  line->add("orientation_sigma_rad", kSigma, of_orientation(&Orientation::sigma_rad));
+  line->add("orientation_covariance_rad2", kCovariance,
+            of_orientation(&Orientation::covariance_rad2));
+  line->add("reference_row", kReferenceRow);
+  line->add("landmarks", std::int64_t{record.landmarks});
+  line->add("residual_px", record.residual_px);
+  line->add("line_delay_s", record.camera.line_delay);
+  line->add("focal_length_px", record.camera.focal_length);
+  line->add("aspect", record.camera.aspect);
+  line->add("radial_distortion", record.camera.radial_distortion);
+  line->add("latency_s", record.latency_s);
+  line->add("telemetry_age_s", record.telemetry_age_s);
+}
+
+// One line, in memory of its own; what has no value is said by the word that the kind of line has for that.
+class Text {
+ public:
+  explicit Text(std::string_view nothing) : nothing_(nothing) { text_.reserve(kLongestLine); }
+
+  void put(std::string_view text) { text_.append(text); }
+  void put(char one) { text_.push_back(one); }
+  void put_value(bool value) { put(value ? "true" : "false"); }
+  void put_value(std::int64_t value) {
+    fmt::format_to(std::back_inserter(text_), FMT_COMPILE("{}"), value);
+  }
+  // What is not finite has no value.
+  void put_value(double value) {
+    if (!std::isfinite(value)) return put(nothing_);
+    const std::size_t begin = text_.size();
+    fmt::format_to(std::back_inserter(text_), FMT_COMPILE("{}"), value);
+    // A number that could be a whole one is still seen to be a measured one.
+    if (text_.find_first_of(".e", begin) == std::string::npos) put(".0");
+  }
+  template <class T>
+  void put_value(const std::optional<T>& value) {
+    value ? put_value(*value) : put(nothing_);
+  }
+
+ protected:
+  // Replaces the comma behind the last field.
+  [[nodiscard]] std::string take(std::string_view end) {
+    text_.pop_back();
+    put(end);
+    return std::move(text_);
+  }
+
+ private:
+  std::string_view nothing_;
+  std::string text_;
 };
 
-std::vector<Field> fields(const OrientationRecord& record) {
-  // A member of the orientation, null where there is none.
-  const auto of_orientation = [&record](auto member) {
-    return record.orientation ? Json((*record.orientation).*member) : Json();
-  };
-  using Orientation = OrientationRecord::Orientation;
-  return {
-      {"frame", or_null(record.frame), {}},
-      {"time_s", or_null(record.time_s), {}},
-      {"receive_time_s", record.receive_time_s, {}},
-      {"mode", to_string(record.mode), {}},
-      {"status", to_string(record.status), {}},
-      {"calibrated", record.calibrated, {}},
-      {"calibration", to_string(record.calibration.activity), {}},
-      {"needs",
-       record.calibration.need == CalibrationNeed::kNothing
-           ? Json()
-           : Json(to_string(record.calibration.need)),
-       {}},
-      {"pan_rad", of_orientation(&Orientation::pan_rad), {}},
-      {"tilt_rad", of_orientation(&Orientation::tilt_rad), {}},
-      {"pan_rate_rad_s", of_orientation(&Orientation::pan_rate_rad_s), {}},
-      {"tilt_rate_rad_s", of_orientation(&Orientation::tilt_rate_rad_s), {}},
-      {"pan_acceleration_rad_s2", of_orientation(&Orientation::pan_acceleration_rad_s2), {}},
-      {"tilt_acceleration_rad_s2", of_orientation(&Orientation::tilt_acceleration_rad_s2), {}},
-      {"q_base_from_camera",
-       of_orientation(&Orientation::q_base_from_camera),
-       {"q_x", "q_y", "q_z", "q_w"}},
-      {"orientation_sigma_rad",
-       of_orientation(&Orientation::sigma_rad),
-       {"orientation_sigma_rad_0", "orientation_sigma_rad_1", "orientation_sigma_rad_2"}},
-      {"orientation_covariance_rad2",
-       of_orientation(&Orientation::covariance_rad2),
-       {"orientation_covariance_rad2_0", "orientation_covariance_rad2_1",
-        "orientation_covariance_rad2_2", "orientation_covariance_rad2_3",
-        "orientation_covariance_rad2_4", "orientation_covariance_rad2_5",
-        "orientation_covariance_rad2_6", "orientation_covariance_rad2_7",
-        "orientation_covariance_rad2_8"}},
-      {"reference_row", kReferenceRow, {}},
-      {"landmarks", record.landmarks, {}},
-      {"residual_px", or_null(record.residual_px), {}},
-      {"line_delay_s", record.camera.line_delay, {}},
-      {"focal_length_px", record.camera.focal_length, {}},
-      {"aspect", record.camera.aspect, {}},
-      {"radial_distortion", record.camera.radial_distortion, {}},
-      {"latency_s", or_null(record.latency_s), {}},
-      {"telemetry_age_s", or_null(record.telemetry_age_s), {}},
-  };
-}
+class JsonLine : public Text {
+ public:
+  JsonLine() : Text("null") { put('{'); }
 
-std::string csv_cell(const Json& value) {
-  // What is not finite has no value, as in JSON.
-  const bool not_finite = value.is_number_float() && !std::isfinite(value.get<double>());
-  if (value.is_null() || not_finite) return "";
-  return value.is_string() ? value.get<std::string>() : value.dump();
-}
+  template <class T>
+  void add(std::string_view name, const T& value) {
+    put_name(name);
+    put_json(value);
+    put(',');
+  }
+  template <std::size_t kSize>
+  void add(std::string_view name, const Columns<kSize>&,
+           const std::optional<std::array<double, kSize>>& values) {
+    put_name(name);
+    if (!values) {
+      put("null,");
+      return;
+    }
+    char before = '[';
+    for (const double value : *values) {
+      put(before);
+      put_value(value);
+      before = ',';
+    }
+    put("],");
+  }
+  [[nodiscard]] std::string line() { return take("}\n"); }
 
-// Replaces the comma after the last cell.
-void end_line(std::string& line) { line.back() = '\n'; }
+ private:
+  void put_name(std::string_view name) {
+    put('"');
+    put(name);
+    put("\":");
+  }
+  // Our own words have nothing in them that JSON would want changed.
+  void put_json(std::string_view word) {
+    put('"');
+    put(word);
+    put('"');
+  }
+  void put_json(const std::optional<std::string_view>& word) {
+    word ? put_json(*word) : put("null");
+  }
+  template <class T>
+  void put_json(const T& value) {
+    put_value(value);
+  }
+};
+
+class CsvLine : public Text {
+ public:
+  CsvLine() : Text("") {}
+
+  void add(std::string_view, std::string_view word) {
+    put(word);
+    put(',');
+  }
+  void add(std::string_view, const std::optional<std::string_view>& word) {
+    put(word.value_or(""));
+    put(',');
+  }
+  template <class T>
+  void add(std::string_view, const T& value) {
+    put_value(value);
+    put(',');
+  }
+  template <std::size_t kSize>
+  void add(std::string_view, const Columns<kSize>&,
+           const std::optional<std::array<double, kSize>>& values) {
+    for (std::size_t i = 0; i < kSize; ++i) {
+      if (values) put_value((*values)[i]);
+      put(',');
+    }
+  }
+  [[nodiscard]] std::string line() { return take("\n"); }
+};
+
+class CsvHeader : public Text {
+ public:
+  CsvHeader() : Text("") {}
+
+  template <class T>
+  void add(std::string_view name, const T&) {
+    put(name);
+    put(',');
+  }
+  template <std::size_t kSize, class T>
+  void add(std::string_view, const Columns<kSize>& columns, const T&) {
+    for (const char* column : columns) add(column, nullptr);
+  }
+  [[nodiscard]] std::string line() { return take("\n"); }
+};
+
+template <class Line>
+std::string line_of(const OrientationRecord& record) {
+  Line line;
+  add_fields(record, &line);
+  return line.line();
+}
 
 }  // namespace
 
-std::string json_line(const OrientationRecord& record) {
-  Json object;
-  for (Field& field : fields(record)) object[field.name] = std::move(field.value);
-  return object.dump() + "\n";
-}
+std::string json_line(const OrientationRecord& record) { return line_of<JsonLine>(record); }
 
-std::string csv_header() {
-  std::string line;
-  for (const Field& field : fields(OrientationRecord())) {
-    if (field.columns.empty()) line.append(field.name).append(",");
-    for (const char* column : field.columns) line.append(column).append(",");
-  }
-  end_line(line);
-  return line;
-}
+std::string csv_header() { return line_of<CsvHeader>(OrientationRecord()); }
 
-std::string csv_line(const OrientationRecord& record) {
-  std::string line;
-  for (const Field& field : fields(record)) {
-    if (field.columns.empty()) line.append(csv_cell(field.value)).append(",");
-    for (std::size_t i = 0; i < field.columns.size(); ++i) {
-      line.append(field.value.is_null() ? "" : csv_cell(field.value[i])).append(",");
-    }
-  }
-  end_line(line);
-  return line;
-}
+std::string csv_line(const OrientationRecord& record) { return line_of<CsvLine>(record); }
 
 }  // namespace alidade

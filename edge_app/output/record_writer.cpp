@@ -9,8 +9,9 @@
 #include <utility>
 namespace alidade {
 
-RecordWriter::RecordWriter(int descriptor, OutputFormat format, std::string name)
+RecordWriter::RecordWriter(int descriptor, OutputFormat format, std::string name, Stalled stalled)
     : descriptor_(descriptor),
+      stalled_(stalled),
       wake_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
       format_(format),
       name_(std::move(name)),
@@ -26,35 +27,47 @@ void RecordWriter::interrupt() {
 }
 
 bool RecordWriter::write(const OrientationRecord& record) {
-  const std::string line = format_ == OutputFormat::kCsv ? csv_line(record) : json_line(record);
-  if (!header_pending_) return write_text(line);
-  header_pending_ = false;
-  return write_text(csv_header() + line);
+  // A record that was begun is ended before the next one.
+  if (!write_rest()) return false;
+  bool taken = false;
+  if (rest_.empty()) {
+    rest_ = format_ == OutputFormat::kCsv ? csv_line(record) : json_line(record);
+    if (header_pending_) rest_.insert(0, csv_header());
+    const std::size_t size = rest_.size();
+    if (!write_rest()) return false;
+    taken = rest_.size() < size;
+    if (!taken) rest_.clear();
+  }
+  if (taken) {
+    header_pending_ = false;
+  } else {
+    ++dropped_;
+  }
+  return true;
 }
 
 RecordWriter::Ready RecordWriter::wait_until_writable() {
   pollfd descriptors[] = {{descriptor_, POLLOUT, 0}, {wake_, POLLIN, 0}};
+  const int patience_ms = stalled_ == Stalled::kWait ? -1 : 0;
   int ready = 0;
   do {
-    ready = ::poll(descriptors, 2, -1);
+    ready = ::poll(descriptors, 2, patience_ms);
   } while (ready < 0 && errno == EINTR);
   if (ready < 0) return Ready::kFailed;
   // POLLERR or POLLHUP: let write(2) say what is wrong.
   return descriptors[0].revents != 0 ? Ready::kYes : Ready::kNo;
 }
 
-bool RecordWriter::write_text(const std::string& text) {
+// As much of it as is to be written now.
+bool RecordWriter::write_rest() {
   std::size_t written = 0;
-  while (written < text.size()) {
+  while (written < rest_.size()) {
     const Ready ready = wait_until_writable();
-    if (ready == Ready::kNo) {
-      ++dropped_;
-      return true;
-    }
+    if (ready == Ready::kNo) break;
     // A pipe that polls writable takes PIPE_BUF (4096) bytes, more than any record, without waiting.
-    const ssize_t count = ready == Ready::kFailed
-                              ? -1
-                              : ::write(descriptor_, text.data() + written, text.size() - written);
+    const ssize_t count = ready == Ready::kFailed ? -1
+                                                  : ::write(descriptor_, rest_.data() + written,
+                                                            rest_.size() - written);
     if (count < 0 && (errno == EINTR || errno == EAGAIN)) continue;
     if (count < 0) {
       if (errno != EPIPE) {
@@ -64,6 +77,7 @@ bool RecordWriter::write_text(const std::string& text) {
     }
     written += static_cast<std::size_t>(count);
   }
+  rest_.erase(0, written);
   return true;
 }
 

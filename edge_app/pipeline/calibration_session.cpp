@@ -62,6 +62,12 @@ void CalibrationSession::add_keyframe(const ImageView& image) {
   const FrameStamp& stamp = frames_.back().stamp;
   images_.push_back({stamp.frame, stamp.receive_time_s, last_angle_.pan, last_angle_.tilt,
                      std::make_shared<PackedImage>(image)});
+  const auto bytes = [this] {
+    std::size_t sum = 0;
+    for (const KeptImage& kept : images_) sum += kept.image->bytes();
+    return sum;
+  };
+  while (images_.size() > 1 && bytes() > limits_.max_keyframe_bytes) images_.erase(images_.begin());
 }
 
 std::vector<FrameStamp> CalibrationSession::stamps() const {

@@ -28,9 +28,11 @@ struct SessionLimits {
   double window_s = 40;  // of frames
   std::size_t max_frames = 1500;
   std::size_t max_keyframes = 16;
-  std::size_t max_samples = 20000;  // of telemetry; without frames nothing else bounds it
-  double telemetry_margin_s = 2;    // kept before the first frame: the clock offset may be so large
-  double keyframes_apart = 0.3;     // of the field of view
+  std::size_t max_keyframe_bytes = std::size_t{10}
+                                   << 20;  // of all, packed: 8 of 1080 lines; one stays in any case
+  std::size_t max_samples = 20000;         // of telemetry; without frames nothing else bounds it
+  double telemetry_margin_s = 2;  // kept before the first frame: the clock offset may be so large
+  double keyframes_apart = 0.3;   // of the field of view
 };
 
 class CalibrationSession {
@@ -45,7 +47,8 @@ class CalibrationSession {
   void add(const PanTiltSample& sample);
   // Whether the head points where no image was taken yet. False without frames or telemetry.
   [[nodiscard]] bool wants_keyframe(const Camera<double>& camera) const;
-  // The image of the frame last added; copied. Takes the place of the oldest where there are enough. Needs a frame.
+  // The image of the frame last added; copied. Takes the place of the oldest where there are enough, or
+  // where they take too much memory. Needs a frame.
   void add_keyframe(const ImageView& image);
 
   [[nodiscard]] bool empty() const { return frames_.empty(); }

@@ -1,6 +1,7 @@
 #include "edge_app/pipeline/link_watch.h"
 
 #include <algorithm>
+#include <mutex>
 
 namespace alidade {
 
@@ -22,7 +23,7 @@ void LinkWatch::item(double now_s) {
 
 void LinkWatch::lost(const std::string& reason) {
   {
-    const std::lock_guard<std::mutex> lock(mutex_);
+    const std::lock_guard<PriorityMutex> lock(mutex_);
     reason_ = reason;
   }
   fresh_ = true;
@@ -30,7 +31,7 @@ void LinkWatch::lost(const std::string& reason) {
 }
 
 void LinkWatch::waiting(const std::string& reason) {
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<PriorityMutex> lock(mutex_);
   waiting_ = reason;
 }
 
@@ -46,7 +47,7 @@ LinkHealth LinkWatch::now(double now_s) const {
     const double longer_s = std::max(interval_s, age_s);
     if (interval_s >= 0 && longer_s > 0) health.rate_hz = 1 / longer_s;
   }
-  const std::lock_guard<std::mutex> lock(mutex_);
+  const std::lock_guard<PriorityMutex> lock(mutex_);
   if (!waiting_.empty()) {
     health.reason = waiting_;
   } else if (!health.connected) {

@@ -9,9 +9,10 @@
 
 #include <atomic>
 #include <cstdint>
-#include <mutex>
 #include <optional>
 #include <string>
+
+#include "platform/system/priority_mutex.h"
 
 namespace alidade {
 
@@ -45,7 +46,7 @@ class LinkWatch {
   std::atomic<double> interval_s_{-1};  // < 0: fewer than two items of this connection
   int intervals_ = 0;                   // reading thread: that interval_s_ is the mean of
   bool fresh_ = true;                   // reading thread: the next item is its connection's first
-  mutable std::mutex mutex_;
+  mutable PriorityMutex mutex_;
   std::string reason_;   // guarded by mutex_
   std::string waiting_;  // guarded by mutex_
 };

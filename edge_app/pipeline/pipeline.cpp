@@ -19,6 +19,11 @@ namespace {
 constexpr double kDropLogInterval_s = 1;
 constexpr double kOldTelemetryLogInterval_s = 60;
 
+void log_granted(const char* whose, const RealtimeReport& report) {
+  spdlog::log(report.warnings.empty() ? spdlog::level::info : spdlog::level::warn, "{}: {}", whose,
+              report.line());
+}
+
 }  // namespace
 
 Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink,
@@ -43,6 +48,7 @@ Pipeline::~Pipeline() {
 }
 
 void Pipeline::start() {
+  if (options_.realtime.lock_memory) log_granted("memory", lock_process_memory());
   // The consumers first, so that nothing is dropped at the start.
   threads_.emplace_back(&Pipeline::write_output, this);
   if (calibration_ != nullptr) threads_.emplace_back(&Pipeline::calibrate, this);
@@ -63,7 +69,7 @@ void Pipeline::stop() {
 }
 
 PipelineSummary Pipeline::summary() const {
-  std::unique_lock<std::mutex> lock(summary_mutex_);
+  std::unique_lock<PriorityMutex> lock(summary_mutex_);
   PipelineSummary summary = summary_;
   summary.page_faults = page_faults_;
   lock.unlock();
@@ -124,8 +130,22 @@ bool Pipeline::push(const Frame& frame) {
   return true;
 }
 
+// The calling thread's scheduling. What is not permitted the real-time thread has said: it asks for more.
+void Pipeline::take_place(ThreadDuty duty) const {
+  const int priority = priority_of(duty, options_.realtime.priority);
+  if (priority > 0 || options_.realtime.lock_memory)
+    static_cast<void>(apply_realtime({priority, -1, false}));
+}
+
 void Pipeline::capture() {
-  const auto on_frame = [this](const Frame& frame) { return check_size(frame) && push(frame); };
+  // A link's own thread is started by the first read, and with the caller's scheduling; from the first frame on this one decodes.
+  take_place(ThreadDuty::kBrief);
+  bool decodes = false;
+  const auto on_frame = [&](const Frame& frame) {
+    if (!decodes) take_place(ThreadDuty::kDecoding);
+    decodes = true;
+    return check_size(frame) && push(frame);
+  };
   const auto on_loss = [this](double now_s) {
     VideoMessage message;
     message.kind = VideoMessage::Kind::kLost;
@@ -138,6 +158,7 @@ void Pipeline::capture() {
 }
 
 void Pipeline::read_telemetry() {
+  take_place(ThreadDuty::kBrief);
   const auto on_sample = [this](const PanTiltSample& sample) {
     stage_.push(TelemetryMessage{TelemetryMessage::Kind::kSample, sample});
     return true;
@@ -152,9 +173,8 @@ void Pipeline::read_telemetry() {
 
 void Pipeline::run_realtime() {
   // Start-up: the last that may allocate or log on this thread.
-  const RealtimeReport report = apply_realtime(options_.realtime);
-  spdlog::log(report.warnings.empty() ? spdlog::level::info : spdlog::level::warn,
-              "real-time thread: {}", report.line());
+  log_granted("real-time thread",
+              apply_realtime({options_.realtime.priority, options_.realtime.cpu, false}));
   faults_at_start_ = thread_page_faults();
   realtime_thread_.store(this_thread(), std::memory_order_release);
   do {
@@ -163,7 +183,7 @@ void Pipeline::run_realtime() {
   const PageFaults at_end = thread_page_faults();
   realtime_thread_.store(0, std::memory_order_release);
   // Nothing is in a hurry here.
-  const std::lock_guard<std::mutex> lock(summary_mutex_);
+  const std::lock_guard<PriorityMutex> lock(summary_mutex_);
   page_faults_ = {at_end.minor - faults_at_start_.minor, at_end.major - faults_at_start_.major};
 }
 
@@ -216,6 +236,7 @@ void Pipeline::calibrate() {
 }
 
 void Pipeline::write_output() {
+  take_place(ThreadDuty::kBrief);
   bool open = true;
   bool last = false;
   while (!last) {
@@ -224,10 +245,14 @@ void Pipeline::write_output() {
     OutputMessage message;
     while (stage_.pop(message)) {
       stage_.answer_pulse();
-      account(message);
-      if (!open) continue;
-      open = sink_.write(message.record);
-      account_way(message, monotonic_now_s());
+      count(message);
+      const bool was_open = open;
+      if (open) open = sink_.write(message.record);
+      const double written_s = monotonic_now_s();
+      // Nobody waits for what is logged.
+      log_events(message);
+      if (!was_open) continue;
+      account_way(message, written_s);
       if (open) continue;
       if (sink_.error().empty()) {
         finish();
@@ -242,7 +267,7 @@ void Pipeline::write_output() {
 
 void Pipeline::account_way(const OutputMessage& message, double written_s) {
   if (!message.record.frame || !options_.measure_latency) return;
-  const std::lock_guard<std::mutex> lock(summary_mutex_);
+  const std::lock_guard<PriorityMutex> lock(summary_mutex_);
   summary_.decoding.add(message.decoded_s - message.record.receive_time_s);
   summary_.waiting.add(message.taken_s - message.decoded_s);
   summary_.computing.add(message.made_s - message.taken_s);
@@ -250,7 +275,7 @@ void Pipeline::account_way(const OutputMessage& message, double written_s) {
 }
 
 void Pipeline::count(const OutputMessage& message) {
-  const std::lock_guard<std::mutex> lock(summary_mutex_);
+  const std::lock_guard<PriorityMutex> lock(summary_mutex_);
   ++summary_.records;
   if (message.record.frame) ++summary_.frames;
   if (message.record.orientation) ++summary_.with_orientation;
@@ -275,8 +300,7 @@ void Pipeline::log_old_telemetry(const OrientationRecord& record) {
   old_telemetry_logged_at_s_ = now_s;
 }
 
-void Pipeline::account(const OutputMessage& message) {
-  count(message);
+void Pipeline::log_events(const OutputMessage& message) {
   log_old_telemetry(message.record);
   if (message.events.video_clock_restarted) {
     spdlog::info("{}: clock filter restarted at frame {}", video_.name(), *message.record.frame);

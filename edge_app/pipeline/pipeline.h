@@ -9,6 +9,9 @@
 //   output thread     queue -> sink; logs what the real-time thread may not log; counts
 //   tap thread        ImageTap: small images, for those who ask; only if there is a tap
 //
+// Where the real-time thread has a priority, all on a record's way have theirs below it, in this order: the link's own thread,
+// which stamps arrivals, telemetry and output; decoding. So a record waits for no other program, and none of them for the step.
+// Memory is locked before they start, and each touches its stack before its first item.
 // A source that loses its connection is waited for; records of mode `none` are made at the loss and
 // then each second until it is back. The pipeline is finished when the video has ended, a source
 // has failed for good, or the sink takes no more; stop() ends it at any time.
@@ -27,6 +30,7 @@
 #include "edge_app/pipeline/realtime_stage.h"
 #include "edge_app/pipeline/self_calibration.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
+#include "platform/system/priority_mutex.h"
 #include "platform/system/realtime.h"
 #include "platform/video/frame_source.h"
 
@@ -95,11 +99,12 @@ class Pipeline {
   void capture();
   void read_telemetry();
   void run_realtime();
+  void take_place(ThreadDuty duty) const;
   void calibrate();
   void feed_calibration();
   void write_output();
   void count(const OutputMessage& message);
-  void account(const OutputMessage& message);
+  void log_events(const OutputMessage& message);
   void log_old_telemetry(const OrientationRecord& record);
   void account_way(const OutputMessage& message, double written_s);
   bool push(const Frame& frame);
@@ -121,7 +126,7 @@ class Pipeline {
   int finished_;                       // eventfd
   std::mutex error_mutex_;             // the first of several threads to fail is heard; not on the
   std::string error_;                  // real-time thread
-  mutable std::mutex summary_mutex_;   // the real-time thread does not take it
+  mutable PriorityMutex summary_mutex_;  // the real-time thread does not take it
   PipelineSummary summary_;
   PageFaults page_faults_;               // real-time thread, at its end
   PageFaults faults_at_start_;           // real-time thread, before it says its number

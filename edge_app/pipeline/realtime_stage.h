@@ -147,7 +147,7 @@ class RealtimeStage {
   static constexpr std::size_t kPublished = 4;
   boost::lockfree::spsc_queue<VideoMessage, boost::lockfree::capacity<256>> video_queue_;
   boost::lockfree::spsc_queue<TelemetryMessage, boost::lockfree::capacity<1024>> telemetry_queue_;
-  boost::lockfree::spsc_queue<OutputMessage, boost::lockfree::capacity<1024>> output_queue_;
+  boost::lockfree::spsc_queue<OutputMessage, boost::lockfree::capacity<256>> output_queue_;
   boost::lockfree::spsc_queue<ImageSlot, boost::lockfree::capacity<2 * kImageSlots>> returned_;
   boost::lockfree::spsc_queue<ImageSlot, boost::lockfree::capacity<2 * kImageSlots>>
       returned_by_calibration_;

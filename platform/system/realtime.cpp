@@ -17,7 +17,6 @@
 #include <cstring>
 #include <fstream>
 #include <sstream>
-#include <utility>
 
 namespace alidade {
 namespace {
@@ -61,12 +60,53 @@ void set_processor(int cpu, RealtimeReport* report) {
 
 std::atomic<bool> freed_memory_is_kept{false};
 
-// Whether a mapping, a line of /proc/self/maps, is brought in as a whole: heap and stacks, and code and data that
-// the real-time thread may use.
-bool is_brought_in(const std::string& permissions, const std::string& path,
-                   const std::string& program) {
-  if (permissions[0] != 'r') return false;
-  if (path.empty() || path[0] == '[') return permissions.compare(1, 3, "w-p") == 0;
+// A range of addresses, from /proc/self/smaps.
+struct Mapping {
+  char* begin = nullptr;
+  std::size_t size = 0;  // bytes
+  std::string permissions;
+  std::string path;        // empty or in brackets: of no file
+  bool is_changed = true;  // pages of it are no longer the file's
+
+  [[nodiscard]] bool is_data() const {
+    return permissions == "rw-p" && (path.empty() || path[0] == '[');
+  }
+  [[nodiscard]] bool is_unchanged_file() const {
+    return !path.empty() && path[0] == '/' && permissions[0] == 'r' && permissions[1] == '-' &&
+           permissions[3] == 'p' && !is_changed;
+  }
+};
+
+std::vector<Mapping> all_mappings() {
+  std::vector<Mapping> mappings;
+  std::ifstream file("/proc/self/smaps");
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream words(line);
+    std::string first;
+    words >> first;
+    if (first.empty()) continue;
+    if (first.back() != ':') {
+      std::istringstream range(first);
+      std::uintptr_t begin = 0, end = 0;
+      char dash = 0;
+      range >> std::hex >> begin >> dash >> end;
+      Mapping& mapping = mappings.emplace_back();
+      std::string offset, device, inode;
+      words >> mapping.permissions >> offset >> device >> inode >> mapping.path;
+      mapping.begin = reinterpret_cast<char*>(begin);
+      mapping.size = end - begin;
+      if (mapping.permissions.size() != 4) mappings.pop_back();
+    } else if (first == "Anonymous:" && !mappings.empty()) {
+      long changed_kb = 1;
+      words >> changed_kb;
+      mappings.back().is_changed = changed_kb != 0;
+    }
+  }
+  return mappings;
+}
+
+// Code and data that the real-time thread may use.
+bool is_of_the_real_time_thread(const std::string& path, const std::string& program) {
   if (path == program) return true;
   const std::string name = path.substr(path.rfind('/') + 1);
   for (const char* library : {"libc.so", "libm.so", "libstdc++.so", "libgcc_s.so", "ld-linux"}) {
@@ -75,28 +115,27 @@ bool is_brought_in(const std::string& permissions, const std::string& path,
   return false;
 }
 
-// What there is now is locked as it is touched, but for what is brought in; what comes later is brought in.
+// What there is now is locked as it is touched, but for what is brought in.
 bool lock_all() {
-  if (mlockall(MCL_CURRENT | MCL_ONFAULT) != 0) return false;
   std::array<char, PATH_MAX> program{};
   if (readlink("/proc/self/exe", program.data(), program.size() - 1) < 0) return false;
-  std::ifstream maps("/proc/self/maps");
-  std::vector<std::pair<std::uintptr_t, std::uintptr_t>> ranges;
-  for (std::string line; std::getline(maps, line);) {
-    std::istringstream words(line);
-    std::uintptr_t begin = 0, end = 0;
-    char dash = 0;
-    std::string permissions, offset, device, inode, path;
-    words >> std::hex >> begin >> dash >> end >> permissions >> offset >> device >> inode >> path;
-    if (permissions.size() == 4 && is_brought_in(permissions, path, program.data()))
-      ranges.emplace_back(begin, end);
+  const std::vector<Mapping> mappings = all_mappings();
+  const auto is_brought_in = [&](const Mapping& mapping) {
+    return mapping.is_data() || (mapping.permissions[0] == 'r' &&
+                                 is_of_the_real_time_thread(mapping.path, program.data()));
+  };
+  for (const Mapping& mapping : mappings) {
+    // What is needed again comes again, from the same file.
+    if (mapping.is_unchanged_file() && !is_brought_in(mapping))
+      static_cast<void>(madvise(mapping.begin, mapping.size, MADV_DONTNEED));
   }
-  // A mapping may have gone since, a thread's stack say: then there is nothing to lock.
-  for (const auto& [begin, end] : ranges) {
-    if (mlock(reinterpret_cast<const void*>(begin), end - begin) != 0 && errno != ENOMEM)
+  if (mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) != 0) return false;
+  for (const Mapping& mapping : mappings) {
+    // A mapping may have gone since: then there is nothing to lock.
+    if (is_brought_in(mapping) && mlock(mapping.begin, mapping.size) != 0 && errno != ENOMEM)
       return false;
   }
-  return mlockall(MCL_FUTURE) == 0;
+  return true;
 }
 
 void lock_memory(RealtimeReport* report) {
@@ -108,7 +147,8 @@ void lock_memory(RealtimeReport* report) {
   }
   // First, so that what malloc has is locked once and stays.
   freed_memory_is_kept = true;
-  const bool kept = mallopt(M_TRIM_THRESHOLD, -1) == 1 && mallopt(M_MMAP_MAX, 0) == 1;
+  const bool kept = mallopt(M_TRIM_THRESHOLD, -1) == 1 &&
+                    mallopt(M_MMAP_THRESHOLD, static_cast<int>(kFetchedAlone)) == 1;
   if (!lock_all()) {
     report->warnings.push_back(std::string("memory is not locked (") + std::strerror(errno) + ")");
     return;
@@ -161,20 +201,23 @@ std::string RealtimeReport::line() const {
 
 RealtimeReport apply_realtime(const RealtimeOptions& options) {
   RealtimeReport report;
+  if (options.lock_memory) lock_memory(&report);
   if (options.priority > 0) set_priority(options.priority, &report);
   if (options.cpu >= 0) set_processor(options.cpu, &report);
-  if (options.lock_memory) lock_memory(&report);
   prefault_stack(&report);
   return report;
 }
 
-bool use_small_stacks() {
-  pthread_attr_t attributes;
-  if (pthread_attr_init(&attributes) != 0) return false;
-  const bool set = pthread_attr_setstacksize(&attributes, kThreadStack) == 0 &&
-                   pthread_setattr_default_np(&attributes) == 0;
-  pthread_attr_destroy(&attributes);
-  return set;
+int priority_of(ThreadDuty duty, int priority) {
+  if (priority <= 0) return 0;
+  const int below = duty == ThreadDuty::kStep ? 0 : duty == ThreadDuty::kBrief ? 1 : 2;
+  return std::max(1, priority - below);
+}
+
+RealtimeReport lock_process_memory() {
+  RealtimeReport report;
+  lock_memory(&report);
+  return report;
 }
 
 void return_freed_memory() {

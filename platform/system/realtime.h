@@ -1,6 +1,6 @@
 #pragma once
 // What a thread asks of the kernel to meet its deadlines: SCHED_FIFO, a processor of its own, and
-// memory that is there when it is touched: never paged out, never given back (these hold for the whole
+// memory that stays where it was touched: never paged out, never given back (these hold for the whole
 // process), the stack touched beforehand. And the opposite, for a thread that must never be in the way.
 // Everything is optional: without the permission the thread runs on, only less punctually.
 // Threads started by a thread inherit its scheduling.
@@ -12,14 +12,21 @@
 namespace alidade {
 
 struct RealtimeOptions {
-  int priority = 0;  // SCHED_FIFO priority 1..99; 0 leaves the normal scheduling
-  int cpu = -1;      // processor to run on; -1: any
-  // Locks all memory of the process, now and later, and keeps malloc from returning it to the kernel
-  // and from fetching large blocks one by one: fresh memory is a page fault. Heap and stacks, now and later, this
-  // program and the C and C++ libraries are brought in; what else was linked with other libraries, a hundred MB of
-  // codecs, is kept once it was used.
-  bool lock_memory = false;
+  int priority = 0;          // SCHED_FIFO priority 1..99; 0 leaves the normal scheduling
+  int cpu = -1;              // processor to run on; -1: any
+  bool lock_memory = false;  // lock_process_memory(), first
 };
+
+// What a thread does, for its place below the real-time one.
+enum class ThreadDuty {
+  kStep,     // the real-time thread's
+  kBrief,    // stamping, telemetry, writing: microseconds at a time, and late stamps are wrong ones
+  kDecoding  // milliseconds at a time
+};
+
+// The SCHED_FIFO priority that goes with a duty where the real-time thread has `priority`: the same, one and two lower, but never
+// under 1, which is above all normal threads. 0 stays 0.
+[[nodiscard]] int priority_of(ThreadDuty duty, int priority);
 
 // A few words for each thing that was granted ("SCHED_FIFO 60"), and a line in plain words for each
 // that was not permitted, with what would permit it.
@@ -31,15 +38,17 @@ struct RealtimeReport {
   [[nodiscard]] std::string line() const;
 };
 
+// Locks all memory of the process, now and later, and keeps malloc from returning blocks below kFetchedAlone to the kernel: fresh
+// memory is a page fault. Brought in are all data that there are, this program and the C and C++ libraries; what comes later stays
+// once it was touched. Of the other libraries, a hundred MB of codecs, nothing is kept but what is used from now on: what the loader
+// alone has needed is let go. Before other threads are started, so that none of their stacks is brought in as a whole.
+inline constexpr std::size_t kFetchedAlone = std::size_t{512} << 10;  // bytes
+[[nodiscard]] RealtimeReport lock_process_memory();
+
 // Applies the options to the calling thread and touches kPrefaultedStack of its stack, if it has that much.
 // Allocates.
 inline constexpr std::size_t kPrefaultedStack = std::size_t{256} << 10;  // bytes
 [[nodiscard]] RealtimeReport apply_realtime(const RealtimeOptions& options);
-
-// Stacks of threads that are started from now on are of this size: locked memory holds all of each, of which glibc's
-// default is 8 MB. Returns whether it could be had.
-inline constexpr std::size_t kThreadStack = std::size_t{2} << 20;  // bytes
-[[nodiscard]] bool use_small_stacks();
 
 // Gives memory that was freed back to the kernel, unless the process keeps it (lock_memory). Allocation by other
 // threads waits meanwhile: for a thread that has just freed megabytes.

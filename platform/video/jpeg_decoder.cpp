@@ -59,8 +59,7 @@ bool JpegDecoder::decode(std::string_view jpeg, Picture* picture) {
     return false;
   }
   const std::size_t size = static_cast<std::size_t>(width) * static_cast<std::size_t>(height);
-  const std::shared_ptr<unsigned char> luma(new unsigned char[size],
-                                            std::default_delete<unsigned char[]>());
+  const std::shared_ptr<std::uint8_t> luma = pool_.take(size);
   if (tjDecompress2(handle_.get(), bytes_of(jpeg), jpeg.size(), luma.get(), width, width, height,
                     TJPF_GRAY, TJFLAG_LIMITSCANS) != 0) {
     const std::string message = tjGetErrorStr2(handle_.get());

@@ -3,7 +3,7 @@
 // nor converted. Pictures without Huffman tables (as in AVI) are decoded with the standard ones.
 // A picture that is cut off or damaged is told from a whole one; excess bytes before its end marker,
 // which some cameras write, are no damage. A picture of hundreds of scans is refused: a few forged bytes
-// must not hold the thread for minutes. One thread at a time; allocates each picture.
+// must not hold the thread for minutes. One thread at a time; the memory of pictures is used again (LumaPool).
 
 #include <cstddef>
 #include <memory>
@@ -11,6 +11,7 @@
 #include <string_view>
 
 #include "platform/video/luma_decoder.h"  // Picture
+#include "platform/video/luma_pool.h"
 
 namespace alidade {
 
@@ -34,6 +35,7 @@ class JpegDecoder {
   bool fail(const std::string& error);
 
   std::unique_ptr<void, Close> handle_;
+  LumaPool pool_;
   std::string error_;
 };
 

@@ -16,6 +16,7 @@
 #include "platform/system/clock.h"
 #include "platform/system/file_descriptor.h"
 #include "platform/video/jpeg_decoder.h"
+#include "platform/video/luma_pool.h"
 #include "platform/video/stream_copy.h"
 #include "platform/video/v4l2_device.h"
 #include "platform/video/v4l2_stamps.h"
@@ -90,6 +91,7 @@ class V4l2Source : public FrameSource {
   bool restarted_ = true;
   std::int64_t next_frame_ = 0;
   JpegDecoder decoder_;
+  LumaPool pool_;
   CodecParametersPtr parameters_;  // of what is stored: JPEG as it came, else uncompressed luma
   StreamCopy copy_;
 };
@@ -255,8 +257,7 @@ bool V4l2Source::take_picture(const V4l2Device::Buffer& buffer,
     picture->owner = held;
     return true;
   }
-  const std::shared_ptr<std::uint8_t> luma(new std::uint8_t[pixels(*picture)],
-                                           std::default_delete<std::uint8_t[]>());
+  const std::shared_ptr<std::uint8_t> luma = pool_.take(pixels(*picture));
   copy_luma(format, buffer.data, width, height, device_->stride(), luma.get());
   picture->luma = luma.get();
   picture->stride = width;

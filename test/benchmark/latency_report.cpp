@@ -89,11 +89,15 @@ ThreadUse use_of(int thread) {
   return out;
 }
 
-int fifo_thread() {
+int fifo_thread(int priority) {
   int found = -1;
   for (const auto& task : std::filesystem::directory_iterator("/proc/self/task")) {
     const int thread = std::stoi(task.path().filename().string());
-    if (::sched_getscheduler(thread) != SCHED_FIFO) continue;
+    sched_param parameters{};
+    if (::sched_getscheduler(thread) != SCHED_FIFO || ::sched_getparam(thread, &parameters) != 0 ||
+        parameters.sched_priority != priority) {
+      continue;
+    }
     if (found >= 0) return -1;
     found = thread;
   }

@@ -37,9 +37,9 @@ struct ThreadUse {
 [[nodiscard]] ThreadUse thread_use();
 // Of another thread of this process, by its number; but for the allocations. Nothing if there is no such thread.
 [[nodiscard]] ThreadUse use_of(int thread);
-// The number of this process's only thread under SCHED_FIFO: a Pipeline's real-time thread, where that was permitted.
-// -1 if there is none or more than one.
-[[nodiscard]] int fifo_thread();
+// The number of this process's only thread of that priority under SCHED_FIFO: a Pipeline's real-time thread, where that was
+// permitted. -1 if there is none or more than one.
+[[nodiscard]] int fifo_thread(int priority);
 
 class LatencyReport {
  public:

@@ -209,7 +209,7 @@ bool run(LatencyReport* report) {
   Turns without;
   ThreadUse with_use;
   ThreadUse without_use;
-  const int realtime_thread = fifo_thread();
+  const int realtime_thread = fifo_thread(kPriority);
   const int oe_before = recorder.oe();
   for (std::size_t turn = 0; turn < kTurns / 2; ++turn) {
     const ThreadUse before = use_of(realtime_thread);

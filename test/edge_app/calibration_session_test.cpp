@@ -4,7 +4,10 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 #include "core/model/trigonometry.h"
+#include "edge_app/pipeline/packed_image.h"
 
 namespace alidade {
 namespace {
@@ -114,6 +117,18 @@ TEST_F(CalibrationSessionTest, TheOldestKeyframeGivesWay) {
   for (int i = 0; i < 20; ++i) EXPECT_TRUE(take_keyframe(0.2 * i)) << i;
   EXPECT_EQ(keyframes(), limits_.max_keyframes);
   EXPECT_TRUE(take_keyframe(0)) << "that of this view has gone";
+}
+
+TEST_F(CalibrationSessionTest, KeyframesTakeNoMoreMemoryThanTheyMayButOneStays) {
+  const PackedImage one({pixels_.data(), kWidth, kHeight, kWidth});
+  for (const auto& [bytes, kept] : {std::pair<std::size_t, std::size_t>{3 * one.bytes(), 3},
+                                    {4 * one.bytes() - 1, 3},
+                                    {one.bytes() - 1, 1}}) {
+    limits_.max_keyframe_bytes = bytes;
+    session_ = CalibrationSession(limits_);
+    for (int i = 0; i < 6; ++i) EXPECT_TRUE(take_keyframe(0.2 * i)) << i;
+    EXPECT_EQ(keyframes(), kept) << bytes;
+  }
 }
 
 // Held out is each tenth; 15 is between 14 and 16 as its sender's clock, else its count, else the order has it.

@@ -5,6 +5,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
+#include <pthread.h>
+#include <sched.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
@@ -271,6 +273,66 @@ TEST_F(PipelineTest, ShowsAImageToWhoAsksAndLetsGoOfItAtTheEnd) {
     viewer.join();
   }
   EXPECT_EQ(luma.use_count(), 1);
+}
+
+// The SCHED_FIFO priority of the calling thread; 0: it has none.
+int own_priority() {
+  int policy = -1;
+  sched_param parameters{};
+  pthread_getschedparam(pthread_self(), &policy, &parameters);
+  return policy == SCHED_FIFO ? parameters.sched_priority : 0;
+}
+
+// Keeps who called.
+template <typename Interface, typename Item>
+class WatchedSource final : public Interface {
+ public:
+  ReadStatus read(Item& item, double timeout_s) override {
+    priorities_.push_back(own_priority());
+    return source_.read(item, timeout_s);
+  }
+  void stop() override { source_.stop(); }
+  [[nodiscard]] std::string error() const override { return source_.error(); }
+  [[nodiscard]] std::string name() const override { return source_.name(); }
+
+  ScriptedSource<Interface, Item> source_{"watched"};
+  std::vector<int> priorities_;  // of each read
+};
+
+class WatchedSink final : public RecordSink {
+ public:
+  [[nodiscard]] bool write(const OrientationRecord&) override {
+    priority_ = own_priority();
+    return true;
+  }
+  void interrupt() override {}
+  [[nodiscard]] std::string error() const override { return ""; }
+
+  std::atomic<int> priority_{-1};  // of the last write; -1: none yet
+};
+
+TEST_F(PipelineTest, GivesAllOnARecordsWayTheirPlaceBelowTheRealtimeThread) {
+  constexpr int kPriority = 30;
+  bool permitted = false;
+  std::thread([&] { permitted = apply_realtime({kPriority, -1, false}).warnings.empty(); }).join();
+  if (!permitted) GTEST_SKIP() << "not permitted to have a priority";
+  WatchedSource<FrameSource, Frame> video;
+  WatchedSource<PanTiltSource, PanTiltSample> pan_tilt;
+  WatchedSink sink;
+  PipelineOptions options = options_for_tests();
+  options.realtime.priority = kPriority;
+  Pipeline pipeline(video, pan_tilt, sink, nullptr, options);
+  pipeline.start();
+  video.source_.push(frame());
+  EXPECT_TRUE(eventually([&] { return sink.priority_ >= 0; }));
+  video.source_.push(frame());
+  EXPECT_TRUE(eventually([&] { return pipeline.summary().frames == 2; }));
+  pipeline.stop();
+  // What the first read starts goes before decoding.
+  EXPECT_EQ(video.priorities_.front(), priority_of(ThreadDuty::kBrief, kPriority));
+  EXPECT_EQ(video.priorities_.back(), priority_of(ThreadDuty::kDecoding, kPriority));
+  EXPECT_EQ(pan_tilt.priorities_.back(), priority_of(ThreadDuty::kBrief, kPriority));
+  EXPECT_EQ(sink.priority_, priority_of(ThreadDuty::kBrief, kPriority));
 }
 
 TEST_F(PipelineTest, StopEndsSourcesThatGiveNothing) {

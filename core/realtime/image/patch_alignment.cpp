@@ -1,8 +1,11 @@
 #include "core/realtime/image/patch_alignment.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
+#include "core/realtime/image/ask_ahead.h"
+#include "core/realtime/image/byte_vector.h"
 #include "core/realtime/image/sampling.h"
 
 namespace alidade {
@@ -23,35 +26,47 @@ constexpr float kNoise0 = 2416.0F / 5040;
 constexpr float kNoise1 = 1191.0F / 5040;
 constexpr float kNoise2 = 120.0F / 5040;
 
+// A row of a patch.
+using Row = EightFloats;
+static_assert(kSize == 8 && kTaps == 4, "as a row holds eight points, and shifted() makes four");
+
+// Of eleven pixels, those that lie 0, 1, 2 and 3 px right of the first of each point's.
+std::array<Row, kTaps> shifted(const std::uint8_t* pixels) {
+  const Row first = load_eight(pixels);
+  const Row last = load_eight(pixels + 3);
+  return {first,
+          {shuffle<1, 2, 4, 5>(first.low, last.low), shuffle<1, 2, 4, 5>(first.high, last.high)},
+          {shuffle<2, 3, 5, 6>(first.low, last.low), shuffle<2, 3, 5, 6>(first.high, last.high)},
+          last};
+}
+
+Row blend(const float (&weight)[kTaps], const Row* rows) {
+  return {weight[0] * rows[0].low + weight[1] * rows[1].low + weight[2] * rows[2].low +
+              weight[3] * rows[3].low,
+          weight[0] * rows[0].high + weight[1] * rows[1].high + weight[2] * rows[2].high +
+              weight[3] * rows[3].high};
+}
+
 // The blurred image at points 1 px apart, all with the same weights.
 template <bool kWithGradient>
 void sample_grid(const ImageView& image, const TapPlace& place, Points* value, Points* du,
                  Points* dv) {
   const auto across = CubicSpline::taps(place.t_u);
   const auto down = CubicSpline::taps(place.t_v);
-  float lines[kSource][kSize];
-  float slopes[kSource][kSize];
+  std::array<Row, kSource> lines;
+  std::array<Row, kSource> slopes;
   for (int j = 0; j < kSource; ++j) {
-    const std::uint8_t* row = image.row(place.row + j) + place.column;
-    float pixels[kSource];
-    for (int i = 0; i < kSource; ++i) pixels[i] = static_cast<float>(row[i]);
-    for (int i = 0; i < kSize; ++i) {
-      lines[j][i] = across.weight[0] * pixels[i] + across.weight[1] * pixels[i + 1] +
-                    across.weight[2] * pixels[i + 2] + across.weight[3] * pixels[i + 3];
-    }
-    if constexpr (kWithGradient) {
-      for (int i = 0; i < kSize; ++i) {
-        slopes[j][i] = across.slope[0] * pixels[i] + across.slope[1] * pixels[i + 1] +
-                       across.slope[2] * pixels[i + 2] + across.slope[3] * pixels[i + 3];
-      }
-    }
+    const auto line = static_cast<std::size_t>(j);
+    const auto pixels = shifted(image.row(place.row + j) + place.column);
+    lines[line] = blend(across.weight, pixels.data());
+    if constexpr (kWithGradient) slopes[line] = blend(across.slope, pixels.data());
   }
-  const auto combine = [](const float(&from)[kSource][kSize], const float* weight, Points* to) {
+  const auto combine = [](const std::array<Row, kSource>& from, const float(&weight)[kTaps],
+                          Points* to) {
     for (int j = 0; j < kSize; ++j) {
-      for (int i = 0; i < kSize; ++i) {
-        (*to)(j, i) = weight[0] * from[j][i] + weight[1] * from[j + 1][i] +
-                      weight[2] * from[j + 2][i] + weight[3] * from[j + 3][i];
-      }
+      const Row row = blend(weight, from.data() + j);
+      store(row.low, to->data() + kSize * j);
+      store(row.high, to->data() + kSize * j + kSize / 2);
     }
   };
   combine(lines, down.weight, value);
@@ -287,6 +302,19 @@ AlignmentStatus align(const ReferencePatch& reference, const ImageView& image,
                                                       : AlignmentStatus::kUnlike;
   }
   return AlignmentStatus::kNotConverged;
+}
+
+void ask_for_patch(const ImageView& image, const Vector2<double>& at) {
+  TapPlace place;
+  if (find_taps<kTaps>(image, at.x() - kHalf, at.y() - kHalf, kSize, kSize, &place) !=
+      SampleStatus::kOk) {
+    return;
+  }
+  for (int j = 0; j < kSource; ++j) {
+    const std::uint8_t* row = image.row(place.row + j) + place.column;
+    ask_ahead(row);
+    ask_ahead(row + kSource - 1);
+  }
 }
 
 bool measure_step(const ReferencePatch& reference, const ImageView& image,

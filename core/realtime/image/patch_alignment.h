@@ -101,6 +101,9 @@ struct Alignment {
                                     const Vector2<double>& start, const AlignmentLimits& limits,
                                     Alignment* out);
 
+// Asks memory for the pixels about `at`, px, for an align() or measure_step() that starts there soon (ask_ahead.h).
+void ask_for_patch(const ImageView& image, const Vector2<double>& at);
+
 // One step of align(), for those who move many patches together.
 struct PatchStep {
   Vector2<double>

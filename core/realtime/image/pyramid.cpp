@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "core/realtime/image/ask_ahead.h"
 #include "core/realtime/image/byte_vector.h"
 
 namespace alidade {
@@ -19,38 +20,43 @@ ShortVector means(const std::uint8_t* upper, const std::uint8_t* lower) {
 }
 
 ByteVector narrow(ShortVector first, ShortVector second) {
-#if defined(__clang__)
-  return __builtin_shufflevector(reinterpret_cast<ByteVector>(first),
-                                 reinterpret_cast<ByteVector>(second), 0, 2, 4, 6, 8, 10, 12, 14,
-                                 16, 18, 20, 22, 24, 26, 28, 30);
-#else
-  return __builtin_shuffle(reinterpret_cast<ByteVector>(first),
-                           reinterpret_cast<ByteVector>(second),
-                           ByteVector{0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30});
-#endif
+  return shuffle<0, 2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 24, 26, 28, 30>(
+      reinterpret_cast<ByteVector>(first), reinterpret_cast<ByteVector>(second));
+}
+
+struct TwoRows {
+  const std::uint8_t* upper;
+  const std::uint8_t* lower;
+};
+
+TwoRows two_rows(const ImageView& image, int first) {
+  return {image.row(first), image.row(first + 1)};
+}
+
+// A row of `width` means. Meanwhile memory is asked for two rows that come later, where kAskAhead.
+template <bool kAskAhead>
+void halve(const TwoRows& in, const TwoRows& later, int width, std::uint8_t* out) {
+  int u = 0;
+  for (; u + kByteLanes <= width; u += kByteLanes) {
+    const int from = 2 * u;
+    if constexpr (kAskAhead) {
+      if (from % kCacheLine == 0) {
+        ask_ahead(later.upper + from);
+        ask_ahead(later.lower + from);
+      }
+    }
+    store(narrow(means(in.upper + from, in.lower + from),
+                 means(in.upper + from + kByteLanes, in.lower + from + kByteLanes)),
+          out + u);
+  }
+  for (; u < width; ++u) {
+    const std::uint8_t* upper = in.upper + 2 * u;
+    const std::uint8_t* lower = in.lower + 2 * u;
+    out[u] = static_cast<std::uint8_t>((upper[0] + upper[1] + lower[0] + lower[1] + 2) / 4);
+  }
 }
 
 }  // namespace
-
-void halve(const ImageView& in, std::uint8_t* out, std::ptrdiff_t out_stride) {
-  const int width = in.width / 2;
-  for (int v = 0; v < in.height / 2; ++v, out += out_stride) {
-    const std::uint8_t* upper = in.row(2 * v);
-    const std::uint8_t* lower = in.row(2 * v + 1);
-    int u = 0;
-    for (; u + kByteLanes <= width; u += kByteLanes) {
-      const int from = 2 * u;
-      store(narrow(means(upper + from, lower + from),
-                   means(upper + from + kByteLanes, lower + from + kByteLanes)),
-            out + u);
-    }
-    for (; u < width; ++u) {
-      const int i = 2 * u;
-      out[u] =
-          static_cast<std::uint8_t>((upper[i] + upper[i + 1] + lower[i] + lower[i + 1] + 2) / 4);
-    }
-  }
-}
 
 Pyramid::Pyramid(int max_width, int max_height, int max_octaves)
     : max_width_(std::max(max_width, 0)),
@@ -68,21 +74,43 @@ PyramidStatus Pyramid::build(const ImageView& image, int octaves) {
   octaves_ = 0;
   if (!image.valid()) return PyramidStatus::kNoImage;
   if (image.width > max_width_ || image.height > max_height_) return PyramidStatus::kTooLarge;
-  octaves = std::min(octaves, max_octaves_);
+  views_[0] = image;
+  octaves_ = std::clamp(octaves, 0, 1);
   std::uint8_t* free = memory_.data();
-  for (int l = 0; l < octaves; ++l, ++octaves_) {
-    ImageView& view = views_[static_cast<std::size_t>(l)];
-    if (l == 0) {
-      view = image;
-      continue;
-    }
-    const ImageView& finer = views_[static_cast<std::size_t>(l - 1)];
-    view = {free, finer.width / 2, finer.height / 2, row_stride(finer.width / 2)};
+  for (const int wanted = std::min(octaves, max_octaves_); octaves_ < wanted; ++octaves_) {
+    const ImageView& finer = views_[static_cast<std::size_t>(octaves_ - 1)];
+    const int width = finer.width / 2;
+    const ImageView view{free, width, finer.height / 2, row_stride(width)};
     if (!view.valid()) break;
-    halve(finer, free, view.stride);
+    views_[static_cast<std::size_t>(octaves_)] = view;
     free += view.stride * view.height;
   }
+  if (octaves_ > 1) fill();
   return PyramidStatus::kOk;
+}
+
+// Two rows of an octave become one of the next while they are in the cache, which holds no whole image; and as most of
+// the time would go into waiting for the image, memory is asked for its rows well before they are needed.
+void Pyramid::fill() {
+  constexpr int kRowsAhead = 8;  // half of it waits, twice of it gains nothing
+  const ImageView& image = views_[0];
+  for (int v = 0; v < views_[1].height; ++v) {
+    const int later = std::min(2 * v + kRowsAhead, image.height - 2);
+    halve<true>(two_rows(image, 2 * v), two_rows(image, later), views_[1].width, row_of(1, v));
+    // Row v of octave l is the second of a pair if v is odd.
+    int row = v;
+    for (int l = 1; l + 1 < octaves_ && row % 2 == 1; ++l) {
+      row /= 2;
+      const TwoRows pair = two_rows(views_[static_cast<std::size_t>(l)], 2 * row);
+      halve<false>(pair, pair, views_[static_cast<std::size_t>(l + 1)].width, row_of(l + 1, row));
+    }
+  }
+}
+
+// Octaves but the first lie in memory_, one after the other.
+std::uint8_t* Pyramid::row_of(int octave, int v) {
+  const ImageView& view = views_[static_cast<std::size_t>(octave)];
+  return memory_.data() + (view.row(v) - memory_.data());
 }
 
 }  // namespace alidade

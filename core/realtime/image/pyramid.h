@@ -46,6 +46,9 @@ class Pyramid {
   [[nodiscard]] std::size_t memory_bytes() const { return memory_.size(); }
 
  private:
+  void fill();
+  [[nodiscard]] std::uint8_t* row_of(int octave, int v);
+
   int max_width_;
   int max_height_;
   int max_octaves_;
@@ -53,9 +56,5 @@ class Pyramid {
   std::vector<std::uint8_t> memory_;
   std::array<ImageView, kMaxOctaves> views_;
 };
-
-// One octave: out has in's size halved and rounded down, in rows of out_stride bytes. out must not
-// overlap in.
-void halve(const ImageView& in, std::uint8_t* out, std::ptrdiff_t out_stride);
 
 }  // namespace alidade

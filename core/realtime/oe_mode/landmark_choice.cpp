@@ -13,7 +13,7 @@ static_assert(kStride > LandmarkChoiceOptions::kMaxParts);
 
 double reliability(const VisibleLandmark& visible, const LandmarkMap& map) {
   const LandmarkStatistics& s = map.at(visible.slot).statistics;
-  return std::ldexp((s.matched + 1.0) / (s.looked_for + 2.0), -visible.octave);
+  return (s.matched + 1.0) / (s.looked_for + 2.0) / (1 << visible.octave);
 }
 
 }  // namespace

@@ -4,9 +4,16 @@
 #include <cmath>
 
 #include "core/model/direction.h"
+#include "core/realtime/image/ask_ahead.h"
 #include "core/realtime/oe_mode/view_projection.h"
 
 namespace alidade {
+namespace {
+
+// Landmarks between the one that memory is asked for and the one that is looked at.
+constexpr std::size_t kLandmarksAhead = 2;
+
+}  // namespace
 
 bool LandmarkSearchOptions::validate(const char** error) const {
   const char* problem = nullptr;
@@ -90,6 +97,15 @@ void LandmarkSearch::find_visible(const SearchedFrame& frame, const ViewProjecti
   visible_.find(frame.calibration, frame.map, view);
 }
 
+// Of a landmark that is looked for soon. Its pixels are needed where its patch is prepared again, which is rare.
+void LandmarkSearch::ask_for(const SearchedFrame& frame, const VisibleLandmark& wanted) const {
+  const Landmark& landmark = frame.map.at(wanted.slot);
+  ask_ahead(&landmark, &landmark.pixels);
+  const Prepared& prepared = prepared_[static_cast<std::size_t>(wanted.slot)];
+  ask_ahead(&prepared, &prepared + 1);
+  ask_for_patch(frame.pyramid.octave(wanted.octave), std::ldexp(1.0, -wanted.octave) * wanted.u);
+}
+
 // The landmark's image as this frame should show it; null if it cannot.
 const ReferencePatch* LandmarkSearch::reference(const SearchedFrame& frame, int slot,
                                                 const SeenDirection& seen) {
@@ -158,7 +174,10 @@ void LandmarkSearch::fit_fine(const SearchedFrame& frame, const ViewProjection& 
   found_.clear();
   observations_.clear();
   J_tangent_.clear();
-  for (const VisibleLandmark& wanted : choice_.chosen()) {
+  const std::vector<VisibleLandmark>& chosen = choice_.chosen();
+  for (std::size_t i = 0; i < chosen.size(); ++i) {
+    if (i + kLandmarksAhead < chosen.size()) ask_for(frame, chosen[i + kLandmarksAhead]);
+    const VisibleLandmark& wanted = chosen[i];
     const Landmark& landmark = frame.map.at(wanted.slot);
     SeenDirection seen;
     Sensitivity<2> J_parameters;

@@ -129,6 +129,7 @@ class LandmarkSearch {
     PrepareStatus status = PrepareStatus::kTooFlat;
   };
 
+  void ask_for(const SearchedFrame& frame, const VisibleLandmark& wanted) const;
   const ReferencePatch* reference(const SearchedFrame& frame, int slot, const SeenDirection& seen);
 
   LandmarkSearchOptions options_;

@@ -71,7 +71,7 @@ class Octaves {
 [[nodiscard]] inline bool holds_patch(const Camera<double>& camera, const Vector2<double>& u,
                                       int octave) {
   constexpr double kMargin_px = 2.5;  // of the octave: the taps around the outermost points
-  const double border_px = std::ldexp(0.5 * kPatchSize + kMargin_px, octave);
+  const double border_px = (0.5 * kPatchSize + kMargin_px) * (1 << octave);
   return u.x() >= border_px && u.y() >= border_px && u.x() <= camera.width - border_px &&
          u.y() <= camera.height - border_px;
 }

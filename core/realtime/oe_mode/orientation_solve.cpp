@@ -169,12 +169,18 @@ Vector2<double> middle_of_landmarks(const FoundLandmark* landmarks, int count) {
   return {median(pan.data(), count), median(tilt.data(), count)};
 }
 
-double median_square(const Problem& problem, const Vector6& x) {
-  std::array<double, kMaxFoundLandmarks> squares;
+using Squares = std::array<double, kMaxFoundLandmarks>;  // normalised, by landmark
+
+void find_squares(const Problem& problem, const Vector6& x, Squares* out) {
   for (int i = 0; i < problem.count(); ++i) {
-    squares[static_cast<std::size_t>(i)] = problem.normalised_square(i, x);
+    (*out)[static_cast<std::size_t>(i)] = problem.normalised_square(i, x);
   }
-  return median(squares.data(), problem.count()) / kChiSquare2Median;
+}
+
+double median_square(const Squares& squares, int count) {
+  Squares sorted;
+  std::copy_n(squares.begin(), count, sorted.begin());
+  return median(sorted.data(), count) / kChiSquare2Median;
 }
 
 // Residuals against their covariances, averaged over neighbours: 1 if they are independent.
@@ -224,18 +230,21 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   x.head<2>() = middle_of_landmarks(landmarks, count);
   const double max_square = limits.max_scale * limits.max_scale;
   double scale_square = 1;
+  Squares squares;  // at x
+  find_squares(problem, x, &squares);
   std::array<double, kMaxFoundLandmarks> weights;
   constexpr int kRobustSteps = 6;
   for (int step = 0; step < kRobustSteps; ++step) {
     // The scale that half of the landmarks show; a shrinking one lets few capture the rest.
-    scale_square = std::clamp(median_square(problem, x), 1.0, max_square);
+    scale_square = std::clamp(median_square(squares, count), 1.0, max_square);
     const double c = 4 * scale_square;
-    for (int i = 0; i < count; ++i) {
-      const double fall = c / (c + problem.normalised_square(i, x));
-      weights[static_cast<std::size_t>(i)] = fall * fall;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
+      const double fall = c / (c + squares[i]);
+      weights[i] = fall * fall;
     }
     x = solve_without_angles(problem, scaled, weights.data(), scale_square, nullptr);
     if (!all_finite(x)) return SolveStatus::kNotFinite;
+    find_squares(problem, x, &squares);
   }
 
   // All or nothing, by the scale of those that are in.
@@ -245,8 +254,9 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   for (int step = 0; step < kGateSteps; ++step) {
     inliers = 0;
     for (int i = 0; i < count; ++i) {
-      landmarks[i].inlier = problem.normalised_square(i, x) < kChiSquare2Gate * scale_square;
-      weights[static_cast<std::size_t>(i)] = landmarks[i].inlier ? 1 : 0;
+      const auto of_it = static_cast<std::size_t>(i);
+      landmarks[i].inlier = squares[of_it] < kChiSquare2Gate * scale_square;
+      weights[of_it] = landmarks[i].inlier ? 1 : 0;
       inliers += landmarks[i].inlier ? 1 : 0;
     }
     if (inliers < std::max(limits.min_inliers, kMinInliers + 1) ||
@@ -254,9 +264,10 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
       return SolveStatus::kTooFew;
     }
     x = solve_without_angles(problem, scaled, weights.data(), scale_square, &covariance);
+    find_squares(problem, x, &squares);
     double square = 0;
     for (int i = 0; i < count; ++i) {
-      if (landmarks[i].inlier) square += problem.normalised_square(i, x);
+      if (landmarks[i].inlier) square += squares[static_cast<std::size_t>(i)];
     }
     scale_square = std::clamp(square / (2 * inliers - 6), 1.0, max_square);
   }

@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "core/model/camera.h"
+#include "core/realtime/image/ask_ahead.h"
 #include "core/realtime/oe_mode/octaves.h"
 #include "core/realtime/oe_mode/view_projection.h"
 
@@ -35,7 +36,10 @@ const std::vector<VisibleLandmark>& VisibleLandmarks::find(const Calibration& ca
                                                            const ViewProjection& view) {
   visible_.clear();
   const int near = map.find(view.optical_axis(), cosine_of_cone_, slots_.data(), map.capacity());
+  constexpr int kLandmarksAhead = 8;
   for (int i = 0; i < near; ++i) {
+    if (i + kLandmarksAhead < near)
+      ask_ahead(&map.at(slots_[static_cast<std::size_t>(i + kLandmarksAhead)]).d);
     const int slot = slots_[static_cast<std::size_t>(i)];
     const Landmark& landmark = map.at(slot);
     Vector2<double> u;

@@ -5,8 +5,10 @@
 extern "C" {
 #include <libavcodec/avcodec.h>
 }
+#include <fcntl.h>
 #include <pthread.h>
 #include <sched.h>
+#include <sys/mman.h>
 #include <sys/resource.h>
 #include <sys/wait.h>
 #include <unistd.h>
@@ -14,6 +16,7 @@ extern "C" {
 #include <algorithm>
 #include <array>
 #include <atomic>
+#include <cstdint>
 #include <cstdlib>
 #include <fstream>
 #include <functional>
@@ -24,7 +27,11 @@ extern "C" {
 #include <vector>
 
 #include "platform/system/clock.h"
+#include "platform/system/file_descriptor.h"
+#include "platform/system/priority_mutex.h"
+#include "test/platform/support/eventually.h"
 #include "test/support/fresh_memory.h"
+#include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {
@@ -187,22 +194,94 @@ TEST(ApplyRealtime, LeavesASmallStackAlone) {
   EXPECT_THAT(report.warnings, ElementsAre(HasSubstr("stack")));
 }
 
-TEST(ApplyRealtime, LockedMemoryIsThereBeforeItIsTouched) {
+// Of the mapping that holds an address, a line of /proc/self/smaps.
+std::string line_of_mapping(const char* address, const std::string& key) {
+  std::ifstream file("/proc/self/smaps");
+  bool is_it = false;
+  for (std::string line; std::getline(file, line);) {
+    std::istringstream words(line);
+    std::string first;
+    words >> first;
+    if (first.empty()) continue;
+    if (first.back() != ':') {
+      const std::size_t dash = first.find('-');
+      const auto at = reinterpret_cast<std::uintptr_t>(address);
+      is_it = at >= std::stoull(first.substr(0, dash), nullptr, 16) &&
+              at < std::stoull(first.substr(dash + 1), nullptr, 16);
+    } else if (is_it && first == key + ":") {
+      return line;
+    }
+  }
+  return "";
+}
+
+TEST(LockProcessMemory, BringsInWhatThereIsAndKeepsWhatComesLater) {
   if (!kOwnMemoryOnly) GTEST_SKIP() << "the sanitizer touches memory too";
   const int result = in_child([] {
-    {
-      const FreshMemory memory(64 * kPage);
-      if (faults_of_touching(memory.data(), memory.size()) == 0) return 1;
-    }
-    RealtimeOptions options;
-    options.lock_memory = true;
-    const RealtimeReport report = apply_realtime(options);
-    if (std::find(report.granted.begin(), report.granted.end(), "memory locked") ==
-        report.granted.end()) {
-      return report.warnings.empty() ? 2 : kNotPermitted;
-    }
-    const FreshMemory memory(64 * kPage);
-    return faults_of_touching(memory.data(), memory.size()) == 0 ? kGood : 3;
+    const FreshMemory before(64 * kPage);
+    if (!lock_process_memory().warnings.empty()) return kNotPermitted;
+    if (faults_of_touching(before.data(), before.size()) != 0) return 1;
+    const FreshMemory later(64 * kPage);
+    if (faults_of_touching(later.data(), later.size()) == 0) return 2;
+    const auto is_locked = [](const FreshMemory& memory) {
+      return line_of_mapping(memory.data(), "VmFlags").find(" lo") != std::string::npos;
+    };
+    return is_locked(before) && is_locked(later) ? kGood : 3;
+  });
+  if (result == kNotPermitted) GTEST_SKIP() << "not permitted to lock memory";
+  EXPECT_EQ(result, kGood);
+}
+
+TEST(LockProcessMemory, TakesNoMoreOfALaterStackThanItsThreadUses) {
+  if (!kOwnMemoryOnly) GTEST_SKIP() << "the sanitizer touches memory too";
+  const int result = in_child([] {
+    if (!lock_process_memory().warnings.empty()) return kNotPermitted;
+    // Larger than any that another test may have left behind.
+    pthread_attr_t attributes;
+    pthread_t thread{};
+    if (pthread_attr_init(&attributes) != 0) return 1;
+    if (pthread_attr_setstacksize(&attributes, std::size_t{64} << 20) != 0) return 1;
+    long resident_kb = -1;
+    const auto look = [](void* out) -> void* {
+      const char here = 0;
+      std::istringstream words(line_of_mapping(&here, "Rss"));
+      std::string key;
+      words >> key >> *static_cast<long*>(out);
+      return nullptr;
+    };
+    if (pthread_create(&thread, &attributes, look, &resident_kb) != 0) return 1;
+    pthread_join(thread, nullptr);
+    pthread_attr_destroy(&attributes);
+    return resident_kb > 0 && resident_kb < 1024 ? kGood : 2;
+  });
+  if (result == kNotPermitted) GTEST_SKIP() << "not permitted to lock memory";
+  EXPECT_EQ(result, kGood);
+}
+
+TEST(LockProcessMemory, LetsGoOfFilesThatNobodyNeedsAnyMore) {
+  if (!kOwnMemoryOnly) GTEST_SKIP() << "the sanitizer touches memory too";
+  const TemporaryDirectory directory;
+  constexpr std::size_t kSize = 64 * kPage;
+  const std::string name = directory.write("tables", std::string(kSize, 'x'));
+  const int result = in_child([&] {
+    const FileDescriptor file(::open(name.c_str(), O_RDONLY | O_CLOEXEC));
+    const auto* const tables =
+        static_cast<const char*>(::mmap(nullptr, kSize, PROT_READ, MAP_PRIVATE, file.get(), 0));
+    if (tables == MAP_FAILED) return 1;
+    const auto is_whole = [&] {
+      return std::count(tables, tables + kSize, 'x') == static_cast<std::ptrdiff_t>(kSize);
+    };
+    const auto resident_kb = [&] {
+      std::istringstream words(line_of_mapping(tables, "Rss"));
+      std::string key;
+      long kb = -1;
+      words >> key >> kb;
+      return kb;
+    };
+    if (!is_whole() || resident_kb() != kSize / 1024) return 2;
+    if (!lock_process_memory().warnings.empty()) return kNotPermitted;
+    if (resident_kb() != 0) return 3;
+    return is_whole() ? kGood : 4;  // from the file again
   });
   if (result == kNotPermitted) GTEST_SKIP() << "not permitted to lock memory";
   EXPECT_EQ(result, kGood);
@@ -221,7 +300,7 @@ CodeSize code_of(const std::string& name) {
     std::string key;
     long size = 0;
     words >> key >> size;
-    if (line.find(" r-xp ") != std::string::npos || key.find('-') != std::string::npos)
+    if (key.find('-') != std::string::npos)
       wanted = line.find(" r-xp ") != std::string::npos && line.find(name) != std::string::npos;
     if (wanted && key == "Size:") sum.mapped += size;
     if (wanted && key == "Rss:") sum.resident += size;
@@ -229,13 +308,11 @@ CodeSize code_of(const std::string& name) {
   return sum;
 }
 
-TEST(ApplyRealtime, BringsInTheCodeOfTheProgramAndNotOfAllLibraries) {
+TEST(LockProcessMemory, BringsInTheCodeOfTheProgramAndNotOfAllLibraries) {
   if (!kOwnMemoryOnly) GTEST_SKIP() << "the sanitizer touches memory too";
   const int result = in_child([] {
     if (avcodec_version() == 0) return 4;
-    RealtimeOptions options;
-    options.lock_memory = true;
-    if (!apply_realtime(options).warnings.empty()) return kNotPermitted;
+    if (!lock_process_memory().warnings.empty()) return kNotPermitted;
     for (const char* name : {"/libc.so", "/libstdc++.so", "platform_system_test"}) {
       const CodeSize code = code_of(name);
       if (code.mapped == 0 || code.resident != code.mapped) return 1;
@@ -249,52 +326,76 @@ TEST(ApplyRealtime, BringsInTheCodeOfTheProgramAndNotOfAllLibraries) {
   EXPECT_EQ(result, kGood);
 }
 
-TEST(UseSmallStacks, HoldsForThreadsStartedLater) {
-  const int result = in_child([] {
-    if (!use_small_stacks()) return 1;
-    // More threads at a time than glibc keeps stacks of ended ones for.
-    std::array<std::size_t, 16> sizes{};
-    std::array<std::thread, 16> threads;
-    std::atomic<bool> all_started{false};
-    for (std::size_t i = 0; i < threads.size(); ++i) {
-      threads[i] = std::thread([&, i] {
-        pthread_attr_t attributes;
-        void* lowest = nullptr;
-        if (pthread_getattr_np(pthread_self(), &attributes) == 0) {
-          pthread_attr_getstack(&attributes, &lowest, &sizes[i]);
-          pthread_attr_destroy(&attributes);
-        }
-        while (!all_started) std::this_thread::yield();
-      });
-    }
-    all_started = true;
-    for (std::thread& thread : threads) thread.join();
-    return sizes.back() == kThreadStack ? kGood : 2;
-  });
-  EXPECT_EQ(result, kGood);
-}
-
-TEST(ApplyRealtime, LockedMemoryStaysWithMalloc) {
+TEST(LockProcessMemory, LeavesAllButLargeBlocksWithMalloc) {
   if (!kOwnMemoryOnly) GTEST_SKIP() << "the sanitizer has a malloc of its own";
   const int result = in_child([] {
-    // More than malloc ever takes from its heap unless told to.
-    constexpr std::size_t kBlock = std::size_t{40} << 20;
-    const auto is_of_the_heap = [] {
-      const std::unique_ptr<char, void (*)(void*)> block(static_cast<char*>(std::malloc(kBlock)),
+    // More than malloc takes from its heap unless told to.
+    constexpr std::size_t kBlock = kFetchedAlone / 2;
+    const auto is_of_the_heap = [](std::size_t size) {
+      const std::unique_ptr<char, void (*)(void*)> block(static_cast<char*>(std::malloc(size)),
                                                          std::free);
       return block != nullptr && std::less<>()(block.get(), static_cast<char*>(::sbrk(0)));
     };
-    if (is_of_the_heap()) return 1;
-    RealtimeOptions options;
-    options.lock_memory = true;
-    if (!apply_realtime(options).warnings.empty()) return kNotPermitted;
+    if (is_of_the_heap(kBlock)) return 1;
+    if (!lock_process_memory().warnings.empty()) return kNotPermitted;
     const char* const before = static_cast<char*>(::sbrk(0));
-    if (!is_of_the_heap()) return 2;
+    if (!is_of_the_heap(kBlock)) return 2;
     const char* const after = static_cast<char*>(::sbrk(0));
-    return after - before >= static_cast<std::ptrdiff_t>(kBlock / 2) ? kGood : 3;
+    if (after - before < static_cast<std::ptrdiff_t>(kBlock / 2)) return 3;
+    return is_of_the_heap(2 * kFetchedAlone) ? 4 : kGood;
   });
   if (result == kNotPermitted) GTEST_SKIP() << "not permitted to lock memory";
   EXPECT_EQ(result, kGood);
+}
+
+TEST(PriorityOf, PutsBriefWorkBelowTheStepAndDecodingBelowThat) {
+  EXPECT_EQ(priority_of(ThreadDuty::kStep, 60), 60);
+  EXPECT_EQ(priority_of(ThreadDuty::kBrief, 60), 59);
+  EXPECT_EQ(priority_of(ThreadDuty::kDecoding, 60), 58);
+  for (const ThreadDuty duty : {ThreadDuty::kStep, ThreadDuty::kBrief, ThreadDuty::kDecoding}) {
+    EXPECT_EQ(priority_of(duty, 1), 1);
+    EXPECT_EQ(priority_of(duty, 0), 0);
+  }
+}
+
+// Of the calling thread, as the kernel has it: 0 and more is normal, below are real-time priorities.
+int effective_priority() {
+  std::ifstream file("/proc/thread-self/stat");
+  std::string line;
+  std::getline(file, line);
+  std::istringstream words(line.substr(line.rfind(')') + 1));
+  std::string skipped;
+  for (int i = 0; i < 15; ++i) words >> skipped;  // state to cstime
+  int priority = 0;
+  words >> priority;
+  return priority;
+}
+
+TEST(PriorityMutex, ItsHolderRunsAsTheOneThatWaitsForIt) {
+  constexpr int kWaiting = 20;
+  PriorityMutex mutex;
+  std::atomic<bool> held{false};
+  std::atomic<bool> refused{false};
+  bool lifted = false;
+  int afterwards = -1;
+  std::thread holder([&] {
+    mutex.lock();
+    held = true;
+    lifted = eventually([&] { return refused || effective_priority() == -1 - kWaiting; });
+    mutex.unlock();
+    afterwards = effective_priority();
+  });
+  ASSERT_TRUE(eventually([&] { return held.load(); }));
+  std::thread waiter([&] {
+    refused = !apply_realtime({kWaiting, -1, false}).warnings.empty();
+    mutex.lock();
+    mutex.unlock();
+  });
+  waiter.join();
+  holder.join();
+  if (refused) GTEST_SKIP() << "not permitted to have a priority";
+  EXPECT_TRUE(lifted);
+  EXPECT_GE(afterwards, 0);
 }
 
 TEST(ThreadPageFaults, CountsThoseOfTheCallingThread) {

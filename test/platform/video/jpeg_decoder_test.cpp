@@ -34,6 +34,30 @@ TEST(JpegDecoder, DecodesAPictureByHand) {
   EXPECT_EQ(picture.height, 8);
 }
 
+TEST(JpegDecoder, UsesMemoryAgainThatNobodyLooksAt) {
+  JpegDecoder decoder;
+  Picture first;
+  Picture second;
+  ASSERT_TRUE(decoder.decode(kGood, &first));
+  ASSERT_TRUE(decoder.decode(kGood, &second));
+  const std::uint8_t* const of_first = first.luma;
+  EXPECT_NE(second.luma, of_first) << "while somebody looks at it";
+  first = {};
+  Picture third;
+  ASSERT_TRUE(decoder.decode(kGood, &third));
+  EXPECT_EQ(third.luma, of_first);
+}
+
+TEST(JpegDecoder, LeavesAPictureItsMemoryWhenItGoes) {
+  Picture picture;
+  {
+    JpegDecoder decoder;
+    ASSERT_TRUE(decoder.decode(kGood, &picture));
+  }
+  const int grey = picture.luma[0];
+  EXPECT_EQ(picture.luma[63], grey);
+}
+
 // To the library tables without a picture are a whole stream.
 TEST(JpegDecoder, RefusesAPictureWithoutASize) {
   for (const std::string& tables : {kBegin + kEnd, kBegin + kQuantization + kEnd}) {

@@ -96,6 +96,32 @@ TEST(ByteVector, LoadsAndStoresSixteenBytesAtAnyAddressAndNoMore) {
   }
 }
 
+TEST(ByteVector, ShufflesLanesOfTwoVectors) {
+  Bytes first, second;
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    first[i] = static_cast<std::uint8_t>(i);
+    second[i] = static_cast<std::uint8_t>(100 + i);
+  }
+  const Bytes shuffled = bytes_of(shuffle<15, 16, 0, 31, 1, 1, 17, 18, 2, 3, 4, 5, 6, 7, 8, 9>(
+      vector_of(first), vector_of(second)));
+  const Bytes expected = {15, 100, 0, 115, 1, 1, 101, 102, 2, 3, 4, 5, 6, 7, 8, 9};
+  EXPECT_EQ(shuffled, expected);
+}
+
+TEST(FloatVector, LoadsEightBytesAtAnyAddressAndNoMore) {
+  const PageEnd page;
+  for (std::size_t offset = 8; offset < 16; ++offset) {
+    std::uint8_t* at = page.last(offset);
+    const std::array<std::uint8_t, 8> values = {0, 1, 127, 128, 254, 255, 3, 77};
+    std::copy(values.begin(), values.end(), at);
+    const EightFloats eight = load_eight(at);
+    for (int i = 0; i < 4; ++i) {
+      EXPECT_EQ(eight.low[i], values[static_cast<std::size_t>(i)]);
+      EXPECT_EQ(eight.high[i], values[static_cast<std::size_t>(i + 4)]);
+    }
+  }
+}
+
 TEST(FloatVector, LoadsFourBytesAndFourFloatsAtAnyAddressAndNoMore) {
   const PageEnd page;
   for (std::size_t offset = 4; offset < 8; ++offset) {
