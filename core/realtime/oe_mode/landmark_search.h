@@ -125,6 +125,7 @@ class LandmarkSearch {
   struct Prepared {
     ReferencePatch patch;
     Matrix2<float> A;
+    Matrix2<float> B;      // the view that was asked for last is A (I + B)
     std::uint32_t id = 0;  // of the landmark it belongs to
     PrepareStatus status = PrepareStatus::kTooFlat;
   };
