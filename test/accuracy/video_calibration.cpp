@@ -4,6 +4,7 @@
 #include <cmath>
 #include <cstddef>
 #include <random>
+#include <system_error>
 
 #include "core/model/direction.h"
 #include "edge_app/commands/calibration_input.h"
@@ -53,6 +54,15 @@ constexpr double kSlowDuration_s = 30;
 constexpr double kFields[] = {0.06, 0.17, 0.35, 0.7};         // rad
 constexpr double kCornerDistortions[] = {-0.05, 0.03, 0.07};  // k r^2
 constexpr double kReadouts[] = {0.6, -0.4, 0.2};              // of a period
+
+// The folder goes with it, however the recording ends.
+struct Removed {
+  const fs::path& folder;
+  ~Removed() {
+    std::error_code ignored;
+    fs::remove_all(folder, ignored);
+  }
+};
 
 template <class T, std::size_t kCount>
 const T& pick(const T (&all)[kCount], int number) {
@@ -112,6 +122,7 @@ VideoRecording video_recording(int number) {
 std::optional<VideoErrors> calibrate_video_recording(const VideoRecording& recording,
                                                      const fs::path& folder, std::string* error) {
   VideoErrors errors;
+  const Removed removed{folder};
   try {
     simulator::write_recording(recording.config, folder);
     CalibrationJob job = load_calibration_job(folder.string());
@@ -119,7 +130,6 @@ std::optional<VideoErrors> calibrate_video_recording(const VideoRecording& recor
     const CalibrationResult result = calibrate_job(folder.string(), 2, &job, &signals);
     Calibration truth;
     const bool read = load_calibration((folder / "truth.yaml").string(), &truth, error);
-    fs::remove_all(folder);
     if (!read) return std::nullopt;
     if (!result.ok()) {
       *error = result.message;

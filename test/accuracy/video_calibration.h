@@ -17,14 +17,14 @@
 
 namespace alidade::test {
 
-inline constexpr int kVideoRecordings = 40;
+inline constexpr int kVideoRecordings = 40;  // of an experiment
 
 struct VideoRecording {
   std::string name;
   simulator::Config config;
 };
 
-// number: from 0; from kVideoRecordings on all repeat with other noise.
+// number: from 0, each another.
 [[nodiscard]] VideoRecording video_recording(int number);
 
 // Errors in units of their sigmas, and the errors themselves in the parameters' units, of kComparedParameters.

@@ -10,7 +10,8 @@
 //     inliers  of the found: in agreement with the solution    orientation_solve.h
 //
 // Each word is the name of its stage, in lists and counts alike.
-// A landmark's patch is kept as this view shows it, and prepared again when the view has changed enough.
+// A landmark's patch is kept as this view shows it, and prepared again when the view has changed enough; until then positions
+// are corrected for the change (docs/oe_mode.md).
 // Memory is taken by the constructor; nothing else allocates, waits or throws. One thread.
 
 #include <cstdint>
