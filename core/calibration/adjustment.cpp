@@ -156,16 +156,12 @@ bool Adjustment::covariance(const Linearisation& in, GlobalMatrix* covariance,
     return scale[i] * scale[j] * root(i, from).dot(root(j, from));
   };
   const auto first_global = size - kGlobalCount;
+  global_rows_.setZero(kGlobalCount, size);
   for (int i = 0; i < kGlobalCount; ++i) {
-    for (int j = 0; j < kGlobalCount; ++j) {
-      (*covariance)(i, j) = inverse(first_global + i, first_global + j);
-    }
+    if (fixed_[static_cast<std::size_t>(i)]) continue;
+    for (Eigen::Index j = 0; j < size; ++j) global_rows_(i, j) = inverse(first_global + i, j);
   }
-  for (int i = 0; i < kGlobalCount; ++i) {
-    if (!fixed_[static_cast<std::size_t>(i)]) continue;
-    covariance->row(i).setZero();
-    covariance->col(i).setZero();
-  }
+  *covariance = global_rows_.rightCols<kGlobalCount>();
   *telemetry_unknowns = 0;
   for (Eigen::Index j = 0; j < size; ++j) {
     for (Eigen::Index i = j; i < size; ++i) {

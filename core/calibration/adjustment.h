@@ -40,6 +40,12 @@ class Adjustment {
   [[nodiscard]] bool covariance(const Linearisation& linearisation, GlobalMatrix* covariance,
                                 double* telemetry_unknowns);
 
+  // Of each observation at the state of the latest covariance(), in units of its sigma.
+  [[nodiscard]] std::vector<Influence> influences(const AdjustmentState& state,
+                                                  const Linearisation& linearisation) const {
+    return lineariser_.influences(state, linearisation, global_rows_);
+  }
+
   [[nodiscard]] int steps_taken() const { return steps_taken_; }
 
  private:
@@ -53,6 +59,7 @@ class Adjustment {
 
   Eigen::MatrixXd reduced_;
   Eigen::VectorXd reduced_g_;
+  GlobalRows global_rows_;  // of H^-1, landmarks eliminated; zero where fixed
 };
 
 }  // namespace alidade::internal

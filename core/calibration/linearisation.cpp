@@ -1,5 +1,6 @@
 #include "core/calibration/linearisation.h"
 
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 
@@ -248,6 +249,44 @@ void Lineariser::add_observations(const AdjustmentState& state, const LossScales
   }
   out->H.block<kCameraCount, kCameraCount>(camera_row, camera_row) += H_cc;
   out->g.segment<kCameraCount>(camera_row) += g_c;
+}
+
+std::vector<Influence> Lineariser::influences(const AdjustmentState& state, const Linearisation& at,
+                                              const GlobalRows& inverse) const {
+  const ObservationModel model(state);
+  const Eigen::Matrix<double, kGlobalCount, kCameraCount> of_camera =
+      inverse.middleCols<kCameraCount>(inverse.cols() - kGlobalCount);
+  std::vector<Influence> all(data_.observations.size(), Influence::Zero());
+  for (std::size_t i = 0; i < all.size();) {
+    const int name = data_.observations[i].landmark;
+    const auto l = static_cast<std::size_t>(name);
+    const ObservationModel::Landmark landmark = model.turn(state.landmarks[l]);
+    // What the landmark's direction takes over.
+    Influence of_landmark = of_camera * at.H_camera[l];
+    for (std::size_t j = at.touched_begin[l]; j < at.touched_begin[l + 1]; ++j) {
+      of_landmark += inverse.middleCols<2>(2 * at.touched[j]) * at.H_touched[j];
+    }
+    of_landmark *= at.H_landmark[l].inverse();
+    for (; i < all.size() && data_.observations[i].landmark == name; ++i) {
+      const AdjustmentObservation& observation = data_.observations[i];
+      if (!observation.used) continue;
+      const LinearisedResidual& residual = at.observations[i];
+      const TrajectorySpline::Basis basis =
+          state.trajectory.basis(residual.time_s, residual.segment);
+      ObservationModel::Result result;
+      if (!model.evaluate(observation, state.trajectory.position(basis),
+                          state.trajectory.rate(basis), landmark, &result)) {
+        continue;
+      }
+      Influence of_angle = Influence::Zero();
+      for (int k = 0; k < 4; ++k) {
+        of_angle += basis.weight[k] * inverse.middleCols<2>(2 * (basis.segment + k));
+      }
+      all[i] = of_angle * result.J_angle.transpose() + of_camera * result.J_camera.transpose() -
+               of_landmark * result.J_landmark.transpose();
+    }
+  }
+  return all;
 }
 
 void Lineariser::add_telemetry(const AdjustmentState& state, const LossScales& loss,

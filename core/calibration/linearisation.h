@@ -115,6 +115,11 @@ struct Linearisation {
   std::vector<Eigen::Matrix<double, kCameraCount, 2>> H_camera;
 };
 
+// Rows of H^-1, landmarks eliminated, that belong to the parameters: as many columns as H.
+using GlobalRows = Eigen::Matrix<double, kGlobalCount, Eigen::Dynamic>;
+// By how much the parameters move with the error of one observation, in units of its sigma.
+using Influence = Eigen::Matrix<double, kGlobalCount, 2>;
+
 void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_landmark,
                 AdjustmentState* state);
 
@@ -127,6 +132,11 @@ class Lineariser {
 
   // All that *out holds is replaced; its memory is used again.
   void linearise(const AdjustmentState& state, const LossScales& loss, Linearisation* out);
+
+  // Of each observation, zero if it is not used. `at`: of least squares, at this state; inverse: of its H.
+  [[nodiscard]] std::vector<Influence> influences(const AdjustmentState& state,
+                                                  const Linearisation& at,
+                                                  const GlobalRows& inverse) const;
 
  private:
   void add_observations(const AdjustmentState& state, const LossScales& loss, Linearisation* out);

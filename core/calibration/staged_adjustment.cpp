@@ -10,6 +10,7 @@
 #include "core/calibration/median.h"
 #include "core/calibration/noise_check.h"
 #include "core/calibration/rounded_telemetry.h"
+#include "core/calibration/shared_errors.h"
 
 namespace alidade::internal {
 
@@ -71,7 +72,10 @@ StageStatus StagedAdjustment::adjust_on_inliers(CalibrationQuality* quality) {
             "image's size and the tracks those of one zoom?" +
                 doubt_};
   }
-  return allow_for_repetition(quality);
+  const StageStatus status = allow_for_repetition(quality);
+  if (!status.ok()) return status;
+  allow_for_shared_errors();
+  return {};
 }
 
 bool StagedAdjustment::settle_robustly() {
@@ -167,6 +171,14 @@ StageStatus StagedAdjustment::allow_for_repetition(CalibrationQuality* quality) 
             "the adjustment does not converge with errors that repeat from frame to frame"};
   }
   return {};
+}
+
+void StagedAdjustment::allow_for_shared_errors() {
+  const std::vector<Influence> influences = adjustment_.influences(adjusted_.state, adjusted_.at);
+  adjusted_.covariance = grown_covariance(
+      influences,
+      shared_error_growth(selected_->data, adjusted_.at, influences, adjusted_.covariance),
+      adjusted_.covariance);
 }
 
 }  // namespace alidade::internal

@@ -5,8 +5,9 @@
 //                       crossings (rounded_telemetry.h): readings hold a trajectory everywhere, crossings only from
 //                       close by. Outliers are marked by what comes out.
 //   adjust_on_inliers   least squares on the rest, outliers marked anew; noise levels that the residuals contradict
-//                       beyond chance are replaced by the residuals' (noise_check.h); covariance. A robust loss on good
-//                       data would inflate the sigmas that are reported.
+//                       beyond chance are replaced by the residuals' (noise_check.h); covariance, grown where
+//                       residuals move the parameters together (shared_errors.h). A robust loss on good data would
+//                       inflate the sigmas that are reported.
 // Allocates; one object for each recording.
 
 #include <string>
@@ -46,6 +47,7 @@ class StagedAdjustment {
   bool mark_outliers();
   bool correct_noise(CalibrationQuality* quality);
   [[nodiscard]] StageStatus allow_for_repetition(CalibrationQuality* quality);
+  void allow_for_shared_errors();
 
   SelectedInput* selected_;
   TelemetryNoise noise_;

@@ -72,7 +72,7 @@ CalibrationResult calibrate_video(const std::string& recording, const Calibratio
   VideoTracks tracks = estimate == nullptr ? track_video(recording, job->input, look)
                                            : track_video(recording, job->input, *estimate, look);
   *remarks = std::move(tracks.remarks);
-  job->input.observations = choose_tracks(tracks.observations);
+  job->input.observations = choose_tracks(std::move(tracks.observations));
   return calibrate_visibly(job, kShareOfLooking, progress);
 }
 

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <tuple>
 #include <unordered_map>
 #include <unordered_set>
+#include <utility>
 
 #include "edge_app/pipeline/stale_repeats.h"
 
@@ -142,8 +144,35 @@ void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
                                                               : StampNoise::kOneSided;
 }
 
-std::vector<CalibrationObservation> choose_tracks(
-    const std::vector<CalibrationObservation>& observations, std::size_t max_observations) {
+std::vector<CalibrationObservation> without_shared_pixels(
+    std::vector<CalibrationObservation> observations) {
+  std::unordered_map<std::int64_t, double> information;  // of each landmark, 1/px^2
+  for (const CalibrationObservation& seen : observations)
+    information[seen.landmark] += 1 / (seen.sigma_px * seen.sigma_px);
+  const auto rank = [&information](const CalibrationObservation& seen) {
+    return std::make_tuple(seen.frame, -information.at(seen.landmark), seen.landmark);
+  };
+  std::sort(observations.begin(), observations.end(),
+            [&rank](const CalibrationObservation& a, const CalibrationObservation& b) {
+              return rank(a) < rank(b);
+            });
+  std::vector<CalibrationObservation> kept;
+  std::size_t frame_begin = 0;
+  for (const CalibrationObservation& seen : observations) {
+    if (!kept.empty() && kept.back().frame != seen.frame) frame_begin = kept.size();
+    const auto begin = kept.begin() + static_cast<std::ptrdiff_t>(frame_begin);
+    if (std::none_of(begin, kept.end(), [&seen](const CalibrationObservation& better) {
+          return std::hypot(seen.u_px - better.u_px, seen.v_px - better.v_px) < kSharedPixels_px;
+        })) {
+      kept.push_back(seen);
+    }
+  }
+  return kept;
+}
+
+std::vector<CalibrationObservation> choose_tracks(std::vector<CalibrationObservation> given,
+                                                  std::size_t max_observations) {
+  const std::vector<CalibrationObservation> observations = without_shared_pixels(std::move(given));
   struct Track {
     std::int64_t landmark = 0;
     std::size_t count = 0;

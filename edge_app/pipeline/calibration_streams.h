@@ -27,12 +27,19 @@ void add_frames(std::vector<FrameStamp> stamps, CalibrationInput* input,
 void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
                    CalibrationOptions* options, std::vector<std::string>* remarks);
 
-// Leaves what an adjustment can use in reasonable time: landmarks seen kMinSightings times or more, and of
-// these, if there are more than max_observations, those that moved farthest through the image.
+// Two landmarks may be one corner, seen in two octaves: the noise of its pixels is in both, which are then no two
+// observations (docs/calibration.md). Of those of a frame that lie closer than this one is left, that of the landmark
+// with the most information; by frame.
+inline constexpr double kSharedPixels_px = 8;
+[[nodiscard]] std::vector<CalibrationObservation> without_shared_pixels(
+    std::vector<CalibrationObservation> observations);
+
+// Leaves what an adjustment can use in reasonable time: without shared pixels, landmarks seen kMinSightings times or
+// more, and of these, if there are more than max_observations, those that moved farthest through the image.
 inline constexpr int kMinSightings = 5;
 inline constexpr std::size_t kMaxObservations = 30000;
 [[nodiscard]] std::vector<CalibrationObservation> choose_tracks(
-    const std::vector<CalibrationObservation>& observations,
+    std::vector<CalibrationObservation> observations,
     std::size_t max_observations = kMaxObservations);
 
 }  // namespace alidade

@@ -171,6 +171,19 @@ PrepareStatus sample_reference(const ImageView& reference, const Vector2<double>
   return PrepareStatus::kOk;
 }
 
+// Of a displacement's weights with the gradients and the points' places.
+Matrix2<float> moments(const Points& to, const Points& du, const Points& dv) {
+  const auto place = Eigen::Array<float, kSize, 1>::LinSpaced(-static_cast<float>(kHalf),
+                                                              static_cast<float>(kHalf));
+  Matrix2<float> M;
+  for (int row = 0; row < 2; ++row) {
+    const Points product = to * (row == 0 ? du : dv);
+    M(row, 0) = (product.colwise().sum().transpose() * place).sum();
+    M(row, 1) = (product.rowwise().sum() * place).sum();
+  }
+  return M;
+}
+
 // image = gain * value + moved . gradient + constant, moved = gain * displacement
 struct Fit {
   Vector2<float> moved;
@@ -197,6 +210,8 @@ PrepareStatus prepare(const ImageView& reference, const Vector2<double>& centre,
   if (status != PrepareStatus::kOk) return status;
 
   const float mean = value.mean();
+  const Points whole_du = du;
+  const Points whole_dv = dv;
   light().take_out_of(&value);
   light().take_out_of(&du);
   light().take_out_of(&dv);
@@ -239,6 +254,8 @@ PrepareStatus prepare(const ImageView& reference, const Vector2<double>& centre,
     out->unit_covariance += by_small * by_small.transpose() * variance + mixed + mixed.transpose();
     out->unobserved.setZero();
   }
+  out->warp_moments_u = moments(out->to_u, whole_du, whole_dv);
+  out->warp_moments_v = moments(out->to_v, whole_du, whole_dv);
   out->value = value;
   out->energy = energy;
   out->value_gradient = value_gradient;

@@ -46,6 +46,8 @@ struct ReferencePatch {
   float residual_trace = 0;        // sum of squared residuals for noise of 1 grey level
   Matrix2<float> unit_covariance;  // H^-1 G' R G H^-1
   Matrix2<float> unobserved;       // projection on directions without contrast
+  // Of u and of v: sums of to_u (to_v) times gradient (row) times point (column), px.
+  Matrix2<float> warp_moments_u, warp_moments_v;
 };
 static_assert(std::is_trivially_destructible_v<ReferencePatch>);
 
@@ -67,6 +69,14 @@ enum class PrepareStatus {
 [[nodiscard]] PrepareStatus prepare(const ImageView& reference, const Vector2<double>& centre,
                                     const Matrix2<double>& A, double min_contrast,
                                     ReferencePatch* out);
+
+// Where a patch lies that was prepared with A and is seen as A (I + B): the position that align() finds plus this,
+// px, to first order in B. Without it a patch whose contrast lies to one side of its middle seems displaced by as
+// much as B moves that side.
+[[nodiscard]] inline Vector2<double> warp_displacement(const ReferencePatch& patch,
+                                                       const Matrix2<float>& B) {
+  return {patch.warp_moments_u.cwiseProduct(B).sum(), patch.warp_moments_v.cwiseProduct(B).sum()};
+}
 
 struct AlignmentLimits {
   int max_iterations = 12;

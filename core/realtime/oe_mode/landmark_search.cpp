@@ -127,6 +127,7 @@ const ReferencePatch* LandmarkSearch::reference(const SearchedFrame& frame, int 
                               prepared.A.cast<double>(),
                               frame.octaves.least_contrast(landmark.octave), &prepared.patch);
   }
+  prepared.B = prepared.A.inverse() * (wanted - prepared.A);
   return is_usable(prepared.status) ? &prepared.patch : nullptr;
 }
 
@@ -195,7 +196,8 @@ void LandmarkSearch::fit_fine(const SearchedFrame& frame, const ViewProjection& 
     observation.slot = wanted.slot;
     observation.id = landmark.id;
     observation.octave = wanted.octave;
-    observation.u = alignment.position / to_octave;
+    const Matrix2<float>& B = prepared_[static_cast<std::size_t>(wanted.slot)].B;
+    observation.u = (alignment.position + warp_displacement(*patch, B)) / to_octave;
     observation.covariance = alignment.covariance / (to_octave * to_octave);
     FoundLandmark& f = found_.emplace_back();
     f.u = observation.u;

@@ -10,7 +10,8 @@
 //     inliers  of the found: in agreement with the solution    orientation_solve.h
 //
 // Each word is the name of its stage, in lists and counts alike.
-// A landmark's patch is kept as this view shows it, and prepared again when the view has changed enough.
+// A landmark's patch is kept as this view shows it, and prepared again when the view has changed enough; until then positions
+// are corrected for the change (docs/oe_mode.md).
 // Memory is taken by the constructor; nothing else allocates, waits or throws. One thread.
 
 #include <cstdint>
@@ -125,6 +126,7 @@ class LandmarkSearch {
   struct Prepared {
     ReferencePatch patch;
     Matrix2<float> A;
+    Matrix2<float> B;      // the view that was asked for last is A (I + B)
     std::uint32_t id = 0;  // of the landmark it belongs to
     PrepareStatus status = PrepareStatus::kTooFlat;
   };

@@ -291,6 +291,46 @@ TEST(PatchAlignment, PreparesAWarpedReferenceAsTheImageThatShowsItSo) {
   EXPECT_GT(compared, 5);
 }
 
+// Prepared for the image's warp A (I + B), or for A and corrected by what B displaces: the same to second order,
+// 4 px of half a patch times |B|^2 = 1e-3. Uncorrected, contrast a pixel beside the middle moves by |B| px.
+TEST(PatchAlignment, TellsWhereAPatchLiesThatIsWarpedMoreThanPreparedFor) {
+  Matrix2<double> A;
+  A << 1.05, -0.2, 0.2, 1.05;
+  Matrix2<double> B;
+  B << 0.02, -0.015, 0.01, -0.02;
+  std::mt19937_64 random(29);
+  double squares = 0;
+  double uncorrected_squares = 0;
+  int count = 0;
+  for (int n = 0; n < 200; ++n) {
+    const AnalyticImage texture(&random);
+    const Vector2<double> shift = random_shift(&random);
+    const auto changed = [&](const Vector2<double>& at) {
+      return texture(kCentre + A * ((kIdentity + B) * (at - shift - kCentre)));
+    };
+    const Pixels before = make_pixels(kSize, kSize, texture, 0, &random);
+    const Pixels after = make_pixels(kSize, kSize, changed, 0, &random);
+    ReferencePatch prepared;
+    ReferencePatch exact;
+    if (prepare(before.view, kCentre, A, kMinContrast, &prepared) != PrepareStatus::kOk ||
+        prepare(before.view, kCentre, A * (kIdentity + B), kMinContrast, &exact) !=
+            PrepareStatus::kOk) {
+      continue;
+    }
+    Alignment found;
+    Alignment expected;
+    ASSERT_EQ(align(prepared, after.view, kCentre, {}, &found), AlignmentStatus::kConverged);
+    ASSERT_EQ(align(exact, after.view, kCentre, {}, &expected), AlignmentStatus::kConverged);
+    const Vector2<double> off = found.position - expected.position;
+    uncorrected_squares += off.squaredNorm() / 2;
+    squares += (off + warp_displacement(prepared, B.cast<float>())).squaredNorm() / 2;
+    ++count;
+  }
+  ASSERT_GT(count, 100);
+  EXPECT_LT(std::sqrt(squares / count), 4 * B.squaredNorm());
+  EXPECT_GT(std::sqrt(uncorrected_squares / count), 8 * B.squaredNorm());
+}
+
 TEST(PatchAlignment, GoesAsFarAsItMayAndNoFarther) {
   std::mt19937_64 random(25);
   const AnalyticImage texture(&random);

@@ -5,6 +5,8 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
+#include <map>
 #include <set>
 #include <utility>
 
@@ -72,6 +74,33 @@ TEST_F(SearchedScene, FindsFineLandmarksWhereTheyAre) {
   }
   EXPECT_LT(squares / fine.found, 2);
   EXPECT_GT(squares / fine.found, 0.3);
+}
+
+// A view a little wider than the landmarks' is within what a prepared patch serves for. How long it serves may cost
+// time, but must not move its landmark: to second order, 4 px of half a patch times the square of the change, and
+// what alignment leaves between its last step and none.
+TEST_F(SearchedScene, FindsLandmarksAtTheSamePlaceHoweverLongAPatchServes) {
+  constexpr double kWider = 0.009;
+  scene_.calibration_.camera.focal_length /= 1 + kWider;
+  LandmarkSearchOptions options;
+  ASSERT_GT(0.5 * options.fine_warp_tolerance, kWider);
+  options.fine_warp_tolerance = 1e-6F;
+  LandmarkSearch exact(options, scene_.map_.capacity());
+  exact.reset(scene_.calibration_);
+  static_cast<void>(exact.align_fine(frame(), TexturedScene::motion_at({0, 0})));
+  static_cast<void>(search_.align_fine(frame(), TexturedScene::motion_at({0, 0})));
+  std::map<std::uint32_t, Vector2<double>> expected;
+  for (const OeObservation& seen : exact.observations()) expected[seen.id] = seen.u;
+  double squares = 0;
+  int compared = 0;
+  for (const OeObservation& seen : search_.observations()) {
+    const auto other = expected.find(seen.id);
+    if (other == expected.end()) continue;
+    squares += std::ldexp((seen.u - other->second).squaredNorm() / 2, -2 * seen.octave);
+    ++compared;
+  }
+  ASSERT_GT(compared, 50);
+  EXPECT_LT(std::sqrt(squares / compared), 4 * kWider * kWider + AlignmentLimits{}.converged_step);
 }
 
 TEST_F(SearchedScene, FindsNothingWhereThereIsNothing) {
