@@ -72,7 +72,8 @@ class CubicSpline {
     const double x = (time_s - knot(segment)) / length;
     const Matrix4<double>& B = from_power_[static_cast<std::size_t>(segment)];
     result.weight = B * Vector4<double>(1, x, x * x, x * x * x);
-    result.rate_weight = B.template rightCols<3>() * (Vector3<double>(1, 2 * x, 3 * x * x) / length);
+    result.rate_weight =
+        B.template rightCols<3>() * (Vector3<double>(1, 2 * x, 3 * x * x) / length);
     return result;
   }
 

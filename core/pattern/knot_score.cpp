@@ -18,7 +18,8 @@ struct Scored {
   Matrix<double, 2, 6> J;
 };
 
-std::vector<Scored> scored(const PatternData& data, const PatternMask& used, const PatternState& state, double sigma_px) {
+std::vector<Scored> scored(const PatternData& data, const PatternMask& used,
+                           const PatternState& state, double sigma_px) {
   std::vector<Scored> all;
   const double line_delay = state.lens[index(LensParameter::kLineDelay)];
   int segment = 0;
@@ -29,12 +30,13 @@ std::vector<Scored> scored(const PatternData& data, const PatternMask& used, con
       const PatternObservation& observation = frame.observations[i];
       segment = state.curve.segment_at(frame.time_s + observation.u.y() * line_delay, segment);
       MovingProjection projection;
-      if (project_moving(state.curve, segment, control_points_of(state.curve, segment), state.lens, frame.time_s,
-                         data.points_m[static_cast<std::size_t>(observation.point)], observation.u.y(), &projection,
-                         true) != ProjectionStatus::kOk) {
+      if (project_moving(state.curve, segment, control_points_of(state.curve, segment), state.lens,
+                         frame.time_s, data.points_m[static_cast<std::size_t>(observation.point)],
+                         observation.u.y(), &projection, true) != ProjectionStatus::kOk) {
         continue;
       }
-      all.push_back({projection.time_s, (projection.u - observation.u) / sigma_px, projection.J_u_x / sigma_px});
+      all.push_back({projection.time_s, (projection.u - observation.u) / sigma_px,
+                     projection.J_u_x / sigma_px});
     }
   }
   return all;
@@ -61,7 +63,8 @@ Step best_step(const std::vector<Scored>& all, const CubicSpline<6>& spline) {
     Normal& of_segment = N[static_cast<std::size_t>(basis.segment)];
     for (int i = 0; i < 4; ++i) {
       g.segment<6>(6 * (basis.segment + i)) -= basis.weight[i] * b;
-      for (int j = 0; j <= i; ++j) of_segment.block<6, 6>(6 * i, 6 * j) += basis.weight[i] * basis.weight[j] * information;
+      for (int j = 0; j <= i; ++j)
+        of_segment.block<6, 6>(6 * i, 6 * j) += basis.weight[i] * basis.weight[j] * information;
     }
   }
   std::vector<Eigen::Triplet<double>> entries;
@@ -72,7 +75,8 @@ Step best_step(const std::vector<Scored>& all, const CubicSpline<6>& spline) {
     for (int i = 0; i < 24; ++i) {
       diagonal[6 * s + i] += of_segment(i, i);
       for (int j = 0; j <= i; ++j) {
-        if (i / 6 == j / 6 || of_segment(i, j) != 0) entries.emplace_back(6 * s + i, 6 * s + j, of_segment(i, j));
+        if (i / 6 == j / 6 || of_segment(i, j) != 0)
+          entries.emplace_back(6 * s + i, 6 * s + j, of_segment(i, j));
       }
     }
   }
@@ -85,13 +89,16 @@ Step best_step(const std::vector<Scored>& all, const CubicSpline<6>& spline) {
   }
   Eigen::SparseMatrix<double> H(size, size);
   H.setFromTriplets(entries.begin(), entries.end());
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> ldlt(H);
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower,
+                              Eigen::NaturalOrdering<int>>
+      ldlt(H);
   step.gain.assign(all.size(), 0);
   if (ldlt.info() != Eigen::Success) return step;
   const Eigen::VectorXd x = ldlt.solve(g);
   for (std::size_t i = 0; i < all.size(); ++i) {
     Matrix<double, 6, 1> change = Matrix<double, 6, 1>::Zero();
-    for (int k = 0; k < 4; ++k) change += bases[i].weight[k] * x.segment<6>(6 * (bases[i].segment + k));
+    for (int k = 0; k < 4; ++k)
+      change += bases[i].weight[k] * x.segment<6>(6 * (bases[i].segment + k));
     step.gain[i] = all[i].r.squaredNorm() - (all[i].r + all[i].J * change).squaredNorm();
   }
   return step;
@@ -121,7 +128,8 @@ KnotScore score_knots(const PatternData& data, const PatternMask& used, const Pa
   const Step fine = best_step(all, curve.split(every));
   std::vector<double> gain(segments, 0);
   for (std::size_t i = 0; i < all.size(); ++i) {
-    gain[static_cast<std::size_t>(curve.segment_at(all[i].time_s))] += fine.gain[i] - coarse.gain[i];
+    gain[static_cast<std::size_t>(curve.segment_at(all[i].time_s))] +=
+        fine.gain[i] - coarse.gain[i];
   }
   constexpr int kLeastObservations = 12;  // of a segment: twice what its new knot adds
   std::vector<char> can(segments, 0);
@@ -143,13 +151,14 @@ KnotScore score_knots(const PatternData& data, const PatternMask& used, const Pa
   return score;
 }
 
-double observation_noise(const PatternData& data, const PatternMask& used, const PatternState& state,
-                         double frame_interval_s) {
+double observation_noise(const PatternData& data, const PatternMask& used,
+                         const PatternState& state, double frame_interval_s) {
   const std::vector<Scored> all = scored(data, used, state, 1);
   std::vector<double> knots;
   const double begin = state.curve.begin_s();
   const int count = std::max(1, static_cast<int>((state.curve.end_s() - begin) / frame_interval_s));
-  for (int i = 0; i <= count; ++i) knots.push_back(begin + (state.curve.end_s() - begin) * i / count);
+  for (int i = 0; i <= count; ++i)
+    knots.push_back(begin + (state.curve.end_s() - begin) * i / count);
   const Step step = best_step(all, CubicSpline<6>(knots));
   double sum = 0;
   for (std::size_t i = 0; i < all.size(); ++i) sum += all[i].r.squaredNorm() - step.gain[i];

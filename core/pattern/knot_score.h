@@ -13,24 +13,24 @@
 namespace alidade::internal {
 
 struct KnotScoreOptions {
-  double sigma_px = 1;           // of an observation's coordinate
+  double sigma_px = 1;            // of an observation's coordinate
   double shortest_segment_s = 0;  // no half may be shorter
 };
 
 struct KnotScore {
-  std::vector<int> split;     // segments to halve, in increasing order
-  double gain = 0;            // of squared residuals in units of sigma, were all that can be halved
-  double expected = 0;        // from noise alone
-  double gain_of_short = 0;   // were those halved that are too short for it
+  std::vector<int> split;    // segments to halve, in increasing order
+  double gain = 0;           // of squared residuals in units of sigma, were all that can be halved
+  double expected = 0;       // from noise alone
+  double gain_of_short = 0;  // were those halved that are too short for it
   double expected_of_short = 0;
 };
 
-[[nodiscard]] KnotScore score_knots(const PatternData& data, const PatternMask& used, const PatternState& state,
-                                    const KnotScoreOptions& options);
+[[nodiscard]] KnotScore score_knots(const PatternData& data, const PatternMask& used,
+                                    const PatternState& state, const KnotScoreOptions& options);
 
 // sigma of an observation's coordinate, px: what one step of a curve with a knot a frame leaves, whatever the knots of the
 // state's own curve do not follow.
-[[nodiscard]] double observation_noise(const PatternData& data, const PatternMask& used, const PatternState& state,
-                                       double frame_interval_s);
+[[nodiscard]] double observation_noise(const PatternData& data, const PatternMask& used,
+                                       const PatternState& state, double frame_interval_s);
 
 }  // namespace alidade::internal

@@ -27,7 +27,15 @@ enum class LensParameter {
 };
 inline constexpr int kLensParameterCount = 9;
 inline constexpr std::array<const char*, kLensParameterCount> kLensParameterNames = {
-    "focal_length_u", "focal_length_v", "optical_centre_u", "optical_centre_v", "k1", "k2", "p1", "p2", "line_delay"};
+    "focal_length_u",
+    "focal_length_v",
+    "optical_centre_u",
+    "optical_centre_v",
+    "k1",
+    "k2",
+    "p1",
+    "p2",
+    "line_delay"};
 
 [[nodiscard]] constexpr int index(LensParameter parameter) { return static_cast<int>(parameter); }
 
@@ -36,9 +44,10 @@ using LensVector = Matrix<double, kLensParameterCount, 1>;
 using LensMatrix = Matrix<double, kLensParameterCount, kLensParameterCount>;
 
 // p_c: m, or any length. J_u_lens leaves the line delay's column 0. Outputs are written with kOk only.
-[[nodiscard]] inline ProjectionStatus project_lens(const LensVector& lens, const Vector3<double>& p_c, Vector2<double>* u,
-                                                   Matrix<double, 2, 3>* J_u_p = nullptr,
-                                                   Matrix<double, 2, kLensParameterCount>* J_u_lens = nullptr) {
+[[nodiscard]] inline ProjectionStatus project_lens(
+    const LensVector& lens, const Vector3<double>& p_c, Vector2<double>* u,
+    Matrix<double, 2, 3>* J_u_p = nullptr,
+    Matrix<double, 2, kLensParameterCount>* J_u_lens = nullptr) {
   if (!all_finite(p_c)) return ProjectionStatus::kNotFinite;
   if (p_c.z() <= 0) return ProjectionStatus::kBehindCamera;
   const double f_u = lens[index(LensParameter::kFocalLengthU)];
@@ -62,14 +71,16 @@ using LensMatrix = Matrix<double, kLensParameterCount, kLensParameterCount>;
   if (J_u_p != nullptr) {
     const double s_r2 = k1 + 2 * k2 * r2;  // d s / d r^2
     Matrix2<double> J_xd_x;
-    J_xd_x << s + 2 * s_r2 * x * x + 2 * p1 * y + 6 * p2 * x, 2 * s_r2 * x * y + 2 * p1 * x + 2 * p2 * y,
-        2 * s_r2 * x * y + 2 * p1 * x + 2 * p2 * y, s + 2 * s_r2 * y * y + 6 * p1 * y + 2 * p2 * x;
+    J_xd_x << s + 2 * s_r2 * x * x + 2 * p1 * y + 6 * p2 * x,
+        2 * s_r2 * x * y + 2 * p1 * x + 2 * p2 * y, 2 * s_r2 * x * y + 2 * p1 * x + 2 * p2 * y,
+        s + 2 * s_r2 * y * y + 6 * p1 * y + 2 * p2 * x;
     J_xd_x.row(0) *= f_u / p_c.z();
     J_xd_x.row(1) *= f_v / p_c.z();
     *J_u_p << J_xd_x, -J_xd_x * Vector2<double>(x, y);
   }
   if (J_u_lens != nullptr) {
-    *J_u_lens << x_d, 0, 1, 0, f_u * x * r2, f_u * x * r2 * r2, f_u * 2 * x * y, f_u * (r2 + 2 * x * x), 0,  //
+    *J_u_lens << x_d, 0, 1, 0, f_u * x * r2, f_u * x * r2 * r2, f_u * 2 * x * y,
+        f_u * (r2 + 2 * x * x), 0,  //
         0, y_d, 0, 1, f_v * y * r2, f_v * y * r2 * r2, f_v * (r2 + 2 * y * y), f_v * 2 * x * y, 0;
   }
   return ProjectionStatus::kOk;

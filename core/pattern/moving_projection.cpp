@@ -10,12 +10,13 @@ ControlPoints control_points_of(const PoseCurve& curve, int segment) {
   return points;
 }
 
-ProjectionStatus project_moving(const PoseCurve& curve, int segment, const ControlPoints& points, const LensVector& lens,
-                                double frame_time_s, const Vector3<double>& p, double row_guess,
+ProjectionStatus project_moving(const PoseCurve& curve, int segment, const ControlPoints& points,
+                                const LensVector& lens, double frame_time_s,
+                                const Vector3<double>& p, double row_guess,
                                 MovingProjection* projection, bool with_jacobians) {
   constexpr int kMaxSteps = 12;
-  constexpr double kRowTolerance = 1e-9;   // px
-  constexpr double kSlopeLimit = 0.98;     // rows that the image moves per row that is read
+  constexpr double kRowTolerance = 1e-9;  // px
+  constexpr double kSlopeLimit = 0.98;    // rows that the image moves per row that is read
   const double line_delay = lens[index(LensParameter::kLineDelay)];
   double row = row_guess;
   for (int step = 0; step < kMaxSteps; ++step) {
@@ -28,7 +29,8 @@ ProjectionStatus project_moving(const PoseCurve& curve, int segment, const Contr
     Vector2<double> u;
     Matrix<double, 2, 3> J_u_p;
     Matrix<double, 2, kLensParameterCount> J_u_lens;
-    const ProjectionStatus status = project_lens(lens, p_c, &u, &J_u_p, with_jacobians ? &J_u_lens : nullptr);
+    const ProjectionStatus status =
+        project_lens(lens, p_c, &u, &J_u_p, with_jacobians ? &J_u_lens : nullptr);
     if (status != ProjectionStatus::kOk) return status;
     Matrix<double, 3, 6> J_p_x;
     J_p_x << -R.transpose(), skew(p_c) * right_jacobian_so3(Vector3<double>(x.tail<3>()));

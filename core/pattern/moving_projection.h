@@ -12,10 +12,10 @@
 namespace alidade {
 
 struct MovingProjection {
-  Vector2<double> u;                                 // px
-  double time_s = 0;                                 // when the point's row was exposed
-  SplineBasis basis;                                 // of the pose then
-  Matrix<double, 2, 6> J_u_x;                        // by the pose then
+  Vector2<double> u;                                // px
+  double time_s = 0;                                // when the point's row was exposed
+  SplineBasis basis;                                // of the pose then
+  Matrix<double, 2, 6> J_u_x;                       // by the pose then
   Matrix<double, 2, kLensParameterCount> J_u_lens;  // line delay included
 };
 
@@ -27,8 +27,10 @@ using ControlPoints = Matrix<double, 6, 4>;
 // row_guess: px, where the solution for the row begins. Only by the segment's polynomials, also beyond its ends: what a
 // solver's parameter blocks are does not change while it steps. kNoRow: the image moves as fast as the read-out, or
 // the row was not found. Outputs are written with kOk only.
-[[nodiscard]] ProjectionStatus project_moving(const PoseCurve& curve, int segment, const ControlPoints& points,
-                                              const LensVector& lens, double frame_time_s, const Vector3<double>& p,
-                                              double row_guess, MovingProjection* projection, bool with_jacobians);
+[[nodiscard]] ProjectionStatus project_moving(const PoseCurve& curve, int segment,
+                                              const ControlPoints& points, const LensVector& lens,
+                                              double frame_time_s, const Vector3<double>& p,
+                                              double row_guess, MovingProjection* projection,
+                                              bool with_jacobians);
 
 }  // namespace alidade

@@ -27,8 +27,8 @@ ControlPoints points_of(double const* const* parameters) {
 // c^2 log(1 + s / c^2).
 class FrameCost : public ceres::CostFunction {
  public:
-  FrameCost(const PatternData* data, const PoseCurve* curve, int frame, int segment, std::vector<int> observations,
-            const PatternAdjustmentOptions& options)
+  FrameCost(const PatternData* data, const PoseCurve* curve, int frame, int segment,
+            std::vector<int> observations, const PatternAdjustmentOptions& options)
       : data_(data),
         curve_(curve),
         frame_(frame),
@@ -41,16 +41,18 @@ class FrameCost : public ceres::CostFunction {
     set_num_residuals(2 * static_cast<int>(observations_.size()));
   }
 
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
     const ControlPoints points = points_of(parameters);
     const LensVector lens = Eigen::Map<const LensVector>(parameters[kLensBlock]);
     const PatternFrame& frame = data_->frames[static_cast<std::size_t>(frame_)];
     MovingProjection projection;
     for (std::size_t i = 0; i < observations_.size(); ++i) {
-      const PatternObservation& observation = frame.observations[static_cast<std::size_t>(observations_[i])];
+      const PatternObservation& observation =
+          frame.observations[static_cast<std::size_t>(observations_[i])];
       const Vector3<double>& p = data_->points_m[static_cast<std::size_t>(observation.point)];
-      if (project_moving(*curve_, segment_, points, lens, frame.time_s, p, observation.u.y(), &projection,
-                         jacobians != nullptr) != ProjectionStatus::kOk) {
+      if (project_moving(*curve_, segment_, points, lens, frame.time_s, p, observation.u.y(),
+                         &projection, jacobians != nullptr) != ProjectionStatus::kOk) {
         return false;
       }
       const Vector2<double> r = (projection.u - observation.u) / sigma_px_;
@@ -64,11 +66,12 @@ class FrameCost : public ceres::CostFunction {
       const Matrix<double, 2, 6> J_x = scale * projection.J_u_x;
       for (int k = 0; k < 4; ++k) {
         if (jacobians[k] == nullptr) continue;
-        Block<6>(jacobians[k], num_residuals(), 6).middleRows<2>(row) = projection.basis.weight[k] * J_x;
+        Block<6>(jacobians[k], num_residuals(), 6).middleRows<2>(row) =
+            projection.basis.weight[k] * J_x;
       }
       if (jacobians[kLensBlock] != nullptr) {
-        Block<kLensParameterCount>(jacobians[kLensBlock], num_residuals(), kLensParameterCount).middleRows<2>(row) =
-            scale * projection.J_u_lens;
+        Block<kLensParameterCount>(jacobians[kLensBlock], num_residuals(), kLensParameterCount)
+            .middleRows<2>(row) = scale * projection.J_u_lens;
       }
     }
     return true;
@@ -110,17 +113,20 @@ class AccelerationCost : public ceres::SizedCostFunction<12, 6, 6, 6, 6> {
       const double time_s = begin + length * (0.5 + (g == 0 ? -0.5 : 0.5) / std::sqrt(3.0));
       const Vector4<double> weights = curve.acceleration_weights(segment, time_s);
       for (int k = 0; k < 4; ++k) {
-        factor_[static_cast<std::size_t>(g)][static_cast<std::size_t>(k)] = weights[k] * std::sqrt(length / 2) * scale;
+        factor_[static_cast<std::size_t>(g)][static_cast<std::size_t>(k)] =
+            weights[k] * std::sqrt(length / 2) * scale;
       }
     }
   }
 
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
     for (int g = 0; g < 2; ++g) {
       Eigen::Map<PoseVector> out(residuals + 6 * g);
       out.setZero();
       for (int k = 0; k < 4; ++k) {
-        const PoseVector& factor = factor_[static_cast<std::size_t>(g)][static_cast<std::size_t>(k)];
+        const PoseVector& factor =
+            factor_[static_cast<std::size_t>(g)][static_cast<std::size_t>(k)];
         out += factor.cwiseProduct(Eigen::Map<const PoseVector>(parameters[k]));
         if (jacobians == nullptr || jacobians[k] == nullptr) continue;
         Eigen::Map<Eigen::Matrix<double, 12, 6, Eigen::RowMajor>> J(jacobians[k]);
@@ -145,11 +151,13 @@ class KnowledgeCost : public ceres::SizedCostFunction<kLensParameterCount, kLens
     J_ = root.asDiagonal() * L.transpose();
   }
 
-  bool Evaluate(double const* const* parameters, double* residuals, double** jacobians) const override {
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override {
     Eigen::Map<LensVector> out(residuals);
     out = J_ * (Eigen::Map<const LensVector>(parameters[0]) - mean_);
     if (jacobians != nullptr && jacobians[0] != nullptr) {
-      Eigen::Map<Eigen::Matrix<double, kLensParameterCount, kLensParameterCount, Eigen::RowMajor>> J(jacobians[0]);
+      Eigen::Map<Eigen::Matrix<double, kLensParameterCount, kLensParameterCount, Eigen::RowMajor>>
+          J(jacobians[0]);
       J = J_;
     }
     return true;
@@ -161,13 +169,16 @@ class KnowledgeCost : public ceres::SizedCostFunction<kLensParameterCount, kLens
 };
 
 struct Blocks {
-  std::vector<double*> points;  // control points that something holds
+  std::vector<double*> points;  // control points
   double* lens = nullptr;
+  std::vector<ceres::ResidualBlockId> observations;
+  std::vector<int> frame_of_row;  // of the observations' residuals
 };
 
 // state's control points and lens are the parameter blocks; spline is a copy that stays as it is.
 Blocks build(const PatternData& data, const PatternMask& used, const LensKnowledge& knowledge,
-             const PatternAdjustmentOptions& options, const PoseCurve& spline, PatternState* state, ceres::Problem* problem) {
+             const PatternAdjustmentOptions& options, const PoseCurve& spline, PatternState* state,
+             ceres::Problem* problem) {
   PoseCurve& curve = state->curve;
   Blocks blocks;
   blocks.lens = state->lens.data();
@@ -202,9 +213,11 @@ Blocks build(const PatternData& data, const PatternMask& used, const LensKnowled
         if (segment[i] == s) in_segment.push_back(static_cast<int>(i));
       }
       if (in_segment.empty()) continue;
-      problem->AddResidualBlock(
-          new FrameCost(&data, &spline, static_cast<int>(f), s, std::move(in_segment), options), nullptr,
-          {point(s), point(s + 1), point(s + 2), point(s + 3), blocks.lens});
+      blocks.frame_of_row.insert(blocks.frame_of_row.end(), 2 * in_segment.size(),
+                                 static_cast<int>(f));
+      blocks.observations.push_back(problem->AddResidualBlock(
+          new FrameCost(&data, &spline, static_cast<int>(f), s, std::move(in_segment), options),
+          nullptr, {point(s), point(s + 1), point(s + 2), point(s + 3), blocks.lens}));
     }
   }
   if (!knowledge.information.isZero()) {
@@ -222,9 +235,44 @@ Blocks build(const PatternData& data, const PatternMask& used, const LensKnowled
   return blocks;
 }
 
+using SparseRows = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>;
+
+// Detections near each other in time err together: blur, corners at the same places in their pixels. By how much the lens is
+// then less well known, the data tell: each stretch of frames pulls at it, X^T J^T r, and the spread of these pulls is a second
+// estimate of its variance that needs no independence within a stretch. Where that is larger beyond chance, it counts.
+void inflate(const Blocks& blocks, ceres::Problem::EvaluateOptions evaluate,
+             const Eigen::MatrixXd& X, int frames, ceres::Problem* problem, Eigen::MatrixXd* C) {
+  constexpr int kStretches = 100;
+  evaluate.residual_blocks = blocks.observations;
+  ceres::CRSMatrix rows;
+  std::vector<double> r;
+  if (!problem->Evaluate(evaluate, nullptr, &r, nullptr, &rows)) return;
+  const SparseRows J(rows.num_rows, rows.num_cols, static_cast<Eigen::Index>(rows.values.size()),
+                     rows.rows.data(), rows.cols.data(), rows.values.data());
+  const Eigen::MatrixXd JX = J * X;
+  const int stretches = std::min(kStretches, frames);
+  Eigen::MatrixXd pull = Eigen::MatrixXd::Zero(X.cols(), stretches);
+  for (Eigen::Index i = 0; i < JX.rows(); ++i) {
+    const auto stretch =
+        static_cast<int>(static_cast<long long>(blocks.frame_of_row[static_cast<std::size_t>(i)]) *
+                         stretches / frames);
+    pull.col(stretch) += r[static_cast<std::size_t>(i)] * JX.row(i).transpose();
+  }
+  const double beyond_chance = 1 + 2 * std::sqrt(2.0 / stretches);
+  const double freedom = static_cast<double>(JX.rows()) /
+                         std::max<double>(1, static_cast<double>(JX.rows() - X.rows()));
+  Eigen::VectorXd factor = Eigen::VectorXd::Ones(C->rows());
+  for (Eigen::Index i = 0; i < C->rows(); ++i) {
+    const double ratio = freedom * pull.row(i).squaredNorm() / (*C)(i, i);
+    if (ratio > beyond_chance) factor[i] = std::sqrt(ratio);
+  }
+  *C = (factor.asDiagonal() * *C * factor.asDiagonal()).eval();
+}
+
 }  // namespace
 
-PatternAdjustment adjust_pattern(const PatternData& data, const PatternMask& used, const LensKnowledge& knowledge,
+PatternAdjustment adjust_pattern(const PatternData& data, const PatternMask& used,
+                                 const LensKnowledge& knowledge,
                                  const PatternAdjustmentOptions& options, PatternState* state) {
   const PoseCurve spline = state->curve;
   ceres::Problem problem;
@@ -244,8 +292,10 @@ PatternAdjustment adjust_pattern(const PatternData& data, const PatternMask& use
   return result;
 }
 
-std::optional<LensMatrix> lens_covariance(const PatternData& data, const PatternMask& used, const LensKnowledge& knowledge,
-                                          const PatternAdjustmentOptions& options, const PatternState& state) {
+std::optional<LensMatrix> lens_covariance(const PatternData& data, const PatternMask& used,
+                                          const LensKnowledge& knowledge,
+                                          const PatternAdjustmentOptions& options,
+                                          const PatternState& state) {
   std::vector<int> free;
   for (int i = 0; i < kLensParameterCount; ++i) {
     if (!knowledge.fixed[static_cast<std::size_t>(i)]) free.push_back(i);
@@ -258,28 +308,35 @@ std::optional<LensMatrix> lens_covariance(const PatternData& data, const Pattern
   ceres::Problem::EvaluateOptions evaluate;
   evaluate.parameter_blocks = blocks.points;
   evaluate.parameter_blocks.push_back(blocks.lens);
-  ceres::CRSMatrix crs;
-  if (!problem.Evaluate(evaluate, nullptr, nullptr, nullptr, &crs)) return std::nullopt;
-  using Sparse = Eigen::SparseMatrix<double, Eigen::RowMajor>;
-  const Eigen::Map<const Sparse> J(crs.num_rows, crs.num_cols, static_cast<Eigen::Index>(crs.values.size()),
-                                   crs.rows.data(), crs.cols.data(), crs.values.data());
+  ceres::CRSMatrix all;
+  if (!problem.Evaluate(evaluate, nullptr, nullptr, nullptr, &all)) return std::nullopt;
+  const SparseRows J(all.num_rows, all.num_cols, static_cast<Eigen::Index>(all.values.size()),
+                     all.rows.data(), all.cols.data(), all.values.data());
   // Columns of one length: parameters are of very different units.
-  Eigen::VectorXd scale = Eigen::VectorXd::Zero(crs.num_cols);
-  for (std::size_t i = 0; i < crs.values.size(); ++i) scale[crs.cols[i]] += crs.values[i] * crs.values[i];
+  Eigen::VectorXd scale = Eigen::VectorXd::Zero(all.num_cols);
+  for (std::size_t i = 0; i < all.values.size(); ++i)
+    scale[all.cols[i]] += all.values[i] * all.values[i];
   scale = scale.cwiseSqrt().cwiseMax(1e-30).cwiseInverse();
   const Eigen::SparseMatrix<double> scaled = J * scale.asDiagonal();
   const Eigen::SparseMatrix<double> H = scaled.transpose() * scaled;
-  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower, Eigen::NaturalOrdering<int>> ldlt(H);
+  const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower,
+                              Eigen::NaturalOrdering<int>>
+      ldlt(H);
   // Natural order: the curve's band, then the lens, whose pivots are what the data say of it beside the curve.
-  if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().minCoeff() > 1e-13)) return std::nullopt;
-  const auto begin = crs.num_cols - static_cast<int>(free.size());
+  if (ldlt.info() != Eigen::Success || !(ldlt.vectorD().array() > 1e-13).all()) return std::nullopt;
+  const auto lens_begin = all.num_cols - static_cast<int>(free.size());
+  Eigen::MatrixXd X(all.num_cols,
+                    static_cast<Eigen::Index>(free.size()));  // the lens's columns of the inverse
   for (std::size_t k = 0; k < free.size(); ++k) {
-    Eigen::VectorXd unit = Eigen::VectorXd::Zero(crs.num_cols);
-    unit[begin + static_cast<int>(k)] = 1;
-    const Eigen::VectorXd column = ldlt.solve(unit);
-    for (std::size_t i = 0; i < free.size(); ++i) {
-      const int row = begin + static_cast<int>(i);
-      covariance(free[i], free[k]) = column[row] * scale[row] * scale[begin + static_cast<int>(k)];
+    Eigen::VectorXd unit = Eigen::VectorXd::Zero(all.num_cols);
+    unit[lens_begin + static_cast<int>(k)] = scale[lens_begin + static_cast<int>(k)];
+    X.col(static_cast<Eigen::Index>(k)) = scale.cwiseProduct(Eigen::VectorXd(ldlt.solve(unit)));
+  }
+  Eigen::MatrixXd C = X.bottomRows(static_cast<Eigen::Index>(free.size()));
+  inflate(blocks, evaluate, X, static_cast<int>(data.frames.size()), &problem, &C);
+  for (std::size_t i = 0; i < free.size(); ++i) {
+    for (std::size_t k = 0; k < free.size(); ++k) {
+      covariance(free[i], free[k]) = C(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
     }
   }
   return covariance;

@@ -26,12 +26,12 @@ struct LensKnowledge {
 };
 
 struct PatternAdjustmentOptions {
-  double sigma_px = 1;                // of an observation's coordinate
-  double robust_scale = 0;            // Cauchy's, in sigmas; 0: squares
-  double position_noise = 100;        // prior: power density of the accelerations, (m/s^2)^2 s
-  double rotation_noise = 1e4;        // (rad/s^2)^2 s
+  double sigma_px = 1;          // of an observation's coordinate
+  double robust_scale = 0;      // Cauchy's, in sigmas; 0: squares
+  double position_noise = 100;  // prior: power density of the accelerations, (m/s^2)^2 s
+  double rotation_noise = 1e4;  // (rad/s^2)^2 s
   int max_steps = 30;
-  double relative_decrease = 1e-7;    // of the cost, at which it ends
+  double relative_decrease = 1e-7;  // of the cost, at which it ends
 };
 
 struct PatternAdjustment {
@@ -44,12 +44,17 @@ struct PatternAdjustment {
 // Which observations take part, frame by frame as in the data.
 using PatternMask = std::vector<std::vector<char>>;
 
-[[nodiscard]] PatternAdjustment adjust_pattern(const PatternData& data, const PatternMask& used, const LensKnowledge& knowledge,
-                                               const PatternAdjustmentOptions& options, PatternState* state);
+[[nodiscard]] PatternAdjustment adjust_pattern(const PatternData& data, const PatternMask& used,
+                                               const LensKnowledge& knowledge,
+                                               const PatternAdjustmentOptions& options,
+                                               PatternState* state);
 
-// Covariance of the lens with the curve free, at the state. Empty if what is not fixed is not determined.
-[[nodiscard]] std::optional<LensMatrix> lens_covariance(const PatternData& data, const PatternMask& used,
+// Covariance of the lens with the curve free, at the state; of a parameter at which stretches of time pull harder than independent
+// noise of options.sigma_px lets them, by that much larger. Empty if what is not fixed is not determined.
+[[nodiscard]] std::optional<LensMatrix> lens_covariance(const PatternData& data,
+                                                        const PatternMask& used,
                                                         const LensKnowledge& knowledge,
-                                                        const PatternAdjustmentOptions& options, const PatternState& state);
+                                                        const PatternAdjustmentOptions& options,
+                                                        const PatternState& state);
 
 }  // namespace alidade::internal

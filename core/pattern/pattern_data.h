@@ -20,7 +20,8 @@ struct PatternFrame {
 struct PatternData {
   int width = 0;   // px
   int height = 0;  // px
-  std::vector<Vector3<double>> points_m;  // pattern frame: x right, y down, z away from the viewer; z = 0 on a plane
+  std::vector<Vector3<double>>
+      points_m;  // pattern frame: x right, y down, z away from the viewer; z = 0 on a plane
   std::vector<PatternFrame> frames;
 };
 

@@ -19,7 +19,8 @@ void points_of(const PatternData& data, const PatternFrame& frame, std::vector<c
                std::vector<cv::Point2f>* pixels) {
   for (const PatternObservation& observation : frame.observations) {
     const Vector3<double>& p = data.points_m[static_cast<std::size_t>(observation.point)];
-    points->emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()), static_cast<float>(p.z()));
+    points->emplace_back(static_cast<float>(p.x()), static_cast<float>(p.y()),
+                         static_cast<float>(p.z()));
     pixels->push_back(to_opencv(observation.u));
   }
 }
@@ -68,14 +69,20 @@ std::vector<std::size_t> slow_views(const PatternData& data) {
 }
 
 cv::Matx33d camera_matrix(const LensVector& lens) {
-  return {lens[index(LensParameter::kFocalLengthU)], 0, lens[index(LensParameter::kCentreU)] - 0.5,
-          0, lens[index(LensParameter::kFocalLengthV)], lens[index(LensParameter::kCentreV)] - 0.5,
-          0, 0, 1};
+  return {lens[index(LensParameter::kFocalLengthU)],
+          0,
+          lens[index(LensParameter::kCentreU)] - 0.5,
+          0,
+          lens[index(LensParameter::kFocalLengthV)],
+          lens[index(LensParameter::kCentreV)] - 0.5,
+          0,
+          0,
+          1};
 }
 
 cv::Vec4d distortion(const LensVector& lens) {
-  return {lens[index(LensParameter::kK1)], lens[index(LensParameter::kK2)], lens[index(LensParameter::kP1)],
-          lens[index(LensParameter::kP2)]};
+  return {lens[index(LensParameter::kK1)], lens[index(LensParameter::kK2)],
+          lens[index(LensParameter::kP1)], lens[index(LensParameter::kP2)]};
 }
 
 }  // namespace
@@ -85,16 +92,18 @@ std::optional<LensVector> start_lens(const PatternData& data, const LensKnowledg
   if (views.size() < 3) return std::nullopt;
   std::vector<std::vector<cv::Point3f>> points(views.size());
   std::vector<std::vector<cv::Point2f>> pixels(views.size());
-  for (std::size_t i = 0; i < views.size(); ++i) points_of(data, data.frames[views[i]], &points[i], &pixels[i]);
+  for (std::size_t i = 0; i < views.size(); ++i)
+    points_of(data, data.frames[views[i]], &points[i], &pixels[i]);
   cv::Mat K = cv::Mat::eye(3, 3, CV_64F);
   cv::Mat distortion_found = cv::Mat::zeros(5, 1, CV_64F);
   std::vector<cv::Mat> rotations;
   std::vector<cv::Mat> translations;
   // Few unknowns: what a moving shutter bends must not be taken for a lens.
-  constexpr int kFlags = cv::CALIB_FIX_K2 | cv::CALIB_FIX_K3 | cv::CALIB_ZERO_TANGENT_DIST | cv::CALIB_FIX_PRINCIPAL_POINT |
-                         cv::CALIB_FIX_ASPECT_RATIO;
+  constexpr int kFlags = cv::CALIB_FIX_K2 | cv::CALIB_FIX_K3 | cv::CALIB_ZERO_TANGENT_DIST |
+                         cv::CALIB_FIX_PRINCIPAL_POINT | cv::CALIB_FIX_ASPECT_RATIO;
   try {
-    cv::calibrateCamera(points, pixels, {data.width, data.height}, K, distortion_found, rotations, translations, kFlags);
+    cv::calibrateCamera(points, pixels, {data.width, data.height}, K, distortion_found, rotations,
+                        translations, kFlags);
   } catch (const cv::Exception&) {
     return std::nullopt;
   }
@@ -123,7 +132,9 @@ std::vector<FramePose> start_poses(const PatternData& data, const LensVector& le
     cv::Vec3d rotation;
     cv::Vec3d translation;
     try {
-      if (!cv::solvePnP(points, pixels, camera_matrix(lens), distortion(lens), rotation, translation)) continue;
+      if (!cv::solvePnP(points, pixels, camera_matrix(lens), distortion(lens), rotation,
+                        translation))
+        continue;
     } catch (const cv::Exception&) {
       continue;
     }
@@ -133,9 +144,11 @@ std::vector<FramePose> start_poses(const PatternData& data, const LensVector& le
     double rows = 0;
     for (const PatternObservation& observation : frame.observations) rows += observation.u.y();
     pose.time_s = frame.time_s + line_delay * rows / static_cast<double>(frame.observations.size());
-    const Matrix3<double> R_camera_from_pattern = exp_so3(Vector3<double>(rotation[0], rotation[1], rotation[2]));
+    const Matrix3<double> R_camera_from_pattern =
+        exp_so3(Vector3<double>(rotation[0], rotation[1], rotation[2]));
     pose.R_pattern_from_camera = R_camera_from_pattern.transpose();
-    pose.centre = -pose.R_pattern_from_camera * Vector3<double>(translation[0], translation[1], translation[2]);
+    pose.centre = -pose.R_pattern_from_camera *
+                  Vector3<double>(translation[0], translation[1], translation[2]);
     if (pose.centre.allFinite()) poses.push_back(pose);
   }
   return poses;
@@ -154,7 +167,8 @@ PoseCurve start_curve(const std::vector<FramePose>& poses, double spacing_s, dou
   std::vector<PoseVector> values;
   for (const FramePose& pose : poses) {
     PoseVector x;
-    Vector3<double> phi = log_so3(Matrix3<double>(curve.R_0.transpose() * pose.R_pattern_from_camera));
+    Vector3<double> phi =
+        log_so3(Matrix3<double>(curve.R_0.transpose() * pose.R_pattern_from_camera));
     const double angle = phi.norm();
     if (!values.empty() && angle > 1e-9) {
       const Vector3<double> before = values.back().tail<3>();
@@ -166,10 +180,12 @@ PoseCurve start_curve(const std::vector<FramePose>& poses, double spacing_s, dou
   }
   const int size = curve.control_points();
   std::vector<Eigen::Triplet<double>> entries;
-  Eigen::Matrix<double, Eigen::Dynamic, 6> g = Eigen::Matrix<double, Eigen::Dynamic, 6>::Zero(size, 6);
+  Eigen::Matrix<double, Eigen::Dynamic, 6> g =
+      Eigen::Matrix<double, Eigen::Dynamic, 6>::Zero(size, 6);
   const auto add = [&entries](int segment, const Vector4<double>& weights, double factor) {
     for (int i = 0; i < 4; ++i) {
-      for (int j = 0; j < 4; ++j) entries.emplace_back(segment + i, segment + j, factor * weights[i] * weights[j]);
+      for (int j = 0; j < 4; ++j)
+        entries.emplace_back(segment + i, segment + j, factor * weights[i] * weights[j]);
     }
   };
   for (std::size_t i = 0; i < poses.size(); ++i) {
@@ -181,7 +197,8 @@ PoseCurve start_curve(const std::vector<FramePose>& poses, double spacing_s, dou
   const double spacing = (end - begin) / count;
   for (int s = 0; s < curve.segments(); ++s) {
     for (const double x : {0.0, 1.0}) {
-      add(s, curve.acceleration_weights(s, curve.knot(s) + x * spacing) * (spacing * spacing), 1e-4);
+      add(s, curve.acceleration_weights(s, curve.knot(s) + x * spacing) * (spacing * spacing),
+          1e-4);
     }
   }
   Eigen::SparseMatrix<double> H(size, size);

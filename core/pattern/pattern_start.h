@@ -17,12 +17,14 @@ struct FramePose {
 };
 
 // Focal length, optical centre and k1 with the parameters that knowledge fixes at its mean. Empty: the views do not determine it.
-[[nodiscard]] std::optional<LensVector> start_lens(const PatternData& data, const LensKnowledge& knowledge);
+[[nodiscard]] std::optional<LensVector> start_lens(const PatternData& data,
+                                                   const LensKnowledge& knowledge);
 
 // Of each frame that shows enough of the pattern to have one.
 [[nodiscard]] std::vector<FramePose> start_poses(const PatternData& data, const LensVector& lens);
 
 // Uniform knots some spacing_s apart over all poses, with the rows' read-out at both ends. Two poses or more.
-[[nodiscard]] PoseCurve start_curve(const std::vector<FramePose>& poses, double spacing_s, double margin_s);
+[[nodiscard]] PoseCurve start_curve(const std::vector<FramePose>& poses, double spacing_s,
+                                    double margin_s);
 
 }  // namespace alidade::internal

@@ -27,9 +27,9 @@ struct PatternScene {
   double rate_hz = 20;
   double duration_s = 30;
   double noise_px = 0.05;
-  double speed = 1;              // of the hand
-  double wrong = 0;              // fraction of detections that are anywhere within 10 px
-  double missing_frames = 0;     // fraction of frames without the board
+  double speed = 1;           // of the hand
+  double wrong = 0;           // fraction of detections that are anywhere within 10 px
+  double missing_frames = 0;  // fraction of frames without the board
   std::uint64_t seed = 1;
 };
 
@@ -40,24 +40,30 @@ class HandMotion {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> uniform(0, 1);
     // Amplitudes of x, y, z (m) and of the turns about x, y, z (rad): slow and wide, medium, fast and small.
-    const double amplitude[3][6] = {{.08, .06, .12, .35, .35, .25}, {.03, .03, .03, .12, .12, .12}, {.008, .008, .008, .03, .03, .03}};
+    const double amplitude[3][6] = {{.08, .06, .12, .35, .35, .25},
+                                    {.03, .03, .03, .12, .12, .12},
+                                    {.008, .008, .008, .03, .03, .03}};
     const double frequency[3] = {0.13, 0.5, 1.3};
     for (int band = 0; band < 3; ++band) {
       for (int i = 0; i < 6; ++i) {
         const double f = frequency[band] * (0.75 + 0.5 * uniform(random)) * speed;
-        waves_[i][band] = {amplitude[band][i] * (0.7 + 0.6 * uniform(random)), 2 * M_PI * f, 2 * M_PI * uniform(random)};
+        waves_[i][band] = {amplitude[band][i] * (0.7 + 0.6 * uniform(random)), 2 * M_PI * f,
+                           2 * M_PI * uniform(random)};
       }
     }
   }
 
   // Of a point in the board's frame, in the camera's.
-  [[nodiscard]] Eigen::Vector3d in_camera(const Eigen::Vector3d& p, const Eigen::Vector3d& board_centre, double t) const {
+  [[nodiscard]] Eigen::Vector3d in_camera(const Eigen::Vector3d& p,
+                                          const Eigen::Vector3d& board_centre, double t) const {
     double x[6];
     for (int i = 0; i < 6; ++i) {
       x[i] = 0;
-      for (const Wave& wave : waves_[i]) x[i] += wave.amplitude * std::sin(wave.frequency * t + wave.phase);
+      for (const Wave& wave : waves_[i])
+        x[i] += wave.amplitude * std::sin(wave.frequency * t + wave.phase);
     }
-    const Eigen::Matrix3d turn = (Eigen::AngleAxisd(x[5], Eigen::Vector3d::UnitZ()) * Eigen::AngleAxisd(x[4], Eigen::Vector3d::UnitY()) *
+    const Eigen::Matrix3d turn = (Eigen::AngleAxisd(x[5], Eigen::Vector3d::UnitZ()) *
+                                  Eigen::AngleAxisd(x[4], Eigen::Vector3d::UnitY()) *
                                   Eigen::AngleAxisd(x[3], Eigen::Vector3d::UnitX()))
                                      .toRotationMatrix();
     // The board turns about its middle, which stays about half a metre ahead.
@@ -87,9 +93,11 @@ inline PatternData simulate_pattern(const PatternScene& scene) {
   data.width = scene.width;
   data.height = scene.height;
   for (int j = 0; j < scene.rows; ++j) {
-    for (int i = 0; i < scene.columns; ++i) data.points_m.emplace_back(i * scene.square_m, j * scene.square_m, 0);
+    for (int i = 0; i < scene.columns; ++i)
+      data.points_m.emplace_back(i * scene.square_m, j * scene.square_m, 0);
   }
-  const Eigen::Vector3d centre(0.5 * (scene.columns - 1) * scene.square_m, 0.5 * (scene.rows - 1) * scene.square_m, 0);
+  const Eigen::Vector3d centre(0.5 * (scene.columns - 1) * scene.square_m,
+                               0.5 * (scene.rows - 1) * scene.square_m, 0);
   const HandMotion motion(scene.seed, scene.speed);
   std::mt19937_64 random(scene.seed + 1000);
   std::normal_distribution<double> noise(0, scene.noise_px);
@@ -102,7 +110,9 @@ inline PatternData simulate_pattern(const PatternScene& scene) {
     for (std::size_t k = 0; seen && k < data.points_m.size(); ++k) {
       // row - v(row) changes its sign once.
       const auto pixel = [&](double row) {
-        return simulated_pixel(scene.lens, motion.in_camera(data.points_m[k], centre, frame.time_s + row * scene.lens.line_delay_s));
+        return simulated_pixel(scene.lens,
+                               motion.in_camera(data.points_m[k], centre,
+                                                frame.time_s + row * scene.lens.line_delay_s));
       };
       double low = -400;
       double high = scene.height + 400.0;
@@ -113,7 +123,8 @@ inline PatternData simulate_pattern(const PatternScene& scene) {
       Eigen::Vector2d u = pixel(0.5 * (low + high));
       if (u.x() < 4 || u.y() < 4 || u.x() > scene.width - 4 || u.y() > scene.height - 4) continue;
       u += Eigen::Vector2d(noise(random), noise(random));
-      if (uniform(random) < scene.wrong) u += 20 * Eigen::Vector2d(uniform(random) - 0.5, uniform(random) - 0.5);
+      if (uniform(random) < scene.wrong)
+        u += 20 * Eigen::Vector2d(uniform(random) - 0.5, uniform(random) - 0.5);
       frame.observations.push_back({static_cast<int>(k), u});
     }
     if (frame.observations.size() < 6) frame.observations.clear();
