@@ -12,6 +12,7 @@
 
 #include "core/calibration/number_text.h"
 #include "edge_app/commands/calibrate.h"
+#include "edge_app/commands/calibrate_shutter.h"
 #include "edge_app/commands/check.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/record.h"
@@ -119,6 +120,32 @@ void add_calibrate(CLI::App& app, int* exit_code) {
   command->callback([options, exit_code] { *exit_code = calibrate_recording(*options); });
 }
 
+void add_calibrate_shutter(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<CalibrateShutterOptions>();
+  CLI::App* command = app.add_subcommand(
+      "calibrate-shutter",
+      "Line delay and lens from a video of a known pattern; writes lens.yaml, camera_info.yaml and "
+      "trajectory.csv");
+  command->add_option("video", options->video, "Directory of a recording, or a video file");
+  command
+      ->add_option("--pattern", options->pattern,
+                   "chessboard:9x6:25mm (inner corners, square), circles:4x11:20mm, "
+                   "symmetric-circles:7x6:20mm or aprilgrid:6x6:30mm:0.3")
+      ->required();
+  command->add_option("--print", options->paper,
+                      "Draw the pattern in true size, as SVG on stdout, for a4, a3, a2, a1, a0 or "
+                      "letter");
+  command->add_option("-o,--output", options->directory,
+                      "Directory for the results (default: alidade in the recording or beside the "
+                      "file)");
+  command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
+  command->footer(
+      "Move the camera before the pattern for some 30 s: show it whole, tilted to all sides, near "
+      "and "
+      "far, and shake the camera a little, so that the image moves while it is read out.");
+  command->callback([options, exit_code] { *exit_code = calibrate_shutter(*options); });
+}
+
 void add_check(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<CheckOptions>();
   CLI::App* command = app.add_subcommand(
@@ -194,6 +221,7 @@ int run_command_line(int argc, char** argv) {
   add_record(app, &exit_code);
   add_replay(app, &exit_code);
   add_calibrate(app, &exit_code);
+  add_calibrate_shutter(app, &exit_code);
   add_check(app, &exit_code);
   try {
     app.parse(argc, argv);

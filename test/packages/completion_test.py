@@ -40,7 +40,7 @@ class Completion(unittest.TestCase):
         return set(done.stdout.split())
 
     def setUp(self):
-        self.commands = set(re.findall(r"^  (\w+) ", help_of().partition("Subcommands:")[2], re.M))
+        self.commands = set(re.findall(r"^  ([\w-]+) ", help_of().partition("Subcommands:")[2], re.M))
 
     def test_offers_every_command(self):
         self.assertGreaterEqual(len(self.commands), 5)
@@ -57,7 +57,7 @@ class Completion(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             pathlib.Path(folder, "camera.yaml").touch()
             pathlib.Path(folder, "recording").mkdir()
-            for words in (("run", "-c", ""), ("check", "--config", ""), ("replay", "x", "--calibration", "")):
+            for words in (("run", "-c", ""), ("check", "--config", ""), ("replay", "x", "--calibration", ""), ("calibrate-shutter", "")):
                 self.assertEqual(self.offered(*words, folder=folder), {"camera.yaml", "recording"})
             for words in (("replay", ""), ("calibrate", "re"), ("record", "-o", "")):
                 self.assertEqual(self.offered(*words, folder=folder), {"recording"})

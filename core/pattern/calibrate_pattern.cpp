@@ -1,0 +1,290 @@
+#include "core/pattern/calibrate_pattern.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+
+#include "core/pattern/knot_score.h"
+#include "core/pattern/moving_projection.h"
+#include "core/pattern/pattern_adjustment.h"
+#include "core/pattern/pattern_start.h"
+
+namespace alidade {
+namespace {
+
+using internal::KnotScore;
+using internal::LensKnowledge;
+using internal::PatternAdjustmentOptions;
+using internal::PatternMask;
+using internal::PatternState;
+
+constexpr int kMaxRounds = 12;
+constexpr double kSpacing_frames = 3;  // of the first knots
+constexpr double kSpacing_s = 0.2;     // and no closer than this
+constexpr double kShortestSegment_frames = 0.5;
+constexpr double kMedianOfChiSquare2 = 1.3862943611198906;  // 2 ln 2
+// Squared error over variance beyond which a detection is wrong: chance does it once in 270,000.
+constexpr double kWrong = 25;
+constexpr int kLeastFrames = 12;
+
+std::string formatted(const char* format, double a, double b = 0) {
+  char text[240];
+  std::snprintf(text, sizeof text, format, a, b);
+  return text;
+}
+
+bool is_valid(const PatternData& data) {
+  if (data.width <= 0 || data.height <= 0) return false;
+  for (std::size_t f = 0; f < data.frames.size(); ++f) {
+    const PatternFrame& frame = data.frames[f];
+    if (!std::isfinite(frame.time_s) || (f > 0 && frame.time_s <= data.frames[f - 1].time_s))
+      return false;
+    for (const PatternObservation& observation : frame.observations) {
+      if (observation.point < 0 || observation.point >= static_cast<int>(data.points_m.size()))
+        return false;
+      if (!all_finite(observation.u)) return false;
+    }
+  }
+  return std::all_of(data.points_m.begin(), data.points_m.end(),
+                     [](const auto& p) { return all_finite(p); });
+}
+
+double median(std::vector<double> values) {
+  if (values.empty()) return 0;
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+double median_interval(const PatternData& data) {
+  std::vector<double> intervals;
+  for (std::size_t f = 1; f < data.frames.size(); ++f)
+    intervals.push_back(data.frames[f].time_s - data.frames[f - 1].time_s);
+  return median(intervals);
+}
+
+// The detections' noise if half of them are right, and which of them are wrong by it.
+double leave_out_wrong(const PatternData& data, const PatternState& state, double least_sigma_px,
+                       PatternMask* used) {
+  const std::vector<PatternResidual> residuals = pattern_residuals(data, state.lens, state.curve);
+  std::vector<double> squares;
+  squares.reserve(residuals.size());
+  for (const PatternResidual& residual : residuals) squares.push_back(residual.error.squaredNorm());
+  const double variance =
+      std::max(median(squares) / kMedianOfChiSquare2, least_sigma_px * least_sigma_px);
+  for (auto& frame : *used) std::fill(frame.begin(), frame.end(), char{0});
+  for (const PatternResidual& residual : residuals) {
+    (*used)[static_cast<std::size_t>(residual.frame)]
+           [static_cast<std::size_t>(residual.observation)] =
+               residual.error.squaredNorm() <= kWrong * variance ? 1 : 0;
+  }
+  return std::sqrt(variance);
+}
+
+// Frames whose detections are mostly wrong tell nothing: half of a board that is another's, a board taken for its own turn.
+int used_frames(const PatternMask& used) {
+  return static_cast<int>(std::count_if(used.begin(), used.end(), [](const auto& frame) {
+    return std::count(frame.begin(), frame.end(), char{1}) > 0;
+  }));
+}
+
+LensKnowledge knowledge_of(const PatternCalibrationOptions& options) {
+  LensKnowledge knowledge;
+  knowledge.fixed = options.fixed;
+  knowledge.mean = options.prior_mean;
+  knowledge.information = options.prior_information;
+  return knowledge;
+}
+
+PatternCalibration refused(PatternCalibration result, PatternStatus status, std::string message) {
+  result.status = status;
+  result.message = std::move(message);
+  return result;
+}
+
+// Is the curve's finest still too coarse for the motion? Detections err together within a frame, too, by blur and by where in a
+// pixel corners lie, which takes up to twice what independent noise gains; a motion that is not followed takes tens of times.
+bool is_frame_rate_too_low(const KnotScore& score) {
+  constexpr double kTimesTheExpected = 4;
+  return score.gain_of_short >
+         kTimesTheExpected * (score.expected_of_short + 5 * std::sqrt(2 * score.expected_of_short));
+}
+
+}  // namespace
+
+double PatternCalibration::sigma(LensParameter parameter) const {
+  return std::sqrt(std::max(0.0, covariance(index(parameter), index(parameter))));
+}
+
+std::vector<PatternResidual> pattern_residuals(const PatternData& data, const LensVector& lens,
+                                               const PoseCurve& curve) {
+  std::vector<PatternResidual> residuals;
+  const double line_delay = lens[index(LensParameter::kLineDelay)];
+  int segment = 0;
+  for (std::size_t f = 0; f < data.frames.size(); ++f) {
+    const PatternFrame& frame = data.frames[f];
+    for (std::size_t i = 0; i < frame.observations.size(); ++i) {
+      const PatternObservation& observation = frame.observations[i];
+      segment = curve.segment_at(frame.time_s + observation.u.y() * line_delay, segment);
+      MovingProjection projection;
+      if (project_moving(curve, segment, control_points_of(curve, segment), lens, frame.time_s,
+                         data.points_m[static_cast<std::size_t>(observation.point)],
+                         observation.u.y(), &projection, false) != ProjectionStatus::kOk) {
+        continue;
+      }
+      residuals.push_back({static_cast<int>(f), static_cast<int>(i), projection.u - observation.u,
+                           projection.time_s});
+    }
+  }
+  return residuals;
+}
+
+PatternCalibration calibrate_pattern(const PatternData& data,
+                                     const PatternCalibrationOptions& options) {
+  PatternCalibration result;
+  if (!is_valid(data))
+    return refused(result, PatternStatus::kBadInput, "times must increase, numbers be finite");
+  result.frame_interval_s = median_interval(data);
+  LensKnowledge knowledge = knowledge_of(options);
+
+  std::optional<LensVector> lens = internal::start_lens(data, knowledge);
+  const auto seen =
+      std::count_if(data.frames.begin(), data.frames.end(),
+                    [](const PatternFrame& frame) { return !frame.observations.empty(); });
+  if (seen == 0)
+    return refused(result, PatternStatus::kNoPattern,
+                   "the pattern was found in no frame; is it this pattern, in view and lit?");
+  if (seen < kLeastFrames) {
+    return refused(result, PatternStatus::kTooFewFrames,
+                   formatted("the pattern was found in %.0f frames only; %.0f or more are needed",
+                             static_cast<double>(seen), kLeastFrames));
+  }
+  if (!lens) {
+    return refused(result, PatternStatus::kNoStart,
+                   "the views give no focal length; show the pattern whole, tilted by 30 to 45 "
+                   "degrees, from several sides");
+  }
+  if (!options.fixed[static_cast<std::size_t>(index(LensParameter::kLineDelay))]) {
+    (*lens)[index(LensParameter::kLineDelay)] = options.start_line_delay_s;
+  }
+  const std::vector<internal::FramePose> poses = internal::start_poses(data, *lens);
+  if (poses.size() < kLeastFrames) {
+    return refused(
+        result, PatternStatus::kNotConverged,
+        "no pose of the camera fits the detections; are the pattern's rows and columns as told?");
+  }
+  PatternState state;
+  state.lens = *lens;
+  const double spacing_s = std::max(kSpacing_frames * result.frame_interval_s, kSpacing_s);
+  state.curve = internal::start_curve(poses, spacing_s, result.frame_interval_s);
+
+  PatternMask used;
+  for (const PatternFrame& frame : data.frames)
+    used.emplace_back(frame.observations.size(), char{1});
+  PatternAdjustmentOptions adjustment;
+  double sigma_px = leave_out_wrong(data, state, 0.01, &used);
+
+  // The curve and what bends the image most, before the rest of the lens may take part.
+  LensKnowledge first = knowledge;
+  for (const LensParameter parameter :
+       {LensParameter::kCentreU, LensParameter::kCentreV, LensParameter::kK2, LensParameter::kP1,
+        LensParameter::kP2}) {
+    first.fixed[static_cast<std::size_t>(index(parameter))] = true;
+  }
+  adjustment.robust_scale = 2;
+  adjustment.relative_decrease = 1e-2;
+  for (int i = 0; i < 2; ++i) {
+    adjustment.sigma_px = sigma_px;
+    if (!internal::adjust_pattern(data, used, first, adjustment, &state).usable) break;
+    sigma_px = leave_out_wrong(data, state, 0.01, &used);
+  }
+
+  internal::KnotScoreOptions score_options;
+  score_options.shortest_segment_s = kShortestSegment_frames * result.frame_interval_s;
+  KnotScore score;
+  adjustment.robust_scale = 4;
+  adjustment.relative_decrease = 1e-4;  // the score looks one step ahead of it
+  for (;; ++result.rounds) {
+    adjustment.sigma_px = sigma_px;
+    if (!internal::adjust_pattern(data, used, knowledge, adjustment, &state).usable) {
+      return refused(result, PatternStatus::kNotConverged,
+                     "no motion of the camera explains the detections");
+    }
+    sigma_px = leave_out_wrong(data, state, 0.01, &used);
+    score_options.sigma_px =
+        internal::observation_noise(data, used, state, result.frame_interval_s);
+    score = internal::score_knots(data, used, state, score_options);
+    if (score.split.empty() || result.rounds == kMaxRounds) break;
+    state.curve = state.curve.split(score.split);
+  }
+
+  // By least squares on what is right.
+  adjustment.robust_scale = 0;
+  adjustment.sigma_px = score_options.sigma_px;
+  adjustment.relative_decrease = 1e-8;
+  if (!internal::adjust_pattern(data, used, knowledge, adjustment, &state).usable) {
+    return refused(result, PatternStatus::kNotConverged,
+                   "no motion of the camera explains the detections");
+  }
+  result.lens = state.lens;
+  result.curve = state.curve;
+  result.used = used;
+  result.frames = used_frames(used);
+  double sum = 0;
+  for (const PatternResidual& residual : pattern_residuals(data, state.lens, state.curve)) {
+    const bool is_used = used[static_cast<std::size_t>(residual.frame)]
+                             [static_cast<std::size_t>(residual.observation)] != 0;
+    result.observations += is_used ? 1 : 0;
+    sum += is_used ? residual.error.squaredNorm() : 0;
+  }
+  for (const PatternFrame& frame : data.frames)
+    result.left_out += static_cast<int>(frame.observations.size());
+  result.left_out -= result.observations;
+  result.residual_rms_px = std::sqrt(sum / (2.0 * std::max(1, result.observations)));
+  const double freedom =
+      2.0 * result.observations - 6.0 * state.curve.control_points() - kLensParameterCount;
+  if (freedom < result.observations / 4.0) {
+    return refused(result, PatternStatus::kTooFewFrames,
+                   "too few points a frame for the motion; show more of the pattern");
+  }
+  result.sigma_px = std::sqrt(sum / freedom);
+
+  adjustment.sigma_px = result.sigma_px;
+  const std::optional<LensMatrix> covariance =
+      internal::lens_covariance(data, used, knowledge, adjustment, state);
+  const std::string move = "move the camera faster, in all directions and by turning it";
+  if (!covariance) {
+    return refused(result, PatternStatus::kNoLens,
+                   "the video determines neither lens nor line delay; " + move +
+                       ", and show the pattern tilted, near and far");
+  }
+  result.covariance = *covariance;
+  if (is_frame_rate_too_low(score)) {
+    return refused(
+        result, PatternStatus::kFrameRateTooLow,
+        formatted("the camera moved too fast for %.1f frames a second; move it more slowly",
+                  1 / result.frame_interval_s));
+  }
+  const double readout_sigma_s = result.sigma(LensParameter::kLineDelay) * data.height;
+  if (!(readout_sigma_s <= options.largest_readout_sigma_s)) {
+    return refused(
+        result, PatternStatus::kNoLineDelay,
+        formatted(
+            "the image hardly moved while it was read out: line delay known to %.2g us only; ",
+            1e6 * result.sigma(LensParameter::kLineDelay)) +
+            move);
+  }
+  const double focal_length_sigma = result.sigma(LensParameter::kFocalLengthU) / state.lens[0];
+  if (!(focal_length_sigma <= options.largest_focal_length_sigma)) {
+    return refused(result, PatternStatus::kNoLens,
+                   formatted("focal length known to %.1f %% only: the views are too much alike; "
+                             "show the pattern tilted by 30 to 45 "
+                             "degrees, near and far",
+                             100 * focal_length_sigma));
+  }
+  result.status = PatternStatus::kOk;
+  return result;
+}
+
+}  // namespace alidade

@@ -1,0 +1,147 @@
+#include "core/pattern/known_pattern.h"
+
+#include <array>
+#include <cmath>
+#include <cstdlib>
+#include <locale>
+#include <sstream>
+
+namespace alidade {
+namespace {
+
+constexpr const char* kExamples =
+    "chessboard:9x6:25mm, circles:4x11:20mm, symmetric-circles:7x6:20mm or aprilgrid:6x6:30mm:0.3";
+
+struct NamedKind {
+  const char* name;
+  PatternKind kind;
+};
+constexpr std::array<NamedKind, 4> kKinds = {{{"chessboard", PatternKind::kChessboard},
+                                              {"circles", PatternKind::kAsymmetricCircles},
+                                              {"symmetric-circles", PatternKind::kSymmetricCircles},
+                                              {"aprilgrid", PatternKind::kAprilGrid}}};
+
+struct Unit {
+  const char* name;
+  double metres;
+};
+constexpr std::array<Unit, 4> kUnits = {{{"mm", 1e-3}, {"cm", 1e-2}, {"m", 1}, {"in", 0.0254}}};
+
+// A number and what stands behind it, in the classic locale.
+std::optional<double> leading_number(const std::string& text, std::string* rest) {
+  std::istringstream in(text);
+  in.imbue(std::locale::classic());
+  double value = 0;
+  if (!(in >> value) || !std::isfinite(value)) return std::nullopt;
+  rest->clear();
+  std::getline(in, *rest, '\0');
+  return value;
+}
+
+std::optional<double> length_of(const std::string& text) {
+  std::string unit;
+  const std::optional<double> value = leading_number(text, &unit);
+  if (!value) return std::nullopt;
+  for (const Unit& known : kUnits) {
+    if (unit == known.name) return *value * known.metres;
+  }
+  return std::nullopt;
+}
+
+bool counts_of(const std::string& text, int* columns, int* rows) {
+  const std::size_t by = text.find('x');
+  if (by == std::string::npos || by == 0 || by + 1 == text.size()) return false;
+  if (text.find_first_not_of("0123456789x") != std::string::npos ||
+      text.find('x', by + 1) != std::string::npos)
+    return false;
+  if (text.size() > 9) return false;
+  *columns = std::atoi(text.substr(0, by).c_str());
+  *rows = std::atoi(text.substr(by + 1).c_str());
+  return true;
+}
+
+std::vector<std::string> split(const std::string& text) {
+  std::vector<std::string> parts;
+  std::istringstream in(text);
+  for (std::string part; std::getline(in, part, ':');) parts.push_back(part);
+  return parts;
+}
+
+}  // namespace
+
+std::vector<Vector3<double>> KnownPattern::points_m() const {
+  std::vector<Vector3<double>> points;
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      if (kind == PatternKind::kAsymmetricCircles) {
+        points.emplace_back((2 * column + row % 2) * size_m, row * size_m, 0);
+      } else if (kind == PatternKind::kAprilGrid) {
+        const double x = column * size_m * (1 + gap);
+        const double y = row * size_m * (1 + gap);
+        points.emplace_back(x, y + size_m, 0);
+        points.emplace_back(x + size_m, y + size_m, 0);
+        points.emplace_back(x + size_m, y, 0);
+        points.emplace_back(x, y, 0);
+      } else {
+        points.emplace_back(column * size_m, row * size_m, 0);
+      }
+    }
+  }
+  return points;
+}
+
+bool KnownPattern::is_symmetric() const {
+  switch (kind) {
+    case PatternKind::kChessboard:
+    case PatternKind::kSymmetricCircles:
+      return true;  // a chessboard's colours tell in half of the cases, but not OpenCV
+    case PatternKind::kAsymmetricCircles:
+      return rows % 2 == 1;
+    case PatternKind::kAprilGrid:
+      return false;
+  }
+  return false;
+}
+
+std::optional<KnownPattern> parse_pattern(const std::string& text, std::string* error) {
+  const std::vector<std::string> parts = split(text);
+  const auto wrong = [&](const std::string& what) {
+    *error = "'" + text + "': " + what + "; expected " + kExamples;
+    return std::nullopt;
+  };
+  if (parts.empty()) return wrong("no pattern");
+  KnownPattern pattern;
+  bool known = false;
+  for (const NamedKind& named : kKinds) {
+    if (parts[0] != named.name) continue;
+    pattern.kind = named.kind;
+    known = true;
+  }
+  if (!known) return wrong("'" + parts[0] + "' is no kind of pattern");
+  const bool grid = pattern.kind == PatternKind::kAprilGrid;
+  if (parts.size() != (grid ? 4U : 3U))
+    return wrong(grid ? "kind, counts, length and gap make it" : "kind, counts and length make it");
+  if (!counts_of(parts[1], &pattern.columns, &pattern.rows))
+    return wrong("'" + parts[1] + "' is not COLUMNSxROWS");
+  const int least = grid ? 1 : 3;
+  if (pattern.columns < least || pattern.rows < least || pattern.columns > 100 ||
+      pattern.rows > 100) {
+    return wrong("'" + parts[1] + "' is out of range, " + std::to_string(least) + " to 100");
+  }
+  if (grid && pattern.columns * pattern.rows > 587) return wrong("the family has 587 tags");
+  const std::optional<double> size = length_of(parts[2]);
+  if (!size) return wrong("'" + parts[2] + "' is not a length with its unit, mm, cm, m or in");
+  if (!(*size >= 1e-4 && *size <= 10))
+    return wrong("'" + parts[2] + "' is out of range, 0.1 mm to 10 m");
+  pattern.size_m = *size;
+  if (grid) {
+    std::string rest;
+    const std::optional<double> gap = leading_number(parts[3], &rest);
+    if (!gap || !rest.empty() || !(*gap > 0 && *gap <= 2))
+      return wrong("'" + parts[3] + "' is not a gap as a part of a tag's side, 0 to 2");
+    pattern.gap = *gap;
+  }
+  return pattern;
+}
+
+}  // namespace alidade

@@ -1,0 +1,28 @@
+#pragma once
+// What the calibration by a known pattern works on: where its points were seen, in which frame.
+
+#include <vector>
+
+#include "core/model/linear_algebra.h"
+
+namespace alidade {
+
+struct PatternObservation {
+  int point = 0;      // index into PatternData::points_m
+  Vector2<double> u;  // px, the centre of the top-left pixel is at (0.5, 0.5)
+};
+
+struct PatternFrame {
+  double time_s = 0;  // exposure of row 0, of a steady clock, increasing
+  std::vector<PatternObservation> observations;
+};
+
+struct PatternData {
+  int width = 0;   // px
+  int height = 0;  // px
+  std::vector<Vector3<double>>
+      points_m;  // pattern frame: x right, y down, z away from the viewer; z = 0 on a plane
+  std::vector<PatternFrame> frames;
+};
+
+}  // namespace alidade

@@ -1,0 +1,141 @@
+#include "core/pattern/pattern_drawing.h"
+
+#include <apriltag.h>
+#include <tag36h11.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdio>
+#include <cstdlib>
+#include <utility>
+
+namespace alidade {
+namespace {
+
+struct Paper {
+  const char* name;
+  double width_mm, height_mm;
+};
+constexpr std::array<Paper, 6> kPapers = {{{"a4", 210, 297},
+                                           {"a3", 297, 420},
+                                           {"a2", 420, 594},
+                                           {"a1", 594, 841},
+                                           {"a0", 841, 1189},
+                                           {"letter", 215.9, 279.4}}};
+constexpr double kMargin_mm = 5;  // that printers leave white
+constexpr double kCircle = 0.5;   // a circle's radius, of half the least distance of two centres
+
+struct Shapes {
+  std::string svg;
+  double width_mm = 0, height_mm = 0;
+
+  void rectangle(double x, double y, double w, double h) {
+    char text[160];
+    std::snprintf(text, sizeof text,
+                  "<rect x=\"%.4f\" y=\"%.4f\" width=\"%.4f\" height=\"%.4f\"/>\n", x, y, w, h);
+    svg += text;
+  }
+  void circle(double x, double y, double r) {
+    char text[160];
+    std::snprintf(text, sizeof text, "<circle cx=\"%.4f\" cy=\"%.4f\" r=\"%.4f\"/>\n", x, y, r);
+    svg += text;
+  }
+};
+
+Shapes chessboard(const KnownPattern& pattern, double size_mm) {
+  Shapes shapes;
+  // With a white square's room around.
+  shapes.width_mm = (pattern.columns + 1) * size_mm;
+  shapes.height_mm = (pattern.rows + 1) * size_mm;
+  for (int row = 0; row <= pattern.rows; ++row) {
+    for (int column = row % 2; column <= pattern.columns; column += 2) {
+      shapes.rectangle(column * size_mm, row * size_mm, size_mm, size_mm);
+    }
+  }
+  return shapes;
+}
+
+Shapes circles(const KnownPattern& pattern) {
+  Shapes shapes;
+  const bool symmetric = pattern.kind == PatternKind::kSymmetricCircles;
+  const double size_mm = 1000 * pattern.size_m;
+  // The nearest neighbour in an asymmetric grid is diagonal.
+  const double radius = kCircle * size_mm * (symmetric ? 0.5 : std::sqrt(0.5));
+  for (const Vector3<double>& p : pattern.points_m()) {
+    const double x = 1000 * p.x() + 2 * radius;
+    const double y = 1000 * p.y() + 2 * radius;
+    shapes.circle(x, y, radius);
+    shapes.width_mm = std::max(shapes.width_mm, x + 2 * radius);
+    shapes.height_mm = std::max(shapes.height_mm, y + 2 * radius);
+  }
+  return shapes;
+}
+
+Shapes april_grid(const KnownPattern& pattern) {
+  Shapes shapes;
+  const double size_mm = 1000 * pattern.size_m;
+  const double pitch = size_mm * (1 + pattern.gap);
+  apriltag_family_t* family = tag36h11_create();
+  // The border's outer edge is the tag's side; around it lies one white cell.
+  const double cell = size_mm / family->width_at_border;
+  const int white = (family->total_width - family->width_at_border) / 2;
+  for (int row = 0; row < pattern.rows; ++row) {
+    for (int column = 0; column < pattern.columns; ++column) {
+      image_u8_t* image = apriltag_to_image(family, row * pattern.columns + column);
+      for (int y = white; y < image->height - white; ++y) {
+        for (int x = white; x < image->width - white; ++x) {
+          if (image->buf[y * image->stride + x] != 0) continue;
+          // A hair wider, so that no seam shows between cells.
+          shapes.rectangle(column * pitch + (x - white) * cell, row * pitch + (y - white) * cell,
+                           cell * 1.002, cell * 1.002);
+        }
+      }
+      // As image_u8_destroy() does, which the shared library does not export.
+      std::free(image->buf);
+      std::free(image);
+    }
+  }
+  tag36h11_destroy(family);
+  shapes.width_mm = (pattern.columns - 1) * pitch + size_mm;
+  shapes.height_mm = (pattern.rows - 1) * pitch + size_mm;
+  return shapes;
+}
+
+}  // namespace
+
+std::optional<std::string> draw_pattern(const KnownPattern& pattern, const std::string& paper,
+                                        std::string* error) {
+  const auto* found =
+      std::find_if(kPapers.begin(), kPapers.end(), [&](const Paper& p) { return paper == p.name; });
+  if (found == kPapers.end()) {
+    *error = "'" + paper + "' is no paper; expected a4, a3, a2, a1, a0 or letter";
+    return std::nullopt;
+  }
+  const Shapes shapes = pattern.kind == PatternKind::kChessboard
+                            ? chessboard(pattern, 1000 * pattern.size_m)
+                        : pattern.kind == PatternKind::kAprilGrid ? april_grid(pattern)
+                                                                  : circles(pattern);
+  double width = found->width_mm;
+  double height = found->height_mm;
+  if (shapes.width_mm > shapes.height_mm) std::swap(width, height);
+  char text[400];
+  if (shapes.width_mm > width - 2 * kMargin_mm || shapes.height_mm > height - 2 * kMargin_mm) {
+    std::snprintf(text, sizeof text,
+                  "the pattern is %.0f x %.0f mm, and %s holds %.0f x %.0f mm; choose a larger "
+                  "paper or a smaller pattern",
+                  shapes.width_mm, shapes.height_mm, found->name, width - 2 * kMargin_mm,
+                  height - 2 * kMargin_mm);
+    *error = text;
+    return std::nullopt;
+  }
+  std::snprintf(text, sizeof text,
+                "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.1fmm\" height=\"%.1fmm\" "
+                "viewBox=\"0 0 %.1f %.1f\">\n"
+                "<g transform=\"translate(%.3f %.3f)\" shape-rendering=\"geometricPrecision\">\n",
+                width, height, width, height, (width - shapes.width_mm) / 2,
+                (height - shapes.height_mm) / 2);
+  return text + shapes.svg + "</g>\n</svg>\n";
+}
+
+}  // namespace alidade

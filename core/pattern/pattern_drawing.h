@@ -1,0 +1,16 @@
+#pragma once
+// A known pattern as an SVG page in true size, for printing at 100 %. Pure text.
+
+#include <optional>
+#include <string>
+
+#include "core/pattern/known_pattern.h"
+
+namespace alidade {
+
+// paper: a4, a3, a2, a1, a0 or letter; landscape where the pattern is wider than high. Empty and one line in *error where the
+// paper is unknown or too small.
+[[nodiscard]] std::optional<std::string> draw_pattern(const KnownPattern& pattern,
+                                                      const std::string& paper, std::string* error);
+
+}  // namespace alidade

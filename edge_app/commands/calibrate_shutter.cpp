@@ -1,0 +1,153 @@
+// `alidade calibrate-shutter`: from a video of a known pattern to line delay and lens. A lens that is not good enough is not
+// written, so that it cannot replace one that is.
+
+#include "edge_app/commands/calibrate_shutter.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+
+#include "core/pattern/calibrate_pattern.h"
+#include "core/pattern/pattern_drawing.h"
+#include "edge_app/commands/command.h"
+#include "edge_app/commands/pattern_video.h"
+#include "edge_app/commands/stop_signals.h"
+#include "edge_app/storage/lens_file.h"
+#include "platform/system/whole_file.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+PatternVideo find_visibly(const CalibrateShutterOptions& options, const KnownPattern& pattern) {
+  StopSignals signals;
+  const bool show = is_terminal(STDERR_FILENO);
+  PatternVideo video = find_pattern(options.video, pattern, [&](int images, int found) {
+    if (show)
+      fmt::print(stderr, "\r\033[K{}: {} images, the pattern in {}", options.video, images, found);
+    return signals.wait(-1, 0) != StopSignals::Event::kSignal;
+  });
+  if (show) fmt::print(stderr, "\r\033[K");
+  return video;
+}
+
+// The line delay in us, all else in its own unit.
+struct ShownUnit {
+  const char* name;
+  double value;
+};
+ShownUnit unit_of(LensParameter parameter) {
+  if (parameter == LensParameter::kLineDelay) return {"us/row", 1e-6};
+  return {index(parameter) < index(LensParameter::kK1) ? "px" : "", 1};
+}
+
+bool is_global_shutter(const PatternCalibration& calibration) {
+  return std::abs(calibration.lens[index(LensParameter::kLineDelay)]) <=
+         3 * calibration.sigma(LensParameter::kLineDelay);
+}
+
+std::string text_of(const PatternCalibration& calibration, const PatternVideo& video) {
+  std::string text = fmt::format(
+      "{} of {} images show the pattern, {} points used, {} left out; a detection's sigma {:.3f} "
+      "px\n",
+      video.found, video.images, calibration.observations, calibration.left_out,
+      calibration.sigma_px);
+  for (int i = 0; i < kLensParameterCount; ++i) {
+    const auto parameter = static_cast<LensParameter>(i);
+    const ShownUnit unit = unit_of(parameter);
+    const double sigma = calibration.sigma(parameter) / unit.value;
+    const int decimals =
+        sigma > 0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(sigma))), 0, 12) : 6;
+    text += fmt::format("  {:<17}{:>14.{}f} ± {:.{}f} {}\n",
+                        kLensParameterNames[static_cast<std::size_t>(i)],
+                        calibration.lens[i] / unit.value, decimals, sigma, decimals, unit.name);
+  }
+  if (is_global_shutter(calibration))
+    text += "the line delay is 0 within 3 sigmas: a global shutter, or rows too fast to tell\n";
+  return text;
+}
+
+std::string json_of(const PatternCalibration& calibration, const PatternVideo& video) {
+  nlohmann::ordered_json json;
+  for (int i = 0; i < kLensParameterCount; ++i) {
+    json[kLensParameterNames[static_cast<std::size_t>(i)]] = {
+        {"value", calibration.lens[i]},
+        {"sigma", calibration.sigma(static_cast<LensParameter>(i))}};
+  }
+  json["global_shutter"] = is_global_shutter(calibration);
+  json["images"] = video.images;
+  json["found"] = video.found;
+  json["repeated"] = video.repeated;
+  json["lost"] = video.lost;
+  json["observations"] = calibration.observations;
+  json["left_out"] = calibration.left_out;
+  json["detection_sigma_px"] = calibration.sigma_px;
+  json["segments"] = calibration.curve.segments();
+  return json.dump() + "\n";
+}
+
+void print(const std::string& text) {
+  std::fputs(text.c_str(), stdout);
+  if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
+}
+
+void write(const fs::path& directory, const char* name, const std::string& text) {
+  std::string error;
+  const std::string path = (directory / name).string();
+  if (!write_file_atomically(path, text, &error))
+    throw CommandError(kExitFailed, error + "; give a directory with room with -o");
+  spdlog::info("{}", path);
+}
+
+}  // namespace
+
+int calibrate_shutter(const CalibrateShutterOptions& options) {
+  std::string error;
+  const std::optional<KnownPattern> pattern = parse_pattern(options.pattern, &error);
+  if (!pattern) throw CommandError(kExitUsage, "--pattern " + error);
+  if (!options.paper.empty()) {
+    const std::optional<std::string> drawing = draw_pattern(*pattern, options.paper, &error);
+    if (!drawing) throw CommandError(kExitUsage, "--print: " + error);
+    print(*drawing);
+    return kExitOk;
+  }
+  if (options.video.empty()) {
+    throw CommandError(kExitUsage,
+                       "calibrate-shutter: no video; give a recording's directory or a video file, "
+                       "or --print PAPER");
+  }
+  const PatternVideo video = find_visibly(options, *pattern);
+  const PatternCalibration calibration = calibrate_pattern(video.data);
+  for (const std::string& remark : video.remarks) spdlog::warn("{}: {}", options.video, remark);
+  if (calibration.status != PatternStatus::kOk)
+    throw CommandError(kExitFailed, options.video + ": " + calibration.message);
+  for (const std::string& warning : calibration.warnings)
+    spdlog::warn("{}: {}", options.video, warning);
+
+  std::error_code failed;
+  const fs::path beside = fs::is_directory(options.video, failed)
+                              ? fs::path(options.video)
+                              : fs::path(options.video).parent_path();
+  const fs::path directory =
+      options.directory.empty() ? beside / "alidade" : fs::path(options.directory);
+  fs::create_directories(directory, failed);
+  if (failed) {
+    throw CommandError(kExitFailed, directory.string() + ": cannot be made: " + failed.message() +
+                                        "; give a directory that can be written with -o");
+  }
+  const LensNotes notes{options.pattern, video.data.width, video.data.height};
+  write(directory, "trajectory.csv", format_trajectory(calibration, video.data));
+  write(directory, "camera_info.yaml", format_camera_info(calibration, notes));
+  write(directory, "lens.yaml", format_lens(calibration, notes));
+  print(options.json ? json_of(calibration, video) : text_of(calibration, video));
+  return kExitOk;
+}
+
+}  // namespace alidade

@@ -1,0 +1,137 @@
+#include "edge_app/commands/pattern_video.h"
+
+#include <fmt/format.h>
+
+#include <cstring>
+#include <filesystem>
+#include <limits>
+#include <memory>
+#include <optional>
+
+#include "core/calibration/clock_line.h"
+#include "core/pattern/pattern_detector.h"
+#include "edge_app/commands/command.h"
+#include "platform/video/recording_frame_source.h"
+#include "platform/video/video_file.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Is this image the one before, to the bit? What sensors see never is, what a converter of frame rates puts in is.
+class RepeatedImages {
+ public:
+  bool is_repeated(const Frame& frame) {
+    const auto width = static_cast<std::size_t>(frame.width);
+    const auto height = static_cast<std::size_t>(frame.height);
+    const bool comparable = before_.size() == width * height;
+    before_.resize(width * height);
+    bool same = comparable;
+    for (std::size_t v = 0; v < height; ++v) {
+      const std::uint8_t* row = frame.luma + static_cast<std::ptrdiff_t>(v) * frame.stride;
+      std::uint8_t* row_before = before_.data() + v * width;
+      if (same && std::memcmp(row, row_before, width) == 0) continue;
+      same = false;
+      std::memcpy(row_before, row, width);
+    }
+    return same;
+  }
+
+ private:
+  std::vector<std::uint8_t> before_;
+};
+
+std::unique_ptr<FrameSource> open_video(const std::string& video) {
+  std::error_code error;
+  if (!fs::exists(video, error)) {
+    throw CommandError(kExitFailed,
+                       video + ": is not there; expected a recording's directory or a video file");
+  }
+  if (fs::is_directory(video, error)) return open_recorded_frames({video, true, false});
+  return open_video_file(video);
+}
+
+// Row 0's exposure of each frame, on a steady clock where there is one.
+void regularise(const std::vector<FrameStamp>& stamps, PatternVideo* video) {
+  internal::ClockInput clock;
+  bool by_sender = true;
+  for (const FrameStamp& stamp : stamps) by_sender = by_sender && stamp.sender_time_s.has_value();
+  for (const FrameStamp& stamp : stamps) {
+    clock.stamp_s.push_back(by_sender ? *stamp.sender_time_s : stamp.receive_time_s);
+    clock.sequence.push_back(stamp.sequence);
+  }
+  clock.one_sided = !by_sender;
+  for (std::size_t i = 1; i < clock.stamp_s.size(); ++i) {
+    if (clock.stamp_s[i] > clock.stamp_s[i - 1]) continue;
+    throw CommandError(kExitFailed, fmt::format("time stamps do not increase: {} s follows {} s at "
+                                                "image {}; expected a video as it was taken",
+                                                clock.stamp_s[i], clock.stamp_s[i - 1], i));
+  }
+  const internal::ClockLine line = internal::fit_clock_line(clock);
+  for (std::size_t i = 0; i < stamps.size(); ++i) video->data.frames[i].time_s = line.time_s[i];
+  video->lost = line.lost;
+  if (!line.steady) {
+    video->remarks.emplace_back(
+        "the frame rate is not steady; time stamps are taken as they are, and their errors are not "
+        "part of any sigma");
+  }
+  if (line.lost > 0)
+    video->remarks.push_back(fmt::format("{} images are missing by their time stamps", line.lost));
+}
+
+}  // namespace
+
+PatternVideo find_pattern(const std::string& path, const KnownPattern& pattern,
+                          const std::function<bool(int images, int found)>& progress) {
+  const std::unique_ptr<FrameSource> source = open_video(path);
+  PatternVideo video;
+  video.data.points_m = pattern.points_m();
+  PatternDetector detector(pattern);
+  RepeatedImages repeated;
+  std::vector<FrameStamp> stamps;
+  for (;;) {
+    Frame frame;
+    const ReadStatus status = source->read(frame, std::numeric_limits<double>::infinity());
+    if (status == ReadStatus::kEnd) break;
+    if (status != ReadStatus::kOk) throw CommandError(kExitFailed, source->error());
+    if (frame.luma == nullptr)
+      throw CommandError(kExitFailed, path + ": holds no images; expected video.mkv or frames/");
+    if (video.images == 0) {
+      video.data.width = frame.width;
+      video.data.height = frame.height;
+    }
+    if (frame.width != video.data.width || frame.height != video.data.height) {
+      throw CommandError(
+          kExitFailed,
+          fmt::format("{}: image {} is {}x{}, those before are {}x{}; expected one size", path,
+                      video.images, frame.width, frame.height, video.data.width,
+                      video.data.height));
+    }
+    ++video.images;
+    if (repeated.is_repeated(frame)) {
+      ++video.repeated;
+      continue;
+    }
+    PatternFrame found;
+    found.observations = detector.find(frame.luma, frame.width, frame.height, frame.stride);
+    video.found += found.observations.empty() ? 0 : 1;
+    video.data.frames.push_back(std::move(found));
+    stamps.push_back(frame.stamp);
+    if (!progress(video.images, video.found))
+      throw CommandError(kExitFailed, path + ": interrupted; nothing stored");
+  }
+  if (stamps.size() < 3)
+    throw CommandError(kExitFailed, fmt::format("{}: {} images; a video of some 30 s is needed",
+                                                path, stamps.size()));
+  regularise(stamps, &video);
+  const double interval_s = (video.data.frames.back().time_s - video.data.frames.front().time_s) /
+                            static_cast<double>(stamps.size() - 1);
+  follow_half_turns(pattern, 10 * interval_s, &video.data);
+  if (video.repeated > 0)
+    video.remarks.push_back(
+        fmt::format("{} images repeat the one before and are left out", video.repeated));
+  return video;
+}
+
+}  // namespace alidade

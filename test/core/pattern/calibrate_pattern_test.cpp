@@ -1,0 +1,158 @@
+#include "core/pattern/calibrate_pattern.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "test/core/pattern/pattern_simulation.h"
+#include "test/support/not_a_number.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+
+LensVector truth_of(const test::PatternScene& scene) {
+  const test::SimulatedLens& l = scene.lens;
+  LensVector truth;
+  truth << l.f_u, l.f_v, l.c_u, l.c_v, l.k1, l.k2, l.p1, l.p2, l.line_delay_s;
+  return truth;
+}
+
+double line_delay_of(const PatternCalibration& calibration) {
+  return calibration.lens[index(LensParameter::kLineDelay)];
+}
+
+// Whether its error is one that its sigma admits: beyond four, chance alone is once in 16,000.
+void expect_honest(const PatternCalibration& calibration, const test::PatternScene& scene) {
+  ASSERT_EQ(calibration.status, PatternStatus::kOk) << calibration.message;
+  const LensVector error = calibration.lens - truth_of(scene);
+  for (int i = 0; i < kLensParameterCount; ++i) {
+    EXPECT_LT(std::abs(error[i]), 4 * calibration.sigma(static_cast<LensParameter>(i)))
+        << kLensParameterNames[static_cast<std::size_t>(i)];
+  }
+}
+
+test::PatternScene short_scene(double line_delay_s, double rate_hz, std::uint64_t seed) {
+  test::PatternScene scene;
+  scene.duration_s = 8;
+  scene.lens.line_delay_s = line_delay_s;
+  scene.rate_hz = rate_hz;
+  scene.seed = seed;
+  return scene;
+}
+
+// Nine parameters a run: the sum of their normalised squared errors is chi-square with nine degrees of freedom each.
+TEST(CalibratePattern, ErrorsAreAsLargeAsTheCovarianceSays) {
+  double sum = 0;
+  int runs = 0;
+  for (const auto& [line_delay, rate] :
+       {std::pair{137.5e-6, 7.0}, {51.56e-6, 20.0}, {-60e-6, 20.0}}) {
+    for (const std::uint64_t seed : {1U, 2U}) {
+      const test::PatternScene scene = short_scene(line_delay, rate, seed);
+      const PatternCalibration calibration = calibrate_pattern(test::simulate_pattern(scene));
+      ASSERT_EQ(calibration.status, PatternStatus::kOk) << calibration.message;
+      const LensVector error = calibration.lens - truth_of(scene);
+      sum += error.dot(calibration.covariance.ldlt().solve(error));
+      ++runs;
+      EXPECT_NEAR(calibration.sigma_px, scene.noise_px, 0.05 * scene.noise_px);
+      // 30 s know it to 0.06 to 0.11 us; 8 s to twice that.
+      EXPECT_LT(calibration.sigma(LensParameter::kLineDelay), 0.3e-6);
+    }
+  }
+  const double freedom = 9.0 * runs;
+  EXPECT_NEAR(sum, freedom, 4 * std::sqrt(2 * freedom));
+}
+
+// A start at the wrong sign, twice as large, ends where the right one does.
+TEST(CalibratePattern, FindsTheSignOfTheLineDelay) {
+  const test::PatternScene scene = short_scene(51.56e-6, 15, 4);
+  const PatternData data = test::simulate_pattern(scene);
+  PatternCalibrationOptions options;
+  options.start_line_delay_s = -100e-6;
+  const PatternCalibration from_wrong = calibrate_pattern(data, options);
+  expect_honest(from_wrong, scene);
+  EXPECT_NEAR(line_delay_of(from_wrong), line_delay_of(calibrate_pattern(data)),
+              0.2 * from_wrong.sigma(LensParameter::kLineDelay));
+}
+
+TEST(CalibratePattern, GlobalShutterHasNoLineDelay) {
+  const test::PatternScene scene = short_scene(0, 15, 5);
+  expect_honest(calibrate_pattern(test::simulate_pattern(scene)), scene);
+}
+
+TEST(CalibratePattern, WrongDetectionsAreLeftOut) {
+  test::PatternScene scene = short_scene(51.56e-6, 15, 6);
+  scene.wrong = 0.03;
+  const PatternCalibration calibration = calibrate_pattern(test::simulate_pattern(scene));
+  expect_honest(calibration, scene);
+  EXPECT_NEAR(calibration.sigma_px, scene.noise_px, 0.05 * scene.noise_px);
+  // Within 10 px a side, three in a hundred thousand are too near to the truth to be noticed.
+  EXPECT_GT(calibration.left_out, 0.9 * 0.03 * (calibration.observations + calibration.left_out));
+}
+
+TEST(CalibratePattern, FramesWithoutThePatternAreBridged) {
+  test::PatternScene scene = short_scene(51.56e-6, 15, 7);
+  PatternData data = test::simulate_pattern(scene);
+  for (PatternFrame& frame : data.frames) {
+    if (frame.time_s > 3 && frame.time_s < 5) frame.observations.clear();
+  }
+  expect_honest(calibrate_pattern(data), scene);
+}
+
+TEST(CalibratePattern, KnownParametersStayAsTheyAre) {
+  const test::PatternScene scene = short_scene(51.56e-6, 15, 8);
+  PatternCalibrationOptions options;
+  options.prior_mean = truth_of(scene);
+  options.fixed.fill(true);
+  options.fixed[static_cast<std::size_t>(index(LensParameter::kLineDelay))] = false;
+  const PatternCalibration calibration = calibrate_pattern(test::simulate_pattern(scene), options);
+  ASSERT_EQ(calibration.status, PatternStatus::kOk) << calibration.message;
+  EXPECT_EQ(calibration.lens.head<8>(), truth_of(scene).head<8>());
+  EXPECT_LT(std::abs(line_delay_of(calibration) - scene.lens.line_delay_s),
+            4 * calibration.sigma(LensParameter::kLineDelay));
+  EXPECT_EQ(calibration.sigma(LensParameter::kFocalLengthU), 0);
+}
+
+TEST(CalibratePattern, SaysWhatIsMissing) {
+  const test::PatternScene scene = short_scene(51.56e-6, 15, 9);
+  const PatternData good = test::simulate_pattern(scene);
+  const auto refused = [](const PatternData& data, PatternStatus status, const char* what) {
+    const PatternCalibration calibration = calibrate_pattern(data);
+    EXPECT_EQ(calibration.status, status) << what << ": " << calibration.message;
+    EXPECT_THAT(calibration.message, HasSubstr(what));
+  };
+  PatternData data = good;
+  for (PatternFrame& frame : data.frames) frame.observations.clear();
+  refused(data, PatternStatus::kNoPattern, "found in no frame");
+  data.frames.clear();
+  refused(data, PatternStatus::kNoPattern, "found in no frame");
+  data = good;
+  data.frames.resize(8);
+  refused(data, PatternStatus::kTooFewFrames, "in 8 frames only");
+  data = good;
+  data.frames[3].time_s = data.frames[2].time_s;
+  refused(data, PatternStatus::kBadInput, "times must increase");
+  data = good;
+  data.frames[3].observations[0].u.x() = kNan;
+  refused(data, PatternStatus::kBadInput, "finite");
+  data = good;
+  data.frames[3].observations[0].point = 54;
+  refused(data, PatternStatus::kBadInput, "");
+
+  test::PatternScene still = scene;
+  still.speed = 1e-4;
+  const PatternCalibration at_rest = calibrate_pattern(test::simulate_pattern(still));
+  EXPECT_NE(at_rest.status, PatternStatus::kOk);
+  EXPECT_FALSE(at_rest.message.empty());
+
+  test::PatternScene shaken = scene;
+  shaken.speed = 8;
+  const PatternCalibration too_fast = calibrate_pattern(test::simulate_pattern(shaken));
+  EXPECT_EQ(too_fast.status, PatternStatus::kFrameRateTooLow) << too_fast.message;
+  EXPECT_THAT(too_fast.message, HasSubstr("15.0 frames a second; move it more slowly"));
+}
+
+}  // namespace
+}  // namespace alidade
