@@ -43,8 +43,9 @@ struct FrameTime {
   bool of_use = true;  // false: nor will it be known later, when the pace or the line is
   // Steps of the least delay, which the receive time contains and the line does not.
   double delay_shift_s = 0;
-  // By how much frames leave the line again and again; contained in clock.sigma_s. 0: they do not.
-  double wander_s = 0;
+  // By how much frames leave the line; contained in clock.sigma_s, and the same in neighbouring frames.
+  double off_line_s = 0;
+  double wander_s = 0;  // the same where they do again and again, else 0
   // With a restart or step of the clock: by how much the line may be another than the one before, whichever of delay and
   // stamps it was that moved.
   double moved_s = 0;
@@ -69,7 +70,8 @@ class FrameClock {
   FrameTime update(const FrameStamp& stamp) {
     FrameTime time = judge(stamp);
     if (!waiting_ && kind_ != Kind::kNothing) time.delay_shift_s = clock_.filter().delay_shift_s();
-    if (kind_ != Kind::kNothing && wander_.wanders()) time.wander_s = wander_.off_s();
+    if (kind_ != Kind::kNothing) time.off_line_s = wander_.off_s();
+    if (wander_.wanders()) time.wander_s = time.off_line_s;
     time.stamps_left_out = stamps_left_out_;
     return time;
   }
@@ -81,6 +83,7 @@ class FrameClock {
   static constexpr double kEarly_s = 0.02;      // the least delay of a connection differs by less
   static constexpr double kStoodStill_s = 0.5;  // half of the window at the pace that tells
   static constexpr double kGate = 6;            // sigmas of a line, in which items come down to it
+  static constexpr double kOpen = 3;            // sigmas that a line says itself
 
   FrameTime judge(const FrameStamp& stamp) {
     if (!wait_for_pace_) return {ask_clock(stamp, stamp.restarted)};
@@ -255,7 +258,7 @@ class FrameClock {
     } else if (late_s <= gate_s) {
       behind_backlog_ = false;
     }
-    if (!behind_backlog_) wander_.add(receive_s, late_s, gate_s);
+    if (!behind_backlog_) wander_.add(receive_s, late_s, kOpen * sigma_s);
   }
 
   double stamp_sigma_s_;

@@ -216,8 +216,8 @@ TEST_F(FrameClockTest, ARestartIsNotForgottenOverAFrameThatCannotBeUsed) {
 // Stamps that swing by 90 ms in 40 s. Whether the stamps wander and arrivals are right, or the delay wanders and stamps are
 // right, the line's time is one or the other, or between.
 TEST_F(FrameClockTest, SigmaCoversWhatWanders) {
-  // A line leaves a millisecond open, and what was seen is as old as two parts of the window: at 3.5 ms/s at most.
-  constexpr double kOpen_s = 1e-3 + 2 * DelayWander::kPart_s * 3.5e-3;
+  // What was seen is as old as a part of the window, 3.5 ms/s at most.
+  constexpr double kOpen_s = DelayWander::kPart_s * 3.5e-3;
   play(0, 20);
   int known = 0;
   int frames = 0;
