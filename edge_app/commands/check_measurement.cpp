@@ -5,6 +5,7 @@
 
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <future>
 #include <mutex>
 #include <optional>
@@ -12,6 +13,7 @@
 #include <utility>
 
 #include "edge_app/commands/command.h"
+#include "edge_app/pipeline/repeated_images.h"
 #include "platform/system/clock.h"
 
 namespace alidade {
@@ -129,10 +131,22 @@ Measured measure(const Config& config, double duration_s) {
   const auto video = make_frame_source(config.video, true);
   const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
   ImageThread images;
+  std::optional<std::uint64_t> digest;  // of the image before
+  const auto repeats = [&digest](const Frame& frame) {
+    const ImageView image{frame.luma, frame.width, frame.height, frame.stride};
+    const std::optional<std::uint64_t> before = digest;
+    digest = image.valid() ? std::optional(image_digest(image)) : std::nullopt;
+    return digest && digest == before;
+  };
+  std::optional<double> started_s;
   const std::future<void> frames = std::async(std::launch::async, [&] {
     measured.video = collect<Frame>(
         *video, config.video.timeout_s + kConnectSlack, duration_s, [&](const Frame& frame) {
-          measured.frames.push_back({frame.stamp, frame.width, frame.height, frame.decode_s});
+          measured.frames.push_back(
+              {frame.stamp, frame.width, frame.height, frame.decode_s, repeats(frame)});
+          const double now_s = monotonic_now_s();
+          if (!started_s) started_s = now_s;
+          if (now_s < *started_s + kStart_s) measured.counters_at_start = video->counters();
           images.offer(frame);
         });
   });
