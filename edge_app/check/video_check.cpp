@@ -157,6 +157,7 @@ VideoReport check_video(const std::vector<CheckedFrame>& frames,
   if (frames.empty()) return report;
   report.width = frames.front().width;
   report.height = frames.front().height;
+  report.stamped_at = frames.back().stamp.stamped_at;
   std::vector<ClockedStamp> stamps;
   std::vector<double> decoding;
   for (const CheckedFrame& frame : frames) {

@@ -44,10 +44,11 @@ struct VideoReport {
   int width = 0;  // px, of the first
   int height = 0;
   bool size_fits = true;
-  std::optional<double> rate_hz;     // of the frames that came
-  std::optional<Spread> interval_s;  // see above
-  std::optional<std::int64_t> lost;  // empty: nothing tells
-  bool skips_or_lost = false;        // they are told by the sender's times
+  StampedAt stamped_at = StampedAt::kArrival;  // of the last
+  std::optional<double> rate_hz;               // of the frames that came
+  std::optional<Spread> interval_s;            // see above
+  std::optional<std::int64_t> lost;            // empty: nothing tells
+  bool skips_or_lost = false;                  // they are told by the sender's times
   FrameSourceCounters counters;
   FrameSourceCounters at_start;  // of these, in the first seconds
   std::optional<Spread> decode_s;

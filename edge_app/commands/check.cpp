@@ -89,13 +89,25 @@ std::string rate_of(const std::optional<double>& rate_hz) {
   return rate_hz ? fmt::format("{:.2f} Hz", *rate_hz) : "one only: no rate";
 }
 
+const char* sequence_clock(const VideoReport& video) {
+  switch (video.stamped_at) {
+    case StampedAt::kExposureStart:
+      return "sequence numbers, stamped at the start of exposure";
+    case StampedAt::kFrameEnd:
+      return "sequence numbers, stamped at the end of the frame";
+    case StampedAt::kArrival:
+      break;
+  }
+  return "sequence numbers";
+}
+
 std::string headline(const VideoReport& video, const VideoNeeds& needs) {
   if (video.frames == 0) return "failed";
   const char* size = needs.width == 0  ? "no size to compare with"
                      : video.size_fits ? "as expected"
                                        : "not as expected";
   const char* clock = video.clock.kind == StampKind::kSender     ? "sender clock"
-                      : video.clock.kind == StampKind::kSequence ? "sequence numbers"
+                      : video.clock.kind == StampKind::kSequence ? sequence_clock(video)
                                                                  : "arrival times only";
   return fmt::format("{}x{} px ({}), {}, {}", video.width, video.height, size,
                      rate_of(video.rate_hz), clock);

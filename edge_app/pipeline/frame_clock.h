@@ -16,7 +16,9 @@
 //                   was seen of it. Such a frame is of unknown age only beyond that.
 //                   Stamps that run at another rate than the pictures come (stamp_rate.h) tell nothing: once that is shown
 //                   they are left out, on later connections too, and what else the stream tells goes on alone.
-//   count alone     (V4L2: stamps of the driver.) The same but for the start: a driver holds back a few buffers only.
+//   count alone     (V4L2: stamps of the driver.) The same but for the start: a driver holds back a few buffers only. Where the
+//                   driver stamped a frame when it was taken, that is its age, and a count that leaves the stamps is of a camera
+//                   with another rate by now: such frames have their stamps, and from kManyStrays in a row on another line.
 //   nothing         receipt_clock.h.
 // A recording's later frames may show that those which its connection begins with did not wait (fresh_beginning.h): then
 // nothing is waited for at its beginning, and the rest is as above.
@@ -80,7 +82,9 @@ class FrameClock {
   enum class Kind : std::uint8_t { kNew, kSenderTime, kSequence, kNothing };
 
   static constexpr int kStrangeInARow = 3;
-  static constexpr double kEarly_s = 0.02;      // the least delay of a connection differs by less
+  static constexpr double kEarly_s = 0.02;   // the least delay of a connection differs by less
+  static constexpr double kAstray_s = 0.01;  // more than a driver's stamps jitter
+  static constexpr int kManyStrays = 25;
   static constexpr double kStoodStill_s = 0.5;  // half of the window at the pace that tells
   static constexpr double kGate = 6;            // sigmas of a line, in which items come down to it
   static constexpr double kOpen = 3;            // sigmas that a line says itself
@@ -156,6 +160,7 @@ class FrameClock {
     line_begins_ = true;
     late_ = false;
     behind_backlog_ = false;
+    strays_ = 0;
     pace_.restart();
     wander_.restart();
     receipts_.restart();
@@ -216,9 +221,27 @@ class FrameClock {
     time.known = !time.clock.rejected;
     if (time.clock.rejected) return time;
     if (time.clock.restarted && !by_count) return begin_again(stamp);
+    if (by_count && goes_astray(stamp, &time)) return time;
     if (time.clock.delay_stepped) time.moved_s = std::abs(filter.delay_shift_s() - shift_s);
     judge_lateness(stamp, &time);
     return time;
+  }
+
+  bool goes_astray(const FrameStamp& stamp, FrameTime* time) {
+    const double off_s =
+        stamp.receive_time_s - clock_.filter().delay_shift_s() - time->clock.time_s;
+    if (stamp.stamped_at == StampedAt::kArrival || std::abs(off_s) <= kAstray_s) {
+      strays_ = 0;
+      return false;
+    }
+    if (++strays_ == kManyStrays) {
+      *time = begin_again(stamp);
+      return true;
+    }
+    time->clock.time_s = stamp.receive_time_s;
+    time->clock.sigma_s = stamp_sigma_s_;
+    time->of_use = false;  // calibrations go by the count
+    return true;
   }
 
   // All that the stream has shown so far was of a backlog, or of another clock.
@@ -281,6 +304,7 @@ class FrameClock {
   bool late_ = false;        // the last frame, by more than jitter
   bool runs_on_ = false;     // the sender's clock, while its items wait; as seen on any connection
   bool behind_backlog_ = false;
+  int strays_ = 0;  // in a row
   bool stamps_left_out_ = false;
 };
 

@@ -258,6 +258,26 @@ TEST_F(FrameClockTest, WhatWaitedTellsNothingOfTheDelay) {
   }
 }
 
+// In the dark, and back in the light: it counts on without a gap, and the driver's stamps say when each frame was taken.
+TEST_F(FrameClockTest, ACameraThatChangesItsRateHasTheDriversStampsUntilTheNewOneIsKnown) {
+  std::int64_t sequence = 0;
+  double t = 0;
+  int restarts = 0;
+  for (const double interval_s : {1 / 30.0, 1 / 15.0, 1 / 30.0}) {
+    for (int i = 0; i < 300; ++i, t += interval_s) {
+      FrameStamp stamp;
+      stamp.receive_time_s = t;
+      stamp.sequence = sequence++;
+      stamp.stamped_at = StampedAt::kExposureStart;
+      const FrameTime time = clock_.update(stamp);
+      EXPECT_TRUE(time.known) << t;
+      EXPECT_NEAR(time.clock.time_s, t, std::max(5 * time.clock.sigma_s, 1e-6)) << t;
+      restarts += time.clock.restarted ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(restarts, 2);
+}
+
 // A camera that counts its pictures at a nominal rate, and takes 2 % fewer or more.
 class StampsAtAnotherRate : public FrameClockTest, public testing::WithParamInterface<double> {};
 
