@@ -36,7 +36,7 @@ bool on_grid(const std::vector<double>& intervals, double usual) {
 
 std::optional<std::int64_t> lost_frames(const std::vector<CheckedFrame>& frames,
                                         const std::vector<double>& intervals,
-                                        const std::optional<Spread>& interval) {
+                                        const std::optional<Spread>& interval, bool* by_times) {
   constexpr double kMostLost = 1e6;
   constexpr double kJump_s = 1;  // a clock that steps by more loses no frames (ClockFilterOptions)
   const bool grid = interval && on_grid(intervals, interval->median);
@@ -54,6 +54,7 @@ std::optional<std::int64_t> lost_frames(const std::vector<CheckedFrame>& frames,
       const double received_s = now.receive_time_s - before.receive_time_s;
       step =
           std::abs(sender_s - received_s) < kJump_s ? std::round(sender_s / interval->median) : 1;
+      *by_times = true;
     } else {
       continue;
     }
@@ -87,25 +88,33 @@ void judge_coding(VideoReport* report, const VideoNeeds& needs,
 void judge_losses(VideoReport* report, const VideoNeeds& needs) {
   constexpr double kFew = 0.01;
   constexpr double kMany = 0.1;
-  const auto judge = [&](std::int64_t count, const char* what, const char* remedy) {
+  const auto judge = [&](std::int64_t count, const char* what, const char* remedy,
+                         Severity worst = Severity::kProblem) {
     const double share = static_cast<double>(count) /
                          static_cast<double>(report->frames + static_cast<std::size_t>(count));
     if (!(share > kFew)) return;
     report->findings.push_back(
-        {share > kMany ? Severity::kProblem : Severity::kAdvice,
+        {share > kMany ? worst : Severity::kAdvice,
          fmt::format("video {}: {} of {} frames {}; {}", needs.source, count,
                      report->frames + static_cast<std::size_t>(count), what, remedy)});
   };
-  judge(std::max<std::int64_t>(0, report->counters.dropped),
+  judge(std::max<std::int64_t>(0, report->counters.dropped - report->at_start.dropped),
         "were dropped because they were not read in time",
         "lower the camera's rate or size, or use a faster machine");
-  judge(std::max<std::int64_t>(0, report->counters.damaged), "were damaged",
-        "look for packet loss; lower the bit rate, or use transport: tcp");
+  judge(std::max<std::int64_t>(0, report->counters.damaged - report->at_start.damaged),
+        "were damaged", "look for packet loss; lower the bit rate, or use transport: tcp");
   // What was dropped or damaged here leaves a gap, too.
   const std::int64_t elsewhere =
       report->lost.value_or(0) - report->counters.dropped - report->counters.damaged;
-  judge(std::max<std::int64_t>(0, elsewhere), "never came",
-        "look at the link between camera and machine, and at the camera's own load");
+  if (report->skips_or_lost) {
+    judge(std::max<std::int64_t>(0, elsewhere), "are missing on the camera's clock",
+          "nothing tells whether the camera left them out, as in low light or under load, or the "
+          "link lost them: by transport: tcp it was the camera",
+          Severity::kAdvice);
+  } else {
+    judge(std::max<std::int64_t>(0, elsewhere), "never came",
+          "look at the link between camera and machine, and at the camera's own load");
+  }
 }
 
 // The capture thread decodes one image after the other: what takes longer than a period piles up. A fifth is
@@ -146,14 +155,16 @@ std::string milliseconds(const Spread& spread) {
 }  // namespace
 
 VideoReport check_video(const std::vector<CheckedFrame>& frames,
-                        const FrameSourceCounters& counters, const ClockFilterOptions& clock,
-                        const VideoNeeds& needs) {
+                        const FrameSourceCounters& counters, const FrameSourceCounters& at_start,
+                        const ClockFilterOptions& clock, const VideoNeeds& needs) {
   VideoReport report;
   report.frames = frames.size();
   report.counters = counters;
+  report.at_start = at_start;
   if (frames.empty()) return report;
   report.width = frames.front().width;
   report.height = frames.front().height;
+  report.stamped_at = frames.back().stamp.stamped_at;
   std::vector<ClockedStamp> stamps;
   std::vector<double> decoding;
   for (const CheckedFrame& frame : frames) {
@@ -165,7 +176,7 @@ VideoReport check_video(const std::vector<CheckedFrame>& frames,
   if (span_s > 0) report.rate_hz = static_cast<double>(frames.size() - 1) / span_s;
   const std::vector<double> steps = intervals(frames);
   report.interval_s = spread_of(steps);
-  report.lost = lost_frames(frames, steps, report.interval_s);
+  report.lost = lost_frames(frames, steps, report.interval_s, &report.skips_or_lost);
   report.decode_s = spread_of(decoding);
   report.clock = check_clock(stamps, clock, &report.time_s);
   judge_size(&report, needs);
@@ -186,6 +197,8 @@ ReportLines describe(const VideoReport& report) {
   frames += report.lost ? fmt::format("; {} lost", *report.lost) : "; losses cannot be seen";
   frames +=
       fmt::format(", {} damaged, {} dropped", report.counters.damaged, report.counters.dropped);
+  if (report.at_start.dropped > 0)
+    frames += fmt::format(" ({} in a burst at the start)", report.at_start.dropped);
   lines.emplace_back("frames", frames);
   lines.emplace_back("clock filter", describe(report.clock));
   if (report.clock.lateness_s) {

@@ -4,7 +4,8 @@
 //
 //   intervals  of the sender's times; of the receive times where the sender tells none. Their median is the period,
 //              their deviation what is left of jitter once the arrival does not matter.
-//   losses     gaps in the sequence numbers; else of the sender's times, where these lie on a steady grid
+//   losses     gaps in the sequence numbers; else of the sender's times, where these lie on a steady grid: there nothing
+//              tells a frame that was lost from one that the camera left out
 // Frames after a reconnection begin anew: no interval and no loss reaches across.
 // Seconds. Pure functions; they allocate and do not throw, whatever the stamps hold.
 
@@ -28,6 +29,7 @@ struct CheckedFrame {
   int height = 0;
   std::optional<double> decode_s;
   bool interlaced = false;  // its coding
+  bool repeats = false;     // its image is exactly the one before
 };
 
 struct VideoNeeds {
@@ -43,18 +45,24 @@ struct VideoReport {
   int width = 0;  // px, of the first
   int height = 0;
   bool size_fits = true;
-  std::optional<double> rate_hz;     // of the frames that came
-  std::optional<Spread> interval_s;  // see above
-  std::optional<std::int64_t> lost;  // empty: nothing tells
+  StampedAt stamped_at = StampedAt::kArrival;  // of the last
+  std::optional<double> rate_hz;               // of the frames that came
+  std::optional<Spread> interval_s;            // see above
+  std::optional<std::int64_t> lost;            // empty: nothing tells
+  bool skips_or_lost = false;                  // they are told by the sender's times
   FrameSourceCounters counters;
+  FrameSourceCounters at_start;  // of these, in the first seconds
   std::optional<Spread> decode_s;
   ClockReport clock;
   std::vector<double> time_s;  // of each frame
   Findings findings;
 };
 
+// at_start: the part of counters that was counted in the first seconds. A relay or camera may begin with a burst of kept
+// pictures, which overflows queues of any machine, and once.
 [[nodiscard]] VideoReport check_video(const std::vector<CheckedFrame>& frames,
                                       const FrameSourceCounters& counters,
+                                      const FrameSourceCounters& at_start,
                                       const ClockFilterOptions& clock, const VideoNeeds& needs);
 
 [[nodiscard]] ReportLines describe(const VideoReport& report);

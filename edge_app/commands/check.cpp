@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "edge_app/check/motion_check.h"
+#include "edge_app/check/repeat_check.h"
 #include "edge_app/check/telemetry_check.h"
 #include "edge_app/check/video_check.h"
 #include "edge_app/commands/check.h"
@@ -88,13 +89,25 @@ std::string rate_of(const std::optional<double>& rate_hz) {
   return rate_hz ? fmt::format("{:.2f} Hz", *rate_hz) : "one only: no rate";
 }
 
+const char* sequence_clock(const VideoReport& video) {
+  switch (video.stamped_at) {
+    case StampedAt::kExposureStart:
+      return "sequence numbers, stamped at the start of exposure";
+    case StampedAt::kFrameEnd:
+      return "sequence numbers, stamped at the end of the frame";
+    case StampedAt::kArrival:
+      break;
+  }
+  return "sequence numbers";
+}
+
 std::string headline(const VideoReport& video, const VideoNeeds& needs) {
   if (video.frames == 0) return "failed";
   const char* size = needs.width == 0  ? "no size to compare with"
                      : video.size_fits ? "as expected"
                                        : "not as expected";
   const char* clock = video.clock.kind == StampKind::kSender     ? "sender clock"
-                      : video.clock.kind == StampKind::kSequence ? "sequence numbers"
+                      : video.clock.kind == StampKind::kSequence ? sequence_clock(video)
                                                                  : "arrival times only";
   return fmt::format("{}x{} px ({}), {}, {}", video.width, video.height, size,
                      rate_of(video.rate_hz), clock);
@@ -126,6 +139,7 @@ void print_report(const CheckReport& report, const VideoNeeds& video_needs) {
   fmt::print("video          {}: {}\n", measured.video.name, headline(report.video, video_needs));
   print(describe(report.video));
   print(describe(measured.images));
+  print(describe(report.repeats));
   fmt::print("pan/tilt       {}: {}\n", measured.pan_tilt.name, headline(report.telemetry));
   print(describe(report.telemetry));
   if (report.motion) {
@@ -161,13 +175,16 @@ int check_links(const CheckOptions& options) {
   const Camera<double>& camera = calibration.calibration.camera;
   const VideoNeeds video_needs{measured.video.name, calibration.name, camera.width, camera.height,
                                config.realtime.landmarks};
-  const VideoReport video =
-      check_video(measured.frames, measured.counters, step.video_clock, video_needs);
+  const VideoReport video = check_video(measured.frames, measured.counters,
+                                        measured.counters_at_start, step.video_clock, video_needs);
   const TelemetryReport telemetry =
       check_telemetry(measured.samples, measured.delivered_s, step.telemetry_clock,
                       telemetry_needs(measured, config, calibration, step));
 
-  CheckReport report{options.config, calibration, measured, video, telemetry, {}, {}};
+  CheckReport report{options.config, calibration, measured, video, telemetry, {}, {}, {}};
+  report.repeats =
+      check_repeats(measured.frames, video.time_s, telemetry.fresh,
+                    {measured.video.name, calibration.calibration.camera.focal_length});
   add_connection(measured.video, "video", &report.findings);
   add_connection(measured.pan_tilt, "pan/tilt", &report.findings);
   const auto add = [&report](const Findings& more) {
@@ -175,6 +192,7 @@ int check_links(const CheckOptions& options) {
   };
   add(video.findings);
   add(measured.images.findings);
+  add(report.repeats.findings);
   add(telemetry.findings);
   if (measured.images.images > 1 && !telemetry.fresh.empty()) {
     report.motion = motion_of(measured, video, telemetry, config, calibration);

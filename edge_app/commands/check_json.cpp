@@ -67,12 +67,16 @@ Json video_json(const CheckReport& report) {
                {"lost", or_null(video.lost)},
                {"damaged", video.counters.damaged},
                {"dropped", video.counters.dropped},
+               {"dropped_at_start", video.at_start.dropped},
                {"decode_s", as_json(video.decode_s)},
                {"clock", any ? as_json(video.clock) : Json()}});
   json["pictures"] = {{"looked_at", images.images},
                       {"mean_level", images.images > 0 ? Json(images.light.mean) : Json()},
                       {"noise_level", images.images > 0 ? Json(images.noise) : Json()},
-                      {"points", images.points ? Json(images.points->median) : Json()}};
+                      {"points", images.points ? Json(images.points->median) : Json()},
+                      {"while_turning", report.repeats.turning},
+                      {"repeated", report.repeats.repeated},
+                      {"fresh_hz", or_null(report.repeats.fresh_hz)}};
   return json;
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "edge_app/check/motion_check.h"
+#include "edge_app/check/repeat_check.h"
 #include "edge_app/check/telemetry_check.h"
 #include "edge_app/check/video_check.h"
 #include "edge_app/commands/check_measurement.h"
@@ -19,6 +20,7 @@ struct CheckReport {
   const Measured& measured;
   const VideoReport& video;
   const TelemetryReport& telemetry;
+  RepeatReport repeats;
   std::optional<MotionReport> motion;  // where there are pictures and samples
   Findings findings;                   // of all of them
 };

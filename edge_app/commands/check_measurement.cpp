@@ -6,6 +6,7 @@
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
+#include <cstdint>
 #include <future>
 #include <mutex>
 #include <optional>
@@ -14,6 +15,7 @@
 
 #include "edge_app/commands/command.h"
 #include "edge_app/pipeline/read_loop.h"
+#include "edge_app/pipeline/repeated_images.h"
 #include "platform/system/clock.h"
 
 namespace alidade {
@@ -147,14 +149,25 @@ Measured measure(const Config& config, double duration_s) {
   ImageThread images;
   std::atomic<bool> video_waits{false};
   std::atomic<bool> pan_tilt_waits{false};
+  std::optional<std::uint64_t> digest;  // of the image before
+  const auto repeats = [&digest](const Frame& frame) {
+    const ImageView image{frame.luma, frame.width, frame.height, frame.stride};
+    const std::optional<std::uint64_t> before = digest;
+    digest = image.valid() ? std::optional(image_digest(image)) : std::nullopt;
+    return digest && digest == before;
+  };
+  std::optional<double> started_s;
   const std::future<void> frames = std::async(std::launch::async, [&] {
-    measured.video =
-        collect<Frame>(*video, config.video.timeout_s + kConnectSlack, duration_s, &video_waits,
-                       pan_tilt_waits, [&](const Frame& frame) {
-                         measured.frames.push_back({frame.stamp, frame.width, frame.height,
-                                                    frame.decode_s, frame.interlaced});
-                         if (frame.luma != nullptr) images.offer(frame);
-                       });
+    measured.video = collect<Frame>(
+        *video, config.video.timeout_s + kConnectSlack, duration_s, &video_waits, pan_tilt_waits,
+        [&](const Frame& frame) {
+          measured.frames.push_back({frame.stamp, frame.width, frame.height, frame.decode_s,
+                                     frame.interlaced, repeats(frame)});
+          const double now_s = monotonic_now_s();
+          if (!started_s) started_s = now_s;
+          if (now_s < *started_s + kStart_s) measured.counters_at_start = video->counters();
+          if (frame.luma != nullptr) images.offer(frame);
+        });
   });
   const std::future<void> samples = std::async(std::launch::async, [&] {
     measured.pan_tilt = collect<PanTiltSample>(

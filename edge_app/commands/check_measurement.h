@@ -15,6 +15,9 @@
 
 namespace alidade {
 
+// A stream may begin with a burst of pictures that a relay had kept.
+inline constexpr double kStart_s = 2;
+
 // What became of one connection.
 struct Connection {
   std::string error;  // why nothing came, or no more; empty: none
@@ -32,6 +35,7 @@ struct Measured {
   std::vector<PanTiltSample> samples;
   std::vector<double> delivered_s;  // each of them
   FrameSourceCounters counters;
+  FrameSourceCounters counters_at_start;  // after the first kStart_s
   ImageReport images;
 };
 

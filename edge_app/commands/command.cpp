@@ -85,7 +85,8 @@ Calibration data_sheet_calibration(const CameraConfig& camera) {
 
 OrientationStepOptions step_options(const Config& config, const NamedCalibration& calibration) {
   OrientationStepOptions options = step_options(RecordingNoise{}, calibration);
-  options.wait_for_pace = config.video.type != VideoConfig::Type::kRecording;
+  options.wait_for_pace = options.other_connection =
+      config.video.type != VideoConfig::Type::kRecording;
   TelemetryNoise& noise = options.telemetry_noise;
   noise.pan_tilt_sigma = config.pan_tilt.angle_sigma_rad.value_or(noise.pan_tilt_sigma);
   noise.resolution = config.pan_tilt.angle_quantum_rad;

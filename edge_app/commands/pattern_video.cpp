@@ -2,15 +2,17 @@
 
 #include <fmt/format.h>
 
-#include <cstring>
+#include <cstdint>
 #include <filesystem>
 #include <limits>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "core/calibration/clock_line.h"
 #include "core/pattern/pattern_detector.h"
 #include "edge_app/commands/command.h"
+#include "edge_app/pipeline/repeated_images.h"
 #include "platform/video/recording_frame_source.h"
 #include "platform/video/video_file.h"
 
@@ -18,29 +20,6 @@ namespace alidade {
 namespace {
 
 namespace fs = std::filesystem;
-
-// Is this image the one before, to the bit? What sensors see never is, what a converter of frame rates puts in is.
-class RepeatedImages {
- public:
-  bool is_repeated(const Frame& frame) {
-    const auto width = static_cast<std::size_t>(frame.width);
-    const auto height = static_cast<std::size_t>(frame.height);
-    const bool comparable = before_.size() == width * height;
-    before_.resize(width * height);
-    bool same = comparable;
-    for (std::size_t v = 0; v < height; ++v) {
-      const std::uint8_t* row = frame.luma + static_cast<std::ptrdiff_t>(v) * frame.stride;
-      std::uint8_t* row_before = before_.data() + v * width;
-      if (same && std::memcmp(row, row_before, width) == 0) continue;
-      same = false;
-      std::memcpy(row_before, row, width);
-    }
-    return same;
-  }
-
- private:
-  std::vector<std::uint8_t> before_;
-};
 
 std::unique_ptr<FrameSource> open_video(const std::string& video) {
   std::error_code error;
@@ -88,7 +67,7 @@ PatternVideo find_pattern(const std::string& path, const KnownPattern& pattern,
   PatternVideo video;
   video.data.points_m = pattern.points_m();
   PatternDetector detector(pattern);
-  RepeatedImages repeated;
+  std::optional<std::uint64_t> before;  // digest of the image before
   std::vector<FrameStamp> stamps;
   for (;;) {
     Frame frame;
@@ -109,7 +88,9 @@ PatternVideo find_pattern(const std::string& path, const KnownPattern& pattern,
                       video.data.height));
     }
     ++video.images;
-    if (repeated.is_repeated(frame)) {
+    const std::uint64_t digest =
+        image_digest({frame.luma, frame.width, frame.height, frame.stride});
+    if (std::exchange(before, digest) == digest) {
       ++video.repeated;
       continue;
     }

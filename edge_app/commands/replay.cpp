@@ -1,6 +1,7 @@
 // `alidade replay`: the real-time step over a recording, on one thread: telemetry up to a frame's
 // receive time is known when the frame is answered, and nothing later is. So the answer is what
-// a live step would have given, and the same in each replay.
+// a live step would have given, and the same in each replay. But for one thing: that the first frames had not waited for
+// long the later ones show, and a replay need not wait for them.
 // In OE mode images are decoded besides; a frame whose image cannot be is answered from telemetry.
 // It reads no configuration: how long telemetry holds is the default of TelemetryLimits.
 
@@ -25,6 +26,7 @@
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/config/noise_file.h"
 #include "edge_app/output/record_writer.h"
+#include "edge_app/pipeline/fresh_beginning.h"
 #include "edge_app/pipeline/latency_histogram.h"
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
 #include "platform/storage/recording.h"
@@ -207,7 +209,12 @@ int replay_recording(const ReplayOptions& options) {
   const std::unique_ptr<Images> images = open_images(options);
   OrientationStepOptions of_step = step_options(noise, calibration);
   if (images) of_step.oe = oe_options(calibration.calibration.camera);
+  // Stamps that scatter to both sides are no arrivals.
+  of_step.wait_for_pace = !noise.image_stamp_sigma_s;
   OrientationStep step(of_step);
+  std::vector<FrameStamp> stamps;
+  if (!read_frames_csv(options.recording, &stamps, &error)) throw CommandError(kExitFailed, error);
+  if (begins_fresh(stamps)) step.expect_fresh_frames();
 
   StopSignals signals;
   const auto video = open_recorded_frames({options.recording, false, false});

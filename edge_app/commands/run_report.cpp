@@ -40,12 +40,14 @@ std::string describe(const PipelineSummary& summary, bool latency_measured) {
           : "latency not measured on a recording";
   return fmt::format(
       "{} frames; {} records: OE {}, PT {}, none {}; {}; dropped by full queues: {} frames, {} "
-      "telemetry samples, {} records; {} pictures too late; page faults of the real-time thread: "
+      "telemetry samples, {} records; {} pictures too late, {} repeated; page faults of the "
+      "real-time thread: "
       "{} minor, {} major",
       summary.frames, summary.records, summary.with_landmarks,
       summary.with_orientation - summary.with_landmarks, summary.records - summary.with_orientation,
       latency, summary.drops.frames, summary.drops.telemetry, summary.drops.records,
-      summary.drops.late_images, summary.page_faults.minor, summary.page_faults.major);
+      summary.drops.late_images, summary.repeated, summary.page_faults.minor,
+      summary.page_faults.major);
 }
 
 LifeReport::LifeReport(const ServiceManager& manager, Pipeline* pipeline)

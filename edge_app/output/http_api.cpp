@@ -177,6 +177,7 @@ ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
                    {"oe", summary.with_landmarks},
                    {"pt", summary.with_orientation - summary.with_landmarks},
                    {"none", summary.records - summary.with_orientation},
+                   {"repeated", summary.repeated},
                    {"damaged", losses.damaged},
                    {"not_fetched", losses.dropped}};
   out["links"] = {{"video", link_json(summary.video_link)},
@@ -189,7 +190,9 @@ ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
   out["video_clock"] = {{"locked", newest && newest->clock_locked},
                         {"sigma_s", newest && newest->time_s ? Json(newest->time_sigma_s) : Json()},
                         {"restarts", summary.clock_restarts},
-                        {"floor_shifts", summary.delay_steps}};
+                        {"floor_shifts", summary.delay_steps},
+                        {"wander_s", summary.delay_wander_s},
+                        {"left_out_rate_error", or_null(summary.stamps_left_out)}};
   out["latency_s"] = sources.latency_measured ? quantiles(summary.latency) : Json();
   if (sources.latency_measured) {
     out["stages_s"] = {{"decoding", quantiles(summary.decoding)},

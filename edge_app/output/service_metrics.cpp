@@ -148,10 +148,18 @@ std::string service_metrics(const HttpApiSources& sources, const HttpCounters& h
   out.counter("alidade_late_pictures_total",
               "Pictures not looked at, so that the frames behind them need not wait");
   out.add(summary.drops.late_images);
+  out.counter("alidade_repeated_pictures_total",
+              "Pictures that were the one before, sent again while the camera turned");
+  out.add(summary.repeated);
   out.counter("alidade_video_clock_restarts_total", "Starts of the video's clock filter anew");
   out.add(summary.clock_restarts);
   out.counter("alidade_video_clock_floor_shifts_total", "Steps of the video's least delay");
   out.add(summary.delay_steps);
+  out.gauge("alidade_video_clock_wander_seconds",
+            "By how much time stamps and arrivals wander against each other");
+  out.add(summary.delay_wander_s);
+  out.gauge("alidade_video_stamps_left_out", "1: they run at another rate than the pictures come");
+  out.add(std::int64_t{summary.stamps_left_out.has_value()});
   out.counter("alidade_realtime_page_faults_total",
               "Page faults of the real-time thread after its start-up");
   out.add(std::int64_t{summary.page_faults.minor}, {{"kind", "minor"}});

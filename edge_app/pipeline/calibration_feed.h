@@ -37,6 +37,8 @@ struct FrameTracks {
   Tracker tracker = Tracker::kNone;
   bool clock_restarted = false;                  // the frame clock began anew with this frame
   bool delay_stepped = false;                    // the least delay of the video stepped
+  double delay_wander_s = 0;                     // by how much it was seen to wander
+  bool telemetry_too_old = false;                // beyond max_extrapolation_s
   OeStatus oe_status = OeStatus::kNoPrediction;  // kOe
   int looked_for = 0;                            // landmarks chosen, or points expected
   int count = 0;

@@ -12,16 +12,27 @@
 //                   with it. Where such frames come at the pace, it did, and the clock begins anew.
 //                   A frame that comes before a young line by more than kEarly_s shows that all before it had
 //                   waited: as at a reconnection.
-//   count alone     (V4L2: stamps of the driver.) The same but for the start: a driver holds back a few buffers only.
+//                   Where frames leave the line and come back (delay_wander.h), delay or stamps wander: sigma has what
+//                   was seen of it. Such a frame is of unknown age only beyond that.
+//                   Stamps that run at another rate than the pictures come (stamp_rate.h) tell nothing: once that is shown
+//                   they are left out, on later connections too, and what else the stream tells goes on alone.
+//   count alone     (V4L2: stamps of the driver.) The same but for the start: a driver holds back a few buffers only. Where the
+//                   driver stamped a frame when it was taken, that is its age, and a count that leaves the stamps is of a camera
+//                   with another rate by now: such frames have their stamps, and from kManyStrays in a row on another line.
 //   nothing         receipt_clock.h.
-// wait_for_pace false (a recording, whose stamps have been there all the time): CaptureClock alone.
+// A recording's later frames may show that those which its connection begins with did not wait (fresh_beginning.h): then
+// nothing is waited for at its beginning, and the rest is as above.
+// wait_for_pace false (stamps that are no arrivals, or of a recording that is read as a source): CaptureClock alone.
 // Fixed memory, no allocation, one thread. Seconds.
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <optional>
 
 #include "core/model/arrival_pace.h"
+#include "core/model/delay_wander.h"
+#include "core/model/stamp_rate.h"
 #include "edge_app/pipeline/capture_clock.h"
 #include "edge_app/pipeline/receipt_clock.h"
 #include "platform/streams/frame.h"
@@ -34,6 +45,14 @@ struct FrameTime {
   bool of_use = true;  // false: nor will it be known later, when the pace or the line is
   // Steps of the least delay, which the receive time contains and the line does not.
   double delay_shift_s = 0;
+  // By how much frames leave the line; contained in clock.sigma_s, and the same in neighbouring frames.
+  double off_line_s = 0;
+  double wander_s = 0;  // the same where they do again and again, else 0
+  // With a restart or step of the clock: by how much the line may be another than the one before, whichever of delay and
+  // stamps it was that moved.
+  double moved_s = 0;
+  bool stamps_left_out = false;                 // the sender's: they run at another rate
+  std::optional<double> stamp_rate_error = {};  // their rate less one, in the first such frame
 };
 
 class FrameClock {
@@ -42,13 +61,20 @@ class FrameClock {
   FrameClock(const ClockFilterOptions& options, double stamp_sigma_s, bool wait_for_pace)
       : stamp_sigma_s_(stamp_sigma_s),
         settle_s_(options.settle_s),
+        least_step_s_(options.min_delay_step_s),
         wait_for_pace_(wait_for_pace),
         clock_(options),
         receipts_(stamp_sigma_s) {}
 
+  // The connection that begins with the next frame does so without a backlog.
+  void expect_fresh() { fresh_ = true; }
+
   FrameTime update(const FrameStamp& stamp) {
     FrameTime time = judge(stamp);
     if (!waiting_ && kind_ != Kind::kNothing) time.delay_shift_s = clock_.filter().delay_shift_s();
+    if (kind_ != Kind::kNothing) time.off_line_s = wander_.off_s();
+    if (wander_.wanders()) time.wander_s = time.off_line_s;
+    time.stamps_left_out = stamps_left_out_;
     return time;
   }
 
@@ -56,14 +82,18 @@ class FrameClock {
   enum class Kind : std::uint8_t { kNew, kSenderTime, kSequence, kNothing };
 
   static constexpr int kStrangeInARow = 3;
-  static constexpr double kEarly_s = 0.02;      // the least delay of a connection differs by less
+  static constexpr double kEarly_s = 0.02;   // the least delay of a connection differs by less
+  static constexpr double kAstray_s = 0.01;  // more than a driver's stamps jitter
+  static constexpr int kManyStrays = 25;
   static constexpr double kStoodStill_s = 0.5;  // half of the window at the pace that tells
+  static constexpr double kGate = 6;            // sigmas of a line, in which items come down to it
+  static constexpr double kOpen = 3;            // sigmas that a line says itself
 
   FrameTime judge(const FrameStamp& stamp) {
     if (!wait_for_pace_) return {ask_clock(stamp, stamp.restarted)};
-    const Kind kind = stamp.sender_time_s ? Kind::kSenderTime
-                      : stamp.sequence    ? Kind::kSequence
-                                          : Kind::kNothing;
+    const Kind kind = stamp.sender_time_s && !stamps_left_out_ ? Kind::kSenderTime
+                      : stamp.sequence                         ? Kind::kSequence
+                                                               : Kind::kNothing;
     const bool finite = std::isfinite(stamp.receive_time_s) &&
                         (!stamp.sender_time_s || std::isfinite(*stamp.sender_time_s));
     begins_ = begins_ || stamp.restarted;
@@ -76,10 +106,30 @@ class FrameClock {
     strange_ = 0;
     begins_ = false;
     if (begins) begin(kind);
-    FrameTime time = kind == Kind::kNothing ? by_receipt(stamp)
-                     : waiting_             ? wait(stamp)
-                                            : by_line(stamp);
+    if (begins) rate_.restart();
+    if (kind == Kind::kSenderTime && runs_off(stamp)) return leave_stamps_out(stamp);
+    FrameTime time = by_what_is_told(stamp);
     time.clock.restarted = time.clock.restarted || (anew && kind != Kind::kNothing);
+    return time;
+  }
+
+  FrameTime by_what_is_told(const FrameStamp& stamp) {
+    return kind_ == Kind::kNothing ? by_receipt(stamp) : waiting_ ? wait(stamp) : by_line(stamp);
+  }
+
+  bool runs_off(const FrameStamp& stamp) {
+    rate_.add(stamp.receive_time_s, *stamp.sender_time_s);
+    return rate_.off().has_value();
+  }
+
+  FrameTime leave_stamps_out(const FrameStamp& stamp) {
+    stamps_left_out_ = true;
+    begin(stamp.sequence ? Kind::kSequence : Kind::kNothing);
+    FrameStamp without = stamp;
+    without.sender_time_s.reset();
+    FrameTime time = by_what_is_told(without);
+    time.clock.restarted = true;
+    time.stamp_rate_error = rate_.off();
     return time;
   }
 
@@ -104,10 +154,15 @@ class FrameClock {
 
   void begin(Kind kind) {
     kind_ = kind;
-    waiting_ = kind == Kind::kSenderTime;
+    began_fresh_ = fresh_;
+    waiting_ = kind == Kind::kSenderTime && !fresh_;
+    fresh_ = fresh_ && kind == Kind::kNothing;
     line_begins_ = true;
     late_ = false;
+    behind_backlog_ = false;
+    strays_ = 0;
     pace_.restart();
+    wander_.restart();
     receipts_.restart();
   }
 
@@ -117,7 +172,12 @@ class FrameClock {
     time.clock.time_s = answer.time_s;
     time.clock.sigma_s = answer.sigma_s;
     time.clock.state = ClockState::kLocked;  // it will not be known better
-    time.known = time.of_use = answer.known;
+    fresh_ = fresh_ && !answer.known;
+    if (fresh_) {
+      time.clock.time_s = stamp.receive_time_s;
+      time.clock.sigma_s = stamp_sigma_s_;
+    }
+    time.known = time.of_use = answer.known || fresh_;
     return time;
   }
 
@@ -153,15 +213,35 @@ class FrameClock {
     const double before_s = by_count ? 0
                                      : stamp.receive_time_s - filter.delay_shift_s() -
                                            filter.to_host(*stamp.sender_time_s);
-    if (young && before_s < -kEarly_s) return begin_again(stamp);
+    if (young && !began_fresh_ && before_s < -kEarly_s) return begin_again(stamp);
+    const double shift_s = filter.delay_shift_s();
     time.clock = ask_clock(stamp, line_begins_);
     if (line_begins_) line_since_s_ = stamp.receive_time_s;
     line_begins_ = false;
     time.known = !time.clock.rejected;
     if (time.clock.rejected) return time;
     if (time.clock.restarted && !by_count) return begin_again(stamp);
+    if (by_count && goes_astray(stamp, &time)) return time;
+    if (time.clock.delay_stepped) time.moved_s = std::abs(filter.delay_shift_s() - shift_s);
     judge_lateness(stamp, &time);
     return time;
+  }
+
+  bool goes_astray(const FrameStamp& stamp, FrameTime* time) {
+    const double off_s =
+        stamp.receive_time_s - clock_.filter().delay_shift_s() - time->clock.time_s;
+    if (stamp.stamped_at == StampedAt::kArrival || std::abs(off_s) <= kAstray_s) {
+      strays_ = 0;
+      return false;
+    }
+    if (++strays_ == kManyStrays) {
+      *time = begin_again(stamp);
+      return true;
+    }
+    time->clock.time_s = stamp.receive_time_s;
+    time->clock.sigma_s = stamp_sigma_s_;
+    time->of_use = false;  // calibrations go by the count
+    return true;
   }
 
   // All that the stream has shown so far was of a backlog, or of another clock.
@@ -170,13 +250,16 @@ class FrameClock {
     FrameTime time = waiting_ ? wait(stamp) : FrameTime{ask_clock(stamp, true)};
     line_begins_ = waiting_;
     time.clock.restarted = true;
+    time.moved_s = wander_.off_s();
     return time;
   }
 
   void judge_lateness(const FrameStamp& stamp, FrameTime* time) {
     const double late_s =
         stamp.receive_time_s - clock_.filter().delay_shift_s() - time->clock.time_s;
-    if (late_s <= ArrivalPace::kBacklog_s) {
+    watch_wander(stamp.receive_time_s, late_s, time->clock.sigma_s);
+    time->clock.sigma_s = std::hypot(time->clock.sigma_s, wander_.off_s());
+    if (late_s <= ArrivalPace::kBacklog_s + wander_.off_s()) {
       runs_on_ = runs_on_ || (late_ && late_s < ArrivalPace::kBacklog_s / 2);
       late_ = late_ && !runs_on_ && late_s >= ArrivalPace::kBacklog_s / 2;
       return;
@@ -189,20 +272,40 @@ class FrameClock {
     if (pace_.shown(kStoodStill_s)) *time = begin_again(stamp);
   }
 
+  // A backlog comes at once and is worked off: until it is, it tells nothing of the delay. What wanders was seen before
+  // it is as late as that.
+  void watch_wander(double receive_s, double late_s, double sigma_s) {
+    const double gate_s = std::max(least_step_s_, kGate * sigma_s);
+    if (late_s > ArrivalPace::kBacklog_s && wander_.off_s() < ArrivalPace::kBacklog_s / 2) {
+      behind_backlog_ = true;
+    } else if (late_s <= gate_s) {
+      behind_backlog_ = false;
+    }
+    if (!behind_backlog_) wander_.add(receive_s, late_s, kOpen * sigma_s);
+  }
+
   double stamp_sigma_s_;
   double settle_s_;
+  double least_step_s_;
   bool wait_for_pace_;
   CaptureClock clock_;
   ReceiptClock receipts_;
   ArrivalPace pace_;  // of a stream that waits, or of late frames
+  DelayWander wander_;
+  StampRate rate_;
   Kind kind_ = Kind::kNew;
-  bool begins_ = true;    // with the next usable frame
+  bool begins_ = true;  // with the next usable frame
+  bool fresh_ = false;  // until a frame's time is known by what came
+  bool began_fresh_ = false;
   int strange_ = 0;       // stamps of another kind in a row
   bool waiting_ = false;  // for the pace
   bool line_begins_ = true;
   double line_since_s_ = 0;  // receive time
   bool late_ = false;        // the last frame, by more than jitter
   bool runs_on_ = false;     // the sender's clock, while its items wait; as seen on any connection
+  bool behind_backlog_ = false;
+  int strays_ = 0;  // in a row
+  bool stamps_left_out_ = false;
 };
 
 }  // namespace alidade

@@ -1,6 +1,7 @@
 #include "edge_app/pipeline/orientation_step.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <stdexcept>
@@ -34,7 +35,7 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
       telemetry_(empty_telemetry(false)),
       // A stored calibration was made with another connection.
       minimum_delay_sigma_s_(
-          options.wait_for_pace && options.calibrated ? options.minimum_delay_sigma_s : 0) {
+          options.other_connection && options.calibrated ? options.minimum_delay_sigma_s : 0) {
   if (!options.oe) return;
   OeOptions oe = *options.oe;
   oe.max_width = options.calibration.camera.width;
@@ -48,6 +49,29 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
   start_up.max_points = kMaxFramePoints;
   start_up_ = std::make_unique<StartUpTracker>(start_up);
 }
+
+namespace {
+
+// What a delay errs by, or a clock that wanders, is the same in many frames: more of them do not average it. At another time
+// the rate is another, too: by the acceleration a, and the angle by its second order, a t^2 / 2.
+void allow_for_lasting_error(double sigma_s, InterpolatedPanTilt* measured) {
+  if (!(sigma_s > 0)) return;
+  const double square = sigma_s * sigma_s;
+  const std::array<double, 2> rate = {measured->rate.pan, measured->rate.tilt};
+  double share = 0;
+  for (int axis = 0; axis < 2; ++axis) {
+    const double of_rate = rate[static_cast<std::size_t>(axis)];
+    double& variance = measured->covariance(axis, axis);
+    const double lasting = square * of_rate * of_rate;
+    if (lasting > 0) share = std::max(share, std::min(1.0, lasting / variance));
+    variance += measured->acceleration_square[axis] * square * square / 4;
+    measured->covariance(2 + axis, 2 + axis) += measured->acceleration_square[axis] * square;
+  }
+  measured->correlation_time_s =
+      std::max(measured->correlation_time_s, share * DelayWander::kMemory_s);
+}
+
+}  // namespace
 
 OrientationStep::Telemetry OrientationStep::empty_telemetry(bool filtered) const {
   // Filtered times share the error of their line; polled ones have each an error of its own, which a
@@ -116,6 +140,7 @@ void OrientationStep::settle_pending_frames() {
   while (oe_->pending(*newest_s, &look_up)) {
     InterpolatedPanTilt late;
     const QueryStatus query = telemetry_.query(look_up.time_s, look_up.time_sigma_s, &late);
+    allow_for_lasting_error(lasting_sigma_s_, &late);
     oe_->settle_pending(query == QueryStatus::kOk ? &late : nullptr);
   }
 }
@@ -157,15 +182,20 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const ClockEstimate& clock = frame_time.clock;
   events->video_clock_restarted = clock.restarted;
   events->video_delay_stepped = clock.delay_stepped;
+  events->video_delay_wander_s = frame_time.wander_s;
+  events->stamps_left_out = frame_time.stamp_rate_error;
   if (clock.restarted || clock.delay_stepped)
-    minimum_delay_sigma_s_ = options_.minimum_delay_sigma_s;
+    minimum_delay_sigma_s_ = std::hypot(options_.minimum_delay_sigma_s, frame_time.moved_s);
   image_ = image;
   tracks_.stamp = stamp;
   tracks_.stamp.receive_time_s -= frame_time.delay_shift_s;  // as if the delay had not stepped
+  if (frame_time.stamps_left_out) tracks_.stamp.sender_time_s.reset();
   tracks_.time_s = clock.time_s;
   tracks_.time_is_of_use = frame_time.of_use;
   tracks_.clock_restarted = clock.restarted;
   tracks_.delay_stepped = clock.delay_stepped;
+  tracks_.delay_wander_s = frame_time.wander_s;
+  tracks_.telemetry_too_old = false;
   tracks_.tracker = FrameTracks::Tracker::kNone;
 
   OrientationRecord record = empty_record();
@@ -182,13 +212,27 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const double to_middle_row_s = calibration.line_delay * (0.5 * calibration.camera.height);
   InterpolatedPanTilt measured;
   const double telemetry_time_s = clock.time_s + calibration.clock_offset + to_middle_row_s;
-  const double time_sigma_s = std::hypot(clock.sigma_s, minimum_delay_sigma_s_);
-  const QueryStatus query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
+  lasting_sigma_s_ = std::hypot(minimum_delay_sigma_s_, frame_time.off_line_s);
+  double time_sigma_s = std::hypot(clock.sigma_s, minimum_delay_sigma_s_);
+  QueryStatus query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
+  if (repeated_images_.judge(image, clock.time_s, has_result(query) ? &measured : nullptr,
+                             calibration.camera.focal_length)) {
+    record.time_s.reset();
+    record.status = RecordStatus::kImageRepeated;
+    image_ = ImageView{};
+    return record;
+  }
+  if (repeated_images_.sigma_s() > 0) {
+    time_sigma_s = std::hypot(time_sigma_s, repeated_images_.sigma_s());
+    query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
+  }
+  allow_for_lasting_error(lasting_sigma_s_, &measured);
   if (const auto newest_s = telemetry_.newest_time())
     record.telemetry_age_s = telemetry_time_s - *newest_s;
   record.time_sigma_s = time_sigma_s;
   record.clock_locked = clock.state == ClockState::kLocked;
   record.status = status_of_telemetry(query, telemetry_lost_, record.clock_locked);
+  tracks_.telemetry_too_old = record.status == RecordStatus::kTelemetryTooOld;
   if (!zoom_fits()) {
     // Neither the lens nor the axes of another zoom are this one's.
     record.status = RecordStatus::kOtherZoom;

@@ -3,8 +3,8 @@
 // come. One way for the live pipeline and for a replay; pure: no thread, no clock of its own.
 //
 // A frame's time: sender clock, else sequence numbers, through the video's clock filter; without
-// both the receive time as it is. Where it may have waited for nobody knows how long (frame_clock.h), it has no
-// time, and no orientation: "picture time unknown". A sample's time likewise; without both it is the middle of
+// both the receive time as it is. Where it may have waited for nobody knows how long (frame_clock.h), live or when it was
+// recorded, it has no time, and no orientation: "picture time unknown". A sample's time likewise; without both it is the middle of
 // [earliest, latest], sigma = width / sqrt(12), each sample with an error of its own; what took far longer than usual, by a
 // stall, is left out.
 // The frame's middle row is looked up in the telemetry at time + d at once (telemetry_buffer.h): if it lies beyond
@@ -14,6 +14,8 @@
 // In OE mode (oe_mode.h) landmarks of the frame's image join in; the same telemetry is the prior.
 // The record is PT's, and its status says why, where they do not hold; it is OE's also where
 // telemetry is missing but landmarks carry the orientation on (its status then names what is missing).
+// An image that is sent again while the camera turns is of another time than its frame: "picture repeated", no orientation
+// (repeated_images.h).
 // While there is no calibration for the camera, or none for the zoom that the pan/tilt source reports, points
 // are followed instead (start_up_tracker.h), for the calibration thread to make one of.
 // After a reconnection the stream's clock begins anew; telemetry from before it is forgotten. The least
@@ -36,6 +38,7 @@
 #include "edge_app/pipeline/frame_landmarks.h"
 #include "edge_app/pipeline/orientation_record.h"
 #include "edge_app/pipeline/published_calibration.h"
+#include "edge_app/pipeline/repeated_images.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
 
@@ -44,8 +47,10 @@ namespace alidade {
 struct OrientationStepOptions {
   Calibration calibration;
   bool calibrated = false;  // passed on to the records
-  // Frames and telemetry are live: they may have waited before they were received.
+  // Receive times are arrivals: frames and telemetry may have waited before them.
   bool wait_for_pace = false;
+  // The calibration, if it is one, was made over another connection, whose least delay was another.
+  bool other_connection = false;
   ClockFilterOptions video_clock;
   ClockFilterOptions telemetry_clock;
   // One standard deviation of a receive time that has to do for the time itself, s.
@@ -75,6 +80,10 @@ struct OrientationStepOptions {
 struct StepEvents {
   bool video_clock_restarted = false;
   bool video_delay_stepped = false;  // the least delay stepped: flagged, not followed
+  double video_delay_wander_s = 0;   // by how much it was seen to wander; 0: it does not
+  // The sender's time stamps run at another rate than the pictures come, and are left out from this frame on: their
+  // rate less one.
+  std::optional<double> stamps_left_out;
 };
 
 class OrientationStep {
@@ -82,6 +91,8 @@ class OrientationStep {
   // Throws as make_oe_mode() does.
   explicit OrientationStep(const OrientationStepOptions& options);
 
+  // What follows the next frame shows that the connection that begins with it has no backlog (fresh_beginning.h).
+  void expect_fresh_frames() { video_clock_.expect_fresh(); }
   void add_telemetry(const PanTiltSample& sample);
   // The connection to the pan/tilt source was lost; the next sample ends that.
   void telemetry_lost();
@@ -129,6 +140,8 @@ class OrientationStep {
   std::optional<double> zoom_;                // as last reported
   std::optional<double> zoom_at_adoption_;    // that a calibration without zoom is for
   double minimum_delay_sigma_s_ = 0;
+  double lasting_sigma_s_ = 0;  // of a frame's time, what it has in common with those about it
+  RepeatedImages repeated_images_;
   ImageView image_;                  // of the frame last added, until it is maintained
   FrameTracks tracks_;               // of the frame last added, but for its points
   bool telemetry_filtered_ = false;  // times in telemetry_ come from telemetry_clock_

@@ -18,6 +18,8 @@ namespace {
 
 constexpr double kDropLogInterval_s = 1;
 constexpr double kOldTelemetryLogInterval_s = 60;
+constexpr double kWanderLogInterval_s = 60;
+constexpr double kRepeatedLogInterval_s = 600;
 
 void log_granted(const char* whose, const RealtimeReport& report) {
   spdlog::log(report.warnings.empty() ? spdlog::level::info : spdlog::level::warn, "{}: {}", whose,
@@ -280,10 +282,13 @@ void Pipeline::count(const OutputMessage& message) {
   if (message.record.frame) ++summary_.frames;
   if (message.record.orientation) ++summary_.with_orientation;
   if (message.record.mode == RecordMode::kOe) ++summary_.with_landmarks;
+  if (message.record.status == RecordStatus::kImageRepeated) ++summary_.repeated;
   if (message.record.frame && message.record.latency_s)
     summary_.latency.add(*message.record.latency_s);
   if (message.events.video_clock_restarted) ++summary_.clock_restarts;
   if (message.events.video_delay_stepped) ++summary_.delay_steps;
+  if (message.record.frame) summary_.delay_wander_s = message.events.video_delay_wander_s;
+  if (message.events.stamps_left_out) summary_.stamps_left_out = message.events.stamps_left_out;
 }
 
 // Nothing else in the log tells why such records have no angle of telemetry: no connection is known to be lost.
@@ -291,24 +296,71 @@ void Pipeline::log_old_telemetry(const OrientationRecord& record) {
   if (record.status != RecordStatus::kTelemetryTooOld || !record.telemetry_age_s) return;
   const double now_s = monotonic_now_s();
   if (now_s < old_telemetry_logged_at_s_ + kOldTelemetryLogInterval_s) return;
+  constexpr double kReserve = 1.2;
+  constexpr double kWorthTelling_s = 0.05;
+  const double offset_s = record.camera.clock_offset;
+  const std::string later =
+      offset_s > kWorthTelling_s
+          ? fmt::format(
+                " ({:.0f} ms of it, the clock offset, telemetry comes later than the video)",
+                1e3 * offset_s)
+          : "";
   spdlog::warn(
-      "{}: {} at frame {}: it lies {:.0f} ms beyond the newest angle that is trusted, and "
-      "realtime.max_extrapolation_s is {:.0f} ms; raise it or pan_tilt.rate_hz, or lower "
-      "pan_tilt.max_repeat_s as far as `alidade check` allows",
+      "{}: {} at frame {}: it lies {:.0f} ms beyond the newest angle that is trusted{}, and "
+      "realtime.max_extrapolation_s is {:.0f} ms; raise it to {:.2f}, or raise pan_tilt.rate_hz, "
+      "or "
+      "lower pan_tilt.max_repeat_s as far as `alidade check` allows",
       pan_tilt_.name(), to_string(record.status), *record.frame, 1e3 * *record.telemetry_age_s,
-      1e3 * options_.step.telemetry_limits.max_extrapolation_s);
+      later, 1e3 * options_.step.telemetry_limits.max_extrapolation_s,
+      kReserve * *record.telemetry_age_s + 0.005);
   old_telemetry_logged_at_s_ = now_s;
 }
 
-void Pipeline::log_events(const OutputMessage& message) {
-  log_old_telemetry(message.record);
-  if (message.events.video_clock_restarted) {
+void Pipeline::log_clock(const OutputMessage& message) {
+  const StepEvents& events = message.events;
+  if (events.stamps_left_out) {
+    spdlog::warn(
+        "{}: its time stamps run at {:.2f} % of the rate at which its pictures come, and are left "
+        "out from frame "
+        "{} on: a picture's time is known by its arrival, to {:.0f} ms; a camera that counts its "
+        "stamps at a rate it does not keep may be set to that rate",
+        video_.name(), 100 * (1 + *events.stamps_left_out), *message.record.frame,
+        1e3 * options_.step.video_stamp_sigma_s);
+  } else if (events.video_clock_restarted) {
     spdlog::info("{}: clock filter restarted at frame {}", video_.name(), *message.record.frame);
   }
-  if (message.events.video_delay_stepped) {
+  if (events.video_delay_stepped) {
     spdlog::warn("{}: the least delay of the video stepped at frame {}; not followed",
                  video_.name(), *message.record.frame);
   }
+  const double now_s = monotonic_now_s();
+  if (events.video_delay_wander_s == 0 || now_s < wander_logged_at_s_ + kWanderLogInterval_s)
+    return;
+  spdlog::warn(
+      "{}: time stamps and arrivals of its pictures wander against each other, by {:.0f} ms at "
+      "frame {}: a picture's time is known to that only; is a relay in between?",
+      video_.name(), 1e3 * events.video_delay_wander_s, *message.record.frame);
+  wander_logged_at_s_ = now_s;
+}
+
+void Pipeline::log_repeated(const OrientationRecord& record) {
+  const double now_s = monotonic_now_s();
+  if (record.status != RecordStatus::kImageRepeated ||
+      now_s < repeated_logged_at_s_ + kRepeatedLogInterval_s) {
+    return;
+  }
+  spdlog::warn(
+      "{}: the picture of frame {} is the one before, sent again while the camera turned; such "
+      "pictures are counted and left out; set the camera, converter or grabber to the rate at "
+      "which it takes pictures",
+      video_.name(), *record.frame);
+  repeated_logged_at_s_ = now_s;
+}
+
+void Pipeline::log_events(const OutputMessage& message) {
+  log_repeated(message.record);
+  log_old_telemetry(message.record);
+  log_clock(message);
   const DropCounters drops = stage_.drops();
   const double now_s = monotonic_now_s();
   if (drops.total() == drops_logged_.total() || now_s < drops_logged_at_s_ + kDropLogInterval_s)

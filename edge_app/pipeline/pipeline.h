@@ -21,6 +21,7 @@
 #include <cstdint>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -50,11 +51,15 @@ struct PipelineOptions {
 struct PipelineSummary {
   std::int64_t clock_restarts = 0;
   std::int64_t delay_steps = 0;
+  double delay_wander_s = 0;  // of the video, as of the last frame; 0: it does not wander
+  // The rate of the sender's time stamps, less one, where they are left out for it.
+  std::optional<double> stamps_left_out;
   std::int64_t records = 0;
   std::int64_t frames = 0;
   std::int64_t with_orientation = 0;
   DropCounters drops;
   std::int64_t with_landmarks = 0;  // of these, in OE mode
+  std::int64_t repeated = 0;        // frames whose image was the one before, sent again
   LatencyHistogram latency;
   // A frame's way: received (its last packet), pushed by the capture thread, taken up by the real-time thread,
   // record made, record written.
@@ -106,6 +111,8 @@ class Pipeline {
   void count(const OutputMessage& message);
   void log_events(const OutputMessage& message);
   void log_old_telemetry(const OrientationRecord& record);
+  void log_clock(const OutputMessage& message);
+  void log_repeated(const OrientationRecord& record);
   void account_way(const OutputMessage& message, double written_s);
   bool push(const Frame& frame);
   bool check_size(const Frame& frame);
@@ -134,6 +141,8 @@ class Pipeline {
   DropCounters drops_logged_;            // output thread
   double drops_logged_at_s_ = 0;
   double old_telemetry_logged_at_s_ = -1e9;  // output thread
+  double wander_logged_at_s_ = -1e9;         // output thread
+  double repeated_logged_at_s_ = -1e9;       // output thread
   std::vector<std::thread> threads_;
 };
 

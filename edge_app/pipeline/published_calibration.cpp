@@ -2,6 +2,15 @@
 
 namespace alidade {
 
+MapState kept_map(const MapState& map) {
+  // Far more than telemetry errs by, and few enough pixels to find landmarks over: 30 at 30000 px. What was moved farther
+  // contradicts telemetry.
+  constexpr double kMoved_rad = 1e-3;
+  MapState kept = map;
+  kept.offset_covariance += kMoved_rad * kMoved_rad * Matrix2<double>::Identity();
+  return kept;
+}
+
 const char* to_string(CalibrationActivity activity) {
   switch (activity) {
     case CalibrationActivity::kOff:
@@ -42,6 +51,10 @@ const char* to_string(CalibrationNeed need) {
       return "more of the same motion";
     case CalibrationNeed::kSteadyZoom:
       return "a steady zoom";
+    case CalibrationNeed::kSteadyDelay:
+      return "video whose delay does not wander";
+    case CalibrationNeed::kYoungTelemetry:
+      return "younger telemetry, or a larger realtime.max_extrapolation_s";
   }
   return "unknown need";
 }

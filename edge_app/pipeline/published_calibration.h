@@ -18,6 +18,10 @@ struct PublishedCalibration {
   std::string name;         // for people: a file, "data sheet", "live"
 };
 
+// A map from before a restart, or kept for another zoom, as it may be handed over: it knows the base to a fraction of what
+// telemetry does, but not by how much that was moved meanwhile, or the head's zero. Telemetry's first answers tell.
+[[nodiscard]] MapState kept_map(const MapState& map);
+
 // What the calibration thread is doing.
 enum class CalibrationActivity : std::uint8_t {
   kOff,         // no automatic calibration: the calibration stays as it is
@@ -30,16 +34,18 @@ enum class CalibrationActivity : std::uint8_t {
 // What would help it.
 enum class CalibrationNeed : std::uint8_t {
   kNothing,
-  kVideo,         // no frames come
-  kTelemetry,     // no pan/tilt samples come
-  kMotion,        // the camera must move
-  kPan,           // it tilts only
-  kTilt,          // it pans only
-  kAcceleration,  // constant velocity: clock offset and line delay stay unknown
-  kTexture,       // scene too plain: too few landmarks
-  kAgreement,     // telemetry does not describe the motion in the video
-  kTime,          // more of the same
-  kSteadyZoom     // the zoom is moving
+  kVideo,          // no frames come
+  kTelemetry,      // no pan/tilt samples come
+  kMotion,         // the camera must move
+  kPan,            // it tilts only
+  kTilt,           // it pans only
+  kAcceleration,   // constant velocity: clock offset and line delay stay unknown
+  kTexture,        // scene too plain: too few landmarks
+  kAgreement,      // telemetry does not describe the motion in the video
+  kTime,           // more of the same
+  kSteadyZoom,     // the zoom is moving
+  kSteadyDelay,    // the video's delay wanders
+  kYoungTelemetry  // it comes so much later than the video that frames get no angle
 };
 
 [[nodiscard]] const char* to_string(CalibrationActivity activity);

@@ -5,7 +5,7 @@
 //   TelemetryBuffer::query()   how the frame lies to the telemetry samples (QueryStatus)
 //   OeMode::process()          whether landmarks held (OeStatus); for frames that telemetry has an answer for
 //   FrameClock                 whether the frame's time is known
-//   OrientationStep            zoom, loss of the video
+//   OrientationStep            zoom, loss of the video, images sent again (RepeatedImages)
 //   RealtimeStage              images that came too late to be looked at
 // What a person reads of each, and what to do: edge_app/README.md.
 
@@ -36,11 +36,12 @@ enum class RecordStatus : std::uint8_t {
   kContradiction,         // mode PT: landmarks and telemetry exclude each other
   kBadImage,              // mode PT: no image, or one that is not of the calibration's size
   kImageTooLate,          // mode PT: others waited behind the frame, which went without its image
-  kOtherZoom,             // no calibration for the zoom that the pan/tilt source reports
-  kNotFinite              // a stamp is not a finite number
+  kImageRepeated,  // the image is the one before, sent again while the camera turned (RepeatedImages)
+  kOtherZoom,      // no calibration for the zoom that the pan/tilt source reports
+  kNotFinite       // a stamp is not a finite number
 };
 
-inline constexpr std::array<RecordStatus, 15> kRecordStatuses = {
+inline constexpr std::array<RecordStatus, 16> kRecordStatuses = {
     RecordStatus::kOk,
     RecordStatus::kClockWarmingUp,
     RecordStatus::kTimeUnknown,
@@ -54,6 +55,7 @@ inline constexpr std::array<RecordStatus, 15> kRecordStatuses = {
     RecordStatus::kContradiction,
     RecordStatus::kBadImage,
     RecordStatus::kImageTooLate,
+    RecordStatus::kImageRepeated,
     RecordStatus::kOtherZoom,
     RecordStatus::kNotFinite};
 static_assert(static_cast<std::size_t>(kRecordStatuses.back()) + 1 == kRecordStatuses.size());
@@ -105,6 +107,8 @@ constexpr const char* to_string(RecordStatus status) {
       return "no usable picture";
     case RecordStatus::kImageTooLate:
       return "picture too late";
+    case RecordStatus::kImageRepeated:
+      return "picture repeated";
     case RecordStatus::kOtherZoom:
       return "no calibration for this zoom";
     case RecordStatus::kNotFinite:

@@ -56,7 +56,7 @@ SelfCalibration::SelfCalibration(const SelfCalibrationOptions& options, Calibrat
   if (stored != nullptr) {
     first->calibration = stored->calibration;
     first->calibrated = true;
-    first->map = stored->map;
+    first->map = kept_map(stored->map);
     first->name = stored->path;
   } else {
     first->calibration = options.data_sheet;
@@ -100,11 +100,11 @@ void SelfCalibration::look_for_stored() {
   }
   const StoredCalibration* stored = archive_->find(zoom_);
   // One that claims to hold for any zoom would have fitted already.
-  if (stored == nullptr || !stored->calibration.zoom) return;
+  if (stored == nullptr || !stored->calibration.zoom || is_rejected(stored->calibration)) return;
   auto found = std::make_shared<PublishedCalibration>();
   found->calibration = stored->calibration;
   found->calibrated = true;
-  found->map = stored->map;
+  found->map = kept_map(stored->map);
   found->name = stored->path.empty() ? "live" : stored->path;
   messages_.push_back(fmt::format("zoom {}: the calibration {} holds", *zoom_, found->name));
   published_ = next_ = found;
@@ -115,6 +115,28 @@ void SelfCalibration::look_for_stored() {
   clock_offset_known_ = false;
   watch_interval_s_ = options_.schedule.first_watch_s;
   need_ = CalibrationNeed::kNothing;
+}
+
+bool SelfCalibration::is_rejected(const Calibration& calibration) const {
+  return std::find(rejected_.begin(), rejected_.end(), *calibration.zoom) != rejected_.end();
+}
+
+bool SelfCalibration::judge_delay(const FrameTracks& tracks) {
+  constexpr double kSteady = 0.5;  // of what is too much: it fades slowly
+  const double most_s = options_.schedule.most_wander_s;
+  const bool wanders = tracks.delay_wander_s > (delay_wanders_ ? kSteady * most_s : most_s);
+  if (wanders != delay_wanders_) {
+    messages_.push_back(
+        wanders
+            ? fmt::format("the video's delay, or its time stamps, wander by {:.0f} ms and more, "
+                          "as behind a relay: nothing is calibrated and nothing withdrawn until "
+                          "they hold; the camera itself would be better read directly",
+                          1e3 * tracks.delay_wander_s)
+            : "the video's delay holds again; the clock offset is found anew");
+    begin_anew();
+    clock_offset_known_ = false;
+  }
+  return delay_wanders_ = wanders;
 }
 
 void SelfCalibration::judge_agreement(const FrameTracks& tracks) {
@@ -129,6 +151,7 @@ void SelfCalibration::judge_agreement(const FrameTracks& tracks) {
       fmt::format("landmarks contradict telemetry in {} of {} frames: the calibration {} is "
                   "withdrawn (was the camera moved on its mount, or its lens?); calibrating anew",
                   disagreement_.contradicted_frames(), disagreement_.frames(), published_->name));
+  if (published_->calibration.zoom) rejected_.push_back(*published_->calibration.zoom);
   published_ = next_ = withdrawn;
   doubtful_ = true;
   begin_anew();
@@ -200,6 +223,9 @@ void SelfCalibration::publish(const SessionCalibration& checked) {
     if (!archive_->save(stored, &error)) messages_.push_back(error + "; kept, will be tried again");
     last_store_s_ = now_s_;
   }
+  rejected_.erase(std::remove_if(rejected_.begin(), rejected_.end(),
+                                 [this](double zoom) { return zoom_fits(zoom); }),
+                  rejected_.end());
   published_ = next_ = fresh;
   doubtful_ = false;
   contradiction_.restart();
@@ -260,6 +286,8 @@ void SelfCalibration::add(const FrameTracks& tracks) {
     if (!session_.empty()) begin_anew();
     if (is_calibrated_here()) clock_offset_known_ = false;
   }
+  telemetry_is_old_ = old_telemetry_.judge(now_s_, tracks.telemetry_too_old);
+  if (judge_delay(tracks)) return;
   judge_agreement(tracks);
   if (tracks.tracker == FrameTracks::Tracker::kNone || !tracks.time_is_of_use) return;
   if (tracks.tracker != tracker_) {
@@ -338,7 +366,11 @@ CalibrationReport SelfCalibration::report() const {
   report.activity = is_calibrated_here() ? CalibrationActivity::kWatching
                     : doubtful_          ? CalibrationActivity::kDoubtful
                                          : CalibrationActivity::kCollecting;
-  if (is_calibrated_here() && !fresh_wanted_) return report;
+  const bool wanders = delay_wanders_ && !video_is_lost_;
+  if (wanders) report.need = CalibrationNeed::kSteadyDelay;
+  const bool old = telemetry_is_old_ && !video_is_lost_ && !telemetry_is_lost_;
+  if (old) report.need = CalibrationNeed::kYoungTelemetry;
+  if (wanders || old || (is_calibrated_here() && !fresh_wanted_)) return report;
   if (video_is_lost_ || last_frame_s_ < now_s_ - options_.schedule.silence_s) {
     report.need = CalibrationNeed::kVideo;
   } else if (telemetry_is_lost_ || last_sample_s_ < now_s_ - options_.schedule.silence_s) {

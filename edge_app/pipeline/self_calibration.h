@@ -9,7 +9,9 @@
 //   maps       the keyframes once more, with the new calibration and trajectory: the map in the base frame
 //   watches    later motion is calibrated on its own and held against what is published: it refines it, or
 //              contradicts it; where landmarks and telemetry disagree for long, the calibration is withdrawn
-//   zoom       one calibration for each; the stored one is used when the camera returns
+//   zoom       one calibration for each; the stored one is used when the camera returns, unless it was withdrawn
+//   delay      while the video's delay wanders, landmarks that disagree with telemetry tell nothing of the camera: nothing is
+//              withdrawn, and nothing calibrated
 //
 // Allocates; work() takes seconds. One thread.
 
@@ -45,6 +47,7 @@ struct CalibrationSchedule {
   double zoom_settles_s = 0.5;     // before anything is adjusted
   double silence_s = 2;            // without a frame or sample, while the other stream goes on
   double worth_publishing = 0.75;  // of a parameter's sigma, to which a refinement must bring one
+  double most_wander_s = 0.01;     // of the video's delay
 };
 
 struct SelfCalibrationOptions {
@@ -95,6 +98,9 @@ class SelfCalibration {
   void begin_anew();
   void begin_fresh();
   void look_for_stored();
+  [[nodiscard]] bool is_rejected(const Calibration& calibration) const;
+  // True: the delay wanders, and the frame is of no use.
+  bool judge_delay(const FrameTracks& tracks);
   void judge_agreement(const FrameTracks& tracks);
   [[nodiscard]] bool zoom_fits(const std::optional<double>& wanted) const;
   [[nodiscard]] bool is_calibrated_here() const;
@@ -128,6 +134,10 @@ class SelfCalibration {
   std::shared_ptr<const PublishedCalibration> next_;  // to be published
   bool clock_offset_known_ = true;  // since the publication the frames' clock went on
   bool doubtful_ = false;
+  std::vector<double> rejected_;  // zooms whose stored calibrations were withdrawn
+  bool delay_wanders_ = false;
+  DisagreementJudge old_telemetry_{{2, 0.5, 5}};
+  bool telemetry_is_old_ = false;
   ContradictionJudge contradiction_;
   DisagreementJudge disagreement_;
   double watch_interval_s_;

@@ -15,6 +15,13 @@ inline constexpr const char* kInterlaced =
     "camera model here knows; set "
     "the camera to progressive";
 
+// What the receive time of a frame is.
+enum class StampedAt : std::uint8_t {
+  kArrival,        // here; the frame may have waited before
+  kExposureStart,  // by the driver, when the sensor took it: wherever it waited since, it is of then
+  kFrameEnd        // by the driver, when all of it was read out
+};
+
 // When and in which order a frame came. Fixed size: crosses queues by value.
 struct FrameStamp {
   std::int64_t frame = 0;  // 0, 1, 2, ... of the frames this source delivered
@@ -26,6 +33,7 @@ struct FrameStamp {
   std::optional<std::int64_t> sequence;  // sender's count of frames, unwrapped; a gap is a loss
   bool restarted =
       false;  // first frame after a (re)connection: sender clock and sequence begin anew
+  StampedAt stamped_at = StampedAt::kArrival;
 };
 
 // One frame: its stamp and, if decoded, its luma plane.

@@ -215,6 +215,7 @@ ReadStatus V4l2Source::take(Frame& frame) {
   frame = Frame{};
   frame.stamp.frame = next_frame_++;
   frame.stamp.receive_time_s = stamp.receive_time_s;
+  frame.stamp.stamped_at = stamp.stamped_at;
   frame.stamp.sequence = stamp.sequence;
   frame.stamp.restarted = std::exchange(restarted_, false);
   frame.width = picture.width;

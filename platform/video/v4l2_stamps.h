@@ -19,12 +19,15 @@
 #include <cstdint>
 #include <optional>
 
+#include "platform/streams/frame.h"
+
 namespace alidade {
 
 class V4l2Stamps {
  public:
   struct Stamp {
     double receive_time_s = 0;
+    StampedAt stamped_at = StampedAt::kArrival;  // what that is
     std::optional<std::int64_t> sequence;
     std::int64_t lost = 0;   // buffers between this one and the one before
     bool duplicate = false;  // of the one before
@@ -38,6 +41,10 @@ class V4l2Stamps {
     const bool monotonic =
         (flags & V4L2_BUF_FLAG_TIMESTAMP_MASK) == V4L2_BUF_FLAG_TIMESTAMP_MONOTONIC && stamp_s > 0;
     result.receive_time_s = monotonic ? std::min(stamp_s, dequeued_s) : dequeued_s;
+    if (monotonic && stamp_s <= dequeued_s) {
+      const bool start = (flags & V4L2_BUF_FLAG_TSTAMP_SRC_MASK) == V4L2_BUF_FLAG_TSTAMP_SRC_SOE;
+      result.stamped_at = start ? StampedAt::kExposureStart : StampedAt::kFrameEnd;
+    }
     if (buffers_ == 0) {
       unwrapped_ = sequence;
     } else {

@@ -4,10 +4,14 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <vector>
+
+#include "edge_app/pipeline/fresh_beginning.h"
 
 namespace alidade {
 namespace {
@@ -72,6 +76,45 @@ TEST_F(FrameClockTest, WaitsForThePaceAndThenKnowsWhatItWouldHaveKnown) {
     }
   }
   EXPECT_EQ(unknown, 13);  // half a second
+}
+
+// As of a recording, whose later frames show it.
+TEST_F(FrameClockTest, AConnectionThatIsKnownToBeginFreshIsAnsweredFromItsFirstFrameOn) {
+  clock_.expect_fresh();
+  EXPECT_EQ(play(0, 4), 100);
+  // The next one is not known to.
+  sender_ahead_s_ = 5000;
+  EXPECT_EQ(play(4, 8, true), 100 - 13);
+  has_sender_ = false;
+  FrameClock clock(ClockFilterOptions{}, 5e-3, true);
+  clock.expect_fresh();
+  for (double t = 0; t < 4; t += kInterval_s) {
+    FrameStamp stamp;
+    stamp.receive_time_s = t;
+    const FrameTime time = clock.update(stamp);
+    EXPECT_TRUE(time.known) << t;
+    EXPECT_EQ(time.clock.time_s, t);
+  }
+}
+
+TEST_F(FrameClockTest, ARecordingsLaterFramesTellWhetherTheFirstHadWaited) {
+  for (const bool has_sender : {true, false}) {
+    std::vector<FrameStamp> fresh;
+    for (int i = 0; i < 100; ++i) {
+      FrameStamp stamp;
+      stamp.receive_time_s = 7 + kInterval_s * i + (i % 10 == 0 ? 0.01 : 0);
+      if (has_sender) stamp.sender_time_s = kInterval_s * i;
+      fresh.push_back(stamp);
+    }
+    EXPECT_TRUE(begins_fresh(fresh));
+    std::vector<FrameStamp> waited = fresh;
+    for (std::size_t i = 0; i < 20; ++i) {
+      waited[i].receive_time_s = 7 + kInterval_s * 20 - 1e-3 * static_cast<double>(20 - i);
+    }
+    EXPECT_FALSE(begins_fresh(waited));
+    EXPECT_TRUE(begins_fresh({fresh.front()}));
+    EXPECT_TRUE(begins_fresh({}));
+  }
 }
 
 TEST_F(FrameClockTest, ABacklogAfterAReconnectionHasNoTimeAndLeavesNoTrace) {
@@ -169,6 +212,109 @@ TEST_F(FrameClockTest, ARestartIsNotForgottenOverAFrameThatCannotBeUsed) {
   EXPECT_FALSE(add(5, std::numeric_limits<double>::infinity(), true).known);
   EXPECT_TRUE(add(5.04, 5.04).clock.restarted);
 }
+
+// Stamps that swing by 90 ms in 40 s. Whether the stamps wander and arrivals are right, or the delay wanders and stamps are
+// right, the line's time is one or the other, or between.
+TEST_F(FrameClockTest, SigmaCoversWhatWanders) {
+  // What was seen is as old as a part of the window, 3.5 ms/s at most.
+  constexpr double kOpen_s = DelayWander::kPart_s * 3.5e-3;
+  play(0, 20);
+  int known = 0;
+  int frames = 0;
+  int beyond = 0;
+  double last_wander_s = 0;
+  for (double t = 20; t < 200; t += kInterval_s) {
+    const double swing_s = 0.045 * (1 - std::cos(2 * 3.14159265358979 * (t - 20) / 80));
+    const FrameTime time = add(t - swing_s, t);
+    ++frames;
+    known += time.known ? 1 : 0;
+    const double wrong_s =
+        std::max(std::abs(time.clock.time_s - t), std::abs(time.clock.time_s - (t - swing_s)));
+    beyond += time.known && wrong_s > 5 * time.clock.sigma_s + kOpen_s ? 1 : 0;
+    last_wander_s = time.wander_s;
+  }
+  EXPECT_EQ(known, frames);
+  EXPECT_EQ(beyond, 0);
+  EXPECT_GT(last_wander_s, 0.01);
+  EXPECT_LT(last_wander_s, 0.1);
+}
+
+TEST_F(FrameClockTest, AStepOfTheDelayIsNotKnownToBeTheDelays) {
+  play(0, 20);
+  double moved_s = 0;
+  for (double t = 20; t < 40; t += kInterval_s) {
+    moved_s = std::max(moved_s, add(t, t + 0.03).moved_s);
+  }
+  EXPECT_NEAR(moved_s, 0.03, 1e-3);
+}
+
+TEST_F(FrameClockTest, WhatWaitedTellsNothingOfTheDelay) {
+  play(0, 15);
+  for (const double stall_s : {15.0, 20.0}) {
+    for (int i = 0; i < 25; ++i) add(stall_s + kInterval_s * i, stall_s + 1 + 0.03 * i);
+    for (double t = stall_s + 1.8; t < stall_s + 5; t += kInterval_s) {
+      EXPECT_LT(add(t, t).clock.sigma_s, 1e-3) << t;
+    }
+  }
+}
+
+// In the dark, and back in the light: it counts on without a gap, and the driver's stamps say when each frame was taken.
+TEST_F(FrameClockTest, ACameraThatChangesItsRateHasTheDriversStampsUntilTheNewOneIsKnown) {
+  std::int64_t sequence = 0;
+  double t = 0;
+  int restarts = 0;
+  for (const double interval_s : {1 / 30.0, 1 / 15.0, 1 / 30.0}) {
+    for (int i = 0; i < 300; ++i, t += interval_s) {
+      FrameStamp stamp;
+      stamp.receive_time_s = t;
+      stamp.sequence = sequence++;
+      stamp.stamped_at = StampedAt::kExposureStart;
+      const FrameTime time = clock_.update(stamp);
+      EXPECT_TRUE(time.known) << t;
+      EXPECT_NEAR(time.clock.time_s, t, std::max(5 * time.clock.sigma_s, 1e-6)) << t;
+      restarts += time.clock.restarted ? 1 : 0;
+    }
+  }
+  EXPECT_EQ(restarts, 2);
+}
+
+// A camera that counts its pictures at a nominal rate, and takes 2 % fewer or more.
+class StampsAtAnotherRate : public FrameClockTest, public testing::WithParamInterface<double> {};
+
+TEST_P(StampsAtAnotherRate, AreLeftOutAfterHalfAMinute) {
+  const auto add_at = [&](double t, bool restarted) {
+    FrameStamp stamp;
+    stamp.receive_time_s = t;
+    stamp.sender_time_s = 90 + (1 + GetParam()) * t;
+    stamp.restarted = restarted;
+    return clock_.update(stamp);
+  };
+  std::optional<double> left_out_s;
+  int known = 0;
+  for (double t = 0; t < 60; t += kInterval_s) {
+    const FrameTime time = add_at(t, t == 0);
+    if (time.stamp_rate_error) {
+      EXPECT_FALSE(left_out_s);
+      EXPECT_NEAR(*time.stamp_rate_error, GetParam(), 1e-4);
+      EXPECT_TRUE(time.clock.restarted);
+      left_out_s = t;
+    }
+    EXPECT_EQ(time.stamps_left_out, left_out_s.has_value());
+    if (!time.known) continue;
+    ++known;
+    EXPECT_NEAR(time.clock.time_s, t, 5 * time.clock.sigma_s);
+    EXPECT_GE(time.clock.sigma_s, 5e-3) << "a receive time's";
+  }
+  ASSERT_TRUE(left_out_s);
+  EXPECT_NEAR(*left_out_s, 31, 1.1);
+  EXPECT_GT(known, 680);
+  // The camera is the same after a reconnection, and the arrivals' pace known.
+  int unknown = 0;
+  for (double t = 70; t < 75; t += kInterval_s) unknown += add_at(t, t == 70).known ? 0 : 1;
+  EXPECT_LT(unknown, 20);
+}
+
+INSTANTIATE_TEST_SUITE_P(Rates, StampsAtAnotherRate, testing::Values(0.02, -0.02));
 
 class ReceiptClockTest : public testing::Test {
  protected:

@@ -113,6 +113,22 @@ TEST_F(HttpApiTest, SaysHowEachLinkDoes) {
   }
 }
 
+TEST_F(HttpApiTest, SaysWhatIsWrongWithTheVideosTimesAndPictures) {
+  EXPECT_TRUE(body_of(get("/api/v1/status"))["video_clock"]["left_out_rate_error"].is_null());
+  summary_.repeated = 375;
+  summary_.delay_wander_s = 0.034;
+  summary_.stamps_left_out = -0.02;
+  const json status = body_of(get("/api/v1/status"));
+  EXPECT_EQ(status["frames"]["repeated"], 375);
+  EXPECT_EQ(status["video_clock"]["wander_s"], 0.034);
+  EXPECT_EQ(status["video_clock"]["left_out_rate_error"], -0.02);
+  const std::string metrics = get("/metrics");
+  for (const char* line : {"alidade_repeated_pictures_total 375", "alidade_video_stamps_left_out 1",
+                           "alidade_video_clock_wander_seconds 0.034"}) {
+    EXPECT_THAT(metrics, HasSubstr(std::string("\n") + line + "\n"));
+  }
+}
+
 TEST_F(HttpApiTest, AFrameWithoutAnOrientationHasNoDirectionsAndSaysWhy) {
   EXPECT_TRUE(live_.write(record_without_orientation(7)));
   const std::string answer = post("/api/v1/direction", R"({"frame":7,"pixels":[[1,2]]})");

@@ -259,6 +259,46 @@ TEST(OrientationStep, APolledIntervalCountsAsItsStandardDeviation) {
   EXPECT_NEAR(sigma(0.018, 1), expected, 1e-6 * expected);
 }
 
+// Each answer comes 0.4 s after it was true, and nobody tells but the clock offset.
+TEST(OrientationStep, ALargerLimitAnswersWhereTelemetryComesLate) {
+  constexpr double kLate_s = 0.4;
+  const auto pan = [](double t) { return 0.1 * std::sin(1.5 * t); };
+  for (const double limit_s : {0.25, 0.5}) {
+    OrientationStepOptions options = options_without_offsets();
+    options.calibration.clock_offset = kLate_s;
+    options.telemetry_limits.max_extrapolation_s = limit_s;
+    OrientationStep step(options);
+    std::mt19937 random(4);
+    std::normal_distribution<double> noise(0, options.telemetry_noise.pan_tilt_sigma);
+    int beyond = 0;
+    for (int i = 0; i < 600; ++i) {
+      const double t = i / 30.0;
+      PanTiltSample sample;
+      sample.earliest_time_s = t + kLate_s - 2e-3;
+      sample.latest_time_s = t + kLate_s + 2e-3;
+      sample.pan_rad = pan(t) + noise(random);
+      sample.tilt_rad = noise(random);
+      step.add_telemetry(sample);
+      if (i < 60) continue;
+      // A frame of just then, before the next sample.
+      const double captured_s = sample.latest_time_s + 0.02;
+      const OrientationRecord record = add_frame(&step, stamp_at(captured_s, i));
+      FrameTracks tracks;
+      step.get_tracks(&tracks);
+      EXPECT_EQ(tracks.telemetry_too_old, limit_s < kLate_s);
+      if (limit_s < kLate_s) {
+        EXPECT_EQ(record.status, RecordStatus::kTelemetryTooOld);
+        EXPECT_NEAR(*record.telemetry_age_s, kLate_s + 0.022, 1e-9);
+        continue;
+      }
+      ASSERT_TRUE(record.orientation) << to_string(record.status);
+      const double wrong = std::abs(record.orientation->pan_rad - pan(captured_s));
+      beyond += wrong > 5 * record.orientation->sigma_rad[1] ? 1 : 0;
+    }
+    EXPECT_EQ(beyond, 0);
+  }
+}
+
 TEST(OrientationStep, ForgetsTelemetryFromBeforeAReconnection) {
   OrientationStep step(options_without_offsets());
   const Sweep sweep;
@@ -480,6 +520,89 @@ TEST_F(OeStepTest, BeginsWithTelemetryAndThenHoldsToLandmarks) {
     ASSERT_TRUE(record.orientation);
     EXPECT_NEAR(record.orientation->pan_rad, rest_.pan_0, 1e-5);  // 0.02 px
     EXPECT_NEAR(record.orientation->tilt_rad, rest_.tilt_0, 1e-5);
+  }
+}
+
+// A map from before a restart knows the base to a fraction of what one answer of telemetry does. By how much the base was
+// moved meanwhile nobody tells: from what no telemetry shows at once to what contradicts it.
+TEST_F(OeStepTest, NoAnswerIsConfidentlyWrongWhereTheBaseWasMovedWhileTheProgramWasAway) {
+  OrientationStepOptions restarted = options();
+  const double sigma = restarted.telemetry_noise.pan_tilt_sigma;
+  OeOptions oe = *restarted.oe;
+  oe.max_width = Scene::kWidth;
+  oe.max_height = Scene::kHeight;
+  OeMode before(oe);
+  before.reset(restarted.calibration);
+  for (int i = 0; i < 100; ++i) {
+    InterpolatedPanTilt measured;
+    measured.time_s = i;
+    measured.angle = {rest_.pan_0, rest_.tilt_0};
+    measured.covariance.diagonal() << sigma * sigma, sigma * sigma, 1e-8, 1e-8;
+    FrameOrientation frame;
+    static_cast<void>(before.process(scene_.image(), i, &measured, &frame));
+    before.maintain();
+  }
+  const MapState map = before.map_state();
+  ASSERT_GT(map.landmarks.size(), 50U);
+  ASSERT_LT(std::sqrt(map.offset_covariance(0, 0)), 0.3 * sigma);
+  restarted.map = kept_map(map);
+  restarted.other_connection = true;
+  std::mt19937 random(12);
+  std::normal_distribution<double> noise(0, sigma);
+  for (const double moved_rad : {0.0, 2e-4, 5e-4, 2e-3, 5e-3, 0.1}) {
+    OrientationStep step(restarted);
+    double worst = 0;
+    int held = 0;
+    for (int i = 0; i < 100; ++i) {
+      const double t = 0.08 * i;
+      for (int k = 0; k < 4; ++k) {
+        PanTiltSample sample = rest_.sample(t + 0.02 * k);
+        sample.pan_rad += moved_rad + noise(random);
+        sample.tilt_rad += noise(random);
+        step.add_telemetry(sample);
+      }
+      StepEvents events;
+      const OrientationRecord record = step.add_frame(stamp_at(t, i), scene_.image(), &events);
+      step.maintain();
+      if (!record.orientation) continue;
+      held += record.mode == RecordMode::kOe ? 1 : 0;
+      worst = std::max(worst, std::abs(record.orientation->pan_rad - rest_.pan_0 - moved_rad) /
+                                  record.orientation->sigma_rad[1]);
+    }
+    EXPECT_LT(worst, 5) << "moved by " << moved_rad;
+    EXPECT_GT(held, 40) << "moved by " << moved_rad;
+  }
+}
+
+// The base is where the first answer says: all that follow are as sure of it as that was, and err as it did.
+TEST_F(OeStepTest, LandmarksFoundedByOneAnswerAreAsSureAsThat) {
+  OrientationStepOptions fresh = options();
+  const double sigma = fresh.telemetry_noise.pan_tilt_sigma;
+  for (unsigned seed = 1; seed <= 20; ++seed) {
+    std::mt19937 random(seed);
+    std::normal_distribution<double> noise(0, sigma);
+    OrientationStep step(fresh);
+    double worst = 0;
+    for (int i = 0; i < 15; ++i) {
+      const double t = 0.08 * i;
+      // Two before the first frame, no more than there have to be, and it beyond them.
+      for (const double age_s : {0.06, 0.04}) {
+        PanTiltSample sample = rest_.sample(t - age_s);
+        sample.pan_rad += noise(random);
+        sample.tilt_rad += noise(random);
+        step.add_telemetry(sample);
+      }
+      StepEvents events;
+      const OrientationRecord record = step.add_frame(stamp_at(t, i), scene_.image(), &events);
+      step.maintain();
+      ASSERT_TRUE(record.orientation);
+      worst = std::max(
+          {worst,
+           std::abs(record.orientation->pan_rad - rest_.pan_0) / record.orientation->sigma_rad[1],
+           std::abs(record.orientation->tilt_rad - rest_.tilt_0) /
+               record.orientation->sigma_rad[0]});
+    }
+    EXPECT_LT(worst, 5) << "seed " << seed;
   }
 }
 

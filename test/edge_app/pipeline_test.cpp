@@ -175,6 +175,33 @@ TEST_F(PipelineTest, CountsThePageFaultsOfTheRealtimeThread) {
   EXPECT_GE(pipeline.summary().page_faults.minor, static_cast<long>(image.size() / kPage));
 }
 
+// The camera counts 2 % more than it takes pictures. Time is what the stamps say: the test waits for nothing.
+TEST_F(PipelineTest, SumsUpThatTimeStampsAreLeftOut) {
+  PipelineOptions options = options_for_tests();
+  options.step.wait_for_pace = true;
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options);
+  pipeline.start();
+  for (int i = 0; i < 1200; ++i) {
+    Frame counted = frame();
+    counted.stamp.receive_time_s = 0.04 * i;
+    counted.stamp.sender_time_s = 1.02 * counted.stamp.receive_time_s;
+    counted.stamp.restarted = i == 0;
+    video_.push(counted);
+    // No more than the queues hold.
+    if (i % 100 == 99) {
+      const auto enough = static_cast<std::size_t>(i + 1);
+      sink_.wait_until([enough](const auto& so_far) { return so_far.size() >= enough; });
+    }
+  }
+  const std::vector<OrientationRecord> records = sink_.records();
+  ASSERT_EQ(records.size(), 1200U);
+  pipeline.stop();
+  ASSERT_TRUE(pipeline.summary().stamps_left_out);
+  EXPECT_NEAR(*pipeline.summary().stamps_left_out, 0.02, 1e-4);
+  EXPECT_EQ(records[0].status, RecordStatus::kTimeUnknown);
+  EXPECT_NE(records[1199].status, RecordStatus::kTimeUnknown);
+}
+
 TEST_F(PipelineTest, SaysNoneWhileTheVideoIsAwayAndGoesOnWhenItIsBack) {
   Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options_for_tests());
   pipeline.start();

@@ -93,6 +93,7 @@ struct Feed {
   std::int64_t first_frame = 0;
   double poll_s = 0;  // so long before its stamp a sample was asked for; 0: it came by itself
   bool delay_steps = false;  // with the first frame the least delay of the video is another one
+  double delay_wander_s = 0;
   std::function<void()> before_adjusting = {};
 };
 
@@ -129,6 +130,7 @@ std::vector<Published> feed(SelfCalibration* calibration, const test::Simulation
     tracks.tracker = how.tracker;
     tracks.clock_restarted = tracks.stamp.restarted = how.restarts && frame.frame == 0;
     tracks.delay_stepped = how.delay_steps && frame.frame == 0;
+    tracks.delay_wander_s = how.delay_wander_s;
     tracks.oe_status =
         frame.stamp_s >= how.contradicting_from_s ? OeStatus::kContradiction : OeStatus::kOk;
     for (const TrackedPoint& point : points[frame.frame]) {
@@ -365,6 +367,86 @@ TEST(SelfCalibration, WithdrawsWhatLandmarksContradictForLong) {
   EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
 }
 
+// A file that landmarks contradict is not taken up with the next sample that tells its zoom.
+TEST(SelfCalibration, DoesNotTakeUpAgainWhatItHasWithdrawn) {
+  const test::Simulation s = camera();
+  MemoryArchive archive;
+  SelfCalibration calibration(options_for(s), &archive);
+  Feed how;
+  how.zoom = 100;
+  ASSERT_FALSE(feed(&calibration, s, how).empty());
+  ASSERT_NE(archive.find(100), nullptr);
+  how.tracker = FrameTracks::Tracker::kOe;
+  how.from_s = 20;
+  how.first_frame = 1000;
+  how.contradicting_from_s = 0;
+  test::Simulation for_seconds = s;
+  for_seconds.duration_s = 5;
+  const auto published = feed(&calibration, for_seconds, how);
+  ASSERT_EQ(published.size(), 1U);
+  EXPECT_FALSE(published[0].calibration->calibrated);
+  EXPECT_EQ(calibration.report().activity, CalibrationActivity::kDoubtful);
+  // At another zoom and back: it is still the same file.
+  test::Simulation briefly = s;
+  briefly.duration_s = 1;
+  how.contradicting_from_s = std::numeric_limits<double>::infinity();
+  for (const double zoom : {900.0, 100.0}) {
+    how.zoom = zoom;
+    how.from_s += 20;
+    how.first_frame += 1000;
+    EXPECT_THAT(feed(&calibration, briefly, how), IsEmpty()) << zoom;
+  }
+  // One that is made anew takes its place, and is taken up as any other.
+  how.tracker = FrameTracks::Tracker::kStartUp;
+  how.from_s += 20;
+  how.first_frame += 1000;
+  const auto again = feed(&calibration, s, how);
+  ASSERT_FALSE(again.empty());
+  EXPECT_TRUE(again.back().calibration->calibrated);
+  archive.stored_.erase(archive.stored_.begin());
+  test::Simulation narrow = s;
+  narrow.focal_length = 8000;
+  how.zoom = 900;
+  how.from_s += 20;
+  how.first_frame += 1000;
+  ASSERT_FALSE(feed(&calibration, narrow, how).empty());
+  how.zoom = 100;
+  how.from_s += 20;
+  how.first_frame += 1000;
+  EXPECT_EQ(feed(&calibration, briefly, how).size(), 1U);
+}
+
+// Landmarks that disagree with telemetry then tell of the video's times, not of the camera.
+TEST(SelfCalibration, NeitherWithdrawsNorCalibratesWhileTheDelayWanders) {
+  const test::Simulation s = camera();
+  SelfCalibration calibration(options_for(s), nullptr);
+  ASSERT_FALSE(feed(&calibration, s, {}).empty());
+  static_cast<void>(calibration.take_messages());
+  Feed how;
+  how.tracker = FrameTracks::Tracker::kOe;
+  how.from_s = 20;
+  how.first_frame = 1000;
+  how.contradicting_from_s = 0;
+  how.delay_wander_s = 0.05;
+  EXPECT_THAT(feed(&calibration, s, how), IsEmpty());
+  EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
+  EXPECT_EQ(calibration.report().need, CalibrationNeed::kSteadyDelay);
+  EXPECT_THAT(calibration.take_messages(),
+              ::testing::ElementsAre(AllOf(HasSubstr("wander by 50 ms"), HasSubstr("relay"))));
+  // As soon as it holds again the offset to telemetry is found anew, as of a new connection.
+  test::Simulation later = s;
+  later.clock_offset += 0.004;
+  later.duration_s = 16;
+  how.from_s = 40;
+  how.first_frame = 2000;
+  how.contradicting_from_s = std::numeric_limits<double>::infinity();
+  how.delay_wander_s = 0;
+  const auto published = feed(&calibration, later, how);
+  ASSERT_EQ(published.size(), 1U);
+  expect_truth(later, published[0].calibration->calibration);
+  EXPECT_EQ(calibration.report().need, CalibrationNeed::kNothing);
+}
+
 TEST(SelfCalibration, FindsTheClockOffsetOfANewConnection) {
   const test::Simulation s = camera();
   SelfCalibration calibration(options_for(s), nullptr);
@@ -377,6 +459,43 @@ TEST(SelfCalibration, FindsTheClockOffsetOfANewConnection) {
       {FrameTracks::Tracker::kOe, {}, 20, true, std::numeric_limits<double>::infinity(), 1000});
   ASSERT_EQ(published.size(), 1U);
   expect_truth(reconnected, published[0].calibration->calibration);
+}
+
+// As late as a slow device behind a fast camera: within what is searched, and kept from before the first frame.
+TEST(SelfCalibration, FindsTelemetryThatComesLaterThanTheVideo) {
+  test::Simulation s = camera();
+  s.clock_offset = 0.4;
+  SelfCalibration calibration(options_for(s), nullptr);
+  const auto published = feed(&calibration, s, {});
+  ASSERT_FALSE(published.empty());
+  expect_truth(s, published.back().calibration->calibration);
+}
+
+TEST(SelfCalibration, SaysThatTelemetryComesTooLateAlsoWhereThereIsACalibration) {
+  MemoryArchive archive;
+  StoredCalibration stored;
+  stored.calibration.camera = {5000, 1, 0, 1920, 1080};
+  archive.stored_.push_back(stored);
+  SelfCalibration calibration(options_for(camera()), &archive);
+  FrameTracks frame;
+  const auto play = [&](int frames, bool too_old) {
+    for (int i = 0; i < frames; ++i) {
+      frame.stamp.receive_time_s += 0.05;
+      frame.telemetry_too_old = too_old;
+      calibration.add(frame);
+      PanTiltSample sample;
+      sample.latest_time_s = frame.stamp.receive_time_s;
+      calibration.add(sample);
+    }
+  };
+  play(40, false);
+  EXPECT_EQ(calibration.report().need, CalibrationNeed::kNothing);
+  play(40, true);
+  EXPECT_EQ(calibration.report().activity, CalibrationActivity::kWatching);
+  EXPECT_EQ(calibration.report().need, CalibrationNeed::kYoungTelemetry);
+  EXPECT_THAT(to_string(calibration.report().need), HasSubstr("realtime.max_extrapolation_s"));
+  play(40, false);
+  EXPECT_EQ(calibration.report().need, CalibrationNeed::kNothing);
 }
 
 // A video whose least delay steps has another clock offset from then on, as after a reconnection.

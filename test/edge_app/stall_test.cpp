@@ -266,7 +266,7 @@ Outcome play(const Scenario& scenario, std::uint64_t seed) {
   options.calibrated = true;
   options.video_clock.stamp_resolution_s = 1.0 / 90000;
   options.telemetry_noise.pan_tilt_sigma = 5e-5;
-  options.wait_for_pace = true;
+  options.wait_for_pace = options.other_connection = true;
   OrientationStep step(options);
 
   Outcome outcome;

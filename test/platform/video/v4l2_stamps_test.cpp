@@ -18,6 +18,19 @@ TEST(V4l2Stamps, TakeAMonotonicStampAsItIs) {
             9.6);
 }
 
+TEST(V4l2Stamps, TellWhatTheDriverStamped) {
+  V4l2Stamps stamps;
+  EXPECT_EQ(stamps.update(0, kMonotonic | V4L2_BUF_FLAG_TSTAMP_SRC_SOE, 9.5, 10).stamped_at,
+            StampedAt::kExposureStart);
+  EXPECT_EQ(stamps.update(1, kMonotonic | V4L2_BUF_FLAG_TSTAMP_SRC_EOF, 9.5, 10).stamped_at,
+            StampedAt::kFrameEnd);
+  // Where the moment of taking out has to do, the driver's word is of another time.
+  EXPECT_EQ(stamps.update(2, kUnknown | V4L2_BUF_FLAG_TSTAMP_SRC_SOE, 9.5, 10).stamped_at,
+            StampedAt::kArrival);
+  EXPECT_EQ(stamps.update(3, kMonotonic | V4L2_BUF_FLAG_TSTAMP_SRC_SOE, 10.5, 10).stamped_at,
+            StampedAt::kArrival);
+}
+
 TEST(V4l2Stamps, TakeTheMomentOfTakingOutWhereTheStampIsNone) {
   V4l2Stamps stamps;
   EXPECT_EQ(stamps.update(0, kUnknown, 9.5, 10).receive_time_s, 10);

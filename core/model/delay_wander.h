@@ -1,0 +1,115 @@
+#pragma once
+// DelayWander: do the items of a stream leave the line of its clock, and by how much?
+//
+//   lateness_i = receive_i - line(sender_i): where the line holds, the least of a window is 0 but for chance
+//
+// The least delay of a stream is constant, or it steps (MinimumDelayStep). Where it rises and falls for ever, either the delay
+// wanders, as behind a relay whose buffer fills and empties, or the sender's stamps do, and arrivals tell the time
+// better than the line. Stamps alone cannot tell which: so much of an item's time is not known.
+//   off the line  the least lateness of two neighbouring parts of a window is beyond the gate, and beyond chance: were the n
+//                 delays exponential, with the least m and the mean m + s, then m > c s would happen with the odds
+//                 (1 + c)^-(n - 1), which kOdds sets to e^-10. Or two items come before the line by more than the gate:
+//                 nothing is early. By how much: the greater of the parts' least, and once more their difference, as the
+//                 latest item is farther than either.
+//   windows       of parts of kPart_s, which follow, and of kLongPart_s, which see what jitter hides from the others.
+//   wanders       it is off the line by kWander_s for more than kShare of the time, of the last kMemory_s. What was seen
+//                 then fades no faster than that: what wanders comes back to the line, and leaves it again.
+// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are seconds of the host's clock.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <type_traits>
+
+namespace alidade {
+
+class DelayWander {
+ public:
+  static constexpr double kPart_s = 0.25;
+  static constexpr double kLongPart_s = 1;
+  static constexpr double kWander_s = 1e-3;
+  static constexpr double kMemory_s = 20;
+
+  // The line is another one. What was seen before is not forgotten.
+  void restart() { windows_ = {{{kPart_s, {}, {}}, {kLongPart_s, {}, {}}}}; }
+
+  // receive_s: in order. gate_s: what the line itself leaves open, >= 0.
+  void add(double receive_s, double lateness_s, double gate_s) {
+    const double since_s = std::max(0.0, receive_s - last_s_);
+    last_s_ = receive_s;
+    now_s_ = 0;
+    for (Window& window : windows_) {
+      window.add(receive_s, lateness_s);
+      now_s_ = std::max(now_s_, window.off_s(gate_s));
+    }
+    seen_s_ = std::max(now_s_, seen_s_ * std::exp(-since_s / kMemory_s));
+    // A silence is one part at most.
+    const double off = now_s_ > kWander_s ? 1 : 0;
+    share_ += (off - share_) * std::min(since_s, kPart_s) / kMemory_s;
+  }
+
+  [[nodiscard]] bool wanders() const { return share_ > kShare; }
+  // By how much an item may be off the line, as of the last one.
+  [[nodiscard]] double off_s() const { return wanders() ? seen_s_ : now_s_; }
+
+ private:
+  static constexpr double kLeastItems = 3;
+  static constexpr double kOdds = 10;
+  static constexpr double kShare = 0.15;
+
+  struct Part {
+    double since_s = 0;
+    double items = 0;
+    double least_s = std::numeric_limits<double>::infinity();
+    double second_s = std::numeric_limits<double>::infinity();  // the least but one
+    double sum_s = 0;
+
+    void add(double receive_s, double lateness_s) {
+      if (items == 0) since_s = receive_s;
+      items += 1;
+      sum_s += lateness_s;
+      second_s = std::min(second_s, std::max(least_s, lateness_s));
+      least_s = std::min(least_s, lateness_s);
+    }
+  };
+
+  struct Window {
+    double part_s = 0;
+    Part old = {};
+    Part young = {};
+
+    void add(double receive_s, double lateness_s) {
+      if (young.items >= kLeastItems && receive_s - young.since_s >= part_s) {
+        old = young;
+        young = {};
+      }
+      young.add(receive_s, lateness_s);
+    }
+
+    // 0: it is on the line.
+    [[nodiscard]] double off_s(double gate_s) const {
+      if (old.items == 0) return 0;
+      const double items = old.items + young.items;
+      const double least_s = std::min(old.least_s, young.least_s);
+      const double above_s = (old.sum_s + young.sum_s) / items - least_s;
+      const double late_s = std::max(gate_s, above_s * std::expm1(kOdds / (items - 1)));
+      const double second_s =
+          std::min(std::max(old.least_s, young.least_s), std::min(old.second_s, young.second_s));
+      if (least_s <= late_s && second_s >= -gate_s) return 0;
+      // A part that has just begun says too little of its least.
+      const double now_s = young.items >= kLeastItems ? young.least_s : old.least_s;
+      return std::max(std::abs(old.least_s), std::abs(now_s)) + std::abs(now_s - old.least_s);
+    }
+  };
+
+  std::array<Window, 2> windows_{{{kPart_s, {}, {}}, {kLongPart_s, {}, {}}}};
+  double last_s_ = 0;
+  double now_s_ = 0;
+  double seen_s_ = 0;
+  double share_ = 0;
+};
+
+static_assert(std::is_trivially_copyable_v<DelayWander>);
+
+}  // namespace alidade
