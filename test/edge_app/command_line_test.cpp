@@ -202,7 +202,7 @@ TEST(CommandLine, NamesWhatWasMistypedAndWhatIsNearest) {
     const Result result = alidade(arguments);
     EXPECT_EQ(result.exit_code, 2) << result.errors;
     EXPECT_THAT(result.errors, HasSubstr(line));
-    EXPECT_LT(result.errors.size(), 120U) << result.errors;
+    EXPECT_LT(result.errors.size(), 160U) << result.errors;
     EXPECT_EQ(result.errors.find('\n'), result.errors.size() - 1) << result.errors;
   }
 }

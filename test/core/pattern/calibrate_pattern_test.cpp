@@ -57,8 +57,8 @@ TEST(CalibratePattern, ErrorsAreAsLargeAsTheCovarianceSays) {
       sum += error.dot(calibration.covariance.ldlt().solve(error));
       ++runs;
       EXPECT_NEAR(calibration.sigma_px, scene.noise_px, 0.05 * scene.noise_px);
-      // 30 s know it to 0.06 to 0.11 us; 8 s to twice that.
-      EXPECT_LT(calibration.sigma(LensParameter::kLineDelay), 0.3e-6);
+      // 30 s know it to 0.06 to 0.13 us, 8 s to twice that, stretches that pull harder by chance to half as much again.
+      EXPECT_LT(calibration.sigma(LensParameter::kLineDelay), 0.4e-6);
     }
   }
   const double freedom = 9.0 * runs;
