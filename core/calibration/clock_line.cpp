@@ -4,8 +4,8 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/calibration/median.h"
 #include "core/model/lower_line.h"
+#include "core/model/median.h"
 
 namespace alidade::internal {
 

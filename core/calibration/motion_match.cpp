@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstddef>
 
-#include "core/calibration/median.h"
+#include "core/model/median.h"
 
 namespace alidade::internal {
 

@@ -7,10 +7,10 @@
 #include <vector>
 
 #include "core/calibration/knot_choice.h"
-#include "core/calibration/median.h"
 #include "core/calibration/noise_check.h"
 #include "core/calibration/rounded_telemetry.h"
 #include "core/calibration/shared_errors.h"
+#include "core/model/median.h"
 
 namespace alidade::internal {
 

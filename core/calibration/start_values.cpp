@@ -7,10 +7,10 @@
 #include <limits>
 #include <vector>
 
-#include "core/calibration/median.h"
 #include "core/calibration/rounded_telemetry.h"
 #include "core/calibration/sufficiency.h"
 #include "core/calibration/telemetry_fit.h"
+#include "core/model/median.h"
 
 namespace alidade::internal {
 

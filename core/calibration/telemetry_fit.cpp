@@ -6,7 +6,7 @@
 #include <cstddef>
 #include <utility>
 
-#include "core/calibration/median.h"
+#include "core/model/median.h"
 
 namespace alidade::internal {
 

@@ -2,16 +2,14 @@
 // TrajectorySpline: pan and tilt over time, a CubicSpline whose control points are (pan, tilt; rad, TRUE angles, not
 // wrapped). Positions and rates are exact.
 
-#include <vector>
-
 #include "core/model/angle.h"
 #include "core/model/cubic_spline.h"
 
 namespace alidade {
 
-class TrajectorySpline : public CubicSpline<2> {
+class TrajectorySpline : public CubicSpline<2, TrajectorySpline> {
  public:
-  using CubicSpline<2>::CubicSpline;
+  using CubicSpline::CubicSpline;
 
   [[nodiscard]] PanTilt<double> position(const Basis& basis) const {
     const Point p = value(basis);
@@ -23,13 +21,6 @@ class TrajectorySpline : public CubicSpline<2> {
   }
   [[nodiscard]] PanTilt<double> position(double time_s) const { return position(basis(time_s)); }
   [[nodiscard]] PanTilt<double> rate(double time_s) const { return rate(basis(time_s)); }
-
-  // The same curve with a knot more in the middle of each of these segments, given in increasing order.
-  [[nodiscard]] TrajectorySpline split(const std::vector<int>& segments_to_split) const {
-    TrajectorySpline result = *this;
-    result.insert_knots(segments_to_split);
-    return result;
-  }
 };
 
 }  // namespace alidade

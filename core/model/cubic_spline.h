@@ -1,5 +1,5 @@
 #pragma once
-// CubicSpline<N>: N coordinates over time as a cubic (4th-order) B-spline with free knots (Oth 1, section 4.1).
+// CubicSpline<N, Derived>: N coordinates over time as a cubic (4th-order) B-spline with free knots (Oth 1, section 4.1).
 //   x(t) = sum_{i=0..3} w_i(t) c_{s+i},   s the segment with knot_s <= t < knot_{s+1}
 // c_j are control points. The weights of a segment are
 // cubic polynomials of (t - knot_s) / (knot_{s+1} - knot_s) by the recursion of Cox and de Boor.
@@ -7,6 +7,7 @@
 // inserted anywhere without changing the curve (Boehm), which is how segments are split where the
 // motion needs it (Oth, section 4.2). For batch estimators: unlike all else here it allocates, in the constructor and in
 // split(). Free of shared state.
+// Derived: the class that is made of it, which split() gives.
 
 #include <algorithm>
 #include <cstddef>
@@ -23,7 +24,7 @@ struct SplineBasis {
   Vector4<double> rate_weight;
 };
 
-template <int N>
+template <int N, class Derived>
 class CubicSpline {
  public:
   using Basis = SplineBasis;
@@ -95,8 +96,14 @@ class CubicSpline {
     return control_points_[static_cast<std::size_t>(i)];
   }
 
- protected:
   // The same curve with a knot more in the middle of each of these segments, given in increasing order.
+  [[nodiscard]] Derived split(const std::vector<int>& segments_to_split) const {
+    Derived result = static_cast<const Derived&>(*this);
+    result.insert_knots(segments_to_split);
+    return result;
+  }
+
+ private:
   void insert_knots(const std::vector<int>& segments_to_split) {
     // Right to left, so that the indices of the segments still to come hold.
     for (auto it = segments_to_split.rbegin(); it != segments_to_split.rend(); ++it) {
@@ -116,7 +123,6 @@ class CubicSpline {
     update_polynomials();
   }
 
- private:
   [[nodiscard]] Point sum(int segment, const Vector4<double>& weights) const {
     Point x = Point::Zero();
     for (int i = 0; i < 4; ++i) x += weights[i] * control_point(segment + i);

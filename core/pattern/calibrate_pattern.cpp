@@ -4,7 +4,10 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdio>
+#include <optional>
+#include <utility>
 
+#include "core/model/median.h"
 #include "core/pattern/knot_score.h"
 #include "core/pattern/moving_projection.h"
 #include "core/pattern/pattern_adjustment.h"
@@ -14,7 +17,6 @@ namespace alidade {
 namespace {
 
 using internal::KnotScore;
-using internal::LensKnowledge;
 using internal::PatternAdjustmentOptions;
 using internal::PatternMask;
 using internal::PatternState;
@@ -23,6 +25,7 @@ constexpr int kMaxRounds = 12;
 constexpr double kSpacing_frames = 3;  // of the first knots
 constexpr double kSpacing_s = 0.2;     // and no closer than this
 constexpr double kShortestSegment_frames = 0.5;
+constexpr double kLeastSigma_px = 0.01;                     // better than any detector
 constexpr double kMedianOfChiSquare2 = 1.3862943611198906;  // 2 ln 2
 // Squared error over variance beyond which a detection is wrong: chance does it once in 270,000.
 constexpr double kWrong = 25;
@@ -50,29 +53,22 @@ bool is_valid(const PatternData& data) {
                      [](const auto& p) { return all_finite(p); });
 }
 
-double median(std::vector<double> values) {
-  if (values.empty()) return 0;
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
-
 double median_interval(const PatternData& data) {
   std::vector<double> intervals;
   for (std::size_t f = 1; f < data.frames.size(); ++f)
     intervals.push_back(data.frames[f].time_s - data.frames[f - 1].time_s);
-  return median(intervals);
+  return intervals.empty() ? 0 : median(std::move(intervals));
 }
 
 // The detections' noise if half of them are right, and which of them are wrong by it.
-double leave_out_wrong(const PatternData& data, const PatternState& state, double least_sigma_px,
-                       PatternMask* used) {
+double leave_out_wrong(const PatternData& data, const PatternState& state, PatternMask* used) {
   const std::vector<PatternResidual> residuals = pattern_residuals(data, state.lens, state.curve);
   std::vector<double> squares;
   squares.reserve(residuals.size());
   for (const PatternResidual& residual : residuals) squares.push_back(residual.error.squaredNorm());
+  const double least = kLeastSigma_px * kLeastSigma_px;
   const double variance =
-      std::max(median(squares) / kMedianOfChiSquare2, least_sigma_px * least_sigma_px);
+      squares.empty() ? least : std::max(median(std::move(squares)) / kMedianOfChiSquare2, least);
   for (auto& frame : *used) std::fill(frame.begin(), frame.end(), char{0});
   for (const PatternResidual& residual : residuals) {
     (*used)[static_cast<std::size_t>(residual.frame)]
@@ -82,19 +78,10 @@ double leave_out_wrong(const PatternData& data, const PatternState& state, doubl
   return std::sqrt(variance);
 }
 
-// Frames whose detections are mostly wrong tell nothing: half of a board that is another's, a board taken for its own turn.
 int used_frames(const PatternMask& used) {
   return static_cast<int>(std::count_if(used.begin(), used.end(), [](const auto& frame) {
     return std::count(frame.begin(), frame.end(), char{1}) > 0;
   }));
-}
-
-LensKnowledge knowledge_of(const PatternCalibrationOptions& options) {
-  LensKnowledge knowledge;
-  knowledge.fixed = options.fixed;
-  knowledge.mean = options.prior_mean;
-  knowledge.information = options.prior_information;
-  return knowledge;
 }
 
 PatternCalibration refused(PatternCalibration result, PatternStatus status, std::string message) {
@@ -120,23 +107,11 @@ double PatternCalibration::sigma(LensParameter parameter) const {
 std::vector<PatternResidual> pattern_residuals(const PatternData& data, const LensVector& lens,
                                                const PoseCurve& curve) {
   std::vector<PatternResidual> residuals;
-  const double line_delay = lens[index(LensParameter::kLineDelay)];
-  int segment = 0;
-  for (std::size_t f = 0; f < data.frames.size(); ++f) {
-    const PatternFrame& frame = data.frames[f];
-    for (std::size_t i = 0; i < frame.observations.size(); ++i) {
-      const PatternObservation& observation = frame.observations[i];
-      segment = curve.segment_at(frame.time_s + observation.u.y() * line_delay, segment);
-      MovingProjection projection;
-      if (project_moving(curve, segment, control_points_of(curve, segment), lens, frame.time_s,
-                         data.points_m[static_cast<std::size_t>(observation.point)],
-                         observation.u.y(), &projection, false) != ProjectionStatus::kOk) {
-        continue;
-      }
-      residuals.push_back({static_cast<int>(f), static_cast<int>(i), projection.u - observation.u,
-                           projection.time_s});
-    }
-  }
+  for_each_projection(data, lens, curve, false,
+                      [&](std::size_t f, std::size_t i, const MovingProjection& projection) {
+                        residuals.push_back({static_cast<int>(f), static_cast<int>(i),
+                                             projection.u - data.frames[f].observations[i].u});
+                      });
   return residuals;
 }
 
@@ -146,9 +121,7 @@ PatternCalibration calibrate_pattern(const PatternData& data,
   if (!is_valid(data))
     return refused(result, PatternStatus::kBadInput, "times must increase, numbers be finite");
   result.frame_interval_s = median_interval(data);
-  LensKnowledge knowledge = knowledge_of(options);
-
-  std::optional<LensVector> lens = internal::start_lens(data, knowledge);
+  const LensKnowledge& knowledge = options.known;
   const auto seen =
       std::count_if(data.frames.begin(), data.frames.end(),
                     [](const PatternFrame& frame) { return !frame.observations.empty(); });
@@ -160,12 +133,13 @@ PatternCalibration calibrate_pattern(const PatternData& data,
                    formatted("the pattern was found in %.0f frames only; %.0f or more are needed",
                              static_cast<double>(seen), kLeastFrames));
   }
+  std::optional<LensVector> lens = internal::start_lens(data, knowledge);
   if (!lens) {
     return refused(result, PatternStatus::kNoStart,
                    "the views give no focal length; show the pattern whole, tilted by 30 to 45 "
                    "degrees, from several sides");
   }
-  if (!options.fixed[static_cast<std::size_t>(index(LensParameter::kLineDelay))]) {
+  if (!knowledge.fixed[static_cast<std::size_t>(index(LensParameter::kLineDelay))]) {
     (*lens)[index(LensParameter::kLineDelay)] = options.start_line_delay_s;
   }
   const std::vector<internal::FramePose> poses = internal::start_poses(data, *lens);
@@ -183,7 +157,7 @@ PatternCalibration calibrate_pattern(const PatternData& data,
   for (const PatternFrame& frame : data.frames)
     used.emplace_back(frame.observations.size(), char{1});
   PatternAdjustmentOptions adjustment;
-  double sigma_px = leave_out_wrong(data, state, 0.01, &used);
+  double sigma_px = leave_out_wrong(data, state, &used);
 
   // The curve and what bends the image most, before the rest of the lens may take part.
   LensKnowledge first = knowledge;
@@ -196,8 +170,8 @@ PatternCalibration calibrate_pattern(const PatternData& data,
   adjustment.relative_decrease = 1e-2;
   for (int i = 0; i < 2; ++i) {
     adjustment.sigma_px = sigma_px;
-    if (!internal::adjust_pattern(data, used, first, adjustment, &state).usable) break;
-    sigma_px = leave_out_wrong(data, state, 0.01, &used);
+    if (!internal::adjust_pattern(data, used, first, adjustment, &state)) break;
+    sigma_px = leave_out_wrong(data, state, &used);
   }
 
   internal::KnotScoreOptions score_options;
@@ -207,11 +181,11 @@ PatternCalibration calibrate_pattern(const PatternData& data,
   adjustment.relative_decrease = 1e-4;  // the score looks one step ahead of it
   for (;; ++result.rounds) {
     adjustment.sigma_px = sigma_px;
-    if (!internal::adjust_pattern(data, used, knowledge, adjustment, &state).usable) {
+    if (!internal::adjust_pattern(data, used, knowledge, adjustment, &state)) {
       return refused(result, PatternStatus::kNotConverged,
                      "no motion of the camera explains the detections");
     }
-    sigma_px = leave_out_wrong(data, state, 0.01, &used);
+    sigma_px = leave_out_wrong(data, state, &used);
     score_options.sigma_px =
         internal::observation_noise(data, used, state, result.frame_interval_s);
     score = internal::score_knots(data, used, state, score_options);
@@ -223,7 +197,7 @@ PatternCalibration calibrate_pattern(const PatternData& data,
   adjustment.robust_scale = 0;
   adjustment.sigma_px = score_options.sigma_px;
   adjustment.relative_decrease = 1e-8;
-  if (!internal::adjust_pattern(data, used, knowledge, adjustment, &state).usable) {
+  if (!internal::adjust_pattern(data, used, knowledge, adjustment, &state)) {
     return refused(result, PatternStatus::kNotConverged,
                    "no motion of the camera explains the detections");
   }

@@ -6,7 +6,6 @@
 //   where residuals ask for it; then once more on what is left, by least squares
 // Batch work: it allocates. It touches no file.
 
-#include <array>
 #include <string>
 #include <vector>
 
@@ -29,11 +28,7 @@ enum class PatternStatus {
 };
 
 struct PatternCalibrationOptions {
-  // A parameter that is fixed keeps the value that it has in prior_mean.
-  std::array<bool, kLensParameterCount> fixed = {};
-  LensVector prior_mean = LensVector::Zero();
-  LensMatrix prior_information =
-      LensMatrix::Zero();         // inverse covariance of what is known before; 0: nothing
+  LensKnowledge known;
   double start_line_delay_s = 0;  // where the search begins, any sign
   double largest_readout_sigma_s =
       5e-4;  // standard deviation of line delay * height beyond which the motion was not enough
@@ -42,8 +37,7 @@ struct PatternCalibrationOptions {
 
 struct PatternCalibration {
   PatternStatus status = PatternStatus::kBadInput;
-  std::string message;                // one line, if refused: what is wrong and what would help
-  std::vector<std::string> warnings;  // of an answer
+  std::string message;  // one line, if refused: what is wrong and what would help
 
   LensVector lens = LensVector::Zero();
   LensMatrix covariance = LensMatrix::Zero();  // in LensParameter's units; 0 for what was fixed
@@ -68,7 +62,6 @@ struct PatternResidual {
   int frame = 0;
   int observation = 0;
   Vector2<double> error;  // px
-  double time_s = 0;
 };
 [[nodiscard]] std::vector<PatternResidual> pattern_residuals(const PatternData& data,
                                                              const LensVector& lens,

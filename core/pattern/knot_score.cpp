@@ -21,24 +21,13 @@ struct Scored {
 std::vector<Scored> scored(const PatternData& data, const PatternMask& used,
                            const PatternState& state, double sigma_px) {
   std::vector<Scored> all;
-  const double line_delay = state.lens[index(LensParameter::kLineDelay)];
-  int segment = 0;
-  for (std::size_t f = 0; f < data.frames.size(); ++f) {
-    const PatternFrame& frame = data.frames[f];
-    for (std::size_t i = 0; i < frame.observations.size(); ++i) {
-      if (used[f][i] == 0) continue;
-      const PatternObservation& observation = frame.observations[i];
-      segment = state.curve.segment_at(frame.time_s + observation.u.y() * line_delay, segment);
-      MovingProjection projection;
-      if (project_moving(state.curve, segment, control_points_of(state.curve, segment), state.lens,
-                         frame.time_s, data.points_m[static_cast<std::size_t>(observation.point)],
-                         observation.u.y(), &projection, true) != ProjectionStatus::kOk) {
-        continue;
-      }
-      all.push_back({projection.time_s, (projection.u - observation.u) / sigma_px,
-                     projection.J_u_x / sigma_px});
-    }
-  }
+  for_each_projection(
+      data, state.lens, state.curve, true,
+      [&](std::size_t f, std::size_t i, const MovingProjection& projection) {
+        if (used[f][i] == 0) return;
+        const Vector2<double> error = projection.u - data.frames[f].observations[i].u;
+        all.push_back({projection.time_s, error / sigma_px, projection.J_u_x / sigma_px});
+      });
   return all;
 }
 
@@ -48,7 +37,7 @@ struct Step {
 };
 
 // The best change of the control points of a curve with these knots.
-Step best_step(const std::vector<Scored>& all, const CubicSpline<6>& spline) {
+Step best_step(const std::vector<Scored>& all, const PoseCurve& spline) {
   using Normal = Matrix<double, 24, 24>;
   const int size = 6 * spline.control_points();
   std::vector<Normal> N(static_cast<std::size_t>(spline.segments()), Normal::Zero());
@@ -159,7 +148,7 @@ double observation_noise(const PatternData& data, const PatternMask& used,
   const int count = std::max(1, static_cast<int>((state.curve.end_s() - begin) / frame_interval_s));
   for (int i = 0; i <= count; ++i)
     knots.push_back(begin + (state.curve.end_s() - begin) * i / count);
-  const Step step = best_step(all, CubicSpline<6>(knots));
+  const Step step = best_step(all, PoseCurve(knots));
   double sum = 0;
   for (std::size_t i = 0; i < all.size(); ++i) sum += all[i].r.squaredNorm() - step.gain[i];
   const double freedom = 2 * static_cast<double>(all.size()) - step.unknowns;

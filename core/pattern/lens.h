@@ -43,6 +43,13 @@ inline constexpr std::array<const char*, kLensParameterCount> kLensParameterName
 using LensVector = Matrix<double, kLensParameterCount, 1>;
 using LensMatrix = Matrix<double, kLensParameterCount, kLensParameterCount>;
 
+// What is known of a lens beside the data.
+struct LensKnowledge {
+  std::array<bool, kLensParameterCount> fixed = {};  // to the mean
+  LensVector mean = LensVector::Zero();
+  LensMatrix information = LensMatrix::Zero();  // inverse covariance; 0: nothing is known
+};
+
 // p_c: m, or any length. J_u_lens leaves the line delay's column 0. Outputs are written with kOk only.
 [[nodiscard]] inline ProjectionStatus project_lens(
     const LensVector& lens, const Vector3<double>& p_c, Vector2<double>* u,

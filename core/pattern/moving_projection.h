@@ -5,8 +5,11 @@
 // With the row that the model predicts in place of the measured one, the residual's covariance is the detection's own, and
 // (Oth 18 to 21) is not needed. Jacobians follow from the implicit function theorem.
 
+#include <cstddef>
+
 #include "core/model/projection_status.h"
 #include "core/pattern/lens.h"
+#include "core/pattern/pattern_data.h"
 #include "core/pattern/pose_curve.h"
 
 namespace alidade {
@@ -32,5 +35,26 @@ using ControlPoints = Matrix<double, 6, 4>;
                                               double frame_time_s, const Vector3<double>& p,
                                               double row_guess, MovingProjection* projection,
                                               bool with_jacobians);
+
+// use(frame, observation, projection), both as indices, for each observation that the model sees, in the data's order.
+template <class Use>
+void for_each_projection(const PatternData& data, const LensVector& lens, const PoseCurve& curve,
+                         bool with_jacobians, Use use) {
+  const double line_delay = lens[index(LensParameter::kLineDelay)];
+  int segment = 0;
+  for (std::size_t f = 0; f < data.frames.size(); ++f) {
+    const PatternFrame& frame = data.frames[f];
+    for (std::size_t i = 0; i < frame.observations.size(); ++i) {
+      const PatternObservation& observation = frame.observations[i];
+      segment = curve.segment_at(frame.time_s + observation.u.y() * line_delay, segment);
+      MovingProjection projection;
+      if (project_moving(curve, segment, control_points_of(curve, segment), lens, frame.time_s,
+                         data.points_m[static_cast<std::size_t>(observation.point)],
+                         observation.u.y(), &projection, with_jacobians) == ProjectionStatus::kOk) {
+        use(f, i, projection);
+      }
+    }
+  }
+}
 
 }  // namespace alidade

@@ -4,6 +4,7 @@
 
 #include <Eigen/SparseCholesky>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <limits>
@@ -271,9 +272,9 @@ void inflate(const Blocks& blocks, ceres::Problem::EvaluateOptions evaluate,
 
 }  // namespace
 
-PatternAdjustment adjust_pattern(const PatternData& data, const PatternMask& used,
-                                 const LensKnowledge& knowledge,
-                                 const PatternAdjustmentOptions& options, PatternState* state) {
+bool adjust_pattern(const PatternData& data, const PatternMask& used,
+                    const LensKnowledge& knowledge, const PatternAdjustmentOptions& options,
+                    PatternState* state) {
   const PoseCurve spline = state->curve;
   ceres::Problem problem;
   build(data, used, knowledge, options, spline, state, &problem);
@@ -284,12 +285,7 @@ PatternAdjustment adjust_pattern(const PatternData& data, const PatternMask& use
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
-  PatternAdjustment result;
-  result.usable = summary.IsSolutionUsable() && state->lens.allFinite();
-  result.message = summary.message;
-  result.steps = static_cast<int>(summary.iterations.size());
-  result.cost = 2 * summary.final_cost;
-  return result;
+  return summary.IsSolutionUsable() && state->lens.allFinite();
 }
 
 std::optional<LensMatrix> lens_covariance(const PatternData& data, const PatternMask& used,

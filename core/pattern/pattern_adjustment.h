@@ -2,9 +2,7 @@
 // The joint adjustment of pose curve and lens (Oth 7, with theta the whole lens): all observations, a weak prior on the
 // curve's accelerations (Oth, section 4.1), what is known of the lens before. By Ceres, with analytic Jacobians.
 
-#include <array>
 #include <optional>
-#include <string>
 #include <vector>
 
 #include "core/pattern/lens.h"
@@ -18,13 +16,6 @@ struct PatternState {
   PoseCurve curve;
 };
 
-// What is known of a lens beside the data.
-struct LensKnowledge {
-  std::array<bool, kLensParameterCount> fixed = {};
-  LensVector mean = LensVector::Zero();
-  LensMatrix information = LensMatrix::Zero();  // inverse covariance of what is known; 0: nothing
-};
-
 struct PatternAdjustmentOptions {
   double sigma_px = 1;          // of an observation's coordinate
   double robust_scale = 0;      // Cauchy's, in sigmas; 0: squares
@@ -34,20 +25,13 @@ struct PatternAdjustmentOptions {
   double relative_decrease = 1e-7;  // of the cost, at which it ends
 };
 
-struct PatternAdjustment {
-  bool usable = false;
-  std::string message;  // Ceres's, one line
-  int steps = 0;
-  double cost = 0;  // sum of squares in units of sigma, observations and priors
-};
-
 // Which observations take part, frame by frame as in the data.
 using PatternMask = std::vector<std::vector<char>>;
 
-[[nodiscard]] PatternAdjustment adjust_pattern(const PatternData& data, const PatternMask& used,
-                                               const LensKnowledge& knowledge,
-                                               const PatternAdjustmentOptions& options,
-                                               PatternState* state);
+// False: the solver found nothing that can be used.
+[[nodiscard]] bool adjust_pattern(const PatternData& data, const PatternMask& used,
+                                  const LensKnowledge& knowledge,
+                                  const PatternAdjustmentOptions& options, PatternState* state);
 
 // Covariance of the lens with the curve free, at the state; of a parameter at which stretches of time pull harder than independent
 // noise of options.sigma_px lets them, by that much larger. Empty if what is not fixed is not determined.

@@ -5,8 +5,6 @@
 // camera that looks at a board turns less than pi about it, so the curve stays away from the singularity at 2 pi. Linear in
 // its control points, so that the Jacobian by each is a weight times that by x.
 
-#include <vector>
-
 #include "core/model/cubic_spline.h"
 #include "core/model/rotation.h"
 
@@ -15,21 +13,14 @@ namespace alidade {
 // (C, phi)
 using PoseVector = Matrix<double, 6, 1>;
 
-class PoseCurve : public CubicSpline<6> {
+class PoseCurve : public CubicSpline<6, PoseCurve> {
  public:
-  using CubicSpline<6>::CubicSpline;
+  using CubicSpline::CubicSpline;
 
   Matrix3<double> R_0 = Matrix3<double>::Identity();
 
   [[nodiscard]] Matrix3<double> R_pattern_from_camera(const PoseVector& x) const {
     return R_0 * exp_so3(Vector3<double>(x.tail<3>()));
-  }
-
-  // The same curve with a knot more in the middle of each of these segments, given in increasing order.
-  [[nodiscard]] PoseCurve split(const std::vector<int>& segments_to_split) const {
-    PoseCurve result = *this;
-    result.insert_knots(segments_to_split);
-    return result;
   }
 };
 

@@ -10,12 +10,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
-#include <filesystem>
-#include <system_error>
 
 #include "edge_app/commands/calibrate.h"
 #include "edge_app/commands/calibration_input.h"
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/output_directory.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/commands/visible_calibration.h"
 #include "edge_app/output/calibration_report.h"
@@ -23,12 +22,9 @@
 #include "edge_app/storage/calibration_file.h"
 #include "edge_app/storage/map_file.h"
 #include "platform/storage/recording.h"
-#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {
-
-namespace fs = std::filesystem;
 
 // Leaves *prior as it is if text is empty.
 void set_prior(const char* option, const std::string& text, const char* unit,
@@ -87,37 +83,6 @@ std::string tracks_text(const std::vector<CalibrationObservation>& observations)
   return text;
 }
 
-class OutputDirectory {
- public:
-  OutputDirectory(const std::string& given, const std::string& recording)
-      : path_(given.empty() ? fs::path(recording) / "alidade" : fs::path(given)) {
-    std::error_code error;
-    fs::create_directories(path_, error);
-    if (error) {
-      throw CommandError(kExitFailed, path_.string() + ": cannot be made: " + error.message() +
-                                          "; give a directory that can be written with -o");
-    }
-  }
-
-  // write(path, &error) -> bool. Remembers the file under `kind`.
-  template <class Write>
-  void add(const char* kind, const char* name, Write write) {
-    const std::string path = (path_ / name).string();
-    std::string error;
-    if (!write(path, &error)) {
-      throw CommandError(kExitFailed, error + "; give a directory with room with -o");
-    }
-    files_.emplace_back(kind, path);
-  }
-  [[nodiscard]] const std::vector<std::pair<std::string, std::string>>& files() const {
-    return files_;
-  }
-
- private:
-  fs::path path_;
-  std::vector<std::pair<std::string, std::string>> files_;
-};
-
 }  // namespace
 
 int calibrate_recording(const CalibrateOptions& options) {
@@ -139,18 +104,12 @@ int calibrate_recording(const CalibrateOptions& options) {
   if (job.tracks_from_video && result.ok()) map = map_visibly(recording, result, &signals);
 
   OutputDirectory directory(options.directory, recording);
-  directory.add("report", "report.html", [&](const std::string& path, std::string* error) {
-    return write_file_atomically(
-        path,
-        calibration_report({recording, job.input, job.options, result, job.remarks, ALIDADE_VERSION,
-                            fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)))}),
-        error);
-  });
-  if (job.tracks_from_video) {
-    directory.add("tracks", "tracks.csv", [&](const std::string& path, std::string* error) {
-      return write_file_atomically(path, tracks_text(job.input.observations), error);
-    });
-  }
+  directory.add(
+      "report", "report.html",
+      calibration_report({recording, job.input, job.options, result, job.remarks, ALIDADE_VERSION,
+                          fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)))}));
+  if (job.tracks_from_video)
+    directory.add("tracks", "tracks.csv", tracks_text(job.input.observations));
   if (result.ok()) {
     directory.add("landmarks", "map.bin", [&](const std::string& path, std::string* error) {
       return save_map(path, {result.landmarks, map}, result.calibration, error);

@@ -7,24 +7,21 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
-#include <filesystem>
 #include <nlohmann/json.hpp>
 
 #include "core/pattern/calibrate_pattern.h"
 #include "core/pattern/pattern_drawing.h"
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/output_directory.h"
 #include "edge_app/commands/pattern_video.h"
 #include "edge_app/commands/stop_signals.h"
+#include "edge_app/output/value_text.h"
 #include "edge_app/storage/lens_file.h"
-#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {
-
-namespace fs = std::filesystem;
 
 PatternVideo find_visibly(const CalibrateShutterOptions& options, const KnownPattern& pattern) {
   StopSignals signals;
@@ -63,11 +60,9 @@ std::string text_of(const PatternCalibration& calibration, const PatternVideo& v
     const auto parameter = static_cast<LensParameter>(i);
     const ShownUnit unit = unit_of(parameter);
     const double sigma = calibration.sigma(parameter) / unit.value;
-    const int decimals =
-        sigma > 0 ? std::clamp(1 - static_cast<int>(std::floor(std::log10(sigma))), 0, 12) : 6;
-    text += fmt::format("  {:<17}{:>14.{}f} ± {:.{}f} {}\n",
-                        kLensParameterNames[static_cast<std::size_t>(i)],
-                        calibration.lens[i] / unit.value, decimals, sigma, decimals, unit.name);
+    text += fmt::format(
+        "  {:<17}{:>14} ± {} {}\n", kLensParameterNames[static_cast<std::size_t>(i)],
+        value_text(calibration.lens[i] / unit.value, sigma), sigma_text(sigma), unit.name);
   }
   if (is_global_shutter(calibration))
     text += "the line delay is 0 within 3 sigmas: a global shutter, or rows too fast to tell\n";
@@ -98,14 +93,6 @@ void print(const std::string& text) {
   if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
 }
 
-void write(const fs::path& directory, const char* name, const std::string& text) {
-  std::string error;
-  const std::string path = (directory / name).string();
-  if (!write_file_atomically(path, text, &error))
-    throw CommandError(kExitFailed, error + "; give a directory with room with -o");
-  spdlog::info("{}", path);
-}
-
 }  // namespace
 
 int calibrate_shutter(const CalibrateShutterOptions& options) {
@@ -128,24 +115,13 @@ int calibrate_shutter(const CalibrateShutterOptions& options) {
   for (const std::string& remark : video.remarks) spdlog::warn("{}: {}", options.video, remark);
   if (calibration.status != PatternStatus::kOk)
     throw CommandError(kExitFailed, options.video + ": " + calibration.message);
-  for (const std::string& warning : calibration.warnings)
-    spdlog::warn("{}: {}", options.video, warning);
 
-  std::error_code failed;
-  const fs::path beside = fs::is_directory(options.video, failed)
-                              ? fs::path(options.video)
-                              : fs::path(options.video).parent_path();
-  const fs::path directory =
-      options.directory.empty() ? beside / "alidade" : fs::path(options.directory);
-  fs::create_directories(directory, failed);
-  if (failed) {
-    throw CommandError(kExitFailed, directory.string() + ": cannot be made: " + failed.message() +
-                                        "; give a directory that can be written with -o");
-  }
+  OutputDirectory directory(options.directory, options.video);
   const LensNotes notes{options.pattern, video.data.width, video.data.height};
-  write(directory, "trajectory.csv", format_trajectory(calibration, video.data));
-  write(directory, "camera_info.yaml", format_camera_info(calibration, notes));
-  write(directory, "lens.yaml", format_lens(calibration, notes));
+  directory.add("trajectory", "trajectory.csv", format_trajectory(calibration, video.data));
+  directory.add("camera_info", "camera_info.yaml", format_camera_info(calibration, notes));
+  directory.add("lens", "lens.yaml", format_lens(calibration, notes));
+  for (const auto& [kind, path] : directory.files()) spdlog::info("{}: {}", kind, path);
   print(options.json ? json_of(calibration, video) : text_of(calibration, video));
   return kExitOk;
 }

@@ -8,27 +8,13 @@
 #include <optional>
 
 #include "edge_app/output/calibration_json.h"
+#include "edge_app/output/value_text.h"
 
 namespace alidade {
 namespace {
 
 double sigma_of(const Calibration& calibration, Parameter parameter) {
   return std::sqrt(calibration.covariance(index(parameter), index(parameter)));
-}
-
-// Digits after the point that show two digits of sigma.
-int decimals_for(double sigma) {
-  return std::clamp(1 - static_cast<int>(std::floor(std::log10(sigma))), 0, 12);
-}
-
-std::string value_text(double value, double sigma) {
-  return sigma > 0 ? fmt::format("{:.{}f}", value, decimals_for(sigma)) : fmt::format("{}", value);
-}
-
-std::string sigma_text(double sigma) {
-  if (!(sigma > 0)) return "exact";
-  return sigma < 1e-4 ? fmt::format("{:.1e}", sigma)
-                      : fmt::format("{:.{}f}", sigma, decimals_for(sigma));
 }
 
 std::string prior_text(const std::optional<CalibrationPrior>& prior, double unit) {

@@ -43,11 +43,6 @@ std::string format_lens(const PatternCalibration& calibration, const LensNotes& 
   out << YAML::Key << "residual_rms_px" << YAML::Value << short_text(calibration.residual_rms_px);
   out << YAML::Key << "frame_interval_s" << YAML::Value << exact_text(calibration.frame_interval_s);
   out << YAML::Key << "segments" << YAML::Value << calibration.curve.segments();
-  if (!calibration.warnings.empty()) {
-    out << YAML::Key << "warnings" << YAML::Value << YAML::BeginSeq;
-    for (const std::string& warning : calibration.warnings) out << YAML::DoubleQuoted << warning;
-    out << YAML::EndSeq;
-  }
   out << YAML::EndMap << YAML::EndMap;
   return std::string(out.c_str()) + "\n";
 }

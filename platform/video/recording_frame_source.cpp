@@ -12,6 +12,7 @@
 
 #include "platform/storage/playback.h"
 #include "platform/storage/recording.h"
+#include "platform/video/av_file.h"
 #include "platform/video/luma_decoder.h"
 
 namespace alidade {
@@ -31,8 +32,6 @@ class FramesOnDisk : public RecordingFrameSource {
       : options_(options), playback_(options.directory, options.realtime) {
     silence_av_log();
   }
-
-  ~FramesOnDisk() override { avformat_close_input(&video_); }
 
   ReadStatus read(Frame& frame, double timeout_s) override;
   void stop() override { playback_.stop(); }
@@ -74,13 +73,13 @@ class FramesOnDisk : public RecordingFrameSource {
   LumaDecoder decoder_;
 
   // video.mkv
-  AVFormatContext* video_ = nullptr;
-  int stream_ = 0;
+  AvFile video_;
   bool drained_ = false;
   std::int64_t packets_ = 0;
   std::set<std::int64_t> in_decoder_;  // timestamps of packets whose picture has not come
   std::int64_t last_pts_ = AV_NOPTS_VALUE;
-  bool has_b_frames_ = false;  // a packet came behind one whose picture was taken later
+  bool has_b_frames_ = false;      // a packet came behind one whose picture was taken later
+  bool order_is_checked_ = false;  // and found right
 
   bool interlaced_ = false;  // the coding of one of the pictures
 
@@ -113,18 +112,10 @@ ReadStatus FramesOnDisk::load() {
 }
 
 ReadStatus FramesOnDisk::open_video(const std::string& path) {
-  int code = avformat_open_input(&video_, path.c_str(), nullptr, nullptr);
-  if (code >= 0) {
-    code = avformat_find_stream_info(video_, nullptr);  // how far pictures are out of order
+  if (!video_.open(path, &error_)) {
+    return ReadStatus::kFailed;
   }
-  if (code < 0) {
-    return fail(path + ": " + av_error_text(code));
-  }
-  stream_ = av_find_best_stream(video_, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
-  if (stream_ < 0) {
-    return fail(path + ": there is no video in it");
-  }
-  if (!decoder_.open(*video_->streams[stream_]->codecpar, false)) {
+  if (!decoder_.open(*video_.stream().codecpar, false)) {
     return fail(path + ": " + decoder_.error());
   }
   return ReadStatus::kOk;
@@ -147,12 +138,7 @@ bool FramesOnDisk::feed_decoder() {
     return false;
   }
   const PacketPtr packet(av_packet_alloc());
-  int code = 0;
-  do {
-    av_packet_unref(packet.get());
-    code = av_read_frame(video_, packet.get());
-  } while (code >= 0 && packet->stream_index != stream_);
-  if (code < 0) {  // the end, or where a kill cut the file off
+  if (!video_.read(packet.get())) {
     drained_ = true;
     (void)decoder_.send(nullptr);
     return true;
@@ -161,8 +147,8 @@ bool FramesOnDisk::feed_decoder() {
     packet->pts = packets_;
   }
   ++packets_;
-  has_b_frames_ =
-      has_b_frames_ || packet->pts < last_pts_;  // the first one's is the least there is
+  // The first one's is the least there is.
+  has_b_frames_ = has_b_frames_ || packet->pts < last_pts_;
   last_pts_ = packet->pts;
   in_decoder_.insert(packet->pts);
   (void)decoder_.send(packet.get());  // an undecodable one is noticed when the next picture comes
@@ -174,11 +160,13 @@ bool FramesOnDisk::feed_decoder() {
 bool FramesOnDisk::rows_are_in_order() {
   constexpr double kMostReordering_s = 1;
   const auto steps_back = [](const FrameStamp& a, const FrameStamp& b) {
-    return a.sender_time_s && b.sender_time_s &&
-           *b.sender_time_s<*a.sender_time_s&& * b.sender_time_s> * a.sender_time_s -
-               kMostReordering_s;
+    if (!a.sender_time_s || !b.sender_time_s) return false;
+    const double step_s = *b.sender_time_s - *a.sender_time_s;
+    return step_s < 0 && step_s > -kMostReordering_s;
   };
-  if (std::adjacent_find(stamps_.begin(), stamps_.end(), steps_back) == stamps_.end()) return true;
+  order_is_checked_ = order_is_checked_ || std::adjacent_find(stamps_.begin(), stamps_.end(),
+                                                              steps_back) == stamps_.end();
+  if (order_is_checked_) return true;
   error_ =
       options_.directory +
       "/frames.csv: sender_time_s steps back, and video.mkv has B-frames: rows in the order in "

@@ -108,13 +108,13 @@ ReadStatus RtspSession::connect(std::string* error) {
 }
 
 ReadStatus RtspSession::connect_plainly(const GstRTSPUrl& url, std::string* error) {
-  const std::unique_ptr<GSocketClient, Unref> client(g_socket_client_new());
+  const std::unique_ptr<GSocketClient, GObjectUnref> client(g_socket_client_new());
   // In whole seconds, rounded up; 0 would be for ever.
   const double left_s = std::clamp(deadline_s_ - monotonic_now_s(), 0.0, kLongest_s);
   g_socket_client_set_timeout(client.get(), 1 + static_cast<guint>(left_s));
   g_socket_client_set_enable_proxy(client.get(), FALSE);
   GError* failure = nullptr;
-  std::unique_ptr<GSocketConnection, Unref> socket(g_socket_client_connect_to_host(
+  std::unique_ptr<GSocketConnection, GObjectUnref> socket(g_socket_client_connect_to_host(
       client.get(), url.host, url.port, cancellable_.get(), &failure));
   if (!socket) {
     *error = failure->message;

@@ -61,9 +61,6 @@ class RtspSession : public RtpTransport {
   void reply(RtspMessage* request);
   [[nodiscard]] ReadStatus lost(GstRTSPResult result, std::string* error) const;
 
-  struct Unref {
-    void operator()(void* object) const { g_object_unref(object); }
-  };
   struct FreeConnection {
     void operator()(GstRTSPConnection* connection) const { gst_rtsp_connection_free(connection); }
   };
@@ -78,9 +75,10 @@ class RtspSession : public RtpTransport {
   bool pinged_again_ = false;  // with a new login
   double next_look_s_ = 0;     // by UDP: for what the camera says
   std::atomic<bool> interrupted_{false};
-  std::unique_ptr<GCancellable, Unref> cancellable_{g_cancellable_new()};
+  std::unique_ptr<GCancellable, GObjectUnref> cancellable_{g_cancellable_new()};
   std::mutex mutex_;  // lets interrupt() see whole what of these is there
-  std::unique_ptr<GSocketConnection, Unref> socket_;  // null over TLS: it is the connection's
+  std::unique_ptr<GSocketConnection, GObjectUnref>
+      socket_;  // null over TLS: it is the connection's
   std::unique_ptr<GstRTSPConnection, FreeConnection> connection_;
   std::unique_ptr<RtpPorts> ports_;  // by UDP only
   int first_port_ = 0;               // RTP's; RTCP's is the next

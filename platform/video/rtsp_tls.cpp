@@ -5,10 +5,6 @@
 namespace alidade {
 namespace {
 
-struct Unref {
-  void operator()(void* object) const { g_object_unref(object); }
-};
-
 // Faults for which no authority vouches; the last where one of the same name has another key.
 constexpr int kUnknown = G_TLS_CERTIFICATE_UNKNOWN_CA | G_TLS_CERTIFICATE_GENERIC_ERROR;
 
@@ -36,7 +32,7 @@ ReadStatus RtspTls::prepare(GstRTSPConnection* connection, std::string* error) {
   }
   if (!certificate_file_.empty()) {
     GError* failure = nullptr;
-    const std::unique_ptr<GTlsDatabase, Unref> known(
+    const std::unique_ptr<GTlsDatabase, GObjectUnref> known(
         g_tls_file_database_new(certificate_file_.c_str(), &failure));
     if (!known) {
       *error = certificate_file_ + ": no certificates in PEM form: " + failure->message;

@@ -12,6 +12,10 @@
 
 namespace alidade {
 
+struct GObjectUnref {
+  void operator()(void* object) const { g_object_unref(object); }
+};
+
 class RtspTls {
  public:
   // As RtpSourceOptions::certificate_file.

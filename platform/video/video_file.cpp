@@ -3,6 +3,7 @@
 #include <atomic>
 #include <utility>
 
+#include "platform/video/av_file.h"
 #include "platform/video/luma_decoder.h"
 
 namespace alidade {
@@ -11,13 +12,10 @@ namespace {
 class VideoFile : public FrameSource {
  public:
   explicit VideoFile(std::string path) : path_(std::move(path)) { silence_av_log(); }
-  ~VideoFile() override { avformat_close_input(&file_); }
-  VideoFile(const VideoFile&) = delete;
-  VideoFile& operator=(const VideoFile&) = delete;
 
   ReadStatus read(Frame& frame, double timeout_s) override;
   void stop() override { stopped_ = true; }
-  std::string error() const override { return path_ + ": " + error_; }
+  std::string error() const override { return error_; }
   std::string name() const override { return path_; }
   FrameSourceCounters counters() const override { return {damaged_, 0}; }
 
@@ -27,8 +25,7 @@ class VideoFile : public FrameSource {
 
   std::string path_;
   std::string error_;
-  AVFormatContext* file_ = nullptr;
-  int stream_ = 0;
+  AvFile file_;
   LumaDecoder decoder_;
   std::int64_t frames_ = 0;
   std::int64_t damaged_ = 0;
@@ -38,19 +35,12 @@ class VideoFile : public FrameSource {
 };
 
 bool VideoFile::open() {
-  int code = avformat_open_input(&file_, path_.c_str(), nullptr, nullptr);
-  if (code >= 0) code = avformat_find_stream_info(file_, nullptr);
-  if (code < 0) {
-    error_ = av_error_text(code) + "; expected a video file";
+  if (!file_.open(path_, &error_)) {
+    error_ += "; expected a video file";
     return false;
   }
-  stream_ = av_find_best_stream(file_, AVMEDIA_TYPE_VIDEO, -1, -1, nullptr, 0);
-  if (stream_ < 0) {
-    error_ = "there is no video in it";
-    return false;
-  }
-  if (!decoder_.open(*file_->streams[stream_]->codecpar, false)) {
-    error_ = decoder_.error();
+  if (!decoder_.open(*file_.stream().codecpar, false)) {
+    error_ = path_ + ": " + decoder_.error();
     return false;
   }
   return true;
@@ -59,12 +49,7 @@ bool VideoFile::open() {
 // One more packet for the decoder; at the end of the file, or where it breaks off, that no more will come.
 void VideoFile::feed() {
   const PacketPtr packet(av_packet_alloc());
-  int code = 0;
-  do {
-    av_packet_unref(packet.get());
-    code = av_read_frame(file_, packet.get());
-  } while (code >= 0 && packet->stream_index != stream_);
-  if (code < 0) {
+  if (!file_.read(packet.get())) {
     drained_ = true;
     (void)decoder_.send(nullptr);
   } else if (!decoder_.send(packet.get())) {
@@ -74,7 +59,7 @@ void VideoFile::feed() {
 
 ReadStatus VideoFile::read(Frame& frame, double /*timeout_s*/) {
   if (failed_) return ReadStatus::kFailed;
-  if (file_ == nullptr && !open()) {
+  if (!file_.is_open() && !open()) {
     failed_ = true;
     return ReadStatus::kFailed;
   }
@@ -82,7 +67,7 @@ ReadStatus VideoFile::read(Frame& frame, double /*timeout_s*/) {
     Picture picture;
     switch (decoder_.receive(&picture)) {
       case LumaDecoder::Result::kUnsupported:
-        error_ = decoder_.error();
+        error_ = path_ + ": " + decoder_.error();
         failed_ = true;
         return ReadStatus::kFailed;
       case LumaDecoder::Result::kDamaged:
@@ -96,16 +81,16 @@ ReadStatus VideoFile::read(Frame& frame, double /*timeout_s*/) {
         break;
     }
     if (picture.pts == AV_NOPTS_VALUE) {
-      error_ =
-          "its pictures have no time stamps; put it into a container that has them, such as MKV or "
-          "MP4";
+      error_ = path_ +
+               ": its pictures have no time stamps; put it into a container that has them, such as "
+               "MKV or "
+               "MP4";
       failed_ = true;
       return ReadStatus::kFailed;
     }
     frame = Frame{};
     frame.stamp.frame = frames_++;
-    frame.stamp.sender_time_s =
-        static_cast<double>(picture.pts) * av_q2d(file_->streams[stream_]->time_base);
+    frame.stamp.sender_time_s = static_cast<double>(picture.pts) * av_q2d(file_.stream().time_base);
     frame.stamp.receive_time_s = *frame.stamp.sender_time_s;
     frame.width = picture.width;
     frame.height = picture.height;

@@ -182,8 +182,8 @@ TEST(CommandLine, NamesWhatWasMistypedAndWhatIsNearest) {
            Slip{{"rnu"}, "unknown command 'rnu'; did you mean run?; see alidade --help"},
            Slip{{"chekc", "-c", "x"}, "unknown command 'chekc'; did you mean check?; see"},
            Slip{{"fly"},
-                "unknown command 'fly'; expected one of run, record, replay, calibrate, check; "
-                "see alidade --help"},
+                "unknown command 'fly'; expected one of run, record, replay, calibrate, "
+                "calibrate-shutter, check; see alidade --help"},
            Slip{{"run", "--confg", "x"},
                 "unknown option '--confg'; did you mean --config?; see alidade run --help"},
            Slip{{"run", "-c", "x", "--duraton=3"},

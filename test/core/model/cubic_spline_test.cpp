@@ -8,16 +8,11 @@
 namespace alidade {
 namespace {
 
-class Spline : public CubicSpline<2> {
+class Spline : public CubicSpline<2, Spline> {
  public:
-  using CubicSpline<2>::CubicSpline;
+  using CubicSpline::CubicSpline;
   [[nodiscard]] Vector2<double> position(double time_s) const { return value(basis(time_s)); }
   [[nodiscard]] Vector2<double> rate(double time_s) const { return derivative(basis(time_s)); }
-  [[nodiscard]] Spline split(const std::vector<int>& which) const {
-    Spline result = *this;
-    result.insert_knots(which);
-    return result;
-  }
 };
 
 Spline uneven_spline() {

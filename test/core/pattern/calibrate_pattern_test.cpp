@@ -104,9 +104,9 @@ TEST(CalibratePattern, FramesWithoutThePatternAreBridged) {
 TEST(CalibratePattern, KnownParametersStayAsTheyAre) {
   const test::PatternScene scene = short_scene(51.56e-6, 15, 8);
   PatternCalibrationOptions options;
-  options.prior_mean = truth_of(scene);
-  options.fixed.fill(true);
-  options.fixed[static_cast<std::size_t>(index(LensParameter::kLineDelay))] = false;
+  options.known.mean = truth_of(scene);
+  options.known.fixed.fill(true);
+  options.known.fixed[static_cast<std::size_t>(index(LensParameter::kLineDelay))] = false;
   const PatternCalibration calibration = calibrate_pattern(test::simulate_pattern(scene), options);
   ASSERT_EQ(calibration.status, PatternStatus::kOk) << calibration.message;
   EXPECT_EQ(calibration.lens.head<8>(), truth_of(scene).head<8>());

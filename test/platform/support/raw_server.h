@@ -15,6 +15,8 @@
 #include <thread>
 #include <utility>
 
+#include "test/platform/support/eventually.h"
+
 namespace alidade {
 
 class RawServer {
@@ -82,6 +84,19 @@ class RawServer {
     char buffer[2048];
     while (wait_readable(fd) && ::recv(fd, buffer, sizeof buffer, 0) > 0) {
     }
+  }
+
+  // What a read without a time-out gives that is stopped once a connection has come.
+  template <class Source, class Item>
+  auto status_when_stopped(Source& source, Item& item) const {
+    constexpr double kNever_s = 1e6;
+    std::thread stopper([&] {
+      eventually([&] { return connections() > 0; });
+      source.stop();
+    });
+    const auto status = source.read(item, kNever_s);
+    stopper.join();
+    return status;
   }
 
   static void reset(int fd) {

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <vector>
 
-namespace alidade::internal {
+namespace alidade {
 
 [[nodiscard]] inline double median(std::vector<double> values) {
   const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
@@ -13,4 +13,4 @@ namespace alidade::internal {
   return *middle;
 }
 
-}  // namespace alidade::internal
+}  // namespace alidade
