@@ -11,14 +11,8 @@
 namespace alidade {
 namespace {
 
+using test::truth_of;
 using ::testing::HasSubstr;
-
-LensVector truth_of(const test::PatternScene& scene) {
-  const test::SimulatedLens& l = scene.lens;
-  LensVector truth;
-  truth << l.f_u, l.f_v, l.c_u, l.c_v, l.k1, l.k2, l.p1, l.p2, l.line_delay_s;
-  return truth;
-}
 
 double line_delay_of(const PatternCalibration& calibration) {
   return calibration.lens[index(LensParameter::kLineDelay)];
@@ -27,7 +21,7 @@ double line_delay_of(const PatternCalibration& calibration) {
 // Whether its error is one that its sigma admits: beyond four, chance alone is once in 16,000.
 void expect_honest(const PatternCalibration& calibration, const test::PatternScene& scene) {
   ASSERT_EQ(calibration.status, PatternStatus::kOk) << calibration.message;
-  const LensVector error = calibration.lens - truth_of(scene);
+  const LensVector error = calibration.lens - truth_of(scene.lens);
   for (int i = 0; i < kLensParameterCount; ++i) {
     EXPECT_LT(std::abs(error[i]), 4 * calibration.sigma(static_cast<LensParameter>(i)))
         << kLensParameterNames[static_cast<std::size_t>(i)];
@@ -53,7 +47,7 @@ TEST(CalibratePattern, ErrorsAreAsLargeAsTheCovarianceSays) {
       const test::PatternScene scene = short_scene(line_delay, rate, seed);
       const PatternCalibration calibration = calibrate_pattern(test::simulate_pattern(scene));
       ASSERT_EQ(calibration.status, PatternStatus::kOk) << calibration.message;
-      const LensVector error = calibration.lens - truth_of(scene);
+      const LensVector error = calibration.lens - truth_of(scene.lens);
       sum += error.dot(calibration.covariance.ldlt().solve(error));
       ++runs;
       EXPECT_NEAR(calibration.sigma_px, scene.noise_px, 0.05 * scene.noise_px);
@@ -104,12 +98,12 @@ TEST(CalibratePattern, FramesWithoutThePatternAreBridged) {
 TEST(CalibratePattern, KnownParametersStayAsTheyAre) {
   const test::PatternScene scene = short_scene(51.56e-6, 15, 8);
   PatternCalibrationOptions options;
-  options.known.mean = truth_of(scene);
+  options.known.mean = truth_of(scene.lens);
   options.known.fixed.fill(true);
   options.known.fixed[static_cast<std::size_t>(index(LensParameter::kLineDelay))] = false;
   const PatternCalibration calibration = calibrate_pattern(test::simulate_pattern(scene), options);
   ASSERT_EQ(calibration.status, PatternStatus::kOk) << calibration.message;
-  EXPECT_EQ(calibration.lens.head<8>(), truth_of(scene).head<8>());
+  EXPECT_EQ(calibration.lens.head<8>(), truth_of(scene.lens).head<8>());
   EXPECT_LT(std::abs(line_delay_of(calibration) - scene.lens.line_delay_s),
             4 * calibration.sigma(LensParameter::kLineDelay));
   EXPECT_EQ(calibration.sigma(LensParameter::kFocalLengthU), 0);

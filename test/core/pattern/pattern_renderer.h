@@ -22,7 +22,7 @@ struct RenderOptions {
 class PatternRenderer {
  public:
   PatternRenderer(const PatternScene& scene, const RenderOptions& options)
-      : scene_(scene), options_(options), motion_(scene.seed, scene.speed) {
+      : scene_(scene), options_(options), motion_(scene.seed, scene.speed, scene.hand) {
     const int n = options.samples;
     rays_.reserve(static_cast<std::size_t>(scene.width * scene.height * n * n));
     for (int v = 0; v < scene.height; ++v) {

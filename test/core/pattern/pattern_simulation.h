@@ -4,11 +4,13 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <random>
 #include <vector>
 
+#include "core/pattern/lens.h"
 #include "core/pattern/pattern_data.h"
 
 namespace alidade::test {
@@ -19,15 +21,30 @@ struct SimulatedLens {
   double line_delay_s = 51.56e-6;
 };
 
+inline LensVector truth_of(const SimulatedLens& l) {
+  LensVector truth;
+  truth << l.f_u, l.f_v, l.c_u, l.c_v, l.k1, l.k2, l.p1, l.p2, l.line_delay_s;
+  return truth;
+}
+
+// How the board moves before the camera: of x, y, z (m) and of the turns about x, y, z (rad).
+struct HandStyle {
+  std::array<double, 6> amplitude = {{1, 1, 1, 1, 1, 1}};  // times the usual
+  double away_m = 0.55;
+};
+
 struct PatternScene {
   SimulatedLens lens;
   int width = 752, height = 480;  // px
   int columns = 9, rows = 6;
   double square_m = 0.03;
+  bool staggered =
+      false;  // an asymmetric grid of circles: square_m is half of the distance of two in a row
   double rate_hz = 20;
   double duration_s = 30;
   double noise_px = 0.05;
-  double speed = 1;           // of the hand
+  double speed = 1;  // of the hand
+  HandStyle hand;
   double wrong = 0;           // fraction of detections that are anywhere within 10 px
   double missing_frames = 0;  // fraction of frames without the board
   std::uint64_t seed = 1;
@@ -36,7 +53,7 @@ struct PatternScene {
 // Position (m, board's frame: x right, y down, z into the board) and orientation of the camera.
 class HandMotion {
  public:
-  HandMotion(std::uint64_t seed, double speed) {
+  HandMotion(std::uint64_t seed, double speed, const HandStyle& style) : away_m_(style.away_m) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> uniform(0, 1);
     // Amplitudes of x, y, z (m) and of the turns about x, y, z (rad): slow and wide, medium, fast and small.
@@ -47,7 +64,8 @@ class HandMotion {
     for (int band = 0; band < 3; ++band) {
       for (int i = 0; i < 6; ++i) {
         const double f = frequency[band] * (0.75 + 0.5 * uniform(random)) * speed;
-        waves_[i][band] = {amplitude[band][i] * (0.7 + 0.6 * uniform(random)), 2 * M_PI * f,
+        const double size = amplitude[band][i] * style.amplitude[static_cast<std::size_t>(i)];
+        waves_[i][band] = {size * (0.7 + 0.6 * uniform(random)), 2 * M_PI * f,
                            2 * M_PI * uniform(random)};
       }
     }
@@ -66,8 +84,8 @@ class HandMotion {
                                   Eigen::AngleAxisd(x[4], Eigen::Vector3d::UnitY()) *
                                   Eigen::AngleAxisd(x[3], Eigen::Vector3d::UnitX()))
                                      .toRotationMatrix();
-    // The board turns about its middle, which stays about half a metre ahead.
-    return turn * (p - board_centre) + Eigen::Vector3d(x[0], x[1], 0.55 + x[2]);
+    // The board turns about its middle, which stays ahead.
+    return turn * (p - board_centre) + Eigen::Vector3d(x[0], x[1], away_m_ + x[2]);
   }
 
  private:
@@ -75,6 +93,7 @@ class HandMotion {
     double amplitude, frequency, phase;
   };
   Wave waves_[6][3];
+  double away_m_;
 };
 
 inline Eigen::Vector2d simulated_pixel(const SimulatedLens& lens, const Eigen::Vector3d& p) {
@@ -87,18 +106,29 @@ inline Eigen::Vector2d simulated_pixel(const SimulatedLens& lens, const Eigen::V
   return {lens.f_u * a_d + lens.c_u, lens.f_v * b_d + lens.c_v};
 }
 
+inline std::vector<Eigen::Vector3d> simulated_board(const PatternScene& scene) {
+  std::vector<Eigen::Vector3d> points;
+  for (int j = 0; j < scene.rows; ++j) {
+    for (int i = 0; i < scene.columns; ++i)
+      points.emplace_back((scene.staggered ? 2 * i + j % 2 : i) * scene.square_m,
+                          j * scene.square_m, 0);
+  }
+  return points;
+}
+
+// Half-way between the first and the last.
+inline Eigen::Vector3d centre_of(const std::vector<Eigen::Vector3d>& board) {
+  return 0.5 * (board.front() + board.back());
+}
+
 // All that the moving camera sees; frames of which less than six points are in the image are empty.
 inline PatternData simulate_pattern(const PatternScene& scene) {
   PatternData data;
   data.width = scene.width;
   data.height = scene.height;
-  for (int j = 0; j < scene.rows; ++j) {
-    for (int i = 0; i < scene.columns; ++i)
-      data.points_m.emplace_back(i * scene.square_m, j * scene.square_m, 0);
-  }
-  const Eigen::Vector3d centre(0.5 * (scene.columns - 1) * scene.square_m,
-                               0.5 * (scene.rows - 1) * scene.square_m, 0);
-  const HandMotion motion(scene.seed, scene.speed);
+  data.points_m = simulated_board(scene);
+  const Eigen::Vector3d centre = centre_of(data.points_m);
+  const HandMotion motion(scene.seed, scene.speed, scene.hand);
   std::mt19937_64 random(scene.seed + 1000);
   std::normal_distribution<double> noise(0, scene.noise_px);
   std::uniform_real_distribution<double> uniform(0, 1);
