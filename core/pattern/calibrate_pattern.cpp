@@ -16,14 +16,21 @@
 namespace alidade {
 namespace {
 
+using internal::AdjustmentEnd;
 using internal::KnotScore;
 using internal::PatternAdjustmentOptions;
 using internal::PatternMask;
 using internal::PatternState;
 
-constexpr int kMaxRounds = 12;
-constexpr double kSpacing_frames = 3;  // of the first knots
-constexpr double kSpacing_s = 0.2;     // and no closer than this
+constexpr int kMaxRounds = 20;
+constexpr int kRoughSteps = 8;  // of a round: what they gain the next round's knots may undo
+constexpr int kFinalSteps = 50;
+constexpr double kFar = 1e4;  // trust regions
+constexpr double kNear = 1e8;
+constexpr double kFollowed =
+    4;  // of what chance gains: the curve follows the motion, but for little
+constexpr double kSpacing_frames = 1.5;  // of the first knots
+constexpr double kSpacing_s = 0.2;       // and no closer than this
 constexpr double kShortestSegment_frames = 0.5;
 constexpr double kLeastSigma_px = 0.01;                     // better than any detector
 constexpr double kMedianOfChiSquare2 = 1.3862943611198906;  // 2 ln 2
@@ -90,13 +97,16 @@ PatternCalibration refused(PatternCalibration result, PatternStatus status, std:
   return result;
 }
 
-// Is the curve's finest still too coarse for the motion? Detections err together within a frame, too, by blur and by where in a
-// pixel corners lie, which takes up to twice what independent noise gains; a motion that is not followed takes tens of times.
-bool is_frame_rate_too_low(const KnotScore& score) {
-  constexpr double kTimesTheExpected = 4;
-  return score.gain_of_short >
-         kTimesTheExpected * (score.expected_of_short + 5 * std::sqrt(2 * score.expected_of_short));
+// What the finest curve misses of the motion, as a multiple of what chance would gain by finer knots; 1 within chance. The lens
+// bends to it in the same way all along, so that errors grow with it and not with its root: simulated motions at 1.6 to 3 times had
+// errors of up to 6 sigmas of what was followed. Detections that err together within a frame, by blur and by where in a
+// pixel corners lie, take up to twice what independent ones do; a motion that is not followed takes tens of times.
+double missed_motion(const KnotScore& score) {
+  if (score.expected_of_short <= 0) return 1;
+  const double beyond_chance = score.expected_of_short + 5 * std::sqrt(2 * score.expected_of_short);
+  return score.gain_of_short > beyond_chance ? score.gain_of_short / score.expected_of_short : 1;
 }
+constexpr double kMostMissed = 4;
 
 }  // namespace
 
@@ -159,29 +169,27 @@ PatternCalibration calibrate_pattern(const PatternData& data,
   PatternAdjustmentOptions adjustment;
   double sigma_px = leave_out_wrong(data, state, &used);
 
-  // The curve and what bends the image most, before the rest of the lens may take part.
-  LensKnowledge first = knowledge;
-  for (const LensParameter parameter :
-       {LensParameter::kCentreU, LensParameter::kCentreV, LensParameter::kK2, LensParameter::kP1,
-        LensParameter::kP2}) {
-    first.fixed[static_cast<std::size_t>(index(parameter))] = true;
+  // A curve that is too coarse bends the lens to what it cannot follow, and no later knots bring it back. So the curve and the
+  // line delay first; the rest of the lens as soon as further knots would gain little.
+  LensKnowledge held = knowledge;
+  for (int i = 0; i < kLensParameterCount; ++i) {
+    const auto k = static_cast<std::size_t>(i);
+    if (knowledge.fixed[k] || i == index(LensParameter::kLineDelay)) continue;
+    held.fixed[k] = true;
   }
-  adjustment.robust_scale = 2;
-  adjustment.relative_decrease = 1e-2;
-  for (int i = 0; i < 2; ++i) {
-    adjustment.sigma_px = sigma_px;
-    if (!internal::adjust_pattern(data, used, first, adjustment, &state)) break;
-    sigma_px = leave_out_wrong(data, state, &used);
-  }
-
   internal::KnotScoreOptions score_options;
   score_options.shortest_segment_s = kShortestSegment_frames * result.frame_interval_s;
   KnotScore score;
   adjustment.robust_scale = 4;
   adjustment.relative_decrease = 1e-4;  // the score looks one step ahead of it
+  adjustment.max_steps = kRoughSteps;
+  bool is_held = true;
   for (;; ++result.rounds) {
     adjustment.sigma_px = sigma_px;
-    if (!internal::adjust_pattern(data, used, knowledge, adjustment, &state)) {
+    adjustment.first_radius = is_held ? kFar : kNear;
+    const AdjustmentEnd end =
+        internal::adjust_pattern(data, used, is_held ? held : knowledge, adjustment, &state);
+    if (end == AdjustmentEnd::kFailed) {
       return refused(result, PatternStatus::kNotConverged,
                      "no motion of the camera explains the detections");
     }
@@ -189,7 +197,10 @@ PatternCalibration calibrate_pattern(const PatternData& data,
     score_options.sigma_px =
         internal::observation_noise(data, used, state, result.frame_interval_s);
     score = internal::score_knots(data, used, state, score_options);
-    if (score.split.empty() || result.rounds == kMaxRounds) break;
+    const bool is_followed = score.gain < kFollowed * score.expected || score.split.empty();
+    if (result.rounds == kMaxRounds) break;
+    if (score.split.empty() && !is_held && end == AdjustmentEnd::kConverged) break;
+    if (is_followed) is_held = false;
     state.curve = state.curve.split(score.split);
   }
 
@@ -197,10 +208,13 @@ PatternCalibration calibrate_pattern(const PatternData& data,
   adjustment.robust_scale = 0;
   adjustment.sigma_px = score_options.sigma_px;
   adjustment.relative_decrease = 1e-8;
-  if (!internal::adjust_pattern(data, used, knowledge, adjustment, &state)) {
+  adjustment.max_steps = kFinalSteps;
+  if (internal::adjust_pattern(data, used, knowledge, adjustment, &state) ==
+      AdjustmentEnd::kFailed) {
     return refused(result, PatternStatus::kNotConverged,
                    "no motion of the camera explains the detections");
   }
+  score = internal::score_knots(data, used, state, score_options);
   result.lens = state.lens;
   result.curve = state.curve;
   result.used = used;
@@ -233,8 +247,9 @@ PatternCalibration calibrate_pattern(const PatternData& data,
                    "the video determines neither lens nor line delay; " + move +
                        ", and show the pattern tilted, near and far");
   }
-  result.covariance = *covariance;
-  if (is_frame_rate_too_low(score)) {
+  const double missed = missed_motion(score);
+  result.covariance = *covariance * (missed * missed);
+  if (missed > kMostMissed) {
     return refused(
         result, PatternStatus::kFrameRateTooLow,
         formatted("the camera moved too fast for %.1f frames a second; move it more slowly",
@@ -256,6 +271,12 @@ PatternCalibration calibrate_pattern(const PatternData& data,
                              "show the pattern tilted by 30 to 45 "
                              "degrees, near and far",
                              100 * focal_length_sigma));
+  }
+  if (missed > 1) {
+    result.warning = formatted(
+        "the camera moved almost too fast for %.1f frames a second: sigmas are %.1f times larger "
+        "for it",
+        1 / result.frame_interval_s, missed);
   }
   result.status = PatternStatus::kOk;
   return result;

@@ -38,6 +38,7 @@ struct PatternCalibrationOptions {
 struct PatternCalibration {
   PatternStatus status = PatternStatus::kBadInput;
   std::string message;  // one line, if refused: what is wrong and what would help
+  std::string warning;  // one line, if not: what makes it worse than it could be
 
   LensVector lens = LensVector::Zero();
   LensMatrix covariance = LensMatrix::Zero();  // in LensParameter's units; 0 for what was fixed

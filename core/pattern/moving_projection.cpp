@@ -15,8 +15,8 @@ ProjectionStatus project_moving(const PoseCurve& curve, int segment, const Contr
                                 const Vector3<double>& p, double row_guess,
                                 MovingProjection* projection, bool with_jacobians) {
   constexpr int kMaxSteps = 12;
-  constexpr double kRowTolerance = 1e-9;  // px
-  constexpr double kSlopeLimit = 0.98;    // rows that the image moves per row that is read
+  constexpr double kSteady = 1e-3;      // px, within which the image's motion is a straight one
+  constexpr double kSlopeLimit = 0.98;  // rows that the image moves per row that is read
   const double line_delay = lens[index(LensParameter::kLineDelay)];
   double row = row_guess;
   for (int step = 0; step < kMaxSteps; ++step) {
@@ -39,12 +39,10 @@ ProjectionStatus project_moving(const PoseCurve& curve, int segment, const Contr
     const double slope = u_rate.y() * line_delay;
     if (slope >= kSlopeLimit || !std::isfinite(slope)) return ProjectionStatus::kNoRow;
     const double change = (u.y() - row) / (1 - slope);
-    if (std::abs(change) > kRowTolerance) {
-      row += change;
-      continue;
-    }
-    projection->u = u;
-    projection->time_s = time_s;
+    row += change;
+    if (std::abs(change) > kSteady) continue;
+    projection->u = u + u_rate * (line_delay * change);
+    projection->time_s = frame_time_s + row * line_delay;
     projection->basis = basis;
     if (with_jacobians) {
       // A change of the row by what changes elsewhere, then of the pixel by the row.

@@ -272,20 +272,23 @@ void inflate(const Blocks& blocks, ceres::Problem::EvaluateOptions evaluate,
 
 }  // namespace
 
-bool adjust_pattern(const PatternData& data, const PatternMask& used,
-                    const LensKnowledge& knowledge, const PatternAdjustmentOptions& options,
-                    PatternState* state) {
+AdjustmentEnd adjust_pattern(const PatternData& data, const PatternMask& used,
+                             const LensKnowledge& knowledge,
+                             const PatternAdjustmentOptions& options, PatternState* state) {
   const PoseCurve spline = state->curve;
   ceres::Problem problem;
   build(data, used, knowledge, options, spline, state, &problem);
   ceres::Solver::Options solver;
   solver.linear_solver_type = ceres::SPARSE_NORMAL_CHOLESKY;
   solver.max_num_iterations = options.max_steps;
+  solver.initial_trust_region_radius = options.first_radius;
   solver.function_tolerance = options.relative_decrease;
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
-  return summary.IsSolutionUsable() && state->lens.allFinite();
+  if (!summary.IsSolutionUsable() || !state->lens.allFinite()) return AdjustmentEnd::kFailed;
+  return summary.termination_type == ceres::CONVERGENCE ? AdjustmentEnd::kConverged
+                                                        : AdjustmentEnd::kOutOfSteps;
 }
 
 std::optional<LensMatrix> lens_covariance(const PatternData& data, const PatternMask& used,

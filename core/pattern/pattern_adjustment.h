@@ -22,16 +22,25 @@ struct PatternAdjustmentOptions {
   double position_noise = 100;  // prior: power density of the accelerations, (m/s^2)^2 s
   double rotation_noise = 1e4;  // (rad/s^2)^2 s
   int max_steps = 30;
+  // Of the trust region to begin with, in Ceres's units: small far from the solution, so that no step runs wild; large near it,
+  // where it would only keep what the data hardly hold from getting there.
+  double first_radius = 1e4;
   double relative_decrease = 1e-7;  // of the cost, at which it ends
 };
 
 // Which observations take part, frame by frame as in the data.
 using PatternMask = std::vector<std::vector<char>>;
 
-// False: the solver found nothing that can be used.
-[[nodiscard]] bool adjust_pattern(const PatternData& data, const PatternMask& used,
-                                  const LensKnowledge& knowledge,
-                                  const PatternAdjustmentOptions& options, PatternState* state);
+enum class AdjustmentEnd {
+  kConverged,
+  kOutOfSteps,  // usable, and not at the minimum
+  kFailed,      // the solver found nothing that can be used
+};
+
+[[nodiscard]] AdjustmentEnd adjust_pattern(const PatternData& data, const PatternMask& used,
+                                           const LensKnowledge& knowledge,
+                                           const PatternAdjustmentOptions& options,
+                                           PatternState* state);
 
 // Covariance of the lens with the curve free, at the state; of a parameter at which stretches of time pull harder than independent
 // noise of options.sigma_px lets them, by that much larger. Empty if what is not fixed is not determined.

@@ -30,49 +30,45 @@ SimulatedLens changed(SimulatedLens lens, const Change& x) {
   return lens;
 }
 
-class ForwardModel {
+// Where one point is while the rows near its own are exposed: the motion's parabola there. A change of pose or lens moves a
+// point by hundredths of a row.
+class NearRow {
  public:
-  explicit ForwardModel(const PatternScene& scene)
-      : lens_(scene.lens),
-        board_(simulated_board(scene)),
-        centre_(centre_of(board_)),
-        motion_(scene.seed, scene.speed, scene.hand) {}
+  NearRow(const HandMotion& motion, const Eigen::Vector3d& point, const Eigen::Vector3d& centre,
+          double time_s)
+      : time_s_(time_s), now_(motion.in_camera(point, centre, time_s)) {
+    const Eigen::Vector3d after = motion.in_camera(point, centre, time_s + kStep_s);
+    const Eigen::Vector3d before = motion.in_camera(point, centre, time_s - kStep_s);
+    rate_ = (after - before) / (2 * kStep_s);
+    half_acceleration_ = (after + before - 2 * now_) / (2 * kStep_s * kStep_s);
+  }
 
-  // Where a point is seen with all that changed; row: px, a guess, and the row found.
-  [[nodiscard]] Eigen::Vector2d pixel(int point, double frame_time_s, const Change& x,
-                                      double* row) const {
-    const SimulatedLens lens = changed(lens_, x);
-    const Eigen::Vector3d turn = x.segment<3>(3);
-    const Eigen::AngleAxisd turned(turn.norm(), turn.norm() > 0 ? Eigen::Vector3d(turn.normalized())
-                                                                : Eigen::Vector3d::UnitX());
-    const auto seen_in = [&](double of_row) {
-      const Eigen::Vector3d p = motion_.in_camera(board_[static_cast<std::size_t>(point)], centre_,
-                                                  frame_time_s + of_row * lens.line_delay_s);
-      return simulated_pixel(lens, turned * p + x.head<3>());
-    };
-    // The secant through two guesses; the image moves by far less than a row while one is read.
-    double a = *row;
-    Eigen::Vector2d u = seen_in(a);
-    double miss_a = u.y() - a;
-    double b = u.y();
-    for (int i = 0; i < 8 && std::abs(b - a) > 1e-9; ++i) {
-      u = seen_in(b);
-      const double miss_b = u.y() - b;
-      const double next = miss_b == miss_a ? b : b - miss_b * (b - a) / (miss_b - miss_a);
-      a = b;
-      miss_a = miss_b;
-      b = next;
-    }
-    *row = b;
-    return u;
+  [[nodiscard]] Eigen::Vector3d in_camera(double time_s) const {
+    const double dt = time_s - time_s_;
+    return now_ + dt * (rate_ + dt * half_acceleration_);
   }
 
  private:
-  SimulatedLens lens_;
-  std::vector<Eigen::Vector3d> board_;
-  Eigen::Vector3d centre_;
-  HandMotion motion_;
+  static constexpr double kStep_s = 1e-4;
+  double time_s_;
+  Eigen::Vector3d now_;
+  Eigen::Vector3d rate_;
+  Eigen::Vector3d half_acceleration_;
 };
+
+// Where the point is seen with all that changed.
+Eigen::Vector2d changed_pixel(const SimulatedLens& of_truth, const NearRow& point,
+                              double frame_time_s, double row, const Change& x) {
+  const SimulatedLens lens = changed(of_truth, x);
+  const Eigen::Vector3d turn = x.segment<3>(3);
+  const double angle = turn.norm();
+  Eigen::Matrix3d turned = Eigen::Matrix3d::Identity();
+  if (angle > 0) turned = Eigen::AngleAxisd(angle, turn / angle).toRotationMatrix();
+  return seen_pixel(lens, row, [&](double of_row) {
+    return Eigen::Vector3d(turned * point.in_camera(frame_time_s + of_row * lens.line_delay_s) +
+                           x.head<3>());
+  });
+}
 
 // The four uniform cubic B-splines on a segment, x in [0, 1].
 Eigen::Vector4d weights_at(double x) {
@@ -85,7 +81,9 @@ Eigen::Vector4d weights_at(double x) {
 }  // namespace
 
 LensMatrix pattern_bound(const PatternScene& scene, const PatternData& data, double knots_per_s) {
-  const ForwardModel model(scene);
+  const std::vector<Eigen::Vector3d> board = simulated_board(scene);
+  const Eigen::Vector3d centre = centre_of(board);
+  const HandMotion motion(scene.seed, scene.speed, scene.hand);
   const Change h = steps();
   const double first = data.frames.front().time_s - 0.1;
   const double length = data.frames.back().time_s + 0.2 - first;
@@ -96,19 +94,19 @@ LensMatrix pattern_bound(const PatternScene& scene, const PatternData& data, dou
   std::vector<Local> of_segment(static_cast<std::size_t>(segments), Local::Zero());
   for (const PatternFrame& frame : data.frames) {
     for (const PatternObservation& observation : frame.observations) {
-      double row = observation.u.y();
-      (void)model.pixel(observation.point, frame.time_s, Change::Zero(), &row);
+      const Eigen::Vector3d& p = board[static_cast<std::size_t>(observation.point)];
+      const double row =
+          seen_pixel(scene.lens, observation.u.y(), [&](double of_row) {
+            return motion.in_camera(p, centre, frame.time_s + of_row * scene.lens.line_delay_s);
+          }).y();
+      const NearRow point(motion, p, centre, frame.time_s + row * scene.lens.line_delay_s);
       Eigen::Matrix<double, 2, kUnknowns> J;
       for (int i = 0; i < kUnknowns; ++i) {
         Change x = Change::Zero();
-        double row_of_changed = row;
         x[i] = h[i];
-        const Eigen::Vector2d above =
-            model.pixel(observation.point, frame.time_s, x, &row_of_changed);
-        x[i] = -h[i];
-        row_of_changed = row;
-        J.col(i) =
-            (above - model.pixel(observation.point, frame.time_s, x, &row_of_changed)) / (2 * h[i]);
+        J.col(i) = (changed_pixel(scene.lens, point, frame.time_s, row, x) -
+                    changed_pixel(scene.lens, point, frame.time_s, row, -x)) /
+                   (2 * h[i]);
       }
       const double place =
           (frame.time_s + row * scene.lens.line_delay_s - first) / length * segments;

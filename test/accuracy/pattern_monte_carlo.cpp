@@ -46,13 +46,14 @@ std::vector<double> line_delay_us(const std::vector<PatternRun>& runs,
 std::vector<PatternRuns> run_settings(const std::vector<PatternSetting>& settings, int runs,
                                       std::uint64_t first_seed, std::ostream& progress) {
   std::vector<PatternRuns> all;
-  for (const PatternSetting& setting : settings) {
-    all.push_back({setting, {}});
-    for (int i = 0; i < runs; ++i) {
+  for (const PatternSetting& setting : settings) all.push_back({setting, {}});
+  // By turns: whoever looks early sees something of every setting.
+  for (int i = 0; i < runs; ++i) {
+    for (auto& [setting, of_setting] : all) {
       PatternScene scene = setting.scene;
       scene.seed = first_seed + static_cast<std::uint64_t>(i);
-      all.back().runs.push_back(run_pattern(scene, true));
-      const PatternRun& run = all.back().runs.back();
+      of_setting.push_back(run_pattern(scene, true));
+      const PatternRun& run = of_setting.back();
       progress << setting.name << ", seed " << scene.seed << ": ";
       if (run.status == PatternStatus::kOk) {
         progress << number(1e6 * run.error[kLineDelay]) << " us, stated "

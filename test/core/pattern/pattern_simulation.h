@@ -1,6 +1,6 @@
 #pragma once
 // A camera moved by hand before a board, with known truth. Shares no mathematics with core/pattern: the pose is sums of sines in
-// position and Euler angles, rotations are products about axes, the lens is written out again, the row is found by bisection.
+// position and Euler angles, rotations are products about axes, the lens is written out again, the row is found by secants.
 
 #include <Eigen/Geometry>
 #include <algorithm>
@@ -121,6 +121,25 @@ inline Eigen::Vector3d centre_of(const std::vector<Eigen::Vector3d>& board) {
   return 0.5 * (board.front() + board.back());
 }
 
+// Where a point is seen that is at in_camera(row) when this row is exposed: row = v(row), by the secant through two guesses.
+template <class InCamera>
+Eigen::Vector2d seen_pixel(const SimulatedLens& lens, double row_guess, const InCamera& in_camera) {
+  double before = row_guess;
+  Eigen::Vector2d u = simulated_pixel(lens, in_camera(before));
+  double miss_before = u.y() - before;
+  double row = u.y();
+  for (int step = 0; step < 20 && std::abs(row - before) > 1e-10; ++step) {
+    u = simulated_pixel(lens, in_camera(row));
+    const double miss = u.y() - row;
+    const double next =
+        miss == miss_before ? row : row - miss * (row - before) / (miss - miss_before);
+    before = row;
+    miss_before = miss;
+    row = next;
+  }
+  return u;
+}
+
 // All that the moving camera sees; frames of which less than six points are in the image are empty.
 inline PatternData simulate_pattern(const PatternScene& scene) {
   PatternData data;
@@ -138,19 +157,10 @@ inline PatternData simulate_pattern(const PatternScene& scene) {
     frame.time_s = f / scene.rate_hz;
     const bool seen = uniform(random) >= scene.missing_frames;
     for (std::size_t k = 0; seen && k < data.points_m.size(); ++k) {
-      // row - v(row) changes its sign once.
-      const auto pixel = [&](double row) {
-        return simulated_pixel(scene.lens,
-                               motion.in_camera(data.points_m[k], centre,
-                                                frame.time_s + row * scene.lens.line_delay_s));
-      };
-      double low = -400;
-      double high = scene.height + 400.0;
-      for (int step = 0; step < 60; ++step) {
-        const double middle = 0.5 * (low + high);
-        (pixel(middle).y() > middle ? low : high) = middle;
-      }
-      Eigen::Vector2d u = pixel(0.5 * (low + high));
+      Eigen::Vector2d u = seen_pixel(scene.lens, 0.5 * scene.height, [&](double row) {
+        return motion.in_camera(data.points_m[k], centre,
+                                frame.time_s + row * scene.lens.line_delay_s);
+      });
       if (u.x() < 4 || u.y() < 4 || u.x() > scene.width - 4 || u.y() > scene.height - 4) continue;
       u += Eigen::Vector2d(noise(random), noise(random));
       if (uniform(random) < scene.wrong)
