@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <cstdio>
 #include <optional>
 #include <utility>
 
@@ -11,61 +10,34 @@
 #include "core/pattern/knot_score.h"
 #include "core/pattern/moving_projection.h"
 #include "core/pattern/pattern_adjustment.h"
+#include "core/pattern/pattern_checks.h"
 #include "core/pattern/pattern_start.h"
 
 namespace alidade {
 namespace {
 
 using internal::AdjustmentEnd;
+using internal::formatted;
 using internal::KnotScore;
 using internal::PatternAdjustmentOptions;
 using internal::PatternMask;
 using internal::PatternState;
+using internal::PatternViews;
 
 constexpr int kMaxRounds = 20;
 constexpr int kRoughSteps = 8;  // of a round: what they gain the next round's knots may undo
 constexpr int kFinalSteps = 50;
 constexpr double kFar = 1e4;  // trust regions
 constexpr double kNear = 1e8;
-constexpr double kFollowed =
-    4;  // of what chance gains: the curve follows the motion, but for little
-constexpr double kSpacing_frames = 1.5;  // of the first knots
-constexpr double kSpacing_s = 0.2;       // and no closer than this
-constexpr double kShortestSegment_frames = 0.5;
+// Times what chance gains, below which the curve follows the motion but for little: a lens that is some per cent off takes five.
+constexpr double kFollowed = 20;
+constexpr double kSpacing_frames = 1.5;                     // of the first knots
+constexpr double kSpacing_s = 0.2;                          // and no closer than this
 constexpr double kLeastSigma_px = 0.01;                     // better than any detector
 constexpr double kMedianOfChiSquare2 = 1.3862943611198906;  // 2 ln 2
 // Squared error over variance beyond which a detection is wrong: chance does it once in 270,000.
 constexpr double kWrong = 25;
 constexpr int kLeastFrames = 12;
-
-std::string formatted(const char* format, double a, double b = 0) {
-  char text[240];
-  std::snprintf(text, sizeof text, format, a, b);
-  return text;
-}
-
-bool is_valid(const PatternData& data) {
-  if (data.width <= 0 || data.height <= 0) return false;
-  for (std::size_t f = 0; f < data.frames.size(); ++f) {
-    const PatternFrame& frame = data.frames[f];
-    if (!std::isfinite(frame.time_s) || (f > 0 && frame.time_s <= data.frames[f - 1].time_s))
-      return false;
-    for (const PatternObservation& observation : frame.observations) {
-      if (observation.point < 0 || observation.point >= static_cast<int>(data.points_m.size()))
-        return false;
-      if (!all_finite(observation.u)) return false;
-    }
-  }
-  return std::all_of(data.points_m.begin(), data.points_m.end(),
-                     [](const auto& p) { return all_finite(p); });
-}
-
-double median_interval(const PatternData& data) {
-  std::vector<double> intervals;
-  for (std::size_t f = 1; f < data.frames.size(); ++f)
-    intervals.push_back(data.frames[f].time_s - data.frames[f - 1].time_s);
-  return intervals.empty() ? 0 : median(std::move(intervals));
-}
 
 // The detections' noise if half of them are right, and which of them are wrong by it.
 double leave_out_wrong(const PatternData& data, const PatternState& state, PatternMask* used) {
@@ -107,11 +79,18 @@ double missed_motion(const KnotScore& score) {
   return score.gain_of_short > beyond_chance ? score.gain_of_short / score.expected_of_short : 1;
 }
 constexpr double kMostMissed = 4;
+constexpr double kLeastTravel = 0.01;  // of the image's height
+// Times the first focal length, beyond which it runs off because nothing holds it.
+constexpr double kRunOff = 4;
 
 }  // namespace
 
 double PatternCalibration::sigma(LensParameter parameter) const {
   return std::sqrt(std::max(0.0, covariance(index(parameter), index(parameter))));
+}
+
+bool PatternCalibration::has_global_shutter() const {
+  return std::abs(lens[index(LensParameter::kLineDelay)]) <= 3 * sigma(LensParameter::kLineDelay);
 }
 
 std::vector<PatternResidual> pattern_residuals(const PatternData& data, const LensVector& lens,
@@ -128,26 +107,30 @@ std::vector<PatternResidual> pattern_residuals(const PatternData& data, const Le
 PatternCalibration calibrate_pattern(const PatternData& data,
                                      const PatternCalibrationOptions& options) {
   PatternCalibration result;
-  if (!is_valid(data))
-    return refused(result, PatternStatus::kBadInput, "times must increase, numbers be finite");
-  result.frame_interval_s = median_interval(data);
+  if (auto what = internal::bad_input(data))
+    return refused(result, PatternStatus::kBadInput, std::move(*what));
+  result.frame_interval_s = internal::frame_interval(data);
   const LensKnowledge& knowledge = options.known;
-  const auto seen =
-      std::count_if(data.frames.begin(), data.frames.end(),
-                    [](const PatternFrame& frame) { return !frame.observations.empty(); });
-  if (seen == 0)
+  const PatternViews views = internal::views_of(data);
+  if (views.frames == 0) {
     return refused(result, PatternStatus::kNoPattern,
                    "the pattern was found in no frame; is it this pattern, in view and lit?");
-  if (seen < kLeastFrames) {
+  }
+  if (views.frames < kLeastFrames) {
     return refused(result, PatternStatus::kTooFewFrames,
                    formatted("the pattern was found in %.0f frames only; %.0f or more are needed",
-                             static_cast<double>(seen), kLeastFrames));
+                             views.frames, kLeastFrames));
+  }
+  if (views.travel_px < kLeastTravel * data.height) {
+    return refused(result, PatternStatus::kNoLineDelay,
+                   formatted("the pattern stayed where it was in the image, within %.1f pixels; ",
+                             views.travel_px) +
+                       internal::how_to_move(views));
   }
   std::optional<LensVector> lens = internal::start_lens(data, knowledge);
   if (!lens) {
     return refused(result, PatternStatus::kNoStart,
-                   "the views give no focal length; show the pattern whole, tilted by 30 to 45 "
-                   "degrees, from several sides");
+                   "the views give no focal length; " + internal::how_to_show(views));
   }
   if (!knowledge.fixed[static_cast<std::size_t>(index(LensParameter::kLineDelay))]) {
     (*lens)[index(LensParameter::kLineDelay)] = options.start_line_delay_s;
@@ -178,12 +161,12 @@ PatternCalibration calibrate_pattern(const PatternData& data,
     held.fixed[k] = true;
   }
   internal::KnotScoreOptions score_options;
-  score_options.shortest_segment_s = kShortestSegment_frames * result.frame_interval_s;
   KnotScore score;
   adjustment.robust_scale = 4;
   adjustment.relative_decrease = 1e-4;  // the score looks one step ahead of it
   adjustment.max_steps = kRoughSteps;
   bool is_held = true;
+  const double first_focal_length_px = state.lens[0];
   for (;; ++result.rounds) {
     adjustment.sigma_px = sigma_px;
     adjustment.first_radius = is_held ? kFar : kNear;
@@ -193,15 +176,23 @@ PatternCalibration calibrate_pattern(const PatternData& data,
       return refused(result, PatternStatus::kNotConverged,
                      "no motion of the camera explains the detections");
     }
+    const double times = state.lens[0] / first_focal_length_px;
+    if (!(times < kRunOff && times > 1 / kRunOff)) {
+      return refused(
+          result, PatternStatus::kNoLens,
+          "the views are too much alike for a focal length; " + internal::how_to_show(views));
+    }
     sigma_px = leave_out_wrong(data, state, &used);
     score_options.sigma_px =
         internal::observation_noise(data, used, state, result.frame_interval_s);
     score = internal::score_knots(data, used, state, score_options);
     const bool is_followed = score.gain < kFollowed * score.expected || score.split.empty();
     if (result.rounds == kMaxRounds) break;
-    if (score.split.empty() && !is_held && end == AdjustmentEnd::kConverged) break;
+    // What a lens that is not there yet leaves must not be taken for motion.
+    const bool is_settled = !is_held && end == AdjustmentEnd::kConverged;
+    if (is_settled && score.split.empty()) break;
     if (is_followed) is_held = false;
-    state.curve = state.curve.split(score.split);
+    if (is_settled || !is_followed) state.curve = state.curve.split(score.split);
   }
 
   // By least squares on what is right.
@@ -241,42 +232,49 @@ PatternCalibration calibrate_pattern(const PatternData& data,
   adjustment.sigma_px = result.sigma_px;
   const std::optional<LensMatrix> covariance =
       internal::lens_covariance(data, used, knowledge, adjustment, state);
-  const std::string move = "move the camera faster, in all directions and by turning it";
   if (!covariance) {
+    return refused(
+        result, PatternStatus::kNoLens,
+        "the video determines neither lens nor line delay; " + internal::how_to_show(views));
+  }
+  result.covariance = *covariance;
+  // Before all else: with a lens that is not determined nothing else of the result means anything.
+  const double focal_length_sigma =
+      std::max(result.sigma(LensParameter::kFocalLengthU) / state.lens[0],
+               result.sigma(LensParameter::kFocalLengthV) / state.lens[1]);
+  if (!(focal_length_sigma <= options.largest_focal_length_sigma)) {
     return refused(result, PatternStatus::kNoLens,
-                   "the video determines neither lens nor line delay; " + move +
-                       ", and show the pattern tilted, near and far");
+                   formatted("focal length known to %.1f %% only: the views are too much alike; ",
+                             100 * focal_length_sigma) +
+                       internal::how_to_show(views));
   }
   const double missed = missed_motion(score);
-  result.covariance = *covariance * (missed * missed);
+  result.covariance *= missed * missed;
   if (missed > kMostMissed) {
     return refused(
         result, PatternStatus::kFrameRateTooLow,
-        formatted("the camera moved too fast for %.1f frames a second; move it more slowly",
+        formatted("the camera moved too fast for %.1f frames a second: move it more slowly; or the "
+                  "pattern is not flat, or not as long and high as told",
                   1 / result.frame_interval_s));
   }
-  const double readout_sigma_s = result.sigma(LensParameter::kLineDelay) * data.height;
-  if (!(readout_sigma_s <= options.largest_readout_sigma_s)) {
-    return refused(
-        result, PatternStatus::kNoLineDelay,
-        formatted(
-            "the image hardly moved while it was read out: line delay known to %.2g us only; ",
-            1e6 * result.sigma(LensParameter::kLineDelay)) +
-            move);
-  }
-  const double focal_length_sigma = result.sigma(LensParameter::kFocalLengthU) / state.lens[0];
-  if (!(focal_length_sigma <= options.largest_focal_length_sigma)) {
-    return refused(result, PatternStatus::kNoLens,
-                   formatted("focal length known to %.1f %% only: the views are too much alike; "
-                             "show the pattern tilted by 30 to 45 "
-                             "degrees, near and far",
-                             100 * focal_length_sigma));
+  const double line_delay_sigma_s = result.sigma(LensParameter::kLineDelay);
+  if (!(line_delay_sigma_s * data.height <= options.largest_readout_sigma_s)) {
+    return refused(result, PatternStatus::kNoLineDelay,
+                   formatted("the image hardly moved while it was read out: line delay known to "
+                             "%.2g us only; ",
+                             1e6 * line_delay_sigma_s) +
+                       internal::how_to_move(views));
   }
   if (missed > 1) {
-    result.warning = formatted(
+    result.remarks.push_back(formatted(
         "the camera moved almost too fast for %.1f frames a second: sigmas are %.1f times larger "
         "for it",
-        1 / result.frame_interval_s, missed);
+        1 / result.frame_interval_s, missed));
+  }
+  if (line_delay_sigma_s > 0 && result.has_global_shutter()) {
+    result.remarks.push_back(
+        formatted("no line delay, within %.2g us: all rows are exposed at once (a global shutter)",
+                  3e6 * line_delay_sigma_s));
   }
   result.status = PatternStatus::kOk;
   return result;

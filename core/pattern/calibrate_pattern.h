@@ -4,6 +4,8 @@
 //   start: lens and poses as if all rows were exposed at once, a curve through the poses
 //   again and again: adjust curve and lens together, leave out wrong detections, estimate the detections' noise, split the curve
 //   where residuals ask for it; then once more on what is left, by least squares
+// What nothing in the data tells: a pattern that is larger or smaller than told in all directions. Lens and line delay are the
+// same then, positions and distances as much too small or too large. One that is stretched or bent is noticed by its misfit.
 // Batch work: it allocates. It touches no file.
 
 #include <string>
@@ -37,8 +39,8 @@ struct PatternCalibrationOptions {
 
 struct PatternCalibration {
   PatternStatus status = PatternStatus::kBadInput;
-  std::string message;  // one line, if refused: what is wrong and what would help
-  std::string warning;  // one line, if not: what makes it worse than it could be
+  std::string message;               // one line, if refused: what is wrong and what would help
+  std::vector<std::string> remarks;  // one line each, if not: what is worth knowing of it
 
   LensVector lens = LensVector::Zero();
   LensMatrix covariance = LensMatrix::Zero();  // in LensParameter's units; 0 for what was fixed
@@ -53,6 +55,8 @@ struct PatternCalibration {
   std::vector<std::vector<char>> used;  // by frame and observation
 
   [[nodiscard]] double sigma(LensParameter parameter) const;
+  // The line delay is 0 within three sigmas.
+  [[nodiscard]] bool has_global_shutter() const;
 };
 
 [[nodiscard]] PatternCalibration calibrate_pattern(const PatternData& data,

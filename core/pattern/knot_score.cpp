@@ -5,7 +5,9 @@
 #include <cmath>
 #include <cstddef>
 #include <numeric>
+#include <utility>
 
+#include "core/model/median.h"
 #include "core/pattern/moving_projection.h"
 
 namespace alidade::internal {
@@ -93,6 +95,28 @@ Step best_step(const std::vector<Scored>& all, const PoseCurve& spline) {
   return step;
 }
 
+// Times of the frames that take part.
+std::vector<double> times_used(const PatternData& data, const PatternMask& used) {
+  std::vector<double> times;
+  for (std::size_t f = 0; f < data.frames.size(); ++f) {
+    if (std::count(used[f].begin(), used[f].end(), char{1}) > 0)
+      times.push_back(data.frames[f].time_s);
+  }
+  return times;
+}
+
+// From one of these to the next, about the stretch of time; the median, so that a pause at its end counts for nothing.
+double interval_about(const std::vector<double>& times, double begin_s, double end_s) {
+  const auto first = times.begin();
+  const auto at = [&](double t) { return std::lower_bound(first, times.end(), t) - first; };
+  const auto last = static_cast<std::ptrdiff_t>(times.size()) - 1;
+  const std::ptrdiff_t from = std::max<std::ptrdiff_t>(at(begin_s) - 2, 0);
+  const std::ptrdiff_t to = std::min<std::ptrdiff_t>(at(end_s) + 1, last);
+  std::vector<double> intervals;
+  for (std::ptrdiff_t i = from; i < to; ++i) intervals.push_back(first[i + 1] - first[i]);
+  return intervals.empty() ? 0 : median(std::move(intervals));
+}
+
 // The gain that chance exceeds in one of `tests` with six degrees of freedom once in a hundred times.
 double beyond_chance(int tests) {
   const double probability = 0.01 / std::max(1, tests);
@@ -122,12 +146,15 @@ KnotScore score_knots(const PatternData& data, const PatternMask& used, const Pa
   }
   constexpr int kLeastObservations = 12;  // of a segment: twice what its new knot adds
   std::vector<char> can(segments, 0);
+  const std::vector<double> times = times_used(data, used);
   KnotScore score;
   int tests = 0;
   for (std::size_t s = 0; s < segments; ++s) {
     if (population[s] < kLeastObservations) continue;
     const auto i = static_cast<int>(s);
-    can[s] = curve.knot(i + 1) - curve.knot(i) >= 2 * options.shortest_segment_s ? 1 : 0;
+    const double shortest_s =
+        options.shortest_frames * interval_about(times, curve.knot(i), curve.knot(i + 1));
+    can[s] = curve.knot(i + 1) - curve.knot(i) >= 2 * shortest_s ? 1 : 0;
     tests += can[s];
     (can[s] != 0 ? score.gain : score.gain_of_short) += gain[s];
     (can[s] != 0 ? score.expected : score.expected_of_short) += 6;

@@ -13,8 +13,9 @@
 namespace alidade::internal {
 
 struct KnotScoreOptions {
-  double sigma_px = 1;            // of an observation's coordinate
-  double shortest_segment_s = 0;  // no half may be shorter
+  double sigma_px = 1;  // of an observation's coordinate
+  double shortest_frames =
+      0.5;  // no half may be shorter, counted in frames that show the pattern there
 };
 
 struct KnotScore {

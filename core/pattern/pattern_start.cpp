@@ -52,8 +52,11 @@ std::vector<std::size_t> slow_views(const PatternData& data) {
     std::size_t most = 0;
     for (std::size_t f = view * count / kViews; f < (view + 1) * count / kViews; ++f) {
       const PatternFrame& frame = data.frames[f];
-      if (frame.observations.size() < kLeastPoints || f + 1 >= count) continue;
-      const std::optional<double> speed = speed_between(frame, data.frames[f + 1]);
+      if (frame.observations.size() < kLeastPoints) continue;
+      std::size_t next = f + 1;
+      while (next < count && data.frames[next].observations.empty()) ++next;
+      if (next >= count) continue;
+      const std::optional<double> speed = speed_between(frame, data.frames[next]);
       if (!speed) continue;
       // A whole pattern is worth some motion.
       const std::size_t seen = frame.observations.size();

@@ -115,7 +115,8 @@ int calibrate_shutter(const CalibrateShutterOptions& options) {
   for (const std::string& remark : video.remarks) spdlog::warn("{}: {}", options.video, remark);
   if (calibration.status != PatternStatus::kOk)
     throw CommandError(kExitFailed, options.video + ": " + calibration.message);
-  if (!calibration.warning.empty()) spdlog::warn("{}: {}", options.video, calibration.warning);
+  for (const std::string& remark : calibration.remarks)
+    spdlog::warn("{}: {}", options.video, remark);
 
   OutputDirectory directory(options.directory, options.video);
   const LensNotes notes{options.pattern, video.data.width, video.data.height};

@@ -12,7 +12,10 @@ namespace alidade {
 namespace {
 
 using test::truth_of;
+using ::testing::AllOf;
+using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 
 double line_delay_of(const PatternCalibration& calibration) {
   return calibration.lens[index(LensParameter::kLineDelay)];
@@ -59,40 +62,86 @@ TEST(CalibratePattern, ErrorsAreAsLargeAsTheCovarianceSays) {
   EXPECT_NEAR(sum, freedom, 4 * std::sqrt(2 * freedom));
 }
 
-// A start at the wrong sign, twice as large, ends where the right one does.
+// Starts on both sides, twice as large, end where the one at 0 does.
 TEST(CalibratePattern, FindsTheSignOfTheLineDelay) {
   const test::PatternScene scene = short_scene(51.56e-6, 15, 4);
   const PatternData data = test::simulate_pattern(scene);
-  PatternCalibrationOptions options;
-  options.start_line_delay_s = -100e-6;
-  const PatternCalibration from_wrong = calibrate_pattern(data, options);
-  expect_honest(from_wrong, scene);
-  EXPECT_NEAR(line_delay_of(from_wrong), line_delay_of(calibrate_pattern(data)),
-              0.2 * from_wrong.sigma(LensParameter::kLineDelay));
+  const double from_zero = line_delay_of(calibrate_pattern(data));
+  for (const double start : {-100e-6, 100e-6}) {
+    PatternCalibrationOptions options;
+    options.start_line_delay_s = start;
+    const PatternCalibration calibration = calibrate_pattern(data, options);
+    expect_honest(calibration, scene);
+    EXPECT_NEAR(line_delay_of(calibration), from_zero,
+                0.2 * calibration.sigma(LensParameter::kLineDelay));
+    EXPECT_FALSE(calibration.has_global_shutter());
+    EXPECT_THAT(calibration.remarks, IsEmpty());
+  }
 }
 
-TEST(CalibratePattern, GlobalShutterHasNoLineDelay) {
+TEST(CalibratePattern, GlobalShutterHasNoLineDelayAndSaysSo) {
   const test::PatternScene scene = short_scene(0, 15, 5);
-  expect_honest(calibrate_pattern(test::simulate_pattern(scene)), scene);
+  const PatternCalibration calibration = calibrate_pattern(test::simulate_pattern(scene));
+  expect_honest(calibration, scene);
+  EXPECT_TRUE(calibration.has_global_shutter());
+  EXPECT_THAT(calibration.remarks, ElementsAre(HasSubstr("a global shutter")));
 }
 
 TEST(CalibratePattern, WrongDetectionsAreLeftOut) {
   test::PatternScene scene = short_scene(51.56e-6, 15, 6);
-  scene.wrong = 0.03;
+  scene.wrong = 0.05;
   const PatternCalibration calibration = calibrate_pattern(test::simulate_pattern(scene));
   expect_honest(calibration, scene);
   EXPECT_NEAR(calibration.sigma_px, scene.noise_px, 0.05 * scene.noise_px);
   // Within 10 px a side, three in a hundred thousand are too near to the truth to be noticed.
-  EXPECT_GT(calibration.left_out, 0.9 * 0.03 * (calibration.observations + calibration.left_out));
+  EXPECT_GT(calibration.left_out, 0.9 * 0.05 * (calibration.observations + calibration.left_out));
 }
 
-TEST(CalibratePattern, FramesWithoutThePatternAreBridged) {
+TEST(CalibratePattern, LeavesOfFiveSecondsAreBridged) {
   test::PatternScene scene = short_scene(51.56e-6, 15, 7);
+  scene.duration_s = 13;
   PatternData data = test::simulate_pattern(scene);
   for (PatternFrame& frame : data.frames) {
-    if (frame.time_s > 3 && frame.time_s < 5) frame.observations.clear();
+    if (frame.time_s > 4 && frame.time_s < 9) frame.observations.clear();
   }
   expect_honest(calibrate_pattern(data), scene);
+}
+
+// Blurred ones, in which nothing is found: here and there, or every second.
+TEST(CalibratePattern, HalfOfTheFramesMayBeMissing) {
+  test::PatternScene scene = short_scene(51.56e-6, 20, 8);
+  scene.missing_frames = 0.5;
+  expect_honest(calibrate_pattern(test::simulate_pattern(scene)), scene);
+  scene.missing_frames = 0;
+  scene.rate_hz = 24;
+  PatternData data = test::simulate_pattern(scene);
+  for (std::size_t f = 1; f < data.frames.size(); f += 2) data.frames[f].observations.clear();
+  expect_honest(calibrate_pattern(data), scene);
+}
+
+// Half a second's shake in two frames' time: what the curve misses bends the lens, and the sigmas tell of it.
+TEST(CalibratePattern, MotionThatIsAlmostTooFastWidensTheSigmas) {
+  test::PatternScene scene = short_scene(51.56e-6, 15, 2);
+  const double slow_sigma =
+      calibrate_pattern(test::simulate_pattern(scene)).sigma(LensParameter::kLineDelay);
+  scene.speed = 3.6;
+  const PatternCalibration calibration = calibrate_pattern(test::simulate_pattern(scene));
+  expect_honest(calibration, scene);
+  EXPECT_THAT(calibration.remarks, ElementsAre(HasSubstr("almost too fast for 15.0 frames")));
+  EXPECT_GT(calibration.sigma(LensParameter::kLineDelay), slow_sigma);
+}
+
+// Nothing tells of a pattern that is larger in all directions; of one that is longer, that nothing fits.
+TEST(CalibratePattern, OnlyThePatternsShapeIsNoticed) {
+  test::PatternScene scene = short_scene(51.56e-6, 15, 10);
+  scene.duration_s = 5;
+  PatternData data = test::simulate_pattern(scene);
+  for (auto& p : data.points_m) p *= 2;
+  expect_honest(calibrate_pattern(data), scene);
+  for (auto& p : data.points_m) p.x() *= 1.05;
+  const PatternCalibration longer = calibrate_pattern(data);
+  EXPECT_NE(longer.status, PatternStatus::kOk);
+  EXPECT_THAT(longer.message, HasSubstr("not as long and high as told"));
 }
 
 TEST(CalibratePattern, KnownParametersStayAsTheyAre) {
@@ -127,25 +176,41 @@ TEST(CalibratePattern, SaysWhatIsMissing) {
   refused(data, PatternStatus::kTooFewFrames, "in 8 frames only");
   data = good;
   data.frames[3].time_s = data.frames[2].time_s;
-  refused(data, PatternStatus::kBadInput, "times must increase");
+  refused(data, PatternStatus::kBadInput, "frame 3: the time stamp of the one before, 0.133333 s");
+  data.frames[3].time_s = data.frames[1].time_s;
+  refused(data, PatternStatus::kBadInput, "frame 3: its time stamp, 0.066667 s, lies before");
   data = good;
   data.frames[3].observations[0].u.x() = kNan;
-  refused(data, PatternStatus::kBadInput, "finite");
+  refused(data, PatternStatus::kBadInput, "frame 3: a detection is not a finite number");
   data = good;
   data.frames[3].observations[0].point = 54;
-  refused(data, PatternStatus::kBadInput, "");
+  refused(data, PatternStatus::kBadInput, "frame 3: point 54 is none of the pattern's");
 
-  test::PatternScene still = scene;
-  still.speed = 1e-4;
-  const PatternCalibration at_rest = calibrate_pattern(test::simulate_pattern(still));
-  EXPECT_NE(at_rest.status, PatternStatus::kOk);
-  EXPECT_FALSE(at_rest.message.empty());
+  test::PatternScene brief = scene;
+  brief.duration_s = 5;
+  test::PatternScene still = brief;
+  still.hand.amplitude.fill(0);
+  refused(test::simulate_pattern(still), PatternStatus::kNoLineDelay, "stayed where it was");
+  test::PatternScene slow = brief;
+  slow.speed = 0.02;
+  const PatternCalibration hardly = calibrate_pattern(test::simulate_pattern(slow));
+  EXPECT_NE(hardly.status, PatternStatus::kOk);
+  EXPECT_FALSE(hardly.message.empty());
+  // Shifted and turned in its plane, and no more.
+  test::PatternScene flat = brief;
+  flat.hand.amplitude[2] = flat.hand.amplitude[3] = flat.hand.amplitude[4] = 0;
+  refused(test::simulate_pattern(flat), PatternStatus::kNoLens, "show the pattern tilted by 30");
+  test::PatternScene far = brief;
+  far.hand.away_m = 6;
+  const PatternCalibration from_afar = calibrate_pattern(test::simulate_pattern(far));
+  EXPECT_EQ(from_afar.status, PatternStatus::kNoLens);
+  EXPECT_THAT(from_afar.message, AllOf(HasSubstr("focal length known to"), HasSubstr("go nearer")));
 
-  test::PatternScene shaken = scene;
+  test::PatternScene shaken = brief;
   shaken.speed = 8;
   const PatternCalibration too_fast = calibrate_pattern(test::simulate_pattern(shaken));
   EXPECT_EQ(too_fast.status, PatternStatus::kFrameRateTooLow) << too_fast.message;
-  EXPECT_THAT(too_fast.message, HasSubstr("15.0 frames a second; move it more slowly"));
+  EXPECT_THAT(too_fast.message, HasSubstr("15.0 frames a second: move it more slowly"));
 }
 
 }  // namespace

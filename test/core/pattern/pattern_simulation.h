@@ -31,6 +31,7 @@ inline LensVector truth_of(const SimulatedLens& l) {
 struct HandStyle {
   std::array<double, 6> amplitude = {{1, 1, 1, 1, 1, 1}};  // times the usual
   double away_m = 0.55;
+  double tilt_rad = 0;  // about the board's y, as it lies before it moves
 };
 
 struct PatternScene {
@@ -53,7 +54,8 @@ struct PatternScene {
 // Position (m, board's frame: x right, y down, z into the board) and orientation of the camera.
 class HandMotion {
  public:
-  HandMotion(std::uint64_t seed, double speed, const HandStyle& style) : away_m_(style.away_m) {
+  HandMotion(std::uint64_t seed, double speed, const HandStyle& style)
+      : away_m_(style.away_m), tilt_(Eigen::AngleAxisd(style.tilt_rad, Eigen::Vector3d::UnitY())) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> uniform(0, 1);
     // Amplitudes of x, y, z (m) and of the turns about x, y, z (rad): slow and wide, medium, fast and small.
@@ -85,7 +87,7 @@ class HandMotion {
                                   Eigen::AngleAxisd(x[3], Eigen::Vector3d::UnitX()))
                                      .toRotationMatrix();
     // The board turns about its middle, which stays ahead.
-    return turn * (p - board_centre) + Eigen::Vector3d(x[0], x[1], away_m_ + x[2]);
+    return tilt_ * (turn * (p - board_centre)) + Eigen::Vector3d(x[0], x[1], away_m_ + x[2]);
   }
 
  private:
@@ -94,6 +96,7 @@ class HandMotion {
   };
   Wave waves_[6][3];
   double away_m_;
+  Eigen::AngleAxisd tilt_;
 };
 
 inline Eigen::Vector2d simulated_pixel(const SimulatedLens& lens, const Eigen::Vector3d& p) {

@@ -1,0 +1,105 @@
+#include "core/pattern/pattern_checks.h"
+
+#include <Eigen/Geometry>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdio>
+#include <utility>
+#include <vector>
+
+#include "core/model/median.h"
+
+namespace alidade::internal {
+namespace {
+
+using Box = Eigen::AlignedBox2d;
+
+constexpr double kSmall = 0.25;  // of the image, below which nearer helps most
+
+std::string nearer(const PatternViews& views) {
+  if (views.extent >= kSmall) return "";
+  return formatted("go nearer, the pattern fills %.0f %% of the image's width only, and ",
+                   100 * views.extent);
+}
+
+}  // namespace
+
+std::string formatted(const char* format, double a, double b) {
+  char text[320];
+  std::snprintf(text, sizeof text, format, a, b);
+  return text;
+}
+
+std::optional<std::string> bad_input(const PatternData& data) {
+  if (data.width <= 0 || data.height <= 0)
+    return formatted("an image of %.0f x %.0f pixels", data.width, data.height);
+  for (const auto& p : data.points_m) {
+    if (!all_finite(p)) return "a point of the pattern is not a finite number";
+  }
+  for (std::size_t f = 0; f < data.frames.size(); ++f) {
+    const PatternFrame& frame = data.frames[f];
+    const auto number = static_cast<double>(f);
+    if (!std::isfinite(frame.time_s))
+      return formatted("frame %.0f: its time is not a finite number", number);
+    if (f > 0 && frame.time_s <= data.frames[f - 1].time_s) {
+      return formatted(frame.time_s == data.frames[f - 1].time_s
+                           ? "frame %.0f: the time stamp of the one before, %.6f s, again; leave "
+                             "repeated frames "
+                             "out"
+                           : "frame %.0f: its time stamp, %.6f s, lies before the last one's; "
+                             "times must increase",
+                       number, frame.time_s);
+    }
+    for (const PatternObservation& observation : frame.observations) {
+      if (observation.point < 0 || observation.point >= static_cast<int>(data.points_m.size())) {
+        return formatted("frame %.0f: point %.0f is none of the pattern's", number,
+                         observation.point);
+      }
+      if (!all_finite(observation.u))
+        return formatted("frame %.0f: a detection is not a finite number", number);
+    }
+  }
+  return std::nullopt;
+}
+
+double frame_interval(const PatternData& data) {
+  std::vector<double> intervals;
+  for (std::size_t f = 1; f < data.frames.size(); ++f)
+    intervals.push_back(data.frames[f].time_s - data.frames[f - 1].time_s);
+  return intervals.empty() ? 0 : median(std::move(intervals));
+}
+
+PatternViews views_of(const PatternData& data) {
+  PatternViews views;
+  std::vector<Box> of_point(data.points_m.size());
+  std::vector<double> extents;
+  for (const PatternFrame& frame : data.frames) {
+    if (frame.observations.empty()) continue;
+    ++views.frames;
+    Box of_frame;
+    for (const PatternObservation& observation : frame.observations) {
+      of_frame.extend(observation.u);
+      of_point[static_cast<std::size_t>(observation.point)].extend(observation.u);
+    }
+    const Vector2<double> sides = of_frame.sizes();
+    extents.push_back(std::max(sides.x() / data.width, sides.y() / data.height));
+  }
+  std::vector<double> travels;
+  for (const Box& box : of_point) {
+    if (!box.isEmpty()) travels.push_back(box.diagonal().norm());
+  }
+  if (!extents.empty()) views.extent = median(std::move(extents));
+  if (!travels.empty()) views.travel_px = median(std::move(travels));
+  return views;
+}
+
+std::string how_to_move(const PatternViews& views) {
+  return nearer(views) + "move the camera faster, in all directions and by turning it";
+}
+
+std::string how_to_show(const PatternViews& views) {
+  return nearer(views) + "show the pattern tilted by 30 to 45 degrees to all sides, near and far";
+}
+
+}  // namespace alidade::internal
