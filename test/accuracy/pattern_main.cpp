@@ -1,6 +1,6 @@
 // alidade_pattern_accuracy: is the calibration by a known pattern as accurate as it can be, and as it says? (README.md)
 //   alidade_pattern_accuracy [--runs N] [--seed N] [--only SETTING] [--csv FILE]      Monte Carlo; the paper's Tables 1 and 2
-//   alidade_pattern_accuracy --figures DIR [--seed N] [--share S]                    its Table 3, Figures 4 and 5
+//   alidade_pattern_accuracy --figures DIR [--seed N] [--share S]                    its Table 3, Figures 4 and 5, standardisation
 // Exit status: 0 it is, 1 not (the last lines say in what), 2 wrong usage.
 
 #include <CLI/CLI.hpp>
@@ -33,8 +33,10 @@ int main(int argc, char** argv) {
   app.add_option("--only", only, "one setting")->check(CLI::IsMember(names));
   app.add_option("--csv", csv, "also write every run to this file");
   app.add_option("--figures", figures,
-                 "the paper's Table 3, Figures 4 and 5, into this folder, and no Monte Carlo");
-  app.add_option("--share", share, "of Table 3's recordings")->check(CLI::Range(0.0, 1.0));
+                 "the paper's Table 3, Figures 4 and 5, standardisation, into this folder, and no "
+                 "Monte Carlo");
+  app.add_option("--share", share, "of Table 3's recordings, and of 20 for the standardisation")
+      ->check(CLI::Range(0.0, 1.0));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -45,6 +47,8 @@ int main(int argc, char** argv) {
       alidade::test::print_uniform_knots(seed, figures, std::cout);
       alidade::test::print_localization(seed, figures, std::cout);
       alidade::test::print_telephones(share, seed, std::cout);
+      alidade::test::print_standardisation(std::max(2, static_cast<int>(20 * share)), seed,
+                                           std::cout);
     } catch (const std::exception& error) {
       std::cerr << "alidade_pattern_accuracy: " << error.what() << "\n";
       return 1;

@@ -1,6 +1,7 @@
 #include "test/accuracy/pattern_monte_carlo.h"
 
 #include <cmath>
+#include <cstddef>
 #include <iterator>
 
 #include "test/accuracy/report.h"
@@ -13,6 +14,11 @@ namespace {
 constexpr int kLineDelay = index(LensParameter::kLineDelay);
 // What an estimator may lose against the bound.
 constexpr double kLoss = 1.05;
+
+// Another hand and another noise for each setting: their runs are put together.
+std::uint64_t seed_of(std::uint64_t first_seed, std::size_t setting, std::size_t run) {
+  return first_seed + 1000 * setting + run;
+}
 
 std::string within(double value, const Interval& interval) {
   return number(value) + " (" + number(interval.low) + " to " + number(interval.high) + ")";
@@ -49,9 +55,10 @@ std::vector<PatternRuns> run_settings(const std::vector<PatternSetting>& setting
   for (const PatternSetting& setting : settings) all.push_back({setting, {}});
   // By turns: whoever looks early sees something of every setting.
   for (int i = 0; i < runs; ++i) {
-    for (auto& [setting, of_setting] : all) {
+    for (std::size_t k = 0; k < all.size(); ++k) {
+      auto& [setting, of_setting] = all[k];
       PatternScene scene = setting.scene;
-      scene.seed = first_seed + static_cast<std::uint64_t>(i);
+      scene.seed = seed_of(first_seed, k, static_cast<std::size_t>(i));
       of_setting.push_back(run_pattern(scene, true));
       const PatternRun& run = of_setting.back();
       progress << setting.name << ", seed " << scene.seed << ": ";
@@ -130,10 +137,11 @@ void write_pattern_runs(const std::vector<PatternRuns>& all, std::uint64_t first
   for (const char* name : kLensParameterNames)
     csv << ',' << name << "_error," << name << "_sigma," << name << "_bound";
   csv << '\n';
-  for (const auto& [setting, runs] : all) {
+  for (std::size_t k = 0; k < all.size(); ++k) {
+    const auto& [setting, runs] = all[k];
     for (std::size_t i = 0; i < runs.size(); ++i) {
-      csv << setting.name << ',' << first_seed + i << ',' << static_cast<int>(runs[i].status) << ','
-          << runs[i].cpu_s;
+      csv << setting.name << ',' << seed_of(first_seed, k, i) << ','
+          << static_cast<int>(runs[i].status) << ',' << runs[i].cpu_s;
       for (int p = 0; p < kLensParameterCount; ++p)
         csv << ',' << runs[i].error[p] << ',' << std::sqrt(runs[i].covariance(p, p)) << ','
             << std::sqrt(runs[i].bound(p, p));

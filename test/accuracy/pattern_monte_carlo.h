@@ -15,7 +15,7 @@ struct PatternRuns {
   std::vector<PatternRun> runs;
 };
 
-// Seeds first_seed, first_seed + 1, ...; each run is told to `progress` as it ends.
+// Seeds first_seed, first_seed + 1, ..., a thousand further for each setting; each run is told to `progress` as it ends.
 [[nodiscard]] std::vector<PatternRuns> run_settings(const std::vector<PatternSetting>& settings,
                                                     int runs, std::uint64_t first_seed,
                                                     std::ostream& progress);
