@@ -44,12 +44,16 @@ void refine(const cv::Mat& image, std::vector<cv::Point2f>* corners) {
                    {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 40, 0.001});
 }
 
-// One threshold for the whole image, in milliseconds; where that fails, thresholds that adapt to the light, in an image small enough
-// that looking in vain does not take seconds.
+// One threshold for the whole image, in milliseconds.
 bool find_chessboard(const cv::Mat& image, const cv::Size& size,
                      std::vector<cv::Point2f>* corners) {
+  return cv::findChessboardCorners(image, size, *corners, cv::CALIB_CB_FAST_CHECK);
+}
+
+// Where that fails: thresholds that adapt to the light, in an image small enough that looking in vain does not take seconds.
+bool find_chessboard_in_any_light(const cv::Mat& image, const cv::Size& size,
+                                  std::vector<cv::Point2f>* corners) {
   constexpr int kLargest_px = 400;
-  if (cv::findChessboardCorners(image, size, *corners, cv::CALIB_CB_FAST_CHECK)) return true;
   const double scale =
       std::min(1.0, static_cast<double>(kLargest_px) / std::max(image.cols, image.rows));
   cv::Mat small;
@@ -106,10 +110,26 @@ bool find_circles(const cv::Mat& image, const KnownPattern& pattern,
 struct PatternDetector::State {
   KnownPattern pattern;
   std::unique_ptr<internal::TagGrid> tags;
+  int in_vain = 0;  // images in a row in which thresholds that adapt were of no use
 
-  bool find_grid(const cv::Mat& image, std::vector<cv::Point2f>* corners) const {
+  // Light changes slowly: what did not help in the last images is tried now and then only.
+  bool try_any_light(const cv::Mat& image, std::vector<cv::Point2f>* corners) {
+    constexpr int kPatience = 4;
+    constexpr int kEvery = 8;
+    const bool skip = in_vain >= kPatience && in_vain % kEvery != 0;
+    ++in_vain;
+    if (skip || !find_chessboard_in_any_light(image, {pattern.columns, pattern.rows}, corners))
+      return false;
+    in_vain = 0;
+    return true;
+  }
+
+  bool find_grid(const cv::Mat& image, std::vector<cv::Point2f>* corners) {
     if (pattern.kind == PatternKind::kChessboard) {
-      if (!find_chessboard(image, {pattern.columns, pattern.rows}, corners)) return false;
+      if (!find_chessboard(image, {pattern.columns, pattern.rows}, corners) &&
+          !try_any_light(image, corners)) {
+        return false;
+      }
       refine(image, corners);
       return true;
     }
