@@ -22,6 +22,9 @@ constexpr double kLeastCircleContrast = 10;  // grey levels
 constexpr int kTerms = 10;                   // of a polynomial of third degree
 constexpr std::size_t kManyPoints = 20;      // that determine it
 constexpr double kDrawnRadius = 0.25;
+// Of an area from the others', relative, beyond which something lies on the circle: at least, and of the median one.
+constexpr double kLeastDifference = 0.01;
+constexpr double kDifferences = 7;
 
 struct Blob {
   cv::Point2d centre;
@@ -166,8 +169,9 @@ Outline outline(const GridMap& map, const Vector2<double>& centre, double radius
 
 }  // namespace
 
-void refine_circles(const cv::Mat& image, const KnownPattern& pattern,
-                    std::vector<cv::Point2f>* centres) {
+std::vector<char> refine_circles(const cv::Mat& image, const KnownPattern& pattern,
+                                 std::vector<cv::Point2f>* centres) {
+  std::vector<char> is_whole(centres->size(), 1);
   // In units of the least distance of two circles.
   const double spacing =
       pattern.size_m * (pattern.kind == PatternKind::kSymmetricCircles ? 1 : std::sqrt(2.0));
@@ -177,7 +181,7 @@ void refine_circles(const cv::Mat& image, const KnownPattern& pattern,
   }
   const auto place = [&](std::size_t i) { return Vector2<double>(places[i].x, places[i].y); };
   const GridMap rough(places, *centres);
-  if (!rough.is_valid()) return;
+  if (!rough.is_valid()) return is_whole;
   std::vector<Blob> blobs;
   for (std::size_t i = 0; i < places.size(); ++i) {
     constexpr double kStep = 0.1;
@@ -188,25 +192,28 @@ void refine_circles(const cv::Mat& image, const KnownPattern& pattern,
     }
     const Window window{J.inverse(), kCircleWindow * J.row(0).norm(),
                         kCircleWindow * J.row(1).norm()};
-    if (!window.pattern_from_image.allFinite()) return;
+    if (!window.pattern_from_image.allFinite()) return is_whole;
     blobs.push_back(centroid(image, (*centres)[i], window));
     (*centres)[i] = blobs.back().centre;
   }
   const GridMap map(places, *centres);
-  if (!map.is_valid()) return;
-  std::vector<double> squares;  // of the radius
+  if (!map.is_valid()) return is_whole;
+  std::vector<double> ratios;  // of the areas measured to those of circles as drawn
+  for (std::size_t i = 0; i < places.size(); ++i)
+    ratios.push_back(blobs[i].area / outline(map, place(i), kDrawnRadius).area);
+  const double ratio = median(ratios);
+  if (!(ratio > 0)) return is_whole;
+  const double radius = kDrawnRadius * std::sqrt(ratio);
+  std::vector<double> differences;
+  for (const double r : ratios) differences.push_back(std::abs(r / ratio - 1));
+  const double limit = std::max(kLeastDifference, kDifferences * median(differences));
   for (std::size_t i = 0; i < places.size(); ++i) {
-    const double area = outline(map, place(i), kDrawnRadius).area;
-    if (blobs[i].area > 0 && area > 0)
-      squares.push_back(blobs[i].area / area * kDrawnRadius * kDrawnRadius);
-  }
-  if (squares.empty()) return;
-  const double radius = std::sqrt(median(std::move(squares)));
-  for (std::size_t i = 0; i < places.size(); ++i) {
+    is_whole[i] = differences[i] <= limit ? 1 : 0;
     const Vector2<double> beside = outline(map, place(i), radius).centroid - map(place(i));
     if (all_finite(beside))
       (*centres)[i] -= cv::Point2f(static_cast<float>(beside.x()), static_cast<float>(beside.y()));
   }
+  return is_whole;
 }
 
 }  // namespace alidade::internal

@@ -12,8 +12,9 @@
 
 namespace alidade::internal {
 
-// centres: OpenCV's pixels, in the order of pattern.points_m(); where a circle cannot be measured they stay as they are.
-void refine_circles(const cv::Mat& image, const KnownPattern& pattern,
-                    std::vector<cv::Point2f>* centres);
+// centres: OpenCV's pixels, in the order of pattern.points_m(). By centre: 0 where the circle's area is not what the others let
+// expect, because something lies on it or it could not be measured.
+[[nodiscard]] std::vector<char> refine_circles(const cv::Mat& image, const KnownPattern& pattern,
+                                               std::vector<cv::Point2f>* centres);
 
 }  // namespace alidade::internal

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
@@ -124,7 +125,11 @@ struct PatternDetector::State {
     return true;
   }
 
-  bool find_grid(const cv::Mat& image, std::vector<cv::Point2f>* corners) {
+  bool find_grid(const cv::Mat& image, std::vector<cv::Point2f>* corners,
+                 std::vector<int>* points) {
+    const std::size_t count = static_cast<std::size_t>(pattern.columns * pattern.rows);
+    points->resize(count);
+    std::iota(points->begin(), points->end(), 0);
     if (pattern.kind == PatternKind::kChessboard) {
       if (!find_chessboard(image, {pattern.columns, pattern.rows}, corners) &&
           !try_any_light(image, corners)) {
@@ -134,7 +139,15 @@ struct PatternDetector::State {
       return true;
     }
     if (!find_circles(image, pattern, corners)) return false;
-    internal::refine_circles(image, pattern, corners);
+    const std::vector<char> is_whole = internal::refine_circles(image, pattern, corners);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (is_whole[i] == 0) continue;
+      (*points)[kept] = (*points)[i];
+      (*corners)[kept++] = (*corners)[i];
+    }
+    points->resize(kept);
+    corners->resize(kept);
     return true;
   }
 
@@ -170,9 +183,7 @@ std::vector<PatternObservation> PatternDetector::find(const std::uint8_t* luma, 
   try {
     if (state_->pattern.kind == PatternKind::kAprilGrid) {
       state_->find_tags(image, &corners, &points);
-    } else if (state_->find_grid(image, &corners)) {
-      for (std::size_t i = 0; i < corners.size(); ++i) points.push_back(static_cast<int>(i));
-    } else {
+    } else if (!state_->find_grid(image, &corners, &points)) {
       corners.clear();
     }
   } catch (const cv::Exception&) {
@@ -192,16 +203,18 @@ void follow_half_turns(const KnownPattern& pattern, double max_gap_s, PatternDat
   for (PatternFrame& frame : data->frames) {
     if (frame.observations.empty()) continue;
     const auto last = static_cast<int>(data->points_m.size()) - 1;
-    // Symmetric patterns are found whole.
-    if (before != nullptr && frame.time_s - before->time_s <= max_gap_s &&
-        before->observations.size() == frame.observations.size()) {
+    if (before != nullptr && frame.time_s - before->time_s <= max_gap_s) {
+      std::vector<const PatternObservation*> there(data->points_m.size(), nullptr);
+      for (const PatternObservation& observation : before->observations)
+        there[static_cast<std::size_t>(observation.point)] = &observation;
       double same = 0;
       double turned = 0;
-      for (std::size_t i = 0; i < frame.observations.size(); ++i) {
-        same += (frame.observations[i].u - before->observations[i].u).norm();
-        turned +=
-            (frame.observations[frame.observations.size() - 1 - i].u - before->observations[i].u)
-                .norm();
+      for (const PatternObservation& observation : frame.observations) {
+        const PatternObservation* a = there[static_cast<std::size_t>(observation.point)];
+        const PatternObservation* b = there[static_cast<std::size_t>(last - observation.point)];
+        if (a == nullptr || b == nullptr) continue;
+        same += (observation.u - a->u).norm();
+        turned += (observation.u - b->u).norm();
       }
       if (turned < same) {
         std::reverse(frame.observations.begin(), frame.observations.end());
