@@ -48,7 +48,10 @@ void refine(const cv::Mat& image, std::vector<cv::Point2f>* corners) {
 // One threshold for the whole image, in milliseconds.
 bool find_chessboard(const cv::Mat& image, const cv::Size& size,
                      std::vector<cv::Point2f>* corners) {
-  return cv::findChessboardCorners(image, size, *corners, cv::CALIB_CB_FAST_CHECK);
+  // Noise makes thousands of quads, each of which costs time.
+  cv::Mat smooth;
+  cv::GaussianBlur(image, smooth, {0, 0}, kSearchSmoothing_px);
+  return cv::findChessboardCorners(smooth, size, *corners, cv::CALIB_CB_FAST_CHECK);
 }
 
 // Where that fails: thresholds that adapt to the light, in an image small enough that looking in vain does not take seconds.
@@ -59,7 +62,6 @@ bool find_chessboard_in_any_light(const cv::Mat& image, const cv::Size& size,
       std::min(1.0, static_cast<double>(kLargest_px) / std::max(image.cols, image.rows));
   cv::Mat small;
   cv::resize(image, small, {}, scale, scale, cv::INTER_AREA);
-  // Noise makes thousands of quads, each of which costs time.
   cv::GaussianBlur(small, small, {0, 0}, kSearchSmoothing_px);
   if (!cv::findChessboardCorners(
           small, size, *corners,
