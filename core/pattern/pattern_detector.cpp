@@ -1,13 +1,15 @@
 #include "core/pattern/pattern_detector.h"
 
-#include <apriltag.h>
-#include <tag36h11.h>
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <opencv2/calib3d.hpp>
+#include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
+
+#include "core/pattern/circle_centres.h"
+#include "core/pattern/tag_grid.h"
 
 namespace alidade {
 namespace {
@@ -16,6 +18,9 @@ namespace {
 constexpr double kWindow = 0.35;
 constexpr int kLargestWindow_px = 11;
 constexpr int kLeastWindow_px = 2;
+constexpr double kSmoothing = 0.14;  // standard deviation, of half the window
+constexpr double kSearchSmoothing_px = 1.2;
+constexpr double kLeastImageContrast = 20;  // grey levels, of an image with circles
 constexpr int kLeastImage_px = 32;
 
 // Half the side of the window around each corner, from the least distance to another.
@@ -33,20 +38,31 @@ int window_of(const std::vector<cv::Point2f>& corners) {
 
 void refine(const cv::Mat& image, std::vector<cv::Point2f>* corners) {
   const int half = window_of(*corners);
-  cv::cornerSubPix(image, *corners, {half, half}, {-1, -1},
+  // Gradients by differences are wrong where edges are sharper than pixels: corners are three times better for it.
+  cv::Mat smooth;
+  cv::GaussianBlur(image, smooth, {0, 0}, kSmoothing * half);
+  cv::cornerSubPix(smooth, *corners, {half, half}, {-1, -1},
                    {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 40, 0.001});
 }
 
-// One threshold for the whole image, in milliseconds; where that fails, thresholds that adapt to the light, in an image small enough
-// that looking in vain does not take seconds.
+// One threshold for the whole image, in milliseconds.
 bool find_chessboard(const cv::Mat& image, const cv::Size& size,
                      std::vector<cv::Point2f>* corners) {
+  // Noise makes thousands of quads, each of which costs time.
+  cv::Mat smooth;
+  cv::GaussianBlur(image, smooth, {0, 0}, kSearchSmoothing_px);
+  return cv::findChessboardCorners(smooth, size, *corners, cv::CALIB_CB_FAST_CHECK);
+}
+
+// Where that fails: thresholds that adapt to the light, in an image small enough that looking in vain does not take seconds.
+bool find_chessboard_in_any_light(const cv::Mat& image, const cv::Size& size,
+                                  std::vector<cv::Point2f>* corners) {
   constexpr int kLargest_px = 400;
-  if (cv::findChessboardCorners(image, size, *corners, cv::CALIB_CB_FAST_CHECK)) return true;
   const double scale =
       std::min(1.0, static_cast<double>(kLargest_px) / std::max(image.cols, image.rows));
   cv::Mat small;
   cv::resize(image, small, {}, scale, scale, cv::INTER_AREA);
+  cv::GaussianBlur(small, small, {0, 0}, kSearchSmoothing_px);
   if (!cv::findChessboardCorners(
           small, size, *corners,
           cv::CALIB_CB_ADAPTIVE_THRESH | cv::CALIB_CB_NORMALIZE_IMAGE | cv::CALIB_CB_FAST_CHECK)) {
@@ -59,60 +75,99 @@ bool find_chessboard(const cv::Mat& image, const cv::Size& size,
   return true;
 }
 
-struct DetectorEnd {
-  void operator()(apriltag_detector_t* detector) const { apriltag_detector_destroy(detector); }
-};
-struct FamilyEnd {
-  void operator()(apriltag_family_t* family) const { tag36h11_destroy(family); }
-};
+// low, high: the darkest and the brightest of it.
+cv::Ptr<cv::SimpleBlobDetector> blob_detector(const cv::Mat& image, double low, double high,
+                                              int circles) {
+  cv::SimpleBlobDetector::Params params;
+  params.minThreshold = static_cast<float>(low + 0.2 * (high - low));
+  params.maxThreshold = static_cast<float>(low + 0.8 * (high - low));
+  params.thresholdStep = static_cast<float>(0.1 * (high - low));
+  params.minDistBetweenBlobs = 5;
+  params.minArea = 10;
+  params.maxArea = static_cast<float>(image.total()) / static_cast<float>(circles);
+  return cv::SimpleBlobDetector::create(params);
+}
+
+// In an image of half the size, where noise makes few blobs, then in all of it.
+bool find_circles(const cv::Mat& image, const KnownPattern& pattern,
+                  std::vector<cv::Point2f>* centres) {
+  const cv::Size size(pattern.columns, pattern.rows);
+  const int flags = pattern.kind == PatternKind::kSymmetricCircles ? cv::CALIB_CB_SYMMETRIC_GRID
+                                                                   : cv::CALIB_CB_ASYMMETRIC_GRID;
+  double low = 0;
+  double high = 0;
+  cv::minMaxLoc(image, &low, &high);
+  if (high - low < kLeastImageContrast) return false;
+  const auto blobs = [&](const cv::Mat& of) { return blob_detector(of, low, high, size.area()); };
+  cv::Mat half;
+  cv::resize(image, half, {}, 0.5, 0.5, cv::INTER_AREA);
+  if (cv::findCirclesGrid(half, size, *centres, flags, blobs(half))) {
+    for (cv::Point2f& centre : *centres) centre = 2 * centre + cv::Point2f(0.5F, 0.5F);
+    return true;
+  }
+  return cv::findCirclesGrid(image, size, *centres, flags, blobs(image));
+}
 
 }  // namespace
 
 struct PatternDetector::State {
   KnownPattern pattern;
-  std::unique_ptr<apriltag_family_t, FamilyEnd> family;
-  std::unique_ptr<apriltag_detector_t, DetectorEnd> detector;
+  std::unique_ptr<internal::TagGrid> tags;
+  int in_vain = 0;  // images in a row in which thresholds that adapt were of no use
 
-  bool find_grid(const cv::Mat& image, std::vector<cv::Point2f>* corners) const {
-    const cv::Size size(pattern.columns, pattern.rows);
+  // Light changes slowly: what did not help in the last images is tried now and then only.
+  bool try_any_light(const cv::Mat& image, std::vector<cv::Point2f>* corners) {
+    constexpr int kPatience = 4;
+    constexpr int kEvery = 8;
+    const bool skip = in_vain >= kPatience && in_vain % kEvery != 0;
+    ++in_vain;
+    if (skip || !find_chessboard_in_any_light(image, {pattern.columns, pattern.rows}, corners))
+      return false;
+    in_vain = 0;
+    return true;
+  }
+
+  bool find_grid(const cv::Mat& image, std::vector<cv::Point2f>* corners,
+                 std::vector<int>* points) {
+    const std::size_t count = static_cast<std::size_t>(pattern.columns * pattern.rows);
+    points->resize(count);
+    std::iota(points->begin(), points->end(), 0);
     if (pattern.kind == PatternKind::kChessboard) {
-      if (!find_chessboard(image, size, corners)) return false;
+      if (!find_chessboard(image, {pattern.columns, pattern.rows}, corners) &&
+          !try_any_light(image, corners)) {
+        return false;
+      }
       refine(image, corners);
       return true;
     }
-    const bool symmetric = pattern.kind == PatternKind::kSymmetricCircles;
-    return cv::findCirclesGrid(
-        image, size, *corners,
-        symmetric ? cv::CALIB_CB_SYMMETRIC_GRID : cv::CALIB_CB_ASYMMETRIC_GRID);
+    if (!find_circles(image, pattern, corners)) return false;
+    const std::vector<char> is_whole = internal::refine_circles(image, pattern, corners);
+    std::size_t kept = 0;
+    for (std::size_t i = 0; i < count; ++i) {
+      if (is_whole[i] == 0) continue;
+      (*points)[kept] = (*points)[i];
+      (*corners)[kept++] = (*corners)[i];
+    }
+    points->resize(kept);
+    corners->resize(kept);
+    return true;
   }
 
   void find_tags(const cv::Mat& image, std::vector<cv::Point2f>* corners,
                  std::vector<int>* points) const {
-    image_u8_t view = {image.cols, image.rows, static_cast<int32_t>(image.step), image.data};
-    zarray_t* found = apriltag_detector_detect(detector.get(), &view);
-    for (int i = 0; i < zarray_size(found); ++i) {
-      apriltag_detection_t* tag = nullptr;
-      zarray_get(found, i, static_cast<void*>(&tag));
-      if (tag->id >= pattern.columns * pattern.rows || tag->hamming > 1) continue;
-      for (int k = 0; k < 4; ++k) {
-        // libapriltag's image spans [0, w] x [0, h]; OpenCV's begins at the first pixel's centre.
-        corners->emplace_back(static_cast<float>(tag->p[k][0] - 0.5),
-                              static_cast<float>(tag->p[k][1] - 0.5));
-        points->push_back(4 * tag->id + k);
-      }
+    int point = 0;
+    for (const internal::TagGrid::Corners& tag : tags->find(image)) {
+      for (std::size_t k = 0; k < tag.size(); ++k) points->push_back(point + static_cast<int>(k));
+      corners->insert(corners->end(), tag.begin(), tag.end());
+      point += 4;
     }
-    apriltag_detections_destroy(found);
-    if (!corners->empty()) refine(image, corners);
   }
 };
 
 PatternDetector::PatternDetector(const KnownPattern& pattern) : state_(std::make_unique<State>()) {
   state_->pattern = pattern;
-  if (pattern.kind != PatternKind::kAprilGrid) return;
-  state_->family.reset(tag36h11_create());
-  state_->detector.reset(apriltag_detector_create());
-  state_->detector->quad_decimate = 1;
-  apriltag_detector_add_family(state_->detector.get(), state_->family.get());
+  if (pattern.kind == PatternKind::kAprilGrid)
+    state_->tags = std::make_unique<internal::TagGrid>(pattern);
 }
 
 PatternDetector::~PatternDetector() = default;
@@ -130,9 +185,7 @@ std::vector<PatternObservation> PatternDetector::find(const std::uint8_t* luma, 
   try {
     if (state_->pattern.kind == PatternKind::kAprilGrid) {
       state_->find_tags(image, &corners, &points);
-    } else if (state_->find_grid(image, &corners)) {
-      for (std::size_t i = 0; i < corners.size(); ++i) points.push_back(static_cast<int>(i));
-    } else {
+    } else if (!state_->find_grid(image, &corners, &points)) {
       corners.clear();
     }
   } catch (const cv::Exception&) {
@@ -152,16 +205,18 @@ void follow_half_turns(const KnownPattern& pattern, double max_gap_s, PatternDat
   for (PatternFrame& frame : data->frames) {
     if (frame.observations.empty()) continue;
     const auto last = static_cast<int>(data->points_m.size()) - 1;
-    // Symmetric patterns are found whole.
-    if (before != nullptr && frame.time_s - before->time_s <= max_gap_s &&
-        before->observations.size() == frame.observations.size()) {
+    if (before != nullptr && frame.time_s - before->time_s <= max_gap_s) {
+      std::vector<const PatternObservation*> there(data->points_m.size(), nullptr);
+      for (const PatternObservation& observation : before->observations)
+        there[static_cast<std::size_t>(observation.point)] = &observation;
       double same = 0;
       double turned = 0;
-      for (std::size_t i = 0; i < frame.observations.size(); ++i) {
-        same += (frame.observations[i].u - before->observations[i].u).norm();
-        turned +=
-            (frame.observations[frame.observations.size() - 1 - i].u - before->observations[i].u)
-                .norm();
+      for (const PatternObservation& observation : frame.observations) {
+        const PatternObservation* a = there[static_cast<std::size_t>(observation.point)];
+        const PatternObservation* b = there[static_cast<std::size_t>(last - observation.point)];
+        if (a == nullptr || b == nullptr) continue;
+        same += (observation.u - a->u).norm();
+        turned += (observation.u - b->u).norm();
       }
       if (turned < same) {
         std::reverse(frame.observations.begin(), frame.observations.end());

@@ -1,13 +1,10 @@
 #include "test/simulator/config.h"
 
-#include <yaml-cpp/yaml.h>
-
 #include <cmath>
 #include <cstdlib>
-#include <functional>
-#include <limits>
-#include <set>
 #include <utility>
+
+#include "test/simulator/config_section.h"
 
 namespace alidade::simulator {
 namespace {
@@ -16,136 +13,6 @@ constexpr double kPi = 3.14159265358979323846;
 constexpr double kDegree = kPi / 180;
 constexpr double kMilli = 1e-3;
 constexpr double kMicro = 1e-6;
-constexpr double kInfinity = std::numeric_limits<double>::infinity();
-
-struct Range {
-  double lowest;
-  double highest;
-};
-constexpr Range kAny{-kInfinity, kInfinity};
-constexpr Range kNotNegative{0, kInfinity};
-constexpr Range kPositive{std::numeric_limits<double>::min(), kInfinity};
-constexpr Range kUnitInterval{0, 1};
-constexpr Range kPort{0, 65535};
-
-// One mapping of the file: every key is asked for by name, and finish() rejects what nobody asked
-// for. A key that is absent leaves the value as it was.
-class Section {
- public:
-  Section(std::filesystem::path file, const YAML::Node& node, std::string name)
-      : file_(std::move(file)), node_(node), name_(std::move(name)) {
-    if (!node_.IsMap()) fail(node_, "'" + name_ + "' must hold keys with values");
-  }
-
-  [[noreturn]] void fail(const YAML::Node& node, const std::string& what) const {
-    throw ConfigError(file_.string() + ":" + std::to_string(node.Mark().line + 1) + ": " + what);
-  }
-  [[noreturn]] void fail(const std::string& what) const { fail(node_, what); }
-
-  // The number in the file times `unit` becomes the value; the range is that of the file.
-  void number(const char* key, double* value, Range range = kAny, double unit = 1) {
-    if (const YAML::Node node = take(key)) *value = scalar(node, key, range) * unit;
-  }
-
-  void integer(const char* key, int* value, Range range) {
-    if (const YAML::Node node = take(key)) {
-      const double number = scalar(node, key, range);
-      if (number != std::floor(number)) fail(node, std::string(key) + " must be a whole number");
-      *value = static_cast<int>(number);
-    }
-  }
-
-  void pair(const char* key, Eigen::Vector2d* value, double unit) {
-    if (const YAML::Node node = take(key)) {
-      if (!node.IsSequence() || node.size() != 2) {
-        fail(node, std::string(key) + " must be two numbers: [a, b]");
-      }
-      *value = Eigen::Vector2d(scalar(node[0], key, kAny), scalar(node[1], key, kAny)) * unit;
-    }
-  }
-
-  void text(const char* key, std::string* value) {
-    if (const YAML::Node node = take(key)) {
-      if (!node.IsScalar()) fail(node, std::string(key) + " must be a text");
-      *value = node.Scalar();
-    }
-  }
-
-  void path(const char* key, std::filesystem::path* value) {
-    std::string name;
-    text(key, &name);
-    if (!name.empty()) *value = file_.parent_path() / name;
-  }
-
-  template <class Value>
-  void choice(const char* key, Value* value,
-              const std::vector<std::pair<const char*, Value>>& choices) {
-    const YAML::Node node = take(key);
-    if (!node) return;
-    std::string names;
-    for (const auto& [name, choice] : choices) {
-      if (node.IsScalar() && node.Scalar() == name) {
-        *value = choice;
-        return;
-      }
-      names += (names.empty() ? "" : ", ") + std::string(name);
-    }
-    fail(node, std::string(key) + " must be one of: " + names);
-  }
-
-  void section(const char* key, const std::function<void(Section&)>& read) {
-    if (const YAML::Node node = take(key)) visit(node, key, read);
-  }
-
-  void list(const char* key, const std::function<void(Section&)>& read) {
-    const YAML::Node node = take(key);
-    if (!node) return;
-    if (!node.IsSequence()) fail(node, std::string(key) + " must be a list");
-    for (const YAML::Node& item : node) visit(item, key, read);
-  }
-
-  void finish() const {
-    for (const auto& item : node_) {
-      const std::string key = item.first.Scalar();
-      if (known_.count(key) == 0) fail(item.first, "unknown key '" + key + "' in " + name_);
-    }
-  }
-
- private:
-  YAML::Node take(const char* key) {
-    known_.insert(key);
-    return std::as_const(node_)[key];
-  }
-
-  void visit(const YAML::Node& node, const char* key, const std::function<void(Section&)>& read) {
-    Section section(file_, node, key);
-    read(section);
-    section.finish();
-  }
-
-  double scalar(const YAML::Node& node, const char* key, Range range) const {
-    double value = 0;
-    if (!node.IsScalar() || !YAML::convert<double>::decode(node, value) || !std::isfinite(value)) {
-      fail(node, std::string(key) + " must be a number");
-    }
-    if (value < range.lowest || value > range.highest) {
-      std::string bounds = range.lowest == kPositive.lowest ? "more than 0" : "";
-      if (bounds.empty() && range.highest == kInfinity) bounds = "0 or more";
-      if (bounds.empty()) {
-        bounds = "between " + YAML::Node(range.lowest).Scalar() + " and " +
-                 YAML::Node(range.highest).Scalar();
-      }
-      fail(node, std::string(key) + " is " + node.Scalar() + ", must be " + bounds);
-    }
-    return value;
-  }
-
-  std::filesystem::path file_;
-  YAML::Node node_;
-  std::string name_;
-  std::set<std::string> known_;
-};
-
 void read_image(Section& section, ImageConfig* image) {
   section.integer("width", &image->width, {16, 16384});
   section.integer("height", &image->height, {16, 16384});
@@ -350,6 +217,43 @@ void read_live(Section& section, LiveConfig* live) {
   }
 }
 
+void read_pattern(Section& section, PatternConfig* pattern) {
+  using Kind = PatternConfig::Kind;
+  section.choice<Kind>("kind", &pattern->kind,
+                       {{"chessboard", Kind::kChessboard},
+                        {"circles", Kind::kCircles},
+                        {"symmetric_circles", Kind::kSymmetricCircles},
+                        {"april_grid", Kind::kAprilGrid}});
+  section.integer("columns", &pattern->columns, {1, 100});
+  section.integer("rows", &pattern->rows, {1, 100});
+  section.number("size_mm", &pattern->size, kPositive, kMilli);
+  section.number("gap", &pattern->gap, kPositive);
+  section.flag("corner_squares", &pattern->corner_squares);
+  section.number("black", &pattern->black, kUnitInterval);
+  section.number("white", &pattern->white, kUnitInterval);
+  section.number("table", &pattern->table, kUnitInterval);
+  section.number("finger_mm", &pattern->finger, kNotNegative, kMilli);
+  section.section("lens", [&](Section& item) {
+    PatternConfig::Lens& lens = pattern->lens;
+    item.number("focal_length_u_px", &lens.focal_length_u, kPositive);
+    item.number("focal_length_v_px", &lens.focal_length_v, kPositive);
+    item.number("centre_u_px", &lens.centre_u);
+    item.number("centre_v_px", &lens.centre_v);
+    item.number("k1", &lens.k1);
+    item.number("k2", &lens.k2);
+    item.number("p1", &lens.p1);
+    item.number("p2", &lens.p2);
+  });
+  section.section("hand", [&](Section& item) {
+    item.number("distance_mm", &pattern->hand.distance, kPositive, kMilli);
+    item.number("speed", &pattern->hand.speed, kNotNegative);
+    item.number("reach", &pattern->hand.reach, kNotNegative);
+  });
+  if (pattern->kind == Kind::kAprilGrid && pattern->columns * pattern->rows > 587) {
+    section.fail("pattern has more than the 587 tags of family 36h11");
+  }
+}
+
 void read_config(Section& section, Config* config) {
   double seed = 1;
   section.number("seed", &seed, {0, 9007199254740992.0});
@@ -364,6 +268,10 @@ void read_config(Section& section, Config* config) {
   section.section("timing", [&](Section& item) { read_timing(item, &config->timing); });
   section.section("recording", [&](Section& item) { read_recording(item, &config->recording); });
   section.section("live", [&](Section& item) { read_live(item, &config->live); });
+  section.section("pattern", [&](Section& item) {
+    config->pattern.emplace();
+    read_pattern(item, &*config->pattern);
+  });
   section.section("guess", [&](Section& item) {
     double focal_length = 0;
     item.number("focal_length_px", &focal_length, kPositive);
@@ -373,6 +281,9 @@ void read_config(Section& section, Config* config) {
   section.finish();
   if (std::abs(config->camera.line_delay) * config->image.height * config->image.rate_hz > 1) {
     section.fail("camera: reading out all rows (line_delay_us x height) outlasts a frame");
+  }
+  if (config->pattern && config->recording.images == RecordingConfig::Images::kNone) {
+    section.fail("recording: a pattern needs images: video, png or pgm");
   }
 }
 

@@ -136,6 +136,29 @@ struct LiveConfig {
   Link head_link = Link::kSerial;
 };
 
+// A printed pattern before a camera held by hand, in place of a scene and a head (pattern_board.h, pattern_camera.h).
+struct PatternConfig {
+  enum class Kind { kChessboard, kCircles, kSymmetricCircles, kAprilGrid };
+  struct Lens {
+    double focal_length_u = 600, focal_length_v = 602, centre_u = 380, centre_v = 236;  // px
+    double k1 = -0.28, k2 = 0.08, p1 = 3e-4, p2 = -2e-4;
+  };
+  struct Hand {
+    double distance = 0.55;  // m, of the pattern's middle
+    double speed = 1;        // 0 = at rest
+    double reach = 1;        // sideways; from about 2 on the pattern leaves the view in part
+  };
+  Kind kind = Kind::kChessboard;
+  int columns = 9, rows = 6;
+  double size = 0.03;          // m
+  double gap = 0.3;            // AprilGrid: part of size
+  bool corner_squares = true;  // AprilGrid: kalibr's
+  double black = 0.16, white = 0.82, table = 0.47;
+  double finger = 0;  // m, diameter of what goes round on the board; 0 = nothing
+  Lens lens;
+  Hand hand;
+};
+
 struct Config {
   std::uint64_t seed = 1;
   double duration = 0;  // s; 0: live without end
@@ -148,6 +171,7 @@ struct Config {
   TimingConfig timing;
   RecordingConfig recording;
   LiveConfig live;
+  std::optional<PatternConfig> pattern;
   std::optional<double> guess_focal_length;  // px, of guess.yaml; default: the truth, rounded
   std::filesystem::path truth_dir;           // live: where truth.yaml and truth.csv go
 };

@@ -85,6 +85,15 @@ TEST_F(VirtualCameraConfig, NamesFileAndLineOfEveryMistake) {
            Mistake{"live: {codec: h264, mjpeg_port: 0}\n",
                    "camera.yaml:1: mjpeg_port needs codec: mjpeg"},
            Mistake{"live: {user: me}\n", "camera.yaml:1: user and password_env come together"},
+           Mistake{"pattern: {kind: dots}\n",
+                   "camera.yaml:1: kind must be one of: chessboard, circles, symmetric_circles, "
+                   "april_grid"},
+           Mistake{"pattern:\n  kind: april_grid\n  columns: 30\n  rows: 30\n",
+                   "camera.yaml:2: pattern has more than the 587 tags of family 36h11"},
+           Mistake{"pattern: {corner_squares: 2}\n",
+                   "camera.yaml:1: corner_squares must be true or false"},
+           Mistake{"pattern: {}\nrecording: {images: none}\n",
+                   "camera.yaml:1: recording: a pattern needs images: video, png or pgm"},
            Mistake{"camera: {line_delay_us: 60}\n",
                    "camera.yaml:1: camera: reading out all rows (line_delay_us x height) outlasts "
                    "a frame"},

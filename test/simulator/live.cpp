@@ -159,6 +159,7 @@ void start(Server& server) {
 }  // namespace
 
 void serve_live(const Config& config, const std::atomic<bool>& stop) {
+  if (config.pattern) throw ConfigError("pattern: is for recordings; name a directory with -o");
   const double video_latency = config.telemetry.latency - config.camera.clock_offset;
   if (video_latency < 0) {
     throw ConfigError(

@@ -186,5 +186,12 @@ TEST(VirtualCameraProgram, EndsByItselfAfterItsDuration) {
   EXPECT_EQ(lines, 1 + 5);
 }
 
+TEST(VirtualCameraProgram, SaysThatAPatternIsForRecordings) {
+  const TemporaryDirectory directory;
+  Child child({"-c", directory.write("a.yaml", "pattern: {kind: circles}\n")});
+  EXPECT_THAT(child.read_line(), HasSubstr("pattern: is for recordings; name a directory with -o"));
+  EXPECT_EQ(child.exit_code(), 2);
+}
+
 }  // namespace
 }  // namespace alidade

@@ -1,8 +1,10 @@
 #include "test/simulator/recording_writer.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <map>
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
@@ -12,6 +14,7 @@
 #include <vector>
 
 #include "test/simulator/parallel.h"
+#include "test/simulator/pattern_renderer.h"
 #include "test/simulator/random.h"
 #include "test/simulator/renderer.h"
 #include "test/simulator/servers/encoder.h"
@@ -188,8 +191,33 @@ std::vector<std::uint8_t> encode(const Config& config, std::vector<std::uint8_t>
   return bytes;
 }
 
-void write_images(const Config& config, const std::vector<FrameEvent>& frames,
-                  const Renderer& renderer, const fs::path& directory) {
+// Before a pattern a head says nothing, and a sender's exact clock would hide the stamps' jitter.
+void write_pattern_frames(const std::vector<FrameEvent>& frames, const PatternCamera& camera,
+                          const fs::path& directory) {
+  OutputFile stamps(directory / "frames.csv");
+  OutputFile truth(directory / "truth.csv");
+  stamps.stream() << "frame,receive_time_s,sequence\n";
+  truth.stream() << "frame,time_s,x_m,y_m,z_m,q_x,q_y,q_z,q_w,sequence,stamp_time_s\n";
+  for (const FrameEvent& event : frames) {
+    stamps.stream() << event.frame << ',' << event.stamp_s << ',' << event.sequence << '\n';
+    const CameraPose pose = camera.pose(event.capture_s);
+    const Eigen::Matrix3d R = pose.R_camera_from_pattern.transpose();
+    const Eigen::Vector3d centre = -R * pose.pattern_in_camera;
+    const Eigen::Quaterniond q(R);
+    truth.stream() << event.frame << ',' << event.capture_s << ',' << centre.x() << ','
+                   << centre.y() << ',' << centre.z() << ',' << q.x() << ',' << q.y() << ','
+                   << q.z() << ',' << q.w() << ',' << event.sequence << ',' << event.stamp_s
+                   << '\n';
+  }
+  stamps.flush();
+  truth.flush();
+}
+
+using Render = std::function<std::vector<std::uint8_t>(const FrameEvent&)>;
+
+// The video's own stamps are those of frames.csv before a pattern, where the file may be read by itself; else capture times.
+void write_images(const Config& config, const std::vector<FrameEvent>& frames, const Render& render,
+                  const fs::path& directory) {
   const bool video = config.recording.images == Images::kVideo;
   const char* extension = config.recording.images == Images::kPng ? "png" : "pgm";
   std::optional<VideoWriter> writer;
@@ -204,14 +232,13 @@ void write_images(const Config& config, const std::vector<FrameEvent>& frames,
   const std::size_t batch = 4 * processors();
   for (std::size_t start = 0; start < frames.size(); start += batch) {
     std::vector<std::vector<std::uint8_t>> encoded(std::min(batch, frames.size() - start));
-    parallel_for(encoded.size(), [&](std::size_t i) {
-      const FrameEvent& event = frames[start + i];
-      encoded[i] = encode(config, renderer.render(event.capture_s, event.sequence));
-    });
+    parallel_for(encoded.size(),
+                 [&](std::size_t i) { encoded[i] = encode(config, render(frames[start + i])); });
     for (std::size_t i = 0; i < encoded.size(); ++i) {
       if (encoded[i].empty()) throw std::runtime_error("a frame could not be encoded");
       if (video) {
-        writer->write(encoded[i], frames[start + i].capture_s);
+        const FrameEvent& event = frames[start + i];
+        writer->write(encoded[i], config.pattern ? event.stamp_s : event.capture_s);
         continue;
       }
       std::array<char, 32> name{};
@@ -227,10 +254,24 @@ void write_images(const Config& config, const std::vector<FrameEvent>& frames,
   if (video) writer->finish();
 }
 
+void write_pattern_recording(const Config& config, const fs::path& directory) {
+  const PatternRenderer renderer(config);
+  prepare_directory(directory);
+  const std::vector<FrameEvent> frames = all_frames(config);
+  write_recording_yaml(config, directory);
+  write_pattern_frames(frames, renderer.camera(), directory);
+  write_lens_yaml(directory / "truth.yaml", config);
+  write_images(
+      config, frames,
+      [&](const FrameEvent& event) { return renderer.render(event.capture_s, event.sequence); },
+      directory);
+}
+
 }  // namespace
 
 void write_recording(const Config& config, const fs::path& directory) {
   if (config.duration <= 0) throw ConfigError("duration_s is missing: a recording needs an end");
+  if (config.pattern) return write_pattern_recording(config, directory);
   const std::unique_ptr<Path> path = make_path(config);
   const CameraModel camera(config.camera, config.image, *path);
   const bool images = config.recording.images != Images::kNone;
@@ -245,7 +286,10 @@ void write_recording(const Config& config, const fs::path& directory) {
   write_guess_yaml(config, directory);
   write_truth_yaml(directory / "truth.yaml", config, camera);
   if (images) {
-    write_images(config, frames, *renderer, directory);
+    write_images(
+        config, frames,
+        [&](const FrameEvent& event) { return renderer->render(event.capture_s, event.sequence); },
+        directory);
   } else {
     write_tracks(config, frames, camera, directory);
   }

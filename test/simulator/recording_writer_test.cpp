@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
+#include <Eigen/Geometry>
 #include <cmath>
 #include <cstdlib>
 #include <fstream>
@@ -12,6 +13,8 @@
 #include <sstream>
 
 #include "test/simulator/camera_model.h"
+#include "test/simulator/pattern_board.h"
+#include "test/simulator/pattern_camera.h"
 #include "test/simulator/scene.h"
 #include "test/support/temporary_directory.h"
 
@@ -226,6 +229,42 @@ TEST_F(VirtualRecording, RefusesADirectoryThatHoldsSomething) {
 TEST_F(VirtualRecording, NeedsADuration) {
   config_.duration = 0;
   EXPECT_THROW(write_recording(config_, directory()), ConfigError);
+}
+
+TEST_F(VirtualRecording, TellsLensAndPoseBeforeAPattern) {
+  config_.pattern.emplace();
+  config_.recording.images = RecordingConfig::Images::kPgm;
+  config_.duration = 0.4;
+  config_.timing.image.sigma = 1e-3;
+  const std::string recording = write();
+  const YAML::Node lens = YAML::LoadFile(recording + "truth.yaml");
+  EXPECT_EQ(lens["line_delay"]["value"].as<double>(), -20e-6);
+  EXPECT_EQ(lens["focal_length_v"]["value"].as<double>(), 602);
+  EXPECT_EQ(lens["optical_centre_u"]["value"].as<double>(), 380);
+  EXPECT_EQ(lens["k2"]["value"].as<double>(), 0.08);
+  const Table frames = read_csv(recording + "frames.csv", "frame,receive_time_s,sequence");
+  const Table truth = read_csv(recording + "truth.csv",
+                               "frame,time_s,x_m,y_m,z_m,q_x,q_y,q_z,q_w,sequence,stamp_time_s");
+  ASSERT_EQ(truth.size(), 10U);
+  ASSERT_EQ(frames.size(), truth.size());
+  const PatternBoard board(*config_.pattern);
+  const PatternCamera camera(config_, board.centre());
+  double jitter = 0;
+  for (std::size_t i = 0; i < truth.size(); ++i) {
+    const auto& row = truth[i];
+    EXPECT_NEAR(row.at("time_s"), static_cast<double>(i) / 25, 1e-12);
+    EXPECT_EQ(frames[i].at("receive_time_s"), row.at("stamp_time_s"));
+    jitter = std::max(jitter, std::abs(row.at("stamp_time_s") - row.at("time_s")));
+    // A place of the board seen from the pose that is told.
+    const Eigen::Quaterniond q(row.at("q_w"), row.at("q_x"), row.at("q_y"), row.at("q_z"));
+    const Eigen::Vector3d place(board.points().back().x(), board.points().back().y(), 0);
+    const Eigen::Vector3d p =
+        q.conjugate() * (place - Eigen::Vector3d(row.at("x_m"), row.at("y_m"), row.at("z_m")));
+    const CameraPose pose = camera.pose(row.at("time_s"));
+    EXPECT_LT((p - pose.R_camera_from_pattern * place - pose.pattern_in_camera).norm(), 1e-9);
+  }
+  EXPECT_GT(jitter, 1e-4);
+  EXPECT_EQ(cv::imread(recording + "frames/000009.pgm", cv::IMREAD_GRAYSCALE).cols, 160);
 }
 
 }  // namespace

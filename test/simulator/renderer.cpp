@@ -32,23 +32,6 @@ constexpr std::array<Point, 8> kPointsInMotion{{{0.0625, 0.1875},
                                                 {-0.0625, -0.1875}}};
 constexpr double kRestBlur = 1;  // px during the exposure
 
-std::vector<float> normal_quantiles() {
-  std::vector<float> quantiles(1 << 16);
-  for (std::size_t i = 0; i < quantiles.size() / 2; ++i) {
-    const double probability =
-        (static_cast<double>(i) + 0.5) / static_cast<double>(quantiles.size());
-    double low = -6;
-    double high = 0;
-    for (int step = 0; step < 40; ++step) {
-      const double middle = (low + high) / 2;
-      (std::erfc(-middle / std::sqrt(2.0)) / 2 < probability ? low : high) = middle;
-    }
-    quantiles[i] = static_cast<float>(low);
-    quantiles[quantiles.size() - 1 - i] = static_cast<float>(-low);
-  }
-  return quantiles;
-}
-
 // Directions that bound what the camera will see: a grid over the image, all along the path.
 std::vector<Eigen::Vector3d> seen_directions(const Config& config, const Path& path,
                                              const CameraModel& camera) {
@@ -77,7 +60,7 @@ Renderer::Renderer(const Config& config, const Path& path)
       camera_(config.camera, config.image, path),
       scene_(config.scene, config.camera.focal_length, seen_directions(config, path, camera_),
              config.seed),
-      normal_quantiles_(normal_quantiles()) {
+      noise_(config.sensor, config.seed) {
   if (config.sensor.boil > 0) {
     std::mt19937_64 generator = make_generator(config.seed, Stream::kBoil);
     std::normal_distribution<double> normal;
@@ -156,14 +139,11 @@ std::vector<std::uint8_t> Renderer::render(double t0_s, std::int64_t sequence) c
       rests ? 4 : std::min(8 * static_cast<int>(std::ceil(blur / 8)), kMostExposures);
 
   const double corner_squared = (width * width + height * height) / 4.0;
-  const std::uint64_t noise_seed =
-      mix(mix(config_.seed, static_cast<std::uint64_t>(Stream::kPixel)),
-          static_cast<std::uint64_t>(sequence));
-
   std::vector<std::uint8_t> image(row_size * static_cast<std::size_t>(height));
   std::vector<double> x(row_size);
   std::vector<double> y(row_size);
   std::vector<float> signal(row_size);
+  std::vector<double> grey(row_size);
   for (int row = 0; row < height; ++row) {
     const double v = row + 0.5;
     const double row_time = t0_s + v * config_.camera.line_delay;
@@ -180,23 +160,15 @@ std::vector<std::uint8_t> Renderer::render(double t0_s, std::int64_t sequence) c
 
     const double row_light = 255 * light(row_time);
     const double from_axis_v = v - height / 2.0;
-    std::uint64_t bits = 0;
-    std::uint8_t* out = image.data() + static_cast<std::size_t>(row) * row_size;
-    const std::uint64_t row_seed = mix(noise_seed, static_cast<std::uint64_t>(row));
     for (int column = 0; column < width; ++column) {
       const auto i = static_cast<std::size_t>(column);
       const double from_axis_u = column + 0.5 - width / 2.0;
       const double r_squared =
           (from_axis_u * from_axis_u + from_axis_v * from_axis_v) / corner_squared;
       // Catmull-Rom overshoots a little at crisp edges; light is not negative.
-      const double grey =
-          std::max(0.0F, signal[i]) * row_light * (1 - sensor.vignetting * r_squared);
-      if (column % 4 == 0) bits = mix(row_seed, static_cast<std::uint64_t>(column));
-      const double normal = normal_quantiles_[(bits >> (16 * (column % 4))) & 0xffffU];
-      const double noisy = grey + normal * std::sqrt(sensor.shot_noise * grey +
-                                                     sensor.read_noise * sensor.read_noise);
-      out[i] = static_cast<std::uint8_t>(std::clamp(noisy + 0.5, 0.0, 255.0));
+      grey[i] = std::max(0.0F, signal[i]) * row_light * (1 - sensor.vignetting * r_squared);
     }
+    noise_.digitise(sequence, row, grey, image.data() + static_cast<std::size_t>(row) * row_size);
   }
   return image;
 }

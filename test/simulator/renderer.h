@@ -17,6 +17,7 @@
 
 #include "test/simulator/camera_model.h"
 #include "test/simulator/scene.h"
+#include "test/simulator/sensor_noise.h"
 
 namespace alidade::simulator {
 
@@ -49,7 +50,7 @@ class Renderer {
   CameraModel camera_;
   Scene scene_;
   std::vector<Wave> waves_;
-  std::vector<float> normal_quantiles_;  // 65536 equally likely values of N(0, 1)
+  SensorNoise noise_;
 };
 
 }  // namespace alidade::simulator

@@ -2,6 +2,7 @@
 
 #include <iomanip>
 #include <stdexcept>
+#include <utility>
 
 #include "test/simulator/telemetry.h"
 
@@ -17,18 +18,30 @@ void OutputFile::flush() {
   if (!stream_) throw std::runtime_error(file_.string() + ": writing failed");
 }
 
+namespace {
+
+void write_format(const Config& config, std::ofstream& out) {
+  out << "format: 1\nimage: {width: " << config.image.width << ", height: " << config.image.height
+      << "}\n";
+}
+
+void write_value(const char* name, double number, std::ofstream& out) {
+  out << name << ": {value: " << number << ", sigma: 0}\n";
+}
+
+}  // namespace
+
 void write_truth_yaml(const std::filesystem::path& file, const Config& config,
                       const CameraModel& camera) {
   OutputFile output(file);
   const auto value = [&](const char* name, double number) {
-    output.stream() << name << ": {value: " << number << ", sigma: 0}\n";
+    write_value(name, number, output.stream());
   };
   const auto axis = [&](const char* name, const Eigen::Vector3d& vector) {
     output.stream() << name << ": {value: [" << vector.x() << ", " << vector.y() << ", "
                     << vector.z() << "], sigma: [0, 0]}\n";
   };
-  output.stream() << "format: 1\nimage: {width: " << config.image.width
-                  << ", height: " << config.image.height << "}\n";
+  write_format(config, output.stream());
   value("focal_length", config.camera.focal_length);
   value("aspect", config.camera.aspect);
   value("radial_distortion", config.camera.radial_distortion);
@@ -38,6 +51,24 @@ void write_truth_yaml(const std::filesystem::path& file, const Config& config,
   value("pan_scale", config.camera.pan_scale);
   value("tilt_scale", config.camera.tilt_scale);
   value("clock_offset", config.camera.clock_offset);
+  output.flush();
+}
+
+void write_lens_yaml(const std::filesystem::path& file, const Config& config) {
+  OutputFile output(file);
+  const PatternConfig::Lens& lens = config.pattern->lens;
+  write_format(config, output.stream());
+  for (const auto& [name, number] : {std::pair{"line_delay", config.camera.line_delay},
+                                     {"focal_length_u", lens.focal_length_u},
+                                     {"focal_length_v", lens.focal_length_v},
+                                     {"optical_centre_u", lens.centre_u},
+                                     {"optical_centre_v", lens.centre_v},
+                                     {"k1", lens.k1},
+                                     {"k2", lens.k2},
+                                     {"p1", lens.p1},
+                                     {"p2", lens.p2}}) {
+    write_value(name, number, output.stream());
+  }
   output.flush();
 }
 

@@ -10,6 +10,8 @@
 //   sequence     counts the lost frames too
 //   sender_time_s       the same moment on the sender's own, perhaps skewed clock
 //   stamp_time_s        recording: the stamp in frames.csv; live: when the frame is handed out
+// Before a pattern truth.yaml holds the lens under the names of lens.yaml, and truth.csv the camera's pose in the pattern's frame
+// (x_m, y_m, z_m, q_x, q_y, q_z, q_w) in place of angles.
 
 #include <filesystem>
 #include <fstream>
@@ -22,6 +24,9 @@ namespace alidade::simulator {
 // Throws std::runtime_error naming the file if it cannot be written; so do the others here.
 void write_truth_yaml(const std::filesystem::path& file, const Config& config,
                       const CameraModel& camera);
+
+// config.pattern must be set.
+void write_lens_yaml(const std::filesystem::path& file, const Config& config);
 
 // An output file with its name, that notices when writing fails.
 class OutputFile {

@@ -1,0 +1,219 @@
+#include "core/pattern/circle_centres.h"
+
+#include <Eigen/QR>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <opencv2/calib3d.hpp>
+
+#include "core/model/median.h"
+#include "core/model/rotation.h"
+
+namespace alidade::internal {
+namespace {
+
+// Of the least distance of two circles in the pattern: radii. Circles have a quarter of it, the rest is for blur.
+constexpr double kCircleWindow = 0.42;
+constexpr double kRim = 0.36;    // beyond lies paper
+constexpr double kCore = 0.1;    // within all is as dark as it gets
+constexpr double kFloor = 0.15;  // of the contrast: what is less dark is paper with noise
+constexpr double kLeastCircleContrast = 10;  // grey levels
+constexpr int kTerms = 10;                   // of a polynomial of third degree
+constexpr std::size_t kManyPoints = 20;      // that determine it
+constexpr double kDrawnRadius = 0.25;
+// Of an area from the others', relative, beyond which something lies on the circle: at least, and of the median one.
+constexpr double kLeastDifference = 0.01;
+constexpr double kDifferences = 7;
+
+struct Blob {
+  cv::Point2d centre;
+  double area = 0;  // px^2; 0: not measured
+};
+
+// An ellipse about a centre: what is round in the pattern.
+struct Window {
+  Matrix2<double> pattern_from_image;
+  double half_width = 0, half_height = 0;  // px
+
+  [[nodiscard]] double distance(double u, double v) const {
+    return (pattern_from_image * Vector2<double>(u, v)).norm();
+  }
+};
+
+Blob centroid(const cv::Mat& image, const cv::Point2d& start, const Window& window) {
+  Blob blob{start, 0};
+  for (int step = 0; step < 3; ++step) {
+    const cv::Point2d c = blob.centre;
+    const int left = static_cast<int>(std::ceil(c.x - window.half_width));
+    const int right = static_cast<int>(std::floor(c.x + window.half_width));
+    const int top = static_cast<int>(std::ceil(c.y - window.half_height));
+    const int bottom = static_cast<int>(std::floor(c.y + window.half_height));
+    if (left < 0 || top < 0 || right >= image.cols || bottom >= image.rows) return {start, 0};
+    std::vector<double> rim;
+    std::uint8_t darkest = 255;
+    for (int v = top; v <= bottom; ++v) {
+      const auto* row = image.ptr<std::uint8_t>(v);
+      for (int u = left; u <= right; ++u) {
+        const double d = window.distance(u - c.x, v - c.y);
+        if (d > kCircleWindow) continue;
+        darkest = std::min(darkest, row[u]);
+        if (d > kRim) rim.push_back(row[u]);
+      }
+    }
+    if (rim.empty()) return {start, 0};
+    const double paper = median(std::move(rim));
+    const double contrast = paper - darkest;
+    if (contrast < kLeastCircleContrast) return {start, 0};
+    const double level = paper - kFloor * contrast;
+    double sum = 0;
+    double sum_u = 0;
+    double sum_v = 0;
+    double core = 0;
+    int core_count = 0;
+    for (int v = top; v <= bottom; ++v) {
+      const auto* row = image.ptr<std::uint8_t>(v);
+      for (int u = left; u <= right; ++u) {
+        const double d = window.distance(u - c.x, v - c.y);
+        if (d > kCircleWindow) continue;
+        const double weight = std::max(0.0, level - row[u]);
+        if (d < kCore) {
+          core += weight;
+          ++core_count;
+        }
+        sum += weight;
+        sum_u += weight * u;
+        sum_v += weight * v;
+      }
+    }
+    if (!(sum > 0)) return {start, 0};
+    blob.centre = {sum_u / sum, sum_v / sum};
+    blob.area = core > 0 ? sum * core_count / core : 0;
+    if (cv::norm(blob.centre - c) < 0.01) break;
+  }
+  return blob;
+}
+
+using Terms = Matrix<double, 1, kTerms>;
+
+Terms terms(double x, double y) {
+  return (Terms() << 1, x, y, x * x, x * y, y * y, x * x * x, x * x * y, x * y * y, y * y * y)
+      .finished();
+}
+
+// From the pattern to the image: a homography for perspective, then a polynomial for the lens.
+class GridMap {
+ public:
+  GridMap(const std::vector<cv::Point2f>& places, const std::vector<cv::Point2f>& centres) {
+    const cv::Mat found = cv::findHomography(places, centres);
+    if (found.empty()) return;
+    H_ = found;
+    is_valid_ = true;
+    const auto count = static_cast<Eigen::Index>(places.size());
+    Eigen::MatrixXd A(count, kTerms);
+    Eigen::MatrixXd b(count, 2);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const auto k = static_cast<std::size_t>(i);
+      const Vector2<double> x = undistorted({places[k].x, places[k].y});
+      A.row(i) = terms(x.x(), x.y());
+      b.row(i) << centres[k].x - kUnit_px * x.x(), centres[k].y - kUnit_px * x.y();
+    }
+    if (places.size() >= kManyPoints) bend_ = A.colPivHouseholderQr().solve(b);
+  }
+
+  [[nodiscard]] bool is_valid() const { return is_valid_; }
+
+  [[nodiscard]] Vector2<double> operator()(const Vector2<double>& place) const {
+    const Vector2<double> x = undistorted(place);
+    return kUnit_px * x + (terms(x.x(), x.y()) * bend_).transpose();
+  }
+
+ private:
+  static constexpr double kUnit_px = 300;  // makes polynomials of about one
+
+  [[nodiscard]] Vector2<double> undistorted(const Vector2<double>& place) const {
+    const cv::Vec3d x = H_ * cv::Vec3d(place.x(), place.y(), 1);
+    return Vector2<double>(x[0], x[1]) / (x[2] * kUnit_px);
+  }
+
+  bool is_valid_ = false;
+  cv::Matx33d H_;
+  Matrix<double, kTerms, 2> bend_ = Matrix<double, kTerms, 2>::Zero();
+};
+
+struct Outline {
+  Vector2<double> centroid;
+  double area = 0;
+};
+
+// Of the image of a circle: of a polygon as large as the circle.
+Outline outline(const GridMap& map, const Vector2<double>& centre, double radius) {
+  constexpr int kCorners = 24;
+  const double step = 2 * kPi / kCorners;
+  const double reach = radius * std::sqrt(step / std::sin(step));
+  const Vector2<double> origin = map(centre);
+  Vector2<double> before = map(centre + Vector2<double>(reach, 0)) - origin;
+  Outline of{Vector2<double>::Zero(), 0};
+  for (int i = 1; i <= kCorners; ++i) {
+    const Vector2<double> corner =
+        map(centre + reach * Vector2<double>(std::cos(i * step), std::sin(i * step))) - origin;
+    const double twice_area = before.x() * corner.y() - before.y() * corner.x();
+    of.area += twice_area / 2;
+    of.centroid += twice_area / 6 * (before + corner);
+    before = corner;
+  }
+  of.centroid = of.centroid / of.area + origin;
+  of.area = std::abs(of.area);
+  return of;
+}
+
+}  // namespace
+
+std::vector<char> refine_circles(const cv::Mat& image, const KnownPattern& pattern,
+                                 std::vector<cv::Point2f>* centres) {
+  std::vector<char> is_whole(centres->size(), 1);
+  // In units of the least distance of two circles.
+  const double spacing =
+      pattern.size_m * (pattern.kind == PatternKind::kSymmetricCircles ? 1 : std::sqrt(2.0));
+  std::vector<cv::Point2f> places;
+  for (const Vector3<double>& p : pattern.points_m()) {
+    places.emplace_back(static_cast<float>(p.x() / spacing), static_cast<float>(p.y() / spacing));
+  }
+  const auto place = [&](std::size_t i) { return Vector2<double>(places[i].x, places[i].y); };
+  const GridMap rough(places, *centres);
+  if (!rough.is_valid()) return is_whole;
+  std::vector<Blob> blobs;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    constexpr double kStep = 0.1;
+    Matrix2<double> J;
+    for (int k = 0; k < 2; ++k) {
+      const Vector2<double> step = kStep * Vector2<double>::Unit(k);
+      J.col(k) = (rough(place(i) + step) - rough(place(i) - step)) / (2 * kStep);
+    }
+    const Window window{J.inverse(), kCircleWindow * J.row(0).norm(),
+                        kCircleWindow * J.row(1).norm()};
+    if (!window.pattern_from_image.allFinite()) return is_whole;
+    blobs.push_back(centroid(image, (*centres)[i], window));
+    (*centres)[i] = blobs.back().centre;
+  }
+  const GridMap map(places, *centres);
+  if (!map.is_valid()) return is_whole;
+  std::vector<double> ratios;  // of the areas measured to those of circles as drawn
+  for (std::size_t i = 0; i < places.size(); ++i)
+    ratios.push_back(blobs[i].area / outline(map, place(i), kDrawnRadius).area);
+  const double ratio = median(ratios);
+  if (!(ratio > 0)) return is_whole;
+  const double radius = kDrawnRadius * std::sqrt(ratio);
+  std::vector<double> differences;
+  for (const double r : ratios) differences.push_back(std::abs(r / ratio - 1));
+  const double limit = std::max(kLeastDifference, kDifferences * median(differences));
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    is_whole[i] = differences[i] <= limit ? 1 : 0;
+    const Vector2<double> beside = outline(map, place(i), radius).centroid - map(place(i));
+    if (all_finite(beside))
+      (*centres)[i] -= cv::Point2f(static_cast<float>(beside.x()), static_cast<float>(beside.y()));
+  }
+  return is_whole;
+}
+
+}  // namespace alidade::internal

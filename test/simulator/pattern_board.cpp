@@ -1,0 +1,249 @@
+#include "test/simulator/pattern_board.h"
+
+#include <apriltag/apriltag.h>
+#include <apriltag/tag36h11.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <cstdlib>
+#include <utility>
+
+namespace alidade::simulator {
+
+using Eigen::Vector2d;
+
+namespace {
+
+constexpr int kTagCells = 8;  // a side, with the black border
+
+}  // namespace
+
+double box_cover(double depth, const Vector2d& n, const Vector2d& box) {
+  // The box's shadow on the normal is a trapezium: two uniform distributions folded.
+  double a = std::abs(n.x()) * box.x() / 2;
+  double b = std::abs(n.y()) * box.y() / 2;
+  if (a < b) std::swap(a, b);
+  if (depth >= a + b) return 1;
+  if (depth <= -a - b) return 0;
+  if (depth > a - b) return 1 - (a + b - depth) * (a + b - depth) / (8 * a * b);
+  if (depth < b - a) return (depth + a + b) * (depth + a + b) / (8 * a * b);
+  return 0.5 + depth / (2 * a);
+}
+
+void PatternBoard::Nodes::set(std::vector<double> nodes) {
+  nodes_ = std::move(nodes);
+  double least = nodes_.back() - nodes_.front();
+  for (int i = 0; i < cells(); ++i) least = std::min(least, length(i));
+  steps_per_m_ = 1 / least;
+  const auto steps = static_cast<std::size_t>((nodes_.back() - nodes_.front()) * steps_per_m_) + 1;
+  for (std::size_t s = 0; s < steps; ++s) {
+    const double x = nodes_.front() + static_cast<double>(s) / steps_per_m_;
+    int cell = first_.empty() ? 0 : first_.back();
+    while (cell + 1 < cells() && nodes_[static_cast<std::size_t>(cell) + 1] <= x) ++cell;
+    first_.push_back(cell);
+  }
+}
+
+PatternBoard::Place PatternBoard::Nodes::find(double x) const {
+  if (x <= nodes_.front()) return {0, 0};
+  if (x >= nodes_.back()) return {cells() - 1, length(cells() - 1)};
+  int cell = first_[static_cast<std::size_t>((x - nodes_.front()) * steps_per_m_)];
+  while (cell + 1 < cells() && nodes_[static_cast<std::size_t>(cell) + 1] <= x) ++cell;
+  return {cell, x - nodes_[static_cast<std::size_t>(cell)]};
+}
+
+double PatternBoard::Nodes::length(int cell) const {
+  const auto i = static_cast<std::size_t>(cell);
+  return nodes_[i + 1] - nodes_[i];
+}
+
+PatternBoard::PatternBoard(const PatternConfig& config) : config_(config) {
+  switch (config.kind) {
+    case PatternConfig::Kind::kChessboard:
+      make_chessboard(config);
+      break;
+    case PatternConfig::Kind::kCircles:
+    case PatternConfig::Kind::kSymmetricCircles:
+      make_circles(config);
+      break;
+    case PatternConfig::Kind::kAprilGrid:
+      make_april_grid(config);
+      break;
+  }
+}
+
+template <class IsBlack>
+void PatternBoard::fill(const IsBlack& is_black) {
+  const int columns = x_.cells();
+  const int rows = y_.cells();
+  const auto width = static_cast<std::size_t>(columns) + 1;
+  integral_.assign(width * (static_cast<std::size_t>(rows) + 1), 0);
+  for (int row = 0; row < rows; ++row) {
+    double sum = 0;
+    for (int column = 0; column < columns; ++column) {
+      const double above = (is_black(column, row) ? config_.black : config_.white) - config_.table;
+      above_table_.push_back(above);
+      sum += above * x_.length(column) * y_.length(row);
+      const std::size_t node =
+          (static_cast<std::size_t>(row) + 1) * width + static_cast<std::size_t>(column) + 1;
+      integral_[node] = integral_[node - width] + sum;
+    }
+  }
+}
+
+void PatternBoard::make_chessboard(const PatternConfig& config) {
+  const double s = config.size;
+  for (int row = 0; row < config.rows; ++row) {
+    for (int column = 0; column < config.columns; ++column)
+      points_.emplace_back(column * s, row * s);
+  }
+  std::vector<double> x;
+  std::vector<double> y;
+  for (int i = -2; i <= config.columns + 1; ++i) x.push_back(i * s);
+  for (int i = -2; i <= config.rows + 1; ++i) y.push_back(i * s);
+  low_ = {x.front(), y.front()};
+  high_ = {x.back(), y.back()};
+  x_.set(x);
+  y_.set(y);
+  fill([&](int column, int row) {
+    const bool margin =
+        column == 0 || row == 0 || column == config.columns + 2 || row == config.rows + 2;
+    return !margin && (column + row) % 2 == 0;
+  });
+}
+
+void PatternBoard::make_circles(const PatternConfig& config) {
+  const bool symmetric = config.kind == PatternConfig::Kind::kSymmetricCircles;
+  const double s = config.size;
+  radius_ = s * (symmetric ? 0.25 : std::sqrt(0.5) / 2);
+  for (int row = 0; row < config.rows; ++row) {
+    for (int column = 0; column < config.columns; ++column)
+      points_.emplace_back((symmetric ? column : 2 * column + row % 2) * s, row * s);
+  }
+  const double margin = 2 * radius_;
+  low_ = {-margin, -margin};
+  high_ = {(symmetric ? config.columns - 1 : 2 * config.columns - 1) * s + margin,
+           (config.rows - 1) * s + margin};
+  x_.set({low_.x(), high_.x()});
+  y_.set({low_.y(), high_.y()});
+  fill([](int, int) { return false; });
+}
+
+void PatternBoard::make_april_grid(const PatternConfig& config) {
+  const double s = config.size;
+  const double gap = config.gap * s;
+  const double pitch = s + gap;
+  for (int row = 0; row < config.rows; ++row) {
+    for (int column = 0; column < config.columns; ++column) {
+      const Vector2d at(column * pitch, row * pitch);
+      for (const Vector2d& corner :
+           {Vector2d(0, s), Vector2d(s, s), Vector2d(s, 0), Vector2d(0, 0)})
+        points_.emplace_back(at + corner);
+    }
+  }
+  // Cells: a white margin, a gap, and for each tag its cells and a gap.
+  const auto nodes = [&](int tags) {
+    std::vector<double> x{-2 * gap, -gap};
+    for (int tag = 0; tag < tags; ++tag) {
+      for (int cell = 0; cell <= kTagCells; ++cell) x.push_back(tag * pitch + cell * s / kTagCells);
+    }
+    x.push_back(x.back() + gap);
+    x.push_back(x.back() + gap);
+    return x;
+  };
+  const std::vector<double> x = nodes(config.columns);
+  const std::vector<double> y = nodes(config.rows);
+  low_ = {x.front(), y.front()};
+  high_ = {x.back(), y.back()};
+  x_.set(x);
+  y_.set(y);
+
+  const int tags = config.columns * config.rows;
+  std::vector<std::uint8_t> black(static_cast<std::size_t>(tags * kTagCells * kTagCells), 0);
+  apriltag_family_t* family = tag36h11_create();
+  for (int tag = 0; tag < tags; ++tag) {
+    image_u8_t* image = apriltag_to_image(family, static_cast<std::uint32_t>(tag));
+    const int white = (image->width - kTagCells) / 2;
+    for (int i = 0; i < kTagCells * kTagCells; ++i) {
+      const int place = (i / kTagCells + white) * image->stride + i % kTagCells + white;
+      black[static_cast<std::size_t>(tag * kTagCells * kTagCells + i)] =
+          image->buf[place] == 0 ? 1 : 0;
+    }
+    // What image_u8_destroy() does; the shared library does not export it.
+    std::free(image->buf);
+    std::free(image);
+  }
+  tag36h11_destroy(family);
+  fill([&](int column, int row) {
+    // Behind the margin each tag has its gap and its cells; a last gap closes.
+    const int c = column - 1;
+    const int r = row - 1;
+    if (c < 0 || r < 0 || column >= x_.cells() - 1 || row >= y_.cells() - 1) return false;
+    const int in_column = c % (kTagCells + 1);
+    const int in_row = r % (kTagCells + 1);
+    if (in_column == 0 && in_row == 0) return config.corner_squares;
+    if (in_column == 0 || in_row == 0) return false;
+    const int tag = r / (kTagCells + 1) * config.columns + c / (kTagCells + 1);
+    return black[static_cast<std::size_t>((tag * kTagCells + in_row - 1) * kTagCells + in_column -
+                                          1)] != 0;
+  });
+}
+
+double PatternBoard::integral(const Place& x, const Place& y) const {
+  const auto width = static_cast<std::size_t>(x_.cells()) + 1;
+  const double* corner =
+      &integral_[static_cast<std::size_t>(y.cell) * width + static_cast<std::size_t>(x.cell)];
+  const double a = x.in / x_.length(x.cell);
+  const double b = y.in / y_.length(y.cell);
+  const double above = corner[0] + a * (corner[1] - corner[0]);
+  const double below = corner[width] + a * (corner[width + 1] - corner[width]);
+  return above + b * (below - above);
+}
+
+double PatternBoard::circles_cover(const Vector2d& place, const Vector2d& box) const {
+  const Vector2d p = place / config_.size;
+  int column = static_cast<int>(std::lround(p.x()));
+  int row = static_cast<int>(std::lround(p.y()));
+  int columns = config_.columns;
+  if (config_.kind == PatternConfig::Kind::kCircles) {
+    columns = 2 * config_.columns;
+    // Circles lie where the sum is even.
+    if ((column + row) % 2 != 0) {
+      const Vector2d from(p.x() - column, p.y() - row);
+      if (std::abs(from.x()) > std::abs(from.y())) {
+        column += from.x() > 0 ? 1 : -1;
+      } else {
+        row += from.y() > 0 ? 1 : -1;
+      }
+    }
+  }
+  if (column < 0 || row < 0 || column >= columns || row >= config_.rows) return 0;
+  const Vector2d from = place - config_.size * Vector2d(column, row);
+  const double distance = from.norm();
+  if (distance < 1e-9) return 1;
+  return box_cover(radius_ - distance, from / distance, box);
+}
+
+double PatternBoard::brightness(const Vector2d& place, const Vector2d& box) const {
+  const Place left = x_.find(place.x() - box.x() / 2);
+  const Place right = x_.find(place.x() + box.x() / 2);
+  const Place top = y_.find(place.y() - box.y() / 2);
+  const Place bottom = y_.find(place.y() + box.y() / 2);
+  double value = config_.table;
+  const bool outside = place.x() < low_.x() || place.y() < low_.y() || place.x() > high_.x() ||
+                       place.y() > high_.y();
+  if (left.cell == right.cell && top.cell == bottom.cell && !outside && left.in > 0 && top.in > 0 &&
+      right.in < x_.length(right.cell) && bottom.in < y_.length(bottom.cell)) {
+    value += above_table_[static_cast<std::size_t>(top.cell * x_.cells() + left.cell)];
+  } else {
+    value += (integral(right, bottom) - integral(left, bottom) - integral(right, top) +
+              integral(left, top)) /
+             (box.x() * box.y());
+  }
+  if (radius_ > 0 && !outside) value += (config_.black - config_.white) * circles_cover(place, box);
+  return value;
+}
+
+}  // namespace alidade::simulator
