@@ -3,12 +3,14 @@
 
 #include "edge_app/commands/calibrate_shutter.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <nlohmann/json.hpp>
 
 #include "core/pattern/calibrate_pattern.h"
@@ -17,6 +19,7 @@
 #include "edge_app/commands/output_directory.h"
 #include "edge_app/commands/pattern_video.h"
 #include "edge_app/commands/stop_signals.h"
+#include "edge_app/output/pattern_report.h"
 #include "edge_app/output/value_text.h"
 #include "edge_app/storage/lens_file.h"
 
@@ -118,6 +121,11 @@ int calibrate_shutter(const CalibrateShutterOptions& options) {
 
   OutputDirectory directory(options.directory, options.video);
   const LensNotes notes{options.pattern, video.data.width, video.data.height};
+  directory.add(
+      "report", "report.html",
+      pattern_report({options.video, options.pattern, video.data, calibration, video.images,
+                      video.found, video.remarks, ALIDADE_VERSION,
+                      fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)))}));
   directory.add("trajectory", "trajectory.csv", format_trajectory(calibration, video.data));
   directory.add("camera_info", "camera_info.yaml", format_camera_info(calibration, notes));
   directory.add("lens", "lens.yaml", format_lens(calibration, notes));
