@@ -16,7 +16,6 @@ namespace {
 constexpr double kWindow = 0.35;
 constexpr int kLargestWindow_px = 11;
 constexpr int kLeastWindow_px = 2;
-constexpr int kLeastImage_px = 32;
 
 // Half the side of the window around each corner, from the least distance to another.
 int window_of(const std::vector<cv::Point2f>& corners) {

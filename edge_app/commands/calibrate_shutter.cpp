@@ -91,6 +91,25 @@ std::string json_of(const PatternCalibration& calibration, const PatternVideo& v
   return json.dump() + "\n";
 }
 
+// What a person easily has wrong about this kind of pattern.
+std::string hint_for(PatternStatus status, const KnownPattern& pattern) {
+  if (status != PatternStatus::kNoPattern) return "";
+  switch (pattern.kind) {
+    case PatternKind::kChessboard:
+      return fmt::format(" {}x{} are inner corners, of a board of {}x{} squares", pattern.columns,
+                         pattern.rows, pattern.columns + 1, pattern.rows + 1);
+    case PatternKind::kAsymmetricCircles:
+      return fmt::format(" {}x{} are {} rows of {} circles, every second row moved by half",
+                         pattern.columns, pattern.rows, pattern.rows, pattern.columns);
+    case PatternKind::kSymmetricCircles:
+      return fmt::format(" {}x{} are {} rows of {} circles", pattern.columns, pattern.rows,
+                         pattern.rows, pattern.columns);
+    case PatternKind::kAprilGrid:
+      return " The tags are of family 36h11, numbered from 0 on, with a white margin";
+  }
+  return "";
+}
+
 void print(const std::string& text) {
   std::fputs(text.c_str(), stdout);
   if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
@@ -116,8 +135,10 @@ int calibrate_shutter(const CalibrateShutterOptions& options) {
   const PatternVideo video = find_visibly(options, *pattern);
   const PatternCalibration calibration = calibrate_pattern(video.data);
   for (const std::string& remark : video.remarks) spdlog::warn("{}: {}", options.video, remark);
-  if (calibration.status != PatternStatus::kOk)
-    throw CommandError(kExitFailed, options.video + ": " + calibration.message);
+  if (calibration.status != PatternStatus::kOk) {
+    throw CommandError(kExitFailed, options.video + ": " + calibration.message +
+                                        hint_for(calibration.status, *pattern));
+  }
 
   OutputDirectory directory(options.directory, options.video);
   const LensNotes notes{options.pattern, video.data.width, video.data.height};
