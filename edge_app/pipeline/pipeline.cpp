@@ -53,7 +53,10 @@ void Pipeline::start() {
   if (options_.realtime.lock_memory) log_granted("memory", lock_process_memory());
   // The consumers first, so that nothing is dropped at the start.
   threads_.emplace_back(&Pipeline::write_output, this);
-  if (calibration_ != nullptr) threads_.emplace_back(&Pipeline::calibrate, this);
+  if (calibration_ != nullptr) {
+    threads_.emplace_back(&Pipeline::calibrate, this);
+    calibrating_ = threads_.back().native_handle();
+  }
   if (options_.tap != nullptr) threads_.emplace_back(&ImageTap::run, options_.tap);
   threads_.emplace_back(&Pipeline::run_realtime, this);
   threads_.emplace_back(&Pipeline::read_telemetry, this);
@@ -65,7 +68,11 @@ void Pipeline::stop() {
   video_.stop();
   pan_tilt_.stop();
   sink_.interrupt();
-  if (calibration_ != nullptr) calibration_->cancel();
+  if (calibration_ != nullptr) {
+    calibration_->cancel();
+    // It ends at its next look at that, which a thread that runs last may reach after minutes.
+    if (!threads_.empty()) static_cast<void>(set_usual_priority(calibrating_));
+  }
   for (std::thread& thread : threads_) thread.join();
   threads_.clear();
 }

@@ -144,6 +144,7 @@ class Pipeline {
   double wander_logged_at_s_ = -1e9;         // output thread
   double repeated_logged_at_s_ = -1e9;       // output thread
   std::vector<std::thread> threads_;
+  pthread_t calibrating_{};  // one of them, if there is a calibration
 };
 
 }  // namespace alidade

@@ -51,7 +51,7 @@ enum class CalibrationNeed : std::uint8_t {
 [[nodiscard]] const char* to_string(CalibrationActivity activity);
 [[nodiscard]] const char* to_string(CalibrationNeed need);  // "tilt more"; empty for kNothing
 
-struct CalibrationReport {
+struct alignas(2) CalibrationReport {  // one word to every compiler: threads exchange it whole
   CalibrationActivity activity = CalibrationActivity::kOff;
   CalibrationNeed need = CalibrationNeed::kNothing;
 };

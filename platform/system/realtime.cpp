@@ -242,6 +242,11 @@ std::string set_lowest_priority() {
   return std::string("cannot run at the lowest priority (") + std::strerror(error) + ")";
 }
 
+bool set_usual_priority(pthread_t thread) {
+  const sched_param none{};
+  return pthread_setschedparam(thread, SCHED_OTHER, &none) == 0;
+}
+
 PageFaults thread_page_faults() {
   rusage usage{};
   if (getrusage(RUSAGE_THREAD, &usage) != 0) return {};

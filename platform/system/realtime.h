@@ -5,6 +5,8 @@
 // Everything is optional: without the permission the thread runs on, only less punctually.
 // Threads started by a thread inherit its scheduling.
 
+#include <pthread.h>
+
 #include <cstddef>
 #include <string>
 #include <vector>
@@ -57,6 +59,10 @@ void return_freed_memory();
 // Lets the calling thread run only when no other wants to (SCHED_IDLE, else the highest nice value), whatever
 // the thread that started it runs as. Returns one line if it could not be had; empty = granted.
 [[nodiscard]] std::string set_lowest_priority();
+
+// Undoes it for another thread, so that one that shall end does on a busy machine, too. False: the kernel refused, as it does
+// below RLIMIT_NICE 20 without CAP_SYS_NICE.
+bool set_usual_priority(pthread_t thread);
 
 // Of the calling thread, since it began.
 struct PageFaults {

@@ -31,14 +31,10 @@ constexpr PathPlan kPaths[] = {{"cosine", PathType::kTripleCosine, 0.5, 10},
                                {"sweep", PathType::kSweep, 0.7, 8},
                                {"jerky", PathType::kJerky, 0.7, 16},
                                {"slow", PathType::kTripleCosine, 0.15, 28}};
-struct ScenePlan {
-  const char* photo;
-  double width;  // horizontal fields of view
-};
-constexpr ScenePlan kScenes[] = {{"picosdeeuropa_by_Aitzol_Berasategi.jpg", 4.5},
-                                 {"aitzgorri_by_Aitzol_Berasategi.jpg", 4.5},
-                                 {"picosdeeuropa_by_Aitzol_Berasategi.jpg", 9},
-                                 {"aitzgorri_by_Aitzol_Berasategi.jpg", 9}};
+constexpr const char* kPhotos[] = {
+    "picosdeeuropa_by_Aitzol_Berasategi.jpg", "aitzgorri_by_Aitzol_Berasategi.jpg",
+    "life_by_Aitzol_Berasategi.jpg", "friends_by_Aitzol_Berasategi.jpg"};
+constexpr double kWidths[] = {4.5, 9};  // of a photo, in horizontal fields of view
 struct QualityPlan {
   double noise;  // grey levels
   int jpeg;
@@ -74,10 +70,9 @@ const T& pick(const T (&all)[kCount], int number) {
 VideoRecording video_recording(int number) {
   const int path_number = number / 4;
   const PathPlan& path = pick(kPaths, path_number);
-  const ScenePlan& scene = pick(kScenes, number);
   const QualityPlan& quality = pick(kQualities, number);
   const SizePlan& size = pick(kSizes, number / 3);
-  const double field = pick(kFields, number + number / 16);
+  const double field = pick(kFields, number + path_number);
   std::mt19937_64 random(static_cast<std::uint64_t>(number) + 1);
   std::normal_distribution<double> normal;
   std::uniform_real_distribution<double> uniform(-1, 1);
@@ -102,8 +97,9 @@ VideoRecording video_recording(int number) {
   c.path.period = path.period_s;
   set_peak_speed(path.fields_per_second, &c);
   simulator::PatchConfig photo;
-  photo.file = fs::path(ALIDADE_TEST_DATA) / scene.photo;
-  photo.width = std::min(scene.width * field, 2.7);
+  photo.file = fs::path(ALIDADE_TEST_DATA) / pick(kPhotos, number);
+  // Near and afar in turns: each photo on each path, from sixteen to sixteen.
+  photo.width = std::min(pick(kWidths, number + path_number + number / 16) * field, 2.7);
   c.scene.photos.push_back(photo);
   c.scene.detail = 0.5;
   c.sensor.exposure = 2e-3;

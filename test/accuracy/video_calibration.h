@@ -1,7 +1,7 @@
 #pragma once
 // Calibration from video, as `alidade calibrate` makes it, on recordings of the virtual camera: is it as certain as it
 // says? Every scene meets every path, and sizes, fields of view, qualities, lenses and read-outs change in turns.
-//   scenes     two photos, each from near and from afar, which shows other parts and other detail of it
+//   scenes     four photos, each from near and from afar, which shows other parts and other detail of it
 //   paths      cosine, sweep with stops and jerks at 0.5 to 0.7 horizontal fields of view a second, 12 to 20 s;
 //              a slow one at 0.15, 30 s
 //   qualities  noise of 2, 3 and 6 grey levels with JPEG 85, 75 and 60

@@ -6,10 +6,12 @@
 #include <cstddef>
 #include <cstdlib>
 
+#include "test/support/sanitizer.h"
+
 namespace alidade::test {
 
 // False: the sanitizers touch memory besides the program's.
-#if defined(__SANITIZE_ADDRESS__) || defined(__SANITIZE_THREAD__)
+#if defined(ALIDADE_ADDRESS_SANITIZER) || defined(ALIDADE_THREAD_SANITIZER)
 inline constexpr bool kOwnMemoryOnly = false;
 #else
 inline constexpr bool kOwnMemoryOnly = true;

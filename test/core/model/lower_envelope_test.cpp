@@ -41,7 +41,7 @@ TEST(LowerEnvelope, FindsTheLineBelowTheItems) {
 TEST(LowerEnvelope, RemembersTheWindowWhateverItsSlots) {
   ClockFilterOptions options;
   options.window_s = 20;
-  const auto memory_s = [&options](auto envelope) {
+  const auto memory_s = [](auto envelope) {
     envelope.start(prior());
     feed(&envelope, 0, 100, 4);
     return envelope.memory_s();

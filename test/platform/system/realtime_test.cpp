@@ -21,6 +21,7 @@ extern "C" {
 #include <cstdlib>
 #include <fstream>
 #include <functional>
+#include <future>
 #include <memory>
 #include <sstream>
 #include <string>
@@ -436,6 +437,28 @@ TEST(SetLowestPriority, LetsAllOthersGoFirst) {
   EXPECT_EQ(warning, "");
   EXPECT_TRUE(last);
   EXPECT_FALSE(runs_last());
+}
+
+TEST(SetUsualPriority, LetsAThreadThatRunsLastRunAsOthersDo) {
+  std::promise<void> is_last;
+  std::promise<void> is_hurried;
+  bool last = true;
+  std::thread thread([&] {
+    static_cast<void>(set_lowest_priority());
+    is_last.set_value();
+    is_hurried.get_future().wait();
+    last = runs_last();
+  });
+  is_last.get_future().wait();
+  const bool granted = set_usual_priority(thread.native_handle());
+  is_hurried.set_value();
+  thread.join();
+  rlimit nice{};
+  ::getrlimit(RLIMIT_NICE, &nice);
+  if (::geteuid() == 0 || nice.rlim_cur >= 20) {
+    EXPECT_TRUE(granted);
+  }
+  EXPECT_EQ(last, !granted);
 }
 
 TEST(SetLowestPriority, HoldsWhateverTheThreadThatStartedItRunsAs) {

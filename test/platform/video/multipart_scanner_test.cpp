@@ -138,7 +138,7 @@ TEST(MultipartScanner, NeedsNoHeaders) {
 }
 
 TEST(MultipartScanner, DoesNotBelieveAWrongLength) {
-  for (const std::size_t told : {0, 1, 2, 5, 6, 8, 9, 10, 11, 20, 500, 99'999}) {
+  for (const std::size_t told : {0U, 1U, 2U, 5U, 6U, 8U, 9U, 10U, 11U, 20U, 500U, 99'999U}) {
     const std::string stream =
         with_length(jpeg("abc"), told) + with_length(jpeg("second")) + "--frame\r\n";
     EXPECT_EQ(bodies(stream), (Bodies{jpeg("abc"), jpeg("second")})) << told;
@@ -185,7 +185,7 @@ TEST(MultipartScanner, StampsAPartWhenItsFirstByteComes) {
 }
 
 TEST(MultipartScanner, GivesUpAPartThatIsTooLongAndGoesOnWithTheNext) {
-  for (const std::size_t piece : {1, 100, 100'000}) {
+  for (const std::size_t piece : {1U, 100U, 100'000U}) {
     MultipartScanner scanner("frame", kMax);
     const std::string stream = with_length(jpeg(std::string(5000, 'x'))) + with_length(jpeg("a")) +
                                "--frame\r\nX: " + std::string(10'000, 'y') + "\r\n\r\n" +
@@ -230,7 +230,7 @@ TEST(MultipartScanner, TakesAPartOfTheGreatestLengthInPiecesOfAnySize) {
 
 TEST(MultipartScanner, LearnsTheSameBoundaryInPiecesOfAnySize) {
   const std::string part = "--frame\r\n\r\n" + jpeg("a") + "\r\n";
-  for (const std::size_t blanks : {193, 194, 300}) {
+  for (const std::size_t blanks : {193U, 194U, 300U}) {
     const std::string stream = "--x" + std::string(blanks, ' ') + "y\r\n--no" +
                                std::string(blanks, ' ') + "\n" + part + part;
     const Bodies whole = bodies(stream, "");

@@ -205,9 +205,8 @@ TEST_P(RtpSourceTimestamps, AreUnwrappedAndGiveUtcFromTheFirstReportOn) {
   relay.begin_at(static_cast<std::uint32_t>(first_timestamp));
   RtpSender sender(codec, relay.port());
   const double began_utc_s = std::floor(sender.began_utc_s());
-  const auto report = [&] {
-    relay.report(static_cast<std::uint64_t>(began_utc_s + 2'208'988'800.0) << 32U,
-                 static_cast<std::uint32_t>(first_timestamp));
+  const auto report = [&, timestamp = static_cast<std::uint32_t>(first_timestamp)] {
+    relay.report(static_cast<std::uint64_t>(began_utc_s + 2'208'988'800.0) << 32U, timestamp);
   };
   if (report_first) report();
   FrameStamp first;

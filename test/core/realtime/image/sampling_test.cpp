@@ -15,7 +15,7 @@ namespace {
 template <class Kernel>
 class Sampling : public testing::Test {};
 using Kernels = testing::Types<Bilinear, CatmullRom, CubicSpline>;
-TYPED_TEST_SUITE(Sampling, Kernels);
+TYPED_TEST_SUITE(Sampling, Kernels, );
 
 TYPED_TEST(Sampling, IsExactOnARampAtPixelCoordinates) {
   std::mt19937_64 random(1);
@@ -76,7 +76,7 @@ double plain_sample(const ImageView& image, double u, double v) {
 template <class Kernel>
 class VectorSampling : public testing::Test {};
 using FourTaps = testing::Types<CatmullRom, CubicSpline>;
-TYPED_TEST_SUITE(VectorSampling, FourTaps);
+TYPED_TEST_SUITE(VectorSampling, FourTaps, );
 
 TYPED_TEST(VectorSampling, EqualsTheScalarSumToTheRoundingOfFloats) {
   std::mt19937_64 random(4);

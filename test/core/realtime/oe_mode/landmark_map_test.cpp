@@ -252,17 +252,20 @@ TEST(LandmarkMap, FindsExactlyWhatASearchOfEverythingFinds) {
   std::size_t found = 0;
   std::size_t searches = 0;
   for (const int capacity : {1, 15, 16, 17, 500}) {
+    const auto any_slot = [&] {
+      return static_cast<int>(random() % static_cast<std::uint64_t>(capacity));
+    };
     for (const double spread : {1e-5, 1e-3, 0.05, 1.0}) {
       LandmarkMap map(capacity, 1e-5);
       fill(&map, 2 * capacity, spread, &random);
       for (const auto& d : hard_directions()) {
         int slot = 0;
-        if (map.size() > capacity / 2) map.retire(static_cast<int>(random() % capacity));
+        if (map.size() > capacity / 2) map.retire(any_slot());
         (void)map.insert(landmark_at(d, 7), 0, &slot);
       }
       std::vector<Vector3<double>> centres = hard_directions();
       for (int i = 0; i < 100; ++i) {
-        const int slot = static_cast<int>(random() % capacity);
+        const int slot = any_slot();
         if (!map.occupied(slot)) continue;
         centres.push_back(map.at(slot).d);
         centres.push_back(near(map.at(slot).d, std::pow(10, exponent(random)), &random));
@@ -272,7 +275,7 @@ TEST(LandmarkMap, FindsExactlyWhatASearchOfEverythingFinds) {
         std::vector<double> cosines = {1, 0, -1, -0.999, std::cos(std::pow(10, exponent(random)))};
         // So near the limit that rounding to float decides wrongly half of the times, and on it.
         for (int i = 0; i < 5; ++i) {
-          const int slot = static_cast<int>(random() % capacity);
+          const int slot = any_slot();
           if (!map.occupied(slot)) continue;
           for (const double beside : {-1e-14, 0.0, 1e-14}) {
             const double cosine = centre.normalized().dot(map.at(slot).d) + beside;

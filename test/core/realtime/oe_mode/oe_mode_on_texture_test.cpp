@@ -109,7 +109,7 @@ TEST_F(OeModeOnTexture, IsNoSurerThanTheMapIsStraight) {
 TEST_F(OeModeOnTexture, TellsOfTheLandmarksThatTheAnswerRestsOn) {
   rest(5);
   const ImageView moved = scene_.look({6, 0});
-  std::vector<std::uint8_t> half(static_cast<std::size_t>(moved.width) * moved.height, 100);
+  std::vector<std::uint8_t> half(static_cast<std::size_t>(moved.width * moved.height), 100);
   for (int v = 0; v < moved.height; ++v) {
     std::copy_n(moved.row(v), moved.width / 2,
                 half.begin() + static_cast<std::ptrdiff_t>(v) * moved.width);
