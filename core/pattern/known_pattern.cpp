@@ -77,7 +77,7 @@ std::vector<Vector3<double>> KnownPattern::points_m() const {
         points.emplace_back((2 * column + row % 2) * size_m, row * size_m, 0);
       } else if (kind == PatternKind::kAprilGrid) {
         const double x = column * size_m * (1 + gap);
-        const double y = row * size_m * (1 + gap);
+        const double y = (rows - 1 - row) * size_m * (1 + gap);
         points.emplace_back(x, y + size_m, 0);
         points.emplace_back(x + size_m, y + size_m, 0);
         points.emplace_back(x + size_m, y, 0);

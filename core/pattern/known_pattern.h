@@ -4,7 +4,8 @@
 //   circles:4x11:20mm          asymmetric grid, as OpenCV counts it: 11 rows of 4, every second one moved by half the distance of
 //                              two circles of a row; the length is half of that distance
 //   symmetric-circles:7x6:20mm distance of neighbours
-//   aprilgrid:6x6:30mm:0.3     tags of family 36h11 (kalibr's grid), a tag's side, the gap between tags as a part of it
+//   aprilgrid:6x6:30mm:0.3     tags of family 36h11, numbered from the lower left upwards (kalibr's grid), a tag's side, the gap between
+//                              tags as a part of it
 // Lengths in mm, cm, m or in.
 
 #include <optional>

@@ -14,6 +14,8 @@ namespace alidade {
 
 class PatternDetector {
  public:
+  static constexpr int kLeastImage_px = 32;  // a side of an image in which something can be found
+
   explicit PatternDetector(const KnownPattern& pattern);
   ~PatternDetector();
   PatternDetector(const PatternDetector&) = delete;

@@ -87,8 +87,9 @@ Shapes april_grid(const KnownPattern& pattern) {
         for (int x = white; x < image->width - white; ++x) {
           if (image->buf[y * image->stride + x] != 0) continue;
           // A hair wider, so that no seam shows between cells.
-          shapes.rectangle(column * pitch + (x - white) * cell, row * pitch + (y - white) * cell,
-                           cell * 1.002, cell * 1.002);
+          shapes.rectangle(column * pitch + (x - white) * cell,
+                           (pattern.rows - 1 - row) * pitch + (y - white) * cell, cell * 1.002,
+                           cell * 1.002);
         }
       }
       // As image_u8_destroy() does, which the shared library does not export.

@@ -14,6 +14,7 @@
 #include "edge_app/commands/calibrate.h"
 #include "edge_app/commands/calibration_input.h"
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/lens_prior.h"
 #include "edge_app/commands/output_directory.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/commands/visible_calibration.h"
@@ -67,9 +68,28 @@ void set_priors(const CalibrateOptions& options, CalibrationOptions* calibration
   if (!calibration->validate(&error)) throw CommandError(kExitUsage, error);
 }
 
+// What the options say goes before what the file says.
+void set_lens_prior(const CalibrateOptions& options, CalibrationJob* job) {
+  if (options.prior.empty()) return;
+  job->known = load_lens_prior(options.prior, job->input.width, job->input.height, &job->remarks);
+  const auto give_way = [&](const char* option, const std::string& text, const char* what,
+                            KnownValue* value) {
+    if (text.empty()) return;
+    value->wanted = false;
+    job->remarks.push_back(
+        fmt::format("{}: {} {} goes before its {}", options.prior, option, text, what));
+  };
+  give_way("--focal-length", options.focal_length, "focal length", &job->known.focal_length);
+  give_way("--aspect", options.aspect, "aspect", &job->known.aspect);
+  give_way("--radial-distortion", options.radial_distortion, "distortion",
+           &job->known.radial_distortion);
+  give_way("--line-delay", options.line_delay, "line delay", &job->known.line_delay);
+}
+
 CalibrationJob load_job(const std::string& recording, const CalibrateOptions& options) {
   CalibrationJob job = load_calibration_job(recording);
   set_priors(options, &job.options);
+  set_lens_prior(options, &job);
   return job;
 }
 

@@ -10,7 +10,8 @@ struct CalibrateOptions {
   std::string recording;  // its directory
   std::string directory;  // empty: <recording>/alidade
   bool json = false;
-  int passes = 2;  // of finding tracks in the video
+  int passes = 2;     // of finding tracks in the video
+  std::string prior;  // a lens.yaml; empty: none
   // VALUE or VALUE,SIGMA; "free"; empty: as the estimator has it.
   std::string focal_length;
   std::string aspect;

@@ -3,13 +3,17 @@
 
 #include "edge_app/commands/calibrate_shutter.h"
 
+#include <fmt/chrono.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <cmath>
 #include <cstdio>
+#include <ctime>
 #include <nlohmann/json.hpp>
+#include <string>
+#include <vector>
 
 #include "core/pattern/calibrate_pattern.h"
 #include "core/pattern/pattern_drawing.h"
@@ -17,6 +21,7 @@
 #include "edge_app/commands/output_directory.h"
 #include "edge_app/commands/pattern_video.h"
 #include "edge_app/commands/stop_signals.h"
+#include "edge_app/output/pattern_report.h"
 #include "edge_app/output/value_text.h"
 #include "edge_app/storage/lens_file.h"
 
@@ -88,6 +93,25 @@ std::string json_of(const PatternCalibration& calibration, const PatternVideo& v
   return json.dump() + "\n";
 }
 
+// What a person easily has wrong about this kind of pattern.
+std::string hint_for(PatternStatus status, const KnownPattern& pattern) {
+  if (status != PatternStatus::kNoPattern) return "";
+  switch (pattern.kind) {
+    case PatternKind::kChessboard:
+      return fmt::format(" {}x{} are inner corners, of a board of {}x{} squares", pattern.columns,
+                         pattern.rows, pattern.columns + 1, pattern.rows + 1);
+    case PatternKind::kAsymmetricCircles:
+      return fmt::format(" {}x{} are {} rows of {} circles, every second row moved by half",
+                         pattern.columns, pattern.rows, pattern.rows, pattern.columns);
+    case PatternKind::kSymmetricCircles:
+      return fmt::format(" {}x{} are {} rows of {} circles", pattern.columns, pattern.rows,
+                         pattern.rows, pattern.columns);
+    case PatternKind::kAprilGrid:
+      return " The tags are of family 36h11, numbered from 0 on, with a white margin";
+  }
+  return "";
+}
+
 void print(const std::string& text) {
   std::fputs(text.c_str(), stdout);
   if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
@@ -112,14 +136,21 @@ int calibrate_shutter(const CalibrateShutterOptions& options) {
   }
   const PatternVideo video = find_visibly(options, *pattern);
   const PatternCalibration calibration = calibrate_pattern(video.data);
-  for (const std::string& remark : video.remarks) spdlog::warn("{}: {}", options.video, remark);
-  if (calibration.status != PatternStatus::kOk)
-    throw CommandError(kExitFailed, options.video + ": " + calibration.message);
-  for (const std::string& remark : calibration.remarks)
-    spdlog::warn("{}: {}", options.video, remark);
+  std::vector<std::string> remarks = video.remarks;
+  remarks.insert(remarks.end(), calibration.remarks.begin(), calibration.remarks.end());
+  for (const std::string& remark : remarks) spdlog::warn("{}: {}", options.video, remark);
+  if (calibration.status != PatternStatus::kOk) {
+    throw CommandError(kExitFailed, options.video + ": " + calibration.message +
+                                        hint_for(calibration.status, *pattern));
+  }
 
   OutputDirectory directory(options.directory, options.video);
   const LensNotes notes{options.pattern, video.data.width, video.data.height};
+  directory.add(
+      "report", "report.html",
+      pattern_report({options.video, options.pattern, video.data, calibration, video.images,
+                      video.found, remarks, ALIDADE_VERSION,
+                      fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)))}));
   directory.add("trajectory", "trajectory.csv", format_trajectory(calibration, video.data));
   directory.add("camera_info", "camera_info.yaml", format_camera_info(calibration, notes));
   directory.add("lens", "lens.yaml", format_lens(calibration, notes));

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/calibration/known_camera.h"
 #include "edge_app/config/value_file.h"
 
 namespace alidade {
@@ -13,6 +14,7 @@ namespace alidade {
 struct CalibrationJob {
   CalibrationInput input;
   CalibrationOptions options;
+  KnownCamera known;  // beside the options
   CalibrationValues guess;
   bool tracks_from_video = false;    // input.observations are still to be found in the video
   std::vector<std::string> remarks;  // about the recording, for the report

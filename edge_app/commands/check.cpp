@@ -4,6 +4,7 @@
 // stdout, what is wrong to stderr.
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <cstdio>
 #include <optional>
@@ -19,6 +20,7 @@
 #include "edge_app/commands/check_json.h"
 #include "edge_app/commands/check_measurement.h"
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/lens_prior.h"
 
 namespace alidade {
 namespace {
@@ -163,11 +165,23 @@ void print_beginning(const std::string& configuration, const NamedCalibration& c
   std::fflush(stdout);
 }
 
+// Before the minutes of measuring: what is wrong with it ends the command.
+void check_lens_prior(const Config& config, const Camera<double>& camera) {
+  if (config.calibration.prior.empty() || camera.width == 0) return;
+  std::vector<std::string> remarks;
+  const KnownCamera known =
+      load_lens_prior(config.calibration.prior, camera.width, camera.height, &remarks);
+  for (const std::string& remark : remarks) spdlog::warn("{}", remark);
+  spdlog::info("{}: line delay {:.3f} +- {:.3f} us", config.calibration.prior,
+               1e6 * known.line_delay.prior.value, 1e6 * known.line_delay.prior.sigma);
+}
+
 }  // namespace
 
 int check_links(const CheckOptions& options) {
   const Config config = require_config(options.config);
   const NamedCalibration calibration = choose_calibration(config);
+  check_lens_prior(config, calibration.calibration.camera);
   if (!options.json) print_beginning(options.config, calibration);
 
   const Measured measured = measure(config, options.duration_s);

@@ -102,6 +102,11 @@ void add_calibrate(CLI::App& app, int* exit_code) {
           "Video without tracks.csv: look once (1), or again with the estimated camera (2)")
       ->check(CLI::Range(1, 2))
       ->capture_default_str();
+  command
+      ->add_option("--prior", options->prior,
+                   "lens.yaml of alidade calibrate-shutter: line delay at any zoom, focal length "
+                   "and distortion at its own; the options below go before it")
+      ->type_name("FILE");
   const char* group = "What is known beforehand: VALUE (exact), VALUE,SIGMA, or free";
   const auto add_prior = [&](const char* name, std::string* text, const char* help) {
     command->add_option(name, *text, help)->group(group)->type_name("PRIOR");
@@ -124,8 +129,8 @@ void add_calibrate_shutter(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<CalibrateShutterOptions>();
   CLI::App* command = app.add_subcommand(
       "calibrate-shutter",
-      "Line delay and lens from a video of a known pattern; writes lens.yaml, camera_info.yaml and "
-      "trajectory.csv");
+      "Line delay and lens from a video of a known pattern; writes lens.yaml, camera_info.yaml, "
+      "trajectory.csv and report.html");
   command->add_option("video", options->video, "Directory of a recording, or a video file");
   command
       ->add_option("--pattern", options->pattern,

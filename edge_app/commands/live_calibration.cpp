@@ -4,10 +4,31 @@
 #include <spdlog/spdlog.h>
 
 #include <cmath>
+#include <string>
+#include <vector>
 
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/lens_prior.h"
 
 namespace alidade {
+namespace {
+
+void set_lens_prior(const Config& config, SelfCalibrationOptions* options) {
+  const std::string& path = config.calibration.prior;
+  const Camera<double>& camera = options->data_sheet.camera;
+  std::vector<std::string> remarks;
+  options->camera = load_lens_prior(path, camera.width, camera.height, &remarks);
+  for (const std::string& remark : remarks) spdlog::warn("{}", remark);
+  if (config.camera.line_delay_s == 0) {
+    options->data_sheet.line_delay = options->camera.line_delay.prior.value;
+  } else {
+    spdlog::info(
+        "camera.line_delay_s goes before the line delay of {} until the camera is calibrated",
+        path);
+  }
+}
+
+}  // namespace
 
 Calibrating begin_calibrating(const Config& config, const std::string& path) {
   Calibrating result;
@@ -53,6 +74,8 @@ Calibrating begin_calibrating(const Config& config, const std::string& path) {
                         ": video.width and video.height are missing: without a calibration, OE "
                         "mode needs the size of the picture; give them, or set realtime.mode: PT");
   }
+  if (config.calibration.automatic && !config.calibration.prior.empty())
+    set_lens_prior(config, &options);
   if (config.pan_tilt.angle_sigma_rad) {
     options.noise.pan_tilt_sigma_rad = std::hypot(
         *config.pan_tilt.angle_sigma_rad, config.pan_tilt.angle_quantum_rad / std::sqrt(12.0));

@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdint>
 #include <filesystem>
 #include <limits>
@@ -11,6 +12,7 @@
 
 #include "core/calibration/clock_line.h"
 #include "core/pattern/pattern_detector.h"
+#include "core/pattern/pattern_doubts.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/pipeline/repeated_images.h"
 #include "platform/video/recording_frame_source.h"
@@ -32,7 +34,8 @@ std::unique_ptr<FrameSource> open_video(const std::string& video) {
 }
 
 // Row 0's exposure of each frame, on a steady clock where there is one.
-void regularise(const std::vector<FrameStamp>& stamps, PatternVideo* video) {
+void regularise(const std::string& path, const std::vector<FrameStamp>& stamps,
+                PatternVideo* video) {
   internal::ClockInput clock;
   bool by_sender = true;
   for (const FrameStamp& stamp : stamps) by_sender = by_sender && stamp.sender_time_s.has_value();
@@ -43,9 +46,11 @@ void regularise(const std::vector<FrameStamp>& stamps, PatternVideo* video) {
   clock.one_sided = !by_sender;
   for (std::size_t i = 1; i < clock.stamp_s.size(); ++i) {
     if (clock.stamp_s[i] > clock.stamp_s[i - 1]) continue;
-    throw CommandError(kExitFailed, fmt::format("time stamps do not increase: {} s follows {} s at "
-                                                "image {}; expected a video as it was taken",
-                                                clock.stamp_s[i], clock.stamp_s[i - 1], i));
+    throw CommandError(
+        kExitFailed,
+        fmt::format("{}: time stamps do not increase: image {} is of {} s, the one before of {} s; "
+                    "expected the video as the camera gave it, not cut or joined",
+                    path, stamps[i].frame, clock.stamp_s[i], clock.stamp_s[i - 1]));
   }
   const internal::ClockLine line = internal::fit_clock_line(clock);
   for (std::size_t i = 0; i < stamps.size(); ++i) video->data.frames[i].time_s = line.time_s[i];
@@ -53,7 +58,15 @@ void regularise(const std::vector<FrameStamp>& stamps, PatternVideo* video) {
   if (!line.steady) {
     video->remarks.emplace_back(
         "the frame rate is not steady; time stamps are taken as they are, and their errors are not "
-        "part of any sigma");
+        "part of any sigma: fix the frame rate, and the exposure with it");
+  }
+  constexpr double kMuchJitter = 0.1;  // of a period
+  if (line.steady && line.stamp_sigma_s > kMuchJitter * line.period_s) {
+    video->remarks.push_back(
+        fmt::format("time stamps scatter by {:.1f} ms about a steady rate of {:.2f} frames a "
+                    "second; if the frame "
+                    "rate varies in truth, fix it, and the exposure with it",
+                    1e3 * line.stamp_sigma_s, 1 / line.period_s));
   }
   if (line.lost > 0)
     video->remarks.push_back(fmt::format("{} images are missing by their time stamps", line.lost));
@@ -69,6 +82,7 @@ PatternVideo find_pattern(const std::string& path, const KnownPattern& pattern,
   PatternDetector detector(pattern);
   std::optional<std::uint64_t> before;  // digest of the image before
   std::vector<FrameStamp> stamps;
+  bool interlaced = false;
   for (;;) {
     Frame frame;
     const ReadStatus status = source->read(frame, std::numeric_limits<double>::infinity());
@@ -80,6 +94,15 @@ PatternVideo find_pattern(const std::string& path, const KnownPattern& pattern,
       video.data.width = frame.width;
       video.data.height = frame.height;
     }
+    if (std::min(frame.width, frame.height) < PatternDetector::kLeastImage_px) {
+      throw CommandError(
+          kExitFailed,
+          fmt::format(
+              "{}: its images are {}x{} px, too small for a pattern; expected {} px or more a "
+              "side, better several hundred",
+              path, frame.width, frame.height, PatternDetector::kLeastImage_px));
+    }
+    interlaced = interlaced || frame.interlaced;
     if (frame.width != video.data.width || frame.height != video.data.height) {
       throw CommandError(
           kExitFailed,
@@ -105,10 +128,12 @@ PatternVideo find_pattern(const std::string& path, const KnownPattern& pattern,
   if (stamps.size() < 3)
     throw CommandError(kExitFailed, fmt::format("{}: {} images; a video of some 30 s is needed",
                                                 path, stamps.size()));
-  regularise(stamps, &video);
+  regularise(path, stamps, &video);
   const double interval_s = (video.data.frames.back().time_s - video.data.frames.front().time_s) /
                             static_cast<double>(stamps.size() - 1);
   follow_half_turns(pattern, 10 * interval_s, &video.data);
+  if (interlaced) video.remarks.emplace_back(kInterlaced);
+  for (const std::string& remark : doubts_of(video.data)) video.remarks.push_back(remark);
   if (video.repeated > 0)
     video.remarks.push_back(
         fmt::format("{} images repeat the one before and are left out", video.repeated));

@@ -50,19 +50,22 @@ class VisibleProgress {
 };
 
 // `begin` of the part is done already.
-CalibrationResult calibrate_visibly(CalibrationJob* job, double begin, VisibleProgress* progress) {
-  job->options.progress = [begin, progress](double done, const char* what) {
+KnownCameraCalibration calibrate_visibly(const CalibrationJob& job, double begin,
+                                         VisibleProgress* progress) {
+  CalibrationOptions options = job.options;
+  options.progress = [begin, progress](double done, const char* what) {
     return progress->show(begin + (1 - begin) * done, what);
   };
-  CalibrationResult result = calibrate(job->input, job->options);
-  if (result.status == CalibrationStatus::kCancelled) throw progress->cancelled();
-  return result;
+  KnownCameraCalibration calibrated = calibrate_knowing(job.input, options, job.known);
+  if (calibrated.result.status == CalibrationStatus::kCancelled) throw progress->cancelled();
+  return calibrated;
 }
 
 // Finds tracks, without or with a first estimate, and calibrates with them.
-CalibrationResult calibrate_video(const std::string& recording, const CalibrationResult* estimate,
-                                  CalibrationJob* job, std::vector<std::string>* remarks,
-                                  VisibleProgress* progress) {
+KnownCameraCalibration calibrate_video(const std::string& recording,
+                                       const CalibrationResult* estimate, CalibrationJob* job,
+                                       std::vector<std::string>* remarks,
+                                       VisibleProgress* progress) {
   const VideoProgress look = [progress, estimate](double done) {
     const char* what = estimate == nullptr ? "following points in the video"
                                            : "following points again, with the estimated camera";
@@ -73,7 +76,7 @@ CalibrationResult calibrate_video(const std::string& recording, const Calibratio
                                            : track_video(recording, job->input, *estimate, look);
   *remarks = std::move(tracks.remarks);
   job->input.observations = choose_tracks(std::move(tracks.observations));
-  return calibrate_visibly(job, kShareOfLooking, progress);
+  return calibrate_visibly(*job, kShareOfLooking, progress);
 }
 
 }  // namespace
@@ -81,10 +84,17 @@ CalibrationResult calibrate_video(const std::string& recording, const Calibratio
 CalibrationResult calibrate_job(const std::string& recording, int passes, CalibrationJob* job,
                                 StopSignals* signals) {
   VisibleProgress progress(recording, signals);
-  if (!job->tracks_from_video) return calibrate_visibly(job, 0, &progress);
   std::vector<std::string> remarks;
+  const auto finish = [&](KnownCameraCalibration calibrated) {
+    for (const auto* said : {&remarks, &calibrated.remarks})
+      job->remarks.insert(job->remarks.end(), said->begin(), said->end());
+    job->options = std::move(calibrated.options);
+    job->options.progress = nullptr;
+    return std::move(calibrated.result);
+  };
+  if (!job->tracks_from_video) return finish(calibrate_visibly(*job, 0, &progress));
   progress.set_part(0, passes > 1 ? 0.5 : 1);
-  CalibrationResult first = calibrate_video(recording, nullptr, job, &remarks, &progress);
+  KnownCameraCalibration first = calibrate_video(recording, nullptr, job, &remarks, &progress);
   if (job->input.observations.empty()) {
     throw CommandError(
         kExitFailed,
@@ -93,22 +103,22 @@ CalibrationResult calibrate_job(const std::string& recording, int passes, Calibr
             "with texture, lit and in focus, that stays in view for that long",
             recording, kMinSightings));
   }
-  const bool usable = first.ok() || first.status == CalibrationStatus::kWeak;
+  const bool usable = first.result.ok() || first.result.status == CalibrationStatus::kWeak;
   if (passes > 1 && usable) {
     const std::vector<CalibrationObservation> first_tracks = job->input.observations;
     progress.set_part(0.5, 1);
-    CalibrationResult second = calibrate_video(recording, &first, job, &remarks, &progress);
-    if (second.ok() || !first.ok()) {
+    KnownCameraCalibration second =
+        calibrate_video(recording, &first.result, job, &remarks, &progress);
+    if (second.result.ok() || !first.result.ok()) {
       first = std::move(second);
     } else {
       job->input.observations = first_tracks;
       remarks.push_back(fmt::format(
           "the second look at the video led to no calibration ({}: {}); this is the first one's",
-          to_string(second.status), second.message));
+          to_string(second.result.status), second.result.message));
     }
   }
-  job->remarks.insert(job->remarks.end(), remarks.begin(), remarks.end());
-  return first;
+  return finish(std::move(first));
 }
 
 MapState map_visibly(const std::string& recording, const CalibrationResult& result,

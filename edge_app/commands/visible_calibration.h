@@ -12,7 +12,7 @@
 namespace alidade {
 
 // Finds tracks in the video, if the job has none, without and (passes 2) with a first estimate; calibrates with them.
-// Leaves observations and remarks in *job.
+// Leaves observations, remarks and the options as used in *job.
 [[nodiscard]] CalibrationResult calibrate_job(const std::string& recording, int passes,
                                               CalibrationJob* job, StopSignals* signals);
 

@@ -86,6 +86,7 @@ CameraConfig read_camera(YamlSection section) {
 CalibrationConfig read_calibration(YamlSection section, const std::string& path) {
   CalibrationConfig calibration;
   if (const auto file = section.text("file")) calibration.file = path_relative_to(path, *file);
+  if (const auto prior = section.text("prior")) calibration.prior = path_relative_to(path, *prior);
   calibration.automatic = section.truth("auto").value_or(calibration.automatic);
   calibration.zoom_tolerance = section.number("zoom_tolerance", {0, 1e6, "units of the device"})
                                    .value_or(calibration.zoom_tolerance);
@@ -245,6 +246,13 @@ void read_config(YamlSection& top, const std::string& path, Config* config) {
         path +
         ": video and pan_tilt are a recording and a live stream, which have no common "
         "clock; set both types to recording, or neither");
+  }
+  const bool calibrates = config->calibration.automatic && config->realtime.landmarks &&
+                          config->video.type != VideoConfig::Type::kRecording;
+  if (!config->calibration.prior.empty() && !calibrates) {
+    config->warnings.push_back(calibration.where("prior") +
+                               ": is not used, as nothing is calibrated: that takes live video, "
+                               "realtime.mode OE and calibration.auto true");
   }
   if (config->calibration.file.empty() && !config->camera.focal_length_px) {
     throw ConfigError(path +

@@ -49,7 +49,8 @@ struct CameraConfig {
 };
 
 struct CalibrationConfig {
-  std::string file;  // empty: none
+  std::string file;   // empty: none
+  std::string prior;  // a lens.yaml; empty: none
   // Live only: calibrate while the camera moves, and store the result in file.
   bool automatic = true;
   double zoom_tolerance = 0;  // device units within which a calibration holds

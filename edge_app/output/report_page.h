@@ -12,6 +12,7 @@
 
 #include "core/model/angle.h"
 #include "edge_app/output/calibration_report.h"
+#include "edge_app/output/html_page.h"
 #include "edge_app/output/svg_plot.h"
 
 namespace alidade::report {
@@ -41,8 +42,7 @@ class ReportPage {
   }
   // caption is HTML; label what the plot shows, for those who cannot see it.
   void figure(const std::string& caption, const SvgPlot& plot, const std::string& label) {
-    add("<figure><figcaption>{}</figcaption>\n<div class=\"plot\">{}</div></figure>\n", caption,
-        plot.svg(label));
+    body_ += html_figure(caption, plot.svg(label));
   }
 
   [[nodiscard]] const CalibrationReportInput& report() const { return report_; }

@@ -186,6 +186,7 @@ SessionCalibration SelfCalibration::adjust(const Calibration* known) const {
   options.width = options_.data_sheet.camera.width;
   options.height = options_.data_sheet.camera.height;
   options.adjustment = options_.adjustment;
+  options.camera = options_.camera;
   options.noise = options_.noise;
   options.checks = options_.checks;
   options.is_cancelled = [this] { return cancelled_.load(); };
@@ -213,6 +214,7 @@ void SelfCalibration::publish(const SessionCalibration& checked) {
                   "in frames held out; map of {} landmarks",
                   quality.frames, quality.landmarks, describe(fresh->calibration),
                   quality.pixel_sigma_ratio, checked.hold_out, fresh->map.landmarks.size()));
+  messages_.insert(messages_.end(), checked.remarks.begin(), checked.remarks.end());
   if (archive_ != nullptr) {
     StoredCalibration stored;
     stored.calibration = fresh->calibration;

@@ -53,6 +53,7 @@ struct CalibrationSchedule {
 struct SelfCalibrationOptions {
   Calibration data_sheet;         // with the image size; what holds without a calibration
   CalibrationOptions adjustment;  // priors of a first calibration
+  KnownCamera camera;             // what is known of it beside them
   CalibrationNoise noise;
   double zoom_tolerance = 0;  // device units within which a calibration holds
   SessionLimits session;

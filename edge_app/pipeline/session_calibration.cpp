@@ -102,7 +102,11 @@ SessionCalibration calibrate_session(const CalibrationSession& session,
   const std::vector<CalibrationObservation> held_out = take_held_out(stamps, &input.observations);
 
   SessionCalibration checked;
-  checked.result = calibrate(input, adjustment);
+  // What is published has it in it.
+  KnownCameraCalibration calibrated =
+      calibrate_knowing(input, adjustment, known == nullptr ? options.camera : KnownCamera());
+  checked.result = std::move(calibrated.result);
+  checked.remarks = std::move(calibrated.remarks);
   CalibrationResult& result = checked.result;
   if (!result.ok()) {
     checked.refusal = result.message;

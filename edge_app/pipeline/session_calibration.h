@@ -12,8 +12,10 @@
 #include <functional>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/calibration/known_camera.h"
 #include "edge_app/pipeline/calibration_session.h"
 
 namespace alidade {
@@ -29,6 +31,7 @@ struct SessionCalibrationOptions {
   int width = 0;                  // px
   int height = 0;                 // px
   CalibrationOptions adjustment;  // priors of a calibration from the data alone
+  KnownCamera camera;             // what is known of it beforehand, for the same
   CalibrationNoise noise;
   CalibrationChecks checks;
   std::size_t max_observations = 15000;
@@ -44,12 +47,13 @@ struct KnownCalibration {
 };
 
 struct SessionCalibration {
-  CalibrationResult result;  // without the zoom
-  std::string refusal;       // empty: it may be published
-  double hold_out = 0;       // rms of the normalised residuals in frames that were not used
+  CalibrationResult result;          // without the zoom
+  std::string refusal;               // empty: it may be published
+  double hold_out = 0;               // rms of the normalised residuals in frames that were not used
+  std::vector<std::string> remarks;  // what is known beforehand and was not taken
 };
 
-// known: null: from the data alone.
+// known: null: from the data, and what is known of the camera beforehand.
 [[nodiscard]] SessionCalibration calibrate_session(const CalibrationSession& session,
                                                    const SessionCalibrationOptions& options,
                                                    const KnownCalibration* known);

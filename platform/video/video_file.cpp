@@ -92,6 +92,7 @@ ReadStatus VideoFile::read(Frame& frame, double /*timeout_s*/) {
     frame.stamp.frame = frames_++;
     frame.stamp.sender_time_s = static_cast<double>(picture.pts) * av_q2d(file_.stream().time_base);
     frame.stamp.receive_time_s = *frame.stamp.sender_time_s;
+    frame.interlaced = picture.interlaced;
     frame.width = picture.width;
     frame.height = picture.height;
     frame.luma = picture.luma;

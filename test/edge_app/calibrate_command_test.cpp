@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "edge_app/storage/calibration_file.h"
+#include "edge_app/storage/lens_file.h"
 #include "edge_app/storage/map_file.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/edge_app/recording_files.h"
@@ -148,6 +149,101 @@ TEST_F(CalibrateCommand, StatesAndUsesThePriorsOfItsOptions) {
   EXPECT_FALSE(priors.contains("aspect"));
   EXPECT_EQ(priors["clock_offset"]["sigma"], 0.0001);
   EXPECT_EQ(priors["pan_scale"]["sigma"], 0.001);
+}
+
+// The lens.yaml of the simulated camera, for images of this size.
+std::string lens_file_of(const test::Simulation& simulation, int width, int height,
+                         double line_delay_sigma) {
+  const double scale = static_cast<double>(width) / simulation.width;
+  PatternCalibration bench;
+  bench.lens << scale * simulation.focal_length,
+      scale * simulation.focal_length * simulation.aspect, width / 2.0, height / 2.0,
+      simulation.radial_distortion, 0, 0, 0, simulation.line_delay / scale;
+  LensVector sigma;
+  sigma << 0.005, 0.005, 0.05, 0.05, 1e-3, 1e-3, 1e-5, 1e-5, line_delay_sigma;
+  bench.covariance = sigma.cwiseAbs2().asDiagonal();
+  return format_lens(bench, {"chessboard:9x6:25mm", width, height});
+}
+
+TEST_F(CalibrateCommand, TakesALensFromTheBenchAsPrior) {
+  record(test::Simulation());
+  const std::string lens =
+      directory_.write("bench/lens.yaml", lens_file_of(simulation_, 1920, 1080, 1e-9));
+  ASSERT_EQ(calibrate_command({path(), "-o", path("alone")}).exit_code, 0);
+  Calibration alone;
+  std::string error;
+  ASSERT_TRUE(load_calibration(path("alone/calibration.yaml"), &alone, &error)) << error;
+  const Result result = calibrate_command({path(), "--json", "--prior", lens});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.errors, Not(HasSubstr("contradicts")));
+  const Calibration calibration = stored();
+  expect_near_truth(calibration, simulation_);
+  for (const Parameter p : {Parameter::kLineDelay, Parameter::kFocalLength}) {
+    EXPECT_LT(calibration.covariance(index(p), index(p)),
+              0.25 * alone.covariance(index(p), index(p)))
+        << to_string(p);
+  }
+  const auto priors = nlohmann::json::parse(result.output)["priors"];
+  EXPECT_EQ(priors["line_delay"]["value"], 1e-6);
+  EXPECT_TRUE(priors.contains("focal_length") && priors.contains("radial_distortion"));
+}
+
+TEST_F(CalibrateCommand, ScalesALensOfAnotherSizeAndRefusesOneOfAnotherShape) {
+  record(test::Simulation());
+  const std::string half = directory_.write("half.yaml", lens_file_of(simulation_, 960, 540, 2e-9));
+  const Result result = calibrate_command({path(), "--json", "--prior", half});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.errors,
+              HasSubstr("half.yaml: is of images of 960x540 px and is scaled to 1920x1080"));
+  const auto priors = nlohmann::json::parse(result.output)["priors"];
+  EXPECT_NEAR(priors["line_delay"]["value"].get<double>(), 1e-6, 1e-12);
+  EXPECT_NEAR(priors["focal_length"]["value"].get<double>(), 4000, 1e-3);
+  const std::string square =
+      directory_.write("square.yaml", lens_file_of(simulation_, 1440, 1080, 1e-9));
+  fs::remove_all(path("alidade"));
+  const Result refused = calibrate_command({path(), "--prior", square});
+  expect_refused(refused, 2, "is of images of 1440x1080 px, these are 1920x1080, of another shape");
+}
+
+TEST_F(CalibrateCommand, OptionsGoBeforeTheLensFileAndItIsSaid) {
+  record(test::Simulation());
+  const std::string lens =
+      directory_.write("lens.yaml", lens_file_of(simulation_, 1920, 1080, 1e-9));
+  const Result result = calibrate_command(
+      {path(), "--json", "--prior", lens, "--line-delay", "1e-6", "--focal-length", "free"});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.errors, HasSubstr("--line-delay 1e-6 goes before its line delay"));
+  EXPECT_THAT(result.errors, HasSubstr("--focal-length free goes before its focal length"));
+  const auto priors = nlohmann::json::parse(result.output)["priors"];
+  EXPECT_EQ(priors["line_delay"]["sigma"], 0);
+  EXPECT_FALSE(priors.contains("focal_length"));
+  EXPECT_TRUE(priors.contains("radial_distortion"));
+}
+
+TEST_F(CalibrateCommand, SaysWhichPartOfALensFileContradictsTheRecording) {
+  record(test::Simulation());
+  test::Simulation other = simulation_;
+  other.line_delay = 30e-6;
+  other.focal_length = 1300;
+  const std::string lens = directory_.write("lens.yaml", lens_file_of(other, 1920, 1080, 1e-9));
+  const Result result = calibrate_command({path(), "--prior", lens});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  for (const char* what :
+       {"line delay contradicts the recording and is left out: 30 +- ",
+        "found at another zoom, focal length and distortion do not count here"}) {
+    EXPECT_THAT(result.errors, HasSubstr(what));
+    EXPECT_THAT(directory_.read("alidade/report.html"), HasSubstr(what));
+  }
+  expect_near_truth(stored(), simulation_);
+}
+
+TEST_F(CalibrateCommand, NamesTheLineOfABadLensFile) {
+  record(test::Simulation());
+  expect_refused(calibrate_command({path(), "--prior", path("none.yaml")}), 2,
+                 "none.yaml: cannot be read: No such file or directory");
+  directory_.write("lens.yaml", "format: 1\nfocal: 3\n");
+  expect_refused(calibrate_command({path(), "--prior", path("lens.yaml")}), 2,
+                 "lens.yaml:2: unknown key focal");
 }
 
 TEST_F(CalibrateCommand, CountsLostFramesBySenderTimes) {

@@ -91,6 +91,23 @@ TEST_F(ConfigTest, WarnsOfAnHttpServerThatIsOpenToAll) {
               HasSubstr(":4: output.http: listens to other machines without a token"));
 }
 
+TEST_F(ConfigTest, WarnsOfAPriorWhereNothingIsCalibrated) {
+  const std::string live =
+      "video: {type: rtsp, url: 'rtsp://camera/s'}\npan_tilt: {type: vapix, url: http://camera}\n";
+  const std::string recorded =
+      "video: {type: recording, directory: x}\npan_tilt: {type: recording, directory: x}\n";
+  for (const std::string& text :
+       {live + "calibration: {file: c.yaml, prior: lens.yaml, auto: false}\n",
+        live + "calibration: {file: c.yaml, prior: lens.yaml}\nrealtime: {mode: PT}\n",
+        recorded + "calibration: {file: c.yaml, prior: lens.yaml}\n"}) {
+    ASSERT_THAT(load(text), IsEmpty());
+    EXPECT_THAT(config_.warnings,
+                ::testing::ElementsAre(HasSubstr(":3: calibration.prior: is not used")));
+  }
+  ASSERT_THAT(load(live + "calibration: {file: c.yaml, prior: lens.yaml}\n"), IsEmpty());
+  EXPECT_THAT(config_.warnings, IsEmpty());
+}
+
 TEST_F(ConfigTest, DoesNotRepeatATokenThatIsOfNoUse) {
   ::setenv("ALIDADE_TEST_TOKEN", "short", 1);
   const std::string error = load(std::string(kMinimal) +
@@ -124,7 +141,8 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
            "           angle_sigma_rad: 2e-5, angle_quantum_rad: 1e-4}\n"
            "camera: {focal_length_px: 30000, aspect: 1.01, radial_distortion: -2.5,\n"
            "         line_delay_s: 1.5e-5, upside_down: true, zoom: fixed}\n"
-           "calibration: {file: /etc/c.yaml, auto: false, zoom_tolerance: 2.5}\n"
+           "calibration: {file: /etc/c.yaml, prior: bench/lens.yaml, auto: false, zoom_tolerance: "
+           "2.5}\n"
            "realtime: {mode: PT, priority: 60, cpu: 3, lock_memory: true, max_extrapolation_s: "
            "0.5}\n"
            "output: {csv: true, json: false}\n"),
@@ -149,6 +167,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.camera.line_delay_s, 1.5e-5);
   EXPECT_TRUE(config_.camera.upside_down);
   EXPECT_EQ(config_.calibration.file, "/etc/c.yaml");
+  EXPECT_EQ(config_.calibration.prior, directory_.path() + "/bench/lens.yaml");
   EXPECT_FALSE(config_.calibration.automatic);
   EXPECT_EQ(config_.calibration.zoom_tolerance, 2.5);
   EXPECT_FALSE(config_.realtime.landmarks);

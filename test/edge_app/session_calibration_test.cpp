@@ -128,6 +128,33 @@ TEST(SessionCalibration, WhatIsKnownMakesItSharper) {
   EXPECT_LT(refined.result.calibration.covariance(f, f), first.result.calibration.covariance(f, f));
 }
 
+TEST(SessionCalibration, TakesWhatIsKnownOfTheCameraBeforehandOnceAndSaysWhatContradicts) {
+  const test::Simulation s = session_camera();
+  const CalibrationSession session = session_of(s, 1);
+  SessionCalibrationOptions options = session_options(s);
+  const SessionCalibration alone = calibrate_session(session, options, nullptr);
+  ASSERT_THAT(alone.refusal, IsEmpty());
+  const double sigma = std::sqrt(alone.result.calibration.covariance(index(Parameter::kLineDelay),
+                                                                     index(Parameter::kLineDelay)));
+  options.camera.name = "lens.yaml";
+  options.camera.line_delay = {{s.line_delay, 0.1 * sigma}, true};
+  const auto sigma_of = [](const SessionCalibration& c) {
+    return std::sqrt(c.result.calibration.covariance(index(Parameter::kLineDelay),
+                                                     index(Parameter::kLineDelay)));
+  };
+  const SessionCalibration sharp = calibrate_session(session, options, nullptr);
+  EXPECT_THAT(sharp.remarks, IsEmpty());
+  EXPECT_LT(sigma_of(sharp), 0.15 * sigma);
+  // What is published holds it already.
+  const KnownCalibration published{alone.result.calibration, true};
+  EXPECT_GT(sigma_of(calibrate_session(session, options, &published)), 0.5 * sigma);
+  options.camera.line_delay.prior.value += 20 * sigma;
+  const SessionCalibration contradicted = calibrate_session(session, options, nullptr);
+  EXPECT_THAT(contradicted.remarks,
+              ::testing::ElementsAre(HasSubstr("lens.yaml: line delay contradicts")));
+  EXPECT_EQ(contradicted.result.calibration.line_delay, alone.result.calibration.line_delay);
+}
+
 // The known offset errs by it as much as the new data do, and so says the more of the rest.
 TEST(SessionCalibration, WhatAllPollsHaveInCommonDoesNotWeakenAKnownClockOffset) {
   constexpr double kWidth_s = 0.02;

@@ -57,7 +57,7 @@ class Completion(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             pathlib.Path(folder, "camera.yaml").touch()
             pathlib.Path(folder, "recording").mkdir()
-            for words in (("run", "-c", ""), ("check", "--config", ""), ("replay", "x", "--calibration", ""), ("calibrate-shutter", "")):
+            for words in (("run", "-c", ""), ("check", "--config", ""), ("replay", "x", "--calibration", ""), ("calibrate", "x", "--prior", ""), ("calibrate-shutter", "")):
                 self.assertEqual(self.offered(*words, folder=folder), {"camera.yaml", "recording"})
             for words in (("replay", ""), ("calibrate", "re"), ("record", "-o", "")):
                 self.assertEqual(self.offered(*words, folder=folder), {"recording"})

@@ -137,7 +137,7 @@ void PatternBoard::make_april_grid(const PatternConfig& config) {
   const double pitch = s + gap;
   for (int row = 0; row < config.rows; ++row) {
     for (int column = 0; column < config.columns; ++column) {
-      const Vector2d at(column * pitch, row * pitch);
+      const Vector2d at(column * pitch, (config.rows - 1 - row) * pitch);
       for (const Vector2d& corner :
            {Vector2d(0, s), Vector2d(s, s), Vector2d(s, 0), Vector2d(0, 0)})
         points_.emplace_back(at + corner);
@@ -185,7 +185,8 @@ void PatternBoard::make_april_grid(const PatternConfig& config) {
     const int in_row = r % (kTagCells + 1);
     if (in_column == 0 && in_row == 0) return config.corner_squares;
     if (in_column == 0 || in_row == 0) return false;
-    const int tag = r / (kTagCells + 1) * config.columns + c / (kTagCells + 1);
+    const int tag_row = config.rows - 1 - r / (kTagCells + 1);  // numbered upwards
+    const int tag = tag_row * config.columns + c / (kTagCells + 1);
     return black[static_cast<std::size_t>((tag * kTagCells + in_row - 1) * kTagCells + in_column -
                                           1)] != 0;
   });

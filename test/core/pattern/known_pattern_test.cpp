@@ -65,10 +65,9 @@ TEST(KnownPattern, PointsLieWhereTheyArePrinted) {
   EXPECT_LT((circles[4] - Vector3<double>(0.01, 0.01, 0)).norm(), 1e-15);
   const std::vector<Vector3<double>> tags = parsed("aprilgrid:2x2:10mm:0.5").points_m();
   ASSERT_EQ(tags.size(), 16U);
-  EXPECT_LT((tags[4] - Vector3<double>(0.015, 0.01, 0)).norm(),
-            1e-15);  // the second tag's lower left corner
-  EXPECT_LT((tags[15] - Vector3<double>(0.015, 0.015, 0)).norm(),
-            1e-15);  // the last one's upper left
+  // Numbered upwards, as kalibr's: the second tag's lower left corner, the last one's upper left.
+  EXPECT_LT((tags[4] - Vector3<double>(0.015, 0.025, 0)).norm(), 1e-15);
+  EXPECT_LT((tags[15] - Vector3<double>(0.015, 0, 0)).norm(), 1e-15);
 }
 
 }  // namespace

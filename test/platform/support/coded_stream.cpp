@@ -13,7 +13,7 @@ namespace {
 constexpr int kWidth = 160;
 constexpr int kHeight = 128;
 
-void check(int code) {
+void require_coding(int code) {
   if (code < 0) throw std::runtime_error(av_error_text(code));
 }
 
@@ -42,13 +42,13 @@ CodecContextPtr make_encoder(const CodedStreamOptions& options) {
   } else {
     av_opt_set(encoder->priv_data, "x264-params", "b-adapt=0:scenecut=0", 0);
   }
-  check(avcodec_open2(encoder.get(), codec, nullptr));
+  require_coding(avcodec_open2(encoder.get(), codec, nullptr));
   return encoder;
 }
 
 // Stripes that move: no two pictures are the same.
 void paint(AVFrame* picture, int number) {
-  check(av_frame_make_writable(picture));
+  require_coding(av_frame_make_writable(picture));
   for (int plane = 0; plane < 3; ++plane) {
     const int rows = plane == 0 ? kHeight : kHeight / 2;
     for (int v = 0; v < rows; ++v) {
@@ -66,13 +66,13 @@ CodedStream coded_stream(const CodedStreamOptions& options) {
   const CodecContextPtr encoder = make_encoder(options);
   CodedStream stream;
   stream.parameters.reset(avcodec_parameters_alloc());
-  check(avcodec_parameters_from_context(stream.parameters.get(), encoder.get()));
+  require_coding(avcodec_parameters_from_context(stream.parameters.get(), encoder.get()));
   const FramePtr picture(av_frame_alloc());
   picture->width = kWidth;
   picture->height = kHeight;
   picture->format = encoder->pix_fmt;
   picture->interlaced_frame = options.interlaced ? 1 : 0;
-  check(av_frame_get_buffer(picture.get(), 0));
+  require_coding(av_frame_get_buffer(picture.get(), 0));
   const PacketPtr packet(av_packet_alloc());
   for (int i = 0; i <= options.pictures; ++i) {
     if (i < options.pictures) {
@@ -81,7 +81,8 @@ CodedStream coded_stream(const CodedStreamOptions& options) {
       // The encoder uses no more of what it is allowed to.
       picture->pict_type = i % options.key_every == 0 ? AV_PICTURE_TYPE_I : AV_PICTURE_TYPE_P;
     }
-    check(avcodec_send_frame(encoder.get(), i < options.pictures ? picture.get() : nullptr));
+    require_coding(
+        avcodec_send_frame(encoder.get(), i < options.pictures ? picture.get() : nullptr));
     while (avcodec_receive_packet(encoder.get(), packet.get()) == 0) {
       stream.pictures.emplace_back(reinterpret_cast<const char*>(packet->data),
                                    static_cast<std::size_t>(packet->size));

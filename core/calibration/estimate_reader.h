@@ -1,0 +1,74 @@
+#pragma once
+// EstimateReader: what files of estimates (calibration.yaml, lens.yaml) have in common, read strictly (strict_yaml.h):
+//   format: 1
+//   image: {width: 1920, height: 1080}
+//   NAME: {value: ..., sigma: ...}
+//   covariance: {names: [...], matrix: [[...]]}
+// All complaints are YamlError with one line, `file:line: what; what would be right`. Allocates.
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/calibration/strict_yaml.h"
+
+namespace alidade {
+
+// Of a plausible value in the right unit: one outside is more likely in another unit.
+struct EstimateRange {
+  double least;
+  double most;
+  const char* hint;  // completes "give ..."
+};
+
+// What a covariance is of: rows by name, the largest sigma of each, and what to say of an unknown name and of the unit.
+struct EstimateRows {
+  std::vector<std::string> names;
+  std::vector<double> largest_sigma;
+  std::string known;
+  std::string unit;
+};
+
+class EstimateReader {
+ public:
+  EstimateReader(YAML::Node root, std::string file);
+
+  [[noreturn]] void fail(const YAML::Node& node, const std::string& text) const;
+  [[nodiscard]] const YAML::Node& root() const { return root_; }
+
+  // kind completes "not ..."; known: the keys at the top.
+  void check_top(const std::string& kind, const std::vector<std::string>& known) const;
+  void check_keys(const YAML::Node& map, const std::vector<std::string>& known,
+                  const std::string& prefix) const;
+  // prefix: of the key's path, with a dot at its end.
+  [[nodiscard]] YAML::Node required(const YAML::Node& map, const char* key,
+                                    const std::string& prefix) const;
+  [[nodiscard]] double number(const YAML::Node& node, const std::string& name) const;
+  [[nodiscard]] std::vector<double> numbers(const YAML::Node& node, const std::string& name,
+                                            std::size_t count) const;
+
+  void read_image(int* width, int* height) const;
+  // The map {value, sigma} of this name.
+  [[nodiscard]] YAML::Node entry(const std::string& name) const;
+  // Its value, in its range.
+  [[nodiscard]] double value(const YAML::Node& entry, const std::string& name,
+                             const EstimateRange& range) const;
+
+  // Over the rows that the file names; others stay. Symmetric, positive semidefinite, no sigma beyond its largest.
+  void read_covariance(const YAML::Node& entry, const EstimateRows& rows,
+                       Eigen::Ref<Eigen::MatrixXd> covariance) const;
+  // sigma against the covariance of the same file.
+  void check_sigma(const YAML::Node& node, const std::string& name, double sigma,
+                   double variance) const;
+
+ private:
+  [[nodiscard]] int pixels(const YAML::Node& image, const char* key) const;
+  [[nodiscard]] std::vector<int> rows_of(const YAML::Node& names, const EstimateRows& rows) const;
+  void check_positive(const YAML::Node& matrix, const EstimateRows& rows,
+                      const Eigen::MatrixXd& covariance) const;
+
+  const YAML::Node root_;
+  const std::string file_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,100 @@
+#include "core/pattern/pattern_doubts.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <cstdio>
+#include <utility>
+
+#include "core/model/median.h"
+
+namespace alidade {
+namespace {
+
+// Between two frames in a row. A hand that moves the image by the pattern's own size from one frame to the next blurs it away.
+constexpr double kJump = 0.7;  // of the pattern's diagonal in the image
+constexpr int kFewestJumps = 3;
+constexpr double kNextFrame = 1.5;  // intervals
+constexpr double kLongGap_s = 1;
+
+std::string line(const char* format, double a, double b) {
+  char text[240];
+  std::snprintf(text, sizeof text, format, a, b);
+  return text;
+}
+
+double diagonal_of(const PatternFrame& frame) {
+  Vector2<double> low = frame.observations.front().u;
+  Vector2<double> high = low;
+  for (const PatternObservation& seen : frame.observations) {
+    low = low.cwiseMin(seen.u);
+    high = high.cwiseMax(seen.u);
+  }
+  return (high - low).norm();
+}
+
+// Of the points that both show, median of the distances; 0 where they share none.
+double shift_between(const PatternFrame& a, const PatternFrame& b) {
+  std::vector<double> shifts;
+  std::size_t j = 0;
+  for (const PatternObservation& of_a : a.observations) {
+    while (j < b.observations.size() && b.observations[j].point < of_a.point) ++j;
+    if (j == b.observations.size()) break;
+    if (b.observations[j].point == of_a.point)
+      shifts.push_back((b.observations[j].u - of_a.u).norm());
+  }
+  return shifts.empty() ? 0 : median(std::move(shifts));
+}
+
+bool has_a_point_twice(const PatternFrame& frame) {
+  return std::adjacent_find(frame.observations.begin(), frame.observations.end(),
+                            [](const PatternObservation& a, const PatternObservation& b) {
+                              return a.point == b.point;
+                            }) != frame.observations.end();
+}
+
+}  // namespace
+
+std::vector<std::string> doubts_of(const PatternData& data) {
+  std::vector<std::string> doubts;
+  std::vector<double> intervals;
+  for (std::size_t f = 1; f < data.frames.size(); ++f)
+    intervals.push_back(data.frames[f].time_s - data.frames[f - 1].time_s);
+  if (intervals.empty()) return doubts;
+  const double interval_s = median(std::move(intervals));
+  const PatternFrame* before = nullptr;
+  int jumps = 0;
+  int twice = 0;
+  for (const PatternFrame& frame : data.frames) {
+    if (frame.observations.empty()) continue;
+    twice += has_a_point_twice(frame) ? 1 : 0;
+    if (before != nullptr) {
+      const double apart_s = frame.time_s - before->time_s;
+      if (apart_s <= kNextFrame * interval_s &&
+          shift_between(*before, frame) > kJump * diagonal_of(frame)) {
+        ++jumps;
+      }
+      if (apart_s > kLongGap_s) {
+        const double start_s = data.frames.front().time_s;
+        doubts.push_back(
+            line("the pattern was not found from %.1f to %.1f s; keep it in view, in focus and lit",
+                 before->time_s - start_s, frame.time_s - start_s));
+      }
+    }
+    before = &frame;
+  }
+  if (jumps >= kFewestJumps) {
+    doubts.push_back(line(
+        "the pattern jumps through the image %.0f times from one frame to the next; is there a "
+        "second one in view? Cover it, or move more slowly",
+        jumps, 0));
+  }
+  if (twice >= kFewestJumps) {
+    doubts.push_back(
+        line("parts of the pattern are seen twice in %.0f images; is there a second one in view? "
+             "Cover it",
+             twice, 0));
+  }
+  return doubts;
+}
+
+}  // namespace alidade

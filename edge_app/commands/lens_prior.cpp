@@ -1,0 +1,90 @@
+#include "edge_app/commands/lens_prior.h"
+
+#include <fmt/format.h>
+
+#include <Eigen/Eigenvalues>
+#include <cmath>
+#include <optional>
+
+#include "core/pattern/lens_camera.h"
+#include "edge_app/commands/command.h"
+#include "edge_app/storage/lens_file.h"
+
+namespace alidade {
+namespace {
+
+// The same camera's picture scaled to this width.
+LensEstimate scaled_lens(const LensEstimate& lens, int width, int height) {
+  const double scale = static_cast<double>(width) / lens.width;
+  LensVector factor = LensVector::Ones();
+  for (const LensParameter parameter : {LensParameter::kFocalLengthU, LensParameter::kFocalLengthV,
+                                        LensParameter::kCentreU, LensParameter::kCentreV}) {
+    factor[index(parameter)] = scale;
+  }
+  factor[index(LensParameter::kLineDelay)] = static_cast<double>(lens.height) / height;
+  LensEstimate result;
+  result.width = width;
+  result.height = height;
+  result.lens = lens.lens.cwiseProduct(factor);
+  result.covariance = factor.asDiagonal() * lens.covariance * factor.asDiagonal();
+  return result;
+}
+
+// For variances that are to stand without their correlations.
+double variance_growth(const Matrix<double, 4, 4>& covariance) {
+  Matrix<double, 4, 4> correlation = Matrix<double, 4, 4>::Identity();
+  for (int i = 0; i < 4; ++i) {
+    for (int j = 0; j < 4; ++j) {
+      const double scale = std::sqrt(covariance(i, i) * covariance(j, j));
+      if (scale > 0) correlation(i, j) = covariance(i, j) / scale;
+    }
+  }
+  return Eigen::SelfAdjointEigenSolver<Matrix<double, 4, 4>>(correlation, Eigen::EigenvaluesOnly)
+      .eigenvalues()
+      .maxCoeff();
+}
+
+}  // namespace
+
+KnownCamera load_lens_prior(const std::string& path, int width, int height,
+                            std::vector<std::string>* remarks) {
+  LensEstimate lens;
+  std::string error;
+  if (!load_lens(path, &lens, &error)) throw CommandError(kExitUsage, error);
+  if (lens.width != width || lens.height != height) {
+    if (std::abs(lens.height * static_cast<double>(width) / lens.width - height) > 1) {
+      throw CommandError(
+          kExitUsage,
+          fmt::format(
+              "{}: is of images of {}x{} px, these are {}x{}, of another shape: what part of "
+              "the sensor they show is not known; calibrate the lens in this video mode",
+              path, lens.width, lens.height, width, height));
+    }
+    remarks->push_back(fmt::format(
+        "{}: is of images of {}x{} px and is scaled to {}x{}; if the camera reads other "
+        "rows of its sensor in this video mode, calibrate the lens in it",
+        path, lens.width, lens.height, width, height));
+    lens = scaled_lens(lens, width, height);
+  }
+  const std::optional<LensCamera> nearest =
+      camera_of_lens(lens.lens, lens.covariance, width, height);
+  if (!nearest) {
+    throw CommandError(kExitUsage,
+                       path +
+                           ": its distortion turns back within the image; show the pattern up to "
+                           "the image's corners when the lens is calibrated");
+  }
+  const double growth = variance_growth(nearest->covariance);
+  const auto known = [&](double value, int row) {
+    return KnownValue{{value, std::sqrt(growth * nearest->covariance(row, row))}, true};
+  };
+  KnownCamera camera;
+  camera.name = path;
+  camera.focal_length = known(nearest->camera.focal_length, 0);
+  camera.aspect = known(nearest->camera.aspect, 1);
+  camera.radial_distortion = known(nearest->camera.radial_distortion, 2);
+  camera.line_delay = known(nearest->line_delay, 3);
+  return camera;
+}
+
+}  // namespace alidade

@@ -1,0 +1,128 @@
+#include <string>
+#include <vector>
+
+#include "core/calibration/estimate_reader.h"
+#include "core/calibration/number_text.h"
+#include "edge_app/storage/lens_file.h"
+#include "platform/system/whole_file.h"
+
+namespace alidade {
+namespace {
+
+EstimateRange plausible_range(LensParameter parameter) {
+  switch (parameter) {
+    case LensParameter::kFocalLengthU:
+    case LensParameter::kFocalLengthV:
+      return {1, 1e7, "pixels, more than 0"};
+    case LensParameter::kCentreU:
+    case LensParameter::kCentreV:
+      return {-1e5, 1e5, "pixels from the image's corner"};
+    case LensParameter::kLineDelay:
+      return {-1e-3, 1e-3, "seconds a row; 14 microseconds are 14e-6"};
+    default:
+      return {-1e12, 1e12, "a plain number"};
+  }
+}
+
+// Of one standard deviation, in the unit of the value.
+double largest_sigma(LensParameter parameter) {
+  const EstimateRange range = plausible_range(parameter);
+  return range.most - range.least;
+}
+
+class LensReader {
+ public:
+  LensReader(const YAML::Node& root, const std::string& name) : file_(root, name) {}
+
+  LensEstimate read() const {
+    const std::vector<std::string> names(kLensParameterNames.begin(), kLensParameterNames.end());
+    std::vector<std::string> known = {"format", "image"};
+    known.insert(known.end(), names.begin(), names.end());
+    known.insert(known.end(), {"covariance", "quality"});
+    file_.check_top("a lens", known);
+    LensEstimate estimate;
+    file_.read_image(&estimate.width, &estimate.height);
+    EstimateRows rows{names, {}, join(names), "the unit of the value"};
+    std::vector<double> sigmas;
+    for (int i = 0; i < kLensParameterCount; ++i) {
+      const auto parameter = static_cast<LensParameter>(i);
+      const std::string& name = names[static_cast<std::size_t>(i)];
+      const YAML::Node entry = file_.entry(name);
+      estimate.lens[i] = file_.value(entry, name, plausible_range(parameter));
+      rows.largest_sigma.push_back(largest_sigma(parameter));
+      const YAML::Node sigma = file_.required(entry, "sigma", name + ".");
+      sigmas.push_back(file_.number(sigma, name + ".sigma"));
+      if (sigmas.back() < 0 || sigmas.back() > rows.largest_sigma.back()) {
+        file_.fail(sigma, name + ".sigma is " + short_text(sigmas.back()) +
+                              "; one standard deviation, in the unit of the value, is needed");
+      }
+    }
+    check_plausible(estimate);
+    const YAML::Node& root = file_.root();
+    const YAML::Node covariance = file_.required(root, "covariance", "");
+    file_.read_covariance(covariance, rows, estimate.covariance);
+    if (covariance["names"].size() != names.size()) {
+      file_.fail(covariance["names"],
+                 "covariance.names lacks some of the parameters; name all of " + join(names));
+    }
+    for (int i = 0; i < kLensParameterCount; ++i) {
+      const auto at = static_cast<std::size_t>(i);
+      file_.check_sigma(root[names[at]]["sigma"], names[at], sigmas[at], estimate.covariance(i, i));
+    }
+    if (root["quality"] && !root["quality"].IsMap()) {
+      file_.fail(root["quality"], "quality is not a map; write `quality: {name: value, ...}`");
+    }
+    return estimate;
+  }
+
+ private:
+  // Values that betray another unit or another image.
+  void check_plausible(const LensEstimate& estimate) const {
+    const auto value = [&](LensParameter parameter) { return estimate.lens[index(parameter)]; };
+    const auto name = [](LensParameter parameter) {
+      return std::string(kLensParameterNames[static_cast<std::size_t>(index(parameter))]);
+    };
+    const auto fail = [&](LensParameter parameter, const std::string& what) {
+      file_.fail(file_.root()[name(parameter)]["value"],
+                 name(parameter) + " " + short_text(value(parameter)) + what);
+    };
+    for (const LensParameter f : {LensParameter::kFocalLengthU, LensParameter::kFocalLengthV}) {
+      if (value(f) < 0.1 * estimate.width) {
+        fail(f, " sees more than 157 degrees across the image; give pixels, not millimetres");
+      }
+    }
+    const double aspect = value(LensParameter::kFocalLengthV) / value(LensParameter::kFocalLengthU);
+    if (aspect < 0.5 || aspect > 2) {
+      fail(LensParameter::kFocalLengthV, " is " + short_text(aspect) +
+                                             " times focal_length_u; two focal lengths of one "
+                                             "lens are about the same");
+    }
+    const auto check_centre = [&](LensParameter centre, int size) {
+      if (value(centre) < 0 || value(centre) > size) {
+        fail(centre, " lies outside the image of " + std::to_string(estimate.width) + "x" +
+                         std::to_string(estimate.height) +
+                         " px; are image and lens of one camera?");
+      }
+    };
+    check_centre(LensParameter::kCentreU, estimate.width);
+    check_centre(LensParameter::kCentreV, estimate.height);
+  }
+
+  const EstimateReader file_;
+};
+
+}  // namespace
+
+bool parse_lens(const std::string& text, const std::string& name, LensEstimate* lens,
+                std::string* error) {
+  return read_yaml(
+      text, name, {"", "; valid YAML is needed"},
+      [&](const YAML::Node& root) { *lens = LensReader(root, name).read(); }, error);
+}
+
+bool load_lens(const std::string& path, LensEstimate* lens, std::string* error) {
+  std::string text;
+  return read_file(path, &text, error) && parse_lens(text, path, lens, error);
+}
+
+}  // namespace alidade
