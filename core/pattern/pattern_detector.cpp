@@ -21,7 +21,6 @@ constexpr int kLeastWindow_px = 2;
 constexpr double kSmoothing = 0.14;  // standard deviation, of half the window
 constexpr double kSearchSmoothing_px = 1.2;
 constexpr double kLeastImageContrast = 20;  // grey levels, of an image with circles
-constexpr int kLeastImage_px = 32;
 
 // Half the side of the window around each corner, from the least distance to another.
 int window_of(const std::vector<cv::Point2f>& corners) {
