@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "edge_app/storage/lens_file.h"
-#include "test/core/pattern/pattern_renderer.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/platform/support/coded_stream.h"
+#include "test/simulator/pattern_renderer.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {
@@ -95,23 +95,22 @@ class CalibrateShutterCommand : public ::testing::Test {
 };
 
 TEST_F(CalibrateShutterCommand, AVideoGivesLensReportAndWay) {
-  test::PatternScene scene;
-  scene.width = 376;
-  scene.height = 240;
-  scene.lens = {300, 301, 190, 118, -0.28, 0.08, 3e-4, -2e-4, 80e-6};
-  scene.rate_hz = 12;
-  scene.seed = 2;
+  simulator::Config config;
+  config.image = {376, 240, 12};
+  config.seed = 2;
+  config.camera.line_delay = 80e-6;
+  config.sensor.read_noise = 1;
+  config.pattern.emplace();
+  config.pattern->lens = {300, 301, 190, 118, -0.28, 0.08, 3e-4, -2e-4};
   constexpr int kFrames = 96;
-  test::RenderOptions rendering;
-  rendering.samples = 2;
-  const test::PatternRenderer renderer(scene, rendering);
+  const simulator::PatternRenderer renderer(config);
   directory_.write("video/recording.yaml", "format: 1\nwidth: 376\nheight: 240\n");
   std::string frames = "frame,receive_time_s,sequence\n";
   for (int i = 0; i < kFrames; ++i) {
-    const double time_s = i / scene.rate_hz;
+    const double time_s = i / config.image.rate_hz;
     frames += fmt::format("{},{},{}\n", i, 10 + time_s, i);
     directory_.write(fmt::format("video/frames/{:06}.pgm", i),
-                     pgm(scene.width, scene.height, renderer.image(time_s)));
+                     pgm(config.image.width, config.image.height, renderer.render(time_s, i)));
   }
   directory_.write("video/frames.csv", frames);
   const Result result = calibrate(directory_.path() + "/video");
