@@ -69,14 +69,15 @@ PatternCalibration refused(PatternCalibration result, PatternStatus status, std:
   return result;
 }
 
-// What the finest curve misses of the motion, as a multiple of what chance would gain by finer knots; 1 within chance. The lens
-// bends to it in the same way all along, so that errors grow with it and not with its root: simulated motions at 1.6 to 3 times had
-// errors of up to 6 sigmas of what was followed. Detections that err together within a frame, by blur and by where in a
+// What the finest curve misses of the motion, as a multiple of what chance would gain by finer knots all along; 1 within chance.
+// The lens bends to it in the same way all along, so that errors grow with it and not with its root: simulated motions at 1.6 to 3
+// times had errors of up to 6 sigmas of what was followed. Detections that err together within a frame, by blur and by where in a
 // pixel corners lie, take up to twice what independent ones do; a motion that is not followed takes tens of times.
 double missed_motion(const KnotScore& score) {
-  if (score.expected_of_short <= 0) return 1;
   const double beyond_chance = score.expected_of_short + 5 * std::sqrt(2 * score.expected_of_short);
-  return score.gain_of_short > beyond_chance ? score.gain_of_short / score.expected_of_short : 1;
+  if (score.gain_of_short <= beyond_chance) return 1;
+  return 1 + (score.gain_of_short - score.expected_of_short) /
+                 (score.expected + score.expected_of_short);
 }
 constexpr double kMostMissed = 4;
 constexpr double kLeastTravel = 0.01;  // of the image's height

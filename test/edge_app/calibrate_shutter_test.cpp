@@ -102,6 +102,7 @@ TEST_F(CalibrateShutterCommand, AVideoGivesLensReportAndWay) {
   config.sensor.read_noise = 1;
   config.pattern.emplace();
   config.pattern->lens = {300, 301, 190, 118, -0.28, 0.08, 3e-4, -2e-4};
+  config.pattern->hand.speed = 0.6;  // which 12 frames a second can follow
   constexpr int kFrames = 96;
   const simulator::PatternRenderer renderer(config);
   directory_.write("video/recording.yaml", "format: 1\nwidth: 376\nheight: 240\n");
