@@ -5,14 +5,11 @@ extern "C" {
 #include <libavutil/time.h>
 }
 
-#include <arpa/inet.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
-
 #include <cmath>
 #include <cstring>
 #include <stdexcept>
+
+#include "test/support/udp_port_pair.h"
 
 namespace alidade {
 namespace {
@@ -23,44 +20,12 @@ void must(int code) {
   }
 }
 
-// The bound port, or -1.
-int bound_udp_port(int wanted, int* fd) {
-  *fd = ::socket(AF_INET, SOCK_DGRAM | SOCK_CLOEXEC, 0);
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_addr.s_addr = htonl(INADDR_ANY);
-  address.sin_port = htons(static_cast<std::uint16_t>(wanted));
-  socklen_t size = sizeof address;
-  auto* generic = reinterpret_cast<sockaddr*>(&address);
-  return ::bind(*fd, generic, size) == 0 && ::getsockname(*fd, generic, &size) == 0
-             ? ntohs(address.sin_port)
-             : -1;
-}
-
 }  // namespace
 
-int free_rtp_port() {
-  for (;;) {
-    int first_fd = -1;
-    int second_fd = -1;
-    const int first = bound_udp_port(0, &first_fd);
-    const int second = first > 0 && first % 2 == 0 ? bound_udp_port(first + 1, &second_fd) : -1;
-    ::close(first_fd);
-    ::close(second_fd);
-    if (second > 0) {
-      return first;
-    }
-  }
-}
+int free_rtp_port() { return test::udp_port_pair(); }
 
 bool rtp_port_taken(int port) {
-  bool taken = true;
-  for (const int each : {port, port + 1}) {
-    int fd = -1;
-    taken = bound_udp_port(each, &fd) < 0 && taken;
-    ::close(fd);
-  }
-  return taken;
+  return !test::UdpPortBlock::is_free(port) && !test::UdpPortBlock::is_free(port + 1);
 }
 
 RtpSender::RtpSender(Codec codec, int port, double first_time_s, int packet_bytes)

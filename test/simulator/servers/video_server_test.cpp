@@ -1,11 +1,7 @@
 // The video server seen by a client that shares no code with it: libavformat over real sockets.
 #include "test/simulator/servers/video_server.h"
 
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
-#include <netinet/in.h>
-#include <sys/socket.h>
-#include <unistd.h>
 
 #include <atomic>
 #include <chrono>
@@ -20,6 +16,7 @@
 
 #include "test/simulator/servers/av_client.h"
 #include "test/simulator/servers/encoder.h"
+#include "test/support/udp_port_pair.h"
 
 extern "C" {
 #include <libavutil/error.h>
@@ -154,35 +151,13 @@ class Camera {
   std::thread thread_;
 };
 
-// An even UDP port that is free, and so is the next.
-int free_port_pair() {
-  for (int attempt = 0; attempt < 100; ++attempt) {
-    const int first = socket(AF_INET, SOCK_DGRAM, 0);
-    const int second = socket(AF_INET, SOCK_DGRAM, 0);
-    sockaddr_in address{};
-    address.sin_family = AF_INET;
-    address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-    socklen_t size = sizeof address;
-    auto* generic = reinterpret_cast<sockaddr*>(&address);
-    bool good = bind(first, generic, size) == 0 && getsockname(first, generic, &size) == 0;
-    const int port = ntohs(address.sin_port);
-    address.sin_port = htons(static_cast<std::uint16_t>(port + 1));
-    good = good && port % 2 == 0 && port < 65535 && bind(second, generic, size) == 0;
-    close(first);
-    close(second);
-    if (good) return port;
-  }
-  return 0;
-}
-
 class VideoServerStream : public testing::TestWithParam<std::tuple<Codec, Transport>> {
  protected:
   void SetUp() override {
     const auto [codec, transport] = GetParam();
     options_ = options_for(codec);
     if (transport == Transport::kPlainRtp) {
-      options_.rtp_port = free_port_pair();
-      ASSERT_NE(options_.rtp_port, 0);
+      options_.rtp_port = test::udp_port_pair();
       options_.sdp_file =
           testing::TempDir() + "video_server_test_" + std::to_string(options_.rtp_port) + ".sdp";
     }
