@@ -164,7 +164,7 @@ void PatternBoard::make_april_grid(const PatternConfig& config) {
   std::vector<std::uint8_t> black(static_cast<std::size_t>(tags * kTagCells * kTagCells), 0);
   apriltag_family_t* family = tag36h11_create();
   for (int tag = 0; tag < tags; ++tag) {
-    image_u8_t* image = apriltag_to_image(family, static_cast<std::uint32_t>(tag));
+    image_u8_t* image = apriltag_to_image(family, tag);
     const int white = (image->width - kTagCells) / 2;
     for (int i = 0; i < kTagCells * kTagCells; ++i) {
       const int place = (i / kTagCells + white) * image->stride + i % kTagCells + white;
