@@ -5,6 +5,8 @@
 #include <cmath>
 #include <cstdio>
 
+#include "core/calibration/correlation.h"
+
 namespace alidade::internal {
 
 namespace {
@@ -32,16 +34,8 @@ double sigma(const Calibration& c, Parameter parameter) {
 
 // The direction in which the parameters are most uncertain together.
 void describe_weakest(CalibrationResult* result) {
-  const auto& cov = result->calibration.covariance;
-  // Exact parameters stand apart with a correlation of 1 with themselves: they are never the extremes.
-  ParameterCovariance<double> correlation = ParameterCovariance<double>::Identity();
-  for (int i = 0; i < kParameterCount; ++i) {
-    for (int j = 0; j < kParameterCount; ++j) {
-      if (cov(i, i) > 0 && cov(j, j) > 0) {
-        correlation(i, j) = cov(i, j) / std::sqrt(cov(i, i) * cov(j, j));
-      }
-    }
-  }
+  // Exact parameters stand apart and are never the extremes.
+  const ParameterCovariance<double> correlation = correlation_of(result->calibration.covariance);
   const Eigen::SelfAdjointEigenSolver<ParameterCovariance<double>> eigen(correlation);
   const auto& values = eigen.eigenvalues();
   result->quality.condition = values[kParameterCount - 1] / std::max(values[0], 1e-300);

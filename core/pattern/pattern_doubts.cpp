@@ -1,11 +1,12 @@
 #include "core/pattern/pattern_doubts.h"
 
+#include <Eigen/Geometry>
 #include <algorithm>
 #include <cstddef>
-#include <cstdio>
 #include <utility>
 
 #include "core/model/median.h"
+#include "core/pattern/pattern_checks.h"
 
 namespace alidade {
 namespace {
@@ -16,20 +17,10 @@ constexpr int kFewestJumps = 3;
 constexpr double kNextFrame = 1.5;  // intervals
 constexpr double kLongGap_s = 1;
 
-std::string line(const char* format, double a, double b) {
-  char text[240];
-  std::snprintf(text, sizeof text, format, a, b);
-  return text;
-}
-
 double diagonal_of(const PatternFrame& frame) {
-  Vector2<double> low = frame.observations.front().u;
-  Vector2<double> high = low;
-  for (const PatternObservation& seen : frame.observations) {
-    low = low.cwiseMin(seen.u);
-    high = high.cwiseMax(seen.u);
-  }
-  return (high - low).norm();
+  Eigen::AlignedBox2d box;
+  for (const PatternObservation& seen : frame.observations) box.extend(seen.u);
+  return box.diagonal().norm();
 }
 
 // Of the points that both show, median of the distances; 0 where they share none.
@@ -56,11 +47,7 @@ bool has_a_point_twice(const PatternFrame& frame) {
 
 std::vector<std::string> doubts_of(const PatternData& data) {
   std::vector<std::string> doubts;
-  std::vector<double> intervals;
-  for (std::size_t f = 1; f < data.frames.size(); ++f)
-    intervals.push_back(data.frames[f].time_s - data.frames[f - 1].time_s);
-  if (intervals.empty()) return doubts;
-  const double interval_s = median(std::move(intervals));
+  const double interval_s = internal::frame_interval(data);
   const PatternFrame* before = nullptr;
   int jumps = 0;
   int twice = 0;
@@ -75,24 +62,24 @@ std::vector<std::string> doubts_of(const PatternData& data) {
       }
       if (apart_s > kLongGap_s) {
         const double start_s = data.frames.front().time_s;
-        doubts.push_back(
-            line("the pattern was not found from %.1f to %.1f s; keep it in view, in focus and lit",
-                 before->time_s - start_s, frame.time_s - start_s));
+        doubts.push_back(internal::formatted(
+            "the pattern was not found from %.1f to %.1f s; keep it in view, in focus and lit",
+            before->time_s - start_s, frame.time_s - start_s));
       }
     }
     before = &frame;
   }
   if (jumps >= kFewestJumps) {
-    doubts.push_back(line(
+    doubts.push_back(internal::formatted(
         "the pattern jumps through the image %.0f times from one frame to the next; is there a "
         "second one in view? Cover it, or move more slowly",
-        jumps, 0));
+        jumps));
   }
   if (twice >= kFewestJumps) {
-    doubts.push_back(
-        line("parts of the pattern are seen twice in %.0f images; is there a second one in view? "
-             "Cover it",
-             twice, 0));
+    doubts.push_back(internal::formatted(
+        "parts of the pattern are seen twice in %.0f images; is there a second one in view? "
+        "Cover it",
+        twice));
   }
   return doubts;
 }

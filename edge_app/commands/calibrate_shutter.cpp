@@ -8,7 +8,6 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
-#include <cmath>
 #include <cstdio>
 #include <ctime>
 #include <nlohmann/json.hpp>
@@ -21,8 +20,8 @@
 #include "edge_app/commands/output_directory.h"
 #include "edge_app/commands/pattern_video.h"
 #include "edge_app/commands/stop_signals.h"
+#include "edge_app/output/lens_rows.h"
 #include "edge_app/output/pattern_report.h"
-#include "edge_app/output/value_text.h"
 #include "edge_app/storage/lens_file.h"
 
 namespace alidade {
@@ -40,36 +39,16 @@ PatternVideo find_visibly(const CalibrateShutterOptions& options, const KnownPat
   return video;
 }
 
-// The line delay in us, all else in its own unit.
-struct ShownUnit {
-  const char* name;
-  double value;
-};
-ShownUnit unit_of(LensParameter parameter) {
-  if (parameter == LensParameter::kLineDelay) return {"us/row", 1e-6};
-  return {index(parameter) < index(LensParameter::kK1) ? "px" : "", 1};
-}
-
-bool is_global_shutter(const PatternCalibration& calibration) {
-  return std::abs(calibration.lens[index(LensParameter::kLineDelay)]) <=
-         3 * calibration.sigma(LensParameter::kLineDelay);
-}
-
 std::string text_of(const PatternCalibration& calibration, const PatternVideo& video) {
   std::string text = fmt::format(
       "{} of {} images show the pattern, {} points used, {} left out; a detection's sigma {:.3f} "
       "px\n",
       video.found, video.images, calibration.observations, calibration.left_out,
       calibration.sigma_px);
-  for (int i = 0; i < kLensParameterCount; ++i) {
-    const auto parameter = static_cast<LensParameter>(i);
-    const ShownUnit unit = unit_of(parameter);
-    const double sigma = calibration.sigma(parameter) / unit.value;
-    text += fmt::format(
-        "  {:<17}{:>14} ± {} {}\n", kLensParameterNames[static_cast<std::size_t>(i)],
-        value_text(calibration.lens[i] / unit.value, sigma), sigma_text(sigma), unit.name);
+  for (const LensRow& row : lens_rows(calibration)) {
+    text += fmt::format("  {:<17}{:>14} ± {} {}\n", row.name, row.value, row.sigma, row.unit);
   }
-  if (is_global_shutter(calibration))
+  if (calibration.has_global_shutter())
     text += "the line delay is 0 within 3 sigmas: a global shutter, or rows too fast to tell\n";
   return text;
 }
@@ -81,7 +60,7 @@ std::string json_of(const PatternCalibration& calibration, const PatternVideo& v
         {"value", calibration.lens[i]},
         {"sigma", calibration.sigma(static_cast<LensParameter>(i))}};
   }
-  json["global_shutter"] = is_global_shutter(calibration);
+  json["global_shutter"] = calibration.has_global_shutter();
   json["images"] = video.images;
   json["found"] = video.found;
   json["repeated"] = video.repeated;

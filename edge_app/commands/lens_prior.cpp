@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 
+#include "core/calibration/correlation.h"
 #include "core/pattern/lens_camera.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/storage/lens_file.h"
@@ -32,14 +33,8 @@ LensEstimate scaled_lens(const LensEstimate& lens, int width, int height) {
 
 // For variances that are to stand without their correlations.
 double variance_growth(const Matrix<double, 4, 4>& covariance) {
-  Matrix<double, 4, 4> correlation = Matrix<double, 4, 4>::Identity();
-  for (int i = 0; i < 4; ++i) {
-    for (int j = 0; j < 4; ++j) {
-      const double scale = std::sqrt(covariance(i, i) * covariance(j, j));
-      if (scale > 0) correlation(i, j) = covariance(i, j) / scale;
-    }
-  }
-  return Eigen::SelfAdjointEigenSolver<Matrix<double, 4, 4>>(correlation, Eigen::EigenvaluesOnly)
+  return Eigen::SelfAdjointEigenSolver<Matrix<double, 4, 4>>(correlation_of(covariance),
+                                                             Eigen::EigenvaluesOnly)
       .eigenvalues()
       .maxCoeff();
 }

@@ -8,6 +8,7 @@
 #include <limits>
 
 #include "edge_app/output/html_page.h"
+#include "edge_app/output/lens_rows.h"
 #include "edge_app/output/report_page.h"
 #include "edge_app/output/svg_plot.h"
 #include "edge_app/output/value_text.h"
@@ -92,13 +93,13 @@ class PatternPage {
         report_.data.width, report_.data.height, report_.data.frames.back().time_s - start_s_);
     const double line_delay = c.lens[index(LensParameter::kLineDelay)];
     const double sigma = c.sigma(LensParameter::kLineDelay);
-    const bool is_global = std::abs(line_delay) <= 3 * sigma;
     add("<div class=\"verdict\"><strong>Line delay {} \u00b1 {} us/row</strong><p>{}</p></div>\n",
         value_text(1e6 * line_delay, 1e6 * sigma), sigma_text(1e6 * sigma),
-        is_global ? "0 within 3 sigmas: a global shutter, or rows too fast to tell"
-                  : fmt::format("{:.2f} ms from the first row to the last, read {}",
-                                1e3 * std::abs(line_delay) * report_.data.height,
-                                line_delay > 0 ? "from top to bottom" : "from bottom to top"));
+        c.has_global_shutter()
+            ? "0 within 3 sigmas: a global shutter, or rows too fast to tell"
+            : fmt::format("{:.2f} ms from the first row to the last, read {}",
+                          1e3 * std::abs(line_delay) * report_.data.height,
+                          line_delay > 0 ? "from top to bottom" : "from bottom to top"));
     add("<ul class=\"facts\">\n");
     const auto fact = [this](const std::string& number, const std::string& what) {
       add("<li><b>{}</b>{}</li>\n", number, what);
@@ -119,17 +120,9 @@ class PatternPage {
   void parameters() {
     add("<h2>Parameters</h2>\n<div class=\"scroll\"><table>\n<thead><tr><th>parameter</th>"
         "<th>value</th><th>sigma</th><th>unit</th></tr></thead>\n<tbody>\n");
-    for (int i = 0; i < kLensParameterCount; ++i) {
-      const auto parameter = static_cast<LensParameter>(i);
-      const bool is_delay = parameter == LensParameter::kLineDelay;
-      const double unit = is_delay ? 1e-6 : 1;
-      const double sigma = report_.calibration.sigma(parameter) / unit;
-      add("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n",
-          kLensParameterNames[static_cast<std::size_t>(i)],
-          value_text(report_.calibration.lens[i] / unit, sigma), sigma_text(sigma),
-          is_delay                        ? "us/row"
-          : i < index(LensParameter::kK1) ? "px"
-                                          : "1");
+    for (const LensRow& row : lens_rows(report_.calibration)) {
+      add("<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td></tr>\n", row.name, row.value, row.sigma,
+          *row.unit == '\0' ? "1" : row.unit);
     }
     add("</tbody>\n</table></div>\n<p class=\"soft\">sigma: one standard deviation. Pixels with "
         "the "

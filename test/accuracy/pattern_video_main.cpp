@@ -13,6 +13,7 @@
 
 #include "test/accuracy/pattern_calibration.h"
 #include "test/accuracy/pattern_detections.h"
+#include "test/accuracy/recording_range.h"
 #include "test/accuracy/statistics.h"
 #include "test/accuracy/table.h"
 
@@ -22,7 +23,7 @@ namespace {
 constexpr double kWorstSigmas = 4;
 constexpr double kWorstLineDelay_s = 0.15e-6;
 
-int run(int from, int recordings, const std::filesystem::path& folder) {
+int run(const RecordingRange& range) {
   Table each;
   each.title = "line delay and lens from video of a pattern: errors in sigmas";
   each.header = {"recording", "found", "sigma px", "error us", "sigma us"};
@@ -30,10 +31,10 @@ int run(int from, int recordings, const std::filesystem::path& folder) {
   each.header.emplace_back("CPU s");
   std::vector<std::string> missed;
   std::vector<std::vector<double>> squares(kLensParameterCount);
-  for (int i = from; i < from + recordings; ++i) {
+  for (int i = range.from; i < range.from + range.recordings; ++i) {
     const PatternRecording recording = pattern_recording(i);
     const PatternOutcome outcome =
-        calibrate_pattern_recording(recording, folder / std::to_string(i));
+        calibrate_pattern_recording(recording, range.folder / std::to_string(i));
     const PatternCalibration& calibration = outcome.calibration;
     if (calibration.status != PatternStatus::kOk) {
       missed.push_back(recording.name + ": refused: " + calibration.message);
@@ -61,9 +62,7 @@ int run(int from, int recordings, const std::filesystem::path& folder) {
     }
     row.push_back(number(outcome.detection_cpu_s, 2) + "+" + number(outcome.adjustment_cpu_s, 2));
     each.rows.push_back(row);
-    // They take minutes: whoever looks sees how far it is.
-    for (const std::string& cell : row) std::cout << cell << "  ";
-    std::cout << std::endl;
+    show(row);
   }
   Table all;
   all.title = "mean of (error / sigma)^2";
@@ -77,10 +76,7 @@ int run(int from, int recordings, const std::filesystem::path& folder) {
     if (i == static_cast<std::size_t>(index(LensParameter::kLineDelay)) && !chance.contains(anees))
       missed.emplace_back("line delay: sigmas are not honest");
   }
-  each.print(std::cout);
-  all.print(std::cout);
-  for (const std::string& what : missed) std::cout << "MISSED: " << what << "\n";
-  return missed.empty() ? 0 : 1;
+  return conclude(each, all, missed);
 }
 
 }  // namespace
@@ -88,15 +84,10 @@ int run(int from, int recordings, const std::filesystem::path& folder) {
 
 int main(int argc, char** argv) {
   CLI::App app("Line delay and lens from rendered video of a pattern against the truth");
-  int recordings = alidade::test::kPatternRecordings;
-  std::filesystem::path folder = "pattern_accuracy";
-  int from = 0;
+  alidade::test::RecordingRange range{0, alidade::test::kPatternRecordings, "pattern_accuracy"};
   int frames = 100;
   bool detections = false;
-  app.add_option("--from", from, "Number of the first")->check(CLI::Range(0, 10000));
-  app.add_option("--recordings", recordings, "How many")->check(CLI::Range(1, 10000));
-  app.add_option("--folder", folder, "Where they are written, one at a time")
-      ->capture_default_str();
+  alidade::test::add_options(&app, &range);
   app.add_flag("--detections", detections, "The table of detections alone");
   app.add_option("--frames", frames, "Of each line of that table")->check(CLI::Range(1, 100000));
   try {
@@ -109,8 +100,8 @@ int main(int argc, char** argv) {
       alidade::test::detection_table(frames).print(std::cout);
       return 0;
     }
-    std::filesystem::create_directories(folder);
-    return alidade::test::run(from, recordings, folder);
+    std::filesystem::create_directories(range.folder);
+    return alidade::test::run(range);
   } catch (const std::exception& error) {
     std::cerr << "alidade_pattern_video_accuracy: " << error.what() << "\n";
     return 2;

@@ -11,6 +11,7 @@
 #include <string>
 #include <vector>
 
+#include "test/accuracy/recording_range.h"
 #include "test/accuracy/statistics.h"
 #include "test/accuracy/table.h"
 #include "test/accuracy/video_calibration.h"
@@ -22,7 +23,7 @@ constexpr double kWorst = 4;  // sigmas
 
 std::string shown(double value) { return number(value); }
 
-int run(int from, int recordings, const std::filesystem::path& folder) {
+int run(const RecordingRange& range) {
   std::array<std::vector<double>, kComparedParameters.size()> squares;
   Table each;
   each.title = "calibrations from video: errors in sigmas";
@@ -30,14 +31,15 @@ int run(int from, int recordings, const std::filesystem::path& folder) {
   for (const Parameter p : kComparedParameters) each.header.emplace_back(to_string(p));
   std::vector<std::string> missed;
   int refused = 0;
-  for (int i = from; i < from + recordings + refused; ++i) {
+  for (int i = range.from; i < range.from + range.recordings + refused; ++i) {
     const VideoRecording recording = video_recording(i);
     std::string error;
-    const auto errors = calibrate_video_recording(recording, folder / std::to_string(i), &error);
+    const auto errors =
+        calibrate_video_recording(recording, range.folder / std::to_string(i), &error);
     if (!errors) {
       // Little contrast in much noise: no calibration is no wrong one. Another takes its place.
       std::cout << recording.name << ": refused: " << error << std::endl;
-      if (++refused > recordings) {
+      if (++refused > range.recordings) {
         missed.emplace_back("more than half of the recordings were refused");
         break;
       }
@@ -54,9 +56,7 @@ int run(int from, int recordings, const std::filesystem::path& folder) {
       }
     }
     each.rows.push_back(row);
-    // They take minutes: whoever looks sees how far it is.
-    for (const std::string& cell : row) std::cout << cell << ' ';
-    std::cout << std::endl;
+    show(row);
   }
   // All eight keep theirs together in 95 of 100 experiments.
   const double probability = std::pow(0.95, 1.0 / static_cast<double>(squares.size()));
@@ -70,10 +70,7 @@ int run(int from, int recordings, const std::filesystem::path& folder) {
     all.rows.push_back({name, shown(anees), shown(chance.low), shown(chance.high)});
     if (!(anees <= chance.high)) missed.push_back(std::string(name) + ": sigmas too small");
   }
-  each.print(std::cout);
-  all.print(std::cout);
-  for (const std::string& what : missed) std::cout << "MISSED: " << what << "\n";
-  return missed.empty() ? 0 : 1;
+  return conclude(each, all, missed);
 }
 
 }  // namespace
@@ -81,21 +78,16 @@ int run(int from, int recordings, const std::filesystem::path& folder) {
 
 int main(int argc, char** argv) {
   CLI::App app("Calibrations from video against the truth of rendered recordings");
-  int recordings = alidade::test::kVideoRecordings;
-  std::filesystem::path folder = "video_accuracy";
-  int from = 0;
-  app.add_option("--from", from, "Number of the first")->check(CLI::Range(0, 10000));
-  app.add_option("--recordings", recordings, "How many")->check(CLI::Range(1, 10000));
-  app.add_option("--folder", folder, "Where they are written, one at a time")
-      ->capture_default_str();
+  alidade::test::RecordingRange range{0, alidade::test::kVideoRecordings, "video_accuracy"};
+  alidade::test::add_options(&app, &range);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
     return app.exit(error) == 0 ? 0 : 2;
   }
   try {
-    std::filesystem::create_directories(folder);
-    return alidade::test::run(from, recordings, folder);
+    std::filesystem::create_directories(range.folder);
+    return alidade::test::run(range);
   } catch (const std::exception& error) {
     std::cerr << "alidade_video_accuracy: " << error.what() << "\n";
     return 2;

@@ -30,6 +30,7 @@
 #include "test/benchmark/turning_camera.h"
 #include "test/platform/support/raw_server.h"
 #include "test/platform/support/rtp_sender.h"
+#include "test/support/udp_port_pair.h"
 
 namespace alidade::benchmarks {
 
@@ -108,7 +109,7 @@ class HttpSender {
 class RtpImages {
  public:
   RtpImages(const Timetable& timetable, const Camera<double>& camera)
-      : timetable_(timetable), port_(free_rtp_port()) {
+      : timetable_(timetable), port_(test::udp_port_pair()) {
     const std::string url = "rtp://127.0.0.1:" + std::to_string(port_) + "?pkt_size=1400";
     require(avformat_alloc_output_context2(&format_, nullptr, "rtp", url.c_str()) >= 0,
             "libavformat makes no RTP");

@@ -20,6 +20,7 @@
 #include "test/platform/support/rtp_relay.h"
 #include "test/platform/support/rtp_sender.h"
 #include "test/support/temporary_directory.h"
+#include "test/support/udp_port_pair.h"
 
 namespace alidade {
 namespace {
@@ -136,7 +137,7 @@ TEST_F(CheckCommand, PassesAHealthySetup) {
 // Longer than a connection is given without a picture.
 TEST_F(CheckCommand, WaitsForAKeyFrameForAsLongAsItTakesAndSaysSo) {
   constexpr double kWithout_s = 5.5;
-  const int port = free_rtp_port();
+  const int port = test::udp_port_pair();
   std::atomic<bool> over{false};
   std::thread camera([&] {
     ASSERT_TRUE(eventually([port] { return rtp_port_taken(port); }));

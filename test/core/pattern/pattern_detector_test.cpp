@@ -48,6 +48,7 @@ Observations found_in(const std::vector<std::uint8_t>& image, const simulator::C
 struct Errors {
   double squares = 0;
   int count = 0, wrong = 0;
+  int frames = 0;  // in which something was found
 
   void add(const simulator::PatternRenderer& renderer, double time_s, const KnownPattern& pattern,
            const Observations& found) {
@@ -58,6 +59,7 @@ struct Errors {
       return Eigen::Vector2d(o.u - renderer.camera().project_rolling(place, time_s).value());
     };
     if (found.empty()) return;
+    ++frames;
     const bool turned = pattern.is_symmetric() &&
                         error(found.front(), true).norm() < error(found.front(), false).norm();
     for (const PatternObservation& o : found) {
@@ -73,24 +75,27 @@ struct Errors {
   [[nodiscard]] double rms() const { return std::sqrt(squares / (2 * count)); }
 };
 
+// Of frames this far apart, from 0 on.
+Errors errors_of(const simulator::Config& config, const char* text, int frames, double interval_s) {
+  const KnownPattern pattern = pattern_of(text);
+  const simulator::PatternRenderer renderer(config);
+  PatternDetector detector(pattern);
+  Errors errors;
+  for (int f = 0; f < frames; ++f) {
+    const double time_s = interval_s * f;
+    errors.add(renderer, time_s, pattern, found_in(renderer.render(time_s, f), config, &detector));
+  }
+  return errors;
+}
+
 class PrintedPatterns : public testing::TestWithParam<Printed> {};
 
 // 0.05 px a coordinate, noise-free: simulator, detectors and their pixel conventions agree.
 TEST_P(PrintedPatterns, PointsAtRestAreFoundWhereTheyAre) {
   simulator::Config config = scene_of(GetParam());
   config.pattern->hand.speed = 1e-3;  // at rest while a frame is taken; every 700 s another pose
-  const KnownPattern pattern = pattern_of(GetParam().text);
-  const simulator::PatternRenderer renderer(config);
-  PatternDetector detector(pattern);
-  Errors errors;
-  int frames = 0;
-  for (int f = 0; f < 8; ++f) {
-    const double time_s = 700.0 * f;
-    const Observations found = found_in(renderer.render(time_s, f), config, &detector);
-    frames += found.empty() ? 0 : 1;
-    errors.add(renderer, time_s, pattern, found);
-  }
-  EXPECT_GE(frames, 6);
+  const Errors errors = errors_of(config, GetParam().text, 8, 700.0);
+  EXPECT_GE(errors.frames, 6);
   EXPECT_LE(errors.wrong, errors.count / 500);
   EXPECT_LT(errors.rms(), GetParam().rms_at_rest);
 }
@@ -101,18 +106,8 @@ TEST_P(PrintedPatterns, MovingPointsAreFoundWhereTheirRowsSawThem) {
   config.camera.line_delay = -60e-6;
   config.sensor.exposure = 4e-3;
   config.sensor.read_noise = 2;
-  const KnownPattern pattern = pattern_of(GetParam().text);
-  const simulator::PatternRenderer renderer(config);
-  PatternDetector detector(pattern);
-  Errors errors;
-  int frames = 0;
-  for (int f = 0; f < 8; ++f) {
-    const double time_s = 0.05 * f;
-    const Observations found = found_in(renderer.render(time_s, f), config, &detector);
-    frames += found.empty() ? 0 : 1;
-    errors.add(renderer, time_s, pattern, found);
-  }
-  EXPECT_EQ(frames, 8);
+  const Errors errors = errors_of(config, GetParam().text, 8, 0.05);
+  EXPECT_EQ(errors.frames, 8);
   EXPECT_LE(errors.wrong, errors.count / 500);
   EXPECT_LT(errors.rms(), GetParam().rms_moving);
 }
@@ -147,15 +142,7 @@ TEST(PatternDetector, HiddenTagsAreNotFound) {
   simulator::Config config = scene_of(kTags);
   config.pattern->finger = 0.06;
   config.pattern->hand.distance = 0.25;  // too near to be in view whole
-  const simulator::PatternRenderer renderer(config);
-  const KnownPattern pattern = pattern_of(kTags.text);
-  PatternDetector detector(pattern);
-  Errors errors;
-  for (int f = 0; f < 6; ++f) {
-    const double time_s = 0.4 * f;
-    const Observations found = found_in(renderer.render(time_s, f), config, &detector);
-    errors.add(renderer, time_s, pattern, found);
-  }
+  const Errors errors = errors_of(config, kTags.text, 6, 0.4);
   EXPECT_GT(errors.count, 6 * 40);
   EXPECT_LT(errors.count, 6 * 4 * 36);
   EXPECT_LE(errors.wrong, errors.count / 100);
@@ -166,19 +153,9 @@ TEST(PatternDetector, HalfHiddenCirclesAreLeftOut) {
   const Printed printed = {"circles:4x11:25mm", Kind::kCircles, 4, 11, 0.025, 0, 0};
   simulator::Config config = scene_of(printed);
   config.pattern->finger = 0.03;
-  const simulator::PatternRenderer renderer(config);
-  const KnownPattern pattern = pattern_of(printed.text);
-  PatternDetector detector(pattern);
-  Errors errors;
-  int frames = 0;
-  for (int f = 0; f < 20; ++f) {
-    const double time_s = 0.3 * f;
-    const Observations found = found_in(renderer.render(time_s, f), config, &detector);
-    frames += found.empty() ? 0 : 1;
-    errors.add(renderer, time_s, pattern, found);
-  }
-  EXPECT_LT(errors.count, 44 * frames);
-  EXPECT_GT(errors.count, 40 * frames);
+  const Errors errors = errors_of(config, printed.text, 20, 0.3);
+  EXPECT_LT(errors.count, 44 * errors.frames);
+  EXPECT_GT(errors.count, 40 * errors.frames);
   EXPECT_EQ(errors.wrong, 0);
   EXPECT_LT(errors.rms(), 0.012);
 }

@@ -9,6 +9,7 @@
 #include <stdexcept>
 
 #include "test/platform/support/rtp_sender.h"
+#include "test/support/udp_port_pair.h"
 
 namespace alidade {
 namespace {
@@ -44,7 +45,7 @@ std::uint32_t timestamp_of(const RtpRelay::Packet& packet) {
 
 }  // namespace
 
-RtpRelay::RtpRelay(int to_port) : port_(free_rtp_port()), to_port_(to_port) {
+RtpRelay::RtpRelay(int to_port) : port_(test::udp_port_pair()), to_port_(to_port) {
   fd_ = bound_socket(port_);
   rtcp_fd_ = bound_socket(port_ + 1);
 }

@@ -22,8 +22,6 @@ void must(int code) {
 
 }  // namespace
 
-int free_rtp_port() { return test::udp_port_pair(); }
-
 bool rtp_port_taken(int port) {
   return !test::UdpPortBlock::is_free(port) && !test::UdpPortBlock::is_free(port + 1);
 }

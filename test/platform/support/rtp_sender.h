@@ -51,9 +51,6 @@ inline void PrintTo(const RtpSender::Codec& codec, std::ostream* out) {
                                               : "H265");
 }
 
-// An even UDP port of the loopback that is free, and the one after it, too.
-int free_rtp_port();
-
 // Whether somebody listens at this pair of ports.
 bool rtp_port_taken(int port);
 

@@ -11,6 +11,7 @@
 #include "test/platform/support/rtp_sender.h"
 #include "test/platform/support/rtsp_server.h"
 #include "test/support/temporary_directory.h"
+#include "test/support/udp_port_pair.h"
 
 namespace alidade {
 namespace {
@@ -46,7 +47,7 @@ struct RtspRig : LiveFrameSourceRig {
 
 struct RtpRig : LiveFrameSourceRig {
   explicit RtpRig(Patience patience) {
-    const int port = free_rtp_port();
+    const int port = test::udp_port_pair();
     options.url = "rtp://@:" + std::to_string(port);
     set_patience(patience, &options, 0.5);
     source = open();

@@ -23,6 +23,7 @@
 #include "test/platform/support/rtp_relay.h"
 #include "test/platform/support/rtp_sender.h"
 #include "test/support/temporary_directory.h"
+#include "test/support/udp_port_pair.h"
 
 namespace alidade {
 namespace {
@@ -83,7 +84,7 @@ double number_of(const Frame& frame, const FrameStamp& first) {
 
 class RtpSourceWith : public ::testing::TestWithParam<Codec> {
  protected:
-  const int port_ = free_rtp_port();
+  const int port_ = test::udp_port_pair();
   RtpSourceOptions options_ = options_for(port_, GetParam());
 };
 
@@ -198,7 +199,7 @@ INSTANTIATE_TEST_SUITE_P(
 
 TEST_P(RtpSourceTimestamps, AreUnwrappedAndGiveUtcFromTheFirstReportOn) {
   const auto [codec, first_timestamp, report_first] = GetParam();
-  const int port = free_rtp_port();
+  const int port = test::udp_port_pair();
   const auto source = open_rtp(options_for(port, codec));
   listen(*source, port);
   RtpRelay relay(port);
@@ -296,7 +297,7 @@ TEST_P(RtpSourceWith, PutsPacketsInOrderThatOvertookEachOther) {
 // However long before it the first ones came: an encoder may send each slice as soon as it is made.
 TEST(RtpSourceSlices, LetAPictureBeStampedOnTheArrivalOfItsLastPacket) {
   constexpr int kSmallPacket = 40;  // bytes: several for each picture
-  const int port = free_rtp_port();
+  const int port = test::udp_port_pair();
   const auto source = open_rtp(options_for(port, Codec::kH264));
   listen(*source, port);
   RtpRelay relay(port);
@@ -524,7 +525,7 @@ TEST_P(RtpSourceOfPredicted, ShowNoPictureThatIsCodedFromALostOne) {
 TEST_P(RtpSourceOfPredicted, ShowNoPictureThatLostAPacketAndNoneThatIsCodedFromIt) {
   constexpr int kSmallPacket = 40;  // bytes: several for each key frame
   for (const int from_the_end : {1, 2}) {
-    const int port = free_rtp_port();
+    const int port = test::udp_port_pair();
     const auto source = open_rtp(options_for(port, GetParam()));
     listen(*source, port);
     RtpRelay relay(port);
@@ -717,7 +718,7 @@ TEST_P(RtpSourceCopy, GoesOnOverAReconnection) {
 }
 
 TEST(RtpSourceCopyFailure, EndsTheSourceWithTheReason) {
-  const int port = free_rtp_port();
+  const int port = test::udp_port_pair();
   const TemporaryDirectory directory;
   RtpSourceOptions options = options_for(port, Codec::kMjpeg);
   options.copy_to = directory.path() + "/nowhere/video.mkv";
@@ -762,7 +763,7 @@ TEST(RtpSourceOptions, ThatCannotWorkFailAtOnceAndShowNoPassword) {
 }
 
 TEST(RtpSourceReconnection, LeaksNoFileDescriptor) {
-  RtpSourceOptions options = options_for(free_rtp_port(), Codec::kMjpeg);
+  RtpSourceOptions options = options_for(test::udp_port_pair(), Codec::kMjpeg);
   options.timeout_s = 0.001;
   const auto source = open_rtp(options);
   Frame frame;
@@ -780,7 +781,7 @@ TEST(RtpSourceReconnection, LeaksNoFileDescriptor) {
 }
 
 TEST(RtpSourceStop, EndsAReadThatWaitsForPackets) {
-  const int port = free_rtp_port();
+  const int port = test::udp_port_pair();
   RtpSourceOptions options = options_for(port, Codec::kMjpeg);
   options.timeout_s = kNever_s;
   const auto source = open_rtp(options);
@@ -794,7 +795,7 @@ TEST(RtpSourceStop, EndsAReadThatWaitsForPackets) {
 }
 
 TEST(RtpSourceStop, EndsAPause) {
-  RtpSourceOptions options = options_for(free_rtp_port(), Codec::kMjpeg);
+  RtpSourceOptions options = options_for(test::udp_port_pair(), Codec::kMjpeg);
   options.timeout_s = 0.001;
   options.max_backoff_s = kNever_s;
   const auto source = open_rtp(options);
