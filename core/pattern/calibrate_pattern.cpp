@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/model/median.h"
+#include "core/pattern/circle_images.h"
 #include "core/pattern/knot_score.h"
 #include "core/pattern/moving_projection.h"
 #include "core/pattern/pattern_adjustment.h"
@@ -127,8 +128,9 @@ std::vector<PatternResidual> pattern_residuals(const PatternData& data, const Le
   return residuals;
 }
 
-PatternCalibration calibrate_pattern(const PatternData& data,
+PatternCalibration calibrate_pattern(const PatternData& as_detected,
                                      const PatternCalibrationOptions& options) {
+  PatternData data = as_detected;
   PatternCalibration result;
   if (auto what = internal::bad_input(data))
     return refused(result, PatternStatus::kBadInput, std::move(*what));
@@ -216,6 +218,7 @@ PatternCalibration calibrate_pattern(const PatternData& data,
     const bool is_settled = !is_held && end == AdjustmentEnd::kConverged;
     if (is_settled && score.split.empty()) break;
     if (is_followed) is_held = false;
+    if (!is_held) data = recentred(as_detected, state.lens, state.curve);
     if (is_settled || !is_followed) state.curve = state.curve.split(score.split);
   }
 
