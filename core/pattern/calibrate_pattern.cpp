@@ -103,6 +103,13 @@ double missed_motion(const KnotScore& score) {
                  (score.expected + score.expected_of_short);
 }
 constexpr double kMostMissed = 4;
+
+// The larger one, a part of itself.
+double focal_length_sigma(const PatternCalibration& calibration) {
+  return std::max(calibration.sigma(LensParameter::kFocalLengthU) / calibration.lens[0],
+                  calibration.sigma(LensParameter::kFocalLengthV) / calibration.lens[1]);
+}
+
 constexpr double kLeastTravel = 0.01;  // of the image's height
 // Times the first focal length, beyond which it runs off because nothing holds it.
 constexpr double kRunOff = 4;
@@ -257,24 +264,22 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
   result.sigma_px = std::sqrt(sum / freedom);
 
   adjustment.sigma_px = result.sigma_px;
-  const std::optional<LensMatrix> covariance =
+  const std::optional<internal::LensCovariance> covariance =
       internal::lens_covariance(data, used, knowledge, adjustment, state);
   if (!covariance) {
     return refused(
         result, PatternStatus::kNoLens,
         "the video determines neither lens nor line delay; " + internal::how_to_show(views));
   }
-  result.covariance = *covariance;
+  result.covariance = covariance->independent;
   // Before all else: with a lens that is not determined nothing else of the result means anything.
-  const double focal_length_sigma =
-      std::max(result.sigma(LensParameter::kFocalLengthU) / state.lens[0],
-               result.sigma(LensParameter::kFocalLengthV) / state.lens[1]);
-  if (!(focal_length_sigma <= options.largest_focal_length_sigma)) {
+  if (!(focal_length_sigma(result) <= options.largest_focal_length_sigma)) {
     return refused(result, PatternStatus::kNoLens,
                    formatted("focal length known to %.1f %% only: the views are too much alike; ",
-                             100 * focal_length_sigma) +
+                             100 * focal_length_sigma(result)) +
                        internal::how_to_show(views));
   }
+  result.covariance = covariance->covariance();
   const double missed = missed_motion(score);
   result.covariance *= missed * missed;
   if (missed > kMostMissed) {
@@ -283,6 +288,13 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
         formatted("the camera moved too fast for %.1f frames a second: move it more slowly; or the "
                   "pattern is not flat, or not as long and high as told",
                   1 / result.frame_interval_s));
+  }
+  if (!(focal_length_sigma(result) <= options.largest_focal_length_sigma)) {
+    return refused(
+        result, PatternStatus::kNoLens,
+        formatted("focal length known to %.1f %% only, since the pattern's points do not "
+                  "lie where they should; is it flat, and as long and high as told?",
+                  100 * focal_length_sigma(result)));
   }
   const double line_delay_sigma_s = result.sigma(LensParameter::kLineDelay);
   if (!(line_delay_sigma_s * data.height <= options.largest_readout_sigma_s)) {
