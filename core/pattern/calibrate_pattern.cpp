@@ -80,6 +80,20 @@ void expect_accelerations(const PoseCurve& curve, PatternAdjustmentOptions* opti
   options->rotation_noise = std::max(1e-9, kAccelerationTime_s * mean.tail<3>().mean());
 }
 
+// Some of a frame's points tell its pose well enough for where the curve begins.
+PatternMask thinned(PatternMask used) {
+  constexpr int kEnough = 48;
+  for (auto& frame : used) {
+    const auto points = std::count(frame.begin(), frame.end(), char{1});
+    const auto every = (points + kEnough - 1) / kEnough;
+    std::ptrdiff_t number = 0;
+    for (char& is_used : frame) {
+      if (is_used != 0 && number++ % every != 0) is_used = 0;
+    }
+  }
+  return used;
+}
+
 int used_frames(const PatternMask& used) {
   return static_cast<int>(std::count_if(used.begin(), used.end(), [](const auto& frame) {
     return std::count(frame.begin(), frame.end(), char{1}) > 0;
@@ -203,7 +217,8 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
     adjustment.sigma_px = sigma_px;
     adjustment.first_radius = is_held ? kFar : kNear;
     const AdjustmentEnd end =
-        internal::adjust_pattern(data, used, is_held ? held : knowledge, adjustment, &state);
+        is_held ? internal::adjust_pattern(data, thinned(used), held, adjustment, &state)
+                : internal::adjust_pattern(data, used, knowledge, adjustment, &state);
     if (end == AdjustmentEnd::kFailed) {
       return refused(result, PatternStatus::kNotConverged,
                      "no motion of the camera explains the detections");
