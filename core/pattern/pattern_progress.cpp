@@ -26,7 +26,7 @@ constexpr double kOutlying = 0.025;  // of the views to each side: poses of few 
 constexpr double kEnough_s = 20;
 constexpr double kUnseen_s = 1.5;
 constexpr double kSeldom = 0.5;
-constexpr double kUnfollowed = 0.012;
+constexpr double kUnfollowed = 0.025;
 constexpr double kCovered = 0.2;
 constexpr double kTilt = 15 * kPi / 180;
 constexpr double kDistanceRatio = 1.2;
@@ -132,7 +132,9 @@ void measure_motion(const PatternData& data, PatternProgress* progress) {
     before = &frame;
   }
   if (progress->seen_s > 0) progress->speed = std::sqrt(squares / progress->seen_s);
-  progress->unseen_s = end_s - (before == nullptr ? data.frames.front() : *before).time_s;
+  const double begin_s = data.frames.front().time_s;
+  progress->last_seen_s = before == nullptr ? 0 : before->time_s - begin_s;
+  progress->unseen_s = end_s - begin_s - progress->last_seen_s;
   progress->found = static_cast<double>(recent_found) / recent;
   progress->unfollowed = unfollowed_motion(data, end_s - kRecent_s);
 }
@@ -230,8 +232,11 @@ PatternProgress progress_of(const PatternData& data) {
 std::vector<std::string> advice_of(const PatternProgress& progress) {
   std::vector<std::string> lines;
   if (progress.unseen_s >= kUnseen_s) {
-    lines.emplace_back(
-        "the pattern is not found; is it this pattern, whole in view, in focus and lit?");
+    lines.push_back(
+        (progress.extent == 0
+             ? "the pattern is not found"
+             : internal::formatted("the pattern is not found since %.0f s", progress.last_seen_s)) +
+        "; is it this pattern, whole in view, in focus and lit?");
   } else if (progress.found < kSeldom) {
     lines.emplace_back(
         "the pattern is found in few images; move more slowly, or give more light and keep it in "
@@ -247,7 +252,8 @@ std::vector<std::string> advice_of(const PatternProgress& progress) {
 }
 
 bool is_enough(const PatternProgress& progress) {
-  return progress.seen_s >= kEnough_s && still_to_show(progress).empty();
+  return progress.seen_s >= kEnough_s && progress.unfollowed <= kUnfollowed &&
+         still_to_show(progress).empty();
 }
 
 }  // namespace alidade

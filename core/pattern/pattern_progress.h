@@ -15,6 +15,7 @@ namespace alidade {
 struct PatternProgress {
   double seen_s = 0;          // time over which the pattern was seen in one frame after the other
   double unseen_s = 0;        // since it was last seen; never seen: since the first frame
+  double last_seen_s = 0;     // when that was, since the first frame
   double found = 0;           // part of the last seconds' frames in which it was found
   double extent = 0;          // as PatternViews
   double speed = 0;           // of points in the image, image heights/s, root mean square
@@ -28,7 +29,7 @@ struct PatternProgress {
 
 [[nodiscard]] PatternProgress progress_of(const PatternData& data);
 
-// By how much the middle of five frames' points lie from where the others' say, were the motion a cubic in between: beyond some
+// By how much the points of the middle one of five frames lie from where the others say, were the motion a cubic in between: beyond some
 // pixels the frames do not follow the motion. Median of the fives with more than `since_s` as their first time, part of the image's
 // height; 0 without any.
 [[nodiscard]] double unfollowed_motion(const PatternData& data, double since_s);
@@ -36,7 +37,7 @@ struct PatternProgress {
 // What would help, one line each, what matters most first. Empty: all there is to show was shown.
 [[nodiscard]] std::vector<std::string> advice_of(const PatternProgress& progress);
 
-// All was shown, whatever the pattern does now, and for long enough.
+// All was shown, for long enough, and in the last seconds not too fast.
 [[nodiscard]] bool is_enough(const PatternProgress& progress);
 
 }  // namespace alidade

@@ -80,6 +80,19 @@ bool PatternSearch::look(const Frame& frame) {
   return is_found;
 }
 
+void PatternSearch::undo_half_turns() {
+  constexpr double kFollowed = 10;  // images, in the mean
+  const std::vector<PatternFrame>& frames = video_.data.frames;
+  const double all_s = frames.back().time_s - frames.front().time_s;
+  follow_half_turns(pattern_, kFollowed * all_s / static_cast<double>(frames.size() - 1),
+                    &video_.data);
+}
+
+const PatternData& PatternSearch::found_so_far() {
+  if (video_.data.frames.size() > 1) undo_half_turns();
+  return video_.data;
+}
+
 std::vector<PatternSearch::Span> PatternSearch::connections() const {
   std::vector<Span> spans;
   for (std::size_t i = 0; i < stamps_.size(); ++i) {
@@ -197,9 +210,7 @@ PatternVideo PatternSearch::finish() {
     while (stamps_[at].frame != looked_[f]) ++at;
     data.frames[f].time_s = times[at++];
   }
-  const double interval_s = (data.frames.back().time_s - data.frames.front().time_s) /
-                            static_cast<double>(data.frames.size() - 1);
-  follow_half_turns(pattern_, 10 * interval_s, &data);
+  undo_half_turns();
   if (interlaced_) video_.remarks.emplace_back(kInterlaced);
   for (const std::string& remark : doubts_of(data)) video_.remarks.push_back(remark);
   if (video_.repeated > 0)

@@ -40,8 +40,8 @@ class PatternSearch {
   // Frames that were noted, in their order, not necessarily all. True: the pattern is in it.
   bool look(const Frame& frame);
 
-  // What look() has found so far; times are those of arrival.
-  [[nodiscard]] const PatternData& found_so_far() const { return video_.data; }
+  // look()'s thread: what it has found so far; times are those of arrival.
+  [[nodiscard]] const PatternData& found_so_far();
 
   // Ends it. Throws CommandError: too few images, stamps that do not increase.
   [[nodiscard]] PatternVideo finish();
@@ -57,6 +57,8 @@ class PatternSearch {
   [[nodiscard]] std::vector<double> times_of(Span span);
   [[nodiscard]] std::vector<double> all_times();
   void remark_clock();
+  // A symmetric pattern's points, the same way round from image to image.
+  void undo_half_turns();
 
   const std::string name_;
   const KnownPattern pattern_;
