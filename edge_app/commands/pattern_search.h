@@ -6,6 +6,7 @@
 // Stamps of all frames go into the clock, also of those whose image nobody looked at: note() and look() share no state, so that
 // a thread may read while another looks.
 
+#include <cstddef>
 #include <cstdint>
 #include <optional>
 #include <string>
