@@ -283,6 +283,8 @@ AdjustmentEnd adjust_pattern(const PatternData& data, const PatternMask& used,
   solver.max_num_iterations = options.max_steps;
   solver.initial_trust_region_radius = options.first_radius;
   solver.function_tolerance = options.relative_decrease;
+  // Steps of a line delay, 1e-7 s, are nothing beside focal lengths of hundreds of pixels.
+  solver.parameter_tolerance = 0;
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
