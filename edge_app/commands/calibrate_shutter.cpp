@@ -50,7 +50,10 @@ PatternVideo find_live(const CalibrateShutterOptions& options, const KnownPatter
                                 "instead: alidade calibrate-shutter {}",
                                 options.config, config.directory));
   }
-  return film_pattern(config, pattern, options.duration_s.value_or(kUsualFilm_s));
+  PatternVideo video = film_pattern(config, pattern, options.duration_s.value_or(kUsualFilm_s));
+  spdlog::info("{}: calibrating, the pattern is in {} of {} images; Ctrl-C ends it at once",
+               video.name, video.found, video.images);
+  return video;
 }
 
 void check_usage(const CalibrateShutterOptions& options) {

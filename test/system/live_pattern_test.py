@@ -70,6 +70,7 @@ class LivePattern(Bench):
         rtsp, mjpeg = ({"type": "rtsp", "url": camera.video_url}, {"type": "mjpeg", "url": camera.others["mjpeg"]})
         by_itself = self.calibrate("by_itself", rtsp, "--json")
         interrupted = self.calibrate("interrupted", mjpeg, "--json")
+        impatient = self.calibrate("impatient", mjpeg)
 
         # Ten seconds of the pattern, by the camera's own count.
         wait_until(lambda: len((camera.truth / "truth.csv").read_text().splitlines()) > 10 * 15, "ten seconds")
@@ -78,6 +79,12 @@ class LivePattern(Bench):
         self.assertEqual(code, 0, interrupted.error_text())
         self.assert_is_true(interrupted, lines)
         self.assert_stored("interrupted")
+
+        impatient.child.send_signal(signal.SIGINT)
+        wait_until(lambda: self.said(impatient, "calibrating, "), "the calibration")
+        code, lines = impatient.end(signal.SIGINT)
+        self.assertEqual((code, lines), (-signal.SIGINT, []), impatient.error_text())
+        self.assertFalse((self.folder / "impatient").exists())
 
         code, lines = by_itself.end()
         self.assertEqual(code, 0, by_itself.error_text())
