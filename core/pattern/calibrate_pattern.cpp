@@ -80,6 +80,32 @@ void expect_accelerations(const PoseCurve& curve, PatternAdjustmentOptions* opti
   options->rotation_noise = std::max(1e-9, kAccelerationTime_s * mean.tail<3>().mean());
 }
 
+// Is the image read out in less than a hundredth of a frame's time?
+bool is_almost_at_once(const PatternData& data, const LensVector& lens,
+                       const LensKnowledge& knowledge, double frame_interval_s) {
+  constexpr double kReadout = 0.01;
+  constexpr int kDelay = index(LensParameter::kLineDelay);
+  return !knowledge.fixed[static_cast<std::size_t>(kDelay)] &&
+         std::abs(lens[kDelay]) * data.height < kReadout * frame_interval_s;
+}
+
+// Rows that are exposed at once do not tell how fast the camera moves; their neighbours in time do, more or less well. A least-squares
+// fit of both would find the speeds that, with some line delay beside 0, explain noise. So the curve as if there were no line
+// delay, then one step of all from there, in which the line delay has no part in the speeds.
+bool take_as_at_once(const PatternData& data, const PatternMask& used,
+                     const LensKnowledge& knowledge, PatternAdjustmentOptions options,
+                     PatternState* state) {
+  constexpr int kDelay = index(LensParameter::kLineDelay);
+  LensKnowledge at_once = knowledge;
+  at_once.fixed[static_cast<std::size_t>(kDelay)] = true;
+  state->lens[kDelay] = 0;
+  if (internal::adjust_pattern(data, used, at_once, options, state) == AdjustmentEnd::kFailed)
+    return false;
+  options.max_steps = 1;
+  options.first_radius = 1e16;
+  return internal::adjust_pattern(data, used, knowledge, options, state) != AdjustmentEnd::kFailed;
+}
+
 // Some of a frame's points tell its pose well enough for where the curve begins.
 PatternMask thinned(PatternMask used) {
   constexpr int kEnough = 48;
@@ -251,6 +277,11 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
   adjustment.max_steps = kFinalSteps;
   if (internal::adjust_pattern(data, used, knowledge, adjustment, &state) ==
       AdjustmentEnd::kFailed) {
+    return refused(result, PatternStatus::kNotConverged,
+                   "no motion of the camera explains the detections");
+  }
+  if (is_almost_at_once(data, state.lens, knowledge, result.frame_interval_s) &&
+      !take_as_at_once(data, used, knowledge, adjustment, &state)) {
     return refused(result, PatternStatus::kNotConverged,
                    "no motion of the camera explains the detections");
   }

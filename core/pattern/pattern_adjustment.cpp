@@ -11,6 +11,7 @@
 #include <memory>
 #include <utility>
 
+#include "core/pattern/image_cells.h"
 #include "core/pattern/moving_projection.h"
 
 namespace alidade::internal {
@@ -248,22 +249,17 @@ struct Groups {
 // lacks. The same point: what the detector or the print has wrong about it.
 std::array<Groups, 3> groups_of(const PatternData& data, const Blocks& blocks) {
   constexpr int kStretches = 100;
-  constexpr int kColumns = 12;
-  constexpr int kRows = 8;
+  const ImageCells cells(data.width, data.height);
   const auto frames = static_cast<int>(data.frames.size());
   std::array<Groups, 3> groups;
   groups[0].count = std::min(kStretches, frames);
-  groups[1].count = kColumns * kRows;
+  groups[1].count = cells.count();
   groups[2].count = static_cast<int>(data.points_m.size());
-  const auto part = [](double x, double size, int parts) {
-    return std::clamp(static_cast<int>(x / size * parts), 0, parts - 1);
-  };
   for (const auto& [f, i] : blocks.seen) {
     const PatternObservation& o =
         data.frames[static_cast<std::size_t>(f)].observations[static_cast<std::size_t>(i)];
     groups[0].of.push_back(static_cast<int>(static_cast<long long>(f) * groups[0].count / frames));
-    groups[1].of.push_back(part(o.u.y(), data.height, kRows) * kColumns +
-                           part(o.u.x(), data.width, kColumns));
+    groups[1].of.push_back(cells.cell_of(o.u));
     groups[2].of.push_back(o.point);
   }
   return groups;

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <random>
 
 #include "test/core/pattern/pattern_simulation.h"
 #include "test/support/not_a_number.h"
@@ -85,6 +86,35 @@ TEST(CalibratePattern, GlobalShutterHasNoLineDelayAndSaysSo) {
   expect_honest(calibration, scene);
   EXPECT_TRUE(calibration.has_global_shutter());
   EXPECT_THAT(calibration.remarks, ElementsAre(HasSubstr("a global shutter")));
+}
+
+// Rows that are exposed at once say nothing of how fast the camera moves; what a free curve makes of that must not count. One degree
+// of freedom a run: chance exceeds 23.5 of four once in 10,000 times.
+TEST(CalibratePattern, OfAGlobalShutterSigmasAreAsLargeAsErrors) {
+  double sum = 0;
+  for (const std::uint64_t seed : {1U, 2U, 3U, 4U}) {
+    test::PatternScene scene = short_scene(0, 10, seed);
+    scene.duration_s = 10;
+    scene.missing_frames = 0.5;
+    const PatternCalibration calibration = calibrate_pattern(test::simulate_pattern(scene));
+    expect_honest(calibration, scene);
+    sum += std::pow(line_delay_of(calibration) / calibration.sigma(LensParameter::kLineDelay), 2);
+  }
+  EXPECT_LT(sum, 23.5);
+}
+
+// A print is never quite what was drawn: what each point is off by is the same in all images.
+TEST(CalibratePattern, SigmasHoldWhatAPrintHasWrong) {
+  const test::PatternScene scene = short_scene(51.56e-6, 15, 12);
+  PatternData data = test::simulate_pattern(scene);
+  const PatternCalibration as_drawn = calibrate_pattern(data);
+  std::mt19937_64 random(5);
+  std::normal_distribution<double> off_m(0, 1e-4);
+  for (auto& p : data.points_m) p += Vector3<double>(off_m(random), off_m(random), 0);
+  const PatternCalibration calibration = calibrate_pattern(data);
+  expect_honest(calibration, scene);
+  EXPECT_GT(calibration.sigma(LensParameter::kFocalLengthU),
+            3 * as_drawn.sigma(LensParameter::kFocalLengthU));
 }
 
 TEST(CalibratePattern, WrongDetectionsAreLeftOut) {
