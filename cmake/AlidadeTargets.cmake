@@ -131,6 +131,30 @@ function(alidade_find_opencv libraries)
   set(${libraries} ${${libraries}} PARENT_SCOPE)
 endfunction()
 
+# alidade_find_aruco()
+# finds OPENCV_ARUCO and OPENCV_ARUCO_INCLUDE_DIR as ALIDADE_CHARUCO asks for; OPENCV_ARUCO is empty without. The static library: the
+# shared one lies in Debian's libopencv-contrib406, which needs VTK's, Qt's and Tesseract's relatives wherever the executable runs.
+function(alidade_find_aruco)
+  if(ALIDADE_CHARUCO STREQUAL "OFF")
+    set(OPENCV_ARUCO "" PARENT_SCOPE)
+    set(OPENCV_ARUCO_INCLUDE_DIR "" PARENT_SCOPE)
+    return()
+  endif()
+  find_path(OPENCV_ARUCO_INCLUDE_DIR opencv2/aruco/charuco.hpp PATH_SUFFIXES opencv4)
+  find_library(OPENCV_ARUCO_LIBRARY libopencv_aruco.a)
+  set(OPENCV_ARUCO "")
+  if(OPENCV_ARUCO_INCLUDE_DIR AND OPENCV_ARUCO_LIBRARY)
+    set(OPENCV_ARUCO ${OPENCV_ARUCO_LIBRARY})
+  elseif(ALIDADE_CHARUCO STREQUAL "ON")
+    message(FATAL_ERROR "ALIDADE_CHARUCO is ON, and OpenCV's aruco is not there: install libopencv-contrib-dev")
+  else()
+    message(STATUS "ChArUco boards are left out: they need libopencv-contrib-dev")
+    set(OPENCV_ARUCO_INCLUDE_DIR "")
+  endif()
+  set(OPENCV_ARUCO ${OPENCV_ARUCO} PARENT_SCOPE)
+  set(OPENCV_ARUCO_INCLUDE_DIR ${OPENCV_ARUCO_INCLUDE_DIR} PARENT_SCOPE)
+endfunction()
+
 # All test programs that another processor can run; what `cmake --build` of an ARM preset builds.
 add_custom_target(processor_programs)
 

@@ -1,0 +1,397 @@
+#include "core/pattern/charuco_grid.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <limits>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/imgproc.hpp>
+#include <utility>
+
+#include "core/model/median.h"
+#include "core/pattern/aruco_markers.h"
+#include "core/pattern/corner_refinement.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr double kReach_squares = 2.1;   // of markers that vouch for each other
+constexpr double kAgrees_squares = 0.4;  // what a step to another square exceeds by far
+constexpr double kCharucoSmoothing_px = 0.7;
+constexpr double kRimWindow = 0.9;  // of the rim
+constexpr int kLeastRimWindow_px = 2;
+constexpr int kLargestRimWindow_px = 8;
+constexpr double kLargestStep_squares = 0.15;  // of a corner from where it is expected
+constexpr double kLargestLastStep_squares = 0.05;
+constexpr double kLeastCornerContrast = 8;   // grey levels, white above black
+constexpr double kLeastContrastShare = 0.4;  // of the image's median one
+// From a corner, where it is looked how bright its squares are.
+constexpr double kBlack_squares = 0.25;
+constexpr double kWhite_rims = 0.6;
+constexpr std::size_t kCornerNeighbours = 8;  // whose homography predicts a corner
+constexpr std::size_t kFewestCorners = 4;     // that are a board
+constexpr int kFewestMarkers = 3;             // that are no accident
+constexpr double kLargestAsymmetry = 0.25;    // of the standard deviation
+// How far a lens bends what the neighbours expect.
+constexpr double kCornerFits_px = 1;
+constexpr double kCornerFits_squares = 0.03;
+
+cv::Point2d mapped(const cv::Matx33d& H, const cv::Point2d& p) {
+  const cv::Vec3d x = H * cv::Vec3d(p.x, p.y, 1);
+  return {x[0] / x[2], x[1] / x[2]};
+}
+
+// The nearest pixel's; black outside.
+double grey_at(const cv::Mat& image, const cv::Point2d& p) {
+  if (!(p.x >= 0 && p.y >= 0 && p.x < image.cols - 1 && p.y < image.rows - 1)) return 0;
+  return image.at<std::uint8_t>(static_cast<int>(std::lround(p.y)),
+                                static_cast<int>(std::lround(p.x)));
+}
+
+bool has_room(const cv::Mat& image, const cv::Point2f& p, int half) {
+  const auto edge = static_cast<float>(half + 1);
+  return p.x >= edge && p.y >= edge && p.x < static_cast<float>(image.cols) - edge - 1 &&
+         p.y < static_cast<float>(image.rows) - edge - 1;
+}
+
+// How unlike itself after half a turn: mean difference, of the standard deviation.
+double asymmetry(const cv::Mat& image, const cv::Point2f& corner, int half) {
+  cv::Mat patch;
+  cv::getRectSubPix(image, {2 * half + 1, 2 * half + 1}, corner, patch);
+  cv::Mat turned;
+  cv::flip(patch, turned, -1);
+  cv::Scalar mean;
+  cv::Scalar deviation;
+  cv::meanStdDev(patch, mean, deviation);
+  return cv::norm(patch, turned, cv::NORM_L1) /
+         (static_cast<double>(patch.total()) * std::max(1.0, deviation[0]));
+}
+
+}  // namespace
+
+CharucoGrid::CharucoGrid(const KnownPattern& pattern)
+    : pattern_(pattern), half_marker_(0.5 * pattern.marker_m / pattern.size_m) {
+  for (int row = 0; row < pattern.rows; ++row) {
+    for (int column = 0; column < pattern.columns; ++column)
+      middles_[(column + row) % 2 == 1 ? 0 : 1].emplace_back(column - 0.5, row - 0.5);
+  }
+  // Of an odd number of rows both layouts are one.
+  if (pattern.rows % 2 == 1) middles_[1] = middles_[0];
+}
+
+void CharucoGrid::find(const cv::Mat& image, std::vector<cv::Point2f>* corners,
+                       std::vector<int>* points) {
+  corners_.assign(static_cast<std::size_t>((pattern_.columns - 1) * (pattern_.rows - 1)), {});
+  const std::vector<Marker> markers = markers_in(image);
+  if (markers.empty()) return;
+  cv::GaussianBlur(image, smooth_, {0, 0}, kCharucoSmoothing_px);
+  start(markers);
+  grow();
+  finish(image, markers);
+  drop_misfits();
+  const auto found = std::count_if(corners_.begin(), corners_.end(),
+                                   [](const Corner& corner) { return corner.is_found; });
+  if (static_cast<std::size_t>(found) < kFewestCorners) return;
+  ++images_found_;
+  for (std::size_t point = 0; point < corners_.size(); ++point) {
+    if (!corners_[point].is_found) continue;
+    corners->push_back(corners_[point].at);
+    points->push_back(static_cast<int>(point));
+  }
+}
+
+std::string CharucoGrid::doubt() const {
+  if (images_found_ > 0 || images_with_markers_ == 0) return "";
+  const std::string name = kMarkerDictionaries[static_cast<std::size_t>(pattern_.dictionary)].name;
+  return "markers of dictionary " + name + " are seen in " + std::to_string(images_with_markers_) +
+         " images, but do not lie as on this board; check its counts, which are of squares, and the "
+         "sides of its squares and markers";
+}
+
+int CharucoGrid::agreement(const Marker& a, const Marker& b, std::size_t layout) const {
+  const auto place = [&](const Marker& marker) {
+    return middles_[layout][static_cast<std::size_t>(marker.id)];
+  };
+  const cv::Point2d step = place(b) - place(a);
+  if (cv::norm(step) > kReach_squares) return 0;
+  const auto expects = [&](const Marker& from, const Marker& to, const cv::Point2d& by) {
+    return cv::norm(mapped(from.image_from_board, by) - mapped(to.image_from_board, {0, 0})) <
+           kAgrees_squares * to.square_px;
+  };
+  return expects(a, b, step) || expects(b, a, -step) ? 1 : -1;
+}
+
+std::vector<CharucoGrid::Marker> CharucoGrid::markers_in(const cv::Mat& image) {
+  const auto h = static_cast<float>(half_marker_);
+  const std::vector<cv::Point2f> square = {{-h, -h}, {h, -h}, {h, h}, {-h, h}};
+  std::vector<Marker> markers;
+  for (const ArucoMarker& found : find_markers(image, pattern_.dictionary)) {
+    if (found.id >= pattern_.markers()) continue;
+    // From its own middle, until the layout is known.
+    markers.push_back({found.id, cv::getPerspectiveTransform(square, found.corners),
+                       least_distance(found.corners) / (2 * half_marker_)});
+  }
+  if (markers.size() >= kFewestMarkers) ++images_with_markers_;
+  std::vector<std::vector<int>> agree(markers.size(), std::vector<int>(markers.size(), 0));
+  for (const std::size_t layout : {std::size_t{0}, std::size_t{1}}) {
+    for (std::size_t i = 0; i < markers.size(); ++i) {
+      for (std::size_t j = 0; j < i; ++j)
+        votes_[layout] += agreement(markers[i], markers[j], layout) > 0 ? 1 : 0;
+    }
+  }
+  layout_ = votes_[1] > votes_[0] ? 1 : 0;
+  if (votes_[0] == votes_[1] && pattern_.rows % 2 == 0) return {};
+  for (std::size_t i = 0; i < markers.size(); ++i) {
+    for (std::size_t j = 0; j < i; ++j)
+      agree[i][j] = agree[j][i] = agreement(markers[i], markers[j], layout_);
+  }
+  // The worst first: whom it speaks against may be right.
+  std::vector<char> counts(markers.size(), 1);
+  for (;;) {
+    int least = 1;
+    std::size_t worst = markers.size();
+    for (std::size_t i = 0; i < markers.size(); ++i) {
+      if (counts[i] == 0) continue;
+      int sum = 0;
+      for (std::size_t j = 0; j < markers.size(); ++j) sum += counts[j] != 0 ? agree[i][j] : 0;
+      if (sum >= least) continue;
+      least = sum;
+      worst = i;
+    }
+    if (worst == markers.size()) break;
+    counts[worst] = 0;
+  }
+  std::vector<Marker> kept;
+  for (std::size_t i = 0; i < markers.size(); ++i) {
+    if (counts[i] == 0) continue;
+    Marker& marker = markers[i];
+    const cv::Point2d middle = middles_[layout_][static_cast<std::size_t>(marker.id)];
+    marker.image_from_board =
+        marker.image_from_board * cv::Matx33d(1, 0, -middle.x, 0, 1, -middle.y, 0, 0, 1);
+    kept.push_back(marker);
+  }
+  return kept;
+}
+
+void CharucoGrid::start(const std::vector<Marker>& markers) {
+  double square_px = std::numeric_limits<double>::max();
+  for (const Marker& marker : markers) square_px = std::min(square_px, marker.square_px);
+  rim_window_px_ = std::clamp(static_cast<int>(kRimWindow * (0.5 - half_marker_) * square_px),
+                              kLeastRimWindow_px, kLargestRimWindow_px);
+  // Markers on both sides of a corner: between what they expect.
+  struct Expected {
+    cv::Point2d sum;
+    int markers = 0;
+    cv::Matx33d image_from_board;
+  };
+  std::vector<Expected> expected(corners_.size());
+  for (const Marker& marker : markers) {
+    const cv::Point2d middle = middles_[layout_][static_cast<std::size_t>(marker.id)];
+    for (std::size_t point = 0; point < corners_.size(); ++point) {
+      const cv::Point2d step = place_of(static_cast<int>(point)) - middle;
+      if (std::max(std::abs(step.x), std::abs(step.y)) > 0.6) continue;
+      expected[point].sum += mapped(marker.image_from_board, middle + step);
+      expected[point].markers += 1;
+      expected[point].image_from_board = marker.image_from_board;
+    }
+  }
+  std::vector<double> contrasts;
+  for (std::size_t point = 0; point < corners_.size(); ++point) {
+    const Expected& e = expected[point];
+    if (e.markers == 0) continue;
+    corners_[point] = settled(static_cast<int>(point), e.image_from_board, e.sum / e.markers);
+    if (corners_[point].is_found) contrasts.push_back(corners_[point].contrast);
+  }
+  if (contrasts.empty()) return;
+  const double least = kLeastContrastShare * median(std::move(contrasts));
+  for (Corner& corner : corners_) corner.is_found = corner.is_found && corner.contrast >= least;
+}
+
+void CharucoGrid::grow() {
+  constexpr int kRounds = 12;
+  bool grown = true;
+  for (int round = 0; grown && round < kRounds; ++round) {
+    grown = false;
+    for (std::size_t i = 0; i < corners_.size(); ++i) {
+      if (corners_[i].is_found) continue;
+      const auto point = static_cast<int>(i);
+      const cv::Point2d place = place_of(point);
+      cv::Matx33d H;
+      if (!homography_about(place, point, false, &H)) continue;
+      const std::vector<int> about = corners_about(place, point);
+      const Corner corner = settled(point, H, mapped(H, place));
+      double contrast = 0;
+      for (const int other : about) contrast += corners_[static_cast<std::size_t>(other)].contrast;
+      if (!corner.is_found ||
+          corner.contrast < kLeastContrastShare * contrast / static_cast<double>(about.size()))
+        continue;
+      corners_[i] = corner;
+      grown = true;
+    }
+  }
+}
+
+CharucoGrid::Corner CharucoGrid::settled(int point, const cv::Matx33d& image_from_board,
+                                         const cv::Point2d& expected) const {
+  Corner corner;
+  corner.at = expected;
+  if (!has_room(smooth_, corner.at, rim_window_px_)) return corner;
+  std::vector<cv::Point2f> refined = {corner.at};
+  cv::cornerSubPix(smooth_, refined, {rim_window_px_, rim_window_px_}, {-1, -1},
+                   {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 40, 0.01});
+  corner.at = refined.front();
+
+  const cv::Point2d place = place_of(point);
+  const cv::Point2d origin = mapped(image_from_board, place);
+  const cv::Point2d along_row = mapped(image_from_board, place + cv::Point2d(0.5, 0)) - origin;
+  const double limit_px = std::max(kCornerFits_px, 2 * kLargestStep_squares * cv::norm(along_row));
+  if (!(cv::norm(cv::Point2d(corner.at) - expected) <= limit_px)) return corner;
+  double white = 255;
+  double black = 0;
+  for (const int right : {0, 1}) {
+    for (const int below : {0, 1}) {
+      const bool dark = is_black(point % (pattern_.columns - 1) + right,
+                                 point / (pattern_.columns - 1) + below);
+      const double reach = dark ? kBlack_squares : kWhite_rims * (0.5 - half_marker_);
+      const cv::Point2d step(reach * (2 * right - 1), reach * (2 * below - 1));
+      const double grey = grey_at(
+          smooth_, cv::Point2d(corner.at) + mapped(image_from_board, place + step) - origin);
+      if (dark) {
+        black = std::max(black, grey);
+      } else {
+        white = std::min(white, grey);
+      }
+    }
+  }
+  corner.contrast = white - black;
+  corner.is_found = corner.contrast >= kLeastCornerContrast;
+  return corner;
+}
+
+cv::Mat CharucoGrid::painted(const cv::Mat& image, const std::vector<Marker>& markers) const {
+  cv::Mat clean = image.clone();
+  // Through the middle of the white rim.
+  const double half = (half_marker_ + 0.5) / 2;
+  const std::array<cv::Point2d, 4> outline = {
+      {{-half, -half}, {half, -half}, {half, half}, {-half, half}}};
+  for (std::size_t id = 0; id < middles_[layout_].size(); ++id) {
+    const cv::Point2d middle = middles_[layout_][id];
+    cv::Matx33d H;
+    const auto marker = std::find_if(markers.begin(), markers.end(), [&](const Marker& m) {
+      return m.id == static_cast<int>(id);
+    });
+    if (marker != markers.end()) {
+      H = marker->image_from_board;
+    } else if (!homography_about(middle, -1, false, &H)) {
+      continue;
+    }
+    constexpr int kShift = 4;  // sixteenths of a pixel
+    constexpr int kSteps = 8;  // along a side
+    std::vector<cv::Point> polygon;
+    std::vector<double> greys;
+    for (std::size_t i = 0; i < 4; ++i) {
+      polygon.emplace_back(mapped(H, middle + outline[i]) * (1 << kShift));
+      for (int step = 0; step < kSteps; ++step) {
+        const cv::Point2d p = outline[i] + (outline[(i + 1) % 4] - outline[i]) * step / kSteps;
+        greys.push_back(grey_at(image, mapped(H, middle + p)));
+      }
+    }
+    cv::fillConvexPoly(clean, polygon, cv::Scalar(median(std::move(greys))), cv::LINE_8, kShift);
+  }
+  return clean;
+}
+
+void CharucoGrid::finish(const cv::Mat& image, const std::vector<Marker>& markers) {
+  const cv::Mat clean = painted(image, markers);
+  std::vector<std::size_t> points;
+  std::vector<cv::Point2f> refined;
+  for (std::size_t point = 0; point < corners_.size(); ++point) {
+    if (!corners_[point].is_found) continue;
+    points.push_back(point);
+    refined.push_back(corners_[point].at);
+  }
+  if (refined.size() < 2) return;
+  const int half = corner_window(refined);
+  const double limit_px =
+      std::max(kCornerFits_px, kLargestLastStep_squares * least_distance(refined));
+  refine_corners(clean, &refined);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    Corner& corner = corners_[points[i]];
+    corner.is_found = has_room(clean, refined[i], half) &&
+                      cv::norm(refined[i] - corner.at) <= limit_px &&
+                      asymmetry(clean, refined[i], half) <= kLargestAsymmetry;
+    corner.at = refined[i];
+  }
+}
+
+void CharucoGrid::drop_misfits() {
+  const std::vector<Corner> all = corners_;
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    if (!all[i].is_found) continue;
+    const auto point = static_cast<int>(i);
+    const cv::Point2d place = place_of(point);
+    const auto off = [&](bool robust) {
+      cv::Matx33d H;
+      if (!homography_about(place, point, robust, &H)) return 0.0;
+      const double square_px =
+          cv::norm(mapped(H, place + cv::Point2d(0.5, 0)) - mapped(H, place - cv::Point2d(0.5, 0)));
+      return cv::norm(mapped(H, place) - cv::Point2d(all[i].at)) /
+             std::max(kCornerFits_px, kCornerFits_squares * square_px);
+    };
+    if (off(false) > 1 && off(true) > 1) corners_[i].is_found = false;
+  }
+}
+
+std::vector<int> CharucoGrid::corners_about(const cv::Point2d& place, int without) const {
+  const int columns = pattern_.columns - 1;
+  const int rows = pattern_.rows - 1;
+  std::vector<std::pair<double, int>> near;
+  for (int row = std::max(0, static_cast<int>(place.y) - 2);
+       row <= std::min(rows - 1, static_cast<int>(place.y) + 2); ++row) {
+    for (int column = std::max(0, static_cast<int>(place.x) - 2);
+         column <= std::min(columns - 1, static_cast<int>(place.x) + 2); ++column) {
+      const int point = row * columns + column;
+      if (point == without || !corners_[static_cast<std::size_t>(point)].is_found) continue;
+      near.emplace_back(cv::norm(place - place_of(point)), point);
+    }
+  }
+  std::sort(near.begin(), near.end());
+  if (near.size() > kCornerNeighbours) near.resize(kCornerNeighbours);
+  std::vector<int> points;
+  for (const auto& [distance, point] : near) points.push_back(point);
+  return points;
+}
+
+bool CharucoGrid::homography_about(const cv::Point2d& place, int without, bool robust,
+                                   cv::Matx33d* image_from_board) const {
+  const std::vector<int> points = corners_about(place, without);
+  if (points.empty() || cv::norm(place - place_of(points.front())) > 1.5) return false;
+  // Two each in two rows: no three of them need be on one line.
+  std::vector<cv::Point2f> from;
+  std::vector<cv::Point2f> to;
+  std::vector<int> in_row(static_cast<std::size_t>(pattern_.rows), 0);
+  for (const int point : points) {
+    from.emplace_back(place_of(point));
+    to.push_back(corners_[static_cast<std::size_t>(point)].at);
+    ++in_row[static_cast<std::size_t>(point / (pattern_.columns - 1))];
+  }
+  if (std::count_if(in_row.begin(), in_row.end(), [](int n) { return n >= 2; }) < 2) return false;
+  const cv::Mat H = cv::findHomography(from, to, robust ? cv::RANSAC : 0, kCornerFits_px);
+  if (H.empty()) return false;
+  *image_from_board = H;
+  return true;
+}
+
+cv::Point2d CharucoGrid::place_of(int point) const {
+  const int columns = pattern_.columns - 1;
+  return {static_cast<double>(point % columns), static_cast<double>(point / columns)};
+}
+
+bool CharucoGrid::is_black(int column, int row) const {
+  const bool even = (column + row) % 2 == 0;
+  // Of old, and of an even number of rows.
+  return layout_ == 1 && pattern_.rows % 2 == 0 ? !even : even;
+}
+
+}  // namespace alidade::internal
