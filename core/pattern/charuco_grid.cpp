@@ -5,25 +5,22 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
 #include "core/model/median.h"
-#include "core/pattern/aruco_markers.h"
 #include "core/pattern/corner_refinement.h"
 
 namespace alidade::internal {
 namespace {
 
-constexpr double kReach_squares = 2.1;   // of markers that vouch for each other
-constexpr double kAgrees_squares = 0.4;  // what a step to another square exceeds by far
 constexpr double kCharucoSmoothing_px = 0.7;
 constexpr double kRimWindow = 0.9;  // of the rim
 constexpr int kLeastRimWindow_px = 2;
 constexpr int kLargestRimWindow_px = 8;
 constexpr double kLargestStep_squares = 0.15;  // of a corner from where it is expected
-constexpr double kLargestLastStep_squares = 0.05;
 constexpr double kLeastCornerContrast = 8;   // grey levels, white above black
 constexpr double kLeastContrastShare = 0.4;  // of the image's median one
 // From a corner, where it is looked how bright its squares are.
@@ -31,15 +28,18 @@ constexpr double kBlack_squares = 0.25;
 constexpr double kWhite_rims = 0.6;
 constexpr std::size_t kCornerNeighbours = 8;  // whose homography predicts a corner
 constexpr std::size_t kFewestCorners = 4;     // that are a board
-constexpr int kFewestMarkers = 3;             // that are no accident
-constexpr double kLargestAsymmetry = 0.25;    // of the standard deviation
+constexpr double kLargestAsymmetry = 0.2;     // of the standard deviation
 // How far a lens bends what the neighbours expect.
 constexpr double kCornerFits_px = 1;
 constexpr double kCornerFits_squares = 0.03;
+// Of what is seen along the middle of a white rim: its sides that blur and noise leave bright.
+constexpr double kWhiteShare = 0.9;
 
-cv::Point2d mapped(const cv::Matx33d& H, const cv::Point2d& p) {
-  const cv::Vec3d x = H * cv::Vec3d(p.x, p.y, 1);
-  return {x[0] / x[2], x[1] / x[2]};
+// A square's corners from its middle, in squares.
+const std::vector<cv::Point2f>& square_corners() {
+  static const std::vector<cv::Point2f> corners = {
+      {-0.5F, -0.5F}, {0.5F, -0.5F}, {0.5F, 0.5F}, {-0.5F, 0.5F}};
+  return corners;
 }
 
 // The nearest pixel's; black outside.
@@ -71,19 +71,14 @@ double asymmetry(const cv::Mat& image, const cv::Point2f& corner, int half) {
 }  // namespace
 
 CharucoGrid::CharucoGrid(const KnownPattern& pattern)
-    : pattern_(pattern), half_marker_(0.5 * pattern.marker_m / pattern.size_m) {
-  for (int row = 0; row < pattern.rows; ++row) {
-    for (int column = 0; column < pattern.columns; ++column)
-      middles_[(column + row) % 2 == 1 ? 0 : 1].emplace_back(column - 0.5, row - 0.5);
-  }
-  // Of an odd number of rows both layouts are one.
-  if (pattern.rows % 2 == 1) middles_[1] = middles_[0];
-}
+    : pattern_(pattern),
+      half_marker_(0.5 * pattern.marker_m / pattern.size_m),
+      layout_(pattern) {}
 
 void CharucoGrid::find(const cv::Mat& image, std::vector<cv::Point2f>* corners,
                        std::vector<int>* points) {
   corners_.assign(static_cast<std::size_t>((pattern_.columns - 1) * (pattern_.rows - 1)), {});
-  const std::vector<Marker> markers = markers_in(image);
+  const Markers markers = layout_.markers_in(image);
   if (markers.empty()) return;
   cv::GaussianBlur(image, smooth_, {0, 0}, kCharucoSmoothing_px);
   start(markers);
@@ -102,106 +97,45 @@ void CharucoGrid::find(const cv::Mat& image, std::vector<cv::Point2f>* corners,
 }
 
 std::string CharucoGrid::doubt() const {
-  if (images_found_ > 0 || images_with_markers_ == 0) return "";
-  const std::string name = kMarkerDictionaries[static_cast<std::size_t>(pattern_.dictionary)].name;
-  return "markers of dictionary " + name + " are seen in " + std::to_string(images_with_markers_) +
+  const int images = layout_.images_with_markers();
+  if (images_found_ > 0 || images == 0) return "";
+  return "markers of dictionary " +
+         std::string(kMarkerDictionaries[static_cast<std::size_t>(pattern_.dictionary)].name) +
+         " are seen in " + std::to_string(images) +
          " images, but do not lie as on this board; check its counts, which are of squares, and the "
          "sides of its squares and markers";
 }
 
-int CharucoGrid::agreement(const Marker& a, const Marker& b, std::size_t layout) const {
-  const auto place = [&](const Marker& marker) {
-    return middles_[layout][static_cast<std::size_t>(marker.id)];
-  };
-  const cv::Point2d step = place(b) - place(a);
-  if (cv::norm(step) > kReach_squares) return 0;
-  const auto expects = [&](const Marker& from, const Marker& to, const cv::Point2d& by) {
-    return cv::norm(mapped(from.image_from_board, by) - mapped(to.image_from_board, {0, 0})) <
-           kAgrees_squares * to.square_px;
-  };
-  return expects(a, b, step) || expects(b, a, -step) ? 1 : -1;
-}
-
-std::vector<CharucoGrid::Marker> CharucoGrid::markers_in(const cv::Mat& image) {
-  const auto h = static_cast<float>(half_marker_);
-  const std::vector<cv::Point2f> square = {{-h, -h}, {h, -h}, {h, h}, {-h, h}};
-  std::vector<Marker> markers;
-  for (const ArucoMarker& found : find_markers(image, pattern_.dictionary)) {
-    if (found.id >= pattern_.markers()) continue;
-    // From its own middle, until the layout is known.
-    markers.push_back({found.id, cv::getPerspectiveTransform(square, found.corners),
-                       least_distance(found.corners) / (2 * half_marker_)});
-  }
-  if (markers.size() >= kFewestMarkers) ++images_with_markers_;
-  std::vector<std::vector<int>> agree(markers.size(), std::vector<int>(markers.size(), 0));
-  for (const std::size_t layout : {std::size_t{0}, std::size_t{1}}) {
-    for (std::size_t i = 0; i < markers.size(); ++i) {
-      for (std::size_t j = 0; j < i; ++j)
-        votes_[layout] += agreement(markers[i], markers[j], layout) > 0 ? 1 : 0;
-    }
-  }
-  layout_ = votes_[1] > votes_[0] ? 1 : 0;
-  if (votes_[0] == votes_[1] && pattern_.rows % 2 == 0) return {};
-  for (std::size_t i = 0; i < markers.size(); ++i) {
-    for (std::size_t j = 0; j < i; ++j)
-      agree[i][j] = agree[j][i] = agreement(markers[i], markers[j], layout_);
-  }
-  // The worst first: whom it speaks against may be right.
-  std::vector<char> counts(markers.size(), 1);
-  for (;;) {
-    int least = 1;
-    std::size_t worst = markers.size();
-    for (std::size_t i = 0; i < markers.size(); ++i) {
-      if (counts[i] == 0) continue;
-      int sum = 0;
-      for (std::size_t j = 0; j < markers.size(); ++j) sum += counts[j] != 0 ? agree[i][j] : 0;
-      if (sum >= least) continue;
-      least = sum;
-      worst = i;
-    }
-    if (worst == markers.size()) break;
-    counts[worst] = 0;
-  }
-  std::vector<Marker> kept;
-  for (std::size_t i = 0; i < markers.size(); ++i) {
-    if (counts[i] == 0) continue;
-    Marker& marker = markers[i];
-    const cv::Point2d middle = middles_[layout_][static_cast<std::size_t>(marker.id)];
-    marker.image_from_board =
-        marker.image_from_board * cv::Matx33d(1, 0, -middle.x, 0, 1, -middle.y, 0, 0, 1);
-    kept.push_back(marker);
-  }
-  return kept;
-}
-
-void CharucoGrid::start(const std::vector<Marker>& markers) {
+void CharucoGrid::start(const Markers& markers) {
   double square_px = std::numeric_limits<double>::max();
-  for (const Marker& marker : markers) square_px = std::min(square_px, marker.square_px);
+  for (const CharucoLayout::Marker& marker : markers)
+    square_px = std::min(square_px, marker.square_px);
   rim_window_px_ = std::clamp(static_cast<int>(kRimWindow * (0.5 - half_marker_) * square_px),
                               kLeastRimWindow_px, kLargestRimWindow_px);
-  // Markers on both sides of a corner: between what they expect.
+  // Between what the markers on both sides of a corner expect.
   struct Expected {
     cv::Point2d sum;
     int markers = 0;
     cv::Matx33d image_from_board;
   };
-  std::vector<Expected> expected(corners_.size());
-  for (const Marker& marker : markers) {
-    const cv::Point2d middle = middles_[layout_][static_cast<std::size_t>(marker.id)];
-    for (std::size_t point = 0; point < corners_.size(); ++point) {
-      const cv::Point2d step = place_of(static_cast<int>(point)) - middle;
-      if (std::max(std::abs(step.x), std::abs(step.y)) > 0.6) continue;
-      expected[point].sum += mapped(marker.image_from_board, middle + step);
-      expected[point].markers += 1;
-      expected[point].image_from_board = marker.image_from_board;
+  std::map<int, Expected> expected;
+  for (const CharucoLayout::Marker& marker : markers) {
+    const cv::Point2d middle = layout_.middles()[static_cast<std::size_t>(marker.id)];
+    for (const cv::Point2f& corner : square_corners()) {
+      const cv::Point2d place = middle + cv::Point2d(corner);
+      const Corner* inner = corner_at(place);
+      if (inner == nullptr) continue;
+      Expected& e = expected[static_cast<int>(inner - corners_.data())];
+      e.sum += mapped(marker.image_from_board, place);
+      e.markers += 1;
+      e.image_from_board = marker.image_from_board;
     }
   }
   std::vector<double> contrasts;
-  for (std::size_t point = 0; point < corners_.size(); ++point) {
-    const Expected& e = expected[point];
-    if (e.markers == 0) continue;
-    corners_[point] = settled(static_cast<int>(point), e.image_from_board, e.sum / e.markers);
-    if (corners_[point].is_found) contrasts.push_back(corners_[point].contrast);
+  for (const auto& [point, e] : expected) {
+    Corner& corner = corners_[static_cast<std::size_t>(point)];
+    corner = settled(point, e.image_from_board, e.sum / e.markers);
+    if (corner.is_found) contrasts.push_back(corner.contrast);
   }
   if (contrasts.empty()) return;
   const double least = kLeastContrastShare * median(std::move(contrasts));
@@ -251,7 +185,7 @@ CharucoGrid::Corner CharucoGrid::settled(int point, const cv::Matx33d& image_fro
   double black = 0;
   for (const int right : {0, 1}) {
     for (const int below : {0, 1}) {
-      const bool dark = is_black(point % (pattern_.columns - 1) + right,
+      const bool dark = layout_.is_black(point % (pattern_.columns - 1) + right,
                                  point / (pattern_.columns - 1) + below);
       const double reach = dark ? kBlack_squares : kWhite_rims * (0.5 - half_marker_);
       const cv::Point2d step(reach * (2 * right - 1), reach * (2 * below - 1));
@@ -269,40 +203,57 @@ CharucoGrid::Corner CharucoGrid::settled(int point, const cv::Matx33d& image_fro
   return corner;
 }
 
-cv::Mat CharucoGrid::painted(const cv::Mat& image, const std::vector<Marker>& markers) const {
+bool CharucoGrid::homography_of_square(int id, const Markers& markers,
+                                       cv::Matx33d* image_from_board) const {
+  const cv::Point2d middle = layout_.middles()[static_cast<std::size_t>(id)];
+  std::vector<cv::Point2f> from;
+  std::vector<cv::Point2f> to;
+  for (const cv::Point2f& corner : square_corners()) {
+    const cv::Point2d place = middle + cv::Point2d(corner);
+    const Corner* inner = corner_at(place);
+    if (inner == nullptr || !inner->is_found) continue;
+    from.emplace_back(place);
+    to.push_back(inner->at);
+  }
+  if (from.size() == square_corners().size()) {
+    *image_from_board = cv::getPerspectiveTransform(from, to);
+    return true;
+  }
+  const auto marker =
+      std::find_if(markers.begin(), markers.end(), [&](const auto& m) { return m.id == id; });
+  if (marker == markers.end()) return homography_about(middle, -1, false, image_from_board);
+  *image_from_board = marker->image_from_board;
+  return true;
+}
+
+cv::Mat CharucoGrid::painted(const cv::Mat& image, const Markers& markers) const {
+  constexpr int kShift = 4;  // sixteenths of a pixel
+  constexpr int kSteps = 8;  // along a side
   cv::Mat clean = image.clone();
-  // Through the middle of the white rim.
-  const double half = (half_marker_ + 0.5) / 2;
-  const std::array<cv::Point2d, 4> outline = {
-      {{-half, -half}, {half, -half}, {half, half}, {-half, half}}};
-  for (std::size_t id = 0; id < middles_[layout_].size(); ++id) {
-    const cv::Point2d middle = middles_[layout_][id];
+  for (std::size_t id = 0; id < layout_.middles().size(); ++id) {
     cv::Matx33d H;
-    const auto marker = std::find_if(markers.begin(), markers.end(), [&](const Marker& m) {
-      return m.id == static_cast<int>(id);
-    });
-    if (marker != markers.end()) {
-      H = marker->image_from_board;
-    } else if (!homography_about(middle, -1, false, &H)) {
-      continue;
-    }
-    constexpr int kShift = 4;  // sixteenths of a pixel
-    constexpr int kSteps = 8;  // along a side
+    if (!homography_of_square(static_cast<int>(id), markers, &H)) continue;
+    const cv::Point2d middle = layout_.middles()[id];
+    std::vector<cv::Point2d> outline;  // through the middle of the white rim
+    for (const cv::Point2f& corner : square_corners())
+      outline.emplace_back(middle + (half_marker_ + 0.5) * cv::Point2d(corner));
     std::vector<cv::Point> polygon;
     std::vector<double> greys;
-    for (std::size_t i = 0; i < 4; ++i) {
-      polygon.emplace_back(mapped(H, middle + outline[i]) * (1 << kShift));
-      for (int step = 0; step < kSteps; ++step) {
-        const cv::Point2d p = outline[i] + (outline[(i + 1) % 4] - outline[i]) * step / kSteps;
-        greys.push_back(grey_at(image, mapped(H, middle + p)));
-      }
+    for (std::size_t i = 0; i < outline.size(); ++i) {
+      const cv::Point2d side = outline[(i + 1) % outline.size()] - outline[i];
+      polygon.emplace_back(mapped(H, outline[i]) * (1 << kShift));
+      for (int step = 0; step < kSteps; ++step)
+        greys.push_back(grey_at(image, mapped(H, outline[i] + side * step / kSteps)));
     }
-    cv::fillConvexPoly(clean, polygon, cv::Scalar(median(std::move(greys))), cv::LINE_8, kShift);
+    const auto white = greys.begin() + static_cast<std::ptrdiff_t>(
+                                           kWhiteShare * static_cast<double>(greys.size()));
+    std::nth_element(greys.begin(), white, greys.end());
+    cv::fillConvexPoly(clean, polygon, cv::Scalar(*white), cv::LINE_8, kShift);
   }
   return clean;
 }
 
-void CharucoGrid::finish(const cv::Mat& image, const std::vector<Marker>& markers) {
+void CharucoGrid::finish(const cv::Mat& image, const Markers& markers) {
   const cv::Mat clean = painted(image, markers);
   std::vector<std::size_t> points;
   std::vector<cv::Point2f> refined;
@@ -314,7 +265,7 @@ void CharucoGrid::finish(const cv::Mat& image, const std::vector<Marker>& marker
   if (refined.size() < 2) return;
   const int half = corner_window(refined);
   const double limit_px =
-      std::max(kCornerFits_px, kLargestLastStep_squares * least_distance(refined));
+      std::max(kCornerFits_px, kLargestStep_squares * least_distance(refined));
   refine_corners(clean, &refined);
   for (std::size_t i = 0; i < points.size(); ++i) {
     Corner& corner = corners_[points[i]];
@@ -388,10 +339,12 @@ cv::Point2d CharucoGrid::place_of(int point) const {
   return {static_cast<double>(point % columns), static_cast<double>(point / columns)};
 }
 
-bool CharucoGrid::is_black(int column, int row) const {
-  const bool even = (column + row) % 2 == 0;
-  // Of old, and of an even number of rows.
-  return layout_ == 1 && pattern_.rows % 2 == 0 ? !even : even;
+const CharucoGrid::Corner* CharucoGrid::corner_at(const cv::Point2d& place) const {
+  const auto column = static_cast<int>(std::lround(place.x));
+  const auto row = static_cast<int>(std::lround(place.y));
+  if (column < 0 || row < 0 || column >= pattern_.columns - 1 || row >= pattern_.rows - 1)
+    return nullptr;
+  return &corners_[static_cast<std::size_t>(row * (pattern_.columns - 1) + column)];
 }
 
 }  // namespace alidade::internal
