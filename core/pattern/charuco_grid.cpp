@@ -254,25 +254,34 @@ cv::Mat CharucoGrid::painted(const cv::Mat& image, const Markers& markers) const
 }
 
 void CharucoGrid::finish(const cv::Mat& image, const Markers& markers) {
-  const cv::Mat clean = painted(image, markers);
-  std::vector<std::size_t> points;
-  std::vector<cv::Point2f> refined;
-  for (std::size_t point = 0; point < corners_.size(); ++point) {
-    if (!corners_[point].is_found) continue;
-    points.push_back(point);
-    refined.push_back(corners_[point].at);
-  }
-  if (refined.size() < 2) return;
-  const int half = corner_window(refined);
-  const double limit_px =
-      std::max(kCornerFits_px, kLargestStep_squares * least_distance(refined));
-  refine_corners(clean, &refined);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    Corner& corner = corners_[points[i]];
-    corner.is_found = has_room(clean, refined[i], half) &&
-                      cv::norm(refined[i] - corner.at) <= limit_px &&
-                      asymmetry(clean, refined[i], half) <= kLargestAsymmetry;
-    corner.at = refined[i];
+  constexpr int kPasses = 3;  // blur leaves the corners off by more than what may be painted
+  bool is_settled = false;
+  for (int pass = 0; pass < kPasses && !is_settled; ++pass) {
+    const cv::Mat clean = painted(image, markers);
+    std::vector<Corner*> found;
+    std::vector<cv::Point2f> refined;
+    for (Corner& corner : corners_) {
+      if (!corner.is_found) continue;
+      found.push_back(&corner);
+      refined.push_back(corner.at);
+    }
+    if (refined.size() < kFewestCorners) return;
+    const int half = corner_window(refined);
+    const double limit_px =
+        std::max(kCornerFits_px, kLargestStep_squares * least_distance(refined));
+    refine_corners(clean, &refined);
+    is_settled = true;
+    for (std::size_t i = 0; i < found.size(); ++i) {
+      const double step_px = cv::norm(refined[i] - found[i]->at);
+      is_settled = is_settled && step_px <= kCornerFits_px;
+      found[i]->is_found = has_room(clean, refined[i], half) && step_px <= limit_px;
+      found[i]->at = refined[i];
+    }
+    if (!is_settled && pass + 1 < kPasses) continue;
+    for (Corner* corner : found) {
+      if (corner->is_found && asymmetry(clean, corner->at, half) > kLargestAsymmetry)
+        corner->is_found = false;
+    }
   }
 }
 
