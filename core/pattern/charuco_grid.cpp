@@ -8,6 +8,7 @@
 #include <map>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/imgproc.hpp>
+#include <optional>
 #include <utility>
 
 #include "core/model/median.h"
@@ -21,8 +22,8 @@ constexpr double kRimWindow = 0.9;  // of the rim
 constexpr int kLeastRimWindow_px = 2;
 constexpr int kLargestRimWindow_px = 8;
 constexpr double kLargestStep_squares = 0.15;  // of a corner from where it is expected
-constexpr double kLeastCornerContrast = 8;   // grey levels, white above black
-constexpr double kLeastContrastShare = 0.4;  // of the image's median one
+constexpr double kLeastCornerContrast = 8;     // grey levels, white above black
+constexpr double kLeastContrastShare = 0.4;    // of the image's median one
 // From a corner, where it is looked how bright its squares are.
 constexpr double kBlack_squares = 0.25;
 constexpr double kWhite_rims = 0.6;
@@ -71,9 +72,7 @@ double asymmetry(const cv::Mat& image, const cv::Point2f& corner, int half) {
 }  // namespace
 
 CharucoGrid::CharucoGrid(const KnownPattern& pattern)
-    : pattern_(pattern),
-      half_marker_(0.5 * pattern.marker_m / pattern.size_m),
-      layout_(pattern) {}
+    : pattern_(pattern), half_marker_(0.5 * pattern.marker_m / pattern.size_m), layout_(pattern) {}
 
 void CharucoGrid::find(const cv::Mat& image, std::vector<cv::Point2f>* corners,
                        std::vector<int>* points) {
@@ -97,13 +96,22 @@ void CharucoGrid::find(const cv::Mat& image, std::vector<cv::Point2f>* corners,
 }
 
 std::string CharucoGrid::doubt() const {
-  const int images = layout_.images_with_markers();
-  if (images_found_ > 0 || images == 0) return "";
-  return "markers of dictionary " +
-         std::string(kMarkerDictionaries[static_cast<std::size_t>(pattern_.dictionary)].name) +
-         " are seen in " + std::to_string(images) +
-         " images, but do not lie as on this board; check its counts, which are of squares, and the "
-         "sides of its squares and markers";
+  if (images_found_ > 0) return "";
+  const auto name = [](int dictionary) {
+    return std::string(kMarkerDictionaries[static_cast<std::size_t>(dictionary)].name);
+  };
+  const std::string mine = name(pattern_.dictionary);
+  if (layout_.images_with_markers() > 0) {
+    return "markers of dictionary " + mine + " are seen in " +
+           std::to_string(layout_.images_with_markers()) +
+           " images, but do not lie as on this board; check its counts, which are of squares, and "
+           "the sides of its squares and markers";
+  }
+  if (const std::optional<int> other = layout_.other_dictionary()) {
+    return "no markers of dictionary " + mine + " are seen, but some of " + name(*other) +
+           "; is it the board's dictionary? An AprilGrid, too, has markers, of apriltag_36h11";
+  }
+  return "no markers of dictionary " + mine + " are seen in any image";
 }
 
 void CharucoGrid::start(const Markers& markers) {
@@ -186,7 +194,7 @@ CharucoGrid::Corner CharucoGrid::settled(int point, const cv::Matx33d& image_fro
   for (const int right : {0, 1}) {
     for (const int below : {0, 1}) {
       const bool dark = layout_.is_black(point % (pattern_.columns - 1) + right,
-                                 point / (pattern_.columns - 1) + below);
+                                         point / (pattern_.columns - 1) + below);
       const double reach = dark ? kBlack_squares : kWhite_rims * (0.5 - half_marker_);
       const cv::Point2d step(reach * (2 * right - 1), reach * (2 * below - 1));
       const double grey = grey_at(
@@ -245,8 +253,8 @@ cv::Mat CharucoGrid::painted(const cv::Mat& image, const Markers& markers) const
       for (int step = 0; step < kSteps; ++step)
         greys.push_back(grey_at(image, mapped(H, outline[i] + side * step / kSteps)));
     }
-    const auto white = greys.begin() + static_cast<std::ptrdiff_t>(
-                                           kWhiteShare * static_cast<double>(greys.size()));
+    const auto white = greys.begin() +
+                       static_cast<std::ptrdiff_t>(kWhiteShare * static_cast<double>(greys.size()));
     std::nth_element(greys.begin(), white, greys.end());
     cv::fillConvexPoly(clean, polygon, cv::Scalar(*white), cv::LINE_8, kShift);
   }

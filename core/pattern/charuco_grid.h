@@ -23,7 +23,7 @@ class CharucoGrid {
   // 8-bit grey. corners: OpenCV's pixels; points: of each its index into KnownPattern::points_m. Both stay empty: not found.
   void find(const cv::Mat& image, std::vector<cv::Point2f>* corners, std::vector<int>* points);
 
-  // One line about markers in the images so far that never made this board, and what would help; empty: nothing to say.
+  // One line, why the images so far never showed this board and what would help; empty: one did.
   [[nodiscard]] std::string doubt() const;
 
  private:

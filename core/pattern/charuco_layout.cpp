@@ -1,5 +1,6 @@
 #include "core/pattern/charuco_layout.h"
 
+#include <algorithm>
 #include <numeric>
 #include <opencv2/imgproc.hpp>
 #include <utility>
@@ -10,9 +11,15 @@
 namespace alidade::internal {
 namespace {
 
-constexpr double kReach_squares = 2.1;   // of markers that vouch for each other
+// Of markers that vouch for each other: diagonal neighbours. Those of one row would on a board of other counts, too.
+constexpr double kReach_squares = 1.5;
 constexpr double kAgrees_squares = 0.4;  // what a step to another square exceeds by far
 constexpr std::size_t kFewMarkers = 3;   // fewer may be an accident
+// Of a dictionary of a thousand codes more quads are markers by accident.
+constexpr std::size_t kManyMarkers = 6;
+// The largest of each kind, which hold the smaller ones.
+constexpr std::array<int, 9> kLargestDictionaries = {3, 7, 11, 15, 16, 17, 18, 19, 20};
+constexpr int kLastOfFour = 15;  // up to here four sizes of each kind
 
 }  // namespace
 
@@ -47,6 +54,23 @@ int CharucoLayout::agreement(const Marker& a, const Marker& b, std::size_t layou
   return expects(a, b, step) || expects(b, a, -step) ? 1 : -1;
 }
 
+void CharucoLayout::look_for_others(const cv::Mat& image) {
+  constexpr int kEvery = 4;
+  const int turn = images_without_++;
+  if (other_dictionary_ || turn % kEvery != 0) return;
+  const int dictionary =
+      kLargestDictionaries[static_cast<std::size_t>(turn / kEvery) % kLargestDictionaries.size()];
+  int largest = 0;
+  const std::vector<ArucoMarker> found = find_markers(image, dictionary);
+  for (const ArucoMarker& marker : found) largest = std::max(largest, marker.id);
+  if (found.size() < kManyMarkers) return;
+  int smallest = dictionary;
+  while (dictionary <= kLastOfFour && smallest > dictionary - 3 &&
+         largest < kMarkerDictionaries[static_cast<std::size_t>(smallest - 1)].markers)
+    --smallest;
+  if (smallest != pattern_.dictionary) other_dictionary_ = smallest;
+}
+
 std::vector<CharucoLayout::Marker> CharucoLayout::markers_in(const cv::Mat& image) {
   const double marker = pattern_.marker_m / pattern_.size_m;  // squares
   const auto h = static_cast<float>(marker / 2);
@@ -57,7 +81,11 @@ std::vector<CharucoLayout::Marker> CharucoLayout::markers_in(const cv::Mat& imag
     seen.push_back({found.id, cv::getPerspectiveTransform(outline, found.corners),
                     least_distance(found.corners) / marker});
   }
-  if (seen.size() >= kFewMarkers) ++images_with_markers_;
+  if (seen.size() >= kFewMarkers) {
+    ++images_with_markers_;
+  } else if (images_with_markers_ == 0) {
+    look_for_others(image);
+  }
   const std::size_t count = seen.size();
   for (const std::size_t layout : {std::size_t{0}, std::size_t{1}}) {
     for (std::size_t i = 0; i < count; ++i) {
@@ -93,8 +121,8 @@ std::vector<CharucoLayout::Marker> CharucoLayout::markers_in(const cv::Mat& imag
   for (const std::size_t i : left) {
     const cv::Point2d middle = middles()[static_cast<std::size_t>(seen[i].id)];
     kept.push_back(seen[i]);
-    kept.back().image_from_board = seen[i].image_from_board *
-                                   cv::Matx33d(1, 0, -middle.x, 0, 1, -middle.y, 0, 0, 1);
+    kept.back().image_from_board =
+        seen[i].image_from_board * cv::Matx33d(1, 0, -middle.x, 0, 1, -middle.y, 0, 0, 1);
   }
   return kept;
 }

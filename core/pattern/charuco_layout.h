@@ -6,6 +6,7 @@
 #include <array>
 #include <cstddef>
 #include <opencv2/core.hpp>
+#include <optional>
 #include <vector>
 
 #include "core/pattern/known_pattern.h"
@@ -33,8 +34,12 @@ class CharucoLayout {
   [[nodiscard]] bool is_black(int column, int row) const;  // of squares
   // Images so far in which some markers of the dictionary were found.
   [[nodiscard]] int images_with_markers() const { return images_with_markers_; }
+  // Where they were found in none: another dictionary, many of whose markers were.
+  [[nodiscard]] std::optional<int> other_dictionary() const { return other_dictionary_; }
 
  private:
+  // In some of the images only, for one dictionary at a time: it takes as long as to look for the right one.
+  void look_for_others(const cv::Mat& image);
   // 1: each lies where the other lets expect it, -1: not, 0: too far from each other to tell. Both homographies still from their
   // own square's middle.
   [[nodiscard]] int agreement(const Marker& a, const Marker& b, std::size_t layout) const;
@@ -44,6 +49,8 @@ class CharucoLayout {
   std::array<int, 2> votes_ = {};
   std::size_t chosen_ = 0;
   int images_with_markers_ = 0;
+  int images_without_ = 0;
+  std::optional<int> other_dictionary_;
 };
 
 }  // namespace alidade::internal

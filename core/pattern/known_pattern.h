@@ -29,20 +29,20 @@ struct MarkerDictionary {
   int markers;
 };
 inline constexpr std::array<MarkerDictionary, 21> kMarkerDictionaries = {
-    {{"4x4_50", 50},           {"4x4_100", 100},          {"4x4_250", 250},
-     {"4x4_1000", 1000},       {"5x5_50", 50},            {"5x5_100", 100},
-     {"5x5_250", 250},         {"5x5_1000", 1000},        {"6x6_50", 50},
-     {"6x6_100", 100},         {"6x6_250", 250},          {"6x6_1000", 1000},
-     {"7x7_50", 50},           {"7x7_100", 100},          {"7x7_250", 250},
-     {"7x7_1000", 1000},       {"aruco_original", 1024},  {"apriltag_16h5", 30},
-     {"apriltag_25h9", 35},    {"apriltag_36h10", 2320},  {"apriltag_36h11", 587}}};
+    {{"4x4_50", 50},        {"4x4_100", 100},         {"4x4_250", 250},
+     {"4x4_1000", 1000},    {"5x5_50", 50},           {"5x5_100", 100},
+     {"5x5_250", 250},      {"5x5_1000", 1000},       {"6x6_50", 50},
+     {"6x6_100", 100},      {"6x6_250", 250},         {"6x6_1000", 1000},
+     {"7x7_50", 50},        {"7x7_100", 100},         {"7x7_250", 250},
+     {"7x7_1000", 1000},    {"aruco_original", 1024}, {"apriltag_16h5", 30},
+     {"apriltag_25h9", 35}, {"apriltag_36h10", 2320}, {"apriltag_36h11", 587}}};
 
 struct KnownPattern {
   PatternKind kind = PatternKind::kChessboard;
   int columns = 0;
   int rows = 0;
-  double size_m = 0;  // of what the kind says
-  double gap = 0;     // AprilGrid: part of size_m
+  double size_m = 0;    // of what the kind says
+  double gap = 0;       // AprilGrid: part of size_m
   double marker_m = 0;  // ChArUco: a marker's side
   int dictionary = 0;   // ChArUco: index into kMarkerDictionaries
 

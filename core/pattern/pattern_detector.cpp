@@ -178,6 +178,10 @@ std::vector<PatternObservation> PatternDetector::find(const std::uint8_t* luma, 
   return observations;
 }
 
+std::string PatternDetector::doubt() const {
+  return state_->charuco ? state_->charuco->doubt() : std::string();
+}
+
 void follow_half_turns(const KnownPattern& pattern, double max_gap_s, PatternData* data) {
   if (!pattern.is_symmetric()) return;
   const PatternFrame* before = nullptr;

@@ -6,9 +6,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
-#include <cstdint>
 #include <utility>
 
 #include "core/pattern/aruco_markers.h"
@@ -26,9 +26,9 @@ constexpr std::array<Paper, 6> kPapers = {{{"a4", 210, 297},
                                            {"a1", 594, 841},
                                            {"a0", 841, 1189},
                                            {"letter", 215.9, 279.4}}};
-constexpr double kMargin_mm = 5;  // that printers leave white
+constexpr double kMargin_mm = 5;   // that printers leave white
 constexpr double kNoSeam = 1.002;  // a hair wider, so that no seam shows between cells
-constexpr double kCircle = 0.5;   // a circle's radius, of half the least distance of two centres
+constexpr double kCircle = 0.5;    // a circle's radius, of half the least distance of two centres
 
 struct Shapes {
   std::string svg;

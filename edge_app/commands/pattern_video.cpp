@@ -134,6 +134,7 @@ PatternVideo find_pattern(const std::string& path, const KnownPattern& pattern,
   follow_half_turns(pattern, 10 * interval_s, &video.data);
   if (interlaced) video.remarks.emplace_back(kInterlaced);
   for (const std::string& remark : doubts_of(video.data)) video.remarks.push_back(remark);
+  if (!detector.doubt().empty()) video.remarks.push_back(detector.doubt());
   if (video.repeated > 0)
     video.remarks.push_back(
         fmt::format("{} images repeat the one before and are left out", video.repeated));
