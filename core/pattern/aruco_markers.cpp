@@ -17,11 +17,11 @@ static_assert(cv::aruco::DICT_4X4_50 == 0 && cv::aruco::DICT_7X7_1000 == 15 &&
 
 bool has_aruco() { return true; }
 
-std::vector<ArucoMarker> find_markers(const cv::Mat& image, int dictionary) {
+std::vector<ArucoMarker> find_markers(const cv::Mat& image, int dictionary, int window_px) {
   const auto parameters = cv::aruco::DetectorParameters::create();
-  // One threshold, in a window of some of a marker's cells: three of them take three times as long and find hardly more.
-  parameters->adaptiveThreshWinSizeMin = 15;
-  parameters->adaptiveThreshWinSizeMax = 15;
+  // One window: OpenCV's usual three take three times as long.
+  parameters->adaptiveThreshWinSizeMin = window_px;
+  parameters->adaptiveThreshWinSizeMax = window_px;
   std::vector<std::vector<cv::Point2f>> corners;
   std::vector<int> ids;
   cv::aruco::detectMarkers(image, cv::aruco::getPredefinedDictionary(dictionary), corners, ids,

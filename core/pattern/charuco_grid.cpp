@@ -21,18 +21,18 @@ constexpr double kCharucoSmoothing_px = 0.7;
 constexpr double kRimWindow = 0.9;  // of the rim
 constexpr int kLeastRimWindow_px = 2;
 constexpr int kLargestRimWindow_px = 8;
-constexpr double kLargestStep_squares = 0.15;  // of a corner from where it is expected
-constexpr double kLeastCornerContrast = 8;     // grey levels, white above black
-constexpr double kLeastContrastShare = 0.4;    // of the image's median one
+constexpr double kLeastCornerContrast = 8;   // grey levels, white above black
+constexpr double kLeastContrastShare = 0.4;  // of the image's median one
 // From a corner, where it is looked how bright its squares are.
 constexpr double kBlack_squares = 0.25;
 constexpr double kWhite_rims = 0.6;
 constexpr std::size_t kCornerNeighbours = 8;  // whose homography predicts a corner
 constexpr std::size_t kFewestCorners = 4;     // that are a board
 constexpr double kLargestAsymmetry = 0.2;     // of the standard deviation
-// How far a lens bends what the neighbours expect.
+constexpr double kSettled_px = 1;             // of a corner's step, which paints over the same
+// How far a lens bends what neighbours on one side of a corner expect.
 constexpr double kCornerFits_px = 1;
-constexpr double kCornerFits_squares = 0.03;
+constexpr double kCornerFits_squares = 0.08;
 // Of what is seen along the middle of a white rim: its sides that blur and noise leave bright.
 constexpr double kWhiteShare = 0.9;
 
@@ -186,9 +186,6 @@ CharucoGrid::Corner CharucoGrid::settled(int point, const cv::Matx33d& image_fro
 
   const cv::Point2d place = place_of(point);
   const cv::Point2d origin = mapped(image_from_board, place);
-  const cv::Point2d along_row = mapped(image_from_board, place + cv::Point2d(0.5, 0)) - origin;
-  const double limit_px = std::max(kCornerFits_px, 2 * kLargestStep_squares * cv::norm(along_row));
-  if (!(cv::norm(cv::Point2d(corner.at) - expected) <= limit_px)) return corner;
   double white = 255;
   double black = 0;
   for (const int right : {0, 1}) {
@@ -275,14 +272,11 @@ void CharucoGrid::finish(const cv::Mat& image, const Markers& markers) {
     }
     if (refined.size() < kFewestCorners) return;
     const int half = corner_window(refined);
-    const double limit_px =
-        std::max(kCornerFits_px, kLargestStep_squares * least_distance(refined));
     refine_corners(clean, &refined);
     is_settled = true;
     for (std::size_t i = 0; i < found.size(); ++i) {
-      const double step_px = cv::norm(refined[i] - found[i]->at);
-      is_settled = is_settled && step_px <= kCornerFits_px;
-      found[i]->is_found = has_room(clean, refined[i], half) && step_px <= limit_px;
+      is_settled = is_settled && cv::norm(refined[i] - found[i]->at) <= kSettled_px;
+      found[i]->is_found = has_room(clean, refined[i], half);
       found[i]->at = refined[i];
     }
     if (!is_settled && pass + 1 < kPasses) continue;

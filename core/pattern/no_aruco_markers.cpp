@@ -6,7 +6,10 @@ namespace alidade::internal {
 
 bool has_aruco() { return false; }
 
-std::vector<ArucoMarker> find_markers(const cv::Mat& /*image*/, int /*dictionary*/) { return {}; }
+std::vector<ArucoMarker> find_markers(const cv::Mat& /*image*/, int /*dictionary*/,
+                                      int /*window_px*/) {
+  return {};
+}
 
 cv::Mat marker_cells(int /*dictionary*/, int /*id*/) { return {}; }
 

@@ -108,8 +108,9 @@ TEST_F(VirtualCameraConfig, NamesFileAndLineOfEveryMistake) {
 TEST_F(VirtualCameraConfig, ACharucoBoardsMarkersFit) {
   const std::string head = "pattern:\n  kind: charuco\n";
   if (!PatternBoard::has_charuco()) {
-    EXPECT_EQ(error_of(head), "camera.yaml:2: this build has no ChArUco boards, which need "
-                              "libopencv-contrib-dev");
+    EXPECT_EQ(error_of(head),
+              "camera.yaml:2: this build has no ChArUco boards, which need "
+              "libopencv-contrib-dev");
     return;
   }
   EXPECT_EQ(error_of(head + "  marker_mm: 30\n"),

@@ -106,15 +106,17 @@ Raster raster_of(const std::string& text) {
   return raster;
 }
 
-void expect_whole(const Raster& raster, const std::string& text) {
+// All of its points are found but one; -1: all of them.
+void expect_whole(const Raster& raster, const std::string& text, int but = -1) {
   PatternDetector detector(pattern_of(text));
   const auto found = detector.find(raster.image.data, raster.image.cols, raster.image.rows,
                                    static_cast<std::ptrdiff_t>(raster.image.step));
-  EXPECT_EQ(found.size(), raster.points.size()) << text;
+  EXPECT_EQ(found.size(), raster.points.size() - (but < 0 ? 0 : 1)) << text;
   for (const PatternObservation& o : found) {
     const cv::Point2d at(o.u.x() - 0.5, o.u.y() - 0.5);
     EXPECT_LT(cv::norm(at - raster.points[static_cast<std::size_t>(o.point)]), 0.05)
         << text << ", " << o.point;
+    EXPECT_NE(o.point, but) << text;
   }
 }
 
@@ -160,6 +162,46 @@ TEST(Charuco, MarkersInWrongPlacesAreLeftOut) {
   expect_whole(wrong, text);
 }
 
+// Sharp and with the right colours, but its neighbours expect it elsewhere.
+TEST(Charuco, ACornerInAWrongPlaceIsLeftOut) {
+  const char* text = "charuco:9x6:30mm:22mm";
+  Raster raster = raster_of(text);
+  constexpr int kPoint = 2 * 8 + 3;
+  const cv::Point at = raster.points[kPoint];
+  constexpr int kHalf = 24;
+  const cv::Mat source = raster.image.clone();
+  const cv::Rect place(at.x - kHalf, at.y - kHalf, 2 * kHalf, 2 * kHalf);
+  source(place).copyTo(raster.image(place + cv::Point(6, 6)));
+  expect_whole(raster, text, kPoint);
+}
+
+// A light's reflection in a black square would move the corner by a part of a pixel.
+TEST(Charuco, ACornerWithSomethingOnItIsLeftOut) {
+  const char* text = "charuco:9x6:30mm:22mm";
+  Raster raster = raster_of(text);
+  constexpr int kPoint = 2 * 8 + 3;
+  const cv::Point at = raster.points[kPoint];
+  const auto grey = [&](int right, int down) {
+    return raster.image.at<std::uint8_t>(at + cv::Point(right, down));
+  };
+  const int right = grey(20, 20) < grey(20, -20) ? 1 : -1;
+  cv::circle(raster.image, at + cv::Point(5 * right, 5), 4, cv::Scalar(230), cv::FILLED);
+  expect_whole(raster, text, kPoint);
+}
+
+// Half a window would be what OpenCV makes up beyond the edge.
+TEST(Charuco, ACornerAtTheImagesEdgeIsLeftOut) {
+  const char* text = "charuco:9x7:30mm:22mm";
+  const Raster raster = raster_of(text);
+  const int left = static_cast<int>(raster.points[0].x) - 6;
+  const cv::Mat part = raster.image.colRange(left, raster.image.cols).clone();
+  PatternDetector detector(pattern_of(text));
+  const auto found =
+      detector.find(part.data, part.cols, part.rows, static_cast<std::ptrdiff_t>(part.step));
+  EXPECT_EQ(found.size(), 7U * 6U);
+  for (const PatternObservation& o : found) EXPECT_NE(o.point % 8, 0);
+}
+
 // OpenCV before 4.6 drew boards of an even number of rows the other way round.
 TEST(Charuco, BothLayoutsAreFound) {
   for (const bool old_layout : {false, true}) {
@@ -171,6 +213,35 @@ TEST(Charuco, BothLayoutsAreFound) {
     EXPECT_EQ(errors.wrong, 0);
     EXPECT_LT(errors.rms(), 0.02);
   }
+}
+
+// Without its first column a board of an even number of rows looks like one of the other layout without its last: nothing is guessed.
+TEST(Charuco, APartThatFitsBothLayoutsWaitsForTheRest) {
+  const char* text = "charuco:9x6:30mm:22mm";
+  const Raster raster = raster_of(text);
+  const cv::Mat part =
+      raster.image.colRange(static_cast<int>(raster.points[0].x) - 6, raster.image.cols).clone();
+  PatternDetector detector(pattern_of(text));
+  const auto found_in = [&](const cv::Mat& image) {
+    return detector
+        .find(image.data, image.cols, image.rows, static_cast<std::ptrdiff_t>(image.step))
+        .size();
+  };
+  EXPECT_EQ(found_in(part), 0U);
+  EXPECT_EQ(found_in(raster.image), 8U * 5U);
+  EXPECT_EQ(found_in(part), 7U * 5U);
+}
+
+// Markers of 80 px and more, in the first image that shows them.
+TEST(Charuco, LargeImagesShowLargeMarkers) {
+  simulator::Config config = test::scene_of({"", Kind::kCharuco, 10, 7, 0.03, 0, 0});
+  config.image = {1920, 1080, 20};
+  config.pattern->lens = {1600, 1602, 960, 536, -0.1, 0.02, 0, 0};
+  config.pattern->marker = 0.0255;
+  const test::DetectedErrors errors = test::errors_of(config, "charuco:10x7:30mm:25.5mm", 2, 0.4);
+  EXPECT_GE(errors.count, 2 * 53);
+  EXPECT_EQ(errors.wrong, 0);
+  EXPECT_LT(errors.rms(), 0.02);
 }
 
 constexpr Printed kBoard = {"charuco:10x7:30mm:22mm", Kind::kCharuco, 10, 7, 0.03, 0, 0};
@@ -186,7 +257,20 @@ TEST(Charuco, ABoardSeenInPartIsFoundInPart) {
   EXPECT_GT(errors.count, 12 * 27);
   EXPECT_LT(errors.count, 12 * 50);
   EXPECT_EQ(errors.wrong, 0);
-  EXPECT_LT(errors.rms(), 0.03);
+  EXPECT_LT(errors.rms(), 0.017);
+}
+
+// Edges of a finger cross the board's: what they make is not taken for corners.
+TEST(Charuco, AFingerMakesNoCorners) {
+  simulator::Config config = scene_of(kBoard);
+  config.pattern->finger = 0.04;
+  config.pattern->hand.reach = 1.6;
+  config.pattern->hand.speed = 1e-3;
+  config.sensor.read_noise = 2;
+  const test::DetectedErrors errors = test::errors_of(config, kBoard.text, 24, 700.0);
+  EXPECT_EQ(errors.frames, 24);
+  EXPECT_GT(errors.count, 24 * 50);
+  EXPECT_EQ(errors.wrong, 0);
 }
 
 // Too blurred for most of the markers' codes; corners grow from the others.
@@ -198,7 +282,7 @@ TEST(Charuco, BlurredBoardsAreFound) {
   EXPECT_EQ(errors.frames, 8);
   EXPECT_GT(errors.count, 8 * 53);
   EXPECT_EQ(errors.wrong, 0);
-  EXPECT_LT(errors.rms(), 0.05);
+  EXPECT_LT(errors.rms(), 0.035);
 }
 
 struct Mistaken {
