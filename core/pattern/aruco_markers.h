@@ -15,10 +15,8 @@ struct ArucoMarker {
   std::vector<cv::Point2f> corners;  // OpenCV's pixels, from the marker's upper left clockwise
 };
 
-// dictionary: index into kMarkerDictionaries. window_px: odd, what is compared with its mean; best about a third of a marker or more.
-// Corners to about a pixel; some may be of what is no marker.
-[[nodiscard]] std::vector<ArucoMarker> find_markers(const cv::Mat& image, int dictionary,
-                                                    int window_px);
+// dictionary: index into kMarkerDictionaries. Each id once. Corners to about a pixel; some may be of what is no marker.
+[[nodiscard]] std::vector<ArucoMarker> find_markers(const cv::Mat& image, int dictionary);
 
 // A marker's cells as printed, with its border of one black cell: 0 black, else white.
 [[nodiscard]] cv::Mat marker_cells(int dictionary, int id);

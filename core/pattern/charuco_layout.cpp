@@ -6,7 +6,6 @@
 #include <opencv2/imgproc.hpp>
 #include <utility>
 
-#include "core/model/median.h"
 #include "core/pattern/aruco_markers.h"
 #include "core/pattern/corner_refinement.h"
 
@@ -23,10 +22,6 @@ constexpr std::size_t kManyMarkers = 6;
 constexpr std::array<int, 9> kLargestDictionaries = {3, 7, 11, 15, 16, 17, 18, 19, 20};
 constexpr int kLastOfFour = 15;  // up to here four sizes of each kind
 constexpr int kClearLead = 3;    // of votes, which no single wrong marker gives
-constexpr double kWindow_squares = 0.5;
-constexpr std::array<int, 4> kWindows_px = {7, 15, 41, 91};  // where hardly a marker is found
-
-int usual_window(const cv::Mat& image) { return 2 * (image.cols / 100) + 1; }
 
 }  // namespace
 
@@ -68,7 +63,7 @@ void CharucoLayout::look_for_others(const cv::Mat& image) {
   const int dictionary =
       kLargestDictionaries[static_cast<std::size_t>(turn / kEvery) % kLargestDictionaries.size()];
   int largest = 0;
-  const std::vector<ArucoMarker> found = find_markers(image, dictionary, usual_window(image));
+  const std::vector<ArucoMarker> found = find_markers(image, dictionary);
   for (const ArucoMarker& marker : found) largest = std::max(largest, marker.id);
   if (found.size() < kManyMarkers) return;
   int smallest = dictionary;
@@ -78,35 +73,16 @@ void CharucoLayout::look_for_others(const cv::Mat& image) {
   if (smallest != pattern_.dictionary) other_dictionary_ = smallest;
 }
 
-std::vector<CharucoLayout::Marker> CharucoLayout::seen_in(const cv::Mat& image) {
-  if (window_px_ == 0) window_px_ = usual_window(image);
-  std::vector<ArucoMarker> found = find_markers(image, pattern_.dictionary, window_px_);
-  if (2 * static_cast<int>(found.size()) < pattern_.markers()) {
-    const int other = kWindows_px[tried_windows_++ % kWindows_px.size()];
-    std::vector<ArucoMarker> more = find_markers(image, pattern_.dictionary, other);
-    if (more.size() > found.size()) found = std::move(more);
-  }
-  const double marker_part = pattern_.marker_m / pattern_.size_m;
+std::vector<CharucoLayout::Marker> CharucoLayout::markers_in(const cv::Mat& image) {
+  const double marker_part = pattern_.marker_m / pattern_.size_m;  // of a square
   const auto h = static_cast<float>(marker_part / 2);
   const std::vector<cv::Point2f> outline = {{-h, -h}, {h, -h}, {h, h}, {-h, h}};
   std::vector<Marker> seen;
-  std::vector<double> squares_px;
-  for (const ArucoMarker& marker : found) {
-    if (marker.id >= pattern_.markers()) continue;
-    squares_px.push_back(least_distance(marker.corners) / marker_part);
-    seen.push_back(
-        {marker.id, cv::getPerspectiveTransform(outline, marker.corners), squares_px.back()});
+  for (const ArucoMarker& found : find_markers(image, pattern_.dictionary)) {
+    if (found.id >= pattern_.markers()) continue;
+    seen.push_back({found.id, cv::getPerspectiveTransform(outline, found.corners),
+                    least_distance(found.corners) / marker_part});
   }
-  if (seen.size() >= kFewMarkers) {
-    const double window = kWindow_squares * median(std::move(squares_px));
-    window_px_ =
-        std::clamp(2 * static_cast<int>(window / 2) + 1, kWindows_px.front(), kWindows_px.back());
-  }
-  return seen;
-}
-
-std::vector<CharucoLayout::Marker> CharucoLayout::markers_in(const cv::Mat& image) {
-  const std::vector<Marker> seen = seen_in(image);
   if (seen.size() >= kFewMarkers) {
     ++images_with_markers_;
   } else if (images_with_markers_ == 0) {

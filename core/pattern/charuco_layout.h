@@ -39,7 +39,6 @@ class CharucoLayout {
   [[nodiscard]] std::optional<int> other_dictionary() const { return other_dictionary_; }
 
  private:
-  [[nodiscard]] std::vector<Marker> seen_in(const cv::Mat& image);
   // In some of the images only, for one dictionary at a time: it takes as long as to look for the right one.
   void look_for_others(const cv::Mat& image);
   // 1: each lies where the other lets expect it, -1: not, 0: too far from each other to tell. Both homographies still from their
@@ -50,8 +49,6 @@ class CharucoLayout {
   std::array<std::vector<cv::Point2d>, 2> middles_;  // from OpenCV 4.6 on, before
   std::array<int, 2> votes_ = {};
   std::size_t chosen_ = 0;
-  int window_px_ = 0;  // by the last image's markers; 0: none yet
-  std::size_t tried_windows_ = 0;
   int images_with_markers_ = 0;
   int images_without_ = 0;
   std::optional<int> other_dictionary_;

@@ -6,10 +6,7 @@ namespace alidade::internal {
 
 bool has_aruco() { return false; }
 
-std::vector<ArucoMarker> find_markers(const cv::Mat& /*image*/, int /*dictionary*/,
-                                      int /*window_px*/) {
-  return {};
-}
+std::vector<ArucoMarker> find_markers(const cv::Mat& /*image*/, int /*dictionary*/) { return {}; }
 
 cv::Mat marker_cells(int /*dictionary*/, int /*id*/) { return {}; }
 

@@ -193,7 +193,7 @@ TEST(Charuco, ACornerWithSomethingOnItIsLeftOut) {
 TEST(Charuco, ACornerAtTheImagesEdgeIsLeftOut) {
   const char* text = "charuco:9x7:30mm:22mm";
   const Raster raster = raster_of(text);
-  const int left = static_cast<int>(raster.points[0].x) - 6;
+  const int left = static_cast<int>(raster.points[0].x) - 10;
   const cv::Mat part = raster.image.colRange(left, raster.image.cols).clone();
   PatternDetector detector(pattern_of(text));
   const auto found =
@@ -232,16 +232,17 @@ TEST(Charuco, APartThatFitsBothLayoutsWaitsForTheRest) {
   EXPECT_EQ(found_in(part), 7U * 5U);
 }
 
-// Markers of 80 px and more, in the first image that shows them.
-TEST(Charuco, LargeImagesShowLargeMarkers) {
-  simulator::Config config = test::scene_of({"", Kind::kCharuco, 10, 7, 0.03, 0, 0});
-  config.image = {1920, 1080, 20};
-  config.pattern->lens = {1600, 1602, 960, 536, -0.1, 0.02, 0, 0};
-  config.pattern->marker = 0.0255;
-  const test::DetectedErrors errors = test::errors_of(config, "charuco:10x7:30mm:25.5mm", 2, 0.4);
-  EXPECT_GE(errors.count, 2 * 53);
-  EXPECT_EQ(errors.wrong, 0);
-  EXPECT_LT(errors.rms(), 0.02);
+// Narrow rims: what OpenCV takes for one outline, markers and their squares, would hide half of the markers.
+TEST(Charuco, LargeAndSmallMarkersAreFound) {
+  for (const double scale : {0.25, 0.5, 1.0, 2.0, 3.0}) {
+    for (const char* text : {"charuco:7x5:30mm:24mm:5x5_100", "charuco:9x7:30mm:25.5mm"}) {
+      Raster raster = raster_of(text);
+      cv::resize(raster.image, raster.image, {}, scale, scale, cv::INTER_AREA);
+      for (cv::Point2d& p : raster.points)
+        p = scale * (p + cv::Point2d(0.5, 0.5)) - cv::Point2d(0.5, 0.5);
+      expect_whole(raster, text);
+    }
+  }
 }
 
 constexpr Printed kBoard = {"charuco:10x7:30mm:22mm", Kind::kCharuco, 10, 7, 0.03, 0, 0};
