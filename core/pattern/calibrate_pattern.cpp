@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/model/median.h"
+#include "core/pattern/circle_images.h"
 #include "core/pattern/knot_score.h"
 #include "core/pattern/moving_projection.h"
 #include "core/pattern/pattern_adjustment.h"
@@ -57,6 +58,28 @@ double leave_out_wrong(const PatternData& data, const PatternState& state, Patte
   return std::sqrt(variance);
 }
 
+// How far apart in time a hand's accelerations are related: turns of less than 2 Hz.
+constexpr double kAccelerationTime_s = 0.1;
+
+// What the curve may do where the data leave it free, as much as the motion itself did. Where it has two knots a frame, pose and speed
+// of each frame are free; rows that are exposed at once tell the pose alone, and some line delay beside 0 would then explain
+// noise by a speed that suits it.
+void expect_accelerations(const PoseCurve& curve, PatternAdjustmentOptions* options) {
+  PoseVector sum = PoseVector::Zero();
+  for (int s = 0; s < curve.segments(); ++s) {
+    const double length = curve.knot(s + 1) - curve.knot(s);
+    for (const double x : {0.5 - 0.5 / std::sqrt(3.0), 0.5 + 0.5 / std::sqrt(3.0)}) {
+      const Vector4<double> weights = curve.acceleration_weights(s, curve.knot(s) + x * length);
+      PoseVector a = PoseVector::Zero();
+      for (int k = 0; k < 4; ++k) a += weights[k] * curve.control_point(s + k);
+      sum += length / 2 * a.cwiseAbs2();
+    }
+  }
+  const PoseVector mean = sum / (curve.end_s() - curve.begin_s());
+  options->position_noise = std::max(1e-9, kAccelerationTime_s * mean.head<3>().mean());
+  options->rotation_noise = std::max(1e-9, kAccelerationTime_s * mean.tail<3>().mean());
+}
+
 int used_frames(const PatternMask& used) {
   return static_cast<int>(std::count_if(used.begin(), used.end(), [](const auto& frame) {
     return std::count(frame.begin(), frame.end(), char{1}) > 0;
@@ -105,8 +128,9 @@ std::vector<PatternResidual> pattern_residuals(const PatternData& data, const Le
   return residuals;
 }
 
-PatternCalibration calibrate_pattern(const PatternData& data,
+PatternCalibration calibrate_pattern(const PatternData& as_detected,
                                      const PatternCalibrationOptions& options) {
+  PatternData data = as_detected;
   PatternCalibration result;
   if (auto what = internal::bad_input(data))
     return refused(result, PatternStatus::kBadInput, std::move(*what));
@@ -184,6 +208,7 @@ PatternCalibration calibrate_pattern(const PatternData& data,
           "the views are too much alike for a focal length; " + internal::how_to_show(views));
     }
     sigma_px = leave_out_wrong(data, state, &used);
+    if (result.rounds == 0) expect_accelerations(state.curve, &adjustment);
     score_options.sigma_px =
         internal::observation_noise(data, used, state, result.frame_interval_s);
     score = internal::score_knots(data, used, state, score_options);
@@ -193,6 +218,7 @@ PatternCalibration calibrate_pattern(const PatternData& data,
     const bool is_settled = !is_held && end == AdjustmentEnd::kConverged;
     if (is_settled && score.split.empty()) break;
     if (is_followed) is_held = false;
+    if (!is_held) data = recentred(as_detected, state.lens, state.curve);
     if (is_settled || !is_followed) state.curve = state.curve.split(score.split);
   }
 

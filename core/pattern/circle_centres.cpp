@@ -6,9 +6,10 @@
 #include <cstddef>
 #include <cstdint>
 #include <opencv2/calib3d.hpp>
+#include <utility>
 
 #include "core/model/median.h"
-#include "core/model/rotation.h"
+#include "core/pattern/circle_images.h"
 
 namespace alidade::internal {
 namespace {
@@ -28,7 +29,8 @@ constexpr double kDifferences = 7;
 
 struct Blob {
   cv::Point2d centre;
-  double area = 0;  // px^2; 0: not measured
+  double area = 0;       // of what is darker than the floor, px^2; 0: not measured
+  double full_area = 0;  // with its blurred rim, which noise reaches more
 };
 
 // An ellipse about a centre: what is round in the pattern.
@@ -42,14 +44,14 @@ struct Window {
 };
 
 Blob centroid(const cv::Mat& image, const cv::Point2d& start, const Window& window) {
-  Blob blob{start, 0};
+  Blob blob{start, 0, 0};
   for (int step = 0; step < 3; ++step) {
     const cv::Point2d c = blob.centre;
     const int left = static_cast<int>(std::ceil(c.x - window.half_width));
     const int right = static_cast<int>(std::floor(c.x + window.half_width));
     const int top = static_cast<int>(std::ceil(c.y - window.half_height));
     const int bottom = static_cast<int>(std::floor(c.y + window.half_height));
-    if (left < 0 || top < 0 || right >= image.cols || bottom >= image.rows) return {start, 0};
+    if (left < 0 || top < 0 || right >= image.cols || bottom >= image.rows) return {start, 0, 0};
     std::vector<double> rim;
     std::uint8_t darkest = 255;
     for (int v = top; v <= bottom; ++v) {
@@ -61,24 +63,28 @@ Blob centroid(const cv::Mat& image, const cv::Point2d& start, const Window& wind
         if (d > kRim) rim.push_back(row[u]);
       }
     }
-    if (rim.empty()) return {start, 0};
+    if (rim.empty()) return {start, 0, 0};
     const double paper = median(std::move(rim));
     const double contrast = paper - darkest;
-    if (contrast < kLeastCircleContrast) return {start, 0};
+    if (contrast < kLeastCircleContrast) return {start, 0, 0};
     const double level = paper - kFloor * contrast;
     double sum = 0;
     double sum_u = 0;
     double sum_v = 0;
     double core = 0;
     int core_count = 0;
+    double full_sum = 0;
+    double full_core = 0;
     for (int v = top; v <= bottom; ++v) {
       const auto* row = image.ptr<std::uint8_t>(v);
       for (int u = left; u <= right; ++u) {
         const double d = window.distance(u - c.x, v - c.y);
         if (d > kCircleWindow) continue;
         const double weight = std::max(0.0, level - row[u]);
+        full_sum += paper - row[u];
         if (d < kCore) {
           core += weight;
+          full_core += paper - row[u];
           ++core_count;
         }
         sum += weight;
@@ -86,9 +92,10 @@ Blob centroid(const cv::Mat& image, const cv::Point2d& start, const Window& wind
         sum_v += weight * v;
       }
     }
-    if (!(sum > 0)) return {start, 0};
+    if (!(sum > 0)) return {start, 0, 0};
     blob.centre = {sum_u / sum, sum_v / sum};
     blob.area = core > 0 ? sum * core_count / core : 0;
+    blob.full_area = core > 0 ? full_sum * core_count / full_core : 0;
     if (cv::norm(blob.centre - c) < 0.01) break;
   }
   return blob;
@@ -141,37 +148,13 @@ class GridMap {
   Matrix<double, kTerms, 2> bend_ = Matrix<double, kTerms, 2>::Zero();
 };
 
-struct Outline {
-  Vector2<double> centroid;
-  double area = 0;
-};
-
-// Of the image of a circle: of a polygon as large as the circle.
-Outline outline(const GridMap& map, const Vector2<double>& centre, double radius) {
-  constexpr int kCorners = 24;
-  const double step = 2 * kPi / kCorners;
-  const double reach = radius * std::sqrt(step / std::sin(step));
-  const Vector2<double> origin = map(centre);
-  Vector2<double> before = map(centre + Vector2<double>(reach, 0)) - origin;
-  Outline of{Vector2<double>::Zero(), 0};
-  for (int i = 1; i <= kCorners; ++i) {
-    const Vector2<double> corner =
-        map(centre + reach * Vector2<double>(std::cos(i * step), std::sin(i * step))) - origin;
-    const double twice_area = before.x() * corner.y() - before.y() * corner.x();
-    of.area += twice_area / 2;
-    of.centroid += twice_area / 6 * (before + corner);
-    before = corner;
-  }
-  of.centroid = of.centroid / of.area + origin;
-  of.area = std::abs(of.area);
-  return of;
-}
-
 }  // namespace
 
-std::vector<char> refine_circles(const cv::Mat& image, const KnownPattern& pattern,
-                                 std::vector<cv::Point2f>* centres) {
-  std::vector<char> is_whole(centres->size(), 1);
+CircleCentres refine_circles(const cv::Mat& image, const KnownPattern& pattern,
+                             std::vector<cv::Point2f>* centres) {
+  CircleCentres found;
+  found.is_whole.assign(centres->size(), 1);
+  found.beside.assign(centres->size(), Vector2<double>::Zero());
   // In units of the least distance of two circles.
   const double spacing =
       pattern.size_m * (pattern.kind == PatternKind::kSymmetricCircles ? 1 : std::sqrt(2.0));
@@ -181,7 +164,7 @@ std::vector<char> refine_circles(const cv::Mat& image, const KnownPattern& patte
   }
   const auto place = [&](std::size_t i) { return Vector2<double>(places[i].x, places[i].y); };
   const GridMap rough(places, *centres);
-  if (!rough.is_valid()) return is_whole;
+  if (!rough.is_valid()) return found;
   std::vector<Blob> blobs;
   for (std::size_t i = 0; i < places.size(); ++i) {
     constexpr double kStep = 0.1;
@@ -192,28 +175,35 @@ std::vector<char> refine_circles(const cv::Mat& image, const KnownPattern& patte
     }
     const Window window{J.inverse(), kCircleWindow * J.row(0).norm(),
                         kCircleWindow * J.row(1).norm()};
-    if (!window.pattern_from_image.allFinite()) return is_whole;
+    if (!window.pattern_from_image.allFinite()) return found;
     blobs.push_back(centroid(image, (*centres)[i], window));
     (*centres)[i] = blobs.back().centre;
   }
   const GridMap map(places, *centres);
-  if (!map.is_valid()) return is_whole;
+  if (!map.is_valid()) return found;
   std::vector<double> ratios;  // of the areas measured to those of circles as drawn
-  for (std::size_t i = 0; i < places.size(); ++i)
-    ratios.push_back(blobs[i].area / outline(map, place(i), kDrawnRadius).area);
+  std::vector<double> full_ratios;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const double drawn = circle_image(map, place(i), kDrawnRadius).area;
+    ratios.push_back(blobs[i].area / drawn);
+    full_ratios.push_back(blobs[i].full_area / drawn);
+  }
   const double ratio = median(ratios);
-  if (!(ratio > 0)) return is_whole;
-  const double radius = kDrawnRadius * std::sqrt(ratio);
+  const double full_ratio = median(std::move(full_ratios));
+  if (!(ratio > 0) || !(full_ratio > 0)) return found;
+  const double radius = kDrawnRadius * std::sqrt(full_ratio);
+  found.radius_m = radius * spacing;
   std::vector<double> differences;
   for (const double r : ratios) differences.push_back(std::abs(r / ratio - 1));
   const double limit = std::max(kLeastDifference, kDifferences * median(differences));
   for (std::size_t i = 0; i < places.size(); ++i) {
-    is_whole[i] = differences[i] <= limit ? 1 : 0;
-    const Vector2<double> beside = outline(map, place(i), radius).centroid - map(place(i));
-    if (all_finite(beside))
-      (*centres)[i] -= cv::Point2f(static_cast<float>(beside.x()), static_cast<float>(beside.y()));
+    found.is_whole[i] = differences[i] <= limit ? 1 : 0;
+    const Vector2<double> beside = circle_image(map, place(i), radius).beside;
+    if (!all_finite(beside)) continue;
+    found.beside[i] = beside;
+    (*centres)[i] -= cv::Point2f(static_cast<float>(beside.x()), static_cast<float>(beside.y()));
   }
-  return is_whole;
+  return found;
 }
 
 }  // namespace alidade::internal

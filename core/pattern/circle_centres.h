@@ -12,9 +12,15 @@
 
 namespace alidade::internal {
 
-// centres: OpenCV's pixels, in the order of pattern.points_m(). By centre: 0 where the circle's area is not what the others let
-// expect, because something lies on it or it could not be measured.
-[[nodiscard]] std::vector<char> refine_circles(const cv::Mat& image, const KnownPattern& pattern,
-                                               std::vector<cv::Point2f>* centres);
+struct CircleCentres {
+  std::vector<char>
+      is_whole;  // 0: its area is not what the others let expect, or could not be measured
+  std::vector<Vector2<double>> beside;  // what the centroid was off by, px
+  double radius_m = 0;                  // 0: not measured, the centres are as they were
+};
+
+// centres: OpenCV's pixels, in the order of pattern.points_m().
+[[nodiscard]] CircleCentres refine_circles(const cv::Mat& image, const KnownPattern& pattern,
+                                           std::vector<cv::Point2f>* centres);
 
 }  // namespace alidade::internal

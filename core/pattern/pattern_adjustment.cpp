@@ -9,6 +9,7 @@
 #include <cstddef>
 #include <limits>
 #include <memory>
+#include <utility>
 
 #include "core/pattern/moving_projection.h"
 
@@ -173,7 +174,7 @@ struct Blocks {
   std::vector<double*> points;  // control points
   double* lens = nullptr;
   std::vector<ceres::ResidualBlockId> observations;
-  std::vector<int> frame_of_row;  // of the observations' residuals
+  std::vector<std::pair<int, int>> seen;  // frame and observation of each two residuals
 };
 
 // state's control points and lens are the parameter blocks; spline is a copy that stays as it is.
@@ -214,8 +215,7 @@ Blocks build(const PatternData& data, const PatternMask& used, const LensKnowled
         if (segment[i] == s) in_segment.push_back(static_cast<int>(i));
       }
       if (in_segment.empty()) continue;
-      blocks.frame_of_row.insert(blocks.frame_of_row.end(), 2 * in_segment.size(),
-                                 static_cast<int>(f));
+      for (const int i : in_segment) blocks.seen.emplace_back(static_cast<int>(f), i);
       blocks.observations.push_back(problem->AddResidualBlock(
           new FrameCost(&data, &spline, static_cast<int>(f), s, std::move(in_segment), options),
           nullptr, {point(s), point(s + 1), point(s + 2), point(s + 3), blocks.lens}));
@@ -238,12 +238,43 @@ Blocks build(const PatternData& data, const PatternMask& used, const LensKnowled
 
 using SparseRows = Eigen::Map<const Eigen::SparseMatrix<double, Eigen::RowMajor>>;
 
-// Detections near each other in time err together: blur, corners at the same places in their pixels. By how much the lens is
-// then less well known, the data tell: each stretch of frames pulls at it, X^T J^T r, and the spread of these pulls is a second
-// estimate of its variance that needs no independence within a stretch. Where that is larger beyond chance, it counts.
-void inflate(const Blocks& blocks, ceres::Problem::EvaluateOptions evaluate,
-             const Eigen::MatrixXd& X, int frames, ceres::Problem* problem, Eigen::MatrixXd* C) {
+// Groups of observations that may err together.
+struct Groups {
+  int count = 0;
+  std::vector<int> of;  // observation
+};
+
+// Near each other in time: blur, corners at the same places in their pixels. In the same part of the image: what the lens's model
+// lacks. The same point: what the detector or the print has wrong about it.
+std::array<Groups, 3> groups_of(const PatternData& data, const Blocks& blocks) {
   constexpr int kStretches = 100;
+  constexpr int kColumns = 12;
+  constexpr int kRows = 8;
+  const auto frames = static_cast<int>(data.frames.size());
+  std::array<Groups, 3> groups;
+  groups[0].count = std::min(kStretches, frames);
+  groups[1].count = kColumns * kRows;
+  groups[2].count = static_cast<int>(data.points_m.size());
+  const auto part = [](double x, double size, int parts) {
+    return std::clamp(static_cast<int>(x / size * parts), 0, parts - 1);
+  };
+  for (const auto& [f, i] : blocks.seen) {
+    const PatternObservation& o =
+        data.frames[static_cast<std::size_t>(f)].observations[static_cast<std::size_t>(i)];
+    groups[0].of.push_back(static_cast<int>(static_cast<long long>(f) * groups[0].count / frames));
+    groups[1].of.push_back(part(o.u.y(), data.height, kRows) * kColumns +
+                           part(o.u.x(), data.width, kColumns));
+    groups[2].of.push_back(o.point);
+  }
+  return groups;
+}
+
+// By how much the lens is less well known because detections err together, the data tell: each group of them pulls at it,
+// X^T J^T r, and the spread of these pulls is a second estimate of its variance that needs no independence within a group. Where that
+// is larger beyond chance, it counts.
+void inflate(const PatternData& data, const Blocks& blocks,
+             ceres::Problem::EvaluateOptions evaluate, const Eigen::MatrixXd& X,
+             ceres::Problem* problem, Eigen::MatrixXd* C) {
   evaluate.residual_blocks = blocks.observations;
   ceres::CRSMatrix rows;
   std::vector<double> r;
@@ -251,22 +282,22 @@ void inflate(const Blocks& blocks, ceres::Problem::EvaluateOptions evaluate,
   const SparseRows J(rows.num_rows, rows.num_cols, static_cast<Eigen::Index>(rows.values.size()),
                      rows.rows.data(), rows.cols.data(), rows.values.data());
   const Eigen::MatrixXd JX = J * X;
-  const int stretches = std::min(kStretches, frames);
-  Eigen::MatrixXd pull = Eigen::MatrixXd::Zero(X.cols(), stretches);
-  for (Eigen::Index i = 0; i < JX.rows(); ++i) {
-    const auto stretch =
-        static_cast<int>(static_cast<long long>(blocks.frame_of_row[static_cast<std::size_t>(i)]) *
-                         stretches / frames);
-    pull.col(stretch) += r[static_cast<std::size_t>(i)] * JX.row(i).transpose();
-  }
-  const double beyond_chance = 1 + 2 * std::sqrt(2.0 / stretches);
   const double freedom = static_cast<double>(JX.rows()) /
                          std::max<double>(1, static_cast<double>(JX.rows() - X.rows()));
-  Eigen::VectorXd factor = Eigen::VectorXd::Ones(C->rows());
-  for (Eigen::Index i = 0; i < C->rows(); ++i) {
-    const double ratio = freedom * pull.row(i).squaredNorm() / (*C)(i, i);
-    if (ratio > beyond_chance) factor[i] = std::sqrt(ratio);
+  Eigen::VectorXd excess = Eigen::VectorXd::Zero(C->rows());
+  for (const Groups& groups : groups_of(data, blocks)) {
+    Eigen::MatrixXd pull = Eigen::MatrixXd::Zero(X.cols(), groups.count);
+    for (Eigen::Index i = 0; i < JX.rows(); ++i) {
+      pull.col(groups.of[static_cast<std::size_t>(i / 2)]) +=
+          r[static_cast<std::size_t>(i)] * JX.row(i).transpose();
+    }
+    const double beyond_chance = 1 + 2.5 * std::sqrt(2.0 / groups.count);
+    for (Eigen::Index i = 0; i < C->rows(); ++i) {
+      const double ratio = freedom * pull.row(i).squaredNorm() / (*C)(i, i);
+      if (ratio > beyond_chance) excess[i] += ratio - 1;
+    }
   }
+  const Eigen::VectorXd factor = (1 + excess.array()).sqrt();
   *C = (factor.asDiagonal() * *C * factor.asDiagonal()).eval();
 }
 
@@ -283,6 +314,8 @@ AdjustmentEnd adjust_pattern(const PatternData& data, const PatternMask& used,
   solver.max_num_iterations = options.max_steps;
   solver.initial_trust_region_radius = options.first_radius;
   solver.function_tolerance = options.relative_decrease;
+  // Steps of a line delay, 1e-7 s, are nothing beside focal lengths of hundreds of pixels.
+  solver.parameter_tolerance = 0;
   solver.logging_type = ceres::SILENT;
   ceres::Solver::Summary summary;
   ceres::Solve(solver, &problem, &summary);
@@ -332,7 +365,7 @@ std::optional<LensMatrix> lens_covariance(const PatternData& data, const Pattern
     X.col(static_cast<Eigen::Index>(k)) = scale.cwiseProduct(Eigen::VectorXd(ldlt.solve(unit)));
   }
   Eigen::MatrixXd C = X.bottomRows(static_cast<Eigen::Index>(free.size()));
-  inflate(blocks, evaluate, X, static_cast<int>(data.frames.size()), &problem, &C);
+  inflate(data, blocks, evaluate, X, &problem, &C);
   for (std::size_t i = 0; i < free.size(); ++i) {
     for (std::size_t k = 0; k < free.size(); ++k) {
       covariance(free[i], free[k]) = C(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));

@@ -10,6 +10,9 @@ namespace alidade {
 struct PatternObservation {
   int point = 0;      // index into PatternData::points_m
   Vector2<double> u;  // px, the centre of the top-left pixel is at (0.5, 0.5)
+  // Of a circle: u is its centroid less `beside`, px; radius: as measured, 0: no circle.
+  Vector2<double> beside = Vector2<double>::Zero();
+  double radius_m = 0;
 };
 
 struct PatternFrame {

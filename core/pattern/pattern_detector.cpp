@@ -88,7 +88,8 @@ struct PatternDetector::State {
   KnownPattern pattern;
   std::unique_ptr<internal::TagGrid> tags;
   std::unique_ptr<internal::CharucoGrid> charuco;
-  int in_vain = 0;  // images in a row in which thresholds that adapt were of no use
+  internal::CircleCentres circles;  // of the last image
+  int in_vain = 0;                  // images in a row in which thresholds that adapt were of no use
 
   // Light changes slowly: what did not help in the last images is tried now and then only.
   bool try_any_light(const cv::Mat& image, std::vector<cv::Point2f>* corners) {
@@ -116,10 +117,10 @@ struct PatternDetector::State {
       return true;
     }
     if (!find_circles(image, pattern, corners)) return false;
-    const std::vector<char> is_whole = internal::refine_circles(image, pattern, corners);
+    circles = internal::refine_circles(image, pattern, corners);
     std::size_t kept = 0;
     for (std::size_t i = 0; i < count; ++i) {
-      if (is_whole[i] == 0) continue;
+      if (circles.is_whole[i] == 0) continue;
       (*points)[kept] = (*points)[i];
       (*corners)[kept++] = (*corners)[i];
     }
@@ -171,7 +172,12 @@ std::vector<PatternObservation> PatternDetector::find(const std::uint8_t* luma, 
     return observations;  // what it finds fault with holds no pattern
   }
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    observations.push_back({points[i], {corners[i].x + 0.5, corners[i].y + 0.5}});
+    PatternObservation seen{points[i], {corners[i].x + 0.5, corners[i].y + 0.5}};
+    if (state_->circles.radius_m > 0) {
+      seen.beside = state_->circles.beside[static_cast<std::size_t>(points[i])];
+      seen.radius_m = state_->circles.radius_m;
+    }
+    observations.push_back(seen);
   }
   std::sort(observations.begin(), observations.end(),
             [](const auto& a, const auto& b) { return a.point < b.point; });

@@ -14,7 +14,6 @@
 namespace alidade::internal {
 namespace {
 
-constexpr int kCells = 8;  // a tag's side, with its black border
 // Of 36 bits two codes of the family differ in 11: another tag's correlation is at most 1 - 22 / 36.
 constexpr double kLeastCorrelation = 0.6;
 constexpr double kLeastTagContrast = 5;  // grey levels, standard deviation over the bits
@@ -43,6 +42,15 @@ double shortest_side(const TagGrid::Corners& corners) {
   return shortest;
 }
 
+TagCells cells_of(const apriltag_family_t& family, int tag) {
+  TagCells cells{};
+  for (std::uint32_t i = 0; i < family.nbits; ++i) {
+    cells[family.bit_y[i]][family.bit_x[i]] =
+        ((family.codes[tag] >> (family.nbits - 1 - i)) & 1U) != 0;
+  }
+  return cells;
+}
+
 }  // namespace
 
 struct TagGrid::Library {
@@ -59,6 +67,8 @@ TagGrid::TagGrid(const KnownPattern& pattern)
   // Less is noise, which costs most of the time.
   detector->qtp.min_white_black_diff = 20;
   apriltag_detector_add_family(detector, library_->family.get());
+  for (int tag = 0; tag < pattern_.columns * pattern_.rows; ++tag)
+    cells_.push_back(cells_of(*library_->family, tag));
 }
 
 TagGrid::~TagGrid() = default;
@@ -168,7 +178,7 @@ void TagGrid::repair(const cv::Mat& image) {
     if (expected.empty() || off(expected, found_[tag]) < kFits_px) continue;
     expected = predicted(number, true);
     if (expected.empty()) continue;
-    const double limit = std::max(kFits_px, kFits_cells * shortest_side(expected) / kCells);
+    const double limit = std::max(kFits_px, kFits_cells * shortest_side(expected) / kTagCells);
     if (off(expected, found_[tag]) < limit) continue;
     Corners corners = expected;
     if (confirm(image, number, &corners) && off(expected, corners) < limit) {
@@ -180,8 +190,8 @@ void TagGrid::repair(const cv::Mat& image) {
 }
 
 bool TagGrid::confirm(const cv::Mat& image, int tag, Corners* corners) const {
-  const double cell = shortest_side(*corners) / kCells;
-  const double room = std::min(1.0, pattern_.gap * kCells) * cell;
+  const double cell = shortest_side(*corners) / kTagCells;
+  const double room = std::min(1.0, pattern_.gap * kTagCells) * cell;
   const int half =
       std::clamp(static_cast<int>(kWindow_cells * room), kLeastTagWindow_px, kLargestTagWindow_px);
   const cv::Rect2f inner(static_cast<float>(half + 1), static_cast<float>(half + 1),
@@ -197,13 +207,15 @@ bool TagGrid::confirm(const cv::Mat& image, int tag, Corners* corners) const {
     if (!(cv::norm((*corners)[i] - start[i]) <= std::max(1.0, kLargestChange_cells * cell)))
       return false;
   }
-  return code_correlation(image, tag, *corners) >= kLeastCorrelation;
+  return code_correlation(image, tag, *corners) >= kLeastCorrelation &&
+         refine_tag_corners(smooth_, cells_[static_cast<std::size_t>(tag)],
+                            pattern_.gap * kTagCells, corners);
 }
 
 double TagGrid::code_correlation(const cv::Mat& image, int tag, const Corners& corners) const {
   const apriltag_family_t& family = *library_->family;
   // In cells, in the order of the corners.
-  const Corners square = {{0, kCells}, {kCells, kCells}, {kCells, 0}, {0, 0}};
+  const Corners square = {{0, kTagCells}, {kTagCells, kTagCells}, {kTagCells, 0}, {0, 0}};
   const cv::Matx33d H = cv::getPerspectiveTransform(square, corners);
   const auto bits = static_cast<int>(family.nbits);
   double sum = 0;

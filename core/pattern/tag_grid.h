@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "core/pattern/known_pattern.h"
+#include "core/pattern/tag_corners.h"
 
 namespace alidade::internal {
 
@@ -42,7 +43,8 @@ class TagGrid {
   KnownPattern pattern_;
   std::vector<cv::Point2f> points_;  // m
   std::unique_ptr<Library> library_;
-  cv::Mat smooth_;  // the image, for corners
+  std::vector<TagCells> cells_;  // by tag
+  cv::Mat smooth_;               // the image, for corners
   std::vector<Corners> found_, before_, before_that_;
 };
 

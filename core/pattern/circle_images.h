@@ -1,0 +1,51 @@
+#pragma once
+// Of a circle's image the centroid is not where its centre is seen: perspective and lens bend, by some hundredths of a pixel.
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/model/trigonometry.h"
+#include "core/pattern/lens.h"
+#include "core/pattern/pattern_data.h"
+#include "core/pattern/pose_curve.h"
+
+namespace alidade {
+
+// Circles whose centres the detector took from their centroids by what the grid tells of lens and perspective, now by the lens and
+// the pose that are known. Other observations stay as they are.
+[[nodiscard]] PatternData recentred(const PatternData& data, const LensVector& lens,
+                                    const PoseCurve& curve);
+
+namespace internal {
+
+struct CircleImage {
+  Vector2<double> beside =
+      Vector2<double>::Zero();  // from the image of the centre to the centroid, px
+  double area = 0;              // px^2
+};
+
+// map: a place on the pattern to px. Of a polygon as large as the circle.
+template <class Map>
+[[nodiscard]] CircleImage circle_image(const Map& map, const Vector2<double>& centre,
+                                       double radius) {
+  constexpr int kCorners = 24;
+  const double step = 2 * kPi / kCorners;
+  const double reach = radius * std::sqrt(step / std::sin(step));
+  const Vector2<double> origin = map(centre);
+  Vector2<double> before = map(centre + Vector2<double>(reach, 0)) - origin;
+  CircleImage image;
+  for (int i = 1; i <= kCorners; ++i) {
+    const Vector2<double> corner =
+        map(centre + reach * Vector2<double>(std::cos(i * step), std::sin(i * step))) - origin;
+    const double twice_area = before.x() * corner.y() - before.y() * corner.x();
+    image.area += twice_area / 2;
+    image.beside += twice_area / 6 * (before + corner);
+    before = corner;
+  }
+  image.beside /= image.area;
+  image.area = std::abs(image.area);
+  return image;
+}
+
+}  // namespace internal
+}  // namespace alidade

@@ -1,0 +1,225 @@
+#include "core/pattern/tag_corners.h"
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
+#include <opencv2/imgproc.hpp>
+
+#include "core/model/linear_algebra.h"
+#include "core/model/trigonometry.h"
+
+namespace alidade::internal {
+namespace {
+
+constexpr int kSteps = 2;
+constexpr double kReach_cells =
+    1.6;  // of the window, which shall hold the border and what is next to it
+constexpr double kLeastReach_px = 2;
+constexpr double kStartBlur_px = 0.8;
+constexpr double kLeastBlur_px = 0.4;
+constexpr double kLargestBlur_px = 4;
+constexpr double kBlurPrior = 0.3;       // standard deviation of a step, of the blur
+constexpr double kNoise = 3;             // grey levels, beside that prior
+constexpr double kLeastExplained = 0.7;  // of the window's variance
+constexpr int kUnknowns = 6;             // brightness, contrast, position, blur along both axes
+
+// Cells from a corner inwards: outside, the border, the first of the code, the second and all behind it.
+constexpr int kIntervals = 4;
+using Weights = Vector4<double>;
+
+// Integral and density of the normal distribution, from a table: some hundred thousand of each are asked for an image.
+class NormalDistribution {
+ public:
+  NormalDistribution() {
+    for (int i = 0; i <= kEntries; ++i) {
+      const double z = (i - kEntries / 2) / kPerSigma;
+      entries_[static_cast<std::size_t>(i)] = {0.5 * std::erfc(-z / std::sqrt(2.0)),
+                                               std::exp(-z * z / 2) / std::sqrt(2 * kPi)};
+    }
+  }
+
+  // Integral up to z, density at z.
+  [[nodiscard]] Vector2<double> operator()(double z) const {
+    const double x = std::clamp(z * kPerSigma + kEntries / 2, 0.0, kEntries - 0.001);
+    const auto i = static_cast<std::size_t>(x);
+    const double part = x - static_cast<double>(i);
+    return (1 - part) * entries_[i] + part * entries_[i + 1];
+  }
+
+ private:
+  static constexpr double kPerSigma = 100;
+  static constexpr int kEntries = 1000;
+  std::array<Vector2<double>, kEntries + 1> entries_;
+};
+
+struct Profile {
+  Weights share;  // of the intervals at a place, blurred
+  Weights rate;   // by the place
+  Weights by_blur;
+};
+
+// place, blur: cells.
+Profile profile(double place, double blur) {
+  static const NormalDistribution normal;
+  Profile p;
+  p.share << 1, 0, 0, 0;
+  p.rate.setZero();
+  p.by_blur.setZero();
+  for (int edge = 0; edge + 1 < kIntervals; ++edge) {
+    const double z = (place - edge) / blur;
+    const Vector2<double> at = normal(z);
+    const Vector2<double> by = Vector2<double>(1, -z) * (at[1] / blur);
+    p.share[edge] -= at[0];
+    p.share[edge + 1] += at[0];
+    p.rate[edge] -= by[0];
+    p.rate[edge + 1] += by[0];
+    p.by_blur[edge] -= by[1];
+    p.by_blur[edge + 1] += by[1];
+  }
+  return p;
+}
+
+struct CornerFit {
+  Vector2<double> shift;  // px
+  Vector2<double> blur;   // px, change along both axes
+  double explained = 0;
+};
+
+struct Blur {
+  double x = kStartBlur_px, y = kStartBlur_px;  // px, across edges along the tag's columns and rows
+};
+
+// The tag's cells about one of its corners, inwards positive.
+class CornerView {
+ public:
+  CornerView(const TagCells& cells, const cv::Matx33d& cells_from_image, const cv::Point2d& corner,
+             const cv::Point2d& origin)
+      : cells_from_image_(cells_from_image),
+        origin_(origin),
+        inward_(origin.x == 0 ? 1 : -1, origin.y == 0 ? 1 : -1) {
+    for (int row = 0; row < kIntervals; ++row) {
+      for (int column = 0; column < kIntervals; ++column)
+        white_(row, column) = is_white(cells, row - 1, column - 1) ? 1 : 0;
+    }
+    constexpr double kStep_px = 0.5;
+    for (int k = 0; k < 2; ++k) {
+      const cv::Point2d step(k == 0 ? kStep_px : 0, k == 0 ? 0 : kStep_px);
+      J_.col(k) = (place(corner + step) - place(corner - step)) / (2 * kStep_px);
+    }
+    cell_px_ = {1 / J_.row(0).norm(), 1 / J_.row(1).norm()};
+  }
+
+  [[nodiscard]] Vector2<double> place(const cv::Point2d& pixel) const {
+    const cv::Vec3d p = cells_from_image_ * cv::Vec3d(pixel.x, pixel.y, 1);
+    return {inward_.x() * (p[0] / p[2] - origin_.x), inward_.y() * (p[1] / p[2] - origin_.y)};
+  }
+
+  // Across edges.
+  [[nodiscard]] const Vector2<double>& cell_px() const { return cell_px_; }
+  [[nodiscard]] const Matrix2<double>& cells_by_px() const { return J_; }
+  // By row, by column.
+  [[nodiscard]] const Matrix4<double>& white() const { return white_; }
+
+ private:
+  [[nodiscard]] bool is_white(const TagCells& cells, int row, int column) const {
+    if (row < 0 || column < 0) return row >= 0 || column >= 0;
+    const int r = inward_.y() > 0 ? row : kTagCells - 1 - row;
+    const int c = inward_.x() > 0 ? column : kTagCells - 1 - column;
+    return cells[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
+  }
+
+  cv::Matx33d cells_from_image_;
+  cv::Point2d origin_;
+  Vector2<double> inward_;
+  Matrix4<double> white_;
+  Matrix2<double> J_;  // cells by px
+  Vector2<double> cell_px_;
+};
+
+bool fit(const cv::Mat& image, const CornerView& view, const cv::Point2d& corner, const Blur& blur,
+         double gap_cells, CornerFit* result) {
+  const double least_cell = view.cell_px().minCoeff();
+  if (!(least_cell > 0.5)) return false;
+  const double reach = std::max(std::min(kReach_cells, gap_cells), kLeastReach_px / least_cell);
+  const Matrix2<double> px_by_cells = view.cells_by_px().inverse();
+  const Vector2<double> half = reach * px_by_cells.cwiseAbs().rowwise().sum();
+  const int left = static_cast<int>(std::ceil(corner.x - half.x()));
+  const int right = static_cast<int>(std::floor(corner.x + half.x()));
+  const int top = static_cast<int>(std::ceil(corner.y - half.y()));
+  const int bottom = static_cast<int>(std::floor(corner.y + half.y()));
+  if (left < 0 || top < 0 || right >= image.cols || bottom >= image.rows) return false;
+  const double blur_x = blur.x / view.cell_px().x();
+  const double blur_y = blur.y / view.cell_px().y();
+
+  using Unknowns = Matrix<double, kUnknowns, 1>;
+  Matrix<double, kUnknowns, kUnknowns> N = Matrix<double, kUnknowns, kUnknowns>::Zero();
+  Unknowns b = Unknowns::Zero();
+  double sum = 0;
+  double squares = 0;
+  int count = 0;
+  for (int v = top; v <= bottom; ++v) {
+    const auto* row = image.ptr<std::uint8_t>(v);
+    for (int u = left; u <= right; ++u) {
+      const Vector2<double> place = view.place({static_cast<double>(u), static_cast<double>(v)});
+      if (std::abs(place.x()) > reach || std::abs(place.y()) > reach) continue;
+      const Profile x = profile(place.x(), blur_x);
+      const Profile y = profile(place.y(), blur_y);
+      const Weights along_x = view.white().transpose() * y.share;
+      const Weights along_y = view.white() * x.share;
+      const Vector2<double> rate(x.rate.dot(along_x), y.rate.dot(along_y));
+      Unknowns J;
+      J << 1, x.share.dot(along_x), -view.cells_by_px().transpose() * rate,
+          x.by_blur.dot(along_x) / view.cell_px().x(), y.by_blur.dot(along_y) / view.cell_px().y();
+      const double grey = row[u];
+      N += J * J.transpose();
+      b += grey * J;
+      sum += grey;
+      squares += grey * grey;
+      ++count;
+    }
+  }
+  if (count < 2 * kUnknowns) return false;
+  const double variance = squares - sum * sum / count;
+  // In units of the contrast, which is not known before.
+  const double prior = kNoise * kNoise * count / std::max(1.0, 4 * variance);
+  N(4, 4) += prior / std::pow(kBlurPrior * blur.x, 2);
+  N(5, 5) += prior / std::pow(kBlurPrior * blur.y, 2);
+  const Unknowns x = N.ldlt().solve(b);
+  if (!x.allFinite() || !(x[1] > 0)) return false;
+  result->shift = x.segment<2>(2) / x[1];
+  result->blur = x.segment<2>(4) / x[1];
+  result->explained = 1 - (squares - x.dot(b)) / std::max(1e-9, variance);
+  return true;
+}
+
+}  // namespace
+
+bool refine_tag_corners(const cv::Mat& image, const TagCells& cells, double gap_cells,
+                        std::vector<cv::Point2f>* corners) {
+  const std::vector<cv::Point2f> square = {
+      {0, kTagCells}, {kTagCells, kTagCells}, {kTagCells, 0}, {0, 0}};
+  Blur blur;
+  for (int step = 0; step < kSteps; ++step) {
+    const cv::Matx33d cells_from_image = cv::getPerspectiveTransform(*corners, square);
+    Vector2<double> blur_step = Vector2<double>::Zero();
+    for (std::size_t k = 0; k < 4; ++k) {
+      cv::Point2f& corner = (*corners)[k];
+      const CornerView view(cells, cells_from_image, corner, square[k]);
+      CornerFit found;
+      if (!fit(image, view, corner, blur, gap_cells, &found)) return false;
+      const double limit = 0.5 * view.cell_px().minCoeff();
+      if (!(found.shift.norm() <= limit) || !(found.explained >= kLeastExplained)) return false;
+      corner +=
+          cv::Point2f(static_cast<float>(found.shift.x()), static_cast<float>(found.shift.y()));
+      blur_step += found.blur / 4;
+    }
+    blur.x = std::clamp(blur.x + blur_step.x(), kLeastBlur_px, kLargestBlur_px);
+    blur.y = std::clamp(blur.y + blur_step.y(), kLeastBlur_px, kLargestBlur_px);
+  }
+  return true;
+}
+
+}  // namespace alidade::internal
