@@ -101,6 +101,10 @@ std::string CharucoGrid::doubt() const {
     return std::string(kMarkerDictionaries[static_cast<std::size_t>(dictionary)].name);
   };
   const std::string mine = name(pattern_.dictionary);
+  if (layout_.is_undecided()) {
+    return "the part of the board that is seen may be of one drawn by OpenCV of today or of before "
+           "4.6; show it whole once";
+  }
   if (layout_.images_with_markers() > 0) {
     return "markers of dictionary " + mine + " are seen in " +
            std::to_string(layout_.images_with_markers()) +

@@ -44,6 +44,11 @@ bool CharucoLayout::is_black(int column, int row) const {
   return ((column + row) % 2 == 0) != turned;
 }
 
+bool CharucoLayout::is_undecided() const {
+  return pattern_.rows % 2 == 0 && votes_[0] + votes_[1] > 0 &&
+         std::abs(votes_[1] - votes_[0]) < kClearLead;
+}
+
 int CharucoLayout::agreement(const Marker& a, const Marker& b, std::size_t layout) const {
   const std::vector<cv::Point2d>& middles = middles_[layout];
   const cv::Point2d step =
@@ -96,7 +101,7 @@ std::vector<CharucoLayout::Marker> CharucoLayout::markers_in(const cv::Mat& imag
     }
   }
   chosen_ = votes_[1] > votes_[0] ? 1 : 0;
-  if (pattern_.rows % 2 == 0 && std::abs(votes_[1] - votes_[0]) < kClearLead) return {};
+  if (is_undecided()) return {};
 
   std::vector<std::vector<int>> agree(count, std::vector<int>(count, 0));
   for (std::size_t i = 0; i < count; ++i) {

@@ -35,6 +35,8 @@ class CharucoLayout {
   [[nodiscard]] bool is_black(int column, int row) const;  // of squares
   // Images so far in which some markers of the dictionary were found.
   [[nodiscard]] int images_with_markers() const { return images_with_markers_; }
+  // Markers agree, but as well in one layout as in the other.
+  [[nodiscard]] bool is_undecided() const;
   // Where they were found in none: another dictionary, many of whose markers were.
   [[nodiscard]] std::optional<int> other_dictionary() const { return other_dictionary_; }
 

@@ -228,8 +228,10 @@ TEST(Charuco, APartThatFitsBothLayoutsWaitsForTheRest) {
         .size();
   };
   EXPECT_EQ(found_in(part), 0U);
+  EXPECT_THAT(detector.doubt(), HasSubstr("show it whole once"));
   EXPECT_EQ(found_in(raster.image), 8U * 5U);
   EXPECT_EQ(found_in(part), 7U * 5U);
+  EXPECT_EQ(detector.doubt(), "");
 }
 
 // Narrow rims: what OpenCV takes for one outline, markers and their squares, would hide half of the markers.
