@@ -80,6 +80,20 @@ void expect_accelerations(const PoseCurve& curve, PatternAdjustmentOptions* opti
   options->rotation_noise = std::max(1e-9, kAccelerationTime_s * mean.tail<3>().mean());
 }
 
+// Some of a frame's points tell its pose well enough for where the curve begins.
+PatternMask thinned(PatternMask used) {
+  constexpr int kEnough = 48;
+  for (auto& frame : used) {
+    const auto points = std::count(frame.begin(), frame.end(), char{1});
+    const auto every = (points + kEnough - 1) / kEnough;
+    std::ptrdiff_t number = 0;
+    for (char& is_used : frame) {
+      if (is_used != 0 && number++ % every != 0) is_used = 0;
+    }
+  }
+  return used;
+}
+
 int used_frames(const PatternMask& used) {
   return static_cast<int>(std::count_if(used.begin(), used.end(), [](const auto& frame) {
     return std::count(frame.begin(), frame.end(), char{1}) > 0;
@@ -103,6 +117,13 @@ double missed_motion(const KnotScore& score) {
                  (score.expected + score.expected_of_short);
 }
 constexpr double kMostMissed = 4;
+
+// The larger one, a part of itself.
+double focal_length_sigma(const PatternCalibration& calibration) {
+  return std::max(calibration.sigma(LensParameter::kFocalLengthU) / calibration.lens[0],
+                  calibration.sigma(LensParameter::kFocalLengthV) / calibration.lens[1]);
+}
+
 constexpr double kLeastTravel = 0.01;  // of the image's height
 // Times the first focal length, beyond which it runs off because nothing holds it.
 constexpr double kRunOff = 4;
@@ -196,7 +217,8 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
     adjustment.sigma_px = sigma_px;
     adjustment.first_radius = is_held ? kFar : kNear;
     const AdjustmentEnd end =
-        internal::adjust_pattern(data, used, is_held ? held : knowledge, adjustment, &state);
+        is_held ? internal::adjust_pattern(data, thinned(used), held, adjustment, &state)
+                : internal::adjust_pattern(data, used, knowledge, adjustment, &state);
     if (end == AdjustmentEnd::kFailed) {
       return refused(result, PatternStatus::kNotConverged,
                      "no motion of the camera explains the detections");
@@ -257,24 +279,22 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
   result.sigma_px = std::sqrt(sum / freedom);
 
   adjustment.sigma_px = result.sigma_px;
-  const std::optional<LensMatrix> covariance =
+  const std::optional<internal::LensCovariance> covariance =
       internal::lens_covariance(data, used, knowledge, adjustment, state);
   if (!covariance) {
     return refused(
         result, PatternStatus::kNoLens,
         "the video determines neither lens nor line delay; " + internal::how_to_show(views));
   }
-  result.covariance = *covariance;
+  result.covariance = covariance->independent;
   // Before all else: with a lens that is not determined nothing else of the result means anything.
-  const double focal_length_sigma =
-      std::max(result.sigma(LensParameter::kFocalLengthU) / state.lens[0],
-               result.sigma(LensParameter::kFocalLengthV) / state.lens[1]);
-  if (!(focal_length_sigma <= options.largest_focal_length_sigma)) {
+  if (!(focal_length_sigma(result) <= options.largest_focal_length_sigma)) {
     return refused(result, PatternStatus::kNoLens,
                    formatted("focal length known to %.1f %% only: the views are too much alike; ",
-                             100 * focal_length_sigma) +
+                             100 * focal_length_sigma(result)) +
                        internal::how_to_show(views));
   }
+  result.covariance = covariance->covariance();
   const double missed = missed_motion(score);
   result.covariance *= missed * missed;
   if (missed > kMostMissed) {
@@ -283,6 +303,13 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
         formatted("the camera moved too fast for %.1f frames a second: move it more slowly; or the "
                   "pattern is not flat, or not as long and high as told",
                   1 / result.frame_interval_s));
+  }
+  if (!(focal_length_sigma(result) <= options.largest_focal_length_sigma)) {
+    return refused(
+        result, PatternStatus::kNoLens,
+        formatted("focal length known to %.1f %% only, since the pattern's points do not "
+                  "lie where they should; is it flat, and as long and high as told?",
+                  100 * focal_length_sigma(result)));
   }
   const double line_delay_sigma_s = result.sigma(LensParameter::kLineDelay);
   if (!(line_delay_sigma_s * data.height <= options.largest_readout_sigma_s)) {

@@ -272,19 +272,19 @@ std::array<Groups, 3> groups_of(const PatternData& data, const Blocks& blocks) {
 // By how much the lens is less well known because detections err together, the data tell: each group of them pulls at it,
 // X^T J^T r, and the spread of these pulls is a second estimate of its variance that needs no independence within a group. Where that
 // is larger beyond chance, it counts.
-void inflate(const PatternData& data, const Blocks& blocks,
-             ceres::Problem::EvaluateOptions evaluate, const Eigen::MatrixXd& X,
-             ceres::Problem* problem, Eigen::MatrixXd* C) {
+Eigen::VectorXd growth(const PatternData& data, const Blocks& blocks,
+                       ceres::Problem::EvaluateOptions evaluate, const Eigen::MatrixXd& X,
+                       const Eigen::MatrixXd& C, ceres::Problem* problem) {
   evaluate.residual_blocks = blocks.observations;
   ceres::CRSMatrix rows;
   std::vector<double> r;
-  if (!problem->Evaluate(evaluate, nullptr, &r, nullptr, &rows)) return;
+  Eigen::VectorXd excess = Eigen::VectorXd::Zero(C.rows());
+  if (!problem->Evaluate(evaluate, nullptr, &r, nullptr, &rows)) return excess.array() + 1;
   const SparseRows J(rows.num_rows, rows.num_cols, static_cast<Eigen::Index>(rows.values.size()),
                      rows.rows.data(), rows.cols.data(), rows.values.data());
   const Eigen::MatrixXd JX = J * X;
   const double freedom = static_cast<double>(JX.rows()) /
                          std::max<double>(1, static_cast<double>(JX.rows() - X.rows()));
-  Eigen::VectorXd excess = Eigen::VectorXd::Zero(C->rows());
   for (const Groups& groups : groups_of(data, blocks)) {
     Eigen::MatrixXd pull = Eigen::MatrixXd::Zero(X.cols(), groups.count);
     for (Eigen::Index i = 0; i < JX.rows(); ++i) {
@@ -292,13 +292,12 @@ void inflate(const PatternData& data, const Blocks& blocks,
           r[static_cast<std::size_t>(i)] * JX.row(i).transpose();
     }
     const double beyond_chance = 1 + 2.5 * std::sqrt(2.0 / groups.count);
-    for (Eigen::Index i = 0; i < C->rows(); ++i) {
-      const double ratio = freedom * pull.row(i).squaredNorm() / (*C)(i, i);
+    for (Eigen::Index i = 0; i < C.rows(); ++i) {
+      const double ratio = freedom * pull.row(i).squaredNorm() / C(i, i);
       if (ratio > beyond_chance) excess[i] += ratio - 1;
     }
   }
-  const Eigen::VectorXd factor = (1 + excess.array()).sqrt();
-  *C = (factor.asDiagonal() * *C * factor.asDiagonal()).eval();
+  return (1 + excess.array()).sqrt();
 }
 
 }  // namespace
@@ -324,16 +323,16 @@ AdjustmentEnd adjust_pattern(const PatternData& data, const PatternMask& used,
                                                         : AdjustmentEnd::kOutOfSteps;
 }
 
-std::optional<LensMatrix> lens_covariance(const PatternData& data, const PatternMask& used,
-                                          const LensKnowledge& knowledge,
-                                          const PatternAdjustmentOptions& options,
-                                          const PatternState& state) {
+std::optional<LensCovariance> lens_covariance(const PatternData& data, const PatternMask& used,
+                                              const LensKnowledge& knowledge,
+                                              const PatternAdjustmentOptions& options,
+                                              const PatternState& state) {
   std::vector<int> free;
   for (int i = 0; i < kLensParameterCount; ++i) {
     if (!knowledge.fixed[static_cast<std::size_t>(i)]) free.push_back(i);
   }
-  LensMatrix covariance = LensMatrix::Zero();
-  if (free.empty()) return covariance;
+  LensCovariance result;
+  if (free.empty()) return result;
   PatternState at = state;
   ceres::Problem problem;
   const Blocks blocks = build(data, used, knowledge, options, state.curve, &at, &problem);
@@ -364,14 +363,15 @@ std::optional<LensMatrix> lens_covariance(const PatternData& data, const Pattern
     unit[lens_begin + static_cast<int>(k)] = scale[lens_begin + static_cast<int>(k)];
     X.col(static_cast<Eigen::Index>(k)) = scale.cwiseProduct(Eigen::VectorXd(ldlt.solve(unit)));
   }
-  Eigen::MatrixXd C = X.bottomRows(static_cast<Eigen::Index>(free.size()));
-  inflate(data, blocks, evaluate, X, &problem, &C);
+  const Eigen::MatrixXd C = X.bottomRows(static_cast<Eigen::Index>(free.size()));
+  const Eigen::VectorXd factor = growth(data, blocks, evaluate, X, C, &problem);
   for (std::size_t i = 0; i < free.size(); ++i) {
-    for (std::size_t k = 0; k < free.size(); ++k) {
-      covariance(free[i], free[k]) = C(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(k));
-    }
+    const auto row = static_cast<Eigen::Index>(i);
+    result.growth[free[i]] = factor[row];
+    for (std::size_t k = 0; k < free.size(); ++k)
+      result.independent(free[i], free[k]) = C(row, static_cast<Eigen::Index>(k));
   }
-  return covariance;
+  return result;
 }
 
 }  // namespace alidade::internal

@@ -42,12 +42,22 @@ enum class AdjustmentEnd {
                                            const PatternAdjustmentOptions& options,
                                            PatternState* state);
 
-// Covariance of the lens with the curve free, at the state; of a parameter at which stretches of time pull harder than independent
-// noise of options.sigma_px lets them, by that much larger. Empty if what is not fixed is not determined.
-[[nodiscard]] std::optional<LensMatrix> lens_covariance(const PatternData& data,
-                                                        const PatternMask& used,
-                                                        const LensKnowledge& knowledge,
-                                                        const PatternAdjustmentOptions& options,
-                                                        const PatternState& state);
+struct LensCovariance {
+  LensMatrix independent =
+      LensMatrix::Zero();  // if detections err independently, by options.sigma_px
+  // Of each sigma, 1 or more: what stretches of time, parts of the image and single points pull harder than independent errors would.
+  LensVector growth = LensVector::Ones();
+
+  [[nodiscard]] LensMatrix covariance() const {
+    return growth.asDiagonal() * independent * growth.asDiagonal();
+  }
+};
+
+// With the curve free, at the state. Empty if what is not fixed is not determined.
+[[nodiscard]] std::optional<LensCovariance> lens_covariance(const PatternData& data,
+                                                            const PatternMask& used,
+                                                            const LensKnowledge& knowledge,
+                                                            const PatternAdjustmentOptions& options,
+                                                            const PatternState& state);
 
 }  // namespace alidade::internal

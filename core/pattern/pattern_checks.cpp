@@ -15,10 +15,8 @@ namespace {
 
 using Box = Eigen::AlignedBox2d;
 
-constexpr double kSmall = 0.25;  // of the image, below which nearer helps most
-
 std::string nearer(const PatternViews& views) {
-  if (views.extent >= kSmall) return "";
+  if (views.extent >= kSmallExtent) return "";
   return formatted("go nearer, the pattern fills %.0f %% of the image's width only, and ",
                    100 * views.extent);
 }
@@ -94,9 +92,19 @@ PatternViews views_of(const PatternData& data) {
   return views;
 }
 
-std::string how_to_move(const PatternViews& views) {
-  return nearer(views) + "move the camera faster, in all directions and by turning it";
+double shift_between(const PatternFrame& a, const PatternFrame& b) {
+  std::vector<double> shifts;
+  std::size_t j = 0;
+  for (const PatternObservation& of_a : a.observations) {
+    while (j < b.observations.size() && b.observations[j].point < of_a.point) ++j;
+    if (j == b.observations.size()) break;
+    if (b.observations[j].point == of_a.point)
+      shifts.push_back((b.observations[j].u - of_a.u).norm());
+  }
+  return shifts.empty() ? 0 : median(std::move(shifts));
 }
+
+std::string how_to_move(const PatternViews& views) { return nearer(views) + kMoveFaster; }
 
 std::string how_to_show(const PatternViews& views) {
   return nearer(views) + "show the pattern tilted by 30 to 45 degrees to all sides, near and far";

@@ -24,6 +24,15 @@ struct PatternViews {
 // Median time from one frame to the next, s; 0 with less than two.
 [[nodiscard]] double frame_interval(const PatternData& data);
 
+// Below which going nearer helps most: part of the image.
+inline constexpr double kSmallExtent = 0.25;
+
+// Of the points that both frames show, in the order of points: median of how far they moved, px; 0 where they share none.
+[[nodiscard]] double shift_between(const PatternFrame& a, const PatternFrame& b);
+
+inline constexpr const char* kMoveFaster =
+    "move the camera faster, in all directions and by turning it";
+
 // How to move, in words; nearer first if the pattern is small in the image.
 [[nodiscard]] std::string how_to_move(const PatternViews& views);
 [[nodiscard]] std::string how_to_show(const PatternViews& views);

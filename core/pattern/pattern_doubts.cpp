@@ -3,9 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cstddef>
-#include <utility>
 
-#include "core/model/median.h"
 #include "core/pattern/pattern_checks.h"
 
 namespace alidade {
@@ -21,19 +19,6 @@ double diagonal_of(const PatternFrame& frame) {
   Eigen::AlignedBox2d box;
   for (const PatternObservation& seen : frame.observations) box.extend(seen.u);
   return box.diagonal().norm();
-}
-
-// Of the points that both show, median of the distances; 0 where they share none.
-double shift_between(const PatternFrame& a, const PatternFrame& b) {
-  std::vector<double> shifts;
-  std::size_t j = 0;
-  for (const PatternObservation& of_a : a.observations) {
-    while (j < b.observations.size() && b.observations[j].point < of_a.point) ++j;
-    if (j == b.observations.size()) break;
-    if (b.observations[j].point == of_a.point)
-      shifts.push_back((b.observations[j].u - of_a.u).norm());
-  }
-  return shifts.empty() ? 0 : median(std::move(shifts));
 }
 
 bool has_a_point_twice(const PatternFrame& frame) {
@@ -57,7 +42,7 @@ std::vector<std::string> doubts_of(const PatternData& data) {
     if (before != nullptr) {
       const double apart_s = frame.time_s - before->time_s;
       if (apart_s <= kNextFrame * interval_s &&
-          shift_between(*before, frame) > kJump * diagonal_of(frame)) {
+          internal::shift_between(*before, frame) > kJump * diagonal_of(frame)) {
         ++jumps;
       }
       if (apart_s > kLongGap_s) {

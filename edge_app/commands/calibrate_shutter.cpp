@@ -18,6 +18,7 @@
 #include "core/pattern/calibrate_pattern.h"
 #include "core/pattern/pattern_drawing.h"
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/live_pattern.h"
 #include "edge_app/commands/output_directory.h"
 #include "edge_app/commands/pattern_video.h"
 #include "edge_app/commands/stop_signals.h"
@@ -27,6 +28,8 @@
 
 namespace alidade {
 namespace {
+
+constexpr double kUsualFilm_s = 60;
 
 PatternVideo find_visibly(const CalibrateShutterOptions& options, const KnownPattern& pattern) {
   StopSignals signals;
@@ -38,6 +41,39 @@ PatternVideo find_visibly(const CalibrateShutterOptions& options, const KnownPat
   });
   if (show) fmt::print(stderr, "\r\033[K");
   return video;
+}
+
+PatternVideo find_live(const CalibrateShutterOptions& options, const KnownPattern& pattern) {
+  const VideoConfig config = require_video_config(options.config);
+  if (config.type == VideoConfig::Type::kRecording) {
+    throw CommandError(
+        kExitUsage, fmt::format("{}: video.type: a recording is no live video; give its directory "
+                                "instead: alidade calibrate-shutter {}",
+                                options.config, config.directory));
+  }
+  PatternVideo video = film_pattern(config, pattern, options.duration_s.value_or(kUsualFilm_s));
+  spdlog::info("{}: calibrating, the pattern is in {} of {} images; Ctrl-C ends it at once",
+               video.name, video.found, video.images);
+  return video;
+}
+
+void check_usage(const CalibrateShutterOptions& options) {
+  if (options.video.empty() && options.config.empty()) {
+    throw CommandError(kExitUsage,
+                       "calibrate-shutter: no video; give a recording's directory or a video file, "
+                       "-c camera.yaml for a live one, or --print PAPER");
+  }
+  if (!options.video.empty() && !options.config.empty()) {
+    throw CommandError(kExitUsage,
+                       fmt::format("calibrate-shutter: {} and -c are two videos; give a "
+                                   "recording or a file, or -c for a live one",
+                                   options.video));
+  }
+  if (options.config.empty() && options.duration_s) {
+    throw CommandError(kExitUsage,
+                       "calibrate-shutter: --duration is for a live video, with -c; a recording or "
+                       "a file is read to its end");
+  }
 }
 
 std::string text_of(const PatternCalibration& calibration, const PatternVideo& video) {
@@ -65,6 +101,7 @@ std::string json_of(const PatternCalibration& calibration, const PatternVideo& v
   json["images"] = video.images;
   json["found"] = video.found;
   json["repeated"] = video.repeated;
+  json["skipped"] = video.skipped;
   json["lost"] = video.lost;
   json["observations"] = calibration.observations;
   json["left_out"] = calibration.left_out;
@@ -116,18 +153,15 @@ int calibrate_shutter(const CalibrateShutterOptions& options) {
     print(*drawing);
     return kExitOk;
   }
-  if (options.video.empty()) {
-    throw CommandError(kExitUsage,
-                       "calibrate-shutter: no video; give a recording's directory or a video file, "
-                       "or --print PAPER");
-  }
-  const PatternVideo video = find_visibly(options, *pattern);
+  check_usage(options);
+  const PatternVideo video =
+      options.config.empty() ? find_visibly(options, *pattern) : find_live(options, *pattern);
   const PatternCalibration calibration = calibrate_pattern(video.data);
   std::vector<std::string> remarks = video.remarks;
   remarks.insert(remarks.end(), calibration.remarks.begin(), calibration.remarks.end());
-  for (const std::string& remark : remarks) spdlog::warn("{}: {}", options.video, remark);
+  for (const std::string& remark : remarks) spdlog::warn("{}: {}", video.name, remark);
   if (calibration.status != PatternStatus::kOk) {
-    throw CommandError(kExitFailed, options.video + ": " + calibration.message +
+    throw CommandError(kExitFailed, video.name + ": " + calibration.message +
                                         hint_for(calibration.status, *pattern));
   }
 
@@ -135,7 +169,7 @@ int calibrate_shutter(const CalibrateShutterOptions& options) {
   const LensNotes notes{options.pattern, video.data.width, video.data.height};
   directory.add(
       "report", "report.html",
-      pattern_report({options.video, options.pattern, video.data, calibration, video.images,
+      pattern_report({video.name, options.pattern, video.data, calibration, video.images,
                       video.found, remarks, ALIDADE_VERSION,
                       fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)))}));
   directory.add("trajectory", "trajectory.csv", format_trajectory(calibration, video.data));

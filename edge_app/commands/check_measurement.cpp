@@ -64,10 +64,7 @@ Connection collect(Source& source, double wait_s, double duration_s, std::atomic
     on_item(item);
   }
   *waits = false;
-  if (!any && connection.error.empty()) {
-    connection.error =
-        fmt::format("{}: connected, but nothing came within {:.0f} s", connection.name, wait_s);
-  }
+  if (!any && connection.error.empty()) connection.error = nothing_came(connection.name, wait_s);
   return connection;
 }
 
@@ -141,8 +138,6 @@ void show_progress(const std::future<void>& done, double duration_s) {
 }  // namespace
 
 Measured measure(const Config& config, double duration_s) {
-  // s, beyond a source's own timeout: logging in, and a first key frame; longer than it takes a source to say that it waits.
-  constexpr double kConnectSlack = 4;
   Measured measured;
   const auto video = make_frame_source(config.video, true);
   const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
@@ -159,7 +154,7 @@ Measured measure(const Config& config, double duration_s) {
   std::optional<double> started_s;
   const std::future<void> frames = std::async(std::launch::async, [&] {
     measured.video = collect<Frame>(
-        *video, config.video.timeout_s + kConnectSlack, duration_s, &video_waits, pan_tilt_waits,
+        *video, config.video.timeout_s + kConnectSlack_s, duration_s, &video_waits, pan_tilt_waits,
         [&](const Frame& frame) {
           measured.frames.push_back({frame.stamp, frame.width, frame.height, frame.decode_s,
                                      frame.interlaced, repeats(frame)});
@@ -171,7 +166,7 @@ Measured measure(const Config& config, double duration_s) {
   });
   const std::future<void> samples = std::async(std::launch::async, [&] {
     measured.pan_tilt = collect<PanTiltSample>(
-        *pan_tilt, config.pan_tilt.timeout_s + kConnectSlack, duration_s, &pan_tilt_waits,
+        *pan_tilt, config.pan_tilt.timeout_s + kConnectSlack_s, duration_s, &pan_tilt_waits,
         video_waits, [&](const PanTiltSample& sample) {
           measured.samples.push_back(sample);
           // A recording's times are of another clock.

@@ -27,6 +27,14 @@ Config require_config(const std::string& path) {
   return config;
 }
 
+VideoConfig require_video_config(const std::string& path) {
+  Config config;
+  std::string error;
+  if (!load_config(path, &config, &error, ConfigScope::kVideo))
+    throw CommandError(kExitUsage, error);
+  return config.video;
+}
+
 NamedCalibration require_calibration_file(const std::string& path) {
   NamedCalibration chosen;
   std::string error;
@@ -230,6 +238,10 @@ std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config)
       break;
   }
   return open_recorded_pan_tilt({config.directory, true});
+}
+
+std::string nothing_came(const std::string& source, double wait_s) {
+  return fmt::format("{}: connected, but nothing came within {:.0f} s", source, wait_s);
 }
 
 void log_source_losses(const FrameSource& source) {

@@ -27,6 +27,9 @@ struct CommandError : std::runtime_error {
 // Loads it and logs its warnings; throws CommandError.
 Config require_config(const std::string& path);
 
+// The video of a configuration of which the rest need not be there (ConfigScope::kVideo); throws CommandError.
+VideoConfig require_video_config(const std::string& path);
+
 // A calibration with what a person calls it.
 struct NamedCalibration {
   Calibration calibration;
@@ -51,6 +54,13 @@ OrientationStepOptions step_options(const RecordingNoise& noise,
 std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,
                                                const std::string& copy_to = "");
 std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config);
+
+// What a live source may take to its first item, beyond its own timeout, s: logging in, and a first key frame; longer than it takes
+// a source to say that it waits.
+inline constexpr double kConnectSlack_s = 4;
+
+// One line: the link stands, and brings nothing.
+std::string nothing_came(const std::string& source, double wait_s);
 
 // Logs the frames that a live source received damaged or had to drop, if any.
 void log_source_losses(const FrameSource& source);

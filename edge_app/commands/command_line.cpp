@@ -15,6 +15,7 @@
 #include "edge_app/commands/calibrate_shutter.h"
 #include "edge_app/commands/check.h"
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/live_pattern.h"
 #include "edge_app/commands/record.h"
 #include "edge_app/commands/replay.h"
 #include "edge_app/commands/run.h"
@@ -28,6 +29,13 @@ namespace {
 std::string is_duration(const std::string& text) {
   const std::optional<double> value = number_of(text);
   return value && *value > 0 ? "" : fmt::format("'{}' is not a number of seconds above 0", text);
+}
+std::string is_film_duration(const std::string& text) {
+  const std::optional<double> value = number_of(text);
+  return value && *value > 0 && *value <= kLongestFilm_s
+             ? ""
+             : fmt::format("'{}' is not a number of seconds above 0, up to {:.0f}", text,
+                           kLongestFilm_s);
 }
 std::string is_share(const std::string& text) {
   const std::optional<double> value = number_of(text);
@@ -129,9 +137,17 @@ void add_calibrate_shutter(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<CalibrateShutterOptions>();
   CLI::App* command = app.add_subcommand(
       "calibrate-shutter",
-      "Line delay and lens from a video of a known pattern; writes lens.yaml, camera_info.yaml, "
-      "trajectory.csv and report.html");
+      "Line delay and lens from a video of a known pattern, stored or live; writes lens.yaml, "
+      "camera_info.yaml, trajectory.csv and report.html");
   command->add_option("video", options->video, "Directory of a recording, or a video file");
+  command->add_option(
+      "-c,--config", options->config,
+      "Configuration (YAML) of a live camera in place of a video; its video section "
+      "is enough");
+  command
+      ->add_option("--duration", options->duration_s,
+                   "Live: end after so many seconds (default: 60), if not before, as all was shown")
+      ->check(is_film_duration);
   command
       ->add_option("--pattern", options->pattern,
                    "chessboard:9x6:25mm (inner corners, square), circles:4x11:20mm, "
@@ -144,7 +160,7 @@ void add_calibrate_shutter(CLI::App& app, int* exit_code) {
                       "letter");
   command->add_option("-o,--output", options->directory,
                       "Directory for the results (default: alidade in the recording or beside the "
-                      "file)");
+                      "file; live: in the current folder)");
   command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
   command->footer(
       "Move the camera before the pattern for some 30 s: show it whole, tilted to all sides, near "

@@ -1,26 +1,15 @@
 #pragma once
-// The frames of a video with the pattern's points in them, on a steady clock: repeated images left out, lost ones noticed, stamps
-// that jitter put right (fit_clock_line). Throws CommandError: no or unreadable video, images that change their size.
+// The pattern in a recording or a video file, every image of it.
 
 #include <functional>
 #include <string>
-#include <vector>
 
-#include "core/pattern/known_pattern.h"
-#include "core/pattern/pattern_data.h"
+#include "edge_app/commands/pattern_search.h"
 
 namespace alidade {
 
-struct PatternVideo {
-  PatternData data;
-  int images = 0;                    // read
-  int repeated = 0;                  // the same image again
-  int found = 0;                     // images with the pattern
-  int lost = 0;                      // by the stamps
-  std::vector<std::string> remarks;  // about the video
-};
-
-// progress: images so far; false ends the reading (CommandError).
+// progress: images so far; false ends the reading (CommandError). Throws CommandError: no or unreadable video, images that change
+// their size.
 [[nodiscard]] PatternVideo find_pattern(const std::string& video, const KnownPattern& pattern,
                                         const std::function<bool(int images, int found)>& progress);
 

@@ -220,7 +220,31 @@ void check_ages(const Config& config, const YamlSection& pan_tilt, const YamlSec
                   extrapolation_s, repeat_s, why, repeat_s, right_repeat));
 }
 
-void read_config(YamlSection& top, const std::string& path, Config* config) {
+// What goes with what, beyond single sections.
+void check_together(const Config& config, const YamlSection& calibration, const std::string& path,
+                    std::vector<std::string>* warnings) {
+  if ((config.video.type == VideoConfig::Type::kRecording) !=
+      (config.pan_tilt.type == PanTiltConfig::Type::kRecording)) {
+    throw ConfigError(
+        path +
+        ": video and pan_tilt are a recording and a live stream, which have no common "
+        "clock; set both types to recording, or neither");
+  }
+  const bool calibrates = config.calibration.automatic && config.realtime.landmarks &&
+                          config.video.type != VideoConfig::Type::kRecording;
+  if (!config.calibration.prior.empty() && !calibrates) {
+    warnings->push_back(calibration.where("prior") +
+                        ": is not used, as nothing is calibrated: that takes live video, "
+                        "realtime.mode OE and calibration.auto true");
+  }
+  if (config.calibration.file.empty() && !config.camera.focal_length_px) {
+    throw ConfigError(path +
+                      ": neither a calibration nor a data sheet is given; set calibration.file or "
+                      "camera.focal_length_px");
+  }
+}
+
+void read_config(YamlSection& top, const std::string& path, ConfigScope scope, Config* config) {
   const YamlSection video = top.section("video");
   const YamlSection pan_tilt = top.section("pan_tilt");
   const YamlSection camera = top.section("camera");
@@ -230,50 +254,33 @@ void read_config(YamlSection& top, const std::string& path, Config* config) {
   // Before one is missed: it may be there, mistyped.
   top.finish();
   for (const char* required : {"video", "pan_tilt"}) {
-    if (!top.has(required))
+    const bool is_needed = scope == ConfigScope::kAll || required == std::string("video");
+    if (is_needed && !top.has(required))
       throw ConfigError(path + ": section '" + required + "' is missing; add it");
   }
   config->video = read_video(video, path);
-  config->pan_tilt = read_pan_tilt(pan_tilt, path);
+  if (top.has("pan_tilt")) config->pan_tilt = read_pan_tilt(pan_tilt, path);
   config->camera = read_camera(camera);
   config->calibration = read_calibration(calibration, path);
   config->realtime = read_realtime(realtime);
-  check_ages(*config, pan_tilt, realtime);
+  if (scope == ConfigScope::kAll) check_ages(*config, pan_tilt, realtime);
   config->output = read_output(output, path, &config->warnings);
-  if ((config->video.type == VideoConfig::Type::kRecording) !=
-      (config->pan_tilt.type == PanTiltConfig::Type::kRecording)) {
-    throw ConfigError(
-        path +
-        ": video and pan_tilt are a recording and a live stream, which have no common "
-        "clock; set both types to recording, or neither");
-  }
-  const bool calibrates = config->calibration.automatic && config->realtime.landmarks &&
-                          config->video.type != VideoConfig::Type::kRecording;
-  if (!config->calibration.prior.empty() && !calibrates) {
-    config->warnings.push_back(calibration.where("prior") +
-                               ": is not used, as nothing is calibrated: that takes live video, "
-                               "realtime.mode OE and calibration.auto true");
-  }
-  if (config->calibration.file.empty() && !config->camera.focal_length_px) {
-    throw ConfigError(path +
-                      ": neither a calibration nor a data sheet is given; set calibration.file or "
-                      "camera.focal_length_px");
-  }
+  if (scope == ConfigScope::kAll) check_together(*config, calibration, path, &config->warnings);
 }
 
 }  // namespace
 
 bool parse_config(const std::string& text, const std::string& path, Config* config,
-                  std::string* error) {
+                  std::string* error, ConfigScope scope) {
   *config = Config();
   return parse_yaml(
-      text, path, [&](YamlSection& top) { read_config(top, path, config); }, error);
+      text, path, [&](YamlSection& top) { read_config(top, path, scope, config); }, error);
 }
 
-bool load_config(const std::string& path, Config* config, std::string* error) {
+bool load_config(const std::string& path, Config* config, std::string* error, ConfigScope scope) {
   *config = Config();
   return read_yaml_file(
-      path, [&](YamlSection& top) { read_config(top, path, config); }, error);
+      path, [&](YamlSection& top) { read_config(top, path, scope, config); }, error);
 }
 
 }  // namespace alidade

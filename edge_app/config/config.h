@@ -79,10 +79,17 @@ struct Config {
   std::vector<std::string> warnings;  // FILE:LINE: ... lines for the log
 };
 
+// What must be there. What is there is checked either way.
+enum class ConfigScope {
+  kAll,
+  kVideo  // a camera without a head, as on a bench; of the result, the video
+};
+
 // path stands for the file in errors, and is where relative paths start.
 // False with a line "FILE[:LINE]: KEY: what is wrong; what would be right" in *error.
 [[nodiscard]] bool parse_config(const std::string& text, const std::string& path, Config* config,
-                                std::string* error);
-[[nodiscard]] bool load_config(const std::string& path, Config* config, std::string* error);
+                                std::string* error, ConfigScope scope = ConfigScope::kAll);
+[[nodiscard]] bool load_config(const std::string& path, Config* config, std::string* error,
+                               ConfigScope scope = ConfigScope::kAll);
 
 }  // namespace alidade

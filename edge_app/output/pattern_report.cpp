@@ -7,6 +7,8 @@
 #include <cstddef>
 #include <limits>
 
+#include "core/pattern/image_cells.h"
+#include "core/pattern/pattern_view.h"
 #include "edge_app/output/html_page.h"
 #include "edge_app/output/lens_rows.h"
 #include "edge_app/output/report_page.h"
@@ -180,25 +182,17 @@ class PatternPage {
     Vector2<double> sum = Vector2<double>::Zero();
     int count = 0;
   };
-  // The image in cells about as high as wide, with what was seen in them.
+  // With what was seen in them.
   [[nodiscard]] std::vector<Cell> cells() const {
-    constexpr int kColumns = 16;
-    const double width = report_.data.width;
-    const double height = report_.data.height;
-    const int rows = std::clamp(static_cast<int>(std::lround(kColumns * height / width)), 1, 48);
-    std::vector<Cell> cells(static_cast<std::size_t>(kColumns * rows));
-    for (int row = 0; row < rows; ++row) {
-      for (int column = 0; column < kColumns; ++column) {
-        Cell& cell = cells[static_cast<std::size_t>(row * kColumns + column)];
-        cell.low = {column * width / kColumns, row * height / rows};
-        cell.high = {(column + 1) * width / kColumns, (row + 1) * height / rows};
-      }
+    const ImageCells image(report_.data.width, report_.data.height);
+    std::vector<Cell> cells;
+    for (int i = 0; i < image.count(); ++i) {
+      const Vector2<double> low = image.low(i);
+      const Vector2<double> high = image.high(i);
+      cells.push_back({{low.x(), low.y()}, {high.x(), high.y()}});
     }
     for (const ShownResidual& residual : with_) {
-      const int column =
-          std::clamp(static_cast<int>(residual.u.x() * kColumns / width), 0, kColumns - 1);
-      const int row = std::clamp(static_cast<int>(residual.u.y() * rows / height), 0, rows - 1);
-      Cell& cell = cells[static_cast<std::size_t>(row * kColumns + column)];
+      Cell& cell = cells[static_cast<std::size_t>(image.cell_of(residual.u))];
       cell.sum += residual.error;
       ++cell.count;
     }
@@ -322,10 +316,8 @@ class PatternPage {
                     most, empty, all.size()),
         plot, "coverage of the image");
 
-    // Of each frame used: where the pattern's normal points in the camera, and how far its middle is.
-    Vector3<double> middle = Vector3<double>::Zero();
-    for (const Vector3<double>& p : report_.data.points_m) middle += p;
-    middle /= static_cast<double>(report_.data.points_m.size());
+    // Of each frame used.
+    const Vector3<double> middle = middle_of(report_.data.points_m);
     std::vector<PlotPoint> tilts;
     std::vector<PlotPoint> distances;
     double largest_tilt = 1;
@@ -336,15 +328,12 @@ class PatternPage {
       if (std::count(used.begin(), used.end(), char{1}) == 0) continue;
       const double time_s = report_.data.frames[f].time_s;
       const PoseVector x = curve.value(curve.basis(time_s));
-      const Matrix3<double> R = curve.R_pattern_from_camera(x).transpose();
-      const Vector3<double> normal = R.col(2);
-      const PlotPoint tilt{kDegrees * std::atan2(normal.x(), normal.z()),
-                           kDegrees * std::atan2(normal.y(), normal.z())};
-      const double distance_m = (middle - x.head<3>()).norm();
+      const PatternView view = pattern_view(curve.R_pattern_from_camera(x), x.head<3>(), middle);
+      const PlotPoint tilt{kDegrees * view.tilt.x(), kDegrees * view.tilt.y()};
       tilts.push_back(tilt);
-      distances.push_back({time_s - start_s_, distance_m});
+      distances.push_back({time_s - start_s_, view.distance_m});
       largest_tilt = std::max({largest_tilt, std::abs(tilt.x), std::abs(tilt.y)});
-      farthest_m = std::max(farthest_m, distance_m);
+      farthest_m = std::max(farthest_m, view.distance_m);
     }
     const double reach = std::min(90.0, 1.1 * largest_tilt);
     SvgPlot tilt_plot(kHalf_px, 400, {-reach, reach, "tilt to the side, deg"},

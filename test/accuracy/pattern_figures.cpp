@@ -146,9 +146,10 @@ void print_uniform_knots(std::uint64_t seed, const std::filesystem::path& folder
     if (internal::adjust_pattern(data, used, {}, options, &state) ==
         internal::AdjustmentEnd::kFailed)
       continue;
-    const std::optional<LensMatrix> covariance =
+    const std::optional<internal::LensCovariance> covariance =
         internal::lens_covariance(data, used, {}, options, state);
-    if (covariance) uniform.push_back(judged(scene, data, state.lens, *covariance, state.curve));
+    if (covariance)
+      uniform.push_back(judged(scene, data, state.lens, covariance->covariance(), state.curve));
   }
   Table table;
   table.title = "Figure 4: uniform knots, one recording of 30 s, " + number(scene.rate_hz) +

@@ -19,6 +19,8 @@
 #include <string>
 #include <vector>
 
+#include "core/pattern/calibrate_pattern.h"
+#include "edge_app/storage/lens_file.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/edge_app/process.h"
 #include "test/support/temporary_directory.h"
@@ -197,6 +199,11 @@ TEST(CommandLine, NamesWhatWasMistypedAndWhatIsNearest) {
            Slip{{"run", "-c", "x", "--duration", "0"}, not_above_0},
            Slip{{"run", "-c", "x", "--duration", "nan"}, not_above_0},
            Slip{{"run", "-c", "x", "--duration", "10s"}, not_above_0},
+           Slip{
+               {"calibrate-shutter", "-c", "x", "--pattern", "y", "--duration", "-1"},
+               "'-1' is not a number of seconds above 0, up to 300; see alidade calibrate-shutter"},
+           Slip{{"calibrate-shutter", "-c", "x", "--pattern", "y", "--duration", "301"},
+                "'301' is not a number of seconds above 0, up to 300; see"},
            Slip{{"calibrate", "x", "--scale-sigma", "2"}, "'2' is not a number from 0 to 1; see"},
        }) {
     const Result result = alidade(arguments);
@@ -302,6 +309,65 @@ TEST_F(CommandLineTest, RunWithoutCalibratingTakesCalibrationsOfSeveralZooms) {
   const Result result = alidade({"run", "-c", config, "--duration", "0.1"});
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.errors, AllOf(HasSubstr("zoom 1"), HasSubstr("zoom 2")));
+}
+
+TEST_F(CommandLineTest, CalibrateShutterTakesOneVideo) {
+  const std::string live = live_config();
+  const auto calibrate = [](std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), {"calibrate-shutter", "--pattern", "chessboard:9x6:25mm"});
+    return alidade(arguments);
+  };
+  for (const auto& [arguments, what] :
+       {std::pair(std::vector<std::string>{}, "no video; give a recording's directory or a video"),
+        {{"video.mp4", "-c", live}, "video.mp4 and -c are two videos; give a recording or a file"},
+        {{"video.mp4", "--duration", "3"}, "--duration is for a live video, with -c"},
+        {{"-c", path("none.yaml")}, "none.yaml: cannot be read"},
+        {{"-c", recorded_config()},
+         "video.type: a recording is no live video; give its directory"}}) {
+    const Result result = calibrate(arguments);
+    EXPECT_EQ(result.exit_code, 2) << what;
+    EXPECT_THAT(result.errors, AllOf(StartsWith("alidade: "), HasSubstr(what)));
+    EXPECT_EQ(result.errors.find('\n'), result.errors.size() - 1) << result.errors;
+    EXPECT_THAT(result.output, IsEmpty());
+  }
+}
+
+TEST_F(CommandLineTest, CalibrateShutterSaysThatNoCameraAnswers) {
+  const std::string port = std::to_string(refusing_port());
+  const std::string config =
+      directory_.write("bench.yaml", "video: {type: mjpeg, url: 'http://127.0.0.1:" + port +
+                                         "/x', timeout_s: 0.1, max_backoff_s: 0.2}\n");
+  const Result result =
+      alidade({"calibrate-shutter", "-c", config, "--pattern", "chessboard:9x6:25mm"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.errors, HasSubstr("; trying again"));
+  EXPECT_THAT(last_line(result.errors),
+              AllOf(StartsWith("alidade: http://127.0.0.1:" + port), HasSubstr("connect")));
+}
+
+// The line delay of each record is the bench's until there is a calibration.
+TEST_F(CommandLineTest, RunBeginsWithTheLensOfItsConfiguration) {
+  const std::string config = live_config(", width: 320, height: 240",
+                                         "camera: {focal_length_px: 300}\n"
+                                         "calibration: {prior: lens.yaml}\n");
+  for (const auto& [text, what] :
+       {std::pair(std::string(), "lens.yaml: cannot be read: No such file or directory"),
+        {"format: 1\nfocal: 3\n", "lens.yaml:2: unknown key focal"}}) {
+    if (!text.empty()) directory_.write("lens.yaml", text);
+    const Result result = alidade({"run", "-c", config});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(result.errors, AllOf(StartsWith("alidade: "), HasSubstr(what)));
+    EXPECT_EQ(result.errors.find('\n'), result.errors.size() - 1) << result.errors;
+  }
+  PatternCalibration bench;
+  bench.lens << 300, 301, 160, 120, -0.1, 0, 0, 0, -43e-6;
+  LensVector sigma;
+  sigma << 0.1, 0.1, 0.1, 0.1, 1e-3, 1e-3, 1e-4, 1e-4, 1e-7;
+  bench.covariance = sigma.cwiseAbs2().asDiagonal();
+  directory_.write("lens.yaml", format_lens(bench, {"chessboard:9x6:25mm", 320, 240}));
+  Process process(command({"run", "-c", config}));
+  const std::string record = process.read_line();
+  EXPECT_NEAR(nlohmann::json::parse(record)["line_delay_s"].get<double>(), -43e-6, 1e-12) << record;
 }
 
 // What the error recommends.

@@ -60,6 +60,26 @@ TEST_F(ConfigTest, MinimalConfigurationHasTheDocumentedDefaults) {
   EXPECT_THAT(config_.warnings, IsEmpty());
 }
 
+// As of a camera on a bench; what else is there is as strict as ever.
+TEST_F(ConfigTest, VideoAloneIsEnoughWhereOnlyThatIsNeeded) {
+  const auto error_of = [this](const std::string& text) {
+    std::string error;
+    const bool ok = parse_config(text, "camera.yaml", &config_, &error, ConfigScope::kVideo);
+    EXPECT_EQ(ok, error.empty());
+    return error;
+  };
+  const std::string video = "video: {type: v4l2, device: /dev/video3}\n";
+  EXPECT_THAT(error_of(video), IsEmpty());
+  EXPECT_EQ(config_.video.device, "/dev/video3");
+  EXPECT_THAT(error_of(kMinimal), IsEmpty());
+  EXPECT_THAT(error_of(video + "realtime: {max_extrapolation_s: 0.05}\n"), IsEmpty());
+  EXPECT_THAT(error_of("camera: {focal_length_px: 3}\n"), HasSubstr("'video' is missing"));
+  EXPECT_THAT(error_of(video + "pan_tlt: {type: vapix}\n"), HasSubstr("pan_tlt"));
+  EXPECT_THAT(error_of(video + "pan_tilt: {type: vapx}\n"), HasSubstr("vapx"));
+  EXPECT_THAT(error_of(video + "camera: {focal_length: 3}\n"), HasSubstr("focal_length"));
+  EXPECT_THAT(load(video), HasSubstr("section 'pan_tilt' is missing; add it"));
+}
+
 TEST_F(ConfigTest, TheHttpServerHasAnAddressAndATokenFromElsewhere) {
   const std::string minimal = kMinimal;
   ASSERT_THAT(load(minimal + "output: {http: '127.0.0.1:8080'}\n"), IsEmpty());

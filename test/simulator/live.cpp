@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
+#include <functional>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -12,6 +13,7 @@
 #include <vector>
 
 #include "test/simulator/parallel.h"
+#include "test/simulator/pattern_renderer.h"
 #include "test/simulator/renderer.h"
 #include "test/simulator/servers/encoder.h"
 #include "test/simulator/servers/head_server.h"
@@ -46,23 +48,72 @@ void sleep_until(double moment, const std::atomic<bool>& stop) {
   }
 }
 
+// What the camera looks at: a scene from a head, or a printed pattern from a hand.
+class Subject {
+ public:
+  Subject(const Config& config, const Path& path) : path_(path) {
+    if (config.pattern) {
+      pattern_.emplace(config);
+    } else {
+      scene_.emplace(config, path);
+    }
+  }
+
+  [[nodiscard]] std::vector<std::uint8_t> render(double t0_s, std::int64_t sequence) const {
+    return pattern_ ? pattern_->render(t0_s, sequence) : scene_->render(t0_s, sequence);
+  }
+
+  // s; 0: what is seen does not repeat.
+  [[nodiscard]] double period_s() const {
+    return scene_ && scene_->steady() ? path_.period_s() : 0;
+  }
+
+  void write_truth(const Config& config) {
+    const std::filesystem::path& folder = config.truth_dir;
+    std::filesystem::create_directories(folder);
+    if (pattern_) {
+      write_lens_yaml(folder / "truth.yaml", config);
+      poses_.emplace(folder / "truth.csv");
+    } else {
+      write_truth_yaml(folder / "truth.yaml", config, scene_->camera());
+      angles_.emplace(folder / "truth.csv");
+    }
+  }
+  // Nothing without write_truth().
+  void add_truth(const FrameEvent& event, double origin_s) {
+    if (poses_) poses_->add(event, pattern_->camera().pose(event.capture_s), origin_s);
+    if (angles_) angles_->add(event, path_.at(event.capture_s), origin_s);
+  }
+  void flush_truth() {
+    if (poses_) poses_->flush();
+    if (angles_) angles_->flush();
+  }
+
+ private:
+  const Path& path_;
+  std::optional<Renderer> scene_;  // one of the two
+  std::optional<PatternRenderer> pattern_;
+  std::optional<TruthCsv> angles_;
+  std::optional<PatternTruthCsv> poses_;
+};
+
 // How many frames stand for all of them.
-std::size_t frames_to_render(const Config& config, const Path& path, const Renderer& renderer) {
-  const double per_period = path.period_s() * config.image.rate_hz;
-  const bool repeats =
-      per_period > 0 && renderer.steady() && std::abs(per_period - std::round(per_period)) < 1e-6;
+std::size_t frames_to_render(const Config& config, const Subject& subject) {
+  const double per_period = subject.period_s() * config.image.rate_hz;
+  const bool repeats = per_period > 0 && std::abs(per_period - std::round(per_period)) < 1e-6;
   const double in_all = std::ceil(config.duration * config.image.rate_hz);
   if (!repeats && config.duration <= 0) {
     throw ConfigError(
-        "duration_s is missing: this path or scene does not repeat after a whole number of frames");
+        "duration_s is missing: this path, scene or hand does not repeat after a whole number of "
+        "frames");
   }
   double count = repeats ? std::round(per_period) : in_all;
   if (config.duration > 0) count = std::min(count, in_all);
   return static_cast<std::size_t>(count);
 }
 
-std::vector<std::vector<std::uint8_t>> encoded_frames(const Config& config,
-                                                      const Renderer& renderer, std::size_t count,
+std::vector<std::vector<std::uint8_t>> encoded_frames(const Config& config, const Subject& subject,
+                                                      std::size_t count,
                                                       const std::atomic<bool>& stop) {
   const int width = config.image.width;
   const int height = config.image.height;
@@ -82,8 +133,8 @@ std::vector<std::vector<std::uint8_t>> encoded_frames(const Config& config,
     const std::size_t size = std::min(batch, count - start);
     parallel_for(size, [&](std::size_t i) {
       auto& frame = frames[start + i];
-      frame = renderer.render(static_cast<double>(start + i) / config.image.rate_hz,
-                              static_cast<std::int64_t>(start + i));
+      frame = subject.render(static_cast<double>(start + i) / config.image.rate_hz,
+                             static_cast<std::int64_t>(start + i));
       if (jpeg) {
         frame = encode_jpeg(frame.data(), width, height, width, config.sensor.jpeg_quality);
       }
@@ -158,8 +209,9 @@ void start(Server& server) {
 
 }  // namespace
 
-void serve_live(const Config& config, const std::atomic<bool>& stop) {
-  if (config.pattern) throw ConfigError("pattern: is for recordings; name a directory with -o");
+void serve_live(const Config& given, const std::atomic<bool>& stop) {
+  Config config = given;
+  if (config.pattern) config.path.amplitude = 0;  // what no hand turns rests
   const double video_latency = config.telemetry.latency - config.camera.clock_offset;
   if (video_latency < 0) {
     throw ConfigError(
@@ -167,17 +219,11 @@ void serve_live(const Config& config, const std::atomic<bool>& stop) {
         "before it is captured");
   }
   const std::unique_ptr<Path> path = make_path(config);
-  const Renderer renderer(config, *path);
-  const auto frames =
-      encoded_frames(config, renderer, frames_to_render(config, *path, renderer), stop);
+  Subject subject(config, *path);
+  const auto frames = encoded_frames(config, subject, frames_to_render(config, subject), stop);
   if (stop) return;
 
-  std::optional<TruthCsv> truth;
-  if (!config.truth_dir.empty()) {
-    std::filesystem::create_directories(config.truth_dir);
-    write_truth_yaml(config.truth_dir / "truth.yaml", config, renderer.camera());
-    truth.emplace(config.truth_dir / "truth.csv");
-  }
+  if (!config.truth_dir.empty()) subject.write_truth(config);
 
   VideoServer video(video_options(config));
   start(video);
@@ -235,14 +281,13 @@ void serve_live(const Config& config, const std::atomic<bool>& stop) {
     video.push(frame.data(), frame.size(), origin + event.sender_s);
     if (rtp) rtp->push(frame.data(), frame.size(), origin + event.sender_s);
     if (mjpeg) mjpeg->push(frame.data(), frame.size(), origin + event.sender_s);
-    if (!truth) continue;
-    truth->add(event, path->at(event.capture_s), origin);
+    subject.add_truth(event, origin);
     if (monotonic_now() >= next_flush) {
-      truth->flush();
+      subject.flush_truth();
       next_flush += 1;
     }
   }
-  if (truth) truth->flush();
+  subject.flush_truth();
   if (rtp) rtp->stop();
   if (mjpeg) mjpeg->stop();
   video.stop();

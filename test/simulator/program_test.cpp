@@ -186,11 +186,25 @@ TEST(VirtualCameraProgram, EndsByItselfAfterItsDuration) {
   EXPECT_EQ(lines, 1 + 5);
 }
 
-TEST(VirtualCameraProgram, SaysThatAPatternIsForRecordings) {
+// As long as it was told: a hand's motion does not repeat.
+TEST(VirtualCameraProgram, ServesAPatternLiveWithItsTruth) {
   const TemporaryDirectory directory;
-  Child child({"-c", directory.write("a.yaml", "pattern: {kind: circles}\n")});
-  EXPECT_THAT(child.read_line(), HasSubstr("pattern: is for recordings; name a directory with -o"));
-  EXPECT_EQ(child.exit_code(), 2);
+  const std::string small =
+      "image: {width: 96, height: 64, rate_hz: 25}\ntruth_dir: truth\n"
+      "camera: {line_delay_us: 80}\npattern: {kind: circles, lens: {focal_length_u_px: 90}}\n";
+  EXPECT_THAT(Child({"-c", directory.write("endless.yaml", small)}).read_line(),
+              HasSubstr("duration_s is missing"));
+  Child child({"-c", directory.write("a.yaml", small + "duration_s: 0.2\n")});
+  EXPECT_THAT(child.read_line(), HasSubstr("ready rtsp://127.0.0.1:"));
+  EXPECT_EQ(child.exit_code(), 0);
+  std::ifstream truth(directory.path() + "/truth/truth.csv");
+  std::string line;
+  std::getline(truth, line);
+  EXPECT_EQ(line, "frame,time_s,x_m,y_m,z_m,q_x,q_y,q_z,q_w,sequence,stamp_time_s");
+  int lines = 0;
+  while (std::getline(truth, line)) ++lines;
+  EXPECT_EQ(lines, 5);
+  EXPECT_THAT(directory.read("truth/truth.yaml"), HasSubstr("focal_length_u: {value: 90"));
 }
 
 }  // namespace

@@ -1,6 +1,6 @@
 #include "test/simulator/recording_writer.h"
 
-#include <Eigen/Geometry>
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
 #include <cstdio>
@@ -195,19 +195,11 @@ std::vector<std::uint8_t> encode(const Config& config, std::vector<std::uint8_t>
 void write_pattern_frames(const std::vector<FrameEvent>& frames, const PatternCamera& camera,
                           const fs::path& directory) {
   OutputFile stamps(directory / "frames.csv");
-  OutputFile truth(directory / "truth.csv");
+  PatternTruthCsv truth(directory / "truth.csv");
   stamps.stream() << "frame,receive_time_s,sequence\n";
-  truth.stream() << "frame,time_s,x_m,y_m,z_m,q_x,q_y,q_z,q_w,sequence,stamp_time_s\n";
   for (const FrameEvent& event : frames) {
     stamps.stream() << event.frame << ',' << event.stamp_s << ',' << event.sequence << '\n';
-    const CameraPose pose = camera.pose(event.capture_s);
-    const Eigen::Matrix3d R = pose.R_camera_from_pattern.transpose();
-    const Eigen::Vector3d centre = -R * pose.pattern_in_camera;
-    const Eigen::Quaterniond q(R);
-    truth.stream() << event.frame << ',' << event.capture_s << ',' << centre.x() << ','
-                   << centre.y() << ',' << centre.z() << ',' << q.x() << ',' << q.y() << ','
-                   << q.z() << ',' << q.w() << ',' << event.sequence << ',' << event.stamp_s
-                   << '\n';
+    truth.add(event, camera.pose(event.capture_s), 0);
   }
   stamps.flush();
   truth.flush();

@@ -1,5 +1,6 @@
 #include "test/simulator/truth.h"
 
+#include <Eigen/Geometry>
 #include <iomanip>
 #include <stdexcept>
 #include <utility>
@@ -81,6 +82,20 @@ void TruthCsv::add(const FrameEvent& event, const Angles& angles, double origin_
   out << event.frame << ',' << origin_s + event.capture_s << ',' << wrapped(angles.pan) << ','
       << wrapped(angles.tilt) << ',' << event.sequence << ',' << origin_s + event.sender_s << ','
       << origin_s + event.stamp_s << '\n';
+}
+
+PatternTruthCsv::PatternTruthCsv(const std::filesystem::path& file) : file_(file) {
+  file_.stream() << "frame,time_s,x_m,y_m,z_m,q_x,q_y,q_z,q_w,sequence,stamp_time_s\n";
+}
+
+void PatternTruthCsv::add(const FrameEvent& event, const CameraPose& pose, double origin_s) {
+  const Eigen::Matrix3d R = pose.R_camera_from_pattern.transpose();
+  const Eigen::Vector3d centre = -R * pose.pattern_in_camera;
+  const Eigen::Quaterniond q(R);
+  std::ofstream& out = file_.stream();
+  out << event.frame << ',' << origin_s + event.capture_s << ',' << centre.x() << ',' << centre.y()
+      << ',' << centre.z() << ',' << q.x() << ',' << q.y() << ',' << q.z() << ',' << q.w() << ','
+      << event.sequence << ',' << origin_s + event.stamp_s << '\n';
 }
 
 }  // namespace alidade::simulator

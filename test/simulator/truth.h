@@ -17,6 +17,7 @@
 #include <fstream>
 
 #include "test/simulator/camera_model.h"
+#include "test/simulator/pattern_camera.h"
 #include "test/simulator/timeline.h"
 
 namespace alidade::simulator {
@@ -46,6 +47,17 @@ class TruthCsv {
   explicit TruthCsv(const std::filesystem::path& file);
   // The times of the event are shifted by origin_s: 0 in a recording.
   void add(const FrameEvent& event, const Angles& angles, double origin_s);
+  void flush() { file_.flush(); }
+
+ private:
+  OutputFile file_;
+};
+
+// The same before a pattern.
+class PatternTruthCsv {
+ public:
+  explicit PatternTruthCsv(const std::filesystem::path& file);
+  void add(const FrameEvent& event, const CameraPose& pose, double origin_s);
   void flush() { file_.flush(); }
 
  private:
