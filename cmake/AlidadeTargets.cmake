@@ -131,6 +131,24 @@ function(alidade_find_opencv libraries)
   set(${libraries} ${${libraries}} PARENT_SCOPE)
 endfunction()
 
+# alidade_find_aruco()
+# finds OPENCV_ARUCO as ALIDADE_CHARUCO asks for; empty: without. After alidade_find_opencv(). The static library: the shared one lies in
+# Debian's libopencv-contrib406, which needs Qt and Tesseract wherever the executable runs.
+function(alidade_find_aruco)
+  set(found "")
+  if(NOT ALIDADE_CHARUCO STREQUAL "OFF")
+    find_library(OPENCV_ARUCO_LIBRARY libopencv_aruco.a)
+    if(OPENCV_ARUCO_LIBRARY AND EXISTS ${OPENCV_INCLUDE_DIR}/opencv2/aruco/charuco.hpp)
+      set(found ${OPENCV_ARUCO_LIBRARY})
+    elseif(ALIDADE_CHARUCO STREQUAL "ON")
+      message(FATAL_ERROR "ALIDADE_CHARUCO is ON, and OpenCV's aruco is not there: install libopencv-contrib-dev")
+    else()
+      message(STATUS "ChArUco boards are left out: they need libopencv-contrib-dev")
+    endif()
+  endif()
+  set(OPENCV_ARUCO "${found}" PARENT_SCOPE)
+endfunction()
+
 # All test programs that another processor can run; what `cmake --build` of an ARM preset builds.
 add_custom_target(processor_programs)
 

@@ -1,25 +1,31 @@
 #include "core/pattern/known_pattern.h"
 
 #include <array>
+#include <cctype>
 #include <cmath>
+#include <cstddef>
 #include <cstdlib>
 #include <locale>
 #include <sstream>
+
+#include "core/pattern/aruco_markers.h"
 
 namespace alidade {
 namespace {
 
 constexpr const char* kExamples =
-    "chessboard:9x6:25mm, circles:4x11:20mm, symmetric-circles:7x6:20mm or aprilgrid:6x6:30mm:0.3";
+    "chessboard:9x6:25mm, circles:4x11:20mm, symmetric-circles:7x6:20mm, aprilgrid:6x6:30mm:0.3 or "
+    "charuco:9x6:30mm:22mm:4x4_50";
 
 struct NamedKind {
   const char* name;
   PatternKind kind;
 };
-constexpr std::array<NamedKind, 4> kKinds = {{{"chessboard", PatternKind::kChessboard},
+constexpr std::array<NamedKind, 5> kKinds = {{{"chessboard", PatternKind::kChessboard},
                                               {"circles", PatternKind::kAsymmetricCircles},
                                               {"symmetric-circles", PatternKind::kSymmetricCircles},
-                                              {"aprilgrid", PatternKind::kAprilGrid}}};
+                                              {"aprilgrid", PatternKind::kAprilGrid},
+                                              {"charuco", PatternKind::kCharuco}}};
 
 struct Unit {
   const char* name;
@@ -60,6 +66,44 @@ bool counts_of(const std::string& text, int* columns, int* rows) {
   return true;
 }
 
+// Also as OpenCV spells it: DICT_4X4_50.
+std::optional<int> dictionary_of(std::string text) {
+  for (char& c : text) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (text.rfind("dict_", 0) == 0) text.erase(0, 5);
+  for (std::size_t i = 0; i < kMarkerDictionaries.size(); ++i) {
+    if (text == kMarkerDictionaries[i].name) return static_cast<int>(i);
+  }
+  return std::nullopt;
+}
+
+// What stands behind a square's side: the marker's, and the dictionary. What is wrong about it, or nothing.
+std::string read_markers(const std::vector<std::string>& parts, KnownPattern* pattern) {
+  const std::optional<double> marker = length_of(parts[3]);
+  if (!marker) return "'" + parts[3] + "' is not a marker's length with its unit, mm, cm, m or in";
+  if (!(*marker > 0 && *marker < pattern->size_m)) {
+    return "a marker of " + parts[3] + " does not fit into a square of " + parts[2] +
+           "; the square comes first, the marker has some 0.75 of it";
+  }
+  pattern->marker_m = *marker;
+  if (parts.size() > 4) {
+    const std::optional<int> dictionary = dictionary_of(parts[4]);
+    if (!dictionary) {
+      return "'" + parts[4] +
+             "' is no dictionary; known are 4x4_50, _100, _250, _1000, the same with 5x5, 6x6 and "
+             "7x7, aruco_original, apriltag_16h5, _25h9, _36h10 and _36h11";
+    }
+    pattern->dictionary = *dictionary;
+  }
+  const MarkerDictionary& dictionary =
+      kMarkerDictionaries[static_cast<std::size_t>(pattern->dictionary)];
+  if (pattern->markers() > dictionary.markers) {
+    return "the board has " + std::to_string(pattern->markers()) + " markers, dictionary " +
+           dictionary.name + " only " + std::to_string(dictionary.markers) +
+           "; name the one that it was printed with";
+  }
+  return "";
+}
+
 std::vector<std::string> split(const std::string& text) {
   std::vector<std::string> parts;
   std::istringstream in(text);
@@ -71,8 +115,9 @@ std::vector<std::string> split(const std::string& text) {
 
 std::vector<Vector3<double>> KnownPattern::points_m() const {
   std::vector<Vector3<double>> points;
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
+  const int less = kind == PatternKind::kCharuco ? 1 : 0;  // its corners lie between squares
+  for (int row = 0; row < rows - less; ++row) {
+    for (int column = 0; column < columns - less; ++column) {
       if (kind == PatternKind::kAsymmetricCircles) {
         points.emplace_back((2 * column + row % 2) * size_m, row * size_m, 0);
       } else if (kind == PatternKind::kAprilGrid) {
@@ -98,6 +143,7 @@ bool KnownPattern::is_symmetric() const {
     case PatternKind::kAsymmetricCircles:
       return rows % 2 == 1;
     case PatternKind::kAprilGrid:
+    case PatternKind::kCharuco:
       return false;
   }
   return false;
@@ -119,7 +165,16 @@ std::optional<KnownPattern> parse_pattern(const std::string& text, std::string* 
   }
   if (!known) return wrong("'" + parts[0] + "' is no kind of pattern");
   const bool grid = pattern.kind == PatternKind::kAprilGrid;
-  if (parts.size() != (grid ? 4U : 3U))
+  const bool charuco = pattern.kind == PatternKind::kCharuco;
+  if (charuco && !internal::has_aruco()) {
+    *error = "'" + text +
+             "': this build of alidade has no ChArUco boards; they need Debian's package "
+             "libopencv-contrib-dev when it is built";
+    return std::nullopt;
+  }
+  if (charuco && parts.size() != 4 && parts.size() != 5)
+    return wrong("kind, counts, square, marker and perhaps a dictionary make it");
+  if (!charuco && parts.size() != (grid ? 4U : 3U))
     return wrong(grid ? "kind, counts, length and gap make it" : "kind, counts and length make it");
   if (!counts_of(parts[1], &pattern.columns, &pattern.rows))
     return wrong("'" + parts[1] + "' is not COLUMNSxROWS");
@@ -134,6 +189,10 @@ std::optional<KnownPattern> parse_pattern(const std::string& text, std::string* 
   if (!(*size >= 1e-4 && *size <= 10))
     return wrong("'" + parts[2] + "' is out of range, 0.1 mm to 10 m");
   pattern.size_m = *size;
+  if (charuco) {
+    const std::string fault = read_markers(parts, &pattern);
+    if (!fault.empty()) return wrong(fault);
+  }
   if (grid) {
     std::string rest;
     const std::optional<double> gap = leading_number(parts[3], &rest);

@@ -8,41 +8,16 @@
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgproc.hpp>
 
+#include "core/pattern/charuco_grid.h"
 #include "core/pattern/circle_centres.h"
+#include "core/pattern/corner_refinement.h"
 #include "core/pattern/tag_grid.h"
 
 namespace alidade {
 namespace {
 
-// A part of the least distance of two points: a window that holds one corner only.
-constexpr double kWindow = 0.35;
-constexpr int kLargestWindow_px = 11;
-constexpr int kLeastWindow_px = 2;
-constexpr double kSmoothing = 0.14;  // standard deviation, of half the window
 constexpr double kSearchSmoothing_px = 1.2;
 constexpr double kLeastImageContrast = 20;  // grey levels, of an image with circles
-
-// Half the side of the window around each corner, from the least distance to another.
-int window_of(const std::vector<cv::Point2f>& corners) {
-  float least = std::numeric_limits<float>::max();
-  for (std::size_t i = 0; i < corners.size(); ++i) {
-    for (std::size_t j = i + 1; j < corners.size(); ++j) {
-      const cv::Point2f d = corners[j] - corners[i];
-      least = std::min(least, d.dot(d));
-    }
-  }
-  return std::clamp(static_cast<int>(kWindow * std::sqrt(least)), kLeastWindow_px,
-                    kLargestWindow_px);
-}
-
-void refine(const cv::Mat& image, std::vector<cv::Point2f>* corners) {
-  const int half = window_of(*corners);
-  // Gradients by differences are wrong where edges are sharper than pixels: corners are three times better for it.
-  cv::Mat smooth;
-  cv::GaussianBlur(image, smooth, {0, 0}, kSmoothing * half);
-  cv::cornerSubPix(smooth, *corners, {half, half}, {-1, -1},
-                   {cv::TermCriteria::COUNT + cv::TermCriteria::EPS, 40, 0.001});
-}
 
 // One threshold for the whole image, in milliseconds.
 bool find_chessboard(const cv::Mat& image, const cv::Size& size,
@@ -112,6 +87,7 @@ bool find_circles(const cv::Mat& image, const KnownPattern& pattern,
 struct PatternDetector::State {
   KnownPattern pattern;
   std::unique_ptr<internal::TagGrid> tags;
+  std::unique_ptr<internal::CharucoGrid> charuco;
   internal::CircleCentres circles;  // of the last image
   int in_vain = 0;                  // images in a row in which thresholds that adapt were of no use
 
@@ -137,7 +113,7 @@ struct PatternDetector::State {
           !try_any_light(image, corners)) {
         return false;
       }
-      refine(image, corners);
+      internal::refine_corners(image, corners);
       return true;
     }
     if (!find_circles(image, pattern, corners)) return false;
@@ -168,6 +144,8 @@ PatternDetector::PatternDetector(const KnownPattern& pattern) : state_(std::make
   state_->pattern = pattern;
   if (pattern.kind == PatternKind::kAprilGrid)
     state_->tags = std::make_unique<internal::TagGrid>(pattern);
+  if (pattern.kind == PatternKind::kCharuco)
+    state_->charuco = std::make_unique<internal::CharucoGrid>(pattern);
 }
 
 PatternDetector::~PatternDetector() = default;
@@ -185,6 +163,8 @@ std::vector<PatternObservation> PatternDetector::find(const std::uint8_t* luma, 
   try {
     if (state_->pattern.kind == PatternKind::kAprilGrid) {
       state_->find_tags(image, &corners, &points);
+    } else if (state_->pattern.kind == PatternKind::kCharuco) {
+      state_->charuco->find(image, &corners, &points);
     } else if (!state_->find_grid(image, &corners, &points)) {
       corners.clear();
     }
@@ -202,6 +182,10 @@ std::vector<PatternObservation> PatternDetector::find(const std::uint8_t* luma, 
   std::sort(observations.begin(), observations.end(),
             [](const auto& a, const auto& b) { return a.point < b.point; });
   return observations;
+}
+
+std::string PatternDetector::doubt() const {
+  return state_->charuco ? state_->charuco->doubt() : std::string();
 }
 
 void follow_half_turns(const KnownPattern& pattern, double max_gap_s, PatternData* data) {

@@ -1,10 +1,11 @@
 #pragma once
-// Where the points of a known pattern are in an image: OpenCV's chessboards and circle grids, libapriltag's tags, corners to a
-// fraction of a pixel by OpenCV. One thread at a time.
+// Where the points of a known pattern are in an image: OpenCV's chessboards, circle grids and ChArUco boards, libapriltag's
+// tags, corners to a fraction of a pixel by OpenCV. One thread at a time.
 
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "core/pattern/known_pattern.h"
@@ -24,6 +25,9 @@ class PatternDetector {
   // 8-bit luma, row v at luma + v * stride. The observations in increasing order of their points; empty: not found.
   [[nodiscard]] std::vector<PatternObservation> find(const std::uint8_t* luma, int width,
                                                      int height, std::ptrdiff_t stride);
+
+  // One line about a pattern that no image so far showed, what was there in its place; empty: nothing to say.
+  [[nodiscard]] std::string doubt() const;
 
  private:
   struct State;

@@ -6,9 +6,12 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <cstdlib>
 #include <utility>
+
+#include "core/pattern/aruco_markers.h"
 
 namespace alidade {
 namespace {
@@ -23,8 +26,9 @@ constexpr std::array<Paper, 6> kPapers = {{{"a4", 210, 297},
                                            {"a1", 594, 841},
                                            {"a0", 841, 1189},
                                            {"letter", 215.9, 279.4}}};
-constexpr double kMargin_mm = 5;  // that printers leave white
-constexpr double kCircle = 0.5;   // a circle's radius, of half the least distance of two centres
+constexpr double kMargin_mm = 5;   // that printers leave white
+constexpr double kNoSeam = 1.002;  // a hair wider, so that no seam shows between cells
+constexpr double kCircle = 0.5;    // a circle's radius, of half the least distance of two centres
 
 struct Shapes {
   std::string svg;
@@ -86,10 +90,9 @@ Shapes april_grid(const KnownPattern& pattern) {
       for (int y = white; y < image->height - white; ++y) {
         for (int x = white; x < image->width - white; ++x) {
           if (image->buf[y * image->stride + x] != 0) continue;
-          // A hair wider, so that no seam shows between cells.
           shapes.rectangle(column * pitch + (x - white) * cell,
-                           (pattern.rows - 1 - row) * pitch + (y - white) * cell, cell * 1.002,
-                           cell * 1.002);
+                           (pattern.rows - 1 - row) * pitch + (y - white) * cell, cell * kNoSeam,
+                           cell * kNoSeam);
         }
       }
       // As image_u8_destroy() does, which the shared library does not export.
@@ -100,6 +103,35 @@ Shapes april_grid(const KnownPattern& pattern) {
   tag36h11_destroy(family);
   shapes.width_mm = (pattern.columns - 1) * pitch + size_mm;
   shapes.height_mm = (pattern.rows - 1) * pitch + size_mm;
+  return shapes;
+}
+
+// As OpenCV draws it from 4.6 on: its upper left square is black.
+Shapes charuco(const KnownPattern& pattern) {
+  Shapes shapes;
+  const double size_mm = 1000 * pattern.size_m;
+  const double marker_mm = 1000 * pattern.marker_m;
+  shapes.width_mm = pattern.columns * size_mm;
+  shapes.height_mm = pattern.rows * size_mm;
+  int id = 0;
+  for (int row = 0; row < pattern.rows; ++row) {
+    for (int column = 0; column < pattern.columns; ++column) {
+      if ((column + row) % 2 == 0) {
+        shapes.rectangle(column * size_mm, row * size_mm, size_mm, size_mm);
+        continue;
+      }
+      const cv::Mat cells = internal::marker_cells(pattern.dictionary, id++);
+      const double cell = marker_mm / cells.cols;
+      const double left = column * size_mm + (size_mm - marker_mm) / 2;
+      const double top = row * size_mm + (size_mm - marker_mm) / 2;
+      for (int y = 0; y < cells.rows; ++y) {
+        for (int x = 0; x < cells.cols; ++x) {
+          if (cells.at<std::uint8_t>(y, x) != 0) continue;
+          shapes.rectangle(left + x * cell, top + y * cell, cell * kNoSeam, cell * kNoSeam);
+        }
+      }
+    }
+  }
   return shapes;
 }
 
@@ -116,6 +148,7 @@ std::optional<std::string> draw_pattern(const KnownPattern& pattern, const std::
   const Shapes shapes = pattern.kind == PatternKind::kChessboard
                             ? chessboard(pattern, 1000 * pattern.size_m)
                         : pattern.kind == PatternKind::kAprilGrid ? april_grid(pattern)
+                        : pattern.kind == PatternKind::kCharuco   ? charuco(pattern)
                                                                   : circles(pattern);
   double width = found->width_mm;
   double height = found->height_mm;

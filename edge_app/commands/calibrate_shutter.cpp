@@ -8,6 +8,7 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <cstddef>
 #include <cstdio>
 #include <ctime>
 #include <nlohmann/json.hpp>
@@ -124,6 +125,13 @@ std::string hint_for(PatternStatus status, const KnownPattern& pattern) {
                          pattern.rows, pattern.columns);
     case PatternKind::kAprilGrid:
       return " The tags are of family 36h11, numbered from 0 on, with a white margin";
+    case PatternKind::kCharuco:
+      return fmt::format(
+          " {}x{} are squares, every second one with a marker of {}; without markers it is a "
+          "chessboard:{}x{}, with gaps between its tags an aprilgrid",
+          pattern.columns, pattern.rows,
+          kMarkerDictionaries[static_cast<std::size_t>(pattern.dictionary)].name,
+          pattern.columns - 1, pattern.rows - 1);
   }
   return "";
 }

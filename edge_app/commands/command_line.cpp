@@ -151,7 +151,9 @@ void add_calibrate_shutter(CLI::App& app, int* exit_code) {
   command
       ->add_option("--pattern", options->pattern,
                    "chessboard:9x6:25mm (inner corners, square), circles:4x11:20mm, "
-                   "symmetric-circles:7x6:20mm or aprilgrid:6x6:30mm:0.3")
+                   "symmetric-circles:7x6:20mm, aprilgrid:6x6:30mm:0.3 or charuco:9x6:30mm:22mm "
+                   "(squares; a square's and a marker's side; then :DICTIONARY, if it is not "
+                   "4x4_50)")
       ->required();
   command->add_option("--print", options->paper,
                       "Draw the pattern in true size, as SVG on stdout, for a4, a3, a2, a1, a0 or "

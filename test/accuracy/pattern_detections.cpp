@@ -55,11 +55,16 @@ void name_as_truth(const KnownPattern& pattern, const Truth& truth,
 }  // namespace
 
 const std::vector<PatternUnderTest>& patterns_under_test() {
-  static const std::vector<PatternUnderTest> patterns = {
-      {"chessboard:9x6:30mm", Kind::kChessboard, 9, 6, 0.030},
-      {"circles:4x11:25mm", Kind::kCircles, 4, 11, 0.025},
-      {"symmetric-circles:9x6:30mm", Kind::kSymmetricCircles, 9, 6, 0.030},
-      {"aprilgrid:6x6:27mm:0.3", Kind::kAprilGrid, 6, 6, 0.027}};
+  static const std::vector<PatternUnderTest> patterns = [] {
+    std::vector<PatternUnderTest> all = {
+        {"chessboard:9x6:30mm", Kind::kChessboard, 9, 6, 0.030},
+        {"circles:4x11:25mm", Kind::kCircles, 4, 11, 0.025},
+        {"symmetric-circles:9x6:30mm", Kind::kSymmetricCircles, 9, 6, 0.030},
+        {"aprilgrid:6x6:27mm:0.3", Kind::kAprilGrid, 6, 6, 0.027}};
+    if (simulator::PatternBoard::has_charuco())
+      all.push_back({"charuco:10x7:30mm:22mm", Kind::kCharuco, 10, 7, 0.030});
+    return all;
+  }();
   return patterns;
 }
 

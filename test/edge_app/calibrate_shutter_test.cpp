@@ -168,6 +168,18 @@ TEST_F(CalibrateShutterCommand, NoPatternInAnyFrame) {
   expect_refused(calibrate(directory_.path(), "aprilgrid:6x6:30mm:0.3"), 1, "family 36h11");
 }
 
+// Of a build without OpenCV's aruco the package that it lacks.
+TEST_F(CalibrateShutterCommand, NoCharucoBoardInAnyFrame) {
+  write_greys(directory_, 64, 48, steady(14));
+  const Result result = calibrate(directory_.path(), "charuco:9x6:30mm:22mm");
+  if (!simulator::PatternBoard::has_charuco())
+    return expect_refused(result, 2, "no ChArUco boards; they need Debian's package libopencv");
+  expect_refused(result, 1, "9x6 are squares, every second one with a marker of 4x4_50");
+  EXPECT_THAT(result.errors, HasSubstr("no markers of dictionary 4x4_50 are seen in any image"));
+  expect_refused(calibrate(directory_.path(), "charuco:9x6:22mm:30mm"), 2,
+                 "a marker of 30mm does not fit into a square of 22mm; the square comes first");
+}
+
 TEST_F(CalibrateShutterCommand, AnImageOneColumnWide) {
   write_greys(directory_, 1, 48, steady(14));
   expect_refused(calibrate(directory_.path()), 1,

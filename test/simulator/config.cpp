@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "test/simulator/config_section.h"
+#include "test/simulator/pattern_board.h"
 
 namespace alidade::simulator {
 namespace {
@@ -223,12 +224,16 @@ void read_pattern(Section& section, PatternConfig* pattern) {
                        {{"chessboard", Kind::kChessboard},
                         {"circles", Kind::kCircles},
                         {"symmetric_circles", Kind::kSymmetricCircles},
-                        {"april_grid", Kind::kAprilGrid}});
+                        {"april_grid", Kind::kAprilGrid},
+                        {"charuco", Kind::kCharuco}});
   section.integer("columns", &pattern->columns, {1, 100});
   section.integer("rows", &pattern->rows, {1, 100});
   section.number("size_mm", &pattern->size, kPositive, kMilli);
   section.number("gap", &pattern->gap, kPositive);
   section.flag("corner_squares", &pattern->corner_squares);
+  section.number("marker_mm", &pattern->marker, kPositive, kMilli);
+  section.integer("dictionary", &pattern->dictionary, {0, 20});
+  section.flag("old_layout", &pattern->old_layout);
   section.number("black", &pattern->black, kUnitInterval);
   section.number("white", &pattern->white, kUnitInterval);
   section.number("table", &pattern->table, kUnitInterval);
@@ -252,6 +257,12 @@ void read_pattern(Section& section, PatternConfig* pattern) {
   if (pattern->kind == Kind::kAprilGrid && pattern->columns * pattern->rows > 587) {
     section.fail("pattern has more than the 587 tags of family 36h11");
   }
+  if (pattern->kind != Kind::kCharuco) return;
+  if (!PatternBoard::has_charuco())
+    section.fail("this build has no ChArUco boards, which need libopencv-contrib-dev");
+  if (pattern->marker >= pattern->size) section.fail("marker_mm is not smaller than size_mm");
+  if (pattern->columns * pattern->rows / 2 > PatternBoard::charuco_markers(pattern->dictionary))
+    section.fail("pattern has more markers than its dictionary");
 }
 
 void read_config(Section& section, Config* config) {

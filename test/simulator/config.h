@@ -138,7 +138,7 @@ struct LiveConfig {
 
 // A printed pattern before a camera held by hand, in place of a scene and a head (pattern_board.h, pattern_camera.h).
 struct PatternConfig {
-  enum class Kind { kChessboard, kCircles, kSymmetricCircles, kAprilGrid };
+  enum class Kind { kChessboard, kCircles, kSymmetricCircles, kAprilGrid, kCharuco };
   struct Lens {
     double focal_length_u = 600, focal_length_v = 602, centre_u = 380, centre_v = 236;  // px
     double k1 = -0.28, k2 = 0.08, p1 = 3e-4, p2 = -2e-4;
@@ -153,6 +153,9 @@ struct PatternConfig {
   double size = 0.03;          // m
   double gap = 0.3;            // AprilGrid: part of size
   bool corner_squares = true;  // AprilGrid: kalibr's
+  double marker = 0.022;       // m, ChArUco: a marker's side
+  int dictionary = 0;          // ChArUco: OpenCV's number of a predefined one
+  bool old_layout = false;     // ChArUco: as OpenCV drew it before 4.6
   double black = 0.16, white = 0.82, table = 0.47;
   double finger = 0;  // m, diameter of what goes round on the board; 0 = nothing
   Lens lens;

@@ -1,4 +1,5 @@
 #include "test/simulator/config.h"
+#include "test/simulator/pattern_board.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -87,7 +88,7 @@ TEST_F(VirtualCameraConfig, NamesFileAndLineOfEveryMistake) {
            Mistake{"live: {user: me}\n", "camera.yaml:1: user and password_env come together"},
            Mistake{"pattern: {kind: dots}\n",
                    "camera.yaml:1: kind must be one of: chessboard, circles, symmetric_circles, "
-                   "april_grid"},
+                   "april_grid, charuco"},
            Mistake{"pattern:\n  kind: april_grid\n  columns: 30\n  rows: 30\n",
                    "camera.yaml:2: pattern has more than the 587 tags of family 36h11"},
            Mistake{"pattern: {corner_squares: 2}\n",
@@ -102,6 +103,22 @@ TEST_F(VirtualCameraConfig, NamesFileAndLineOfEveryMistake) {
   }
   EXPECT_THAT(error_of("camera: {a: [}\n"), testing::StartsWith("camera.yaml:1: "));
   EXPECT_THROW((void)load_config(directory_.path() + "/none.yaml"), ConfigError);
+}
+
+TEST_F(VirtualCameraConfig, ACharucoBoardsMarkersFit) {
+  const std::string head = "pattern:\n  kind: charuco\n";
+  if (!PatternBoard::has_charuco()) {
+    EXPECT_EQ(error_of(head),
+              "camera.yaml:2: this build has no ChArUco boards, which need "
+              "libopencv-contrib-dev");
+    return;
+  }
+  EXPECT_EQ(error_of(head + "  marker_mm: 30\n"),
+            "camera.yaml:2: marker_mm is not smaller than size_mm");
+  EXPECT_EQ(error_of(head + "  columns: 12\n  rows: 9\n"),
+            "camera.yaml:2: pattern has more markers than its dictionary");
+  const Config config = load(head + "  columns: 12\n  rows: 9\n  dictionary: 1\n");
+  EXPECT_EQ(config.pattern->kind, PatternConfig::Kind::kCharuco);
 }
 
 TEST_F(VirtualCameraConfig, NamesTheLineOfABrokenPathFile) {

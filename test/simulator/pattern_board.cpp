@@ -8,7 +8,12 @@
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
+#include <opencv2/core.hpp>
 #include <utility>
+
+#ifdef ALIDADE_ARUCO
+#include <opencv2/aruco.hpp>
+#endif
 
 namespace alidade::simulator {
 
@@ -17,6 +22,24 @@ using Eigen::Vector2d;
 namespace {
 
 constexpr int kTagCells = 8;  // a side, with the black border
+
+#ifdef ALIDADE_ARUCO
+cv::Ptr<cv::aruco::Dictionary> codes_of(int dictionary) {
+  return cv::aruco::getPredefinedDictionary(dictionary);
+}
+
+// 0 black, with the border; printed upright.
+cv::Mat cells_of(int dictionary, int marker) {
+  const auto codes = codes_of(dictionary);
+  const int bits = codes->markerSize;
+  cv::Mat cells = cv::Mat::zeros(bits + 2, bits + 2, CV_8U);
+  cv::aruco::Dictionary::getBitsFromByteList(codes->bytesList.row(marker), bits)
+      .copyTo(cells(cv::Rect(1, 1, bits, bits)));
+  return cells;
+}
+#else
+cv::Mat cells_of(int /*dictionary*/, int /*marker*/) { return cv::Mat::zeros(3, 3, CV_8U); }
+#endif
 
 }  // namespace
 
@@ -71,8 +94,19 @@ PatternBoard::PatternBoard(const PatternConfig& config) : config_(config) {
     case PatternConfig::Kind::kAprilGrid:
       make_april_grid(config);
       break;
+    case PatternConfig::Kind::kCharuco:
+      make_charuco(config);
+      break;
   }
 }
+
+#ifdef ALIDADE_ARUCO
+bool PatternBoard::has_charuco() { return true; }
+int PatternBoard::charuco_markers(int dictionary) { return codes_of(dictionary)->bytesList.rows; }
+#else
+bool PatternBoard::has_charuco() { return false; }
+int PatternBoard::charuco_markers(int /*dictionary*/) { return 0; }
+#endif
 
 template <class IsBlack>
 void PatternBoard::fill(const IsBlack& is_black) {
@@ -189,6 +223,57 @@ void PatternBoard::make_april_grid(const PatternConfig& config) {
     const int tag = tag_row * config.columns + c / (kTagCells + 1);
     return black[static_cast<std::size_t>((tag * kTagCells + in_row - 1) * kTagCells + in_column -
                                           1)] != 0;
+  });
+}
+
+void PatternBoard::make_charuco(const PatternConfig& config) {
+  const double s = config.size;
+  for (int row = 0; row + 1 < config.rows; ++row) {
+    for (int column = 0; column + 1 < config.columns; ++column)
+      points_.emplace_back(column * s, row * s);
+  }
+  const int cells = cells_of(config.dictionary, 0).cols;
+  // Cells: a white margin, and for each square a rim, a marker's cells, a rim.
+  const auto nodes = [&](int squares) {
+    std::vector<double> x{-1.3 * s};
+    for (int square = 0; square < squares; ++square) {
+      x.push_back((square - 1) * s);
+      for (int cell = 0; cell <= cells; ++cell)
+        x.push_back((square - 0.5) * s + (double(cell) / cells - 0.5) * config.marker);
+    }
+    x.push_back((squares - 1) * s);
+    x.push_back((squares - 0.7) * s);
+    return x;
+  };
+  const std::vector<double> x = nodes(config.columns);
+  const std::vector<double> y = nodes(config.rows);
+  low_ = {x.front(), y.front()};
+  high_ = {x.back(), y.back()};
+  x_.set(x);
+  y_.set(y);
+
+  // Before 4.6 OpenCV counted rows from below, where the first square was black.
+  const int first = config.old_layout && config.rows % 2 == 0 ? 1 : 0;
+  std::vector<cv::Mat> marker_of;  // by square; empty: black
+  int marker = 0;
+  for (int row = 0; row < config.rows; ++row) {
+    for (int column = 0; column < config.columns; ++column) {
+      const bool black = (column + row + first) % 2 == 0;
+      marker_of.push_back(black ? cv::Mat() : cells_of(config.dictionary, marker++));
+    }
+  }
+  const int parts = cells + 2;  // of a square's side
+  fill([&](int column, int row) {
+    const int c = column - 1;
+    const int r = row - 1;
+    if (c < 0 || r < 0 || c >= parts * config.columns || r >= parts * config.rows) return false;
+    const cv::Mat& square =
+        marker_of[static_cast<std::size_t>(r / parts * config.columns + c / parts)];
+    if (square.empty()) return true;
+    const int in_column = c % parts;
+    const int in_row = r % parts;
+    if (in_column == 0 || in_row == 0 || in_column > cells || in_row > cells) return false;
+    return square.at<std::uint8_t>(in_row - 1, in_column - 1) == 0;
   });
 }
 

@@ -8,6 +8,7 @@
 //   symmetric_circles  `size` apart
 //   april_grid         tag36h11 (codes from libapriltag, as printed), side `size`, gap * size between tags; corner squares:
 //                      the black squares that kalibr prints where gaps cross
+//   charuco            columns x rows squares of OpenCV's board, side `size`, markers with side `marker`; points: the inner corners
 // Circles have a quarter of the least distance of two as radius. Thread-safe after construction.
 
 #include <Eigen/Core>
@@ -20,6 +21,11 @@ namespace alidade::simulator {
 class PatternBoard {
  public:
   explicit PatternBoard(const PatternConfig& config);
+
+  // Is OpenCV's aruco in this build?
+  [[nodiscard]] static bool has_charuco();
+  // Of one of OpenCV's dictionaries; 0 without aruco.
+  [[nodiscard]] static int charuco_markers(int dictionary);
 
   [[nodiscard]] const std::vector<Eigen::Vector2d>& points() const { return points_; }
   [[nodiscard]] Eigen::Vector2d centre() const { return (low_ + high_) / 2; }
@@ -52,6 +58,7 @@ class PatternBoard {
   void make_chessboard(const PatternConfig& config);
   void make_circles(const PatternConfig& config);
   void make_april_grid(const PatternConfig& config);
+  void make_charuco(const PatternConfig& config);
   // is_black(column, row) of the cells.
   template <class IsBlack>
   void fill(const IsBlack& is_black);

@@ -60,9 +60,14 @@ TEST_P(PrintedPattern, BrightnessIsTheMeanOverTheBox) {
   EXPECT_NEAR(brightest, config.pattern->white, 1e-9);
 }
 
-INSTANTIATE_TEST_SUITE_P(Kinds, PrintedPattern,
-                         testing::Values(Kind::kChessboard, Kind::kCircles, Kind::kSymmetricCircles,
-                                         Kind::kAprilGrid));
+std::vector<Kind> kinds() {
+  std::vector<Kind> all = {Kind::kChessboard, Kind::kCircles, Kind::kSymmetricCircles,
+                           Kind::kAprilGrid};
+  if (PatternBoard::has_charuco()) all.push_back(Kind::kCharuco);
+  return all;
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, PrintedPattern, testing::ValuesIn(kinds()));
 
 TEST(PatternCamera, SlopeIsTheInverseOfTheLens) {
   const Config config = scene_of(Kind::kChessboard);

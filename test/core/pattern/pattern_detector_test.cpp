@@ -6,87 +6,17 @@
 #include <cmath>
 
 #include "test/core/pattern/pattern_simulation.h"
-#include "test/simulator/pattern_renderer.h"
+#include "test/core/pattern/printed_pattern.h"
 
 namespace alidade {
 namespace {
 
-KnownPattern pattern_of(const std::string& text) {
-  std::string error;
-  return parse_pattern(text, &error).value();
-}
-
+using test::errors_of;
+using test::found_in;
+using test::pattern_of;
+using test::Printed;
+using test::scene_of;
 using Kind = simulator::PatternConfig::Kind;
-using Observations = std::vector<PatternObservation>;
-
-// The same pattern as a person names it and as the virtual camera has it, and what its detector reaches, px.
-struct Printed {
-  const char* text;
-  Kind kind;
-  int columns, rows;
-  double size_m;
-  double rms_at_rest, rms_moving;
-};
-
-simulator::Config scene_of(const Printed& printed) {
-  simulator::Config config;
-  config.image = {752, 480, 20};
-  config.pattern.emplace();
-  config.pattern->kind = printed.kind;
-  config.pattern->columns = printed.columns;
-  config.pattern->rows = printed.rows;
-  config.pattern->size = printed.size_m;
-  return config;
-}
-
-Observations found_in(const std::vector<std::uint8_t>& image, const simulator::Config& config,
-                      PatternDetector* detector) {
-  return detector->find(image.data(), config.image.width, config.image.height, config.image.width);
-}
-
-// What is found of a frame against its truth. Patterns may be named from either end.
-struct Errors {
-  double squares = 0;
-  int count = 0, wrong = 0;
-  int frames = 0;  // in which something was found
-
-  void add(const simulator::PatternRenderer& renderer, double time_s, const KnownPattern& pattern,
-           const Observations& found) {
-    const auto& places = renderer.board().points();
-    const auto error = [&](const PatternObservation& o, bool turned) {
-      const auto point = static_cast<std::size_t>(o.point);
-      const Eigen::Vector2d place = places[turned ? places.size() - 1 - point : point];
-      return Eigen::Vector2d(o.u - renderer.camera().project_rolling(place, time_s).value());
-    };
-    if (found.empty()) return;
-    ++frames;
-    const bool turned = pattern.is_symmetric() &&
-                        error(found.front(), true).norm() < error(found.front(), false).norm();
-    for (const PatternObservation& o : found) {
-      const double square = error(o, turned).squaredNorm();
-      if (square > 0.25) {
-        ++wrong;
-        continue;
-      }
-      squares += square;
-      ++count;
-    }
-  }
-  [[nodiscard]] double rms() const { return std::sqrt(squares / (2 * count)); }
-};
-
-// Of frames this far apart, from 0 on.
-Errors errors_of(const simulator::Config& config, const char* text, int frames, double interval_s) {
-  const KnownPattern pattern = pattern_of(text);
-  const simulator::PatternRenderer renderer(config);
-  PatternDetector detector(pattern);
-  Errors errors;
-  for (int f = 0; f < frames; ++f) {
-    const double time_s = interval_s * f;
-    errors.add(renderer, time_s, pattern, found_in(renderer.render(time_s, f), config, &detector));
-  }
-  return errors;
-}
 
 class PrintedPatterns : public testing::TestWithParam<Printed> {};
 
@@ -94,7 +24,7 @@ class PrintedPatterns : public testing::TestWithParam<Printed> {};
 TEST_P(PrintedPatterns, PointsAtRestAreFoundWhereTheyAre) {
   simulator::Config config = scene_of(GetParam());
   config.pattern->hand.speed = 1e-3;  // at rest while a frame is taken; every 700 s another pose
-  const Errors errors = errors_of(config, GetParam().text, 8, 700.0);
+  const test::DetectedErrors errors = errors_of(config, GetParam().text, 8, 700.0);
   EXPECT_GE(errors.frames, 6);
   EXPECT_LE(errors.wrong, errors.count / 500);
   EXPECT_LT(errors.rms(), GetParam().rms_at_rest);
@@ -106,22 +36,28 @@ TEST_P(PrintedPatterns, MovingPointsAreFoundWhereTheirRowsSawThem) {
   config.camera.line_delay = -60e-6;
   config.sensor.exposure = 4e-3;
   config.sensor.read_noise = 2;
-  const Errors errors = errors_of(config, GetParam().text, 8, 0.05);
+  const test::DetectedErrors errors = errors_of(config, GetParam().text, 8, 0.05);
   EXPECT_EQ(errors.frames, 8);
   EXPECT_LE(errors.wrong, errors.count / 500);
   EXPECT_LT(errors.rms(), GetParam().rms_moving);
 }
 
-INSTANTIATE_TEST_SUITE_P(
-    Kinds, PrintedPatterns,
-    testing::Values(Printed{"chessboard:9x6:30mm", Kind::kChessboard, 9, 6, 0.03, 0.02, 0.025},
-                    Printed{"circles:4x11:25mm", Kind::kCircles, 4, 11, 0.025, 0.01, 0.015},
-                    Printed{"symmetric-circles:9x6:30mm", Kind::kSymmetricCircles, 9, 6, 0.03, 0.01,
-                            0.015},
-                    Printed{"aprilgrid:6x6:27mm:0.3", Kind::kAprilGrid, 6, 6, 0.027, 0.05, 0.06}),
-    [](const auto& printed) {
-      return std::string(printed.param.text).substr(0, 4) + std::to_string(printed.index);
-    });
+std::vector<Printed> printed_patterns() {
+  std::vector<Printed> all = {
+      {"chessboard:9x6:30mm", Kind::kChessboard, 9, 6, 0.03, 0.02, 0.025},
+      {"circles:4x11:25mm", Kind::kCircles, 4, 11, 0.025, 0.01, 0.015},
+      {"symmetric-circles:9x6:30mm", Kind::kSymmetricCircles, 9, 6, 0.03, 0.01, 0.015},
+      {"aprilgrid:6x6:27mm:0.3", Kind::kAprilGrid, 6, 6, 0.027, 0.05, 0.06}};
+  if (simulator::PatternBoard::has_charuco())
+    all.push_back({"charuco:10x7:30mm:22mm", Kind::kCharuco, 10, 7, 0.03, 0.02, 0.025});
+  return all;
+}
+
+INSTANTIATE_TEST_SUITE_P(Kinds, PrintedPatterns, testing::ValuesIn(printed_patterns()),
+                         [](const auto& printed) {
+                           return std::string(printed.param.text).substr(0, 4) +
+                                  std::to_string(printed.index);
+                         });
 
 constexpr Printed kTags = {"aprilgrid:6x6:27mm:0.3", Kind::kAprilGrid, 6, 6, 0.027, 0, 0};
 
@@ -142,7 +78,7 @@ TEST(PatternDetector, HiddenTagsAreNotFound) {
   simulator::Config config = scene_of(kTags);
   config.pattern->finger = 0.06;
   config.pattern->hand.distance = 0.25;  // too near to be in view whole
-  const Errors errors = errors_of(config, kTags.text, 6, 0.4);
+  const test::DetectedErrors errors = errors_of(config, kTags.text, 6, 0.4);
   EXPECT_GT(errors.count, 6 * 40);
   EXPECT_LT(errors.count, 6 * 4 * 36);
   EXPECT_LE(errors.wrong, errors.count / 100);
@@ -153,7 +89,7 @@ TEST(PatternDetector, HalfHiddenCirclesAreLeftOut) {
   const Printed printed = {"circles:4x11:25mm", Kind::kCircles, 4, 11, 0.025, 0, 0};
   simulator::Config config = scene_of(printed);
   config.pattern->finger = 0.03;
-  const Errors errors = errors_of(config, printed.text, 20, 0.3);
+  const test::DetectedErrors errors = errors_of(config, printed.text, 20, 0.3);
   EXPECT_LT(errors.count, 44 * errors.frames);
   EXPECT_GT(errors.count, 40 * errors.frames);
   EXPECT_EQ(errors.wrong, 0);

@@ -1,0 +1,13 @@
+// Of a build that has not found opencv_aruco: parse_pattern() refuses the patterns that would need more.
+
+#include "core/pattern/aruco_markers.h"
+
+namespace alidade::internal {
+
+bool has_aruco() { return false; }
+
+std::vector<ArucoMarker> find_markers(const cv::Mat& /*image*/, int /*dictionary*/) { return {}; }
+
+cv::Mat marker_cells(int /*dictionary*/, int /*id*/) { return {}; }
+
+}  // namespace alidade::internal
