@@ -62,7 +62,6 @@ cv::Ptr<cv::SimpleBlobDetector> blob_detector(const cv::Mat& image, double low, 
   return cv::SimpleBlobDetector::create(params);
 }
 
-// In an image of half the size, where noise makes few blobs, then in all of it.
 bool find_circles(const cv::Mat& image, const KnownPattern& pattern,
                   std::vector<cv::Point2f>* centres) {
   const cv::Size size(pattern.columns, pattern.rows);
@@ -72,14 +71,18 @@ bool find_circles(const cv::Mat& image, const KnownPattern& pattern,
   double high = 0;
   cv::minMaxLoc(image, &low, &high);
   if (high - low < kLeastImageContrast) return false;
-  const auto blobs = [&](const cv::Mat& of) { return blob_detector(of, low, high, size.area()); };
+  return cv::findCirclesGrid(image, size, *centres, flags,
+                             blob_detector(image, low, high, size.area()));
+}
+
+// In an image of half the size noise makes few blobs.
+bool find_circles_in_half(const cv::Mat& image, const KnownPattern& pattern,
+                          std::vector<cv::Point2f>* centres) {
   cv::Mat half;
   cv::resize(image, half, {}, 0.5, 0.5, cv::INTER_AREA);
-  if (cv::findCirclesGrid(half, size, *centres, flags, blobs(half))) {
-    for (cv::Point2f& centre : *centres) centre = 2 * centre + cv::Point2f(0.5F, 0.5F);
-    return true;
-  }
-  return cv::findCirclesGrid(image, size, *centres, flags, blobs(image));
+  if (!find_circles(half, pattern, centres)) return false;
+  for (cv::Point2f& centre : *centres) centre = 2 * centre + cv::Point2f(0.5F, 0.5F);
+  return true;
 }
 
 }  // namespace
@@ -89,16 +92,16 @@ struct PatternDetector::State {
   std::unique_ptr<internal::TagGrid> tags;
   std::unique_ptr<internal::CharucoGrid> charuco;
   internal::CircleCentres circles;  // of the last image
-  int in_vain = 0;                  // images in a row in which thresholds that adapt were of no use
+  int in_vain = 0;                  // images in a row in which what takes long was of no use
 
-  // Light changes slowly: what did not help in the last images is tried now and then only.
-  bool try_any_light(const cv::Mat& image, std::vector<cv::Point2f>* corners) {
+  // Light and distance change slowly: what takes long and did not help in the last images is tried now and then only.
+  template <class Find>
+  bool now_and_then(const Find& find) {
     constexpr int kPatience = 4;
     constexpr int kEvery = 8;
     const bool skip = in_vain >= kPatience && in_vain % kEvery != 0;
     ++in_vain;
-    if (skip || !find_chessboard_in_any_light(image, {pattern.columns, pattern.rows}, corners))
-      return false;
+    if (skip || !find()) return false;
     in_vain = 0;
     return true;
   }
@@ -109,14 +112,18 @@ struct PatternDetector::State {
     points->resize(count);
     std::iota(points->begin(), points->end(), 0);
     if (pattern.kind == PatternKind::kChessboard) {
-      if (!find_chessboard(image, {pattern.columns, pattern.rows}, corners) &&
-          !try_any_light(image, corners)) {
+      if (!find_chessboard(image, {pattern.columns, pattern.rows}, corners) && !now_and_then([&] {
+            return find_chessboard_in_any_light(image, {pattern.columns, pattern.rows}, corners);
+          })) {
         return false;
       }
       internal::refine_corners(image, corners);
       return true;
     }
-    if (!find_circles(image, pattern, corners)) return false;
+    if (!find_circles_in_half(image, pattern, corners) &&
+        !now_and_then([&] { return find_circles(image, pattern, corners); })) {
+      return false;
+    }
     circles = internal::refine_circles(image, pattern, corners);
     std::size_t kept = 0;
     for (std::size_t i = 0; i < count; ++i) {
