@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/pattern/calibrate_pattern.h"
+#include "core/pattern/circle_images.h"
 #include "core/pattern/pattern_drawing.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/live_pattern.h"
@@ -169,8 +170,9 @@ int calibrate_shutter(const CalibrateShutterOptions& options) {
   const LensNotes notes{options.pattern, video.data.width, video.data.height};
   directory.add(
       "report", "report.html",
-      pattern_report({video.name, options.pattern, video.data, calibration, video.images,
-                      video.found, remarks, ALIDADE_VERSION,
+      pattern_report({video.name, options.pattern,
+                      recentred(video.data, calibration.lens, calibration.curve), calibration,
+                      video.images, video.found, remarks, ALIDADE_VERSION,
                       fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)))}));
   directory.add("trajectory", "trajectory.csv", format_trajectory(calibration, video.data));
   directory.add("camera_info", "camera_info.yaml", format_camera_info(calibration, notes));

@@ -218,7 +218,10 @@ PatternVideo film_pattern(const VideoConfig& config, const KnownPattern& pattern
   const std::string reason = live.reason();
   live.stop();
   log_source_losses(*source);
-  if (!live.error().empty()) throw CommandError(kExitFailed, live.error());
+  if (!live.error().empty()) {
+    if (live.found() == 0) throw CommandError(kExitFailed, live.error());
+    spdlog::warn("{}; what was filmed before is used", live.error());
+  }
   if (!live.started_s()) {
     const std::string why = by_itself ? nothing_came(source->name(), first_wait_s)
                                       : source->name() + ": interrupted before an image came";
