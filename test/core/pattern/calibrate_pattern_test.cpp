@@ -103,6 +103,27 @@ TEST(CalibratePattern, OfAGlobalShutterSigmasAreAsLargeAsErrors) {
   EXPECT_LT(sum, 23.5);
 }
 
+// Views that differ by few degrees leave f open by per cents, where its sigma means little.
+TEST(CalibratePattern, ViewsThatAreAlmostAlikeAreRefusedOrHonest) {
+  int refused = 0;
+  for (const std::uint64_t seed : {2U, 3U}) {
+    for (const double turns : {0.1, 0.15}) {
+      test::PatternScene scene = short_scene(51.56e-6, 20, seed);
+      scene.duration_s = 15;
+      scene.noise_px = 0.1;
+      for (std::size_t i = 3; i < 6; ++i) scene.hand.amplitude[i] = turns;
+      const PatternCalibration calibration = calibrate_pattern(test::simulate_pattern(scene));
+      if (calibration.status == PatternStatus::kOk) {
+        expect_honest(calibration, scene);
+      } else {
+        EXPECT_EQ(calibration.status, PatternStatus::kNoLens) << calibration.message;
+        ++refused;
+      }
+    }
+  }
+  EXPECT_GE(refused, 2);
+}
+
 // A print is never quite what was drawn: what each point is off by is the same in all images.
 TEST(CalibratePattern, SigmasHoldWhatAPrintHasWrong) {
   const test::PatternScene scene = short_scene(51.56e-6, 15, 12);

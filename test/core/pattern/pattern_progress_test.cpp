@@ -50,10 +50,10 @@ TEST(PatternProgress, WhatIsEnoughCalibratesSharply) {
     const PatternCalibration calibration = calibrate_pattern(data);
     ASSERT_EQ(calibration.status, PatternStatus::kOk) << calibration.message;
     const LensVector truth = test::truth_of(scene.lens);
-    // A twentieth of what is refused.
+    // An eighth of what is refused.
     const PatternCalibrationOptions limits;
     EXPECT_LT(calibration.sigma(LensParameter::kFocalLengthU) / truth[0],
-              limits.largest_focal_length_sigma / 20);
+              limits.largest_focal_length_sigma / 8);
     EXPECT_LT(calibration.sigma(LensParameter::kLineDelay) * scene.height,
               limits.largest_readout_sigma_s / 4);
     for (const LensParameter parameter :
