@@ -65,17 +65,7 @@ constexpr double kAccelerationTime_s = 0.1;
 // of each frame are free; rows that are exposed at once tell the pose alone, and some line delay beside 0 would then explain
 // noise by a speed that suits it.
 void expect_accelerations(const PoseCurve& curve, PatternAdjustmentOptions* options) {
-  PoseVector sum = PoseVector::Zero();
-  for (int s = 0; s < curve.segments(); ++s) {
-    const double length = curve.knot(s + 1) - curve.knot(s);
-    for (const double x : {0.5 - 0.5 / std::sqrt(3.0), 0.5 + 0.5 / std::sqrt(3.0)}) {
-      const Vector4<double> weights = curve.acceleration_weights(s, curve.knot(s) + x * length);
-      PoseVector a = PoseVector::Zero();
-      for (int k = 0; k < 4; ++k) a += weights[k] * curve.control_point(s + k);
-      sum += length / 2 * a.cwiseAbs2();
-    }
-  }
-  const PoseVector mean = sum / (curve.end_s() - curve.begin_s());
+  const PoseVector mean = internal::mean_square_acceleration(curve);
   options->position_noise = std::max(1e-9, kAccelerationTime_s * mean.head<3>().mean());
   options->rotation_noise = std::max(1e-9, kAccelerationTime_s * mean.tail<3>().mean());
 }
@@ -266,7 +256,7 @@ PatternCalibration calibrate_pattern(const PatternData& as_detected,
     const bool is_settled = !is_held && end == AdjustmentEnd::kConverged;
     if (is_settled && score.split.empty()) break;
     if (is_followed) is_held = false;
-    if (!is_held) data = recentred(as_detected, state.lens, state.curve);
+    if (!is_held) data = recentred(std::move(data), state.lens, state.curve);
     if (is_settled || !is_followed) state.curve = state.curve.split(score.split);
   }
 

@@ -10,6 +10,7 @@
 
 #include "core/model/median.h"
 #include "core/pattern/circle_images.h"
+#include "core/pattern/pixel_window.h"
 
 namespace alidade::internal {
 namespace {
@@ -47,16 +48,13 @@ Blob centroid(const cv::Mat& image, const cv::Point2d& start, const Window& wind
   Blob blob{start, 0, 0};
   for (int step = 0; step < 3; ++step) {
     const cv::Point2d c = blob.centre;
-    const int left = static_cast<int>(std::ceil(c.x - window.half_width));
-    const int right = static_cast<int>(std::floor(c.x + window.half_width));
-    const int top = static_cast<int>(std::ceil(c.y - window.half_height));
-    const int bottom = static_cast<int>(std::floor(c.y + window.half_height));
-    if (left < 0 || top < 0 || right >= image.cols || bottom >= image.rows) return {start, 0, 0};
+    const cv::Rect pixels = pixels_about(c, window.half_width, window.half_height);
+    if (!is_within(pixels, image)) return {start, 0, 0};
     std::vector<double> rim;
     std::uint8_t darkest = 255;
-    for (int v = top; v <= bottom; ++v) {
+    for (int v = pixels.y; v < pixels.br().y; ++v) {
       const auto* row = image.ptr<std::uint8_t>(v);
-      for (int u = left; u <= right; ++u) {
+      for (int u = pixels.x; u < pixels.br().x; ++u) {
         const double d = window.distance(u - c.x, v - c.y);
         if (d > kCircleWindow) continue;
         darkest = std::min(darkest, row[u]);
@@ -75,9 +73,9 @@ Blob centroid(const cv::Mat& image, const cv::Point2d& start, const Window& wind
     int core_count = 0;
     double full_sum = 0;
     double full_core = 0;
-    for (int v = top; v <= bottom; ++v) {
+    for (int v = pixels.y; v < pixels.br().y; ++v) {
       const auto* row = image.ptr<std::uint8_t>(v);
-      for (int u = left; u <= right; ++u) {
+      for (int u = pixels.x; u < pixels.br().x; ++u) {
         const double d = window.distance(u - c.x, v - c.y);
         if (d > kCircleWindow) continue;
         const double weight = std::max(0.0, level - row[u]);

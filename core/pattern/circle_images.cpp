@@ -4,11 +4,10 @@
 
 namespace alidade {
 
-PatternData recentred(const PatternData& data, const LensVector& lens, const PoseCurve& curve) {
-  PatternData result = data;
+PatternData recentred(PatternData data, const LensVector& lens, const PoseCurve& curve) {
   const auto nowhere = Vector2<double>::Constant(std::numeric_limits<double>::quiet_NaN()).eval();
   const double line_delay = lens[index(LensParameter::kLineDelay)];
-  for (PatternFrame& frame : result.frames) {
+  for (PatternFrame& frame : data.frames) {
     for (PatternObservation& seen : frame.observations) {
       if (!(seen.radius_m > 0)) continue;
       const PoseVector x = curve.value(curve.basis(frame.time_s + seen.u.y() * line_delay));
@@ -28,7 +27,7 @@ PatternData recentred(const PatternData& data, const LensVector& lens, const Pos
       seen.beside = beside;
     }
   }
-  return result;
+  return data;
 }
 
 }  // namespace alidade

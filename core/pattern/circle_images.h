@@ -13,7 +13,7 @@ namespace alidade {
 
 // Circles whose centres the detector took from their centroids by what the grid tells of lens and perspective, now by the lens and
 // the pose that are known. Other observations stay as they are.
-[[nodiscard]] PatternData recentred(const PatternData& data, const LensVector& lens,
+[[nodiscard]] PatternData recentred(PatternData data, const LensVector& lens,
                                     const PoseCurve& curve);
 
 namespace internal {

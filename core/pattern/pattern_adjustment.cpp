@@ -102,22 +102,30 @@ class FrameCost : public ceres::CostFunction {
   double robust_scale_;
 };
 
-// The integral of the squared accelerations over a segment, exactly: they are linear there, and two points of Gauss's
-// quadrature do.
+// Gauss's quadrature over a segment: two points, exact for the square of an acceleration, which is linear there.
+struct Moment {
+  double time_s, weight_s;
+};
+std::array<Moment, 2> moments_of(const PoseCurve& curve, int segment) {
+  const double begin = curve.knot(segment);
+  const double length = curve.knot(segment + 1) - begin;
+  const double off = 0.5 / std::sqrt(3.0);
+  return {{{begin + length * (0.5 - off), length / 2}, {begin + length * (0.5 + off), length / 2}}};
+}
+
+// The integral of the squared accelerations over a segment.
 class AccelerationCost : public ceres::SizedCostFunction<12, 6, 6, 6, 6> {
  public:
   AccelerationCost(const PoseCurve& curve, int segment, const PatternAdjustmentOptions& options) {
-    const double begin = curve.knot(segment);
-    const double length = curve.knot(segment + 1) - begin;
     PoseVector scale;
     scale << Vector3<double>::Constant(1 / std::sqrt(options.position_noise)),
         Vector3<double>::Constant(1 / std::sqrt(options.rotation_noise));
-    for (int g = 0; g < 2; ++g) {
-      const double time_s = begin + length * (0.5 + (g == 0 ? -0.5 : 0.5) / std::sqrt(3.0));
-      const Vector4<double> weights = curve.acceleration_weights(segment, time_s);
+    const std::array<Moment, 2> moments = moments_of(curve, segment);
+    for (std::size_t g = 0; g < moments.size(); ++g) {
+      const Vector4<double> weights = curve.acceleration_weights(segment, moments[g].time_s);
       for (int k = 0; k < 4; ++k) {
-        factor_[static_cast<std::size_t>(g)][static_cast<std::size_t>(k)] =
-            weights[k] * std::sqrt(length / 2) * scale;
+        factor_[g][static_cast<std::size_t>(k)] =
+            weights[k] * std::sqrt(moments[g].weight_s) * scale;
       }
     }
   }
@@ -297,6 +305,19 @@ Eigen::VectorXd growth(const PatternData& data, const Blocks& blocks,
 }
 
 }  // namespace
+
+PoseVector mean_square_acceleration(const PoseCurve& curve) {
+  PoseVector sum = PoseVector::Zero();
+  for (int s = 0; s < curve.segments(); ++s) {
+    for (const Moment& moment : moments_of(curve, s)) {
+      const Vector4<double> weights = curve.acceleration_weights(s, moment.time_s);
+      PoseVector a = PoseVector::Zero();
+      for (int k = 0; k < 4; ++k) a += weights[k] * curve.control_point(s + k);
+      sum += moment.weight_s * a.cwiseAbs2();
+    }
+  }
+  return sum / (curve.end_s() - curve.begin_s());
+}
 
 AdjustmentEnd adjust_pattern(const PatternData& data, const PatternMask& used,
                              const LensKnowledge& knowledge,

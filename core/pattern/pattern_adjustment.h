@@ -28,6 +28,9 @@ struct PatternAdjustmentOptions {
   double relative_decrease = 1e-7;  // of the cost, at which it ends
 };
 
+// Over all of the curve, (m/s^2)^2 and (rad/s^2)^2.
+[[nodiscard]] PoseVector mean_square_acceleration(const PoseCurve& curve);
+
 // Which observations take part, frame by frame as in the data.
 using PatternMask = std::vector<std::vector<char>>;
 

@@ -10,6 +10,7 @@
 
 #include "core/model/linear_algebra.h"
 #include "core/model/trigonometry.h"
+#include "core/pattern/pixel_window.h"
 
 namespace alidade::internal {
 namespace {
@@ -146,11 +147,8 @@ bool fit(const cv::Mat& image, const CornerView& view, const cv::Point2d& corner
   const double reach = std::max(std::min(kReach_cells, gap_cells), kLeastReach_px / least_cell);
   const Matrix2<double> px_by_cells = view.cells_by_px().inverse();
   const Vector2<double> half = reach * px_by_cells.cwiseAbs().rowwise().sum();
-  const int left = static_cast<int>(std::ceil(corner.x - half.x()));
-  const int right = static_cast<int>(std::floor(corner.x + half.x()));
-  const int top = static_cast<int>(std::ceil(corner.y - half.y()));
-  const int bottom = static_cast<int>(std::floor(corner.y + half.y()));
-  if (left < 0 || top < 0 || right >= image.cols || bottom >= image.rows) return false;
+  const cv::Rect window = pixels_about(corner, half.x(), half.y());
+  if (!is_within(window, image)) return false;
   const double blur_x = blur.x / view.cell_px().x();
   const double blur_y = blur.y / view.cell_px().y();
 
@@ -160,9 +158,9 @@ bool fit(const cv::Mat& image, const CornerView& view, const cv::Point2d& corner
   double sum = 0;
   double squares = 0;
   int count = 0;
-  for (int v = top; v <= bottom; ++v) {
+  for (int v = window.y; v < window.br().y; ++v) {
     const auto* row = image.ptr<std::uint8_t>(v);
-    for (int u = left; u <= right; ++u) {
+    for (int u = window.x; u < window.br().x; ++u) {
       const Vector2<double> place = view.place({static_cast<double>(u), static_cast<double>(v)});
       if (std::abs(place.x()) > reach || std::abs(place.y()) > reach) continue;
       const Profile x = profile(place.x(), blur_x);
@@ -197,17 +195,21 @@ bool fit(const cv::Mat& image, const CornerView& view, const cv::Point2d& corner
 
 }  // namespace
 
+const std::vector<cv::Point2f>& tag_square() {
+  static const std::vector<cv::Point2f> corners = {
+      {0, kTagCells}, {kTagCells, kTagCells}, {kTagCells, 0}, {0, 0}};
+  return corners;
+}
+
 bool refine_tag_corners(const cv::Mat& image, const TagCells& cells, double gap_cells,
                         std::vector<cv::Point2f>* corners) {
-  const std::vector<cv::Point2f> square = {
-      {0, kTagCells}, {kTagCells, kTagCells}, {kTagCells, 0}, {0, 0}};
   Blur blur;
   for (int step = 0; step < kSteps; ++step) {
-    const cv::Matx33d cells_from_image = cv::getPerspectiveTransform(*corners, square);
+    const cv::Matx33d cells_from_image = cv::getPerspectiveTransform(*corners, tag_square());
     Vector2<double> blur_step = Vector2<double>::Zero();
     for (std::size_t k = 0; k < 4; ++k) {
       cv::Point2f& corner = (*corners)[k];
-      const CornerView view(cells, cells_from_image, corner, square[k]);
+      const CornerView view(cells, cells_from_image, corner, tag_square()[k]);
       CornerFit found;
       if (!fit(image, view, corner, blur, gap_cells, &found)) return false;
       const double limit = 0.5 * view.cell_px().minCoeff();

@@ -14,7 +14,10 @@ inline constexpr int kTagCells = 8;  // a tag's side, with its black border
 // is_white[row][column], from the upper left of the tag.
 using TagCells = std::array<std::array<bool, kTagCells>, kTagCells>;
 
-// corners: OpenCV's pixels, lower left, lower right, upper right, upper left; a pixel or so off at first. gap_cells: to the next tag,
+// Its corners, in cells: lower left, lower right, upper right, upper left.
+[[nodiscard]] const std::vector<cv::Point2f>& tag_square();
+
+// corners: OpenCV's pixels, in that order, a pixel or so off at first. gap_cells: to the next tag,
 // the side of the square outside. False: they leave the image, or what is seen there is something else.
 [[nodiscard]] bool refine_tag_corners(const cv::Mat& image, const TagCells& cells, double gap_cells,
                                       std::vector<cv::Point2f>* corners);

@@ -214,9 +214,8 @@ bool TagGrid::confirm(const cv::Mat& image, int tag, Corners* corners) const {
 
 double TagGrid::code_correlation(const cv::Mat& image, int tag, const Corners& corners) const {
   const apriltag_family_t& family = *library_->family;
-  // In cells, in the order of the corners.
-  const Corners square = {{0, kTagCells}, {kTagCells, kTagCells}, {kTagCells, 0}, {0, 0}};
-  const cv::Matx33d H = cv::getPerspectiveTransform(square, corners);
+  const TagCells& cells = cells_[static_cast<std::size_t>(tag)];
+  const cv::Matx33d H = cv::getPerspectiveTransform(tag_square(), corners);
   const auto bits = static_cast<int>(family.nbits);
   double sum = 0;
   double squares = 0;
@@ -230,7 +229,7 @@ double TagGrid::code_correlation(const cv::Mat& image, int tag, const Corners& c
     const double grey = image.at<std::uint8_t>(v, u);
     sum += grey;
     squares += grey * grey;
-    if (((family.codes[tag] >> (bits - 1 - i)) & 1U) != 0) {
+    if (cells[family.bit_y[i]][family.bit_x[i]]) {
       white_sum += grey;
       ++white;
     }

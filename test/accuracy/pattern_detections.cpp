@@ -10,6 +10,7 @@
 
 #include "core/pattern/pattern_detector.h"
 #include "test/simulator/pattern_renderer.h"
+#include "test/simulator/pattern_scene.h"
 
 namespace alidade::test {
 namespace {
@@ -76,15 +77,10 @@ KnownPattern known(const PatternUnderTest& pattern) {
 }
 
 simulator::Config pattern_scene(const PatternUnderTest& pattern) {
-  simulator::Config config;
-  config.image = {752, 480, 20};
+  simulator::Config config =
+      simulator::pattern_scene(pattern.kind, pattern.columns, pattern.rows, pattern.size_m);
   config.camera.line_delay = 51.56e-6;
   config.sensor.jpeg_quality = 95;
-  config.pattern.emplace();
-  config.pattern->kind = pattern.kind;
-  config.pattern->columns = pattern.columns;
-  config.pattern->rows = pattern.rows;
-  config.pattern->size = pattern.size_m;
   return config;
 }
 

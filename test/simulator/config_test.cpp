@@ -1,5 +1,4 @@
 #include "test/simulator/config.h"
-#include "test/simulator/pattern_board.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -8,6 +7,7 @@
 #include <cstdlib>
 
 #include "test/simulator/path.h"
+#include "test/simulator/pattern_board.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade::simulator {

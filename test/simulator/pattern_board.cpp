@@ -108,6 +108,13 @@ bool PatternBoard::has_charuco() { return false; }
 int PatternBoard::charuco_markers(int /*dictionary*/) { return 0; }
 #endif
 
+void PatternBoard::lay(const std::vector<double>& x, const std::vector<double>& y) {
+  low_ = {x.front(), y.front()};
+  high_ = {x.back(), y.back()};
+  x_.set(x);
+  y_.set(y);
+}
+
 template <class IsBlack>
 void PatternBoard::fill(const IsBlack& is_black) {
   const int columns = x_.cells();
@@ -137,10 +144,7 @@ void PatternBoard::make_chessboard(const PatternConfig& config) {
   std::vector<double> y;
   for (int i = -2; i <= config.columns + 1; ++i) x.push_back(i * s);
   for (int i = -2; i <= config.rows + 1; ++i) y.push_back(i * s);
-  low_ = {x.front(), y.front()};
-  high_ = {x.back(), y.back()};
-  x_.set(x);
-  y_.set(y);
+  lay(x, y);
   fill([&](int column, int row) {
     const bool margin =
         column == 0 || row == 0 || column == config.columns + 2 || row == config.rows + 2;
@@ -157,11 +161,8 @@ void PatternBoard::make_circles(const PatternConfig& config) {
       points_.emplace_back((symmetric ? column : 2 * column + row % 2) * s, row * s);
   }
   const double margin = 2 * radius_;
-  low_ = {-margin, -margin};
-  high_ = {(symmetric ? config.columns - 1 : 2 * config.columns - 1) * s + margin,
-           (config.rows - 1) * s + margin};
-  x_.set({low_.x(), high_.x()});
-  y_.set({low_.y(), high_.y()});
+  lay({-margin, (symmetric ? config.columns - 1 : 2 * config.columns - 1) * s + margin},
+      {-margin, (config.rows - 1) * s + margin});
   fill([](int, int) { return false; });
 }
 
@@ -187,12 +188,7 @@ void PatternBoard::make_april_grid(const PatternConfig& config) {
     x.push_back(x.back() + gap);
     return x;
   };
-  const std::vector<double> x = nodes(config.columns);
-  const std::vector<double> y = nodes(config.rows);
-  low_ = {x.front(), y.front()};
-  high_ = {x.back(), y.back()};
-  x_.set(x);
-  y_.set(y);
+  lay(nodes(config.columns), nodes(config.rows));
 
   const int tags = config.columns * config.rows;
   std::vector<std::uint8_t> black(static_cast<std::size_t>(tags * kTagCells * kTagCells), 0);
@@ -245,12 +241,7 @@ void PatternBoard::make_charuco(const PatternConfig& config) {
     x.push_back((squares - 0.7) * s);
     return x;
   };
-  const std::vector<double> x = nodes(config.columns);
-  const std::vector<double> y = nodes(config.rows);
-  low_ = {x.front(), y.front()};
-  high_ = {x.back(), y.back()};
-  x_.set(x);
-  y_.set(y);
+  lay(nodes(config.columns), nodes(config.rows));
 
   // Before 4.6 OpenCV counted rows from below, where the first square was black.
   const int first = config.old_layout && config.rows % 2 == 0 ? 1 : 0;

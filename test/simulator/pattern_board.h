@@ -59,6 +59,8 @@ class PatternBoard {
   void make_circles(const PatternConfig& config);
   void make_april_grid(const PatternConfig& config);
   void make_charuco(const PatternConfig& config);
+  // Where the cells' columns and rows end, m.
+  void lay(const std::vector<double>& x, const std::vector<double>& y);
   // is_black(column, row) of the cells.
   template <class IsBlack>
   void fill(const IsBlack& is_black);

@@ -13,6 +13,7 @@
 #include "core/pattern/calibrate_pattern.h"
 #include "core/pattern/pattern_drawing.h"
 #include "test/core/pattern/printed_pattern.h"
+#include "test/core/pattern/refused_patterns.h"
 
 namespace alidade {
 namespace {
@@ -49,7 +50,7 @@ TEST(Charuco, DictionariesAreOpenCVs) {
 }
 
 TEST(Charuco, SaysWhatIsWrongInOneLine) {
-  const std::vector<std::pair<const char*, const char*>> cases = {
+  test::expect_refused({
       {"charuco:9x6:30mm", "square, marker and perhaps a dictionary"},
       {"charuco:9x6:30mm:22mm:4x4_50:7", "square, marker and perhaps a dictionary"},
       {"charuco:9x6:30mm:22", "'22' is not a marker's length with its unit"},
@@ -60,13 +61,7 @@ TEST(Charuco, SaysWhatIsWrongInOneLine) {
       {"charuco:2x6:30mm:22mm", "out of range"},
       {"charuco:9x6:30mm:22mm:8x8_50", "'8x8_50' is no dictionary; known are 4x4_50"},
       {"charuco:12x9:30mm:22mm", "54 markers, dictionary 4x4_50 only 50"},
-  };
-  for (const auto& [text, what] : cases) {
-    std::string error;
-    EXPECT_FALSE(parse_pattern(text, &error)) << text;
-    EXPECT_THAT(error, HasSubstr(what)) << text;
-    EXPECT_EQ(error.find('\n'), std::string::npos);
-  }
+  });
 }
 
 struct Raster {

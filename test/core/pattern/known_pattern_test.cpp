@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "test/core/pattern/refused_patterns.h"
+
 namespace alidade {
 namespace {
 
@@ -25,7 +27,7 @@ TEST(KnownPattern, ReadsWhatAPersonWrites) {
 }
 
 TEST(KnownPattern, SaysWhatIsWrongInOneLine) {
-  const std::vector<std::pair<const char*, const char*>> cases = {
+  test::expect_refused({
       {"", "no pattern"},
       {"chess:9x6:25mm", "'chess' is no kind"},
       {"chessboard:9x6", "kind, counts and length"},
@@ -46,13 +48,7 @@ TEST(KnownPattern, SaysWhatIsWrongInOneLine) {
       {"aprilgrid:6x6:30mm", "length and gap"},
       {"aprilgrid:6x6:30mm:3", "'3' is not a gap"},
       {"aprilgrid:30x30:30mm:0.3", "587 tags"},
-  };
-  for (const auto& [text, what] : cases) {
-    std::string error;
-    EXPECT_FALSE(parse_pattern(text, &error)) << text;
-    EXPECT_THAT(error, ::testing::HasSubstr(what)) << text;
-    EXPECT_EQ(error.find('\n'), std::string::npos);
-  }
+  });
 }
 
 TEST(KnownPattern, PointsLieWhereTheyArePrinted) {

@@ -47,7 +47,7 @@ std::vector<Printed> printed_patterns() {
       {"chessboard:9x6:30mm", Kind::kChessboard, 9, 6, 0.03, 0.02, 0.025},
       {"circles:4x11:25mm", Kind::kCircles, 4, 11, 0.025, 0.01, 0.015},
       {"symmetric-circles:9x6:30mm", Kind::kSymmetricCircles, 9, 6, 0.03, 0.01, 0.015},
-      {"aprilgrid:6x6:27mm:0.3", Kind::kAprilGrid, 6, 6, 0.027, 0.05, 0.06}};
+      {"aprilgrid:6x6:27mm:0.3", Kind::kAprilGrid, 6, 6, 0.027, 0.01, 0.015}};
   if (simulator::PatternBoard::has_charuco())
     all.push_back({"charuco:10x7:30mm:22mm", Kind::kCharuco, 10, 7, 0.03, 0.02, 0.025});
   return all;

@@ -10,6 +10,7 @@
 #include "core/pattern/known_pattern.h"
 #include "core/pattern/pattern_detector.h"
 #include "test/simulator/pattern_renderer.h"
+#include "test/simulator/pattern_scene.h"
 
 namespace alidade::test {
 
@@ -28,14 +29,7 @@ struct Printed {
 };
 
 inline simulator::Config scene_of(const Printed& printed) {
-  simulator::Config config;
-  config.image = {752, 480, 20};
-  config.pattern.emplace();
-  config.pattern->kind = printed.kind;
-  config.pattern->columns = printed.columns;
-  config.pattern->rows = printed.rows;
-  config.pattern->size = printed.size_m;
-  return config;
+  return simulator::pattern_scene(printed.kind, printed.columns, printed.rows, printed.size_m);
 }
 
 inline std::vector<PatternObservation> found_in(const std::vector<std::uint8_t>& image,
