@@ -425,6 +425,7 @@ TEST(RealtimeStage, AllocatesNothingWhileCalibrationsComeAndGo) {
   calibrated.map.landmarks.resize(500);
   PublishedCalibration withdrawn;
   withdrawn.calibration = calibrated.calibration;
+  const double begin_s = monotonic_now_s();
   int oe = 0;
   int followed = 0;
   {
@@ -433,7 +434,10 @@ TEST(RealtimeStage, AllocatesNothingWhileCalibrationsComeAndGo) {
     PanTiltSample sample;
     OutputMessage out;
     for (int i = 0; i < 200; ++i) {
+      const double time_s = begin_s + 0.02 * i;  // however busy the machine is
       TelemetryMessage message = sample_message(0);
+      message.sample.earliest_time_s = time_s - 1e-3;
+      message.sample.latest_time_s = time_s;
       message.sample.zoom = i > 150 && i < 170 ? 2 : 1;
       stage->push(message);
       bool published = true;
@@ -445,7 +449,9 @@ TEST(RealtimeStage, AllocatesNothingWhileCalibrationsComeAndGo) {
       if (looked_at) {
         EXPECT_EQ(tap.ask(std::chrono::milliseconds(0)), nullptr);
       }
-      stage->push(image_message(scene, i % 2, 0));
+      VideoMessage image = image_message(scene, i % 2, 0);
+      image.stamp.receive_time_s = time_s;
+      stage->push(image);
       EXPECT_TRUE(stage->process());
       while (looked_at && tap.of_frame(i % 2) == nullptr) std::this_thread::yield();
       while (stage->pop(out)) oe += out.record.mode == RecordMode::kOe ? 1 : 0;
