@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace alidade::simulator {
 namespace {
@@ -23,23 +24,33 @@ Eigen::Vector3d tilted(const Eigen::Vector3d& axis, const Eigen::Vector3d& tange
 
 }  // namespace
 
-CameraModel::CameraModel(const CameraConfig& camera, const ImageConfig& image, const Path& path)
+CameraModel::CameraModel(const CameraConfig& camera, const ImageConfig& image, const Path& path,
+                         std::optional<Zoom> zoom)
     : camera_(camera),
       image_(image),
       path_(&path),
-      focal_(camera.focal_length, camera.focal_length * camera.aspect),
-      per_focal_(focal_.cwiseInverse()),
-      centre_(image.width / 2.0, image.height / 2.0),
+      zoom_(std::move(zoom)),
+      lens_(zoom_ ? zoom_->lens(0)
+                  : Lens{camera.focal_length,
+                         camera.aspect,
+                         camera.radial_distortion,
+                         {image.width / 2.0, image.height / 2.0}}),
+      per_focal_(
+          Eigen::Vector2d(lens_.focal_length, lens_.focal_length * lens_.aspect).cwiseInverse()),
       pan_axis_(tilted(Eigen::Vector3d::UnitZ(), Eigen::Vector3d::UnitX(), Eigen::Vector3d::UnitY(),
                        camera.pan_axis_offset)),
       tilt_axis_(tilted(Eigen::Vector3d::UnitY(), Eigen::Vector3d::UnitX(),
                         Eigen::Vector3d::UnitZ(), camera.tilt_axis_offset)) {
-  const double k = camera.radial_distortion;
-  largest_slope_squared_ = k < 0 ? -1 / (3 * k) : std::numeric_limits<double>::infinity();
+  const double k = lens_.radial_distortion;
+  // The corner that is farthest from the optical centre.
+  const Eigen::Vector2d size(image.width, image.height);
+  const Eigen::Vector2d farthest = lens_.centre.cwiseMax(size - lens_.centre);
+  const double corner_squared = (farthest.cwiseQuotient(Eigen::Vector2d(
+                                     lens_.focal_length, lens_.focal_length * lens_.aspect)))
+                                    .squaredNorm();
   // At the largest slope the distorted radius is 2/3 of it.
-  const double corner_squared = (centre_.cwiseQuotient(focal_)).squaredNorm();
   const double largest_squared =
-      std::min(corner_squared * kTableMargin, largest_slope_squared_ * 4 / 9);
+      std::min(corner_squared * kTableMargin, lens_.largest_slope_squared() * 4 / 9);
   samples_per_square_ = static_cast<double>(kTableSize - 1) / largest_squared;
   shrink_.reserve(kTableSize);
   double slope = 0;
@@ -63,19 +74,11 @@ Eigen::Matrix3d CameraModel::base_from_camera(const Angles& angles) const {
          Eigen::AngleAxisd(angles.tilt, tilt_axis_).toRotationMatrix() * base_from_rdf;
 }
 
-std::optional<Eigen::Vector2d> CameraModel::project(const Eigen::Vector3d& d_camera) const {
-  if (d_camera.z() <= 0) return std::nullopt;
-  const Eigen::Vector2d slope = d_camera.head<2>() / d_camera.z();
-  const double square = slope.squaredNorm();
-  if (square >= largest_slope_squared_) return std::nullopt;
-  return centre_ + focal_.cwiseProduct(slope) * (1 + camera_.radial_distortion * square);
-}
-
 std::optional<Eigen::Vector2d> CameraModel::project_rolling(const Eigen::Vector3d& d_base,
                                                             double t0_s) const {
   const auto seen_from_row = [&](double row) {
     const double time = t0_s + row * camera_.line_delay;
-    return project(base_from_camera_at(time).transpose() * d_base);
+    return lens_at(time).project(base_from_camera_at(time).transpose() * d_base);
   };
   // The row that is exposed while the direction lies on it: the root of v(row) - row, by bisection.
   double low = 0;

@@ -2,10 +2,13 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <optional>
+#include <string>
 #include <utility>
 
 #include "test/simulator/config_section.h"
 #include "test/simulator/pattern_board.h"
+#include "test/simulator/zoom.h"
 
 namespace alidade::simulator {
 namespace {
@@ -20,7 +23,12 @@ void read_image(Section& section, ImageConfig* image) {
   section.number("rate_hz", &image->rate_hz, kPositive);
 }
 
-void read_camera(Section& section, CameraConfig* camera) {
+void read_camera(Section& section, bool zooms, CameraConfig* camera) {
+  for (const char* key : {"focal_length_px", "radial_distortion"}) {
+    if (zooms && section.has(key)) {
+      section.fail(std::string(key) + " belongs to a lens without zoom: zoom has its own");
+    }
+  }
   section.number("focal_length_px", &camera->focal_length, kPositive);
   section.number("aspect", &camera->aspect, kPositive);
   section.number("radial_distortion", &camera->radial_distortion);
@@ -42,6 +50,7 @@ void read_path(Section& section, PathConfig* path) {
   section.number("amplitude", &path->amplitude, kNotNegative);
   section.number("period_s", &path->period, kPositive);
   section.number("stop_s", &path->stop, kNotNegative);
+  section.number("focal_length_px", &path->focal_length, kPositive);
   section.number("pan_deg", &path->pan, kAny, kDegree);
   section.number("tilt_deg", &path->tilt, kAny, kDegree);
   section.path("file", &path->file);
@@ -271,7 +280,10 @@ void read_config(Section& section, Config* config) {
   config->seed = static_cast<std::uint64_t>(seed);
   section.number("duration_s", &config->duration, kNotNegative);
   section.section("image", [&](Section& item) { read_image(item, &config->image); });
-  section.section("camera", [&](Section& item) { read_camera(item, &config->camera); });
+  section.section("zoom", [&](Section& item) { read_zoom(item, &config->zoom.emplace()); });
+  section.section("camera", [&](Section& item) {
+    read_camera(item, config->zoom.has_value(), &config->camera);
+  });
   section.section("path", [&](Section& item) { read_path(item, &config->path); });
   section.section("scene", [&](Section& item) { read_scene(item, &config->scene); });
   section.section("sensor", [&](Section& item) { read_sensor(item, &config->sensor); });
@@ -293,6 +305,7 @@ void read_config(Section& section, Config* config) {
   if (std::abs(config->camera.line_delay) * config->image.height * config->image.rate_hz > 1) {
     section.fail("camera: reading out all rows (line_delay_us x height) outlasts a frame");
   }
+  if (config->pattern && config->zoom) section.fail("a pattern is seen without zoom");
   if (config->pattern && config->recording.images == RecordingConfig::Images::kNone) {
     section.fail("recording: a pattern needs images: video, png or pgm");
   }
@@ -315,8 +328,16 @@ Config load_config(const std::filesystem::path& file) {
   return config;
 }
 
+double field_of_view(const ImageConfig& image, double focal_length) {
+  return 2 * std::atan2(image.width, 2 * focal_length);
+}
+
 double horizontal_field_of_view(const Config& config) {
-  return 2 * std::atan2(config.image.width, 2 * config.camera.focal_length);
+  const std::optional<Zoom> zoom = make_zoom(config);
+  const double focal_length = config.path.focal_length > 0 ? config.path.focal_length
+                              : zoom                       ? zoom->focal_lengths().tele
+                                                           : config.camera.focal_length;
+  return field_of_view(config.image, focal_length);
 }
 
 }  // namespace alidade::simulator

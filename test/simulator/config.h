@@ -14,6 +14,7 @@
 #include <vector>
 
 #include "test/simulator/servers/simulated_head.h"
+#include "test/simulator/zoom_config.h"
 
 namespace alidade::simulator {
 
@@ -48,6 +49,8 @@ struct PathConfig {
   double period = 10;        // s
   double stop = 0.5;         // s of rest after each move of a sweep
   double pan = 0, tilt = 0;  // rad, the centre
+  double focal_length =
+      0;  // px, whose fields of view are meant; 0: the camera's, with a zoom the longest of its path
   std::filesystem::path file;
 };
 
@@ -175,6 +178,7 @@ struct Config {
   RecordingConfig recording;
   LiveConfig live;
   std::optional<PatternConfig> pattern;
+  std::optional<ZoomConfig> zoom;            // in place of the camera's focal length and distortion
   std::optional<double> guess_focal_length;  // px, of guess.yaml; default: the truth, rounded
   std::filesystem::path truth_dir;           // live: where truth.yaml and truth.csv go
 };
@@ -182,7 +186,9 @@ struct Config {
 // Throws ConfigError.
 [[nodiscard]] Config load_config(const std::filesystem::path& file);
 
-// Angle of the image's width seen through an undistorted lens, rad: the s of the paper's path.
+// Angle of the image's width seen through an undistorted lens, rad.
+[[nodiscard]] double field_of_view(const ImageConfig& image, double focal_length);
+// That of the path: the s of the paper's.
 [[nodiscard]] double horizontal_field_of_view(const Config& config);
 
 }  // namespace alidade::simulator

@@ -42,6 +42,8 @@ class Section {
   }
   [[noreturn]] void fail(const std::string& what) const { fail(node_, what); }
 
+  [[nodiscard]] bool has(const char* key) const { return node_[key].IsDefined(); }
+
   // The number in the file times `unit` becomes the value; the range is that of the file.
   void number(const char* key, double* value, Range range = kAny, double unit = 1) {
     if (const YAML::Node node = take(key)) *value = scalar(node, key, range) * unit;

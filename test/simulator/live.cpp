@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdio>
 #include <functional>
 #include <memory>
 #include <mutex>
+#include <numeric>
 #include <optional>
 #include <string>
 #include <vector>
@@ -24,6 +26,7 @@
 #include "test/simulator/telemetry.h"
 #include "test/simulator/timeline.h"
 #include "test/simulator/truth.h"
+#include "test/simulator/zoom.h"
 
 namespace alidade::simulator {
 namespace {
@@ -63,9 +66,14 @@ class Subject {
     return pattern_ ? pattern_->render(t0_s, sequence) : scene_->render(t0_s, sequence);
   }
 
-  // s; 0: what is seen does not repeat.
-  [[nodiscard]] double period_s() const {
-    return scene_ && scene_->steady() ? path_.period_s() : 0;
+  // After how many frames what is seen repeats; 0: it does not, or not after a whole number.
+  [[nodiscard]] std::int64_t period(double rate_hz) const {
+    if (!scene_ || !scene_->steady()) return 0;
+    const Zoom* zoom = scene_->camera().zoom();
+    const std::int64_t turns = whole_frames(path_.period_s(), rate_hz);
+    if (zoom == nullptr || !zoom->path().moves()) return turns;
+    const std::int64_t zooms = whole_frames(zoom->period_s(), rate_hz);
+    return turns > 0 && zooms > 0 ? std::lcm(turns, zooms) : 0;
   }
 
   void write_truth(const Config& config) {
@@ -76,7 +84,8 @@ class Subject {
       poses_.emplace(folder / "truth.csv");
     } else {
       write_truth_yaml(folder / "truth.yaml", config, scene_->camera());
-      angles_.emplace(folder / "truth.csv");
+      const Zoom* zoom = scene_->camera().zoom();
+      angles_.emplace(folder / "truth.csv", zoom != nullptr ? std::optional(*zoom) : std::nullopt);
     }
   }
   // Nothing without write_truth().
@@ -90,6 +99,11 @@ class Subject {
   }
 
  private:
+  static std::int64_t whole_frames(double period_s, double rate_hz) {
+    const double frames = period_s * rate_hz;
+    return std::abs(frames - std::round(frames)) < 1e-6 ? std::llround(frames) : 0;
+  }
+
   const Path& path_;
   std::optional<Renderer> scene_;  // one of the two
   std::optional<PatternRenderer> pattern_;
@@ -99,15 +113,14 @@ class Subject {
 
 // How many frames stand for all of them.
 std::size_t frames_to_render(const Config& config, const Subject& subject) {
-  const double per_period = subject.period_s() * config.image.rate_hz;
-  const bool repeats = per_period > 0 && std::abs(per_period - std::round(per_period)) < 1e-6;
+  const std::int64_t per_period = subject.period(config.image.rate_hz);
   const double in_all = std::ceil(config.duration * config.image.rate_hz);
-  if (!repeats && config.duration <= 0) {
+  if (per_period == 0 && config.duration <= 0) {
     throw ConfigError(
-        "duration_s is missing: this path, scene or hand does not repeat after a whole number of "
-        "frames");
+        "duration_s is missing: this path, zoom, scene or hand does not repeat after a whole "
+        "number of frames");
   }
-  double count = repeats ? std::round(per_period) : in_all;
+  double count = per_period > 0 ? static_cast<double>(per_period) : in_all;
   if (config.duration > 0) count = std::min(count, in_all);
   return static_cast<std::size_t>(count);
 }
@@ -184,18 +197,26 @@ HeadServer::Link link_of(LiveConfig::Link link) {
   return HeadServer::Link::kSerial;
 }
 
-// ONVIF in its generic space: -1..1 for half a turn of pan and a quarter of tilt either way.
-OnvifDevice onvif_device(const LiveConfig& live, const std::function<HeadPosition()>& position) {
+// What a live camera tells of itself at one moment.
+struct Reading {
+  double pan_deg = 0;
+  double tilt_deg = 0;
+  std::optional<double> zoom;  // device units
+  double zoom_part = 0;        // 0 at the wide end, 1 at the tele end
+};
+
+// ONVIF in its generic space: -1..1 for half a turn of pan and a quarter of tilt either way, 0..1 for the zoom.
+OnvifDevice onvif_device(const LiveConfig& live, const std::function<Reading()>& position) {
   OnvifDevice device;
   device.login = live.user.empty() ? OnvifDevice::Login::kNone : OnvifDevice::Login::kToken;
   device.user = live.user;
   device.password = live.password;
   device.announced_host.clear();
   device.position = [position] {
-    const HeadPosition now = position();
+    const Reading now = position();
     char text[128];
-    std::snprintf(text, sizeof text, R"(<tt:PanTilt x="%.7f" y="%.7f"/><tt:Zoom x="0"/>)",
-                  now.pan_deg / 180, now.tilt_deg / 90);
+    std::snprintf(text, sizeof text, R"(<tt:PanTilt x="%.7f" y="%.7f"/><tt:Zoom x="%.7g"/>)",
+                  now.pan_deg / 180, now.tilt_deg / 90, now.zoom_part);
     return std::string(text);
   };
   return device;
@@ -237,15 +258,19 @@ void serve_live(const Config& given, const std::atomic<bool>& stop) {
   vapix_options.user = config.live.user;
   vapix_options.password = config.live.password;
   std::mutex measuring;  // each server asks on threads of its own
+  const std::optional<Zoom> zoom = make_zoom(config);
   const auto position_at = [&](double now) {
     const std::lock_guard<std::mutex> lock(measuring);
     const Angles angles = telemetry.measure(now - origin - config.telemetry.latency);
-    return HeadPosition{angles.pan * kDegreesPerRadian, angles.tilt * kDegreesPerRadian, 1};
+    Reading reading{angles.pan * kDegreesPerRadian, angles.tilt * kDegreesPerRadian,
+                    telemetry.zoom(), 0};
+    if (zoom) reading.zoom_part = zoom->part(*reading.zoom);
+    return reading;
   };
   const auto position = [&] { return position_at(monotonic_now()); };
   VapixServer vapix(vapix_options, [&](double now) {
-    const HeadPosition there = position_at(now);
-    return VapixPosition{there.pan_deg, there.tilt_deg, 1};
+    const Reading there = position_at(now);
+    return VapixPosition{there.pan_deg, there.tilt_deg, there.zoom.value_or(1)};
   });
   start(vapix);
   std::string ready = "ready rtsp://127.0.0.1:" + std::to_string(video.port()) +
@@ -263,7 +288,12 @@ void serve_live(const Config& given, const std::atomic<bool>& stop) {
   }
   std::optional<HeadServer> head;
   if (config.live.head) {
-    head.emplace(link_of(config.live.head_link), config.live.head->make(position));
+    const auto head_position = [&] {
+      const Reading now = position();
+      const auto steps = std::lround(config.live.head->tele_zoom * now.zoom_part);
+      return HeadPosition{now.pan_deg, now.tilt_deg, now.zoom ? static_cast<int>(steps) : 1};
+    };
+    head.emplace(link_of(config.live.head_link), config.live.head->make(head_position));
     ready += " head=" + head->address();
   }
   std::printf("%s\n", ready.c_str());

@@ -3,13 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <cstdlib>
-#include <fstream>
 #include <random>
-#include <sstream>
-#include <string>
 #include <vector>
 
+#include "test/simulator/path_table.h"
 #include "test/simulator/random.h"
 
 namespace alidade::simulator {
@@ -108,14 +105,17 @@ std::unique_ptr<Path> make_jerky(const PathConfig& config, double field, std::ui
 class Sampled : public Path {
  public:
   explicit Sampled(const std::filesystem::path& file) {
-    std::ifstream stream(file);
-    std::string line;
-    if (!std::getline(stream, line)) throw ConfigError(file.string() + ": cannot be read");
-    const std::array<std::size_t, 3> columns = find_columns(file, line);
-    for (int number = 2; std::getline(stream, line); ++number) {
-      add(file.string() + ":" + std::to_string(number), columns, split(line));
+    for (const std::vector<double>& row :
+         read_path_table(file, {"time_s", "pan_rad", "tilt_rad"})) {
+      Angles point{row[1], row[2]};
+      if (!points_.empty()) {
+        // The shorter way round: a truth.csv wraps its angles.
+        point.pan = points_.back().pan + std::remainder(point.pan - points_.back().pan, kTwoPi);
+        point.tilt = points_.back().tilt + std::remainder(point.tilt - points_.back().tilt, kTwoPi);
+      }
+      times_.push_back(row[0]);
+      points_.push_back(point);
     }
-    if (times_.size() < 2) throw ConfigError(file.string() + ": a path needs two points or more");
   }
 
   Angles at(double time_s) const override {
@@ -136,53 +136,6 @@ class Sampled : public Path {
   double period_s() const override { return 0; }
 
  private:
-  static std::vector<std::string> split(const std::string& line) {
-    std::vector<std::string> cells;
-    std::stringstream stream(line);
-    for (std::string cell; std::getline(stream, cell, ',');) {
-      while (!cell.empty() && (cell.back() == '\r' || cell.back() == ' ')) cell.pop_back();
-      cells.push_back(cell);
-    }
-    return cells;
-  }
-
-  static std::array<std::size_t, 3> find_columns(const std::filesystem::path& file,
-                                                 const std::string& header) {
-    const std::vector<std::string> names = split(header);
-    std::array<std::size_t, 3> columns{};
-    const std::array<const char*, 3> wanted{"time_s", "pan_rad", "tilt_rad"};
-    for (std::size_t i = 0; i < wanted.size(); ++i) {
-      const auto found = std::find(names.begin(), names.end(), wanted.at(i));
-      if (found == names.end()) {
-        throw ConfigError(file.string() + ":1: column " + wanted.at(i) + " is missing");
-      }
-      columns.at(i) = static_cast<std::size_t>(found - names.begin());
-    }
-    return columns;
-  }
-
-  void add(const std::string& where, const std::array<std::size_t, 3>& columns,
-           const std::vector<std::string>& cells) {
-    std::array<double, 3> values{};
-    for (std::size_t i = 0; i < 3; ++i) {
-      char* end = nullptr;
-      const std::string cell = columns.at(i) < cells.size() ? cells[columns.at(i)] : "";
-      values.at(i) = std::strtod(cell.c_str(), &end);
-      if (cell.empty() || *end != '\0' || !std::isfinite(values.at(i))) {
-        throw ConfigError(where + ": a path needs a number in time_s, pan_rad and tilt_rad");
-      }
-    }
-    Angles point{values[1], values[2]};
-    if (!times_.empty()) {
-      if (values[0] <= times_.back()) throw ConfigError(where + ": time_s must increase");
-      // The shorter way round: a truth.csv wraps its angles.
-      point.pan = points_.back().pan + std::remainder(point.pan - points_.back().pan, kTwoPi);
-      point.tilt = points_.back().tilt + std::remainder(point.tilt - points_.back().tilt, kTwoPi);
-    }
-    times_.push_back(values[0]);
-    points_.push_back(point);
-  }
-
   double tangent(std::size_t i, double Angles::*axis) const {
     if (i == 0 || i + 1 == times_.size()) return 0;
     return (points_[i + 1].*axis - points_[i - 1].*axis) / (times_[i + 1] - times_[i - 1]);

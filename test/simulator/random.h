@@ -21,7 +21,8 @@ enum class Stream : std::uint64_t {
   kBoil,
   kTexture,
   kTracks,
-  kPeriods
+  kPeriods,
+  kZoom
 };
 
 // The finaliser of splitmix64 (Steele, Lea, Flood 2014): every input bit changes half the output.

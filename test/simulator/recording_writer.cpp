@@ -1,11 +1,8 @@
 #include "test/simulator/recording_writer.h"
 
-#include <Eigen/Core>
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <functional>
-#include <map>
 #include <memory>
 #include <opencv2/imgcodecs.hpp>
 #include <optional>
@@ -20,6 +17,7 @@
 #include "test/simulator/servers/encoder.h"
 #include "test/simulator/telemetry.h"
 #include "test/simulator/timeline.h"
+#include "test/simulator/track_writer.h"
 #include "test/simulator/truth.h"
 #include "test/simulator/video_writer.h"
 
@@ -29,7 +27,6 @@ namespace {
 namespace fs = std::filesystem;
 using Images = RecordingConfig::Images;
 
-constexpr double kPi = 3.14159265358979323846;
 constexpr double kTelemetryMargin = 1;  // s before the first and after the last frame
 
 void prepare_directory(const fs::path& directory) {
@@ -62,9 +59,10 @@ void write_recording_yaml(const Config& config, const fs::path& directory) {
 }
 
 void write_frames(const std::vector<FrameEvent>& frames, const Path& path,
-                  const fs::path& directory) {
+                  const CameraModel& camera, const fs::path& directory) {
   OutputFile stamps(directory / "frames.csv");
-  TruthCsv truth(directory / "truth.csv");
+  TruthCsv truth(directory / "truth.csv",
+                 camera.zoom() != nullptr ? std::optional(*camera.zoom()) : std::nullopt);
   stamps.stream() << "frame,receive_time_s,sender_time_s,sequence\n";
   for (const FrameEvent& event : frames) {
     stamps.stream() << event.frame << ',' << event.stamp_s << ',' << event.sender_s << ','
@@ -77,7 +75,8 @@ void write_frames(const std::vector<FrameEvent>& frames, const Path& path,
 
 void write_telemetry(const Config& config, const Path& path, const fs::path& directory) {
   OutputFile output(directory / "telemetry.csv");
-  output.stream() << "receive_time_s,pan_rad,tilt_rad,sequence\n";
+  output.stream() << "receive_time_s,pan_rad,tilt_rad," << (config.zoom ? "zoom," : "")
+                  << "sequence\n";
   Telemetry telemetry(config, path);
   JitteredStamps stamps(config.timing.telemetry, config.seed, Stream::kTelemetryStamp);
   const double rate = config.telemetry.rate_hz;
@@ -86,7 +85,9 @@ void write_telemetry(const Config& config, const Path& path, const fs::path& dir
     const double time = static_cast<double>(i) / rate - kTelemetryMargin;
     const Angles angles = telemetry.measure(time);
     output.stream() << stamps.stamp(time) + config.camera.clock_offset << ',' << angles.pan << ','
-                    << angles.tilt << ',' << i << '\n';
+                    << angles.tilt << ',';
+    if (config.zoom) output.stream() << telemetry.zoom().value() << ',';
+    output.stream() << i << '\n';
   }
   output.flush();
 }
@@ -124,57 +125,15 @@ void write_noise_yaml(const Config& config, const fs::path& directory) {
   output.flush();
 }
 
-// As a data sheet would tell it: two digits of the focal length, nothing else.
-void write_guess_yaml(const Config& config, const fs::path& directory) {
-  const double focal_length = config.camera.focal_length;
+// As a data sheet would tell it: two digits of the focal length (with a zoom, of that at time 0), nothing else.
+void write_guess_yaml(const Config& config, const CameraModel& camera, const fs::path& directory) {
+  const double focal_length = camera.lens_at(0).focal_length;
   const double unit = std::pow(10, std::floor(std::log10(focal_length)) - 1);
   const double guess = config.guess_focal_length.value_or(std::round(focal_length / unit) * unit);
   OutputFile output(directory / "guess.yaml");
   output.stream() << "focal_length: {value: " << guess
                   << "}\nradial_distortion: {value: 0}\nclock_offset: {value: 0}\n"
                      "line_delay: {value: 0}\n";
-  output.flush();
-}
-
-// Landmarks stand on a grid of azimuth and elevation over the whole sphere.
-void write_tracks(const Config& config, const std::vector<FrameEvent>& frames,
-                  const CameraModel& camera, const fs::path& directory) {
-  OutputFile output(directory / "tracks.csv");
-  output.stream() << "frame,landmark,u_px,v_px,sigma_px\n";
-  const double wanted = config.recording.landmark_spacing * horizontal_field_of_view(config);
-  const int around = std::max(4, static_cast<int>(std::lround(2 * kPi / wanted)));
-  const double spacing = 2 * kPi / around;
-  const double reach = 0.55 * std::atan2(std::hypot(config.image.width, config.image.height),
-                                         config.camera.focal_length) +
-                       2 * spacing;
-  std::map<std::pair<int, int>, int> numbers;
-  std::mt19937_64 generator = make_generator(config.seed, Stream::kTracks);
-  std::normal_distribution<double> noise(0, config.recording.pixel_sigma);
-  for (const FrameEvent& event : frames) {
-    const Eigen::Vector3d axis = camera.base_from_camera_at(event.capture_s).col(2);
-    const double azimuth = std::atan2(axis.y(), axis.x());
-    const double elevation = -std::asin(std::clamp(axis.z(), -1.0, 1.0));
-    const auto row_of = [&](double angle) {
-      return static_cast<int>(std::lround(angle / spacing));
-    };
-    const double highest = std::min(std::abs(elevation) + reach, kPi / 2);
-    const double sideways = std::min(kPi - spacing, reach / std::max(0.01, std::cos(highest)));
-    for (int row = row_of(elevation - reach); row <= row_of(elevation + reach); ++row) {
-      if (std::abs(row) * spacing > kPi / 2) continue;
-      for (int column = row_of(azimuth - sideways); column <= row_of(azimuth + sideways);
-           ++column) {
-        const auto seen =
-            camera.project_rolling(direction(column * spacing, row * spacing), event.capture_s);
-        if (!seen) continue;
-        const std::pair<int, int> place{row, (column % around + around) % around};
-        const int number = numbers.emplace(place, static_cast<int>(numbers.size())).first->second;
-        const double u = seen->x() + noise(generator);
-        output.stream() << event.frame << ',' << number << ',' << u << ','
-                        << seen->y() + noise(generator) << ',' << config.recording.pixel_sigma
-                        << '\n';
-      }
-    }
-  }
   output.flush();
 }
 
@@ -265,17 +224,17 @@ void write_recording(const Config& config, const fs::path& directory) {
   if (config.duration <= 0) throw ConfigError("duration_s is missing: a recording needs an end");
   if (config.pattern) return write_pattern_recording(config, directory);
   const std::unique_ptr<Path> path = make_path(config);
-  const CameraModel camera(config.camera, config.image, *path);
+  const CameraModel camera(config.camera, config.image, *path, make_zoom(config));
   const bool images = config.recording.images != Images::kNone;
   const auto renderer = images ? std::make_unique<Renderer>(config, *path) : nullptr;
 
   prepare_directory(directory);
   const std::vector<FrameEvent> frames = all_frames(config);
   write_recording_yaml(config, directory);
-  write_frames(frames, *path, directory);
+  write_frames(frames, *path, camera, directory);
   write_telemetry(config, *path, directory);
   write_noise_yaml(config, directory);
-  write_guess_yaml(config, directory);
+  write_guess_yaml(config, camera, directory);
   write_truth_yaml(directory / "truth.yaml", config, camera);
   if (images) {
     write_images(
@@ -283,7 +242,7 @@ void write_recording(const Config& config, const fs::path& directory) {
         [&](const FrameEvent& event) { return renderer->render(event.capture_s, event.sequence); },
         directory);
   } else {
-    write_tracks(config, frames, camera, directory);
+    write_tracks(config, frames, camera, directory / "tracks.csv");
   }
 }
 

@@ -32,33 +32,53 @@ constexpr std::array<Point, 8> kPointsInMotion{{{0.0625, 0.1875},
                                                 {-0.0625, -0.1875}}};
 constexpr double kRestBlur = 1;  // px during the exposure
 
+// A zoom's preparation for one focal length serves from half of it on; a little less, as the lens is no tangent.
+constexpr double kServesFrom = 0.45;
+
 // Directions that bound what the camera will see: a grid over the image, all along the path.
-std::vector<Eigen::Vector3d> seen_directions(const Config& config, const Path& path,
-                                             const CameraModel& camera) {
+std::vector<Sight> all_sights(const Config& config, const Path& path, const CameraModel& camera) {
   constexpr int kTimes = 600;
+  constexpr int kZoomTimes = 2400;  // the view changes quickly
   constexpr int kGrid = 4;
-  const double length = std::max(config.duration, path.period_s());
-  std::vector<Eigen::Vector3d> seen;
-  for (int i = 0; i <= kTimes; ++i) {
-    const Eigen::Matrix3d turn = camera.base_from_camera_at(length * i / kTimes);
+  const Zoom* zoom = camera.zoom();
+  const int times = zoom != nullptr ? kZoomTimes : kTimes;
+  const double length =
+      std::max({config.duration, path.period_s(), zoom != nullptr ? zoom->path().period_s() : 0.0});
+  std::vector<Sight> sights{{config.camera.focal_length, {}}};
+  if (zoom != nullptr) {
+    const ZoomConfig::Ends focal_lengths = zoom->focal_lengths();
+    sights.front().focal_length = focal_lengths.tele;
+    while (sights.back().focal_length >= 2 * focal_lengths.wide) {
+      sights.push_back({sights.back().focal_length / 2, {}});
+    }
+  }
+  for (int i = 0; i <= times; ++i) {
+    const double time = length * i / times;
+    const Eigen::Matrix3d turn = camera.base_from_camera_at(time);
+    const Lens lens = camera.lens_at(time);
     for (int row = 0; row <= kGrid; ++row) {
       for (int column = 0; column <= kGrid; ++column) {
-        const Eigen::Vector2d slope =
-            camera.slope(config.image.width * column / static_cast<double>(kGrid),
-                         config.image.height * row / static_cast<double>(kGrid));
-        if (!slope.hasNaN()) seen.push_back(turn * slope.homogeneous().normalized());
+        const double u = config.image.width * column / static_cast<double>(kGrid);
+        const double v = config.image.height * row / static_cast<double>(kGrid);
+        const Eigen::Vector2d slope = zoom != nullptr ? lens.slope(u, v) : camera.slope(u, v);
+        if (slope.hasNaN()) continue;
+        const Eigen::Vector3d d_base = turn * slope.homogeneous().normalized();
+        for (Sight& sight : sights) {
+          const bool serves = lens.focal_length >= kServesFrom * sight.focal_length;
+          if (serves || &sight == &sights.back()) sight.seen.push_back(d_base);
+        }
       }
     }
   }
-  return seen;
+  return sights;
 }
 
 }  // namespace
 
 Renderer::Renderer(const Config& config, const Path& path)
     : config_(config),
-      camera_(config.camera, config.image, path),
-      scene_(config.scene, config.camera.focal_length, seen_directions(config, path, camera_),
+      camera_(config.camera, config.image, path, make_zoom(config)),
+      scene_(config.scene, all_sights(config, path, camera_), camera_.zoom() != nullptr,
              config.seed),
       noise_(config.sensor, config.seed) {
   if (config.sensor.boil > 0) {
@@ -93,8 +113,8 @@ Eigen::Vector2d Renderer::boil(double u, double v, double time_s) const {
   return sum;
 }
 
-void Renderer::rays_of_row(double v, double offset_u, double time_s, std::vector<double>* x,
-                           std::vector<double>* y) const {
+void Renderer::rays_of_row(const Lens* lens, double v, double offset_u, double time_s,
+                           std::vector<double>* x, std::vector<double>* y) const {
   Eigen::Vector2d left = Eigen::Vector2d::Zero();
   Eigen::Vector2d right = boil(0, v, time_s);
   for (int column = 0; column < config_.image.width; ++column) {
@@ -104,7 +124,9 @@ void Renderer::rays_of_row(double v, double offset_u, double time_s, std::vector
       right = boil(column + kBoilStep, v, time_s);
     }
     const Eigen::Vector2d shift = left + (right - left) * (within / double{kBoilStep});
-    const Eigen::Vector2d slope = camera_.slope(column + 0.5 + offset_u + shift.x(), v + shift.y());
+    const double u = column + 0.5 + offset_u + shift.x();
+    const Eigen::Vector2d slope =
+        lens != nullptr ? lens->slope(u, v + shift.y()) : camera_.slope(u, v + shift.y());
     (*x)[static_cast<std::size_t>(column)] = slope.x();
     (*y)[static_cast<std::size_t>(column)] = slope.y();
   }
@@ -128,12 +150,15 @@ std::vector<std::uint8_t> Renderer::render(double t0_s, std::int64_t sequence) c
   const auto row_size = static_cast<std::size_t>(width);
 
   const double readout = height * config_.camera.line_delay;
-  const Eigen::Matrix3d before =
-      camera_.base_from_camera_at(t0_s + readout / 2 - sensor.exposure / 2);
-  const Eigen::Matrix3d after =
-      camera_.base_from_camera_at(t0_s + readout / 2 + sensor.exposure / 2);
-  // The norm of a difference of rotations by the small angle a is sqrt(2) a.
-  const double blur = config_.camera.focal_length * (after - before).norm() / std::sqrt(2.0);
+  const double opens = t0_s + readout / 2 - sensor.exposure / 2;
+  const double closes = t0_s + readout / 2 + sensor.exposure / 2;
+  const Eigen::Matrix3d before = camera_.base_from_camera_at(opens);
+  const Eigen::Matrix3d after = camera_.base_from_camera_at(closes);
+  const double focal_length = camera_.lens_at(closes).focal_length;
+  // The norm of a difference of rotations by the small angle a is sqrt(2) a. Zooming is fastest in the corners.
+  const double blur = focal_length * (after - before).norm() / std::sqrt(2.0) +
+                      std::abs(focal_length / camera_.lens_at(opens).focal_length - 1) *
+                          std::hypot(width, height) / 2;
   const bool rests = blur < kRestBlur;
   const int exposures =
       rests ? 4 : std::min(8 * static_cast<int>(std::ceil(blur / 8)), kMostExposures);
@@ -153,9 +178,11 @@ std::vector<std::uint8_t> Renderer::render(double t0_s, std::int64_t sequence) c
       const auto& [offset_u, offset_v] = rests
                                              ? kPointsAtRest.at(static_cast<std::size_t>(i))
                                              : kPointsInMotion.at(static_cast<std::size_t>(i % 8));
-      rays_of_row(v + offset_v, offset_u, time, &x, &y);
-      scene_.shade(camera_.base_from_camera_at(time), time, x.data(), y.data(), row_size,
-                   1.0F / static_cast<float>(exposures), signal.data());
+      const Lens lens = camera_.lens_at(time);
+      rays_of_row(camera_.zoom() != nullptr ? &lens : nullptr, v + offset_v, offset_u, time, &x,
+                  &y);
+      scene_.shade(camera_.base_from_camera_at(time), time, lens.focal_length, x.data(), y.data(),
+                   row_size, 1.0F / static_cast<float>(exposures), signal.data());
     }
 
     const double row_light = 255 * light(row_time);

@@ -1,5 +1,5 @@
 #pragma once
-// Frames of the virtual camera, row by row: every row sees the scene with the orientation of its own
+// Frames of the virtual camera, row by row: every row sees the scene with the orientation and the lens of its own
 // time, evaluated on the true path.
 //
 // A pixel's signal is the mean over its area and its exposure: sub-exposures spread evenly over the
@@ -42,8 +42,9 @@ class Renderer {
   };
 
   [[nodiscard]] Eigen::Vector2d boil(double u, double v, double time_s) const;
-  void rays_of_row(double v, double offset_u, double time_s, std::vector<double>* x,
-                   std::vector<double>* y) const;
+  // lens: with a zoom, that of time_s; null: the camera's.
+  void rays_of_row(const Lens* lens, double v, double offset_u, double time_s,
+                   std::vector<double>* x, std::vector<double>* y) const;
   [[nodiscard]] double light(double time_s) const;
 
   Config config_;

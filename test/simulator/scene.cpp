@@ -69,6 +69,18 @@ std::optional<Eigen::AlignedBox2d> seen_part(const PatchConfig& config,
   return box;
 }
 
+// From pixel to pixel of a block, in the coordinates given.
+double pixel_spacing(const std::array<double, kBlock>& x, const std::array<double, kBlock>& y,
+                     const std::array<float, kBlock>& cover, std::size_t size) {
+  for (std::size_t i = 0; i + 1 < size; ++i) {
+    if (cover[i] > 0 && cover[i + 1] > 0) return std::hypot(x[i + 1] - x[i], y[i + 1] - y[i]);
+  }
+  return 0;
+}
+
+// The mip level for pixels so many texels apart: at most one texel of the level a pixel keeps the picture smooth.
+double level_of(double spacing) { return std::log2(0.7 * std::max(1e-3, spacing)); }
+
 // A rectangle with a coarse pattern, so that it looks like something and not like a flat area.
 cv::Mat object_picture(double brightness) {
   cv::Mat picture(32, 64, CV_32F, cv::Scalar(brightness));
@@ -87,16 +99,15 @@ Eigen::Vector3d direction(double azimuth, double elevation) {
           -std::sin(elevation)};
 }
 
-Scene::Scene(const SceneConfig& config, double focal_length,
-             const std::vector<Eigen::Vector3d>& seen, std::uint64_t seed)
-    : background_(static_cast<float>(config.background)), pixels_per_unit_(focal_length) {
+Scene::Scene(const SceneConfig& config, const std::vector<Sight>& sights, bool zooms,
+             std::uint64_t seed)
+    : background_(static_cast<float>(config.background)), zooms_(zooms) {
   for (const PatchConfig& moving : config.moving) {
     add_object(moving, object_picture(moving.brightness));
   }
   for (const PatchConfig& flat : config.flat) {
     add_object(flat, cv::Mat(8, 8, CV_32F, cv::Scalar(flat.brightness)));
   }
-  const double density = focal_length * kTexelsPerPixel;
   std::uint64_t texture_seed = mix(seed, static_cast<std::uint64_t>(Stream::kTexture));
   for (const PatchConfig& photo : config.photos) {
     cv::Mat bytes;
@@ -107,15 +118,15 @@ Scene::Scene(const SceneConfig& config, double focal_length,
     if (bytes.empty()) throw ConfigError(photo.file.string() + ": not a picture that can be read");
     cv::Mat picture;
     bytes.convertTo(picture, CV_32F, 1 / 255.0);
-    add_photo(photo, picture, seen, density, config.detail, ++texture_seed);
+    add_photo(photo, picture, sights, config.detail, ++texture_seed);
   }
   for (const PatchConfig& procedural : config.procedural) {
     const double shape = half_extent(procedural.projection, procedural.height) /
                          half_extent(procedural.projection, procedural.width);
     const int height = std::max(1, static_cast<int>(std::lround(kProceduralWidth * shape)));
     ++texture_seed;
-    add_photo(procedural, make_procedural(kProceduralWidth, height, mix(texture_seed)), seen,
-              density, config.detail, texture_seed);
+    add_photo(procedural, make_procedural(kProceduralWidth, height, mix(texture_seed)), sights,
+              config.detail, texture_seed);
   }
   if (patches_.size() > kMostPatches) {
     throw ConfigError("scene: at most " + std::to_string(kMostPatches) + " patches can be seen");
@@ -126,13 +137,14 @@ void Scene::add_object(const PatchConfig& config, const cv::Mat& picture) {
   const Eigen::Vector2d half_size(half_extent(config.projection, config.width),
                                   half_extent(config.projection, config.height));
   const Eigen::Vector2d texels(picture.cols, picture.rows);
-  patches_.push_back(
-      {config, Texture(picture), -half_size, texels.cwiseQuotient(2 * half_size), half_size});
+  Patch patch{config, half_size, {}};
+  patch.layers.push_back({Texture(picture), -half_size, texels.cwiseQuotient(2 * half_size),
+                          Eigen::AlignedBox2d(-half_size, half_size)});
+  patches_.push_back(std::move(patch));
 }
 
 void Scene::add_photo(const PatchConfig& config, const cv::Mat& photo,
-                      const std::vector<Eigen::Vector3d>& seen, double density, double detail,
-                      std::uint64_t seed) {
+                      const std::vector<Sight>& sights, double detail, std::uint64_t seed) {
   Eigen::Vector2d half_size;
   half_size.x() = half_extent(config.projection, config.width);
   half_size.y() = half_size.x() * photo.rows / photo.cols;
@@ -140,31 +152,46 @@ void Scene::add_photo(const PatchConfig& config, const cv::Mat& photo,
   if (config.projection == Projection::kEquirectangular && half_size.y() > 1.5708) {
     throw ConfigError(name + ": is more than 180 degrees high; make it narrower");
   }
-  const auto part = seen_part(config, seen, half_size);
-  if (!part) return;
-
   const double photo_density = photo.cols / (2 * half_size.x());
-  const Eigen::Vector2d low = (part->min() + half_size) * photo_density;
-  const Eigen::Vector2d high = (part->max() + half_size) * photo_density;
-  const cv::Point first(static_cast<int>(std::floor(low.x())) - 4,
-                        static_cast<int>(std::floor(low.y())) - 4);
-  const cv::Point last(static_cast<int>(std::ceil(high.x())) + 4,
-                       static_cast<int>(std::ceil(high.y())) + 4);
-  const cv::Rect window = cv::Rect(first, last) & cv::Rect(0, 0, photo.cols, photo.rows);
-  const double scale = density / photo_density;
-  if (window.width * scale * window.height * scale > kLargestTexture) {
-    throw ConfigError(name + ": the area swept at this focal length is too large to be prepared; " +
-                      "take a smaller path amplitude, width_deg or focal_length_px");
+  Patch patch{config, half_size, {}};
+  for (const Sight& sight : sights) {
+    const auto part = seen_part(config, sight.seen, half_size);
+    if (!part) continue;
+    const Eigen::Vector2d low = (part->min() + half_size) * photo_density;
+    const Eigen::Vector2d high = (part->max() + half_size) * photo_density;
+    const cv::Point first(static_cast<int>(std::floor(low.x())) - 4,
+                          static_cast<int>(std::floor(low.y())) - 4);
+    const cv::Point last(static_cast<int>(std::ceil(high.x())) + 4,
+                         static_cast<int>(std::ceil(high.y())) + 4);
+    const cv::Rect window = cv::Rect(first, last) & cv::Rect(0, 0, photo.cols, photo.rows);
+    const double scale = sight.focal_length * kTexelsPerPixel / photo_density;
+    if (window.width * scale * window.height * scale > kLargestTexture) {
+      throw ConfigError(name +
+                        ": the area swept at this focal length is too large to be prepared; " +
+                        "take a smaller path amplitude, width_deg or focal_length_px");
+    }
+    cv::Mat picture = make_detailed(photo, window, scale, detail, zooms_, seed);
+    const Eigen::Vector2d texels(picture.cols, picture.rows);
+    const Eigen::Vector2d extent = Eigen::Vector2d(window.width, window.height) / photo_density;
+    const Eigen::Vector2d corner = Eigen::Vector2d(window.x, window.y) / photo_density - half_size;
+    patch.layers.push_back({Texture(picture), corner, texels.cwiseQuotient(extent), *part});
   }
-  cv::Mat picture = make_detailed(photo, window, scale, detail, seed);
-  const Eigen::Vector2d texels(picture.cols, picture.rows);
-  const Eigen::Vector2d extent = Eigen::Vector2d(window.width, window.height) / photo_density;
-  const Eigen::Vector2d corner = Eigen::Vector2d(window.x, window.y) / photo_density - half_size;
-  patches_.push_back({config, Texture(picture), corner, texels.cwiseQuotient(extent), half_size});
+  if (!patch.layers.empty()) patches_.push_back(std::move(patch));
 }
 
-void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, const double* x,
-                  const double* y, std::size_t count, float weight, float* sum) const {
+const Scene::Layer& Scene::layer_for(const Patch& patch, double spacing,
+                                     const Eigen::AlignedBox2d& box) {
+  std::size_t i = patch.layers.size() - 1;
+  while (i > 0 && level_of(spacing * patch.layers[i].density.x()) < 0 &&
+         patch.layers[i - 1].part.contains(box)) {
+    --i;
+  }
+  return patch.layers[i];
+}
+
+void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, double focal_length,
+                  const double* x, const double* y, std::size_t count, float weight,
+                  float* sum) const {
   std::array<Eigen::Matrix3d, kMostPatches> patch_from_camera;
   for (std::size_t n = 0; n < patches_.size(); ++n) {
     const PatchConfig& config = patches_[n].config;
@@ -182,8 +209,8 @@ void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, const 
     for (std::size_t n = 0; n < patches_.size(); ++n) {
       const Patch& patch = patches_[n];
       const Eigen::Matrix3d& turn = patch_from_camera[n];
-      std::array<double, kBlock> texel_x{};
-      std::array<double, kBlock> texel_y{};
+      std::array<double, kBlock> right{};  // patch coordinates
+      std::array<double, kBlock> down{};
       std::array<float, kBlock> cover{};
       float most = 0;
       for (std::size_t i = 0; i < size; ++i) {
@@ -193,30 +220,40 @@ void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, const 
             patch.config.projection, turn(0, 0) * ray_x + turn(0, 1) * ray_y + turn(0, 2),
             turn(1, 0) * ray_x + turn(1, 1) * ray_y + turn(1, 2),
             turn(2, 0) * ray_x + turn(2, 1) * ray_y + turn(2, 2));
-        texel_x[i] = (point.x() - patch.corner.x()) * patch.density.x();
-        texel_y[i] = (point.y() - patch.corner.y()) * patch.density.y();
+        right[i] = point.x();
+        down[i] = point.y();
         const double inside =
-            0.5 + pixels_per_unit_ * std::min(patch.half_size.x() - std::abs(point.x()),
-                                              patch.half_size.y() - std::abs(point.y()));
+            0.5 + focal_length * std::min(patch.half_size.x() - std::abs(point.x()),
+                                          patch.half_size.y() - std::abs(point.y()));
         // A NaN, of the ray or of the far side, is not inside.
         cover[i] = inside > 0 ? static_cast<float>(std::min(inside, 1.0)) : 0.0F;
         most = std::max(most, cover[i]);
       }
       if (most == 0) continue;
-      // Texels from pixel to pixel: at most one texel of the level keeps the picture smooth.
-      double spacing = 1;
-      for (std::size_t i = 0; i + 1 < size; ++i) {
-        if (cover[i] > 0 && cover[i + 1] > 0) {
-          spacing =
-              std::max(1e-3, std::hypot(texel_x[i + 1] - texel_x[i], texel_y[i + 1] - texel_y[i]));
-          break;
+      const Layer* layer = &patch.layers.front();
+      if (zooms_ && patch.layers.size() > 1) {
+        Eigen::AlignedBox2d box;
+        for (std::size_t i = 0; i < size; ++i) {
+          if (cover[i] > 0) box.extend(Eigen::Vector2d(right[i], down[i]));
         }
+        // The soft border is outside of the patch.
+        box = box.intersection(Eigen::AlignedBox2d(-patch.half_size, patch.half_size));
+        layer = &layer_for(patch, pixel_spacing(right, down, cover, size), box);
       }
-      const int level = std::clamp(static_cast<int>(std::lround(std::log2(0.7 * spacing))), 0,
-                                   patch.texture.highest_level());
+      std::array<double, kBlock> texel_x{};
+      std::array<double, kBlock> texel_y{};
+      for (std::size_t i = 0; i < size; ++i) {
+        texel_x[i] = (right[i] - layer->corner.x()) * layer->density.x();
+        texel_y[i] = (down[i] - layer->corner.y()) * layer->density.y();
+      }
+      const Texture& texture = layer->texture;
+      const double fine = level_of(pixel_spacing(texel_x, texel_y, cover, size));
+      const int level = std::clamp(static_cast<int>(std::lround(fine)), 0, texture.highest_level());
       for (std::size_t i = 0; i < size; ++i) {
         if (cover[i] * open[i] <= 0) continue;
-        shine[i] += open[i] * cover[i] * patch.texture.sample(texel_x[i], texel_y[i], level);
+        shine[i] += open[i] * cover[i] *
+                    (zooms_ ? texture.sample_between(texel_x[i], texel_y[i], fine)
+                            : texture.sample(texel_x[i], texel_y[i], level));
         open[i] *= 1 - cover[i];
       }
     }

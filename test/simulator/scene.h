@@ -5,11 +5,13 @@
 // direction (azimuth positive right, elevation positive up; in base, FRD:
 // (cos e cos a, cos e sin a, -sin e)), upright there, and mapped either rectilinearly (tangent plane)
 // or by longitude and latitude about its own centre. Borders are soft over one pixel.
-// Each patch is prepared once at the density the camera needs (about 1.4 texels a pixel at the optical
-// axis), over the part that will be seen. Brightness: 0 black, 1 white, linear.
+// Each patch is prepared at the density the camera needs (about 1.4 texels a pixel at the optical
+// axis), over the part that will be seen; under a zoom once for each doubling of the focal length, over what is seen at about
+// that one or a longer one, and what lies between two densities is made of both. Brightness: 0 black, 1 white, linear.
 // shade() is thread-safe and does not allocate.
 
 #include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstddef>
 #include <cstdint>
 #include <vector>
@@ -22,35 +24,48 @@ namespace alidade::simulator {
 // Unit vector in the base frame.
 [[nodiscard]] Eigen::Vector3d direction(double azimuth, double elevation);
 
+// What will be seen with about this focal length or, under a zoom, a longer one.
+struct Sight {
+  double focal_length = 0;  // px
+  // In base; their surroundings will be seen. Enough of them to bound that area.
+  std::vector<Eigen::Vector3d> seen;
+};
+
 class Scene {
  public:
-  // focal_length: of the camera, px. seen: directions in base whose surroundings will be seen,
-  // enough of them to bound that area. Throws ConfigError: photo unreadable, or scene too large.
-  Scene(const SceneConfig& config, double focal_length, const std::vector<Eigen::Vector3d>& seen,
+  // sights: one without zoom; with a zoom one for each doubling, the longest focal length first and the last one
+  // with all that is seen. Throws ConfigError: photo unreadable, or scene too large.
+  Scene(const SceneConfig& config, const std::vector<Sight>& sights, bool zooms,
         std::uint64_t seed);
 
   // Adds to sum[i] the brightness along each ray (x[i], y[i], 1) of the camera frame, times weight.
-  // Neighbours in the arrays are neighbours in the image, a pixel apart. A NaN ray adds nothing.
-  void shade(const Eigen::Matrix3d& base_from_camera, double time_s, const double* x,
-             const double* y, std::size_t count, float weight, float* sum) const;
+  // Neighbours in the arrays are neighbours in the image, a pixel apart. A NaN ray adds nothing. focal_length: of that moment, px.
+  void shade(const Eigen::Matrix3d& base_from_camera, double time_s, double focal_length,
+             const double* x, const double* y, std::size_t count, float weight, float* sum) const;
 
  private:
-  struct Patch {
-    PatchConfig config;
+  struct Layer {
     Texture texture;
     // Texel = density * (patch coordinate - corner); patch coordinates are tangents or angles from
     // the centre, to the right and down.
     Eigen::Vector2d corner, density;
+    Eigen::AlignedBox2d part;  // of the patch, in patch coordinates, that it holds
+  };
+  struct Patch {
+    PatchConfig config;
     Eigen::Vector2d half_size;  // of the whole patch, in patch coordinates
+    std::vector<Layer> layers;  // the densest first
   };
 
-  void add_photo(const PatchConfig& config, const cv::Mat& photo,
-                 const std::vector<Eigen::Vector3d>& seen, double density, double detail,
-                 std::uint64_t seed);
+  void add_photo(const PatchConfig& config, const cv::Mat& photo, const std::vector<Sight>& sights,
+                 double detail, std::uint64_t seed);
   void add_object(const PatchConfig& config, const cv::Mat& picture);
+  // The coarsest that is dense enough for pixels `spacing` apart and holds the box, all in patch coordinates; else the nearest.
+  [[nodiscard]] static const Layer& layer_for(const Patch& patch, double spacing,
+                                              const Eigen::AlignedBox2d& box);
 
   float background_;
-  double pixels_per_unit_;  // at the optical axis
+  bool zooms_;
   std::vector<Patch> patches_;
 };
 

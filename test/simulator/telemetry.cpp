@@ -16,6 +16,7 @@ Telemetry::Telemetry(const Config& config, const Path& path)
       pan_scale_(config.camera.pan_scale),
       tilt_scale_(config.camera.tilt_scale),
       path_(&path),
+      zoom_(make_zoom(config)),
       noise_(make_generator(config.seed, Stream::kAngle)),
       stale_(make_generator(config.seed, Stream::kStaleRepeat)) {}
 
@@ -35,6 +36,7 @@ Angles Telemetry::measure(double time_s) {
     return wrapped(value);
   };
   const Angles truth = path_->at(time_s);
+  if (zoom_) last_zoom_ = zoom_->reported(time_s);
   const double pan = report(truth.pan, pan_scale_);
   last_ = Angles{pan, report(truth.tilt, tilt_scale_)};
   return *last_;

@@ -6,6 +6,7 @@
 // With internal_rate_hz the head refreshes its value at multiples of that period and repeats it in
 // between: the value is then up to one such period old, half of it on average, and so much is to be
 // added to the clock offset that an estimator finds. A stale repeat is the value of the sample before.
+// A zoom is told as zoom.h has it, with the angles of the same refresh.
 // Angles are rad, wrapped to [-pi, pi). Not thread-safe.
 
 #include <cstdint>
@@ -13,6 +14,7 @@
 #include <random>
 
 #include "test/simulator/path.h"
+#include "test/simulator/zoom.h"
 
 namespace alidade::simulator {
 
@@ -26,15 +28,19 @@ class Telemetry {
 
   // What the head says when the truth is that of time_s.
   [[nodiscard]] Angles measure(double time_s);
+  // The reading that came with what measure() gave last; nothing without a zoom.
+  [[nodiscard]] std::optional<double> zoom() const { return last_zoom_; }
 
  private:
   TelemetryConfig config_;
   double pan_scale_, tilt_scale_;
   const Path* path_;
+  std::optional<Zoom> zoom_;
   std::mt19937_64 noise_, stale_;
   std::normal_distribution<double> normal_;
   std::optional<std::int64_t> refresh_;  // count of the internal refresh that made last_
   std::optional<Angles> last_;
+  std::optional<double> last_zoom_;
 };
 
 }  // namespace alidade::simulator

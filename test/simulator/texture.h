@@ -7,7 +7,9 @@
 // make_detailed() resamples a photo to the texel density wanted; where the photo is too coarse for
 // that it adds generated contrast, octave by octave, in proportion to the contrast that the photo has
 // at its finest scale at that place: rock stays rough and sky stays smooth. The generated contrast is
-// tied to the photo's own pixels: it is the same whatever part is wanted and however densely.
+// tied to the photo's own pixels: it is the same whatever part is wanted and however densely. Where one photo is prepared at
+// several densities each octave is `balanced`: it adds nothing to the mean over the points of the octave before, so that
+// each preparation is the average of the denser ones.
 // Sampling is thread-safe and does not allocate.
 
 #include <Eigen/Core>
@@ -26,6 +28,15 @@ class Texture {
   explicit Texture(const cv::Mat& picture);
 
   [[nodiscard]] int highest_level() const { return static_cast<int>(levels_.size()) - 1; }
+
+  // Between two levels where `level` is no whole number: as it changes nothing jumps.
+  [[nodiscard]] float sample_between(double x, double y, double level) const {
+    const double finer = std::clamp(level, 0.0, static_cast<double>(highest_level()));
+    const int whole = static_cast<int>(finer);
+    const auto part = static_cast<float>(finer - whole);
+    const float value = sample(x, y, whole);
+    return part == 0 ? value : value + part * (sample(x, y, whole + 1) - value);
+  }
 
   // Beyond the border the outermost texel goes on.
   [[nodiscard]] float sample(double x, double y, int level) const {
@@ -79,7 +90,7 @@ class Texture {
 // The part `window` (photo pixels) of a photo (CV_32F, [0, 1]) at `scale` texels a photo pixel, as
 // nearly as whole texels allow. detail 0 adds nothing, 1 continues the photo's finest contrast.
 [[nodiscard]] cv::Mat make_detailed(const cv::Mat& photo, const cv::Rect& window, double scale,
-                                    double detail, std::uint64_t seed);
+                                    double detail, bool balanced, std::uint64_t seed);
 
 // A generated picture of natural appearance: as much contrast in every octave.
 [[nodiscard]] cv::Mat make_procedural(int width, int height, std::uint64_t seed);

@@ -30,6 +30,28 @@ void write_value(const char* name, double number, std::ofstream& out) {
   out << name << ": {value: " << number << ", sigma: 0}\n";
 }
 
+// px, from the image's centre.
+void write_centre_offset(const ImageConfig& image, const Lens& lens, std::ofstream& out) {
+  out << '[' << lens.centre.x() - image.width / 2.0 << ", " << lens.centre.y() - image.height / 2.0
+      << ']';
+}
+
+void write_zoom(const Config& config, const Zoom& zoom, std::ofstream& out) {
+  constexpr int kSamples = 129;
+  out << "centre_offset: {value: ";
+  write_centre_offset(config.image, zoom.lens(0), out);
+  out << ", sigma: [0, 0]}\nzoom: " << zoom.reading(0) << "\nzoom_curve:\n";
+  const ZoomConfig::Ends& ends = config.zoom->reading;
+  for (int i = 0; i < kSamples; ++i) {
+    const double reading = ends.wide + (ends.tele - ends.wide) * i / (kSamples - 1);
+    const Lens lens = zoom.nominal_lens(reading);
+    out << "  - {zoom: " << reading << ", focal_length: " << lens.focal_length
+        << ", radial_distortion: " << lens.radial_distortion << ", centre_offset: ";
+    write_centre_offset(config.image, lens, out);
+    out << "}\n";
+  }
+}
+
 }  // namespace
 
 void write_truth_yaml(const std::filesystem::path& file, const Config& config,
@@ -42,16 +64,18 @@ void write_truth_yaml(const std::filesystem::path& file, const Config& config,
     output.stream() << name << ": {value: [" << vector.x() << ", " << vector.y() << ", "
                     << vector.z() << "], sigma: [0, 0]}\n";
   };
+  const Lens lens = camera.lens_at(0);
   write_format(config, output.stream());
-  value("focal_length", config.camera.focal_length);
-  value("aspect", config.camera.aspect);
-  value("radial_distortion", config.camera.radial_distortion);
+  value("focal_length", lens.focal_length);
+  value("aspect", lens.aspect);
+  value("radial_distortion", lens.radial_distortion);
   value("line_delay", config.camera.line_delay);
   axis("pan_axis", camera.pan_axis());
   axis("tilt_axis", camera.tilt_axis());
   value("pan_scale", config.camera.pan_scale);
   value("tilt_scale", config.camera.tilt_scale);
   value("clock_offset", config.camera.clock_offset);
+  if (camera.zoom() != nullptr) write_zoom(config, *camera.zoom(), output.stream());
   output.flush();
 }
 
@@ -73,15 +97,24 @@ void write_lens_yaml(const std::filesystem::path& file, const Config& config) {
   output.flush();
 }
 
-TruthCsv::TruthCsv(const std::filesystem::path& file) : file_(file) {
-  file_.stream() << "frame,time_s,pan_rad,tilt_rad,sequence,sender_time_s,stamp_time_s\n";
+TruthCsv::TruthCsv(const std::filesystem::path& file, std::optional<Zoom> zoom)
+    : file_(file), zoom_(std::move(zoom)) {
+  file_.stream() << "frame,time_s,pan_rad,tilt_rad,sequence,sender_time_s,stamp_time_s"
+                 << (zoom_ ? ",focal_length_px,radial_distortion,centre_u_px,centre_v_px,zoom" : "")
+                 << '\n';
 }
 
 void TruthCsv::add(const FrameEvent& event, const Angles& angles, double origin_s) {
   std::ofstream& out = file_.stream();
   out << event.frame << ',' << origin_s + event.capture_s << ',' << wrapped(angles.pan) << ','
       << wrapped(angles.tilt) << ',' << event.sequence << ',' << origin_s + event.sender_s << ','
-      << origin_s + event.stamp_s << '\n';
+      << origin_s + event.stamp_s;
+  if (zoom_) {
+    const Lens lens = zoom_->lens(event.capture_s);
+    out << ',' << lens.focal_length << ',' << lens.radial_distortion << ',' << lens.centre.x()
+        << ',' << lens.centre.y() << ',' << zoom_->reading(event.capture_s);
+  }
+  out << '\n';
 }
 
 PatternTruthCsv::PatternTruthCsv(const std::filesystem::path& file) : file_(file) {

@@ -84,6 +84,7 @@ struct PtuHead : SimulatedHead {
 struct HeadModel {
   const char* name;  // that configurations and command lines give it: pan_tilt.type
   std::unique_ptr<SimulatedHead> (*make)(std::function<HeadPosition()> position);
+  int tele_zoom;  // what it tells at the tele end, 0 at the wide end; 0: it knows of no zoom
 };
 
 template <class Head>
@@ -91,8 +92,8 @@ std::unique_ptr<SimulatedHead> make_head(std::function<HeadPosition()> position)
   return std::make_unique<Head>(std::move(position));
 }
 
-inline constexpr std::array kHeadModels = {HeadModel{"pelco_d", make_head<PelcoDHead>},
-                                           HeadModel{"visca", make_head<ViscaHead>},
-                                           HeadModel{"ptu", make_head<PtuHead>}};
+inline constexpr std::array kHeadModels = {HeadModel{"pelco_d", make_head<PelcoDHead>, 0xFFFF},
+                                           HeadModel{"visca", make_head<ViscaHead>, 0x4000},
+                                           HeadModel{"ptu", make_head<PtuHead>, 0}};
 
 }  // namespace alidade

@@ -1,0 +1,25 @@
+#pragma once
+// tracks.csv: where the landmarks of a made-up grid appear in each frame, with noise.
+//
+// Landmarks stand on a grid of azimuth and elevation over the whole sphere, `landmark_spacing` fields of view apart. Under a
+// zoom there are grids nested in one another, each twice as dense as the one before, the first for the shortest focal length of
+// the path. A frame shows the grid whose spacing is nearest to the one asked for, without the points that are in a grid
+// kLandmarkOctaves before it: what was a small detail at one end fills the image at the other. A landmark is one direction under one number at
+// every zoom.
+
+#include <filesystem>
+#include <vector>
+
+#include "test/simulator/camera_model.h"
+#include "test/simulator/timeline.h"
+
+namespace alidade::simulator {
+
+// Over so many doublings of the focal length a landmark is seen.
+inline constexpr int kLandmarkOctaves = 3;
+
+// Throws std::runtime_error naming the file if it cannot be written.
+void write_tracks(const Config& config, const std::vector<FrameEvent>& frames,
+                  const CameraModel& camera, const std::filesystem::path& file);
+
+}  // namespace alidade::simulator
