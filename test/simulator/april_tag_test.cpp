@@ -2,7 +2,7 @@
 // rendered frames by the AprilTag library, must lie where the truth says.
 //
 // The truth's place is computed here by a route of its own: the formulas of the model written out
-// once more, and for the rolling shutter a search through the rows for the one that is exposed while
+// once more (of a zoom's lens, what truth.csv would tell at the row's time), and for the rolling shutter a search through the rows for the one that is exposed while
 // the point lies on it. As a tag's edges are curved by lens and motion, the place expected of a tag is
 // made as the detector makes it: lines through the four projected edges, their corners, the crossing
 // of the diagonals. The library's coordinates have the centre of the top-left pixel at (0.5, 0.5).
@@ -12,6 +12,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/Dense>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdlib>
@@ -53,7 +54,11 @@ struct Case {
   double line_delay;  // s
   double amplitude;   // of the path; 0 = at rest
   double exposure;    // s
+  // 0: no zoom; else the focal length is that at kMoment, of a zoom at rest (1) or of one that goes to so many times it in 2 s.
+  double zoom_factor = 0;
 };
+
+constexpr double kMoment = 1;  // s, the middle of a sweep, when the path moves
 
 Config config_of(const Case& test_case) {
   Config config;
@@ -72,13 +77,31 @@ Config config_of(const Case& test_case) {
   config.sensor.exposure = test_case.exposure;
   config.scene.background = 1;
   config.scene.detail = 0;
+  if (test_case.zoom_factor == 0) return config;
+  config.path.focal_length = test_case.focal_length;
+  ZoomConfig& zoom = config.zoom.emplace();
+  zoom.focal_length = {test_case.focal_length / 4, test_case.focal_length * 5};
+  zoom.distortion = {-0.03, 0.02};
+  zoom.centre = {5, -3};
+  zoom.centre_wander = 10;
+  zoom.sigma_rep = 2e-3;
+  zoom.backlash = 1e-3;
+  zoom.speed = 1.5;
+  zoom.acceleration = 10;
+  const ZoomCurve curve(zoom);
+  const double start = test_case.focal_length / std::sqrt(test_case.zoom_factor);
+  zoom.path.reading = curve.reading(curve.part_at(std::log(start)));
+  if (test_case.zoom_factor == 1) return config;
+  zoom.path.type = ZoomPathConfig::Type::kSweep;
+  zoom.path.factor = test_case.zoom_factor;
+  zoom.path.duration = 2 * kMoment;
   return config;
 }
 
 // The model once more, from its formulas.
 class Truth {
  public:
-  explicit Truth(const Config& config) : config_(config) {
+  explicit Truth(const Config& config) : config_(config), zoom_(make_zoom(config)) {
     const CameraConfig& camera = config.camera;
     pan_axis_ = bent(Vector3d(0, 0, 1),
                      Vector3d(camera.pan_axis_offset.x(), camera.pan_axis_offset.y(), 0));
@@ -87,7 +110,8 @@ class Truth {
   }
 
   Matrix3d base_from_camera(double time) const {
-    const double s = 2 * std::atan(config_.image.width / 2.0 / config_.camera.focal_length);
+    const double f = zoom_ ? config_.path.focal_length : config_.camera.focal_length;
+    const double s = 2 * std::atan(config_.image.width / 2.0 / f);
     const double a = config_.path.amplitude * s / (2 * kPi);
     const double phase = 2 * kPi * time / config_.path.period;
     Matrix3d frd_from_rdf;
@@ -100,10 +124,17 @@ class Truth {
     const Vector3d d = base_from_camera(time).transpose() * d_base;
     const double x = d.x() / d.z();
     const double y = d.y() / d.z();
-    const double f = config_.camera.focal_length;
-    const double radial = 1 + config_.camera.radial_distortion * (x * x + y * y);
-    return {f * x * radial + config_.image.width / 2.0,
-            config_.camera.aspect * f * y * radial + config_.image.height / 2.0};
+    double f = config_.camera.focal_length;
+    double k = config_.camera.radial_distortion;
+    Vector2d centre(config_.image.width / 2.0, config_.image.height / 2.0);
+    if (zoom_) {
+      const Lens lens = zoom_->lens(time);
+      f = lens.focal_length;
+      k = lens.radial_distortion;
+      centre = lens.centre;
+    }
+    const double radial = 1 + k * (x * x + y * y);
+    return {f * x * radial + centre.x(), config_.camera.aspect * f * y * radial + centre.y()};
   }
 
   // Every row in turn: on which is the point while that row is exposed?
@@ -128,6 +159,7 @@ class Truth {
   }
 
   Config config_;
+  std::optional<Zoom> zoom_;
   Vector3d pan_axis_, tilt_axis_;
 };
 
@@ -159,7 +191,12 @@ Vector2d tag_corner(int i, double photo_tangent) {
   return std::sqrt(2.0) * kHalfTag * photo_tangent * Vector2d(std::cos(angle), std::sin(angle));
 }
 
-Vector2d expected_centre(const Truth& truth, const PatchConfig& patch, double t0) {
+struct Tag {
+  Vector2d centre;
+  std::array<Vector2d, 4> corners;  // in some order
+};
+
+Tag expected_tag(const Truth& truth, const PatchConfig& patch, double t0) {
   const double photo_tangent = 2 * std::tan(patch.width / 2);
   const double a = patch.azimuth;
   const double e = patch.elevation;
@@ -179,7 +216,14 @@ Vector2d expected_centre(const Truth& truth, const PatchConfig& patch, double t0
   }
   std::array<Vector2d, 4> corners;
   for (std::size_t i = 0; i < 4; ++i) corners.at(i) = crossing(edges.at(i), edges.at((i + 3) % 4));
-  return crossing({corners[0], corners[2] - corners[0]}, {corners[1], corners[3] - corners[1]});
+  return {crossing({corners[0], corners[2] - corners[0]}, {corners[1], corners[3] - corners[1]}),
+          corners};
+}
+
+double distance_to_nearest(const Vector2d& point, const std::array<Vector2d, 4>& places) {
+  double least = (point - places[0]).norm();
+  for (const Vector2d& place : places) least = std::min(least, (point - place).norm());
+  return least;
 }
 
 class AprilTags : public testing::TestWithParam<Case> {
@@ -223,21 +267,25 @@ class AprilTags : public testing::TestWithParam<Case> {
     return file;
   }
 
-  // Centres of the tags found, by number.
-  std::map<int, Vector2d> detect(std::vector<std::uint8_t> image, const ImageConfig& size) {
+  // The tags found, by number.
+  std::map<int, Tag> detect(std::vector<std::uint8_t> image, const ImageConfig& size) {
     const cv::Mat rendered(size.height, size.width, CV_8U, image.data());
     cv::Mat enlarged;
     cv::resize(rendered, enlarged, {}, kEnlarged, kEnlarged, cv::INTER_CUBIC);
     image_u8_t view{enlarged.cols, enlarged.rows, enlarged.cols, enlarged.data};
     zarray_t* found = apriltag_detector_detect(detector_, &view);
-    std::map<int, Vector2d> centres;
+    std::map<int, Tag> tags;
     for (int i = 0; i < zarray_size(found); ++i) {
       apriltag_detection_t* detection = nullptr;
       zarray_get(found, i, &detection);
-      centres[detection->id] = Vector2d(detection->c[0], detection->c[1]) / kEnlarged;
+      Tag& tag = tags[detection->id];
+      tag.centre = Vector2d(detection->c[0], detection->c[1]) / kEnlarged;
+      for (std::size_t n = 0; n < 4; ++n) {
+        tag.corners.at(n) = Vector2d(detection->p[n][0], detection->p[n][1]) / kEnlarged;
+      }
     }
     apriltag_detections_destroy(found);
-    return centres;
+    return tags;
   }
 
   TemporaryDirectory directory_;
@@ -248,35 +296,44 @@ class AprilTags : public testing::TestWithParam<Case> {
 TEST_P(AprilTags, AreFoundWhereTheTruthPutsThem) {
   Config config = config_of(GetParam());
   const double field = horizontal_field_of_view(config);
+  const std::unique_ptr<Path> path = make_path(config);
+  const Angles middle = config.zoom ? path->at(kMoment) : Angles{config.path.pan, config.path.tilt};
   for (int id = 0; id < kTagsAcross * kTagsAcross; ++id) {
     PatchConfig tag;
     tag.file = draw(id);
-    tag.width = kPhotoPixels / config.camera.focal_length;
-    tag.azimuth = config.path.pan + 0.29 * field * (id % kTagsAcross - 1);
-    tag.elevation = config.path.tilt + 0.24 * field * (id / kTagsAcross - 1);
+    tag.width = kPhotoPixels / GetParam().focal_length;
+    tag.azimuth = middle.pan + 0.29 * field * (id % kTagsAcross - 1);
+    tag.elevation = middle.tilt + 0.24 * field * (id / kTagsAcross - 1);
     config.scene.photos.push_back(tag);
   }
-  const std::unique_ptr<Path> path = make_path(config);
   const Renderer renderer(config, *path);
   const Truth truth(config);
 
   int found = 0;
   double squares = 0;
+  double corner_squares = 0;
   Vector2d sum = Vector2d::Zero();
   // Moments near the turning points and crossings of the path, when most tags are in view.
   const std::vector<double> times =
-      config.path.amplitude > 0 ? std::vector<double>{0.02, 0.4, 2.7, 3.3} : std::vector<double>{0};
+      config.zoom                 ? std::vector<double>{kMoment - 0.1, kMoment, kMoment + 0.1}
+      : config.path.amplitude > 0 ? std::vector<double>{0.02, 0.4, 2.7, 3.3}
+                                  : std::vector<double>{0};
   for (const double t0 : times) {
-    for (const auto& [id, centre] : detect(renderer.render(t0, 0), config.image)) {
+    for (const auto& [id, seen] : detect(renderer.render(t0, 0), config.image)) {
       const PatchConfig& tag = config.scene.photos.at(static_cast<std::size_t>(id));
-      const Vector2d expected = expected_centre(truth, tag, t0);
+      const Tag expected = expected_tag(truth, tag, t0);
       // The detector cuts its search for an edge short near the border.
       const Eigen::AlignedBox2d inner(
           Vector2d::Constant(kBorder),
           Vector2d(config.image.width - kBorder, config.image.height - kBorder));
-      if (!inner.contains(expected)) continue;
-      const Vector2d error = centre - expected;
+      if (!inner.contains(expected.centre)) continue;
+      const Vector2d error = seen.centre - expected.centre;
       EXPECT_LT(error.norm(), 0.05) << "tag " << id << " at " << t0 << " s, " << error.transpose();
+      for (const Vector2d& corner : seen.corners) {
+        const double off = distance_to_nearest(corner, expected.corners);
+        EXPECT_LT(off, 0.08) << "a corner of tag " << id << " at " << t0 << " s";
+        corner_squares += off * off;
+      }
       sum += error;
       squares += error.squaredNorm();
       ++found;
@@ -286,6 +343,8 @@ TEST_P(AprilTags, AreFoundWhereTheTruthPutsThem) {
   ASSERT_GE(found, config.path.amplitude > 0 ? 12 : 5);
   EXPECT_LT((sum / found).norm(), 0.01);
   EXPECT_LT(std::sqrt(squares / found), 0.02);
+  // Each from two of the four edges, a corner is less certain than the centre.
+  EXPECT_LT(std::sqrt(corner_squares / (4 * found)), 0.025);
 }
 
 INSTANTIATE_TEST_SUITE_P(
@@ -297,7 +356,14 @@ INSTANTIATE_TEST_SUITE_P(
                     Case{"NarrowMovingBarrelWithBlur", 8000, 1, -20, 40e-6, 0.5, 4e-3},
                     Case{"PaperCamera", 32008, 1, 55.4, -14.2e-6, 0.5, 0},
                     Case{"WideMoving", 600, 1, 0.1, 30e-6, 0.5, 0},
-                    Case{"WideMovingBarrelUpsideDown", 600, 0.98, -0.1, -30e-6, 0.5, 2e-3}),
+                    Case{"WideMovingBarrelUpsideDown", 600, 0.98, -0.1, -30e-6, 0.5, 2e-3},
+                    Case{"WideZoom", 600, 1, 0, 30e-6, 0.5, 0, 1},
+                    Case{"WideZoomingIn", 600, 1, 0, 30e-6, 0.5, 0, 10},
+                    Case{"MediumZoom", 3000, 1, 0, 30e-6, 0.5, 0, 1},
+                    Case{"MediumZoomingOutUpsideDown", 3000, 1, 0, -30e-6, 0.5, 0, 0.1},
+                    Case{"NarrowZoom", 12000, 1.01, 0, 30e-6, 0.5, 0, 1},
+                    Case{"NarrowZoomingInUpsideDownWithBlur", 12000, 1.01, 0, -30e-6, 0.5, 4e-3,
+                         10}),
     [](const auto& scene) { return std::string(scene.param.name); });
 
 }  // namespace

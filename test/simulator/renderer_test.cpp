@@ -310,6 +310,81 @@ TEST_F(VirtualSensor, ShowsTheSameSceneWhateverThePathAround) {
   EXPECT_LT(sum / static_cast<double>(still.size()), 1);
 }
 
+// 500 to 16,000 px, at rest at one of them.
+Config zoom_at(double focal_length, std::vector<double> others) {
+  Config config = still_camera();
+  PatchConfig patch;
+  patch.width = patch.height = 60 * kDegree;
+  config.scene.procedural.push_back(patch);
+  ZoomConfig& zoom = config.zoom.emplace();
+  zoom.focal_length = {500, 16000};
+  zoom.path.type = ZoomPathConfig::Type::kDwell;
+  zoom.path.stops.push_back({std::nullopt, focal_length, 10});
+  for (const double other : others) zoom.path.stops.push_back({std::nullopt, other, 1});
+  return config;
+}
+
+// Standard deviation of the difference of neighbours: of what is as fine as the pixels.
+double finest_contrast(const Image& image) {
+  double sum = 0;
+  for (std::size_t i = 1; i < image.size(); ++i) {
+    if (i % 160 != 0) sum += (image[i] - image[i - 1]) * (image[i] - image[i - 1]);
+  }
+  return std::sqrt(sum / static_cast<double>(image.size()));
+}
+
+TEST_F(VirtualSensor, ShowsContrastAsFineAsItsPixelsAtEveryZoom) {
+  const double wide = finest_contrast(render(zoom_at(500, {16000})));
+  for (const double focal_length : {1200.0, 4000.0, 16000.0}) {
+    Config config = zoom_at(focal_length, {500, 16000});
+    const double contrast = finest_contrast(render(config));
+    EXPECT_GT(contrast, 0.5 * wide) << focal_length;
+    EXPECT_LT(contrast, 2 * wide) << focal_length;
+    config.scene.detail = 0;
+    // A pixel of the procedural photo is 16 px wide at the long end.
+    if (focal_length < 10000) continue;
+    EXPECT_LT(finest_contrast(render(config)), 0.2 * contrast);
+  }
+}
+
+TEST_F(VirtualSensor, ShowsTheSameSceneWhicheverZoomsItWasPreparedFor) {
+  for (const double focal_length : {500.0, 1300.0, 3500.0}) {
+    const Image alone = render(zoom_at(focal_length, {}));
+    const Image among = render(zoom_at(focal_length, {500, 16000}));
+    ASSERT_GT(variance(alone), 20);
+    double squares = 0;
+    for (std::size_t i = 0; i < alone.size(); ++i) {
+      squares += (alone[i] - among[i]) * (alone[i] - among[i]);
+    }
+    const double difference = std::sqrt(squares / static_cast<double>(alone.size()));
+    EXPECT_LT(difference, 0.35 * finest_contrast(alone)) << focal_length;
+  }
+}
+
+TEST_F(VirtualSensor, NothingJumpsWhileTheZoomPassesFromOnePreparationToAnother) {
+  Config config = zoom_at(500, {16000});
+  config.zoom->path = {};
+  config.zoom->path.type = ZoomPathConfig::Type::kCreep;
+  config.zoom->path.factor = 32;
+  config.zoom->path.rate = 0.01;
+  config.zoom->speed = 1;
+  const std::unique_ptr<Path> path = make_path(config);
+  const Renderer renderer(config, *path);
+  // Pairs a fiftieth of a per cent apart, at a zoom that one preparation serves alone and around the changes.
+  std::vector<double> changes;
+  for (double time = 60; time < 200; time += 10) {
+    const Image before = renderer.render(time, 0);
+    const Image after = renderer.render(time + 0.02, 0);
+    double squares = 0;
+    for (std::size_t i = 0; i < before.size(); ++i) {
+      squares += (after[i] - before[i]) * (after[i] - before[i]);
+    }
+    changes.push_back(std::sqrt(squares / static_cast<double>(before.size())));
+  }
+  // Rounding to grey levels is 0.4 of one, of two pictures.
+  for (const double change : changes) EXPECT_LT(change, 0.6);
+}
+
 TEST_F(VirtualSensor, RefusesAPhotoThatCannotBeRead) {
   Config config = still_camera();
   PatchConfig patch;

@@ -8,7 +8,7 @@
 namespace alidade::simulator {
 namespace {
 
-constexpr Range kShape{0.2, 5};
+constexpr Range kShape{0.25, 4};
 constexpr Range kRipple{0, 0.5};
 constexpr Range kDistortion{-0.1, 0.3};
 constexpr Range kSmall{0, 0.1};
