@@ -24,6 +24,21 @@ using simulator::PatchConfig;
 // Telemetry begins that long before the first frame and ends that long after the last, s.
 constexpr double kTelemetryMargin = 1;
 
+// All that a noise-free frame under a zoom depends on besides.
+template <class Add>
+void add_zoom(const simulator::ZoomConfig& zoom, double path_focal_length, const Add& add) {
+  const simulator::ZoomPathConfig& path = zoom.path;
+  add('z', path_focal_length, zoom.focal_length.wide, zoom.focal_length.tele, zoom.shape,
+      zoom.ripple, zoom.distortion.wide, zoom.distortion.tele, zoom.centre.transpose(),
+      zoom.centre_wander, zoom.reading.wide, zoom.reading.tele, zoom.sigma_rep, zoom.backlash,
+      zoom.speed, zoom.acceleration);
+  add(static_cast<int>(path.type), path.reading.value_or(-1), path.factor, path.duration, path.stop,
+      path.rate, path.file.string());
+  for (const auto& stop : path.stops) {
+    add(stop.reading.value_or(-1), stop.focal_length.value_or(-1), stop.rest);
+  }
+}
+
 // All that a noise-free frame depends on.
 std::string image_key(const Config& config) {
   std::ostringstream key;
@@ -45,6 +60,7 @@ std::string image_key(const Config& config) {
           static_cast<int>(patch.projection));
     }
   }
+  if (config.zoom) add_zoom(*config.zoom, path.focal_length, add);
   add(sensor.exposure, sensor.vignetting, sensor.boil);
   for (const auto& step : sensor.brightness_steps) add(step.time, step.factor);
   for (const auto& interval : sensor.covered) add('-', interval.from, interval.to);
@@ -93,7 +109,7 @@ RenderedRecording::RenderedRecording(std::string name, const Config& config,
       config_(config),
       frames_(static_cast<int>(std::lround(config.duration * config.image.rate_hz))),
       path_(simulator::make_path(config)),
-      camera_(config.camera, config.image, *path_),
+      camera_(config.camera, config.image, *path_, simulator::make_zoom(config)),
       renderer_(std::make_unique<simulator::Renderer>(without_noise(config), *path_)),
       telemetry_(telemetry_noise(config)) {
   simulator::Telemetry head(config, *path_);

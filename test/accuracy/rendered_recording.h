@@ -53,15 +53,18 @@ class RenderedRecording {
   [[nodiscard]] Eigen::Matrix3d base_from_camera(double time_s) const {
     return camera_.base_from_camera_at(time_s);
   }
-  // Unit, in the camera frame; NaN where a pixel sees nothing.
+  // Unit, in the camera frame, with a zoom at time 0; NaN where a pixel sees nothing.
   [[nodiscard]] Eigen::Vector3d ray(const Eigen::Vector2d& u) const {
     return camera_.slope(u.x(), u.y()).homogeneous().normalized();
   }
   // Of a pixel of a frame, at its own row's time; unit, in the base frame.
   [[nodiscard]] Eigen::Vector3d direction(int frame, const Eigen::Vector2d& u) const {
-    return base_from_camera(time(frame) + u.y() * config_.camera.line_delay) * ray(u);
+    const double row_time = time(frame) + u.y() * config_.camera.line_delay;
+    return base_from_camera(row_time) *
+           camera_.slope_at(u.x(), u.y(), row_time).homogeneous().normalized();
   }
   [[nodiscard]] const simulator::CameraModel& camera() const { return camera_; }
+  [[nodiscard]] simulator::Lens lens(double time_s) const { return camera_.lens_at(time_s); }
 
   // The truth, as an estimator is told it: without any uncertainty.
   [[nodiscard]] Calibration calibration() const;

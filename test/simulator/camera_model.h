@@ -58,6 +58,11 @@ class CameraModel {
     return {shrink * x, shrink * y};
   }
 
+  // Of the lens of that time.
+  [[nodiscard]] Eigen::Vector2d slope_at(double u, double v, double time_s) const {
+    return zoom_ ? zoom_->lens(time_s).slope(u, v) : slope(u, v);
+  }
+
   [[nodiscard]] const Eigen::Vector3d& pan_axis() const { return pan_axis_; }
   [[nodiscard]] const Eigen::Vector3d& tilt_axis() const { return tilt_axis_; }
 

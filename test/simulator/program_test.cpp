@@ -1,7 +1,10 @@
 // The program alidade-simulate as its users meet it: command line, real sockets, signals.
+#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <netinet/in.h>
 #include <signal.h>
+#include <sys/socket.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
@@ -12,6 +15,8 @@
 #include <fstream>
 #include <set>
 #include <sstream>
+#include <string>
+#include <vector>
 
 #include "test/simulator/servers/av_client.h"
 #include "test/support/temporary_directory.h"
@@ -173,6 +178,84 @@ TEST(VirtualCameraProgram, ServesVideoAndPanTiltWithTheTruthUntilItIsStopped) {
     }
     EXPECT_TRUE(std::ifstream(directory.path() + "/truth/truth.yaml").good());
   }
+}
+
+// The zoom of an answer to a query of a head at the far end of a TCP connection.
+std::string answer_of_head(const std::string& address, const std::string& query, std::size_t size) {
+  const int fd = ::socket(AF_INET, SOCK_STREAM | SOCK_CLOEXEC, 0);
+  sockaddr_in to{};
+  to.sin_family = AF_INET;
+  to.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
+  to.sin_port =
+      htons(static_cast<std::uint16_t>(std::stoi(address.substr(address.rfind(':') + 1))));
+  std::string answer;
+  if (::connect(fd, reinterpret_cast<const sockaddr*>(&to), sizeof to) == 0 &&
+      ::send(fd, query.data(), query.size(), MSG_NOSIGNAL) > 0) {
+    answer.resize(size);
+    const ssize_t count = ::recv(fd, answer.data(), size, MSG_WAITALL);
+    answer.resize(count > 0 ? static_cast<std::size_t>(count) : 0);
+  }
+  ::close(fd);
+  return answer;
+}
+
+// Half way from wide to tele, in whole steps of 20: each protocol has its own units.
+TEST(VirtualCameraProgram, TellsItsZoomByEveryProtocolThatHasOne) {
+  const std::string zooming =
+      "image: {width: 160, height: 120, rate_hz: 25}\n"
+      "path: {amplitude: 0, period_s: 0.4}\ntruth_dir: truth\n"
+      "zoom: {reading: {wide: 0, tele: 1000, step: 20}, path: {zoom: 507}}\n";
+  struct Head {
+    const char* name;
+    std::string query, answer;
+  };
+  using namespace std::string_literals;
+  // 0.5 of 0x4000 and of 0xFFFF, rounded.
+  const std::vector<Head> heads{
+      {"visca", "\x81\x09\x04\x47\xFF"s, "\x90\x50\x02\x00\x00\x00\xFF"s},
+      {"pelco_d", "\xFF\x01\x00\x55\x00\x00\x56"s, "\xFF\x01\x00\x5D\x80\x00\xDE"s}};
+  for (const Head& head : heads) {
+    const TemporaryDirectory directory;
+    Child child(
+        {"-c", directory.write("a.yaml", zooming + "live: {onvif_port: 0, head_link: tcp, head: " +
+                                             head.name + "}\n")});
+    std::stringstream ready(child.read_line());
+    std::vector<std::string> words;
+    for (std::string word; ready >> word;) words.push_back(word);
+    ASSERT_EQ(words.size(), 5U) << ready.str();
+    EXPECT_EQ(answer_of_head(words[4], head.query, head.answer.size()), head.answer) << head.name;
+    httplib::Client vapix(words[2]);
+    const auto position = vapix.Get("/axis-cgi/com/ptz.cgi?query=position");
+    ASSERT_TRUE(position);
+    EXPECT_THAT(position->body, HasSubstr("zoom=500\r\n"));
+    httplib::Client onvif(words[3].substr(std::string("onvif=").size()));
+    const auto status =
+        onvif.Post("/onvif/ptz", "<Body><GetStatus></GetStatus></Body>", "text/xml");
+    ASSERT_TRUE(status);
+    EXPECT_THAT(status->body, HasSubstr("Zoom x=\"0.5\""));
+    child.signal(SIGTERM);
+    EXPECT_EQ(child.exit_code(), 0);
+    EXPECT_THAT(directory.read("truth/truth.csv"), HasSubstr("focal_length_px"));
+  }
+}
+
+// Drawn anew by each movement it never repeats; else it does when path and zoom do.
+TEST(VirtualCameraProgram, AZoomThatNeverRepeatsNeedsADuration) {
+  const TemporaryDirectory directory;
+  const auto zooming = [&](const std::string& keys) {
+    return directory.write(
+        "a.yaml",
+        "image: {width: 32, height: 16, rate_hz: 5}\npath: {amplitude: 0, period_s: 2}\n"
+        "zoom: {" +
+            keys + "path: {type: sweep, factor: 1.2, sweep_s: 1, stop_s: 0.5}}\n");
+  };
+  Child endless({"-c", zooming("sigma_rep: 0.001, ")});
+  EXPECT_THAT(endless.read_line(), HasSubstr("duration_s is missing"));
+  EXPECT_EQ(endless.exit_code(), 2);
+  Child repeating({"-c", zooming("backlash: 0.001, ")});
+  EXPECT_THAT(repeating.read_line(), HasSubstr("ready rtsp://"));
+  repeating.signal(SIGTERM);
+  EXPECT_EQ(repeating.exit_code(), 0);
 }
 
 TEST(VirtualCameraProgram, EndsByItselfAfterItsDuration) {

@@ -60,7 +60,7 @@ std::vector<Sight> all_sights(const Config& config, const Path& path, const Came
       for (int column = 0; column <= kGrid; ++column) {
         const double u = config.image.width * column / static_cast<double>(kGrid);
         const double v = config.image.height * row / static_cast<double>(kGrid);
-        const Eigen::Vector2d slope = zoom != nullptr ? lens.slope(u, v) : camera.slope(u, v);
+        const Eigen::Vector2d slope = camera.slope_at(u, v, time);
         if (slope.hasNaN()) continue;
         const Eigen::Vector3d d_base = turn * slope.homogeneous().normalized();
         for (Sight& sight : sights) {

@@ -179,14 +179,28 @@ void Scene::add_photo(const PatchConfig& config, const cv::Mat& photo,
   if (!patch.layers.empty()) patches_.push_back(std::move(patch));
 }
 
-const Scene::Layer& Scene::layer_for(const Patch& patch, double spacing,
-                                     const Eigen::AlignedBox2d& box) {
+std::size_t Scene::layer_for(const Patch& patch, double spacing, const Eigen::AlignedBox2d& box) {
   std::size_t i = patch.layers.size() - 1;
   while (i > 0 && level_of(spacing * patch.layers[i].density.x()) < 0 &&
          patch.layers[i - 1].part.contains(box)) {
     --i;
   }
-  return patch.layers[i];
+  return i;
+}
+
+float Scene::zoomed_sample(const Patch& patch, std::size_t layer, double level,
+                           const Eigen::Vector2d& point) {
+  const Layer& fine = patch.layers[layer];
+  const Eigen::Vector2d texel = (point - fine.corner).cwiseProduct(fine.density);
+  if (layer + 1 == patch.layers.size()) {
+    return fine.texture.sample_between(texel.x(), texel.y(), level);
+  }
+  const float value = fine.texture.sample(texel.x(), texel.y(), 0);
+  if (level <= 0.5) return value;
+  const Layer& coarse = patch.layers[layer + 1];
+  const Eigen::Vector2d other = (point - coarse.corner).cwiseProduct(coarse.density);
+  const auto part = static_cast<float>(std::clamp(2 * level - 1, 0.0, 1.0));
+  return value + part * (coarse.texture.sample(other.x(), other.y(), 0) - value);
 }
 
 void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, double focal_length,
@@ -230,30 +244,31 @@ void Scene::shade(const Eigen::Matrix3d& base_from_camera, double time_s, double
         most = std::max(most, cover[i]);
       }
       if (most == 0) continue;
-      const Layer* layer = &patch.layers.front();
-      if (zooms_ && patch.layers.size() > 1) {
+      std::size_t number = 0;
+      if (patch.layers.size() > 1) {
         Eigen::AlignedBox2d box;
         for (std::size_t i = 0; i < size; ++i) {
           if (cover[i] > 0) box.extend(Eigen::Vector2d(right[i], down[i]));
         }
         // The soft border is outside of the patch.
         box = box.intersection(Eigen::AlignedBox2d(-patch.half_size, patch.half_size));
-        layer = &layer_for(patch, pixel_spacing(right, down, cover, size), box);
+        number = layer_for(patch, pixel_spacing(right, down, cover, size), box);
       }
+      const Layer& layer = patch.layers[number];
       std::array<double, kBlock> texel_x{};
       std::array<double, kBlock> texel_y{};
       for (std::size_t i = 0; i < size; ++i) {
-        texel_x[i] = (right[i] - layer->corner.x()) * layer->density.x();
-        texel_y[i] = (down[i] - layer->corner.y()) * layer->density.y();
+        texel_x[i] = (right[i] - layer.corner.x()) * layer.density.x();
+        texel_y[i] = (down[i] - layer.corner.y()) * layer.density.y();
       }
-      const Texture& texture = layer->texture;
-      const double fine = level_of(pixel_spacing(texel_x, texel_y, cover, size));
-      const int level = std::clamp(static_cast<int>(std::lround(fine)), 0, texture.highest_level());
+      const double exact = level_of(pixel_spacing(texel_x, texel_y, cover, size));
+      const int level =
+          std::clamp(static_cast<int>(std::lround(exact)), 0, layer.texture.highest_level());
       for (std::size_t i = 0; i < size; ++i) {
         if (cover[i] * open[i] <= 0) continue;
         shine[i] += open[i] * cover[i] *
-                    (zooms_ ? texture.sample_between(texel_x[i], texel_y[i], fine)
-                            : texture.sample(texel_x[i], texel_y[i], level));
+                    (zooms_ ? zoomed_sample(patch, number, exact, {right[i], down[i]})
+                            : layer.texture.sample(texel_x[i], texel_y[i], level));
         open[i] *= 1 - cover[i];
       }
     }

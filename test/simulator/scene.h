@@ -61,8 +61,12 @@ class Scene {
                  double detail, std::uint64_t seed);
   void add_object(const PatchConfig& config, const cv::Mat& picture);
   // The coarsest that is dense enough for pixels `spacing` apart and holds the box, all in patch coordinates; else the nearest.
-  [[nodiscard]] static const Layer& layer_for(const Patch& patch, double spacing,
-                                              const Eigen::AlignedBox2d& box);
+  [[nodiscard]] static std::size_t layer_for(const Patch& patch, double spacing,
+                                             const Eigen::AlignedBox2d& box);
+  // From a layer and the next coarser one, so that nothing jumps where the one gives way to the other; level: of the former, that
+  // pixels are apart.
+  [[nodiscard]] static float zoomed_sample(const Patch& patch, std::size_t layer, double level,
+                                           const Eigen::Vector2d& point);
 
   float background_;
   bool zooms_;

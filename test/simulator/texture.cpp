@@ -23,21 +23,6 @@ cv::Mat lattice_noise(const cv::Rect& part, std::uint64_t seed) {
   return noise;
 }
 
-// Takes the mean of each two by two points away, and keeps the variance. The first point's numbers must be even, and the sizes.
-void balance(cv::Mat* noise) {
-  const auto scale = static_cast<float>(std::sqrt(4.0 / 3));
-  for (int y = 0; y < noise->rows; y += 2) {
-    float* upper = noise->ptr<float>(y);
-    float* lower = noise->ptr<float>(y + 1);
-    for (int x = 0; x < noise->cols; x += 2) {
-      const float mean = (upper[x] + upper[x + 1] + lower[x] + lower[x + 1]) / 4;
-      for (float* value : {upper + x, upper + x + 1, lower + x, lower + x + 1}) {
-        *value = scale * (*value - mean);
-      }
-    }
-  }
-}
-
 // Standard deviation of what is finer than about two pixels, smoothed over the neighbourhood.
 cv::Mat finest_contrast(const cv::Mat& photo) {
   cv::Mat blurred;
@@ -65,23 +50,24 @@ Texture::Texture(const cv::Mat& picture) {
 }
 
 cv::Mat make_detailed(const cv::Mat& photo, const cv::Rect& window, double scale, double detail,
-                      bool balanced, std::uint64_t seed) {
+                      bool nested, std::uint64_t seed) {
   const cv::Size size(std::max(1, static_cast<int>(std::lround(window.width * scale))),
                       std::max(1, static_cast<int>(std::lround(window.height * scale))));
   cv::Mat picture;
   cv::resize(photo(window), picture, size, 0, 0, scale < 1 ? cv::INTER_AREA : cv::INTER_CUBIC);
-  if (detail == 0 || scale < 2) return picture;
+  if (detail == 0 || (!nested && scale < 2)) return picture;
   const cv::Mat contrast = finest_contrast(photo)(window) * detail;
-  for (int octave = 1; std::exp2(octave) <= scale; ++octave) {
+  // Of an octave that is finer than the texels their mean is left.
+  const double finest = nested ? 2 * scale : scale;
+  for (int octave = 1; std::exp2(octave) <= finest; ++octave) {
     const int finer = 1 << octave;  // lattice points a photo pixel
     const cv::Rect part(window.x * finer, window.y * finer, window.width * finer,
                         window.height * finer);
     cv::Mat amplitude;
     cv::resize(contrast, amplitude, part.size(), 0, 0, cv::INTER_LINEAR);
     cv::Mat noise = lattice_noise(part, mix(seed, static_cast<std::uint64_t>(octave)));
-    if (balanced) balance(&noise);
     noise = noise.mul(amplitude);
-    cv::resize(noise, noise, size, 0, 0, cv::INTER_CUBIC);
+    cv::resize(noise, noise, size, 0, 0, finer > scale ? cv::INTER_AREA : cv::INTER_CUBIC);
     picture += noise;
   }
   return picture;

@@ -7,9 +7,8 @@
 // make_detailed() resamples a photo to the texel density wanted; where the photo is too coarse for
 // that it adds generated contrast, octave by octave, in proportion to the contrast that the photo has
 // at its finest scale at that place: rock stays rough and sky stays smooth. The generated contrast is
-// tied to the photo's own pixels: it is the same whatever part is wanted and however densely. Where one photo is prepared at
-// several densities each octave is `balanced`: it adds nothing to the mean over the points of the octave before, so that
-// each preparation is the average of the denser ones.
+// tied to the photo's own pixels: it is the same whatever part is wanted and however densely. Where one photo is prepared
+// at several densities (`nested`) each holds the mean of the octave after its finest, too, as an average of the denser one would.
 // Sampling is thread-safe and does not allocate.
 
 #include <Eigen/Core>
@@ -90,7 +89,7 @@ class Texture {
 // The part `window` (photo pixels) of a photo (CV_32F, [0, 1]) at `scale` texels a photo pixel, as
 // nearly as whole texels allow. detail 0 adds nothing, 1 continues the photo's finest contrast.
 [[nodiscard]] cv::Mat make_detailed(const cv::Mat& photo, const cv::Rect& window, double scale,
-                                    double detail, bool balanced, std::uint64_t seed);
+                                    double detail, bool nested, std::uint64_t seed);
 
 // A generated picture of natural appearance: as much contrast in every octave.
 [[nodiscard]] cv::Mat make_procedural(int width, int height, std::uint64_t seed);
