@@ -315,7 +315,8 @@ TEST_P(AprilTags, AreFoundWhereTheTruthPutsThem) {
   Vector2d sum = Vector2d::Zero();
   // Moments near the turning points and crossings of the path, when most tags are in view.
   const std::vector<double> times =
-      config.zoom                 ? std::vector<double>{kMoment - 0.1, kMoment, kMoment + 0.1}
+      GetParam().zoom_factor == 1 ? std::vector<double>{kMoment}
+      : config.zoom               ? std::vector<double>{kMoment - 0.1, kMoment, kMoment + 0.1}
       : config.path.amplitude > 0 ? std::vector<double>{0.02, 0.4, 2.7, 3.3}
                                   : std::vector<double>{0};
   for (const double t0 : times) {
@@ -331,7 +332,7 @@ TEST_P(AprilTags, AreFoundWhereTheTruthPutsThem) {
       EXPECT_LT(error.norm(), 0.05) << "tag " << id << " at " << t0 << " s, " << error.transpose();
       for (const Vector2d& corner : seen.corners) {
         const double off = distance_to_nearest(corner, expected.corners);
-        EXPECT_LT(off, 0.08) << "a corner of tag " << id << " at " << t0 << " s";
+        EXPECT_LT(off, 0.05) << "a corner of tag " << id << " at " << t0 << " s";
         corner_squares += off * off;
       }
       sum += error;
@@ -340,7 +341,7 @@ TEST_P(AprilTags, AreFoundWhereTheTruthPutsThem) {
     }
   }
   // A tag or more of each frame may be out of view.
-  ASSERT_GE(found, config.path.amplitude > 0 ? 12 : 5);
+  ASSERT_GE(found, times.size() > 1 ? 12 : 5);
   EXPECT_LT((sum / found).norm(), 0.01);
   EXPECT_LT(std::sqrt(squares / found), 0.02);
   // Each from two of the four edges, a corner is less certain than the centre.

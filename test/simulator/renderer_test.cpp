@@ -2,14 +2,12 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <functional>
 #include <memory>
 #include <numeric>
 #include <opencv2/imgcodecs.hpp>
-#include <vector>
 
 #include "test/support/temporary_directory.h"
 
@@ -310,83 +308,6 @@ TEST_F(VirtualSensor, ShowsTheSameSceneWhateverThePathAround) {
   double sum = 0;
   for (std::size_t i = 0; i < still.size(); ++i) sum += std::abs(still[i] - moving[i]);
   EXPECT_LT(sum / static_cast<double>(still.size()), 1);
-}
-
-// 500 to 16,000 px, at rest at one of them.
-Config zoom_at(double focal_length, std::vector<double> others) {
-  Config config = still_camera();
-  PatchConfig patch;
-  patch.width = patch.height = 60 * kDegree;
-  config.scene.procedural.push_back(patch);
-  ZoomConfig& zoom = config.zoom.emplace();
-  zoom.focal_length = {500, 16000};
-  zoom.path.type = ZoomPathConfig::Type::kDwell;
-  zoom.path.stops.push_back({std::nullopt, focal_length, 10});
-  for (const double other : others) zoom.path.stops.push_back({std::nullopt, other, 1});
-  return config;
-}
-
-// Standard deviation of the difference of neighbours: of what is as fine as the pixels.
-double finest_contrast(const Image& image) {
-  double sum = 0;
-  for (std::size_t i = 1; i < image.size(); ++i) {
-    if (i % 160 != 0) sum += (image[i] - image[i - 1]) * (image[i] - image[i - 1]);
-  }
-  return std::sqrt(sum / static_cast<double>(image.size()));
-}
-
-// Root of the mean square.
-double difference(const Image& a, const Image& b) {
-  double squares = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) squares += (a[i] - b[i]) * (a[i] - b[i]);
-  return std::sqrt(squares / static_cast<double>(a.size()));
-}
-
-TEST_F(VirtualSensor, HasContrastAsFineAsItsPixelsAtEveryZoom) {
-  const double wide = finest_contrast(render(zoom_at(500, {16000})));
-  for (const double focal_length : {1200.0, 4000.0, 16000.0}) {
-    Config config = zoom_at(focal_length, {500, 16000});
-    const double contrast = finest_contrast(render(config));
-    EXPECT_GT(contrast, 0.5 * wide) << focal_length;
-    EXPECT_LT(contrast, 2 * wide) << focal_length;
-    config.scene.detail = 0;
-    // A pixel of the procedural photo is 16 px wide at the long end.
-    if (focal_length < 10000) continue;
-    EXPECT_LT(finest_contrast(render(config)), 0.2 * contrast);
-  }
-}
-
-TEST_F(VirtualSensor, ShowsTheSameSceneWhicheverZoomsItWasPreparedFor) {
-  for (const double focal_length : {500.0, 1300.0, 3500.0}) {
-    const Image alone = render(zoom_at(focal_length, {}));
-    const Image among = render(zoom_at(focal_length, {500, 16000}));
-    ASSERT_GT(variance(alone), 20);
-    // The texels of the two are not of one size.
-    EXPECT_LT(difference(alone, among), 0.2 * finest_contrast(alone)) << focal_length;
-  }
-}
-
-TEST_F(VirtualSensor, NothingJumpsWhileTheZoomPassesFromOnePreparationToAnother) {
-  Config config = zoom_at(500, {16000});
-  config.zoom->path = {};
-  config.zoom->path.type = ZoomPathConfig::Type::kCreep;
-  config.zoom->path.factor = 32;
-  config.zoom->path.rate = 0.01;
-  config.zoom->speed = 1;
-  const std::unique_ptr<Path> path = make_path(config);
-  const Renderer renderer(config, *path);
-  // 500 px times e to the 0.01 t: about where one preparation gives way to the next, and half way between two.
-  for (const double from : {31.5, 66.0, 135.5}) {
-    std::vector<double> changes;
-    Image last = renderer.render(from, 0);
-    for (double time = from + 0.1; time < from + 3; time += 0.1) {
-      const Image image = renderer.render(time, 0);
-      changes.push_back(difference(image, last));
-      last = image;
-    }
-    std::sort(changes.begin(), changes.end());
-    EXPECT_LT(changes.back(), 1.3 * changes[changes.size() / 2]) << from;
-  }
 }
 
 TEST_F(VirtualSensor, RefusesAPhotoThatCannotBeRead) {
