@@ -225,13 +225,16 @@ class SampledZoom : public ZoomPath {
     return (places_[i + 1] - places_[i]) / (times_[i + 1] - times_[i]);
   }
 
-  // The harmonic mean of the neighbouring secants keeps the cubic monotone.
+  // Of the parabola through the neighbours; at most three times either secant keeps the cubic monotone.
   void find_tangents() {
     tangents_.assign(times_.size(), 0);
     for (std::size_t i = 1; i + 1 < times_.size(); ++i) {
       const double before = secant(i - 1);
       const double after = secant(i);
-      if (before * after > 0) tangents_[i] = 2 * before * after / (before + after);
+      if (before * after <= 0) continue;
+      const double part = (times_[i] - times_[i - 1]) / (times_[i + 1] - times_[i - 1]);
+      const double most = 3 * std::min(std::abs(before), std::abs(after));
+      tangents_[i] = std::clamp(before + part * (after - before), -most, most);
     }
   }
 

@@ -5,8 +5,8 @@
 //   dwell   rests at each stop, moving between them as fast as the motor can; after the last to the first again
 //   sweep   the focal length times `factor` in `duration`, a rest, back, a rest
 //   creep   the same at a steady, slow rate
-//   csv     columns time_s, zoom (a truth.csv will do): a monotone cubic of log f through the points (Fritsch and Carlson
-//           1980); equal neighbours are a rest
+//   csv     columns time_s, zoom: a monotone cubic of log f through the points (Fritsch and Carlson 1980); equal neighbours
+//           are a rest. A truth.csv will do, if the motor is granted a fifth more acceleration: a cubic has its own
 //
 // A movement of the first four kinds starts and ends at rest: its rate rises as sin^2 to its speed, stays, and falls likewise.
 // No path exceeds the motor's speed and acceleration: one that would is refused.
