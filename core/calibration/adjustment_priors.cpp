@@ -10,7 +10,9 @@ PriorKnowledge prior_knowledge(int width, int height, const CalibrationOptions& 
   PriorKnowledge known;
   AdjustmentState& mean = known.priors.mean;
   GlobalVector& information = known.priors.information;
-  mean.camera = {focal_length, 1, 0, width, height};
+  mean.camera.focal_length = focal_length;
+  mean.camera.width = width;
+  mean.camera.height = height;
   mean.mechanics.pan_axis = options.pan_axis.normalized();
   mean.mechanics.tilt_axis = options.tilt_axis.normalized();
   const auto set = [&](Parameter parameter, double sigma) {
@@ -31,6 +33,9 @@ PriorKnowledge prior_knowledge(int width, int height, const CalibrationOptions& 
     mean.distortion = options.radial_distortion->value / unit;
     set(Parameter::kRadialDistortion, options.radial_distortion->sigma / unit);
   }
+  mean.camera.set_centre_offset(options.centre_offset_px);
+  set(Parameter::kCentreU, options.centre_sigma_px);
+  set(Parameter::kCentreV, options.centre_sigma_px);
   if (options.line_delay) {
     mean.readout_s = options.line_delay->value * height;
     set(Parameter::kLineDelay, options.line_delay->sigma * height);

@@ -19,6 +19,7 @@ Eigen::Matrix<double, kParameterCount, 1> difference(const Calibration& a, const
   Eigen::Matrix<double, kParameterCount, 1> d = Eigen::Matrix<double, kParameterCount, 1>::Zero();
   d[index(Parameter::kFocalLength)] = b.camera.focal_length - a.camera.focal_length;
   d[index(Parameter::kRadialDistortion)] = b.camera.radial_distortion - a.camera.radial_distortion;
+  d.segment<2>(index(Parameter::kCentreU)) = b.camera.centre_offset() - a.camera.centre_offset();
   d[index(Parameter::kLineDelay)] = b.line_delay - a.line_delay;
   d.segment<2>(index(Parameter::kPanAxis0)) =
       direction_minus(b.mechanics.pan_axis, a.mechanics.pan_axis);

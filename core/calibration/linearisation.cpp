@@ -58,7 +58,7 @@ struct ObservationModel {
     const Vector3<double> d_c = R.transpose() * landmark.d_b;
     Vector2<double> u;
     Matrix<double, 2, 3> J_u_dc;
-    Matrix<double, 2, 3> J_u_camera;
+    Matrix<double, 2, kCameraParameterCount> J_u_camera;
     if (project(camera, d_c, &u, &J_u_dc, &J_u_camera) != ProjectionStatus::kOk) return false;
     const Matrix<double, 2, 3> J_u_xi = J_u_dc * skew(d_c);
     const Matrix2<double> J_u_angle = J_u_xi * J_xi_angle;
@@ -78,7 +78,8 @@ struct ObservationModel {
         camera.focal_length * J_u_camera.col(0) + 2 * camera.radial_distortion * J_u_camera.col(2);
     J.col(1) = camera.aspect * J_u_camera.col(1);
     J.col(2) = distortion_unit * J_u_camera.col(2);
-    J.col(3) = J_u_time * (observation.u.y() / camera.height);
+    J.middleCols<2>(index(Parameter::kCentreU)) = J_u_camera.rightCols<2>();
+    J.col(index(Parameter::kLineDelay)) = J_u_time * (observation.u.y() / camera.height);
     J.rightCols<4>() = J_u_xi * J_xi_axes + J_u_db * landmark.J_db_axes;
     out->J_camera = whiten * J;
     return true;
@@ -132,6 +133,8 @@ void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_
   state->camera.focal_length *= std::exp(global[index(Parameter::kFocalLength)]);
   state->camera.aspect *= std::exp(global[index(Parameter::kAspect)]);
   state->distortion += global[index(Parameter::kRadialDistortion)];
+  state->camera.centre_u += global[index(Parameter::kCentreU)];
+  state->camera.centre_v += global[index(Parameter::kCentreV)];
   state->readout_s += global[index(Parameter::kLineDelay)];
   Mechanics<double>& mechanics = state->mechanics;
   mechanics.pan_axis = direction_plus<double>(
@@ -353,6 +356,8 @@ void Lineariser::add_priors(const AdjustmentState& state, Linearisation* out) co
   J(index(Parameter::kRadialDistortion), index(Parameter::kRadialDistortion)) = f_ratio * f_ratio;
   J(index(Parameter::kRadialDistortion), index(Parameter::kFocalLength)) =
       2 * state.distortion * f_ratio * f_ratio;
+  error.segment<2>(index(Parameter::kCentreU)) =
+      mean.camera.centre_offset() - state.camera.centre_offset();
   error[index(Parameter::kLineDelay)] = mean.readout_s - state.readout_s;
   const auto add_axis = [&](const Vector3<double>& axis, const Vector3<double>& prior, int first) {
     Matrix<double, 2, 3> J_change_axis;

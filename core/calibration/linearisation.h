@@ -8,7 +8,7 @@
 // rolling-shutter projection, with white noise of sigma_px. Derivatives hold A fixed, at the observed row: the
 // noise of v then shifts the line delay by some hundredths of its sigma (bounded in ceres_adjustment_test).
 // Parameters are scaled so that every lens is equally easy: log f, log alpha, k (R / f)^2 (R: half the
-// image's diagonal, px), read-out time l h; changes are local (direction.h for axes and landmarks).
+// image's diagonal, px), the optical centre's offset (px), read-out time l h; changes are local (direction.h for axes and landmarks).
 // Angles in rad, times in s on the image clock. Allocates.
 
 #include <Eigen/Core>
@@ -26,7 +26,7 @@ namespace alidade::internal {
 inline constexpr int kDrift = kParameterCount;
 inline constexpr int kGlobalCount = kParameterCount + 1;
 // The first ones act on observations.
-inline constexpr int kCameraCount = 8;
+inline constexpr int kCameraCount = 10;
 
 using GlobalVector = Eigen::Matrix<double, kGlobalCount, 1>;
 using GlobalMatrix = Eigen::Matrix<double, kGlobalCount, kGlobalCount>;

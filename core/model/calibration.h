@@ -16,6 +16,8 @@ enum class Parameter : int {
   kFocalLength,
   kAspect,
   kRadialDistortion,
+  kCentreU,
+  kCentreV,
   kLineDelay,
   kPanAxis0,
   kPanAxis1,
@@ -40,6 +42,10 @@ inline constexpr int kParameterCount = static_cast<int>(Parameter::kCount);
       return "aspect";
     case Parameter::kRadialDistortion:
       return "radial_distortion";
+    case Parameter::kCentreU:
+      return "centre_u";
+    case Parameter::kCentreV:
+      return "centre_v";
     case Parameter::kLineDelay:
       return "line_delay";
     case Parameter::kPanAxis0:
@@ -79,6 +85,13 @@ struct Calibration {
   std::optional<double> zoom;  // device units at which this calibration holds
   // Zero rows are parameters taken as exact.
   ParameterCovariance<double> covariance = ParameterCovariance<double>::Zero();
+
+  // Whether the optical centre is anything but the image's middle exactly.
+  [[nodiscard]] bool has_centre() const {
+    return camera.centre_u != 0 || camera.centre_v != 0 ||
+           covariance(index(Parameter::kCentreU), index(Parameter::kCentreU)) != 0 ||
+           covariance(index(Parameter::kCentreV), index(Parameter::kCentreV)) != 0;
+  }
 };
 
 }  // namespace alidade

@@ -1,9 +1,10 @@
 #pragma once
 // The base camera: perspective with one term of radial distortion (PTCEE 28, 29), RDF frame.
 //   x = (d_1, d_2) / d_3,   s = 1 + k |x|^2
-//   u = f x_1 s + w/2,      v = alpha f x_2 s + h/2
+//   u = f x_1 s + w/2 + c_u,      v = alpha f x_2 s + h/2 + c_v
 // Pixels are continuous, the centre of the top-left pixel is at (0.5, 0.5). The image's border
-// plays no part: pixels outside it have directions too.
+// plays no part: pixels outside it have directions too. At one zoom the optical centre's offset c can
+// hardly be told from a turn by c / f, and is taken as 0; over several zooms it shows.
 // The inverse needs no iteration. With r_d = |x| s and q = k r_d^2, the ratio m = |x| / r_d solves
 // m + q m^3 = 1, so it is a function of q alone:
 //   q > 0: m = sinh(asinh(y)/3) 3/y,   q < 0: m = sin(asin(y)/3) 3/y,   y = sqrt(27 |q| / 4).
@@ -27,12 +28,28 @@ struct Camera {
   S radial_distortion = S(0);  // k
   int width = 0;               // px
   int height = 0;              // px
+  S centre_u = S(0);           // c, px: of the optical centre from the image's middle
+  S centre_v = S(0);
 
   template <class T>
   [[nodiscard]] Camera<T> cast() const {
-    return {T(focal_length), T(aspect), T(radial_distortion), width, height};
+    return {T(focal_length), T(aspect),   T(radial_distortion), width,
+            height,          T(centre_u), T(centre_v)};
+  }
+
+  [[nodiscard]] Vector2<S> centre_offset() const { return {centre_u, centre_v}; }
+  void set_centre_offset(const Vector2<S>& c) {
+    centre_u = c.x();
+    centre_v = c.y();
+  }
+  // px, of the image
+  [[nodiscard]] Vector2<S> optical_centre() const {
+    return {S(width) / S(2) + centre_u, S(height) / S(2) + centre_v};
   }
 };
+
+// f, alpha, k, c_u, c_v: the first of Parameter.
+inline constexpr int kCameraParameterCount = 5;
 
 namespace internal {
 
@@ -58,12 +75,12 @@ template <class S>
 
 }  // namespace internal
 
-// d_c need not have unit length. J_u_camera: columns f, alpha, k.
+// d_c need not have unit length. J_u_camera: columns f, alpha, k, c_u, c_v.
 template <class S>
-[[nodiscard]] ProjectionStatus project(const Camera<S>& camera, const NonDeduced<Vector3<S>>& d_c,
-                                       NonDeduced<Vector2<S>>* u,
-                                       NonDeduced<Matrix<S, 2, 3>>* J_u_d = nullptr,
-                                       NonDeduced<Matrix<S, 2, 3>>* J_u_camera = nullptr) {
+[[nodiscard]] ProjectionStatus project(
+    const Camera<S>& camera, const NonDeduced<Vector3<S>>& d_c, NonDeduced<Vector2<S>>* u,
+    NonDeduced<Matrix<S, 2, 3>>* J_u_d = nullptr,
+    NonDeduced<Matrix<S, 2, kCameraParameterCount>>* J_u_camera = nullptr) {
   if (!all_finite(d_c)) return ProjectionStatus::kNotFinite;
   if (d_c.z() <= S(0)) return ProjectionStatus::kBehindCamera;
   const S& f = camera.focal_length;
@@ -75,8 +92,8 @@ template <class S>
 
   const S scale = S(1) + k * r_squared;
   const Vector2<S> x_d = scale * x;
-  const Vector2<S> pixel(f * x_d.x() + S(camera.width) / S(2),
-                         f * aspect * x_d.y() + S(camera.height) / S(2));
+  const Vector2<S> centre = camera.optical_centre();
+  const Vector2<S> pixel(f * x_d.x() + centre.x(), f * aspect * x_d.y() + centre.y());
   if (!all_finite(pixel)) return ProjectionStatus::kNotFinite;
   *u = pixel;
   if (J_u_d != nullptr) {
@@ -86,24 +103,24 @@ template <class S>
     *J_u_d << J_u_x, -J_u_x * x;
   }
   if (J_u_camera != nullptr) {
-    *J_u_camera << x_d.x(), S(0), f * r_squared * x.x(),  //
-        aspect * x_d.y(), f * x_d.y(), f * aspect * r_squared * x.y();
+    *J_u_camera << x_d.x(), S(0), f * r_squared * x.x(), S(1), S(0),  //
+        aspect * x_d.y(), f * x_d.y(), f * aspect * r_squared * x.y(), S(0), S(1);
   }
   return ProjectionStatus::kOk;
 }
 
-// d_c has unit length. J_d_camera: columns f, alpha, k.
+// d_c has unit length. J_d_camera: columns f, alpha, k, c_u, c_v.
 template <class S>
-[[nodiscard]] ProjectionStatus unproject(const Camera<S>& camera, const NonDeduced<Vector2<S>>& u,
-                                         NonDeduced<Vector3<S>>* d_c,
-                                         NonDeduced<Matrix<S, 3, 2>>* J_d_u = nullptr,
-                                         NonDeduced<Matrix3<S>>* J_d_camera = nullptr) {
+[[nodiscard]] ProjectionStatus unproject(
+    const Camera<S>& camera, const NonDeduced<Vector2<S>>& u, NonDeduced<Vector3<S>>* d_c,
+    NonDeduced<Matrix<S, 3, 2>>* J_d_u = nullptr,
+    NonDeduced<Matrix<S, 3, kCameraParameterCount>>* J_d_camera = nullptr) {
   using std::sqrt;
   const S& f = camera.focal_length;
   const S& aspect = camera.aspect;
   const S& k = camera.radial_distortion;
-  const Vector2<S> x_d((u.x() - S(camera.width) / S(2)) / f,
-                       (u.y() - S(camera.height) / S(2)) / (f * aspect));
+  const Vector2<S> from_centre = u - camera.optical_centre();
+  const Vector2<S> x_d(from_centre.x() / f, from_centre.y() / (f * aspect));
   if (!all_finite(x_d)) return ProjectionStatus::kNotFinite;
   const S r_d_squared = x_d.squaredNorm();
   const S q = k * r_d_squared;
@@ -124,14 +141,15 @@ template <class S>
   J_d_x(0, 0) += z;
   J_d_x(1, 1) += z;
   const Matrix<S, 3, 2> J_d_xd = J_d_x * J_x_xd;
-  if (J_d_u != nullptr) {
-    J_d_u->col(0) = J_d_xd.col(0) / f;
-    J_d_u->col(1) = J_d_xd.col(1) / (f * aspect);
-  }
+  Matrix<S, 3, 2> J_d_pixel;
+  J_d_pixel.col(0) = J_d_xd.col(0) / f;
+  J_d_pixel.col(1) = J_d_xd.col(1) / (f * aspect);
+  if (J_d_u != nullptr) *J_d_u = J_d_pixel;
   if (J_d_camera != nullptr) {
     J_d_camera->col(0) = -J_d_xd * x_d / f;
     J_d_camera->col(1) = -J_d_xd.col(1) * x_d.y() / aspect;
     J_d_camera->col(2) = J_d_x * x_d * (dm_dq * r_d_squared);
+    J_d_camera->template rightCols<2>() = -J_d_pixel;
   }
   return ProjectionStatus::kOk;
 }

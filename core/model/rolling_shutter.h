@@ -93,7 +93,7 @@ template <class S>
       J_d_u != nullptr || J_d_motion != nullptr || J_d_parameters != nullptr;
   Vector3<S> d_c;
   Matrix<S, 3, 2> J_dc_u;
-  Matrix3<S> J_dc_camera;
+  Matrix<S, 3, kCameraParameterCount> J_dc_camera;
   const ProjectionStatus status = unproject(camera, u, &d_c, J_d_u != nullptr ? &J_dc_u : nullptr,
                                             J_d_parameters != nullptr ? &J_dc_camera : nullptr);
   if (status != ProjectionStatus::kOk) return status;
@@ -122,7 +122,8 @@ template <class S>
   }
   if (J_d_parameters != nullptr) {
     J_d_parameters->setZero();
-    J_d_parameters->template middleCols<3>(index(Parameter::kFocalLength)) = R * J_dc_camera;
+    J_d_parameters->template middleCols<kCameraParameterCount>(index(Parameter::kFocalLength)) =
+        R * J_dc_camera;
     J_d_parameters->col(index(Parameter::kLineDelay)) = J_d_time * rows;
     J_d_parameters->template middleCols<4>(index(Parameter::kPanAxis0)) = J_d_xi * J_xi_axes;
   }
@@ -147,7 +148,7 @@ template <class S>
                                           J_u_parameters != nullptr ? &J_xi_axes : nullptr);
   const Vector3<S> d_c = R.transpose() * d_b;
   Matrix<S, 2, 3> J_u_dc;
-  Matrix<S, 2, 3> J_u_camera;
+  Matrix<S, 2, kCameraParameterCount> J_u_camera;
   const ProjectionStatus status = project(camera, d_c, u, with_jacobians ? &J_u_dc : nullptr,
                                           J_u_parameters != nullptr ? &J_u_camera : nullptr);
   if (status != ProjectionStatus::kOk || !with_jacobians) return status;
@@ -161,7 +162,8 @@ template <class S>
   if (J_u_motion != nullptr) *J_u_motion << J_u_angle, J_u_angle * (rows * line_delay);
   if (J_u_parameters != nullptr) {
     J_u_parameters->setZero();
-    J_u_parameters->template middleCols<3>(index(Parameter::kFocalLength)) = J_u_camera;
+    J_u_parameters->template middleCols<kCameraParameterCount>(index(Parameter::kFocalLength)) =
+        J_u_camera;
     J_u_parameters->col(index(Parameter::kLineDelay)) = J_u_time * rows;
     J_u_parameters->template middleCols<4>(index(Parameter::kPanAxis0)) = J_u_xi * J_xi_axes;
   }

@@ -87,7 +87,7 @@ std::optional<Fit> fit(const std::vector<GridPoint>& part, const Camera<double>&
       const Vector3<double> d = R * part[i].d;
       Vector2<double> u;
       Matrix<double, 2, 3> J_u_d;
-      Matrix<double, 2, 3> J_u_camera;
+      Matrix<double, 2, kCameraParameterCount> J_u_camera;
       if (project(camera, d, &u, &J_u_d, &J_u_camera) != ProjectionStatus::kOk) return std::nullopt;
       const auto at = static_cast<Eigen::Index>(2 * i);
       error.segment<2>(at) = part[i].u - u;

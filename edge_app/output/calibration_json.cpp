@@ -2,6 +2,9 @@
 
 #include <cmath>
 #include <nlohmann/json.hpp>
+#include <vector>
+
+#include "core/calibration/calibration_text.h"
 
 namespace alidade {
 
@@ -22,6 +25,11 @@ ordered_json parameters_json(const Calibration& calibration) {
   scalar(Parameter::kFocalLength, calibration.camera.focal_length);
   scalar(Parameter::kAspect, calibration.camera.aspect);
   scalar(Parameter::kRadialDistortion, calibration.camera.radial_distortion);
+  if (calibration.has_centre()) {
+    parameters["centre_offset"] = {
+        {"value", {calibration.camera.centre_u, calibration.camera.centre_v}},
+        {"sigma", {sigma(index(Parameter::kCentreU)), sigma(index(Parameter::kCentreV))}}};
+  }
   scalar(Parameter::kLineDelay, calibration.line_delay);
   axis("pan_axis", calibration.mechanics.pan_axis, Parameter::kPanAxis0);
   axis("tilt_axis", calibration.mechanics.tilt_axis, Parameter::kTiltAxis0);
@@ -39,11 +47,14 @@ ordered_json calibration_json(const Calibration& calibration) {
   if (calibration.zoom) json["zoom"] = *calibration.zoom;
   ordered_json names = ordered_json::array();
   ordered_json matrix = ordered_json::array();
-  for (int i = 0; i < kParameterCount; ++i) {
-    names.push_back(to_string(static_cast<Parameter>(i)));
-    ordered_json row = ordered_json::array();
-    for (int j = 0; j < kParameterCount; ++j) row.push_back(calibration.covariance(i, j));
-    matrix.push_back(std::move(row));
+  const std::vector<Parameter> parameters = parameters_of(calibration);
+  for (const Parameter row : parameters) {
+    names.push_back(to_string(row));
+    ordered_json values = ordered_json::array();
+    for (const Parameter column : parameters) {
+      values.push_back(calibration.covariance(index(row), index(column)));
+    }
+    matrix.push_back(std::move(values));
   }
   json["covariance"] = {{"names", std::move(names)}, {"matrix", std::move(matrix)}};
   return json;

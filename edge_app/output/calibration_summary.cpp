@@ -62,7 +62,7 @@ std::vector<SummaryRow> summary_rows(const CalibrationResult& result,
                                      const CalibrationOptions& options) {
   const Calibration& c = result.calibration;
   const auto& m = c.mechanics;
-  return {
+  std::vector<SummaryRow> rows = {
       scalar_row(c, Parameter::kFocalLength, c.camera.focal_length, 1, "px", options.focal_length),
       scalar_row(c, Parameter::kAspect, c.camera.aspect, 1, "1", options.aspect),
       scalar_row(c, Parameter::kRadialDistortion, c.camera.radial_distortion, 1, "1",
@@ -73,6 +73,14 @@ std::vector<SummaryRow> summary_rows(const CalibrationResult& result,
       scalar_row(c, Parameter::kPanScale, m.pan_scale, 1, "1", options.pan_scale),
       scalar_row(c, Parameter::kTiltScale, m.tilt_scale, 1, "1", options.tilt_scale),
       scalar_row(c, Parameter::kClockOffset, c.clock_offset, 1e-3, "ms", options.clock_offset)};
+  if (c.has_centre()) {
+    const CalibrationPrior u{options.centre_offset_px.x(), options.centre_sigma_px};
+    const CalibrationPrior v{options.centre_offset_px.y(), options.centre_sigma_px};
+    rows.insert(rows.begin() + 3,
+                {scalar_row(c, Parameter::kCentreU, c.camera.centre_u, 1, "px", u),
+                 scalar_row(c, Parameter::kCentreV, c.camera.centre_v, 1, "px", v)});
+  }
+  return rows;
 }
 
 std::string summary_text(const CalibrationResult& result, const CalibrationOptions& options) {

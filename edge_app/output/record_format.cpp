@@ -22,6 +22,7 @@ constexpr std::size_t kLongestLine = 2048;  // bytes that most lines do not exce
 template <std::size_t kSize>
 using Columns = std::array<const char*, kSize>;
 constexpr Columns<4> kQ = {"q_x", "q_y", "q_z", "q_w"};
+constexpr Columns<2> kCentre = {"centre_offset_u_px", "centre_offset_v_px"};
 constexpr Columns<3> kSigma = {"orientation_sigma_rad_0", "orientation_sigma_rad_1",
                                "orientation_sigma_rad_2"};
 constexpr Columns<9> kCovariance = {
@@ -68,6 +69,8 @@ void add_fields(const OrientationRecord& record, Line* line) {
   line->add("focal_length_px", record.camera.focal_length);
   line->add("aspect", record.camera.aspect);
   line->add("radial_distortion", record.camera.radial_distortion);
+  line->add("centre_offset_px", kCentre,
+            std::optional(std::array<double, 2>{record.camera.centre_u, record.camera.centre_v}));
   line->add("latency_s", record.latency_s);
   line->add("telemetry_age_s", record.telemetry_age_s);
 }

@@ -25,6 +25,8 @@ PlainCalibration pack(const Calibration& calibration) {
   out.focal_length = calibration.camera.focal_length;
   out.aspect = calibration.camera.aspect;
   out.radial_distortion = calibration.camera.radial_distortion;
+  out.centre_u = calibration.camera.centre_u;
+  out.centre_v = calibration.camera.centre_v;
   out.width = calibration.camera.width;
   out.height = calibration.camera.height;
   out.line_delay = calibration.line_delay;
@@ -56,6 +58,8 @@ Calibration unpack(const PlainCalibration& calibration) {
   out.camera.focal_length = calibration.focal_length;
   out.camera.aspect = calibration.aspect;
   out.camera.radial_distortion = calibration.radial_distortion;
+  out.camera.centre_u = calibration.centre_u;
+  out.camera.centre_v = calibration.centre_v;
   out.camera.width = calibration.width;
   out.camera.height = calibration.height;
   out.line_delay = calibration.line_delay;

@@ -17,6 +17,8 @@ struct PlainCalibration {
   double focal_length = 0;
   double aspect = 1;
   double radial_distortion = 0;
+  double centre_u = 0;
+  double centre_v = 0;
   std::int32_t width = 0;
   std::int32_t height = 0;
   double line_delay = 0;

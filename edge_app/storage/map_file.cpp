@@ -8,6 +8,7 @@
 #include <cstring>
 #include <limits>
 
+#include "core/calibration/calibration_text.h"
 #include "core/realtime/oe_mode/landmark_map.h"
 #include "platform/system/whole_file.h"
 
@@ -23,9 +24,9 @@ constexpr char kMagic[] = "ALIDMAP\n";
 constexpr std::size_t kMagicSize = sizeof kMagic - 1;
 constexpr std::uint32_t kVersion = 3;
 constexpr std::size_t kVersionEnd = 12;
-constexpr std::size_t kHeaderSize = 352;
+constexpr std::size_t kHeaderSizeWithout = 176;  // sensitivities, two rows
 constexpr std::size_t kPointSize = 60;
-constexpr std::size_t kLandmarkSize = 464;
+constexpr std::size_t kLandmarkSizeWithout = 376;
 constexpr std::size_t kChecksumSize = 4;
 
 class Writer {
@@ -52,11 +53,15 @@ class Writer {
       for (int j = i; j < kSize; ++j) f64(m(i, j));
     }
   }
-  void sensitivity(const Sensitivity<2>& m) {
-    for (int i = 0; i < m.size(); ++i) f64(m(i / kParameterCount, i % kParameterCount));
+  void sensitivity(const Sensitivity<2>& m, const std::vector<Parameter>& parameters) {
+    for (int i = 0; i < 2; ++i) {
+      for (const Parameter p : parameters) f64(m(i, index(p)));
+    }
   }
-  void sensitivity(const LandmarkSensitivity& m) {
-    for (int i = 0; i < m.size(); ++i) f32(m(i / kParameterCount, i % kParameterCount));
+  void sensitivity(const LandmarkSensitivity& m, const std::vector<Parameter>& parameters) {
+    for (int i = 0; i < 2; ++i) {
+      for (const Parameter p : parameters) f32(m(i, index(p)));
+    }
   }
   [[nodiscard]] const std::string& bytes() const { return bytes_; }
 
@@ -96,11 +101,17 @@ class Cursor {
       for (int j = i; j < kSize; ++j) (*m)(i, j) = (*m)(j, i) = f64();
     }
   }
-  void sensitivity(Sensitivity<2>* m) {
-    for (int i = 0; i < m->size(); ++i) (*m)(i / kParameterCount, i % kParameterCount) = f64();
+  void sensitivity(Sensitivity<2>* m, const std::vector<Parameter>& parameters) {
+    m->setZero();
+    for (int i = 0; i < 2; ++i) {
+      for (const Parameter p : parameters) (*m)(i, index(p)) = f64();
+    }
   }
-  void sensitivity(LandmarkSensitivity* m) {
-    for (int i = 0; i < m->size(); ++i) (*m)(i / kParameterCount, i % kParameterCount) = f32();
+  void sensitivity(LandmarkSensitivity* m, const std::vector<Parameter>& parameters) {
+    m->setZero();
+    for (int i = 0; i < 2; ++i) {
+      for (const Parameter p : parameters) (*m)(i, index(p)) = f32();
+    }
   }
 
  private:
@@ -203,12 +214,12 @@ void read(Cursor* in, CalibrationLandmark* point) {
   point->observations = static_cast<int>(in->u32());
 }
 
-void write(const Landmark& landmark, Writer* out) {
+void write(const Landmark& landmark, const std::vector<Parameter>& parameters, Writer* out) {
   out->u32(landmark.octave);
   out->vector(landmark.d);
   out->symmetric(landmark.covariance);
   out->symmetric(landmark.shared_covariance);
-  out->sensitivity(landmark.sensitivity);
+  out->sensitivity(landmark.sensitivity, parameters);
   for (int i = 0; i < 4; ++i) out->f64(landmark.J_pixel_tangent(i / 2, i % 2));
   for (const std::uint8_t pixel : landmark.pixels) {
     const char byte = static_cast<char>(pixel);
@@ -219,13 +230,13 @@ void write(const Landmark& landmark, Writer* out) {
   out->f32(landmark.statistics.residual_square);
 }
 
-void read(Cursor* in, Landmark* landmark) {
+void read(Cursor* in, const std::vector<Parameter>& parameters, Landmark* landmark) {
   // One that does not fit is out of range all the same.
   landmark->octave = static_cast<std::uint8_t>(std::min(in->u32(), std::uint32_t{0xff}));
   in->vector(&landmark->d);
   in->symmetric(&landmark->covariance);
   in->symmetric(&landmark->shared_covariance);
-  in->sensitivity(&landmark->sensitivity);
+  in->sensitivity(&landmark->sensitivity, parameters);
   for (int i = 0; i < 4; ++i) landmark->J_pixel_tangent(i / 2, i % 2) = in->f64();
   for (std::uint8_t& pixel : landmark->pixels) pixel = in->u8();
   landmark->statistics.looked_for = in->u32();
@@ -246,11 +257,16 @@ std::uint32_t calibration_check(const Calibration& c) {
   }
   values.vector(c.mechanics.pan_axis);
   values.vector(c.mechanics.tilt_axis);
+  if (c.has_centre()) {
+    values.f64(c.camera.centre_u);
+    values.f64(c.camera.centre_v);
+  }
   return checksum(values.bytes(), values.bytes().size());
 }
 
 std::string format_map(const MapContent& content, const Calibration& calibration) {
   const MapState& map = content.map;
+  const std::vector<Parameter> parameters = parameters_of(calibration);
   Writer out;
   out.text(kMagic, kMagicSize);
   out.u32(kVersion);
@@ -262,9 +278,9 @@ std::string format_map(const MapContent& content, const Calibration& calibration
   out.symmetric(map.offset_covariance);
   for (const Matrix3<double>& shear : map.shear_covariance) out.symmetric(shear);
   out.f64(map.shear_tilt);
-  out.sensitivity(map.offset_sensitivity);
+  out.sensitivity(map.offset_sensitivity, parameters);
   for (const CalibrationLandmark& point : content.points) write(point, &out);
-  for (const Landmark& landmark : map.landmarks) write(landmark, &out);
+  for (const Landmark& landmark : map.landmarks) write(landmark, parameters, &out);
   out.u32(checksum(out.bytes(), out.bytes().size()));
   return out.bytes();
 }
@@ -285,7 +301,10 @@ bool parse_map(const std::string& bytes, const std::string& name, const Calibrat
     return refuse("map of version " + std::to_string(version) + ", this program reads version " +
                   std::to_string(kVersion));
   }
-  if (bytes.size() < kHeaderSize + kChecksumSize) {
+  const std::vector<Parameter> parameters = parameters_of(calibration);
+  const std::size_t header_size = kHeaderSizeWithout + 2 * 8 * parameters.size();
+  const std::size_t landmark_size = kLandmarkSizeWithout + 2 * 4 * parameters.size();
+  if (bytes.size() < header_size + kChecksumSize) {
     return refuse("too short for a map (" + std::to_string(bytes.size()) + " bytes)");
   }
   const std::uint32_t check = in.u32();
@@ -293,8 +312,8 @@ bool parse_map(const std::string& bytes, const std::string& name, const Calibrat
   const std::uint64_t landmarks = in.u64();
   const std::size_t end = bytes.size() - kChecksumSize;
   // Bounded one by one, so that the sum cannot overflow.
-  if (points > end / kPointSize || landmarks > end / kLandmarkSize ||
-      kHeaderSize + points * kPointSize + landmarks * kLandmarkSize != end) {
+  if (points > end / kPointSize || landmarks > end / landmark_size ||
+      header_size + points * kPointSize + landmarks * landmark_size != end) {
     return refuse("its size does not fit its " + std::to_string(points) + " points and " +
                   std::to_string(landmarks) + " landmarks: cut off, or damaged");
   }
@@ -311,7 +330,7 @@ bool parse_map(const std::string& bytes, const std::string& name, const Calibrat
   in.symmetric(&map.offset_covariance);
   for (Matrix3<double>& shear : map.shear_covariance) in.symmetric(&shear);
   map.shear_tilt = in.f64();
-  in.sensitivity(&map.offset_sensitivity);
+  in.sensitivity(&map.offset_sensitivity, parameters);
   std::string flaw = flaw_of(map);
   if (!flaw.empty()) return refuse("its frame " + flaw);
   found.points.resize(static_cast<std::size_t>(points));
@@ -322,7 +341,7 @@ bool parse_map(const std::string& bytes, const std::string& name, const Calibrat
   }
   map.landmarks.resize(static_cast<std::size_t>(landmarks));
   for (std::size_t i = 0; i < map.landmarks.size(); ++i) {
-    read(&in, &map.landmarks[i]);
+    read(&in, parameters, &map.landmarks[i]);
     flaw = flaw_of(map.landmarks[i]);
     if (!flaw.empty()) return refuse("landmark " + std::to_string(i) + " " + flaw);
   }

@@ -11,18 +11,19 @@
 //         72   6 f64    covariance of pan's shear: upper half, by rows, of (angle, rate, acceleration)
 //        120   6 f64    of tilt's
 //        168   f64      the tilt that the shear is told for, rad
-//        176   22 f64   sensitivity of the offset: by rows pan, tilt, in the order of Parameter
+//        176   22 f64   sensitivity of the offset: by rows pan, tilt, in the order of parameters_of() the
+//                       calibration: 26 of one whose optical centre is not the image's middle; what follows is 32 bytes on
 //        352   n times 60 bytes:
 //                 i64     point's name in the tracks
 //                 3 f64   d_b, unit direction in the base
 //                 3 f64   cov_d: xx, xy, yy in tangent_basis(d_b), rad^2; the calibration taken as exact
 //                 u32     observations
-//              m times 464 bytes, see Landmark in core/realtime/oe_mode/landmark_map.h:
+//              m times 464 bytes (480), see Landmark in core/realtime/oe_mode/landmark_map.h:
 //                 u32     octave, 0 to 7
 //                 3 f64   d, unit direction in the map's frame
 //                 3 f64   covariance: xx, xy, yy, rad^2
 //                 3 f64   shared covariance, likewise
-//                 22 f32  sensitivity, by rows
+//                 22 f32  (26) sensitivity, by rows
 //                 4 f64   J_pixel_tangent, by rows
 //                 256 u8  image, by rows
 //                 u32     frames in which it was looked for

@@ -104,6 +104,10 @@ class Differences {
         case Parameter::kRadialDistortion:
           changed.radial_distortion += change;
           break;
+        case Parameter::kCentreU:
+        case Parameter::kCentreV:
+          changed.optical_centre_offset_px[parameter == Parameter::kCentreV] += change;
+          break;
         case Parameter::kPanAxis0:
         case Parameter::kPanAxis1:
           changed.pan_axis += change * bound_.pan_basis.col(parameter == Parameter::kPanAxis1);
@@ -176,6 +180,8 @@ Bound compute_bound(const Simulation& s, const SimulatedRecording& recording,
   set_optional(Parameter::kRadialDistortion, options.radial_distortion);
   set_optional(Parameter::kLineDelay, options.line_delay);
   set_optional(Parameter::kClockOffset, options.clock_offset);
+  set_prior(Parameter::kCentreU, options.centre_sigma_px);
+  set_prior(Parameter::kCentreV, options.centre_sigma_px);
   set_prior(Parameter::kPanScale, options.pan_scale.sigma);
   set_prior(Parameter::kTiltScale, options.tilt_scale.sigma);
   for (const Parameter p :
@@ -273,8 +279,8 @@ Bound compute_bound(const Simulation& s, const SimulatedRecording& recording,
       };
       for (const Parameter p :
            {Parameter::kFocalLength, Parameter::kAspect, Parameter::kRadialDistortion,
-            Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0,
-            Parameter::kTiltAxis1}) {
+            Parameter::kCentreU, Parameter::kCentreV, Parameter::kPanAxis0, Parameter::kPanAxis1,
+            Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
         if (!given[static_cast<std::size_t>(index(p))]) {
           add(index(p), differences.by_parameter(p, angle, d));
         }

@@ -100,13 +100,13 @@ std::string some_bytes(int points, int landmarks) {
   return format_map(some_content(points, landmarks), map_calibration());
 }
 
-TEST(MapFile, ReadsBackTheSameBits) {
-  const MapContent written = some_content(7, 9);
-  const std::string bytes = format_map(written, map_calibration());
-  EXPECT_EQ(bytes.size(), kHeaderSize + 7 * kPointSize + 9 * kLandmarkSize + kChecksumSize);
+void expect_the_same_bits(const MapContent& written, const Calibration& calibration,
+                          std::size_t size) {
+  const std::string bytes = format_map(written, calibration);
+  EXPECT_EQ(bytes.size(), size);
   MapContent read;
   std::string error;
-  ASSERT_TRUE(parse(bytes, &read, &error)) << error;
+  ASSERT_TRUE(parse_map(bytes, "map.bin", calibration, &read, &error)) << error;
   ASSERT_EQ(read.points.size(), written.points.size());
   for (std::size_t i = 0; i < read.points.size(); ++i) {
     EXPECT_EQ(read.points[i].landmark, written.points[i].landmark);
@@ -136,7 +136,29 @@ TEST(MapFile, ReadsBackTheSameBits) {
     EXPECT_EQ(is.statistics.matched, was.statistics.matched);
     EXPECT_EQ(is.statistics.residual_square, was.statistics.residual_square);
   }
-  EXPECT_EQ(format_map(read, map_calibration()), bytes);
+  EXPECT_EQ(format_map(read, calibration), bytes);
+}
+
+TEST(MapFile, ReadsBackTheSameBits) {
+  MapContent written = some_content(7, 9);
+  // Where the optical centre is the image's middle exactly, what follows it is not kept.
+  const int centre = index(Parameter::kCentreU);
+  written.map.offset_sensitivity.middleCols<2>(centre).setZero();
+  for (Landmark& landmark : written.map.landmarks)
+    landmark.sensitivity.middleCols<2>(centre).setZero();
+  expect_the_same_bits(written, map_calibration(),
+                       kHeaderSize + 7 * kPointSize + 9 * kLandmarkSize + kChecksumSize);
+}
+
+TEST(MapFile, ReadsBackWhatFollowsTheOpticalCentre) {
+  Calibration calibration = map_calibration();
+  calibration.camera.centre_v = -2.5;
+  expect_the_same_bits(
+      some_content(7, 9), calibration,
+      kHeaderSize + 32 + 7 * kPointSize + 9 * (kLandmarkSize + 16) + kChecksumSize);
+  MapContent read;
+  std::string error;
+  EXPECT_FALSE(parse(format_map(some_content(2, 2), calibration), &read, &error));
 }
 
 TEST(MapFile, HoldsNothingToo) {
@@ -271,7 +293,7 @@ TEST(MapFile, RefusesLandmarksThatMakeNoSense) {
                  "not positive");
   expect_refused([](MapContent* c) { c->map.landmarks[1].shared_covariance(0, 1) = kNan; },
                  "not finite");
-  expect_refused([](MapContent* c) { c->map.landmarks[1].sensitivity(0, 3) = HUGE_VALF; },
+  expect_refused([](MapContent* c) { c->map.landmarks[1].sensitivity(0, 5) = HUGE_VALF; },
                  "not finite");
   expect_refused([](MapContent* c) { c->map.landmarks[1].J_pixel_tangent.setOnes(); }, "no extent");
   expect_refused([](MapContent* c) { c->map.landmarks[1].J_pixel_tangent(1, 0) = HUGE_VAL; },
@@ -287,7 +309,7 @@ TEST(MapFile, RefusesAFrameThatMakesNoSense) {
   expect_refused([](MapContent* c) { c->map.offset.tilt = kNan; }, "its frame has a number");
   expect_refused([](MapContent* c) { c->map.offset_covariance(0, 0) = -1; }, "not positive");
   expect_refused([](MapContent* c) { c->map.shear_tilt = HUGE_VAL; }, "not finite");
-  expect_refused([](MapContent* c) { c->map.offset_sensitivity(1, 10) = kNan; }, "not finite");
+  expect_refused([](MapContent* c) { c->map.offset_sensitivity(1, 12) = kNan; }, "not finite");
   expect_refused([](MapContent* c) { c->map.shear_covariance[0](0, 2) = kNan; }, "not finite");
   expect_refused([](MapContent* c) { c->map.shear_covariance[1](1, 2) = 1; }, "not positive");
   // Each two of the three may be so, but not all three.

@@ -63,7 +63,8 @@ inline std::vector<NamedCamera> hard_cameras() {
           {"k barely positive", {1000, 1, 1e-18, 1280, 720}, 0.5},
           {"k barely negative", {1000, 1, -1e-18, 1280, 720}, 0.5},
           {"wide, pincushion", {600, 0.98, 0.4, 1280, 720}, 0.5},
-          {"wide, barrel", {900, 1, -0.15, 1280, 720}, 0.05}};
+          {"wide, barrel", {900, 1, -0.15, 1280, 720}, 0.05},
+          {"off centre", {1500, 1.01, 0.2, 1280, 720, 21.5, -13.25}, 0.5}};
 }
 
 // points_a_side^2 pixels from border to border, margins included.

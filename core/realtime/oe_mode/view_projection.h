@@ -69,7 +69,7 @@ class ViewProjection {
     const Vector3<double> d_c = path.at(s);
     Vector2<double> u;
     Matrix<double, 2, 3> J_u_dc;
-    Matrix<double, 2, 3> J_u_camera;
+    Matrix<double, 2, kCameraParameterCount> J_u_camera;
     if (alidade::project(camera_, d_c, &u, &J_u_dc,
                          J_parameters != nullptr ? &J_u_camera : nullptr) !=
         ProjectionStatus::kOk) {
@@ -87,7 +87,7 @@ class ViewProjection {
     out->J_d = J_u * (R_[0] + s * (R_[1] + s * R_[2]));
     if (J_parameters == nullptr) return true;
     J_parameters->setZero();
-    J_parameters->leftCols<3>() = J_u_fixed * J_u_camera;
+    J_parameters->leftCols<kCameraParameterCount>() = J_u_fixed * J_u_camera;
     const PanTilt<double> rate = rate_at_row(motion_, line_delay_, out->u.y());
     J_parameters->col(index(Parameter::kLineDelay)) =
         (out->u.y() - motion_.reference_row) * (out->J_angle * rate.vector());

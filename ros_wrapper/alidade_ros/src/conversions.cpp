@@ -152,7 +152,8 @@ sensor_msgs::CameraInfo camera_info(const Record& record, int width, int height,
   message.D = {record.radial_distortion, 0, 0, 0, 0};
   const double f_u = record.focal_length_px;
   const double f_v = record.focal_length_px * record.aspect;
-  const alidade_msgs::Pixel centre = ros_from_pixel(width / 2.0, height / 2.0);
+  const alidade_msgs::Pixel centre = ros_from_pixel(width / 2.0 + record.centre_offset_px[0],
+                                                    height / 2.0 + record.centre_offset_px[1]);
   message.K = {f_u, 0, centre.u, 0, f_v, centre.v, 0, 0, 1};
   message.R = {1, 0, 0, 0, 1, 0, 0, 0, 1};
   message.P = {f_u, 0, centre.u, 0, 0, f_v, centre.v, 0, 0, 0, 1, 0};

@@ -60,6 +60,8 @@ bool parse_record(const std::string& text, Record* record, std::string* error) {
     r.focal_length_px = json.at("focal_length_px").get<double>();
     r.aspect = json.at("aspect").get<double>();
     r.radial_distortion = json.at("radial_distortion").get<double>();
+    // An edge of before has none.
+    r.centre_offset_px = json.value("centre_offset_px", r.centre_offset_px);
     if (r.mode != "none") {
       Record::Orientation& o = r.orientation.emplace();
       o.pan_rad = json.at("pan_rad").get<double>();

@@ -80,7 +80,9 @@ inline AdjustmentProblem make_adjustment_problem(Simulation simulation, double k
 
   // What calibrate() assumes by default.
   problem.priors.mean = start;
-  problem.fixed[static_cast<std::size_t>(index(Parameter::kAspect))] = true;
+  for (const Parameter exact : {Parameter::kAspect, Parameter::kCentreU, Parameter::kCentreV}) {
+    problem.fixed[static_cast<std::size_t>(index(exact))] = true;
+  }
   auto& information = problem.priors.information;
   for (int i = index(Parameter::kPanAxis0); i <= index(Parameter::kTiltAxis1); ++i) {
     information[i] = 1 / (0.05 * 0.05);

@@ -244,7 +244,9 @@ TEST(Adjustment, EliminatingLandmarksGivesTheSolutionOfTheWholeSystem) {
 
 TEST(Adjustment, ConvergesFromFarAwayAndHoldsWhatIsFixed) {
   AdjustmentScene scene = make_adjustment_scene();
-  scene.fixed[static_cast<std::size_t>(index(Parameter::kAspect))] = true;
+  for (const Parameter exact : {Parameter::kAspect, Parameter::kCentreU, Parameter::kCentreV}) {
+    scene.fixed[static_cast<std::size_t>(index(exact))] = true;
+  }
   scene.priors.information.setConstant(0);
   scene.priors.information[index(Parameter::kPanScale)] = 1e16;
   scene.priors.information[index(Parameter::kTiltScale)] = 1e16;

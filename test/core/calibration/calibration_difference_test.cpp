@@ -22,7 +22,7 @@ Calibration some_calibration() {
   c.mechanics.tilt_axis = Vector3<double>(-0.03, 1, 0.02).normalized();
   c.clock_offset = -0.08;
   Eigen::Matrix<double, kParameterCount, 1> sigma;
-  sigma << 3, 0, 0.5, 2e-8, 5e-4, 4e-4, 6e-4, 3e-4, 1e-8, 1e-8, 2e-4;
+  sigma << 3, 0, 0.5, 0, 0, 2e-8, 5e-4, 4e-4, 6e-4, 3e-4, 1e-8, 1e-8, 2e-4;
   for (int i = 0; i < kParameterCount; ++i) {
     for (int j = 0; j < kParameterCount; ++j)
       c.covariance(i, j) = (i == j ? 1 : 0.3) * sigma[i] * sigma[j];

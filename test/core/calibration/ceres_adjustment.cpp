@@ -236,7 +236,7 @@ class ObservationCost final : public ceres::SizedCostFunction<2, 2, 2, 2, 2, 2, 
     Matrix<double, 3, 4> J_xi_axes;
     Matrix<double, 2, 3> J_u_dc;
     Matrix<double, 2, 3> J_u_xi;
-    Matrix<double, 2, 3> J_u_camera;
+    Matrix<double, 2, kCameraParameterCount> J_u_camera;
     Matrix2<double> J_u_angle;
     Vector2<double> J_u_time;
   };
@@ -354,6 +354,7 @@ class PriorCost final : public ceres::SizedCostFunction<kGlobalCount, 2, 2, 3, 3
     const double stretch = std::exp(2 * (parameters[0][0] - std::log(mean_.camera.focal_length)));
     e[index(Parameter::kFocalLength)] = std::log(mean_.camera.focal_length) - parameters[0][0];
     e[index(Parameter::kRadialDistortion)] = mean_.distortion - parameters[0][1] * stretch;
+    e.segment<2>(index(Parameter::kCentreU)).setZero();  // exact in what is compared
     e[index(Parameter::kLineDelay)] = mean_.readout_s - parameters[1][0];
     e[index(Parameter::kClockOffset)] = mean_.shift_s - parameters[1][1];
     Matrix<double, 2, 3> J_axis[2];

@@ -68,9 +68,13 @@ class Model {
     using std::pow;
     const double R = 0.5 * std::hypot(state.camera.width, state.camera.height);
     const S f = state.camera.focal_length * exp(change(Parameter::kFocalLength));
-    camera_ = {f, state.camera.aspect * exp(change(Parameter::kAspect)),
+    camera_ = {f,
+               state.camera.aspect * exp(change(Parameter::kAspect)),
                (state.distortion + change(Parameter::kRadialDistortion)) * f * f / (R * R),
-               state.camera.width, state.camera.height};
+               state.camera.width,
+               state.camera.height,
+               state.camera.centre_u + change(Parameter::kCentreU),
+               state.camera.centre_v + change(Parameter::kCentreV)};
     line_delay_ = (state.readout_s + change(Parameter::kLineDelay)) / S(state.camera.height);
     mechanics_ = {axis(state.mechanics.pan_axis, Parameter::kPanAxis0),
                   axis(state.mechanics.tilt_axis, Parameter::kTiltAxis0),

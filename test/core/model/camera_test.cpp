@@ -31,11 +31,12 @@ TEST(Camera, ProjectsByItsDefinition) {
   EXPECT_NEAR(u.y(), 240 - 1100 * 0.2 * s, 1e-12);
 }
 
-TEST(Camera, OpticalAxisProjectsToTheImagesCentre) {
+TEST(Camera, OpticalAxisProjectsToTheOpticalCentre) {
   for (const auto& [name, camera, margin] : hard_cameras()) {
     Vec2 u;
     ASSERT_EQ(project(camera, Vec3(0, 0, 1), &u), ProjectionStatus::kOk) << name;
-    EXPECT_EQ(u, Vec2(camera.width / 2.0, camera.height / 2.0)) << name;
+    EXPECT_EQ(u, Vec2(camera.width / 2.0 + camera.centre_u, camera.height / 2.0 + camera.centre_v))
+        << name;
     Vec3 d;
     ASSERT_EQ(unproject(camera, u, &d), ProjectionStatus::kOk) << name;
     EXPECT_EQ(d, Vec3(0, 0, 1)) << name;
@@ -108,6 +109,41 @@ TEST(Camera, UnprojectInvertsProjectAndDoesNotNeedUnitLength) {
   }
 }
 
+using CameraChange = Matrix<double, kCameraParameterCount, 1>;
+
+Camera<double> changed(Camera<double> camera, const CameraChange& e) {
+  camera.focal_length += e[0];
+  camera.aspect += e[1];
+  camera.radial_distortion += e[2];
+  camera.centre_u += e[3];
+  camera.centre_v += e[4];
+  return camera;
+}
+
+CameraChange camera_steps(double k_step) {
+  CameraChange steps;
+  steps << 1, 1e-3, k_step, 1, 1;
+  return steps;
+}
+
+TEST(Camera, OpticalCentreShiftsAllPixelsAlike) {
+  for (const auto& named : hard_cameras()) {
+    Camera<double> shifted = named.camera;
+    shifted.centre_u += 17.25;
+    shifted.centre_v -= 3.5;
+    int checked = 0;
+    for (const Vec2& u : pixel_grid(named, 9)) {
+      Vec3 d;
+      ASSERT_EQ(unproject(named.camera, u, &d), ProjectionStatus::kOk);
+      Vec2 there;
+      ASSERT_EQ(project(shifted, d, &there), ProjectionStatus::kOk);
+      EXPECT_LE((there - u - Vec2(17.25, -3.5)).norm(), 1e-9) << named.name;
+      ++checked;
+    }
+    EXPECT_EQ(checked, 81) << named.name;
+  }
+}
+
 TEST(Camera, JacobiansOfProjectAgreeWithNumericOnes) {
   for (const auto& named : hard_cameras()) {
     const Camera<double>& camera = named.camera;
@@ -119,7 +155,7 @@ TEST(Camera, JacobiansOfProjectAgreeWithNumericOnes) {
       d *= 1.7;
       Vec2 projected;
       Matrix<double, 2, 3> J_u_d;
-      Matrix<double, 2, 3> J_u_camera;
+      Matrix<double, 2, kCameraParameterCount> J_u_camera;
       ASSERT_EQ(project(camera, d, &projected, &J_u_d, &J_u_camera), ProjectionStatus::kOk);
       const auto at = [](const Camera<double>& c, const Vec3& direction) -> std::optional<Vec2> {
         Vec2 result;
@@ -130,15 +166,8 @@ TEST(Camera, JacobiansOfProjectAgreeWithNumericOnes) {
       const auto numeric_d = numeric_jacobian<2, 3>(
           [&](const Vec3& e) { return at(camera, d + e); }, 1 / camera.focal_length);
       const double k_step = 1e-3 * std::max(1.0, std::abs(camera.radial_distortion));
-      const auto numeric_camera = numeric_jacobian<2, 3>(
-          [&](const Vec3& e) {
-            Camera<double> c = camera;
-            c.focal_length += e[0];
-            c.aspect += e[1];
-            c.radial_distortion += e[2];
-            return at(c, d);
-          },
-          Vec3(1, 1e-3, k_step));
+      const auto numeric_camera = numeric_jacobian<2, kCameraParameterCount>(
+          [&](const CameraChange& e) { return at(changed(camera, e), d); }, camera_steps(k_step));
       // A few roundings of coordinates of thousands of pixels.
       EXPECT_LT(test::disagreement(J_u_d, numeric_d, 4e-12), 1) << named.name;
       EXPECT_LT(test::disagreement(J_u_camera, numeric_camera, 4e-12), 1) << named.name;
@@ -146,7 +175,7 @@ TEST(Camera, JacobiansOfProjectAgreeWithNumericOnes) {
       ++checked;
     }
     EXPECT_EQ(checked, 81) << named.name;
-    EXPECT_EQ(evaluated, 81 * 24) << named.name;
+    EXPECT_EQ(evaluated, 81 * 32) << named.name;
   }
 }
 
@@ -158,7 +187,7 @@ TEST(Camera, JacobiansOfUnprojectAgreeWithNumericOnes) {
     for (const Vec2& u : pixel_grid(named, 9)) {
       Vec3 d;
       Matrix<double, 3, 2> J_d_u;
-      Matrix3<double> J_d_camera;
+      Matrix<double, 3, kCameraParameterCount> J_d_camera;
       ASSERT_EQ(unproject(camera, u, &d, &J_d_u, &J_d_camera), ProjectionStatus::kOk);
       const auto at = [](const Camera<double>& c, const Vec2& pixel) -> std::optional<Vec3> {
         Vec3 result;
@@ -168,22 +197,15 @@ TEST(Camera, JacobiansOfUnprojectAgreeWithNumericOnes) {
       const auto numeric_u =
           numeric_jacobian<3, 2>([&](const Vec2& e) { return at(camera, u + e); }, 1.0);
       const double k_step = 1e-3 * std::max(1.0, std::abs(camera.radial_distortion));
-      const auto numeric_camera = numeric_jacobian<3, 3>(
-          [&](const Vec3& e) {
-            Camera<double> c = camera;
-            c.focal_length += e[0];
-            c.aspect += e[1];
-            c.radial_distortion += e[2];
-            return at(c, u);
-          },
-          Vec3(1, 1e-3, k_step));
+      const auto numeric_camera = numeric_jacobian<3, kCameraParameterCount>(
+          [&](const CameraChange& e) { return at(changed(camera, e), u); }, camera_steps(k_step));
       EXPECT_LT(test::disagreement(J_d_u, numeric_u, 1e-15), 1) << named.name;
       EXPECT_LT(test::disagreement(J_d_camera, numeric_camera, 1e-15), 1) << named.name;
       evaluated += numeric_u.evaluated + numeric_camera.evaluated;
       ++checked;
     }
     EXPECT_EQ(checked, 81) << named.name;
-    EXPECT_EQ(evaluated, 81 * 20) << named.name;
+    EXPECT_EQ(evaluated, 81 * 28) << named.name;
   }
 }
 

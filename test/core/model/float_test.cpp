@@ -122,7 +122,7 @@ TEST(Float, RollingShutterAgreesWithDoubleWithJacobians) {
       }
     }
   }
-  EXPECT_EQ(checked, 8 * 3 * 4 * 25);
+  EXPECT_EQ(checked, 9 * 3 * 4 * 25);
 }
 
 }  // namespace

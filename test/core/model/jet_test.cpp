@@ -114,32 +114,36 @@ TEST(Jet, CameraJacobiansAreTheDerivatives) {
     int checked = 0;
     const Camera<double>& camera = named.camera;
     for (const Vec2& u : test::pixel_grid(named, 21)) {
-      Camera<Jet<6>> camera_jet = camera.cast<Jet<6>>();
+      Camera<Jet<8>> camera_jet = camera.cast<Jet<8>>();
       camera_jet.focal_length.v[3] = 1;
       camera_jet.aspect.v[4] = 1;
       camera_jet.radial_distortion.v[5] = 1;
+      camera_jet.centre_u.v[6] = 1;
+      camera_jet.centre_v.v[7] = 1;
 
       Vec3 d;
       Matrix<double, 3, 2> J_d_u;
-      Matrix3<double> J_d_camera;
+      Matrix<double, 3, kCameraParameterCount> J_d_camera;
       ASSERT_EQ(unproject(camera, u, &d, &J_d_u, &J_d_camera), ProjectionStatus::kOk);
-      Vector3<Jet<6>> d_jet;
-      ASSERT_EQ(unproject(camera_jet, variables<6>(u), &d_jet), ProjectionStatus::kOk);
+      Vector3<Jet<8>> d_jet;
+      ASSERT_EQ(unproject(camera_jet, variables<8>(u), &d_jet), ProjectionStatus::kOk);
       EXPECT_LE((value_of(d_jet) - d).norm(), 1e-15);
-      const Matrix<double, 3, 6> J_unproject = derivative(d_jet);
+      const Matrix<double, 3, 8> J_unproject = derivative(d_jet);
       const double pixel = 1 / camera.focal_length;
       expect_columns_near<3, 2>(J_d_u, J_unproject.leftCols<2>(), 1e-12, pixel, named.name);
-      expect_columns_near<3, 3>(J_d_camera, J_unproject.rightCols<3>(), 1e-11, pixel, named.name);
+      expect_columns_near<3, kCameraParameterCount>(
+          J_d_camera, J_unproject.rightCols<kCameraParameterCount>(), 1e-11, pixel, named.name);
 
       Vec2 projected;
       Matrix<double, 2, 3> J_u_d;
-      Matrix<double, 2, 3> J_u_camera;
+      Matrix<double, 2, kCameraParameterCount> J_u_camera;
       ASSERT_EQ(project(camera, d, &projected, &J_u_d, &J_u_camera), ProjectionStatus::kOk);
-      Vector2<Jet<6>> u_jet;
-      ASSERT_EQ(project(camera_jet, variables<6>(d), &u_jet), ProjectionStatus::kOk);
-      const Matrix<double, 2, 6> J_project = derivative(u_jet);
+      Vector2<Jet<8>> u_jet;
+      ASSERT_EQ(project(camera_jet, variables<8>(d), &u_jet), ProjectionStatus::kOk);
+      const Matrix<double, 2, 8> J_project = derivative(u_jet);
       expect_columns_near<2, 3>(J_u_d, J_project.leftCols<3>(), 1e-13, 1, named.name);
-      expect_columns_near<2, 3>(J_u_camera, J_project.rightCols<3>(), 1e-13, 1, named.name);
+      expect_columns_near<2, kCameraParameterCount>(
+          J_u_camera, J_project.rightCols<kCameraParameterCount>(), 1e-13, 1, named.name);
       ++checked;
     }
     EXPECT_EQ(checked, 441) << named.name;
@@ -207,6 +211,8 @@ RollingJets rolling_jets(const Camera<double>& camera, const Mechanics<double>& 
   jets.camera.focal_length.v[slot(Parameter::kFocalLength)] = 1;
   jets.camera.aspect.v[slot(Parameter::kAspect)] = 1;
   jets.camera.radial_distortion.v[slot(Parameter::kRadialDistortion)] = 1;
+  jets.camera.centre_u.v[slot(Parameter::kCentreU)] = 1;
+  jets.camera.centre_v.v[slot(Parameter::kCentreV)] = 1;
   jets.mechanics.pan_axis = direction_plus(
       jets.mechanics.pan_axis, variables<kVariables>(Vec2(0, 0), slot(Parameter::kPanAxis0)));
   jets.mechanics.tilt_axis = direction_plus(

@@ -56,7 +56,8 @@ TEST(FrameOrientation, MapsEveryPixelAsTheSlowForwardModelDoes) {
                                    named.camera.height,
                                    line_delay,
                                    calibration.mechanics.pan_axis,
-                                   calibration.mechanics.tilt_axis};
+                                   calibration.mechanics.tilt_axis,
+                                   named.camera.centre_offset()};
       const auto path = [&](double t) {
         const double h = t - 7;
         return Eigen::Vector2d(angle.pan + rate.pan * h + acceleration.pan * h * h / 2,
@@ -75,7 +76,7 @@ TEST(FrameOrientation, MapsEveryPixelAsTheSlowForwardModelDoes) {
       }
     }
   }
-  EXPECT_EQ(compared, 8 * 3 * 49);
+  EXPECT_EQ(compared, 9 * 3 * 49);
 }
 
 TEST(FrameOrientation, HoldsTheRotationAndItsRateAtRow0) {
@@ -212,8 +213,8 @@ TEST(FrameOrientation, IsTheSameFromWhateverRowItWasMade) {
 // the other.
 TEST(FrameOrientation, PixelCovarianceIsTheDirectionsSeenInTheImage) {
   Calibration calibration = paper_calibration();
-  calibration.covariance.diagonal() << 600, 1e-8, 1e-2, 5e-15, 1e-9, 1e-9, 1e-9, 1e-9, 1e-8, 1e-8,
-      1e-6;
+  calibration.covariance.diagonal() << 600, 1e-8, 1e-2, 2, 3, 5e-15, 1e-9, 1e-9, 1e-9, 1e-9, 1e-8,
+      1e-8, 1e-6;
   const FrameOrientation frame = orientation(calibration, {-1, 0.2}, {0.3, 0.2});
   for (const Vector2<double>& u :
        {Vector2<double>(0, 0), Vector2<double>(1900, 30), Vector2<double>(960, 1080)}) {

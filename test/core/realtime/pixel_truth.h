@@ -19,6 +19,7 @@ struct TrueCamera {
   double line_delay = 0;
   Eigen::Vector3d pan_axis = Eigen::Vector3d::UnitZ();
   Eigen::Vector3d tilt_axis = Eigen::Vector3d::UnitY();
+  Eigen::Vector2d centre_offset = Eigen::Vector2d::Zero();  // px
 };
 
 // Radius r with r (1 + k r^2) = r_d, by halving the interval where the model is monotone, in which r is
@@ -39,8 +40,10 @@ inline Eigen::Vector3d true_direction(const TrueCamera& camera,
                                       const std::function<Eigen::Vector2d(double)>& path,
                                       double time_s, const Eigen::Vector2d& pixel) {
   const Eigen::Vector2d angle = path(time_s + pixel.y() * camera.line_delay);
-  const double x_d = (pixel.x() - 0.5 * camera.width) / camera.focal_length;
-  const double y_d = (pixel.y() - 0.5 * camera.height) / (camera.focal_length * camera.aspect);
+  const double x_d =
+      (pixel.x() - 0.5 * camera.width - camera.centre_offset.x()) / camera.focal_length;
+  const double y_d = (pixel.y() - 0.5 * camera.height - camera.centre_offset.y()) /
+                     (camera.focal_length * camera.aspect);
   const double r_d = std::hypot(x_d, y_d);
   const double ratio = r_d > 0 ? undistorted_radius(camera.radial_distortion, r_d) / r_d : 1;
   // x right, y down, z forward becomes forward, right, down.

@@ -91,12 +91,15 @@ TEST_P(PtModeErrors, AreWhatTheCovarianceSays) {
         c.camera.radial_distortion + x[2],
         c.camera.width,
         c.camera.height,
-        c.line_delay + x[3],
-        direction_plus<double>(calibration.mechanics.pan_axis, x.segment<2>(4)),
-        direction_plus<double>(calibration.mechanics.tilt_axis, x.segment<2>(6))};
-    const double pan_scale = c.pan_scale + x[8];
-    const double tilt_scale = c.tilt_scale + x[9];
-    const double clock_offset = c.clock_offset + x[10];
+        c.line_delay + x[index(Parameter::kLineDelay)],
+        direction_plus<double>(calibration.mechanics.pan_axis,
+                               x.segment<2>(index(Parameter::kPanAxis0))),
+        direction_plus<double>(calibration.mechanics.tilt_axis,
+                               x.segment<2>(index(Parameter::kTiltAxis0))),
+        x.segment<2>(index(Parameter::kCentreU))};
+    const double pan_scale = c.pan_scale + x[index(Parameter::kPanScale)];
+    const double tilt_scale = c.tilt_scale + x[index(Parameter::kTiltScale)];
+    const double clock_offset = c.clock_offset + x[index(Parameter::kClockOffset)];
 
     // True (pan, tilt) by image time. The paper's path: three times as wide as the image, as high.
     const double phase = 10 * uniform(random);

@@ -46,6 +46,7 @@ struct Record {
   double focal_length_px = 0;
   double aspect = 1;
   double radial_distortion = 0;
+  std::array<double, 2> centre_offset_px{};  // of the optical centre from the image's middle
 };
 
 // The event `hello` of the stream.

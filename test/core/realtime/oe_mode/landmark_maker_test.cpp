@@ -166,10 +166,11 @@ TEST_F(MadeLandmarks, ShareWhatTheFrameDoesNotKnow) {
             frame.motion.angle.pan + x[0] + t * (frame.motion.rate.pan + x[2]),
             frame.motion.angle.tilt + x[1] + t * (frame.motion.rate.tilt + x[3]));
       };
-      return true_direction({camera.focal_length, camera.aspect, camera.radial_distortion,
-                             camera.width, camera.height, changed.line_delay,
-                             changed.mechanics.pan_axis, changed.mechanics.tilt_axis},
-                            path, -frame.motion.reference_row * changed.line_delay, u);
+      return true_direction(
+          {camera.focal_length, camera.aspect, camera.radial_distortion, camera.width,
+           camera.height, changed.line_delay, changed.mechanics.pan_axis,
+           changed.mechanics.tilt_axis, camera.centre_offset()},
+          path, -frame.motion.reference_row * changed.line_delay, u);
     };
     for (int j = 0; j < kParameterCount; ++j) {
       const Vector3<double> moved = direction_with(j, steps[j]) - direction_with(j, -steps[j]);

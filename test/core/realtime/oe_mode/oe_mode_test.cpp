@@ -263,8 +263,10 @@ TEST_F(OeModeOnFrames, FollowsTheCalibrationAsItsSensitivitySays) {
     const FrameOrientation less = last_frame(-e);
     const Vector2<double> numeric = (more.angle.vector() - less.angle.vector()) / (2 * kPixel);
     const Vector2<double> told = frame.motion_sensitivity.col(j).head<2>() * steps[j] / kPixel;
-    // Of the third of a pixel by which the image itself has moved.
-    EXPECT_LT((told - numeric).norm(), 2e-3 + 0.06 * numeric.norm())
+    // Of the third of a pixel by which the image itself has moved. A centre that is elsewhere turns the camera by as
+    // much and leaves next to nothing of that: what differs is told by other patches, not by the shift.
+    const bool is_centre = j == index(Parameter::kCentreU) || j == index(Parameter::kCentreV);
+    EXPECT_LT((told - numeric).norm(), 2e-3 + 0.06 * numeric.norm() + (is_centre ? 0.03 * 0.3 : 0))
         << to_string(static_cast<Parameter>(j)) << " " << told.transpose() << ", by difference "
         << numeric.transpose();
     shown += numeric.norm() > 0.01 ? 1 : 0;
