@@ -74,6 +74,9 @@ struct CalibrationOptions {
   std::optional<CalibrationPrior> focal_length;  // px
   std::optional<CalibrationPrior> aspect = CalibrationPrior{1, 0};
   std::optional<CalibrationPrior> radial_distortion;
+  // Of the optical centre from the image's middle; at one zoom it can hardly be told from the axes.
+  Vector2<double> centre_offset_px = Vector2<double>::Zero();
+  double centre_sigma_px = 0;                    // each component; 0: known exactly
   std::optional<CalibrationPrior> line_delay;    // s/row
   std::optional<CalibrationPrior> clock_offset;  // s
   CalibrationPrior pan_scale = {1, 1e-8};

@@ -6,6 +6,7 @@
 
 #include "core/calibration/calibration_text.h"
 #include "core/calibration/number_text.h"
+#include "core/calibration/zoom_text.h"
 
 namespace alidade {
 
@@ -52,6 +53,16 @@ void write_quality(const CalibrationNotes& notes, YAML::Emitter* out) {
 
 }  // namespace
 
+std::vector<Parameter> parameters_of(const Calibration& calibration) {
+  std::vector<Parameter> parameters;
+  for (int i = 0; i < kParameterCount; ++i) {
+    const auto parameter = static_cast<Parameter>(i);
+    const bool is_centre = parameter == Parameter::kCentreU || parameter == Parameter::kCentreV;
+    if (!is_centre || calibration.has_centre()) parameters.push_back(parameter);
+  }
+  return parameters;
+}
+
 std::string format_calibration(const Calibration& calibration, const CalibrationNotes& notes) {
   YAML::Emitter out;
   const auto& cov = calibration.covariance;
@@ -82,6 +93,15 @@ std::string format_calibration(const Calibration& calibration, const Calibration
   write_scalar(Parameter::kAspect, calibration.camera.aspect, "f_v / f_u");
   write_scalar(Parameter::kRadialDistortion, calibration.camera.radial_distortion,
                "u = f x (1 + k |x|^2) + centre");
+  const std::vector<Parameter> parameters = parameters_of(calibration);
+  if (calibration.has_centre()) {
+    out << YAML::Key << "centre_offset" << YAML::Value << YAML::Flow << YAML::BeginMap << YAML::Key
+        << "value" << YAML::Value << YAML::BeginSeq << exact_text(calibration.camera.centre_u)
+        << exact_text(calibration.camera.centre_v) << YAML::EndSeq << YAML::Key << "sigma"
+        << YAML::Value << YAML::BeginSeq << sigma(Parameter::kCentreU) << sigma(Parameter::kCentreV)
+        << YAML::EndSeq << YAML::EndMap
+        << YAML::Comment("px, of the optical centre from the image's middle");
+  }
   write_scalar(Parameter::kLineDelay, calibration.line_delay, "s/row");
   write_axis("pan_axis", calibration.mechanics.pan_axis, Parameter::kPanAxis0,
              "unit vector in the base: forward, right, down; sigma in rad");
@@ -95,14 +115,18 @@ std::string format_calibration(const Calibration& calibration, const Calibration
   if (!cov.isZero(0)) {
     out << YAML::Key << "covariance" << YAML::Value << YAML::BeginMap << YAML::Key << "names"
         << YAML::Value << YAML::Flow << YAML::BeginSeq;
-    for (int i = 0; i < kParameterCount; ++i) out << to_string(static_cast<Parameter>(i));
+    for (const Parameter row : parameters) out << to_string(row);
     out << YAML::EndSeq << YAML::Key << "matrix" << YAML::Value << YAML::BeginSeq;
-    for (int i = 0; i < kParameterCount; ++i) {
+    for (const Parameter row : parameters) {
       out << YAML::Flow << YAML::BeginSeq;
-      for (int j = 0; j < kParameterCount; ++j) out << exact_text(cov(i, j));
+      for (const Parameter column : parameters) out << exact_text(cov(index(row), index(column)));
       out << YAML::EndSeq;
     }
     out << YAML::EndSeq << YAML::EndMap;
+  }
+  if (!notes.zoom_curve.empty()) {
+    out << YAML::Key << "zoom_curve" << YAML::Value;
+    internal::write_zoom_curve(notes.zoom_curve, &out);
   }
   if (notes.quality) write_quality(notes, &out);
   if (!notes.landmarks.empty()) {

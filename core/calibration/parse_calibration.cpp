@@ -7,6 +7,7 @@
 #include "core/calibration/estimate_reader.h"
 #include "core/calibration/number_text.h"
 #include "core/calibration/strict_yaml.h"
+#include "core/calibration/zoom_text.h"
 
 namespace alidade {
 
@@ -18,6 +19,9 @@ EstimateRange plausible_range(Parameter parameter) {
       return {1, 1e7, "pixels, more than 0"};
     case Parameter::kAspect:
       return {0.5, 2, "a ratio near 1"};
+    case Parameter::kCentreU:
+    case Parameter::kCentreV:
+      return {-1e4, 1e4, "pixels from the image's middle, right and down"};
     case Parameter::kLineDelay:
       return {-1e-3, 1e-3, "seconds a row; 14 microseconds are 14e-6"};
     case Parameter::kPanScale:
@@ -62,10 +66,11 @@ class CalibrationReader {
   CalibrationReader(const YAML::Node& root, const std::string& name) : file_(root, name) {}
 
   Calibration read() {
-    file_.check_top("a calibration",
-                    {"format", "image", "focal_length", "aspect", "radial_distortion", "line_delay",
-                     "pan_axis", "tilt_axis", "pan_scale", "tilt_scale", "clock_offset", "zoom",
-                     "covariance", "quality", "landmarks"});
+    file_.check_top(
+        "a calibration",
+        {"format", "image", "focal_length", "aspect", "radial_distortion", "centre_offset",
+         "zoom_curve", "line_delay", "pan_axis", "tilt_axis", "pan_scale", "tilt_scale",
+         "clock_offset", "zoom", "covariance", "quality", "landmarks"});
     const YAML::Node& root = file_.root();
     file_.read_image(&calibration_.camera.width, &calibration_.camera.height);
 
@@ -77,6 +82,7 @@ class CalibrationReader {
     }
     if (root["aspect"]) calibration_.camera.aspect = scalar(Parameter::kAspect);
     calibration_.camera.radial_distortion = scalar(Parameter::kRadialDistortion);
+    if (root["centre_offset"]) calibration_.camera.set_centre_offset(centre_offset());
     calibration_.line_delay = scalar(Parameter::kLineDelay);
     calibration_.mechanics.pan_axis =
         axis("pan_axis", calibration_.mechanics.pan_axis, Parameter::kPanAxis0);
@@ -93,8 +99,15 @@ class CalibrationReader {
       file_.fail(root["landmarks"], "landmarks is not a file name; write `landmarks: map.bin`");
     }
     if (root["covariance"]) covariance(root["covariance"]);
+    if (root["zoom_curve"]) {
+      if (!calibration_.zoom) {
+        file_.fail(root["zoom_curve"], "zoom is missing; add the reading of focal_length");
+      }
+      curve_ = internal::read_zoom_curve(file_, root["zoom_curve"], calibration_);
+    }
     return calibration_;
   }
+  [[nodiscard]] const ZoomCurve& curve() const { return curve_; }
 
  private:
   void set_sigma(const YAML::Node& node, const std::string& name, double sigma,
@@ -135,15 +148,33 @@ class CalibrationReader {
     }
     // What a person rounded is made a unit vector; what a program wrote stays as it is, bit by bit.
     if (std::abs(norm - 1) > 1e-15) axis /= norm;
-    if (entry["sigma"]) {
-      const YAML::Node sigma = entry["sigma"];
-      const std::vector<double> pair = file_.numbers(sigma, name + ".sigma", 2);
-      for (int i = 0; i < 2; ++i) {
-        set_sigma(sigma, name, pair[static_cast<std::size_t>(i)],
-                  static_cast<Parameter>(index(first) + i));
+    set_pair_of_sigmas(entry, name, first);
+    return axis;
+  }
+
+  Vector2<double> centre_offset() {
+    const std::string name = "centre_offset";
+    const YAML::Node entry = file_.entry(name);
+    const YAML::Node node = file_.required(entry, "value", name + ".");
+    const std::vector<double> values = file_.numbers(node, name, 2);
+    const EstimateRange range = plausible_range(Parameter::kCentreU);
+    for (const double value : values) {
+      if (value < range.least || value > range.most) {
+        file_.fail(node, name + " has " + short_text(value) + "; give " + range.hint);
       }
     }
-    return axis;
+    set_pair_of_sigmas(entry, name, Parameter::kCentreU);
+    return {values[0], values[1]};
+  }
+
+  void set_pair_of_sigmas(const YAML::Node& entry, const std::string& name, Parameter first) {
+    if (!entry["sigma"]) return;
+    const YAML::Node sigma = entry["sigma"];
+    const std::vector<double> pair = file_.numbers(sigma, name + ".sigma", 2);
+    for (int i = 0; i < 2; ++i) {
+      set_sigma(sigma, name, pair[static_cast<std::size_t>(i)],
+                static_cast<Parameter>(index(first) + i));
+    }
   }
 
   void covariance(const YAML::Node& entry) {
@@ -162,16 +193,22 @@ class CalibrationReader {
 
   const EstimateReader file_;
   Calibration calibration_;
+  ZoomCurve curve_;
   std::vector<Sigma> sigmas_;
 };
 
 }  // namespace
 
 bool parse_calibration(const std::string& text, const std::string& name, Calibration* calibration,
-                       std::string* error) {
+                       std::string* error, ZoomCurve* curve) {
   return read_yaml(
       text, name, {"", "; valid YAML is needed"},
-      [&](const YAML::Node& root) { *calibration = CalibrationReader(root, name).read(); }, error);
+      [&](const YAML::Node& root) {
+        CalibrationReader reader(root, name);
+        *calibration = reader.read();
+        if (curve != nullptr) *curve = reader.curve();
+      },
+      error);
 }
 
 }  // namespace alidade

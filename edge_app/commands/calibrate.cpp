@@ -10,8 +10,11 @@
 #include <cstdio>
 #include <cstdlib>
 #include <ctime>
+#include <utility>
+#include <vector>
 
 #include "edge_app/commands/calibrate.h"
+#include "edge_app/commands/calibrate_zooms.h"
 #include "edge_app/commands/calibration_input.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/lens_prior.h"
@@ -86,11 +89,16 @@ void set_lens_prior(const CalibrateOptions& options, CalibrationJob* job) {
   give_way("--line-delay", options.line_delay, "line delay", &job->known.line_delay);
 }
 
-CalibrationJob load_job(const std::string& recording, const CalibrateOptions& options) {
-  CalibrationJob job = load_calibration_job(recording);
-  set_priors(options, &job.options);
-  set_lens_prior(options, &job);
-  return job;
+std::vector<ZoomJob> load_jobs(const CalibrateOptions& options) {
+  std::vector<ZoomJob> jobs;
+  for (const std::string& recording : options.recordings) {
+    for (CalibrationJob& job : load_calibration_jobs(recording, options.zoom_tolerance)) {
+      set_priors(options, &job.options);
+      set_lens_prior(options, &job);
+      jobs.push_back({recording, std::move(job)});
+    }
+  }
+  return jobs;
 }
 
 // The format of a recording's tracks.csv.
@@ -103,13 +111,9 @@ std::string tracks_text(const std::vector<CalibrationObservation>& observations)
   return text;
 }
 
-}  // namespace
-
-int calibrate_recording(const CalibrateOptions& options) {
-  const std::string& recording = options.recording;
-  StopSignals signals;
-  CalibrationJob job = load_job(recording, options);
-  const CalibrationResult result = calibrate_job(recording, options.passes, &job, &signals);
+int calibrate_one(const std::string& recording, const CalibrateOptions& options, CalibrationJob job,
+                  StopSignals* signals) {
+  const CalibrationResult result = calibrate_job(recording, options.passes, &job, signals);
   for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", recording, remark);
   // Without a solution there is nothing to draw.
   if (result.frames.empty()) {
@@ -121,7 +125,7 @@ int calibrate_recording(const CalibrateOptions& options) {
   }
 
   MapState map;
-  if (job.tracks_from_video && result.ok()) map = map_visibly(recording, result, &signals);
+  if (job.tracks_from_video && result.ok()) map = map_visibly(recording, result, signals);
 
   OutputDirectory directory(options.directory, recording);
   directory.add(
@@ -137,8 +141,11 @@ int calibrate_recording(const CalibrateOptions& options) {
     // Last: when it stands, all of its run does.
     directory.add("calibration", "calibration.yaml",
                   [&](const std::string& path, std::string* error) {
-                    const CalibrationNotes notes{result.quality, result.exclusions.describe(),
-                                                 stated_priors(job.options), "map.bin"};
+                    const CalibrationNotes notes{result.quality,
+                                                 result.exclusions.describe(),
+                                                 stated_priors(job.options),
+                                                 "map.bin",
+                                                 {}};
                     return save_calibration(path, result.calibration, notes, error);
                   });
   }
@@ -152,6 +159,15 @@ int calibrate_recording(const CalibrateOptions& options) {
                                                 result.message));
   }
   return kExitOk;
+}
+
+}  // namespace
+
+int calibrate_recordings(const CalibrateOptions& options) {
+  StopSignals signals;
+  std::vector<ZoomJob> jobs = load_jobs(options);
+  if (jobs.size() > 1) return calibrate_zooms(options, std::move(jobs), &signals);
+  return calibrate_one(jobs.front().recording, options, std::move(jobs.front().job), &signals);
 }
 
 }  // namespace alidade

@@ -3,12 +3,14 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace alidade {
 
 struct CalibrateOptions {
-  std::string recording;  // its directory
-  std::string directory;  // empty: <recording>/alidade
+  std::vector<std::string> recordings;  // their directories
+  std::string directory;                // empty: <recording>/alidade
+  double zoom_tolerance = 0;            // device units within which two readings are one
   bool json = false;
   int passes = 2;     // of finding tracks in the video
   std::string prior;  // a lens.yaml; empty: none
@@ -21,7 +23,8 @@ struct CalibrateOptions {
   std::optional<double> scale_sigma;
 };
 
-// The calibration from a recording. Returns the exit code; throws CommandError.
-[[nodiscard]] int calibrate_recording(const CalibrateOptions& options);
+// The calibration from a recording, or, of several zoom readings, from all of them. Returns the exit code; throws
+// CommandError.
+[[nodiscard]] int calibrate_recordings(const CalibrateOptions& options);
 
 }  // namespace alidade

@@ -4,8 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <unordered_set>
+#include <utility>
 
+#include "core/calibration/zoom_stretches.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/video_tracks.h"
 #include "edge_app/config/noise_file.h"
@@ -33,9 +37,54 @@ void check_size(const std::string& directory, const RecordingInfo& info,
                   info.height));
 }
 
+struct Tables {
+  std::vector<FrameStamp> frames;
+  std::vector<PanTiltSample> telemetry;
+  std::vector<TrackPoint> tracks;
+};
+
+std::vector<ZoomReading> zoom_readings(const std::vector<PanTiltSample>& telemetry) {
+  std::vector<ZoomReading> readings;
+  for (const PanTiltSample& sample : telemetry) {
+    if (sample.zoom) readings.push_back({sample.latest_time_s, *sample.zoom});
+  }
+  return readings;
+}
+
+Tables part_of(const Tables& all, const ZoomStretch& stretch) {
+  Tables part;
+  std::unordered_set<std::int64_t> names;
+  for (const FrameStamp& frame : all.frames) {
+    if (frame.receive_time_s < stretch.begin_s + kZoomMargin_s ||
+        frame.receive_time_s > stretch.end_s - kZoomMargin_s) {
+      continue;
+    }
+    part.frames.push_back(frame);
+    names.insert(frame.frame);
+  }
+  for (const PanTiltSample& sample : all.telemetry) {
+    if (sample.latest_time_s >= stretch.begin_s && sample.latest_time_s <= stretch.end_s)
+      part.telemetry.push_back(sample);
+  }
+  for (const TrackPoint& point : all.tracks) {
+    if (names.count(point.frame) > 0) part.tracks.push_back(point);
+  }
+  return part;
+}
+
+void fill(Tables tables, CalibrationJob* job) {
+  add_frames(std::move(tables.frames), &job->input, &job->options, &job->remarks);
+  add_telemetry(std::move(tables.telemetry), &job->input, &job->options, &job->remarks);
+  for (const TrackPoint& point : tables.tracks) {
+    job->input.observations.push_back(
+        {point.frame, point.landmark, point.u_px, point.v_px, point.sigma_px});
+  }
+}
+
 }  // namespace
 
-CalibrationJob load_calibration_job(const std::string& directory) {
+std::vector<CalibrationJob> load_calibration_jobs(const std::string& directory,
+                                                  double zoom_tolerance) {
   const auto require = [](bool ok, const std::string& error) {
     if (!ok) throw CommandError(kExitUsage, error);
   };
@@ -68,21 +117,35 @@ CalibrationJob load_calibration_job(const std::string& directory) {
   }
   require(load_values((fs::path(directory) / "guess.yaml").string(), &job.guess, &error), error);
 
-  std::vector<FrameStamp> frames;
-  require(read_frames_csv(directory, &frames, &error), error);
-  add_frames(std::move(frames), &job.input, &job.options, &job.remarks);
-  std::vector<PanTiltSample> telemetry;
-  require(read_telemetry_csv(directory, &telemetry, &error), error);
-  add_telemetry(std::move(telemetry), &job.input, &job.options, &job.remarks);
-  if (job.tracks_from_video) return job;
-  std::vector<TrackPoint> tracks;
-  require(read_tracks_csv(directory, &tracks, &error), error);
-  check_size(directory, info, tracks);
-  for (const TrackPoint& point : tracks) {
-    job.input.observations.push_back(
-        {point.frame, point.landmark, point.u_px, point.v_px, point.sigma_px});
+  Tables tables;
+  require(read_frames_csv(directory, &tables.frames, &error), error);
+  require(read_telemetry_csv(directory, &tables.telemetry, &error), error);
+  if (!job.tracks_from_video) {
+    require(read_tracks_csv(directory, &tables.tracks, &error), error);
+    check_size(directory, info, tables.tracks);
   }
-  return job;
+  const std::vector<ZoomReading> readings = zoom_readings(tables.telemetry);
+  const std::vector<ZoomStretch> all = find_zoom_stretches(readings, {zoom_tolerance});
+  if (all.size() <= 1) {
+    if (!all.empty()) job.zoom = all.front().zoom;
+    fill(tables, &job);
+    return {job};
+  }
+  const std::vector<ZoomStretch> stretches = find_zoom_stretches(
+      readings, {zoom_tolerance, ZoomStretchOptions().glitch_s, kLeastStretch_s});
+  require(!stretches.empty(),
+          fmt::format(
+              "{}: the zoom reading never stands still for {:g} s; dwell at each zoom for "
+              "10 s and more while the camera pans and tilts{}",
+              directory, kLeastStretch_s,
+              zoom_tolerance > 0 ? "" : ", or give --zoom-tolerance to a reading that flickers"));
+  std::vector<CalibrationJob> jobs;
+  for (const ZoomStretch& stretch : stretches) {
+    jobs.push_back(job);
+    jobs.back().zoom = stretch.zoom;
+    fill(part_of(tables, stretch), &jobs.back());
+  }
+  return jobs;
 }
 
 }  // namespace alidade

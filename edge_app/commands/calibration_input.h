@@ -2,6 +2,7 @@
 // From a recording's files to what calibrate() takes. Without tracks.csv its video must hold them. Stamps and counts: see
 // calibration_streams.h.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -17,10 +18,16 @@ struct CalibrationJob {
   KnownCamera known;  // beside the options
   CalibrationValues guess;
   bool tracks_from_video = false;    // input.observations are still to be found in the video
+  std::optional<double> zoom;        // the reading that all of it has, device units
   std::vector<std::string> remarks;  // about the recording, for the report
 };
 
-// With what the recording says of its stamps and scales in the options. Throws CommandError.
-CalibrationJob load_calibration_job(const std::string& directory);
+// The recording, or, if its zoom moves, each stretch in which the reading stands still for kLeastStretch_s, less
+// kZoomMargin_s at either end, as image and telemetry are not yet known to be of one clock. With what it says of its stamps
+// and scales in the options. zoom_tolerance: device units within which two readings are one. Throws CommandError.
+inline constexpr double kLeastStretch_s = 6;
+inline constexpr double kZoomMargin_s = 1;
+[[nodiscard]] std::vector<CalibrationJob> load_calibration_jobs(const std::string& directory,
+                                                                double zoom_tolerance = 0);
 
 }  // namespace alidade

@@ -38,7 +38,8 @@ VideoConfig require_video_config(const std::string& path) {
 NamedCalibration require_calibration_file(const std::string& path) {
   NamedCalibration chosen;
   std::string error;
-  if (!load_calibration(path, &chosen.calibration, &error)) throw CommandError(kExitUsage, error);
+  if (!load_calibration(path, &chosen.calibration, &error, &chosen.zoom_curve))
+    throw CommandError(kExitUsage, error);
   chosen.calibrated = true;
   chosen.name = path;
   return chosen;
@@ -66,7 +67,7 @@ NamedCalibration choose_calibration(const Config& config) {
     spdlog::warn("{}: no calibration yet; the data sheet's camera is used",
                  file.empty() ? "calibration.file is not set" : file);
   }
-  NamedCalibration chosen{data_sheet_calibration(config.camera), false, "data sheet"};
+  NamedCalibration chosen{data_sheet_calibration(config.camera), false, "data sheet", {}};
   chosen.calibration.camera.width = video.width;
   chosen.calibration.camera.height = video.height;
   return chosen;
@@ -118,6 +119,7 @@ OrientationStepOptions step_options(const RecordingNoise& noise,
   OrientationStepOptions options;
   options.calibration = calibration.calibration;
   options.calibrated = calibration.calibrated;
+  options.zoom_curve = calibration.zoom_curve;
   options.video_clock =
       clock(noise.image_stamp_sigma_s, noise.image_period_s, noise.image_period_sigma_s);
   // The clock of RTP, the coarsest that a live video stream has.

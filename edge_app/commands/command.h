@@ -35,6 +35,7 @@ struct NamedCalibration {
   Calibration calibration;
   bool calibrated = false;  // false: the data sheet's values
   std::string name;         // file, or "data sheet"
+  ZoomCurve zoom_curve;     // of the file; may be empty
 };
 
 NamedCalibration require_calibration_file(const std::string& path);

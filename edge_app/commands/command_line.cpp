@@ -100,9 +100,19 @@ void add_calibrate(CLI::App& app, int* exit_code) {
       app.add_subcommand("calibrate",
                          "Calibrate from a recording's video (or tracks.csv) and telemetry; writes "
                          "calibration.yaml, map.bin and report.html");
-  command->add_option("recording", options->recording, "Directory of the recording")->required();
+  command
+      ->add_option(
+          "recording", options->recordings,
+          "Directory of the recording; several, or one in which the zoom dwells at several "
+          "readings, become one calibration for all zooms between")
+      ->required();
   command->add_option("-o,--output", options->directory,
-                      "Directory for the results (default: DIR/alidade)");
+                      "Directory for the results (default: DIR/alidade, of several the first's)");
+  command
+      ->add_option("--zoom-tolerance", options->zoom_tolerance,
+                   "Zoom readings that differ by no more are one, in units of the device")
+      ->check(CLI::NonNegativeNumber)
+      ->capture_default_str();
   command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
   command
       ->add_option(
@@ -130,7 +140,7 @@ void add_calibrate(CLI::App& app, int* exit_code) {
                    "noise.yaml's pan_tilt_scale_sigma, or 1e-8)")
       ->check(is_share)
       ->group(group);
-  command->callback([options, exit_code] { *exit_code = calibrate_recording(*options); });
+  command->callback([options, exit_code] { *exit_code = calibrate_recordings(*options); });
 }
 
 void add_calibrate_shutter(CLI::App& app, int* exit_code) {

@@ -85,7 +85,7 @@ int run_live(const RunOptions& options) {
   if (config.realtime.landmarks && !is_recording(config)) {
     calibrating = begin_calibrating(config, options.config);
     const auto first = calibrating.calibration->first();
-    calibration = {first->calibration, first->calibrated, first->name};
+    calibration = {first->calibration, first->calibrated, first->name, first->zoom_curve};
     map = first->map;
   } else {
     calibration = choose_calibration(config);

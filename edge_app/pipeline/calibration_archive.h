@@ -22,9 +22,13 @@ class CalibrationArchive {
  public:
   virtual ~CalibrationArchive() = default;
 
-  // The calibration for a zoom: the nearest within the tolerance, else the one without zoom, which holds for
-  // any. Without a zoom: the one without, else the only one. Null if there is none. Holds until the next save().
+  // The calibration for a zoom: the nearest within the tolerance, else by the zoom curve, else the one without zoom, which
+  // holds for any. Without a zoom: the one without, else the only one, or the curve's. Null if there is none. Holds until
+  // the next find() or save().
   [[nodiscard]] virtual const StoredCalibration* find(std::optional<double> zoom) const = 0;
+
+  // Empty: there is none.
+  [[nodiscard]] virtual const ZoomCurve& zoom_curve() const = 0;
 
   // Keeps it in memory in any case, in place of the one for its zoom, within the tolerance; its `path` is
   // ignored. False with one line if it could not be written (disk full, no permission): what was stored before

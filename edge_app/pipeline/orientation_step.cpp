@@ -127,6 +127,7 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
     timed.time_s = sample.latest_time_s - width_s / 2;
     timed.time_sigma_s = width_s > 0 ? width_s / std::sqrt(12.0) : options_.telemetry_stamp_sigma_s;
   }
+  if (sample.zoom) zoom_lookup_.add(timed.time_s, *sample.zoom);
   // What the buffer refuses (a duplicate, a value that is not finite) it counts, and the records'
   // sigma says the rest.
   static_cast<void>(telemetry_.push(timed));
@@ -152,6 +153,7 @@ void OrientationStep::adopt(const PublishedCalibration& published) {
   options_.calibrated = published.calibrated;
   zoom_at_adoption_ = zoom_;
   minimum_delay_sigma_s_ = 0;
+  options_.zoom_curve = published.zoom_curve;
   if (oe_) oe_->reset(published.calibration, published.map);
 }
 
@@ -235,11 +237,28 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   tracks_.telemetry_too_old = record.status == RecordStatus::kTelemetryTooOld;
   if (!zoom_fits()) {
     // Neither the lens nor the axes of another zoom are this one's.
-    record.status = RecordStatus::kOtherZoom;
+    if (!has_result(query) || !orient_between(measured, telemetry_time_s, &record))
+      record.status = RecordStatus::kOtherZoom;
     return record;
   }
   orient(has_result(query) ? &measured : nullptr, image, &record);
   return record;
+}
+
+bool OrientationStep::orient_between(const InterpolatedPanTilt& measured, double telemetry_time_s,
+                                     OrientationRecord* record) {
+  const double readout_s =
+      std::abs(options_.calibration.line_delay) * options_.calibration.camera.height;
+  Calibration between;
+  if (!zoom_lookup_.calibration(options_.zoom_curve, telemetry_time_s, readout_s, &between))
+    return false;
+  FrameOrientation frame;
+  if (!pt_orientation(between, *record->time_s, measured, &frame)) return false;
+  record->calibrated = true;
+  record->camera = pack(between);
+  record->mode = RecordMode::kPt;
+  record->orientation = orientation_of(frame);
+  return true;
 }
 
 void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageView& image,

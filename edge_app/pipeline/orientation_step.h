@@ -16,6 +16,7 @@
 // telemetry is missing but landmarks carry the orientation on (its status then names what is missing).
 // An image that is sent again while the camera turns is of another time than its frame: "picture repeated", no orientation
 // (repeated_images.h).
+// Where the zoom is another than the calibration's, or moves, its zoom curve gives PT mode a lens (zoom_lookup.h).
 // While there is no calibration for the camera, or none for the zoom that the pan/tilt source reports, points
 // are followed instead (start_up_tracker.h), for the calibration thread to make one of.
 // After a reconnection the stream's clock begins anew; telemetry from before it is forgotten. The least
@@ -39,6 +40,7 @@
 #include "edge_app/pipeline/orientation_record.h"
 #include "edge_app/pipeline/published_calibration.h"
 #include "edge_app/pipeline/repeated_images.h"
+#include "edge_app/pipeline/zoom_lookup.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
 
@@ -66,6 +68,7 @@ struct OrientationStepOptions {
   // With OE mode: follow points as long as there is no calibration.
   bool follow_points = false;
   double zoom_tolerance = 0;  // device units within which the calibration holds
+  ZoomCurve zoom_curve;       // for other zooms; may be empty
   double minimum_delay_sigma_s =
       5e-3;  // by how much a new connection's least delay differs, one standard deviation
 };
@@ -137,8 +140,13 @@ class OrientationStep {
   Telemetry telemetry_;
   std::unique_ptr<OeMode> oe_;                // null: PT mode
   std::unique_ptr<StartUpTracker> start_up_;  // null: nobody wants its points
-  std::optional<double> zoom_;                // as last reported
-  std::optional<double> zoom_at_adoption_;    // that a calibration without zoom is for
+  // PT mode's record by the zoom curve; false: it has no lens for the moment.
+  [[nodiscard]] bool orient_between(const InterpolatedPanTilt& measured, double telemetry_time_s,
+                                    OrientationRecord* record);
+
+  std::optional<double> zoom_;  // as last reported
+  ZoomLookup zoom_lookup_;
+  std::optional<double> zoom_at_adoption_;  // that a calibration without zoom is for
   double minimum_delay_sigma_s_ = 0;
   double lasting_sigma_s_ = 0;  // of a frame's time, what it has in common with those about it
   RepeatedImages repeated_images_;

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "core/model/calibration.h"
+#include "core/model/zoom_curve.h"
 #include "core/realtime/oe_mode/map_state.h"
 
 namespace alidade {
@@ -16,6 +17,7 @@ struct PublishedCalibration {
   bool calibrated = false;  // false: the data sheet's values; landmarks are not looked for
   MapState map;             // may be empty
   std::string name;         // for people: a file, "data sheet", "live"
+  ZoomCurve zoom_curve;     // for other zooms, and while the zoom moves; may be empty
 };
 
 // A map from before a restart, or kept for another zoom, as it may be handed over: it knows the base to a fraction of what

@@ -62,6 +62,7 @@ SelfCalibration::SelfCalibration(const SelfCalibrationOptions& options, Calibrat
     first->calibration = options.data_sheet;
     first->name = "data sheet";
   }
+  if (archive != nullptr) first->zoom_curve = archive->zoom_curve();
   published_ = first;
   // The connection that it was made with is another one.
   clock_offset_known_ = stored == nullptr;
@@ -106,6 +107,7 @@ void SelfCalibration::look_for_stored() {
   found->calibrated = true;
   found->map = kept_map(stored->map);
   found->name = stored->path.empty() ? "live" : stored->path;
+  found->zoom_curve = archive_->zoom_curve();
   messages_.push_back(fmt::format("zoom {}: the calibration {} holds", *zoom_, found->name));
   published_ = next_ = found;
   fresh_wanted_ = false;
@@ -207,6 +209,7 @@ void SelfCalibration::publish(const SessionCalibration& checked) {
   fresh->calibrated = true;
   fresh->map = map_from_keyframes(checked.result, session_.keyframes(checked.result));
   fresh->name = "live";
+  fresh->zoom_curve = published_->zoom_curve;
   const CalibrationQuality& quality = checked.result.quality;
   messages_.push_back(
       fmt::format("calibrated from {} frames, {} landmarks: {}; residuals {:.2f} of the tracker's "

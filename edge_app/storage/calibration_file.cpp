@@ -4,9 +4,10 @@
 
 namespace alidade {
 
-bool load_calibration(const std::string& path, Calibration* calibration, std::string* error) {
+bool load_calibration(const std::string& path, Calibration* calibration, std::string* error,
+                      ZoomCurve* curve) {
   std::string text;
-  return read_file(path, &text, error) && parse_calibration(text, path, calibration, error);
+  return read_file(path, &text, error) && parse_calibration(text, path, calibration, error, curve);
 }
 
 bool save_calibration(const std::string& path, const Calibration& calibration, std::string* error) {

@@ -9,8 +9,9 @@
 namespace alidade {
 
 // False leaves one line in *error: `path: cannot be read: why`, or what is wrong in which line.
+// curve, if not null: its zoom curve, empty without one.
 [[nodiscard]] bool load_calibration(const std::string& path, Calibration* calibration,
-                                    std::string* error);
+                                    std::string* error, ZoomCurve* curve = nullptr);
 
 // Atomic: a reader, or a power cut, meets the old file or the new one, never half of one. A
 // calibration that load_calibration() would refuse is refused here.

@@ -143,6 +143,8 @@ CalibrationStore::CalibrationStore(std::string file, double zoom_tolerance)
 
 std::vector<std::string> CalibrationStore::load(int width, int height) {
   entries_.clear();
+  curve_ = {};
+  curve_path_.clear();
   std::vector<std::string> lines;
   const fs::path file(file_);
   const fs::path folder = folder_of(file);
@@ -173,8 +175,9 @@ void CalibrationStore::load_file(const std::string& path, int width, int height,
   stored.path = path;
   std::string text;
   std::string error;
+  ZoomCurve curve;
   if (!read_file(path, &text, &error) ||
-      !parse_calibration(text, path, &stored.calibration, &error)) {
+      !parse_calibration(text, path, &stored.calibration, &error, &curve)) {
     lines->push_back(fmt::format("{}; {}", error, set_aside_with_maps(path)));
     return;
   }
@@ -192,6 +195,12 @@ void CalibrationStore::load_file(const std::string& path, int width, int height,
           fmt::format("{}: for {}, as {} is: not used", path, zoom_text(zoom), entry.stored.path));
       return;
     }
+  }
+  if (!curve.empty() && curve_.empty()) {
+    curve_ = curve;
+    curve_path_ = path;
+    lines->push_back(fmt::format("{}: zoom curve from reading {} to {}", path,
+                                 curve.first_reading(), curve.last_reading()));
   }
   load_map_beside(path, text, &stored, lines);
   lines->push_back(fmt::format("{}: calibration for {}, {} landmarks", path, zoom_text(zoom),
@@ -216,6 +225,16 @@ std::optional<std::size_t> CalibrationStore::nearest(std::optional<double> zoom)
 
 const StoredCalibration* CalibrationStore::find(std::optional<double> zoom) const {
   std::optional<std::size_t> found = nearest(zoom);
+  if (!found && zoom && curve_.at(*zoom, &between_.calibration)) {
+    between_.path = fmt::format("{}, between its zooms", curve_path_);
+    return &between_;
+  }
+  if (!found && !zoom && !curve_.empty()) {
+    const auto holds_curve =
+        std::find_if(entries_.begin(), entries_.end(),
+                     [this](const Entry& entry) { return entry.stored.path == curve_path_; });
+    if (holds_curve != entries_.end()) return &holds_curve->stored;
+  }
   if (!found && zoom) found = nearest(std::nullopt);
   if (!found && !zoom && entries_.size() == 1) found = 0;
   return found ? &entries_[*found].stored : nullptr;
@@ -278,6 +297,8 @@ bool CalibrationStore::write(Entry* entry, std::string* error) {
   bool map_is_new = false;
   std::string map_flaw;
   stored.notes.landmarks.clear();
+  // A new calibration at one reading leaves the others alone.
+  if (path == curve_path_) stored.notes.zoom_curve = curve_;
   if (!stored.map.landmarks.empty()) {
     const MapContent content{{}, stored.map};
     const std::string bytes = format_map(content, stored.calibration);

@@ -2,6 +2,7 @@
 // CalibrationStore: the calibrations of one camera on disk, one for each zoom setting, each with its map.
 //   FILE                      the calibration without zoom (INTERFACES: calibration.file)
 //   STEM.zoom-1234.5.yaml     the one at that zoom, beside it; the zoom that it holds counts, not its name
+//   either                    may hold the camera's zoom curve, which gives a calibration where no file has one
 //   *.map-1a2b3c4d.bin        the map that a yaml names, beside it, tied to it by checksum (map_file.h)
 // A file that is damaged, cannot be read, or is not of this image size, is set aside with its maps (renamed to
 // NAME.damaged, .damaged.1 ...), said, and never used. A map that is damaged costs the map only.
@@ -31,6 +32,7 @@ class CalibrationStore final : public CalibrationArchive {
 
   [[nodiscard]] bool empty() const { return entries_.empty(); }
   [[nodiscard]] const StoredCalibration* find(std::optional<double> zoom) const override;
+  [[nodiscard]] const ZoomCurve& zoom_curve() const override { return curve_; }
   [[nodiscard]] bool save(const StoredCalibration& calibration, std::string* error) override;
   [[nodiscard]] bool has_pending() const override;
   [[nodiscard]] bool save_pending(std::string* error) override;
@@ -49,6 +51,9 @@ class CalibrationStore final : public CalibrationArchive {
   std::string file_;
   double zoom_tolerance_;
   std::vector<Entry> entries_;
+  ZoomCurve curve_;
+  std::string curve_path_;             // of the file that holds it
+  mutable StoredCalibration between_;  // by the curve: what find() made last
 };
 
 }  // namespace alidade

@@ -24,6 +24,7 @@ class MemoryArchive : public CalibrationArchive {
  public:
   explicit MemoryArchive(double zoom_tolerance) : zoom_tolerance_(zoom_tolerance) {}
   [[nodiscard]] const StoredCalibration* find(std::optional<double> zoom) const override;
+  [[nodiscard]] const ZoomCurve& zoom_curve() const override { return no_curve_; }
   [[nodiscard]] bool save(const StoredCalibration& calibration, std::string* error) override;
   [[nodiscard]] bool has_pending() const override { return false; }
   [[nodiscard]] bool save_pending(std::string*) override { return true; }
@@ -31,6 +32,7 @@ class MemoryArchive : public CalibrationArchive {
  private:
   double zoom_tolerance_;
   std::vector<std::unique_ptr<StoredCalibration>> kept_;
+  ZoomCurve no_curve_;
 };
 
 struct Answer {

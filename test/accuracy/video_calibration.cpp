@@ -121,7 +121,7 @@ std::optional<VideoErrors> calibrate_video_recording(const VideoRecording& recor
   const Removed removed{folder};
   try {
     simulator::write_recording(recording.config, folder);
-    CalibrationJob job = load_calibration_job(folder.string());
+    CalibrationJob job = load_calibration_jobs(folder.string()).front();
     StopSignals signals;
     const CalibrationResult result = calibrate_job(folder.string(), 2, &job, &signals);
     Calibration truth;

@@ -16,6 +16,7 @@
 #include "edge_app/storage/calibration_file.h"
 #include "edge_app/storage/map_file.h"
 #include "test/support/temporary_directory.h"
+#include "test/support/zoom_nodes.h"
 
 namespace alidade {
 namespace {
@@ -150,6 +151,32 @@ TEST_F(CalibrationStoreTest, FindsNothingWhereNothingIs) {
   EXPECT_EQ(nowhere.find({}), nullptr);
   EXPECT_EQ(nowhere.find(5), nullptr);
   EXPECT_FALSE(nowhere.has_pending());
+}
+
+TEST_F(CalibrationStoreTest, FindsBetweenTheZoomsByTheCurve) {
+  const ZoomCurve curve = test::zoom_curve();
+  CalibrationNotes notes;
+  notes.zoom_curve = curve;
+  std::string error;
+  ASSERT_TRUE(save_calibration(path("zoom.yaml"), curve.node(0), notes, &error)) << error;
+  CalibrationStore first(path("zoom.yaml"));
+  EXPECT_THAT(first.load(kWidth, kHeight),
+              Contains(HasSubstr("zoom curve from reading 1000 to 2000")));
+  EXPECT_EQ(focal_length(first.find({})), curve.node(0).camera.focal_length);
+  const StoredCalibration* between = first.find(1400);
+  ASSERT_NE(between, nullptr);
+  EXPECT_EQ(between->calibration.zoom, 1400);
+  EXPECT_NEAR(focal_length(between), test::zoom_focal_length(1400), 0.05 * 3000);
+  EXPECT_EQ(first.find(5000), nullptr) << "as far from the nodes";
+  // A calibration made at its first reading, and one between: the curve stays.
+  ASSERT_TRUE(first.save(some(1001, 1000), &error)) << error;
+  ASSERT_TRUE(first.save(some(2222, 1400), &error)) << error;
+  CalibrationStore again(path("zoom.yaml"));
+  static_cast<void>(again.load(kWidth, kHeight));
+  EXPECT_EQ(focal_length(again.find(1000)), 1001);
+  EXPECT_EQ(focal_length(again.find(1400)), 2222);
+  EXPECT_NEAR(focal_length(again.find(1600)), test::zoom_focal_length(1600), 0.05 * 4000);
+  EXPECT_FALSE(again.zoom_curve().empty());
 }
 
 TEST_F(CalibrationStoreTest, FindsACalibrationAndItsMapAgain) {

@@ -3,6 +3,7 @@
 
 #include <sstream>
 #include <string>
+#include <vector>
 
 #include "test/support/simulated_recording.h"
 #include "test/support/temporary_directory.h"
@@ -19,14 +20,18 @@ inline void write_frames(const TemporaryDirectory& directory, const CalibrationI
   directory.write("frames.csv", text.str());
 }
 
+// zoom: of each sample; empty: the file has no such column.
 inline void write_telemetry(const TemporaryDirectory& directory, const CalibrationInput& input,
-                            double unit_rad = 1) {
+                            double unit_rad = 1, const std::vector<double>& zoom = {}) {
   std::ostringstream text;
   text.precision(17);
-  text << "receive_time_s,pan_rad,tilt_rad,sequence\n";
-  for (const CalibrationTelemetry& sample : input.telemetry) {
+  text << "receive_time_s,pan_rad,tilt_rad,sequence" << (zoom.empty() ? "\n" : ",zoom\n");
+  for (std::size_t i = 0; i < input.telemetry.size(); ++i) {
+    const CalibrationTelemetry& sample = input.telemetry[i];
     text << sample.stamp_s << ',' << sample.pan_rad / unit_rad << ',' << sample.tilt_rad / unit_rad
-         << ',' << *sample.sequence << '\n';
+         << ',' << *sample.sequence;
+    if (!zoom.empty()) text << ',' << zoom[i];
+    text << '\n';
   }
   directory.write("telemetry.csv", text.str());
 }

@@ -33,6 +33,7 @@ class MemoryArchive final : public CalibrationArchive {
     }
     return stored_.size() == 1 && !zoom ? &stored_[0] : nullptr;
   }
+  [[nodiscard]] const ZoomCurve& zoom_curve() const override { return curve; }
   [[nodiscard]] bool save(const StoredCalibration& calibration, std::string* error) override {
     stored_.push_back(calibration);
     pending_ = full;
@@ -49,6 +50,7 @@ class MemoryArchive final : public CalibrationArchive {
 
   bool full = false;
   int tries = 0;
+  ZoomCurve curve;
   std::vector<StoredCalibration> stored_;
 
  private:

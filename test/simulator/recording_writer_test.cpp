@@ -203,7 +203,7 @@ TEST_F(VirtualRecording, TellsTheZoomInTelemetryAndItsLensInTheTruth) {
               1e-9);
   EXPECT_EQ(yaml["zoom"].as<double>(), 1);
   EXPECT_EQ(yaml["centre_offset"]["value"][1].as<double>(), -2);
-  const YAML::Node curve = yaml["zoom_curve"];
+  const YAML::Node curve = yaml["zoom_samples"];
   ASSERT_GT(curve.size(), 60U);
   for (std::size_t i = 0; i < curve.size(); ++i) {
     const Lens lens = expected.nominal_lens(curve[i]["zoom"].as<double>());

@@ -40,7 +40,7 @@ void write_zoom(const Config& config, const Zoom& zoom, std::ofstream& out) {
   constexpr int kSamples = 129;
   out << "centre_offset: {value: ";
   write_centre_offset(config.image, zoom.lens(0), out);
-  out << ", sigma: [0, 0]}\nzoom: " << zoom.reading(0) << "\nzoom_curve:\n";
+  out << ", sigma: [0, 0]}\nzoom: " << zoom.reading(0) << "\nzoom_samples:\n";
   const ZoomConfig::Ends& ends = config.zoom->reading;
   for (int i = 0; i < kSamples; ++i) {
     const double reading = ends.wide + (ends.tele - ends.wide) * i / (kSamples - 1);

@@ -12,7 +12,7 @@
 //   stamp_time_s        recording: the stamp in frames.csv; live: when the frame is handed out
 //   focal_length_px, radial_distortion, centre_u_px, centre_v_px, zoom   with a zoom: the true lens at that time, and the true
 //                       reading, between steps too
-// With a zoom truth.yaml tells the lens at time 0, its reading (zoom), and besides zoom_curve, a list over the whole range of what
+// With a zoom truth.yaml tells the lens at time 0, its reading (zoom), and besides zoom_samples, a list over the whole range of what
 // the lens is at a reading (zoom, focal_length, radial_distortion, centre_offset) if it comes back exactly.
 // Before a pattern truth.yaml holds the lens under the names of lens.yaml, and truth.csv the camera's pose in the pattern's frame
 // (x_m, y_m, z_m, q_x, q_y, q_z, q_w) in place of angles.

@@ -13,12 +13,14 @@ namespace alidade {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 // The paper's calibration with numbers that decimals cannot hold.
 Calibration paper_calibration() {
   Calibration calibration;
   calibration.camera = {32008 + 1 / 3.0, 1 - 1e-16, 55.4, 1920, 1080};
+  calibration.camera.set_centre_offset({-7.1, 1 / 3.0});
   calibration.line_delay = -14.2e-6;
   calibration.mechanics.pan_axis = Vector3<double>(-0.012, 0.001, 1).normalized();
   calibration.mechanics.tilt_axis = Vector3<double>(0.002, 1, 0.014).normalized();
@@ -33,7 +35,7 @@ Calibration paper_calibration() {
     for (int j = 0; j < kParameterCount; ++j) factor(i, j) = normal(generator);
   }
   Matrix<double, kParameterCount, 1> sigmas;
-  sigmas << 24, 0, 0.11, 7e-8, 1e-4, 2e-4, 3e-4, 1e-4, 0.07, 0.06, 1e-3;
+  sigmas << 24, 0, 0.11, 3, 4, 7e-8, 1e-4, 2e-4, 3e-4, 1e-4, 0.07, 0.06, 1e-3;
   const ParameterCovariance<double> cov =
       sigmas.asDiagonal() * (factor * factor.transpose()) * sigmas.asDiagonal() / kParameterCount;
   calibration.covariance = (cov + cov.transpose()) / 2;
@@ -57,6 +59,7 @@ void expect_same_bits(const Calibration& a, const Calibration& b) {
   EXPECT_TRUE(same_bits(a.camera.focal_length, b.camera.focal_length));
   EXPECT_TRUE(same_bits(a.camera.aspect, b.camera.aspect));
   EXPECT_TRUE(same_bits(a.camera.radial_distortion, b.camera.radial_distortion));
+  EXPECT_TRUE(same_bits(a.camera.centre_offset(), b.camera.centre_offset()));
   EXPECT_EQ(a.camera.width, b.camera.width);
   EXPECT_EQ(a.camera.height, b.camera.height);
   EXPECT_TRUE(same_bits(a.line_delay, b.line_delay));
@@ -143,6 +146,36 @@ TEST(CalibrationText, AcceptsQualityAndLandmarks) {
                    "landmarks: map.bin\nzoom: 12.5\n")
                 .zoom,
             12.5);
+}
+
+// Of a centre that is the image's middle exactly nothing is written: as before there were others.
+TEST(CalibrationText, TellsOfTheOpticalCentreWhereItIsNotTheMiddle) {
+  const std::string with = format_calibration(paper_calibration());
+  EXPECT_THAT(with, HasSubstr("centre_offset: {value: [-7.1, 0.3333333333333333], sigma: ["));
+  EXPECT_THAT(with, HasSubstr("radial_distortion, centre_u, centre_v, line_delay"));
+  Calibration middle = paper_calibration();
+  middle.camera.set_centre_offset({0, 0});
+  for (const Parameter p : {Parameter::kCentreU, Parameter::kCentreV}) {
+    middle.covariance.row(index(p)).setZero();
+    middle.covariance.col(index(p)).setZero();
+  }
+  const std::string without = format_calibration(middle);
+  EXPECT_THAT(without, Not(HasSubstr("centre_")));
+  expect_same_bits(parsed(without), middle);
+}
+
+TEST(CalibrationText, RefusesACentreThatIsNone) {
+  const auto refused = [](const std::string& line) {
+    return refusal(std::string(kByHand) + line + "\n");
+  };
+  EXPECT_THAT(refused("centre_offset: {value: [1]}"),
+              HasSubstr("centre_offset is not a list of 2 numbers"));
+  EXPECT_THAT(refused("centre_offset: {value: [1, 20000]}"),
+              HasSubstr("centre_offset has 20000; give pixels from the image's middle"));
+  EXPECT_THAT(refused("centre_offset: {value: [1, .nan]}"), HasSubstr("finite number"));
+  EXPECT_THAT(refused("centre_offset: {value: [1, 2], sigma: [1, -1]}"),
+              HasSubstr("centre_offset.sigma is -1"));
+  EXPECT_THAT(refused("centre_offset: [1, 2]"), HasSubstr("centre_offset is not a map"));
 }
 
 TEST(CalibrationText, RoundTripIsExactToTheBit) {
@@ -284,7 +317,9 @@ TEST(CalibrationText, RefusesAFaultyCovariance) {
   EXPECT_EQ(good.covariance(0, 2), 1.2);
   EXPECT_EQ(good.covariance(2, 0), 1.2);
   EXPECT_EQ(good.covariance(2, 2), 0.0121);
-  EXPECT_EQ(good.covariance(3, 3), 7e-8 * 7e-8) << "a parameter without a row keeps its sigma";
+  EXPECT_EQ(good.covariance(index(Parameter::kLineDelay), index(Parameter::kLineDelay)),
+            7e-8 * 7e-8)
+      << "a parameter without a row keeps its sigma";
 
   EXPECT_THAT(refusal(with(two, "[[576, 1.2], [1.3, 0.0121]]")), HasSubstr("not symmetric"));
   EXPECT_THAT(refusal(with("[line_delay, pan_axis_0]", "[[1, 0], [0, 1e-8]]")),

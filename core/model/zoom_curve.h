@@ -1,0 +1,187 @@
+#pragma once
+// ZoomCurve: one calibration for every zoom reading z of a lens, from those at some readings, its nodes.
+//   y(z) = (log f, kappa, c_u, c_v)   kappa = k (R / f)^2, R half the image's diagonal, px: the distortion in the corner
+//   x = (z - z_first) / (z_last - z_first)
+//   y_j(z) = level_j + Gaussian process of covariance
+//     K_j(x, x') = L_j^2 + S_j^2 (x - 1/2)(x' - 1/2) + q_j^2 W(x + 1, x' + 1),   W(s, t) = m^2 (3 M - m) / 6,  m, M = min, max(s, t)
+// W is a twice integrated random walk's (Wahba 1978): its mean is a cubic spline, its variance grows with the cube of the
+// distance from the nodes, between and beyond them. A lens does not come back exactly: each movement leaves log f off by
+// eps ~ N(0, repeatability^2), at a node and at use. Line delay, axes, scales, aspect and clock offset are the same at all
+// readings (SharedParameter). Made by core/calibration/zoom_fit.h. Fixed memory; no allocation.
+
+#include <Eigen/Core>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+
+#include "core/model/calibration.h"
+
+namespace alidade {
+
+// What depends on the reading, in this order.
+enum class ZoomQuantity : int { kLogFocalLength, kCornerDistortion, kCentreU, kCentreV, kCount };
+inline constexpr int kZoomQuantityCount = static_cast<int>(ZoomQuantity::kCount);
+
+// What does not, in this order.
+inline constexpr std::array<Parameter, 9> kSharedParameters = {
+    Parameter::kAspect,   Parameter::kLineDelay, Parameter::kPanAxis0,
+    Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1,
+    Parameter::kPanScale, Parameter::kTiltScale, Parameter::kClockOffset};
+inline constexpr int kSharedCount = static_cast<int>(kSharedParameters.size());
+
+// L, S and q above, in the unit of the quantity; x is 0 to 1 over the nodes.
+struct ZoomSmoothness {
+  double level_sigma = 0;
+  double slope_sigma = 0;
+  double roughness = 0;
+
+  // Of the process at two x of at least -1.
+  [[nodiscard]] double covariance(double x, double other) const {
+    const double low = std::min(x, other) + 1;
+    const double high = std::max(x, other) + 1;
+    return level_sigma * level_sigma + slope_sigma * slope_sigma * (x - 0.5) * (other - 0.5) +
+           roughness * roughness * low * low * (3 * high - low) / 6;
+  }
+};
+
+class ZoomCurve {
+ public:
+  static constexpr int kMaxNodes = 24;
+  static constexpr int kMaxSize = kZoomQuantityCount * kMaxNodes + kSharedCount;
+  template <int max_rows, int max_columns>
+  using Bounded = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_rows, max_columns>;
+
+  // All that at() needs; matrices have the size of the nodes that there are.
+  struct Content {
+    int nodes = 0;
+    std::array<double, kMaxNodes> reading{};  // not decreasing; the first and the last differ
+    std::array<double, kZoomQuantityCount> level{};
+    std::array<ZoomSmoothness, kZoomQuantityCount> smoothness;
+    double repeatability = 0;  // sigma of log f after a movement
+    Calibration shared;        // its image size and shared parameters count
+    // Node by node the quantities less their level, eps of that visit included.
+    Bounded<kZoomQuantityCount * kMaxNodes, 1> value;
+    Bounded<kMaxSize, kMaxSize> covariance;  // of value, then the shared parameters
+    // Inverse covariance of the process at the nodes, repeatability included, of each quantity.
+    std::array<Bounded<kMaxNodes, kMaxNodes>, kZoomQuantityCount> inverse;
+  };
+
+  ZoomCurve() = default;
+  explicit ZoomCurve(const Content& content) : c_(content) {}
+
+  [[nodiscard]] bool empty() const { return c_.nodes == 0; }
+  [[nodiscard]] const Content& content() const { return c_; }
+  [[nodiscard]] double first_reading() const { return c_.reading[0]; }
+  [[nodiscard]] double last_reading() const {
+    return c_.reading[static_cast<std::size_t>(c_.nodes - 1)];
+  }
+
+  // The calibration after a movement to this reading, its zoom set. False for an empty curve, and for a reading that is
+  // not finite or further from the nodes than these from each other.
+  [[nodiscard]] bool at(double reading, Calibration* calibration) const {
+    if (empty() || !std::isfinite(reading)) return false;
+    const double x = position(reading);
+    if (!(x >= -1 && x <= 2)) return false;
+    std::array<Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxNodes, 1>, kZoomQuantityCount>
+        weight;
+    Vector4<double> y;
+    Matrix4<double> covariance = Matrix4<double>::Zero();
+    for (int j = 0; j < kZoomQuantityCount; ++j) {
+      const auto q = static_cast<std::size_t>(j);
+      const ZoomSmoothness& smooth = c_.smoothness[q];
+      Eigen::Matrix<double, Eigen::Dynamic, 1, 0, kMaxNodes, 1> k(c_.nodes);
+      for (int i = 0; i < c_.nodes; ++i) k[i] = smooth.covariance(x, node_position(i));
+      weight[q].noalias() = c_.inverse[q].lazyProduct(k);
+      y[j] = c_.level[q];
+      for (int i = 0; i < c_.nodes; ++i) y[j] += weight[q][i] * c_.value(row(i, j), 0);
+      covariance(j, j) = std::max(0.0, smooth.covariance(x, x) - k.dot(weight[q]));
+    }
+    covariance(0, 0) += c_.repeatability * c_.repeatability;
+    // Columns: how each quantity's error goes with all that is in covariance.
+    Eigen::Matrix<double, Eigen::Dynamic, kZoomQuantityCount, 0, kMaxSize, kZoomQuantityCount>
+        of_all(c_.covariance.rows(), kZoomQuantityCount);
+    of_all.setZero();
+    for (int j = 0; j < kZoomQuantityCount; ++j) {
+      for (int i = 0; i < c_.nodes; ++i) {
+        of_all.col(j) += weight[static_cast<std::size_t>(j)][i] * c_.covariance.col(row(i, j));
+      }
+    }
+    for (int j = 0; j < kZoomQuantityCount; ++j) {
+      for (int i = 0; i < c_.nodes; ++i) {
+        covariance.row(j) += weight[static_cast<std::size_t>(j)][i] * of_all.row(row(i, j));
+      }
+    }
+    assemble(y, covariance, of_all.bottomRows<kSharedCount>(), calibration);
+    calibration->zoom = reading;
+    return true;
+  }
+
+  // The calibration of a node, 0 to content().nodes - 1, as it was at that visit.
+  [[nodiscard]] Calibration node(int i) const {
+    Calibration calibration;
+    const int first = row(i, 0);
+    Vector4<double> y = c_.value.middleRows<kZoomQuantityCount>(first);
+    for (int j = 0; j < kZoomQuantityCount; ++j) y[j] += c_.level[static_cast<std::size_t>(j)];
+    assemble(y, c_.covariance.block<kZoomQuantityCount, kZoomQuantityCount>(first, first),
+             c_.covariance.block<kSharedCount, kZoomQuantityCount>(row(c_.nodes, 0), first),
+             &calibration);
+    calibration.zoom = c_.reading[static_cast<std::size_t>(i)];
+    return calibration;
+  }
+
+ private:
+  [[nodiscard]] double position(double reading) const {
+    return (reading - first_reading()) / (last_reading() - first_reading());
+  }
+  [[nodiscard]] double node_position(int node) const {
+    return position(c_.reading[static_cast<std::size_t>(node)]);
+  }
+  [[nodiscard]] static int row(int node, int quantity) {
+    return kZoomQuantityCount * node + quantity;
+  }
+
+  void assemble(const Vector4<double>& y, const Matrix4<double>& cov_y,
+                const Matrix<double, kSharedCount, kZoomQuantityCount>& cov_shared_y,
+                Calibration* out) const {
+    constexpr std::array<Parameter, kZoomQuantityCount> kOfQuantity = {
+        Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kCentreU,
+        Parameter::kCentreV};
+    *out = c_.shared;
+    Camera<double>& camera = out->camera;
+    camera.focal_length = std::exp(y[0]);
+    const double per_corner =
+        std::pow(2 * camera.focal_length / std::hypot(camera.width, camera.height), 2);
+    camera.radial_distortion = per_corner * y[1];
+    camera.set_centre_offset(y.tail<2>());
+    Matrix4<double> J = Matrix4<double>::Identity();  // of f, k, c by y
+    J(0, 0) = camera.focal_length;
+    J(1, 0) = 2 * camera.radial_distortion;
+    J(1, 1) = per_corner;
+    const Matrix4<double> cov_lens = J * cov_y * J.transpose();
+    const Matrix<double, kSharedCount, kZoomQuantityCount> cov_shared_lens =
+        cov_shared_y * J.transpose();
+    const int shared_row = kZoomQuantityCount * c_.nodes;
+    for (int i = 0; i < kZoomQuantityCount; ++i) {
+      const int a = index(kOfQuantity[static_cast<std::size_t>(i)]);
+      for (int j = 0; j < kZoomQuantityCount; ++j) {
+        out->covariance(a, index(kOfQuantity[static_cast<std::size_t>(j)])) = cov_lens(i, j);
+      }
+      for (int j = 0; j < kSharedCount; ++j) {
+        const int b = index(kSharedParameters[static_cast<std::size_t>(j)]);
+        out->covariance(a, b) = out->covariance(b, a) = cov_shared_lens(j, i);
+      }
+    }
+    for (int i = 0; i < kSharedCount; ++i) {
+      for (int j = 0; j < kSharedCount; ++j) {
+        out->covariance(index(kSharedParameters[static_cast<std::size_t>(i)]),
+                        index(kSharedParameters[static_cast<std::size_t>(j)])) =
+            c_.covariance(shared_row + i, shared_row + j);
+      }
+    }
+  }
+
+  Content c_;
+};
+
+}  // namespace alidade

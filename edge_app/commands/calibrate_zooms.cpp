@@ -1,0 +1,174 @@
+#include "edge_app/commands/calibrate_zooms.h"
+
+#include <fmt/chrono.h>
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <cmath>
+#include <cstdio>
+#include <ctime>
+#include <nlohmann/json.hpp>
+#include <utility>
+
+#include "core/calibration/zoom_fit.h"
+#include "edge_app/commands/command.h"
+#include "edge_app/commands/output_directory.h"
+#include "edge_app/commands/visible_calibration.h"
+#include "edge_app/output/calibration_json.h"
+#include "edge_app/output/calibration_report.h"
+#include "edge_app/output/value_text.h"
+#include "edge_app/storage/calibration_file.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kCentreShare =
+    0.01;  // of the image's width: how far an optical centre is off, usually
+
+// What holds at one zoom only can be no prior of several.
+void refuse_priors_of_one_zoom(const CalibrateOptions& options, std::size_t stretches) {
+  const auto refuse = [stretches](const char* option, const std::string& text) {
+    if (text.empty()) return;
+    throw CommandError(kExitUsage,
+                       fmt::format("{} holds at one zoom, and these are {} stretches of constant "
+                                   "zoom; leave it out, or give one recording at one zoom",
+                                   option, stretches));
+  };
+  refuse("--focal-length", options.focal_length);
+  refuse("--radial-distortion", options.radial_distortion);
+}
+
+void require_readings(const std::vector<ZoomJob>& jobs) {
+  for (const ZoomJob& each : jobs) {
+    if (each.job.zoom) continue;
+    throw CommandError(kExitUsage,
+                       fmt::format("{}: telemetry.csv has no zoom reading, which one of several "
+                                   "recordings needs; calibrate it alone, or add the column zoom",
+                                   each.recording));
+  }
+}
+
+void add_priors(const CalibrationOptions& options, ZoomFitOptions* fit) {
+  const auto add = [fit](Parameter parameter, const std::optional<CalibrationPrior>& prior) {
+    if (prior && prior->sigma > 0) {
+      fit->shared_priors.push_back({parameter, prior->value, prior->sigma});
+    }
+  };
+  add(Parameter::kAspect, options.aspect);
+  add(Parameter::kLineDelay, options.line_delay);
+  add(Parameter::kClockOffset, options.clock_offset);
+  add(Parameter::kPanScale, options.pan_scale);
+  add(Parameter::kTiltScale, options.tilt_scale);
+  fit->axis_sigma_rad = options.axis_sigma_rad;
+  fit->centre_sigma_px = options.centre_sigma_px;
+}
+
+double sigma_of(const Calibration& c, Parameter parameter) {
+  return std::sqrt(c.covariance(index(parameter), index(parameter)));
+}
+
+std::string zooms_text(const ZoomFit& fit, const std::vector<Calibration>& nodes) {
+  std::string text = fmt::format("{:>10}  {:>12}  {:>9}  {:>12}  {:>9}  {:>16}  {:>13}\n",
+                                 "reading", "f, px", "sigma", "k", "sigma", "centre, px", "sigma");
+  for (const Calibration& c : nodes) {
+    const double f = sigma_of(c, Parameter::kFocalLength);
+    const double k = sigma_of(c, Parameter::kRadialDistortion);
+    const double u = sigma_of(c, Parameter::kCentreU);
+    const double v = sigma_of(c, Parameter::kCentreV);
+    text += fmt::format("{:>10g}  {:>12}  {:>9}  {:>12}  {:>9}  {:>16}  {:>13}\n", *c.zoom,
+                        value_text(c.camera.focal_length, f), sigma_text(f),
+                        value_text(c.camera.radial_distortion, k), sigma_text(k),
+                        value_text(c.camera.centre_u, u) + ", " + value_text(c.camera.centre_v, v),
+                        sigma_text(u) + ", " + sigma_text(v));
+  }
+  const Calibration& any = nodes.front();
+  const auto line = [&](const char* name, double value, Parameter p, double unit, const char* of) {
+    const double sigma = sigma_of(any, p) / unit;
+    text += fmt::format("{}  {} +- {} {}\n", name, value_text(value / unit, sigma),
+                        sigma_text(sigma), of);
+  };
+  line("line_delay", any.line_delay, Parameter::kLineDelay, 1e-6, "us/row");
+  line("clock_offset", any.clock_offset, Parameter::kClockOffset, 1e-3, "ms");
+  text += fmt::format(
+      "readings agree on what they share: {:.1f}, {} expected; after a movement f may be {:.2g} % "
+      "off\n",
+      fit.chi_square, fit.degrees_of_freedom, 100 * fit.curve.content().repeatability);
+  return text;
+}
+
+std::string zooms_json(const ZoomFit& fit, const std::vector<Calibration>& nodes,
+                       const OutputDirectory& directory) {
+  using nlohmann::ordered_json;
+  ordered_json json;
+  json["status"] = "ok";
+  json["calibration"] = parameters_json(nodes.front());
+  json["zooms"] = ordered_json::array();
+  for (const Calibration& c : nodes) {
+    ordered_json node = parameters_json(c);
+    node["zoom"] = *c.zoom;
+    json["zooms"].push_back(std::move(node));
+  }
+  json["shared_chi_square"] = fit.chi_square;
+  json["shared_degrees_of_freedom"] = fit.degrees_of_freedom;
+  json["files"] = ordered_json::object();
+  for (const auto& [kind, path] : directory.files()) json["files"][kind] = path;
+  return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+}
+
+std::vector<Calibration> nodes_of(const ZoomCurve& curve) {
+  std::vector<Calibration> nodes;
+  for (int i = 0; i < curve.content().nodes; ++i) nodes.push_back(curve.node(i));
+  return nodes;
+}
+
+}  // namespace
+
+int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
+                    StopSignals* signals) {
+  refuse_priors_of_one_zoom(options, jobs.size());
+  require_readings(jobs);
+  OutputDirectory directory(options.directory, jobs.front().recording);
+  std::vector<Calibration> calibrations;
+  ZoomFitOptions fit_options;
+  const std::string now = fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)));
+  for (std::size_t i = 0; i < jobs.size(); ++i) {
+    auto& [recording, job] = jobs[i];
+    const std::string name = fmt::format("{} at zoom {:g}", recording, *job.zoom);
+    job.options.centre_sigma_px = kCentreShare * job.input.width;
+    CalibrationResult result = calibrate_job(recording, options.passes, &job, signals);
+    for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", name, remark);
+    if (!result.frames.empty()) {
+      directory.add("report", fmt::format("report-{}.html", i + 1).c_str(),
+                    calibration_report(
+                        {name, job.input, job.options, result, job.remarks, ALIDADE_VERSION, now}));
+    }
+    if (!result.ok()) {
+      spdlog::warn("{}: left out: {}: {}", name, to_string(result.status), result.message);
+      continue;
+    }
+    result.calibration.zoom = job.zoom;
+    calibrations.push_back(result.calibration);
+    if (calibrations.size() == 1) add_priors(job.options, &fit_options);
+  }
+  ZoomFit fit;
+  std::string error;
+  if (!fit_zoom(calibrations, fit_options, &fit, &error)) {
+    throw CommandError(kExitFailed, fmt::format("{} of {} stretches of constant zoom could be "
+                                                "calibrated: {}",
+                                                calibrations.size(), jobs.size(), error));
+  }
+  const std::vector<Calibration> nodes = nodes_of(fit.curve);
+  directory.add("calibration", "calibration.yaml", [&](const std::string& path, std::string* why) {
+    CalibrationNotes notes;
+    notes.zoom_curve = fit.curve;
+    return save_calibration(path, nodes.front(), notes, why);
+  });
+  std::fputs(
+      options.json ? zooms_json(fit, nodes, directory).c_str() : zooms_text(fit, nodes).c_str(),
+      stdout);
+  if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
+  for (const auto& [kind, path] : directory.files()) spdlog::info("{}: {}", kind, path);
+  return kExitOk;
+}
+
+}  // namespace alidade
