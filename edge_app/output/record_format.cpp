@@ -67,6 +67,7 @@ void add_fields(const OrientationRecord& record, Line* line) {
   line->add("residual_px", record.residual_px);
   line->add("line_delay_s", record.camera.line_delay);
   line->add("focal_length_px", record.camera.focal_length);
+  line->add("focal_length_sigma_px", std::sqrt(record.camera.covariance[0]));
   line->add("aspect", record.camera.aspect);
   line->add("radial_distortion", record.camera.radial_distortion);
   line->add("centre_offset_px", kCentre,

@@ -7,10 +7,9 @@ namespace alidade {
 
 void ZoomLookup::add(double time_s, double zoom) {
   if (!std::isfinite(time_s) || !std::isfinite(zoom)) return;
-  if (count_ > 0 && time_s <= newest_.time_s) return;
-  before_ = newest_;
-  newest_ = {time_s, zoom};
-  count_ = std::min(count_ + 1, 2);
+  if (count_ > 0 && time_s <= reading(0).time_s) return;
+  readings_[count_ % kKept] = {time_s, zoom};
+  ++count_;
 }
 
 bool ZoomLookup::calibration(const ZoomCurve& curve, double time_s, double readout_s,
@@ -20,22 +19,28 @@ bool ZoomLookup::calibration(const ZoomCurve& curve, double time_s, double reado
   constexpr double kUneven = 0.15;
   // A movement is over when readings have told nothing for so long.
   constexpr double kLongest_s = 1;
-  double zoom = newest_.zoom;
+  // The two readings about the time, or those next to it.
+  const std::size_t kept = std::min(count_, kKept);
+  std::size_t after = 0;
+  while (after + 2 < kept && reading(after + 1).time_s > time_s) ++after;
+  const Reading& newer = reading(after);
+  double zoom = newer.zoom;
   double spread = 0;
-  if (count_ > 1 && newest_.zoom != before_.zoom) {
-    const double interval_s = newest_.time_s - before_.time_s;
-    const double rate = (newest_.zoom - before_.zoom) / interval_s;
-    const double after_s = std::clamp(time_s - newest_.time_s, -interval_s, kLongest_s);
+  if (kept > 1 && newer.zoom != reading(after + 1).zoom) {
+    const Reading& older = reading(after + 1);
+    const double interval_s = newer.time_s - older.time_s;
+    const double rate = (newer.zoom - older.zoom) / interval_s;
+    const double after_s = std::clamp(time_s - newer.time_s, -interval_s, kLongest_s);
     zoom += rate * after_s;
-    // Before the older reading the lens moved likewise, or not yet.
-    const double beyond_s = std::max({after_s, before_.time_s - time_s, 0.0});
+    // Before the oldest reading the lens moved likewise, or not yet.
+    const double beyond_s = std::max({after_s, older.time_s - time_s, 0.0});
     spread = std::abs(rate) * (std::min(beyond_s, kLongest_s) / 2 + readout_s / 4) +
-             kUneven * std::abs(newest_.zoom - before_.zoom);
+             kUneven * std::abs(newer.zoom - older.zoom);
   }
   if (!curve.at(zoom, calibration)) {
     // What the movement was thought to go on to.
-    if (!curve.at(newest_.zoom, calibration)) return false;
-    zoom = newest_.zoom;
+    zoom = newer.zoom;
+    if (!curve.at(zoom, calibration)) return false;
   }
   if (spread == 0) return true;
   // Either way from there, where the curve goes on.

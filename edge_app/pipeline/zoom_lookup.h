@@ -1,7 +1,10 @@
 #pragma once
-// ZoomLookup: which zoom the lens had at a time, from the last two readings, and the calibration that the zoom curve gives for it.
-// Between the two the reading is interpolated; after the newer one a lens that moved moves on, or has stopped: half of the
-// way is the standard deviation. Fixed memory; allocates nothing.
+// ZoomLookup: which zoom the lens had at a time, from its latest readings, and the calibration that the zoom curve gives for it.
+// Between two readings it is interpolated; after the newest a lens that moved moves on, or has stopped: half of the way is the
+// standard deviation. Fixed memory; allocates nothing.
+
+#include <array>
+#include <cstddef>
 
 #include "core/model/zoom_curve.h"
 
@@ -22,9 +25,15 @@ class ZoomLookup {
     double time_s = 0;
     double zoom = 0;
   };
-  Reading before_;
-  Reading newest_;
-  int count_ = 0;  // up to 2
+  static constexpr std::size_t kKept = 64;
+
+  // back: 0 is the newest.
+  [[nodiscard]] const Reading& reading(std::size_t back) const {
+    return readings_[(count_ - 1 - back) % kKept];
+  }
+
+  std::array<Reading, kKept> readings_;
+  std::size_t count_ = 0;  // of all
 };
 
 }  // namespace alidade
