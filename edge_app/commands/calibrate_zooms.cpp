@@ -158,10 +158,15 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
                                                 calibrations.size(), jobs.size(), error));
   }
   const std::vector<Calibration> nodes = nodes_of(fit.curve);
+  // Who uses it has moved the zoom since.
+  Calibration first;
+  if (!fit.curve.at(fit.curve.first_reading(), &first)) {
+    throw CommandError(kExitFailed, "the zoom curve has no calibration at its first reading");
+  }
   directory.add("calibration", "calibration.yaml", [&](const std::string& path, std::string* why) {
     CalibrationNotes notes;
     notes.zoom_curve = fit.curve;
-    return save_calibration(path, nodes.front(), notes, why);
+    return save_calibration(path, first, notes, why);
   });
   std::fputs(
       options.json ? zooms_json(fit, nodes, directory).c_str() : zooms_text(fit, nodes).c_str(),

@@ -164,6 +164,12 @@ bool OrientationStep::zoom_fits() const {
          std::abs(*zoom_ - *wanted) <= options_.zoom_tolerance;
 }
 
+bool OrientationStep::zoom_moved(double telemetry_time_s) const {
+  return options_.calibrated && !options_.zoom_curve.empty() && options_.calibration.zoom &&
+         !zoom_lookup_.stands_at(*options_.calibration.zoom, options_.zoom_tolerance,
+                                 telemetry_time_s);
+}
+
 OrientationRecord OrientationStep::empty_record() const {
   OrientationRecord record;
   record.calibrated = options_.calibrated && zoom_fits();
@@ -235,7 +241,9 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   record.clock_locked = clock.state == ClockState::kLocked;
   record.status = status_of_telemetry(query, telemetry_lost_, record.clock_locked);
   tracks_.telemetry_too_old = record.status == RecordStatus::kTelemetryTooOld;
-  if (!zoom_fits()) {
+  if (!zoom_fits() || zoom_moved(telemetry_time_s)) {
+    // The map is another zoom's.
+    image_ = finds_landmarks() ? ImageView{} : image_;
     // Neither the lens nor the axes of another zoom are this one's.
     if (!has_result(query) || !orient_between(measured, telemetry_time_s, &record))
       record.status = RecordStatus::kOtherZoom;

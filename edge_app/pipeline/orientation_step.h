@@ -127,6 +127,8 @@ class OrientationStep {
   [[nodiscard]] OrientationRecord empty_record() const;
   // False: there is a calibration, but not for the zoom that the pan/tilt source reports.
   [[nodiscard]] bool zoom_fits() const;
+  // With a zoom curve: the reading fits, but did not when a frame of this telemetry time was taken, or is not known.
+  [[nodiscard]] bool zoom_moved(double telemetry_time_s) const;
   [[nodiscard]] bool is_stalled_poll(const PanTiltSample& sample);
   // Frames that extrapolated telemetry answered, and that telemetry encloses by this sample.
   void settle_pending_frames();

@@ -12,6 +12,21 @@ void ZoomLookup::add(double time_s, double zoom) {
   ++count_;
 }
 
+std::size_t ZoomLookup::newer_of(double time_s) const {
+  const std::size_t kept = std::min(count_, kKept);
+  std::size_t back = 0;
+  while (back + 2 < kept && reading(back + 1).time_s > time_s) ++back;
+  return back;
+}
+
+bool ZoomLookup::stands_at(double zoom, double tolerance, double time_s) const {
+  if (count_ == 0) return false;
+  const std::size_t newer = newer_of(time_s);
+  const Reading& older = reading(count_ > 1 ? newer + 1 : newer);
+  return std::abs(reading(newer).zoom - zoom) <= tolerance &&
+         std::abs(older.zoom - zoom) <= tolerance;
+}
+
 bool ZoomLookup::calibration(const ZoomCurve& curve, double time_s, double readout_s,
                              Calibration* calibration) const {
   if (count_ == 0) return false;
@@ -19,14 +34,11 @@ bool ZoomLookup::calibration(const ZoomCurve& curve, double time_s, double reado
   constexpr double kUneven = 0.15;
   // A movement is over when readings have told nothing for so long.
   constexpr double kLongest_s = 1;
-  // The two readings about the time, or those next to it.
-  const std::size_t kept = std::min(count_, kKept);
-  std::size_t after = 0;
-  while (after + 2 < kept && reading(after + 1).time_s > time_s) ++after;
+  const std::size_t after = newer_of(time_s);
   const Reading& newer = reading(after);
   double zoom = newer.zoom;
   double spread = 0;
-  if (kept > 1 && newer.zoom != reading(after + 1).zoom) {
+  if (count_ > 1 && newer.zoom != reading(after + 1).zoom) {
     const Reading& older = reading(after + 1);
     const double interval_s = newer.time_s - older.time_s;
     const double rate = (newer.zoom - older.zoom) / interval_s;

@@ -15,6 +15,9 @@ class ZoomLookup {
   // Telemetry time, s; device units. What is not finite, or not later than before, is left out.
   void add(double time_s, double zoom);
 
+  // Whether the lens stood at this zoom then: the readings about the time are within the tolerance of it.
+  [[nodiscard]] bool stands_at(double zoom, double tolerance, double time_s) const;
+
   // As PT mode needs it for a frame whose middle row has this telemetry time and whose rows are read out in readout_s. False: no
   // reading, or the curve ends before it.
   [[nodiscard]] bool calibration(const ZoomCurve& curve, double time_s, double readout_s,
@@ -31,6 +34,9 @@ class ZoomLookup {
   [[nodiscard]] const Reading& reading(std::size_t back) const {
     return readings_[(count_ - 1 - back) % kKept];
   }
+
+  // Of the newer of the two readings about the time, or next to it; there is one at least.
+  [[nodiscard]] std::size_t newer_of(double time_s) const;
 
   std::array<Reading, kKept> readings_;
   std::size_t count_ = 0;  // of all
