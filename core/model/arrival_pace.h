@@ -13,7 +13,8 @@
 //              least, so 3 D / (2 n), and is no pace for any D beyond kSame_s: at the shortest window a backlog that
 //              is worked off 0.8 % faster than it grows.
 //   windows    kLeastHalf_s and its doubles, so that slow streams and delays with a rhythm (key frames) have theirs.
-//              Where a backlog was seen, from the double on: what remains of it may come more slowly.
+//              Where a backlog was seen, from the double on: what remains of it may come more slowly. Unless something else
+//              tells that it is over, too.
 // A stream that is late by a constant cannot be told from a network with that delay.
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are seconds.
 
@@ -59,7 +60,9 @@ class ArrivalPace {
   }
 
   // By the items up to the last one; none: not shown, or no more. In windows with halves of least_half_s or more.
-  [[nodiscard]] std::optional<Shown> shown(double least_half_s = kLeastHalf_s) const {
+  // no_backlog: something else tells that the last one did not wait.
+  [[nodiscard]] std::optional<Shown> shown(double least_half_s = kLeastHalf_s,
+                                           bool no_backlog = false) const {
     if (size_ < 2 * kLeastItems) return std::nullopt;
     const double now_s = item(size_ - 1).receive_s;
     double half_s = kLeastHalf_s;
@@ -71,7 +74,7 @@ class ArrivalPace {
       const double tolerance_s = std::max(kSame_s, 3 * std::max(young.spread_s(), old.spread_s()));
       const double least_s = std::min(young.least_s, old.least_s);
       if (std::abs(young.least_s - old.least_s) > tolerance_s) continue;
-      if (i == 0 && saw_backlog(least_s)) continue;
+      if (i == 0 && !no_backlog && saw_backlog(least_s)) continue;
       std::size_t first = old.first;
       while (item(first).receive_s - item(first).sender_s > least_s + kBacklog_s) ++first;
       return Shown{first, least_s};
@@ -79,9 +82,9 @@ class ArrivalPace {
     return std::nullopt;
   }
 
-  // Has an item since the restart waited for longer than those of this level?
-  [[nodiscard]] bool saw_backlog(double least_s) const {
-    return greatest_s_ > least_s + kBacklog_s;
+  // Has an item since the restart waited for so much longer than those of this level?
+  [[nodiscard]] bool saw_backlog(double least_s, double longer_s = kBacklog_s) const {
+    return greatest_s_ > least_s + longer_s;
   }
 
   // The latest items, oldest first.

@@ -14,6 +14,8 @@
 //                   waited: as at a reconnection.
 //                   Where frames leave the line and come back (delay_wander.h), delay or stamps wander: sigma has what
 //                   was seen of it. Such a frame is of unknown age only beyond that.
+//                   Where the sender tells absolute times, too, pictures that these and the connection before say are fresh
+//                   are answered from the third on, and behind a backlog the pace is believed sooner (utc_line.h).
 //                   Stamps that run at another rate than the pictures come (stamp_rate.h) tell nothing: once that is shown
 //                   they are left out, on later connections too, and what else the stream tells goes on alone.
 //   count alone     (V4L2: stamps of the driver.) The same but for the start: a driver holds back a few buffers only. Where the
@@ -35,6 +37,7 @@
 #include "core/model/stamp_rate.h"
 #include "edge_app/pipeline/capture_clock.h"
 #include "edge_app/pipeline/receipt_clock.h"
+#include "edge_app/pipeline/utc_line.h"
 #include "platform/streams/frame.h"
 
 namespace alidade {
@@ -82,6 +85,7 @@ class FrameClock {
   enum class Kind : std::uint8_t { kNew, kSenderTime, kSequence, kNothing };
 
   static constexpr int kStrangeInARow = 3;
+  static constexpr int kFreshInARow = 3;     // a backlog comes down faster than it was sent
   static constexpr double kEarly_s = 0.02;   // the least delay of a connection differs by less
   static constexpr double kAstray_s = 0.01;  // more than a driver's stamps jitter
   static constexpr int kManyStrays = 25;
@@ -108,6 +112,7 @@ class FrameClock {
     if (begins) begin(kind);
     if (begins) rate_.restart();
     if (kind == Kind::kSenderTime && runs_off(stamp)) return leave_stamps_out(stamp);
+    if (kind == Kind::kSenderTime) utc_.watch(stamp);
     FrameTime time = by_what_is_told(stamp);
     time.clock.restarted = time.clock.restarted || (anew && kind != Kind::kNothing);
     return time;
@@ -124,6 +129,7 @@ class FrameClock {
 
   FrameTime leave_stamps_out(const FrameStamp& stamp) {
     stamps_left_out_ = true;
+    utc_.forget();
     begin(stamp.sequence ? Kind::kSequence : Kind::kNothing);
     FrameStamp without = stamp;
     without.sender_time_s.reset();
@@ -153,10 +159,13 @@ class FrameClock {
   }
 
   void begin(Kind kind) {
+    const bool has_line = kind_ == Kind::kSenderTime && !waiting_ && !line_begins_ && !late_;
+    utc_.end_connection(has_line ? &clock_.filter() : nullptr, wander_.off_s());
     kind_ = kind;
     began_fresh_ = fresh_;
     waiting_ = kind == Kind::kSenderTime && !fresh_;
     fresh_ = fresh_ && kind == Kind::kNothing;
+    fresh_by_utc_ = 0;
     line_begins_ = true;
     late_ = false;
     behind_backlog_ = false;
@@ -183,13 +192,26 @@ class FrameClock {
 
   FrameTime wait(const FrameStamp& stamp) {
     pace_.add(stamp.receive_time_s, *stamp.sender_time_s);
-    const auto shown = pace_.shown();
+    const double level_s = stamp.receive_time_s - *stamp.sender_time_s;
+    const std::optional<UtcLine::Age> age = utc_.age(stamp);
+    const bool agrees = age && age->agrees();
+    if (age && age->late_s < -UtcLine::kAgrees_s) utc_.forget();  // nothing comes before its time
+    const auto shown = pace_.shown(ArrivalPace::kLeastHalf_s, agrees);
     if (!shown) {
       FrameTime time = unusable(stamp);
       time.clock.rejected = false;
       time.of_use = true;
+      const bool waited = pace_.saw_backlog(level_s, UtcLine::kAgrees_s);
+      if (fresh_by_utc_ < kFreshInARow) fresh_by_utc_ = agrees && !waited ? fresh_by_utc_ + 1 : 0;
+      if (!agrees || fresh_by_utc_ < kFreshInARow) return time;
+      time.clock.time_s = age->time_s;
+      time.clock.sigma_s = age->sigma_s;
+      time.known = true;
       return time;
     }
+    // Fresh ones that the absolute clock does not say are fresh: it was set.
+    if (age && std::abs(age->late_s - (level_s - shown->least_s)) > UtcLine::kAgrees_s)
+      utc_.forget();
     const bool backlog = pace_.saw_backlog(shown->least_s);
     FrameTime time;
     for (std::size_t i = backlog ? shown->first : 0; i < pace_.size(); ++i) {
@@ -247,6 +269,7 @@ class FrameClock {
   // All that the stream has shown so far was of a backlog, or of another clock.
   FrameTime begin_again(const FrameStamp& stamp) {
     begin(kind_);
+    utc_.forget();
     FrameTime time = waiting_ ? wait(stamp) : FrameTime{ask_clock(stamp, true)};
     line_begins_ = waiting_;
     time.clock.restarted = true;
@@ -293,10 +316,12 @@ class FrameClock {
   ArrivalPace pace_;  // of a stream that waits, or of late frames
   DelayWander wander_;
   StampRate rate_;
+  UtcLine utc_;
   Kind kind_ = Kind::kNew;
   bool begins_ = true;  // with the next usable frame
   bool fresh_ = false;  // until a frame's time is known by what came
   bool began_fresh_ = false;
+  int fresh_by_utc_ = 0;  // of the connection's first frames, in a row
   int strange_ = 0;       // stamps of another kind in a row
   bool waiting_ = false;  // for the pace
   bool line_begins_ = true;

@@ -153,6 +153,108 @@ TEST_F(FrameClockTest, TheSigmaOfASlowStreamIsOfTheFramesBehindTheBacklog) {
   EXPECT_LT(*first_sigma_s, ClockFilterOptions{}.expected_jitter_s);
 }
 
+// The third frame of a connection whose first ones the sender's absolute clock says are fresh is answered, and all after it.
+class AbsoluteTimes : public FrameClockTest {
+ protected:
+  static constexpr double kEpoch_s = 1.7e9;
+  static constexpr int kPace = 13;  // frames until the pace is shown
+
+  // The frames that have no time.
+  int play(double from_s, double to_s, double utc_ahead_s) {
+    int unknown = 0;
+    for (double t = from_s; t < to_s - 1e-6; t += kInterval_s) {
+      FrameStamp stamp;
+      stamp.receive_time_s = t;
+      stamp.restarted = t == from_s;
+      stamp.sender_time_s = t + sender_ahead_s_;
+      stamp.sender_utc_s = kEpoch_s + utc_ahead_s + t;
+      const FrameTime time = clock_.update(stamp);
+      unknown += time.known ? 0 : 1;
+      if (time.known) {
+        EXPECT_NEAR(time.clock.time_s, t, 5 * time.clock.sigma_s) << t;
+      }
+    }
+    sender_ahead_s_ += 1000;  // the next connection's time stamps begin anywhere
+    return unknown;
+  }
+};
+
+TEST_F(AbsoluteTimes, TellThatANewConnectionBeginsFresh) {
+  EXPECT_EQ(play(0, 15, 0), kPace);
+  EXPECT_EQ(play(20, 40, 0), 2);
+  EXPECT_EQ(play(100, 103, 0), 2);
+  // That connection's own line is not known well, the one before it is.
+  EXPECT_EQ(play(110, 115, 0), 2);
+}
+
+TEST_F(AbsoluteTimes, TellNothingThatWasNotSeenToHoldForTenSeconds) {
+  EXPECT_EQ(play(0, 9, 0), kPace);
+  EXPECT_EQ(play(20, 29, 0), kPace);
+}
+
+TEST_F(AbsoluteTimes, TellNothingWhereTheClockWasSet) {
+  for (const double step_s : {0.5, -0.5, 0.03, -0.03, 3600.0}) {
+    clock_ = FrameClock{ClockFilterOptions{}, 5e-3, true};
+    play(0, 15, 0);
+    EXPECT_EQ(play(20, 35, step_s), kPace) << step_s;
+    EXPECT_EQ(play(40, 45, step_s), 2) << "set once";
+  }
+  // So little that it agrees: sigma covers it, as play() has it.
+  clock_ = FrameClock{ClockFilterOptions{}, 5e-3, true};
+  play(0, 15, 0);
+  EXPECT_EQ(play(20, 35, 0.015), 2);
+}
+
+TEST_F(AbsoluteTimes, TellNothingWhileTheyWanderAgainstTheTimeStamps) {
+  for (double t = 0; t < 15; t += kInterval_s) {
+    FrameStamp stamp;
+    stamp.receive_time_s = t;
+    stamp.sender_time_s = t + sender_ahead_s_;
+    stamp.sender_utc_s = kEpoch_s + t + (std::fmod(t, 5) < kInterval_s ? 0.01 : 0);
+    clock_.update(stamp);
+  }
+  sender_ahead_s_ = 7000;
+  EXPECT_EQ(play(20, 35, 0), kPace);
+}
+
+TEST_F(AbsoluteTimes, NeverMakeOldFramesFresh) {
+  play(0, 15, 0);
+  for (int i = 0; i < 50; ++i) {
+    FrameStamp stamp;
+    stamp.receive_time_s = 22 + 2e-3 * i;
+    stamp.restarted = i == 0;
+    stamp.sender_time_s = 5000 + kInterval_s * i;
+    stamp.sender_utc_s = kEpoch_s + 20 + kInterval_s * i;
+    EXPECT_FALSE(clock_.update(stamp).known) << i;
+  }
+  int unknown = 0;
+  for (double t = 22.12; t < 25; t += kInterval_s) {
+    FrameStamp stamp;
+    stamp.receive_time_s = t;
+    stamp.sender_time_s = 5000 + t - 20;
+    stamp.sender_utc_s = kEpoch_s + t;
+    unknown += clock_.update(stamp).known ? 0 : 1;
+  }
+  EXPECT_LE(unknown, kPace) << "half a second at the pace, not one";
+}
+
+// By a step as long as some of a backlog is old: in its middle pictures seem fresh.
+TEST_F(AbsoluteTimes, OfAClockThatWasPutForwardMakeNoBacklogFresh) {
+  for (const double age_s : {0.3, 1.0, 3.0}) {
+    clock_ = FrameClock{ClockFilterOptions{}, 5e-3, true};
+    play(0, 15, 0);
+    const double begin_s = 25 - (age_s + 0.2);
+    for (double t = begin_s; t < begin_s + 2; t += kInterval_s) {
+      FrameStamp stamp;
+      stamp.receive_time_s = 25 + 0.8 * (t - begin_s);
+      stamp.restarted = t == begin_s;
+      stamp.sender_time_s = sender_ahead_s_ + t;
+      stamp.sender_utc_s = kEpoch_s + age_s + t;
+      EXPECT_FALSE(clock_.update(stamp).known) << t << ", " << age_s;
+    }
+  }
+}
+
 TEST_F(FrameClockTest, TheLineHoldsForWhatWaitsOnceTheSendersClockWasSeenToRunOn) {
   play(0, 15);
   for (const double stall_s : {15.0, 20.0}) {

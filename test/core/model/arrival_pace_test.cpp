@@ -79,6 +79,22 @@ TEST(ArrivalPace, IsNotShownByABacklog) {
   }
 }
 
+TEST(ArrivalPace,
+     IsShownInASecondBehindABacklogOrInHalfASecondWhereSomethingElseTellsThatItIsOver) {
+  for (const bool told : {false, true}) {
+    ArrivalPace pace;
+    pace.restart();
+    for (int i = 0; i < 75; ++i) pace.add(3 + 1e-3 * i, kOrigin_s + kPeriod_s * i);
+    std::optional<double> shown_s;
+    for (double t = 3.08; t < 6 && !shown_s; t += kPeriod_s) {
+      pace.add(t, kOrigin_s + t);
+      if (pace.shown(ArrivalPace::kLeastHalf_s, told)) shown_s = t;
+    }
+    ASSERT_TRUE(shown_s);
+    EXPECT_NEAR(*shown_s, 3.08 + (told ? 0.5 : 1), 2 * kPeriod_s);
+  }
+}
+
 // 0.4 s of it at once, then nothing for as long as 0.3 s of pictures take.
 TEST(ArrivalPace, IsNotShownByABacklogThatComesInPieces) {
   for (unsigned seed = 1; seed <= 20; ++seed) {

@@ -1,0 +1,101 @@
+#pragma once
+// UtcLine: what a sender's absolute clock (FrameStamp::sender_utc_s: ONVIF's capture time in each packet, or RTCP's reports)
+// tells of the age of pictures at a reconnection, where the clock of its time stamps begins anew.
+//
+//   before   host time = line(sender), sender = utc - ahead       as last seen through the connection before
+//   after    time = line(utc - ahead), late = receive - time
+//
+// An absolute clock may be set meanwhile, by any step, and reports may be nonsense. What is late may therefore be old, or
+// of a clock that was put back: that nobody can tell. But an age that is none, to kAgrees_s, is two clocks' word: a picture
+// as old as a step is long, to that, would be a coincidence. So nothing but that is ever concluded, and sigma covers the
+// clock's error within kAgrees_s: it contains `late`, the line's and the delays' own.
+// Believed is
+//   ahead    once it held for kProven_s: to kSteady_s. What leaves that begins anew, and what was kept is forgotten;
+//   the line if it was locked and still is known to kSharp_s, which for hours it is not.
+// Fixed memory, no allocation, one thread. Seconds. Beyond PTCEE.
+
+#include <cmath>
+#include <optional>
+
+#include "core/model/clock_filter.h"
+#include "platform/streams/frame.h"
+
+namespace alidade {
+
+class UtcLine {
+ public:
+  static constexpr double kAgrees_s = 0.02;  // the least delay of a connection differs by less
+
+  struct Age {
+    double time_s = 0;   // as the line before has it
+    double sigma_s = 0;  // of that, if it agrees
+    double late_s = 0;   // the receive time less that
+    [[nodiscard]] bool agrees() const { return std::abs(late_s) <= kAgrees_s; }
+  };
+
+  // Each frame with a sender's clock, in the order of arrival.
+  void watch(const FrameStamp& stamp) {
+    if (!tells(stamp)) return;
+    const double ahead_s = *stamp.sender_utc_s - *stamp.sender_time_s;
+    if (!steady_since_s_ || !(std::abs(ahead_s - steady_ahead_s_) <= kSteady_s)) {
+      if (steady_since_s_) kept_.reset();
+      steady_since_s_ = stamp.receive_time_s;
+      steady_ahead_s_ = ahead_s;
+    }
+    ahead_s_ = ahead_s;
+    seen_s_ = stamp.receive_time_s;
+  }
+
+  // The connection has ended. filter: its line; null if it had none that was believed. off_line_s: by how much frames left it.
+  void end_connection(const ClockFilter<>* filter, double off_line_s) {
+    if (filter != nullptr && filter->state() == ClockState::kLocked && steady_since_s_ &&
+        seen_s_ - *steady_since_s_ >= kProven_s) {
+      kept_ = Kept{*filter, ahead_s_, off_line_s};
+    }
+    steady_since_s_.reset();
+  }
+
+  // What was kept is wrong, or what it was kept of.
+  void forget() {
+    kept_.reset();
+    steady_since_s_.reset();
+  }
+
+  // Of a frame of a later connection; none: nothing is known.
+  [[nodiscard]] std::optional<Age> age(const FrameStamp& stamp) const {
+    if (!kept_ || !tells(stamp)) return std::nullopt;
+    const ClockFilter<>& filter = kept_->filter;
+    const double sender_s = *stamp.sender_utc_s - kept_->ahead_s;
+    const double line_sigma_s = std::hypot(filter.sigma(sender_s), kept_->off_line_s);
+    if (!(line_sigma_s <= kSharp_s)) return std::nullopt;
+    Age age;
+    age.time_s = filter.to_host(sender_s);
+    age.late_s = stamp.receive_time_s - filter.delay_shift_s() - age.time_s;
+    age.sigma_s = std::hypot(std::hypot(line_sigma_s, filter.jitter_s()), age.late_s);
+    return age;
+  }
+
+ private:
+  static constexpr double kSteady_s = 5e-3;
+  static constexpr double kProven_s =
+      10;  // a rate that is off by more than 5e-4 does not hold so long
+  static constexpr double kSharp_s = 5e-3;
+
+  struct Kept {
+    ClockFilter<> filter;
+    double ahead_s = 0;
+    double off_line_s = 0;
+  };
+
+  [[nodiscard]] static bool tells(const FrameStamp& stamp) {
+    return stamp.sender_time_s && stamp.sender_utc_s && std::isfinite(*stamp.sender_utc_s);
+  }
+
+  std::optional<Kept> kept_;
+  std::optional<double> steady_since_s_;  // receive time
+  double steady_ahead_s_ = 0;
+  double ahead_s_ = 0;
+  double seen_s_ = 0;
+};
+
+}  // namespace alidade
