@@ -76,6 +76,7 @@ MotionMatch match_motion(const std::vector<ImageMotion>& motion, const Trajector
     *angle = (1 - share) * grid[i] + share * grid[i + 1];
     return true;
   };
+  bool apart = true;
   const auto evaluate = [&](double shift) {
     MotionMatch match;
     match.shift_s = shift;
@@ -96,6 +97,7 @@ MotionMatch match_motion(const std::vector<ImageMotion>& motion, const Trajector
     }
     // A candidate that leaves most of the video without telemetry is no match.
     if (2 * used < motion.size()) return match;
+    apart = false;
     const auto normalised = [](double ab, double aa, double bb) {
       return aa > 0 && bb > 0 ? ab / std::sqrt(aa * bb) : 0.0;
     };
@@ -120,6 +122,7 @@ MotionMatch match_motion(const std::vector<ImageMotion>& motion, const Trajector
   for (double range = half_range_s / steps; range > 1e-4; range /= 5)
     search(best.shift_s, range, 5);
   best.at_edge = at_edge;
+  best.apart = apart;
   return best;
 }
 

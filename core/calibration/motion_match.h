@@ -26,6 +26,7 @@ struct MotionMatch {
   double focal_length = 0;
   double correlation = 0;  // of the motions, 1 = perfect
   bool at_edge = false;    // of the range that was searched
+  bool apart = false;      // no shift gives half of the video's motion telemetry beside it
 };
 
 // The best shift within half_range_s of centre_s, to 0.1 ms.

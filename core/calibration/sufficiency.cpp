@@ -128,6 +128,10 @@ CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
         "scene; change speed and direction some times";
     return CalibrationStatus::kConstantVelocity;
   }
+  if (match.apart) {
+    *why = "telemetry accompanies less than half of the video: was its connection lost meanwhile?";
+    return CalibrationStatus::kBadInput;
+  }
   if (match.correlation < kMinCorrelation) {
     *why = text(
         "telemetry does not describe the motion seen in the video (best correlation %.2f with the "

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numeric>
 #include <tuple>
 #include <unordered_map>
 #include <unordered_set>
@@ -41,16 +42,9 @@ void keep_longest_part(const char* what, std::vector<Item>* items,
                              items->begin() + static_cast<std::ptrdiff_t>(best_end));
 }
 
-// The count of each time on its steady grid; empty if they do not lie on one.
-std::vector<std::int64_t> count_on_grid(const std::vector<double>& times) {
+// The count of each time on a steady grid of about this period; empty if they do not lie on one.
+std::vector<std::int64_t> count_on_grid(const std::vector<double>& times, double period) {
   constexpr double kMaxDistance = 0.25;  // of the period
-  if (times.size() < 3) return {};
-  std::vector<double> steps;
-  for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
-  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
-  std::nth_element(steps.begin(), middle, steps.end());
-  double period = *middle;
-  if (!(period > 0)) return {};
   // Counted from one item to the next, which an error of the period does not harm; then checked on the
   // grid of the whole.
   std::vector<std::int64_t> counts = {0};
@@ -65,6 +59,21 @@ std::vector<std::int64_t> count_on_grid(const std::vector<double>& times) {
     if (std::abs(times[i] - expected) > kMaxDistance * period) return {};
   }
   return counts;
+}
+
+// The same for the usual step, else, where most items are missing, as on a machine that has too much to do, for the shortest.
+std::vector<std::int64_t> count_on_grid(const std::vector<double>& times) {
+  if (times.size() < 3) return {};
+  std::vector<double> steps;
+  for (std::size_t i = 1; i < times.size(); ++i) steps.push_back(times[i] - times[i - 1]);
+  std::sort(steps.begin(), steps.end());
+  if (!(steps.front() > 0)) return {};
+  std::vector<std::int64_t> counts = count_on_grid(times, steps[steps.size() / 2]);
+  if (!counts.empty()) return counts;
+  const auto single = std::upper_bound(steps.begin(), steps.end(), 1.5 * steps.front());
+  const double period =
+      std::accumulate(steps.begin(), single, 0.0) / static_cast<double>(single - steps.begin());
+  return count_on_grid(times, period);
 }
 
 // sequence(item) and sender_time(item) are optionals.

@@ -47,6 +47,8 @@ const char* to_string(CalibrationNeed need) {
       return "scene too plain";
     case CalibrationNeed::kAgreement:
       return "telemetry that describes the motion in the video";
+    case CalibrationNeed::kPictures:
+      return "more of the pictures: the machine is too slow or too busy";
     case CalibrationNeed::kTime:
       return "more of the same motion";
     case CalibrationNeed::kSteadyZoom:

@@ -44,6 +44,7 @@ enum class CalibrationNeed : std::uint8_t {
   kAcceleration,   // constant velocity: clock offset and line delay stay unknown
   kTexture,        // scene too plain: too few landmarks
   kAgreement,      // telemetry does not describe the motion in the video
+  kPictures,       // most of them never come here: the machine has too much to do
   kTime,           // more of the same
   kSteadyZoom,     // the zoom is moving
   kSteadyDelay,    // the video's delay wanders

@@ -62,8 +62,11 @@ void RealtimeStage::drain_telemetry() {
       continue;
     }
     step_.add_telemetry(message.sample);
-    if (feed_wanted_ && !feed_samples_.push(message.sample))
-      unheard_.fetch_add(1, std::memory_order_relaxed);
+    if (!feed_wanted_) continue;
+    message.sample.restarted = message.sample.restarted || unheard_sample_restart_;
+    const bool heard = feed_samples_.push(message.sample);
+    unheard_sample_restart_ = !heard && message.sample.restarted;
+    count_unheard(heard);
   }
 }
 
@@ -107,14 +110,25 @@ void RealtimeStage::process_frame(const VideoMessage& received) {
 }
 
 void RealtimeStage::feed(const VideoMessage& message, bool* lent) {
-  step_.get_tracks(&feed_frame_.tracks);
+  FrameTracks& tracks = feed_frame_.tracks;
+  step_.get_tracks(&tracks);
+  tracks.clock_restarted = tracks.clock_restarted || unheard_frame_restart_;
+  tracks.delay_stepped = tracks.delay_stepped || unheard_delay_step_;
   const bool lend = message.image.valid() && message.slot != kNoImageSlot &&
                     image_wanted_.exchange(false, std::memory_order_relaxed);
   feed_frame_.image = lend ? message.image : ImageView{};
   feed_frame_.slot = lend ? message.slot : kNoImageSlot;
-  *lent = feed_frames_.push(feed_frame_) && lend;
+  const bool heard = feed_frames_.push(feed_frame_);
+  unheard_frame_restart_ = !heard && tracks.clock_restarted;
+  unheard_delay_step_ = !heard && tracks.delay_stepped;
+  count_unheard(heard);
+  *lent = heard && lend;
   if (lend && !*lent) image_wanted_.store(true, std::memory_order_relaxed);
   feed_.post();
+}
+
+void RealtimeStage::count_unheard(bool heard) {
+  if (!heard) unheard_.fetch_add(1, std::memory_order_relaxed);
 }
 
 void RealtimeStage::tap(const VideoMessage& message, bool* lent) {

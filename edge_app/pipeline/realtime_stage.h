@@ -69,7 +69,7 @@ struct DropCounters {
   std::int64_t frames = 0;
   std::int64_t telemetry = 0;
   std::int64_t records = 0;
-  // Samples that the calibration thread was too busy to hear of: no loss for the records.
+  // Frames and samples that the calibration thread was too busy to hear of: no loss for the records.
   std::int64_t unheard = 0;
   // Images that nobody looked at, so that the frames behind them need not wait.
   std::int64_t late_images = 0;
@@ -141,6 +141,7 @@ class RealtimeStage {
   void process_frame(const VideoMessage& received);
   void pass_on_pulse();
   void feed(const VideoMessage& message, bool* lent);
+  void count_unheard(bool heard);
   void tap(const VideoMessage& message, bool* lent);
   void emit(const OutputMessage& message);
 
@@ -163,7 +164,11 @@ class RealtimeStage {
   std::atomic<bool> image_wanted_{false};
   std::atomic<bool> video_lost_{false};
   std::atomic<bool> telemetry_lost_{false};
-  FeedFrame feed_frame_;      // real-time thread: too large for its stack
+  FeedFrame feed_frame_;  // real-time thread: too large for its stack
+  // Real-time thread: what those that found no room had to tell of the clocks, for the next that does.
+  bool unheard_frame_restart_ = false;
+  bool unheard_delay_step_ = false;
+  bool unheard_sample_restart_ = false;
   TappedFrame tapped_frame_;  // likewise
   Semaphore feed_;
   Semaphore input_;

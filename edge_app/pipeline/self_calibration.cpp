@@ -7,30 +7,11 @@
 #include <utility>
 
 #include "core/calibration/calibration_difference.h"
+#include "edge_app/pipeline/calibration_refusal.h"
 #include "edge_app/pipeline/keyframe_map.h"
 
 namespace alidade {
 namespace {
-
-CalibrationNeed need_of(const SessionCalibration& checked) {
-  const CalibrationResult& result = checked.result;
-  switch (result.status) {
-    case CalibrationStatus::kNoMotion:
-      return CalibrationNeed::kMotion;
-    case CalibrationStatus::kOneAxisOnly:
-      return checked.refusal.rfind("pan", 0) == 0 ? CalibrationNeed::kPan : CalibrationNeed::kTilt;
-    case CalibrationStatus::kConstantVelocity:
-      return CalibrationNeed::kAcceleration;
-    case CalibrationStatus::kTooFewLandmarks:
-      return CalibrationNeed::kTexture;
-    case CalibrationStatus::kTelemetryMismatch:
-      return CalibrationNeed::kAgreement;
-    case CalibrationStatus::kWeak:
-      return result.quality.weak_in_time ? CalibrationNeed::kAcceleration : CalibrationNeed::kTime;
-    default:
-      return CalibrationNeed::kTime;
-  }
-}
 
 std::string describe(const Calibration& c) {
   return fmt::format(
@@ -251,10 +232,9 @@ void SelfCalibration::try_first() {
   }
   // The program ends: nobody is to do anything about it.
   if (checked.result.status == CalibrationStatus::kCancelled) return;
-  need_ = need_of(checked);
-  say_once(fmt::format("{} ({}): {}",
-                       fresh_wanted_ ? "no fresh calibration yet" : "not calibrated yet",
-                       to_string(checked.result.status), checked.refusal));
+  const CalibrationRefusal refusal = why_refused(checked, session_.frames());
+  need_ = refusal.need;
+  say_once((fresh_wanted_ ? "no fresh calibration yet" : "not calibrated yet") + refusal.why);
 }
 
 void SelfCalibration::hold_against_published() {

@@ -138,6 +138,15 @@ TEST(CalibrationStreams, AGapInTheSendersTimesIsOneInTheCount) {
   EXPECT_EQ(counts_of({0, 0.1, 0.2, 0.5, 0.6, 0.7}), (Counts{0, 1, 2, 5, 6, 7}));
 }
 
+// Of every six one or two, so that the usual step is no single period.
+TEST(CalibrationStreams, WhereMostItemsAreMissingTheShortestStepIsThePeriod) {
+  using Counts = std::vector<std::optional<std::int64_t>>;
+  EXPECT_EQ(counts_of({0, 0.3, 0.4, 0.9, 1.2, 1.5, 1.6, 2.1}),
+            (Counts{0, 3, 4, 9, 12, 15, 16, 21}));
+  EXPECT_EQ(counts_of({0, 0.3, 0.6, 0.8, 1.3}), (Counts(5)))
+      << "none is a multiple of the shortest";
+}
+
 TEST(CalibrationStreams, TimesBesideTheirGridAreNotCounted) {
   const std::vector<std::optional<std::int64_t>> none(7);
   EXPECT_NE(counts_of({0, 0.1, 0.2, 0.3, 0.4, 0.5, 0.6}), none);

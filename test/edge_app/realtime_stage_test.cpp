@@ -317,6 +317,46 @@ TEST(RealtimeStage, CountsTheSamplesThatTheCalibrationThreadDoesNotHear) {
   EXPECT_EQ(stage->drops().unheard, 5 * 1024 - 4096);
 }
 
+// The frames' queue to it holds 256. What no longer fits may have begun another clock.
+TEST(RealtimeStage, TellsTheCalibrationThreadOfRestartsThatItDidNotHearOf) {
+  const auto stage = std::make_unique<RealtimeStage>(options_with_images(), true, true);
+  const auto frame = [&](int i, bool restarted) {
+    VideoMessage message = frame_message(i);
+    message.stamp.sequence = i;
+    message.stamp.restarted = restarted;
+    stage->push(message);
+    EXPECT_TRUE(stage->process());
+    while (count_records(stage.get()) > 0) {
+    }
+  };
+  const auto sample = [&](int i, bool restarted) {
+    TelemetryMessage message = sample_message(0.001 * i);
+    message.sample.restarted = restarted;
+    stage->push(message);
+    EXPECT_TRUE(stage->process());
+  };
+  for (int i = 0; i < 256; ++i) frame(i, false);
+  for (int i = 0; i < 4096; ++i) sample(i, false);
+  EXPECT_EQ(stage->drops().unheard, 0);
+  for (int i = 0; i < 3; ++i) {
+    frame(256 + i, i == 1);
+    sample(4096 + i, i == 1);
+  }
+  EXPECT_EQ(stage->drops().unheard, 6);
+  FeedFrame fed;
+  PanTiltSample heard;
+  while (stage->pop(fed)) EXPECT_FALSE(fed.tracks.clock_restarted);
+  while (stage->pop(heard)) EXPECT_FALSE(heard.restarted);
+  for (int i = 0; i < 2; ++i) {
+    frame(300 + i, false);
+    sample(5000 + i, false);
+    ASSERT_TRUE(stage->pop(fed));
+    ASSERT_TRUE(stage->pop(heard));
+    EXPECT_EQ(fed.tracks.clock_restarted, i == 0);
+    EXPECT_EQ(heard.restarted, i == 0);
+  }
+}
+
 TEST(RealtimeStage, TakesOverWhatIsPublishedBeforeTheNextFrame) {
   const Scene scene;
   const auto stage = std::make_unique<RealtimeStage>(options_with_images(), true, true);
@@ -418,9 +458,13 @@ TEST(RealtimeStage, AllocatesNothingWhileCalibrationsComeAndGo) {
   const Scene scene;
   ImageTap tap(std::chrono::milliseconds(0));
   std::thread tap_thread(&ImageTap::run, &tap);
-  const auto stage = std::make_unique<RealtimeStage>(options_with_images(), true, true, &tap);
+  OrientationStepOptions options = options_with_images();
+  // A head at rest repeats its angle, which else is believed after a tenth of a second: later than this test is over on a
+  // fast machine.
+  options.telemetry_limits.max_repeat_s = 0;
+  const auto stage = std::make_unique<RealtimeStage>(options, true, true, &tap);
   PublishedCalibration calibrated;
-  calibrated.calibration = options_with_images().calibration;
+  calibrated.calibration = options.calibration;
   calibrated.calibrated = true;
   calibrated.map.landmarks.resize(500);
   PublishedCalibration withdrawn;

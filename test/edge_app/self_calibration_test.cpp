@@ -10,6 +10,7 @@
 
 #include <functional>
 #include <map>
+#include <random>
 #include <thread>
 
 #include "test/support/simulated_recording.h"
@@ -97,6 +98,11 @@ struct Feed {
   bool delay_steps = false;  // with the first frame the least delay of the video is another one
   double delay_wander_s = 0;
   std::function<void()> before_adjusting = {};
+  // A machine with too much to do takes up this share of the frames, and stamps them late, by so much in the mean, but for
+  // the sender's clock.
+  double taken_up = 1;
+  double late_s = 0;
+  double head_back_s = 0;  // the connection to the head begins anew then
 };
 
 std::vector<Published> feed(SelfCalibration* calibration, const test::Simulation& s,
@@ -110,7 +116,11 @@ std::vector<Published> feed(SelfCalibration* calibration, const test::Simulation
   }
   std::vector<Published> published;
   std::size_t next_sample = 0;
+  std::mt19937_64 random(s.seed);
+  double stamped_s = 0;
+  bool back = false;
   for (const CalibrationFrame& frame : input.frames) {
+    if (std::uniform_real_distribution<double>(0, 1)(random) >= how.taken_up) continue;
     for (; next_sample < input.telemetry.size() &&
            input.telemetry[next_sample].stamp_s <= frame.stamp_s;
          ++next_sample) {
@@ -122,12 +132,22 @@ std::vector<Published> feed(SelfCalibration* calibration, const test::Simulation
       sample.tilt_rad = from.tilt_rad;
       if (how.poll_s == 0) sample.sequence = from.sequence;
       sample.zoom = how.zoom;
+      sample.restarted = how.head_back_s > 0 && from.stamp_s >= how.head_back_s && !back;
+      back = back || sample.restarted;
       calibration->add(sample);
     }
     FrameTracks tracks;
     tracks.stamp.frame = how.first_frame + frame.frame;
     tracks.stamp.receive_time_s = how.from_s + frame.stamp_s;
-    tracks.stamp.sequence = frame.sequence;
+    if (how.late_s > 0) {
+      stamped_s =
+          std::max(stamped_s, tracks.stamp.receive_time_s +
+                                  std::exponential_distribution<double>(1 / how.late_s)(random));
+      tracks.stamp.receive_time_s = stamped_s;
+      tracks.stamp.sender_time_s = 700 + static_cast<double>(*frame.sequence) / s.image_rate_hz;
+    } else {
+      tracks.stamp.sequence = frame.sequence;
+    }
     tracks.time_s = tracks.stamp.receive_time_s;
     tracks.tracker = how.tracker;
     tracks.clock_restarted = tracks.stamp.restarted = how.restarts && frame.frame == 0;
@@ -235,6 +255,50 @@ TEST(SelfCalibration, DoesNotBelieveTelemetryOfAnotherMotion) {
   SelfCalibration calibration(options_for(s), nullptr);
   EXPECT_THAT(feed(&calibration, s, {}), IsEmpty());
   EXPECT_STREQ(to_string(calibration.report().need), to_string(CalibrationNeed::kAgreement));
+}
+
+// A machine with too much to do leaves out most pictures, at random, and stamps late what it takes up.
+class StarvedCalibration : public ::testing::Test {
+ protected:
+  std::vector<Published> starve(double taken_up, double late_s, double duration_s) {
+    s_.duration_s = duration_s;
+    Feed starved;
+    starved.taken_up = taken_up;
+    starved.late_s = late_s;
+    return feed(&calibration_, s_, starved);
+  }
+  test::Simulation s_ = camera();
+  SelfCalibration calibration_{options_for(s_), nullptr};
+};
+
+TEST_F(StarvedCalibration, SucceedsWithOneInThreePictures) {
+  const auto published = starve(0.3, 0.05, 10);
+  ASSERT_FALSE(published.empty());
+  expect_truth(s_, published[0].calibration->calibration);
+}
+
+TEST_F(StarvedCalibration, SaysThatTheMachineIsTooBusyAndDoesNotBlameTelemetry) {
+  EXPECT_THAT(starve(0.15, 1, 10), IsEmpty());
+  EXPECT_STREQ(to_string(calibration_.report().need), to_string(CalibrationNeed::kPictures));
+  EXPECT_THAT(calibration_.take_messages(),
+              AllOf(Not(IsEmpty()), Each(HasSubstr("% of the pictures came here")),
+                    Each(Not(HasSubstr("telemetry does not")))));
+}
+
+// The head's connection was lost during the video: what was before is forgotten.
+TEST(SelfCalibration, DoesNotBlameTelemetryForWhatItDoesNotAccompany) {
+  const test::Simulation s = camera();
+  SelfCalibrationOptions options = options_for(s);
+  SelfCalibration calibration(options, nullptr);
+  Feed lost;
+  lost.head_back_s = options.schedule.first_try_s - 1;
+  const auto published = feed(&calibration, s, lost);
+  const std::vector<std::string> messages = calibration.take_messages();
+  ASSERT_GE(messages.size(), 2U);
+  EXPECT_THAT(messages[0], HasSubstr("telemetry accompanies less than half of the video"));
+  EXPECT_THAT(messages, Each(Not(HasSubstr("telemetry does not describe"))));
+  ASSERT_FALSE(published.empty());
+  expect_truth(s, published[0].calibration->calibration);
 }
 
 TEST(SelfCalibration, NamesTheStreamThatIsLost) {
