@@ -1,6 +1,7 @@
 #include "edge_app/pipeline/pipeline.h"
 
 #include <fmt/format.h>
+#include <sched.h>
 #include <spdlog/spdlog.h>
 #include <sys/eventfd.h>
 #include <unistd.h>
@@ -26,6 +27,11 @@ void log_granted(const char* whose, const RealtimeReport& report) {
               report.line());
 }
 
+int processor_of_the_way(const PipelineOptions& options) {
+  if (options.step.oe) return -1;
+  return options.realtime.cpu >= 0 ? options.realtime.cpu : ::sched_getcpu();
+}
+
 }  // namespace
 
 Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink,
@@ -37,6 +43,7 @@ Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink
       options_(options),
       stage_(options.step, options.measure_latency, calibration != nullptr, options.tap),
       images_(kImageSlots),
+      way_processor_(processor_of_the_way(options)),
       finished_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
   if (finished_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
   for (ImageSlot slot = 0; slot < kImageSlots; ++slot) free_slots_.push_back(slot);
@@ -144,6 +151,14 @@ void Pipeline::take_place(ThreadDuty duty) const {
   const int priority = priority_of(duty, options_.realtime.priority);
   if (priority > 0 || options_.realtime.lock_memory)
     static_cast<void>(apply_realtime({priority, -1, false}));
+  static_cast<void>(share_processor());
+}
+
+// Where nobody looks at images, what a record passes takes microseconds on each thread, and to wake another processor takes
+// longer: one for all of them. At normal priority that is the kernel's to decide, who knows what else there is to do.
+bool Pipeline::share_processor() const {
+  if (way_processor_ < 0 || ::sched_getscheduler(0) != SCHED_FIFO) return false;
+  return apply_realtime({0, way_processor_, false}).warnings.empty();
 }
 
 void Pipeline::capture() {
@@ -184,6 +199,8 @@ void Pipeline::run_realtime() {
   // Start-up: the last that may allocate or log on this thread.
   log_granted("real-time thread",
               apply_realtime({options_.realtime.priority, options_.realtime.cpu, false}));
+  if (share_processor())
+    spdlog::info("all threads on a record's way share processor {}", way_processor_);
   faults_at_start_ = thread_page_faults();
   realtime_thread_.store(this_thread(), std::memory_order_release);
   do {

@@ -11,6 +11,7 @@
 //
 // Where the real-time thread has a priority, all on a record's way have theirs below it, in this order: the link's own thread,
 // which stamps arrivals, telemetry and output; decoding. So a record waits for no other program, and none of them for the step.
+// In PT mode they then share one processor: the real-time thread's, or any.
 // Memory is locked before they start, and each touches its stack before its first item.
 // A source that loses its connection is waited for; records of mode `none` are made at the loss and
 // then each second until it is back. The pipeline is finished when the video has ended, a source
@@ -105,6 +106,7 @@ class Pipeline {
   void read_telemetry();
   void run_realtime();
   void take_place(ThreadDuty duty) const;
+  [[nodiscard]] bool share_processor() const;
   void calibrate();
   void feed_calibration();
   void write_output();
@@ -130,6 +132,7 @@ class Pipeline {
   LinkWatch pan_tilt_watch_;
   std::vector<Frame> images_;  // capture thread: by slot, those that somebody still looks at
   std::vector<ImageSlot> free_slots_;  // capture thread
+  int way_processor_;                  // of the threads on a record's way; -1: each has its own
   int finished_;                       // eventfd
   std::mutex error_mutex_;             // the first of several threads to fail is heard; not on the
   std::string error_;                  // real-time thread

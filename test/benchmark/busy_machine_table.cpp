@@ -1,7 +1,8 @@
 // Latency from a picture's arrival to its record written while as many other programs compute as there are processors: all that a
 // frame passes in `alidade run`, as end_to_end_table has it, with realtime.priority and without, in turns, and the processor time
 // that each takes. 1280x720 at 30 frames/s over the loopback, as RTP (from the last packet) and as MJPEG over HTTP (from the first byte).
-// Besides: records by telemetry alone, whose pictures nobody decodes, from the frame's arrival, without the other programs and beside them.
+// Besides: records by telemetry alone, whose pictures nobody decodes, from the frame's arrival, without the other programs and beside them;
+// and what of that is the kernel's: two wake-ups of threads that sleep, by the same semaphores, on one processor and on any.
 //
 // Judged where priority is granted (a judgement that fails is said, and the exit code is 1):
 //   with priority      p99 <= 2 p50 + 2 ms, and no more processor time than without by kMoreCpu
@@ -15,6 +16,7 @@
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <array>
 #include <cstdio>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -24,6 +26,7 @@
 #include <vector>
 
 #include "edge_app/pipeline/pipeline.h"
+#include "edge_app/pipeline/semaphore.h"
 #include "platform/system/clock.h"
 #include "platform/video/mjpeg_source.h"
 #include "platform/video/rtp_source.h"
@@ -150,7 +153,7 @@ void take_turn(Link link, bool priority, const TurningCamera& camera, const Jpeg
 void measure_telemetry_only(const TurningCamera& camera, const std::string& row,
                             LatencyReport* report) {
   const double start_s = monotonic_now_s();
-  PacedVideo video(camera, start_s, kTelemetryOnlySpeed);
+  PacedVideo video(camera, start_s, kTelemetryOnlySpeed, false);
   PacedPanTilt pan_tilt(camera, start_s, kTelemetryOnlySpeed);
   PipelineOptions options;
   options.step = step_options(camera, true);
@@ -178,6 +181,44 @@ void measure_telemetry_only(const TurningCamera& camera, const std::string& row,
         std::pair{"computing", &summary.computing}, std::pair{"writing", &summary.writing}}) {
     context[part] = parts_of(*histogram);
   }
+}
+
+// From a thread that wakes a second one, which wakes a third, to that: at the frames' pace, with the priorities of a record's way.
+void measure_wake_ups(int processor, const std::string& row, LatencyReport* report) {
+  std::array<Semaphore, 2> woken;
+  double sent_s = 0;
+  std::vector<double> took_s;
+  const auto is_over = [&] { return took_s.size() == kTelemetryOnly; };
+  const auto begin = [processor](ThreadDuty duty) {
+    static_cast<void>(apply_realtime({priority_of(duty, kPriority), processor, false}));
+  };
+  Semaphore next;
+  std::thread last([&] {
+    begin(ThreadDuty::kBrief);
+    while (!is_over()) {
+      woken[1].wait();
+      took_s.push_back(monotonic_now_s() - sent_s);
+      next.post();
+    }
+  });
+  std::thread middle([&] {
+    begin(ThreadDuty::kStep);
+    for (std::size_t i = 0; i < kTelemetryOnly; ++i) {
+      woken[0].wait();
+      woken[1].post();
+    }
+  });
+  std::thread first([&] {
+    begin(ThreadDuty::kDecoding);
+    for (std::size_t i = 0; i < kTelemetryOnly; ++i) {
+      sleep_until(monotonic_now_s() + 1 / (30 * kTelemetryOnlySpeed));
+      sent_s = monotonic_now_s();
+      woken[0].post();
+      next.wait();
+    }
+  });
+  for (std::thread* thread : {&first, &middle, &last}) thread->join();
+  report->add(row, took_s, {});
 }
 
 class Judge {
@@ -241,6 +282,8 @@ int main(int argc, char** argv) {
   const Jpegs jpegs = encoded(camera);
   LatencyReport report("busy_machine");
   Judge judge;
+  measure_wake_ups(0, "two wake-ups, one processor", &report);
+  measure_wake_ups(-1, "two wake-ups, any processor", &report);
   measure_telemetry_only(camera, "telemetry only", &report);
   others.begin();
   measure_telemetry_only(camera, "telemetry only, others compute", &report);

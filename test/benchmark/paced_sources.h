@@ -19,10 +19,11 @@ inline constexpr double kPacedSigma = 1e-5;  // rad
 void sleep_until(double due_s);
 
 // speed: times that of the camera, which has 30 frames/s. Frames are stamped when read() returns, as if their last packet came then.
+// decodes: false: without luma, as where nobody looks at it.
 class PacedVideo final : public FrameSource {
  public:
-  PacedVideo(const TurningCamera& camera, double start_s, double speed)
-      : camera_(camera), start_s_(start_s), speed_(speed) {}
+  PacedVideo(const TurningCamera& camera, double start_s, double speed, bool decodes)
+      : camera_(camera), start_s_(start_s), speed_(speed), decodes_(decodes) {}
   ReadStatus read(Frame& frame, double) override {
     if (stopped_) return ReadStatus::kStopped;
     sleep_until(start_s_ + camera_.time_s(next_) / speed_);
@@ -32,7 +33,7 @@ class PacedVideo final : public FrameSource {
     frame.stamp.sequence = next_++;
     frame.width = view.width;
     frame.height = view.height;
-    frame.luma = view.luma;
+    if (decodes_) frame.luma = view.luma;
     frame.stride = view.stride;
     frame.stamp.receive_time_s = monotonic_now_s();
     return ReadStatus::kOk;
@@ -45,6 +46,7 @@ class PacedVideo final : public FrameSource {
   const TurningCamera& camera_;
   double start_s_;
   double speed_;
+  bool decodes_;
   int next_ = 0;
   std::atomic<bool> stopped_{false};
 };

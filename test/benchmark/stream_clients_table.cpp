@@ -177,7 +177,7 @@ bool run(LatencyReport* report) {
   options.realtime = {kPriority, -1, true};
 
   const double start_s = monotonic_now_s() + 1;
-  PacedVideo video(camera, start_s, kSpeed);
+  PacedVideo video(camera, start_s, kSpeed, true);
   PacedPanTilt pan_tilt(camera, start_s, kSpeed);
   LiveState live;
   Recorder recorder;

@@ -310,12 +310,24 @@ int own_priority() {
   return policy == SCHED_FIFO ? parameters.sched_priority : 0;
 }
 
+// Those that the calling thread may run on.
+std::vector<int> own_processors() {
+  cpu_set_t set;
+  std::vector<int> processors;
+  if (sched_getaffinity(0, sizeof set, &set) != 0) return processors;
+  for (int cpu = 0; cpu < CPU_SETSIZE; ++cpu) {
+    if (CPU_ISSET(static_cast<unsigned>(cpu), &set)) processors.push_back(cpu);
+  }
+  return processors;
+}
+
 // Keeps who called.
 template <typename Interface, typename Item>
 class WatchedSource final : public Interface {
  public:
   ReadStatus read(Item& item, double timeout_s) override {
     priorities_.push_back(own_priority());
+    processors_ = own_processors();
     return source_.read(item, timeout_s);
   }
   void stop() override { source_.stop(); }
@@ -324,17 +336,20 @@ class WatchedSource final : public Interface {
 
   ScriptedSource<Interface, Item> source_{"watched"};
   std::vector<int> priorities_;  // of each read
+  std::vector<int> processors_;  // of the last read
 };
 
 class WatchedSink final : public RecordSink {
  public:
   [[nodiscard]] bool write(const OrientationRecord&) override {
+    processors_ = own_processors();
     priority_ = own_priority();
     return true;
   }
   void interrupt() override {}
   [[nodiscard]] std::string error() const override { return ""; }
 
+  std::vector<int> processors_;
   std::atomic<int> priority_{-1};  // of the last write; -1: none yet
 };
 
@@ -360,6 +375,45 @@ TEST_F(PipelineTest, GivesAllOnARecordsWayTheirPlaceBelowTheRealtimeThread) {
   EXPECT_EQ(video.priorities_.back(), priority_of(ThreadDuty::kDecoding, kPriority));
   EXPECT_EQ(pan_tilt.priorities_.back(), priority_of(ThreadDuty::kBrief, kPriority));
   EXPECT_EQ(sink.priority_, priority_of(ThreadDuty::kBrief, kPriority));
+}
+
+// To wake a processor takes longer than all that they do; where images are looked at, decoding has one of its own.
+TEST_F(PipelineTest, PutsThemOnOneProcessorInPtModeOnly) {
+  constexpr int kPriority = 30;
+  bool permitted = false;
+  std::thread([&] { permitted = apply_realtime({kPriority, -1, false}).warnings.empty(); }).join();
+  const std::vector<int> all = own_processors();
+  for (const int priority : {0, kPriority}) {
+    for (const bool oe : {false, true}) {
+      for (const int chosen : {-1, all.back()}) {
+        WatchedSource<FrameSource, Frame> video;
+        WatchedSource<PanTiltSource, PanTiltSample> pan_tilt;
+        WatchedSink sink;
+        PipelineOptions options = options_for_tests();
+        options.realtime.priority = priority;
+        options.realtime.cpu = chosen;
+        options.step.calibration.camera.width = 64;
+        options.step.calibration.camera.height = 48;
+        if (oe) options.step.oe.emplace();
+        Pipeline pipeline(video, pan_tilt, sink, nullptr, options);
+        pipeline.start();
+        video.source_.push(frame());
+        EXPECT_TRUE(eventually([&] { return sink.priority_ >= 0; }));
+        pipeline.stop();
+        SCOPED_TRACE(testing::Message() << priority << ' ' << oe << ' ' << chosen);
+        if (oe || priority == 0 || !permitted) {
+          EXPECT_EQ(sink.processors_, all);
+        } else {
+          ASSERT_EQ(sink.processors_.size(), 1U);
+          if (chosen >= 0) {
+            EXPECT_EQ(sink.processors_[0], chosen);
+          }
+        }
+        EXPECT_EQ(video.processors_, sink.processors_);
+        EXPECT_EQ(pan_tilt.processors_, sink.processors_);
+      }
+    }
+  }
 }
 
 TEST_F(PipelineTest, StopEndsSourcesThatGiveNothing) {
