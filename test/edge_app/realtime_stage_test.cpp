@@ -458,13 +458,9 @@ TEST(RealtimeStage, AllocatesNothingWhileCalibrationsComeAndGo) {
   const Scene scene;
   ImageTap tap(std::chrono::milliseconds(0));
   std::thread tap_thread(&ImageTap::run, &tap);
-  OrientationStepOptions options = options_with_images();
-  // A head at rest repeats its angle, which else is believed after a tenth of a second: later than this test is over on a
-  // fast machine.
-  options.telemetry_limits.max_repeat_s = 0;
-  const auto stage = std::make_unique<RealtimeStage>(options, true, true, &tap);
+  const auto stage = std::make_unique<RealtimeStage>(options_with_images(), true, true, &tap);
   PublishedCalibration calibrated;
-  calibrated.calibration = options.calibration;
+  calibrated.calibration = options_with_images().calibration;
   calibrated.calibrated = true;
   calibrated.map.landmarks.resize(500);
   PublishedCalibration withdrawn;
