@@ -33,9 +33,8 @@ struct ZoomFitOptions {
 
 struct ZoomFit {
   ZoomCurve curve;
-  double chi_square = 0;           // of the shared parameters' differences
-  int degrees_of_freedom = 0;      // of it
-  std::vector<std::string> notes;  // what is unusual, a line each
+  double chi_square = 0;       // of the shared parameters' differences
+  int degrees_of_freedom = 0;  // of it
 };
 
 // calibrations: at two or more readings, each with its zoom. False and one line in *error: what is wrong, and with which.

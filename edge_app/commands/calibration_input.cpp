@@ -139,6 +139,11 @@ std::vector<CalibrationJob> load_calibration_jobs(const std::string& directory,
               "10 s and more while the camera pans and tilts{}",
               directory, kLeastStretch_s,
               zoom_tolerance > 0 ? "" : ", or give --zoom-tolerance to a reading that flickers"));
+  if (stretches.size() == 1) {
+    job.remarks.push_back(fmt::format("the zoom moves: only the {:.0f} s at reading {:g} are used",
+                                      stretches.front().end_s - stretches.front().begin_s,
+                                      stretches.front().zoom));
+  }
   std::vector<CalibrationJob> jobs;
   for (const ZoomStretch& stretch : stretches) {
     jobs.push_back(job);
