@@ -12,8 +12,6 @@
 namespace alidade::simulator {
 namespace {
 
-constexpr double kTwoPi = 6.28318530717958647692;
-
 // From 0 to 1 with no velocity and no acceleration at either end.
 double smooth_step(double x) {
   x = std::clamp(x, 0.0, 1.0);

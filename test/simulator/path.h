@@ -19,6 +19,8 @@
 
 namespace alidade::simulator {
 
+inline constexpr double kTwoPi = 6.28318530717958647692;
+
 struct Angles {
   double pan = 0;   // rad, positive to the right
   double tilt = 0;  // rad, positive up

@@ -5,12 +5,12 @@
 #include <cmath>
 #include <random>
 
+#include "test/simulator/path.h"
 #include "test/simulator/random.h"
 
 namespace alidade::simulator {
 namespace {
 
-constexpr double kTwoPi = 6.28318530717958647692;
 constexpr int kMostExposures = 64;
 constexpr int kWaves = 24;
 // Boil is evaluated at every so many columns, and is linear in between.

@@ -6,10 +6,7 @@
 
 namespace alidade::simulator {
 
-double wrapped(double angle) {
-  constexpr double kTwoPi = 6.28318530717958647692;
-  return angle - kTwoPi * std::floor(angle / kTwoPi + 0.5);
-}
+double wrapped(double angle) { return angle - kTwoPi * std::floor(angle / kTwoPi + 0.5); }
 
 Telemetry::Telemetry(const Config& config, const Path& path)
     : config_(config.telemetry),

@@ -66,8 +66,8 @@ TEST_P(PtModeErrors, AreWhatTheCovarianceSays) {
   calibration.mechanics.pan_scale = c.pan_scale;
   calibration.mechanics.tilt_scale = c.tilt_scale;
   if (c.uncertain_calibration) {
-    calibration.covariance.diagonal() << 25 * 25, 1e-10, 0.2 * 0.2, 1e-14, 4e-10, 4e-10, 4e-10,
-        4e-10, 1e-8, 1e-8, 1e-6;
+    calibration.covariance.diagonal() << 25 * 25, 1e-10, 0.2 * 0.2, 1, 4, 1e-14, 4e-10, 4e-10,
+        4e-10, 4e-10, 1e-8, 1e-8, 1e-6;
   }
   TelemetryNoise noise;
   noise.pan_tilt_sigma = c.angle_sigma;
