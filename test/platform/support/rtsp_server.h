@@ -18,6 +18,9 @@ extern const RtspStream kMjpegStream;
 extern const RtspStream kH264Stream;
 extern const RtspStream kH265Stream;
 
+// When PLAY comes, the server winds back what it has begun: the first of these and the next can come with one timestamp.
+constexpr int kPicturesBeforePlay = 1;
+
 class RtspServer {
  public:
   // certificate: PEM file with it and its key, for RTSP over TLS.
