@@ -119,8 +119,11 @@ MotionMatch match_motion(const std::vector<ImageMotion>& motion, const Trajector
   };
   const int steps = std::max(10, static_cast<int>(half_range_s / 0.02));
   const bool at_edge = std::abs(search(centre_s, half_range_s, steps)) == steps;
-  for (double range = half_range_s / steps; range > 1e-4; range /= 5)
-    search(best.shift_s, range, 5);
+  double range_s = half_range_s / steps;
+  while (range_s > 1e-4) {
+    search(best.shift_s, range_s, 5);
+    range_s /= 5;
+  }
   best.at_edge = at_edge;
   best.apart = apart;
   return best;

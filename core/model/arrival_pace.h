@@ -9,9 +9,9 @@
 // receive - sender of the one is that of the other, and neither is a single item's. Minima, as delays are only ever too
 // long; that they agree to tolerance is asked for at both sides, as one that rises is a new stall.
 //   tolerance  kSame_s, or 3 standard deviations of the least of a half's n delays, were they exponential: their mean
-//              above the least, divided by n. A steady fall by D between the halves has a mean of D / 2 above the
-//              least, so 3 D / (2 n), and is no pace for any D beyond kSame_s: at the shortest window a backlog that
-//              is worked off 0.8 % faster than it grows.
+//              above the least, divided by n; what waited by more than kBacklog_s is no delay. A steady fall by D between
+//              the halves has a mean of D / 2 above the least, so 3 D / (2 n), and is no pace for any D beyond kSame_s: at
+//              the shortest window a backlog that is worked off 0.8 % faster than it grows.
 //   windows    kLeastHalf_s and its doubles, so that slow streams and delays with a rhythm (key frames) have theirs.
 //              Where a backlog was seen, from the double on: what remains of it may come more slowly. Unless something else
 //              tells that it is over, too.
@@ -71,12 +71,12 @@ class ArrivalPace {
       const Half young = half(size_, now_s - half_s);
       const Half old = half(young.first, now_s - 2 * half_s);
       if (!young.stands() || !old.stands()) continue;
-      const double tolerance_s = std::max(kSame_s, 3 * std::max(young.spread_s(), old.spread_s()));
+      const double tolerance_s = std::max(kSame_s, 3 * std::max(young.spread_s, old.spread_s));
       const double least_s = std::min(young.least_s, old.least_s);
       if (std::abs(young.least_s - old.least_s) > tolerance_s) continue;
       if (i == 0 && !no_backlog && saw_backlog(least_s)) continue;
       std::size_t first = old.first;
-      while (item(first).receive_s - item(first).sender_s > least_s + kBacklog_s) ++first;
+      while (level(first) > least_s + kBacklog_s) ++first;
       return Shown{first, least_s};
     }
     return std::nullopt;
@@ -109,20 +109,16 @@ class ArrivalPace {
     std::size_t items = 0;
     double least_s = std::numeric_limits<double>::infinity();
     double second_s = std::numeric_limits<double>::infinity();  // the least but one
-    double sum_s = 0;
-
-    // Standard deviation of the least, were the delays exponential.
-    [[nodiscard]] double spread_s() const {
-      const auto n = static_cast<double>(items);
-      return (sum_s / n - least_s) / n;
-    }
+    double spread_s = 0;  // standard deviation of the least, were the delays exponential
     // Not a moment on the way down.
     [[nodiscard]] bool stands() const {
-      return items >= kLeastItems && second_s - least_s <= std::max(kNear_s, spread_s());
+      return items >= kLeastItems && second_s - least_s <= std::max(kNear_s, spread_s);
     }
   };
 
   [[nodiscard]] const Item& item(std::size_t i) const { return items_[(begin_ + i) % kItems]; }
+
+  [[nodiscard]] double level(std::size_t i) const { return item(i).receive_s - item(i).sender_s; }
 
   // The items before `end` that were received at since_s or later.
   [[nodiscard]] Half half(std::size_t end, double since_s) const {
@@ -131,11 +127,19 @@ class ArrivalPace {
     while (half.first > 0 && item(half.first - 1).receive_s >= since_s) {
       --half.first;
       ++half.items;
-      const double level_s = item(half.first).receive_s - item(half.first).sender_s;
-      half.sum_s += level_s;
+      const double level_s = level(half.first);
       half.second_s = std::min(half.second_s, std::max(half.least_s, level_s));
       half.least_s = std::min(half.least_s, level_s);
     }
+    double sum_s = 0;
+    double n = 0;
+    for (std::size_t i = half.first; i < end; ++i) {
+      const double above_s = level(i) - half.least_s;
+      if (above_s > kBacklog_s) continue;  // no delay, and one such would pass for a wide spread
+      sum_s += above_s;
+      ++n;
+    }
+    if (n > 0) half.spread_s = sum_s / (n * n);
     return half;
   }
 

@@ -110,7 +110,7 @@ std::vector<CalibrationJob> load_calibration_jobs(const std::string& directory,
   job.input.height = info.height;
   RecordingNoise noise;
   require(load_noise(directory, &noise, &error), error);
-  job.input.noise = noise;
+  job.input.noise = static_cast<const CalibrationNoise&>(noise);
   if (noise.pan_tilt_scale_sigma) {
     job.options.pan_scale.sigma = *noise.pan_tilt_scale_sigma;
     job.options.tilt_scale.sigma = *noise.pan_tilt_scale_sigma;

@@ -84,8 +84,9 @@ Counts count_items(const std::vector<Item>& items, Sequence sequence, SenderTime
   if (all([&](const Item& item) { return sequence(item).has_value(); })) {
     for (const Item& item : items) counts.push_back(sequence(item));
   } else if (all([&](const Item& item) { return sender_time(item).has_value(); })) {
-    std::vector<double> times;
-    for (const Item& item : items) times.push_back(*sender_time(item));
+    std::vector<double> times(items.size());
+    std::transform(items.begin(), items.end(), times.begin(),
+                   [&](const Item& item) { return *sender_time(item); });
     for (const std::int64_t count : count_on_grid(times)) counts.emplace_back(count);
   }
   counts.resize(items.size());

@@ -235,6 +235,9 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
           effect[i] * effect[j] * acceleration_square;
     }
   }
+  // E[(a tau^2 / 2)^2] of a normal tau: what a time error makes where the mount turns round, and the rate says nothing.
+  covariance.diagonal().head<2>() +=
+      0.75 * shared_time_variance * shared_time_variance * acceleration_square;
   for (int axis = 0; axis < 2; ++axis) {
     // All samples of an axis that moves less than a step are rounded alike: averaging them does
     // not help.

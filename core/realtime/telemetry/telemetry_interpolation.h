@@ -12,7 +12,7 @@
 // A stamp's error has a part that neighbouring samples share (a clock's offset) and a part of its
 // own; the difference of two own parts has the standard deviation period_sigma_s (PTCEE 20, 21, made
 // symmetric in the two samples). A rate w turns a time error tau into an angle error w tau of both
-// axes. Angles in rad as measured, times in s on the telemetry clock. No allocation.
+// axes, an acceleration a into a tau^2 / 2. Angles in rad as measured, times in s on the telemetry clock. No allocation.
 
 #include <cstdint>
 #include <limits>

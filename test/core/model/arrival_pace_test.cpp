@@ -112,6 +112,20 @@ TEST(ArrivalPace, IsNotShownByABacklogThatComesInPieces) {
   }
 }
 
+// The oldest of a ring that overflowed, then its latest, worked off a little faster than it grows: the gap between them is
+// no delay.
+TEST(ArrivalPace, IsNotShownByABacklogWithAHoleInIt) {
+  constexpr double kApart_s = kPeriod_s / 1.13;
+  for (const int oldest : {1, 4, 12}) {
+    ArrivalPace pace;
+    pace.restart();
+    for (int i = 0; i < 100; ++i) {
+      pace.add(6 + kApart_s * i, kOrigin_s + kPeriod_s * i + (i < oldest ? 0 : 3));
+      EXPECT_FALSE(pace.shown()) << i << " behind " << oldest;
+    }
+  }
+}
+
 // Two pieces of a backlog pass the same age by chance.
 TEST(ArrivalPace, IsNotShownByAMomentOnTheWayDown) {
   constexpr double kApart_s = 1e-3;

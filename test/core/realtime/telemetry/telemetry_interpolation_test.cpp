@@ -115,6 +115,34 @@ TEST(TelemetryInterpolation, LineMissesTheExpectedAccelerationByItsCovariance) {
 }
 
 // Whichever neighbours the answer rests on, at uneven steps: they show the acceleration that is there.
+// Where the mount turns round its rate is 0, and an error tau of the time asked for makes a tau^2 / 2: the variance is the
+// mean square of that over a normal tau, by the sum over a fine grid.
+TEST(TelemetryInterpolation, CountsWhatATimeErrorMakesWhereTheMountTurnsRound) {
+  constexpr double kTimeSigma_s = 0.012;
+  constexpr double kTurning_s = 1;
+  const auto truth = [](double t) { return 0.1 * std::cos(2.5 * (t - kTurning_s)); };
+  TelemetryNoise noise;
+  noise.pan_tilt_sigma = 1e-5;
+  noise.period_sigma_s = 1e-9;
+  TelemetryBuffer<64> buffer(noise);
+  for (int i = 0; i < 60; ++i) {
+    const double t = i / 30.0;
+    ASSERT_EQ(buffer.push({t, 1e-9, truth(t), -truth(t)}), PushStatus::kStored);
+  }
+  InterpolatedPanTilt result;
+  ASSERT_TRUE(has_result(buffer.query(kTurning_s, kTimeSigma_s, &result)));
+  double mean_square = 0;
+  double weights = 0;
+  for (double z = -8; z <= 8; z += 0.01) {
+    const double error = truth(kTurning_s + z * kTimeSigma_s) - truth(kTurning_s);
+    mean_square += std::exp(-z * z / 2) * error * error;
+    weights += std::exp(-z * z / 2);
+  }
+  mean_square /= weights;
+  EXPECT_NEAR(result.covariance(0, 0) / mean_square, 1, 0.02);
+  EXPECT_NEAR(result.covariance(1, 1) / mean_square, 1, 0.02);
+}
+
 TEST(TelemetryInterpolation, FindsTheAccelerationThatItsSamplesShow) {
   constexpr double kAcceleration = 2;  // rad/s^2
   TelemetryNoise noise;
