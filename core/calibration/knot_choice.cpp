@@ -10,6 +10,8 @@ namespace alidade::internal {
 
 namespace {
 
+constexpr double kUnknowns = 2;  // that a new knot adds: pan and tilt
+
 // All that one frame, or one telemetry sample, says about a change x of the angles at its time:
 // cost(x) = cost(0) - 2 b^T x + x^T N x.
 struct Pointing {
@@ -91,6 +93,22 @@ std::vector<double> gains(const std::vector<Pointing>& pointings, const Trajecto
   return result;
 }
 
+// Of each segment: whether it and its neighbours together gain twice what noise alone gives.
+std::vector<bool> halving_pays(const std::vector<double>& gain) {
+  constexpr std::size_t kNeighbours = 16;
+  constexpr double kSigmas = 4;
+  const std::size_t count = std::min(kNeighbours, gain.size());
+  const double expected = kUnknowns * static_cast<double>(count);
+  const double limit = std::max(2 * expected, expected + kSigmas * std::sqrt(2 * expected));
+  std::vector<bool> pays(gain.size());
+  for (std::size_t s = 0; s < gain.size(); ++s) {
+    const std::size_t from = std::min(s - std::min(s, count / 2), gain.size() - count);
+    const auto first = gain.begin() + static_cast<std::ptrdiff_t>(from);
+    pays[s] = std::accumulate(first, first + static_cast<std::ptrdiff_t>(count), 0.0) > limit;
+  }
+  return pays;
+}
+
 }  // namespace
 
 KnotChoice choose_knots(const AdjustmentData& data, const TrajectorySpline& trajectory,
@@ -110,13 +128,13 @@ KnotChoice choose_knots(const AdjustmentData& data, const TrajectorySpline& traj
   }
 
   KnotChoice choice;
-  choice.expected = 2 * static_cast<double>(segments);
+  choice.expected = kUnknowns * static_cast<double>(segments);
   for (const double g : gain) choice.gain += g;
-  const bool all_beyond_chance = choice.gain > choice.expected + 3 * std::sqrt(2 * choice.expected);
+  const std::vector<bool> pays = halving_pays(gain);
   const double one_beyond_chance = 2 * std::log(100.0 * static_cast<double>(segments));
   for (std::size_t s = 0; s < segments; ++s) {
     const bool supported = population[2 * s] >= 2 && population[2 * s + 1] >= 2;
-    if (supported && gain[s] > (all_beyond_chance ? 2.0 : one_beyond_chance)) {
+    if (supported && gain[s] > (pays[s] ? kUnknowns : one_beyond_chance)) {
       choice.split.push_back(static_cast<int>(s));
     }
   }

@@ -5,8 +5,10 @@
 // gives chi-square with two degrees of freedom a segment: more says that the motion is not followed.
 // This sharpens (Oth, section 4.2), whose test of a segment's whole cost against its expectation drowns
 // a bias of every residual of a frame in the noise of all of them.
-//   split a segment if its own gain is beyond chance among all segments (1 %), or, when the sum over all is
-//   (beyond 3 standard deviations), if its gain exceeds its expectation. Otherwise stop: no over-fitting.
+//   split a segment if its own gain is beyond chance among all segments (1 %), or, where it and its neighbours (16 segments)
+//   gain twice what noise gives, if its gain exceeds its expectation. A knot then takes off more than its two unknowns
+//   cost. That all of a long recording together gain a little more than by chance is no reason: it always comes true, as
+//   every motion bends more than its spline.
 
 #include <vector>
 

@@ -69,20 +69,51 @@ TEST(KnotChoice, GainIsTheFallOfTheSquaresByHalvingEverySegment) {
   EXPECT_EQ(choice.expected, 2 * 6);
 }
 
-// Between the expectation and three standard deviations more it is chance.
-TEST(KnotChoice, SplitsWhereTheGainOfAllIsBeyondChance) {
-  constexpr int kSegments = 50;
-  Residuals residuals;  // alike in each segment, so that none stands out
-  for (int i = 0; i < 10 * kSegments; ++i) {
-    residuals.add((i + 0.5) / 10, Vector2<double>::Constant(std::cos(2 * kPi * (i + 0.5) / 10)));
+// Alike in each segment from `from` to `to`, so that none stands out, and nothing elsewhere.
+Residuals bends(int segments, int from, int to) {
+  Residuals residuals;
+  for (int i = 0; i < 10 * segments; ++i) {
+    const double t = (i + 0.5) / 10;
+    const bool bent = t > from && t < to;
+    residuals.add(t, Vector2<double>::Constant(bent ? std::cos(2 * kPi * t) : 0));
   }
+  return residuals;
+}
+
+double mean_gain(const Residuals& residuals, const TrajectorySpline& spline, int of) {
+  return choose_knots(residuals.data, spline, residuals.at).gain / of;
+}
+
+// Twice the 2 of noise are what 16 neighbours must gain, however many there are in all; fewer must gain 4 standard
+// deviations more than noise.
+TEST(KnotChoice, SplitsWhereASegmentAndItsNeighboursGainTwiceWhatNoiseGives) {
+  for (const int segments : {4, 16, 50, 800}) {
+    SCOPED_TRACE(segments);
+    Residuals residuals = bends(segments, 0, segments);
+    const TrajectorySpline spline = of_segments(segments);
+    const double limit = segments < 16 ? 2 + 4 * 2 / std::sqrt(segments) : 4;
+    // Segments at the ends gain a little more or less than those between them.
+    residuals.scale(std::sqrt(0.85 * limit / mean_gain(residuals, spline, segments)));
+    EXPECT_TRUE(choose_knots(residuals.data, spline, residuals.at).split.empty());
+    residuals.scale(std::sqrt(1.15 / 0.85));
+    EXPECT_GE(choose_knots(residuals.data, spline, residuals.at).split.size(), segments - 2);
+  }
+}
+
+TEST(KnotChoice, SplitsAPartThatBendsAsIfItWereAlone) {
+  constexpr int kSegments = 800;
+  constexpr int kFrom = 300;
+  constexpr int kTo = 330;
+  Residuals residuals = bends(kSegments, kFrom, kTo);
   const TrajectorySpline spline = of_segments(kSegments);
-  const double limit = 2 * kSegments + 3 * std::sqrt(4.0 * kSegments);
-  const double gain = choose_knots(residuals.data, spline, residuals.at).gain;
-  residuals.scale(std::sqrt(0.99 * limit / gain));
-  EXPECT_TRUE(choose_knots(residuals.data, spline, residuals.at).split.empty());
-  residuals.scale(std::sqrt(1.01 / 0.99));
-  EXPECT_FALSE(choose_knots(residuals.data, spline, residuals.at).split.empty());
+  residuals.scale(std::sqrt(6 / mean_gain(residuals, spline, kTo - kFrom)));
+  const std::vector<int> split = choose_knots(residuals.data, spline, residuals.at).split;
+  // With 6 a segment 11 of the 16 must bend: three at either end have fewer.
+  EXPECT_NEAR(static_cast<double>(split.size()), kTo - kFrom - 6, 2);
+  for (const int s : split) {
+    EXPECT_GE(s, kFrom - 1);
+    EXPECT_LE(s, kTo);
+  }
 }
 
 TEST(KnotChoice, SplitsOnlyWhereBothHalvesHaveData) {
