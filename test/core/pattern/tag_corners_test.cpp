@@ -73,8 +73,8 @@ TagImage seen(const TagCells& cells, double cell_px, double turn, double shear, 
   return result;
 }
 
-// Of each coordinate, over tags that are turned and foreshortened, started half a pixel off.
-double rms_error(double cell_px, double blur_px, double noise) {
+// Of each coordinate, over tags that are turned (by multiples of turn) and foreshortened, started half a pixel off.
+double rms_error(double cell_px, double blur_px, double noise, double turn = 0.5) {
   double squares = 0;
   int count = 0;
   for (std::uint64_t seed = 1; seed <= 12; ++seed) {
@@ -82,7 +82,7 @@ double rms_error(double cell_px, double blur_px, double noise) {
     std::uniform_real_distribution<double> uniform(-0.5, 0.5);
     const TagCells cells = some_code(seed);
     const TagImage tag =
-        seen(cells, cell_px, 0.5 * static_cast<double>(seed), 0.8, blur_px, noise, seed);
+        seen(cells, cell_px, turn * static_cast<double>(seed), 0.8, blur_px, noise, seed);
     std::vector<cv::Point2f> corners = tag.corners;
     for (cv::Point2f& c : corners)
       c += cv::Point2f(static_cast<float>(uniform(random)), static_cast<float>(uniform(random)));
@@ -101,6 +101,7 @@ TEST(TagCorners, AreFoundToHundredthsOfAPixel) {
   EXPECT_LT(rms_error(3, 0, 0), 0.02);
   EXPECT_LT(rms_error(2.5, 0, 2), 0.03);
   EXPECT_LT(rms_error(4, 3, 2), 0.04);  // moved by three pixels while it was exposed
+  EXPECT_LT(rms_error(4, 5, 0, M_PI / 2), 0.034);  // along one axis of the tag or the other
 }
 
 TEST(TagCorners, AreNotFoundWhereSomethingElseIs) {
