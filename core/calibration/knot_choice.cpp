@@ -93,13 +93,13 @@ std::vector<double> gains(const std::vector<Pointing>& pointings, const Trajecto
   return result;
 }
 
-// Of each segment: whether it and its neighbours together gain twice what noise alone gives.
+// Of each segment: whether it and its neighbours together gain so much more than noise gives: where there are 16, twice that.
 std::vector<bool> halving_pays(const std::vector<double>& gain) {
   constexpr std::size_t kNeighbours = 16;
   constexpr double kSigmas = 4;
   const std::size_t count = std::min(kNeighbours, gain.size());
   const double expected = kUnknowns * static_cast<double>(count);
-  const double limit = std::max(2 * expected, expected + kSigmas * std::sqrt(2 * expected));
+  const double limit = expected + kSigmas * std::sqrt(2 * expected);
   std::vector<bool> pays(gain.size());
   for (std::size_t s = 0; s < gain.size(); ++s) {
     const std::size_t from = std::min(s - std::min(s, count / 2), gain.size() - count);

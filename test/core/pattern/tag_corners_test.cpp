@@ -100,7 +100,7 @@ TEST(TagCorners, AreFoundToHundredthsOfAPixel) {
   EXPECT_LT(rms_error(5, 0, 0), 0.015);
   EXPECT_LT(rms_error(3, 0, 0), 0.02);
   EXPECT_LT(rms_error(2.5, 0, 2), 0.03);
-  EXPECT_LT(rms_error(4, 3, 2), 0.04);  // moved by three pixels while it was exposed
+  EXPECT_LT(rms_error(4, 3, 2), 0.04);             // moved by three pixels while it was exposed
   EXPECT_LT(rms_error(4, 5, 0, M_PI / 2), 0.034);  // along one axis of the tag or the other
 }
 
