@@ -15,29 +15,15 @@ import subprocess
 import sys
 import unittest
 
-HERE = pathlib.Path(__file__).resolve().parent
+from machine import CALIBRATION, HERE, MACHINES, TOP, judge, make, run
+
 sys.path.insert(0, str(HERE.parent))
 from calibration_film import FILM, sigmas_apart  # noqa: E402
 
-TOP = HERE.parents[2]
-SKIPPED = 77
 WIDTH, HEIGHT = 320, 180
 PROGRAMS = ("edge_app/alidade", "test/system/virtual_machine/v4l2_camera_test",
             "test/system/virtual_machine/loopback_camera", "test/system/virtual_machine/camera_control",
             "test/system/virtual_machine/simulated_head")
-
-# No replay without one; the pictures matter here, not the angles.
-CALIBRATION = """format: 1
-image: {width: %d, height: %d}
-focal_length: {value: 1000}
-radial_distortion: {value: 0}
-line_delay: {value: 0}
-clock_offset: {value: 0}
-pan_axis: {value: [0, 0, 1]}
-tilt_axis: {value: [0, 1, 0]}
-pan_scale: {value: 1}
-tilt_scale: {value: 1}
-"""
 
 # A thousand lives of each format take minutes.
 SHORT = "*-*Thousand*:V4l2Throughput*:V4l2/*Uyvy:V4l2/*Nv12"
@@ -45,7 +31,6 @@ SECONDS = {"short": 3, "long": 20}
 DEADLINE_S = {"short": 500, "long": 3000}
 
 ARCHITECTURE, LENGTH, BUILD = sys.argv[1], sys.argv[2], pathlib.Path(sys.argv[3]).resolve()
-MACHINES = TOP / "build/virtual_machine"
 WORK = MACHINES / f"{ARCHITECTURE}-{LENGTH}"
 ALIDADE = BUILD / "edge_app/alidade"
 SIMULATE = BUILD / "test/simulator/alidade-simulate"
@@ -54,15 +39,6 @@ SIMULATE = BUILD / "test/simulator/alidade-simulate"
 FULL_FILM = {**FILM, "duration_s": 4, "image": {"width": 1920, "height": 1080, "rate_hz": 10},
              "camera": {"focal_length_px": 5400, "line_delay_us": 15}}
 MOST_RESIDENT_MB = 80
-
-
-def run(*command):
-    """Runs it; a skip of its own is one of this test."""
-    done = subprocess.run([str(c) for c in command], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    if done.returncode == SKIPPED:
-        print(done.stdout)
-        sys.exit(SKIPPED)
-    return done
 
 
 def config(video, **sections):
@@ -74,10 +50,7 @@ def config(video, **sections):
 
 def boot():
     """The machine's console, after it has run its script."""
-    machine = MACHINES / ARCHITECTURE
-    made = run(HERE / "make-machine", ARCHITECTURE, machine)
-    if made.returncode != 0:
-        sys.exit(f"make-machine failed:\n{made.stdout}")
+    machine = make(ARCHITECTURE)
     programs, system = (BUILD, "/")
     if ARCHITECTURE != "amd64":
         programs, system = cross_build()
@@ -237,11 +210,4 @@ class VirtualMachine(unittest.TestCase):
 
 
 if __name__ == "__main__":
-    CONSOLE = boot()
-    SUITE = unittest.defaultTestLoader.loadTestsFromTestCase(VirtualMachine)
-    RESULT = unittest.TextTestRunner(stream=sys.stdout, verbosity=2).run(SUITE)
-    if not RESULT.wasSuccessful():
-        print(f"--- console of the machine\n{CONSOLE}")
-    else:
-        print("\n".join(line for line in CONSOLE.splitlines() if line.startswith("machine:")))
-    sys.exit(0 if RESULT.wasSuccessful() else 1)
+    judge(VirtualMachine, boot())
