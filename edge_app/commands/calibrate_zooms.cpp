@@ -22,9 +22,6 @@
 namespace alidade {
 namespace {
 
-constexpr double kCentreShare =
-    0.01;  // of the image's width: how far an optical centre is off, usually
-
 // What holds at one zoom only can be no prior of several.
 void refuse_priors_of_one_zoom(const CalibrateOptions& options, std::size_t stretches) {
   const auto refuse = [stretches](const char* option, const std::string& text) {
@@ -134,7 +131,7 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     auto& [recording, job] = jobs[i];
     const std::string name = fmt::format("{} at zoom {:g}", recording, *job.zoom);
-    job.options.centre_sigma_px = kCentreShare * job.input.width;
+    job.options.centre_sigma_px = kUsualCentreShare * job.input.width;
     CalibrationResult result = calibrate_job(recording, options.passes, &job, signals);
     for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", name, remark);
     if (!result.frames.empty()) {
