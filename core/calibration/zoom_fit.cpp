@@ -97,6 +97,23 @@ bool make_sample(const Calibration& c, const Calibration& reference, const ZoomF
 
 }  // namespace
 
+ZoomFitOptions zoom_fit_options(const CalibrationOptions& made_with) {
+  ZoomFitOptions options;
+  const auto add = [&options](Parameter parameter, const std::optional<CalibrationPrior>& prior) {
+    if (prior && prior->sigma > 0) {
+      options.shared_priors.push_back({parameter, prior->value, prior->sigma});
+    }
+  };
+  add(Parameter::kAspect, made_with.aspect);
+  add(Parameter::kLineDelay, made_with.line_delay);
+  add(Parameter::kClockOffset, made_with.clock_offset);
+  add(Parameter::kPanScale, made_with.pan_scale);
+  add(Parameter::kTiltScale, made_with.tilt_scale);
+  options.axis_sigma_rad = made_with.axis_sigma_rad;
+  options.centre_sigma_px = made_with.centre_sigma_px;
+  return options;
+}
+
 bool fit_zoom(const std::vector<Calibration>& calibrations, const ZoomFitOptions& options,
               ZoomFit* fit, std::string* error) {
   if (calibrations.size() > ZoomCurve::kMaxNodes) {

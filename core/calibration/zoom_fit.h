@@ -15,6 +15,7 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration/calibration_types.h"
 #include "core/model/zoom_curve.h"
 
 namespace alidade {
@@ -24,7 +25,8 @@ inline constexpr double kUsualCentreShare = 0.01;
 
 struct ZoomFitOptions {
   double repeatability = 0.002;  // sigma of log f after a movement
-  // Priors that went into each of the calibrations: counted once. 0: none. Axes' about the nominal ones.
+  // Priors that went into each of the calibrations: counted once. 0: none. Axes' about the nominal ones. One that is sharper than a
+  // calibration knows the parameter did not go into that.
   double centre_sigma_px = 0;
   double axis_sigma_rad = 0.05;
   // Of shared parameters but the axes.
@@ -41,6 +43,9 @@ struct ZoomFitOptions {
   // So many standard deviations more than expected do calibrations of one camera differ in what they share.
   double two_cameras = 8;
 };
+
+// With the priors of calibrations that were made so.
+[[nodiscard]] ZoomFitOptions zoom_fit_options(const CalibrationOptions& made_with);
 
 struct ZoomFit {
   ZoomCurve curve;

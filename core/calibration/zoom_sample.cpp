@@ -115,7 +115,9 @@ bool set_zoom_information(const std::vector<int>& places, const ZoomFitOptions& 
   if (information.size() == 0) return false;
   const auto set_prior = [&](Parameter parameter, double mean, double sigma) {
     const int place = zoom_place_of(parameter);
-    if (sigma <= 0 || sample->covariance(place, place) <= 0) return;
+    constexpr double kRounding = 1e-6;
+    const double variance = sample->covariance(place, place);
+    if (sigma <= 0 || variance <= 0 || variance > (1 + kRounding) * sigma * sigma) return;
     sample->prior_information[place] = 1 / (sigma * sigma);
     sample->prior_weighted[place] = mean / (sigma * sigma);
   };

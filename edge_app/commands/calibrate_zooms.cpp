@@ -45,21 +45,6 @@ void require_readings(const std::vector<ZoomJob>& jobs) {
   }
 }
 
-void add_priors(const CalibrationOptions& options, ZoomFitOptions* fit) {
-  const auto add = [fit](Parameter parameter, const std::optional<CalibrationPrior>& prior) {
-    if (prior && prior->sigma > 0) {
-      fit->shared_priors.push_back({parameter, prior->value, prior->sigma});
-    }
-  };
-  add(Parameter::kAspect, options.aspect);
-  add(Parameter::kLineDelay, options.line_delay);
-  add(Parameter::kClockOffset, options.clock_offset);
-  add(Parameter::kPanScale, options.pan_scale);
-  add(Parameter::kTiltScale, options.tilt_scale);
-  fit->axis_sigma_rad = options.axis_sigma_rad;
-  fit->centre_sigma_px = options.centre_sigma_px;
-}
-
 double sigma_of(const Calibration& c, Parameter parameter) {
   return std::sqrt(c.covariance(index(parameter), index(parameter)));
 }
@@ -145,7 +130,7 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
     }
     result.calibration.zoom = job.zoom;
     calibrations.push_back(result.calibration);
-    if (calibrations.size() == 1) add_priors(job.options, &fit_options);
+    if (calibrations.size() == 1) fit_options = zoom_fit_options(job.options);
   }
   ZoomFit fit;
   std::string error;
