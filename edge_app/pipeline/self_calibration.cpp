@@ -315,17 +315,7 @@ void SelfCalibration::add(const PanTiltSample& sample) {
   now_s_ = std::max(now_s_, sample.latest_time_s);
   last_sample_s_ = sample.latest_time_s;
   telemetry_is_lost_ = false;
-  const bool same_zoom =
-      zoom_ && sample.zoom && std::abs(*sample.zoom - *zoom_) <= options_.zoom_tolerance;
-  if (sample.zoom && !same_zoom) {
-    if (zoom_) {
-      zoom_changed_s_ = sample.latest_time_s;
-      zooms_ = true;
-      nodes_.leave();
-    }
-    zoom_ = sample.zoom;
-    begin_anew();
-  }
+  judge_zoom(sample);
   look_for_stored();
   session_.add(sample);
 }

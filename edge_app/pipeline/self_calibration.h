@@ -38,17 +38,19 @@ namespace alidade {
 
 // When something is tried: seconds, of data where it says so, else between two tries.
 struct CalibrationSchedule {
-  double first_try_s = 6;          // of data
-  double next_try_s = 1.5;         // of new data
-  int many_tries = 20;             // in vain, after which ...
-  double slow_try_s = 5;           // ... so much new data is awaited
-  double watch_window_s = 12;      // of data for a calibration that is held against another
-  double first_watch_s = 12;       // doubling up to ...
-  double longest_watch_s = 600;    // ... this
-  double store_retry_s = 60;       // what a full disk did not take
-  double zoom_arrives_s = 0.1;     // without a change: it does not just pass by
-  double zoom_settles_s = 0.5;     // before anything is adjusted
-  double silence_s = 2;            // without a frame or sample, while the other stream goes on
+  double first_try_s = 6;        // of data
+  double next_try_s = 1.5;       // of new data
+  int many_tries = 20;           // in vain, after which ...
+  double slow_try_s = 5;         // ... so much new data is awaited
+  double watch_window_s = 12;    // of data for a calibration that is held against another
+  double first_watch_s = 12;     // doubling up to ...
+  double longest_watch_s = 600;  // ... this
+  double store_retry_s = 60;     // what a full disk did not take
+  double zoom_arrives_s = 0.1;   // without a change: it does not just pass by
+  double zoom_settles_s = 0.5;   // before anything is adjusted
+  double zoom_glitch_s = 0.2;    // a reading that differs for less is none; no movement is shorter
+  double zoom_silence_s = 5;     // without a reading, where there were some
+  double silence_s = 2;          // without a frame or sample, while the other stream goes on
   double worth_publishing = 0.75;  // of a parameter's sigma, to which a refinement must bring one
   double most_wander_s = 0.01;     // of the video's delay
 };
@@ -102,6 +104,8 @@ class SelfCalibration {
  private:
   void begin_anew();
   void begin_fresh();
+  void judge_zoom(const PanTiltSample& sample);
+  void take_zoom(double zoom, double changed_s);
   void clock_began_anew();
   void look_for_stored();
   [[nodiscard]] bool is_rejected(const Calibration& calibration) const;
@@ -151,6 +155,9 @@ class SelfCalibration {
   ZoomNodes nodes_;
   std::optional<FirstZoom> of_first_zoom_;  // until it is known that there is another one
   double zoom_changed_s_ = -1e9;
+  std::optional<double>
+      odd_zoom_s_;  // since when readings differ, after it stood still: a glitch, or a movement
+  double last_zoom_s_ = 0;
   double now_s_ = 0;  // the latest receive time of either stream
   double last_frame_s_ = 0;
   double last_sample_s_ = 0;

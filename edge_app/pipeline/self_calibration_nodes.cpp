@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
 #include <limits>
 #include <utility>
 
@@ -17,6 +18,9 @@ ZoomFitOptions fit_options_of(const SessionCalibration& checked) {
   options.common_clock_sigma_s = checked.common_clock_sigma_s;
   return options;
 }
+
+// Standard deviation of log f to which landmarks can be looked for: less than 7 px at the border of 1280.
+constexpr double kSharp = 0.01;
 
 bool look_forward(const Calibration& c, Vector3<double>* d_b) {
   const Vector2<double> middle(0.5 * c.camera.width, 0.5 * c.camera.height);
@@ -37,6 +41,49 @@ bool look_alike(const Calibration& a, const Calibration& b) {
 
 }  // namespace
 
+void SelfCalibration::take_zoom(double zoom, double changed_s) {
+  if (zoom_) {
+    zoom_changed_s_ = changed_s;
+    zooms_ = true;
+    nodes_.leave();
+  }
+  zoom_ = zoom;
+  odd_zoom_s_.reset();
+  begin_anew();
+}
+
+void SelfCalibration::judge_zoom(const PanTiltSample& sample) {
+  const double time_s = sample.latest_time_s;
+  if (sample.zoom && !std::isfinite(*sample.zoom)) {
+    say_once("the pan/tilt source tells a zoom reading that is no number; such are left out");
+  }
+  if (!sample.zoom || !std::isfinite(*sample.zoom)) {
+    if (zoom_ && time_s > last_zoom_s_ + options_.schedule.zoom_silence_s) {
+      say_once(fmt::format(
+          "no zoom reading for {:g} s; the last, {}, is taken to hold: does the pan/tilt link tell "
+          "the zoom in every answer?",
+          options_.schedule.zoom_silence_s, *zoom_));
+    }
+    return;
+  }
+  last_zoom_s_ = time_s;
+  const double zoom = *sample.zoom;
+  if (zoom_ && std::abs(zoom - *zoom_) <= options_.zoom_tolerance) {
+    if (odd_zoom_s_) {
+      say_once(fmt::format(
+          "the zoom reading left {} and was back within {:g} s, as no lens can: taken for a glitch",
+          *zoom_, options_.schedule.zoom_glitch_s));
+    }
+    odd_zoom_s_.reset();
+    return;
+  }
+  const bool stood = zoom_ && time_s > zoom_changed_s_ + options_.schedule.zoom_settles_s;
+  if (stood && !odd_zoom_s_) odd_zoom_s_ = time_s;
+  if (odd_zoom_s_ && time_s < *odd_zoom_s_ + options_.schedule.zoom_glitch_s) return;
+  // A movement has not ended before its last reading.
+  take_zoom(zoom, time_s);
+}
+
 // The zoom is another one: is it one that the camera had before, or one of the curve's?
 void SelfCalibration::look_for_stored() {
   if (!zoom_ || is_calibrated_here() || now_s_ < zoom_changed_s_ + options_.schedule.zoom_arrives_s)
@@ -45,8 +92,19 @@ void SelfCalibration::look_for_stored() {
   // One that claims to hold for any zoom would have fitted already.
   if (stored != nullptr && !stored->calibration.zoom) stored = nullptr;
   auto found = std::make_shared<PublishedCalibration>();
-  const bool by_curve = nodes_.curve().at(*zoom_, &found->calibration) &&
+  const bool on_curve = nodes_.curve().at(*zoom_, &found->calibration) &&
                         (stored == nullptr || has_free_centre(stored->calibration));
+  const double f_sigma = parameter_sigma(found->calibration, Parameter::kFocalLength) /
+                         found->calibration.camera.focal_length;
+  const bool by_curve = on_curve && f_sigma <= kSharp;
+  if (on_curve && !by_curve) {
+    // The real-time thread has the curve, and follows points.
+    say_once(fmt::format(
+        "zoom {}: by the zoom curve the focal length is known to {:.2g} %: PT mode with that sigma "
+        "until it is calibrated here",
+        *zoom_, 100 * f_sigma));
+    return;
+  }
   if (stored != nullptr && (!by_curve || look_alike(stored->calibration, found->calibration)))
     found->map = kept_map(stored->map);
   if (by_curve) {
@@ -158,10 +216,11 @@ void SelfCalibration::contradict_nodes(const SessionCalibration& alone, const st
 
 void SelfCalibration::begin_nodes_anew(const SessionCalibration& alone) {
   const std::string aside = archive_ == nullptr ? "" : archive_->set_zooms_aside();
-  messages_.push_back(fmt::format(
-      "another camera or lens than the zoom curve's, or moved on its mount: a new curve begins at "
-      "zoom {}{}{}",
-      *zoom_, aside.empty() ? "" : "; ", aside));
+  messages_.push_back(
+      fmt::format("another camera or lens than the zoom curve's, or moved on its mount, or its "
+                  "reading does not "
+                  "follow the lens: a new curve begins at zoom {}{}{}",
+                  *zoom_, aside.empty() ? "" : "; ", aside));
   nodes_.begin_anew(alone.result.calibration);
   rejected_.clear();
   publish(alone);

@@ -103,6 +103,8 @@ struct Feed {
   double taken_up = 1;
   double late_s = 0;
   double head_back_s = 0;  // the connection to the head begins anew then
+  std::function<std::optional<double>(double)> zoom_at = {};  // in place of zoom, by the time
+  std::function<bool(double)> blurred = {};                   // nothing is seen then
 };
 
 inline std::vector<Published> feed(SelfCalibration* calibration, const Simulation& s,
@@ -131,7 +133,7 @@ inline std::vector<Published> feed(SelfCalibration* calibration, const Simulatio
       sample.pan_rad = from.pan_rad;
       sample.tilt_rad = from.tilt_rad;
       if (how.poll_s == 0) sample.sequence = from.sequence;
-      sample.zoom = how.zoom;
+      sample.zoom = how.zoom_at ? how.zoom_at(from.stamp_s) : how.zoom;
       sample.restarted = how.head_back_s > 0 && from.stamp_s >= how.head_back_s && !back;
       back = back || sample.restarted;
       calibration->add(sample);
@@ -156,7 +158,7 @@ inline std::vector<Published> feed(SelfCalibration* calibration, const Simulatio
     tracks.oe_status =
         frame.stamp_s >= how.contradicting_from_s ? OeStatus::kContradiction : OeStatus::kOk;
     for (const TrackedPoint& point : points[frame.frame]) {
-      if (tracks.count == kMaxFramePoints) break;
+      if (tracks.count == kMaxFramePoints || (how.blurred && how.blurred(frame.stamp_s))) break;
       tracks.points[static_cast<std::size_t>(tracks.count++)] = point;
     }
     tracks.looked_for = tracks.count;
