@@ -286,6 +286,8 @@ void SelfCalibration::add(const FrameTracks& tracks) {
   if (judge_delay(tracks)) return;
   judge_agreement(tracks);
   if (tracks.tracker == FrameTracks::Tracker::kNone || !tracks.time_is_of_use) return;
+  // Behind a machine that is too busy frames of the zoom before come after the reading of the next.
+  if (tracks.stamp.receive_time_s < zoom_changed_s_ + options_.schedule.zoom_settles_s) return;
   if (tracks.tracker != tracker_) {
     begin_anew();
     tracker_ = tracks.tracker;

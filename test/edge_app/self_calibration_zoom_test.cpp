@@ -265,6 +265,18 @@ TEST_F(ZoomingCamera, AFrozenReadingIsSaid) {
                     Contains(HasSubstr("its reading does not follow the lens"))));
 }
 
+// As where the calibration thread is seconds behind: telemetry is heard before the frames that wait.
+TEST_F(ZoomingCamera, FramesFromBeforeAMovementAreNotOfTheReadingAfterIt) {
+  ASSERT_FALSE(dwell(0, zoomed(0)).empty());
+  PanTiltSample sample;
+  sample.zoom = 200;
+  for (const double later_s : {20.0, 20.5}) {
+    sample.earliest_time_s = sample.latest_time_s = from_s_ + later_s;
+    calibration_.add(sample);
+  }
+  EXPECT_THAT(dwell(200, zoomed(0, 4)), IsEmpty());
+}
+
 // Wraps to 0 above 200: the same reading for two lenses.
 TEST_F(ZoomingCamera, AReadingThatWrapsIsSaid) {
   ASSERT_FALSE(dwell(10, zoomed(10)).empty());
