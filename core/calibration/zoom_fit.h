@@ -9,17 +9,24 @@
 // the two cannot be compared otherwise.
 // Refused: readings of two cameras (shared parameters that differ beyond chance), a focal length that is not
 // monotone in the reading. Pure; allocates. Not for the real-time thread.
+// extend_zoom(): one more calibration to a curve, which is taken apart for it: the same as if all had been fitted together.
 
+#include <optional>
 #include <string>
 #include <vector>
 
+#include "core/calibration/calibration_types.h"
 #include "core/model/zoom_curve.h"
 
 namespace alidade {
 
+// Of an image's width: how far an optical centre is off, usually.
+inline constexpr double kUsualCentreShare = 0.01;
+
 struct ZoomFitOptions {
   double repeatability = 0.002;  // sigma of log f after a movement
-  // Priors that went into each of the calibrations: counted once. 0: none. Axes' about the nominal ones.
+  // Priors that went into each of the calibrations: counted once. 0: none. Axes' about the nominal ones. One that is sharper than a
+  // calibration knows the parameter did not go into that.
   double centre_sigma_px = 0;
   double axis_sigma_rad = 0.05;
   // Of shared parameters but the axes.
@@ -29,17 +36,34 @@ struct ZoomFitOptions {
     double sigma;
   };
   std::vector<Prior> shared_priors;
+  // In every clock offset alike, so that more calibrations do not average it out; stays in the curve's.
+  double common_clock_sigma_s = 0;
+  bool clock_is_another =
+      false;  // extend_zoom(): the curve's clock offset is of another connection
+  // So many standard deviations more than expected do calibrations of one camera differ in what they share.
+  double two_cameras = 8;
 };
+
+// With the priors of calibrations that were made so.
+[[nodiscard]] ZoomFitOptions zoom_fit_options(const CalibrationOptions& made_with);
 
 struct ZoomFit {
   ZoomCurve curve;
   double chi_square = 0;       // of the shared parameters' differences
   int degrees_of_freedom = 0;  // of it
+  int node = 0;                // extend_zoom(): of the calibration
 };
 
 // calibrations: at two or more readings, each with its zoom. False and one line in *error: what is wrong, and with which.
 [[nodiscard]] bool fit_zoom(const std::vector<Calibration>& calibrations,
                             const ZoomFitOptions& options, ZoomFit* fit, std::string* error);
+
+// visit: the node that the calibration is another observation of, the zoom not moved since; none: a visit of its own, whose reading
+// may be that of another. Where there are kMaxNodes, one of those that are closest together is left out, what it said of the
+// others kept.
+[[nodiscard]] bool extend_zoom(const ZoomCurve& curve, const Calibration& added,
+                               std::optional<int> visit, const ZoomFitOptions& options,
+                               ZoomFit* fit, std::string* error);
 
 // Content::inverse from the rest. False if two nodes are too close for it.
 [[nodiscard]] bool set_inverses(ZoomCurve::Content* content);

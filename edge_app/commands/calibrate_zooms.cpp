@@ -22,9 +22,6 @@
 namespace alidade {
 namespace {
 
-constexpr double kCentreShare =
-    0.01;  // of the image's width: how far an optical centre is off, usually
-
 // What holds at one zoom only can be no prior of several.
 void refuse_priors_of_one_zoom(const CalibrateOptions& options, std::size_t stretches) {
   const auto refuse = [stretches](const char* option, const std::string& text) {
@@ -46,21 +43,6 @@ void require_readings(const std::vector<ZoomJob>& jobs) {
                                    "recordings needs; calibrate it alone, or add the column zoom",
                                    each.recording));
   }
-}
-
-void add_priors(const CalibrationOptions& options, ZoomFitOptions* fit) {
-  const auto add = [fit](Parameter parameter, const std::optional<CalibrationPrior>& prior) {
-    if (prior && prior->sigma > 0) {
-      fit->shared_priors.push_back({parameter, prior->value, prior->sigma});
-    }
-  };
-  add(Parameter::kAspect, options.aspect);
-  add(Parameter::kLineDelay, options.line_delay);
-  add(Parameter::kClockOffset, options.clock_offset);
-  add(Parameter::kPanScale, options.pan_scale);
-  add(Parameter::kTiltScale, options.tilt_scale);
-  fit->axis_sigma_rad = options.axis_sigma_rad;
-  fit->centre_sigma_px = options.centre_sigma_px;
 }
 
 double sigma_of(const Calibration& c, Parameter parameter) {
@@ -134,7 +116,7 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
   for (std::size_t i = 0; i < jobs.size(); ++i) {
     auto& [recording, job] = jobs[i];
     const std::string name = fmt::format("{} at zoom {:g}", recording, *job.zoom);
-    job.options.centre_sigma_px = kCentreShare * job.input.width;
+    job.options.centre_sigma_px = kUsualCentreShare * job.input.width;
     CalibrationResult result = calibrate_job(recording, options.passes, &job, signals);
     for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", name, remark);
     if (!result.frames.empty()) {
@@ -148,7 +130,7 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
     }
     result.calibration.zoom = job.zoom;
     calibrations.push_back(result.calibration);
-    if (calibrations.size() == 1) add_priors(job.options, &fit_options);
+    if (calibrations.size() == 1) fit_options = zoom_fit_options(job.options);
   }
   ZoomFit fit;
   std::string error;

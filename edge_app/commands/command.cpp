@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <cmath>
 #include <filesystem>
 
 #include "edge_app/storage/calibration_file.h"
@@ -76,6 +77,14 @@ NamedCalibration choose_calibration(const Config& config) {
 Calibration data_sheet_calibration(const CameraConfig& camera) {
   Calibration calibration;
   calibration.camera.focal_length = *camera.focal_length_px;
+  if (camera.focal_length_range) {
+    // Anywhere between its ends.
+    const double sigma =
+        std::log(camera.focal_length_range->tele_px / camera.focal_length_range->wide_px) /
+        std::sqrt(12.0) * *camera.focal_length_px;
+    calibration.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength)) =
+        sigma * sigma;
+  }
   calibration.camera.aspect = camera.aspect;
   calibration.camera.radial_distortion = camera.radial_distortion;
   calibration.line_delay = camera.upside_down ? -camera.line_delay_s : camera.line_delay_s;

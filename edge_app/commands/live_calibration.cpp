@@ -81,6 +81,7 @@ Calibrating begin_calibrating(const Config& config, const std::string& path) {
         *config.pan_tilt.angle_sigma_rad, config.pan_tilt.angle_quantum_rad / std::sqrt(12.0));
   }
   options.zoom_tolerance = config.calibration.zoom_tolerance;
+  options.zooms = config.camera.focal_length_range.has_value();
   options.automatic = config.calibration.automatic;
   result.calibration = std::make_unique<SelfCalibration>(options, result.store.get());
   return result;

@@ -50,7 +50,8 @@ void write_side_files(const Config& config, const std::string& directory) {
     std::ofstream(fs::path(directory) / "noise.yaml")
         << fmt::format("pan_tilt_sigma_rad: {}\n", *config.pan_tilt.angle_sigma_rad);
   }
-  if (config.camera.focal_length_px) {
+  // Which of its focal lengths a lens that zooms will have nobody knows.
+  if (config.camera.focal_length_px && !config.camera.focal_length_range) {
     const Camera<double>& camera = data_sheet_calibration(config.camera).camera;
     std::ofstream(fs::path(directory) / "guess.yaml")
         << fmt::format("focal_length: {{value: {}}}\nradial_distortion: {{value: {}}}\n",

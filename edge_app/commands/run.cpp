@@ -119,6 +119,7 @@ int run_live(const RunOptions& options) {
   HttpApiSources sources;
   sources.live = &live;
   sources.summary = [&pipeline] { return pipeline.summary(); };
+  sources.zoom_curve = [&pipeline] { return pipeline.zoom_curve(); };
   sources.video_losses = [&video] { return video->counters(); };
   sources.ask_for_calibration = [&calibrating] {
     return calibrating.calibration && calibrating.calibration->ask_for_fresh();

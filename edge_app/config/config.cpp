@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <cstdlib>
 #include <fstream>
 
@@ -69,9 +70,34 @@ VideoConfig read_video(YamlSection section, const std::string& path) {
   return video;
 }
 
+constexpr NumberRange kFocalLengths{1, 1e8, "px"};
+
+FocalLengthRange read_focal_lengths(YamlSection section) {
+  const auto end = [&section](const char* key) {
+    const std::optional<double> value = section.number(key, kFocalLengths);
+    if (!value)
+      section.fail_missing(key, "give wide and tele, px, or one number for a lens of one zoom");
+    return *value;
+  };
+  const FocalLengthRange range{end("wide"), end("tele")};
+  if (!(range.wide_px < range.tele_px)) {
+    section.fail("tele",
+                 fmt::format("is {:g} px and wide is {:g} px; wide is the shorter of the two",
+                             range.tele_px, range.wide_px));
+  }
+  section.finish();
+  return range;
+}
+
 CameraConfig read_camera(YamlSection section) {
   CameraConfig camera;
-  camera.focal_length_px = section.number("focal_length_px", {1, 1e8, "px"});
+  if (section.is_section("focal_length_px")) {
+    const FocalLengthRange range = read_focal_lengths(section.section("focal_length_px"));
+    camera.focal_length_range = range;
+    camera.focal_length_px = std::sqrt(range.wide_px * range.tele_px);
+  } else {
+    camera.focal_length_px = section.number("focal_length_px", kFocalLengths);
+  }
   camera.aspect = section.number("aspect", {0.5, 2, "1"}).value_or(camera.aspect);
   camera.radial_distortion =
       section.number("radial_distortion", {-1e8, 1e8, "1"}).value_or(camera.radial_distortion);

@@ -38,9 +38,17 @@ struct VideoConfig {
   double max_backoff_s = 5;               // longest pause between two attempts
 };
 
+// Of a lens that zooms: at both ends of its range.
+struct FocalLengthRange {
+  double wide_px = 0;
+  double tele_px = 0;  // more than that
+};
+
 // The data sheet's camera: used as long as there is no calibration.
 struct CameraConfig {
+  // Where it zooms the one in the middle, in octaves.
   std::optional<double> focal_length_px;
+  std::optional<FocalLengthRange> focal_length_range;
   double aspect = 1;
   double radial_distortion = 0;
   double line_delay_s = 0;  // of the sensor read top to bottom

@@ -78,6 +78,11 @@ std::optional<YAML::Node> YamlSection::find(const std::string& key) const {
 
 bool YamlSection::has(const std::string& key) const { return find(key).has_value(); }
 
+bool YamlSection::is_section(const std::string& key) const {
+  const std::optional<YAML::Node> node = find(key);
+  return node && node->IsMap();
+}
+
 std::string YamlSection::where(const std::string& key) const {
   // The key's line: an empty value has no place of its own.
   std::string at = place(file_, node_);

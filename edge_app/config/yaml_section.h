@@ -34,6 +34,7 @@ class YamlSection {
   YamlSection(const YAML::Node& node, std::string name, std::string file);
 
   [[nodiscard]] bool has(const std::string& key) const;
+  [[nodiscard]] bool is_section(const std::string& key) const;
   std::optional<std::string> text(const std::string& key);
   std::optional<double> number(const std::string& key, const NumberRange& range);
   // A list of exactly `count` numbers.

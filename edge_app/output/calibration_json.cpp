@@ -60,4 +60,38 @@ ordered_json calibration_json(const Calibration& calibration) {
   return json;
 }
 
+ordered_json zoom_curve_json(const ZoomCurve& curve) {
+  constexpr int kSamples = 41;
+  const ZoomCurve::Content& content = curve.content();
+  ordered_json nodes = ordered_json::array();
+  for (int i = 0; i < content.nodes; ++i) {
+    const ordered_json all = parameters_json(curve.node(i));
+    ordered_json node{{"reading", content.reading[static_cast<std::size_t>(i)]}};
+    for (const char* name : {"focal_length", "radial_distortion", "centre_offset"}) {
+      if (all.contains(name)) node[name] = all[name];
+    }
+    nodes.push_back(std::move(node));
+  }
+  ordered_json readings = ordered_json::array();
+  ordered_json focal_lengths = ordered_json::array();
+  ordered_json sigmas = ordered_json::array();
+  for (int i = 0; i < kSamples; ++i) {
+    const double share = static_cast<double>(i) / (kSamples - 1);
+    const double reading =
+        curve.first_reading() + share * (curve.last_reading() - curve.first_reading());
+    Calibration c;
+    if (!curve.at(reading, &c)) continue;
+    readings.push_back(reading);
+    focal_lengths.push_back(c.camera.focal_length);
+    sigmas.push_back(
+        std::sqrt(c.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength))));
+  }
+  return {{"repeatability", content.repeatability},
+          {"nodes", std::move(nodes)},
+          {"samples",
+           {{"reading", std::move(readings)},
+            {"focal_length_px", std::move(focal_lengths)},
+            {"focal_length_sigma_px", std::move(sigmas)}}}};
+}
+
 }  // namespace alidade

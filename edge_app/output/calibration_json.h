@@ -4,6 +4,7 @@
 #include <nlohmann/json_fwd.hpp>
 
 #include "core/model/calibration.h"
+#include "core/model/zoom_curve.h"
 
 namespace alidade {
 
@@ -12,5 +13,8 @@ nlohmann::ordered_json parameters_json(const Calibration& calibration);
 
 // All of the file but for what it tells of the run that wrote it.
 nlohmann::ordered_json calibration_json(const Calibration& calibration);
+
+// What people want to see of a curve that is not empty: its nodes, and the focal length from the first to the last.
+nlohmann::ordered_json zoom_curve_json(const ZoomCurve& curve);
 
 }  // namespace alidade

@@ -69,7 +69,9 @@ ServerResponse calibration(const HttpApiSources& sources) {
   const auto newest = sources.live->newest();
   if (!newest || !newest->calibrated)
     return http_error(404, "there is no calibration for this camera at this zoom yet");
-  return json_response(calibration_json(unpack(newest->camera)));
+  Json json = calibration_json(unpack(newest->camera));
+  if (const auto curve = zoom_curve_of(sources)) json["zoom_curve"] = zoom_curve_json(*curve);
+  return json_response(json);
 }
 
 ServerResponse calibrate(const HttpApiSources& sources) {
@@ -217,6 +219,11 @@ ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
 }
 
 }  // namespace
+
+std::shared_ptr<const ZoomCurve> zoom_curve_of(const HttpApiSources& sources) {
+  const auto curve = sources.zoom_curve ? sources.zoom_curve() : nullptr;
+  return curve && !curve->empty() ? curve : nullptr;
+}
 
 void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
   sources.live->set_on_news([server] { server->wake(); });

@@ -4,6 +4,7 @@
 // real-time thread.
 
 #include <functional>
+#include <memory>
 #include <string>
 
 #include "edge_app/output/http/http_server.h"
@@ -19,10 +20,15 @@ struct HttpApiSources {
   std::function<FrameSourceCounters()> video_losses;
   // False: nothing is calibrated here.
   std::function<bool()> ask_for_calibration;
+  // Empty without one. The zoom curve in use; null: there is none.
+  std::function<std::shared_ptr<const ZoomCurve>()> zoom_curve;
   std::string version;
   std::string camera;            // the video source's name, without a password
   bool latency_measured = true;  // false for a recording
 };
+
+// Null: there is none.
+[[nodiscard]] std::shared_ptr<const ZoomCurve> zoom_curve_of(const HttpApiSources& sources);
 
 // Borrows *sources.live, and calls the functions, until the server has stopped. Every record wakes the server: that must
 // exist as long as there are records, stopped or not.

@@ -67,6 +67,22 @@ void add_calibration_metrics(const OrientationRecord& newest, double age_s, Metr
   out->add(sigma(Parameter::kTiltScale), {{"axis", "tilt"}});
 }
 
+// curve: null if there is none.
+void add_zoom_metrics(const OrientationRecord& newest,
+                      const std::shared_ptr<const ZoomCurve>& curve, MetricsText* out) {
+  if (newest.camera.zoom) {
+    out->gauge("alidade_calibration_zoom_reading",
+               "Zoom reading that the calibration in use is for, in the device's own scale");
+    out->add(*newest.camera.zoom);
+  }
+  out->gauge("alidade_zoom_curve_nodes", "Calibrated visits of zoom readings; 0: no zoom curve");
+  out->add(std::int64_t{curve ? curve->content().nodes : 0});
+  if (!curve) return;
+  out->gauge("alidade_zoom_curve_reading", "First and last zoom reading of the curve");
+  out->add(curve->first_reading(), {{"end", "first"}});
+  out->add(curve->last_reading(), {{"end", "last"}});
+}
+
 void add_record_metrics(const OrientationRecord& newest, MetricsText* out) {
   out->gauge("alidade_mode", "1 for the mode of the newest record");
   for (const RecordMode mode : {RecordMode::kOe, RecordMode::kPt, RecordMode::kNone})
@@ -177,6 +193,7 @@ std::string service_metrics(const HttpApiSources& sources, const HttpCounters& h
     add_record_metrics(*newest, &out);
     add_calibration_metrics(*newest, now_s - sources.live->calibration_since_s().value_or(now_s),
                             &out);
+    add_zoom_metrics(*newest, zoom_curve_of(sources), &out);
   }
   out.gauge("alidade_stream_clients", "Clients of the event stream");
   out.add(http.streams);

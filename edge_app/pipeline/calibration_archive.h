@@ -31,12 +31,16 @@ class CalibrationArchive {
   [[nodiscard]] virtual const ZoomCurve& zoom_curve() const = 0;
 
   // Keeps it in memory in any case, in place of the one for its zoom, within the tolerance; its `path` is
-  // ignored. False with one line if it could not be written (disk full, no permission): what was stored before
+  // ignored. Its notes' zoom curve, if there is one, takes the place of the curve that there is. False with one line if it could not be written (disk full, no permission): what was stored before
   // stays stored, and save_pending() tries again. False too if the map is not valid: the calibration is then
   // stored without it, and nothing is pending.
   [[nodiscard]] virtual bool save(const StoredCalibration& calibration, std::string* error) = 0;
   [[nodiscard]] virtual bool has_pending() const = 0;
   [[nodiscard]] virtual bool save_pending(std::string* error) = 0;
+
+  // Forgets the calibrations of all zooms and the curve, which are of another camera or lens. Their files are kept under other
+  // names; returns what was done, for the log; empty: there were none.
+  [[nodiscard]] virtual std::string set_zooms_aside() = 0;
 };
 
 }  // namespace alidade

@@ -109,7 +109,7 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
     if (oe_) oe_->forget_pending();
   }
   telemetry_lost_ = false;
-  if (sample.zoom) {
+  if (sample.zoom && std::isfinite(*sample.zoom)) {
     zoom_ = sample.zoom;
     if (!zoom_at_adoption_) zoom_at_adoption_ = sample.zoom;
   }

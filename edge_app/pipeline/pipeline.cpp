@@ -44,7 +44,8 @@ Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink
       stage_(options.step, options.measure_latency, calibration != nullptr, options.tap),
       images_(kImageSlots),
       way_processor_(processor_of_the_way(options)),
-      finished_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+      finished_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+      zoom_curve_(std::make_shared<const ZoomCurve>(options.step.zoom_curve)) {
   if (finished_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
   for (ImageSlot slot = 0; slot < kImageSlots; ++slot) free_slots_.push_back(slot);
   // Records made before the calibration thread first wakes say it too.
@@ -245,6 +246,10 @@ void Pipeline::calibrate() {
     const bool due = calibration_->due();
     if (due) stage_.report({CalibrationActivity::kAdjusting, report.need});
     if (auto published = calibration_->work()) {
+      {
+        const std::lock_guard<PriorityMutex> lock(summary_mutex_);
+        zoom_curve_ = {published, &published->zoom_curve};
+      }
       if (stage_.publish(published.get())) lent.push_back(std::move(published));
     }
     if (due) return_freed_memory();
@@ -298,6 +303,11 @@ void Pipeline::account_way(const OutputMessage& message, double written_s) {
   summary_.waiting.add(message.taken_s - message.decoded_s);
   summary_.computing.add(message.made_s - message.taken_s);
   summary_.writing.add(written_s - message.made_s);
+}
+
+std::shared_ptr<const ZoomCurve> Pipeline::zoom_curve() const {
+  const std::lock_guard<PriorityMutex> lock(summary_mutex_);
+  return zoom_curve_;
 }
 
 void Pipeline::count(const OutputMessage& message) {

@@ -100,6 +100,8 @@ class Pipeline {
   [[nodiscard]] const std::string& error() const { return error_; }
   // Any thread, at any time: what has come so far.
   [[nodiscard]] PipelineSummary summary() const;
+  // Likewise: the zoom curve in use, perhaps an empty one.
+  [[nodiscard]] std::shared_ptr<const ZoomCurve> zoom_curve() const;
 
  private:
   void capture();
@@ -138,10 +140,11 @@ class Pipeline {
   std::string error_;                  // real-time thread
   mutable PriorityMutex summary_mutex_;  // the real-time thread does not take it
   PipelineSummary summary_;
-  PageFaults page_faults_;               // real-time thread, at its end
-  PageFaults faults_at_start_;           // real-time thread, before it says its number
-  std::atomic<int> realtime_thread_{0};  // 0: not running
-  DropCounters drops_logged_;            // output thread
+  std::shared_ptr<const ZoomCurve> zoom_curve_;  // under summary_mutex_
+  PageFaults page_faults_;                       // real-time thread, at its end
+  PageFaults faults_at_start_;                   // real-time thread, before it says its number
+  std::atomic<int> realtime_thread_{0};          // 0: not running
+  DropCounters drops_logged_;                    // output thread
   double drops_logged_at_s_ = 0;
   double old_telemetry_logged_at_s_ = -1e9;  // output thread
   double wander_logged_at_s_ = -1e9;         // output thread

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/calibration/calibration_difference.h"
+#include "core/calibration/zoom_fit.h"
 #include "edge_app/pipeline/calibration_refusal.h"
 #include "edge_app/pipeline/keyframe_map.h"
 
@@ -29,6 +30,7 @@ SelfCalibration::SelfCalibration(const SelfCalibrationOptions& options, Calibrat
     : options_(options),
       archive_(archive),
       session_(options.session),
+      zooms_(options.zooms),
       contradiction_(options.contradiction),
       disagreement_(options.disagreement),
       watch_interval_s_(options.schedule.first_watch_s) {
@@ -43,7 +45,13 @@ SelfCalibration::SelfCalibration(const SelfCalibrationOptions& options, Calibrat
     first->calibration = options.data_sheet;
     first->name = "data sheet";
   }
-  if (archive != nullptr) first->zoom_curve = archive->zoom_curve();
+  if (archive != nullptr) {
+    const bool free_centre =
+        stored != nullptr && stored->calibration.zoom && has_free_centre(stored->calibration);
+    nodes_.begin_with(archive->zoom_curve(), free_centre ? &stored->calibration : nullptr);
+  }
+  zooms_ = zooms_ || !nodes_.empty();
+  first->zoom_curve = nodes_.curve();
   published_ = first;
   // The connection that it was made with is another one.
   clock_offset_known_ = stored == nullptr;
@@ -74,34 +82,13 @@ bool SelfCalibration::is_calibrated_here() const {
   return published_->calibrated && zoom_fits(published_->calibration.zoom);
 }
 
-// The zoom is another one: is it one that the camera had before?
-void SelfCalibration::look_for_stored() {
-  if (archive_ == nullptr || is_calibrated_here() ||
-      now_s_ < zoom_changed_s_ + options_.schedule.zoom_arrives_s) {
-    return;
-  }
-  const StoredCalibration* stored = archive_->find(zoom_);
-  // One that claims to hold for any zoom would have fitted already.
-  if (stored == nullptr || !stored->calibration.zoom || is_rejected(stored->calibration)) return;
-  auto found = std::make_shared<PublishedCalibration>();
-  found->calibration = stored->calibration;
-  found->calibrated = true;
-  found->map = kept_map(stored->map);
-  found->name = stored->path.empty() ? "live" : stored->path;
-  found->zoom_curve = archive_->zoom_curve();
-  messages_.push_back(fmt::format("zoom {}: the calibration {} holds", *zoom_, found->name));
-  published_ = next_ = found;
-  fresh_wanted_ = false;
-  doubtful_ = false;
-  contradiction_.restart();
-  // Which connection it was made with is not known.
-  clock_offset_known_ = false;
-  watch_interval_s_ = options_.schedule.first_watch_s;
-  need_ = CalibrationNeed::kNothing;
-}
-
 bool SelfCalibration::is_rejected(const Calibration& calibration) const {
   return std::find(rejected_.begin(), rejected_.end(), *calibration.zoom) != rejected_.end();
+}
+
+void SelfCalibration::clock_began_anew() {
+  nodes_.clock_began_anew();
+  if (of_first_zoom_) of_first_zoom_->clock_holds = false;
 }
 
 bool SelfCalibration::judge_delay(const FrameTracks& tracks) {
@@ -118,6 +105,7 @@ bool SelfCalibration::judge_delay(const FrameTracks& tracks) {
             : "the video's delay holds again; the clock offset is found anew");
     begin_anew();
     clock_offset_known_ = false;
+    clock_began_anew();
   }
   return delay_wanders_ = wanders;
 }
@@ -158,30 +146,48 @@ bool SelfCalibration::adjusting_is_due() const {
     return session_.span_s() >= schedule.first_try_s &&
            (tries_ == 0 || newest_s >= last_try_s_ + pause_s);
   }
+  if (makes_nodes() && !nodes_.has_visit()) {
+    return session_.span_s() >= schedule.first_try_s && newest_s >= last_try_s_ + watch_interval_s_;
+  }
   return session_.span_s() >= schedule.watch_window_s &&
          newest_s >= began_s_ + schedule.watch_window_s &&
          newest_s >=
              last_try_s_ + (clock_offset_known_ ? watch_interval_s_ : schedule.first_watch_s);
 }
 
-SessionCalibration SelfCalibration::adjust(const Calibration* known) const {
+SessionCalibration SelfCalibration::adjust(const CalibrationSession& session,
+                                           const Calibration* known) const {
   SessionCalibrationOptions options;
   options.width = options_.data_sheet.camera.width;
   options.height = options_.data_sheet.camera.height;
   options.adjustment = options_.adjustment;
+  if (makes_nodes()) options.adjustment.centre_sigma_px = kUsualCentreShare * options.width;
   options.camera = options_.camera;
   options.noise = options_.noise;
   options.checks = options_.checks;
   options.is_cancelled = [this] { return cancelled_.load(); };
   SessionCalibration checked;
   if (known == nullptr) {
-    checked = calibrate_session(session_, options, nullptr);
+    checked = calibrate_session(session, options, nullptr);
   } else {
     const KnownCalibration prior{*known, clock_offset_known_};
-    checked = calibrate_session(session_, options, &prior);
+    checked = calibrate_session(session, options, &prior);
   }
   checked.result.calibration.zoom = zoom_;
   return checked;
+}
+
+void SelfCalibration::store(const SessionCalibration& checked, const MapState& map) {
+  last_store_s_ = now_s_;
+  if (archive_ == nullptr) return;
+  StoredCalibration stored;
+  stored.calibration = checked.result.calibration;
+  stored.notes.quality = checked.result.quality;
+  stored.notes.excluded = checked.result.exclusions.describe();
+  stored.notes.zoom_curve = nodes_.curve();
+  stored.map = map;
+  std::string error;
+  if (!archive_->save(stored, &error)) messages_.push_back(error + "; kept, will be tried again");
 }
 
 void SelfCalibration::publish(const SessionCalibration& checked) {
@@ -190,7 +196,7 @@ void SelfCalibration::publish(const SessionCalibration& checked) {
   fresh->calibrated = true;
   fresh->map = map_from_keyframes(checked.result, session_.keyframes(checked.result));
   fresh->name = "live";
-  fresh->zoom_curve = published_->zoom_curve;
+  fresh->zoom_curve = nodes_.curve();
   const CalibrationQuality& quality = checked.result.quality;
   messages_.push_back(
       fmt::format("calibrated from {} frames, {} landmarks: {}; residuals {:.2f} of the tracker's "
@@ -199,22 +205,12 @@ void SelfCalibration::publish(const SessionCalibration& checked) {
                   quality.frames, quality.landmarks, describe(fresh->calibration),
                   quality.pixel_sigma_ratio, checked.hold_out, fresh->map.landmarks.size()));
   messages_.insert(messages_.end(), checked.remarks.begin(), checked.remarks.end());
-  if (archive_ != nullptr) {
-    StoredCalibration stored;
-    stored.calibration = fresh->calibration;
-    stored.notes.quality = quality;
-    stored.notes.excluded = checked.result.exclusions.describe();
-    stored.map = fresh->map;
-    std::string error;
-    if (!archive_->save(stored, &error)) messages_.push_back(error + "; kept, will be tried again");
-    last_store_s_ = now_s_;
-  }
+  store(checked, fresh->map);
   rejected_.erase(std::remove_if(rejected_.begin(), rejected_.end(),
                                  [this](double zoom) { return zoom_fits(zoom); }),
                   rejected_.end());
   published_ = next_ = fresh;
   doubtful_ = false;
-  contradiction_.restart();
   clock_offset_known_ = true;
   fresh_wanted_ = false;
   said_.clear();
@@ -224,10 +220,10 @@ void SelfCalibration::publish(const SessionCalibration& checked) {
 // Without what an earlier calibration says.
 void SelfCalibration::try_first() {
   ++tries_;
-  const SessionCalibration checked = adjust(nullptr);
+  SessionCalibration checked = adjust(session_, nullptr);
   if (checked.refusal.empty()) {
     watch_interval_s_ = options_.schedule.first_watch_s;
-    publish(checked);
+    settle(std::move(checked));
     return;
   }
   // The program ends: nobody is to do anything about it.
@@ -240,21 +236,35 @@ void SelfCalibration::try_first() {
 void SelfCalibration::hold_against_published() {
   const CalibrationSchedule& schedule = options_.schedule;
   watch_interval_s_ = std::min(2 * watch_interval_s_, schedule.longest_watch_s);
-  const SessionCalibration alone = adjust(nullptr);
+  SessionCalibration alone = adjust(session_, nullptr);
   // Motion that does not suffice tells nothing against what is known.
   if (!alone.refusal.empty()) return;
   const double chi_square =
       difference_chi_square(published_->calibration, alone.result.calibration, clock_offset_known_);
-  const ContradictionJudge::Verdict verdict = contradiction_.judge(chi_square);
+  // That a reading agrees with itself tells nothing of the curve.
+  const bool agrees = makes_nodes() && chi_square <= options_.contradiction.least_chi_square;
+  const ContradictionJudge::Verdict verdict =
+      agrees ? ContradictionJudge::Verdict::kAgrees : contradiction_.judge(chi_square);
   if (verdict != ContradictionJudge::Verdict::kAgrees) {
     watch_interval_s_ = schedule.first_watch_s;
     messages_.push_back(
         fmt::format("the camera is not what the calibration says (chi-square {:.0f}): {}",
                     chi_square, describe(alone.result.calibration)));
-    if (verdict == ContradictionJudge::Verdict::kBelieved) publish(alone);
+    if (verdict != ContradictionJudge::Verdict::kBelieved) return;
+    contradiction_.restart();
+    if (makes_nodes()) {
+      begin_nodes_anew(alone);
+    } else {
+      publish(alone);
+    }
     return;
   }
-  const SessionCalibration refined = adjust(&published_->calibration);
+  if (makes_nodes()) {
+    refine_node(std::move(alone));
+    return;
+  }
+  keep_first_zoom();
+  const SessionCalibration refined = adjust(session_, &published_->calibration);
   if (!refined.refusal.empty()) return;
   if (!clock_offset_known_ ||
       is_sharper(refined.result.calibration, published_->calibration, schedule.worth_publishing)) {
@@ -270,11 +280,14 @@ void SelfCalibration::add(const FrameTracks& tracks) {
   if (tracks.clock_restarted || tracks.delay_stepped) {
     if (!session_.empty()) begin_anew();
     if (is_calibrated_here()) clock_offset_known_ = false;
+    clock_began_anew();
   }
   telemetry_is_old_ = old_telemetry_.judge(now_s_, tracks.telemetry_too_old);
   if (judge_delay(tracks)) return;
   judge_agreement(tracks);
   if (tracks.tracker == FrameTracks::Tracker::kNone || !tracks.time_is_of_use) return;
+  // Behind a machine that is too busy frames of the zoom before come after the reading of the next.
+  if (tracks.stamp.receive_time_s < zoom_changed_s_ + options_.schedule.zoom_settles_s) return;
   if (tracks.tracker != tracker_) {
     begin_anew();
     tracker_ = tracks.tracker;
@@ -304,13 +317,7 @@ void SelfCalibration::add(const PanTiltSample& sample) {
   now_s_ = std::max(now_s_, sample.latest_time_s);
   last_sample_s_ = sample.latest_time_s;
   telemetry_is_lost_ = false;
-  const bool same_zoom =
-      zoom_ && sample.zoom && std::abs(*sample.zoom - *zoom_) <= options_.zoom_tolerance;
-  if (sample.zoom && !same_zoom) {
-    if (zoom_) zoom_changed_s_ = sample.latest_time_s;
-    zoom_ = sample.zoom;
-    begin_anew();
-  }
+  judge_zoom(sample);
   look_for_stored();
   session_.add(sample);
 }
@@ -326,7 +333,9 @@ bool SelfCalibration::ask_for_fresh() {
 
 void SelfCalibration::cancel() { cancelled_ = true; }
 
-bool SelfCalibration::due() const { return storing_is_due() || adjusting_is_due(); }
+bool SelfCalibration::due() const {
+  return storing_is_due() || centre_is_due() || adjusting_is_due();
+}
 
 std::shared_ptr<const PublishedCalibration> SelfCalibration::work() {
   if (storing_is_due()) {
@@ -334,6 +343,7 @@ std::shared_ptr<const PublishedCalibration> SelfCalibration::work() {
     last_store_s_ = now_s_;
     say_once(archive_->save_pending(&error) ? "the calibration is stored now" : error);
   }
+  if (centre_is_due()) free_the_centre();
   if (adjusting_is_due()) {
     last_try_s_ = session_.newest_s();
     if (is_calibrated_here() && !fresh_wanted_) {

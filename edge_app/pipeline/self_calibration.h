@@ -10,6 +10,8 @@
 //   watches    later motion is calibrated on its own and held against what is published: it refines it, or
 //              contradicts it; where landmarks and telemetry disagree for long, the calibration is withdrawn
 //   zoom       one calibration for each; the stored one is used when the camera returns, unless it was withdrawn
+//   zooms      where telemetry tells of several readings, calibrations have a free optical centre and become nodes of a zoom curve,
+//              which holds at every reading at once (zoom_nodes.h). What contradicts it twice in a row begins a new one
 //   delay      while the video's delay wanders, landmarks that disagree with telemetry tell nothing of the camera: nothing is
 //              withdrawn, and nothing calibrated
 //
@@ -29,23 +31,26 @@
 #include "edge_app/pipeline/calibration_watch.h"
 #include "edge_app/pipeline/published_calibration.h"
 #include "edge_app/pipeline/session_calibration.h"
+#include "edge_app/pipeline/zoom_nodes.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 
 namespace alidade {
 
 // When something is tried: seconds, of data where it says so, else between two tries.
 struct CalibrationSchedule {
-  double first_try_s = 6;          // of data
-  double next_try_s = 1.5;         // of new data
-  int many_tries = 20;             // in vain, after which ...
-  double slow_try_s = 5;           // ... so much new data is awaited
-  double watch_window_s = 12;      // of data for a calibration that is held against another
-  double first_watch_s = 12;       // doubling up to ...
-  double longest_watch_s = 600;    // ... this
-  double store_retry_s = 60;       // what a full disk did not take
-  double zoom_arrives_s = 0.1;     // without a change: it does not just pass by
-  double zoom_settles_s = 0.5;     // before anything is adjusted
-  double silence_s = 2;            // without a frame or sample, while the other stream goes on
+  double first_try_s = 6;        // of data
+  double next_try_s = 1.5;       // of new data
+  int many_tries = 20;           // in vain, after which ...
+  double slow_try_s = 5;         // ... so much new data is awaited
+  double watch_window_s = 12;    // of data for a calibration that is held against another
+  double first_watch_s = 12;     // doubling up to ...
+  double longest_watch_s = 600;  // ... this
+  double store_retry_s = 60;     // what a full disk did not take
+  double zoom_arrives_s = 0.1;   // without a change: it does not just pass by
+  double zoom_settles_s = 0.5;   // before anything is adjusted
+  double zoom_glitch_s = 0.2;    // a reading that differs for less is none; no movement is shorter
+  double zoom_silence_s = 5;     // without a reading, where there were some
+  double silence_s = 2;          // without a frame or sample, while the other stream goes on
   double worth_publishing = 0.75;  // of a parameter's sigma, to which a refinement must bring one
   double most_wander_s = 0.01;     // of the video's delay
 };
@@ -56,6 +61,7 @@ struct SelfCalibrationOptions {
   KnownCamera camera;             // what is known of it beside them
   CalibrationNoise noise;
   double zoom_tolerance = 0;  // device units within which a calibration holds
+  bool zooms = false;         // known beforehand; else the second reading tells
   SessionLimits session;
   CalibrationSchedule schedule;
   CalibrationChecks checks;
@@ -98,6 +104,9 @@ class SelfCalibration {
  private:
   void begin_anew();
   void begin_fresh();
+  void judge_zoom(const PanTiltSample& sample);
+  void take_zoom(double zoom, double changed_s);
+  void clock_began_anew();
   void look_for_stored();
   [[nodiscard]] bool is_rejected(const Calibration& calibration) const;
   // True: the delay wanders, and the frame is of no use.
@@ -107,11 +116,22 @@ class SelfCalibration {
   [[nodiscard]] bool is_calibrated_here() const;
   [[nodiscard]] bool storing_is_due() const;
   [[nodiscard]] bool adjusting_is_due() const;
+  [[nodiscard]] bool makes_nodes() const { return zooms_ && zoom_.has_value(); }
+  [[nodiscard]] bool centre_is_due() const { return zooms_ && of_first_zoom_.has_value(); }
   // known: what is published, as prior; null: from the data alone.
-  [[nodiscard]] SessionCalibration adjust(const Calibration* known) const;
+  [[nodiscard]] SessionCalibration adjust(const CalibrationSession& session,
+                                          const Calibration* known) const;
+  void keep_first_zoom();
+  void free_the_centre();
   void try_first();
   void hold_against_published();
+  void settle(SessionCalibration checked);
+  void refine_node(SessionCalibration alone);
+  void take_node(const ZoomAddition& addition, SessionCalibration* checked);
+  void contradict_nodes(const SessionCalibration& alone, const std::string& why);
+  void begin_nodes_anew(const SessionCalibration& alone);
   void publish(const SessionCalibration& checked);
+  void store(const SessionCalibration& checked, const MapState& map);
   void say_once(const std::string& line);
 
   SelfCalibrationOptions options_;
@@ -123,8 +143,21 @@ class SelfCalibration {
   double last_try_s_ = 0;
   int tries_ = 0;
 
+  // What the first zoom's calibration was made of, for another one with a free optical centre.
+  struct FirstZoom {
+    double zoom = 0;
+    CalibrationSession session;
+    bool clock_holds = true;
+  };
+
   std::optional<double> zoom_;
+  bool zooms_;  // the camera has more than one zoom
+  ZoomNodes nodes_;
+  std::optional<FirstZoom> of_first_zoom_;  // until it is known that there is another one
   double zoom_changed_s_ = -1e9;
+  std::optional<double>
+      odd_zoom_s_;  // since when readings differ, after it stood still: a glitch, or a movement
+  double last_zoom_s_ = 0;
   double now_s_ = 0;  // the latest receive time of either stream
   double last_frame_s_ = 0;
   double last_sample_s_ = 0;

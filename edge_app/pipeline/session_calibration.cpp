@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 
+#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -42,6 +43,65 @@ void set_priors(const KnownCalibration& known, double inflation, double common_s
     adjustment->axis_sigma_rad =
         std::max(adjustment->axis_sigma_rad, inflation * parameter_sigma(calibration, p));
   }
+}
+
+// The covariance by factor^2, but for the priors' part: one calibration of many gives its priors back (zoom_fit.h). False: it is not
+// positive.
+bool grow_beyond_priors(const CalibrationOptions& made_with, double factor,
+                        Calibration* calibration) {
+  Eigen::VectorXd prior = Eigen::VectorXd::Zero(kParameterCount);  // information
+  const auto set = [&prior](Parameter p, double sigma) {
+    if (sigma > 0) prior[index(p)] = 1 / (sigma * sigma);
+  };
+  const auto set_if = [&set](Parameter p, const std::optional<CalibrationPrior>& known) {
+    if (known) set(p, known->sigma);
+  };
+  set_if(Parameter::kFocalLength, made_with.focal_length);
+  set_if(Parameter::kAspect, made_with.aspect);
+  set_if(Parameter::kRadialDistortion, made_with.radial_distortion);
+  set_if(Parameter::kLineDelay, made_with.line_delay);
+  set_if(Parameter::kClockOffset, made_with.clock_offset);
+  set(Parameter::kPanScale, made_with.pan_scale.sigma);
+  set(Parameter::kTiltScale, made_with.tilt_scale.sigma);
+  for (const Parameter p : {Parameter::kCentreU, Parameter::kCentreV})
+    set(p, made_with.centre_sigma_px);
+  for (const Parameter p :
+       {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
+    set(p, made_with.axis_sigma_rad);
+  }
+  // In units of the sigmas, over what is not exact.
+  Eigen::VectorXd sigma = calibration->covariance.diagonal().cwiseMax(0).cwiseSqrt();
+  std::vector<int> rows;
+  for (int i = 0; i < kParameterCount; ++i) {
+    if (sigma[i] > 0) rows.push_back(i);
+  }
+  const auto size = static_cast<Eigen::Index>(rows.size());
+  Eigen::MatrixXd correlation(size, size);
+  Eigen::VectorXd known(size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    const int row = rows[static_cast<std::size_t>(i)];
+    known[i] = prior[row] * sigma[row] * sigma[row];
+    for (Eigen::Index j = 0; j < size; ++j) {
+      const int column = rows[static_cast<std::size_t>(j)];
+      correlation(i, j) = calibration->covariance(row, column) / (sigma[row] * sigma[column]);
+    }
+  }
+  const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(size, size);
+  const Eigen::LLT<Eigen::MatrixXd> llt(correlation);
+  if (llt.info() != Eigen::Success) return false;
+  Eigen::MatrixXd information = llt.solve(one) / (factor * factor);
+  information.diagonal() += (1 - 1 / (factor * factor)) * known;
+  const Eigen::LLT<Eigen::MatrixXd> grown(information);
+  if (grown.info() != Eigen::Success) return false;
+  const Eigen::MatrixXd covariance = grown.solve(one);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    for (Eigen::Index j = 0; j < size; ++j) {
+      const int row = rows[static_cast<std::size_t>(i)];
+      const int column = rows[static_cast<std::size_t>(j)];
+      calibration->covariance(row, column) = covariance(i, j) * sigma[row] * sigma[column];
+    }
+  }
+  return true;
 }
 
 // Leaves the others in *observations.
@@ -116,7 +176,12 @@ SessionCalibration calibrate_session(const CalibrationSession& session,
   const double unit = std::max(1.0, result.quality.pixel_sigma_ratio);
   checked.refusal = refusal_of(result.quality, checked.hold_out, unit, options.checks);
   const double excess = std::max(1.0, checked.hold_out / unit);
-  result.calibration.covariance *= excess * excess;
+  checked.adjustment = std::move(calibrated.options);
+  checked.common_clock_sigma_s = common_s;
+  if (!(checked.adjustment.centre_sigma_px > 0) ||
+      !grow_beyond_priors(checked.adjustment, excess, &result.calibration)) {
+    result.calibration.covariance *= excess * excess;
+  }
   const int d = index(Parameter::kClockOffset);
   result.calibration.covariance(d, d) += common_s * common_s;
   return checked;

@@ -5,7 +5,7 @@
 //   unit     = max(1, pixel_sigma_ratio)         by how much the tracker's sigmas are too small
 //   excess   = max(1, hold_out / unit)           by how much the calibration predicts worse than it claims
 //   covariance of the result = excess^2 times that of calibrate(), and of the clock offset what all polls of
-//              the telemetry have in common on top
+//              the telemetry have in common on top; with a free optical centre only what is not from priors grows
 // The trajectory may be coarser than the motion, and patches err alike: what the model lacks shows where it was not
 // fitted. Allocates; takes tenths of seconds. Pure.
 
@@ -51,6 +51,8 @@ struct SessionCalibration {
   std::string refusal;               // empty: it may be published
   double hold_out = 0;               // rms of the normalised residuals in frames that were not used
   std::vector<std::string> remarks;  // what is known beforehand and was not taken
+  CalibrationOptions adjustment;     // as used, with its priors
+  double common_clock_sigma_s = 0;   // what all polls have in common, in the clock offset
 };
 
 // known: null: from the data, and what is known of the camera beforehand.

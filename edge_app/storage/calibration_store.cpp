@@ -81,9 +81,9 @@ std::vector<fs::path> maps_of(const fs::path& yaml) {
 }
 
 // Says what was done with a file that is of no use: moved to a name of its own where that is possible.
-std::string set_aside(const fs::path& path) {
-  fs::path aside = path.string() + ".damaged";
-  for (int i = 1; is_there(aside); ++i) aside = fmt::format("{}.damaged.{}", path.string(), i);
+std::string set_aside(const fs::path& path, const char* as = ".damaged") {
+  fs::path aside = path.string() + as;
+  for (int i = 1; is_there(aside); ++i) aside = fmt::format("{}{}.{}", path.string(), as, i);
   std::error_code error;
   fs::rename(path, aside, error);
   if (error) return "not used; cannot be set aside: " + error.message();
@@ -91,9 +91,9 @@ std::string set_aside(const fs::path& path) {
 }
 
 // With the maps of a calibration, which another one would otherwise replace.
-std::string set_aside_with_maps(const fs::path& yaml) {
-  for (const fs::path& map : maps_of(yaml)) static_cast<void>(set_aside(map));
-  return set_aside(yaml);
+std::string set_aside_with_maps(const fs::path& yaml, const char* as = ".damaged") {
+  for (const fs::path& map : maps_of(yaml)) static_cast<void>(set_aside(map, as));
+  return set_aside(yaml, as);
 }
 
 // The map that a calibration names, which was parsed before; an empty path if it names none. False with a
@@ -248,7 +248,30 @@ bool CalibrationStore::save(const StoredCalibration& calibration, std::string* e
   const std::string path = same ? entry.stored.path : "";
   entry = {calibration, true};
   entry.stored.path = path;
-  return write(&entry, error);
+  if (calibration.notes.zoom_curve.empty()) return write(&entry, error);
+  curve_ = calibration.notes.zoom_curve;
+  for (Entry& other : entries_) {
+    if (&other != &entry && !curve_path_.empty() && other.stored.path == curve_path_)
+      other.pending = true;
+  }
+  return save_pending(error);
+}
+
+std::string CalibrationStore::set_zooms_aside() {
+  std::string done;
+  const auto is_of_a_zoom = [this](const Entry& entry) {
+    return entry.stored.calibration.zoom ||
+           (!curve_path_.empty() && entry.stored.path == curve_path_);
+  };
+  for (const Entry& entry : entries_) {
+    if (!is_of_a_zoom(entry) || entry.stored.path.empty()) continue;
+    done += fmt::format("{}{}: {}", done.empty() ? "" : "; ", entry.stored.path,
+                        set_aside_with_maps(entry.stored.path, ".replaced"));
+  }
+  entries_.erase(std::remove_if(entries_.begin(), entries_.end(), is_of_a_zoom), entries_.end());
+  curve_ = {};
+  curve_path_.clear();
+  return done;
 }
 
 bool CalibrationStore::has_pending() const {
@@ -268,16 +291,19 @@ bool CalibrationStore::save_pending(std::string* error) {
 }
 
 // A name for a new file that no other calibration has: what a file holds counts, not how it is called.
-std::string CalibrationStore::free_path(std::optional<double> zoom) const {
+std::string CalibrationStore::free_path(const StoredCalibration& stored) const {
+  const std::optional<double>& zoom = stored.calibration.zoom;
   const fs::path file(file_);
   const fs::path begin = folder_of(file) / file.stem();
   const std::string named =
       fmt::format("{}.zoom-{}", begin.string(), zoom ? fmt::format("{}", *zoom) : "any");
-  std::string path = zoom ? named + kExtension : file_;
+  const bool brings_curve = curve_path_.empty() && !stored.notes.zoom_curve.empty();
+  std::string path = zoom && !brings_curve ? named + kExtension : file_;
   const auto taken = [&] {
     return std::any_of(entries_.begin(), entries_.end(),
                        [&](const Entry& entry) { return entry.stored.path == path; });
   };
+  if (brings_curve && taken()) path = named + kExtension;
   for (int i = 1; taken(); ++i) path = fmt::format("{}-{}{}", named, i, kExtension);
   return path;
 }
@@ -286,7 +312,7 @@ std::string CalibrationStore::free_path(std::optional<double> zoom) const {
 // whatever comes between, the calibration on disk has its map beside it.
 bool CalibrationStore::write(Entry* entry, std::string* error) {
   StoredCalibration& stored = entry->stored;
-  const fs::path path = stored.path.empty() ? free_path(stored.calibration.zoom) : stored.path;
+  const fs::path path = stored.path.empty() ? free_path(stored) : stored.path;
   std::error_code failure;
   fs::create_directories(folder_of(path), failure);
   if (failure) {
@@ -298,7 +324,9 @@ bool CalibrationStore::write(Entry* entry, std::string* error) {
   std::string map_flaw;
   stored.notes.landmarks.clear();
   // A new calibration at one reading leaves the others alone.
-  if (path == curve_path_) stored.notes.zoom_curve = curve_;
+  const bool holds_curve =
+      curve_path_.empty() ? !stored.notes.zoom_curve.empty() : path == curve_path_;
+  stored.notes.zoom_curve = holds_curve ? curve_ : ZoomCurve();
   if (!stored.map.landmarks.empty()) {
     const MapContent content{{}, stored.map};
     const std::string bytes = format_map(content, stored.calibration);
@@ -318,6 +346,7 @@ bool CalibrationStore::write(Entry* entry, std::string* error) {
     return false;
   }
   stored.path = path.string();
+  if (holds_curve) curve_path_ = stored.path;
   entry->pending = false;
   for (const fs::path& old : maps_of(path)) {
     if (old != map) fs::remove(old, failure);

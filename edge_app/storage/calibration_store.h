@@ -2,7 +2,8 @@
 // CalibrationStore: the calibrations of one camera on disk, one for each zoom setting, each with its map.
 //   FILE                      the calibration without zoom (INTERFACES: calibration.file)
 //   STEM.zoom-1234.5.yaml     the one at that zoom, beside it; the zoom that it holds counts, not its name
-//   either                    may hold the camera's zoom curve, which gives a calibration where no file has one
+//   either                    may hold the camera's zoom curve, which gives a calibration where no file has one: the file of
+//                             the calibration with which it came, FILE if there was none
 //   *.map-1a2b3c4d.bin        the map that a yaml names, beside it, tied to it by checksum (map_file.h)
 // A file that is damaged, cannot be read, or is not of this image size, is set aside with its maps (renamed to
 // NAME.damaged, .damaged.1 ...), said, and never used. A map that is damaged costs the map only.
@@ -36,6 +37,8 @@ class CalibrationStore final : public CalibrationArchive {
   [[nodiscard]] bool save(const StoredCalibration& calibration, std::string* error) override;
   [[nodiscard]] bool has_pending() const override;
   [[nodiscard]] bool save_pending(std::string* error) override;
+  // Renamed to NAME.replaced, .replaced.1 ..., with their maps.
+  [[nodiscard]] std::string set_zooms_aside() override;
 
  private:
   struct Entry {
@@ -45,7 +48,7 @@ class CalibrationStore final : public CalibrationArchive {
 
   void load_file(const std::string& path, int width, int height, std::vector<std::string>* lines);
   [[nodiscard]] std::optional<std::size_t> nearest(std::optional<double> zoom) const;
-  [[nodiscard]] std::string free_path(std::optional<double> zoom) const;
+  [[nodiscard]] std::string free_path(const StoredCalibration& stored) const;
   [[nodiscard]] bool write(Entry* entry, std::string* error);
 
   std::string file_;

@@ -28,6 +28,10 @@ class MemoryArchive : public CalibrationArchive {
   [[nodiscard]] bool save(const StoredCalibration& calibration, std::string* error) override;
   [[nodiscard]] bool has_pending() const override { return false; }
   [[nodiscard]] bool save_pending(std::string*) override { return true; }
+  [[nodiscard]] std::string set_zooms_aside() override {
+    kept_.clear();
+    return "";
+  }
 
  private:
   double zoom_tolerance_;

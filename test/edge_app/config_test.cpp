@@ -104,6 +104,17 @@ TEST_F(ConfigTest, TheHttpServerHasAnAddressAndATokenFromElsewhere) {
   EXPECT_EQ(config_.output.stdout_format, OutputFormat::kCsv);
 }
 
+TEST_F(ConfigTest, TakesTheFocalLengthsOfALensThatZooms) {
+  ASSERT_THAT(load("video: {type: rtsp, url: 'rtsp://camera/s'}\n"
+                   "pan_tilt: {type: vapix, url: 'http://camera'}\n"
+                   "camera: {focal_length_px: {wide: 1000, tele: 16000}}\n"),
+              IsEmpty());
+  ASSERT_TRUE(config_.camera.focal_length_range);
+  EXPECT_EQ(config_.camera.focal_length_range->wide_px, 1000);
+  EXPECT_EQ(config_.camera.focal_length_range->tele_px, 16000);
+  EXPECT_DOUBLE_EQ(*config_.camera.focal_length_px, 4000);
+}
+
 TEST_F(ConfigTest, WarnsOfAnHttpServerThatIsOpenToAll) {
   ASSERT_THAT(load(std::string(kMinimal) + "output: {http: '0.0.0.0:8080'}\n"), IsEmpty());
   ASSERT_EQ(config_.warnings.size(), 1U);
@@ -652,6 +663,21 @@ INSTANTIATE_TEST_SUITE_P(
                 ":4: camera.focal_length_px", "not a plain number"},
         Mistake{"NumberOutOfRange", MINIMAL "camera: {focal_length_px: -5}\n",
                 ":4: camera.focal_length_px", "from 1 to 100000000 (px)"},
+        Mistake{"RangeWithoutTele", MINIMAL "camera: {focal_length_px: {wide: 1200}}\n",
+                ":4: camera.focal_length_px.tele", "is missing; give wide and tele, px"},
+        Mistake{"RangeTurnedRound",
+                MINIMAL "camera: {focal_length_px: {wide: 24000, tele: 1200}}\n",
+                ":4: camera.focal_length_px.tele",
+                "is 1200 px and wide is 24000 px; wide is the shorter of the two"},
+        Mistake{"RangeOfOne", MINIMAL "camera: {focal_length_px: {wide: 1200, tele: 1200}}\n",
+                ":4: camera.focal_length_px.tele", "wide is the shorter of the two"},
+        Mistake{"RangeFromZero", MINIMAL "camera: {focal_length_px: {wide: 0, tele: 1200}}\n",
+                ":4: camera.focal_length_px.wide", "from 1 to 100000000 (px)"},
+        Mistake{"RangeToNaN", MINIMAL "camera: {focal_length_px: {wide: 1200, tele: .nan}}\n",
+                ":4: camera.focal_length_px.tele", "not a plain number"},
+        Mistake{"RangeWithAThird",
+                MINIMAL "camera: {focal_length_px: {wide: 1, tele: 2, middle: 1.5}}\n",
+                ":4: camera.focal_length_px.middle", "unknown key"},
         Mistake{"LineDelayInMicroseconds", MINIMAL "camera: {line_delay_s: 14.2}\n",
                 ":4: camera.line_delay_s", "(s/row)"},
         Mistake{"FractionForAWholeNumber", MINIMAL "realtime: {priority: 1.5}\n",

@@ -6,11 +6,14 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+#include <memory>
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <thread>
 
 #include "test/edge_app/http_client.h"
+#include "test/support/zoom_nodes.h"
 
 namespace alidade {
 namespace {
@@ -37,6 +40,7 @@ class HttpApiTest : public ::testing::Test {
     sources.summary = [this] { return summary_; };
     sources.video_losses = [] { return FrameSourceCounters{3, 4}; };
     sources.ask_for_calibration = [this] { return asked_ = calibrating_; };
+    sources.zoom_curve = [this] { return curve_; };
     sources.version = "1.2.3";
     sources.camera = "a camera";
     add_api_routes(&server_, sources);
@@ -60,6 +64,7 @@ class HttpApiTest : public ::testing::Test {
 
   LiveState live_{few_lines()};
   PipelineSummary summary_;
+  std::shared_ptr<const ZoomCurve> curve_;
   bool calibrating_ = false;
   bool asked_ = false;
   HttpServer server_{HttpServerOptions{}};
@@ -137,6 +142,44 @@ TEST_F(HttpApiTest, AFrameWithoutAnOrientationHasNoDirectionsAndSaysWhy) {
   EXPECT_THAT(post("/api/v1/pixel", R"({"time_s":100.28,"directions":[[1,0,0]]})"),
               StartsWith("HTTP/1.1 409 "));
   EXPECT_THAT(get("/api/v1/calibration"), StartsWith("HTTP/1.1 404 "));
+}
+
+TEST_F(HttpApiTest, TellsTheZoomCurveWithTheCalibration) {
+  OrientationRecord record = record_without_orientation(1);
+  record.calibrated = true;
+  const ZoomCurve curve = test::zoom_curve();
+  record.camera = pack(curve.node(2));
+  ASSERT_TRUE(live_.write(record));
+  EXPECT_FALSE(body_of(get("/api/v1/calibration")).contains("zoom_curve"));
+  EXPECT_THAT(get("/metrics"), HasSubstr("\nalidade_zoom_curve_nodes 0\n"));
+  curve_ = std::make_shared<const ZoomCurve>();
+  EXPECT_FALSE(body_of(get("/api/v1/calibration")).contains("zoom_curve")) << "an empty one";
+  curve_ = std::make_shared<const ZoomCurve>(curve);
+  const json told = body_of(get("/api/v1/calibration"))["zoom_curve"];
+  ASSERT_EQ(told["nodes"].size(), 5U);
+  for (int i = 0; i < 5; ++i) {
+    const Calibration c = curve.node(i);
+    const json& node = told["nodes"][static_cast<std::size_t>(i)];
+    EXPECT_EQ(node["reading"], *c.zoom);
+    EXPECT_EQ(node["focal_length"]["value"], c.camera.focal_length);
+    EXPECT_EQ(node["focal_length"]["sigma"], std::sqrt(c.covariance(0, 0)));
+    EXPECT_EQ(node["centre_offset"]["value"][0], c.camera.centre_u);
+  }
+  const json& samples = told["samples"];
+  ASSERT_EQ(samples["reading"].size(), samples["focal_length_px"].size());
+  ASSERT_GE(samples["reading"].size(), 20U);
+  EXPECT_EQ(samples["reading"].front(), 1000);
+  EXPECT_EQ(samples["reading"].back(), 2000);
+  for (std::size_t i = 0; i < samples["reading"].size(); ++i) {
+    Calibration c;
+    ASSERT_TRUE(curve.at(samples["reading"][i], &c));
+    EXPECT_EQ(samples["focal_length_px"][i], c.camera.focal_length);
+    EXPECT_EQ(samples["focal_length_sigma_px"][i], std::sqrt(c.covariance(0, 0)));
+  }
+  const std::string metrics = get("/metrics");
+  EXPECT_THAT(metrics, HasSubstr("\nalidade_zoom_curve_nodes 5\n"));
+  EXPECT_THAT(metrics, HasSubstr("\nalidade_calibration_zoom_reading 1500\n"));
+  EXPECT_THAT(metrics, HasSubstr("\nalidade_zoom_curve_reading{end=\"last\"} 2000\n"));
 }
 
 TEST_F(HttpApiTest, PassesOnThatAFreshCalibrationIsWanted) {

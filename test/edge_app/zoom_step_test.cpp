@@ -64,6 +64,18 @@ TEST(ZoomStep, HasAnOrientationAtEveryReading) {
   }
 }
 
+TEST(ZoomStep, AReadingThatIsNoNumberIsLeftOut) {
+  OrientationStep step(zooming_options());
+  for (int i = 0; i < 25; ++i) {
+    step.add_telemetry(
+        sample_at(kInterval_s * i, i % 2 == 1 ? 1500 : std::numeric_limits<double>::quiet_NaN()));
+  }
+  const OrientationRecord record = frame_at(&step, 0.9);
+  EXPECT_EQ(record.mode, RecordMode::kPt);
+  EXPECT_EQ(record.status, RecordStatus::kOk);
+  EXPECT_EQ(record.camera.zoom, 1500);
+}
+
 TEST(ZoomStep, HasNoneBeyondTheCurveOrWithoutOne) {
   for (const bool with_curve : {true, false}) {
     OrientationStepOptions options = zooming_options();

@@ -12,6 +12,7 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/calibration/calibration_text.h"
+#include "core/model/direction.h"
 #include "test/support/simulated_recording.h"
 
 namespace alidade {
@@ -356,6 +357,178 @@ TEST(ZoomFit, RefusesWhatIsNoCurveOfOneCamera) {
     bad[1].covariance.col(index(p)).setZero();
   }
   EXPECT_THAT(refusal(bad), HasSubstr("do not take the same parameters as exact"));
+}
+
+// In sigmas of `of`, and the largest change of a sigma.
+struct CurveDifference {
+  double value = 0;
+  double sigma = 0;
+};
+CurveDifference difference(const Calibration& of, const Calibration& other) {
+  CurveDifference worst;
+  const auto compare = [&](double a, double b, Parameter p) {
+    const double sigma = std::sqrt(of.covariance(index(p), index(p)));
+    worst.value = std::max(worst.value, std::abs(a - b) / sigma);
+    worst.sigma = std::max(
+        worst.sigma, std::abs(std::log(std::sqrt(other.covariance(index(p), index(p))) / sigma)));
+  };
+  compare(of.camera.focal_length, other.camera.focal_length, Parameter::kFocalLength);
+  compare(of.camera.radial_distortion, other.camera.radial_distortion,
+          Parameter::kRadialDistortion);
+  compare(of.camera.centre_u, other.camera.centre_u, Parameter::kCentreU);
+  compare(of.camera.centre_v, other.camera.centre_v, Parameter::kCentreV);
+  compare(of.line_delay, other.line_delay, Parameter::kLineDelay);
+  compare(of.clock_offset, other.clock_offset, Parameter::kClockOffset);
+  const Vector2<double> turn =
+      direction_minus<double>(of.mechanics.tilt_axis, other.mechanics.tilt_axis);
+  compare(turn[0], 0, Parameter::kTiltAxis0);
+  compare(turn[1], 0, Parameter::kTiltAxis1);
+  return worst;
+}
+
+ZoomFit extended(const ZoomCurve& curve, const Calibration& added, std::optional<int> visit_of = {},
+                 const ZoomFitOptions& options = fit_options()) {
+  ZoomFit fit;
+  std::string error;
+  EXPECT_TRUE(extend_zoom(curve, added, visit_of, options, &fit, &error)) << error;
+  return fit;
+}
+
+// Each order of coming, each node and a reading between: what all say together. The roughness is chosen by what the nodes say
+// once all is known of them, not by each alone: between nodes sigmas differ by that.
+TEST(ZoomExtension, IsAsIfAllHadBeenFittedTogether) {
+  const std::vector<Calibration> all = calibrations(five_visits());
+  const ZoomCurve together = five_curve();
+  for (const std::vector<int>& order :
+       {std::vector<int>{0, 1, 2, 3, 4}, {4, 0, 2, 1, 3}, {2, 3, 4, 1, 0}}) {
+    ZoomFit fit;
+    std::string error;
+    ASSERT_TRUE(
+        fit_zoom({all[static_cast<std::size_t>(order[0])], all[static_cast<std::size_t>(order[1])]},
+                 fit_options(), &fit, &error))
+        << error;
+    for (int i = 2; i < 5; ++i) {
+      const auto which = static_cast<std::size_t>(order[static_cast<std::size_t>(i)]);
+      fit = extended(fit.curve, all[which]);
+      EXPECT_EQ(fit.curve.node(fit.node).zoom, all[which].zoom);
+    }
+    ASSERT_EQ(fit.curve.content().nodes, 5);
+    for (int i = 0; i < 5; ++i) {
+      const CurveDifference d = difference(together.node(i), fit.curve.node(i));
+      EXPECT_LT(d.value, 0.1) << i;
+      EXPECT_LT(d.sigma, 0.05) << i;
+    }
+    for (const double reading : {1500.0, 6000.0}) {
+      Calibration a;
+      Calibration b;
+      ASSERT_TRUE(together.at(reading, &a));
+      ASSERT_TRUE(fit.curve.at(reading, &b));
+      EXPECT_LT(difference(a, b).value, 0.5) << reading;
+    }
+  }
+}
+
+TEST(ZoomExtension, AnotherObservationOfAVisitIsOneOfTheSameNode) {
+  const std::vector<Calibration> all = calibrations(five_visits());
+  const ZoomCurve before = five_curve();
+  const ZoomFit same = extended(before, all[3], 3);
+  ASSERT_EQ(same.curve.content().nodes, 5);
+  EXPECT_EQ(same.node, 3);
+  const auto variance = [](const ZoomCurve& curve, int node) {
+    return curve.node(node).covariance(0, 0);
+  };
+  // Twice the same: half the variance, and a value between that of its own and all together.
+  EXPECT_NEAR(variance(same.curve, 3) / variance(before, 3), 0.5, 0.02);
+  EXPECT_LT(difference(before.node(3), same.curve.node(3)).value, 1);
+  const ZoomFit another = extended(before, all[3]);
+  ASSERT_EQ(another.curve.content().nodes, 6);
+  EXPECT_EQ(another.curve.node(another.node).zoom, all[3].zoom);
+  // Of that visit alone, but for what they share.
+  EXPECT_GT(variance(another.curve, another.node) / variance(before, 3), 0.8);
+}
+
+TEST(ZoomExtension, KeepsWhatNodesSaidThatMakeRoom) {
+  ZoomCurve curve = five_curve();
+  const std::vector<Calibration> more = calibrations(visit({3000, 8500}, 5));
+  for (int i = 0; i < 40; ++i) curve = extended(curve, more[i % 2 == 0 ? 0 : 1]).curve;
+  ASSERT_EQ(curve.content().nodes, ZoomCurve::kMaxNodes);
+  EXPECT_EQ(curve.first_reading(), kFirst);
+  EXPECT_EQ(curve.last_reading(), kLast);
+  for (int i = 0; i < curve.content().nodes; ++i) {
+    EXPECT_TRUE(curve.node(i).covariance.allFinite());
+    EXPECT_GT(curve.node(i).covariance(0, 0), 0);
+  }
+  // Forty calibrations told the line delay; some of them are no nodes by then.
+  const int l = index(Parameter::kLineDelay);
+  const double one = more[0].covariance(l, l);
+  EXPECT_LT(curve.node(0).covariance(l, l), 1.3 * one / 40);
+}
+
+TEST(ZoomExtension, AClockOfAnotherConnectionContradictsNothing) {
+  Calibration later = five_visits()[2].calibration;
+  later.clock_offset += 0.004;
+  ZoomFit fit;
+  std::string error;
+  ZoomFitOptions options = fit_options();
+  EXPECT_FALSE(extend_zoom(five_curve(), later, {}, options, &fit, &error));
+  EXPECT_THAT(error, HasSubstr("does not share"));
+  options.clock_is_another = true;
+  fit = extended(five_curve(), later, {}, options);
+  const int d = index(Parameter::kClockOffset);
+  EXPECT_NEAR(fit.curve.node(0).clock_offset, later.clock_offset,
+              std::sqrt(later.covariance(d, d)));
+}
+
+// However many calibrations there are.
+TEST(ZoomExtension, DoesNotAverageOutWhatAllClockOffsetsHaveInCommon) {
+  ZoomFitOptions options = fit_options();
+  options.common_clock_sigma_s = 2e-3;
+  const int d = index(Parameter::kClockOffset);
+  std::vector<Calibration> all = calibrations(five_visits());
+  for (Calibration& c : all) c.covariance(d, d) += std::pow(options.common_clock_sigma_s, 2);
+  ZoomFit fit;
+  std::string error;
+  ASSERT_TRUE(fit_zoom({all[0], all[4]}, options, &fit, &error)) << error;
+  for (const int i : {1, 2, 3}) {
+    fit = extended(fit.curve, all[static_cast<std::size_t>(i)], {}, options);
+    const double sigma = std::sqrt(fit.curve.node(0).covariance(d, d));
+    EXPECT_GE(sigma, options.common_clock_sigma_s);
+    EXPECT_LT(sigma, 1.1 * options.common_clock_sigma_s);
+  }
+}
+
+TEST(ZoomExtension, RefusesWhatIsNotOfThisCamera) {
+  const Calibration good = five_visits()[2].calibration;
+  const auto refusal = [](const Calibration& added) {
+    ZoomFit fit;
+    std::string error;
+    EXPECT_FALSE(extend_zoom(five_curve(), added, {}, fit_options(), &fit, &error));
+    EXPECT_EQ(error.find('\n'), std::string::npos);
+    return error;
+  };
+  Calibration bad = good;
+  bad.zoom.reset();
+  EXPECT_THAT(refusal(bad), HasSubstr("no zoom reading"));
+  bad = good;
+  bad.camera.height = 960;
+  EXPECT_THAT(refusal(bad), HasSubstr("different sizes"));
+  bad = good;
+  bad.line_delay += 1e-6;
+  EXPECT_THAT(refusal(bad), HasSubstr("reading 5000 does not share line delay"));
+  bad = good;
+  bad.camera.focal_length *= 1.1;
+  EXPECT_THAT(refusal(bad), HasSubstr("does the reading follow the lens?"));
+  bad = good;
+  bad.zoom = 3000;
+  EXPECT_THAT(refusal(bad), HasSubstr("the focal length goes back between zoom readings"));
+  bad = good;
+  bad.covariance.row(index(Parameter::kCentreU)).setZero();
+  bad.covariance.col(index(Parameter::kCentreU)).setZero();
+  EXPECT_THAT(refusal(bad), HasSubstr("do not take the same parameters as exact"));
+  bad = good;
+  bad.covariance(index(Parameter::kClockOffset), index(Parameter::kLineDelay)) = 1;
+  bad.covariance(index(Parameter::kLineDelay), index(Parameter::kClockOffset)) = 1;
+  EXPECT_THAT(refusal(bad), HasSubstr("covariance that is not positive"));
 }
 
 TEST(ZoomText, IsReadBackAsItWasWritten) {

@@ -1,0 +1,158 @@
+#include "core/calibration/zoom_sample.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "core/model/direction.h"
+
+namespace alidade::internal {
+namespace {
+
+// Where a parameter of a calibration stands in a sample.
+Parameter zoom_parameter_at(int i) {
+  constexpr std::array<Parameter, kZoomQuantityCount> kLens = {
+      Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kCentreU,
+      Parameter::kCentreV};
+  return i < kZoomQuantityCount
+             ? kLens[static_cast<std::size_t>(i)]
+             : kSharedParameters[static_cast<std::size_t>(i - kZoomQuantityCount)];
+}
+
+// Of a shared parameter but the axes.
+double shared_value(const Calibration& c, Parameter parameter) {
+  switch (parameter) {
+    case Parameter::kAspect:
+      return c.camera.aspect;
+    case Parameter::kLineDelay:
+      return c.line_delay;
+    case Parameter::kPanScale:
+      return c.mechanics.pan_scale;
+    case Parameter::kTiltScale:
+      return c.mechanics.tilt_scale;
+    default:
+      return c.clock_offset;
+  }
+}
+
+}  // namespace
+
+int zoom_place_of(Parameter parameter) {
+  int place = 0;
+  while (zoom_parameter_at(place) != parameter) ++place;
+  return place;
+}
+
+ZoomSample make_zoom_sample(const Calibration& c, const Calibration& reference) {
+  ZoomSample sample;
+  sample.reading = *c.zoom;
+  const double per_corner =
+      std::pow(2 * c.camera.focal_length / std::hypot(c.camera.width, c.camera.height), 2);
+  sample.value.head<kZoomQuantityCount>() << std::log(c.camera.focal_length),
+      c.camera.radial_distortion / per_corner, c.camera.centre_u, c.camera.centre_v;
+  for (const Parameter p : {Parameter::kAspect, Parameter::kLineDelay, Parameter::kPanScale,
+                            Parameter::kTiltScale, Parameter::kClockOffset}) {
+    sample.value[zoom_place_of(p)] = shared_value(c, p) - shared_value(reference, p);
+  }
+
+  ZoomSampleMatrix J = ZoomSampleMatrix::Identity();
+  J(0, 0) = 1 / c.camera.focal_length;
+  J(1, 0) = -2 * c.camera.radial_distortion / (per_corner * c.camera.focal_length);
+  J(1, 1) = 1 / per_corner;
+  const auto set_axis = [&](Parameter first, const Vector3<double>& axis,
+                            const Vector3<double>& of_reference) {
+    const int place = zoom_place_of(first);
+    Matrix<double, 2, 3> J_axis;
+    sample.value.segment<2>(place) = direction_minus<double>(axis, of_reference, &J_axis);
+    J.block<2, 2>(place, place) = J_axis * tangent_basis(axis);
+  };
+  set_axis(Parameter::kPanAxis0, c.mechanics.pan_axis, reference.mechanics.pan_axis);
+  set_axis(Parameter::kTiltAxis0, c.mechanics.tilt_axis, reference.mechanics.tilt_axis);
+
+  ZoomSampleMatrix covariance;
+  for (int i = 0; i < kZoomSampleSize; ++i) {
+    for (int j = 0; j < kZoomSampleSize; ++j) {
+      covariance(i, j) = c.covariance(index(zoom_parameter_at(i)), index(zoom_parameter_at(j)));
+    }
+  }
+  sample.covariance = J * covariance * J.transpose();
+  return sample;
+}
+
+std::vector<int> free_places(const Eigen::MatrixXd& covariance) {
+  std::vector<int> places;
+  for (int i = 0; i < covariance.rows(); ++i) {
+    if (covariance(i, i) > 0) places.push_back(i);
+  }
+  return places;
+}
+
+Eigen::MatrixXd part_of(const Eigen::MatrixXd& matrix, const std::vector<int>& places) {
+  const auto size = static_cast<Eigen::Index>(places.size());
+  Eigen::MatrixXd result(size, size);
+  for (Eigen::Index i = 0; i < size; ++i) {
+    for (Eigen::Index j = 0; j < size; ++j) {
+      result(i, j) =
+          matrix(places[static_cast<std::size_t>(i)], places[static_cast<std::size_t>(j)]);
+    }
+  }
+  return result;
+}
+
+Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& matrix) {
+  const Eigen::VectorXd scale = matrix.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+  const Eigen::LLT<Eigen::MatrixXd> llt(scale.asDiagonal() * matrix * scale.asDiagonal());
+  if (llt.info() != Eigen::Success) return {};
+  const Eigen::MatrixXd inverse =
+      llt.solve(Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
+  return scale.asDiagonal() * inverse * scale.asDiagonal();
+}
+
+bool set_zoom_information(const std::vector<int>& places, const ZoomFitOptions& options,
+                          const Calibration& reference, ZoomSample* sample) {
+  const Eigen::MatrixXd information = scaled_inverse(part_of(sample->covariance, places));
+  if (information.size() == 0) return false;
+  const auto set_prior = [&](Parameter parameter, double mean, double sigma) {
+    const int place = zoom_place_of(parameter);
+    constexpr double kRounding = 1e-6;
+    const double variance = sample->covariance(place, place);
+    if (sigma <= 0 || variance <= 0 || variance > (1 + kRounding) * sigma * sigma) return;
+    sample->prior_information[place] = 1 / (sigma * sigma);
+    sample->prior_weighted[place] = mean / (sigma * sigma);
+  };
+  set_prior(Parameter::kCentreU, 0, options.centre_sigma_px);
+  set_prior(Parameter::kCentreV, 0, options.centre_sigma_px);
+  const auto set_axis_prior = [&](Parameter first, const Vector3<double>& nominal,
+                                  const Vector3<double>& of_reference) {
+    const Vector2<double> mean = direction_minus<double>(nominal, of_reference);
+    set_prior(first, mean[0], options.axis_sigma_rad);
+    set_prior(static_cast<Parameter>(index(first) + 1), mean[1], options.axis_sigma_rad);
+  };
+  set_axis_prior(Parameter::kPanAxis0, Vector3<double>::UnitZ(), reference.mechanics.pan_axis);
+  set_axis_prior(Parameter::kTiltAxis0, Vector3<double>::UnitY(), reference.mechanics.tilt_axis);
+  for (const ZoomFitOptions::Prior& prior : options.shared_priors) {
+    set_prior(prior.parameter, prior.value - shared_value(reference, prior.parameter), prior.sigma);
+  }
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    for (std::size_t j = 0; j < places.size(); ++j) {
+      sample->information(places[i], places[j]) =
+          information(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+  }
+  return true;
+}
+
+void take_common_clock_error(const std::vector<int>& places, int clock, double common_sigma_s,
+                             Eigen::MatrixXd* covariance) {
+  constexpr double kMost = 0.96;  // of what the other parameters leave open
+  const auto at = std::find(places.begin(), places.end(), clock);
+  if (!(common_sigma_s > 0) || at == places.end()) return;
+  const Eigen::MatrixXd information = scaled_inverse(part_of(*covariance, places));
+  if (information.size() == 0) return;
+  const auto row = static_cast<Eigen::Index>(at - places.begin());
+  (*covariance)(clock, clock) -=
+      std::min(common_sigma_s * common_sigma_s, kMost / information(row, row));
+}
+
+}  // namespace alidade::internal

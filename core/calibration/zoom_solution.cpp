@@ -1,0 +1,202 @@
+#include "core/calibration/zoom_solution.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+
+#include "core/calibration/number_text.h"
+#include "core/model/direction.h"
+
+namespace alidade::internal {
+namespace {
+
+// Of the nodes' values, a movement's error at each included.
+Eigen::MatrixXd process_covariance(const ZoomCurve::Content& content, int quantity) {
+  const ZoomSmoothness& smoothness = content.smoothness[static_cast<std::size_t>(quantity)];
+  const double first = content.reading[0];
+  const double last = content.reading[static_cast<std::size_t>(content.nodes - 1)];
+  const auto position = [&](int node) {
+    return (content.reading[static_cast<std::size_t>(node)] - first) / (last - first);
+  };
+  // Two visits of one reading are not quite one, or no rounding would tell them apart: to hundredths of a pixel.
+  const double apart = quantity == 0 ? 1e-5 : 1e-4;
+  Eigen::MatrixXd K(content.nodes, content.nodes);
+  for (int i = 0; i < content.nodes; ++i) {
+    for (int j = 0; j < content.nodes; ++j)
+      K(i, j) = smoothness.covariance(position(i), position(j));
+    K(i, i) += std::pow(apart * smoothness.level_sigma, 2);
+    if (quantity == 0) K(i, i) += content.repeatability * content.repeatability;
+  }
+  return K;
+}
+
+// What is usual of lenses: a focal length whose logarithm bends by as much as it rises, a distortion of some parts in a
+// hundred at the corner, a centre within a hundredth of the image that wanders by half of that.
+std::array<ZoomSmoothness, kZoomQuantityCount> usual(double rise, const Camera<double>& camera) {
+  const double centre_px = kUsualCentreShare * camera.width;
+  return {ZoomSmoothness{5, 20, 1.5 * std::max(std::abs(rise), 0.1)}, ZoomSmoothness{0.3, 0.3, 0.1},
+          ZoomSmoothness{centre_px, centre_px, 0.5 * centre_px},
+          ZoomSmoothness{centre_px, centre_px, 0.5 * centre_px}};
+}
+
+bool is_monotone(const ZoomCurve& curve, std::string* error) {
+  constexpr int kSteps = 200;
+  const auto& value = curve.content().value;
+  const bool rises = value(kZoomQuantityCount * (curve.content().nodes - 1), 0) > value(0, 0);
+  double last_f = 0;
+  double last = 0;
+  for (int i = 0; i <= kSteps; ++i) {
+    const double reading =
+        curve.first_reading() + (curve.last_reading() - curve.first_reading()) * i / kSteps;
+    Calibration c;
+    if (!curve.at(reading, &c)) return false;
+    const double sigma =
+        std::sqrt(c.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength)));
+    const double back = rises ? last_f - c.camera.focal_length : c.camera.focal_length - last_f;
+    if (i > 0 && back > 3 * sigma) {
+      *error = "the focal length goes back between zoom readings " + short_text(last) + " and " +
+               short_text(reading) + "; readings of one lens, in one unit, are needed";
+      return false;
+    }
+    if (i == 0 || back < 0) {
+      last_f = c.camera.focal_length;
+      last = reading;
+    }
+  }
+  return true;
+}
+
+}  // namespace
+ZoomSolution::ZoomSolution(ZoomEvidence evidence, std::vector<int> places,
+                           const Calibration& reference, const ZoomFitOptions& options)
+    : evidence_(std::move(evidence)),
+      places_(std::move(places)),
+      reference_(reference),
+      options_(options),
+      nodes_(evidence_.nodes()) {}
+
+bool ZoomSolution::run(std::string* error) {
+  content_.nodes = nodes_;
+  std::copy(evidence_.reading.begin(), evidence_.reading.end(), content_.reading.begin());
+  content_.level = evidence_.level;
+  content_.repeatability = options_.repeatability;
+  content_.smoothness =
+      usual(evidence_.value(nodes_ - 1, 0) - evidence_.value(0, 0), reference_.camera);
+  choose_roughness();
+  if (solve()) return true;
+  *error = "the calibrations leave what their readings share undetermined";
+  return false;
+}
+
+ZoomSampleVector ZoomSolution::left_of(const ZoomSample& sample, int node) const {
+  ZoomSampleVector left = sample.value;
+  for (int a = 0; a < kZoomSampleSize; ++a) left[a] -= solution_[evidence_.row(node, a)];
+  for (int q = 0; q < kZoomQuantityCount; ++q) {
+    left[q] -= content_.level[static_cast<std::size_t>(q)];
+  }
+  return left;
+}
+
+int ZoomSolution::shared_places() const {
+  return static_cast<int>(std::count_if(places_.begin(), places_.end(),
+                                        [](int place) { return place >= kZoomQuantityCount; }));
+}
+
+bool ZoomSolution::curve(ZoomCurve* curve, std::string* error) const {
+  *curve = ZoomCurve(content_);
+  return is_monotone(*curve, error);
+}
+
+// Likelihood of each quantity by itself, the others taken as open.
+void ZoomSolution::choose_roughness() {
+  constexpr int kSteps = 33;
+  constexpr double kDecades = 2;          // on either side
+  constexpr double kPriorDecades = 0.75;  // standard deviation
+  for (int q = 0; q < kZoomQuantityCount; ++q) {
+    ZoomSmoothness& smoothness = content_.smoothness[static_cast<std::size_t>(q)];
+    const double usual_roughness = smoothness.roughness;
+    double best = -1e300;
+    double best_roughness = usual_roughness;
+    const Eigen::VectorXd y = evidence_.value.col(q);
+    for (int step = 0; step < kSteps; ++step) {
+      const double decades = kDecades * (2.0 * step / (kSteps - 1) - 1);
+      smoothness.roughness = usual_roughness * std::pow(10, decades);
+      Eigen::MatrixXd K = process_covariance(content_, q);
+      K.diagonal() += evidence_.variance.col(q);
+      const Eigen::LLT<Eigen::MatrixXd> llt(K);
+      if (llt.info() != Eigen::Success) continue;
+      const double log_determinant = 2 * llt.matrixLLT().diagonal().array().log().sum();
+      const double likelihood = -0.5 * (y.dot(llt.solve(y)) + log_determinant) -
+                                0.5 * std::pow(decades / kPriorDecades, 2);
+      if (likelihood <= best) continue;
+      best = likelihood;
+      best_roughness = smoothness.roughness;
+    }
+    smoothness.roughness = best_roughness;
+  }
+}
+
+bool ZoomSolution::solve() {
+  if (!set_inverses(&content_)) return false;
+  Eigen::MatrixXd H = evidence_.H;
+  for (int q = 0; q < kZoomQuantityCount; ++q) {
+    const auto& inverse = content_.inverse[static_cast<std::size_t>(q)];
+    for (int i = 0; i < nodes_; ++i) {
+      for (int j = 0; j < nodes_; ++j) H(evidence_.row(i, q), evidence_.row(j, q)) += inverse(i, j);
+    }
+  }
+  // What all calibrations take as exact is exact.
+  const std::vector<int> rows = evidence_.rows(places_);
+  const Eigen::MatrixXd inverse = scaled_inverse(part_of(H, rows));
+  if (inverse.size() == 0) return false;
+  content_.covariance.setZero(H.rows(), H.cols());
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    for (std::size_t j = 0; j < rows.size(); ++j) {
+      content_.covariance(rows[i], rows[j]) =
+          inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
+    }
+  }
+  solution_ = content_.covariance * evidence_.g;
+  content_.value = solution_.head(kZoomQuantityCount * nodes_);
+  take_shared(solution_.tail<kSharedCount>());
+  const int clock = evidence_.row(0, zoom_place_of(Parameter::kClockOffset));
+  content_.covariance(clock, clock) += std::pow(options_.common_clock_sigma_s, 2);
+  return true;
+}
+
+void ZoomSolution::take_shared(const Eigen::Matrix<double, kSharedCount, 1>& change) {
+  const auto of = [&](Parameter p) { return change[zoom_place_of(p) - kZoomQuantityCount]; };
+  const auto axis = [&](const Vector3<double>& from, Parameter first) {
+    const auto second = static_cast<Parameter>(index(first) + 1);
+    return Vector3<double>(
+        direction_plus<double>(from, Vector2<double>(of(first), of(second))).normalized());
+  };
+  Calibration& shared = content_.shared;
+  shared = reference_;
+  shared.camera.aspect += of(Parameter::kAspect);
+  shared.line_delay += of(Parameter::kLineDelay);
+  shared.mechanics.pan_axis = axis(reference_.mechanics.pan_axis, Parameter::kPanAxis0);
+  shared.mechanics.tilt_axis = axis(reference_.mechanics.tilt_axis, Parameter::kTiltAxis0);
+  shared.mechanics.pan_scale += of(Parameter::kPanScale);
+  shared.mechanics.tilt_scale += of(Parameter::kTiltScale);
+  shared.clock_offset += of(Parameter::kClockOffset);
+  shared.covariance.setZero();
+}
+
+}  // namespace alidade::internal
+
+namespace alidade {
+
+bool set_inverses(ZoomCurve::Content* content) {
+  for (int q = 0; q < kZoomQuantityCount; ++q) {
+    const Eigen::MatrixXd inverse =
+        internal::scaled_inverse(internal::process_covariance(*content, q));
+    if (inverse.size() == 0) return false;
+    content->inverse[static_cast<std::size_t>(q)] = inverse;
+  }
+  return true;
+}
+
+}  // namespace alidade

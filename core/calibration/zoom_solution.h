@@ -1,0 +1,43 @@
+#pragma once
+// ZoomSolution: least squares over all that calibrations say of a zoom's nodes, with the curves as prior: their roughness by its
+// likelihood, then nodes, shared parameters and covariance. Steps 2 and 3 of zoom_fit.h. Allocates.
+
+#include <Eigen/Core>
+#include <string>
+#include <vector>
+
+#include "core/calibration/zoom_evidence.h"
+#include "core/calibration/zoom_fit.h"
+
+namespace alidade::internal {
+
+class ZoomSolution {
+ public:
+  // places: of a sample that are not exact. reference: what the shared parameters are changes from; must outlive it, as the options.
+  ZoomSolution(ZoomEvidence evidence, std::vector<int> places, const Calibration& reference,
+               const ZoomFitOptions& options);
+
+  // False and one line in *error: something is left undetermined.
+  [[nodiscard]] bool run(std::string* error);
+
+  // After run(): a sample less what all say together.
+  [[nodiscard]] ZoomSampleVector left_of(const ZoomSample& sample, int node) const;
+  [[nodiscard]] int shared_places() const;
+  // False and one line in *error: the focal length is not monotone.
+  [[nodiscard]] bool curve(ZoomCurve* curve, std::string* error) const;
+
+ private:
+  void choose_roughness();
+  [[nodiscard]] bool solve();
+  void take_shared(const Eigen::Matrix<double, kSharedCount, 1>& change);
+
+  ZoomEvidence evidence_;
+  std::vector<int> places_;
+  const Calibration& reference_;
+  const ZoomFitOptions& options_;
+  int nodes_;
+  ZoomCurve::Content content_;
+  Eigen::VectorXd solution_;
+};
+
+}  // namespace alidade::internal
