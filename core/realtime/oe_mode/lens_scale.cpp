@@ -9,10 +9,10 @@ namespace {
 constexpr int kOfF = index(Parameter::kFocalLength);
 constexpr int kOfK = index(Parameter::kRadialDistortion);
 
-ParameterDirection direction_at(const Calibration& calibration) {
+ParameterDirection direction_at(const Camera<double>& camera, bool with_distortion) {
   ParameterDirection a = ParameterDirection::Zero();
-  a[kOfF] = calibration.camera.focal_length;
-  a[kOfK] = 2 * calibration.camera.radial_distortion;
+  a[kOfF] = camera.focal_length;
+  if (with_distortion) a[kOfK] = 2 * camera.radial_distortion;
   return a;
 }
 
@@ -20,8 +20,8 @@ ParameterDirection direction_at(const Calibration& calibration) {
 
 LensScale LensScale::begin(const Calibration& calibration) {
   LensScale out;
-  out.direction = direction_at(calibration);
   const ParameterCovariance<double>& P = calibration.covariance;
+  out.direction = direction_at(calibration.camera, P(kOfK, kOfK) > 0);
   const double f = calibration.camera.focal_length;
   const double variance = P(kOfF, kOfF) / (f * f);
   if (!(variance > 0) || !std::isfinite(variance)) return out;
@@ -79,21 +79,24 @@ void LensScale::learn(double measurement, double information, const Sensitivity<
 Calibration LensScale::at(const Calibration& calibration, double phi, double phi_variance,
                           const Sensitivity<1>& phi_sensitivity) const {
   Calibration out = calibration;
-  out.camera.focal_length *= std::exp(phi);
-  out.camera.radial_distortion *= std::exp(2 * phi);
-  const ParameterDirection a = direction_at(out);
+  const ParameterDirection a = move(phi, &out.camera);
   const ParameterDirection with_phi = others * phi_sensitivity.transpose();
   const double total = phi_variance + phi_sensitivity.dot(with_phi.transpose());
-  out.covariance = others + total * a * a.transpose() + a * with_phi.transpose() +
-                   with_phi * a.transpose();
+  out.covariance =
+      others + total * a * a.transpose() + a * with_phi.transpose() + with_phi * a.transpose();
   return out;
 }
 
 void LensScale::move_calibration(double phi, Calibration* calibration) {
-  calibration->camera.focal_length *= std::exp(phi);
-  calibration->camera.radial_distortion *= std::exp(2 * phi);
-  direction = direction_at(*calibration);
+  direction = move(phi, &calibration->camera);
   value -= phi;
+}
+
+ParameterDirection LensScale::move(double phi, Camera<double>* camera) const {
+  const bool with_distortion = direction[kOfK] != 0;
+  camera->focal_length *= std::exp(phi);
+  if (with_distortion) camera->radial_distortion *= std::exp(2 * phi);
+  return direction_at(*camera, with_distortion);
 }
 
 }  // namespace alidade

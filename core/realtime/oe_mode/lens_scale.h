@@ -1,8 +1,8 @@
 #pragma once
 // LensScale: phi, by how much log f differs from the calibration that the map is made with: a lens does not come back exactly to
 // where a zoom curve has it (zoom_curve.h). Learnt together with the map's offset g, which telemetry ties to it.
-//   f(phi) = f exp(phi),   k(phi) = k exp(2 phi)   the distortion in the corner stays
-//   d / d phi = S a of all that has a Sensitivity S,   a = (f, 2 k) at the parameters f and k, else 0
+//   f(phi) = f exp(phi),   k(phi) = k exp(2 phi)   the distortion in the corner stays; a k that is exact stays itself
+//   d / d phi = S a of all that has a Sensitivity S,   a = (f, 2 k or 0) at the parameters f and k, else 0
 // Errors: of the calibration a phi + e, with e, of covariance `others`, independent of what follows; of (g, phi) their own noise plus
 // their sensitivity times e. Landmarks and motions are kept as they come out at phi = 0; what they make of phi is S a.
 // Plain values; no allocation.
@@ -17,8 +17,8 @@ using ParameterDirection = Matrix<double, kParameterCount, 1>;
 // Not learnt: phi is 0, and what f errs by is the calibration's covariance, as of any other parameter.
 struct LensScale {
   bool learnt = false;
-  double value = 0;     // phi
-  double variance = 0;  // of its own noise
+  double value = 0;                                                  // phi
+  double variance = 0;                                               // of its own noise
   Vector2<double> covariance_with_offset = Vector2<double>::Zero();  // rad, of their noise
   Sensitivity<1> sensitivity = Sensitivity<1>::Zero();               // to e
   ParameterDirection direction = ParameterDirection::Zero();         // a
@@ -48,6 +48,10 @@ struct LensScale {
   }
   // The calibration at `phi`, without its covariance; what phi is counted from moves along.
   void move_calibration(double phi, Calibration* calibration);
+
+ private:
+  // Returns the direction there.
+  [[nodiscard]] ParameterDirection move(double phi, Camera<double>* camera) const;
 };
 
 }  // namespace alidade

@@ -31,7 +31,7 @@ bool MapOffset::learn(const Vector2<double>& innovation,
                       const Matrix2<double>& innovation_covariance,
                       const Sensitivity<2>& innovation_sensitivity, const Vector2<double>& by_lens,
                       double max_chi_square, LensScale* lens) {
-  Matrix3<double> noise;  // of (offset, phi)
+  Matrix3<double> noise;                              // of (offset, phi)
   noise << covariance, lens->covariance_with_offset,  //
       lens->covariance_with_offset.transpose(), lens->variance;
   Matrix<double, 2, 3> H;
@@ -88,11 +88,10 @@ bool MapOffsetFilter::learn(double frame_time_s, const OffsetInnovation& innovat
       variance_inflation(options_.shared_correlation_time_s, frame_time_s - learnt_time_s_);
   const Matrix2<double> covariance =
       innovation.covariance + inflation * innovation.shared_covariance;
-  if (lens_.learnt
-          ? !offset_.learn(innovation.value, covariance, innovation.sensitivity, innovation.by_lens,
-                           options_.max_contradiction, &lens_)
-          : !offset_.learn(innovation.value, covariance, innovation.sensitivity,
-                           options_.max_contradiction)) {
+  if (lens_.learnt ? !offset_.learn(innovation.value, covariance, innovation.sensitivity,
+                                    innovation.by_lens, options_.max_contradiction, &lens_)
+                   : !offset_.learn(innovation.value, covariance, innovation.sensitivity,
+                                    options_.max_contradiction)) {
     return false;
   }
   learnt_time_s_ = frame_time_s;
@@ -102,9 +101,7 @@ bool MapOffsetFilter::learn(double frame_time_s, const OffsetInnovation& innovat
 void MapOffsetFilter::learn_scale(double frame_time_s, double measurement, double information,
                                   const Sensitivity<1>& sensitivity) {
   if (!lens_.learnt || !(information > 0) || !std::isfinite(measurement)) return;
-  const double inflation = variance_inflation(options_.shared_correlation_time_s,
-                                              frame_time_s - scale_learnt_time_s_);
-  lens_.learn(measurement, information / inflation, sensitivity, &offset_.value,
+  lens_.learn(measurement, information / scale_inflation(frame_time_s), sensitivity, &offset_.value,
               &offset_.covariance, &offset_.sensitivity);
   scale_learnt_time_s_ = frame_time_s;
 }

@@ -26,7 +26,7 @@
 namespace alidade {
 
 struct MapOffsetOptions {
-  double drift = 1e-6;  // rad / sqrt(s), >= 0: of map against telemetry, by heat and gears
+  double drift = 1e-6;       // rad / sqrt(s), >= 0: of map against telemetry, by heat and gears
   double lens_drift = 1e-7;  // 1 / sqrt(s), >= 0: of log f at rest, by heat
   // s, >= 0: what the landmarks in view have in common stays with them; so long they are taken as the same.
   double shared_correlation_time_s = 10;
@@ -92,6 +92,11 @@ class MapOffsetFilter {
   void begin_lens(const LensScale& lens) { lens_ = lens; }
   [[nodiscard]] const LensScale& lens() const { return lens_; }
   // What the landmarks of a frame say of phi by their scale: its information, see LensScale::learn().
+  // Of its variance: what neighbouring frames' landmarks say is the same for long.
+  [[nodiscard]] double scale_inflation(double frame_time_s) const {
+    return variance_inflation(options_.shared_correlation_time_s,
+                              frame_time_s - scale_learnt_time_s_);
+  }
   void learn_scale(double frame_time_s, double measurement, double information,
                    const Sensitivity<1>& sensitivity);
   // phi is in the calibration from here on: what waits is as it would have come out with that.
@@ -145,7 +150,7 @@ class MapOffsetFilter {
   MapOffset offset_;
   LensScale lens_;
   double scale_learnt_time_s_ = kNever;  // the frame whose landmarks' scale was learnt from last
-  double learnt_time_s_ = kNever;    // the frame whose telemetry was learnt from last
+  double learnt_time_s_ = kNever;        // the frame whose telemetry was learnt from last
   double answered_time_s_ = kNever;  // the frame that telemetry, extrapolated or not, answered last
   std::array<PendingFrame, kMaxPending> pending_{};  // a ring
   std::size_t first_pending_ = 0;

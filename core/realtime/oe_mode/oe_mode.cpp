@@ -79,8 +79,7 @@ MapState OeMode::map_state() const {
   }
   if (lens_is_learnt()) {
     // As they are by the calibration that was given.
-    const double phi =
-        std::log(given_.camera.focal_length / calibration_.camera.focal_length);
+    const double phi = std::log(given_.camera.focal_length / calibration_.camera.focal_length);
     for (Landmark& landmark : out.landmarks) {
       landmark.d = direction_plus<double>(landmark.d, phi * by_lens(landmark, offset_.lens()));
     }
@@ -191,7 +190,10 @@ OeMode::Solution OeMode::solve_about(const FrameMotion<double>& motion,
   statistics_.found = fine.found;
   MotionPrior prior = predicted.prior;
   prior.offset_covariance = offset_.offset().covariance;
-  prior.lens = lens_is_learnt() ? &offset_.lens() : nullptr;
+  if (lens_is_learnt()) {
+    prior.lens = &offset_.lens();
+    prior.scale_inflation = offset_.scale_inflation(frame_.time_s);
+  }
   prior.motion.tail<2>() = predicted.motion.acceleration.vector() - motion.acceleration.vector();
   const Vector2<double> moved = predicted.motion.angle.vector() - motion.angle.vector();
   if (prior.has_telemetry) {

@@ -166,8 +166,8 @@ class OeMode {
   FocalLength focal_length_ = FocalLength::kCalibrated;
   Calibration calibration_;          // that the map is made with; but for the focal length as given
   Calibration answers_calibration_;  // where the focal length is learnt
-  bool ready_ = false;        // there is room for the calibration's images
-  std::uint32_t frames_ = 0;  // count
+  bool ready_ = false;               // there is room for the calibration's images
+  std::uint32_t frames_ = 0;         // count
 
   Pyramid pyramid_;  // of the frame last looked at
   Octaves octaves_;

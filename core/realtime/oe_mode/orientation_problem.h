@@ -119,7 +119,8 @@ class OrientationProblem {
 
   [[nodiscard]] Vector2<double> left(int i, const MotionAndLens& at) const {
     const Term& term = terms_[static_cast<std::size_t>(i)];
-    const Vector2<double> r = landmarks_[i].residual - landmarks_[i].J_angle * angle_at(at.x, term.t);
+    const Vector2<double> r =
+        landmarks_[i].residual - landmarks_[i].J_angle * angle_at(at.x, term.t);
     return lens_ == nullptr ? r : Vector2<double>(r + at.phi * term.s);
   }
 
@@ -157,6 +158,7 @@ struct ScaledPrior {
   Matrix4<double> telemetry_information = Matrix4<double>::Zero();
   Vector4<double> telemetry = Vector4<double>::Zero();
   Vector6 motion_by_lens = Vector6::Zero();  // d motion / d phi
+  double scale_inflation = 1;
 };
 
 [[nodiscard]] inline ScaledPrior scaled(const MotionPrior& prior, double unit_s, const Vector6& D) {
@@ -166,6 +168,7 @@ struct ScaledPrior {
   out.motion = D.cwiseProduct(prior.motion);
   out.motion_b = out.motion_information * out.motion;
   if (prior.lens != nullptr) {
+    out.scale_inflation = prior.scale_inflation;
     out.motion_by_lens = D.cwiseProduct(prior.motion_sensitivity * prior.lens->direction);
   }
   if (prior.has_telemetry) {

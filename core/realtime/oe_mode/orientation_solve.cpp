@@ -54,8 +54,7 @@ struct WithoutAngles {
 };
 
 WithoutAngles solve_without_angles(const OrientationProblem& problem, const ScaledPrior& prior,
-                                   const double* weights, double inflation,
-                                   bool with_covariance) {
+                                   const double* weights, double inflation, bool with_covariance) {
   Matrix6 N;
   Vector6 b;
   problem.normal_equations(weights, &N, &b);
@@ -76,8 +75,9 @@ WithoutAngles solve_without_angles(const OrientationProblem& problem, const Scal
   // Landmarks that came with this lens know nothing of it, but for rounding.
   out.information = std::max(0.0, out.row.information - out.row.c.dot(out.by_lens));
   const double known = 1 / lens->variance;
-  out.phi_information = out.information + known;
-  out.phi = (out.row.b + out.row.c.dot(out.x) + known * lens->value) / out.phi_information;
+  out.phi_information = out.information / prior.scale_inflation + known;
+  out.phi = ((out.row.b + out.row.c.dot(out.x)) / prior.scale_inflation + known * lens->value) /
+            out.phi_information;
   return out;
 }
 
@@ -209,8 +209,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   }
   const double inflation =
       std::max(scale_square, neighbours_inflation(problem, landmarks, width, height, x));
-  const WithoutAngles own =
-      solve_without_angles(problem, scaled, weights.data(), inflation, true);
+  const WithoutAngles own = solve_without_angles(problem, scaled, weights.data(), inflation, true);
 
   // What the landmarks have in common counts as an offset of this frame's own.
   Matrix2<double> shared = Matrix2<double>::Zero();
@@ -266,9 +265,8 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
       all += H.transpose() * scaled.telemetry_information * H;
       right += H.transpose() * (scaled.telemetry_information * scaled.telemetry);
       const Vector4<double> D4(1, 1, unit_s, unit_s);
-      sensitivity +=
-          H.transpose() *
-          (scaled.telemetry_information * (D4.asDiagonal() * prior.telemetry_sensitivity));
+      sensitivity += H.transpose() * (scaled.telemetry_information *
+                                      (D4.asDiagonal() * prior.telemetry_sensitivity));
     }
     if (lens == nullptr) {
       all.bottomRightCorner<2, 2>() += inverse_of(offset_covariance);
@@ -298,21 +296,28 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
           (scaled.motion_information * scaled.motion_by_lens).transpose() * D.asDiagonal() *
               prior.motion_sensitivity;
       SolvedLens& solved = out->lens;
-      const Vector8 by_lens = posterior * c;
-      const double information = own.row.information + known(2, 2) - c.dot(by_lens);
-      solved.variance = 1 / information;
-      solved.value = solved.variance * (own.row.b + known(2, 2) * lens->value + c.dot(solution));
-      solved.sensitivity = solved.variance * (known(2, 2) * lens->sensitivity - of_row +
-                                              c.transpose() * sensitivity);
-      solved.motion_by_lens = by_lens.head<6>().cwiseQuotient(D);
-      solved.offset_by_lens = by_lens.tail<2>();
       solved.innovation_by_lens = own.by_lens.head<2>();
       solved.information = own.information;
       if (own.information > 0) {
+        Sensitivity<6> right_of_own = right_of_sensitivities;
+        right_of_own.middleRows<2>(2) +=
+            scaled.rate_information * (unit_s * prior.telemetry_sensitivity.bottomRows<2>());
         solved.measured = (own.row.b + own.row.c.dot(own.x)) / own.information;
         solved.measured_sensitivity =
-            (own.by_lens.transpose() * right_of_sensitivities - of_row) / own.information;
+            (own.by_lens.transpose() * right_of_own - of_row) / own.information;
       }
+      // The share of it that frames before said already is taken out.
+      const double old = (1 - 1 / prior.scale_inflation) * own.information;
+      const Vector8 by_lens = posterior * c;
+      const double information = own.row.information - old + known(2, 2) - c.dot(by_lens);
+      solved.variance = 1 / information;
+      solved.value = solved.variance * (own.row.b - old * solved.measured +
+                                        known(2, 2) * lens->value + c.dot(solution));
+      solved.sensitivity =
+          solved.variance * (known(2, 2) * lens->sensitivity - of_row -
+                             old * solved.measured_sensitivity + c.transpose() * sensitivity);
+      solved.motion_by_lens = by_lens.head<6>().cwiseQuotient(D);
+      solved.offset_by_lens = by_lens.tail<2>();
       x = {solution.head<6>() + solved.value * by_lens.head<6>(), solved.value};
       if (!std::isfinite(solved.value) || !(solved.variance > 0) ||
           !all_finite(solved.sensitivity) || !all_finite(by_lens)) {

@@ -58,6 +58,8 @@ struct MotionPrior {
   Matrix6 motion_information = Matrix6::Zero();
   Sensitivity<6> motion_sensitivity = Sensitivity<6>::Zero();
   const LensScale* lens = nullptr;  // before this frame; null: not learnt
+  // Of the variance of what the landmarks' scale says of phi, which frames before said already; >= 1.
+  double scale_inflation = 1;
 };
 
 enum class SolveStatus {
