@@ -14,7 +14,6 @@ struct Term {
   Matrix2<double> JtWJ;
   Matrix<double, 2, 2> JtW;
   double t;
-  Vector2<double> s;  // px, d residual / d phi, where phi is unknown
 };
 
 // The unknowns but for the offset; phi stays 0 where it is not one.
@@ -42,7 +41,7 @@ class OrientationProblem {
       term.JtW = landmark.J_angle.transpose() * term.information;
       term.JtWJ = term.JtW * landmark.J_angle;
       term.t = landmark.time_s / unit_s;
-      if (lens != nullptr) term.s = landmark.sensitivity * lens->direction;
+      if (lens != nullptr) s_[static_cast<std::size_t>(i)] = landmark.sensitivity * lens->direction;
     }
   }
 
@@ -78,12 +77,12 @@ class OrientationProblem {
     for (int i = 0; i < count_; ++i) {
       if (weights[i] == 0) continue;
       const Term& term = terms_[static_cast<std::size_t>(i)];
-      const Vector2<double> c = weights[i] * (term.JtW * term.s);
+      const Vector2<double> c = weights[i] * (term.JtW * s_[static_cast<std::size_t>(i)]);
       row.c.head<2>() += c;
       row.c.segment<2>(2) += term.t * c;
       row.c.tail<2>() += (0.5 * term.t * term.t) * c;
-      const Vector2<double> Ws = weights[i] * (term.information * term.s);
-      row.information += Ws.dot(term.s);
+      const Vector2<double> Ws = weights[i] * (term.information * s_[static_cast<std::size_t>(i)]);
+      row.information += Ws.dot(s_[static_cast<std::size_t>(i)]);
       row.b -= Ws.dot(landmarks_[i].residual);
     }
     return row;
@@ -95,7 +94,8 @@ class OrientationProblem {
     for (int i = 0; i < count_; ++i) {
       if (!landmarks_[i].inlier) continue;
       const Term& term = terms_[static_cast<std::size_t>(i)];
-      row += (term.information * term.s).transpose() * landmarks_[i].sensitivity;
+      row += (term.information * s_[static_cast<std::size_t>(i)]).transpose() *
+             landmarks_[i].sensitivity;
     }
     return row;
   }
@@ -117,15 +117,19 @@ class OrientationProblem {
     return right;
   }
 
+  // with_lens: as lens() is there; a constant of those who ask for all landmarks.
+  template <bool with_lens>
   [[nodiscard]] Vector2<double> left(int i, const MotionAndLens& at) const {
-    const Term& term = terms_[static_cast<std::size_t>(i)];
+    const auto of_it = static_cast<std::size_t>(i);
     const Vector2<double> r =
-        landmarks_[i].residual - landmarks_[i].J_angle * angle_at(at.x, term.t);
-    return lens_ == nullptr ? r : Vector2<double>(r + at.phi * term.s);
+        landmarks_[i].residual - landmarks_[i].J_angle * angle_at(at.x, terms_[of_it].t);
+    if constexpr (with_lens) return r + at.phi * s_[of_it];
+    return r;
   }
 
+  template <bool with_lens>
   [[nodiscard]] double normalised_square(int i, const MotionAndLens& at) const {
-    const Vector2<double> r = left(i, at);
+    const Vector2<double> r = left<with_lens>(i, at);
     return r.dot(terms_[static_cast<std::size_t>(i)].information * r);
   }
 
@@ -146,6 +150,8 @@ class OrientationProblem {
   double unit_s_;
   const LensScale* lens_;
   std::array<Term, kMaxFoundLandmarks> terms_;
+  // px, d residual / d phi; apart from the terms, which all solutions go through. Not written without a lens.
+  std::array<Vector2<double>, kMaxFoundLandmarks> s_;
 };
 
 // Telemetry and prior in scaled units.

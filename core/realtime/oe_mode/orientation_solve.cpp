@@ -106,10 +106,16 @@ Vector2<double> middle_of_landmarks(const FoundLandmark* landmarks, int count) {
 
 using Squares = std::array<double, kMaxFoundLandmarks>;  // normalised, by landmark
 
+template <bool with_lens>
 void find_squares(const OrientationProblem& problem, const MotionAndLens& x, Squares* out) {
   for (int i = 0; i < problem.count(); ++i) {
-    (*out)[static_cast<std::size_t>(i)] = problem.normalised_square(i, x);
+    (*out)[static_cast<std::size_t>(i)] = problem.normalised_square<with_lens>(i, x);
   }
+}
+
+void find_squares(const OrientationProblem& problem, const MotionAndLens& x, Squares* out) {
+  problem.lens() != nullptr ? find_squares<true>(problem, x, out)
+                            : find_squares<false>(problem, x, out);
 }
 
 double median_square(const Squares& squares, int count) {
@@ -136,7 +142,9 @@ double neighbours_inflation(const OrientationProblem& problem, const FoundLandma
     const int row = std::clamp(static_cast<int>(landmarks[i].u.y() / height * kRows), 0, kRows - 1);
     Cell& cell = cells[static_cast<std::size_t>(row * kColumns + column)];
     cell.information += problem.term(i).information;
-    cell.sum += problem.term(i).information * problem.left(i, x);
+    const Vector2<double> left =
+        problem.lens() != nullptr ? problem.left<true>(i, x) : problem.left<false>(i, x);
+    cell.sum += problem.term(i).information * left;
     cell.used = true;
   }
   int freedom = -6;
@@ -346,8 +354,9 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   out->offset_correction_sensitivity = sensitivity.bottomRows<2>();
   out->inliers = inliers;
   out->inflation = inflation;
+  find_squares(problem, x, &squares);
   for (int i = 0; i < count; ++i) {
-    landmarks[i].normalised_square = problem.normalised_square(i, x);
+    landmarks[i].normalised_square = squares[static_cast<std::size_t>(i)];
   }
   // What nothing tells has no finite variance, and the factorisation gives it none.
   if (!all_finite(out->correction) || !all_finite(out->covariance) ||
