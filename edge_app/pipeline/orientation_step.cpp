@@ -41,7 +41,7 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
   oe.max_width = options.calibration.camera.width;
   oe.max_height = options.calibration.camera.height;
   oe_ = make_oe_mode(oe);
-  oe_->reset(options.calibration, options.map);
+  oe_->reset(options.calibration, options.map, focal_length());
   if (!options.follow_points) return;
   StartUpOptions start_up;
   start_up.width = oe.max_width;
@@ -154,7 +154,11 @@ void OrientationStep::adopt(const PublishedCalibration& published) {
   zoom_at_adoption_ = zoom_;
   minimum_delay_sigma_s_ = 0;
   options_.zoom_curve = published.zoom_curve;
-  if (oe_) oe_->reset(published.calibration, published.map);
+  if (oe_) oe_->reset(published.calibration, published.map, focal_length());
+}
+
+FocalLength OrientationStep::focal_length() const {
+  return options_.zoom_curve.empty() ? FocalLength::kCalibrated : FocalLength::kLearnt;
 }
 
 bool OrientationStep::zoom_fits() const {
@@ -287,6 +291,7 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
   }
   record->mode = frame.mode == OrientationMode::kOe ? RecordMode::kOe : RecordMode::kPt;
   record->landmarks = frame.landmarks;
+  if (focal_length() == FocalLength::kLearnt) record->camera = pack(frame.calibration);
   if (record->mode == RecordMode::kOe) record->residual_px = residual_rms(*oe_);
   record->orientation = orientation_of(frame);
 }

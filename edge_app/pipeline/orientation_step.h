@@ -16,6 +16,7 @@
 // telemetry is missing but landmarks carry the orientation on (its status then names what is missing).
 // An image that is sent again while the camera turns is of another time than its frame: "picture repeated", no orientation
 // (repeated_images.h).
+// A lens that zooms does not come back exactly: with a zoom curve OE mode learns the focal length, too, and the record has it.
 // Where the zoom is another than the calibration's, or moves, its zoom curve gives PT mode a lens (zoom_lookup.h).
 // While there is no calibration for the camera, or none for the zoom that the pan/tilt source reports, points
 // are followed instead (start_up_tracker.h), for the calibration thread to make one of.
@@ -125,6 +126,8 @@ class OrientationStep {
 
   [[nodiscard]] Telemetry empty_telemetry(bool filtered) const;
   [[nodiscard]] OrientationRecord empty_record() const;
+  // Learnt with a zoom curve only.
+  [[nodiscard]] FocalLength focal_length() const;
   // False: there is a calibration, but not for the zoom that the pan/tilt source reports.
   [[nodiscard]] bool zoom_fits() const;
   // With a zoom curve: the reading fits, but did not when a frame of this telemetry time was taken, or is not known.

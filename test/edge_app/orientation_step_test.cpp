@@ -737,6 +737,56 @@ TEST_F(OeStepTest, AnotherZoomHasNoOrientationUntilItsCalibrationComes) {
   EXPECT_TRUE(record.calibrated);
 }
 
+// A lens that is 2 % off, before a scene so far that the picture moves as a whole.
+TEST(OrientationStep, RecordsTellTheFocalLengthThatIsLearntWithAZoomCurveOnly) {
+  constexpr double kFocalLength =
+      200000;  // px; the perspective of a turn is below a thousandth of one
+  constexpr double kTold = 1.02 * kFocalLength;
+  const Scene scene;
+  ZoomCurve::Content content;
+  content.nodes = 2;
+  for (const bool has_curve : {true, false}) {
+    SCOPED_TRACE(has_curve);
+    OrientationStepOptions options;
+    options.calibration.camera.focal_length = kTold;
+    options.calibration.camera.width = Scene::kWidth;
+    options.calibration.camera.height = Scene::kHeight;
+    const int f = index(Parameter::kFocalLength);
+    options.calibration.covariance(f, f) = std::pow(0.02 * kTold, 2);
+    options.calibrated = true;
+    options.telemetry_noise.pan_tilt_sigma = 2e-8;
+    options.oe.emplace();
+    options.oe->maker.cell_size_px = 30;
+    options.oe->offset.drift = 1e-8;  // rad / sqrt(s): of so long a lens, too, far below a pixel
+    if (has_curve) options.zoom_curve = ZoomCurve(content);
+    OrientationStep step(options);
+    // A pixel a frame.
+    Sweep turning;
+    turning.pan_rate = 12.5 / kFocalLength;
+    turning.tilt_0 = turning.tilt_rate = 0;
+    int in_oe = 0;
+    OrientationRecord record;
+    for (int i = 0; i <= 60; ++i) {
+      const double t = 0.08 * i;
+      turning.feed(&step, t, t + 0.07);
+      StepEvents events;
+      record = step.add_frame(stamp_at(t, i), scene.image(i), &events);
+      step.maintain();
+      in_oe += record.mode == RecordMode::kOe ? 1 : 0;
+      if (i == 0 || !has_curve) {
+        EXPECT_EQ(record.camera.focal_length, kTold);
+      }
+    }
+    if (!has_curve) continue;
+    EXPECT_EQ(in_oe, 60);
+    const double sigma = std::sqrt(record.camera.covariance[0]);
+    // On the way there; how well, learnt_focal_length_test.cpp asks on pictures of a camera.
+    EXPECT_LT(record.camera.focal_length, kTold - 0.2 * (kTold - kFocalLength));
+    EXPECT_GT(record.camera.focal_length, kFocalLength);
+    EXPECT_LT(sigma, 0.2 * 0.02 * kTold);
+  }
+}
+
 // What is not said to be for a zoom is for the one at which it was taken over.
 TEST_F(OeStepTest, ACalibrationWithoutZoomIsForTheOneOfItsAdoption) {
   const auto mode_at = [&](double zoom) {

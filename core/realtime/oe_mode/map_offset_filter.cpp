@@ -8,6 +8,7 @@ bool MapOffsetOptions::validate(const char** error) const {
   const char* problem = nullptr;
   if (!(max_contradiction > 0)) problem = "max_contradiction must be positive";
   if (!(shared_correlation_time_s >= 0)) problem = "shared_correlation_time_s must not be negative";
+  if (!(lens_drift >= 0)) problem = "lens_drift must not be negative";
   if (!(drift >= 0)) problem = "drift must not be negative";
   if (error != nullptr && problem != nullptr) *error = problem;
   return problem == nullptr;
@@ -26,11 +27,41 @@ bool MapOffset::learn(const Vector2<double>& innovation,
   return true;
 }
 
+bool MapOffset::learn(const Vector2<double>& innovation,
+                      const Matrix2<double>& innovation_covariance,
+                      const Sensitivity<2>& innovation_sensitivity, const Vector2<double>& by_lens,
+                      double max_chi_square, LensScale* lens) {
+  Matrix3<double> noise;                              // of (offset, phi)
+  noise << covariance, lens->covariance_with_offset,  //
+      lens->covariance_with_offset.transpose(), lens->variance;
+  Matrix<double, 2, 3> H;
+  H << Matrix2<double>::Identity(), by_lens;
+  const Matrix<double, 3, 2> with_innovation = noise * H.transpose();
+  const Matrix2<double> information =
+      inverse_of((H * with_innovation + innovation_covariance).eval());
+  const Vector2<double> left = innovation - by_lens * lens->value;
+  if (!(left.dot(information * left) < max_chi_square)) return false;
+  const Matrix<double, 3, 2> gain = with_innovation * information;
+  const Sensitivity<2> of_left = innovation_sensitivity - by_lens * lens->sensitivity;
+  value += gain.topRows<2>() * left;
+  sensitivity += gain.topRows<2>() * of_left;
+  lens->make_independent(&sensitivity);
+  lens->value += gain.row(2).dot(left);
+  lens->sensitivity += gain.row(2) * of_left;
+  noise = symmetric<3>(noise - gain * with_innovation.transpose());
+  covariance = noise.topLeftCorner<2, 2>();
+  lens->covariance_with_offset = noise.topRightCorner<2, 1>();
+  lens->variance = noise(2, 2);
+  return true;
+}
+
 void MapOffsetFilter::reset(const MapOffset& offset) {
   offset_ = offset;
   learnt_time_s_ = kNever;
   answered_time_s_ = kNever;
   contradicted_ = false;
+  lens_.covariance_with_offset.setZero();
+  scale_learnt_time_s_ = kNever;
   forget_pending();
 }
 
@@ -41,11 +72,13 @@ double MapOffsetFilter::inflation(const InterpolatedPanTilt& telemetry, double f
 
 void MapOffsetFilter::drift(double elapsed_s) {
   offset_.covariance.diagonal().array() += options_.drift * options_.drift * elapsed_s;
+  if (lens_.learnt) lens_.variance += options_.lens_drift * options_.lens_drift * elapsed_s;
 }
 
 void MapOffsetFilter::begin(double frame_time_s, const Matrix2<double>& angle_covariance,
                             bool extrapolated) {
   offset_ = {Vector2<double>::Zero(), angle_covariance, Sensitivity<2>::Zero()};
+  lens_.covariance_with_offset.setZero();
   answered_time_s_ = frame_time_s;
   if (!extrapolated) learnt_time_s_ = frame_time_s;
 }
@@ -53,13 +86,34 @@ void MapOffsetFilter::begin(double frame_time_s, const Matrix2<double>& angle_co
 bool MapOffsetFilter::learn(double frame_time_s, const OffsetInnovation& innovation) {
   const double inflation =
       variance_inflation(options_.shared_correlation_time_s, frame_time_s - learnt_time_s_);
-  if (!offset_.learn(innovation.value,
-                     innovation.covariance + inflation * innovation.shared_covariance,
-                     innovation.sensitivity, options_.max_contradiction)) {
+  const Matrix2<double> covariance =
+      innovation.covariance + inflation * innovation.shared_covariance;
+  if (lens_.learnt ? !offset_.learn(innovation.value, covariance, innovation.sensitivity,
+                                    innovation.by_lens, options_.max_contradiction, &lens_)
+                   : !offset_.learn(innovation.value, covariance, innovation.sensitivity,
+                                    options_.max_contradiction)) {
     return false;
   }
   learnt_time_s_ = frame_time_s;
   return true;
+}
+
+void MapOffsetFilter::learn_scale(double frame_time_s, double measurement, double information,
+                                  const Sensitivity<1>& sensitivity) {
+  if (!lens_.learnt || !(information > 0) || !std::isfinite(measurement)) return;
+  lens_.learn(measurement, information / scale_inflation(frame_time_s), sensitivity, &offset_.value,
+              &offset_.covariance, &offset_.sensitivity);
+  scale_learnt_time_s_ = frame_time_s;
+}
+
+void MapOffsetFilter::move_lens(Calibration* calibration) {
+  const double phi = lens_.value;
+  for (std::size_t i = 0; i < pending_count_; ++i) {
+    PendingFrame& frame = pending_at(i);
+    frame.angle += phi * (frame.sensitivity * lens_.direction);
+  }
+  lens_.move_calibration(phi, calibration);
+  lens_.make_independent(&offset_.sensitivity);
 }
 
 void MapOffsetFilter::add_pending(const PendingFrame& frame) {
@@ -99,6 +153,7 @@ void MapOffsetFilter::settle_oldest(const Calibration& calibration,
       variance_inflation(late->correlation_time_s, frame.frame_time_s - learnt_time_s_);
   innovation.covariance = frame.covariance + inflation * covariance;
   innovation.shared_covariance = frame.shared_covariance;
+  if (lens_.learnt) innovation.by_lens = frame.sensitivity * lens_.direction;
   if (!all_finite(innovation.value) || !all_finite(covariance)) return;
   contradicted_ = !learn(frame.frame_time_s, innovation);
 }

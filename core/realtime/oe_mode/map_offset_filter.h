@@ -9,6 +9,7 @@
 // what it could tell the next ones tell too. Each is settled once, the oldest first.
 // The same telemetry samples answer for a while, and neighbouring frames share landmarks: what was used
 // already counts less, by variance_inflation().
+// Where the focal length is learnt too (lens_scale.h), telemetry ties both to each other: one filter of (offset, phi).
 // An innovation that offset and landmarks exclude is not learnt from. If it came late, the frames since are
 // in doubt as well: contradicted(), until a frame agrees.
 // Fixed memory; no allocation. One thread.
@@ -19,12 +20,14 @@
 
 #include "core/model/calibration.h"
 #include "core/realtime/oe_mode/covariance.h"
+#include "core/realtime/oe_mode/lens_scale.h"
 #include "core/realtime/telemetry/telemetry_interpolation.h"
 
 namespace alidade {
 
 struct MapOffsetOptions {
-  double drift = 1e-6;  // rad / sqrt(s), >= 0: of map against telemetry, by heat and gears
+  double drift = 1e-6;       // rad / sqrt(s), >= 0: of map against telemetry, by heat and gears
+  double lens_drift = 1e-7;  // 1 / sqrt(s), >= 0: of log f at rest, by heat
   // s, >= 0: what the landmarks in view have in common stays with them; so long they are taken as the same.
   double shared_correlation_time_s = 10;
   double max_contradiction =
@@ -44,6 +47,11 @@ struct MapOffset {
   [[nodiscard]] bool learn(const Vector2<double>& innovation,
                            const Matrix2<double>& innovation_covariance,
                            const Sensitivity<2>& innovation_sensitivity, double max_chi_square);
+  // The same together with phi, at whose value 0 the innovation is, and of which it has so much more a unit.
+  [[nodiscard]] bool learn(const Vector2<double>& innovation,
+                           const Matrix2<double>& innovation_covariance,
+                           const Sensitivity<2>& innovation_sensitivity,
+                           const Vector2<double>& by_lens, double max_chi_square, LensScale* lens);
 };
 
 // What a frame says of telemetry's angles minus the map's, and how well, apart from the offset.
@@ -53,6 +61,7 @@ struct OffsetInnovation {
   Matrix2<double> shared_covariance =
       Matrix2<double>::Zero();  // rad^2, by what the landmarks share
   Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
+  Vector2<double> by_lens = Vector2<double>::Zero();  // rad, of value, a unit of phi
 };
 
 // A frame that extrapolated telemetry answered.
@@ -78,6 +87,20 @@ class MapOffsetFilter {
   void reset(const MapOffset& offset = {});
 
   [[nodiscard]] const MapOffset& offset() const { return offset_; }
+
+  // Whatever the map, of the lens that it is made with.
+  void begin_lens(const LensScale& lens) { lens_ = lens; }
+  [[nodiscard]] const LensScale& lens() const { return lens_; }
+  // What the landmarks of a frame say of phi by their scale: its information, see LensScale::learn().
+  // Of its variance: what neighbouring frames' landmarks say is the same for long.
+  [[nodiscard]] double scale_inflation(double frame_time_s) const {
+    return variance_inflation(options_.shared_correlation_time_s,
+                              frame_time_s - scale_learnt_time_s_);
+  }
+  void learn_scale(double frame_time_s, double measurement, double information,
+                   const Sensitivity<1>& sensitivity);
+  // phi is in the calibration from here on: what waits is as it would have come out with that.
+  void move_lens(Calibration* calibration);
 
   // By which factor the variance of telemetry's angles is inflated in this frame: of an answer that the same
   // samples gave before, only a part is news.
@@ -125,7 +148,9 @@ class MapOffsetFilter {
 
   MapOffsetOptions options_;
   MapOffset offset_;
-  double learnt_time_s_ = kNever;    // the frame whose telemetry was learnt from last
+  LensScale lens_;
+  double scale_learnt_time_s_ = kNever;  // the frame whose landmarks' scale was learnt from last
+  double learnt_time_s_ = kNever;        // the frame whose telemetry was learnt from last
   double answered_time_s_ = kNever;  // the frame that telemetry, extrapolated or not, answered last
   std::array<PendingFrame, kMaxPending> pending_{};  // a ring
   std::size_t first_pending_ = 0;

@@ -88,6 +88,8 @@ class MapShear {
   // middle_row_time_s: s, image clock.
   void add_frame(double middle_row_time_s, const FrameMotion<double>& motion,
                  const Matrix6& motion_covariance);
+  // Angles before and after this are not of one curve.
+  void begin_curve() { frame_count_ = 0; }
   // What is to be corrected, with half the read-out of the frame added last: known here as done already. None:
   // too few frames, or no rolling shutter.
   [[nodiscard]] std::optional<ShearCorrection> correct();

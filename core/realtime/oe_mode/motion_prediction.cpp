@@ -102,6 +102,14 @@ FrameMotion<double> MotionPrediction::last_carried_on(double frame_time_s) const
   return alidade::carried_on(last_motion_, frame_time_s - last_time_s_);
 }
 
+void MotionPrediction::move(double change, const ParameterDirection& direction) {
+  const Vector6 by = change * (last_sensitivity_ * direction);
+  FrameMotion<double>& m = last_motion_;
+  m.angle = {m.angle.pan + by[0], m.angle.tilt + by[1]};
+  m.rate = {m.rate.pan + by[2], m.rate.tilt + by[3]};
+  m.acceleration = {m.acceleration.pan + by[4], m.acceleration.tilt + by[5]};
+}
+
 void MotionPrediction::remember(double frame_time_s, const FrameMotion<double>& motion,
                                 const Matrix6& covariance, const Matrix2<double>& shared_covariance,
                                 const Sensitivity<6>& sensitivity) {

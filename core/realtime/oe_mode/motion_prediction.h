@@ -71,6 +71,8 @@ class MotionPrediction {
                 const Matrix2<double>& shared_covariance, const Sensitivity<6>& sensitivity);
   // The same motion, as the corrected map shows it.
   void correct(const FrameMotion<double>& motion) { last_motion_ = motion; }
+  // As it comes out by parameters that are `change` times this direction away.
+  void move(double change, const ParameterDirection& direction);
 
  private:
   MotionPredictionOptions options_;

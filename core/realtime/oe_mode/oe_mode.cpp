@@ -3,10 +3,19 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/model/direction.h"
 #include "core/realtime/oe_mode/view_projection.h"
 #include "core/realtime/pt_mode.h"
 
 namespace alidade {
+namespace {
+
+// d (tangent_basis(landmark.d) coordinates) / d phi
+Vector2<double> by_lens(const Landmark& landmark, const LensScale& lens) {
+  return landmark.sensitivity.cast<double>() * lens.direction;
+}
+
+}  // namespace
 
 OeMode::OeMode(const OeOptions& options)
     : options_(options),
@@ -28,7 +37,9 @@ std::size_t OeMode::memory_bytes() const {
          in_view_.memory_bytes();
 }
 
-void OeMode::reset(const Calibration& calibration) {
+void OeMode::reset(const Calibration& calibration, FocalLength focal_length) {
+  given_ = calibration;
+  focal_length_ = focal_length;
   calibration_ = calibration;
   const Camera<double>& camera = calibration.camera;
   ready_ = camera.width > 0 && camera.height > 0 && camera.width <= options_.max_width &&
@@ -41,8 +52,8 @@ void OeMode::reset(const Calibration& calibration) {
   frames_ = 0;
 }
 
-void OeMode::reset(const Calibration& calibration, const MapState& map) {
-  reset(calibration);
+void OeMode::reset(const Calibration& calibration, const MapState& map, FocalLength focal_length) {
+  reset(calibration, focal_length);
   if (!ready_ || !is_valid(map)) return;
   for (const Landmark& landmark : map.landmarks) {
     int slot = 0;
@@ -66,6 +77,13 @@ MapState OeMode::map_state() const {
   for (int slot = 0; slot < map_.capacity(); ++slot) {
     if (map_.occupied(slot)) out.landmarks.push_back(map_.at(slot));
   }
+  if (lens_is_learnt()) {
+    // As they are by the calibration that was given.
+    const double phi = std::log(given_.camera.focal_length / calibration_.camera.focal_length);
+    for (Landmark& landmark : out.landmarks) {
+      landmark.d = direction_plus<double>(landmark.d, phi * by_lens(landmark, offset_.lens()));
+    }
+  }
   const MapOffset& offset = offset_.offset();
   out.offset = {offset.value.x(), offset.value.y()};
   out.offset_covariance = offset.covariance;
@@ -80,7 +98,15 @@ void OeMode::clear_landmarks() {
   search_.clear();
 }
 
+void OeMode::begin_lens() {
+  calibration_ = given_;
+  offset_.begin_lens(focal_length_ == FocalLength::kLearnt ? LensScale::begin(given_)
+                                                           : LensScale{});
+  if (lens_is_learnt()) answers_calibration_ = given_;
+}
+
 void OeMode::forget_map() {
+  begin_lens();
   clear_landmarks();
   offset_.reset();
   shear_.reset(calibration_);
@@ -100,7 +126,8 @@ OeStatus OeMode::process(const ImageView& image, double frame_time_s,
   if (telemetry == nullptr && !prediction_.follows(frame_time_s)) {
     return finish(OeStatus::kNoPrediction);
   }
-  if (telemetry != nullptr && !pt_orientation(calibration_, frame_time_s, *telemetry, out)) {
+  if (telemetry != nullptr &&
+      !pt_orientation(answers_calibration(), frame_time_s, *telemetry, out)) {
     return finish(OeStatus::kNotFinite);
   }
   if (!build_pyramid(image)) {
@@ -163,6 +190,10 @@ OeMode::Solution OeMode::solve_about(const FrameMotion<double>& motion,
   statistics_.found = fine.found;
   MotionPrior prior = predicted.prior;
   prior.offset_covariance = offset_.offset().covariance;
+  if (lens_is_learnt()) {
+    prior.lens = &offset_.lens();
+    prior.scale_inflation = offset_.scale_inflation(frame_.time_s);
+  }
   prior.motion.tail<2>() = predicted.motion.acceleration.vector() - motion.acceleration.vector();
   const Vector2<double> moved = predicted.motion.angle.vector() - motion.angle.vector();
   if (prior.has_telemetry) {
@@ -222,8 +253,8 @@ OeStatus OeMode::answer_without_landmarks(const PredictedMotion& predicted,
   MotionCovariance covering = out->motion_covariance;
   covering.topLeftCorner<2, 2>() +=
       solution.solved.innovation * solution.solved.innovation.transpose();
-  return finish(make_frame_orientation(calibration_, frame_.time_s, OrientationMode::kPt, 0,
-                                       out->motion(), covering, out->motion_sensitivity, out)
+  return finish(make_frame_orientation(answers_calibration(), frame_.time_s, OrientationMode::kPt,
+                                       0, out->motion(), covering, out->motion_sensitivity, out)
                     ? OeStatus::kContradiction
                     : OeStatus::kNotFinite);
 }
@@ -267,8 +298,13 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   shear_.add_to(&covariance);
   Sensitivity<6> sensitivity = solved.sensitivity;
   sensitivity.topRows<2>() += offset.sensitivity + solved.offset_correction_sensitivity;
-  if (!make_frame_orientation(calibration_, frame_.time_s, OrientationMode::kOe, solved.inliers,
-                              in_base, covariance, sensitivity, out)) {
+  if (lens_is_learnt()) {
+    answers_calibration_ = offset_.lens().at(calibration_, solved.lens.value, solved.lens.variance,
+                                             solved.lens.sensitivity);
+    add_lens(solved.lens, &in_base, &sensitivity);
+  }
+  if (!make_frame_orientation(answers_calibration(), frame_.time_s, OrientationMode::kOe,
+                              solved.inliers, in_base, covariance, sensitivity, out)) {
     return finish(frame_.telemetry != FrameTelemetry::kNone ? OeStatus::kTooFew
                                                             : OeStatus::kNoPrediction);
   }
@@ -277,7 +313,13 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
     static_cast<void>(offset_.learn(
         frame_.time_s,
         {solved.innovation, solved.innovation_covariance, solved.shared_covariance,
-         predicted.prior.telemetry_sensitivity.topRows<2>() - solved.sensitivity.topRows<2>()}));
+         predicted.prior.telemetry_sensitivity.topRows<2>() - solved.sensitivity.topRows<2>(),
+         solved.lens.innovation_by_lens}));
+  }
+  if (lens_is_learnt()) {
+    offset_.learn_scale(frame_.time_s, solved.lens.measured, solved.lens.information,
+                        solved.lens.measured_sensitivity);
+    answers_calibration_ = offset_.lens().at_value(calibration_);
   }
   offset_.note_answer(frame_.time_s);
   prediction_.remember(frame_.time_s, motion, solved.frame_covariance, solved.shared_covariance,
@@ -287,6 +329,41 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   statistics_.inliers = solved.inliers;
   frame_.use = MapUse::kHeld;
   return finish(OeStatus::kOk);
+}
+
+// Motion and sensitivity are those at phi = 0: at its value, and by all of it.
+void OeMode::add_lens(const SolvedLens& lens, FrameMotion<double>* in_base,
+                      Sensitivity<6>* sensitivity) const {
+  Vector6 by_lens = lens.motion_by_lens;
+  by_lens.head<2>() += lens.offset_by_lens;
+  const Vector6 change = lens.value * by_lens;
+  in_base->angle = {in_base->angle.pan + change[0], in_base->angle.tilt + change[1]};
+  in_base->rate = {in_base->rate.pan + change[2], in_base->rate.tilt + change[3]};
+  in_base->acceleration = {in_base->acceleration.pan + change[4],
+                           in_base->acceleration.tilt + change[5]};
+  const ParameterDirection& direction = offset_.lens().direction;
+  offset_.lens().make_independent(sensitivity);
+  sensitivity->col(index(Parameter::kFocalLength)) +=
+      by_lens / direction[index(Parameter::kFocalLength)];
+}
+
+// What is known of the lens goes into the calibration where it shows, and all that came with that follows.
+void OeMode::follow_lens() {
+  constexpr double kShows_px = 0.1;  // in the image's corners; until then the linear problem has it
+  const LensScale& lens = offset_.lens();
+  const Camera<double>& camera = calibration_.camera;
+  const double phi = lens.value;
+  if (!(std::abs(phi) * std::hypot(camera.width, camera.height) > 2 * kShows_px)) return;
+  for (int slot = 0; slot < map_.capacity(); ++slot) {
+    if (!map_.occupied(slot)) continue;
+    const Landmark& landmark = map_.at(slot);
+    map_.refine(slot, direction_plus<double>(landmark.d, phi * by_lens(landmark, lens)),
+                landmark.covariance);
+  }
+  prediction_.move(phi, lens.direction);
+  shear_.begin_curve();
+  offset_.move_lens(&calibration_);
+  answers_calibration_ = offset_.lens().at_value(calibration_);
 }
 
 bool OeMode::pending(double newest_sample_s, TelemetryLookUp* look_up) const {
@@ -333,6 +410,7 @@ void OeMode::maintain() {
   const ViewProjection view(calibration_, frame_.motion);
   share_of_new_ = maker_.make(calibration_, pyramid_, octaves_, frame_,
                               in_view_.find(calibration_, map_, view), &map_);
+  follow_lens();
 }
 
 // What was handed over and is not found where it should be has gone, or was never there, if the image has

@@ -25,6 +25,8 @@
 // The map begins empty, in the frame that the first telemetry gave it, or as another OeMode left it.
 // What was handed over is believed as far as images bear it out: a map that telemetry contradicts is
 // forgotten after 50 frames, as is, after 50 frames that show other things, what should be in view of it.
+// Where the calibration's focal length is that of a zoom curve it is learnt too, from the first frame on, and the answer's
+// calibration has it (lens_scale.h); landmarks follow.
 // Fixed memory, taken by the constructor; nothing else allocates, waits or throws. One thread.
 
 #include <cstddef>
@@ -48,6 +50,11 @@ enum class OeStatus {
   kNoPrediction,   // neither telemetry nor a frame before: nothing is written
   kBadImage,       // none, or not of the calibration's size: telemetry alone
   kNotFinite       // nothing is written
+};
+
+enum class FocalLength {
+  kCalibrated,  // with the covariance that the calibration has
+  kLearnt       // besides, from the images: the lens has come back from a movement
 };
 
 struct OeStatistics {
@@ -76,11 +83,12 @@ class OeMode {
   OeMode& operator=(const OeMode&) = delete;
 
   // Begins anew: empty map, nothing remembered. Real-time safe.
-  void reset(const Calibration& calibration);
+  void reset(const Calibration& calibration, FocalLength focal_length = FocalLength::kCalibrated);
   // The same, but with this map, made with this calibration, by this mount without a restart that
   // moved its zero; it is in OE mode in its first frame. Landmarks that are not valid, or that there is
   // no room for, are left out; a map that is not valid is none. Real-time safe: 0.3 us a landmark.
-  void reset(const Calibration& calibration, const MapState& map);
+  void reset(const Calibration& calibration, const MapState& map,
+             FocalLength focal_length = FocalLength::kCalibrated);
 
   // frame_time_s: t0, row 0 on the image clock. at_middle_row: telemetry at t0 + clock_offset +
   // line_delay * height / 2, null if there is none. The image must outlive the maintain() that
@@ -137,6 +145,16 @@ class OeMode {
   OeStatus answer_with_landmarks(const PredictedMotion& predicted, const Solution& solution,
                                  FrameOrientation* out);
 
+  [[nodiscard]] bool lens_is_learnt() const { return offset_.lens().learnt; }
+  // Of answers: with the focal length as learnt so far.
+  [[nodiscard]] const Calibration& answers_calibration() const {
+    return lens_is_learnt() ? answers_calibration_ : calibration_;
+  }
+  void begin_lens();
+  void add_lens(const SolvedLens& lens, FrameMotion<double>* in_base,
+                Sensitivity<6>* sensitivity) const;
+  void follow_lens();
+
   void doubt_map();
   void begin_map();
   void straighten_map();
@@ -144,9 +162,12 @@ class OeMode {
   void forget_map();
 
   OeOptions options_;
-  Calibration calibration_;
-  bool ready_ = false;        // there is room for the calibration's images
-  std::uint32_t frames_ = 0;  // count
+  Calibration given_;  // by reset()
+  FocalLength focal_length_ = FocalLength::kCalibrated;
+  Calibration calibration_;          // that the map is made with; but for the focal length as given
+  Calibration answers_calibration_;  // where the focal length is learnt
+  bool ready_ = false;               // there is room for the calibration's images
+  std::uint32_t frames_ = 0;         // count
 
   Pyramid pyramid_;  // of the frame last looked at
   Octaves octaves_;

@@ -5,8 +5,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/realtime/oe_mode/orientation_problem.h"
+
 namespace alidade {
 namespace {
+
+using internal::LensRow;
+using internal::MotionAndLens;
+using internal::OrientationProblem;
+using internal::ScaledPrior;
 
 using Matrix8 = Matrix<double, 8, 8>;
 using Vector8 = Matrix<double, 8, 1>;
@@ -21,128 +28,33 @@ double median(double* values, int count) {
   return *middle;
 }
 
-// A landmark as the sums want it, times in units of half the read-out.
-struct Term {
-  Matrix2<double> information;  // 1/px^2
-  Matrix2<double> JtWJ;
-  Matrix<double, 2, 2> JtW;
-  double t;
-};
-
-class Problem {
- public:
-  Problem(FoundLandmark* landmarks, int count, double unit_s)
-      : landmarks_(landmarks), count_(count), unit_s_(unit_s) {
-    for (int i = 0; i < count; ++i) {
-      const FoundLandmark& landmark = landmarks[i];
-      Term& term = terms_[static_cast<std::size_t>(i)];
-      term.information = inverse_of(landmark.covariance);
-      term.JtW = landmark.J_angle.transpose() * term.information;
-      term.JtWJ = term.JtW * landmark.J_angle;
-      term.t = landmark.time_s / unit_s;
-    }
-  }
-
-  // Of x in scaled units, from landmarks with these weights.
-  void normal_equations(const double* weights, Matrix6* N, Vector6* b) const {
-    Matrix2<double> A[5];
-    Vector2<double> c[3];
-    for (Matrix2<double>& a : A) a.setZero();
-    for (Vector2<double>& v : c) v.setZero();
-    for (int i = 0; i < count_; ++i) {
-      if (weights[i] == 0) continue;
-      const Term& term = terms_[static_cast<std::size_t>(i)];
-      Matrix2<double> a = weights[i] * term.JtWJ;
-      Vector2<double> v = weights[i] * (term.JtW * landmarks_[i].residual);
-      for (int power = 0; power < 5; ++power) {
-        A[power] += a;
-        a *= term.t;
-      }
-      for (int power = 0; power < 3; ++power) {
-        c[power] += v;
-        v *= term.t;
-      }
-    }
-    *N << A[0], A[1], A[2] / 2,  //
-        A[1], A[2], A[3] / 2,    //
-        A[2] / 2, A[3] / 2, A[4] / 4;
-    *b << c[0], c[1], c[2] / 2;
-  }
-
-  // The right-hand side of normal_equations(), of sensitivities in place of residuals, inliers only.
-  [[nodiscard]] Sensitivity<6> right_of_sensitivities() const {
-    std::array<Sensitivity<2>, 3> c;
-    for (Sensitivity<2>& m : c) m.setZero();
-    for (int i = 0; i < count_; ++i) {
-      if (!landmarks_[i].inlier) continue;
-      const Term& term = terms_[static_cast<std::size_t>(i)];
-      const Sensitivity<2> v = term.JtW * landmarks_[i].sensitivity;
-      c[0] += v;
-      c[1] += term.t * v;
-      c[2] += (0.5 * term.t * term.t) * v;
-    }
-    Sensitivity<6> right;
-    right << c[0], c[1], c[2];
-    return right;
-  }
-
-  [[nodiscard]] Vector2<double> left(int i, const Vector6& x) const {
-    const double t = terms_[static_cast<std::size_t>(i)].t;
-    return landmarks_[i].residual - landmarks_[i].J_angle * angle_at(x, t);
-  }
-
-  [[nodiscard]] double normalised_square(int i, const Vector6& x) const {
-    const Vector2<double> r = left(i, x);
-    return r.dot(terms_[static_cast<std::size_t>(i)].information * r);
-  }
-
-  [[nodiscard]] const Term& term(int i) const { return terms_[static_cast<std::size_t>(i)]; }
-  [[nodiscard]] int count() const { return count_; }
-
-  // Scaled = D unscaled.
-  [[nodiscard]] Vector6 scaling() const {
-    Vector6 D;
-    D << 1, 1, unit_s_, unit_s_, unit_s_ * unit_s_, unit_s_ * unit_s_;
-    return D;
-  }
-
- private:
-  FoundLandmark* landmarks_;
-  int count_;
-  double unit_s_;
-  std::array<Term, kMaxFoundLandmarks> terms_;
-};
-
-// Telemetry and prior in scaled units.
-struct ScaledPrior {
-  Matrix6 motion_information;
-  Vector6 motion_b;
-  Matrix2<double> rate_information = Matrix2<double>::Zero();
-  Vector2<double> rate = Vector2<double>::Zero();
-  Matrix4<double> telemetry_information = Matrix4<double>::Zero();
-  Vector4<double> telemetry = Vector4<double>::Zero();
-};
-
-ScaledPrior scale(const MotionPrior& prior, double unit_s, const Vector6& D) {
-  ScaledPrior out;
-  const Vector6 inverse = D.cwiseInverse();
-  out.motion_information = inverse.asDiagonal() * prior.motion_information * inverse.asDiagonal();
-  out.motion_b = out.motion_information * D.cwiseProduct(prior.motion);
-  if (prior.has_telemetry) {
-    const Vector4<double> D4(1, 1, unit_s, unit_s);
-    const Matrix4<double> covariance =
-        D4.asDiagonal() * prior.telemetry_covariance * D4.asDiagonal();
-    out.telemetry_information = covariance.inverse();
-    out.telemetry = D4.cwiseProduct(prior.telemetry);
-    out.rate_information = inverse_of(covariance.bottomRightCorner<2, 2>());
-    out.rate = out.telemetry.tail<2>();
-  }
-  return out;
+// The row of phi, of landmarks and of the frames before.
+LensRow row_of_lens(const OrientationProblem& problem, const ScaledPrior& prior,
+                    const double* weights, double inflation) {
+  LensRow row = problem.lens_row(weights);
+  const Vector6 prior_c = prior.motion_information * prior.motion_by_lens;
+  row.c = row.c / inflation + prior_c;
+  row.information = row.information / inflation + prior_c.dot(prior.motion_by_lens);
+  row.b = row.b / inflation - prior_c.dot(prior.motion);
+  return row;
 }
 
-// x from landmarks, the frames before and telemetry's rates, without its angles.
-Vector6 solve_without_angles(const Problem& problem, const ScaledPrior& prior,
-                             const double* weights, double inflation, Matrix6* covariance) {
+// x from landmarks, the frames before and telemetry's rates, without its angles; x at a known phi, and phi by those without what
+// is known from before.
+struct WithoutAngles {
+  Vector6 x;
+  Matrix6 covariance;
+  LensRow row;
+  Vector6 by_lens = Vector6::Zero();
+  double information = 0;
+  double phi = 0;  // with what is known from before
+  double phi_information = 0;
+
+  [[nodiscard]] MotionAndLens best() const { return {x + phi * by_lens, phi}; }
+};
+
+WithoutAngles solve_without_angles(const OrientationProblem& problem, const ScaledPrior& prior,
+                                   const double* weights, double inflation, bool with_covariance) {
   Matrix6 N;
   Vector6 b;
   problem.normal_equations(weights, &N, &b);
@@ -153,8 +65,31 @@ Vector6 solve_without_angles(const Problem& problem, const ScaledPrior& prior,
   N.block<2, 2>(2, 2) += prior.rate_information;
   b.segment<2>(2) += prior.rate_information * prior.rate;
   const Eigen::LDLT<Matrix6> factor(N);
-  if (covariance != nullptr) *covariance = factor.solve(Matrix6::Identity());
-  return factor.solve(b);
+  WithoutAngles out;
+  if (with_covariance) out.covariance = factor.solve(Matrix6::Identity());
+  out.x = factor.solve(b);
+  const LensScale* lens = problem.lens();
+  if (lens == nullptr) return out;
+  out.row = row_of_lens(problem, prior, weights, inflation);
+  out.by_lens = factor.solve(out.row.c);
+  // Landmarks that came with this lens know nothing of it, but for rounding.
+  out.information = std::max(0.0, out.row.information - out.row.c.dot(out.by_lens));
+  const double known = 1 / lens->variance;
+  out.phi_information = out.information / prior.scale_inflation + known;
+  out.phi = ((out.row.b + out.row.c.dot(out.x)) / prior.scale_inflation + known * lens->value) /
+            out.phi_information;
+  return out;
+}
+
+// What telemetry's angles should be more than landmarks', and how well that is known, where landmarks and what is known from
+// before tell phi.
+void expect_of_lens(const LensScale& lens, const WithoutAngles& own, Vector2<double>* innovation,
+                    Matrix2<double>* expected) {
+  const Vector2<double> offset_by_phi = lens.covariance_with_offset / lens.variance;
+  const Vector2<double> by_phi = own.by_lens.head<2>() + offset_by_phi;
+  *innovation -= own.phi * own.by_lens.head<2>() + (own.phi - lens.value) * offset_by_phi;
+  *expected += by_phi * by_phi.transpose() / own.phi_information -
+               offset_by_phi * lens.covariance_with_offset.transpose();
 }
 
 // What most landmarks say about the angles alone.
@@ -171,10 +106,16 @@ Vector2<double> middle_of_landmarks(const FoundLandmark* landmarks, int count) {
 
 using Squares = std::array<double, kMaxFoundLandmarks>;  // normalised, by landmark
 
-void find_squares(const Problem& problem, const Vector6& x, Squares* out) {
+template <bool with_lens>
+void find_squares(const OrientationProblem& problem, const MotionAndLens& x, Squares* out) {
   for (int i = 0; i < problem.count(); ++i) {
-    (*out)[static_cast<std::size_t>(i)] = problem.normalised_square(i, x);
+    (*out)[static_cast<std::size_t>(i)] = problem.normalised_square<with_lens>(i, x);
   }
+}
+
+void find_squares(const OrientationProblem& problem, const MotionAndLens& x, Squares* out) {
+  problem.lens() != nullptr ? find_squares<true>(problem, x, out)
+                            : find_squares<false>(problem, x, out);
 }
 
 double median_square(const Squares& squares, int count) {
@@ -184,8 +125,8 @@ double median_square(const Squares& squares, int count) {
 }
 
 // Residuals against their covariances, averaged over neighbours: 1 if they are independent.
-double neighbours_inflation(const Problem& problem, const FoundLandmark* landmarks, double width,
-                            double height, const Vector6& x) {
+double neighbours_inflation(const OrientationProblem& problem, const FoundLandmark* landmarks,
+                            double width, double height, const MotionAndLens& x) {
   constexpr int kColumns = 10;
   constexpr int kRows = 6;
   struct Cell {
@@ -201,7 +142,9 @@ double neighbours_inflation(const Problem& problem, const FoundLandmark* landmar
     const int row = std::clamp(static_cast<int>(landmarks[i].u.y() / height * kRows), 0, kRows - 1);
     Cell& cell = cells[static_cast<std::size_t>(row * kColumns + column)];
     cell.information += problem.term(i).information;
-    cell.sum += problem.term(i).information * problem.left(i, x);
+    const Vector2<double> left =
+        problem.lens() != nullptr ? problem.left<true>(i, x) : problem.left<false>(i, x);
+    cell.sum += problem.term(i).information * left;
     cell.used = true;
   }
   int freedom = -6;
@@ -222,12 +165,14 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   count = std::min(count, kMaxFoundLandmarks);
   if (count < std::max(limits.min_inliers, kMinInliers)) return SolveStatus::kTooFew;
   const double unit_s = std::max(std::abs(half_readout_s), limits.min_half_readout_s);
-  const Problem problem(landmarks, count, unit_s);
+  const LensScale* lens = prior.lens;
+  const OrientationProblem problem(landmarks, count, unit_s, lens);
   const Vector6 D = problem.scaling();
-  const ScaledPrior scaled = scale(prior, unit_s, D);
+  const ScaledPrior scaled = internal::scaled(prior, unit_s, D);
 
-  Vector6 x = Vector6::Zero();
-  x.head<2>() = middle_of_landmarks(landmarks, count);
+  MotionAndLens x;
+  x.x.head<2>() = middle_of_landmarks(landmarks, count);
+  if (lens != nullptr) x.phi = lens->value;
   const double max_square = limits.max_scale * limits.max_scale;
   double scale_square = 1;
   Squares squares;  // at x
@@ -242,14 +187,13 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
       const double fall = c / (c + squares[i]);
       weights[i] = fall * fall;
     }
-    x = solve_without_angles(problem, scaled, weights.data(), scale_square, nullptr);
-    if (!all_finite(x)) return SolveStatus::kNotFinite;
+    x = solve_without_angles(problem, scaled, weights.data(), scale_square, false).best();
+    if (!all_finite(x.x)) return SolveStatus::kNotFinite;
     find_squares(problem, x, &squares);
   }
 
   // All or nothing, by the scale of those that are in.
   int inliers = 0;
-  Matrix6 covariance;
   constexpr int kGateSteps = 3;
   for (int step = 0; step < kGateSteps; ++step) {
     inliers = 0;
@@ -263,7 +207,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
         inliers < limits.min_inlier_share * count) {
       return SolveStatus::kTooFew;
     }
-    x = solve_without_angles(problem, scaled, weights.data(), scale_square, &covariance);
+    x = solve_without_angles(problem, scaled, weights.data(), scale_square, false).best();
     find_squares(problem, x, &squares);
     double square = 0;
     for (int i = 0; i < count; ++i) {
@@ -273,7 +217,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   }
   const double inflation =
       std::max(scale_square, neighbours_inflation(problem, landmarks, width, height, x));
-  x = solve_without_angles(problem, scaled, weights.data(), inflation, &covariance);
+  const WithoutAngles own = solve_without_angles(problem, scaled, weights.data(), inflation, true);
 
   // What the landmarks have in common counts as an offset of this frame's own.
   Matrix2<double> shared = Matrix2<double>::Zero();
@@ -296,44 +240,105 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   out->contradiction = 0;
   if (prior.has_telemetry) {
     const Matrix4<double> telemetry_covariance = scaled.telemetry_information.inverse();
-    out->innovation = scaled.telemetry.head<2>() - x.head<2>();
+    out->innovation = scaled.telemetry.head<2>() - own.x.head<2>();
     out->innovation_covariance =
-        telemetry_covariance.topLeftCorner<2, 2>() + covariance.topLeftCorner<2, 2>();
-    const Matrix2<double> expected = out->innovation_covariance + prior_offset;
-    out->contradiction = out->innovation.dot(inverse_of(expected) * out->innovation);
-    if (!(out->contradiction < limits.max_contradiction)) return SolveStatus::kContradiction;
-
+        telemetry_covariance.topLeftCorner<2, 2>() + own.covariance.topLeftCorner<2, 2>();
+    Matrix2<double> expected = out->innovation_covariance + prior_offset;
+    Vector2<double> unexpected = out->innovation;
+    if (lens != nullptr) expect_of_lens(*lens, own, &unexpected, &expected);
+    out->contradiction = unexpected.dot(inverse_of(expected) * unexpected);
+    if (!(out->contradiction < limits.max_contradiction)) {
+      out->innovation = unexpected;
+      return SolveStatus::kContradiction;
+    }
+  }
+  if (prior.has_telemetry || lens != nullptr) {
     // The rates were used once already: here again from the beginning, with the angles.
     Matrix6 N;
     Vector6 b;
     problem.normal_equations(weights.data(), &N, &b);
     Matrix8 all = Matrix8::Zero();
     all.topLeftCorner<6, 6>() = N / inflation + scaled.motion_information;
-    // An offset known exactly has no information matrix; nothing is known to a millionth of this.
-    constexpr double kLeastVariance = 1e-20;  // rad^2
-    all.bottomRightCorner<2, 2>() =
-        inverse_of(prior_offset + kLeastVariance * Matrix2<double>::Identity());
     Vector8 right = Vector8::Zero();
     right.head<6>() = b / inflation + scaled.motion_b;
-    Matrix<double, 4, 8> H = Matrix<double, 4, 8>::Zero();
-    H.topLeftCorner<4, 4>().setIdentity();
-    H.topRightCorner<2, 2>().setIdentity();
-    all += H.transpose() * scaled.telemetry_information * H;
-    right += H.transpose() * (scaled.telemetry_information * scaled.telemetry);
-    const Eigen::LDLT<Matrix8> factor(all);
-    solution = factor.solve(right);
-    posterior = factor.solve(Matrix8::Identity());
-    const Vector4<double> D4(1, 1, unit_s, unit_s);
     sensitivity.topRows<6>() = right_of_sensitivities;
-    sensitivity += H.transpose() *
-                   (scaled.telemetry_information * (D4.asDiagonal() * prior.telemetry_sensitivity));
-    sensitivity = (posterior * sensitivity).eval();
+    // An offset known exactly has no information matrix; nothing is known to a millionth of this.
+    constexpr double kLeastVariance = 1e-20;  // rad^2
+    const Matrix2<double> offset_covariance =
+        prior_offset + kLeastVariance * Matrix2<double>::Identity();
+    if (prior.has_telemetry) {
+      Matrix<double, 4, 8> H = Matrix<double, 4, 8>::Zero();
+      H.topLeftCorner<4, 4>().setIdentity();
+      H.topRightCorner<2, 2>().setIdentity();
+      all += H.transpose() * scaled.telemetry_information * H;
+      right += H.transpose() * (scaled.telemetry_information * scaled.telemetry);
+      const Vector4<double> D4(1, 1, unit_s, unit_s);
+      sensitivity += H.transpose() * (scaled.telemetry_information *
+                                      (D4.asDiagonal() * prior.telemetry_sensitivity));
+    }
+    if (lens == nullptr) {
+      all.bottomRightCorner<2, 2>() += inverse_of(offset_covariance);
+      const Eigen::LDLT<Matrix8> factor(all);
+      solution = factor.solve(right);
+      posterior = factor.solve(Matrix8::Identity());
+      sensitivity = (posterior * sensitivity).eval();
+    } else {
+      // Of (g, phi).
+      Matrix3<double> known;
+      known << offset_covariance, lens->covariance_with_offset,
+          lens->covariance_with_offset.transpose(), lens->variance;
+      known = known.inverse().eval();
+      const Vector2<double> known_both = known.topRightCorner<2, 1>();
+      all.bottomRightCorner<2, 2>() += known.topLeftCorner<2, 2>();
+      right.tail<2>() += known_both * lens->value;
+      Vector8 c;
+      c << right_of_sensitivities * lens->direction, -known_both;
+      sensitivity.bottomRows<2>() += known_both * lens->sensitivity;
+      const Eigen::LDLT<Matrix8> factor(all);
+      solution = factor.solve(right);
+      posterior = factor.solve(Matrix8::Identity());
+      sensitivity = (posterior * sensitivity).eval();
+
+      const Sensitivity<1> of_row =
+          problem.lens_row_of_sensitivities() / inflation +
+          (scaled.motion_information * scaled.motion_by_lens).transpose() * D.asDiagonal() *
+              prior.motion_sensitivity;
+      SolvedLens& solved = out->lens;
+      solved.innovation_by_lens = own.by_lens.head<2>();
+      solved.information = own.information;
+      if (own.information > 0) {
+        Sensitivity<6> right_of_own = right_of_sensitivities;
+        right_of_own.middleRows<2>(2) +=
+            scaled.rate_information * (unit_s * prior.telemetry_sensitivity.bottomRows<2>());
+        solved.measured = (own.row.b + own.row.c.dot(own.x)) / own.information;
+        solved.measured_sensitivity =
+            (own.by_lens.transpose() * right_of_own - of_row) / own.information;
+      }
+      // The share of it that frames before said already is taken out.
+      const double old = (1 - 1 / prior.scale_inflation) * own.information;
+      const Vector8 by_lens = posterior * c;
+      const double information = own.row.information - old + known(2, 2) - c.dot(by_lens);
+      solved.variance = 1 / information;
+      solved.value = solved.variance * (own.row.b - old * solved.measured +
+                                        known(2, 2) * lens->value + c.dot(solution));
+      solved.sensitivity =
+          solved.variance * (known(2, 2) * lens->sensitivity - of_row -
+                             old * solved.measured_sensitivity + c.transpose() * sensitivity);
+      solved.motion_by_lens = by_lens.head<6>().cwiseQuotient(D);
+      solved.offset_by_lens = by_lens.tail<2>();
+      x = {solution.head<6>() + solved.value * by_lens.head<6>(), solved.value};
+      if (!std::isfinite(solved.value) || !(solved.variance > 0) ||
+          !all_finite(solved.sensitivity) || !all_finite(by_lens)) {
+        return SolveStatus::kNotFinite;
+      }
+    }
   } else {
-    solution.head<6>() = x;
-    sensitivity.topRows<6>() = covariance * right_of_sensitivities;
-    posterior.topLeftCorner<6, 6>() = covariance;
+    solution.head<6>() = own.x;
+    sensitivity.topRows<6>() = own.covariance * right_of_sensitivities;
+    posterior.topLeftCorner<6, 6>() = own.covariance;
     posterior.bottomRightCorner<2, 2>() = prior_offset;
   }
+  if (lens == nullptr) x.x = solution.head<6>();
 
   const Vector6 unscale = D.cwiseInverse();
   Matrix<double, 6, 8> to_base = Matrix<double, 6, 8>::Zero();
@@ -349,8 +354,9 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   out->offset_correction_sensitivity = sensitivity.bottomRows<2>();
   out->inliers = inliers;
   out->inflation = inflation;
+  find_squares(problem, x, &squares);
   for (int i = 0; i < count; ++i) {
-    landmarks[i].normalised_square = problem.normalised_square(i, solution.head<6>());
+    landmarks[i].normalised_square = squares[static_cast<std::size_t>(i)];
   }
   // What nothing tells has no finite variance, and the factorisation gives it none.
   if (!all_finite(out->correction) || !all_finite(out->covariance) ||

@@ -14,6 +14,9 @@
 // shared covariance of the landmarks themselves, averaged with their weights.
 // The calibration is taken as exact; how the solution depends on it follows from how the residuals and the
 // prior do (Sensitivity): the linear problem once more, with these on the right-hand side.
+// Where the focal length is learnt (lens_scale.h) phi joins the unknowns, known from before as g is, with which it is correlated:
+//   found - predicted + s phi = J (...) + noise,   s = d (found - predicted) / d phi
+// Corrections and their covariances are then those at phi = 0, and SolvedLens tells what phi is and makes of them.
 // Pure functions; no allocation.
 
 #include <array>
@@ -21,6 +24,7 @@
 #include "core/model/angle.h"
 #include "core/model/calibration.h"
 #include "core/realtime/oe_mode/covariance.h"
+#include "core/realtime/oe_mode/lens_scale.h"
 
 namespace alidade {
 
@@ -53,6 +57,9 @@ struct MotionPrior {
   Vector6 motion = Vector6::Zero();  // expected minus predicted
   Matrix6 motion_information = Matrix6::Zero();
   Sensitivity<6> motion_sensitivity = Sensitivity<6>::Zero();
+  const LensScale* lens = nullptr;  // before this frame; null: not learnt
+  // Of the variance of what the landmarks' scale says of phi, which frames before said already; >= 1.
+  double scale_inflation = 1;
 };
 
 enum class SolveStatus {
@@ -60,6 +67,21 @@ enum class SolveStatus {
   kTooFew,         // inliers
   kContradiction,  // of landmarks and telemetry
   kNotFinite
+};
+
+// Of a learnt focal length, all known together.
+struct SolvedLens {
+  double value = 0;     // phi
+  double variance = 0;  // of its noise
+  Sensitivity<1> sensitivity = Sensitivity<1>::Zero();
+  // A unit of phi adds to correction, to offset_correction, and takes from the innovation.
+  Vector6 motion_by_lens = Vector6::Zero();
+  Vector2<double> offset_by_lens = Vector2<double>::Zero();
+  Vector2<double> innovation_by_lens = Vector2<double>::Zero();
+  // What the landmarks' scale alone says of phi; information 0: nothing.
+  double measured = 0;
+  double information = 0;
+  Sensitivity<1> measured_sensitivity = Sensitivity<1>::Zero();
 };
 
 struct SolvedMotion {
@@ -71,6 +93,7 @@ struct SolvedMotion {
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();  // of angles, by the landmarks used
   Sensitivity<6> sensitivity = Sensitivity<6>::Zero();          // of correction
   Sensitivity<2> offset_correction_sensitivity = Sensitivity<2>::Zero();  // of offset_correction
+  SolvedLens lens;                                                        // where it is learnt
   int inliers = 0;
   double inflation = 1;      // of the landmarks' covariances
   double contradiction = 0;  // chi-square, 2 degrees of freedom, of landmarks against telemetry

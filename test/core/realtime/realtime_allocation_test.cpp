@@ -184,6 +184,8 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
     std::shuffle(landmark.pixels.begin(), landmark.pixels.end(), random);
   }
   ASSERT_GT(good.landmarks.size(), 10U);
+  Calibration returned = calibration;
+  returned.covariance(0, 0) = std::pow(2e-3 * kFocalLength, 2);
   const AllocationGuard guard;
   oe.reset(calibration);
   for (int k = 0; k < kFrames; ++k) {
@@ -212,6 +214,7 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
     }
     if (k == kFrames / 4) oe.reset(calibration, good);
     if (k == kFrames / 2) oe.reset(calibration);
+    if (k == kFrames * 5 / 8) oe.reset(returned, good, FocalLength::kLearnt);
     if (k == kFrames * 3 / 4) oe.reset(calibration, bad);
   }
   EXPECT_EQ(guard.count(), 0);

@@ -1,0 +1,192 @@
+#pragma once
+// The sums of orientation_solve.cpp: landmarks and prior as a linear problem, times in units of half the read-out. Internal.
+
+#include <Eigen/LU>
+#include <array>
+
+#include "core/realtime/oe_mode/orientation_solve.h"
+
+namespace alidade::internal {
+
+// A landmark as the sums want it, times in units of half the read-out.
+struct Term {
+  Matrix2<double> information;  // 1/px^2
+  Matrix2<double> JtWJ;
+  Matrix<double, 2, 2> JtW;
+  double t;
+};
+
+// The unknowns but for the offset; phi stays 0 where it is not one.
+struct MotionAndLens {
+  Vector6 x = Vector6::Zero();  // scaled
+  double phi = 0;
+};
+
+// The row of phi in the normal equations of (x, phi):  N x - c phi = b,  information phi - c x = b_phi.
+struct LensRow {
+  Vector6 c = Vector6::Zero();
+  double information = 0;
+  double b = 0;
+};
+
+class OrientationProblem {
+ public:
+  // lens: null where phi is known to be 0.
+  OrientationProblem(FoundLandmark* landmarks, int count, double unit_s, const LensScale* lens)
+      : landmarks_(landmarks), count_(count), unit_s_(unit_s), lens_(lens) {
+    for (int i = 0; i < count; ++i) {
+      const FoundLandmark& landmark = landmarks[i];
+      Term& term = terms_[static_cast<std::size_t>(i)];
+      term.information = inverse_of(landmark.covariance);
+      term.JtW = landmark.J_angle.transpose() * term.information;
+      term.JtWJ = term.JtW * landmark.J_angle;
+      term.t = landmark.time_s / unit_s;
+      if (lens != nullptr) s_[static_cast<std::size_t>(i)] = landmark.sensitivity * lens->direction;
+    }
+  }
+
+  // Of x in scaled units, from landmarks with these weights.
+  void normal_equations(const double* weights, Matrix6* N, Vector6* b) const {
+    Matrix2<double> A[5];
+    Vector2<double> c[3];
+    for (Matrix2<double>& a : A) a.setZero();
+    for (Vector2<double>& v : c) v.setZero();
+    for (int i = 0; i < count_; ++i) {
+      if (weights[i] == 0) continue;
+      const Term& term = terms_[static_cast<std::size_t>(i)];
+      Matrix2<double> a = weights[i] * term.JtWJ;
+      Vector2<double> v = weights[i] * (term.JtW * landmarks_[i].residual);
+      for (int power = 0; power < 5; ++power) {
+        A[power] += a;
+        a *= term.t;
+      }
+      for (int power = 0; power < 3; ++power) {
+        c[power] += v;
+        v *= term.t;
+      }
+    }
+    *N << A[0], A[1], A[2] / 2,  //
+        A[1], A[2], A[3] / 2,    //
+        A[2] / 2, A[3] / 2, A[4] / 4;
+    *b << c[0], c[1], c[2] / 2;
+  }
+
+  // Of landmarks alone; lens.
+  [[nodiscard]] LensRow lens_row(const double* weights) const {
+    LensRow row;
+    for (int i = 0; i < count_; ++i) {
+      if (weights[i] == 0) continue;
+      const Term& term = terms_[static_cast<std::size_t>(i)];
+      const Vector2<double> c = weights[i] * (term.JtW * s_[static_cast<std::size_t>(i)]);
+      row.c.head<2>() += c;
+      row.c.segment<2>(2) += term.t * c;
+      row.c.tail<2>() += (0.5 * term.t * term.t) * c;
+      const Vector2<double> Ws = weights[i] * (term.information * s_[static_cast<std::size_t>(i)]);
+      row.information += Ws.dot(s_[static_cast<std::size_t>(i)]);
+      row.b -= Ws.dot(landmarks_[i].residual);
+    }
+    return row;
+  }
+
+  // How -lens_row().b changes with the parameters; inliers only.
+  [[nodiscard]] Sensitivity<1> lens_row_of_sensitivities() const {
+    Sensitivity<1> row = Sensitivity<1>::Zero();
+    for (int i = 0; i < count_; ++i) {
+      if (!landmarks_[i].inlier) continue;
+      const Term& term = terms_[static_cast<std::size_t>(i)];
+      row += (term.information * s_[static_cast<std::size_t>(i)]).transpose() *
+             landmarks_[i].sensitivity;
+    }
+    return row;
+  }
+
+  // The right-hand side of normal_equations(), of sensitivities in place of residuals, inliers only.
+  [[nodiscard]] Sensitivity<6> right_of_sensitivities() const {
+    std::array<Sensitivity<2>, 3> c;
+    for (Sensitivity<2>& m : c) m.setZero();
+    for (int i = 0; i < count_; ++i) {
+      if (!landmarks_[i].inlier) continue;
+      const Term& term = terms_[static_cast<std::size_t>(i)];
+      const Sensitivity<2> v = term.JtW * landmarks_[i].sensitivity;
+      c[0] += v;
+      c[1] += term.t * v;
+      c[2] += (0.5 * term.t * term.t) * v;
+    }
+    Sensitivity<6> right;
+    right << c[0], c[1], c[2];
+    return right;
+  }
+
+  // with_lens: as lens() is there; a constant of those who ask for all landmarks.
+  template <bool with_lens>
+  [[nodiscard]] Vector2<double> left(int i, const MotionAndLens& at) const {
+    const auto of_it = static_cast<std::size_t>(i);
+    const Vector2<double> r =
+        landmarks_[i].residual - landmarks_[i].J_angle * angle_at(at.x, terms_[of_it].t);
+    if constexpr (with_lens) return r + at.phi * s_[of_it];
+    return r;
+  }
+
+  template <bool with_lens>
+  [[nodiscard]] double normalised_square(int i, const MotionAndLens& at) const {
+    const Vector2<double> r = left<with_lens>(i, at);
+    return r.dot(terms_[static_cast<std::size_t>(i)].information * r);
+  }
+
+  [[nodiscard]] const Term& term(int i) const { return terms_[static_cast<std::size_t>(i)]; }
+  [[nodiscard]] int count() const { return count_; }
+  [[nodiscard]] const LensScale* lens() const { return lens_; }
+
+  // Scaled = D unscaled.
+  [[nodiscard]] Vector6 scaling() const {
+    Vector6 D;
+    D << 1, 1, unit_s_, unit_s_, unit_s_ * unit_s_, unit_s_ * unit_s_;
+    return D;
+  }
+
+ private:
+  FoundLandmark* landmarks_;
+  int count_;
+  double unit_s_;
+  const LensScale* lens_;
+  std::array<Term, kMaxFoundLandmarks> terms_;
+  // px, d residual / d phi; apart from the terms, which all solutions go through. Not written without a lens.
+  std::array<Vector2<double>, kMaxFoundLandmarks> s_;
+};
+
+// Telemetry and prior in scaled units.
+struct ScaledPrior {
+  Matrix6 motion_information;
+  Vector6 motion;
+  Vector6 motion_b;
+  Matrix2<double> rate_information = Matrix2<double>::Zero();
+  Vector2<double> rate = Vector2<double>::Zero();
+  Matrix4<double> telemetry_information = Matrix4<double>::Zero();
+  Vector4<double> telemetry = Vector4<double>::Zero();
+  Vector6 motion_by_lens = Vector6::Zero();  // d motion / d phi
+  double scale_inflation = 1;
+};
+
+[[nodiscard]] inline ScaledPrior scaled(const MotionPrior& prior, double unit_s, const Vector6& D) {
+  ScaledPrior out;
+  const Vector6 inverse = D.cwiseInverse();
+  out.motion_information = inverse.asDiagonal() * prior.motion_information * inverse.asDiagonal();
+  out.motion = D.cwiseProduct(prior.motion);
+  out.motion_b = out.motion_information * out.motion;
+  if (prior.lens != nullptr) {
+    out.scale_inflation = prior.scale_inflation;
+    out.motion_by_lens = D.cwiseProduct(prior.motion_sensitivity * prior.lens->direction);
+  }
+  if (prior.has_telemetry) {
+    const Vector4<double> D4(1, 1, unit_s, unit_s);
+    const Matrix4<double> covariance =
+        D4.asDiagonal() * prior.telemetry_covariance * D4.asDiagonal();
+    out.telemetry_information = covariance.inverse();
+    out.telemetry = D4.cwiseProduct(prior.telemetry);
+    out.rate_information = inverse_of(covariance.bottomRightCorner<2, 2>());
+    out.rate = out.telemetry.tail<2>();
+  }
+  return out;
+}
+
+}  // namespace alidade::internal

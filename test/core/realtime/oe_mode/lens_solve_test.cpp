@@ -1,0 +1,330 @@
+// The solution where the focal length is unknown, too: its errors against its covariance, and how it follows the calibration.
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+#include <Eigen/LU>
+#include <cmath>
+#include <random>
+#include <vector>
+
+#include "core/realtime/oe_mode/orientation_solve.h"
+#include "core/realtime/oe_mode/view_projection.h"
+
+namespace alidade::test {
+namespace {
+
+constexpr int kF = index(Parameter::kFocalLength);
+constexpr double kWidth = 1280;
+constexpr double kHeight = 720;
+constexpr double kFocal = 4000;          // px
+constexpr double kLineDelay = -14.2e-6;  // s/row
+constexpr double kHalf_s = kLineDelay * kHeight / 2;
+constexpr double kNoise = 0.08;          // px
+constexpr double kAcceleration = 2;      // rad/s^2
+constexpr double kOffset = 3e-5;         // rad
+constexpr double kTelemetry = 4e-5;      // rad
+constexpr double kTelemetryRate = 1e-3;  // rad/s
+
+using Vector7 = Matrix<double, 7, 1>;
+using Matrix7 = Matrix<double, 7, 7>;
+
+struct LensWorld {
+  double sigma = 2e-3;       // of phi
+  double known = 0;          // its value before
+  double correlation = 0.5;  // of phi and g
+  double knows_lens = 0;     // 1: the landmarks came with this lens from here, 0: they are right
+  bool has_telemetry = true;
+  double claimed = 1;  // landmarks err by so much of what they claim
+};
+
+// A frame as it is drawn; x, g and phi are the truth, and what is told of it.
+class LensFrame {
+ public:
+  LensFrame(const LensWorld& world, std::uint64_t seed) : random_(seed) {
+    Calibration calibration;
+    calibration.camera = {kFocal, 1, -0.2, static_cast<int>(kWidth), static_cast<int>(kHeight)};
+    calibration.line_delay = kLineDelay;
+    calibration.covariance(kF, kF) = std::pow(kFocal * world.sigma, 2);
+    lens_ = LensScale::begin(calibration);
+    lens_.value = world.known;
+    const double n = normal(1);
+    phi = world.known + world.sigma * n;
+    const double rest = std::sqrt(1 - world.correlation * world.correlation);
+    g = kOffset * Vector2<double>(world.correlation * n + rest * normal(1), normal(1));
+    lens_.covariance_with_offset = {world.correlation * kOffset * world.sigma, 0};
+    x << normal(1 / kFocal), normal(1 / kFocal), normal(0.01), normal(0.01), normal(kAcceleration),
+        normal(kAcceleration);
+    const FrameMotion<double> motion{{0.3, -0.4}, {0.1, 0.05}, kHeight / 2};
+    const ViewProjection view(calibration, motion);
+    for (int i = 0; i < 120; ++i) {
+      const Vector2<double> u(uniform(0, kWidth), uniform(0, kHeight));
+      Vector3<double> d;
+      SeenDirection seen;
+      Sensitivity<2> J_parameters;
+      EXPECT_EQ(rolling_shutter_unproject(calibration.camera, calibration.mechanics, kLineDelay,
+                                          motion, u, &d),
+                ProjectionStatus::kOk);
+      EXPECT_TRUE(view.project(d, &seen, &J_parameters));
+      FoundLandmark f{};
+      f.u = seen.u;
+      f.J_angle = seen.J_angle;
+      f.time_s = seen.time_s;
+      f.covariance = kNoise * kNoise * Matrix2<double>::Identity();
+      f.sensitivity = -(1 - world.knows_lens) * J_parameters;
+      const Vector2<double> s = f.sensitivity * lens_.direction;
+      f.residual = f.J_angle * angle_at(x, f.time_s) - phi * s +
+                   Vector2<double>(normal(world.claimed * kNoise), normal(world.claimed * kNoise));
+      landmarks.push_back(f);
+    }
+    prior.lens = &lens_;
+    prior.offset_covariance = kOffset * kOffset * Matrix2<double>::Identity();
+    prior.motion_information.diagonal().tail<2>().setConstant(1 / (kAcceleration * kAcceleration));
+    prior.has_telemetry = world.has_telemetry;
+    if (!world.has_telemetry) return;
+    prior.telemetry = x.head<4>();
+    prior.telemetry.head<2>() += g;
+    const Vector4<double> sigma(kTelemetry, kTelemetry, kTelemetryRate, kTelemetryRate);
+    for (int i = 0; i < 4; ++i) prior.telemetry[i] += normal(sigma[i]);
+    prior.telemetry_covariance = sigma.cwiseAbs2().asDiagonal();
+  }
+  LensFrame(const LensFrame&) = delete;
+  LensFrame& operator=(const LensFrame&) = delete;
+
+  SolveStatus solve(SolvedMotion* out) {
+    return solve_orientation(landmarks.data(), static_cast<int>(landmarks.size()), prior,
+                             SolveLimits{}, kWidth, kHeight, kHalf_s, out);
+  }
+  double normal(double sigma) { return sigma * std::normal_distribution<double>()(random_); }
+  double uniform(double from, double to) {
+    return std::uniform_real_distribution<double>(from, to)(random_);
+  }
+
+  Vector6 x;          // map's frame
+  Vector2<double> g;  // of the offset
+  double phi = 0;
+  std::vector<FoundLandmark> landmarks;
+  MotionPrior prior;
+  LensScale lens_;
+
+ private:
+  std::mt19937_64 random_;
+};
+
+// Of base angle, rate and acceleration, by a unit of phi.
+Vector6 by_lens_of(const SolvedLens& lens) {
+  Vector6 by_lens = lens.motion_by_lens;
+  by_lens.head<2>() += lens.offset_by_lens;
+  return by_lens;
+}
+
+// Of base angle, rate and acceleration, and phi.
+Vector7 estimate_of(const SolvedMotion& solved) {
+  Vector7 out;
+  out << solved.correction + solved.lens.value * by_lens_of(solved.lens), solved.lens.value;
+  out.head<2>() += solved.offset_correction;
+  return out;
+}
+
+Matrix7 covariance_of(const SolvedMotion& solved) {
+  Vector7 with_lens;
+  with_lens << by_lens_of(solved.lens), 1;
+  Matrix7 out = solved.lens.variance * with_lens * with_lens.transpose();
+  out.topLeftCorner<6, 6>() += solved.covariance;
+  return out;
+}
+
+TEST(LensSolve, ErrsAsItsCovarianceSays) {
+  constexpr int kRuns = 300;
+  for (const double sigma : {1e-5, 2e-3, 1e-2}) {
+    for (const double known : {0.0, -3e-3}) {
+      for (const double knows_lens : {0.0, 0.9, 1.0}) {
+        for (const bool has_telemetry : {true, false}) {
+          SCOPED_TRACE(testing::Message()
+                       << sigma << ' ' << known << ' ' << knows_lens << ' ' << has_telemetry);
+          LensWorld world;
+          world.sigma = sigma;
+          world.known = known;
+          world.knows_lens = knows_lens;
+          world.has_telemetry = has_telemetry;
+          double squares = 0;
+          double as_drawn = 0;  // by the covariance before inflation, about
+          for (int run = 0; run < kRuns; ++run) {
+            LensFrame frame(world, static_cast<std::uint64_t>(run));
+            SolvedMotion solved;
+            ASSERT_EQ(frame.solve(&solved), SolveStatus::kOk);
+            Vector7 truth;
+            truth << frame.x, frame.phi;
+            truth.head<2>() += frame.g;
+            const Vector7 error = estimate_of(solved) - truth;
+            const double square = error.dot(covariance_of(solved).ldlt().solve(error));
+            squares += square / kRuns;
+            as_drawn += solved.inflation * square / kRuns;
+          }
+          // Four standard deviations of the mean of chi-squares of 7 degrees.
+          const double tolerance = 4 * std::sqrt(14.0 / kRuns);
+          EXPECT_LT(squares, 7 + tolerance);
+          EXPECT_GT(as_drawn, 7 - tolerance);
+        }
+      }
+    }
+  }
+}
+
+// Landmarks that are right tell it by their scale; those that came with this lens, from here, tell nothing.
+TEST(LensSolve, LearnsFromTheScaleOfWhatDoesNotKnowTheLens) {
+  LensWorld world;
+  world.correlation = 0;
+  LensFrame right(world, 7);
+  SolvedMotion solved;
+  ASSERT_EQ(right.solve(&solved), SolveStatus::kOk);
+  // 120 of 0.08 px, 420 px from the centre, root mean square.
+  const double expected = kNoise / (420 * std::sqrt(120.0));
+  EXPECT_LT(std::sqrt(solved.lens.variance), 2 * expected);
+  EXPECT_NEAR(1 / std::sqrt(solved.lens.information), std::sqrt(solved.lens.variance),
+              0.1 * std::sqrt(solved.lens.variance));
+  EXPECT_LT(std::abs(solved.lens.measured - right.phi), 5 * expected);
+
+  world.knows_lens = 1;
+  LensFrame own(world, 7);
+  ASSERT_EQ(own.solve(&solved), SolveStatus::kOk);
+  EXPECT_NEAR(solved.lens.variance, own.lens_.variance, 1e-6 * own.lens_.variance);
+  EXPECT_NEAR(solved.lens.value, own.lens_.value, 1e-3 * world.sigma);
+}
+
+// What frames before said already is no news.
+TEST(LensSolve, CountsOldInformationOnce) {
+  LensFrame frame(LensWorld{}, 8);
+  SolvedMotion news;
+  ASSERT_EQ(frame.solve(&news), SolveStatus::kOk);
+  frame.prior.scale_inflation = 100;
+  SolvedMotion old;
+  ASSERT_EQ(frame.solve(&old), SolveStatus::kOk);
+  EXPECT_DOUBLE_EQ(old.lens.information, news.lens.information);
+  EXPECT_GT(old.lens.variance, 20 * news.lens.variance);
+  EXPECT_LT(old.lens.variance, 110 * news.lens.variance);
+}
+
+// The limit of a lens that is known exactly.
+TEST(LensSolve, IsAsWithoutALensWhereThatIsKnown) {
+  for (const bool has_telemetry : {true, false}) {
+    LensWorld world;
+    world.sigma = 1e-9;
+    world.correlation = 0;
+    world.has_telemetry = has_telemetry;
+    LensFrame frame(world, 9);
+    SolvedMotion with_lens;
+    ASSERT_EQ(frame.solve(&with_lens), SolveStatus::kOk);
+    frame.prior.lens = nullptr;
+    SolvedMotion without;
+    ASSERT_EQ(frame.solve(&without), SolveStatus::kOk);
+    EXPECT_EQ(with_lens.inliers, without.inliers);
+    const Vector6 sigma = without.covariance.diagonal().cwiseSqrt();
+    const Vector6 difference = with_lens.correction - without.correction;
+    EXPECT_LT(difference.cwiseQuotient(sigma).norm(), 1e-4);
+    EXPECT_LT((with_lens.covariance - without.covariance).norm(), 1e-6 * without.covariance.norm());
+  }
+}
+
+// What phi may explain is no contradiction; what it may not is.
+TEST(LensSolve, BlamesTheLensForWhatItCanDoOnly) {
+  LensWorld world;
+  world.sigma = 1e-2;
+  world.correlation = 0;
+  world.knows_lens = 1;
+  LensFrame frame(world, 10);
+  ASSERT_GT(std::abs(frame.phi), 0.5 * world.sigma);
+  // Landmarks that came with this lens from a tenth of a radian away: angles go with f.
+  const double away = 0.1;
+  for (FoundLandmark& f : frame.landmarks) {
+    f.sensitivity.col(kF) = -f.J_angle * Vector2<double>(away, 0) / kFocal;
+    f.residual -= frame.phi * (f.sensitivity * frame.lens_.direction);
+  }
+  SolvedMotion solved;
+  ASSERT_EQ(frame.solve(&solved), SolveStatus::kOk);
+  const double telemetry_sigma = std::hypot(kTelemetry, kOffset) / away;
+  EXPECT_LT(std::abs(solved.lens.value - frame.phi), 5 * telemetry_sigma);
+  EXPECT_LT(std::sqrt(solved.lens.variance), 1.1 * telemetry_sigma);
+  EXPECT_NEAR(solved.lens.innovation_by_lens.x(), -away, 1e-6);
+  // 10 sigmas of what the lens may do.
+  frame.prior.telemetry[0] += 10 * world.sigma * away;
+  EXPECT_EQ(frame.solve(&solved), SolveStatus::kContradiction);
+  frame.prior.telemetry[0] -= 10 * world.sigma * away;
+  // What it moves pan by does not excuse tilt.
+  frame.prior.telemetry[1] += 8 * std::hypot(kTelemetry, kOffset);
+  EXPECT_EQ(frame.solve(&solved), SolveStatus::kContradiction);
+  frame.prior.lens = nullptr;
+  frame.prior.telemetry[1] -= 8 * std::hypot(kTelemetry, kOffset);
+  EXPECT_EQ(frame.solve(&solved), SolveStatus::kContradiction) << "the lens was needed";
+}
+
+TEST(LensSolve, FollowsTheCalibrationAsItsSensitivitySays) {
+  for (const bool has_telemetry : {true, false}) {
+    LensWorld world;
+    world.has_telemetry = has_telemetry;
+    world.claimed = 0.3;  // no inflation, which would follow the residuals
+    LensFrame frame(world, 11);
+    Sensitivity<1> of_lens;
+    Sensitivity<4> of_telemetry;
+    for (int j = 0; j < kParameterCount; ++j) {
+      of_lens[j] = frame.normal(1e-3);
+      for (int i = 0; i < 4; ++i) of_telemetry(i, j) = frame.normal(1e-4);
+      for (FoundLandmark& f : frame.landmarks) {
+        if (j != kF && j != index(Parameter::kRadialDistortion))
+          f.sensitivity.col(j) = Vector2<double>(frame.normal(0.1), frame.normal(0.1));
+      }
+    }
+    frame.lens_.sensitivity = of_lens;
+    frame.prior.telemetry_sensitivity = of_telemetry;
+    frame.prior.scale_inflation = 3;
+    SolvedMotion solved;
+    ASSERT_EQ(frame.solve(&solved), SolveStatus::kOk);
+    const auto moved = [&](int j, double step) {
+      for (FoundLandmark& f : frame.landmarks) f.residual += step * f.sensitivity.col(j);
+      frame.lens_.value += step * of_lens[j];
+      frame.prior.telemetry += step * of_telemetry.col(j);
+      SolvedMotion out;
+      EXPECT_EQ(frame.solve(&out), SolveStatus::kOk);
+      EXPECT_EQ(out.inliers, solved.inliers);
+      for (FoundLandmark& f : frame.landmarks) f.residual -= step * f.sensitivity.col(j);
+      frame.lens_.value -= step * of_lens[j];
+      frame.prior.telemetry -= step * of_telemetry.col(j);
+      return out;
+    };
+    // But for f and k, whose effect phi takes over.
+    for (int j = 0; j < kParameterCount; ++j) {
+      if (j == kF || j == index(Parameter::kRadialDistortion)) continue;
+      constexpr double kStep = 1e-3;
+      const SolvedMotion more = moved(j, kStep);
+      const SolvedMotion less = moved(j, -kStep);
+      const double lens = (more.lens.value - less.lens.value) / (2 * kStep);
+      EXPECT_NEAR(solved.lens.sensitivity[j], lens, 1e-3 * std::abs(lens) + 1e-9) << j;
+      const double measured = (more.lens.measured - less.lens.measured) / (2 * kStep);
+      EXPECT_NEAR(solved.lens.measured_sensitivity[j], measured, 1e-3 * std::abs(measured) + 1e-9)
+          << j;
+      const Vector6 motion = (more.correction - less.correction) / (2 * kStep);
+      EXPECT_LT((solved.sensitivity.col(j) - motion).cwiseQuotient(motion).norm(), 1e-2) << j;
+    }
+  }
+}
+
+TEST(LensSolve, FindsWrongLandmarksWhereTheScaleIsWrongToo) {
+  for (std::uint64_t seed = 0; seed < 40; ++seed) {
+    LensWorld world;
+    world.sigma = 5e-3;
+    LensFrame frame(world, seed);
+    for (std::size_t i = 0; i < frame.landmarks.size(); i += 4) {
+      frame.landmarks[i].residual += Vector2<double>(frame.uniform(2, 4), frame.uniform(-4, -2));
+    }
+    SolvedMotion solved;
+    ASSERT_EQ(frame.solve(&solved), SolveStatus::kOk);
+    for (std::size_t i = 0; i < frame.landmarks.size(); i += 4) {
+      EXPECT_FALSE(frame.landmarks[i].inlier);
+    }
+    EXPECT_GT(solved.inliers, 80);
+    EXPECT_LT(std::abs(solved.lens.value - frame.phi), 5 * std::sqrt(solved.lens.variance));
+  }
+}
+
+}  // namespace
+}  // namespace alidade::test
