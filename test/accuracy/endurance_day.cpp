@@ -278,8 +278,9 @@ VirtualDay::VirtualDay(const DayPlan& plan, const std::filesystem::path& scenes)
   }
   const bool zooms = !plan.zooms.empty();
   const double focal_length = (zooms ? kNarrow : kWide).focal_length * plan.width / 480;
-  scene_ = std::make_unique<simulator::Scene>(make_scene(plan.plain_scene, scenes), focal_length,
-                                              seen, plan.seed);
+  scene_ = std::make_unique<simulator::Scene>(
+      make_scene(plan.plain_scene, scenes),
+      std::vector<simulator::Sight>{{focal_length, std::move(seen)}}, false, plan.seed);
   make_frames();
   make_samples();
   make_events();
@@ -501,8 +502,8 @@ void VirtualDay::render(std::size_t frame, std::uint8_t* image) const {
       }
       const double time = start + (row + 0.5) * config_.camera.line_delay +
                           kExposure * ((static_cast<double>(i) + 0.5) / kPoints.size() - 0.5);
-      scene_->shade(optics.mount * head_from_camera(optics, time), time, x.data(), y.data(), width,
-                    1.0F / kPoints.size(), signal.data());
+      scene_->shade(optics.mount * head_from_camera(optics, time), time, optics.focal_length,
+                    x.data(), y.data(), width, 1.0F / kPoints.size(), signal.data());
     }
     std::uint64_t random = 0;
     for (std::size_t column = 0; column < width; ++column) {
