@@ -131,7 +131,10 @@ FrameSearch LiveState::find_at(double time_s, OrientationRecord* record) const {
   if (nearest + 1 < kept_.size())
     period_s = std::min(period_s, time_of(nearest + 1) - time_of(nearest));
   if (kept_.size() == 1) period_s = 0;
-  if (!(std::abs(time_s - time_of(nearest)) <= period_s / 2)) return FrameSearch::kNotKept;
+  // Whoever asks may have the time by another clock, and the first frames' times can lie close together.
+  constexpr double kLeastReach_s = 1e-3;
+  const double reach_s = std::max(period_s / 2, kLeastReach_s);
+  if (!(std::abs(time_s - time_of(nearest)) <= reach_s)) return FrameSearch::kNotKept;
   *record = kept_[nearest];
   return FrameSearch::kFound;
 }

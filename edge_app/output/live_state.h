@@ -62,7 +62,7 @@ class LiveState final : public RecordSink {
   // The newest that has an orientation.
   [[nodiscard]] std::optional<OrientationRecord> newest_oriented() const;
   [[nodiscard]] FrameSearch find(std::int64_t frame, OrientationRecord* record) const;
-  // The frame whose row 0 was exposed nearest to time_s, no further from it than half the way to the next frame.
+  // The frame whose row 0 was exposed nearest to time_s, no further from it than half the way to the next frame, or than 1 ms.
   [[nodiscard]] FrameSearch find_at(double time_s, OrientationRecord* record) const;
   [[nodiscard]] std::vector<HistorySample> history() const;
   // When, on the host's clock, the calibration in use was first seen; empty before the first record.

@@ -100,12 +100,23 @@ TEST(LiveState, FindsTheFrameNearestToATimeWithinHalfAPeriod) {
   EXPECT_EQ(frame_at(-1e300), -1);
 }
 
-TEST(LiveState, ALoneFrameIsFoundAtItsOwnTimeOnly) {
+// The time of whoever asks comes by way of another clock.
+TEST(LiveState, ALoneFrameAndOneCloseToAnotherAreFoundWithinAMillisecond) {
   LiveState state;
   write(&state, 1, 1);
   OrientationRecord found;
-  EXPECT_EQ(state.find_at(100.04, &found), FrameSearch::kFound);
+  for (const double near_s : {-0.9e-3, 0.0, 1e-5, 0.9e-3}) {
+    EXPECT_EQ(state.find_at(100.04 + near_s, &found), FrameSearch::kFound) << near_s;
+  }
+  EXPECT_EQ(state.find_at(100.04 - 1.1e-3, &found), FrameSearch::kNotKept);
   EXPECT_EQ(state.find_at(100.05, &found), FrameSearch::kNotKept);
+  OrientationRecord next = record(2);
+  next.time_s = 100.04 + 2e-5;
+  EXPECT_TRUE(state.write(next));
+  ASSERT_EQ(state.find_at(100.04 + 5e-5, &found), FrameSearch::kFound);
+  EXPECT_EQ(found.frame, 2);
+  ASSERT_EQ(state.find_at(100.04 - 5e-5, &found), FrameSearch::kFound);
+  EXPECT_EQ(found.frame, 1);
 }
 
 TEST(LiveState, ForgetsFramesWhenTheirClockGoesBack) {
