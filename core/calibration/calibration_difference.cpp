@@ -2,7 +2,6 @@
 
 #include <Eigen/LU>
 #include <algorithm>
-#include <cmath>
 
 #include "core/model/direction.h"
 
@@ -16,24 +15,19 @@ using ComparedCovariance = Eigen::Matrix<double, kCount, kCount>;
 
 // b - a, by Parameter.
 Eigen::Matrix<double, kParameterCount, 1> difference(const Calibration& a, const Calibration& b) {
-  Eigen::Matrix<double, kParameterCount, 1> d = Eigen::Matrix<double, kParameterCount, 1>::Zero();
-  d[index(Parameter::kFocalLength)] = b.camera.focal_length - a.camera.focal_length;
-  d[index(Parameter::kRadialDistortion)] = b.camera.radial_distortion - a.camera.radial_distortion;
-  d.segment<2>(index(Parameter::kCentreU)) = b.camera.centre_offset() - a.camera.centre_offset();
-  d[index(Parameter::kLineDelay)] = b.line_delay - a.line_delay;
+  Eigen::Matrix<double, kParameterCount, 1> d;
+  for (int i = 0; i < kParameterCount; ++i) {
+    const auto parameter = static_cast<Parameter>(i);
+    d[i] = parameter_value(b, parameter) - parameter_value(a, parameter);
+  }
   d.segment<2>(index(Parameter::kPanAxis0)) =
       direction_minus(b.mechanics.pan_axis, a.mechanics.pan_axis);
   d.segment<2>(index(Parameter::kTiltAxis0)) =
       direction_minus(b.mechanics.tilt_axis, a.mechanics.tilt_axis);
-  d[index(Parameter::kClockOffset)] = b.clock_offset - a.clock_offset;
   return d;
 }
 
 }  // namespace
-
-double parameter_sigma(const Calibration& calibration, Parameter parameter) {
-  return std::sqrt(std::max(0.0, calibration.covariance(index(parameter), index(parameter))));
-}
 
 double difference_chi_square(const Calibration& a, const Calibration& b, bool with_clock_offset) {
   const auto d = difference(a, b);

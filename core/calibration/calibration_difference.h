@@ -19,9 +19,6 @@ inline constexpr std::array<Parameter, 8> kComparedParameters = {
     Parameter::kPanAxis0,    Parameter::kPanAxis1,         Parameter::kTiltAxis0,
     Parameter::kTiltAxis1,   Parameter::kClockOffset};  // the last one
 
-// One standard deviation, in the unit of the parameter; a variance that rounding left negative counts as 0.
-[[nodiscard]] double parameter_sigma(const Calibration& calibration, Parameter parameter);
-
 // with_clock_offset: false where the frames' clock began anew between the two, so that the offsets have nothing in
 // common: the chi-square is then one of 7 degrees of freedom.
 [[nodiscard]] double difference_chi_square(const Calibration& a, const Calibration& b,

@@ -34,6 +34,39 @@ bool CalibrationOptions::validate(std::string* error) const {
   return problem == nullptr;
 }
 
+std::optional<double> CalibrationOptions::prior_sigma(Parameter parameter) const {
+  const auto of = [](const std::optional<CalibrationPrior>& prior) {
+    return prior ? std::optional<double>(prior->sigma) : std::nullopt;
+  };
+  switch (parameter) {
+    case Parameter::kFocalLength:
+      return of(focal_length);
+    case Parameter::kAspect:
+      return of(aspect);
+    case Parameter::kRadialDistortion:
+      return of(radial_distortion);
+    case Parameter::kCentreU:
+    case Parameter::kCentreV:
+      return centre_sigma_px;
+    case Parameter::kLineDelay:
+      return of(line_delay);
+    case Parameter::kPanAxis0:
+    case Parameter::kPanAxis1:
+    case Parameter::kTiltAxis0:
+    case Parameter::kTiltAxis1:
+      return axis_sigma_rad;
+    case Parameter::kPanScale:
+      return pan_scale.sigma;
+    case Parameter::kTiltScale:
+      return tilt_scale.sigma;
+    case Parameter::kClockOffset:
+      return of(clock_offset);
+    case Parameter::kCount:
+      break;
+  }
+  return std::nullopt;
+}
+
 std::vector<std::string> CalibrationExclusions::describe() const {
   std::vector<std::string> lines;
   const auto add = [&lines](int count, const char* what) {

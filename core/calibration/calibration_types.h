@@ -97,6 +97,9 @@ struct CalibrationOptions {
 
   // False and one line in *error (if not null) when a value is out of its range.
   [[nodiscard]] bool validate(std::string* error = nullptr) const;
+
+  // Of what is known of a parameter before; 0: exactly; none: nothing.
+  [[nodiscard]] std::optional<double> prior_sigma(Parameter parameter) const;
 };
 
 enum class CalibrationStatus {

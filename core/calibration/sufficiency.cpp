@@ -28,10 +28,6 @@ std::string text(const char* format, double a, double b = 0) {
   return buffer;
 }
 
-double sigma(const Calibration& c, Parameter parameter) {
-  return std::sqrt(c.covariance(index(parameter), index(parameter)));
-}
-
 // The direction in which the parameters are most uncertain together.
 void describe_weakest(CalibrationResult* result) {
   // Exact parameters stand apart and are never the extremes.
@@ -160,14 +156,14 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
   describe_weakest(result);
 
   std::vector<std::string> reasons;
-  const double f_error = sigma(c, Parameter::kFocalLength) / c.camera.focal_length;
+  const double f_error = parameter_sigma(c, Parameter::kFocalLength) / c.camera.focal_length;
   const auto correlation = [&c](Parameter a, Parameter b) {
-    const double scale = sigma(c, a) * sigma(c, b);
+    const double scale = parameter_sigma(c, a) * parameter_sigma(c, b);
     return scale > 0 ? c.covariance(index(a), index(b)) / scale : 0.0;
   };
   const bool scale_from_prior =
       options.pan_scale.sigma > 0 &&
-      sigma(c, Parameter::kPanScale) > 0.5 * options.pan_scale.sigma &&
+      parameter_sigma(c, Parameter::kPanScale) > 0.5 * options.pan_scale.sigma &&
       std::abs(correlation(Parameter::kFocalLength, Parameter::kPanScale)) > 0.95;
   if (scale_from_prior) {
     advice.push_back(text(
@@ -180,21 +176,22 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
     reasons.push_back(
         text("focal length known to %.1f %% only: move farther on both axes", 100 * f_error));
   }
-  const double d_error = sigma(c, Parameter::kClockOffset);
+  const double d_error = parameter_sigma(c, Parameter::kClockOffset);
   if (d_error > kMaxClockOffsetError_s) {
     reasons.push_back(
         text("clock offset known to %.1f ms only (largest rate %.3f rad/s): change speed and "
              "direction more and faster",
              1e3 * d_error, motion.largest_rate.norm()));
   }
-  const double readout_error = sigma(c, Parameter::kLineDelay) * c.camera.height;
+  const double readout_error = parameter_sigma(c, Parameter::kLineDelay) * c.camera.height;
   if (readout_error > kMaxReadoutError_s) {
     reasons.push_back(
         text("read-out known to %.1f ms only: move faster while the image is read out",
              1e3 * readout_error));
   }
   const double corner = 0.5 * std::hypot(c.camera.width, c.camera.height) / c.camera.focal_length;
-  const double distortion_error = sigma(c, Parameter::kRadialDistortion) * corner * corner;
+  const double distortion_error =
+      parameter_sigma(c, Parameter::kRadialDistortion) * corner * corner;
   if (distortion_error > kMaxDistortionError) {
     reasons.push_back(
         text("radial distortion known to %.1f %% of the radius only: let landmarks cross the whole "
@@ -203,7 +200,7 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
   }
   for (const Parameter p :
        {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
-    if (options.axis_sigma_rad > 0 && sigma(c, p) > 0.7 * options.axis_sigma_rad) {
+    if (options.axis_sigma_rad > 0 && parameter_sigma(c, p) > 0.7 * options.axis_sigma_rad) {
       advice.push_back(std::string(to_string(p)) +
                        " rests on its prior: a larger range of the other axis would show it");
     }
@@ -214,7 +211,7 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
     result->status = CalibrationStatus::kOk;
     result->message =
         text("focal length %.1f px (sigma %.2g)", c.camera.focal_length,
-             sigma(c, Parameter::kFocalLength)) +
+             parameter_sigma(c, Parameter::kFocalLength)) +
         text(", clock offset %.3f ms (sigma %.2g)", 1e3 * c.clock_offset, 1e3 * d_error);
     return;
   }

@@ -3,22 +3,10 @@
 #include <algorithm>
 #include <cstddef>
 
+#include "core/calibration/partial_inverse.h"
+
 namespace alidade::internal {
 namespace {
-
-// Rows and columns of matrix or vector at places of a larger one, zero elsewhere.
-Eigen::MatrixXd spread(const Eigen::MatrixXd& matrix, const std::vector<int>& rows,
-                       const std::vector<int>& columns, Eigen::Index size_rows,
-                       Eigen::Index size_columns) {
-  Eigen::MatrixXd result = Eigen::MatrixXd::Zero(size_rows, size_columns);
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    for (std::size_t j = 0; j < columns.size(); ++j) {
-      result(rows[i], columns[j]) =
-          matrix(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-    }
-  }
-  return result;
-}
 
 // All rows but those of one node, of a curve with so many.
 std::vector<int> rows_but(int node, int nodes) {
@@ -72,7 +60,6 @@ void add_zoom_sample(const ZoomSample& sample, int node, bool with_shared_priors
 }
 
 bool take_apart(const ZoomCurve& curve, const ZoomCurveParts& parts, ZoomEvidence* evidence) {
-  constexpr double kAnyClock_s = 0.1;  // as far as two connections' delays may differ
   const ZoomCurve::Content& content = curve.content();
   *evidence = no_zoom_evidence({content.reading.begin(), content.reading.begin() + content.nodes});
   evidence->level = content.level;
@@ -80,12 +67,11 @@ bool take_apart(const ZoomCurve& curve, const ZoomCurveParts& parts, ZoomEvidenc
   const std::vector<int> rows = evidence->rows(parts.places);
   const int clock = evidence->row(0, zoom_place_of(Parameter::kClockOffset));
   take_common_clock_error(rows, clock, parts.common_clock_sigma_s, &covariance);
-  if (parts.clock_is_another) covariance(clock, clock) += kAnyClock_s * kAnyClock_s;
-  const Eigen::MatrixXd information = scaled_inverse(part_of(covariance, rows));
-  if (information.size() == 0) return false;
+  if (parts.clock_is_another) covariance(clock, clock) += kAnyConnection_s * kAnyConnection_s;
+  evidence->H = inverse_over(covariance, rows);
+  if (evidence->H.size() == 0) return false;
   Eigen::VectorXd mean = Eigen::VectorXd::Zero(covariance.rows());
   mean.head(content.value.rows()) = content.value;
-  evidence->H = spread(information, rows, rows, covariance.rows(), covariance.rows());
   // The curves are about their levels: all of this is of the calibrations.
   evidence->g = evidence->H * mean;
   for (int q = 0; q < kZoomQuantityCount; ++q) {
@@ -107,8 +93,9 @@ int insert_node(double reading, ZoomEvidence* evidence) {
   ZoomEvidence larger = no_zoom_evidence(readings);
   const std::vector<int> rows = rows_but(node, larger.nodes());
   larger.level = evidence->level;
-  larger.H = spread(evidence->H, rows, rows, larger.H.rows(), larger.H.cols());
-  larger.g = spread(evidence->g, rows, {0}, larger.g.rows(), 1);
+  const Eigen::Map<const Eigen::ArrayXi> at(rows.data(), static_cast<Eigen::Index>(rows.size()));
+  larger.H(at, at) = evidence->H;
+  larger.g(at, 0) = evidence->g;
   *evidence = larger;
   return node;
 }
@@ -123,10 +110,8 @@ bool set_marginals(const std::vector<int>& places, double centre_sigma_px, ZoomE
       }
     }
   }
-  const std::vector<int> rows = evidence->rows(places);
-  const Eigen::MatrixXd inverse = scaled_inverse(part_of(H, rows));
-  if (inverse.size() == 0) return false;
-  const Eigen::MatrixXd covariance = spread(inverse, rows, rows, H.rows(), H.cols());
+  const Eigen::MatrixXd covariance = inverse_over(H, evidence->rows(places));
+  if (covariance.size() == 0) return false;
   const Eigen::VectorXd mean = covariance * evidence->g;
   for (int i = 0; i < evidence->nodes(); ++i) {
     for (int q = 0; q < kZoomQuantityCount; ++q) {
@@ -150,11 +135,9 @@ ZoomCurve::Content without_a_node(const ZoomCurve::Content& content) {
     rest.reading[static_cast<std::size_t>(i)] = reading(i + 1);
   }
   const std::vector<int> rows = rows_but(crowded, content.nodes);
-  rest.covariance = part_of(content.covariance, rows);
-  rest.value.resize(kZoomQuantityCount * rest.nodes, 1);
-  for (Eigen::Index i = 0; i < rest.value.rows(); ++i) {
-    rest.value(i, 0) = content.value(rows[static_cast<std::size_t>(i)], 0);
-  }
+  rest.covariance = content.covariance(rows, rows);
+  const std::vector<int> of_nodes(rows.begin(), rows.end() - kSharedCount);
+  rest.value = content.value(of_nodes, 0);
   return rest;
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/calibration/number_text.h"
+#include "core/calibration/partial_inverse.h"
 #include "core/calibration/zoom_evidence.h"
 #include "core/calibration/zoom_sample.h"
 #include "core/calibration/zoom_solution.h"
@@ -15,16 +16,11 @@ namespace alidade {
 namespace {
 
 using internal::free_places;
-using internal::part_of;
-using internal::scaled_inverse;
 using internal::zoom_place_of;
 using internal::ZoomEvidence;
 using internal::ZoomSample;
 using internal::ZoomSampleVector;
 using internal::ZoomSolution;
-
-constexpr const char* kUndetermined =
-    "the calibrations leave what their readings share undetermined";
 
 std::string reading_text(double reading) { return "reading " + short_text(reading); }
 
@@ -74,12 +70,9 @@ bool compare_shared(const ZoomSample& sample, const ZoomCurve::Content& curve,
     covariance(clock, clock) += kAny_s * kAny_s;
   }
   const std::vector<int> places = free_places(covariance);
-  const Eigen::MatrixXd weight = scaled_inverse(part_of(covariance, places));
+  const Eigen::MatrixXd weight = internal::inverse_over(covariance, places);
   if (weight.size() == 0) return false;
-  Eigen::VectorXd d(weight.rows());
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    d[static_cast<Eigen::Index>(i)] = sample.value[kZoomQuantityCount + places[i]];
-  }
+  const Eigen::VectorXd d = sample.value.tail<kSharedCount>();
   fit->chi_square = d.dot(weight * d);
   fit->degrees_of_freedom = static_cast<int>(places.size());
   return true;
@@ -170,11 +163,6 @@ bool fit_zoom(const std::vector<Calibration>& calibrations, const ZoomFitOptions
       return false;
     }
   }
-  if (!internal::set_marginals(places, kUsualCentreShare * sorted.front().camera.width,
-                               &evidence)) {
-    *error = kUndetermined;
-    return false;
-  }
   ZoomSolution fitting(std::move(evidence), std::move(places), sorted.front(), options);
   if (!fitting.run(error)) return false;
   double worst = -1;
@@ -241,10 +229,6 @@ bool extend_zoom(const ZoomCurve& curve, const Calibration& added, std::optional
   }
   fit->node = visit ? *visit : internal::insert_node(sample.reading, &evidence);
   internal::add_zoom_sample(sample, fit->node, false, &evidence);
-  if (!internal::set_marginals(places, kUsualCentreShare * added.camera.width, &evidence)) {
-    *error = kUndetermined;
-    return false;
-  }
   if (!compare_shared(sample, before, options, fit)) {
     *error = "the zoom curve has a covariance that is not positive";
     return false;

@@ -22,6 +22,8 @@ namespace alidade {
 
 // Of an image's width: how far an optical centre is off, usually.
 inline constexpr double kUsualCentreShare = 0.01;
+// As far as the clock offsets of two connections to one camera may differ.
+inline constexpr double kAnyConnection_s = 0.1;
 
 struct ZoomFitOptions {
   double repeatability = 0.002;  // sigma of log f after a movement

@@ -1,10 +1,10 @@
 #include "core/calibration/zoom_sample.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
 
+#include "core/calibration/partial_inverse.h"
 #include "core/model/direction.h"
 
 namespace alidade::internal {
@@ -18,22 +18,6 @@ Parameter zoom_parameter_at(int i) {
   return i < kZoomQuantityCount
              ? kLens[static_cast<std::size_t>(i)]
              : kSharedParameters[static_cast<std::size_t>(i - kZoomQuantityCount)];
-}
-
-// Of a shared parameter but the axes.
-double shared_value(const Calibration& c, Parameter parameter) {
-  switch (parameter) {
-    case Parameter::kAspect:
-      return c.camera.aspect;
-    case Parameter::kLineDelay:
-      return c.line_delay;
-    case Parameter::kPanScale:
-      return c.mechanics.pan_scale;
-    case Parameter::kTiltScale:
-      return c.mechanics.tilt_scale;
-    default:
-      return c.clock_offset;
-  }
 }
 
 }  // namespace
@@ -53,7 +37,7 @@ ZoomSample make_zoom_sample(const Calibration& c, const Calibration& reference) 
       c.camera.radial_distortion / per_corner, c.camera.centre_u, c.camera.centre_v;
   for (const Parameter p : {Parameter::kAspect, Parameter::kLineDelay, Parameter::kPanScale,
                             Parameter::kTiltScale, Parameter::kClockOffset}) {
-    sample.value[zoom_place_of(p)] = shared_value(c, p) - shared_value(reference, p);
+    sample.value[zoom_place_of(p)] = parameter_value(c, p) - parameter_value(reference, p);
   }
 
   ZoomSampleMatrix J = ZoomSampleMatrix::Identity();
@@ -80,39 +64,11 @@ ZoomSample make_zoom_sample(const Calibration& c, const Calibration& reference) 
   return sample;
 }
 
-std::vector<int> free_places(const Eigen::MatrixXd& covariance) {
-  std::vector<int> places;
-  for (int i = 0; i < covariance.rows(); ++i) {
-    if (covariance(i, i) > 0) places.push_back(i);
-  }
-  return places;
-}
-
-Eigen::MatrixXd part_of(const Eigen::MatrixXd& matrix, const std::vector<int>& places) {
-  const auto size = static_cast<Eigen::Index>(places.size());
-  Eigen::MatrixXd result(size, size);
-  for (Eigen::Index i = 0; i < size; ++i) {
-    for (Eigen::Index j = 0; j < size; ++j) {
-      result(i, j) =
-          matrix(places[static_cast<std::size_t>(i)], places[static_cast<std::size_t>(j)]);
-    }
-  }
-  return result;
-}
-
-Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& matrix) {
-  const Eigen::VectorXd scale = matrix.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
-  const Eigen::LLT<Eigen::MatrixXd> llt(scale.asDiagonal() * matrix * scale.asDiagonal());
-  if (llt.info() != Eigen::Success) return {};
-  const Eigen::MatrixXd inverse =
-      llt.solve(Eigen::MatrixXd::Identity(matrix.rows(), matrix.cols()));
-  return scale.asDiagonal() * inverse * scale.asDiagonal();
-}
-
 bool set_zoom_information(const std::vector<int>& places, const ZoomFitOptions& options,
                           const Calibration& reference, ZoomSample* sample) {
-  const Eigen::MatrixXd information = scaled_inverse(part_of(sample->covariance, places));
+  const Eigen::MatrixXd information = inverse_over(sample->covariance, places);
   if (information.size() == 0) return false;
+  sample->information = information;
   const auto set_prior = [&](Parameter parameter, double mean, double sigma) {
     const int place = zoom_place_of(parameter);
     constexpr double kRounding = 1e-6;
@@ -132,13 +88,8 @@ bool set_zoom_information(const std::vector<int>& places, const ZoomFitOptions& 
   set_axis_prior(Parameter::kPanAxis0, Vector3<double>::UnitZ(), reference.mechanics.pan_axis);
   set_axis_prior(Parameter::kTiltAxis0, Vector3<double>::UnitY(), reference.mechanics.tilt_axis);
   for (const ZoomFitOptions::Prior& prior : options.shared_priors) {
-    set_prior(prior.parameter, prior.value - shared_value(reference, prior.parameter), prior.sigma);
-  }
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    for (std::size_t j = 0; j < places.size(); ++j) {
-      sample->information(places[i], places[j]) =
-          information(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-    }
+    set_prior(prior.parameter, prior.value - parameter_value(reference, prior.parameter),
+              prior.sigma);
   }
   return true;
 }
@@ -146,13 +97,11 @@ bool set_zoom_information(const std::vector<int>& places, const ZoomFitOptions& 
 void take_common_clock_error(const std::vector<int>& places, int clock, double common_sigma_s,
                              Eigen::MatrixXd* covariance) {
   constexpr double kMost = 0.96;  // of what the other parameters leave open
-  const auto at = std::find(places.begin(), places.end(), clock);
-  if (!(common_sigma_s > 0) || at == places.end()) return;
-  const Eigen::MatrixXd information = scaled_inverse(part_of(*covariance, places));
+  if (!(common_sigma_s > 0) || std::count(places.begin(), places.end(), clock) == 0) return;
+  const Eigen::MatrixXd information = inverse_over(*covariance, places);
   if (information.size() == 0) return;
-  const auto row = static_cast<Eigen::Index>(at - places.begin());
   (*covariance)(clock, clock) -=
-      std::min(common_sigma_s * common_sigma_s, kMost / information(row, row));
+      std::min(common_sigma_s * common_sigma_s, kMost / information(clock, clock));
 }
 
 }  // namespace alidade::internal

@@ -34,12 +34,6 @@ struct ZoomSample {
                                         const ZoomFitOptions& options, const Calibration& reference,
                                         ZoomSample* sample);
 
-// Of positive variance.
-[[nodiscard]] std::vector<int> free_places(const Eigen::MatrixXd& covariance);
-[[nodiscard]] Eigen::MatrixXd part_of(const Eigen::MatrixXd& matrix,
-                                      const std::vector<int>& places);
-// Of a positive definite matrix whose rows differ by many orders of magnitude; empty if it is none.
-[[nodiscard]] Eigen::MatrixXd scaled_inverse(const Eigen::MatrixXd& matrix);
 // What all polls of the telemetry have in common is no error of one calibration: taken off a covariance's clock offset, as far as it
 // stays positive. places: of the covariance that are not exact; clock: the offset's row.
 void take_common_clock_error(const std::vector<int>& places, int clock, double common_sigma_s,

@@ -7,10 +7,14 @@
 #include <utility>
 
 #include "core/calibration/number_text.h"
+#include "core/calibration/partial_inverse.h"
 #include "core/model/direction.h"
 
 namespace alidade::internal {
 namespace {
+
+constexpr const char* kUndetermined =
+    "the calibrations leave what their readings share undetermined";
 
 // Of the nodes' values, a movement's error at each included.
 Eigen::MatrixXd process_covariance(const ZoomCurve::Content& content, int quantity) {
@@ -52,8 +56,7 @@ bool is_monotone(const ZoomCurve& curve, std::string* error) {
         curve.first_reading() + (curve.last_reading() - curve.first_reading()) * i / kSteps;
     Calibration c;
     if (!curve.at(reading, &c)) return false;
-    const double sigma =
-        std::sqrt(c.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength)));
+    const double sigma = parameter_sigma(c, Parameter::kFocalLength);
     const double back = rises ? last_f - c.camera.focal_length : c.camera.focal_length - last_f;
     if (i > 0 && back > 3 * sigma) {
       *error = "the focal length goes back between zoom readings " + short_text(last) + " and " +
@@ -69,6 +72,7 @@ bool is_monotone(const ZoomCurve& curve, std::string* error) {
 }
 
 }  // namespace
+
 ZoomSolution::ZoomSolution(ZoomEvidence evidence, std::vector<int> places,
                            const Calibration& reference, const ZoomFitOptions& options)
     : evidence_(std::move(evidence)),
@@ -78,6 +82,12 @@ ZoomSolution::ZoomSolution(ZoomEvidence evidence, std::vector<int> places,
       nodes_(evidence_.nodes()) {}
 
 bool ZoomSolution::run(std::string* error) {
+  const bool determined =
+      set_marginals(places_, kUsualCentreShare * reference_.camera.width, &evidence_);
+  if (!determined) {
+    *error = kUndetermined;
+    return false;
+  }
   content_.nodes = nodes_;
   std::copy(evidence_.reading.begin(), evidence_.reading.end(), content_.reading.begin());
   content_.level = evidence_.level;
@@ -86,7 +96,7 @@ bool ZoomSolution::run(std::string* error) {
       usual(evidence_.value(nodes_ - 1, 0) - evidence_.value(0, 0), reference_.camera);
   choose_roughness();
   if (solve()) return true;
-  *error = "the calibrations leave what their readings share undetermined";
+  *error = kUndetermined;
   return false;
 }
 
@@ -148,16 +158,9 @@ bool ZoomSolution::solve() {
     }
   }
   // What all calibrations take as exact is exact.
-  const std::vector<int> rows = evidence_.rows(places_);
-  const Eigen::MatrixXd inverse = scaled_inverse(part_of(H, rows));
-  if (inverse.size() == 0) return false;
-  content_.covariance.setZero(H.rows(), H.cols());
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    for (std::size_t j = 0; j < rows.size(); ++j) {
-      content_.covariance(rows[i], rows[j]) =
-          inverse(static_cast<Eigen::Index>(i), static_cast<Eigen::Index>(j));
-    }
-  }
+  const Eigen::MatrixXd covariance = inverse_over(H, evidence_.rows(places_));
+  if (covariance.size() == 0) return false;
+  content_.covariance = covariance;
   solution_ = content_.covariance * evidence_.g;
   content_.value = solution_.head(kZoomQuantityCount * nodes_);
   take_shared(solution_.tail<kSharedCount>());

@@ -4,6 +4,8 @@
 // parameter Jacobian of Alidade. An axis has two numbers, its change (rad) in its own tangent_basis
 // (direction.h). SI units; see the members. Plain values; no allocation.
 
+#include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "core/model/camera.h"
@@ -93,5 +95,41 @@ struct Calibration {
            covariance(index(Parameter::kCentreV), index(Parameter::kCentreV)) != 0;
   }
 };
+
+// One standard deviation, in the unit of the parameter; a variance that rounding left negative counts as 0.
+[[nodiscard]] inline double parameter_sigma(const Calibration& calibration, Parameter parameter) {
+  return std::sqrt(std::max(0.0, calibration.covariance(index(parameter), index(parameter))));
+}
+
+// Of any parameter that is a number by itself: all but the axes', which give 0, as they are counted from the axis.
+[[nodiscard]] inline double parameter_value(const Calibration& calibration, Parameter parameter) {
+  switch (parameter) {
+    case Parameter::kFocalLength:
+      return calibration.camera.focal_length;
+    case Parameter::kAspect:
+      return calibration.camera.aspect;
+    case Parameter::kRadialDistortion:
+      return calibration.camera.radial_distortion;
+    case Parameter::kCentreU:
+      return calibration.camera.centre_u;
+    case Parameter::kCentreV:
+      return calibration.camera.centre_v;
+    case Parameter::kLineDelay:
+      return calibration.line_delay;
+    case Parameter::kPanScale:
+      return calibration.mechanics.pan_scale;
+    case Parameter::kTiltScale:
+      return calibration.mechanics.tilt_scale;
+    case Parameter::kClockOffset:
+      return calibration.clock_offset;
+    case Parameter::kPanAxis0:
+    case Parameter::kPanAxis1:
+    case Parameter::kTiltAxis0:
+    case Parameter::kTiltAxis1:
+    case Parameter::kCount:
+      break;
+  }
+  return 0;
+}
 
 }  // namespace alidade

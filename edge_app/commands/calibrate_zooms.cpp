@@ -45,18 +45,14 @@ void require_readings(const std::vector<ZoomJob>& jobs) {
   }
 }
 
-double sigma_of(const Calibration& c, Parameter parameter) {
-  return std::sqrt(c.covariance(index(parameter), index(parameter)));
-}
-
 std::string zooms_text(const ZoomFit& fit, const std::vector<Calibration>& nodes) {
   std::string text = fmt::format("{:>10}  {:>12}  {:>9}  {:>12}  {:>9}  {:>16}  {:>13}\n",
                                  "reading", "f, px", "sigma", "k", "sigma", "centre, px", "sigma");
   for (const Calibration& c : nodes) {
-    const double f = sigma_of(c, Parameter::kFocalLength);
-    const double k = sigma_of(c, Parameter::kRadialDistortion);
-    const double u = sigma_of(c, Parameter::kCentreU);
-    const double v = sigma_of(c, Parameter::kCentreV);
+    const double f = parameter_sigma(c, Parameter::kFocalLength);
+    const double k = parameter_sigma(c, Parameter::kRadialDistortion);
+    const double u = parameter_sigma(c, Parameter::kCentreU);
+    const double v = parameter_sigma(c, Parameter::kCentreV);
     text += fmt::format("{:>10g}  {:>12}  {:>9}  {:>12}  {:>9}  {:>16}  {:>13}\n", *c.zoom,
                         value_text(c.camera.focal_length, f), sigma_text(f),
                         value_text(c.camera.radial_distortion, k), sigma_text(k),
@@ -65,7 +61,7 @@ std::string zooms_text(const ZoomFit& fit, const std::vector<Calibration>& nodes
   }
   const Calibration& any = nodes.front();
   const auto line = [&](const char* name, double value, Parameter p, double unit, const char* of) {
-    const double sigma = sigma_of(any, p) / unit;
+    const double sigma = parameter_sigma(any, p) / unit;
     text += fmt::format("{}  {} +- {} {}\n", name, value_text(value / unit, sigma),
                         sigma_text(sigma), of);
   };

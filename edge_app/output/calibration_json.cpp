@@ -12,30 +12,29 @@ using nlohmann::ordered_json;
 
 ordered_json parameters_json(const Calibration& calibration) {
   ordered_json parameters;
-  const auto sigma = [&](int parameter) {
-    return std::sqrt(calibration.covariance(parameter, parameter));
-  };
-  const auto scalar = [&](Parameter parameter, double value) {
-    parameters[to_string(parameter)] = {{"value", value}, {"sigma", sigma(index(parameter))}};
+  const auto sigma = [&](Parameter parameter) { return parameter_sigma(calibration, parameter); };
+  const auto scalar = [&](Parameter parameter) {
+    parameters[to_string(parameter)] = {{"value", parameter_value(calibration, parameter)},
+                                        {"sigma", sigma(parameter)}};
   };
   const auto axis = [&](const char* name, const Vector3<double>& value, Parameter first) {
     parameters[name] = {{"value", {value.x(), value.y(), value.z()}},
-                        {"sigma", {sigma(index(first)), sigma(index(first) + 1)}}};
+                        {"sigma", {sigma(first), sigma(static_cast<Parameter>(index(first) + 1))}}};
   };
-  scalar(Parameter::kFocalLength, calibration.camera.focal_length);
-  scalar(Parameter::kAspect, calibration.camera.aspect);
-  scalar(Parameter::kRadialDistortion, calibration.camera.radial_distortion);
+  scalar(Parameter::kFocalLength);
+  scalar(Parameter::kAspect);
+  scalar(Parameter::kRadialDistortion);
   if (calibration.has_centre()) {
     parameters["centre_offset"] = {
         {"value", {calibration.camera.centre_u, calibration.camera.centre_v}},
-        {"sigma", {sigma(index(Parameter::kCentreU)), sigma(index(Parameter::kCentreV))}}};
+        {"sigma", {sigma(Parameter::kCentreU), sigma(Parameter::kCentreV)}}};
   }
-  scalar(Parameter::kLineDelay, calibration.line_delay);
+  scalar(Parameter::kLineDelay);
   axis("pan_axis", calibration.mechanics.pan_axis, Parameter::kPanAxis0);
   axis("tilt_axis", calibration.mechanics.tilt_axis, Parameter::kTiltAxis0);
-  scalar(Parameter::kPanScale, calibration.mechanics.pan_scale);
-  scalar(Parameter::kTiltScale, calibration.mechanics.tilt_scale);
-  scalar(Parameter::kClockOffset, calibration.clock_offset);
+  scalar(Parameter::kPanScale);
+  scalar(Parameter::kTiltScale);
+  scalar(Parameter::kClockOffset);
   return parameters;
 }
 
@@ -83,8 +82,7 @@ ordered_json zoom_curve_json(const ZoomCurve& curve) {
     if (!curve.at(reading, &c)) continue;
     readings.push_back(reading);
     focal_lengths.push_back(c.camera.focal_length);
-    sigmas.push_back(
-        std::sqrt(c.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength))));
+    sigmas.push_back(parameter_sigma(c, Parameter::kFocalLength));
   }
   return {{"repeatability", content.repeatability},
           {"nodes", std::move(nodes)},

@@ -13,10 +13,6 @@
 namespace alidade {
 namespace {
 
-double sigma_of(const Calibration& calibration, Parameter parameter) {
-  return std::sqrt(calibration.covariance(index(parameter), index(parameter)));
-}
-
 std::string prior_text(const std::optional<CalibrationPrior>& prior, double unit) {
   if (!prior) return "none";
   if (prior->sigma == 0) return fmt::format("{:.6g}, exact", prior->value / unit);
@@ -26,7 +22,7 @@ std::string prior_text(const std::optional<CalibrationPrior>& prior, double unit
 SummaryRow scalar_row(const Calibration& calibration, Parameter parameter, double value,
                       double unit, const char* unit_name,
                       const std::optional<CalibrationPrior>& prior) {
-  const double sigma = sigma_of(calibration, parameter) / unit;
+  const double sigma = parameter_sigma(calibration, parameter) / unit;
   return {to_string(parameter), value_text(value / unit, sigma), sigma_text(sigma), unit_name,
           prior_text(prior, unit)};
 }
@@ -34,8 +30,8 @@ SummaryRow scalar_row(const Calibration& calibration, Parameter parameter, doubl
 SummaryRow axis_row(const Calibration& calibration, const char* name, const Vector3<double>& axis,
                     Parameter first, double prior_sigma) {
   constexpr double kMilli = 1e-3;
-  const double s0 = sigma_of(calibration, first);
-  const double s1 = sigma_of(calibration, static_cast<Parameter>(index(first) + 1));
+  const double s0 = parameter_sigma(calibration, first);
+  const double s1 = parameter_sigma(calibration, static_cast<Parameter>(index(first) + 1));
   const double least = s0 > 0 && s1 > 0 ? std::min(s0, s1) : std::max(s0, s1);
   std::string value;
   for (int i = 0; i < 3; ++i) value += (i == 0 ? "" : " ") + value_text(axis[i], least);

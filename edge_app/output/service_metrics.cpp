@@ -24,7 +24,7 @@ std::int64_t resident_memory() {
 void add_calibration_metrics(const OrientationRecord& newest, double age_s, MetricsText* out) {
   const Calibration calibration = unpack(newest.camera);
   const auto sigma = [&calibration](Parameter parameter) {
-    return std::sqrt(calibration.covariance(index(parameter), index(parameter)));
+    return parameter_sigma(calibration, parameter);
   };
   out->gauge("alidade_calibrated", "1: a calibration is in use; 0: the data sheet");
   out->add(std::int64_t{newest.calibrated});

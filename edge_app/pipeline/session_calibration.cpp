@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
@@ -10,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "core/calibration/calibration_difference.h"
 #include "core/calibration/held_out.h"
+#include "core/calibration/partial_inverse.h"
 #include "edge_app/pipeline/calibration_streams.h"
 
 namespace alidade {
@@ -50,57 +49,19 @@ void set_priors(const KnownCalibration& known, double inflation, double common_s
 bool grow_beyond_priors(const CalibrationOptions& made_with, double factor,
                         Calibration* calibration) {
   Eigen::VectorXd prior = Eigen::VectorXd::Zero(kParameterCount);  // information
-  const auto set = [&prior](Parameter p, double sigma) {
-    if (sigma > 0) prior[index(p)] = 1 / (sigma * sigma);
-  };
-  const auto set_if = [&set](Parameter p, const std::optional<CalibrationPrior>& known) {
-    if (known) set(p, known->sigma);
-  };
-  set_if(Parameter::kFocalLength, made_with.focal_length);
-  set_if(Parameter::kAspect, made_with.aspect);
-  set_if(Parameter::kRadialDistortion, made_with.radial_distortion);
-  set_if(Parameter::kLineDelay, made_with.line_delay);
-  set_if(Parameter::kClockOffset, made_with.clock_offset);
-  set(Parameter::kPanScale, made_with.pan_scale.sigma);
-  set(Parameter::kTiltScale, made_with.tilt_scale.sigma);
-  for (const Parameter p : {Parameter::kCentreU, Parameter::kCentreV})
-    set(p, made_with.centre_sigma_px);
-  for (const Parameter p :
-       {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
-    set(p, made_with.axis_sigma_rad);
-  }
-  // In units of the sigmas, over what is not exact.
-  Eigen::VectorXd sigma = calibration->covariance.diagonal().cwiseMax(0).cwiseSqrt();
-  std::vector<int> rows;
   for (int i = 0; i < kParameterCount; ++i) {
-    if (sigma[i] > 0) rows.push_back(i);
+    const double sigma = made_with.prior_sigma(static_cast<Parameter>(i)).value_or(0);
+    if (sigma > 0) prior[i] = 1 / (sigma * sigma);
   }
-  const auto size = static_cast<Eigen::Index>(rows.size());
-  Eigen::MatrixXd correlation(size, size);
-  Eigen::VectorXd known(size);
-  for (Eigen::Index i = 0; i < size; ++i) {
-    const int row = rows[static_cast<std::size_t>(i)];
-    known[i] = prior[row] * sigma[row] * sigma[row];
-    for (Eigen::Index j = 0; j < size; ++j) {
-      const int column = rows[static_cast<std::size_t>(j)];
-      correlation(i, j) = calibration->covariance(row, column) / (sigma[row] * sigma[column]);
-    }
-  }
-  const Eigen::MatrixXd one = Eigen::MatrixXd::Identity(size, size);
-  const Eigen::LLT<Eigen::MatrixXd> llt(correlation);
-  if (llt.info() != Eigen::Success) return false;
-  Eigen::MatrixXd information = llt.solve(one) / (factor * factor);
-  information.diagonal() += (1 - 1 / (factor * factor)) * known;
-  const Eigen::LLT<Eigen::MatrixXd> grown(information);
-  if (grown.info() != Eigen::Success) return false;
-  const Eigen::MatrixXd covariance = grown.solve(one);
-  for (Eigen::Index i = 0; i < size; ++i) {
-    for (Eigen::Index j = 0; j < size; ++j) {
-      const int row = rows[static_cast<std::size_t>(i)];
-      const int column = rows[static_cast<std::size_t>(j)];
-      calibration->covariance(row, column) = covariance(i, j) * sigma[row] * sigma[column];
-    }
-  }
+  const Eigen::MatrixXd covariance = calibration->covariance;
+  const std::vector<int> places = internal::free_places(covariance);
+  Eigen::MatrixXd information = internal::inverse_over(covariance, places);
+  if (information.size() == 0) return false;
+  information /= factor * factor;
+  information.diagonal() += (1 - 1 / (factor * factor)) * prior;
+  const Eigen::MatrixXd grown = internal::inverse_over(information, places);
+  if (grown.size() == 0) return false;
+  calibration->covariance = grown;
   return true;
 }
 

@@ -32,9 +32,8 @@ bool ZoomNodes::add(const Calibration& alone, ZoomFitOptions options, ZoomAdditi
   }
   Calibration first = *first_;
   if (!clock_is_known_) {
-    constexpr double kAny_s = 0.1;
     first.covariance(index(Parameter::kClockOffset), index(Parameter::kClockOffset)) +=
-        kAny_s * kAny_s;
+        kAnyConnection_s * kAnyConnection_s;
   }
   if (!fit_zoom({first, alone}, options, &fit, error)) return false;
   const int node = *alone.zoom > *first.zoom ? 1 : 0;

@@ -168,25 +168,10 @@ Bound compute_bound(const Simulation& s, const SimulatedRecording& recording,
 
   // Which parameters are unknown, and their priors.
   std::array<bool, kParameterCount> given{};
-  const auto set_prior = [&](Parameter p, double sigma) {
-    given[static_cast<std::size_t>(index(p))] = sigma == 0;
-    bound.prior_sigma[index(p)] = sigma;
-  };
-  const auto set_optional = [&](Parameter p, const std::optional<CalibrationPrior>& prior) {
-    if (prior) set_prior(p, prior->sigma);
-  };
-  set_optional(Parameter::kFocalLength, options.focal_length);
-  set_optional(Parameter::kAspect, options.aspect);
-  set_optional(Parameter::kRadialDistortion, options.radial_distortion);
-  set_optional(Parameter::kLineDelay, options.line_delay);
-  set_optional(Parameter::kClockOffset, options.clock_offset);
-  set_prior(Parameter::kCentreU, options.centre_sigma_px);
-  set_prior(Parameter::kCentreV, options.centre_sigma_px);
-  set_prior(Parameter::kPanScale, options.pan_scale.sigma);
-  set_prior(Parameter::kTiltScale, options.tilt_scale.sigma);
-  for (const Parameter p :
-       {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
-    set_prior(p, options.axis_sigma_rad);
+  for (int i = 0; i < kParameterCount; ++i) {
+    const std::optional<double> sigma = options.prior_sigma(static_cast<Parameter>(i));
+    given[static_cast<std::size_t>(i)] = sigma == 0.0;
+    bound.prior_sigma[i] = sigma.value_or(0);
   }
 
   double begin = recording.telemetry_time_s.front();

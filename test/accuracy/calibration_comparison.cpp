@@ -41,25 +41,6 @@ constexpr std::array<Axis, 2> kAxes = {
      {Parameter::kTiltAxis0, &CalibrationValues::tilt_axis, "tilt_axis", {{0, 2}}}}};
 static_assert(kScalars.size() + kAxes.size() == CalibrationComparison::kQuantities);
 
-double value_of(const Calibration& c, Parameter parameter) {
-  switch (parameter) {
-    case Parameter::kFocalLength:
-      return c.camera.focal_length;
-    case Parameter::kAspect:
-      return c.camera.aspect;
-    case Parameter::kRadialDistortion:
-      return c.camera.radial_distortion;
-    case Parameter::kLineDelay:
-      return c.line_delay;
-    case Parameter::kPanScale:
-      return c.mechanics.pan_scale;
-    case Parameter::kTiltScale:
-      return c.mechanics.tilt_scale;
-    default:
-      return c.clock_offset;
-  }
-}
-
 std::optional<double> limit_of(const CalibrationLimits& limits, Parameter parameter, double truth) {
   switch (parameter) {
     case Parameter::kFocalLength:
@@ -131,7 +112,7 @@ std::string CalibrationComparison::add(const ComparedRun& known, const Calibrati
   for (std::size_t i = 0; i < kScalars.size(); ++i) {
     const Scalar& scalar = kScalars[i];
     const double variance = c.covariance(index(scalar.parameter), index(scalar.parameter));
-    const double estimate = value_of(c, scalar.parameter);
+    const double estimate = parameter_value(c, scalar.parameter);
     const std::optional<StatedValue>& truth = known.truth.*scalar.member;
     const std::optional<StatedValue>& peer = known.peer.*scalar.member;
     std::optional<double> limit;

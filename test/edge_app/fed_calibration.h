@@ -59,15 +59,7 @@ class MemoryArchive final : public CalibrationArchive {
 };
 
 inline Simulation calibrated_camera() {
-  Simulation s;
-  s.seed = 3;
-  s.focal_length = 4000;
-  s.image_rate_hz = 20;
-  s.telemetry_rate_hz = 60;
-  s.pixel_sigma = 0.1;
-  s.image_stamp_sigma_s = 5e-4;
-  s.telemetry_stamp_sigma_s = 5e-4;
-  s.one_sided_stamps = true;
+  Simulation s = arrival_stamped_camera();
   s.duration_s = 14;
   return s;
 }

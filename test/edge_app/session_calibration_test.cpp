@@ -17,17 +17,6 @@ namespace {
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
 
-test::Simulation session_camera() {
-  test::Simulation s;
-  s.seed = 3;
-  s.image_rate_hz = 20;
-  s.pixel_sigma = 0.1;
-  s.image_stamp_sigma_s = 5e-4;
-  s.telemetry_stamp_sigma_s = 5e-4;
-  s.one_sided_stamps = true;
-  return s;
-}
-
 // held_out_factor: of the sigmas that the tracker states in the frames that are held out.
 // polled_width_s: of the interval in which each angle was asked for; 0: numbered by the device.
 CalibrationSession session_of(const test::Simulation& s, double held_out_factor,
@@ -75,7 +64,7 @@ SessionCalibrationOptions session_options(const test::Simulation& s) {
 }
 
 SessionCalibration calibrated(double held_out_factor, const Calibration* known = nullptr) {
-  const test::Simulation s = session_camera();
+  const test::Simulation s = test::arrival_stamped_camera();
   const CalibrationSession session = session_of(s, held_out_factor);
   if (known == nullptr) return calibrate_session(session, session_options(s), nullptr);
   const KnownCalibration prior{*known, true};
@@ -129,7 +118,7 @@ TEST(SessionCalibration, WhatIsKnownMakesItSharper) {
 }
 
 TEST(SessionCalibration, TakesWhatIsKnownOfTheCameraBeforehandOnceAndSaysWhatContradicts) {
-  const test::Simulation s = session_camera();
+  const test::Simulation s = test::arrival_stamped_camera();
   const CalibrationSession session = session_of(s, 1);
   SessionCalibrationOptions options = session_options(s);
   const SessionCalibration alone = calibrate_session(session, options, nullptr);
@@ -158,7 +147,7 @@ TEST(SessionCalibration, TakesWhatIsKnownOfTheCameraBeforehandOnceAndSaysWhatCon
 // The known offset errs by it as much as the new data do, and so says the more of the rest.
 TEST(SessionCalibration, WhatAllPollsHaveInCommonDoesNotWeakenAKnownClockOffset) {
   constexpr double kWidth_s = 0.02;
-  const test::Simulation s = session_camera();
+  const test::Simulation s = test::arrival_stamped_camera();
   const CalibrationSession session = session_of(s, 1, kWidth_s);
   const int d = index(Parameter::kClockOffset);
   Calibration known = calibrate_session(session, session_options(s), nullptr).result.calibration;
@@ -183,7 +172,7 @@ TEST(SessionCalibration, WhatAllPollsHaveInCommonDoesNotWeakenAKnownClockOffset)
 }
 
 TEST(SessionCalibration, EndsSoonWhenItIsCancelled) {
-  const test::Simulation s = session_camera();
+  const test::Simulation s = test::arrival_stamped_camera();
   SessionCalibrationOptions options = session_options(s);
   int asked = 0;
   options.is_cancelled = [&asked] { return ++asked > 0; };

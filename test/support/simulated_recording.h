@@ -64,6 +64,18 @@ struct Simulation {
   }
 };
 
+// Fast enough for a session of some seconds, its stamps of arrival: never early.
+inline Simulation arrival_stamped_camera() {
+  Simulation s;
+  s.seed = 3;
+  s.image_rate_hz = 20;
+  s.pixel_sigma = 0.1;
+  s.image_stamp_sigma_s = 5e-4;
+  s.telemetry_stamp_sigma_s = 5e-4;
+  s.one_sided_stamps = true;
+  return s;
+}
+
 // What calibrate() gets, and the truth behind it.
 struct SimulatedRecording {
   CalibrationInput input;

@@ -240,6 +240,36 @@ TEST(Calibrate, EstimatesTheAspectWhenAsked) {
   expect_within_sigmas(s, calibrate(simulate(s), options));
 }
 
+TEST(CalibrationOptions, TellOfEachParameterHowWellItIsKnownBefore) {
+  CalibrationOptions options;
+  options.aspect = CalibrationPrior{1, 0};
+  options.line_delay = CalibrationPrior{-1e-5, 2e-7};
+  options.pan_scale.sigma = 3e-8;
+  options.tilt_scale.sigma = 4e-8;
+  options.centre_sigma_px = 5;
+  options.axis_sigma_rad = 0.06;
+  for (const Parameter open :
+       {Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kClockOffset}) {
+    EXPECT_EQ(options.prior_sigma(open), std::nullopt);
+  }
+  EXPECT_EQ(options.prior_sigma(Parameter::kAspect), 0);
+  EXPECT_EQ(options.prior_sigma(Parameter::kLineDelay), 2e-7);
+  EXPECT_EQ(options.prior_sigma(Parameter::kPanScale), 3e-8);
+  EXPECT_EQ(options.prior_sigma(Parameter::kTiltScale), 4e-8);
+  EXPECT_EQ(options.prior_sigma(Parameter::kCentreU), 5);
+  EXPECT_EQ(options.prior_sigma(Parameter::kCentreV), 5);
+  for (const Parameter axis :
+       {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1}) {
+    EXPECT_EQ(options.prior_sigma(axis), 0.06);
+  }
+  options.focal_length = CalibrationPrior{4000, 7};
+  options.radial_distortion = CalibrationPrior{0, 8};
+  options.clock_offset = CalibrationPrior{0, 9};
+  EXPECT_EQ(options.prior_sigma(Parameter::kFocalLength), 7);
+  EXPECT_EQ(options.prior_sigma(Parameter::kRadialDistortion), 8);
+  EXPECT_EQ(options.prior_sigma(Parameter::kClockOffset), 9);
+}
+
 TEST(Calibrate, TakesOneSidedStamps) {
   Simulation s = small_simulation(13);
   s.one_sided_stamps = true;

@@ -7,6 +7,8 @@
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <random>
+#include <utility>
+#include <vector>
 
 #include "core/model/direction.h"
 
@@ -110,6 +112,38 @@ TEST(CalibrationDifference, IsSharperWhereOneComparedParameterIs) {
   after = before;
   after.covariance(index(Parameter::kPanScale), index(Parameter::kPanScale)) = 0;
   EXPECT_FALSE(is_sharper(after, before, 0.75));
+}
+
+TEST(Calibration, ItsParametersAreTheNumbersOfItsMembers) {
+  const Calibration from = some_calibration();
+  Calibration c = from;
+  const std::vector<std::pair<Parameter, double*>> members = {
+      {Parameter::kFocalLength, &c.camera.focal_length},
+      {Parameter::kAspect, &c.camera.aspect},
+      {Parameter::kRadialDistortion, &c.camera.radial_distortion},
+      {Parameter::kCentreU, &c.camera.centre_u},
+      {Parameter::kCentreV, &c.camera.centre_v},
+      {Parameter::kLineDelay, &c.line_delay},
+      {Parameter::kPanScale, &c.mechanics.pan_scale},
+      {Parameter::kTiltScale, &c.mechanics.tilt_scale},
+      {Parameter::kClockOffset, &c.clock_offset}};
+  for (const auto& [parameter, member] : members) {
+    *member = 3.25;
+    for (int i = 0; i < kParameterCount; ++i) {
+      const auto other = static_cast<Parameter>(i);
+      EXPECT_EQ(parameter_value(c, other), other == parameter ? 3.25 : parameter_value(from, other))
+          << to_string(other);
+    }
+    *member = parameter_value(from, parameter);
+  }
+  EXPECT_EQ(parameter_value(from, Parameter::kTiltAxis1), 0);
+}
+
+TEST(Calibration, TakesAVarianceThatRoundingLeftNegativeAsZero) {
+  Calibration c = some_calibration();
+  EXPECT_NEAR(parameter_sigma(c, Parameter::kFocalLength), 3, 1e-12);
+  c.covariance(0, 0) = -1e-20;
+  EXPECT_EQ(parameter_sigma(c, Parameter::kFocalLength), 0);
 }
 
 }  // namespace
