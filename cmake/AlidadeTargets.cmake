@@ -40,7 +40,7 @@ function(alidade_prelude name)
 endfunction()
 
 # alidade_unity(target)
-# compiles up to eight sources of the target as one, which halves what edge_app costs: half of that is what its sources include.
+# compiles up to eight sources of the target as one, which halves what most rooms cost: half of that is what their sources include.
 # Names in anonymous namespaces must then differ within a room. The presets `dev` and `fuzz` compile each source by itself.
 function(alidade_unity target)
   if(ALIDADE_UNITY)

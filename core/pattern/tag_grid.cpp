@@ -28,13 +28,6 @@ constexpr double kFits_px = 1;
 constexpr double kFits_cells = 0.3;
 constexpr std::size_t kNeighbours = 4;  // whose homography predicts a tag
 
-struct DetectorEnd {
-  void operator()(apriltag_detector_t* detector) const { apriltag_detector_destroy(detector); }
-};
-struct FamilyEnd {
-  void operator()(apriltag_family_t* family) const { tag36h11_destroy(family); }
-};
-
 double shortest_side(const TagGrid::Corners& corners) {
   double shortest = 1e9;
   for (std::size_t i = 0; i < 4; ++i)
@@ -54,6 +47,12 @@ TagCells cells_of(const apriltag_family_t& family, int tag) {
 }  // namespace
 
 struct TagGrid::Library {
+  struct DetectorEnd {
+    void operator()(apriltag_detector_t* detector) const { apriltag_detector_destroy(detector); }
+  };
+  struct FamilyEnd {
+    void operator()(apriltag_family_t* family) const { tag36h11_destroy(family); }
+  };
   std::unique_ptr<apriltag_family_t, FamilyEnd> family{tag36h11_create()};
   std::unique_ptr<apriltag_detector_t, DetectorEnd> detector{apriltag_detector_create()};
 };

@@ -10,7 +10,7 @@
 namespace alidade::simulator {
 namespace {
 
-constexpr double kPi = 3.14159265358979323846;
+constexpr double kTelemetryPi = 3.14159265358979323846;
 constexpr int kSamples = 20000;
 
 // Turns right at 0.1 rad/s and stays at a tilt of 0.25 rad.
@@ -43,9 +43,9 @@ TEST(VirtualTelemetry, WrapsAtHalfATurn) {
   const Turning path;
   Telemetry telemetry(Config{}, path);
   EXPECT_NEAR(telemetry.measure(31).pan, 3.1, 1e-12);
-  EXPECT_NEAR(telemetry.measure(32).pan, 3.2 - 2 * kPi, 1e-12);
-  EXPECT_EQ(wrapped(kPi), -kPi);
-  EXPECT_EQ(wrapped(-kPi), -kPi);
+  EXPECT_NEAR(telemetry.measure(32).pan, 3.2 - 2 * kTelemetryPi, 1e-12);
+  EXPECT_EQ(wrapped(kTelemetryPi), -kTelemetryPi);
+  EXPECT_EQ(wrapped(-kTelemetryPi), -kTelemetryPi);
 }
 
 TEST(VirtualTelemetry, HasNoiseOfTheSigmaAskedForInBothAxes) {

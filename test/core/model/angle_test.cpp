@@ -4,6 +4,7 @@
 
 #include <limits>
 
+#include "test/core/model/rounding.h"
 #include "test/support/hard_values.h"
 
 namespace alidade {
@@ -11,7 +12,7 @@ namespace {
 
 using test::hard_angles;
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+using test::kEpsilon;
 
 template <class S>
 void expect_wrapped_into_range() {

@@ -5,6 +5,7 @@
 #include <limits>
 #include <random>
 
+#include "test/core/model/rounding.h"
 #include "test/support/hard_values.h"
 #include "test/support/not_a_number.h"
 #include "test/support/numeric_jacobian.h"
@@ -19,7 +20,7 @@ using test::pixel_grid;
 using Vec2 = Vector2<double>;
 using Vec3 = Vector3<double>;
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+using test::kEpsilon;
 constexpr double kInfinity = std::numeric_limits<double>::infinity();
 
 TEST(Camera, ProjectsByItsDefinition) {

@@ -11,27 +11,21 @@
 #include <vector>
 
 #include "core/model/one_sided_clock.h"
+#include "test/core/model/stamp_delays.h"
 #include "test/support/allocation_guard.h"
 #include "test/support/not_a_number.h"
 
 namespace alidade {
 namespace {
 
-using Random = std::mt19937_64;
-using Delay = std::function<double(Random&, double)>;
+using test::Delay;
+using test::exponential;
+using test::gaussian;
+using test::Random;
+using test::symmetric;
 
 constexpr double kInf = std::numeric_limits<double>::infinity();
 
-Delay exponential(double mean_s) {
-  return [mean_s](Random& random, double) {
-    return std::exponential_distribution<double>(1 / mean_s)(random);
-  };
-}
-Delay gaussian(double sigma_s) {
-  return [sigma_s](Random& random, double) {
-    return std::normal_distribution<double>(0, sigma_s)(random);
-  };
-}
 // Least delay grows by step_s at time from_s and is back at time to_s.
 Delay stepping(double mean_s, double step_s, double from_s, double to_s) {
   return [=](Random& random, double t) {
@@ -81,12 +75,6 @@ struct Score {
   double rms() const { return std::sqrt(squares / static_cast<double>(n)); }
   double anees() const { return normalised / static_cast<double>(n); }
 };
-
-ClockFilterOptions symmetric() {
-  ClockFilterOptions options;
-  options.jitter = ClockJitter::kSymmetric;
-  return options;
-}
 
 // Normalised squared errors at given ages, averaged over independent runs.
 std::vector<double> anees_at(const Stream& stream, const ClockFilterOptions& options,

@@ -9,22 +9,16 @@
 #include <random>
 #include <vector>
 
+#include "test/core/model/stamp_delays.h"
+
 namespace alidade {
 namespace {
 
-using Random = std::mt19937_64;
-using Delay = std::function<double(Random&, double)>;
-
-Delay exponential(double mean_s) {
-  return [mean_s](Random& random, double) {
-    return std::exponential_distribution<double>(1 / mean_s)(random);
-  };
-}
-Delay gaussian(double sigma_s) {
-  return [sigma_s](Random& random, double) {
-    return std::normal_distribution<double>(0, sigma_s)(random);
-  };
-}
+using test::Delay;
+using test::exponential;
+using test::gaussian;
+using test::Random;
+using test::symmetric;
 
 struct Recording {
   std::vector<double> host, receive, sender;
@@ -88,12 +82,6 @@ Recording record(unsigned seed, double rate_hz, double duration_s, const Delay& 
     if (uniform(random) >= loss) recording.add(host, host + delay(random, t), 1e9 + t, i);
   }
   return recording;
-}
-
-ClockFilterOptions symmetric() {
-  ClockFilterOptions options;
-  options.jitter = ClockJitter::kSymmetric;
-  return options;
 }
 
 TEST(ClockSmoother, AnswersZeroOneAndTwoItems) {

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "test/core/model/rounding.h"
 #include "test/support/hard_values.h"
 #include "test/support/numeric_jacobian.h"
 
@@ -17,7 +18,7 @@ using Vec3 = Vector3<double>;
 using Mat3 = Matrix3<double>;
 using Vec4 = Vector4<double>;
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+using test::kEpsilon;
 
 std::vector<PanTilt<double>> hard_pan_tilts() {
   std::vector<PanTilt<double>> angles;

@@ -9,7 +9,7 @@
 namespace alidade::internal {
 namespace {
 
-constexpr double kMeanDelay_s = 1e-3;
+constexpr double kShortDelay_s = 1e-3;
 constexpr double kGate_s = 1e-3;
 
 // Feeds 25 items a second, their residuals exponential above step_s, as OneSidedClock does with a locked line, until a
@@ -17,7 +17,7 @@ constexpr double kGate_s = 1e-3;
 std::optional<DelayStep> feed(MinimumDelayStep* steps, double from_s, double duration_s,
                               double step_s, unsigned seed) {
   std::mt19937_64 random(seed);
-  std::exponential_distribution<double> delay(1 / kMeanDelay_s);
+  std::exponential_distribution<double> delay(1 / kShortDelay_s);
   for (double t = from_s; t < from_s + duration_s; t += 0.04) {
     const double residual = step_s + delay(random);
     const bool early = residual < -kGate_s;

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "test/core/model/rounding.h"
 #include "test/support/hard_values.h"
 #include "test/support/numeric_jacobian.h"
 
@@ -15,7 +16,7 @@ using test::numeric_jacobian;
 using Vec3 = Vector3<double>;
 using Mat3 = Matrix3<double>;
 
-constexpr double kEpsilon = std::numeric_limits<double>::epsilon();
+using test::kEpsilon;
 
 std::vector<Vec3> hard_rotation_vectors() {
   std::vector<Vec3> vectors;

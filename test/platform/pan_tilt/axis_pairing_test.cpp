@@ -5,10 +5,10 @@
 #include <cmath>
 #include <random>
 
+#include "core/model/trigonometry.h"
+
 namespace alidade {
 namespace {
-
-constexpr double kPi = 3.14159265358979323846;
 
 TEST(AxisPairing, GivesBothAxesOfOneMoment) {
   AxisPairing pairing;

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <memory>
 
+#include "core/model/trigonometry.h"
 #include "platform/pan_tilt/onvif_messages.h"
 #include "platform/system/clock.h"
 #include "test/platform/support/eventually.h"
@@ -24,9 +25,7 @@ using ::testing::StartsWith;
 
 using Login = OnvifDevice::Login;
 
-constexpr double kPi = 3.14159265358979323846;
-
-OnvifSourceOptions options_for(const std::string& url) {
+OnvifSourceOptions onvif_options(const std::string& url) {
   OnvifSourceOptions options;
   options.url = url;
   options.pan_range = {-kPi, kPi};
@@ -37,8 +36,8 @@ OnvifSourceOptions options_for(const std::string& url) {
   return options;
 }
 
-OnvifSourceOptions options_for(const OnvifServer& server, const OnvifDevice& device = {}) {
-  OnvifSourceOptions options = options_for(server.url());
+OnvifSourceOptions onvif_options(const OnvifServer& server, const OnvifDevice& device = {}) {
+  OnvifSourceOptions options = onvif_options(server.url());
   if (device.login != Login::kNone) {
     options.user = device.user;
     options.password = device.password;
@@ -64,7 +63,7 @@ OnvifDevice device_at(const std::string& position) {
 
 TEST(OnvifSource, MapsTheGenericSpaceByItsRanges) {
   const OnvifServer server;
-  const auto source = open_onvif(options_for(server));
+  const auto source = open_onvif(onvif_options(server));
   PanTiltSample sample;
   ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_DOUBLE_EQ(sample.pan_rad, kPi / 2);
@@ -85,7 +84,7 @@ TEST(OnvifSource, TakesDegreesAsTheyAre) {
   const OnvifServer server(
       device_at(R"(<tt:PanTilt x="-170.5" y="20" space="http://www.onvif.org/ver10/)"
                 R"(tptz/PanTiltSpaces/SphericalPositionSpaceDegrees"/>)"));
-  OnvifSourceOptions options = options_for(server);
+  OnvifSourceOptions options = onvif_options(server);
   options.pan_range.reset();
   options.tilt_range.reset();
   options.profile = "mine";
@@ -103,7 +102,7 @@ TEST(OnvifSource, TurnsSignAndZeroOfEachAxis) {
   OnvifDevice device;
   device.position = [] { return R"(<tt:PanTilt x="0.5" y="-0.25"/>)"; };
   const OnvifServer server(device);
-  OnvifSourceOptions options = options_for(server);
+  OnvifSourceOptions options = onvif_options(server);
   options.pan_range = OnvifRange{-180 * kRadPerDeg, 180 * kRadPerDeg};
   options.tilt_range = OnvifRange{-90 * kRadPerDeg, 90 * kRadPerDeg};
   options.pan = {1, -10};
@@ -117,7 +116,7 @@ TEST(OnvifSource, TurnsSignAndZeroOfEachAxis) {
 
 TEST(OnvifSource, SaysThatTheGenericSpaceNeedsRanges) {
   const OnvifServer server;
-  OnvifSourceOptions options = options_for(server);
+  OnvifSourceOptions options = onvif_options(server);
   options.pan_range.reset();
   const auto source = open_onvif(options);
   PanTiltSample sample;
@@ -133,7 +132,7 @@ TEST(OnvifSource, FindsTheServicesWhateverTheDeviceCallsItself) {
       device.prefix = prefix;
       device.position = [] { return R"(<tt:PanTilt y="0" x="1"/>)"; };
       const OnvifServer server(device);
-      const auto source = open_onvif(options_for(server.url() + "/onvif/device_service"));
+      const auto source = open_onvif(onvif_options(server.url() + "/onvif/device_service"));
       PanTiltSample sample;
       ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
       EXPECT_DOUBLE_EQ(sample.pan_rad, -kPi);
@@ -148,7 +147,7 @@ TEST_P(OnvifSourceLogin, LogsInOnTheDevicesClockAndKeepsItsConnection) {
   for (const double offset_s : {0.0, 86400.0 * 365, -1.5e9}) {
     OnvifServer server(device);
     server.clock_offset_s = offset_s;
-    const auto source = open_onvif(options_for(server, device));
+    const auto source = open_onvif(onvif_options(server, device));
     PanTiltSample sample;
     for (int i = 0; i < 20; ++i) {
       ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
@@ -163,7 +162,7 @@ TEST_P(OnvifSourceLogin, LogsInWhereEvenTheClockNeedsIt) {
   OnvifDevice device = device_with(GetParam());
   device.clock_needs_login = true;
   const OnvifServer server(device);
-  const auto source = open_onvif(options_for(server, device));
+  const auto source = open_onvif(onvif_options(server, device));
   PanTiltSample sample;
   EXPECT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
 }
@@ -172,7 +171,7 @@ TEST_P(OnvifSourceLogin, OutlivesARestartOfTheDevice) {
   const OnvifDevice device = device_with(GetParam());
   auto server = std::make_unique<OnvifServer>(device);
   const int port = server->port();
-  const auto source = open_onvif(options_for(*server, device));
+  const auto source = open_onvif(onvif_options(*server, device));
   PanTiltSample sample;
   ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   server->renew_nonce();
@@ -190,7 +189,7 @@ TEST_P(OnvifSourceLogin, OutlivesARestartOfTheDevice) {
 TEST_P(OnvifSourceLogin, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
   const OnvifDevice device = device_with(GetParam());
   const OnvifServer server(device);
-  OnvifSourceOptions options = options_for(server, device);
+  OnvifSourceOptions options = onvif_options(server, device);
   options.password = "guess";
   const auto source = open_onvif(options);
   PanTiltSample sample;
@@ -200,7 +199,7 @@ TEST_P(OnvifSourceLogin, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
   EXPECT_EQ(source->read(sample, 0), ReadStatus::kFailed);
   EXPECT_EQ(server.count("GetStatus"), 0);
 
-  const auto anonymous = open_onvif(options_for(server));
+  const auto anonymous = open_onvif(onvif_options(server));
   EXPECT_EQ(read_until(*anonymous, sample, ReadStatus::kFailed), ReadStatus::kFailed);
   EXPECT_THAT(anonymous->error(), HasSubstr("wants a user and a password"));
 }
@@ -208,7 +207,7 @@ TEST_P(OnvifSourceLogin, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
 TEST_P(OnvifSourceLogin, TriesOnWhenADeviceThatHasWorkedRefuses) {
   const OnvifDevice device = device_with(GetParam());
   OnvifServer server(device);
-  const auto source = open_onvif(options_for(server, device));
+  const auto source = open_onvif(onvif_options(server, device));
   PanTiltSample sample;
   ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   server.password_changed = true;
@@ -232,7 +231,7 @@ INSTANTIATE_TEST_SUITE_P(Methods, OnvifSourceLogin,
 TEST(OnvifSource, FollowsADeviceWhoseClockIsSet) {
   const OnvifDevice device = device_with(Login::kToken);
   OnvifServer server(device);
-  const auto source = open_onvif(options_for(server, device));
+  const auto source = open_onvif(onvif_options(server, device));
   PanTiltSample sample;
   ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   server.clock_offset_s = 3600;
@@ -250,7 +249,7 @@ TEST(OnvifSource, GivesAnIntervalThatHoldsTheMomentOfTheMeasurement) {
            "\" y=\"0\"/>";
   };
   const OnvifServer server(device);
-  const auto source = open_onvif(options_for(server, device));
+  const auto source = open_onvif(onvif_options(server, device));
   double last_s = 0;
   for (int i = 0; i < 100; ++i) {
     PanTiltSample sample;
@@ -269,7 +268,7 @@ TEST(OnvifSource, GivesEachSampleTheDevicesTimeIfItChangesSensibly) {
   OnvifDevice device;
   device.utc_time = [&answers] { return xml_time(1.8e9 + 0.005 * ++answers); };
   const OnvifServer server(device);
-  const auto source = open_onvif(options_for(server));
+  const auto source = open_onvif(onvif_options(server));
   PanTiltSample sample;
   double last_s = 0;
   for (int i = 0; i < 10; ++i) {
@@ -286,7 +285,7 @@ TEST(OnvifSource, GivesNoDeviceTimeThatStands) {
   OnvifDevice device;
   device.utc_time = [] { return "2026-01-01T00:00:00Z"; };
   const OnvifServer server(device);
-  const auto source = open_onvif(options_for(server));
+  const auto source = open_onvif(onvif_options(server));
   PanTiltSample sample;
   for (int i = 0; i < 3; ++i) {
     ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
@@ -296,7 +295,7 @@ TEST(OnvifSource, GivesNoDeviceTimeThatStands) {
 
 TEST(OnvifSource, ReportsFaultsAndHttpErrorsAndRecovers) {
   OnvifServer server;
-  const auto source = open_onvif(options_for(server));
+  const auto source = open_onvif(onvif_options(server));
   PanTiltSample sample;
   server.set_fault("ter:NoProfile", "The profile token does not exist");
   EXPECT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
@@ -318,7 +317,7 @@ TEST(OnvifSource, ReportsFaultsAndHttpErrorsAndRecovers) {
 TEST(OnvifSource, FailsAtOnceOnAUrlItCannotUse) {
   PanTiltSample sample;
   for (const char* url : {"http://user:se@cret@camera", "camera", "ftp://camera", ""}) {
-    const auto source = open_onvif(options_for(url));
+    const auto source = open_onvif(onvif_options(url));
     EXPECT_EQ(source->read(sample, 0), ReadStatus::kFailed) << url;
     EXPECT_THAT(source->error(), AllOf(HasSubstr("://"), Not(HasSubstr("cret"))));
   }
@@ -341,7 +340,7 @@ TEST(OnvifSource, SurvivesAnswersThatBreakOrMeanNothing) {
       }
     }
   });
-  const auto source = open_onvif(options_for(url_of(server)));
+  const auto source = open_onvif(onvif_options(url_of(server)));
   PanTiltSample sample;
   std::string errors;
   for (int i = 0; i < 10; ++i) {
@@ -361,7 +360,7 @@ TEST(OnvifSource, GivesUpAnAnswerWhoseBodyIsTooSlow) {
       }
     }
   });
-  OnvifSourceOptions options = options_for(url_of(server));
+  OnvifSourceOptions options = onvif_options(url_of(server));
   options.timeout_s = 0.1;
   const auto source = open_onvif(options);
   PanTiltSample sample;
@@ -371,7 +370,7 @@ TEST(OnvifSource, GivesUpAnAnswerWhoseBodyIsTooSlow) {
 
 TEST(OnvifSource, StopEndsARequestThatIsNotAnswered) {
   RawServer server([&server](int fd) { server.stay_silent(fd); });
-  const auto source = open_onvif(options_for(url_of(server)));
+  const auto source = open_onvif(onvif_options(url_of(server)));
   PanTiltSample sample;
   EXPECT_EQ(server.status_when_stopped(*source, sample), ReadStatus::kStopped);
 }

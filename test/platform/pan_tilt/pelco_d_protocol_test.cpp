@@ -5,6 +5,8 @@
 
 #include <random>
 
+#include "test/platform/support/bytes_of.h"
+
 namespace alidade {
 namespace {
 
@@ -12,14 +14,6 @@ using ::testing::HasSubstr;
 
 constexpr std::uint8_t kPanAnswer = 0x59;
 constexpr std::uint8_t kTiltAnswer = 0x5B;
-
-std::string bytes_of(std::initializer_list<int> values) {
-  std::string bytes;
-  for (const int value : values) {
-    bytes += static_cast<char>(value);
-  }
-  return bytes;
-}
 
 // As the vendor's manual counts, not as the parser does.
 std::string answer_of(int address, int opcode, int value) {

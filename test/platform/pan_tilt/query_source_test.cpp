@@ -32,7 +32,6 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-constexpr double kNever_s = 1e6;
 constexpr int kReadingsBetweenFences = kQueriesPerFence / 2 + 1;  // each axis asked by itself
 
 double difference_deg(double a_rad, double b_deg) {

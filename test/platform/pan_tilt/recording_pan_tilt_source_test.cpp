@@ -5,14 +5,13 @@
 
 #include <memory>
 
+#include "test/platform/support/eventually.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {
 
 using ::testing::HasSubstr;
-
-constexpr double kNever_s = 1e6;
 
 std::unique_ptr<PanTiltSource> source_of(const TemporaryDirectory& directory,
                                          bool realtime = false) {

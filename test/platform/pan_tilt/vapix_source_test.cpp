@@ -22,9 +22,7 @@ using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
 
-constexpr double kNever_s = 1e6;
-
-VapixSourceOptions options_for(const std::string& url) {
+VapixSourceOptions vapix_options(const std::string& url) {
   VapixSourceOptions options;
   options.url = url;
   options.rate_hz = 1000;
@@ -43,7 +41,7 @@ std::string url_of(const RawServer& server) {
 
 TEST(VapixSource, DeliversPositionsInRadians) {
   AxisServer server("", "", [] { return position(12.5); });
-  const auto source = open_vapix(options_for(server.url()));
+  const auto source = open_vapix(vapix_options(server.url()));
   PanTiltSample sample;
   ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_DOUBLE_EQ(sample.pan_rad, 12.5 * kRadPerDeg);
@@ -57,7 +55,7 @@ TEST(VapixSource, DeliversPositionsInRadians) {
 
 TEST(VapixSource, NamesTheVideoChannelIfThereAreSeveral) {
   AxisServer server("", "", [] { return position(0); });
-  VapixSourceOptions options = options_for(server.url() + "/");
+  VapixSourceOptions options = vapix_options(server.url() + "/");
   options.camera = 2;
   const auto source = open_vapix(options);
   PanTiltSample sample;
@@ -67,7 +65,7 @@ TEST(VapixSource, NamesTheVideoChannelIfThereAreSeveral) {
 
 TEST(VapixSource, TurnsSignAndZeroOfEachAxis) {
   AxisServer server("", "", [] { return "pan=-170.5\ntilt=20\n"; });
-  VapixSourceOptions options = options_for(server.url());
+  VapixSourceOptions options = vapix_options(server.url());
   options.pan = {-1, 20};
   options.tilt = {1, 5};
   const auto source = open_vapix(options);
@@ -82,7 +80,7 @@ TEST(VapixSource, GivesAnIntervalThatHoldsTheMomentOfTheMeasurement) {
   double origin_s = monotonic_now_s();
   AxisServer server("user", "secret",
                     [origin_s] { return position(monotonic_now_s() - origin_s); });
-  VapixSourceOptions options = options_for(server.url());
+  VapixSourceOptions options = vapix_options(server.url());
   options.user = "user";
   options.password = "secret";
   const auto source = open_vapix(options);
@@ -101,7 +99,7 @@ TEST(VapixSource, GivesAnIntervalThatHoldsTheMomentOfTheMeasurement) {
 
 TEST(VapixSource, LogsInOnceAndKeepsItsConnection) {
   AxisServer server("us er", "p@ss:w\"ord/%", [] { return position(1); });
-  VapixSourceOptions options = options_for(server.url());
+  VapixSourceOptions options = vapix_options(server.url());
   options.user = "us er";
   options.password = "p@ss:w\"ord/%";
   const auto source = open_vapix(options);
@@ -116,7 +114,7 @@ TEST(VapixSource, LogsInOnceAndKeepsItsConnection) {
 
 TEST(VapixSource, LogsInAgainWhenTheCameraHasForgottenItsNonces) {
   AxisServer server("user", "secret", [] { return position(1); });
-  VapixSourceOptions options = options_for(server.url());
+  VapixSourceOptions options = vapix_options(server.url());
   options.user = "user";
   options.password = "secret";
   const auto source = open_vapix(options);
@@ -134,7 +132,7 @@ TEST(VapixSource, LogsInAgainWhenTheCameraHasForgottenItsNonces) {
 
 TEST(VapixSource, TriesOnWhenACameraThatHasWorkedRefuses) {
   AxisServer server("user", "secret", [] { return position(1); });
-  VapixSourceOptions options = options_for(server.url());
+  VapixSourceOptions options = vapix_options(server.url());
   options.user = "user";
   options.password = "secret";
   const auto source = open_vapix(options);
@@ -153,7 +151,7 @@ TEST(VapixSource, TriesOnWhenACameraThatHasWorkedRefuses) {
 TEST(VapixSource, TakesUserAndPasswordOutOfTheUrl) {
   AxisServer server("user", "sec@ret", [] { return position(1); });
   const auto source =
-      open_vapix(options_for("http://user:sec%40ret@127.0.0.1:" + std::to_string(server.port())));
+      open_vapix(vapix_options("http://user:sec%40ret@127.0.0.1:" + std::to_string(server.port())));
   PanTiltSample sample;
   EXPECT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_EQ(source->name(), server.url() + "/");
@@ -161,7 +159,7 @@ TEST(VapixSource, TakesUserAndPasswordOutOfTheUrl) {
 
 TEST(VapixSource, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
   AxisServer server("user", "secret", [] { return position(1); });
-  VapixSourceOptions options = options_for(server.url());
+  VapixSourceOptions options = vapix_options(server.url());
   options.user = "user";
   options.password = "guess";
   const auto source = open_vapix(options);
@@ -171,7 +169,7 @@ TEST(VapixSource, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
   EXPECT_EQ(source->read(sample, 0), ReadStatus::kFailed);
   EXPECT_EQ(server.polls, 0);
 
-  const auto anonymous = open_vapix(options_for(server.url()));
+  const auto anonymous = open_vapix(vapix_options(server.url()));
   EXPECT_EQ(read_until(*anonymous, sample, ReadStatus::kFailed), ReadStatus::kFailed);
   EXPECT_THAT(anonymous->error(), HasSubstr("the camera wants a user and a password (401)"));
 }
@@ -184,7 +182,7 @@ TEST(VapixSource, SaysThatACameraOffersNoDigest) {
                       "Content-Length: 0\r\n\r\n");
     }
   });
-  VapixSourceOptions options = options_for(url_of(server));
+  VapixSourceOptions options = vapix_options(url_of(server));
   options.user = "user";
   options.password = "secret";
   const auto source = open_vapix(options);
@@ -197,7 +195,7 @@ TEST(VapixSource, FailsAtOnceOnAUrlItCannotUse) {
   PanTiltSample sample;
   for (const char* url : {"http://user:se@cret@camera", "camera", "ftp://camera",
                           "http://camera/axis-cgi/com/ptz.cgi", ""}) {
-    const auto source = open_vapix(options_for(url));
+    const auto source = open_vapix(vapix_options(url));
     EXPECT_EQ(source->read(sample, 0), ReadStatus::kFailed) << url;
     EXPECT_THAT(source->error(), AllOf(HasSubstr("://"), Not(HasSubstr("cret"))));
   }
@@ -206,7 +204,7 @@ TEST(VapixSource, FailsAtOnceOnAUrlItCannotUse) {
 TEST(VapixSource, ReportsRefusedConnectionsAndTriesAgainUntilTheCameraIsThere) {
   const int port = unused_port();
   const auto source =
-      open_vapix(options_for("http://user:secret@127.0.0.1:" + std::to_string(port)));
+      open_vapix(vapix_options("http://user:secret@127.0.0.1:" + std::to_string(port)));
   PanTiltSample sample;
   for (int i = 0; i < 3; ++i) {
     ASSERT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
@@ -222,7 +220,7 @@ TEST(VapixSource, ReportsRefusedConnectionsAndTriesAgainUntilTheCameraIsThere) {
 TEST(VapixSource, OutlivesARestartOfTheCamera) {
   auto server = std::make_unique<AxisServer>("user", "secret", [] { return position(1); });
   const int port = server->port();
-  VapixSourceOptions options = options_for(server->url());
+  VapixSourceOptions options = vapix_options(server->url());
   options.user = "user";
   options.password = "secret";
   const auto source = open_vapix(options);
@@ -243,7 +241,7 @@ TEST(VapixSource, OutlivesARestartOfTheCamera) {
 
 TEST(VapixSource, ReportsHttpErrorsAndRecovers) {
   AxisServer server("", "", [] { return position(1); });
-  const auto source = open_vapix(options_for(server.url()));
+  const auto source = open_vapix(vapix_options(server.url()));
   PanTiltSample sample;
   for (const int status : {404, 500, 302}) {
     server.status = status;
@@ -257,7 +255,7 @@ TEST(VapixSource, ReportsHttpErrorsAndRecovers) {
 
 TEST(VapixSource, RecognisesAnErrorInAnAnswerOfStatus200) {
   AxisServer server("", "", [] { return "Error: PTZ is off\r\n"; });
-  const auto source = open_vapix(options_for(server.url()));
+  const auto source = open_vapix(vapix_options(server.url()));
   PanTiltSample sample;
   EXPECT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
   EXPECT_THAT(source->error(), HasSubstr("the camera answers 'Error: PTZ is off'"));
@@ -265,7 +263,7 @@ TEST(VapixSource, RecognisesAnErrorInAnAnswerOfStatus200) {
 
 TEST(VapixSource, RefusesAnAnswerTooLongForAPosition) {
   AxisServer server("", "", [] { return std::string(100'000, 'x'); });
-  const auto source = open_vapix(options_for(server.url()));
+  const auto source = open_vapix(vapix_options(server.url()));
   PanTiltSample sample;
   EXPECT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
   EXPECT_THAT(source->error(), HasSubstr("longer than 4096 bytes"));
@@ -289,7 +287,7 @@ TEST(VapixSource, SurvivesConnectionsThatBreakAtAnyPoint) {
     }
     RawServer::send(fd, "HTTP/1.1 200 OK\r\nConnection: close\r\n\r\n" + position(4));
   });
-  const auto source = open_vapix(options_for(url_of(server)));
+  const auto source = open_vapix(vapix_options(url_of(server)));
   PanTiltSample sample;
   int lost = 0;
   for (int good = 0; good < 3;) {
@@ -312,7 +310,7 @@ TEST(VapixSource, StampsTheFirstBytesOfAnAnswerThatComesInPieces) {
       RawServer::send(fd, "pan=1\ntilt=1");
     }
   });
-  const auto source = open_vapix(options_for(url_of(server)));
+  const auto source = open_vapix(vapix_options(url_of(server)));
   PanTiltSample sample;
   EXPECT_EQ(source->read(sample, 0.02), ReadStatus::kTimeout);
   EXPECT_EQ(source->read(sample, 0.02), ReadStatus::kTimeout);
@@ -324,7 +322,7 @@ TEST(VapixSource, StampsTheFirstBytesOfAnAnswerThatComesInPieces) {
 
 TEST(VapixSource, GivesUpAPollThatIsNotAnswered) {
   RawServer server([&server](int fd) { server.stay_silent(fd); });
-  VapixSourceOptions options = options_for(url_of(server));
+  VapixSourceOptions options = vapix_options(url_of(server));
   options.timeout_s = 0.05;
   const auto source = open_vapix(options);
   PanTiltSample sample;
@@ -334,7 +332,7 @@ TEST(VapixSource, GivesUpAPollThatIsNotAnswered) {
 
 TEST(VapixSource, NeverPollsFasterThanAsked) {
   AxisServer server("", "", [] { return position(1); });
-  VapixSourceOptions options = options_for(server.url());
+  VapixSourceOptions options = vapix_options(server.url());
   options.rate_hz = 100;
   const auto source = open_vapix(options);
   const double before_s = monotonic_now_s();
@@ -347,7 +345,7 @@ TEST(VapixSource, NeverPollsFasterThanAsked) {
 
 TEST(VapixSource, LeaksNoFileDescriptorOverManyReconnections) {
   RawServer server([](int fd) { RawServer::reset(fd); });
-  const auto source = open_vapix(options_for(url_of(server)));
+  const auto source = open_vapix(vapix_options(url_of(server)));
   PanTiltSample sample;
   const auto open_files = [] {
     return std::distance(std::filesystem::directory_iterator("/proc/self/fd"),
@@ -363,13 +361,13 @@ TEST(VapixSource, LeaksNoFileDescriptorOverManyReconnections) {
 
 TEST(VapixSource, StopEndsAPollThatIsNotAnswered) {
   RawServer server([&server](int fd) { server.stay_silent(fd); });
-  const auto source = open_vapix(options_for(url_of(server)));
+  const auto source = open_vapix(vapix_options(url_of(server)));
   PanTiltSample sample;
   EXPECT_EQ(server.status_when_stopped(*source, sample), ReadStatus::kStopped);
 }
 
 TEST(VapixSource, StopEndsAPause) {
-  VapixSourceOptions options = options_for("http://127.0.0.1:" + std::to_string(unused_port()));
+  VapixSourceOptions options = vapix_options("http://127.0.0.1:" + std::to_string(unused_port()));
   options.max_backoff_s = kNever_s;
   const auto source = open_vapix(options);
   PanTiltSample sample;

@@ -6,18 +6,12 @@
 #include <ostream>
 #include <random>
 
+#include "test/platform/support/bytes_of.h"
+
 namespace alidade {
 namespace {
 
 using ::testing::HasSubstr;
-
-std::string bytes_of(std::initializer_list<int> values) {
-  std::string bytes;
-  for (const int value : values) {
-    bytes += static_cast<char>(value);
-  }
-  return bytes;
-}
 
 std::string datagram(int type, std::uint32_t sequence, const std::string& payload) {
   std::string bytes = bytes_of({type / 256, type % 256, 0, static_cast<int>(payload.size())});

@@ -6,12 +6,11 @@
 #include <thread>
 #include <utility>
 
+#include "test/platform/support/eventually.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {
-
-constexpr double kNever_s = 1e6;
 
 TEST(Playback, LetsEverythingOutAtOnceAtFullSpeed) {
   Playback playback("", false);

@@ -15,6 +15,8 @@
 namespace alidade {
 
 constexpr double kDeadline_s = 30;
+// Of a wait that something else ends.
+constexpr double kNever_s = 1e6;
 
 // Reads until the status is one of those wanted (or none is left to come); returns the last status.
 template <class Source, class Item, class Wanted>

@@ -89,7 +89,6 @@ class RawServer {
   // What a read without a time-out gives that is stopped once a connection has come.
   template <class Source, class Item>
   auto status_when_stopped(Source& source, Item& item) const {
-    constexpr double kNever_s = 1e6;
     std::thread stopper([&] {
       eventually([&] { return connections() > 0; });
       source.stop();

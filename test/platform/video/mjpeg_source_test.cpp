@@ -31,7 +31,6 @@ using ::testing::StartsWith;
 
 using Login = MjpegServer::Login;
 
-constexpr double kNever_s = 1e6;
 constexpr double kGreyTolerance = 3;  // neighbouring numbers differ by 7
 
 MjpegSourceOptions options_for(const std::string& url) {
@@ -138,7 +137,7 @@ TEST(MjpegSource, StampsTheFirstByteOfAPictureThatComesSlowly) {
             1);  // a busy machine may sleep over a pause, but a stamp of the last byte never is
 }
 
-std::string name_of(Login login) {
+std::string login_name(Login login) {
   return login == Login::kBasic       ? "Basic"
          : login == Login::kDigestMd5 ? "DigestMd5"
                                       : "DigestSha256";
@@ -212,7 +211,7 @@ TEST_P(MjpegSourceLogin, TriesOnWhenACameraThatHasWorkedRefuses) {
 
 INSTANTIATE_TEST_SUITE_P(Methods, MjpegSourceLogin,
                          ::testing::Values(Login::kBasic, Login::kDigestMd5, Login::kDigestSha256),
-                         [](const auto& which) { return name_of(which.param); });
+                         [](const auto& which) { return login_name(which.param); });
 
 TEST(MjpegSource, FailsAtOnceOnAUrlItCannotUse) {
   Frame frame;

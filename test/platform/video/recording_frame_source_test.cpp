@@ -18,8 +18,6 @@ using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 
-constexpr double kNever_s = 1e6;
-
 // A recording whose frame n is of one grey, 10 n.
 struct Recording {
   explicit Recording(int rows) {

@@ -35,8 +35,6 @@ using ::testing::Not;
 
 using Codec = RtpSender::Codec;
 
-constexpr double kNever_s = 1e6;
-
 RtpSourceOptions options_for(int port, Codec codec) {
   RtpSourceOptions options;
   options.url = "rtp://@:" + std::to_string(port);

@@ -26,8 +26,6 @@ using ::testing::StartsWith;
 
 using Transport = RtpSourceOptions::Transport;
 
-constexpr double kNever_s = 1e6;
-
 RtpSourceOptions options_for(const std::string& url, Transport transport = Transport::kTcp) {
   RtpSourceOptions options;
   options.url = url;

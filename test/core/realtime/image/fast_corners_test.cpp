@@ -14,20 +14,20 @@
 namespace alidade::test {
 namespace {
 
-struct Image {
+struct CornerImage {
   std::vector<std::uint8_t> memory;
   ImageView view;
 };
 
-Image grey(int width, int height, int level, int padding = 0) {
-  Image image;
+CornerImage grey(int width, int height, int level, int padding = 0) {
+  CornerImage image;
   const std::ptrdiff_t stride = width + padding;
   image.memory.assign(static_cast<std::size_t>(stride * height), static_cast<std::uint8_t>(level));
   image.view = {image.memory.data(), width, height, stride};
   return image;
 }
 
-void paint(Image* image, int u0, int v0, int u1, int v1, int level) {
+void paint(CornerImage* image, int u0, int v0, int u1, int v1, int level) {
   for (int v = v0; v < v1; ++v) {
     for (int u = u0; u < u1; ++u) {
       image->memory[static_cast<std::size_t>(v * image->view.stride + u)] =
@@ -37,9 +37,9 @@ void paint(Image* image, int u0, int v0, int u1, int v1, int level) {
 }
 
 // Blobs of every size: corners, edges, flat parts.
-Image blobs(int width, int height, int padding, std::uint64_t seed) {
+CornerImage blobs(int width, int height, int padding, std::uint64_t seed) {
   std::mt19937_64 random(seed);
-  Image image = grey(width, height, 128, padding);
+  CornerImage image = grey(width, height, 128, padding);
   const auto pick = [&](int below) {
     return static_cast<int>(random() % static_cast<unsigned>(below));
   };
@@ -123,7 +123,8 @@ std::map<Place, int> corners_of(const ImageView& image, int cell, int threshold)
 TEST(FastCorners, EqualThePlainDefinitionForEverySizeCellAndThreshold) {
   std::size_t corners = 0;
   for (int width = 22; width < 75; width += 1) {
-    const Image image = blobs(width, 7 + width % 41, width % 5, static_cast<std::uint64_t>(width));
+    const CornerImage image =
+        blobs(width, 7 + width % 41, width % 5, static_cast<std::uint64_t>(width));
     for (const int cell : {8, 17, 32, 100}) {
       const auto expected = plain_corners(image.view, cell, width % 60);
       EXPECT_EQ(corners_of(image.view, cell, width % 60), expected) << width << ' ' << cell;
@@ -134,7 +135,7 @@ TEST(FastCorners, EqualThePlainDefinitionForEverySizeCellAndThreshold) {
 }
 
 TEST(FastCorners, ScoreIsTheLargestThresholdThatStillGivesACornerPlusOne) {
-  const Image image = blobs(60, 60, 3, 7);
+  const CornerImage image = blobs(60, 60, 3, 7);
   int positive = 0;
   for (int v = 3; v < 57; ++v) {
     for (int u = 3; u < 57; ++u) {
@@ -147,7 +148,7 @@ TEST(FastCorners, ScoreIsTheLargestThresholdThatStillGivesACornerPlusOne) {
 
 TEST(FastCorners, StandOnTheFourCornersOfASquareAndNowhereOnItsEdges) {
   for (const auto& [square, ground] : {std::pair(200, 60), std::pair(60, 200)}) {
-    Image image = grey(64, 64, ground);
+    CornerImage image = grey(64, 64, ground);
     paint(&image, 20, 22, 41, 43, square);
     const auto corners = corners_of(image.view, 8, 20);
     ASSERT_GE(corners.size(), 4U);
@@ -162,17 +163,17 @@ TEST(FastCorners, StandOnTheFourCornersOfASquareAndNowhereOnItsEdges) {
 
 TEST(FastCorners, AreNotFoundOnFlatImagesStraightEdgesAndBelowTheThreshold) {
   EXPECT_TRUE(corners_of(grey(100, 50, 77).view, 16, 0).empty());
-  Image edge = grey(100, 50, 50);
+  CornerImage edge = grey(100, 50, 50);
   paint(&edge, 40, 0, 100, 50, 200);
   EXPECT_TRUE(corners_of(edge.view, 16, 0).empty());
-  Image faint = grey(100, 50, 100);
+  CornerImage faint = grey(100, 50, 100);
   paint(&faint, 40, 20, 60, 40, 110);
   EXPECT_TRUE(corners_of(faint.view, 16, 10).empty());
   EXPECT_FALSE(corners_of(faint.view, 16, 9).empty());
 }
 
 TEST(FastCorners, FindsCornersAsNearToTheBorderAsTheCircleAllows) {
-  Image image = grey(40, 30, 0);
+  CornerImage image = grey(40, 30, 0);
   for (const Place& place : {Place(3, 3), Place(3, 36), Place(26, 3), Place(26, 36)}) {
     paint(&image, place.second, place.first, place.second + 1, place.first + 1, 255);
   }
@@ -182,7 +183,7 @@ TEST(FastCorners, FindsCornersAsNearToTheBorderAsTheCircleAllows) {
 }
 
 TEST(FastCorners, TellsHowManyFoundNoRoom) {
-  const Image image = blobs(200, 100, 0, 9);
+  const CornerImage image = blobs(200, 100, 0, 9);
   FastGrid grid(200, 100, 16);
   std::vector<FastCorner> all(static_cast<std::size_t>(grid.max_cells()));
   const FastResult whole = grid.detect(image.view, 10, all.data(), grid.max_cells());

@@ -12,13 +12,13 @@
 namespace alidade::test {
 namespace {
 
-constexpr int kWidth = 160;
-constexpr int kHeight = 120;
+constexpr int kNoisyWidth = 160;
+constexpr int kNoisyHeight = 120;
 
 template <class GreyAt>
 double noise_of(const GreyAt& grey_at, double sigma) {
   std::mt19937_64 random(1);
-  const Pixels pixels = make_pixels(kWidth, kHeight, grey_at, sigma, &random);
+  const Pixels pixels = make_pixels(kNoisyWidth, kNoisyHeight, grey_at, sigma, &random);
   std::vector<float> scratch(4096);
   return image_noise(pixels.view, scratch.data(), static_cast<int>(scratch.size()));
 }
@@ -42,7 +42,7 @@ TEST(ImageNoise, IsThatOfTheSmoothPartsOfATexturedImage) {
   std::mt19937_64 random(2);
   const AnalyticImage texture(&random, 15);
   const auto half = [&](const Vector2<double>& at) {
-    return at.x() < 0.5 * kWidth ? texture(at) : 128;
+    return at.x() < 0.5 * kNoisyWidth ? texture(at) : 128;
   };
   constexpr double kSigma = 3;
   const double found = noise_of(half, kSigma);

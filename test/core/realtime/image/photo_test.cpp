@@ -131,7 +131,7 @@ cv::Mat rounded(const cv::Mat& image, double sigma, std::mt19937_64* random) {
   return result;
 }
 
-struct Errors {
+struct PhotoErrors {
   int count = 0, prepared = 0;
   Vector2<double> sum = Vector2<double>::Zero();
   double squares = 0, variances = 0, normalised = 0;
@@ -139,13 +139,13 @@ struct Errors {
 };
 
 // As a camera takes it: the lens and the pixels' size have removed the finest detail.
-Errors align_corners(const cv::Mat& photo, double sigma) {
+PhotoErrors align_corners(const cv::Mat& photo, double sigma) {
   cv::Mat soft;
   photo.convertTo(soft, CV_64F);
   cv::GaussianBlur(soft, soft, {}, 0.7);
   std::mt19937_64 random(1);
   std::uniform_real_distribution<double> uniform(0, 1);
-  Errors errors;
+  PhotoErrors errors;
   const cv::Mat before = rounded(soft, sigma, &random);
   const std::vector<FastCorner> corners = corners_of(before, 48, 20);
   for (int n = 0; n < 4; ++n) {
@@ -181,7 +181,7 @@ Errors align_corners(const cv::Mat& photo, double sigma) {
 }
 
 TEST_P(Photo, CornersAreFoundAgainToHundredthsOfAPixel) {
-  const Errors errors = align_corners(photo_, 0);
+  const PhotoErrors errors = align_corners(photo_, 0);
   ASSERT_GT(errors.count, 500);
   EXPECT_GT(errors.count, 0.99 * errors.prepared);
   EXPECT_LT((errors.sum / errors.count).cwiseAbs().maxCoeff(), 0.002);
@@ -190,7 +190,7 @@ TEST_P(Photo, CornersAreFoundAgainToHundredthsOfAPixel) {
 }
 
 TEST_P(Photo, ErrorsAreAsLargeAsTheCovarianceSays) {
-  const Errors errors = align_corners(photo_, 2);
+  const PhotoErrors errors = align_corners(photo_, 2);
   ASSERT_GT(errors.count, 500);
   EXPECT_GT(errors.count, 0.98 * errors.prepared);
   // As in patch_alignment_test, but one reference's noise serves four trials: as good as a fourth of them.

@@ -10,14 +10,14 @@
 namespace alidade::test {
 namespace {
 
-struct Image {
+struct LevelImage {
   std::vector<std::uint8_t> memory;
   ImageView view;
 };
 
-Image random_image(int width, int height, int padding, std::mt19937_64* random) {
+LevelImage random_image(int width, int height, int padding, std::mt19937_64* random) {
   std::uniform_int_distribution<int> grey(0, 255);
-  Image image;
+  LevelImage image;
   const std::ptrdiff_t stride = width + padding;
   image.memory.resize(static_cast<std::size_t>(stride * height));
   for (auto& pixel : image.memory) pixel = static_cast<std::uint8_t>(grey(*random));
@@ -57,7 +57,7 @@ TEST(Pyramid, EqualsTheScalarReferenceForEverySizeAndStride) {
   int compared = 0;
   for (int width = 1; width <= 131; ++width) {
     for (const int padding : {0, 1, 13}) {
-      const Image image = random_image(width, 5 + width % 33, padding, &random);
+      const LevelImage image = random_image(width, 5 + width % 33, padding, &random);
       ASSERT_EQ(pyramid.build(image.view, 4), PyramidStatus::kOk);
       compared += expect_octaves_follow(pyramid);
     }
@@ -67,7 +67,7 @@ TEST(Pyramid, EqualsTheScalarReferenceForEverySizeAndStride) {
 
 TEST(Pyramid, TakesAImageThatIsStoredBottomUp) {
   std::mt19937_64 random(2);
-  Image image = random_image(50, 30, 7, &random);
+  LevelImage image = random_image(50, 30, 7, &random);
   image.view = {image.view.row(29), 50, 30, -image.view.stride};
   Pyramid pyramid(50, 30, 3);
   ASSERT_EQ(pyramid.build(image.view, 3), PyramidStatus::kOk);

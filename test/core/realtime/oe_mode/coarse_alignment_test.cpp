@@ -19,8 +19,8 @@
 namespace alidade::test {
 namespace {
 
-constexpr int kWidth = 1920;
-constexpr int kHeight = 1080;
+constexpr int kFullWidth = 1920;
+constexpr int kFullHeight = 1080;
 constexpr int kMargin = 80;  // px, by which a view may be moved in its image
 constexpr int kOctaves = 6;
 constexpr int kFinest = 2;
@@ -28,8 +28,8 @@ constexpr int kPatches = 24;  // of each octave
 
 // Waves with periods from 10 to 800 px, as many of each octave, so that all octaves have contrast.
 std::vector<float> texture(std::uint64_t seed) {
-  constexpr int kColumns = kWidth + 2 * kMargin;
-  constexpr int kRows = kHeight + 2 * kMargin;
+  constexpr int kColumns = kFullWidth + 2 * kMargin;
+  constexpr int kRows = kFullHeight + 2 * kMargin;
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> uniform(0, 1);
   std::vector<float> grey(static_cast<std::size_t>(kColumns) * kRows, 128.0F);
@@ -51,9 +51,10 @@ std::vector<float> texture(std::uint64_t seed) {
   return grey;
 }
 
-class Image {
+class BlurredImage {
  public:
-  Image(const std::vector<float>& grey, double gain, std::uint64_t seed) : pixels_(grey.size()) {
+  BlurredImage(const std::vector<float>& grey, double gain, std::uint64_t seed)
+      : pixels_(grey.size()) {
     std::mt19937_64 random(seed);
     std::normal_distribution<float> noise(0, 2);
     for (std::size_t i = 0; i < grey.size(); ++i) {
@@ -64,16 +65,16 @@ class Image {
 
   // What is at u without a shift is at u + shift.
   [[nodiscard]] ImageView view(int shift_u = 0, int shift_v = 0) const {
-    constexpr int kStride = kWidth + 2 * kMargin;
-    return {pixels_.data() + (kMargin - shift_v) * kStride + kMargin - shift_u, kWidth, kHeight,
-            kStride};
+    constexpr int kStride = kFullWidth + 2 * kMargin;
+    return {pixels_.data() + (kMargin - shift_v) * kStride + kMargin - shift_u, kFullWidth,
+            kFullHeight, kStride};
   }
 
   // Hides a strip of the view by what another one shows there.
-  void cover(int shift_u, int shift_v, int from_u, int to_u, const Image& other) {
+  void cover(int shift_u, int shift_v, int from_u, int to_u, const BlurredImage& other) {
     const ImageView target = view(shift_u, shift_v);
     const ImageView source = other.view();
-    for (int v = 0; v < kHeight; ++v) {
+    for (int v = 0; v < kFullHeight; ++v) {
       std::uint8_t* to = pixels_.data() + (target.row(v) - pixels_.data());
       std::copy(source.row(v) + from_u, source.row(v) + to_u, to + from_u);
     }
@@ -88,7 +89,7 @@ class CoarseAlignmentTest : public testing::Test {
   // Descending octaves, positions all over where a patch stays in the image.
   void SetUp() override {
     J_angle_ << -20000, 800, 500, 19000;
-    Pyramid pyramid(kWidth, kHeight, kOctaves);
+    Pyramid pyramid(kFullWidth, kFullHeight, kOctaves);
     ASSERT_EQ(pyramid.build(reference_.view(), kOctaves), PyramidStatus::kOk);
     std::mt19937_64 random(3);
     std::uniform_real_distribution<double> uniform(0, 1);
@@ -96,8 +97,8 @@ class CoarseAlignmentTest : public testing::Test {
     for (int octave = kOctaves - 1; octave >= kFinest; --octave) {
       const double border = border_of(octave);
       for (int taken = 0; taken < kPatches;) {
-        const double u = border + (kWidth - 2 * border) * uniform(random);
-        const Vector2<double> at(u, border + (kHeight - 2 * border) * uniform(random));
+        const double u = border + (kFullWidth - 2 * border) * uniform(random);
+        const Vector2<double> at(u, border + (kFullHeight - 2 * border) * uniform(random));
         ReferencePatch patch;
         if (prepare(pyramid.octave(octave), std::ldexp(1.0, -octave) * at,
                     Matrix2<double>::Identity(), 1, &patch) != PrepareStatus::kOk) {
@@ -122,7 +123,8 @@ class CoarseAlignmentTest : public testing::Test {
     return ok;
   }
 
-  void expect_recovered(const Image& image, double radius, double search_px, double least_found) {
+  void expect_recovered(const BlurredImage& image, double radius, double search_px,
+                        double least_found) {
     for (int i = 0; i < 12; ++i) {
       const double turn = 2 * kPi * (i + 0.3) / 12;
       const int du = static_cast<int>(std::lround(radius * std::cos(turn)));
@@ -140,15 +142,15 @@ class CoarseAlignmentTest : public testing::Test {
   }
 
   const std::vector<float> grey_ = texture(1);
-  const Image reference_{grey_, 1, 1};
+  const BlurredImage reference_{grey_, 1, 1};
   Matrix2<double> J_angle_;  // px/rad
   std::vector<ReferencePatch> references_;
   std::vector<CoarsePatch> patches_;
-  Pyramid pyramid_{kWidth, kHeight, kOctaves};
+  Pyramid pyramid_{kFullWidth, kFullHeight, kOctaves};
 };
 
 TEST_F(CoarseAlignmentTest, FindsItsWayFromTheReachOfTheCoarsestOctave) {
-  const Image same(grey_, 1, 2);
+  const BlurredImage same(grey_, 1, 2);
   for (const double radius : {0.0, 5.0, 20.0, 40.0}) {
     SCOPED_TRACE(radius);
     expect_recovered(same, radius, 0, 0.95);
@@ -156,7 +158,7 @@ TEST_F(CoarseAlignmentTest, FindsItsWayFromTheReachOfTheCoarsestOctave) {
 }
 
 TEST_F(CoarseAlignmentTest, FindsItsWayFromSixtyPixelsBySearching) {
-  const Image same(grey_, 1, 2);
+  const BlurredImage same(grey_, 1, 2);
   for (const double radius : {0.0, 20.0, 60.0}) {
     SCOPED_TRACE(radius);
     expect_recovered(same, radius, 60, 0.95);
@@ -166,14 +168,14 @@ TEST_F(CoarseAlignmentTest, FindsItsWayFromSixtyPixelsBySearching) {
 TEST_F(CoarseAlignmentTest, DoesNotMindBrightness) {
   for (const double gain : {0.5, 2.0}) {
     SCOPED_TRACE(gain);
-    const Image changed(grey_, gain, 2);
+    const BlurredImage changed(grey_, gain, 2);
     expect_recovered(changed, 30, 0, 0.95);
     expect_recovered(changed, 60, 60, 0.95);
   }
 }
 
 TEST_F(CoarseAlignmentTest, DoesNotMindWhatHidesThirtyPercent) {
-  const Image other(texture(2), 1, 4);
+  const BlurredImage other(texture(2), 1, 4);
   for (const double radius : {0.0, 30.0, 60.0}) {
     for (int i = 0; i < 6; ++i) {
       const double turn = 2 * kPi * (i + 0.3) / 6;
@@ -181,8 +183,8 @@ TEST_F(CoarseAlignmentTest, DoesNotMindWhatHidesThirtyPercent) {
       const int dv = static_cast<int>(std::lround(radius * std::sin(turn)));
       // Each octave has its patches in a strip of its own width; 30 % of the coarsest's are hidden.
       const auto from = static_cast<int>(border_of(kOctaves - 1));
-      const int to = from + (kWidth - 2 * from) * 3 / 10;
-      Image covered(grey_, 1, 2);
+      const int to = from + (kFullWidth - 2 * from) * 3 / 10;
+      BlurredImage covered(grey_, 1, 2);
       covered.cover(du, dv, 0, to, other);
       CoarseOptions options;
       options.search_px = radius > 40 ? radius : 0;
@@ -198,10 +200,11 @@ TEST_F(CoarseAlignmentTest, DoesNotMindWhatHidesThirtyPercent) {
 }
 
 TEST_F(CoarseAlignmentTest, FindsNothingWhereNothingIsAlike) {
-  const std::vector<std::uint8_t> blank(static_cast<std::size_t>(kWidth) * kHeight, 90);
-  const Image other(texture(2), 1, 4);
-  const Image noise(std::vector<float>(grey_.size(), 128.0F), 1, 5);
-  const ImageView images[] = {{blank.data(), kWidth, kHeight, kWidth}, other.view(), noise.view()};
+  const std::vector<std::uint8_t> blank(static_cast<std::size_t>(kFullWidth) * kFullHeight, 90);
+  const BlurredImage other(texture(2), 1, 4);
+  const BlurredImage noise(std::vector<float>(grey_.size(), 128.0F), 1, 5);
+  const ImageView images[] = {
+      {blank.data(), kFullWidth, kFullHeight, kFullWidth}, other.view(), noise.view()};
   for (const ImageView& image : images) {
     for (const double search_px : {0.0, 60.0}) {
       CoarseOptions options;

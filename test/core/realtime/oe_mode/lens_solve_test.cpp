@@ -14,12 +14,12 @@
 namespace alidade::test {
 namespace {
 
-constexpr int kF = index(Parameter::kFocalLength);
-constexpr double kWidth = 1280;
-constexpr double kHeight = 720;
-constexpr double kFocal = 4000;          // px
+constexpr int kRowOfF = index(Parameter::kFocalLength);
+constexpr double kLensWidth = 1280;
+constexpr double kLensHeight = 720;
+constexpr double kLensFocal = 4000;      // px
 constexpr double kLineDelay = -14.2e-6;  // s/row
-constexpr double kHalf_s = kLineDelay * kHeight / 2;
+constexpr double kHalf_s = kLineDelay * kLensHeight / 2;
 constexpr double kNoise = 0.08;          // px
 constexpr double kAcceleration = 2;      // rad/s^2
 constexpr double kOffset = 3e-5;         // rad
@@ -43,9 +43,10 @@ class LensFrame {
  public:
   LensFrame(const LensWorld& world, std::uint64_t seed) : random_(seed) {
     Calibration calibration;
-    calibration.camera = {kFocal, 1, -0.2, static_cast<int>(kWidth), static_cast<int>(kHeight)};
+    calibration.camera = {kLensFocal, 1, -0.2, static_cast<int>(kLensWidth),
+                          static_cast<int>(kLensHeight)};
     calibration.line_delay = kLineDelay;
-    calibration.covariance(kF, kF) = std::pow(kFocal * world.sigma, 2);
+    calibration.covariance(kRowOfF, kRowOfF) = std::pow(kLensFocal * world.sigma, 2);
     lens_ = LensScale::begin(calibration);
     lens_.value = world.known;
     const double n = normal(1);
@@ -53,12 +54,12 @@ class LensFrame {
     const double rest = std::sqrt(1 - world.correlation * world.correlation);
     g = kOffset * Vector2<double>(world.correlation * n + rest * normal(1), normal(1));
     lens_.covariance_with_offset = {world.correlation * kOffset * world.sigma, 0};
-    x << normal(1 / kFocal), normal(1 / kFocal), normal(0.01), normal(0.01), normal(kAcceleration),
-        normal(kAcceleration);
-    const FrameMotion<double> motion{{0.3, -0.4}, {0.1, 0.05}, kHeight / 2};
+    x << normal(1 / kLensFocal), normal(1 / kLensFocal), normal(0.01), normal(0.01),
+        normal(kAcceleration), normal(kAcceleration);
+    const FrameMotion<double> motion{{0.3, -0.4}, {0.1, 0.05}, kLensHeight / 2};
     const ViewProjection view(calibration, motion);
     for (int i = 0; i < 120; ++i) {
-      const Vector2<double> u(uniform(0, kWidth), uniform(0, kHeight));
+      const Vector2<double> u(uniform(0, kLensWidth), uniform(0, kLensHeight));
       Vector3<double> d;
       SeenDirection seen;
       Sensitivity<2> J_parameters;
@@ -93,7 +94,7 @@ class LensFrame {
 
   SolveStatus solve(SolvedMotion* out) {
     return solve_orientation(landmarks.data(), static_cast<int>(landmarks.size()), prior,
-                             SolveLimits{}, kWidth, kHeight, kHalf_s, out);
+                             SolveLimits{}, kLensWidth, kLensHeight, kHalf_s, out);
   }
   double normal(double sigma) { return sigma * std::normal_distribution<double>()(random_); }
   double uniform(double from, double to) {
@@ -237,7 +238,7 @@ TEST(LensSolve, BlamesTheLensForWhatItCanDoOnly) {
   // Landmarks that came with this lens from a tenth of a radian away: angles go with f.
   const double away = 0.1;
   for (FoundLandmark& f : frame.landmarks) {
-    f.sensitivity.col(kF) = -f.J_angle * Vector2<double>(away, 0) / kFocal;
+    f.sensitivity.col(kRowOfF) = -f.J_angle * Vector2<double>(away, 0) / kLensFocal;
     f.residual -= frame.phi * (f.sensitivity * frame.lens_.direction);
   }
   SolvedMotion solved;
@@ -270,7 +271,7 @@ TEST(LensSolve, FollowsTheCalibrationAsItsSensitivitySays) {
       of_lens[j] = frame.normal(1e-3);
       for (int i = 0; i < 4; ++i) of_telemetry(i, j) = frame.normal(1e-4);
       for (FoundLandmark& f : frame.landmarks) {
-        if (j != kF && j != index(Parameter::kRadialDistortion))
+        if (j != kRowOfF && j != index(Parameter::kRadialDistortion))
           f.sensitivity.col(j) = Vector2<double>(frame.normal(0.1), frame.normal(0.1));
       }
     }
@@ -293,7 +294,7 @@ TEST(LensSolve, FollowsTheCalibrationAsItsSensitivitySays) {
     };
     // But for f and k, whose effect phi takes over.
     for (int j = 0; j < kParameterCount; ++j) {
-      if (j == kF || j == index(Parameter::kRadialDistortion)) continue;
+      if (j == kRowOfF || j == index(Parameter::kRadialDistortion)) continue;
       constexpr double kStep = 1e-3;
       const SolvedMotion more = moved(j, kStep);
       const SolvedMotion less = moved(j, -kStep);

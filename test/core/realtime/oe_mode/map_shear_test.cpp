@@ -14,7 +14,7 @@
 namespace alidade::test {
 namespace {
 
-constexpr double kPeriod_s = 0.04;
+constexpr double kShearPeriod_s = 0.04;
 
 Calibration sheared_calibration() {
   Calibration calibration;
@@ -143,7 +143,7 @@ class ShearedFrames : public testing::Test {
 
   // Frame k, as a map shows it whose rates and accelerations are wrong by so much.
   void add(int k, const Vector2<double>& wrong_rate, const Vector2<double>& wrong_acceleration) {
-    const double t = k * kPeriod_s;
+    const double t = k * kShearPeriod_s;
     shear_.add_frame(t,
                      motion_of(angle(t), rate(t) + wrong_rate, acceleration() + wrong_acceleration),
                      frame_covariance());

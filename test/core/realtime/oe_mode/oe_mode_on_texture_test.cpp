@@ -40,8 +40,8 @@ class OeModeOnTexture : public testing::Test {
   OeModeOnTexture() { oe_.reset(scene_.calibration_); }
 
   OeStatus process(const ImageView& image, const InterpolatedPanTilt& telemetry) {
-    constexpr double kPeriod_s = 0.04;
-    return oe_.process(image, kPeriod_s * frames_++, &telemetry, &frame_);
+    constexpr double kFramePeriod_s = 0.04;
+    return oe_.process(image, kFramePeriod_s * frames_++, &telemetry, &frame_);
   }
 
   // So many frames of a camera at rest.

@@ -20,13 +20,13 @@
 namespace alidade::test {
 namespace {
 
-constexpr double kWidth = 1920;
-constexpr double kHeight = 1080;
+constexpr double kSolvedWidth = 1920;
+constexpr double kSolvedHeight = 1080;
 constexpr double kFocalLength = 8000;  // px
 constexpr double kNoise = 0.1;         // px, of a landmark, about
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
-constexpr double kAccelerationSigma = 2;  // rad/s^2, of the prior
+constexpr double kPriorAccelerationSigma = 2;  // rad/s^2, of the prior
 
 struct World {
   double line_delay = 20e-6;  // s/row
@@ -39,7 +39,7 @@ struct World {
   double understated = 1;         // errors are so many times what is claimed
   double edges = 0;               // share of landmarks that see one direction only
 
-  [[nodiscard]] double half_readout_s() const { return line_delay * kHeight / 2; }
+  [[nodiscard]] double half_readout_s() const { return line_delay * kSolvedHeight / 2; }
 };
 
 // One frame: the truth is drawn, then what is seen of it.
@@ -51,7 +51,7 @@ struct Frame {
 
   SolveStatus solve(const World& world, SolvedMotion* out, const SolveLimits& limits = {}) {
     return solve_orientation(landmarks.data(), static_cast<int>(landmarks.size()), prior, limits,
-                             kWidth, kHeight, world.half_readout_s(), out);
+                             kSolvedWidth, kSolvedHeight, world.half_readout_s(), out);
   }
 };
 
@@ -69,10 +69,10 @@ class Simulation {
   // Positions all over the image, Jacobians of a camera at a tilt, covariances of all shapes.
   [[nodiscard]] FoundLandmark landmark(const World& world, const Vector2<double>& u) {
     Calibration calibration;
-    calibration.camera = {kFocalLength, 1, 0.5, static_cast<int>(kWidth),
-                          static_cast<int>(kHeight)};
+    calibration.camera = {kFocalLength, 1, 0.5, static_cast<int>(kSolvedWidth),
+                          static_cast<int>(kSolvedHeight)};
     calibration.line_delay = world.line_delay;
-    const FrameMotion<double> motion{{0.3, -0.4}, {0.1, 0.05}, kHeight / 2};
+    const FrameMotion<double> motion{{0.3, -0.4}, {0.1, 0.05}, kSolvedHeight / 2};
     Vector3<double> d;
     SeenDirection seen;
     EXPECT_EQ(rolling_shutter_unproject(calibration.camera, calibration.mechanics,
@@ -102,8 +102,8 @@ class Simulation {
   [[nodiscard]] Frame frame(const World& world) {
     std::vector<Vector2<double>> positions;
     for (int i = 0; i < world.landmarks; ++i) {
-      const double u = uniform(0, kWidth);
-      positions.emplace_back(u, uniform(0, kHeight));
+      const double u = uniform(0, kSolvedWidth);
+      positions.emplace_back(u, uniform(0, kSolvedHeight));
     }
     return frame(world, positions);
   }
@@ -112,7 +112,7 @@ class Simulation {
     Frame out;
     const double far = 2 / kFocalLength;
     out.x << uniform(-far, far), uniform(-far, far), normal(0.01), normal(0.01),
-        normal(kAccelerationSigma), normal(kAccelerationSigma);
+        normal(kPriorAccelerationSigma), normal(kPriorAccelerationSigma);
     x_ = out.x;
     for (int i = 0; i < 2; ++i) out.g[i] = normal(world.offset) + normal(world.shared);
     for (const Vector2<double>& u : positions) {
@@ -121,7 +121,7 @@ class Simulation {
       found.residual += seen_shift(found);
     }
     out.prior.motion_information.diagonal().tail<2>().setConstant(
-        1 / (kAccelerationSigma * kAccelerationSigma));
+        1 / (kPriorAccelerationSigma * kPriorAccelerationSigma));
     out.prior.offset_covariance = world.offset * world.offset * Matrix2<double>::Identity();
     out.prior.has_telemetry = world.has_telemetry;
     if (world.has_telemetry) measure(world, &out);
@@ -321,15 +321,15 @@ TEST(OrientationSolve, RefusesTooFew) {
   SolvedMotion solved;
   Frame frame = simulation.frame(world);
   for (int count : {0, 1, 7}) {
-    EXPECT_EQ(solve_orientation(frame.landmarks.data(), count, frame.prior, {}, kWidth, kHeight,
-                                world.half_readout_s(), &solved),
+    EXPECT_EQ(solve_orientation(frame.landmarks.data(), count, frame.prior, {}, kSolvedWidth,
+                                kSolvedHeight, world.half_readout_s(), &solved),
               SolveStatus::kTooFew);
   }
-  EXPECT_EQ(solve_orientation(nullptr, 0, frame.prior, {}, kWidth, kHeight, world.half_readout_s(),
-                              &solved),
-            SolveStatus::kTooFew);
-  EXPECT_EQ(solve_orientation(frame.landmarks.data(), 8, frame.prior, {}, kWidth, kHeight,
+  EXPECT_EQ(solve_orientation(nullptr, 0, frame.prior, {}, kSolvedWidth, kSolvedHeight,
                               world.half_readout_s(), &solved),
+            SolveStatus::kTooFew);
+  EXPECT_EQ(solve_orientation(frame.landmarks.data(), 8, frame.prior, {}, kSolvedWidth,
+                              kSolvedHeight, world.half_readout_s(), &solved),
             SolveStatus::kOk);
 }
 
@@ -449,7 +449,7 @@ TEST(OrientationSolve, LeavesRatesToTelemetryWithoutALineDelay) {
       EXPECT_NEAR(solved.correction[i], frame.prior.telemetry[i], 1e-6 * sigma);
       EXPECT_NEAR(solved.covariance(i, i), sigma * sigma, 1e-6 * sigma * sigma);
     }
-    EXPECT_NEAR(solved.covariance(4, 4), kAccelerationSigma * kAccelerationSigma, 1e-6);
+    EXPECT_NEAR(solved.covariance(4, 4), kPriorAccelerationSigma * kPriorAccelerationSigma, 1e-6);
     score.add(frame, solved);
   }
   expect_consistent(score);
@@ -485,8 +485,8 @@ TEST(OrientationSolve, FindsErrorsThatNeighboursShare) {
     for (int cell = 0; cell < kColumns * kRows; ++cell) {
       for (int i = 0; i < 3; ++i) {
         positions.emplace_back(
-            kWidth * (cell % kColumns + simulation.uniform(0.01, 0.99)) / kColumns,
-            kHeight * (cell / kColumns + simulation.uniform(0.01, 0.99)) / kRows);
+            kSolvedWidth * (cell % kColumns + simulation.uniform(0.01, 0.99)) / kColumns,
+            kSolvedHeight * (cell / kColumns + simulation.uniform(0.01, 0.99)) / kRows);
       }
     }
     Frame frame = simulation.frame(world, positions);
@@ -614,7 +614,7 @@ TEST(OrientationSolve, SensitivityIsHowTheSolutionFollowsTheCalibration) {
     Frame frame = simulation.frame(world);
     // Weak enough to leave the landmarks their say, strong enough to be seen.
     Vector6 sigma;
-    sigma << 3e-6, 3e-6, 1e-3, 1e-3, kAccelerationSigma, kAccelerationSigma;
+    sigma << 3e-6, 3e-6, 1e-3, 1e-3, kPriorAccelerationSigma, kPriorAccelerationSigma;
     frame.prior.motion_information.diagonal() = sigma.cwiseAbs2().cwiseInverse();
     frame.prior.motion.head<4>() = frame.x.head<4>();
     const auto fill = [&](auto* sensitivity, double scale) {
@@ -670,7 +670,7 @@ TEST(OrientationSolve, SensitivityHoldsWhereLandmarksAreLessSureThanTheyClaim) {
     }
     Frame frame = simulation.frame(world, positions);
     Vector6 sigma;
-    sigma << 3e-5, 3e-5, 1e-2, 1e-2, kAccelerationSigma, kAccelerationSigma;
+    sigma << 3e-5, 3e-5, 1e-2, 1e-2, kPriorAccelerationSigma, kPriorAccelerationSigma;
     frame.prior.motion_information.diagonal() = sigma.cwiseAbs2().cwiseInverse();
     frame.prior.motion = frame.x;
     for (FoundLandmark& landmark : frame.landmarks) {

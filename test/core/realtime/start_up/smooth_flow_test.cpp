@@ -13,16 +13,16 @@
 namespace alidade::test {
 namespace {
 
-constexpr int kWidth = 1920;
-constexpr int kHeight = 1080;
+constexpr int kFlowWidth = 1920;
+constexpr int kFlowHeight = 1080;
 
 // 60 degrees wide, k r^2 = 7 % in the corners.
 Camera<double> wide_camera() {
   Camera<double> camera;
-  camera.width = kWidth;
-  camera.height = kHeight;
-  camera.focal_length = 0.5 * kWidth / std::tan(0.5 * 1.0472);
-  const double corner = 0.5 * std::hypot(kWidth, kHeight) / camera.focal_length;
+  camera.width = kFlowWidth;
+  camera.height = kFlowHeight;
+  camera.focal_length = 0.5 * kFlowWidth / std::tan(0.5 * 1.0472);
+  const double corner = 0.5 * std::hypot(kFlowWidth, kFlowHeight) / camera.focal_length;
   camera.radial_distortion = 0.07 / (corner * corner);
   return camera;
 }
@@ -43,7 +43,7 @@ std::vector<FlowSample> samples_of(const Vector3<double>& turn, int count, doubl
   std::normal_distribution<double> normal(0, 1);
   std::vector<FlowSample> samples;
   for (int i = 0; i < count; ++i) {
-    const Vector2<double> u(kWidth * uniform(*random), kHeight * uniform(*random));
+    const Vector2<double> u(kFlowWidth * uniform(*random), kFlowHeight * uniform(*random));
     const Vector2<double> noise(normal(*random), normal(*random));
     samples.push_back({u, motion(wide_camera(), turn, u) + sigma * noise});
   }
@@ -55,8 +55,8 @@ const Vector3<double> kTurn(0.01, 0.045, 0.01);
 
 double largest_error(const SmoothFlow& flow, const Vector3<double>& turn) {
   double largest = 0;
-  for (double v = 0; v <= kHeight; v += kHeight / 8.0) {
-    for (double u = 0; u <= kWidth; u += kWidth / 8.0) {
+  for (double v = 0; v <= kFlowHeight; v += kFlowHeight / 8.0) {
+    for (double u = 0; u <= kFlowWidth; u += kFlowWidth / 8.0) {
       const Vector2<double> expected = motion(wide_camera(), turn, {u, v});
       largest = std::max(largest, (flow.at({u, v}) - expected).norm());
     }
@@ -67,7 +67,7 @@ double largest_error(const SmoothFlow& flow, const Vector3<double>& turn) {
 TEST(SmoothFlow, HoldsTheMotionOfAWideDistortedLens) {
   std::mt19937_64 random(1);
   const std::vector<FlowSample> samples = samples_of(kTurn, 200, 0, &random);
-  SmoothFlow flow(kWidth, kHeight, 200);
+  SmoothFlow flow(kFlowWidth, kFlowHeight, 200);
   flow.set_uniform({-60, 10});
   const double left_over = flow.fit(samples.data(), 200, 0.05);
   EXPECT_LT(left_over, 0.1);
@@ -77,7 +77,7 @@ TEST(SmoothFlow, HoldsTheMotionOfAWideDistortedLens) {
 TEST(SmoothFlow, GradientIsTheDerivative) {
   std::mt19937_64 random(2);
   const std::vector<FlowSample> samples = samples_of(kTurn, 200, 0, &random);
-  SmoothFlow flow(kWidth, kHeight, 200);
+  SmoothFlow flow(kFlowWidth, kFlowHeight, 200);
   (void)flow.fit(samples.data(), 200, 0.05);
   for (const Vector2<double>& u :
        {Vector2<double>(0, 0), Vector2<double>(1800, 300), Vector2<double>(960, 540)}) {
@@ -98,19 +98,19 @@ TEST(SmoothFlow, LeavesOutWhatMovesByItself) {
   std::vector<FlowSample> samples = samples_of(0.1 * kTurn, 200, 0.1, &random);
   int by_itself = 0;
   for (FlowSample& sample : samples) {
-    const double x = sample.at.x() / kWidth;
-    const double y = sample.at.y() / kHeight;
+    const double x = sample.at.x() / kFlowWidth;
+    const double y = sample.at.y() / kFlowHeight;
     if (!(x > 0.7 && y > 0.4) && !(x < 0.2 && y < 0.6)) continue;
     sample.moved += Vector2<double>(6, 1);
     ++by_itself;
   }
   ASSERT_GT(by_itself, 50);
-  SmoothFlow flow(kWidth, kHeight, 200);
+  SmoothFlow flow(kFlowWidth, kFlowHeight, 200);
   flow.set_uniform({-8, 1});
   EXPECT_LT(flow.fit(samples.data(), 200, 0.05), 0.2);
   // Where it has samples to stand on; elsewhere it is free to bend.
   for (double x = 0.25; x < 0.7; x += 0.1) {
-    const Vector2<double> u(x * kWidth, 0.5 * kHeight);
+    const Vector2<double> u(x * kFlowWidth, 0.5 * kFlowHeight);
     EXPECT_LT((flow.at(u) - motion(wide_camera(), 0.1 * kTurn, u)).norm(), 0.2) << x;
   }
 }
@@ -121,7 +121,7 @@ TEST(SmoothFlow, SaysHowMuchIsLeftOver) {
   double mean = 0;
   for (int run = 0; run < kRuns; ++run) {
     const std::vector<FlowSample> samples = samples_of(0.1 * kTurn, 250, 0.5, &random);
-    SmoothFlow flow(kWidth, kHeight, 250);
+    SmoothFlow flow(kFlowWidth, kFlowHeight, 250);
     mean += flow.fit(samples.data(), 250, 0.05) / kRuns;
   }
   // 240 degrees of freedom of 250, and the median's own error: 8 % of a run.
@@ -131,7 +131,7 @@ TEST(SmoothFlow, SaysHowMuchIsLeftOver) {
 TEST(SmoothFlow, IsTheSameEverywhereOnceItIsUniform) {
   std::mt19937_64 random(7);
   const std::vector<FlowSample> samples = samples_of(kTurn, 200, 0, &random);
-  SmoothFlow flow(kWidth, kHeight, 200);
+  SmoothFlow flow(kFlowWidth, kFlowHeight, 200);
   (void)flow.fit(samples.data(), 200, 0.05);
   flow.set_uniform({3, -4});
   for (const Vector2<double>& u : {Vector2<double>(0, 0), Vector2<double>(1800, 300)}) {
@@ -152,19 +152,21 @@ TEST(SmoothFlow, WeighsASlopeAgainstWhatIsKnownOfItBefore) {
   std::vector<FlowSample> samples;
   for (int i = 0; i < kCount; ++i) {
     const double x = d * (2.0 * i / (kCount - 1) - 1);
-    samples.push_back({Vector2<double>(0.5 * kWidth * (1 + x), 0.5 * kHeight), {kSlope * x, 0}});
+    samples.push_back(
+        {Vector2<double>(0.5 * kFlowWidth * (1 + x), 0.5 * kFlowHeight), {kSlope * x, 0}});
   }
-  SmoothFlow flow(kWidth, kHeight, kCount);
+  SmoothFlow flow(kFlowWidth, kFlowHeight, kCount);
   flow.set_uniform({0, 0});
   (void)flow.fit(samples.data(), kCount, kSigma);
-  const double found = flow.gradient({0.5 * kWidth, 0.5 * kHeight})(0, 0) * 0.5 * kWidth;
+  const double found =
+      flow.gradient({0.5 * kFlowWidth, 0.5 * kFlowHeight})(0, 0) * 0.5 * kFlowWidth;
   EXPECT_NEAR(found, kSlope / 2, 0.1 * kSlope);
 }
 
 TEST(SmoothFlow, StaysAsItIsWithTooFewSamples) {
   std::mt19937_64 random(5);
   const std::vector<FlowSample> samples = samples_of(kTurn, 3, 0, &random);
-  SmoothFlow flow(kWidth, kHeight, 10);
+  SmoothFlow flow(kFlowWidth, kFlowHeight, 10);
   flow.set_uniform({1, 2});
   EXPECT_EQ(flow.fit(samples.data(), 3, 0.05), std::numeric_limits<double>::infinity());
   EXPECT_EQ(flow.at({100, 900}), Vector2<double>(1, 2));
@@ -178,7 +180,7 @@ TEST(SmoothFlow, BendsLittleBeyondItsSamples) {
     sample.at *= 0.2;
     sample.moved = motion(wide_camera(), 0.1 * kTurn, sample.at) + Vector2<double>(0.1, 0);
   }
-  SmoothFlow flow(kWidth, kHeight, 40);
+  SmoothFlow flow(kFlowWidth, kFlowHeight, 40);
   (void)flow.fit(samples.data(), 40, 0.1);
   EXPECT_LT(largest_error(flow, 0.1 * kTurn), 30);
 }

@@ -29,19 +29,19 @@ using Eigen::Vector3d;
 
 constexpr double kPi = 3.14159265358979323846;
 constexpr double kDegree = kPi / 180;
-constexpr double kFrame = 0.04;  // s
-constexpr int kWidth = 480;      // px
-constexpr int kHeight = 270;     // px
+constexpr double kFrame = 0.04;      // s
+constexpr int kTrackedWidth = 480;   // px
+constexpr int kTrackedHeight = 270;  // px
 
 // A far landscape all around, seen with a field of view of so many degrees.
 sim::Config camera(double field_deg, double k_r2_in_corners) {
   sim::Config config;
   config.seed = 11;
-  config.image = {kWidth, kHeight, 25};
+  config.image = {kTrackedWidth, kTrackedHeight, 25};
   config.duration = 10;
   const double slope = std::tan(0.5 * field_deg * kDegree);
-  config.camera.focal_length = 0.5 * kWidth / slope;
-  const double corner = slope * std::hypot(kWidth, kHeight) / kWidth;
+  config.camera.focal_length = 0.5 * kTrackedWidth / slope;
+  const double corner = slope * std::hypot(kTrackedWidth, kTrackedHeight) / kTrackedWidth;
   config.camera.radial_distortion = k_r2_in_corners / (corner * corner);
   config.path.amplitude = 0;
   config.sensor.exposure = 0.002;
@@ -100,7 +100,7 @@ class Truth {
 
 // Errors of all observations but the first of each landmark, after what they have in common is taken out
 // of each track: that is its landmark's, not theirs.
-struct Errors {
+struct TrackErrors {
   int observations = 0;
   int landmarks = 0;      // seen twice or more
   double length = 0;      // mean number of observations of these
@@ -113,7 +113,7 @@ struct Errors {
 };
 
 struct Tracked {
-  Errors errors;
+  TrackErrors errors;
   std::vector<StartUpStatistics> statistics;
 };
 
@@ -123,8 +123,8 @@ struct Sight {
   Matrix2<double> covariance;
 };
 
-Errors judge(const std::map<std::uint32_t, std::vector<Sight>>& tracks, const Truth& truth) {
-  Errors errors;
+TrackErrors judge(const std::map<std::uint32_t, std::vector<Sight>>& tracks, const Truth& truth) {
+  TrackErrors errors;
   double square = 0;
   double normalised = 0;
   double believable = 0;
@@ -203,7 +203,7 @@ Tracked track(const sim::Config& config, const std::function<sim::Angles(double)
     }
   }
   run.errors = judge(tracks, truth);
-  const Errors& e = run.errors;
+  const TrackErrors& e = run.errors;
   std::printf(
       "%6d observations, %5d landmarks of %5.1f; rms %.4f px, normalised %.2f, bias %.4f %.4f, "
       "wrong "
@@ -236,7 +236,7 @@ TEST_P(UnknownLens, TracksStayOnTheirScenePointsWithinTheirCovariances) {
   sim::Config config = camera(lens.field_deg, lens.k_r2_in_corners);
   config.camera.line_delay = lens.line_delay;
   const Tracked run = track(config, swing(lens.field_deg), 24);
-  const Errors& errors = run.errors;
+  const TrackErrors& errors = run.errors;
   for (std::size_t i = 1; i < run.statistics.size(); ++i) {
     EXPECT_EQ(run.statistics[i].status, StartUpStatus::kOk) << i;
   }
@@ -352,15 +352,15 @@ TEST(StartUpTracker, KnowsThePositionsOfPointsOfOctaveOneInPixelsOfTheImage) {
   const AnalyticImage texture(&random, 9);
   constexpr double kStretch = 3;
   StartUpOptions options;
-  options.width = kWidth;
-  options.height = kHeight;
+  options.width = kTrackedWidth;
+  options.height = kTrackedHeight;
   StartUpTracker tracker(options);
   std::map<std::uint32_t, std::vector<std::pair<Vector2d, Matrix2<double>>>> tracks;
   for (int k = 0; k < 8; ++k) {
     const Vector2d shift(0.7 * k, -0.4 * k);
     const Pixels image = make_pixels(
-        kWidth, kHeight, [&](const Vector2d& u) { return texture((u + shift) / kStretch); }, 2,
-        &random);
+        kTrackedWidth, kTrackedHeight,
+        [&](const Vector2d& u) { return texture((u + shift) / kStretch); }, 2, &random);
     static_cast<void>(tracker.process(image.view));
     for (int i = 0; i < tracker.observation_count(); ++i) {
       const TrackObservation& seen = tracker.observations()[i];
