@@ -51,7 +51,7 @@ struct LandmarkSearchOptions {
 struct OeObservation {
   int slot = 0;          // of the map
   std::uint32_t id = 0;  // of the landmark
-  int octave = 0;
+  int octave = 0;        // in which it was found
   Vector2<double> u = Vector2<double>::Zero();           // px of the image, where it was found
   Matrix2<double> covariance = Matrix2<double>::Zero();  // px^2, of u
   Vector2<double> residual = Vector2<double>::Zero();  // px, found minus predicted by the solution
@@ -64,6 +64,8 @@ struct SearchedFrame {
   const LandmarkMap& map;
   const Pyramid& pyramid;
   const Octaves& octaves;
+  // Where the frame's lens is another than the map's, its columns of sensitivities; null: the same.
+  const LensColumns* lens = nullptr;
 };
 
 class LandmarkSearch {
@@ -74,6 +76,9 @@ class LandmarkSearch {
   LandmarkSearch& operator=(const LandmarkSearch&) = delete;
 
   void reset(const Calibration& calibration);
+  void change_lens(const Calibration& calibration) {
+    visible_.change_lens(calibration, options_.cone_margin);
+  }
   // Nothing is found; to begin a frame with, and when the map is cleared.
   void clear();
 
@@ -95,8 +100,8 @@ class LandmarkSearch {
   Fine align_fine(const SearchedFrame& frame, const FrameMotion<double>& motion);
 
   // Completes observations(): residuals after this correction of `motion` (rad, rad/s, rad/s^2), inliers as
-  // the solution marked them in found().
-  void conclude(const Vector6& correction);
+  // the solution marked them in found(). zoom: correction of the lens (1, 1/s), where the frame has its own.
+  void conclude(const Vector6& correction, const Vector2<double>& zoom = Vector2<double>::Zero());
 
   // The steps of the two stages, in their order, for those who look at each by itself.
   void find_visible(const SearchedFrame& frame, const ViewProjection& view);
@@ -132,7 +137,8 @@ class LandmarkSearch {
   };
 
   void ask_for(const SearchedFrame& frame, const VisibleLandmark& wanted) const;
-  const ReferencePatch* reference(const SearchedFrame& frame, int slot, const SeenDirection& seen);
+  const ReferencePatch* reference(const SearchedFrame& frame, int slot, int octave,
+                                  const SeenDirection& seen);
 
   LandmarkSearchOptions options_;
   VisibleLandmarks visible_;

@@ -1,0 +1,209 @@
+#pragma once
+// The virtual camera behind a lens that zooms, frame by frame: images, telemetry with the errors that it states, and what a zoom
+// reading and a zoom curve tell of the lens. The curve is the lens' own but for its repeatability.
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <functional>
+#include <memory>
+#include <optional>
+#include <random>
+#include <utility>
+#include <vector>
+
+#include "core/realtime/oe_mode/frame_lens.h"
+#include "core/realtime/telemetry/telemetry_interpolation.h"
+#include "test/simulator/renderer.h"
+#include "test/support/frame_errors.h"
+
+namespace alidade::test {
+
+// Turns about (0, 0) so fast that it crosses up to `fields` fields of view a second, those of the lens at that time.
+class ZoomedPath : public simulator::Path {
+ public:
+  ZoomedPath(const simulator::Config& config, double fields, double period_s) {
+    const simulator::Zoom zoom(config);
+    const auto steps = static_cast<std::size_t>(config.duration / kStep_s) + 2;
+    angles_.resize(steps);
+    const double phase = 0.3 * static_cast<double>(config.seed);
+    for (std::size_t i = 1; i < steps; ++i) {
+      const double t = (static_cast<double>(i) - 0.5) * kStep_s;
+      const double field = config.image.width / zoom.nominal_lens(zoom.reading(t)).focal_length;
+      const double turn = simulator::kTwoPi * t / period_s + phase;
+      angles_[i] = {angles_[i - 1].pan + kStep_s * fields * field * std::sin(turn),
+                    angles_[i - 1].tilt + kStep_s * 0.3 * fields * field * std::cos(1.7 * turn)};
+    }
+  }
+
+  // A cubic through four of the table.
+  [[nodiscard]] simulator::Angles at(double time_s) const override {
+    const double position = std::clamp(time_s / kStep_s, 1.0, static_cast<double>(angles_.size()) - 2.001);
+    const auto i = static_cast<std::size_t>(position);
+    const double t = time_s / kStep_s - static_cast<double>(i);
+    const auto blend = [t](double a, double b, double c, double d) {
+      const double slope_b = (c - a) / 2;
+      const double slope_c = (d - b) / 2;
+      const double h = 1 - t;
+      return b * (1 + 2 * t) * h * h + slope_b * t * h * h + c * t * t * (3 - 2 * t) -
+             slope_c * t * t * h;
+    };
+    const simulator::Angles* p = &angles_[i - 1];
+    return {blend(p[0].pan, p[1].pan, p[2].pan, p[3].pan),
+            blend(p[0].tilt, p[1].tilt, p[2].tilt, p[3].tilt)};
+  }
+  [[nodiscard]] double period_s() const override { return 0; }
+
+ private:
+  static constexpr double kStep_s = 5e-3;
+  std::vector<simulator::Angles> angles_;
+};
+
+class ZoomingCamera {
+ public:
+  // config: with a zoom.
+  ZoomingCamera(const simulator::Config& config, std::unique_ptr<simulator::Path> path)
+      : config_(config),
+        path_(std::move(path)),
+        renderer_(config, *path_),
+        random_(config.seed) {}
+
+  [[nodiscard]] const simulator::CameraModel& camera() const { return renderer_.camera(); }
+  [[nodiscard]] double time_s(int k) const { return k / config_.image.rate_hz; }
+  [[nodiscard]] int frames() const {
+    return static_cast<int>(config_.duration * config_.image.rate_hz);
+  }
+  [[nodiscard]] double middle_s(int k) const {
+    return time_s(k) + config_.camera.line_delay * config_.image.height / 2;
+  }
+  [[nodiscard]] std::vector<std::uint8_t> image(int k) const {
+    return renderer_.render(time_s(k), k);
+  }
+  [[nodiscard]] ImageView view(const std::vector<std::uint8_t>& image) const {
+    return {image.data(), config_.image.width, config_.image.height, config_.image.width};
+  }
+
+  [[nodiscard]] InterpolatedPanTilt telemetry(int k, double angle_sigma, double rate_sigma) {
+    constexpr double h = 1e-3;  // s
+    const double t = middle_s(k);
+    const simulator::Angles before = path_->at(t - h);
+    const simulator::Angles now = path_->at(t);
+    const simulator::Angles after = path_->at(t + h);
+    const auto noise = [&](double sigma) { return sigma * normal_(random_); };
+    InterpolatedPanTilt out;
+    out.time_s = time_s(k);
+    out.angle = {now.pan + noise(angle_sigma), now.tilt + noise(angle_sigma)};
+    out.rate = {(after.pan - before.pan) / (2 * h) + noise(rate_sigma),
+                (after.tilt - before.tilt) / (2 * h) + noise(rate_sigma)};
+    out.covariance.diagonal() << angle_sigma * angle_sigma, angle_sigma * angle_sigma,
+        rate_sigma * rate_sigma, rate_sigma * rate_sigma;
+    const Vector2<double> acceleration((after.pan - 2 * now.pan + before.pan) / (h * h),
+                                       (after.tilt - 2 * now.tilt + before.tilt) / (h * h));
+    out.acceleration_square = acceleration.cwiseAbs2();
+    out.samples = 2;
+    return out;
+  }
+
+  // Of what is told at that time; sigma: of log f.
+  [[nodiscard]] Calibration curve_at(double told_s, double sigma) const {
+    return curve_of(camera().zoom()->reading(told_s), sigma);
+  }
+  [[nodiscard]] Calibration curve_of(double reading, double sigma) const {
+    const simulator::Lens lens = camera().zoom()->nominal_lens(reading);
+    Calibration out;
+    out.camera = {lens.focal_length,
+                  lens.aspect,
+                  lens.radial_distortion,
+                  config_.image.width,
+                  config_.image.height,
+                  lens.centre.x() - config_.image.width / 2.0,
+                  lens.centre.y() - config_.image.height / 2.0};
+    out.line_delay = config_.camera.line_delay;
+    out.zoom = reading;
+    const auto set = [&out](Parameter p, double s) { out.covariance(index(p), index(p)) = s * s; };
+    set(Parameter::kFocalLength, sigma * lens.focal_length);
+    // 0.1 px in the corners.
+    const double corner = std::hypot(config_.image.width, config_.image.height) / 2;
+    set(Parameter::kRadialDistortion,
+        0.1 / corner * std::pow(lens.focal_length / corner, 2));
+    set(Parameter::kCentreU, 0.2);
+    set(Parameter::kCentreV, 0.2);
+    return out;
+  }
+  // As it is known without the image. late_s: by which the reading is behind.
+  [[nodiscard]] FrameLens lens(int k, double sigma, double late_s = 0) const {
+    const double t = middle_s(k) - late_s;
+    constexpr double h = 2e-2;  // s
+    FrameLens out;
+    out.calibration = curve_at(t, sigma);
+    out.rate = std::log(curve_at(t + h, sigma).camera.focal_length /
+                        curve_at(t - h, sigma).camera.focal_length) /
+               (2 * h);
+    out.rate_sigma = 0.1;
+    const simulator::Zoom& zoom = *camera().zoom();
+    const double before_s = t - 1.5 / config_.image.rate_hz;
+    out.moves = std::abs(zoom.reading(t + h) - zoom.reading(before_s)) > 0;
+    return out;
+  }
+
+  // Log of the frame's focal length over the true one, at row 0.
+  [[nodiscard]] double log_error(int k, const FrameOrientation& frame) const {
+    return std::log(frame.calibration.camera.focal_length / camera().lens_at(time_s(k)).focal_length);
+  }
+
+ private:
+  simulator::Config config_;
+  std::unique_ptr<simulator::Path> path_;
+  simulator::Renderer renderer_;
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+};
+
+// Of a frame's directions, over the image.
+struct FrameErrors {
+  double rms_px = 0;     // what is left when the directions are turned to fit at the best
+  double sigmas = 0;     // the largest of all, by its covariance, nothing taken out
+  double log_sigmas = 0;  // of the focal length
+};
+
+inline FrameErrors errors_of(const ZoomingCamera& camera, int k, const FrameOrientation& frame) {
+  constexpr int kColumns = 9;
+  constexpr int kRows = 7;
+  const Vector2<double> size(frame.calibration.camera.width, frame.calibration.camera.height);
+  Matrix3<double> N = Matrix3<double>::Zero();
+  Vector3<double> b = Vector3<double>::Zero();
+  std::vector<std::pair<Matrix<double, 2, 3>, Vector2<double>>> points;
+  FrameErrors out;
+  for (int row = 0; row < kRows; ++row) {
+    for (int column = 0; column < kColumns; ++column) {
+      const Vector2<double> u((0.02 + 0.96 * column / (kColumns - 1)) * size.x(),
+                              (0.02 + 0.96 * row / (kRows - 1)) * size.y());
+      const Vector2<double> e = pixel_error(camera.camera(), camera.time_s(k), frame, u);
+      Matrix<double, 2, 3> J;  // of a turn: along u, along v, about the axis
+      const Vector2<double> from_middle = (u - size / 2) / size.x();
+      J << 1, 0, -from_middle.y(), 0, 1, from_middle.x();
+      N += J.transpose() * J;
+      b += J.transpose() * e;
+      points.emplace_back(J, e);
+      Vector3<double> d;
+      Vector2<double> back;
+      Matrix2<double> covariance;
+      EXPECT_EQ(frame.direction(u, &d), ProjectionStatus::kOk);
+      EXPECT_EQ(frame.pixel(d, &back, &covariance), ProjectionStatus::kOk);
+      out.sigmas = std::max(out.sigmas, std::sqrt(e.dot(covariance.inverse() * e)));
+    }
+  }
+  const Vector3<double> turn = N.inverse() * b;
+  for (const auto& [J, e] : points) {
+    out.rms_px += (e - J * turn).squaredNorm() / static_cast<double>(points.size());
+  }
+  out.rms_px = std::sqrt(out.rms_px);
+  const int of_f = index(Parameter::kFocalLength);
+  out.log_sigmas = std::abs(camera.log_error(k, frame)) * frame.calibration.camera.focal_length /
+                   std::sqrt(frame.calibration.covariance(of_f, of_f));
+  return out;
+}
+
+}  // namespace alidade::test
