@@ -1,6 +1,7 @@
 #pragma once
 // The virtual camera behind a lens that zooms, frame by frame: images, telemetry with the errors that it states, and what a zoom
-// reading and a zoom curve tell of the lens. The curve is the lens' own but for its repeatability.
+// reading and a zoom curve tell of the lens. The curve is the lens' own but for its repeatability, and for errors of distortion and
+// centre that are the same at all readings, drawn from what the curve says of them.
 
 #include <gtest/gtest.h>
 
@@ -68,7 +69,9 @@ class ZoomingCamera {
       : config_(config),
         path_(std::move(path)),
         renderer_(config, *path_),
-        random_(config.seed) {}
+        random_(config.seed),
+        corner_error_px_(kCorner_px * normal_(random_)),
+        centre_error_px_(kCentre_px * normal_(random_), kCentre_px * normal_(random_)) {}
 
   [[nodiscard]] const simulator::CameraModel& camera() const { return renderer_.camera(); }
   [[nodiscard]] double time_s(int k) const { return k / config_.image.rate_hz; }
@@ -124,17 +127,18 @@ class ZoomingCamera {
     out.zoom = reading;
     const auto set = [&out](Parameter p, double s) { out.covariance(index(p), index(p)) = s * s; };
     set(Parameter::kFocalLength, sigma * lens.focal_length);
-    // 0.1 px in the corners.
     const double corner = std::hypot(config_.image.width, config_.image.height) / 2;
-    set(Parameter::kRadialDistortion,
-        0.1 / corner * std::pow(lens.focal_length / corner, 2));
-    set(Parameter::kCentreU, 0.2);
-    set(Parameter::kCentreV, 0.2);
+    const double k_of_px = std::pow(lens.focal_length / corner, 2) / corner;
+    set(Parameter::kRadialDistortion, kCorner_px * k_of_px);
+    set(Parameter::kCentreU, kCentre_px);
+    set(Parameter::kCentreV, kCentre_px);
+    out.camera.radial_distortion += corner_error_px_ * k_of_px;
+    out.camera.set_centre_offset(out.camera.centre_offset() + centre_error_px_);
     return out;
   }
-  // As it is known without the image. late_s: by which the reading is behind.
-  [[nodiscard]] FrameLens lens(int k, double sigma, double late_s = 0) const {
-    const double t = middle_s(k) - late_s;
+  // As it is known without the image, for a reading of that frame's middle row, or of another time.
+  [[nodiscard]] FrameLens lens(int k, double sigma) const { return lens_at(middle_s(k), sigma); }
+  [[nodiscard]] FrameLens lens_at(double t, double sigma) const {
     constexpr double h = 2e-2;  // s
     FrameLens out;
     out.calibration = curve_at(t, sigma);
@@ -157,8 +161,12 @@ class ZoomingCamera {
   simulator::Config config_;
   std::unique_ptr<simulator::Path> path_;
   simulator::Renderer renderer_;
+  static constexpr double kCorner_px = 0.1;
+  static constexpr double kCentre_px = 0.2;
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
+  double corner_error_px_;  // by the distortion
+  Vector2<double> centre_error_px_;
 };
 
 // Of a frame's directions, over the image.
