@@ -110,6 +110,10 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   }
   telemetry_lost_ = false;
   if (sample.zoom && std::isfinite(*sample.zoom)) {
+    if (zoom_ != sample.zoom) {
+      Calibration there;
+      zoom_on_curve_ = options_.zoom_curve.at(*sample.zoom, &there);
+    }
     zoom_ = sample.zoom;
     if (!zoom_at_adoption_) zoom_at_adoption_ = sample.zoom;
   }
@@ -148,13 +152,32 @@ void OrientationStep::settle_pending_frames() {
 
 void OrientationStep::telemetry_lost() { telemetry_lost_ = true; }
 
+// Of the same curve, by what all its zooms share, and at a zoom to which OE mode has followed the lens.
+bool OrientationStep::keeps_map(const PublishedCalibration& published) const {
+  if (!oe_ || !options_.calibrated || !published.calibrated || !oe_->lens_has_moved()) return false;
+  const Calibration& now = options_.calibration;
+  const Calibration& next = published.calibration;
+  Calibration by_curve;
+  return oe_->statistics().status == OeStatus::kOk && next.zoom &&
+         published.zoom_curve.at(*next.zoom, &by_curve) &&
+         by_curve.camera.focal_length == next.camera.focal_length &&
+         now.line_delay == next.line_delay && now.clock_offset == next.clock_offset &&
+         now.mechanics.pan_axis == next.mechanics.pan_axis &&
+         now.mechanics.tilt_axis == next.mechanics.tilt_axis &&
+         now.mechanics.pan_scale == next.mechanics.pan_scale &&
+         now.mechanics.tilt_scale == next.mechanics.tilt_scale;
+}
+
 void OrientationStep::adopt(const PublishedCalibration& published) {
+  const bool keep = keeps_map(published);
   options_.calibration = published.calibration;
   options_.calibrated = published.calibrated;
   zoom_at_adoption_ = zoom_;
   minimum_delay_sigma_s_ = 0;
   options_.zoom_curve = published.zoom_curve;
-  if (oe_) oe_->reset(published.calibration, published.map, focal_length());
+  Calibration there;
+  zoom_on_curve_ = zoom_ && options_.zoom_curve.at(*zoom_, &there);
+  if (oe_ && !keep) oe_->reset(published.calibration, published.map, focal_length());
 }
 
 FocalLength OrientationStep::focal_length() const {
@@ -245,7 +268,19 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   record.clock_locked = clock.state == ClockState::kLocked;
   record.status = status_of_telemetry(query, telemetry_lost_, record.clock_locked);
   tracks_.telemetry_too_old = record.status == RecordStatus::kTelemetryTooOld;
-  if (!zoom_fits() || zoom_moved(telemetry_time_s)) {
+  const bool elsewhere = !zoom_fits() || zoom_moved(telemetry_time_s);
+  if (elsewhere || (oe_ && oe_->lens_has_moved())) {
+    const double readout_s = std::abs(calibration.line_delay) * calibration.camera.height;
+    FrameLens lens;
+    if (follows_lens() && zoom_lookup_.lens(options_.zoom_curve, telemetry_time_s, readout_s,
+                                            options_.zoom_tolerance, &lens)) {
+      record.calibrated = true;
+      record.camera = pack(lens.calibration);
+      orient(has_result(query) ? &measured : nullptr, image, &lens, &record);
+      return record;
+    }
+  }
+  if (elsewhere) {
     // The map is another zoom's.
     image_ = finds_landmarks() ? ImageView{} : image_;
     // Neither the lens nor the axes of another zoom are this one's.
@@ -253,7 +288,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
       record.status = RecordStatus::kOtherZoom;
     return record;
   }
-  orient(has_result(query) ? &measured : nullptr, image, &record);
+  orient(has_result(query) ? &measured : nullptr, image, nullptr, &record);
   return record;
 }
 
@@ -274,10 +309,10 @@ bool OrientationStep::orient_between(const InterpolatedPanTilt& measured, double
 }
 
 void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageView& image,
-                             OrientationRecord* record) {
+                             const FrameLens* lens, OrientationRecord* record) {
   FrameOrientation frame;
   if (finds_landmarks()) {
-    const OeStatus status = oe_->process(image, *record->time_s, measured, &frame);
+    const OeStatus status = oe_->process(image, *record->time_s, measured, lens, &frame);
     // That the frame's time is not yet known well, sigma says too.
     if (measured != nullptr && status != OeStatus::kOk)
       record->status = status_of_landmarks(status);

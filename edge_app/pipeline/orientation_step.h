@@ -17,7 +17,8 @@
 // An image that is sent again while the camera turns is of another time than its frame: "picture repeated", no orientation
 // (repeated_images.h).
 // A lens that zooms does not come back exactly: with a zoom curve OE mode learns the focal length, too, and the record has it.
-// Where the zoom is another than the calibration's, or moves, its zoom curve gives PT mode a lens (zoom_lookup.h).
+// Where the zoom is another than the calibration's, or moves, its zoom curve gives OE mode, or PT mode, a lens (zoom_lookup.h): OE
+// mode's map stays, also when the calibration of another zoom of the same curve is adopted.
 // While there is no calibration for the camera, or none for the zoom that the pan/tilt source reports, points
 // are followed instead (start_up_tracker.h), for the calibration thread to make one of.
 // After a reconnection the stream's clock begins anew; telemetry from before it is forgotten. The least
@@ -108,7 +109,9 @@ class OrientationStep {
   // points through it.
   void maintain();
   // In OE mode, with the calibration and the zoom of this moment.
-  [[nodiscard]] bool finds_landmarks() const { return oe_ && options_.calibrated && zoom_fits(); }
+  [[nodiscard]] bool finds_landmarks() const {
+    return oe_ && options_.calibrated && (zoom_fits() || follows_lens());
+  }
   // In OE mode, or following points.
   [[nodiscard]] bool looks_at_images() const { return finds_landmarks() || start_up_; }
   // What the frame last added, and maintained, has for the calibration thread.
@@ -132,11 +135,18 @@ class OrientationStep {
   [[nodiscard]] bool zoom_fits() const;
   // With a zoom curve: the reading fits, but did not when a frame of this telemetry time was taken, or is not known.
   [[nodiscard]] bool zoom_moved(double telemetry_time_s) const;
+  // OE mode has a map that it has followed to this zoom, or can follow there.
+  [[nodiscard]] bool follows_lens() const {
+    return oe_ && options_.calibrated && zoom_on_curve_ && oe_->map().size() > 0;
+  }
+  // The map is of use with what is published, and worth more than what comes with it.
+  [[nodiscard]] bool keeps_map(const PublishedCalibration& published) const;
   [[nodiscard]] bool is_stalled_poll(const PanTiltSample& sample);
   // Frames that extrapolated telemetry answered, and that telemetry encloses by this sample.
   void settle_pending_frames();
   // Completes a record that has its time and telemetry's status; measured: null if there is none.
-  void orient(const InterpolatedPanTilt* measured, const ImageView& image,
+  // lens: of the frame, where that may be another than the calibration's; else null.
+  void orient(const InterpolatedPanTilt* measured, const ImageView& image, const FrameLens* lens,
               OrientationRecord* record);
 
   OrientationStepOptions options_;
@@ -150,6 +160,7 @@ class OrientationStep {
                                     OrientationRecord* record);
 
   std::optional<double> zoom_;  // as last reported
+  bool zoom_on_curve_ = false;  // zoom_ is one of the zoom curve's
   ZoomLookup zoom_lookup_;
   std::optional<double> zoom_at_adoption_;  // that a calibration without zoom is for
   double minimum_delay_sigma_s_ = 0;

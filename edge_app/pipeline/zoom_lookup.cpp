@@ -64,4 +64,33 @@ bool ZoomLookup::calibration(const ZoomCurve& curve, double time_s, double reado
   return true;
 }
 
+bool ZoomLookup::lens(const ZoomCurve& curve, double time_s, double readout_s, double tolerance,
+                      FrameLens* lens) const {
+  if (!calibration(curve, time_s, readout_s, &lens->calibration)) return false;
+  const std::size_t after = newer_of(time_s);
+  const Reading& newer = reading(after);
+  const Reading& older = reading(count_ > 1 ? after + 1 : after);
+  const Reading& next = reading(after > 0 ? after - 1 : after);
+  const double low = std::min({newer.zoom, older.zoom, next.zoom});
+  const double high = std::max({newer.zoom, older.zoom, next.zoom});
+  lens->moves = high - low > tolerance;
+  lens->rate = 0;
+  lens->rate_sigma = 0;
+  if (!lens->moves) return true;
+  // A motor's speeds, where the curve does not reach.
+  constexpr double kAnyRate = 1;  // 1/s
+  lens->rate_sigma = kAnyRate;
+  Calibration from;
+  Calibration to;
+  if (newer.zoom == older.zoom || !curve.at(older.zoom, &from) || !curve.at(newer.zoom, &to))
+    return true;
+  const double change = std::log(to.camera.focal_length / from.camera.focal_length);
+  lens->rate = change / (newer.time_s - older.time_s);
+  // As even as calibration() has it, between two readings; beyond them anything up to a stop.
+  const bool beyond = time_s > newer.time_s || time_s < older.time_s;
+  constexpr double kUneven = 0.3;
+  lens->rate_sigma = (beyond ? 1 : kUneven) * std::abs(lens->rate);
+  return true;
+}
+
 }  // namespace alidade

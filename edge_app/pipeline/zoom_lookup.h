@@ -7,6 +7,7 @@
 #include <cstddef>
 
 #include "core/model/zoom_curve.h"
+#include "core/realtime/oe_mode/frame_lens.h"
 
 namespace alidade {
 
@@ -22,6 +23,9 @@ class ZoomLookup {
   // reading, or the curve ends before it.
   [[nodiscard]] bool calibration(const ZoomCurve& curve, double time_s, double readout_s,
                                  Calibration* calibration) const;
+  // As OE mode needs it, likewise. tolerance: readings so far apart are of a lens that stands, device units.
+  [[nodiscard]] bool lens(const ZoomCurve& curve, double time_s, double readout_s, double tolerance,
+                          FrameLens* lens) const;
 
  private:
   struct Reading {

@@ -138,7 +138,8 @@ class ZoomingCamera {
   }
   // As it is known without the image, for a reading of that frame's middle row, or of another time.
   [[nodiscard]] FrameLens lens(int k, double sigma) const { return lens_at(middle_s(k), sigma); }
-  [[nodiscard]] FrameLens lens_at(double t, double sigma) const {
+  [[nodiscard]] FrameLens lens_at(double told_s, double sigma) const {
+    const double t = std::max(0.0, told_s);
     constexpr double h = 2e-2;  // s
     FrameLens out;
     out.calibration = curve_at(t, sigma);
@@ -147,8 +148,9 @@ class ZoomingCamera {
                (2 * h);
     out.rate_sigma = 0.1;
     const simulator::Zoom& zoom = *camera().zoom();
-    const double before_s = t - 1.5 / config_.image.rate_hz;
-    out.moves = std::abs(zoom.reading(t + h) - zoom.reading(before_s)) > 0;
+    const double before_s = std::max(0.0, t - 1.5 / config_.image.rate_hz);
+    out.moves = zoom.reading(t + h) != zoom.reading(before_s);
+    if (!out.moves) out.rate = 0;
     return out;
   }
 

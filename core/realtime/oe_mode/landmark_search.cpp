@@ -21,7 +21,7 @@ bool LandmarkSearchOptions::validate(const char** error) const {
   if (!(coarse_reach_px > 0)) problem = "coarse_reach_px must be positive";
   if (!(search_sigmas > 0)) problem = "search_sigmas must be positive";
   if (!(cone_margin >= 1)) problem = "cone_margin must be at least 1";
-  if (!(fine_warp_tolerance > 0) || !(coarse_warp_tolerance > 0)) {
+  if (!(fine_warp_tolerance > 0) || !(coarse_warp_tolerance > 0) || !(zooming_warp_tolerance > 0)) {
     problem = "warp tolerances must be positive";
   }
   if (coarse_patches < 1 || coarse_patches > kMaxCoarsePatches) {
@@ -116,8 +116,9 @@ const ReferencePatch* LandmarkSearch::reference(const SearchedFrame& frame, int 
       std::ldexp(1.0, -octave) * seen.J_d * tangent_basis(landmark.d);
   const Matrix2<double> A = landmark.J_pixel_tangent * J_octave.inverse();
   Prepared& prepared = prepared_[static_cast<std::size_t>(slot)];
-  const float tolerance = frame.octaves.is_coarse(octave) ? options_.coarse_warp_tolerance
-                                                                   : options_.fine_warp_tolerance;
+  const float at_rest = frame.octaves.is_coarse(octave) ? options_.coarse_warp_tolerance
+                                                         : options_.fine_warp_tolerance;
+  const float tolerance = frame.zooms ? options_.zooming_warp_tolerance : at_rest;
   const Matrix2<float> wanted = A.cast<float>();
   if (prepared.id != landmark.id || !((prepared.A - wanted).cwiseAbs().maxCoeff() <= tolerance)) {
     // Seen as it was, it needs no resampling.

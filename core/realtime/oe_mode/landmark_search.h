@@ -38,6 +38,8 @@ struct LandmarkSearchOptions {
   // As the reference was seen; a patch is prepared again when an element of its warp changed by this, > 0.
   float fine_warp_tolerance = 0.02F;
   float coarse_warp_tolerance = 0.04F;
+  // While the lens zooms every view is another one.
+  float zooming_warp_tolerance = 0.05F;
   double cone_margin = 1.3;  // see VisibleLandmarks::reset(), >= 1
   double search_sigmas = 3;  // of the prediction, that the first search among coarse octaves covers
   double coarse_reach_px = 0.75;  // px of the coarsest octave that alignment finds without a search
@@ -66,6 +68,7 @@ struct SearchedFrame {
   const Octaves& octaves;
   // Where the frame's lens is another than the map's, its columns of sensitivities; null: the same.
   const LensColumns* lens = nullptr;
+  bool zooms = false;  // the lens moves
 };
 
 class LandmarkSearch {

@@ -10,9 +10,6 @@
 namespace alidade {
 namespace {
 
-// Frames whose lens shows no rate, and no reading that it moves, before it is taken to stand.
-constexpr int kAtRest = 3;
-
 // d (tangent_basis(landmark.d) coordinates) / d phi
 Vector2<double> by_lens(const Landmark& landmark, const LensScale& lens) {
   return landmark.sensitivity.cast<double>() * lens.direction;
@@ -282,7 +279,7 @@ OeStatus OeMode::answer_without_landmarks(const PredictedMotion& predicted,
   frame_.shared_covariance = predicted.offset_covariance;
   frame_.sensitivity = predicted.sensitivity;
   // Where no landmark was to be expected, telemetry may place new ones.
-  const bool new_view = has_telemetry && (!columns_ || frames_at_rest_ >= kAtRest) &&
+  const bool new_view = has_telemetry && (!columns_ || at_rest()) &&
                         statistics_.chosen < options_.look.few &&
                         static_cast<int>(search_.coarse().size()) < options_.look.few_coarse;
   frame_.use = new_view ? MapUse::kNewView : MapUse::kLost;
@@ -437,7 +434,7 @@ bool OeMode::take_lens(const FrameLens* lens) {
     frames_at_rest_ = 0;
   }
   if (reading_ && reading_->moves) frames_at_rest_ = 0;
-  predict_lens(frames_at_rest_ < kAtRest);
+  predict_lens(!at_rest());
   if (reading_) {
     answers_calibration_ = reading_->calibration;
     // The movement that is carried on ends unseen; a reading that tells more is taken instead.
@@ -521,7 +518,7 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
       const Solution second = look_with_own_lens(carried, predicted);
       if (holds(second)) return second;
     }
-    if (frames_at_rest_ >= kAtRest) {
+    if (at_rest()) {
       predict_lens(true);
       const Solution moved = look_with_own_lens(carried, predicted);
       if (holds(moved)) {
@@ -567,7 +564,7 @@ void OeMode::learn_own_lens(const Solution& solution, double zoom_rate) {
                          zoom.covariance,
                          zoom.sensitivity};
   frames_lost_ = 0;
-  const bool moves = frames_at_rest_ < kAtRest;
+  const bool moves = !at_rest();
   track_.learn(frame_.time_s, moves, predicted_lens_, state);
   constexpr double kSigmas = 4;
   const bool rests = (!reading_ || !reading_->moves) &&
@@ -700,7 +697,7 @@ void OeMode::begin_map() {
 }
 
 void OeMode::straighten_map() {
-  if (columns_ && frames_at_rest_ < kAtRest) {
+  if (columns_ && !at_rest()) {
     shear_.begin_curve();
     shear_.inherit(share_of_new_, frame_.covariance);
     return;

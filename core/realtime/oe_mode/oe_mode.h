@@ -150,7 +150,8 @@ class OeMode {
   };
 
   [[nodiscard]] SearchedFrame searched() const {
-    return {calibration_, map_, pyramid_, octaves_, columns_ ? &*columns_ : nullptr};
+    return {calibration_, map_, pyramid_, octaves_, columns_ ? &*columns_ : nullptr,
+            columns_ && !at_rest()};
   }
   void begin_frame(const ImageView& image, double frame_time_s,
                    const InterpolatedPanTilt* telemetry);
@@ -175,6 +176,8 @@ class OeMode {
   void begin_lens();
   // The lens of this frame. False: nothing to begin a map with, or to look for one.
   [[nodiscard]] bool take_lens(const FrameLens* lens);
+  // Without a rate for some frames, or a reading that it moves: a lens that moved stands.
+  [[nodiscard]] bool at_rest() const { return frames_at_rest_ >= kAtRest; }
   void predict_lens(bool moves);
   void predict_lens_by_reading();
   void set_camera(const Camera<double>& camera);
@@ -198,6 +201,8 @@ class OeMode {
   void straighten_map();
   void clear_landmarks();
   void forget_map();
+
+  static constexpr int kAtRest = 3;  // frames
 
   OeOptions options_;
   Calibration given_;  // by reset()

@@ -28,7 +28,6 @@ struct SeenDirection {
 
 class ViewProjection {
  public:
-  // A motion with a zoom_rate is one about the middle row.
   ViewProjection(const Calibration& calibration, const FrameMotion<double>& motion)
       : camera_(calibration.camera),
         line_delay_(calibration.line_delay),
@@ -45,6 +44,9 @@ class ViewProjection {
     R_[0] = R_at(middle_row_, &J_xi_angle_);
     R_[1] = 0.5 * (last - first);
     R_[2] = 0.5 * (last + first) - R_[0];
+    if (motion.zoom_rate == 0) return;
+    camera_ = camera_at_row(calibration.camera, motion, line_delay_, middle_row_);
+    to_middle_row_ = camera_.focal_length / calibration.camera.focal_length;
   }
 
   // False where the camera has no pixel for it or the row does not settle.
@@ -95,10 +97,17 @@ class ViewProjection {
     out->J_d = J_u * (R_[0] + s * (R_[1] + s * R_[2]));
     if (J_parameters == nullptr) return true;
     J_parameters->setZero();
+    const Vector2<double> by_zoom = alidade::by_zoom(camera_, J_u_camera);
+    J_u_camera.col(index(Parameter::kFocalLength)) *= to_middle_row_;
+    J_u_camera.col(index(Parameter::kRadialDistortion)) *= to_middle_row_ * to_middle_row_;
     J_parameters->leftCols<kCameraParameterCount>() = J_u_fixed * J_u_camera;
     const PanTilt<double> rate = rate_at_row(motion_, line_delay_, out->u.y());
     J_parameters->col(index(Parameter::kLineDelay)) =
         (out->u.y() - motion_.reference_row) * (out->J_angle * rate.vector());
+    if (zoom_to_last_row_ != 0) {
+      J_parameters->col(index(Parameter::kLineDelay)) +=
+          (out->u.y() - motion_.reference_row) * motion_.zoom_rate * (J_u_fixed * by_zoom);
+    }
     J_parameters->middleCols<4>(index(Parameter::kPanAxis0)) = J_u * skew(d_c) * J_xi_axes_;
     return true;
   }
@@ -150,7 +159,8 @@ class ViewProjection {
     return false;
   }
 
-  Camera<double> camera_;
+  Camera<double> camera_;      // at the middle row
+  double to_middle_row_ = 1;  // its focal length over that at the reference row
   double line_delay_;
   FrameMotion<double> motion_;
   double middle_row_;

@@ -1,34 +1,41 @@
-// OE mode behind a lens that zooms: at rest after a movement, and while it moves.
+// OE mode behind a lens that zooms: at rest, while it moves, and at rest again.
 
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <cstdlib>
+#include <map>
 #include <memory>
+#include <set>
+#include <string>
 #include <vector>
 
 #include "core/model/trigonometry.h"
 #include "core/realtime/oe_mode/oe_mode.h"
+#include "test/support/allocation_guard.h"
 #include "test/support/zooming_camera.h"
 
 namespace alidade::test {
 namespace {
 
 constexpr double kRepeatability = 2e-3;
+constexpr double kWide = 1000;
+constexpr double kTele = 4000;
+constexpr double kRest_s = 1.2;
+constexpr double kSpeed = 0.6;         // 1/s
+constexpr double kAcceleration = 2.5;  // 1/s^2
+constexpr double kRateHz = 25;
 
-simulator::Config zooming(double wide, double tele, std::uint64_t seed) {
+// Two octaves while it turns by up to 0.4 fields of view a second, the picture upside down.
+simulator::Config two_octaves() {
   simulator::Config config;
-  config.seed = seed;
-  config.image = {480, 270, 25};
+  config.image = {480, 270, kRateHz};
   config.camera.line_delay = -40e-6;
-  config.duration = 5;
-  for (const auto& [name, azimuth, elevation, width] :
-       {std::tuple{"life_by_Aitzol_Berasategi.jpg", -0.5, 0.0, 7.0},
-        std::tuple{"picosdeeuropa_by_Aitzol_Berasategi.jpg", 0.0, 0.0, 60.0}}) {
+  config.duration = 10;
+  for (const auto& [name, azimuth, width] : {std::tuple{"life_by_Aitzol_Berasategi.jpg", -0.5, 7.0},
+                                             std::tuple{"picosdeeuropa_by_Aitzol_Berasategi.jpg", 0.0, 60.0}}) {
     simulator::PatchConfig photo;
     photo.file = std::string(ALIDADE_TEST_DATA "/") + name;
     photo.azimuth = azimuth * kPi / 180;
-    photo.elevation = elevation * kPi / 180;
     photo.width = width * kPi / 180;
     config.scene.photos.push_back(photo);
   }
@@ -36,46 +43,184 @@ simulator::Config zooming(double wide, double tele, std::uint64_t seed) {
   config.sensor.shot_noise = 0.02;
   config.sensor.read_noise = 0.7;
   simulator::ZoomConfig& zoom = config.zoom.emplace();
-  zoom.focal_length = {wide, tele};
+  zoom.focal_length = {kWide, 2 * kTele};
   zoom.sigma_rep = kRepeatability;
   zoom.distortion = {-0.02, 0.01};
   zoom.centre = {2, -1};
   zoom.centre_wander = 3;
+  zoom.speed = kSpeed;
+  zoom.acceleration = kAcceleration;
+  zoom.path.type = simulator::ZoomPathConfig::Type::kDwell;
+  zoom.path.stops = {{std::nullopt, kWide, kRest_s}, {std::nullopt, kTele, kRest_s}};
   return config;
 }
 
-TEST(ZoomingLens, Explore) {
-  simulator::Config config = zooming(1000, 8000, 1);
-  config.zoom->path.type = simulator::ZoomPathConfig::Type::kSweep;
-  config.zoom->path.factor = 6;
-  config.zoom->path.duration = 4;
-  config.zoom->path.stop = 1;
-  config.duration = 12;
-  // At rest first.
-  config.zoom->path.type = simulator::ZoomPathConfig::Type::kDwell;
-  config.zoom->speed = 0.5;
-  config.zoom->path.stops = {{std::nullopt, 1000, 3}, {std::nullopt, 6000, 3}};
-  ZoomingCamera camera(config, std::make_unique<ZoomedPath>(config, 0.4, 3));
-  OeOptions options;
-  options.max_width = 480;
-  options.max_height = 270;
-  options.max_landmarks = 2000;
-  options.maker.cell_size_px = 24;
-  OeMode oe(options);
-  oe.reset(camera.lens(0, kRepeatability).calibration, FocalLength::kLearnt);
-  for (int k = 0; k < camera.frames(); ++k) {
-    const auto pixels = camera.image(k);
-    const InterpolatedPanTilt telemetry = camera.telemetry(k, 5e-5, 5e-4);
-    const FrameLens lens = camera.lens(k, kRepeatability);
-    FrameOrientation frame;
-    const OeStatus status = oe.process(camera.view(pixels), camera.time_s(k), &telemetry, &lens, &frame);
-    const FrameErrors e = errors_of(camera, k, frame);
-    const OeStatistics& s = oe.statistics();
-    std::printf("%3d f %7.1f mv %d st %d own %d vis %3d ch %3d fo %3d in %3d rms %.3f sig %.2f flog %.1e fsig %.2f rs %.1f  map %d\n",
-                k, frame.calibration.camera.focal_length, lens.moves, static_cast<int>(status), s.own_lens, s.fine_visible, s.chosen, s.found, s.inliers,
-                e.rms_px, e.sigmas, camera.log_error(k, frame), e.log_sigmas, s.reading_sigmas, oe.map().size());
-    oe.maintain();
+class ZoomingLens : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    const simulator::Config config = two_octaves();
+    camera_ = new ZoomingCamera(config, std::make_unique<ZoomedPath>(config, 0.4, 3));
   }
+  static void TearDownTestSuite() {
+    delete camera_;
+    images_.clear();
+  }
+
+  ZoomingLens() {
+    OeOptions options;
+    options.max_width = 480;
+    options.max_height = 270;
+    options.max_landmarks = 2000;
+    options.maker.cell_size_px = 24;
+    oe_ = std::make_unique<OeMode>(options);
+    oe_->reset(camera_->lens_at(0, kRepeatability).calibration, FocalLength::kLearnt);
+    while (moves(last_of_wide_ + 1) == false) ++last_of_wide_;
+    first_of_tele_ = last_of_wide_ + 1;
+    while (moves(first_of_tele_)) ++first_of_tele_;
+  }
+
+  [[nodiscard]] static bool moves(int k) { return camera_->lens(k, kRepeatability).moves; }
+
+  [[nodiscard]] static ImageView image(int k) {
+    std::vector<std::uint8_t>& pixels = images_[k];
+    if (pixels.empty()) pixels = camera_->image(k);
+    return camera_->view(pixels);
+  }
+
+  OeStatus process(int k, const FrameLens* lens) {
+    const InterpolatedPanTilt telemetry = camera_->telemetry(k, 5e-5, 5e-4);
+    const ImageView view = image(k);
+    const AllocationGuard guard;
+    const OeStatus status = oe_->process(view, camera_->time_s(k), &telemetry, lens, &frame_);
+    statistics_ = oe_->statistics();
+    oe_->maintain();
+    EXPECT_EQ(guard.count(), 0);
+    errors_ = errors_of(*camera_, k, frame_);
+    // Whatever the mode: 5 sigmas of a direction, and of the focal length.
+    EXPECT_LT(errors_.sigmas, 5) << k;
+    EXPECT_LT(errors_.log_sigmas, 5) << k;
+    return status;
+  }
+  OeStatus process(int k) {
+    const FrameLens lens = camera_->lens(k, kRepeatability);
+    return process(k, &lens);
+  }
+  // At rest at the wide end, so that the map knows its scale.
+  void begin() {
+    for (int k = kFirst; k <= last_of_wide_; ++k) static_cast<void>(process(k));
+    ASSERT_EQ(oe_->statistics().status, OeStatus::kOk);
+    ASSERT_FALSE(oe_->lens_has_moved());
+  }
+  [[nodiscard]] std::set<std::uint32_t> found_ids() const {
+    std::set<std::uint32_t> ids;
+    for (int i = 0; i < statistics_.found; ++i) ids.insert(oe_->observations()[i].id);
+    return ids;
+  }
+
+  // The middle row of the very first frames is exposed before the path begins.
+  static constexpr int kFirst = 2;
+  static ZoomingCamera* camera_;
+  static std::map<int, std::vector<std::uint8_t>> images_;
+  std::unique_ptr<OeMode> oe_;
+  FrameOrientation frame_;
+  OeStatistics statistics_;
+  FrameErrors errors_;
+  int last_of_wide_ = kFirst;
+  int first_of_tele_ = 0;
+};
+
+ZoomingCamera* ZoomingLens::camera_ = nullptr;
+std::map<int, std::vector<std::uint8_t>> ZoomingLens::images_;
+
+TEST_F(ZoomingLens, IsFollowedOverTwoOctavesAndBackToRest) {
+  begin();
+  const double of_map = std::sqrt(frame_.calibration.covariance(0, 0)) /
+                        frame_.calibration.camera.focal_length;
+  double rms_square = 0;
+  int moving = 0;
+  for (int k = last_of_wide_ + 1; k < first_of_tele_ + 20; ++k) {
+    ASSERT_EQ(process(k), OeStatus::kOk) << k;
+    EXPECT_TRUE(statistics_.own_lens) << k;
+    EXPECT_LT(statistics_.reading_sigmas, 4) << k;
+    EXPECT_LT(errors_.rms_px, 0.15) << k;
+    if (k >= first_of_tele_ + 5) {
+      EXPECT_LT(errors_.rms_px, 0.05) << k;
+    }
+    if (k >= first_of_tele_) continue;
+    ++moving;
+    rms_square += errors_.rms_px * errors_.rms_px;
+    // d log f / dt as the motor has it.
+    const double true_rate = std::log(camera_->camera().lens_at(camera_->time_s(k) + 1e-3).focal_length /
+                                      camera_->camera().lens_at(camera_->time_s(k) - 1e-3).focal_length) / 2e-3;
+    EXPECT_NEAR(frame_.zoom_rate, true_rate, 0.02) << k;
+  }
+  EXPECT_GT(moving, 40);
+  EXPECT_LT(std::sqrt(rms_square / moving), 0.05);
+  EXPECT_NEAR(frame_.zoom_rate, 0, 1e-4);
+  // It knows f as well as the map knows its scale, not as well as the curve.
+  EXPECT_LT(std::sqrt(frame_.calibration.covariance(0, 0)),
+            3 * of_map * frame_.calibration.camera.focal_length);
+  EXPECT_LT(of_map, 0.3 * kRepeatability);
+}
+
+// Nobody looked while it moved, by less than an octave: the map is the same, and holds from the first frame on.
+TEST_F(ZoomingLens, KeepsItsMapAcrossAChangeThatNobodySaw) {
+  begin();
+  const std::set<std::uint32_t> before = found_ids();
+  int stop = last_of_wide_ + 1;
+  const double f = camera_->camera().lens_at(camera_->time_s(last_of_wide_)).focal_length;
+  while (camera_->camera().lens_at(camera_->time_s(stop)).focal_length < 1.7 * f) ++stop;
+  FrameLens lens = camera_->lens(stop, kRepeatability);
+  ASSERT_EQ(process(stop, &lens), OeStatus::kOk);
+  EXPECT_LT(errors_.rms_px, 0.15);
+  std::size_t again = 0;
+  for (const std::uint32_t id : found_ids()) again += before.count(id);
+  EXPECT_GT(again, 20U);
+}
+
+// The reading stands still all the way, or there is none: images tell, and the contradiction is said.
+TEST_F(ZoomingLens, IsFollowedWithoutReadingsOfItsMovement) {
+  for (const bool stuck : {true, false}) {
+    SCOPED_TRACE(stuck);
+    oe_->reset(camera_->lens_at(0, kRepeatability).calibration, FocalLength::kLearnt);
+    begin();
+    const FrameLens at_wide = camera_->lens(last_of_wide_, kRepeatability);
+    int held = 0;
+    int contradictions = 0;
+    const int frames = first_of_tele_ + 10 - last_of_wide_;
+    for (int k = last_of_wide_ + 1; k <= last_of_wide_ + frames; ++k) {
+      held += process(k, stuck ? &at_wide : nullptr) == OeStatus::kOk ? 1 : 0;
+      contradictions += statistics_.reading_sigmas > 5 ? 1 : 0;
+    }
+    EXPECT_GE(held, 0.95 * frames);
+    if (stuck) {
+      EXPECT_GT(contradictions, frames / 2);
+    }
+  }
+}
+
+TEST_F(ZoomingLens, BeginsItsMapAtRest) {
+  const int middle = (last_of_wide_ + first_of_tele_) / 2;
+  oe_->reset(camera_->lens(middle, kRepeatability).calibration, FocalLength::kLearnt);
+  for (int k = middle + 1; k < first_of_tele_; ++k) {
+    ASSERT_EQ(process(k), OeStatus::kTooFew) << k;
+    EXPECT_EQ(frame_.mode, OrientationMode::kPt);
+    EXPECT_EQ(oe_->map().size(), 0);
+  }
+  for (int k = first_of_tele_; k < first_of_tele_ + 10; ++k) static_cast<void>(process(k));
+  EXPECT_EQ(oe_->statistics().status, OeStatus::kOk);
+  EXPECT_GT(oe_->map().size(), 50);
+}
+
+// What is handed over is a map of the calibration that was given, and of its lens.
+TEST_F(ZoomingLens, HandsOnWhatTheFirstLensMade) {
+  begin();
+  const Calibration given = camera_->lens_at(0, kRepeatability).calibration;
+  for (int k = last_of_wide_ + 1; k < first_of_tele_; ++k) static_cast<void>(process(k));
+  const MapState map = oe_->map_state();
+  EXPECT_LT(map.landmarks.size(), static_cast<std::size_t>(oe_->map().size()));
+  oe_->reset(given, map, FocalLength::kLearnt);
+  EXPECT_EQ(process(last_of_wide_), OeStatus::kOk);
 }
 
 }  // namespace
