@@ -113,6 +113,7 @@ void OeMode::begin_lens() {
   }
   track_.reset();
   columns_.reset();
+  reading_contradicted_ = false;
   moved_phi_ = 0;
   frames_lost_ = 0;
   frame_.lens = {};
@@ -252,7 +253,11 @@ OeMode::Solution OeMode::find_and_solve(const PredictedMotion& predicted,
   const bool doubtful = first.status == SolveStatus::kTooFew ||
                         (first.status == SolveStatus::kOk &&
                          first.solved.inliers < look.least_held * statistics_.chosen);
-  if (!doubtful) return first;
+  // A lens that moves unawares is seen by residuals first, all of which may still be inliers.
+  constexpr double kMisfit = 6;  // times the covariance claimed
+  const bool misfit = lens_is_learnt() && (!columns_ || at_rest()) &&
+                      first.status == SolveStatus::kOk && first.solved.inflation > kMisfit;
+  if (!doubtful && !misfit) return first;
   if (lens_is_learnt() && map_.size() > 0) return look_for_moved_lens(first, coarse, predicted);
   if (!prediction_.follows(frame_.time_s)) return first;
   // A second look, where the motion before leads to.
@@ -435,7 +440,16 @@ bool OeMode::take_lens(const FrameLens* lens) {
   }
   if (reading_ && reading_->moves) frames_at_rest_ = 0;
   predict_lens(!at_rest());
-  if (reading_) {
+  if (reading_ && reading_contradicted_ && track_.age_s(frame_.time_s) < options_.lens.longest_s) {
+    // What images told lately is worth more.
+    const Vector2<double> of = predicted_lens_.covariance.diagonal();
+    const LensScale& scale = offset_.lens();
+    answers_calibration_ = reading_->calibration;
+    answers_calibration_.camera = zoomed(calibration_.camera, scale.value);
+    const double f = answers_calibration_.camera.focal_length;
+    const int of_f = index(Parameter::kFocalLength);
+    answers_calibration_.covariance(of_f, of_f) = f * f * (of[0] + scale.variance);
+  } else if (reading_) {
     answers_calibration_ = reading_->calibration;
     // The movement that is carried on ends unseen; a reading that tells more is taken instead.
     const double f = reading_->calibration.camera.focal_length;
@@ -503,16 +517,21 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
   const LookOptions& look = options_.look;
   const int chosen = statistics_.chosen;
   const bool follows = prediction_.follows(frame_.time_s);
+  // Better than the first look, if that was something.
+  constexpr double kBetter = 0.5;
+  const bool few = first.status != SolveStatus::kOk ||
+                   first.solved.inliers < look.least_held * statistics_.chosen;
   const auto holds = [&](const Solution& s) {
     return s.status == SolveStatus::kOk && s.solved.inliers >= look.least_held_again &&
-           s.solved.inliers >= look.least_held * statistics_.chosen;
+           s.solved.inliers >= look.least_held * statistics_.chosen &&
+           (few || s.solved.inflation < kBetter * first.solved.inflation);
   };
   const FrameMotion<double> carried =
       follows ? prediction_.last_carried_on(frame_.time_s) : coarse.motion;
   const bool had_own = columns_.has_value();
   const LensTrack::State predicted_before = predicted_lens_;
   if (had_own) {
-    if (follows) {
+    if (follows && few) {
       set_camera(zoomed(calibration_.camera, predicted_lens_.value[0] -
                                                  std::log(calibration_.camera.focal_length)));
       const Solution second = look_with_own_lens(carried, predicted);
@@ -526,15 +545,17 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
         return moved;
       }
     }
-    if (reading_) {
+    if (reading_ && few) {
       predict_lens_by_reading();
       const Solution by_reading = look_with_own_lens(coarse.motion, predicted);
       if (holds(by_reading)) return by_reading;
     }
   } else {
     if (follows) {
-      const Solution second = solve_about(carried, predicted);
-      if (holds(second)) return second;
+      if (few) {
+        const Solution second = solve_about(carried, predicted);
+        if (holds(second)) return second;
+      }
       track_.begin(frame_.time_s - prediction_.since_last_s(frame_.time_s),
                    std::log(calibration_.camera.focal_length));
       frames_at_rest_ = 0;
@@ -581,6 +602,8 @@ void OeMode::learn_own_lens(const Solution& solution, double zoom_rate) {
   const double variance = reading_->calibration.covariance(of_f, of_f) / (f * f) + lens.variance;
   statistics_.reading_sigmas =
       std::abs(state.value[0] + lens.value - std::log(f)) / std::sqrt(variance);
+  constexpr double kExcluded = 5;
+  reading_contradicted_ = statistics_.reading_sigmas > kExcluded;
 }
 
 // phi: value, variance and sensitivity of the map's scale.

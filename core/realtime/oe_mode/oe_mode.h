@@ -233,6 +233,7 @@ class OeMode {
   LensTrack::State predicted_lens_;
   int frames_at_rest_ = 0;       // in a row
   int frames_lost_ = 0;          // in a row
+  bool reading_contradicted_ = false;  // by the frame that landmarks held last
   double cells_focal_length_ = 1;  // px, that the map's cells are for
 
   OeStatistics statistics_;

@@ -104,7 +104,7 @@ class ViewProjection {
     const PanTilt<double> rate = rate_at_row(motion_, line_delay_, out->u.y());
     J_parameters->col(index(Parameter::kLineDelay)) =
         (out->u.y() - motion_.reference_row) * (out->J_angle * rate.vector());
-    if (zoom_to_last_row_ != 0) {
+    if (motion_.zoom_rate != 0) {
       J_parameters->col(index(Parameter::kLineDelay)) +=
           (out->u.y() - motion_.reference_row) * motion_.zoom_rate * (J_u_fixed * by_zoom);
     }
