@@ -270,13 +270,13 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   tracks_.telemetry_too_old = record.status == RecordStatus::kTelemetryTooOld;
   const bool elsewhere = !zoom_fits() || zoom_moved(telemetry_time_s);
   if (elsewhere || (oe_ && oe_->lens_has_moved())) {
-    const double readout_s = std::abs(calibration.line_delay) * calibration.camera.height;
     FrameLens lens;
-    if (follows_lens() && zoom_lookup_.lens(options_.zoom_curve, telemetry_time_s, readout_s,
-                                            options_.zoom_tolerance, &lens)) {
+    if (follows_lens() && look_up_lens(telemetry_time_s, &lens)) {
       record.calibrated = true;
       record.camera = pack(lens.calibration);
+      const bool excluded = found_focal_length_ > 0;
       orient(has_result(query) ? &measured : nullptr, image, &lens, &record);
+      events->zoom_contradicted = !excluded && found_focal_length_ > 0;
       return record;
     }
   }
@@ -290,6 +290,32 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   }
   orient(has_result(query) ? &measured : nullptr, image, nullptr, &record);
   return record;
+}
+
+bool OrientationStep::look_up_lens(double telemetry_time_s, FrameLens* lens) {
+  const double readout_s =
+      std::abs(options_.calibration.line_delay) * options_.calibration.camera.height;
+  if (!zoom_lookup_.lens(options_.zoom_curve, telemetry_time_s, readout_s, options_.zoom_tolerance,
+                         lens)) {
+    return false;
+  }
+  read_lens_ = lens->calibration;
+  FrameLens found;
+  if (found_focal_length_ > 0 &&
+      lens_of_focal_length(options_.zoom_curve, found_focal_length_, &found)) {
+    *lens = found;
+  }
+  return true;
+}
+
+void OrientationStep::judge_reading(const Calibration& found) {
+  constexpr double kExcluded = 5;  // standard deviations
+  const int f = index(Parameter::kFocalLength);
+  const double change = std::log(found.camera.focal_length / read_lens_.camera.focal_length);
+  const double sigma = std::hypot(
+      std::sqrt(found.covariance(f, f)) / found.camera.focal_length,
+      std::sqrt(read_lens_.covariance(f, f)) / read_lens_.camera.focal_length);
+  found_focal_length_ = std::abs(change) > kExcluded * sigma ? found.camera.focal_length : 0;
 }
 
 bool OrientationStep::orient_between(const InterpolatedPanTilt& measured, double telemetry_time_s,
@@ -325,6 +351,13 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
     return;
   }
   record->mode = frame.mode == OrientationMode::kOe ? RecordMode::kOe : RecordMode::kPt;
+  if (lens != nullptr) {
+    if (record->mode == RecordMode::kOe) {
+      judge_reading(frame.calibration);
+    } else {
+      found_focal_length_ = 0;
+    }
+  }
   record->landmarks = frame.landmarks;
   if (focal_length() == FocalLength::kLearnt) record->camera = pack(frame.calibration);
   if (record->mode == RecordMode::kOe) record->residual_px = residual_rms(*oe_);

@@ -85,6 +85,7 @@ struct OrientationStepOptions {
 struct StepEvents {
   bool video_clock_restarted = false;
   bool video_delay_stepped = false;  // the least delay stepped: flagged, not followed
+  bool zoom_contradicted = false;    // images exclude the focal length of the zoom reading, from this frame on
   double video_delay_wander_s = 0;   // by how much it was seen to wander; 0: it does not
   // The sender's time stamps run at another rate than the pictures come, and are left out from this frame on: their
   // rate less one.
@@ -159,7 +160,15 @@ class OrientationStep {
   [[nodiscard]] bool orient_between(const InterpolatedPanTilt& measured, double telemetry_time_s,
                                     OrientationRecord* record);
 
+  // What the zoom's readings say of a frame's lens; where OE mode excluded that in the frame before, the curve's at the focal length
+  // that OE mode found.
+  [[nodiscard]] bool look_up_lens(double telemetry_time_s, FrameLens* lens);
+  // After OE mode's answer: whether it excludes what the reading says.
+  void judge_reading(const Calibration& found);
+
   std::optional<double> zoom_;  // as last reported
+  Calibration read_lens_;       // by the readings, of the frame last added
+  double found_focal_length_ = 0;  // px, of OE mode where it excludes the reading; else 0
   bool zoom_on_curve_ = false;  // zoom_ is one of the zoom curve's
   ZoomLookup zoom_lookup_;
   std::optional<double> zoom_at_adoption_;  // that a calibration without zoom is for

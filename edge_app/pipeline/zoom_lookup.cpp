@@ -93,4 +93,40 @@ bool ZoomLookup::lens(const ZoomCurve& curve, double time_s, double readout_s, d
   return true;
 }
 
+// By regula falsi, as the curve is monotone and smooth (Illinois: the end that stays counts half).
+bool lens_of_focal_length(const ZoomCurve& curve, double focal_length, FrameLens* lens) {
+  if (curve.empty() || !(focal_length > 0)) return false;
+  constexpr int kMaxSteps = 30;
+  constexpr double kNear = 1e-4;  // of log f: distortion and centre hardly change
+  const double wanted = std::log(focal_length);
+  const auto log_at = [&](double reading, double* out) {
+    if (!curve.at(reading, &lens->calibration)) return false;
+    *out = std::log(lens->calibration.camera.focal_length) - wanted;
+    return true;
+  };
+  double a = curve.first_reading();
+  double b = curve.last_reading();
+  double at_a = 0;
+  double at_b = 0;
+  if (!log_at(a, &at_a) || !log_at(b, &at_b) || at_a * at_b > 0) return false;
+  lens->moves = true;
+  lens->rate = 0;
+  lens->rate_sigma = 1;
+  for (int step = 0; step < kMaxSteps; ++step) {
+    const double middle = at_a == at_b ? a : (a * at_b - b * at_a) / (at_b - at_a);
+    double at_middle = 0;
+    if (!log_at(middle, &at_middle)) return false;
+    if (std::abs(at_middle) < kNear) return true;
+    if (at_middle * at_b < 0) {
+      a = b;
+      at_a = at_b;
+    } else {
+      at_a /= 2;
+    }
+    b = middle;
+    at_b = at_middle;
+  }
+  return false;
+}
+
 }  // namespace alidade

@@ -132,7 +132,10 @@ int run(const Options& options) {
   Part rest, moving, after;
   int since_movement = 1000;
   double worst = 0;
-  for (int k = 0; k < camera.frames(); ++k) {
+  double excluded = 0;  // px, the focal length found where it excludes the reading
+  int contradictions = 0;
+  // The middle row of the very first frames is exposed before the path begins.
+  for (int k = 2; k < camera.frames(); ++k) {
     std::vector<std::uint8_t> pixels = camera.image(k);
     std::vector<std::uint8_t> coded;
     cv::imencode(".jpg", cv::Mat(config.image.height, config.image.width, CV_8U, pixels.data()), coded,
@@ -141,11 +144,22 @@ int run(const Options& options) {
     const ImageView view{decoded.data, decoded.cols, decoded.rows, static_cast<int>(decoded.step)};
     const InterpolatedPanTilt telemetry = camera.telemetry(k, 5e-5, 1e-3);
     FrameLens lens = lens_of(camera, options, k);
+    // As the program does: where images exclude the reading, the curve's lens at what they found.
+    const int of_f = index(Parameter::kFocalLength);
+    const double told = lens.calibration.camera.focal_length;
+    const double told_sigma = std::sqrt(lens.calibration.covariance(of_f, of_f)) / told;
+    if (excluded > 0) lens = camera.lens_of_focal_length(excluded, kRepeatability);
     lens.calibration.mechanics = calibration.mechanics;
     FrameOrientation frame;
     const double begin = cpu_s();
     const OeStatus status = oe.process(view, camera.time_s(k), &telemetry, &lens, &frame);
     const double cpu_ms = 1e3 * (cpu_s() - begin);
+    const double found = frame.calibration.camera.focal_length;
+    excluded = frame.mode == OrientationMode::kOe &&
+                       std::abs(std::log(found / told)) > 5 * told_sigma
+                   ? found
+                   : 0;
+    contradictions += excluded > 0 ? 1 : 0;
     const bool moves = camera.lens(k, 0).moves;
     since_movement = moves ? 0 : since_movement + 1;
     const FrameErrors e = errors_of(camera, k, frame);
@@ -158,7 +172,6 @@ int run(const Options& options) {
                   e.log_sigmas, s.reading_sigmas, oe.map().size());
     }
     oe.maintain();
-    if (k < 1) continue;
     worst = std::max({worst, e.sigmas, e.log_sigmas});
     Part& part = moves ? moving : since_movement <= 25 ? after : rest;
     ++part.frames;
@@ -172,6 +185,7 @@ int run(const Options& options) {
   }
   std::printf("seed %d, %g to %g px in %g s, fault %s\n", static_cast<int>(options.seed), options.from,
               options.from * options.factor, options.sweep_s, options.fault.c_str());
+  std::printf("%d frames exclude the reading\n", contradictions);
   rest.print("at rest");
   moving.print("moving");
   after.print("1 s after");

@@ -12,15 +12,52 @@
 #include <memory>
 #include <optional>
 #include <random>
+#include <string>
+#include <tuple>
 #include <utility>
 #include <vector>
 
+#include "core/model/trigonometry.h"
 #include "core/realtime/frame_orientation.h"
 #include "core/realtime/oe_mode/frame_lens.h"
 #include "core/realtime/telemetry/telemetry_interpolation.h"
 #include "test/simulator/renderer.h"
 
 namespace alidade::test {
+
+inline constexpr double kTwoOctavesRepeatability = 2e-3;
+
+// From 1000 to 4000 px in 2.7 s, at rest before and after, the picture upside down; 480x270.
+inline simulator::Config two_octaves() {
+  constexpr double kRest_s = 1.2;
+  simulator::Config config;
+  config.image = {480, 270, 25};
+  config.camera.line_delay = -40e-6;
+  config.duration = 10;
+  for (const auto& [name, azimuth, width] :
+       {std::tuple{"life_by_Aitzol_Berasategi.jpg", -0.5, 7.0},
+        std::tuple{"picosdeeuropa_by_Aitzol_Berasategi.jpg", 0.0, 60.0}}) {
+    simulator::PatchConfig photo;
+    photo.file = std::string(ALIDADE_TEST_DATA "/") + name;
+    photo.azimuth = azimuth * kPi / 180;
+    photo.width = width * kPi / 180;
+    config.scene.photos.push_back(photo);
+  }
+  config.sensor.exposure = 1e-3;
+  config.sensor.shot_noise = 0.02;
+  config.sensor.read_noise = 0.7;
+  simulator::ZoomConfig& zoom = config.zoom.emplace();
+  zoom.focal_length = {1000, 8000};
+  zoom.sigma_rep = kTwoOctavesRepeatability;
+  zoom.distortion = {-0.02, 0.01};
+  zoom.centre = {2, -1};
+  zoom.centre_wander = 3;
+  zoom.speed = 0.6;
+  zoom.acceleration = 2.5;
+  zoom.path.type = simulator::ZoomPathConfig::Type::kDwell;
+  zoom.path.stops = {{std::nullopt, 1000, kRest_s}, {std::nullopt, 4000, kRest_s}};
+  return config;
+}
 
 // Turns about (0, 0) so fast that it crosses up to `fields` fields of view a second, those of the lens at that time.
 class ZoomedPath : public simulator::Path {
@@ -109,6 +146,8 @@ class ZoomingCamera {
     return out;
   }
 
+  [[nodiscard]] simulator::Angles angles_at(double t) const { return path_->at(t); }
+
   // Of what is told at that time; sigma: of log f.
   [[nodiscard]] Calibration curve_at(double told_s, double sigma) const {
     return curve_of(camera().zoom()->reading(told_s), sigma);
@@ -151,6 +190,25 @@ class ZoomingCamera {
     const double before_s = std::max(0.0, t - 1.5 / config_.image.rate_hz);
     out.moves = zoom.reading(t + h) != zoom.reading(before_s);
     if (!out.moves) out.rate = 0;
+    return out;
+  }
+
+  [[nodiscard]] double reading_of(double focal_length) const {
+    const simulator::Zoom& zoom = *camera().zoom();
+    double low = config_.zoom->reading.wide;
+    double high = config_.zoom->reading.tele;
+    for (int step = 0; step < 40; ++step) {
+      const double middle = (low + high) / 2;
+      (zoom.nominal_lens(middle).focal_length < focal_length ? low : high) = middle;
+    }
+    return low;
+  }
+  // As the curve has it where it has this focal length.
+  [[nodiscard]] FrameLens lens_of_focal_length(double focal_length, double sigma) const {
+    FrameLens out;
+    out.calibration = curve_of(reading_of(focal_length), sigma);
+    out.rate_sigma = 1;
+    out.moves = true;
     return out;
   }
 

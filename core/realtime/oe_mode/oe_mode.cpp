@@ -105,6 +105,7 @@ void OeMode::clear_landmarks() {
 }
 
 void OeMode::begin_lens() {
+  last_reading_focal_length_ = given_.camera.focal_length;
   if (track_.active() && reading_) {
     // The lens that the map was begun with is gone.
     given_ = reading_->calibration;
@@ -420,7 +421,10 @@ bool OeMode::take_lens(const FrameLens* lens) {
   reading_.reset();
   frame_.lens = {};
   if (focal_length_ != FocalLength::kLearnt || !lens_is_learnt()) return true;
-  if (lens != nullptr) reading_ = *lens;
+  if (lens != nullptr) {
+    reading_ = *lens;
+    last_reading_focal_length_ = lens->calibration.camera.focal_length;
+  }
   if (!track_.active()) {
     const bool moved =
         lens != nullptr && (lens->moves || lens->calibration.camera.focal_length !=
@@ -440,11 +444,12 @@ bool OeMode::take_lens(const FrameLens* lens) {
   }
   if (reading_ && reading_->moves) frames_at_rest_ = 0;
   predict_lens(!at_rest());
-  if (reading_ && reading_contradicted_ && track_.age_s(frame_.time_s) < options_.lens.longest_s) {
+  const bool is_young = track_.age_s(frame_.time_s) < options_.lens.longest_s;
+  if (is_young && (!reading_ || reading_contradicted_)) {
     // What images told lately is worth more.
     const Vector2<double> of = predicted_lens_.covariance.diagonal();
     const LensScale& scale = offset_.lens();
-    answers_calibration_ = reading_->calibration;
+    if (reading_) answers_calibration_ = reading_->calibration;
     answers_calibration_.camera = zoomed(calibration_.camera, scale.value);
     const double f = answers_calibration_.camera.focal_length;
     const int of_f = index(Parameter::kFocalLength);
@@ -456,10 +461,8 @@ bool OeMode::take_lens(const FrameLens* lens) {
     const int of_f = index(Parameter::kFocalLength);
     const double variance = reading_->calibration.covariance(of_f, of_f) / (f * f);
     if (!(predicted_lens_.covariance(0, 0) < variance)) predict_lens_by_reading();
-  } else if (track_.age_s(frame_.time_s) > options_.lens.longest_s) {
-    return false;
   }
-  return true;
+  return reading_.has_value() || is_young;
 }
 
 void OeMode::predict_lens(bool moves) {
@@ -616,7 +619,14 @@ Calibration OeMode::lens_of_answer(double phi, double variance,
   const double own = frame_.lens.covariance(0, 0) + half_s * half_s * frame_.lens.covariance(1, 1);
   Sensitivity<1> of_it = frame_.lens.sensitivity.row(0);
   lens.make_independent(&of_it);
-  Calibration out = lens.at(calibration_, phi, variance + own, sensitivity + of_it);
+  // Without a reading distortion and centre are those of the last one: a lens' change by so much in an octave and a half.
+  constexpr double kDistortionChange = 0.02;  // in the corner, part of its distance
+  constexpr double kCentreChange_px = 5;
+  const double since =
+      reading_ ? 0 : std::log(calibration_.camera.focal_length / last_reading_focal_length_);
+  const double unknown = kDistortionChange * since;
+  Calibration out =
+      lens.at(calibration_, phi, variance + own + unknown * unknown, sensitivity + of_it);
   if (reading_) {
     // Distortion and centre err as much as the curve says of this zoom, or as they did with the map's lens.
     ParameterDirection factors = ParameterDirection::Ones();
@@ -631,6 +641,12 @@ Calibration OeMode::lens_of_answer(double phi, double variance,
     out.covariance = (factors.asDiagonal() * out.covariance * factors.asDiagonal()).eval();
   }
   columns_->to_frame(&out.covariance);
+  const double of_corner = std::pow(out.camera.focal_length / half_diagonal_px(), 2);
+  out.covariance(index(Parameter::kRadialDistortion), index(Parameter::kRadialDistortion)) +=
+      std::pow(unknown * of_corner, 2);
+  for (const Parameter p : {Parameter::kCentreU, Parameter::kCentreV}) {
+    out.covariance(index(p), index(p)) += std::pow(kCentreChange_px * since, 2);
+  }
   return out;
 }
 

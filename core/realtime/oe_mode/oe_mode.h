@@ -109,7 +109,8 @@ class OeMode {
     return process(image, frame_time_s, at_middle_row, nullptr, out);
   }
   // The same behind a lens that zooms, with FocalLength::kLearnt; lens: what is known of it, null: nothing new. Where that is
-  // missing or wrong the frames before and the image tell, as far as they can.
+  // missing or wrong the frames before and the image tell f, as far as they can. Distortion and centre are taken from `lens`: where
+  // its focal length is excluded (reading_sigmas), the caller hands in the curve's at the focal length that was found.
   [[nodiscard]] OeStatus process(const ImageView& image, double frame_time_s,
                                  const InterpolatedPanTilt* at_middle_row, const FrameLens* lens,
                                  FrameOrientation* out);
@@ -235,6 +236,7 @@ class OeMode {
   int frames_lost_ = 0;          // in a row
   bool reading_contradicted_ = false;  // by the frame that landmarks held last
   double cells_focal_length_ = 1;  // px, that the map's cells are for
+  double last_reading_focal_length_ = 1;  // px, by the last reading
 
   OeStatistics statistics_;
   ProcessedFrame frame_;  // process() writes it, maintain() uses it up
