@@ -300,22 +300,36 @@ bool OrientationStep::look_up_lens(double telemetry_time_s, FrameLens* lens) {
     return false;
   }
   read_lens_ = lens->calibration;
+  lens_time_s_ = telemetry_time_s;
+  constexpr double kLongest_s = 0.5;  // without landmarks: as LensTrackOptions::longest_s
+  const double age_s = telemetry_time_s - found_time_s_;
+  if (!(age_s < kLongest_s)) found_focal_length_ = 0;
   FrameLens found;
   if (found_focal_length_ > 0 &&
-      lens_of_focal_length(options_.zoom_curve, found_focal_length_, &found)) {
+      lens_of_focal_length(options_.zoom_curve,
+                           found_focal_length_ * std::exp(found_rate_ * age_s), &found)) {
     *lens = found;
+    lens->rate = found_rate_;
+    constexpr double kAcceleration = 2;  // 1/s^2, a motor's
+    const double change =
+        kAcceleration * age_s * age_s / 2 * lens->calibration.camera.focal_length;
+    const int f = index(Parameter::kFocalLength);
+    lens->calibration.covariance(f, f) += change * change;
   }
   return true;
 }
 
-void OrientationStep::judge_reading(const Calibration& found) {
+void OrientationStep::judge_reading(const FrameOrientation& found) {
   constexpr double kExcluded = 5;  // standard deviations
   const int f = index(Parameter::kFocalLength);
-  const double change = std::log(found.camera.focal_length / read_lens_.camera.focal_length);
-  const double sigma = std::hypot(
-      std::sqrt(found.covariance(f, f)) / found.camera.focal_length,
-      std::sqrt(read_lens_.covariance(f, f)) / read_lens_.camera.focal_length);
-  found_focal_length_ = std::abs(change) > kExcluded * sigma ? found.camera.focal_length : 0;
+  const Camera<double>& camera = found.calibration.camera;
+  const double change = std::log(camera.focal_length / read_lens_.camera.focal_length);
+  const double sigma =
+      std::hypot(std::sqrt(found.calibration.covariance(f, f)) / camera.focal_length,
+                 std::sqrt(read_lens_.covariance(f, f)) / read_lens_.camera.focal_length);
+  found_focal_length_ = std::abs(change) > kExcluded * sigma ? camera.focal_length : 0;
+  found_rate_ = found.zoom_rate;
+  found_time_s_ = lens_time_s_;
 }
 
 bool OrientationStep::orient_between(const InterpolatedPanTilt& measured, double telemetry_time_s,
@@ -351,13 +365,7 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
     return;
   }
   record->mode = frame.mode == OrientationMode::kOe ? RecordMode::kOe : RecordMode::kPt;
-  if (lens != nullptr) {
-    if (record->mode == RecordMode::kOe) {
-      judge_reading(frame.calibration);
-    } else {
-      found_focal_length_ = 0;
-    }
-  }
+  if (lens != nullptr && record->mode == RecordMode::kOe) judge_reading(frame);
   record->landmarks = frame.landmarks;
   if (focal_length() == FocalLength::kLearnt) record->camera = pack(frame.calibration);
   if (record->mode == RecordMode::kOe) record->residual_px = residual_rms(*oe_);

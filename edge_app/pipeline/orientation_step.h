@@ -164,11 +164,15 @@ class OrientationStep {
   // that OE mode found.
   [[nodiscard]] bool look_up_lens(double telemetry_time_s, FrameLens* lens);
   // After OE mode's answer: whether it excludes what the reading says.
-  void judge_reading(const Calibration& found);
+  void judge_reading(const FrameOrientation& found);
 
   std::optional<double> zoom_;  // as last reported
   Calibration read_lens_;       // by the readings, of the frame last added
-  double found_focal_length_ = 0;  // px, of OE mode where it excludes the reading; else 0
+  // Of OE mode where it excludes the reading, at that frame's time; focal length 0: it does not.
+  double found_focal_length_ = 0;  // px
+  double found_rate_ = 0;          // 1/s
+  double found_time_s_ = 0;        // telemetry time
+  double lens_time_s_ = 0;         // likewise, of the frame last added
   bool zoom_on_curve_ = false;  // zoom_ is one of the zoom curve's
   ZoomLookup zoom_lookup_;
   std::optional<double> zoom_at_adoption_;  // that a calibration without zoom is for

@@ -157,7 +157,7 @@ int run(const Options& options) {
     const double found = frame.calibration.camera.focal_length;
     excluded = frame.mode == OrientationMode::kOe &&
                        std::abs(std::log(found / told)) > 5 * told_sigma
-                   ? found
+                   ? found * std::exp(frame.zoom_rate * camera.time_s(1))
                    : 0;
     contradictions += excluded > 0 ? 1 : 0;
     const bool moves = camera.lens(k, 0).moves;

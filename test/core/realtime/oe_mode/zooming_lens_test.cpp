@@ -153,7 +153,10 @@ TEST_F(ZoomingLens, IsFollowedWhereItsReadingIsStuck) {
   for (int k = last_of_wide_ + 1; k <= last_of_wide_ + frames; ++k) {
     const bool contradicted = std::abs(std::log(found / told)) > 5 * kRepeatability;
     const FrameLens lens =
-        contradicted ? camera_->lens_of_focal_length(found, kRepeatability) : stuck;
+        contradicted
+            ? camera_->lens_of_focal_length(
+                  found * std::exp(frame_.zoom_rate * camera_->time_s(1)), kRepeatability)
+            : stuck;
     const bool ok = process(k, &lens) == OeStatus::kOk;
     held += ok ? 1 : 0;
     found = ok ? frame_.calibration.camera.focal_length : told;
