@@ -531,6 +531,8 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
   };
   const FrameMotion<double> carried =
       follows ? prediction_.last_carried_on(frame_.time_s) : coarse.motion;
+  // Coarse octaves find the view whatever the lens does in a frame; a motion that is carried on is a few pixels off.
+  const FrameMotion<double>& there = coarse.aligned ? coarse.motion : carried;
   const bool had_own = columns_.has_value();
   const LensTrack::State predicted_before = predicted_lens_;
   if (had_own) {
@@ -542,7 +544,7 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
     }
     if (at_rest()) {
       predict_lens(true);
-      const Solution moved = look_with_own_lens(carried, predicted);
+      const Solution moved = look_with_own_lens(there, predicted);
       if (holds(moved)) {
         frames_at_rest_ = 0;
         return moved;
@@ -550,7 +552,7 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
     }
     if (reading_ && few) {
       predict_lens_by_reading();
-      const Solution by_reading = look_with_own_lens(coarse.motion, predicted);
+      const Solution by_reading = look_with_own_lens(there, predicted);
       if (holds(by_reading)) return by_reading;
     }
   } else {
@@ -564,7 +566,7 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
       frames_at_rest_ = 0;
       const Calibration before = calibration_;
       predict_lens(true);
-      const Solution moved = look_with_own_lens(carried, predicted);
+      const Solution moved = look_with_own_lens(there, predicted);
       if (holds(moved)) return moved;
       set_camera(before.camera);
       track_.reset();
