@@ -93,8 +93,7 @@ template <class S>
 template <class S, int kRows>
 [[nodiscard]] Matrix<S, kRows, 1> by_zoom(const Camera<S>& camera,
                                           const Matrix<S, kRows, kCameraParameterCount>& J_camera) {
-  return camera.focal_length * J_camera.col(0) +
-         S(2) * camera.radial_distortion * J_camera.col(2);
+  return camera.focal_length * J_camera.col(0) + S(2) * camera.radial_distortion * J_camera.col(2);
 }
 
 // From that by the camera of a row to that by the camera of the reference row.

@@ -60,7 +60,7 @@ struct FrameOrientation {
   Matrix3<double> orientation_covariance = Matrix3<double>::Zero();  // rad^2, of xi
   Vector3<double> angular_velocity = Vector3<double>::Zero();        // rad/s, camera frame
 
-  [[nodiscard]] FrameMotion<double> motion() const { 
+  [[nodiscard]] FrameMotion<double> motion() const {
     return {angle, rate, 0.0, acceleration, zoom_rate};
   }
   [[nodiscard]] Eigen::Quaterniond quaternion() const {

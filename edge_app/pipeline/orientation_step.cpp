@@ -306,13 +306,12 @@ bool OrientationStep::look_up_lens(double telemetry_time_s, FrameLens* lens) {
   if (!(age_s < kLongest_s)) found_focal_length_ = 0;
   FrameLens found;
   if (found_focal_length_ > 0 &&
-      lens_of_focal_length(options_.zoom_curve,
-                           found_focal_length_ * std::exp(found_rate_ * age_s), &found)) {
+      lens_of_focal_length(options_.zoom_curve, found_focal_length_ * std::exp(found_rate_ * age_s),
+                           &found)) {
     *lens = found;
     lens->rate = found_rate_;
     constexpr double kAcceleration = 2;  // 1/s^2, a motor's
-    const double change =
-        kAcceleration * age_s * age_s / 2 * lens->calibration.camera.focal_length;
+    const double change = kAcceleration * age_s * age_s / 2 * lens->calibration.camera.focal_length;
     const int f = index(Parameter::kFocalLength);
     lens->calibration.covariance(f, f) += change * change;
   }

@@ -85,8 +85,9 @@ struct OrientationStepOptions {
 struct StepEvents {
   bool video_clock_restarted = false;
   bool video_delay_stepped = false;  // the least delay stepped: flagged, not followed
-  bool zoom_contradicted = false;    // images exclude the focal length of the zoom reading, from this frame on
-  double video_delay_wander_s = 0;   // by how much it was seen to wander; 0: it does not
+  bool zoom_contradicted =
+      false;  // images exclude the focal length of the zoom reading, from this frame on
+  double video_delay_wander_s = 0;  // by how much it was seen to wander; 0: it does not
   // The sender's time stamps run at another rate than the pictures come, and are left out from this frame on: their
   // rate less one.
   std::optional<double> stamps_left_out;
@@ -173,7 +174,7 @@ class OrientationStep {
   double found_rate_ = 0;          // 1/s
   double found_time_s_ = 0;        // telemetry time
   double lens_time_s_ = 0;         // likewise, of the frame last added
-  bool zoom_on_curve_ = false;  // zoom_ is one of the zoom curve's
+  bool zoom_on_curve_ = false;     // zoom_ is one of the zoom curve's
   ZoomLookup zoom_lookup_;
   std::optional<double> zoom_at_adoption_;  // that a calibration without zoom is for
   double minimum_delay_sigma_s_ = 0;

@@ -88,9 +88,11 @@ FrameLens lens_of(const ZoomingCamera& camera, const Options& options, int k) {
     return 1 + kQuantum * std::round((camera.camera().zoom()->reading(s) - 1) / kQuantum);
   };
   FrameLens lens;
-  const double step = std::log(camera.curve_of(std::min(9999.0, told(t) + kQuantum / 2), 0).camera.focal_length /
-                               camera.curve_of(std::max(1.0, told(t) - kQuantum / 2), 0).camera.focal_length);
-  lens.calibration = camera.curve_of(std::clamp(told(t), 1.0, 9999.0), std::hypot(kRepeatability, step / std::sqrt(12)));
+  const double step =
+      std::log(camera.curve_of(std::min(9999.0, told(t) + kQuantum / 2), 0).camera.focal_length /
+               camera.curve_of(std::max(1.0, told(t) - kQuantum / 2), 0).camera.focal_length);
+  lens.calibration = camera.curve_of(std::clamp(told(t), 1.0, 9999.0),
+                                     std::hypot(kRepeatability, step / std::sqrt(12)));
   lens.moves = told(t) != told(t - 0.06);
   lens.rate_sigma = 1;
   return lens;
@@ -107,11 +109,13 @@ struct Part {
   int frames = 0;
   int oe = 0;
   void print(const char* name) const {
-    std::printf("%-8s %4d frames, OE %5.1f %%, rms %.3f px (worst %.3f), log f %.1e rms (worst %.1e), worst %.2f sigmas, f %.2f "
-                "sigmas, rms of sigmas %.2f, f %.2f; process() %.2f ms (median)\n",
-                name, frames, 100.0 * oe / std::max(frames, 1), root_mean_square(rms_px), largest(rms_px),
-                root_mean_square(log_errors), largest(log_errors), largest(sigmas), largest(log_sigmas),
-                root_mean_square(sigmas), root_mean_square(log_sigmas), median(cpu_ms));
+    std::printf(
+        "%-8s %4d frames, OE %5.1f %%, rms %.3f px (worst %.3f), log f %.1e rms (worst %.1e), "
+        "worst %.2f sigmas, f %.2f "
+        "sigmas, rms of sigmas %.2f, f %.2f; process() %.2f ms (median)\n",
+        name, frames, 100.0 * oe / std::max(frames, 1), root_mean_square(rms_px), largest(rms_px),
+        root_mean_square(log_errors), largest(log_errors), largest(sigmas), largest(log_sigmas),
+        root_mean_square(sigmas), root_mean_square(log_sigmas), median(cpu_ms));
   }
 };
 
@@ -138,8 +142,8 @@ int run(const Options& options) {
   for (int k = 2; k < camera.frames(); ++k) {
     std::vector<std::uint8_t> pixels = camera.image(k);
     std::vector<std::uint8_t> coded;
-    cv::imencode(".jpg", cv::Mat(config.image.height, config.image.width, CV_8U, pixels.data()), coded,
-                 {cv::IMWRITE_JPEG_QUALITY, 85});
+    cv::imencode(".jpg", cv::Mat(config.image.height, config.image.width, CV_8U, pixels.data()),
+                 coded, {cv::IMWRITE_JPEG_QUALITY, 85});
     const cv::Mat decoded = cv::imdecode(coded, cv::IMREAD_GRAYSCALE);
     const ImageView view{decoded.data, decoded.cols, decoded.rows, static_cast<int>(decoded.step)};
     const InterpolatedPanTilt telemetry = camera.telemetry(k, 5e-5, 1e-3);
@@ -155,21 +159,23 @@ int run(const Options& options) {
     const OeStatus status = oe.process(view, camera.time_s(k), &telemetry, &lens, &frame);
     const double cpu_ms = 1e3 * (cpu_s() - begin);
     const double found = frame.calibration.camera.focal_length;
-    excluded = frame.mode == OrientationMode::kOe &&
-                       std::abs(std::log(found / told)) > 5 * told_sigma
-                   ? found * std::exp(frame.zoom_rate * camera.time_s(1))
-                   : 0;
+    excluded =
+        frame.mode == OrientationMode::kOe && std::abs(std::log(found / told)) > 5 * told_sigma
+            ? found * std::exp(frame.zoom_rate * camera.time_s(1))
+            : 0;
     contradictions += excluded > 0 ? 1 : 0;
     const bool moves = camera.lens(k, 0).moves;
     since_movement = moves ? 0 : since_movement + 1;
     const FrameErrors e = errors_of(camera, k, frame);
     const OeStatistics s = oe.statistics();
     if (options.details) {
-      std::printf("%3d f %7.1f moves %d status %d own %d visible %3d found %3d inliers %3d rms %.3f sigmas %.2f log f %8.1e "
-                  "sigmas %.2f reading %.1f map %d\n",
-                  k, frame.calibration.camera.focal_length, moves, static_cast<int>(status), s.own_lens,
-                  s.fine_visible, s.found, s.inliers, e.rms_px, e.sigmas, camera.log_error(k, frame),
-                  e.log_sigmas, s.reading_sigmas, oe.map().size());
+      std::printf(
+          "%3d f %7.1f moves %d status %d own %d visible %3d found %3d inliers %3d rms %.3f sigmas "
+          "%.2f log f %8.1e "
+          "sigmas %.2f reading %.1f map %d\n",
+          k, frame.calibration.camera.focal_length, moves, static_cast<int>(status), s.own_lens,
+          s.fine_visible, s.found, s.inliers, e.rms_px, e.sigmas, camera.log_error(k, frame),
+          e.log_sigmas, s.reading_sigmas, oe.map().size());
     }
     oe.maintain();
     worst = std::max({worst, e.sigmas, e.log_sigmas});
@@ -183,8 +189,8 @@ int run(const Options& options) {
     part.log_sigmas.push_back(e.log_sigmas);
     part.cpu_ms.push_back(cpu_ms);
   }
-  std::printf("seed %d, %g to %g px in %g s, fault %s\n", static_cast<int>(options.seed), options.from,
-              options.from * options.factor, options.sweep_s, options.fault.c_str());
+  std::printf("seed %d, %g to %g px in %g s, fault %s\n", static_cast<int>(options.seed),
+              options.from, options.from * options.factor, options.sweep_s, options.fault.c_str());
   std::printf("%d frames exclude the reading\n", contradictions);
   rest.print("at rest");
   moving.print("moving");

@@ -78,7 +78,8 @@ class ZoomedPath : public simulator::Path {
 
   // A cubic through four of the table.
   [[nodiscard]] simulator::Angles at(double time_s) const override {
-    const double position = std::clamp(time_s / kStep_s, 1.0, static_cast<double>(angles_.size()) - 2.001);
+    const double position =
+        std::clamp(time_s / kStep_s, 1.0, static_cast<double>(angles_.size()) - 2.001);
     const auto i = static_cast<std::size_t>(position);
     const double t = time_s / kStep_s - static_cast<double>(i);
     const auto blend = [t](double a, double b, double c, double d) {
@@ -214,7 +215,8 @@ class ZoomingCamera {
 
   // Log of the frame's focal length over the true one, at row 0.
   [[nodiscard]] double log_error(int k, const FrameOrientation& frame) const {
-    return std::log(frame.calibration.camera.focal_length / camera().lens_at(time_s(k)).focal_length);
+    return std::log(frame.calibration.camera.focal_length /
+                    camera().lens_at(time_s(k)).focal_length);
   }
 
  private:
@@ -231,8 +233,8 @@ class ZoomingCamera {
 
 // Of a frame's directions, over the image.
 struct FrameErrors {
-  double rms_px = 0;     // what is left when the directions are turned to fit at the best
-  double sigmas = 0;     // the largest of all, by its covariance, nothing taken out
+  double rms_px = 0;      // what is left when the directions are turned to fit at the best
+  double sigmas = 0;      // the largest of all, by its covariance, nothing taken out
   double log_sigmas = 0;  // of the focal length
 };
 

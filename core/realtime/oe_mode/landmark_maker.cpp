@@ -203,9 +203,9 @@ bool LandmarkMaker::make_one(const View& view, const FastCorner& corner, int oct
     const OwnLens& own = view.frame.lens;
     const double time_s = time_of_row(view.frame.motion, calibration.line_delay, u.y());
     const Vector2<double> by_zoom =
-        to_tangent * (J_d_parameters.col(index(Parameter::kFocalLength)) * view.lens->direction_f +
-                      J_d_parameters.col(index(Parameter::kRadialDistortion)) *
-                          view.lens->direction_k);
+        to_tangent *
+        (J_d_parameters.col(index(Parameter::kFocalLength)) * view.lens->direction_f +
+         J_d_parameters.col(index(Parameter::kRadialDistortion)) * view.lens->direction_k);
     sensitivity += by_zoom * own.sensitivity_at(time_s);
     landmark.covariance += own.variance(time_s) * by_zoom * by_zoom.transpose();
   }
@@ -213,7 +213,8 @@ bool LandmarkMaker::make_one(const View& view, const FastCorner& corner, int oct
   landmark.shared_covariance =
       view.frame.shared_covariance + view.frame.covariance.topLeftCorner<2, 2>();
   int slot = 0;
-  return view.map->insert(landmark, view.frame.frame, &slot, view.frame.lens.zoom) == InsertStatus::kOk;
+  return view.map->insert(landmark, view.frame.frame, &slot, view.frame.lens.zoom) ==
+         InsertStatus::kOk;
 }
 
 bool LandmarkMaker::is_textured(const Pyramid& pyramid, const Octaves& octaves) {

@@ -110,7 +110,7 @@ LandmarkMap::Key LandmarkMap::cell_of(const Vector3<double>& d, int octave, int 
   if (column >= columns) column = 0;  // pi is where -pi is
   // Fewer than 2^23 of either, by kMinCellSize.
   return static_cast<Key>(zoom & 0xff) << 56 | static_cast<Key>(octave) << 48 |
-          static_cast<Key>(ring) << 24 | static_cast<Key>(column);
+         static_cast<Key>(ring) << 24 | static_cast<Key>(column);
 }
 
 std::size_t LandmarkMap::home(Key key) const {
@@ -146,8 +146,7 @@ int LandmarkMap::slot_of_least_worth(std::uint32_t now) const {
   return least;
 }
 
-InsertStatus LandmarkMap::insert(const Landmark& landmark, std::uint32_t now, int* slot,
-                                 int zoom) {
+InsertStatus LandmarkMap::insert(const Landmark& landmark, std::uint32_t now, int* slot, int zoom) {
   if (landmark.octave >= kMaxOctaves || !is_unit(landmark.d)) return InsertStatus::kBad;
   if (cell_taken(landmark.d, landmark.octave, zoom)) return InsertStatus::kCellTaken;
   if (size_ == capacity()) {

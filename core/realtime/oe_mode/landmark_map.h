@@ -89,11 +89,11 @@ class LandmarkMap {
   [[nodiscard]] int slot_of_least_worth(std::uint32_t now) const;
   void place(int slot, const Vector3<double>& d);  // where find() looks for it
 
-  std::vector<Landmark> landmarks_;       // by slot
-  std::vector<Key> cells_;                // by slot
-  std::vector<float> x_, y_, z_;          // by slot; free ones are far from the sphere
-  std::vector<int> free_;                 // slots, the next to give last; size_ of them are not
-  std::vector<int> table_;                // slots by cell, or kNone: linear probing
+  std::vector<Landmark> landmarks_;  // by slot
+  std::vector<Key> cells_;           // by slot
+  std::vector<float> x_, y_, z_;     // by slot; free ones are far from the sphere
+  std::vector<int> free_;            // slots, the next to give last; size_ of them are not
+  std::vector<int> table_;           // slots by cell, or kNone: linear probing
   std::array<Rings, 2 * kMaxZoom + 1> rings_{};  // from pole to pole, by zoom and octave
   double cell_size_ = 0;
   int size_ = 0;

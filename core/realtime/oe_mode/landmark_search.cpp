@@ -95,8 +95,7 @@ void LandmarkSearch::conclude(const Vector6& correction, const Vector2<double>& 
 }
 
 void LandmarkSearch::find_visible(const SearchedFrame& frame, const ViewProjection& view) {
-  visible_.find(frame.calibration, frame.map, view, frame.pyramid.octaves(),
-                frame.lens != nullptr);
+  visible_.find(frame.calibration, frame.map, view, frame.pyramid.octaves(), frame.lens != nullptr);
 }
 
 // Of a landmark that is looked for soon. Its pixels are needed where its patch is prepared again, which is rare.
@@ -112,12 +111,11 @@ void LandmarkSearch::ask_for(const SearchedFrame& frame, const VisibleLandmark& 
 const ReferencePatch* LandmarkSearch::reference(const SearchedFrame& frame, int slot, int octave,
                                                 const SeenDirection& seen) {
   const Landmark& landmark = frame.map.at(slot);
-  const Matrix2<double> J_octave =
-      std::ldexp(1.0, -octave) * seen.J_d * tangent_basis(landmark.d);
+  const Matrix2<double> J_octave = std::ldexp(1.0, -octave) * seen.J_d * tangent_basis(landmark.d);
   const Matrix2<double> A = landmark.J_pixel_tangent * J_octave.inverse();
   Prepared& prepared = prepared_[static_cast<std::size_t>(slot)];
   const float at_rest = frame.octaves.is_coarse(octave) ? options_.coarse_warp_tolerance
-                                                         : options_.fine_warp_tolerance;
+                                                        : options_.fine_warp_tolerance;
   const float tolerance = frame.zooms ? options_.zooming_warp_tolerance : at_rest;
   const Matrix2<float> wanted = A.cast<float>();
   if (prepared.id != landmark.id || !((prepared.A - wanted).cwiseAbs().maxCoeff() <= tolerance)) {
@@ -126,9 +124,9 @@ const ReferencePatch* LandmarkSearch::reference(const SearchedFrame& frame, int 
         (wanted - Matrix2<float>::Identity()).cwiseAbs().maxCoeff() <= 0.5F * tolerance;
     prepared.A = alike ? Matrix2<float>::Identity() : wanted;
     prepared.id = landmark.id;
-    prepared.status = prepare(landmark.image(), Vector2<double>::Constant(kReferenceCentre),
-                              prepared.A.cast<double>(),
-                              frame.octaves.least_contrast(octave), &prepared.patch);
+    prepared.status =
+        prepare(landmark.image(), Vector2<double>::Constant(kReferenceCentre),
+                prepared.A.cast<double>(), frame.octaves.least_contrast(octave), &prepared.patch);
   }
   prepared.B = prepared.A.inverse() * (wanted - prepared.A);
   return is_usable(prepared.status) ? &prepared.patch : nullptr;

@@ -51,9 +51,9 @@ struct LandmarkSearchOptions {
 
 // One landmark in one frame.
 struct OeObservation {
-  int slot = 0;          // of the map
-  std::uint32_t id = 0;  // of the landmark
-  int octave = 0;        // in which it was found
+  int slot = 0;                                          // of the map
+  std::uint32_t id = 0;                                  // of the landmark
+  int octave = 0;                                        // in which it was found
   Vector2<double> u = Vector2<double>::Zero();           // px of the image, where it was found
   Matrix2<double> covariance = Matrix2<double>::Zero();  // px^2, of u
   Vector2<double> residual = Vector2<double>::Zero();  // px, found minus predicted by the solution

@@ -68,7 +68,8 @@ struct LensColumns {
   void to_map(Sensitivity<kRows>* S) const {
     const int f = index(Parameter::kFocalLength);
     const int k = index(Parameter::kRadialDistortion);
-    S->col(f) = (S->col(f) * focal_length + S->col(k) * (by_zoom - of_k * direction_k)) / direction_f;
+    S->col(f) =
+        (S->col(f) * focal_length + S->col(k) * (by_zoom - of_k * direction_k)) / direction_f;
     S->col(k) *= of_k;
   }
   template <int kRows>
@@ -81,9 +82,9 @@ struct LensColumns {
   }
   void to_frame(ParameterCovariance<double>* covariance) const;
 
-  double focal_length, by_zoom;      // of the frame's lens: f, d k / d log f
+  double focal_length, by_zoom;     // of the frame's lens: f, d k / d log f
   double direction_f, direction_k;  // a
-  double of_k;                       // (f / f_a)^2
+  double of_k;                      // (f / f_a)^2
 };
 
 }  // namespace alidade

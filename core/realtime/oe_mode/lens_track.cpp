@@ -38,8 +38,7 @@ LensTrack::State LensTrack::predicted(double time_s, bool moves) const {
   if (!moves && rested_) {
     out.value[1] = 0;
     out.covariance.setZero();
-    out.covariance(0, 0) =
-        state_.covariance(0, 0) + options_.drift * options_.drift * std::abs(dt);
+    out.covariance(0, 0) = state_.covariance(0, 0) + options_.drift * options_.drift * std::abs(dt);
     out.covariance(1, 1) = kRestingRate * kRestingRate;
     out.sensitivity.row(1).setZero();
     return out;
@@ -79,8 +78,7 @@ void LensTrack::learn(double time_s, bool moves, const State& predicted, const S
   const double full = prior * information / (1 + prior * information);
   const double share = gain / full;
   state_.value[0] += share * (solved.value[0] - predicted.value[0]);
-  state_.sensitivity.row(0) +=
-      share * (solved.sensitivity.row(0) - predicted.sensitivity.row(0));
+  state_.sensitivity.row(0) += share * (solved.sensitivity.row(0) - predicted.sensitivity.row(0));
   const double least = options_.least_sigma * options_.least_sigma;
   state_.covariance(0, 0) = std::max(least, prior * (1 - gain));
 }

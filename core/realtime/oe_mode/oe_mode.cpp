@@ -426,9 +426,8 @@ bool OeMode::take_lens(const FrameLens* lens) {
     last_reading_focal_length_ = lens->calibration.camera.focal_length;
   }
   if (!track_.active()) {
-    const bool moved =
-        lens != nullptr && (lens->moves || lens->calibration.camera.focal_length !=
-                                               given_.camera.focal_length);
+    const bool moved = lens != nullptr && (lens->moves || lens->calibration.camera.focal_length !=
+                                                              given_.camera.focal_length);
     if (!moved) return true;
     if (map_.size() == 0) {
       // A map begins with a lens at rest: of one that moves its landmarks would be sheared unawares.
@@ -537,8 +536,8 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
   const LensTrack::State predicted_before = predicted_lens_;
   if (had_own) {
     if (follows && few) {
-      set_camera(zoomed(calibration_.camera, predicted_lens_.value[0] -
-                                                 std::log(calibration_.camera.focal_length)));
+      set_camera(zoomed(calibration_.camera,
+                        predicted_lens_.value[0] - std::log(calibration_.camera.focal_length)));
       const Solution second = look_with_own_lens(carried, predicted);
       if (holds(second)) return second;
     }
@@ -586,9 +585,8 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
 void OeMode::learn_own_lens(const Solution& solution, double zoom_rate) {
   const SolvedZoom& zoom = solution.solved.zoom;
   set_camera(zoomed(solution.camera, zoom.correction[0]));
-  LensTrack::State state{{std::log(calibration_.camera.focal_length), zoom_rate},
-                         zoom.covariance,
-                         zoom.sensitivity};
+  LensTrack::State state{
+      {std::log(calibration_.camera.focal_length), zoom_rate}, zoom.covariance, zoom.sensitivity};
   frames_lost_ = 0;
   const bool moves = !at_rest();
   track_.learn(frame_.time_s, moves, predicted_lens_, state);

@@ -151,7 +151,7 @@ class OeMode {
   };
 
   [[nodiscard]] SearchedFrame searched() const {
-    return {calibration_, map_, pyramid_, octaves_, columns_ ? &*columns_ : nullptr,
+    return {calibration_,          map_, pyramid_, octaves_, columns_ ? &*columns_ : nullptr,
             columns_ && !at_rest()};
   }
   void begin_frame(const ImageView& image, double frame_time_s,
@@ -229,13 +229,13 @@ class OeMode {
   double share_of_new_ = 0;   // of the landmarks in view, made by the maintain() before
 
   // Of the frame's lens, where it is not the map's.
-  std::optional<FrameLens> reading_;    // of the frame
+  std::optional<FrameLens> reading_;  // of the frame
   std::optional<LensColumns> columns_;
   LensTrack::State predicted_lens_;
-  int frames_at_rest_ = 0;       // in a row
-  int frames_lost_ = 0;          // in a row
-  bool reading_contradicted_ = false;  // by the frame that landmarks held last
-  double cells_focal_length_ = 1;  // px, that the map's cells are for
+  int frames_at_rest_ = 0;                // in a row
+  int frames_lost_ = 0;                   // in a row
+  bool reading_contradicted_ = false;     // by the frame that landmarks held last
+  double cells_focal_length_ = 1;         // px, that the map's cells are for
   double last_reading_focal_length_ = 1;  // px, by the last reading
 
   OeStatistics statistics_;

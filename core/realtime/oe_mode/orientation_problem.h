@@ -73,7 +73,11 @@ class OrientationProblem {
   // lens: null where phi is known to be 0. zoom: null where the frame's lens is the map's.
   OrientationProblem(FoundLandmark* landmarks, int count, double unit_s, const LensScale* lens,
                      const ZoomPrior* zoom)
-      : landmarks_(landmarks), count_(count), unit_s_(unit_s), lens_(lens), zooms_(zoom != nullptr) {
+      : landmarks_(landmarks),
+        count_(count),
+        unit_s_(unit_s),
+        lens_(lens),
+        zooms_(zoom != nullptr) {
     if (zooms_) {
       const Vector2<double> scale(1, unit_s);
       zoom_.value = scale.cwiseProduct(zoom->value);
@@ -216,7 +220,8 @@ class OrientationProblem {
   }
   [[nodiscard]] Vector2<double> left(int i, const MotionAndLens& at) const {
     if (zooms_) return left<Unknowns::kAll>(i, at);
-    return lens_ != nullptr ? left<Unknowns::kMotionAndLens>(i, at) : left<Unknowns::kMotion>(i, at);
+    return lens_ != nullptr ? left<Unknowns::kMotionAndLens>(i, at)
+                            : left<Unknowns::kMotion>(i, at);
   }
 
   template <Unknowns unknowns>

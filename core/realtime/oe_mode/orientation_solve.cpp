@@ -81,8 +81,7 @@ WithoutAngles solve_without_angles(const OrientationProblem& problem, const Scal
   out.x = factor.solve(b);
   const LensScale* lens = problem.lens();
   if (lens == nullptr) return out;
-  out.row = row_of_lens(problem, prior, weights, inflation,
-                        problem.zooms() ? &out.zoom : nullptr);
+  out.row = row_of_lens(problem, prior, weights, inflation, problem.zooms() ? &out.zoom : nullptr);
   out.by_lens = factor.solve(out.row.c);
   // Landmarks that came with this lens know nothing of it, but for rounding.
   out.information = std::max(0.0, out.row.information - out.row.c.dot(out.by_lens));

@@ -114,7 +114,7 @@ struct SolvedMotion {
   Sensitivity<6> sensitivity = Sensitivity<6>::Zero();          // of correction
   Sensitivity<2> offset_correction_sensitivity = Sensitivity<2>::Zero();  // of offset_correction
   SolvedLens lens;                                                        // where it is learnt
-  SolvedZoom zoom;  // where the prior has one
+  SolvedZoom zoom;                                                        // where the prior has one
   int inliers = 0;
   double inflation = 1;      // of the landmarks' covariances
   double contradiction = 0;  // chi-square, 2 degrees of freedom, of landmarks against telemetry

@@ -49,7 +49,7 @@ struct ProcessedFrame {
   FrameTelemetry telemetry = FrameTelemetry::kNone;
   double look_up_time_s = 0;  // telemetry clock, as telemetry was asked for it
   double look_up_sigma_s = 0;
-  FrameMotion<double> motion;            // map's frame, about the middle row; its zoom_rate is solved
+  FrameMotion<double> motion;  // map's frame, about the middle row; its zoom_rate is solved
   Matrix6 covariance = Matrix6::Zero();  // of motion, by the frame's own noise
   Matrix2<double> shared_covariance =
       Matrix2<double>::Zero();                          // rad^2, of its angles, by the map's

@@ -159,13 +159,13 @@ class ViewProjection {
     return false;
   }
 
-  Camera<double> camera_;      // at the middle row
+  Camera<double> camera_;     // at the middle row
   double to_middle_row_ = 1;  // its focal length over that at the reference row
   double line_delay_;
   FrameMotion<double> motion_;
   double middle_row_;
   double zoom_to_last_row_;  // change of log f from the middle row on
-  Matrix3<double> R_[3];  // camera from base: R_[0] + s R_[1] + s^2 R_[2], s from -1 to 1
+  Matrix3<double> R_[3];     // camera from base: R_[0] + s R_[1] + s^2 R_[2], s from -1 to 1
   Matrix<double, 3, 2> J_xi_angle_;
   Matrix<double, 3, 4> J_xi_axes_;
 };

@@ -16,8 +16,8 @@ VisibleLandmarks::VisibleLandmarks(int capacity) {
 }
 
 int octaves_larger(const Landmark& landmark, double focal_length) {
-  const double made_px = std::ldexp(
-      std::sqrt(std::abs(landmark.J_pixel_tangent.determinant())), landmark.octave);
+  const double made_px =
+      std::ldexp(std::sqrt(std::abs(landmark.J_pixel_tangent.determinant())), landmark.octave);
   return static_cast<int>(std::lround(std::log2(focal_length / made_px)));
 }
 

@@ -187,8 +187,7 @@ TEST(LensColumns, AreOfTheSameChangesForEveryLens) {
     Camera<double> camera = other;
     const double factor = std::exp(change);
     camera.focal_length *= factor;
-    camera.radial_distortion =
-        (camera.radial_distortion + corner) * factor * factor;
+    camera.radial_distortion = (camera.radial_distortion + corner) * factor * factor;
     Vector2<double> out;
     EXPECT_EQ(project(camera, d, &out), ProjectionStatus::kOk);
     return out;

@@ -35,8 +35,8 @@ struct LensWorld {
   double correlation = 0.5;  // of phi and g
   double knows_lens = 0;     // 1: the landmarks came with this lens from here, 0: they are right
   bool has_telemetry = true;
-  double claimed = 1;  // landmarks err by so much of what they claim
-  double zoom = 0;     // sigma of log f of the frame's own lens; 0: it has none
+  double claimed = 1;      // landmarks err by so much of what they claim
+  double zoom = 0;         // sigma of log f of the frame's own lens; 0: it has none
   double zoom_rate = 0.5;  // 1/s, likewise of its rate
 };
 

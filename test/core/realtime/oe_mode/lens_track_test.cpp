@@ -19,8 +19,7 @@ constexpr double kRateSigma = 5e-3;   // 1/s
 LensTrack::State joined(const LensTrack::State& predicted, const Vector2<double>& measured) {
   Matrix2<double> noise = Matrix2<double>::Zero();
   noise.diagonal() << kFrameSigma * kFrameSigma, kRateSigma * kRateSigma;
-  const Matrix2<double> gain =
-      predicted.covariance * (predicted.covariance + noise).inverse();
+  const Matrix2<double> gain = predicted.covariance * (predicted.covariance + noise).inverse();
   LensTrack::State out = predicted;
   out.value += gain * (measured - predicted.value);
   out.covariance = predicted.covariance - gain * predicted.covariance;
@@ -47,7 +46,8 @@ TEST(LensTrack, ErrsAsItsCovarianceSaysWhileTheLensMoves) {
       const Vector2<double> off = predicted.value - truth;
       of_predicted += off.dot(predicted.covariance.inverse() * off) / (kRuns * kFrames);
       const LensTrack::State state = joined(
-          predicted, truth + Vector2<double>(kFrameSigma * normal(random), kRateSigma * normal(random)));
+          predicted,
+          truth + Vector2<double>(kFrameSigma * normal(random), kRateSigma * normal(random)));
       track.learn(k * kPeriod_s, true, predicted, state);
       const Vector2<double> error = track.state().value - truth;
       squares += error.dot(track.state().covariance.inverse() * error) / (kRuns * kFrames);
@@ -85,10 +85,10 @@ TEST(LensTrack, TakesWhatLandmarksSayAtRestForOneAnswer) {
 
 TEST(LensTrack, RefusesOptionsThatMakeNoSense) {
   EXPECT_TRUE(LensTrackOptions{}.validate());
-  for (const auto& spoil : {+[](LensTrackOptions* o) { o->acceleration = 0; },
-                            +[](LensTrackOptions* o) { o->drift = -1; },
-                            +[](LensTrackOptions* o) { o->longest_s = 0; },
-                            +[](LensTrackOptions* o) { o->least_sigma = std::nan(""); }}) {
+  for (const auto& spoil :
+       {+[](LensTrackOptions* o) { o->acceleration = 0; },
+        +[](LensTrackOptions* o) { o->drift = -1; }, +[](LensTrackOptions* o) { o->longest_s = 0; },
+        +[](LensTrackOptions* o) { o->least_sigma = std::nan(""); }}) {
     LensTrackOptions options;
     spoil(&options);
     const char* error = nullptr;

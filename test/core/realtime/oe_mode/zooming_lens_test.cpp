@@ -97,8 +97,8 @@ std::map<int, std::vector<std::uint8_t>> ZoomingLens::images_;
 
 TEST_F(ZoomingLens, IsFollowedOverTwoOctavesAndBackToRest) {
   begin();
-  const double of_map = std::sqrt(frame_.calibration.covariance(0, 0)) /
-                        frame_.calibration.camera.focal_length;
+  const double of_map =
+      std::sqrt(frame_.calibration.covariance(0, 0)) / frame_.calibration.camera.focal_length;
   double rms_square = 0;
   int moving = 0;
   for (int k = last_of_wide_ + 1; k < first_of_tele_ + 20; ++k) {
@@ -113,8 +113,10 @@ TEST_F(ZoomingLens, IsFollowedOverTwoOctavesAndBackToRest) {
     ++moving;
     rms_square += errors_.rms_px * errors_.rms_px;
     // d log f / dt as the motor has it.
-    const double true_rate = std::log(camera_->camera().lens_at(camera_->time_s(k) + 1e-3).focal_length /
-                                      camera_->camera().lens_at(camera_->time_s(k) - 1e-3).focal_length) / 2e-3;
+    const double true_rate =
+        std::log(camera_->camera().lens_at(camera_->time_s(k) + 1e-3).focal_length /
+                 camera_->camera().lens_at(camera_->time_s(k) - 1e-3).focal_length) /
+        2e-3;
     EXPECT_NEAR(frame_.zoom_rate, true_rate, 0.02) << k;
   }
   EXPECT_GT(moving, 40);
@@ -153,10 +155,9 @@ TEST_F(ZoomingLens, IsFollowedWhereItsReadingIsStuck) {
   for (int k = last_of_wide_ + 1; k <= last_of_wide_ + frames; ++k) {
     const bool contradicted = std::abs(std::log(found / told)) > 5 * kRepeatability;
     const FrameLens lens =
-        contradicted
-            ? camera_->lens_of_focal_length(
-                  found * std::exp(frame_.zoom_rate * camera_->time_s(1)), kRepeatability)
-            : stuck;
+        contradicted ? camera_->lens_of_focal_length(
+                           found * std::exp(frame_.zoom_rate * camera_->time_s(1)), kRepeatability)
+                     : stuck;
     const bool ok = process(k, &lens) == OeStatus::kOk;
     held += ok ? 1 : 0;
     found = ok ? frame_.calibration.camera.focal_length : told;
