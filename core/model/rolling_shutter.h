@@ -4,6 +4,7 @@
 //   angle(v) = angle + rate t + acceleration t^2 / 2,  t = (v - reference_row) * line_delay
 //   back-projection, direct:    d_b = R_base_from_camera(angle(v)) unproject(u),  v = u_v
 //   projection, solved for v:   v = project(R_base_from_camera(angle(v))^T d_b)_v
+//   while the lens zooms:       log f(v) = log f + zoom_rate t, the distortion in the corner as it is: k(v) = k (f(v) / f)^2
 // Where PTCEE 26, 27 hold the body rate constant, here the ANGLES move at constant rates, or, where
 // somebody knows them, at constant accelerations: half a field of view a second gained in a second bends a
 // frame that is read out in 30 ms by 0.1 px.
@@ -27,18 +28,20 @@
 namespace alidade {
 
 // The mount's motion about one frame: TRUE angles (rad) when the row reference_row is exposed, and
-// rates (rad/s) then, constant accelerations (rad/s^2).
+// rates (rad/s) then, constant accelerations (rad/s^2); and that of the lens: d log f / dt (1/s), where the camera is as it is
+// when reference_row is exposed.
 template <class S>
 struct FrameMotion {
   PanTilt<S> angle;
   PanTilt<S> rate;
   S reference_row = S(0);  // px
   PanTilt<S> acceleration = {};
+  S zoom_rate = S(0);
 
   template <class T>
   [[nodiscard]] FrameMotion<T> cast() const {
     return {angle.template cast<T>(), rate.template cast<T>(), T(reference_row),
-            acceleration.template cast<T>()};
+            acceleration.template cast<T>(), T(zoom_rate)};
   }
 };
 
@@ -67,6 +70,41 @@ template <class S>
           motion.rate.tilt + motion.acceleration.tilt * time};
 }
 
+// The camera with another focal length: log f is `change` more, and the distortion in the corner as it was.
+template <class S>
+[[nodiscard]] Camera<S> zoomed(const Camera<S>& camera, const NonDeduced<S>& change) {
+  using std::exp;
+  const S factor = exp(change);
+  Camera<S> out = camera;
+  out.focal_length *= factor;
+  out.radial_distortion *= factor * factor;
+  return out;
+}
+
+// When a row is exposed.
+template <class S>
+[[nodiscard]] Camera<S> camera_at_row(const Camera<S>& camera, const FrameMotion<S>& motion,
+                                      const NonDeduced<S>& line_delay, const NonDeduced<S>& row) {
+  if (motion.zoom_rate == S(0)) return camera;
+  return zoomed(camera, motion.zoom_rate * time_of_row(motion, line_delay, row));
+}
+
+// d y / d log f with the distortion in the corner as it is, from y's Jacobian by the camera.
+template <class S, int kRows>
+[[nodiscard]] Matrix<S, kRows, 1> by_zoom(const Camera<S>& camera,
+                                          const Matrix<S, kRows, kCameraParameterCount>& J_camera) {
+  return camera.focal_length * J_camera.col(0) + S(2) * camera.radial_distortion * J_camera.col(2);
+}
+
+// From that by the camera of a row to that by the camera of the reference row.
+template <class S, int kRows>
+void refer_to_reference_row(const Camera<S>& camera, const Camera<S>& at_row,
+                            Matrix<S, kRows, kCameraParameterCount>* J_camera) {
+  const S factor = at_row.focal_length / camera.focal_length;
+  J_camera->col(0) *= factor;
+  J_camera->col(2) *= factor * factor;
+}
+
 // d (pan, tilt, pan rate, tilt rate) / d Parameter of a motion made from MEASURED angles that were
 // looked up at the image's time plus clock_offset, with rates constant about that time. The total
 // Jacobian of a pixel or direction is J_parameters + J_motion * motion_parameter_jacobian(...).
@@ -91,11 +129,14 @@ template <class S>
     NonDeduced<Matrix<S, 3, kParameterCount>>* J_d_parameters = nullptr) {
   const bool with_jacobians =
       J_d_u != nullptr || J_d_motion != nullptr || J_d_parameters != nullptr;
+  const bool zooms = motion.zoom_rate != S(0);
+  const Camera<S> at_row = camera_at_row(camera, motion, line_delay, u.y());
   Vector3<S> d_c;
   Matrix<S, 3, 2> J_dc_u;
   Matrix<S, 3, kCameraParameterCount> J_dc_camera;
-  const ProjectionStatus status = unproject(camera, u, &d_c, J_d_u != nullptr ? &J_dc_u : nullptr,
-                                            J_d_parameters != nullptr ? &J_dc_camera : nullptr);
+  const ProjectionStatus status =
+      unproject(at_row, u, &d_c, J_d_u != nullptr ? &J_dc_u : nullptr,
+                J_d_parameters != nullptr || (zooms && with_jacobians) ? &J_dc_camera : nullptr);
   if (status != ProjectionStatus::kOk) return status;
 
   Matrix<S, 3, 2> J_xi_angle;
@@ -109,8 +150,11 @@ template <class S>
   if (!with_jacobians) return ProjectionStatus::kOk;
 
   const Matrix3<S> J_d_xi = -R * skew(d_c);
-  const Vector3<S> J_d_time =
-      J_d_xi * (J_xi_angle * rate_at_row(motion, line_delay, u.y()).vector());
+  Vector3<S> J_d_time = J_d_xi * (J_xi_angle * rate_at_row(motion, line_delay, u.y()).vector());
+  if (zooms) {
+    J_d_time += motion.zoom_rate * (R * by_zoom(at_row, J_dc_camera));
+    refer_to_reference_row(camera, at_row, &J_dc_camera);
+  }
   const S rows = u.y() - motion.reference_row;
   if (J_d_u != nullptr) {
     *J_d_u = R * J_dc_u;
@@ -147,15 +191,22 @@ template <class S>
                                           with_jacobians ? &J_xi_angle : nullptr,
                                           J_u_parameters != nullptr ? &J_xi_axes : nullptr);
   const Vector3<S> d_c = R.transpose() * d_b;
+  const bool zooms = motion.zoom_rate != S(0);
+  const Camera<S> at_row = camera_at_row(camera, motion, line_delay, row);
   Matrix<S, 2, 3> J_u_dc;
   Matrix<S, 2, kCameraParameterCount> J_u_camera;
-  const ProjectionStatus status = project(camera, d_c, u, with_jacobians ? &J_u_dc : nullptr,
-                                          J_u_parameters != nullptr ? &J_u_camera : nullptr);
+  const ProjectionStatus status =
+      project(at_row, d_c, u, with_jacobians ? &J_u_dc : nullptr,
+              J_u_parameters != nullptr || (zooms && with_jacobians) ? &J_u_camera : nullptr);
   if (status != ProjectionStatus::kOk || !with_jacobians) return status;
 
   const Matrix<S, 2, 3> J_u_xi = J_u_dc * skew(d_c);
   const Matrix<S, 2, 2> J_u_angle = J_u_xi * J_xi_angle;
-  const Vector2<S> J_u_time = J_u_angle * rate_at_row(motion, line_delay, row).vector();
+  Vector2<S> J_u_time = J_u_angle * rate_at_row(motion, line_delay, row).vector();
+  if (zooms) {
+    J_u_time += motion.zoom_rate * by_zoom(at_row, J_u_camera);
+    refer_to_reference_row(camera, at_row, &J_u_camera);
+  }
   const S rows = row - motion.reference_row;
   if (J_u_row != nullptr) *J_u_row = J_u_time * line_delay;
   if (J_u_d != nullptr) *J_u_d = J_u_dc * R.transpose();

@@ -91,14 +91,20 @@ bool make_frame_orientation(const Calibration& calibration, double time_s, Orien
       sensitivity * calibration.covariance * sensitivity.transpose();
   const Vector3<double> angular_velocity = J_xi_angle * rate.vector();  // PTCEE 46
   if (!std::isfinite(time_s) || !all_finite(R) || !all_finite(angular_velocity) ||
-      !all_finite(motion.acceleration.vector()) || !all_finite(covariance_at_row_0) ||
-      !all_finite(sensitivity_at_row_0) || !all_finite(orientation_covariance)) {
+      !all_finite(motion.acceleration.vector()) || !std::isfinite(motion.zoom_rate) ||
+      !all_finite(covariance_at_row_0) || !all_finite(sensitivity_at_row_0) ||
+      !all_finite(orientation_covariance)) {
     return false;
   }
   out->time_s = time_s;
   out->mode = mode;
   out->landmarks = landmarks;
   out->calibration = calibration;
+  if (motion.zoom_rate != 0) {
+    out->calibration.camera =
+        camera_at_row(calibration.camera, motion, calibration.line_delay, 0.0);
+  }
+  out->zoom_rate = motion.zoom_rate;
   out->angle = angle;
   out->rate = rate;
   out->acceleration = motion.acceleration;

@@ -53,13 +53,16 @@ struct FrameOrientation {
   PanTilt<double> rate;   // rad/s, true
   // rad/s^2, true, constant during the frame; 0 in PT mode, which has its effect in the covariance
   PanTilt<double> acceleration;
+  double zoom_rate = 0;  // 1/s, d log f / dt; the calibration's camera is that of row 0
   MotionCovariance motion_covariance = MotionCovariance::Zero();  // WITHOUT the calibration's part
   Sensitivity<6> motion_sensitivity = Sensitivity<6>::Zero();     // which this tells
   Matrix3<double> R_base_from_camera = r_frd_from_rdf<double>();
   Matrix3<double> orientation_covariance = Matrix3<double>::Zero();  // rad^2, of xi
   Vector3<double> angular_velocity = Vector3<double>::Zero();        // rad/s, camera frame
 
-  [[nodiscard]] FrameMotion<double> motion() const { return {angle, rate, 0.0, acceleration}; }
+  [[nodiscard]] FrameMotion<double> motion() const {
+    return {angle, rate, 0.0, acceleration, zoom_rate};
+  }
   [[nodiscard]] Eigen::Quaterniond quaternion() const {
     return Eigen::Quaterniond(R_base_from_camera);
   }
@@ -78,7 +81,7 @@ struct FrameOrientation {
 [[nodiscard]] Sensitivity<6> telemetry_sensitivity(const Mechanics<double>& mechanics,
                                                    const FrameMotion<double>& motion);
 
-// Fills everything from the true motion about any row, its measurement's covariance and its
+// Fills everything from the true motion about any row, at which the calibration's camera holds, its measurement's covariance and its
 // sensitivity. False if a result is not finite; *out is then untouched.
 [[nodiscard]] bool make_frame_orientation(const Calibration& calibration, double time_s,
                                           OrientationMode mode, int landmarks,

@@ -48,6 +48,7 @@ FrameGeometry pack(const FrameOrientation& frame) {
   out.angle = frame.angle;
   out.rate = frame.rate;
   out.acceleration = frame.acceleration;
+  out.zoom_rate = frame.zoom_rate;
   store(frame.motion_covariance, &out.motion_covariance);
   store(frame.motion_sensitivity, &out.motion_sensitivity);
   return out;
@@ -80,6 +81,7 @@ FrameOrientation unpack(const FrameGeometry& geometry, const PlainCalibration& c
   out.angle = geometry.angle;
   out.rate = geometry.rate;
   out.acceleration = geometry.acceleration;
+  out.zoom_rate = geometry.zoom_rate;
   out.motion_covariance = load<6, 6>(geometry.motion_covariance);
   out.motion_sensitivity = load<6, kParameterCount>(geometry.motion_sensitivity);
   return out;

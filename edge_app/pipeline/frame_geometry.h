@@ -36,6 +36,7 @@ struct FrameGeometry {
   PanTilt<double> angle;  // true, not wrapped
   PanTilt<double> rate;
   PanTilt<double> acceleration;
+  double zoom_rate = 0;  // 1/s
   std::array<double, 36> motion_covariance{};
   std::array<double, 6 * kParameterCount> motion_sensitivity{};
 };

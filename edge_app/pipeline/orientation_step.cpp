@@ -110,6 +110,10 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   }
   telemetry_lost_ = false;
   if (sample.zoom && std::isfinite(*sample.zoom)) {
+    if (zoom_ != sample.zoom) {
+      Calibration there;
+      zoom_on_curve_ = options_.zoom_curve.at(*sample.zoom, &there);
+    }
     zoom_ = sample.zoom;
     if (!zoom_at_adoption_) zoom_at_adoption_ = sample.zoom;
   }
@@ -148,13 +152,32 @@ void OrientationStep::settle_pending_frames() {
 
 void OrientationStep::telemetry_lost() { telemetry_lost_ = true; }
 
+// Of the same curve, by what all its zooms share, and at a zoom to which OE mode has followed the lens.
+bool OrientationStep::keeps_map(const PublishedCalibration& published) const {
+  if (!oe_ || !options_.calibrated || !published.calibrated || !oe_->lens_has_moved()) return false;
+  const Calibration& now = options_.calibration;
+  const Calibration& next = published.calibration;
+  Calibration by_curve;
+  return oe_->statistics().status == OeStatus::kOk && next.zoom &&
+         published.zoom_curve.at(*next.zoom, &by_curve) &&
+         by_curve.camera.focal_length == next.camera.focal_length &&
+         now.line_delay == next.line_delay && now.clock_offset == next.clock_offset &&
+         now.mechanics.pan_axis == next.mechanics.pan_axis &&
+         now.mechanics.tilt_axis == next.mechanics.tilt_axis &&
+         now.mechanics.pan_scale == next.mechanics.pan_scale &&
+         now.mechanics.tilt_scale == next.mechanics.tilt_scale;
+}
+
 void OrientationStep::adopt(const PublishedCalibration& published) {
+  const bool keep = keeps_map(published);
   options_.calibration = published.calibration;
   options_.calibrated = published.calibrated;
   zoom_at_adoption_ = zoom_;
   minimum_delay_sigma_s_ = 0;
   options_.zoom_curve = published.zoom_curve;
-  if (oe_) oe_->reset(published.calibration, published.map, focal_length());
+  Calibration there;
+  zoom_on_curve_ = zoom_ && options_.zoom_curve.at(*zoom_, &there);
+  if (oe_ && !keep) oe_->reset(published.calibration, published.map, focal_length());
 }
 
 FocalLength OrientationStep::focal_length() const {
@@ -245,7 +268,19 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   record.clock_locked = clock.state == ClockState::kLocked;
   record.status = status_of_telemetry(query, telemetry_lost_, record.clock_locked);
   tracks_.telemetry_too_old = record.status == RecordStatus::kTelemetryTooOld;
-  if (!zoom_fits() || zoom_moved(telemetry_time_s)) {
+  const bool elsewhere = !zoom_fits() || zoom_moved(telemetry_time_s);
+  if (elsewhere || (oe_ && oe_->lens_has_moved())) {
+    FrameLens lens;
+    if (follows_lens() && look_up_lens(telemetry_time_s, &lens)) {
+      record.calibrated = true;
+      record.camera = pack(lens.calibration);
+      const bool excluded = found_focal_length_ > 0;
+      orient(has_result(query) ? &measured : nullptr, image, &lens, &record);
+      events->zoom_contradicted = !excluded && found_focal_length_ > 0;
+      return record;
+    }
+  }
+  if (elsewhere) {
     // The map is another zoom's.
     image_ = finds_landmarks() ? ImageView{} : image_;
     // Neither the lens nor the axes of another zoom are this one's.
@@ -253,8 +288,47 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
       record.status = RecordStatus::kOtherZoom;
     return record;
   }
-  orient(has_result(query) ? &measured : nullptr, image, &record);
+  orient(has_result(query) ? &measured : nullptr, image, nullptr, &record);
   return record;
+}
+
+bool OrientationStep::look_up_lens(double telemetry_time_s, FrameLens* lens) {
+  const double readout_s =
+      std::abs(options_.calibration.line_delay) * options_.calibration.camera.height;
+  if (!zoom_lookup_.lens(options_.zoom_curve, telemetry_time_s, readout_s, options_.zoom_tolerance,
+                         lens)) {
+    return false;
+  }
+  read_lens_ = lens->calibration;
+  lens_time_s_ = telemetry_time_s;
+  constexpr double kLongest_s = 0.5;  // without landmarks: as LensTrackOptions::longest_s
+  const double age_s = telemetry_time_s - found_time_s_;
+  if (!(age_s < kLongest_s)) found_focal_length_ = 0;
+  FrameLens found;
+  if (found_focal_length_ > 0 &&
+      lens_of_focal_length(options_.zoom_curve, found_focal_length_ * std::exp(found_rate_ * age_s),
+                           &found)) {
+    *lens = found;
+    lens->rate = found_rate_;
+    constexpr double kAcceleration = 2;  // 1/s^2, a motor's
+    const double change = kAcceleration * age_s * age_s / 2 * lens->calibration.camera.focal_length;
+    const int f = index(Parameter::kFocalLength);
+    lens->calibration.covariance(f, f) += change * change;
+  }
+  return true;
+}
+
+void OrientationStep::judge_reading(const FrameOrientation& found) {
+  constexpr double kExcluded = 5;  // standard deviations
+  const int f = index(Parameter::kFocalLength);
+  const Camera<double>& camera = found.calibration.camera;
+  const double change = std::log(camera.focal_length / read_lens_.camera.focal_length);
+  const double sigma =
+      std::hypot(std::sqrt(found.calibration.covariance(f, f)) / camera.focal_length,
+                 std::sqrt(read_lens_.covariance(f, f)) / read_lens_.camera.focal_length);
+  found_focal_length_ = std::abs(change) > kExcluded * sigma ? camera.focal_length : 0;
+  found_rate_ = found.zoom_rate;
+  found_time_s_ = lens_time_s_;
 }
 
 bool OrientationStep::orient_between(const InterpolatedPanTilt& measured, double telemetry_time_s,
@@ -274,10 +348,10 @@ bool OrientationStep::orient_between(const InterpolatedPanTilt& measured, double
 }
 
 void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageView& image,
-                             OrientationRecord* record) {
+                             const FrameLens* lens, OrientationRecord* record) {
   FrameOrientation frame;
   if (finds_landmarks()) {
-    const OeStatus status = oe_->process(image, *record->time_s, measured, &frame);
+    const OeStatus status = oe_->process(image, *record->time_s, measured, lens, &frame);
     // That the frame's time is not yet known well, sigma says too.
     if (measured != nullptr && status != OeStatus::kOk)
       record->status = status_of_landmarks(status);
@@ -290,6 +364,7 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
     return;
   }
   record->mode = frame.mode == OrientationMode::kOe ? RecordMode::kOe : RecordMode::kPt;
+  if (lens != nullptr && record->mode == RecordMode::kOe) judge_reading(frame);
   record->landmarks = frame.landmarks;
   if (focal_length() == FocalLength::kLearnt) record->camera = pack(frame.calibration);
   if (record->mode == RecordMode::kOe) record->residual_px = residual_rms(*oe_);

@@ -17,7 +17,8 @@
 // An image that is sent again while the camera turns is of another time than its frame: "picture repeated", no orientation
 // (repeated_images.h).
 // A lens that zooms does not come back exactly: with a zoom curve OE mode learns the focal length, too, and the record has it.
-// Where the zoom is another than the calibration's, or moves, its zoom curve gives PT mode a lens (zoom_lookup.h).
+// Where the zoom is another than the calibration's, or moves, its zoom curve gives OE mode, or PT mode, a lens (zoom_lookup.h): OE
+// mode's map stays, also when the calibration of another zoom of the same curve is adopted.
 // While there is no calibration for the camera, or none for the zoom that the pan/tilt source reports, points
 // are followed instead (start_up_tracker.h), for the calibration thread to make one of.
 // After a reconnection the stream's clock begins anew; telemetry from before it is forgotten. The least
@@ -84,7 +85,9 @@ struct OrientationStepOptions {
 struct StepEvents {
   bool video_clock_restarted = false;
   bool video_delay_stepped = false;  // the least delay stepped: flagged, not followed
-  double video_delay_wander_s = 0;   // by how much it was seen to wander; 0: it does not
+  bool zoom_contradicted =
+      false;  // images exclude the focal length of the zoom reading, from this frame on
+  double video_delay_wander_s = 0;  // by how much it was seen to wander; 0: it does not
   // The sender's time stamps run at another rate than the pictures come, and are left out from this frame on: their
   // rate less one.
   std::optional<double> stamps_left_out;
@@ -108,7 +111,9 @@ class OrientationStep {
   // points through it.
   void maintain();
   // In OE mode, with the calibration and the zoom of this moment.
-  [[nodiscard]] bool finds_landmarks() const { return oe_ && options_.calibrated && zoom_fits(); }
+  [[nodiscard]] bool finds_landmarks() const {
+    return oe_ && options_.calibrated && (zoom_fits() || follows_lens());
+  }
   // In OE mode, or following points.
   [[nodiscard]] bool looks_at_images() const { return finds_landmarks() || start_up_; }
   // What the frame last added, and maintained, has for the calibration thread.
@@ -132,11 +137,18 @@ class OrientationStep {
   [[nodiscard]] bool zoom_fits() const;
   // With a zoom curve: the reading fits, but did not when a frame of this telemetry time was taken, or is not known.
   [[nodiscard]] bool zoom_moved(double telemetry_time_s) const;
+  // OE mode has a map that it has followed to this zoom, or can follow there.
+  [[nodiscard]] bool follows_lens() const {
+    return oe_ && options_.calibrated && zoom_on_curve_ && oe_->map().size() > 0;
+  }
+  // The map is of use with what is published, and worth more than what comes with it.
+  [[nodiscard]] bool keeps_map(const PublishedCalibration& published) const;
   [[nodiscard]] bool is_stalled_poll(const PanTiltSample& sample);
   // Frames that extrapolated telemetry answered, and that telemetry encloses by this sample.
   void settle_pending_frames();
   // Completes a record that has its time and telemetry's status; measured: null if there is none.
-  void orient(const InterpolatedPanTilt* measured, const ImageView& image,
+  // lens: of the frame, where that may be another than the calibration's; else null.
+  void orient(const InterpolatedPanTilt* measured, const ImageView& image, const FrameLens* lens,
               OrientationRecord* record);
 
   OrientationStepOptions options_;
@@ -149,7 +161,20 @@ class OrientationStep {
   [[nodiscard]] bool orient_between(const InterpolatedPanTilt& measured, double telemetry_time_s,
                                     OrientationRecord* record);
 
+  // What the zoom's readings say of a frame's lens; where OE mode excluded that in the frame before, the curve's at the focal length
+  // that OE mode found.
+  [[nodiscard]] bool look_up_lens(double telemetry_time_s, FrameLens* lens);
+  // After OE mode's answer: whether it excludes what the reading says.
+  void judge_reading(const FrameOrientation& found);
+
   std::optional<double> zoom_;  // as last reported
+  Calibration read_lens_;       // by the readings, of the frame last added
+  // Of OE mode where it excludes the reading, at that frame's time; focal length 0: it does not.
+  double found_focal_length_ = 0;  // px
+  double found_rate_ = 0;          // 1/s
+  double found_time_s_ = 0;        // telemetry time
+  double lens_time_s_ = 0;         // likewise, of the frame last added
+  bool zoom_on_curve_ = false;     // zoom_ is one of the zoom curve's
   ZoomLookup zoom_lookup_;
   std::optional<double> zoom_at_adoption_;  // that a calibration without zoom is for
   double minimum_delay_sigma_s_ = 0;

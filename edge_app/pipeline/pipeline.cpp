@@ -367,6 +367,12 @@ void Pipeline::log_clock(const OutputMessage& message) {
     spdlog::warn("{}: the least delay of the video stepped at frame {}; not followed",
                  video_.name(), *message.record.frame);
   }
+  if (events.zoom_contradicted) {
+    spdlog::warn(
+        "{}: its zoom reading is not the zoom that the pictures show from frame {} on: it stands "
+        "still, or comes late; pictures are believed as long as landmarks hold",
+        pan_tilt_.name(), *message.record.frame);
+  }
   const double now_s = monotonic_now_s();
   if (events.video_delay_wander_s == 0 || now_s < wander_logged_at_s_ + kWanderLogInterval_s)
     return;

@@ -64,4 +64,69 @@ bool ZoomLookup::calibration(const ZoomCurve& curve, double time_s, double reado
   return true;
 }
 
+bool ZoomLookup::lens(const ZoomCurve& curve, double time_s, double readout_s, double tolerance,
+                      FrameLens* lens) const {
+  if (!calibration(curve, time_s, readout_s, &lens->calibration)) return false;
+  const std::size_t after = newer_of(time_s);
+  const Reading& newer = reading(after);
+  const Reading& older = reading(count_ > 1 ? after + 1 : after);
+  const Reading& next = reading(after > 0 ? after - 1 : after);
+  const double low = std::min({newer.zoom, older.zoom, next.zoom});
+  const double high = std::max({newer.zoom, older.zoom, next.zoom});
+  lens->moves = high - low > tolerance;
+  lens->rate = 0;
+  lens->rate_sigma = 0;
+  if (!lens->moves) return true;
+  // A motor's speeds, where the curve does not reach.
+  constexpr double kAnyRate = 1;  // 1/s
+  lens->rate_sigma = kAnyRate;
+  Calibration from;
+  Calibration to;
+  if (newer.zoom == older.zoom || !curve.at(older.zoom, &from) || !curve.at(newer.zoom, &to))
+    return true;
+  const double change = std::log(to.camera.focal_length / from.camera.focal_length);
+  lens->rate = change / (newer.time_s - older.time_s);
+  // As even as calibration() has it, between two readings; beyond them anything up to a stop.
+  const bool beyond = time_s > newer.time_s || time_s < older.time_s;
+  constexpr double kUneven = 0.3;
+  lens->rate_sigma = (beyond ? 1 : kUneven) * std::abs(lens->rate);
+  return true;
+}
+
+// By regula falsi, as the curve is monotone and smooth (Illinois: the end that stays counts half).
+bool lens_of_focal_length(const ZoomCurve& curve, double focal_length, FrameLens* lens) {
+  if (curve.empty() || !(focal_length > 0)) return false;
+  constexpr int kMaxSteps = 30;
+  constexpr double kNear = 1e-4;  // of log f: distortion and centre hardly change
+  const double wanted = std::log(focal_length);
+  const auto log_at = [&](double reading, double* out) {
+    if (!curve.at(reading, &lens->calibration)) return false;
+    *out = std::log(lens->calibration.camera.focal_length) - wanted;
+    return true;
+  };
+  double a = curve.first_reading();
+  double b = curve.last_reading();
+  double at_a = 0;
+  double at_b = 0;
+  if (!log_at(a, &at_a) || !log_at(b, &at_b) || at_a * at_b > 0) return false;
+  lens->moves = true;
+  lens->rate = 0;
+  lens->rate_sigma = 1;
+  for (int step = 0; step < kMaxSteps; ++step) {
+    const double middle = at_a == at_b ? a : (a * at_b - b * at_a) / (at_b - at_a);
+    double at_middle = 0;
+    if (!log_at(middle, &at_middle)) return false;
+    if (std::abs(at_middle) < kNear) return true;
+    if (at_middle * at_b < 0) {
+      a = b;
+      at_a = at_b;
+    } else {
+      at_a /= 2;
+    }
+    b = middle;
+    at_b = at_middle;
+  }
+  return false;
+}
+
 }  // namespace alidade

@@ -7,6 +7,7 @@
 #include <cstddef>
 
 #include "core/model/zoom_curve.h"
+#include "core/realtime/oe_mode/frame_lens.h"
 
 namespace alidade {
 
@@ -22,6 +23,9 @@ class ZoomLookup {
   // reading, or the curve ends before it.
   [[nodiscard]] bool calibration(const ZoomCurve& curve, double time_s, double readout_s,
                                  Calibration* calibration) const;
+  // As OE mode needs it, likewise. tolerance: readings so far apart are of a lens that stands, device units.
+  [[nodiscard]] bool lens(const ZoomCurve& curve, double time_s, double readout_s, double tolerance,
+                          FrameLens* lens) const;
 
  private:
   struct Reading {
@@ -41,5 +45,10 @@ class ZoomLookup {
   std::array<Reading, kKept> readings_;
   std::size_t count_ = 0;  // of all
 };
+
+// As the curve has it at the reading where it has this focal length, px: for a lens whose reading is wrong. moves is set. False: the
+// curve does not come there.
+[[nodiscard]] bool lens_of_focal_length(const ZoomCurve& curve, double focal_length,
+                                        FrameLens* lens);
 
 }  // namespace alidade

@@ -25,6 +25,7 @@ struct LandmarkMaker::View {
   const Octaves& octaves;
   const ProcessedFrame& frame;
   LandmarkMap* map;
+  const LensColumns* lens;
 };
 
 bool LandmarkMakerOptions::validate(const char** error) const {
@@ -77,8 +78,9 @@ std::uint8_t& LandmarkMaker::cell_at(const View& view, int octave, const Vector2
 
 double LandmarkMaker::make(const Calibration& calibration, const Pyramid& pyramid,
                            const Octaves& octaves, const ProcessedFrame& frame,
-                           const std::vector<VisibleLandmark>& visible, LandmarkMap* map) {
-  const View view{calibration, pyramid, octaves, frame, map};
+                           const std::vector<VisibleLandmark>& visible, LandmarkMap* map,
+                           const LensColumns* lens) {
+  const View view{calibration, pyramid, octaves, frame, map, lens};
   const auto in_view = static_cast<int>(visible.size());
   const bool empty = in_view < options_.empty_view;
   int budget = empty ? kNoLimit : options_.max_new;
@@ -171,7 +173,7 @@ bool LandmarkMaker::make_one(const View& view, const FastCorner& corner, int oct
   if (rolling_shutter_unproject(calibration.camera, calibration.mechanics, calibration.line_delay,
                                 view.frame.motion, u, &landmark.d, &J_d_u, &J_d_motion,
                                 &J_d_parameters) != ProjectionStatus::kOk ||
-      view.map->cell_taken(landmark.d, octave)) {
+      view.map->cell_taken(landmark.d, octave, view.frame.lens.zoom)) {
     return false;
   }
   for (int row = 0; row < kReferencePixels; ++row) {
@@ -187,19 +189,32 @@ bool LandmarkMaker::make_one(const View& view, const FastCorner& corner, int oct
   landmark.octave = static_cast<std::uint8_t>(octave);
   const Matrix<double, 2, 3> to_tangent = tangent_basis(landmark.d).transpose();
   const Matrix2<double> J_tangent_u = to_tangent * J_d_u;
-  landmark.sensitivity =
-      (to_tangent * (J_d_parameters + J_d_motion * view.frame.sensitivity.topRows<4>()))
-          .cast<float>();
+  if (view.lens != nullptr) view.lens->to_map(&J_d_parameters);
+  Sensitivity<2> sensitivity =
+      to_tangent * (J_d_parameters + J_d_motion * view.frame.sensitivity.topRows<4>());
   landmark.J_pixel_tangent = J_tangent_u.inverse() / to_image;
   // Where its point lies is exact; what makes it find itself elsewhere is the image's noise.
   const Matrix2<double> J_tangent_pixel = to_image * J_tangent_u;
   const double noise = view.octaves.noise(octave);
   landmark.covariance = noise * noise * J_tangent_pixel * patch.unit_covariance.cast<double>() *
                         J_tangent_pixel.transpose();
+  if (view.lens != nullptr) {
+    // What the frame errs by in its own lens is not the map's scale.
+    const OwnLens& own = view.frame.lens;
+    const double time_s = time_of_row(view.frame.motion, calibration.line_delay, u.y());
+    const Vector2<double> by_zoom =
+        to_tangent *
+        (J_d_parameters.col(index(Parameter::kFocalLength)) * view.lens->direction_f +
+         J_d_parameters.col(index(Parameter::kRadialDistortion)) * view.lens->direction_k);
+    sensitivity += by_zoom * own.sensitivity_at(time_s);
+    landmark.covariance += own.variance(time_s) * by_zoom * by_zoom.transpose();
+  }
+  landmark.sensitivity = sensitivity.cast<float>();
   landmark.shared_covariance =
       view.frame.shared_covariance + view.frame.covariance.topLeftCorner<2, 2>();
   int slot = 0;
-  return view.map->insert(landmark, view.frame.frame, &slot) == InsertStatus::kOk;
+  return view.map->insert(landmark, view.frame.frame, &slot, view.frame.lens.zoom) ==
+         InsertStatus::kOk;
 }
 
 bool LandmarkMaker::is_textured(const Pyramid& pyramid, const Octaves& octaves) {

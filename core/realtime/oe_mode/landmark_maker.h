@@ -15,6 +15,7 @@
 #include "core/realtime/image/fast_corners.h"
 #include "core/realtime/image/pyramid.h"
 #include "core/realtime/oe_mode/landmark_map.h"
+#include "core/realtime/oe_mode/lens_scale.h"
 #include "core/realtime/oe_mode/octaves.h"
 #include "core/realtime/oe_mode/processed_frame.h"
 #include "core/realtime/oe_mode/visible_landmarks.h"
@@ -44,11 +45,11 @@ class LandmarkMaker {
   LandmarkMaker(const LandmarkMaker&) = delete;
   LandmarkMaker& operator=(const LandmarkMaker&) = delete;
 
-  // frame.motion is that of the image in the pyramid; visible: landmarks of the map that it shows. Returns
-  // the share of landmarks in view that is new, 0 to 1.
+  // frame.motion is that of the image in the pyramid; visible: landmarks of the map that it shows. lens: where the frame has its
+  // own, as SearchedFrame has it. Returns the share of landmarks in view that is new, 0 to 1.
   double make(const Calibration& calibration, const Pyramid& pyramid, const Octaves& octaves,
               const ProcessedFrame& frame, const std::vector<VisibleLandmark>& visible,
-              LandmarkMap* map);
+              LandmarkMap* map, const LensColumns* lens = nullptr);
 
   // Whether the image has something to show.
   [[nodiscard]] bool is_textured(const Pyramid& pyramid, const Octaves& octaves);

@@ -52,8 +52,12 @@ void LandmarkMap::clear(double cell_size, double largest_cell_size) {
   for (int octave = 0; octave < kMaxOctaves; ++octave) {
     const double size =
         std::max(cell_size_, std::min(std::ldexp(cell_size_, octave), largest_cell_size));
-    const double rings = std::round(kPi / size);
-    rings_[static_cast<std::size_t>(octave)] = std::max(1, static_cast<int>(rings));
+    for (int zoom = -kMaxZoom; zoom <= kMaxZoom; ++zoom) {
+      const double finer = std::exp2(static_cast<double>(zoom) / kZoomsPerOctave);
+      const double rings = std::round(kPi / std::max(size / finer, kMinCellSize));
+      rings_[static_cast<std::size_t>(zoom + kMaxZoom)][static_cast<std::size_t>(octave)] =
+          std::max(1, static_cast<int>(rings));
+    }
   }
   for (std::size_t i = 0; i < free_.size(); ++i) free_[i] = static_cast<int>(free_.size() - 1 - i);
   for (auto* coordinate : {&x_, &y_, &z_}) {
@@ -92,8 +96,10 @@ LandmarkSensitivity& LandmarkMap::sensitivity(int slot) {
 }
 
 // Every ring is as high as the others; its columns are about as wide as it is high in its middle.
-LandmarkMap::Key LandmarkMap::cell_of(const Vector3<double>& d, int octave) const {
-  const int rings = rings_[static_cast<std::size_t>(octave)];
+LandmarkMap::Key LandmarkMap::cell_of(const Vector3<double>& d, int octave, int zoom) const {
+  zoom = std::clamp(zoom, -kMaxZoom, kMaxZoom);
+  const int rings =
+      rings_[static_cast<std::size_t>(zoom + kMaxZoom)][static_cast<std::size_t>(octave)];
   const double height = kPi / rings;
   const double from_pole = std::atan2(std::hypot(d.x(), d.y()), d.z());
   const int ring = std::min(rings - 1, static_cast<int>(from_pole / height));
@@ -103,7 +109,8 @@ LandmarkMap::Key LandmarkMap::cell_of(const Vector3<double>& d, int octave) cons
   int column = static_cast<int>(turn * columns);
   if (column >= columns) column = 0;  // pi is where -pi is
   // Fewer than 2^23 of either, by kMinCellSize.
-  return static_cast<Key>(octave) << 48 | static_cast<Key>(ring) << 24 | static_cast<Key>(column);
+  return static_cast<Key>(zoom & 0xff) << 56 | static_cast<Key>(octave) << 48 |
+         static_cast<Key>(ring) << 24 | static_cast<Key>(column);
 }
 
 std::size_t LandmarkMap::home(Key key) const {
@@ -139,9 +146,9 @@ int LandmarkMap::slot_of_least_worth(std::uint32_t now) const {
   return least;
 }
 
-InsertStatus LandmarkMap::insert(const Landmark& landmark, std::uint32_t now, int* slot) {
+InsertStatus LandmarkMap::insert(const Landmark& landmark, std::uint32_t now, int* slot, int zoom) {
   if (landmark.octave >= kMaxOctaves || !is_unit(landmark.d)) return InsertStatus::kBad;
-  if (cell_taken(landmark.d, landmark.octave)) return InsertStatus::kCellTaken;
+  if (cell_taken(landmark.d, landmark.octave, zoom)) return InsertStatus::kCellTaken;
   if (size_ == capacity()) {
     const int least = slot_of_least_worth(now);
     if (least == kNone) return InsertStatus::kFull;
@@ -157,7 +164,7 @@ InsertStatus LandmarkMap::insert(const Landmark& landmark, std::uint32_t now, in
   landmarks_[i].statistics = {};
   landmarks_[i].statistics.last_frame = now;
   place(*slot, landmark.d);
-  cells_[i] = cell_of(landmark.d, landmark.octave);
+  cells_[i] = cell_of(landmark.d, landmark.octave, zoom);
   table_[position(cells_[i])] = *slot;
   return InsertStatus::kOk;
 }
@@ -187,9 +194,9 @@ void LandmarkMap::refine(int slot, const Vector3<double>& d, const Matrix2<doubl
   landmarks_[static_cast<std::size_t>(slot)].covariance = covariance;
 }
 
-bool LandmarkMap::cell_taken(const Vector3<double>& d, int octave) const {
+bool LandmarkMap::cell_taken(const Vector3<double>& d, int octave, int zoom) const {
   if (octave < 0 || octave >= kMaxOctaves || !is_unit(d)) return false;
-  return table_[position(cell_of(d, octave))] != kNone;
+  return table_[position(cell_of(d, octave, zoom))] != kNone;
 }
 
 // Squares of chords are compared, which floats resolve to 2e-7 rad at any angle, while cosines near 1

@@ -21,7 +21,7 @@ bool LandmarkSearchOptions::validate(const char** error) const {
   if (!(coarse_reach_px > 0)) problem = "coarse_reach_px must be positive";
   if (!(search_sigmas > 0)) problem = "search_sigmas must be positive";
   if (!(cone_margin >= 1)) problem = "cone_margin must be at least 1";
-  if (!(fine_warp_tolerance > 0) || !(coarse_warp_tolerance > 0)) {
+  if (!(fine_warp_tolerance > 0) || !(coarse_warp_tolerance > 0) || !(zooming_warp_tolerance > 0)) {
     problem = "warp tolerances must be positive";
   }
   if (coarse_patches < 1 || coarse_patches > kMaxCoarsePatches) {
@@ -85,16 +85,17 @@ LandmarkSearch::Fine LandmarkSearch::align_fine(const SearchedFrame& frame,
           static_cast<int>(found_.size())};
 }
 
-void LandmarkSearch::conclude(const Vector6& correction) {
+void LandmarkSearch::conclude(const Vector6& correction, const Vector2<double>& zoom) {
   for (std::size_t i = 0; i < found_.size(); ++i) {
     const FoundLandmark& f = found_[i];
-    observations_[i].residual = f.residual - f.J_angle * angle_at(correction, f.time_s);
+    observations_[i].residual = f.residual - f.J_angle * angle_at(correction, f.time_s) -
+                                (zoom[0] + f.time_s * zoom[1]) * f.by_zoom;
     observations_[i].inlier = f.inlier;
   }
 }
 
 void LandmarkSearch::find_visible(const SearchedFrame& frame, const ViewProjection& view) {
-  visible_.find(frame.calibration, frame.map, view);
+  visible_.find(frame.calibration, frame.map, view, frame.pyramid.octaves(), frame.lens != nullptr);
 }
 
 // Of a landmark that is looked for soon. Its pixels are needed where its patch is prepared again, which is rare.
@@ -107,15 +108,15 @@ void LandmarkSearch::ask_for(const SearchedFrame& frame, const VisibleLandmark& 
 }
 
 // The landmark's image as this frame should show it; null if it cannot.
-const ReferencePatch* LandmarkSearch::reference(const SearchedFrame& frame, int slot,
+const ReferencePatch* LandmarkSearch::reference(const SearchedFrame& frame, int slot, int octave,
                                                 const SeenDirection& seen) {
   const Landmark& landmark = frame.map.at(slot);
-  const Matrix2<double> J_octave =
-      std::ldexp(1.0, -landmark.octave) * seen.J_d * tangent_basis(landmark.d);
+  const Matrix2<double> J_octave = std::ldexp(1.0, -octave) * seen.J_d * tangent_basis(landmark.d);
   const Matrix2<double> A = landmark.J_pixel_tangent * J_octave.inverse();
   Prepared& prepared = prepared_[static_cast<std::size_t>(slot)];
-  const float tolerance = frame.octaves.is_coarse(landmark.octave) ? options_.coarse_warp_tolerance
-                                                                   : options_.fine_warp_tolerance;
+  const float at_rest = frame.octaves.is_coarse(octave) ? options_.coarse_warp_tolerance
+                                                        : options_.fine_warp_tolerance;
+  const float tolerance = frame.zooms ? options_.zooming_warp_tolerance : at_rest;
   const Matrix2<float> wanted = A.cast<float>();
   if (prepared.id != landmark.id || !((prepared.A - wanted).cwiseAbs().maxCoeff() <= tolerance)) {
     // Seen as it was, it needs no resampling.
@@ -123,9 +124,9 @@ const ReferencePatch* LandmarkSearch::reference(const SearchedFrame& frame, int 
         (wanted - Matrix2<float>::Identity()).cwiseAbs().maxCoeff() <= 0.5F * tolerance;
     prepared.A = alike ? Matrix2<float>::Identity() : wanted;
     prepared.id = landmark.id;
-    prepared.status = prepare(landmark.image(), Vector2<double>::Constant(kReferenceCentre),
-                              prepared.A.cast<double>(),
-                              frame.octaves.least_contrast(landmark.octave), &prepared.patch);
+    prepared.status =
+        prepare(landmark.image(), Vector2<double>::Constant(kReferenceCentre),
+                prepared.A.cast<double>(), frame.octaves.least_contrast(octave), &prepared.patch);
   }
   prepared.B = prepared.A.inverse() * (wanted - prepared.A);
   return is_usable(prepared.status) ? &prepared.patch : nullptr;
@@ -141,7 +142,7 @@ void LandmarkSearch::prepare_coarse(const SearchedFrame& frame, const ViewProjec
       if (candidate.octave != octave) continue;
       SeenDirection seen;
       if (!view.project(frame.map.at(candidate.slot).d, &seen)) continue;
-      const ReferencePatch* patch = reference(frame, candidate.slot, seen);
+      const ReferencePatch* patch = reference(frame, candidate.slot, octave, seen);
       if (patch == nullptr) continue;
       coarse_.push_back({patch, octave, seen.u, seen.J_angle});
       coarse_slots_.push_back(candidate.slot);
@@ -183,7 +184,7 @@ void LandmarkSearch::fit_fine(const SearchedFrame& frame, const ViewProjection& 
     SeenDirection seen;
     Sensitivity<2> J_parameters;
     if (!view.project(landmark.d, &seen, &J_parameters)) continue;
-    const ReferencePatch* patch = reference(frame, wanted.slot, seen);
+    const ReferencePatch* patch = reference(frame, wanted.slot, wanted.octave, seen);
     if (patch == nullptr) continue;
     const double to_octave = std::ldexp(1.0, -wanted.octave);
     Alignment alignment;
@@ -206,6 +207,11 @@ void LandmarkSearch::fit_fine(const SearchedFrame& frame, const ViewProjection& 
     f.time_s = seen.time_s;
     f.covariance = observation.covariance + J * landmark.covariance * J.transpose();
     f.shared_covariance = landmark.shared_covariance;
+    if (frame.lens != nullptr) {
+      frame.lens->to_map(&J_parameters);
+      f.by_zoom = J_parameters.col(index(Parameter::kFocalLength)) * frame.lens->direction_f +
+                  J_parameters.col(index(Parameter::kRadialDistortion)) * frame.lens->direction_k;
+    }
     f.sensitivity = -J_parameters - J * landmark.sensitivity.cast<double>();
     J_tangent_.push_back(J);
   }

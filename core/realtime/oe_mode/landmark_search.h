@@ -38,6 +38,8 @@ struct LandmarkSearchOptions {
   // As the reference was seen; a patch is prepared again when an element of its warp changed by this, > 0.
   float fine_warp_tolerance = 0.02F;
   float coarse_warp_tolerance = 0.04F;
+  // While the lens zooms every view is another one.
+  float zooming_warp_tolerance = 0.05F;
   double cone_margin = 1.3;  // see VisibleLandmarks::reset(), >= 1
   double search_sigmas = 3;  // of the prediction, that the first search among coarse octaves covers
   double coarse_reach_px = 0.75;  // px of the coarsest octave that alignment finds without a search
@@ -49,9 +51,9 @@ struct LandmarkSearchOptions {
 
 // One landmark in one frame.
 struct OeObservation {
-  int slot = 0;          // of the map
-  std::uint32_t id = 0;  // of the landmark
-  int octave = 0;
+  int slot = 0;                                          // of the map
+  std::uint32_t id = 0;                                  // of the landmark
+  int octave = 0;                                        // in which it was found
   Vector2<double> u = Vector2<double>::Zero();           // px of the image, where it was found
   Matrix2<double> covariance = Matrix2<double>::Zero();  // px^2, of u
   Vector2<double> residual = Vector2<double>::Zero();  // px, found minus predicted by the solution
@@ -64,6 +66,9 @@ struct SearchedFrame {
   const LandmarkMap& map;
   const Pyramid& pyramid;
   const Octaves& octaves;
+  // Where the frame's lens is another than the map's, its columns of sensitivities; null: the same.
+  const LensColumns* lens = nullptr;
+  bool zooms = false;  // the lens moves
 };
 
 class LandmarkSearch {
@@ -74,6 +79,9 @@ class LandmarkSearch {
   LandmarkSearch& operator=(const LandmarkSearch&) = delete;
 
   void reset(const Calibration& calibration);
+  void change_lens(const Calibration& calibration) {
+    visible_.change_lens(calibration, options_.cone_margin);
+  }
   // Nothing is found; to begin a frame with, and when the map is cleared.
   void clear();
 
@@ -95,8 +103,8 @@ class LandmarkSearch {
   Fine align_fine(const SearchedFrame& frame, const FrameMotion<double>& motion);
 
   // Completes observations(): residuals after this correction of `motion` (rad, rad/s, rad/s^2), inliers as
-  // the solution marked them in found().
-  void conclude(const Vector6& correction);
+  // the solution marked them in found(). zoom: correction of the lens (1, 1/s), where the frame has its own.
+  void conclude(const Vector6& correction, const Vector2<double>& zoom = Vector2<double>::Zero());
 
   // The steps of the two stages, in their order, for those who look at each by itself.
   void find_visible(const SearchedFrame& frame, const ViewProjection& view);
@@ -132,7 +140,8 @@ class LandmarkSearch {
   };
 
   void ask_for(const SearchedFrame& frame, const VisibleLandmark& wanted) const;
-  const ReferencePatch* reference(const SearchedFrame& frame, int slot, const SeenDirection& seen);
+  const ReferencePatch* reference(const SearchedFrame& frame, int slot, int octave,
+                                  const SeenDirection& seen);
 
   LandmarkSearchOptions options_;
   VisibleLandmarks visible_;

@@ -94,9 +94,29 @@ void LensScale::move_calibration(double phi, Calibration* calibration) {
 
 ParameterDirection LensScale::move(double phi, Camera<double>* camera) const {
   const bool with_distortion = direction[kOfK] != 0;
-  camera->focal_length *= std::exp(phi);
-  if (with_distortion) camera->radial_distortion *= std::exp(2 * phi);
-  return direction_at(*camera, with_distortion);
+  const double factor = std::exp(phi);
+  camera->focal_length *= factor;
+  if (with_distortion) camera->radial_distortion *= factor * factor;
+  ParameterDirection moved = direction;
+  moved[kOfF] *= factor;
+  moved[kOfK] *= factor * factor;
+  return moved;
+}
+
+LensColumns::LensColumns(const LensScale& lens, const Camera<double>& camera)
+    : focal_length(camera.focal_length),
+      by_zoom(2 * camera.radial_distortion),
+      direction_f(lens.direction[kOfF]),
+      direction_k(lens.direction[kOfK]),
+      of_k(std::pow(focal_length / direction_f, 2)) {}
+
+void LensColumns::to_frame(ParameterCovariance<double>* covariance) const {
+  ParameterCovariance<double> D = ParameterCovariance<double>::Identity();
+  D(kOfF, kOfF) = focal_length / direction_f;
+  D(kOfK, kOfF) = (by_zoom - of_k * direction_k) / direction_f;
+  D(kOfK, kOfK) = of_k;
+  *covariance = (D * *covariance * D.transpose()).eval();
+  *covariance = symmetric<kParameterCount>(*covariance);
 }
 
 }  // namespace alidade

@@ -5,6 +5,8 @@
 //   d / d phi = S a of all that has a Sensitivity S,   a = (f, 2 k or 0) at the parameters f and k, else 0
 // Errors: of the calibration a phi + e, with e, of covariance `others`, independent of what follows; of (g, phi) their own noise plus
 // their sensitivity times e. Landmarks and motions are kept as they come out at phi = 0; what they make of phi is S a.
+// Where the lens has moved since (lens_track.h) all this stays the map's: phi is then the scale of the map's directions, and a frame's
+// own camera has f exp(phi) of its own f. Columns of its parameters become the map's by LensColumns.
 // Plain values; no allocation.
 
 #include "core/model/calibration.h"
@@ -52,6 +54,37 @@ struct LensScale {
  private:
   // Returns the direction there.
   [[nodiscard]] ParameterDirection move(double phi, Camera<double>* camera) const;
+};
+
+// Parameters of a frame's own lens in terms of the map's, by f and k at the map's lens, a = (f_a, a_k):
+//   change of log f, the distortion in the corner as it is    f_a: in the column of f
+//   change of the distortion in the corner                    k (f_a / f)^2: in the column of k
+// All others are the same for both. d / d phi stays S a.
+struct LensColumns {
+  // camera: of the frame.
+  LensColumns(const LensScale& lens, const Camera<double>& camera);
+
+  template <int kRows>
+  void to_map(Sensitivity<kRows>* S) const {
+    const int f = index(Parameter::kFocalLength);
+    const int k = index(Parameter::kRadialDistortion);
+    S->col(f) =
+        (S->col(f) * focal_length + S->col(k) * (by_zoom - of_k * direction_k)) / direction_f;
+    S->col(k) *= of_k;
+  }
+  template <int kRows>
+  void to_frame(Sensitivity<kRows>* S) const {
+    const int f = index(Parameter::kFocalLength);
+    const int k = index(Parameter::kRadialDistortion);
+    S->col(k) /= of_k;
+    S->col(f) =
+        (S->col(f) * direction_f - S->col(k) * (by_zoom - of_k * direction_k)) / focal_length;
+  }
+  void to_frame(ParameterCovariance<double>* covariance) const;
+
+  double focal_length, by_zoom;     // of the frame's lens: f, d k / d log f
+  double direction_f, direction_k;  // a
+  double of_k;                      // (f / f_a)^2
 };
 
 }  // namespace alidade

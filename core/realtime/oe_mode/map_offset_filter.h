@@ -99,6 +99,8 @@ class MapOffsetFilter {
   }
   void learn_scale(double frame_time_s, double measurement, double information,
                    const Sensitivity<1>& sensitivity);
+  // The map's scale errs by so much more, independently: a variance.
+  void doubt_scale(double by) { lens_.variance += by; }
   // phi is in the calibration from here on: what waits is as it would have come out with that.
   void move_lens(Calibration* calibration);
 

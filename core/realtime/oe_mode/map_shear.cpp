@@ -65,13 +65,30 @@ void ShearCorrection::straighten(const Calibration& calibration, const FrameMoti
 }
 
 void MapShear::reset(const Calibration& calibration) {
+  take_lens(calibration);
+  for (Matrix3<double>& covariance : covariances_) covariance.setZero();
+  frame_count_ = 0;
+}
+
+void MapShear::change_lens(const Calibration& calibration) {
+  const double before = s_per_rad_;
+  take_lens(calibration);
+  if (!(before * s_per_rad_ > 0)) return;
+  // Error of an angle at an elevation: rate * s_per_rad * elevation.
+  const double ratio = before / s_per_rad_;
+  const Vector3<double> scale(1, ratio, ratio * ratio);
+  for (Matrix3<double>& covariance : covariances_) {
+    covariance = (scale.asDiagonal() * covariance * scale.asDiagonal()).eval();
+  }
+  frame_count_ = 0;
+}
+
+void MapShear::take_lens(const Calibration& calibration) {
   const Camera<double>& camera = calibration.camera;
   s_per_rad_ = -calibration.line_delay * camera.focal_length * camera.aspect;
   half_readout_s_ = std::abs(calibration.line_delay * camera.height / 2);
   focal_length_ = camera.focal_length;
   field_of_view_ = 2 * std::atan(0.5 * camera.width / camera.focal_length);
-  for (Matrix3<double>& covariance : covariances_) covariance.setZero();
-  frame_count_ = 0;
 }
 
 void MapShear::set(const Covariances& covariances, double tilt) {

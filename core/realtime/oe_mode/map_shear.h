@@ -72,6 +72,8 @@ class MapShear {
 
   // A map without shear.
   void reset(const Calibration& calibration);
+  // The same landmarks through another lens: a sheared row is as long, and is read out in another time.
+  void change_lens(const Calibration& calibration);
   // A map that comes with its shear.
   void set(const Covariances& covariances, double tilt);
   // A map that begins in a frame with this motion: its rates' errors are the shear.
@@ -99,6 +101,8 @@ class MapShear {
 
  private:
   static constexpr std::size_t kCurve = 5;  // angles in a row that give a polynomial of degree 4
+
+  void take_lens(const Calibration& calibration);
 
   struct Frame {
     double time_s = 0;  // middle row

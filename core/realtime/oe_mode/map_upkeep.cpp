@@ -71,19 +71,22 @@ void MapUpkeep::refine(const ProcessedFrame& frame, const LandmarkSearch& search
     if (observation.inlier) {
       const Landmark& landmark = map->at(slot);
       const Matrix2<double> to_tangent = J_tangent.inverse();
-      const Matrix2<double> measured =
-          to_tangent *
-          (frame.inflation * observation.covariance +
-           f.J_angle * frame.covariance.topLeftCorner<2, 2>() * f.J_angle.transpose()) *
-          to_tangent.transpose();
+      Matrix2<double> seen =
+          frame.inflation * observation.covariance +
+          f.J_angle * frame.covariance.topLeftCorner<2, 2>() * f.J_angle.transpose();
+      if (frame.lens.used) {
+        seen += frame.lens.variance(f.time_s) * f.by_zoom * f.by_zoom.transpose();
+      }
+      const Matrix2<double> measured = to_tangent * seen * to_tangent.transpose();
       const Matrix2<double> gain = landmark.covariance * (landmark.covariance + measured).inverse();
       const Vector2<double> change = gain * (to_tangent * observation.residual);
       const Matrix2<double> covariance =
           symmetric<2>((Matrix2<double>::Identity() - gain) * landmark.covariance) +
           options_.least_covariance * measured;
       if (all_finite(change) && all_finite(covariance)) {
-        const Sensitivity<2> unexplained =
+        Sensitivity<2> unexplained =
             f.sensitivity - f.J_angle * angle_at(frame.sensitivity, f.time_s);
+        if (frame.lens.used) unexplained -= f.by_zoom * frame.lens.sensitivity_at(f.time_s);
         map->sensitivity(slot) += (gain * (to_tangent * unexplained)).cast<float>();
         map->refine(slot, direction_plus<double>(landmark.d, change), covariance);
       }

@@ -27,10 +27,14 @@ FrameMotion<double> carried_on(const FrameMotion<double>& from, double t) {
 }
 
 void MotionPrediction::reset(const Calibration& calibration) {
+  change_lens(calibration);
+  forget();
+}
+
+void MotionPrediction::change_lens(const Calibration& calibration) {
   const Camera<double>& camera = calibration.camera;
   const double field_of_view = 2 * std::atan(0.5 * camera.width / camera.focal_length);
   acceleration_sigma_ = options_.acceleration_fields * field_of_view;
-  forget();
 }
 
 PredictedMotion MotionPrediction::by_telemetry(const Calibration& calibration,

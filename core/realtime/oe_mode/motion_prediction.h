@@ -46,6 +46,8 @@ class MotionPrediction {
   explicit MotionPrediction(const MotionPredictionOptions& options) : options_(options) {}
 
   void reset(const Calibration& calibration);
+  // The calibration has another lens.
+  void change_lens(const Calibration& calibration);
   // No frame before.
   void forget() { has_last_ = false; }
 

@@ -27,14 +27,19 @@
 // forgotten after 50 frames, as is, after 50 frames that show other things, what should be in view of it.
 // Where the calibration's focal length is that of a zoom curve it is learnt too, from the first frame on, and the answer's
 // calibration has it (lens_scale.h); landmarks follow.
+// Such a lens may move, too: with what is known of it from frame to frame (FrameLens), frames solve log f and its rate besides
+// (lens_track.h), and landmarks are looked for in the octaves in which they have about their size. The map stays; it begins with a lens at rest.
 // Fixed memory, taken by the constructor; nothing else allocates, waits or throws. One thread.
 
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 
 #include "core/model/calibration.h"
 #include "core/realtime/frame_orientation.h"
 #include "core/realtime/image/image_view.h"
+#include "core/realtime/oe_mode/frame_lens.h"
 #include "core/realtime/oe_mode/landmark_map.h"
 #include "core/realtime/oe_mode/map_state.h"
 #include "core/realtime/oe_mode/oe_options.h"
@@ -67,6 +72,10 @@ struct OeStatistics {
   double coarse_shift_px = 0;  // by which coarse alignment moved the prediction, image centre
   PanTilt<double> map_offset;  // rad, base minus map
   Matrix2<double> map_offset_covariance = Matrix2<double>::Zero();  // rad^2
+  // The frame's lens was solved for by itself, as it had moved since the map was begun; and by how many of both's standard
+  // deviations its log f is not what the zoom reading says.
+  bool own_lens = false;
+  double reading_sigmas = 0;
 };
 
 // What telemetry is to be asked for again.
@@ -96,7 +105,18 @@ class OeMode {
   // Extrapolated telemetry is a prior for this frame only: the map's offset learns nothing from it, and the
   // frame is pending.
   [[nodiscard]] OeStatus process(const ImageView& image, double frame_time_s,
-                                 const InterpolatedPanTilt* at_middle_row, FrameOrientation* out);
+                                 const InterpolatedPanTilt* at_middle_row, FrameOrientation* out) {
+    return process(image, frame_time_s, at_middle_row, nullptr, out);
+  }
+  // The same behind a lens that zooms, with FocalLength::kLearnt; lens: what is known of it, null: nothing new. Where that is
+  // missing or wrong the frames before and the image tell f, as far as they can. Distortion and centre are taken from `lens`: where
+  // its focal length is excluded (reading_sigmas), the caller hands in the curve's at the focal length that was found.
+  [[nodiscard]] OeStatus process(const ImageView& image, double frame_time_s,
+                                 const InterpolatedPanTilt* at_middle_row, const FrameLens* lens,
+                                 FrameOrientation* out);
+
+  // Whether the map was begun with another lens than the frame last processed had, or that lens moved.
+  [[nodiscard]] bool lens_has_moved() const { return track_.active(); }
 
   // Map upkeep with the frame last processed; does nothing where that had no sure orientation.
   void maintain();
@@ -127,9 +147,13 @@ class OeMode {
     SolveStatus status = SolveStatus::kTooFew;
     FrameMotion<double> motion;  // about which it was linearised, map's frame
     SolvedMotion solved;
+    Camera<double> camera;  // likewise
   };
 
-  [[nodiscard]] SearchedFrame searched() const { return {calibration_, map_, pyramid_, octaves_}; }
+  [[nodiscard]] SearchedFrame searched() const {
+    return {calibration_,          map_, pyramid_, octaves_, columns_ ? &*columns_ : nullptr,
+            columns_ && !at_rest()};
+  }
   void begin_frame(const ImageView& image, double frame_time_s,
                    const InterpolatedPanTilt* telemetry);
   OeStatus finish(OeStatus status) { return statistics_.status = status; }
@@ -151,6 +175,24 @@ class OeMode {
     return lens_is_learnt() ? answers_calibration_ : calibration_;
   }
   void begin_lens();
+  // The lens of this frame. False: nothing to begin a map with, or to look for one.
+  [[nodiscard]] bool take_lens(const FrameLens* lens);
+  // Without a rate for some frames, or a reading that it moves: a lens that moved stands.
+  [[nodiscard]] bool at_rest() const { return frames_at_rest_ >= kAtRest; }
+  void predict_lens(bool moves);
+  void predict_lens_by_reading();
+  void set_camera(const Camera<double>& camera);
+  [[nodiscard]] double half_diagonal_px() const {
+    return 0.5 * std::hypot(calibration_.camera.width, calibration_.camera.height);
+  }
+  [[nodiscard]] Solution look_with_own_lens(FrameMotion<double> motion,
+                                            const PredictedMotion& predicted);
+  [[nodiscard]] Solution look_for_moved_lens(const Solution& first,
+                                             const LandmarkSearch::Coarse& coarse,
+                                             const PredictedMotion& predicted);
+  void learn_own_lens(const Solution& solution, double zoom_rate);
+  [[nodiscard]] Calibration lens_of_answer(double phi, double variance,
+                                           const Sensitivity<1>& sensitivity) const;
   void add_lens(const SolvedLens& lens, FrameMotion<double>* in_base,
                 Sensitivity<6>* sensitivity) const;
   void follow_lens();
@@ -161,11 +203,14 @@ class OeMode {
   void clear_landmarks();
   void forget_map();
 
+  static constexpr int kAtRest = 3;  // frames
+
   OeOptions options_;
   Calibration given_;  // by reset()
   FocalLength focal_length_ = FocalLength::kCalibrated;
   Calibration calibration_;          // that the map is made with; but for the focal length as given
   Calibration answers_calibration_;  // where the focal length is learnt
+  double moved_phi_ = 0;             // what of phi is in it already
   bool ready_ = false;               // there is room for the calibration's images
   std::uint32_t frames_ = 0;         // count
 
@@ -176,11 +221,22 @@ class OeMode {
   MotionPrediction prediction_;
   LandmarkSearch search_;
   MapOffsetFilter offset_;
+  LensTrack track_;
   MapShear shear_;
   MapUpkeep upkeep_;
   LandmarkMaker maker_;
   VisibleLandmarks in_view_;  // of maintain()
   double share_of_new_ = 0;   // of the landmarks in view, made by the maintain() before
+
+  // Of the frame's lens, where it is not the map's.
+  std::optional<FrameLens> reading_;  // of the frame
+  std::optional<LensColumns> columns_;
+  LensTrack::State predicted_lens_;
+  int frames_at_rest_ = 0;                // in a row
+  int frames_lost_ = 0;                   // in a row
+  bool reading_contradicted_ = false;     // by the frame that landmarks held last
+  double cells_focal_length_ = 1;         // px, that the map's cells are for
+  double last_reading_focal_length_ = 1;  // px, by the last reading
 
   OeStatistics statistics_;
   ProcessedFrame frame_;  // process() writes it, maintain() uses it up

@@ -20,7 +20,11 @@ struct Term {
 struct MotionAndLens {
   Vector6 x = Vector6::Zero();  // scaled
   double phi = 0;
+  Vector2<double> zoom = Vector2<double>::Zero();  // scaled; of a frame's own lens
 };
+
+// Which of them residuals depend on besides x.
+enum class Unknowns { kMotion, kMotionAndLens, kAll };
 
 // The row of phi in the normal equations of (x, phi):  N x - c phi = b,  information phi - c x = b_phi.
 struct LensRow {
@@ -29,11 +33,58 @@ struct LensRow {
   double b = 0;
 };
 
+// The rows of the frame's own lens l, prior included:  N l + C' x - c phi = b;  all as if landmarks' covariances were not inflated.
+struct ZoomRows {
+  Matrix2<double> inverse = Matrix2<double>::Zero();  // of N
+  Matrix<double, 6, 2> C = Matrix<double, 6, 2>::Zero();
+  Vector2<double> c = Vector2<double>::Zero();
+  Vector2<double> b = Vector2<double>::Zero();
+
+  // What follows for x, and for phi and x, once l is eliminated.
+  void eliminate(Matrix6* of_x, Vector6* right) const {
+    const Matrix<double, 6, 2> by = C * inverse;
+    *of_x -= by * C.transpose();
+    *right -= by * b;
+  }
+  void eliminate(LensRow* row) const {
+    const Vector2<double> by = inverse * c;
+    row->c -= C * by;
+    row->information -= c.dot(by);
+    row->b += by.dot(b);
+  }
+  // l at x and phi; and what a unit of phi adds, where it adds x_by_phi to x.
+  [[nodiscard]] Vector2<double> at(const Vector6& x, double phi) const {
+    return inverse * (b - C.transpose() * x + c * phi);
+  }
+  [[nodiscard]] Vector2<double> by_lens(const Vector6& x_by_phi) const {
+    return inverse * (c - C.transpose() * x_by_phi);
+  }
+};
+
+// What is known before of l, scaled.
+struct ScaledZoomPrior {
+  Vector2<double> value;
+  Matrix2<double> information;
+  Sensitivity<2> sensitivity;
+};
+
 class OrientationProblem {
  public:
-  // lens: null where phi is known to be 0.
-  OrientationProblem(FoundLandmark* landmarks, int count, double unit_s, const LensScale* lens)
-      : landmarks_(landmarks), count_(count), unit_s_(unit_s), lens_(lens) {
+  // lens: null where phi is known to be 0. zoom: null where the frame's lens is the map's.
+  OrientationProblem(FoundLandmark* landmarks, int count, double unit_s, const LensScale* lens,
+                     const ZoomPrior* zoom)
+      : landmarks_(landmarks),
+        count_(count),
+        unit_s_(unit_s),
+        lens_(lens),
+        zooms_(zoom != nullptr) {
+    if (zooms_) {
+      const Vector2<double> scale(1, unit_s);
+      zoom_.value = scale.cwiseProduct(zoom->value);
+      zoom_.information =
+          inverse_of((scale.asDiagonal() * zoom->covariance * scale.asDiagonal()).eval());
+      zoom_.sensitivity = scale.asDiagonal() * zoom->sensitivity;
+    }
     for (int i = 0; i < count; ++i) {
       const FoundLandmark& landmark = landmarks[i];
       Term& term = terms_[static_cast<std::size_t>(i)];
@@ -117,25 +168,72 @@ class OrientationProblem {
     return right;
   }
 
-  // with_lens: as lens() is there; a constant of those who ask for all landmarks.
-  template <bool with_lens>
+  // Of l; landmarks with these weights.
+  [[nodiscard]] ZoomRows zoom_rows(const double* weights, double inflation) const {
+    ZoomRows rows;
+    Matrix2<double> N = inflation * zoom_.information;
+    rows.b = N * zoom_.value;
+    for (int i = 0; i < count_; ++i) {
+      if (weights[i] == 0) continue;
+      const Term& term = terms_[static_cast<std::size_t>(i)];
+      const Vector2<double>& z = landmarks_[i].by_zoom;
+      const Vector2<double> Wz = weights[i] * (term.information * z);
+      const Vector2<double> times(1, term.t);
+      N += z.dot(Wz) * times * times.transpose();
+      rows.b += Wz.dot(landmarks_[i].residual) * times;
+      rows.c += Wz.dot(s_[static_cast<std::size_t>(i)]) * times;
+      const Vector2<double> v = weights[i] * (term.JtW * z);
+      rows.C.topRows<2>() += v * times.transpose();
+      rows.C.middleRows<2>(2) += term.t * v * times.transpose();
+      rows.C.bottomRows<2>() += (0.5 * term.t * term.t) * v * times.transpose();
+    }
+    rows.inverse = inverse_of(N);
+    return rows;
+  }
+
+  // How zoom_rows().b changes with the parameters; inliers only.
+  [[nodiscard]] Sensitivity<2> zoom_rows_of_sensitivities(double inflation) const {
+    Sensitivity<2> rows = inflation * zoom_.information * zoom_.sensitivity;
+    for (int i = 0; i < count_; ++i) {
+      if (!landmarks_[i].inlier) continue;
+      const Term& term = terms_[static_cast<std::size_t>(i)];
+      const Sensitivity<1> of_it =
+          (term.information * landmarks_[i].by_zoom).transpose() * landmarks_[i].sensitivity;
+      rows.row(0) += of_it;
+      rows.row(1) += term.t * of_it;
+    }
+    return rows;
+  }
+
+  // unknowns: as unknowns(); a constant of those who ask for all landmarks.
+  template <Unknowns unknowns>
   [[nodiscard]] Vector2<double> left(int i, const MotionAndLens& at) const {
     const auto of_it = static_cast<std::size_t>(i);
     const Vector2<double> r =
         landmarks_[i].residual - landmarks_[i].J_angle * angle_at(at.x, terms_[of_it].t);
-    if constexpr (with_lens) return r + at.phi * s_[of_it];
+    if constexpr (unknowns == Unknowns::kMotionAndLens) return r + at.phi * s_[of_it];
+    if constexpr (unknowns == Unknowns::kAll) {
+      return r + at.phi * s_[of_it] -
+             (at.zoom[0] + terms_[of_it].t * at.zoom[1]) * landmarks_[i].by_zoom;
+    }
     return r;
   }
+  [[nodiscard]] Vector2<double> left(int i, const MotionAndLens& at) const {
+    if (zooms_) return left<Unknowns::kAll>(i, at);
+    return lens_ != nullptr ? left<Unknowns::kMotionAndLens>(i, at)
+                            : left<Unknowns::kMotion>(i, at);
+  }
 
-  template <bool with_lens>
+  template <Unknowns unknowns>
   [[nodiscard]] double normalised_square(int i, const MotionAndLens& at) const {
-    const Vector2<double> r = left<with_lens>(i, at);
+    const Vector2<double> r = left<unknowns>(i, at);
     return r.dot(terms_[static_cast<std::size_t>(i)].information * r);
   }
 
   [[nodiscard]] const Term& term(int i) const { return terms_[static_cast<std::size_t>(i)]; }
   [[nodiscard]] int count() const { return count_; }
   [[nodiscard]] const LensScale* lens() const { return lens_; }
+  [[nodiscard]] bool zooms() const { return zooms_; }
 
   // Scaled = D unscaled.
   [[nodiscard]] Vector6 scaling() const {
@@ -149,6 +247,8 @@ class OrientationProblem {
   int count_;
   double unit_s_;
   const LensScale* lens_;
+  bool zooms_;
+  ScaledZoomPrior zoom_;  // where zooms_
   std::array<Term, kMaxFoundLandmarks> terms_;
   // px, d residual / d phi; apart from the terms, which all solutions go through. Not written without a lens.
   std::array<Vector2<double>, kMaxFoundLandmarks> s_;

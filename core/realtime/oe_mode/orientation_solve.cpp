@@ -14,6 +14,8 @@ using internal::LensRow;
 using internal::MotionAndLens;
 using internal::OrientationProblem;
 using internal::ScaledPrior;
+using internal::Unknowns;
+using internal::ZoomRows;
 
 using Matrix8 = Matrix<double, 8, 8>;
 using Vector8 = Matrix<double, 8, 1>;
@@ -30,8 +32,9 @@ double median(double* values, int count) {
 
 // The row of phi, of landmarks and of the frames before.
 LensRow row_of_lens(const OrientationProblem& problem, const ScaledPrior& prior,
-                    const double* weights, double inflation) {
+                    const double* weights, double inflation, const ZoomRows* zoom) {
   LensRow row = problem.lens_row(weights);
+  if (zoom != nullptr) zoom->eliminate(&row);
   const Vector6 prior_c = prior.motion_information * prior.motion_by_lens;
   row.c = row.c / inflation + prior_c;
   row.information = row.information / inflation + prior_c.dot(prior.motion_by_lens);
@@ -49,8 +52,12 @@ struct WithoutAngles {
   double information = 0;
   double phi = 0;  // with what is known from before
   double phi_information = 0;
+  ZoomRows zoom;
 
-  [[nodiscard]] MotionAndLens best() const { return {x + phi * by_lens, phi}; }
+  [[nodiscard]] MotionAndLens best() const {
+    const Vector6 at = x + phi * by_lens;
+    return {at, phi, zoom.at(at, phi)};
+  }
 };
 
 WithoutAngles solve_without_angles(const OrientationProblem& problem, const ScaledPrior& prior,
@@ -58,6 +65,11 @@ WithoutAngles solve_without_angles(const OrientationProblem& problem, const Scal
   Matrix6 N;
   Vector6 b;
   problem.normal_equations(weights, &N, &b);
+  WithoutAngles out;
+  if (problem.zooms()) {
+    out.zoom = problem.zoom_rows(weights, inflation);
+    out.zoom.eliminate(&N, &b);
+  }
   N /= inflation;
   b /= inflation;
   N += prior.motion_information;
@@ -65,12 +77,11 @@ WithoutAngles solve_without_angles(const OrientationProblem& problem, const Scal
   N.block<2, 2>(2, 2) += prior.rate_information;
   b.segment<2>(2) += prior.rate_information * prior.rate;
   const Eigen::LDLT<Matrix6> factor(N);
-  WithoutAngles out;
   if (with_covariance) out.covariance = factor.solve(Matrix6::Identity());
   out.x = factor.solve(b);
   const LensScale* lens = problem.lens();
   if (lens == nullptr) return out;
-  out.row = row_of_lens(problem, prior, weights, inflation);
+  out.row = row_of_lens(problem, prior, weights, inflation, problem.zooms() ? &out.zoom : nullptr);
   out.by_lens = factor.solve(out.row.c);
   // Landmarks that came with this lens know nothing of it, but for rounding.
   out.information = std::max(0.0, out.row.information - out.row.c.dot(out.by_lens));
@@ -106,16 +117,21 @@ Vector2<double> middle_of_landmarks(const FoundLandmark* landmarks, int count) {
 
 using Squares = std::array<double, kMaxFoundLandmarks>;  // normalised, by landmark
 
-template <bool with_lens>
+template <Unknowns unknowns>
 void find_squares(const OrientationProblem& problem, const MotionAndLens& x, Squares* out) {
   for (int i = 0; i < problem.count(); ++i) {
-    (*out)[static_cast<std::size_t>(i)] = problem.normalised_square<with_lens>(i, x);
+    (*out)[static_cast<std::size_t>(i)] = problem.normalised_square<unknowns>(i, x);
   }
 }
 
 void find_squares(const OrientationProblem& problem, const MotionAndLens& x, Squares* out) {
-  problem.lens() != nullptr ? find_squares<true>(problem, x, out)
-                            : find_squares<false>(problem, x, out);
+  if (problem.zooms()) {
+    find_squares<Unknowns::kAll>(problem, x, out);
+  } else if (problem.lens() != nullptr) {
+    find_squares<Unknowns::kMotionAndLens>(problem, x, out);
+  } else {
+    find_squares<Unknowns::kMotion>(problem, x, out);
+  }
 }
 
 double median_square(const Squares& squares, int count) {
@@ -142,9 +158,7 @@ double neighbours_inflation(const OrientationProblem& problem, const FoundLandma
     const int row = std::clamp(static_cast<int>(landmarks[i].u.y() / height * kRows), 0, kRows - 1);
     Cell& cell = cells[static_cast<std::size_t>(row * kColumns + column)];
     cell.information += problem.term(i).information;
-    const Vector2<double> left =
-        problem.lens() != nullptr ? problem.left<true>(i, x) : problem.left<false>(i, x);
-    cell.sum += problem.term(i).information * left;
+    cell.sum += problem.term(i).information * problem.left(i, x);
     cell.used = true;
   }
   int freedom = -6;
@@ -166,13 +180,14 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   if (count < std::max(limits.min_inliers, kMinInliers)) return SolveStatus::kTooFew;
   const double unit_s = std::max(std::abs(half_readout_s), limits.min_half_readout_s);
   const LensScale* lens = prior.lens;
-  const OrientationProblem problem(landmarks, count, unit_s, lens);
+  const OrientationProblem problem(landmarks, count, unit_s, lens, prior.zoom);
   const Vector6 D = problem.scaling();
   const ScaledPrior scaled = internal::scaled(prior, unit_s, D);
 
   MotionAndLens x;
   x.x.head<2>() = middle_of_landmarks(landmarks, count);
   if (lens != nullptr) x.phi = lens->value;
+  if (prior.zoom != nullptr) x.zoom = {prior.zoom->value[0], unit_s * prior.zoom->value[1]};
   const double max_square = limits.max_scale * limits.max_scale;
   double scale_square = 1;
   Squares squares;  // at x
@@ -231,8 +246,16 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   shared /= total;
   const Matrix2<double> prior_offset = prior.offset_covariance + shared;
 
+  ZoomRows zoom;
+  Sensitivity<2> zoom_of_sensitivities = Sensitivity<2>::Zero();
+  if (problem.zooms()) {
+    zoom = problem.zoom_rows(weights.data(), inflation);
+    zoom_of_sensitivities = problem.zoom_rows_of_sensitivities(inflation);
+  }
+  Sensitivity<6> right_of_landmarks = problem.right_of_sensitivities();
+  if (problem.zooms()) right_of_landmarks -= zoom.C * (zoom.inverse * zoom_of_sensitivities);
   const Sensitivity<6> right_of_sensitivities =
-      problem.right_of_sensitivities() / inflation +
+      right_of_landmarks / inflation +
       scaled.motion_information * (D.asDiagonal() * prior.motion_sensitivity);
   Sensitivity<8> sensitivity = Sensitivity<8>::Zero();
   Vector8 solution = Vector8::Zero();
@@ -257,6 +280,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
     Matrix6 N;
     Vector6 b;
     problem.normal_equations(weights.data(), &N, &b);
+    if (problem.zooms()) zoom.eliminate(&N, &b);
     Matrix8 all = Matrix8::Zero();
     all.topLeftCorner<6, 6>() = N / inflation + scaled.motion_information;
     Vector8 right = Vector8::Zero();
@@ -299,8 +323,12 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
       posterior = factor.solve(Matrix8::Identity());
       sensitivity = (posterior * sensitivity).eval();
 
+      Sensitivity<1> of_landmarks = problem.lens_row_of_sensitivities();
+      if (problem.zooms()) {
+        of_landmarks -= (zoom.inverse * zoom.c).transpose() * zoom_of_sensitivities;
+      }
       const Sensitivity<1> of_row =
-          problem.lens_row_of_sensitivities() / inflation +
+          of_landmarks / inflation +
           (scaled.motion_information * scaled.motion_by_lens).transpose() * D.asDiagonal() *
               prior.motion_sensitivity;
       SolvedLens& solved = out->lens;
@@ -326,7 +354,23 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
                              old * solved.measured_sensitivity + c.transpose() * sensitivity);
       solved.motion_by_lens = by_lens.head<6>().cwiseQuotient(D);
       solved.offset_by_lens = by_lens.tail<2>();
-      x = {solution.head<6>() + solved.value * by_lens.head<6>(), solved.value};
+      const Vector6 at = solution.head<6>() + solved.value * by_lens.head<6>();
+      x = {at, solved.value, zoom.at(at, solved.value)};
+      if (problem.zooms()) {
+        const Vector2<double> of_unit(1, 1 / unit_s);
+        const Matrix<double, 2, 6> gain = of_unit.asDiagonal() * zoom.inverse * zoom.C.transpose();
+        out->zoom.correction = of_unit.cwiseProduct(zoom.at(solution.head<6>(), 0));
+        out->zoom.covariance =
+            inflation * of_unit.asDiagonal() * zoom.inverse * of_unit.asDiagonal();
+        out->zoom.covariance += gain * posterior.topLeftCorner<6, 6>() * gain.transpose();
+        out->zoom.sensitivity = of_unit.asDiagonal() * zoom.inverse * zoom_of_sensitivities;
+        out->zoom.sensitivity -= gain * sensitivity.topRows<6>();
+        out->zoom.by_lens = of_unit.cwiseProduct(zoom.by_lens(by_lens.head<6>()));
+        if (!all_finite(out->zoom.correction) || !all_finite(out->zoom.covariance) ||
+            !all_finite(out->zoom.by_lens)) {
+          return SolveStatus::kNotFinite;
+        }
+      }
       if (!std::isfinite(solved.value) || !(solved.variance > 0) ||
           !all_finite(solved.sensitivity) || !all_finite(by_lens)) {
         return SolveStatus::kNotFinite;

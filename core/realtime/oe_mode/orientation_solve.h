@@ -17,6 +17,9 @@
 // Where the focal length is learnt (lens_scale.h) phi joins the unknowns, known from before as g is, with which it is correlated:
 //   found - predicted + s phi = J (...) + noise,   s = d (found - predicted) / d phi
 // Corrections and their covariances are then those at phi = 0, and SolvedLens tells what phi is and makes of them.
+// Where the lens has moved since the map was made, or moves (frame_lens.h), the frame's own lens joins them, l = (log f, its rate):
+//   found - predicted + s phi = J (...) + z (dl_0 + t dl_1) + noise,   z = d u / d log f of the frame's camera
+// It is eliminated first, with what is known of it before the frame as prior.
 // Pure functions; no allocation.
 
 #include <array>
@@ -40,8 +43,16 @@ struct FoundLandmark {
   Matrix2<double> covariance;  // px^2, of the residual by noise and by the landmark's own direction
   Matrix2<double> shared_covariance;                    // rad^2, of (pan, tilt), see Landmark
   Sensitivity<2> sensitivity = Sensitivity<2>::Zero();  // px/unit, of the residual
+  Vector2<double> by_zoom = Vector2<double>::Zero();    // px, z above; where the prior has a zoom
   double normalised_square = 0;  // out: residual after the solution, by covariance
   bool inlier = false;           // out
+};
+
+// Of (log f, its rate in 1/s) of the frame's lens, at phi = 0, without its landmarks.
+struct ZoomPrior {
+  Vector2<double> value = Vector2<double>::Zero();  // expected minus predicted
+  Matrix2<double> covariance = Matrix2<double>::Identity();
+  Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
 };
 
 // What is known without landmarks, relative to the motion the residuals were predicted with.
@@ -60,6 +71,7 @@ struct MotionPrior {
   const LensScale* lens = nullptr;  // before this frame; null: not learnt
   // Of the variance of what the landmarks' scale says of phi, which frames before said already; >= 1.
   double scale_inflation = 1;
+  const ZoomPrior* zoom = nullptr;  // null: the lens is the map's; needs `lens`
 };
 
 enum class SolveStatus {
@@ -84,6 +96,14 @@ struct SolvedLens {
   Sensitivity<1> measured_sensitivity = Sensitivity<1>::Zero();
 };
 
+// Of the frame's lens, beside phi.
+struct SolvedZoom {
+  Vector2<double> correction = Vector2<double>::Zero();  // of what was predicted, at phi = 0
+  Matrix2<double> covariance = Matrix2<double>::Zero();
+  Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
+  Vector2<double> by_lens = Vector2<double>::Zero();  // a unit of phi adds to it
+};
+
 struct SolvedMotion {
   Vector6 correction = Vector6::Zero();  // of the predicted motion, map frame
   // Of g, in this frame: what its landmarks share is in it.
@@ -94,6 +114,7 @@ struct SolvedMotion {
   Sensitivity<6> sensitivity = Sensitivity<6>::Zero();          // of correction
   Sensitivity<2> offset_correction_sensitivity = Sensitivity<2>::Zero();  // of offset_correction
   SolvedLens lens;                                                        // where it is learnt
+  SolvedZoom zoom;                                                        // where the prior has one
   int inliers = 0;
   double inflation = 1;      // of the landmarks' covariances
   double contradiction = 0;  // chi-square, 2 degrees of freedom, of landmarks against telemetry

@@ -5,6 +5,7 @@
 // as a quadratic in the row through its values at the first, middle and last row. What that leaves out is
 // below (w T)^3 / 15 rad for a turn of w rad/s and half the read-out T: 3e-4 px for a field of view of
 // 60 degrees crossed in a second at 25 us a row. The row is found by a secant from a first guess.
+// A lens that zooms (FrameMotion::zoom_rate): as if the direction's third component shrank from row to row by exp(-zoom_rate t).
 // Pure; no allocation. Directions outside the image are projected too, as far as the camera goes.
 
 #include <Eigen/Core>
@@ -31,7 +32,8 @@ class ViewProjection {
       : camera_(calibration.camera),
         line_delay_(calibration.line_delay),
         motion_(motion),
-        middle_row_(0.5 * calibration.camera.height) {
+        middle_row_(0.5 * calibration.camera.height),
+        zoom_to_last_row_(motion.zoom_rate * calibration.line_delay * middle_row_) {
     const auto R_at = [&](double row, Matrix<double, 3, 2>* J) -> Matrix3<double> {
       return R_base_from_camera(calibration.mechanics, angle_at_row(motion, line_delay_, row), J,
                                 J != nullptr ? &J_xi_axes_ : nullptr)
@@ -42,6 +44,9 @@ class ViewProjection {
     R_[0] = R_at(middle_row_, &J_xi_angle_);
     R_[1] = 0.5 * (last - first);
     R_[2] = 0.5 * (last + first) - R_[0];
+    if (motion.zoom_rate == 0) return;
+    camera_ = camera_at_row(calibration.camera, motion, line_delay_, middle_row_);
+    to_middle_row_ = camera_.focal_length / calibration.camera.focal_length;
   }
 
   // False where the camera has no pixel for it or the row does not settle.
@@ -56,8 +61,9 @@ class ViewProjection {
     if (alidade::project(camera_, middle, u) != ProjectionStatus::kOk) return false;
     if (line_delay_ == 0) return true;
     const double s = std::clamp(parameter(u->y()), -1.5, 1.5);
-    return alidade::project(camera_, (middle + s * (R_[1] * d + s * (R_[2] * d))).eval(), u) ==
-           ProjectionStatus::kOk;
+    Vector3<double> d_c = middle + s * (R_[1] * d + s * (R_[2] * d));
+    if (zoom_to_last_row_ != 0) d_c.z() *= depth(s);
+    return alidade::project(camera_, d_c, u) == ProjectionStatus::kOk;
   }
 
   // J_parameters: d u / d Parameter for this motion about its reference row.
@@ -66,17 +72,21 @@ class ViewProjection {
     Path path;
     if (!find(d, &path, &out->u)) return false;
     const double s = parameter(out->u.y());
-    const Vector3<double> d_c = path.at(s);
+    const Vector3<double> d_c = path.at(s);  // but for the zoom
+    Vector3<double> zoomed_d_c = d_c;
+    Vector3<double> slope = path.slope(s);
+    if (zoom_to_last_row_ != 0) zoom(s, &zoomed_d_c, &slope);
     Vector2<double> u;
     Matrix<double, 2, 3> J_u_dc;
     Matrix<double, 2, kCameraParameterCount> J_u_camera;
-    if (alidade::project(camera_, d_c, &u, &J_u_dc,
+    if (alidade::project(camera_, zoomed_d_c, &u, &J_u_dc,
                          J_parameters != nullptr ? &J_u_camera : nullptr) !=
         ProjectionStatus::kOk) {
       return false;
     }
     out->time_s = time_of_row(motion_, line_delay_, out->u.y());
-    const Vector2<double> J_u_row = J_u_dc * path.slope(s) / middle_row_;
+    const Vector2<double> J_u_row = J_u_dc * slope / middle_row_;
+    if (zoom_to_last_row_ != 0) J_u_dc.col(2) *= depth(s);
     // The row follows the pixel: see rolling_shutter_project().
     Matrix2<double> J_u_fixed = Matrix2<double>::Identity();
     J_u_fixed.col(1) += J_u_row / (1 - J_u_row.y());
@@ -87,10 +97,17 @@ class ViewProjection {
     out->J_d = J_u * (R_[0] + s * (R_[1] + s * R_[2]));
     if (J_parameters == nullptr) return true;
     J_parameters->setZero();
+    const Vector2<double> by_zoom = alidade::by_zoom(camera_, J_u_camera);
+    J_u_camera.col(index(Parameter::kFocalLength)) *= to_middle_row_;
+    J_u_camera.col(index(Parameter::kRadialDistortion)) *= to_middle_row_ * to_middle_row_;
     J_parameters->leftCols<kCameraParameterCount>() = J_u_fixed * J_u_camera;
     const PanTilt<double> rate = rate_at_row(motion_, line_delay_, out->u.y());
     J_parameters->col(index(Parameter::kLineDelay)) =
         (out->u.y() - motion_.reference_row) * (out->J_angle * rate.vector());
+    if (motion_.zoom_rate != 0) {
+      J_parameters->col(index(Parameter::kLineDelay)) +=
+          (out->u.y() - motion_.reference_row) * motion_.zoom_rate * (J_u_fixed * by_zoom);
+    }
     J_parameters->middleCols<4>(index(Parameter::kPanAxis0)) = J_u * skew(d_c) * J_xi_axes_;
     return true;
   }
@@ -107,6 +124,13 @@ class ViewProjection {
   };
 
   [[nodiscard]] double parameter(double row) const { return (row - middle_row_) / middle_row_; }
+  [[nodiscard]] double depth(double s) const { return std::exp(-zoom_to_last_row_ * s); }
+  // A direction in camera coordinates and how it changes with s, as the zoom of that row makes them.
+  void zoom(double s, Vector3<double>* d_c, Vector3<double>* slope) const {
+    const double factor = depth(s);
+    slope->z() = factor * (slope->z() - zoom_to_last_row_ * d_c->z());
+    d_c->z() *= factor;
+  }
 
   [[nodiscard]] bool find(const Vector3<double>& d, Path* path, Vector2<double>* u) const {
     constexpr double kTolerance = 1e-4;  // px; the pixel's own error is that times its slope
@@ -123,9 +147,9 @@ class ViewProjection {
       // Far outside the image the quadratic is an extrapolation, and nobody asks.
       const double next = row + (v - row) / (1 - slope);
       if (!(next > -0.5 * camera_.height && next < 1.5 * camera_.height)) return false;
-      if (alidade::project(camera_, path->at(parameter(next)), u) != ProjectionStatus::kOk) {
-        return false;
-      }
+      Vector3<double> d_c = path->at(parameter(next));
+      if (zoom_to_last_row_ != 0) d_c.z() *= depth(parameter(next));
+      if (alidade::project(camera_, d_c, u) != ProjectionStatus::kOk) return false;
       slope = (u->y() - v) / (next - row);
       if (!(slope < 1)) return false;
       row = next;
@@ -135,11 +159,13 @@ class ViewProjection {
     return false;
   }
 
-  Camera<double> camera_;
+  Camera<double> camera_;     // at the middle row
+  double to_middle_row_ = 1;  // its focal length over that at the reference row
   double line_delay_;
   FrameMotion<double> motion_;
   double middle_row_;
-  Matrix3<double> R_[3];  // camera from base: R_[0] + s R_[1] + s^2 R_[2], s from -1 to 1
+  double zoom_to_last_row_;  // change of log f from the middle row on
+  Matrix3<double> R_[3];     // camera from base: R_[0] + s R_[1] + s^2 R_[2], s from -1 to 1
   Matrix<double, 3, 2> J_xi_angle_;
   Matrix<double, 3, 4> J_xi_axes_;
 };

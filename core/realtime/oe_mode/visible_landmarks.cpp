@@ -15,7 +15,18 @@ VisibleLandmarks::VisibleLandmarks(int capacity) {
   visible_.reserve(slots_.size());
 }
 
+int octaves_larger(const Landmark& landmark, double focal_length) {
+  const double made_px =
+      std::ldexp(std::sqrt(std::abs(landmark.J_pixel_tangent.determinant())), landmark.octave);
+  return static_cast<int>(std::lround(std::log2(focal_length / made_px)));
+}
+
 void VisibleLandmarks::reset(const Calibration& calibration, double cone_margin) {
+  change_lens(calibration, cone_margin);
+  visible_.clear();
+}
+
+void VisibleLandmarks::change_lens(const Calibration& calibration, double cone_margin) {
   const Camera<double>& camera = calibration.camera;
   const double w = camera.width;
   const double h = camera.height;
@@ -28,12 +39,12 @@ void VisibleLandmarks::reset(const Calibration& calibration, double cone_margin)
     cone = std::max(cone, seen ? std::acos(std::min(1.0, d_c.z())) : kPi / 2);
   }
   cosine_of_cone_ = std::cos(std::min(kPi, cone_margin * cone));
-  visible_.clear();
 }
 
 const std::vector<VisibleLandmark>& VisibleLandmarks::find(const Calibration& calibration,
                                                            const LandmarkMap& map,
-                                                           const ViewProjection& view) {
+                                                           const ViewProjection& view, int octaves,
+                                                           bool across_octaves) {
   visible_.clear();
   const int near = map.find(view.optical_axis(), cosine_of_cone_, slots_.data(), map.capacity());
   constexpr int kLandmarksAhead = 8;
@@ -43,11 +54,15 @@ const std::vector<VisibleLandmark>& VisibleLandmarks::find(const Calibration& ca
     const int slot = slots_[static_cast<std::size_t>(i)];
     const Landmark& landmark = map.at(slot);
     Vector2<double> u;
-    if (!view.project_roughly(landmark.d, &u) ||
-        !holds_patch(calibration.camera, u, landmark.octave)) {
+    int octave = landmark.octave;
+    if (across_octaves) {
+      octave += octaves_larger(landmark, calibration.camera.focal_length);
+      if (octave < 0 || octave >= octaves) continue;
+    }
+    if (!view.project_roughly(landmark.d, &u) || !holds_patch(calibration.camera, u, octave)) {
       continue;
     }
-    visible_.push_back({slot, landmark.octave, u});
+    visible_.push_back({slot, octave, u});
   }
   return visible_;
 }

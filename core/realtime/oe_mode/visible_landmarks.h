@@ -13,9 +13,12 @@ class ViewProjection;
 
 struct VisibleLandmark {
   int slot;           // of the map
-  int octave;         // of the landmark
+  int octave;         // in which it is seen: the landmark's, but where the lens has zoomed
   Vector2<double> u;  // px of the image, predicted, to a pixel or so
 };
+
+// By how many octaves a landmark is larger in an image of this focal length, px, than in the one that it was made of.
+[[nodiscard]] int octaves_larger(const Landmark& landmark, double focal_length);
 
 class VisibleLandmarks {
  public:
@@ -25,10 +28,19 @@ class VisibleLandmarks {
   // cone_margin: room for what the camera turns while it reads out, and for a wrong prediction, times the
   // angle from the optical axis to the farthest corner.
   void reset(const Calibration& calibration, double cone_margin);
+  // The calibration has another lens.
+  void change_lens(const Calibration& calibration, double cone_margin);
 
-  // In ascending order of slots; valid until the next call.
+  // In ascending order of slots; valid until the next call. octaves: of the image. across_octaves:
+  // landmarks were made with other focal lengths, too.
+  // Each is seen in the octave in which it has about its size then, and not at all where the image has none.
   const std::vector<VisibleLandmark>& find(const Calibration& calibration, const LandmarkMap& map,
-                                           const ViewProjection& view);
+                                           const ViewProjection& view, int octaves,
+                                           bool across_octaves);
+  const std::vector<VisibleLandmark>& find(const Calibration& calibration, const LandmarkMap& map,
+                                           const ViewProjection& view) {
+    return find(calibration, map, view, 0, false);
+  }
   // As find() left it.
   [[nodiscard]] const std::vector<VisibleLandmark>& latest() const { return visible_; }
 

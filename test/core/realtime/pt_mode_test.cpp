@@ -45,7 +45,7 @@ std::ostream& operator<<(std::ostream& out, const Case& c) { return out << c.nam
 
 class PtModeErrors : public testing::TestWithParam<Case> {};
 
-constexpr int kRuns = 1000;
+constexpr int kPtRuns = 1000;
 
 double normalised(const Vector2<double>& error, const Matrix2<double>& covariance) {
   return error.dot(covariance.ldlt().solve(error)) / 2;
@@ -79,7 +79,7 @@ TEST_P(PtModeErrors, AreWhatTheCovarianceSays) {
   double direction_sum = 0;
   double pixel_sum = 0;
   double worst_pixel = 0;
-  for (int run = 0; run < kRuns; ++run) {
+  for (int run = 0; run < kPtRuns; ++run) {
     // The truth, of which the calibration is an estimate.
     ParameterCovariance<double> sigma = ParameterCovariance<double>::Zero();
     sigma.diagonal() = calibration.covariance.diagonal().cwiseSqrt();
@@ -173,10 +173,10 @@ TEST_P(PtModeErrors, AreWhatTheCovarianceSays) {
     pixel_sum += run_pixel_sum / (kGrid * kGrid);
   }
   // A run's mean over its pixels varies no more than one pixel does.
-  const double tolerance = 4 * std::sqrt(2.0 / (2 * kRuns));
+  const double tolerance = 4 * std::sqrt(2.0 / (2 * kPtRuns));
   const auto expect_honest = [&](double sum, const char* what) {
-    EXPECT_LT(sum / kRuns, 1 + tolerance) << what;
-    EXPECT_GT(sum / kRuns, c.least_mean - tolerance) << what;
+    EXPECT_LT(sum / kPtRuns, 1 + tolerance) << what;
+    EXPECT_GT(sum / kPtRuns, c.least_mean - tolerance) << what;
   };
   if (!c.uncertain_calibration) {
     expect_honest(angle_sum, "angles");

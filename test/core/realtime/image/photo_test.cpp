@@ -22,7 +22,7 @@
 namespace alidade::test {
 namespace {
 
-constexpr double kMinContrast = 4;
+constexpr double kPhotoContrast = 4;
 
 ImageView view_of(const cv::Mat& image) {
   return {image.data, image.cols, image.rows, static_cast<std::ptrdiff_t>(image.step)};
@@ -159,8 +159,8 @@ PhotoErrors align_corners(const cv::Mat& photo, double sigma) {
         continue;
       }
       ReferencePatch reference;
-      if (prepare(view_of(before), centre, Matrix2<double>::Identity(), kMinContrast, &reference) !=
-          PrepareStatus::kOk) {
+      if (prepare(view_of(before), centre, Matrix2<double>::Identity(), kPhotoContrast,
+                  &reference) != PrepareStatus::kOk) {
         continue;
       }
       ++errors.prepared;

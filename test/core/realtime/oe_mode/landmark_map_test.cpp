@@ -106,6 +106,35 @@ TEST(LandmarkMap, BeginsEmptyAndClearsToEmpty) {
   EXPECT_NE(map.at(slot).id, id);
 }
 
+// Cells that another focal length made stand in nobody's way, and those of a longer one are as much smaller.
+TEST(LandmarkMap, CellsFollowTheZoom) {
+  constexpr double kCell = 0.01;
+  std::mt19937_64 random(11);
+  LandmarkMap map(1000, kCell);
+  const Vector3<double> d = anywhere(&random);
+  int slot = 0;
+  for (const int zoom : {-LandmarkMap::kMaxZoom, -1, 0, 1, 9, LandmarkMap::kMaxZoom}) {
+    EXPECT_FALSE(map.cell_taken(d, 1, zoom));
+    ASSERT_EQ(map.insert(landmark_at(d, 1), 0, &slot, zoom), InsertStatus::kOk);
+    EXPECT_TRUE(map.cell_taken(d, 1, zoom));
+    EXPECT_EQ(map.insert(landmark_at(d, 1), 0, &slot, zoom), InsertStatus::kCellTaken);
+  }
+  // How many of very many neighbours find a cell of their own: as many as there are cells, a quarter of them at half the focal
+  // length, but for those that the border cuts.
+  const auto cells = [&](int zoom) {
+    LandmarkMap many(8000, kCell);
+    std::uniform_real_distribution<double> within(-0.2, 0.2);
+    for (int i = 0; i < 40000; ++i) {
+      const Vector3<double> by(within(random), within(random), 1);
+      static_cast<void>(many.insert(landmark_at(by.normalized()), 0, &slot, zoom));
+    }
+    return many.size();
+  };
+  const double ratio = static_cast<double>(cells(0)) / cells(-LandmarkMap::kZoomsPerOctave);
+  EXPECT_GT(ratio, 3.2);
+  EXPECT_LT(ratio, 4.2);
+}
+
 TEST(LandmarkMap, TakesTheNearestUsefulCapacityAndCellSize) {
   EXPECT_EQ(LandmarkMap(0, 0.1).capacity(), 1);
   EXPECT_EQ(LandmarkMap(-5, 0.1).capacity(), 1);

@@ -163,6 +163,51 @@ TEST(LensScale, ErrsAsItsCovarianceSaysWhileItIsLearntWithTheOffset) {
   EXPECT_LT(after, 0.2 * before);
 }
 
+// By changes of log f and of the corner's distortion, which mean the same for every lens.
+TEST(LensColumns, AreOfTheSameChangesForEveryLens) {
+  Draws draws(6);
+  const Calibration calibration = draws.calibration(1e-3);
+  const LensScale lens = LensScale::begin(calibration);
+  Camera<double> other = calibration.camera;
+  other.focal_length *= 7;
+  other.radial_distortion = -11;
+  const LensColumns columns(lens, other);
+  Vector2<double> u;
+  Matrix<double, 2, kCameraParameterCount> J;
+  const Vector3<double> d(0.01, -0.02, 1);
+  ASSERT_EQ(project(other, d, &u, nullptr, &J), ProjectionStatus::kOk);
+  Sensitivity<2> S = Sensitivity<2>::Zero();
+  S.leftCols<kCameraParameterCount>() = J;
+  const Sensitivity<2> of_frame = S;
+  columns.to_map(&S);
+
+  // d / d phi: f exp(phi), the distortion in the corner as it is.
+  constexpr double kStep = 1e-6;
+  const auto at = [&](double change, double corner) {
+    Camera<double> camera = other;
+    const double factor = std::exp(change);
+    camera.focal_length *= factor;
+    camera.radial_distortion = (camera.radial_distortion + corner) * factor * factor;
+    Vector2<double> out;
+    EXPECT_EQ(project(camera, d, &out), ProjectionStatus::kOk);
+    return out;
+  };
+  const Vector2<double> by_phi = (at(kStep, 0) - at(-kStep, 0)) / (2 * kStep);
+  EXPECT_LT((S * lens.direction - by_phi).norm(), 1e-6 * by_phi.norm());
+  // A change of the corner is 49 times as much of k here.
+  const Vector2<double> by_k = (at(0, 49 * kStep) - at(0, -49 * kStep)) / (2 * kStep);
+  EXPECT_LT((S.col(kK) - by_k).norm(), 1e-6 * by_k.norm());
+
+  Sensitivity<2> back = S;
+  columns.to_frame(&back);
+  EXPECT_LT((back - of_frame).norm(), 1e-9 * of_frame.norm());
+  ParameterCovariance<double> covariance = calibration.covariance;
+  columns.to_frame(&covariance);
+  const Matrix2<double> by_map = S * calibration.covariance * S.transpose();
+  const Matrix2<double> by_frame = of_frame * covariance * of_frame.transpose();
+  EXPECT_LT((by_map - by_frame).norm(), 1e-9 * by_map.norm());
+}
+
 TEST(LensScale, IsAsItWasWhereAnInnovationCannotBe) {
   Draws draws(5);
   LensScale lens = LensScale::begin(draws.calibration(1e-3));

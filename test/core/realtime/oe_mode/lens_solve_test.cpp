@@ -20,7 +20,7 @@ constexpr double kLensHeight = 720;
 constexpr double kLensFocal = 4000;      // px
 constexpr double kLineDelay = -14.2e-6;  // s/row
 constexpr double kHalf_s = kLineDelay * kLensHeight / 2;
-constexpr double kNoise = 0.08;          // px
+constexpr double kLensNoise = 0.08;      // px
 constexpr double kAcceleration = 2;      // rad/s^2
 constexpr double kOffset = 3e-5;         // rad
 constexpr double kTelemetry = 4e-5;      // rad
@@ -35,7 +35,9 @@ struct LensWorld {
   double correlation = 0.5;  // of phi and g
   double knows_lens = 0;     // 1: the landmarks came with this lens from here, 0: they are right
   bool has_telemetry = true;
-  double claimed = 1;  // landmarks err by so much of what they claim
+  double claimed = 1;      // landmarks err by so much of what they claim
+  double zoom = 0;         // sigma of log f of the frame's own lens; 0: it has none
+  double zoom_rate = 0.5;  // 1/s, likewise of its rate
 };
 
 // A frame as it is drawn; x, g and phi are the truth, and what is told of it.
@@ -54,6 +56,13 @@ class LensFrame {
     const double rest = std::sqrt(1 - world.correlation * world.correlation);
     g = kOffset * Vector2<double>(world.correlation * n + rest * normal(1), normal(1));
     lens_.covariance_with_offset = {world.correlation * kOffset * world.sigma, 0};
+    if (world.zoom > 0) {
+      own = {normal(world.zoom), normal(world.zoom_rate)};
+      zoom_.covariance.diagonal() << world.zoom * world.zoom, world.zoom_rate * world.zoom_rate;
+      zoom_.value = {normal(world.zoom), 0};
+      own += zoom_.value;
+      prior.zoom = &zoom_;
+    }
     x << normal(1 / kLensFocal), normal(1 / kLensFocal), normal(0.01), normal(0.01),
         normal(kAcceleration), normal(kAcceleration);
     const FrameMotion<double> motion{{0.3, -0.4}, {0.1, 0.05}, kLensHeight / 2};
@@ -71,11 +80,13 @@ class LensFrame {
       f.u = seen.u;
       f.J_angle = seen.J_angle;
       f.time_s = seen.time_s;
-      f.covariance = kNoise * kNoise * Matrix2<double>::Identity();
+      f.covariance = kLensNoise * kLensNoise * Matrix2<double>::Identity();
       f.sensitivity = -(1 - world.knows_lens) * J_parameters;
       const Vector2<double> s = f.sensitivity * lens_.direction;
-      f.residual = f.J_angle * angle_at(x, f.time_s) - phi * s +
-                   Vector2<double>(normal(world.claimed * kNoise), normal(world.claimed * kNoise));
+      f.by_zoom = J_parameters * lens_.direction;
+      f.residual =
+          f.J_angle * angle_at(x, f.time_s) - phi * s + (own[0] + f.time_s * own[1]) * f.by_zoom +
+          Vector2<double>(normal(world.claimed * kLensNoise), normal(world.claimed * kLensNoise));
       landmarks.push_back(f);
     }
     prior.lens = &lens_;
@@ -104,9 +115,11 @@ class LensFrame {
   Vector6 x;          // map's frame
   Vector2<double> g;  // of the offset
   double phi = 0;
+  Vector2<double> own = Vector2<double>::Zero();  // log f and its rate, beside phi
   std::vector<FoundLandmark> landmarks;
   MotionPrior prior;
   LensScale lens_;
+  ZoomPrior zoom_;
 
  private:
   std::mt19937_64 random_;
@@ -172,6 +185,94 @@ TEST(LensSolve, ErrsAsItsCovarianceSays) {
   }
 }
 
+TEST(LensSolve, ErrsAsItsCovarianceSaysWhereTheFrameHasALensOfItsOwn) {
+  constexpr int kRuns = 300;
+  for (const double zoom : {1e-5, 2e-3}) {
+    for (const double knows_lens : {0.9, 1.0}) {
+      for (const bool has_telemetry : {true, false}) {
+        SCOPED_TRACE(testing::Message() << zoom << ' ' << knows_lens << ' ' << has_telemetry);
+        LensWorld world;
+        world.knows_lens = knows_lens;
+        world.has_telemetry = has_telemetry;
+        world.zoom = zoom;
+        double squares = 0;
+        double of_zoom = 0;
+        double error_square = 0;
+        for (int run = 0; run < kRuns; ++run) {
+          LensFrame frame(world, static_cast<std::uint64_t>(run));
+          SolvedMotion solved;
+          ASSERT_EQ(frame.solve(&solved), SolveStatus::kOk);
+          Vector7 truth;
+          truth << frame.x, frame.phi;
+          truth.head<2>() += frame.g;
+          const Vector7 error = estimate_of(solved) - truth;
+          squares += error.dot(covariance_of(solved).ldlt().solve(error)) / kRuns;
+          const SolvedZoom& own = solved.zoom;
+          const Vector2<double> own_error =
+              own.correction + solved.lens.value * own.by_lens - frame.own;
+          const Matrix2<double> covariance =
+              own.covariance + solved.lens.variance * own.by_lens * own.by_lens.transpose();
+          of_zoom += own_error.dot(covariance.inverse() * own_error) / kRuns;
+          error_square += own_error[0] * own_error[0] / kRuns;
+        }
+        // Four standard deviations of the means of chi-squares of 7 and of 2 degrees.
+        EXPECT_LT(squares, 7 + 4 * std::sqrt(14.0 / kRuns));
+        EXPECT_LT(of_zoom, 2 + 4 * std::sqrt(4.0 / kRuns));
+        // Landmarks that came with phi leave it to them alone, 420 px from the centre.
+        if (knows_lens == 1) {
+          EXPECT_LT(std::sqrt(error_square), 2 * kLensNoise / (420 * std::sqrt(120.0)));
+        }
+      }
+    }
+  }
+}
+
+// A lens that is known before as well as anything is one that there is none of.
+TEST(LensSolve, IsTheSameWhereTheFramesLensIsKnown) {
+  LensWorld world;
+  LensFrame without(world, 5);
+  LensFrame with(world, 5);
+  ZoomPrior zoom;
+  zoom.covariance = 1e-20 * Matrix2<double>::Identity();
+  with.prior.zoom = &zoom;
+  SolvedMotion a;
+  SolvedMotion b;
+  ASSERT_EQ(without.solve(&a), SolveStatus::kOk);
+  ASSERT_EQ(with.solve(&b), SolveStatus::kOk);
+  for (int i = 0; i < 6; ++i) {
+    const double sigma = std::sqrt(a.covariance(i, i));
+    EXPECT_NEAR(a.correction[i], b.correction[i], 1e-4 * sigma);
+    EXPECT_NEAR(a.covariance(i, i), b.covariance(i, i), 1e-4 * a.covariance(i, i));
+  }
+  EXPECT_NEAR(a.lens.value, b.lens.value, 1e-4 * std::sqrt(a.lens.variance));
+  EXPECT_LT(b.zoom.correction.norm(), 1e-9);
+}
+
+// How it comes out by other parameters, from the same frame: the linear problem is linear.
+TEST(LensSolve, OwnLensFollowsTheParametersAsItsSensitivitySays) {
+  LensWorld world;
+  world.knows_lens = 1;
+  world.zoom = 1e-3;
+  LensFrame frame(world, 6);
+  const int axis = index(Parameter::kPanAxis0);
+  constexpr double kStep = 1e-5;
+  for (FoundLandmark& f : frame.landmarks) {
+    f.sensitivity.col(axis) = Vector2<double>(f.u.x() - 600, 0.5 * f.u.y() * f.time_s * 1e3);
+  }
+  frame.zoom_.sensitivity(0, axis) = 0.3;
+  SolvedMotion before;
+  ASSERT_EQ(frame.solve(&before), SolveStatus::kOk);
+  for (FoundLandmark& f : frame.landmarks) f.residual += kStep * f.sensitivity.col(axis);
+  frame.zoom_.value[0] += kStep * 0.3;
+  SolvedMotion after;
+  ASSERT_EQ(frame.solve(&after), SolveStatus::kOk);
+  ASSERT_EQ(before.inliers, after.inliers);
+  const Vector2<double> change = (after.zoom.correction - before.zoom.correction) / kStep;
+  const Vector2<double> expected = before.zoom.sensitivity.col(axis);
+  EXPECT_NEAR(change[0], expected[0], 0.02 * std::abs(expected[0]));
+  EXPECT_NEAR(change[1], expected[1], 0.02 * expected.norm());
+}
+
 // Landmarks that are right tell it by their scale; those that came with this lens, from here, tell nothing.
 TEST(LensSolve, LearnsFromTheScaleOfWhatDoesNotKnowTheLens) {
   LensWorld world;
@@ -180,7 +281,7 @@ TEST(LensSolve, LearnsFromTheScaleOfWhatDoesNotKnowTheLens) {
   SolvedMotion solved;
   ASSERT_EQ(right.solve(&solved), SolveStatus::kOk);
   // 120 of 0.08 px, 420 px from the centre, root mean square.
-  const double expected = kNoise / (420 * std::sqrt(120.0));
+  const double expected = kLensNoise / (420 * std::sqrt(120.0));
   EXPECT_LT(std::sqrt(solved.lens.variance), 2 * expected);
   EXPECT_NEAR(1 / std::sqrt(solved.lens.information), std::sqrt(solved.lens.variance),
               0.1 * std::sqrt(solved.lens.variance));

@@ -264,5 +264,27 @@ TEST_F(ShearedFrames, HaveTheErrorsOfTheTiltTheyLookAt) {
   EXPECT_LT((shear_.covariances()[0] - before[0]).norm(), 1e-12);
 }
 
+// The errors of landmarks stay what they are, whatever lens looks at them.
+TEST(MapShear, OfAnAngleIsTheSameThroughAnotherLens) {
+  Calibration calibration = sheared_calibration();
+  MapShear shear{MapShearOptions{}};
+  shear.reset(calibration);
+  shear.begin(motion_of(angle(0), rate(0), acceleration()), first_covariance());
+  // As a frame sees it that looks a field of view higher.
+  const auto there = [&] {
+    MapShear moved{MapShearOptions{}};
+    moved.reset(calibration);
+    moved.set(shear.covariances(), shear.tilt());
+    moved.move_to(shear.tilt() + 0.2);
+    return moved.angle_covariance();
+  };
+  const Matrix2<double> before = there();
+  const double rate_before = shear.covariances()[0](1, 1);
+  calibration.camera.focal_length *= 4;
+  shear.change_lens(calibration);
+  EXPECT_LT((there() - before).norm(), 1e-9 * before.norm());
+  EXPECT_NEAR(shear.covariances()[0](1, 1), rate_before / 16, 1e-9 * rate_before);
+}
+
 }  // namespace
 }  // namespace alidade::test

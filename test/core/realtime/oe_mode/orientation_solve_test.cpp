@@ -22,7 +22,7 @@ namespace {
 
 constexpr double kSolvedWidth = 1920;
 constexpr double kSolvedHeight = 1080;
-constexpr double kFocalLength = 8000;  // px
+constexpr double kSolvedFocal = 8000;  // px
 constexpr double kNoise = 0.1;         // px, of a landmark, about
 constexpr double kNaN = std::numeric_limits<double>::quiet_NaN();
 constexpr double kNoLimit = std::numeric_limits<double>::infinity();
@@ -69,7 +69,7 @@ class Simulation {
   // Positions all over the image, Jacobians of a camera at a tilt, covariances of all shapes.
   [[nodiscard]] FoundLandmark landmark(const World& world, const Vector2<double>& u) {
     Calibration calibration;
-    calibration.camera = {kFocalLength, 1, 0.5, static_cast<int>(kSolvedWidth),
+    calibration.camera = {kSolvedFocal, 1, 0.5, static_cast<int>(kSolvedWidth),
                           static_cast<int>(kSolvedHeight)};
     calibration.line_delay = world.line_delay;
     const FrameMotion<double> motion{{0.3, -0.4}, {0.1, 0.05}, kSolvedHeight / 2};
@@ -110,7 +110,7 @@ class Simulation {
 
   [[nodiscard]] Frame frame(const World& world, const std::vector<Vector2<double>>& positions) {
     Frame out;
-    const double far = 2 / kFocalLength;
+    const double far = 2 / kSolvedFocal;
     out.x << uniform(-far, far), uniform(-far, far), normal(0.01), normal(0.01),
         normal(kPriorAccelerationSigma), normal(kPriorAccelerationSigma);
     x_ = out.x;
@@ -197,13 +197,13 @@ void expect_consistent(const Score& score) {
   EXPECT_LT(score.worst_bias(), 4.5);
 }
 
-constexpr int kRuns = 600;
+constexpr int kSolvedRuns = 600;
 
 // Frames as they are drawn, which all can be solved.
 Score score_of(const World& world, std::uint64_t seed) {
   Simulation simulation(seed);
   Score score;
-  for (int run = 0; run < kRuns; ++run) {
+  for (int run = 0; run < kSolvedRuns; ++run) {
     Frame frame = simulation.frame(world);
     SolvedMotion solved;
     EXPECT_EQ(frame.solve(world, &solved), SolveStatus::kOk);
@@ -230,7 +230,7 @@ TEST(OrientationSolve, ErrorsAreAsLargeAsTheCovarianceSaysWithAndWithoutTelemetr
             const Score score = score_of(world, 1);
             expect_consistent(score);
             // The gate's thousandth, and what a far start costs.
-            EXPECT_GT(score.inliers, 0.995 * kRuns * landmarks);
+            EXPECT_GT(score.inliers, 0.995 * kSolvedRuns * landmarks);
             EXPECT_LT(score.mean_inflation(), 1.3);
           }
         }
@@ -295,7 +295,7 @@ TEST(OrientationSolve, FlagsThirtyPercentThatAgreeAndFortyFiveThatDoNot) {
       Score score;
       int good = 0;
       int good_in = 0;
-      for (int run = 0; run < kRuns; ++run) {
+      for (int run = 0; run < kSolvedRuns; ++run) {
         Frame frame = simulation.frame(world);
         std::vector<bool> spoilt;
         spoil(wrong, wrong == Wrong::kTogether ? 0.3 : 0.45, &simulation, &frame, &spoilt);
@@ -379,7 +379,7 @@ TEST(OrientationSolve, BelievesLittleOfLandmarksThatAgreeOnNothing) {
   Simulation simulation(16);
   double squares = 0;
   int solved_runs = 0;
-  for (int run = 0; run < kRuns; ++run) {
+  for (int run = 0; run < kSolvedRuns; ++run) {
     Frame frame = simulation.frame(world);
     std::vector<bool> spoilt;
     spoil(Wrong::kEachByItself, 0.9, &simulation, &frame, &spoilt);
@@ -440,7 +440,7 @@ TEST(OrientationSolve, LeavesRatesToTelemetryWithoutALineDelay) {
   world.line_delay = 0;
   Simulation simulation(7);
   Score score;
-  for (int run = 0; run < kRuns; ++run) {
+  for (int run = 0; run < kSolvedRuns; ++run) {
     Frame frame = simulation.frame(world);
     SolvedMotion solved;
     ASSERT_EQ(frame.solve(world, &solved), SolveStatus::kOk);
@@ -480,7 +480,7 @@ TEST(OrientationSolve, FindsErrorsThatNeighboursShare) {
   Score score;
   constexpr int kColumns = 10;
   constexpr int kRows = 6;
-  for (int run = 0; run < kRuns; ++run) {
+  for (int run = 0; run < kSolvedRuns; ++run) {
     std::vector<Vector2<double>> positions;
     for (int cell = 0; cell < kColumns * kRows; ++cell) {
       for (int i = 0; i < 3; ++i) {
@@ -730,7 +730,7 @@ TEST(OrientationSolve, KeepsItsCovarianceWhenLandmarksRepeat) {
   world.landmarks = 60;
   Simulation simulation(12);
   Score score;
-  for (int run = 0; run < kRuns; ++run) {
+  for (int run = 0; run < kSolvedRuns; ++run) {
     Frame frame = simulation.frame(world);
     const std::vector<FoundLandmark> once = frame.landmarks;
     for (int i = 0; i < 3; ++i) {

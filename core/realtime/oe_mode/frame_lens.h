@@ -1,0 +1,18 @@
+#pragma once
+// FrameLens: what is known of the lens of one frame without its image, by a zoom reading and a zoom curve (core/model/zoom_curve.h).
+// Plain values.
+
+#include "core/model/calibration.h"
+
+namespace alidade {
+
+struct FrameLens {
+  // When the middle row is exposed; its covariance holds the curve's, the lens' repeatability and what the reading's time errs by.
+  Calibration calibration;
+  double rate = 0;        // 1/s, d log f / dt
+  double rate_sigma = 0;  // 1/s
+  // Not: the lens stands where it stood in the frame before, as far as its readings tell.
+  bool moves = false;
+};
+
+}  // namespace alidade

@@ -1,0 +1,207 @@
+// OE mode behind a lens that zooms: at rest, while it moves, and at rest again.
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <map>
+#include <memory>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "core/realtime/oe_mode/oe_mode.h"
+#include "test/support/allocation_guard.h"
+#include "test/support/zooming_camera.h"
+
+namespace alidade::test {
+namespace {
+
+constexpr double kRepeatability = kTwoOctavesRepeatability;
+
+class ZoomingLens : public testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    const simulator::Config config = two_octaves();
+    camera_ = new ZoomingCamera(config, std::make_unique<ZoomedPath>(config, 0.4, 3));
+  }
+  static void TearDownTestSuite() {
+    delete camera_;
+    images_.clear();
+  }
+
+  ZoomingLens() {
+    OeOptions options;
+    options.max_width = 480;
+    options.max_height = 270;
+    options.max_landmarks = 2000;
+    options.maker.cell_size_px = 24;
+    oe_ = std::make_unique<OeMode>(options);
+    oe_->reset(camera_->lens_at(0, kRepeatability).calibration, FocalLength::kLearnt);
+    while (moves(last_of_wide_ + 1) == false) ++last_of_wide_;
+    first_of_tele_ = last_of_wide_ + 1;
+    while (moves(first_of_tele_)) ++first_of_tele_;
+  }
+
+  [[nodiscard]] static bool moves(int k) { return camera_->lens(k, kRepeatability).moves; }
+
+  [[nodiscard]] static ImageView image(int k) {
+    std::vector<std::uint8_t>& pixels = images_[k];
+    if (pixels.empty()) pixels = camera_->image(k);
+    return camera_->view(pixels);
+  }
+
+  OeStatus process(int k, const FrameLens* lens) {
+    const InterpolatedPanTilt telemetry = camera_->telemetry(k, 5e-5, 5e-4);
+    const ImageView view = image(k);
+    const AllocationGuard guard;
+    const OeStatus status = oe_->process(view, camera_->time_s(k), &telemetry, lens, &frame_);
+    statistics_ = oe_->statistics();
+    oe_->maintain();
+    EXPECT_EQ(guard.count(), 0);
+    errors_ = errors_of(*camera_, k, frame_);
+    // Whatever the mode: 5 sigmas of a direction, and of the focal length.
+    EXPECT_LT(errors_.sigmas, 5) << k;
+    EXPECT_LT(errors_.log_sigmas, 5) << k;
+    return status;
+  }
+  OeStatus process(int k) {
+    const FrameLens lens = camera_->lens(k, kRepeatability);
+    return process(k, &lens);
+  }
+  // At rest at the wide end, so that the map knows its scale.
+  void begin() {
+    for (int k = kFirst; k <= last_of_wide_; ++k) static_cast<void>(process(k));
+    ASSERT_EQ(oe_->statistics().status, OeStatus::kOk);
+    ASSERT_FALSE(oe_->lens_has_moved());
+  }
+  [[nodiscard]] std::set<std::uint32_t> found_ids() const {
+    std::set<std::uint32_t> ids;
+    for (int i = 0; i < statistics_.found; ++i) ids.insert(oe_->observations()[i].id);
+    return ids;
+  }
+
+  // The middle row of the very first frames is exposed before the path begins.
+  static constexpr int kFirst = 2;
+  static ZoomingCamera* camera_;
+  static std::map<int, std::vector<std::uint8_t>> images_;
+  std::unique_ptr<OeMode> oe_;
+  FrameOrientation frame_;
+  OeStatistics statistics_;
+  FrameErrors errors_;
+  int last_of_wide_ = kFirst;
+  int first_of_tele_ = 0;
+};
+
+ZoomingCamera* ZoomingLens::camera_ = nullptr;
+std::map<int, std::vector<std::uint8_t>> ZoomingLens::images_;
+
+TEST_F(ZoomingLens, IsFollowedOverTwoOctavesAndBackToRest) {
+  begin();
+  const double of_map =
+      std::sqrt(frame_.calibration.covariance(0, 0)) / frame_.calibration.camera.focal_length;
+  double rms_square = 0;
+  int moving = 0;
+  for (int k = last_of_wide_ + 1; k < first_of_tele_ + 20; ++k) {
+    ASSERT_EQ(process(k), OeStatus::kOk) << k;
+    EXPECT_TRUE(statistics_.own_lens) << k;
+    EXPECT_LT(statistics_.reading_sigmas, 4) << k;
+    EXPECT_LT(errors_.rms_px, 0.15) << k;
+    if (k >= first_of_tele_ + 5) {
+      EXPECT_LT(errors_.rms_px, 0.05) << k;
+    }
+    if (k >= first_of_tele_) continue;
+    ++moving;
+    rms_square += errors_.rms_px * errors_.rms_px;
+    // d log f / dt as the motor has it.
+    const double true_rate =
+        std::log(camera_->camera().lens_at(camera_->time_s(k) + 1e-3).focal_length /
+                 camera_->camera().lens_at(camera_->time_s(k) - 1e-3).focal_length) /
+        2e-3;
+    EXPECT_NEAR(frame_.zoom_rate, true_rate, 0.02) << k;
+  }
+  EXPECT_GT(moving, 40);
+  EXPECT_LT(std::sqrt(rms_square / moving), 0.05);
+  EXPECT_NEAR(frame_.zoom_rate, 0, 1e-4);
+  // It knows f as well as the map knows its scale, not as well as the curve.
+  EXPECT_LT(std::sqrt(frame_.calibration.covariance(0, 0)),
+            3 * of_map * frame_.calibration.camera.focal_length);
+  EXPECT_LT(of_map, 0.3 * kRepeatability);
+}
+
+// Nobody looked while it moved, by less than an octave: the map is the same, and holds from the first frame on.
+TEST_F(ZoomingLens, KeepsItsMapAcrossAChangeThatNobodySaw) {
+  begin();
+  const std::set<std::uint32_t> before = found_ids();
+  int stop = last_of_wide_ + 1;
+  const double f = camera_->camera().lens_at(camera_->time_s(last_of_wide_)).focal_length;
+  while (camera_->camera().lens_at(camera_->time_s(stop)).focal_length < 1.7 * f) ++stop;
+  FrameLens lens = camera_->lens(stop, kRepeatability);
+  ASSERT_EQ(process(stop, &lens), OeStatus::kOk);
+  EXPECT_LT(errors_.rms_px, 0.15);
+  std::size_t again = 0;
+  for (const std::uint32_t id : found_ids()) again += before.count(id);
+  EXPECT_GT(again, 20U);
+}
+
+// The reading stands still all the way: images tell, the contradiction is said, and the curve has a lens for what they tell.
+TEST_F(ZoomingLens, IsFollowedWhereItsReadingIsStuck) {
+  begin();
+  const FrameLens stuck = camera_->lens_at(0, kRepeatability);
+  const double told = stuck.calibration.camera.focal_length;
+  int held = 0;
+  int contradictions = 0;
+  const int frames = first_of_tele_ + 10 - last_of_wide_;
+  double found = told;
+  for (int k = last_of_wide_ + 1; k <= last_of_wide_ + frames; ++k) {
+    const bool contradicted = std::abs(std::log(found / told)) > 5 * kRepeatability;
+    const FrameLens lens =
+        contradicted ? camera_->lens_of_focal_length(
+                           found * std::exp(frame_.zoom_rate * camera_->time_s(1)), kRepeatability)
+                     : stuck;
+    const bool ok = process(k, &lens) == OeStatus::kOk;
+    held += ok ? 1 : 0;
+    found = ok ? frame_.calibration.camera.focal_length : told;
+    contradictions += contradicted ? 1 : 0;
+  }
+  EXPECT_GE(held, 0.95 * frames);
+  EXPECT_GT(contradictions, frames / 2);
+}
+
+// For some frames there is no reading at all.
+TEST_F(ZoomingLens, IsFollowedThroughAGapInItsReadings) {
+  begin();
+  const int middle = (last_of_wide_ + first_of_tele_) / 2;
+  for (int k = last_of_wide_ + 1; k < middle + 15; ++k) {
+    const bool gap = k >= middle && k < middle + 8;
+    const OeStatus status = gap ? process(k, nullptr) : process(k);
+    // The optical centre wanders unseen, until telemetry says so.
+    EXPECT_TRUE(status == OeStatus::kOk || (gap && status == OeStatus::kContradiction)) << k;
+  }
+}
+
+TEST_F(ZoomingLens, BeginsItsMapAtRest) {
+  const int middle = (last_of_wide_ + first_of_tele_) / 2;
+  oe_->reset(camera_->lens(middle, kRepeatability).calibration, FocalLength::kLearnt);
+  for (int k = middle + 1; k < first_of_tele_; ++k) {
+    ASSERT_EQ(process(k), OeStatus::kTooFew) << k;
+    EXPECT_EQ(frame_.mode, OrientationMode::kPt);
+    EXPECT_EQ(oe_->map().size(), 0);
+  }
+  for (int k = first_of_tele_; k < first_of_tele_ + 10; ++k) static_cast<void>(process(k));
+  EXPECT_EQ(oe_->statistics().status, OeStatus::kOk);
+  EXPECT_GT(oe_->map().size(), 50);
+}
+
+// What is handed over is a map of the calibration that was given, and of its lens.
+TEST_F(ZoomingLens, HandsOnWhatTheFirstLensMade) {
+  begin();
+  const Calibration given = camera_->lens_at(0, kRepeatability).calibration;
+  for (int k = last_of_wide_ + 1; k < first_of_tele_; ++k) static_cast<void>(process(k));
+  const MapState map = oe_->map_state();
+  EXPECT_LT(map.landmarks.size(), static_cast<std::size_t>(oe_->map().size()));
+  oe_->reset(given, map, FocalLength::kLearnt);
+  EXPECT_EQ(process(last_of_wide_), OeStatus::kOk);
+}
+
+}  // namespace
+}  // namespace alidade::test
