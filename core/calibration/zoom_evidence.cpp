@@ -29,6 +29,37 @@ std::vector<int> rows_but(int node, int nodes) {
   return rows;
 }
 
+// log_f_information and log_f_weighted: H with all other rows eliminated.
+bool set_log_f(const Eigen::MatrixXd& H, const std::vector<int>& rows, ZoomEvidence* evidence) {
+  const int nodes = evidence->nodes();
+  std::vector<int> others;
+  for (const int row : rows) {
+    if (row >= kZoomQuantityCount * nodes || row % kZoomQuantityCount != 0) others.push_back(row);
+  }
+  const Eigen::MatrixXd inverse = scaled_inverse(part_of(H, others));
+  if (inverse.size() == 0) return false;
+  const auto count = static_cast<Eigen::Index>(others.size());
+  Eigen::MatrixXd H_of(nodes, count);
+  Eigen::VectorXd g_others(count);
+  evidence->log_f_information.resize(nodes, nodes);
+  evidence->log_f_weighted.resize(nodes);
+  for (int i = 0; i < nodes; ++i) {
+    const int row = evidence->row(i, 0);
+    evidence->log_f_weighted[i] = evidence->g[row];
+    for (int j = 0; j < nodes; ++j) {
+      evidence->log_f_information(i, j) = H(row, evidence->row(j, 0));
+    }
+    for (Eigen::Index j = 0; j < count; ++j)
+      H_of(i, j) = H(row, others[static_cast<std::size_t>(j)]);
+  }
+  for (Eigen::Index j = 0; j < count; ++j)
+    g_others[j] = evidence->g[others[static_cast<std::size_t>(j)]];
+  const Eigen::MatrixXd weighted = H_of * inverse;
+  evidence->log_f_information -= weighted * H_of.transpose();
+  evidence->log_f_weighted -= weighted * g_others;
+  return true;
+}
+
 }  // namespace
 
 std::vector<int> ZoomEvidence::rows(const std::vector<int>& places) const {
@@ -45,6 +76,7 @@ std::vector<int> ZoomEvidence::rows(const std::vector<int>& places) const {
 ZoomEvidence no_zoom_evidence(const std::vector<double>& readings) {
   ZoomEvidence evidence;
   evidence.reading = readings;
+  evidence.is_between.assign(readings.size(), false);
   const int size = kZoomQuantityCount * evidence.nodes() + kSharedCount;
   evidence.H.setZero(size, size);
   evidence.g.setZero(size);
@@ -75,6 +107,8 @@ bool take_apart(const ZoomCurve& curve, const ZoomCurveParts& parts, ZoomEvidenc
   constexpr double kAnyClock_s = 0.1;  // as far as two connections' delays may differ
   const ZoomCurve::Content& content = curve.content();
   *evidence = no_zoom_evidence({content.reading.begin(), content.reading.begin() + content.nodes});
+  evidence->is_between.assign(content.is_between.begin(),
+                              content.is_between.begin() + content.nodes);
   evidence->level = content.level;
   Eigen::MatrixXd covariance = content.covariance;
   const std::vector<int> rows = evidence->rows(parts.places);
@@ -105,6 +139,8 @@ int insert_node(double reading, ZoomEvidence* evidence) {
   std::vector<double> readings = evidence->reading;
   readings.insert(readings.begin() + node, reading);
   ZoomEvidence larger = no_zoom_evidence(readings);
+  larger.is_between = evidence->is_between;
+  larger.is_between.insert(larger.is_between.begin() + node, false);
   const std::vector<int> rows = rows_but(node, larger.nodes());
   larger.level = evidence->level;
   larger.H = spread(evidence->H, rows, rows, larger.H.rows(), larger.H.cols());
@@ -124,6 +160,12 @@ bool set_marginals(const std::vector<int>& places, double centre_sigma_px, ZoomE
     }
   }
   const std::vector<int> rows = evidence->rows(places);
+  if (!set_log_f(H, rows, evidence)) return false;
+  for (int i = 0; i < evidence->nodes(); ++i) {
+    constexpr double kAnyLogF = 1;  // of what movements leave open: the other quantities do not ask
+    if (evidence->is_between[static_cast<std::size_t>(i)])
+      H(evidence->row(i, 0), evidence->row(i, 0)) += 1 / (kAnyLogF * kAnyLogF);
+  }
   const Eigen::MatrixXd inverse = scaled_inverse(part_of(H, rows));
   if (inverse.size() == 0) return false;
   const Eigen::MatrixXd covariance = spread(inverse, rows, rows, H.rows(), H.cols());
@@ -148,6 +190,8 @@ ZoomCurve::Content without_a_node(const ZoomCurve::Content& content) {
   --rest.nodes;
   for (int i = crowded; i < rest.nodes; ++i) {
     rest.reading[static_cast<std::size_t>(i)] = reading(i + 1);
+    rest.is_between[static_cast<std::size_t>(i)] =
+        content.is_between[static_cast<std::size_t>(i + 1)];
   }
   const std::vector<int> rows = rows_but(crowded, content.nodes);
   rest.covariance = part_of(content.covariance, rows);

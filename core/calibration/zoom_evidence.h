@@ -13,13 +13,18 @@
 namespace alidade::internal {
 
 struct ZoomEvidence {
-  std::vector<double> reading;  // of the nodes, not decreasing
+  std::vector<double> reading;   // of the nodes, not decreasing
+  std::vector<bool> is_between;  // of them: as ZoomCurve::Content
   std::array<double, kZoomQuantityCount> level{};
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
   // Each quantity of each node by itself, with a centre that is as good as usual: tells how rough the curves are.
   Eigen::MatrixXd value;     // nodes x quantities, less the level
   Eigen::MatrixXd variance;  // likewise
+  // What is known of log f of all nodes together, less the level, the rest taken as open: movements tell several with one error,
+  // and some not at all.
+  Eigen::MatrixXd log_f_information;
+  Eigen::VectorXd log_f_weighted;  // times the mean
 
   [[nodiscard]] int nodes() const { return static_cast<int>(reading.size()); }
   // Row of H, by a sample's place.
@@ -46,7 +51,7 @@ struct ZoomCurveParts {
                               ZoomEvidence* evidence);
 // Room for one more node; returns where.
 int insert_node(double reading, ZoomEvidence* evidence);
-// value and variance from H and g; centre_sigma_px: how good a centre is, usually. False: H is not positive.
+// value, variance and what is known of log f from H and g; centre_sigma_px: how good a centre is, usually. False: H is not positive.
 [[nodiscard]] bool set_marginals(const std::vector<int>& places, double centre_sigma_px,
                                  ZoomEvidence* evidence);
 

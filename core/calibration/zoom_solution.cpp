@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <utility>
 
 #include "core/calibration/number_text.h"
@@ -12,7 +13,7 @@
 namespace alidade::internal {
 namespace {
 
-// Of the nodes' values, a movement's error at each included.
+// Of the nodes' values, a movement's error at each visit included.
 Eigen::MatrixXd process_covariance(const ZoomCurve::Content& content, int quantity) {
   const ZoomSmoothness& smoothness = content.smoothness[static_cast<std::size_t>(quantity)];
   const double first = content.reading[0];
@@ -27,7 +28,8 @@ Eigen::MatrixXd process_covariance(const ZoomCurve::Content& content, int quanti
     for (int j = 0; j < content.nodes; ++j)
       K(i, j) = smoothness.covariance(position(i), position(j));
     K(i, i) += std::pow(apart * smoothness.level_sigma, 2);
-    if (quantity == 0) K(i, i) += content.repeatability * content.repeatability;
+    if (quantity == 0 && !content.is_between[static_cast<std::size_t>(i)])
+      K(i, i) += content.repeatability * content.repeatability;
   }
   return K;
 }
@@ -39,6 +41,29 @@ std::array<ZoomSmoothness, kZoomQuantityCount> usual(double rise, const Camera<d
   return {ZoomSmoothness{5, 20, 1.5 * std::max(std::abs(rise), 0.1)}, ZoomSmoothness{0.3, 0.3, 0.1},
           ZoomSmoothness{centre_px, centre_px, 0.5 * centre_px},
           ZoomSmoothness{centre_px, centre_px, 0.5 * centre_px}};
+}
+
+// Of log f at the nodes, of which some may not be told at all: with K the process's covariance, A what is known,
+//   -(log |K| + log |K^-1 + A| - b^T (K^-1 + A)^-1 b) / 2,  b = A times the mean
+std::optional<double> log_f_likelihood(const ZoomCurve::Content& content,
+                                       const ZoomEvidence& evidence) {
+  const Eigen::MatrixXd inverse = scaled_inverse(process_covariance(content, 0));
+  if (inverse.size() == 0) return std::nullopt;
+  const auto log_determinant = [](const Eigen::MatrixXd& matrix, Eigen::LLT<Eigen::MatrixXd>* llt,
+                                  Eigen::VectorXd* scale) -> std::optional<double> {
+    *scale = matrix.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    llt->compute(scale->asDiagonal() * matrix * scale->asDiagonal());
+    if (llt->info() != Eigen::Success) return std::nullopt;
+    return 2 * (llt->matrixLLT().diagonal().array().log().sum() - scale->array().log().sum());
+  };
+  Eigen::LLT<Eigen::MatrixXd> of_prior;
+  Eigen::LLT<Eigen::MatrixXd> of_both;
+  Eigen::VectorXd scale;
+  const auto prior = log_determinant(inverse, &of_prior, &scale);
+  const auto both = log_determinant(inverse + evidence.log_f_information, &of_both, &scale);
+  if (!prior || !both) return std::nullopt;
+  const Eigen::VectorXd b = scale.cwiseProduct(evidence.log_f_weighted);
+  return 0.5 * (*prior - *both + b.dot(of_both.solve(b)));
 }
 
 bool is_monotone(const ZoomCurve& curve, std::string* error) {
@@ -80,6 +105,7 @@ ZoomSolution::ZoomSolution(ZoomEvidence evidence, std::vector<int> places,
 bool ZoomSolution::run(std::string* error) {
   content_.nodes = nodes_;
   std::copy(evidence_.reading.begin(), evidence_.reading.end(), content_.reading.begin());
+  std::copy(evidence_.is_between.begin(), evidence_.is_between.end(), content_.is_between.begin());
   content_.level = evidence_.level;
   content_.repeatability = options_.repeatability;
   content_.smoothness =
@@ -109,6 +135,16 @@ bool ZoomSolution::curve(ZoomCurve* curve, std::string* error) const {
   return is_monotone(*curve, error);
 }
 
+std::optional<double> ZoomSolution::likelihood_of(int quantity) const {
+  const Eigen::VectorXd y = evidence_.value.col(quantity);
+  Eigen::MatrixXd K = process_covariance(content_, quantity);
+  K.diagonal() += evidence_.variance.col(quantity);
+  const Eigen::LLT<Eigen::MatrixXd> llt(K);
+  if (llt.info() != Eigen::Success) return std::nullopt;
+  const double log_determinant = 2 * llt.matrixLLT().diagonal().array().log().sum();
+  return -0.5 * (y.dot(llt.solve(y)) + log_determinant);
+}
+
 // Likelihood of each quantity by itself, the others taken as open.
 void ZoomSolution::choose_roughness() {
   constexpr int kSteps = 33;
@@ -119,17 +155,13 @@ void ZoomSolution::choose_roughness() {
     const double usual_roughness = smoothness.roughness;
     double best = -1e300;
     double best_roughness = usual_roughness;
-    const Eigen::VectorXd y = evidence_.value.col(q);
     for (int step = 0; step < kSteps; ++step) {
       const double decades = kDecades * (2.0 * step / (kSteps - 1) - 1);
       smoothness.roughness = usual_roughness * std::pow(10, decades);
-      Eigen::MatrixXd K = process_covariance(content_, q);
-      K.diagonal() += evidence_.variance.col(q);
-      const Eigen::LLT<Eigen::MatrixXd> llt(K);
-      if (llt.info() != Eigen::Success) continue;
-      const double log_determinant = 2 * llt.matrixLLT().diagonal().array().log().sum();
-      const double likelihood = -0.5 * (y.dot(llt.solve(y)) + log_determinant) -
-                                0.5 * std::pow(decades / kPriorDecades, 2);
+      const std::optional<double> likelihood_of_data =
+          q == 0 ? log_f_likelihood(content_, evidence_) : likelihood_of(q);
+      if (!likelihood_of_data) continue;
+      const double likelihood = *likelihood_of_data - 0.5 * std::pow(decades / kPriorDecades, 2);
       if (likelihood <= best) continue;
       best = likelihood;
       best_roughness = smoothness.roughness;

@@ -1,8 +1,10 @@
 #include "test/accuracy/zoom_experiment.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <ostream>
 #include <random>
 #include <unordered_set>
@@ -88,7 +90,7 @@ void judge_nodes(const ZoomRecording& truth, const ZoomCurve& curve,
   Eigen::MatrixXd e(dwells, kZoomQuantityCount);
   std::vector<int> node_of;
   for (int i = 0; i < content.nodes; ++i) {
-    node_of.push_back(i);
+    if (!content.is_between[static_cast<std::size_t>(i)]) node_of.push_back(i);
   }
   for (Eigen::Index i = 0; i < dwells; ++i) {
     const auto node = static_cast<std::size_t>(node_of[static_cast<std::size_t>(i)]);
@@ -157,7 +159,7 @@ void judge_between(const ZoomRecording& truth, const ZoomCurve& curve, std::uint
     double nearest_f = 0;
     for (int node = 0; node < content.nodes; ++node) {
       const double away = std::abs(content.reading[static_cast<std::size_t>(node)] - reading);
-      if (away >= nearest) continue;
+      if (away >= nearest || content.is_between[static_cast<std::size_t>(node)]) continue;
       nearest = away;
       nearest_f = curve.node(node).camera.focal_length;
     }
@@ -165,37 +167,93 @@ void judge_between(const ZoomRecording& truth, const ZoomCurve& curve, std::uint
   }
 }
 
-// One recording, its dwells calibrated once with and once without a free optical centre.
-struct ZoomRun {
-  std::uint64_t seed = 0;
-  CurveErrors with_centre;
-  CurveErrors middle;  // taken as the centre
+// Calibrations of single dwells, each by itself: squares of errors over sigmas.
+struct AloneErrors {
+  std::array<std::vector<double>, kZoomQuantityCount> square;
+  std::vector<double> axes_square;  // e^T P^-1 e
+  std::vector<double> axes_worst;   // rad
 };
 
-CurveErrors judge_dwells(const ZoomRecording& recording, const std::vector<ZoomStretch>& dwells,
-                         double centre_sigma_px, std::uint64_t seed) {
-  CurveErrors errors;
-  std::vector<Calibration> calibrations;
-  std::vector<double> dwell_s;
-  CalibrationOptions options;
-  options.centre_sigma_px = centre_sigma_px;
-  for (const ZoomStretch& dwell : dwells) {
+struct ZoomRun {
+  std::uint64_t seed = 0;
+  std::vector<std::string> errors;
+  AloneErrors alone;         // optical centre free
+  AloneErrors alone_middle;  // the image's middle taken as the optical centre
+  CurveErrors dwells;
+  CurveErrors movements;  // their part in it
+};
+
+struct Dwells {
+  std::vector<ZoomStretch> stretch;  // of each calibration
+  std::vector<Calibration> calibration;
+  std::vector<double> time_s;  // of the middle, true
+};
+
+Dwells calibrate_dwells(const ZoomRecording& recording, const std::vector<ZoomStretch>& stretches,
+                        const CalibrationOptions& options, std::vector<std::string>* errors) {
+  Dwells dwells;
+  for (const ZoomStretch& dwell : stretches) {
     CalibrationResult result = calibrate(part_in(recording.input(), dwell), options);
     if (!result.ok()) {
-      errors.error = "reading " + number(dwell.zoom) + ": " + result.message;
+      errors->push_back("reading " + number(dwell.zoom) + " left out: " + result.message);
       continue;
     }
     result.calibration.zoom = dwell.zoom;
-    calibrations.push_back(result.calibration);
-    dwell_s.push_back((dwell.begin_s + dwell.end_s) / 2 - recording.config().camera.clock_offset);
+    dwells.stretch.push_back(dwell);
+    dwells.calibration.push_back(result.calibration);
+    dwells.time_s.push_back((dwell.begin_s + dwell.end_s) / 2 -
+                            recording.config().camera.clock_offset);
   }
+  return dwells;
+}
+
+AloneErrors judge_alone(const ZoomRecording& recording, const Dwells& dwells) {
+  AloneErrors errors;
+  for (std::size_t i = 0; i < dwells.calibration.size(); ++i) {
+    const Calibration& c = dwells.calibration[i];
+    const simulator::Lens lens = recording.camera().lens_at(dwells.time_s[i]);
+    const Eigen::Vector2d centre =
+        lens.centre - Eigen::Vector2d(c.camera.width, c.camera.height) / 2;
+    const std::array<double, kZoomQuantityCount> error = {
+        c.camera.focal_length - lens.focal_length,
+        c.camera.radial_distortion - lens.radial_distortion, c.camera.centre_u - centre.x(),
+        c.camera.centre_v - centre.y()};
+    constexpr std::array<Parameter, kZoomQuantityCount> kOf = {
+        Parameter::kFocalLength, Parameter::kRadialDistortion, Parameter::kCentreU,
+        Parameter::kCentreV};
+    for (std::size_t q = 0; q < kOf.size(); ++q) {
+      const double variance = c.covariance(index(kOf[q]), index(kOf[q]));
+      if (variance > 0) errors.square[q].push_back(error[q] * error[q] / variance);
+    }
+    Eigen::VectorXd axes(kAxesSize);
+    axes << direction_minus<double>(recording.camera().pan_axis(), c.mechanics.pan_axis),
+        direction_minus<double>(recording.camera().tilt_axis(), c.mechanics.tilt_axis);
+    const int first = index(Parameter::kPanAxis0);
+    errors.axes_square.push_back(
+        square_of(axes, c.covariance.block<kAxesSize, kAxesSize>(first, first)));
+    errors.axes_worst.push_back(axes.cwiseAbs().maxCoeff());
+  }
+  return errors;
+}
+
+CurveErrors judge_curve(const ZoomRecording& recording, const Dwells& dwells,
+                        const std::vector<MovementObservation>& movements,
+                        const CalibrationOptions& options, std::uint64_t seed, ZoomFit* fit) {
+  CurveErrors errors;
   ZoomFitOptions fit_options = zoom_fit_options(options);
   fit_options.repeatability = recording.config().zoom->sigma_rep;
-  ZoomFit fit;
-  errors.fitted = fit_zoom(calibrations, fit_options, &fit, &errors.error);
+  errors.fitted = fit_zoom(dwells.calibration, movements, fit_options, fit, &errors.error);
   if (!errors.fitted) return errors;
-  judge_nodes(recording, fit.curve, dwell_s, &errors);
-  judge_between(recording, fit.curve, seed, &errors);
+  // Nodes are in the order of readings.
+  std::vector<std::size_t> order(dwells.time_s.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::stable_sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return dwells.stretch[a].zoom < dwells.stretch[b].zoom;
+  });
+  std::vector<double> time_s;
+  for (const std::size_t i : order) time_s.push_back(dwells.time_s[i]);
+  judge_nodes(recording, fit->curve, time_s, &errors);
+  judge_between(recording, fit->curve, seed, &errors);
   return errors;
 }
 
@@ -203,19 +261,50 @@ ZoomRun make_run(const ZoomExperimentOptions& options, std::uint64_t seed) {
   ZoomRun run;
   run.seed = seed;
   const ZoomRecording recording(options.scenario, seed);
-  const std::vector<ZoomStretch> dwells =
+  const std::vector<ZoomStretch> stretches =
       find_zoom_stretches(recording.readings(), {0, ZoomStretchOptions().glitch_s, kLeastDwell_s});
-  run.with_centre =
-      judge_dwells(recording, dwells, kUsualCentreShare * recording.input().width, seed);
-  run.middle = judge_dwells(recording, dwells, 0, seed);
+  CalibrationOptions calibration;
+  std::vector<std::string> ignored;
+  run.alone_middle =
+      judge_alone(recording, calibrate_dwells(recording, stretches, calibration, &ignored));
+  calibration.centre_sigma_px = kUsualCentreShare * recording.input().width;
+  const Dwells dwells = calibrate_dwells(recording, stretches, calibration, &run.errors);
+  run.alone = judge_alone(recording, dwells);
+  ZoomFit fit;
+  run.dwells = judge_curve(recording, dwells, {}, calibration, seed, &fit);
+  if (!run.dwells.fitted) {
+    run.errors.push_back(run.dwells.error);
+    return run;
+  }
+  if (!options.movements) return run;
+  std::vector<MovementObservation> observations;
+  const std::vector<double> readings = readings_between(dwells.calibration);
+  for (const ZoomMovement& movement :
+       find_movements(recording.input(), recording.readings(), dwells.stretch)) {
+    MovementObservation observation;
+    std::string error;
+    if (!observe_movement(movement, fit.curve, readings, &observation, &error)) {
+      run.errors.push_back("movement from " + number(movement.from.zoom) + " to " +
+                           number(movement.to.zoom) + ": " + error);
+      continue;
+    }
+    for (std::size_t i = 0; i < dwells.stretch.size(); ++i) {
+      if (dwells.stretch[i].begin_s == movement.from.begin_s) observation.from = i;
+      if (dwells.stretch[i].begin_s == movement.to.begin_s) observation.to = i;
+    }
+    observations.push_back(observation);
+  }
+  ZoomFit with_movements;
+  run.movements = judge_curve(recording, dwells, observations, calibration, seed, &with_movements);
+  if (!run.movements.fitted) run.errors.push_back(run.movements.error);
   return run;
 }
 
 // One way of calibrating over all runs.
 class ZoomVerdict {
  public:
-  ZoomVerdict(std::string name, bool judged, std::vector<std::string>* missed)
-      : name_(std::move(name)), judged_(judged), missed_(missed) {}
+  ZoomVerdict(std::string name, std::vector<std::string>* missed)
+      : name_(std::move(name)), missed_(missed) {}
 
   [[nodiscard]] std::string mean_square(const std::string& what, double sum, int count) {
     const double probability = 1 - (1 - kVerdictProbability) / kStatistics;
@@ -225,14 +314,11 @@ class ZoomVerdict {
     const Interval interval = mean_square_interval(count, kPrintedProbability);
     return number(mean) + " (" + number(interval.low) + " to " + number(interval.high) + ")";
   }
-  void fail(const std::string& what) {
-    if (judged_) missed_->push_back(name_ + ": " + what);
-  }
+  void fail(const std::string& what) { missed_->push_back(name_ + ": " + what); }
 
  private:
   static constexpr int kStatistics = 5;
   std::string name_;
-  bool judged_;
   std::vector<std::string>* missed_;
 };
 
@@ -241,9 +327,8 @@ double square_mean(const std::vector<double>& values) {
 }
 
 void report_way(const std::vector<const CurveErrors*>& runs, const std::string& name,
-                std::size_t nodes, bool judged, std::vector<std::string>* missed,
-                std::ostream& out) {
-  ZoomVerdict verdict(name, judged, missed);
+                std::size_t nodes, std::vector<std::string>* missed, std::ostream& out) {
+  ZoomVerdict verdict(name, missed);
   const auto count = static_cast<int>(runs.size());
   Table at_nodes;
   at_nodes.title = name + ", " + std::to_string(count) + " runs: at the nodes";
@@ -320,6 +405,37 @@ void report_way(const std::vector<const CurveErrors*>& runs, const std::string& 
   between.print(out);
 }
 
+void report_alone(const std::vector<ZoomRun>& runs, AloneErrors ZoomRun::*way, const char* name,
+                  std::ostream& out) {
+  Table table;
+  table.title = std::string("each dwell by itself, ") + name + ": mean of (error / sigma)^2";
+  table.header = {"", "", "95 %", "largest, sigmas"};
+  const auto add = [&](const char* what, const std::vector<double>& squares, int size) {
+    if (squares.empty()) return;
+    const Interval interval =
+        mean_square_interval(size * static_cast<int>(squares.size()), kPrintedProbability);
+    table.rows.push_back({what, number(mean(squares) / size),
+                          number(interval.low) + " to " + number(interval.high),
+                          number(std::sqrt(largest(squares)))});
+  };
+  for (std::size_t q = 0; q < kNames.size(); ++q) {
+    std::vector<double> squares;
+    for (const ZoomRun& run : runs) {
+      squares.insert(squares.end(), (run.*way).square[q].begin(), (run.*way).square[q].end());
+    }
+    add(q == 0 ? "f" : q == 1 ? "k" : kNames[q], squares, 1);
+  }
+  std::vector<double> axes;
+  std::vector<double> worst;
+  for (const ZoomRun& run : runs) {
+    axes.insert(axes.end(), (run.*way).axes_square.begin(), (run.*way).axes_square.end());
+    worst.insert(worst.end(), (run.*way).axes_worst.begin(), (run.*way).axes_worst.end());
+  }
+  add("axes", axes, kAxesSize);
+  table.notes = {"largest error of an axis " + number(largest(worst)) + " rad"};
+  table.print(out);
+}
+
 }  // namespace
 
 std::vector<std::string> run_zoom_experiment(const ZoomExperimentOptions& options,
@@ -328,22 +444,24 @@ std::vector<std::string> run_zoom_experiment(const ZoomExperimentOptions& option
   std::vector<ZoomRun> runs;
   for (int i = 0; i < options.runs; ++i) {
     runs.push_back(make_run(options, options.first_seed + static_cast<std::uint64_t>(i)));
+    for (const std::string& error : runs.back().errors) {
+      out << "seed " << runs.back().seed << ": " << error << "\n";
+      missed.push_back("seed " + std::to_string(runs.back().seed) + ": " + error);
+    }
   }
-  const auto report = [&](const char* name, CurveErrors ZoomRun::*way, bool judged) {
+  report_alone(runs, &ZoomRun::alone_middle, "the middle taken as the optical centre", out);
+  report_alone(runs, &ZoomRun::alone, "optical centre free", out);
+  const auto report = [&](const char* name, CurveErrors ZoomRun::*way) {
     std::vector<const CurveErrors*> fitted;
     for (const ZoomRun& run : runs) {
-      const CurveErrors& errors = run.*way;
-      if (errors.fitted) fitted.push_back(&errors);
-      if (errors.error.empty()) continue;
-      out << name << ", seed " << run.seed << ": " << errors.error << "\n";
-      if (judged) missed.push_back(std::string(name) + ": " + errors.error);
+      if ((run.*way).fitted) fitted.push_back(&(run.*way));
     }
     if (!fitted.empty()) {
-      report_way(fitted, name, options.scenario.focal_lengths.size(), judged, &missed, out);
+      report_way(fitted, name, options.scenario.focal_lengths.size(), &missed, out);
     }
   };
-  report("optical centre estimated", &ZoomRun::with_centre, true);
-  report("optical centre taken as the middle", &ZoomRun::middle, false);
+  report("curve of the dwells", &ZoomRun::dwells);
+  if (options.movements) report("curve of dwells and movements", &ZoomRun::movements);
   return missed;
 }
 
