@@ -123,7 +123,7 @@ MovementRows rows_of(const MovementObservation& movement, double repeatability,
 }  // namespace
 
 bool add_movements(const std::vector<MovementObservation>& movements, const ZoomFitOptions& options,
-                   std::vector<int>* node_of, ZoomEvidence* evidence) {
+                   double clock_sigma_s, std::vector<int>* node_of, ZoomEvidence* evidence) {
   for (const MovementObservation& movement : movements) {
     for (const auto& end : {movement.from, movement.to}) {
       if (!end || *end >= node_of->size()) continue;
@@ -156,7 +156,8 @@ bool add_movements(const std::vector<MovementObservation>& movements, const Zoom
     covariance.block(next, next, count, count) = rows.covariance;
     next += count;
   }
-  covariance += std::pow(options.zoom_late_sigma_s, 2) * rate * rate.transpose();
+  covariance += (std::pow(options.zoom_late_sigma_s, 2) + std::pow(clock_sigma_s, 2)) * rate *
+                rate.transpose();
   const Eigen::MatrixXd weight = scaled_inverse(covariance);
   if (weight.size() == 0) return false;
   evidence->H += S.transpose() * weight * S;

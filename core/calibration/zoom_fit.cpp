@@ -148,6 +148,28 @@ std::vector<double> readings_between(const std::vector<Calibration>& calibration
   return readings;
 }
 
+std::vector<std::string> zoom_advice(const ZoomCurve& curve, double share) {
+  std::vector<std::string> advice;
+  const ZoomCurve::Content& content = curve.content();
+  for (int i = 1; i < content.nodes; ++i) {
+    const double begin = content.reading[static_cast<std::size_t>(i - 1)];
+    const double end = content.reading[static_cast<std::size_t>(i)];
+    Calibration c;
+    if (!curve.at(0.5 * (begin + end), &c)) continue;
+    const double sigma =
+        std::sqrt(c.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength))) /
+        c.camera.focal_length;
+    if (sigma <= share) continue;
+    constexpr double kPercent = 100;
+    advice.push_back("zoom between readings " + short_text(begin) + " and " + short_text(end) +
+                     " was never seen: the focal length is known to " +
+                     short_text(std::round(kPercent * 10 * sigma) / 10) +
+                     " % there; dwell between them, or let the zoom pass while the camera sees "
+                     "texture");
+  }
+  return advice;
+}
+
 ZoomFitOptions zoom_fit_options(const CalibrationOptions& made_with) {
   ZoomFitOptions options;
   const auto add = [&options](Parameter parameter, const std::optional<CalibrationPrior>& prior) {
@@ -228,7 +250,14 @@ bool fit_zoom(const std::vector<Calibration>& calibrations,
     }
   }
   std::vector<int> node_of = nodes_by_calibration(calibrations);
-  if (!internal::add_movements(movements, options, &node_of, &evidence)) {
+  const int clock = zoom_place_of(Parameter::kClockOffset);
+  double clock_information = 0;
+  for (const ZoomSample& sample : samples) {
+    if (sample.covariance(clock, clock) > 0)
+      clock_information += 1 / sample.covariance(clock, clock);
+  }
+  const double clock_sigma_s = clock_information > 0 ? 1 / std::sqrt(clock_information) : 0;
+  if (!internal::add_movements(movements, options, clock_sigma_s, &node_of, &evidence)) {
     *error = "a movement of the zoom has a covariance that is not positive";
     return false;
   }

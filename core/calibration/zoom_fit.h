@@ -71,6 +71,10 @@ struct ZoomFit {
                             const std::vector<MovementObservation>& movements,
                             const ZoomFitOptions& options, ZoomFit* fit, std::string* error);
 
+// What would help, one line each: between which readings the focal length is known to worse than `share` of it, as neither a dwell
+// nor a movement showed it.
+[[nodiscard]] std::vector<std::string> zoom_advice(const ZoomCurve& curve, double share = 0.01);
+
 // visit: the node that the calibration is another observation of, the zoom not moved since; none: a visit of its own, whose reading
 // may be that of another. Where there are kMaxNodes, one of those that are closest together is left out, what it said of the
 // others kept.

@@ -162,8 +162,10 @@ bool observe_movement(const ZoomMovement& movement, const ZoomCurve& curve,
     *error = status.message;
     return false;
   }
-  const RecordingClocks clocks =
-      internal::fit_clocks(movement.input, CalibrationOptions(), &selected);
+  CalibrationOptions stamps;
+  stamps.image_stamps = movement.image_stamps;
+  stamps.telemetry_stamps = movement.telemetry_stamps;
+  const RecordingClocks clocks = internal::fit_clocks(movement.input, stamps, &selected);
   internal::unwrap(&selected.data.telemetry);
 
   MovementData data;
@@ -232,6 +234,11 @@ bool observe_movement(const ZoomMovement& movement, const ZoomCurve& curve,
     const auto at = static_cast<Eigen::Index>(2 + i);
     observation->covariance(at, at) += crossings[i].variance;
   }
+  // Where the lines through the stamps lie is drawn anew for each movement.
+  const Eigen::VectorXd& rate = observation->rate_per_s;
+  observation->covariance +=
+      (std::pow(clocks.image.offset_sigma_s, 2) + std::pow(clocks.telemetry.offset_sigma_s, 2)) *
+      rate * rate.transpose();
   observation->pixel_sigma_ratio = adjustment.pixel_sigma_ratio();
   observation->frames = adjustment.frames();
   observation->landmarks = adjustment.landmarks();

@@ -20,8 +20,10 @@
 namespace alidade {
 
 struct ZoomMovement {
-  CalibrationInput
-      input;  // frames and telemetry of both rests and of what is between, tracks at least of the latter
+  // Frames and telemetry of both rests and of what is between, tracks at least of the latter.
+  CalibrationInput input;
+  StampNoise image_stamps = StampNoise::kSymmetric;  // as in CalibrationOptions
+  StampNoise telemetry_stamps = StampNoise::kSymmetric;
   std::vector<ZoomReading> readings;  // stamps as the telemetry's
   ZoomStretch from;                   // the rests
   ZoomStretch to;

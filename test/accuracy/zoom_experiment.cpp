@@ -59,7 +59,8 @@ struct CurveErrors {
   double axes_worst = 0;                 // rad
   std::vector<double> normalised;        // f at other readings, a movement's error in it
   std::vector<double> normalised_curve;  // without
-  std::vector<double> relative;          // errors of f, of the curve
+  std::vector<double> relative;          // errors of f
+  std::vector<double> relative_curve;    // without
   std::vector<double> relative_sigma;    // a movement's in it
   std::vector<double> relative_nearest;  // errors of the nearest node's f
   int beyond = 0;                        // 3 sigmas
@@ -153,6 +154,7 @@ void judge_between(const ZoomRecording& truth, const ZoomCurve& curve, std::uint
     errors->normalised.push_back((error - eps) / sigma);
     errors->normalised_curve.push_back(error / of_curve);
     errors->relative.push_back(std::abs(error - eps));
+    errors->relative_curve.push_back(std::abs(error));
     errors->relative_sigma.push_back(sigma);
     errors->beyond += std::abs(error - eps) > 3 * sigma ? 1 : 0;
     double nearest = 1e300;
@@ -238,9 +240,11 @@ AloneErrors judge_alone(const ZoomRecording& recording, const Dwells& dwells) {
 
 CurveErrors judge_curve(const ZoomRecording& recording, const Dwells& dwells,
                         const std::vector<MovementObservation>& movements,
-                        const CalibrationOptions& options, std::uint64_t seed, ZoomFit* fit) {
+                        const CalibrationOptions& options, const ZoomExperimentOptions& experiment,
+                        std::uint64_t seed, ZoomFit* fit) {
   CurveErrors errors;
   ZoomFitOptions fit_options = zoom_fit_options(options);
+  fit_options.zoom_late_sigma_s = experiment.zoom_late_sigma_s;
   fit_options.repeatability = recording.config().zoom->sigma_rep;
   errors.fitted = fit_zoom(dwells.calibration, movements, fit_options, fit, &errors.error);
   if (!errors.fitted) return errors;
@@ -271,7 +275,7 @@ ZoomRun make_run(const ZoomExperimentOptions& options, std::uint64_t seed) {
   const Dwells dwells = calibrate_dwells(recording, stretches, calibration, &run.errors);
   run.alone = judge_alone(recording, dwells);
   ZoomFit fit;
-  run.dwells = judge_curve(recording, dwells, {}, calibration, seed, &fit);
+  run.dwells = judge_curve(recording, dwells, {}, calibration, options, seed, &fit);
   if (!run.dwells.fitted) {
     run.errors.push_back(run.dwells.error);
     return run;
@@ -295,7 +299,8 @@ ZoomRun make_run(const ZoomExperimentOptions& options, std::uint64_t seed) {
     observations.push_back(observation);
   }
   ZoomFit with_movements;
-  run.movements = judge_curve(recording, dwells, observations, calibration, seed, &with_movements);
+  run.movements =
+      judge_curve(recording, dwells, observations, calibration, options, seed, &with_movements);
   if (!run.movements.fitted) run.errors.push_back(run.movements.error);
   return run;
 }
@@ -366,7 +371,7 @@ void report_way(const std::vector<const CurveErrors*>& runs, const std::string& 
                     number(largest(neighbour_sizes)) + " px"};
   at_nodes.print(out);
 
-  std::vector<double> normalised, of_curve, relative, sigma, nearest;
+  std::vector<double> normalised, of_curve, relative, relative_curve, sigma, nearest;
   int beyond_most = 0;
   int beyond = 0;
   const auto add = [](const std::vector<double>& from, std::vector<double>* to) {
@@ -377,6 +382,7 @@ void report_way(const std::vector<const CurveErrors*>& runs, const std::string& 
     add(run->normalised, &normalised);
     add(run->normalised_curve, &of_curve);
     add(run->relative, &relative);
+    add(run->relative_curve, &relative_curve);
     add(run->relative_sigma, &sigma);
     add(run->relative_nearest, &nearest);
     beyond_most = std::max(beyond_most, run->beyond);
@@ -394,6 +400,7 @@ void report_way(const std::vector<const CurveErrors*>& runs, const std::string& 
         {what, number(median(values)), number(root_mean_square(values)), number(largest(values))});
   };
   row("error", relative);
+  row("the curve's alone, without what a movement adds", relative_curve);
   row("sigma", sigma);
   row("error of the nearest node's f", nearest);
   between.notes = {"error / sigma: mean square " + number(square_mean(normalised)) + ", largest " +

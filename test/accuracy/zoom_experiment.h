@@ -12,6 +12,7 @@
 #include <string>
 #include <vector>
 
+#include "core/calibration/zoom_fit.h"
 #include "test/accuracy/zoom_recording.h"
 
 namespace alidade::test {
@@ -21,6 +22,7 @@ struct ZoomExperimentOptions {
   int runs = 10;
   std::uint64_t first_seed = 1;
   bool movements = true;  // of the zoom, too
+  double zoom_late_sigma_s = ZoomFitOptions().zoom_late_sigma_s;
 };
 
 // Prints tables; what lies where an honest estimator's would not in one experiment of a hundred.
