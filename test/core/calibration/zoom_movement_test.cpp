@@ -132,11 +132,12 @@ MovementObservation observe(const Ride& ride) {
 }
 
 Eigen::VectorXd error_of(const MovementObservation& observation, const Ride& ride) {
-  Eigen::VectorXd error = observation.log_focal_length;
-  error[0] -= ride.log_f_at(ride.from);
-  error[1] -= ride.log_f_at(ride.to);
-  for (std::size_t i = 0; i < observation.reading.size(); ++i) {
-    error[static_cast<Eigen::Index>(2 + i)] -= ride.log_f_at(observation.reading[i]);
+  std::vector<double> readings = {ride.from, ride.to};
+  readings.insert(readings.end(), observation.reading.begin(), observation.reading.end());
+  Eigen::VectorXd error(static_cast<Eigen::Index>(readings.size()));
+  for (Eigen::Index i = 0; i < error.size(); ++i) {
+    error[i] =
+        observation.log_focal_length[i] - ride.log_f_at(readings[static_cast<std::size_t>(i)]);
   }
   return error;
 }
