@@ -29,34 +29,38 @@ std::vector<int> rows_but(int node, int nodes) {
   return rows;
 }
 
-// log_f_information and log_f_weighted: H with all other rows eliminated.
-bool set_log_f(const Eigen::MatrixXd& H, const std::vector<int>& rows, ZoomEvidence* evidence) {
+// information and weighted of a quantity: H with all other rows eliminated.
+bool set_information(int quantity, const Eigen::MatrixXd& H, const std::vector<int>& rows,
+                     ZoomEvidence* evidence) {
   const int nodes = evidence->nodes();
   std::vector<int> others;
   for (const int row : rows) {
-    if (row >= kZoomQuantityCount * nodes || row % kZoomQuantityCount != 0) others.push_back(row);
+    if (row >= kZoomQuantityCount * nodes || row % kZoomQuantityCount != quantity)
+      others.push_back(row);
   }
   const Eigen::MatrixXd inverse = scaled_inverse(part_of(H, others));
   if (inverse.size() == 0) return false;
   const auto count = static_cast<Eigen::Index>(others.size());
   Eigen::MatrixXd H_of(nodes, count);
   Eigen::VectorXd g_others(count);
-  evidence->log_f_information.resize(nodes, nodes);
-  evidence->log_f_weighted.resize(nodes);
+  Eigen::MatrixXd information(nodes, nodes);
+  Eigen::VectorXd weighted(nodes);
   for (int i = 0; i < nodes; ++i) {
-    const int row = evidence->row(i, 0);
-    evidence->log_f_weighted[i] = evidence->g[row];
+    const int row = evidence->row(i, quantity);
+    weighted[i] = evidence->g[row];
     for (int j = 0; j < nodes; ++j) {
-      evidence->log_f_information(i, j) = H(row, evidence->row(j, 0));
+      information(i, j) = evidence->H(row, evidence->row(j, quantity));
     }
     for (Eigen::Index j = 0; j < count; ++j)
       H_of(i, j) = H(row, others[static_cast<std::size_t>(j)]);
   }
   for (Eigen::Index j = 0; j < count; ++j)
     g_others[j] = evidence->g[others[static_cast<std::size_t>(j)]];
-  const Eigen::MatrixXd weighted = H_of * inverse;
-  evidence->log_f_information -= weighted * H_of.transpose();
-  evidence->log_f_weighted -= weighted * g_others;
+  const Eigen::MatrixXd share = H_of * inverse;
+  information -= share * H_of.transpose();
+  weighted -= share * g_others;
+  evidence->information[static_cast<std::size_t>(quantity)] = information;
+  evidence->weighted[static_cast<std::size_t>(quantity)] = weighted;
   return true;
 }
 
@@ -80,8 +84,6 @@ ZoomEvidence no_zoom_evidence(const std::vector<double>& readings) {
   const int size = kZoomQuantityCount * evidence.nodes() + kSharedCount;
   evidence.H.setZero(size, size);
   evidence.g.setZero(size);
-  evidence.value.setZero(evidence.nodes(), kZoomQuantityCount);
-  evidence.variance.setZero(evidence.nodes(), kZoomQuantityCount);
   return evidence;
 }
 
@@ -160,22 +162,13 @@ bool set_marginals(const std::vector<int>& places, double centre_sigma_px, ZoomE
     }
   }
   const std::vector<int> rows = evidence->rows(places);
-  if (!set_log_f(H, rows, evidence)) return false;
   for (int i = 0; i < evidence->nodes(); ++i) {
-    constexpr double kAnyLogF = 1;  // of what movements leave open: the other quantities do not ask
+    constexpr double kAnyLogF = 1;  // of what movements leave open, where another quantity is asked
     if (evidence->is_between[static_cast<std::size_t>(i)])
       H(evidence->row(i, 0), evidence->row(i, 0)) += 1 / (kAnyLogF * kAnyLogF);
   }
-  const Eigen::MatrixXd inverse = scaled_inverse(part_of(H, rows));
-  if (inverse.size() == 0) return false;
-  const Eigen::MatrixXd covariance = spread(inverse, rows, rows, H.rows(), H.cols());
-  const Eigen::VectorXd mean = covariance * evidence->g;
-  for (int i = 0; i < evidence->nodes(); ++i) {
-    for (int q = 0; q < kZoomQuantityCount; ++q) {
-      const int row = evidence->row(i, q);
-      evidence->value(i, q) = mean[row];
-      evidence->variance(i, q) = covariance(row, row);
-    }
+  for (int q = 0; q < kZoomQuantityCount; ++q) {
+    if (!set_information(q, H, rows, evidence)) return false;
   }
   return true;
 }

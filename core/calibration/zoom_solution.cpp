@@ -34,6 +34,19 @@ Eigen::MatrixXd process_covariance(const ZoomCurve::Content& content, int quanti
   return K;
 }
 
+// Of log f from the first node to the last: by least squares with curves that may be of any shape.
+double rise_of(const ZoomEvidence& evidence) {
+  constexpr double kAny = 10;  // sigma of log f less its level
+  Eigen::MatrixXd information = evidence.information[0];
+  information.diagonal().array() += 1 / (kAny * kAny);
+  const Eigen::VectorXd log_f = information.ldlt().solve(evidence.weighted[0]);
+  int first = 0;
+  int last = evidence.nodes() - 1;
+  while (first < last && evidence.is_between[static_cast<std::size_t>(first)]) ++first;
+  while (last > first && evidence.is_between[static_cast<std::size_t>(last)]) --last;
+  return log_f[last] - log_f[first];
+}
+
 // What is usual of lenses: a focal length whose logarithm bends by as much as it rises, a distortion of some parts in a
 // hundred at the corner, a centre within a hundredth of the image that wanders by half of that.
 std::array<ZoomSmoothness, kZoomQuantityCount> usual(double rise, const Camera<double>& camera) {
@@ -43,11 +56,12 @@ std::array<ZoomSmoothness, kZoomQuantityCount> usual(double rise, const Camera<d
           ZoomSmoothness{centre_px, centre_px, 0.5 * centre_px}};
 }
 
-// Of log f at the nodes, of which some may not be told at all: with K the process's covariance, A what is known,
+// Of a quantity at the nodes, of which some may not be told at all: with K the process's covariance, A what is known,
 //   -(log |K| + log |K^-1 + A| - b^T (K^-1 + A)^-1 b) / 2,  b = A times the mean
-std::optional<double> log_f_likelihood(const ZoomCurve::Content& content,
+std::optional<double> curve_likelihood(const ZoomCurve::Content& content, int quantity,
                                        const ZoomEvidence& evidence) {
-  const Eigen::MatrixXd inverse = scaled_inverse(process_covariance(content, 0));
+  const auto of = static_cast<std::size_t>(quantity);
+  const Eigen::MatrixXd inverse = scaled_inverse(process_covariance(content, quantity));
   if (inverse.size() == 0) return std::nullopt;
   const auto log_determinant = [](const Eigen::MatrixXd& matrix, Eigen::LLT<Eigen::MatrixXd>* llt,
                                   Eigen::VectorXd* scale) -> std::optional<double> {
@@ -60,9 +74,9 @@ std::optional<double> log_f_likelihood(const ZoomCurve::Content& content,
   Eigen::LLT<Eigen::MatrixXd> of_both;
   Eigen::VectorXd scale;
   const auto prior = log_determinant(inverse, &of_prior, &scale);
-  const auto both = log_determinant(inverse + evidence.log_f_information, &of_both, &scale);
+  const auto both = log_determinant(inverse + evidence.information[of], &of_both, &scale);
   if (!prior || !both) return std::nullopt;
-  const Eigen::VectorXd b = scale.cwiseProduct(evidence.log_f_weighted);
+  const Eigen::VectorXd b = scale.cwiseProduct(evidence.weighted[of]);
   return 0.5 * (*prior - *both + b.dot(of_both.solve(b)));
 }
 
@@ -108,8 +122,7 @@ bool ZoomSolution::run(std::string* error) {
   std::copy(evidence_.is_between.begin(), evidence_.is_between.end(), content_.is_between.begin());
   content_.level = evidence_.level;
   content_.repeatability = options_.repeatability;
-  content_.smoothness =
-      usual(evidence_.value(nodes_ - 1, 0) - evidence_.value(0, 0), reference_.camera);
+  content_.smoothness = usual(rise_of(evidence_), reference_.camera);
   choose_roughness();
   if (solve()) return true;
   *error = "the calibrations leave what their readings share undetermined";
@@ -135,16 +148,6 @@ bool ZoomSolution::curve(ZoomCurve* curve, std::string* error) const {
   return is_monotone(*curve, error);
 }
 
-std::optional<double> ZoomSolution::likelihood_of(int quantity) const {
-  const Eigen::VectorXd y = evidence_.value.col(quantity);
-  Eigen::MatrixXd K = process_covariance(content_, quantity);
-  K.diagonal() += evidence_.variance.col(quantity);
-  const Eigen::LLT<Eigen::MatrixXd> llt(K);
-  if (llt.info() != Eigen::Success) return std::nullopt;
-  const double log_determinant = 2 * llt.matrixLLT().diagonal().array().log().sum();
-  return -0.5 * (y.dot(llt.solve(y)) + log_determinant);
-}
-
 // Likelihood of each quantity by itself, the others taken as open.
 void ZoomSolution::choose_roughness() {
   constexpr int kSteps = 33;
@@ -158,8 +161,7 @@ void ZoomSolution::choose_roughness() {
     for (int step = 0; step < kSteps; ++step) {
       const double decades = kDecades * (2.0 * step / (kSteps - 1) - 1);
       smoothness.roughness = usual_roughness * std::pow(10, decades);
-      const std::optional<double> likelihood_of_data =
-          q == 0 ? log_f_likelihood(content_, evidence_) : likelihood_of(q);
+      const std::optional<double> likelihood_of_data = curve_likelihood(content_, q, evidence_);
       if (!likelihood_of_data) continue;
       const double likelihood = *likelihood_of_data - 0.5 * std::pow(decades / kPriorDecades, 2);
       if (likelihood <= best) continue;

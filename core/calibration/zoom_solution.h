@@ -3,7 +3,6 @@
 // likelihood, then nodes, shared parameters and covariance. Steps 2 and 3 of zoom_fit.h. Allocates.
 
 #include <Eigen/Core>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -29,7 +28,6 @@ class ZoomSolution {
 
  private:
   void choose_roughness();
-  [[nodiscard]] std::optional<double> likelihood_of(int quantity) const;
   [[nodiscard]] bool solve();
   void take_shared(const Eigen::Matrix<double, kSharedCount, 1>& change);
 

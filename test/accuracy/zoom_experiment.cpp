@@ -52,6 +52,7 @@ struct CurveErrors {
   bool fitted = false;
   std::string error;
   std::array<double, kZoomQuantityCount> square{};   // e^T P^-1 e over the nodes
+  Eigen::MatrixXd normalised_nodes;                  // nodes x quantities, sigmas
   std::array<double, kZoomQuantityCount> worst{};    // sigmas, of one node
   std::array<double, kZoomQuantityCount> largest{};  // of one node, in the quantity's unit
   std::vector<double> neighbour_px;                  // both coordinates, one node before the last
@@ -89,6 +90,7 @@ void judge_nodes(const ZoomRecording& truth, const ZoomCurve& curve,
   const ZoomCurve::Content& content = curve.content();
   const auto dwells = static_cast<Eigen::Index>(dwell_s.size());
   Eigen::MatrixXd e(dwells, kZoomQuantityCount);
+  errors->normalised_nodes.setZero(dwells, kZoomQuantityCount);
   std::vector<int> node_of;
   for (int i = 0; i < content.nodes; ++i) {
     if (!content.is_between[static_cast<std::size_t>(i)]) node_of.push_back(i);
@@ -111,8 +113,9 @@ void judge_nodes(const ZoomRecording& truth, const ZoomCurve& curve,
             content.covariance(kZoomQuantityCount * node_of[static_cast<std::size_t>(i)] + q,
                                kZoomQuantityCount * node_of[static_cast<std::size_t>(j)] + q);
       }
-      errors->worst[at] =
-          std::max(errors->worst[at], std::abs(e(i, q)) / std::sqrt(covariance(i, i)));
+      if (covariance(i, i) > 0)
+        errors->normalised_nodes(i, q) = e(i, q) / std::sqrt(covariance(i, i));
+      errors->worst[at] = std::max(errors->worst[at], std::abs(errors->normalised_nodes(i, q)));
       errors->largest[at] = std::max(errors->largest[at], std::abs(e(i, q)));
     }
     // Without the centre, its covariance is zero.
@@ -366,9 +369,20 @@ void report_way(const std::vector<const CurveErrors*>& runs, const std::string& 
       {"axes", verdict.mean_square("axes", axes, kAxesSize * count), "-", number(axes_worst)});
   std::vector<double> neighbour_sizes;
   for (const double px : neighbour) neighbour_sizes.push_back(std::abs(px));
-  at_nodes.notes = {"centre at the node before the last: rms " +
-                    number(root_mean_square(neighbour)) + " px, largest " +
-                    number(largest(neighbour_sizes)) + " px"};
+  for (std::size_t q = 0; q < kNames.size(); ++q) {
+    std::string text = std::string("mean of (error / sigma)^2 of ") + kNames[q] + ", node by node:";
+    for (Eigen::Index i = 0; i < static_cast<Eigen::Index>(nodes); ++i) {
+      double sum = 0;
+      for (const CurveErrors* run : runs) {
+        sum += std::pow(run->normalised_nodes(i, static_cast<Eigen::Index>(q)), 2);
+      }
+      text += " " + number(sum / count);
+    }
+    at_nodes.notes.push_back(text);
+  }
+  at_nodes.notes.push_back("centre at the node before the last: rms " +
+                           number(root_mean_square(neighbour)) + " px, largest " +
+                           number(largest(neighbour_sizes)) + " px");
   at_nodes.print(out);
 
   std::vector<double> normalised, of_curve, relative, relative_curve, sigma, nearest;

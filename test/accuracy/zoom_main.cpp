@@ -15,6 +15,7 @@ int main(int argc, char** argv) {
   app.add_option("--repeatability", options.scenario.sigma_rep, "sigma of log f after a movement");
   app.add_option("--pixel-sigma", options.scenario.pixel_sigma, "noise of the tracks, px");
   app.add_option("--rest", options.scenario.rest_s, "of each dwell, s");
+  app.add_flag("!--no-movements", options.movements, "the dwells alone");
   app.add_option("--cycles", options.scenario.cycles, "2: back through the dwells, too");
   app.add_option("--late-sigma", options.zoom_late_sigma_s, "what the fit takes as possible, s");
   app.add_option("--late", options.scenario.late_s, "the zoom that is told is older, s");
