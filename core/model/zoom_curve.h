@@ -56,7 +56,7 @@ class ZoomCurve {
   // All that at() needs; matrices have the size of the nodes that there are.
   struct Content {
     int nodes = 0;
-    std::array<double, kMaxNodes> reading{};  // not decreasing; the first and the last differ
+    std::array<double, kMaxNodes> reading{};   // not decreasing; the first and the last differ
     std::array<bool, kMaxNodes> is_between{};  // without a visit: the value has no eps
     std::array<double, kZoomQuantityCount> level{};
     std::array<ZoomSmoothness, kZoomQuantityCount> smoothness;
@@ -74,6 +74,11 @@ class ZoomCurve {
 
   [[nodiscard]] bool empty() const { return c_.nodes == 0; }
   [[nodiscard]] const Content& content() const { return c_; }
+  // Nodes that are not between dwells.
+  [[nodiscard]] int visits() const {
+    const auto begin = c_.is_between.begin();
+    return static_cast<int>(std::count(begin, begin + c_.nodes, false));
+  }
   [[nodiscard]] double first_reading() const { return c_.reading[0]; }
   [[nodiscard]] double last_reading() const {
     return c_.reading[static_cast<std::size_t>(c_.nodes - 1)];
