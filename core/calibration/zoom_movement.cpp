@@ -24,6 +24,7 @@ using internal::SelectedInput;
 constexpr double kGuard_s = 0.15;
 constexpr double kRest_s = 0.8;
 constexpr int kLeastLandmarks = 20;
+constexpr double kLoose = 0.05;         // sigma of log f from which on nothing was followed
 constexpr double kWorstPixelRatio = 4;  // residuals over the stated noise
 
 // The readings of the movement, at the image clock's times.
@@ -208,10 +209,16 @@ bool observe_movement(const ZoomMovement& movement, const ZoomCurve& curve,
     for (std::size_t i = 1; i < passed.size(); ++i) {
       const double part = (reading - passed[i - 1].zoom) / (passed[i].zoom - passed[i - 1].zoom);
       if (!(part >= 0 && part < 1)) continue;
-      crossings.push_back(
-          crossing_at(reading, passed[i - 1], passed[i], curve, adjustment, step, stamp_sigma));
+      const Crossing crossing =
+          crossing_at(reading, passed[i - 1], passed[i], curve, adjustment, step, stamp_sigma);
+      const double variance = crossing.row.dot(adjustment.covariance() * crossing.row);
+      if (variance < kLoose * kLoose) crossings.push_back(crossing);
       break;
     }
+  }
+  if (crossings.empty()) {
+    *error = "no landmarks are followed through it";
+    return false;
   }
   const auto size = static_cast<Eigen::Index>(2 + crossings.size());
   Eigen::MatrixXd rows(size, adjustment.unknowns());

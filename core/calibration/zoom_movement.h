@@ -46,7 +46,7 @@ struct MovementObservation {
 // Movements longer than this are left out.
 inline constexpr double kLongestMovement_s = 20;
 
-// curve: of the rests, at least. readings: of which those that were passed are observed. from and to are left to the caller. False
+// curve: of the rests, at least. readings: of which those that were passed while landmarks were followed are observed. from and to are left to the caller. False
 // and one line in *error: why nothing can be said.
 [[nodiscard]] bool observe_movement(const ZoomMovement& movement, const ZoomCurve& curve,
                                     const std::vector<double>& readings,

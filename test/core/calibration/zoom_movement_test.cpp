@@ -204,6 +204,19 @@ TEST(ZoomMovement, SaysWhyItTellsNothing) {
   ZoomMovement bad = good;
   bad.input.observations.clear();
   EXPECT_THAT(refusal(bad, curve), HasSubstr("landmarks"));
+  // Nothing is seen on the way, and what is seen after it are others than before.
+  bad = good;
+  auto& seen = bad.input.observations;
+  seen.erase(std::remove_if(seen.begin(), seen.end(),
+                            [](const CalibrationObservation& o) {
+                              const double time = 0.04 * static_cast<double>(o.frame);
+                              return time > kRest_s && time < kRest_s + kWay_s;
+                            }),
+             seen.end());
+  for (CalibrationObservation& o : seen) {
+    if (static_cast<double>(o.frame) > kRest_s / 0.04) o.landmark += 1000;
+  }
+  EXPECT_THAT(refusal(bad, curve), HasSubstr("no landmarks are followed through it"));
   bad = good;
   bad.to.begin_s += 100;
   EXPECT_THAT(refusal(bad, curve), HasSubstr("more than 20"));
@@ -217,7 +230,7 @@ TEST(ZoomMovement, SaysWhyItTellsNothing) {
   bad.readings[5].zoom = std::nan("");
   EXPECT_THAT(refusal(bad, curve), HasSubstr("not finite"));
   bad = good;
-  for (auto& seen : bad.input.observations) seen.sigma_px = 0.005;
+  for (CalibrationObservation& o : bad.input.observations) o.sigma_px = 0.005;
   EXPECT_THAT(refusal(bad, curve), HasSubstr("times as far off as they say"));
 }
 
