@@ -13,6 +13,8 @@
 namespace alidade::internal {
 namespace {
 
+constexpr int kFirstCentre = static_cast<int>(ZoomQuantity::kCentreU);  // and the one after it
+
 // Of the nodes' values, a movement's error at each visit included.
 Eigen::MatrixXd process_covariance(const ZoomCurve::Content& content, int quantity) {
   const ZoomSmoothness& smoothness = content.smoothness[static_cast<std::size_t>(quantity)];
@@ -148,7 +150,9 @@ bool ZoomSolution::curve(ZoomCurve* curve, std::string* error) const {
   return is_monotone(*curve, error);
 }
 
-// Likelihood of each quantity by itself, the others taken as open.
+// Likelihood of each quantity by itself, the others taken as open. Log f and distortion are told so well by their nodes that the
+// best roughness will do. Centres are not: the best of what a few uncertain nodes leave possible is often too smooth, and draws
+// them off by more than it says. The mean over what is possible is rougher.
 void ZoomSolution::choose_roughness() {
   constexpr int kSteps = 33;
   constexpr double kDecades = 2;          // on either side
@@ -156,19 +160,29 @@ void ZoomSolution::choose_roughness() {
   for (int q = 0; q < kZoomQuantityCount; ++q) {
     ZoomSmoothness& smoothness = content_.smoothness[static_cast<std::size_t>(q)];
     const double usual_roughness = smoothness.roughness;
-    double best = -1e300;
-    double best_roughness = usual_roughness;
+    std::vector<double> roughness;
+    std::vector<double> likelihood;
     for (int step = 0; step < kSteps; ++step) {
       const double decades = kDecades * (2.0 * step / (kSteps - 1) - 1);
       smoothness.roughness = usual_roughness * std::pow(10, decades);
-      const std::optional<double> likelihood_of_data = curve_likelihood(content_, q, evidence_);
-      if (!likelihood_of_data) continue;
-      const double likelihood = *likelihood_of_data - 0.5 * std::pow(decades / kPriorDecades, 2);
-      if (likelihood <= best) continue;
-      best = likelihood;
-      best_roughness = smoothness.roughness;
+      const std::optional<double> of_data = curve_likelihood(content_, q, evidence_);
+      if (!of_data) continue;
+      roughness.push_back(smoothness.roughness);
+      likelihood.push_back(*of_data - 0.5 * std::pow(decades / kPriorDecades, 2));
     }
-    smoothness.roughness = best_roughness;
+    smoothness.roughness = usual_roughness;
+    if (likelihood.empty()) continue;
+    const auto best = std::max_element(likelihood.begin(), likelihood.end());
+    smoothness.roughness = roughness[static_cast<std::size_t>(best - likelihood.begin())];
+    if (q < kFirstCentre) continue;
+    double sum = 0;
+    double weights = 0;
+    for (std::size_t i = 0; i < roughness.size(); ++i) {
+      const double weight = std::exp(likelihood[i] - *best);
+      sum += weight * roughness[i];
+      weights += weight;
+    }
+    smoothness.roughness = sum / weights;
   }
 }
 
