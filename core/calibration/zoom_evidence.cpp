@@ -17,6 +17,28 @@ std::vector<int> rows_but(int node, int nodes) {
   return rows;
 }
 
+// information and weighted of a quantity: H with all other rows eliminated.
+bool set_information(int quantity, const Eigen::MatrixXd& H, const std::vector<int>& rows,
+                     ZoomEvidence* evidence) {
+  const int nodes = evidence->nodes();
+  std::vector<int> others;
+  for (const int row : rows) {
+    if (row >= kZoomQuantityCount * nodes || row % kZoomQuantityCount != quantity)
+      others.push_back(row);
+  }
+  std::vector<int> own(static_cast<std::size_t>(nodes));
+  for (int i = 0; i < nodes; ++i) own[static_cast<std::size_t>(i)] = evidence->row(i, quantity);
+  const Eigen::MatrixXd inverse = scaled_inverse(H(others, others));
+  if (inverse.size() == 0) return false;
+  const Eigen::MatrixXd H_of = H(own, others);
+  const Eigen::MatrixXd share = H_of * inverse;
+  const Eigen::MatrixXd information = evidence->H(own, own) - share * H_of.transpose();
+  const Eigen::VectorXd weighted = evidence->g(own, 0) - share * evidence->g(others, 0);
+  evidence->information[static_cast<std::size_t>(quantity)] = information;
+  evidence->weighted[static_cast<std::size_t>(quantity)] = weighted;
+  return true;
+}
+
 }  // namespace
 
 std::vector<int> ZoomEvidence::rows(const std::vector<int>& places) const {
@@ -33,11 +55,10 @@ std::vector<int> ZoomEvidence::rows(const std::vector<int>& places) const {
 ZoomEvidence no_zoom_evidence(const std::vector<double>& readings) {
   ZoomEvidence evidence;
   evidence.reading = readings;
+  evidence.is_between.assign(readings.size(), false);
   const int size = kZoomQuantityCount * evidence.nodes() + kSharedCount;
   evidence.H.setZero(size, size);
   evidence.g.setZero(size);
-  evidence.value.setZero(evidence.nodes(), kZoomQuantityCount);
-  evidence.variance.setZero(evidence.nodes(), kZoomQuantityCount);
   return evidence;
 }
 
@@ -62,6 +83,8 @@ void add_zoom_sample(const ZoomSample& sample, int node, bool with_shared_priors
 bool take_apart(const ZoomCurve& curve, const ZoomCurveParts& parts, ZoomEvidence* evidence) {
   const ZoomCurve::Content& content = curve.content();
   *evidence = no_zoom_evidence({content.reading.begin(), content.reading.begin() + content.nodes});
+  evidence->is_between.assign(content.is_between.begin(),
+                              content.is_between.begin() + content.nodes);
   evidence->level = content.level;
   Eigen::MatrixXd covariance = content.covariance;
   const std::vector<int> rows = evidence->rows(parts.places);
@@ -91,6 +114,8 @@ int insert_node(double reading, ZoomEvidence* evidence) {
   std::vector<double> readings = evidence->reading;
   readings.insert(readings.begin() + node, reading);
   ZoomEvidence larger = no_zoom_evidence(readings);
+  larger.is_between = evidence->is_between;
+  larger.is_between.insert(larger.is_between.begin() + node, false);
   const std::vector<int> rows = rows_but(node, larger.nodes());
   larger.level = evidence->level;
   const Eigen::Map<const Eigen::ArrayXi> at(rows.data(), static_cast<Eigen::Index>(rows.size()));
@@ -110,15 +135,14 @@ bool set_marginals(const std::vector<int>& places, double centre_sigma_px, ZoomE
       }
     }
   }
-  const Eigen::MatrixXd covariance = inverse_over(H, evidence->rows(places));
-  if (covariance.size() == 0) return false;
-  const Eigen::VectorXd mean = covariance * evidence->g;
+  const std::vector<int> rows = evidence->rows(places);
   for (int i = 0; i < evidence->nodes(); ++i) {
-    for (int q = 0; q < kZoomQuantityCount; ++q) {
-      const int row = evidence->row(i, q);
-      evidence->value(i, q) = mean[row];
-      evidence->variance(i, q) = covariance(row, row);
-    }
+    constexpr double kAnyLogF = 1;  // of what movements leave open, where another quantity is asked
+    if (evidence->is_between[static_cast<std::size_t>(i)])
+      H(evidence->row(i, 0), evidence->row(i, 0)) += 1 / (kAnyLogF * kAnyLogF);
+  }
+  for (int q = 0; q < kZoomQuantityCount; ++q) {
+    if (!set_information(q, H, rows, evidence)) return false;
   }
   return true;
 }
@@ -133,6 +157,8 @@ ZoomCurve::Content without_a_node(const ZoomCurve::Content& content) {
   --rest.nodes;
   for (int i = crowded; i < rest.nodes; ++i) {
     rest.reading[static_cast<std::size_t>(i)] = reading(i + 1);
+    rest.is_between[static_cast<std::size_t>(i)] =
+        content.is_between[static_cast<std::size_t>(i + 1)];
   }
   const std::vector<int> rows = rows_but(crowded, content.nodes);
   rest.covariance = content.covariance(rows, rows);

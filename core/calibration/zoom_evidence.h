@@ -13,13 +13,15 @@
 namespace alidade::internal {
 
 struct ZoomEvidence {
-  std::vector<double> reading;  // of the nodes, not decreasing
+  std::vector<double> reading;   // of the nodes, not decreasing
+  std::vector<bool> is_between;  // of them: as ZoomCurve::Content
   std::array<double, kZoomQuantityCount> level{};
   Eigen::MatrixXd H;
   Eigen::VectorXd g;
-  // Each quantity of each node by itself, with a centre that is as good as usual: tells how rough the curves are.
-  Eigen::MatrixXd value;     // nodes x quantities, less the level
-  Eigen::MatrixXd variance;  // likewise
+  // What is known of each quantity of all nodes together, less the level, the others open, with centres that are as good as usual:
+  // tells how rough the curves are. Errors that nodes have in common, such as those of the axes in the centres, are in it.
+  std::array<Eigen::MatrixXd, kZoomQuantityCount> information;
+  std::array<Eigen::VectorXd, kZoomQuantityCount> weighted;  // times the mean
 
   [[nodiscard]] int nodes() const { return static_cast<int>(reading.size()); }
   // Row of H, by a sample's place.
@@ -46,7 +48,7 @@ struct ZoomCurveParts {
                               ZoomEvidence* evidence);
 // Room for one more node; returns where.
 int insert_node(double reading, ZoomEvidence* evidence);
-// value and variance from H and g; centre_sigma_px: how good a centre is, usually. False: H is not positive.
+// information and weighted from H and g; centre_sigma_px: how good a centre is, usually. False: H is not positive.
 [[nodiscard]] bool set_marginals(const std::vector<int>& places, double centre_sigma_px,
                                  ZoomEvidence* evidence);
 

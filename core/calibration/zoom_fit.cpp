@@ -4,8 +4,11 @@
 #include <array>
 #include <cmath>
 #include <cstddef>
+#include <iterator>
+#include <map>
 #include <utility>
 
+#include "core/calibration/movement_evidence.h"
 #include "core/calibration/number_text.h"
 #include "core/calibration/partial_inverse.h"
 #include "core/calibration/zoom_evidence.h"
@@ -88,7 +91,77 @@ bool make_sample(const Calibration& c, const Calibration& reference, const ZoomF
   return internal::set_zoom_information(free_places(covariance), options, reference, sample);
 }
 
+// Of a curve of these calibrations alone: nodes are in the order of readings, then as they are given.
+std::vector<int> nodes_by_calibration(const std::vector<Calibration>& calibrations) {
+  std::vector<int> node_of(calibrations.size(), 0);
+  for (std::size_t i = 0; i < calibrations.size(); ++i) {
+    for (std::size_t j = 0; j < calibrations.size(); ++j) {
+      const double a = *calibrations[i].zoom;
+      const double b = *calibrations[j].zoom;
+      if (b < a || (b == a && j < i)) ++node_of[i];
+    }
+  }
+  return node_of;
+}
+
 }  // namespace
+
+std::vector<double> readings_between(const std::vector<Calibration>& calibrations) {
+  constexpr double kClose = 0.15;  // of log f
+  std::map<double, double> log_f_at;
+  for (const Calibration& c : calibrations) {
+    if (c.zoom && std::isfinite(*c.zoom)) log_f_at[*c.zoom] = std::log(c.camera.focal_length);
+  }
+  struct Gap {
+    double begin;
+    double end;
+    double rise;
+    int nodes = 0;
+  };
+  std::vector<Gap> gaps;
+  for (auto next = log_f_at.begin(); next != log_f_at.end(); ++next) {
+    if (next == log_f_at.begin()) continue;
+    const auto before = std::prev(next);
+    gaps.push_back({before->first, next->first, std::abs(next->second - before->second)});
+  }
+  auto room = ZoomCurve::kMaxNodes - static_cast<int>(calibrations.size() + log_f_at.size());
+  for (; room > 0 && !gaps.empty(); --room) {
+    const auto widest = std::max_element(gaps.begin(), gaps.end(), [](const Gap& a, const Gap& b) {
+      return a.rise / (a.nodes + 1) < b.rise / (b.nodes + 1);
+    });
+    if (widest->rise / (widest->nodes + 1) < kClose) break;
+    ++widest->nodes;
+  }
+  std::vector<double> readings;
+  for (const Gap& gap : gaps) {
+    for (int i = 1; i <= gap.nodes; ++i) {
+      readings.push_back(gap.begin + (gap.end - gap.begin) * i / (gap.nodes + 1));
+    }
+  }
+  return readings;
+}
+
+std::vector<std::string> zoom_advice(const ZoomCurve& curve, double share) {
+  std::vector<std::string> advice;
+  const ZoomCurve::Content& content = curve.content();
+  for (int i = 1; i < content.nodes; ++i) {
+    const double begin = content.reading[static_cast<std::size_t>(i - 1)];
+    const double end = content.reading[static_cast<std::size_t>(i)];
+    Calibration c;
+    if (!curve.at(0.5 * (begin + end), &c)) continue;
+    const double sigma =
+        std::sqrt(c.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength))) /
+        c.camera.focal_length;
+    if (sigma <= share) continue;
+    constexpr double kPercent = 100;
+    advice.push_back("zoom between readings " + short_text(begin) + " and " + short_text(end) +
+                     " was never seen: the focal length is known to " +
+                     short_text(std::round(kPercent * 10 * sigma) / 10) +
+                     " % there; dwell between them, or let the zoom pass while the camera sees "
+                     "texture");
+  }
+  return advice;
+}
 
 ZoomFitOptions zoom_fit_options(const CalibrationOptions& made_with) {
   ZoomFitOptions options;
@@ -108,6 +181,12 @@ ZoomFitOptions zoom_fit_options(const CalibrationOptions& made_with) {
 }
 
 bool fit_zoom(const std::vector<Calibration>& calibrations, const ZoomFitOptions& options,
+              ZoomFit* fit, std::string* error) {
+  return fit_zoom(calibrations, {}, options, fit, error);
+}
+
+bool fit_zoom(const std::vector<Calibration>& calibrations,
+              const std::vector<MovementObservation>& movements, const ZoomFitOptions& options,
               ZoomFit* fit, std::string* error) {
   if (calibrations.size() > ZoomCurve::kMaxNodes) {
     *error = std::to_string(calibrations.size()) + " zoom readings are given; up to " +
@@ -163,13 +242,29 @@ bool fit_zoom(const std::vector<Calibration>& calibrations, const ZoomFitOptions
       return false;
     }
   }
+  std::vector<int> node_of = nodes_by_calibration(calibrations);
+  const int clock = zoom_place_of(Parameter::kClockOffset);
+  double clock_information = 0;
+  for (const ZoomSample& sample : samples) {
+    if (sample.covariance(clock, clock) > 0)
+      clock_information += 1 / sample.covariance(clock, clock);
+  }
+  const double clock_sigma_s = clock_information > 0 ? 1 / std::sqrt(clock_information) : 0;
+  if (!internal::add_movements(movements, options, clock_sigma_s, &node_of, &evidence)) {
+    *error = "a movement of the zoom has a covariance that is not positive";
+    return false;
+  }
+  const std::vector<bool> is_between = evidence.is_between;
   ZoomSolution fitting(std::move(evidence), std::move(places), sorted.front(), options);
   if (!fitting.run(error)) return false;
   double worst = -1;
   double worst_reading = 0;
   fit->chi_square = 0;
+  int node = -1;
   for (std::size_t i = 0; i < samples.size(); ++i) {
-    const ZoomSampleVector left = fitting.left_of(samples[i], static_cast<int>(i));
+    ++node;
+    while (is_between[static_cast<std::size_t>(node)]) ++node;
+    const ZoomSampleVector left = fitting.left_of(samples[i], node);
     const double square = left.dot(samples[i].information * left);
     fit->chi_square += square;
     if (square <= worst) continue;

@@ -9,6 +9,7 @@
 // the two cannot be compared otherwise.
 // Refused: readings of two cameras (shared parameters that differ beyond chance), a focal length that is not
 // monotone in the reading. Pure; allocates. Not for the real-time thread.
+// Movements of the zoom between the dwells add nodes of log f between them (movement_evidence.h).
 // extend_zoom(): one more calibration to a curve, which is taken apart for it: the same as if all had been fitted together.
 
 #include <optional>
@@ -16,6 +17,7 @@
 #include <vector>
 
 #include "core/calibration/calibration_types.h"
+#include "core/calibration/zoom_movement.h"
 #include "core/model/zoom_curve.h"
 
 namespace alidade {
@@ -27,6 +29,8 @@ inline constexpr double kAnyConnection_s = 0.1;
 
 struct ZoomFitOptions {
   double repeatability = 0.002;  // sigma of log f after a movement
+  // The reading may be older or newer than the angles that came with it, by the same in all of a camera's movements.
+  double zoom_late_sigma_s = 0.01;
   // Priors that went into each of the calibrations: counted once. 0: none. Axes' about the nominal ones. One that is sharper than a
   // calibration knows the parameter did not go into that.
   double centre_sigma_px = 0;
@@ -59,6 +63,19 @@ struct ZoomFit {
 // calibrations: at two or more readings, each with its zoom. False and one line in *error: what is wrong, and with which.
 [[nodiscard]] bool fit_zoom(const std::vector<Calibration>& calibrations,
                             const ZoomFitOptions& options, ZoomFit* fit, std::string* error);
+
+// Readings between those of the calibrations at which movements may be observed, in increasing order: as many as fit into a curve
+// with these calibrations, evenly between them.
+[[nodiscard]] std::vector<double> readings_between(const std::vector<Calibration>& calibrations);
+
+// The same with what movements say; their from and to are places in calibrations.
+[[nodiscard]] bool fit_zoom(const std::vector<Calibration>& calibrations,
+                            const std::vector<MovementObservation>& movements,
+                            const ZoomFitOptions& options, ZoomFit* fit, std::string* error);
+
+// What would help, one line each: between which readings the focal length is known to worse than `share` of it, as neither a dwell
+// nor a movement showed it.
+[[nodiscard]] std::vector<std::string> zoom_advice(const ZoomCurve& curve, double share = 0.01);
 
 // visit: the node that the calibration is another observation of, the zoom not moved since; none: a visit of its own, whose reading
 // may be that of another. Where there are kMaxNodes, one of those that are closest together is left out, what it said of the

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <optional>
 #include <utility>
 
 #include "core/calibration/number_text.h"
@@ -15,8 +16,9 @@ namespace {
 
 constexpr const char* kUndetermined =
     "the calibrations leave what their readings share undetermined";
+constexpr int kFirstCentre = static_cast<int>(ZoomQuantity::kCentreU);  // and the one after it
 
-// Of the nodes' values, a movement's error at each included.
+// Of the nodes' values, a movement's error at each visit included.
 Eigen::MatrixXd process_covariance(const ZoomCurve::Content& content, int quantity) {
   const ZoomSmoothness& smoothness = content.smoothness[static_cast<std::size_t>(quantity)];
   const double first = content.reading[0];
@@ -31,9 +33,23 @@ Eigen::MatrixXd process_covariance(const ZoomCurve::Content& content, int quanti
     for (int j = 0; j < content.nodes; ++j)
       K(i, j) = smoothness.covariance(position(i), position(j));
     K(i, i) += std::pow(apart * smoothness.level_sigma, 2);
-    if (quantity == 0) K(i, i) += content.repeatability * content.repeatability;
+    if (quantity == 0 && !content.is_between[static_cast<std::size_t>(i)])
+      K(i, i) += content.repeatability * content.repeatability;
   }
   return K;
+}
+
+// Of log f from the first node to the last: by least squares with curves that may be of any shape.
+double rise_of(const ZoomEvidence& evidence) {
+  constexpr double kAny = 10;  // sigma of log f less its level
+  Eigen::MatrixXd information = evidence.information[0];
+  information.diagonal().array() += 1 / (kAny * kAny);
+  const Eigen::VectorXd log_f = information.ldlt().solve(evidence.weighted[0]);
+  int first = 0;
+  int last = evidence.nodes() - 1;
+  while (first < last && evidence.is_between[static_cast<std::size_t>(first)]) ++first;
+  while (last > first && evidence.is_between[static_cast<std::size_t>(last)]) --last;
+  return log_f[last] - log_f[first];
 }
 
 // What is usual of lenses: a focal length whose logarithm bends by as much as it rises, a distortion of some parts in a
@@ -43,6 +59,30 @@ std::array<ZoomSmoothness, kZoomQuantityCount> usual(double rise, const Camera<d
   return {ZoomSmoothness{5, 20, 1.5 * std::max(std::abs(rise), 0.1)}, ZoomSmoothness{0.3, 0.3, 0.1},
           ZoomSmoothness{centre_px, centre_px, 0.5 * centre_px},
           ZoomSmoothness{centre_px, centre_px, 0.5 * centre_px}};
+}
+
+// Of a quantity at the nodes, of which some may not be told at all: with K the process's covariance, A what is known,
+//   -(log |K| + log |K^-1 + A| - b^T (K^-1 + A)^-1 b) / 2,  b = A times the mean
+std::optional<double> curve_likelihood(const ZoomCurve::Content& content, int quantity,
+                                       const ZoomEvidence& evidence) {
+  const auto of = static_cast<std::size_t>(quantity);
+  const Eigen::MatrixXd inverse = scaled_inverse(process_covariance(content, quantity));
+  if (inverse.size() == 0) return std::nullopt;
+  const auto log_determinant = [](const Eigen::MatrixXd& matrix, Eigen::LLT<Eigen::MatrixXd>* llt,
+                                  Eigen::VectorXd* scale) -> std::optional<double> {
+    *scale = matrix.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
+    llt->compute(scale->asDiagonal() * matrix * scale->asDiagonal());
+    if (llt->info() != Eigen::Success) return std::nullopt;
+    return 2 * (llt->matrixLLT().diagonal().array().log().sum() - scale->array().log().sum());
+  };
+  Eigen::LLT<Eigen::MatrixXd> of_prior;
+  Eigen::LLT<Eigen::MatrixXd> of_both;
+  Eigen::VectorXd scale;
+  const auto prior = log_determinant(inverse, &of_prior, &scale);
+  const auto both = log_determinant(inverse + evidence.information[of], &of_both, &scale);
+  if (!prior || !both) return std::nullopt;
+  const Eigen::VectorXd b = scale.cwiseProduct(evidence.weighted[of]);
+  return 0.5 * (*prior - *both + b.dot(of_both.solve(b)));
 }
 
 bool is_monotone(const ZoomCurve& curve, std::string* error) {
@@ -90,10 +130,10 @@ bool ZoomSolution::run(std::string* error) {
   }
   content_.nodes = nodes_;
   std::copy(evidence_.reading.begin(), evidence_.reading.end(), content_.reading.begin());
+  std::copy(evidence_.is_between.begin(), evidence_.is_between.end(), content_.is_between.begin());
   content_.level = evidence_.level;
   content_.repeatability = options_.repeatability;
-  content_.smoothness =
-      usual(evidence_.value(nodes_ - 1, 0) - evidence_.value(0, 0), reference_.camera);
+  content_.smoothness = usual(rise_of(evidence_), reference_.camera);
   choose_roughness();
   if (solve()) return true;
   *error = kUndetermined;
@@ -119,7 +159,9 @@ bool ZoomSolution::curve(ZoomCurve* curve, std::string* error) const {
   return is_monotone(*curve, error);
 }
 
-// Likelihood of each quantity by itself, the others taken as open.
+// Likelihood of each quantity by itself, the others taken as open. Log f and distortion are told so well by their nodes that the
+// best roughness will do. Centres are not: the best of what a few uncertain nodes leave possible is often too smooth, and draws
+// them off by more than it says. The mean over what is possible is rougher.
 void ZoomSolution::choose_roughness() {
   constexpr int kSteps = 33;
   constexpr double kDecades = 2;          // on either side
@@ -127,24 +169,29 @@ void ZoomSolution::choose_roughness() {
   for (int q = 0; q < kZoomQuantityCount; ++q) {
     ZoomSmoothness& smoothness = content_.smoothness[static_cast<std::size_t>(q)];
     const double usual_roughness = smoothness.roughness;
-    double best = -1e300;
-    double best_roughness = usual_roughness;
-    const Eigen::VectorXd y = evidence_.value.col(q);
+    std::vector<double> roughness;
+    std::vector<double> likelihood;
     for (int step = 0; step < kSteps; ++step) {
       const double decades = kDecades * (2.0 * step / (kSteps - 1) - 1);
       smoothness.roughness = usual_roughness * std::pow(10, decades);
-      Eigen::MatrixXd K = process_covariance(content_, q);
-      K.diagonal() += evidence_.variance.col(q);
-      const Eigen::LLT<Eigen::MatrixXd> llt(K);
-      if (llt.info() != Eigen::Success) continue;
-      const double log_determinant = 2 * llt.matrixLLT().diagonal().array().log().sum();
-      const double likelihood = -0.5 * (y.dot(llt.solve(y)) + log_determinant) -
-                                0.5 * std::pow(decades / kPriorDecades, 2);
-      if (likelihood <= best) continue;
-      best = likelihood;
-      best_roughness = smoothness.roughness;
+      const std::optional<double> of_data = curve_likelihood(content_, q, evidence_);
+      if (!of_data) continue;
+      roughness.push_back(smoothness.roughness);
+      likelihood.push_back(*of_data - 0.5 * std::pow(decades / kPriorDecades, 2));
     }
-    smoothness.roughness = best_roughness;
+    smoothness.roughness = usual_roughness;
+    if (likelihood.empty()) continue;
+    const auto best = std::max_element(likelihood.begin(), likelihood.end());
+    smoothness.roughness = roughness[static_cast<std::size_t>(best - likelihood.begin())];
+    if (q < kFirstCentre) continue;
+    double sum = 0;
+    double weights = 0;
+    for (std::size_t i = 0; i < roughness.size(); ++i) {
+      const double weight = std::exp(likelihood[i] - *best);
+      sum += weight * roughness[i];
+      weights += weight;
+    }
+    smoothness.roughness = sum / weights;
   }
 }
 

@@ -69,7 +69,7 @@ void read_nodes(const EstimateReader& file, const YAML::Node& nodes, ZoomCurve::
   const std::string prefix = name + ".";
   for (int i = 0; i < content->nodes; ++i) {
     const YAML::Node node = nodes[static_cast<std::size_t>(i)];
-    std::vector<std::string> known{"reading"};
+    std::vector<std::string> known{"reading", "between_dwells"};
     known.insert(known.end(), kQuantityNames.begin(), kQuantityNames.end());
     file.check_keys(node, known, prefix);
     const double reading = bounded(file, node, "reading", prefix, -1e12, 1e12);
@@ -78,6 +78,14 @@ void read_nodes(const EstimateReader& file, const YAML::Node& nodes, ZoomCurve::
                           " is less than the one before; give them in increasing order");
     }
     content->reading[static_cast<std::size_t>(i)] = reading;
+    if (const YAML::Node between = node["between_dwells"]) {
+      bool value = false;
+      if (!YAML::convert<bool>::decode(between, value)) {
+        file.fail(between,
+                  prefix + "between_dwells is " + between.Scalar() + "; true or false is expected");
+      }
+      content->is_between[static_cast<std::size_t>(i)] = value;
+    }
     for (std::size_t q = 0; q < kQuantityNames.size(); ++q) {
       content->value(kZoomQuantityCount * i + static_cast<int>(q), 0) =
           bounded(file, node, kQuantityNames[q], prefix, -kLargest[q], kLargest[q]);
@@ -142,6 +150,9 @@ void write_zoom_curve(const ZoomCurve& curve, YAML::Emitter* out) {
     for (int q = 0; q < kZoomQuantityCount; ++q) {
       const auto of = static_cast<std::size_t>(q);
       number(kQuantityNames[of], content.level[of] + content.value(kZoomQuantityCount * i + q, 0));
+    }
+    if (content.is_between[static_cast<std::size_t>(i)]) {
+      o << YAML::Key << "between_dwells" << YAML::Value << true;
     }
     const int row = kZoomQuantityCount * i;
     const double f = std::exp(content.level[0] + content.value(row, 0));

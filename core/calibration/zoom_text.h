@@ -5,6 +5,7 @@
 //     smoothness: {log_focal_length: {level_sigma: ..., slope_sigma: ..., roughness: ...}, ...}
 //     nodes:
 //       - {reading: 1, log_focal_length: 7.09, corner_distortion: -0.06, centre_u: 19.9, centre_v: -12}
+//       - {..., between_dwells: true}               what movements of the zoom showed, no dwell
 //     covariance: {names: [log_focal_length@0, ..., clock_offset], matrix: [[...]]}    @: the node's number, from 0
 // Comments tell focal lengths in px with their sigmas. What was written is read back to the last digits but one. Allocates.
 

@@ -7,7 +7,8 @@
 // W is a twice integrated random walk's (Wahba 1978): its mean is a cubic spline, its variance grows with the cube of the
 // distance from the nodes, between and beyond them. A lens does not come back exactly: each movement leaves log f off by
 // eps ~ N(0, repeatability^2), at a node and at use. Line delay, axes, scales, aspect and clock offset are the same at all
-// readings (SharedParameter). Made by core/calibration/zoom_fit.h. Fixed memory; no allocation.
+// readings (SharedParameter). A node between the dwells tells of y itself, what movements of the zoom showed of it
+// (is_between). Made by core/calibration/zoom_fit.h. Fixed memory; no allocation.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -55,7 +56,8 @@ class ZoomCurve {
   // All that at() needs; matrices have the size of the nodes that there are.
   struct Content {
     int nodes = 0;
-    std::array<double, kMaxNodes> reading{};  // not decreasing; the first and the last differ
+    std::array<double, kMaxNodes> reading{};   // not decreasing; the first and the last differ
+    std::array<bool, kMaxNodes> is_between{};  // without a visit: the value has no eps
     std::array<double, kZoomQuantityCount> level{};
     std::array<ZoomSmoothness, kZoomQuantityCount> smoothness;
     double repeatability = 0;  // sigma of log f after a movement
@@ -63,7 +65,7 @@ class ZoomCurve {
     // Node by node the quantities less their level, eps of that visit included.
     Bounded<kZoomQuantityCount * kMaxNodes, 1> value;
     Bounded<kMaxSize, kMaxSize> covariance;  // of value, then the shared parameters
-    // Inverse covariance of the process at the nodes, repeatability included, of each quantity.
+    // Inverse covariance of the process at the nodes, repeatability at visits included, of each quantity.
     std::array<Bounded<kMaxNodes, kMaxNodes>, kZoomQuantityCount> inverse;
   };
 
@@ -72,6 +74,11 @@ class ZoomCurve {
 
   [[nodiscard]] bool empty() const { return c_.nodes == 0; }
   [[nodiscard]] const Content& content() const { return c_; }
+  // Nodes that are not between dwells.
+  [[nodiscard]] int visits() const {
+    const auto begin = c_.is_between.begin();
+    return static_cast<int>(std::count(begin, begin + c_.nodes, false));
+  }
   [[nodiscard]] double first_reading() const { return c_.reading[0]; }
   [[nodiscard]] double last_reading() const {
     return c_.reading[static_cast<std::size_t>(c_.nodes - 1)];
@@ -117,7 +124,7 @@ class ZoomCurve {
     return true;
   }
 
-  // The calibration of a node, 0 to content().nodes - 1, as it was at that visit.
+  // The calibration of a node, 0 to content().nodes - 1, as it was at that visit; between visits without what a movement adds.
   [[nodiscard]] Calibration node(int i) const {
     Calibration calibration;
     const int first = row(i, 0);

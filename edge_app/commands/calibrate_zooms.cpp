@@ -4,6 +4,7 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
 #include <cmath>
 #include <cstdio>
 #include <ctime>
@@ -45,7 +46,24 @@ void require_readings(const std::vector<ZoomJob>& jobs) {
   }
 }
 
-std::string zooms_text(const ZoomFit& fit, const std::vector<Calibration>& nodes) {
+// Of the focal length at readings between the first and the last, relative, after a movement: the median and the largest.
+std::pair<double, double> sigmas_between(const ZoomCurve& curve) {
+  constexpr int kReadings = 41;
+  std::vector<double> sigmas;
+  for (int i = 0; i < kReadings; ++i) {
+    const double reading = curve.first_reading() +
+                           (curve.last_reading() - curve.first_reading()) * (i + 0.5) / kReadings;
+    Calibration c;
+    if (curve.at(reading, &c))
+      sigmas.push_back(parameter_sigma(c, Parameter::kFocalLength) / c.camera.focal_length);
+  }
+  std::sort(sigmas.begin(), sigmas.end());
+  if (sigmas.empty()) return {0, 0};
+  return {sigmas[sigmas.size() / 2], sigmas.back()};
+}
+
+std::string zooms_text(const ZoomFit& fit, const std::vector<Calibration>& nodes,
+                       std::size_t movements) {
   std::string text = fmt::format("{:>10}  {:>12}  {:>9}  {:>12}  {:>9}  {:>16}  {:>13}\n",
                                  "reading", "f, px", "sigma", "k", "sigma", "centre, px", "sigma");
   for (const Calibration& c : nodes) {
@@ -71,11 +89,14 @@ std::string zooms_text(const ZoomFit& fit, const std::vector<Calibration>& nodes
       "readings agree on what they share: {:.1f}, {} expected; after a movement f may be {:.2g} % "
       "off\n",
       fit.chi_square, fit.degrees_of_freedom, 100 * fit.curve.content().repeatability);
+  const auto [usual, largest] = sigmas_between(fit.curve);
+  text += fmt::format("between them f is known to {:.2g} %, {:.2g} % at most, from {} movement{}\n",
+                      100 * usual, 100 * largest, movements, movements == 1 ? "" : "s");
   return text;
 }
 
 std::string zooms_json(const ZoomFit& fit, const std::vector<Calibration>& nodes,
-                       const OutputDirectory& directory) {
+                       std::size_t movements, const OutputDirectory& directory) {
   using nlohmann::ordered_json;
   ordered_json json;
   json["status"] = "ok";
@@ -88,15 +109,45 @@ std::string zooms_json(const ZoomFit& fit, const std::vector<Calibration>& nodes
   }
   json["shared_chi_square"] = fit.chi_square;
   json["shared_degrees_of_freedom"] = fit.degrees_of_freedom;
+  json["movements"] = movements;
+  const auto [usual, largest] = sigmas_between(fit.curve);
+  json["focal_length_sigma_between"] = {{"median", usual}, {"largest", largest}};
+  json["advice"] = zoom_advice(fit.curve);
   json["files"] = ordered_json::object();
   for (const auto& [kind, path] : directory.files()) json["files"][kind] = path;
   return json.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
 }
 
+// Of the dwells.
 std::vector<Calibration> nodes_of(const ZoomCurve& curve) {
   std::vector<Calibration> nodes;
-  for (int i = 0; i < curve.content().nodes; ++i) nodes.push_back(curve.node(i));
+  for (int i = 0; i < curve.content().nodes; ++i) {
+    if (!curve.content().is_between[static_cast<std::size_t>(i)]) nodes.push_back(curve.node(i));
+  }
   return nodes;
+}
+
+// What the tracks show while the zoom moves; calibration_of: each job's place among the calibrations, where it has one.
+std::vector<MovementObservation> observe_movements(
+    const std::vector<ZoomJob>& jobs, const std::vector<std::optional<std::size_t>>& calibration_of,
+    const std::vector<Calibration>& calibrations, const ZoomCurve& curve) {
+  std::vector<MovementObservation> observations;
+  const std::vector<double> readings = readings_between(calibrations);
+  for (std::size_t i = 1; i < jobs.size(); ++i) {
+    const auto& movement = jobs[i].job.movement;
+    if (!movement || !(calibration_of[i - 1] || calibration_of[i])) continue;
+    MovementObservation observation;
+    std::string error;
+    if (!observe_movement(*movement, curve, readings, &observation, &error)) {
+      spdlog::warn("{}: the zoom's movement from {:g} to {:g} is left out: {}", jobs[i].recording,
+                   movement->from.zoom, movement->to.zoom, error);
+      continue;
+    }
+    observation.from = calibration_of[i - 1];
+    observation.to = calibration_of[i];
+    observations.push_back(std::move(observation));
+  }
+  return observations;
 }
 
 }  // namespace
@@ -107,6 +158,7 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
   require_readings(jobs);
   OutputDirectory directory(options.directory, jobs.front().recording);
   std::vector<Calibration> calibrations;
+  std::vector<std::optional<std::size_t>> calibration_of(jobs.size());
   ZoomFitOptions fit_options;
   const std::string now = fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)));
   for (std::size_t i = 0; i < jobs.size(); ++i) {
@@ -125,6 +177,7 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
       continue;
     }
     result.calibration.zoom = job.zoom;
+    calibration_of[i] = calibrations.size();
     calibrations.push_back(result.calibration);
     if (calibrations.size() == 1) fit_options = zoom_fit_options(job.options);
   }
@@ -135,6 +188,15 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
                                                 "calibrated: {}",
                                                 calibrations.size(), jobs.size(), error));
   }
+  const std::vector<MovementObservation> movements =
+      observe_movements(jobs, calibration_of, calibrations, fit.curve);
+  ZoomFit with_movements;
+  if (fit_zoom(calibrations, movements, fit_options, &with_movements, &error)) {
+    fit = with_movements;
+  } else {
+    spdlog::warn("movements of the zoom are left out: {}", error);
+  }
+  for (const std::string& line : zoom_advice(fit.curve)) spdlog::warn("{}", line);
   const std::vector<Calibration> nodes = nodes_of(fit.curve);
   // Who uses it has moved the zoom since.
   Calibration first;
@@ -146,9 +208,9 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
     notes.zoom_curve = fit.curve;
     return save_calibration(path, first, notes, why);
   });
-  std::fputs(
-      options.json ? zooms_json(fit, nodes, directory).c_str() : zooms_text(fit, nodes).c_str(),
-      stdout);
+  std::fputs(options.json ? zooms_json(fit, nodes, movements.size(), directory).c_str()
+                          : zooms_text(fit, nodes, movements.size()).c_str(),
+             stdout);
   if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
   for (const auto& [kind, path] : directory.files()) spdlog::info("{}: {}", kind, path);
   return kExitOk;

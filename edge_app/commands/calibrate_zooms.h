@@ -1,6 +1,6 @@
 #pragma once
 // `alidade calibrate` over several zoom readings: each stretch is calibrated with a free optical centre, and all together give
-// the camera's zoom curve (core/calibration/zoom_fit.h).
+// the camera's zoom curve (core/calibration/zoom_fit.h), with what the tracks show while the zoom moves from one to the next.
 
 #include <string>
 #include <vector>

@@ -72,6 +72,48 @@ Tables part_of(const Tables& all, const ZoomStretch& stretch) {
   return part;
 }
 
+void fill(Tables tables, CalibrationJob* job);
+
+// From one stretch to the next; nothing without tracks of it.
+std::optional<ZoomMovement> movement_between(const Tables& all, const ZoomStretch& from,
+                                             const ZoomStretch& to, CalibrationJob job) {
+  Tables part;
+  std::unordered_set<std::int64_t> names;
+  for (const FrameStamp& frame : all.frames) {
+    if (frame.receive_time_s < from.begin_s || frame.receive_time_s > to.end_s) continue;
+    part.frames.push_back(frame);
+    if (frame.receive_time_s >= from.end_s - 2 * kZoomMargin_s &&
+        frame.receive_time_s <= to.begin_s + 2 * kZoomMargin_s) {
+      names.insert(frame.frame);
+    }
+  }
+  for (const PanTiltSample& sample : all.telemetry) {
+    if (sample.latest_time_s >= from.begin_s && sample.latest_time_s <= to.end_s)
+      part.telemetry.push_back(sample);
+  }
+  for (const TrackPoint& point : all.tracks) {
+    if (names.count(point.frame) > 0) part.tracks.push_back(point);
+  }
+  if (part.tracks.empty()) return std::nullopt;
+  ZoomMovement movement;
+  movement.from = from;
+  movement.to = to;
+  // As add_telemetry() has them: what a poll tells is of its middle.
+  const bool polled = is_polled(part.telemetry);
+  for (const PanTiltSample& sample : part.telemetry) {
+    const double width = sample.latest_time_s - sample.earliest_time_s;
+    if (sample.zoom) {
+      movement.readings.push_back(
+          {polled ? sample.latest_time_s - width / 2 : sample.latest_time_s, *sample.zoom});
+    }
+  }
+  fill(std::move(part), &job);
+  movement.input = std::move(job.input);
+  movement.image_stamps = job.options.image_stamps;
+  movement.telemetry_stamps = job.options.telemetry_stamps;
+  return movement;
+}
+
 void fill(Tables tables, CalibrationJob* job) {
   add_frames(std::move(tables.frames), &job->input, &job->options, &job->remarks);
   add_telemetry(std::move(tables.telemetry), &job->input, &job->options, &job->remarks);
@@ -149,6 +191,10 @@ std::vector<CalibrationJob> load_calibration_jobs(const std::string& directory,
     jobs.push_back(job);
     jobs.back().zoom = stretch.zoom;
     fill(part_of(tables, stretch), &jobs.back());
+    if (jobs.size() > 1) {
+      const ZoomStretch& before = stretches[jobs.size() - 2];
+      jobs.back().movement = movement_between(tables, before, stretch, job);
+    }
   }
   return jobs;
 }

@@ -8,6 +8,7 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/calibration/known_camera.h"
+#include "core/calibration/zoom_movement.h"
 #include "edge_app/config/value_file.h"
 
 namespace alidade {
@@ -20,6 +21,8 @@ struct CalibrationJob {
   bool tracks_from_video = false;    // input.observations are still to be found in the video
   std::optional<double> zoom;        // the reading that all of it has, device units
   std::vector<std::string> remarks;  // about the recording, for the report
+  // Of the zoom, from the stretch of the job before to this one's, where there are tracks of it.
+  std::optional<ZoomMovement> movement;
 };
 
 // The recording, or, if its zoom moves, each stretch in which the reading stands still for kLeastStretch_s, less

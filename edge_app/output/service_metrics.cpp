@@ -76,7 +76,7 @@ void add_zoom_metrics(const OrientationRecord& newest,
     out->add(*newest.camera.zoom);
   }
   out->gauge("alidade_zoom_curve_nodes", "Calibrated visits of zoom readings; 0: no zoom curve");
-  out->add(std::int64_t{curve ? curve->content().nodes : 0});
+  out->add(std::int64_t{curve ? curve->visits() : 0});
   if (!curve) return;
   out->gauge("alidade_zoom_curve_reading", "First and last zoom reading of the curve");
   out->add(curve->first_reading(), {{"end", "first"}});

@@ -108,11 +108,15 @@ void add_frames(std::vector<FrameStamp> stamps, CalibrationInput* input,
       input->noise.image_stamp_sigma_s ? StampNoise::kSymmetric : StampNoise::kOneSided;
 }
 
-void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
-                   CalibrationOptions* options, std::vector<std::string>* remarks) {
-  const bool polled = std::none_of(samples.begin(), samples.end(), [](const PanTiltSample& sample) {
+bool is_polled(const std::vector<PanTiltSample>& samples) {
+  return std::none_of(samples.begin(), samples.end(), [](const PanTiltSample& sample) {
     return sample.sequence.has_value() || sample.device_time_s.has_value();
   });
+}
+
+void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
+                   CalibrationOptions* options, std::vector<std::string>* remarks) {
+  const bool polled = is_polled(samples);
   // Polled samples bear the host's times, which go on over a reconnection.
   if (!polled) keep_longest_part("telemetry.csv", &samples, remarks);
   const Counts counts = count_items(

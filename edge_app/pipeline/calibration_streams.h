@@ -21,6 +21,9 @@
 
 namespace alidade {
 
+// Whether the samples are answers to questions, each of about when its stamps say, without a clock or count of the head's own.
+[[nodiscard]] bool is_polled(const std::vector<PanTiltSample>& samples);
+
 // Frames into input->frames, and what is known of their stamps into *options; remarks get a line for what was left out.
 void add_frames(std::vector<FrameStamp> stamps, CalibrationInput* input,
                 CalibrationOptions* options, std::vector<std::string>* remarks);

@@ -195,9 +195,8 @@ void SelfCalibration::take_node(const ZoomAddition& addition, SessionCalibration
   publish(*checked);
   if (!addition.node) return;
   const ZoomCurve& curve = nodes_.curve();
-  messages_.push_back(fmt::format("zoom curve: {} nodes from reading {} to {}",
-                                  curve.content().nodes, curve.first_reading(),
-                                  curve.last_reading()));
+  messages_.push_back(fmt::format("zoom curve: {} nodes from reading {} to {}", curve.visits(),
+                                  curve.first_reading(), curve.last_reading()));
   // What it was made of is in the node.
   session_.clear();
 }

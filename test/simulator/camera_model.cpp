@@ -80,19 +80,37 @@ std::optional<Eigen::Vector2d> CameraModel::project_rolling(const Eigen::Vector3
     const double time = t0_s + row * camera_.line_delay;
     return lens_at(time).project(base_from_camera_at(time).transpose() * d_base);
   };
-  // The row that is exposed while the direction lies on it: the root of v(row) - row, by bisection.
+  // The row that is exposed while the direction lies on it: the root of v(row) - row, by false position in which the end that
+  // stays counts half (Illinois).
   double low = 0;
   double high = image_.height;
   const auto first = seen_from_row(low);
   const auto last = seen_from_row(high);
   if (!first || !last || first->y() < low || last->y() > high) return std::nullopt;
-  for (int step = 0; step < 60; ++step) {
-    const double middle = (low + high) / 2;
-    const auto seen = seen_from_row(middle);
+  double at_low = first->y() - low;
+  double at_high = last->y() - high;
+  constexpr double kRows = 1e-10;
+  double row = low;
+  int stayed = 0;  // the end that stays: -1 the low one, 1 the high one
+  for (int step = 0; step < 60 && high - low > kRows; ++step) {
+    row = at_low > at_high ? (low * at_high - high * at_low) / (at_high - at_low) : low;
+    const auto seen = seen_from_row(row);
     if (!seen) return std::nullopt;
-    (seen->y() > middle ? low : high) = middle;
+    const double off = seen->y() - row;
+    if (std::abs(off) < kRows) break;
+    if (off > 0) {
+      low = row;
+      at_low = off;
+      if (stayed == 1) at_high /= 2;
+      stayed = 1;
+    } else {
+      high = row;
+      at_high = off;
+      if (stayed == -1) at_low /= 2;
+      stayed = -1;
+    }
   }
-  auto seen = seen_from_row((low + high) / 2);
+  auto seen = seen_from_row(row);
   if (!seen || seen->x() < 0 || seen->x() > image_.width) return std::nullopt;
   return seen;
 }

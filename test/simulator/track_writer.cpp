@@ -26,10 +26,9 @@ int coarser_grids(int row, int column, int octave) {
 
 }  // namespace
 
-void write_tracks(const Config& config, const std::vector<FrameEvent>& frames,
-                  const CameraModel& camera, const std::filesystem::path& file) {
-  OutputFile output(file);
-  output.stream() << "frame,landmark,u_px,v_px,sigma_px\n";
+std::vector<TrackedPoint> make_tracks(const Config& config, const std::vector<FrameEvent>& frames,
+                                      const CameraModel& camera) {
+  std::vector<TrackedPoint> tracks;
   const Zoom* zoom = camera.zoom();
   const double shortest = zoom != nullptr ? zoom->focal_lengths().wide : config.camera.focal_length;
   const double wanted =
@@ -69,11 +68,20 @@ void write_tracks(const Config& config, const std::vector<FrameEvent>& frames,
         const std::pair<int, int> place{row * finest, (column % around + around) % around * finest};
         const int number = numbers.emplace(place, static_cast<int>(numbers.size())).first->second;
         const double u = seen->x() + noise(generator);
-        output.stream() << event.frame << ',' << number << ',' << u << ','
-                        << seen->y() + noise(generator) << ',' << config.recording.pixel_sigma
-                        << '\n';
+        tracks.push_back({event.frame, number, u, seen->y() + noise(generator)});
       }
     }
+  }
+  return tracks;
+}
+
+void write_tracks(const Config& config, const std::vector<FrameEvent>& frames,
+                  const CameraModel& camera, const std::filesystem::path& file) {
+  OutputFile output(file);
+  output.stream() << "frame,landmark,u_px,v_px,sigma_px\n";
+  for (const TrackedPoint& point : make_tracks(config, frames, camera)) {
+    output.stream() << point.frame << ',' << point.landmark << ',' << point.u << ',' << point.v
+                    << ',' << config.recording.pixel_sigma << '\n';
   }
   output.flush();
 }

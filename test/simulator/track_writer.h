@@ -7,6 +7,7 @@
 // kLandmarkOctaves before it: what was a small detail at one end fills the image at the other. A landmark is one direction under one number at
 // every zoom.
 
+#include <cstdint>
 #include <filesystem>
 #include <vector>
 
@@ -17,6 +18,17 @@ namespace alidade::simulator {
 
 // Over so many doublings of the focal length a landmark is seen.
 inline constexpr int kLandmarkOctaves = 3;
+
+struct TrackedPoint {
+  std::int64_t frame = 0;
+  int landmark = 0;
+  double u = 0, v = 0;  // px, with noise of config.recording.pixel_sigma
+};
+
+// By frame.
+[[nodiscard]] std::vector<TrackedPoint> make_tracks(const Config& config,
+                                                    const std::vector<FrameEvent>& frames,
+                                                    const CameraModel& camera);
 
 // Throws std::runtime_error naming the file if it cannot be written.
 void write_tracks(const Config& config, const std::vector<FrameEvent>& frames,
