@@ -112,7 +112,7 @@ TEST_F(FollowedZoom, StaysInOeModeFromOneZoomToTheNext) {
     const OrientationRecord record = add(k);
     expect_honest(k, record);
     if (k > last_of_wide_) held += record.mode == RecordMode::kOe ? 1 : 0;
-    if (k > last_of_wide_ + 3 && k < first_of_tele_ - 3) {
+    if (record.mode == RecordMode::kOe && k > last_of_wide_ + 3 && k < first_of_tele_ - 3) {
       EXPECT_NE(record.orientation->geometry.zoom_rate, 0) << k;
     }
   }
