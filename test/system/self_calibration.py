@@ -48,6 +48,14 @@ class Watch:
                 return None
         return self.first_oe
 
+    def until_heard(self, activity, longest_s):
+        """Reads on until a record tells of this activity; False if the records go on for longer without it."""
+        while activity not in (heard for heard, _ in self.heard):
+            record = self.next()
+            if record is None or self.since_first_frame(record) > longest_s:
+                return False
+        return True
+
     def read_for(self, seconds):
         """Reads on for so long, by the records' own times."""
         end_s = self.records[-1]["receive_time_s"] + seconds
