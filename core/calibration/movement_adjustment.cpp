@@ -39,6 +39,11 @@ ZoomMotionSpline spline_over(const MovementData& data) {
   return ZoomMotionSpline(knots);
 }
 
+Matrix2<double> damped(Matrix2<double> H, double damping) {
+  H.diagonal() *= 1 + damping;
+  return H;
+}
+
 double robust_weight(double square, double loss) { return 1 / (1 + square / (loss * loss)); }
 double robust_square(double square, double loss) {
   return loss * loss * std::log1p(square / (loss * loss));
@@ -70,28 +75,23 @@ MovementAdjustment::MovementAdjustment(MovementData data, const ZoomCurve& curve
   }
   log_f_unknowns_ += 2;
   set_places();
-  unknowns_ = point_row(spline_.control_points()) + log_f_unknowns_ + 3 * kPlaces;
+  unknowns_ = first_beside() + 3 * kPlaces;
   set_start();
   set_landmarks();
 }
 
 int MovementAdjustment::log_f_unknown(int control_point) const {
-  return point_row(spline_.control_points()) +
-         log_f_unknown_[static_cast<std::size_t>(control_point)];
+  return first_log_f() + log_f_unknown_[static_cast<std::size_t>(control_point)];
 }
 
 void MovementAdjustment::set_places() {
-  const double per_corner_root = 1 / half_diagonal_of(data_);
   const auto quantities = [&](double reading, Vector3<double>* sigma) {
     Calibration c;
     if (!curve_.at(reading, &c)) return Vector3<double>(0, 0, 0);
-    const double per_corner = std::pow(c.camera.focal_length * per_corner_root, 2);
+    const double per_corner = per_corner_at(c.camera.focal_length);
     if (sigma != nullptr) {
-      const auto of = [&](Parameter p) {
-        return std::sqrt(std::max(0.0, c.covariance(index(p), index(p))));
-      };
-      *sigma = {of(Parameter::kRadialDistortion) / per_corner, of(Parameter::kCentreU),
-                of(Parameter::kCentreV)};
+      *sigma = {parameter_sigma(c, Parameter::kRadialDistortion) / per_corner,
+                parameter_sigma(c, Parameter::kCentreU), parameter_sigma(c, Parameter::kCentreV)};
     }
     return Vector3<double>(c.camera.radial_distortion / per_corner, c.camera.centre_u,
                            c.camera.centre_v);
@@ -114,23 +114,31 @@ void MovementAdjustment::set_places() {
   }
 }
 
+MovementAdjustment::Passing MovementAdjustment::passing_at(double time_s) const {
+  if (time_s < way_time_s_.front()) return {1, 0};
+  if (time_s >= way_time_s_.back()) return {way_time_s_.size() - 1, 1};
+  const auto after = std::upper_bound(way_time_s_.begin(), way_time_s_.end(), time_s);
+  const auto i = static_cast<std::size_t>(after - way_time_s_.begin());
+  return {i, (time_s - way_time_s_[i - 1]) / (way_time_s_[i] - way_time_s_[i - 1])};
+}
+
+double MovementAdjustment::per_corner_at(double focal_length) const {
+  return std::pow(focal_length / half_diagonal_of(data_), 2);
+}
+
+Camera<double> MovementAdjustment::camera_at(double log_f, const LensPlace& lens) const {
+  Camera<double> camera = shared_.camera;
+  camera.focal_length = std::exp(log_f);
+  camera.radial_distortion = lens.quantities[0] * per_corner_at(camera.focal_length);
+  camera.set_centre_offset(lens.quantities.tail<2>());
+  return camera;
+}
+
 MovementAdjustment::LensPlace MovementAdjustment::lens_at(double time_s) const {
   LensPlace place;
-  const auto after = std::upper_bound(way_time_s_.begin(), way_time_s_.end(), time_s);
-  double way = 0;
-  if (after == way_time_s_.begin()) {
-    way = way_share_.front();
-    place.quantities = way_quantities_.front();
-  } else if (after == way_time_s_.end()) {
-    way = way_share_.back();
-    place.quantities = way_quantities_.back();
-  } else {
-    const auto i = static_cast<std::size_t>(after - way_time_s_.begin());
-    const double share = (time_s - way_time_s_[i - 1]) / (way_time_s_[i] - way_time_s_[i - 1]);
-    way = (1 - share) * way_share_[i - 1] + share * way_share_[i];
-    place.quantities = (1 - share) * way_quantities_[i - 1] + share * way_quantities_[i];
-  }
-  const double at = way * (kPlaces - 1);
+  const auto [i, share] = passing_at(time_s);
+  place.quantities = (1 - share) * way_quantities_[i - 1] + share * way_quantities_[i];
+  const double at = ((1 - share) * way_share_[i - 1] + share * way_share_[i]) * (kPlaces - 1);
   place.first = std::clamp(static_cast<int>(at), 0, kPlaces - 2);
   place.share = at - place.first;
   place.quantities +=
@@ -172,15 +180,8 @@ void MovementAdjustment::set_start() {
   for (int i = 0; i <= kPerSegment * spline_.segments(); ++i) {
     const double time = spline_.begin_s() + (spline_.end_s() - spline_.begin_s()) * i /
                                                 (kPerSegment * spline_.segments());
-    const auto after = std::upper_bound(way_time_s_.begin(), way_time_s_.end(), time);
-    double reading = data_.passed.front().zoom;
-    if (after == way_time_s_.end()) {
-      reading = data_.passed.back().zoom;
-    } else if (after != way_time_s_.begin()) {
-      const auto at = static_cast<std::size_t>(after - way_time_s_.begin());
-      const double share = (time - way_time_s_[at - 1]) / (way_time_s_[at] - way_time_s_[at - 1]);
-      reading = (1 - share) * data_.passed[at - 1].zoom + share * data_.passed[at].zoom;
-    }
+    const auto [at, share] = passing_at(time);
+    const double reading = (1 - share) * data_.passed[at - 1].zoom + share * data_.passed[at].zoom;
     Calibration c;
     if (curve_.at(reading, &c)) add(time, 2, std::log(c.camera.focal_length), &H_f);
   }
@@ -211,14 +212,8 @@ void MovementAdjustment::set_landmarks() {
     const double time = data_.input.frame_time_s[static_cast<std::size_t>(seen.frame)] +
                         seen.u.y() * shared_.line_delay;
     const ZoomMotionSpline::Point at = spline_.value(basis(time));
-    const LensPlace lens = lens_at(time);
-    Camera<double> camera = shared_.camera;
-    camera.focal_length = std::exp(at[2]);
-    camera.radial_distortion =
-        lens.quantities[0] * std::pow(camera.focal_length / half_diagonal_of(data_), 2);
-    camera.set_centre_offset(lens.quantities.tail<2>());
     Vector3<double> d_c;
-    if (unproject(camera, seen.u, &d_c) != ProjectionStatus::kOk) {
+    if (unproject(camera_at(at[2], lens_at(time)), seen.u, &d_c) != ProjectionStatus::kOk) {
       seen.used = false;
       continue;
     }
@@ -240,11 +235,7 @@ bool MovementAdjustment::observe(const AdjustmentObservation& seen, Row* row) co
   const ZoomMotionSpline::Point motion = spline_.value(at);
   const ZoomMotionSpline::Point rate = spline_.derivative(at);
   const LensPlace lens = lens_at(time);
-  Camera<double> camera = shared_.camera;
-  const double f = camera.focal_length = std::exp(motion[2]);
-  const double per_corner = std::pow(f / half_diagonal_of(data_), 2);
-  camera.radial_distortion = lens.quantities[0] * per_corner;
-  camera.set_centre_offset(lens.quantities.tail<2>());
+  const Camera<double> camera = camera_at(motion[2], lens);
   const Vector3<double>& d_b = landmarks_[static_cast<std::size_t>(seen.landmark)];
   Matrix<double, 3, 2> J_xi_angle;
   const Matrix3<double> R =
@@ -256,7 +247,7 @@ bool MovementAdjustment::observe(const AdjustmentObservation& seen, Row* row) co
   if (project(camera, d_c, &u, &J_u_dc, &J_u_camera) != ProjectionStatus::kOk) return false;
   const Matrix2<double> J_u_angle = J_u_dc * skew(d_c) * J_xi_angle;
   const Vector2<double> J_u_log_f =
-      f * J_u_camera.col(0) + 2 * camera.radial_distortion * J_u_camera.col(2);
+      camera.focal_length * J_u_camera.col(0) + 2 * camera.radial_distortion * J_u_camera.col(2);
   const Vector2<double> J_u_row =
       (J_u_angle * rate.head<2>() + J_u_log_f * rate[2]) * shared_.line_delay;
   constexpr double kMaxSlope = 0.9;
@@ -280,10 +271,10 @@ bool MovementAdjustment::observe(const AdjustmentObservation& seen, Row* row) co
     add(point_row(point) + 1, weight * J_angle.col(1));
     add(log_f_unknown(point), weight * J_log_f);
   }
-  const int beside = point_row(spline_.control_points()) + log_f_unknowns_;
+  const double per_corner = per_corner_at(camera.focal_length);
   for (const int which : {0, 1}) {
     const double share = which == 0 ? 1 - lens.share : lens.share;
-    const int first = beside + 3 * (lens.first + which);
+    const int first = first_beside() + 3 * (lens.first + which);
     add(first, share * per_corner * (whiten * J_u_camera.col(2)));
     add(first + 1, share * whiten.col(0));
     add(first + 2, share * whiten.col(1));
@@ -374,19 +365,19 @@ void MovementAdjustment::linearise(double loss_px, bool with_derivatives, Normal
       }
     }
   }
-  const int beside = point_row(spline_.control_points()) + log_f_unknowns_;
   for (int i = 0; i < 3 * kPlaces; ++i) {
     const double sigma = beside_sigma_(i % 3, i / 3);
     const double n = beside_(i % 3, i / 3);
     out->cost += n * n / (sigma * sigma);
     if (!with_derivatives) continue;
-    out->H(beside + i, beside + i) += 1 / (sigma * sigma);
-    out->g[beside + i] -= n / (sigma * sigma);
+    const int a = first_beside() + i;
+    out->H(a, a) += 1 / (sigma * sigma);
+    out->g[a] -= n / (sigma * sigma);
   }
   if (!with_derivatives) return;
   // Nothing is said of where log f is, only that no step goes far.
   for (int i = 0; i < log_f_unknowns_; ++i) {
-    const int a = point_row(spline_.control_points()) + i;
+    const int a = first_log_f() + i;
     out->H(a, a) += 1 / (kLogFSigma * kLogFSigma);
   }
 }
@@ -399,8 +390,7 @@ bool MovementAdjustment::reduce(const Normal& normal, double damping, Eigen::Mat
   for (std::size_t l = 0; l < landmarks_.size(); ++l) {
     const std::vector<int>& touched = normal.touched[l];
     if (touched.empty()) continue;
-    Matrix2<double> H_l = normal.H_landmark[l];
-    H_l.diagonal() *= 1 + damping;
+    const Matrix2<double> H_l = damped(normal.H_landmark[l], damping);
     if (!(H_l.determinant() > 1e-12 * std::pow(H_l.trace(), 2))) return false;
     const Matrix2<double> inverse = H_l.inverse();
     for (std::size_t i = 0; i < touched.size(); ++i) {
@@ -434,21 +424,18 @@ bool MovementAdjustment::solve(const Normal& normal, double damping, Eigen::Vect
     for (std::size_t i = 0; i < normal.touched[l].size(); ++i) {
       right -= normal.H_touched[l][i] * (*x)[normal.touched[l][i]];
     }
-    Matrix2<double> H_l = normal.H_landmark[l];
-    H_l.diagonal() *= 1 + damping;
-    (*x_landmark)[l] = H_l.inverse() * right;
+    (*x_landmark)[l] = damped(normal.H_landmark[l], damping).inverse() * right;
   }
   return x->allFinite();
 }
 
 void MovementAdjustment::apply(const Eigen::VectorXd& x,
                                const std::vector<Vector2<double>>& x_landmark) {
-  const int log_f = point_row(spline_.control_points());
   for (int i = 0; i < spline_.control_points(); ++i) {
     spline_.control_point(i) +=
         Vector3<double>(x[point_row(i)], x[point_row(i) + 1], x[log_f_unknown(i)]);
   }
-  for (int i = 0; i < 3 * kPlaces; ++i) beside_(i % 3, i / 3) += x[log_f + log_f_unknowns_ + i];
+  for (int i = 0; i < 3 * kPlaces; ++i) beside_(i % 3, i / 3) += x[first_beside() + i];
   for (std::size_t l = 0; l < landmarks_.size(); ++l) {
     landmarks_[l] = direction_plus<double>(landmarks_[l], x_landmark[l]).normalized();
   }

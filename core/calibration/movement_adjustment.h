@@ -91,7 +91,19 @@ class MovementAdjustment {
   };
 
   [[nodiscard]] ZoomMotionSpline::Basis basis(double time_s) const { return spline_.basis(time_s); }
+  // Between which two readings, and the second's share; before and after all of them the first and the last.
+  struct Passing {
+    std::size_t second;
+    double share;
+  };
+  [[nodiscard]] Passing passing_at(double time_s) const;
   [[nodiscard]] LensPlace lens_at(double time_s) const;
+  [[nodiscard]] Camera<double> camera_at(double log_f, const LensPlace& lens) const;
+  // k of a unit of corner distortion.
+  [[nodiscard]] double per_corner_at(double focal_length) const;
+  // Where log f and n begin among the unknowns.
+  [[nodiscard]] int first_log_f() const { return 2 * spline_.control_points(); }
+  [[nodiscard]] int first_beside() const { return first_log_f() + log_f_unknowns_; }
   [[nodiscard]] int log_f_unknown(int control_point) const;
   void set_places();
   void set_start();

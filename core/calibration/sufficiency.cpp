@@ -156,7 +156,7 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
   describe_weakest(result);
 
   std::vector<std::string> reasons;
-  const double f_error = parameter_sigma(c, Parameter::kFocalLength) / c.camera.focal_length;
+  const double f_error = relative_focal_length_sigma(c);
   const auto correlation = [&c](Parameter a, Parameter b) {
     const double scale = parameter_sigma(c, a) * parameter_sigma(c, b);
     return scale > 0 ? c.covariance(index(a), index(b)) / scale : 0.0;

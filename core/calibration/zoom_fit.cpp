@@ -149,9 +149,7 @@ std::vector<std::string> zoom_advice(const ZoomCurve& curve, double share) {
     const double end = content.reading[static_cast<std::size_t>(i)];
     Calibration c;
     if (!curve.at(0.5 * (begin + end), &c)) continue;
-    const double sigma =
-        std::sqrt(c.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength))) /
-        c.camera.focal_length;
+    const double sigma = relative_focal_length_sigma(c);
     if (sigma <= share) continue;
     constexpr double kPercent = 100;
     advice.push_back("zoom between readings " + short_text(begin) + " and " + short_text(end) +

@@ -101,6 +101,11 @@ struct Calibration {
   return std::sqrt(std::max(0.0, calibration.covariance(index(parameter), index(parameter))));
 }
 
+// Of the focal length over itself, which is that of its logarithm.
+[[nodiscard]] inline double relative_focal_length_sigma(const Calibration& calibration) {
+  return parameter_sigma(calibration, Parameter::kFocalLength) / calibration.camera.focal_length;
+}
+
 // Of any parameter that is a number by itself: all but the axes', which give 0, as they are counted from the axis.
 [[nodiscard]] inline double parameter_value(const Calibration& calibration, Parameter parameter) {
   switch (parameter) {

@@ -54,8 +54,7 @@ std::pair<double, double> sigmas_between(const ZoomCurve& curve) {
     const double reading = curve.first_reading() +
                            (curve.last_reading() - curve.first_reading()) * (i + 0.5) / kReadings;
     Calibration c;
-    if (curve.at(reading, &c))
-      sigmas.push_back(parameter_sigma(c, Parameter::kFocalLength) / c.camera.focal_length);
+    if (curve.at(reading, &c)) sigmas.push_back(relative_focal_length_sigma(c));
   }
   std::sort(sigmas.begin(), sigmas.end());
   if (sigmas.empty()) return {0, 0};
@@ -190,11 +189,13 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
   }
   const std::vector<MovementObservation> movements =
       observe_movements(jobs, calibration_of, calibrations, fit.curve);
-  ZoomFit with_movements;
-  if (fit_zoom(calibrations, movements, fit_options, &with_movements, &error)) {
-    fit = with_movements;
-  } else {
-    spdlog::warn("movements of the zoom are left out: {}", error);
+  if (!movements.empty()) {
+    ZoomFit with_movements;
+    if (fit_zoom(calibrations, movements, fit_options, &with_movements, &error)) {
+      fit = with_movements;
+    } else {
+      spdlog::warn("movements of the zoom are left out: {}", error);
+    }
   }
   for (const std::string& line : zoom_advice(fit.curve)) spdlog::warn("{}", line);
   const std::vector<Calibration> nodes = nodes_of(fit.curve);

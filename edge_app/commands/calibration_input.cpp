@@ -51,20 +51,23 @@ std::vector<ZoomReading> zoom_readings(const std::vector<PanTiltSample>& telemet
   return readings;
 }
 
-Tables part_of(const Tables& all, const ZoomStretch& stretch) {
+struct Span {
+  double begin_s;
+  double end_s;
+  [[nodiscard]] bool holds(double time_s) const { return time_s >= begin_s && time_s <= end_s; }
+};
+
+// Tracks are those of the part's frames that lie in `tracks`.
+Tables part_of(const Tables& all, const Span& frames, const Span& telemetry, const Span& tracks) {
   Tables part;
   std::unordered_set<std::int64_t> names;
   for (const FrameStamp& frame : all.frames) {
-    if (frame.receive_time_s < stretch.begin_s + kZoomMargin_s ||
-        frame.receive_time_s > stretch.end_s - kZoomMargin_s) {
-      continue;
-    }
+    if (!frames.holds(frame.receive_time_s)) continue;
     part.frames.push_back(frame);
-    names.insert(frame.frame);
+    if (tracks.holds(frame.receive_time_s)) names.insert(frame.frame);
   }
   for (const PanTiltSample& sample : all.telemetry) {
-    if (sample.latest_time_s >= stretch.begin_s && sample.latest_time_s <= stretch.end_s)
-      part.telemetry.push_back(sample);
+    if (telemetry.holds(sample.latest_time_s)) part.telemetry.push_back(sample);
   }
   for (const TrackPoint& point : all.tracks) {
     if (names.count(point.frame) > 0) part.tracks.push_back(point);
@@ -72,40 +75,26 @@ Tables part_of(const Tables& all, const ZoomStretch& stretch) {
   return part;
 }
 
+Tables part_of(const Tables& all, const ZoomStretch& stretch) {
+  const Span frames{stretch.begin_s + kZoomMargin_s, stretch.end_s - kZoomMargin_s};
+  return part_of(all, frames, {stretch.begin_s, stretch.end_s}, frames);
+}
+
 void fill(Tables tables, CalibrationJob* job);
 
 // From one stretch to the next; nothing without tracks of it.
 std::optional<ZoomMovement> movement_between(const Tables& all, const ZoomStretch& from,
                                              const ZoomStretch& to, CalibrationJob job) {
-  Tables part;
-  std::unordered_set<std::int64_t> names;
-  for (const FrameStamp& frame : all.frames) {
-    if (frame.receive_time_s < from.begin_s || frame.receive_time_s > to.end_s) continue;
-    part.frames.push_back(frame);
-    if (frame.receive_time_s >= from.end_s - 2 * kZoomMargin_s &&
-        frame.receive_time_s <= to.begin_s + 2 * kZoomMargin_s) {
-      names.insert(frame.frame);
-    }
-  }
-  for (const PanTiltSample& sample : all.telemetry) {
-    if (sample.latest_time_s >= from.begin_s && sample.latest_time_s <= to.end_s)
-      part.telemetry.push_back(sample);
-  }
-  for (const TrackPoint& point : all.tracks) {
-    if (names.count(point.frame) > 0) part.tracks.push_back(point);
-  }
+  const Span all_of_it{from.begin_s, to.end_s};
+  Tables part = part_of(all, all_of_it, all_of_it,
+                        {from.end_s - 2 * kZoomMargin_s, to.begin_s + 2 * kZoomMargin_s});
   if (part.tracks.empty()) return std::nullopt;
   ZoomMovement movement;
   movement.from = from;
   movement.to = to;
-  // As add_telemetry() has them: what a poll tells is of its middle.
   const bool polled = is_polled(part.telemetry);
   for (const PanTiltSample& sample : part.telemetry) {
-    const double width = sample.latest_time_s - sample.earliest_time_s;
-    if (sample.zoom) {
-      movement.readings.push_back(
-          {polled ? sample.latest_time_s - width / 2 : sample.latest_time_s, *sample.zoom});
-    }
+    if (sample.zoom) movement.readings.push_back({stamp_of(sample, polled), *sample.zoom});
   }
   fill(std::move(part), &job);
   movement.input = std::move(job.input);

@@ -114,6 +114,11 @@ bool is_polled(const std::vector<PanTiltSample>& samples) {
   });
 }
 
+double stamp_of(const PanTiltSample& sample, bool polled) {
+  const double width = sample.latest_time_s - sample.earliest_time_s;
+  return polled ? sample.latest_time_s - width / 2 : sample.latest_time_s;
+}
+
 void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
                    CalibrationOptions* options, std::vector<std::string>* remarks) {
   const bool polled = is_polled(samples);
@@ -136,8 +141,8 @@ void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
     if (stale[i]) continue;
     const PanTiltSample& sample = samples[i];
     const double width = sample.latest_time_s - sample.earliest_time_s;
-    const double stamp = polled ? sample.latest_time_s - width / 2 : sample.latest_time_s;
-    input->telemetry.push_back({stamp, sample.pan_rad, sample.tilt_rad, counts[i]});
+    input->telemetry.push_back(
+        {stamp_of(sample, polled), sample.pan_rad, sample.tilt_rad, counts[i]});
     square_widths += width * width;
     widths.push_back(width);
   }

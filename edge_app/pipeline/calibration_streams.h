@@ -23,6 +23,8 @@ namespace alidade {
 
 // Whether the samples are answers to questions, each of about when its stamps say, without a clock or count of the head's own.
 [[nodiscard]] bool is_polled(const std::vector<PanTiltSample>& samples);
+// When a sample was true, by its stamps: one of those that were polled in the middle of its interval.
+[[nodiscard]] double stamp_of(const PanTiltSample& sample, bool polled);
 
 // Frames into input->frames, and what is known of their stamps into *options; remarks get a line for what was left out.
 void add_frames(std::vector<FrameStamp> stamps, CalibrationInput* input,

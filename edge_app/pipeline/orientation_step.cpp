@@ -320,12 +320,10 @@ bool OrientationStep::look_up_lens(double telemetry_time_s, FrameLens* lens) {
 
 void OrientationStep::judge_reading(const FrameOrientation& found) {
   constexpr double kExcluded = 5;  // standard deviations
-  const int f = index(Parameter::kFocalLength);
   const Camera<double>& camera = found.calibration.camera;
   const double change = std::log(camera.focal_length / read_lens_.camera.focal_length);
-  const double sigma =
-      std::hypot(std::sqrt(found.calibration.covariance(f, f)) / camera.focal_length,
-                 std::sqrt(read_lens_.covariance(f, f)) / read_lens_.camera.focal_length);
+  const double sigma = std::hypot(relative_focal_length_sigma(found.calibration),
+                                  relative_focal_length_sigma(read_lens_));
   found_focal_length_ = std::abs(change) > kExcluded * sigma ? camera.focal_length : 0;
   found_rate_ = found.zoom_rate;
   found_time_s_ = lens_time_s_;

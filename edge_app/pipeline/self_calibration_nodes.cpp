@@ -94,8 +94,7 @@ void SelfCalibration::look_for_stored() {
   auto found = std::make_shared<PublishedCalibration>();
   const bool on_curve = nodes_.curve().at(*zoom_, &found->calibration) &&
                         (stored == nullptr || has_free_centre(stored->calibration));
-  const double f_sigma = parameter_sigma(found->calibration, Parameter::kFocalLength) /
-                         found->calibration.camera.focal_length;
+  const double f_sigma = relative_focal_length_sigma(found->calibration);
   const bool by_curve = on_curve && f_sigma <= kSharp;
   if (on_curve && !by_curve) {
     // The real-time thread has the curve, and follows points.

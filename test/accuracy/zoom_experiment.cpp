@@ -149,9 +149,7 @@ void judge_between(const ZoomRecording& truth, const ZoomCurve& curve, std::uint
     const double f = truth.zoom().nominal_lens(reading).focal_length;
     const double eps = truth.config().zoom->sigma_rep * normal(random);
     const double error = std::log(c.camera.focal_length / f);
-    const double sigma =
-        std::sqrt(c.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength))) /
-        c.camera.focal_length;
+    const double sigma = relative_focal_length_sigma(c);
     const double of_curve =
         std::sqrt(std::max(1e-18, sigma * sigma - std::pow(content.repeatability, 2)));
     errors->normalised.push_back((error - eps) / sigma);

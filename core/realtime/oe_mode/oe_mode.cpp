@@ -15,6 +15,14 @@ Vector2<double> by_lens(const Landmark& landmark, const LensScale& lens) {
   return landmark.sensitivity.cast<double>() * lens.direction;
 }
 
+// change: of angle, rate and acceleration.
+void add(const Vector6& change, FrameMotion<double>* motion) {
+  motion->angle = {motion->angle.pan + change[0], motion->angle.tilt + change[1]};
+  motion->rate = {motion->rate.pan + change[2], motion->rate.tilt + change[3]};
+  motion->acceleration = {motion->acceleration.pan + change[4],
+                          motion->acceleration.tilt + change[5]};
+}
+
 }  // namespace
 
 OeMode::OeMode(const OeOptions& options)
@@ -308,11 +316,7 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   const SolvedMotion& solved = solution.solved;
   const bool enclosed = frame_.telemetry == FrameTelemetry::kEnclosed;
   FrameMotion<double> motion = solution.motion;
-  motion.angle = {motion.angle.pan + solved.correction[0],
-                  motion.angle.tilt + solved.correction[1]};
-  motion.rate = {motion.rate.pan + solved.correction[2], motion.rate.tilt + solved.correction[3]};
-  motion.acceleration = {motion.acceleration.pan + solved.correction[4],
-                         motion.acceleration.tilt + solved.correction[5]};
+  add(solved.correction, &motion);
   if (columns_) motion.zoom_rate += solved.zoom.correction[1];
   shear_.move_to(motion.angle.tilt);
   if (frame_.telemetry == FrameTelemetry::kExtrapolated) {
@@ -384,11 +388,7 @@ void OeMode::add_lens(const SolvedLens& lens, FrameMotion<double>* in_base,
                       Sensitivity<6>* sensitivity) const {
   Vector6 by_lens = lens.motion_by_lens;
   by_lens.head<2>() += lens.offset_by_lens;
-  const Vector6 change = lens.value * by_lens;
-  in_base->angle = {in_base->angle.pan + change[0], in_base->angle.tilt + change[1]};
-  in_base->rate = {in_base->rate.pan + change[2], in_base->rate.tilt + change[3]};
-  in_base->acceleration = {in_base->acceleration.pan + change[4],
-                           in_base->acceleration.tilt + change[5]};
+  add(lens.value * by_lens, in_base);
   const ParameterDirection& direction = offset_.lens().direction;
   offset_.lens().make_independent(sensitivity);
   sensitivity->col(index(Parameter::kFocalLength)) +=
@@ -456,9 +456,7 @@ bool OeMode::take_lens(const FrameLens* lens) {
   } else if (reading_) {
     answers_calibration_ = reading_->calibration;
     // The movement that is carried on ends unseen; a reading that tells more is taken instead.
-    const double f = reading_->calibration.camera.focal_length;
-    const int of_f = index(Parameter::kFocalLength);
-    const double variance = reading_->calibration.covariance(of_f, of_f) / (f * f);
+    const double variance = std::pow(relative_focal_length_sigma(reading_->calibration), 2);
     if (!(predicted_lens_.covariance(0, 0) < variance)) predict_lens_by_reading();
   }
   return reading_.has_value() || is_young;
@@ -473,13 +471,11 @@ void OeMode::predict_lens(bool moves) {
 
 void OeMode::predict_lens_by_reading() {
   const Calibration& calibration = reading_->calibration;
-  const double f = calibration.camera.focal_length;
-  const int of_f = index(Parameter::kFocalLength);
   const LensScale& lens = offset_.lens();
   predicted_lens_ = {};
-  predicted_lens_.value << std::log(f) - lens.value, reading_->rate;
+  predicted_lens_.value << std::log(calibration.camera.focal_length) - lens.value, reading_->rate;
   predicted_lens_.covariance.diagonal()
-      << calibration.covariance(of_f, of_f) / (f * f) + lens.variance,
+      << std::pow(relative_focal_length_sigma(calibration), 2) + lens.variance,
       std::max(reading_->rate_sigma * reading_->rate_sigma, 1e-12);
   set_camera(zoomed(calibration.camera, -lens.value));
 }
@@ -503,10 +499,7 @@ OeMode::Solution OeMode::look_with_own_lens(FrameMotion<double> motion,
   if (out.status != SolveStatus::kOk) return out;
   const SolvedMotion& solved = out.solved;
   if (!(std::abs(solved.zoom.correction[0]) * half_diagonal_px() > kFar_px)) return out;
-  const Vector6& by = solved.correction;
-  motion.angle = {motion.angle.pan + by[0], motion.angle.tilt + by[1]};
-  motion.rate = {motion.rate.pan + by[2], motion.rate.tilt + by[3]};
-  motion.acceleration = {motion.acceleration.pan + by[4], motion.acceleration.tilt + by[5]};
+  add(solved.correction, &motion);
   motion.zoom_rate += solved.zoom.correction[1];
   set_camera(zoomed(calibration_.camera, solved.zoom.correction[0]));
   return solve_about(motion, predicted);
@@ -599,12 +592,11 @@ void OeMode::learn_own_lens(const Solution& solution, double zoom_rate) {
                  static_cast<int>(std::lround(LandmarkMap::kZoomsPerOctave * octaves))};
   statistics_.own_lens = true;
   if (!reading_) return;
-  const double f = reading_->calibration.camera.focal_length;
-  const int of_f = index(Parameter::kFocalLength);
+  const double told = std::log(reading_->calibration.camera.focal_length);
   const LensScale& lens = offset_.lens();
-  const double variance = reading_->calibration.covariance(of_f, of_f) / (f * f) + lens.variance;
-  statistics_.reading_sigmas =
-      std::abs(state.value[0] + lens.value - std::log(f)) / std::sqrt(variance);
+  const double variance =
+      std::pow(relative_focal_length_sigma(reading_->calibration), 2) + lens.variance;
+  statistics_.reading_sigmas = std::abs(state.value[0] + lens.value - told) / std::sqrt(variance);
   constexpr double kExcluded = 5;
   reading_contradicted_ = statistics_.reading_sigmas > kExcluded;
 }

@@ -140,6 +140,13 @@ Vector7 estimate_of(const SolvedMotion& solved) {
   return out;
 }
 
+Vector7 truth_of(const LensFrame& frame) {
+  Vector7 truth;
+  truth << frame.x, frame.phi;
+  truth.head<2>() += frame.g;
+  return truth;
+}
+
 Matrix7 covariance_of(const SolvedMotion& solved) {
   Vector7 with_lens;
   with_lens << by_lens_of(solved.lens), 1;
@@ -167,10 +174,7 @@ TEST(LensSolve, ErrsAsItsCovarianceSays) {
             LensFrame frame(world, static_cast<std::uint64_t>(run));
             SolvedMotion solved;
             ASSERT_EQ(frame.solve(&solved), SolveStatus::kOk);
-            Vector7 truth;
-            truth << frame.x, frame.phi;
-            truth.head<2>() += frame.g;
-            const Vector7 error = estimate_of(solved) - truth;
+            const Vector7 error = estimate_of(solved) - truth_of(frame);
             const double square = error.dot(covariance_of(solved).ldlt().solve(error));
             squares += square / kRuns;
             as_drawn += solved.inflation * square / kRuns;
@@ -202,10 +206,7 @@ TEST(LensSolve, ErrsAsItsCovarianceSaysWhereTheFrameHasALensOfItsOwn) {
           LensFrame frame(world, static_cast<std::uint64_t>(run));
           SolvedMotion solved;
           ASSERT_EQ(frame.solve(&solved), SolveStatus::kOk);
-          Vector7 truth;
-          truth << frame.x, frame.phi;
-          truth.head<2>() += frame.g;
-          const Vector7 error = estimate_of(solved) - truth;
+          const Vector7 error = estimate_of(solved) - truth_of(frame);
           squares += error.dot(covariance_of(solved).ldlt().solve(error)) / kRuns;
           const SolvedZoom& own = solved.zoom;
           const Vector2<double> own_error =
