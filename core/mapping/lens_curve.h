@@ -1,0 +1,100 @@
+#pragma once
+// LensCurve: a lens over its range of focal lengths, about what is thought of it beforehand.
+//   s        position: log f (f in px) as the zoom reading has it by a data sheet, or by an earlier calibration
+//   x(s)     = (delta, kappa, c_u, c_v), a cubic B-spline over s
+//   log f    = s + delta(s) + eps,  eps how the lens came to rest in that very picture
+//   k        = kappa (f / R)^2,     R half the image's diagonal, px: kappa is the distortion in the corner (core/model/zoom_curve.h)
+//   c        the optical centre from the image's middle, px
+// Beyond its ends x goes on as it is at the end. Linear in its control points. The constructor allocates.
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/model/camera.h"
+#include "core/model/cubic_spline.h"
+#include "core/model/rolling_shutter.h"
+
+namespace alidade {
+
+// delta, kappa, c_u, c_v
+inline constexpr int kLensQuantityCount = 4;
+using LensQuantities = Matrix<double, kLensQuantityCount, 1>;
+
+class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
+ public:
+  LensCurve() = default;
+
+  // Over log f from first to last, in segments of at most `spacing`; the same at all of them: that of `camera` but for its f.
+  LensCurve(const Camera<double>& camera, double first, double last, double spacing)
+      : CubicSpline(even_knots(first, last, spacing)),
+        width_(camera.width),
+        height_(camera.height),
+        aspect_(camera.aspect) {
+    const double to_corner = corner_px() / camera.focal_length;
+    const LensQuantities x(0, camera.radial_distortion * to_corner * to_corner, camera.centre_u,
+                           camera.centre_v);
+    for (int i = 0; i < control_points(); ++i) control_point(i) = x;
+  }
+
+  // Of one lens that does not zoom; f may be another nevertheless.
+  [[nodiscard]] static LensCurve of(const Camera<double>& camera) {
+    const double log_f = std::log(camera.focal_length);
+    return {camera, log_f - 0.01, log_f + 0.01, 1};
+  }
+
+  [[nodiscard]] int width() const { return width_; }
+  [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] double corner_px() const { return std::hypot(width_, height_) / 2; }
+
+  // The weights at s, held to the curve's range.
+  [[nodiscard]] Basis basis_at(double s) const { return basis(std::clamp(s, begin_s(), end_s())); }
+
+  [[nodiscard]] Camera<double> camera(double s, const LensQuantities& x, double eps) const {
+    Camera<double> out;
+    out.focal_length = std::exp(s + x[0] + eps);
+    out.aspect = aspect_;
+    const double per_corner = out.focal_length / corner_px();
+    out.radial_distortion = x[1] * per_corner * per_corner;
+    out.width = width_;
+    out.height = height_;
+    out.set_centre_offset(x.tail<2>());
+    return out;
+  }
+  [[nodiscard]] Camera<double> camera_at(double s, double eps = 0) const {
+    return camera(s, value(basis_at(s)), eps);
+  }
+
+  // The lens of a focal length, whatever reading belongs to it. J_camera_log: d (f, alpha, k, c_u, c_v) / d log f.
+  [[nodiscard]] Camera<double> camera_of(
+      double log_f, Matrix<double, kCameraParameterCount, 1>* J_camera_log = nullptr) const {
+    double s = log_f;
+    for (int step = 0; step < 4; ++step) s = log_f - value(basis_at(s))[0];
+    const Basis at = basis_at(s);
+    const LensQuantities x = value(at);
+    const Camera<double> out = camera(s, x, 0);
+    if (J_camera_log != nullptr) {
+      const bool inside = begin_s() < s && s < end_s();
+      const LensQuantities slope = inside ? derivative(at) : LensQuantities(LensQuantities::Zero());
+      const LensQuantities by_log = slope / (1 + slope[0]);
+      const double per_corner = out.focal_length / corner_px();
+      *J_camera_log << out.focal_length, 0,
+          2 * out.radial_distortion + by_log[1] * per_corner * per_corner, by_log[2], by_log[3];
+    }
+    return out;
+  }
+
+ private:
+  [[nodiscard]] static std::vector<double> even_knots(double first, double last, double spacing) {
+    const int segments = std::max(1, static_cast<int>(std::ceil((last - first) / spacing)));
+    std::vector<double> out;
+    for (int i = 0; i <= segments; ++i) out.push_back(first + (last - first) * i / segments);
+    return out;
+  }
+
+  int width_ = 0;
+  int height_ = 0;
+  double aspect_ = 1;
+};
+
+}  // namespace alidade

@@ -1,0 +1,76 @@
+#pragma once
+// Where a direction of the map is seen in one picture: written once, for localization and adjustment.
+//   u = project(camera at row v, M(v)^T R^T d),   R = R_base_from_camera when the reference row is exposed
+//   M(v) = Exp(w t), t = (v - reference row) * line delay,   camera at row v: log f more by zoom_rate t, the corner's distortion as it is
+// w is the camera's turn rate in its own frame, constant over a picture. The angles' rates are what is constant (rolling_shutter.h);
+// the difference is second order in the turn during one read-out. v is the row that was measured: errors of it move t, see
+// reprojection_error_covariance() of rolling_shutter.h. No allocation.
+
+#include "core/model/camera.h"
+#include "core/model/rolling_shutter.h"
+#include "core/model/rotation.h"
+
+namespace alidade {
+
+struct PictureMotion {
+  Vector3<double> angular_velocity = Vector3<double>::Zero();  // w, camera frame, rad/s
+  double zoom_rate = 0;                                        // d log f / dt, 1/s
+  double line_delay = 0;                                       // s/row, any sign
+  double reference_row = 0;                                    // px
+
+  [[nodiscard]] double time_of_row(double v) const { return (v - reference_row) * line_delay; }
+};
+
+struct MapProjection {
+  Vector2<double> u;                                        // px
+  Vector2<double> J_u_row;                                  // the image's motion per row
+  Matrix<double, 2, 3> J_u_xi;                              // of R Exp(xi)
+  Matrix<double, 2, 3> J_u_d;                               // of d in base
+  Matrix<double, 2, kCameraParameterCount> J_u_camera;      // of the camera at the reference row
+};
+
+[[nodiscard]] inline ProjectionStatus project_from_map(const Camera<double>& camera,
+                                                       const PictureMotion& motion,
+                                                       const Matrix3<double>& R_base_from_camera,
+                                                       double row, const Vector3<double>& d_b,
+                                                       MapProjection* out) {
+  const double time = motion.time_of_row(row);
+  const Vector3<double> d_reference = R_base_from_camera.transpose() * d_b;
+  const bool turns = time != 0 && !motion.angular_velocity.isZero(0);
+  const Matrix3<double> R_row_from_reference =
+      turns ? exp_so3(Vector3<double>(-time * motion.angular_velocity))
+            : Matrix3<double>(Matrix3<double>::Identity());
+  const Vector3<double> d_row = R_row_from_reference * d_reference;
+  const bool zooms = motion.zoom_rate != 0;
+  const Camera<double> at_row = zooms ? zoomed(camera, motion.zoom_rate * time) : camera;
+  Matrix<double, 2, 3> J_u_row_frame;
+  const ProjectionStatus status =
+      project(at_row, d_row, &out->u, &J_u_row_frame, &out->J_u_camera);
+  if (status != ProjectionStatus::kOk) return status;
+  Vector2<double> J_u_time = J_u_row_frame * (skew(d_row) * motion.angular_velocity);
+  if (zooms) {
+    J_u_time += motion.zoom_rate * by_zoom(at_row, out->J_u_camera);
+    refer_to_reference_row(camera, at_row, &out->J_u_camera);
+  }
+  out->J_u_row = motion.line_delay * J_u_time;
+  const Matrix<double, 2, 3> J_u_reference = J_u_row_frame * R_row_from_reference;
+  out->J_u_xi = J_u_reference * skew(d_reference);
+  out->J_u_d = J_u_reference * R_base_from_camera.transpose();
+  return ProjectionStatus::kOk;
+}
+
+// The direction that a pixel shows, unit length, base.
+[[nodiscard]] inline ProjectionStatus unproject_to_map(const Camera<double>& camera,
+                                                       const PictureMotion& motion,
+                                                       const Matrix3<double>& R_base_from_camera,
+                                                       const Vector2<double>& u,
+                                                       Vector3<double>* d_b) {
+  const double time = motion.time_of_row(u.y());
+  Vector3<double> d_row;
+  const ProjectionStatus status = unproject(zoomed(camera, motion.zoom_rate * time), u, &d_row);
+  if (status != ProjectionStatus::kOk) return status;
+  *d_b = R_base_from_camera * (exp_so3(Vector3<double>(time * motion.angular_velocity)) * d_row);
+  return ProjectionStatus::kOk;
+}
+
+}  // namespace alidade

@@ -1,0 +1,91 @@
+#include "core/mapping/feature_matching.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <random>
+#include <set>
+
+namespace alidade::test {
+namespace {
+
+// As far apart as descriptors of different things are.
+std::vector<Descriptor> random_descriptors(int count, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::exponential_distribution<double> value(1.0 / 35);
+  std::vector<Descriptor> out(static_cast<std::size_t>(count));
+  for (Descriptor& descriptor : out) {
+    for (std::uint8_t& entry : descriptor) {
+      entry = static_cast<std::uint8_t>(std::min(255.0, value(random)));
+    }
+  }
+  return out;
+}
+
+std::vector<Descriptor> noisy(std::vector<Descriptor> descriptors, double sigma, unsigned seed) {
+  std::mt19937_64 random(seed);
+  std::normal_distribution<double> noise(0, sigma);
+  for (Descriptor& descriptor : descriptors) {
+    for (std::uint8_t& entry : descriptor) {
+      entry = static_cast<std::uint8_t>(std::clamp(entry + noise(random), 0.0, 255.0));
+    }
+  }
+  return descriptors;
+}
+
+TEST(FeatureMatching, FindsWhatIsTheSameButForNoise) {
+  const std::vector<Descriptor> indexed = random_descriptors(1500, 1);
+  std::vector<Descriptor> queries = noisy(indexed, 6, 2);
+  std::reverse(queries.begin(), queries.end());
+  const std::vector<FeatureMatch> matches = FeatureIndex(indexed).match(queries);
+  int right = 0;
+  for (const FeatureMatch& match : matches) right += match.query + match.indexed == 1499 ? 1 : 0;
+  EXPECT_GE(right, 1350);
+  EXPECT_LE(static_cast<int>(matches.size()) - right, 5);
+}
+
+TEST(FeatureMatching, BelievesNothingOfWhatIsThereTwice) {
+  std::vector<Descriptor> indexed = random_descriptors(300, 3);
+  const std::vector<Descriptor> again = noisy(indexed, 6, 4);
+  indexed.insert(indexed.end(), again.begin(), again.end());
+  const std::vector<Descriptor> queries = noisy(random_descriptors(300, 3), 6, 5);
+  EXPECT_LE(FeatureIndex(indexed).match(queries).size(), 15U);
+}
+
+TEST(FeatureMatching, GivesEachIndexedFeatureToOneQuery) {
+  const std::vector<Descriptor> indexed = random_descriptors(200, 6);
+  std::vector<Descriptor> queries = noisy(indexed, 12, 7);
+  const std::vector<Descriptor> nearer = noisy(indexed, 3, 8);
+  queries.insert(queries.end(), nearer.begin(), nearer.end());
+  std::set<int> taken;
+  int of_nearer = 0;
+  for (const FeatureMatch& match : FeatureIndex(indexed).match(queries)) {
+    EXPECT_TRUE(taken.insert(match.indexed).second);
+    of_nearer += match.query >= 200 ? 1 : 0;
+  }
+  EXPECT_GE(of_nearer, 190);
+}
+
+TEST(FeatureMatching, IsTheSameEachTime) {
+  const std::vector<Descriptor> indexed = random_descriptors(500, 9);
+  const std::vector<Descriptor> queries = noisy(indexed, 25, 10);
+  const auto pairs = [&] {
+    std::vector<std::pair<int, int>> out;
+    for (const FeatureMatch& match : FeatureIndex(indexed).match(queries)) {
+      out.emplace_back(match.query, match.indexed);
+    }
+    return out;
+  };
+  const auto first = pairs();
+  ASSERT_FALSE(first.empty());
+  EXPECT_EQ(first, pairs());
+}
+
+TEST(FeatureMatching, OfNothingOrOneThereAreNone) {
+  EXPECT_TRUE(FeatureIndex({}).match(random_descriptors(5, 1)).empty());
+  EXPECT_TRUE(FeatureIndex(random_descriptors(1, 1)).match(random_descriptors(1, 1)).empty());
+  EXPECT_TRUE(FeatureIndex(random_descriptors(50, 1)).match({}).empty());
+}
+
+}  // namespace
+}  // namespace alidade::test
