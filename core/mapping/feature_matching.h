@@ -13,8 +13,9 @@
 namespace alidade {
 
 struct MatchOptions {
-  double ratio = 0.8;  // of the distances to nearest and second nearest, above which nothing is believed
-  int checks = 64;     // leaves of the trees that are looked at for each
+  double ratio =
+      0.8;  // of the distances to nearest and second nearest, above which nothing is believed
+  int checks = 64;  // leaves of the trees that are looked at for each
 };
 
 struct FeatureMatch {

@@ -35,10 +35,11 @@ struct FeatureSet {
 };
 
 struct FeatureOptions {
-  int max_features = 1000;           // 1 or more
-  int cells = 8;                     // a side: each cell of the image has the same right to features
+  int max_features = 1000;  // 1 or more
+  int cells = 8;            // a side: each cell of the image has the same right to features
   double contrast_threshold = 0.02;  // SIFT's; 0.04 is OpenCV's own
-  double least_distance_px = 1.5;    // of two features; SIFT gives some blobs two orientations: one is kept
+  double least_distance_px =
+      1.5;  // of two features; SIFT gives some blobs two orientations: one is kept
 };
 
 class FeatureDetector {

@@ -68,11 +68,16 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
   // The lens of a focal length, whatever reading belongs to it. J_camera_log: d (f, alpha, k, c_u, c_v) / d log f.
   [[nodiscard]] Camera<double> camera_of(
       double log_f, Matrix<double, kCameraParameterCount, 1>* J_camera_log = nullptr) const {
+    // A contraction: delta changes slowly.
     double s = log_f;
-    for (int step = 0; step < 4; ++step) s = log_f - value(basis_at(s))[0];
+    for (int step = 0; step < 30; ++step) {
+      const double before = s;
+      s = log_f - value(basis_at(s))[0];
+      if (std::abs(s - before) < 1e-13) break;
+    }
     const Basis at = basis_at(s);
     const LensQuantities x = value(at);
-    const Camera<double> out = camera(s, x, 0);
+    const Camera<double> out = camera(s, x, log_f - s - x[0]);
     if (J_camera_log != nullptr) {
       const bool inside = begin_s() < s && s < end_s();
       const LensQuantities slope = inside ? derivative(at) : LensQuantities(LensQuantities::Zero());

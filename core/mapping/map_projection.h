@@ -22,11 +22,11 @@ struct PictureMotion {
 };
 
 struct MapProjection {
-  Vector2<double> u;                                        // px
-  Vector2<double> J_u_row;                                  // the image's motion per row
-  Matrix<double, 2, 3> J_u_xi;                              // of R Exp(xi)
-  Matrix<double, 2, 3> J_u_d;                               // of d in base
-  Matrix<double, 2, kCameraParameterCount> J_u_camera;      // of the camera at the reference row
+  Vector2<double> u;                                    // px
+  Vector2<double> J_u_row;                              // the image's motion per row
+  Matrix<double, 2, 3> J_u_xi;                          // of R Exp(xi)
+  Matrix<double, 2, 3> J_u_d;                           // of d in base
+  Matrix<double, 2, kCameraParameterCount> J_u_camera;  // of the camera at the reference row
 };
 
 [[nodiscard]] inline ProjectionStatus project_from_map(const Camera<double>& camera,
@@ -44,8 +44,7 @@ struct MapProjection {
   const bool zooms = motion.zoom_rate != 0;
   const Camera<double> at_row = zooms ? zoomed(camera, motion.zoom_rate * time) : camera;
   Matrix<double, 2, 3> J_u_row_frame;
-  const ProjectionStatus status =
-      project(at_row, d_row, &out->u, &J_u_row_frame, &out->J_u_camera);
+  const ProjectionStatus status = project(at_row, d_row, &out->u, &J_u_row_frame, &out->J_u_camera);
   if (status != ProjectionStatus::kOk) return status;
   Vector2<double> J_u_time = J_u_row_frame * (skew(d_row) * motion.angular_velocity);
   if (zooms) {

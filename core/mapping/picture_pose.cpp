@@ -18,7 +18,8 @@ using internal::two_point_pose;
 using internal::TwoPointPose;
 
 constexpr double kHuber_sigmas = 2.5;
-constexpr double kSureEnough = 1e-6;  // probability that no two inliers have been drawn, at which drawing ends
+constexpr double kSureEnough =
+    1e-6;  // probability that no two inliers have been drawn, at which drawing ends
 
 // Pose and lens as they are adjusted.
 struct PoseState {
@@ -28,10 +29,10 @@ struct PoseState {
 };
 
 struct Residual {
-  Vector2<double> error;         // px, seen less predicted
-  Matrix<double, 2, 4> J;        // of the prediction, by xi and log f
-  Matrix2<double> information;   // 1/px^2
-  double square = 0;             // of the error in its sigmas
+  Vector2<double> error;        // px, seen less predicted
+  Matrix<double, 2, 4> J;       // of the prediction, by xi and log f
+  Matrix2<double> information;  // 1/px^2
+  double square = 0;            // of the error in its sigmas
 };
 
 bool residual_of(const PoseMatch& match, const PoseKnowledge& knowledge, const PoseState& state,
@@ -47,8 +48,7 @@ bool residual_of(const PoseMatch& match, const PoseKnowledge& knowledge, const P
   const Matrix<double, 2, 2> J_u_tangent = seen.J_u_d * tangent_basis(match.d_b);
   const Matrix2<double> of_pixel = reprojection_error_covariance<double>(
       seen.J_u_row, match.sigma_px * match.sigma_px * Matrix2<double>::Identity());
-  const Matrix2<double> covariance =
-      of_pixel + J_u_tangent * match.cov_d * J_u_tangent.transpose();
+  const Matrix2<double> covariance = of_pixel + J_u_tangent * match.cov_d * J_u_tangent.transpose();
   out->information = covariance.inverse();
   out->square = out->error.dot(out->information * out->error);
   return std::isfinite(out->square);
@@ -112,14 +112,15 @@ Consensus best_pose(const std::vector<PoseMatch>& matches, const std::vector<int
     const auto pose = two_point_pose(a, b, knowledge);
     if (!pose || !agrees_with_knowledge(*pose, knowledge, options)) continue;
     inliers.clear();
-    const double cost = cost_of(matches, candidates, knowledge, *pose, options.threshold_px, least,
-                                &inliers);
+    const double cost =
+        cost_of(matches, candidates, knowledge, *pose, options.threshold_px, least, &inliers);
     if (!(cost < least)) continue;
     least = cost;
     best.pose = *pose;
     best.inliers = inliers;
     // Far-apart twos are needed: half of the good ones lie too near to each other to tell.
-    const double share = static_cast<double>(inliers.size()) / static_cast<double>(candidates.size());
+    const double share =
+        static_cast<double>(inliers.size()) / static_cast<double>(candidates.size());
     const double good = std::clamp(0.5 * share * share, 1e-9, 1 - 1e-9);
     needed = static_cast<int>(std::min<double>(
         options.max_trials,
@@ -134,8 +135,8 @@ double chance_log10(std::size_t matches, std::size_t inliers, double radius_px,
                     const LensCurve& lens) {
   const double n = static_cast<double>(matches);
   const double k = static_cast<double>(inliers);
-  const double p =
-      std::min(1.0, 3.14159 * radius_px * radius_px / (lens.width() * static_cast<double>(lens.height())));
+  const double p = std::min(
+      1.0, 3.14159 * radius_px * radius_px / (lens.width() * static_cast<double>(lens.height())));
   const double log_choices = std::lgamma(n + 1) - std::lgamma(k + 1) - std::lgamma(n - k + 1);
   return (log_choices + (k - 2) * std::log(p) + 2 * std::log(n)) / std::log(10.0);
 }
@@ -167,7 +168,7 @@ struct NormalEquations {
 
 NormalEquations normal_equations(const std::vector<PoseMatch>& matches,
                                  const std::vector<int>& inliers, const PoseKnowledge& knowledge,
-                                 const PoseState& state) {
+                                 const PoseState& state, double noise) {
   NormalEquations out;
   Matrix<double, kCameraParameterCount, 1> J_camera_log;
   const Camera<double> camera = knowledge.lens.camera_of(state.log_f, &J_camera_log);
@@ -179,9 +180,9 @@ NormalEquations normal_equations(const std::vector<PoseMatch>& matches,
       continue;
     }
     const double size = std::sqrt(residual.square);
-    const double weight = size <= kHuber_sigmas ? 1 : kHuber_sigmas / size;
-    out.cost += size <= kHuber_sigmas ? residual.square
-                                      : kHuber_sigmas * (2 * size - kHuber_sigmas);
+    const double bend = kHuber_sigmas * noise;
+    const double weight = size <= bend ? 1 : bend / size;
+    out.cost += size <= bend ? residual.square : bend * (2 * size - bend);
     const Matrix<double, 4, 2> weighted = weight * residual.J.transpose() * residual.information;
     out.N += weighted * residual.J;
     out.b += weighted * residual.error;
@@ -227,10 +228,10 @@ PoseState moved(const PoseKnowledge& knowledge, const PoseState& state,
 
 // Levenberg-Marquardt; false: no minimum.
 bool adjust(const std::vector<PoseMatch>& matches, const std::vector<int>& inliers,
-            const PoseKnowledge& knowledge, PoseState* state) {
+            const PoseKnowledge& knowledge, double noise, PoseState* state) {
   constexpr int kMaxSteps = 30;
   double damping = 1e-6;
-  NormalEquations at = normal_equations(matches, inliers, knowledge, *state);
+  NormalEquations at = normal_equations(matches, inliers, knowledge, *state, noise);
   for (int step = 0; step < kMaxSteps; ++step) {
     const auto A = directions_of_change(knowledge, *state);
     Eigen::MatrixXd N = A.transpose() * at.N * A;
@@ -239,7 +240,7 @@ bool adjust(const std::vector<PoseMatch>& matches, const std::vector<int>& inlie
     const Eigen::VectorXd change = N.ldlt().solve(b);
     if (!change.allFinite() || change.norm() > 10) return false;
     const PoseState next = moved(knowledge, *state, change);
-    const NormalEquations there = normal_equations(matches, inliers, knowledge, next);
+    const NormalEquations there = normal_equations(matches, inliers, knowledge, next, noise);
     const double gained = at.cost - there.cost;
     if (gained >= 0) {
       *state = next;
@@ -252,6 +253,27 @@ bool adjust(const std::vector<PoseMatch>& matches, const std::vector<int>& inlie
     if (damping > 1e6) return true;
   }
   return true;
+}
+
+// How much larger the residuals are than claimed, 1 at least: by their median, which wrong ones hardly move. With a gate by the
+// claim alone, what is left of larger noise would look calm.
+double noise_of(const std::vector<PoseMatch>& matches, const std::vector<int>& inliers,
+                const PoseKnowledge& knowledge, const PoseState& state) {
+  Matrix<double, kCameraParameterCount, 1> J_camera_log;
+  const Camera<double> camera = knowledge.lens.camera_of(state.log_f, &J_camera_log);
+  std::vector<double> squares;
+  Residual residual;
+  for (const int i : inliers) {
+    if (residual_of(matches[static_cast<std::size_t>(i)], knowledge, state, camera, J_camera_log,
+                    &residual)) {
+      squares.push_back(residual.square);
+    }
+  }
+  if (squares.empty()) return 1;
+  const auto middle = squares.begin() + static_cast<std::ptrdiff_t>(squares.size() / 2);
+  std::nth_element(squares.begin(), middle, squares.end());
+  const double median_of_two = 2 * std::log(2.0);  // of chi-square with two degrees of freedom
+  return std::max(1.0, std::sqrt(*middle / median_of_two));
 }
 
 std::vector<int> within_gate(const std::vector<PoseMatch>& matches,
@@ -348,18 +370,20 @@ PicturePose find_pose(const std::vector<PoseMatch>& matches, const PoseKnowledge
     state.R = R_base_from_camera(*knowledge.mechanics, state.angle);
   }
   out.inliers = best.inliers;
+  double noise = 1;
   // Two matches' pose misses some that the adjusted one finds.
   for (const double gate : {4 * options.gate_sigmas, 1.5 * options.gate_sigmas, options.gate_sigmas,
                             options.gate_sigmas}) {
-    if (!adjust(matches, out.inliers, knowledge, &state)) {
+    if (!adjust(matches, out.inliers, knowledge, noise, &state)) {
       out.status = PoseStatus::kNotDetermined;
       return out;
     }
-    out.inliers = within_gate(matches, candidates, knowledge, state, gate);
+    noise = noise_of(matches, out.inliers, knowledge, state);
+    out.inliers = within_gate(matches, candidates, knowledge, state, gate * noise);
     if (out.inliers.size() < least_inliers) return out;
   }
-  out.chance_log10 = chance_log10(candidates.size(), out.inliers.size(), options.threshold_px,
-                                  knowledge.lens);
+  out.chance_log10 =
+      chance_log10(candidates.size(), out.inliers.size(), options.threshold_px, knowledge.lens);
   out.status = PoseStatus::kByChance;
   if (out.chance_log10 > options.most_chance_log10) return out;
   out.status = layout_status(matches, out.inliers, knowledge, options);
@@ -376,7 +400,7 @@ PicturePose find_pose(const std::vector<PoseMatch>& matches, const PoseKnowledge
     out.status = PoseStatus::kRival;
     return out;
   }
-  const NormalEquations at = normal_equations(matches, out.inliers, knowledge, state);
+  const NormalEquations at = normal_equations(matches, out.inliers, knowledge, state, noise);
   if (!covariance_of(at, knowledge, state, &out)) {
     out.status = PoseStatus::kNotDetermined;
     return out;

@@ -21,10 +21,10 @@
 namespace alidade {
 
 struct PoseMatch {
-  Vector2<double> u;                                    // px
-  double sigma_px = 0.2;                                // of each coordinate of u; above 0
-  Vector3<double> d_b;                                  // unit direction of the landmark, base
-  Matrix2<double> cov_d = Matrix2<double>::Zero();      // in tangent_basis(d_b), rad^2
+  Vector2<double> u;                                // px
+  double sigma_px = 0.2;                            // of each coordinate of u; above 0
+  Vector3<double> d_b;                              // unit direction of the landmark, base
+  Matrix2<double> cov_d = Matrix2<double>::Zero();  // in tangent_basis(d_b), rad^2
 };
 
 struct FocalLengthPrior {
@@ -43,14 +43,17 @@ struct PoseKnowledge {
 };
 
 struct PoseOptions {
-  int max_trials = 2000;          // twos of matches
-  double threshold_px = 3;        // a match further off is no inlier of two matches' pose
-  double gate_sigmas = 4;         // nor of the adjusted one, in its own sigmas
-  double roll_tolerance = 0.05;   // rad: what two matches' noise makes of the mount's roll
+  int max_trials = 2000;    // twos of matches
+  double threshold_px = 3;  // a match further off is no inlier of two matches' pose
+  double gate_sigmas =
+      4;  // nor of the adjusted one, in its own sigmas times the noise that was found
+  double roll_tolerance = 0.05;  // rad: what two matches' noise makes of the mount's roll
   int least_inliers = 8;
-  double least_spread = 0.03;     // rms of the inliers along their narrow side, of the image's width
-  double most_chance_log10 = -6;  // of as many inliers among matches by chance, times the poses tried
-  double rival_share = 0.5;       // another pose with so many of the inliers, among the rest: which one is right?
+  double least_spread = 0.03;  // rms of the inliers along their narrow side, of the image's width
+  double most_chance_log10 =
+      -6;  // of as many inliers among matches by chance, times the poses tried
+  double rival_share =
+      0.5;  // another pose with so many of the inliers, among the rest: which one is right?
   std::uint64_t seed = 1;
 };
 
@@ -72,12 +75,13 @@ struct PicturePose {
   PoseStatus status = PoseStatus::kTooFewMatches;
   Matrix3<double> R_base_from_camera = Matrix3<double>::Identity();
   double log_f = 0;
-  Matrix4<double> covariance = Matrix4<double>::Zero();  // of xi in R Exp(xi) (camera frame, rad), log f
-  Camera<double> camera;                                 // of log_f
-  std::optional<PanTilt<double>> angle;                  // true angles, with a mount
-  std::vector<int> inliers;                              // of the matches, increasing
-  double noise_scale = 0;    // root mean square of the residuals in their sigmas
-  double chance_log10 = 0;   // see most_chance_log10
+  Matrix4<double> covariance =
+      Matrix4<double>::Zero();           // of xi in R Exp(xi) (camera frame, rad), log f
+  Camera<double> camera;                 // of log_f
+  std::optional<PanTilt<double>> angle;  // true angles, with a mount
+  std::vector<int> inliers;              // of the matches, increasing
+  double noise_scale = 0;                // root mean square of the residuals in their sigmas
+  double chance_log10 = 0;               // see most_chance_log10
   int trials = 0;
 };
 

@@ -45,10 +45,11 @@ TEST(FeatureMatching, FindsWhatIsTheSameButForNoise) {
 }
 
 TEST(FeatureMatching, BelievesNothingOfWhatIsThereTwice) {
-  std::vector<Descriptor> indexed = random_descriptors(300, 3);
-  const std::vector<Descriptor> again = noisy(indexed, 6, 4);
+  const std::vector<Descriptor> things = random_descriptors(300, 3);
+  std::vector<Descriptor> indexed = noisy(things, 6, 11);
+  const std::vector<Descriptor> again = noisy(things, 6, 4);
   indexed.insert(indexed.end(), again.begin(), again.end());
-  const std::vector<Descriptor> queries = noisy(random_descriptors(300, 3), 6, 5);
+  const std::vector<Descriptor> queries = noisy(things, 6, 5);
   EXPECT_LE(FeatureIndex(indexed).match(queries).size(), 15U);
 }
 
