@@ -61,6 +61,18 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
     out.set_centre_offset(x.tail<2>());
     return out;
   }
+  // d (f, alpha, k, c_u, c_v) / d x, of a camera of this lens; the first column is by eps, too.
+  [[nodiscard]] Matrix<double, kCameraParameterCount, kLensQuantityCount> J_camera_x(
+      const Camera<double>& camera) const {
+    const double per_corner = camera.focal_length / corner_px();
+    Matrix<double, kCameraParameterCount, kLensQuantityCount> J;
+    J << camera.focal_length, 0, 0, 0,                                //
+        0, 0, 0, 0,                                                   //
+        2 * camera.radial_distortion, per_corner * per_corner, 0, 0,  //
+        0, 0, 1, 0,                                                   //
+        0, 0, 0, 1;
+    return J;
+  }
   [[nodiscard]] Camera<double> camera_at(double s, double eps = 0) const {
     return camera(s, value(basis_at(s)), eps);
   }

@@ -1,0 +1,71 @@
+#pragma once
+// The terms of map_adjustment.h as Ceres' cost functions, with their Jacobians.
+// A picture's block is (xi, eps) with R = R_start Exp(xi); a landmark's the change of its start direction; the lens's are control points.
+
+#include <ceres/sized_cost_function.h>
+
+#include "core/mapping/map_adjustment.h"
+
+namespace alidade::internal {
+
+inline constexpr int kPictureBlock = 4;
+
+// Parameters: picture, landmark, the four control points that act at the picture's position. Residuals: error over sigma.
+class SeenCost
+    : public ceres::SizedCostFunction<2, kPictureBlock, 2, kLensQuantityCount, kLensQuantityCount,
+                                      kLensQuantityCount, kLensQuantityCount> {
+ public:
+  // All but the observation have to live as long as this; of lens nothing but its shape is used.
+  SeenCost(const MapPicture* picture, const LensCurve* lens, const Vector3<double>* d_start,
+           const MapObservation& seen);
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  const MapPicture* picture_;
+  const LensCurve* lens_;
+  const Vector3<double>* d_start_;
+  Vector2<double> u_;
+  double sigma_px_;
+  LensCurve::Basis basis_;
+};
+
+// Telemetry and eps of a picture.
+class PicturePriorCost : public ceres::SizedCostFunction<4, kPictureBlock> {
+ public:
+  PicturePriorCost(const Matrix3<double>& R_start, const std::optional<OrientationPrior>& telemetry,
+                   double eps_sigma);
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  Matrix3<double> R_prior_from_start_;
+  Matrix3<double> root_information_;  // 0 without telemetry
+  double eps_sigma_;
+};
+
+// (x - level) / sigma
+class LensLevelCost : public ceres::SizedCostFunction<kLensQuantityCount, kLensQuantityCount> {
+ public:
+  LensLevelCost(const LensQuantities& level, const LensQuantities& sigma)
+      : level_(level), sigma_(sigma) {}
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  LensQuantities level_, sigma_;
+};
+
+// (x_a - 2 x_b + x_c) / sigma
+class LensBendCost : public ceres::SizedCostFunction<kLensQuantityCount, kLensQuantityCount,
+                                                     kLensQuantityCount, kLensQuantityCount> {
+ public:
+  explicit LensBendCost(const LensQuantities& sigma) : sigma_(sigma) {}
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  LensQuantities sigma_;
+};
+
+}  // namespace alidade::internal
