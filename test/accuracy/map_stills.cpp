@@ -26,8 +26,6 @@ constexpr int kColumns = 5;
 constexpr int kRows = 4;
 constexpr double kWide_px = 1200;
 constexpr double kTele_px = 24000;
-constexpr int kBornInPicture =
-    100;  // directions that are drawn in each picture; others see them, too
 constexpr double kSmallest_px = 1.5;
 constexpr double kLargest_px = 12;
 
