@@ -61,20 +61,41 @@ bool is_usable(const MapEvidence& evidence, const MapOptions& options) {
       });
 }
 
-// Directions that the start values give, the mean of all pictures that see them.
-std::vector<Vector3<double>> start_directions(const MapEvidence& evidence, const LensCurve& lens) {
-  std::vector<Vector3<double>> out(static_cast<std::size_t>(evidence.landmarks),
-                                   Vector3<double>::Zero());
-  for (const MapObservation& seen : evidence.observations) {
+// Directions that the start values give: of each landmark the mean of those that most agree with; of length 0 where there is none.
+// `agrees`: the observations of that mean. What is elsewhere has no part in the adjustment: a landmark between two pictures that
+// look apart may have no pixel in either.
+std::vector<Vector3<double>> start_directions(const MapEvidence& evidence,
+                                              const MapOptions& options,
+                                              std::vector<bool>* agrees) {
+  std::vector<Vector3<double>> seen_at;
+  std::vector<std::vector<std::size_t>> of_landmark(static_cast<std::size_t>(evidence.landmarks));
+  for (std::size_t i = 0; i < evidence.observations.size(); ++i) {
+    const MapObservation& seen = evidence.observations[i];
     const MapPicture& picture = evidence.pictures[static_cast<std::size_t>(seen.picture)];
-    Vector3<double> d;
-    if (unproject_to_map(lens.camera_at(picture.position), picture.motion, picture.R_start, seen.u,
-                         &d) == ProjectionStatus::kOk) {
-      out[static_cast<std::size_t>(seen.landmark)] += d;
+    Vector3<double> d = Vector3<double>::Zero();
+    if (unproject_to_map(options.lens.camera_at(picture.position), picture.motion, picture.R_start,
+                         seen.u, &d) == ProjectionStatus::kOk) {
+      of_landmark[static_cast<std::size_t>(seen.landmark)].push_back(i);
     }
+    seen_at.push_back(d);
   }
-  for (Vector3<double>& d : out) {
-    if (d.norm() > 1e-6) d.normalize();
+  agrees->assign(evidence.observations.size(), false);
+  std::vector<Vector3<double>> out(of_landmark.size(), Vector3<double>::Zero());
+  for (std::size_t j = 0; j < out.size(); ++j) {
+    std::vector<std::size_t> best;
+    for (const std::size_t a : of_landmark[j]) {
+      std::vector<std::size_t> near;
+      for (const std::size_t b : of_landmark[j]) {
+        if ((seen_at[a] - seen_at[b]).norm() < options.most_start_error) near.push_back(b);
+      }
+      if (near.size() > best.size()) best = std::move(near);
+      if (best.size() == of_landmark[j].size()) break;
+    }
+    for (const std::size_t i : best) {
+      out[j] += seen_at[i];
+      (*agrees)[i] = true;
+    }
+    if (!best.empty()) out[j].normalize();
   }
   return out;
 }
@@ -346,10 +367,10 @@ MapAdjustment adjust_map(const MapEvidence& evidence, const MapOptions& options)
   state.pictures.assign(evidence.pictures.size(), Vector4<double>::Zero());
   state.landmarks.assign(static_cast<std::size_t>(evidence.landmarks), Vector2<double>::Zero());
   state.lens = options.lens;
-  state.d_start = start_directions(evidence, options.lens);
+  std::vector<bool> agrees;
+  state.d_start = start_directions(evidence, options, &agrees);
 
-  const std::vector<bool> all(evidence.observations.size(), true);
-  std::vector<bool> used = tied(evidence, state, all);
+  std::vector<bool> used = tied(evidence, state, agrees);
   const auto pictures = static_cast<int>(evidence.pictures.size());
   const auto hangs_together = [&] {
     out.groups = connected_pictures(pictures, seen_in(evidence, used), options.least_common);

@@ -54,6 +54,8 @@ struct MapOptions {
   // Sigmas of a control point's delta, kappa, c_u, c_v about the beginning, and of second differences of neighbouring ones.
   LensQuantities level_sigma{0.05, 0.1, 30, 30};
   LensQuantities bend_sigma{0.02, 0.02, 3, 3};
+  double most_start_error =
+      0.1;                 // rad, of a direction that orientation and lens give to begin with
   double gate_sigmas = 4;  // times the noise that was found
   int least_common = 8;    // landmarks that two pictures need in common to hang together
   int max_steps = 100;     // of each adjustment

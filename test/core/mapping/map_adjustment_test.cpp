@@ -153,6 +153,26 @@ TEST(MapAdjustment, WithoutTelemetryKeepsTheFirstOrientationAndFindsTheRest) {
   }
 }
 
+// Between two pictures that look apart, a landmark has no pixel in either.
+TEST(MapAdjustment, WrongMatchesAcrossTheSceneAreLeftOut) {
+  SmallMap map = small_map(15, 0);
+  const auto right = static_cast<int>(map.evidence.observations.size());
+  for (int i = 0; i < 12; ++i) {
+    const int landmark = map.evidence.landmarks++;
+    map.evidence.observations.push_back({3 * (i % 2), landmark, {20.0 + 10 * i, 300}});
+    map.evidence.observations.push_back({12 + i % 6, landmark, {1000, 50.0 * i}});
+  }
+  MapOptions options = small_options();
+  for (int i = 0; i < options.lens.control_points(); ++i) options.lens.control_point(i)[1] = -0.03;
+  const MapAdjustment found = adjust_map(map.evidence, options);
+  ASSERT_EQ(found.status, MapStatus::kOk) << to_string(found.status);
+  ASSERT_GE(found.left_out.size(), 24U);
+  for (int i = 0; i < 24; ++i) {
+    EXPECT_EQ(found.left_out[found.left_out.size() - 24 + static_cast<std::size_t>(i)], right + i);
+  }
+  EXPECT_LT(square_of_all(map, found) / 72, 1 + 4 * std::sqrt(2 / 72.0));
+}
+
 TEST(MapAdjustment, NamesThePicturesThatDoNotConnect) {
   const SmallMap map = small_map(12, 0, -2.5);
   const MapAdjustment found = adjust_map(map.evidence, small_options());
