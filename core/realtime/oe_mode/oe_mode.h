@@ -28,19 +28,18 @@
 // Where the calibration's focal length is that of a zoom curve it is learnt too, from the first frame on, and the answer's
 // calibration has it (lens_scale.h); landmarks follow.
 // Such a lens may move, too: with what is known of it from frame to frame (FrameLens), frames solve log f and its rate besides
-// (lens_track.h), and landmarks are looked for in the octaves in which they have about their size. The map stays; it begins with a lens at rest.
+// (lens_follower.h), and landmarks are looked for in the octaves in which they have about their size. The map stays; it begins with a lens at rest.
 // Fixed memory, taken by the constructor; nothing else allocates, waits or throws. One thread.
 
-#include <cmath>
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 
 #include "core/model/calibration.h"
 #include "core/realtime/frame_orientation.h"
 #include "core/realtime/image/image_view.h"
 #include "core/realtime/oe_mode/frame_lens.h"
 #include "core/realtime/oe_mode/landmark_map.h"
+#include "core/realtime/oe_mode/lens_follower.h"
 #include "core/realtime/oe_mode/map_state.h"
 #include "core/realtime/oe_mode/oe_options.h"
 #include "core/realtime/oe_mode/processed_frame.h"
@@ -116,7 +115,7 @@ class OeMode {
                                  FrameOrientation* out);
 
   // Whether the map was begun with another lens than the frame last processed had, or that lens moved.
-  [[nodiscard]] bool lens_has_moved() const { return track_.active(); }
+  [[nodiscard]] bool lens_has_moved() const { return lens_.follows(); }
 
   // Map upkeep with the frame last processed; does nothing where that had no sure orientation.
   void maintain();
@@ -151,8 +150,7 @@ class OeMode {
   };
 
   [[nodiscard]] SearchedFrame searched() const {
-    return {calibration_,          map_, pyramid_, octaves_, columns_ ? &*columns_ : nullptr,
-            columns_ && !at_rest()};
+    return {calibration_, map_, pyramid_, octaves_, lens_.columns(), lens_.moves()};
   }
   void begin_frame(const ImageView& image, double frame_time_s,
                    const InterpolatedPanTilt* telemetry);
@@ -176,15 +174,8 @@ class OeMode {
   }
   void begin_lens();
   // The lens of this frame. False: nothing to begin a map with, or to look for one.
-  [[nodiscard]] bool take_lens(const FrameLens* lens);
-  // Without a rate for some frames, or a reading that it moves: a lens that moved stands.
-  [[nodiscard]] bool at_rest() const { return frames_at_rest_ >= kAtRest; }
-  void predict_lens(bool moves);
-  void predict_lens_by_reading();
+  [[nodiscard]] bool take_lens(const FrameLens* reading);
   void set_camera(const Camera<double>& camera);
-  [[nodiscard]] double half_diagonal_px() const {
-    return 0.5 * std::hypot(calibration_.camera.width, calibration_.camera.height);
-  }
   [[nodiscard]] Solution look_with_own_lens(FrameMotion<double> motion,
                                             const PredictedMotion& predicted);
   [[nodiscard]] Solution look_for_moved_lens(const Solution& first,
@@ -203,8 +194,6 @@ class OeMode {
   void clear_landmarks();
   void forget_map();
 
-  static constexpr int kAtRest = 3;  // frames
-
   OeOptions options_;
   Calibration given_;  // by reset()
   FocalLength focal_length_ = FocalLength::kCalibrated;
@@ -221,22 +210,13 @@ class OeMode {
   MotionPrediction prediction_;
   LandmarkSearch search_;
   MapOffsetFilter offset_;
-  LensTrack track_;
+  LensFollower lens_;
   MapShear shear_;
   MapUpkeep upkeep_;
   LandmarkMaker maker_;
-  VisibleLandmarks in_view_;  // of maintain()
-  double share_of_new_ = 0;   // of the landmarks in view, made by the maintain() before
-
-  // Of the frame's lens, where it is not the map's.
-  std::optional<FrameLens> reading_;  // of the frame
-  std::optional<LensColumns> columns_;
-  LensTrack::State predicted_lens_;
-  int frames_at_rest_ = 0;                // in a row
-  int frames_lost_ = 0;                   // in a row
-  bool reading_contradicted_ = false;     // by the frame that landmarks held last
-  double cells_focal_length_ = 1;         // px, that the map's cells are for
-  double last_reading_focal_length_ = 1;  // px, by the last reading
+  VisibleLandmarks in_view_;       // of maintain()
+  double share_of_new_ = 0;        // of the landmarks in view, made by the maintain() before
+  double cells_focal_length_ = 1;  // px, that the map's cells are for
 
   OeStatistics statistics_;
   ProcessedFrame frame_;  // process() writes it, maintain() uses it up

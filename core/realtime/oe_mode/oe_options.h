@@ -4,7 +4,7 @@
 #include "core/realtime/image/image_noise.h"
 #include "core/realtime/oe_mode/landmark_maker.h"
 #include "core/realtime/oe_mode/landmark_search.h"
-#include "core/realtime/oe_mode/lens_track.h"
+#include "core/realtime/oe_mode/lens_follower.h"
 #include "core/realtime/oe_mode/map_offset_filter.h"
 #include "core/realtime/oe_mode/map_shear.h"
 #include "core/realtime/oe_mode/map_upkeep.h"
@@ -41,7 +41,7 @@ struct OeOptions {
   LandmarkSearchOptions search;
   LookOptions look;
   MapOffsetOptions offset;
-  LensTrackOptions lens;
+  LensFollowerOptions lens;
   MapShearOptions shear;
   MapUpkeepOptions upkeep;
   LandmarkMakerOptions maker;

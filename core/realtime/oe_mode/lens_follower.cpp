@@ -1,0 +1,163 @@
+#include "core/realtime/oe_mode/lens_follower.h"
+
+#include <algorithm>
+
+namespace alidade {
+namespace {
+
+constexpr int kOfFocalLength = index(Parameter::kFocalLength);
+constexpr int kOfDistortion = index(Parameter::kRadialDistortion);
+
+double half_diagonal_px(const Camera<double>& camera) {
+  return 0.5 * std::hypot(camera.width, camera.height);
+}
+
+}  // namespace
+
+bool LensFollowerOptions::validate(const char** error) const {
+  const char* problem = nullptr;
+  if (!(centre_change_px >= 0)) problem = "centre_change_px must not be negative";
+  if (!(distortion_change >= 0)) problem = "distortion_change must not be negative";
+  if (frames_lost_for_good < 1) problem = "frames_lost_for_good must be at least 1";
+  if (!(excluded_sigmas > 0)) problem = "excluded_sigmas must be positive";
+  if (!(resting_sigmas > 0)) problem = "resting_sigmas must be positive";
+  if (frames_at_rest < 1) problem = "frames_at_rest must be at least 1";
+  if (error != nullptr && problem != nullptr) *error = problem;
+  return problem == nullptr && track.validate(error);
+}
+
+void LensFollower::begin(double focal_length) {
+  last_reading_focal_length_ = focal_length;
+  track_.reset();
+  columns_.reset();
+  reading_contradicted_ = false;
+  frames_lost_ = 0;
+}
+
+void LensFollower::begin_frame(const FrameLens* reading) {
+  reading_.reset();
+  if (reading == nullptr) return;
+  reading_ = *reading;
+  last_reading_focal_length_ = reading->calibration.camera.focal_length;
+  if (reading->moves) frames_at_rest_ = 0;
+}
+
+void LensFollower::follow(double time_s, double focal_length) {
+  track_.begin(time_s, std::log(focal_length));
+  frames_at_rest_ = 0;
+}
+
+void LensFollower::give_up() {
+  track_.reset();
+  columns_.reset();
+}
+
+Camera<double> LensFollower::expect_after_last(double time_s, bool may_move, const LensScale& scale,
+                                               const Camera<double>& latest) {
+  expected_ = track_.predicted(time_s, may_move);
+  scale.make_independent(&expected_.sensitivity);
+  const Camera<double>& camera = reading_ ? reading_->calibration.camera : latest;
+  return zoomed(camera, expected_.value[0] - std::log(camera.focal_length));
+}
+
+Camera<double> LensFollower::expect_by_reading(const LensScale& scale) {
+  const Calibration& calibration = reading_->calibration;
+  expected_ = {};
+  expected_.value << std::log(calibration.camera.focal_length) - scale.value, reading_->rate;
+  expected_.covariance.diagonal() << reading_variance(scale),
+      std::max(reading_->rate_sigma * reading_->rate_sigma, 1e-12);
+  return zoomed(calibration.camera, -scale.value);
+}
+
+// Of log f at phi = 0.
+double LensFollower::reading_variance(const LensScale& scale) const {
+  return std::pow(relative_focal_length_sigma(reading_->calibration), 2) + scale.variance;
+}
+
+bool LensFollower::reading_tells_more(double time_s) const {
+  if (!reading_ || (reading_contradicted_ && is_young(time_s))) return false;
+  // The movement that is carried on ends unseen.
+  const double variance = std::pow(relative_focal_length_sigma(reading_->calibration), 2);
+  return !(expected_.covariance(0, 0) < variance);
+}
+
+void LensFollower::answer_unseen(double time_s, const LensScale& scale,
+                                 const Camera<double>& camera, Calibration* answer) const {
+  if (reading_) *answer = reading_->calibration;
+  if (!is_young(time_s) || (reading_ && !reading_contradicted_)) return;
+  // What images told lately is worth more.
+  answer->camera = zoomed(camera, scale.value);
+  const double f = answer->camera.focal_length;
+  answer->covariance(kOfFocalLength, kOfFocalLength) =
+      f * f * (expected_.covariance(0, 0) + scale.variance);
+}
+
+ZoomPrior LensFollower::prior(const Camera<double>& camera, double zoom_rate) const {
+  ZoomPrior out;
+  out.value = expected_.value - Vector2<double>(std::log(camera.focal_length), zoom_rate);
+  out.covariance = expected_.covariance;
+  out.sensitivity = expected_.sensitivity;
+  return out;
+}
+
+LearntLens LensFollower::learn(double time_s, const SolvedZoom& zoom, double focal_length,
+                               double zoom_rate, const LensScale& scale) {
+  const LensTrack::State state{
+      {std::log(focal_length), zoom_rate}, zoom.covariance, zoom.sensitivity};
+  frames_lost_ = 0;
+  track_.learn(time_s, !at_rest(), expected_, state);
+  const bool rests =
+      (!reading_ || !reading_->moves) &&
+      std::abs(zoom_rate) < options_.resting_sigmas * std::sqrt(zoom.covariance(1, 1));
+  frames_at_rest_ = rests ? std::min(frames_at_rest_ + 1, options_.frames_at_rest) : 0;
+  LearntLens out;
+  out.lens.used = true;
+  out.lens.covariance = zoom.covariance;
+  out.lens.sensitivity = zoom.sensitivity;
+  if (!reading_) return out;
+  const double told = std::log(reading_->calibration.camera.focal_length);
+  out.reading_sigmas =
+      std::abs(state.value[0] + scale.value - told) / std::sqrt(reading_variance(scale));
+  reading_contradicted_ = out.reading_sigmas > options_.excluded_sigmas;
+  return out;
+}
+
+Calibration LensFollower::answer(const Calibration& calibration, const OwnLens& own,
+                                 const LensScale& scale, double phi, double variance,
+                                 const Sensitivity<1>& sensitivity) const {
+  if (!columns_ || !own.used) return scale.at(calibration, phi, variance, sensitivity);
+  // The frame's own errors besides, in its last row as in its middle one.
+  const double half_s = calibration.line_delay * (0.5 * calibration.camera.height);
+  const double of_lens = own.covariance(0, 0) + half_s * half_s * own.covariance(1, 1);
+  Sensitivity<1> of_it = own.sensitivity.row(0);
+  scale.make_independent(&of_it);
+  // Without a reading distortion and centre are those of the last one.
+  const double since =
+      reading_ ? 0 : std::log(calibration.camera.focal_length / last_reading_focal_length_);
+  const double unknown = options_.distortion_change * since;
+  Calibration out =
+      scale.at(calibration, phi, variance + of_lens + unknown * unknown, sensitivity + of_it);
+  if (reading_) {
+    // Distortion and centre err as much as the curve says of this zoom, or as they did with the map's lens.
+    ParameterDirection factors = ParameterDirection::Ones();
+    ParameterCovariance<double> in_frame = scale.others;
+    columns_->to_frame(&in_frame);
+    for (const Parameter p :
+         {Parameter::kRadialDistortion, Parameter::kCentreU, Parameter::kCentreV}) {
+      const double before = in_frame(index(p), index(p));
+      const double there = reading_->calibration.covariance(index(p), index(p));
+      if (before > 0 && there > before) factors[index(p)] = std::sqrt(there / before);
+    }
+    out.covariance = (factors.asDiagonal() * out.covariance * factors.asDiagonal()).eval();
+  }
+  columns_->to_frame(&out.covariance);
+  const double of_corner =
+      std::pow(out.camera.focal_length / half_diagonal_px(calibration.camera), 2);
+  out.covariance(kOfDistortion, kOfDistortion) += std::pow(unknown * of_corner, 2);
+  for (const Parameter p : {Parameter::kCentreU, Parameter::kCentreV}) {
+    out.covariance(index(p), index(p)) += std::pow(options_.centre_change_px * since, 2);
+  }
+  return out;
+}
+
+}  // namespace alidade
