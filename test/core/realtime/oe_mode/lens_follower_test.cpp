@@ -211,10 +211,11 @@ TEST_F(FollowedLens, StandsAfterThreeFramesWithoutARate) {
   follow();
   const FrameLens rests = told(kMapFocalLength);
   const FrameLens moves = told(kMapFocalLength, true);
-  const double l = std::log(kMapFocalLength);
+  double l = std::log(kMapFocalLength);
   int k = 0;
   const auto frame = [&](const FrameLens& reading, double rate) {
     ++k;
+    l += kFrame_s * rate;
     expect(k * kFrame_s, &reading, !follower_.at_rest());
     static_cast<void>(learn(k * kFrame_s, {l, rate}));
   };
@@ -237,11 +238,17 @@ TEST_F(FollowedLens, StandsAfterThreeFramesWithoutARate) {
 
 TEST_F(FollowedLens, DoubtsDistortionAndCentreWithoutAReading) {
   follow();
-  const double far = std::log(1.5);
-  const LearntLens learnt = [&] {
-    expect(kFrame_s, nullptr);
-    return learn(kFrame_s, {std::log(kMapFocalLength) + far, 0});
-  }();
+  Vector2<double> truth(std::log(kMapFocalLength), 0);
+  LearntLens learnt;
+  for (int k = 1; k <= 40; ++k) {
+    const double rate = 0.04 * std::min(k, 40 - k);
+    truth[0] += kFrame_s * (truth[1] + rate) / 2;
+    truth[1] = rate;
+    expect(k * kFrame_s, nullptr);
+    learnt = learn(k * kFrame_s, truth);
+  }
+  const double far = truth[0] - std::log(kMapFocalLength);
+  ASSERT_NEAR(far, 0.64, 1e-9);
   const Calibration blind = answer(learnt.lens);
   const FrameLens reading = told(camera_.focal_length);
   follower_.begin_frame(&reading);
@@ -251,11 +258,22 @@ TEST_F(FollowedLens, DoubtsDistortionAndCentreWithoutAReading) {
   };
   const LensFollowerOptions options;
   const double of_corner = std::pow(camera_.focal_length / std::hypot(640, 360), 2);
+  const double unknown = options.distortion_change * far;
   EXPECT_NEAR(more(Parameter::kCentreU), options.centre_change_px * far, 1e-3);
   EXPECT_NEAR(more(Parameter::kCentreV), options.centre_change_px * far, 1e-3);
-  EXPECT_NEAR(more(Parameter::kRadialDistortion) / of_corner, options.distortion_change * far,
-              2e-3 * far);
-  EXPECT_GT(log_variance(blind), std::pow(options.distortion_change * far, 2));
+  // Of the corner itself, and of log f, which takes the corner's 2 % along.
+  EXPECT_NEAR(more(Parameter::kRadialDistortion) / of_corner, unknown * std::hypot(1, 2 * 0.02),
+              1e-3 * unknown);
+  EXPECT_NEAR(log_variance(blind) - log_variance(read), unknown * unknown,
+              1e-3 * unknown * unknown);
+  // Where the map is begun anew with the lens that it is, none of that is unknown.
+  follower_.begin(camera_.focal_length);
+  follower_.begin_frame(nullptr);
+  follower_.look_through(scale_, camera_);
+  const Calibration anew = answer(learnt.lens);
+  EXPECT_NEAR(anew.covariance(index(Parameter::kCentreU), index(Parameter::kCentreU)),
+              read.covariance(index(Parameter::kCentreU), index(Parameter::kCentreU)), 1e-12);
+  EXPECT_NEAR(log_variance(anew), log_variance(read), 1e-15);
 }
 
 TEST_F(FollowedLens, IsGivenUpAfterFramesWithoutLandmarksWhereItsReadingStands) {
