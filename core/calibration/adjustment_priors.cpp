@@ -29,7 +29,7 @@ PriorKnowledge prior_knowledge(int width, int height, const CalibrationOptions& 
     set(Parameter::kAspect, options.aspect->sigma / options.aspect->value);
   }
   if (options.radial_distortion) {
-    const double unit = std::pow(mean.camera.focal_length / mean.half_diagonal(), 2);
+    const double unit = mean.camera.distortion_of_corner();
     mean.distortion = options.radial_distortion->value / unit;
     set(Parameter::kRadialDistortion, options.radial_distortion->sigma / unit);
   }

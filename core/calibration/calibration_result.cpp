@@ -67,7 +67,7 @@ ParameterCovariance<double> physical_covariance(const Calibration& c, const Cloc
   const int d = index(Parameter::kClockOffset);
   J(f, f) = c.camera.focal_length;
   J(index(Parameter::kAspect), index(Parameter::kAspect)) = c.camera.aspect;
-  J(k, k) = std::pow(c.camera.focal_length / state.half_diagonal(), 2);
+  J(k, k) = c.camera.distortion_of_corner();
   J(k, f) = 2 * c.camera.radial_distortion;
   if (!shares.line_delay_known) {
     J(l, l) = (1 + shares.image_rate) / c.camera.height;

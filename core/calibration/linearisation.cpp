@@ -25,7 +25,7 @@ struct ObservationModel {
       : camera(state.physical_camera()),
         mechanics(state.mechanics),
         line_delay(state.line_delay()),
-        distortion_unit(std::pow(state.camera.focal_length / state.half_diagonal(), 2)) {
+        distortion_unit(state.camera.distortion_of_corner()) {
     J_xi_axes_anchor.setZero();
     R_base_from_anchor =
         R_base_from_camera(state.mechanics, state.anchor, nullptr, &J_xi_axes_anchor);
@@ -113,13 +113,9 @@ void add_control_points(const TrajectorySpline::Basis& basis, const Matrix2<doub
 
 }  // namespace
 
-double AdjustmentState::half_diagonal() const {
-  return 0.5 * std::hypot(camera.width, camera.height);
-}
-
 Camera<double> AdjustmentState::physical_camera() const {
   Camera<double> physical = camera;
-  physical.radial_distortion = distortion * std::pow(camera.focal_length / half_diagonal(), 2);
+  physical.radial_distortion = distortion * camera.distortion_of_corner();
   return physical;
 }
 

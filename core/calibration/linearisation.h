@@ -68,7 +68,6 @@ struct AdjustmentState {
   PanTilt<double> anchor;
   std::vector<Vector3<double>> landmarks;
 
-  [[nodiscard]] double half_diagonal() const;
   [[nodiscard]] Camera<double> physical_camera() const;
   [[nodiscard]] double line_delay() const { return readout_s / camera.height; }
 };

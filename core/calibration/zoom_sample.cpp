@@ -31,8 +31,7 @@ int zoom_place_of(Parameter parameter) {
 ZoomSample make_zoom_sample(const Calibration& c, const Calibration& reference) {
   ZoomSample sample;
   sample.reading = *c.zoom;
-  const double per_corner =
-      std::pow(2 * c.camera.focal_length / std::hypot(c.camera.width, c.camera.height), 2);
+  const double per_corner = c.camera.distortion_of_corner();
   sample.value.head<kZoomQuantityCount>() << std::log(c.camera.focal_length),
       c.camera.radial_distortion / per_corner, c.camera.centre_u, c.camera.centre_v;
   for (const Parameter p : {Parameter::kAspect, Parameter::kLineDelay, Parameter::kPanScale,

@@ -54,22 +54,20 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
     Camera<double> out;
     out.focal_length = std::exp(s + x[0] + eps);
     out.aspect = aspect_;
-    const double per_corner = out.focal_length / corner_px();
-    out.radial_distortion = x[1] * per_corner * per_corner;
     out.width = width_;
     out.height = height_;
+    out.radial_distortion = x[1] * out.distortion_of_corner();
     out.set_centre_offset(x.tail<2>());
     return out;
   }
   // d (f, alpha, k, c_u, c_v) / d x, of a camera of this lens; the first column is by eps, too.
   [[nodiscard]] Matrix<double, kCameraParameterCount, kLensQuantityCount> J_camera_x(
       const Camera<double>& camera) const {
-    const double per_corner = camera.focal_length / corner_px();
     Matrix<double, kCameraParameterCount, kLensQuantityCount> J;
-    J << camera.focal_length, 0, 0, 0,                                //
-        0, 0, 0, 0,                                                   //
-        2 * camera.radial_distortion, per_corner * per_corner, 0, 0,  //
-        0, 0, 1, 0,                                                   //
+    J << camera.focal_length, 0, 0, 0,                                      //
+        0, 0, 0, 0,                                                         //
+        2 * camera.radial_distortion, camera.distortion_of_corner(), 0, 0,  //
+        0, 0, 1, 0,                                                         //
         0, 0, 0, 1;
     return J;
   }
@@ -94,9 +92,8 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
       const bool inside = begin_s() < s && s < end_s();
       const LensQuantities slope = inside ? derivative(at) : LensQuantities(LensQuantities::Zero());
       const LensQuantities by_log = slope / (1 + slope[0]);
-      const double per_corner = out.focal_length / corner_px();
       *J_camera_log << out.focal_length, 0,
-          2 * out.radial_distortion + by_log[1] * per_corner * per_corner, by_log[2], by_log[3];
+          2 * out.radial_distortion + by_log[1] * out.distortion_of_corner(), by_log[2], by_log[3];
     }
     return out;
   }

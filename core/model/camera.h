@@ -46,6 +46,11 @@ struct Camera {
   [[nodiscard]] Vector2<S> optical_centre() const {
     return {S(width) / S(2) + centre_u, S(height) / S(2) + centre_v};
   }
+  // (f / R)^2, R half the image's diagonal, px: k of a lens whose distortion in the corner, kappa, is 1.
+  [[nodiscard]] S distortion_of_corner() const {
+    const S per_corner = focal_length / S(0.5 * std::hypot(width, height));
+    return per_corner * per_corner;
+  }
 };
 
 // f, alpha, k, c_u, c_v: the first of Parameter.

@@ -157,8 +157,7 @@ class ZoomCurve {
     *out = c_.shared;
     Camera<double>& camera = out->camera;
     camera.focal_length = std::exp(y[0]);
-    const double per_corner =
-        std::pow(2 * camera.focal_length / std::hypot(camera.width, camera.height), 2);
+    const double per_corner = camera.distortion_of_corner();
     camera.radial_distortion = per_corner * y[1];
     camera.set_centre_offset(y.tail<2>());
     Matrix4<double> J = Matrix4<double>::Identity();  // of f, k, c by y

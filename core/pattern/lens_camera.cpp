@@ -81,8 +81,7 @@ std::optional<Fit> fit(const std::vector<GridPoint>& part, const Camera<double>&
   Eigen::VectorXd error(rows);
   for (int step = 0; step < kSteps; ++step) {
     Camera<double>& camera = result.camera;
-    const double k_unit =
-        std::pow(camera.focal_length / (0.5 * std::hypot(camera.width, camera.height)), 2);
+    const double k_unit = camera.distortion_of_corner();
     for (std::size_t i = 0; i < part.size(); ++i) {
       const Vector3<double> d = R * part[i].d;
       Vector2<double> u;

@@ -8,10 +8,6 @@ namespace {
 constexpr int kOfFocalLength = index(Parameter::kFocalLength);
 constexpr int kOfDistortion = index(Parameter::kRadialDistortion);
 
-double half_diagonal_px(const Camera<double>& camera) {
-  return 0.5 * std::hypot(camera.width, camera.height);
-}
-
 }  // namespace
 
 bool LensFollowerOptions::validate(const char** error) const {
@@ -151,9 +147,8 @@ Calibration LensFollower::answer(const Calibration& calibration, const OwnLens& 
     out.covariance = (factors.asDiagonal() * out.covariance * factors.asDiagonal()).eval();
   }
   columns_->to_frame(&out.covariance);
-  const double of_corner =
-      std::pow(out.camera.focal_length / half_diagonal_px(calibration.camera), 2);
-  out.covariance(kOfDistortion, kOfDistortion) += std::pow(unknown * of_corner, 2);
+  out.covariance(kOfDistortion, kOfDistortion) +=
+      std::pow(unknown * out.camera.distortion_of_corner(), 2);
   for (const Parameter p : {Parameter::kCentreU, Parameter::kCentreV}) {
     out.covariance(index(p), index(p)) += std::pow(options_.centre_change_px * since, 2);
   }

@@ -313,7 +313,6 @@ bool OeMode::take_lens(const FrameLens* reading) {
       // A map begins with a lens at rest: of one that moves its landmarks would be sheared unawares.
       given_ = reading->calibration;
       reset(given_, focal_length_);
-      lens_.begin_frame(reading);
       return !reading->moves;
     }
     lens_.follow(frame_.time_s - prediction_.since_last_s(frame_.time_s),

@@ -82,7 +82,7 @@ class Shared final : public ceres::EvaluationCallback {
     camera = state_.camera;
     camera.focal_length = std::exp(blocks_.lens[0]);
     camera.aspect = std::exp(blocks_.log_aspect);
-    distortion_unit = std::pow(camera.focal_length / state_.half_diagonal(), 2);
+    distortion_unit = camera.distortion_of_corner();
     camera.radial_distortion = blocks_.lens[1] * distortion_unit;
     line_delay = blocks_.timing[0] / camera.height;
     mechanics.pan_axis = blocks_.pan_axis;

@@ -296,22 +296,5 @@ TEST_F(FollowedLens, IsGivenUpAfterFramesWithoutLandmarksWhereItsReadingStands) 
   EXPECT_FALSE(follower_.is_lost_for_good()) << "landmarks hold";
 }
 
-TEST(LensFollower, RefusesOptionsThatMakeNoSense) {
-  EXPECT_TRUE(LensFollowerOptions{}.validate());
-  for (const auto& spoil : {+[](LensFollowerOptions* o) { o->track.drift = -1; },
-                            +[](LensFollowerOptions* o) { o->frames_at_rest = 0; },
-                            +[](LensFollowerOptions* o) { o->resting_sigmas = 0; },
-                            +[](LensFollowerOptions* o) { o->excluded_sigmas = std::nan(""); },
-                            +[](LensFollowerOptions* o) { o->frames_lost_for_good = 0; },
-                            +[](LensFollowerOptions* o) { o->distortion_change = -1; },
-                            +[](LensFollowerOptions* o) { o->centre_change_px = std::nan(""); }}) {
-    LensFollowerOptions options;
-    spoil(&options);
-    const char* error = nullptr;
-    EXPECT_FALSE(options.validate(&error));
-    EXPECT_NE(error, nullptr);
-  }
-}
-
 }  // namespace
 }  // namespace alidade::test

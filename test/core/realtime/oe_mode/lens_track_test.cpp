@@ -83,19 +83,5 @@ TEST(LensTrack, TakesWhatLandmarksSayAtRestForOneAnswer) {
   EXPECT_LT(track.state().value[0], value + 0.5e-5);
 }
 
-TEST(LensTrack, RefusesOptionsThatMakeNoSense) {
-  EXPECT_TRUE(LensTrackOptions{}.validate());
-  for (const auto& spoil :
-       {+[](LensTrackOptions* o) { o->acceleration = 0; },
-        +[](LensTrackOptions* o) { o->drift = -1; }, +[](LensTrackOptions* o) { o->longest_s = 0; },
-        +[](LensTrackOptions* o) { o->least_sigma = std::nan(""); }}) {
-    LensTrackOptions options;
-    spoil(&options);
-    const char* error = nullptr;
-    EXPECT_FALSE(options.validate(&error));
-    EXPECT_NE(error, nullptr);
-  }
-}
-
 }  // namespace
 }  // namespace alidade::test
