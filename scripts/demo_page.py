@@ -3,7 +3,7 @@
 
     demo_page.py RUN_LOG PICTURE      RUN_LOG: where the program says which address it listens on
 
-Without a browser (chromium-driver and python3-selenium, which `scripts/install-deps all` installs) there is no picture: exit status 0.
+Without a browser (chromium-driver and python3-selenium, which `scripts/install-deps page` installs) there is no picture: exit status 0.
 """
 import re
 import shutil
@@ -23,7 +23,7 @@ def main():
     except ImportError:
         driver = None
     if driver is None:
-        print("no picture of the status page: no browser (scripts/install-deps all installs one)", file=sys.stderr)
+        print("no picture of the status page: no browser (scripts/install-deps page installs one)", file=sys.stderr)
         return
     end = time.monotonic() + DEADLINE_S
     address = None
