@@ -48,7 +48,7 @@ constexpr bool has_a_row_for_each_head() {
   }
   return true;
 }
-static_assert(has_a_row_for_each_head(), "kHeads, HeadType and HeadOptions must have one order");
+static_assert(has_a_row_for_each_head(), "kHeads and HeadType must have one order");
 
 }  // namespace internal
 

@@ -9,6 +9,7 @@
 #include <unistd.h>
 
 #include <httplib.h>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <cstdio>
@@ -19,6 +20,7 @@
 #include <vector>
 
 #include "test/simulator/servers/av_client.h"
+#include "test/simulator/servers/simulated_head.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {
@@ -214,6 +216,12 @@ TEST(VirtualCameraProgram, TellsItsZoomByEveryProtocolThatHasOne) {
   const std::vector<Head> heads{
       {"visca", "\x81\x09\x04\x47\xFF"s, "\x90\x50\x02\x00\x00\x00\xFF"s},
       {"pelco_d", "\xFF\x01\x00\x55\x00\x00\x56"s, "\xFF\x01\x00\x5D\x80\x00\xDE"s}};
+  for (const HeadModel& model : kHeadModels) {
+    const bool is_tried = std::any_of(heads.begin(), heads.end(), [&](const Head& head) {
+      return std::string(model.name) == head.name;
+    });
+    EXPECT_EQ(is_tried, model.tele_zoom != 0) << model.name;
+  }
   for (const Head& head : heads) {
     const TemporaryDirectory directory;
     Child child(
