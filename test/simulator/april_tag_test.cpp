@@ -239,7 +239,7 @@ class AprilTags : public testing::TestWithParam<Case> {
 
   // A photo of tag `id`, turned by kTagTurn, on white.
   std::string draw(int id) {
-    image_u8_t* tag = apriltag_to_image(family_, static_cast<std::uint32_t>(id));
+    image_u8_t* tag = apriltag_to_image(family_, id);
     const double cell = 2 * kHalfTag * kPhotoSize / family_->width_at_border;
     cv::Mat photo(kPhotoSize, kPhotoSize, CV_8U);
     for (int y = 0; y < kPhotoSize; ++y) {

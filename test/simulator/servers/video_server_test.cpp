@@ -71,11 +71,8 @@ std::string url_of(const VideoServer& server, const std::string& login = "") {
 // Pushes frames 0, 1, 2, ... at kRateHz from a thread of its own and remembers when each was taken.
 class Camera {
  public:
-  Camera(VideoServer& server, const VideoServerOptions& options, int jpeg_quality = 85)
-      : server_(server),
-        options_(options),
-        jpeg_quality_(jpeg_quality),
-        thread_([this] { run(); }) {}
+  Camera(VideoServer& server, const VideoServerOptions& options)
+      : server_(server), options_(options), thread_([this] { run(); }) {}
 
   ~Camera() {
     {
@@ -142,7 +139,6 @@ class Camera {
 
   VideoServer& server_;
   const VideoServerOptions options_;
-  const int jpeg_quality_;
   std::mutex mutex_;
   std::condition_variable changed_;
   bool stopping_ = false;
@@ -326,7 +322,7 @@ TEST(VideoServer, ServesOneClientWhileAnotherDoesNotRead) {
   VideoServer server(options);
   std::string error;
   ASSERT_TRUE(server.start(&error)) << error;
-  Camera camera(server, options, 100);
+  Camera camera(server, options);
   AvClient idle;
   ASSERT_EQ(idle.open(url_of(server), Transport::kTcp), 0);
   AvClient busy;
