@@ -86,7 +86,8 @@ void JointAssociation::weigh(AssociationMethod method, const double* missed, int
     if (static_cast<int>(members_.size()) <= kLargestExactCluster &&
         columns <= kLargestExactCluster) {
       ++exact_clusters_;
-      weigh_exactly(missed, pairs);
+      fill_cluster(missed, pairs);
+      method == AssociationMethod::kApart ? weigh_apart(pairs) : weigh_exactly(pairs);
     } else {
       ++cheap_clusters_;
       for (const int u : members_) weigh_cheaply(missed, u, pairs);
@@ -111,66 +112,122 @@ void JointAssociation::weigh_cheaply(const double* missed, int target, GatedPair
   }
 }
 
-void JointAssociation::weigh_exactly(const double* missed, GatedPair* pairs) {
-  const int rows = static_cast<int>(members_.size());
-  std::array<std::array<double, kLargestExactCluster>, kLargestExactCluster> r{};
-  std::array<double, kLargestExactCluster> m{};
-  int columns = 0;
-  for (int row = 0; row < rows; ++row) {
+void JointAssociation::fill_cluster(const double* missed, const GatedPair* pairs) {
+  rows_ = static_cast<int>(members_.size());
+  columns_ = 0;
+  for (int row = 0; row < rows_; ++row) {
     const int t = members_[at(row)];
     // A common factor of a target's possibilities changes nothing, and keeps the products in range.
     double scale = missed[t];
     for (int i = first_pair_[at(t)]; i < first_pair_[at(t) + 1]; ++i) {
       scale = std::max(scale, pairs[i].ratio);
     }
-    m[at(row)] = missed[t] / scale;
+    none_[at(row)] = missed[t] / scale;
+    ratio_[at(row)].fill(0);
     for (int i = first_pair_[at(t)]; i < first_pair_[at(t) + 1]; ++i) {
       const int column = column_[at(pairs[i].detection)];
-      columns = std::max(columns, column + 1);
-      r[at(row)][at(column)] = pairs[i].ratio / scale;
+      columns_ = std::max(columns_, column + 1);
+      ratio_[at(row)][at(column)] = pairs[i].ratio / scale;
     }
   }
+}
 
-  const std::size_t sets = std::size_t{1} << columns;
-  for (int row = 0; row <= rows; ++row) {
+void JointAssociation::weigh_exactly(GatedPair* pairs) {
+  const std::size_t sets = std::size_t{1} << columns_;
+  for (int row = 0; row <= rows_; ++row) {
     std::fill_n(before_[at(row)].begin(), sets, 0.0);
-    std::fill_n(after_[at(row)].begin(), sets, row == rows ? 1.0 : 0.0);
+    std::fill_n(after_[at(row)].begin(), sets, row == rows_ ? 1.0 : 0.0);
   }
   before_[0][0] = 1;
-  for (int row = 0; row < rows; ++row) {
+  for (int row = 0; row < rows_; ++row) {
     for (std::size_t taken = 0; taken < sets; ++taken) {
       const double weight = before_[at(row)][taken];
       if (weight == 0) continue;
-      before_[at(row) + 1][taken] += weight * m[at(row)];
-      for (int c = 0; c < columns; ++c) {
+      before_[at(row) + 1][taken] += weight * none_[at(row)];
+      for (int c = 0; c < columns_; ++c) {
         const std::size_t bit = std::size_t{1} << c;
-        if ((taken & bit) == 0) before_[at(row) + 1][taken | bit] += weight * r[at(row)][at(c)];
+        if ((taken & bit) == 0) {
+          before_[at(row) + 1][taken | bit] += weight * ratio_[at(row)][at(c)];
+        }
       }
     }
   }
-  for (int row = rows - 1; row >= 0; --row) {
+  for (int row = rows_ - 1; row >= 0; --row) {
     for (std::size_t taken = 0; taken < sets; ++taken) {
-      double weight = after_[at(row) + 1][taken] * m[at(row)];
-      for (int c = 0; c < columns; ++c) {
+      double weight = after_[at(row) + 1][taken] * none_[at(row)];
+      for (int c = 0; c < columns_; ++c) {
         const std::size_t bit = std::size_t{1} << c;
-        if ((taken & bit) == 0) weight += r[at(row)][at(c)] * after_[at(row) + 1][taken | bit];
+        if ((taken & bit) == 0) {
+          weight += ratio_[at(row)][at(c)] * after_[at(row) + 1][taken | bit];
+        }
       }
       after_[at(row)][taken] = weight;
     }
   }
   const double total = after_[0][0];
-  for (int row = 0; row < rows; ++row) {
+  for (int row = 0; row < rows_; ++row) {
     const int t = members_[at(row)];
     for (int i = first_pair_[at(t)]; i < first_pair_[at(t) + 1]; ++i) {
-      const std::size_t bit = std::size_t{1} << column_[at(pairs[i].detection)];
+      const std::size_t column = at(column_[at(pairs[i].detection)]);
+      const std::size_t bit = std::size_t{1} << column;
       double weight = 0;
       for (std::size_t taken = 0; taken < sets; ++taken) {
         if ((taken & bit) == 0) {
           weight += before_[at(row)][taken] * after_[at(row) + 1][taken | bit];
         }
       }
-      const std::size_t column = at(column_[at(pairs[i].detection)]);
-      pairs[i].weight = weight * r[at(row)][column] / total;
+      pairs[i].weight = weight * ratio_[at(row)][column] / total;
+    }
+  }
+}
+
+void JointAssociation::weigh_apart(GatedPair* pairs) {
+  const std::size_t row_sets = std::size_t{1} << rows_;
+  const std::size_t column_sets = std::size_t{1} << columns_;
+  std::array<std::array<double, kLargestExactCluster>, kLargestExactCluster> sum{};
+  double total = 0;
+  for (std::size_t rows = 0; rows < row_sets; ++rows) {
+    double others = 1;
+    int last = -1;
+    for (int row = 0; row < rows_; ++row) {
+      if ((rows >> row & 1) != 0) {
+        last = row;
+      } else {
+        others *= none_[at(row)];
+      }
+    }
+    for (std::size_t columns = 0; columns < column_sets; ++columns) {
+      double best = rows == 0 && columns == 0 ? 1.0 : 0.0;
+      signed char best_column = -1;
+      for (int c = 0; last >= 0 && c < columns_; ++c) {
+        if ((columns >> c & 1) == 0) continue;
+        const double weight =
+            best_[rows & ~(std::size_t{1} << last)][columns & ~(std::size_t{1} << c)] *
+            ratio_[at(last)][at(c)];
+        if (weight > best) {
+          best = weight;
+          best_column = static_cast<signed char>(c);
+        }
+      }
+      best_[rows][columns] = best;
+      last_column_[rows][columns] = best_column;
+      if (best == 0) continue;
+      total += best * others;
+      std::size_t r = rows;
+      std::size_t d = columns;
+      for (int row = last; row >= 0; --row) {
+        if ((r >> row & 1) == 0) continue;
+        const int c = last_column_[r][d];
+        sum[at(row)][at(c)] += best * others;
+        r &= ~(std::size_t{1} << row);
+        d &= ~(std::size_t{1} << c);
+      }
+    }
+  }
+  for (int row = 0; row < rows_; ++row) {
+    const int t = members_[at(row)];
+    for (int i = first_pair_[at(t)]; i < first_pair_[at(t) + 1]; ++i) {
+      pairs[i].weight = sum[at(row)][at(column_[at(pairs[i].detection)])] / total;
     }
   }
 }

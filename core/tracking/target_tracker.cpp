@@ -14,7 +14,7 @@ namespace {
 
 // Identities given while frames are done again, until it is known who was who.
 constexpr std::uint64_t kProvisional = std::uint64_t{1} << 63;
-constexpr double kLeastWeightOfSeen = 0.2;
+constexpr double kLeastWeightOfSeen = 0.3;
 constexpr double kClaimed = 0.5;
 constexpr double kOutsideSigmas = 5;
 
@@ -103,8 +103,8 @@ TargetTracker::TargetTracker(const TargetTrackerOptions& options)
       weights_(index(options.max_detections)),
       missed_(index(options.max_targets)),
       claimed_(index(options.max_detections)),
-      by_x_(index(options.max_detections)),
-      by_weight_(pairs_.size()) {
+      taken_(index(options.max_detections)),
+      by_x_(index(options.max_detections)) {
   targets_.reserve(index(options.max_targets));
   before_replay_.reserve(index(options.max_targets));
   order_.reserve(history_.size());
@@ -213,7 +213,7 @@ void TargetTracker::step(Kept* kept) {
   const double dt_s = targets_.empty() ? 0 : kept->frame.time_s - time_s_;
   predict(kept->frame.time_s, kept->frame);
   gate(*kept);
-  associate(*kept);
+  associate();
   update();
   count_looks(kept->frame, dt_s);
   bear(*kept);
@@ -276,33 +276,28 @@ void TargetTracker::gate(const Kept& kept) {
   }
 }
 
-void TargetTracker::associate(const Kept& kept) {
+void TargetTracker::associate() {
   const int targets = static_cast<int>(targets_.size());
   const int pairs =
       targets == 0 ? 0 : seen_[index(targets - 1)].first_pair + seen_[index(targets - 1)].pairs;
   association_.weigh(options_.association, missed_.data(), targets, pairs_.data(), pairs);
-  std::fill_n(claimed_.begin(), kept.frame.count, 0.0);
+  std::fill(claimed_.begin(), claimed_.end(), 0.0);
+  std::fill(taken_.begin(), taken_.end(), char{0});
   for (int i = 0; i < pairs; ++i) {
     claimed_[index(pairs_[index(i)].detection)] += pairs_[index(i)].weight;
   }
 
-  // Of weights that are nearly the same the elder target's counts: within a fifth, which is what 4 log2 rounds to.
-  int candidates = 0;
-  for (int i = 0; i < pairs; ++i) {
-    if (pairs_[index(i)].weight >= kLeastWeightOfSeen) by_weight_[index(candidates++)] = i;
-  }
-  const auto level = [&](int i) { return std::floor(4 * std::log2(pairs_[index(i)].weight)); };
-  std::sort(by_weight_.begin(), by_weight_.begin() + candidates,
-            [&](int a, int b) { return level(a) != level(b) ? level(a) > level(b) : a < b; });
-  for (Target& target : targets_) target.detection = -1;
-  for (int i = 0; i < candidates; ++i) {
-    const GatedPair& pair = pairs_[index(by_weight_[index(i)])];
-    Target& target = targets_[index(pair.target)];
-    double& claimed = claimed_[index(pair.detection)];
-    const double taken = 2;  // more than any sum of weights
-    if (target.detection >= 0 || claimed >= taken) continue;
-    target.detection = pair.detection;
-    claimed = taken;
+  // The elder first: of two on one target, which weigh its detection alike, the younger goes unseen.
+  for (std::size_t t = 0; t < targets_.size(); ++t) {
+    targets_[t].detection = -1;
+    double best = kLeastWeightOfSeen;
+    for (int i = 0; i < seen_[t].pairs; ++i) {
+      const GatedPair& pair = pairs_[index(seen_[t].first_pair + i)];
+      if (pair.weight < best || taken_[index(pair.detection)]) continue;
+      best = pair.weight;
+      targets_[t].detection = pair.detection;
+    }
+    if (targets_[t].detection >= 0) taken_[index(targets_[t].detection)] = 1;
   }
 }
 
@@ -354,7 +349,7 @@ bool TargetTracker::gives_up(const Target& target, double time_s) const {
 
 void TargetTracker::bear(const Kept& kept) {
   for (int d = 0; d < kept.frame.count; ++d) {
-    if (claimed_[index(d)] >= kClaimed) continue;
+    if (taken_[index(d)] || claimed_[index(d)] >= kClaimed) continue;
     const std::optional<TargetState> state =
         first_state(options_.space, kept.frame.H_measured_from_world, kept.detections[index(d)],
                     options_.sigma_first_velocity);

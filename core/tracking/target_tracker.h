@@ -26,7 +26,8 @@ struct TargetTrackerOptions {
   double acceleration_density = 0.5;   // m^2/s^3 or rad^2/s^3; 0.5: people who walk
   double sigma_first_velocity = 2;     // m/s or rad/s
   double detection_probability = 0.9;  // of a target in view, in (0, 1)
-  double gate_probability = 0.999;     // that a target's detection is in its gate, in (0, 1)
+  // That a target's detection is in its gate, in (0, 1). Wide: who turns sharply is still in it, and the weights know how unlikely that is.
+  double gate_probability = 0.99999;
   int birth_hits = 3;
   int birth_looks = 5;         // at most 32
   double lose_after_s = 1;     // in view, unseen
@@ -107,7 +108,7 @@ class TargetTracker {
   void step(Kept* kept);
   void predict(double time_s, const TargetFrame& frame);
   void gate(const Kept& kept);
-  void associate(const Kept& kept);
+  void associate();
   void update();
   void count_looks(const TargetFrame& frame, double dt_s);
   void bear(const Kept& kept);
@@ -134,7 +135,8 @@ class TargetTracker {
   std::vector<GatedPair> pairs_;
   std::vector<Innovation> innovations_;
   std::vector<double> weights_, missed_, claimed_;
-  std::vector<int> by_x_, by_weight_;
+  std::vector<char> taken_;  // of each detection: it counts as seen
+  std::vector<int> by_x_;
 };
 
 }  // namespace alidade

@@ -1,6 +1,6 @@
 #pragma once
 // People on a plane before a pan-tilt-zoom camera, and what a detector finds of them: truth for tests of tracking. A pinhole camera of its own,
-// which shares no code with core/. World: X right, Y forward, Z up, metres; the camera stands at (0, 0, height). Pixels as in the house's convention.
+// which shares no code with core/. World: X right, Y forward, Z up, metres; the camera stands 7 m above the origin, 12 m for hockey. Pixels as in the house's convention.
 // A target's place in the picture is where it stands; its box is 1.75 m high and 0.4 times as wide.
 
 #include <Eigen/Core>
@@ -14,7 +14,10 @@ enum class SceneKind {
   kCrossing,  // two and two towards each other, passing 0.4 m apart in the middle, again and again
   kGroup,     // side by side, 0.8 m apart, on the same way
   kHockey,    // players after a puck, on 50 x 26 m
+  kModel,  // with white acceleration of kModelAccelerationDensity and nothing else, from a slow start
 };
+
+inline constexpr double kModelAccelerationDensity = 0.1;  // m^2/s^3
 
 struct TargetSceneOptions {
   SceneKind kind = SceneKind::kWalkers;
