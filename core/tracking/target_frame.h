@@ -1,0 +1,54 @@
+#pragma once
+// What a target tracker is told of one frame: when, how measured coordinates depend on the place in the world, how much of it is in view,
+// and the detections. The camera is the caller's: the tracker sees a homography (target_filter.h) and numbers.
+// In view is what lies inside all edges of a region of measured coordinates: edge . (x, y, 1) > 0. For detections in pixels that is the
+// picture, for detections on the plane what the picture shows of it; what hides targets is cut off likewise.
+
+#include <array>
+#include <cmath>
+
+#include "core/model/linear_algebra.h"
+#include "core/tracking/target_filter.h"
+
+namespace alidade {
+
+struct ViewRegion {
+  static constexpr int kMostEdges = 6;
+  std::array<Vector3<double>, kMostEdges> edges{};
+  int count = 0;  // 0: everything is in view
+};
+
+[[nodiscard]] inline ViewRegion picture_region(double width_px, double height_px) {
+  ViewRegion region;
+  region.edges[0] = {1, 0, 0};
+  region.edges[1] = {-1, 0, width_px};
+  region.edges[2] = {0, 1, 0};
+  region.edges[3] = {0, -1, height_px};
+  region.count = 4;
+  return region;
+}
+
+// How likely a place with this covariance is in the region, were the distances to its edges independent.
+[[nodiscard]] inline double probability_in_view(const ViewRegion& region,
+                                                const Vector2<double>& place,
+                                                const Matrix2<double>& cov) {
+  double probability = 1;
+  for (int i = 0; i < region.count; ++i) {
+    const Vector3<double>& edge = region.edges[static_cast<std::size_t>(i)];
+    const double distance = edge.head<2>().dot(place) + edge[2];
+    const double variance = edge.head<2>().dot(cov * edge.head<2>());
+    probability *= 0.5 * std::erfc(-distance / std::sqrt(2 * variance));
+  }
+  return probability;
+}
+
+struct TargetFrame {
+  double time_s = 0;
+  Matrix3<double> H_measured_from_world = Matrix3<double>::Identity();
+  ViewRegion view;
+  double false_alarm_density = 1e-7;  // per unit of measured area, of one frame
+  const TargetMeasurement* detections = nullptr;
+  int count = 0;
+};
+
+}  // namespace alidade
