@@ -37,6 +37,10 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
     for (int i = 0; i < control_points(); ++i) control_point(i) = x;
   }
 
+  // All quantities 0, to be filled in: of knots and control points that were kept. Two knots or more, increasing.
+  LensCurve(int width, int height, double aspect, const std::vector<double>& knots)
+      : CubicSpline(knots), width_(width), height_(height), aspect_(aspect) {}
+
   // Of one lens that does not zoom; f may be another nevertheless.
   [[nodiscard]] static LensCurve of(const Camera<double>& camera) {
     const double log_f = std::log(camera.focal_length);
@@ -45,6 +49,7 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
 
   [[nodiscard]] int width() const { return width_; }
   [[nodiscard]] int height() const { return height_; }
+  [[nodiscard]] double aspect() const { return aspect_; }
   [[nodiscard]] double corner_px() const { return std::hypot(width_, height_) / 2; }
 
   // The weights at s, held to the curve's range.
