@@ -80,7 +80,6 @@ void MapShear::change_lens(const Calibration& calibration) {
   for (Matrix3<double>& covariance : covariances_) {
     covariance = (scale.asDiagonal() * covariance * scale.asDiagonal()).eval();
   }
-  frame_count_ = 0;
 }
 
 void MapShear::take_lens(const Calibration& calibration) {
@@ -141,9 +140,13 @@ void MapShear::add_frame(double middle_row_time_s, const FrameMotion<double>& mo
                          const Matrix6& motion_covariance) {
   const double since_s = middle_row_time_s - frames_[0].time_s;
   if (frame_count_ > 0 && !(since_s > 0 && since_s < options_.longest_s)) frame_count_ = 0;
-  Frame now{middle_row_time_s,    motion.angle.vector(),
-            motion.rate.vector(), motion.acceleration.vector(),
-            motion_covariance,    Vector2<double>::Constant(field_of_view_)};
+  Frame now{middle_row_time_s,
+            motion.angle.vector(),
+            motion.rate.vector(),
+            motion.acceleration.vector(),
+            motion_covariance,
+            Vector2<double>::Constant(field_of_view_),
+            s_per_rad_};
   if (frame_count_ >= kCurve) {
     now.surprise = now.angle;
     for (std::size_t i = 0; i < kCurve; ++i) {
@@ -162,6 +165,7 @@ void MapShear::add_frame(double middle_row_time_s, const FrameMotion<double>& mo
 
 std::optional<ShearCorrection> MapShear::correct() {
   if (frame_count_ < frames_.size() || half_readout_s_ == 0) return std::nullopt;
+  if (std::abs(frames_.back().s_per_rad / s_per_rad_ - 1) > kSameLens) return std::nullopt;
   const Frame& middle = frames_[kCurve / 2];
   // s, between frames, on average.
   const double h = (frames_[0].time_s - frames_[kCurve - 1].time_s) / (kCurve - 1);

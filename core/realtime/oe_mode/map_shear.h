@@ -101,6 +101,8 @@ class MapShear {
 
  private:
   static constexpr std::size_t kCurve = 5;  // angles in a row that give a polynomial of degree 4
+  // Of s_per_rad: frames whose lenses differ by more show shears of different size.
+  static constexpr double kSameLens = 0.02;
 
   void take_lens(const Calibration& calibration);
 
@@ -109,6 +111,7 @@ class MapShear {
     Vector2<double> angle, rate, acceleration;
     Matrix6 covariance;
     Vector2<double> surprise;  // rad, by which it missed the curve through those before
+    double s_per_rad = 0;      // of its lens
   };
 
   MapShearOptions options_;

@@ -242,6 +242,24 @@ TEST_F(ShearedFrames, TellNothingWithoutRollingShutter) {
   EXPECT_FALSE(shear_.correct());
 }
 
+// A lens that stands is found anew in each frame, a little beside where it was; one that moves shows the same map sheared by other rates.
+TEST_F(ShearedFrames, TellThroughALensThatStandsAndNotThroughOneThatMoves) {
+  for (const double zoom : {1e-5, 0.01}) {
+    const Vector2<double> wrong_rate(1.2 * kRateSigma, -1.9 * kRateSigma);
+    Calibration calibration = sheared_calibration();
+    shear_.reset(calibration);
+    begin();
+    for (int k = 0; k < 12; ++k) {
+      calibration.camera.focal_length *= 1 + (zoom < 1e-3 && k % 2 == 1 ? -zoom : zoom);
+      shear_.change_lens(calibration);
+      add(k, wrong_rate, {0, 0});
+    }
+    const auto correction = shear_.correct();
+    EXPECT_EQ(correction.has_value(), zoom < 1e-3);
+    if (correction) EXPECT_LT((correction->rate - wrong_rate).norm(), 0.05 * wrong_rate.norm());
+  }
+}
+
 // Elsewhere a wrong acceleration is a wrong rate, and a wrong angle, and back again it is what it was.
 TEST_F(ShearedFrames, HaveTheErrorsOfTheTiltTheyLookAt) {
   begin();
