@@ -329,7 +329,7 @@ TEST_F(SceneMapFileTest, AFullDiskLosesNothing) {
   {
     SceneMapFile file;
     ASSERT_TRUE(file.open(path, &error)) << error;
-    for (const rlim_t bytes : {0, 1000, 8000, 30000}) {
+    for (const rlim_t bytes : {0U, 1000U, 8000U, 30000U}) {
       {
         const SmallDisk full(bytes);
         EXPECT_FALSE(file.replace(random_scene_map(9, 40, 600), &error)) << bytes;

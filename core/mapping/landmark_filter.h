@@ -1,0 +1,121 @@
+#pragma once
+// One landmark's own Kalman filter: its direction, from where pictures with a known pose see it (Lisanti et al., eqs. 7 to 9).
+//   seen from      u with sigma_px, in a picture at R, log f, of which (xi, log f) has the covariance cov_pose
+//   innovation     y = G (u - project(R, f, d)),  G = (J_u_d B_d)^-1: where it was seen, from d, in tangent_basis(d), rad
+//   eq. 8          cov_y = J_y_pose cov_pose J_y_pose^T + sigma^2 J_y_u J_y_u^T + P          pose, detection, landmark
+//   eq. 9          K = P cov_y^-1,  d <- d (+) K y
+// The paper counts a pose's error anew in each picture; but a pose that was found from landmarks has their common error, which no number
+// of pictures tells. So a landmark's error has two parts (scene_map.h): its own, P, filtered as above, and the common one, C, which stays
+// (a Schmidt filter's):
+//   C <- M M^T + k S,   M = (I - K) C^1/2 + K Cp^1/2,   k = trace(K) / 2
+// Cp is the common part of those that the pose was found from, taken as one and the same error with C, where it is larger (M = C^1/2
+// where it is not: C knows this place of the view). S is what their own parts have left in the pose: their mean, which stays as it is
+// while they draw closer to each other, so that what P loses of it C has to gain. Detection's part of a pose's error is new in each
+// picture, and cancels over the landmarks that gave the pose.
+// Pure; no allocation. Outputs are written with kOk only.
+
+#include <Eigen/LU>
+#include <cmath>
+
+#include "core/mapping/map_projection.h"
+#include "core/model/direction.h"
+
+namespace alidade {
+
+// A picture as the map explains it.
+struct PosedPicture {
+  Matrix3<double> R_base_from_camera = Matrix3<double>::Identity();
+  Camera<double> camera;
+  Matrix<double, kCameraParameterCount, 1> J_camera_log;  // d camera / d log f
+  PictureMotion motion;
+  Matrix4<double> cov_pose = Matrix4<double>::Zero();  // (xi, log f)
+};
+
+struct LandmarkSight {
+  Vector2<double> y;              // rad, in tangent_basis(d)
+  Matrix2<double> J_y_u;          // rad/px
+  Matrix<double, 2, 4> J_y_pose;  // by (xi, log f)
+  Matrix2<double> cov_detection;  // rad^2
+  Matrix2<double> cov_of_pose;    // rad^2: the pose's part of eq. 8
+};
+
+[[nodiscard]] inline ProjectionStatus see_landmark(const PosedPicture& picture,
+                                                   const Vector2<double>& u, double sigma_px,
+                                                   const Vector3<double>& d_b, LandmarkSight* out) {
+  MapProjection p;
+  const ProjectionStatus status =
+      project_from_map(picture.camera, picture.motion, picture.R_base_from_camera, u.y(), d_b, &p);
+  if (status != ProjectionStatus::kOk) return status;
+  const Matrix2<double> J_u_tangent = p.J_u_d * tangent_basis(d_b);
+  const double determinant = J_u_tangent.determinant();
+  if (!std::isnormal(determinant)) return ProjectionStatus::kBeyondDistortionLimit;
+  const Matrix2<double> G = J_u_tangent.inverse();
+  out->y = G * (u - p.u);
+  // An error of the row moves the moment at which the landmark is projected.
+  Matrix2<double> J_r_u = Matrix2<double>::Identity();
+  J_r_u.col(1) -= p.J_u_row;
+  out->J_y_u = G * J_r_u;
+  out->J_y_pose << -G * p.J_u_xi, -G * (p.J_u_camera * picture.J_camera_log);
+  out->cov_detection = sigma_px * sigma_px * out->J_y_u * out->J_y_u.transpose();
+  out->cov_of_pose = out->J_y_pose * picture.cov_pose * out->J_y_pose.transpose();
+  return ProjectionStatus::kOk;
+}
+
+// Eq. 8.
+[[nodiscard]] inline Matrix2<double> innovation_covariance(const LandmarkSight& sight,
+                                                           const Matrix2<double>& covariance) {
+  return sight.cov_of_pose + sight.cov_detection + covariance;
+}
+
+// The symmetric root of a symmetric, positive semidefinite matrix (Cayley, Hamilton).
+[[nodiscard]] inline Matrix2<double> root_of(const Matrix2<double>& m) {
+  const double s = std::sqrt(std::max(0.0, m.determinant()));
+  const double t = std::sqrt(std::max(0.0, m.trace() + 2 * s));
+  if (t == 0) return Matrix2<double>::Zero();
+  return (m + s * Matrix2<double>::Identity()) / t;
+}
+
+struct LandmarkState {
+  Vector3<double> d_b;
+  Matrix2<double> covariance;         // own, P
+  Matrix2<double> shared_covariance;  // common, C
+};
+
+enum class LandmarkUpdate {
+  kOk,
+  kBeyondGate,  // further off than the gate: another thing, or a mistake; nothing is changed
+  kSingular,    // nothing is uncertain; nothing is changed
+};
+
+// common: Cp. share_of_landmarks: which part of the pose's covariance comes from the landmarks' own errors, 0 to 1: S is so much of it.
+[[nodiscard]] inline LandmarkUpdate update_landmark(const LandmarkSight& sight,
+                                                    const Matrix2<double>& common,
+                                                    double share_of_landmarks, double gate_sigmas,
+                                                    LandmarkState* state) {
+  const Matrix2<double> cov_y = innovation_covariance(sight, state->covariance);
+  if (!std::isnormal(cov_y.determinant())) return LandmarkUpdate::kSingular;
+  const Matrix2<double> information = cov_y.inverse();
+  if (!(sight.y.dot(information * sight.y) <= gate_sigmas * gate_sigmas)) {
+    return LandmarkUpdate::kBeyondGate;
+  }
+  const Matrix2<double> K = state->covariance * information;
+  const Matrix2<double> rest = Matrix2<double>::Identity() - K;
+  // Joseph's form: stays positive whatever is rounded.
+  const Matrix2<double> own = rest * state->covariance * rest.transpose() +
+                              K * (sight.cov_detection + sight.cov_of_pose) * K.transpose();
+  const bool is_known_better = common.trace() <= state->shared_covariance.trace();
+  const Matrix2<double> root = root_of(state->shared_covariance);
+  const Matrix2<double> M =
+      is_known_better ? root : Matrix2<double>(rest * root + K * root_of(common));
+  const Matrix2<double> shared =
+      M * M.transpose() + K.trace() / 2 * share_of_landmarks * sight.cov_of_pose;
+  // The step is far smaller than what the basis turns by, except where it jumps: the covariances are told anew there.
+  const Matrix<double, 3, 2> before = tangent_basis(state->d_b);
+  state->d_b = direction_plus<double>(state->d_b, K * sight.y).normalized();
+  const Matrix2<double> turn = tangent_basis(state->d_b).transpose() * before;
+  state->covariance = turn * (0.5 * (own + own.transpose())) * turn.transpose();
+  state->shared_covariance = turn * (0.5 * (shared + shared.transpose())) * turn.transpose();
+  return LandmarkUpdate::kOk;
+}
+
+}  // namespace alidade

@@ -1,0 +1,500 @@
+#include "core/mapping/map_upkeep.h"
+
+#include <algorithm>
+#include <map>
+
+#include "core/mapping/sphere_cell.h"
+#include "core/model/trigonometry.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kSecondsADay = 86400;
+constexpr double kFinestScale_px = 1.6;
+// Counts are halved here: what was long ago says little of today.
+constexpr std::uint32_t kMostLooks = 200;
+
+std::uint64_t mixed(std::uint64_t x) {
+  // Steele, Lea, Flood 2014 (SplitMix64)
+  x += 0x9e3779b97f4a7c15U;
+  x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9U;
+  x = (x ^ (x >> 27U)) * 0x94d049bb133111ebU;
+  return x ^ (x >> 31U);
+}
+
+int squared_distance(const Descriptor& a, const Descriptor& b) {
+  int sum = 0;
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const int step = int{a[i]} - int{b[i]};
+    sum += step * step;
+  }
+  return sum;
+}
+
+double least_eigenvalue(const Matrix2<double>& m) {
+  const double half = m.trace() / 2;
+  return half - std::sqrt(std::max(0.0, half * half - m.determinant()));
+}
+
+void count_look(bool found, double now_utc_s, LandmarkLife* life) {
+  if (life->looked_for >= kMostLooks) {
+    life->looked_for /= 2;
+    life->matched /= 2;
+  }
+  ++life->looked_for;
+  if (!found) return;
+  ++life->matched;
+  life->last_seen_utc_s = now_utc_s;
+}
+
+// What is found of it when it is looked for, with two looks of one in two beforehand.
+double usual_share(const LandmarkLife& life) {
+  return (life.matched + 1.0) / (life.looked_for + 2.0);
+}
+
+struct Box {
+  Vector2<double> least, most;
+  bool empty = true;
+
+  void add(const Vector2<double>& u) {
+    least = empty ? u : Vector2<double>(least.cwiseMin(u));
+    most = empty ? u : Vector2<double>(most.cwiseMax(u));
+    empty = false;
+  }
+  [[nodiscard]] double area() const { return empty ? 0 : (most - least).prod(); }
+};
+
+struct Visible {
+  std::size_t index = 0;  // in the map
+  Vector2<double> u;
+  double scale_px = 0;
+  bool expected = false;
+};
+
+}  // namespace
+
+struct MapUpkeep::Picture {
+  PosedPicture posed;
+  Matrix3<double> common = Matrix3<double>::Zero();  // of the matched landmarks, on all sides, base
+  double share_of_landmarks = 0;
+  Box matched;
+  std::vector<char> taken;         // by feature: matched
+  std::vector<Visible> visible;    // by increasing index
+  std::vector<std::size_t> found;  // indices of landmarks that were matched, increasing
+  std::map<std::int64_t, SceneLandmark> changed;
+
+  [[nodiscard]] Matrix2<double> common_at(const Vector3<double>& d_b) const {
+    const Matrix<double, 3, 2> basis = tangent_basis(d_b);
+    return basis.transpose() * common * basis;
+  }
+  // Where the picture shows a direction. False: nowhere.
+  [[nodiscard]] bool shows(const Vector3<double>& d_b, double border_px, Vector2<double>* u) const {
+    double row = posed.motion.reference_row;
+    MapProjection p;
+    for (int step = 0; step < 3; ++step) {
+      if (project_from_map(posed.camera, posed.motion, posed.R_base_from_camera, row, d_b, &p) !=
+          ProjectionStatus::kOk) {
+        return false;
+      }
+      row = p.u.y();
+    }
+    *u = p.u;
+    return p.u.x() >= border_px && p.u.x() <= posed.camera.width - border_px &&
+           p.u.y() >= border_px && p.u.y() <= posed.camera.height - border_px;
+  }
+};
+
+bool UpkeepOptions::validate(const char** error) const {
+  const auto refuse = [&](const char* what) {
+    if (error != nullptr) *error = what;
+    return false;
+  };
+  if (!(sigma_px > 0) || !(least_sigma_px >= 0) || !(gate_sigmas > 0) || !(wander_of_scale >= 0)) {
+    return refuse("sigmas, gate and wander must not be negative, sigma_px and gate_sigmas not 0");
+  }
+  if (!(forgetting >= 0) || !(forgetting <= 1)) return refuse("forgetting must be from 0 to 1");
+  if (birth_views < 1 || !(least_proximity >= 0) || !(least_proximity <= 1) ||
+      !(birth_gate_px > 0) || most_descriptor_step < 0 || most_candidates < 0) {
+    return refuse("a condition of birth is out of range");
+  }
+  if (!(patience_s > 0) || least_misses < 1 || !(fog_share >= 0) || !(fog_share <= 1)) {
+    return refuse("a condition of death is out of range");
+  }
+  if (!(cell_scales > 0) || cell_capacity < 1 || most_landmarks < 1 ||
+      most_landmarks > static_cast<int>(SceneMap::kMostLandmarks)) {
+    return refuse("a bound of the map is out of range");
+  }
+  if (!(least_scale_px > 0) || !(most_scale_px > least_scale_px) || !(most_zoom_ratio >= 1) ||
+      !(border_px >= 0)) {
+    return refuse("what should be found is out of range");
+  }
+  return true;
+}
+
+double UpkeepOptions::sigma_of(double scale_px) const {
+  return sigma_px * std::max(1.0, scale_px / kFinestScale_px);
+}
+
+double worth_of(const SceneLandmark& landmark, double now_utc_s, double patience_s) {
+  const double unseen_s = std::max(0.0, now_utc_s - landmark.life.last_seen_utc_s);
+  return usual_share(landmark.life) * std::exp(-unseen_s / patience_s);
+}
+
+void average_descriptor(const Descriptor& seen, double weight, std::uint64_t salt,
+                        Descriptor* average) {
+  std::array<double, kDescriptorSize> x{};
+  double seen_square = 0, average_square = 0, square = 0;
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double s = seen[i], a = (*average)[i];
+    x[i] = (1 - weight) * a + weight * s;
+    seen_square += s * s;
+    average_square += a * a;
+    square += x[i] * x[i];
+  }
+  if (square == 0) return;
+  const double length = (1 - weight) * std::sqrt(average_square) + weight * std::sqrt(seen_square);
+  const double scale = length / std::sqrt(square);
+  for (std::size_t i = 0; i < x.size(); ++i) {
+    const double chance = static_cast<double>(mixed(salt + i) >> 11U) * 0x1p-53;
+    (*average)[i] = static_cast<std::uint8_t>(std::min(255.0, std::floor(scale * x[i] + chance)));
+  }
+}
+
+MapChange MapUpkeep::show(const UpkeepView& view, const SceneMap& map, UpkeepCounts* counts) {
+  UpkeepCounts ignored;
+  UpkeepCounts& count = counts != nullptr ? *counts : ignored;
+  count = {};
+  MapChange change;
+  Picture picture;
+  if (!look(view, map, &picture)) {
+    count.refused = true;
+    return change;
+  }
+  follow(view, map, &picture, &count);
+  judge(view, map, &picture, &change, &count);
+  std::vector<SceneLandmark> ready;
+  find_candidates(view, map, &picture, &count, &ready);
+  give_birth(ready, view.time_utc_s, map, &picture, &change, &count);
+  for (auto& [id, landmark] : picture.changed) change.changed.push_back(std::move(landmark));
+  return change;
+}
+
+bool MapUpkeep::look(const UpkeepView& view, const SceneMap& map, Picture* picture) const {
+  if (!valid_ || view.features == nullptr || !view.R_base_from_camera.allFinite() ||
+      !std::isfinite(view.log_f) || !view.covariance.allFinite() ||
+      !view.angular_velocity.allFinite() || !std::isfinite(view.zoom_rate) ||
+      !std::isfinite(view.time_utc_s) ||
+      view.features->descriptors.size() != view.features->features.size()) {
+    return false;
+  }
+  PosedPicture& posed = picture->posed;
+  posed.R_base_from_camera = view.R_base_from_camera;
+  posed.camera = map.lens.camera_of(view.log_f, &posed.J_camera_log);
+  posed.motion = {view.angular_velocity, view.zoom_rate, map.line_delay, map.reference_row};
+  posed.cov_pose = view.covariance;
+  picture->taken.assign(view.features->size(), 0);
+
+  Matrix4<double> of_landmarks = Matrix4<double>::Zero(), of_all = Matrix4<double>::Zero();
+  for (const UpkeepMatch& match : view.matches) {
+    const std::ptrdiff_t index = landmark_index(map, match.landmark);
+    if (index < 0 || match.feature < 0 ||
+        static_cast<std::size_t>(match.feature) >= view.features->size()) {
+      return false;
+    }
+    const auto feature = static_cast<std::size_t>(match.feature);
+    if (picture->taken[feature] != 0) return false;
+    picture->taken[feature] = 1;
+    picture->found.push_back(static_cast<std::size_t>(index));
+    const Feature& seen = view.features->features[feature];
+    const SceneLandmark& landmark = map.landmarks[static_cast<std::size_t>(index)];
+    picture->matched.add(seen.u);
+    LandmarkSight sight;
+    if (see_landmark(posed, seen.u, options_.sigma_of(seen.scale), landmark.d_b, &sight) !=
+        ProjectionStatus::kOk) {
+      continue;
+    }
+    const Matrix2<double> information = (sight.cov_detection + landmark.covariance).inverse();
+    const Matrix<double, 2, 4> weighted = information * sight.J_y_pose;
+    of_all += sight.J_y_pose.transpose() * weighted;
+    of_landmarks += weighted.transpose() * landmark.covariance * weighted;
+    // Along the direction itself it has no error: filled up, so that the mean over a wide view is not too small.
+    const Matrix<double, 3, 2> basis = tangent_basis(landmark.d_b);
+    picture->common +=
+        basis * landmark.shared_covariance * basis.transpose() +
+        landmark.shared_covariance.trace() / 2 * landmark.d_b * landmark.d_b.transpose();
+  }
+  std::sort(picture->found.begin(), picture->found.end());
+  if (std::adjacent_find(picture->found.begin(), picture->found.end()) != picture->found.end()) {
+    return false;
+  }
+  if (!view.matches.empty()) picture->common /= static_cast<double>(view.matches.size());
+  const double all = (of_all * view.covariance).trace();
+  const double theirs = (of_landmarks * view.covariance).trace();
+  picture->share_of_landmarks = all > 0 ? std::clamp(theirs / all, 0.0, 1.0) : 1;
+
+  // Everything within the circle about the image.
+  const Camera<double>& camera = posed.camera;
+  const double radius = std::atan(std::hypot(camera.width, camera.height) / camera.focal_length);
+  const double least_cosine = std::cos(std::min(kPi / 2, radius));
+  for (std::size_t i = 0; i < map.landmarks.size(); ++i) {
+    const SceneLandmark& landmark = map.landmarks[i];
+    if (landmark.d_b.dot(posed.R_base_from_camera.col(2)) < least_cosine) continue;
+    Visible visible;
+    visible.index = i;
+    if (!picture->shows(landmark.d_b, options_.border_px, &visible.u)) continue;
+    visible.scale_px = landmark.scale_rad * camera.focal_length;
+    const double zoomed = camera.focal_length / landmark.focal_length_px;
+    visible.expected = visible.scale_px >= options_.least_scale_px &&
+                       visible.scale_px <= options_.most_scale_px &&
+                       zoomed <= options_.most_zoom_ratio && zoomed * options_.most_zoom_ratio >= 1;
+    picture->visible.push_back(visible);
+  }
+  return true;
+}
+
+bool MapUpkeep::follow_one(const Feature& seen, const Descriptor& descriptor, double now_utc_s,
+                           const Picture& picture, SceneLandmark* landmark) const {
+  LandmarkState state{landmark->d_b, landmark->covariance, landmark->shared_covariance};
+  const double days =
+      std::clamp((now_utc_s - landmark->life.last_seen_utc_s) / kSecondsADay, 0.0, 30.0);
+  const double wander = options_.wander_of_scale * landmark->scale_rad;
+  state.covariance.diagonal().array() += wander * wander * days;
+  LandmarkSight sight;
+  if (see_landmark(picture.posed, seen.u, options_.sigma_of(seen.scale), state.d_b, &sight) !=
+          ProjectionStatus::kOk ||
+      update_landmark(sight, picture.common_at(state.d_b), picture.share_of_landmarks,
+                      options_.gate_sigmas, &state) != LandmarkUpdate::kOk) {
+    return false;
+  }
+  const double floor = options_.least_sigma_px / landmark->focal_length_px;
+  const double least = least_eigenvalue(state.covariance);
+  if (least < floor * floor) state.covariance.diagonal().array() += floor * floor - least;
+  landmark->d_b = state.d_b;
+  landmark->covariance = state.covariance;
+  landmark->shared_covariance = state.shared_covariance;
+  average_descriptor(
+      descriptor, options_.forgetting,
+      mixed(static_cast<std::uint64_t>(landmark->id)) + mixed(landmark->life.matched),
+      &landmark->descriptor);
+  return true;
+}
+
+void MapUpkeep::follow(const UpkeepView& view, const SceneMap& map, Picture* picture,
+                       UpkeepCounts* counts) {
+  for (const UpkeepMatch& match : view.matches) {
+    const auto feature = static_cast<std::size_t>(match.feature);
+    SceneLandmark landmark =
+        map.landmarks[static_cast<std::size_t>(landmark_index(map, match.landmark))];
+    const bool followed =
+        follow_one(view.features->features[feature], view.features->descriptors[feature],
+                   view.time_utc_s, *picture, &landmark);
+    count_look(followed, view.time_utc_s, &landmark.life);
+    if (followed) {
+      ++counts->updated;
+      misses_.erase(landmark.id);
+    } else {
+      ++counts->beyond_gate;
+      ++misses_[landmark.id];
+    }
+    picture->changed[landmark.id] = landmark;
+  }
+}
+
+void MapUpkeep::judge(const UpkeepView& view, const SceneMap& map, Picture* picture,
+                      MapChange* change, UpkeepCounts* counts) {
+  double usual = 0;
+  int found = 0;
+  const auto was_found = [&](const Visible& visible) {
+    return std::binary_search(picture->found.begin(), picture->found.end(), visible.index);
+  };
+  for (const Visible& visible : picture->visible) {
+    if (!visible.expected) continue;
+    ++counts->expected;
+    usual += usual_share(map.landmarks[visible.index].life);
+    found += was_found(visible) ? 1 : 0;
+  }
+  counts->all_hidden = found < options_.fog_share * usual;
+  if (counts->all_hidden) return;
+  for (const Visible& visible : picture->visible) {
+    if (!visible.expected || was_found(visible)) continue;
+    const SceneLandmark& landmark = map.landmarks[visible.index];
+    const int misses = ++misses_[landmark.id];
+    const double unseen_s = view.time_utc_s - landmark.life.last_seen_utc_s;
+    if (misses >= options_.least_misses && unseen_s > options_.patience_s) {
+      change->died.push_back(landmark.id);
+      misses_.erase(landmark.id);
+      ++counts->died;
+      continue;
+    }
+    SceneLandmark looked_for = landmark;
+    count_look(false, view.time_utc_s, &looked_for.life);
+    picture->changed[landmark.id] = looked_for;
+  }
+}
+
+void MapUpkeep::find_candidates(const UpkeepView& view, const SceneMap& map, Picture* picture,
+                                UpkeepCounts* counts, std::vector<SceneLandmark>* ready) {
+  const std::vector<Feature>& features = view.features->features;
+  const std::vector<Descriptor>& descriptors = view.features->descriptors;
+  const int most_square = options_.most_descriptor_step * options_.most_descriptor_step;
+  const double gate_square = options_.birth_gate_px * options_.birth_gate_px;
+  const double f = picture->posed.camera.focal_length;
+  const auto is_like = [&](std::size_t feature, const Vector2<double>& u, double scale_px,
+                           const Descriptor& descriptor) {
+    const Feature& seen = features[feature];
+    return (seen.u - u).squaredNorm() <= gate_square && seen.scale < 1.5 * scale_px &&
+           scale_px < 1.5 * seen.scale &&
+           squared_distance(descriptors[feature], descriptor) <= most_square;
+  };
+  // What an unmatched landmark explains is none.
+  std::vector<char> taken = picture->taken;
+  for (const Visible& visible : picture->visible) {
+    const SceneLandmark& landmark = map.landmarks[visible.index];
+    for (std::size_t i = 0; i < features.size(); ++i) {
+      if (taken[i] == 0 && is_like(i, visible.u, visible.scale_px, landmark.descriptor))
+        taken[i] = 1;
+    }
+  }
+
+  std::vector<Candidate> kept;
+  for (Candidate& candidate : candidates_) {
+    SceneLandmark& landmark = candidate.landmark;
+    Vector2<double> u;
+    if (!picture->shows(landmark.d_b, options_.border_px, &u)) {
+      kept.push_back(std::move(candidate));
+      continue;
+    }
+    const double scale_px = landmark.scale_rad * f;
+    std::size_t best = features.size();
+    for (std::size_t i = 0; i < features.size(); ++i) {
+      if (taken[i] == 0 && is_like(i, u, scale_px, landmark.descriptor) &&
+          (best == features.size() ||
+           (features[i].u - u).squaredNorm() < (features[best].u - u).squaredNorm())) {
+        best = i;
+      }
+    }
+    if (best == features.size() ||
+        !follow_one(features[best], descriptors[best], view.time_utc_s, *picture, &landmark)) {
+      if (counts->all_hidden) kept.push_back(std::move(candidate));
+      continue;
+    }
+    taken[best] = 1;
+    landmark.life.last_seen_utc_s = view.time_utc_s;
+    if (++candidate.views >= options_.birth_views) {
+      Box with = picture->matched;
+      with.add(features[best].u);
+      if (picture->matched.area() >= options_.least_proximity * with.area()) {
+        ready->push_back(landmark);
+        continue;
+      }
+      ++counts->not_close;
+    }
+    kept.push_back(std::move(candidate));
+  }
+
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    if (taken[i] != 0 || !(features[i].scale >= options_.least_scale_px)) continue;
+    Candidate candidate;
+    SceneLandmark& landmark = candidate.landmark;
+    LandmarkSight sight;
+    if (unproject_to_map(picture->posed.camera, picture->posed.motion,
+                         picture->posed.R_base_from_camera, features[i].u,
+                         &landmark.d_b) != ProjectionStatus::kOk ||
+        see_landmark(picture->posed, features[i].u, options_.sigma_of(features[i].scale),
+                     landmark.d_b, &sight) != ProjectionStatus::kOk) {
+      continue;
+    }
+    landmark.d_b.normalize();
+    landmark.covariance =
+        sight.cov_detection + (1 - picture->share_of_landmarks) * sight.cov_of_pose;
+    landmark.shared_covariance =
+        picture->common_at(landmark.d_b) + picture->share_of_landmarks * sight.cov_of_pose;
+    landmark.scale_rad = features[i].scale / f;
+    landmark.focal_length_px = f;
+    landmark.descriptor = descriptors[i];
+    landmark.life.born_utc_s = landmark.life.last_seen_utc_s = view.time_utc_s;
+    candidate.views = 1;
+    kept.push_back(std::move(candidate));
+  }
+  // The oldest have waited longest without being seen again.
+  const auto most = static_cast<std::size_t>(options_.most_candidates);
+  if (kept.size() > most) {
+    kept.erase(kept.begin(), kept.end() - static_cast<std::ptrdiff_t>(most));
+  }
+  candidates_ = std::move(kept);
+}
+
+void MapUpkeep::give_birth(const std::vector<SceneLandmark>& ready, double now_utc_s,
+                           const SceneMap& map, Picture* picture, MapChange* change,
+                           UpkeepCounts* counts) {
+  if (ready.empty()) return;
+  // Who lives in the cells that are asked for.
+  std::unordered_map<std::uint64_t, std::vector<const SceneLandmark*>> cells;
+  for (const SceneLandmark& landmark : ready) {
+    cells[sphere_cell(landmark.d_b, landmark.scale_rad, options_.cell_scales)];
+  }
+  const auto is_dead = [&](std::int64_t id) {
+    return std::find(change->died.begin(), change->died.end(), id) != change->died.end();
+  };
+  const auto worth = [&](const SceneLandmark* landmark) {
+    return worth_of(*landmark, now_utc_s, options_.patience_s);
+  };
+  const auto is_worth_less = [&](const SceneLandmark* a, const SceneLandmark* b) {
+    const double of_a = worth(a), of_b = worth(b);
+    return of_a != of_b ? of_a < of_b : a->id < b->id;
+  };
+  std::vector<const SceneLandmark*> all;
+  for (const SceneLandmark& landmark : map.landmarks) {
+    if (is_dead(landmark.id)) continue;
+    const auto changed = picture->changed.find(landmark.id);
+    const SceneLandmark* as_it_is =
+        changed != picture->changed.end() ? &changed->second : &landmark;
+    all.push_back(as_it_is);
+    const auto cell =
+        cells.find(sphere_cell(landmark.d_b, landmark.scale_rad, options_.cell_scales));
+    if (cell != cells.end()) cell->second.push_back(as_it_is);
+  }
+  const auto living = [&] {
+    return map.landmarks.size() + change->born.size() - change->died.size();
+  };
+  std::vector<std::int64_t> dead;
+  const auto replaceable = [&](std::vector<const SceneLandmark*>* among) {
+    among->erase(std::remove_if(among->begin(), among->end(),
+                                [&](const SceneLandmark* l) { return is_dead(l->id); }),
+                 among->end());
+    const auto least = std::min_element(among->begin(), among->end(), is_worth_less);
+    constexpr double kWorthOfNew = 0.5;
+    return least != among->end() && worth(*least) < kWorthOfNew ? (*least)->id : std::int64_t{0};
+  };
+  const auto kill = [&](std::int64_t id) {
+    change->died.insert(std::lower_bound(change->died.begin(), change->died.end(), id), id);
+    dead.push_back(id);
+    misses_.erase(id);
+    ++counts->died;
+  };
+  std::unordered_map<std::uint64_t, int> newborn;
+  for (const SceneLandmark& landmark : ready) {
+    const std::uint64_t key = sphere_cell(landmark.d_b, landmark.scale_rad, options_.cell_scales);
+    std::vector<const SceneLandmark*>& cell = cells[key];
+    std::int64_t goes = 0;
+    if (static_cast<int>(cell.size()) + newborn[key] >= options_.cell_capacity) {
+      goes = replaceable(&cell);
+      if (static_cast<int>(cell.size()) + newborn[key] < options_.cell_capacity) goes = -1;
+      if (goes == 0) continue;
+    } else if (living() >= static_cast<std::size_t>(options_.most_landmarks)) {
+      goes = replaceable(&all);
+      if (goes == 0) continue;
+    }
+    if (goes > 0) kill(goes);
+    SceneLandmark born = landmark;
+    born.id = map.next_landmark + static_cast<std::int64_t>(change->born.size());
+    born.life.born_utc_s = born.life.last_seen_utc_s = now_utc_s;
+    born.life.looked_for = born.life.matched = 0;
+    change->born.push_back(born);
+    ++newborn[key];
+    ++counts->born;
+  }
+  for (const std::int64_t id : dead) picture->changed.erase(id);
+}
+
+}  // namespace alidade
