@@ -6,6 +6,20 @@
 #include "core/model/rotation.h"
 
 namespace alidade {
+namespace {
+
+Matrix3<double> about(int axis, double angle) {
+  return rotation_about(Vector3<double>(Vector3<double>::Unit(axis)), angle);
+}
+
+// Of a level base: east, north, up to north, east, down, then the heading about down.
+Matrix3<double> R_headed_from_world(double heading) {
+  Matrix3<double> R_ned_from_enu;
+  R_ned_from_enu << 0, 1, 0, 1, 0, 0, 0, 0, -1;
+  return about(2, -heading) * R_ned_from_enu;
+}
+
+}  // namespace
 
 const char* to_string(PlaneStatus status) {
   switch (status) {
@@ -47,13 +61,26 @@ Vector3<double> heading_jacobian(const WorldPlane& plane) {
 }
 
 Matrix3<double> R_base_from_world_of(double heading, double pitch, double roll) {
-  // East, north, up to north, east, down; then as an aircraft: heading about down, pitch about right, roll about forward.
-  Matrix3<double> R_ned_from_enu;
-  R_ned_from_enu << 0, 1, 0, 1, 0, 0, 0, 0, -1;
-  const auto about = [](int axis, double angle) {
-    return rotation_about(Vector3<double>(Vector3<double>::Unit(axis)), angle);
-  };
-  return about(0, -roll) * about(1, -pitch) * about(2, -heading) * R_ned_from_enu;
+  return about(0, -roll) * about(1, -pitch) * R_headed_from_world(heading);
+}
+
+BaseAttitude base_attitude(const WorldPlane& plane) {
+  BaseAttitude out;
+  out.heading = heading(plane);
+  // Of the heading's frame, whose second axis is level: forward in its plane, then right about it.
+  const Matrix3<double> R = plane.R_base_from_world * R_headed_from_world(out.heading).transpose();
+  out.pitch = std::atan2(-R(0, 2), R(0, 0));
+  const Matrix3<double> rolled = R * about(1, -out.pitch).transpose();
+  out.roll = std::atan2(rolled(1, 2), rolled(1, 1));
+  return out;
+}
+
+Matrix3<double> attitude_jacobian(const BaseAttitude& attitude) {
+  const Matrix3<double> R_headed = R_headed_from_world(attitude.heading);
+  const Matrix3<double> R = R_base_from_world_of(attitude.heading, attitude.pitch, attitude.roll);
+  Matrix3<double> J;
+  J << Vector3<double>::UnitZ(), -R_headed.row(1).transpose(), -R.row(0).transpose();
+  return J;
 }
 
 PlaneStatus plane_point(const WorldPlane& plane, const Vector3<double>& d_b, Vector2<double>* X,

@@ -46,8 +46,17 @@ inline constexpr double kLeastForward = 1e-3;  // sine of the angle between forw
 // d heading / d xi.
 [[nodiscard]] Vector3<double> heading_jacobian(const WorldPlane& plane);
 
-// Of the base as it stands on a plane: pitch > 0 lifts its forward direction, roll > 0 lowers its right side; heading as above. rad.
+// How the base stands, as of an aircraft, rad: pitch > 0 lifts its forward direction, roll > 0 lowers its right side.
 [[nodiscard]] Matrix3<double> R_base_from_world_of(double heading, double pitch, double roll);
+struct BaseAttitude {
+  double heading = 0;
+  double pitch = 0;
+  double roll = 0;
+};
+[[nodiscard]] BaseAttitude base_attitude(const WorldPlane& plane);
+
+// d xi / d (heading, pitch, roll): invertible unless forward points straight up or down.
+[[nodiscard]] Matrix3<double> attitude_jacobian(const BaseAttitude& attitude);
 
 struct PlaneLimits {
   double most_sigma_share = 0.2;  // largest sigma of a place over its distance from the camera

@@ -16,6 +16,7 @@
 #include "edge_app/commands/check.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/live_pattern.h"
+#include "edge_app/commands/plane.h"
 #include "edge_app/commands/record.h"
 #include "edge_app/commands/replay.h"
 #include "edge_app/commands/run.h"
@@ -179,6 +180,24 @@ void add_calibrate_shutter(CLI::App& app, int* exit_code) {
   command->callback([options, exit_code] { *exit_code = calibrate_shutter(*options); });
 }
 
+void add_plane(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<PlaneOptions>();
+  CLI::App* command = app.add_subcommand(
+      "plane", "The ground under the camera, from what is known of it; writes plane.yaml");
+  command->add_option("action", options->action, "What to do: fit")
+      ->required()
+      ->check(CLI::IsMember({"fit"}));
+  command
+      ->add_option(
+          "data", options->data,
+          "What is known (YAML): heights, level, points, horizon, lengths, upright targets")
+      ->required();
+  command->add_option("-o,--output", options->output,
+                      "File for the result (default: plane.yaml beside the data)");
+  command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
+  command->callback([options, exit_code] { *exit_code = fit_plane_command(*options); });
+}
+
 void add_check(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<CheckOptions>();
   CLI::App* command = app.add_subcommand(
@@ -255,6 +274,7 @@ int run_command_line(int argc, char** argv) {
   add_replay(app, &exit_code);
   add_calibrate(app, &exit_code);
   add_calibrate_shutter(app, &exit_code);
+  add_plane(app, &exit_code);
   add_check(app, &exit_code);
   try {
     app.parse(argc, argv);

@@ -193,6 +193,17 @@ YamlSection YamlSection::section(const std::string& key) {
   return YamlSection(value ? *value : YAML::Node(), path_of(key), file_);
 }
 
+std::vector<YamlSection> YamlSection::sections(const std::string& key) {
+  asked_.push_back(key);
+  const std::optional<YAML::Node> value = find(key);
+  if (!value) return {};
+  if (!value->IsSequence()) fail(key, "expected a list of mappings; write `- {key: value, ...}`");
+  std::vector<YamlSection> out;
+  for (const YAML::Node& item : *value)
+    out.emplace_back(item, fmt::format("{}[{}]", path_of(key), out.size()), file_);
+  return out;
+}
+
 void YamlSection::finish() const {
   for (const auto& entry : node_) {
     const std::string key = entry.first.Scalar();

@@ -48,6 +48,8 @@ class YamlSection {
                                     const std::vector<std::string>& planned = {});
   // A section inside this one; an empty one if the key is absent.
   YamlSection section(const std::string& key);
+  // A list of sections, named KEY[0] and so on; none if the key is absent.
+  std::vector<YamlSection> sections(const std::string& key);
 
   // Throws if a key is left that no reader asked for.
   void finish() const;

@@ -57,10 +57,12 @@ class Completion(unittest.TestCase):
         with tempfile.TemporaryDirectory() as folder:
             pathlib.Path(folder, "camera.yaml").touch()
             pathlib.Path(folder, "recording").mkdir()
-            for words in (("run", "-c", ""), ("check", "--config", ""), ("replay", "x", "--calibration", ""), ("calibrate", "x", "--prior", ""), ("calibrate-shutter", "")):
+            for words in (("run", "-c", ""), ("check", "--config", ""), ("replay", "x", "--calibration", ""), ("calibrate", "x", "--prior", ""), ("calibrate-shutter", ""),
+                          ("plane", "fit", ""), ("plane", "fit", "x", "-o", "")):
                 self.assertEqual(self.offered(*words, folder=folder), {"camera.yaml", "recording"})
             for words in (("replay", ""), ("calibrate", "re"), ("record", "-o", "")):
                 self.assertEqual(self.offered(*words, folder=folder), {"recording"})
+            self.assertEqual(self.offered("plane", "", folder=folder), {"fit"})
             self.assertEqual(self.offered("replay", "x", "--mode", "", folder=folder), {"OE", "PT"})
             self.assertEqual(self.offered("run", "--duration", "", folder=folder), set())
             self.assertEqual(self.offered("fly", "", folder=folder), set())

@@ -104,6 +104,25 @@ TEST(WorldPlane, HeadingsJacobianAgreesWithDifferences) {
   EXPECT_NEAR(J[2], 1, 1e-12);  // xi_z is the heading
 }
 
+TEST(WorldPlane, AttitudeAndItsJacobianAreThoseOfTheRotation) {
+  for (const Vector3<double>& angles : {Vector3<double>(0.7, 0.3, -0.2),
+                                        Vector3<double>(-2.5, -1.2, 3), Vector3<double>(3, 0, 0)}) {
+    WorldPlane plane;
+    plane.R_base_from_world = R_base_from_world_of(angles[0], angles[1], angles[2]);
+    const BaseAttitude attitude = base_attitude(plane);
+    const Vector3<double> found(attitude.heading, attitude.pitch, attitude.roll);
+    EXPECT_LT((found - angles).norm(), 1e-12);
+    const auto numeric = numeric_jacobian<3, 3>(
+        [&](const Vector3<double>& change) {
+          const Vector3<double> a = angles + change;
+          return log_so3(
+              Matrix3<double>(plane.R_world_from_base() * R_base_from_world_of(a[0], a[1], a[2])));
+        },
+        1e-3);
+    EXPECT_LT(disagreement(attitude_jacobian(attitude), numeric, 1e-14), 1);
+  }
+}
+
 TEST(WorldPlane, CovarianceIsThatOfDraws) {
   const WorldPlane plane = mast();
   const Vector3<double> d = direction_to(plane, {60, 70, 0});

@@ -1,0 +1,145 @@
+#pragma once
+// What is known of the ground under a camera, as fit_plane() (plane_fit.h) takes it: any mix of data, each with its errors.
+//   height, place, level, heading   of the camera and its base, by themselves
+//   point        a direction to what has a known place in w, on the plane or above it
+//   horizon      a direction at no elevation: of the horizon, or the vanishing point of a line on the plane
+//   bearing      such a direction whose heading is known, too: of a street in a map
+//   vertical     the vanishing point of upright edges: straight up or straight down
+//   length       directions to two points of the plane at a known distance from one another
+//   upright      directions to foot and head of something that stands on the plane, of known height
+// Directions are those of the base frame, unit length. Errors of different data are independent, but for those that sights from one
+// picture share: the turn of the whole picture, its look. All sigmas above 0: what is exact gets a small one. SI and rad. Allocates
+// (names).
+
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "core/model/linear_algebra.h"
+
+namespace alidade {
+
+// A direction that was seen: the true one, turned by the look's error and its own.
+struct PlaneSight {
+  Vector3<double> d_b = Vector3<double>::UnitX();
+  Matrix2<double> covariance = Matrix2<double>::Identity();  // rad^2, in tangent_basis(d_b)
+  int look = -1;  // of PlaneEvidence::looks; -1: nothing shared
+};
+
+enum class PlaneDatumKind {
+  kHeight,
+  kPlace,
+  kLevel,
+  kHeading,
+  kPoint,
+  kHorizon,
+  kBearing,
+  kVertical,
+  kLength,
+  kUpright
+};
+
+[[nodiscard]] const char* to_string(PlaneDatumKind kind);
+
+// Made by the functions below.
+struct PlaneDatum {
+  PlaneDatumKind kind = PlaneDatumKind::kHeight;
+  std::string name;
+  PlaneSight sight;                                 // point, horizon, bearing, vertical; foot; from
+  PlaneSight other;                                 // head; to
+  Vector3<double> place = Vector3<double>::Zero();  // m, in w; level: up_b
+  Vector3<double> place_sigma = Vector3<double>::Ones();  // m
+  double value = 0;                                       // m or rad
+  double sigma = 1;
+};
+
+struct PlaneEvidence {
+  std::vector<PlaneDatum> data;
+  std::vector<Matrix3<double>>
+      looks;  // covariance of each look's turn, rad^2, about the base's axes
+};
+
+[[nodiscard]] inline PlaneDatum camera_height(double height_m, double sigma_m) {
+  PlaneDatum out;
+  out.kind = PlaneDatumKind::kHeight;
+  out.name = "height";
+  out.value = height_m;
+  out.sigma = sigma_m;
+  return out;
+}
+
+[[nodiscard]] inline PlaneDatum camera_place(const Vector2<double>& place_m, double sigma_m) {
+  PlaneDatum out;
+  out.kind = PlaneDatumKind::kPlace;
+  out.name = "place";
+  out.place.head<2>() = place_m;
+  out.place_sigma.setConstant(sigma_m);
+  return out;
+}
+
+// Of the base against gravity, see R_base_from_world_of(); sigma of each of the two tilts.
+[[nodiscard]] PlaneDatum base_level(double pitch_rad, double roll_rad, double sigma_rad);
+
+[[nodiscard]] inline PlaneDatum base_heading(double heading_rad, double sigma_rad) {
+  PlaneDatum out;
+  out.kind = PlaneDatumKind::kHeading;
+  out.name = "heading";
+  out.value = heading_rad;
+  out.sigma = sigma_rad;
+  return out;
+}
+
+[[nodiscard]] inline PlaneDatum known_point(std::string name, const PlaneSight& sight,
+                                            const Vector3<double>& place_m,
+                                            const Vector3<double>& sigma_m) {
+  PlaneDatum out;
+  out.kind = PlaneDatumKind::kPoint;
+  out.name = std::move(name);
+  out.sight = sight;
+  out.place = place_m;
+  out.place_sigma = sigma_m;
+  return out;
+}
+
+[[nodiscard]] inline PlaneDatum on_horizon(std::string name, const PlaneSight& sight) {
+  PlaneDatum out;
+  out.kind = PlaneDatumKind::kHorizon;
+  out.name = std::move(name);
+  out.sight = sight;
+  return out;
+}
+
+[[nodiscard]] inline PlaneDatum known_bearing(std::string name, const PlaneSight& sight,
+                                              double heading_rad, double sigma_rad) {
+  PlaneDatum out = on_horizon(std::move(name), sight);
+  out.kind = PlaneDatumKind::kBearing;
+  out.value = heading_rad;
+  out.sigma = sigma_rad;
+  return out;
+}
+
+[[nodiscard]] inline PlaneDatum vertical(std::string name, const PlaneSight& sight) {
+  PlaneDatum out = on_horizon(std::move(name), sight);
+  out.kind = PlaneDatumKind::kVertical;
+  return out;
+}
+
+[[nodiscard]] inline PlaneDatum known_length(std::string name, const PlaneSight& from,
+                                             const PlaneSight& to, double length_m,
+                                             double sigma_m) {
+  PlaneDatum out = on_horizon(std::move(name), from);
+  out.kind = PlaneDatumKind::kLength;
+  out.other = to;
+  out.value = length_m;
+  out.sigma = sigma_m;
+  return out;
+}
+
+[[nodiscard]] inline PlaneDatum upright(std::string name, const PlaneSight& foot,
+                                        const PlaneSight& head, double height_m, double sigma_m) {
+  PlaneDatum out = known_length(std::move(name), foot, head, height_m, sigma_m);
+  out.kind = PlaneDatumKind::kUpright;
+  return out;
+}
+
+}  // namespace alidade

@@ -1,0 +1,136 @@
+// `alidade plane fit`: from what somebody knows of the ground under a camera to plane.yaml. A plane that is not determined, or that
+// one of the data contradicts, is reported and not written.
+
+#include "edge_app/commands/plane.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "core/model/trigonometry.h"
+#include "core/tracking/plane_fit.h"
+#include "edge_app/commands/command.h"
+#include "edge_app/config/plane_data.h"
+#include "edge_app/storage/plane_file.h"
+#include "platform/system/whole_file.h"
+
+namespace alidade {
+namespace {
+
+bool is_angle(int value) { return value < 3; }
+
+std::string values_text(const PlaneFit& fit) {
+  const PlaneValues values = plane_values(fit.plane);
+  std::string text;
+  for (int i = 0; i < kPlaneParameterCount; ++i) {
+    const double unit = is_angle(i) ? 180 / kPi : 1;
+    const double sigma = std::sqrt(values.covariance(i, i));
+    text += fmt::format("  {:<8}{:>12.4f} ", kPlaneValueNames[static_cast<std::size_t>(i)],
+                        values.value[i] * unit);
+    text += sigma > 0 ? fmt::format("± {:.4f} {}\n", sigma * unit, is_angle(i) ? "deg" : "m")
+                      : std::string("by definition\n");
+  }
+  return text;
+}
+
+std::string data_text(const PlaneEvidence& evidence, const PlaneFit& fit) {
+  std::string text;
+  for (std::size_t i = 0; i < fit.data.size(); ++i) {
+    const PlaneDatum& datum = evidence.data[i];
+    const DatumFit& fits = fit.data[i];
+    text += fmt::format("  {:<16}{:<20}", to_string(datum.kind), datum.name);
+    text += fits.misfit ? fmt::format("{:>7.2f} sigmas, checked to {:.0f} %", *fits.misfit,
+                                      100 * fits.checked)
+                        : std::string("nothing else checks it");
+    text += static_cast<int>(i) == fit.worst ? "  <- does not fit\n" : "\n";
+  }
+  return text;
+}
+
+std::string text_of(const PlaneEvidence& evidence, const PlaneFit& fit) {
+  std::string text = values_text(fit);
+  text += fmt::format("{} data, {} more equations than unknowns", evidence.data.size(),
+                      fit.degrees_of_freedom);
+  if (fit.degrees_of_freedom > 0)
+    text += fmt::format("; residuals are {:.2f} of what their sigmas say", fit.noise_scale);
+  text += "; misfits:\n" + data_text(evidence, fit);
+  if (fit.origin_below_camera)
+    text += "nothing says where the camera stands: x and y are counted from below it\n";
+  if (fit.heading_of_base)
+    text += "nothing says where north is: y lies below the base's forward direction\n";
+  return text;
+}
+
+std::string json_of(const PlaneEvidence& evidence, const PlaneFit& fit) {
+  const PlaneValues values = plane_values(fit.plane);
+  nlohmann::ordered_json json;
+  json["status"] = to_string(fit.status);
+  for (int i = 0; i < kPlaneParameterCount; ++i) {
+    json[kPlaneValueNames[static_cast<std::size_t>(i)]] = {
+        {"value", values.value[i]}, {"sigma", std::sqrt(values.covariance(i, i))}};
+  }
+  json["degrees_of_freedom"] = fit.degrees_of_freedom;
+  json["noise_scale"] = fit.noise_scale;
+  json["origin_below_camera"] = fit.origin_below_camera;
+  json["heading_of_base"] = fit.heading_of_base;
+  json["data"] = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < fit.data.size(); ++i) {
+    nlohmann::ordered_json datum;
+    datum["kind"] = to_string(evidence.data[i].kind);
+    datum["name"] = evidence.data[i].name;
+    datum["misfit"] = nullptr;
+    if (fit.data[i].misfit) datum["misfit"] = *fit.data[i].misfit;
+    datum["checked"] = fit.data[i].checked;
+    json["data"].push_back(datum);
+  }
+  return json.dump() + "\n";
+}
+
+void print_plane(const std::string& text) {
+  std::fputs(text.c_str(), stdout);
+  if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
+}
+
+// What the data lead to must not take their place.
+std::string output_path(const PlaneOptions& options) {
+  namespace fs = std::filesystem;
+  const fs::path path = options.output.empty() ? fs::path(options.data).parent_path() / "plane.yaml"
+                                               : fs::path(options.output);
+  std::error_code error;
+  if (fs::equivalent(path, options.data, error)) {
+    throw CommandError(kExitUsage,
+                       path.string() + ": is the data file itself; give another file with -o");
+  }
+  return path.string();
+}
+
+}  // namespace
+
+int fit_plane_command(const PlaneOptions& options) {
+  PlaneData data;
+  std::string error;
+  if (!load_plane_data(options.data, &data, &error)) throw CommandError(kExitUsage, error);
+  const std::string path = output_path(options);
+  const PlaneFit fit = fit_plane(data.evidence);
+  const bool fits = fit.status == PlaneFitStatus::kOk;
+  if (fits || fit.status == PlaneFitStatus::kMisfit)
+    print_plane(options.json ? json_of(data.evidence, fit) : text_of(data.evidence, fit));
+  if (!fits) throw CommandError(kExitFailed, options.data + ": " + fit.message);
+  const Vector3<double> forward_w = fit.plane.R_world_from_base().col(0);
+  if (!(forward_w.head<2>().norm() > kLeastForward)) {
+    throw CommandError(kExitFailed, options.data +
+                                        ": the base's forward direction points straight up or "
+                                        "down: plane.yaml cannot say its heading");
+  }
+  if (!write_file_atomically(path, format_plane({fit.plane, data.origin}, fit), &error))
+    throw CommandError(kExitFailed, error + "; give a file that can be written with -o");
+  spdlog::info("plane: {}", path);
+  return kExitOk;
+}
+
+}  // namespace alidade

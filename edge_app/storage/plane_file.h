@@ -1,0 +1,45 @@
+#pragma once
+// plane.yaml of `alidade plane fit`: the ground under the camera.
+//   format: 1
+//   origin: {latitude_deg: 48.1, longitude_deg: 11.5, height_m: 520}     optional: x is east and y north of it (local_frame.h)
+//   heading: {value: 0.7, sigma: 0.002}     rad, of the base's forward direction, clockwise from y
+//   pitch, roll                             rad, of the base: forward lifted, right side lowered
+//   x, y, height                            m, of the camera's optical centre
+//   covariance: {names: [...], matrix: [[...]]}     of these six, all named; 0 for what the camera itself defines
+//   quality: {...}                                  optional: not kept, it belongs to the run that wrote it
+// Reading is strict, as of lens.yaml: every slip is an error in one line, `file:line: what; what would be right`. What is written is
+// read back to rounding.
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "core/tracking/local_frame.h"
+#include "core/tracking/plane_fit.h"
+#include "core/tracking/world_plane.h"
+
+namespace alidade {
+
+struct PlaneEstimate {
+  WorldPlane plane;
+  std::optional<GeodeticPosition> origin;
+};
+
+[[nodiscard]] bool parse_plane(const std::string& text, const std::string& name,
+                               PlaneEstimate* estimate, std::string* error);
+// The same for a file: one that cannot be read is an error, too.
+[[nodiscard]] bool load_plane(const std::string& path, PlaneEstimate* estimate, std::string* error);
+
+// The six values and their covariance, in the order above.
+struct PlaneValues {
+  Matrix<double, kPlaneParameterCount, 1> value;
+  PlaneCovariance covariance;
+};
+inline constexpr std::array<const char*, kPlaneParameterCount> kPlaneValueNames = {
+    "heading", "pitch", "roll", "x", "y", "height"};
+[[nodiscard]] PlaneValues plane_values(const WorldPlane& plane);
+
+// The base's forward direction must not point straight up or down (kLeastForward): its heading would mean nothing.
+[[nodiscard]] std::string format_plane(const PlaneEstimate& estimate, const PlaneFit& fit);
+
+}  // namespace alidade

@@ -1,0 +1,113 @@
+// `alidade plane fit` as a person meets it.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "edge_app/storage/plane_file.h"
+#include "test/edge_app/alidade_command.h"
+#include "test/support/temporary_directory.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::IsEmpty;
+using ::testing::StartsWith;
+
+namespace fs = std::filesystem;
+
+// A base at height 10 that stands level and faces north, above the origin.
+constexpr const char* kYard = R"(format: 1
+height: {height_m: 10, sigma_m: 0.05}
+level: {sigma_deg: 0.1}
+points:
+  - {name: kerb, direction: [30, 0, 10], sigma_rad: 2e-4, x_m: 0, y_m: 30, sigma_m: 0.02}
+  - {name: drain, direction: [20, 15, 10], sigma_rad: 2e-4, x_m: 15, y_m: 20, sigma_m: 0.02}
+  - {name: pole, direction: [40, -20, 6], sigma_rad: 2e-4, x_m: -20, y_m: 40, z_m: 4, sigma_m: 0.02}
+)";
+
+class PlaneCommand : public testing::Test {
+ protected:
+  std::string write(const std::string& text, const std::string& name = "yard.yaml") const {
+    const fs::path path = fs::path(directory_.path()) / name;
+    std::ofstream(path) << text;
+    return path.string();
+  }
+  [[nodiscard]] std::string in_directory(const std::string& name) const {
+    return (fs::path(directory_.path()) / name).string();
+  }
+  static std::string changed(const std::string& old, const std::string& by) {
+    std::string text = kYard;
+    return text.replace(text.find(old), old.size(), by);
+  }
+
+ private:
+  TemporaryDirectory directory_;
+};
+
+TEST_F(PlaneCommand, WritesThePlaneBesideTheDataAndTellsHowEachFits) {
+  const Result result = alidade({"plane", "fit", write(kYard)});
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.output, HasSubstr("heading"));
+  EXPECT_THAT(result.output, HasSubstr("10.0000 ±"));
+  for (const char* name : {"height", "level", "kerb", "drain", "pole"})
+    EXPECT_THAT(result.output, HasSubstr(name));
+  PlaneEstimate plane;
+  std::string error;
+  ASSERT_TRUE(load_plane(in_directory("plane.yaml"), &plane, &error)) << error;
+  EXPECT_LT((plane.plane.position - Vector3<double>(0, 0, 10)).norm(), 1e-6);
+  EXPECT_GT(plane.plane.covariance(5, 5), 0);
+}
+
+TEST_F(PlaneCommand, GivesJsonAndWritesWhereItIsTold) {
+  const std::string file = in_directory("here.yaml");
+  const Result result = alidade({"plane", "fit", write(kYard), "-o", file, "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  const nlohmann::json json = nlohmann::json::parse(result.output);
+  EXPECT_EQ(json["status"], "ok");
+  EXPECT_NEAR(json["height"]["value"].get<double>(), 10, 1e-6);
+  EXPECT_EQ(json["data"].size(), 5u);
+  EXPECT_TRUE(fs::exists(file));
+  EXPECT_FALSE(fs::exists(in_directory("plane.yaml")));
+}
+
+TEST_F(PlaneCommand, NamesWhatDoesNotFitAndWritesNothing) {
+  const Result result =
+      alidade({"plane", "fit", write(changed("x_m: 15, y_m: 20", "x_m: 15, y_m: 22"))});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output, HasSubstr("<- does not fit"));
+  EXPECT_THAT(last_line(result.errors), HasSubstr("drain does not fit"));
+  EXPECT_FALSE(fs::exists(in_directory("plane.yaml")));
+}
+
+TEST_F(PlaneCommand, RefusesWhatIsNotDeterminedWithWhatWouldHelp) {
+  const Result result =
+      alidade({"plane", "fit",
+               write("format: 1\nheight: {height_m: 10, sigma_m: 0.1}\nhorizon:\n"
+                     "  - {name: sea, direction: [1, 0, 0], sigma_rad: 1e-4}\n")});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(result.output, IsEmpty());
+  EXPECT_THAT(last_line(result.errors), HasSubstr("tilt is not determined: give the base's level"));
+}
+
+TEST_F(PlaneCommand, ASlipIsBadUsageWithFileAndLine) {
+  const std::string file = write(changed("sigma_m: 0.05", "sigma_mm: 50"));
+  const Result result = alidade({"plane", "fit", file});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(last_line(result.errors), StartsWith("alidade: " + file + ":2: "));
+  EXPECT_EQ(alidade({"plane", "fit", in_directory("none.yaml")}).exit_code, 2);
+  EXPECT_EQ(alidade({"plane", "fold", file}).exit_code, 2);
+  EXPECT_EQ(alidade({"plane", "fit"}).exit_code, 2);
+  // The data stay what they are.
+  const Result onto = alidade({"plane", "fit", write(kYard, "plane.yaml")});
+  EXPECT_EQ(onto.exit_code, 2);
+  EXPECT_THAT(last_line(onto.errors), HasSubstr("is the data file itself"));
+}
+
+}  // namespace
+}  // namespace alidade
