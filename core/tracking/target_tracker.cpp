@@ -299,6 +299,13 @@ void TargetTracker::associate() {
     }
     if (targets_[t].detection >= 0) taken_[index(targets_[t].detection)] = 1;
   }
+  // What a target that is not seen may just reach is rather that target, turning, than a new one.
+  for (std::size_t t = 0; t < targets_.size(); ++t) {
+    if (targets_[t].identity == 0 || targets_[t].detection >= 0) continue;
+    for (int i = 0; i < seen_[t].pairs; ++i) {
+      taken_[index(pairs_[index(seen_[t].first_pair + i)].detection)] = 1;
+    }
+  }
 }
 
 void TargetTracker::update() {

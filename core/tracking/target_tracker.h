@@ -1,6 +1,7 @@
 #pragma once
 // Targets from detections, frame after frame: predicted, associated, updated (target_filter.h, joint_association.h), born and given up.
-//   born     from a detection that no target claims; a target, with an identity, when seen in birth_hits of its first birth_looks looks
+//   born     from a detection that no target claims, nor a target could that is not seen; confirmed, with an identity, when seen in
+//            birth_hits of its first birth_looks looks
 //   given up when it was in view and not seen for lose_after_s: each frame counts with how much likelier the place was in view than not.
 //            Out of view it waits while its covariance grows, for forget_after_s or until it could be anywhere (most_sigma), and is taken
 //            up where it comes back
@@ -135,7 +136,8 @@ class TargetTracker {
   std::vector<GatedPair> pairs_;
   std::vector<Innovation> innovations_;
   std::vector<double> weights_, missed_, claimed_;
-  std::vector<char> taken_;  // of each detection: it counts as seen
+  std::vector<char>
+      taken_;  // of each detection: no other target is seen in it, none is born from it
   std::vector<int> by_x_;
 };
 

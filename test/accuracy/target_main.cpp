@@ -16,7 +16,7 @@ int main(int argc, char** argv) {
   app.add_option("--false-alarms", options.false_alarms, "a frame");
   app.add_option("--noise", options.noise_px, "of a detection's coordinates, px");
   app.add_option("--only", options.only, "one table")
-      ->check(CLI::IsMember({"spaces", "associations", "errors", "times"}));
+      ->check(CLI::IsMember({"spaces", "associations", "errors", "sky", "times"}));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -6,7 +6,9 @@
 #include <cmath>
 #include <ostream>
 #include <random>
+#include <utility>
 
+#include "test/accuracy/sky_tracking.h"
 #include "test/accuracy/statistics.h"
 #include "test/accuracy/table.h"
 #include "test/accuracy/tracked_scene.h"
@@ -201,6 +203,44 @@ void normalised_errors(const TargetTrackingOptions& options, std::ostream& out,
   table.print(out);
 }
 
+void in_the_sky(const TargetTrackingOptions& options, std::ostream& out,
+                std::vector<std::string>* missed) {
+  Table table;
+  table.title = "Three drones that cross the sky past the zenith";
+  table.header = kHeader;
+  MotMetrics metrics[2];
+  std::vector<double> nees;
+  for (const bool sphere : {true, false}) {
+    Row row;
+    row.name = sphere ? "on the sphere" : "in pixels as seen";
+    SkyOptions sky;
+    sky.recall = options.recall;
+    sky.false_alarms = options.false_alarms;
+    sky.noise_px = options.noise_px;
+    sky.on_the_sphere = sphere;
+    for (int run = 0; run < options.runs; ++run) {
+      sky.seed = options.first_seed + static_cast<std::uint64_t>(run);
+      TrackedSky tracked = track_sky(sky);
+      nees.insert(nees.end(), tracked.nees.begin(), tracked.nees.end());
+      TrackedScene scene;
+      scene.truth = std::move(tracked.truth);
+      scene.result = std::move(tracked.result);
+      append_scene(scene, &row.scene);
+    }
+    row.metrics = mot_metrics(row.scene.truth, row.scene.result);
+    row.switches_a_minute =
+        static_cast<double>(row.metrics.num_switches) / (kMinutes * options.runs);
+    table.rows.push_back(cells(row));
+    metrics[sphere ? 0 : 1] = row.metrics;
+  }
+  table.notes = {"Normalised errors squared of directions, a degree of freedom, one a second: " +
+                 number(mean(nees) / 2)};
+  table.print(out);
+  check(metrics[0].mota >= 0.9, "drones: MOTA " + percent(metrics[0].mota) + " %, mark 90", missed);
+  check(metrics[0].hota > metrics[1].hota, "drones: the sphere is not ahead of pixels by HOTA",
+        missed);
+}
+
 double percentile(std::vector<double> values, double share) {
   std::sort(values.begin(), values.end());
   return values[static_cast<std::size_t>(share * static_cast<double>(values.size() - 1))];
@@ -296,6 +336,7 @@ std::vector<std::string> run_target_tracking(const TargetTrackingOptions& option
       tables[] = {{"spaces", in_three_spaces},
                   {"associations", by_association},
                   {"errors", normalised_errors},
+                  {"sky", in_the_sky},
                   {"times", times}};
   for (const auto& [name, table] : tables) {
     if (options.only.empty() || options.only == name) table(options, out, &missed);

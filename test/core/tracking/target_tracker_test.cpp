@@ -213,6 +213,10 @@ TEST_F(LateFrames, AreRefusedWhereTheHistoryEnds) {
   EXPECT_EQ(add(looks_[20], &tracker).status, FrameStatus::kTooLate);
   EXPECT_TRUE(same(before, tracker.targets()));
   EXPECT_EQ(add(looks_[21], &tracker).status, FrameStatus::kTakenLate);
+  options.history_frames = 1;
+  TargetTracker shortest(options);
+  for (std::size_t k = 0; k < 30; ++k) (void)add(looks_[k], &shortest);
+  EXPECT_EQ(add(looks_[28], &shortest).status, FrameStatus::kTooLate);
   TargetTracker long_one({});
   for (const Look& look : looks_) (void)add(look, &long_one);
   EXPECT_EQ(add(looks_[looks_.size() - 60], &long_one).status, FrameStatus::kTooLate);
