@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "test/support/allocation_guard.h"
@@ -69,6 +70,19 @@ bool same(const std::vector<Target>& a, const std::vector<Target>& b) {
     }
   }
   return true;
+}
+
+TEST(ViewRegion, HoldsAPlaceAsLikelyAsItsCovarianceSays) {
+  const ViewRegion region = picture_region(1000, 500);
+  Matrix2<double> cov;
+  cov << 100, 30, 30, 25;
+  EXPECT_NEAR(probability_in_view(region, {500, 250}, cov), 1, 1e-12);
+  EXPECT_NEAR(probability_in_view(region, {0, 250}, cov), 0.5, 1e-12);
+  EXPECT_NEAR(probability_in_view(region, {1000, 500}, cov), 0.25, 1e-12);
+  // One sigma outside, by x and by y.
+  EXPECT_NEAR(probability_in_view(region, {1010, 250}, cov), 0.158655, 1e-6);
+  EXPECT_NEAR(probability_in_view(region, {500, -5}, cov), 0.158655, 1e-6);
+  EXPECT_EQ(probability_in_view({}, {1e9, 1e9}, cov), 1);
 }
 
 TEST(TargetTracker, BearsATargetFromThreeLooksOfFive) {
@@ -168,6 +182,22 @@ TEST_F(LateFrames, GiveWhatTheRightOrderGives) {
     }
   }
   EXPECT_GE(confirmed(late), 2);
+}
+
+TEST_F(LateFrames, MayBeTheFirst) {
+  TargetTracker in_order({});
+  TargetTracker late({});
+  for (const std::size_t k : {0, 1, 2, 3, 4, 5}) (void)add(looks_[k], &in_order);
+  for (const std::size_t k : {1, 2, 4, 0, 5, 3}) (void)add(looks_[k], &late);
+  EXPECT_GE(confirmed(late), 2);
+  // But for the identities, which had been given out before the first frame came.
+  std::vector<Target> targets = late.targets();
+  ASSERT_EQ(targets.size(), in_order.targets().size());
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    EXPECT_EQ(targets[i].identity == 0, in_order.targets()[i].identity == 0);
+    targets[i].identity = in_order.targets()[i].identity;
+  }
+  EXPECT_TRUE(same(in_order.targets(), targets));
 }
 
 TEST_F(LateFrames, ChangeNoIdentity) {
