@@ -132,6 +132,32 @@ TEST(TargetTracker, WaitsForWhatIsOutOfViewAndKnowsItAgain) {
   EXPECT_LT((tracker.targets()[0].state.mean.head<2>() - back(274)).norm(), 0.3);
 }
 
+TEST(TargetTracker, HandsOverBetweenZooms) {
+  TargetTracker tracker({});
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  double sigma_wide = 0;
+  for (int k = 0; k < 150; ++k) {
+    // Ten times as far in, from one frame to the next, and back.
+    const double f = k >= 50 && k < 100 ? 500 : 50;
+    const Vector2<double> place(0.04 * k - 3, 0.3);
+    Look look(k * kDt, {f * place + 2 * Vector2<double>(normal(random), normal(random))});
+    look.detections[0].cov = 4 * Matrix2<double>::Identity();
+    look.frame.H_measured_from_world = Vector3<double>(f, f, 1).asDiagonal();
+    look.frame.view.count = 0;
+    look.frame.false_alarm_density = 1e-7;
+    ASSERT_EQ(add(look, &tracker).status, FrameStatus::kTaken);
+    if (k < 3) continue;
+    ASSERT_EQ(confirmed(tracker), 1) << k;
+    EXPECT_EQ(tracker.targets()[0].identity, 1U);
+    const double sigma = std::sqrt(tracker.targets()[0].state.cov(0, 0));
+    if (k == 49) sigma_wide = sigma;
+    if (k == 99) {
+      EXPECT_LT(sigma, sigma_wide / 4);
+    }
+  }
+}
+
 TEST(TargetTracker, ForgetsWhatIsAwayForLong) {
   TargetTrackerOptions options;
   options.forget_after_s = 3;
