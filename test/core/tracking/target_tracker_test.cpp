@@ -9,6 +9,7 @@
 #include <vector>
 
 #include <gtest/gtest.h>
+#include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "test/support/allocation_guard.h"
@@ -71,6 +72,19 @@ bool same(const std::vector<Target>& a, const std::vector<Target>& b) {
   return true;
 }
 
+TEST(ViewRegion, HoldsAPlaceAsLikelyAsItsCovarianceSays) {
+  const ViewRegion region = picture_region(1000, 500);
+  Matrix2<double> cov;
+  cov << 100, 30, 30, 25;
+  EXPECT_NEAR(probability_in_view(region, {500, 250}, cov), 1, 1e-12);
+  EXPECT_NEAR(probability_in_view(region, {0, 250}, cov), 0.5, 1e-12);
+  EXPECT_NEAR(probability_in_view(region, {1000, 500}, cov), 0.25, 1e-12);
+  // One sigma outside, by x and by y.
+  EXPECT_NEAR(probability_in_view(region, {1010, 250}, cov), 0.158655, 1e-6);
+  EXPECT_NEAR(probability_in_view(region, {500, -5}, cov), 0.158655, 1e-6);
+  EXPECT_EQ(probability_in_view({}, {1e9, 1e9}, cov), 1);
+}
+
 TEST(TargetTracker, BearsATargetFromThreeLooksOfFive) {
   TargetTracker tracker({});
   EXPECT_EQ(add(Look(0, {{1, 2}}), &tracker).status, FrameStatus::kTaken);
@@ -116,6 +130,32 @@ TEST(TargetTracker, WaitsForWhatIsOutOfViewAndKnowsItAgain) {
   ASSERT_EQ(confirmed(tracker), 1);
   EXPECT_EQ(tracker.targets()[0].identity, 1U);
   EXPECT_LT((tracker.targets()[0].state.mean.head<2>() - back(274)).norm(), 0.3);
+}
+
+TEST(TargetTracker, HandsOverBetweenZooms) {
+  TargetTracker tracker({});
+  std::mt19937 random(3);
+  std::normal_distribution<double> normal;
+  double sigma_wide = 0;
+  for (int k = 0; k < 150; ++k) {
+    // Ten times as far in, from one frame to the next, and back.
+    const double f = k >= 50 && k < 100 ? 500 : 50;
+    const Vector2<double> place(0.04 * k - 3, 0.3);
+    Look look(k * kDt, {f * place + 2 * Vector2<double>(normal(random), normal(random))});
+    look.detections[0].cov = 4 * Matrix2<double>::Identity();
+    look.frame.H_measured_from_world = Vector3<double>(f, f, 1).asDiagonal();
+    look.frame.view.count = 0;
+    look.frame.false_alarm_density = 1e-7;
+    ASSERT_EQ(add(look, &tracker).status, FrameStatus::kTaken);
+    if (k < 3) continue;
+    ASSERT_EQ(confirmed(tracker), 1) << k;
+    EXPECT_EQ(tracker.targets()[0].identity, 1U);
+    const double sigma = std::sqrt(tracker.targets()[0].state.cov(0, 0));
+    if (k == 49) sigma_wide = sigma;
+    if (k == 99) {
+      EXPECT_LT(sigma, sigma_wide / 4);
+    }
+  }
 }
 
 TEST(TargetTracker, ForgetsWhatIsAwayForLong) {
@@ -168,6 +208,22 @@ TEST_F(LateFrames, GiveWhatTheRightOrderGives) {
     }
   }
   EXPECT_GE(confirmed(late), 2);
+}
+
+TEST_F(LateFrames, MayBeTheFirst) {
+  TargetTracker in_order({});
+  TargetTracker late({});
+  for (const std::size_t k : {0, 1, 2, 3, 4, 5}) (void)add(looks_[k], &in_order);
+  for (const std::size_t k : {1, 2, 4, 0, 5, 3}) (void)add(looks_[k], &late);
+  EXPECT_GE(confirmed(late), 2);
+  // But for the identities, which had been given out before the first frame came.
+  std::vector<Target> targets = late.targets();
+  ASSERT_EQ(targets.size(), in_order.targets().size());
+  for (std::size_t i = 0; i < targets.size(); ++i) {
+    EXPECT_EQ(targets[i].identity == 0, in_order.targets()[i].identity == 0);
+    targets[i].identity = in_order.targets()[i].identity;
+  }
+  EXPECT_TRUE(same(in_order.targets(), targets));
 }
 
 TEST_F(LateFrames, ChangeNoIdentity) {
