@@ -74,6 +74,20 @@ bool write_file_atomically(const std::string& path, const std::string& content,
   return true;
 }
 
+bool move_into_place(const std::string& from, const std::string& to, std::string* error) {
+  const int descriptor = ::open(from.c_str(), O_RDONLY | O_CLOEXEC);
+  const bool safe = descriptor >= 0 && ::fsync(descriptor) == 0;
+  const int code = errno;
+  if (descriptor >= 0) ::close(descriptor);
+  if (!safe) errno = code;
+  if (!safe || ::rename(from.c_str(), to.c_str()) != 0) {
+    *error = to + ": cannot be written: " + std::strerror(errno);
+    return false;
+  }
+  sync_folder_of(to);
+  return true;
+}
+
 bool read_file(const std::string& path, std::string* content, std::string* error) {
   std::ifstream file(path, std::ios::binary);
   file.peek();  // a folder opens, but cannot be read

@@ -10,6 +10,10 @@ namespace alidade {
 [[nodiscard]] bool write_file_atomically(const std::string& path, const std::string& content,
                                          std::string* error);
 
+// The same of a file that somebody else wrote beside its place.
+[[nodiscard]] bool move_into_place(const std::string& from, const std::string& to,
+                                   std::string* error);
+
 // False leaves `path: cannot be read: why` in *error.
 [[nodiscard]] bool read_file(const std::string& path, std::string* content, std::string* error);
 
