@@ -4,7 +4,10 @@
 // Repeated texture fails that test, and what passes by chance has to fit a pose (picture_pose.h). Of features that claim the same
 // one the nearest keeps it. Equal input gives equal matches. Batch work: allocates.
 
+#include <array>
 #include <cstddef>
+#include <functional>
+#include <limits>
 #include <memory>
 #include <vector>
 
@@ -24,6 +27,24 @@ struct FeatureMatch {
   double ratio = 0;  // of distances; the smaller the surer
 };
 
+// The nearest of a feature, by increasing distance; where there are fewer, indexed is -1.
+struct NearFeature {
+  int indexed = -1;
+  float square = std::numeric_limits<float>::infinity();  // of the distance
+};
+inline constexpr int kNearFeatures = 4;
+using NearFeatures = std::array<NearFeature, kNearFeatures>;
+
+// By looking at all: exact, and for some thousands faster than trees.
+[[nodiscard]] std::vector<NearFeatures> nearest_features(const std::vector<Descriptor>& queries,
+                                                         const std::vector<Descriptor>& indexed);
+
+// The ratio test on them. is_same(a, b): whether two of the indexed are one thing that stands there more than once, of which the
+// next is no rival; empty: none are. In increasing order of query, each of the indexed at most once.
+[[nodiscard]] std::vector<FeatureMatch> believed_matches(
+    const std::vector<NearFeatures>& near, double ratio,
+    const std::function<bool(int, int)>& is_same = {});
+
 // Descriptors prepared for being searched; keeps a copy of them.
 class FeatureIndex {
  public:
@@ -37,6 +58,10 @@ class FeatureIndex {
   // In increasing order of query. Fewer than two descriptors on the index's side match nothing: there is no ratio.
   [[nodiscard]] std::vector<FeatureMatch> match(const std::vector<Descriptor>& queries,
                                                 const MatchOptions& options = {}) const;
+
+  // As nearest_features(), but for what the trees miss.
+  [[nodiscard]] std::vector<NearFeatures> nearest(const std::vector<Descriptor>& queries,
+                                                  int checks) const;
 
  private:
   struct State;

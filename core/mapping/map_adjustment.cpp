@@ -38,6 +38,9 @@ struct MapState {
 bool is_usable(const MapEvidence& evidence, const MapOptions& options) {
   const auto pictures = static_cast<int>(evidence.pictures.size());
   if (pictures == 0 || evidence.landmarks < 1 || options.lens.segments() < 1) return false;
+  if (options.start && options.start->control_points() != options.lens.control_points()) {
+    return false;
+  }
   if (!((options.level_sigma.array() > 0).all() && (options.bend_sigma.array() > 0).all())) {
     return false;
   }
@@ -64,17 +67,16 @@ bool is_usable(const MapEvidence& evidence, const MapOptions& options) {
 // Directions that the start values give: of each landmark the mean of those that most agree with; of length 0 where there is none.
 // `agrees`: the observations of that mean. What is elsewhere has no part in the adjustment: a landmark between two pictures that
 // look apart may have no pixel in either.
-std::vector<Vector3<double>> start_directions(const MapEvidence& evidence,
-                                              const MapOptions& options,
-                                              std::vector<bool>* agrees) {
+std::vector<Vector3<double>> start_directions(const MapEvidence& evidence, const LensCurve& lens,
+                                              double most_start_error, std::vector<bool>* agrees) {
   std::vector<Vector3<double>> seen_at;
   std::vector<std::vector<std::size_t>> of_landmark(static_cast<std::size_t>(evidence.landmarks));
   for (std::size_t i = 0; i < evidence.observations.size(); ++i) {
     const MapObservation& seen = evidence.observations[i];
     const MapPicture& picture = evidence.pictures[static_cast<std::size_t>(seen.picture)];
     Vector3<double> d = Vector3<double>::Zero();
-    if (unproject_to_map(options.lens.camera_at(picture.position), picture.motion, picture.R_start,
-                         seen.u, &d) == ProjectionStatus::kOk) {
+    if (unproject_to_map(lens.camera_at(picture.position), picture.motion, picture.R_start, seen.u,
+                         &d) == ProjectionStatus::kOk) {
       of_landmark[static_cast<std::size_t>(seen.landmark)].push_back(i);
     }
     seen_at.push_back(d);
@@ -86,7 +88,7 @@ std::vector<Vector3<double>> start_directions(const MapEvidence& evidence,
     for (const std::size_t a : of_landmark[j]) {
       std::vector<std::size_t> near;
       for (const std::size_t b : of_landmark[j]) {
-        if ((seen_at[a] - seen_at[b]).norm() < options.most_start_error) near.push_back(b);
+        if ((seen_at[a] - seen_at[b]).norm() < most_start_error) near.push_back(b);
       }
       if (near.size() > best.size()) best = std::move(near);
       if (best.size() == of_landmark[j].size()) break;
@@ -118,6 +120,7 @@ struct MapProblem {
   ceres::Problem problem;
   std::vector<double*> landmarks;
   std::vector<double*> shared;  // pictures, then control points
+  std::size_t pictures = 0;
   std::vector<ceres::ResidualBlockId> seen;
 };
 
@@ -128,6 +131,7 @@ std::unique_ptr<MapProblem> build_problem(const MapEvidence& evidence, const Map
   ceres::Problem& problem = out->problem;
   LensCurve& lens = state->lens;
   for (Vector4<double>& picture : state->pictures) out->shared.push_back(picture.data());
+  out->pictures = out->shared.size();
   for (int i = 0; i < lens.control_points(); ++i) {
     out->shared.push_back(lens.control_point(i).data());
   }
@@ -181,7 +185,10 @@ bool solve(const MapOptions& options, double least_gain, MapProblem* map, bool* 
   solver.linear_solver_type = ceres::SPARSE_SCHUR;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (double* block : map->landmarks) ordering->AddElementToGroup(block, 0);
-  for (double* block : map->shared) ordering->AddElementToGroup(block, 1);
+  // Within a group the order is that of addresses: the lens has one of its own, so that it is the same each time.
+  for (std::size_t i = 0; i < map->shared.size(); ++i) {
+    ordering->AddElementToGroup(map->shared[i], i < map->pictures ? 1 : 2);
+  }
   solver.linear_solver_ordering = ordering;
   solver.max_num_iterations = options.max_steps;
   solver.num_threads = std::max(1, options.threads);
@@ -366,9 +373,9 @@ MapAdjustment adjust_map(const MapEvidence& evidence, const MapOptions& options)
   MapState state;
   state.pictures.assign(evidence.pictures.size(), Vector4<double>::Zero());
   state.landmarks.assign(static_cast<std::size_t>(evidence.landmarks), Vector2<double>::Zero());
-  state.lens = options.lens;
+  state.lens = options.start.value_or(options.lens);
   std::vector<bool> agrees;
-  state.d_start = start_directions(evidence, options, &agrees);
+  state.d_start = start_directions(evidence, state.lens, options.most_start_error, &agrees);
 
   std::vector<bool> used = tied(evidence, state, agrees);
   const auto pictures = static_cast<int>(evidence.pictures.size());
@@ -400,7 +407,8 @@ MapAdjustment adjust_map(const MapEvidence& evidence, const MapOptions& options)
   if (!hangs_together()) return out;
   const auto map = build_problem(evidence, options, used, noise, &state);
   out.status = MapStatus::kNotDetermined;
-  if (!solve(options, 1e-8, map.get(), &converged, &out.steps)) return out;
+  // What is still to gain then is far below one sigma: observations that the loss bends creep for long.
+  if (!solve(options, 1e-6, map.get(), &converged, &out.steps)) return out;
   Eigen::MatrixXd covariance;
   if (!shared_covariance(map.get(), &covariance, &out.noise_scale)) return out;
   out.status = MapStatus::kNotConverged;

@@ -50,7 +50,9 @@ struct MapEvidence {
 };
 
 struct MapOptions {
-  LensCurve lens;  // to begin with; its range has to hold all positions
+  LensCurve lens;  // as it is thought of; its range has to hold all positions
+  std::optional<LensCurve>
+      start;  // the adjustment begins here, of the same knots; none: with the lens above
   // Sigmas of a control point's delta, kappa, c_u, c_v about the beginning, and of second differences of neighbouring ones.
   LensQuantities level_sigma{0.05, 0.1, 30, 30};
   LensQuantities bend_sigma{0.02, 0.02, 3, 3};

@@ -82,6 +82,49 @@ TEST(FeatureMatching, IsTheSameEachTime) {
   EXPECT_EQ(first, pairs());
 }
 
+TEST(NearestFeatures, AreThoseOfAll) {
+  const std::vector<Descriptor> indexed = random_descriptors(50, 12);
+  const std::vector<Descriptor> queries = random_descriptors(7, 13);
+  const auto near = nearest_features(queries, indexed);
+  ASSERT_EQ(near.size(), queries.size());
+  for (std::size_t i = 0; i < queries.size(); ++i) {
+    std::vector<std::pair<float, int>> all;
+    for (std::size_t j = 0; j < indexed.size(); ++j) {
+      float square = 0;
+      for (std::size_t n = 0; n < queries[i].size(); ++n) {
+        const float off = static_cast<float>(queries[i][n]) - static_cast<float>(indexed[j][n]);
+        square += off * off;
+      }
+      all.emplace_back(square, static_cast<int>(j));
+    }
+    std::sort(all.begin(), all.end());
+    for (std::size_t k = 0; k < kNearFeatures; ++k) {
+      EXPECT_EQ(near[i][k].indexed, all[k].second);
+      EXPECT_EQ(near[i][k].square, all[k].first);
+    }
+  }
+}
+
+TEST(NearestFeatures, OfFewAreFew) {
+  const auto near = nearest_features(random_descriptors(1, 1), random_descriptors(2, 2));
+  EXPECT_GE(near[0][1].indexed, 0);
+  EXPECT_EQ(near[0][2].indexed, -1);
+  EXPECT_TRUE(believed_matches({NearFeatures{}}, 0.8).empty());
+}
+
+TEST(BelievedMatches, TakeNoRivalForWhatIsTheSameThing) {
+  NearFeatures near;
+  near[0] = {3, 100};
+  near[1] = {5, 110};
+  near[2] = {7, 900};
+  EXPECT_TRUE(believed_matches({near}, 0.8).empty());
+  const auto is_same = [](int a, int b) { return a + b == 8; };
+  const auto matches = believed_matches({near}, 0.8, is_same);
+  ASSERT_EQ(matches.size(), 1U);
+  EXPECT_EQ(matches[0].indexed, 3);
+  EXPECT_NEAR(matches[0].ratio, 1.0 / 3, 1e-12);
+}
+
 TEST(FeatureMatching, OfNothingOrOneThereAreNone) {
   EXPECT_TRUE(FeatureIndex({}).match(random_descriptors(5, 1)).empty());
   EXPECT_TRUE(FeatureIndex(random_descriptors(1, 1)).match(random_descriptors(1, 1)).empty());

@@ -1,0 +1,71 @@
+#pragma once
+// Which pictures of a camera that turns and zooms a map keeps: taken slowly, and none near one that is there.
+//   apart   the largest of |pan| cos(tilt) / field across, |tilt| / field down and |log f| / step of two pictures, in the steps of the
+//           options; a field is what the longer focal length sees
+// A step of half a field leaves half of what is seen in common with the neighbour. Pure; allocates where a picture is kept.
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "core/model/angle.h"
+
+namespace alidade {
+
+struct KeyframeChoiceOptions {
+  double step_fields = 0.35;         // of pan and tilt
+  double step_log_f = 0.35;          // of log f
+  double most_motion_px = 10;        // of the image while it is read out
+  double most_log_f_change = 0.002;  // likewise
+
+  [[nodiscard]] bool validate(const char** error = nullptr) const {
+    const char* what = nullptr;
+    if (!(step_fields > 0 && step_fields <= 1)) what = "step_fields must be above 0, at most 1";
+    if (!(step_log_f > 0)) what = "step_log_f must be above 0";
+    if (!(most_motion_px > 0)) what = "most_motion_px must be above 0";
+    if (!(most_log_f_change > 0)) what = "most_log_f_change must be above 0";
+    if (what != nullptr && error != nullptr) *error = what;
+    return what == nullptr;
+  }
+};
+
+// Where a picture is thought to look.
+struct SeenPlace {
+  PanTilt<double> angle;
+  double log_f = 0;
+};
+
+class KeyframeChoice {
+ public:
+  // The image's size, px.
+  KeyframeChoice(int width, int height, const KeyframeChoiceOptions& options = {})
+      : width_(width), height_(height), options_(options) {}
+
+  // turn_rate, rad/s; zoom_rate, d log f / dt, 1/s; readout_s: of the whole image.
+  [[nodiscard]] bool is_slow(double log_f, double turn_rate, double zoom_rate,
+                             double readout_s) const {
+    return std::abs(turn_rate) * std::exp(log_f) * readout_s <= options_.most_motion_px &&
+           std::abs(zoom_rate) * readout_s <= options_.most_log_f_change;
+  }
+  [[nodiscard]] bool is_new(const SeenPlace& place) const {
+    return std::all_of(kept_.begin(), kept_.end(),
+                       [&](const SeenPlace& other) { return apart(place, other) >= 1; });
+  }
+  void keep(const SeenPlace& place) { kept_.push_back(place); }
+
+ private:
+  [[nodiscard]] double apart(const SeenPlace& a, const SeenPlace& b) const {
+    const double f = std::exp(std::max(a.log_f, b.log_f));
+    const Vector2<double> off = minus(a.angle, b.angle);
+    const double across = 2 * std::atan(width_ / (2 * f)) * options_.step_fields;
+    const double down = 2 * std::atan(height_ / (2 * f)) * options_.step_fields;
+    return std::max({std::abs(off.x()) * std::cos(a.angle.tilt) / across, std::abs(off.y()) / down,
+                     std::abs(a.log_f - b.log_f) / options_.step_log_f});
+  }
+
+  int width_, height_;
+  KeyframeChoiceOptions options_;
+  std::vector<SeenPlace> kept_;
+};
+
+}  // namespace alidade
