@@ -213,8 +213,8 @@ TEST_F(LateFrames, GiveWhatTheRightOrderGives) {
 TEST_F(LateFrames, MayBeTheFirst) {
   TargetTracker in_order({});
   TargetTracker late({});
-  for (const std::size_t k : {0, 1, 2, 3, 4, 5}) (void)add(looks_[k], &in_order);
-  for (const std::size_t k : {1, 2, 4, 0, 5, 3}) (void)add(looks_[k], &late);
+  for (const std::size_t k : {0U, 1U, 2U, 3U, 4U, 5U}) (void)add(looks_[k], &in_order);
+  for (const std::size_t k : {1U, 2U, 4U, 0U, 5U, 3U}) (void)add(looks_[k], &late);
   EXPECT_GE(confirmed(late), 2);
   // But for the identities, which had been given out before the first frame came.
   std::vector<Target> targets = late.targets();
