@@ -109,7 +109,7 @@ class ZoomingCamera {
         renderer_(config, *path_),
         random_(config.seed),
         corner_error_px_(kCorner_px * normal_(random_)),
-        centre_error_px_(kCentre_px * normal_(random_), kCentre_px * normal_(random_)) {}
+        centre_error_px_(draw_centre_error()) {}
 
   [[nodiscard]] const simulator::CameraModel& camera() const { return renderer_.camera(); }
   [[nodiscard]] double time_s(int k) const { return k / config_.image.rate_hz; }
@@ -220,6 +220,14 @@ class ZoomingCamera {
   }
 
  private:
+  // One after the other: of two arguments each compiler draws another one first, which would be another film.
+  [[nodiscard]] Vector2<double> draw_centre_error() {
+    Vector2<double> out;
+    out.y() = kCentre_px * normal_(random_);
+    out.x() = kCentre_px * normal_(random_);
+    return out;
+  }
+
   simulator::Config config_;
   std::unique_ptr<simulator::Path> path_;
   simulator::Renderer renderer_;

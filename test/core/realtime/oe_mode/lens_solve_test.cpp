@@ -81,6 +81,7 @@ class LensFrame {
       f.J_angle = seen.J_angle;
       f.time_s = seen.time_s;
       f.covariance = kLensNoise * kLensNoise * Matrix2<double>::Identity();
+      f.shared_covariance.setZero();
       f.sensitivity = -(1 - world.knows_lens) * J_parameters;
       const Vector2<double> s = f.sensitivity * lens_.direction;
       f.by_zoom = J_parameters * lens_.direction;
