@@ -239,7 +239,13 @@ struct Localizer::State {
     const auto nearest =
         std::min_element(keyframes.begin(), keyframes.end(),
                          [&](const Keyframe& a, const Keyframe& b) { return off(a) < off(b); });
-    if (nearest != keyframes.end()) out->pose.covariance += nearest->covariance;
+    if (nearest == keyframes.end()) return;
+    out->pose.covariance += nearest->covariance;
+    const double axis = options.between_px * off(*nearest) / out->pose.camera.focal_length;
+    const double log_f = options.between_log_f * off(*nearest);
+    out->pose.covariance(0, 0) += axis * axis;
+    out->pose.covariance(1, 1) += axis * axis;
+    out->pose.covariance(3, 3) += log_f * log_f;
   }
 
   [[nodiscard]] Localization by_hint(const FeatureSet& features, const LocalizationHint& hint,

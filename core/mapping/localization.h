@@ -44,6 +44,10 @@ struct LocalizationOptions {
   double near_px = 6;  // where a landmark is looked for about its place by the first pose
   double most_distance =
       260;  // of descriptors, of 512 for the most unlike, of two that are one thing
+  // What the lens may do between the zooms of the keyframes that its curve does not follow, for each unit of log f from the nearest:
+  // sigma of log f, and of the optical axis.
+  double between_log_f = 2e-3;
+  double between_px = 2;
   double least_size =
       0.5;  // of a feature over what its landmark's should be, and its inverse at most
 };
