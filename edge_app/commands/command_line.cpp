@@ -201,6 +201,8 @@ void add_map_build(CLI::App& map, int* exit_code) {
       map.add_subcommand("build", "A scene map from recordings: all that was seen at all zooms");
   command->add_option("recording", options->recordings, "Directories of recordings")->required();
   command->add_option("-o,--output", options->map, "File of the map")->required();
+  command->add_option("--add", options->add,
+                      "A map whose pictures are taken over; the two may be one file");
   command->add_option("--calibration", options->calibration,
                       "Calibration (default: alidade/calibration.yaml in the first recording, if "
                       "it is there)");

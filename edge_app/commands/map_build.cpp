@@ -18,6 +18,7 @@
 #include "edge_app/commands/map_report.h"
 #include "edge_app/pipeline/small_image.h"
 #include "edge_app/storage/scene_map_file.h"
+#include "platform/video/jpeg_decoder.h"
 
 namespace alidade {
 namespace {
@@ -48,12 +49,15 @@ void require_one_size(const std::vector<MapRecording>& recordings) {
   }
 }
 
-// By place where telemetry tells it, else evenly over time.
+// By place where telemetry tells it, beside those that are there, else evenly over time.
 std::vector<Chosen> choose(const std::vector<MapRecording>& recordings,
-                           const std::vector<std::vector<MapView>>& views,
+                           const std::vector<std::vector<MapView>>& views, const SceneMap& there,
                            const MapBuildOptions& build, int most) {
   const double readout_s = std::abs(build.line_delay) * build.height;
   KeyframeChoice choice(build.width, build.height);
+  for (const SceneKeyframe& k : there.keyframes) {
+    if (k.telemetry) choice.keep({*k.telemetry, k.position});
+  }
   std::vector<Chosen> placed;
   std::vector<Chosen> others;
   for (std::size_t r = 0; r < recordings.size(); ++r) {
@@ -85,6 +89,49 @@ std::vector<Chosen> choose(const std::vector<MapRecording>& recordings,
   std::stable_sort(out.begin(), out.end(),
                    [](const Chosen& a, const Chosen& b) { return a.recording < b.recording; });
   return out;
+}
+
+// The keyframes of a map that is there, with their pictures; none without one.
+SceneMap map_to_add(const std::string& path, const MapBuildOptions& build) {
+  SceneMap map;
+  if (path.empty()) return map;
+  std::string error;
+  if (!load_scene_map(path, &map, &error, true)) throw CommandError(kExitUsage, error);
+  if (map.lens.width() != build.width || map.lens.height() != build.height) {
+    throw CommandError(
+        kExitUsage,
+        fmt::format("{}: is of {}x{} px, the recordings have {}x{}; a map is of one "
+                    "camera at one size",
+                    path, map.lens.width(), map.lens.height(), build.width, build.height));
+  }
+  return map;
+}
+
+// Their features are found again: a map keeps what became landmarks.
+void add_keyframes(const SceneMap& map, double angle_sigma, const FeatureDetector& detector,
+                   MapBuilder* builder) {
+  JpegDecoder decoder;
+  for (const SceneKeyframe& k : map.keyframes) {
+    const std::string jpeg(k.picture.begin(), k.picture.end());
+    Picture picture;
+    if (jpeg.empty() || !decoder.decode(jpeg, &picture)) {
+      spdlog::warn("keyframe {} of the map to add has no picture, and is left out", k.id);
+      continue;
+    }
+    MapView view;
+    view.recording = k.recording;
+    view.frame = k.frame;
+    view.time_utc_s = k.time_utc_s;
+    view.zoom = k.zoom;
+    view.log_f = k.position;
+    view.telemetry = k.telemetry;
+    view.angle_sigma = angle_sigma;
+    view.angular_velocity = k.angular_velocity;
+    view.zoom_rate = k.zoom_rate;
+    builder->add(
+        view, features_of(detector, {picture.luma, picture.width, picture.height, picture.stride}),
+        k.picture);
+  }
 }
 
 std::string name_of(const MapView& view) {
@@ -191,7 +238,9 @@ int build_map(const MapBuildCommand& options) {
   Progress progress;
   MapBuilder builder(build);
   const FeatureDetector detector;
-  const std::vector<Chosen> chosen = choose(recordings, views, build, options.keyframes);
+  const SceneMap there = map_to_add(options.add, build);
+  add_keyframes(there, views.front().front().angle_sigma, detector, &builder);
+  const std::vector<Chosen> chosen = choose(recordings, views, there, build, options.keyframes);
   std::size_t done = 0;
   for (std::size_t r = 0; r < recordings.size(); ++r) {
     std::vector<std::size_t> frames;

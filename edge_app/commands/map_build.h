@@ -9,6 +9,7 @@ namespace alidade {
 struct MapBuildCommand {
   std::vector<std::string> recordings;
   std::string map;           // the file to write
+  std::string add;           // a map whose keyframes are taken over; empty: none
   std::string calibration;   // empty: <first recording>/alidade/calibration.yaml, if it is there
   std::string focal_length;  // px, or WIDE:TELE
   int keyframes = 300;       // at most

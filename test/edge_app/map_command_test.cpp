@@ -131,6 +131,21 @@ TEST_F(MapCommands, LocalizeTakesPictures) {
   EXPECT_EQ(lines_of(result.output).at(0)["status"], "ok");
 }
 
+TEST_F(MapCommands, BuildAddsWhatIsNewToAMap) {
+  std::string further = walking_camera(kMapTexture);
+  further.replace(further.find("period_s: 40"), 12, "period_s: 40, pan_deg: 35");
+  film("further", further);
+  const Result result = map_command({"build", path("further"), "--add", path("scene.map"), "-o",
+                                     path("more.map"), "--focal-length", "810", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  const auto before = nlohmann::json::parse(built_->output);
+  const auto after = nlohmann::json::parse(result.output);
+  EXPECT_GT(after["keyframes"].get<int>(), before["keyframes"].get<int>() + 1);
+  EXPECT_GT(after["levels"][0]["pan_rad"][1].get<double>(),
+            before["levels"][0]["pan_rad"][1].get<double>() + 0.3);
+  EXPECT_NEAR(after["levels"][0]["focal_length_px"][0].get<double>(), 800, 8);
+}
+
 TEST_F(MapCommands, PicturesOfAnotherSizeAndNoneAreRefused) {
   film("small", walking_camera(kMapTexture, "240, height: 136"));
   const Result size = alidade({"localize", path("scene.map"), path("small/frames/000000.png")});
