@@ -87,6 +87,21 @@ std::vector<cv::KeyPoint> spread(std::vector<cv::KeyPoint> points, const cv::Siz
   return out;
 }
 
+// The mean of each two by two pixels.
+cv::Mat halved(const cv::Mat& image) {
+  cv::Mat out(image.rows / 2, image.cols / 2, CV_8U);
+  for (int v = 0; v < out.rows; ++v) {
+    const std::uint8_t* above = image.ptr(2 * v);
+    const std::uint8_t* below = image.ptr(2 * v + 1);
+    std::uint8_t* to = out.ptr(v);
+    for (int u = 0; u < out.cols; ++u) {
+      const int sum = above[2 * u] + above[2 * u + 1] + below[2 * u] + below[2 * u + 1];
+      to[u] = static_cast<std::uint8_t>((sum + 2) / 4);
+    }
+  }
+  return out;
+}
+
 Descriptor root_sift(const float* histogram) {
   float sum = 0;
   for (int i = 0; i < kDescriptorSize; ++i) sum += histogram[i];
@@ -121,6 +136,12 @@ FeatureSet FeatureDetector::find(const std::uint8_t* luma, int width, int height
   if (luma == nullptr || width < kLeastImage_px || height < kLeastImage_px) return out;
   cv::Mat image(height, width, CV_8U);
   for (int v = 0; v < height; ++v) std::copy_n(luma + v * stride, width, image.ptr(v));
+  int scale = 1;
+  while (scale < state_->options.shrink && image.cols / 2 >= kLeastImage_px &&
+         image.rows / 2 >= kLeastImage_px) {
+    image = halved(image);
+    scale *= 2;
+  }
   std::vector<cv::KeyPoint> points;
   state_->sift->detect(image, points);
   points = spread(std::move(points), image.size(), state_->options);
@@ -131,8 +152,8 @@ FeatureSet FeatureDetector::find(const std::uint8_t* luma, int width, int height
   for (std::size_t i = 0; i < points.size(); ++i) {
     const cv::KeyPoint& point = points[i];
     Feature feature;
-    feature.u = {point.pt.x + shift, point.pt.y + shift};
-    feature.scale = point.size / 2;
+    feature.u = scale * Vector2<double>(point.pt.x + shift, point.pt.y + shift);
+    feature.scale = scale * static_cast<double>(point.size) / 2;
     feature.angle = point.angle * CV_PI / 180;
     feature.response = point.response;
     out.features.push_back(feature);

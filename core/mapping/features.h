@@ -40,6 +40,8 @@ struct FeatureOptions {
   double contrast_threshold = 0.02;  // SIFT's; 0.04 is OpenCV's own
   double least_distance_px =
       1.5;  // of two features; SIFT gives some blobs two orientations: one is kept
+  int shrink =
+      1;  // 1, 2 or 4: the image is looked at in so many times fewer pixels; faster, without the smallest features
 };
 
 class FeatureDetector {

@@ -82,6 +82,7 @@ class Building {
     for (const int i : kept_) R_.push_back(start[static_cast<std::size_t>(i)].value());
     MapOptions adjustment = options_.adjustment;
     adjustment.lens = lens_;
+    adjustment.level_sigma.tail<2>().setConstant(options_.centre_share * options_.width);
     if (searched_) {
       adjustment.level_sigma[0] = std::max(adjustment.level_sigma[0], kSearchedLogSigma);
     }

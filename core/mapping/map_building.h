@@ -47,6 +47,7 @@ struct MapBuildOptions {
       0.02;  // of log_f: what the data sheet may be wrong by at a picture, while nothing is known
   double repeatability = 1e-3;  // sigma of log f after a movement of the zoom
   double lens_spacing = 0.4;    // of log f: knots of the lens's curve
+  double centre_share = 0.01;  // of the width: sigma of the optical centre about the image's middle
   LinkOptions links;
   MapOptions adjustment;     // its lens is set here
   int first_features = 150;  // of each picture, for the first adjustment

@@ -16,6 +16,10 @@
 #include "edge_app/commands/check.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/live_pattern.h"
+#include "edge_app/commands/localize.h"
+#include "edge_app/commands/map_build.h"
+#include "edge_app/commands/map_export.h"
+#include "edge_app/commands/map_info.h"
 #include "edge_app/commands/plane.h"
 #include "edge_app/commands/record.h"
 #include "edge_app/commands/replay.h"
@@ -210,6 +214,70 @@ void add_check(CLI::App& app, int* exit_code) {
   command->callback([options, exit_code] { *exit_code = check_links(*options); });
 }
 
+void add_map_build(CLI::App& map, int* exit_code) {
+  auto options = std::make_shared<MapBuildCommand>();
+  CLI::App* command =
+      map.add_subcommand("build", "A scene map from recordings: all that was seen at all zooms");
+  command->add_option("recording", options->recordings, "Directories of recordings")->required();
+  command->add_option("-o,--output", options->map, "File of the map")->required();
+  command->add_option("--add", options->add,
+                      "A map whose pictures are taken over; the two may be one file");
+  command->add_option("--calibration", options->calibration,
+                      "Calibration (default: alidade/calibration.yaml in the first recording, if "
+                      "it is there)");
+  command
+      ->add_option("--focal-length", options->focal_length,
+                   "px, by a data sheet; WIDE:TELE at the least and the most zoom reading")
+      ->type_name("PX");
+  command->add_option("--keyframes", options->keyframes, "Pictures to keep at most")
+      ->check(CLI::Range(2, 2000))
+      ->capture_default_str();
+  command->add_flag("--no-telemetry", options->no_telemetry, "By the pictures alone");
+  command->add_flag("--largest-part", options->largest_part,
+                    "Where parts do not hang together, take the largest");
+  command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
+  command->callback([options, exit_code] { *exit_code = build_map(*options); });
+}
+
+void add_map(CLI::App& app, int* exit_code) {
+  CLI::App* map = app.add_subcommand("map", "Build, show, check or export a scene map");
+  map->require_subcommand(1);
+  add_map_build(*map, exit_code);
+  using Show = int (*)(const MapInfoCommand&);
+  const auto add_show = [&](const char* name, const char* help, Show show) {
+    auto options = std::make_shared<MapInfoCommand>();
+    CLI::App* command = map->add_subcommand(name, help);
+    command->add_option("map", options->map, "File of the map")->required();
+    command->add_flag("--json", options->json, "On stdout as one line of JSON");
+    command->callback([options, exit_code, show] { *exit_code = show(*options); });
+  };
+  add_show("info", "What a scene map holds", show_map);
+  add_show("check", "Whether all of a scene map can be true", check_map);
+  auto options = std::make_shared<MapExportCommand>();
+  CLI::App* command = map->add_subcommand(
+      "export", "keyframes.csv, the keyframes' pictures and panorama.png of a scene map");
+  command->add_option("map", options->map, "File of the map")->required();
+  command->add_option("-o,--output", options->directory, "Directory for them")->required();
+  command->callback([options, exit_code] { *exit_code = export_map(*options); });
+}
+
+void add_localize(CLI::App& app, int* exit_code) {
+  auto options = std::make_shared<LocalizeCommand>();
+  CLI::App* command =
+      app.add_subcommand("localize", "Where pictures look, by a scene map; JSON Lines on stdout");
+  command->add_option("map", options->map, "File of the map")->required();
+  command
+      ->add_option("picture", options->pictures, "Files of pictures, and directories of recordings")
+      ->required();
+  command->add_option("--calibration", options->calibration,
+                      "Of a recording: tells the focal length by the zoom reading");
+  command->add_flag("--no-telemetry", options->no_telemetry, "By the pictures alone");
+  command->add_option("--every", options->every, "Of a recording's frames, every so many")
+      ->check(CLI::PositiveNumber)
+      ->capture_default_str();
+  command->callback([options, exit_code] { *exit_code = localize_pictures(*options); });
+}
+
 std::vector<std::string> command_names(const CLI::App& app) {
   std::vector<std::string> names;
   for (const CLI::App* command : app.get_subcommands({})) names.push_back(command->get_name());
@@ -276,6 +344,8 @@ int run_command_line(int argc, char** argv) {
   add_calibrate_shutter(app, &exit_code);
   add_plane(app, &exit_code);
   add_check(app, &exit_code);
+  add_map(app, &exit_code);
+  add_localize(app, &exit_code);
   try {
     app.parse(argc, argv);
     return exit_code;

@@ -53,6 +53,14 @@ class Completion(unittest.TestCase):
                 self.assertEqual(self.offered(command, "-"), options(help_of(command)))
         self.assertEqual(self.offered("calibrate", "x", "--foc"), {"--focal-length"})
 
+    def test_offers_what_a_map_can_be_asked_and_the_options_of_each(self):
+        asked = set(re.findall(r"^  ([\w-]+) ", help_of("map").partition("Subcommands:")[2], re.M))
+        self.assertGreaterEqual(len(asked), 4)
+        self.assertEqual(self.offered("map", "") - {"-h", "--help"}, asked)
+        for command in asked:
+            with self.subTest(command=command):
+                self.assertEqual(self.offered("map", command, "-"), options(help_of("map", command)))
+
     def test_offers_files_where_they_are_wanted_and_nothing_for_a_number(self):
         with tempfile.TemporaryDirectory() as folder:
             pathlib.Path(folder, "camera.yaml").touch()

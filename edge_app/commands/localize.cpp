@@ -1,0 +1,151 @@
+#include "edge_app/commands/localize.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "core/mapping/localization.h"
+#include "core/mapping/map_building.h"
+#include "edge_app/commands/command.h"
+#include "edge_app/commands/map_recording.h"
+#include "edge_app/storage/scene_map_file.h"
+#include "platform/video/picture_file.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+using nlohmann::ordered_json;
+
+void write_line(const ordered_json& json) {
+  const std::string line = json.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
+  std::fputs(line.c_str(), stdout);
+  if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
+}
+
+void add_pose(const Localization& found, const Mechanics<double>& mechanics, ordered_json* json) {
+  (*json)["status"] = to_string(found.status);
+  (*json)["matches"] = found.matches;
+  if (found.status != LocalizationStatus::kOk) return;
+  const PicturePose& pose = found.pose;
+  const PanTilt<double> angle = nearest_angles_of(mechanics, pose.R_base_from_camera);
+  const Eigen::Quaterniond q(pose.R_base_from_camera);
+  (*json)["pan_rad"] = angle.pan;
+  (*json)["tilt_rad"] = angle.tilt;
+  (*json)["q_base_from_camera"] = {q.x(), q.y(), q.z(), q.w()};
+  (*json)["orientation_sigma_rad"] = {std::sqrt(pose.covariance(0, 0)),
+                                      std::sqrt(pose.covariance(1, 1)),
+                                      std::sqrt(pose.covariance(2, 2))};
+  (*json)["focal_length_px"] = pose.camera.focal_length;
+  (*json)["focal_length_sigma_px"] = pose.camera.focal_length * std::sqrt(pose.covariance(3, 3));
+  (*json)["aspect"] = pose.camera.aspect;
+  (*json)["radial_distortion"] = pose.camera.radial_distortion;
+}
+
+class Asking {
+ public:
+  Asking(const LocalizeCommand& options, const SceneMap& map)
+      : options_(options),
+        localizer_(map),
+        detector_(localization_features(false)),
+        quick_(localization_features(true)),
+        width_(map.lens.width()),
+        height_(map.lens.height()),
+        mechanics_(map.mechanics.value_or(Mechanics<double>())) {}
+
+  void picture(const std::string& path) {
+    Picture picture;
+    std::string error;
+    if (!read_picture_file(path, &picture, &error)) throw CommandError(kExitUsage, error);
+    require_size(path, picture.width, picture.height);
+    ordered_json json;
+    json["picture"] = path;
+    add_pose(localizer_.find(features_of(
+                 detector_, {picture.luma, picture.width, picture.height, picture.stride})),
+             mechanics_, &json);
+    write_line(json);
+  }
+
+  void recording(const std::string& directory) {
+    const MapRecording recording = load_map_recording(directory, !options_.no_telemetry);
+    require_size(directory, recording.info.width, recording.info.height);
+    std::optional<NamedCalibration> calibration;
+    if (!options_.calibration.empty()) {
+      calibration = require_calibration_file(options_.calibration);
+    }
+    const Calibration* known = calibration ? &calibration->calibration : nullptr;
+    const FocalLengthKnowledge focal_lengths =
+        known != nullptr ? FocalLengthKnowledge(*known, calibration->zoom_curve)
+                         : FocalLengthKnowledge();
+    std::vector<std::size_t> frames;
+    for (std::size_t i = 0; i < recording.frames.size();
+         i += static_cast<std::size_t>(options_.every)) {
+      frames.push_back(i);
+    }
+    for_each_picture(recording, frames, [&](std::size_t frame, const ImageView& image) {
+      const FrameStamp& stamp = recording.frames[frame];
+      const MapView view = map_view(recording, stamp, known, focal_lengths);
+      LocalizationHint hint;
+      if (view.telemetry && view.log_f) {
+        hint.R_base_from_camera =
+            R_base_from_camera(mechanics_, true_from_measured(mechanics_, *view.telemetry));
+        hint.R_sigma = view.angle_sigma;
+        hint.focal_length = FocalLengthPrior{*view.log_f, 0.02};
+        hint.angular_velocity = view.angular_velocity;
+        hint.zoom_rate = view.zoom_rate;
+      }
+      ordered_json json;
+      json["recording"] = directory;
+      json["frame"] = stamp.frame;
+      json["receive_time_s"] = stamp.receive_time_s;
+      if (view.zoom) json["zoom"] = *view.zoom;
+      Localization found;
+      if (hint.focal_length) found = localizer_.find(features_of(quick_, image), hint);
+      if (found.status != LocalizationStatus::kOk) {
+        found = localizer_.find(features_of(detector_, image), hint);
+      }
+      add_pose(found, mechanics_, &json);
+      write_line(json);
+    });
+  }
+
+ private:
+  void require_size(const std::string& what, int width, int height) const {
+    if (width == width_ && height == height_) return;
+    throw CommandError(kExitUsage,
+                       fmt::format("{}: {}x{} px, but {} is of {}x{} px; a map serves pictures of "
+                                   "its own camera and size",
+                                   what, width, height, options_.map, width_, height_));
+  }
+
+  const LocalizeCommand& options_;
+  Localizer localizer_;
+  FeatureDetector detector_;
+  FeatureDetector quick_;
+  int width_, height_;
+  Mechanics<double> mechanics_;
+};
+
+}  // namespace
+
+int localize_pictures(const LocalizeCommand& options) {
+  SceneMap map;
+  std::string error;
+  if (!load_scene_map(options.map, &map, &error)) throw CommandError(kExitUsage, error);
+  Asking asking(options, map);
+  for (const std::string& path : options.pictures) {
+    if (fs::is_directory(path)) {
+      asking.recording(path);
+    } else {
+      asking.picture(path);
+    }
+  }
+  return kExitOk;
+}
+
+}  // namespace alidade

@@ -1,0 +1,300 @@
+#include "edge_app/commands/map_build.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdio>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <optional>
+
+#include "core/mapping/keyframe_choice.h"
+#include "core/mapping/map_building.h"
+#include "edge_app/commands/command.h"
+#include "edge_app/commands/map_recording.h"
+#include "edge_app/commands/map_report.h"
+#include "edge_app/pipeline/small_image.h"
+#include "edge_app/storage/scene_map_file.h"
+#include "platform/video/jpeg_decoder.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct Chosen {
+  std::size_t recording;
+  std::size_t frame;  // place in its frames
+};
+
+std::optional<NamedCalibration> calibration_of(const MapBuildCommand& options) {
+  if (!options.calibration.empty()) return require_calibration_file(options.calibration);
+  const fs::path beside = fs::path(options.recordings.front()) / "alidade" / "calibration.yaml";
+  if (!fs::exists(beside)) return std::nullopt;
+  return require_calibration_file(beside.string());
+}
+
+void require_one_size(const std::vector<MapRecording>& recordings) {
+  const RecordingInfo& first = recordings.front().info;
+  for (const MapRecording& each : recordings) {
+    if (each.info.width == first.width && each.info.height == first.height) continue;
+    throw CommandError(
+        kExitUsage, fmt::format("{}: frames of {}x{} px, those of {} have {}x{}; a map is of one "
+                                "camera at one size",
+                                each.directory, each.info.width, each.info.height,
+                                recordings.front().directory, first.width, first.height));
+  }
+}
+
+// By place where telemetry tells it, beside those that are there, else evenly over time.
+std::vector<Chosen> choose(const std::vector<MapRecording>& recordings,
+                           const std::vector<std::vector<MapView>>& views, const SceneMap& there,
+                           const MapBuildOptions& build, int most) {
+  const double readout_s = std::abs(build.line_delay) * build.height;
+  KeyframeChoice choice(build.width, build.height);
+  for (const SceneKeyframe& k : there.keyframes) {
+    if (k.telemetry) choice.keep({*k.telemetry, k.position});
+  }
+  std::vector<Chosen> placed;
+  std::vector<Chosen> others;
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    for (std::size_t i = 0; i < views[r].size(); ++i) {
+      const MapView& view = views[r][i];
+      if (!view.telemetry || !view.log_f) {
+        if (recordings[r].telemetry.empty() || !view.log_f) others.push_back({r, i});
+        continue;
+      }
+      // Without a read-out that is known nothing that moves can be trusted.
+      const bool is_slow = choice.is_slow(*view.log_f, view.angular_velocity.norm(), view.zoom_rate,
+                                          readout_s > 0 ? readout_s : 0.03);
+      const SeenPlace place{*view.telemetry, *view.log_f};
+      if (!is_slow || !choice.is_new(place)) continue;
+      choice.keep(place);
+      placed.push_back({r, i});
+    }
+  }
+  const auto thinned = [](const std::vector<Chosen>& all, std::size_t count) {
+    if (all.size() <= count) return all;
+    std::vector<Chosen> some;
+    for (std::size_t i = 0; i < count; ++i) some.push_back(all[i * all.size() / count]);
+    return some;
+  };
+  const auto limit = static_cast<std::size_t>(most);
+  std::vector<Chosen> out = thinned(placed, limit);
+  const std::vector<Chosen> rest = thinned(others, limit - std::min(limit, out.size()));
+  out.insert(out.end(), rest.begin(), rest.end());
+  std::stable_sort(out.begin(), out.end(),
+                   [](const Chosen& a, const Chosen& b) { return a.recording < b.recording; });
+  return out;
+}
+
+// The keyframes of a map that is there, with their pictures; none without one.
+SceneMap map_to_add(const std::string& path, const MapBuildOptions& build) {
+  SceneMap map;
+  if (path.empty()) return map;
+  std::string error;
+  if (!load_scene_map(path, &map, &error, true)) throw CommandError(kExitUsage, error);
+  if (map.lens.width() != build.width || map.lens.height() != build.height) {
+    throw CommandError(
+        kExitUsage,
+        fmt::format("{}: is of {}x{} px, the recordings have {}x{}; a map is of one "
+                    "camera at one size",
+                    path, map.lens.width(), map.lens.height(), build.width, build.height));
+  }
+  return map;
+}
+
+// Their features are found again: a map keeps what became landmarks.
+void add_keyframes(const SceneMap& map, double angle_sigma, const FeatureDetector& detector,
+                   MapBuilder* builder) {
+  JpegDecoder decoder;
+  for (const SceneKeyframe& k : map.keyframes) {
+    const std::string jpeg(k.picture.begin(), k.picture.end());
+    Picture picture;
+    if (jpeg.empty() || !decoder.decode(jpeg, &picture)) {
+      spdlog::warn("keyframe {} of the map to add has no picture, and is left out", k.id);
+      continue;
+    }
+    MapView view;
+    view.recording = k.recording;
+    view.frame = k.frame;
+    view.time_utc_s = k.time_utc_s;
+    view.zoom = k.zoom;
+    view.log_f = k.position;
+    view.telemetry = k.telemetry;
+    view.angle_sigma = angle_sigma;
+    view.angular_velocity = k.angular_velocity;
+    view.zoom_rate = k.zoom_rate;
+    builder->add(
+        view, features_of(detector, {picture.luma, picture.width, picture.height, picture.stride}),
+        k.picture);
+  }
+}
+
+std::string name_of(const MapView& view) {
+  return fmt::format("{} frame {}", view.recording, view.frame);
+}
+
+std::string names_of(const MapBuilder& builder, const std::vector<int>& pictures) {
+  constexpr std::size_t kNamed = 4;
+  std::string out;
+  for (std::size_t i = 0; i < std::min(kNamed, pictures.size()); ++i) {
+    out += (i > 0 ? ", " : "") + name_of(builder.view(pictures[i]));
+  }
+  if (pictures.size() > kNamed) out += fmt::format(" and {} more", pictures.size() - kNamed);
+  return out;
+}
+
+[[noreturn]] void refuse(const MapBuilder& builder, const MapBuild& build) {
+  const std::string what = to_string(build.status);
+  switch (build.status) {
+    case MapBuildStatus::kNotConnected: {
+      std::string parts;
+      for (std::size_t g = 0; g < std::min<std::size_t>(4, build.groups.size()); ++g) {
+        parts += fmt::format("{}{} ({})", g > 0 ? "; " : "", build.groups[g].size(),
+                             names_of(builder, build.groups[g]));
+      }
+      throw CommandError(kExitFailed,
+                         fmt::format("{}: {} parts, of pictures {}; add recordings that pass from "
+                                     "one to the other, slowly and at zooms between, or take the "
+                                     "largest with --largest-part",
+                                     what, build.groups.size(), parts));
+    }
+    case MapBuildStatus::kNoTexture:
+      throw CommandError(kExitFailed,
+                         fmt::format("{}: {} of {} pictures have too little; record by day, where "
+                                     "there is something to be seen",
+                                     what, build.without_texture.size(), builder.size()));
+    case MapBuildStatus::kNoFocalLength:
+      throw CommandError(kExitFailed, what +
+                                          "; give --focal-length, and zoom readings for all "
+                                          "recordings or for none");
+    default:
+      throw CommandError(kExitFailed, what + "; show more of the scene, each part several times");
+  }
+}
+
+class Progress {
+ public:
+  void say(double done, const char* what) {
+    if (!is_terminal(STDERR_FILENO)) return;
+    std::fprintf(stderr, "\r%3.0f %%  %-24s", 100 * done, what);
+    if (done >= 1) std::fputc('\n', stderr);
+  }
+};
+
+}  // namespace
+
+int build_map(const MapBuildCommand& options) {
+  std::vector<MapRecording> recordings;
+  std::vector<double> readings;
+  for (const std::string& directory : options.recordings) {
+    recordings.push_back(load_map_recording(directory, !options.no_telemetry));
+    const std::vector<double> more = recordings.back().zoom_readings();
+    readings.insert(readings.end(), more.begin(), more.end());
+  }
+  require_one_size(recordings);
+  const auto calibration = calibration_of(options);
+  const Calibration* known = calibration ? &calibration->calibration : nullptr;
+  MapBuildOptions build;
+  build.width = recordings.front().info.width;
+  build.height = recordings.front().info.height;
+  if (known != nullptr &&
+      (known->camera.width != build.width || known->camera.height != build.height)) {
+    throw CommandError(kExitUsage,
+                       fmt::format("{}: is of {}x{} px, the recordings have {}x{}; name the "
+                                   "calibration of this size with --calibration",
+                                   calibration->name, known->camera.width, known->camera.height,
+                                   build.width, build.height));
+  }
+  const FocalLengthKnowledge focal_lengths = focal_length_knowledge(
+      options.focal_length, known, calibration ? calibration->zoom_curve : ZoomCurve(), readings);
+  build.mechanics = known != nullptr ? known->mechanics : Mechanics<double>();
+  if (known != nullptr) build.line_delay = known->line_delay;
+  build.largest_part = options.largest_part;
+  if (options.focal_length.find(':') != std::string::npos) {
+    build.log_f_sigma = 0.1;
+    build.adjustment.level_sigma[0] = 0.3;
+    build.adjustment.bend_sigma[0] = 0.1;
+  }
+
+  std::vector<std::vector<MapView>> views;
+  for (const MapRecording& recording : recordings) {
+    views.emplace_back();
+    for (const FrameStamp& frame : recording.frames) {
+      views.back().push_back(map_view(recording, frame, known, focal_lengths));
+      if (focal_lengths.needs_reading() && !views.back().back().log_f) views.back().pop_back();
+    }
+    if (views.back().empty()) {
+      throw CommandError(kExitUsage,
+                         recording.directory +
+                             ": no frame has a zoom reading that the calibration or data sheet "
+                             "covers; leave it out, or record telemetry with zoom");
+    }
+  }
+  Progress progress;
+  MapBuilder builder(build);
+  const FeatureDetector detector;
+  const SceneMap there = map_to_add(options.add, build);
+  add_keyframes(there, views.front().front().angle_sigma, detector, &builder);
+  const std::vector<Chosen> chosen = choose(recordings, views, there, build, options.keyframes);
+  std::size_t done = 0;
+  for (std::size_t r = 0; r < recordings.size(); ++r) {
+    std::vector<std::size_t> frames;
+    std::vector<const MapView*> of_frame;
+    for (const Chosen& c : chosen) {
+      if (c.recording != r) continue;
+      const MapView& view = views[r][c.frame];
+      // Views of frames without a reading are not there: by number.
+      const auto at = std::find_if(recordings[r].frames.begin(), recordings[r].frames.end(),
+                                   [&](const FrameStamp& s) { return s.frame == view.frame; });
+      frames.push_back(static_cast<std::size_t>(at - recordings[r].frames.begin()));
+      of_frame.push_back(&view);
+    }
+    for_each_picture(recordings[r], frames, [&](std::size_t frame, const ImageView& image) {
+      const auto at =
+          static_cast<std::size_t>(std::find(frames.begin(), frames.end(), frame) - frames.begin());
+      const std::string jpeg = small_jpeg(image, image.width);
+      builder.add(*of_frame[at], features_of(detector, image), {jpeg.begin(), jpeg.end()});
+      progress.say(0.4 * static_cast<double>(++done) / static_cast<double>(chosen.size()),
+                   "features");
+    });
+  }
+  if (builder.size() < 2) {
+    throw CommandError(kExitFailed,
+                       fmt::format("{} of {} frames can be keyframes: a map needs pictures taken "
+                                   "slowly, with telemetry about their time; see alidade check",
+                                   builder.size(), recordings.front().frames.size()));
+  }
+  const MapBuild result =
+      builder.build([&](double part, const char* what) { progress.say(0.4 + 0.6 * part, what); });
+  progress.say(1, "");
+  if (!result.without_texture.empty()) {
+    spdlog::warn("left out, as they have too little texture: {}",
+                 names_of(builder, result.without_texture));
+  }
+  if (!result.not_connected.empty()) {
+    spdlog::warn("left out, as they hang on no other: {}", names_of(builder, result.not_connected));
+  }
+  if (result.status != MapBuildStatus::kOk) refuse(builder, result);
+  std::string error;
+  if (!save_scene_map(options.map, result.map, &error)) throw CommandError(kExitFailed, error);
+  std::fputs(
+      options.json ? map_json(result.map, options.map).c_str() : map_text(result.map).c_str(),
+      stdout);
+  if (!options.json) {
+    std::fputs(fmt::format("{} of {} pictures, {} twos of them compared, {} linked; {} tracks, {} "
+                           "observations, {:.2g} px rms\n",
+                           result.map.keyframes.size(), builder.size(), result.compared,
+                           result.linked, result.tracks, result.observations, result.residual_px)
+                   .c_str(),
+               stdout);
+  }
+  if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
+  return kExitOk;
+}
+
+}  // namespace alidade

@@ -1,0 +1,24 @@
+#pragma once
+// `alidade map build`: a scene map of recordings. Its options bear the names of the command line (command_line.cpp).
+
+#include <string>
+#include <vector>
+
+namespace alidade {
+
+struct MapBuildCommand {
+  std::vector<std::string> recordings;
+  std::string map;           // the file to write
+  std::string add;           // a map whose keyframes are taken over; empty: none
+  std::string calibration;   // empty: <first recording>/alidade/calibration.yaml, if it is there
+  std::string focal_length;  // px, or WIDE:TELE
+  int keyframes = 300;       // at most
+  bool no_telemetry = false;
+  bool largest_part = false;
+  bool json = false;
+};
+
+// Returns the exit code; throws CommandError.
+[[nodiscard]] int build_map(const MapBuildCommand& options);
+
+}  // namespace alidade

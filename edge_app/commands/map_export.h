@@ -1,0 +1,17 @@
+#pragma once
+// `alidade map export`: keyframes.csv, the keyframes' pictures, and panorama.png, a picture of all that the map has seen.
+
+#include <string>
+
+namespace alidade {
+
+struct MapExportCommand {
+  std::string map;
+  std::string directory;
+  int panorama_width = 4096;  // px, at most
+};
+
+// Returns the exit code; throws CommandError.
+[[nodiscard]] int export_map(const MapExportCommand& options);
+
+}  // namespace alidade

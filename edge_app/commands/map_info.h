@@ -1,0 +1,17 @@
+#pragma once
+// `alidade map info` and `map check`: what a scene map holds, and whether all of it can be.
+
+#include <string>
+
+namespace alidade {
+
+struct MapInfoCommand {
+  std::string map;
+  bool json = false;
+};
+
+// Return the exit code; throw CommandError.
+[[nodiscard]] int show_map(const MapInfoCommand& options);
+[[nodiscard]] int check_map(const MapInfoCommand& options);
+
+}  // namespace alidade

@@ -1,0 +1,208 @@
+#include "edge_app/commands/map_recording.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <limits>
+
+#include "core/calibration/number_text.h"
+#include "edge_app/commands/command.h"
+#include "edge_app/commands/video_tracks.h"
+#include "platform/video/recording_frame_source.h"
+
+namespace alidade {
+namespace {
+
+namespace fs = std::filesystem;
+
+// Of log f by a data sheet: one number, and a range between whose ends the lens goes its own way.
+constexpr double kSheetSigma = 0.02;
+constexpr double kRangeSigma = 0.1;
+// rad, of telemetry's orientation: with a calibration noise and backlash, without one the axes' directions, too.
+constexpr double kCalibratedAngleSigma = 5e-4;
+constexpr double kNominalAngleSigma = 1e-2;
+
+// Telemetry about a time; none before the first sample and after the last.
+struct Telling {
+  PanTilt<double> measured;
+  PanTilt<double> rate;  // 1/s
+  std::optional<double> zoom;
+  double zoom_rate = 0;  // 1/s
+};
+
+std::optional<Telling> telling_at(const std::vector<PanTiltSample>& samples, double time_s) {
+  const auto after =
+      std::upper_bound(samples.begin(), samples.end(), time_s,
+                       [](double t, const PanTiltSample& s) { return t < s.latest_time_s; });
+  if (after == samples.begin() || after == samples.end()) return std::nullopt;
+  const PanTiltSample& a = *std::prev(after);
+  const PanTiltSample& b = *after;
+  const double span = b.latest_time_s - a.latest_time_s;
+  const double part = span > 0 ? (time_s - a.latest_time_s) / span : 0;
+  const PanTilt<double> from{a.pan_rad, a.tilt_rad};
+  const Vector2<double> way = minus({b.pan_rad, b.tilt_rad}, from);
+  Telling out;
+  out.measured = plus(from, Vector2<double>(part * way));
+  if (span > 0) out.rate = {way.x() / span, way.y() / span};
+  if (a.zoom && b.zoom) {
+    out.zoom = *a.zoom + part * (*b.zoom - *a.zoom);
+    if (span > 0) out.zoom_rate = (*b.zoom - *a.zoom) / span;
+  } else if (a.zoom || b.zoom) {
+    out.zoom = a.zoom ? a.zoom : b.zoom;
+  }
+  return out;
+}
+
+double focal_length_of(const std::string& text) {
+  const std::optional<double> px = number_of(text);
+  if (px && *px >= 10 && *px <= 1e6) return *px;
+  throw CommandError(
+      kExitUsage, fmt::format("--focal-length: '{}' is no focal length in px; give one, as 1250, "
+                              "or WIDE:TELE, as 1250:25000",
+                              text));
+}
+
+}  // namespace
+
+FocalLengthKnowledge::FocalLengthKnowledge(const Calibration& calibration, const ZoomCurve& curve)
+    : needs_reading_(!curve.empty()) {
+  at_ = [calibration, curve](const std::optional<double>& zoom) -> std::optional<FocalLengthPrior> {
+    Calibration c = calibration;
+    if (!curve.empty() && (!zoom || !curve.at(*zoom, &c))) return std::nullopt;
+    return FocalLengthPrior{std::log(c.camera.focal_length),
+                            std::max(1e-4, relative_focal_length_sigma(c))};
+  };
+}
+
+FocalLengthKnowledge::FocalLengthKnowledge(double px) {
+  at_ = [px](const std::optional<double>&) { return FocalLengthPrior{std::log(px), kSheetSigma}; };
+}
+
+FocalLengthKnowledge::FocalLengthKnowledge(double wide_px, double tele_px, double wide_reading,
+                                           double tele_reading)
+    : needs_reading_(true) {
+  at_ = [=](const std::optional<double>& zoom) -> std::optional<FocalLengthPrior> {
+    if (!zoom) return std::nullopt;
+    const double part = (*zoom - wide_reading) / (tele_reading - wide_reading);
+    return FocalLengthPrior{std::log(wide_px) + part * std::log(tele_px / wide_px), kRangeSigma};
+  };
+}
+
+std::optional<FocalLengthPrior> FocalLengthKnowledge::at(const std::optional<double>& zoom) const {
+  return at_ ? at_(zoom) : std::nullopt;
+}
+
+FocalLengthKnowledge focal_length_knowledge(const std::string& focal_length,
+                                            const Calibration* calibration, const ZoomCurve& curve,
+                                            const std::vector<double>& readings) {
+  const auto [least, most] = std::minmax_element(readings.begin(), readings.end());
+  const bool zooms = !readings.empty() && *most > *least;
+  if (!focal_length.empty()) {
+    const std::size_t colon = focal_length.find(':');
+    if (colon == std::string::npos) {
+      if (zooms) {
+        throw CommandError(kExitUsage,
+                           "--focal-length: the recordings zoom; give WIDE:TELE, the focal lengths "
+                           "at their least and most reading, or a calibration of several zooms");
+      }
+      return FocalLengthKnowledge(focal_length_of(focal_length));
+    }
+    if (!zooms) {
+      throw CommandError(kExitUsage,
+                         "--focal-length: WIDE:TELE needs zoom readings in telemetry.csv that "
+                         "differ; give one focal length");
+    }
+    return {focal_length_of(focal_length.substr(0, colon)),
+            focal_length_of(focal_length.substr(colon + 1)), *least, *most};
+  }
+  if (calibration != nullptr) return {*calibration, curve};
+  if (zooms) {
+    throw CommandError(kExitUsage,
+                       "the recordings zoom, and nothing says what their readings mean; give "
+                       "--focal-length WIDE:TELE, or --calibration FILE with zoom_nodes");
+  }
+  return {};
+}
+
+std::vector<double> MapRecording::zoom_readings() const {
+  std::vector<double> out;
+  for (const PanTiltSample& sample : telemetry) {
+    if (sample.zoom) out.push_back(*sample.zoom);
+  }
+  return out;
+}
+
+MapRecording load_map_recording(const std::string& directory, bool with_telemetry) {
+  const auto require = [](bool ok, const std::string& error) {
+    if (!ok) throw CommandError(kExitUsage, error);
+  };
+  MapRecording out;
+  out.directory = directory;
+  std::string error;
+  require(read_recording_info(directory, &out.info, &error), error);
+  require(has_video(directory),
+          directory + ": no pictures in it; a scene map needs video.mkv or frames/");
+  require(read_frames_csv(directory, &out.frames, &error), error);
+  require(!out.frames.empty(), directory + "/frames.csv: no frames; record some");
+  if (with_telemetry && fs::exists(fs::path(directory) / "telemetry.csv")) {
+    require(read_telemetry_csv(directory, &out.telemetry, &error), error);
+    std::stable_sort(out.telemetry.begin(), out.telemetry.end(),
+                     [](const PanTiltSample& a, const PanTiltSample& b) {
+                       return a.latest_time_s < b.latest_time_s;
+                     });
+  }
+  return out;
+}
+
+MapView map_view(const MapRecording& recording, const FrameStamp& frame,
+                 const Calibration* calibration, const FocalLengthKnowledge& known) {
+  MapView view;
+  view.recording = recording.directory;
+  view.frame = frame.frame;
+  view.time_utc_s = frame.sender_utc_s.value_or(0);
+  const Calibration nominal;
+  const Calibration& c = calibration != nullptr ? *calibration : nominal;
+  const double line_delay = calibration != nullptr ? c.line_delay : 0;
+  const double clock_offset = calibration != nullptr ? c.clock_offset : 0;
+  const double middle_s = line_delay * recording.info.height / 2;
+  const auto told = telling_at(recording.telemetry, frame.receive_time_s + middle_s + clock_offset);
+  const auto f = known.at(told ? told->zoom : std::nullopt);
+  if (f) view.log_f = f->log_f;
+  if (!told) return view;
+  view.zoom = told->zoom;
+  view.telemetry = told->measured;
+  view.angle_sigma = calibration != nullptr ? kCalibratedAngleSigma : kNominalAngleSigma;
+  const Mechanics<double> mechanics = calibration != nullptr ? c.mechanics : Mechanics<double>();
+  view.angular_velocity = angular_velocity(mechanics, true_from_measured(mechanics, told->measured),
+                                           true_from_measured(mechanics, told->rate));
+  if (told->zoom && told->zoom_rate != 0) {
+    constexpr double kStep_s = 1e-3;
+    const auto later = known.at(*told->zoom + kStep_s * told->zoom_rate);
+    if (f && later) view.zoom_rate = (later->log_f - f->log_f) / kStep_s;
+  }
+  return view;
+}
+
+void for_each_picture(const MapRecording& recording, const std::vector<std::size_t>& frames,
+                      const std::function<void(std::size_t, const ImageView&)>& use) {
+  const auto video = open_recorded_frames({recording.directory, true, false});
+  for (std::size_t next = 0; next < frames.size();) {
+    Frame frame;
+    const ReadStatus status = video->read(frame, std::numeric_limits<double>::infinity());
+    if (status == ReadStatus::kEnd) return;
+    if (status != ReadStatus::kOk) throw CommandError(kExitFailed, video->error());
+    // One that could not be decoded is not among them.
+    while (next < frames.size() && recording.frames[frames[next]].frame < frame.stamp.frame) {
+      ++next;
+    }
+    if (next == frames.size() || recording.frames[frames[next]].frame != frame.stamp.frame) {
+      continue;
+    }
+    use(frames[next], {frame.luma, frame.width, frame.height, frame.stride});
+    ++next;
+  }
+}
+
+}  // namespace alidade

@@ -1,0 +1,182 @@
+// `alidade map` and `alidade localize`: the built executable on recordings that alidade-simulate made. The virtual camera shares no
+// code with what is tested.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <filesystem>
+#include <nlohmann/json.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "test/edge_app/alidade_command.h"
+#include "test/support/temporary_directory.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+namespace fs = std::filesystem;
+
+// A slow walk around, a field to either side, a picture each second.
+std::string walking_camera(const std::string& scene, const std::string& size = "640, height: 360") {
+  return "seed: 5\n"
+         "duration_s: 40\n"
+         "image: {width: " +
+         size +
+         ", rate_hz: 1}\n"
+         "camera: {focal_length_px: 800}\n"
+         "path: {type: triple_cosine, amplitude: 0.5, period_s: 40}\n"
+         "sensor: {read_noise: 1, jpeg_quality: 95}\n"
+         "recording: {images: png}\n"
+         "telemetry: {rate_hz: 5, sigma_rad: 2.0e-4}\n" +
+         scene;
+}
+
+const char* const kMapTexture =
+    "scene:\n"
+    "  procedural:\n"
+    "    - {width_deg: 360, height_deg: 180, projection: equirectangular}\n";
+
+Result map_command(std::vector<std::string> arguments) {
+  arguments.insert(arguments.begin(), "map");
+  return alidade(arguments);
+}
+
+std::vector<nlohmann::json> lines_of(const std::string& text) {
+  std::vector<nlohmann::json> out;
+  std::istringstream stream(text);
+  for (std::string line; std::getline(stream, line);) out.push_back(nlohmann::json::parse(line));
+  return out;
+}
+
+// One recording and one map for all tests, which write elsewhere.
+class MapCommands : public ::testing::Test {
+ protected:
+  static void SetUpTestSuite() {
+    directory_ = new TemporaryDirectory;
+    film("walk", walking_camera(kMapTexture));
+    built_ = new Result(map_command(
+        {"build", path("walk"), "-o", path("scene.map"), "--focal-length", "810", "--json"}));
+  }
+  static void TearDownTestSuite() {
+    delete built_;
+    delete directory_;
+  }
+  static void film(const std::string& name, const std::string& configuration) {
+    const std::string file = directory_->write(name + ".yaml", configuration);
+    const Result result = run({ALIDADE_SIMULATE, "-c", file, "-o", path(name)});
+    ASSERT_EQ(result.exit_code, 0) << result.errors;
+  }
+  static std::string path(const std::string& name) { return directory_->path() + "/" + name; }
+
+  static TemporaryDirectory* directory_;
+  static Result* built_;
+};
+TemporaryDirectory* MapCommands::directory_ = nullptr;
+Result* MapCommands::built_ = nullptr;
+
+TEST_F(MapCommands, BuildTellsTheFocalLength) {
+  ASSERT_EQ(built_->exit_code, 0) << built_->errors;
+  const auto json = nlohmann::json::parse(built_->output);
+  EXPECT_EQ(json["status"], "ok");
+  EXPECT_GE(json["keyframes"].get<int>(), 5);
+  const double f = json["levels"][0]["focal_length_px"][0].get<double>();
+  EXPECT_NEAR(f, 800, 8);
+}
+
+TEST_F(MapCommands, InfoAndCheckReadIt) {
+  const Result info = map_command({"info", path("scene.map")});
+  EXPECT_EQ(info.exit_code, 0) << info.errors;
+  EXPECT_THAT(info.output, StartsWith("640x360 px, "));
+  const Result check = map_command({"check", path("scene.map")});
+  EXPECT_EQ(check.exit_code, 0) << check.errors;
+  EXPECT_THAT(check.output, HasSubstr("whole"));
+}
+
+TEST_F(MapCommands, ExportWritesKeyframesPicturesAndAPanorama) {
+  const Result result = map_command({"export", path("scene.map"), "-o", path("out")});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  const auto rows = read_csv(directory_->read("out/keyframes.csv"));
+  ASSERT_GE(rows.size(), 5U);
+  EXPECT_NEAR(std::stod(rows[0].at("focal_length_px")), 800, 8);
+  EXPECT_TRUE(fs::exists(path("out/keyframes/000001.jpg")));
+  EXPECT_THAT(directory_->read("out/panorama.png"), StartsWith("\x89PNG"));
+}
+
+TEST_F(MapCommands, LocalizeFindsFramesWithoutTelemetry) {
+  const Result result =
+      alidade({"localize", path("scene.map"), "--no-telemetry", "--every", "6", path("walk")});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  const auto truth = read_csv(directory_->read("walk/truth.csv"));
+  const auto lines = lines_of(result.output);
+  ASSERT_EQ(lines.size(), 7U);
+  for (const auto& line : lines) {
+    ASSERT_EQ(line["status"], "ok") << line;
+    const auto& row = truth.at(line["frame"].get<std::size_t>());
+    // The axes are not known: without a calibration the map's base is.
+    EXPECT_NEAR(line["pan_rad"].get<double>(), std::stod(row.at("pan_rad")), 1e-2);
+    EXPECT_NEAR(line["tilt_rad"].get<double>(), std::stod(row.at("tilt_rad")), 1e-2);
+    EXPECT_NEAR(line["focal_length_px"].get<double>(), 800, 8);
+  }
+}
+
+TEST_F(MapCommands, LocalizeTakesPictures) {
+  const Result result = alidade({"localize", path("scene.map"), path("walk/frames/000007.png")});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_EQ(lines_of(result.output).at(0)["status"], "ok");
+}
+
+TEST_F(MapCommands, BuildAddsWhatIsNewToAMap) {
+  std::string further = walking_camera(kMapTexture);
+  further.replace(further.find("period_s: 40"), 12, "period_s: 40, pan_deg: 35");
+  film("further", further);
+  const Result result = map_command({"build", path("further"), "--add", path("scene.map"), "-o",
+                                     path("more.map"), "--focal-length", "810", "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  const auto before = nlohmann::json::parse(built_->output);
+  const auto after = nlohmann::json::parse(result.output);
+  EXPECT_GT(after["keyframes"].get<int>(), before["keyframes"].get<int>() + 1);
+  EXPECT_GT(after["levels"][0]["pan_rad"][1].get<double>(),
+            before["levels"][0]["pan_rad"][1].get<double>() + 0.3);
+  EXPECT_NEAR(after["levels"][0]["focal_length_px"][0].get<double>(), 800, 8);
+}
+
+TEST_F(MapCommands, PicturesOfAnotherSizeAndNoneAreRefused) {
+  film("small", walking_camera(kMapTexture, "240, height: 136"));
+  const Result size = alidade({"localize", path("scene.map"), path("small/frames/000000.png")});
+  EXPECT_EQ(size.exit_code, 2);
+  EXPECT_THAT(last_line(size.errors), HasSubstr("240x136 px"));
+  const Result none = alidade({"localize", path("scene.map"), path("walk/truth.csv")});
+  EXPECT_EQ(none.exit_code, 2);
+  const Result both = map_command({"build", path("walk"), path("small"), "-o", path("x.map")});
+  EXPECT_EQ(both.exit_code, 2);
+  EXPECT_THAT(last_line(both.errors), HasSubstr("one size"));
+}
+
+TEST_F(MapCommands, WhatHasNoTextureIsRefused) {
+  film("blank", walking_camera("scene: {background: 0.5}\n"));
+  const Result result =
+      map_command({"build", path("blank"), "-o", path("blank.map"), "--focal-length", "800"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(last_line(result.errors), HasSubstr("texture"));
+  EXPECT_FALSE(fs::exists(path("blank.map")));
+}
+
+TEST_F(MapCommands, WhatIsNoMapIsRefused) {
+  directory_->write("no.map", "this is no map");
+  for (const char* command : {"info", "check"}) {
+    const Result result = map_command({command, path("no.map")});
+    EXPECT_EQ(result.exit_code, 2);
+    EXPECT_THAT(last_line(result.errors), HasSubstr("no.map"));
+  }
+  EXPECT_EQ(map_command({"info", path("none.map")}).exit_code, 2);
+  EXPECT_EQ(map_command({}).exit_code, 2);
+}
+
+}  // namespace
+}  // namespace alidade
