@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <map>
+#include <unordered_map>
 
 #include "core/mapping/sphere_cell.h"
 #include "core/model/trigonometry.h"
@@ -42,8 +43,12 @@ void count_look(bool found, double now_utc_s, LandmarkLife* life) {
     life->matched /= 2;
   }
   ++life->looked_for;
-  if (!found) return;
+  if (!found) {
+    ++life->missed;
+    return;
+  }
   ++life->matched;
+  life->missed = 0;
   life->last_seen_utc_s = now_utc_s;
 }
 
@@ -117,7 +122,8 @@ bool UpkeepOptions::validate(const char** error) const {
       !(birth_gate_px > 0) || most_descriptor_step < 0 || most_candidates < 0) {
     return refuse("a condition of birth is out of range");
   }
-  if (!(patience_s > 0) || least_misses < 1 || !(fog_share >= 0) || !(fog_share <= 1)) {
+  if (!(patience_s > 0) || !(longest_fog_s > 0) || least_misses < 1 || !(fog_share >= 0) ||
+      !(fog_share <= 1)) {
     return refuse("a condition of death is out of range");
   }
   if (!(cell_scales > 0) || cell_capacity < 1 || most_landmarks < 1 ||
@@ -289,13 +295,7 @@ void MapUpkeep::follow(const UpkeepView& view, const SceneMap& map, Picture* pic
         follow_one(view.features->features[feature], view.features->descriptors[feature],
                    view.time_utc_s, *picture, &landmark);
     count_look(followed, view.time_utc_s, &landmark.life);
-    if (followed) {
-      ++counts->updated;
-      misses_.erase(landmark.id);
-    } else {
-      ++counts->beyond_gate;
-      ++misses_[landmark.id];
-    }
+    ++(followed ? counts->updated : counts->beyond_gate);
     picture->changed[landmark.id] = landmark;
   }
 }
@@ -310,7 +310,11 @@ void MapUpkeep::judge(const UpkeepView& view, const SceneMap& map, Picture* pict
   for (const Visible& visible : picture->visible) {
     if (!visible.expected) continue;
     ++counts->expected;
-    usual += usual_share(map.landmarks[visible.index].life);
+    // What was missing the last time, or not seen for long, says nothing of fog: else what is gone would hide its own death.
+    const LandmarkLife& life = map.landmarks[visible.index].life;
+    if (life.missed > 0 || view.time_utc_s - life.last_seen_utc_s > options_.longest_fog_s)
+      continue;
+    usual += usual_share(life);
     found += was_found(visible) ? 1 : 0;
   }
   counts->all_hidden = found < options_.fog_share * usual;
@@ -318,11 +322,10 @@ void MapUpkeep::judge(const UpkeepView& view, const SceneMap& map, Picture* pict
   for (const Visible& visible : picture->visible) {
     if (!visible.expected || was_found(visible)) continue;
     const SceneLandmark& landmark = map.landmarks[visible.index];
-    const int misses = ++misses_[landmark.id];
     const double unseen_s = view.time_utc_s - landmark.life.last_seen_utc_s;
-    if (misses >= options_.least_misses && unseen_s > options_.patience_s) {
+    if (static_cast<int>(landmark.life.missed) + 1 >= options_.least_misses &&
+        unseen_s > options_.patience_s) {
       change->died.push_back(landmark.id);
-      misses_.erase(landmark.id);
       ++counts->died;
       continue;
     }
@@ -469,7 +472,6 @@ void MapUpkeep::give_birth(const std::vector<SceneLandmark>& ready, double now_u
   const auto kill = [&](std::int64_t id) {
     change->died.insert(std::lower_bound(change->died.begin(), change->died.end(), id), id);
     dead.push_back(id);
-    misses_.erase(id);
     ++counts->died;
   };
   std::unordered_map<std::uint64_t, int> newborn;

@@ -4,15 +4,14 @@
 //   seen       direction by the landmark's own filter (landmark_filter.h), descriptor by a running average with forgetting
 //   born       a feature that no landmark explains, seen at one place in so many pictures running, if it stands close to the landmarks
 //              that gave the pose: the proximity check (Fig. 3), area of their bounding box over that of the box with the new one in it
-//   dead       not found for `patience_s`, and in so many pictures in which it should have been. A miss counts only where others are
-//              found as usual: that fog, night or a lorry hides them all is no landmark's fault
+//   dead       not found for `patience_s`, and in so many pictures in which it should have been. A miss counts only where what was
+//              found the last time is found again: that fog, night or a lorry hides all is no landmark's fault
 // Bounded: the sphere is divided into cells of a size that goes with the landmark's, with so many landmarks each; where one is full, and
 // when the map is, the least useful goes for a new one, if it is worth less.
-// Deterministic: equal pictures give equal changes. Batch work: allocates; one thread at a time. What it remembers beside the map (misses,
-// features that may become landmarks) is bounded, and lost at the end without harm.
+// Deterministic: equal pictures give equal changes. Batch work: allocates; one thread at a time. What it remembers beside the map, features that may
+// become landmarks, is bounded, and lost at the end without harm.
 
 #include <cstdint>
-#include <unordered_map>
 #include <vector>
 
 #include "core/mapping/features.h"
@@ -39,7 +38,8 @@ struct UpkeepOptions {
   // Death
   double patience_s = 2.5 * 86400;
   int least_misses = 20;
-  double fog_share = 0.5;  // found of what is usually found: with less, nobody is guilty
+  double fog_share = 0.5;  // found of what was found the last time: with less, nobody is guilty
+  double longest_fog_s = 5 * 86400;  // what was not seen for longer is gone, not hidden
   // Bounds
   double cell_scales = 20;  // side of a cell, in the scale of its octave
   int cell_capacity = 3;
@@ -116,7 +116,6 @@ class MapUpkeep {
   UpkeepOptions options_;
   bool valid_;
   std::vector<Candidate> candidates_;
-  std::unordered_map<std::int64_t, int> misses_;  // running, by id
 };
 
 // How much a landmark is worth keeping, 0 to 1: found when looked for, and not long ago.

@@ -53,6 +53,7 @@ struct LandmarkLife {
   double last_seen_utc_s = 0;
   std::uint32_t looked_for = 0;  // views in which it should have been found
   std::uint32_t matched = 0;     // of those
+  std::uint32_t missed = 0;      // running, up to the latest: 0 if it was found there
 };
 
 struct SceneLandmark {

@@ -46,7 +46,7 @@ class SceneRows {
         insert_picture_(database, "INSERT INTO picture VALUES(?,?,?)"),
         put_landmark_(
             database,
-            "INSERT OR REPLACE INTO landmark VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)"),
+            "INSERT OR REPLACE INTO landmark VALUES(?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?,?)"),
         insert_sighting_(database, "INSERT INTO sighting VALUES(?,?,?,?,?)"),
         find_landmark_(database, "SELECT sightings, sightings_crc, crc FROM landmark WHERE id = ?"),
         delete_sightings_(database, "DELETE FROM sighting WHERE landmark = ?"),

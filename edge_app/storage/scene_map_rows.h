@@ -246,6 +246,7 @@ void landmark_fields(Row* row, Landmark& l, Sum& sightings, Sum& sighting_sum) {
   row->field(l.life.last_seen_utc_s);
   row->field(l.life.looked_for);
   row->field(l.life.matched);
+  row->field(l.life.missed);
   row->field(sightings);
   row->field(sighting_sum);
 }

@@ -21,6 +21,7 @@ inline const std::array<std::string, 7> kSceneMapTables = {
     "CREATE TABLE landmark(id INTEGER PRIMARY KEY, d_x, d_y, d_z, cov_xx, cov_xy, cov_yy, "
     "shared_xx, shared_xy, shared_yy, "
     "scale_rad, focal_length_px, descriptor, born_utc_s, last_seen_utc_s, looked_for, matched, "
+    "missed, "
     "sightings, sightings_crc, crc)",
     "CREATE TABLE lens_knot(number INTEGER PRIMARY KEY, log_f)",
     "CREATE TABLE lens_point(number INTEGER PRIMARY KEY, delta, kappa, centre_u, centre_v)",

@@ -39,7 +39,8 @@ class MapBytes {
       matrix(l.covariance);
       matrix(l.shared_covariance);
       put(l.id, l.scale_rad, l.focal_length_px, l.descriptor, l.life.born_utc_s,
-          l.life.last_seen_utc_s, l.life.looked_for, l.life.matched, l.sightings.size());
+          l.life.last_seen_utc_s, l.life.looked_for, l.life.matched, l.life.missed,
+          l.sightings.size());
       for (const SceneSighting& s : l.sightings) put(s.keyframe, s.u.x(), s.u.y(), s.scale_px);
     }
   }

@@ -5,13 +5,9 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/resource.h>
-#include <sys/wait.h>
-#include <unistd.h>
 
 #include <filesystem>
-#include <fstream>
 
-#include "edge_app/storage/scene_map_schema.h"
 #include "test/edge_app/changing_scene_map.h"
 #include "test/support/temporary_directory.h"
 

@@ -3,7 +3,8 @@
 // lens): what it would find in each picture, without pictures.
 //   things       corners and blobs on the sphere; a share of them vanishes within the month, others appear instead
 //   light        the sun turns once a day: descriptors change, blobs move by a part of a pixel, some things are there for hours only
-//   cars         groups of things that stand for hours in one half of a view, and drive off by a few pixels before
+//   cars         groups of things that stand for hours in one half of a view
+//   trees        things in the right half that sway together, slowly; with `bare` nothing lasting stands there
 //   shadows      things that wander by pixels in a minute
 //   fog          hours in which next to nothing is seen
 // What is matched with the map is found by descriptors near the place where telemetry looks for it; poses are find_pose()'s.
@@ -33,6 +34,8 @@ struct ChangingSceneOptions {
   int cars = 2;          // groups of 20 at a time in a view
   double shadows = 0.1;  // share of things that wander
   bool fog = true;
+  int trees = 0;      // things in a view
+  bool bare = false;  // the right 60 % of each view hold trees and nothing else
 };
 
 class ChangingScene {
@@ -52,6 +55,7 @@ class ChangingScene {
       for (int i = 0; i < options_.cars; ++i) add_cars(place);
       const int shadows = static_cast<int>(options_.shadows * options_.things);
       for (int i = 0; i < shadows; ++i) add_shadow(place);
+      for (int i = 0; i < options_.trees; ++i) add_tree(place);
     }
     std::uniform_real_distribution<double> day(0, options_.days);
     for (int i = 0; options_.fog && i < options_.days / 2; ++i)
@@ -110,7 +114,8 @@ class ChangingScene {
       turn.emplace_back(common * normal(), common * normal(), common * normal());
     }
     for (const Thing& thing : things_) {
-      if (thing.from_s > 0 || thing.wander_px_per_s != 0 || !lit(thing, 0)) continue;
+      if (thing.from_s > 0 || thing.wander_px_per_s != 0 || thing.sway_px != 0 || !lit(thing, 0))
+        continue;
       SceneLandmark landmark;
       landmark.id = map.next_landmark++;
       const Eigen::Vector3d d = direction_of(thing, 0);
@@ -140,6 +145,7 @@ class ChangingScene {
     double from_s = -1, until_s = 1e12;
     double lit_from = 0, lit_hours = 24;  // of the day
     double wander_px_per_s = 0;
+    double sway_px = 0;
     Eigen::Vector3d wander_to;
     double phase = 0;  // of what light does to its place
     Histogram base{}, cosine{}, sine{};
@@ -166,14 +172,14 @@ class ChangingScene {
     return out;
   }
   void add_lasting(int place) {
-    Thing thing = thing_at(place, kWidth * part(), kHeight * part());
+    Thing thing = thing_at(place, lasting_width() * part(), kHeight * part());
     if (options_.light > 0 && part() < 0.2) {
       thing.lit_from = 24 * part();
       thing.lit_hours = 4 + 6 * part();
     }
     if (part() < options_.replaced) {
       thing.until_s = options_.days * kDay_s * part();
-      Thing instead = thing_at(place, kWidth * part(), kHeight * part());
+      Thing instead = thing_at(place, lasting_width() * part(), kHeight * part());
       instead.from_s = thing.until_s;
       things_.push_back(instead);
     }
@@ -193,6 +199,14 @@ class ChangingScene {
       }
       t = until;
     }
+  }
+  [[nodiscard]] double lasting_width() const { return options_.bare ? 0.4 * kWidth : kWidth; }
+  void add_tree(int place) {
+    Thing thing = thing_at(place, kWidth * (0.5 + 0.5 * part()), kHeight * part());
+    thing.sway_px = 4;
+    // All to one side.
+    thing.wander_to = thing.d.cross(Eigen::Vector3d::UnitZ()).normalized();
+    things_.push_back(thing);
   }
   void add_shadow(int place) {
     Thing thing = thing_at(place, kWidth * part(), kHeight * part());
@@ -217,7 +231,8 @@ class ChangingScene {
     const double wandered = thing.wander_px_per_s * std::fmod(t_s, kDay_s);
     const double shifted =
         0.05 * thing.scale_px * options_.light * std::cos(2 * kPi * hour(t_s) / 24 + thing.phase);
-    return (thing.d + (wandered + shifted) / kFocalLength * thing.wander_to).normalized();
+    const double swayed = thing.sway_px * std::sin(2 * kPi * t_s / 9000);
+    return (thing.d + (wandered + shifted + swayed) / kFocalLength * thing.wander_to).normalized();
   }
   [[nodiscard]] Descriptor descriptor_of(const Thing& thing, double t_s) {
     const double angle = 2 * kPi * hour(t_s) / 24, amount = light_at(t_s);

@@ -167,7 +167,7 @@ TEST_F(UpkeepTest, WhatIsGoneDiesAfterItsPatience) {
 
 TEST_F(UpkeepTest, NoLandmarkIsGuiltyOfFog) {
   const std::vector<SceneLandmark> before = map.landmarks;
-  for (int i = 0; i < 300; ++i) {
+  for (int i = 0; i < 110; ++i) {
     show({1, 6, 19, 24}, {}, 3600.0 * i);
     EXPECT_TRUE(counts.all_hidden);
   }
@@ -187,6 +187,28 @@ TEST_F(UpkeepTest, AWholeSceneThatIsReplacedIsNotTakenForFogForever) {
   }
   EXPECT_EQ(map.landmarks.size(), 24U);
   EXPECT_EQ(landmark_index(map, 7), -1);
+}
+
+TEST_F(UpkeepTest, ManyThatAreGoneDoNotHideTheirOwnDeath) {
+  // Five cars come and go, each with more things than the rest of the scene; each is there for 25 pictures.
+  double t = 0;
+  for (int car = 0; car < 5; ++car) {
+    std::vector<Vector2<double>> things;
+    for (int i = 0; i < 30; ++i) {
+      things.emplace_back(230.0 + 14 * car + 150 * (i % 6), 130.0 + 10 * car + 100 * (i / 6));
+    }
+    std::set<std::int64_t> seen = grid();
+    for (int i = 0; i < 25; ++i, t += 60) {
+      const MapChange change = show(seen, i < 20 ? things : std::vector<Vector2<double>>{}, t);
+      for (const SceneLandmark& landmark : change.born) seen.insert(landmark.id);
+    }
+    EXPECT_GT(seen.size(), 40U);
+  }
+  EXPECT_GT(map.landmarks.size(), 120U);
+  // Another program goes on with the map.
+  upkeep = MapUpkeep();
+  for (int i = 0; i < 150; ++i, t += 3600) show(grid(), {}, t);
+  EXPECT_EQ(map.landmarks.size(), 24U);
 }
 
 TEST_F(UpkeepTest, ACellHoldsSoManyAndTheLeastUsefulGoes) {

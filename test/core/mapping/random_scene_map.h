@@ -63,7 +63,7 @@ inline SceneMap random_scene_map(std::uint64_t seed, int keyframes, int landmark
     l.focal_length_px = std::exp(7 + 2.3 * part(random));
     for (std::uint8_t& value : l.descriptor) value = static_cast<std::uint8_t>(random());
     l.life = {1.7e9 + i, 1.7e9 + 2 * i, static_cast<std::uint32_t>(20 + i),
-              static_cast<std::uint32_t>(10 + i)};
+              static_cast<std::uint32_t>(10 + i), static_cast<std::uint32_t>(i % 9)};
     for (int s = 0; s < i % 5 && s < keyframes; ++s) {
       const SceneKeyframe& by = map.keyframes[static_cast<std::size_t>(s * keyframes / 5)];
       if (!l.sightings.empty() && l.sightings.back().keyframe == by.id) continue;
