@@ -182,6 +182,7 @@ int check_links(const CheckOptions& options) {
   const Config config = require_config(options.config);
   const NamedCalibration calibration = choose_calibration(config);
   check_lens_prior(config, calibration.calibration.camera);
+  static_cast<void>(require_plane(config));
   if (!options.json) print_beginning(options.config, calibration);
 
   const Measured measured = measure(config, options.duration_s);

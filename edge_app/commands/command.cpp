@@ -9,6 +9,7 @@
 #include <filesystem>
 
 #include "edge_app/storage/calibration_file.h"
+#include "edge_app/storage/plane_file.h"
 #include "platform/pan_tilt/onvif_source.h"
 #include "platform/pan_tilt/query_source.h"
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
@@ -44,6 +45,14 @@ NamedCalibration require_calibration_file(const std::string& path) {
   chosen.calibrated = true;
   chosen.name = path;
   return chosen;
+}
+
+std::shared_ptr<const PlaneEstimate> require_plane(const Config& config) {
+  if (config.tracking.plane.empty()) return nullptr;
+  PlaneEstimate plane;
+  std::string error;
+  if (!load_plane(config.tracking.plane, &plane, &error)) throw CommandError(kExitUsage, error);
+  return std::make_shared<const PlaneEstimate>(plane);
 }
 
 NamedCalibration choose_calibration(const Config& config) {

@@ -7,6 +7,7 @@
 #include <stdexcept>
 #include <string>
 
+#include "core/tracking/plane_estimate.h"
 #include "edge_app/config/config.h"
 #include "edge_app/config/noise_file.h"
 #include "edge_app/pipeline/orientation_step.h"
@@ -42,6 +43,9 @@ NamedCalibration require_calibration_file(const std::string& path);
 
 // The file's calibration; the data sheet's if there is no file, or not yet (calibration.auto).
 NamedCalibration choose_calibration(const Config& config);
+
+// The ground plane that the configuration names; null if it names none.
+std::shared_ptr<const PlaneEstimate> require_plane(const Config& config);
 
 // A camera known from its data sheet only: nominal axes, no offsets, and standard deviations that admit it.
 Calibration data_sheet_calibration(const CameraConfig& camera);

@@ -79,6 +79,7 @@ void wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport
 
 int run_live(const RunOptions& options) {
   const Config config = require_config(options.config);
+  const std::shared_ptr<const PlaneEstimate> plane = require_plane(config);
   Calibrating calibrating;
   NamedCalibration calibration;
   MapState map;
@@ -124,6 +125,7 @@ int run_live(const RunOptions& options) {
   sources.ask_for_calibration = [&calibrating] {
     return calibrating.calibration && calibrating.calibration->ask_for_fresh();
   };
+  sources.plane = plane;
   sources.version = ALIDADE_VERSION;
   sources.camera = video->name();
   sources.latency_measured = of_pipeline.measure_latency;

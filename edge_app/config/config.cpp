@@ -246,6 +246,13 @@ void check_ages(const Config& config, const YamlSection& pan_tilt, const YamlSec
                   extrapolation_s, repeat_s, why, repeat_s, right_repeat));
 }
 
+TrackingConfig read_tracking(YamlSection section, const std::string& path) {
+  TrackingConfig tracking;
+  if (const auto plane = section.text("plane")) tracking.plane = path_relative_to(path, *plane);
+  section.finish();
+  return tracking;
+}
+
 // What goes with what, beyond single sections.
 void check_together(const Config& config, const YamlSection& calibration, const std::string& path,
                     std::vector<std::string>* warnings) {
@@ -276,6 +283,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   const YamlSection camera = top.section("camera");
   const YamlSection calibration = top.section("calibration");
   const YamlSection realtime = top.section("realtime");
+  const YamlSection tracking = top.section("tracking");
   const YamlSection output = top.section("output");
   // Before one is missed: it may be there, mistyped.
   top.finish();
@@ -289,6 +297,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   config->camera = read_camera(camera);
   config->calibration = read_calibration(calibration, path);
   config->realtime = read_realtime(realtime);
+  config->tracking = read_tracking(tracking, path);
   if (scope == ConfigScope::kAll) check_ages(*config, pan_tilt, realtime);
   config->output = read_output(output, path, &config->warnings);
   if (scope == ConfigScope::kAll) check_together(*config, calibration, path, &config->warnings);

@@ -64,6 +64,10 @@ struct CalibrationConfig {
   double zoom_tolerance = 0;  // device units within which a calibration holds
 };
 
+struct TrackingConfig {
+  std::string plane;  // a plane.yaml; empty: none
+};
+
 struct RealtimeConfig {
   bool landmarks = true;  // mode OE; false: PT, and nothing is calibrated
   int priority = 0;       // SCHED_FIFO priority, see priority_of(); 0 leaves the scheduler alone
@@ -83,6 +87,7 @@ struct Config {
   CameraConfig camera;
   CalibrationConfig calibration;
   RealtimeConfig realtime;
+  TrackingConfig tracking;
   OutputConfig output;
   std::vector<std::string> warnings;  // FILE:LINE: ... lines for the log
 };

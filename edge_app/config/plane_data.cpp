@@ -87,6 +87,11 @@ class PlaneDataReader {
   static std::string name_of(YamlSection& section) {
     const std::optional<std::string> name = section.text("name");
     if (!name) section.fail_missing("name", "the report calls it by that");
+    const auto is_control = [](char c) {
+      return static_cast<unsigned char>(c) < 0x20 || c == 0x7F;
+    };
+    if (std::any_of(name->begin(), name->end(), is_control))
+      section.fail("name", "has characters that are no text; give one line");
     return *name;
   }
   static double sigma_of(YamlSection& section) {

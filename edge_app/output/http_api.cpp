@@ -12,6 +12,7 @@
 #include "edge_app/output/openapi.h"
 #include "edge_app/output/or_null.h"
 #include "edge_app/output/pixel_query.h"
+#include "edge_app/output/plane_json.h"
 #include "edge_app/output/record_events.h"
 #include "edge_app/output/record_format.h"
 #include "edge_app/output/service_metrics.h"
@@ -74,6 +75,13 @@ ServerResponse calibration(const HttpApiSources& sources) {
   return json_response(json);
 }
 
+ServerResponse ground_plane(const HttpApiSources& sources) {
+  if (!sources.plane)
+    return http_error(
+        404, "no plane is configured: set tracking.plane to a plane.yaml of alidade plane fit");
+  return json_response(plane_json(*sources.plane));
+}
+
 ServerResponse calibrate(const HttpApiSources& sources) {
   if (!sources.ask_for_calibration())
     return http_error(409,
@@ -118,7 +126,7 @@ ServerResponse directions(const HttpApiSources& sources, const std::string& body
   OrientationRecord record;
   ServerResponse refusal;
   if (!choose_record(sources, query.which, &record, &refusal)) return refusal;
-  return text_response("application/json", direction_answer(record, query));
+  return text_response("application/json", direction_answer(record, query, sources.plane.get()));
 }
 
 ServerResponse pixels(const HttpApiSources& sources, const std::string& body) {
@@ -250,6 +258,8 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
               [sources](const ServerRequest&) { return history(sources); });
   server->get("/api/v1/calibration", HttpAccess::kToken,
               [sources](const ServerRequest&) { return calibration(sources); });
+  server->get("/api/v1/plane", HttpAccess::kToken,
+              [sources](const ServerRequest&) { return ground_plane(sources); });
   server->post("/api/v1/calibrate", HttpAccess::kToken, kMaxQueryBytes,
                [sources](const ServerRequest&) { return calibrate(sources); });
   server->post(

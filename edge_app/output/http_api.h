@@ -7,6 +7,7 @@
 #include <memory>
 #include <string>
 
+#include "core/tracking/plane_estimate.h"
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/live_state.h"
 #include "edge_app/pipeline/pipeline.h"
@@ -22,6 +23,7 @@ struct HttpApiSources {
   std::function<bool()> ask_for_calibration;
   // Empty without one. The zoom curve in use; null: there is none.
   std::function<std::shared_ptr<const ZoomCurve>()> zoom_curve;
+  std::shared_ptr<const PlaneEstimate> plane;  // null: none is configured
   std::string version;
   std::string camera;            // the video source's name, without a password
   bool latency_measured = true;  // false for a recording

@@ -10,6 +10,7 @@
 #include <set>
 
 #include "core/model/direction.h"
+#include "edge_app/output/plane_json.h"
 #include "edge_app/pipeline/frame_geometry.h"
 
 namespace alidade {
@@ -185,7 +186,8 @@ bool parse_pixel_query(const std::string& body, PixelQuery* query, std::string* 
   return true;
 }
 
-std::string direction_answer(const OrientationRecord& record, const DirectionQuery& query) {
+std::string direction_answer(const OrientationRecord& record, const DirectionQuery& query,
+                             const PlaneEstimate* plane) {
   const FrameOrientation frame = unpack(record.orientation->geometry, record.camera);
   Json directions = Json::array();
   for (const Vector2<double>& u : query.pixels) {
@@ -213,6 +215,7 @@ std::string direction_answer(const OrientationRecord& record, const DirectionQue
       item["basis"] = {as_json(Vector3<double>(basis.col(0))),
                        as_json(Vector3<double>(basis.col(1)))};
       item["sigma_rad"] = std::sqrt(std::max(largest, 0.0));
+      if (plane != nullptr) item["plane"] = plane_point_json(*plane, d_b, cov);
     }
     directions.push_back(std::move(item));
   }

@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "core/model/linear_algebra.h"
+#include "core/tracking/plane_estimate.h"
 #include "edge_app/pipeline/orientation_record.h"
 
 namespace alidade {
@@ -46,9 +47,10 @@ struct PixelQuery {
 [[nodiscard]] bool parse_pixel_query(const std::string& body, PixelQuery* query,
                                      std::string* error);
 
-// Of a record with a frame and an orientation. One line of JSON with a line feed.
+// Of a record with a frame and an orientation. One line of JSON with a line feed. With a plane each direction has its place on it.
 [[nodiscard]] std::string direction_answer(const OrientationRecord& record,
-                                           const DirectionQuery& query);
+                                           const DirectionQuery& query,
+                                           const PlaneEstimate* plane = nullptr);
 [[nodiscard]] std::string pixel_answer(const OrientationRecord& record, const PixelQuery& query);
 
 }  // namespace alidade

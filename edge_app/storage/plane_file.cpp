@@ -2,7 +2,6 @@
 
 #include <yaml-cpp/yaml.h>
 
-#include <Eigen/LU>
 #include <cmath>
 
 #include "core/calibration/number_text.h"
@@ -16,22 +15,6 @@ constexpr double kDegrees = 180 / kPi;
 std::string degrees_text(double angle) { return exact_text(angle * kDegrees); }
 
 }  // namespace
-
-PlaneValues plane_values(const WorldPlane& plane) {
-  const BaseAttitude attitude = base_attitude(plane);
-  PlaneValues out;
-  out.value << attitude.heading, attitude.pitch, attitude.roll, plane.position;
-  PlaneCovariance J = PlaneCovariance::Identity();
-  J.topLeftCorner<3, 3>() = attitude_jacobian(attitude).inverse();
-  out.covariance = J * plane.covariance * J.transpose();
-  out.covariance = (out.covariance + out.covariance.transpose()).eval() / 2;
-  // A heading that is defined has none but rounding.
-  if (out.covariance(0, 0) < 1e-20 * out.covariance.topLeftCorner<3, 3>().trace()) {
-    out.covariance.row(0).setZero();
-    out.covariance.col(0).setZero();
-  }
-  return out;
-}
 
 std::string format_plane(const PlaneEstimate& estimate, const PlaneFit& fit) {
   constexpr std::array<const char*, kPlaneParameterCount> kMeanings = {

@@ -10,34 +10,17 @@
 // Reading is strict, as of lens.yaml: every slip is an error in one line, `file:line: what; what would be right`. What is written is
 // read back to rounding.
 
-#include <array>
-#include <optional>
 #include <string>
 
-#include "core/tracking/local_frame.h"
+#include "core/tracking/plane_estimate.h"
 #include "core/tracking/plane_fit.h"
-#include "core/tracking/world_plane.h"
 
 namespace alidade {
-
-struct PlaneEstimate {
-  WorldPlane plane;
-  std::optional<GeodeticPosition> origin;
-};
 
 [[nodiscard]] bool parse_plane(const std::string& text, const std::string& name,
                                PlaneEstimate* estimate, std::string* error);
 // The same for a file: one that cannot be read is an error, too.
 [[nodiscard]] bool load_plane(const std::string& path, PlaneEstimate* estimate, std::string* error);
-
-// The six values and their covariance, in the order above.
-struct PlaneValues {
-  Matrix<double, kPlaneParameterCount, 1> value;
-  PlaneCovariance covariance;
-};
-inline constexpr std::array<const char*, kPlaneParameterCount> kPlaneValueNames = {
-    "heading", "pitch", "roll", "x", "y", "height"};
-[[nodiscard]] PlaneValues plane_values(const WorldPlane& plane);
 
 // The base's forward direction must not point straight up or down (kLeastForward): its heading would mean nothing.
 [[nodiscard]] std::string format_plane(const PlaneEstimate& estimate, const PlaneFit& fit);

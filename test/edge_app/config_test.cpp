@@ -176,6 +176,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
            "2.5}\n"
            "realtime: {mode: PT, priority: 60, cpu: 3, lock_memory: true, max_extrapolation_s: "
            "0.5}\n"
+           "tracking: {plane: ground/plane.yaml}\n"
            "output: {csv: true, json: false}\n"),
       IsEmpty());
   EXPECT_EQ(config_.video.transport, VideoConfig::Transport::kUdp);
@@ -201,6 +202,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.calibration.prior, directory_.path() + "/bench/lens.yaml");
   EXPECT_FALSE(config_.calibration.automatic);
   EXPECT_EQ(config_.calibration.zoom_tolerance, 2.5);
+  EXPECT_EQ(config_.tracking.plane, directory_.path() + "/ground/plane.yaml");
   EXPECT_FALSE(config_.realtime.landmarks);
   EXPECT_EQ(config_.realtime.priority, 60);
   EXPECT_EQ(config_.realtime.cpu, 3);

@@ -34,13 +34,14 @@ LiveStateOptions few_lines() {
 
 class HttpApiTest : public ::testing::Test {
  protected:
-  HttpApiTest() {
+  explicit HttpApiTest(std::shared_ptr<const PlaneEstimate> plane = nullptr) {
     HttpApiSources sources;
     sources.live = &live_;
     sources.summary = [this] { return summary_; };
     sources.video_losses = [] { return FrameSourceCounters{3, 4}; };
     sources.ask_for_calibration = [this] { return asked_ = calibrating_; };
     sources.zoom_curve = [this] { return curve_; };
+    sources.plane = std::move(plane);
     sources.version = "1.2.3";
     sources.camera = "a camera";
     add_api_routes(&server_, sources);
@@ -68,6 +69,19 @@ class HttpApiTest : public ::testing::Test {
   bool calibrating_ = false;
   bool asked_ = false;
   HttpServer server_{HttpServerOptions{}};
+};
+
+PlaneEstimate some_ground() {
+  PlaneEstimate out;
+  out.plane.R_base_from_world = R_base_from_world_of(0.5, 0.1, 0);
+  out.plane.position = {1, 2, 12};
+  out.plane.covariance.diagonal().setConstant(1e-4);
+  return out;
+}
+
+class HttpApiWithPlaneTest : public HttpApiTest {
+ protected:
+  HttpApiWithPlaneTest() : HttpApiTest(std::make_shared<const PlaneEstimate>(some_ground())) {}
 };
 
 OrientationRecord record_without_orientation(std::int64_t frame) {
@@ -142,6 +156,22 @@ TEST_F(HttpApiTest, AFrameWithoutAnOrientationHasNoDirectionsAndSaysWhy) {
   EXPECT_THAT(post("/api/v1/pixel", R"({"time_s":100.28,"directions":[[1,0,0]]})"),
               StartsWith("HTTP/1.1 409 "));
   EXPECT_THAT(get("/api/v1/calibration"), StartsWith("HTTP/1.1 404 "));
+}
+
+TEST_F(HttpApiTest, WithoutAPlaneSaysHowToHaveOne) {
+  const std::string answer = get("/api/v1/plane");
+  EXPECT_THAT(answer, StartsWith("HTTP/1.1 404 "));
+  EXPECT_THAT(body_of(answer)["error"].get<std::string>(), HasSubstr("set tracking.plane"));
+}
+
+TEST_F(HttpApiWithPlaneTest, TellsThePlane) {
+  const json told = body_of(get("/api/v1/plane"));
+  EXPECT_EQ(told["height"]["value"], 12.0);
+  EXPECT_EQ(told["height"]["sigma"], 0.01);
+  EXPECT_NEAR(told["heading"]["value"].get<double>(), 0.5, 1e-12);
+  EXPECT_TRUE(told["origin"].is_null());
+  EXPECT_EQ(told["covariance"]["names"].size(), 6U);
+  EXPECT_EQ(told["covariance"]["matrix"][5][5], 1e-4);
 }
 
 TEST_F(HttpApiTest, TellsTheZoomCurveWithTheCalibration) {

@@ -77,6 +77,10 @@ json directions_of(const std::string& body) {
   return json::parse(direction_answer(record(), direction_query(body)));
 }
 
+json directions_on(const PlaneEstimate& plane, const std::string& body) {
+  return json::parse(direction_answer(record(), direction_query(body), &plane));
+}
+
 json pixels_of(const std::string& body) {
   PixelQuery query;
   std::string error;
@@ -95,6 +99,36 @@ Matrix2<double> matrix_of(const json& rows) {
   Matrix2<double> out;
   out << vector_of<2>(rows.at(0)).transpose(), vector_of<2>(rows.at(1)).transpose();
   return out;
+}
+
+// The place is that of the plane's own geometry, its covariance that of the direction and the plane.
+TEST(DirectionQuery, WithAPlaneADirectionHasItsPlaceOnIt) {
+  PlaneEstimate estimate;
+  // The frame looks down by 0.2 rad at the middle; the base faces east.
+  estimate.plane.R_base_from_world = R_base_from_world_of(kPi / 2, 0.01, -0.02);
+  estimate.plane.position = {3, 4, 20};
+  estimate.plane.covariance.diagonal() << 1e-8, 1e-8, 1e-6, 0.01, 0.01, 0.0025;
+  const std::string body = R"({"pixels": [[100, 600], [640, 360]], "pixel_sigma_px": 0.5})";
+  const json answer = directions_on(estimate, body)["directions"];
+  for (const json& item : answer) {
+    PlanePoint expected;
+    ASSERT_EQ(plane_point(estimate.plane, vector_of<3>(item["direction"]),
+                          matrix_of(item["covariance"]), {}, &expected),
+              PlaneStatus::kOk);
+    const json& plane = item["plane"];
+    EXPECT_LT((vector_of<2>(plane["position_m"]) - expected.position).norm(), 1e-9);
+    EXPECT_LT((matrix_of(plane["covariance_m2"]) - expected.covariance).norm(), 1e-12);
+    EXPECT_GT(plane["position_m"][0].get<double>(), 20);  // east of the camera
+    EXPECT_NEAR(plane["distance_m"].get<double>(), expected.distance, 1e-9);
+    EXPECT_FALSE(plane.contains("latitude_deg"));
+  }
+  EXPECT_FALSE(directions_of(body)["directions"][0].contains("plane"));
+  estimate.origin = GeodeticPosition{0.8, 0.2, 100};
+  const json on_earth = directions_on(estimate, body)["directions"][0]["plane"];
+  EXPECT_NEAR(on_earth["latitude_deg"].get<double>(), 0.8 * 180 / kPi, 0.01);
+  // A base that looks up sees no ground.
+  estimate.plane.R_base_from_world = R_base_from_world_of(0, 0.6, 0);
+  EXPECT_EQ(directions_on(estimate, body)["directions"][1]["plane"]["error"], "above the horizon");
 }
 
 TEST(FrameGeometry, PackedAndUnpackedIsTheSame) {

@@ -125,6 +125,7 @@ TEST(PlaneData, RefusesEverySlipInOneLine) {
            {"level: {", "levle: {", "unknown key"},
            {"sigma_m: 0.05", "sigma_m: 0", "data.yaml:7: height.sigma_m: '0' is not"},
            {"height_m: 12,", "height_m: -12,", "height.height_m"},
+           {"name: kerb,", "name: \"a\\nb\",", "points[0].name: has characters that are no text"},
            {"name: kerb, ", "", "points[0].name: is missing"},
            {"direction: [2, 0.2, 0.6]", "direction: [2, 0.2]",
             "points[0].direction: expected a list"},
