@@ -87,7 +87,7 @@ void JointAssociation::weigh(AssociationMethod method, const double* missed, int
         columns <= kLargestExactCluster) {
       ++exact_clusters_;
       fill_cluster(missed, pairs);
-      method == AssociationMethod::kApart ? weigh_apart(pairs) : weigh_exactly(pairs);
+      weigh_exactly(pairs);
     } else {
       ++cheap_clusters_;
       for (const int u : members_) weigh_cheaply(missed, u, pairs);
@@ -177,57 +177,6 @@ void JointAssociation::weigh_exactly(GatedPair* pairs) {
         }
       }
       pairs[i].weight = weight * ratio_[at(row)][column] / total;
-    }
-  }
-}
-
-void JointAssociation::weigh_apart(GatedPair* pairs) {
-  const std::size_t row_sets = std::size_t{1} << rows_;
-  const std::size_t column_sets = std::size_t{1} << columns_;
-  std::array<std::array<double, kLargestExactCluster>, kLargestExactCluster> sum{};
-  double total = 0;
-  for (std::size_t rows = 0; rows < row_sets; ++rows) {
-    double others = 1;
-    int last = -1;
-    for (int row = 0; row < rows_; ++row) {
-      if ((rows >> row & 1) != 0) {
-        last = row;
-      } else {
-        others *= none_[at(row)];
-      }
-    }
-    for (std::size_t columns = 0; columns < column_sets; ++columns) {
-      double best = rows == 0 && columns == 0 ? 1.0 : 0.0;
-      signed char best_column = -1;
-      for (int c = 0; last >= 0 && c < columns_; ++c) {
-        if ((columns >> c & 1) == 0) continue;
-        const double weight =
-            best_[rows & ~(std::size_t{1} << last)][columns & ~(std::size_t{1} << c)] *
-            ratio_[at(last)][at(c)];
-        if (weight > best) {
-          best = weight;
-          best_column = static_cast<signed char>(c);
-        }
-      }
-      best_[rows][columns] = best;
-      last_column_[rows][columns] = best_column;
-      if (best == 0) continue;
-      total += best * others;
-      std::size_t r = rows;
-      std::size_t d = columns;
-      for (int row = last; row >= 0; --row) {
-        if ((r >> row & 1) == 0) continue;
-        const int c = last_column_[r][d];
-        sum[at(row)][at(c)] += best * others;
-        r &= ~(std::size_t{1} << row);
-        d &= ~(std::size_t{1} << c);
-      }
-    }
-  }
-  for (int row = 0; row < rows_; ++row) {
-    const int t = members_[at(row)];
-    for (int i = first_pair_[at(t)]; i < first_pair_[at(t) + 1]; ++i) {
-      pairs[i].weight = sum[at(row)][at(column_[at(pairs[i].detection)])] / total;
     }
   }
 }

@@ -7,11 +7,9 @@
 // and m of the targets that are not.
 //   kExact    beta = share of all events' weight in which t has j (Fortmann, Bar-Shalom, Scheffe 1983). Summed by sets of taken detections
 //             instead of event by event: 2^detections times targets sums for each cluster
-//   kApart    as kExact, but of the events that pair the same set of targets with the same set of detections only the best counts (JPDA*, Blom
-//             and Bloem 2000): what is as likely the other way round no longer draws two targets that meet onto each other
 //   kCheap    beta = r / (row sum + column sum - r + m) (Fitzgerald 1986; Lisanti et al.'s [27]): PDA if no target shares
 //   kNearest  1 for the pair with the greatest r, then among what is left: the baseline
-// A cluster is what shared detections tie together. kExact and kApart take those of at most kLargestExactCluster targets and detections, and kCheap for others.
+// A cluster is what shared detections tie together. kExact takes those of at most kLargestExactCluster targets and detections, and kCheap for others.
 // Fixed memory after construction, no allocation; equal input, equal weights.
 
 #include <array>
@@ -19,7 +17,7 @@
 
 namespace alidade {
 
-enum class AssociationMethod { kExact, kApart, kCheap, kNearest };
+enum class AssociationMethod { kExact, kCheap, kNearest };
 
 // A detection within the gate of a target.
 struct GatedPair {
@@ -40,7 +38,7 @@ class JointAssociation {
   void weigh(AssociationMethod method, const double* missed, int targets, GatedPair* pairs,
              int count);
 
-  // Of the last call with kExact or kApart: how many clusters were weighed so, and how many were too large.
+  // Of the last call with kExact: how many clusters were weighed so, and how many were too large.
   [[nodiscard]] int exact_clusters() const { return exact_clusters_; }
   [[nodiscard]] int cheap_clusters() const { return cheap_clusters_; }
 
@@ -50,7 +48,6 @@ class JointAssociation {
   void weigh_cheaply(const double* missed, int target, GatedPair* pairs);
   void fill_cluster(const double* missed, const GatedPair* pairs);
   void weigh_exactly(GatedPair* pairs);
-  void weigh_apart(GatedPair* pairs);
   void pick_nearest(GatedPair* pairs, int count);
 
   std::vector<int> parent_;      // of each target, towards its cluster's root
@@ -68,10 +65,6 @@ class JointAssociation {
   // Weight of all ways in which the targets before this one, or from it on, take just, or avoid, a set of detections.
   std::array<std::array<double, 1 << kLargestExactCluster>, kLargestExactCluster + 1> before_{};
   std::array<std::array<double, 1 << kLargestExactCluster>, kLargestExactCluster + 1> after_{};
-  // Of the best way to pair a set of targets with one of detections, and the detection of the last target in it.
-  std::array<std::array<double, 1 << kLargestExactCluster>, 1 << kLargestExactCluster> best_{};
-  std::array<std::array<signed char, 1 << kLargestExactCluster>, 1 << kLargestExactCluster>
-      last_column_{};
   int exact_clusters_ = 0;
   int cheap_clusters_ = 0;
 };

@@ -1,5 +1,5 @@
 // alidade_target_tracking: how well targets are tracked on simulated detections (target_tracking.h).
-//   alidade_target_tracking --runs 10
+//   alidade_target_tracking --only spaces
 // Exit status: 0 all figures are as they should be, 1 some are not (listed last), 2 wrong usage.
 
 #include <CLI/CLI.hpp>

@@ -10,7 +10,7 @@
 namespace alidade::test {
 
 struct TargetTrackingOptions {
-  int runs = 10;  // of 60 s, each table row
+  int runs = 30;  // of 60 s, each table row
   std::uint64_t first_seed = 1;
   double recall = 0.9;
   double false_alarms = 0.1;
