@@ -185,7 +185,7 @@ TEST(CommandLine, NamesWhatWasMistypedAndWhatIsNearest) {
            Slip{{"chekc", "-c", "x"}, "unknown command 'chekc'; did you mean check?; see"},
            Slip{{"fly"},
                 "unknown command 'fly'; expected one of run, record, replay, calibrate, "
-                "calibrate-shutter, check; see alidade --help"},
+                "calibrate-shutter, plane, check, map, localize; see alidade --help"},
            Slip{{"run", "--confg", "x"},
                 "unknown option '--confg'; did you mean --config?; see alidade run --help"},
            Slip{{"run", "-c", "x", "--duraton=3"},
