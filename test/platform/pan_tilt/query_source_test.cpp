@@ -184,14 +184,18 @@ TEST_P(QuerySourceTest, SaysThatAllAnswersComeTooLate) {
   QuerySourceOptions options = rig.options();
   options.timeout_s = 0.4;
   const auto source = rig.open(options);
-  ReadStatus status = ReadStatus::kOk;
-  for (int i = 0; i < 3; ++i) {
-    status = read_until(*source, sample_, [](ReadStatus is) {
+  const auto says_so = HasSubstr("later than 100 ms; raise pan_tilt.timeout_s");
+  int said = 0;
+  // On a busy machine the head's thread may not come to answer at all before it is given up.
+  for (int i = 0; said < 3 && i < 20; ++i) {
+    const ReadStatus status = read_until(*source, sample_, [](ReadStatus is) {
       return is == ReadStatus::kOk || is == ReadStatus::kDisconnected;
     });
     ASSERT_EQ(status, ReadStatus::kDisconnected);
-    EXPECT_THAT(source->error(), HasSubstr("later than 100 ms; raise pan_tilt.timeout_s"));
+    EXPECT_THAT(source->error(), AnyOf(says_so, HasSubstr("no answer of ")));
+    if (testing::Value(source->error(), says_so)) ++said;
   }
+  EXPECT_EQ(said, 3);
   rig.server().answer_s = 0;
   ASSERT_EQ(read_until(*source, sample_, ReadStatus::kOk), ReadStatus::kOk) << source->error();
 }
