@@ -293,11 +293,24 @@ std::vector<std::string> option_names(const CLI::App& app) {
   return names;
 }
 
+// map, build
+std::vector<const CLI::App*> chosen_commands(const CLI::App& app) {
+  std::vector<const CLI::App*> chosen;
+  const CLI::App* above = &app;
+  for (;;) {
+    const std::vector<CLI::App*> next = above->get_subcommands();
+    if (next.empty()) return chosen;
+    above = next.front();
+    chosen.push_back(above);
+  }
+}
+
 // The first word that is no command, or no option of the one that was chosen. The library asks first whether all that is
 // required is there, and what was mistyped is not.
 std::string unknown_word(const CLI::App& app, const std::vector<std::string>& words) {
   const std::vector<std::string> unknown = app.remaining(true);
-  const std::vector<CLI::App*> chosen = app.get_subcommands();
+  const std::vector<const CLI::App*> chosen = chosen_commands(app);
+  const CLI::App& above = chosen.empty() ? app : *chosen.back();
   for (const std::string& word : words) {
     if (std::find(unknown.begin(), unknown.end(), word) == unknown.end()) continue;
     if (word.size() > 1 && word.front() == '-') {
@@ -309,8 +322,8 @@ std::string unknown_word(const CLI::App& app, const std::vector<std::string>& wo
       const std::string name = word.substr(0, word.find('='));
       return fmt::format("unknown option '{}'{}", name, did_you_mean(name, known));
     }
-    if (!chosen.empty()) continue;
-    const std::vector<std::string> known = command_names(app);
+    const std::vector<std::string> known = command_names(above);
+    if (known.empty()) continue;
     return nearest_word(word, known)
                ? fmt::format("unknown command '{}'{}", word, did_you_mean(word, known))
                : fmt::format("unknown command '{}'; expected one of {}", word,
@@ -324,9 +337,9 @@ std::string usage_error(const CLI::App& app, const std::vector<std::string>& wor
                         const CLI::ParseError& error) {
   std::string what = unknown_word(app, words);
   if (what.empty()) what = error.what();
-  const std::vector<CLI::App*> chosen = app.get_subcommands();
-  return fmt::format("{}; see alidade {}--help", what,
-                     chosen.empty() ? "" : chosen.front()->get_name() + " ");
+  std::string command;
+  for (const CLI::App* each : chosen_commands(app)) command += each->get_name() + " ";
+  return fmt::format("{}; see alidade {}--help", what, command);
 }
 
 }  // namespace

@@ -204,6 +204,11 @@ TEST(CommandLine, NamesWhatWasMistypedAndWhatIsNearest) {
                "'-1' is not a number of seconds above 0, up to 300; see alidade calibrate-shutter"},
            Slip{{"calibrate-shutter", "-c", "x", "--pattern", "y", "--duration", "301"},
                 "'301' is not a number of seconds above 0, up to 300; see"},
+           Slip{{"map", "bild", "x"},
+                "unknown command 'bild'; did you mean build?; see alidade map --help"},
+           Slip{{"map", "build", "x", "-o", "y", "--keyfames", "3"},
+                "unknown option '--keyfames'; did you mean --keyframes?; see alidade map build "
+                "--help"},
            Slip{{"calibrate", "x", "--scale-sigma", "2"}, "'2' is not a number from 0 to 1; see"},
        }) {
     const Result result = alidade(arguments);
