@@ -276,7 +276,8 @@ bool SceneMapFile::open(const std::string& path, std::string* error) {
 bool SceneMapFile::check_kind(std::string* error) {
   const std::int64_t application = database_.number_of("PRAGMA application_id");
   if (database_.failed()) return refuse_failure(error);
-  if (application != kSceneMapApplication) return refuse("not a scene map", error);
+  if (application != kSceneMapApplication)
+    return refuse("not a scene map; make one with `alidade map build`", error);
   const std::int64_t format = database_.number_of("PRAGMA user_version");
   if (!database_.failed() && format != kSceneMapFormat) {
     return refuse("a scene map of format " + std::to_string(format) + ", this program has format " +

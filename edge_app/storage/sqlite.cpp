@@ -66,7 +66,7 @@ std::string SqliteDatabase::failure_text() const {
     case SQLITE_OK:
       return "";
     case SQLITE_NOTADB:
-      return "not a database";
+      return "not a database; expected one that this program made";
     case SQLITE_CORRUPT:
       return "damaged, or cut off";
     case SQLITE_BUSY:
