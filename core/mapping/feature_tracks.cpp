@@ -5,6 +5,8 @@
 #include <iterator>
 #include <numeric>
 
+#include "core/mapping/forest.h"
+
 namespace alidade {
 namespace {
 
@@ -39,14 +41,7 @@ class FeatureForest {
   }
   [[nodiscard]] int nodes() const { return static_cast<int>(parent_.size()); }
 
-  [[nodiscard]] int root(int i) {
-    while (parent_[static_cast<std::size_t>(i)] != i) {
-      int& above = parent_[static_cast<std::size_t>(i)];
-      above = parent_[static_cast<std::size_t>(above)];
-      i = above;
-    }
-    return i;
-  }
+  [[nodiscard]] int root(int i) { return internal::root_of(i, &parent_); }
   void join(int a, int b) {
     a = root(a);
     b = root(b);

@@ -4,6 +4,8 @@
 #include <cstddef>
 #include <numeric>
 
+#include "core/mapping/forest.h"
+
 namespace alidade {
 namespace {
 
@@ -14,14 +16,7 @@ class PictureGroups {
     std::iota(parent_.begin(), parent_.end(), 0);
   }
 
-  [[nodiscard]] int root(int i) {
-    while (parent_[static_cast<std::size_t>(i)] != i) {
-      int& above = parent_[static_cast<std::size_t>(i)];
-      above = parent_[static_cast<std::size_t>(above)];
-      i = above;
-    }
-    return i;
-  }
+  [[nodiscard]] int root(int i) { return internal::root_of(i, &parent_); }
   void join(int a, int b) {
     const int low = std::min(root(a), root(b));
     const int high = std::max(root(a), root(b));
