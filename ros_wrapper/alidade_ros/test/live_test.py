@@ -105,8 +105,9 @@ class Live(RosTest):
 
         to_direction = rospy.ServiceProxy("/pixel_to_direction", PixelToDirection)
         to_pixel = rospy.ServiceProxy("/direction_to_pixel", DirectionToPixel)
-        for inbox in (tf, quaternions, joints, nodelets):
+        for inbox in (quaternions, joints, nodelets):
             inbox.wait_for(lambda m: True, "the first message")
+        tf.wait_for(lambda m: m.transforms[0].child_frame_id == "mast_optical_frame", "the camera's first transform")
         # Asked as frames come: the edge remembers ten seconds.
         answers, enough = [], len(orientations.all()) + FRAMES
         while len(orientations.all()) < enough:
@@ -192,24 +193,31 @@ class Live(RosTest):
         return message, [p for p in told["pixels"] if p.get("inside")]
 
     def assert_tf_projects_as_the_api_does(self, answers, tf, info):
+        """Between the transforms of a frame's rows tf2 turns evenly: the frame's acceleration is what it leaves out."""
+        def of_camera():
+            return [t for m in tf.all() for t in m.transforms if t.child_frame_id == "mast_optical_frame"]
         last = max(m.header.stamp for m, _ in answers)
-        tf.wait_for(lambda m: min(t.header.stamp for t in m.transforms) > last, "the frame after the last")
+        wait_until(lambda: any(t.header.stamp > last + rospy.Duration(0.02) for t in of_camera()),
+                   "the transforms of the frame after the last")
         buffer = tf2_py.BufferCore(rospy.Duration(1000))
-        for message in tf.all():
-            for transform in message.transforms:
-                buffer.set_transform(transform, "test")
-        worst, count = 0, 0
+        for transform in of_camera():
+            buffer.set_transform(transform, "test")
+        count = 0
         for message, pixels in answers:
+            readout = abs(message.line_delay) * info.height
+            rows = [t for t in of_camera() if abs((t.header.stamp - message.header.stamp).to_sec()) < readout]
+            if len(rows) < 3:
+                continue  # a subscriber that is late loses the oldest: as many as are asked below must have come
+            uneven = math.hypot(message.pan_acceleration, message.tilt_acceleration) * (readout / 2) ** 2 / 8
             for told in pixels:
                 at = message.header.stamp + rospy.Duration(told["time_s"] - message.time)
                 turn = buffer.lookup_transform_core("mast_base", "mast_optical_frame", at).transform.rotation
                 x, y, z = told["direction"]
                 u, v = project(info, conjugate_rotate(quaternion(turn), [x, -y, -z]))
-                worst = max(worst, math.hypot(u + 0.5 - told["pixel"][0], v + 0.5 - told["pixel"][1]))
+                error = math.hypot(u + 0.5 - told["pixel"][0], v + 0.5 - told["pixel"][1])
+                self.assertLess(error, 0.001 + 1.5 * info.K[0] * uneven, message)
                 count += 1
-        print(f"TF and CameraInfo against the API: {count} pixels, worst {worst:.2g} px")
         self.assertGreater(count, 30)
-        self.assertLess(worst, 0.01)
 
     def test_recovers_from_restarts_of_node_and_edge(self):
         orientations, status = Inbox("/frame_orientation", FrameOrientation), Inbox("/status", Status)
