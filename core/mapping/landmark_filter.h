@@ -113,8 +113,8 @@ enum class LandmarkUpdate {
   const Matrix<double, 3, 2> before = tangent_basis(state->d_b);
   state->d_b = direction_plus<double>(state->d_b, K * sight.y).normalized();
   const Matrix2<double> turn = tangent_basis(state->d_b).transpose() * before;
-  state->covariance = turn * (0.5 * (own + own.transpose())) * turn.transpose();
-  state->shared_covariance = turn * (0.5 * (shared + shared.transpose())) * turn.transpose();
+  state->covariance = turn * symmetric(own) * turn.transpose();
+  state->shared_covariance = turn * symmetric(shared) * turn.transpose();
   return LandmarkUpdate::kOk;
 }
 

@@ -1,58 +1,20 @@
 #include "core/mapping/map_building.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
 #include <numeric>
 
 #include "core/mapping/feature_tracks.h"
+#include "core/mapping/map_making.h"
 #include "core/mapping/match_graph.h"
-#include "core/model/direction.h"
-#include "core/model/median.h"
+#include "core/mapping/place_noise.h"
 
 namespace alidade {
 namespace {
 
 // Of a common focal length that was looked for in steps.
 constexpr double kSearchedLogSigma = 0.15;
-
-// Noise of a feature's place by its size: large ones are less sharp.
-class PlaceNoise {
- public:
-  PlaceNoise() {
-    for (std::size_t i = 0; i < sigma_.size(); ++i) {
-      sigma_[i] = 0.08 * std::pow(2, 0.8 * static_cast<double>(i));
-    }
-  }
-
-  [[nodiscard]] double sigma_px(double scale_px) const { return sigma_[bin(scale_px)]; }
-
-  // By what is left of observations, each with the size of its feature, px.
-  void learn(const std::vector<std::pair<double, double>>& scale_and_error) {
-    constexpr std::size_t kFewest = 100;
-    const double median_of_norm = std::sqrt(2 * std::log(2.0));  // of two standard normal numbers
-    std::array<std::vector<double>, kBins> errors;
-    for (const auto& [scale, error] : scale_and_error) errors[bin(scale)].push_back(error);
-    for (std::size_t i = 0; i < kBins; ++i) {
-      if (errors[i].size() >= kFewest) {
-        sigma_[i] = std::max(0.01, median(errors[i]) / median_of_norm);
-      } else if (i > 0) {
-        sigma_[i] = std::max(sigma_[i], sigma_[i - 1]);
-      }
-    }
-  }
-
- private:
-  static constexpr std::size_t kBins = 8;
-  [[nodiscard]] static std::size_t bin(double scale_px) {
-    const double at = 2 * std::log2(std::max(scale_px, 1.0) / 1.4);
-    return static_cast<std::size_t>(std::clamp(at, 0.0, kBins - 1.0));
-  }
-  std::array<double, kBins> sigma_{};
-};
-
-Matrix2<double> symmetric(const Matrix2<double>& m) { return 0.5 * (m + m.transpose()); }
 
 class Building {
  public:
@@ -94,7 +56,13 @@ class Building {
     if (!adjust(adjustment, 0, true)) return failed();
     say(0.95, "landmarks");
     out_.status = MapBuildStatus::kOk;
-    make_map();
+    MapMaterial material{options_, found_, evidence_, tracks_, noise_, {}, {}};
+    for (const int i : kept_) {
+      material.views.push_back(&views_[static_cast<std::size_t>(i)]);
+      material.pictures.push_back(&pictures_[static_cast<std::size_t>(i)]);
+    }
+    make_scene_map(material, &out_);
+    out_.of_keyframe = kept_;
     return std::move(out_);
   }
 
@@ -357,27 +325,8 @@ class Building {
     }
   }
 
-  // What is left of an observation, px; none: it was left out.
-  [[nodiscard]] std::vector<std::optional<double>> errors_px() const {
-    std::vector<bool> used(evidence_.observations.size(), true);
-    for (const int i : found_.left_out) used[static_cast<std::size_t>(i)] = false;
-    std::vector<std::optional<double>> out(used.size());
-    for (std::size_t i = 0; i < used.size(); ++i) {
-      const MapObservation& seen = evidence_.observations[i];
-      const auto at = static_cast<std::size_t>(seen.picture);
-      MapProjection there;
-      if (used[i] && project_from_map(found_.pictures[at].camera, kept(at).motion,
-                                      found_.pictures[at].R_base_from_camera, seen.u.y(),
-                                      found_.landmarks[static_cast<std::size_t>(seen.landmark)],
-                                      &there) == ProjectionStatus::kOk) {
-        out[i] = (there.u - seen.u).norm();
-      }
-    }
-    return out;
-  }
-
   void learn_noise() {
-    const auto errors = errors_px();
+    const auto errors = errors_px(evidence_, found_);
     std::vector<int> seen_by(tracks_.size(), 0);
     for (std::size_t i = 0; i < errors.size(); ++i) {
       if (errors[i]) ++seen_by[static_cast<std::size_t>(evidence_.observations[i].landmark)];
@@ -395,145 +344,6 @@ class Building {
       }
     }
     noise_.learn(scale_and_error);
-  }
-
-  // Of the direction that a keyframe gives a pixel, by its pose; in tangent_basis(d_b).
-  [[nodiscard]] Matrix2<double> pose_part(std::size_t picture, const Vector2<double>& u,
-                                          const Vector3<double>& d_b) const {
-    const AdjustedPicture& pose = found_.pictures[picture];
-    MapProjection seen;
-    Matrix<double, kCameraParameterCount, 1> J_camera_log;
-    (void)found_.lens.camera_of(std::log(pose.camera.focal_length), &J_camera_log);
-    if (project_from_map(pose.camera, kept(picture).motion, pose.R_base_from_camera, u.y(), d_b,
-                         &seen) != ProjectionStatus::kOk) {
-      return Matrix2<double>::Identity();
-    }
-    const Matrix2<double> J_u_tangent = seen.J_u_d * tangent_basis(d_b);
-    Matrix<double, 2, 4> J_u_pose;
-    J_u_pose << seen.J_u_xi, seen.J_u_camera * J_camera_log;
-    const Matrix<double, 2, 4> J = J_u_tangent.inverse() * J_u_pose;
-    return symmetric(J * found_.covariance_of(static_cast<int>(picture)) * J.transpose());
-  }
-
-  void add_landmark(const Vector3<double>& d_b, const std::vector<PictureFeature>& seen_as) {
-    SceneLandmark l;
-    l.id = out_.map.next_landmark;
-    l.d_b = d_b;
-    Matrix2<double> information = Matrix2<double>::Zero();
-    Matrix2<double> shared = Matrix2<double>::Identity();
-    std::array<double, kDescriptorSize> sum{};
-    double log_scale = 0;
-    double log_f = 0;
-    const double scale_of_noise = std::max(1.0, found_.noise_scale);
-    for (const PictureFeature& f : seen_as) {
-      const auto at = static_cast<std::size_t>(f.picture);
-      const Feature& seen = feature(f);
-      const AdjustedPicture& pose = found_.pictures[at];
-      MapProjection there;
-      if (project_from_map(pose.camera, kept(at).motion, pose.R_base_from_camera, seen.u.y(), d_b,
-                           &there) != ProjectionStatus::kOk) {
-        return;
-      }
-      const Matrix2<double> J = there.J_u_d * tangent_basis(d_b);
-      const double sigma = noise_.sigma_px(seen.scale) * scale_of_noise;
-      information += J.transpose() * J / (sigma * sigma);
-      const Matrix2<double> of_pose = pose_part(at, seen.u, d_b);
-      if (of_pose.trace() < shared.trace()) shared = of_pose;
-      const Descriptor& descriptor =
-          kept(at).features.descriptors[static_cast<std::size_t>(f.feature)];
-      for (std::size_t n = 0; n < sum.size(); ++n) sum[n] += descriptor[n];
-      log_scale += std::log(seen.scale / pose.camera.focal_length);
-      log_f += std::log(pose.camera.focal_length);
-      l.sightings.push_back({f.picture + 1, seen.u, seen.scale});
-    }
-    const auto count = static_cast<double>(seen_as.size());
-    l.covariance = symmetric(information.inverse());
-    l.shared_covariance = shared;
-    l.scale_rad = std::exp(log_scale / count);
-    l.focal_length_px = std::exp(log_f / count);
-    for (std::size_t n = 0; n < sum.size(); ++n) {
-      l.descriptor[n] = static_cast<std::uint8_t>(std::lround(sum[n] / count));
-    }
-    const auto& last =
-        views_[static_cast<std::size_t>(kept_[static_cast<std::size_t>(seen_as.back().picture)])];
-    const auto& first =
-        views_[static_cast<std::size_t>(kept_[static_cast<std::size_t>(seen_as.front().picture)])];
-    l.life.born_utc_s = std::min(first.time_utc_s, last.time_utc_s);
-    l.life.last_seen_utc_s = std::max(first.time_utc_s, last.time_utc_s);
-    l.life.looked_for = static_cast<std::uint32_t>(seen_as.size());
-    l.life.matched = l.life.looked_for;
-    if (!is_valid(l)) return;
-    ++out_.map.next_landmark;
-    out_.map.landmarks.push_back(std::move(l));
-  }
-
-  void make_map() {
-    SceneMap& map = out_.map;
-    map.lens = found_.lens;
-    map.line_delay = options_.line_delay;
-    map.reference_row = options_.height / 2.0;
-    map.mechanics = options_.mechanics;
-    const auto errors = errors_px();
-    std::vector<double> squares(kept_.size(), 0);
-    std::vector<int> counts(kept_.size(), 0);
-    std::vector<std::vector<bool>> taken;
-    for (std::size_t i = 0; i < kept_.size(); ++i) taken.emplace_back(kept(i).features.size());
-    std::size_t at = 0;
-    double sum = 0;
-    for (std::size_t j = 0; j < tracks_.size(); ++j) {
-      std::vector<PictureFeature> seen_as;
-      for (const PictureFeature& f : tracks_[j]) {
-        const auto& error = errors[at++];
-        if (!error) continue;
-        const auto picture = static_cast<std::size_t>(f.picture);
-        seen_as.push_back(f);
-        taken[picture][static_cast<std::size_t>(f.feature)] = true;
-        squares[picture] += *error * *error;
-        ++counts[picture];
-        sum += *error * *error;
-        ++out_.observations;
-      }
-      if (seen_as.size() < 2) continue;
-      add_landmark(found_.landmarks[j], seen_as);
-      ++out_.tracks;
-    }
-    for (std::size_t i = 0; i < kept_.size(); ++i) {
-      const AdjustedPicture& pose = found_.pictures[i];
-      for (std::size_t k = 0; k < taken[i].size(); ++k) {
-        if (taken[i][k]) continue;
-        const PictureFeature f{static_cast<int>(i), static_cast<int>(k)};
-        Vector3<double> d;
-        if (unproject_to_map(pose.camera, kept(i).motion, pose.R_base_from_camera, feature(f).u,
-                             &d) == ProjectionStatus::kOk) {
-          add_landmark(d, {f});
-        }
-      }
-      map.keyframes.push_back(keyframe(i));
-      map.keyframes.back().residual_px = counts[i] > 0 ? std::sqrt(squares[i] / counts[i]) : 0;
-    }
-    out_.of_keyframe = kept_;
-    out_.residual_px = out_.observations > 0 ? std::sqrt(sum / out_.observations) : 0;
-    out_.noise_scale = found_.noise_scale;
-  }
-
-  [[nodiscard]] SceneKeyframe keyframe(std::size_t i) const {
-    const MapView& view = views_[static_cast<std::size_t>(kept_[i])];
-    const AdjustedPicture& pose = found_.pictures[i];
-    SceneKeyframe k;
-    k.id = static_cast<std::int64_t>(i) + 1;
-    k.recording = view.recording;
-    k.frame = view.frame;
-    k.time_utc_s = view.time_utc_s;
-    k.zoom = view.zoom;
-    k.position = kept(i).log_f;
-    k.telemetry = view.telemetry;
-    k.R_base_from_camera = Eigen::Quaterniond(pose.R_base_from_camera).normalized();
-    k.eps = pose.eps;
-    const Matrix4<double> covariance = found_.covariance_of(static_cast<int>(i));
-    k.covariance = 0.5 * (covariance + covariance.transpose());
-    k.angular_velocity = view.angular_velocity;
-    k.zoom_rate = view.zoom_rate;
-    return k;
   }
 
   const MapBuildOptions& options_;

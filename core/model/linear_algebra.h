@@ -47,4 +47,10 @@ template <class S, int kRows, int kColumns>
   return true;
 }
 
+// Without what rounding makes of a covariance.
+template <int kSize>
+[[nodiscard]] Matrix<double, kSize, kSize> symmetric(const Matrix<double, kSize, kSize>& m) {
+  return 0.5 * (m + m.transpose());
+}
+
 }  // namespace alidade

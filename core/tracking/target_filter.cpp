@@ -26,8 +26,6 @@ void follow_place(TargetState* state) {
   state->mean.head<2>().setZero();
 }
 
-void make_symmetric(Matrix4<double>* cov) { *cov = (0.5 * (*cov + cov->transpose())).eval(); }
-
 // Columns: how the direction moves with azimuth and elevation of the chart.
 Matrix<double, 3, 2> chart_tangents(const Matrix3<double>& R_base_from_chart) {
   Matrix<double, 3, 2> tangents;
@@ -67,7 +65,7 @@ std::optional<TargetState> first_state(TargetSpace space,
   state.cov.setZero();
   state.cov.topLeftCorner<2, 2>() = inverse * measurement.cov * inverse.transpose();
   state.cov.bottomRightCorner<2, 2>().diagonal().setConstant(sigma_velocity * sigma_velocity);
-  make_symmetric(&state.cov);
+  state.cov = symmetric(state.cov);
   if (!all_finite(state.mean) || !all_finite(state.cov) || !all_finite(state.R_base_from_chart)) {
     return std::nullopt;
   }
@@ -87,7 +85,7 @@ void predict_target(TargetSpace space, double dt_s, double acceleration_density,
     state->cov(i + 2, i) += acceleration_density * dt_s * dt_s / 2;
     state->cov(i + 2, i + 2) += acceleration_density * dt_s;
   }
-  make_symmetric(&state->cov);
+  state->cov = symmetric(state->cov);
   if (space == TargetSpace::kSphere) follow_place(state);
 }
 
@@ -143,7 +141,7 @@ void update_target(TargetSpace space, const ExpectedPlace& expected, const Innov
   }
   state->mean += mean_step;
   state->cov += spread - less - mean_step * mean_step.transpose();
-  make_symmetric(&state->cov);
+  state->cov = symmetric(state->cov);
   if (space == TargetSpace::kSphere) follow_place(state);
 }
 

@@ -20,12 +20,6 @@ template <int kColumns>
          (0.5 * t * t) * x.template bottomRows<2>();
 }
 
-// Without what rounding makes of a covariance.
-template <int kSize>
-[[nodiscard]] Matrix<double, kSize, kSize> symmetric(const Matrix<double, kSize, kSize>& m) {
-  return 0.5 * (m + m.transpose());
-}
-
 // Of a symmetric matrix; only the upper triangle is read. Not finite where m is singular.
 [[nodiscard]] inline Matrix2<double> inverse_of(const Matrix2<double>& m) {
   const double determinant = m(0, 0) * m(1, 1) - m(0, 1) * m(0, 1);

@@ -1,0 +1,51 @@
+#pragma once
+// Sigma of a feature's place by its size: large ones are less sharp. A guess to begin with, then what adjustments leave of observations:
+// each bin of sizes by the median of its errors' norms, over that of two standard normal numbers. Header only.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <utility>
+#include <vector>
+
+#include "core/model/median.h"
+
+namespace alidade {
+
+class PlaceNoise {
+ public:
+  PlaceNoise() {
+    for (std::size_t i = 0; i < sigma_.size(); ++i) {
+      sigma_[i] = 0.08 * std::pow(2, 0.8 * static_cast<double>(i));
+    }
+  }
+
+  // Of each coordinate, of a feature of that size.
+  [[nodiscard]] double sigma_px(double scale_px) const { return sigma_[bin(scale_px)]; }
+
+  // Observations: each the size of its feature and the norm of its error, px. Bins with fewer than 100 are no sharper than the one below.
+  void learn(const std::vector<std::pair<double, double>>& scale_and_error) {
+    constexpr std::size_t kFewest = 100;
+    const double median_of_norm = std::sqrt(2 * std::log(2.0));
+    std::array<std::vector<double>, kBins> errors;
+    for (const auto& [scale, error] : scale_and_error) errors[bin(scale)].push_back(error);
+    for (std::size_t i = 0; i < kBins; ++i) {
+      if (errors[i].size() >= kFewest) {
+        sigma_[i] = std::max(0.01, median(errors[i]) / median_of_norm);
+      } else if (i > 0) {
+        sigma_[i] = std::max(sigma_[i], sigma_[i - 1]);
+      }
+    }
+  }
+
+ private:
+  static constexpr std::size_t kBins = 8;
+  [[nodiscard]] static std::size_t bin(double scale_px) {
+    const double at = 2 * std::log2(std::max(scale_px, 1.0) / 1.4);
+    return static_cast<std::size_t>(std::clamp(at, 0.0, kBins - 1.0));
+  }
+  std::array<double, kBins> sigma_{};
+};
+
+}  // namespace alidade
