@@ -51,20 +51,23 @@ TagImage seen(const TagCells& cells, double cell_px, double turn, double shear, 
     result.corners.emplace_back(static_cast<float>(u[0]), static_cast<float>(u[1]));
   }
   result.image.create(80, 80, CV_8UC1);
-  constexpr int kSteps = 12;
+  constexpr int kRows = 12;
+  // What moves fills the columns between them.
   const int moves = blur_px > 0 ? 12 : 1;
+  const int columns = blur_px > 0 ? 3 : 12;
+  const int samples = columns * kRows * moves;
   for (int v = 0; v < 80; ++v) {
     for (int u = 0; u < 80; ++u) {
       int white = 0;
-      for (int sample = 0; sample < kSteps * kSteps * moves; ++sample) {
-        const int i = sample % kSteps;
-        const int k = sample / kSteps % kSteps;
-        const double along = blur_px * ((sample / (kSteps * kSteps) + 0.5) / moves - 0.5);
-        const cv::Vec2d at(u + (i + 0.5) / kSteps - 0.5 + along, v + (k + 0.5) / kSteps - 0.5);
+      for (int sample = 0; sample < samples; ++sample) {
+        const int i = sample % columns;
+        const int k = sample / columns % kRows;
+        const double along = blur_px * ((sample / (columns * kRows) + 0.5) / moves - 0.5);
+        const cv::Vec2d at(u + (i + 0.5) / columns - 0.5 + along, v + (k + 0.5) / kRows - 0.5);
         const cv::Vec2d place = to_cells * (at - middle) + cv::Vec2d(4, 4);
         white += is_white(cells, place[0], place[1]) ? 1 : 0;
       }
-      const double grey = 40 + 160.0 * white / (kSteps * kSteps * moves) + normal(random);
+      const double grey = 40 + 160.0 * white / samples + normal(random);
       result.image.at<std::uint8_t>(v, u) =
           static_cast<std::uint8_t>(std::lround(std::clamp(grey, 0.0, 255.0)));
     }

@@ -218,6 +218,9 @@ TEST(OrientationSolve, ErrorsAreAsLargeAsTheCovarianceSaysWithAndWithoutTelemetr
       for (const double weak : {1.0, 1e3}) {
         for (const double shared : {0.0, 1e-5}) {
           for (const int landmarks : {30, 120}) {
+            // Of all combinations those in which any three values meet as often as any other three.
+            if (((line_delay > 0) ^ has_telemetry ^ (weak > 1) ^ (shared > 0) ^ (landmarks > 30)))
+              continue;
             SCOPED_TRACE(testing::Message() << line_delay << ' ' << has_telemetry << ' ' << weak
                                             << ' ' << shared << ' ' << landmarks);
             World world;
