@@ -90,7 +90,7 @@ class CoarseAlignmentTest : public testing::Test {
   void SetUp() override {
     J_angle_ << -20000, 800, 500, 19000;
     Pyramid pyramid(kFullWidth, kFullHeight, kOctaves);
-    ASSERT_EQ(pyramid.build(reference_.view(), kOctaves), PyramidStatus::kOk);
+    ASSERT_EQ(pyramid.build(reference().view(), kOctaves), PyramidStatus::kOk);
     std::mt19937_64 random(3);
     std::uniform_real_distribution<double> uniform(0, 1);
     references_.reserve(kPatches * kOctaves);
@@ -141,8 +141,16 @@ class CoarseAlignmentTest : public testing::Test {
     }
   }
 
-  const std::vector<float> grey_ = texture(1);
-  const BlurredImage reference_{grey_, 1, 1};
+  // Made once for all cases.
+  static const std::vector<float>& grey() {
+    static const std::vector<float> of_first = texture(1);
+    return of_first;
+  }
+  static const BlurredImage& reference() {
+    static const BlurredImage of_first(grey(), 1, 1);
+    return of_first;
+  }
+
   Matrix2<double> J_angle_;  // px/rad
   std::vector<ReferencePatch> references_;
   std::vector<CoarsePatch> patches_;
@@ -150,7 +158,7 @@ class CoarseAlignmentTest : public testing::Test {
 };
 
 TEST_F(CoarseAlignmentTest, FindsItsWayFromTheReachOfTheCoarsestOctave) {
-  const BlurredImage same(grey_, 1, 2);
+  const BlurredImage same(grey(), 1, 2);
   for (const double radius : {0.0, 5.0, 20.0, 40.0}) {
     SCOPED_TRACE(radius);
     expect_recovered(same, radius, 0, 0.95);
@@ -158,7 +166,7 @@ TEST_F(CoarseAlignmentTest, FindsItsWayFromTheReachOfTheCoarsestOctave) {
 }
 
 TEST_F(CoarseAlignmentTest, FindsItsWayFromSixtyPixelsBySearching) {
-  const BlurredImage same(grey_, 1, 2);
+  const BlurredImage same(grey(), 1, 2);
   for (const double radius : {0.0, 20.0, 60.0}) {
     SCOPED_TRACE(radius);
     expect_recovered(same, radius, 60, 0.95);
@@ -168,13 +176,14 @@ TEST_F(CoarseAlignmentTest, FindsItsWayFromSixtyPixelsBySearching) {
 TEST_F(CoarseAlignmentTest, DoesNotMindBrightness) {
   for (const double gain : {0.5, 2.0}) {
     SCOPED_TRACE(gain);
-    const BlurredImage changed(grey_, gain, 2);
+    const BlurredImage changed(grey(), gain, 2);
     expect_recovered(changed, 30, 0, 0.95);
     expect_recovered(changed, 60, 60, 0.95);
   }
 }
 
 TEST_F(CoarseAlignmentTest, DoesNotMindWhatHidesThirtyPercent) {
+  const BlurredImage clear(grey(), 1, 2);
   const BlurredImage other(texture(2), 1, 4);
   for (const double radius : {0.0, 30.0, 60.0}) {
     for (int i = 0; i < 3; ++i) {
@@ -184,7 +193,7 @@ TEST_F(CoarseAlignmentTest, DoesNotMindWhatHidesThirtyPercent) {
       // Each octave has its patches in a strip of its own width; 30 % of the coarsest's are hidden.
       const auto from = static_cast<int>(border_of(kOctaves - 1));
       const int to = from + (kFullWidth - 2 * from) * 3 / 10;
-      BlurredImage covered(grey_, 1, 2);
+      BlurredImage covered = clear;
       covered.cover(du, dv, 0, to, other);
       CoarseOptions options;
       options.search_px = radius > 40 ? radius : 0;
@@ -202,7 +211,7 @@ TEST_F(CoarseAlignmentTest, DoesNotMindWhatHidesThirtyPercent) {
 TEST_F(CoarseAlignmentTest, FindsNothingWhereNothingIsAlike) {
   const std::vector<std::uint8_t> blank(static_cast<std::size_t>(kFullWidth) * kFullHeight, 90);
   const BlurredImage other(texture(2), 1, 4);
-  const BlurredImage noise(std::vector<float>(grey_.size(), 128.0F), 1, 5);
+  const BlurredImage noise(std::vector<float>(grey().size(), 128.0F), 1, 5);
   const ImageView images[] = {
       {blank.data(), kFullWidth, kFullHeight, kFullWidth}, other.view(), noise.view()};
   for (const ImageView& image : images) {
@@ -219,7 +228,7 @@ TEST_F(CoarseAlignmentTest, FindsNothingWhereNothingIsAlike) {
 }
 
 TEST_F(CoarseAlignmentTest, NeedsAFewPatchesInTheImage) {
-  ASSERT_EQ(pyramid_.build(reference_.view(), kOctaves), PyramidStatus::kOk);
+  ASSERT_EQ(pyramid_.build(reference().view(), kOctaves), PyramidStatus::kOk);
   CoarseAlignment out;
   EXPECT_FALSE(align_coarsely(pyramid_, nullptr, 0, {}, &out));
   EXPECT_FALSE(align_coarsely(pyramid_, patches_.data(), 4, {}, &out));
