@@ -7,6 +7,7 @@
 #include <map>
 #include <memory>
 #include <random>
+#include <utility>
 #include <vector>
 
 #include "core/realtime/oe_mode/oe_options.h"
@@ -46,10 +47,35 @@ struct Sigmas {
   double rate = 5 * kPixel;
 };
 
+// Renders each frame once, for all who ask for it.
+class Film {
+ public:
+  explicit Film(const simulator::Config& config)
+      : path_(simulator::make_path(config)), renderer_(config, *path_) {}
+
+  [[nodiscard]] const simulator::Path& path() const { return *path_; }
+  [[nodiscard]] const simulator::CameraModel& camera() const { return renderer_.camera(); }
+  [[nodiscard]] const std::vector<std::uint8_t>& image(int k) {
+    std::vector<std::uint8_t>& image = images_[k];
+    if (image.empty()) image = renderer_.render(k / kRateHz, k);
+    return image;
+  }
+
+ private:
+  std::unique_ptr<simulator::Path> path_;
+  simulator::Renderer renderer_;
+  std::map<int, std::vector<std::uint8_t>> images_;
+};
+
 class VirtualCamera {
  public:
-  explicit VirtualCamera(const simulator::Config& config = swinging_camera())
-      : path_(simulator::make_path(config)), renderer_(config, *path_) {
+  // The one that swings, which most cases film: they share its frames.
+  VirtualCamera() : VirtualCamera(swinging_camera(), swinging_film()) {}
+  explicit VirtualCamera(const simulator::Config& config)
+      : VirtualCamera(config, std::make_shared<Film>(config)) {}
+
+  VirtualCamera(const simulator::Config& config, std::shared_ptr<Film> film)
+      : film_(std::move(film)) {
     const simulator::CameraConfig& c = config.camera;
     calibration_.camera = {c.focal_length, c.aspect, c.radial_distortion, kWidth, kHeight};
     calibration_.line_delay = c.line_delay;
@@ -59,19 +85,15 @@ class VirtualCamera {
   [[nodiscard]] static double time_s(int k) { return k / kRateHz; }
 
   // Of frame k; lives as long as the camera.
-  [[nodiscard]] ImageView image(int k) {
-    std::vector<std::uint8_t>& image = images_[k];
-    if (image.empty()) image = renderer_.render(time_s(k), k);
-    return {image.data(), kWidth, kHeight, kWidth};
-  }
+  [[nodiscard]] ImageView image(int k) { return {film_->image(k).data(), kWidth, kHeight, kWidth}; }
 
   [[nodiscard]] InterpolatedPanTilt telemetry(int k, const Sigmas& sigmas = {},
                                               double before_s = 0) {
     constexpr double h = 1e-3;  // s
     const double t = time_s(k) + calibration_.line_delay * kHeight / 2 - before_s;
-    const simulator::Angles before = path_->at(t - h);
-    const simulator::Angles now = path_->at(t);
-    const simulator::Angles after = path_->at(t + h);
+    const simulator::Angles before = film_->path().at(t - h);
+    const simulator::Angles now = film_->path().at(t);
+    const simulator::Angles after = film_->path().at(t + h);
     const auto noise = [&](double sigma) { return sigma * normal_(random_); };
     InterpolatedPanTilt out;
     out.time_s = time_s(k);  // no clock offset, as of row 0
@@ -112,17 +134,20 @@ class VirtualCamera {
   // Where the direction that the frame gives to u truly is, less u, px.
   [[nodiscard]] Vector2<double> error(int k, const FrameOrientation& frame,
                                       const Vector2<double>& u) const {
-    return pixel_error(renderer_.camera(), time_s(k), frame, u);
+    return pixel_error(film_->camera(), time_s(k), frame, u);
   }
   void judge(int k, const FrameOrientation& frame, double* px, double* square) const {
-    judge_frame(renderer_.camera(), time_s(k), frame, px, square);
+    judge_frame(film_->camera(), time_s(k), frame, px, square);
   }
 
  private:
-  std::unique_ptr<simulator::Path> path_;
-  simulator::Renderer renderer_;
+  static const std::shared_ptr<Film>& swinging_film() {
+    static const auto film = std::make_shared<Film>(swinging_camera());
+    return film;
+  }
+
+  std::shared_ptr<Film> film_;
   Calibration calibration_;
-  std::map<int, std::vector<std::uint8_t>> images_;
   std::mt19937_64 random_{1};
   std::normal_distribution<double> normal_;
 };
