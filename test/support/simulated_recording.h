@@ -10,6 +10,7 @@
 #include <cmath>
 #include <cstdint>
 #include <functional>
+#include <limits>
 #include <random>
 #include <vector>
 
@@ -147,22 +148,41 @@ inline bool pixel_at(const Simulation& s, const Eigen::Vector2d& angle, const Ei
   return true;
 }
 
-// The row whose exposure meets the landmark in it, and the column.
+// The row whose exposure meets the landmark in it, and the column: where the landmark's row less the row that is exposed changes its
+// sign, by regula falsi (Illinois: Dowell, Jarratt 1971), as both are nearly straight.
 inline bool rolling_pixel(const Simulation& s, double frame_time, const Eigen::Vector3d& d,
                           double* u, double* v) {
+  constexpr double kAccuracy_px = 1e-11;
+  const auto ahead = [&](double row) {
+    return pixel_at(s, s.angles(frame_time + row * s.line_delay), d, u, v)
+               ? *v - row
+               : -std::numeric_limits<double>::infinity();
+  };
   double low = -0.2 * s.height;
   double high = 1.2 * s.height;
-  const auto above = [&](double row) {
-    return pixel_at(s, s.angles(frame_time + row * s.line_delay), d, u, v) && *v > row;
-  };
-  if (!above(low) || above(high)) return false;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (low + high);
-    (above(middle) ? low : high) = middle;
+  double at_low = ahead(low);
+  double at_high = ahead(high);
+  if (!(at_low > 0) || at_high > 0) return false;
+  double row = low;
+  int side = 0;
+  for (int i = 0; i < 100; ++i) {
+    row = std::isfinite(at_high) ? (low * at_high - high * at_low) / (at_high - at_low)
+                                 : 0.5 * (low + high);
+    const double at_row = ahead(row);
+    if (std::abs(at_row) < kAccuracy_px) break;
+    if (at_row > 0) {
+      low = row;
+      at_low = at_row;
+      if (side > 0) at_high /= 2;
+      side = 1;
+    } else {
+      high = row;
+      at_high = at_row;
+      if (side < 0) at_low /= 2;
+      side = -1;
+    }
   }
-  const double time = frame_time + 0.5 * (low + high) * s.line_delay;
-  return pixel_at(s, s.angles(time), d, u, v) && *u >= 0 && *u <= s.width && *v >= 0 &&
-         *v <= s.height;
+  return std::isfinite(ahead(row)) && *u >= 0 && *u <= s.width && *v >= 0 && *v <= s.height;
 }
 
 }  // namespace internal
