@@ -13,7 +13,8 @@ constexpr int kHeldZ = 6 * ChangeRegions::kUnit;
 // through (1 4 1) / 6 correlate by 8/18, the next by 1/18.
 constexpr double kSumSigma = 5 + 2 * (4 * 8.0 + 3 * 1.0) / 18;
 constexpr double kLeastEdge = 2.5;  // sigmas
-constexpr int kEdgeShare = 3;       // of the largest |z|
+constexpr double kMergeShare = 0.75;
+constexpr int kEdgeShare = 3;  // of the largest |z|
 
 }  // namespace
 
@@ -27,6 +28,23 @@ bool ChangeOptions::validate(const char** error) const {
   if (!(threshold >= 3 && threshold <= 15)) problem = "threshold must be 3 to 15 sigmas";
   if (error != nullptr && problem != nullptr) *error = problem;
   return problem == nullptr;
+}
+
+double largest_sum(const std::int16_t* z, int width, int height) {
+  int most = 0;
+  for (int v = kHalf; v + kHalf < height; ++v) {
+    for (int u = kHalf; u + kHalf < width; ++u) {
+      int sum = 0;
+      for (int j = -kHalf; j <= kHalf; ++j) {
+        for (int i = -kHalf; i <= kHalf; ++i) {
+          const int at = z[static_cast<std::ptrdiff_t>(v + j) * width + u + i];
+          sum += std::min(std::max(at, -kHeldZ), kHeldZ);
+        }
+      }
+      most = std::max(most, std::abs(sum));
+    }
+  }
+  return most / (kSumSigma * ChangeRegions::kUnit);
 }
 
 ChangeRegions::ChangeRegions(int width, int height, const ChangeOptions& options)
@@ -148,7 +166,12 @@ void ChangeRegions::merge_regions() {
         const Region& b = regions_[k];
         const int between_u = std::max(a.left, b.left) - std::min(a.right, b.right);
         const int between_v = std::max(a.top, b.top) - std::min(a.bottom, b.bottom);
-        if (std::max(between_u, between_v) > options_.merge_px) {
+        const auto size_of = [](const Region& region) {
+          return std::max(region.right - region.left, region.bottom - region.top);
+        };
+        const double near =
+            std::max(options_.merge_px, kMergeShare * std::min(size_of(a), size_of(b)));
+        if (std::max(between_u, between_v) > near) {
           ++k;
           continue;
         }

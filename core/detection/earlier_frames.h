@@ -37,6 +37,8 @@ class EarlierFrames {
   [[nodiscard]] const Frame& preferred(int i) const {
     return frames_[static_cast<std::size_t>(order_[static_cast<std::size_t>(i)])];
   }
+  // In that order, the oldest of the recent ones.
+  [[nodiscard]] int first_recent() const { return ladder_.count; }
   [[nodiscard]] ImageView view(int i) const {
     return {preferred(i).pixels.data(), width_, height_, width_};
   }

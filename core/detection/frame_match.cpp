@@ -8,11 +8,14 @@
 namespace alidade {
 namespace {
 
+using Vector6 = Matrix<double, 6, 1>;
+
 constexpr int kMatchSteps = 4;
 constexpr double kStill_px = 0.01;  // of a step, after which no other is made
 constexpr double kHuberSigmas = 2;
 // Where texture says less of the shift than this, it stays 0, px.
 constexpr double kShiftPrior_px = 2;
+constexpr double kShearPrior_px = 1;
 constexpr double kGainPrior = 0.3;
 constexpr double kOffsetPrior = 30;  // grey levels
 constexpr double kNormalQuartile = 0.6745;
@@ -44,15 +47,14 @@ FrameMatch match_frames(const SmoothedView& now, const ImageView& then, const Ti
   constexpr float kUnit = 1.0F / kSmoothUnit;
   bool last = false;
   for (int step = 0;; ++step) {
-    Matrix4<double> normal = Matrix4<double>::Zero();
-    Vector4<double> right = Vector4<double>::Zero();
-    normal.diagonal() << 1 / (kShiftPrior_px * kShiftPrior_px),
-        1 / (kShiftPrior_px * kShiftPrior_px), 1 / (kGainPrior * kGainPrior),
-        1 / (kOffsetPrior * kOffsetPrior);
-    right << -normal(0, 0) * match.shift.x(), -normal(1, 1) * match.shift.y(),
-        normal(2, 2) * (1 - match.gain), -normal(3, 3) * match.offset;
-    const auto shift_u = static_cast<float>(match.shift.x());
-    const auto shift_v = static_cast<float>(match.shift.y());
+    Vector6 prior;
+    prior << kShiftPrior_px, kShiftPrior_px, kShearPrior_px, kShearPrior_px, kGainPrior,
+        kOffsetPrior;
+    prior = prior.cwiseAbs2().cwiseInverse().eval();
+    Vector6 off;
+    off << match.shift, match.shear, match.gain - 1, match.offset;
+    Matrix<double, 6, 6> normal = prior.asDiagonal();
+    Vector6 right = -prior.cwiseProduct(off);
     std::size_t count = 0;
     // Another pixel of each tile in each row of tiles, so that no pattern is seen at one phase only.
     for (int j = 0; j < rows; ++j) {
@@ -64,15 +66,17 @@ FrameMatch match_frames(const SmoothedView& now, const ImageView& then, const Ti
         const int u = kTile * i + a;
         const int v = kTile * j + b;
         if (u < 1 || v < 1 || u + 1 >= now.width || v + 1 >= now.height) continue;
+        const double r = row_place(v, now.height);
+        const Vector2<double> shift = match.shift_at(r);
         const float s = (static_cast<float>(a) + 0.5F) / kTile;
         const float t = (static_cast<float>(b) + 0.5F) / kTile;
         const auto between = [s, t](float p, float q, float r, float w) {
           return (1 - t) * ((1 - s) * p + s * q) + t * ((1 - s) * r + s * w);
         };
-        const float then_u =
-            between(upper[i].u, upper[i + 1].u, lower[i].u, lower[i + 1].u) + shift_u;
-        const float then_v =
-            between(upper[i].v, upper[i + 1].v, lower[i].v, lower[i + 1].v) + shift_v;
+        const float then_u = between(upper[i].u, upper[i + 1].u, lower[i].u, lower[i + 1].u) +
+                             static_cast<float>(shift.x());
+        const float then_v = between(upper[i].v, upper[i + 1].v, lower[i].v, lower[i + 1].v) +
+                             static_cast<float>(shift.y());
         if (!(then_u >= kSplineMargin && then_v >= kSplineMargin &&
               then_u <= static_cast<float>(then.width) - kSplineMargin &&
               then_v <= static_cast<float>(then.height) - kSplineMargin)) {
@@ -89,8 +93,10 @@ FrameMatch match_frames(const SmoothedView& now, const ImageView& then, const Ti
         (*scratch)[count++] = static_cast<float>(z);
         if (last) continue;
         const double weight = (z <= kHuberSigmas ? 1 : kHuberSigmas / z) / (sigma * sigma);
-        const Vector4<double> J(0.5 * static_cast<double>(kUnit) * (here[u + 1] - here[u - 1]),
-                                0.5 * static_cast<double>(kUnit) * (below[u] - above[u]), seen, 1);
+        const double slope_u = 0.5 * static_cast<double>(kUnit) * (here[u + 1] - here[u - 1]);
+        const double slope_v = 0.5 * static_cast<double>(kUnit) * (below[u] - above[u]);
+        Vector6 J;
+        J << slope_u, slope_v, r * slope_u, r * slope_v, seen, 1;
         normal.noalias() += weight * J * J.transpose();
         right.noalias() += (weight * error) * J;
       }
@@ -104,11 +110,12 @@ FrameMatch match_frames(const SmoothedView& now, const ImageView& then, const Ti
       match.spread = static_cast<double>(*middle) / kNormalQuartile;
       return match;
     }
-    const Vector4<double> change = normal.ldlt().solve(right);
+    const Vector6 change = normal.ldlt().solve(right);
     match.shift += change.head<2>();
-    match.gain += change[2];
-    match.offset += change[3];
-    last = step + 1 == kMatchSteps || change.head<2>().norm() < kStill_px;
+    match.shear += change.segment<2>(2);
+    match.gain += change[4];
+    match.offset += change[5];
+    last = step + 1 == kMatchSteps || change.head<4>().norm() < kStill_px;
   }
 }
 

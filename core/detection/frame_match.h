@@ -1,11 +1,12 @@
 #pragma once
 // What is left between a picture and the same scene predicted from an earlier one, after their orientations have had their say: a
 // small shift, the light.
-//   now(u) = gain then(warp(u) + shift) + offset,   robust least squares over one pixel in 256, weighted by what noise and a
+//   now(u) = gain then(warp(u) + shift + shear r) + offset,   r = 2 u_v / height - 1: from -1 in the first row to 1 in the last;   robust least squares over one pixel in 256, weighted by what noise and a
 //                                                   misalignment of the stated size leave to expect
-// Orientation errors that two frames do not share come out here, up to a pixel or two where the scene has texture; in flat
-// directions the shift stays 0. Things that move are outliers. No allocation.
+// Errors of orientation (shift) and of its rates (shear) that two frames do not share come out here, up to a pixel or two where the scene has
+// texture; in flat directions they stay 0. Things that move are outliers. No allocation.
 
+#include <algorithm>
 #include <cstdint>
 #include <vector>
 
@@ -48,11 +49,21 @@ struct DifferenceModel {
 
 struct FrameMatch {
   Vector2<double> shift = Vector2<double>::Zero();  // px, in the earlier picture
+  Vector2<double> shear = Vector2<double>::Zero();  // px
   double gain = 1;
   double offset = 0;  // grey levels
   double spread = 0;  // of what remains, robust, over what the model expects; 1: as expected
   int samples = 0;
+
+  // r: of the row.
+  [[nodiscard]] Vector2<double> shift_at(double r) const { return shift + r * shear; }
+  [[nodiscard]] double largest_shift() const {
+    return std::max(shift_at(-1).norm(), shift_at(1).norm());
+  }
 };
+
+// Of the middle of a pixel's row.
+[[nodiscard]] inline double row_place(int v, int height) { return (2.0 * v + 1) / height - 1; }
 
 // scratch: room for two floats a tile.
 [[nodiscard]] FrameMatch match_frames(const SmoothedView& now, const ImageView& then,

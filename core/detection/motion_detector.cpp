@@ -18,6 +18,9 @@ constexpr double kLeastGain = 0.5;
 // z, in its units: the least of a row in a tile for which further pictures are asked. A region needs 2.3 sigmas on average.
 constexpr float kLeastAsked = 2.5F * ChangeRegions::kUnit;
 constexpr float kMostZ = 2000;
+// S, sigmas, of a box against the recent picture; and how far about a box is looked.
+constexpr double kLeastRecent = 4;
+constexpr int kAboutBox_px = 2;
 
 }  // namespace
 
@@ -80,6 +83,11 @@ MotionDetector::MotionDetector(const MotionOptions& options)
       static_cast<std::size_t>(warp_.columns()) * static_cast<std::size_t>(warp_.rows());
   tiles_.resize(tiles);
   scratch_.resize(tiles);
+  const auto side =
+      static_cast<std::size_t>(std::ceil(std::min(options.change.most_size_px, 20000.0))) +
+      2 * kAboutBox_px + 2;
+  piece_.resize(std::min(side, static_cast<std::size_t>(options.width)) *
+                std::min(side, static_cast<std::size_t>(options.height)));
 }
 
 void MotionDetector::forget() {
@@ -133,6 +141,7 @@ double MotionDetector::choose_tiles() {
   int covered = 0;
   std::size_t next = 0;
   for (int row = 0; row < warp_.rows(); ++row) {
+    const double r = row_place(kTile * row + kTile / 2, options_.height);
     for (int column = 0; column < columns; ++column) {
       TileChoice& tile = tiles_[next++];
       tile.count = 0;
@@ -145,8 +154,8 @@ double MotionDetector::choose_tiles() {
           if (wanted == TileSight::kAll) {
             const TileCorner* upper =
                 compared.corners.data() + static_cast<std::ptrdiff_t>(row) * (columns + 1) + column;
-            sight = tile_sight(upper, upper + columns + 1, compared.match.shift, options_.width,
-                               options_.height);
+            sight = tile_sight(upper, upper + columns + 1, compared.match.shift_at(r),
+                               options_.width, options_.height);
           }
           if (sight != wanted) continue;
           tile.which[static_cast<std::size_t>(tile.count++)] = static_cast<std::int8_t>(k);
@@ -156,6 +165,10 @@ double MotionDetector::choose_tiles() {
       }
       if (tile.count >= 2) ++covered;
     }
+  }
+  if (earlier_.first_recent() < earlier_.size()) {
+    Compared& recent = compared_[static_cast<std::size_t>(earlier_.first_recent())];
+    recent.chosen = recent.usable;
   }
   return static_cast<double>(covered) / static_cast<double>(tiles_.size());
 }
@@ -183,7 +196,7 @@ bool MotionDetector::match_chosen(const FrameOrientation& orientation, MotionAns
     const FrameMatch match = match_frames(now, earlier_.view(i), compared.corners, warp_.columns(),
                                           warp_.rows(), model, &scratch_);
     compared.match = match;
-    const double shift = match.shift.norm();
+    const double shift = match.largest_shift();
     answer->spread = std::max(answer->spread, match.spread);
     answer->shift_px = std::max(answer->shift_px, shift);
     compared.usable = match.samples >= kLeastSamples && shift <= options_.most_shift_px &&
@@ -202,8 +215,9 @@ void MotionDetector::compare_row(int which, int column, int row, int v, TileRow*
       compared.corners.data() + static_cast<std::ptrdiff_t>(row) * (warp_.columns() + 1) + column;
   const TileCorner* lower = upper + warp_.columns() + 1;
   const float t = (static_cast<float>(v - kTile * row) + 0.5F) / kTile;
-  const auto shift_u = static_cast<float>(compared.match.shift.x());
-  const auto shift_v = static_cast<float>(compared.match.shift.y());
+  const Vector2<double> shift = compared.match.shift_at(row_place(v, options_.height));
+  const auto shift_u = static_cast<float>(shift.x());
+  const auto shift_v = static_cast<float>(shift.y());
   const TileCorner from{(1 - t) * upper[0].u + t * lower[0].u + shift_u,
                         (1 - t) * upper[0].v + t * lower[0].v + shift_v};
   const TileCorner step{((1 - t) * upper[1].u + t * lower[1].u + shift_u - from.u) / kTile,
@@ -268,6 +282,42 @@ void MotionDetector::compare_tile(int column, int row) {
   }
 }
 
+// True where that cannot be told, too.
+bool MotionDetector::differs_from_recent(const DetectionBox& box) {
+  const int which = earlier_.first_recent();
+  const Compared& recent = compared_[static_cast<std::size_t>(which)];
+  if (!recent.usable) return true;
+  const int left = std::max(static_cast<int>(box.left) - kAboutBox_px, 1);
+  const int top = std::max(static_cast<int>(box.top) - kAboutBox_px, 1);
+  const int right =
+      std::min(static_cast<int>(box.left + box.width) + kAboutBox_px, options_.width - 1);
+  const int bottom =
+      std::min(static_cast<int>(box.top + box.height) + kAboutBox_px, options_.height - 1);
+  const int columns = warp_.columns();
+  for (int v = top; v < bottom; ++v) {
+    const int row = v / kTile;
+    const Vector2<double> shift = recent.match.shift_at(row_place(v, options_.height));
+    for (int column = left / kTile; column * kTile < right; ++column) {
+      const TileCorner* upper =
+          recent.corners.data() + static_cast<std::ptrdiff_t>(row) * (columns + 1) + column;
+      if (tile_sight(upper, upper + columns + 1, shift, options_.width, options_.height) !=
+          TileSight::kAll) {
+        return true;
+      }
+      TileRow z;
+      compare_row(which, column, row, v, &z);
+      for (int i = 0; i < kTile; ++i) {
+        const int u = kTile * column + i;
+        if (u < left || u >= right) continue;
+        piece_[static_cast<std::size_t>((v - top) * (right - left) + u - left)] =
+            static_cast<std::int16_t>(
+                std::min(std::max(z[static_cast<std::size_t>(i)], -kMostZ), kMostZ));
+      }
+    }
+  }
+  return largest_sum(piece_.data(), right - left, bottom - top) >= kLeastRecent;
+}
+
 MotionAnswer MotionDetector::find(const ImageView& image, const FrameOrientation& orientation) {
   boxes_.clear();
   MotionAnswer answer;
@@ -295,7 +345,9 @@ MotionAnswer MotionDetector::find(const ImageView& image, const FrameOrientation
     const bool found = regions_.find();
     answer.changed = regions_.changed();
     if (found && answer.changed <= options_.most_changed) {
-      boxes_.assign(regions_.boxes().begin(), regions_.boxes().end());
+      for (const DetectionBox& box : regions_.boxes()) {
+        if (differs_from_recent(box)) boxes_.push_back(box);
+      }
     } else {
       answer.status = MotionStatus::kNotExplained;
     }
@@ -309,7 +361,7 @@ MotionAnswer MotionDetector::find(const ImageView& image, const FrameOrientation
 
 std::size_t MotionDetector::memory_bytes() const {
   return earlier_.memory_bytes() + noise_.memory_bytes() + regions_.memory_bytes() +
-         smooth_.size() * sizeof(std::uint16_t) +
+         (smooth_.size() + piece_.size()) * sizeof(std::uint16_t) +
          compared_.size() * warp_.corners() * sizeof(TileCorner) +
          tiles_.size() * (sizeof(TileChoice) + sizeof(float));
 }

@@ -5,7 +5,8 @@
 // and lenses, row by row, say that it was (frame_warp.h); a common small shift and the light are estimated (frame_match.h).
 //   z(u) = (now - gain then(warp(u) + shift) - offset) / sigma,   sigma^2 = noise^2 + (shift |gradient|)^2 + (blur |second derivative|)^2
 // The smallest z counts, and none where they differ in sign or there is but one: what one of the earlier pictures explains has not changed, so
-// that the place where a target was earlier is no detection. Noise is the picture's own (image_noise.h); if the scene as a whole differs by more than sigma,
+// that the place where a target was earlier is no detection. A box in which nothing differs from the picture three before is of a slow target's place in all
+// of the earlier ones, or of what stands still, and dropped. Noise is the picture's own (image_noise.h); if the scene as a whole differs by more than sigma,
 // sigma is widened to that. 5x5 pixels together decide (change_regions.h). Why so, and what it cannot find: docs/motion_detection.md.
 //
 // What stands still is not found, and what came to stand within about a second no longer; where it goes it leaves a ghost as long.
@@ -102,6 +103,7 @@ class MotionDetector {
   [[nodiscard]] double choose_tiles();
   [[nodiscard]] bool match_chosen(const FrameOrientation& orientation, MotionAnswer* answer);
   void compare_tile(int column, int row);
+  [[nodiscard]] bool differs_from_recent(const DetectionBox& box);
   void compare_row(int which, int column, int row, int v, TileRow* z) const;
 
   MotionOptions options_;
@@ -117,6 +119,7 @@ class MotionDetector {
   std::array<Compared, EarlierFrames::kMost> compared_;  // by the order of earlier_
   std::vector<TileChoice> tiles_;
   std::vector<float> scratch_;
+  std::vector<std::int16_t> piece_;  // z about a box
 };
 
 }  // namespace alidade

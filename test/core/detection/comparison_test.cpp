@@ -85,12 +85,14 @@ TEST(SplineImage, IsTheSameAtPixelCentresAndNearlySoBetween) {
   EXPECT_EQ(smooth[0], 36 * pixels.memory[0]);
 }
 
-TEST(FrameMatch, FindsShiftAndLight) {
+TEST(FrameMatch, FindsShiftShearAndLight) {
   std::mt19937_64 random(4);
   const AnalyticImage wave(&random, 6);
   const Pixels now = make_pixels(256, 192, wave, 1, &random);
   const auto darker = [&](const Vector2<double>& u) {
-    return 0.8 * wave(u + Vector2<double>(-0.6, 0.35)) + 12;
+    // Plus 0.4 px to the right in the last row, and to the left in the first.
+    const double sheared = 0.4 * (2 * u.y() / 192 - 1);
+    return 0.8 * wave(u + Vector2<double>(-0.6 - sheared, 0.35)) + 12;
   };
   const Pixels then = make_pixels(256, 192, darker, 1, &random);
   std::vector<std::uint16_t> smooth(256 * 192);
@@ -111,6 +113,8 @@ TEST(FrameMatch, FindsShiftAndLight) {
       match_frames({smooth.data(), 256, 192}, then.view, same, kColumns, kRows, model, &scratch);
   EXPECT_NEAR(match.shift.x(), 0.6, 0.05);
   EXPECT_NEAR(match.shift.y(), -0.35, 0.05);
+  EXPECT_NEAR(match.shear.x(), 0.4, 0.05);
+  EXPECT_NEAR(match.shear.y(), 0, 0.05);
   EXPECT_NEAR(match.gain, 1 / 0.8, 0.03);
   EXPECT_LT(match.spread, 1.5);
   EXPECT_GT(match.samples, 100);
@@ -178,6 +182,14 @@ TEST_F(ChangeRegionsTest, ABoxIsWhatHasChanged) {
   // Held to 6, 25 of them, over 8.9.
   EXPECT_NEAR(strong.score, 25 * 6 / 8.889, 0.01);
   EXPECT_NEAR(weak.score, 25 * 4 / 8.889, 0.01);
+}
+
+TEST_F(ChangeRegionsTest, APieceHasTheSumThatItsBoxHas) {
+  plant(&regions_, 40, 50, 8, 6, 4);
+  ASSERT_TRUE(regions_.find());
+  ASSERT_EQ(regions_.boxes().size(), 1U);
+  EXPECT_NEAR(largest_sum(regions_.z(), kSize, kSize), regions_.boxes()[0].score, 1e-9);
+  EXPECT_EQ(largest_sum(regions_.z(), 4, 100), 0);
 }
 
 TEST_F(ChangeRegionsTest, PiecesNearEachOtherAreOneThing) {

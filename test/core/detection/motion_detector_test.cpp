@@ -117,6 +117,30 @@ TEST_F(MotionDetectorTest, ThePlaceWhereATargetWasIsNoDetection) {
   }
 }
 
+// So large and slow that its places in all of the earlier pictures overlap, behind where it is.
+TEST_F(MotionDetectorTest, ASlowTargetHasNoGhost) {
+  Disc disc;
+  disc.size_px = 20;
+  disc.velocity = {0, 36};
+  disc.place = {0, -30};
+  PanningCamera still(0);
+  still.disc = disc;
+  int found = 0;
+  for (int i = 0; i < 22; ++i) {
+    const FrameOrientation orientation = still.orientation(i);
+    const Pixels image = still.image(orientation);
+    static_cast<void>(detector_.find(image.view, orientation));
+    if (i < 12) continue;
+    ASSERT_LE(detector_.boxes().size(), 1U) << "frame " << i;
+    found += static_cast<int>(detector_.boxes().size());
+    for (const DetectionBox& box : detector_.boxes()) {
+      const Vector2<double> centre(box.left + box.width / 2, box.top + box.height / 2);
+      EXPECT_LT((centre - still.disc_pixel(orientation)).norm(), 10);
+    }
+  }
+  EXPECT_GE(found, 9);
+}
+
 TEST_F(MotionDetectorTest, FindsATargetInTheCornerOfThePicture) {
   PanningCamera still(0);
   Disc disc;
