@@ -1,0 +1,79 @@
+#pragma once
+// What is left between a picture and the same scene predicted from an earlier one, after their orientations have had their say: a
+// small shift, the light.
+//   now(u) = gain then(warp(u) + shift + shear r) + offset,   r = 2 u_v / height - 1: from -1 in the first row to 1 in the last;   robust least squares over one pixel in 256, weighted by what noise and a
+//                                                   misalignment of the stated size leave to expect
+// Errors of orientation (shift) and of its rates (shear) that two frames do not share come out here, up to a pixel or two where the scene has
+// texture; in flat directions they stay 0. Things that move are outliers. No allocation.
+
+#include <algorithm>
+#include <cstdint>
+#include <vector>
+
+#include "core/detection/frame_warp.h"
+#include "core/model/linear_algebra.h"
+#include "core/realtime/image/image_view.h"
+
+namespace alidade {
+
+// The picture of now, smoothed (spline_image.h).
+struct SmoothedView {
+  const std::uint16_t* pixels = nullptr;
+  int width = 0;
+  int height = 0;
+
+  [[nodiscard]] const std::uint16_t* row(int v) const {
+    return pixels + static_cast<std::ptrdiff_t>(v) * width;
+  }
+};
+
+// What a difference of two smoothed pictures may be without anything having moved, one standard deviation in grey levels squared:
+//   noise^2 + (shift |gradient|)^2 + (blur |second derivative|)^2
+struct DifferenceModel {
+  float noise_square = 1;  // grey levels^2
+  float shift_square = 0;  // px^2
+  float blur_square = 0;   // px^4
+
+  // At pixel u of three rows of a smoothed picture.
+  [[nodiscard]] float variance(const std::uint16_t* above, const std::uint16_t* here,
+                               const std::uint16_t* below, int u) const {
+    constexpr float kUnitSquare = 1.0F / (36 * 36);
+    const auto across = static_cast<float>(here[u + 1] - here[u - 1]);
+    const auto down = static_cast<float>(below[u] - above[u]);
+    const auto curvature =
+        static_cast<float>(here[u + 1] + here[u - 1] + below[u] + above[u] - 4 * here[u]);
+    return noise_square + kUnitSquare * (0.25F * shift_square * (across * across + down * down) +
+                                         blur_square * curvature * curvature);
+  }
+};
+
+struct FrameMatch {
+  Vector2<double> shift = Vector2<double>::Zero();  // px, in the earlier picture
+  Vector2<double> shear = Vector2<double>::Zero();  // px
+  double gain = 1;
+  double offset = 0;  // grey levels
+  double spread = 0;  // of what remains, robust, over what the model expects; 1: as expected
+  int samples = 0;
+
+  // r: of the row.
+  [[nodiscard]] Vector2<double> shift_at(double r) const { return shift + r * shear; }
+  [[nodiscard]] double largest_shift() const {
+    return std::max(shift_at(-1).norm(), shift_at(1).norm());
+  }
+};
+
+// Of the middle of a pixel's row.
+[[nodiscard]] inline double row_place(int v, int height) { return (2.0 * v + 1) / height - 1; }
+
+// scratch: room for two floats a tile.
+[[nodiscard]] FrameMatch match_frames(const SmoothedView& now, const ImageView& then,
+                                      const TileCorners& warp, int columns, int rows,
+                                      const DifferenceModel& model, std::vector<float>* scratch);
+
+// How much of a tile has its pixels in the earlier picture, after a shift.
+enum class TileSight { kNone, kPart, kAll };
+
+[[nodiscard]] TileSight tile_sight(const TileCorner* upper, const TileCorner* lower,
+                                   const Vector2<double>& shift, int width, int height);
+
+}  // namespace alidade
