@@ -93,6 +93,16 @@ ZoomPrior LensFollower::prior(const Camera<double>& camera, double zoom_rate) co
   out.value = expected_.value - Vector2<double>(std::log(camera.focal_length), zoom_rate);
   out.covariance = expected_.covariance;
   out.sensitivity = expected_.sensitivity;
+  const double since = without_reading(camera);
+  const auto set = [&](Parameter p, double unknown) {
+    const double told = reading_ ? reading_->calibration.covariance(index(p), index(p)) : 0;
+    out.own_variances[index(p)] = told + unknown * unknown;
+  };
+  set(Parameter::kRadialDistortion,
+      options_.distortion_change * since * camera.distortion_of_corner());
+  set(Parameter::kCentreU, options_.centre_change_px * since);
+  set(Parameter::kCentreV, options_.centre_change_px * since);
+  out.own_variances[kOfDistortion] /= columns_->of_k * columns_->of_k;
   return out;
 }
 
@@ -128,8 +138,7 @@ Calibration LensFollower::answer(const Calibration& calibration, const OwnLens& 
   Sensitivity<1> of_it = own.sensitivity.row(0);
   scale.make_independent(&of_it);
   // Without a reading distortion and centre are those of the last one.
-  const double since =
-      reading_ ? 0 : std::log(calibration.camera.focal_length / last_reading_focal_length_);
+  const double since = without_reading(calibration.camera);
   const double unknown = options_.distortion_change * since;
   Calibration out =
       scale.at(calibration, phi, variance + of_lens + unknown * unknown, sensitivity + of_it);

@@ -129,6 +129,11 @@ class LensFollower {
     return track_.age_s(time_s) < options_.track.longest_s;
   }
   [[nodiscard]] double reading_variance(const LensScale& scale) const;
+  // What is unknown of this camera's distortion in the corner, 1, and of its centre, px, as there is no reading: by how much log f
+  // is away from the latest one's.
+  [[nodiscard]] double without_reading(const Camera<double>& camera) const {
+    return reading_ ? 0 : std::log(camera.focal_length / last_reading_focal_length_);
+  }
 
   LensFollowerOptions options_;
   LensTrack track_;

@@ -230,7 +230,8 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   if (frame_.telemetry == FrameTelemetry::kExtrapolated) {
     add_pending(motion.angle.vector(),
                 solved.frame_covariance.topLeftCorner<2, 2>() + shear_.angle_covariance(),
-                solved.shared_covariance, solved.sensitivity.topRows<2>());
+                solved.shared_covariance, solved.zoom.innovation_by_calibration,
+                solved.sensitivity.topRows<2>());
   }
   if (offset_.contradicted() && !enclosed) {
     // Until telemetry that belongs to a frame says otherwise.
@@ -272,6 +273,7 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
     static_cast<void>(offset_.learn(
         frame_.time_s,
         {solved.innovation, solved.innovation_covariance, solved.shared_covariance,
+         solved.zoom.innovation_by_calibration,
          predicted.prior.telemetry_sensitivity.topRows<2>() - solved.sensitivity.topRows<2>(),
          solved.lens.innovation_by_lens}));
   }

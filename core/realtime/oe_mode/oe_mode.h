@@ -161,7 +161,8 @@ class OeMode {
   [[nodiscard]] Solution find_and_solve(const PredictedMotion& predicted,
                                         const LandmarkSearch::Coarse& coarse, double sigma_px);
   void add_pending(const Vector2<double>& angle, const Matrix2<double>& covariance,
-                   const Matrix2<double>& shared_covariance, const Sensitivity<2>& sensitivity);
+                   const Matrix2<double>& shared_covariance, const Matrix2<double>& by_calibration,
+                   const Sensitivity<2>& sensitivity);
   OeStatus answer_without_landmarks(const PredictedMotion& predicted, const Solution& solution,
                                     FrameOrientation* out);
   OeStatus answer_with_landmarks(const PredictedMotion& predicted, const Solution& solution,
