@@ -52,8 +52,21 @@ Camera<double> LensFollower::expect_after_last(double time_s, bool may_move, con
                                                const Camera<double>& latest) {
   expected_ = track_.predicted(time_s, may_move);
   scale.make_independent(&expected_.sensitivity);
-  const Camera<double>& camera = reading_ ? reading_->calibration.camera : latest;
-  return zoomed(camera, expected_.value[0] - std::log(camera.focal_length));
+  return with_focal_length(expected_.value[0], scale, latest);
+}
+
+Camera<double> LensFollower::with_focal_length(double log_focal_length, const LensScale& scale,
+                                               const Camera<double>& latest) const {
+  if (!reading_) return zoomed(latest, log_focal_length - std::log(latest.focal_length));
+  const Calibration& told = reading_->calibration;
+  const double change = log_focal_length - std::log(told.camera.focal_length);
+  Camera<double> out = zoomed(told.camera, change);
+  // Where the reading is not believed the curve is followed no further.
+  const double most = options_.excluded_sigmas * relative_focal_length_sigma(told);
+  const double along = std::clamp(change + scale.value, -most, most);
+  out.radial_distortion += along * reading_->corner_by_zoom * out.distortion_of_corner();
+  out.set_centre_offset(out.centre_offset() + along * reading_->centre_by_zoom);
+  return out;
 }
 
 Camera<double> LensFollower::expect_by_reading(const LensScale& scale) {

@@ -83,6 +83,10 @@ class LensFollower {
                                                  const Camera<double>& latest);
   // The same by the reading; there is one.
   [[nodiscard]] Camera<double> expect_by_reading(const LensScale& scale);
+  // The frame's camera where log f is log_focal_length at phi = 0: distortion and centre as the curve has them there, or, without a
+  // reading, as in `latest`.
+  [[nodiscard]] Camera<double> with_focal_length(double log_focal_length, const LensScale& scale,
+                                                 const Camera<double>& latest) const;
   // Of log f and its rate, without the frame's landmarks.
   [[nodiscard]] const LensTrack::State& expected() const { return expected_; }
   // As it was before looks that found nothing.

@@ -349,7 +349,8 @@ OeMode::Solution OeMode::look_with_own_lens(FrameMotion<double> motion,
   if (!(std::abs(solved.zoom.correction[0]) * diagonal_px > 2 * kFar_px)) return out;
   add(solved.correction, &motion);
   motion.zoom_rate += solved.zoom.correction[1];
-  set_camera(zoomed(calibration_.camera, solved.zoom.correction[0]));
+  const double log_f = std::log(calibration_.camera.focal_length) + solved.zoom.correction[0];
+  set_camera(lens_.with_focal_length(log_f, offset_.lens(), calibration_.camera));
   return solve_about(motion, predicted);
 }
 
@@ -382,8 +383,7 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
   };
   if (had_own) {
     if (follows && few) {
-      set_camera(zoomed(calibration_.camera,
-                        expected_before.value[0] - std::log(calibration_.camera.focal_length)));
+      set_camera(lens_.with_focal_length(expected_before.value[0], scale, calibration_.camera));
       const Solution second = look_with_own_lens(carried, predicted);
       if (holds(second)) return second;
     }

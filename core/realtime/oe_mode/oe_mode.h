@@ -108,8 +108,9 @@ class OeMode {
     return process(image, frame_time_s, at_middle_row, nullptr, out);
   }
   // The same behind a lens that zooms, with FocalLength::kLearnt; lens: what is known of it, null: nothing new. Where that is
-  // missing or wrong the frames before and the image tell f, as far as they can. Distortion and centre are taken from `lens`: where
-  // its focal length is excluded (reading_sigmas), the caller hands in the curve's at the focal length that was found.
+  // missing or wrong the frames before and the image tell f, as far as they can. Distortion and centre are taken from `lens`, along its
+  // curve to the f that the image tells: where its focal length is excluded (reading_sigmas), the caller hands in the curve's at the
+  // focal length that was found.
   [[nodiscard]] OeStatus process(const ImageView& image, double frame_time_s,
                                  const InterpolatedPanTilt* at_middle_row, const FrameLens* lens,
                                  FrameOrientation* out);

@@ -29,17 +29,21 @@ class ZoomingLens : public testing::Test {
     images_.clear();
   }
 
-  ZoomingLens() {
+  ZoomingLens() : oe_(make_oe_mode()) {
+    while (moves(last_of_wide_ + 1) == false) ++last_of_wide_;
+    first_of_tele_ = last_of_wide_ + 1;
+    while (moves(first_of_tele_)) ++first_of_tele_;
+  }
+
+  [[nodiscard]] static std::unique_ptr<OeMode> make_oe_mode() {
     OeOptions options;
     options.max_width = 480;
     options.max_height = 270;
     options.max_landmarks = 2000;
     options.maker.cell_size_px = 24;
-    oe_ = std::make_unique<OeMode>(options);
-    oe_->reset(camera_->lens_at(0, kRepeatability).calibration, FocalLength::kLearnt);
-    while (moves(last_of_wide_ + 1) == false) ++last_of_wide_;
-    first_of_tele_ = last_of_wide_ + 1;
-    while (moves(first_of_tele_)) ++first_of_tele_;
+    auto oe = std::make_unique<OeMode>(options);
+    oe->reset(camera_->lens_at(0, kRepeatability).calibration, FocalLength::kLearnt);
+    return oe;
   }
 
   [[nodiscard]] static bool moves(int k) { return camera_->lens(k, kRepeatability).moves; }
@@ -165,6 +169,40 @@ TEST_F(ZoomingLens, IsFollowedWhereItsReadingIsStuck) {
   }
   EXPECT_GE(held, 0.95 * frames);
   EXPECT_GT(contradictions, frames / 2);
+}
+
+// Readings in steps of 2 % have distortion and centre of another focal length: f comes out as with readings of each frame's own.
+TEST_F(ZoomingLens, IsFollowedAsWellByReadingsInCoarseSteps) {
+  constexpr double kQuantum = 200;  // of 9998
+  const std::unique_ptr<OeMode> other = make_oe_mode();
+  int moving = 0;
+  double difference_square = 0;
+  double sigmas_square = 0;
+  for (int k = kFirst; k < first_of_tele_; ++k) {
+    const InterpolatedPanTilt telemetry = camera_->telemetry(k, 5e-5, 5e-4);
+    const FrameLens exact = camera_->lens(k, kRepeatability);
+    const FrameLens coarse = moves(k) ? camera_->coarse_lens(k, kQuantum, kRepeatability) : exact;
+    FrameOrientation by_exact;
+    const OeStatus status =
+        other->process(image(k), camera_->time_s(k), &telemetry, &exact, &by_exact);
+    other->maintain();
+    EXPECT_EQ(oe_->process(image(k), camera_->time_s(k), &telemetry, &coarse, &frame_), status);
+    oe_->maintain();
+    if (!moves(k)) continue;
+    ASSERT_EQ(status, OeStatus::kOk) << k;
+    ++moving;
+    errors_ = errors_of(*camera_, k, frame_);
+    EXPECT_LT(errors_.sigmas, 5) << k;
+    sigmas_square += errors_.log_sigmas * errors_.log_sigmas;
+    const double difference =
+        std::log(frame_.calibration.camera.focal_length / by_exact.calibration.camera.focal_length);
+    difference_square += difference * difference;
+  }
+  EXPECT_GT(moving, 40);
+  // A third of what distortion and centre of the readings themselves make of it.
+  EXPECT_LT(std::sqrt(difference_square / moving), 7e-5);
+  // All frames share the error of the map's scale: 99.9 % of a chi-square of one degree.
+  EXPECT_LT(sigmas_square / moving, 10.8);
 }
 
 // For some frames there is no reading at all.
