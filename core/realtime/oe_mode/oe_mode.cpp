@@ -18,6 +18,13 @@ void add(const Vector6& change, FrameMotion<double>* motion) {
                           motion->acceleration.tilt + change[5]};
 }
 
+// Of the frame's own lens, 1/s, by its noise and that of phi.
+double rate_sigma(const SolvedMotion& solved) {
+  const SolvedZoom& zoom = solved.zoom;
+  return std::sqrt(zoom.covariance(1, 1) +
+                   solved.lens.variance * zoom.by_lens[1] * zoom.by_lens[1]);
+}
+
 }  // namespace
 
 OeMode::OeMode(const OeOptions& options)
@@ -268,6 +275,7 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
     return finish(frame_.telemetry != FrameTelemetry::kNone ? OeStatus::kTooFew
                                                             : OeStatus::kNoPrediction);
   }
+  if (lens_.columns() != nullptr) out->zoom_rate_sigma = rate_sigma(solved);
   if (enclosed) {
     // What contradicts does not come this far: see solve_orientation().
     static_cast<void>(offset_.learn(

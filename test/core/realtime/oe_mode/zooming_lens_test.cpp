@@ -104,6 +104,7 @@ TEST_F(ZoomingLens, IsFollowedOverTwoOctavesAndBackToRest) {
   const double of_map =
       std::sqrt(frame_.calibration.covariance(0, 0)) / frame_.calibration.camera.focal_length;
   double rms_square = 0;
+  double rate_squares = 0;
   int moving = 0;
   for (int k = last_of_wide_ + 1; k < first_of_tele_ + 20; ++k) {
     ASSERT_EQ(process(k), OeStatus::kOk) << k;
@@ -117,14 +118,17 @@ TEST_F(ZoomingLens, IsFollowedOverTwoOctavesAndBackToRest) {
     ++moving;
     rms_square += errors_.rms_px * errors_.rms_px;
     // d log f / dt as the motor has it.
-    const double true_rate =
-        std::log(camera_->camera().lens_at(camera_->time_s(k) + 1e-3).focal_length /
-                 camera_->camera().lens_at(camera_->time_s(k) - 1e-3).focal_length) /
-        2e-3;
-    EXPECT_NEAR(frame_.zoom_rate, true_rate, 0.02) << k;
+    const double middle_s = camera_->middle_s(k);
+    const double middle_rate = std::log(camera_->camera().lens_at(middle_s + 1e-3).focal_length /
+                                        camera_->camera().lens_at(middle_s - 1e-3).focal_length) /
+                               2e-3;
+    EXPECT_NEAR(frame_.zoom_rate, middle_rate, 0.02) << k;
+    ASSERT_GT(frame_.zoom_rate_sigma, 0) << k;
+    rate_squares += std::pow((frame_.zoom_rate - middle_rate) / frame_.zoom_rate_sigma, 2);
   }
   EXPECT_GT(moving, 40);
   EXPECT_LT(std::sqrt(rms_square / moving), 0.05);
+  EXPECT_LT(rate_squares / moving, 1 + 4 * std::sqrt(2.0 / moving));
   EXPECT_NEAR(frame_.zoom_rate, 0, 1e-4);
   // It knows f as well as the map knows its scale, not as well as the curve.
   EXPECT_LT(std::sqrt(frame_.calibration.covariance(0, 0)),
