@@ -74,6 +74,14 @@ void add_fields(const OrientationRecord& record, Line* line) {
             std::optional(std::array<double, 2>{record.camera.centre_u, record.camera.centre_v}));
   line->add("latency_s", record.latency_s);
   line->add("telemetry_age_s", record.telemetry_age_s);
+  std::optional<double> zoom_rate;
+  std::optional<double> zoom_rate_sigma;
+  if (record.orientation && record.orientation->geometry.zoom_rate_sigma > 0) {
+    zoom_rate = record.orientation->geometry.zoom_rate;
+    zoom_rate_sigma = record.orientation->geometry.zoom_rate_sigma;
+  }
+  line->add("zoom_rate_per_s", zoom_rate);
+  line->add("zoom_rate_sigma_per_s", zoom_rate_sigma);
 }
 
 // One line, in memory of its own; what has no value is said by the word that the kind of line has for that.

@@ -49,6 +49,7 @@ FrameGeometry pack(const FrameOrientation& frame) {
   out.rate = frame.rate;
   out.acceleration = frame.acceleration;
   out.zoom_rate = frame.zoom_rate;
+  out.zoom_rate_sigma = frame.zoom_rate_sigma;
   store(frame.motion_covariance, &out.motion_covariance);
   store(frame.motion_sensitivity, &out.motion_sensitivity);
   return out;
@@ -82,6 +83,7 @@ FrameOrientation unpack(const FrameGeometry& geometry, const PlainCalibration& c
   out.rate = geometry.rate;
   out.acceleration = geometry.acceleration;
   out.zoom_rate = geometry.zoom_rate;
+  out.zoom_rate_sigma = geometry.zoom_rate_sigma;
   out.motion_covariance = load<6, 6>(geometry.motion_covariance);
   out.motion_sensitivity = load<6, kParameterCount>(geometry.motion_sensitivity);
   return out;

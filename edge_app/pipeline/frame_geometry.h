@@ -36,7 +36,8 @@ struct FrameGeometry {
   PanTilt<double> angle;  // true, not wrapped
   PanTilt<double> rate;
   PanTilt<double> acceleration;
-  double zoom_rate = 0;  // 1/s
+  double zoom_rate = 0;        // 1/s
+  double zoom_rate_sigma = 0;  // 1/s; 0: none is told
   std::array<double, 36> motion_covariance{};
   std::array<double, 6 * kParameterCount> motion_sensitivity{};
 };

@@ -4,6 +4,30 @@
 #include <cmath>
 
 namespace alidade {
+namespace {
+
+// By a step along the curve from the lens' reading, to either side where the curve goes on.
+void set_slopes(const ZoomCurve& curve, FrameLens* lens) {
+  constexpr double kStep = 5e-3;  // of the readings' range
+  const double step = kStep * (curve.last_reading() - curve.first_reading());
+  const double reading = *lens->calibration.zoom;
+  lens->corner_by_zoom = 0;
+  lens->centre_by_zoom.setZero();
+  Calibration beside;
+  if (!curve.at(reading + step, &beside) && !curve.at(reading - step, &beside)) return;
+  const Camera<double>& from = lens->calibration.camera;
+  const Camera<double>& to = beside.camera;
+  const double change = std::log(to.focal_length / from.focal_length);
+  // A lens that turns over there, or does not zoom.
+  constexpr double kLeast = 1e-6;
+  if (!(std::abs(change) > kLeast)) return;
+  lens->corner_by_zoom = (to.radial_distortion / to.distortion_of_corner() -
+                          from.radial_distortion / from.distortion_of_corner()) /
+                         change;
+  lens->centre_by_zoom = (to.centre_offset() - from.centre_offset()) / change;
+}
+
+}  // namespace
 
 void ZoomLookup::add(double time_s, double zoom) {
   if (!std::isfinite(time_s) || !std::isfinite(zoom)) return;
@@ -67,6 +91,7 @@ bool ZoomLookup::calibration(const ZoomCurve& curve, double time_s, double reado
 bool ZoomLookup::lens(const ZoomCurve& curve, double time_s, double readout_s, double tolerance,
                       FrameLens* lens) const {
   if (!calibration(curve, time_s, readout_s, &lens->calibration)) return false;
+  set_slopes(curve, lens);
   const std::size_t after = newer_of(time_s);
   const Reading& newer = reading(after);
   const Reading& older = reading(count_ > 1 ? after + 1 : after);
@@ -116,7 +141,10 @@ bool lens_of_focal_length(const ZoomCurve& curve, double focal_length, FrameLens
     const double middle = at_a == at_b ? a : (a * at_b - b * at_a) / (at_b - at_a);
     double at_middle = 0;
     if (!log_at(middle, &at_middle)) return false;
-    if (std::abs(at_middle) < kNear) return true;
+    if (std::abs(at_middle) < kNear) {
+      set_slopes(curve, lens);
+      return true;
+    }
     if (at_middle * at_b < 0) {
       a = b;
       at_a = at_b;

@@ -84,18 +84,7 @@ FrameLens lens_of(const ZoomingCamera& camera, const Options& options, int k) {
   if (options.fault == "late") return camera.lens_at(std::max(t - 1, 0.0), kRepeatability);
   if (options.fault != "coarse") return camera.lens(k, kRepeatability);
   constexpr double kQuantum = 200;  // of 9998
-  const auto told = [&](double s) {
-    return 1 + kQuantum * std::round((camera.camera().zoom()->reading(s) - 1) / kQuantum);
-  };
-  FrameLens lens;
-  const double step =
-      std::log(camera.curve_of(std::min(9999.0, told(t) + kQuantum / 2), 0).camera.focal_length /
-               camera.curve_of(std::max(1.0, told(t) - kQuantum / 2), 0).camera.focal_length);
-  lens.calibration = camera.curve_of(std::clamp(told(t), 1.0, 9999.0),
-                                     std::hypot(kRepeatability, step / std::sqrt(12)));
-  lens.moves = told(t) != told(t - 0.06);
-  lens.rate_sigma = 1;
-  return lens;
+  return camera.coarse_lens(k, kQuantum, kRepeatability);
 }
 
 double cpu_s() {

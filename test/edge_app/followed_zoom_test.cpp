@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -34,11 +35,30 @@ ZoomCurve curve_of(const ZoomingCamera& camera) {
   return fit_zoom(nodes, {}, &fit, &error) ? fit.curve : ZoomCurve();
 }
 
+// One film for all tests, and for all seeds of telemetry's noise.
 class FollowedZoom : public testing::Test {
  protected:
-  FollowedZoom() : curve_(curve_of(camera_)) {
+  static void SetUpTestSuite() {
+    const simulator::Config config = two_octaves();
+    camera_ = new ZoomingCamera(config, std::make_unique<ZoomedPath>(config, 0.4, 3));
+    curve_ = curve_of(*camera_);
+    ASSERT_FALSE(curve_.empty());
+  }
+  static void TearDownTestSuite() {
+    delete camera_;
+    images_.clear();
+  }
+
+  FollowedZoom() {
+    while (!moves(last_of_wide_ + 1)) ++last_of_wide_;
+    first_of_tele_ = last_of_wide_ + 1;
+    while (moves(first_of_tele_)) ++first_of_tele_;
+    begin(3);
+  }
+
+  // seed: of telemetry's noise.
+  void begin(std::uint64_t seed) {
     OrientationStepOptions options;
-    EXPECT_FALSE(curve_.empty());
     options.zoom_curve = curve_;
     EXPECT_TRUE(curve_.at(reading(0), &options.calibration));
     options.calibrated = true;
@@ -48,36 +68,38 @@ class FollowedZoom : public testing::Test {
     options.oe->max_landmarks = 2000;
     options.oe->maker.cell_size_px = 24;
     step_ = std::make_unique<OrientationStep>(options);
-    while (!moves(last_of_wide_ + 1)) ++last_of_wide_;
-    first_of_tele_ = last_of_wide_ + 1;
-    while (moves(first_of_tele_)) ++first_of_tele_;
+    fed_s_ = 0;
+    random_.seed(seed);
+    normal_.reset();
   }
 
-  [[nodiscard]] bool moves(int k) const { return camera_.lens(k, 0).moves; }
-  [[nodiscard]] double reading(double t) const {
-    return std::round(camera_.camera().zoom()->reading(std::max(0.0, t)));
+  [[nodiscard]] static bool moves(int k) { return camera_->lens(k, 0).moves; }
+  [[nodiscard]] static double reading(double t) {
+    return std::round(camera_->camera().zoom()->reading(std::max(0.0, t)));
   }
 
   // All telemetry to a little behind the frame; stuck: the zoom's reading stands still since then.
   OrientationRecord add(int k, std::optional<double> stuck = std::nullopt) {
-    const double until_s = camera_.time_s(k) + 2 * kTelemetryInterval_s;
+    const double until_s = camera_->time_s(k) + 2 * kTelemetryInterval_s;
     for (; fed_s_ <= until_s; fed_s_ += kTelemetryInterval_s) {
       PanTiltSample sample;
       sample.earliest_time_s = fed_s_ - 1e-5;
       sample.latest_time_s = fed_s_ + 1e-5;
-      const simulator::Angles angles = camera_.angles_at(fed_s_);
+      const simulator::Angles angles = camera_->angles_at(fed_s_);
       sample.pan_rad = angles.pan + kTelemetrySigma * normal_(random_);
       sample.tilt_rad = angles.tilt + kTelemetrySigma * normal_(random_);
       sample.zoom = stuck ? *stuck : reading(fed_s_);
       step_->add_telemetry(sample);
     }
-    const std::vector<std::uint8_t> pixels = camera_.image(k);
+    std::vector<std::uint8_t>& pixels = images_[k];
+    if (pixels.empty()) pixels = camera_->image(k);
     FrameStamp stamp;
     stamp.frame = k;
-    stamp.receive_time_s = camera_.time_s(k);
+    stamp.receive_time_s = camera_->time_s(k);
     events_ = {};
+    const ImageView image = camera_->view(pixels);
     const AllocationGuard guard;
-    const OrientationRecord record = step_->add_frame(stamp, camera_.view(pixels), &events_);
+    const OrientationRecord record = step_->add_frame(stamp, image, &events_);
     step_->maintain();
     EXPECT_EQ(guard.count(), 0);
     return record;
@@ -86,7 +108,7 @@ class FollowedZoom : public testing::Test {
   void expect_honest(int k, const OrientationRecord& record) const {
     ASSERT_TRUE(record.orientation) << k;
     const FrameOrientation frame = unpack(record.orientation->geometry, record.camera);
-    const FrameErrors errors = errors_of(camera_, k, frame);
+    const FrameErrors errors = errors_of(*camera_, k, frame);
     EXPECT_LT(errors.sigmas, 5) << k;
     EXPECT_LT(errors.log_sigmas, 5) << k;
     if (record.mode == RecordMode::kOe) {
@@ -94,17 +116,21 @@ class FollowedZoom : public testing::Test {
     }
   }
 
-  simulator::Config config_ = two_octaves();
-  ZoomingCamera camera_{config_, std::make_unique<ZoomedPath>(config_, 0.4, 3)};
-  ZoomCurve curve_;
+  static ZoomingCamera* camera_;
+  static ZoomCurve curve_;
+  static std::map<int, std::vector<std::uint8_t>> images_;
   std::unique_ptr<OrientationStep> step_;
   StepEvents events_;
   double fed_s_ = 0;
-  std::mt19937_64 random_{3};
+  std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
   int last_of_wide_ = 2;
   int first_of_tele_ = 0;
 };
+
+ZoomingCamera* FollowedZoom::camera_ = nullptr;
+ZoomCurve FollowedZoom::curve_;
+std::map<int, std::vector<std::uint8_t>> FollowedZoom::images_;
 
 TEST_F(FollowedZoom, StaysInOeModeFromOneZoomToTheNext) {
   int held = 0;
@@ -119,7 +145,7 @@ TEST_F(FollowedZoom, StaysInOeModeFromOneZoomToTheNext) {
   EXPECT_GE(held, 0.95 * (first_of_tele_ + 5 - last_of_wide_ - 1));
   // The calibration thread hands over the curve's calibration of the new zoom: the map stays.
   PublishedCalibration published;
-  ASSERT_TRUE(curve_.at(reading(camera_.time_s(first_of_tele_ + 5)), &published.calibration));
+  ASSERT_TRUE(curve_.at(reading(camera_->time_s(first_of_tele_ + 5)), &published.calibration));
   published.calibrated = true;
   published.zoom_curve = curve_;
   step_->adopt(published);
@@ -135,19 +161,24 @@ TEST_F(FollowedZoom, StaysInOeModeFromOneZoomToTheNext) {
   EXPECT_EQ(add(first_of_tele_ + 12).mode, RecordMode::kPt);
 }
 
+// Whatever telemetry's noise has made the map's offset: the curve's optical centre errs between its nodes by several times that noise.
 TEST_F(FollowedZoom, StaysInOeModeWhereTheReadingIsStuckAndSaysSo) {
   const double stuck = reading(0);
-  int held = 0;
-  int said = 0;
-  for (int k = 2; k < first_of_tele_ + 5; ++k) {
-    const OrientationRecord record = add(k, stuck);
-    if (k <= last_of_wide_) continue;
-    expect_honest(k, record);
-    held += record.mode == RecordMode::kOe ? 1 : 0;
-    said += events_.zoom_contradicted ? 1 : 0;
+  for (const std::uint64_t seed : {1U, 4U, 7U, 8U}) {
+    SCOPED_TRACE(seed);
+    begin(seed);
+    int lost = 0;
+    int said = 0;
+    for (int k = 2; k < first_of_tele_ + 5; ++k) {
+      const OrientationRecord record = add(k, stuck);
+      if (k <= last_of_wide_) continue;
+      expect_honest(k, record);
+      lost += record.mode == RecordMode::kOe ? 0 : 1;
+      said += events_.zoom_contradicted ? 1 : 0;
+    }
+    EXPECT_LE(lost, 1);
+    EXPECT_GE(said, 1);
   }
-  EXPECT_GE(held, 0.95 * (first_of_tele_ + 5 - last_of_wide_ - 1));
-  EXPECT_GE(said, 1);
 }
 
 }  // namespace

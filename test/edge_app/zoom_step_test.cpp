@@ -5,7 +5,10 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <string>
+#include <vector>
 
+#include "core/calibration/zoom_fit.h"
 #include "edge_app/pipeline/orientation_step.h"
 #include "edge_app/pipeline/zoom_lookup.h"
 #include "test/support/allocation_guard.h"
@@ -155,6 +158,47 @@ TEST(ZoomLookup, LeavesOutWhatIsNoReading) {
   lookup.add(1.08, 2900);
   ASSERT_TRUE(lookup.calibration(curve, 1.5, 0, &c));
   EXPECT_EQ(*c.zoom, 2900);
+}
+
+// At both ends, too.
+TEST(ZoomLookup, TellsHowDistortionAndCentreGoOnAlongTheCurve) {
+  constexpr double kBeside = 30;  // device units
+  std::vector<Calibration> nodes;
+  for (const double zoom : {1000.0, 1250.0, 1500.0, 1750.0, 2000.0}) {
+    Calibration node = test::zoom_calibration(zoom);
+    Camera<double>& camera = node.camera;
+    camera.radial_distortion =
+        camera.distortion_of_corner() * (0.03 * std::log(camera.focal_length) - 0.25);
+    camera.set_centre_offset({0.01 * zoom, 1e-5 * zoom * zoom});
+    nodes.push_back(node);
+  }
+  ZoomFit fit;
+  std::string error;
+  ASSERT_TRUE(fit_zoom(nodes, {}, &fit, &error)) << error;
+  const ZoomCurve& curve = fit.curve;
+  const auto corner = [](const Camera<double>& camera) {
+    return camera.radial_distortion / camera.distortion_of_corner();
+  };
+  for (const double zoom : {1000.0, 1550.0, 2000.0}) {
+    ZoomLookup lookup;
+    lookup.add(0, zoom);
+    lookup.add(1, zoom);
+    FrameLens lens;
+    ASSERT_TRUE(lookup.lens(curve, 0.5, 0.01, 0, &lens)) << zoom;
+    FrameLens found;
+    ASSERT_TRUE(lens_of_focal_length(curve, lens.calibration.camera.focal_length, &found)) << zoom;
+    EXPECT_NEAR(found.corner_by_zoom, lens.corner_by_zoom, 1e-3 * std::abs(lens.corner_by_zoom));
+    Calibration beside;
+    ASSERT_TRUE(curve.at(zoom + kBeside, &beside));
+    const Camera<double>& from = lens.calibration.camera;
+    const double change = std::log(beside.camera.focal_length / from.focal_length);
+    const double corner_change = corner(beside.camera) - corner(from);
+    const Vector2<double> centre_change = beside.camera.centre_offset() - from.centre_offset();
+    EXPECT_NE(corner_change, 0);
+    EXPECT_GT(centre_change.norm(), 0.1);
+    EXPECT_NEAR(change * lens.corner_by_zoom, corner_change, 0.1 * std::abs(corner_change));
+    EXPECT_LT((change * lens.centre_by_zoom - centre_change).norm(), 0.1 * centre_change.norm());
+  }
 }
 
 }  // namespace

@@ -191,6 +191,26 @@ class ZoomingCamera {
     const double before_s = std::max(0.0, t - 1.5 / config_.image.rate_hz);
     out.moves = zoom.reading(t + h) != zoom.reading(before_s);
     if (!out.moves) out.rate = 0;
+    set_slopes(&out);
+    return out;
+  }
+  // As told by readings in steps of `quantum`, device units.
+  [[nodiscard]] FrameLens coarse_lens(int k, double quantum, double sigma) const {
+    const double first = config_.zoom->reading.wide;
+    const double last = config_.zoom->reading.tele;
+    const auto told = [&](double t) {
+      const double z = camera().zoom()->reading(std::max(0.0, t));
+      return std::clamp(first + quantum * std::round((z - first) / quantum), first, last);
+    };
+    const double reading = told(middle_s(k));
+    const double step =
+        std::log(curve_of(std::min(last, reading + quantum / 2), 0).camera.focal_length /
+                 curve_of(std::max(first, reading - quantum / 2), 0).camera.focal_length);
+    FrameLens out;
+    out.calibration = curve_of(reading, std::hypot(sigma, step / std::sqrt(12.0)));
+    out.moves = reading != told(middle_s(k) - 1.5 / config_.image.rate_hz);
+    out.rate_sigma = 1;
+    set_slopes(&out);
     return out;
   }
 
@@ -210,6 +230,7 @@ class ZoomingCamera {
     out.calibration = curve_of(reading_of(focal_length), sigma);
     out.rate_sigma = 1;
     out.moves = true;
+    set_slopes(&out);
     return out;
   }
 
@@ -220,6 +241,18 @@ class ZoomingCamera {
   }
 
  private:
+  void set_slopes(FrameLens* lens) const {
+    constexpr double kStep = 5;  // device units
+    const double z = *lens->calibration.zoom;
+    const Camera<double> from = curve_of(std::max(config_.zoom->reading.wide, z - kStep), 0).camera;
+    const Camera<double> to = curve_of(std::min(config_.zoom->reading.tele, z + kStep), 0).camera;
+    const double change = std::log(to.focal_length / from.focal_length);
+    lens->corner_by_zoom = (to.radial_distortion / to.distortion_of_corner() -
+                            from.radial_distortion / from.distortion_of_corner()) /
+                           change;
+    lens->centre_by_zoom = (to.centre_offset() - from.centre_offset()) / change;
+  }
+
   // One after the other: of two arguments each compiler draws another one first, which would be another film.
   [[nodiscard]] Vector2<double> draw_centre_error() {
     Vector2<double> out;

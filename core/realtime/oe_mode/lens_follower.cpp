@@ -52,8 +52,21 @@ Camera<double> LensFollower::expect_after_last(double time_s, bool may_move, con
                                                const Camera<double>& latest) {
   expected_ = track_.predicted(time_s, may_move);
   scale.make_independent(&expected_.sensitivity);
-  const Camera<double>& camera = reading_ ? reading_->calibration.camera : latest;
-  return zoomed(camera, expected_.value[0] - std::log(camera.focal_length));
+  return with_focal_length(expected_.value[0], scale, latest);
+}
+
+Camera<double> LensFollower::with_focal_length(double log_focal_length, const LensScale& scale,
+                                               const Camera<double>& latest) const {
+  if (!reading_) return zoomed(latest, log_focal_length - std::log(latest.focal_length));
+  const Calibration& told = reading_->calibration;
+  const double change = log_focal_length - std::log(told.camera.focal_length);
+  Camera<double> out = zoomed(told.camera, change);
+  // Where the reading is not believed the curve is followed no further.
+  const double most = options_.excluded_sigmas * relative_focal_length_sigma(told);
+  const double along = std::clamp(change + scale.value, -most, most);
+  out.radial_distortion += along * reading_->corner_by_zoom * out.distortion_of_corner();
+  out.set_centre_offset(out.centre_offset() + along * reading_->centre_by_zoom);
+  return out;
 }
 
 Camera<double> LensFollower::expect_by_reading(const LensScale& scale) {
@@ -93,6 +106,16 @@ ZoomPrior LensFollower::prior(const Camera<double>& camera, double zoom_rate) co
   out.value = expected_.value - Vector2<double>(std::log(camera.focal_length), zoom_rate);
   out.covariance = expected_.covariance;
   out.sensitivity = expected_.sensitivity;
+  const double since = without_reading(camera);
+  const auto set = [&](Parameter p, double unknown) {
+    const double told = reading_ ? reading_->calibration.covariance(index(p), index(p)) : 0;
+    out.own_variances[index(p)] = told + unknown * unknown;
+  };
+  set(Parameter::kRadialDistortion,
+      options_.distortion_change * since * camera.distortion_of_corner());
+  set(Parameter::kCentreU, options_.centre_change_px * since);
+  set(Parameter::kCentreV, options_.centre_change_px * since);
+  out.own_variances[kOfDistortion] /= columns_->of_k * columns_->of_k;
   return out;
 }
 
@@ -128,8 +151,7 @@ Calibration LensFollower::answer(const Calibration& calibration, const OwnLens& 
   Sensitivity<1> of_it = own.sensitivity.row(0);
   scale.make_independent(&of_it);
   // Without a reading distortion and centre are those of the last one.
-  const double since =
-      reading_ ? 0 : std::log(calibration.camera.focal_length / last_reading_focal_length_);
+  const double since = without_reading(calibration.camera);
   const double unknown = options_.distortion_change * since;
   Calibration out =
       scale.at(calibration, phi, variance + of_lens + unknown * unknown, sensitivity + of_it);

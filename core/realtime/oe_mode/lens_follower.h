@@ -83,6 +83,10 @@ class LensFollower {
                                                  const Camera<double>& latest);
   // The same by the reading; there is one.
   [[nodiscard]] Camera<double> expect_by_reading(const LensScale& scale);
+  // The frame's camera where log f is log_focal_length at phi = 0: distortion and centre as the curve has them there, or, without a
+  // reading, as in `latest`.
+  [[nodiscard]] Camera<double> with_focal_length(double log_focal_length, const LensScale& scale,
+                                                 const Camera<double>& latest) const;
   // Of log f and its rate, without the frame's landmarks.
   [[nodiscard]] const LensTrack::State& expected() const { return expected_; }
   // As it was before looks that found nothing.
@@ -129,6 +133,11 @@ class LensFollower {
     return track_.age_s(time_s) < options_.track.longest_s;
   }
   [[nodiscard]] double reading_variance(const LensScale& scale) const;
+  // What is unknown of this camera's distortion in the corner, 1, and of its centre, px, as there is no reading: by how much log f
+  // is away from the latest one's.
+  [[nodiscard]] double without_reading(const Camera<double>& camera) const {
+    return reading_ ? 0 : std::log(camera.focal_length / last_reading_focal_length_);
+  }
 
   LensFollowerOptions options_;
   LensTrack track_;

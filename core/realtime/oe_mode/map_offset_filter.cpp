@@ -29,6 +29,7 @@ bool MapOffset::learn(const Vector2<double>& innovation,
 
 bool MapOffset::learn(const Vector2<double>& innovation,
                       const Matrix2<double>& innovation_covariance,
+                      const Matrix2<double>& by_calibration,
                       const Sensitivity<2>& innovation_sensitivity, const Vector2<double>& by_lens,
                       double max_chi_square, LensScale* lens) {
   Matrix3<double> noise;                              // of (offset, phi)
@@ -37,10 +38,12 @@ bool MapOffset::learn(const Vector2<double>& innovation,
   Matrix<double, 2, 3> H;
   H << Matrix2<double>::Identity(), by_lens;
   const Matrix<double, 3, 2> with_innovation = noise * H.transpose();
-  const Matrix2<double> information =
-      inverse_of((H * with_innovation + innovation_covariance).eval());
+  const Matrix2<double> expected = H * with_innovation + innovation_covariance;
   const Vector2<double> left = innovation - by_lens * lens->value;
-  if (!(left.dot(information * left) < max_chi_square)) return false;
+  if (!(left.dot(inverse_of((expected + by_calibration).eval()) * left) < max_chi_square)) {
+    return false;
+  }
+  const Matrix2<double> information = inverse_of(expected);
   const Matrix<double, 3, 2> gain = with_innovation * information;
   const Sensitivity<2> of_left = innovation_sensitivity - by_lens * lens->sensitivity;
   value += gain.topRows<2>() * left;
@@ -88,8 +91,9 @@ bool MapOffsetFilter::learn(double frame_time_s, const OffsetInnovation& innovat
       variance_inflation(options_.shared_correlation_time_s, frame_time_s - learnt_time_s_);
   const Matrix2<double> covariance =
       innovation.covariance + inflation * innovation.shared_covariance;
-  if (lens_.learnt ? !offset_.learn(innovation.value, covariance, innovation.sensitivity,
-                                    innovation.by_lens, options_.max_contradiction, &lens_)
+  if (lens_.learnt ? !offset_.learn(innovation.value, covariance, innovation.by_calibration,
+                                    innovation.sensitivity, innovation.by_lens,
+                                    options_.max_contradiction, &lens_)
                    : !offset_.learn(innovation.value, covariance, innovation.sensitivity,
                                     options_.max_contradiction)) {
     return false;
@@ -153,6 +157,7 @@ void MapOffsetFilter::settle_oldest(const Calibration& calibration,
       variance_inflation(late->correlation_time_s, frame.frame_time_s - learnt_time_s_);
   innovation.covariance = frame.covariance + inflation * covariance;
   innovation.shared_covariance = frame.shared_covariance;
+  innovation.by_calibration = frame.by_calibration;
   if (lens_.learnt) innovation.by_lens = frame.sensitivity * lens_.direction;
   if (!all_finite(innovation.value) || !all_finite(covariance)) return;
   contradicted_ = !learn(frame.frame_time_s, innovation);

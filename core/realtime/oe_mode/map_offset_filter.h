@@ -47,9 +47,11 @@ struct MapOffset {
   [[nodiscard]] bool learn(const Vector2<double>& innovation,
                            const Matrix2<double>& innovation_covariance,
                            const Sensitivity<2>& innovation_sensitivity, double max_chi_square);
-  // The same together with phi, at whose value 0 the innovation is, and of which it has so much more a unit.
+  // The same together with phi, at whose value 0 the innovation is, and of which it has so much more a unit. by_calibration: what is
+  // allowed for besides, but follows from innovation_sensitivity.
   [[nodiscard]] bool learn(const Vector2<double>& innovation,
                            const Matrix2<double>& innovation_covariance,
+                           const Matrix2<double>& by_calibration,
                            const Sensitivity<2>& innovation_sensitivity,
                            const Vector2<double>& by_lens, double max_chi_square, LensScale* lens);
 };
@@ -59,7 +61,8 @@ struct OffsetInnovation {
   Vector2<double> value = Vector2<double>::Zero();       // rad
   Matrix2<double> covariance = Matrix2<double>::Zero();  // rad^2, by noise
   Matrix2<double> shared_covariance =
-      Matrix2<double>::Zero();  // rad^2, by what the landmarks share
+      Matrix2<double>::Zero();                               // rad^2, by what the landmarks share
+  Matrix2<double> by_calibration = Matrix2<double>::Zero();  // rad^2, see SolvedZoom
   Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
   Vector2<double> by_lens = Vector2<double>::Zero();  // rad, of value, a unit of phi
 };
@@ -72,8 +75,9 @@ struct PendingFrame {
   Vector2<double> angle = Vector2<double>::Zero();       // rad, map's frame, middle row
   Matrix2<double> covariance = Matrix2<double>::Zero();  // rad^2, of angle, by noise and map shear
   Matrix2<double> shared_covariance =
-      Matrix2<double>::Zero();                          // rad^2, by what the landmarks share
-  Sensitivity<2> sensitivity = Sensitivity<2>::Zero();  // of angle
+      Matrix2<double>::Zero();                               // rad^2, by what the landmarks share
+  Matrix2<double> by_calibration = Matrix2<double>::Zero();  // rad^2, see SolvedZoom
+  Sensitivity<2> sensitivity = Sensitivity<2>::Zero();       // of angle
 };
 
 class MapOffsetFilter {

@@ -18,6 +18,13 @@ void add(const Vector6& change, FrameMotion<double>* motion) {
                           motion->acceleration.tilt + change[5]};
 }
 
+// Of the frame's own lens, 1/s, by its noise and that of phi.
+double rate_sigma(const SolvedMotion& solved) {
+  const SolvedZoom& zoom = solved.zoom;
+  return std::sqrt(zoom.covariance(1, 1) +
+                   solved.lens.variance * zoom.by_lens[1] * zoom.by_lens[1]);
+}
+
 }  // namespace
 
 OeMode::OeMode(const OeOptions& options)
@@ -230,7 +237,8 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   if (frame_.telemetry == FrameTelemetry::kExtrapolated) {
     add_pending(motion.angle.vector(),
                 solved.frame_covariance.topLeftCorner<2, 2>() + shear_.angle_covariance(),
-                solved.shared_covariance, solved.sensitivity.topRows<2>());
+                solved.shared_covariance, solved.zoom.innovation_by_calibration,
+                solved.sensitivity.topRows<2>());
   }
   if (offset_.contradicted() && !enclosed) {
     // Until telemetry that belongs to a frame says otherwise.
@@ -267,11 +275,13 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
     return finish(frame_.telemetry != FrameTelemetry::kNone ? OeStatus::kTooFew
                                                             : OeStatus::kNoPrediction);
   }
+  if (lens_.columns() != nullptr) out->zoom_rate_sigma = rate_sigma(solved);
   if (enclosed) {
     // What contradicts does not come this far: see solve_orientation().
     static_cast<void>(offset_.learn(
         frame_.time_s,
         {solved.innovation, solved.innovation_covariance, solved.shared_covariance,
+         solved.zoom.innovation_by_calibration,
          predicted.prior.telemetry_sensitivity.topRows<2>() - solved.sensitivity.topRows<2>(),
          solved.lens.innovation_by_lens}));
   }
@@ -347,7 +357,8 @@ OeMode::Solution OeMode::look_with_own_lens(FrameMotion<double> motion,
   if (!(std::abs(solved.zoom.correction[0]) * diagonal_px > 2 * kFar_px)) return out;
   add(solved.correction, &motion);
   motion.zoom_rate += solved.zoom.correction[1];
-  set_camera(zoomed(calibration_.camera, solved.zoom.correction[0]));
+  const double log_f = std::log(calibration_.camera.focal_length) + solved.zoom.correction[0];
+  set_camera(lens_.with_focal_length(log_f, offset_.lens(), calibration_.camera));
   return solve_about(motion, predicted);
 }
 
@@ -380,8 +391,7 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
   };
   if (had_own) {
     if (follows && few) {
-      set_camera(zoomed(calibration_.camera,
-                        expected_before.value[0] - std::log(calibration_.camera.focal_length)));
+      set_camera(lens_.with_focal_length(expected_before.value[0], scale, calibration_.camera));
       const Solution second = look_with_own_lens(carried, predicted);
       if (holds(second)) return second;
     }

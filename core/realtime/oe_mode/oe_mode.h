@@ -108,8 +108,9 @@ class OeMode {
     return process(image, frame_time_s, at_middle_row, nullptr, out);
   }
   // The same behind a lens that zooms, with FocalLength::kLearnt; lens: what is known of it, null: nothing new. Where that is
-  // missing or wrong the frames before and the image tell f, as far as they can. Distortion and centre are taken from `lens`: where
-  // its focal length is excluded (reading_sigmas), the caller hands in the curve's at the focal length that was found.
+  // missing or wrong the frames before and the image tell f, as far as they can. Distortion and centre are taken from `lens`, along its
+  // curve to the f that the image tells: where its focal length is excluded (reading_sigmas), the caller hands in the curve's at the
+  // focal length that was found.
   [[nodiscard]] OeStatus process(const ImageView& image, double frame_time_s,
                                  const InterpolatedPanTilt* at_middle_row, const FrameLens* lens,
                                  FrameOrientation* out);
@@ -161,7 +162,8 @@ class OeMode {
   [[nodiscard]] Solution find_and_solve(const PredictedMotion& predicted,
                                         const LandmarkSearch::Coarse& coarse, double sigma_px);
   void add_pending(const Vector2<double>& angle, const Matrix2<double>& covariance,
-                   const Matrix2<double>& shared_covariance, const Sensitivity<2>& sensitivity);
+                   const Matrix2<double>& shared_covariance, const Matrix2<double>& by_calibration,
+                   const Sensitivity<2>& sensitivity);
   OeStatus answer_without_landmarks(const PredictedMotion& predicted, const Solution& solution,
                                     FrameOrientation* out);
   OeStatus answer_with_landmarks(const PredictedMotion& predicted, const Solution& solution,

@@ -153,7 +153,7 @@ void OeMode::begin_map() {
   offset_.begin(frame_.time_s, frame_.covariance.topLeftCorner<2, 2>(), !enclosed);
   if (frame_.telemetry == FrameTelemetry::kExtrapolated) {
     add_pending(frame_.motion.angle.vector(), Matrix2<double>::Zero(), Matrix2<double>::Zero(),
-                frame_.sensitivity.topRows<2>());
+                Matrix2<double>::Zero(), frame_.sensitivity.topRows<2>());
   }
   frame_.covariance.topLeftCorner<2, 2>().setZero();
   frame_.shared_covariance.setZero();
@@ -221,9 +221,9 @@ void OeMode::forget_pending() { offset_.forget_pending(); }
 
 void OeMode::add_pending(const Vector2<double>& angle, const Matrix2<double>& covariance,
                          const Matrix2<double>& shared_covariance,
-                         const Sensitivity<2>& sensitivity) {
+                         const Matrix2<double>& by_calibration, const Sensitivity<2>& sensitivity) {
   offset_.add_pending({frame_.time_s, frame_.look_up_time_s, frame_.look_up_sigma_s, angle,
-                       covariance, shared_covariance, sensitivity});
+                       covariance, shared_covariance, by_calibration, sensitivity});
 }
 
 }  // namespace alidade

@@ -103,6 +103,17 @@ void expect_of_lens(const LensScale& lens, const WithoutAngles& own, Vector2<dou
                offset_by_phi * lens.covariance_with_offset.transpose();
 }
 
+// Of the innovation, by errors of the calibration: right: of `own`, how its right-hand side changes with the parameters.
+Matrix2<double> innovation_by_calibration(const MotionPrior& prior, const WithoutAngles& own,
+                                          const Sensitivity<6>& right) {
+  const Sensitivity<2> of_landmarks = own.covariance.topRows<2>() * right;
+  const Sensitivity<2> of_both = prior.telemetry_sensitivity.topRows<2>() - of_landmarks;
+  const Matrix2<double> out =
+      of_both * prior.lens->others * of_both.transpose() +
+      of_landmarks * prior.zoom->own_variances.asDiagonal() * of_landmarks.transpose();
+  return symmetric(out);
+}
+
 // What most landmarks say about the angles alone.
 Vector2<double> middle_of_landmarks(const FoundLandmark* landmarks, int count) {
   std::array<double, kMaxFoundLandmarks> pan;
@@ -260,6 +271,12 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   Sensitivity<8> sensitivity = Sensitivity<8>::Zero();
   Vector8 solution = Vector8::Zero();
   Matrix8 posterior = Matrix8::Zero();
+  Sensitivity<6> right_of_own;
+  if (lens != nullptr) {
+    right_of_own = right_of_sensitivities;
+    right_of_own.middleRows<2>(2) +=
+        scaled.rate_information * (unit_s * prior.telemetry_sensitivity.bottomRows<2>());
+  }
   out->contradiction = 0;
   if (prior.has_telemetry) {
     const Matrix4<double> telemetry_covariance = scaled.telemetry_information.inverse();
@@ -269,6 +286,10 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
     Matrix2<double> expected = out->innovation_covariance + prior_offset;
     Vector2<double> unexpected = out->innovation;
     if (lens != nullptr) expect_of_lens(*lens, own, &unexpected, &expected);
+    if (problem.zooms()) {
+      out->zoom.innovation_by_calibration = innovation_by_calibration(prior, own, right_of_own);
+      expected += out->zoom.innovation_by_calibration;
+    }
     out->contradiction = unexpected.dot(inverse_of(expected) * unexpected);
     if (!(out->contradiction < limits.max_contradiction)) {
       out->innovation = unexpected;
@@ -335,9 +356,6 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
       solved.innovation_by_lens = own.by_lens.head<2>();
       solved.information = own.information;
       if (own.information > 0) {
-        Sensitivity<6> right_of_own = right_of_sensitivities;
-        right_of_own.middleRows<2>(2) +=
-            scaled.rate_information * (unit_s * prior.telemetry_sensitivity.bottomRows<2>());
         solved.measured = (own.row.b + own.row.c.dot(own.x)) / own.information;
         solved.measured_sensitivity =
             (own.by_lens.transpose() * right_of_own - of_row) / own.information;

@@ -19,7 +19,9 @@
 // Corrections and their covariances are then those at phi = 0, and SolvedLens tells what phi is and makes of them.
 // Where the lens has moved since the map was made, or moves (frame_lens.h), the frame's own lens joins them, l = (log f, its rate):
 //   found - predicted + s phi = J (...) + z (dl_0 + t dl_1) + noise,   z = d u / d log f of the frame's camera
-// It is eliminated first, with what is known of it before the frame as prior.
+// It is eliminated first, with what is known of it before the frame as prior. The offset has taken up what the calibration errs by at
+// the map's zoom: c px of the optical centre are c / f there, and something else here. Landmarks and telemetry exclude each other
+// where they do so beyond that, too.
 // Pure functions; no allocation.
 
 #include <array>
@@ -53,6 +55,8 @@ struct ZoomPrior {
   Vector2<double> value = Vector2<double>::Zero();  // expected minus predicted
   Matrix2<double> covariance = Matrix2<double>::Identity();
   Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
+  // Of the calibration's errors at this zoom, beside those that it shares with the map's lens; for the map's columns.
+  ParameterDirection own_variances = ParameterDirection::Zero();
 };
 
 // What is known without landmarks, relative to the motion the residuals were predicted with.
@@ -102,6 +106,8 @@ struct SolvedZoom {
   Matrix2<double> covariance = Matrix2<double>::Zero();
   Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
   Vector2<double> by_lens = Vector2<double>::Zero();  // a unit of phi adds to it
+  // rad^2, of the innovation: errors of the calibration at this zoom, which the offset has learnt nothing of.
+  Matrix2<double> innovation_by_calibration = Matrix2<double>::Zero();
 };
 
 struct SolvedMotion {

@@ -413,6 +413,7 @@ void EdgeBridge::diagnose_orientation(diagnostic_updater::DiagnosticStatusWrappe
   status.add("records a second", rate_hz);
   if (newest_->latency_s) status.add("latency (s)", *newest_->latency_s);
   if (newest_->telemetry_age_s) status.add("telemetry age (s)", *newest_->telemetry_age_s);
+  if (newest_->zoom_rate_per_s) status.add("zoom rate (1/s)", *newest_->zoom_rate_per_s);
   if (newest_->residual_px) status.add("residual (px)", *newest_->residual_px);
 }
 

@@ -48,6 +48,7 @@ bool parse_record(const std::string& text, Record* record, std::string* error) {
     r.receive_time_s = json.at("receive_time_s").get<double>();
     r.latency_s = optional_of<double>(json, "latency_s");
     r.telemetry_age_s = optional_of<double>(json, "telemetry_age_s");
+    r.zoom_rate_per_s = optional_of<double>(json, "zoom_rate_per_s");
     r.mode = json.at("mode").get<std::string>();
     r.status = json.at("status").get<std::string>();
     r.calibrated = json.at("calibrated").get<bool>();

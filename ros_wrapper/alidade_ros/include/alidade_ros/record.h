@@ -33,6 +33,7 @@ struct Record {
   double receive_time_s = 0;
   std::optional<double> latency_s;
   std::optional<double> telemetry_age_s;  // how far the frame lies beyond the newest telemetry
+  std::optional<double> zoom_rate_per_s;  // d log f / dt of a lens that is followed
   std::string mode;                       // OE, PT, none
   std::string status;
   bool calibrated = false;

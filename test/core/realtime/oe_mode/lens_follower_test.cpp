@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <random>
+#include <utility>
 
 namespace alidade::test {
 namespace {
@@ -163,6 +164,36 @@ TEST_F(FollowedLens, TakesTheReadingWhereThatTellsMore) {
   EXPECT_EQ(follower_.expected().value[1], 0.3);
   EXPECT_NEAR(follower_.expected().covariance(0, 0),
               log_variance(reading.calibration) + scale_.variance, 1e-15);
+}
+
+// A reading in steps of some per cent has them at another focal length.
+TEST_F(FollowedLens, HasDistortionAndCentreOfTheFocalLengthThatIsSeen) {
+  constexpr double kStep = 0.02;  // of log f, one standard deviation
+  follow();
+  FrameLens reading = told(1.03 * kMapFocalLength, true);
+  const Camera<double>& of_reading = reading.calibration.camera;
+  reading.calibration.covariance(0, 0) = std::pow(kStep * of_reading.focal_length, 2);
+  reading.corner_by_zoom = 0.05;
+  reading.centre_by_zoom = {4, -2};
+  scale_.value = 1e-3;
+  follower_.begin_frame(&reading);
+  // Followed as far as the reading may err.
+  const double told_log_f = std::log(of_reading.focal_length);
+  for (const auto& [change, followed] :
+       {std::pair{-0.03, -0.03}, std::pair{0.05, 0.05}, std::pair{1.0, 5 * kStep}}) {
+    const double log_f = told_log_f - scale_.value + change;
+    const Camera<double> camera = follower_.with_focal_length(log_f, scale_, camera_);
+    EXPECT_NEAR(std::log(camera.focal_length), log_f, 1e-12);
+    EXPECT_NEAR(camera.radial_distortion / camera.distortion_of_corner(),
+                of_reading.radial_distortion / of_reading.distortion_of_corner() + 0.05 * followed,
+                1e-12);
+    EXPECT_NEAR(camera.centre_u, of_reading.centre_u + 4 * followed, 1e-12);
+    EXPECT_NEAR(camera.centre_v, of_reading.centre_v - 2 * followed, 1e-12);
+  }
+  follower_.begin_frame(nullptr);
+  const Camera<double> camera = follower_.with_focal_length(told_log_f, scale_, camera_);
+  EXPECT_NEAR(corner(camera) / corner(camera_), 1, 1e-12);
+  EXPECT_EQ(camera.centre_u, camera_.centre_u);
 }
 
 TEST_F(FollowedLens, SaysThatLandmarksExcludeTheReading) {

@@ -138,7 +138,7 @@ TEST(LensScale, ErrsAsItsCovarianceSaysWhileItIsLearntWithTheOffset) {
       // A parameter e too large in truth is one too small in the calibration: -S e.
       const Vector2<double> y = g - offset.value + by_lens * phi - S * e + noise;
       ASSERT_TRUE(offset.learn(y, kNoise * kNoise * Matrix2<double>::Identity(),
-                               S - offset.sensitivity, by_lens,
+                               Matrix2<double>::Zero(), S - offset.sensitivity, by_lens,
                                std::numeric_limits<double>::infinity(), &lens));
       if (k % 5 != 0) continue;
       constexpr double kScale = 1e-3;
@@ -217,12 +217,19 @@ TEST(LensScale, IsAsItWasWhereAnInnovationCannotBe) {
   const Vector2<double> by_lens(0.1, 0);
   // 10 sigmas of phi, in a direction that phi moves, and one that it does not.
   for (const Vector2<double>& y : {Vector2<double>(0.1 * 0.05, 0), Vector2<double>(0, 1e-3)}) {
-    EXPECT_FALSE(offset.learn(y, 1e-10 * Matrix2<double>::Identity(), Sensitivity<2>::Zero(),
-                              by_lens, 36, &lens));
+    EXPECT_FALSE(offset.learn(y, 1e-10 * Matrix2<double>::Identity(), Matrix2<double>::Zero(),
+                              Sensitivity<2>::Zero(), by_lens, 36, &lens));
     EXPECT_EQ(lens.value, before.value);
     EXPECT_EQ(lens.variance, before.variance);
     EXPECT_EQ(offset.value, Vector2<double>::Zero().eval());
   }
+  // What the calibration errs by is allowed for, and no noise: a quarter of the innovation is the offset's, of equal shares.
+  const Vector2<double> y(0, 1e-3);
+  Matrix2<double> noise = 3e-10 * Matrix2<double>::Identity();
+  EXPECT_TRUE(offset.learn(y, noise, 1e-6 * Matrix2<double>::Identity(), Sensitivity<2>::Zero(),
+                           by_lens, 36, &lens));
+  EXPECT_NEAR(offset.value.y(), 0.25e-3, 1e-9);
+  lens.value = before.value;
   // No information is none.
   lens.learn(1, 0, Sensitivity<1>::Zero(), &offset.value, &offset.covariance, &offset.sensitivity);
   EXPECT_EQ(lens.value, before.value);

@@ -229,6 +229,46 @@ TEST(LensSolve, ErrsAsItsCovarianceSaysWhereTheFrameHasALensOfItsOwn) {
   }
 }
 
+// The offset was learnt at half the focal length: what the optical centre errs by there is twice the angle. Besides, it errs by
+// something of this zoom's own.
+TEST(LensSolve, ContradictionAllowsForTheCentreAtAnotherZoom) {
+  constexpr int kRuns = 300;
+  constexpr double kSharedCentre = 2;  // px
+  constexpr double kOwnCentre = 0.5;   // px
+  LensWorld world;
+  world.knows_lens = 1;
+  world.zoom = 1e-3;
+  double squares = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    LensFrame frame(world, static_cast<std::uint64_t>(run));
+    for (int axis = 0; axis < 2; ++axis) {
+      const int centre = index(Parameter::kCentreU) + axis;
+      for (FoundLandmark& f : frame.landmarks)
+        f.sensitivity.col(centre) = -Vector2<double>::Unit(axis);
+    }
+    SolvedMotion solved;
+    ASSERT_EQ(frame.solve(&solved), SolveStatus::kOk);
+    const Sensitivity<2> of_landmarks = solved.sensitivity.topRows<2>();
+    for (int axis = 0; axis < 2; ++axis) {
+      const int centre = index(Parameter::kCentreU) + axis;
+      const double shared = frame.normal(kSharedCentre);
+      const double own = frame.normal(kOwnCentre);
+      for (FoundLandmark& f : frame.landmarks)
+        f.residual += (shared + own) * f.sensitivity.col(centre);
+      frame.prior.telemetry_sensitivity.block<2, 1>(0, centre) = 2 * of_landmarks.col(centre);
+      frame.prior.telemetry.head<2>() += 2 * shared * of_landmarks.col(centre);
+      frame.lens_.others(centre, centre) = kSharedCentre * kSharedCentre;
+      frame.zoom_.own_variances[centre] = kOwnCentre * kOwnCentre;
+    }
+    ASSERT_EQ(frame.solve(&solved), SolveStatus::kOk) << run;
+    squares += solved.contradiction / kRuns;
+    // What lies beyond that is still one: 20 px are 10 of the angle's sigmas.
+    frame.prior.telemetry[0] += 20 / kLensFocal;
+    EXPECT_EQ(frame.solve(&solved), SolveStatus::kContradiction) << run;
+  }
+  EXPECT_NEAR(squares, 2, 4 * std::sqrt(4.0 / kRuns));
+}
+
 // A lens that is known before as well as anything is one that there is none of.
 TEST(LensSolve, IsTheSameWhereTheFramesLensIsKnown) {
   LensWorld world;
