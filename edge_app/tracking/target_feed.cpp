@@ -1,5 +1,6 @@
 #include "edge_app/tracking/target_feed.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace alidade {
@@ -27,8 +28,18 @@ DetectionAnswer TargetFeed::offer(DetectedFrame frame) {
   const std::lock_guard<std::mutex> lock(mutex_);
   const bool too_late = newest_ && is_taken(answer.status) &&
                         *newest_->record.time_s - *frame.record.time_s > options_.tracker.history_s;
+  const auto is_same = [&frame](const OrientationRecord& other) {
+    return other.time_s == frame.record.time_s;
+  };
+  const bool repeated =
+      is_taken(answer.status) &&
+      ((newest_ && is_same(newest_->record)) ||
+       std::any_of(queue_.begin(), queue_.end(),
+                   [&is_same](const DetectedFrame& one) { return is_same(one.record); }));
   if (too_late) {
     answer.status = DetectionStatus::kTooLate;
+  } else if (repeated) {
+    answer.status = DetectionStatus::kRepeated;
   } else if (is_taken(answer.status) && queue_.size() >= kMostWaiting) {
     answer.status = DetectionStatus::kQueueFull;
   }

@@ -1,7 +1,7 @@
 #pragma once
 // TargetFeed: a TargetStage on a thread of its own, niced, behind a bounded queue. Whoever has detections offers them and is told
 // at once whether they are taken up; nobody waits for the thread, and the threads on a record's way know nothing of it.
-// What offer() takes may still be refused by the stage, as of two that come late at once; that is counted.
+// What offer() takes may still be refused by the stage, as a late frame that has come already; that is counted.
 
 #include <condition_variable>
 #include <deque>
