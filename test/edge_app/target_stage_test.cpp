@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <random>
+#include <string>
 #include <utility>
 
 #include "edge_app/tracking/target_report.h"
@@ -104,6 +105,8 @@ TEST(TargetStage, ItsCovarianceHoldsWhatIsUncertainOfPlaneLensMotionAndBoxes) {
     with_shared += error.dot(reports[0].cov.topLeftCorner<2, 2>().inverse() * error);
     without += error.dot(state.targets[0].target.state.cov.topLeftCorner<2, 2>().inverse() * error);
   }
+  RecordProperty("errors_squared", std::to_string(with_shared));
+  RecordProperty("errors_squared_without_shared_part", std::to_string(without));
   // chi-square of 120: 95 % lies between 91.6 and 152.2.
   EXPECT_GT(with_shared, 91.6);
   EXPECT_LT(with_shared, 152.2);

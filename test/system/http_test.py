@@ -125,7 +125,8 @@ class Http(SystemTest):
     def start(self, mode="PT", json_output=True, settings=None, **sections):
         """alidade with the virtual camera, answering."""
         camera = self.camera(settings=settings)
-        config = self.write_config(camera, output={"json": json_output, "http": "127.0.0.1:0", "token_env": "TEST_TOKEN"},
+        targets = {"targets": str(self.folder / "targets.jsonl")} if "tracking" in sections else {}
+        config = self.write_config(camera, output={"json": json_output, "http": "127.0.0.1:0", "token_env": "TEST_TOKEN", **targets},
                                    realtime={"mode": mode}, **sections)
         run = self.alidade("run", "-c", config, TEST_TOKEN=TOKEN)
         api = Api(run)
@@ -267,6 +268,11 @@ class Http(SystemTest):
         for path in ("/api/v1/direction", "/api/v1/pixel", "/api/v1/calibrate", "/api/v1/detections"):
             self.check_answer(api, path, 401, {}, token=None)
         self.end(run)
+        told = [json.loads(line) for line in (self.folder / "targets.jsonl").read_text().splitlines()]
+        self.assertEqual(len(told), metrics["alidade_detection_frames_total", (("outcome", "taken"),)])
+        for one in told:
+            check(one, {"$ref": "#/components/schemas/Targets"})
+        self.assertEqual(told[-1]["targets"][0]["identity"], 1)
 
     def test_describes_what_it_refuses(self):
         run, api = self.start(tracking={})
