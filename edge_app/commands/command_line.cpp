@@ -87,6 +87,15 @@ void add_replay(CLI::App& app, int* exit_code) {
       ->add_option("--mode", options->mode,
                    "OE or PT (default: OE if the recording has pictures, PT if not)")
       ->check(CLI::IsMember({"OE", "PT"}));
+  CLI::Option* detections = command->add_option(
+      "--detections", options->detections,
+      "What a detector found in the frames: JSON Lines as POST /api/v1/detections has them, or - "
+      "for stdin; writes targets.jsonl");
+  command
+      ->add_option("--tracking", options->tracking,
+                   "Configuration whose section tracking counts for them (default: directions, no "
+                   "plane)")
+      ->needs(detections);
   command->add_flag("--realtime", options->realtime, "At the pace of the recording");
   CLI::Option* json = command->add_flag("--json", options->json, "Also on stdout, as JSON Lines");
   command->add_flag("--csv", options->csv, "Also on stdout, as CSV")->excludes(json);

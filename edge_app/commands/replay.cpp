@@ -23,6 +23,7 @@
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/replay.h"
+#include "edge_app/commands/replay_targets.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/config/noise_file.h"
 #include "edge_app/output/record_writer.h"
@@ -219,9 +220,15 @@ int replay_recording(const ReplayOptions& options) {
   StopSignals signals;
   const auto video = open_recorded_frames({options.recording, false, false});
   const auto pan_tilt = open_recorded_pan_tilt({options.recording, false});
-  OrientationFile file(options.directory.empty()
-                           ? (fs::path(options.recording) / "alidade").string()
-                           : options.directory);
+  const std::string directory = options.directory.empty()
+                                    ? (fs::path(options.recording) / "alidade").string()
+                                    : options.directory;
+  OrientationFile file(directory);
+  std::optional<ReplayTargets> targets;
+  if (!options.detections.empty()) {
+    targets.emplace(options.detections, options.tracking,
+                    (fs::path(directory) / "targets.jsonl").string(), &signals);
+  }
   std::optional<RecordWriter> out;
   if (options.json || options.csv) {
     out.emplace(STDOUT_FILENO, options.json ? OutputFormat::kJson : OutputFormat::kCsv, "stdout",
@@ -256,6 +263,7 @@ int replay_recording(const ReplayOptions& options) {
       if (!out->error().empty()) throw CommandError(kExitFailed, out->error());
       out.reset();
     }
+    if (targets) targets->add(record);
     step.maintain();
     if (progress && summary.frames() % 1000 == 0)
       fmt::print(stderr, "\r{} frames ", summary.frames());
@@ -264,6 +272,7 @@ int replay_recording(const ReplayOptions& options) {
   if (images) {
     for (const std::string& remark : images->remarks()) spdlog::warn("{}", remark);
   }
+  if (targets) spdlog::info("{}", targets->complete());
   file.complete();
   spdlog::info("{}: {}", file.path(), summary.line());
   return kExitOk;

@@ -10,6 +10,8 @@ struct ReplayOptions {
   std::string directory;    // empty: <recording>/alidade
   std::string calibration;  // empty: <recording>/alidade/calibration.yaml
   std::string mode;         // "OE", "PT"; empty: OE if there are images
+  std::string detections;   // JSON Lines; "-": stdin; empty: none
+  std::string tracking;     // a configuration, of which section tracking counts; empty: the sphere
   bool realtime = false;
   bool json = false;
   bool csv = false;

@@ -11,6 +11,7 @@
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/live_calibration.h"
+#include "edge_app/commands/live_targets.h"
 #include "edge_app/commands/run.h"
 #include "edge_app/commands/run_report.h"
 #include "edge_app/commands/stop_signals.h"
@@ -114,6 +115,7 @@ int run_live(const RunOptions& options) {
   // First: these are there at once.
   if (config.output.http) sinks.add(&live);
   if (format) sinks.add(&writer);
+  const std::unique_ptr<LiveTargets> targets = make_live_targets(config, plane);
   ImageTap tap;
   if (config.output.http) of_pipeline.tap = &tap;
   Pipeline pipeline(*video, *pan_tilt, sinks, calibrating.calibration.get(), of_pipeline);
@@ -126,10 +128,15 @@ int run_live(const RunOptions& options) {
     return calibrating.calibration && calibrating.calibration->ask_for_fresh();
   };
   sources.plane = plane;
+  if (targets) {
+    sources.targets = &targets->feed();
+    sources.target_lines = &targets->lines();
+  }
   sources.version = ALIDADE_VERSION;
   sources.camera = video->name();
   sources.latency_measured = of_pipeline.measure_latency;
   const auto http = start_http(config, sources, &tap);
+  if (targets) targets->start();
   pipeline.start();
   const ServiceManager manager;
   manager.ready();
@@ -137,6 +144,7 @@ int run_live(const RunOptions& options) {
   wait_for_the_end(&signals, pipeline, &report, options.duration_s);
   manager.stopping();
   if (http) http->stop();
+  if (targets) targets->stop();
   pipeline.stop();
 
   spdlog::info("{}", describe(pipeline.summary(), of_pipeline.measure_latency));

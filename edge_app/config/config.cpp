@@ -221,6 +221,7 @@ OutputConfig read_output(YamlSection section, const std::string& path,
     }
     if (json && !*json && !csv) output.stdout_format.reset();
   }
+  if (const auto file = section.text("targets")) output.targets = path_relative_to(path, *file);
   section.finish();
   return output;
 }
@@ -244,13 +245,6 @@ void check_ages(const Config& config, const YamlSection& pan_tilt, const YamlSec
       fmt::format("is {} s, no more than pan_tilt.max_repeat_s ({} s), {}more than {}, or "
                   "pan_tilt.max_repeat_s {}",
                   extrapolation_s, repeat_s, why, repeat_s, right_repeat));
-}
-
-TrackingConfig read_tracking(YamlSection section, const std::string& path) {
-  TrackingConfig tracking;
-  if (const auto plane = section.text("plane")) tracking.plane = path_relative_to(path, *plane);
-  section.finish();
-  return tracking;
 }
 
 // What goes with what, beyond single sections.
@@ -277,6 +271,14 @@ void check_together(const Config& config, const YamlSection& calibration, const 
   }
 }
 
+// Detections come over HTTP.
+void check_targets(const Config& config, const YamlSection& output) {
+  if (!config.output.targets.empty() && !config.tracking.targets)
+    output.fail("targets", "stands without section tracking; add tracking");
+  if (!config.output.targets.empty() && !config.output.http)
+    output.fail("targets", "stands without http, over which detections come; add http");
+}
+
 void read_config(YamlSection& top, const std::string& path, ConfigScope scope, Config* config) {
   const YamlSection video = top.section("video");
   const YamlSection pan_tilt = top.section("pan_tilt");
@@ -288,19 +290,22 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   // Before one is missed: it may be there, mistyped.
   top.finish();
   for (const char* required : {"video", "pan_tilt"}) {
-    const bool is_needed = scope == ConfigScope::kAll || required == std::string("video");
+    const bool is_needed = scope == ConfigScope::kAll ||
+                           (scope == ConfigScope::kVideo && required == std::string("video"));
     if (is_needed && !top.has(required))
       throw ConfigError(path + ": section '" + required + "' is missing; add it");
   }
-  config->video = read_video(video, path);
+  if (top.has("video")) config->video = read_video(video, path);
   if (top.has("pan_tilt")) config->pan_tilt = read_pan_tilt(pan_tilt, path);
   config->camera = read_camera(camera);
   config->calibration = read_calibration(calibration, path);
   config->realtime = read_realtime(realtime);
-  config->tracking = read_tracking(tracking, path);
+  config->tracking = read_tracking(tracking, top.has("tracking"), path);
   if (scope == ConfigScope::kAll) check_ages(*config, pan_tilt, realtime);
   config->output = read_output(output, path, &config->warnings);
-  if (scope == ConfigScope::kAll) check_together(*config, calibration, path, &config->warnings);
+  if (scope != ConfigScope::kAll) return;
+  check_together(*config, calibration, path, &config->warnings);
+  check_targets(*config, output);
 }
 
 }  // namespace

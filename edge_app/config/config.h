@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "edge_app/config/pan_tilt_config.h"
+#include "edge_app/config/tracking_config.h"
 #include "edge_app/output/http/http_options.h"
 #include "edge_app/output/record_format.h"  // OutputFormat
 #include "platform/video/v4l2_mode.h"       // V4l2Format
@@ -64,10 +65,6 @@ struct CalibrationConfig {
   double zoom_tolerance = 0;  // device units within which a calibration holds
 };
 
-struct TrackingConfig {
-  std::string plane;  // a plane.yaml; empty: none
-};
-
 struct RealtimeConfig {
   bool landmarks = true;  // mode OE; false: PT, and nothing is calibrated
   int priority = 0;       // SCHED_FIFO priority, see priority_of(); 0 leaves the scheduler alone
@@ -79,6 +76,7 @@ struct RealtimeConfig {
 struct OutputConfig {
   std::optional<OutputFormat> stdout_format = OutputFormat::kJson;  // empty: nothing on stdout
   std::optional<HttpServerOptions> http;                            // empty: no server
+  std::string targets;  // JSON Lines of targets are appended to this file; empty: to none
 };
 
 struct Config {
@@ -95,7 +93,8 @@ struct Config {
 // What must be there. What is there is checked either way.
 enum class ConfigScope {
   kAll,
-  kVideo  // a camera without a head, as on a bench; of the result, the video
+  kVideo,    // a camera without a head, as on a bench; of the result, the video
+  kTracking  // neither need be there; of the result, the tracking
 };
 
 // path stands for the file in errors, and is where relative paths start.

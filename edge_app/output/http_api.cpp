@@ -9,6 +9,7 @@
 
 #include "edge_app/output/calibration_json.h"
 #include "edge_app/output/clock_pair.h"
+#include "edge_app/output/detection_query.h"
 #include "edge_app/output/openapi.h"
 #include "edge_app/output/or_null.h"
 #include "edge_app/output/pixel_query.h"
@@ -16,6 +17,7 @@
 #include "edge_app/output/record_events.h"
 #include "edge_app/output/record_format.h"
 #include "edge_app/output/service_metrics.h"
+#include "edge_app/output/targets_json.h"
 #include "platform/system/clock.h"
 
 namespace alidade {
@@ -139,6 +141,102 @@ ServerResponse pixels(const HttpApiSources& sources, const std::string& body) {
   return text_response("application/json", pixel_answer(record, query));
 }
 
+constexpr const char* kNothingTracked =
+    "nothing is tracked: add section tracking to the configuration";
+
+int http_status_of(DetectionStatus status) {
+  switch (status) {
+    case DetectionStatus::kUnknownFrame:
+    case DetectionStatus::kFrameNotYet:
+      return 404;
+    case DetectionStatus::kTooLate:
+      return 410;
+    case DetectionStatus::kNoOrientation:
+    case DetectionStatus::kRepeated:
+    case DetectionStatus::kNoGeometry:
+      return 409;
+    case DetectionStatus::kQueueFull:
+      return 503;
+    default:
+      return 400;
+  }
+}
+
+// The record of the frame whose detections come.
+DetectionStatus find_detected(const LiveState& live, const FrameChoice& which,
+                              OrientationRecord* record) {
+  const auto newest = live.newest_oriented();
+  const bool later = !newest || (which.frame ? *which.frame > newest->frame.value_or(-1)
+                                             : *which.time_s > newest->time_s.value_or(0));
+  const FrameSearch found =
+      which.frame ? live.find(*which.frame, record) : live.find_at(*which.time_s, record);
+  if (found != FrameSearch::kFound)
+    return later ? DetectionStatus::kFrameNotYet : DetectionStatus::kUnknownFrame;
+  return record->orientation ? DetectionStatus::kTaken : DetectionStatus::kNoOrientation;
+}
+
+ServerResponse detections(const HttpApiSources& sources, const std::string& body) {
+  if (sources.targets == nullptr) return http_error(409, kNothingTracked);
+  TargetFeed& feed = *sources.targets;
+  DetectionQuery query;
+  std::string error;
+  if (!parse_detections(body, &query, &error)) {
+    feed.count_refused(DetectionStatus::kMalformed);
+    return http_error(400, error);
+  }
+  DetectedFrame frame;
+  frame.boxes = std::move(query.boxes);
+  const DetectionStatus found = find_detected(*sources.live, query.which, &frame.record);
+  if (found != DetectionStatus::kTaken) {
+    feed.count_refused(found);
+    return http_error(http_status_of(found), to_string(found));
+  }
+  Json accepted{{"accepted", true},
+                {"frame", *frame.record.frame},
+                {"time_s", *frame.record.time_s},
+                {"boxes", frame.boxes.size()}};
+  const DetectionAnswer answer = feed.offer(std::move(frame));
+  if (is_taken(answer.status)) {
+    ServerResponse response = json_response(accepted);
+    response.status = 202;
+    return response;
+  }
+  const std::string where =
+      answer.box >= 0 ? fmt::format("boxes: item {}: ", answer.box) : std::string();
+  ServerResponse refusal =
+      http_error(http_status_of(answer.status), where + to_string(answer.status));
+  if (answer.status == DetectionStatus::kQueueFull)
+    refusal.headers.emplace_back("Retry-After", "1");
+  return refusal;
+}
+
+ServerResponse targets(const HttpApiSources& sources, const ServerRequest& request) {
+  if (sources.targets == nullptr) return http_error(404, kNothingTracked);
+  const auto state = sources.targets->newest();
+  Json out{{"frame", nullptr},
+           {"time_s", nullptr},
+           {"detected_frame", nullptr},
+           {"space",
+            sources.targets->options().tracker.space == TargetSpace::kPlane ? "plane" : "sphere"},
+           {"targets", Json::array()}};
+  const auto wanted = request.parameter("frame");
+  OrientationRecord record;
+  if (wanted) {
+    const std::optional<std::int64_t> number = frame_number(*wanted);
+    if (!number) return http_error(400, "frame must be a frame's number");
+    FrameChoice which;
+    which.frame = number;
+    ServerResponse refusal;
+    if (!choose_record(sources, which, &record, &refusal)) return refusal;
+  } else if (state) {
+    record = state->record;
+  }
+  if (state) out = targets_json(*state, record);
+  out["detections"] = target_counters_json(sources.targets->counters());
+  out["detections"]["waiting"] = sources.targets->waiting();
+  return json_response(out);
+}
+
 Json quantiles(const LatencyHistogram& histogram) {
   if (histogram.total() == 0) return nullptr;
   return {{"p50", histogram.quantile(0.5)},
@@ -235,6 +333,8 @@ std::shared_ptr<const ZoomCurve> zoom_curve_of(const HttpApiSources& sources) {
 
 void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
   sources.live->set_on_news([server] { server->wake(); });
+  if (sources.target_lines != nullptr)
+    sources.target_lines->set_on_news([server] { server->wake(); });
   server->get("/healthz", HttpAccess::kOpen,
               [](const ServerRequest&) { return text_response("text/plain", "ok\n"); });
   server->get("/metrics", HttpAccess::kToken, [sources, server](const ServerRequest&) {
@@ -249,7 +349,8 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
     ServerResponse response;
     response.type = "text/event-stream";
     response.headers.emplace_back("Cache-Control", "no-cache");
-    response.stream = std::make_unique<RecordEvents>(sources.live, sources.version);
+    response.stream =
+        std::make_unique<RecordEvents>(sources.live, sources.target_lines, sources.version);
     return response;
   });
   server->get("/api/v1/status", HttpAccess::kToken,
@@ -260,6 +361,11 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
               [sources](const ServerRequest&) { return calibration(sources); });
   server->get("/api/v1/plane", HttpAccess::kToken,
               [sources](const ServerRequest&) { return ground_plane(sources); });
+  server->get("/api/v1/targets", HttpAccess::kToken,
+              [sources](const ServerRequest& request) { return targets(sources, request); });
+  server->post(
+      "/api/v1/detections", HttpAccess::kToken, kMaxDetectionBytes,
+      [sources](const ServerRequest& request) { return detections(sources, request.body); });
   server->post("/api/v1/calibrate", HttpAccess::kToken, kMaxQueryBytes,
                [sources](const ServerRequest&) { return calibrate(sources); });
   server->post(

@@ -10,7 +10,9 @@
 #include "core/tracking/plane_estimate.h"
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/live_state.h"
+#include "edge_app/output/target_lines.h"
 #include "edge_app/pipeline/pipeline.h"
+#include "edge_app/tracking/target_feed.h"
 #include "platform/video/frame_source.h"
 
 namespace alidade {
@@ -24,6 +26,9 @@ struct HttpApiSources {
   // Empty without one. The zoom curve in use; null: there is none.
   std::function<std::shared_ptr<const ZoomCurve>()> zoom_curve;
   std::shared_ptr<const PlaneEstimate> plane;  // null: none is configured
+  // Both null where nothing is tracked. Borrowed as live is; where there are some, they wake the server, too.
+  TargetFeed* targets = nullptr;
+  TargetLines* target_lines = nullptr;
   std::string version;
   std::string camera;            // the video source's name, without a password
   bool latency_measured = true;  // false for a recording

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
-#include <set>
 
 #include "core/model/direction.h"
+#include "edge_app/output/json_query.h"
 #include "edge_app/output/plane_json.h"
 #include "edge_app/pipeline/frame_geometry.h"
 
@@ -20,73 +20,6 @@ using Json = nlohmann::ordered_json;
 
 constexpr int kDeepest = 3;  // {"pixels": [[u, v]]}
 constexpr double kLargestSigma_px = 1e3;
-
-// Deeper documents would take a hundred bytes for each of their own.
-bool is_shallow(const std::string& text) {
-  int depth = 0;
-  bool in_string = false;
-  bool escaped = false;
-  for (const char c : text) {
-    if (in_string) {
-      in_string = escaped || c != '"';
-      escaped = !escaped && c == '\\';
-    } else if (c == '"') {
-      in_string = true;
-    } else if (c == '[' || c == '{') {
-      if (++depth > kDeepest) return false;
-    } else if (c == ']' || c == '}') {
-      --depth;
-    }
-  }
-  return true;
-}
-
-bool parse_object(const std::string& body, const std::set<std::string>& keys, Json* object,
-                  std::string* error) {
-  if (!is_shallow(body)) {
-    *error = "the body is nested too deeply";
-    return false;
-  }
-  *object = Json::parse(body, nullptr, false);
-  if (!object->is_object()) {
-    *error = "the body must be a JSON object";
-    return false;
-  }
-  for (const auto& item : object->items()) {
-    if (keys.count(item.key()) != 0) continue;
-    *error = "unknown key; known here: ";
-    for (const std::string& key : keys) *error += (key == *keys.begin() ? "" : ", ") + key;
-    return false;
-  }
-  return true;
-}
-
-bool parse_frame(const Json& object, FrameChoice* which, std::string* error) {
-  const auto frame = object.find("frame");
-  const auto time = object.find("time_s");
-  if (frame != object.end() && time != object.end()) {
-    *error = "frame and time_s exclude each other; give one, or none for the newest frame";
-    return false;
-  }
-  if (frame != object.end()) {
-    const bool fits = frame->is_number_unsigned() &&
-                      frame->get<std::uint64_t>() <=
-                          static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-    if (!fits) {
-      *error = "frame must be an integer, 0 or more";
-      return false;
-    }
-    which->frame = frame->get<std::int64_t>();
-  }
-  if (time != object.end()) {
-    if (!time->is_number() || !std::isfinite(time->get<double>())) {
-      *error = "time_s must be a number";
-      return false;
-    }
-    which->time_s = time->get<double>();
-  }
-  return true;
-}
 
 // An array of 1 to kMaxQueryItems arrays of n finite numbers.
 template <int n>
@@ -152,8 +85,9 @@ bool is_inside(const Camera<double>& camera, const Vector2<double>& u) {
 
 bool parse_direction_query(const std::string& body, DirectionQuery* query, std::string* error) {
   Json object;
-  if (!parse_object(body, {"frame", "pixel_sigma_px", "pixels", "time_s"}, &object, error) ||
-      !parse_frame(object, &query->which, error) ||
+  if (!parse_json_object(body, kDeepest, {"frame", "pixel_sigma_px", "pixels", "time_s"}, &object,
+                         error) ||
+      !parse_frame_choice(object, &query->which, error) ||
       !parse_vectors<2>(object, "pixels", &query->pixels, error))
     return false;
   const auto sigma = object.find("pixel_sigma_px");
@@ -170,8 +104,8 @@ bool parse_direction_query(const std::string& body, DirectionQuery* query, std::
 
 bool parse_pixel_query(const std::string& body, PixelQuery* query, std::string* error) {
   Json object;
-  if (!parse_object(body, {"directions", "frame", "time_s"}, &object, error) ||
-      !parse_frame(object, &query->which, error) ||
+  if (!parse_json_object(body, kDeepest, {"directions", "frame", "time_s"}, &object, error) ||
+      !parse_frame_choice(object, &query->which, error) ||
       !parse_vectors<3>(object, "directions", &query->directions, error))
     return false;
   for (Vector3<double>& direction : query->directions) {

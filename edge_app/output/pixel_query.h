@@ -17,18 +17,13 @@
 
 #include "core/model/linear_algebra.h"
 #include "core/tracking/plane_estimate.h"
+#include "edge_app/output/json_query.h"
 #include "edge_app/pipeline/orientation_record.h"
 
 namespace alidade {
 
 inline constexpr std::size_t kMaxQueryItems = 1000;
 inline constexpr std::size_t kMaxQueryBytes = std::size_t{64} << 10;
-
-// Neither: the newest with an orientation. Never both.
-struct FrameChoice {
-  std::optional<std::int64_t> frame;
-  std::optional<double> time_s;
-};
 
 struct DirectionQuery {
   FrameChoice which;

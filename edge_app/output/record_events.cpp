@@ -20,8 +20,8 @@ std::string event(const char* name, const std::string& data) {
 
 }  // namespace
 
-RecordEvents::RecordEvents(LiveState* live, std::string version)
-    : live_(*live), version_(std::move(version)), reader_(live) {}
+RecordEvents::RecordEvents(LiveState* live, const TargetLines* targets, std::string version)
+    : live_(*live), targets_(targets), version_(std::move(version)), reader_(live) {}
 
 void RecordEvents::next(std::string* piece) {
   if (!greeted_) {
@@ -39,6 +39,11 @@ void RecordEvents::next(std::string* piece) {
   if (news.lost > 0) *piece += event("lost", Json{{"records", news.lost}}.dump());
   for (const LiveState::News::Line& line : news.lines)
     *piece += "id: " + std::to_string(line.id) + "\n" + event("orientation", *line.json);
+  if (targets_ != nullptr) {
+    const TargetLines::Newest newest = targets_->newest();
+    if (newest.id > targets_said_) *piece += event("targets", *newest.json);
+    targets_said_ = newest.id;
+  }
   if (piece->empty() && now_s >= said_s_ + kKeepAliveEveryS) *piece = ": keep-alive\n\n";
   if (!piece->empty()) said_s_ = now_s;
 }

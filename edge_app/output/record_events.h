@@ -1,25 +1,28 @@
 #pragma once
 // RecordEvents: the records of a LiveState as Server-Sent Events, for one client (GET /api/v1/stream).
 //
-//   hello first, clock every few seconds, orientation for each record, lost where the client was too slow, a comment
-//   line when nothing else came for a while
+//   hello first, clock every few seconds, orientation for each record, lost where the client was too slow, targets after each frame of
+//   detections (the newest, if several came), a comment line when nothing else came for a while
 
 #include <string>
 
 #include "edge_app/output/http/http_message.h"
 #include "edge_app/output/live_state.h"
+#include "edge_app/output/target_lines.h"
 
 namespace alidade {
 
 class RecordEvents final : public HttpStream {
  public:
-  // Borrows *live.
-  RecordEvents(LiveState* live, std::string version);
+  // Borrows both; targets: null where nothing is tracked.
+  RecordEvents(LiveState* live, const TargetLines* targets, std::string version);
 
   void next(std::string* piece) override;
 
  private:
   LiveState& live_;
+  const TargetLines* targets_;
+  std::int64_t targets_said_ = 0;  // id
   const std::string version_;
   LiveState::Reader reader_;
   bool greeted_ = false;

@@ -131,6 +131,29 @@ void add_link_metrics(const PipelineSummary& summary, MetricsText* out) {
   }
 }
 
+void add_target_metrics(const TargetFeed& feed, MetricsText* out) {
+  const auto newest = feed.newest();
+  const TargetCounters counters = feed.counters();
+  out->gauge("alidade_targets", "Targets that are tracked, in view or not");
+  out->add(static_cast<std::int64_t>(newest ? newest->targets.size() : 0));
+  out->counter("alidade_detection_frames_total", "Frames of detections, by what became of them");
+  for (int i = 0; i < kDetectionStatusCount; ++i) {
+    const auto status = static_cast<DetectionStatus>(i);
+    out->add(counters.of(status), {{"outcome", label_of(status)}});
+  }
+  out->gauge("alidade_detection_frames_waiting", "Frames of detections in the queue");
+  out->add(static_cast<std::int64_t>(feed.waiting()));
+  out->counter("alidade_detection_boxes_total",
+               "Boxes of frames that were taken, by what became of them");
+  out->add(counters.boxes_taken, {{"outcome", "taken"}});
+  out->add(counters.boxes_below_score, {{"outcome", "below_score"}});
+  out->add(counters.boxes_cut_off, {{"outcome", "cut_off"}});
+  out->add(counters.boxes_without_place, {{"outcome", "without_place"}});
+  out->counter("alidade_target_births_refused_total",
+               "Targets not begun, as tracking.max_targets were there");
+  out->add(counters.births_refused);
+}
+
 }  // namespace
 
 std::string service_metrics(const HttpApiSources& sources, const HttpCounters& http) {
@@ -195,6 +218,7 @@ std::string service_metrics(const HttpApiSources& sources, const HttpCounters& h
                             &out);
     add_zoom_metrics(*newest, zoom_curve_of(sources), &out);
   }
+  if (sources.targets != nullptr) add_target_metrics(*sources.targets, &out);
   out.gauge("alidade_stream_clients", "Clients of the event stream");
   out.add(http.streams);
   out.counter("alidade_stream_lost_records_total", "Records that slow clients did not get");

@@ -6,6 +6,7 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "edge_app/output/json_query.h"
 #include "edge_app/pipeline/small_image.h"
 
 namespace alidade {
@@ -46,12 +47,9 @@ std::optional<ServerResponse> image(ImageTap* tap, const ServerRequest& request)
 std::optional<ServerResponse> overlay(ImageTap* tap, const ServerRequest& request) {
   std::shared_ptr<const LiveImage> image;
   if (const auto wanted = request.parameter("frame")) {
-    constexpr std::size_t kDigits = 18;
-    if (wanted->empty() || wanted->size() > kDigits ||
-        wanted->find_first_not_of("0123456789") != std::string::npos) {
-      return http_error(400, "frame must be a frame's number");
-    }
-    image = tap->of_frame(std::stoll(*wanted));
+    const std::optional<std::int64_t> number = frame_number(*wanted);
+    if (!number) return http_error(400, "frame must be a frame's number");
+    image = tap->of_frame(*number);
     if (image == nullptr)
       return http_error(404, "that frame is not among the last that were shown");
   } else {

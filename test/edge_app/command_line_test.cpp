@@ -518,6 +518,90 @@ TEST_F(CommandLineTest, ReplayOfARecordingOfStallsIsNotConfidentlyWrong) {
   EXPECT_GT(answered, 400);
 }
 
+std::string middle_box(int frame) {
+  return R"({"frame": )" + std::to_string(frame) +
+         R"(, "boxes": [{"u": 950, "v": 530, "width": 20, "height": 20, "class": "drone"}]})" +
+         "\n";
+}
+
+TEST_F(CommandLineTest, ReplayTracksWhatADetectorFoundWithTheSameBytesEachTime) {
+  head_.record(directory_, 60);
+  const std::string calibration = directory_.write("c.yaml", head_.calibration());
+  // Who stays in the middle of a picture that turns turns as sharply.
+  const std::string agile =
+      directory_.write("agile.yaml", "tracking: {acceleration_density_rad2_s3: 0.01}\n");
+  std::string late_lines;
+  std::string in_order;
+  for (int i = 20; i < 60; ++i) {
+    if (i != 30) late_lines += middle_box(i);
+    if (i == 40) late_lines += middle_box(30);  // late
+    in_order += middle_box(i);
+  }
+  const std::string file = directory_.write("d.jsonl", in_order + middle_box(1000));
+  const Result from_file = alidade({"replay", directory_.path(), "--calibration", calibration,
+                                    "--detections", file, "--tracking", agile, "-o", path("a")});
+  ASSERT_EQ(from_file.exit_code, 0) << from_file.errors;
+  EXPECT_THAT(from_file.errors, HasSubstr("1 refused (later than the newest frame)"));
+  directory_.write("late.jsonl", late_lines);
+  for (const char* where : {"b", "c"}) {
+    const Result result =
+        run({"/bin/sh", "-c",
+             "exec \"$0\" replay \"$1\" --calibration \"$2\" --detections - --tracking \"$4\" -o "
+             "\"$3\" < \"$1\"/late.jsonl",
+             ALIDADE_EXECUTABLE, directory_.path(), calibration, path(where), agile});
+    ASSERT_EQ(result.exit_code, 0) << result.errors;
+    EXPECT_THAT(result.errors, HasSubstr("40 frames of detections (1 late)"));
+  }
+  const std::string late = directory_.read("b/targets.jsonl");
+  EXPECT_EQ(directory_.read("c/targets.jsonl"), late);
+  const auto last = nlohmann::json::parse(last_line(directory_.read("a/targets.jsonl")));
+  EXPECT_EQ(nlohmann::json::parse(last_line(late)), last);
+  EXPECT_EQ(last["frame"], 59);
+  EXPECT_EQ(last["space"], "sphere");
+  ASSERT_EQ(last["targets"].size(), 1U);
+  EXPECT_EQ(last["targets"][0]["class"], "drone");
+  EXPECT_NEAR(last["targets"][0]["pixel"][0], 960, 5);
+  EXPECT_NEAR(last["targets"][0]["pixel"][1], 540, 5);
+  EXPECT_NEAR(last["targets"][0]["box"]["width"], 20, 0.1);
+}
+
+TEST_F(CommandLineTest, ReplayNamesTheLineOfDetectionsThatItCannotUse) {
+  head_.record(directory_, 30);
+  directory_.write("alidade/calibration.yaml", head_.calibration());
+  const std::string plain = directory_.write("plain.yaml", "output: {json: true}\n");
+  const std::string groundless = directory_.write("groundless.yaml", "tracking: {space: plane}\n");
+  const struct {
+    std::string lines;
+    std::vector<std::string> more;
+    int exit_code;
+    const char* saying;
+  } slips[] = {
+      {middle_box(20) + "{\"frame\": 21}\n", {}, 1, "d.jsonl:2: boxes must be an array"},
+      {middle_box(20) + "\n\nx\n", {}, 1, "d.jsonl:4: the body must be a JSON object"},
+      {"{\"frame\": 20, \"boxes\": [{\"u\": 5000, \"v\": 1, \"width\": 9, \"height\": 9}]}",
+       {},
+       1,
+       "d.jsonl:1: boxes: item 0: the box's middle is not in the picture"},
+      {std::string(300000, ' '), {}, 1, "d.jsonl:1: is longer than"},
+      {middle_box(20), {"--tracking", plain}, 2, "plain.yaml: has no section tracking"},
+      {middle_box(20), {"--tracking", groundless}, 2, "groundless.yaml:1: tracking.space"},
+  };
+  for (const auto& slip : slips) {
+    const std::string file = directory_.write("d.jsonl", slip.lines);
+    std::vector<std::string> arguments = {"replay", directory_.path(), "--detections", file};
+    arguments.insert(arguments.end(), slip.more.begin(), slip.more.end());
+    const Result result = alidade(arguments);
+    EXPECT_EQ(result.exit_code, slip.exit_code) << slip.saying;
+    EXPECT_THAT(last_line(result.errors), HasSubstr(slip.saying));
+    EXPECT_FALSE(std::filesystem::exists(path("alidade/targets.jsonl")));
+    EXPECT_FALSE(std::filesystem::exists(path("alidade/orientation.csv")));
+  }
+  EXPECT_THAT(alidade({"replay", directory_.path(), "--tracking", plain}).errors,
+              HasSubstr("--detections"));
+  EXPECT_THAT(alidade({"replay", directory_.path(), "--detections", path("nowhere")}).errors,
+              HasSubstr("nowhere: cannot be read"));
+}
+
 TEST_F(CommandLineTest, ReplayGivesTheSameBytesAtAnySpeed) {
   head_.record(directory_, 25);
   const std::string calibration = directory_.write("c.yaml", head_.calibration());

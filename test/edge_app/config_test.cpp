@@ -164,20 +164,26 @@ TEST_F(ConfigTest, RelativePathsStartAtTheConfigurationsFolder) {
 TEST_F(ConfigTest, EveryKeyIsRead) {
   ::setenv("ALIDADE_TEST_PASSWORD", "secret", 1);
   ASSERT_THAT(
-      load("video: {type: rtsp, url: 'rtsp://camera/s', transport: udp, user: eve,\n"
-           "        password_env: ALIDADE_TEST_PASSWORD, timeout_s: 2.5, max_backoff_s: 8,\n"
-           "        width: 1280, height: 720}\n"
-           "pan_tilt: {type: vapix, url: 'https://camera', user: eve, camera: 2, rate_hz: 12.5,\n"
-           "           password_env: ALIDADE_TEST_PASSWORD, timeout_s: 0.5, max_backoff_s: 9,\n"
-           "           angle_sigma_rad: 2e-5, angle_quantum_rad: 1e-4}\n"
-           "camera: {focal_length_px: 30000, aspect: 1.01, radial_distortion: -2.5,\n"
-           "         line_delay_s: 1.5e-5, upside_down: true, zoom: fixed}\n"
-           "calibration: {file: /etc/c.yaml, prior: bench/lens.yaml, auto: false, zoom_tolerance: "
-           "2.5}\n"
-           "realtime: {mode: PT, priority: 60, cpu: 3, lock_memory: true, max_extrapolation_s: "
-           "0.5}\n"
-           "tracking: {plane: ground/plane.yaml}\n"
-           "output: {csv: true, json: false}\n"),
+      load(
+          "video: {type: rtsp, url: 'rtsp://camera/s', transport: udp, user: eve,\n"
+          "        password_env: ALIDADE_TEST_PASSWORD, timeout_s: 2.5, max_backoff_s: 8,\n"
+          "        width: 1280, height: 720}\n"
+          "pan_tilt: {type: vapix, url: 'https://camera', user: eve, camera: 2, rate_hz: 12.5,\n"
+          "           password_env: ALIDADE_TEST_PASSWORD, timeout_s: 0.5, max_backoff_s: 9,\n"
+          "           angle_sigma_rad: 2e-5, angle_quantum_rad: 1e-4}\n"
+          "camera: {focal_length_px: 30000, aspect: 1.01, radial_distortion: -2.5,\n"
+          "         line_delay_s: 1.5e-5, upside_down: true, zoom: fixed}\n"
+          "calibration: {file: /etc/c.yaml, prior: bench/lens.yaml, auto: false, zoom_tolerance: "
+          "2.5}\n"
+          "realtime: {mode: PT, priority: 60, cpu: 3, lock_memory: true, max_extrapolation_s: "
+          "0.5}\n"
+          "tracking: {plane: ground/plane.yaml, space: plane, detection_sigma_px: 3,\n"
+          "           false_alarms_per_frame: 0.5, detection_probability: 0.8, least_score: 0.25,\n"
+          "           acceleration_density_m2_s3: 2, first_velocity_sigma_m_s: 5,\n"
+          "           most_sigma_m: 40, association: cheap, birth_hits: 2, birth_looks: 4,\n"
+          "           lose_after_s: 1.5, forget_after_s: 30, history_s: 3, history_frames: 90,\n"
+          "           max_targets: 64, max_detections: 100}\n"
+          "output: {csv: true, json: false, http: '127.0.0.1:0', targets: targets.jsonl}\n"),
       IsEmpty());
   EXPECT_EQ(config_.video.transport, VideoConfig::Transport::kUdp);
   EXPECT_EQ(config_.video.user, "eve");
@@ -203,12 +209,56 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_FALSE(config_.calibration.automatic);
   EXPECT_EQ(config_.calibration.zoom_tolerance, 2.5);
   EXPECT_EQ(config_.tracking.plane, directory_.path() + "/ground/plane.yaml");
+  ASSERT_TRUE(config_.tracking.targets);
+  const TargetOptions& targets = *config_.tracking.targets;
+  EXPECT_EQ(targets.detection_sigma_px, 3);
+  EXPECT_EQ(targets.false_alarms, 0.5);
+  EXPECT_EQ(targets.least_score, 0.25);
+  EXPECT_EQ(targets.tracker.space, TargetSpace::kPlane);
+  EXPECT_EQ(targets.tracker.association, AssociationMethod::kCheap);
+  EXPECT_EQ(targets.tracker.acceleration_density, 2);
+  EXPECT_EQ(targets.tracker.sigma_first_velocity, 5);
+  EXPECT_EQ(targets.tracker.most_sigma, 40);
+  EXPECT_EQ(targets.tracker.detection_probability, 0.8);
+  EXPECT_EQ(targets.tracker.birth_hits, 2);
+  EXPECT_EQ(targets.tracker.birth_looks, 4);
+  EXPECT_EQ(targets.tracker.lose_after_s, 1.5);
+  EXPECT_EQ(targets.tracker.forget_after_s, 30);
+  EXPECT_EQ(targets.tracker.history_s, 3);
+  EXPECT_EQ(targets.tracker.history_frames, 90);
+  EXPECT_EQ(targets.tracker.max_targets, 64);
+  EXPECT_EQ(targets.tracker.max_detections, 100);
+  EXPECT_EQ(config_.output.targets, directory_.path() + "/targets.jsonl");
   EXPECT_FALSE(config_.realtime.landmarks);
   EXPECT_EQ(config_.realtime.priority, 60);
   EXPECT_EQ(config_.realtime.cpu, 3);
   EXPECT_TRUE(config_.realtime.lock_memory);
   EXPECT_EQ(config_.realtime.max_extrapolation_s, 0.5);
   EXPECT_EQ(config_.output.stdout_format, OutputFormat::kCsv);
+}
+
+TEST_F(ConfigTest, TargetsAreTrackedWhereThereIsTheSection) {
+  ASSERT_THAT(load(kMinimal), IsEmpty());
+  EXPECT_FALSE(config_.tracking.targets);
+  ASSERT_THAT(load(std::string(kMinimal) + "tracking:\n"), IsEmpty());
+  ASSERT_TRUE(config_.tracking.targets);
+  EXPECT_EQ(config_.tracking.targets->tracker.space, TargetSpace::kSphere);
+  ASSERT_THAT(load(std::string(kMinimal) + "tracking: {plane: p.yaml}\n"), IsEmpty());
+  EXPECT_EQ(config_.tracking.targets->tracker.space, TargetSpace::kPlane);
+  ASSERT_THAT(
+      load(std::string(kMinimal) + "tracking: {plane: p.yaml, space: sphere, most_sigma_rad: 0.5,\n"
+                                   "           acceleration_density_rad2_s3: 1e-4, "
+                                   "first_velocity_sigma_rad_s: 0.1}\n"),
+      IsEmpty());
+  EXPECT_EQ(config_.tracking.targets->tracker.space, TargetSpace::kSphere);
+  EXPECT_EQ(config_.tracking.targets->tracker.most_sigma, 0.5);
+  EXPECT_EQ(config_.tracking.targets->tracker.acceleration_density, 1e-4);
+  EXPECT_EQ(config_.tracking.targets->tracker.sigma_first_velocity, 0.1);
+  std::string error;
+  ASSERT_TRUE(parse_config("tracking: {least_score: 0.5}\n", path_, &config_, &error,
+                           ConfigScope::kTracking))
+      << error;
+  EXPECT_EQ(config_.tracking.targets->least_score, 0.5);
 }
 
 TEST_F(ConfigTest, WidthWithoutHeightIsRefused) {
@@ -514,6 +564,29 @@ INSTANTIATE_TEST_SUITE_P(
                 ":1: video.device", "unknown key"},
         Mistake{"DoubledKey", MINIMAL "camera:\n  aspect: 1\n  aspect: 1\n", ":6: camera",
                 "stands twice"},
+        Mistake{"TargetsOnNoPlane", MINIMAL "tracking: {space: plane}\n", ":4: tracking.space",
+                "add plane: plane.yaml"},
+        Mistake{"MetresOnTheSphere", MINIMAL "tracking:\n  most_sigma_m: 3\n",
+                ":5: tracking.most_sigma_m", "expected the key with rad"},
+        Mistake{"RadiansOnThePlane",
+                MINIMAL "tracking:\n  plane: p.yaml\n  acceleration_density_rad2_s3: 1\n",
+                ":6: tracking.acceleration_density_rad2_s3", "expected the key with m"},
+        Mistake{"MoreHitsThanLooks", MINIMAL "tracking:\n  birth_hits: 6\n",
+                ":5: tracking.birth_hits", "leaves 6 hits of 5 looks"},
+        Mistake{"FewerLooksThanHits", MINIMAL "tracking:\n  birth_looks: 2\n",
+                ":5: tracking.birth_looks", "leaves 3 hits of 2 looks"},
+        Mistake{"NoiselessDetector", MINIMAL "tracking: {detection_sigma_px: 0}\n",
+                ":4: tracking.detection_sigma_px", "px"},
+        Mistake{"HistoryBeyondTheRecords", MINIMAL "tracking: {history_s: 10}\n",
+                ":4: tracking.history_s", "9"},
+        Mistake{"TooManyBoxes", MINIMAL "tracking: {max_detections: 10000}\n",
+                ":4: tracking.max_detections", "500"},
+        Mistake{"UnknownAssociation", MINIMAL "tracking: {association: best}\n",
+                ":4: tracking.association", "expected one of exact, cheap, nearest"},
+        Mistake{"TargetsUntracked", MINIMAL "output: {http: '127.0.0.1:0', targets: t.jsonl}\n",
+                ":4: output.targets", "add tracking"},
+        Mistake{"TargetsWithoutHttp", MINIMAL "tracking: {}\noutput: {targets: t.jsonl}\n",
+                ":5: output.targets", "add http"},
         Mistake{"NoVideo", PAN_TILT CALIBRATION, ": ", "section 'video' is missing"},
         Mistake{"NoPanTilt", VIDEO CALIBRATION, ": ", "section 'pan_tilt' is missing"},
         Mistake{"NoCalibrationAndNoDataSheet", VIDEO PAN_TILT, ": ",

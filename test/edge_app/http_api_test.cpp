@@ -12,6 +12,8 @@
 #include <sstream>
 #include <thread>
 
+#include "edge_app/output/detection_query.h"
+#include "test/edge_app/detected_scene.h"
 #include "test/edge_app/http_client.h"
 #include "test/support/zoom_nodes.h"
 
@@ -20,6 +22,7 @@ namespace {
 
 using nlohmann::json;
 using test::Client;
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::Not;
 using ::testing::StartsWith;
@@ -34,8 +37,11 @@ LiveStateOptions few_lines() {
 
 class HttpApiTest : public ::testing::Test {
  protected:
-  explicit HttpApiTest(std::shared_ptr<const PlaneEstimate> plane = nullptr) {
+  explicit HttpApiTest(std::shared_ptr<const PlaneEstimate> plane = nullptr,
+                       TargetFeed* feed = nullptr, TargetLines* lines = nullptr) {
     HttpApiSources sources;
+    sources.targets = feed;
+    sources.target_lines = lines;
     sources.live = &live_;
     sources.summary = [this] { return summary_; };
     sources.video_losses = [] { return FrameSourceCounters{3, 4}; };
@@ -218,6 +224,161 @@ TEST_F(HttpApiTest, PassesOnThatAFreshCalibrationIsWanted) {
   calibrating_ = true;
   EXPECT_THAT(post("/api/v1/calibrate", ""), StartsWith("HTTP/1.1 202 "));
   EXPECT_TRUE(asked_);
+}
+
+TEST_F(HttpApiTest, WithoutTrackingThereAreNoTargets) {
+  EXPECT_THAT(post("/api/v1/detections", R"({"frame": 1, "boxes": []})"),
+              AllOf(StartsWith("HTTP/1.1 409 "), HasSubstr("section tracking")));
+  EXPECT_THAT(get("/api/v1/targets"), StartsWith("HTTP/1.1 404 "));
+  EXPECT_THAT(get("/metrics"), Not(HasSubstr("alidade_targets")));
+}
+
+// Not started: what is offered waits.
+struct Feed {
+  static TargetOptions few_boxes() {
+    TargetOptions options = default_target_options(TargetSpace::kPlane);
+    options.tracker.max_detections = 2;
+    return options;
+  }
+  TargetFeed feed{few_boxes(), test::mast_plane()};
+  TargetLines lines{nullptr};
+};
+
+class HttpApiWithTargetsTest : private Feed, public HttpApiTest {
+ protected:
+  HttpApiWithTargetsTest() : HttpApiTest(test::mast_plane(), &feed, &lines) {
+    feed.add_on_news([this](const auto& state) { lines.take(*state); });
+    for (std::int64_t i = 0; i < 60; ++i) {
+      OrientationRecord record =
+          test::record_of(i, test::swinging_frame(test::watching_calibration(), i));
+      if (i == 50) record.orientation.reset();
+      EXPECT_TRUE(live_.write(record));
+    }
+  }
+  ~HttpApiWithTargetsTest() override {
+    feed.stop();
+    server_.stop();
+  }
+  void start() { ASSERT_TRUE(feed.start()); }
+  const Vector2<double> stands_at_ =
+      test::place_in_view(test::mast(), test::swinging_frame(test::watching_calibration(), 0));
+  std::string send_frame(std::int64_t frame) {
+    const FrameOrientation seen_by = test::swinging_frame(test::watching_calibration(), frame);
+    const DetectionBox box = test::box_with_foot(test::foot_of(test::mast(), seen_by, stands_at_));
+    const json body{{"frame", frame},
+                    {"boxes",
+                     {{{"u", box.u},
+                       {"v", box.v},
+                       {"width", box.width},
+                       {"height", box.height},
+                       {"class", "person"}}}}};
+    return post("/api/v1/detections", body.dump());
+  }
+};
+
+TEST_F(HttpApiWithTargetsTest, RefusesEachKindOfBadDetectionsWithItsReason) {
+  const std::string box = R"({"u": 900, "v": 500, "width": 20, "height": 50})";
+  const struct {
+    std::string body;
+    const char* status;
+    const char* reason;
+  } refusals[] = {
+      {"not JSON", "400", "must be a JSON object"},
+      {R"({"frame": 1, "boxes": [{"u": NaN, "v": 1, "width": 1, "height": 1}]})", "400", "object"},
+      {R"({"frame": 1, "boxes": [{"u": 1e999, "v": 1, "width": 1, "height": 1}]})", "400",
+       "object"},
+      {R"({"boxes": []})", "400", "frame or time_s is missing"},
+      {R"({"frame": 1, "time_s": 2, "boxes": []})", "400", "exclude each other"},
+      {R"({"frame": -1, "boxes": []})", "400", "frame must be an integer"},
+      {R"({"frame": 1})", "400", "boxes must be an array"},
+      {R"({"frame": 1, "boxes": {}})", "400", "boxes must be an array"},
+      {R"({"frame": 1, "boxes": [3]})", "400", "item 0: must be an object"},
+      {R"({"frame": 1, "boxes": [{"u": 1, "v": 1, "width": 1}]})", "400",
+       "item 0: height must be a number and is missing"},
+      {R"({"frame": 1, "boxes": [{"u": "1", "v": 1, "width": 1, "height": 1}]})", "400",
+       "item 0: u must be a number"},
+      {R"({"frame": 1, "boxes": [{"x": 1}]})", "400", "unknown key"},
+      {R"({"frame": 1, "boxes": [[[[[1]]]]]})", "400", "nested"},
+      {R"({"frame": 1, "boxes": [{"u": 1, "v": 1, "width": 1, "height": 1, "class": 7}]})", "400",
+       "class must be a text"},
+      {R"({"frame": 1, "boxes": [{"u": 1, "v": 1, "width": 1, "height": 1, "class": "a\nb"}]})",
+       "400", "class must be a text"},
+      {R"({"frame": 1, "boxes": [{"u": 1, "v": 1, "width": 1, "height": 1, "class": ")" +
+           std::string(33, 'x') + R"("}]})",
+       "400", "class must be a text"},
+      {R"({"frame": 1, "boxes": [)" + box + ", " +
+           R"({"u": 1900, "v": 5, "width": 50, "height": 9})" + "]}",
+       "400", "boxes: item 1: the box's middle is not in the picture"},
+      {R"({"frame": 1, "boxes": [{"u": 1, "v": 1, "width": -1, "height": 1}]})", "400", "no size"},
+      {R"({"frame": 1, "boxes": [{"u": 1, "v": 1, "width": 1, "height": 1, "score": 2}]})", "400",
+       "item 0: the score"},
+      {R"({"frame": 1, "boxes": [)" + box + "," + box + "," + box + "]}", "400",
+       "more boxes than tracking.max_detections"},
+      {R"({"frame": 60, "boxes": []})", "404", "later than the newest frame"},
+      {R"({"time_s": 86500, "boxes": []})", "404", "later than the newest frame"},
+      {R"({"time_s": 50, "boxes": []})", "404", "no such frame"},
+      {R"({"frame": 50, "boxes": []})", "409", "no orientation"},
+  };
+  for (const auto& one : refusals) {
+    const std::string answer = post("/api/v1/detections", one.body);
+    EXPECT_THAT(answer, StartsWith(std::string("HTTP/1.1 ") + one.status + " ")) << one.body;
+    EXPECT_THAT(answer, HasSubstr(one.reason)) << one.body;
+  }
+  EXPECT_THAT(post("/api/v1/detections", std::string(kMaxDetectionBytes + 1, ' ')),
+              StartsWith("HTTP/1.1 413 "));
+  EXPECT_THAT(get("/api/v1/targets?frame=x"), StartsWith("HTTP/1.1 400 "));
+  EXPECT_THAT(get("/api/v1/targets?frame=1000"), StartsWith("HTTP/1.1 404 "));
+  const json targets = body_of(get("/api/v1/targets"));
+  EXPECT_EQ(targets["targets"], json::array());
+  EXPECT_TRUE(targets["frame"].is_null());
+  EXPECT_EQ(targets["detections"]["frames"]["malformed"], 16);
+  EXPECT_EQ(targets["detections"]["frames"]["outside"], 2);
+  EXPECT_EQ(targets["detections"]["frames"]["not_yet"], 2);
+  EXPECT_THAT(get("/metrics"), HasSubstr("alidade_detection_frames_total{outcome=\"score\"} 1\n"));
+}
+
+TEST_F(HttpApiWithTargetsTest, SaysWhenItsQueueIsFull) {
+  const auto most = static_cast<std::int64_t>(TargetFeed::kMostWaiting);
+  for (std::int64_t i = 0; i < most; ++i) ASSERT_THAT(send_frame(i), StartsWith("HTTP/1.1 202 "));
+  EXPECT_THAT(send_frame(3), AllOf(StartsWith("HTTP/1.1 409 "), HasSubstr("already")));
+  EXPECT_THAT(send_frame(most),
+              AllOf(StartsWith("HTTP/1.1 503 "), HasSubstr("Retry-After: 1\r\n")));
+  EXPECT_EQ(body_of(get("/api/v1/targets"))["detections"]["waiting"], most);
+  EXPECT_THAT(get("/metrics"), HasSubstr("alidade_detection_frames_waiting 32\n"));
+}
+
+TEST_F(HttpApiWithTargetsTest, TellsTargetsWhenAskedAndAsEvents) {
+  Client client(server_);
+  client.send("GET /api/v1/stream HTTP/1.1\r\nHost: localhost\r\n\r\n");
+  static_cast<void>(client.receive("event: clock"));
+  start();
+  // In the past when the newest came: what is late is taken.
+  for (std::int64_t i = 20; i < 49; ++i)
+    if (i != 30) ASSERT_THAT(send_frame(i), StartsWith("HTTP/1.1 202 ")) << i;
+  ASSERT_THAT(send_frame(30), StartsWith("HTTP/1.1 202 "));
+  json targets;
+  do {
+    targets = body_of(get("/api/v1/targets"));
+  } while (targets["detections"]["frames"]["late"] == 0);
+  EXPECT_EQ(targets["frame"], 48);
+  EXPECT_EQ(targets["space"], "plane");
+  ASSERT_EQ(targets["targets"].size(), 1U);
+  const json& target = targets["targets"][0];
+  EXPECT_EQ(target["identity"], 1);
+  EXPECT_EQ(target["class"], "person");
+  EXPECT_NEAR(target["position_m"][0], stands_at_.x(), 0.1);
+  EXPECT_NEAR(target["position_m"][1], stands_at_.y(), 0.1);
+  EXPECT_EQ(target["covariance"].size(), 4U);
+  EXPECT_FALSE(target["box"].is_null());
+  const json later = body_of(get("/api/v1/targets?frame=59"));
+  EXPECT_EQ(later["frame"], 59);
+  EXPECT_EQ(later["detected_frame"], 48);
+  EXPECT_GT(later["targets"][0]["covariance"][0][0], target["covariance"][0][0]);
+  EXPECT_THAT(get("/api/v1/targets?frame=50"), StartsWith("HTTP/1.1 409 "));
+  EXPECT_THAT(get("/metrics"), HasSubstr("\nalidade_targets 1\n"));
+  std::string event = client.receive("event: targets");
+  event = client.receive("\n\n");
+  EXPECT_THAT(event, HasSubstr("\"targets\":["));
 }
 
 TEST_F(HttpApiTest, AClientThatIsTooSlowIsToldWhatItLost) {

@@ -49,7 +49,7 @@ class CheckIncludes(unittest.TestCase):
     def test_lets_commands_join_the_rooms_of_the_program(self):
         code, output = check({"edge_app/commands/a.cpp": "".join(
             f'#include "edge_app/{room}/a.h"\n'
-            for room in ("commands", "pipeline", "check", "storage", "output", "config"))})
+            for room in ("commands", "pipeline", "tracking", "check", "storage", "output", "config"))})
         self.assertEqual(code, 0, output)
 
     def test_accepts_the_include_folder_of_a_catkin_package(self):
@@ -82,6 +82,7 @@ class CheckIncludes(unittest.TestCase):
                 ("platform/streams/a.h", "#include <Eigen/Core>"),
                 ("edge_app/pipeline/a.cpp", '#include "test/support/guard.h"'),
                 ("edge_app/pipeline/a.h", '#include "edge_app/storage/calibration_store.h"'),
+                ("edge_app/pipeline/a.cpp", '#include "edge_app/tracking/target_feed.h"'),
                 ("edge_app/check/a.h", '#include "edge_app/output/metrics.h"'),
                 ("edge_app/output/a.cpp", '#include "edge_app/config/config.h"'),
                 ("edge_app/storage/a.cpp", '#include "edge_app/config/yaml_section.h"'),

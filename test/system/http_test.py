@@ -122,10 +122,11 @@ def events(file):
 
 
 class Http(SystemTest):
-    def start(self, mode="PT", json_output=True, **sections):
+    def start(self, mode="PT", json_output=True, settings=None, **sections):
         """alidade with the virtual camera, answering."""
-        camera = self.camera()
-        config = self.write_config(camera, output={"json": json_output, "http": "127.0.0.1:0", "token_env": "TEST_TOKEN"},
+        camera = self.camera(settings=settings)
+        targets = {"targets": str(self.folder / "targets.jsonl")} if "tracking" in sections else {}
+        config = self.write_config(camera, output={"json": json_output, "http": "127.0.0.1:0", "token_env": "TEST_TOKEN", **targets},
                                    realtime={"mode": mode}, **sections)
         run = self.alidade("run", "-c", config, TEST_TOKEN=TOKEN)
         api = Api(run)
@@ -157,8 +158,64 @@ class Http(SystemTest):
         check(answer.json(), self.described(path, method, status))
         return answer.json()
 
+    def ground(self):
+        """A plane.yaml: the camera 20 m above the ground looks down by 20 degrees at zero pan and tilt. And where it then looks."""
+        pitch, height = math.radians(-20), 20
+        names = ["heading", "pitch", "roll", "x", "y", "height"]
+        values = dict(zip(names, (0, pitch, 0, 0, 0, height)))
+        sigmas = dict(zip(names, (0, 1e-3, 1e-3, 0, 0, 0.05)))
+        plane = {"format": 1, **{name: {"value": values[name], "sigma": sigmas[name]} for name in names},
+                 "origin": {"latitude_deg": 48, "longitude_deg": 11, "height_m": 500},
+                 "covariance": {"names": names, "matrix": [[sigmas[a] ** 2 * (a == b) for b in names] for a in names]}}
+        file = self.folder / "plane.yaml"
+        file.write_text(json.dumps(plane))
+        return str(file), (0, height / math.tan(-pitch))
+
+    def follow_somebody(self, api, place, noise_px=0.5, frames=40):
+        """Somebody stands where the camera looks at zero pan and tilt; a detector with noise finds them in each frame."""
+        noise = random.Random(7)
+        client, file = api.follow()
+        seen, last, targets = 0, None, {"targets": []}
+        while seen < frames or not targets["targets"] or targets["targets"][0]["pixel"] is None:
+            def newer(known=last):
+                nonlocal last
+                last = api.ask("api/v1/orientation").json().get("frame", known)
+                return last != known
+            wait_until(newer, "another frame")
+            frame = last
+            pixel = api.ask("api/v1/pixel", {"frame": frame, "directions": [[1, 0, 0]]}).json().get("pixels", [{}])[0]
+            boxes = []
+            if pixel.get("inside"):
+                u, v = (x + noise.gauss(0, noise_px) for x in pixel["pixel"])
+                boxes = [{"u": u - 2, "v": v - 10, "width": 4, "height": 10, "score": 0.8, "class": "person"}]
+            answer = api.ask("api/v1/detections", {"frame": frame, "boxes": boxes})
+            # A box whose middle is above the picture, or a frame that is forgotten or has no orientation.
+            if answer.status in (400, 404, 409):
+                continue
+            self.assertEqual(answer.status, 202, answer.body)
+            check(answer.json(), self.described("/api/v1/detections", "post", 202))
+            seen += len(boxes)
+            targets = api.ask("api/v1/targets").json()
+        data = next(data for name, _, data in events(file) if name == "targets" and data["targets"])
+        check(data, {"$ref": "#/components/schemas/Targets"})
+        client.close()
+        file.close()
+        target, = targets["targets"]
+        error = [x - y for x, y in zip(target["position_m"], place)]
+        (a, b), (c, d) = (row[:2] for row in target["covariance"][:2])
+        squared = (d * error[0] ** 2 - (b + c) * error[0] * error[1] + a * error[1] ** 2) / (a * d - b * c)
+        self.assertLess(squared, 13.8, f"{error} m: chi-square of two, beyond it 1 in 1000")
+        self.assertLess(math.hypot(*error), 1)
+        self.assertLess(math.hypot(*target["velocity_m_s"]), 1)
+        self.assertEqual((target["identity"], target["class"]), (1, "person"))
+        self.assertAlmostEqual(target["latitude_deg"], 48 + target["position_m"][1] / 111.2e3, places=4)
+        return target
+
     def test_answers_as_it_describes(self):
-        run, api = self.start()
+        plane, place = self.ground()
+        run, api = self.start(settings={"path": {"type": "triple_cosine", "period_s": 10, "amplitude": 0.2}},
+                              tracking={"plane": plane, "detection_sigma_px": 0.5})
+        self.assertEqual(self.check_answer(api, "/api/v1/targets")["targets"], [])
         self.assertEqual(yaml.safe_load(api.ask("api/v1/openapi.yaml", token=None).body), DESCRIPTION)
         self.assertEqual(api.ask("healthz", token=None).body, b"ok\n")
         record = self.check_answer(api, "/api/v1/orientation")
@@ -168,7 +225,21 @@ class Http(SystemTest):
         calibration = self.check_answer(api, "/api/v1/calibration")
         self.assertEqual(calibration["image"], {key: IMAGE[key] for key in ("width", "height")})
         self.check_answer(api, "/api/v1/calibrate", 409, b"")
-        self.check_answer(api, "/api/v1/plane", 404)
+        self.assertEqual(self.check_answer(api, "/api/v1/plane")["height"]["value"], 20)
+        self.follow_somebody(api, place)
+        frame = self.check_answer(api, "/api/v1/orientation")["frame"]
+        targets = self.check_answer(api, "/api/v1/targets")
+        self.assertEqual(len(targets["targets"]), 1)
+        later = api.ask(f"api/v1/targets?frame={frame}").json()
+        self.assertEqual((later["frame"], later["detected_frame"]), (frame, targets["detected_frame"]))
+        for body, status in (({"frame": 10**9, "boxes": []}, 404), ({"frame": targets["detected_frame"], "boxes": []}, 409),
+                             ({"frame": frame, "boxes": [{"u": 900, "v": 1, "width": 1, "height": 1}]}, 400)):
+            self.check_answer(api, "/api/v1/detections", status, body)
+        metrics = self.parse_metrics(api.ask("metrics").body.decode())
+        self.assertEqual(metrics["alidade_targets", ()], 1)
+        self.assertGreaterEqual(metrics["alidade_detection_frames_total", (("outcome", "taken"),)], 40)
+        self.assertEqual(metrics["alidade_detection_frames_total", (("outcome", "outside"),)], targets["detections"]["frames"]["outside"] + 1)
+        record = self.check_answer(api, "/api/v1/orientation")
         frame = record["frame"]
         for which in ({}, {"frame": frame}, {"time_s": record["time_s"] + 0.01}):
             answer = self.check_answer(api, "/api/v1/direction", body={
@@ -191,15 +262,21 @@ class Http(SystemTest):
                 ("/api/v1/direction", {"pixels": [[1, 1]], "padding": "x" * 70000}, 413),
                 ("/api/v1/pixel", {"directions": [[0, 0, 0]]}, 400), ("/api/v1/pixel", {"time_s": 0, "directions": [[1, 0, 0]]}, 404)):
             self.check_answer(api, path, status, body)
-        for path in ("/api/v1/orientation", "/api/v1/status", "/api/v1/history", "/api/v1/calibration"):
+        for path in ("/api/v1/orientation", "/api/v1/status", "/api/v1/history", "/api/v1/calibration", "/api/v1/targets"):
             self.check_answer(api, path, 401, token="wrong-horse")
             self.check_answer(api, path, 401, token=None)
-        for path in ("/api/v1/direction", "/api/v1/pixel", "/api/v1/calibrate"):
+        for path in ("/api/v1/direction", "/api/v1/pixel", "/api/v1/calibrate", "/api/v1/detections"):
             self.check_answer(api, path, 401, {}, token=None)
         self.end(run)
+        told = [json.loads(line) for line in (self.folder / "targets.jsonl").read_text().splitlines()]
+        self.assertEqual(len(told), metrics["alidade_detection_frames_total", (("outcome", "taken"),)])
+        for one in told:
+            check(one, {"$ref": "#/components/schemas/Targets"})
+        self.assertEqual(told[-1]["targets"][0]["identity"], 1)
 
     def test_describes_what_it_refuses(self):
-        run, api = self.start()
+        run, api = self.start(tracking={})
+        box = {"u": 1, "v": 2, "width": 3, "height": 4}
         pixels, directions = {"pixels": [[80, 48]]}, {"directions": [[1, 0, 0]]}
         for path, bodies in {
                 "/api/v1/direction": (
@@ -208,6 +285,13 @@ class Http(SystemTest):
                     {"pixels": [[1, 2]] * 1001}, {**pixels, "frame": -1}, {**pixels, "frame": 1.5}, {**pixels, "frame": "1"},
                     {**pixels, "frame": None}, {**pixels, "frame": 1, "time_s": 1}, {**pixels, "pixel_sigma_px": -1},
                     {**pixels, "pixel_sigma_px": 1001}, {**pixels, "sigma": 1}, {**pixels, **directions}),
+                "/api/v1/detections": (
+                    {"frame": 0, "boxes": []}, {"time_s": -1, "boxes": [box]}, {"frame": 0, "boxes": [{**box, "score": 1, "class": "a"}]},
+                    {}, [], {"boxes": []}, {"frame": 0}, {"frame": 0, "time_s": 1, "boxes": []}, {"frame": -1, "boxes": []},
+                    {"frame": 0, "boxes": [1]}, {"frame": 0, "boxes": [{"u": 1}]}, {"frame": 0, "boxes": [{**box, "u": "1"}]},
+                    {"frame": 0, "boxes": [{**box, "x": 1}]}, {"frame": 0, "boxes": [{**box, "class": "x" * 33}]},
+                    {"frame": 0, "boxes": [{**box, "class": None}]}, {"frame": 0, "boxes": [{**box, "score": None}]},
+                    {"frame": 0, "boxes": [], "camera": 1}),
                 "/api/v1/pixel": (
                     directions, {"directions": [[0, 0, -1e-300]]}, {**directions, "time_s": 0}, {"directions": [[0, 0, 0]]},
                     {"directions": [[1, 0, 0], [0, 0, 1e-320]]}, {"directions": [[1, 0]]}, {**directions, "frame": -1},

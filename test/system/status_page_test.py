@@ -25,7 +25,7 @@ SETTINGS = {
 }
 TOKEN = "right-horse"
 # What a browser says of frames that are late on a busy machine,
-LATE = r"/api/v1/picture.*status of 503|/api/v1/(direction|pixel).*status of (404|409)"
+LATE = r"/api/v1/picture.*status of 503|/api/v1/(direction|pixel|targets).*status of (404|409)"
 # and of a server that is not there or wants a token: it is what these tests do to it.
 AWAY = r"ERR_CONNECTION_REFUSED|ERR_CONNECTION_RESET|ERR_EMPTY_RESPONSE|ERR_INCOMPLETE_CHUNKED_ENCODING|status of 401"
 
@@ -69,7 +69,7 @@ class StatusPage(SystemTest):
         image = SETTINGS["image"]
         return self.write_config(camera, video={"width": image["width"], "height": image["height"]},
                                  focal_length_px=SETTINGS["camera"]["focal_length_px"], realtime={"mode": mode},
-                                 output={"json": True, "http": "127.0.0.1:0", **output})
+                                 output={"json": True, "http": "127.0.0.1:0", **output}, tracking={})
 
     def text(self, name):
         return self.browser.execute_script("return document.getElementById(arguments[0]).textContent", name)
@@ -164,12 +164,42 @@ class StatusPage(SystemTest):
         self.assertAlmostEqual(crossed["u"], SETTINGS["image"]["width"] / 2 - step)
         self.assertAlmostEqual(crossed["v"], SETTINGS["image"]["height"] / 2 - step)
 
+        self.shows_targets(address)
+
         shown_s = self.browser.execute_script("return record.time_s")
         self.browser.refresh()
         self.wait_for_text("link", "^live$")
         wait_until(lambda: self.browser.execute_script("return samples.length > 0 && samples[0].t < arguments[0]", shown_s),
                    "the minute before the page was opened")
         self.assert_no_errors_but(LATE)
+
+    def shows_targets(self, address):
+        """Something flies where the middle of the picture is: its box, its name, the plan and the table."""
+        self.assertFalse(self.browser.find_element(By.ID, "targets").is_displayed())
+        size = SETTINGS["image"]
+
+        def ask(path, body=None):
+            request = urllib.request.Request(address + path, body and json.dumps(body).encode())
+            try:
+                with urllib.request.urlopen(request, timeout=DEADLINE_S) as answer:
+                    return json.load(answer)
+            except urllib.error.HTTPError as error:
+                self.assertIn(error.code, (404, 409))  # late, or the same frame again
+                return None
+
+        def shown():
+            record = ask("api/v1/orientation")
+            if record and record["frame"] is not None:
+                ask("api/v1/detections", {"frame": record["frame"], "boxes": [
+                    {"u": size["width"] / 2 - 30, "v": size["height"] / 2 - 20, "width": 60, "height": 40, "class": "drone"}]})
+            return self.text("target-rows") and self.browser.execute_script(
+                "return picture?.targets?.targets.length > 0 && picture.targets.targets[0].box !== null")
+        wait_until(shown, "a target on the page")
+        self.assertRegex(self.text("target-rows"), r"^#1 drone−?[\d.]+\s±\s[\d.]+, −?[\d.]+\s±\s[\d.]+\s°")
+        self.wait_for_text("plan-caption", r"1 target after frame \d+")
+        if "ALIDADE_SCREENSHOTS" in os.environ:
+            self.browser.set_window_size(1280, 1800)
+            self.browser.save_screenshot(os.path.join(os.environ["ALIDADE_SCREENSHOTS"], "targets.png"))
 
     def test_says_that_the_program_is_gone_and_follows_the_next_one(self):
         camera = self.camera(settings=SETTINGS)

@@ -21,7 +21,7 @@
 #include "edge_app/output/http/http_gate.h"
 #include "edge_app/output/http/http_message.h"
 #include "edge_app/output/http/http_options.h"
-#include "edge_app/output/http/niced_threads.h"
+#include "platform/system/niced_threads.h"
 
 namespace alidade {
 

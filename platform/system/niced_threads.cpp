@@ -1,4 +1,4 @@
-#include "edge_app/output/http/niced_threads.h"
+#include "platform/system/niced_threads.h"
 
 #include <sched.h>
 #include <sys/resource.h>

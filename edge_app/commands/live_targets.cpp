@@ -1,0 +1,68 @@
+#include "edge_app/commands/live_targets.h"
+
+#include <fcntl.h>
+#include <spdlog/spdlog.h>
+
+#include <cerrno>
+#include <system_error>
+#include <utility>
+
+#include "edge_app/commands/command.h"
+
+namespace alidade {
+namespace {
+
+// A pipe without a reader would wait for one: that is refused, too.
+FileDescriptor open_to_append(const std::string& path) {
+  if (path.empty()) return FileDescriptor();
+  FileDescriptor file(
+      ::open(path.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC | O_NONBLOCK, 0666));
+  if (!file.is_open()) {
+    throw CommandError(kExitFailed,
+                       path + ": cannot be written: " + std::generic_category().message(errno) +
+                           "; give output.targets a file that can");
+  }
+  return file;
+}
+
+std::shared_ptr<const PlaneEstimate> plane_of(const Config& config,
+                                              std::shared_ptr<const PlaneEstimate> plane) {
+  return config.tracking.targets->tracker.space == TargetSpace::kPlane ? std::move(plane) : nullptr;
+}
+
+}  // namespace
+
+LiveTargets::LiveTargets(const Config& config, std::shared_ptr<const PlaneEstimate> plane)
+    : file_(open_to_append(config.output.targets)),
+      lines_((config.output.targets.empty()
+                  ? nullptr
+                  : &writer_.emplace(file_.get(), config.output.targets, "targets",
+                                     LineWriter::Stalled::kDrop))),
+      feed_(*config.tracking.targets, plane_of(config, std::move(plane))) {
+  feed_.add_on_news([this](const auto& state) { lines_.take(*state); });
+}
+
+void LiveTargets::start() {
+  if (!feed_.start()) throw CommandError(kExitFailed, "there can be no thread for targets");
+}
+
+void LiveTargets::stop() {
+  feed_.stop();
+  if (writer_ && writer_->dropped() > 0)
+    spdlog::warn(
+        "{} lines of targets not written, as the reader of output.targets did not take "
+        "them",
+        writer_->dropped());
+}
+
+std::unique_ptr<LiveTargets> make_live_targets(const Config& config,
+                                               const std::shared_ptr<const PlaneEstimate>& plane) {
+  if (!config.tracking.targets) return nullptr;
+  if (!config.output.http) {
+    spdlog::info("targets: none, as detections come over HTTP; set output.http");
+    return nullptr;
+  }
+  return std::make_unique<LiveTargets>(config, plane);
+}
+
+}  // namespace alidade

@@ -1,0 +1,67 @@
+#pragma once
+// What a detector found in one frame, as it comes from outside, and what became of it.
+// A box is the smallest upright rectangle around the target in the picture as the camera sent it: (u, v) its upper left corner, px, pixels as
+// in the house's convention. Where the target is, is the middle of the lower edge (the foot) on a plane, the middle of the box on the sphere.
+
+#include <cmath>
+#include <cstddef>
+#include <string>
+#include <vector>
+
+#include "core/model/linear_algebra.h"
+#include "edge_app/pipeline/orientation_record.h"
+
+namespace alidade {
+
+struct DetectionBox {
+  double u = 0;  // px, left edge
+  double v = 0;  // px, upper edge
+  double width = 0;
+  double height = 0;
+  double score = 1;  // 0 to 1
+  std::string name;  // its class; empty: not told
+
+  [[nodiscard]] Vector2<double> foot() const { return {u + width / 2, v + height}; }
+  [[nodiscard]] Vector2<double> middle() const { return {u + width / 2, v + height / 2}; }
+};
+
+inline constexpr std::size_t kLongestClass = 32;  // bytes
+
+struct DetectedFrame {
+  OrientationRecord record;  // of the frame: with a number, a time and an orientation
+  std::vector<DetectionBox> boxes;
+};
+
+enum class DetectionStatus {
+  kTaken,
+  kTakenLate,  // put in its place, later frames done again
+  kMalformed,  // not what can be read
+  kTooManyBoxes,
+  kBoxNotFinite,
+  kBoxOutside,  // its middle is not in the picture, or it has no size, or one beyond twice the picture's
+  kBadScore,
+  kUnknownFrame,  // not among those that are kept
+  kFrameNotYet,   // later than the newest
+  kTooLate,  // more than tracker.history_s, or history_frames, behind the newest that was taken
+  kNoOrientation,  // its record has none
+  kRepeated,       // the frame's detections have come already
+  kNoGeometry,     // its picture and the world do not fit together
+  kQueueFull
+};
+inline constexpr int kDetectionStatusCount = static_cast<int>(DetectionStatus::kQueueFull) + 1;
+
+[[nodiscard]] constexpr bool is_taken(DetectionStatus status) {
+  return status == DetectionStatus::kTaken || status == DetectionStatus::kTakenLate;
+}
+
+// Words for people.
+[[nodiscard]] const char* to_string(DetectionStatus status);
+// One word, for metrics.
+[[nodiscard]] const char* label_of(DetectionStatus status);
+
+struct DetectionAnswer {
+  DetectionStatus status = DetectionStatus::kTaken;
+  int box = -1;  // the one at fault
+};
+
+}  // namespace alidade

@@ -1,0 +1,60 @@
+#pragma once
+// TargetsState: all targets after a frame's detections, as it is handed on: an immutable value.
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "core/tracking/plane_estimate.h"
+#include "core/tracking/target_tracker.h"
+#include "edge_app/tracking/detected_frame.h"
+
+namespace alidade {
+
+struct TargetCounters {
+  std::array<std::int64_t, kDetectionStatusCount> frames{};  // by what became of them
+  std::int64_t boxes_taken = 0;
+  // Of frames that were taken, boxes that say nothing of a target's place.
+  std::int64_t boxes_below_score = 0;
+  std::int64_t boxes_cut_off =
+      0;  // by the picture's lower edge: on a plane, their foot is not seen
+  std::int64_t boxes_without_place =
+      0;  // above the horizon or too near to it, or where the lens has no direction
+  std::int64_t births_refused = 0;  // as tracker.max_targets were there
+
+  void count(DetectionStatus status) { ++frames[static_cast<std::size_t>(status)]; }
+  [[nodiscard]] std::int64_t of(DetectionStatus status) const {
+    return frames[static_cast<std::size_t>(status)];
+  }
+};
+
+// How a target was when it was last seen.
+struct TargetLook {
+  std::string name;   // class that most of its detections have lately
+  double weight = 0;  // of that against other classes
+  double score = 0;   // of the last detection
+  double width = 0;   // px, of its box
+  double height = 0;  // px
+  double scale = 0;   // px a metre there, or px a radian
+  Matrix2<double> shared_cov = Matrix2<double>::Zero();  // m^2 or rad^2: of calibration and plane
+};
+
+struct TrackedTarget {
+  Target target;  // with an identity
+  TargetLook look;
+};
+
+struct TargetsState {
+  std::int64_t updates = 0;  // frames taken so far
+  TargetSpace space = TargetSpace::kPlane;
+  double acceleration_density = 0;
+  std::shared_ptr<const PlaneEstimate> plane;  // null on the sphere
+  double time_s = 0;                           // of the targets: middle row of the record's frame
+  OrientationRecord record;                    // of the newest frame that was taken
+  std::vector<TrackedTarget> targets;          // by identity
+  TargetCounters counters;
+};
+
+}  // namespace alidade
