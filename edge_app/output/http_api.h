@@ -11,6 +11,7 @@
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/live_state.h"
 #include "edge_app/pipeline/pipeline.h"
+#include "edge_app/pipeline/scene_report.h"
 #include "platform/video/frame_source.h"
 
 namespace alidade {
@@ -24,6 +25,7 @@ struct HttpApiSources {
   // Empty without one. The zoom curve in use; null: there is none.
   std::function<std::shared_ptr<const ZoomCurve>()> zoom_curve;
   std::shared_ptr<const PlaneEstimate> plane;  // null: none is configured
+  std::function<SceneReport()> scene;          // empty: no scene map is in use
   std::string version;
   std::string camera;            // the video source's name, without a password
   bool latency_measured = true;  // false for a recording

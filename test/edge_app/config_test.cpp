@@ -176,6 +176,8 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
            "2.5}\n"
            "realtime: {mode: PT, priority: 60, cpu: 3, lock_memory: true, max_extrapolation_s: "
            "0.5}\n"
+           "scene_map: {file: scene.map, interval_s: 3, zero_sigma_rad: 2e-4, on_moved_base: "
+           "report}\n"
            "tracking: {plane: ground/plane.yaml}\n"
            "output: {csv: true, json: false}\n"),
       IsEmpty());
@@ -202,6 +204,10 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.calibration.prior, directory_.path() + "/bench/lens.yaml");
   EXPECT_FALSE(config_.calibration.automatic);
   EXPECT_EQ(config_.calibration.zoom_tolerance, 2.5);
+  EXPECT_EQ(config_.scene_map.file, directory_.path() + "/scene.map");
+  EXPECT_EQ(config_.scene_map.interval_s, 3);
+  EXPECT_EQ(config_.scene_map.zero_sigma_rad, 2e-4);
+  EXPECT_FALSE(config_.scene_map.correct_moved_base);
   EXPECT_EQ(config_.tracking.plane, directory_.path() + "/ground/plane.yaml");
   EXPECT_FALSE(config_.realtime.landmarks);
   EXPECT_EQ(config_.realtime.priority, 60);

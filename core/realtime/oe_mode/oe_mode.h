@@ -139,7 +139,7 @@ class OeMode {
   bool settle_base(const BaseMeasurement& measurement) {
     return tie_.settle(measurement, offset_.offset());
   }
-  [[nodiscard]] bool is_tied_to_base() const { return tie_.is_tied(); }
+  [[nodiscard]] const BaseTie& tie() const { return tie_; }
   // How telemetry's zero lies in the base; 0 as long as nothing is known from outside.
   [[nodiscard]] TiedOffset telemetry_zero() const { return tie_.of_telemetry(offset_.offset()); }
   // Puts telemetry's answer about any frame into the base. False: what comes out is not finite, and *out is as it was.

@@ -705,7 +705,7 @@ TEST_F(ToldBase, LandmarksHoldItFromTheNextFrameOnWhateverTelemetrySays) {
     oe_.maintain();
   }
   ASSERT_TRUE(oe_.settle_base(measurement));
-  ASSERT_TRUE(oe_.is_tied_to_base());
+  ASSERT_TRUE(oe_.tie().is_tied());
   for (int k = 5; k < 100; ++k) {
     ASSERT_EQ(process(k), OeStatus::kOk) << k;
     expect_honest(camera_, k, frame_);
