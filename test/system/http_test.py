@@ -169,6 +169,7 @@ class Http(SystemTest):
         self.assertEqual(calibration["image"], {key: IMAGE[key] for key in ("width", "height")})
         self.check_answer(api, "/api/v1/calibrate", 409, b"")
         self.check_answer(api, "/api/v1/plane", 404)
+        self.check_answer(api, "/api/v1/map", 404)
         frame = record["frame"]
         for which in ({}, {"frame": frame}, {"time_s": record["time_s"] + 0.01}):
             answer = self.check_answer(api, "/api/v1/direction", body={
