@@ -15,6 +15,7 @@
 #include "edge_app/commands/run.h"
 #include "edge_app/commands/run_report.h"
 #include "edge_app/commands/stop_signals.h"
+#include "edge_app/localization/scene_localization.h"
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/http_api.h"
 #include "edge_app/output/live_state.h"
@@ -23,6 +24,7 @@
 #include "edge_app/output/status_page.h"
 #include "edge_app/pipeline/pipeline.h"
 #include "edge_app/storage/calibration_store.h"
+#include "edge_app/storage/scene_map_file.h"
 #include "platform/system/clock.h"
 #include "platform/system/realtime.h"
 #include "platform/system/service_manager.h"
@@ -49,6 +51,30 @@ PipelineOptions pipeline_options(const Config& config, const NamedCalibration& c
   options.calibration_name = calibration.name;
   options.measure_latency = !is_recording(config);
   return options;
+}
+
+// Null where none is configured, or none that could be used: records need none, and go on without, in telemetry's base.
+std::unique_ptr<SceneLocalization> load_scene(const Config& config, const Camera<double>& camera) {
+  const SceneMapConfig& scene_map = config.scene_map;
+  if (scene_map.file.empty() || !config.realtime.landmarks) return nullptr;
+  SceneMap map;
+  std::string error;
+  if (!load_scene_map(scene_map.file, &map, &error)) {
+    spdlog::error("scene map: {}; runs without it", error);
+    return nullptr;
+  }
+  if (map.lens.width() != camera.width || map.lens.height() != camera.height) {
+    spdlog::error(
+        "scene map: {} is of pictures of {}x{} px, but the camera's have {}x{} px; a map serves "
+        "its own camera and size: build one of its pictures; runs without it",
+        scene_map.file, map.lens.width(), map.lens.height(), camera.width, camera.height);
+    return nullptr;
+  }
+  spdlog::info("scene map: {}, {} keyframes, {} landmarks", scene_map.file, map.keyframes.size(),
+               map.landmarks.size());
+  return std::make_unique<SceneLocalization>(
+      std::move(map), scene_map.file,
+      BaseJudgeOptions{scene_map.zero_sigma_rad, scene_map.correct_moved_base});
 }
 
 // Null where none is configured.
@@ -118,6 +144,10 @@ int run_live(const RunOptions& options) {
   const std::unique_ptr<LiveTargets> targets = make_live_targets(config, plane);
   ImageTap tap;
   if (config.output.http) of_pipeline.tap = &tap;
+  const auto scene = load_scene(config, calibration.calibration.camera);
+  std::optional<SceneTap> scene_tap;
+  if (scene)
+    of_pipeline.scene = &scene_tap.emplace(*scene, SceneTapOptions{config.scene_map.interval_s});
   Pipeline pipeline(*video, *pan_tilt, sinks, calibrating.calibration.get(), of_pipeline);
   HttpApiSources sources;
   sources.live = &live;
@@ -132,6 +162,7 @@ int run_live(const RunOptions& options) {
     sources.targets = &targets->feed();
     sources.target_lines = &targets->lines();
   }
+  if (scene) sources.scene = [&scene] { return scene->report(); };
   sources.version = ALIDADE_VERSION;
   sources.camera = video->name();
   sources.latency_measured = of_pipeline.measure_latency;

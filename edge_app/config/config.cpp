@@ -120,6 +120,18 @@ CalibrationConfig read_calibration(YamlSection section, const std::string& path)
   return calibration;
 }
 
+SceneMapConfig read_scene_map(YamlSection section, const std::string& path) {
+  SceneMapConfig scene_map;
+  if (const auto file = section.text("file")) scene_map.file = path_relative_to(path, *file);
+  scene_map.interval_s = section.number("interval_s", kSeconds).value_or(scene_map.interval_s);
+  scene_map.zero_sigma_rad =
+      section.number("zero_sigma_rad", {1e-7, 0.5, "rad"}).value_or(scene_map.zero_sigma_rad);
+  scene_map.correct_moved_base =
+      section.choice("on_moved_base", {"correct", "report"}).value_or("correct") == "correct";
+  section.finish();
+  return scene_map;
+}
+
 RealtimeConfig read_realtime(YamlSection section) {
   RealtimeConfig realtime;
   realtime.landmarks = section.choice("mode", {"OE", "PT"}, {}).value_or("OE") == "OE";
@@ -248,7 +260,8 @@ void check_ages(const Config& config, const YamlSection& pan_tilt, const YamlSec
 }
 
 // What goes with what, beyond single sections.
-void check_together(const Config& config, const YamlSection& calibration, const std::string& path,
+void check_together(const Config& config, const YamlSection& calibration,
+                    const YamlSection& scene_map, const std::string& path,
                     std::vector<std::string>* warnings) {
   if ((config.video.type == VideoConfig::Type::kRecording) !=
       (config.pan_tilt.type == PanTiltConfig::Type::kRecording)) {
@@ -263,6 +276,10 @@ void check_together(const Config& config, const YamlSection& calibration, const 
     warnings->push_back(calibration.where("prior") +
                         ": is not used, as nothing is calibrated: that takes live video, "
                         "realtime.mode OE and calibration.auto true");
+  }
+  if (!config.scene_map.file.empty() && !config.realtime.landmarks) {
+    warnings->push_back(scene_map.where("file") +
+                        ": is not used, as realtime.mode PT looks at no picture; set it to OE");
   }
   if (config.calibration.file.empty() && !config.camera.focal_length_px) {
     throw ConfigError(path +
@@ -284,6 +301,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   const YamlSection pan_tilt = top.section("pan_tilt");
   const YamlSection camera = top.section("camera");
   const YamlSection calibration = top.section("calibration");
+  const YamlSection scene_map = top.section("scene_map");
   const YamlSection realtime = top.section("realtime");
   const YamlSection tracking = top.section("tracking");
   const YamlSection output = top.section("output");
@@ -299,12 +317,13 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   if (top.has("pan_tilt")) config->pan_tilt = read_pan_tilt(pan_tilt, path);
   config->camera = read_camera(camera);
   config->calibration = read_calibration(calibration, path);
+  config->scene_map = read_scene_map(scene_map, path);
   config->realtime = read_realtime(realtime);
   config->tracking = read_tracking(tracking, top.has("tracking"), path);
   if (scope == ConfigScope::kAll) check_ages(*config, pan_tilt, realtime);
   config->output = read_output(output, path, &config->warnings);
   if (scope != ConfigScope::kAll) return;
-  check_together(*config, calibration, path, &config->warnings);
+  check_together(*config, calibration, scene_map, path, &config->warnings);
   check_targets(*config, output);
 }
 

@@ -65,6 +65,13 @@ struct CalibrationConfig {
   double zoom_tolerance = 0;  // device units within which a calibration holds
 };
 
+struct SceneMapConfig {
+  std::string file;                // a scene.map; empty: none
+  double interval_s = 10;          // from one localization to the next, while nothing calls for one
+  double zero_sigma_rad = 1e-3;    // of telemetry's zero from one start to the next
+  bool correct_moved_base = true;  // false: a movement is reported only
+};
+
 struct RealtimeConfig {
   bool landmarks = true;  // mode OE; false: PT, and nothing is calibrated
   int priority = 0;       // SCHED_FIFO priority, see priority_of(); 0 leaves the scheduler alone
@@ -84,6 +91,7 @@ struct Config {
   PanTiltConfig pan_tilt;
   CameraConfig camera;
   CalibrationConfig calibration;
+  SceneMapConfig scene_map;
   RealtimeConfig realtime;
   TrackingConfig tracking;
   OutputConfig output;

@@ -16,6 +16,7 @@
 #include "edge_app/output/plane_json.h"
 #include "edge_app/output/record_events.h"
 #include "edge_app/output/record_format.h"
+#include "edge_app/output/scene_json.h"
 #include "edge_app/output/service_metrics.h"
 #include "edge_app/output/targets_json.h"
 #include "platform/system/clock.h"
@@ -82,6 +83,13 @@ ServerResponse ground_plane(const HttpApiSources& sources) {
     return http_error(
         404, "no plane is configured: set tracking.plane to a plane.yaml of alidade plane fit");
   return json_response(plane_json(*sources.plane));
+}
+
+ServerResponse scene_map(const HttpApiSources& sources) {
+  if (!sources.scene)
+    return http_error(404,
+                      "no scene map is in use: set scene_map.file to one of alidade map build");
+  return json_response(scene_json(sources.scene(), monotonic_now_s()));
 }
 
 ServerResponse calibrate(const HttpApiSources& sources) {
@@ -366,6 +374,8 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
   server->post(
       "/api/v1/detections", HttpAccess::kToken, kMaxDetectionBytes,
       [sources](const ServerRequest& request) { return detections(sources, request.body); });
+  server->get("/api/v1/map", HttpAccess::kToken,
+              [sources](const ServerRequest&) { return scene_map(sources); });
   server->post("/api/v1/calibrate", HttpAccess::kToken, kMaxQueryBytes,
                [sources](const ServerRequest&) { return calibrate(sources); });
   server->post(

@@ -12,6 +12,7 @@
 #include "edge_app/output/live_state.h"
 #include "edge_app/output/target_lines.h"
 #include "edge_app/pipeline/pipeline.h"
+#include "edge_app/pipeline/scene_report.h"
 #include "edge_app/tracking/target_feed.h"
 #include "platform/video/frame_source.h"
 
@@ -29,6 +30,7 @@ struct HttpApiSources {
   // Both null where nothing is tracked. Borrowed as live is; where there are some, they wake the server, too.
   TargetFeed* targets = nullptr;
   TargetLines* target_lines = nullptr;
+  std::function<SceneReport()> scene;  // empty: no scene map is in use
   std::string version;
   std::string camera;            // the video source's name, without a password
   bool latency_measured = true;  // false for a recording

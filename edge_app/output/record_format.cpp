@@ -23,6 +23,8 @@ template <std::size_t kSize>
 using Columns = std::array<const char*, kSize>;
 constexpr Columns<4> kQ = {"q_x", "q_y", "q_z", "q_w"};
 constexpr Columns<2> kCentre = {"centre_offset_u_px", "centre_offset_v_px"};
+// "localized." in JSON, "localized_" in CSV.
+constexpr Columns<2> kLocalized = {"age_s", "sigma_rad"};
 constexpr Columns<3> kSigma = {"orientation_sigma_rad_0", "orientation_sigma_rad_1",
                                "orientation_sigma_rad_2"};
 constexpr Columns<9> kCovariance = {
@@ -82,6 +84,9 @@ void add_fields(const OrientationRecord& record, Line* line) {
   }
   line->add("zoom_rate_per_s", zoom_rate);
   line->add("zoom_rate_sigma_per_s", zoom_rate_sigma);
+  std::optional<std::array<double, 2>> localized;
+  if (record.localized) localized = {{record.localized->age_s, record.localized->sigma_rad}};
+  line->add_object("localized", kLocalized, localized);
 }
 
 // One line, in memory of its own; what has no value is said by the word that the kind of line has for that.
@@ -110,9 +115,12 @@ class Text {
 
  protected:
   // Replaces the comma behind the last field.
-  [[nodiscard]] std::string take(std::string_view end) {
+  void end(std::string_view by) {
     text_.pop_back();
-    put(end);
+    put(by);
+  }
+  [[nodiscard]] std::string take(std::string_view by) {
+    end(by);
     return std::move(text_);
   }
 
@@ -146,6 +154,18 @@ class JsonLine : public Text {
       before = ',';
     }
     put("],");
+  }
+  template <std::size_t kSize>
+  void add_object(std::string_view name, const Columns<kSize>& keys,
+                  const std::optional<std::array<double, kSize>>& values) {
+    put_name(name);
+    if (!values) {
+      put("null,");
+      return;
+    }
+    put('{');
+    for (std::size_t i = 0; i < kSize; ++i) add(keys[i], (*values)[i]);
+    end("},");
   }
   [[nodiscard]] std::string line() { return take("}\n"); }
 
@@ -195,6 +215,11 @@ class CsvLine : public Text {
       put(',');
     }
   }
+  template <std::size_t kSize>
+  void add_object(std::string_view name, const Columns<kSize>& keys,
+                  const std::optional<std::array<double, kSize>>& values) {
+    add(name, keys, values);
+  }
   [[nodiscard]] std::string line() { return take("\n"); }
 };
 
@@ -210,6 +235,14 @@ class CsvHeader : public Text {
   template <std::size_t kSize, class T>
   void add(std::string_view, const Columns<kSize>& columns, const T&) {
     for (const char* column : columns) add(column, nullptr);
+  }
+  template <std::size_t kSize, class T>
+  void add_object(std::string_view name, const Columns<kSize>& keys, const T&) {
+    for (const char* key : keys) {
+      put(name);
+      put('_');
+      add(key, nullptr);
+    }
   }
   [[nodiscard]] std::string line() { return take("\n"); }
 };

@@ -114,6 +114,32 @@ void add_record_metrics(const OrientationRecord& newest, MetricsText* out) {
   }
 }
 
+void add_scene_metrics(const SceneReport& report, double now_s, MetricsText* out) {
+  out->gauge("alidade_scene_map_landmarks", "Landmarks of the scene map in use");
+  out->add(report.landmarks);
+  out->counter("alidade_scene_map_pictures_total",
+               "Pictures that were looked for in the scene map, by what came of it");
+  out->add(report.found_by_hint, {{"result", "found_by_hint"}});
+  out->add(report.found - report.found_by_hint, {{"result", "found_in_all"}});
+  out->add(report.not_in_map, {{"result", "not_in_map"}});
+  out->add(report.ambiguous, {{"result", "ambiguous"}});
+  out->add(report.unusable, {{"result", "unusable"}});
+  out->counter("alidade_scene_map_movements_total",
+               "Movements of the base or of telemetry's zero that were found");
+  out->add(report.movements);
+  out->gauge("alidade_scene_map_uncorrected", "1: such a movement is reported only, and lasts");
+  out->add(std::int64_t{report.uncorrected});
+  if (report.last) {
+    out->gauge("alidade_scene_map_last_age_seconds", "Since the last picture was looked for");
+    out->add(now_s - report.last->finished_s);
+  }
+  if (!report.offset) return;
+  out->gauge("alidade_scene_map_telemetry_offset_radians",
+             "What telemetry's true angles lack in the map's base");
+  out->add(report.offset->zero.pan, {{"axis", "pan"}});
+  out->add(report.offset->zero.tilt, {{"axis", "tilt"}});
+}
+
 void add_link_metrics(const PipelineSummary& summary, MetricsText* out) {
   const std::array<std::pair<const char*, const LinkHealth*>, 2> links = {
       {{"video", &summary.video_link}, {"pan_tilt", &summary.pan_tilt_link}}};
@@ -219,6 +245,7 @@ std::string service_metrics(const HttpApiSources& sources, const HttpCounters& h
     add_zoom_metrics(*newest, zoom_curve_of(sources), &out);
   }
   if (sources.targets != nullptr) add_target_metrics(*sources.targets, &out);
+  if (sources.scene) add_scene_metrics(sources.scene(), now_s, &out);
   out.gauge("alidade_stream_clients", "Clients of the event stream");
   out.add(http.streams);
   out.counter("alidade_stream_lost_records_total", "Records that slow clients did not get");

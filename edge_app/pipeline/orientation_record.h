@@ -53,6 +53,13 @@ struct OrientationRecord {
   // How far the frame's middle row, looked up at time_s + clock offset, lies beyond the newest trusted angle of telemetry, s: what
   // max_extrapolation_s bounds. Negative: samples enclose it. None without a sample.
   std::optional<double> telemetry_age_s;
+  // The frame that tied the record to the scene map's base; none: the base is telemetry's.
+  struct Localized {
+    double age_s = 0;      // of that frame
+    double sigma_rad = 0;  // that the tie adds to a direction, root mean square of pan's and tilt's
+    PanTilt<double> telemetry_zero;  // rad, in the map's base: what telemetry's true angles lack
+  };
+  std::optional<Localized> localized;
   std::optional<double> latency_s;  // record made minus receive time; none in a replay
 };
 static_assert(std::is_trivially_copyable_v<OrientationRecord>);

@@ -221,6 +221,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   events->stamps_left_out = frame_time.stamp_rate_error;
   if (clock.restarted || clock.delay_stepped)
     minimum_delay_sigma_s_ = std::hypot(options_.minimum_delay_sigma_s, frame_time.moved_s);
+  answered_by_oe_ = false;
   image_ = image;
   tracks_.stamp = stamp;
   tracks_.stamp.receive_time_s -= frame_time.delay_shift_s;  // as if the delay had not stepped
@@ -341,8 +342,26 @@ bool OrientationStep::orient_between(const InterpolatedPanTilt& measured, double
   record->calibrated = true;
   record->camera = pack(between);
   record->mode = RecordMode::kPt;
+  if (oe_ && !oe_->put_into_base(&frame)) return false;
   record->orientation = orientation_of(frame);
+  note_tie(record);
   return true;
+}
+
+bool OrientationStep::ask_about_base() { return answered_by_oe_ && oe_->ask_about_base(); }
+
+void OrientationStep::settle_base(const ToldBase& told) {
+  if (oe_ && oe_->settle_base(unpack(told))) tied_time_s_ = told.time_s;
+}
+
+void OrientationStep::note_tie(OrientationRecord* record) const {
+  if (!oe_ || !oe_->tie().is_tied()) return;
+  const TiedOffset zero = oe_->telemetry_zero();
+  const Matrix2<double>& covariance =
+      oe_->tie().is_by_map() ? oe_->tie().of_map().covariance : zero.covariance;
+  record->localized = {*record->time_s - tied_time_s_,
+                       std::sqrt(covariance.trace() / 2),
+                       {zero.value.x(), zero.value.y()}};
 }
 
 void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageView& image,
@@ -350,12 +369,15 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
   FrameOrientation frame;
   if (finds_landmarks()) {
     const OeStatus status = oe_->process(image, *record->time_s, measured, lens, &frame);
+    answered_by_oe_ = true;
     // That the frame's time is not yet known well, sigma says too.
     if (measured != nullptr && status != OeStatus::kOk)
       record->status = status_of_landmarks(status);
-  } else if (measured != nullptr) {
+  } else if (measured != nullptr &&
+             pt_orientation(options_.calibration, *record->time_s, *measured, &frame) && oe_ &&
+             !oe_->put_into_base(&frame)) {
     // Where this fails the frame stays without orientation.
-    static_cast<void>(pt_orientation(options_.calibration, *record->time_s, *measured, &frame));
+    frame = FrameOrientation();
   }
   if (frame.mode == OrientationMode::kNone) {
     if (measured != nullptr) record->status = RecordStatus::kNotFinite;
@@ -367,6 +389,7 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
   if (focal_length() == FocalLength::kLearnt) record->camera = pack(frame.calibration);
   if (record->mode == RecordMode::kOe) record->residual_px = residual_rms(*oe_);
   record->orientation = orientation_of(frame);
+  note_tie(record);
 }
 
 void OrientationStep::maintain() {

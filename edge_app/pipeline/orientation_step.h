@@ -19,6 +19,7 @@
 // A lens that zooms does not come back exactly: with a zoom curve OE mode learns the focal length, too, and the record has it.
 // Where the zoom is another than the calibration's, or moves, its zoom curve gives OE mode, or PT mode, a lens (zoom_lookup.h): OE
 // mode's map stays, also when the calibration of another zoom of the same curve is adopted.
+// A scene map that knows where a frame looked may say so later: from then on records, PT's too, are in its base.
 // While there is no calibration for the camera, or none for the zoom that the pan/tilt source reports, points
 // are followed instead (start_up_tracker.h), for the calibration thread to make one of.
 // After a reconnection the stream's clock begins anew; telemetry from before it is forgotten. The least
@@ -42,6 +43,7 @@
 #include "edge_app/pipeline/orientation_record.h"
 #include "edge_app/pipeline/published_calibration.h"
 #include "edge_app/pipeline/repeated_images.h"
+#include "edge_app/pipeline/told_base.h"
 #include "edge_app/pipeline/zoom_lookup.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
@@ -120,6 +122,10 @@ class OrientationStep {
   void get_tracks(FrameTracks* tracks) const;
   // The same for people to look at.
   void get_landmarks(FrameLandmarks* landmarks) const;
+  // Somebody looks by the scene map where the frame last added looked. False: it has no answer that could be held against that.
+  bool ask_about_base();
+  // What came of it: from the next frame on records are in the map's base (base_tie.h), whatever is adopted.
+  void settle_base(const ToldBase& told);
   // Takes over another calibration with its map, between two frames.
   void adopt(const PublishedCalibration& published);
   // The record in place of frames while there is no connection to the video source.
@@ -143,6 +149,8 @@ class OrientationStep {
   }
   // The map is of use with what is published, and worth more than what comes with it.
   [[nodiscard]] bool keeps_map(const PublishedCalibration& published) const;
+  // The base of the record, where the scene map has told it.
+  void note_tie(OrientationRecord* record) const;
   [[nodiscard]] bool is_stalled_poll(const PanTiltSample& sample);
   // Frames that extrapolated telemetry answered, and that telemetry encloses by this sample.
   void settle_pending_frames();
@@ -180,6 +188,8 @@ class OrientationStep {
   double minimum_delay_sigma_s_ = 0;
   double lasting_sigma_s_ = 0;  // of a frame's time, what it has in common with those about it
   RepeatedImages repeated_images_;
+  bool answered_by_oe_ = false;      // the frame last added, in whatever mode
+  double tied_time_s_ = 0;           // of the frame that tied the base
   ImageView image_;                  // of the frame last added, until it is maintained
   FrameTracks tracks_;               // of the frame last added, but for its points
   bool telemetry_filtered_ = false;  // times in telemetry_ come from telemetry_clock_

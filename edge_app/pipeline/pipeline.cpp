@@ -41,7 +41,8 @@ Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink
       sink_(sink),
       calibration_(calibration),
       options_(options),
-      stage_(options.step, options.measure_latency, calibration != nullptr, options.tap),
+      stage_(options.step, options.measure_latency, calibration != nullptr, options.tap,
+             options.scene),
       images_(kImageSlots),
       way_processor_(processor_of_the_way(options)),
       finished_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
@@ -65,6 +66,10 @@ void Pipeline::start() {
     threads_.emplace_back(&Pipeline::calibrate, this);
     calibrating_ = threads_.back().native_handle();
   }
+  if (options_.scene != nullptr) {
+    threads_.emplace_back(&Pipeline::localize, this);
+    localizing_ = threads_.back().native_handle();
+  }
   if (options_.tap != nullptr) threads_.emplace_back(&ImageTap::run, options_.tap);
   threads_.emplace_back(&Pipeline::run_realtime, this);
   threads_.emplace_back(&Pipeline::read_telemetry, this);
@@ -81,6 +86,9 @@ void Pipeline::stop() {
     // It ends at its next look at that, which a thread that runs last may reach after minutes.
     if (!threads_.empty()) static_cast<void>(set_usual_priority(calibrating_));
   }
+  // Likewise: with the picture that it looks at.
+  if (options_.scene != nullptr && !threads_.empty())
+    static_cast<void>(set_usual_priority(localizing_));
   for (std::thread& thread : threads_) thread.join();
   threads_.clear();
 }
@@ -227,6 +235,12 @@ void Pipeline::feed_calibration() {
   }
   if (stage_.video_is_lost()) calibration_->video_lost();
   if (stage_.telemetry_is_lost()) calibration_->telemetry_lost();
+}
+
+void Pipeline::localize() {
+  const std::string warning = set_lowest_priority();
+  if (!warning.empty()) spdlog::warn("localization thread: {}", warning);
+  options_.scene->run([this] { stage_.wake(); });
 }
 
 void Pipeline::calibrate() {

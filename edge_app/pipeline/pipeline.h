@@ -7,6 +7,7 @@
 //   calibration thread  SelfCalibration, with the lowest priority: tracks and telemetry in, a calibration
 //                     with its map out, which the real-time thread takes over between two frames
 //   output thread     queue -> sink; logs what the real-time thread may not log; counts
+//   localization thread  SceneTap, with the lowest priority; only if there is a scene map
 //   tap thread        ImageTap: small images, for those who ask; only if there is a tap
 //
 // Where the real-time thread has a priority, all on a record's way have theirs below it, in this order: the link's own thread,
@@ -47,6 +48,7 @@ struct PipelineOptions {
   std::string calibration_name;
   bool measure_latency = true;  // false for a recording, whose stamps are of another clock
   ImageTap* tap = nullptr;      // borrowed like the sources; null: nobody asks for images
+  SceneTap* scene = nullptr;    // likewise; null: there is no scene map
 };
 
 struct PipelineSummary {
@@ -111,6 +113,7 @@ class Pipeline {
   [[nodiscard]] bool share_processor() const;
   void calibrate();
   void feed_calibration();
+  void localize();
   void write_output();
   void count(const OutputMessage& message);
   void log_events(const OutputMessage& message);
@@ -151,6 +154,7 @@ class Pipeline {
   double repeated_logged_at_s_ = -1e9;       // output thread
   std::vector<std::thread> threads_;
   pthread_t calibrating_{};  // one of them, if there is a calibration
+  pthread_t localizing_{};   // one of them, if there is a scene map
 };
 
 }  // namespace alidade

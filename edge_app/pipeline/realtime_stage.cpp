@@ -19,8 +19,12 @@ constexpr double kPatience_s = 0.1;
 }  // namespace
 
 RealtimeStage::RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed,
-                             ImageTap* tap)
-    : step_(options), measure_latency_(measure_latency), feed_wanted_(feed), tap_(tap) {
+                             ImageTap* tap, SceneTap* scene)
+    : step_(options),
+      measure_latency_(measure_latency),
+      feed_wanted_(feed),
+      tap_(tap),
+      scene_(scene) {
   // Those that the real-time thread fills.
   touch<OutputMessage>(&output_queue_);
   touch<FeedFrame>(&feed_frames_);
@@ -80,6 +84,11 @@ void RealtimeStage::adopt_published() {
   }
 }
 
+void RealtimeStage::take_told() {
+  if (scene_ == nullptr) return;
+  for (ToldBase told; scene_->pop(told);) step_.settle_base(told);
+}
+
 bool RealtimeStage::is_late(const VideoMessage& message, double now_s) const {
   return measure_latency_ && step_.looks_at_images() && message.image.valid() &&
          now_s - message.decoded_s > kPatience_s && video_queue_.read_available() > 0;
@@ -105,6 +114,7 @@ void RealtimeStage::process_frame(const VideoMessage& received) {
   step_.maintain();
   bool lent = false;
   if (feed_wanted_) feed(message, &lent);
+  if (scene_ != nullptr && !lent) localize(message, out.record, &lent);
   if (tap_ != nullptr && !lent) tap(message, &lent);
   if (message.slot != kNoImageSlot && !lent) returned_.push(message.slot);
 }
@@ -141,14 +151,28 @@ void RealtimeStage::tap(const VideoMessage& message, bool* lent) {
   *lent = tap_->push(tapped_frame_);
 }
 
+void RealtimeStage::localize(const VideoMessage& message, const OrientationRecord& record,
+                             bool* lent) {
+  const bool wanted = scene_->wants(monotonic_now_s(), record.mode, message.stamp.restarted);
+  const bool can_lend = message.image.valid() && message.slot != kNoImageSlot;
+  if (!wanted || !can_lend || !record.calibrated || !record.orientation) return;
+  if (!step_.ask_about_base()) return;
+  localizable_frame_.record = record;
+  localizable_frame_.image = message.image;
+  localizable_frame_.slot = message.slot;
+  *lent = scene_->push(localizable_frame_);
+}
+
 bool RealtimeStage::process() noexcept {
   const bool ended = input_ended_.load(std::memory_order_acquire);
   drain_telemetry();
   adopt_published();
+  take_told();
   VideoMessage message;
   while (video_queue_.pop(message)) {
     drain_telemetry();
     adopt_published();
+    take_told();
     pass_on_pulse();
     const bool is_frame = message.kind == VideoMessage::Kind::kFrame;
     video_lost_.store(!is_frame, std::memory_order_relaxed);
@@ -169,6 +193,7 @@ bool RealtimeStage::process() noexcept {
     output_.post();
     feed_.post();
     if (tap_ != nullptr) tap_->end();
+    if (scene_ != nullptr) scene_->end();
   }
   return !ended;
 }

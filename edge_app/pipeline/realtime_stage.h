@@ -6,9 +6,10 @@
 //   calibration thread --PublishedCalibration-->  |           | --FeedFrame,
 //                                                 |           |   PanTiltSample--> calibration thread
 //   ImageTap         --a wish---------------->  |           | --TappedFrame----> ImageTap
+//   SceneTap --ToldBase------------->  |           | --LocalizableFrame--> SceneTap
 //
 // Images stay where the decoder put them: a frame occupies a slot of the capture thread, and whoever had the
-// image last, this thread, the calibration thread or the tap, gives the slot back.
+// image last, this thread, the calibration thread, the localization thread or the tap, gives the slot back.
 // Each queue has one producer and one consumer, a fixed capacity and fixed-size messages. A full
 // queue drops the new message and counts it; nobody waits for anybody. In OE mode a live frame that has waited for
 // long while others wait behind it goes without its image: where the processor cannot keep up, some records are
@@ -23,6 +24,7 @@
 #include "edge_app/pipeline/image_slot.h"
 #include "edge_app/pipeline/image_tap.h"
 #include "edge_app/pipeline/orientation_step.h"
+#include "edge_app/pipeline/scene_tap.h"
 #include "edge_app/pipeline/semaphore.h"
 
 namespace alidade {
@@ -79,14 +81,15 @@ struct DropCounters {
 class RealtimeStage {
  public:
   // measure_latency: receive times are of this host's running clock (not of a recording).
-  // feed: there is a calibration thread. tap: borrowed; null: nobody asks for images.
+  // feed: there is a calibration thread. tap, scene: borrowed; null: nobody asks for images, there is no scene map.
   RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed,
-                ImageTap* tap = nullptr);
+                ImageTap* tap = nullptr, SceneTap* scene = nullptr);
 
   // Capture thread: a slot that nobody needs, one after the other.
   bool pop_returned(ImageSlot& slot) {
     return returned_.pop(slot) || returned_by_calibration_.pop(slot) ||
-           (tap_ != nullptr && tap_->pop_returned(slot));
+           (tap_ != nullptr && tap_->pop_returned(slot)) ||
+           (scene_ != nullptr && scene_->pop_returned(slot));
   }
   // Capture thread. False: the queue is full, the message and its slot are refused.
   bool push(const VideoMessage& message);
@@ -94,6 +97,8 @@ class RealtimeStage {
   // Telemetry thread.
   void push(const TelemetryMessage& message);
 
+  // Localization thread: there is something to do.
+  void wake() { input_.post(); }
   // Real-time thread: sleeps until there is something to do.
   void wait() { input_.wait(); }
   // Real-time thread: handles everything that waits. Telemetry goes first, as a frame's angle may
@@ -137,12 +142,14 @@ class RealtimeStage {
  private:
   void drain_telemetry();
   void adopt_published();
+  void take_told();
   [[nodiscard]] bool is_late(const VideoMessage& message, double now_s) const;
   void process_frame(const VideoMessage& received);
   void pass_on_pulse();
   void feed(const VideoMessage& message, bool* lent);
   void count_unheard(bool heard);
   void tap(const VideoMessage& message, bool* lent);
+  void localize(const VideoMessage& message, const OrientationRecord& record, bool* lent);
   void emit(const OutputMessage& message);
 
   static constexpr std::size_t kPublished = 4;
@@ -169,7 +176,8 @@ class RealtimeStage {
   bool unheard_frame_restart_ = false;
   bool unheard_delay_step_ = false;
   bool unheard_sample_restart_ = false;
-  TappedFrame tapped_frame_;  // likewise
+  TappedFrame tapped_frame_;            // likewise
+  LocalizableFrame localizable_frame_;  // likewise
   Semaphore feed_;
   Semaphore input_;
   Semaphore output_;
@@ -191,6 +199,7 @@ class RealtimeStage {
   bool measure_latency_;
   bool feed_wanted_;
   ImageTap* tap_;
+  SceneTap* scene_;
 };
 
 }  // namespace alidade

@@ -177,6 +177,8 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
           "2.5}\n"
           "realtime: {mode: PT, priority: 60, cpu: 3, lock_memory: true, max_extrapolation_s: "
           "0.5}\n"
+          "scene_map: {file: scene.map, interval_s: 3, zero_sigma_rad: 2e-4, on_moved_base: "
+          "report}\n"
           "tracking: {plane: ground/plane.yaml, space: plane, detection_sigma_px: 3,\n"
           "           false_alarms_per_frame: 0.5, detection_probability: 0.8, least_score: 0.25,\n"
           "           acceleration_density_m2_s3: 2, first_velocity_sigma_m_s: 5,\n"
@@ -208,6 +210,10 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.calibration.prior, directory_.path() + "/bench/lens.yaml");
   EXPECT_FALSE(config_.calibration.automatic);
   EXPECT_EQ(config_.calibration.zoom_tolerance, 2.5);
+  EXPECT_EQ(config_.scene_map.file, directory_.path() + "/scene.map");
+  EXPECT_EQ(config_.scene_map.interval_s, 3);
+  EXPECT_EQ(config_.scene_map.zero_sigma_rad, 2e-4);
+  EXPECT_FALSE(config_.scene_map.correct_moved_base);
   EXPECT_EQ(config_.tracking.plane, directory_.path() + "/ground/plane.yaml");
   ASSERT_TRUE(config_.tracking.targets);
   const TargetOptions& targets = *config_.tracking.targets;

@@ -38,7 +38,8 @@ LiveStateOptions few_lines() {
 class HttpApiTest : public ::testing::Test {
  protected:
   explicit HttpApiTest(std::shared_ptr<const PlaneEstimate> plane = nullptr,
-                       TargetFeed* feed = nullptr, TargetLines* lines = nullptr) {
+                       TargetFeed* feed = nullptr, TargetLines* lines = nullptr,
+                       std::function<SceneReport()> scene = {}) {
     HttpApiSources sources;
     sources.targets = feed;
     sources.target_lines = lines;
@@ -48,6 +49,7 @@ class HttpApiTest : public ::testing::Test {
     sources.ask_for_calibration = [this] { return asked_ = calibrating_; };
     sources.zoom_curve = [this] { return curve_; };
     sources.plane = std::move(plane);
+    sources.scene = std::move(scene);
     sources.version = "1.2.3";
     sources.camera = "a camera";
     add_api_routes(&server_, sources);
@@ -178,6 +180,56 @@ TEST_F(HttpApiWithPlaneTest, TellsThePlane) {
   EXPECT_TRUE(told["origin"].is_null());
   EXPECT_EQ(told["covariance"]["names"].size(), 6U);
   EXPECT_EQ(told["covariance"]["matrix"][5][5], 1e-4);
+}
+
+TEST_F(HttpApiTest, WithoutASceneMapSaysHowToHaveOne) {
+  const std::string answer = get("/api/v1/map");
+  EXPECT_THAT(answer, StartsWith("HTTP/1.1 404 "));
+  EXPECT_THAT(body_of(answer)["error"].get<std::string>(), HasSubstr("set scene_map.file"));
+  EXPECT_THAT(get("/metrics"), Not(HasSubstr("alidade_scene_map")));
+}
+
+class HttpApiWithSceneMapTest : public HttpApiTest {
+ protected:
+  HttpApiWithSceneMapTest() : HttpApiTest(nullptr, nullptr, nullptr, [this] { return report_; }) {}
+
+  SceneReport report_;
+};
+
+TEST_F(HttpApiWithSceneMapTest, TellsWhatLocalizationHasDone) {
+  report_.name = "scene.map";
+  report_.landmarks = 1234;
+  json told = body_of(get("/api/v1/map"));
+  EXPECT_EQ(told["file"], "scene.map");
+  EXPECT_FALSE(told["ready"].get<bool>());
+  EXPECT_TRUE(told["last"].is_null());
+  EXPECT_TRUE(told["offset"].is_null());
+  report_.ready = true;
+  report_.pictures = 5;
+  report_.found = 3;
+  report_.found_by_hint = 2;
+  report_.ambiguous = 2;
+  report_.last = SceneReport::Last{77, 1, 0.25, "ok", 60, true, {1e-4, 2e-4}};
+  report_.offset = BaseOffset{{5e-3, -1e-3}, 1e-8 * Matrix2<double>::Identity(), 2e-4};
+  report_.moved = report_.offset;
+  report_.movements = 1;
+  report_.uncorrected = true;
+  told = body_of(get("/api/v1/map"));
+  EXPECT_EQ(told["pictures"]["found"], 3);
+  EXPECT_EQ(told["pictures"]["ambiguous"], 2);
+  EXPECT_EQ(told["last"]["status"], "ok");
+  EXPECT_EQ(told["last"]["sigma_rad"][1], 2e-4);
+  EXPECT_GT(told["last"]["age_s"].get<double>(), 0);
+  EXPECT_EQ(told["offset"]["pan_rad"], 5e-3);
+  EXPECT_EQ(told["offset"]["sigma_rad"][0], 1e-4);
+  EXPECT_EQ(told["moved"]["roll_rad"], 2e-4);
+  EXPECT_TRUE(told["uncorrected"].get<bool>());
+  const std::string metrics = get("/metrics");
+  EXPECT_THAT(metrics,
+              HasSubstr("\nalidade_scene_map_telemetry_offset_radians{axis=\"pan\"} 0.005\n"));
+  EXPECT_THAT(metrics,
+              HasSubstr("\nalidade_scene_map_pictures_total{result=\"found_in_all\"} 1\n"));
+  EXPECT_THAT(metrics, HasSubstr("\nalidade_scene_map_movements_total 1\n"));
 }
 
 TEST_F(HttpApiTest, TellsTheZoomCurveWithTheCalibration) {

@@ -226,6 +226,7 @@ class Http(SystemTest):
         self.assertEqual(calibration["image"], {key: IMAGE[key] for key in ("width", "height")})
         self.check_answer(api, "/api/v1/calibrate", 409, b"")
         self.assertEqual(self.check_answer(api, "/api/v1/plane")["height"]["value"], 20)
+        self.check_answer(api, "/api/v1/map", 404)
         self.follow_somebody(api, place)
         frame = self.check_answer(api, "/api/v1/orientation")["frame"]
         targets = self.check_answer(api, "/api/v1/targets")

@@ -36,6 +36,7 @@ OeMode::OeMode(const OeOptions& options)
       prediction_(options.prediction),
       search_(options.search, map_.capacity()),
       offset_(options.offset),
+      tie_(options.tie),
       lens_(options.lens),
       shear_(options.shear),
       upkeep_(options.upkeep),
@@ -75,7 +76,8 @@ OeStatus OeMode::process(const ImageView& image, double frame_time_s,
     return finish(OeStatus::kNoPrediction);
   }
   if (telemetry != nullptr &&
-      !pt_orientation(answers_calibration(), frame_time_s, *telemetry, out)) {
+      (!pt_orientation(answers_calibration(), frame_time_s, *telemetry, out) ||
+       !tie_telemetry(out))) {
     return finish(OeStatus::kNotFinite);
   }
   if (!has_lens) return finish(OeStatus::kTooFew);
@@ -92,6 +94,7 @@ OeStatus OeMode::process(const ImageView& image, double frame_time_s,
   const double sigma_px = calibration_.camera.focal_length *
                           std::sqrt(predicted.angle_covariance.diagonal().maxCoeff());
   offset_.drift(prediction_.since_last_s(frame_time_s));
+  tie_.drift(prediction_.since_last_s(frame_time_s));
 
   // 2. Coarse alignment.
   const LandmarkSearch::Coarse coarse =
@@ -113,6 +116,7 @@ void OeMode::begin_frame(const ImageView& image, double frame_time_s,
   const MapOffset& offset = offset_.offset();
   statistics_.map_offset = {offset.value.x(), offset.value.y()};
   statistics_.map_offset_covariance = offset.covariance;
+  tie_.note_nothing();
   search_.clear();
   frame_.frame = frames_;
   frame_.time_s = frame_time_s;
@@ -257,12 +261,11 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
 
   const MapOffset& offset = offset_.offset();
   FrameMotion<double> in_base = motion;
-  const Vector2<double> total = offset.value + solved.offset_correction;
-  in_base.angle = {motion.angle.pan + total.x(), motion.angle.tilt + total.y()};
-  Matrix6 covariance = solved.covariance;
-  shear_.add_to(&covariance);
+  const TiedOffset added = offset_of_answer(solved);
+  in_base.angle = {motion.angle.pan + added.value.x(), motion.angle.tilt + added.value.y()};
+  const Matrix6 covariance = covariance_of_answer(solved);
   Sensitivity<6> sensitivity = solved.sensitivity;
-  sensitivity.topRows<2>() += offset.sensitivity + solved.offset_correction_sensitivity;
+  sensitivity.topRows<2>() += added.sensitivity;
   if (lens_is_learnt()) {
     if (lens_.columns() != nullptr) learn_own_lens(solution, motion.zoom_rate);
     answers_calibration_ =
@@ -276,6 +279,7 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
                                                             : OeStatus::kNoPrediction);
   }
   if (lens_.columns() != nullptr) out->zoom_rate_sigma = rate_sigma(solved);
+  note_landmarks_answer(solved, added);
   if (enclosed) {
     // What contradicts does not come this far: see solve_orientation().
     static_cast<void>(offset_.learn(
@@ -305,7 +309,7 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
 void OeMode::add_lens(const SolvedLens& lens, FrameMotion<double>* in_base,
                       Sensitivity<6>* sensitivity) const {
   Vector6 by_lens = lens.motion_by_lens;
-  by_lens.head<2>() += lens.offset_by_lens;
+  if (!tie_.is_by_map()) by_lens.head<2>() += lens.offset_by_lens;
   add(lens.value * by_lens, in_base);
   const ParameterDirection& direction = offset_.lens().direction;
   offset_.lens().make_independent(sensitivity);

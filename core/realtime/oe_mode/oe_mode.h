@@ -29,6 +29,8 @@
 // calibration has it (lens_scale.h); landmarks follow.
 // Such a lens may move, too: with what is known of it from frame to frame (FrameLens), frames solve log f and its rate besides
 // (lens_follower.h), and landmarks are looked for in the octaves in which they have about their size. The map stays; it begins with a lens at rest.
+// Who knows from outside where a frame looked (a scene map) may say so later: from then on answers, PT's too, are in that base
+// (base_tie.h), whatever becomes of map and calibration.
 // Fixed memory, taken by the constructor; nothing else allocates, waits or throws. One thread.
 
 #include <cstddef>
@@ -37,6 +39,7 @@
 #include "core/model/calibration.h"
 #include "core/realtime/frame_orientation.h"
 #include "core/realtime/image/image_view.h"
+#include "core/realtime/oe_mode/base_tie.h"
 #include "core/realtime/oe_mode/frame_lens.h"
 #include "core/realtime/oe_mode/landmark_map.h"
 #include "core/realtime/oe_mode/lens_follower.h"
@@ -131,6 +134,18 @@ class OeMode {
   // Telemetry's clock began anew: nobody can be asked for what was.
   void forget_pending();
 
+  // Somebody measures where the frame last processed looked; who asked before is forgotten. False: it has no answer.
+  bool ask_about_base() { return tie_.ask(); }
+  // What came of it. False: nothing that is better than what is known.
+  bool settle_base(const BaseMeasurement& measurement) {
+    return tie_.settle(measurement, offset_.offset());
+  }
+  [[nodiscard]] const BaseTie& tie() const { return tie_; }
+  // How telemetry's zero lies in the base; 0 as long as nothing is known from outside.
+  [[nodiscard]] TiedOffset telemetry_zero() const { return tie_.of_telemetry(offset_.offset()); }
+  // Puts telemetry's answer about any frame into the base. False: what comes out is not finite, and *out is as it was.
+  [[nodiscard]] bool put_into_base(FrameOrientation* out) const;
+
   // Of the frame last processed.
   [[nodiscard]] const OeStatistics& statistics() const { return statistics_; }
   // statistics().found of them, residuals and inliers by the solution; without one, by the prediction.
@@ -168,6 +183,12 @@ class OeMode {
                                     FrameOrientation* out);
   OeStatus answer_with_landmarks(const PredictedMotion& predicted, const Solution& solution,
                                  FrameOrientation* out);
+
+  // By what is known from outside too, for a frame that landmarks answer: what is added to the map's angles, and all the covariance.
+  [[nodiscard]] TiedOffset offset_of_answer(const SolvedMotion& solved) const;
+  [[nodiscard]] Matrix6 covariance_of_answer(const SolvedMotion& solved) const;
+  void note_landmarks_answer(const SolvedMotion& solved, const TiedOffset& added);
+  [[nodiscard]] bool tie_telemetry(FrameOrientation* out);
 
   [[nodiscard]] bool lens_is_learnt() const { return offset_.lens().learnt; }
   // Of answers: with the focal length as learnt so far.
@@ -212,6 +233,7 @@ class OeMode {
   MotionPrediction prediction_;
   LandmarkSearch search_;
   MapOffsetFilter offset_;
+  BaseTie tie_;
   LensFollower lens_;
   MapShear shear_;
   MapUpkeep upkeep_;

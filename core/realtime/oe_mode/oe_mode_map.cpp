@@ -84,6 +84,7 @@ void OeMode::clear_landmarks() {
 }
 
 void OeMode::forget_map() {
+  tie_.map_is_lost(offset_.offset());
   begin_lens();
   clear_landmarks();
   offset_.reset();
@@ -146,6 +147,7 @@ void OeMode::doubt_map() {
 // The map's frame is what telemetry says now.
 void OeMode::begin_map() {
   const MapOffset& before = offset_.offset();
+  tie_.map_is_lost(before);
   frame_.motion.angle = {frame_.motion.angle.pan + before.value.x(),
                          frame_.motion.angle.tilt + before.value.y()};
   frame_.sensitivity.topRows<2>() += before.sensitivity;
@@ -173,6 +175,7 @@ void OeMode::straighten_map() {
   if (!correction) return;
   correction->straighten(calibration_, frame_.motion, &map_);
   offset_.move_offset(-correction->angle);
+  tie_.move_map(-correction->angle);
   offset_.correct_pending([&](const Vector2<double>& angle) -> Vector2<double> {
     return correction->angle_error(correction->time_of(angle.y()));
   });

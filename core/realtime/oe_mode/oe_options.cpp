@@ -19,8 +19,8 @@ bool OeOptions::validate(const char** error) const {
   if (error != nullptr && problem != nullptr) *error = problem;
   return problem == nullptr && octaves.validate(error) && noise.validate(error) &&
          prediction.validate(error) && search.validate(error) && look.validate(error) &&
-         offset.validate(error) && lens.validate(error) && shear.validate(error) &&
-         upkeep.validate(error) && maker.validate(error);
+         offset.validate(error) && tie.validate(error) && lens.validate(error) &&
+         shear.validate(error) && upkeep.validate(error) && maker.validate(error);
 }
 
 }  // namespace alidade

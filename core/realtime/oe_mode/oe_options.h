@@ -2,6 +2,7 @@
 // OeOptions: everything that OE mode can be told, each estimator's in its own struct beside it.
 
 #include "core/realtime/image/image_noise.h"
+#include "core/realtime/oe_mode/base_tie.h"
 #include "core/realtime/oe_mode/landmark_maker.h"
 #include "core/realtime/oe_mode/landmark_search.h"
 #include "core/realtime/oe_mode/lens_follower.h"
@@ -41,6 +42,7 @@ struct OeOptions {
   LandmarkSearchOptions search;
   LookOptions look;
   MapOffsetOptions offset;
+  BaseTieOptions tie;
   LensFollowerOptions lens;
   MapShearOptions shear;
   MapUpkeepOptions upkeep;

@@ -169,6 +169,7 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
   OeMode oe(options);
   FrameOrientation frame;
   int in_oe = 0;
+  int ties = 0;
   int without = 0;
   constexpr int kFrames = 10000;
   // A map that is taken over, and one that shows something else and is given up again.
@@ -212,12 +213,17 @@ TEST(RealtimeAllocation, OeModeAllocatesNothing) {
         oe.settle_pending(look_up.time_s == telemetry.time_s ? &telemetry : nullptr);
       }
     }
+    // Now and then somebody knows where it looked.
+    if (k % 50 == 20 && oe.ask_about_base()) {
+      ties += oe.settle_base({{0, 0}, 1e-12 * Matrix2<double>::Identity(), k % 100 == 20}) ? 1 : 0;
+    }
     if (k == kFrames / 4) oe.reset(calibration, good);
     if (k == kFrames / 2) oe.reset(calibration);
     if (k == kFrames * 5 / 8) oe.reset(returned, good, FocalLength::kLearnt);
     if (k == kFrames * 3 / 4) oe.reset(calibration, bad);
   }
   EXPECT_EQ(guard.count(), 0);
+  EXPECT_GT(ties, 0);
   EXPECT_GT(in_oe, kFrames * 99 / 100);
   EXPECT_GE(without, 10);
   EXPECT_GT(oe.map().size(), 20);

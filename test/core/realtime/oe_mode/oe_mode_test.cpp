@@ -659,6 +659,83 @@ TEST_F(LateTelemetry, ForgetsAMapThatItContradictsForLong) {
   EXPECT_LT(lost, 60);
 }
 
+// A camera whose telemetry has another zero than the base that somebody outside knows: told of one frame, answers are in that base.
+class ToldBase : public OeModeOnFrames {
+ protected:
+  static constexpr double kZero = 5e-3;      // rad, 7.5 px
+  static constexpr double kMeasured = 1e-4;  // rad, 0.15 px
+
+  OeStatus process(int k) {
+    telemetry_ = camera_.telemetry(k);
+    telemetry_.angle.pan += kZero;
+    return oe_.process(camera_.image(k), VirtualCamera::time_s(k), &telemetry_, &frame_);
+  }
+
+  // Of frame k, just answered.
+  BaseMeasurement measure(int k) {
+    const PanTilt<double> truth = camera_.telemetry(k, {0, 0}).angle;
+    const PanTilt<double> answered =
+        angle_at_row(frame_.motion(), frame_.calibration.line_delay, kHeight / 2.0);
+    BaseMeasurement out;
+    out.change = {truth.pan - answered.pan + kMeasured * normal_(random_),
+                  truth.tilt - answered.tilt + kMeasured * normal_(random_)};
+    out.covariance = kMeasured * kMeasured * Matrix2<double>::Identity();
+    return out;
+  }
+
+  [[nodiscard]] double error_px(int k) const {
+    return camera_.error(k, frame_, {kWidth / 2.0, kHeight / 2.0}).norm();
+  }
+
+  std::mt19937_64 random_{3};
+  std::normal_distribution<double> normal_;
+};
+
+TEST_F(ToldBase, LandmarksHoldItFromTheNextFrameOnWhateverTelemetrySays) {
+  ASSERT_EQ(process(0), OeStatus::kTooFew);
+  oe_.maintain();
+  ASSERT_EQ(process(1), OeStatus::kOk);
+  EXPECT_GT(error_px(1), 5);
+  const BaseMeasurement measurement = measure(1);
+  ASSERT_TRUE(oe_.ask_about_base());
+  oe_.maintain();
+  // The answer takes a while.
+  for (int k = 2; k < 5; ++k) {
+    ASSERT_EQ(process(k), OeStatus::kOk);
+    oe_.maintain();
+  }
+  ASSERT_TRUE(oe_.settle_base(measurement));
+  ASSERT_TRUE(oe_.tie().is_tied());
+  for (int k = 5; k < 100; ++k) {
+    ASSERT_EQ(process(k), OeStatus::kOk) << k;
+    expect_honest(camera_, k, frame_);
+    // Three standard deviations of the measurement, and what landmarks leave.
+    EXPECT_LT(error_px(k), 3 * kMeasured / kPixel + 0.2) << k;
+    EXPECT_LT(std::sqrt(frame_.motion_covariance(0, 0)), 2 * kMeasured);
+    oe_.maintain();
+  }
+  EXPECT_NEAR(oe_.telemetry_zero().value.x(), -kZero,
+              5 * std::sqrt(oe_.telemetry_zero().covariance(0, 0)));
+}
+
+TEST_F(ToldBase, TelemetrysAnswersAndTheNextMapHaveItToo) {
+  ASSERT_EQ(process(0), OeStatus::kTooFew);
+  const BaseMeasurement measurement = measure(0);
+  ASSERT_TRUE(oe_.ask_about_base());
+  oe_.maintain();
+  ASSERT_TRUE(oe_.settle_base(measurement));
+  for (int k = 1; k < 20; ++k) {
+    ASSERT_EQ(process(k), OeStatus::kOk) << k;
+    expect_honest(camera_, k, frame_);
+    oe_.maintain();
+  }
+  oe_.reset(camera_.calibration());
+  ASSERT_EQ(process(20), OeStatus::kTooFew);
+  EXPECT_EQ(frame_.mode, OrientationMode::kPt);
+  expect_honest(camera_, 20, frame_);
+  EXPECT_LT(error_px(20), 5);
+}
+
 // One OeMode's map in the hands of another.
 class HandedOverMap : public OeModeOnFrames {
  protected:

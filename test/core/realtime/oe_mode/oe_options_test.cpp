@@ -60,6 +60,7 @@ TEST(OeOptions, NameWhatIsNotValid) {
       [](OeOptions* o) { o->lens.track.drift = -1; },
       [](OeOptions* o) { o->lens.track.longest_s = 0; },
       [&](OeOptions* o) { o->lens.track.least_sigma = kNaN; },
+      [](OeOptions* o) { o->tie.drift = -1; },
       [](OeOptions* o) { o->shear.longest_s = 0; },
       [](OeOptions* o) { o->shear.of_surprise = 0; },
       [](OeOptions* o) { o->shear.max_surprise = 0; },

@@ -1,0 +1,54 @@
+// The base that OeMode answers in: telemetry's, or one that was told from outside.
+
+#include "core/realtime/oe_mode/oe_mode.h"
+
+namespace alidade {
+
+TiedOffset OeMode::offset_of_answer(const SolvedMotion& solved) const {
+  if (tie_.is_by_map()) return tie_.of_map();
+  const MapOffset& offset = offset_.offset();
+  const TiedOffset zero = tie_.of_telemetry(offset);
+  return {offset.value + solved.offset_correction + zero.value, zero.covariance,
+          offset.sensitivity + solved.offset_correction_sensitivity + zero.sensitivity};
+}
+
+// Where the map itself is tied, what telemetry does not know of its offset is of no matter.
+Matrix6 OeMode::covariance_of_answer(const SolvedMotion& solved) const {
+  const bool by_map = tie_.is_by_map();
+  Matrix6 covariance = by_map ? solved.frame_covariance : solved.covariance;
+  covariance.topLeftCorner<2, 2>() += offset_of_answer(solved).covariance;
+  if (by_map) covariance.topLeftCorner<2, 2>() += solved.shared_covariance;
+  shear_.add_to(&covariance);
+  return covariance;
+}
+
+void OeMode::note_landmarks_answer(const SolvedMotion& solved, const TiedOffset& added) {
+  Vector2<double> value = added.value;
+  if (lens_is_learnt() && !tie_.is_by_map())
+    value += solved.lens.value * solved.lens.offset_by_lens;
+  tie_.note_landmarks(value,
+                      solved.frame_covariance.topLeftCorner<2, 2>() + solved.shared_covariance +
+                          shear_.angle_covariance(),
+                      solved.sensitivity.topRows<2>());
+}
+
+bool OeMode::tie_telemetry(FrameOrientation* out) {
+  tie_.note_telemetry(telemetry_zero().value, out->motion_covariance.topLeftCorner<2, 2>(),
+                      out->motion_sensitivity.topRows<2>());
+  return put_into_base(out);
+}
+
+bool OeMode::put_into_base(FrameOrientation* out) const {
+  if (!tie_.is_tied()) return true;
+  const TiedOffset zero = telemetry_zero();
+  FrameMotion<double> motion = out->motion();
+  motion.angle = {motion.angle.pan + zero.value.x(), motion.angle.tilt + zero.value.y()};
+  MotionCovariance covariance = out->motion_covariance;
+  covariance.topLeftCorner<2, 2>() += zero.covariance;
+  Sensitivity<6> sensitivity = out->motion_sensitivity;
+  sensitivity.topRows<2>() += zero.sensitivity;
+  return make_frame_orientation(out->calibration, out->time_s, out->mode, out->landmarks, motion,
+                                covariance, sensitivity, out);
+}
+
+}  // namespace alidade

@@ -1,0 +1,68 @@
+#include "edge_app/localization/base_judge.h"
+
+#include "core/realtime/oe_mode/covariance.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kBelieved = 25;  // chi-square, 2 degrees of freedom: one in 3e5 is larger
+
+// Of (pan, tilt), from that of xi.
+Matrix2<double> angle_covariance(const Matrix<double, 3, 2>& J_xi_angle,
+                                 const Matrix3<double>& covariance) {
+  const Matrix2<double> normal = J_xi_angle.transpose() * J_xi_angle;
+  const Matrix<double, 2, 3> to_angle = inverse_of(normal) * J_xi_angle.transpose();
+  const Matrix2<double> out = to_angle * covariance * to_angle.transpose();
+  return symmetric(out);
+}
+
+bool is_beyond(const Vector2<double>& change, const Matrix2<double>& covariance) {
+  return !(change.dot(inverse_of(covariance) * change) < kBelieved);
+}
+
+}  // namespace
+
+BaseJudge::Verdict BaseJudge::judge(const OrientationRecord& record, const Localization& found,
+                                    double reference_row, ToldBase* told, BaseOffset* offset) {
+  const FrameOrientation frame = unpack(record.orientation->geometry, record.camera);
+  const Mechanics<double>& mechanics = frame.calibration.mechanics;
+  const Matrix3<double>& R_localized = found.pose.R_base_from_camera;
+  const PanTilt<double> localized = nearest_angles_of(mechanics, R_localized);
+  const PanTilt<double> answered =
+      angle_at_row(frame.motion(), frame.calibration.line_delay, reference_row);
+  const Vector2<double> change = minus(localized, answered);
+
+  Matrix<double, 3, 2> J_xi_angle;
+  const Matrix3<double> R_by_angles = R_base_from_camera(mechanics, localized, &J_xi_angle);
+  const Matrix2<double> of_map =
+      angle_covariance(J_xi_angle, found.pose.covariance.topLeftCorner<3, 3>());
+  const Matrix2<double> of_record = angle_covariance(
+      J_xi_angle, Eigen::Map<const Matrix3<double>>(record.orientation->covariance_rad2.data()));
+  Matrix2<double> expected = of_map + of_record;
+  offset->covariance = expected;
+  if (!record.localized) {
+    expected.diagonal().array() += options_.zero_sigma * options_.zero_sigma;
+  }
+  const PanTilt<double> before =
+      record.localized ? record.localized->telemetry_zero : PanTilt<double>{};
+  offset->zero = {before.pan + change.x(), before.tilt + change.y()};
+  offset->roll = log_so3<double>(R_by_angles.transpose() * R_localized).z();
+  told->change_rad = {change.x(), change.y()};
+  told->covariance = {of_map(0, 0), of_map(0, 1), of_map(1, 1)};
+  told->moved = false;
+
+  if (!is_beyond(change, expected)) {
+    suspected_.reset();
+    return Verdict::kExpected;
+  }
+  const bool confirmed = suspected_ && !is_beyond(minus(offset->zero, suspected_->zero),
+                                                  offset->covariance + suspected_->covariance);
+  suspected_ = *offset;
+  if (!confirmed) return Verdict::kSuspected;
+  if (!options_.correct) return Verdict::kReported;
+  suspected_.reset();
+  told->moved = true;
+  return Verdict::kMoved;
+}
+
+}  // namespace alidade

@@ -1,0 +1,172 @@
+#include "edge_app/localization/scene_localization.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/mapping/features.h"
+#include "platform/system/clock.h"
+
+namespace alidade {
+namespace {
+
+// What is not known of a frame's lens beside its record's own sigma: of log f.
+constexpr double kFocalLengthSigma = 5e-3;
+constexpr double kMilli = 1e3;
+
+LocalizationHint hint_of(const OrientationRecord& record, double zero_sigma, double reference_row) {
+  const FrameOrientation frame = unpack(record.orientation->geometry, record.camera);
+  const Calibration& calibration = frame.calibration;
+  const PanTilt<double> angle = angle_at_row(frame.motion(), calibration.line_delay, reference_row);
+  LocalizationHint hint;
+  hint.R_base_from_camera = R_base_from_camera(calibration.mechanics, angle);
+  const auto& sigma = record.orientation->sigma_rad;
+  hint.R_sigma = std::hypot(*std::max_element(sigma.begin(), sigma.end()),
+                            record.localized ? 0.0 : zero_sigma);
+  hint.focal_length =
+      FocalLengthPrior{std::log(calibration.camera.focal_length),
+                       std::hypot(kFocalLengthSigma, relative_focal_length_sigma(calibration))};
+  hint.angular_velocity = angular_velocity(calibration.mechanics, angle, frame.rate);
+  hint.zoom_rate = frame.zoom_rate;
+  return hint;
+}
+
+std::string describe(const BaseOffset& offset) {
+  return fmt::format(
+      "pan {:+.2f} mrad, tilt {:+.2f} mrad (sigma {:.2f}, {:.2f}), roll {:+.2f} mrad",
+      kMilli * offset.zero.pan, kMilli * offset.zero.tilt,
+      kMilli * std::sqrt(offset.covariance(0, 0)), kMilli * std::sqrt(offset.covariance(1, 1)),
+      kMilli * offset.roll);
+}
+
+}  // namespace
+
+class SceneLocalization::Searcher {
+ public:
+  explicit Searcher(const SceneMap& map)
+      : localizer_(map),
+        quick_(localization_features(true)),
+        thorough_(localization_features(false)) {}
+
+  [[nodiscard]] Localization find(const ImageView& image, const LocalizationHint& hint) const {
+    const Localization found = localizer_.find(features(quick_, image), hint);
+    return found.status == LocalizationStatus::kOk
+               ? found
+               : localizer_.find(features(thorough_, image), hint);
+  }
+
+ private:
+  static FeatureSet features(const FeatureDetector& detector, const ImageView& image) {
+    return detector.find(image.luma, image.width, image.height, image.stride);
+  }
+
+  Localizer localizer_;
+  FeatureDetector quick_;
+  FeatureDetector thorough_;
+};
+
+SceneLocalization::SceneLocalization(SceneMap map, const std::string& name,
+                                     const BaseJudgeOptions& options)
+    : zero_sigma_(options.zero_sigma),
+      map_(std::move(map)),
+      reference_row_(map_.reference_row),
+      judge_(options) {
+  report_.name = name;
+  report_.keyframes = static_cast<std::int64_t>(map_.keyframes.size());
+  report_.landmarks = static_cast<std::int64_t>(map_.landmarks.size());
+}
+
+SceneLocalization::~SceneLocalization() = default;
+
+void SceneLocalization::prepare() {
+  searcher_ = std::make_unique<const Searcher>(map_);
+  map_ = SceneMap();
+  const std::lock_guard<std::mutex> lock(mutex_);
+  report_.ready = true;
+}
+
+SceneLocator::Outcome SceneLocalization::look(const LocalizableFrame& frame, ToldBase* told) {
+  const double began_s = monotonic_now_s();
+  const Localization found =
+      searcher_->find(frame.image, hint_of(frame.record, zero_sigma_, reference_row_));
+  count(told->frame, found, monotonic_now_s() - began_s);
+  return found.status == LocalizationStatus::kOk ? judge(frame, found, told) : Outcome::kNotFound;
+}
+
+SceneLocator::Outcome SceneLocalization::judge(const LocalizableFrame& frame,
+                                               const Localization& found, ToldBase* told) {
+  BaseOffset offset;
+  const BaseJudge::Verdict verdict =
+      judge_.judge(frame.record, found, reference_row_, told, &offset);
+  const std::lock_guard<std::mutex> lock(mutex_);
+  const bool is_first = !report_.offset;
+  report_.offset = offset;
+  report_.last->sigma_rad = {std::sqrt(told->covariance[0]), std::sqrt(told->covariance[2])};
+  switch (verdict) {
+    case BaseJudge::Verdict::kExpected:
+      report_.uncorrected = false;
+      if (is_first) {
+        spdlog::info("scene map: frame {} is localized; telemetry's angles lack {}", told->frame,
+                     describe(offset));
+      }
+      return Outcome::kTold;
+    case BaseJudge::Verdict::kSuspected:
+      return Outcome::kOnceMore;
+    case BaseJudge::Verdict::kMoved:
+      say_moved(told->frame, offset, true);
+      return Outcome::kTold;
+    case BaseJudge::Verdict::kReported:
+      say_moved(told->frame, offset, false);
+      return Outcome::kNotTold;
+  }
+  return Outcome::kNotTold;
+}
+
+void SceneLocalization::say_moved(std::int64_t frame, const BaseOffset& offset, bool is_corrected) {
+  const bool is_said =
+      report_.uncorrected && minus(offset.zero, report_.moved->zero).norm() < zero_sigma_;
+  report_.uncorrected = !is_corrected;
+  if (is_said) return;
+  ++report_.movements;
+  report_.moved = offset;
+  spdlog::warn(
+      "scene map: telemetry's zero or the base has moved, as frame {} shows: telemetry's angles "
+      "lack "
+      "{}{}",
+      frame, describe(offset),
+      is_corrected ? "; corrected: directions are the map's"
+                   : "; not corrected, as scene_map.on_moved_base says: set it to correct, or put "
+                     "the base or the zero back");
+}
+
+void SceneLocalization::count(std::int64_t frame, const Localization& found, double took_s) {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  ++report_.pictures;
+  switch (found.status) {
+    case LocalizationStatus::kOk:
+      ++report_.found;
+      if (found.by_hint) ++report_.found_by_hint;
+      break;
+    case LocalizationStatus::kNotInMap:
+      ++report_.not_in_map;
+      break;
+    case LocalizationStatus::kAmbiguous:
+      ++report_.ambiguous;
+      break;
+    case LocalizationStatus::kNoUsablePicture:
+      ++report_.unusable;
+      break;
+  }
+  report_.last = SceneReport::Last{
+      frame, monotonic_now_s(), took_s, to_string(found.status), found.matches, found.by_hint, {}};
+}
+
+SceneReport SceneLocalization::report() const {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  return report_;
+}
+
+}  // namespace alidade

@@ -1,0 +1,47 @@
+#pragma once
+// SceneLocalization: where a live picture looks by the scene map, and what that means for telemetry's base. A picture is looked for where its
+// record says, with its focal length, else in all of the map (core/mapping/localization.h); what is refused there changes nothing.
+// A movement of base or zero is logged, once. One thread, but for report().
+
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <string>
+
+#include "core/mapping/scene_map.h"
+#include "edge_app/localization/base_judge.h"
+#include "edge_app/pipeline/scene_report.h"
+#include "edge_app/pipeline/scene_tap.h"
+
+namespace alidade {
+
+class SceneLocalization : public SceneLocator {
+ public:
+  // name: of the map, for people.
+  SceneLocalization(SceneMap map, const std::string& name, const BaseJudgeOptions& options);
+  ~SceneLocalization() override;
+
+  void prepare() override;  // makes the index of the map, which is then gone
+  [[nodiscard]] Outcome look(const LocalizableFrame& frame, ToldBase* told) override;
+
+  // Any thread but the real-time one.
+  [[nodiscard]] SceneReport report() const;
+
+ private:
+  class Searcher;
+  [[nodiscard]] Outcome judge(const LocalizableFrame& frame, const Localization& found,
+                              ToldBase* told);
+  void count(std::int64_t frame, const Localization& found, double took_s);
+  void say_moved(std::int64_t frame, const BaseOffset& offset, bool is_corrected);
+
+  const double zero_sigma_;
+  SceneMap map_;
+  const double reference_row_;
+  std::unique_ptr<const Searcher> searcher_;
+  BaseJudge judge_;
+
+  mutable std::mutex mutex_;  // of what follows
+  SceneReport report_;
+};
+
+}  // namespace alidade

@@ -1,0 +1,110 @@
+#!/usr/bin/env python3
+"""`alidade run` with a scene map: a telemetry zero that has moved since the map was made is found, said and corrected."""
+import json
+import signal
+import subprocess
+import unittest
+import urllib.request
+
+from harness import ALIDADE, SIMULATE, SystemTest, Truth, rms, wait_until
+
+ZERO_RAD = 5e-3  # what telemetry's pan lacks
+MRAD_DEG = 0.0572957795
+# A pixel is 1.25 mrad.
+CAMERA = {
+    "camera": {"focal_length_px": 800, "line_delay_us": 20, "clock_offset_ms": 0},
+    "scene": {"procedural": [{"width_deg": 360, "height_deg": 180, "projection": "equirectangular"}]},
+    "telemetry": {"sigma_rad": 2e-4, "rate_hz": 20},
+}
+
+
+class MovedZero(SystemTest):
+    def build_map(self):
+        film = self.folder / "film.yaml"
+        film.write_text(json.dumps({
+            "seed": 1, "duration_s": 24, "image": {"width": 640, "height": 360, "rate_hz": 1},
+            "path": {"type": "triple_cosine", "amplitude": 0.35, "period_s": 24}, "recording": {"images": "png"},
+            **CAMERA}))
+        subprocess.run([SIMULATE, "-c", film, "-o", self.folder / "film"], check=True, capture_output=True, timeout=300)
+        scene_map = self.folder / "scene.map"
+        built = subprocess.run([ALIDADE, "map", "build", self.folder / "film", "-o", scene_map, "--calibration",
+                                self.folder / "film" / "truth.yaml"], capture_output=True, text=True, timeout=300)
+        self.assertEqual(built.returncode, 0, built.stderr)
+        return scene_map
+
+    def run_with(self, camera, scene_map, records_after, **scene):
+        """Records until so many were tied to the map, and what /api/v1/map says then."""
+        config = self.write_config(
+            camera, pan_tilt={"pan_zero_deg": 5 * MRAD_DEG, "angle_sigma_rad": 2e-4, "rate_hz": 20},
+            realtime={"mode": "OE"}, scene_map={"file": str(scene_map), "zero_sigma_rad": 3e-4, **scene},
+            output={"json": True, "http": "127.0.0.1:0"})
+        run = self.alidade("run", "-c", config)
+        records, tied = [], 0
+        said = lambda: "has moved" in run.error_text()
+        while tied < records_after or not said():
+            line = run.line()
+            self.assertIsNotNone(line, run.error_text())
+            records.append(json.loads(line))
+            tied += records[-1]["localized"] is not None or records_after == 0
+        address = run.error_text().partition("HTTP: listening on ")[2].split()[0]
+        with urllib.request.urlopen(address + "api/v1/map", timeout=30) as answer:
+            state = json.load(answer)
+        code, _ = run.end(signal.SIGINT)
+        self.assertEqual(code, 0, run.error_text())
+        return run, records, state
+
+    def pan_errors(self, camera, records):
+        truth = Truth(camera.truth)
+        errors = []
+        for record in records:
+            angles = truth.angles(record["time_s"]) if record["pan_rad"] is not None else None
+            if angles is not None:
+                errors.append(record["pan_rad"] - angles[0])
+        self.assertGreater(len(errors), len(records) // 2)
+        return errors
+
+    def test_is_found_and_said_and_corrected_as_configured(self):
+        scene_map = self.build_map()
+        camera = self.camera(settings={
+            "image": {"width": 640, "height": 360, "rate_hz": 5},
+            "path": {"type": "triple_cosine", "amplitude": 0.05, "period_s": 6}, **CAMERA})
+        run, records, state = self.run_with(camera, scene_map, 24)
+        reported, untied, of_report = self.run_with(camera, scene_map, 0, on_moved_base="report")
+        camera.end(signal.SIGTERM)
+
+        self.assertIn("corrected: directions are the map's", run.error_text())
+        self.assertEqual(state["movements"], 1)
+        self.assertFalse(state["uncorrected"])
+        self.assertGreaterEqual(state["pictures"]["found"], 2)
+        # Two thirds of a pixel: the map's own base rests on telemetry that errs by 0.2 mrad.
+        self.assertAlmostEqual(state["moved"]["pan_rad"], ZERO_RAD, delta=0.8e-3)
+        self.assertAlmostEqual(state["moved"]["tilt_rad"], 0, delta=0.8e-3)
+        before = [r for r in records if r["localized"] is None and r["mode"] != "none"]
+        after = [r for r in records if r["localized"] is not None]
+        # By arrival pictures are some milliseconds late: the camera turns slowly.
+        self.assertAlmostEqual(rms(self.pan_errors(camera, before)), ZERO_RAD, delta=0.8e-3)
+        self.assertLess(rms(self.pan_errors(camera, after)), 0.8e-3)
+        self.assertLess(after[-1]["localized"]["sigma_rad"], 1e-3)
+
+        self.assertIn("not corrected", reported.error_text())
+        self.assertTrue(of_report["uncorrected"])
+        self.assertAlmostEqual(of_report["offset"]["pan_rad"], ZERO_RAD, delta=0.8e-3)
+        self.assertFalse([r for r in untied if r["localized"] is not None])
+
+    def test_what_cannot_be_used_is_said_and_records_come_without_it(self):
+        camera = self.camera()
+        broken = self.folder / "broken.map"
+        broken.write_text("this is no map")
+        for file, words in ((broken, "broken.map"), (self.folder / "none.map", "none.map")):
+            config = self.write_config(camera, realtime={"mode": "OE"}, scene_map={"file": str(file)})
+            run = self.alidade("run", "-c", config)
+            wait_until(lambda: "runs without it" in run.error_text(), "the error")
+            self.assertIn(words, run.error_text())
+            while json.loads(run.line())["mode"] == "none":
+                pass
+            code, _ = run.end(signal.SIGINT)
+            self.assertEqual(code, 0, run.error_text())
+
+
+if __name__ == "__main__":
+    unittest.main()
