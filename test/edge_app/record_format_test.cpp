@@ -111,7 +111,7 @@ TEST(RecordFormat, LeavesCsvCellsEmptyForWhatARecordLacks) {
   EXPECT_EQ(
       line,
       ",,3.5,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,,,,,,,,,,0.0,0,,0.0,1000.0,"
-      "0.0,1.0,0.0,0.0,0.0,,,,\n");
+      "0.0,1.0,0.0,0.0,0.0,,,,,,\n");
   const std::string header = csv_header();
   EXPECT_EQ(std::count(line.begin(), line.end(), ','),
             std::count(header.begin(), header.end(), ','));
@@ -133,7 +133,7 @@ TEST(RecordFormat, WhatIsNotFiniteHasNoValue) {
   EXPECT_TRUE(nlohmann::json::parse(json_line(record))["receive_time_s"].is_null());
   EXPECT_EQ(csv_line(record),
             ",,,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,,,,,,,,,,0.0,0,,0.0,1000.0,"
-            "0.0,1.0,0.0,0.0,0.0,,,,\n");
+            "0.0,1.0,0.0,0.0,0.0,,,,,,\n");
 }
 
 TEST(RecordFormat, EveryFieldIsInTheDescriptionOfTheApi) {
