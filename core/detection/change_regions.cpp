@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "core/model/forest.h"
+
 namespace alidade {
 namespace {
 
@@ -54,6 +56,7 @@ ChangeRegions::ChangeRegions(int width, int height, const ChangeOptions& options
   columns_.resize(w);
   sums_.resize(w);
   runs_.reserve(kMostRuns);
+  parent_.reserve(kMostRuns);
   region_of_run_.resize(kMostRuns);
   regions_.reserve(kMostRegions);
   boxes_.reserve(kMostRegions);
@@ -84,24 +87,16 @@ bool ChangeRegions::find_runs(int v) {
   for (int u = kHalf; u + kHalf < width_; ++u) {
     if (!beyond(u)) continue;
     if (runs_.size() == kMostRuns) return false;
-    Run run{v, u, u, static_cast<int>(runs_.size()), 0};
+    Run run{v, u, u, 0};
     for (; run.to + kHalf < width_ && beyond(run.to); ++run.to) {
       run.most =
           std::max(run.most, std::abs(static_cast<int>(sums_[static_cast<std::size_t>(run.to)])));
     }
+    parent_.push_back(static_cast<int>(runs_.size()));
     runs_.push_back(run);
     u = run.to;
   }
   return true;
-}
-
-int ChangeRegions::root(int run) {
-  while (runs_[static_cast<std::size_t>(run)].parent != run) {
-    Run& here = runs_[static_cast<std::size_t>(run)];
-    here.parent = runs_[static_cast<std::size_t>(here.parent)].parent;
-    run = here.parent;
-  }
-  return run;
 }
 
 // Those of one row with those of the row before it that they touch, corners included.
@@ -110,8 +105,9 @@ void ChangeRegions::join(std::size_t above, std::size_t above_end, std::size_t h
     const Run& a = runs_[above];
     const Run& b = runs_[here];
     if (a.from <= b.to && b.from <= a.to) {
-      const int roots[] = {root(static_cast<int>(above)), root(static_cast<int>(here))};
-      runs_[static_cast<std::size_t>(std::max(roots[0], roots[1]))].parent =
+      const int roots[] = {internal::root_of(static_cast<int>(above), &parent_),
+                           internal::root_of(static_cast<int>(here), &parent_)};
+      parent_[static_cast<std::size_t>(std::max(roots[0], roots[1]))] =
           std::min(roots[0], roots[1]);
     }
     (a.to < b.to ? above : here) += 1;
@@ -125,7 +121,7 @@ bool ChangeRegions::make_regions() {
     for (int u = run.from; u < run.to; ++u) act(u, std::abs(static_cast<int>(z[u])));
   };
   for (std::size_t i = 0; i < runs_.size(); ++i) {
-    const int top = root(static_cast<int>(i));
+    const int top = internal::root_of(static_cast<int>(i), &parent_);
     int& region = region_of_run_[i];
     if (top == static_cast<int>(i)) {
       if (regions_.size() == kMostRegions) return false;
@@ -207,6 +203,7 @@ void ChangeRegions::make_boxes() {
 
 bool ChangeRegions::find() {
   runs_.clear();
+  parent_.clear();
   boxes_.clear();
   std::size_t above = 0;
   std::size_t above_end = 0;
@@ -229,7 +226,7 @@ bool ChangeRegions::find() {
 
 std::size_t ChangeRegions::memory_bytes() const {
   return (z_.size() + columns_.size() + sums_.size()) * sizeof(std::int16_t) +
-         kMostRuns * (sizeof(Run) + sizeof(int)) +
+         kMostRuns * (sizeof(Run) + 2 * sizeof(int)) +
          kMostRegions * (sizeof(Region) + sizeof(DetectionBox));
 }
 

@@ -51,7 +51,6 @@ class ChangeRegions {
   // Neighbours of a row beyond the threshold.
   struct Run {
     int row, from, to;  // [from, to)
-    int parent;         // of runs_: the union-find forest of regions
     int most;           // |S|, not normalised
   };
   struct Region {
@@ -62,7 +61,6 @@ class ChangeRegions {
 
   void sum_rows(int v);
   [[nodiscard]] bool find_runs(int v);
-  [[nodiscard]] int root(int run);
   void join(std::size_t above, std::size_t above_end, std::size_t here);
   [[nodiscard]] bool make_regions();
   void merge_regions();
@@ -74,6 +72,7 @@ class ChangeRegions {
   std::vector<std::int16_t> columns_;  // sums of five rows
   std::vector<std::int16_t> sums_;     // of a row, 5x5
   std::vector<Run> runs_;
+  std::vector<int> parent_;  // of each run: the forest of regions (forest.h)
   std::vector<int> region_of_run_;
   std::vector<Region> regions_;
   std::vector<DetectionBox> boxes_;

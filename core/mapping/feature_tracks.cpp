@@ -5,7 +5,7 @@
 #include <iterator>
 #include <numeric>
 
-#include "core/mapping/forest.h"
+#include "core/model/forest.h"
 
 namespace alidade {
 namespace {

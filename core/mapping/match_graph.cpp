@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <numeric>
 
-#include "core/mapping/forest.h"
+#include "core/model/forest.h"
 
 namespace alidade {
 namespace {

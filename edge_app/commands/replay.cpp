@@ -5,10 +5,8 @@
 // In OE mode images are decoded besides; a frame whose image cannot be is answered from telemetry.
 // It reads no configuration: how long telemetry holds is the default of TelemetryLimits.
 
-#include <fcntl.h>
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <cerrno>
@@ -22,6 +20,7 @@
 #include <vector>
 
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/partial_file.h"
 #include "edge_app/commands/replay.h"
 #include "edge_app/commands/replay_targets.h"
 #include "edge_app/commands/stop_signals.h"
@@ -43,36 +42,19 @@ namespace fs = std::filesystem;
 class OrientationFile {
  public:
   explicit OrientationFile(const std::string& directory)
-      : path_(fs::path(directory) / "orientation.csv"), partial_(path_.string() + ".partial") {
-    std::error_code error;
-    fs::create_directories(directory, error);
-    descriptor_ = ::open(partial_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666);
-    if (descriptor_ < 0) {
-      throw CommandError(kExitFailed, partial_.string() + ": cannot be written: " +
-                                          std::generic_category().message(errno) +
-                                          "; give a directory that can be written with -o");
-    }
-    writer_.emplace(descriptor_, OutputFormat::kCsv, path_.string(), RecordWriter::Stalled::kWait);
-  }
-  ~OrientationFile() {
-    ::close(descriptor_);
-    std::error_code ignored;
-    fs::remove(partial_, ignored);  // gone already after complete()
-  }
-  OrientationFile(const OrientationFile&) = delete;
-  OrientationFile& operator=(const OrientationFile&) = delete;
+      : file_((fs::path(directory) / "orientation.csv").string()),
+        writer_(file_.descriptor(), OutputFormat::kCsv, file_.path(),
+                RecordWriter::Stalled::kWait) {}
 
   void write(const OrientationRecord& record) {
-    if (!writer_->write(record)) throw CommandError(kExitFailed, writer_->error());
+    if (!writer_.write(record)) throw CommandError(kExitFailed, writer_.error());
   }
-  void complete() { fs::rename(partial_, path_); }
-  [[nodiscard]] std::string path() const { return path_.string(); }
+  void complete() { file_.complete(); }
+  [[nodiscard]] const std::string& path() const { return file_.path(); }
 
  private:
-  fs::path path_;
-  fs::path partial_;
-  int descriptor_ = -1;
-  std::optional<RecordWriter> writer_;
+  PartialFile file_;
+  RecordWriter writer_;
 };
 
 NamedCalibration find_calibration(const ReplayOptions& options) {
@@ -223,6 +205,8 @@ int replay_recording(const ReplayOptions& options) {
   const std::string directory = options.directory.empty()
                                     ? (fs::path(options.recording) / "alidade").string()
                                     : options.directory;
+  std::error_code not_made;
+  fs::create_directories(directory, not_made);  // that it cannot be written says the file
   OrientationFile file(directory);
   std::optional<ReplayTargets> targets;
   if (!options.detections.empty()) {

@@ -5,7 +5,6 @@
 #include <unistd.h>
 
 #include <cerrno>
-#include <filesystem>
 #include <limits>
 #include <system_error>
 #include <utility>
@@ -15,8 +14,6 @@
 
 namespace alidade {
 namespace {
-
-namespace fs = std::filesystem;
 
 std::string why() { return std::generic_category().message(errno); }
 
@@ -46,11 +43,11 @@ TargetStage make_stage(const std::string& path) {
 ReplayTargets::ReplayTargets(const std::string& detections, const std::string& tracking,
                              std::string path, StopSignals* signals)
     : name_(detections == "-" ? "stdin" : detections),
-      path_(std::move(path)),
-      partial_(path_ + ".partial"),
       signals_(signals),
       stage_(make_stage(tracking)),
-      in_(STDIN_FILENO) {
+      in_(STDIN_FILENO),
+      out_(std::move(path)),
+      writer_(out_.descriptor(), out_.path(), "targets", LineWriter::Stalled::kWait) {
   if (detections != "-") {
     opened_.reset(::open(detections.c_str(), O_RDONLY | O_CLOEXEC));
     if (!opened_.is_open())
@@ -58,15 +55,6 @@ ReplayTargets::ReplayTargets(const std::string& detections, const std::string& t
                                          "; give --detections FILE, or - for stdin");
     in_ = opened_.get();
   }
-  out_.reset(::open(partial_.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0666));
-  if (!out_.is_open())
-    throw CommandError(kExitFailed, partial_ + ": cannot be written: " + why() +
-                                        "; give a directory that can be written with -o");
-}
-
-ReplayTargets::~ReplayTargets() {
-  std::error_code ignored;
-  fs::remove(partial_, ignored);  // gone already after complete()
 }
 
 bool ReplayTargets::read_line(std::string* line) {
@@ -119,15 +107,6 @@ bool ReplayTargets::is_due() const {
   return newest_s_ && *waiting_->which.time_s <= *newest_s_;
 }
 
-void ReplayTargets::write(const std::string& text) {
-  for (std::size_t written = 0; written < text.size();) {
-    const ssize_t count = ::write(out_.get(), text.data() + written, text.size() - written);
-    if (count < 0 && errno == EINTR) continue;
-    if (count < 0) throw CommandError(kExitFailed, partial_ + ": cannot be written: " + why());
-    written += static_cast<std::size_t>(count);
-  }
-}
-
 void ReplayTargets::take() {
   const FrameChoice which = waiting_->which;
   DetectedFrame frame;
@@ -145,7 +124,8 @@ void ReplayTargets::take() {
   if (answer.box >= 0)
     throw CommandError(kExitFailed, fmt::format("{}:{}: boxes: item {}: {}", name_, line_,
                                                 answer.box, to_string(answer.status)));
-  if (is_taken(answer.status)) write(targets_line(stage_.state()));
+  if (is_taken(answer.status) && !writer_.write(targets_line(stage_.state())))
+    throw CommandError(kExitFailed, writer_.error());
 }
 
 void ReplayTargets::add(const OrientationRecord& record) {
@@ -164,13 +144,10 @@ void ReplayTargets::add(const OrientationRecord& record) {
 
 std::string ReplayTargets::complete() {
   while (waiting_ || next()) take();
-  out_.reset();
-  std::error_code error;
-  fs::rename(partial_, path_, error);
-  if (error) throw CommandError(kExitFailed, path_ + ": cannot be written: " + error.message());
+  out_.complete();
   const TargetsState state = stage_.state();
   const TargetCounters& counters = state.counters;
-  std::string line = fmt::format("{}: {} frames of detections", path_, state.updates);
+  std::string line = fmt::format("{}: {} frames of detections", out_.path(), state.updates);
   if (counters.of(DetectionStatus::kTakenLate) > 0)
     line += fmt::format(" ({} late)", counters.of(DetectionStatus::kTakenLate));
   for (int i = 0; i < kDetectionStatusCount; ++i) {

@@ -9,9 +9,11 @@
 #include <optional>
 #include <string>
 
+#include "edge_app/commands/partial_file.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/config/tracking_config.h"
 #include "edge_app/output/detection_query.h"
+#include "edge_app/output/line_writer.h"
 #include "edge_app/output/live_state.h"
 #include "edge_app/tracking/target_stage.h"
 #include "platform/system/file_descriptor.h"
@@ -24,9 +26,6 @@ class ReplayTargets {
   // Results appear as path when all is done. Throws CommandError, as all here.
   ReplayTargets(const std::string& detections, const std::string& tracking, std::string path,
                 StopSignals* signals);
-  ~ReplayTargets();
-  ReplayTargets(const ReplayTargets&) = delete;
-  ReplayTargets& operator=(const ReplayTargets&) = delete;
 
   void add(const OrientationRecord& record);
   // What lines are left; the file gets its name. One line about it all.
@@ -37,17 +36,15 @@ class ReplayTargets {
   [[nodiscard]] bool next();
   [[nodiscard]] bool is_due() const;
   void take();
-  void write(const std::string& text);
 
   const std::string name_;  // of the lines' file, for messages
-  const std::string path_;
-  const std::string partial_;
   StopSignals* signals_;
   TargetStage stage_;
   LiveState records_;
   FileDescriptor opened_;  // unless it is stdin
   int in_;
-  FileDescriptor out_;
+  PartialFile out_;
+  LineWriter writer_;
   std::string buffer_;
   std::size_t begin_ = 0;  // of what is left of it
   bool ended_ = false;

@@ -249,6 +249,7 @@ Answer ViscaProtocol::find_in_payload(std::string_view bytes) {
     if (answer_length_ == 0 && frame->length == heard_length_) {
       answer_length_ = heard_length_;
     }
+    const bool is_first = heard_length_ == 0;
     heard_length_ = frame->length;
     answer.pan_deg = frame->pan * options_.pan_deg_per_step;
     answer.tilt_deg = frame->tilt * options_.tilt_deg_per_step;
@@ -259,7 +260,8 @@ Answer ViscaProtocol::find_in_payload(std::string_view bytes) {
                        " steps is more than a turn; are the degrees per step right?";
     } else if (frame->length != answer_length_) {
       answer.kind = Answer::Kind::kRefused;
-      answer.problem = "positions of changing length: noise on the line";
+      answer.problem = is_first ? "one position only, and its length was not confirmed by a second"
+                                : "positions of changing length: noise on the line";
     } else {
       answer.kind = Answer::Kind::kPanTilt;
     }

@@ -4,27 +4,10 @@
 #include "core/model/direction.h"
 #include "edge_app/output/pixel_query.h"
 #include "test/fuzz/fuzz_target.h"
+#include "test/fuzz/record_of_frame.h"
 
 namespace alidade {
 namespace {
-
-OrientationRecord record() {
-  Calibration calibration;
-  calibration.camera = {1000, 1, 0.1, 640, 480};
-  calibration.line_delay = 30e-6;
-  FrameOrientation frame;
-  FUZZ_REQUIRE(make_frame_orientation(
-      calibration, 1, OrientationMode::kOe, 10, {{0.1, -0.2}, {0.3, 0.4}, 0, {1, 2}},
-      1e-10 * MotionCovariance::Identity(), Sensitivity<6>::Zero(), &frame));
-  OrientationRecord out;
-  out.frame = 1;
-  out.time_s = 1;
-  out.mode = RecordMode::kOe;
-  out.camera = pack(calibration);
-  out.orientation = OrientationRecord::Orientation{};
-  out.orientation->geometry = pack(frame);
-  return out;
-}
 
 void require_answer(const std::string& answer) {
   FUZZ_REQUIRE(!answer.empty() && answer.back() == '\n');
@@ -47,7 +30,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     for (const Vector2<double>& u : directions.pixels) FUZZ_REQUIRE(all_finite(u));
     FUZZ_REQUIRE(directions.pixel_sigma_px >= 0 && directions.pixel_sigma_px <= 1000);
     FUZZ_REQUIRE(!directions.which.frame || !directions.which.time_s);
-    require_answer(direction_answer(record(), directions));
+    require_answer(direction_answer(record_of_frame(0), directions));
   } else {
     FUZZ_REQUIRE(is_one_line(error));
   }
@@ -55,7 +38,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     FUZZ_REQUIRE(!pixels.directions.empty() && pixels.directions.size() <= kMaxQueryItems);
     for (const Vector3<double>& d : pixels.directions) FUZZ_REQUIRE(std::abs(d.norm() - 1) < 1e-12);
     FUZZ_REQUIRE(!pixels.which.frame || !pixels.which.time_s);
-    require_answer(pixel_answer(record(), pixels));
+    require_answer(pixel_answer(record_of_frame(0), pixels));
   } else {
     FUZZ_REQUIRE(is_one_line(error));
   }

@@ -186,7 +186,8 @@ class OeMode {
 
   // By what is known from outside too, for a frame that landmarks answer: what is added to the map's angles, and all the covariance.
   [[nodiscard]] TiedOffset offset_of_answer(const SolvedMotion& solved) const;
-  [[nodiscard]] Matrix6 covariance_of_answer(const SolvedMotion& solved) const;
+  [[nodiscard]] Matrix6 covariance_of_answer(const SolvedMotion& solved,
+                                             const TiedOffset& added) const;
   void note_landmarks_answer(const SolvedMotion& solved, const TiedOffset& added);
   [[nodiscard]] bool tie_telemetry(FrameOrientation* out);
 

@@ -13,10 +13,10 @@ TiedOffset OeMode::offset_of_answer(const SolvedMotion& solved) const {
 }
 
 // Where the map itself is tied, what telemetry does not know of its offset is of no matter.
-Matrix6 OeMode::covariance_of_answer(const SolvedMotion& solved) const {
+Matrix6 OeMode::covariance_of_answer(const SolvedMotion& solved, const TiedOffset& added) const {
   const bool by_map = tie_.is_by_map();
   Matrix6 covariance = by_map ? solved.frame_covariance : solved.covariance;
-  covariance.topLeftCorner<2, 2>() += offset_of_answer(solved).covariance;
+  covariance.topLeftCorner<2, 2>() += added.covariance;
   if (by_map) covariance.topLeftCorner<2, 2>() += solved.shared_covariance;
   shear_.add_to(&covariance);
   return covariance;

@@ -186,13 +186,15 @@ TEST_P(QuerySourceTest, SaysThatAllAnswersComeTooLate) {
   const auto source = rig.open(options);
   const auto says_so = HasSubstr("later than 100 ms; raise pan_tilt.timeout_s");
   int said = 0;
-  // On a busy machine the head's thread may not come to answer at all before it is given up.
+  // On a busy machine the head's thread may not come to answer at all before it is given up, or the
+  // source wakes so late that an answer is there: one of VISCA, which asks for a second to believe it.
   for (int i = 0; said < 3 && i < 20; ++i) {
     const ReadStatus status = read_until(*source, sample_, [](ReadStatus is) {
       return is == ReadStatus::kOk || is == ReadStatus::kDisconnected;
     });
     ASSERT_EQ(status, ReadStatus::kDisconnected);
-    EXPECT_THAT(source->error(), AnyOf(says_so, HasSubstr("no answer of ")));
+    EXPECT_THAT(source->error(),
+                AnyOf(says_so, HasSubstr("no answer of "), HasSubstr("not confirmed by a second")));
     if (testing::Value(source->error(), says_so)) ++said;
   }
   EXPECT_EQ(said, 3);

@@ -1,0 +1,28 @@
+#pragma once
+// A file that has its name only when it is whole: until complete() it is NAME.partial, which goes with this object.
+
+#include <string>
+
+#include "platform/system/file_descriptor.h"
+
+namespace alidade {
+
+class PartialFile {
+ public:
+  // Throws CommandError where it cannot be written, as complete() does.
+  explicit PartialFile(std::string path);
+  ~PartialFile();
+  PartialFile(const PartialFile&) = delete;
+  PartialFile& operator=(const PartialFile&) = delete;
+
+  [[nodiscard]] int descriptor() const { return file_.get(); }
+  [[nodiscard]] const std::string& path() const { return path_; }
+  void complete();
+
+ private:
+  const std::string path_;
+  const std::string partial_;
+  FileDescriptor file_;
+};
+
+}  // namespace alidade
