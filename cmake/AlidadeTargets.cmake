@@ -18,13 +18,34 @@ target_compile_options(alidade_options INTERFACE
 # library code when it also instruments.
 if(ALIDADE_SANITIZE)
   target_compile_options(alidade_options INTERFACE
-    -fsanitize=${ALIDADE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all)
+    -fsanitize=${ALIDADE_SANITIZE} -fno-omit-frame-pointer -fno-sanitize-recover=all
+    $<$<BOOL:$<TARGET_PROPERTY:ALIDADE_UNCHECKED>>:-fno-sanitize=$<TARGET_PROPERTY:ALIDADE_UNCHECKED>>)
   target_link_options(alidade_options INTERFACE -fsanitize=${ALIDADE_SANITIZE})
 endif()
 if(ALIDADE_FUZZ)
   # Every library tells libFuzzer which ways its code took.
   target_compile_options(alidade_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
+
+# alidade_leave_unchecked(target)
+# for the rooms of mathematics and the tests: each of Eigen's accesses would carry these checks, half of what such a source costs. The address
+# sanitizer and Eigen's own assertions find what they are for; the preset `fuzz` has them. A property: an option of the target itself would
+# stand before the one that asks for them.
+function(alidade_leave_unchecked target)
+  if(ALIDADE_SANITIZE MATCHES undefined AND NOT ALIDADE_FUZZ)
+    set_target_properties(${target} PROPERTIES ALIDADE_UNCHECKED null,alignment,object-size,vptr,pointer-overflow)
+  endif()
+endfunction()
+
+# alidade_leave_uninstrumented(target)
+# for a tool of the tests: sanitizers are for what is shipped, and the films would take most of their suites' time. The thread sanitizer must
+# see what all threads do.
+function(alidade_leave_uninstrumented target)
+  if(ALIDADE_SANITIZE MATCHES address)
+    set_target_properties(${target} PROPERTIES ALIDADE_UNCHECKED all)
+    target_compile_options(${target} PRIVATE -O2)
+  endif()
+endfunction()
 
 # alidade_prelude(edge_app HEADERS <Eigen/Dense> ... LINK ... OPTIONS ...)
 # compiles once what most sources of the libraries with `PRELUDE edge_app` include; OPTIONS are those of the libraries. Each
@@ -64,6 +85,9 @@ function(alidade_library name)
     target_compile_options(${target} PRIVATE ${A_OPTIONS})
     if(A_UNITY)
       alidade_unity(${target})
+    endif()
+    if(CMAKE_CURRENT_SOURCE_DIR MATCHES "^${PROJECT_SOURCE_DIR}/core/")
+      alidade_leave_unchecked(${target})
     endif()
     if(TARGET alidade_${A_PRELUDE}_prelude)
       target_precompile_headers(${target} REUSE_FROM alidade_${A_PRELUDE}_prelude)
@@ -128,10 +152,7 @@ if(ALIDADE_BUILD_TESTS AND NOT ALIDADE_FUZZ)
   set_target_properties(alidade_test_prelude PROPERTIES POSITION_INDEPENDENT_CODE OFF)
   target_compile_options(alidade_test_prelude PRIVATE -fPIE)
   alidade_compile_as_test(alidade_test_prelude)
-  # The product is what shall have no undefined behaviour: looking for it in tests, too, would double their compilation.
-  if(ALIDADE_SANITIZE MATCHES undefined)
-    target_compile_options(alidade_test_prelude PRIVATE -fno-sanitize=undefined)
-  endif()
+  alidade_leave_unchecked(alidade_test_prelude)
   target_precompile_headers(alidade_test_prelude PRIVATE
     <gmock/gmock.h> <gtest/gtest.h> <Eigen/Dense> <chrono> <filesystem> <fstream> <functional> <map> <random> <sstream> <string> <thread> <vector>)
 endif()
@@ -210,10 +231,8 @@ function(alidade_test name)
   alidade_executable(${name} SOURCES ${A_SOURCES} ${A_SUPPORT}
     LINK ${A_LINK} Eigen3::Eigen GTest::gmock GTest::gtest GTest::gtest_main)
   target_compile_definitions(${name} PRIVATE ${A_DEFINITIONS})
-  # Where tests are looked through for undefined behaviour, a unit of eight sources takes a minute and 2.3 GB. The few with threads make
-  # other units than all of them, in which names of two sources may meet.
-  if(A_UNITY AND NOT ALIDADE_SANITIZE STREQUAL "thread" AND
-      NOT (ALIDADE_SANITIZE MATCHES undefined AND "alidade::model" IN_LIST A_LINK))
+  # The few with threads make other units than all of them, in which names of two sources may meet.
+  if(A_UNITY AND NOT ALIDADE_SANITIZE STREQUAL "thread")
     alidade_unity(${name})
   endif()
   alidade_compile_as_test(${name})
@@ -221,13 +240,9 @@ function(alidade_test name)
     # GCC 12 reports it inside inlined library code.
     target_compile_options(${name} PRIVATE -Wno-maybe-uninitialized)
   endif()
-  # Headers without a library have their tests only, which are then compiled as the product is.
-  if(NOT ALIDADE_SANITIZE MATCHES undefined)
-    target_precompile_headers(${name} REUSE_FROM alidade_test_prelude)
-  elseif(NOT "alidade::model" IN_LIST A_LINK)
-    target_precompile_headers(${name} REUSE_FROM alidade_test_prelude)
-    target_compile_options(${name} PRIVATE -fno-sanitize=undefined)
-  endif()
+  target_precompile_headers(${name} REUSE_FROM alidade_test_prelude)
+  # No less: where a test and a library make the same function of a template, the linker takes the test's.
+  alidade_leave_unchecked(${name})
   if(A_DEPENDS)
     add_dependencies(${name} ${A_DEPENDS})
   endif()
