@@ -1,7 +1,8 @@
 #pragma once
 // SceneLocalization: where a live picture looks by the scene map, and what that means for telemetry's base. A picture is looked for where its
 // record says, with its focal length, else in all of the map (core/mapping/localization.h); what is refused there changes nothing.
-// A movement of base or zero is logged, once. One thread, but for report().
+// A movement of base or zero is logged, once. A frame without an orientation (no telemetry) is looked for in all of the map, by the
+// focal length of its calibration: at another zoom it is not told. One thread, but for report().
 
 #include <memory>
 #include <mutex>
@@ -17,8 +18,9 @@ namespace alidade {
 
 class SceneLocalization : public SceneLocator {
  public:
-  // name: of the map, for people.
-  SceneLocalization(SceneMap map, const std::string& name, const BaseJudgeOptions& options);
+  // name: of the map, for people. has_telemetry: of the camera.
+  SceneLocalization(SceneMap map, const std::string& name, const BaseJudgeOptions& options,
+                    bool has_telemetry = true);
   ~SceneLocalization() override;
 
   void prepare() override;  // makes the index of the map, which is then gone
@@ -31,10 +33,15 @@ class SceneLocalization : public SceneLocator {
   class Searcher;
   [[nodiscard]] Outcome judge(const LocalizableFrame& frame, const Localization& found,
                               ToldBase* told);
+  [[nodiscard]] Outcome tell_whole(const LocalizableFrame& frame, const Localization& found,
+                                   ToldBase* told);
   void count(std::int64_t frame, const Localization& found, double took_s);
   void say_moved(std::int64_t frame, const BaseOffset& offset, bool is_corrected);
 
   const double zero_sigma_;
+  const bool has_telemetry_;
+  bool is_zoom_said_ = false;
+  bool is_start_said_ = false;
   SceneMap map_;
   const double reference_row_;
   std::unique_ptr<const Searcher> searcher_;

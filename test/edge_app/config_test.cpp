@@ -80,6 +80,32 @@ TEST_F(ConfigTest, VideoAloneIsEnoughWhereOnlyThatIsNeeded) {
   EXPECT_THAT(load(video), HasSubstr("section 'pan_tilt' is missing; add it"));
 }
 
+TEST_F(ConfigTest, WithoutTelemetryTheSceneMapAndACalibrationAreNeeded) {
+  const std::string none =
+      "video: {type: rtsp, url: 'rtsp://camera/s'}\n"
+      "pan_tilt: {type: none}\n";
+  const std::string map = "scene_map: {file: scene.map}\n";
+  const std::string calibrated = "calibration: {file: c.yaml}\n";
+  ASSERT_THAT(load(none + map + calibrated), IsEmpty());
+  EXPECT_EQ(config_.pan_tilt.type, PanTiltConfig::Type::kNone);
+  EXPECT_FALSE(config_.calibration.automatic);
+  EXPECT_THAT(load(none + calibrated), HasSubstr(":2: pan_tilt.type: none, and no scene map"));
+  EXPECT_THAT(load(none + map),
+              HasSubstr(":2: pan_tilt.type: none, and nothing can be calibrated"));
+  EXPECT_THAT(load(none + map + "calibration: {file: c.yaml, auto: true}\n"),
+              HasSubstr("set it to false"));
+  EXPECT_THAT(load(none + map + "calibration: {file: c.yaml, auto: false}\n"), IsEmpty());
+  EXPECT_THAT(load(none + map + calibrated + "realtime: {mode: PT}\n"), HasSubstr("set it to OE"));
+  EXPECT_THAT(load("video: {type: recording, directory: film}\n"
+                   "pan_tilt: {type: none}\n" +
+                   map + calibrated),
+              HasSubstr("is for live video"));
+  EXPECT_THAT(load("video: {type: rtsp, url: 'rtsp://camera/s'}\n"
+                   "pan_tilt: {type: none, rate_hz: 3}\n" +
+                   map + calibrated),
+              HasSubstr("rate_hz"));
+}
+
 TEST_F(ConfigTest, TheHttpServerHasAnAddressAndATokenFromElsewhere) {
   const std::string minimal = kMinimal;
   ASSERT_THAT(load(minimal + "output: {http: '127.0.0.1:8080'}\n"), IsEmpty());
