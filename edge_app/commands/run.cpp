@@ -65,7 +65,8 @@ std::unique_ptr<SceneLocalization> load_scene(const Config& config, const Camera
   if (scene_map.file.empty() || !config.realtime.landmarks) return nullptr;
   SceneMap map;
   std::string error;
-  const bool is_read = load_scene_map(scene_map.file, &map, &error);
+  const auto file = std::make_shared<SceneMapFile>();
+  const bool is_read = file->open(scene_map.file, &error) && file->read(&map, &error);
   if (is_read && (map.lens.width() != camera.width || map.lens.height() != camera.height)) {
     error = fmt::format(
         "{} is of pictures of {}x{} px, but the camera's have {}x{} px; a map serves its own "
@@ -82,10 +83,14 @@ std::unique_ptr<SceneLocalization> load_scene(const Config& config, const Camera
   }
   spdlog::info("scene map: {}, {} keyframes, {} landmarks", scene_map.file, map.keyframes.size(),
                map.landmarks.size());
+  StoreMapChange store;
+  if (scene_map.update) {
+    store = [file](const MapChange& change, std::string* why) { return file->update(change, why); };
+  }
   return std::make_unique<SceneLocalization>(
       std::move(map), scene_map.file,
       BaseJudgeOptions{scene_map.zero_sigma_rad, scene_map.correct_moved_base},
-      has_telemetry(config));
+      has_telemetry(config), std::move(store));
 }
 
 // Without telemetry one lens is followed: that of a calibration at one zoom.

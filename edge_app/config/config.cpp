@@ -126,6 +126,9 @@ SceneMapConfig read_scene_map(YamlSection section, const std::string& path) {
   scene_map.interval_s = section.number("interval_s", kSeconds).value_or(scene_map.interval_s);
   scene_map.zero_sigma_rad =
       section.number("zero_sigma_rad", {1e-7, 0.5, "rad"}).value_or(scene_map.zero_sigma_rad);
+  scene_map.update = section.truth("update").value_or(scene_map.update);
+  if (scene_map.update && scene_map.file.empty())
+    section.fail("update", "is true, but there is no map to keep up; add file");
   scene_map.correct_moved_base =
       section.choice("on_moved_base", {"correct", "report"}).value_or("correct") == "correct";
   section.finish();

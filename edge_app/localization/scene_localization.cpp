@@ -4,6 +4,7 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -17,6 +18,11 @@ namespace {
 // What is not known of a frame's lens beside its record's own sigma: of log f.
 constexpr double kFocalLengthSigma = 5e-3;
 constexpr double kMilli = 1e3;
+
+double utc_now_s() {
+  using std::chrono::duration;
+  return duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
 
 FocalLengthPrior focal_length_of(const Calibration& calibration) {
   return {std::log(calibration.camera.focal_length),
@@ -63,11 +69,14 @@ class SceneLocalization::Searcher {
         quick_(localization_features(true)),
         thorough_(localization_features(false)) {}
 
-  [[nodiscard]] Localization find(const ImageView& image, const LocalizationHint& hint) const {
-    const Localization found = localizer_.find(features(quick_, image), hint);
-    return found.status == LocalizationStatus::kOk
-               ? found
-               : localizer_.find(features(thorough_, image), hint);
+  // *seen: what it was found by.
+  [[nodiscard]] Localization find(const ImageView& image, const LocalizationHint& hint,
+                                  FeatureSet* seen) const {
+    *seen = features(quick_, image);
+    const Localization found = localizer_.find(*seen, hint);
+    if (found.status == LocalizationStatus::kOk) return found;
+    *seen = features(thorough_, image);
+    return localizer_.find(*seen, hint);
   }
 
  private:
@@ -81,12 +90,14 @@ class SceneLocalization::Searcher {
 };
 
 SceneLocalization::SceneLocalization(SceneMap map, const std::string& name,
-                                     const BaseJudgeOptions& options, bool has_telemetry)
+                                     const BaseJudgeOptions& options, bool has_telemetry,
+                                     StoreMapChange store)
     : zero_sigma_(options.zero_sigma),
       has_telemetry_(has_telemetry),
       map_(std::move(map)),
       reference_row_(map_.reference_row),
-      judge_(options) {
+      judge_(options),
+      upkeep_(std::move(store)) {
   report_.name = name;
   report_.keyframes = static_cast<std::int64_t>(map_.keyframes.size());
   report_.landmarks = static_cast<std::int64_t>(map_.landmarks.size());
@@ -96,7 +107,8 @@ SceneLocalization::~SceneLocalization() = default;
 
 void SceneLocalization::prepare() {
   searcher_ = std::make_unique<const Searcher>(map_);
-  map_ = SceneMap();
+  upkeep_.index_made();
+  if (!upkeep_.keeps_up()) map_ = SceneMap();
   const std::lock_guard<std::mutex> lock(mutex_);
   report_.ready = true;
 }
@@ -104,11 +116,28 @@ void SceneLocalization::prepare() {
 SceneLocator::Outcome SceneLocalization::look(const LocalizableFrame& frame, ToldBase* told) {
   const double began_s = monotonic_now_s();
   const bool is_whole = !frame.record.orientation;
-  const Localization found = searcher_->find(
-      frame.image, is_whole ? hint_of(frame) : hint_of(frame.record, zero_sigma_, reference_row_));
+  const LocalizationHint hint =
+      is_whole ? hint_of(frame) : hint_of(frame.record, zero_sigma_, reference_row_);
+  FeatureSet seen;
+  const Localization found = searcher_->find(frame.image, hint, &seen);
   count(told->frame, found, monotonic_now_s() - began_s);
   if (found.status != LocalizationStatus::kOk) return Outcome::kNotFound;
-  return is_whole ? tell_whole(frame, found, told) : judge(frame, found, told);
+  const Outcome outcome = is_whole ? tell_whole(frame, found, told) : judge(frame, found, told);
+  // What a second picture is to confirm teaches nothing.
+  if (outcome == Outcome::kTold) keep_up(found, seen, hint);
+  return outcome;
+}
+
+void SceneLocalization::keep_up(const Localization& found, const FeatureSet& seen,
+                                const LocalizationHint& hint) {
+  if (!upkeep_.keeps_up()) return;
+  upkeep_.show(found, seen, hint, utc_now_s(), &map_);
+  if (upkeep_.is_due()) {
+    searcher_ = std::make_unique<const Searcher>(map_);
+    upkeep_.index_made();
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  report_.landmarks = static_cast<std::int64_t>(map_.landmarks.size());
 }
 
 SceneLocator::Outcome SceneLocalization::tell_whole(const LocalizableFrame& frame,

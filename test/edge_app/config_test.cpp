@@ -80,6 +80,12 @@ TEST_F(ConfigTest, VideoAloneIsEnoughWhereOnlyThatIsNeeded) {
   EXPECT_THAT(load(video), HasSubstr("section 'pan_tilt' is missing; add it"));
 }
 
+TEST_F(ConfigTest, AMapThatIsKeptUpIsAFile) {
+  EXPECT_THAT(load(std::string(kMinimal) + "scene_map: {update: true}\n"), HasSubstr("add file"));
+  EXPECT_THAT(load(kMinimal), IsEmpty());
+  EXPECT_FALSE(config_.scene_map.update);
+}
+
 TEST_F(ConfigTest, WithoutTelemetryTheSceneMapAndACalibrationAreNeeded) {
   const std::string none =
       "video: {type: rtsp, url: 'rtsp://camera/s'}\n"
@@ -204,7 +210,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
           "realtime: {mode: PT, priority: 60, cpu: 3, lock_memory: true, max_extrapolation_s: "
           "0.5}\n"
           "scene_map: {file: scene.map, interval_s: 3, zero_sigma_rad: 2e-4, on_moved_base: "
-          "report}\n"
+          "report, update: true}\n"
           "tracking: {plane: ground/plane.yaml, space: plane, detection_sigma_px: 3,\n"
           "           false_alarms_per_frame: 0.5, detection_probability: 0.8, least_score: 0.25,\n"
           "           acceleration_density_m2_s3: 2, first_velocity_sigma_m_s: 5,\n"
@@ -240,6 +246,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.scene_map.interval_s, 3);
   EXPECT_EQ(config_.scene_map.zero_sigma_rad, 2e-4);
   EXPECT_FALSE(config_.scene_map.correct_moved_base);
+  EXPECT_TRUE(config_.scene_map.update);
   EXPECT_EQ(config_.tracking.plane, directory_.path() + "/ground/plane.yaml");
   ASSERT_TRUE(config_.tracking.targets);
   const TargetOptions& targets = *config_.tracking.targets;

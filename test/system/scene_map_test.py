@@ -156,6 +156,29 @@ class NoTelemetry(WithSceneMap):
         self.assertLess(rms(errors), 0.8e-3)
         self.assertLess(max(sigmas), 5)
 
+    def test_a_map_that_is_kept_up_outlives_a_kill(self):
+        scene_map = self.build_map()
+        before = scene_map.read_bytes()
+        camera = self.camera(settings={
+            "image": {"width": 640, "height": 360, "rate_hz": 5},
+            "path": {"type": "triple_cosine", "amplitude": 0.05, "period_s": 6}, **CAMERA})
+        config = self.write_config(
+            camera, pan_tilt=self.NONE, realtime={"mode": "OE"}, output={"json": True},
+            scene_map={"file": str(scene_map), "interval_s": 0.5, "update": True})
+        for held_for in (8, 17, 29):
+            run = self.alidade("run", "-c", config)
+            held = 0
+            while held < held_for:
+                line = run.line()
+                self.assertIsNotNone(line, run.error_text())
+                held += json.loads(line)["mode"] == "OE"
+            run.end(signal.SIGKILL)
+            self.assertNotIn("kept up any more", run.error_text())
+            checked = subprocess.run([ALIDADE, "map", "check", scene_map], capture_output=True, text=True, timeout=60)
+            self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+        camera.end(signal.SIGTERM)
+        self.assertNotEqual(scene_map.read_bytes(), before)
+
     def test_what_it_cannot_do_without_is_an_error_in_one_line(self):
         camera = self.camera()
         config = self.write_config(camera, pan_tilt=self.NONE, realtime={"mode": "OE"})
