@@ -52,6 +52,7 @@ struct Localizer::State {
     double log_f = 0;
   };
   struct Landmark {
+    std::int64_t id = 0;
     Vector3<double> d_b;
     Matrix2<double> covariance;
     double scale_rad = 0;
@@ -227,6 +228,12 @@ struct Localizer::State {
     }
     out->pose = pose;
     out->matches = static_cast<int>(pose.inliers.size());
+    out->covariance_in_map = pose.covariance;
+    out->matched.clear();
+    for (const int i : pose.inliers) {
+      const FeatureMatch& m = matches[static_cast<std::size_t>(i)];
+      out->matched.push_back({m.query, landmark(m.indexed).id});
+    }
     add_common_error(out);
     out->status = LocalizationStatus::kOk;
     return true;
@@ -337,6 +344,7 @@ Localizer::Localizer(const SceneMap& map, const LocalizationOptions& options) : 
   }
   for (const SceneLandmark& landmark : map.landmarks) {
     State::Landmark l;
+    l.id = landmark.id;
     l.d_b = landmark.d_b;
     l.covariance = landmark.covariance;
     l.scale_rad = landmark.scale_rad;

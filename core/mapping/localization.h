@@ -61,10 +61,18 @@ struct LocalizationHint {
   double zoom_rate = 0;                                        // d log f / dt, 1/s
 };
 
+struct LocalizedFeature {
+  int feature = 0;
+  std::int64_t landmark = 0;  // id
+};
+
 struct Localization {
   LocalizationStatus status = LocalizationStatus::kNoUsablePicture;
-  PicturePose pose;           // with kOk; its covariance holds the map's own
-  int matches = 0;            // that agree on it
+  PicturePose pose;  // with kOk; its covariance holds the map's own
+  int matches = 0;   // that agree on it
+  // With kOk: those, as indices of the features and ids of landmarks; and the pose's covariance against these landmarks alone.
+  std::vector<LocalizedFeature> matched;
+  Matrix4<double> covariance_in_map = Matrix4<double>::Zero();
   int expected = 0;           // landmarks that should be seen there
   std::int64_t keyframe = 0;  // id: that looks most alike
   bool by_hint = false;

@@ -78,7 +78,7 @@ struct Visible {
 
 }  // namespace
 
-struct MapUpkeep::Picture {
+struct LandmarkUpkeep::Picture {
   PosedPicture posed;
   Matrix3<double> common = Matrix3<double>::Zero();  // of the matched landmarks, on all sides, base
   double share_of_landmarks = 0;
@@ -166,7 +166,7 @@ void average_descriptor(const Descriptor& seen, double weight, std::uint64_t sal
   }
 }
 
-MapChange MapUpkeep::show(const UpkeepView& view, const SceneMap& map, UpkeepCounts* counts) {
+MapChange LandmarkUpkeep::show(const UpkeepView& view, const SceneMap& map, UpkeepCounts* counts) {
   UpkeepCounts ignored;
   UpkeepCounts& count = counts != nullptr ? *counts : ignored;
   count = {};
@@ -185,7 +185,7 @@ MapChange MapUpkeep::show(const UpkeepView& view, const SceneMap& map, UpkeepCou
   return change;
 }
 
-bool MapUpkeep::look(const UpkeepView& view, const SceneMap& map, Picture* picture) const {
+bool LandmarkUpkeep::look(const UpkeepView& view, const SceneMap& map, Picture* picture) const {
   if (!valid_ || view.features == nullptr || !view.R_base_from_camera.allFinite() ||
       !std::isfinite(view.log_f) || !view.covariance.allFinite() ||
       !view.angular_velocity.allFinite() || !std::isfinite(view.zoom_rate) ||
@@ -258,8 +258,8 @@ bool MapUpkeep::look(const UpkeepView& view, const SceneMap& map, Picture* pictu
   return true;
 }
 
-bool MapUpkeep::follow_one(const Feature& seen, const Descriptor& descriptor, double now_utc_s,
-                           const Picture& picture, SceneLandmark* landmark) const {
+bool LandmarkUpkeep::follow_one(const Feature& seen, const Descriptor& descriptor, double now_utc_s,
+                                const Picture& picture, SceneLandmark* landmark) const {
   LandmarkState state{landmark->d_b, landmark->covariance, landmark->shared_covariance};
   const double days =
       std::clamp((now_utc_s - landmark->life.last_seen_utc_s) / kSecondsADay, 0.0, 30.0);
@@ -285,8 +285,8 @@ bool MapUpkeep::follow_one(const Feature& seen, const Descriptor& descriptor, do
   return true;
 }
 
-void MapUpkeep::follow(const UpkeepView& view, const SceneMap& map, Picture* picture,
-                       UpkeepCounts* counts) {
+void LandmarkUpkeep::follow(const UpkeepView& view, const SceneMap& map, Picture* picture,
+                            UpkeepCounts* counts) {
   for (const UpkeepMatch& match : view.matches) {
     const auto feature = static_cast<std::size_t>(match.feature);
     SceneLandmark landmark =
@@ -300,8 +300,8 @@ void MapUpkeep::follow(const UpkeepView& view, const SceneMap& map, Picture* pic
   }
 }
 
-void MapUpkeep::judge(const UpkeepView& view, const SceneMap& map, Picture* picture,
-                      MapChange* change, UpkeepCounts* counts) {
+void LandmarkUpkeep::judge(const UpkeepView& view, const SceneMap& map, Picture* picture,
+                           MapChange* change, UpkeepCounts* counts) {
   double usual = 0;
   int found = 0;
   const auto was_found = [&](const Visible& visible) {
@@ -335,8 +335,8 @@ void MapUpkeep::judge(const UpkeepView& view, const SceneMap& map, Picture* pict
   }
 }
 
-void MapUpkeep::find_candidates(const UpkeepView& view, const SceneMap& map, Picture* picture,
-                                UpkeepCounts* counts, std::vector<SceneLandmark>* ready) {
+void LandmarkUpkeep::find_candidates(const UpkeepView& view, const SceneMap& map, Picture* picture,
+                                     UpkeepCounts* counts, std::vector<SceneLandmark>* ready) {
   const std::vector<Feature>& features = view.features->features;
   const std::vector<Descriptor>& descriptors = view.features->descriptors;
   const int most_square = options_.most_descriptor_step * options_.most_descriptor_step;
@@ -427,9 +427,9 @@ void MapUpkeep::find_candidates(const UpkeepView& view, const SceneMap& map, Pic
   candidates_ = std::move(kept);
 }
 
-void MapUpkeep::give_birth(const std::vector<SceneLandmark>& ready, double now_utc_s,
-                           const SceneMap& map, Picture* picture, MapChange* change,
-                           UpkeepCounts* counts) {
+void LandmarkUpkeep::give_birth(const std::vector<SceneLandmark>& ready, double now_utc_s,
+                                const SceneMap& map, Picture* picture, MapChange* change,
+                                UpkeepCounts* counts) {
   if (ready.empty()) return;
   // Who lives in the cells that are asked for.
   std::unordered_map<std::uint64_t, std::vector<const SceneLandmark*>> cells;

@@ -1,5 +1,5 @@
 #pragma once
-// MapUpkeep: keeps a scene map true while it is used (Lisanti et al., section 3.3). Each picture whose pose was found from the map is
+// LandmarkUpkeep: keeps a scene map true while it is used (Lisanti et al., section 3.3). Each picture whose pose was found from the map is
 // shown to it, and what becomes of the map is given back as one change:
 //   seen       direction by the landmark's own filter (landmark_filter.h), descriptor by a running average with forgetting
 //   born       a feature that no landmark explains, seen at one place in so many pictures running, if it stands close to the landmarks
@@ -83,10 +83,10 @@ struct UpkeepCounts {
   bool refused = false;     // numbers or indices out of range: nothing was done
 };
 
-class MapUpkeep {
+class LandmarkUpkeep {
  public:
   // Options that validate() refuses keep nothing up: show() refuses all.
-  explicit MapUpkeep(const UpkeepOptions& options = {})
+  explicit LandmarkUpkeep(const UpkeepOptions& options = {})
       : options_(options), valid_(options.validate()) {}
 
   // What the picture changes in the map; apply() it before the next one.

@@ -136,13 +136,14 @@ void add_connection(const Connection& connection, const char* what, Findings* fi
 }
 
 // The report and what would help on stdout; what is wrong on stderr.
-void print_report(const CheckReport& report, const VideoNeeds& video_needs) {
+void print_report(const CheckReport& report, const VideoNeeds& video_needs, bool has_pan_tilt) {
   const Measured& measured = report.measured;
   fmt::print("video          {}: {}\n", measured.video.name, headline(report.video, video_needs));
   print(describe(report.video));
   print(describe(measured.images));
   print(describe(report.repeats));
-  fmt::print("pan/tilt       {}: {}\n", measured.pan_tilt.name, headline(report.telemetry));
+  fmt::print("pan/tilt       {}: {}\n", measured.pan_tilt.name,
+             has_pan_tilt ? headline(report.telemetry) : "the scene map tells where it looks");
   print(describe(report.telemetry));
   if (report.motion) {
     fmt::print("together\n");
@@ -201,14 +202,15 @@ int check_links(const CheckOptions& options) {
       check_repeats(measured.frames, video.time_s, telemetry.fresh,
                     {measured.video.name, calibration.calibration.camera.focal_length});
   add_connection(measured.video, "video", &report.findings);
-  add_connection(measured.pan_tilt, "pan/tilt", &report.findings);
+  const bool has_pan_tilt = config.pan_tilt.type != PanTiltConfig::Type::kNone;
+  if (has_pan_tilt) add_connection(measured.pan_tilt, "pan/tilt", &report.findings);
   const auto add = [&report](const Findings& more) {
     report.findings.insert(report.findings.end(), more.begin(), more.end());
   };
   add(video.findings);
   add(measured.images.findings);
   add(report.repeats.findings);
-  add(telemetry.findings);
+  if (has_pan_tilt) add(telemetry.findings);
   if (measured.images.images > 1 && !telemetry.fresh.empty()) {
     report.motion = motion_of(measured, video, telemetry, config, calibration);
     add(report.motion->findings);
@@ -216,7 +218,7 @@ int check_links(const CheckOptions& options) {
   if (options.json) {
     std::fputs(check_json(report).c_str(), stdout);
   } else {
-    print_report(report, video_needs);
+    print_report(report, video_needs, has_pan_tilt);
   }
   for (const Finding& finding : report.findings) {
     if (finding.severity == Severity::kProblem) fmt::print(stderr, "alidade: {}\n", finding.text);

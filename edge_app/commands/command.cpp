@@ -246,6 +246,19 @@ std::unique_ptr<PanTiltSource> make_head_source(const PanTiltConfig& config) {
 
 }  // namespace
 
+namespace {
+
+// There is none: its end is its beginning.
+class NoPanTilt : public PanTiltSource {
+ public:
+  ReadStatus read(PanTiltSample&, double) override { return ReadStatus::kEnd; }
+  void stop() override {}
+  [[nodiscard]] std::string error() const override { return ""; }
+  [[nodiscard]] std::string name() const override { return "none"; }
+};
+
+}  // namespace
+
 std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config) {
   switch (config.type) {
     case PanTiltConfig::Type::kVapix:
@@ -254,6 +267,8 @@ std::unique_ptr<PanTiltSource> make_pan_tilt_source(const PanTiltConfig& config)
       return make_onvif_source(config);
     case PanTiltConfig::Type::kHead:
       return make_head_source(config);
+    case PanTiltConfig::Type::kNone:
+      return std::make_unique<NoPanTilt>();
     case PanTiltConfig::Type::kRecording:
       break;
   }

@@ -195,6 +195,11 @@ int record_streams(const RecordOptions& options) {
         kExitUsage,
         options.config + ": video.type: a recording cannot be recorded; name a live source");
   }
+  if (config.pan_tilt.type == PanTiltConfig::Type::kNone) {
+    throw CommandError(kExitUsage, options.config +
+                                       ": pan_tilt.type: none, but a recording is of video and "
+                                       "telemetry; name the pan/tilt source");
+  }
   prepare_directory(options.directory);
   write_side_files(config, options.directory);
 

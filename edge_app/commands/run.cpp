@@ -40,9 +40,14 @@ std::string describe(const RealtimeOptions& options) {
       options.lock_memory ? "locked" : "not locked");
 }
 
+bool has_telemetry(const Config& config) {
+  return config.pan_tilt.type != PanTiltConfig::Type::kNone;
+}
+
 PipelineOptions pipeline_options(const Config& config, const NamedCalibration& calibration) {
   PipelineOptions options;
   options.step = step_options(config, calibration);
+  options.step.has_telemetry = has_telemetry(config);
   options.step.zoom_tolerance = config.calibration.zoom_tolerance;
   if (config.realtime.landmarks) options.step.oe = oe_options(calibration.calibration.camera);
   options.realtime = {config.realtime.priority, config.realtime.cpu, config.realtime.lock_memory};
@@ -53,28 +58,49 @@ PipelineOptions pipeline_options(const Config& config, const NamedCalibration& c
   return options;
 }
 
-// Null where none is configured, or none that could be used: records need none, and go on without, in telemetry's base.
+// Null where none is configured, or none that could be used: records need none, and go on without, in telemetry's base. Where there
+// is no telemetry, it throws.
 std::unique_ptr<SceneLocalization> load_scene(const Config& config, const Camera<double>& camera) {
   const SceneMapConfig& scene_map = config.scene_map;
   if (scene_map.file.empty() || !config.realtime.landmarks) return nullptr;
   SceneMap map;
   std::string error;
-  if (!load_scene_map(scene_map.file, &map, &error)) {
-    spdlog::error("scene map: {}; runs without it", error);
-    return nullptr;
-  }
-  if (map.lens.width() != camera.width || map.lens.height() != camera.height) {
-    spdlog::error(
-        "scene map: {} is of pictures of {}x{} px, but the camera's have {}x{} px; a map serves "
-        "its own camera and size: build one of its pictures; runs without it",
+  const auto file = std::make_shared<SceneMapFile>();
+  const bool is_read = file->open(scene_map.file, &error) && file->read(&map, &error);
+  if (is_read && (map.lens.width() != camera.width || map.lens.height() != camera.height)) {
+    error = fmt::format(
+        "{} is of pictures of {}x{} px, but the camera's have {}x{} px; a map serves its own "
+        "camera and size: build one of its pictures",
         scene_map.file, map.lens.width(), map.lens.height(), camera.width, camera.height);
+  }
+  if (!error.empty()) {
+    if (!has_telemetry(config)) {
+      throw CommandError(kExitUsage,
+                         fmt::format("scene map: {}; pan_tilt.type none needs one", error));
+    }
+    spdlog::error("scene map: {}; runs without it", error);
     return nullptr;
   }
   spdlog::info("scene map: {}, {} keyframes, {} landmarks", scene_map.file, map.keyframes.size(),
                map.landmarks.size());
+  StoreMapChange store;
+  if (scene_map.update) {
+    store = [file](const MapChange& change, std::string* why) { return file->update(change, why); };
+  }
   return std::make_unique<SceneLocalization>(
       std::move(map), scene_map.file,
-      BaseJudgeOptions{scene_map.zero_sigma_rad, scene_map.correct_moved_base});
+      BaseJudgeOptions{scene_map.zero_sigma_rad, scene_map.correct_moved_base},
+      has_telemetry(config), std::move(store));
+}
+
+// Without telemetry one lens is followed: that of a calibration at one zoom.
+void check_lens(const std::string& file, const NamedCalibration& calibration) {
+  if (calibration.zoom_curve.empty()) return;
+  throw CommandError(
+      kExitUsage,
+      fmt::format("{}: {} is for a lens that zooms, but with pan_tilt.type none nobody reads the "
+                  "zoom; name a calibration of one zoom, and leave the lens there",
+                  file, calibration.name));
 }
 
 // Null where none is configured.
@@ -110,7 +136,7 @@ int run_live(const RunOptions& options) {
   Calibrating calibrating;
   NamedCalibration calibration;
   MapState map;
-  if (config.realtime.landmarks && !is_recording(config)) {
+  if (config.realtime.landmarks && !is_recording(config) && has_telemetry(config)) {
     calibrating = begin_calibrating(config, options.config);
     const auto first = calibrating.calibration->first();
     calibration = {first->calibration, first->calibrated, first->name, first->zoom_curve};
@@ -118,6 +144,7 @@ int run_live(const RunOptions& options) {
   } else {
     calibration = choose_calibration(config);
   }
+  if (!has_telemetry(config)) check_lens(options.config, calibration);
   spdlog::info("calibration: {}", calibration.name);
   PipelineOptions of_pipeline = pipeline_options(config, calibration);
   of_pipeline.step.map = std::move(map);

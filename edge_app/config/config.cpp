@@ -126,6 +126,9 @@ SceneMapConfig read_scene_map(YamlSection section, const std::string& path) {
   scene_map.interval_s = section.number("interval_s", kSeconds).value_or(scene_map.interval_s);
   scene_map.zero_sigma_rad =
       section.number("zero_sigma_rad", {1e-7, 0.5, "rad"}).value_or(scene_map.zero_sigma_rad);
+  scene_map.update = section.truth("update").value_or(scene_map.update);
+  if (scene_map.update && scene_map.file.empty())
+    section.fail("update", "is true, but there is no map to keep up; add file");
   scene_map.correct_moved_base =
       section.choice("on_moved_base", {"correct", "report"}).value_or("correct") == "correct";
   section.finish();
@@ -259,6 +262,33 @@ void check_ages(const Config& config, const YamlSection& pan_tilt, const YamlSec
                   extrapolation_s, repeat_s, why, repeat_s, right_repeat));
 }
 
+// Without telemetry the scene map tells where the camera looks, through the lens of a calibration.
+void check_without_telemetry(const Config& config, const YamlSection& pan_tilt,
+                             const YamlSection& calibration, const YamlSection& realtime) {
+  if (config.scene_map.file.empty()) {
+    pan_tilt.fail("type",
+                  "none, and no scene map tells where the camera looks; set scene_map.file to one "
+                  "of alidade map build, or name the pan/tilt source");
+  }
+  if (config.calibration.file.empty()) {
+    pan_tilt.fail("type",
+                  "none, and nothing can be calibrated without telemetry; set calibration.file to "
+                  "a calibration of this camera");
+  }
+  if (config.calibration.automatic && calibration.has("auto")) {
+    calibration.fail(
+        "auto", "is true, but pan_tilt.type none has nothing to calibrate with; set it to false");
+  }
+  if (!config.realtime.landmarks) {
+    realtime.fail("mode",
+                  "is PT, which is telemetry's alone; with pan_tilt.type none set it to OE");
+  }
+  if (config.video.type == VideoConfig::Type::kRecording) {
+    pan_tilt.fail("type",
+                  "none is for live video; a recording has its telemetry, set it to recording");
+  }
+}
+
 // What goes with what, beyond single sections.
 void check_together(const Config& config, const YamlSection& calibration,
                     const YamlSection& scene_map, const std::string& path,
@@ -323,6 +353,10 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   if (scope == ConfigScope::kAll) check_ages(*config, pan_tilt, realtime);
   config->output = read_output(output, path, &config->warnings);
   if (scope != ConfigScope::kAll) return;
+  if (config->pan_tilt.type == PanTiltConfig::Type::kNone) {
+    check_without_telemetry(*config, pan_tilt, calibration, realtime);
+    config->calibration.automatic = false;
+  }
   check_together(*config, calibration, scene_map, path, &config->warnings);
   check_targets(*config, output);
 }

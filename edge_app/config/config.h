@@ -70,6 +70,7 @@ struct SceneMapConfig {
   double interval_s = 10;          // from one localization to the next, while nothing calls for one
   double zero_sigma_rad = 1e-3;    // of telemetry's zero from one start to the next
   bool correct_moved_base = true;  // false: a movement is reported only
+  bool update = false;             // the file is kept up by the pictures that are found in it
 };
 
 struct RealtimeConfig {

@@ -43,6 +43,7 @@ std::vector<PanTiltType> pan_tilt_types() {
   std::vector<PanTiltType> types = {{"vapix", Type::kVapix, {}}, {"onvif", Type::kOnvif, {}}};
   for (const Head& head : kHeads) types.push_back({head.key, Type::kHead, head.type});
   types.push_back({"recording", Type::kRecording, {}});
+  types.push_back({"none", Type::kNone, {}});
   return types;
 }
 
@@ -88,6 +89,8 @@ void read_device(YamlSection& section, const PanTiltType& type, const std::strin
       pan_tilt->directory =
           path_relative_to(path, required_text(section, "directory", "my-recording"));
       return;
+    case PanTiltConfig::Type::kNone:
+      return;
   }
 }
 
@@ -98,6 +101,10 @@ PanTiltConfig read_pan_tilt(YamlSection section, const std::string& path) {
   const PanTiltType type = read_pan_tilt_type(section);
   pan_tilt.type = type.type;
   read_device(section, type, path, &pan_tilt);
+  if (type.type == PanTiltConfig::Type::kNone) {
+    section.finish();  // nothing is asked, so nothing else is known
+    return pan_tilt;
+  }
   if (type.type != PanTiltConfig::Type::kRecording) {
     pan_tilt.timeout_s = section.number("timeout_s", kSeconds).value_or(pan_tilt.timeout_s);
     pan_tilt.max_backoff_s =

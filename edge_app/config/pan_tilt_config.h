@@ -11,7 +11,7 @@
 namespace alidade {
 
 struct PanTiltConfig {
-  enum class Type { kVapix, kOnvif, kHead, kRecording };
+  enum class Type { kVapix, kOnvif, kHead, kRecording, kNone };
   Type type = Type::kVapix;
   std::string url;        // vapix, onvif
   HeadConfig head;        // a key of kHeads

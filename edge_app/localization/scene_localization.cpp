@@ -4,10 +4,12 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
+#include <chrono>
 #include <cmath>
 #include <utility>
 
 #include "core/mapping/features.h"
+#include "core/model/rotation.h"
 #include "platform/system/clock.h"
 
 namespace alidade {
@@ -16,6 +18,24 @@ namespace {
 // What is not known of a frame's lens beside its record's own sigma: of log f.
 constexpr double kFocalLengthSigma = 5e-3;
 constexpr double kMilli = 1e3;
+
+double utc_now_s() {
+  using std::chrono::duration;
+  return duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
+}
+
+FocalLengthPrior focal_length_of(const Calibration& calibration) {
+  return {std::log(calibration.camera.focal_length),
+          std::hypot(kFocalLengthSigma, relative_focal_length_sigma(calibration))};
+}
+
+// Of a frame of which nobody knows where it looks.
+LocalizationHint hint_of(const LocalizableFrame& frame) {
+  LocalizationHint hint;
+  hint.focal_length = focal_length_of(unpack(frame.record.camera));
+  hint.angular_velocity = Eigen::Map<const Vector3<double>>(frame.angular_velocity_rad_s.data());
+  return hint;
+}
 
 LocalizationHint hint_of(const OrientationRecord& record, double zero_sigma, double reference_row) {
   const FrameOrientation frame = unpack(record.orientation->geometry, record.camera);
@@ -26,9 +46,7 @@ LocalizationHint hint_of(const OrientationRecord& record, double zero_sigma, dou
   const auto& sigma = record.orientation->sigma_rad;
   hint.R_sigma = std::hypot(*std::max_element(sigma.begin(), sigma.end()),
                             record.localized ? 0.0 : zero_sigma);
-  hint.focal_length =
-      FocalLengthPrior{std::log(calibration.camera.focal_length),
-                       std::hypot(kFocalLengthSigma, relative_focal_length_sigma(calibration))};
+  hint.focal_length = focal_length_of(calibration);
   hint.angular_velocity = angular_velocity(calibration.mechanics, angle, frame.rate);
   hint.zoom_rate = frame.zoom_rate;
   return hint;
@@ -51,11 +69,14 @@ class SceneLocalization::Searcher {
         quick_(localization_features(true)),
         thorough_(localization_features(false)) {}
 
-  [[nodiscard]] Localization find(const ImageView& image, const LocalizationHint& hint) const {
-    const Localization found = localizer_.find(features(quick_, image), hint);
-    return found.status == LocalizationStatus::kOk
-               ? found
-               : localizer_.find(features(thorough_, image), hint);
+  // *seen: what it was found by.
+  [[nodiscard]] Localization find(const ImageView& image, const LocalizationHint& hint,
+                                  FeatureSet* seen) const {
+    *seen = features(quick_, image);
+    const Localization found = localizer_.find(*seen, hint);
+    if (found.status == LocalizationStatus::kOk) return found;
+    *seen = features(thorough_, image);
+    return localizer_.find(*seen, hint);
   }
 
  private:
@@ -69,11 +90,14 @@ class SceneLocalization::Searcher {
 };
 
 SceneLocalization::SceneLocalization(SceneMap map, const std::string& name,
-                                     const BaseJudgeOptions& options)
+                                     const BaseJudgeOptions& options, bool has_telemetry,
+                                     StoreMapChange store)
     : zero_sigma_(options.zero_sigma),
+      has_telemetry_(has_telemetry),
       map_(std::move(map)),
       reference_row_(map_.reference_row),
-      judge_(options) {
+      judge_(options),
+      upkeep_(std::move(store)) {
   report_.name = name;
   report_.keyframes = static_cast<std::int64_t>(map_.keyframes.size());
   report_.landmarks = static_cast<std::int64_t>(map_.landmarks.size());
@@ -83,17 +107,70 @@ SceneLocalization::~SceneLocalization() = default;
 
 void SceneLocalization::prepare() {
   searcher_ = std::make_unique<const Searcher>(map_);
-  map_ = SceneMap();
+  upkeep_.index_made();
+  if (!upkeep_.keeps_up()) map_ = SceneMap();
   const std::lock_guard<std::mutex> lock(mutex_);
   report_.ready = true;
 }
 
 SceneLocator::Outcome SceneLocalization::look(const LocalizableFrame& frame, ToldBase* told) {
   const double began_s = monotonic_now_s();
-  const Localization found =
-      searcher_->find(frame.image, hint_of(frame.record, zero_sigma_, reference_row_));
+  const bool is_whole = !frame.record.orientation;
+  const LocalizationHint hint =
+      is_whole ? hint_of(frame) : hint_of(frame.record, zero_sigma_, reference_row_);
+  FeatureSet seen;
+  const Localization found = searcher_->find(frame.image, hint, &seen);
   count(told->frame, found, monotonic_now_s() - began_s);
-  return found.status == LocalizationStatus::kOk ? judge(frame, found, told) : Outcome::kNotFound;
+  if (found.status != LocalizationStatus::kOk) return Outcome::kNotFound;
+  const Outcome outcome = is_whole ? tell_whole(frame, found, told) : judge(frame, found, told);
+  // What a second picture is to confirm teaches nothing.
+  if (outcome == Outcome::kTold) keep_up(found, seen, hint);
+  return outcome;
+}
+
+void SceneLocalization::keep_up(const Localization& found, const FeatureSet& seen,
+                                const LocalizationHint& hint) {
+  if (!upkeep_.keeps_up()) return;
+  upkeep_.show(found, seen, hint, utc_now_s(), &map_);
+  if (upkeep_.is_due()) {
+    searcher_ = std::make_unique<const Searcher>(map_);
+    upkeep_.index_made();
+  }
+  const std::lock_guard<std::mutex> lock(mutex_);
+  report_.landmarks = static_cast<std::int64_t>(map_.landmarks.size());
+}
+
+SceneLocator::Outcome SceneLocalization::tell_whole(const LocalizableFrame& frame,
+                                                    const Localization& found, ToldBase* told) {
+  const Calibration calibration = unpack(frame.record.camera);
+  const FocalLengthPrior prior = focal_length_of(calibration);
+  constexpr double kExcluded = 4;  // standard deviations
+  if (!(std::abs(found.pose.log_f - prior.log_f) < kExcluded * prior.sigma)) {
+    if (!std::exchange(is_zoom_said_, true)) {
+      spdlog::warn(
+          "scene map: frame {} was taken with a focal length of {:.0f} px, but the calibration is "
+          "for {:.0f} px; without telemetry the lens stays at one zoom: put it back there",
+          told->frame, std::exp(found.pose.log_f), calibration.camera.focal_length);
+    }
+    return Outcome::kNotFound;
+  }
+  is_zoom_said_ = false;
+  const Eigen::Map<const Vector3<double>> velocity(frame.angular_velocity_rad_s.data());
+  const double to_middle_s =
+      calibration.line_delay * (0.5 * calibration.camera.height - reference_row_);
+  const Vector3<double> turn = velocity * to_middle_s;
+  const Matrix3<double> R_reference_from_middle = exp_so3(turn);
+  const Matrix3<double> covariance = R_reference_from_middle.transpose() *
+                                     found.pose.covariance.topLeftCorner<3, 3>() *
+                                     R_reference_from_middle;
+  told->is_whole = true;
+  told->R_base_from_camera = pack_matrix(found.pose.R_base_from_camera * R_reference_from_middle);
+  told->R_covariance = pack_matrix(covariance);
+  if (!std::exchange(is_start_said_, true)) {
+    spdlog::info("scene map: frame {} is localized by {} landmarks; directions begin with it",
+                 told->frame, found.matches);
+  }
+  return Outcome::kTold;
 }
 
 SceneLocator::Outcome SceneLocalization::judge(const LocalizableFrame& frame,
@@ -108,7 +185,7 @@ SceneLocator::Outcome SceneLocalization::judge(const LocalizableFrame& frame,
   switch (verdict) {
     case BaseJudge::Verdict::kExpected:
       report_.uncorrected = false;
-      if (is_first) {
+      if (is_first && has_telemetry_) {
         spdlog::info("scene map: frame {} is localized; telemetry's angles lack {}", told->frame,
                      describe(offset));
       }
@@ -132,12 +209,11 @@ void SceneLocalization::say_moved(std::int64_t frame, const BaseOffset& offset, 
   if (is_said) return;
   ++report_.movements;
   report_.moved = offset;
-  spdlog::warn(
-      "scene map: telemetry's zero or the base has moved, as frame {} shows: telemetry's angles "
-      "lack "
-      "{}{}",
-      frame, describe(offset),
-      is_corrected ? "; corrected: directions are the map's"
+  spdlog::warn("scene map: {} has moved, as frame {} shows: {} angles lack {}{}",
+               has_telemetry_ ? "telemetry's zero or the base" : "the base, or what was followed,",
+               frame, has_telemetry_ ? "telemetry's" : "the followed", describe(offset),
+               is_corrected
+                   ? "; corrected: directions are the map's"
                    : "; not corrected, as scene_map.on_moved_base says: set it to correct, or put "
                      "the base or the zero back");
 }

@@ -1,7 +1,9 @@
 #pragma once
 // SceneLocalization: where a live picture looks by the scene map, and what that means for telemetry's base. A picture is looked for where its
 // record says, with its focal length, else in all of the map (core/mapping/localization.h); what is refused there changes nothing.
-// A movement of base or zero is logged, once. One thread, but for report().
+// A movement of base or zero is logged, once. A frame without an orientation (no telemetry) is looked for in all of the map, by the
+// focal length of its calibration: at another zoom it is not told. What was found, and contradicts nothing, may keep the map up
+// (scene_upkeep.h). One thread, but for report().
 
 #include <memory>
 #include <mutex>
@@ -10,6 +12,7 @@
 
 #include "core/mapping/scene_map.h"
 #include "edge_app/localization/base_judge.h"
+#include "edge_app/localization/scene_upkeep.h"
 #include "edge_app/pipeline/scene_report.h"
 #include "edge_app/pipeline/scene_tap.h"
 
@@ -17,11 +20,12 @@ namespace alidade {
 
 class SceneLocalization : public SceneLocator {
  public:
-  // name: of the map, for people.
-  SceneLocalization(SceneMap map, const std::string& name, const BaseJudgeOptions& options);
+  // name: of the map, for people. has_telemetry: of the camera. store: none: the map is not kept up.
+  SceneLocalization(SceneMap map, const std::string& name, const BaseJudgeOptions& options,
+                    bool has_telemetry = true, StoreMapChange store = nullptr);
   ~SceneLocalization() override;
 
-  void prepare() override;  // makes the index of the map, which is then gone
+  void prepare() override;  // makes the index of the map, which is then gone, unless it is kept up
   [[nodiscard]] Outcome look(const LocalizableFrame& frame, ToldBase* told) override;
 
   // Any thread but the real-time one.
@@ -31,14 +35,21 @@ class SceneLocalization : public SceneLocator {
   class Searcher;
   [[nodiscard]] Outcome judge(const LocalizableFrame& frame, const Localization& found,
                               ToldBase* told);
+  void keep_up(const Localization& found, const FeatureSet& seen, const LocalizationHint& hint);
+  [[nodiscard]] Outcome tell_whole(const LocalizableFrame& frame, const Localization& found,
+                                   ToldBase* told);
   void count(std::int64_t frame, const Localization& found, double took_s);
   void say_moved(std::int64_t frame, const BaseOffset& offset, bool is_corrected);
 
   const double zero_sigma_;
+  const bool has_telemetry_;
+  bool is_zoom_said_ = false;
+  bool is_start_said_ = false;
   SceneMap map_;
   const double reference_row_;
   std::unique_ptr<const Searcher> searcher_;
   BaseJudge judge_;
+  SceneUpkeep upkeep_;
 
   mutable std::mutex mutex_;  // of what follows
   SceneReport report_;

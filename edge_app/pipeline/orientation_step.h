@@ -20,6 +20,8 @@
 // Where the zoom is another than the calibration's, or moves, its zoom curve gives OE mode, or PT mode, a lens (zoom_lookup.h): OE
 // mode's map stays, also when the calibration of another zoom of the same curve is adopted.
 // A scene map that knows where a frame looked may say so later: from then on records, PT's too, are in its base.
+// Without telemetry (has_telemetry false) a localized frame tells where the camera looks, followed from there to the next
+// (scene_start.h), until OE mode's landmarks hold, which go on by the frame before. Where they are lost that begins anew: "not localized".
 // While there is no calibration for the camera, or none for the zoom that the pan/tilt source reports, points
 // are followed instead (start_up_tracker.h), for the calibration thread to make one of.
 // After a reconnection the stream's clock begins anew; telemetry from before it is forgotten. The least
@@ -43,6 +45,7 @@
 #include "edge_app/pipeline/orientation_record.h"
 #include "edge_app/pipeline/published_calibration.h"
 #include "edge_app/pipeline/repeated_images.h"
+#include "edge_app/pipeline/scene_start.h"
 #include "edge_app/pipeline/told_base.h"
 #include "edge_app/pipeline/zoom_lookup.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
@@ -71,6 +74,8 @@ struct OrientationStepOptions {
   MapState map;
   // With OE mode: follow points as long as there is no calibration.
   bool follow_points = false;
+  // False: a scene map alone tells where the camera looks. That takes oe, calibrated, and a lens that does not zoom.
+  bool has_telemetry = true;
   double zoom_tolerance = 0;  // device units within which the calibration holds
   ZoomCurve zoom_curve;       // for other zooms; may be empty
   double minimum_delay_sigma_s =
@@ -124,7 +129,9 @@ class OrientationStep {
   void get_landmarks(FrameLandmarks* landmarks) const;
   // Somebody looks by the scene map where the frame last added looked. False: it has no answer that could be held against that.
   bool ask_about_base();
-  // What came of it: from the next frame on records are in the map's base (base_tie.h), whatever is adopted.
+  // The same where it has none, without telemetry; *angular_velocity: rad/s, camera frame. False: it could not be followed from there.
+  bool ask_where_it_looks(Vector3<double>* angular_velocity);
+  // What came of either: from the next frame on records are in the map's base (base_tie.h), whatever is adopted.
   void settle_base(const ToldBase& told);
   // Takes over another calibration with its map, between two frames.
   void adopt(const PublishedCalibration& published);
@@ -159,6 +166,11 @@ class OrientationStep {
   void orient(const InterpolatedPanTilt* measured, const ImageView& image, const FrameLens* lens,
               OrientationRecord* record);
 
+  // Without telemetry: completes a record that has its time.
+  void orient_by_scene(const ImageView& image, OrientationRecord* record);
+  // True: landmarks hold from here on, in the base of the localized frame.
+  [[nodiscard]] bool begin_by_scene(const ImageView& image, double time_s);
+
   OrientationStepOptions options_;
   FrameClock video_clock_;
   CaptureClock telemetry_clock_;
@@ -188,6 +200,9 @@ class OrientationStep {
   double minimum_delay_sigma_s_ = 0;
   double lasting_sigma_s_ = 0;  // of a frame's time, what it has in common with those about it
   RepeatedImages repeated_images_;
+  SceneStart scene_start_;           // without telemetry
+  bool is_beginning_ = false;        // OE mode's map begins by it
+  double beginning_since_s_ = 0;     // frame time
   bool answered_by_oe_ = false;      // the frame last added, in whatever mode
   double tied_time_s_ = 0;           // of the frame that tied the base
   ImageView image_;                  // of the frame last added, until it is maintained

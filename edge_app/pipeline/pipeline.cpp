@@ -49,6 +49,8 @@ Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink
       zoom_curve_(std::make_shared<const ZoomCurve>(options.step.zoom_curve)) {
   if (finished_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
   for (ImageSlot slot = 0; slot < kImageSlots; ++slot) free_slots_.push_back(slot);
+  if (!options.step.has_telemetry)
+    pan_tilt_watch_.lost("pan_tilt.type is none: the scene map tells where the camera looks");
   // Records made before the calibration thread first wakes say it too.
   if (calibration_ != nullptr) stage_.report(calibration_->report());
 }

@@ -155,8 +155,15 @@ void RealtimeStage::localize(const VideoMessage& message, const OrientationRecor
                              bool* lent) {
   const bool wanted = scene_->wants(monotonic_now_s(), record.mode, message.stamp.restarted);
   const bool can_lend = message.image.valid() && message.slot != kNoImageSlot;
-  if (!wanted || !can_lend || !record.calibrated || !record.orientation) return;
-  if (!step_.ask_about_base()) return;
+  if (!wanted || !can_lend || !record.calibrated || !record.time_s) return;
+  if (record.orientation) {
+    if (!step_.ask_about_base()) return;
+  } else {
+    Vector3<double> angular_velocity;
+    if (!step_.ask_where_it_looks(&angular_velocity)) return;
+    for (int i = 0; i < 3; ++i)
+      localizable_frame_.angular_velocity_rad_s[static_cast<std::size_t>(i)] = angular_velocity[i];
+  }
   localizable_frame_.record = record;
   localizable_frame_.image = message.image;
   localizable_frame_.slot = message.slot;

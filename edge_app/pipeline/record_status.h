@@ -5,7 +5,7 @@
 //   TelemetryBuffer::query()   how the frame lies to the telemetry samples (QueryStatus)
 //   OeMode::process()          whether landmarks held (OeStatus); for frames that telemetry has an answer for
 //   FrameClock                 whether the frame's time is known
-//   OrientationStep            zoom, loss of the video, images sent again (RepeatedImages)
+//   OrientationStep            zoom, loss of the video, images sent again (RepeatedImages), not localized yet (SceneStart)
 //   RealtimeStage              images that came too late to be looked at
 // What a person reads of each, and what to do: edge_app/README.md.
 
@@ -38,10 +38,11 @@ enum class RecordStatus : std::uint8_t {
   kImageTooLate,          // mode PT: others waited behind the frame, which went without its image
   kImageRepeated,  // the image is the one before, sent again while the camera turned (RepeatedImages)
   kOtherZoom,      // no calibration for the zoom that the pan/tilt source reports
-  kNotFinite       // a stamp is not a finite number
+  kNotFinite,      // a stamp is not a finite number
+  kNotLocalized  // without telemetry: nobody has found yet, or found again, where the camera looks
 };
 
-inline constexpr std::array<RecordStatus, 16> kRecordStatuses = {
+inline constexpr std::array<RecordStatus, 17> kRecordStatuses = {
     RecordStatus::kOk,
     RecordStatus::kClockWarmingUp,
     RecordStatus::kTimeUnknown,
@@ -57,7 +58,8 @@ inline constexpr std::array<RecordStatus, 16> kRecordStatuses = {
     RecordStatus::kImageTooLate,
     RecordStatus::kImageRepeated,
     RecordStatus::kOtherZoom,
-    RecordStatus::kNotFinite};
+    RecordStatus::kNotFinite,
+    RecordStatus::kNotLocalized};
 static_assert(static_cast<std::size_t>(kRecordStatuses.back()) + 1 == kRecordStatuses.size());
 
 // Of a frame whose telemetry was asked for. is_lost: there is no connection to the pan/tilt source. clock_locked: the
@@ -113,6 +115,8 @@ constexpr const char* to_string(RecordStatus status) {
       return "no calibration for this zoom";
     case RecordStatus::kNotFinite:
       return "not finite";
+    case RecordStatus::kNotLocalized:
+      return "not localized";
   }
   return "unknown status";
 }

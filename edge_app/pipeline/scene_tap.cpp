@@ -18,7 +18,8 @@ SceneTap::SceneTap(SceneLocator& locator, const SceneTapOptions& options)
 bool SceneTap::wants(double now_s, RecordMode mode, bool began_anew) {
   has_begun_anew_ = has_begun_anew_ || began_anew;
   if (busy_.load(std::memory_order_acquire)) return false;
-  const bool has_reason = has_begun_anew_ || asked_in_oe_ != (mode == RecordMode::kOe);
+  const bool has_reason =
+      has_begun_anew_ || mode == RecordMode::kNone || asked_in_oe_ != (mode == RecordMode::kOe);
   return now_s >= (has_reason ? earliest_s_ : due_s_).load(std::memory_order_relaxed);
 }
 
@@ -58,7 +59,9 @@ void SceneTap::look(const LocalizableFrame& frame, const std::function<void()>& 
   told.time_s = *frame.record.time_s;
   const SceneLocator::Outcome outcome = locator_.look(frame, &told);
   if (outcome == SceneLocator::Outcome::kTold && told_.push(told)) wake();
-  in_vain_ = outcome == SceneLocator::Outcome::kNotFound ? in_vain_ + 1 : 0;
+  const bool is_in_vain =
+      outcome == SceneLocator::Outcome::kNotFound && frame.record.orientation.has_value();
+  in_vain_ = is_in_vain ? in_vain_ + 1 : 0;
   constexpr int kMostDoublings = 5;
   const double pause_s = std::min(
       options_.interval_s, options_.least_pause_s * std::exp2(std::min(in_vain_, kMostDoublings)));

@@ -1,14 +1,17 @@
 #pragma once
 // SceneTap: now and then a picture of the live video for somebody who knows by a scene map where it looks, and what comes of it: at the
-// start, after a reconnection, where OE mode has lost its landmarks or found some, else each interval_s.
+// start, after a reconnection, where OE mode has lost its landmarks or found some, else each interval_s; without telemetry, as soon as may
+// be wherever there is no orientation.
 //
 //   real-time thread --LocalizableFrame--> localization thread --ToldBase--> real-time thread
 //                                                | ImageSlot
 //                                                +--> capture thread
 //
 // One picture at a time, the newest when the thread is ready for one: none waits. To the real-time thread that is a few atomics and the
-// push of a fixed-size message; the image is lent with its slot. Pauses grow while pictures are refused.
+// push of a fixed-size message; the image is lent with its slot. Pauses grow while pictures are refused, but not where there is no
+// orientation meanwhile.
 
+#include <array>
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
 #include <functional>
@@ -22,10 +25,11 @@
 
 namespace alidade {
 
-// One frame on its way to the localization thread; its record has an orientation.
+// One frame on its way to the localization thread.
 struct LocalizableFrame {
-  OrientationRecord record;
-  ImageView image;  // lent with its slot
+  OrientationRecord record;  // with time, and with an orientation unless there is no telemetry
+  std::array<double, 3> angular_velocity_rad_s{};  // camera frame; where it has none
+  ImageView image;                                 // lent with its slot
   ImageSlot slot = kNoImageSlot;
 };
 static_assert(std::is_trivially_copyable_v<LocalizableFrame>);

@@ -1,6 +1,6 @@
 #pragma once
 // ToldBase: what the localization thread tells the real-time thread of one frame: how much further it looked, in the scene map's base,
-// than its record says. Fixed size and trivially copyable: crosses the queue by value.
+// than its record says; or, where that has no orientation, where it looked. Fixed size and trivially copyable: crosses the queue by value.
 
 #include <array>
 #include <cstdint>
@@ -17,8 +17,22 @@ struct ToldBase {
   std::array<double, 2> change_rad{};  // (pan, tilt), true angles: as localized minus as answered
   std::array<double, 3> covariance{};  // rad^2, of the localization: pan, pan with tilt, tilt
   bool moved = false;                  // the base, or telemetry's zero, is known to have moved
+  // Of a frame without an orientation: where it looked when its middle row was exposed, row by row, and the covariance of
+  // R Exp(xi), xi in the camera frame, rad^2. change and covariance are then 0.
+  bool is_whole = false;
+  std::array<double, 9> R_base_from_camera{};
+  std::array<double, 9> R_covariance{};
 };
 static_assert(std::is_trivially_copyable_v<ToldBase>);
+
+[[nodiscard]] inline std::array<double, 9> pack_matrix(const Matrix3<double>& m) {
+  return {m(0, 0), m(0, 1), m(0, 2), m(1, 0), m(1, 1), m(1, 2), m(2, 0), m(2, 1), m(2, 2)};
+}
+[[nodiscard]] inline Matrix3<double> unpack_matrix(const std::array<double, 9>& m) {
+  Matrix3<double> out;
+  out << m[0], m[1], m[2], m[3], m[4], m[5], m[6], m[7], m[8];
+  return out;
+}
 
 [[nodiscard]] inline BaseMeasurement unpack(const ToldBase& told) {
   BaseMeasurement out;

@@ -80,6 +80,38 @@ TEST_F(ConfigTest, VideoAloneIsEnoughWhereOnlyThatIsNeeded) {
   EXPECT_THAT(load(video), HasSubstr("section 'pan_tilt' is missing; add it"));
 }
 
+TEST_F(ConfigTest, AMapThatIsKeptUpIsAFile) {
+  EXPECT_THAT(load(std::string(kMinimal) + "scene_map: {update: true}\n"), HasSubstr("add file"));
+  EXPECT_THAT(load(kMinimal), IsEmpty());
+  EXPECT_FALSE(config_.scene_map.update);
+}
+
+TEST_F(ConfigTest, WithoutTelemetryTheSceneMapAndACalibrationAreNeeded) {
+  const std::string none =
+      "video: {type: rtsp, url: 'rtsp://camera/s'}\n"
+      "pan_tilt: {type: none}\n";
+  const std::string map = "scene_map: {file: scene.map}\n";
+  const std::string calibrated = "calibration: {file: c.yaml}\n";
+  ASSERT_THAT(load(none + map + calibrated), IsEmpty());
+  EXPECT_EQ(config_.pan_tilt.type, PanTiltConfig::Type::kNone);
+  EXPECT_FALSE(config_.calibration.automatic);
+  EXPECT_THAT(load(none + calibrated), HasSubstr(":2: pan_tilt.type: none, and no scene map"));
+  EXPECT_THAT(load(none + map),
+              HasSubstr(":2: pan_tilt.type: none, and nothing can be calibrated"));
+  EXPECT_THAT(load(none + map + "calibration: {file: c.yaml, auto: true}\n"),
+              HasSubstr("set it to false"));
+  EXPECT_THAT(load(none + map + "calibration: {file: c.yaml, auto: false}\n"), IsEmpty());
+  EXPECT_THAT(load(none + map + calibrated + "realtime: {mode: PT}\n"), HasSubstr("set it to OE"));
+  EXPECT_THAT(load("video: {type: recording, directory: film}\n"
+                   "pan_tilt: {type: none}\n" +
+                   map + calibrated),
+              HasSubstr("is for live video"));
+  EXPECT_THAT(load("video: {type: rtsp, url: 'rtsp://camera/s'}\n"
+                   "pan_tilt: {type: none, rate_hz: 3}\n" +
+                   map + calibrated),
+              HasSubstr("rate_hz"));
+}
+
 TEST_F(ConfigTest, TheHttpServerHasAnAddressAndATokenFromElsewhere) {
   const std::string minimal = kMinimal;
   ASSERT_THAT(load(minimal + "output: {http: '127.0.0.1:8080'}\n"), IsEmpty());
@@ -178,7 +210,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
           "realtime: {mode: PT, priority: 60, cpu: 3, lock_memory: true, max_extrapolation_s: "
           "0.5}\n"
           "scene_map: {file: scene.map, interval_s: 3, zero_sigma_rad: 2e-4, on_moved_base: "
-          "report}\n"
+          "report, update: true}\n"
           "tracking: {plane: ground/plane.yaml, space: plane, detection_sigma_px: 3,\n"
           "           false_alarms_per_frame: 0.5, detection_probability: 0.8, least_score: 0.25,\n"
           "           acceleration_density_m2_s3: 2, first_velocity_sigma_m_s: 5,\n"
@@ -214,6 +246,7 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_EQ(config_.scene_map.interval_s, 3);
   EXPECT_EQ(config_.scene_map.zero_sigma_rad, 2e-4);
   EXPECT_FALSE(config_.scene_map.correct_moved_base);
+  EXPECT_TRUE(config_.scene_map.update);
   EXPECT_EQ(config_.tracking.plane, directory_.path() + "/ground/plane.yaml");
   ASSERT_TRUE(config_.tracking.targets);
   const TargetOptions& targets = *config_.tracking.targets;

@@ -46,6 +46,7 @@ LocalizableFrame frame_of(ImageSlot slot, RecordMode mode) {
   frame.record.frame = slot;
   frame.record.time_s = slot;
   frame.record.mode = mode;
+  frame.record.orientation = OrientationRecord::Orientation();
   frame.slot = slot;
   return frame;
 }
@@ -116,6 +117,21 @@ TEST(SceneTap, WaitsLongerTheLongerItIsInVain) {
     longest_s = wait_s;
   }
   EXPECT_GT(longest_s, 8);
+}
+
+// Without telemetry nothing is known until a picture is found.
+TEST(SceneTap, DoesNotWaitLongerWhereThereIsNoOrientation) {
+  ScriptedLocator locator(std::vector<Outcome>(4, Outcome::kNotFound));
+  SceneTap tap(locator, {1000, 1});
+  Looking looking(&tap);
+  for (ImageSlot i = 0; i < 4; ++i) {
+    LocalizableFrame frame = frame_of(i, RecordMode::kNone);
+    frame.record.orientation.reset();
+    looking.wait_until_wanted(monotonic_now_s() + 1.1, RecordMode::kNone);
+    ASSERT_TRUE(tap.push(frame));
+    looking.wait_for_slot(i);
+  }
+  EXPECT_EQ(locator.looked(), 4);
 }
 
 TEST(SceneTap, GivesBackWhatWaitsAtTheEnd) {

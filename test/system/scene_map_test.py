@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""`alidade run` with a scene map: a telemetry zero that has moved since the map was made is found, said and corrected."""
+"""`alidade run` with a scene map: a telemetry zero that has moved since the map was made is found, said and corrected; a camera without
+telemetry runs on the map alone."""
 import json
 import signal
 import subprocess
@@ -18,7 +19,7 @@ CAMERA = {
 }
 
 
-class MovedZero(SystemTest):
+class WithSceneMap(SystemTest):
     def build_map(self):
         film = self.folder / "film.yaml"
         film.write_text(json.dumps({
@@ -32,6 +33,8 @@ class MovedZero(SystemTest):
         self.assertEqual(built.returncode, 0, built.stderr)
         return scene_map
 
+
+class MovedZero(WithSceneMap):
     def run_with(self, camera, scene_map, records_after, **scene):
         """Records until so many were tied to the map, and what /api/v1/map says then."""
         config = self.write_config(
@@ -104,6 +107,91 @@ class MovedZero(SystemTest):
                 pass
             code, _ = run.end(signal.SIGINT)
             self.assertEqual(code, 0, run.error_text())
+
+
+class NoTelemetry(WithSceneMap):
+    NONE = {"type": "none", "url": None, "rate_hz": None, "angle_sigma_rad": None}
+
+    def test_directions_are_the_maps_from_the_first_picture_that_is_found(self):
+        scene_map = self.build_map()
+        camera = self.camera(settings={
+            "image": {"width": 640, "height": 360, "rate_hz": 5}, "duration_s": 60,
+            "sensor": {"covered": [{"from_s": 20, "to_s": 24}]},
+            "path": {"type": "triple_cosine", "amplitude": 0.05, "period_s": 6}, **CAMERA})
+        config = self.write_config(
+            camera, pan_tilt=self.NONE, realtime={"mode": "OE"}, scene_map={"file": str(scene_map), "interval_s": 3},
+            output={"json": True})
+        run = self.alidade("run", "-c", config)
+        records, held, gaps = [], 0, 0
+        # Found, covered, and found again.
+        while gaps < 1 or held < 20:
+            line = run.line()
+            self.assertIsNotNone(line, run.error_text())
+            records.append(json.loads(line))
+            was_held, is_held = held > 0, records[-1]["mode"] == "OE"
+            if was_held and not is_held:
+                gaps += held >= 5
+                held = 0
+            held += is_held
+            self.assertLess(len(records), 600, run.error_text())
+        camera.end(signal.SIGTERM)
+        run.end(signal.SIGINT)
+        truth = Truth(camera.truth)
+        self.assertEqual({r["mode"] for r in records}, {"none", "OE"})
+        errors, sigmas = [], []
+        for record in records:
+            if record["mode"] == "none":
+                self.assertIn(record["status"], ("not localized", "picture time unknown"))
+                continue
+            angles = truth.angles(record["time_s"])
+            if angles is None:
+                continue
+            error = max(abs(record["pan_rad"] - angles[0]), abs(record["tilt_rad"] - angles[1]))
+            errors.append(error)
+            # The map's own base rests on telemetry that errs by 0.2 mrad; by arrival pictures are some milliseconds late.
+            sigmas.append(error / (max(record["orientation_sigma_rad"]) + 0.3e-3))
+        print(f"NoTelemetry: {len(records)} records, {len(errors)} in OE mode, rms {1e3 * rms(errors):.2f} mrad, "
+              f"largest {1e3 * max(errors):.2f} mrad, {max(sigmas):.1f} sigmas")
+        self.assertGreater(len(errors), 20)
+        self.assertLess(rms(errors), 0.8e-3)
+        self.assertLess(max(sigmas), 5)
+
+    def test_a_map_that_is_kept_up_outlives_a_kill(self):
+        scene_map = self.build_map()
+        before = scene_map.read_bytes()
+        camera = self.camera(settings={
+            "image": {"width": 640, "height": 360, "rate_hz": 5},
+            "path": {"type": "triple_cosine", "amplitude": 0.05, "period_s": 6}, **CAMERA})
+        config = self.write_config(
+            camera, pan_tilt=self.NONE, realtime={"mode": "OE"}, output={"json": True},
+            scene_map={"file": str(scene_map), "interval_s": 0.5, "update": True})
+        for held_for in (8, 17, 29):
+            run = self.alidade("run", "-c", config)
+            held = 0
+            while held < held_for:
+                line = run.line()
+                self.assertIsNotNone(line, run.error_text())
+                held += json.loads(line)["mode"] == "OE"
+            run.end(signal.SIGKILL)
+            self.assertNotIn("kept up any more", run.error_text())
+            checked = subprocess.run([ALIDADE, "map", "check", scene_map], capture_output=True, text=True, timeout=60)
+            self.assertEqual(checked.returncode, 0, checked.stdout + checked.stderr)
+        camera.end(signal.SIGTERM)
+        self.assertNotEqual(scene_map.read_bytes(), before)
+
+    def test_what_it_cannot_do_without_is_an_error_in_one_line(self):
+        camera = self.camera()
+        config = self.write_config(camera, pan_tilt=self.NONE, realtime={"mode": "OE"})
+        run = self.alidade("run", "-c", config)
+        code, _ = run.end()
+        self.assertEqual(code, 2)
+        self.assertIn("no scene map tells where the camera looks", run.error_text())
+        config = self.write_config(camera, pan_tilt=self.NONE, realtime={"mode": "OE"},
+                                   scene_map={"file": str(self.folder / "none.map")})
+        run = self.alidade("run", "-c", config)
+        code, _ = run.end()
+        self.assertEqual(code, 2)
+        self.assertIn("pan_tilt.type none needs one", run.error_text())
 
 
 if __name__ == "__main__":

@@ -332,7 +332,7 @@ inline std::vector<SceneDay> live_through(const ChangingSceneOptions& what,
                                           const SceneRunOptions& how) {
   ChangingScene scene(what);
   SceneMap map = scene.first_map(0.1, 0.05);
-  MapUpkeep upkeep(how.options);
+  LandmarkUpkeep upkeep(how.options);
   PoseKnowledge knowledge;
   knowledge.lens = map.lens;
   knowledge.least_log_f = std::log(1000.0);

@@ -83,7 +83,7 @@ class UpkeepTest : public ::testing::Test {
 
   Matrix3<double> R = r_frd_from_rdf<double>();
   SceneMap map;
-  MapUpkeep upkeep;
+  LandmarkUpkeep upkeep;
   UpkeepCounts counts;
 };
 
@@ -206,7 +206,7 @@ TEST_F(UpkeepTest, ManyThatAreGoneDoNotHideTheirOwnDeath) {
   }
   EXPECT_GT(map.landmarks.size(), 120U);
   // Another program goes on with the map.
-  upkeep = MapUpkeep();
+  upkeep = LandmarkUpkeep();
   for (int i = 0; i < 150; ++i, t += 3600) show(grid(), {}, t);
   EXPECT_EQ(map.landmarks.size(), 24U);
 }
@@ -223,7 +223,7 @@ TEST_F(UpkeepTest, ACellHoldsSoManyAndTheLeastUsefulGoes) {
 TEST_F(UpkeepTest, AFullMapGivesUpTheLeastUseful) {
   UpkeepOptions options;
   options.most_landmarks = 24;
-  upkeep = MapUpkeep(options);
+  upkeep = LandmarkUpkeep(options);
   map.landmarks[10].life.matched = 1;
   std::set<std::int64_t> others = grid();
   others.erase(11);
@@ -304,7 +304,7 @@ TEST(SphereCell, CellsAreOfTheSizeThatWasAskedFor) {
   EXPECT_NEAR(same, 0.877 * kPairs, 5 * std::sqrt(kPairs * 0.877 * 0.123) + 0.02 * kPairs);
 }
 
-TEST(MapUpkeep, TwoDaysLeaveTheDirectionWhereItWas) {
+TEST(LandmarkUpkeep, TwoDaysLeaveTheDirectionWhereItWas) {
   ChangingSceneOptions what;
   what.days = 2;
   what.places = 1;
