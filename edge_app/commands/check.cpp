@@ -21,6 +21,7 @@
 #include "edge_app/commands/check_measurement.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/lens_prior.h"
+#include "edge_app/output/mqtt_connection.h"
 
 namespace alidade {
 namespace {
@@ -149,6 +150,9 @@ void print_report(const CheckReport& report, const VideoNeeds& video_needs, bool
     fmt::print("together\n");
     print(describe(*report.motion));
   }
+  if (!report.broker.empty())
+    fmt::print("mqtt           {}: {}\n", report.broker,
+               report.broker_error.empty() ? "connected" : "failed");
   for (const Finding& finding : report.findings) {
     if (finding.severity == Severity::kAdvice) fmt::print("advice         {}\n", finding.text);
   }
@@ -177,6 +181,12 @@ void check_lens_prior(const Config& config, const Camera<double>& camera) {
                1e6 * known.line_delay.prior.value, 1e6 * known.line_delay.prior.sigma);
 }
 
+// Empty: it takes the connection.
+std::string broker_error(const MqttOptions& options) {
+  const std::string error = MqttConnection::files_error(options);
+  return error.empty() ? MqttConnection::try_once(options) : error;
+}
+
 }  // namespace
 
 int check_links(const CheckOptions& options) {
@@ -197,7 +207,7 @@ int check_links(const CheckOptions& options) {
       check_telemetry(measured.samples, measured.delivered_s, step.telemetry_clock,
                       telemetry_needs(measured, config, calibration, step));
 
-  CheckReport report{options.config, calibration, measured, video, telemetry, {}, {}, {}};
+  CheckReport report{options.config, calibration, measured, video, telemetry, {}, {}, {}, {}, {}};
   report.repeats =
       check_repeats(measured.frames, video.time_s, telemetry.fresh,
                     {measured.video.name, calibration.calibration.camera.focal_length});
@@ -214,6 +224,11 @@ int check_links(const CheckOptions& options) {
   if (measured.images.images > 1 && !telemetry.fresh.empty()) {
     report.motion = motion_of(measured, video, telemetry, config, calibration);
     add(report.motion->findings);
+  }
+  if (config.mqtt) {
+    report.broker = config.mqtt->name();
+    report.broker_error = broker_error(*config.mqtt);
+    if (!report.broker_error.empty()) add_problem(&report.findings, report.broker_error);
   }
   if (options.json) {
     std::fputs(check_json(report).c_str(), stdout);

@@ -127,6 +127,11 @@ std::string check_json(const CheckReport& report) {
   json["video"] = video_json(report);
   json["pan_tilt"] = pan_tilt_json(report);
   json["motion"] = motion_json(report.motion);
+  json["mqtt"] = nullptr;
+  if (!report.broker.empty()) {
+    json["mqtt"] = {{"name", report.broker},
+                    {"error", report.broker_error.empty() ? Json() : Json(report.broker_error)}};
+  }
   json["findings"] = Json::array();
   for (const Finding& finding : report.findings) {
     json["findings"].push_back(

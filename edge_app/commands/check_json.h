@@ -22,6 +22,8 @@ struct CheckReport {
   const TelemetryReport& telemetry;
   RepeatReport repeats;
   std::optional<MotionReport> motion;  // where there are pictures and samples
+  std::string broker;                  // of MQTT; empty: none is configured
+  std::string broker_error;            // empty: it takes a connection
   Findings findings;                   // of all of them
 };
 

@@ -19,6 +19,7 @@
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/http_api.h"
 #include "edge_app/output/live_state.h"
+#include "edge_app/output/mqtt_publisher.h"
 #include "edge_app/output/record_sinks.h"
 #include "edge_app/output/record_writer.h"
 #include "edge_app/output/status_page.h"
@@ -117,6 +118,20 @@ std::unique_ptr<HttpServer> start_http(const Config& config, const HttpApiSource
   return server;
 }
 
+// Null where no broker is configured.
+std::unique_ptr<MqttPublisher> make_mqtt(const Config& config, LiveTargets* targets) {
+  if (!config.mqtt) return nullptr;
+  const std::string error = MqttConnection::files_error(*config.mqtt);
+  if (!error.empty()) throw CommandError(kExitUsage, error);
+  auto mqtt = std::make_unique<MqttPublisher>(*config.mqtt);
+  if (targets != nullptr) {
+    targets->feed().add_on_news([mqtt = mqtt.get(), lines = &targets->lines()](const auto&) {
+      mqtt->take_targets(lines->newest().json);
+    });
+  }
+  return mqtt;
+}
+
 // Waits for a signal, the end of the pipeline, or the end of the time asked for.
 void wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport* report,
                       double duration_s) {
@@ -167,8 +182,10 @@ int run_live(const RunOptions& options) {
   RecordSinks sinks;
   // First: these are there at once.
   if (config.output.http) sinks.add(&live);
-  if (format) sinks.add(&writer);
   const std::unique_ptr<LiveTargets> targets = make_live_targets(config, plane);
+  const std::unique_ptr<MqttPublisher> mqtt = make_mqtt(config, targets.get());
+  if (mqtt) sinks.add(mqtt.get());
+  if (format) sinks.add(&writer);
   ImageTap tap;
   if (config.output.http) of_pipeline.tap = &tap;
   const auto scene = load_scene(config, calibration.calibration.camera);
@@ -189,11 +206,13 @@ int run_live(const RunOptions& options) {
     sources.targets = &targets->feed();
     sources.target_lines = &targets->lines();
   }
+  sources.mqtt = mqtt.get();
   if (scene) sources.scene = [&scene] { return scene->report(); };
   sources.version = ALIDADE_VERSION;
   sources.camera = video->name();
   sources.latency_measured = of_pipeline.measure_latency;
   const auto http = start_http(config, sources, &tap);
+  if (mqtt && !mqtt->start()) throw CommandError(kExitFailed, "there can be no thread for MQTT");
   if (targets) targets->start();
   pipeline.start();
   const ServiceManager manager;
@@ -204,6 +223,7 @@ int run_live(const RunOptions& options) {
   if (http) http->stop();
   if (targets) targets->stop();
   pipeline.stop();
+  if (mqtt) mqtt->stop();
 
   spdlog::info("{}", describe(pipeline.summary(), of_pipeline.measure_latency));
   log_source_losses(*video);

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdlib>
-#include <fstream>
 
 #include "edge_app/config/link_keys.h"
 #include "edge_app/config/yaml_section.h"
@@ -170,23 +169,6 @@ HttpServerOptions read_address(const YamlSection& section, const std::string& te
   return http;
 }
 
-bool is_loopback(const std::string& host) {
-  return host == "localhost" || host == "::1" || host.compare(0, 4, "127.") == 0;
-}
-
-// The one line of a file, without the blanks around it.
-std::string read_token_file(const YamlSection& section, const std::string& file) {
-  std::ifstream in(file);
-  std::string line;
-  if (!std::getline(in, line)) {
-    section.fail("token_file", fmt::format("cannot read a line of {}; put the token there", file));
-  }
-  const char* blanks = " \t\r";
-  line.erase(0, line.find_first_not_of(blanks));
-  line.erase(line.find_last_not_of(blanks) + 1);
-  return line;
-}
-
 std::string read_token(YamlSection& section, const std::string& path) {
   const std::optional<std::string> variable = section.text("token_env");
   const std::optional<std::string> file = section.text("token_file");
@@ -204,7 +186,7 @@ std::string read_token(YamlSection& section, const std::string& path) {
     }
     token = value;
   } else {
-    token = read_token_file(section, path_relative_to(path, *file));
+    token = first_line_of(section, "token_file", path_relative_to(path, *file), "token");
   }
   constexpr std::size_t kShortest = 8;
   const bool printable =
@@ -334,6 +316,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   const YamlSection scene_map = top.section("scene_map");
   const YamlSection realtime = top.section("realtime");
   const YamlSection tracking = top.section("tracking");
+  const YamlSection mqtt = top.section("mqtt");
   const YamlSection output = top.section("output");
   // Before one is missed: it may be there, mistyped.
   top.finish();
@@ -352,6 +335,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   config->tracking = read_tracking(tracking, top.has("tracking"), path);
   if (scope == ConfigScope::kAll) check_ages(*config, pan_tilt, realtime);
   config->output = read_output(output, path, &config->warnings);
+  if (top.has("mqtt")) config->mqtt = read_mqtt(mqtt, path, &config->warnings);
   if (scope != ConfigScope::kAll) return;
   if (config->pan_tilt.type == PanTiltConfig::Type::kNone) {
     check_without_telemetry(*config, pan_tilt, calibration, realtime);

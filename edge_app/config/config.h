@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "edge_app/config/mqtt_config.h"
 #include "edge_app/config/pan_tilt_config.h"
 #include "edge_app/config/tracking_config.h"
 #include "edge_app/output/http/http_options.h"
@@ -96,6 +97,7 @@ struct Config {
   RealtimeConfig realtime;
   TrackingConfig tracking;
   OutputConfig output;
+  std::optional<MqttOptions> mqtt;    // empty: no broker is told
   std::vector<std::string> warnings;  // FILE:LINE: ... lines for the log
 };
 

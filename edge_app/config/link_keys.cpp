@@ -4,6 +4,7 @@
 
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
 
 namespace alidade {
 
@@ -52,6 +53,23 @@ void read_login(YamlSection& section, std::string* user, std::string* password) 
                              *variable));
   }
   *password = value;
+}
+
+std::string first_line_of(const YamlSection& section, const std::string& key,
+                          const std::string& file, const std::string& what) {
+  std::ifstream in(file);
+  std::string line;
+  if (!std::getline(in, line)) {
+    section.fail(key, fmt::format("cannot read a line of {}; put the {} there", file, what));
+  }
+  const char* blanks = " \t\r";
+  line.erase(0, line.find_first_not_of(blanks));
+  line.erase(line.find_last_not_of(blanks) + 1);
+  return line;
+}
+
+bool is_loopback(const std::string& host) {
+  return host == "localhost" || host == "::1" || host.compare(0, 4, "127.") == 0;
 }
 
 }  // namespace alidade

@@ -24,4 +24,11 @@ inline constexpr NumberRange kSeconds{0.1, 3600, "s"};
 // user and password_env.
 void read_login(YamlSection& section, std::string* user, std::string* password);
 
+// The first line of a file that holds a secret, without the blanks around it. what: what it holds, for the error.
+[[nodiscard]] std::string first_line_of(const YamlSection& section, const std::string& key,
+                                        const std::string& file, const std::string& what);
+
+// Whether an address is of this machine alone.
+[[nodiscard]] bool is_loopback(const std::string& host);
+
 }  // namespace alidade

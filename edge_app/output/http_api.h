@@ -10,6 +10,7 @@
 #include "core/tracking/plane_estimate.h"
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/live_state.h"
+#include "edge_app/output/mqtt_publisher.h"
 #include "edge_app/output/target_lines.h"
 #include "edge_app/pipeline/pipeline.h"
 #include "edge_app/pipeline/scene_report.h"
@@ -30,7 +31,8 @@ struct HttpApiSources {
   // Both null where nothing is tracked. Borrowed as live is; where there are some, they wake the server, too.
   TargetFeed* targets = nullptr;
   TargetLines* target_lines = nullptr;
-  std::function<SceneReport()> scene;  // empty: no scene map is in use
+  const MqttPublisher* mqtt = nullptr;  // null: no broker is told
+  std::function<SceneReport()> scene;   // empty: no scene map is in use
   std::string version;
   std::string camera;            // the video source's name, without a password
   bool latency_measured = true;  // false for a recording

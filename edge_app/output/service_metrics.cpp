@@ -180,6 +180,17 @@ void add_target_metrics(const TargetFeed& feed, MetricsText* out) {
   out->add(counters.births_refused);
 }
 
+void add_mqtt_metrics(const MqttCounters& mqtt, MetricsText* out) {
+  out->gauge("alidade_mqtt_connected", "1: the MQTT broker has taken the connection");
+  out->add(std::int64_t{mqtt.connected});
+  out->counter("alidade_mqtt_connections_total", "Times that it has taken one");
+  out->add(mqtt.connections);
+  out->counter("alidade_mqtt_published_total", "Messages that it has taken");
+  out->add(mqtt.published);
+  out->counter("alidade_mqtt_replaced_total", "States not sent, as newer ones took their place");
+  out->add(mqtt.replaced);
+}
+
 }  // namespace
 
 std::string service_metrics(const HttpApiSources& sources, const HttpCounters& http) {
@@ -245,6 +256,7 @@ std::string service_metrics(const HttpApiSources& sources, const HttpCounters& h
     add_zoom_metrics(*newest, zoom_curve_of(sources), &out);
   }
   if (sources.targets != nullptr) add_target_metrics(*sources.targets, &out);
+  if (sources.mqtt != nullptr) add_mqtt_metrics(sources.mqtt->counters(), &out);
   if (sources.scene) add_scene_metrics(sources.scene(), now_s, &out);
   out.gauge("alidade_stream_clients", "Clients of the event stream");
   out.add(http.streams);

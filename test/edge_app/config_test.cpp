@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include <cstdlib>
+#include <fstream>
 #include <string>
 
 #include "edge_app/config/nearest_word.h"
@@ -136,6 +137,22 @@ TEST_F(ConfigTest, TheHttpServerHasAnAddressAndATokenFromElsewhere) {
   EXPECT_EQ(config_.output.stdout_format, OutputFormat::kCsv);
 }
 
+TEST_F(ConfigTest, ABrokersPasswordMayStandInAFileAndIsToCrossNoNetworkInTheClear) {
+  std::ofstream(directory_.path() + "/password") << "  open-sesame \nand more\n";
+  const std::string login = ", user: eve, password_file: password}\n";
+  ASSERT_THAT(load(kMinimal + ("mqtt: {url: 'mqtt://broker:1884/'" + login)), IsEmpty());
+  EXPECT_EQ(config_.mqtt->name(), "mqtt://broker:1884");
+  EXPECT_EQ(config_.mqtt->password, "open-sesame");
+  EXPECT_THAT(config_.warnings,
+              ::testing::ElementsAre(HasSubstr("mqtt.url: the password crosses the network")));
+  ASSERT_THAT(load(kMinimal + ("mqtt: {url: 'mqtt://[::1]'" + login)), IsEmpty());
+  EXPECT_EQ(config_.mqtt->name(), "mqtt://[::1]:1883");
+  EXPECT_EQ(config_.mqtt->host, "::1");
+  EXPECT_THAT(config_.warnings, IsEmpty());
+  ASSERT_THAT(load(kMinimal + ("mqtt: {url: 'mqtts://broker'" + login)), IsEmpty());
+  EXPECT_THAT(config_.warnings, IsEmpty());
+}
+
 TEST_F(ConfigTest, TakesTheFocalLengthsOfALensThatZooms) {
   ASSERT_THAT(load("video: {type: rtsp, url: 'rtsp://camera/s'}\n"
                    "pan_tilt: {type: vapix, url: 'http://camera'}\n"
@@ -217,6 +234,10 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
           "           most_sigma_m: 40, association: cheap, birth_hits: 2, birth_looks: 4,\n"
           "           lose_after_s: 1.5, forget_after_s: 30, history_s: 3, history_frames: 90,\n"
           "           max_targets: 64, max_detections: 100}\n"
+          "mqtt: {url: 'mqtts://broker', ca_file: ca.pem, certificate_file: own.pem,\n"
+          "       key_file: own.key, user: eve, password_env: ALIDADE_TEST_PASSWORD,\n"
+          "       prefix: site/mast, client_id: mast, qos: 2, keep_alive_s: 20, timeout_s: 3,\n"
+          "       max_backoff_s: 60, orientation_rate_hz: 0.5}\n"
           "output: {csv: true, json: false, http: '127.0.0.1:0', targets: targets.jsonl}\n"),
       IsEmpty());
   EXPECT_EQ(config_.video.transport, VideoConfig::Transport::kUdp);
@@ -274,6 +295,21 @@ TEST_F(ConfigTest, EveryKeyIsRead) {
   EXPECT_TRUE(config_.realtime.lock_memory);
   EXPECT_EQ(config_.realtime.max_extrapolation_s, 0.5);
   EXPECT_EQ(config_.output.stdout_format, OutputFormat::kCsv);
+  ASSERT_TRUE(config_.mqtt);
+  const MqttOptions& mqtt = *config_.mqtt;
+  EXPECT_EQ(mqtt.name(), "mqtts://broker:8883");
+  EXPECT_EQ(mqtt.ca_file, directory_.path() + "/ca.pem");
+  EXPECT_EQ(mqtt.certificate_file, directory_.path() + "/own.pem");
+  EXPECT_EQ(mqtt.key_file, directory_.path() + "/own.key");
+  EXPECT_EQ(mqtt.user, "eve");
+  EXPECT_EQ(mqtt.password, "secret");
+  EXPECT_EQ(mqtt.prefix, "site/mast");
+  EXPECT_EQ(mqtt.client_id, "mast");
+  EXPECT_EQ(mqtt.qos, 2);
+  EXPECT_EQ(mqtt.keep_alive_s, 20);
+  EXPECT_EQ(mqtt.timeout_s, 3);
+  EXPECT_EQ(mqtt.max_backoff_s, 60);
+  EXPECT_EQ(mqtt.orientation_rate_hz, 0.5);
 }
 
 TEST_F(ConfigTest, TargetsAreTrackedWhereThereIsTheSection) {
@@ -620,6 +656,28 @@ INSTANTIATE_TEST_SUITE_P(
                 ":4: tracking.history_s", "9"},
         Mistake{"TooManyBoxes", MINIMAL "tracking: {max_detections: 10000}\n",
                 ":4: tracking.max_detections", "500"},
+        Mistake{"NoBroker", MINIMAL "mqtt: {qos: 1}\n", ":4: mqtt.url",
+                "expected for example url: mqtt://broker"},
+        Mistake{"BrokerOverHttp", MINIMAL "mqtt: {url: 'http://broker'}\n", ":4: mqtt.url",
+                "starts with mqtt://, mqtts://"},
+        Mistake{"BrokerWithAPath", MINIMAL "mqtt: {url: 'mqtt://broker/a'}\n", ":4: mqtt.url",
+                "see mqtt.prefix"},
+        Mistake{"PasswordInTheBrokersUrl", MINIMAL "mqtt: {url: 'mqtt://u:p@broker'}\n",
+                ":4: mqtt.url", "give them as user and password_env"},
+        Mistake{"AuthorityWithoutTls", MINIMAL "mqtt: {url: 'mqtt://broker', ca_file: ca.pem}\n",
+                ":4: mqtt.ca_file", "is for mqtts:// only"},
+        Mistake{"CertificateWithoutAKey",
+                MINIMAL "mqtt: {url: 'mqtts://broker', certificate_file: a.pem}\n",
+                ":4: mqtt.certificate_file", "give certificate_file and key_file"},
+        Mistake{"TopicWithAWildcard", MINIMAL "mqtt: {url: 'mqtt://broker', prefix: 'a/#'}\n",
+                ":4: mqtt.prefix", "expected for example site/mast"},
+        Mistake{"ServiceBeyondTwo", MINIMAL "mqtt: {url: 'mqtt://broker', qos: 3}\n",
+                ":4: mqtt.qos", "quality of service"},
+        Mistake{"PasswordFileForNobody", MINIMAL "mqtt: {url: 'mqtt://broker', password_file: p}\n",
+                ":4: mqtt.password_file", "stands without a user"},
+        Mistake{"PasswordFileThatIsNotThere",
+                MINIMAL "mqtt: {url: 'mqtt://broker', user: u, password_file: none}\n",
+                ":4: mqtt.password_file", "put the password there"},
         Mistake{"UnknownAssociation", MINIMAL "tracking: {association: best}\n",
                 ":4: tracking.association", "expected one of exact, cheap, nearest"},
         Mistake{"TargetsUntracked", MINIMAL "output: {http: '127.0.0.1:0', targets: t.jsonl}\n",

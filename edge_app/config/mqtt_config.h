@@ -1,0 +1,21 @@
+#pragma once
+// Section `mqtt`: the broker that is told status, targets and orientation (edge_app/output/mqtt_publisher.h).
+//   url: mqtt://broker:1883, or mqtts://broker:8883 with TLS              (required; the port may be left out)
+//   ca_file, certificate_file, key_file                                   PEM; mqtts only
+//   user, password_env | password_file
+//   prefix, client_id, qos, keep_alive_s, timeout_s, max_backoff_s, orientation_rate_hz
+// What each means, and its default: mqtt_options.h.
+
+#include <string>
+#include <vector>
+
+#include "edge_app/config/yaml_section.h"
+#include "edge_app/output/mqtt_options.h"
+
+namespace alidade {
+
+// Throws ConfigError.
+MqttOptions read_mqtt(YamlSection section, const std::string& config_path,
+                      std::vector<std::string>* warnings);
+
+}  // namespace alidade

@@ -1,0 +1,244 @@
+#include "edge_app/output/mqtt_connection.h"
+
+#include <fmt/format.h>
+#include <mosquitto.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <algorithm>
+#include <cerrno>
+#include <fstream>
+#include <system_error>
+
+#include "platform/system/clock.h"
+#include "platform/system/shown.h"
+
+namespace alidade {
+namespace {
+
+constexpr double kMilli = 1000;
+
+// Once, and as long as the program lasts.
+bool library_is_ready() {
+  static const bool ready = mosquitto_lib_init() == MOSQ_ERR_SUCCESS;
+  return ready;
+}
+
+bool is_readable(const std::string& file) {
+  std::ifstream in(file);
+  return in.good() && in.peek() != std::ifstream::traits_type::eof();
+}
+
+}  // namespace
+
+struct MqttConnection::Callbacks {
+  static void connected(mosquitto* /*client*/, void* self, int answer) {
+    auto* connection = static_cast<MqttConnection*>(self);
+    if (answer == 0) {
+      connection->connected_ = true;
+    } else {
+      connection->fail_refused(answer);
+    }
+  }
+  static void published(mosquitto* /*client*/, void* self, int id) {
+    static_cast<MqttConnection*>(self)->on_published_(id);
+  }
+  static void logged(mosquitto* /*client*/, void* self, int level, const char* text) {
+    if (level == MOSQ_LOG_ERR)
+      static_cast<MqttConnection*>(self)->last_complaint_ = shown(text, 160);
+  }
+};
+
+MqttConnection::MqttConnection(const MqttOptions& options, const Message* will)
+    : options_(options) {
+  if (library_is_ready())
+    client_ =
+        mosquitto_new(options.client_id.empty() ? nullptr : options.client_id.c_str(), true, this);
+  if (client_ == nullptr) return;
+  mosquitto_connect_callback_set(client_, &Callbacks::connected);
+  mosquitto_publish_callback_set(client_, &Callbacks::published);
+  mosquitto_log_callback_set(client_, &Callbacks::logged);
+  if (will == nullptr) return;
+  const int set =
+      mosquitto_will_set(client_, will->topic.c_str(), static_cast<int>(will->payload.size()),
+                         will->payload.data(), options.qos, will->retain);
+  if (set != MOSQ_ERR_SUCCESS) set_up_error_ = mosquitto_strerror(set);
+}
+
+MqttConnection::~MqttConnection() {
+  if (client_ != nullptr) mosquitto_destroy(client_);
+}
+
+bool MqttConnection::fail_with(const std::string& what) {
+  connected_ = false;
+  if (error_.empty()) error_ = options_.name() + ": " + what;
+  return false;
+}
+
+// Login and TLS.
+bool MqttConnection::set_up() {
+  if (client_ == nullptr) return fail_with("there is no memory for a connection");
+  if (!set_up_error_.empty()) return fail_with(set_up_error_);
+  if (!options_.user.empty() &&
+      mosquitto_username_pw_set(client_, options_.user.c_str(),
+                                options_.password.empty() ? nullptr : options_.password.c_str()) !=
+          MOSQ_ERR_SUCCESS)
+    return fail_with("the user cannot be sent; use printable text for mqtt.user");
+  if (!options_.tls) return true;
+  const auto or_null = [](const std::string& text) {
+    return text.empty() ? nullptr : text.c_str();
+  };
+  const int set = mosquitto_tls_set(
+      client_, or_null(options_.ca_file), options_.ca_file.empty() ? "/etc/ssl/certs" : nullptr,
+      or_null(options_.certificate_file), or_null(options_.key_file), nullptr);
+  if (set == MOSQ_ERR_SUCCESS) return true;
+  return fail_with(fmt::format("TLS cannot be used: {}", mosquitto_strerror(set)));
+}
+
+std::string MqttConnection::files_error(const MqttOptions& options) {
+  const std::pair<const char*, const std::string*> files[] = {
+      {"ca_file", &options.ca_file},
+      {"certificate_file", &options.certificate_file},
+      {"key_file", &options.key_file}};
+  for (const auto& [key, file] : files) {
+    if (!file->empty() && !is_readable(*file))
+      return fmt::format("mqtt.{}: {} cannot be read; name a file in PEM format", key, *file);
+  }
+  return "";
+}
+
+bool MqttConnection::begin() {
+  if (!set_up()) return false;
+  give_up_s_ = monotonic_now_s() + options_.timeout_s;
+  const int code =
+      mosquitto_connect_async(client_, options_.host.c_str(), options_.port, options_.keep_alive_s);
+  if (code == MOSQ_ERR_SUCCESS || code == MOSQ_ERR_CONN_PENDING) return true;
+  fail(errno, code);
+  return false;
+}
+
+// error_number: errno of the call that returned this code.
+void MqttConnection::fail(int error_number, int code) {
+  const bool is_tls = code == MOSQ_ERR_TLS || code == MOSQ_ERR_TLS_HANDSHAKE;
+  if (is_tls) {
+    static_cast<void>(fail_with(
+        fmt::format("TLS failed{}; the broker's certificate must be for '{}' and of {}",
+                    last_complaint_.empty() ? "" : ": " + last_complaint_, options_.host,
+                    options_.ca_file.empty() ? "an authority of this system, or name mqtt.ca_file"
+                                             : options_.ca_file)));
+  } else if (code == MOSQ_ERR_EAI) {
+    static_cast<void>(fail_with("the name cannot be looked up; is mqtt.url right?"));
+  } else if (code == MOSQ_ERR_ERRNO) {
+    static_cast<void>(fail_with(std::generic_category().message(error_number)));
+  } else if (code == MOSQ_ERR_CONN_LOST && !connected_) {
+    static_cast<void>(fail_with(
+        "no connection, or closed before an answer; is a broker there, and does mqtt.url say "
+        "rightly whether with TLS (mqtts://)?"));
+  } else if (code == MOSQ_ERR_KEEPALIVE) {
+    static_cast<void>(fail_with("the broker has fallen silent"));
+  } else {
+    static_cast<void>(fail_with(mosquitto_strerror(code)));
+  }
+}
+
+void MqttConnection::fail_refused(int answer) {
+  constexpr int kBadIdentifier = 2;
+  constexpr int kBadLogin = 4;
+  constexpr int kNotAuthorized = 5;
+  if (answer == kBadLogin || answer == kNotAuthorized) {
+    static_cast<void>(fail_with(
+        options_.user.empty()
+            ? "the broker wants a login; give mqtt.user with password_env or password_file"
+            : fmt::format("the broker refuses the login of '{}'; check mqtt.user and its password",
+                          shown(options_.user))));
+  } else if (answer == kBadIdentifier) {
+    static_cast<void>(fail_with("the broker refuses mqtt.client_id; choose another"));
+  } else {
+    static_cast<void>(
+        fail_with(fmt::format("the broker refuses: {}", mosquitto_connack_string(answer))));
+  }
+}
+
+// What the socket itself knows of a connection that did not come about. While TLS begins, the library takes that for patience.
+bool MqttConnection::has_broken_off(bool* hung_up) {
+  pollfd socket{this->socket(), POLLIN, 0};
+  *hung_up = ::poll(&socket, 1, 0) == 1 && (socket.revents & (POLLERR | POLLHUP)) != 0;
+  if (!*hung_up) return false;
+  int error_number = 0;
+  socklen_t size = sizeof error_number;
+  static_cast<void>(::getsockopt(socket.fd, SOL_SOCKET, SO_ERROR, &error_number, &size));
+  // Before a reset there may have been an answer, which says more.
+  if (error_number == 0 || error_number == ECONNRESET) return false;
+  fail(error_number, MOSQ_ERR_ERRNO);
+  return true;
+}
+
+bool MqttConnection::step() {
+  const auto failed = [this](int code) {
+    if (code == MOSQ_ERR_SUCCESS && mosquitto_socket(client_) >= 0) return false;
+    if (ending_) return true;
+    fail(errno, code == MOSQ_ERR_SUCCESS ? MOSQ_ERR_CONN_LOST : code);
+    return true;
+  };
+  bool hung_up = false;
+  if (!connected_ && has_broken_off(&hung_up)) return false;
+  constexpr int kMostPackets = 1;  // as its manual has it
+  if (failed(mosquitto_loop_read(client_, kMostPackets)) || !error_.empty()) return false;
+  if (mosquitto_want_write(client_) && failed(mosquitto_loop_write(client_, kMostPackets)))
+    return false;
+  if (failed(mosquitto_loop_misc(client_)) || !error_.empty()) return false;
+  if (connected_) return true;
+  if (hung_up) {
+    fail(0, MOSQ_ERR_CONN_LOST);
+    return false;
+  }
+  if (monotonic_now_s() > give_up_s_)
+    return fail_with(fmt::format("no answer within {:g} s", options_.timeout_s));
+  return true;
+}
+
+int MqttConnection::socket() const { return client_ == nullptr ? -1 : mosquitto_socket(client_); }
+
+bool MqttConnection::wants_to_write() const {
+  return (connected_ || !options_.tls) && mosquitto_want_write(client_);
+}
+
+double MqttConnection::patience_s() const {
+  constexpr double kKeepAlive_s = 1;
+  constexpr double kAnswer_s = 0.1;
+  constexpr double kTls_s = 0.02;
+  if (connected_) return kKeepAlive_s;
+  return options_.tls ? kTls_s : kAnswer_s;
+}
+
+bool MqttConnection::publish(const std::string& topic, const std::string& payload, bool retain,
+                             int* id) {
+  const int code = mosquitto_publish(client_, id, topic.c_str(), static_cast<int>(payload.size()),
+                                     payload.data(), options_.qos, retain);
+  if (code == MOSQ_ERR_SUCCESS) return true;
+  fail(errno, code);
+  return false;
+}
+
+void MqttConnection::end() {
+  ending_ = true;
+  static_cast<void>(mosquitto_disconnect(client_));
+}
+
+std::string MqttConnection::try_once(const MqttOptions& options) {
+  MqttOptions of_a_stranger = options;
+  // The one of a program that runs would throw that out.
+  of_a_stranger.client_id.clear();
+  MqttConnection connection(of_a_stranger, nullptr);
+  if (!connection.begin()) return connection.error();
+  while (!connection.is_connected()) {
+    pollfd socket{connection.socket(), POLLIN, 0};
+    if (connection.wants_to_write()) socket.events |= POLLOUT;
+    static_cast<void>(::poll(&socket, 1, static_cast<int>(kMilli * connection.patience_s())));
+    if (!connection.step()) return connection.error();
+  }
+  connection.end();
+  return "";
+}
+
+}  // namespace alidade
