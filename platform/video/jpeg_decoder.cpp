@@ -73,7 +73,7 @@ bool JpegDecoder::decode(std::string_view jpeg, Picture* picture) {
   picture->height = height;
   picture->luma = luma.get();
   picture->stride = width;
-  picture->pts = AV_NOPTS_VALUE;
+  picture->pts = Picture::kNoPts;
   picture->owner = luma;
   return true;
 }

@@ -10,8 +10,8 @@
 #include <string>
 #include <string_view>
 
-#include "platform/video/luma_decoder.h"  // Picture
 #include "platform/video/luma_pool.h"
+#include "platform/video/picture.h"
 
 namespace alidade {
 

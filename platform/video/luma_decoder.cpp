@@ -7,6 +7,8 @@ extern "C" {
 #include <algorithm>
 
 namespace alidade {
+
+static_assert(Picture::kNoPts == AV_NOPTS_VALUE);
 namespace {
 
 bool has_luma_plane(const AVPixFmtDescriptor* format) {

@@ -15,18 +15,9 @@
 
 #include "platform/video/av_handles.h"
 #include "platform/video/coded_picture.h"
+#include "platform/video/picture.h"
 
 namespace alidade {
-
-struct Picture {
-  int width = 0;   // px
-  int height = 0;  // px
-  const std::uint8_t* luma = nullptr;
-  std::ptrdiff_t stride = 0;          // bytes
-  std::int64_t pts = AV_NOPTS_VALUE;  // of the packet it came from
-  bool interlaced = false;            // coded as two fields, or of a frame's two fields
-  std::shared_ptr<const void> owner;
-};
 
 // Empty: pictures coded each by itself, or by another codec.
 [[nodiscard]] std::optional<CodedBy> coded_by(AVCodecID codec);

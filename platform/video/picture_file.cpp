@@ -4,6 +4,7 @@
 
 #include "platform/video/av_file.h"
 #include "platform/video/av_handles.h"
+#include "platform/video/luma_decoder.h"
 
 namespace alidade {
 

@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <string>
 
-#include "platform/video/luma_decoder.h"  // Picture
+#include "platform/video/picture.h"
 
 namespace alidade {
 
