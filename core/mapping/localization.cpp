@@ -6,7 +6,6 @@
 #include <utility>
 
 #include "core/mapping/feature_matching.h"
-#include "core/mapping/two_point_pose.h"
 #include "core/model/direction.h"
 
 namespace alidade {
@@ -39,11 +38,6 @@ FeatureOptions localization_features(bool with_hint) {
   out.max_features = with_hint ? 300 : 500;
   out.contrast_threshold = with_hint ? 0.006 : 0.008;  // noise falls with shrinking
   return out;
-}
-
-PanTilt<double> nearest_angles_of(const Mechanics<double>& mechanics,
-                                  const Matrix3<double>& R_base_from_camera) {
-  return internal::nearest_angles(mechanics, R_base_from_camera).angle;
 }
 
 struct Localizer::State {

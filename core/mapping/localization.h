@@ -24,10 +24,6 @@ enum class LocalizationStatus { kOk, kNotInMap, kAmbiguous, kNoUsablePicture };
 // As records and commands name it: "ok", "not in the map", "ambiguous", "no usable picture".
 [[nodiscard]] const char* to_string(LocalizationStatus status);
 
-// The true angles at which a mount comes nearest to an orientation.
-[[nodiscard]] PanTilt<double> nearest_angles_of(const Mechanics<double>& mechanics,
-                                                const Matrix3<double>& R_base_from_camera);
-
 // Features to ask with: fast, from a picture shrunk by 2, or with a hint by 4, down to little contrast, as it may be dark.
 [[nodiscard]] FeatureOptions localization_features(bool with_hint);
 

@@ -10,6 +10,7 @@
 #include <random>
 
 #include "core/mapping/two_point_pose.h"
+#include "core/model/nearest_angles.h"
 
 namespace alidade {
 namespace {
@@ -90,8 +91,7 @@ bool agrees_with_knowledge(const TwoPointPose& pose, const PoseKnowledge& knowle
     if (std::abs(pose.log_f - prior.log_f) > 4 * prior.sigma + 0.02) return false;
   }
   if (!knowledge.mechanics) return true;
-  return internal::nearest_angles(*knowledge.mechanics, pose.R_base_from_camera).off <
-         options.roll_tolerance;
+  return nearest_angles(*knowledge.mechanics, pose.R_base_from_camera).off < options.roll_tolerance;
 }
 
 Consensus best_pose(const std::vector<PoseMatch>& matches, const std::vector<int>& candidates,
@@ -366,7 +366,7 @@ PicturePose find_pose(const std::vector<PoseMatch>& matches, const PoseKnowledge
 
   PoseState state{best.pose.R_base_from_camera, {}, best.pose.log_f};
   if (knowledge.mechanics) {
-    state.angle = internal::nearest_angles(*knowledge.mechanics, state.R).angle;
+    state.angle = nearest_angles(*knowledge.mechanics, state.R).angle;
     state.R = R_base_from_camera(*knowledge.mechanics, state.angle);
   }
   out.inliers = best.inliers;

@@ -68,22 +68,4 @@ std::optional<TwoPointPose> two_point_pose(const PoseMatch& a, const PoseMatch& 
   return TwoPointPose{*there * seen->transpose(), log_f};
 }
 
-NearestAngles nearest_angles(const Mechanics<double>& mechanics,
-                             const Matrix3<double>& R_base_from_camera_seen) {
-  const Vector3<double> axis = R_base_from_camera_seen.col(2);
-  NearestAngles out;
-  out.angle = {std::atan2(axis.y(), axis.x()), -std::asin(std::clamp(axis.z(), -1.0, 1.0))};
-  for (int step = 0; step < 8; ++step) {
-    Matrix<double, 3, 2> J;
-    const Matrix3<double> R = R_base_from_camera(mechanics, out.angle, &J);
-    const Vector3<double> xi = log_so3(Matrix3<double>(R.transpose() * R_base_from_camera_seen));
-    const Vector2<double> change = (J.transpose() * J).inverse() * (J.transpose() * xi);
-    out.off = (xi - J * change).norm();
-    if (!all_finite(change)) break;
-    out.angle = plus(out.angle, change);
-    if (change.norm() < 1e-12) break;
-  }
-  return out;
-}
-
 }  // namespace alidade::internal

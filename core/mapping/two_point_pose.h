@@ -16,12 +16,4 @@ struct TwoPointPose {
 [[nodiscard]] std::optional<TwoPointPose> two_point_pose(const PoseMatch& a, const PoseMatch& b,
                                                          const PoseKnowledge& knowledge);
 
-// The angles at which the mount comes nearest to an orientation, and by how much it is off, rad.
-struct NearestAngles {
-  PanTilt<double> angle;
-  double off = 0;
-};
-[[nodiscard]] NearestAngles nearest_angles(const Mechanics<double>& mechanics,
-                                           const Matrix3<double>& R_base_from_camera);
-
 }  // namespace alidade::internal

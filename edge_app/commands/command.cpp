@@ -244,10 +244,6 @@ std::unique_ptr<PanTiltSource> make_head_source(const PanTiltConfig& config) {
   return std::make_unique<QuerySource>(make_protocol(config.head.protocol), options);
 }
 
-}  // namespace
-
-namespace {
-
 // There is none: its end is its beginning.
 class NoPanTilt : public PanTiltSource {
  public:

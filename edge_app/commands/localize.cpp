@@ -11,6 +11,7 @@
 
 #include "core/mapping/localization.h"
 #include "core/mapping/map_building.h"
+#include "core/model/nearest_angles.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/map_recording.h"
 #include "edge_app/storage/scene_map_file.h"
@@ -33,7 +34,7 @@ void add_pose(const Localization& found, const Mechanics<double>& mechanics, ord
   (*json)["matches"] = found.matches;
   if (found.status != LocalizationStatus::kOk) return;
   const PicturePose& pose = found.pose;
-  const PanTilt<double> angle = nearest_angles_of(mechanics, pose.R_base_from_camera);
+  const PanTilt<double> angle = nearest_angles(mechanics, pose.R_base_from_camera).angle;
   const Eigen::Quaterniond q(pose.R_base_from_camera);
   (*json)["pan_rad"] = angle.pan;
   (*json)["tilt_rad"] = angle.tilt;

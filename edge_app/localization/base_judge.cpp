@@ -1,5 +1,6 @@
 #include "edge_app/localization/base_judge.h"
 
+#include "core/model/nearest_angles.h"
 #include "core/realtime/oe_mode/covariance.h"
 
 namespace alidade {
@@ -10,8 +11,7 @@ constexpr double kBelieved = 25;  // chi-square, 2 degrees of freedom: one in 3e
 // Of (pan, tilt), from that of xi.
 Matrix2<double> angle_covariance(const Matrix<double, 3, 2>& J_xi_angle,
                                  const Matrix3<double>& covariance) {
-  const Matrix2<double> normal = J_xi_angle.transpose() * J_xi_angle;
-  const Matrix<double, 2, 3> to_angle = inverse_of(normal) * J_xi_angle.transpose();
+  const Matrix<double, 2, 3> to_angle = J_angle_xi(J_xi_angle);
   const Matrix2<double> out = to_angle * covariance * to_angle.transpose();
   return symmetric(out);
 }
@@ -27,7 +27,7 @@ BaseJudge::Verdict BaseJudge::judge(const OrientationRecord& record, const Local
   const FrameOrientation frame = unpack(record.orientation->geometry, record.camera);
   const Mechanics<double>& mechanics = frame.calibration.mechanics;
   const Matrix3<double>& R_localized = found.pose.R_base_from_camera;
-  const PanTilt<double> localized = nearest_angles_of(mechanics, R_localized);
+  const PanTilt<double> localized = nearest_angles(mechanics, R_localized).angle;
   const PanTilt<double> answered =
       angle_at_row(frame.motion(), frame.calibration.line_delay, reference_row);
   const Vector2<double> change = minus(localized, answered);

@@ -4,7 +4,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <utility>
 
@@ -18,11 +17,6 @@ namespace {
 // What is not known of a frame's lens beside its record's own sigma: of log f.
 constexpr double kFocalLengthSigma = 5e-3;
 constexpr double kMilli = 1e3;
-
-double utc_now_s() {
-  using std::chrono::duration;
-  return duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 FocalLengthPrior focal_length_of(const Calibration& calibration) {
   return {std::log(calibration.camera.focal_length),

@@ -27,8 +27,6 @@ void SceneUpkeep::show(const Localization& found, const FeatureSet& features,
     return;
   }
   ++updates_;
-  born_ += static_cast<std::int64_t>(change.born.size());
-  died_ += static_cast<std::int64_t>(change.died.size());
   changed_ += static_cast<int>(change.born.size() + change.died.size());
 }
 

@@ -32,8 +32,6 @@ class SceneUpkeep {
   void index_made() { changed_ = 0; }
 
   [[nodiscard]] std::int64_t updates() const { return updates_; }
-  [[nodiscard]] std::int64_t born() const { return born_; }
-  [[nodiscard]] std::int64_t died() const { return died_; }
 
  private:
   static constexpr int kWorthAnIndex = 100;  // landmarks
@@ -44,8 +42,6 @@ class SceneUpkeep {
   LandmarkUpkeep upkeep_;
   int changed_ = 0;
   std::int64_t updates_ = 0;
-  std::int64_t born_ = 0;
-  std::int64_t died_ = 0;
 };
 
 }  // namespace alidade

@@ -2,8 +2,7 @@
 
 #include <cmath>
 
-#include "core/model/mechanics.h"
-#include "core/model/rotation.h"
+#include "core/model/nearest_angles.h"
 
 namespace alidade {
 namespace {
@@ -54,24 +53,12 @@ bool SceneStart::find(const Calibration& calibration, double telemetry_time_s,
   const Matrix3<double> covariance =
       R_first_from_now.transpose() * of_told * R_first_from_now + chain_.covariance();
 
-  // From where it would look about nominal axes.
-  const Vector3<double> axis = R_now.col(2);
-  PanTilt<double> angle{std::atan2(axis.y(), axis.x()),
-                        -std::atan2(axis.z(), std::hypot(axis.x(), axis.y()))};
+  const NearestAngles nearest = nearest_angles(mechanics, R_now);
+  const PanTilt<double>& angle = nearest.angle;
   Matrix<double, 3, 2> J_xi_angle;
-  Matrix<double, 2, 3> to_angle;
-  Vector3<double> off;
-  constexpr int kRounds = 6;
-  for (int round = 0; round < kRounds; ++round) {
-    const Matrix3<double> R = R_base_from_camera(mechanics, angle, &J_xi_angle);
-    off = log_so3<double>(R.transpose() * R_now);
-    const Matrix2<double> normal = J_xi_angle.transpose() * J_xi_angle;
-    to_angle = normal.inverse() * J_xi_angle.transpose();
-    if (round + 1 == kRounds) break;
-    const Vector2<double> change = to_angle * off;
-    angle = {angle.pan + change.x(), angle.tilt + change.y()};
-  }
-  if (!all_finite(to_angle) || !(off.norm() < kMostRoll_rad)) return false;
+  static_cast<void>(R_base_from_camera(mechanics, angle, &J_xi_angle));
+  const Matrix<double, 2, 3> to_angle = J_angle_xi(J_xi_angle);
+  if (!all_finite(to_angle) || !(nearest.off < kMostRoll_rad)) return false;
 
   const Vector3<double>& velocity = *chain_.angular_velocity();
   const Vector2<double> rate = to_angle * velocity;

@@ -1,21 +1,17 @@
 #include "platform/pan_tilt/onvif_source.h"
 
-#include <chrono>
 #include <random>
 #include <utility>
 
 #include "platform/pan_tilt/device_clock_trial.h"
 #include "platform/pan_tilt/onvif_messages.h"
+#include "platform/system/clock.h"
 
 namespace alidade {
 namespace {
 
 constexpr std::size_t kMaxBody = 256 * 1024;  // bytes; many long profiles
 constexpr std::size_t kNonceBytes = 16;
-
-double host_utc_s() {
-  return std::chrono::duration<double>(std::chrono::system_clock::now().time_since_epoch()).count();
-}
 
 double mapped(double value, const OnvifRange& range) {
   return range.at_minus_one_rad +
@@ -96,7 +92,7 @@ HttpRequest OnvifConversation::next_request(double now_s) {
     login.emplace();
     login->user = user_;
     login->password = password_;
-    login->created_utc_s = device_minus_host_s_ ? now_s + *device_minus_host_s_ : host_utc_s();
+    login->created_utc_s = device_minus_host_s_ ? now_s + *device_minus_host_s_ : utc_now_s();
     std::uniform_int_distribution<int> byte(0, 255);
     for (std::size_t i = 0; i < kNonceBytes; ++i) {
       login->nonce += static_cast<char>(byte(random_));

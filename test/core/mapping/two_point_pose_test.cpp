@@ -5,6 +5,7 @@
 #include <cmath>
 #include <random>
 
+#include "core/model/nearest_angles.h"
 #include "test/core/mapping/seen_picture.h"
 
 namespace alidade::test {
@@ -39,8 +40,8 @@ TEST(TwoPointPose, UndoesTheCameraEverywhere) {
           const double allowed = 1e-14 * f / apart_px + 1e-10;
           EXPECT_NEAR(pose->log_f, std::log(f), 10 * allowed);
           EXPECT_LT((pose->R_base_from_camera - picture.base_from_camera(0)).norm(), 10 * allowed);
-          const internal::NearestAngles nearest =
-              internal::nearest_angles(*knowledge.mechanics, pose->R_base_from_camera);
+          const NearestAngles nearest =
+              nearest_angles(*knowledge.mechanics, pose->R_base_from_camera);
           EXPECT_LT(nearest.off, 20 * allowed);
           // About the pole pan turns the picture about its axis: only the orientation is determined.
           EXPECT_LT((R_base_from_camera(*knowledge.mechanics, nearest.angle) -
@@ -97,22 +98,6 @@ TEST(TwoPointPose, RefusesWhatDetermineNothing) {
   narrow = knowledge;
   narrow.most_log_f = std::log(1000.0);
   EXPECT_FALSE(internal::two_point_pose(a, b, narrow));
-}
-
-TEST(NearestAngles, SayByHowMuchAMountCannotRoll) {
-  const Mechanics<double> mechanics = paper_mechanics();
-  for (const double pan : {-kPi, -2.0, 0.0, 3.1}) {
-    for (const double tilt : {-1.5, 0.0, 0.8}) {
-      for (const double roll : {-0.2, 0.0, 1e-3, 0.2}) {
-        const Matrix3<double> R = R_base_from_camera(mechanics, PanTilt<double>{pan, tilt}) *
-                                  exp_so3(Vector3<double>(0, 0, roll));
-        const internal::NearestAngles nearest = internal::nearest_angles(mechanics, R);
-        // Pan turns the picture by the sine of tilt, too, and a little roll can be had for a little aim.
-        EXPECT_LE(nearest.off, std::abs(roll) + 1e-12);
-        EXPECT_GE(nearest.off, 0.98 * std::abs(roll) * std::cos(tilt) - 1e-12);
-      }
-    }
-  }
 }
 
 }  // namespace
