@@ -90,6 +90,10 @@ class MovementAdjustment {
     int telemetry_count = 0;
   };
 
+  // Along the movement, of what distortion and centre have beside the curve.
+  static constexpr int kPlaces = 5;
+  static int point_row(int control_point) { return 2 * control_point; }
+
   [[nodiscard]] ZoomMotionSpline::Basis basis(double time_s) const { return spline_.basis(time_s); }
   // Between which two readings, and the second's share; before and after all of them the first and the last.
   struct Passing {

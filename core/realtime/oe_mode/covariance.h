@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "core/model/linear_algebra.h"
+#include "core/model/rolling_shutter.h"
 
 namespace alidade {
 
@@ -18,6 +19,14 @@ template <int kColumns>
 [[nodiscard]] Matrix<double, 2, kColumns> angle_at(const Matrix<double, 6, kColumns>& x, double t) {
   return x.template topRows<2>() + t * x.template middleRows<2>(2) +
          (0.5 * t * t) * x.template bottomRows<2>();
+}
+
+// change: of a motion.
+inline void add(const Vector6& change, FrameMotion<double>* motion) {
+  motion->angle = {motion->angle.pan + change[0], motion->angle.tilt + change[1]};
+  motion->rate = {motion->rate.pan + change[2], motion->rate.tilt + change[3]};
+  motion->acceleration = {motion->acceleration.pan + change[4],
+                          motion->acceleration.tilt + change[5]};
 }
 
 // Of a symmetric matrix; only the upper triangle is read. Not finite where m is singular.

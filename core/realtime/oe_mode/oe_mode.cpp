@@ -1,22 +1,11 @@
 #include "core/realtime/oe_mode/oe_mode.h"
 
-#include <algorithm>
 #include <cmath>
 
-#include "core/model/direction.h"
-#include "core/realtime/oe_mode/view_projection.h"
 #include "core/realtime/pt_mode.h"
 
 namespace alidade {
 namespace {
-
-// change: of angle, rate and acceleration.
-void add(const Vector6& change, FrameMotion<double>* motion) {
-  motion->angle = {motion->angle.pan + change[0], motion->angle.tilt + change[1]};
-  motion->rate = {motion->rate.pan + change[2], motion->rate.tilt + change[3]};
-  motion->acceleration = {motion->acceleration.pan + change[4],
-                          motion->acceleration.tilt + change[5]};
-}
 
 // Of the frame's own lens, 1/s, by its noise and that of phi.
 double rate_sigma(const SolvedMotion& solved) {
@@ -303,152 +292,6 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   statistics_.inliers = solved.inliers;
   frame_.use = MapUse::kHeld;
   return finish(OeStatus::kOk);
-}
-
-// Motion and sensitivity are those at phi = 0: at its value, and by all of it.
-void OeMode::add_lens(const SolvedLens& lens, FrameMotion<double>* in_base,
-                      Sensitivity<6>* sensitivity) const {
-  Vector6 by_lens = lens.motion_by_lens;
-  if (!tie_.is_by_map()) by_lens.head<2>() += lens.offset_by_lens;
-  add(lens.value * by_lens, in_base);
-  const ParameterDirection& direction = offset_.lens().direction;
-  offset_.lens().make_independent(sensitivity);
-  sensitivity->col(index(Parameter::kFocalLength)) +=
-      by_lens / direction[index(Parameter::kFocalLength)];
-}
-
-bool OeMode::take_lens(const FrameLens* reading) {
-  frame_.lens = {};
-  lens_.begin_frame(lens_is_learnt() ? reading : nullptr);
-  if (!lens_is_learnt()) return true;
-  if (!lens_.follows()) {
-    if (!lens_.reads_other_than(given_.camera.focal_length)) return true;
-    if (map_.size() == 0) {
-      // A map begins with a lens at rest: of one that moves its landmarks would be sheared unawares.
-      given_ = reading->calibration;
-      reset(given_, focal_length_);
-      return !reading->moves;
-    }
-    lens_.follow(frame_.time_s - prediction_.since_last_s(frame_.time_s),
-                 calibration_.camera.focal_length);
-  }
-  const LensScale& scale = offset_.lens();
-  set_camera(lens_.expect_after_last(frame_.time_s, !lens_.at_rest(), scale, calibration_.camera));
-  lens_.answer_unseen(frame_.time_s, scale, calibration_.camera, &answers_calibration_);
-  if (lens_.reading_tells_more(frame_.time_s)) set_camera(lens_.expect_by_reading(scale));
-  return lens_.is_known(frame_.time_s);
-}
-
-// Everything that depends on how wide the view is.
-void OeMode::set_camera(const Camera<double>& camera) {
-  calibration_.camera = camera;
-  lens_.look_through(offset_.lens(), camera);
-  search_.change_lens(calibration_);
-  in_view_.change_lens(calibration_, search_.options().cone_margin);
-  prediction_.change_lens(calibration_);
-  shear_.change_lens(calibration_);
-}
-
-// Twice, where the first look finds another lens than was expected: patches and rows are another's then.
-OeMode::Solution OeMode::look_with_own_lens(FrameMotion<double> motion,
-                                            const PredictedMotion& predicted) {
-  constexpr double kFar_px = 0.5;  // in the corners
-  motion.zoom_rate = lens_.expected().value[1];
-  Solution out = solve_about(motion, predicted);
-  if (out.status != SolveStatus::kOk) return out;
-  const SolvedMotion& solved = out.solved;
-  const double diagonal_px = std::hypot(calibration_.camera.width, calibration_.camera.height);
-  if (!(std::abs(solved.zoom.correction[0]) * diagonal_px > 2 * kFar_px)) return out;
-  add(solved.correction, &motion);
-  motion.zoom_rate += solved.zoom.correction[1];
-  const double log_f = std::log(calibration_.camera.focal_length) + solved.zoom.correction[0];
-  set_camera(lens_.with_focal_length(log_f, offset_.lens(), calibration_.camera));
-  return solve_about(motion, predicted);
-}
-
-// Few landmarks hold: the lens may have moved, whatever its readings tell, or stand where they tell.
-OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
-                                             const LandmarkSearch::Coarse& coarse,
-                                             const PredictedMotion& predicted) {
-  const LookOptions& look = options_.look;
-  const int chosen = statistics_.chosen;
-  const bool follows = prediction_.follows(frame_.time_s);
-  // Better than the first look, if that was something.
-  constexpr double kBetter = 0.5;
-  const bool few = first.status != SolveStatus::kOk ||
-                   first.solved.inliers < look.least_held * statistics_.chosen;
-  const auto holds = [&](const Solution& s) {
-    return s.status == SolveStatus::kOk && s.solved.inliers >= look.least_held_again &&
-           s.solved.inliers >= look.least_held * statistics_.chosen &&
-           (few || s.solved.inflation < kBetter * first.solved.inflation);
-  };
-  const FrameMotion<double> carried =
-      follows ? prediction_.last_carried_on(frame_.time_s) : coarse.motion;
-  // Coarse octaves find the view whatever the lens does in a frame; a motion that is carried on is a few pixels off.
-  const FrameMotion<double>& there = coarse.aligned ? coarse.motion : carried;
-  const bool had_own = lens_.columns() != nullptr;
-  const LensTrack::State expected_before = lens_.expected();
-  const LensScale& scale = offset_.lens();
-  const auto look_unawares = [&] {
-    set_camera(lens_.expect_after_last(frame_.time_s, true, scale, calibration_.camera));
-    return look_with_own_lens(there, predicted);
-  };
-  if (had_own) {
-    if (follows && few) {
-      set_camera(lens_.with_focal_length(expected_before.value[0], scale, calibration_.camera));
-      const Solution second = look_with_own_lens(carried, predicted);
-      if (holds(second)) return second;
-    }
-    if (lens_.at_rest()) {
-      const Solution moved = look_unawares();
-      if (holds(moved)) {
-        lens_.note_movement();
-        return moved;
-      }
-    }
-    if (lens_.reading() != nullptr && few) {
-      set_camera(lens_.expect_by_reading(scale));
-      const Solution by_reading = look_with_own_lens(there, predicted);
-      if (holds(by_reading)) return by_reading;
-    }
-  } else if (follows) {
-    if (few) {
-      const Solution second = solve_about(carried, predicted);
-      if (holds(second)) return second;
-    }
-    lens_.follow(frame_.time_s - prediction_.since_last_s(frame_.time_s),
-                 calibration_.camera.focal_length);
-    const Camera<double> before = calibration_.camera;
-    const Solution moved = look_unawares();
-    if (holds(moved)) return moved;
-    set_camera(before);
-    lens_.give_up();
-  }
-  // No better: landmarks are to be as the first look found them.
-  Solution out = first;
-  lens_.expect(expected_before);
-  if (had_own) set_camera(first.camera);
-  if (first.status == SolveStatus::kOk) out = solve_about(first.motion, predicted);
-  statistics_.chosen = chosen;
-  return out;
-}
-
-// The lens that a frame has shown; calibration and frame have it from here on.
-void OeMode::learn_own_lens(const Solution& solution, double zoom_rate) {
-  const SolvedZoom& zoom = solution.solved.zoom;
-  set_camera(zoomed(solution.camera, zoom.correction[0]));
-  const double f = calibration_.camera.focal_length;
-  const LearntLens learnt = lens_.learn(frame_.time_s, zoom, f, zoom_rate, offset_.lens());
-  frame_.lens = learnt.lens;
-  frame_.lens.zoom = static_cast<int>(
-      std::lround(LandmarkMap::kZoomsPerOctave * std::log2(f / cells_focal_length_)));
-  statistics_.own_lens = true;
-  statistics_.reading_sigmas = learnt.reading_sigmas;
-}
-
-Calibration OeMode::lens_of_answer(double phi, double variance,
-                                   const Sensitivity<1>& sensitivity) const {
-  return lens_.answer(calibration_, frame_.lens, offset_.lens(), phi, variance, sensitivity);
 }
 
 }  // namespace alidade

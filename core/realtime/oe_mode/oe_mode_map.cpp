@@ -61,22 +61,6 @@ MapState OeMode::map_state() const {
   return out;
 }
 
-void OeMode::begin_lens() {
-  if (lens_.follows() && lens_.reading() != nullptr) {
-    // The lens that the map was begun with is gone.
-    given_ = lens_.reading()->calibration;
-    search_.change_lens(given_);
-    in_view_.change_lens(given_, search_.options().cone_margin);
-  }
-  lens_.begin(given_.camera.focal_length);
-  moved_phi_ = 0;
-  frame_.lens = {};
-  calibration_ = given_;
-  offset_.begin_lens(focal_length_ == FocalLength::kLearnt ? LensScale::begin(given_)
-                                                           : LensScale{});
-  if (lens_is_learnt()) answers_calibration_ = given_;
-}
-
 void OeMode::clear_landmarks() {
   cells_focal_length_ = calibration_.camera.focal_length;
   map_.clear(maker_.cell_size(calibration_.camera), maker_.largest_cell_size(calibration_.camera));
