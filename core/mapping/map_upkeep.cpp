@@ -1,10 +1,10 @@
 #include "core/mapping/map_upkeep.h"
 
 #include <algorithm>
-#include <map>
-#include <unordered_map>
+#include <cmath>
+#include <utility>
 
-#include "core/mapping/sphere_cell.h"
+#include "core/mapping/upkeep_picture.h"
 #include "core/model/trigonometry.h"
 
 namespace alidade {
@@ -21,15 +21,6 @@ std::uint64_t mixed(std::uint64_t x) {
   x = (x ^ (x >> 30U)) * 0xbf58476d1ce4e5b9U;
   x = (x ^ (x >> 27U)) * 0x94d049bb133111ebU;
   return x ^ (x >> 31U);
-}
-
-int squared_distance(const Descriptor& a, const Descriptor& b) {
-  int sum = 0;
-  for (std::size_t i = 0; i < a.size(); ++i) {
-    const int step = int{a[i]} - int{b[i]};
-    sum += step * step;
-  }
-  return sum;
 }
 
 double least_eigenvalue(const Matrix2<double>& m) {
@@ -57,57 +48,7 @@ double usual_share(const LandmarkLife& life) {
   return (life.matched + 1.0) / (life.looked_for + 2.0);
 }
 
-struct Box {
-  Vector2<double> least, most;
-  bool empty = true;
-
-  void add(const Vector2<double>& u) {
-    least = empty ? u : Vector2<double>(least.cwiseMin(u));
-    most = empty ? u : Vector2<double>(most.cwiseMax(u));
-    empty = false;
-  }
-  [[nodiscard]] double area() const { return empty ? 0 : (most - least).prod(); }
-};
-
-struct Visible {
-  std::size_t index = 0;  // in the map
-  Vector2<double> u;
-  double scale_px = 0;
-  bool expected = false;
-};
-
 }  // namespace
-
-struct LandmarkUpkeep::Picture {
-  PosedPicture posed;
-  Matrix3<double> common = Matrix3<double>::Zero();  // of the matched landmarks, on all sides, base
-  double share_of_landmarks = 0;
-  Box matched;
-  std::vector<char> taken;         // by feature: matched
-  std::vector<Visible> visible;    // by increasing index
-  std::vector<std::size_t> found;  // indices of landmarks that were matched, increasing
-  std::map<std::int64_t, SceneLandmark> changed;
-
-  [[nodiscard]] Matrix2<double> common_at(const Vector3<double>& d_b) const {
-    const Matrix<double, 3, 2> basis = tangent_basis(d_b);
-    return basis.transpose() * common * basis;
-  }
-  // Where the picture shows a direction. False: nowhere.
-  [[nodiscard]] bool shows(const Vector3<double>& d_b, double border_px, Vector2<double>* u) const {
-    double row = posed.motion.reference_row;
-    MapProjection p;
-    for (int step = 0; step < 3; ++step) {
-      if (project_from_map(posed.camera, posed.motion, posed.R_base_from_camera, row, d_b, &p) !=
-          ProjectionStatus::kOk) {
-        return false;
-      }
-      row = p.u.y();
-    }
-    *u = p.u;
-    return p.u.x() >= border_px && p.u.x() <= posed.camera.width - border_px &&
-           p.u.y() >= border_px && p.u.y() <= posed.camera.height - border_px;
-  }
-};
 
 bool UpkeepOptions::validate(const char** error) const {
   const auto refuse = [&](const char* what) {
@@ -245,7 +186,7 @@ bool LandmarkUpkeep::look(const UpkeepView& view, const SceneMap& map, Picture* 
   for (std::size_t i = 0; i < map.landmarks.size(); ++i) {
     const SceneLandmark& landmark = map.landmarks[i];
     if (landmark.d_b.dot(posed.R_base_from_camera.col(2)) < least_cosine) continue;
-    Visible visible;
+    Picture::Visible visible;
     visible.index = i;
     if (!picture->shows(landmark.d_b, options_.border_px, &visible.u)) continue;
     visible.scale_px = landmark.scale_rad * camera.focal_length;
@@ -304,10 +245,10 @@ void LandmarkUpkeep::judge(const UpkeepView& view, const SceneMap& map, Picture*
                            MapChange* change, UpkeepCounts* counts) {
   double usual = 0;
   int found = 0;
-  const auto was_found = [&](const Visible& visible) {
+  const auto was_found = [&](const Picture::Visible& visible) {
     return std::binary_search(picture->found.begin(), picture->found.end(), visible.index);
   };
-  for (const Visible& visible : picture->visible) {
+  for (const Picture::Visible& visible : picture->visible) {
     if (!visible.expected) continue;
     ++counts->expected;
     // What was missing the last time, or not seen for long, says nothing of fog: else what is gone would hide its own death.
@@ -319,7 +260,7 @@ void LandmarkUpkeep::judge(const UpkeepView& view, const SceneMap& map, Picture*
   }
   counts->all_hidden = found < options_.fog_share * usual;
   if (counts->all_hidden) return;
-  for (const Visible& visible : picture->visible) {
+  for (const Picture::Visible& visible : picture->visible) {
     if (!visible.expected || was_found(visible)) continue;
     const SceneLandmark& landmark = map.landmarks[visible.index];
     const double unseen_s = view.time_utc_s - landmark.life.last_seen_utc_s;
@@ -333,170 +274,6 @@ void LandmarkUpkeep::judge(const UpkeepView& view, const SceneMap& map, Picture*
     count_look(false, view.time_utc_s, &looked_for.life);
     picture->changed[landmark.id] = looked_for;
   }
-}
-
-void LandmarkUpkeep::find_candidates(const UpkeepView& view, const SceneMap& map, Picture* picture,
-                                     UpkeepCounts* counts, std::vector<SceneLandmark>* ready) {
-  const std::vector<Feature>& features = view.features->features;
-  const std::vector<Descriptor>& descriptors = view.features->descriptors;
-  const int most_square = options_.most_descriptor_step * options_.most_descriptor_step;
-  const double gate_square = options_.birth_gate_px * options_.birth_gate_px;
-  const double f = picture->posed.camera.focal_length;
-  const auto is_like = [&](std::size_t feature, const Vector2<double>& u, double scale_px,
-                           const Descriptor& descriptor) {
-    const Feature& seen = features[feature];
-    return (seen.u - u).squaredNorm() <= gate_square && seen.scale < 1.5 * scale_px &&
-           scale_px < 1.5 * seen.scale &&
-           squared_distance(descriptors[feature], descriptor) <= most_square;
-  };
-  // What an unmatched landmark explains is none.
-  std::vector<char> taken = picture->taken;
-  for (const Visible& visible : picture->visible) {
-    const SceneLandmark& landmark = map.landmarks[visible.index];
-    for (std::size_t i = 0; i < features.size(); ++i) {
-      if (taken[i] == 0 && is_like(i, visible.u, visible.scale_px, landmark.descriptor))
-        taken[i] = 1;
-    }
-  }
-
-  std::vector<Candidate> kept;
-  for (Candidate& candidate : candidates_) {
-    SceneLandmark& landmark = candidate.landmark;
-    Vector2<double> u;
-    if (!picture->shows(landmark.d_b, options_.border_px, &u)) {
-      kept.push_back(std::move(candidate));
-      continue;
-    }
-    const double scale_px = landmark.scale_rad * f;
-    std::size_t best = features.size();
-    for (std::size_t i = 0; i < features.size(); ++i) {
-      if (taken[i] == 0 && is_like(i, u, scale_px, landmark.descriptor) &&
-          (best == features.size() ||
-           (features[i].u - u).squaredNorm() < (features[best].u - u).squaredNorm())) {
-        best = i;
-      }
-    }
-    if (best == features.size() ||
-        !follow_one(features[best], descriptors[best], view.time_utc_s, *picture, &landmark)) {
-      if (counts->all_hidden) kept.push_back(std::move(candidate));
-      continue;
-    }
-    taken[best] = 1;
-    landmark.life.last_seen_utc_s = view.time_utc_s;
-    if (++candidate.views >= options_.birth_views) {
-      Box with = picture->matched;
-      with.add(features[best].u);
-      if (picture->matched.area() >= options_.least_proximity * with.area()) {
-        ready->push_back(landmark);
-        continue;
-      }
-      ++counts->not_close;
-    }
-    kept.push_back(std::move(candidate));
-  }
-
-  for (std::size_t i = 0; i < features.size(); ++i) {
-    if (taken[i] != 0 || !(features[i].scale >= options_.least_scale_px)) continue;
-    Candidate candidate;
-    SceneLandmark& landmark = candidate.landmark;
-    LandmarkSight sight;
-    if (unproject_to_map(picture->posed.camera, picture->posed.motion,
-                         picture->posed.R_base_from_camera, features[i].u,
-                         &landmark.d_b) != ProjectionStatus::kOk ||
-        see_landmark(picture->posed, features[i].u, options_.sigma_of(features[i].scale),
-                     landmark.d_b, &sight) != ProjectionStatus::kOk) {
-      continue;
-    }
-    landmark.d_b.normalize();
-    landmark.covariance =
-        sight.cov_detection + (1 - picture->share_of_landmarks) * sight.cov_of_pose;
-    landmark.shared_covariance =
-        picture->common_at(landmark.d_b) + picture->share_of_landmarks * sight.cov_of_pose;
-    landmark.scale_rad = features[i].scale / f;
-    landmark.focal_length_px = f;
-    landmark.descriptor = descriptors[i];
-    landmark.life.born_utc_s = landmark.life.last_seen_utc_s = view.time_utc_s;
-    candidate.views = 1;
-    kept.push_back(std::move(candidate));
-  }
-  // The oldest have waited longest without being seen again.
-  const auto most = static_cast<std::size_t>(options_.most_candidates);
-  if (kept.size() > most) {
-    kept.erase(kept.begin(), kept.end() - static_cast<std::ptrdiff_t>(most));
-  }
-  candidates_ = std::move(kept);
-}
-
-void LandmarkUpkeep::give_birth(const std::vector<SceneLandmark>& ready, double now_utc_s,
-                                const SceneMap& map, Picture* picture, MapChange* change,
-                                UpkeepCounts* counts) {
-  if (ready.empty()) return;
-  // Who lives in the cells that are asked for.
-  std::unordered_map<std::uint64_t, std::vector<const SceneLandmark*>> cells;
-  for (const SceneLandmark& landmark : ready) {
-    cells[sphere_cell(landmark.d_b, landmark.scale_rad, options_.cell_scales)];
-  }
-  const auto is_dead = [&](std::int64_t id) {
-    return std::find(change->died.begin(), change->died.end(), id) != change->died.end();
-  };
-  const auto worth = [&](const SceneLandmark* landmark) {
-    return worth_of(*landmark, now_utc_s, options_.patience_s);
-  };
-  const auto is_worth_less = [&](const SceneLandmark* a, const SceneLandmark* b) {
-    const double of_a = worth(a), of_b = worth(b);
-    return of_a != of_b ? of_a < of_b : a->id < b->id;
-  };
-  std::vector<const SceneLandmark*> all;
-  for (const SceneLandmark& landmark : map.landmarks) {
-    if (is_dead(landmark.id)) continue;
-    const auto changed = picture->changed.find(landmark.id);
-    const SceneLandmark* as_it_is =
-        changed != picture->changed.end() ? &changed->second : &landmark;
-    all.push_back(as_it_is);
-    const auto cell =
-        cells.find(sphere_cell(landmark.d_b, landmark.scale_rad, options_.cell_scales));
-    if (cell != cells.end()) cell->second.push_back(as_it_is);
-  }
-  const auto living = [&] {
-    return map.landmarks.size() + change->born.size() - change->died.size();
-  };
-  std::vector<std::int64_t> dead;
-  const auto replaceable = [&](std::vector<const SceneLandmark*>* among) {
-    among->erase(std::remove_if(among->begin(), among->end(),
-                                [&](const SceneLandmark* l) { return is_dead(l->id); }),
-                 among->end());
-    const auto least = std::min_element(among->begin(), among->end(), is_worth_less);
-    constexpr double kWorthOfNew = 0.5;
-    return least != among->end() && worth(*least) < kWorthOfNew ? (*least)->id : std::int64_t{0};
-  };
-  const auto kill = [&](std::int64_t id) {
-    change->died.insert(std::lower_bound(change->died.begin(), change->died.end(), id), id);
-    dead.push_back(id);
-    ++counts->died;
-  };
-  std::unordered_map<std::uint64_t, int> newborn;
-  for (const SceneLandmark& landmark : ready) {
-    const std::uint64_t key = sphere_cell(landmark.d_b, landmark.scale_rad, options_.cell_scales);
-    std::vector<const SceneLandmark*>& cell = cells[key];
-    std::int64_t goes = 0;
-    if (static_cast<int>(cell.size()) + newborn[key] >= options_.cell_capacity) {
-      goes = replaceable(&cell);
-      if (static_cast<int>(cell.size()) + newborn[key] < options_.cell_capacity) goes = -1;
-      if (goes == 0) continue;
-    } else if (living() >= static_cast<std::size_t>(options_.most_landmarks)) {
-      goes = replaceable(&all);
-      if (goes == 0) continue;
-    }
-    if (goes > 0) kill(goes);
-    SceneLandmark born = landmark;
-    born.id = map.next_landmark + static_cast<std::int64_t>(change->born.size());
-    born.life.born_utc_s = born.life.last_seen_utc_s = now_utc_s;
-    born.life.looked_for = born.life.matched = 0;
-    change->born.push_back(born);
-    ++newborn[key];
-    ++counts->born;
-  }
-  for (const std::int64_t id : dead) picture->changed.erase(id);
 }
 
 }  // namespace alidade

@@ -11,6 +11,10 @@ namespace alidade {
 inline constexpr std::int64_t kSceneMapApplication = 0x414C534D;  // "ALSM"
 inline constexpr std::int64_t kSceneMapFormat = 1;
 
+// Of a file whose bytes nothing can be made of.
+inline constexpr const char* kSceneMapDamaged =
+    "damaged, or cut off; build it again, or put back a copy";
+
 // As they are made, and as sqlite_schema lists them by name.
 inline const std::array<std::string, 7> kSceneMapTables = {
     "CREATE TABLE keyframe(id INTEGER PRIMARY KEY, recording, frame, time_utc_s, zoom, position, "

@@ -1,0 +1,63 @@
+#pragma once
+// What LandmarkUpkeep knows of the picture that it is shown, for map_upkeep.cpp and landmark_birth.cpp alone: its pose, where it shows the
+// map's landmarks, and what of them was found and changed.
+
+#include <cstddef>
+#include <cstdint>
+#include <map>
+#include <vector>
+
+#include "core/mapping/map_upkeep.h"
+
+namespace alidade {
+
+struct LandmarkUpkeep::Picture {
+  struct Box {
+    Vector2<double> least, most;
+    bool empty = true;
+
+    void add(const Vector2<double>& u) {
+      least = empty ? u : Vector2<double>(least.cwiseMin(u));
+      most = empty ? u : Vector2<double>(most.cwiseMax(u));
+      empty = false;
+    }
+    [[nodiscard]] double area() const { return empty ? 0 : (most - least).prod(); }
+  };
+  struct Visible {
+    std::size_t index = 0;  // in the map
+    Vector2<double> u;
+    double scale_px = 0;
+    bool expected = false;
+  };
+
+  PosedPicture posed;
+  Matrix3<double> common = Matrix3<double>::Zero();  // of the matched landmarks, on all sides, base
+  double share_of_landmarks = 0;
+  Box matched;
+  std::vector<char> taken;         // by feature: matched
+  std::vector<Visible> visible;    // by increasing index
+  std::vector<std::size_t> found;  // indices of landmarks that were matched, increasing
+  std::map<std::int64_t, SceneLandmark> changed;
+
+  [[nodiscard]] Matrix2<double> common_at(const Vector3<double>& d_b) const {
+    const Matrix<double, 3, 2> basis = tangent_basis(d_b);
+    return basis.transpose() * common * basis;
+  }
+  // Where the picture shows a direction. False: nowhere.
+  [[nodiscard]] bool shows(const Vector3<double>& d_b, double border_px, Vector2<double>* u) const {
+    double row = posed.motion.reference_row;
+    MapProjection p;
+    for (int step = 0; step < 3; ++step) {
+      if (project_from_map(posed.camera, posed.motion, posed.R_base_from_camera, row, d_b, &p) !=
+          ProjectionStatus::kOk) {
+        return false;
+      }
+      row = p.u.y();
+    }
+    *u = p.u;
+    return p.u.x() >= border_px && p.u.x() <= posed.camera.width - border_px &&
+           p.u.y() >= border_px && p.u.y() <= posed.camera.height - border_px;
+  }
+};
+
+}  // namespace alidade
