@@ -72,9 +72,8 @@ bool SceneStart::find(const Calibration& calibration, double telemetry_time_s,
   const Vector2<double> scale(mechanics.pan_scale, mechanics.tilt_scale);
   const Matrix2<double> of_angle = to_angle * covariance * to_angle.transpose();
   Matrix2<double> of_rate = to_angle * chain_.velocity_covariance() * to_angle.transpose();
-  // The step's mean rate is that of half a frame ago.
-  constexpr double kHalfFrame_s = 0.02;
-  of_rate.diagonal().array() += std::pow(acceleration * kHalfFrame_s, 2);
+  // The step's mean rate is that of its middle.
+  of_rate.diagonal().array() += std::pow(acceleration * chain_.step_s() / 2, 2);
   out->covariance.setZero();
   out->covariance.topLeftCorner<2, 2>() = scale.asDiagonal() * of_angle * scale.asDiagonal();
   out->covariance.bottomRightCorner<2, 2>() = scale.asDiagonal() * of_rate * scale.asDiagonal();

@@ -98,6 +98,7 @@ void TurnChain::add(const Calibration& calibration, const FrameTracks& tracks) {
     holds_ = false;
     return;
   }
+  step_s_ = elapsed_s;
   velocity_ = by->turn / elapsed_s;
   velocity_covariance_ = by->covariance / (elapsed_s * elapsed_s);
   if (!holds_) return;

@@ -26,6 +26,8 @@ class TurnChain {
 
   // Of the frame last added; none without a step to it.
   [[nodiscard]] const std::optional<Vector3<double>>& angular_velocity() const { return velocity_; }
+  // Of its last step: from the frame before to the one last added.
+  [[nodiscard]] double step_s() const { return step_s_; }
   // Of the mean rate over the step, (rad/s)^2.
   [[nodiscard]] const Matrix3<double>& velocity_covariance() const { return velocity_covariance_; }
 
@@ -53,6 +55,7 @@ class TurnChain {
   int before_count_ = 0;
   int now_count_ = 0;
   double time_s_ = 0;
+  double step_s_ = 0;
   std::optional<Vector3<double>> velocity_;
   Matrix3<double> velocity_covariance_ = Matrix3<double>::Zero();
   bool holds_ = false;
