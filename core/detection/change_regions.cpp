@@ -185,8 +185,8 @@ void ChangeRegions::merge_regions() {
 void ChangeRegions::make_boxes() {
   for (const Region& region : regions_) {
     DetectionBox box;
-    box.left = region.left;
-    box.top = region.top;
+    box.u = region.left;
+    box.v = region.top;
     box.width = region.right - region.left;
     box.height = region.bottom - region.top;
     box.score = region.most / (kSumSigma * kUnit);
@@ -194,8 +194,7 @@ void ChangeRegions::make_boxes() {
     if (size >= options_.least_size_px && size <= options_.most_size_px) boxes_.push_back(box);
   }
   std::sort(boxes_.begin(), boxes_.end(), [](const DetectionBox& a, const DetectionBox& b) {
-    return a.score != b.score ? a.score > b.score
-                              : (a.top != b.top ? a.top < b.top : a.left < b.left);
+    return a.score != b.score ? a.score > b.score : (a.v != b.v ? a.v < b.v : a.u < b.u);
   });
   const auto most = static_cast<std::size_t>(options_.most_boxes);
   if (boxes_.size() > most) boxes_.resize(most);
