@@ -10,10 +10,7 @@ namespace alidade {
 namespace {
 
 constexpr int kHalf = 2;  // of the 5x5 pixels that are summed
-constexpr int kHeldZ = 6 * ChangeRegions::kUnit;
-// One standard deviation of a sum of 5x5 z: as noise is the same both ways, the variance of a sum of five. Neighbours of white noise seen
-// through (1 4 1) / 6 correlate by 8/18, the next by 1/18.
-constexpr double kSumSigma = 5 + 2 * (4 * 8.0 + 3 * 1.0) / 18;
+constexpr int kHeldZ = kMostChangeZ * ChangeRegions::kUnit;
 constexpr double kLeastEdge = 2.5;  // sigmas
 constexpr double kMergeShare = 0.75;
 constexpr int kEdgeShare = 3;  // of the largest |z|
@@ -46,7 +43,7 @@ double largest_sum(const std::int16_t* z, int width, int height) {
       most = std::max(most, std::abs(sum));
     }
   }
-  return most / (kSumSigma * ChangeRegions::kUnit);
+  return most / (kChangeSumSigma * ChangeRegions::kUnit);
 }
 
 ChangeRegions::ChangeRegions(int width, int height, const ChangeOptions& options)
@@ -80,7 +77,7 @@ void ChangeRegions::sum_rows(int v) {
 }
 
 bool ChangeRegions::find_runs(int v) {
-  const int least = static_cast<int>(std::lround(options_.threshold * kSumSigma * kUnit));
+  const int least = static_cast<int>(std::lround(options_.threshold * kChangeSumSigma * kUnit));
   const auto beyond = [&](int u) {
     return std::abs(static_cast<int>(sums_[static_cast<std::size_t>(u)])) >= least;
   };
@@ -185,17 +182,16 @@ void ChangeRegions::merge_regions() {
 void ChangeRegions::make_boxes() {
   for (const Region& region : regions_) {
     DetectionBox box;
-    box.left = region.left;
-    box.top = region.top;
+    box.u = region.left;
+    box.v = region.top;
     box.width = region.right - region.left;
     box.height = region.bottom - region.top;
-    box.score = region.most / (kSumSigma * kUnit);
+    box.score = region.most / (kChangeSumSigma * kUnit);
     const double size = std::max(box.width, box.height);
     if (size >= options_.least_size_px && size <= options_.most_size_px) boxes_.push_back(box);
   }
   std::sort(boxes_.begin(), boxes_.end(), [](const DetectionBox& a, const DetectionBox& b) {
-    return a.score != b.score ? a.score > b.score
-                              : (a.top != b.top ? a.top < b.top : a.left < b.left);
+    return a.score != b.score ? a.score > b.score : (a.v != b.v ? a.v < b.v : a.u < b.u);
   });
   const auto most = static_cast<std::size_t>(options_.most_boxes);
   if (boxes_.size() > most) boxes_.resize(most);

@@ -23,6 +23,13 @@ struct ChangeOptions {
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
+// One standard deviation of a sum of 5x5 z: as noise is the same both ways, the variance of a sum of five. Neighbours of white noise seen
+// through (1 4 1) / 6 correlate by 8/18, the next by 1/18.
+inline constexpr double kChangeSumSigma = 5 + 2 * (4 * 8.0 + 3 * 1.0) / 18;
+inline constexpr int kMostChangeZ = 6;  // sigmas, that a pixel's z is held to
+// The largest |S| that there can be, sigmas.
+inline constexpr double kMostChangeScore = 25 * kMostChangeZ / kChangeSumSigma;
+
 // The largest |S| of a piece of z, in sigmas; width * height of z, row after row, in 1/kUnit sigma.
 [[nodiscard]] double largest_sum(const std::int16_t* z, int width, int height);
 

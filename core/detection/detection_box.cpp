@@ -5,8 +5,8 @@
 namespace alidade {
 
 double overlap(const DetectionBox& a, const DetectionBox& b) {
-  const double width = std::min(a.left + a.width, b.left + b.width) - std::max(a.left, b.left);
-  const double height = std::min(a.top + a.height, b.top + b.height) - std::max(a.top, b.top);
+  const double width = std::min(a.u + a.width, b.u + b.width) - std::max(a.u, b.u);
+  const double height = std::min(a.v + a.height, b.v + b.height) - std::max(a.v, b.v);
   if (!(width > 0 && height > 0)) return 0;
   const double common = width * height;
   return common / (a.width * a.height + b.width * b.height - common);

@@ -1,17 +1,24 @@
 #pragma once
-// What a detector says of one thing in the picture: an upright box and how sure it is.
-// Pixels as everywhere (CONVENTIONS.md): the box spans [left, left + width] x [top, top + height], and one that holds the top-left pixel alone
+// What a detector, of this folder or from outside, says of one thing in the picture: the smallest upright rectangle around it, and how sure it is.
+// Pixels as everywhere (CONVENTIONS.md): the box spans [u, u + width] x [v, v + height], and one that holds the top-left pixel alone
 // is (0, 0, 1, 1).
+
+#include <string>
+
+#include "core/model/linear_algebra.h"
 
 namespace alidade {
 
 struct DetectionBox {
-  double left = 0;    // px
-  double top = 0;     // px
+  double u = 0;       // px, left edge
+  double v = 0;       // px, upper edge
   double width = 0;   // px
   double height = 0;  // px
-  double score = 0;   // the larger the surer; its scale is the detector's
-  int kind = 0;       // class, of detectors that know several
+  double score = 1;   // the larger the surer; its scale is the detector's, from outside 0 to 1
+  std::string name;   // its class; empty: not told
+
+  [[nodiscard]] Vector2<double> foot() const { return {u + width / 2, v + height}; }
+  [[nodiscard]] Vector2<double> middle() const { return {u + width / 2, v + height / 2}; }
 };
 
 // Area in common over area together, 0 to 1.

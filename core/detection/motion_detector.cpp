@@ -287,12 +287,12 @@ bool MotionDetector::differs_from_recent(const DetectionBox& box) {
   const int which = earlier_.first_recent();
   const Compared& recent = compared_[static_cast<std::size_t>(which)];
   if (!recent.usable) return true;
-  const int left = std::max(static_cast<int>(box.left) - kAboutBox_px, 1);
-  const int top = std::max(static_cast<int>(box.top) - kAboutBox_px, 1);
+  const int left = std::max(static_cast<int>(box.u) - kAboutBox_px, 1);
+  const int top = std::max(static_cast<int>(box.v) - kAboutBox_px, 1);
   const int right =
-      std::min(static_cast<int>(box.left + box.width) + kAboutBox_px, options_.width - 1);
+      std::min(static_cast<int>(box.u + box.width) + kAboutBox_px, options_.width - 1);
   const int bottom =
-      std::min(static_cast<int>(box.top + box.height) + kAboutBox_px, options_.height - 1);
+      std::min(static_cast<int>(box.v + box.height) + kAboutBox_px, options_.height - 1);
   const int columns = warp_.columns();
   for (int v = top; v < bottom; ++v) {
     const int row = v / kTile;

@@ -23,8 +23,8 @@ constexpr int kMostHits = 4096;
 
 DetectionBox person_box(double left, double top, double scale, double score) {
   DetectionBox box;
-  box.left = left + (kWindowWidth_px - kPersonWidth_px) / 2 / scale;
-  box.top = top + kPersonTop_px / scale;
+  box.u = left + (kWindowWidth_px - kPersonWidth_px) / 2 / scale;
+  box.v = top + kPersonTop_px / scale;
   box.width = kPersonWidth_px / scale;
   box.height = kPersonHeight_px / scale;
   box.score = score;
@@ -161,11 +161,11 @@ PersonStatus PersonDetector::find(const ImageView& image, const FrameOrientation
     look_at(image, band);
     // Those of other bands are found there.
     const auto wrong = [&](const DetectionBox& box) {
-      const double foot = box.top + box.height;
+      const double foot = box.v + box.height;
       const double slack = kStride_px / kPersonHeight_px * box.height;
       if (foot < band.top - slack || foot > band.bottom + slack) return true;
       UprightTarget target;
-      const Vector2<double> foot_u(box.left + 0.5 * box.width, foot);
+      const Vector2<double> foot_u(box.u + 0.5 * box.width, foot);
       return upright_target(plane, frame, foot_u, options_.height_m, &target) != PlaneStatus::kOk ||
              std::abs(std::log(box.height / target.height_px)) > options_.height_tolerance;
     };

@@ -38,8 +38,18 @@ LiveTargets::LiveTargets(const Config& config, std::shared_ptr<const PlaneEstima
                   ? nullptr
                   : &writer_.emplace(file_.get(), config.output.targets, "targets",
                                      LineWriter::Stalled::kDrop))),
-      feed_(*config.tracking.targets, plane_of(config, std::move(plane))) {
+      feed_(*config.tracking.targets, plane_of(config, plane)) {
   feed_.add_on_news([this](const auto& state) { lines_.take(*state); });
+  if (!config.detectors.any()) return;
+  tap_.emplace(detectors_.emplace(config.detectors, std::move(plane), feed_));
+  spdlog::info("detectors: {}{}", config.detectors.motion ? "motion " : "",
+               config.detectors.people ? "people" : "");
+}
+
+DetectorsReport LiveTargets::detectors() const {
+  DetectorsReport report = detectors_->report();
+  report.replaced = tap_->replaced();
+  return report;
 }
 
 void LiveTargets::start() {
@@ -58,8 +68,8 @@ void LiveTargets::stop() {
 std::unique_ptr<LiveTargets> make_live_targets(const Config& config,
                                                const std::shared_ptr<const PlaneEstimate>& plane) {
   if (!config.tracking.targets) return nullptr;
-  if (!config.output.http) {
-    spdlog::info("targets: none, as detections come over HTTP; set output.http");
+  if (!config.output.http && !config.detectors.any()) {
+    spdlog::info("targets: none, as detections come over HTTP; set output.http, or detectors");
     return nullptr;
   }
   return std::make_unique<LiveTargets>(config, plane);

@@ -1,11 +1,13 @@
 #pragma once
-// LiveTargets: what `run` has of targets: the feed that takes detections, and where the targets go. None without section tracking.
+// LiveTargets: what `run` has of targets: the feed that takes detections, the detectors built in, where there are, and where the targets go. None
+// without section tracking.
 
 #include <memory>
 #include <optional>
 
 #include "edge_app/config/config.h"
 #include "edge_app/output/target_lines.h"
+#include "edge_app/tracking/built_in_detectors.h"
 #include "edge_app/tracking/target_feed.h"
 #include "platform/system/file_descriptor.h"
 
@@ -18,6 +20,10 @@ class LiveTargets {
 
   [[nodiscard]] TargetFeed& feed() { return feed_; }
   [[nodiscard]] TargetLines& lines() { return lines_; }
+  // Null: no detector is built in.
+  [[nodiscard]] DetectorTap* detector_tap() { return tap_ ? &*tap_ : nullptr; }
+  // Of the tap that is there.
+  [[nodiscard]] DetectorsReport detectors() const;
   void start();
   // Before whom the lines wake is gone.
   void stop();
@@ -27,6 +33,8 @@ class LiveTargets {
   std::optional<LineWriter> writer_;
   TargetLines lines_;
   TargetFeed feed_;
+  std::optional<BuiltInDetectors> detectors_;
+  std::optional<DetectorTap> tap_;
 };
 
 // Null where nothing is tracked.

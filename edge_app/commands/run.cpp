@@ -188,6 +188,7 @@ int run_live(const RunOptions& options) {
   if (format) sinks.add(&writer);
   ImageTap tap;
   if (config.output.http) of_pipeline.tap = &tap;
+  if (targets) of_pipeline.detectors = targets->detector_tap();
   const auto scene = load_scene(config, calibration.calibration.camera);
   std::optional<SceneTap> scene_tap;
   if (scene)
@@ -205,6 +206,8 @@ int run_live(const RunOptions& options) {
   if (targets) {
     sources.targets = &targets->feed();
     sources.target_lines = &targets->lines();
+    if (targets->detector_tap() != nullptr)
+      sources.detectors = [&targets] { return targets->detectors(); };
   }
   sources.mqtt = mqtt.get();
   if (scene) sources.scene = [&scene] { return scene->report(); };

@@ -300,12 +300,28 @@ void check_together(const Config& config, const YamlSection& calibration,
   }
 }
 
-// Detections come over HTTP.
+// What detectors find becomes targets, and they look at frames in OE mode.
+void check_detectors(const Config& config, const YamlSection& detectors) {
+  if (!config.detectors.any()) return;
+  const char* first = config.detectors.motion ? "motion" : "people";
+  if (!config.tracking.targets)
+    detectors.fail(first, "stands without section tracking; add tracking");
+  if (!config.realtime.landmarks)
+    detectors.fail(first, "looks at frames in OE mode only, and realtime.mode is PT; set it to OE");
+  if (config.detectors.people && config.tracking.plane.empty()) {
+    detectors.fail("people",
+                   "takes the ground, which tells how tall people are in the picture; add "
+                   "tracking.plane, a plane.yaml of alidade plane fit");
+  }
+}
+
+// Detections come over HTTP, or of detectors here.
 void check_targets(const Config& config, const YamlSection& output) {
   if (!config.output.targets.empty() && !config.tracking.targets)
     output.fail("targets", "stands without section tracking; add tracking");
-  if (!config.output.targets.empty() && !config.output.http)
-    output.fail("targets", "stands without http, over which detections come; add http");
+  if (!config.output.targets.empty() && !config.output.http && !config.detectors.any())
+    output.fail("targets",
+                "stands without http, over which detections come; add http, or detectors");
 }
 
 void read_config(YamlSection& top, const std::string& path, ConfigScope scope, Config* config) {
@@ -316,6 +332,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   const YamlSection scene_map = top.section("scene_map");
   const YamlSection realtime = top.section("realtime");
   const YamlSection tracking = top.section("tracking");
+  const YamlSection detectors = top.section("detectors");
   const YamlSection mqtt = top.section("mqtt");
   const YamlSection output = top.section("output");
   // Before one is missed: it may be there, mistyped.
@@ -333,6 +350,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   config->scene_map = read_scene_map(scene_map, path);
   config->realtime = read_realtime(realtime);
   config->tracking = read_tracking(tracking, top.has("tracking"), path);
+  config->detectors = read_detectors(detectors);
   if (scope == ConfigScope::kAll) check_ages(*config, pan_tilt, realtime);
   config->output = read_output(output, path, &config->warnings);
   if (top.has("mqtt")) config->mqtt = read_mqtt(mqtt, path, &config->warnings);
@@ -342,6 +360,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
     config->calibration.automatic = false;
   }
   check_together(*config, calibration, scene_map, path, &config->warnings);
+  check_detectors(*config, detectors);
   check_targets(*config, output);
 }
 

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "edge_app/config/detectors_config.h"
 #include "edge_app/config/mqtt_config.h"
 #include "edge_app/config/pan_tilt_config.h"
 #include "edge_app/config/tracking_config.h"
@@ -96,6 +97,7 @@ struct Config {
   SceneMapConfig scene_map;
   RealtimeConfig realtime;
   TrackingConfig tracking;
+  BuiltInDetectorOptions detectors;
   OutputConfig output;
   std::optional<MqttOptions> mqtt;    // empty: no broker is told
   std::vector<std::string> warnings;  // FILE:LINE: ... lines for the log

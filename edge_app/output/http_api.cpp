@@ -261,6 +261,18 @@ Json link_json(const LinkHealth& link) {
           {"rate_hz", or_null(link.rate_hz)}};
 }
 
+Json detectors_json(const DetectorsReport& report) {
+  const auto one = [](const std::optional<DetectorCounters>& counters) -> Json {
+    if (!counters) return nullptr;
+    return {{"pictures", counters->pictures},
+            {"unjudged", counters->unjudged},
+            {"boxes", counters->boxes}};
+  };
+  return {{"replaced", report.replaced},
+          {"motion", one(report.motion)},
+          {"people", one(report.people)}};
+}
+
 ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
   const PipelineSummary summary = sources.summary();
   const FrameSourceCounters losses = sources.video_losses();
@@ -319,6 +331,7 @@ ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
   } else {
     out["stages_s"] = nullptr;
   }
+  out["detectors"] = sources.detectors ? detectors_json(sources.detectors()) : Json();
   out["page_faults"] = {{"minor", summary.page_faults.minor}, {"major", summary.page_faults.major}};
   Json clients = Json::array();
   for (const ReaderCounters& reader : sources.live->readers())

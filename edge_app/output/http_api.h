@@ -14,6 +14,7 @@
 #include "edge_app/output/target_lines.h"
 #include "edge_app/pipeline/pipeline.h"
 #include "edge_app/pipeline/scene_report.h"
+#include "edge_app/tracking/built_in_detectors.h"
 #include "edge_app/tracking/target_feed.h"
 #include "platform/video/frame_source.h"
 
@@ -31,8 +32,9 @@ struct HttpApiSources {
   // Both null where nothing is tracked. Borrowed as live is; where there are some, they wake the server, too.
   TargetFeed* targets = nullptr;
   TargetLines* target_lines = nullptr;
-  const MqttPublisher* mqtt = nullptr;  // null: no broker is told
-  std::function<SceneReport()> scene;   // empty: no scene map is in use
+  std::function<DetectorsReport()> detectors;  // empty: none is built in
+  const MqttPublisher* mqtt = nullptr;         // null: no broker is told
+  std::function<SceneReport()> scene;          // empty: no scene map is in use
   std::string version;
   std::string camera;            // the video source's name, without a password
   bool latency_measured = true;  // false for a recording

@@ -180,6 +180,26 @@ void add_target_metrics(const TargetFeed& feed, MetricsText* out) {
   out->add(counters.births_refused);
 }
 
+void add_detector_metrics(const DetectorsReport& report, MetricsText* out) {
+  const std::array<std::pair<const char*, const std::optional<DetectorCounters>*>, 2> all = {
+      {{"motion", &report.motion}, {"people", &report.people}}};
+  out->counter("alidade_detector_pictures_replaced_total",
+               "Pictures that no detector looked at, as a newer one came");
+  out->add(report.replaced);
+  out->counter("alidade_detector_pictures_total",
+               "Pictures that a detector looked at, by whether it could judge them");
+  for (const auto& [name, counters] : all) {
+    if (!*counters) continue;
+    out->add((*counters)->pictures - (*counters)->unjudged,
+             {{"detector", name}, {"result", "judged"}});
+    out->add((*counters)->unjudged, {{"detector", name}, {"result", "unjudged"}});
+  }
+  out->counter("alidade_detector_boxes_total", "Boxes that a detector found");
+  for (const auto& [name, counters] : all) {
+    if (*counters) out->add((*counters)->boxes, {{"detector", name}});
+  }
+}
+
 void add_mqtt_metrics(const MqttCounters& mqtt, MetricsText* out) {
   out->gauge("alidade_mqtt_connected", "1: the MQTT broker has taken the connection");
   out->add(std::int64_t{mqtt.connected});
@@ -256,6 +276,7 @@ std::string service_metrics(const HttpApiSources& sources, const HttpCounters& h
     add_zoom_metrics(*newest, zoom_curve_of(sources), &out);
   }
   if (sources.targets != nullptr) add_target_metrics(*sources.targets, &out);
+  if (sources.detectors) add_detector_metrics(sources.detectors(), &out);
   if (sources.mqtt != nullptr) add_mqtt_metrics(sources.mqtt->counters(), &out);
   if (sources.scene) add_scene_metrics(sources.scene(), now_s, &out);
   out.gauge("alidade_stream_clients", "Clients of the event stream");

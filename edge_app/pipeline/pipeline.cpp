@@ -42,7 +42,7 @@ Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink
       calibration_(calibration),
       options_(options),
       stage_(options.step, options.measure_latency, calibration != nullptr, options.tap,
-             options.scene),
+             options.scene, options.detectors),
       images_(kImageSlots),
       way_processor_(processor_of_the_way(options)),
       finished_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
@@ -72,6 +72,10 @@ void Pipeline::start() {
     threads_.emplace_back(&Pipeline::localize, this);
     localizing_ = threads_.back().native_handle();
   }
+  if (options_.detectors != nullptr) {
+    threads_.emplace_back(&Pipeline::detect, this);
+    detecting_ = threads_.back().native_handle();
+  }
   if (options_.tap != nullptr) threads_.emplace_back(&ImageTap::run, options_.tap);
   threads_.emplace_back(&Pipeline::run_realtime, this);
   threads_.emplace_back(&Pipeline::read_telemetry, this);
@@ -88,9 +92,11 @@ void Pipeline::stop() {
     // It ends at its next look at that, which a thread that runs last may reach after minutes.
     if (!threads_.empty()) static_cast<void>(set_usual_priority(calibrating_));
   }
-  // Likewise: with the picture that it looks at.
+  // Likewise: with the picture that they look at.
   if (options_.scene != nullptr && !threads_.empty())
     static_cast<void>(set_usual_priority(localizing_));
+  if (options_.detectors != nullptr && !threads_.empty())
+    static_cast<void>(set_usual_priority(detecting_));
   for (std::thread& thread : threads_) thread.join();
   threads_.clear();
 }
@@ -243,6 +249,12 @@ void Pipeline::localize() {
   const std::string warning = set_lowest_priority();
   if (!warning.empty()) spdlog::warn("localization thread: {}", warning);
   options_.scene->run([this] { stage_.wake(); });
+}
+
+void Pipeline::detect() {
+  const std::string warning = set_lowest_priority();
+  if (!warning.empty()) spdlog::warn("detector thread: {}", warning);
+  options_.detectors->run();
 }
 
 void Pipeline::calibrate() {

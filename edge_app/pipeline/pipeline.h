@@ -9,6 +9,7 @@
 //   output thread     queue -> sink; logs what the real-time thread may not log; counts
 //   localization thread  SceneTap, with the lowest priority; only if there is a scene map
 //   tap thread        ImageTap: small images, for those who ask; only if there is a tap
+//   detector thread   DetectorTap, with the lowest priority; only if there is a detector
 //
 // Where the real-time thread has a priority, all on a record's way have theirs below it, in this order: the link's own thread,
 // which stamps arrivals, telemetry and output; decoding. So a record waits for no other program, and none of them for the step.
@@ -46,9 +47,10 @@ struct PipelineOptions {
   int width = 0;
   int height = 0;
   std::string calibration_name;
-  bool measure_latency = true;  // false for a recording, whose stamps are of another clock
-  ImageTap* tap = nullptr;      // borrowed like the sources; null: nobody asks for images
-  SceneTap* scene = nullptr;    // likewise; null: there is no scene map
+  bool measure_latency = true;       // false for a recording, whose stamps are of another clock
+  ImageTap* tap = nullptr;           // borrowed like the sources; null: nobody asks for images
+  SceneTap* scene = nullptr;         // likewise; null: there is no scene map
+  DetectorTap* detectors = nullptr;  // likewise; null: there is none
 };
 
 struct PipelineSummary {
@@ -114,6 +116,7 @@ class Pipeline {
   void calibrate();
   void feed_calibration();
   void localize();
+  void detect();
   void write_output();
   void count(const OutputMessage& message);
   void log_events(const OutputMessage& message);
@@ -155,6 +158,7 @@ class Pipeline {
   std::vector<std::thread> threads_;
   pthread_t calibrating_{};  // one of them, if there is a calibration
   pthread_t localizing_{};   // one of them, if there is a scene map
+  pthread_t detecting_{};    // one of them, if there is a detector
 };
 
 }  // namespace alidade

@@ -19,12 +19,13 @@ constexpr double kPatience_s = 0.1;
 }  // namespace
 
 RealtimeStage::RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed,
-                             ImageTap* tap, SceneTap* scene)
+                             ImageTap* tap, SceneTap* scene, DetectorTap* detectors)
     : step_(options),
       measure_latency_(measure_latency),
       feed_wanted_(feed),
       tap_(tap),
-      scene_(scene) {
+      scene_(scene),
+      detectors_(detectors) {
   // Those that the real-time thread fills.
   touch<OutputMessage>(&output_queue_);
   touch<FeedFrame>(&feed_frames_);
@@ -116,6 +117,7 @@ void RealtimeStage::process_frame(const VideoMessage& received) {
   if (feed_wanted_) feed(message, &lent);
   if (scene_ != nullptr && !lent) localize(message, out.record, &lent);
   if (tap_ != nullptr && !lent) tap(message, &lent);
+  if (detectors_ != nullptr && !lent) detect(message, out.record, &lent);
   if (message.slot != kNoImageSlot && !lent) returned_.push(message.slot);
 }
 
@@ -170,6 +172,16 @@ void RealtimeStage::localize(const VideoMessage& message, const OrientationRecor
   *lent = scene_->push(localizable_frame_);
 }
 
+// Last, as it takes every picture that the others leave.
+void RealtimeStage::detect(const VideoMessage& message, const OrientationRecord& record,
+                           bool* lent) {
+  const bool can_lend = message.image.valid() && message.slot != kNoImageSlot;
+  if (!can_lend || !DetectorTap::takes(record)) return;
+  const ImageSlot replaced = detectors_->put(record, message.image, message.slot);
+  if (replaced != kNoImageSlot) returned_.push(replaced);
+  *lent = true;
+}
+
 bool RealtimeStage::process() noexcept {
   const bool ended = input_ended_.load(std::memory_order_acquire);
   drain_telemetry();
@@ -201,6 +213,7 @@ bool RealtimeStage::process() noexcept {
     feed_.post();
     if (tap_ != nullptr) tap_->end();
     if (scene_ != nullptr) scene_->end();
+    if (detectors_ != nullptr) detectors_->end();
   }
   return !ended;
 }

@@ -7,9 +7,10 @@
 //                                                 |           |   PanTiltSample--> calibration thread
 //   ImageTap         --a wish---------------->  |           | --TappedFrame----> ImageTap
 //   SceneTap --ToldBase------------->  |           | --LocalizableFrame--> SceneTap
+//                                                 |           | --DetectableFrame---> DetectorTap
 //
 // Images stay where the decoder put them: a frame occupies a slot of the capture thread, and whoever had the
-// image last, this thread, the calibration thread, the localization thread or the tap, gives the slot back.
+// image last, this thread, the calibration thread, the localization thread or a tap, gives the slot back.
 // Each queue has one producer and one consumer, a fixed capacity and fixed-size messages. A full
 // queue drops the new message and counts it; nobody waits for anybody. In OE mode a live frame that has waited for
 // long while others wait behind it goes without its image: where the processor cannot keep up, some records are
@@ -21,6 +22,7 @@
 #include <cstdint>
 #include <type_traits>
 
+#include "edge_app/pipeline/detector_tap.h"
 #include "edge_app/pipeline/image_slot.h"
 #include "edge_app/pipeline/image_tap.h"
 #include "edge_app/pipeline/orientation_step.h"
@@ -81,15 +83,17 @@ struct DropCounters {
 class RealtimeStage {
  public:
   // measure_latency: receive times are of this host's running clock (not of a recording).
-  // feed: there is a calibration thread. tap, scene: borrowed; null: nobody asks for images, there is no scene map.
+  // feed: there is a calibration thread. tap, scene, detectors: borrowed; null: nobody asks for images, there is no scene map, no detector.
   RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed,
-                ImageTap* tap = nullptr, SceneTap* scene = nullptr);
+                ImageTap* tap = nullptr, SceneTap* scene = nullptr,
+                DetectorTap* detectors = nullptr);
 
   // Capture thread: a slot that nobody needs, one after the other.
   bool pop_returned(ImageSlot& slot) {
     return returned_.pop(slot) || returned_by_calibration_.pop(slot) ||
            (tap_ != nullptr && tap_->pop_returned(slot)) ||
-           (scene_ != nullptr && scene_->pop_returned(slot));
+           (scene_ != nullptr && scene_->pop_returned(slot)) ||
+           (detectors_ != nullptr && detectors_->pop_returned(slot));
   }
   // Capture thread. False: the queue is full, the message and its slot are refused.
   bool push(const VideoMessage& message);
@@ -150,6 +154,7 @@ class RealtimeStage {
   void count_unheard(bool heard);
   void tap(const VideoMessage& message, bool* lent);
   void localize(const VideoMessage& message, const OrientationRecord& record, bool* lent);
+  void detect(const VideoMessage& message, const OrientationRecord& record, bool* lent);
   void emit(const OutputMessage& message);
 
   static constexpr std::size_t kPublished = 4;
@@ -200,6 +205,7 @@ class RealtimeStage {
   bool feed_wanted_;
   ImageTap* tap_;
   SceneTap* scene_;
+  DetectorTap* detectors_;
 };
 
 }  // namespace alidade

@@ -1,29 +1,14 @@
 #pragma once
-// What a detector found in one frame, as it comes from outside, and what became of it.
-// A box is the smallest upright rectangle around the target in the picture as the camera sent it: (u, v) its upper left corner, px, pixels as
-// in the house's convention. Where the target is, is the middle of the lower edge (the foot) on a plane, the middle of the box on the sphere.
+// What a detector found in one frame, and what became of it. Scores are 0 to 1 here. Where the target is, is the middle of the box's lower edge
+// (the foot) on a plane, the middle of the box on the sphere.
 
-#include <cmath>
 #include <cstddef>
-#include <string>
 #include <vector>
 
-#include "core/model/linear_algebra.h"
+#include "core/detection/detection_box.h"
 #include "edge_app/pipeline/orientation_record.h"
 
 namespace alidade {
-
-struct DetectionBox {
-  double u = 0;  // px, left edge
-  double v = 0;  // px, upper edge
-  double width = 0;
-  double height = 0;
-  double score = 1;  // 0 to 1
-  std::string name;  // its class; empty: not told
-
-  [[nodiscard]] Vector2<double> foot() const { return {u + width / 2, v + height}; }
-  [[nodiscard]] Vector2<double> middle() const { return {u + width / 2, v + height / 2}; }
-};
 
 inline constexpr std::size_t kLongestClass = 32;  // bytes
 

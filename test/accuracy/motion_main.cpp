@@ -37,7 +37,7 @@ double cpu_now_s() {
 void judge(const std::vector<DetectionBox>& boxes, std::vector<TrueTarget> truth, Tally* tally) {
   std::vector<bool> taken(truth.size());
   for (const DetectionBox& box : boxes) {
-    const Eigen::Vector2d centre(box.left + box.width / 2, box.top + box.height / 2);
+    const Eigen::Vector2d centre(box.u + box.width / 2, box.v + box.height / 2);
     double nearest = 1e9;
     std::size_t which = 0;
     for (std::size_t i = 0; i < truth.size(); ++i) {
@@ -75,7 +75,7 @@ void show(const cv::Mat& image, const std::vector<DetectionBox>& boxes,
                cvRound(target.size_px) + 8, target.counts ? 0 : 128, 1);
   }
   for (const DetectionBox& box : boxes) {
-    const cv::Rect2d around(box.left - 4, box.top - 4, box.width + 8, box.height + 8);
+    const cv::Rect2d around(box.u - 4, box.v - 4, box.width + 8, box.height + 8);
     cv::rectangle(shown, around, 255, 1);
     cv::putText(shown, number(box.score, 2), {cvRound(around.x), cvRound(around.y) - 3},
                 cv::FONT_HERSHEY_PLAIN, 1, 255);
@@ -104,9 +104,9 @@ Tally run(const MotionFilmPlan& plan, const MotionOptions& options,
     if (answer.status != MotionStatus::kOk) ++tally.not_ok;
     judge(detector.boxes(), film.truth(i), &tally);
     for (const DetectionBox& box : tally.alarms) {
-      std::cerr << plan.name << ", frame " << i << ": false alarm at " << box.left << ", "
-                << box.top << ", " << box.width << " x " << box.height << " px, "
-                << number(box.score) << " sigmas, spread " << answer.spread << "\n";
+      std::cerr << plan.name << ", frame " << i << ": false alarm at " << box.u << ", " << box.v
+                << ", " << box.width << " x " << box.height << " px, " << number(box.score)
+                << " sigmas, spread " << answer.spread << "\n";
     }
     tally.alarms.clear();
     if (!shown.empty()) {

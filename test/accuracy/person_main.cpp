@@ -77,7 +77,7 @@ FrameOrientation looking_down(double f, int width, int height) {
 }
 
 void list(int frame, const char* what, const DetectionBox& box) {
-  std::cerr << "frame " << frame << ": " << what << " at " << box.left << ", " << box.top << ", "
+  std::cerr << "frame " << frame << ": " << what << " at " << box.u << ", " << box.v << ", "
             << box.width << " x " << box.height << " px, " << number(box.score) << "\n";
 }
 

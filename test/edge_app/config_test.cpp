@@ -336,6 +336,31 @@ TEST_F(ConfigTest, TargetsAreTrackedWhereThereIsTheSection) {
   EXPECT_EQ(config_.tracking.targets->least_score, 0.5);
 }
 
+TEST_F(ConfigTest, ADetectorIsOffUnlessItIsThere) {
+  ASSERT_THAT(load(kMinimal), IsEmpty());
+  EXPECT_FALSE(config_.detectors.any());
+  ASSERT_THAT(load(std::string(kMinimal) + "tracking: {}\ndetectors: {motion: {}}\n"
+                                           "output: {targets: targets.jsonl}\n"),
+              IsEmpty());
+  ASSERT_TRUE(config_.detectors.motion);
+  EXPECT_FALSE(config_.detectors.people);
+  EXPECT_EQ(config_.detectors.motion->exposure_s, MotionOptions().exposure_s);
+  ASSERT_THAT(load(std::string(kMinimal) +
+                   "tracking: {plane: p.yaml}\n"
+                   "detectors: {motion: {exposure_s: 0.001, least_size_px: 4, most_size_px: 50},\n"
+                   "            people: {height_m: 1.6, least_height_px: 60, most_height_px: 300,\n"
+                   "                     threshold: 0.5}}\n"),
+              IsEmpty());
+  EXPECT_EQ(config_.detectors.motion->exposure_s, 0.001);
+  EXPECT_EQ(config_.detectors.motion->change.least_size_px, 4);
+  EXPECT_EQ(config_.detectors.motion->change.most_size_px, 50);
+  ASSERT_TRUE(config_.detectors.people);
+  EXPECT_EQ(config_.detectors.people->height_m, 1.6);
+  EXPECT_EQ(config_.detectors.people->least_height_px, 60);
+  EXPECT_EQ(config_.detectors.people->most_height_px, 300);
+  EXPECT_EQ(config_.detectors.people->threshold, 0.5);
+}
+
 TEST_F(ConfigTest, WidthWithoutHeightIsRefused) {
   const std::string error = load(
       "video:\n  type: rtsp\n  url: rtsp://camera/s\n  width: 1280\n"
@@ -656,6 +681,22 @@ INSTANTIATE_TEST_SUITE_P(
                 ":4: tracking.history_s", "9"},
         Mistake{"TooManyBoxes", MINIMAL "tracking: {max_detections: 10000}\n",
                 ":4: tracking.max_detections", "500"},
+        Mistake{"DetectorWithoutTracking", MINIMAL "detectors: {motion: {}}\n",
+                ":4: detectors.motion", "add tracking"},
+        Mistake{"DetectorInPtMode",
+                MINIMAL "tracking: {}\nrealtime: {mode: PT}\ndetectors: {motion: {}}\n",
+                ":6: detectors.motion", "set it to OE"},
+        Mistake{"PeopleWithoutGround", MINIMAL "tracking: {}\ndetectors: {people: {}}\n",
+                ":5: detectors.people", "add tracking.plane"},
+        Mistake{"UnknownDetector", MINIMAL "detectors: {birds: {}}\n", ":4: detectors.birds",
+                "known here: motion, people"},
+        Mistake{"LeastAboveMost",
+                MINIMAL "tracking: {}\ndetectors:\n  motion:\n    least_size_px: 300\n",
+                ":7: detectors.motion.least_size_px", "leaves 300 to 200 px"},
+        Mistake{"DetectorIsAWord", MINIMAL "detectors: {motion: true}\n", ":4: detectors.motion",
+                "expected a mapping"},
+        Mistake{"ExposureOfHours", MINIMAL "detectors: {motion: {exposure_s: 60}}\n",
+                ":4: detectors.motion.exposure_s", "s"},
         Mistake{"NoBroker", MINIMAL "mqtt: {qos: 1}\n", ":4: mqtt.url",
                 "expected for example url: mqtt://broker"},
         Mistake{"BrokerOverHttp", MINIMAL "mqtt: {url: 'http://broker'}\n", ":4: mqtt.url",

@@ -172,12 +172,12 @@ TEST_F(ChangeRegionsTest, ABoxIsWhatHasChanged) {
   ASSERT_TRUE(regions_.find());
   ASSERT_EQ(regions_.boxes().size(), 2U);
   const DetectionBox& strong = regions_.boxes()[0];
-  EXPECT_EQ(strong.left, 40);
-  EXPECT_EQ(strong.top, 50);
+  EXPECT_EQ(strong.u, 40);
+  EXPECT_EQ(strong.v, 50);
   EXPECT_EQ(strong.width, 8);
   EXPECT_EQ(strong.height, 6);
   const DetectionBox& weak = regions_.boxes()[1];
-  EXPECT_EQ(weak.left, 120);
+  EXPECT_EQ(weak.u, 120);
   EXPECT_EQ(weak.height, 5);
   // Held to 6, 25 of them, over 8.9.
   EXPECT_NEAR(strong.score, 25 * 6 / 8.889, 0.01);
@@ -213,8 +213,8 @@ TEST_F(ChangeRegionsTest, KeepsTheSurestAndSaysWhenThereAreTooMany) {
   for (int i = 0; i < 5; ++i) plant(&few, 20 + 30 * i, 20, 5, 5, 3 + 0.5 * i);
   ASSERT_TRUE(few.find());
   ASSERT_EQ(few.boxes().size(), 3U);
-  EXPECT_EQ(few.boxes()[0].left, 140);
-  EXPECT_EQ(few.boxes()[2].left, 80);
+  EXPECT_EQ(few.boxes()[0].u, 140);
+  EXPECT_EQ(few.boxes()[2].u, 80);
 
   options_.merge_px = 0;
   ChangeRegions many(800, 800, options_);

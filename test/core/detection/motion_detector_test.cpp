@@ -54,7 +54,7 @@ TEST_F(MotionDetectorTest, FindsWhatMovesAtItsPlaceWhileTheCameraPans) {
       ASSERT_EQ(answer.status, MotionStatus::kOk);
       ASSERT_EQ(detector.boxes().size(), 1U) << size << " px, frame " << i;
       const DetectionBox& box = detector.boxes()[0];
-      const Vector2<double> centre(box.left + box.width / 2, box.top + box.height / 2);
+      const Vector2<double> centre(box.u + box.width / 2, box.v + box.height / 2);
       EXPECT_LT((centre - camera.disc_pixel(orientation)).norm(), 2);
       EXPECT_NEAR(box.width, size, 4);
       EXPECT_NEAR(box.height, size, 4);
@@ -134,7 +134,7 @@ TEST_F(MotionDetectorTest, ASlowTargetHasNoGhost) {
     ASSERT_LE(detector_.boxes().size(), 1U) << "frame " << i;
     found += static_cast<int>(detector_.boxes().size());
     for (const DetectionBox& box : detector_.boxes()) {
-      const Vector2<double> centre(box.left + box.width / 2, box.top + box.height / 2);
+      const Vector2<double> centre(box.u + box.width / 2, box.v + box.height / 2);
       EXPECT_LT((centre - still.disc_pixel(orientation)).norm(), 10);
     }
   }
@@ -157,7 +157,7 @@ TEST_F(MotionDetectorTest, FindsATargetInTheCornerOfThePicture) {
   ASSERT_LT(u.y(), 10);
   ASSERT_EQ(detector_.boxes().size(), 1U);
   const DetectionBox& box = detector_.boxes()[0];
-  EXPECT_LT((Vector2<double>(box.left + box.width / 2, box.top + box.height / 2) - u).norm(), 3);
+  EXPECT_LT((Vector2<double>(box.u + box.width / 2, box.v + box.height / 2) - u).norm(), 3);
 }
 
 TEST_F(MotionDetectorTest, TheFirstPicturesHaveTooLittleToBeComparedWith) {

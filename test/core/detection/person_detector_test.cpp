@@ -80,10 +80,10 @@ TEST(PersonOptions, SayWhatIsWrong) {
 }
 
 TEST(DetectionBox, OverlapIsCommonAreaOverAll) {
-  const DetectionBox a{0, 0, 4, 4, 0, 0};
-  const DetectionBox b{2, 0, 4, 4, 0, 0};
+  const DetectionBox a{0, 0, 4, 4, 0, {}};
+  const DetectionBox b{2, 0, 4, 4, 0, {}};
   EXPECT_NEAR(overlap(a, b), 8.0 / 24, 1e-12);
-  EXPECT_EQ(overlap(a, {4, 0, 2, 2, 0, 0}), 0);
+  EXPECT_EQ(overlap(a, {4, 0, 2, 2, 0, {}}), 0);
   EXPECT_NEAR(overlap(a, a), 1, 1e-12);
 }
 
