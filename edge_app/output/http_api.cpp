@@ -277,6 +277,7 @@ ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
   out["mode"] = of_newest([](const Record& r) { return to_string(r.mode); });
   out["status"] = of_newest([](const Record& r) { return to_string(r.status); });
   out["telemetry_age_s"] = of_newest([](const Record& r) { return or_null(r.telemetry_age_s); });
+  out["zoom"] = of_newest([](const Record& r) { return or_null(r.zoom); });
   out["landmarks"] = of_newest([](const Record& r) { return r.landmarks; });
   out["image"] = {{"width", of_newest([](const Record& r) { return r.camera.width; })},
                   {"height", of_newest([](const Record& r) { return r.camera.height; })}};

@@ -76,6 +76,7 @@ void add_fields(const OrientationRecord& record, Line* line) {
             std::optional(std::array<double, 2>{record.camera.centre_u, record.camera.centre_v}));
   line->add("latency_s", record.latency_s);
   line->add("telemetry_age_s", record.telemetry_age_s);
+  line->add("zoom", record.zoom);
   std::optional<double> zoom_rate;
   std::optional<double> zoom_rate_sigma;
   if (record.orientation && record.orientation->geometry.zoom_rate_sigma > 0) {

@@ -50,6 +50,8 @@ struct OrientationRecord {
   // Root mean square of their residuals' lengths, px; none but in mode OE.
   std::optional<double> residual_px;
   PlainCalibration camera;  // the calibration in use
+  // What the pan/tilt source has reported last, in its own scale; none: it reports no zoom.
+  std::optional<double> zoom;
   // How far the frame's middle row, looked up at time_s + clock offset, lies beyond the newest trusted angle of telemetry, s: what
   // max_extrapolation_s bounds. Negative: samples enclose it. None without a sample.
   std::optional<double> telemetry_age_s;

@@ -201,6 +201,7 @@ OrientationRecord OrientationStep::empty_record() const {
   OrientationRecord record;
   record.calibrated = options_.calibrated && zoom_fits();
   record.camera = pack(options_.calibration);
+  record.zoom = zoom_;
   return record;
 }
 

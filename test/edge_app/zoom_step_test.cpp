@@ -56,6 +56,7 @@ TEST(ZoomStep, HasAnOrientationAtEveryReading) {
     EXPECT_EQ(record.mode, RecordMode::kPt) << zoom;
     EXPECT_EQ(record.status, RecordStatus::kOk) << zoom;
     EXPECT_TRUE(record.calibrated);
+    EXPECT_EQ(record.zoom, zoom);
     ASSERT_TRUE(record.orientation);
     EXPECT_NEAR(record.orientation->pan_rad, 0.1, 1e-3);
     EXPECT_LE(std::abs(record.camera.focal_length - test::zoom_focal_length(zoom)),
