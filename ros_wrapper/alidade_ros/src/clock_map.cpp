@@ -34,11 +34,12 @@ std::optional<double> ClockMap::wall_from_monotonic(double monotonic_s) const {
     return stretch.begin_monotonic_s <= monotonic_s;
   });
   const Stretch& stretch = in == stretches_.rend() ? stretches_.front() : *in;
-  return monotonic_s + stretch.offset_s();
+  return monotonic_s + stretch.offset_s() + stamp_offset_s_;
 }
 
-std::optional<double> ClockMap::monotonic_from_wall(double wall_s) const {
+std::optional<double> ClockMap::monotonic_from_wall(double stamp_s) const {
   if (stretches_.empty()) return std::nullopt;
+  const double wall_s = stamp_s - stamp_offset_s_;
   const auto in = std::find_if(stretches_.rbegin(), stretches_.rend(), [&](const Stretch& stretch) {
     return stretch.begin_monotonic_s <= wall_s - stretch.offset_s();
   });

@@ -99,6 +99,12 @@ alidade_msgs::FrameOrientation frame_orientation(const Record& record, std::uint
   message.residual = record.residual_px.value_or(kNan);
   message.line_delay = record.line_delay_s;
   message.focal_length = record.focal_length_px;
+  message.focal_length_sigma = record.focal_length_sigma_px.value_or(kNan);
+  message.zoom = record.zoom.value_or(kNan);
+  message.zoom_rate = record.zoom_rate_per_s.value_or(kNan);
+  message.zoom_rate_sigma = record.zoom_rate_sigma_per_s.value_or(kNan);
+  message.centre_offset_u = record.centre_offset_px[0];
+  message.centre_offset_v = record.centre_offset_px[1];
   message.aspect = record.aspect;
   message.radial_distortion = record.radial_distortion;
   if (record.orientation) {
@@ -183,11 +189,45 @@ alidade_msgs::Calibration calibration(const CalibrationValues& values, const std
   message.pan_scale = values.pan_scale;
   message.tilt_scale = values.tilt_scale;
   message.clock_offset = values.clock_offset;
+  message.centre_offset_u = values.centre_offset[0];
+  message.centre_offset_v = values.centre_offset[1];
   message.zoom = values.zoom.value_or(kNan);
+  message.zoom_repeatability = values.zoom_repeatability.value_or(kNan);
+  for (const ZoomNodeValues& node : values.zoom_nodes) {
+    alidade_msgs::ZoomNode& out = message.zoom_nodes.emplace_back();
+    out.reading = node.reading;
+    out.focal_length = node.focal_length;
+    out.focal_length_sigma = node.focal_length_sigma;
+    out.radial_distortion = node.radial_distortion;
+    out.radial_distortion_sigma = node.radial_distortion_sigma;
+    out.centre_offset_u = node.centre_offset[0];
+    out.centre_offset_v = node.centre_offset[1];
+    out.centre_offset_u_sigma = node.centre_offset_sigma[0];
+    out.centre_offset_v_sigma = node.centre_offset_sigma[1];
+  }
   message.names = values.names;
   message.covariance = values.covariance;
   message.json = json;
   return message;
+}
+
+geometry_msgs::TransformStamped plane_transform(const PlaneValues& plane, const FrameNames& names) {
+  constexpr double kPi = 3.14159265358979323846;
+  tf2::Quaternion plane_from_base;
+  plane_from_base.setRPY(plane.roll, -plane.pitch, kPi / 2 - plane.heading);
+  const tf2::Quaternion q = plane_from_base.inverse();
+  const tf2::Vector3 origin = tf2::quatRotate(q, -tf2::Vector3(plane.x, plane.y, plane.height));
+  geometry_msgs::TransformStamped transform;
+  transform.header = header_of(ros::Time(), names.base);
+  transform.child_frame_id = names.plane;
+  transform.transform.translation.x = origin.x();
+  transform.transform.translation.y = origin.y();
+  transform.transform.translation.z = origin.z();
+  transform.transform.rotation.x = q.x();
+  transform.transform.rotation.y = q.y();
+  transform.transform.rotation.z = q.z();
+  transform.transform.rotation.w = q.w();
+  return transform;
 }
 
 std::array<double, 4> orientation_of_row(const Record& record, const Axes& axes, double row) {

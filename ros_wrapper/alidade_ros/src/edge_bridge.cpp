@@ -3,6 +3,7 @@
 #include <alidade_msgs/Calibration.h>
 #include <alidade_msgs/FrameOrientation.h>
 #include <diagnostic_updater/diagnostic_updater.h>
+#include <tf2_ros/static_transform_broadcaster.h>
 #include <tf2_ros/transform_broadcaster.h>
 
 #include <chrono>
@@ -11,11 +12,13 @@
 #include <utility>
 
 #include "alidade_ros/services.h"
+#include "alidade_ros/targets.h"
 
 namespace alidade_ros {
 namespace {
 
 constexpr std::uint32_t kQueue = 1000;  // records: 40 s at 25 Hz for a subscriber that hangs
+constexpr std::uint32_t kDetectionsQueue = 50;
 constexpr auto kPollPeriod = std::chrono::seconds(1);
 constexpr double kGreatestRosTimeS = 4294967295.0;
 const char* const kMasterMarker = "known_to_master";
@@ -28,11 +31,15 @@ void read(const ros::NodeHandle& handle, const char* name, T* value) {
   }
 }
 
-// The camera's parameters in the record, which change with its calibration.
+// What of the camera in the record changes with its calibration only.
+bool same_calibration(const Record& a, const Record& b) {
+  return a.calibrated == b.calibrated && a.aspect == b.aspect && a.line_delay_s == b.line_delay_s;
+}
+
+// With what changes from frame to frame where there is a zoom curve.
 bool same_camera(const Record& a, const Record& b) {
-  return a.calibrated == b.calibrated && a.focal_length_px == b.focal_length_px &&
-         a.aspect == b.aspect && a.radial_distortion == b.radial_distortion &&
-         a.line_delay_s == b.line_delay_s;
+  return same_calibration(a, b) && a.focal_length_px == b.focal_length_px &&
+         a.radial_distortion == b.radial_distortion && a.centre_offset_px == b.centre_offset_px;
 }
 
 bool same_lens(const sensor_msgs::CameraInfo& a, const sensor_msgs::CameraInfo& b) {
@@ -58,15 +65,18 @@ BridgeOptions read_options(const ros::NodeHandle& handle) {
   read(handle, "camera", &camera);
   options.names.base = camera + "_base";
   options.names.optical = camera + "_optical_frame";
+  options.names.plane = camera + "_plane";
   options.names.pan_joint = camera + "_pan_joint";
   options.names.tilt_joint = camera + "_tilt_joint";
   read(handle, "base_frame", &options.names.base);
   read(handle, "optical_frame", &options.names.optical);
+  read(handle, "plane_frame", &options.names.plane);
   read(handle, "pan_joint", &options.names.pan_joint);
   read(handle, "tilt_joint", &options.names.tilt_joint);
   read(handle, "publish_tf", &options.publish_tf);
   read(handle, "tf_rows", &options.tf_rows);
   read(handle, "time_offset", &options.time_offset_s);
+  read(handle, "marker_distance", &options.marker_distance_m);
   const std::string wrong = wrong_with(options.edge);
   if (!wrong.empty()) throw std::invalid_argument("~" + wrong);
   if (options.tf_rows < 1 || options.tf_rows > 100) {
@@ -78,13 +88,19 @@ BridgeOptions read_options(const ros::NodeHandle& handle) {
   if (!std::isfinite(options.time_offset_s)) {
     throw std::invalid_argument("~time_offset: must be a finite number (s)");
   }
+  if (!(options.marker_distance_m > 0) || !std::isfinite(options.marker_distance_m)) {
+    throw std::invalid_argument("~marker_distance: must be a positive number (m)");
+  }
   return options;
 }
 
 struct EdgeBridge::Ports {
   ros::Publisher frame_orientation, orientation, joint_states, camera_info, calibration, status;
+  ros::Publisher targets, target_markers;
+  ros::Subscriber detections;
   ros::ServiceServer pixel_to_direction, direction_to_pixel, calibrate;
   tf2_ros::TransformBroadcaster tf;
+  tf2_ros::StaticTransformBroadcaster static_tf;
   diagnostic_updater::Updater diagnostics;
 
   Ports(const ros::NodeHandle& handle, const ros::NodeHandle& private_handle)
@@ -97,12 +113,16 @@ EdgeBridge::EdgeBridge(const ros::NodeHandle& handle, const ros::NodeHandle& pri
       private_handle_(private_handle),
       options_(options),
       client_(options.edge),
-      stream_(&client_,
-              {[this](const Hello& hello) { on_hello(hello); },
-               [this](const ClockPair& pair) { on_clock(pair); },
-               [this](const Record& record, std::uint64_t number) { on_record(record, number); },
-               [this](const std::string& error) { on_disconnected(error); },
-               [](const std::string& error) { ROS_WARN_THROTTLE(10, "%s", error.c_str()); }}),
+      stream_(
+          &client_,
+          {[this](const Hello& hello) { on_hello(hello); },
+           [this](const ClockPair& pair) { on_clock(pair); },
+           [this](const Record& record, std::uint64_t number) { on_record(record, number); },
+           [this](const std::string& json, std::string* error) { return on_targets(json, error); },
+           [this](const std::string& error) { on_disconnected(error); },
+           [](const std::string& error) { ROS_WARN_THROTTLE(10, "%s", error.c_str()); }}),
+      target_markers_(options.marker_distance_m),
+      clock_(options.time_offset_s),
       diagnosed_at_(ros::WallTime::now()) {
   advertise();
   publish_status();
@@ -133,6 +153,10 @@ void EdgeBridge::advertise() {
   p.camera_info = handle_.advertise<sensor_msgs::CameraInfo>("camera_info", 1, true);
   p.calibration = handle_.advertise<alidade_msgs::Calibration>("calibration", 1, true);
   p.status = handle_.advertise<alidade_msgs::Status>("status", 1, true);
+  p.targets = handle_.advertise<alidade_msgs::Targets>("targets", 1, true);
+  p.target_markers = handle_.advertise<visualization_msgs::MarkerArray>("target_markers", 1, true);
+  p.detections =
+      handle_.subscribe("detections", kDetectionsQueue, &EdgeBridge::forward_detections, this);
   p.pixel_to_direction =
       handle_.advertiseService("pixel_to_direction", &EdgeBridge::pixel_to_direction, this);
   p.direction_to_pixel =
@@ -144,6 +168,9 @@ void EdgeBridge::advertise() {
   if (camera_info_) p.camera_info.publish(*camera_info_);
   if (calibration_) p.calibration.publish(*calibration_);
   if (status_) p.status.publish(*status_);
+  if (targets_) p.targets.publish(*targets_);
+  if (markers_) p.target_markers.publish(*markers_);
+  if (plane_transform_ && options_.publish_tf) p.static_tf.sendTransform(*plane_transform_);
   private_handle_.setParam(kMasterMarker, true);
 }
 
@@ -167,6 +194,7 @@ void EdgeBridge::on_hello(const Hello& hello) {
     connected_ = true;
     error_.clear();
     calibration_is_old_ = true;
+    plane_is_old_ = true;
   }
   wake_poll();
 }
@@ -189,6 +217,59 @@ void EdgeBridge::on_disconnected(const std::string& error) {
     ROS_WARN_THROTTLE(30, "%s; connecting again", error.c_str());
   }
   publish_status();
+  clear_markers();
+}
+
+void EdgeBridge::clear_markers() {
+  const std::lock_guard<std::mutex> lock(ports_mutex_);
+  if (!markers_) return;
+  ports_->target_markers.publish(target_markers_.clear());
+  markers_.reset();
+}
+
+bool EdgeBridge::on_targets(const std::string& json, std::string* error) {
+  alidade_msgs::Targets targets;
+  MarkerView view;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!parse_targets(json, clock_, options_.names, &targets, error)) return false;
+    if (newest_) {
+      view.focal_length = newest_->focal_length_px;
+      view.aspect = newest_->aspect;
+    }
+    if (plane_) {
+      view.has_camera_position = true;
+      view.camera_position[0] = plane_->x;
+      view.camera_position[1] = plane_->y;
+      view.camera_position[2] = plane_->height;
+    }
+  }
+  const std::lock_guard<std::mutex> lock(ports_mutex_);
+  targets_ = targets;
+  markers_ = target_markers_.take(targets, view);
+  ports_->targets.publish(*targets_);
+  ports_->target_markers.publish(*markers_);
+  return true;
+}
+
+void EdgeBridge::forward_detections(const alidade_msgs::Detections& detections) {
+  std::string question;
+  std::string error;
+  bool asked = detections_question(detections, clock(), &question, &error);
+  if (asked) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!connected_) error = error_;
+    asked = connected_;
+  }
+  if (asked) error = client_.post("/api/v1/detections", question).error;
+  if (!error.empty()) ROS_WARN_THROTTLE(10, "detections refused: %s", error.c_str());
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (error.empty()) {
+    ++detections_taken_;
+  } else {
+    ++detections_refused_;
+    detections_error_ = error;
+  }
 }
 
 void EdgeBridge::on_record(const Record& record, std::uint64_t number) {
@@ -197,10 +278,11 @@ void EdgeBridge::on_record(const Record& record, std::uint64_t number) {
   int height = 0;
   bool changed = false;
   bool camera_changed = false;
+  bool calibration_changed = false;
   {
     const std::lock_guard<std::mutex> lock(mutex_);
     const auto wall = clock_.wall_from_monotonic(record.time_s.value_or(record.receive_time_s));
-    const double seconds = wall.value_or(0) + options_.time_offset_s;
+    const double seconds = wall.value_or(0);
     if (!wall || !(seconds > 0 && seconds < kGreatestRosTimeS)) {
       ROS_WARN_THROTTLE(10, "record %llu left out: its time is none of ROS",
                         static_cast<unsigned long long>(number));
@@ -208,8 +290,11 @@ void EdgeBridge::on_record(const Record& record, std::uint64_t number) {
     }
     stamp = ros_time(seconds);
     camera_changed = !newest_ || !same_camera(*newest_, record);
-    changed = camera_changed || newest_->mode != record.mode || newest_->status != record.status ||
-              newest_->calibration != record.calibration || newest_->needs != record.needs;
+    // A lens alone is asked for with the next second's poll.
+    calibration_changed = !newest_ || !same_calibration(*newest_, record);
+    changed = calibration_changed || newest_->mode != record.mode ||
+              newest_->status != record.status || newest_->calibration != record.calibration ||
+              newest_->needs != record.needs;
     calibration_is_old_ = calibration_is_old_ || camera_changed;
     newest_ = record;
     newest_stamp_ = stamp;
@@ -228,10 +313,8 @@ void EdgeBridge::on_record(const Record& record, std::uint64_t number) {
       }
     }
   }
-  if (camera_changed) {
-    publish_camera_info();
-    wake_poll();
-  }
+  if (camera_changed) publish_camera_info();
+  if (calibration_changed) wake_poll();
   if (changed) publish_status();
 }
 
@@ -291,6 +374,7 @@ void EdgeBridge::poll() {
     if (connected) {
       poll_status();
       poll_calibration();
+      poll_plane();
       publish_camera_info();
     }
     publish_status();
@@ -354,6 +438,31 @@ void EdgeBridge::poll_calibration() {
   ports_->calibration.publish(*calibration_);
 }
 
+void EdgeBridge::poll_plane() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!plane_is_old_) return;
+  }
+  const HttpClient::Answer answer = client_.get("/api/v1/plane");
+  PlaneValues plane;
+  std::string error;
+  const bool there_is_none = answer.status == 404;
+  if (!there_is_none && (!answer.ok() || !parse_plane(answer.body, &plane, &error))) {
+    ROS_WARN_THROTTLE(30, "%s", (answer.ok() ? error : answer.error).c_str());
+    return;
+  }
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    plane_is_old_ = false;
+    plane_.reset();
+    if (!there_is_none) plane_ = plane;
+  }
+  if (there_is_none) return;
+  const std::lock_guard<std::mutex> lock(ports_mutex_);
+  plane_transform_ = plane_transform(plane, options_.names);
+  if (options_.publish_tf) ports_->static_tf.sendTransform(*plane_transform_);
+}
+
 void EdgeBridge::wake_poll() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -378,6 +487,9 @@ void EdgeBridge::diagnose_connection(diagnostic_updater::DiagnosticStatusWrapper
   status.add("repeated records", counters.repeated);
   status.add("not understood", counters.misunderstood);
   status.add("connections", counters.connections);
+  status.add("detections taken", detections_taken_);
+  status.add("detections refused", detections_refused_);
+  if (!detections_error_.empty()) status.add("why, last", detections_error_);
   status.add("steps of the wall clock", clock_.steps());
   if (const auto uncertainty = clock_.uncertainty_s()) {
     status.add("wall clock known to (s)", *uncertainty);

@@ -64,6 +64,8 @@ void EventStream::take(const SseEvent& event) {
     ClockPair pair;
     if (!parse_clock_pair(event.data, &pair, &error)) return misunderstood(error);
     handlers_.on_clock(pair);
+  } else if (event.type == "targets") {
+    if (!handlers_.on_targets(event.data, &error)) return misunderstood(error);
   }
   // `lost` tells what the numbers tell as well; others are of a newer edge.
 }

@@ -31,6 +31,23 @@ ClockPair clock_pair(const Json& json) {
           json.at("bracket_s").get<double>()};
 }
 
+template <typename T>
+void read_estimate(const Json& calibration, const char* name, T* value, T* sigma) {
+  const auto found = calibration.find(name);
+  if (found == calibration.end()) return;
+  *value = found->at("value").get<T>();
+  *sigma = found->at("sigma").get<T>();
+}
+
+ZoomNodeValues zoom_node(const Json& json) {
+  ZoomNodeValues node;
+  node.reading = json.at("reading").get<double>();
+  read_estimate(json, "focal_length", &node.focal_length, &node.focal_length_sigma);
+  read_estimate(json, "radial_distortion", &node.radial_distortion, &node.radial_distortion_sigma);
+  read_estimate(json, "centre_offset", &node.centre_offset, &node.centre_offset_sigma);
+  return node;
+}
+
 // A parameter of the calibration; null or absent: the default stays.
 template <typename T>
 void read_value(const Json& calibration, const char* name, T* value) {
@@ -48,6 +65,8 @@ bool parse_record(const std::string& text, Record* record, std::string* error) {
     r.receive_time_s = json.at("receive_time_s").get<double>();
     r.latency_s = optional_of<double>(json, "latency_s");
     r.telemetry_age_s = optional_of<double>(json, "telemetry_age_s");
+    r.zoom = optional_of<double>(json, "zoom");
+    r.zoom_rate_sigma_per_s = optional_of<double>(json, "zoom_rate_sigma_per_s");
     r.zoom_rate_per_s = optional_of<double>(json, "zoom_rate_per_s");
     r.mode = json.at("mode").get<std::string>();
     r.status = json.at("status").get<std::string>();
@@ -59,6 +78,7 @@ bool parse_record(const std::string& text, Record* record, std::string* error) {
     r.residual_px = optional_of<double>(json, "residual_px");
     r.line_delay_s = json.at("line_delay_s").get<double>();
     r.focal_length_px = json.at("focal_length_px").get<double>();
+    r.focal_length_sigma_px = optional_of<double>(json, "focal_length_sigma_px");
     r.aspect = json.at("aspect").get<double>();
     r.radial_distortion = json.at("radial_distortion").get<double>();
     // An edge of before has none.
@@ -112,6 +132,12 @@ bool parse_calibration(const std::string& text, CalibrationValues* values, std::
     read_value(json, "pan_scale", &v.pan_scale);
     read_value(json, "tilt_scale", &v.tilt_scale);
     read_value(json, "clock_offset", &v.clock_offset);
+    read_value(json, "centre_offset", &v.centre_offset);
+    const auto curve = json.find("zoom_curve");
+    if (curve != json.end() && curve->is_object()) {
+      v.zoom_repeatability = curve->at("repeatability").get<double>();
+      for (const Json& node : curve->at("nodes")) v.zoom_nodes.push_back(zoom_node(node));
+    }
     v.zoom = optional_of<double>(json, "zoom");
     const auto covariance = json.find("covariance");
     if (covariance != json.end() && covariance->is_object()) {
@@ -121,6 +147,16 @@ bool parse_calibration(const std::string& text, CalibrationValues* values, std::
       }
     }
     *values = v;
+  });
+}
+
+bool parse_plane(const std::string& text, PlaneValues* plane, std::string* error) {
+  return parse(text, "plane", error, [&](const Json& json) {
+    const auto value = [&json](const char* name) {
+      return json.at(name).at("value").get<double>();
+    };
+    *plane = {value("heading"), value("pitch"), value("roll"),
+              value("x"),       value("y"),     value("height")};
   });
 }
 

@@ -82,5 +82,12 @@ TEST(ClockMap, StaysSmallWhateverHappens) {
   EXPECT_NEAR(*map.wall_from_monotonic(0), kOffset, 1 + kRounding);
 }
 
+TEST(ClockMap, AnOffsetOfTheStampsIsPutOnAndTakenOff) {
+  ClockMap clock(0.25);
+  clock.add({10, 1000, 0});
+  EXPECT_NEAR(*clock.wall_from_monotonic(12), 1002.25, 1e-9);
+  EXPECT_NEAR(*clock.monotonic_from_wall(1002.25), 12, 1e-9);
+}
+
 }  // namespace
 }  // namespace alidade_ros

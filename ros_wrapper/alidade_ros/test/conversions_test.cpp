@@ -151,6 +151,46 @@ TEST(Conversions, CameraInfoProjectsLikeTheModel) {
   }
 }
 
+TEST(Conversions, TheLensOfTheFrameIsToldWithItsRate) {
+  Record record = moving_record({});
+  record.centre_offset_px = {3.5, -2};
+  record.focal_length_sigma_px = 0.25;
+  record.zoom = 3000;
+  record.zoom_rate_per_s = -0.5;
+  record.zoom_rate_sigma_per_s = 0.01;
+  const auto message = frame_orientation(record, 1, ros_time(5), {});
+  EXPECT_EQ(message.focal_length_sigma, 0.25);
+  EXPECT_EQ(message.zoom, 3000);
+  EXPECT_EQ(message.zoom_rate, -0.5);
+  EXPECT_EQ(message.zoom_rate_sigma, 0.01);
+  EXPECT_EQ(message.centre_offset_u, 3.5);
+  EXPECT_EQ(message.centre_offset_v, -2);
+  const sensor_msgs::CameraInfo info = camera_info(record, 160, 96, ros_time(5), {});
+  EXPECT_EQ(info.K[0], record.focal_length_px);
+  EXPECT_EQ(info.K[2], 83);
+  EXPECT_EQ(info.K[5], 45.5);
+}
+
+TEST(Conversions, ACalibrationHasItsZoomsNodesOrNone) {
+  CalibrationValues values;
+  EXPECT_TRUE(std::isnan(calibration(values, "", ros::Time(), {}).zoom_repeatability));
+  values.zoom_repeatability = 0.002;
+  values.zoom_nodes = {{100, 1300, 0.5, 3, 0.25, {1, 2}, {0.1, 0.2}}};
+  const alidade_msgs::Calibration message = calibration(values, "", ros::Time(), {});
+  EXPECT_EQ(message.zoom_repeatability, 0.002);
+  ASSERT_EQ(message.zoom_nodes.size(), 1U);
+  const alidade_msgs::ZoomNode& node = message.zoom_nodes[0];
+  EXPECT_EQ(node.reading, 100);
+  EXPECT_EQ(node.focal_length, 1300);
+  EXPECT_EQ(node.focal_length_sigma, 0.5);
+  EXPECT_EQ(node.radial_distortion, 3);
+  EXPECT_EQ(node.radial_distortion_sigma, 0.25);
+  EXPECT_EQ(node.centre_offset_u, 1);
+  EXPECT_EQ(node.centre_offset_v, 2);
+  EXPECT_EQ(node.centre_offset_u_sigma, 0.1);
+  EXPECT_EQ(node.centre_offset_v_sigma, 0.2);
+}
+
 TEST(Conversions, RowsTurnAsTheMechanismDoes) {
   const Axes axes = tilted_axes();
   const Record record = moving_record(axes);

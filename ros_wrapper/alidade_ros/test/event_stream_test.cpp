@@ -118,6 +118,12 @@ class Follower {
                 {[this](const Hello& h) { add("hello " + h.start); },
                  [this](const ClockPair&) { add("clock"); },
                  [this](const Record&, std::uint64_t number) { add(std::to_string(number)); },
+                 [this](const std::string& json, std::string* error) {
+                   *error = json;
+                   const bool understood = json != "unclear";
+                   if (understood) add("targets " + json);
+                   return understood;
+                 },
                  [this](const std::string& error) { add("disconnected", error); },
                  [this](const std::string& error) { add("misunderstood", error); }}) {
     stream_.start();
@@ -270,6 +276,14 @@ TEST(HttpClient, RefusesAddressesThatAreNoneOrHoldAPassword) {
   address.token_env = "A";
   address.token_file = "b";
   EXPECT_NE(wrong_with(address), "");
+}
+
+TEST(EventStream, HandsTargetsOnOrSaysThatTheyAreNotUnderstood) {
+  FakeEdge edge({hello("A") + "event: targets\ndata: some\n\nevent: targets\ndata: unclear\n\n"});
+  Follower follower(edge.address());
+  const Words words = follower.words(3);
+  EXPECT_EQ(Words(words.begin(), words.begin() + 3),
+            (Words{"hello A", "targets some", "misunderstood"}));
 }
 
 }  // namespace

@@ -11,7 +11,7 @@ const char* const kRecord =
         "tilt_rate_rad_s":0.4,"pan_acceleration_rad_s2":0.5,"tilt_acceleration_rad_s2":0.6,
         "q_base_from_camera":[0.5,0.5,0.5,0.5],"orientation_covariance_rad2":[1,2,3,4,5,6,7,8,9],
         "reference_row":0,"landmarks":40,"residual_px":0.08,"line_delay_s":1e-5,"focal_length_px":2600,
-        "aspect":1,"radial_distortion":13.9,"latency_s":0.002,"telemetry_age_s":-0.01,"zoom_rate_per_s":0.25,"of_a_newer_edge":[]})";
+        "aspect":1,"radial_distortion":13.9,"latency_s":0.002,"telemetry_age_s":-0.01,"zoom":3000,"zoom_rate_per_s":0.25,"zoom_rate_sigma_per_s":0.01,"focal_length_sigma_px":1.5,"of_a_newer_edge":[]})";
 
 TEST(Record, IsReadWhole) {
   Record record;
@@ -26,7 +26,10 @@ TEST(Record, IsReadWhole) {
   EXPECT_EQ(record.orientation->covariance_rad2[5], 6);
   EXPECT_EQ(record.residual_px, 0.08);
   EXPECT_EQ(record.telemetry_age_s, -0.01);
+  EXPECT_EQ(record.zoom, 3000);
   EXPECT_EQ(record.zoom_rate_per_s, 0.25);
+  EXPECT_EQ(record.zoom_rate_sigma_per_s, 0.01);
+  EXPECT_EQ(record.focal_length_sigma_px, 1.5);
   EXPECT_EQ(record.radial_distortion, 13.9);
 }
 
@@ -42,6 +45,7 @@ TEST(Record, MayBeOfNoFrame) {
   EXPECT_FALSE(record.frame);
   EXPECT_FALSE(record.orientation);
   EXPECT_FALSE(record.telemetry_age_s) << "as an older edge, which does not tell it";
+  EXPECT_FALSE(record.zoom);
   EXPECT_FALSE(record.zoom_rate_per_s);
   EXPECT_EQ(record.needs, "pan more");
 }
@@ -95,6 +99,31 @@ TEST(Record, CalibrationHasValuesAndCovariance) {
   EXPECT_EQ(values.zoom, 12);
   EXPECT_EQ(values.names.size(), 2U);
   EXPECT_EQ(values.covariance, (std::vector<double>{1, 2, 3, 4}));
+}
+
+TEST(Record, CalibrationHasTheZoomsNodes) {
+  CalibrationValues values;
+  std::string error;
+  ASSERT_TRUE(parse_calibration(
+      R"({"image":{"width":160,"height":96},"focal_length":{"value":2600,"sigma":1},
+          "centre_offset":{"value":[1,-2],"sigma":[0.1,0.2]},
+          "zoom_curve":{"repeatability":0.002,"samples":{},"nodes":[
+            {"reading":100,"focal_length":{"value":1300,"sigma":0.5},"radial_distortion":{"value":3,"sigma":0.25}},
+            {"reading":900,"focal_length":{"value":2600,"sigma":1},"radial_distortion":{"value":13,"sigma":0.5},
+             "centre_offset":{"value":[3,4],"sigma":[0.75,1.5]}}]}})",
+      &values, &error))
+      << error;
+  EXPECT_EQ(values.centre_offset, (std::array<double, 2>{1, -2}));
+  EXPECT_EQ(values.zoom_repeatability, 0.002);
+  ASSERT_EQ(values.zoom_nodes.size(), 2U);
+  EXPECT_EQ(values.zoom_nodes[0].reading, 100);
+  EXPECT_EQ(values.zoom_nodes[0].focal_length, 1300);
+  EXPECT_EQ(values.zoom_nodes[0].focal_length_sigma, 0.5);
+  EXPECT_EQ(values.zoom_nodes[0].centre_offset_sigma[1], 0);
+  EXPECT_EQ(values.zoom_nodes[1].radial_distortion, 13);
+  EXPECT_EQ(values.zoom_nodes[1].radial_distortion_sigma, 0.5);
+  EXPECT_EQ(values.zoom_nodes[1].centre_offset[1], 4);
+  EXPECT_EQ(values.zoom_nodes[1].centre_offset_sigma[0], 0.75);
 }
 
 }  // namespace

@@ -26,6 +26,9 @@ class ClockMap {
  public:
   static constexpr std::size_t kStretches = 16;
 
+  // stamp_offset_s: added to every wall time.
+  explicit ClockMap(double stamp_offset_s = 0) : stamp_offset_s_(stamp_offset_s) {}
+
   // Pairs come in the order of their monotonic times.
   void add(const ClockPair& pair);
 
@@ -35,7 +38,7 @@ class ClockMap {
   // None before the first pair.
   [[nodiscard]] std::optional<double> wall_from_monotonic(double monotonic_s) const;
   // Where a step back makes a wall time occur twice, the later one.
-  [[nodiscard]] std::optional<double> monotonic_from_wall(double wall_s) const;
+  [[nodiscard]] std::optional<double> monotonic_from_wall(double stamp_s) const;
 
   // Half the width of the newest interval, s.
   [[nodiscard]] std::optional<double> uncertainty_s() const;
@@ -48,6 +51,7 @@ class ClockMap {
     double greatest_offset_s;
     [[nodiscard]] double offset_s() const { return (least_offset_s + greatest_offset_s) / 2; }
   };
+  double stamp_offset_s_;
   std::deque<Stretch> stretches_;  // oldest first
   std::size_t steps_ = 0;
 };

@@ -35,6 +35,7 @@ namespace alidade_ros {
 struct FrameNames {
   std::string base = "camera_base";
   std::string optical = "camera_optical_frame";
+  std::string plane = "camera_plane";
   std::string pan_joint = "pan_joint";
   std::string tilt_joint = "tilt_joint";
 };
@@ -72,6 +73,12 @@ struct Axes {
 [[nodiscard]] alidade_msgs::Calibration calibration(const CalibrationValues& values,
                                                     const std::string& json, const ros::Time& stamp,
                                                     const FrameNames& names);
+
+// The ground's frame (x east, y north, z up, or as the camera defines them) in the base: parent <base>, so that whoever knows where the
+// base stands may be its parent.
+//   R_plane_from_base = Rz(pi/2 - heading) Ry(-pitch) Rx(roll), both with z up.
+[[nodiscard]] geometry_msgs::TransformStamped plane_transform(const PlaneValues& plane,
+                                                              const FrameNames& names);
 
 // R_base_from_camera, as x, y, z, w, when row v was exposed, t = (v - reference_row) line_delay later:
 //   R' = Exp(dpan a_pan) R  R_frd_from_rdf' Exp(dtilt a_tilt) R_frd_from_rdf,

@@ -5,15 +5,18 @@
 // Threads: the event stream's publishes records; a second one asks once a second for status and, when it
 // changed, the calibration, updates the diagnostics, and looks whether the master still knows this node.
 // roscpp registers with a master once: after the master's restart all topics and services are advertised
-// anew. Services are called on the spinner's threads and wait for the edge at most ten seconds.
+// anew. Services and detections are called on the spinner's threads and wait for the edge at most ten seconds.
 // Lock order: ports_mutex_, then mutex_. Service callbacks never take ports_mutex_, since taking a service
 // down waits for them.
 
 #include <alidade_msgs/Calibrate.h>
+#include <alidade_msgs/Detections.h>
 #include <alidade_msgs/DirectionToPixel.h>
 #include <alidade_msgs/PixelToDirection.h>
 #include <alidade_msgs/Status.h>
+#include <alidade_msgs/Targets.h>
 #include <ros/ros.h>
+#include <visualization_msgs/MarkerArray.h>
 
 #include <condition_variable>
 #include <memory>
@@ -27,6 +30,7 @@
 #include "alidade_ros/event_stream.h"
 #include "alidade_ros/http_client.h"
 #include "alidade_ros/record.h"
+#include "alidade_ros/target_markers.h"
 
 namespace diagnostic_updater {
 class DiagnosticStatusWrapper;
@@ -38,8 +42,9 @@ struct BridgeOptions {
   EdgeAddress edge;
   FrameNames names;
   bool publish_tf = true;
-  int tf_rows = 3;           // transforms a frame
-  double time_offset_s = 0;  // added to every stamp
+  int tf_rows = 3;                // transforms a frame
+  double time_offset_s = 0;       // added to every stamp
+  double marker_distance_m = 10;  // at which targets that are directions are drawn
 };
 
 // From a node's private parameters. Throws std::invalid_argument with one line that names the parameter.
@@ -62,13 +67,17 @@ class EdgeBridge {
   void on_hello(const Hello& hello);
   void on_clock(const ClockPair& pair);
   void on_record(const Record& record, std::uint64_t number);
+  bool on_targets(const std::string& json, std::string* error);
   void on_disconnected(const std::string& error);
   void publish_camera_info();
   void publish_status();
+  void clear_markers();
+  void forward_detections(const alidade_msgs::Detections& detections);
 
   void poll();
   void poll_status();
   void poll_calibration();
+  void poll_plane();
   void wake_poll();
 
   void diagnose_connection(diagnostic_updater::DiagnosticStatusWrapper& status);
@@ -90,10 +99,14 @@ class EdgeBridge {
   EventStream stream_;
 
   std::mutex ports_mutex_;
-  std::unique_ptr<Ports> ports_;  // guarded by ports_mutex_, and what the next three hold
+  std::unique_ptr<Ports> ports_;  // guarded by ports_mutex_, as are the next seven
   std::optional<sensor_msgs::CameraInfo> camera_info_;
   std::optional<alidade_msgs::Calibration> calibration_;
   std::optional<alidade_msgs::Status> status_;
+  std::optional<alidade_msgs::Targets> targets_;
+  std::optional<visualization_msgs::MarkerArray> markers_;
+  std::optional<geometry_msgs::TransformStamped> plane_transform_;
+  TargetMarkers target_markers_;
 
   mutable std::mutex mutex_;  // guards the next
   ClockMap clock_;
@@ -105,6 +118,11 @@ class EdgeBridge {
   Axes axes_;
   std::optional<ImageSize> size_;
   std::string status_json_;
+  std::optional<PlaneValues> plane_;
+  bool plane_is_old_ = true;
+  std::uint64_t detections_taken_ = 0;
+  std::uint64_t detections_refused_ = 0;
+  std::string detections_error_;  // of the last that were refused
   bool calibration_is_old_ = true;
   bool wake_ = false;
   bool ending_ = false;

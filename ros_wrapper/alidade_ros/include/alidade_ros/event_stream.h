@@ -21,9 +21,11 @@
 namespace alidade_ros {
 
 struct EventHandlers {
-  std::function<void(const Hello&)> on_hello;                      // connected
-  std::function<void(const ClockPair&)> on_clock;                  // later pairs
-  std::function<void(const Record&, std::uint64_t)> on_record;     // with its running number
+  std::function<void(const Hello&)> on_hello;                   // connected
+  std::function<void(const ClockPair&)> on_clock;               // later pairs
+  std::function<void(const Record&, std::uint64_t)> on_record;  // with its running number
+  // What is tracked, as the edge's JSON. False: it is not understood, *error is one line.
+  std::function<bool(const std::string& json, std::string* error)> on_targets;
   std::function<void(const std::string& error)> on_disconnected;   // one line
   std::function<void(const std::string& error)> on_misunderstood;  // one line
 };

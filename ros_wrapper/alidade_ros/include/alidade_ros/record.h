@@ -33,8 +33,10 @@ struct Record {
   double receive_time_s = 0;
   std::optional<double> latency_s;
   std::optional<double> telemetry_age_s;  // how far the frame lies beyond the newest telemetry
+  std::optional<double> zoom;             // reading
   std::optional<double> zoom_rate_per_s;  // d log f / dt of a lens that is followed
-  std::string mode;                       // OE, PT, none
+  std::optional<double> zoom_rate_sigma_per_s;
+  std::string mode;  // OE, PT, none
   std::string status;
   bool calibrated = false;
   std::string calibration;
@@ -45,6 +47,7 @@ struct Record {
   std::optional<double> residual_px;
   double line_delay_s = 0;
   double focal_length_px = 0;
+  std::optional<double> focal_length_sigma_px;
   double aspect = 1;
   double radial_distortion = 0;
   std::array<double, 2> centre_offset_px{};  // of the optical centre from the image's middle
@@ -62,6 +65,17 @@ struct ImageSize {
   int height = 0;  // px
 };
 
+// Of a parameter without a sigma: 0, exact.
+struct ZoomNodeValues {
+  double reading = 0;
+  double focal_length = 0;
+  double focal_length_sigma = 0;
+  double radial_distortion = 0;
+  double radial_distortion_sigma = 0;
+  std::array<double, 2> centre_offset{};
+  std::array<double, 2> centre_offset_sigma{};
+};
+
 // What of a calibration is more than text to the node.
 struct CalibrationValues {
   int width = 0;
@@ -75,11 +89,25 @@ struct CalibrationValues {
   double pan_scale = 1;
   double tilt_scale = 1;
   double clock_offset = 0;
+  std::array<double, 2> centre_offset{};
   std::optional<double> zoom;
+  std::vector<ZoomNodeValues> zoom_nodes;  // empty: there is no zoom curve
+  std::optional<double> zoom_repeatability;
   std::vector<std::string> names;
   std::vector<double> covariance;  // row-major over names; empty: not told
 };
 
+// The ground under the camera, as GET /api/v1/plane has it.
+struct PlaneValues {
+  double heading = 0;  // rad, of the base's forward direction, clockwise from y
+  double pitch = 0;    // rad, positive: forward is lifted
+  double roll = 0;     // rad, positive: the right side is lowered
+  double x = 0;        // m, the camera's place over the plane
+  double y = 0;
+  double height = 0;
+};
+
+[[nodiscard]] bool parse_plane(const std::string& json, PlaneValues* plane, std::string* error);
 [[nodiscard]] bool parse_record(const std::string& json, Record* record, std::string* error);
 [[nodiscard]] bool parse_hello(const std::string& json, Hello* hello, std::string* error);
 [[nodiscard]] bool parse_clock_pair(const std::string& json, ClockPair* pair, std::string* error);
