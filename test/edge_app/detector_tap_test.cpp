@@ -33,7 +33,7 @@ OrientationRecord detectable_record(std::int64_t frame) {
   record.frame = frame;
   record.time_s = 0.04 * static_cast<double>(frame);
   record.mode = RecordMode::kOe;
-  record.orientation.emplace();
+  record.orientation = OrientationRecord::Orientation{};
   return record;
 }
 
