@@ -1,0 +1,61 @@
+#include "edge_app/tracking/built_in_detectors.h"
+
+#include <gtest/gtest.h>
+
+#include "test/core/detection/panning_camera.h"
+
+namespace alidade {
+namespace {
+
+DetectableFrame panned_frame(const FrameOrientation& orientation, std::int64_t number,
+                             const ImageView& image) {
+  DetectableFrame frame;
+  frame.record.frame = number;
+  frame.record.time_s = orientation.time_s;
+  frame.record.mode = RecordMode::kOe;
+  frame.record.calibrated = true;
+  frame.record.camera = pack(orientation.calibration);
+  frame.record.orientation = orientation_of(orientation);
+  frame.image = image;
+  return frame;
+}
+
+TEST(BuiltInDetectors, TellTheFeedWhatMovesAndNothingOfPicturesThatTheyCannotJudge) {
+  constexpr int kFrames = 12;
+  TargetFeed feed(default_target_options(TargetSpace::kSphere), nullptr);
+  BuiltInDetectorOptions options;
+  options.motion.emplace();
+  options.motion->exposure_s = 0.001;
+  BuiltInDetectors detectors(options, nullptr, feed);
+  test::PanningCamera camera;
+  camera.disc.emplace();
+  camera.disc->velocity = {90, 40};
+  for (int i = 0; i < kFrames; ++i) {
+    const FrameOrientation orientation = camera.orientation(i);
+    const test::Pixels image = camera.image(orientation);
+    detectors.look(panned_frame(orientation, i, image.view));
+  }
+  const DetectorsReport report = detectors.report();
+  EXPECT_FALSE(report.people);
+  ASSERT_TRUE(report.motion);
+  EXPECT_EQ(report.motion->pictures, kFrames);
+  // Two pictures before it are what one is compared with.
+  EXPECT_EQ(report.motion->unjudged, 2);
+  EXPECT_GT(report.motion->boxes, 0);
+  EXPECT_EQ(feed.waiting(), static_cast<std::size_t>(kFrames - 2));
+}
+
+TEST(BuiltInDetectors, APictureTooSmallIsNotJudged) {
+  TargetFeed feed(default_target_options(TargetSpace::kSphere), nullptr);
+  BuiltInDetectorOptions options;
+  options.motion.emplace();
+  BuiltInDetectors detectors(options, nullptr, feed);
+  const std::vector<std::uint8_t> luma(32 * 32);
+  detectors.look(
+      panned_frame(test::PanningCamera().orientation(0), 0, ImageView{luma.data(), 32, 32, 32}));
+  EXPECT_EQ(detectors.report().motion->unjudged, 1);
+  EXPECT_EQ(feed.waiting(), 0U);
+}
+
+}  // namespace
+}  // namespace alidade
