@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-using Vector6 = Matrix<double, 6, 1>;
+using Vector7 = Matrix<double, 7, 1>;
 
 constexpr int kMatchSteps = 4;
 constexpr double kStill_px = 0.01;  // of a step, after which no other is made
@@ -18,6 +18,8 @@ constexpr double kShiftPrior_px = 2;
 constexpr double kShearPrior_px = 1;
 constexpr double kGainPrior = 0.3;
 constexpr double kOffsetPrior = 30;  // grey levels
+constexpr double kFalloffPrior = 0.3;
+constexpr double kMostFalloff = 0.8;  // corners stay lit
 constexpr double kNormalQuartile = 0.6745;
 
 }  // namespace
@@ -45,16 +47,17 @@ FrameMatch match_frames(const SmoothedView& now, const ImageView& then, const Ti
                         std::vector<float>* scratch) {
   FrameMatch match;
   constexpr float kUnit = 1.0F / kSmoothUnit;
+  const CornerDistance distance(now.width, now.height);
   bool last = false;
   for (int step = 0;; ++step) {
-    Vector6 prior;
+    Vector7 prior;
     prior << kShiftPrior_px, kShiftPrior_px, kShearPrior_px, kShearPrior_px, kGainPrior,
-        kOffsetPrior;
+        kOffsetPrior, kFalloffPrior;
     prior = prior.cwiseAbs2().cwiseInverse().eval();
-    Vector6 off;
-    off << match.shift, match.shear, match.gain - 1, match.offset;
-    Matrix<double, 6, 6> normal = prior.asDiagonal();
-    Vector6 right = -prior.cwiseProduct(off);
+    Vector7 off;
+    off << match.shift, match.shear, match.gain - 1, match.offset, match.falloff;
+    Matrix<double, 7, 7> normal = prior.asDiagonal();
+    Vector7 right = -prior.cwiseProduct(off);
     std::size_t count = 0;
     // Another pixel of each tile in each row of tiles, so that no pattern is seen at one phase only.
     for (int j = 0; j < rows; ++j) {
@@ -86,8 +89,12 @@ FrameMatch match_frames(const SmoothedView& now, const ImageView& then, const Ti
         const std::uint16_t* here = now.row(v);
         const std::uint16_t* below = now.row(v + 1);
         const double seen = spline_value(then, then_u, then_v);
-        const double error = static_cast<double>(kUnit * static_cast<float>(here[u])) -
-                             match.gain * seen - match.offset;
+        const double now_square =
+            distance.square(static_cast<float>(u) + 0.5F, static_cast<float>(v) + 0.5F);
+        const double then_square = distance.square(then_u, then_v);
+        const double gain = match.gain_at(now_square, then_square);
+        const double error =
+            static_cast<double>(kUnit * static_cast<float>(here[u])) - gain * seen - match.offset;
         const double sigma = std::sqrt(static_cast<double>(model.variance(above, here, below, u)));
         const double z = std::abs(error) / sigma;
         (*scratch)[count++] = static_cast<float>(z);
@@ -95,8 +102,10 @@ FrameMatch match_frames(const SmoothedView& now, const ImageView& then, const Ti
         const double weight = (z <= kHuberSigmas ? 1 : kHuberSigmas / z) / (sigma * sigma);
         const double slope_u = 0.5 * static_cast<double>(kUnit) * (here[u + 1] - here[u - 1]);
         const double slope_v = 0.5 * static_cast<double>(kUnit) * (below[u] - above[u]);
-        Vector6 J;
-        J << slope_u, slope_v, r * slope_u, r * slope_v, seen, 1;
+        Vector7 J;
+        J << slope_u, slope_v, r * slope_u, r * slope_v, gain / match.gain * seen, 1,
+            match.gain * seen * (now_square - then_square) /
+                std::pow(1 + match.falloff * then_square, 2);
         normal.noalias() += weight * J * J.transpose();
         right.noalias() += (weight * error) * J;
       }
@@ -110,11 +119,12 @@ FrameMatch match_frames(const SmoothedView& now, const ImageView& then, const Ti
       match.spread = static_cast<double>(*middle) / kNormalQuartile;
       return match;
     }
-    const Vector6 change = normal.ldlt().solve(right);
+    const Vector7 change = normal.ldlt().solve(right);
     match.shift += change.head<2>();
     match.shear += change.segment<2>(2);
     match.gain += change[4];
     match.offset += change[5];
+    match.falloff = std::clamp(match.falloff + change[6], -kMostFalloff, kMostFalloff);
     last = step + 1 == kMatchSteps || change.head<4>().norm() < kStill_px;
   }
 }

@@ -1,10 +1,10 @@
 #pragma once
 // What is left between a picture and the same scene predicted from an earlier one, after their orientations have had their say: a
 // small shift, the light.
-//   now(u) = gain then(warp(u) + shift + shear r) + offset,   r = 2 u_v / height - 1: from -1 in the first row to 1 in the last;   robust least squares over one pixel in 256, weighted by what noise and a
+//   now(u) = gain V(u) / V(w) then(w) + offset,   w = warp(u) + shift + shear r,   V(u) = 1 + falloff |u - middle|^2 / (half diagonal)^2,   r = 2 u_v / height - 1: from -1 in the first row to 1 in the last;   robust least squares over one pixel in 256, weighted by what noise and a
 //                                                   misalignment of the stated size leave to expect
 // Errors of orientation (shift) and of its rates (shear) that two frames do not share come out here, up to a pixel or two where the scene has
-// texture; in flat directions they stay 0. Things that move are outliers. No allocation.
+// texture; in flat directions they stay 0. V: each lens is darker towards its corners, and the scene moves through that as the camera turns. Things that move are outliers. No allocation.
 
 #include <algorithm>
 #include <cstdint>
@@ -51,12 +51,17 @@ struct FrameMatch {
   Vector2<double> shift = Vector2<double>::Zero();  // px, in the earlier picture
   Vector2<double> shear = Vector2<double>::Zero();  // px
   double gain = 1;
-  double offset = 0;  // grey levels
-  double spread = 0;  // of what remains, robust, over what the model expects; 1: as expected
+  double offset = 0;   // grey levels
+  double falloff = 0;  // of the light in the corners, as share of the middle's; negative: darker
+  double spread = 0;   // of what remains, robust, over what the model expects; 1: as expected
   int samples = 0;
 
   // r: of the row.
   [[nodiscard]] Vector2<double> shift_at(double r) const { return shift + r * shear; }
+  // Of the light at now_square over that at then_square, squares of the distances from the middle over that of the corners.
+  [[nodiscard]] double gain_at(double now_square, double then_square) const {
+    return gain * (1 + falloff * now_square) / (1 + falloff * then_square);
+  }
   [[nodiscard]] double largest_shift() const {
     return std::max(shift_at(-1).norm(), shift_at(1).norm());
   }
@@ -64,6 +69,24 @@ struct FrameMatch {
 
 // Of the middle of a pixel's row.
 [[nodiscard]] inline double row_place(int v, int height) { return (2.0 * v + 1) / height - 1; }
+
+// Squares of distances from a picture's middle, over that of its corners.
+class CornerDistance {
+ public:
+  CornerDistance(int width, int height)
+      : middle_u_(0.5F * static_cast<float>(width)),
+        middle_v_(0.5F * static_cast<float>(height)),
+        scale_(1 / (middle_u_ * middle_u_ + middle_v_ * middle_v_)) {}
+
+  [[nodiscard]] float square(float u, float v) const {
+    const float x = u - middle_u_;
+    const float y = v - middle_v_;
+    return scale_ * (x * x + y * y);
+  }
+
+ private:
+  float middle_u_, middle_v_, scale_;
+};
 
 // scratch: room for two floats a tile.
 [[nodiscard]] FrameMatch match_frames(const SmoothedView& now, const ImageView& then,

@@ -224,8 +224,10 @@ void MotionDetector::compare_row(int which, int column, int row, int v, TileRow*
                         ((1 - t) * upper[1].v + t * lower[1].v + shift_v - from.v) / kTile};
   const float most_u = static_cast<float>(options_.width) - kSplineMargin;
   const float most_v = static_cast<float>(options_.height) - kSplineMargin;
+  const CornerDistance distance(options_.width, options_.height);
   TileRow seen;
-  TileRow there;  // 1, or 0 where it is not in the earlier picture
+  TileRow square;  // of the distance from the earlier picture's middle
+  TileRow there;   // 1, or 0 where it is not in the earlier picture
   for (int i = 0; i < kTile; ++i) {
     const float s = static_cast<float>(i) + 0.5F;
     const float u = from.u + s * step.u;
@@ -235,6 +237,7 @@ void MotionDetector::compare_row(int which, int column, int row, int v, TileRow*
     const auto at = static_cast<std::size_t>(i);
     there[at] = held_u == u && held_v == w ? 1.0F : 0.0F;
     seen[at] = spline_value(then, held_u, held_v);
+    square[at] = distance.square(u, w);
   }
   const SmoothedView now{smooth_.data(), options_.width, options_.height};
   const int left = kTile * column;
@@ -242,12 +245,17 @@ void MotionDetector::compare_row(int which, int column, int row, int v, TileRow*
   const std::uint16_t* here = now.row(v) + left;
   const std::uint16_t* below = now.row(v + 1) + left;
   const auto gain = static_cast<float>(compared.match.gain);
+  const auto falloff = static_cast<float>(compared.match.falloff);
   const auto offset = static_cast<float>(compared.match.offset);
   constexpr float kUnit = 1.0F / kSmoothUnit;
   // Beyond the picture's sides nothing is read but other rows' pixels, and nothing is made of them.
   for (int i = 0; i < kTile; ++i) {
     const auto at = static_cast<std::size_t>(i);
-    const float difference = kUnit * static_cast<float>(here[i]) - gain * seen[at] - offset;
+    const float light = gain *
+                        (1 + falloff * distance.square(static_cast<float>(left + i) + 0.5F,
+                                                       static_cast<float>(v) + 0.5F)) /
+                        (1 + falloff * square[at]);
+    const float difference = kUnit * static_cast<float>(here[i]) - light * seen[at] - offset;
     (*z)[at] = there[at] * compared.scale * difference /
                std::sqrt(compared.model.variance(above, here, below, i));
   }

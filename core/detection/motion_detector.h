@@ -3,7 +3,7 @@
 //
 // Each pixel of a picture is compared with the same direction in up to three earlier pictures (earlier_frames.h), where both frames' orientations
 // and lenses, row by row, say that it was (frame_warp.h); a common small shift and the light are estimated (frame_match.h).
-//   z(u) = (now - gain then(warp(u) + shift) - offset) / sigma,   sigma^2 = noise^2 + (shift |gradient|)^2 + (blur |second derivative|)^2
+//   z(u) = (now - light then(warp(u) + shift) - offset) / sigma,   sigma^2 = noise^2 + (shift |gradient|)^2 + (blur |second derivative|)^2
 // The smallest z counts, and none where they differ in sign or there is but one: what one of the earlier pictures explains has not changed, so
 // that the place where a target was earlier is no detection. A box in which nothing differs from the picture three before is of a slow target's place in all
 // of the earlier ones, or of what stands still, and dropped. Noise is the picture's own (image_noise.h); if the scene as a whole differs by more than sigma,

@@ -79,6 +79,21 @@ TEST_F(MotionDetectorTest, TheLightMayChange) {
   EXPECT_THAT(detector_.boxes(), ::testing::IsEmpty());
 }
 
+TEST_F(MotionDetectorTest, FindsNothingThroughALensThatIsDarkerInItsCorners) {
+  camera_.vignetting = 0.3;
+  // Four standard deviations of a median of 192 samples' sizes, one a tile.
+  const double most_spread = 1 + 4 * 1.17 / std::sqrt(192.0);
+  watch(5);
+  int alarms = 0;
+  for (int i = 0; i < 25; ++i) {
+    const MotionAnswer answer = look(next_++);
+    EXPECT_EQ(answer.status, MotionStatus::kOk);
+    EXPECT_LT(answer.spread, most_spread);
+    alarms += static_cast<int>(detector_.boxes().size());
+  }
+  EXPECT_EQ(alarms, 0);
+}
+
 TEST_F(MotionDetectorTest, AnErrorOfTheOrientationIsFoundAndForgiven) {
   watch(6);
   FrameOrientation orientation = camera_.orientation(6);

@@ -77,13 +77,16 @@ class PanningCamera {
         const double inside = 0.5 * disc->size_px - (u - centre).norm() + 0.5;
         sum += disc->brighter * std::min(std::max(inside, 0.0), 1.0);
       }
-      return gain * sum + offset;
+      const Vector2<double> middle(0.5 * kPanWidth, 0.5 * kPanHeight);
+      const double darker = vignetting * (u - middle).squaredNorm() / middle.squaredNorm();
+      return gain * (1 - darker) * sum + offset;
     };
     return make_pixels(kPanWidth, kPanHeight, grey, kPanNoise, &random_);
   }
 
   Calibration calibration;
   std::optional<Disc> disc;
+  double vignetting = 0;  // share of the light that the corners lack
 
  private:
   struct Wave {
