@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "test/core/detection/panning_camera.h"
 #include "test/support/allocation_guard.h"
 #include "test/support/not_a_number.h"
