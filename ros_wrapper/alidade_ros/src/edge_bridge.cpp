@@ -2,17 +2,11 @@
 
 #include <alidade_msgs/Calibration.h>
 #include <alidade_msgs/FrameOrientation.h>
-#include <diagnostic_updater/diagnostic_updater.h>
-#include <tf2_ros/static_transform_broadcaster.h>
-#include <tf2_ros/transform_broadcaster.h>
 
 #include <chrono>
-#include <cmath>
-#include <stdexcept>
 #include <utility>
 
-#include "alidade_ros/services.h"
-#include "alidade_ros/targets.h"
+#include "edge_bridge_ports.h"
 
 namespace alidade_ros {
 namespace {
@@ -22,14 +16,6 @@ constexpr std::uint32_t kDetectionsQueue = 50;
 constexpr auto kPollPeriod = std::chrono::seconds(1);
 constexpr double kGreatestRosTimeS = 4294967295.0;
 const char* const kMasterMarker = "known_to_master";
-
-template <typename T>
-void read(const ros::NodeHandle& handle, const char* name, T* value) {
-  XmlRpc::XmlRpcValue raw;
-  if (handle.getParam(name, raw) && !handle.getParam(name, *value)) {
-    throw std::invalid_argument(std::string("~") + name + ": has another type than its default");
-  }
-}
 
 // What of the camera in the record changes with its calibration only.
 bool same_calibration(const Record& a, const Record& b) {
@@ -54,58 +40,6 @@ bool same_state(const alidade_msgs::Status& a, const alidade_msgs::Status& b) {
 }
 
 }  // namespace
-
-BridgeOptions read_options(const ros::NodeHandle& handle) {
-  BridgeOptions options;
-  read(handle, "url", &options.edge.url);
-  read(handle, "token_env", &options.edge.token_env);
-  read(handle, "token_file", &options.edge.token_file);
-  read(handle, "silence_timeout", &options.edge.silence_timeout_s);
-  std::string camera = "camera";
-  read(handle, "camera", &camera);
-  options.names.base = camera + "_base";
-  options.names.optical = camera + "_optical_frame";
-  options.names.plane = camera + "_plane";
-  options.names.pan_joint = camera + "_pan_joint";
-  options.names.tilt_joint = camera + "_tilt_joint";
-  read(handle, "base_frame", &options.names.base);
-  read(handle, "optical_frame", &options.names.optical);
-  read(handle, "plane_frame", &options.names.plane);
-  read(handle, "pan_joint", &options.names.pan_joint);
-  read(handle, "tilt_joint", &options.names.tilt_joint);
-  read(handle, "publish_tf", &options.publish_tf);
-  read(handle, "tf_rows", &options.tf_rows);
-  read(handle, "time_offset", &options.time_offset_s);
-  read(handle, "marker_distance", &options.marker_distance_m);
-  const std::string wrong = wrong_with(options.edge);
-  if (!wrong.empty()) throw std::invalid_argument("~" + wrong);
-  if (options.tf_rows < 1 || options.tf_rows > 100) {
-    throw std::invalid_argument("~tf_rows: must be from 1 to 100");
-  }
-  if (!(options.edge.silence_timeout_s >= 1)) {
-    throw std::invalid_argument("~silence_timeout: must be at least 1 (s)");
-  }
-  if (!std::isfinite(options.time_offset_s)) {
-    throw std::invalid_argument("~time_offset: must be a finite number (s)");
-  }
-  if (!(options.marker_distance_m > 0) || !std::isfinite(options.marker_distance_m)) {
-    throw std::invalid_argument("~marker_distance: must be a positive number (m)");
-  }
-  return options;
-}
-
-struct EdgeBridge::Ports {
-  ros::Publisher frame_orientation, orientation, joint_states, camera_info, calibration, status;
-  ros::Publisher targets, target_markers;
-  ros::Subscriber detections;
-  ros::ServiceServer pixel_to_direction, direction_to_pixel, calibrate;
-  tf2_ros::TransformBroadcaster tf;
-  tf2_ros::StaticTransformBroadcaster static_tf;
-  diagnostic_updater::Updater diagnostics;
-
-  Ports(const ros::NodeHandle& handle, const ros::NodeHandle& private_handle)
-      : diagnostics(handle, private_handle, private_handle.getNamespace()) {}
-};
 
 EdgeBridge::EdgeBridge(const ros::NodeHandle& handle, const ros::NodeHandle& private_handle,
                        const BridgeOptions& options)
@@ -218,58 +152,6 @@ void EdgeBridge::on_disconnected(const std::string& error) {
   }
   publish_status();
   clear_markers();
-}
-
-void EdgeBridge::clear_markers() {
-  const std::lock_guard<std::mutex> lock(ports_mutex_);
-  if (!markers_) return;
-  ports_->target_markers.publish(target_markers_.clear());
-  markers_.reset();
-}
-
-bool EdgeBridge::on_targets(const std::string& json, std::string* error) {
-  alidade_msgs::Targets targets;
-  MarkerView view;
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (!parse_targets(json, clock_, options_.names, &targets, error)) return false;
-    if (newest_) {
-      view.focal_length = newest_->focal_length_px;
-      view.aspect = newest_->aspect;
-    }
-    if (plane_) {
-      view.has_camera_position = true;
-      view.camera_position[0] = plane_->x;
-      view.camera_position[1] = plane_->y;
-      view.camera_position[2] = plane_->height;
-    }
-  }
-  const std::lock_guard<std::mutex> lock(ports_mutex_);
-  targets_ = targets;
-  markers_ = target_markers_.take(targets, view);
-  ports_->targets.publish(*targets_);
-  ports_->target_markers.publish(*markers_);
-  return true;
-}
-
-void EdgeBridge::forward_detections(const alidade_msgs::Detections& detections) {
-  std::string question;
-  std::string error;
-  bool asked = detections_question(detections, clock(), &question, &error);
-  if (asked) {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (!connected_) error = error_;
-    asked = connected_;
-  }
-  if (asked) error = client_.post("/api/v1/detections", question).error;
-  if (!error.empty()) ROS_WARN_THROTTLE(10, "detections refused: %s", error.c_str());
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (error.empty()) {
-    ++detections_taken_;
-  } else {
-    ++detections_refused_;
-    detections_error_ = error;
-  }
 }
 
 void EdgeBridge::on_record(const Record& record, std::uint64_t number) {
@@ -438,31 +320,6 @@ void EdgeBridge::poll_calibration() {
   ports_->calibration.publish(*calibration_);
 }
 
-void EdgeBridge::poll_plane() {
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    if (!plane_is_old_) return;
-  }
-  const HttpClient::Answer answer = client_.get("/api/v1/plane");
-  PlaneValues plane;
-  std::string error;
-  const bool there_is_none = answer.status == 404;
-  if (!there_is_none && (!answer.ok() || !parse_plane(answer.body, &plane, &error))) {
-    ROS_WARN_THROTTLE(30, "%s", (answer.ok() ? error : answer.error).c_str());
-    return;
-  }
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    plane_is_old_ = false;
-    plane_.reset();
-    if (!there_is_none) plane_ = plane;
-  }
-  if (there_is_none) return;
-  const std::lock_guard<std::mutex> lock(ports_mutex_);
-  plane_transform_ = plane_transform(plane, options_.names);
-  if (options_.publish_tf) ports_->static_tf.sendTransform(*plane_transform_);
-}
-
 void EdgeBridge::wake_poll() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -471,96 +328,9 @@ void EdgeBridge::wake_poll() {
   changed_.notify_all();
 }
 
-void EdgeBridge::diagnose_connection(diagnostic_updater::DiagnosticStatusWrapper& status) {
-  using Level = diagnostic_msgs::DiagnosticStatus;
-  const EventStream::Counters counters = stream_.counters();
-  const std::lock_guard<std::mutex> lock(mutex_);
-  if (connected_) {
-    status.summary(Level::OK, "connected");
-  } else {
-    status.summary(Level::ERROR, error_);
-  }
-  status.add("url", client_.address().url);
-  status.add("edge version", hello_.version);
-  status.add("records", counters.records);
-  status.add("lost records", counters.lost);
-  status.add("repeated records", counters.repeated);
-  status.add("not understood", counters.misunderstood);
-  status.add("connections", counters.connections);
-  status.add("detections taken", detections_taken_);
-  status.add("detections refused", detections_refused_);
-  if (!detections_error_.empty()) status.add("why, last", detections_error_);
-  status.add("steps of the wall clock", clock_.steps());
-  if (const auto uncertainty = clock_.uncertainty_s()) {
-    status.add("wall clock known to (s)", *uncertainty);
-  }
-}
-
-void EdgeBridge::diagnose_orientation(diagnostic_updater::DiagnosticStatusWrapper& status) {
-  using Level = diagnostic_msgs::DiagnosticStatus;
-  const std::uint64_t records = stream_.counters().records;
-  const std::lock_guard<std::mutex> lock(mutex_);
-  const double elapsed_s = (ros::WallTime::now() - diagnosed_at_).toSec();
-  const double rate_hz = static_cast<double>(records - diagnosed_records_) / elapsed_s;
-  diagnosed_records_ = records;
-  if (!connected_ || !newest_) {
-    status.summary(Level::STALE, "no records");
-    return;
-  }
-  if (newest_->mode == "none") {
-    status.summary(Level::ERROR, newest_->status);
-  } else if (newest_->status != "ok") {
-    status.summary(Level::WARN, newest_->mode + " mode: " + newest_->status);
-  } else if (!newest_->calibrated) {
-    status.summary(Level::WARN, "not calibrated: " + newest_->calibration +
-                                    (newest_->needs.empty() ? "" : "; " + newest_->needs));
-  } else {
-    status.summary(Level::OK, newest_->mode + " mode");
-  }
-  status.add("mode", newest_->mode);
-  status.add("calibrated", newest_->calibrated);
-  status.add("calibration", newest_->calibration);
-  status.add("needs", newest_->needs);
-  status.add("landmarks", newest_->landmarks);
-  status.add("records a second", rate_hz);
-  if (newest_->latency_s) status.add("latency (s)", *newest_->latency_s);
-  if (newest_->telemetry_age_s) status.add("telemetry age (s)", *newest_->telemetry_age_s);
-  if (newest_->zoom_rate_per_s) status.add("zoom rate (1/s)", *newest_->zoom_rate_per_s);
-  if (newest_->residual_px) status.add("residual (px)", *newest_->residual_px);
-}
-
 ClockMap EdgeBridge::clock() const {
   const std::lock_guard<std::mutex> lock(mutex_);
   return clock_;
-}
-
-bool EdgeBridge::pixel_to_direction(alidade_msgs::PixelToDirection::Request& request,
-                                    alidade_msgs::PixelToDirection::Response& response) {
-  std::string question;
-  if (!direction_question(request, clock(), &question, &response.error)) return true;
-  const HttpClient::Answer answer = client_.post("/api/v1/direction", question);
-  response.error = answer.error;
-  response.success =
-      answer.ok() && direction_answer(answer.body, clock(), &response, &response.error);
-  return true;
-}
-
-bool EdgeBridge::direction_to_pixel(alidade_msgs::DirectionToPixel::Request& request,
-                                    alidade_msgs::DirectionToPixel::Response& response) {
-  std::string question;
-  if (!pixel_question(request, clock(), &question, &response.error)) return true;
-  const HttpClient::Answer answer = client_.post("/api/v1/pixel", question);
-  response.error = answer.error;
-  response.success = answer.ok() && pixel_answer(answer.body, clock(), &response, &response.error);
-  return true;
-}
-
-bool EdgeBridge::calibrate(alidade_msgs::Calibrate::Request& /*request*/,
-                           alidade_msgs::Calibrate::Response& response) {
-  const HttpClient::Answer answer = client_.post("/api/v1/calibrate", "{}");
-  response.success = answer.ok();
-  response.message = answer.ok() ? answer.body : answer.error;
-  return true;
 }
 
 }  // namespace alidade_ros

@@ -9,7 +9,7 @@ import rosgraph
 import rospy
 import rostest
 import tf2_py
-from alidade_msgs.msg import Calibration, FrameOrientation, Pixel, Status
+from alidade_msgs.msg import Box, Calibration, Detection, Detections, FrameOrientation, Pixel, Status, Targets
 from alidade_msgs.srv import (Calibrate, DirectionToPixel, DirectionToPixelRequest, PixelToDirection,
                               PixelToDirectionRequest)
 from diagnostic_msgs.msg import DiagnosticArray
@@ -18,6 +18,7 @@ from harness import wait_until
 from ros_harness import Inbox, RosTest, quaternion, vector
 from sensor_msgs.msg import CameraInfo, JointState
 from tf2_msgs.msg import TFMessage
+from visualization_msgs.msg import Marker, MarkerArray
 
 FRAMES = 500
 CLOCK_S = 1e-5  # by which the wall clock of a frame may become better known after its message
@@ -247,6 +248,50 @@ class Live(RosTest):
             return [m for m in orientations.all() if m.header.stamp > gone.header.stamp]
         wait_until(lambda: len(of_new_edge()) > 50, "two seconds' frames of the new edge")
         self.assert_each_record_came_once(of_new_edge(), self.running_edge)
+
+    def test_detections_become_targets_and_markers(self):
+        """Something stands straight ahead; a detector, which is a node, finds it in each frame that has it."""
+        width, height = 6, 4
+        orientations, targets = Inbox("/frame_orientation", FrameOrientation), Inbox("/targets", Targets)
+        markers = Inbox("/target_markers", MarkerArray)
+        detector = rospy.Publisher("/detections", Detections, queue_size=50)
+        self.launch()
+        orientations.wait_for(lambda m: m.mode != 0, "an orientation")
+        wait_until(lambda: detector.get_num_connections() > 0, "the node's subscription")
+        asked = set()
+
+        def found():
+            newest = orientations.all()[-1]
+            if newest.mode != 0 and newest.frame not in asked:
+                asked.add(newest.frame)
+                pixel = self.running_edge.ask("/api/v1/pixel", {"frame": newest.frame, "directions": [[1, 0, 0]]})["pixels"][0]
+                boxes = []
+                if pixel.get("inside"):
+                    u, v = pixel["pixel"]
+                    boxes = [Detection(box=Box(u=u - 0.5 - width / 2, v=v - 0.5 - height / 2, width=width, height=height),
+                                       score=0.9, label="boat")]
+                detector.publish(Detections(by_frame=True, frame=newest.frame, detections=boxes))
+            return [m for m in targets.all() if any(t.in_picture and t.label == "boat" for t in m.targets)]
+        wait_until(found, "a target in the picture")
+        message = found()[-1]
+        self.assertEqual(message.space, Targets.SPHERE)
+        self.assertEqual(message.header.frame_id, "mast_base")
+        target, = message.targets
+        for value, variance in ((target.azimuth, target.covariance[0]), (target.elevation, target.covariance[5])):
+            self.assertLess(abs(value), 4 * math.sqrt(variance))
+        self.assertAlmostEqual(target.box.u + target.box.width / 2, target.pixel.u, delta=1e-9)
+        self.assertAlmostEqual(target.box.v + target.box.height / 2, target.pixel.v, delta=1e-9)
+        self.assertEqual([target.box.width, target.box.height], [width, height])
+        of_frame, = [m for m in orientations.all() if m.has_frame and m.frame == message.frame]
+        self.assertAlmostEqual((message.header.stamp - of_frame.header.stamp).to_sec(),
+                               of_frame.line_delay * 48, delta=0.5 * abs(of_frame.line_delay) + CLOCK_S)
+        drawn = markers.wait_for(lambda m: any(k.type == Marker.TEXT_VIEW_FACING and "boat" in k.text for k in m.markers),
+                                 "the target's name")
+        self.assertEqual({k.header.frame_id for k in drawn.markers}, {"mast_base"})
+
+        # Its markers do not outlive the edge.
+        self.running_edge.end()
+        markers.wait_for(lambda m: m.markers and all(k.action == Marker.DELETEALL for k in m.markers), "their end")
 
     def pid_of_node(self):
         try:

@@ -48,7 +48,7 @@ class Edge:
     """`alidade run` with its HTTP API, and every record that it wrote."""
 
     def __init__(self, test, camera, address="127.0.0.1:0", mode="OE"):
-        config = test.write_config(camera, output={"json": True, "http": address}, realtime={"mode": mode},
+        config = test.write_config(camera, output={"json": True, "http": address}, realtime={"mode": mode}, tracking={},
                                    video={"width": 160, "height": 96})
         self.process = test.alidade("run", "-c", config)
         self.address = None

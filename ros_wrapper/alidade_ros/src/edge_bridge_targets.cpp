@@ -1,0 +1,87 @@
+// Targets and their plane out, detections in.
+
+#include <utility>
+
+#include "alidade_ros/targets.h"
+#include "edge_bridge_ports.h"
+
+namespace alidade_ros {
+
+void EdgeBridge::clear_markers() {
+  const std::lock_guard<std::mutex> lock(ports_mutex_);
+  if (!markers_) return;
+  ports_->target_markers.publish(target_markers_.clear());
+  markers_.reset();
+}
+
+bool EdgeBridge::on_targets(const std::string& json, std::string* error) {
+  alidade_msgs::Targets targets;
+  MarkerView view;
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!parse_targets(json, clock_, options_.names, &targets, error)) return false;
+    if (newest_) {
+      view.focal_length = newest_->focal_length_px;
+      view.aspect = newest_->aspect;
+    }
+    if (plane_) {
+      view.has_camera_position = true;
+      view.camera_position[0] = plane_->x;
+      view.camera_position[1] = plane_->y;
+      view.camera_position[2] = plane_->height;
+    }
+  }
+  const std::lock_guard<std::mutex> lock(ports_mutex_);
+  targets_ = targets;
+  markers_ = target_markers_.take(targets, view);
+  ports_->targets.publish(*targets_);
+  ports_->target_markers.publish(*markers_);
+  return true;
+}
+
+void EdgeBridge::forward_detections(const alidade_msgs::Detections& detections) {
+  std::string question;
+  std::string error;
+  bool asked = detections_question(detections, clock(), &question, &error);
+  if (asked) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!connected_) error = error_;
+    asked = connected_;
+  }
+  if (asked) error = client_.post("/api/v1/detections", question).error;
+  if (!error.empty()) ROS_WARN_THROTTLE(10, "detections refused: %s", error.c_str());
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (error.empty()) {
+    ++detections_taken_;
+  } else {
+    ++detections_refused_;
+    detections_error_ = error;
+  }
+}
+
+void EdgeBridge::poll_plane() {
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (!plane_is_old_) return;
+  }
+  const HttpClient::Answer answer = client_.get("/api/v1/plane");
+  PlaneValues plane;
+  std::string error;
+  const bool there_is_none = answer.status == 404;
+  if (!there_is_none && (!answer.ok() || !parse_plane(answer.body, &plane, &error))) {
+    ROS_WARN_THROTTLE(30, "%s", (answer.ok() ? error : answer.error).c_str());
+    return;
+  }
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    plane_is_old_ = false;
+    plane_.reset();
+    if (!there_is_none) plane_ = plane;
+  }
+  if (there_is_none) return;
+  const std::lock_guard<std::mutex> lock(ports_mutex_);
+  plane_transform_ = plane_transform(plane, options_.names);
+  if (options_.publish_tf) ports_->static_tf.sendTransform(*plane_transform_);
+}
+
+}  // namespace alidade_ros
