@@ -6,7 +6,7 @@
 #include <chrono>
 #include <utility>
 
-#include "edge_bridge_ports.h"
+#include "alidade_ros/edge_bridge_ports.h"
 
 namespace alidade_ros {
 namespace {

@@ -1,7 +1,7 @@
 // What others ask the bridge: its health, and its services.
 
+#include "alidade_ros/edge_bridge_ports.h"
 #include "alidade_ros/services.h"
-#include "edge_bridge_ports.h"
 
 namespace alidade_ros {
 

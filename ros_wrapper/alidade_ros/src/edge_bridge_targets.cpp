@@ -2,8 +2,8 @@
 
 #include <utility>
 
+#include "alidade_ros/edge_bridge_ports.h"
 #include "alidade_ros/targets.h"
-#include "edge_bridge_ports.h"
 
 namespace alidade_ros {
 

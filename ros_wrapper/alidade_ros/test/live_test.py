@@ -30,7 +30,8 @@ SCALARS = {  # field of the message: field of the record, factor
     "pan_acceleration": ("pan_acceleration_rad_s2", -1), "tilt_acceleration": ("tilt_acceleration_rad_s2", -1),
     "landmarks": ("landmarks", 1), "residual": ("residual_px", 1), "line_delay": ("line_delay_s", 1),
     "focal_length": ("focal_length_px", 1), "focal_length_sigma": ("focal_length_sigma_px", 1), "zoom": ("zoom", 1),
-    "zoom_rate": ("zoom_rate_per_s", 1), "zoom_rate_sigma": ("zoom_rate_sigma_per_s", 1), "aspect": ("aspect", 1), "radial_distortion": ("radial_distortion", 1)}
+    "zoom_rate": ("zoom_rate_per_s", 1), "zoom_rate_sigma": ("zoom_rate_sigma_per_s", 1), "aspect": ("aspect", 1),
+    "radial_distortion": ("radial_distortion", 1)}
 
 
 def conjugate_rotate(q, v):
@@ -264,7 +265,8 @@ class Live(RosTest):
             newest = orientations.all()[-1]
             if newest.mode != 0 and newest.frame not in asked:
                 asked.add(newest.frame)
-                pixel = self.running_edge.ask("/api/v1/pixel", {"frame": newest.frame, "directions": [[1, 0, 0]]})["pixels"][0]
+                ahead = {"frame": newest.frame, "directions": [[1, 0, 0]]}
+                pixel = self.running_edge.ask("/api/v1/pixel", ahead)["pixels"][0]
                 boxes = []
                 if pixel.get("inside"):
                     u, v = pixel["pixel"]
