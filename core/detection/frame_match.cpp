@@ -92,9 +92,9 @@ FrameMatch match_frames(const SmoothedView& now, const ImageView& then, const Ti
         const double now_square =
             distance.square(static_cast<float>(u) + 0.5F, static_cast<float>(v) + 0.5F);
         const double then_square = distance.square(then_u, then_v);
-        const double gain = match.gain_at(now_square, then_square);
-        const double error =
-            static_cast<double>(kUnit * static_cast<float>(here[u])) - gain * seen - match.offset;
+        const double vignetting = match.vignetting(now_square, then_square);
+        const double error = static_cast<double>(kUnit * static_cast<float>(here[u])) -
+                             match.gain * vignetting * seen - match.offset;
         const double sigma = std::sqrt(static_cast<double>(model.variance(above, here, below, u)));
         const double z = std::abs(error) / sigma;
         (*scratch)[count++] = static_cast<float>(z);
@@ -103,7 +103,7 @@ FrameMatch match_frames(const SmoothedView& now, const ImageView& then, const Ti
         const double slope_u = 0.5 * static_cast<double>(kUnit) * (here[u + 1] - here[u - 1]);
         const double slope_v = 0.5 * static_cast<double>(kUnit) * (below[u] - above[u]);
         Vector7 J;
-        J << slope_u, slope_v, r * slope_u, r * slope_v, gain / match.gain * seen, 1,
+        J << slope_u, slope_v, r * slope_u, r * slope_v, vignetting * seen, 1,
             match.gain * seen * (now_square - then_square) /
                 std::pow(1 + match.falloff * then_square, 2);
         normal.noalias() += weight * J * J.transpose();

@@ -1,10 +1,12 @@
 #pragma once
 // What is left between a picture and the same scene predicted from an earlier one, after their orientations have had their say: a
 // small shift, the light.
-//   now(u) = gain V(u) / V(w) then(w) + offset,   w = warp(u) + shift + shear r,   V(u) = 1 + falloff |u - middle|^2 / (half diagonal)^2,   r = 2 u_v / height - 1: from -1 in the first row to 1 in the last;   robust least squares over one pixel in 256, weighted by what noise and a
-//                                                   misalignment of the stated size leave to expect
+//   now(u) = gain V(u) / V(w) then(w) + offset,   w = warp(u) + shift + shear r
+//   r = 2 u_v / height - 1: from -1 in the first row to 1 in the last;   V(u) = 1 + falloff |u - middle|^2 / (half diagonal)^2
+// by robust least squares over one pixel in 256, weighted by what noise and a misalignment of the stated size leave to expect.
 // Errors of orientation (shift) and of its rates (shear) that two frames do not share come out here, up to a pixel or two where the scene has
-// texture; in flat directions they stay 0. V: each lens is darker towards its corners, and the scene moves through that as the camera turns. Things that move are outliers. No allocation.
+// texture; in flat directions they stay 0. V: a lens is darker towards its corners, and the scene moves through that as the camera
+// turns. Things that move are outliers. No allocation.
 
 #include <algorithm>
 #include <cstdint>
@@ -58,9 +60,9 @@ struct FrameMatch {
 
   // r: of the row.
   [[nodiscard]] Vector2<double> shift_at(double r) const { return shift + r * shear; }
-  // Of the light at now_square over that at then_square, squares of the distances from the middle over that of the corners.
-  [[nodiscard]] double gain_at(double now_square, double then_square) const {
-    return gain * (1 + falloff * now_square) / (1 + falloff * then_square);
+  // V(u) / V(w), of squares of distances from the middle over that of the corners.
+  [[nodiscard]] double vignetting(double now_square, double then_square) const {
+    return (1 + falloff * now_square) / (1 + falloff * then_square);
   }
   [[nodiscard]] double largest_shift() const {
     return std::max(shift_at(-1).norm(), shift_at(1).norm());
