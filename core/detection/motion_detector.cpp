@@ -69,6 +69,7 @@ bool MotionOptions::validate(const char** error) const {
 
 MotionDetector::MotionDetector(const MotionOptions& options)
     : options_(options),
+      distance_(options.width, options.height),
       earlier_(options.width, options.height, options.spacing_s),
       warp_(options.width, options.height),
       noise_(RunningNoiseOptions{}),
@@ -224,7 +225,6 @@ void MotionDetector::compare_row(int which, int column, int row, int v, TileRow*
                         ((1 - t) * upper[1].v + t * lower[1].v + shift_v - from.v) / kTile};
   const float most_u = static_cast<float>(options_.width) - kSplineMargin;
   const float most_v = static_cast<float>(options_.height) - kSplineMargin;
-  const CornerDistance distance(options_.width, options_.height);
   TileRow seen;
   TileRow square;  // of the distance from the earlier picture's middle
   TileRow there;   // 1, or 0 where it is not in the earlier picture
@@ -237,7 +237,7 @@ void MotionDetector::compare_row(int which, int column, int row, int v, TileRow*
     const auto at = static_cast<std::size_t>(i);
     there[at] = held_u == u && held_v == w ? 1.0F : 0.0F;
     seen[at] = spline_value(then, held_u, held_v);
-    square[at] = distance.square(u, w);
+    square[at] = distance_.square(u, w);
   }
   const SmoothedView now{smooth_.data(), options_.width, options_.height};
   const int left = kTile * column;
@@ -252,8 +252,8 @@ void MotionDetector::compare_row(int which, int column, int row, int v, TileRow*
   for (int i = 0; i < kTile; ++i) {
     const auto at = static_cast<std::size_t>(i);
     const float light = gain *
-                        (1 + falloff * distance.square(static_cast<float>(left + i) + 0.5F,
-                                                       static_cast<float>(v) + 0.5F)) /
+                        (1 + falloff * distance_.square(static_cast<float>(left + i) + 0.5F,
+                                                        static_cast<float>(v) + 0.5F)) /
                         (1 + falloff * square[at]);
     const float difference = kUnit * static_cast<float>(here[i]) - light * seen[at] - offset;
     (*z)[at] = there[at] * compared.scale * difference /

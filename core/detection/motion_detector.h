@@ -107,6 +107,7 @@ class MotionDetector {
   void compare_row(int which, int column, int row, int v, TileRow* z) const;
 
   MotionOptions options_;
+  CornerDistance distance_;
   EarlierFrames earlier_;
   FrameWarp warp_;
   RunningNoise noise_;
