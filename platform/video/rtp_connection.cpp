@@ -150,19 +150,21 @@ ReadStatus RtpConnection::open_demuxer(const std::string& sdp, std::string* erro
 // libavformat asks for a packet.
 int RtpConnection::next_packet(void* self, std::uint8_t* data, int capacity) {
   auto* connection = static_cast<RtpConnection*>(self);
-  std::size_t size = 0;
+  ReceivedPacket packet;
   const double deadline_s = connection->last_picture_s_ + connection->options_.timeout_s;
   // Where packets come without end, no wait does.
   connection->transport_status_ =
       monotonic_now_s() > deadline_s
           ? ReadStatus::kTimeout
           : connection->transport_->receive(deadline_s, data, static_cast<std::size_t>(capacity),
-                                            &size, &connection->transport_error_);
+                                            &packet, &connection->transport_error_);
   if (connection->transport_status_ != ReadStatus::kOk) return AVERROR_EXIT;
-  connection->arrival_s_ = monotonic_now_s();
-  connection->timestamps_.move(data, size);
-  if (const auto header = parse_rtp_header(data, size)) connection->ends_.packet_in(*header);
-  return static_cast<int>(size);
+  connection->arrival_s_ = packet.arrival_s;
+  connection->timestamps_.move(data, packet.size);
+  if (const auto header = parse_rtp_header(data, packet.size)) {
+    connection->ends_.packet_in(*header);
+  }
+  return static_cast<int>(packet.size);
 }
 
 // What can be read of the stream that was found.

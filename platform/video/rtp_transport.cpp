@@ -1,60 +1,177 @@
 #include "platform/video/rtp_transport.h"
 
+#include <arpa/inet.h>
+#include <netinet/in.h>
+#include <poll.h>
+#include <sys/socket.h>
+
+#include <algorithm>
 #include <cerrno>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+#include <ctime>
+#include <optional>
+#include <thread>
 
 #include "platform/system/clock.h"
+#include "platform/video/rtp_packet.h"
 #include "platform/video/session_description.h"
 
 namespace alidade {
 namespace {
 
-constexpr std::size_t kPacket = 65'000;         // bytes: more than UDP carries
-constexpr std::size_t kSocketBuffer = 4 << 20;  // bytes: several pictures
+constexpr int kSocketBuffer = 4 << 20;  // bytes: several pictures
+constexpr double kSlice_s = 0.1;        // of a wait: how late an interruption is noticed at most
+
+// A numeric address as the socket interface takes it, IPv4 or IPv6.
+struct SocketAddress {
+  sockaddr_storage storage{};
+  socklen_t size = 0;
+
+  [[nodiscard]] const sockaddr* get() const { return reinterpret_cast<const sockaddr*>(&storage); }
+};
+
+// What a pair of ports listens to.
+struct Listening {
+  SocketAddress address;  // with port 0
+  bool is_group = false;  // multicast
+};
+
+// A sender's address only tells whether it is IPv4 (names are taken to be) or IPv6.
+Listening listening_to(const std::string& address) {
+  Listening out;
+  sockaddr_in ipv4{};
+  sockaddr_in6 ipv6{};
+  if (::inet_pton(AF_INET6, address.c_str(), &ipv6.sin6_addr) == 1) {
+    ipv6.sin6_family = AF_INET6;
+    out.is_group = IN6_IS_ADDR_MULTICAST(&ipv6.sin6_addr);
+    if (!out.is_group) ipv6.sin6_addr = in6addr_any;
+    std::memcpy(&out.address.storage, &ipv6, out.address.size = sizeof ipv6);
+    return out;
+  }
+  ipv4.sin_family = AF_INET;
+  out.is_group = ::inet_pton(AF_INET, address.c_str(), &ipv4.sin_addr) == 1 &&
+                 IN_MULTICAST(ntohl(ipv4.sin_addr.s_addr));
+  if (!out.is_group) ipv4.sin_addr.s_addr = htonl(INADDR_ANY);
+  std::memcpy(&out.address.storage, &ipv4, out.address.size = sizeof ipv4);
+  return out;
+}
+
+SocketAddress with_port(SocketAddress address, int port) {
+  const in_port_t network = htons(static_cast<std::uint16_t>(port));
+  if (address.storage.ss_family == AF_INET6) {
+    reinterpret_cast<sockaddr_in6*>(&address.storage)->sin6_port = network;
+  } else {
+    reinterpret_cast<sockaddr_in*>(&address.storage)->sin_port = network;
+  }
+  return address;
+}
+
+template <class Value>
+bool set(const FileDescriptor& socket, int level, int name, const Value& value) {
+  return ::setsockopt(socket.get(), level, name, &value, sizeof value) == 0;
+}
+
+bool join(const FileDescriptor& socket, const SocketAddress& group) {
+  group_req request{};
+  request.gr_group = group.storage;
+  return set(socket, group.storage.ss_family == AF_INET6 ? IPPROTO_IPV6 : IPPROTO_IP,
+             MCAST_JOIN_GROUP, request);
+}
+
+// None: errno says why.
+FileDescriptor open_socket(const Listening& to, int port) {
+  const int family = to.address.storage.ss_family;
+  FileDescriptor socket(::socket(family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
+  if (!socket.is_open()) return socket;
+  // Less than that, and packets without their time, will do.
+  (void)set(socket, SOL_SOCKET, SO_RCVBUF, kSocketBuffer);
+  (void)set(socket, SOL_SOCKET, SO_TIMESTAMPNS, 1);
+  // A group has many listeners, and each is to hear no other group that comes to the same port.
+  const SocketAddress bound = with_port(to.address, port);
+  const bool works = (!to.is_group || set(socket, SOL_SOCKET, SO_REUSEADDR, 1)) &&
+                     (family != AF_INET6 || set(socket, IPPROTO_IPV6, IPV6_V6ONLY, 1)) &&
+                     ::bind(socket.get(), bound.get(), bound.size) == 0 &&
+                     (!to.is_group || join(socket, to.address));
+  if (!works) socket.reset();
+  return socket;
+}
+
+double seconds(const timespec& time) {
+  return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
+}
+
+// The kernel stamps by the host's UTC, which may have been set since: then a packet is not older than its reading.
+double arrival_of(msghdr* message) {
+  const double now_s = monotonic_now_s();
+  for (cmsghdr* item = CMSG_FIRSTHDR(message); item != nullptr; item = CMSG_NXTHDR(message, item)) {
+    if (item->cmsg_level != SOL_SOCKET || item->cmsg_type != SCM_TIMESTAMPNS) continue;
+    timespec stamp{};
+    std::memcpy(&stamp, CMSG_DATA(item), sizeof stamp);
+    return now_s - std::max(0.0, utc_now_s() - seconds(stamp));
+  }
+  return now_s;
+}
+
+// The next packet that waits; kTimeout: none does.
+ReadStatus take(const FileDescriptor& socket, std::uint8_t* data, std::size_t capacity,
+                ReceivedPacket* packet, std::string* error) {
+  iovec place{data, capacity};
+  alignas(cmsghdr) std::array<std::uint8_t, CMSG_SPACE(sizeof(timespec))> control{};
+  msghdr message{};
+  message.msg_iov = &place;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  const ssize_t size = ::recvmsg(socket.get(), &message, 0);
+  if (size > 0) {
+    *packet = {static_cast<std::size_t>(size), arrival_of(&message)};
+    return ReadStatus::kOk;
+  }
+  if (size == 0 || errno == EAGAIN || errno == EINTR) return ReadStatus::kTimeout;
+  *error = std::strerror(errno);
+  return ReadStatus::kDisconnected;
+}
 
 }  // namespace
 
-int RtpPorts::is_over(void* self) {
-  const auto* ports = static_cast<const RtpPorts*>(self);
-  return ports->interrupted_ || monotonic_now_s() > ports->deadline_s_ ? 1 : 0;
-}
-
 ReadStatus RtpPorts::open(const std::string& address, int port, std::string* error) {
-  const std::string host =
-      address.find(':') == std::string::npos ? address : '[' + address + ']';  // IPv6
-  const std::string url =
-      "rtp://" + host + ":" + std::to_string(port) + "?localrtpport=" + std::to_string(port) +
-      "&localrtcpport=" + std::to_string(port + 1) + "&pkt_size=" + std::to_string(kPacket);
-  AVDictionary* options = nullptr;
-  av_dict_set_int(&options, "buffer_size", kSocketBuffer, 0);
-  deadline_s_ = monotonic_now_s() + 1;  // opening waits for nothing
-  const AVIOInterruptCB interrupt{&RtpPorts::is_over, this};
-  AVIOContext* io = nullptr;
-  const int code = avio_open2(&io, url.c_str(), AVIO_FLAG_READ, &interrupt, &options);
-  av_dict_free(&options);
-  if (code < 0) {
+  const Listening to = listening_to(address);
+  for (int i = 0; i < 2; ++i) {
+    FileDescriptor& socket = sockets_[static_cast<std::size_t>(i)];
+    socket = open_socket(to, port + i);
+    if (socket.is_open()) continue;
     *error = "cannot listen on the UDP ports " + std::to_string(port) + " and " +
-             std::to_string(port + 1) + " (" + av_error_text(code) + "); does another program?";
+             std::to_string(port + 1) + " (" + std::strerror(errno) + "); does another program?";
     return ReadStatus::kDisconnected;
   }
-  io_.reset(io);
   return ReadStatus::kOk;
 }
 
 ReadStatus RtpPorts::receive(double deadline_s, std::uint8_t* data, std::size_t capacity,
-                             std::size_t* size, std::string* error) {
-  deadline_s_ = deadline_s;
-  // Having been interrupted or found nothing is no end for good.
-  io_->eof_reached = 0;
-  io_->error = 0;
-  const int code = avio_read_partial(io_.get(), data, static_cast<int>(capacity));
-  if (code > 0) {
-    *size = static_cast<std::size_t>(code);
-    return ReadStatus::kOk;
+                             ReceivedPacket* packet, std::string* error) {
+  const auto& [media, reports] = sockets_;
+  while (!interrupted_) {
+    ReadStatus status = take(media, data, capacity, packet, error);
+    if (status == ReadStatus::kOk) {
+      const std::optional<RtpHeader> header = parse_rtp_header(data, packet->size);
+      amid_picture_ = header && !header->marker;
+    } else if (status == ReadStatus::kTimeout) {
+      status = take(reports, data, capacity, packet, error);
+    }
+    if (status != ReadStatus::kTimeout) return status;
+    const double left_s = deadline_s - monotonic_now_s();
+    if (!(left_s > 0)) return ReadStatus::kTimeout;
+    if (std::exchange(amid_picture_, false)) {
+      std::this_thread::sleep_for(std::chrono::duration<double>(std::min(left_s, kGather_s)));
+      continue;
+    }
+    std::array<pollfd, 2> waiting{pollfd{media.get(), POLLIN, 0}, pollfd{reports.get(), POLLIN, 0}};
+    const double wait_ms = 1e3 * std::min(left_s, kSlice_s);
+    (void)::poll(waiting.data(), waiting.size(), static_cast<int>(std::ceil(wait_ms)));
   }
-  if (interrupted_) return ReadStatus::kStopped;
-  if (code == AVERROR(EAGAIN) || is_over(this) != 0) return ReadStatus::kTimeout;
-  *error = av_error_text(code);
-  return ReadStatus::kDisconnected;
+  return ReadStatus::kStopped;
 }
 
 ReadStatus UdpTransport::open(double /*deadline_s*/, std::string* sdp, std::string* error) {

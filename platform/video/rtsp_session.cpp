@@ -372,7 +372,7 @@ ReadStatus RtspSession::next_packet(double deadline_s, Packet* packet, std::stri
 }
 
 ReadStatus RtspSession::receive(double deadline_s, std::uint8_t* data, std::size_t capacity,
-                                std::size_t* size, std::string* error) {
+                                ReceivedPacket* received, std::string* error) {
   while (!interrupted_) {
     ReadStatus status = keep_alive(error);
     if (status != ReadStatus::kOk) return status;
@@ -386,7 +386,7 @@ ReadStatus RtspSession::receive(double deadline_s, std::uint8_t* data, std::size
         if (readable(0)) (void)next_packet(deadline_s, &packet, error);
       }
       const double slice_end_s = monotonic_now_s() + std::min(left_s, kSlice_s);
-      status = ports_->receive(slice_end_s, data, capacity, size, error);
+      status = ports_->receive(slice_end_s, data, capacity, received, error);
       if (status != ReadStatus::kTimeout) return status;
       if (readable(0)) status = next_packet(deadline_s, &packet, error);
     } else if (!early_.empty()) {
@@ -399,7 +399,7 @@ ReadStatus RtspSession::receive(double deadline_s, std::uint8_t* data, std::size
     if (status != ReadStatus::kOk && status != ReadStatus::kTimeout) return status;
     if (!packet.empty() && packet.size() <= capacity && !ports_) {
       std::copy(packet.begin(), packet.end(), data);
-      *size = packet.size();
+      *received = {packet.size(), monotonic_now_s()};
       return ReadStatus::kOk;
     }
     if (monotonic_now_s() >= deadline_s) return ReadStatus::kTimeout;

@@ -30,7 +30,7 @@ class RtspSession : public RtpTransport {
 
   [[nodiscard]] ReadStatus open(double deadline_s, std::string* sdp, std::string* error) override;
   [[nodiscard]] ReadStatus receive(double deadline_s, std::uint8_t* data, std::size_t capacity,
-                                   std::size_t* size, std::string* error) override;
+                                   ReceivedPacket* packet, std::string* error) override;
   void interrupt() override;
 
  private:
