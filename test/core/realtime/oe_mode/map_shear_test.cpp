@@ -256,7 +256,9 @@ TEST_F(ShearedFrames, TellThroughALensThatStandsAndNotThroughOneThatMoves) {
     }
     const auto correction = shear_.correct();
     EXPECT_EQ(correction.has_value(), zoom < 1e-3);
-    if (correction) EXPECT_LT((correction->rate - wrong_rate).norm(), 0.05 * wrong_rate.norm());
+    if (correction) {
+      EXPECT_LT((correction->rate - wrong_rate).norm(), 0.05 * wrong_rate.norm());
+    }
   }
 }
 
