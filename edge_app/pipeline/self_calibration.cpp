@@ -65,6 +65,7 @@ void SelfCalibration::say_once(const std::string& line) {
 
 void SelfCalibration::begin_anew() {
   session_.clear();
+  first_node_is_due_ = false;
   tries_ = 0;
   disagreement_.restart();
 }
@@ -88,7 +89,7 @@ bool SelfCalibration::is_rejected(const Calibration& calibration) const {
 
 void SelfCalibration::clock_began_anew() {
   nodes_.clock_began_anew();
-  if (of_first_zoom_) of_first_zoom_->clock_holds = false;
+  if (first_node_) first_node_->clock_holds = false;
 }
 
 bool SelfCalibration::judge_delay(const FrameTracks& tracks) {
@@ -155,35 +156,34 @@ bool SelfCalibration::adjusting_is_due() const {
              last_try_s_ + (clock_offset_known_ ? watch_interval_s_ : schedule.first_watch_s);
 }
 
-SessionCalibration SelfCalibration::adjust(const CalibrationSession& session,
-                                           const Calibration* known) const {
+SessionCalibration SelfCalibration::adjust(const Calibration* known, bool free_centre) const {
   SessionCalibrationOptions options;
   options.width = options_.data_sheet.camera.width;
   options.height = options_.data_sheet.camera.height;
   options.adjustment = options_.adjustment;
-  if (makes_nodes()) options.adjustment.centre_sigma_px = kUsualCentreShare * options.width;
+  if (free_centre) options.adjustment.centre_sigma_px = kUsualCentreShare * options.width;
   options.camera = options_.camera;
   options.noise = options_.noise;
   options.checks = options_.checks;
   options.is_cancelled = [this] { return cancelled_.load(); };
   SessionCalibration checked;
   if (known == nullptr) {
-    checked = calibrate_session(session, options, nullptr);
+    checked = calibrate_session(session_, options, nullptr);
   } else {
     const KnownCalibration prior{*known, clock_offset_known_};
-    checked = calibrate_session(session, options, &prior);
+    checked = calibrate_session(session_, options, &prior);
   }
   checked.result.calibration.zoom = zoom_;
   return checked;
 }
 
-void SelfCalibration::store(const SessionCalibration& checked, const MapState& map) {
+void SelfCalibration::store(const CalibrationResult& result, const MapState& map) {
   last_store_s_ = now_s_;
   if (archive_ == nullptr) return;
   StoredCalibration stored;
-  stored.calibration = checked.result.calibration;
-  stored.notes.quality = checked.result.quality;
-  stored.notes.excluded = checked.result.exclusions.describe();
+  stored.calibration = result.calibration;
+  stored.notes.quality = result.quality;
+  stored.notes.excluded = result.exclusions.describe();
   stored.notes.zoom_curve = nodes_.curve();
   stored.map = map;
   std::string error;
@@ -205,7 +205,7 @@ void SelfCalibration::publish(const SessionCalibration& checked) {
                   quality.frames, quality.landmarks, describe(fresh->calibration),
                   quality.pixel_sigma_ratio, checked.hold_out, fresh->map.landmarks.size()));
   messages_.insert(messages_.end(), checked.remarks.begin(), checked.remarks.end());
-  store(checked, fresh->map);
+  store(checked.result, fresh->map);
   rejected_.erase(std::remove_if(rejected_.begin(), rejected_.end(),
                                  [this](double zoom) { return zoom_fits(zoom); }),
                   rejected_.end());
@@ -220,7 +220,7 @@ void SelfCalibration::publish(const SessionCalibration& checked) {
 // Without what an earlier calibration says.
 void SelfCalibration::try_first() {
   ++tries_;
-  SessionCalibration checked = adjust(session_, nullptr);
+  SessionCalibration checked = adjust(nullptr);
   if (checked.refusal.empty()) {
     watch_interval_s_ = options_.schedule.first_watch_s;
     settle(std::move(checked));
@@ -236,7 +236,7 @@ void SelfCalibration::try_first() {
 void SelfCalibration::hold_against_published() {
   const CalibrationSchedule& schedule = options_.schedule;
   watch_interval_s_ = std::min(2 * watch_interval_s_, schedule.longest_watch_s);
-  SessionCalibration alone = adjust(session_, nullptr);
+  SessionCalibration alone = adjust(nullptr);
   // Motion that does not suffice tells nothing against what is known.
   if (!alone.refusal.empty()) return;
   const double chi_square =
@@ -263,12 +263,13 @@ void SelfCalibration::hold_against_published() {
     refine_node(std::move(alone));
     return;
   }
-  keep_first_zoom();
-  const SessionCalibration refined = adjust(session_, &published_->calibration);
+  if (!first_node_) first_node_is_due_ = true;
+  const SessionCalibration refined = adjust(&published_->calibration);
   if (!refined.refusal.empty()) return;
   if (!clock_offset_known_ ||
       is_sharper(refined.result.calibration, published_->calibration, schedule.worth_publishing)) {
     publish(refined);
+    first_node_is_due_ = true;
   }
 }
 
@@ -334,7 +335,7 @@ bool SelfCalibration::ask_for_fresh() {
 void SelfCalibration::cancel() { cancelled_ = true; }
 
 bool SelfCalibration::due() const {
-  return storing_is_due() || centre_is_due() || adjusting_is_due();
+  return storing_is_due() || first_node_is_wanted() || first_node_is_due() || adjusting_is_due();
 }
 
 std::shared_ptr<const PublishedCalibration> SelfCalibration::work() {
@@ -343,8 +344,10 @@ std::shared_ptr<const PublishedCalibration> SelfCalibration::work() {
     last_store_s_ = now_s_;
     say_once(archive_->save_pending(&error) ? "the calibration is stored now" : error);
   }
-  if (centre_is_due()) free_the_centre();
-  if (adjusting_is_due()) {
+  if (first_node_is_due()) take_first_node();
+  if (first_node_is_wanted()) {
+    make_first_node();
+  } else if (adjusting_is_due()) {
     last_try_s_ = session_.newest_s();
     if (is_calibrated_here() && !fresh_wanted_) {
       hold_against_published();

@@ -117,12 +117,15 @@ class SelfCalibration {
   [[nodiscard]] bool storing_is_due() const;
   [[nodiscard]] bool adjusting_is_due() const;
   [[nodiscard]] bool makes_nodes() const { return zooms_ && zoom_.has_value(); }
-  [[nodiscard]] bool centre_is_due() const { return zooms_ && of_first_zoom_.has_value(); }
-  // known: what is published, as prior; null: from the data alone.
-  [[nodiscard]] SessionCalibration adjust(const CalibrationSession& session,
-                                          const Calibration* known) const;
-  void keep_first_zoom();
-  void free_the_centre();
+  [[nodiscard]] bool first_node_is_wanted() const { return first_node_is_due_ && !zooms_; }
+  [[nodiscard]] bool first_node_is_due() const { return zooms_ && first_node_.has_value(); }
+  // Of the session. known: what is published, as prior; null: from the data alone.
+  [[nodiscard]] SessionCalibration adjust(const Calibration* known, bool free_centre) const;
+  [[nodiscard]] SessionCalibration adjust(const Calibration* known) const {
+    return adjust(known, makes_nodes());
+  }
+  void make_first_node();
+  void take_first_node();
   void try_first();
   void hold_against_published();
   void settle(SessionCalibration checked);
@@ -131,7 +134,7 @@ class SelfCalibration {
   void contradict_nodes(const SessionCalibration& alone, const std::string& why);
   void begin_nodes_anew(const SessionCalibration& alone);
   void publish(const SessionCalibration& checked);
-  void store(const SessionCalibration& checked, const MapState& map);
+  void store(const CalibrationResult& result, const MapState& map);
   void say_once(const std::string& line);
 
   SelfCalibrationOptions options_;
@@ -143,17 +146,20 @@ class SelfCalibration {
   double last_try_s_ = 0;
   int tries_ = 0;
 
-  // What the first zoom's calibration was made of, for another one with a free optical centre.
-  struct FirstZoom {
-    double zoom = 0;
-    CalibrationSession session;
+  // The first zoom's calibration once more, with a free optical centre: a node, if there comes another zoom. Made while its
+  // motion is at hand, as keeping that for good would take more memory than all else here.
+  struct FirstNode {
+    std::string refusal;       // empty: it may be one
+    CalibrationResult result;  // calibration, quality and exclusions alone
+    MapState map;
     bool clock_holds = true;
   };
 
   std::optional<double> zoom_;
   bool zooms_;  // the camera has more than one zoom
   ZoomNodes nodes_;
-  std::optional<FirstZoom> of_first_zoom_;  // until it is known that there is another one
+  bool first_node_is_due_ = false;       // of the session as it is
+  std::optional<FirstNode> first_node_;  // until it is known that there is another zoom
   double zoom_changed_s_ = -1e9;
   std::optional<double>
       odd_zoom_s_;  // since when readings differ, after it stood still: a glitch, or a movement

@@ -129,36 +129,47 @@ void SelfCalibration::look_for_stored() {
   need_ = CalibrationNeed::kNothing;
 }
 
-void SelfCalibration::keep_first_zoom() {
-  if (zoom_ && !zooms_) of_first_zoom_ = FirstZoom{*zoom_, session_, true};
+// In a turn of its own: what is published is not to wait for it.
+void SelfCalibration::make_first_node() {
+  first_node_is_due_ = false;
+  if (!zoom_) return;
+  const SessionCalibration made = adjust(nullptr, true);
+  if (made.result.status == CalibrationStatus::kCancelled) return;
+  FirstNode node;
+  node.refusal = made.refusal;
+  node.result.calibration = made.result.calibration;
+  node.result.quality = made.result.quality;
+  node.result.exclusions = made.result.exclusions;
+  if (made.refusal.empty())
+    node.map = map_from_keyframes(made.result, session_.keyframes(made.result));
+  first_node_ = std::move(node);
 }
 
-// The camera has another zoom: of the first one's motion a calibration that can be a node.
-void SelfCalibration::free_the_centre() {
-  FirstZoom first = std::move(*of_first_zoom_);
-  of_first_zoom_.reset();
+// The camera has another zoom.
+void SelfCalibration::take_first_node() {
+  const FirstNode first = std::move(*first_node_);
+  first_node_.reset();
   if (!nodes_.empty() || !makes_nodes()) return;
-  SessionCalibration checked = adjust(first.session, nullptr);
-  if (!checked.refusal.empty()) {
+  const Calibration& calibration = first.result.calibration;
+  if (!first.refusal.empty()) {
     messages_.push_back(fmt::format(
         "zoom {}: no node of the zoom curve until the camera is there again: with a free optical "
         "centre, {}",
-        first.zoom, checked.refusal));
+        *calibration.zoom, first.refusal));
     return;
   }
-  checked.result.calibration.zoom = first.zoom;
-  nodes_.begin_anew(checked.result.calibration);
+  nodes_.begin_anew(calibration);
   nodes_.leave();
   if (!first.clock_holds) nodes_.clock_began_anew();
-  store(checked, map_from_keyframes(checked.result, first.session.keyframes(checked.result)));
+  store(first.result, first.map);
 }
 
 // Where there was no calibration, or a fresh one is wanted.
 void SelfCalibration::settle(SessionCalibration checked) {
   if (!makes_nodes()) {
-    keep_first_zoom();
     contradiction_.restart();
     publish(checked);
+    first_node_is_due_ = true;
     return;
   }
   ZoomAddition addition;

@@ -1,6 +1,7 @@
 #include "platform/system/realtime.h"
 
 #include <limits.h>
+#include <link.h>
 #include <malloc.h>
 #include <pthread.h>
 #include <sched.h>
@@ -115,11 +116,48 @@ bool is_of_the_real_time_thread(const std::string& path, const std::string& prog
   return false;
 }
 
+// The zeros that a library's data ends with: of no file in /proc/self/smaps, and megabytes in a library of codecs.
+struct Zeros {
+  char* begin = nullptr;
+  char* end = nullptr;
+  std::string library;  // empty: the program
+};
+
+std::vector<Zeros> all_zeros() {
+  std::vector<Zeros> zeros;
+  const auto add = [](dl_phdr_info* object, std::size_t, void* out) {
+    const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+    const auto whole = [page](std::uintptr_t at) {
+      return reinterpret_cast<char*>((at + page - 1) / page * page);
+    };
+    for (int i = 0; i < object->dlpi_phnum; ++i) {
+      const ElfW(Phdr)& part = object->dlpi_phdr[i];
+      const std::uintptr_t at = object->dlpi_addr + part.p_vaddr;
+      const Zeros found{whole(at + part.p_filesz), whole(at + part.p_memsz), object->dlpi_name};
+      if (part.p_type == PT_LOAD && found.begin < found.end)
+        static_cast<std::vector<Zeros>*>(out)->push_back(found);
+    }
+    return 0;
+  };
+  dl_iterate_phdr(add, &zeros);
+  return zeros;
+}
+
 // What there is now is locked as it is touched, but for what is brought in.
 bool lock_all() {
   std::array<char, PATH_MAX> program{};
   if (readlink("/proc/self/exe", program.data(), program.size() - 1) < 0) return false;
-  const std::vector<Mapping> mappings = all_mappings();
+  std::vector<Mapping> mappings = all_mappings();
+  for (const Zeros& zeros : all_zeros()) {
+    if (zeros.library.empty() || is_of_the_real_time_thread(zeros.library, program.data()))
+      continue;
+    for (Mapping& mapping : mappings) {
+      // What the kernel has joined to it comes behind it.
+      if (!mapping.path.empty() || mapping.begin != zeros.begin) continue;
+      mapping.size -= std::min(mapping.size, static_cast<std::size_t>(zeros.end - zeros.begin));
+      mapping.begin = zeros.end;
+    }
+  }
   const auto is_brought_in = [&](const Mapping& mapping) {
     return mapping.is_data() || (mapping.permissions[0] == 'r' &&
                                  is_of_the_real_time_thread(mapping.path, program.data()));
