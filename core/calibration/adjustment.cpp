@@ -29,7 +29,7 @@ void invert_lower(Eigen::Ref<Eigen::MatrixXd> L) {
 }  // namespace
 
 bool Adjustment::reduce(const Linearisation& in, double damping) {
-  reduced_ = in.H;
+  in.H.copy_to(&reduced_);
   reduced_.diagonal() *= 1 + damping;
   reduced_g_ = in.g;
   const auto camera_row = in.H.rows() - kGlobalCount;
@@ -163,13 +163,9 @@ bool Adjustment::covariance(const Linearisation& in, GlobalMatrix* covariance,
   }
   *covariance = global_rows_.rightCols<kGlobalCount>();
   *telemetry_unknowns = 0;
-  for (Eigen::Index j = 0; j < size; ++j) {
-    for (Eigen::Index i = j; i < size; ++i) {
-      const double h = in.H_telemetry(i, j);
-      if (h == 0) continue;
-      *telemetry_unknowns += (i == j ? 1 : 2) * h * inverse(i, j);
-    }
-  }
+  in.H_telemetry.for_each([&](Eigen::Index i, Eigen::Index j, double h) {
+    if (h != 0) *telemetry_unknowns += (i == j ? 1 : 2) * h * inverse(i, j);
+  });
   return true;
 }
 

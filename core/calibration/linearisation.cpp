@@ -102,10 +102,10 @@ constexpr double kLostSquaredError = 1e10;
 
 // H's block of four control points: J^T J (x) w w^T, lower triangle.
 void add_control_points(const TrajectorySpline::Basis& basis, const Matrix2<double>& J_squared,
-                        Eigen::MatrixXd* H) {
+                        NormalMatrix* H) {
   for (int i = 0; i < 4; ++i) {
     for (int j = 0; j <= i; ++j) {
-      H->block<2, 2>(2 * (basis.segment + i), 2 * (basis.segment + j)) +=
+      H->points(basis.segment + i, basis.segment + j) +=
           basis.weight[i] * basis.weight[j] * J_squared;
     }
   }
@@ -150,11 +150,11 @@ void apply_step(const Eigen::VectorXd& x, const std::vector<Vector2<double>>& x_
 
 void Lineariser::linearise(const AdjustmentState& state, const LossScales& loss,
                            Linearisation* out) {
-  const int size = 2 * state.trajectory.control_points() + kGlobalCount;
+  const int control_points = state.trajectory.control_points();
   out->cost = 0;
   out->valid = true;
-  out->H.setZero(size, size);
-  out->g.setZero(size);
+  out->H.set_zero(control_points);
+  out->g.setZero(out->H.rows());
   add_observations(state, loss, out);
   add_telemetry(state, loss, out);
   add_priors(state, out);
@@ -221,7 +221,7 @@ void Lineariser::add_observations(const AdjustmentState& state, const LossScales
         const int point = segment + i;
         const double w = basis.weight[i];
         out->g.segment<2>(2 * point) += w * g_angle;
-        out->H.block<kCameraCount, 2>(camera_row, 2 * point) += w * H_ca;
+        out->H.border().block<kCameraCount, 2>(0, 2 * point) += w * H_ca;
         touched_buffer_[static_cast<std::size_t>(point)] += w * H_al;
         if (!is_touched_[static_cast<std::size_t>(point)]) {
           is_touched_[static_cast<std::size_t>(point)] = true;
@@ -246,7 +246,7 @@ void Lineariser::add_observations(const AdjustmentState& state, const LossScales
     touched_now.clear();
     out->touched_begin.push_back(out->touched.size());
   }
-  out->H.block<kCameraCount, kCameraCount>(camera_row, camera_row) += H_cc;
+  out->H.border().block<kCameraCount, kCameraCount>(0, camera_row) += H_cc;
   out->g.segment<kCameraCount>(camera_row) += g_c;
 }
 
@@ -293,8 +293,8 @@ void Lineariser::add_telemetry(const AdjustmentState& state, const LossScales& l
   const TrajectorySpline& trajectory = state.trajectory;
   const int global_row = 2 * trajectory.control_points();
   const Vector2<double> scale(state.mechanics.pan_scale, state.mechanics.tilt_scale);
-  Eigen::MatrixXd& H = out->H_telemetry;
-  H.setZero(out->H.rows(), out->H.cols());
+  NormalMatrix& H = out->H_telemetry;
+  H.set_zero(trajectory.control_points());
   out->telemetry.resize(data_.telemetry.size());
   int segment = 0;
   for (std::size_t i = 0; i < data_.telemetry.size(); ++i) {
@@ -328,9 +328,9 @@ void Lineariser::add_telemetry(const AdjustmentState& state, const LossScales& l
     for (int k = 0; k < 4; ++k) {
       const int point = basis.segment + k;
       out->g.segment<2>(2 * point) += basis.weight[k] * robust.weight * slope.cwiseProduct(error);
-      H.block<4, 2>(global_row + kCameraCount, 2 * point) += basis.weight[k] * H_pa;
+      H.border().block<4, 2>(kCameraCount, 2 * point) += basis.weight[k] * H_pa;
     }
-    H.block<4, 4>(global_row + kCameraCount, global_row + kCameraCount) +=
+    H.border().block<4, 4>(kCameraCount, global_row + kCameraCount) +=
         robust.weight * J.transpose() * J;
     out->g.segment<4>(global_row + kCameraCount) += robust.weight * J.transpose() * error;
   }
@@ -368,7 +368,7 @@ void Lineariser::add_priors(const AdjustmentState& state, Linearisation* out) co
   error[kDrift] = mean.drift - state.drift;
 
   const GlobalMatrix JtW = J.transpose() * priors_.information.asDiagonal();
-  out->H.bottomRightCorner<kGlobalCount, kGlobalCount>() += JtW * J;
+  out->H.border().rightCols<kGlobalCount>() += JtW * J;
   out->g.tail<kGlobalCount>() += JtW * error;
   out->cost += error.dot(priors_.information.cwiseProduct(error));
 }
@@ -377,11 +377,13 @@ void Lineariser::fix_parameters(Linearisation* out) const {
   const auto first = out->H.rows() - kGlobalCount;
   for (int i = 0; i < kGlobalCount; ++i) {
     if (!fixed_[static_cast<std::size_t>(i)]) continue;
-    out->H.row(first + i).setZero();
-    out->H.col(first + i).setZero();
-    out->H(first + i, first + i) = 1;
-    out->H_telemetry.row(first + i).setZero();
-    out->H_telemetry.col(first + i).setZero();
+    const auto leave_out = [&](NormalMatrix* H) {
+      H->border().row(i).setZero();
+      H->border().col(first + i).setZero();
+    };
+    leave_out(&out->H);
+    leave_out(&out->H_telemetry);
+    out->H.border()(i, first + i) = 1;
     out->g[first + i] = 0;
     if (i >= kCameraCount) continue;
     for (auto& H_camera : out->H_camera) H_camera.row(i).setZero();

@@ -17,6 +17,7 @@
 #include <limits>
 #include <vector>
 
+#include "core/calibration/bordered_band.h"
 #include "core/calibration/trajectory_spline.h"
 #include "core/model/calibration.h"
 
@@ -95,15 +96,17 @@ struct LinearisedResidual {
   Matrix2<double> J_angle;
 };
 
+using NormalMatrix = BorderedBand<kGlobalCount>;
+
 struct Linearisation {
   double cost = 0;    // sum of rho
   bool valid = true;  // every used observation has a projection
   std::vector<LinearisedResidual> observations;
   std::vector<LinearisedResidual> telemetry;
 
-  // Normal equations H x = g: control points (two rows each), then the parameters. Lower triangle.
-  Eigen::MatrixXd H;
-  Eigen::MatrixXd H_telemetry;  // the telemetry's part of H
+  // Normal equations H x = g: control points (two rows each), then the parameters.
+  NormalMatrix H;
+  NormalMatrix H_telemetry;  // the telemetry's part of H
   Eigen::VectorXd g;
   // Landmarks: H_ll, g_l, and rows of H_cl for the touched control points and the camera.
   std::vector<Matrix2<double>> H_landmark;

@@ -177,7 +177,9 @@ TEST(Adjustment, NormalMatrixIsTheDerivativeOfItsGradientAtThePerfectFit) {
   const Eigen::Index size = at.g.size();
   const Eigen::Index total = size + 2 * static_cast<Eigen::Index>(scene.state.landmarks.size());
   Eigen::MatrixXd H = Eigen::MatrixXd::Zero(total, total);
-  H.topLeftCorner(size, size) = at.H;
+  Eigen::MatrixXd without_landmarks;
+  at.H.copy_to(&without_landmarks);
+  H.topLeftCorner(size, size) = without_landmarks;
   for (std::size_t l = 0; l < at.H_landmark.size(); ++l) {
     const Eigen::Index row = size + 2 * static_cast<Eigen::Index>(l);
     H.block<2, 2>(row, row) = at.H_landmark[l];
@@ -222,7 +224,9 @@ TEST(Adjustment, EliminatingLandmarksGivesTheSolutionOfTheWholeSystem) {
     std::vector<Vector2<double>> x_landmark;
     ASSERT_TRUE(adjustment.solve(at, damping, &x, &x_landmark));
     // Put back into the normal equations, every diagonal element of which is damped.
-    Eigen::MatrixXd H = at.H.selfadjointView<Eigen::Lower>();
+    Eigen::MatrixXd lower;
+    at.H.copy_to(&lower);
+    Eigen::MatrixXd H = lower.selfadjointView<Eigen::Lower>();
     H.diagonal() *= 1 + damping;
     Eigen::VectorXd left = H * x;
     const double scale = at.g.cwiseAbs().maxCoeff();

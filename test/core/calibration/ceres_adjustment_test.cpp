@@ -335,7 +335,9 @@ void full_system(const Linearisation& at, Eigen::MatrixXd* H, Eigen::VectorXd* g
   const Eigen::Index total = size + 2 * static_cast<Eigen::Index>(at.g_landmark.size());
   H->setZero(total, total);
   g->resize(total);
-  H->topLeftCorner(size, size) = at.H;
+  Eigen::MatrixXd without_landmarks;
+  at.H.copy_to(&without_landmarks);
+  H->topLeftCorner(size, size) = without_landmarks;
   g->head(size) = at.g;
   for (std::size_t l = 0; l < at.H_landmark.size(); ++l) {
     const Eigen::Index row = size + 2 * static_cast<Eigen::Index>(l);
