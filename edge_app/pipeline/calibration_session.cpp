@@ -81,7 +81,10 @@ std::vector<PanTiltSample> CalibrationSession::telemetry() const {
 }
 
 std::vector<CalibrationObservation> CalibrationSession::observations() const {
+  std::size_t count = 0;
+  for (const KeptFrame& frame : frames_) count += frame.points.size();
   std::vector<CalibrationObservation> observations;
+  observations.reserve(count);
   for (const KeptFrame& frame : frames_) {
     for (const TrackedPoint& point : frame.points) {
       observations.push_back(

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <numeric>
 #include <tuple>
@@ -175,23 +176,24 @@ std::vector<CalibrationObservation> without_shared_pixels(
             [&rank](const CalibrationObservation& a, const CalibrationObservation& b) {
               return rank(a) < rank(b);
             });
-  std::vector<CalibrationObservation> kept;
-  std::size_t frame_begin = 0;
+  // In their own memory: there may be 100,000 of them.
+  auto kept = observations.begin();
+  auto of_frame = kept;
   for (const CalibrationObservation& seen : observations) {
-    if (!kept.empty() && kept.back().frame != seen.frame) frame_begin = kept.size();
-    const auto begin = kept.begin() + static_cast<std::ptrdiff_t>(frame_begin);
-    if (std::none_of(begin, kept.end(), [&seen](const CalibrationObservation& better) {
+    if (kept != observations.begin() && std::prev(kept)->frame != seen.frame) of_frame = kept;
+    if (std::none_of(of_frame, kept, [&seen](const CalibrationObservation& better) {
           return std::hypot(seen.u_px - better.u_px, seen.v_px - better.v_px) < kSharedPixels_px;
         })) {
-      kept.push_back(seen);
+      *kept++ = seen;
     }
   }
-  return kept;
+  observations.erase(kept, observations.end());
+  return observations;
 }
 
-std::vector<CalibrationObservation> choose_tracks(std::vector<CalibrationObservation> given,
+std::vector<CalibrationObservation> choose_tracks(std::vector<CalibrationObservation> observations,
                                                   std::size_t max_observations) {
-  const std::vector<CalibrationObservation> observations = without_shared_pixels(std::move(given));
+  observations = without_shared_pixels(std::move(observations));
   struct Track {
     std::int64_t landmark = 0;
     std::size_t count = 0;
@@ -226,11 +228,13 @@ std::vector<CalibrationObservation> choose_tracks(std::vector<CalibrationObserva
     if (count > max_observations) break;
     chosen.insert(track.landmark);
   }
-  std::vector<CalibrationObservation> result;
-  for (const CalibrationObservation& seen : observations) {
-    if (chosen.count(seen.landmark) != 0) result.push_back(seen);
-  }
-  return result;
+  const auto is_left_out = [&chosen](const CalibrationObservation& seen) {
+    return chosen.count(seen.landmark) == 0;
+  };
+  observations.erase(std::remove_if(observations.begin(), observations.end(), is_left_out),
+                     observations.end());
+  observations.shrink_to_fit();
+  return observations;
 }
 
 }  // namespace alidade
