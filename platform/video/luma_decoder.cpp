@@ -5,6 +5,8 @@ extern "C" {
 }
 
 #include <algorithm>
+#include <string_view>
+#include <utility>
 
 namespace alidade {
 
@@ -28,6 +30,16 @@ std::optional<CodedBy> coded_by(AVCodecID codec) {
 
 bool LumaDecoder::open(const AVCodecParameters& parameters, bool low_delay) {
   context_.reset();
+  jpeg_.reset();
+  decoded_.reset();
+  coded_by_ = coded_by(parameters.codec_id);
+  low_delay_ = low_delay;
+  beginning_ = coded_by_.has_value();
+  begun_ = false;
+  if (low_delay && parameters.codec_id == AV_CODEC_ID_MJPEG) {
+    jpeg_.emplace();
+    return true;
+  }
   const AVCodec* codec = avcodec_find_decoder(parameters.codec_id);
   if (codec == nullptr) {
     error_ = std::string("no decoder for ") + avcodec_get_name(parameters.codec_id);
@@ -38,8 +50,6 @@ bool LumaDecoder::open(const AVCodecParameters& parameters, bool low_delay) {
   if (context_) {
     code = avcodec_parameters_to_context(context_.get(), &parameters);
   }
-  coded_by_ = coded_by(parameters.codec_id);
-  low_delay_ = low_delay;
   if (code >= 0 && coded_by_ && low_delay) {
     const auto changed = without_reordering(*coded_by_, context_->extradata,
                                             static_cast<std::size_t>(context_->extradata_size));
@@ -66,13 +76,12 @@ bool LumaDecoder::open(const AVCodecParameters& parameters, bool low_delay) {
     context_.reset();
     return false;
   }
-  beginning_ = coded_by_.has_value();
-  begun_ = false;
   return true;
 }
 
 void LumaDecoder::flush() {
-  avcodec_flush_buffers(context_.get());
+  decoded_.reset();
+  if (context_) avcodec_flush_buffers(context_.get());
   beginning_ = coded_by_.has_value();
   begun_ = false;
 }
@@ -102,6 +111,17 @@ PacketPtr LumaDecoder::in_decoding_order(const AVPacket& packet) const {
 }
 
 bool LumaDecoder::send(const AVPacket* packet) {
+  if (jpeg_) {
+    if (packet == nullptr) return true;
+    const std::string_view jpeg(reinterpret_cast<const char*>(packet->data),
+                                static_cast<std::size_t>(packet->size));
+    if (!jpeg_->decode(jpeg, &decoded_.emplace())) {
+      decoded_.reset();
+      return false;
+    }
+    decoded_->pts = packet->pts;
+    return true;
+  }
   if (packet == nullptr) return avcodec_send_packet(context_.get(), nullptr) >= 0;
   if (coded_by_ && !begun_) begin(*packet);
   const PacketPtr changed = in_decoding_order(*packet);
@@ -132,6 +152,11 @@ FramePtr LumaDecoder::as_grey(const AVFrame& frame) {
 }
 
 LumaDecoder::Result LumaDecoder::receive(Picture* picture) {
+  if (jpeg_) {
+    if (!decoded_) return Result::kNone;
+    *picture = *std::exchange(decoded_, std::nullopt);
+    return Result::kPicture;
+  }
   std::shared_ptr<AVFrame> frame(av_frame_alloc(), AvDeleter());
   const int code = avcodec_receive_frame(context_.get(), frame.get());
   if (code == AVERROR(EAGAIN) || code == AVERROR_EOF) {

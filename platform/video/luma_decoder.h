@@ -1,5 +1,6 @@
 #pragma once
-// LumaDecoder: compressed pictures in, 8-bit luma planes out, by libavcodec.
+// LumaDecoder: compressed pictures in, 8-bit luma planes out, by libavcodec; JPEG that comes live by jpeg_decoder.h, which leaves
+// the chroma alone: half of the time.
 //
 // The luma plane is the decoder's own plane 0 (grey, any 8-bit YUV 4xx, NV12), neither copied nor
 // converted; the picture's owner keeps it alive. Other pixel formats (RGB, palettes, more bits) become grey by
@@ -15,6 +16,7 @@
 
 #include "platform/video/av_handles.h"
 #include "platform/video/coded_picture.h"
+#include "platform/video/jpeg_decoder.h"
 #include "platform/video/picture.h"
 
 namespace alidade {
@@ -56,8 +58,10 @@ class LumaDecoder {
   [[nodiscard]] PacketPtr in_decoding_order(const AVPacket& packet) const;
   void begin(const AVPacket& packet);
 
-  CodecContextPtr context_;
-  ScalerPtr scaler_;  // made for the first picture that needs it
+  CodecContextPtr context_;          // null with jpeg_
+  std::optional<JpegDecoder> jpeg_;  // decodes in send()
+  std::optional<Picture> decoded_;   // by it, until receive()
+  ScalerPtr scaler_;                 // made for the first picture that needs it
   std::optional<CodedBy> coded_by_;
   bool low_delay_ = false;
   bool beginning_ = false;

@@ -154,14 +154,15 @@ TEST_P(PatientFrameSourceContract, StampsFramesAsTheyComeByTheHostsClock) {
   const double begin_s = monotonic_now_s();
   double first_s = 0;
   double last_s = begin_s;
-  for (int i = 0; i < 10; ++i) {
+  // One piece of a stream may hold two, and all that a busy machine has not read yet.
+  for (int i = 0; i < 10 || last_s == first_s; ++i) {
+    ASSERT_LT(i, 1000);
     ASSERT_EQ(read_until(source_, frame_, ReadStatus::kOk), ReadStatus::kOk) << source_.error();
-    EXPECT_GE(frame_.stamp.receive_time_s, last_s) << i;  // one piece of a stream may hold two
+    EXPECT_GE(frame_.stamp.receive_time_s, last_s) << i;
     EXPECT_LE(frame_.stamp.receive_time_s, monotonic_now_s());
     last_s = frame_.stamp.receive_time_s;
     first_s = i == 0 ? last_s : first_s;
   }
-  EXPECT_GT(last_s, first_s);
 }
 
 TEST_P(PatientFrameSourceContract, EndsAReadOfASilentCameraWhenAnotherThreadStopsIt) {
