@@ -80,7 +80,7 @@ struct RealtimeConfig {
   int priority = 0;       // SCHED_FIFO priority, see priority_of(); 0 leaves the scheduler alone
   int cpu = -1;           // -1: any
   bool lock_memory = false;
-  double max_extrapolation_s = 0.25;  // how far beyond the newest telemetry an angle is stated
+  double max_extrapolation_s = 0.25;  // how far beyond the newest trusted angle one is stated
 };
 
 struct OutputConfig {

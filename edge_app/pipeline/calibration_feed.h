@@ -40,7 +40,6 @@ struct FrameTracks {
   double delay_wander_s = 0;                     // by how much it was seen to wander
   bool telemetry_too_old = false;                // beyond max_extrapolation_s
   OeStatus oe_status = OeStatus::kNoPrediction;  // kOe
-  int looked_for = 0;                            // landmarks chosen, or points expected
   int count = 0;
   std::array<TrackedPoint, kMaxFramePoints> points;  // the first `count`
 };

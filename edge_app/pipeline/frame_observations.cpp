@@ -25,7 +25,6 @@ void add_landmark(const Vector2<double>& expected, const Vector2<double>& residu
 
 void get_tracks(const StartUpTracker& tracker, FrameTracks* tracks) {
   tracks->count = 0;
-  tracks->looked_for = tracker.statistics().looked_for;
   for (int i = 0; i < tracker.observation_count(); ++i) {
     const TrackObservation& point = tracker.observations()[i];
     add_track(point.landmark, point.u, point.sigma, tracks);
@@ -36,7 +35,6 @@ void get_tracks(const OeMode& mode, FrameTracks* tracks) {
   const OeStatistics& statistics = mode.statistics();
   tracks->count = 0;
   tracks->oe_status = statistics.status;
-  tracks->looked_for = statistics.chosen;
   for (int i = 0; statistics.status == OeStatus::kOk && i < statistics.found; ++i) {
     const OeObservation& landmark = mode.observations()[i];
     if (const auto sigma = track_sigma(landmark))

@@ -11,7 +11,7 @@
 
 namespace alidade {
 
-// Set points, their count, looked_for and oe_status; the rest stays. More than there is room for are left out.
+// Set points, their count and oe_status; the rest stays. More than there is room for are left out.
 void get_tracks(const StartUpTracker& tracker, FrameTracks* tracks);
 // Without an answer from landmarks (status not kOk) no points.
 void get_tracks(const OeMode& mode, FrameTracks* tracks);

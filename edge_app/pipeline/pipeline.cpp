@@ -369,9 +369,11 @@ void Pipeline::log_old_telemetry(const OrientationRecord& record) {
           : "";
   spdlog::warn(
       "{}: {} at frame {}: it lies {:.0f} ms beyond the newest angle that is trusted{}, and "
-      "realtime.max_extrapolation_s is {:.0f} ms; raise it to {:.2f}, or raise pan_tilt.rate_hz, "
-      "or "
-      "lower pan_tilt.max_repeat_s as far as `alidade check` allows",
+      "realtime.max_extrapolation_s is {:.0f} ms; raise it to {:.2f} or more if that does not "
+      "grow, or "
+      "raise pan_tilt.rate_hz, or lower pan_tilt.max_repeat_s as far as `alidade check` allows; "
+      "its "
+      "causes, by how telemetry_age_s moves: edge_app/config/README.md",
       pan_tilt_.name(), to_string(record.status), *record.frame, 1e3 * *record.telemetry_age_s,
       later, 1e3 * options_.step.telemetry_limits.max_extrapolation_s,
       kReserve * *record.telemetry_age_s + 0.005);

@@ -31,7 +31,7 @@ constexpr std::size_t kMaxAnswer = 512;  // bytes
 
 struct Query {
   std::string bytes;
-  bool paced = true;  // on the grid of polls; false: at once (what comes before the first poll)
+  bool paced = true;  // on the grid of polls; false: at once (before the first poll, and fences)
 };
 
 struct Answer {
@@ -47,8 +47,10 @@ struct Answer {
   Kind kind = Kind::kNone;
   double pan_deg = 0;
   double tilt_deg = 0;
-  double zoom = 0;        // device units, 0 to 65535
-  std::size_t begin = 0;  // index of the answer's first byte, below the number of bytes searched
+  double zoom = 0;  // device units, 0 to 65535
+  // Index of the answer's first byte, below the number of bytes searched. The interval in which the angle was true ends when
+  // that byte came: 0 is wrong behind noise.
+  std::size_t begin = 0;
   // What the device said, or what is wrong with what came: one line of less than 200 bytes. Never empty of kRefused.
   std::string problem;
 };
@@ -69,10 +71,11 @@ class QueryProtocol {
   // Bytes came that nobody asked for. Where it matters next() asks a fence, as also after every
   // kQueriesPerFence queries: one answer too many makes each answer that of the query before.
   virtual void doubt() = 0;
-  // Whether each datagram is to be searched alone (over UDP), not together with those before it.
+  // Over UDP: whether each datagram is a frame of its own (VISCA's header) and is to be searched alone; false for lines of text.
   [[nodiscard]] virtual bool is_of_datagrams() const = 0;
 
-  // Of one reading of pan and tilt: polls, and bytes of queries and answers together.
+  // Of one reading of pan and tilt: polls, and bytes of queries and answers together, the longest usual ones: at most a quarter
+  // more than a common position takes.
   [[nodiscard]] virtual int polls_per_reading() const = 0;
   [[nodiscard]] virtual int bytes_per_reading() const = 0;
 };

@@ -153,7 +153,6 @@ inline std::vector<Published> feed(SelfCalibration* calibration, const Simulatio
       if (tracks.count == kMaxFramePoints || (how.blurred && how.blurred(frame.stamp_s))) break;
       tracks.points[static_cast<std::size_t>(tracks.count++)] = point;
     }
-    tracks.looked_for = tracks.count;
     calibration->add(tracks);
     if (how.before_adjusting && calibration->due()) how.before_adjusting();
     if (auto news = calibration->work()) published.push_back({news, frame.stamp_s});

@@ -55,7 +55,7 @@ enum class PushStatus {
   kOutOfOrderStored,  // older than the newest, put in its place
   kStaleRepeat,       // the newest value again, too soon to mean that the mount stands still
   kDuplicateTime,     // there is a sample of this time; the first stays
-  kTooOld,            // older than everything in a full buffer
+  kOlderThanBuffer,   // older than everything in a full buffer
   kNotFinite          // a value is not finite, or the time's sigma is negative
 };
 
@@ -87,7 +87,7 @@ enum class QueryStatus {
     case QueryStatus::kBeforeTelemetry:
       return "older than the oldest telemetry sample";
     case QueryStatus::kTelemetryTooOld:
-      return "too far beyond the newest telemetry sample";
+      return "too far beyond the newest trusted angle of telemetry";
     case QueryStatus::kGap:
       return "in a gap of the telemetry";
     case QueryStatus::kNotFinite:
@@ -278,7 +278,7 @@ class TelemetryBuffer {
     while (place > 0 && knot(place - 1).time_s >= added.time_s) --place;
     if (knot(place).time_s == added.time_s) return PushStatus::kDuplicateTime;
     if (size_ == Capacity) {
-      if (place == 0) return PushStatus::kTooOld;
+      if (place == 0) return PushStatus::kOlderThanBuffer;
       ++first_;
       --place;
     } else {
@@ -307,7 +307,7 @@ class TelemetryBuffer {
         return counters_.stale_repeats;
       case PushStatus::kDuplicateTime:
         return counters_.duplicate_times;
-      case PushStatus::kTooOld:
+      case PushStatus::kOlderThanBuffer:
         return counters_.too_old;
       case PushStatus::kNotFinite:
         break;

@@ -32,7 +32,7 @@ struct Record {
   std::optional<double> time_s;
   double receive_time_s = 0;
   std::optional<double> latency_s;
-  std::optional<double> telemetry_age_s;  // how far the frame lies beyond the newest telemetry
+  std::optional<double> telemetry_age_s;  // how far it lies beyond the newest trusted angle
   std::optional<double> zoom;             // reading
   std::optional<double> zoom_rate_per_s;  // d log f / dt of a lens that is followed
   std::optional<double> zoom_rate_sigma_per_s;

@@ -179,7 +179,7 @@ TEST(TelemetryBuffer, KeepsTheNewestWhenFull) {
   for (int i = 0; i < 12; ++i) expect_stored(buffer, mount.at(0.04 * i));
   EXPECT_EQ(buffer.size(), 8U);
   EXPECT_EQ(buffer.newest_time(), 0.04 * 11);
-  EXPECT_EQ(buffer.push(mount.at(0.04 * 3)), PushStatus::kTooOld);
+  EXPECT_EQ(buffer.push(mount.at(0.04 * 3)), PushStatus::kOlderThanBuffer);
   EXPECT_EQ(buffer.counters().too_old, 1);
   InterpolatedPanTilt result;
   ASSERT_EQ(buffer.query(0.04 * 4, 0, &result), QueryStatus::kOk);
