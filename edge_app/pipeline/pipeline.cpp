@@ -373,7 +373,7 @@ void Pipeline::log_old_telemetry(const OrientationRecord& record) {
       "grow, or "
       "raise pan_tilt.rate_hz, or lower pan_tilt.max_repeat_s as far as `alidade check` allows; "
       "its "
-      "causes, by how telemetry_age_s moves: edge_app/config/README.md",
+      "causes, by how telemetry_age_s moves: README of edge_app/config",
       pan_tilt_.name(), to_string(record.status), *record.frame, 1e3 * *record.telemetry_age_s,
       later, 1e3 * options_.step.telemetry_limits.max_extrapolation_s,
       kReserve * *record.telemetry_age_s + 0.005);
