@@ -24,7 +24,7 @@ struct LandmarkStatistics {
 using LandmarkSensitivity = Matrix<float, 2, kParameterCount>;
 
 struct Landmark {
-  std::uint32_t id = 0;                          // never given twice
+  std::uint32_t id = 0;                          // never given twice by one map
   std::uint8_t octave = 0;                       // of the pyramid its image was taken from
   Vector3<double> d = Vector3<double>::UnitX();  // unit, in the map's frame
   // rad^2, of d in tangent_basis(d): its own part, independent of other landmarks' ...

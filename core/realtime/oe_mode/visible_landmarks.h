@@ -14,7 +14,7 @@ class ViewProjection;
 struct VisibleLandmark {
   int slot;           // of the map
   int octave;         // in which it is seen: the landmark's, but where the lens has zoomed
-  Vector2<double> u;  // px of the image, predicted, to a pixel or so
+  Vector2<double> u;  // px of the image, predicted, to a pixel or so; its patch is all in it
 };
 
 // By how many octaves a landmark is larger in an image of this focal length, px, than in the one that it was made of.
