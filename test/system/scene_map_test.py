@@ -156,6 +156,49 @@ class NoTelemetry(WithSceneMap):
         self.assertLess(rms(errors), 0.8e-3)
         self.assertLess(max(sigmas), 5)
 
+    def check(self, config, code):
+        """Text, JSON and errors of `alidade check`."""
+        text, as_json = (subprocess.run([ALIDADE, "check", "--duration", "2", "-c", config, *more], capture_output=True,
+                                        text=True, timeout=120) for more in ([], ["--json"]))
+        self.assertEqual((text.returncode, as_json.returncode), (code, code), text.stderr + as_json.stderr)
+        return text.stdout, json.loads(as_json.stdout), text.stderr
+
+    def test_check_tells_where_the_last_picture_looks_by_the_map(self):
+        scene_map = self.build_map()
+        # Rests where the map has been.
+        camera = self.camera(settings={
+            "image": {"width": 640, "height": 360, "rate_hz": 5},
+            "path": {"type": "triple_cosine", "amplitude": 0, "period_s": 6}, **CAMERA})
+        named = {"realtime": {"mode": "OE"}, "pan_tilt": self.NONE, "scene_map": {"file": str(scene_map)}}
+        text, report, _ = self.check(self.write_config(camera, **named), 0)
+        self.assertIn("none: no telemetry, by configuration", text)
+        self.assertIn("looks at     pan ", text)
+        self.assertIsNone(report["pan_tilt"])
+        self.assertIsNone(report["scene_map"]["error"])
+        last = report["scene_map"]["last"]
+        self.assertEqual(last["status"], "ok")
+        # The map's base rests on telemetry that errs by 0.2 mrad.
+        self.assertAlmostEqual(last["pan_rad"], 0, delta=0.8e-3)
+        self.assertAlmostEqual(last["tilt_rad"], 0, delta=0.8e-3)
+        self.assertLess(max(last["orientation_sigma_rad"]), 1e-3)
+
+        broken = self.folder / "broken.map"
+        broken.write_text("this is no map")
+        _, report, errors = self.check(self.write_config(camera, **{**named, "scene_map": {"file": str(broken)}}), 1)
+        self.assertIn("broken.map", report["scene_map"]["error"])
+        self.assertIsNone(report["scene_map"]["last"])
+        self.assertEqual(errors.count("alidade: scene map: "), 1)
+        camera.end(signal.SIGTERM)
+
+        elsewhere = self.camera(settings={
+            "image": {"width": 640, "height": 360, "rate_hz": 5}, "seed": 77,
+            "path": {"type": "triple_cosine", "amplitude": 0, "period_s": 6}, **CAMERA})
+        text, report, errors = self.check(self.write_config(elsewhere, **named), 1)
+        self.assertIn("is not localized: not in the map", text)
+        self.assertEqual(report["scene_map"]["last"]["status"], "not in the map")
+        self.assertIn("shows nothing that is in the map", errors)
+        elsewhere.end(signal.SIGTERM)
+
     def test_a_map_that_is_kept_up_outlives_a_kill(self):
         scene_map = self.build_map()
         before = scene_map.read_bytes()
