@@ -60,6 +60,7 @@ SceneLocalization::SceneLocalization(SceneMap map, const std::string& name,
   report_.name = name;
   report_.keyframes = static_cast<std::int64_t>(map_.keyframes.size());
   report_.landmarks = static_cast<std::int64_t>(map_.landmarks.size());
+  if (upkeep_.keeps_up()) report_.upkeep.emplace();
 }
 
 SceneLocalization::~SceneLocalization() = default;
@@ -97,6 +98,7 @@ void SceneLocalization::keep_up(const Localization& found, const FeatureSet& see
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   report_.landmarks = static_cast<std::int64_t>(map_.landmarks.size());
+  report_.upkeep = upkeep_.report();
 }
 
 SceneLocator::Outcome SceneLocalization::tell_whole(const LocalizableFrame& frame,

@@ -7,6 +7,7 @@ import subprocess
 import unittest
 import urllib.request
 
+from http_test import check
 from harness import ALIDADE, SIMULATE, SystemTest, Truth, rms, wait_until
 
 ZERO_RAD = 5e-3  # what telemetry's pan lacks
@@ -20,6 +21,14 @@ CAMERA = {
 
 
 class WithSceneMap(SystemTest):
+    def map_state(self, run):
+        """What /api/v1/map says, which is as it is described."""
+        address = run.error_text().partition("HTTP: listening on ")[2].split()[0]
+        with urllib.request.urlopen(address + "api/v1/map", timeout=30) as answer:
+            state = json.load(answer)
+        check(state, {"$ref": "#/components/schemas/SceneMap"})
+        return state
+
     def build_map(self):
         film = self.folder / "film.yaml"
         film.write_text(json.dumps({
@@ -49,9 +58,7 @@ class MovedZero(WithSceneMap):
             self.assertIsNotNone(line, run.error_text())
             records.append(json.loads(line))
             tied += records[-1]["localized"] is not None or records_after == 0
-        address = run.error_text().partition("HTTP: listening on ")[2].split()[0]
-        with urllib.request.urlopen(address + "api/v1/map", timeout=30) as answer:
-            state = json.load(answer)
+        state = self.map_state(run)
         code, _ = run.end(signal.SIGINT)
         self.assertEqual(code, 0, run.error_text())
         return run, records, state
@@ -78,6 +85,7 @@ class MovedZero(WithSceneMap):
         self.assertIn("corrected: directions are the map's", run.error_text())
         self.assertEqual(state["movements"], 1)
         self.assertFalse(state["uncorrected"])
+        self.assertIsNone(state["upkeep"])
         self.assertGreaterEqual(state["pictures"]["found"], 2)
         # Two thirds of a pixel: the map's own base rests on telemetry that errs by 0.2 mrad.
         self.assertAlmostEqual(state["moved"]["pan_rad"], ZERO_RAD, delta=0.8e-3)
@@ -206,7 +214,7 @@ class NoTelemetry(WithSceneMap):
             "image": {"width": 640, "height": 360, "rate_hz": 5},
             "path": {"type": "triple_cosine", "amplitude": 0.05, "period_s": 6}, **CAMERA})
         config = self.write_config(
-            camera, pan_tilt=self.NONE, realtime={"mode": "OE"}, output={"json": True},
+            camera, pan_tilt=self.NONE, realtime={"mode": "OE"}, output={"json": True, "http": "127.0.0.1:0"},
             scene_map={"file": str(scene_map), "interval_s": 0.5, "update": True})
         for held_for in (8, 17, 29):
             run = self.alidade("run", "-c", config)
@@ -215,6 +223,10 @@ class NoTelemetry(WithSceneMap):
                 line = run.line()
                 self.assertIsNotNone(line, run.error_text())
                 held += json.loads(line)["mode"] == "OE"
+            upkeep = self.map_state(run)["upkeep"]
+            self.assertGreaterEqual(upkeep["updated"], upkeep["updates"])
+            self.assertGreaterEqual(upkeep["updates"], 1)
+            self.assertFalse(upkeep["stopped"])
             run.end(signal.SIGKILL)
             self.assertNotIn("kept up any more", run.error_text())
             checked = subprocess.run([ALIDADE, "map", "check", scene_map], capture_output=True, text=True, timeout=60)
