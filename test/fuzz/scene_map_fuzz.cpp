@@ -7,13 +7,13 @@
 #include <array>
 #include <filesystem>
 #include <fstream>
-#include <iterator>
 #include <limits>
 #include <optional>
 #include <vector>
 
 #include "edge_app/storage/scene_map_file.h"
 #include "edge_app/storage/scene_map_rows.h"
+#include "platform/system/whole_file.h"
 #include "test/edge_app/changing_scene_map.h"
 #include "test/fuzz/fuzz_target.h"
 
@@ -53,8 +53,10 @@ const FuzzFolder& folder() {
 }
 
 std::string bytes_of_file(const std::string& path) {
-  std::ifstream in(path, std::ios::binary);
-  return {std::istreambuf_iterator<char>(in), {}};
+  std::string bytes;
+  std::string error;
+  FUZZ_REQUIRE(read_file(path, &bytes, &error));
+  return bytes;
 }
 
 // Without the log of a map that lay there before.
