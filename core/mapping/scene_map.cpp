@@ -39,13 +39,18 @@ bool is_covariance_matrix(const Matrix<double, kSize, kSize>& m) {
   return correlation.llt().info() == Eigen::Success;
 }
 
+// Ids are given one after the other, and never again: no map comes as far, and each has a next one.
+constexpr std::int64_t kMostId = std::int64_t{1} << 53;
+
+bool is_id(std::int64_t id) { return id >= 1 && id <= kMostId; }
+
 bool is_time(double utc_s) { return std::abs(utc_s) <= kMostUtc_s; }
 
 // A focal length between half a pixel and a kilometre of them.
 bool is_log_focal_length(double log_f) { return log_f > -1 && log_f < 21; }
 
 const char* flaw_of(const SceneKeyframe& k) {
-  if (k.id < 1) return "has an id below 1";
+  if (!is_id(k.id)) return "has an id out of range";
   if (k.recording.size() > SceneMap::kMostNameBytes) return "has too long a recording's name";
   if (k.frame < 0) return "has a negative frame number";
   if (!is_time(k.time_utc_s)) return "has a time that is none";
@@ -67,7 +72,7 @@ const char* flaw_of(const SceneKeyframe& k) {
 }
 
 const char* flaw_of(const SceneLandmark& l) {
-  if (l.id < 1) return "has an id below 1";
+  if (!is_id(l.id)) return "has an id out of range";
   if (!is_unit_vector(l.d_b)) return "has a direction that is no unit vector";
   if (!is_covariance_matrix(l.covariance) || !is_covariance_matrix(l.shared_covariance)) {
     return "has a covariance that is none";
@@ -210,6 +215,9 @@ bool is_valid(const SceneMap& map, std::string* error) {
   }
   const std::int64_t last = map.landmarks.empty() ? 0 : map.landmarks.back().id;
   if (map.next_landmark <= last) return refuse("a landmark's id would be given twice", error);
+  if (map.next_landmark > kMostId + 1) {
+    return refuse("there is no id left for a landmark", error);
+  }
   return true;
 }
 

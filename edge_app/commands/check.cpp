@@ -1,6 +1,6 @@
 // `alidade check`: is everything that `run` needs there, and does it do what `run` takes for granted? Reads the
-// configuration and the calibration, connects to video and pan/tilt at once, and measures both for some seconds
-// (check_measurement.h). What the samples show is found in check/; this file asks and prints. A report and advice go to
+// configuration and the calibration, connects to video and pan/tilt at once, measures both for some seconds
+// (check_measurement.h), and looks for the last picture in the scene map (check_scene.h). What the samples show is found in check/; this file asks and prints. A report and advice go to
 // stdout, what is wrong to stderr.
 
 #include <fmt/format.h>
@@ -21,6 +21,7 @@
 #include "edge_app/commands/check_measurement.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/lens_prior.h"
+#include "edge_app/commands/scene_loading.h"
 #include "edge_app/output/mqtt_connection.h"
 
 namespace alidade {
@@ -137,18 +138,22 @@ void add_connection(const Connection& connection, const char* what, Findings* fi
 }
 
 // The report and what would help on stdout; what is wrong on stderr.
-void print_report(const CheckReport& report, const VideoNeeds& video_needs, bool has_pan_tilt) {
+void print_report(const CheckReport& report, const VideoNeeds& video_needs) {
   const Measured& measured = report.measured;
   fmt::print("video          {}: {}\n", measured.video.name, headline(report.video, video_needs));
   print(describe(report.video));
   print(describe(measured.images));
   print(describe(report.repeats));
   fmt::print("pan/tilt       {}: {}\n", measured.pan_tilt.name,
-             has_pan_tilt ? headline(report.telemetry) : "the scene map tells where it looks");
+             report.has_telemetry ? headline(report.telemetry) : "no telemetry, by configuration");
   print(describe(report.telemetry));
   if (report.motion) {
     fmt::print("together\n");
     print(describe(*report.motion));
+  }
+  if (!report.scene.file.empty()) {
+    fmt::print("scene map      {}: {}\n", report.scene.file, headline(report.scene));
+    print(describe(report.scene));
   }
   if (!report.broker.empty())
     fmt::print("mqtt           {}: {}\n", report.broker,
@@ -194,6 +199,7 @@ int check_links(const CheckOptions& options) {
   const NamedCalibration calibration = choose_calibration(config);
   check_lens_prior(config, calibration.calibration.camera);
   static_cast<void>(require_plane(config));
+  require_followable_lens(config, options.config, calibration);
   if (!options.json) print_beginning(options.config, calibration);
 
   const Measured measured = measure(config, options.duration_s);
@@ -207,24 +213,27 @@ int check_links(const CheckOptions& options) {
       check_telemetry(measured.samples, measured.delivered_s, step.telemetry_clock,
                       telemetry_needs(measured, config, calibration, step));
 
-  CheckReport report{options.config, calibration, measured, video, telemetry, {}, {}, {}, {}, {}};
+  CheckReport report{
+      options.config, calibration, measured, video, telemetry, {}, {}, {}, {}, {}, {}, {}};
+  report.has_telemetry = has_telemetry(config);
   report.repeats =
       check_repeats(measured.frames, video.time_s, telemetry.fresh,
                     {measured.video.name, calibration.calibration.camera.focal_length});
   add_connection(measured.video, "video", &report.findings);
-  const bool has_pan_tilt = config.pan_tilt.type != PanTiltConfig::Type::kNone;
-  if (has_pan_tilt) add_connection(measured.pan_tilt, "pan/tilt", &report.findings);
+  if (report.has_telemetry) add_connection(measured.pan_tilt, "pan/tilt", &report.findings);
   const auto add = [&report](const Findings& more) {
     report.findings.insert(report.findings.end(), more.begin(), more.end());
   };
   add(video.findings);
   add(measured.images.findings);
   add(report.repeats.findings);
-  if (has_pan_tilt) add(telemetry.findings);
+  if (report.has_telemetry) add(telemetry.findings);
   if (measured.images.images > 1 && !telemetry.fresh.empty()) {
     report.motion = motion_of(measured, video, telemetry, config, calibration);
     add(report.motion->findings);
   }
+  report.scene = check_scene(config, calibration, measured);
+  add(report.scene.findings);
   if (config.mqtt) {
     report.broker = config.mqtt->name();
     report.broker_error = broker_error(*config.mqtt);
@@ -233,7 +242,7 @@ int check_links(const CheckOptions& options) {
   if (options.json) {
     std::fputs(check_json(report).c_str(), stdout);
   } else {
-    print_report(report, video_needs, has_pan_tilt);
+    print_report(report, video_needs);
   }
   for (const Finding& finding : report.findings) {
     if (finding.severity == Severity::kProblem) fmt::print(stderr, "alidade: {}\n", finding.text);

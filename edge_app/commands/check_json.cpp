@@ -4,6 +4,7 @@
 #include <cmath>
 #include <nlohmann/json.hpp>
 
+#include "edge_app/commands/localization_json.h"
 #include "edge_app/output/or_null.h"
 
 namespace alidade {
@@ -81,6 +82,7 @@ Json video_json(const CheckReport& report) {
 }
 
 Json pan_tilt_json(const CheckReport& report) {
+  if (!report.has_telemetry) return nullptr;
   const TelemetryReport& telemetry = report.telemetry;
   const bool any = telemetry.samples > 0;
   Json json = as_json(report.measured.pan_tilt);
@@ -107,6 +109,20 @@ Json motion_json(const std::optional<MotionReport>& motion) {
           {"clock_offset_s", or_null(motion->clock_offset_s)}};
 }
 
+Json scene_json(const SceneCheck& scene) {
+  if (scene.file.empty()) return nullptr;
+  Json json{{"file", scene.file},
+            {"error", scene.error.empty() ? Json() : Json(scene.error)},
+            {"keyframes", scene.found ? Json(scene.keyframes) : Json()},
+            {"landmarks", scene.found ? Json(scene.landmarks) : Json()},
+            {"last", nullptr}};
+  if (scene.found) {
+    json["last"]["frame"] = scene.frame;
+    add_localization(*scene.found, scene.mechanics, &json["last"]);
+  }
+  return json;
+}
+
 }  // namespace
 
 bool is_ok(const Findings& findings) {
@@ -127,6 +143,7 @@ std::string check_json(const CheckReport& report) {
   json["video"] = video_json(report);
   json["pan_tilt"] = pan_tilt_json(report);
   json["motion"] = motion_json(report.motion);
+  json["scene_map"] = scene_json(report.scene);
   json["mqtt"] = nullptr;
   if (!report.broker.empty()) {
     json["mqtt"] = {{"name", report.broker},

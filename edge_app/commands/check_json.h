@@ -10,6 +10,7 @@
 #include "edge_app/check/telemetry_check.h"
 #include "edge_app/check/video_check.h"
 #include "edge_app/commands/check_measurement.h"
+#include "edge_app/commands/check_scene.h"
 #include "edge_app/commands/command.h"
 
 namespace alidade {
@@ -22,9 +23,11 @@ struct CheckReport {
   const TelemetryReport& telemetry;
   RepeatReport repeats;
   std::optional<MotionReport> motion;  // where there are pictures and samples
-  std::string broker;                  // of MQTT; empty: none is configured
-  std::string broker_error;            // empty: it takes a connection
-  Findings findings;                   // of all of them
+  bool has_telemetry = true;           // by configuration
+  SceneCheck scene;
+  std::string broker;        // of MQTT; empty: none is configured
+  std::string broker_error;  // empty: it takes a connection
+  Findings findings;         // of all of them
 };
 
 // No finding is a problem.

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <chrono>
 #include <condition_variable>
@@ -94,6 +95,8 @@ class ImageThread {
     if (thread_.joinable()) thread_.join();
     return check_;
   }
+  // After finish().
+  [[nodiscard]] const std::optional<Frame>& last() const { return last_; }
 
  private:
   void work() {
@@ -111,6 +114,7 @@ class ImageThread {
       }
       check_.add(frame.stamp.frame, {frame.luma, frame.width, frame.height, frame.stride},
                  connected);
+      last_ = std::move(frame);
     }
   }
 
@@ -120,8 +124,26 @@ class ImageThread {
   bool restarted_ = false;        // guarded by mutex_: since the image last taken
   bool over_ = false;             // guarded by mutex_
   ImageCheck check_;              // the thread's until it is joined
+  std::optional<Frame> last_;     // so is this
   std::thread thread_;            // last: it uses the others
 };
+
+std::optional<LastPicture> last_picture(const std::optional<Frame>& frame,
+                                        const std::vector<CheckedFrame>& frames,
+                                        const std::vector<ImageShift>& shifts) {
+  if (!frame) return std::nullopt;
+  LastPicture last{*frame, {}};
+  if (shifts.empty() || shifts.back().to != frame->stamp.frame) return last;
+  const auto arrival_s = [&frames](std::int64_t number) {
+    const auto at = std::find_if(frames.begin(), frames.end(), [number](const CheckedFrame& f) {
+      return f.stamp.frame == number;
+    });
+    return at == frames.end() ? 0 : at->stamp.receive_time_s;
+  };
+  const double between_s = arrival_s(shifts.back().to) - arrival_s(shifts.back().from);
+  if (between_s > 0) last.shift_px_s = shifts.back().shift / between_s;
+  return last;
+}
 
 void show_progress(const std::future<void>& done, double duration_s) {
   const bool show = is_terminal(STDERR_FILENO);
@@ -165,6 +187,8 @@ Measured measure(const Config& config, double duration_s) {
         });
   });
   const std::future<void> samples = std::async(std::launch::async, [&] {
+    measured.pan_tilt.name = pan_tilt->name();
+    if (config.pan_tilt.type == PanTiltConfig::Type::kNone) return;
     measured.pan_tilt = collect<PanTiltSample>(
         *pan_tilt, config.pan_tilt.timeout_s + kConnectSlack_s, duration_s, &pan_tilt_waits,
         video_waits, [&](const PanTiltSample& sample) {
@@ -178,6 +202,7 @@ Measured measure(const Config& config, double duration_s) {
   show_progress(samples, duration_s);
   measured.counters = video->counters();
   measured.images = images.finish().report({measured.video.name, config.realtime.landmarks});
+  measured.last = last_picture(images.last(), measured.frames, measured.images.shifts);
   return measured;
 }
 

@@ -2,8 +2,9 @@
 // What `alidade check` collects from both links for some seconds.
 //
 // Threads: video and pan/tilt are read by one each; images are looked at by a third, which takes the latest when it is
-// done with the one before, so that looking never makes a source drop frames. No image is kept.
+// done with the one before, so that looking never makes a source drop frames. Of the images the last one is kept.
 
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -28,6 +29,13 @@ struct Connection {
   std::string name;
 };
 
+// The last image that was looked at.
+struct LastPicture {
+  Frame frame;
+  std::optional<Vector2<double>>
+      shift_px_s;  // of its centre, since the one before; none: not known
+};
+
 struct Measured {
   Connection video;
   Connection pan_tilt;
@@ -37,9 +45,10 @@ struct Measured {
   FrameSourceCounters counters;
   FrameSourceCounters counters_at_start;  // after the first kStart_s
   ImageReport images;
+  std::optional<LastPicture> last;
 };
 
-// Each stream for duration_s from its first item on. A video that waits for a key frame is waited for, which is said on
+// Each stream (no telemetry, by configuration, is none) for duration_s from its first item on. A video that waits for a key frame is waited for, which is said on
 // stderr; pan/tilt is read meanwhile. Shows its progress on a terminal.
 [[nodiscard]] Measured measure(const Config& config, double duration_s);
 

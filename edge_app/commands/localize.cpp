@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include <cmath>
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
@@ -11,8 +10,8 @@
 
 #include "core/mapping/localization.h"
 #include "core/mapping/map_building.h"
-#include "core/model/nearest_angles.h"
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/localization_json.h"
 #include "edge_app/commands/map_recording.h"
 #include "edge_app/storage/scene_map_file.h"
 #include "platform/video/picture_file.h"
@@ -27,25 +26,6 @@ void write_line(const ordered_json& json) {
   const std::string line = json.dump(-1, ' ', false, ordered_json::error_handler_t::replace) + "\n";
   std::fputs(line.c_str(), stdout);
   if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
-}
-
-void add_pose(const Localization& found, const Mechanics<double>& mechanics, ordered_json* json) {
-  (*json)["status"] = to_string(found.status);
-  (*json)["matches"] = found.matches;
-  if (found.status != LocalizationStatus::kOk) return;
-  const PicturePose& pose = found.pose;
-  const PanTilt<double> angle = nearest_angles(mechanics, pose.R_base_from_camera).angle;
-  const Eigen::Quaterniond q(pose.R_base_from_camera);
-  (*json)["pan_rad"] = angle.pan;
-  (*json)["tilt_rad"] = angle.tilt;
-  (*json)["q_base_from_camera"] = {q.x(), q.y(), q.z(), q.w()};
-  (*json)["orientation_sigma_rad"] = {std::sqrt(pose.covariance(0, 0)),
-                                      std::sqrt(pose.covariance(1, 1)),
-                                      std::sqrt(pose.covariance(2, 2))};
-  (*json)["focal_length_px"] = pose.camera.focal_length;
-  (*json)["focal_length_sigma_px"] = pose.camera.focal_length * std::sqrt(pose.covariance(3, 3));
-  (*json)["aspect"] = pose.camera.aspect;
-  (*json)["radial_distortion"] = pose.camera.radial_distortion;
 }
 
 class Asking {
@@ -66,9 +46,9 @@ class Asking {
     require_size(path, picture.width, picture.height);
     ordered_json json;
     json["picture"] = path;
-    add_pose(localizer_.find(features_of(
-                 detector_, {picture.luma, picture.width, picture.height, picture.stride})),
-             mechanics_, &json);
+    add_localization(localizer_.find(features_of(
+                         detector_, {picture.luma, picture.width, picture.height, picture.stride})),
+                     mechanics_, &json);
     write_line(json);
   }
 
@@ -110,7 +90,7 @@ class Asking {
       if (found.status != LocalizationStatus::kOk) {
         found = localizer_.find(features_of(detector_, image), hint);
       }
-      add_pose(found, mechanics_, &json);
+      add_localization(found, mechanics_, &json);
       write_line(json);
     });
   }

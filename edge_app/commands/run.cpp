@@ -14,8 +14,8 @@
 #include "edge_app/commands/live_targets.h"
 #include "edge_app/commands/run.h"
 #include "edge_app/commands/run_report.h"
+#include "edge_app/commands/scene_loading.h"
 #include "edge_app/commands/stop_signals.h"
-#include "edge_app/localization/scene_localization.h"
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/http_api.h"
 #include "edge_app/output/live_state.h"
@@ -25,7 +25,6 @@
 #include "edge_app/output/status_page.h"
 #include "edge_app/pipeline/pipeline.h"
 #include "edge_app/storage/calibration_store.h"
-#include "edge_app/storage/scene_map_file.h"
 #include "platform/system/clock.h"
 #include "platform/system/realtime.h"
 #include "platform/system/service_manager.h"
@@ -41,10 +40,6 @@ std::string describe(const RealtimeOptions& options) {
       options.lock_memory ? "locked" : "not locked");
 }
 
-bool has_telemetry(const Config& config) {
-  return config.pan_tilt.type != PanTiltConfig::Type::kNone;
-}
-
 PipelineOptions pipeline_options(const Config& config, const NamedCalibration& calibration) {
   PipelineOptions options;
   options.step = step_options(config, calibration);
@@ -57,51 +52,6 @@ PipelineOptions pipeline_options(const Config& config, const NamedCalibration& c
   options.calibration_name = calibration.name;
   options.measure_latency = !is_recording(config);
   return options;
-}
-
-// Null where none is configured, or none that could be used: records need none, and go on without, in telemetry's base. Where there
-// is no telemetry, it throws.
-std::unique_ptr<SceneLocalization> load_scene(const Config& config, const Camera<double>& camera) {
-  const SceneMapConfig& scene_map = config.scene_map;
-  if (scene_map.file.empty() || !config.realtime.landmarks) return nullptr;
-  SceneMap map;
-  std::string error;
-  const auto file = std::make_shared<SceneMapFile>();
-  const bool is_read = file->open(scene_map.file, &error) && file->read(&map, &error);
-  if (is_read && (map.lens.width() != camera.width || map.lens.height() != camera.height)) {
-    error = fmt::format(
-        "{} is of pictures of {}x{} px, but the camera's have {}x{} px; a map serves its own "
-        "camera and size: build one of its pictures",
-        scene_map.file, map.lens.width(), map.lens.height(), camera.width, camera.height);
-  }
-  if (!error.empty()) {
-    if (!has_telemetry(config)) {
-      throw CommandError(kExitUsage,
-                         fmt::format("scene map: {}; pan_tilt.type none needs one", error));
-    }
-    spdlog::error("scene map: {}; runs without it", error);
-    return nullptr;
-  }
-  spdlog::info("scene map: {}, {} keyframes, {} landmarks", scene_map.file, map.keyframes.size(),
-               map.landmarks.size());
-  StoreMapChange store;
-  if (scene_map.update) {
-    store = [file](const MapChange& change, std::string* why) { return file->update(change, why); };
-  }
-  return std::make_unique<SceneLocalization>(
-      std::move(map), scene_map.file,
-      BaseJudgeOptions{scene_map.zero_sigma_rad, scene_map.correct_moved_base},
-      has_telemetry(config), std::move(store));
-}
-
-// Without telemetry one lens is followed: that of a calibration at one zoom.
-void check_lens(const std::string& file, const NamedCalibration& calibration) {
-  if (calibration.zoom_curve.empty()) return;
-  throw CommandError(
-      kExitUsage,
-      fmt::format("{}: {} is for a lens that zooms, but with pan_tilt.type none nobody reads the "
-                  "zoom; name a calibration of one zoom, and leave the lens there",
-                  file, calibration.name));
 }
 
 // Null where none is configured.
@@ -159,7 +109,7 @@ int run_live(const RunOptions& options) {
   } else {
     calibration = choose_calibration(config);
   }
-  if (!has_telemetry(config)) check_lens(options.config, calibration);
+  require_followable_lens(config, options.config, calibration);
   spdlog::info("calibration: {}", calibration.name);
   PipelineOptions of_pipeline = pipeline_options(config, calibration);
   of_pipeline.step.map = std::move(map);

@@ -7,21 +7,13 @@
 #include <cmath>
 #include <utility>
 
-#include "core/mapping/features.h"
 #include "core/model/rotation.h"
 #include "platform/system/clock.h"
 
 namespace alidade {
 namespace {
 
-// What is not known of a frame's lens beside its record's own sigma: of log f.
-constexpr double kFocalLengthSigma = 5e-3;
 constexpr double kMilli = 1e3;
-
-FocalLengthPrior focal_length_of(const Calibration& calibration) {
-  return {std::log(calibration.camera.focal_length),
-          std::hypot(kFocalLengthSigma, relative_focal_length_sigma(calibration))};
-}
 
 // Of a frame of which nobody knows where it looks.
 LocalizationHint hint_of(const LocalizableFrame& frame) {
@@ -56,33 +48,6 @@ std::string describe(const BaseOffset& offset) {
 
 }  // namespace
 
-class SceneLocalization::Searcher {
- public:
-  explicit Searcher(const SceneMap& map)
-      : localizer_(map),
-        quick_(localization_features(true)),
-        thorough_(localization_features(false)) {}
-
-  // *seen: what it was found by.
-  [[nodiscard]] Localization find(const ImageView& image, const LocalizationHint& hint,
-                                  FeatureSet* seen) const {
-    *seen = features(quick_, image);
-    const Localization found = localizer_.find(*seen, hint);
-    if (found.status == LocalizationStatus::kOk) return found;
-    *seen = features(thorough_, image);
-    return localizer_.find(*seen, hint);
-  }
-
- private:
-  static FeatureSet features(const FeatureDetector& detector, const ImageView& image) {
-    return detector.find(image.luma, image.width, image.height, image.stride);
-  }
-
-  Localizer localizer_;
-  FeatureDetector quick_;
-  FeatureDetector thorough_;
-};
-
 SceneLocalization::SceneLocalization(SceneMap map, const std::string& name,
                                      const BaseJudgeOptions& options, bool has_telemetry,
                                      StoreMapChange store)
@@ -95,12 +60,13 @@ SceneLocalization::SceneLocalization(SceneMap map, const std::string& name,
   report_.name = name;
   report_.keyframes = static_cast<std::int64_t>(map_.keyframes.size());
   report_.landmarks = static_cast<std::int64_t>(map_.landmarks.size());
+  if (upkeep_.keeps_up()) report_.upkeep.emplace();
 }
 
 SceneLocalization::~SceneLocalization() = default;
 
 void SceneLocalization::prepare() {
-  searcher_ = std::make_unique<const Searcher>(map_);
+  searcher_ = std::make_unique<const SceneSearch>(map_);
   upkeep_.index_made();
   if (!upkeep_.keeps_up()) map_ = SceneMap();
   const std::lock_guard<std::mutex> lock(mutex_);
@@ -127,25 +93,20 @@ void SceneLocalization::keep_up(const Localization& found, const FeatureSet& see
   if (!upkeep_.keeps_up()) return;
   upkeep_.show(found, seen, hint, utc_now_s(), &map_);
   if (upkeep_.is_due()) {
-    searcher_ = std::make_unique<const Searcher>(map_);
+    searcher_ = std::make_unique<const SceneSearch>(map_);
     upkeep_.index_made();
   }
   const std::lock_guard<std::mutex> lock(mutex_);
   report_.landmarks = static_cast<std::int64_t>(map_.landmarks.size());
+  report_.upkeep = upkeep_.report();
 }
 
 SceneLocator::Outcome SceneLocalization::tell_whole(const LocalizableFrame& frame,
                                                     const Localization& found, ToldBase* told) {
   const Calibration calibration = unpack(frame.record.camera);
-  const FocalLengthPrior prior = focal_length_of(calibration);
-  constexpr double kExcluded = 4;  // standard deviations
-  if (!(std::abs(found.pose.log_f - prior.log_f) < kExcluded * prior.sigma)) {
-    if (!std::exchange(is_zoom_said_, true)) {
-      spdlog::warn(
-          "scene map: frame {} was taken with a focal length of {:.0f} px, but the calibration is "
-          "for {:.0f} px; without telemetry the lens stays at one zoom: put it back there",
-          told->frame, std::exp(found.pose.log_f), calibration.camera.focal_length);
-    }
+  const std::string other = another_zoom(found, calibration, fmt::format("frame {}", told->frame));
+  if (!other.empty()) {
+    if (!std::exchange(is_zoom_said_, true)) spdlog::warn("scene map: {}", other);
     return Outcome::kNotFound;
   }
   is_zoom_said_ = false;

@@ -12,6 +12,7 @@
 
 #include "core/mapping/scene_map.h"
 #include "edge_app/localization/base_judge.h"
+#include "edge_app/localization/scene_search.h"
 #include "edge_app/localization/scene_upkeep.h"
 #include "edge_app/pipeline/scene_report.h"
 #include "edge_app/pipeline/scene_tap.h"
@@ -32,7 +33,6 @@ class SceneLocalization : public SceneLocator {
   [[nodiscard]] SceneReport report() const;
 
  private:
-  class Searcher;
   [[nodiscard]] Outcome judge(const LocalizableFrame& frame, const Localization& found,
                               ToldBase* told);
   void keep_up(const Localization& found, const FeatureSet& seen, const LocalizationHint& hint);
@@ -47,7 +47,7 @@ class SceneLocalization : public SceneLocator {
   bool is_start_said_ = false;
   SceneMap map_;
   const double reference_row_;
-  std::unique_ptr<const Searcher> searcher_;
+  std::unique_ptr<const SceneSearch> searcher_;
   BaseJudge judge_;
   SceneUpkeep upkeep_;
 

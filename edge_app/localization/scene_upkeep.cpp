@@ -19,20 +19,30 @@ void SceneUpkeep::show(const Localization& found, const FeatureSet& features,
   for (const LocalizedFeature& m : found.matched) {
     if (landmark_index(*map, m.landmark) >= 0) view.matches.push_back({m.feature, m.landmark});
   }
-  const MapChange change = upkeep_.show(view, *map);
+  UpkeepCounts counts;
+  const MapChange change = upkeep_.show(view, *map, &counts);
+  ++report_.pictures;
+  report_.expected += counts.expected;
+  report_.beyond_gate += counts.beyond_gate;
+  report_.not_close += counts.not_close;
+  report_.hidden += counts.all_hidden ? 1 : 0;
   if (change.empty()) return;
   std::string error;
   if (!store_(change, &error) || !apply(change, map, &error)) {
     stop(error);
     return;
   }
-  ++updates_;
+  ++report_.updates;
+  report_.updated += counts.updated;
+  report_.born += static_cast<std::int64_t>(change.born.size());
+  report_.died += static_cast<std::int64_t>(change.died.size());
   changed_ += static_cast<int>(change.born.size() + change.died.size());
 }
 
 void SceneUpkeep::stop(const std::string& error) {
   spdlog::error("scene map: {}; it is not kept up any more until the next start", error);
   store_ = nullptr;
+  report_.stopped = true;
 }
 
 }  // namespace alidade

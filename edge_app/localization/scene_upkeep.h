@@ -11,6 +11,7 @@
 #include "core/mapping/localization.h"
 #include "core/mapping/map_change.h"
 #include "core/mapping/map_upkeep.h"
+#include "edge_app/pipeline/scene_report.h"
 
 namespace alidade {
 
@@ -31,7 +32,7 @@ class SceneUpkeep {
   [[nodiscard]] bool is_due() const { return changed_ >= kWorthAnIndex; }
   void index_made() { changed_ = 0; }
 
-  [[nodiscard]] std::int64_t updates() const { return updates_; }
+  [[nodiscard]] const UpkeepReport& report() const { return report_; }
 
  private:
   static constexpr int kWorthAnIndex = 100;  // landmarks
@@ -41,7 +42,7 @@ class SceneUpkeep {
   StoreMapChange store_;
   LandmarkUpkeep upkeep_;
   int changed_ = 0;
-  std::int64_t updates_ = 0;
+  UpkeepReport report_;
 };
 
 }  // namespace alidade

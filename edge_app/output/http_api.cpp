@@ -332,6 +332,7 @@ ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
     out["stages_s"] = nullptr;
   }
   out["detectors"] = sources.detectors ? detectors_json(sources.detectors()) : Json();
+  out["scene_map"] = sources.scene ? scene_json(sources.scene(), now_s) : Json();
   out["page_faults"] = {{"minor", summary.page_faults.minor}, {"major", summary.page_faults.major}};
   Json clients = Json::array();
   for (const ReaderCounters& reader : sources.live->readers())

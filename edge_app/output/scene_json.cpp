@@ -30,6 +30,20 @@ Json last_json(const std::optional<SceneReport::Last>& last, double now_s) {
           {"sigma_rad", std::move(sigmas)}};
 }
 
+Json upkeep_json(const std::optional<UpkeepReport>& upkeep) {
+  if (!upkeep) return nullptr;
+  return {{"pictures", upkeep->pictures},
+          {"updates", upkeep->updates},
+          {"expected", upkeep->expected},
+          {"updated", upkeep->updated},
+          {"beyond_gate", upkeep->beyond_gate},
+          {"born", upkeep->born},
+          {"died", upkeep->died},
+          {"not_close", upkeep->not_close},
+          {"hidden", upkeep->hidden},
+          {"stopped", upkeep->stopped}};
+}
+
 }  // namespace
 
 Json scene_json(const SceneReport& report, double now_s) {
@@ -48,7 +62,8 @@ Json scene_json(const SceneReport& report, double now_s) {
           {"offset", offset_json(report.offset)},
           {"movements", report.movements},
           {"moved", offset_json(report.moved)},
-          {"uncorrected", report.uncorrected}};
+          {"uncorrected", report.uncorrected},
+          {"upkeep", upkeep_json(report.upkeep)}};
 }
 
 }  // namespace alidade

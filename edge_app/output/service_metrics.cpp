@@ -114,6 +114,27 @@ void add_record_metrics(const OrientationRecord& newest, MetricsText* out) {
   }
 }
 
+void add_upkeep_metrics(const UpkeepReport& upkeep, MetricsText* out) {
+  out->counter("alidade_scene_map_updates_total",
+               "Updates of the scene map on disk, one transaction each");
+  out->add(upkeep.updates);
+  out->gauge("alidade_scene_map_upkeep_stopped", "1: the scene map's file took nothing more");
+  out->add(std::int64_t{upkeep.stopped});
+  out->counter("alidade_scene_map_upkeep_landmarks_total",
+               "Landmarks by what keeping the map up did with them");
+  out->add(upkeep.expected, {{"what", "expected"}});
+  out->add(upkeep.updated, {{"what", "updated"}});
+  out->add(upkeep.beyond_gate, {{"what", "beyond_gate"}});
+  out->add(upkeep.born, {{"what", "born"}});
+  out->add(upkeep.died, {{"what", "died"}});
+  out->add(upkeep.not_close, {{"what", "not_close"}});
+  out->counter("alidade_scene_map_upkeep_pictures_total",
+               "Pictures that the map was kept up by, and those in which too little was found to "
+               "blame a landmark");
+  out->add(upkeep.pictures - upkeep.hidden, {{"what", "seen"}});
+  out->add(upkeep.hidden, {{"what", "hidden"}});
+}
+
 void add_scene_metrics(const SceneReport& report, double now_s, MetricsText* out) {
   out->gauge("alidade_scene_map_landmarks", "Landmarks of the scene map in use");
   out->add(report.landmarks);
@@ -133,6 +154,7 @@ void add_scene_metrics(const SceneReport& report, double now_s, MetricsText* out
     out->gauge("alidade_scene_map_last_age_seconds", "Since the last picture was looked for");
     out->add(now_s - report.last->finished_s);
   }
+  if (report.upkeep) add_upkeep_metrics(*report.upkeep, out);
   if (!report.offset) return;
   out->gauge("alidade_scene_map_telemetry_offset_radians",
              "What telemetry's true angles lack in the map's base");

@@ -19,6 +19,20 @@ struct BaseOffset {
       0;  // rad, about the optical axis: a base that has tilted; no correction of angles makes up for it
 };
 
+// What keeping the map up has done since the start (core/mapping/map_upkeep.h).
+struct UpkeepReport {
+  std::int64_t pictures = 0;     // that were shown to it
+  std::int64_t updates = 0;      // of the file, one transaction each
+  std::int64_t expected = 0;     // landmarks that should be found in them
+  std::int64_t updated = 0;      // and were, and moved by it
+  std::int64_t beyond_gate = 0;  // found, but too far off
+  std::int64_t born = 0;
+  std::int64_t died = 0;
+  std::int64_t not_close = 0;  // not born: too far from all others
+  std::int64_t hidden = 0;     // pictures in which too little was found to blame a landmark
+  bool stopped = false;        // the file took nothing more
+};
+
 struct SceneReport {
   struct Last {
     std::int64_t frame = 0;
@@ -40,10 +54,11 @@ struct SceneReport {
   std::int64_t ambiguous = 0;
   std::int64_t unusable = 0;
   std::optional<Last> last;
-  std::optional<BaseOffset> offset;  // by the last one found
-  std::int64_t movements = 0;        // of base or zero, said by two pictures
-  std::optional<BaseOffset> moved;   // the last of them
-  bool uncorrected = false;          // it is reported only, and lasts
+  std::optional<BaseOffset> offset;    // by the last one found
+  std::int64_t movements = 0;          // of base or zero, said by two pictures
+  std::optional<BaseOffset> moved;     // the last of them
+  bool uncorrected = false;            // it is reported only, and lasts
+  std::optional<UpkeepReport> upkeep;  // none: the map is not to be kept up
 };
 
 }  // namespace alidade

@@ -8,6 +8,13 @@
 
 namespace alidade {
 
+namespace {
+
+// No file comes as far, and each has a next one.
+constexpr std::int64_t kMostRevision = std::int64_t{1} << 53;
+
+}  // namespace
+
 bool SceneMapFile::read_scene(SceneRow* scene, std::string* error) {
   SqliteStatement select(&database_, "SELECT * FROM scene");
   std::int64_t id = 0, sum = 0;
@@ -20,8 +27,10 @@ bool SceneMapFile::read_scene(SceneRow* scene, std::string* error) {
     fits = row.end(&sum) && !select.step();
   }
   if (database_.failed()) return refuse_failure(error);
-  if (!fits || found.has_mechanics < 0 || found.has_mechanics > 1)
+  if (!fits || found.has_mechanics < 0 || found.has_mechanics > 1 || found.revision < 0 ||
+      found.revision > kMostRevision) {
     return refuse(kSceneMapDamaged, error);
+  }
   const auto beyond = [&](const char* what, std::int64_t count, std::size_t most) {
     if (count >= 0 && static_cast<std::size_t>(count) <= most) return false;
     *error = path_ + ": has " + std::to_string(count) + " " + what + ", at most " +
@@ -145,7 +154,11 @@ bool SceneMapFile::read(SceneMap* map, std::string* error, bool with_pictures) {
       !read_landmarks(&row_sum, &found, error)) {
     return false;
   }
-  if (row_sum != scene.row_sum ||
+  std::int64_t sightings = 0;
+  for (const SceneLandmark& landmark : found.landmarks) {
+    sightings += static_cast<std::int64_t>(landmark.sightings.size());
+  }
+  if (row_sum != scene.row_sum || sightings != scene.sightings ||
       static_cast<std::int64_t>(found.keyframes.size()) != scene.keyframes ||
       static_cast<std::int64_t>(found.landmarks.size()) != scene.landmarks) {
     return refuse(kSceneMapDamaged, error);

@@ -1,6 +1,6 @@
 #pragma once
 // A map built of pictures of the virtual camera (rendered_stills.h), and where random views look by it, against truth.
-//   map        65 stills at five focal lengths from 1250 to 20,000 px; readings by a data sheet that is 1 % wrong, telemetry with noise
+//   map        65 stills (or more) at five focal lengths from 1250 to 20,000 px; readings by a data sheet that is 1 % wrong, telemetry with noise
 //              and backlash, nothing of distortion and centre
 //   views      anywhere and at any zoom inside the map, three octaves of light, a fifth of each hidden
 //   refused    views of another scene, of nothing, of fog
@@ -17,6 +17,7 @@ namespace alidade::test {
 struct MapPicturesOptions {
   std::uint64_t seed = 1;
   int views = 100;
+  int columns = 5;  // of the map's views at each focal length: 5 * (3 columns - 2) pictures
   std::filesystem::path cache = std::filesystem::temp_directory_path() / "alidade-stills";
   bool telemetry = true;      // of the map's pictures
   double angle_noise = 1e-4;  // rad

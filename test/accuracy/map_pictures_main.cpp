@@ -13,6 +13,8 @@ int main(int argc, char** argv) {
   alidade::test::MapPicturesOptions options;
   app.add_option("--seed", options.seed, "of scene, lens and noise");
   app.add_option("--views", options.views, "that are localized")->check(CLI::NonNegativeNumber);
+  app.add_option("--columns", options.columns, "of the map's views at each of five focal lengths")
+      ->check(CLI::Range(5, 8));
   app.add_option("--cache", options.cache, "folder that keeps what was rendered");
   app.add_flag("!--no-telemetry", options.telemetry, "the map's pictures have none");
   try {

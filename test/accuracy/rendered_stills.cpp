@@ -140,19 +140,18 @@ simulator::Lens RenderedStills::lens(int i) const { return camera_->lens_at(time
 
 double RenderedStills::zoom_reading(int i) const { return camera_->zoom()->reported(time_of(i)); }
 
-std::vector<StillView> map_views() {
+std::vector<StillView> map_views(int columns) {
   std::vector<StillView> views;
   for (int level = 0; level < kStillLevels; ++level) {
     const double f = kWidestFocalLength_px * std::pow(2, level);
     const double across = 2 * std::atan(kWidth / (2 * f));
     const double down = 2 * std::atan(kHeight / (2 * f));
     for (int row = -1; row <= 1; ++row) {
-      const int columns = row == 0 ? 5 : 4;
-      for (int column = 0; column < columns; ++column) {
+      const int in_row = row == 0 ? columns : columns - 1;
+      for (int column = 0; column < in_row; ++column) {
         // No two of a level at the same: the lens comes to rest anew for each.
         const double off = 1 + 0.004 * (static_cast<double>(views.size() % 3) - 1);
-        views.push_back(
-            {0.3 * across * (column - (columns - 1) / 2.0), 0.35 * down * row, f * off});
+        views.push_back({0.3 * across * (column - (in_row - 1) / 2.0), 0.35 * down * row, f * off});
       }
     }
   }

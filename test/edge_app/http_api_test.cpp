@@ -204,6 +204,8 @@ TEST_F(HttpApiWithSceneMapTest, TellsWhatLocalizationHasDone) {
   EXPECT_FALSE(told["ready"].get<bool>());
   EXPECT_TRUE(told["last"].is_null());
   EXPECT_TRUE(told["offset"].is_null());
+  EXPECT_TRUE(told["upkeep"].is_null());
+  EXPECT_THAT(get("/metrics"), Not(HasSubstr("upkeep")));
   report_.ready = true;
   report_.pictures = 5;
   report_.found = 3;
@@ -214,6 +216,7 @@ TEST_F(HttpApiWithSceneMapTest, TellsWhatLocalizationHasDone) {
   report_.moved = report_.offset;
   report_.movements = 1;
   report_.uncorrected = true;
+  report_.upkeep = UpkeepReport{9, 8, 700, 600, 5, 40, 30, 3, 2, true};
   told = body_of(get("/api/v1/map"));
   EXPECT_EQ(told["pictures"]["found"], 3);
   EXPECT_EQ(told["pictures"]["ambiguous"], 2);
@@ -224,7 +227,14 @@ TEST_F(HttpApiWithSceneMapTest, TellsWhatLocalizationHasDone) {
   EXPECT_EQ(told["offset"]["sigma_rad"][0], 1e-4);
   EXPECT_EQ(told["moved"]["roll_rad"], 2e-4);
   EXPECT_TRUE(told["uncorrected"].get<bool>());
+  EXPECT_EQ(told["upkeep"], json::parse(R"({"pictures": 9, "updates": 8, "expected": 700,
+    "updated": 600, "beyond_gate": 5, "born": 40, "died": 30, "not_close": 3, "hidden": 2,
+    "stopped": true})"));
+  EXPECT_EQ(body_of(get("/api/v1/status"))["scene_map"]["upkeep"], told["upkeep"]);
   const std::string metrics = get("/metrics");
+  EXPECT_THAT(metrics, HasSubstr("\nalidade_scene_map_upkeep_landmarks_total{what=\"born\"} 40\n"));
+  EXPECT_THAT(metrics, HasSubstr("\nalidade_scene_map_upkeep_pictures_total{what=\"seen\"} 7\n"));
+  EXPECT_THAT(metrics, HasSubstr("\nalidade_scene_map_updates_total 8\n"));
   EXPECT_THAT(metrics,
               HasSubstr("\nalidade_scene_map_telemetry_offset_radians{axis=\"pan\"} 0.005\n"));
   EXPECT_THAT(metrics,

@@ -131,6 +131,35 @@ TEST_F(MapCommands, LocalizeTakesPictures) {
   EXPECT_EQ(lines_of(result.output).at(0)["status"], "ok");
 }
 
+// A recording has its telemetry: test/system/scene_map_test.py is without.
+TEST_F(MapCommands, CheckOfLinksLooksForTheLastPicture) {
+  const std::string config =
+      "video: {type: recording, directory: walk}\n"
+      "pan_tilt: {type: recording, directory: walk}\n"
+      "calibration: {file: walk/truth.yaml}\n";
+  const auto check = [&](const std::string& map) {
+    return nlohmann::json::parse(
+        alidade({"check", "--json", "--duration", "2", "-c",
+                 directory_->write("check.yaml", config + "scene_map: {file: " + map + "}\n")})
+            .output);
+  };
+  const auto json = check("scene.map");
+  EXPECT_TRUE(json["scene_map"]["error"].is_null());
+  const auto& last = json["scene_map"]["last"];
+  ASSERT_EQ(last["status"], "ok") << json;
+  const auto truth = read_csv(directory_->read("walk/truth.csv"));
+  const auto& row = truth.at(last["frame"].get<std::size_t>());
+  // The map's base is telemetry's, to its 0.2 mrad; f to 0.2 %.
+  EXPECT_NEAR(last["pan_rad"].get<double>(), std::stod(row.at("pan_rad")), 1e-3);
+  EXPECT_NEAR(last["tilt_rad"].get<double>(), std::stod(row.at("tilt_rad")), 1e-3);
+  EXPECT_NEAR(last["focal_length_px"].get<double>(), 800, 2);
+
+  const auto without = check("none.map");
+  EXPECT_EQ(without["ok"], false);
+  EXPECT_THAT(without["scene_map"]["error"].get<std::string>(), HasSubstr("there is no such file"));
+  EXPECT_TRUE(without["scene_map"]["last"].is_null());
+}
+
 TEST_F(MapCommands, BuildAddsWhatIsNewToAMap) {
   std::string further = walking_camera(kMapTexture);
   further.replace(further.find("period_s: 40"), 12, "period_s: 40, pan_deg: 35");

@@ -7,6 +7,7 @@
 #include <sys/resource.h>
 
 #include <filesystem>
+#include <limits>
 
 #include "test/edge_app/changing_scene_map.h"
 #include "test/support/temporary_directory.h"
@@ -252,6 +253,23 @@ TEST_F(SceneMapFileTest, RefusesMoreThanIsAllowed) {
   expect_refused("columns, at most");
   forge([](SceneRow* scene) { scene->width = 1280, scene->lens_points = 2'000'000'000; });
   expect_refused("points of the lens, at most");
+}
+
+// Else an update would take them for true, and write on from there.
+TEST_F(SceneMapFileTest, RefusesCountsThatDoNotCount) {
+  const SceneMap map = save(map_before_changes());
+  std::int64_t sightings = 0;
+  for (const SceneLandmark& landmark : map.landmarks) {
+    sightings += static_cast<std::int64_t>(landmark.sightings.size());
+  }
+  forge([](SceneRow* scene) { scene->sightings -= 1; });
+  expect_refused("damaged");
+  forge([&](SceneRow* scene) {
+    EXPECT_EQ(scene->sightings, sightings - 1);
+    scene->sightings = sightings;
+    scene->revision = std::numeric_limits<std::int64_t>::max();
+  });
+  expect_refused("damaged");
 }
 
 TEST_F(SceneMapFileTest, RefusesARowThatWasChangedOrLost) {

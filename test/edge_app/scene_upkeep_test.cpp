@@ -69,7 +69,11 @@ TEST_F(SceneUpkeepTest, IsOnDiskWhenItReturns) {
       [&](const MapChange& change, std::string* why) { return file.update(change, why); });
   for (int view = 1; view <= 3; ++view) {
     upkeep.show(found_, seen_, {}, kNow_utc_s + view, &map_);
-    EXPECT_EQ(upkeep.updates(), view);
+    EXPECT_EQ(upkeep.report().pictures, view);
+    EXPECT_EQ(upkeep.report().updates, view);
+    // All 40 are in view, and one was not found.
+    EXPECT_EQ(upkeep.report().expected, 40 * view);
+    EXPECT_EQ(upkeep.report().updated, 39 * view);
     SceneMap stored;  // as another process reads it, whatever becomes of this one
     ASSERT_TRUE(load_scene_map(path, &stored, &error)) << error;
     ASSERT_EQ(stored.landmarks.size(), map_.landmarks.size());
@@ -78,6 +82,26 @@ TEST_F(SceneUpkeepTest, IsOnDiskWhenItReturns) {
     EXPECT_EQ(stored.landmarks.back().life.matched, 0U);
     EXPECT_LT(stored.landmarks.front().covariance.trace(), 2e-8);
   }
+}
+
+// What stays where no landmark is, close to those that are, is one after 20 pictures; what is missed for days is none.
+TEST_F(SceneUpkeepTest, TellsBirthsAndDeaths) {
+  SceneUpkeep upkeep([](const MapChange&, std::string*) { return true; });
+  found_.matched.pop_back();
+  Feature feature;
+  feature.scale = 3;
+  feature.u = {640, 360};
+  seen_.features.push_back(feature);
+  Descriptor descriptor{};
+  descriptor.fill(90);
+  seen_.descriptors.push_back(descriptor);
+  constexpr double kDay_s = 86400;
+  for (int view = 0; view < 25; ++view) {
+    upkeep.show(found_, seen_, {}, kNow_utc_s + 0.5 * kDay_s * view, &map_);
+  }
+  EXPECT_EQ(upkeep.report().born, 1);
+  EXPECT_EQ(upkeep.report().died, 1);
+  EXPECT_EQ(upkeep.report().hidden, 0);
 }
 
 TEST_F(SceneUpkeepTest, EndsWhereTheDiskTakesNothing) {
@@ -91,7 +115,9 @@ TEST_F(SceneUpkeepTest, EndsWhereTheDiskTakesNothing) {
   upkeep.show(found_, seen_, {}, kNow_utc_s + 1, &map_);
   EXPECT_FALSE(upkeep.keeps_up());
   EXPECT_EQ(asked, 1);
-  EXPECT_EQ(upkeep.updates(), 0);
+  EXPECT_EQ(upkeep.report().updates, 0);
+  EXPECT_EQ(upkeep.report().updated, 0);
+  EXPECT_TRUE(upkeep.report().stopped);
   EXPECT_EQ(map_.landmarks.front().life.matched, 0U);
 }
 

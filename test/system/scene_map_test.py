@@ -7,6 +7,7 @@ import subprocess
 import unittest
 import urllib.request
 
+from http_test import check
 from harness import ALIDADE, SIMULATE, SystemTest, Truth, rms, wait_until
 
 ZERO_RAD = 5e-3  # what telemetry's pan lacks
@@ -20,6 +21,14 @@ CAMERA = {
 
 
 class WithSceneMap(SystemTest):
+    def map_state(self, run):
+        """What /api/v1/map says, which is as it is described."""
+        address = run.error_text().partition("HTTP: listening on ")[2].split()[0]
+        with urllib.request.urlopen(address + "api/v1/map", timeout=30) as answer:
+            state = json.load(answer)
+        check(state, {"$ref": "#/components/schemas/SceneMap"})
+        return state
+
     def build_map(self):
         film = self.folder / "film.yaml"
         film.write_text(json.dumps({
@@ -49,9 +58,7 @@ class MovedZero(WithSceneMap):
             self.assertIsNotNone(line, run.error_text())
             records.append(json.loads(line))
             tied += records[-1]["localized"] is not None or records_after == 0
-        address = run.error_text().partition("HTTP: listening on ")[2].split()[0]
-        with urllib.request.urlopen(address + "api/v1/map", timeout=30) as answer:
-            state = json.load(answer)
+        state = self.map_state(run)
         code, _ = run.end(signal.SIGINT)
         self.assertEqual(code, 0, run.error_text())
         return run, records, state
@@ -78,6 +85,7 @@ class MovedZero(WithSceneMap):
         self.assertIn("corrected: directions are the map's", run.error_text())
         self.assertEqual(state["movements"], 1)
         self.assertFalse(state["uncorrected"])
+        self.assertIsNone(state["upkeep"])
         self.assertGreaterEqual(state["pictures"]["found"], 2)
         # Two thirds of a pixel: the map's own base rests on telemetry that errs by 0.2 mrad.
         self.assertAlmostEqual(state["moved"]["pan_rad"], ZERO_RAD, delta=0.8e-3)
@@ -156,6 +164,49 @@ class NoTelemetry(WithSceneMap):
         self.assertLess(rms(errors), 0.8e-3)
         self.assertLess(max(sigmas), 5)
 
+    def check(self, config, code):
+        """Text, JSON and errors of `alidade check`."""
+        text, as_json = (subprocess.run([ALIDADE, "check", "--duration", "2", "-c", config, *more], capture_output=True,
+                                        text=True, timeout=120) for more in ([], ["--json"]))
+        self.assertEqual((text.returncode, as_json.returncode), (code, code), text.stderr + as_json.stderr)
+        return text.stdout, json.loads(as_json.stdout), text.stderr
+
+    def test_check_tells_where_the_last_picture_looks_by_the_map(self):
+        scene_map = self.build_map()
+        # Rests where the map has been.
+        camera = self.camera(settings={
+            "image": {"width": 640, "height": 360, "rate_hz": 5},
+            "path": {"type": "triple_cosine", "amplitude": 0, "period_s": 6}, **CAMERA})
+        named = {"realtime": {"mode": "OE"}, "pan_tilt": self.NONE, "scene_map": {"file": str(scene_map)}}
+        text, report, _ = self.check(self.write_config(camera, **named), 0)
+        self.assertIn("none: no telemetry, by configuration", text)
+        self.assertIn("looks at     pan ", text)
+        self.assertIsNone(report["pan_tilt"])
+        self.assertIsNone(report["scene_map"]["error"])
+        last = report["scene_map"]["last"]
+        self.assertEqual(last["status"], "ok")
+        # The map's base rests on telemetry that errs by 0.2 mrad.
+        self.assertAlmostEqual(last["pan_rad"], 0, delta=0.8e-3)
+        self.assertAlmostEqual(last["tilt_rad"], 0, delta=0.8e-3)
+        self.assertLess(max(last["orientation_sigma_rad"]), 1e-3)
+
+        broken = self.folder / "broken.map"
+        broken.write_text("this is no map")
+        _, report, errors = self.check(self.write_config(camera, **{**named, "scene_map": {"file": str(broken)}}), 1)
+        self.assertIn("broken.map", report["scene_map"]["error"])
+        self.assertIsNone(report["scene_map"]["last"])
+        self.assertEqual(errors.count("alidade: scene map: "), 1)
+        camera.end(signal.SIGTERM)
+
+        elsewhere = self.camera(settings={
+            "image": {"width": 640, "height": 360, "rate_hz": 5}, "seed": 77,
+            "path": {"type": "triple_cosine", "amplitude": 0, "period_s": 6}, **CAMERA})
+        text, report, errors = self.check(self.write_config(elsewhere, **named), 1)
+        self.assertIn("is not localized: not in the map", text)
+        self.assertEqual(report["scene_map"]["last"]["status"], "not in the map")
+        self.assertIn("shows nothing that is in the map", errors)
+        elsewhere.end(signal.SIGTERM)
+
     def test_a_map_that_is_kept_up_outlives_a_kill(self):
         scene_map = self.build_map()
         before = scene_map.read_bytes()
@@ -163,7 +214,7 @@ class NoTelemetry(WithSceneMap):
             "image": {"width": 640, "height": 360, "rate_hz": 5},
             "path": {"type": "triple_cosine", "amplitude": 0.05, "period_s": 6}, **CAMERA})
         config = self.write_config(
-            camera, pan_tilt=self.NONE, realtime={"mode": "OE"}, output={"json": True},
+            camera, pan_tilt=self.NONE, realtime={"mode": "OE"}, output={"json": True, "http": "127.0.0.1:0"},
             scene_map={"file": str(scene_map), "interval_s": 0.5, "update": True})
         for held_for in (8, 17, 29):
             run = self.alidade("run", "-c", config)
@@ -172,6 +223,10 @@ class NoTelemetry(WithSceneMap):
                 line = run.line()
                 self.assertIsNotNone(line, run.error_text())
                 held += json.loads(line)["mode"] == "OE"
+            upkeep = self.map_state(run)["upkeep"]
+            self.assertGreaterEqual(upkeep["updated"], upkeep["updates"])
+            self.assertGreaterEqual(upkeep["updates"], 1)
+            self.assertFalse(upkeep["stopped"])
             run.end(signal.SIGKILL)
             self.assertNotIn("kept up any more", run.error_text())
             checked = subprocess.run([ALIDADE, "map", "check", scene_map], capture_output=True, text=True, timeout=60)

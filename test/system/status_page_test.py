@@ -148,6 +148,16 @@ class StatusPage(SystemTest):
         self.wait_for_text("calibration", r"Focal length10669\.3\spx")
         self.wait_for_text("camera", r"rtsp://127\.0\.0\.1")
         self.wait_for_text("health", r"Frames[1-9]")
+        self.assertNotIn("Scene map", self.text("health"))
+        with urllib.request.urlopen(address + "api/v1/status", timeout=DEADLINE_S) as answer:
+            status = json.load(answer)
+        self.assertIsNone(status["scene_map"])
+        status["scene_map"] = {
+            "landmarks": 4901, "ready": True, "pictures": {"found": 34, "looked_at": 40},
+            "last": {"status": "not in the map", "age_s": 7}, "upkeep": {"born": 12, "died": 3, "stopped": False}}
+        health = self.browser.execute_script(
+            "showStatus(arguments[0]); return document.getElementById('health').textContent", status)
+        self.assertRegex(health, r"Scene map4901 landmarks; found in 34 of 40 pictures; last not in the map, 7 s ago; 12 born, 3 died")
 
         picture = self.browser.find_element(By.ID, "picture")
         clicked = self.direction_of(

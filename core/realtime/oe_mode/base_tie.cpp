@@ -1,5 +1,6 @@
 #include "core/realtime/oe_mode/base_tie.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include "core/realtime/oe_mode/covariance.h"
@@ -13,9 +14,26 @@ bool BaseTieOptions::validate(const char** error) const {
   return problem == nullptr;
 }
 
+Matrix2<double> difference_of_shared(const SharedByView& k, const SharedByView& t) {
+  // Where one lens sees less than the other, what it sees decides.
+  const Vector2<double> extent = k.extent.cwiseMin(t.extent);
+  double overlap = 1;
+  for (int axis = 0; axis < 2; ++axis) {
+    const double apart = std::abs(k.angle[axis] - t.angle[axis]);
+    overlap *= apart < extent[axis] ? 1 - apart / extent[axis] : 0;
+  }
+  Matrix2<double> out = k.covariance + t.covariance;
+  const Vector2<double> common = k.covariance.diagonal().cwiseMin(t.covariance.diagonal());
+  out.diagonal() -= 2 * overlap * common;
+  // What of the correlation of the axes is left is not known: as much as there may be.
+  const double most = std::sqrt(std::max(0.0, out(0, 0) * out(1, 1)));
+  out(0, 1) = out(1, 0) = std::clamp((1 - overlap) * out(0, 1), -most, most);
+  return out;
+}
+
 TiedOffset BaseTie::of_telemetry(const MapOffset& offset) const {
   if (!is_by_map_) return tied_;
-  return {tied_.value - offset.value, tied_.covariance + offset.covariance,
+  return {tied_.value - offset.value, tied_.covariance + shared_.covariance + offset.covariance,
           tied_.sensitivity - offset.sensitivity};
 }
 
@@ -27,12 +45,12 @@ void BaseTie::drift(double elapsed_s) {
 
 void BaseTie::note_telemetry(const Vector2<double>& added, const Matrix2<double>& covariance,
                              const Sensitivity<2>& sensitivity) {
-  last_ = {Answer::Kind::kTelemetry, {added, covariance, sensitivity}};
+  last_ = {Answer::Kind::kTelemetry, {added, covariance, sensitivity}, {}};
 }
 
 void BaseTie::note_landmarks(const Vector2<double>& added, const Matrix2<double>& covariance,
-                             const Sensitivity<2>& sensitivity) {
-  last_ = {Answer::Kind::kLandmarks, {added, covariance, sensitivity}};
+                             const SharedByView& shared, const Sensitivity<2>& sensitivity) {
+  last_ = {Answer::Kind::kLandmarks, {added, covariance, sensitivity}, shared};
 }
 
 bool BaseTie::ask() {
@@ -52,12 +70,13 @@ bool BaseTie::settle(const BaseMeasurement& measurement, const MapOffset& offset
                            -asked.added.sensitivity};
   const bool by_map = asked.kind == Answer::Kind::kLandmarks;
   if (is_tied_ && !measurement.moved) {
-    TiedOffset known = tied_;
-    if (by_map && !is_by_map_) known.covariance += offset.covariance;
-    if (!by_map) known = of_telemetry(offset);
-    if (told.covariance.trace() > known.covariance.trace()) return false;
+    // Of an answer in the view that was measured, but for its own noise.
+    Matrix2<double> known = of_telemetry(offset).covariance;
+    if (by_map) known = is_by_map_ ? covariance_in(asked.shared) : known + offset.covariance;
+    if (told.covariance.trace() > known.trace()) return false;
   }
   tied_ = told;
+  shared_ = asked.shared;
   is_tied_ = true;
   is_by_map_ = by_map;
   return true;
@@ -72,12 +91,14 @@ void BaseTie::move_map(const Vector2<double>& by) {
 
 void BaseTie::map_is_lost(const MapOffset& offset) {
   tied_ = of_telemetry(offset);
+  shared_ = {};
   is_by_map_ = false;
   for (Answer* answer : {&last_, &asked_}) {
     if (answer->kind != Answer::Kind::kLandmarks) continue;
     answer->kind = Answer::Kind::kTelemetry;
     answer->added.value -= offset.value;
-    answer->added.covariance += offset.covariance;
+    answer->added.covariance += answer->shared.covariance + offset.covariance;
+    answer->shared = {};
     answer->added.sensitivity += offset.sensitivity;
   }
 }

@@ -188,6 +188,7 @@ class OeMode {
   [[nodiscard]] TiedOffset offset_of_answer(const SolvedMotion& solved) const;
   [[nodiscard]] Matrix6 covariance_of_answer(const SolvedMotion& solved,
                                              const TiedOffset& added) const;
+  [[nodiscard]] SharedByView shared_by_view(const SolvedMotion& solved) const;
   void note_landmarks_answer(const SolvedMotion& solved, const TiedOffset& added);
   [[nodiscard]] bool tie_telemetry(FrameOrientation* out);
 

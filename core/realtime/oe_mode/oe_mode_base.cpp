@@ -12,12 +12,20 @@ TiedOffset OeMode::offset_of_answer(const SolvedMotion& solved) const {
           offset.sensitivity + solved.offset_correction_sensitivity + zero.sensitivity};
 }
 
+// frame_.motion: this frame's, in the map's frame.
+SharedByView OeMode::shared_by_view(const SolvedMotion& solved) const {
+  const Camera<double>& camera = calibration_.camera;
+  return {solved.shared_covariance,
+          frame_.motion.angle.vector(),
+          {camera.width / camera.focal_length, camera.height / camera.focal_length}};
+}
+
 // Where the map itself is tied, what telemetry does not know of its offset is of no matter.
 Matrix6 OeMode::covariance_of_answer(const SolvedMotion& solved, const TiedOffset& added) const {
   const bool by_map = tie_.is_by_map();
   Matrix6 covariance = by_map ? solved.frame_covariance : solved.covariance;
-  covariance.topLeftCorner<2, 2>() += added.covariance;
-  if (by_map) covariance.topLeftCorner<2, 2>() += solved.shared_covariance;
+  covariance.topLeftCorner<2, 2>() +=
+      by_map ? tie_.covariance_in(shared_by_view(solved)) : added.covariance;
   shear_.add_to(&covariance);
   return covariance;
 }
@@ -27,9 +35,8 @@ void OeMode::note_landmarks_answer(const SolvedMotion& solved, const TiedOffset&
   if (lens_is_learnt() && !tie_.is_by_map())
     value += solved.lens.value * solved.lens.offset_by_lens;
   tie_.note_landmarks(value,
-                      solved.frame_covariance.topLeftCorner<2, 2>() + solved.shared_covariance +
-                          shear_.angle_covariance(),
-                      solved.sensitivity.topRows<2>());
+                      solved.frame_covariance.topLeftCorner<2, 2>() + shear_.angle_covariance(),
+                      shared_by_view(solved), solved.sensitivity.topRows<2>());
 }
 
 bool OeMode::tie_telemetry(FrameOrientation* out) {

@@ -7,6 +7,7 @@
 #include <Eigen/LU>
 #include <cmath>
 #include <random>
+#include <vector>
 
 namespace alidade::test {
 namespace {
@@ -36,7 +37,7 @@ TEST(BaseTie, IsTelemetrysBaseUntilItIsTold) {
 TEST(BaseTie, AFrameOfLandmarksTiesTheMapWhateverTelemetrySaysOfIt) {
   BaseTie tie{BaseTieOptions{}};
   const MapOffset offset = offset_of({3e-3, -1e-3}, 1e-4);
-  tie.note_landmarks(offset.value, square(1e-6), Sensitivity<2>::Zero());
+  tie.note_landmarks(offset.value, square(1e-6), {}, Sensitivity<2>::Zero());
   ASSERT_TRUE(tie.ask());
   tie.note_nothing();
   ASSERT_TRUE(tie.settle(measured({5e-3, 2e-3}, 1e-5), offset));
@@ -54,7 +55,7 @@ TEST(BaseTie, ZeroRemainsWhenTheMapIsLostAlsoForWhoWasAskedBefore) {
   for (const bool lost_before_it_came : {false, true}) {
     BaseTie tie{BaseTieOptions{}};
     const MapOffset offset = offset_of({3e-3, -1e-3}, 1e-4);
-    tie.note_landmarks(offset.value, square(1e-6), Sensitivity<2>::Zero());
+    tie.note_landmarks(offset.value, square(1e-6), {}, Sensitivity<2>::Zero());
     ASSERT_TRUE(tie.ask());
     if (lost_before_it_came) tie.map_is_lost(offset);
     ASSERT_TRUE(tie.settle(measured({5e-3, 2e-3}, 1e-5), offset));
@@ -71,7 +72,7 @@ TEST(BaseTie, TheBetterKnownHoldsUntilItHasGrownOldOrTheBaseHasMoved) {
   options.drift = 1e-5;
   BaseTie tie(options);
   const auto tell = [&](double change, double sigma, bool moved) {
-    tie.note_landmarks(tie.of_map().value, square(1e-7), Sensitivity<2>::Zero());
+    tie.note_landmarks(tie.of_map().value, square(1e-7), {}, Sensitivity<2>::Zero());
     EXPECT_TRUE(tie.ask());
     return tie.settle(measured({change, 0}, sigma, moved), {});
   };
@@ -91,7 +92,7 @@ TEST(BaseTie, ATelemetryFrameTellsTheZeroAndNoMoreOfATiedMap) {
   ASSERT_TRUE(tie.ask());
   ASSERT_TRUE(tie.settle(measured({5e-3, 0}, 1e-5), offset));
   EXPECT_FALSE(tie.is_by_map());
-  tie.note_landmarks({5e-3, 0}, square(1e-6), Sensitivity<2>::Zero());
+  tie.note_landmarks({5e-3, 0}, square(1e-6), {}, Sensitivity<2>::Zero());
   ASSERT_TRUE(tie.ask());
   ASSERT_TRUE(tie.settle(measured({2e-5, 0}, 1e-5), offset));
   ASSERT_TRUE(tie.is_by_map());
@@ -115,7 +116,7 @@ TEST(BaseTie, LearnsNothingOfNumbersThatAreNone) {
 
 TEST(BaseTie, StraightenedMapsStayWhereTheyAre) {
   BaseTie tie{BaseTieOptions{}};
-  tie.note_landmarks({0, 0}, square(1e-7), Sensitivity<2>::Zero());
+  tie.note_landmarks({0, 0}, square(1e-7), {}, Sensitivity<2>::Zero());
   ASSERT_TRUE(tie.ask());
   tie.move_map({1e-4, 0});
   ASSERT_TRUE(tie.settle(measured({1e-3, 0}, 1e-5), {}));
@@ -161,7 +162,7 @@ TEST(BaseTie, AnswersAreAsGoodAsTheyClaim) {
     }
     if (of_landmarks) {
       const Vector2<double> e = noise(kFrame);
-      tie.note_landmarks(filter.offset().value, square(kFrame), Sensitivity<2>::Zero());
+      tie.note_landmarks(filter.offset().value, square(kFrame), {}, Sensitivity<2>::Zero());
       ASSERT_TRUE(tie.ask());
       const Vector2<double> answered = begun - zero + e + filter.offset().value;
       ASSERT_TRUE(tie.settle({noise(kMeasured) - answered, square(kMeasured)}, filter.offset()));
@@ -186,6 +187,91 @@ TEST(BaseTie, AnswersAreAsGoodAsTheyClaim) {
   EXPECT_NEAR(by_landmarks / (kRuns / 2.0), 2, 4 * 2 / std::sqrt(kRuns / 2.0));
   EXPECT_NEAR(by_telemetry / kRuns, 2, 4 * 2 / std::sqrt(1.0 * kRuns));
   EXPECT_NEAR(anew / kRuns, 2, 4 * 2 / std::sqrt(1.0 * kRuns));
+}
+
+// Var(h_k - h_t) of a walk from view to view, where one lies on the way to the other and where the map began between them.
+TEST(BaseTie, WhatLandmarksShareCancelsInTheViewThatWasMeasured) {
+  const auto view = [](double variance, double pan) {
+    return SharedByView{variance * kIdentity, {pan, 0}, {0.4, 0.2}};
+  };
+  EXPECT_NEAR(difference_of_shared(view(4, 1), view(4, 1)).norm(), 0, 1e-12);
+  EXPECT_NEAR(difference_of_shared(view(4, 1), view(3, 1))(0, 0), 1, 1e-12);
+  EXPECT_NEAR(difference_of_shared(view(4, 1), view(4, 1.1))(1, 1), 2, 1e-12);
+  EXPECT_NEAR(difference_of_shared(view(4, 1), view(4, -1))(1, 1), 8, 1e-12);
+  // Whatever the axes have in common, it is a covariance.
+  SharedByView k = view(4, 1);
+  k.covariance(0, 1) = k.covariance(1, 0) = 3.9;
+  for (const double pan : {1.0, 1.1, 1.3, 2.0}) {
+    SharedByView t = k;
+    t.angle.x() = pan;
+    t.covariance(1, 1) = 5;
+    EXPECT_TRUE(is_covariance(difference_of_shared(k, t))) << pan;
+  }
+}
+
+// Without telemetry the map grows from view to view, each made by the one before: what its landmarks err by walks away. A camera turns to
+// and fro over ten fields of view, and one frame in 15 is measured from outside, each as well as the others.
+TEST(BaseTie, LongTurnsWithoutTelemetryAreTiedAnewWhereTheyLead) {
+  constexpr int kRuns = 60;
+  constexpr int kViews = 44;          // a quarter of a field apart
+  constexpr double kField = 0.4;      // rad
+  constexpr double kStep = 2e-5;      // rad, of the walk, from one view to the next
+  constexpr double kFrame = 5e-6;     // rad
+  constexpr double kMeasured = 3e-5;  // rad
+  constexpr int kEach = 15;           // frames
+  std::mt19937_64 random(11);
+  std::normal_distribution<double> normal;
+  const auto noise = [&](double sigma) {
+    const double pan = sigma * normal(random);
+    return Vector2<double>(pan, sigma * normal(random));
+  };
+  const auto normalised = [](const Vector2<double>& error, const Matrix2<double>& covariance) {
+    return error.dot(covariance.inverse() * error);
+  };
+  const auto view_of = [&](int at) {
+    return SharedByView{at * square(kStep), {kField / 4 * at, 0}, {kField, kField}};
+  };
+  double in_measured_view = 0;
+  int measured_views = 0;
+  double all = 0;
+  double at_the_end = 0;
+  for (int run = 0; run < kRuns; ++run) {
+    std::vector<Vector2<double>> walk(1, Vector2<double>::Zero());
+    while (walk.size() < kViews) walk.push_back(walk.back() + noise(kStep));
+    BaseTieOptions options;
+    options.drift = 0;
+    BaseTie tie(options);
+    const Vector2<double> lies = noise(5e-3);  // outer angle minus the map's
+    // What is wrong with an answer in a view.
+    const auto error_in = [&](int at) -> Vector2<double> {
+      return walk[static_cast<std::size_t>(at)] + noise(kFrame) - lies + tie.of_map().value;
+    };
+    constexpr int kTurn = 2 * (kViews - 1);
+    double of_run = 0;
+    for (int k = 0; k < kTurn; ++k) {
+      const int at = kViews - 1 - std::abs(kViews - 1 - k);
+      if (k % kEach == 0) {
+        const Vector2<double> answered = error_in(at);
+        tie.note_landmarks(tie.of_map().value, square(kFrame), view_of(at), Sensitivity<2>::Zero());
+        ASSERT_TRUE(tie.ask());
+        static_cast<void>(tie.settle({noise(kMeasured) - answered, square(kMeasured)}, {}));
+        in_measured_view +=
+            normalised(error_in(at), tie.covariance_in(view_of(at)) + square(kFrame));
+        ++measured_views;
+      }
+      const Vector2<double> error = error_in(at);
+      of_run += normalised(error, tie.covariance_in(view_of(at)) + square(kFrame)) / kTurn;
+      if (at == kViews - 1) at_the_end += error.squaredNorm();
+    }
+    all += of_run;
+  }
+  // Means of chi-squares of 2 degrees, variance 4; four standard deviations. Frames of a run may err alike, and between measured views
+  // more is allowed for than there is.
+  EXPECT_NEAR(in_measured_view / measured_views, 2, 4 * 2 / std::sqrt(1.0 * measured_views));
+  EXPECT_LT(all / kRuns, 2 + 4 * 2 / std::sqrt(1.0 * kRuns));
+  // At the end the newest measurement is less than kEach views old, where the whole walk is kViews.
+  const double variance = kMeasured * kMeasured + kEach * kStep * kStep + 2 * kFrame * kFrame;
+  EXPECT_LT(at_the_end / kRuns, 2 * variance * (1 + 4 / std::sqrt(1.0 * kRuns)));
 }
 
 }  // namespace

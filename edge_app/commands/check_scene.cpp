@@ -1,0 +1,111 @@
+#include "edge_app/commands/check_scene.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "core/model/nearest_angles.h"
+#include "edge_app/commands/scene_loading.h"
+#include "edge_app/localization/scene_search.h"
+
+namespace alidade {
+namespace {
+
+// In the camera's frame, rad/s, by how the picture's middle moved since the one before: what shows there goes left as the camera turns
+// right. 0 where that is not known.
+Vector3<double> angular_velocity_of(const LastPicture& last, double focal_length) {
+  if (!last.shift_px_s) return Vector3<double>::Zero();
+  return {last.shift_px_s->y() / focal_length, -last.shift_px_s->x() / focal_length, 0};
+}
+
+// Why a picture was not found, and what helps.
+std::string why_not(const Localization& found) {
+  switch (found.status) {
+    case LocalizationStatus::kOk:
+      break;
+    case LocalizationStatus::kNotInMap:
+      return "shows nothing that is in the map; point the camera at what the map holds, or add "
+             "this "
+             "view to it with `alidade map build --add`";
+    case LocalizationStatus::kAmbiguous:
+      return "fits several places of the map; point the camera at something that is there only "
+             "once";
+    case LocalizationStatus::kNoUsablePicture:
+      return "shows too little: dark, fog, or nothing with detail; check exposure, focus and what "
+             "is "
+             "in view";
+  }
+  return "";
+}
+
+}  // namespace
+
+SceneCheck check_scene(const Config& config, const NamedCalibration& calibration,
+                       const Measured& measured) {
+  SceneCheck scene;
+  scene.file = config.scene_map.file;
+  if (scene.file.empty() || !measured.last) return scene;
+  const Frame& picture = measured.last->frame;
+  scene.frame = picture.stamp.frame;
+  SceneMapFile file;
+  SceneMap map;
+  if (!open_scene(config.scene_map, picture.width, picture.height, &file, &map, &scene.error)) {
+    add_problem(&scene.findings, "scene map: " + scene.error);
+    return scene;
+  }
+  scene.keyframes = static_cast<std::int64_t>(map.keyframes.size());
+  scene.landmarks = static_cast<std::int64_t>(map.landmarks.size());
+  scene.mechanics = map.mechanics.value_or(Mechanics<double>());
+
+  LocalizationHint hint;
+  // With telemetry the lens may zoom.
+  if (!has_telemetry(config)) hint.focal_length = focal_length_of(calibration.calibration);
+  hint.angular_velocity =
+      angular_velocity_of(*measured.last, calibration.calibration.camera.focal_length);
+  FeatureSet seen;
+  scene.found = SceneSearch(map).find({picture.luma, picture.width, picture.height, picture.stride},
+                                      hint, &seen);
+
+  const std::string name = fmt::format("frame {}", scene.frame);
+  if (scene.found->status != LocalizationStatus::kOk) {
+    const std::string text =
+        fmt::format("scene map: {}: {} {}", scene.file, name, why_not(*scene.found));
+    if (has_telemetry(config)) {
+      add_advice(&scene.findings, text);
+    } else {
+      add_problem(&scene.findings, text + "; until a picture is found there are no directions");
+    }
+  } else if (!has_telemetry(config)) {
+    const std::string other = another_zoom(*scene.found, calibration.calibration, name);
+    if (!other.empty()) add_problem(&scene.findings, "scene map: " + other);
+  }
+  return scene;
+}
+
+std::string headline(const SceneCheck& scene) {
+  if (!scene.error.empty()) return "failed";
+  if (!scene.found) return "not tried: no picture came";
+  return fmt::format("{} keyframes, {} landmarks", scene.keyframes, scene.landmarks);
+}
+
+ReportLines describe(const SceneCheck& scene) {
+  if (!scene.found) return {};
+  const std::string name = fmt::format("frame {}", scene.frame);
+  if (scene.found->status != LocalizationStatus::kOk) {
+    return {{"looks at", fmt::format("not known: {} is not localized: {}", name,
+                                     to_string(scene.found->status))}};
+  }
+  constexpr double kDegrees = 180 / kPi;
+  const PicturePose& pose = scene.found->pose;
+  const PanTilt<double> angle = nearest_angles(scene.mechanics, pose.R_base_from_camera).angle;
+  const auto sigma = [&pose](int i) { return std::sqrt(pose.covariance(i, i)); };
+  return {{"looks at", fmt::format("pan {:.4f} deg, tilt {:.4f} deg (sigma {:.4f} sideways, {:.4f} "
+                                   "up and down, {:.4f} about the axis)",
+                                   kDegrees * angle.pan, kDegrees * angle.tilt, kDegrees * sigma(1),
+                                   kDegrees * sigma(0), kDegrees * sigma(2))},
+          {"by", fmt::format("{}, {} landmarks, focal length {:.1f} px (sigma {:.1f})", name,
+                             scene.found->matches, pose.camera.focal_length,
+                             pose.camera.focal_length * sigma(3))}};
+}
+
+}  // namespace alidade

@@ -1,0 +1,37 @@
+#pragma once
+// SceneSearch: asks a scene map where one picture looks, by few features first, and by more of them where those do not tell
+// (core/mapping/localization.h). Batch work: allocates. One thread at a time.
+
+#include <string>
+
+#include "core/mapping/features.h"
+#include "core/mapping/localization.h"
+#include "core/mapping/scene_map.h"
+#include "core/model/calibration.h"
+#include "core/realtime/image/image_view.h"
+
+namespace alidade {
+
+class SceneSearch {
+ public:
+  // Makes the index of the map, which need not outlive this.
+  explicit SceneSearch(const SceneMap& map);
+
+  // image: of the map's size. *seen: what it was found by, or looked for last.
+  [[nodiscard]] Localization find(const ImageView& image, const LocalizationHint& hint,
+                                  FeatureSet* seen) const;
+
+ private:
+  Localizer localizer_;
+  FeatureDetector quick_;
+  FeatureDetector thorough_;
+};
+
+// That of a picture that is taken to be of this calibration's zoom.
+[[nodiscard]] FocalLengthPrior focal_length_of(const Calibration& calibration);
+
+// One line where what was found, kOk, contradicts a calibration that is for one zoom; else empty. picture: which.
+[[nodiscard]] std::string another_zoom(const Localization& found, const Calibration& calibration,
+                                       const std::string& picture);
+
+}  // namespace alidade
