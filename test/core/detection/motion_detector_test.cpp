@@ -158,6 +158,27 @@ TEST_F(MotionDetectorTest, ASlowTargetHasNoGhost) {
   EXPECT_GE(found, 9);
 }
 
+// It comes into view with the scene about it, so that no earlier picture shows what is behind it.
+TEST_F(MotionDetectorTest, ASlowTargetAtTheEdgeThatComesIntoViewHasNoGhost) {
+  Disc disc;
+  disc.size_px = 18;
+  disc.velocity = {36, 0};
+  disc.place = {128, -10};
+  camera_.disc = disc;
+  int found = 0;
+  for (int i = 0; i < 16; ++i) {
+    const FrameOrientation orientation = camera_.orientation(i);
+    static_cast<void>(look(i));
+    if (i < 6) continue;
+    ASSERT_LE(detector_.boxes().size(), 1U) << "frame " << i;
+    found += static_cast<int>(detector_.boxes().size());
+    for (const DetectionBox& box : detector_.boxes()) {
+      EXPECT_LT((box.middle() - camera_.disc_pixel(orientation)).norm(), 9) << "frame " << i;
+    }
+  }
+  EXPECT_GE(found, 8);
+}
+
 TEST_F(MotionDetectorTest, FindsATargetInTheCornerOfThePicture) {
   PanningCamera still(0);
   Disc disc;
