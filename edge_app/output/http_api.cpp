@@ -270,7 +270,8 @@ Json detectors_json(const DetectorsReport& report) {
   };
   return {{"replaced", report.replaced},
           {"motion", one(report.motion)},
-          {"people", one(report.people)}};
+          {"people", one(report.people)},
+          {"onnx", one(report.onnx)}};
 }
 
 ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
