@@ -78,7 +78,7 @@ TEST(UncoveredPlaces, GoWhicheverWayTheTargetGoesAndHoweverBrightItIs) {
 TEST(UncoveredPlaces, TwoTargetsThatPassEachOtherStay) {
   ChangedScene scene;
   scene.paint(row_of(30, 8), kScene + 30);
-  scene.paint(row_of(48, 8), kScene - 30);
+  scene.paint(row_of(48, 8), kScene - 20);
   scene.change(row_of(30, 8), 9);
   scene.change(row_of(48, 8), -9);
   EXPECT_EQ(scene.kept(), (std::vector<double>{30, 48}));
