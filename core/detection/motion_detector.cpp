@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/detection/spline_image.h"
+#include "core/detection/uncovered_places.h"
 
 namespace alidade {
 namespace {
@@ -356,6 +357,8 @@ MotionAnswer MotionDetector::find(const ImageView& image, const FrameOrientation
       for (const DetectionBox& box : regions_.boxes()) {
         if (differs_from_recent(box)) boxes_.push_back(box);
       }
+      drop_uncovered_places({smooth_.data(), options_.width, options_.height}, regions_.z(),
+                            &boxes_);
     } else {
       answer.status = MotionStatus::kNotExplained;
     }

@@ -4,10 +4,14 @@
 #include <spdlog/spdlog.h>
 
 #include <cerrno>
+#include <sstream>
 #include <system_error>
+#include <thread>
 #include <utility>
 
 #include "edge_app/commands/command.h"
+#include "platform/system/realtime.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {
@@ -30,6 +34,45 @@ std::shared_ptr<const PlaneEstimate> plane_of(const Config& config,
   return config.tracking.targets->tracker.space == TargetSpace::kPlane ? std::move(plane) : nullptr;
 }
 
+std::vector<std::string> lines_of(const std::string& text) {
+  std::vector<std::string> lines;
+  std::istringstream in(text);
+  for (std::string line; std::getline(in, line);) {
+    if (!line.empty() && line.back() == '\r') line.pop_back();
+    if (!line.empty()) lines.push_back(line);
+  }
+  return lines;
+}
+
+// Null where none is configured.
+std::unique_ptr<NetworkDetector> load_network(const std::optional<NetworkFiles>& files) {
+  if (!files) return nullptr;
+  NetworkOptions options = files->options;
+  std::string model;
+  std::string labels;
+  std::string error;
+  if (!read_file(files->model, &model, &error) ||
+      (!files->labels.empty() && !read_file(files->labels, &labels, &error))) {
+    throw CommandError(kExitUsage, "detectors.onnx: " + error);
+  }
+  options.labels = lines_of(labels);
+  if (!files->labels.empty() && options.labels.empty()) {
+    throw CommandError(kExitUsage, "detectors.onnx: " + files->labels +
+                                       ": is empty; expected the classes' names, one a line");
+  }
+  std::unique_ptr<NetworkDetector> network;
+  // OpenCV's worker threads have the priority of the thread that first needs them: not that of the one that starts the real-time thread.
+  std::thread([&] {
+    static_cast<void>(set_lowest_priority());
+    network = NetworkDetector::load(model, options, &error);
+  }).join();
+  if (!network) {
+    throw CommandError(kExitUsage, "detectors.onnx: " + files->model + ": " + error);
+  }
+  spdlog::info("network: {}, {} classes", files->model, network->classes());
+  return network;
+}
+
 }  // namespace
 
 LiveTargets::LiveTargets(const Config& config, std::shared_ptr<const PlaneEstimate> plane)
@@ -41,9 +84,10 @@ LiveTargets::LiveTargets(const Config& config, std::shared_ptr<const PlaneEstima
       feed_(*config.tracking.targets, plane_of(config, plane)) {
   feed_.add_on_news([this](const auto& state) { lines_.take(*state); });
   if (!config.detectors.any()) return;
-  tap_.emplace(detectors_.emplace(config.detectors, std::move(plane), feed_));
-  spdlog::info("detectors: {}{}", config.detectors.motion ? "motion " : "",
-               config.detectors.people ? "people" : "");
+  tap_.emplace(detectors_.emplace(config.detectors, std::move(plane),
+                                  load_network(config.detectors.onnx), feed_));
+  spdlog::info("detectors:{}{}{}", config.detectors.onnx ? " onnx" : "",
+               config.detectors.people ? " people" : "", config.detectors.motion ? " motion" : "");
 }
 
 DetectorsReport LiveTargets::detectors() const {

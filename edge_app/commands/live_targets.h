@@ -15,7 +15,7 @@ namespace alidade {
 
 class LiveTargets {
  public:
-  // config.tracking.targets is there. Throws CommandError where output.targets cannot be written.
+  // config.tracking.targets is there. Throws CommandError where output.targets cannot be written, or detectors.onnx not be used.
   LiveTargets(const Config& config, std::shared_ptr<const PlaneEstimate> plane);
 
   [[nodiscard]] TargetFeed& feed() { return feed_; }

@@ -10,12 +10,15 @@
 #include <cstdio>
 #include <filesystem>
 #include <nlohmann/json.hpp>
+#include <set>
 #include <string>
 
 #include "core/model/trigonometry.h"
 #include "core/tracking/plane_fit.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/config/plane_data.h"
+#include "edge_app/output/json_query.h"
+#include "edge_app/output/plane_json.h"
 #include "edge_app/storage/plane_file.h"
 #include "platform/system/whole_file.h"
 
@@ -23,6 +26,15 @@ namespace alidade {
 namespace {
 
 bool is_angle(int value) { return value < 3; }
+
+constexpr std::size_t kMostDataOfRequest = 100;  // a fit of them is a few milliseconds
+constexpr int kDeepestDatum = 5;                 // {"lengths": [{"from": {"direction": [x]}}]}
+constexpr const char* kNoHeading =
+    "the base's forward direction points straight up or down: plane.yaml cannot say its heading";
+
+bool has_heading(const PlaneFit& fit) {
+  return fit.plane.R_world_from_base().col(0).head<2>().norm() > kLeastForward;
+}
 
 std::string values_text(const PlaneFit& fit) {
   const PlaneValues values = plane_values(fit.plane);
@@ -66,31 +78,6 @@ std::string text_of(const PlaneEvidence& evidence, const PlaneFit& fit) {
   return text;
 }
 
-std::string json_of(const PlaneEvidence& evidence, const PlaneFit& fit) {
-  const PlaneValues values = plane_values(fit.plane);
-  nlohmann::ordered_json json;
-  json["status"] = to_string(fit.status);
-  for (int i = 0; i < kPlaneParameterCount; ++i) {
-    json[kPlaneValueNames[static_cast<std::size_t>(i)]] = {
-        {"value", values.value[i]}, {"sigma", std::sqrt(values.covariance(i, i))}};
-  }
-  json["degrees_of_freedom"] = fit.degrees_of_freedom;
-  json["noise_scale"] = fit.noise_scale;
-  json["origin_below_camera"] = fit.origin_below_camera;
-  json["heading_of_base"] = fit.heading_of_base;
-  json["data"] = nlohmann::ordered_json::array();
-  for (std::size_t i = 0; i < fit.data.size(); ++i) {
-    nlohmann::ordered_json datum;
-    datum["kind"] = to_string(evidence.data[i].kind);
-    datum["name"] = evidence.data[i].name;
-    datum["misfit"] = nullptr;
-    if (fit.data[i].misfit) datum["misfit"] = *fit.data[i].misfit;
-    datum["checked"] = fit.data[i].checked;
-    json["data"].push_back(datum);
-  }
-  return json.dump() + "\n";
-}
-
 void print_plane(const std::string& text) {
   std::fputs(text.c_str(), stdout);
   if (std::fflush(stdout) != 0) throw CommandError(kExitFailed, "stdout: cannot be written");
@@ -119,18 +106,45 @@ int fit_plane_command(const PlaneOptions& options) {
   const PlaneFit fit = fit_plane(data.evidence);
   const bool fits = fit.status == PlaneFitStatus::kOk;
   if (fits || fit.status == PlaneFitStatus::kMisfit)
-    print_plane(options.json ? json_of(data.evidence, fit) : text_of(data.evidence, fit));
+    print_plane(options.json ? plane_fit_json(data.evidence, fit).dump() + "\n"
+                             : text_of(data.evidence, fit));
   if (!fits) throw CommandError(kExitFailed, options.data + ": " + fit.message);
-  const Vector3<double> forward_w = fit.plane.R_world_from_base().col(0);
-  if (!(forward_w.head<2>().norm() > kLeastForward)) {
-    throw CommandError(kExitFailed, options.data +
-                                        ": the base's forward direction points straight up or "
-                                        "down: plane.yaml cannot say its heading");
-  }
+  if (!has_heading(fit)) throw CommandError(kExitFailed, options.data + ": " + kNoHeading);
   if (!write_file_atomically(path, format_plane({fit.plane, data.origin}, fit), &error))
     throw CommandError(kExitFailed, error + "; give a file that can be written with -o");
   spdlog::info("plane: {}", path);
   return kExitOk;
+}
+
+bool answer_plane_fit(const std::string& body, std::string* answer, std::string* error) {
+  using Json = nlohmann::ordered_json;
+  static const std::set<std::string> kKeys = {
+      "format",  "origin",   "height",    "level",   "heading",  "place", "points",
+      "horizon", "bearings", "verticals", "lengths", "uprights", "image", "pictures"};
+  Json object;
+  // JSON is YAML; what is read as such is bounded here in depth.
+  if (!parse_json_object(body, kDeepestDatum, kKeys, &object, error)) return false;
+  PlaneData data;
+  if (!parse_plane_data(object.dump(), "body", &data, error)) return false;
+  if (data.evidence.data.size() > kMostDataOfRequest) {
+    *error =
+        fmt::format("{} data; expected at most {}", data.evidence.data.size(), kMostDataOfRequest);
+    return false;
+  }
+  const PlaneFit fit = fit_plane(data.evidence);
+  const bool fits = fit.status == PlaneFitStatus::kOk;
+  const bool has_file = fits && has_heading(fit);
+  Json out;
+  if (fits || fit.status == PlaneFitStatus::kMisfit) {
+    out = plane_fit_json(data.evidence, fit);
+  } else {
+    out["status"] = to_string(fit.status);
+  }
+  out["message"] = fits && !has_file ? kNoHeading : fit.message;
+  out["plane_yaml"] = nullptr;
+  if (has_file) out["plane_yaml"] = format_plane({fit.plane, data.origin}, fit);
+  *answer = out.dump(-1, ' ', false, Json::error_handler_t::replace) + "\n";
+  return true;
 }
 
 }  // namespace alidade

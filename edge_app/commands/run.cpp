@@ -12,6 +12,7 @@
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/live_calibration.h"
 #include "edge_app/commands/live_targets.h"
+#include "edge_app/commands/plane.h"
 #include "edge_app/commands/run.h"
 #include "edge_app/commands/run_report.h"
 #include "edge_app/commands/scene_loading.h"
@@ -153,6 +154,7 @@ int run_live(const RunOptions& options) {
     return calibrating.calibration && calibrating.calibration->ask_for_fresh();
   };
   sources.plane = plane;
+  sources.fit_plane = answer_plane_fit;
   if (targets) {
     sources.targets = &targets->feed();
     sources.target_lines = &targets->lines();

@@ -303,7 +303,9 @@ void check_together(const Config& config, const YamlSection& calibration,
 // What detectors find becomes targets, and they look at frames in OE mode.
 void check_detectors(const Config& config, const YamlSection& detectors) {
   if (!config.detectors.any()) return;
-  const char* first = config.detectors.motion ? "motion" : "people";
+  const char* first = config.detectors.motion   ? "motion"
+                      : config.detectors.people ? "people"
+                                                : "onnx";
   if (!config.tracking.targets)
     detectors.fail(first, "stands without section tracking; add tracking");
   if (!config.realtime.landmarks)
@@ -350,7 +352,7 @@ void read_config(YamlSection& top, const std::string& path, ConfigScope scope, C
   config->scene_map = read_scene_map(scene_map, path);
   config->realtime = read_realtime(realtime);
   config->tracking = read_tracking(tracking, top.has("tracking"), path);
-  config->detectors = read_detectors(detectors);
+  config->detectors = read_detectors(detectors, path);
   if (scope == ConfigScope::kAll) check_ages(*config, pan_tilt, realtime);
   config->output = read_output(output, path, &config->warnings);
   if (top.has("mqtt")) config->mqtt = read_mqtt(mqtt, path, &config->warnings);

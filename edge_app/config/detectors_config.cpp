@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "edge_app/config/link_keys.h"
+
 namespace alidade {
 namespace {
 
@@ -35,17 +37,36 @@ PersonOptions read_people(YamlSection section) {
   return people;
 }
 
+NetworkFiles read_onnx(YamlSection section, const std::string& config_path) {
+  NetworkFiles network;
+  NetworkOptions& options = network.options;
+  const auto model = section.text("model");
+  if (!model) section.fail_missing("model", "expected the path of a network, exported to ONNX");
+  network.model = path_relative_to(config_path, *model);
+  if (const auto labels = section.text("labels"))
+    network.labels = path_relative_to(config_path, *labels);
+  options.width_px = section.integer("width_px", {32, 4096, "px"}).value_or(options.width_px);
+  options.height_px = section.integer("height_px", {32, 4096, "px"}).value_or(options.height_px);
+  options.threshold = section.number("threshold", {0.001, 0.999, "1"}).value_or(options.threshold);
+  options.most_overlap = section.number("most_overlap", {0, 1, "1"}).value_or(options.most_overlap);
+  section.finish();
+  return network;
+}
+
 }  // namespace
 
-BuiltInDetectorOptions read_detectors(YamlSection section) {
+BuiltInDetectorOptions read_detectors(YamlSection section, const std::string& config_path) {
   BuiltInDetectorOptions detectors;
   const bool has_motion = section.has("motion");
   const bool has_people = section.has("people");
+  const bool has_onnx = section.has("onnx");
   const YamlSection motion = section.section("motion");
   const YamlSection people = section.section("people");
+  const YamlSection onnx = section.section("onnx");
   section.finish();
   if (has_motion) detectors.motion = read_motion(motion);
   if (has_people) detectors.people = read_people(people);
+  if (has_onnx) detectors.onnx = read_onnx(onnx, config_path);
   return detectors;
 }
 

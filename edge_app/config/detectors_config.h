@@ -5,7 +5,13 @@
 //     least_size_px, most_size_px
 //   people: {}                 who stands upright on the ground of tracking.plane
 //     height_m, least_height_px, most_height_px, threshold
-// Takes section tracking, and realtime.mode OE. What each means, and its default: motion_detector.h, person_detector.h.
+//   onnx:                      a network of the user's
+//     model                    its file; needed
+//     labels                   a file with the classes' names, one a line
+//     width_px, height_px      of its input
+//     threshold, most_overlap
+// Files: relative to the configuration's. Takes section tracking, and realtime.mode OE. What each means, and its default: motion_detector.h, person_detector.h,
+// network_detector.h.
 
 #include "edge_app/config/yaml_section.h"
 #include "edge_app/tracking/built_in_detectors.h"
@@ -13,6 +19,6 @@
 namespace alidade {
 
 // Throws ConfigError.
-BuiltInDetectorOptions read_detectors(YamlSection section);
+BuiltInDetectorOptions read_detectors(YamlSection section, const std::string& config_path);
 
 }  // namespace alidade

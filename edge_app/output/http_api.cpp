@@ -85,6 +85,13 @@ ServerResponse ground_plane(const HttpApiSources& sources) {
   return json_response(plane_json(*sources.plane));
 }
 
+ServerResponse plane_fit(const HttpApiSources& sources, const std::string& body) {
+  std::string answer;
+  std::string error;
+  if (!sources.fit_plane(body, &answer, &error)) return http_error(400, error);
+  return text_response("application/json", std::move(answer));
+}
+
 ServerResponse scene_map(const HttpApiSources& sources) {
   if (!sources.scene)
     return http_error(404,
@@ -270,7 +277,8 @@ Json detectors_json(const DetectorsReport& report) {
   };
   return {{"replaced", report.replaced},
           {"motion", one(report.motion)},
-          {"people", one(report.people)}};
+          {"people", one(report.people)},
+          {"onnx", one(report.onnx)}};
 }
 
 ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
@@ -384,6 +392,9 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
               [sources](const ServerRequest&) { return calibration(sources); });
   server->get("/api/v1/plane", HttpAccess::kToken,
               [sources](const ServerRequest&) { return ground_plane(sources); });
+  server->post(
+      "/api/v1/plane/fit", HttpAccess::kToken, kMaxQueryBytes,
+      [sources](const ServerRequest& request) { return plane_fit(sources, request.body); });
   server->get("/api/v1/targets", HttpAccess::kToken,
               [sources](const ServerRequest& request) { return targets(sources, request); });
   server->post(

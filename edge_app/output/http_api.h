@@ -29,6 +29,8 @@ struct HttpApiSources {
   // Empty without one. The zoom curve in use; null: there is none.
   std::function<std::shared_ptr<const ZoomCurve>()> zoom_curve;
   std::shared_ptr<const PlaneEstimate> plane;  // null: none is configured
+  // What is known of the ground to a fit, both JSON; false with one line.
+  std::function<bool(const std::string& body, std::string* answer, std::string* error)> fit_plane;
   // Both null where nothing is tracked. Borrowed as live is; where there are some, they wake the server, too.
   TargetFeed* targets = nullptr;
   TargetLines* target_lines = nullptr;

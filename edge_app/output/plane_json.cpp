@@ -32,6 +32,31 @@ Json plane_json(const PlaneEstimate& estimate) {
   return out;
 }
 
+Json plane_fit_json(const PlaneEvidence& evidence, const PlaneFit& fit) {
+  const PlaneValues values = plane_values(fit.plane);
+  Json json;
+  json["status"] = to_string(fit.status);
+  for (int i = 0; i < kPlaneParameterCount; ++i) {
+    json[kPlaneValueNames[static_cast<std::size_t>(i)]] = {
+        {"value", values.value[i]}, {"sigma", std::sqrt(values.covariance(i, i))}};
+  }
+  json["degrees_of_freedom"] = fit.degrees_of_freedom;
+  json["noise_scale"] = fit.noise_scale;
+  json["origin_below_camera"] = fit.origin_below_camera;
+  json["heading_of_base"] = fit.heading_of_base;
+  json["data"] = Json::array();
+  for (std::size_t i = 0; i < fit.data.size(); ++i) {
+    Json datum;
+    datum["kind"] = to_string(evidence.data[i].kind);
+    datum["name"] = evidence.data[i].name;
+    datum["misfit"] = nullptr;
+    if (fit.data[i].misfit) datum["misfit"] = *fit.data[i].misfit;
+    datum["checked"] = fit.data[i].checked;
+    json["data"].push_back(datum);
+  }
+  return json;
+}
+
 Json plane_point_json(const PlaneEstimate& estimate, const Vector3<double>& d_b,
                       const Matrix2<double>& cov_d) {
   PlanePoint point;

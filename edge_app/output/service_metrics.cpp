@@ -203,8 +203,8 @@ void add_target_metrics(const TargetFeed& feed, MetricsText* out) {
 }
 
 void add_detector_metrics(const DetectorsReport& report, MetricsText* out) {
-  const std::array<std::pair<const char*, const std::optional<DetectorCounters>*>, 2> all = {
-      {{"motion", &report.motion}, {"people", &report.people}}};
+  const std::array<std::pair<const char*, const std::optional<DetectorCounters>*>, 3> all = {
+      {{"motion", &report.motion}, {"people", &report.people}, {"onnx", &report.onnx}}};
   out->counter("alidade_detector_pictures_replaced_total",
                "Pictures that no detector looked at, as a newer one came");
   out->add(report.replaced);

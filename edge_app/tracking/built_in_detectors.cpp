@@ -20,11 +20,29 @@ bool complete_orientation(const OrientationRecord& record, FrameOrientation* out
 }  // namespace
 
 BuiltInDetectors::BuiltInDetectors(const BuiltInDetectorOptions& options,
-                                   std::shared_ptr<const PlaneEstimate> plane, TargetFeed& feed)
-    : options_(options), plane_(std::move(plane)), feed_(feed) {
+                                   std::shared_ptr<const PlaneEstimate> plane,
+                                   std::unique_ptr<NetworkDetector> network, TargetFeed& feed)
+    : options_(options), plane_(std::move(plane)), feed_(feed), network_(std::move(network)) {
   if (options_.people) people_ = std::make_unique<PersonDetector>(*options_.people);
   if (options_.motion) report_.motion.emplace();
   if (options_.people) report_.people.emplace();
+  if (options_.onnx) report_.onnx.emplace();
+}
+
+template <typename Finish>
+void BuiltInDetectors::take(const std::vector<DetectionBox>& found, Finish&& finish) {
+  const auto before = static_cast<std::ptrdiff_t>(boxes_.size());
+  for (DetectionBox box : found) {
+    const Vector2<double> middle = box.middle();
+    const bool is_known =
+        std::any_of(boxes_.begin(), boxes_.begin() + before, [&middle](const DetectionBox& other) {
+          return middle.x() >= other.u && middle.x() <= other.u + other.width &&
+                 middle.y() >= other.v && middle.y() <= other.v + other.height;
+        });
+    if (is_known) continue;
+    finish(&box);
+    boxes_.push_back(std::move(box));
+  }
 }
 
 void BuiltInDetectors::count(std::optional<DetectorCounters>* counters, bool judged,
@@ -35,13 +53,19 @@ void BuiltInDetectors::count(std::optional<DetectorCounters>* counters, bool jud
   (*counters)->boxes += static_cast<std::int64_t>(boxes);
 }
 
+bool BuiltInDetectors::find_by_network(const ImageView& image) {
+  const bool judged = network_->find(image) == NetworkStatus::kOk;
+  take(network_->boxes(), [](DetectionBox*) {});
+  count(&report_.onnx, judged, network_->boxes().size());
+  return judged;
+}
+
 bool BuiltInDetectors::find_people(const ImageView& image, const FrameOrientation& orientation) {
   const bool judged = people_->find(image, orientation, plane_->plane) == PersonStatus::kOk;
-  for (DetectionBox box : people_->boxes()) {
-    box.score = 1 / (1 + std::exp(-box.score));
-    box.name = "person";
-    boxes_.push_back(std::move(box));
-  }
+  take(people_->boxes(), [](DetectionBox* box) {
+    box->score = 1 / (1 + std::exp(-box->score));
+    box->name = "person";
+  });
   count(&report_.people, judged, people_->boxes().size());
   return judged;
 }
@@ -59,19 +83,8 @@ bool BuiltInDetectors::find_motion(const ImageView& image, const FrameOrientatio
     motion_ = std::make_unique<MotionDetector>(options);
   }
   const bool judged = motion_->find(image, orientation).status == MotionStatus::kOk;
-  const std::size_t people = boxes_.size();
-  for (DetectionBox box : motion_->boxes()) {
-    const Vector2<double> middle = box.middle();
-    const bool is_person =
-        std::any_of(boxes_.begin(), boxes_.begin() + static_cast<std::ptrdiff_t>(people),
-                    [&middle](const DetectionBox& person) {
-                      return middle.x() >= person.u && middle.x() <= person.u + person.width &&
-                             middle.y() >= person.v && middle.y() <= person.v + person.height;
-                    });
-    if (is_person) continue;
-    box.score = std::min(1.0, box.score / kMostChangeScore);
-    boxes_.push_back(std::move(box));
-  }
+  take(motion_->boxes(),
+       [](DetectionBox* box) { box->score = std::min(1.0, box->score / kMostChangeScore); });
   count(&report_.motion, judged, motion_->boxes().size());
   return judged;
 }
@@ -81,7 +94,8 @@ void BuiltInDetectors::look(const DetectableFrame& frame) {
   if (!complete_orientation(frame.record, &orientation)) return;
   boxes_.clear();
   bool judged = false;
-  if (people_) judged = find_people(frame.image, orientation);
+  if (network_) judged = find_by_network(frame.image);
+  if (people_) judged = find_people(frame.image, orientation) || judged;
   if (options_.motion) judged = find_motion(frame.image, orientation) || judged;
   if (!judged) return;
   const auto most = static_cast<std::size_t>(feed_.options().tracker.max_detections);

@@ -1,9 +1,9 @@
 #pragma once
-// BuiltInDetectors: what moves (core/detection/motion_detector.h), and people (person_detector.h), in the pictures that a DetectorTap hands
-// over. Both detectors' boxes of a frame go to the TargetFeed together, as if somebody had sent them; where no detector could judge the picture,
-// nothing goes there, as that is no answer.
+// BuiltInDetectors: what the user's network finds (core/detection/network_detector.h), people (person_detector.h), and what moves (motion_detector.h), in
+// the pictures that a DetectorTap hands over. All detectors' boxes of a frame go to the TargetFeed together, as if somebody had sent them; where no detector
+// could judge the picture, nothing goes there, as that is no answer.
 // Scores become 0 to 1: of motion, the share of the largest that there is; of a person, 1 / (1 + e^-s), s the distance from the SVM's plane. Neither
-// is a probability. A mover whose middle is in a person's box is that person, and left out.
+// is a probability. A box whose middle is in one of a detector before, in this order, is of the same thing, and left out.
 // Memory is taken with the first picture, whose size all others must have. For the detector thread, but for report().
 
 #include <cstdint>
@@ -12,18 +12,26 @@
 #include <optional>
 
 #include "core/detection/motion_detector.h"
+#include "core/detection/network_detector.h"
 #include "core/detection/person_detector.h"
 #include "edge_app/pipeline/detector_tap.h"
 #include "edge_app/tracking/target_feed.h"
 
 namespace alidade {
 
+struct NetworkFiles {
+  std::string model;       // path
+  std::string labels;      // path; empty: none
+  NetworkOptions options;  // but for the labels, which the file tells
+};
+
 struct BuiltInDetectorOptions {
   std::optional<MotionOptions>
       motion;  // but for width and height, which the first picture tells; empty: off
   std::optional<PersonOptions> people;  // takes a plane; empty: off
+  std::optional<NetworkFiles> onnx;     // empty: off
 
-  [[nodiscard]] bool any() const { return motion || people; }
+  [[nodiscard]] bool any() const { return motion || people || onnx; }
 };
 
 struct DetectorCounters {
@@ -34,14 +42,15 @@ struct DetectorCounters {
 
 struct DetectorsReport {
   std::int64_t replaced = 0;  // pictures not looked at, as a newer one came
-  std::optional<DetectorCounters> motion, people;
+  std::optional<DetectorCounters> motion, people, onnx;
 };
 
 class BuiltInDetectors : public FrameDetector {
  public:
-  // options are valid. plane: may be null without people. Borrows the feed.
+  // options are valid. plane: may be null without people; network: that of options.onnx, null without. Borrows the feed.
   BuiltInDetectors(const BuiltInDetectorOptions& options,
-                   std::shared_ptr<const PlaneEstimate> plane, TargetFeed& feed);
+                   std::shared_ptr<const PlaneEstimate> plane,
+                   std::unique_ptr<NetworkDetector> network, TargetFeed& feed);
 
   void look(const DetectableFrame& frame) override;
 
@@ -50,8 +59,12 @@ class BuiltInDetectors : public FrameDetector {
 
  private:
   // False: it could not judge the picture.
+  [[nodiscard]] bool find_by_network(const ImageView& image);
   [[nodiscard]] bool find_people(const ImageView& image, const FrameOrientation& orientation);
   [[nodiscard]] bool find_motion(const ImageView& image, const FrameOrientation& orientation);
+  // Those of them that are of nothing that was found before, after finish(&box).
+  template <typename Finish>
+  void take(const std::vector<DetectionBox>& found, Finish&& finish);
   void count(std::optional<DetectorCounters>* counters, bool judged, std::size_t boxes);
 
   const BuiltInDetectorOptions options_;
@@ -59,6 +72,7 @@ class BuiltInDetectors : public FrameDetector {
   TargetFeed& feed_;
   std::unique_ptr<MotionDetector> motion_;
   std::unique_ptr<PersonDetector> people_;
+  std::unique_ptr<NetworkDetector> network_;
   std::vector<DetectionBox> boxes_;  // of the picture at hand
   mutable std::mutex mutex_;         // of what follows
   DetectorsReport report_;

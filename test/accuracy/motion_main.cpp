@@ -203,12 +203,14 @@ void run_speeds(Study* study, const std::vector<double>& speeds) {
 
 void run_targets(Study* study) {
   Table table{"Targets, at half a field of view a second", kHeader, {}, {}};
-  for (const double size : {4.0, 8.0, 16.0}) {
+  for (const double size : {4.0, 8.0, 16.0, 32.0}) {
     for (const double contrast : {10.0, 20.0, 40.0}) {
       MotionFilmPlan plan = study->plan;
       plan.size_px = size;
       plan.contrast = contrast;
-      add(study, &table, number(size) + " px, contrast " + number(contrast), plan);
+      const std::string what = number(size) + " px, contrast " + number(contrast);
+      const Tally sum = add(study, &table, what, plan);
+      if (size == 8 || size == 16) require_mark(study, what, sum);
     }
   }
   table.print(std::cout);

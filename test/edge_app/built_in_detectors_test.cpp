@@ -2,6 +2,9 @@
 
 #include <gtest/gtest.h>
 
+#include <fstream>
+#include <sstream>
+
 #include "test/core/detection/panning_camera.h"
 
 namespace alidade {
@@ -26,7 +29,7 @@ TEST(BuiltInDetectors, TellTheFeedWhatMovesAndNothingOfPicturesThatTheyCannotJud
   BuiltInDetectorOptions options;
   options.motion.emplace();
   options.motion->exposure_s = 0.001;
-  BuiltInDetectors detectors(options, nullptr, feed);
+  BuiltInDetectors detectors(options, nullptr, nullptr, feed);
   test::PanningCamera camera;
   camera.disc.emplace();
   camera.disc->velocity = {90, 40};
@@ -49,12 +52,49 @@ TEST(BuiltInDetectors, APictureTooSmallIsNotJudged) {
   TargetFeed feed(default_target_options(TargetSpace::kSphere), nullptr);
   BuiltInDetectorOptions options;
   options.motion.emplace();
-  BuiltInDetectors detectors(options, nullptr, feed);
+  BuiltInDetectors detectors(options, nullptr, nullptr, feed);
   const std::vector<std::uint8_t> luma(32 * 32);
   detectors.look(
       panned_frame(test::PanningCamera().orientation(0), 0, ImageView{luma.data(), 32, 32, 32}));
   EXPECT_EQ(detectors.report().motion->unjudged, 1);
   EXPECT_EQ(feed.waiting(), 0U);
+}
+
+// Its answer is known: test/data/make_networks.py.
+TEST(BuiltInDetectors, WhatANetworkFindsIsNoMoverAgain) {
+  TargetFeed feed(default_target_options(TargetSpace::kSphere), nullptr);
+  BuiltInDetectorOptions options;
+  options.motion.emplace();
+  options.motion->exposure_s = 0.001;
+  options.onnx.emplace();
+  options.onnx->options.width_px = options.onnx->options.height_px = 64;
+  options.onnx->options.threshold = 0.9;
+  options.onnx->options.labels = {"bright", "dark"};
+  std::ifstream file(std::string(ALIDADE_TEST_DATA) + "/bright_cells_v8.onnx", std::ios::binary);
+  std::ostringstream model;
+  model << file.rdbuf();
+  std::string error;
+  auto network = NetworkDetector::load(model.str(), options.onnx->options, &error);
+  ASSERT_TRUE(network) << error;
+  BuiltInDetectors detectors(options, nullptr, std::move(network), feed);
+  test::PanningCamera camera(0);
+  camera.disc.emplace();
+  camera.disc->size_px = 60;
+  camera.disc->brighter = 200;
+  camera.disc->velocity = {200, 0};
+  constexpr int kFrames = 12;
+  for (int i = 0; i < kFrames; ++i) {
+    const FrameOrientation orientation = camera.orientation(i);
+    const test::Pixels image = camera.image(orientation);
+    detectors.look(panned_frame(orientation, i, image.view));
+  }
+  const DetectorsReport report = detectors.report();
+  ASSERT_TRUE(report.onnx);
+  EXPECT_EQ(report.onnx->pictures, kFrames);
+  EXPECT_EQ(report.onnx->unjudged, 0);
+  EXPECT_GT(report.onnx->boxes, 0);
+  // The network could judge those, too, that motion could not.
+  EXPECT_EQ(feed.waiting(), static_cast<std::size_t>(kFrames));
 }
 
 }  // namespace

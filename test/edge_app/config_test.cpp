@@ -361,6 +361,22 @@ TEST_F(ConfigTest, ADetectorIsOffUnlessItIsThere) {
   EXPECT_EQ(config_.detectors.people->threshold, 0.5);
 }
 
+TEST_F(ConfigTest, ANetworkIsLookedForBesideTheConfiguration) {
+  ASSERT_THAT(load(std::string(kMinimal) +
+                   "tracking: {}\n"
+                   "detectors: {onnx: {model: nets/a.onnx, labels: /a/names.txt, width_px: 320,\n"
+                   "                   height_px: 192, threshold: 0.4, most_overlap: 0.6}}\n"),
+              IsEmpty());
+  ASSERT_TRUE(config_.detectors.onnx);
+  const NetworkFiles& onnx = *config_.detectors.onnx;
+  EXPECT_EQ(onnx.model, directory_.path() + "/nets/a.onnx");
+  EXPECT_EQ(onnx.labels, "/a/names.txt");
+  EXPECT_EQ(onnx.options.width_px, 320);
+  EXPECT_EQ(onnx.options.height_px, 192);
+  EXPECT_EQ(onnx.options.threshold, 0.4);
+  EXPECT_EQ(onnx.options.most_overlap, 0.6);
+}
+
 TEST_F(ConfigTest, WidthWithoutHeightIsRefused) {
   const std::string error = load(
       "video:\n  type: rtsp\n  url: rtsp://camera/s\n  width: 1280\n"
@@ -689,10 +705,16 @@ INSTANTIATE_TEST_SUITE_P(
         Mistake{"PeopleWithoutGround", MINIMAL "tracking: {}\ndetectors: {people: {}}\n",
                 ":5: detectors.people", "add tracking.plane"},
         Mistake{"UnknownDetector", MINIMAL "detectors: {birds: {}}\n", ":4: detectors.birds",
-                "known here: motion, people"},
+                "known here: motion, people, onnx"},
         Mistake{"LeastAboveMost",
                 MINIMAL "tracking: {}\ndetectors:\n  motion:\n    least_size_px: 300\n",
                 ":7: detectors.motion.least_size_px", "leaves 300 to 200 px"},
+        Mistake{"NetworkWithoutModel",
+                MINIMAL "tracking: {}\ndetectors: {onnx: {threshold: 0.5}}\n",
+                ":5: detectors.onnx.model", "expected the path of a network"},
+        Mistake{"NetworkThatIsSureOfNothing",
+                MINIMAL "tracking: {}\ndetectors: {onnx: {model: a.onnx, threshold: 1.5}}\n",
+                ":5: detectors.onnx.threshold", "0.999"},
         Mistake{"DetectorIsAWord", MINIMAL "detectors: {motion: true}\n", ":4: detectors.motion",
                 "expected a mapping"},
         Mistake{"ExposureOfHours", MINIMAL "detectors: {motion: {exposure_s: 60}}\n",

@@ -49,6 +49,11 @@ class HttpApiTest : public ::testing::Test {
     sources.ask_for_calibration = [this] { return asked_ = calibrating_; };
     sources.zoom_curve = [this] { return curve_; };
     sources.plane = std::move(plane);
+    sources.fit_plane = [](const std::string& body, std::string* answer, std::string* why) {
+      *answer = "{\"status\": \"ok\"}\n";
+      *why = "not today";
+      return body == "{}";
+    };
     sources.scene = std::move(scene);
     sources.version = "1.2.3";
     sources.camera = "a camera";
@@ -180,6 +185,13 @@ TEST_F(HttpApiWithPlaneTest, TellsThePlane) {
   EXPECT_TRUE(told["origin"].is_null());
   EXPECT_EQ(told["covariance"]["names"].size(), 6U);
   EXPECT_EQ(told["covariance"]["matrix"][5][5], 1e-4);
+}
+
+TEST_F(HttpApiTest, FitsAPlaneToWhatAClientKnows) {
+  EXPECT_EQ(body_of(post("/api/v1/plane/fit", "{}"))["status"], "ok");
+  const std::string refusal = post("/api/v1/plane/fit", "{]");
+  EXPECT_THAT(refusal, StartsWith("HTTP/1.1 400 "));
+  EXPECT_EQ(body_of(refusal)["error"], "not today");
 }
 
 TEST_F(HttpApiTest, WithoutASceneMapSaysHowToHaveOne) {

@@ -8,6 +8,8 @@
 #include <nlohmann/json.hpp>
 #include <string>
 
+#include "core/tracking/plane_fit.h"
+#include "edge_app/commands/plane.h"
 #include "edge_app/storage/plane_file.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/support/temporary_directory.h"
@@ -107,6 +109,83 @@ TEST_F(PlaneCommand, ASlipIsBadUsageWithFileAndLine) {
   const Result onto = alidade({"plane", "fit", write(kYard, "plane.yaml")});
   EXPECT_EQ(onto.exit_code, 2);
   EXPECT_THAT(last_line(onto.errors), HasSubstr("is the data file itself"));
+}
+
+// As kYard.
+nlohmann::json yard() {
+  const auto point = [](const char* name, double forward, double right, double down, double z) {
+    return nlohmann::json{{"name", name},   {"direction", {forward, right, down}},
+                          {"x_m", right},   {"y_m", forward},
+                          {"z_m", z},       {"sigma_rad", 2e-4},
+                          {"sigma_m", 0.02}};
+  };
+  return {{"format", 1},
+          {"height", {{"height_m", 10}, {"sigma_m", 0.05}}},
+          {"points",
+           {point("kerb", 30, 0, 10, 0), point("drain \u00e9", 20, 15, 10, 0),
+            point("pole", 40, -20, 6, 4)}}};
+}
+
+nlohmann::json fitted(const nlohmann::json& data) {
+  std::string answer;
+  std::string error;
+  EXPECT_TRUE(answer_plane_fit(data.dump(), &answer, &error)) << error;
+  return nlohmann::json::parse(answer);
+}
+
+TEST(PlaneFitRequest, AnswersWithTheFileThatRunTakes) {
+  const nlohmann::json fit = fitted(yard());
+  EXPECT_EQ(fit["status"], "ok");
+  EXPECT_EQ(fit["message"], "");
+  EXPECT_NEAR(fit["height"]["value"].get<double>(), 10, 0.1);
+  EXPECT_LT(fit["height"]["sigma"].get<double>(), 0.05);
+  ASSERT_EQ(fit["data"].size(), 4U);
+  EXPECT_EQ(fit["data"][2]["name"], "drain \u00e9");
+  PlaneEstimate plane;
+  std::string error;
+  ASSERT_TRUE(parse_plane(fit["plane_yaml"].get<std::string>(), "plane.yaml", &plane, &error))
+      << error;
+  EXPECT_NEAR(plane.plane.position.z(), fit["height"]["value"].get<double>(), 1e-9);
+}
+
+TEST(PlaneFitRequest, SaysWhichPointIsWrongAndWhatIsMissing) {
+  nlohmann::json data = yard();
+  data["points"][1]["x_m"] = 18;
+  const nlohmann::json wrong = fitted(data);
+  EXPECT_EQ(wrong["status"], to_string(PlaneFitStatus::kMisfit));
+  EXPECT_THAT(wrong["message"].get<std::string>(), HasSubstr("drain"));
+  EXPECT_TRUE(wrong["plane_yaml"].is_null());
+  EXPECT_GT(wrong["data"][2]["misfit"].get<double>(), 5);
+  data = yard();
+  data["points"].erase(2);
+  data["points"].erase(1);
+  const nlohmann::json open = fitted(data);
+  EXPECT_NE(open["status"], "ok");
+  EXPECT_NE(open["message"], "");
+  EXPECT_TRUE(open["plane_yaml"].is_null());
+}
+
+TEST(PlaneFitRequest, RefusesInALineWhatItCannotRead) {
+  const auto error_of = [](const std::string& body) {
+    std::string answer;
+    std::string error;
+    EXPECT_FALSE(answer_plane_fit(body, &answer, &error)) << body;
+    EXPECT_THAT(error, ::testing::Not(HasSubstr("\n")));
+    return error;
+  };
+  EXPECT_THAT(error_of("points: []"), ::testing::Not(IsEmpty()));
+  EXPECT_THAT(error_of(R"({"format":1,"houses":[]})"), HasSubstr("unknown key"));
+  EXPECT_THAT(error_of(R"({"format":1,"points":[{"name":"a","direction":[1,0,0]}]})"),
+              HasSubstr("x_m"));
+  EXPECT_THAT(
+      error_of(R"({"format":1,"points":)" + std::string(200, '[') + std::string(200, ']') + "}"),
+      ::testing::Not(IsEmpty()));
+  nlohmann::json many = yard();
+  for (int i = 0; i < 100; ++i) {
+    many["points"].push_back(many["points"][0]);
+    many["points"].back()["name"] = std::to_string(i);
+  }
+  EXPECT_THAT(error_of(many.dump()), HasSubstr("expected at most 100"));
 }
 
 }  // namespace

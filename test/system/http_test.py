@@ -226,6 +226,10 @@ class Http(SystemTest):
         self.assertEqual(calibration["image"], {key: IMAGE[key] for key in ("width", "height")})
         self.check_answer(api, "/api/v1/calibrate", 409, b"")
         self.assertEqual(self.check_answer(api, "/api/v1/plane")["height"]["value"], 20)
+        known = {"format": 1, "level": {"sigma_deg": 0.1}, "height": {"height_m": 20, "sigma_m": 0.1}}
+        self.assertIn("height", self.check_answer(api, "/api/v1/plane/fit", body=known)["plane_yaml"])
+        self.assertIsNone(self.check_answer(api, "/api/v1/plane/fit", body={"format": 1})["plane_yaml"])
+        self.check_answer(api, "/api/v1/plane/fit", 400, {"format": 1, "houses": []})
         self.check_answer(api, "/api/v1/map", 404)
         self.follow_somebody(api, place)
         frame = self.check_answer(api, "/api/v1/orientation")["frame"]

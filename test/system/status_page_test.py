@@ -2,6 +2,7 @@
 """The status page of `alidade run` in a real browser: what it shows, what a click says, and what it does when the
 program goes away and comes back."""
 import json
+import math
 import os
 import re
 import signal
@@ -65,11 +66,11 @@ class StatusPage(SystemTest):
         wait_until(address, "the address of the page in the log")
         return run, address().group(1)
 
-    def config(self, camera, mode="OE", **output):
+    def config(self, camera, mode="OE", detectors=None, **output):
         image = SETTINGS["image"]
         return self.write_config(camera, video={"width": image["width"], "height": image["height"]},
                                  focal_length_px=SETTINGS["camera"]["focal_length_px"], realtime={"mode": mode},
-                                 output={"json": True, "http": "127.0.0.1:0", **output}, tracking={})
+                                 output={"json": True, "http": "127.0.0.1:0", **output}, tracking={}, detectors=detectors or {})
 
     def text(self, name):
         return self.browser.execute_script("return document.getElementById(arguments[0]).textContent", name)
@@ -174,6 +175,7 @@ class StatusPage(SystemTest):
         self.assertAlmostEqual(crossed["u"], SETTINGS["image"]["width"] / 2 - step)
         self.assertAlmostEqual(crossed["v"], SETTINGS["image"]["height"] / 2 - step)
 
+        self.fits_the_ground(picture)
         self.shows_targets(address)
 
         shown_s = self.browser.execute_script("return record.time_s")
@@ -182,6 +184,64 @@ class StatusPage(SystemTest):
         wait_until(lambda: self.browser.execute_script("return samples.length > 0 && samples[0].t < arguments[0]", shown_s),
                    "the minute before the page was opened")
         self.assert_no_errors_but(LATE)
+
+    def fits_the_ground(self, picture):
+        """Pixels are chosen and told to lie on ground 10 m below; three of them, and what is missing with fewer. The page tells what fits."""
+        self.browser.find_element(By.ID, "ground-title").click()
+
+        def fill(name, value):
+            self.browser.execute_script("document.getElementById(arguments[0]).value = arguments[1]", name, value)
+
+        def add(u, v, name, off=0):
+            # Where the direction meets the ground, as the test has it: the camera looks along the horizon.
+            told = []
+
+            def chosen():
+                self.browser.execute_script("forgetDirection('')")
+                ActionChains(self.browser).move_to_element_with_offset(picture, u, v).click().perform()
+                wait_until(lambda: self.text("pointing-hint") != "", "an answer")
+                told[:] = [self.browser.execute_script("return marker?.direction")]
+                return told[0] is not None
+            wait_until(chosen, "a direction")
+            forward, right, down = told[0]
+            # Tilted by 20 degrees: the picture looks near the horizon, and ground is what a base that leans sees.
+            lean = 0.35
+            below = down * math.cos(lean) + forward * math.sin(lean)
+            ahead = forward * math.cos(lean) - down * math.sin(lean)
+            fill("point-name", name)
+            fill("point-x", str(round(10 * right / below + off, 4)))
+            fill("point-y", str(round(10 * ahead / below, 4)))
+            self.browser.find_element(By.ID, "point-add").click()
+        fit = self.browser.find_element(By.ID, "ground-fit")
+        fill("point-sigma", "0.01")
+        fill("ground-height", "10")
+        add(-200, -120, "kerb")
+        fit.click()
+        self.wait_for_text("ground-said", ".{20}")
+        self.assertFalse(self.browser.find_element(By.ID, "ground-file").is_displayed())
+        add(200, -100, "drain")
+        add(-150, 120, "post")
+        add(180, 110, "gate")
+        fit.click()
+        self.wait_for_text("ground-said", "^Fits: ")
+        self.assertRegex(self.text("points"), r"^kerb.*misfit \d.*drain.*post.*gate")
+        self.assertRegex(self.text("ground-values"), r"pitch−20\.\d+\s±.*height(9\.9|10\.0)\d*\s±\s0\.0\d+\sm")
+        file = self.browser.find_element(By.ID, "ground-yaml")
+        self.assertTrue(file.is_displayed())
+        self.assertRegex(file.get_attribute("value"), r"(?m)^height: \{value: (9\.9|10)")
+        self.screenshot("ground.png")
+        for width in (390, 1280):
+            self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
+                "width": width, "height": 1800, "deviceScaleFactor": 1, "mobile": width < 500})
+            self.assertEqual(self.browser.execute_script("return document.documentElement.scrollWidth > innerWidth"), False, width)
+            if width == 390:
+                self.screenshot("ground_phone.png")
+        self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
+        self.browser.find_element(By.ID, "ground-title").click()
+
+    def screenshot(self, name):
+        if "ALIDADE_SCREENSHOTS" in os.environ:
+            self.browser.save_screenshot(os.path.join(os.environ["ALIDADE_SCREENSHOTS"], name))
 
     def shows_targets(self, address):
         """Something flies where the middle of the picture is: its box, its name, the plan and the table."""
@@ -207,9 +267,8 @@ class StatusPage(SystemTest):
         wait_until(shown, "a target on the page")
         self.assertRegex(self.text("target-rows"), r"^#1 drone−?[\d.]+\s±\s[\d.]+, −?[\d.]+\s±\s[\d.]+\s°")
         self.wait_for_text("plan-caption", r"1 target after frame \d+")
-        if "ALIDADE_SCREENSHOTS" in os.environ:
-            self.browser.set_window_size(1280, 1800)
-            self.browser.save_screenshot(os.path.join(os.environ["ALIDADE_SCREENSHOTS"], "targets.png"))
+        self.browser.set_window_size(1280, 1800)
+        self.screenshot("targets.png")
 
     def test_says_that_the_program_is_gone_and_follows_the_next_one(self):
         camera = self.camera(settings=SETTINGS)
@@ -232,9 +291,10 @@ class StatusPage(SystemTest):
     def test_says_which_link_is_lost_and_why_and_that_it_is_back(self):
         ports = {"rtsp_port": free_port(), "http_port": free_port()}
         camera = self.camera(settings=SETTINGS, **ports)
-        _, address = self.start(self.config(camera))
+        _, address = self.start(self.config(camera, detectors={"motion": {}}))
         self.browser.get(address)
         self.wait_for_text("link", "^live$")
+        self.wait_for_text("health", r"Detector of motion[1-9]\d* pictures judged, \d+ not; \d+ boxesPictures that detectors left out\d")
         self.wait_for_text("health", r"Video link[\d.]+ a second; newest now; back again 0 times"
                                      r"Pan/tilt link[\d.]+ a second; newest now; back again 0 times")
         camera.end(signal.SIGKILL)

@@ -1,6 +1,7 @@
 // Targets and their plane out, detections in.
 
 #include <utility>
+#include <vector>
 
 #include "alidade_ros/edge_bridge_ports.h"
 #include "alidade_ros/targets.h"
@@ -59,6 +60,19 @@ void EdgeBridge::forward_detections(const alidade_msgs::Detections& detections) 
   }
 }
 
+// Who listens already keeps a static transform until its own end: tf2 has no word for that it is gone. Who comes later shall not be told of it: the
+// latched message is replaced by an empty one.
+void EdgeBridge::forget_plane_transform() {
+  if (!plane_transform_) return;
+  plane_transform_.reset();
+  if (!options_.publish_tf) return;
+  ROS_WARN(
+      "the edge has lost its ground plane; nodes that run keep its transform until they are "
+      "restarted");
+  ports_->static_tf = tf2_ros::StaticTransformBroadcaster();
+  ports_->static_tf.sendTransform(std::vector<geometry_msgs::TransformStamped>());
+}
+
 void EdgeBridge::poll_plane() {
   {
     const std::lock_guard<std::mutex> lock(mutex_);
@@ -78,8 +92,11 @@ void EdgeBridge::poll_plane() {
     plane_.reset();
     if (!there_is_none) plane_ = plane;
   }
-  if (there_is_none) return;
   const std::lock_guard<std::mutex> lock(ports_mutex_);
+  if (there_is_none) {
+    forget_plane_transform();
+    return;
+  }
   plane_transform_ = plane_transform(plane, options_.names);
   if (options_.publish_tf) ports_->static_tf.sendTransform(*plane_transform_);
 }

@@ -200,6 +200,14 @@ TEST_F(ChangeRegionsTest, PiecesNearEachOtherAreOneThing) {
   EXPECT_EQ(regions_.boxes().size(), 2U);
 }
 
+// How near is near goes by the smaller one.
+TEST_F(ChangeRegionsTest, ASmallPieceApartFromALargeOneIsAnotherThing) {
+  plant(&regions_, 40, 50, 30, 30, 4);
+  plant(&regions_, 78, 60, 5, 5, 4);
+  ASSERT_TRUE(regions_.find());
+  EXPECT_EQ(regions_.boxes().size(), 2U);
+}
+
 TEST_F(ChangeRegionsTest, ASinglePixelIsNothing) {
   plant(&regions_, 100, 100, 1, 1, 100);
   plant(&regions_, 20, 100, 3, 3, 1.5);

@@ -158,6 +158,64 @@ TEST_F(MotionDetectorTest, ASlowTargetHasNoGhost) {
   EXPECT_GE(found, 9);
 }
 
+// It comes into view with the scene about it, so that no earlier picture shows what is behind it.
+TEST_F(MotionDetectorTest, ASlowTargetAtTheEdgeThatComesIntoViewHasNoGhost) {
+  Disc disc;
+  disc.size_px = 18;
+  disc.velocity = {36, 0};
+  disc.place = {128, -10};
+  camera_.disc = disc;
+  int found = 0;
+  for (int i = 0; i < 16; ++i) {
+    const FrameOrientation orientation = camera_.orientation(i);
+    static_cast<void>(look(i));
+    if (i < 6) continue;
+    ASSERT_LE(detector_.boxes().size(), 1U) << "frame " << i;
+    found += static_cast<int>(detector_.boxes().size());
+    for (const DetectionBox& box : detector_.boxes()) {
+      EXPECT_LT((box.middle() - camera_.disc_pixel(orientation)).norm(), 9) << "frame " << i;
+    }
+  }
+  EXPECT_GE(found, 8);
+}
+
+// Older pictures still show the scene without it; the one three before does not.
+TEST_F(MotionDetectorTest, ATargetThatHasStoppedIsNoDetectionThreeFramesLater) {
+  PanningCamera still(0);
+  Disc disc;
+  disc.velocity = {150, 0};
+  disc.place = {-90, 0};
+  still.disc = disc;
+  const int stop = 14;
+  int found = 0;
+  for (int i = 0; i <= stop + 4; ++i) {
+    const FrameOrientation orientation = still.orientation(i);
+    if (i >= stop) {
+      still.disc->velocity = {0, 0};
+      still.disc->place = disc.place + stop / kPanRate * disc.velocity;
+    }
+    const Pixels image = still.image(orientation);
+    static_cast<void>(detector_.find(image.view, orientation));
+    if (i == stop) found = static_cast<int>(detector_.boxes().size());
+  }
+  EXPECT_EQ(found, 1);
+  EXPECT_THAT(detector_.boxes(), ::testing::IsEmpty());
+}
+
+// As a lamp that blinks: brighter than in one earlier picture and darker than in another.
+TEST_F(MotionDetectorTest, WhatLiesBetweenTwoEarlierPicturesHasNotChanged) {
+  PanningCamera still(0);
+  still.disc.emplace();
+  const int last = 24;
+  for (int i = 0; i <= last; ++i) {
+    const FrameOrientation orientation = still.orientation(i);
+    still.disc->brighter = i == last ? 0 : (i / 4 % 2 == 0 ? 40 : -40);
+    const Pixels image = still.image(orientation);
+    static_cast<void>(detector_.find(image.view, orientation));
+  }
+  EXPECT_THAT(detector_.boxes(), ::testing::IsEmpty());
+}
+
 TEST_F(MotionDetectorTest, FindsATargetInTheCornerOfThePicture) {
   PanningCamera still(0);
   Disc disc;

@@ -78,6 +78,7 @@ class EdgeBridge {
   void poll_status();
   void poll_calibration();
   void poll_plane();
+  void forget_plane_transform();  // under ports_mutex_
   void wake_poll();
 
   void diagnose_connection(diagnostic_updater::DiagnosticStatusWrapper& status);

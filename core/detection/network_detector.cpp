@@ -1,0 +1,213 @@
+#include "core/detection/network_detector.h"
+
+#include <algorithm>
+#include <cmath>
+#include <opencv2/core/utils/logger.hpp>
+#include <opencv2/dnn.hpp>
+#include <opencv2/imgproc.hpp>
+
+namespace alidade {
+namespace {
+
+constexpr int kPaddingGrey = 114;  // as the networks were taught with
+
+// Of an output: where a candidate's value is.
+struct Layout {
+  bool values_first = false;  // 1 x values x candidates
+  int candidates = 0;
+  int classes = 0;
+
+  [[nodiscard]] int before_classes() const { return values_first ? 4 : 5; }
+};
+
+std::string shape_of(const cv::Mat& output) {
+  std::string shape;
+  for (int i = 0; i < output.dims; ++i) {
+    shape += (i > 0 ? "x" : "") + std::to_string(output.size[i]);
+  }
+  return shape;
+}
+
+bool layout_of(const cv::Mat& output, Layout* layout) {
+  if (output.dims != 3 || output.size[0] != 1 || output.type() != CV_32F) return false;
+  layout->values_first = output.size[1] < output.size[2];
+  const int values = layout->values_first ? output.size[1] : output.size[2];
+  layout->candidates = layout->values_first ? output.size[2] : output.size[1];
+  layout->classes = values - layout->before_classes();
+  return layout->classes >= 1;
+}
+
+// OpenCV logs what it also throws: the caller is told once.
+class SilentLog {
+ public:
+  SilentLog() : before_(cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT)) {}
+  ~SilentLog() { cv::utils::logging::setLogLevel(before_); }
+  SilentLog(const SilentLog&) = delete;
+  SilentLog& operator=(const SilentLog&) = delete;
+
+ private:
+  cv::utils::logging::LogLevel before_;
+};
+
+}  // namespace
+
+struct NetworkDetector::Network {
+  cv::dnn::Net net;
+  Layout layout;
+  cv::Mat scaled, input, blob, output;
+  cv::Rect of_picture;  // in the input
+  std::vector<cv::Rect2d> places;
+  std::vector<float> scores;
+  std::vector<int> classes, kept;
+
+  // The picture into the input's middle.
+  void letterbox(const cv::Mat& grey, const NetworkOptions& options) {
+    const double scale = std::min(static_cast<double>(options.width_px) / grey.cols,
+                                  static_cast<double>(options.height_px) / grey.rows);
+    of_picture.width = std::max(1, cvRound(grey.cols * scale));
+    of_picture.height = std::max(1, cvRound(grey.rows * scale));
+    of_picture.x = (options.width_px - of_picture.width) / 2;
+    of_picture.y = (options.height_px - of_picture.height) / 2;
+    cv::resize(grey, scaled, of_picture.size(), 0, 0,
+               scale < 1 ? cv::INTER_AREA : cv::INTER_LINEAR);
+    cv::copyMakeBorder(scaled, scaled, of_picture.y, options.height_px - of_picture.br().y,
+                       of_picture.x, options.width_px - of_picture.br().x, cv::BORDER_CONSTANT,
+                       cv::Scalar::all(kPaddingGrey));
+    cv::cvtColor(scaled, input, cv::COLOR_GRAY2BGR);
+  }
+
+  // In the picture's pixels.
+  void read_candidates(const cv::Size& picture, double threshold) {
+    places.clear();
+    scores.clear();
+    classes.clear();
+    const auto* values = output.ptr<float>();
+    const int first = layout.before_classes();
+    const auto value = [&](int candidate, int which) -> double {
+      const int at = layout.values_first ? which * layout.candidates + candidate
+                                         : candidate * (first + layout.classes) + which;
+      return values[at];
+    };
+    const double scale_u = static_cast<double>(of_picture.width) / picture.width;
+    const double scale_v = static_cast<double>(of_picture.height) / picture.height;
+    for (int i = 0; i < layout.candidates; ++i) {
+      int best = 0;
+      for (int k = 1; k < layout.classes; ++k) {
+        if (value(i, first + k) > value(i, first + best)) best = k;
+      }
+      const double score = value(i, first + best) * (layout.values_first ? 1 : value(i, 4));
+      if (!(score >= threshold)) continue;
+      const double width = value(i, 2) / scale_u;
+      const double height = value(i, 3) / scale_v;
+      const cv::Rect2d place =
+          cv::Rect2d((value(i, 0) - of_picture.x) / scale_u - width / 2,
+                     (value(i, 1) - of_picture.y) / scale_v - height / 2, width, height) &
+          cv::Rect2d(0, 0, picture.width, picture.height);
+      if (!(place.area() > 0)) continue;
+      places.push_back(place);
+      scores.push_back(static_cast<float>(std::min(score, 1.0)));
+      classes.push_back(best);
+    }
+  }
+
+  // False: the network is not for this input.
+  bool forward() {
+    try {
+      cv::dnn::blobFromImage(input, blob, 1.0 / 255);
+      net.setInput(blob);
+      output = net.forward();
+    } catch (const cv::Exception&) {
+      return false;
+    }
+    return true;
+  }
+};
+
+bool NetworkOptions::validate(const char** error) const {
+  const char* problem = nullptr;
+  if (most_boxes < 1) problem = "most_boxes must be at least 1";
+  if (!(most_overlap >= 0 && most_overlap <= 1)) problem = "most_overlap must be 0 to 1";
+  if (!(threshold > 0 && threshold < 1)) problem = "threshold must be between 0 and 1";
+  if (width_px < 32 || height_px < 32 || width_px > 4096 || height_px > 4096) {
+    problem = "width_px and height_px must be 32 to 4096";
+  }
+  if (error != nullptr && problem != nullptr) *error = problem;
+  return problem == nullptr;
+}
+
+NetworkDetector::NetworkDetector(std::unique_ptr<Network> network, const NetworkOptions& options)
+    : options_(options), network_(std::move(network)) {}
+
+NetworkDetector::~NetworkDetector() = default;
+
+int NetworkDetector::classes() const { return network_->layout.classes; }
+
+std::unique_ptr<NetworkDetector> NetworkDetector::load(const std::string& model,
+                                                       const NetworkOptions& options,
+                                                       std::string* error) {
+  const SilentLog silent;
+  auto network = std::make_unique<Network>();
+  try {
+    network->net = cv::dnn::readNetFromONNX(model.data(), model.size());
+  } catch (const cv::Exception&) {
+  }
+  if (network->net.empty()) {
+    *error = "is no ONNX network that OpenCV can read; export it with opset 12, static shape";
+    return nullptr;
+  }
+  const std::string size =
+      std::to_string(options.width_px) + "x" + std::to_string(options.height_px);
+  network->input.create(options.height_px, options.width_px, CV_8UC3);
+  network->input.setTo(cv::Scalar::all(kPaddingGrey));
+  if (!network->forward()) {
+    *error = "takes no pictures of " + size +
+             " px with three channels; set width_px and height_px to what it was exported with";
+    return nullptr;
+  }
+  if (!layout_of(network->output, &network->layout)) {
+    *error = "has an output of " + shape_of(network->output) +
+             "; expected 1x(4+classes)xN as of YOLOv8, or 1xNx(5+classes) as of YOLOv5";
+    return nullptr;
+  }
+  const auto classes = static_cast<std::size_t>(network->layout.classes);
+  if (!options.labels.empty() && options.labels.size() != classes) {
+    *error = "tells " + std::to_string(classes) + " classes, but there are " +
+             std::to_string(options.labels.size()) + " labels; expected as many, one a line";
+    return nullptr;
+  }
+  return std::unique_ptr<NetworkDetector>(new NetworkDetector(std::move(network), options));
+}
+
+NetworkStatus NetworkDetector::find(const ImageView& image) {
+  boxes_.clear();
+  if (!image.valid() || image.stride < 0) return NetworkStatus::kNoImage;
+  Network& n = *network_;
+  const cv::Mat grey(image.height, image.width, CV_8U, const_cast<std::uint8_t*>(image.row(0)),
+                     static_cast<std::size_t>(image.stride));
+  n.letterbox(grey, options_);
+  Layout layout;
+  if (!n.forward() || !layout_of(n.output, &layout) || layout.classes != n.layout.classes) {
+    return NetworkStatus::kFailed;
+  }
+  n.layout = layout;
+  n.read_candidates(grey.size(), options_.threshold);
+  cv::dnn::NMSBoxes(n.places, n.scores, static_cast<float>(options_.threshold),
+                    static_cast<float>(options_.most_overlap), n.kept);
+  const auto most = static_cast<std::size_t>(options_.most_boxes);
+  if (n.kept.size() > most) n.kept.resize(most);
+  for (const int kept : n.kept) {
+    const auto at = static_cast<std::size_t>(kept);
+    DetectionBox box;
+    box.u = n.places[at].x;
+    box.v = n.places[at].y;
+    box.width = n.places[at].width;
+    box.height = n.places[at].height;
+    box.score = n.scores[at];
+    const auto number = static_cast<std::size_t>(n.classes[at]);
+    box.name = options_.labels.empty() ? std::to_string(number) : options_.labels[number];
+    boxes_.push_back(std::move(box));
+  }
+  return NetworkStatus::kOk;
+}
+
+}  // namespace alidade
