@@ -124,13 +124,17 @@ struct Part {
   int frames = 0;
   int oe = 0;
   void print(const char* name) const {
+    const double common = mean(log_errors);
+    std::vector<double> about = log_errors;
+    for (double& error : about) error -= common;
     std::printf(
-        "%-8s %4d frames, OE %5.1f %%, rms %.3f px (worst %.3f), log f %.1e rms (worst %.1e), "
-        "worst %.2f sigmas, f %.2f "
+        "%-9s %4d frames, OE %5.1f %%, rms %.3f px (worst %.3f), log f %.1e rms (%.1e common to "
+        "all, %.1e about it), worst %.2f sigmas, f %.2f "
         "sigmas, rms of sigmas %.2f, f %.2f; process() %.2f ms (median)\n",
         name, frames, 100.0 * oe / std::max(frames, 1), root_mean_square(rms_px), largest(rms_px),
-        root_mean_square(log_errors), largest(log_errors), largest(sigmas), largest(log_sigmas),
-        root_mean_square(sigmas), root_mean_square(log_sigmas), median(cpu_ms));
+        root_mean_square(log_errors), common, root_mean_square(about), largest(sigmas),
+        largest(log_sigmas), root_mean_square(sigmas), root_mean_square(log_sigmas),
+        median(cpu_ms));
   }
 };
 
@@ -195,7 +199,7 @@ int run(const Options& options) {
     if (frame.mode != OrientationMode::kOe) continue;
     ++part.oe;
     part.rms_px.push_back(e.rms_px);
-    part.log_errors.push_back(std::abs(camera.log_error(k, frame)));
+    part.log_errors.push_back(camera.log_error(k, frame));
     part.sigmas.push_back(e.sigmas);
     part.log_sigmas.push_back(e.log_sigmas);
     part.cpu_ms.push_back(cpu_ms);
