@@ -1,6 +1,7 @@
 // alidade_zoom_sweep: OE mode while the lens zooms, against truth: 1280x720, 20x from 1200 to 24,000 px, line delay -14.2 us, noise of
 // 2 grey levels, JPEG of quality 85, telemetry of 50 urad; at rest, a sweep, at rest, back.
-//   alidade_zoom_sweep [--seed N] [--factor 10] [--sweep 5] [--from 1200] [--fault none|stuck|late|coarse] [--cache DIR] [--details]
+//   alidade_zoom_sweep [--seed N] [--factor 10] [--sweep 5] [--from 1200] [--fault none|stuck|late|coarse] [--cache DIR] [--exact-curve]
+//                      [--details]
 // Exit status: 0 no frame is beyond 5 sigmas, 1 some are, 2 wrong usage.
 
 #include <CLI/CLI.hpp>
@@ -33,6 +34,7 @@ struct Options {
   double rest_s = 2;
   double fields = 0.5;  // of view a second
   std::string fault = "none";
+  bool exact_curve = false;
   bool details = false;
   std::string cache;  // folder
 };
@@ -140,7 +142,8 @@ struct Part {
 
 int run(const Options& options) {
   const simulator::Config config = camera_of(options);
-  ZoomingCamera camera(config, std::make_unique<ZoomedPath>(config, options.fields, 4));
+  ZoomingCamera camera(config, std::make_unique<ZoomedPath>(config, options.fields, 4),
+                       options.exact_curve ? 0 : 1);
   const std::vector<cv::Mat> film = film_of(camera, config, options);
   OeOptions oe_options;
   oe_options.max_width = config.image.width;
@@ -230,6 +233,8 @@ int main(int argc, char** argv) {
   app.add_option("--fault", options.fault, "of the zoom reading")
       ->check(CLI::IsMember({"none", "stuck", "late", "coarse"}));
   app.add_option("--cache", options.cache, "folder where the rendered film is kept");
+  app.add_flag("--exact-curve", options.exact_curve,
+               "distortion and optical centre are told as they are");
   app.add_flag("--details", options.details, "a line a frame");
   try {
     app.parse(argc, argv);
