@@ -19,53 +19,9 @@ namespace alidade::test {
 namespace {
 
 using simulator::Config;
-using simulator::PatchConfig;
 
 // Telemetry begins that long before the first frame and ends that long after the last, s.
 constexpr double kTelemetryMargin = 1;
-
-// All that a noise-free frame under a zoom depends on besides.
-template <class Add>
-void add_zoom(const simulator::ZoomConfig& zoom, double path_focal_length, const Add& add) {
-  const simulator::ZoomPathConfig& path = zoom.path;
-  add('z', path_focal_length, zoom.focal_length.wide, zoom.focal_length.tele, zoom.shape,
-      zoom.ripple, zoom.distortion.wide, zoom.distortion.tele, zoom.centre.transpose(),
-      zoom.centre_wander, zoom.reading.wide, zoom.reading.tele, zoom.sigma_rep, zoom.backlash,
-      zoom.speed, zoom.acceleration);
-  add(static_cast<int>(path.type), path.reading.value_or(-1), path.factor, path.duration, path.stop,
-      path.rate, path.file.string());
-  for (const auto& stop : path.stops) {
-    add(stop.reading.value_or(-1), stop.focal_length.value_or(-1), stop.rest);
-  }
-}
-
-// All that a noise-free frame depends on.
-std::string image_key(const Config& config) {
-  std::ostringstream key;
-  key << std::setprecision(17);
-  const auto add = [&key](auto... values) { ((key << values << ' '), ...); };
-  const auto& [image, camera, path, scene, sensor] =
-      std::tie(config.image, config.camera, config.path, config.scene, config.sensor);
-  add(config.seed, config.duration, image.width, image.height, image.rate_hz);
-  add(camera.focal_length, camera.aspect, camera.radial_distortion, camera.line_delay);
-  add(camera.pan_axis_offset.transpose(), camera.tilt_axis_offset.transpose());
-  add(static_cast<int>(path.type), path.amplitude, path.period, path.stop, path.pan, path.tilt,
-      path.file.string());
-  add(scene.background, scene.detail);
-  for (const auto* patches : {&scene.photos, &scene.procedural, &scene.flat, &scene.moving}) {
-    add('|');
-    for (const PatchConfig& patch : *patches) {
-      add(patch.file.filename().string(), patch.azimuth, patch.elevation, patch.width, patch.height,
-          patch.azimuth_rate, patch.elevation_rate, patch.brightness,
-          static_cast<int>(patch.projection));
-    }
-  }
-  if (config.zoom) add_zoom(*config.zoom, path.focal_length, add);
-  add(sensor.exposure, sensor.vignetting, sensor.boil);
-  for (const auto& step : sensor.brightness_steps) add(step.time, step.factor);
-  for (const auto& interval : sensor.covered) add('-', interval.from, interval.to);
-  return key.str();
-}
 
 Config without_noise(Config config) {
   config.sensor.read_noise = 0;
@@ -111,7 +67,8 @@ RenderedRecording::RenderedRecording(std::string name, const Config& config,
       path_(simulator::make_path(config)),
       camera_(config.camera, config.image, *path_, simulator::make_zoom(config)),
       renderer_(std::make_unique<simulator::Renderer>(without_noise(config), *path_)),
-      telemetry_(telemetry_noise(config)) {
+      telemetry_(telemetry_noise(config)),
+      kept_(name_, image_key(config), cache) {
   simulator::Telemetry head(config, *path_);
   const int samples = static_cast<int>(
       std::ceil((config.duration + 2 * kTelemetryMargin) * config.telemetry.rate_hz));
@@ -123,33 +80,13 @@ RenderedRecording::RenderedRecording(std::string name, const Config& config,
       throw simulator::ConfigError("telemetry that has no noise or too many samples");
     }
   }
-  if (cache.empty()) return;
-  std::ostringstream folder;
-  folder << name_ << '-' << std::hex << std::hash<std::string>{}(image_key(config));
-  cache_ = cache / folder.str();
-  std::filesystem::create_directories(cache_);
 }
 
 cv::Mat RenderedRecording::rendered(int frame) const {
-  std::array<char, 32> name{};
-  std::snprintf(name.data(), name.size(), "%06d.pgm", frame);
-  const std::string file = (cache_ / name.data()).string();
-  if (!cache_.empty() && std::filesystem::exists(file)) {
-    cv::Mat image = cv::imread(file, cv::IMREAD_GRAYSCALE);
-    if (image.empty()) throw std::runtime_error(file + ": cannot be read");
-    return image;
-  }
-  std::vector<std::uint8_t> pixels = renderer_->render(time(frame), frame);
-  const cv::Mat image(config_.image.height, config_.image.width, CV_8U, pixels.data());
-  if (!cache_.empty()) {
-    // Under another name first: whoever stops in between leaves no half image.
-    const std::string unfinished = file + ".part.pgm";
-    if (!cv::imwrite(unfinished, image)) {
-      throw std::runtime_error(unfinished + ": cannot be written");
-    }
-    std::filesystem::rename(unfinished, file);
-  }
-  return image.clone();
+  return kept_.frame(frame, [&] {
+    std::vector<std::uint8_t> pixels = renderer_->render(time(frame), frame);
+    return cv::Mat(config_.image.height, config_.image.width, CV_8U, pixels.data()).clone();
+  });
 }
 
 cv::Mat RenderedRecording::image(int frame, FrameNoise noise) const {

@@ -19,6 +19,7 @@
 #include "core/model/calibration.h"
 #include "core/realtime/image/image_view.h"
 #include "core/realtime/telemetry/telemetry_buffer.h"
+#include "test/accuracy/kept_frames.h"
 #include "test/simulator/renderer.h"
 
 namespace alidade::test {
@@ -83,7 +84,7 @@ class RenderedRecording {
   simulator::CameraModel camera_;
   std::unique_ptr<simulator::Renderer> renderer_;
   TelemetryBuffer<4096> telemetry_;
-  std::filesystem::path cache_;  // of this recording, or empty
+  KeptFrames kept_;
 };
 
 }  // namespace alidade::test

@@ -102,14 +102,15 @@ class ZoomedPath : public simulator::Path {
 
 class ZoomingCamera {
  public:
-  // config: with a zoom.
-  ZoomingCamera(const simulator::Config& config, std::unique_ptr<simulator::Path> path)
+  // config: with a zoom. curve_errors: times what is drawn.
+  ZoomingCamera(const simulator::Config& config, std::unique_ptr<simulator::Path> path,
+                double curve_errors = 1)
       : config_(config),
         path_(std::move(path)),
         renderer_(config, *path_),
         random_(config.seed),
-        corner_error_px_(kCorner_px * normal_(random_)),
-        centre_error_px_(draw_centre_error()) {}
+        corner_error_px_(curve_errors * kCorner_px * normal_(random_)),
+        centre_error_px_(curve_errors * draw_centre_error()) {}
 
   [[nodiscard]] const simulator::CameraModel& camera() const { return renderer_.camera(); }
   [[nodiscard]] double time_s(int k) const { return k / config_.image.rate_hz; }

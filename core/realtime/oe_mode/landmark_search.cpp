@@ -1,6 +1,7 @@
 #include "core/realtime/oe_mode/landmark_search.h"
 
 #include <Eigen/LU>
+#include <algorithm>
 #include <cmath>
 
 #include "core/model/direction.h"
@@ -12,6 +13,17 @@ namespace {
 
 // Landmarks between the one that memory is asked for and the one that is looked at.
 constexpr std::size_t kLandmarksAhead = 2;
+// By so little places differ that are known to a pixel or so.
+constexpr double kSameView_px = 2;
+
+// Of a warp: what the zoom makes of it before it is prepared again.
+float zoomed_ahead(const SearchedFrame& frame, float tolerance) {
+  if (!frame.zooms) return 1;
+  constexpr double kAhead_s = 0.1;  // of a slow zoom
+  constexpr float kShare = 0.6F;    // of the tolerance, as elements of a warp are up to 1.4
+  const float most = kShare * tolerance;
+  return 1 - std::clamp(static_cast<float>(kAhead_s * frame.zoom_rate), -most, most);
+}
 
 }  // namespace
 
@@ -21,7 +33,8 @@ bool LandmarkSearchOptions::validate(const char** error) const {
   if (!(coarse_reach_px > 0)) problem = "coarse_reach_px must be positive";
   if (!(search_sigmas > 0)) problem = "search_sigmas must be positive";
   if (!(cone_margin >= 1)) problem = "cone_margin must be at least 1";
-  if (!(fine_warp_tolerance > 0) || !(coarse_warp_tolerance > 0) || !(zooming_warp_tolerance > 0)) {
+  if (!(fine_warp_tolerance > 0) || !(coarse_warp_tolerance > 0) || !(zooming_warp_tolerance > 0) ||
+      !(zooming_coarse_warp_tolerance > 0)) {
     problem = "warp tolerances must be positive";
   }
   if (coarse_patches < 1 || coarse_patches > kMaxCoarsePatches) {
@@ -50,6 +63,7 @@ void LandmarkSearch::reset(const Calibration& calibration) {
 }
 
 void LandmarkSearch::clear() {
+  knows_view_ = false;
   choice_.clear();
   coarse_.clear();
   coarse_slots_.clear();
@@ -68,17 +82,21 @@ LandmarkSearch::Coarse LandmarkSearch::align_coarse(const SearchedFrame& frame,
   out.motion = predicted;
   Vector2<double> angle;
   out.aligned = fit_coarse(frame, sigma_px, &angle);
+  knows_view_ = !out.aligned;
   if (!out.aligned) return out;
   out.motion.angle.pan += angle.x();
   out.motion.angle.tilt += angle.y();
   out.shift_px = angle.norm() * frame.calibration.camera.focal_length;
+  knows_view_ = out.shift_px < kSameView_px;
   return out;
 }
 
 LandmarkSearch::Fine LandmarkSearch::align_fine(const SearchedFrame& frame,
                                                 const FrameMotion<double>& motion) {
   const ViewProjection view(frame.calibration, motion);
-  find_visible(frame, view);
+  // At many zooms many landmarks were made, and what coarse alignment saw of them serves again.
+  if (!frame.zooms || !knows_view_) find_visible(frame, view);
+  knows_view_ = false;
   choose_fine(frame);
   fit_fine(frame, view);
   return {choice_.fine_visible(), static_cast<int>(choice_.chosen().size()),
@@ -107,6 +125,13 @@ void LandmarkSearch::ask_for(const SearchedFrame& frame, const VisibleLandmark& 
   ask_for_patch(frame.pyramid.octave(wanted.octave), std::ldexp(1.0, -wanted.octave) * wanted.u);
 }
 
+float LandmarkSearch::warp_tolerance(const SearchedFrame& frame, int octave) const {
+  if (frame.octaves.is_coarse(octave)) {
+    return frame.zooms ? options_.zooming_coarse_warp_tolerance : options_.coarse_warp_tolerance;
+  }
+  return frame.zooms ? options_.zooming_warp_tolerance : options_.fine_warp_tolerance;
+}
+
 // The landmark's image as this frame should show it; null if it cannot.
 const ReferencePatch* LandmarkSearch::reference(const SearchedFrame& frame, int slot, int octave,
                                                 const SeenDirection& seen) {
@@ -114,15 +139,15 @@ const ReferencePatch* LandmarkSearch::reference(const SearchedFrame& frame, int 
   const Matrix2<double> J_octave = std::ldexp(1.0, -octave) * seen.J_d * tangent_basis(landmark.d);
   const Matrix2<double> A = landmark.J_pixel_tangent * J_octave.inverse();
   Prepared& prepared = prepared_[static_cast<std::size_t>(slot)];
-  const float at_rest = frame.octaves.is_coarse(octave) ? options_.coarse_warp_tolerance
-                                                        : options_.fine_warp_tolerance;
-  const float tolerance = frame.zooms ? options_.zooming_warp_tolerance : at_rest;
+  const float tolerance = warp_tolerance(frame, octave);
   const Matrix2<float> wanted = A.cast<float>();
   if (prepared.id != landmark.id || !((prepared.A - wanted).cwiseAbs().maxCoeff() <= tolerance)) {
     // Seen as it was, it needs no resampling.
     const bool alike =
         (wanted - Matrix2<float>::Identity()).cwiseAbs().maxCoeff() <= 0.5F * tolerance;
-    prepared.A = alike ? Matrix2<float>::Identity() : wanted;
+    // As it will be seen when the lens has zoomed through half of what it serves for.
+    prepared.A = zoomed_ahead(frame, tolerance) * wanted;
+    if (alike) prepared.A.setIdentity();
     prepared.id = landmark.id;
     prepared.status =
         prepare(landmark.image(), Vector2<double>::Constant(kReferenceCentre),

@@ -38,8 +38,9 @@ struct LandmarkSearchOptions {
   // As the reference was seen; a patch is prepared again when an element of its warp changed by this, > 0.
   float fine_warp_tolerance = 0.02F;
   float coarse_warp_tolerance = 0.04F;
-  // While the lens zooms every view is another one.
+  // While the lens zooms every view is another one; what is coarse leads to a few tenths of a pixel only.
   float zooming_warp_tolerance = 0.05F;
+  float zooming_coarse_warp_tolerance = 0.1F;
   double cone_margin = 1.3;  // see VisibleLandmarks::reset(), >= 1
   double search_sigmas = 3;  // of the prediction, that the first search among coarse octaves covers
   double coarse_reach_px = 0.75;  // px of the coarsest octave that alignment finds without a search
@@ -68,7 +69,8 @@ struct SearchedFrame {
   const Octaves& octaves;
   // Where the frame's lens is another than the map's, its columns of sensitivities; null: the same.
   const LensColumns* lens = nullptr;
-  bool zooms = false;  // the lens moves
+  bool zooms = false;    // the lens moves
+  double zoom_rate = 0;  // 1/s, of log f, as expected
 };
 
 class LandmarkSearch {
@@ -81,6 +83,7 @@ class LandmarkSearch {
   void reset(const Calibration& calibration);
   void change_lens(const Calibration& calibration) {
     visible_.change_lens(calibration, options_.cone_margin);
+    knows_view_ = false;
   }
   // Nothing is found; to begin a frame with, and when the map is cleared.
   void clear();
@@ -139,12 +142,14 @@ class LandmarkSearch {
     PrepareStatus status = PrepareStatus::kTooFlat;
   };
 
+  [[nodiscard]] float warp_tolerance(const SearchedFrame& frame, int octave) const;
   void ask_for(const SearchedFrame& frame, const VisibleLandmark& wanted) const;
   const ReferencePatch* reference(const SearchedFrame& frame, int slot, int octave,
                                   const SeenDirection& seen);
 
   LandmarkSearchOptions options_;
   VisibleLandmarks visible_;
+  bool knows_view_ = false;  // visible_ has what the next look shall see
   LandmarkChoice choice_;
   std::vector<Prepared> prepared_;  // by slot
   std::vector<CoarsePatch> coarse_;

@@ -166,7 +166,13 @@ class OeMode {
   };
 
   [[nodiscard]] SearchedFrame searched() const {
-    return {calibration_, map_, pyramid_, octaves_, lens_.columns(), lens_.moves()};
+    return {calibration_,
+            map_,
+            pyramid_,
+            octaves_,
+            lens_.columns(),
+            lens_.moves(),
+            lens_.expected().value[1]};
   }
   void begin_frame(const ImageView& image, double frame_time_s,
                    const InterpolatedPanTilt* telemetry);

@@ -16,9 +16,11 @@ VisibleLandmarks::VisibleLandmarks(int capacity) {
 }
 
 int octaves_larger(const Landmark& landmark, double focal_length) {
-  const double made_px =
-      std::ldexp(std::sqrt(std::abs(landmark.J_pixel_tangent.determinant())), landmark.octave);
-  return static_cast<int>(std::lround(std::log2(focal_length / made_px)));
+  const double made_square =
+      std::ldexp(std::abs(landmark.J_pixel_tangent.determinant()), 2 * landmark.octave);
+  // The rounded binary logarithm of the square's root, by exponents alone: it is asked of all that are near.
+  const int exponent = std::ilogb(2 * focal_length * focal_length / made_square);
+  return (exponent - (exponent & 1)) / 2;
 }
 
 void VisibleLandmarks::reset(const Calibration& calibration, double cone_margin) {

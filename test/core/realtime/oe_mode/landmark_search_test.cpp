@@ -103,6 +103,47 @@ TEST_F(SearchedScene, FindsLandmarksAtTheSamePlaceHoweverLongAPatchServes) {
   EXPECT_LT(std::sqrt(squares / compared), 4 * kWider * kWider + AlignmentLimits{}.converged_step);
 }
 
+// While the lens zooms, fine landmarks are chosen from what coarse alignment saw: whichever view was looked at before.
+TEST_F(SearchedScene, ChoosesFromThisFramesViewWhileTheLensZooms) {
+  const auto chosen = [&](const SearchedFrame& searched, const FrameMotion<double>& coarse_about,
+                          const FrameMotion<double>& about) {
+    static_cast<void>(search_.align_coarse(searched, coarse_about, 0));
+    static_cast<void>(search_.align_fine(searched, about));
+    std::set<int> slots;
+    for (const VisibleLandmark& landmark : search_.chosen()) slots.insert(landmark.slot);
+    return slots;
+  };
+  SearchedFrame zooms = frame();
+  zooms.zooms = true;
+  for (const Vector2<double>& at : {Vector2<double>(0, 0), {5.3, -3.7}, {-31, 18}}) {
+    scene_.look(at);
+    const FrameMotion<double> there = TexturedScene::motion_at(at);
+    const FrameMotion<double> off = TexturedScene::motion_at(at + Vector2<double>(30, -20));
+    const std::set<int> expected = chosen(frame(), there, there);
+    ASSERT_GT(expected.size(), 50U);
+    EXPECT_EQ(chosen(zooms, there, there), expected);
+    // Coarse alignment moves it there; a second look, at another view, sees that.
+    EXPECT_EQ(chosen(zooms, off, there), expected);
+    static_cast<void>(search_.align_fine(zooms, off));
+    static_cast<void>(search_.align_fine(zooms, there));
+    EXPECT_EQ(search_.chosen().size(), expected.size());
+  }
+}
+
+TEST_F(SearchedScene, CountsTheOctavesThatALandmarkHasGrownByAsTheyRound) {
+  Landmark landmark;
+  landmark.J_pixel_tangent << 1000, 120, -60, 900;
+  for (const std::uint8_t octave : {std::uint8_t{0}, std::uint8_t{3}}) {
+    landmark.octave = octave;
+    const double made_px =
+        std::sqrt(landmark.J_pixel_tangent.determinant()) * std::ldexp(1.0, octave);
+    for (double octaves = -6.02; octaves < 6; octaves += 0.09) {
+      EXPECT_EQ(octaves_larger(landmark, made_px * std::exp2(octaves)), std::lround(octaves))
+          << octaves;
+    }
+  }
+}
+
 TEST_F(SearchedScene, FindsNothingWhereThereIsNothing) {
   scene_.look_at_nothing();
   const LandmarkSearch::Coarse coarse =
