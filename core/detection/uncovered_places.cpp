@@ -86,10 +86,9 @@ void drop_uncovered_places(const SmoothedView& now, const std::int16_t* z,
   };
   // A negative score marks it: a box that goes may tell of another one that it goes, too.
   for (DetectionBox& box : *boxes) {
-    const bool uncovered =
-        std::any_of(boxes->begin(), boxes->end(), [&](const DetectionBox& front) {
-          return &front != &box && uncovered_by(box, front);
-        });
+    const bool uncovered = std::any_of(
+        boxes->begin(), boxes->end(),
+        [&](const DetectionBox& front) { return &front != &box && uncovered_by(box, front); });
     if (uncovered) box.score = -box.score;
   }
   boxes->erase(std::remove_if(boxes->begin(), boxes->end(),
