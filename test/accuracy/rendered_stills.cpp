@@ -152,7 +152,8 @@ std::vector<StillView> map_views(int columns) {
       for (int column = 0; column < in_row; ++column) {
         // No two of a level at the same: the lens comes to rest anew for each.
         const double off = 1 + 0.004 * (static_cast<double>(views.size() % 3) - 1);
-        views.push_back({step * across * (column - (in_row - 1) / 2.0), 0.35 * down * row, f * off});
+        views.push_back(
+            {step * across * (column - (in_row - 1) / 2.0), 0.35 * down * row, f * off});
       }
     }
   }
