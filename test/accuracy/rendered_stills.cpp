@@ -141,6 +141,7 @@ simulator::Lens RenderedStills::lens(int i) const { return camera_->lens_at(time
 double RenderedStills::zoom_reading(int i) const { return camera_->zoom()->reported(time_of(i)); }
 
 std::vector<StillView> map_views(int columns) {
+  const double step = 0.3 * 4 / (columns - 1);  // of a field
   std::vector<StillView> views;
   for (int level = 0; level < kStillLevels; ++level) {
     const double f = kWidestFocalLength_px * std::pow(2, level);
@@ -151,7 +152,8 @@ std::vector<StillView> map_views(int columns) {
       for (int column = 0; column < in_row; ++column) {
         // No two of a level at the same: the lens comes to rest anew for each.
         const double off = 1 + 0.004 * (static_cast<double>(views.size() % 3) - 1);
-        views.push_back({0.3 * across * (column - (in_row - 1) / 2.0), 0.35 * down * row, f * off});
+        views.push_back(
+            {step * across * (column - (in_row - 1) / 2.0), 0.35 * down * row, f * off});
       }
     }
   }

@@ -50,7 +50,8 @@ class RenderedStills {
   std::filesystem::path cache_;
 };
 
-// 3 columns - 2 views, in three rows, at each of five focal lengths, each level about the middle of the wider one.
+// 3 columns - 2 views, in three rows, at each of five focal lengths, each level about the middle of the wider one;
+// with more columns they lie closer.
 [[nodiscard]] std::vector<StillView> map_views(int columns);
 // Views inside those, at any focal length between the levels' least and most, the longest first.
 [[nodiscard]] std::vector<StillView> random_views(int count, std::uint64_t seed);

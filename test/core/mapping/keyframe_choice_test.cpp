@@ -16,7 +16,17 @@ TEST(KeyframeChoice, KeepsPicturesAPartOfTheirFieldApart) {
   EXPECT_TRUE(choice.is_new({{0, 0.36 * 2 * std::atan(0.18)}, log_f}));
   // The longer of two focal lengths has the smaller field.
   EXPECT_FALSE(choice.is_new({{0.1 * field, 0}, log_f + 0.3}));
+  EXPECT_TRUE(choice.is_new({{0.3 * field, 0}, log_f + 0.3}));
   EXPECT_TRUE(choice.is_new({{0, 0}, log_f + 0.36}));
+}
+
+TEST(KeyframeChoice, PansLessFarWhereItLooksUp) {
+  KeyframeChoice choice(1280, 720);
+  const double log_f = std::log(2000.0);
+  const double field = 2 * std::atan(0.32);
+  choice.keep({{0, 1}, log_f});
+  EXPECT_FALSE(choice.is_new({{0.36 * field, 1}, log_f}));
+  EXPECT_TRUE(choice.is_new({{0.36 * field / std::cos(1.0), 1}, log_f}));
 }
 
 TEST(KeyframeChoice, KnowsThatPanTurnsAround) {

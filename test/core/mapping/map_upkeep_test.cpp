@@ -283,6 +283,17 @@ TEST(Descriptors, ADifferenceOfLessThanAStepIsNotLost) {
   EXPECT_NEAR(average[7], 45, 1);
 }
 
+// Their distances are compared with bounds that are for descriptors of one length.
+TEST(Descriptors, AnAverageIsAsLongAsThoseItIsOf) {
+  Descriptor average{}, seen{};
+  for (std::size_t i = 0; i < average.size(); ++i) (i % 2 == 0 ? average : seen)[i] = 64;
+  average_descriptor(seen, 0.5, 1, &average);
+  double square = 0;
+  for (const int value : average) square += value * value;
+  // 64 values of 64 each; each is rounded by less than one.
+  EXPECT_NEAR(std::sqrt(square), 64 * 8, std::sqrt(128.0));
+}
+
 TEST(SphereCell, CellsAreOfTheSizeThatWasAskedFor) {
   // Random directions in a cap; neighbours nearer than a tenth of a side share a cell nine times in ten or so, those two sides apart never.
   std::mt19937_64 random(3);
