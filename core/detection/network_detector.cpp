@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <exception>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/dnn.hpp>
 #include <opencv2/imgproc.hpp>
@@ -28,9 +29,22 @@ std::string shape_of(const cv::Mat& output) {
   return shape;
 }
 
-bool layout_of(const cv::Mat& output, Layout* layout) {
+// As YOLO's three grids have, of strides 8, 16 and 32.
+int places_of(const NetworkOptions& options) {
+  int places = 0;
+  for (const int stride : {8, 16, 32})
+    places += (options.width_px / stride) * (options.height_px / stride);
+  return places;
+}
+
+bool layout_of(const cv::Mat& output, const NetworkOptions& options, Layout* layout) {
   if (output.dims != 3 || output.size[0] != 1 || output.type() != CV_32F) return false;
-  layout->values_first = output.size[1] < output.size[2];
+  // Small inputs have fewer candidates than values; others than YOLO's own have other grids.
+  const int places = places_of(options);
+  const bool as_v8 = output.size[2] == places;
+  const bool as_v5 = output.size[1] == 3 * places;
+  if (as_v8 == as_v5 && output.size[1] == output.size[2]) return false;
+  layout->values_first = as_v8 != as_v5 ? as_v8 : output.size[1] < output.size[2];
   const int values = layout->values_first ? output.size[1] : output.size[2];
   layout->candidates = layout->values_first ? output.size[2] : output.size[1];
   layout->classes = values - layout->before_classes();
@@ -116,7 +130,7 @@ struct NetworkDetector::Network {
       cv::dnn::blobFromImage(input, blob, 1.0 / 255);
       net.setInput(blob);
       output = net.forward();
-    } catch (const cv::Exception&) {
+    } catch (const std::exception&) {
       return false;
     }
     return true;
@@ -149,7 +163,7 @@ std::unique_ptr<NetworkDetector> NetworkDetector::load(const std::string& model,
   auto network = std::make_unique<Network>();
   try {
     network->net = cv::dnn::readNetFromONNX(model.data(), model.size());
-  } catch (const cv::Exception&) {
+  } catch (const std::exception&) {
   }
   if (network->net.empty()) {
     *error = "is no ONNX network that OpenCV can read; export it with opset 12, static shape";
@@ -164,7 +178,7 @@ std::unique_ptr<NetworkDetector> NetworkDetector::load(const std::string& model,
              " px with three channels; set width_px and height_px to what it was exported with";
     return nullptr;
   }
-  if (!layout_of(network->output, &network->layout)) {
+  if (!layout_of(network->output, options, &network->layout)) {
     *error = "has an output of " + shape_of(network->output) +
              "; expected 1x(4+classes)xN as of YOLOv8, or 1xNx(5+classes) as of YOLOv5";
     return nullptr;
@@ -186,7 +200,8 @@ NetworkStatus NetworkDetector::find(const ImageView& image) {
                      static_cast<std::size_t>(image.stride));
   n.letterbox(grey, options_);
   Layout layout;
-  if (!n.forward() || !layout_of(n.output, &layout) || layout.classes != n.layout.classes) {
+  if (!n.forward() || !layout_of(n.output, options_, &layout) ||
+      layout.classes != n.layout.classes) {
     return NetworkStatus::kFailed;
   }
   n.layout = layout;

@@ -21,6 +21,7 @@
 #include "edge_app/commands/check_measurement.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/lens_prior.h"
+#include "edge_app/commands/live_targets.h"
 #include "edge_app/commands/scene_loading.h"
 #include "edge_app/output/mqtt_connection.h"
 
@@ -199,6 +200,7 @@ int check_links(const CheckOptions& options) {
   const NamedCalibration calibration = choose_calibration(config);
   check_lens_prior(config, calibration.calibration.camera);
   static_cast<void>(require_plane(config));
+  static_cast<void>(load_network(config.detectors.onnx));
   require_followable_lens(config, options.config, calibration);
   if (!options.json) print_beginning(options.config, calibration);
 

@@ -43,16 +43,22 @@ std::string why_not(const Localization& found) {
 SceneCheck check_scene(const Config& config, const NamedCalibration& calibration,
                        const Measured& measured) {
   SceneCheck scene;
+  // The configuration's reader has said that mode PT does not use it.
+  if (!config.realtime.landmarks) return scene;
   scene.file = config.scene_map.file;
-  if (scene.file.empty() || !measured.last) return scene;
-  const Frame& picture = measured.last->frame;
-  scene.frame = picture.stamp.frame;
+  const Camera<double>& camera = calibration.calibration.camera;
+  const int width = measured.last ? measured.last->frame.width : camera.width;
+  const int height = measured.last ? measured.last->frame.height : camera.height;
+  if (scene.file.empty() || width == 0) return scene;
   SceneMapFile file;
   SceneMap map;
-  if (!open_scene(config.scene_map, picture.width, picture.height, &file, &map, &scene.error)) {
+  if (!open_scene(config.scene_map, width, height, &file, &map, &scene.error)) {
     add_problem(&scene.findings, "scene map: " + scene.error);
     return scene;
   }
+  if (!measured.last) return scene;
+  const Frame& picture = measured.last->frame;
+  scene.frame = picture.stamp.frame;
   scene.keyframes = static_cast<std::int64_t>(map.keyframes.size());
   scene.landmarks = static_cast<std::int64_t>(map.landmarks.size());
   scene.mechanics = map.mechanics.value_or(Mechanics<double>());

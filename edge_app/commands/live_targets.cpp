@@ -44,7 +44,8 @@ std::vector<std::string> lines_of(const std::string& text) {
   return lines;
 }
 
-// Null where none is configured.
+}  // namespace
+
 std::unique_ptr<NetworkDetector> load_network(const std::optional<NetworkFiles>& files) {
   if (!files) return nullptr;
   NetworkOptions options = files->options;
@@ -72,8 +73,6 @@ std::unique_ptr<NetworkDetector> load_network(const std::optional<NetworkFiles>&
   spdlog::info("network: {}, {} classes", files->model, network->classes());
   return network;
 }
-
-}  // namespace
 
 LiveTargets::LiveTargets(const Config& config, std::shared_ptr<const PlaneEstimate> plane)
     : file_(open_to_append(config.output.targets)),

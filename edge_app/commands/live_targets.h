@@ -13,6 +13,10 @@
 
 namespace alidade {
 
+// Null where none is configured. Throws CommandError where its files cannot be used.
+[[nodiscard]] std::unique_ptr<NetworkDetector> load_network(
+    const std::optional<NetworkFiles>& files);
+
 class LiveTargets {
  public:
   // config.tracking.targets is there. Throws CommandError where output.targets cannot be written, or detectors.onnx not be used.

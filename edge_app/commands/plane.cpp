@@ -27,13 +27,21 @@ namespace {
 
 bool is_angle(int value) { return value < 3; }
 
-constexpr std::size_t kMostDataOfRequest = 100;  // a fit of them is a few milliseconds
-constexpr int kDeepestDatum = 5;                 // {"lengths": [{"from": {"direction": [x]}}]}
+// What an answer to a request may cost: each picture has three unknowns of its own.
+constexpr std::size_t kMostDataOfRequest = 100;
+constexpr std::size_t kMostPicturesOfRequest = 8;
+constexpr int kDeepestDatum = 5;  // {"lengths": [{"from": {"direction": [x]}}]}
 constexpr const char* kNoHeading =
     "the base's forward direction points straight up or down: plane.yaml cannot say its heading";
 
 bool has_heading(const PlaneFit& fit) {
   return fit.plane.R_world_from_base().col(0).head<2>().norm() > kLeastForward;
+}
+
+// Without a heading the values have no finite covariance.
+bool has_values(const PlaneFit& fit) {
+  return (fit.status == PlaneFitStatus::kOk || fit.status == PlaneFitStatus::kMisfit) &&
+         has_heading(fit);
 }
 
 std::string values_text(const PlaneFit& fit) {
@@ -105,11 +113,11 @@ int fit_plane_command(const PlaneOptions& options) {
   const std::string path = output_path(options);
   const PlaneFit fit = fit_plane(data.evidence);
   const bool fits = fit.status == PlaneFitStatus::kOk;
-  if (fits || fit.status == PlaneFitStatus::kMisfit)
+  if (fits && !has_heading(fit)) throw CommandError(kExitFailed, options.data + ": " + kNoHeading);
+  if (has_values(fit))
     print_plane(options.json ? plane_fit_json(data.evidence, fit).dump() + "\n"
                              : text_of(data.evidence, fit));
   if (!fits) throw CommandError(kExitFailed, options.data + ": " + fit.message);
-  if (!has_heading(fit)) throw CommandError(kExitFailed, options.data + ": " + kNoHeading);
   if (!write_file_atomically(path, format_plane({fit.plane, data.origin}, fit), &error))
     throw CommandError(kExitFailed, error + "; give a file that can be written with -o");
   spdlog::info("plane: {}", path);
@@ -131,14 +139,19 @@ bool answer_plane_fit(const std::string& body, std::string* answer, std::string*
         fmt::format("{} data; expected at most {}", data.evidence.data.size(), kMostDataOfRequest);
     return false;
   }
+  if (data.evidence.looks.size() > kMostPicturesOfRequest) {
+    *error = fmt::format("pictures: {}; expected at most {}", data.evidence.looks.size(),
+                         kMostPicturesOfRequest);
+    return false;
+  }
   const PlaneFit fit = fit_plane(data.evidence);
   const bool fits = fit.status == PlaneFitStatus::kOk;
   const bool has_file = fits && has_heading(fit);
   Json out;
-  if (fits || fit.status == PlaneFitStatus::kMisfit) {
+  if (has_values(fit)) {
     out = plane_fit_json(data.evidence, fit);
   } else {
-    out["status"] = to_string(fit.status);
+    out["status"] = fits ? "no heading" : to_string(fit.status);
   }
   out["message"] = fits && !has_file ? kNoHeading : fit.message;
   out["plane_yaml"] = nullptr;

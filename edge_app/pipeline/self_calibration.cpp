@@ -256,6 +256,8 @@ void SelfCalibration::hold_against_published() {
       begin_nodes_anew(alone);
     } else {
       publish(alone);
+      first_node_.reset();
+      first_node_is_due_ = true;
     }
     return;
   }
@@ -263,7 +265,7 @@ void SelfCalibration::hold_against_published() {
     refine_node(std::move(alone));
     return;
   }
-  if (!first_node_) first_node_is_due_ = true;
+  if (!first_node_ || !first_node_->refusal.empty()) first_node_is_due_ = true;
   const SessionCalibration refined = adjust(&published_->calibration);
   if (!refined.refusal.empty()) return;
   if (!clock_offset_known_ ||

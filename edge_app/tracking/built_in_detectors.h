@@ -54,6 +54,8 @@ class BuiltInDetectors : public FrameDetector {
 
   void look(const DetectableFrame& frame) override;
 
+  // Of the picture last looked at, what was handed over; for the thread that looks.
+  [[nodiscard]] const std::vector<DetectionBox>& boxes() const { return boxes_; }
   // Any thread.
   [[nodiscard]] DetectorsReport report() const;
 

@@ -235,7 +235,8 @@ ReadStatus FramesOnDisk::next_image(Frame* frame) {
       const std::shared_ptr<AVCodecParameters> parameters(avcodec_parameters_alloc(), AvDeleter());
       parameters->codec_type = AVMEDIA_TYPE_VIDEO;
       parameters->codec_id = type->codec;
-      if (!decoder_.open(*parameters, true)) {
+      // Of pictures each by itself none is held back.
+      if (!decoder_.open(*parameters, false)) {
         return fail(path + type->extension + ": " + decoder_.error());
       }
       image_codec_ = type->codec;

@@ -102,36 +102,15 @@ double seconds(const timespec& time) {
   return static_cast<double>(time.tv_sec) + 1e-9 * static_cast<double>(time.tv_nsec);
 }
 
-// The kernel stamps by the host's UTC, which may have been set since: then a packet is not older than its reading.
-double arrival_of(msghdr* message) {
-  const double now_s = monotonic_now_s();
+// The kernel stamps by the host's UTC, which may have been set since. What passes between the clocks makes a packet late, not early.
+double age_of(msghdr* message) {
   for (cmsghdr* item = CMSG_FIRSTHDR(message); item != nullptr; item = CMSG_NXTHDR(message, item)) {
     if (item->cmsg_level != SOL_SOCKET || item->cmsg_type != SCM_TIMESTAMPNS) continue;
     timespec stamp{};
     std::memcpy(&stamp, CMSG_DATA(item), sizeof stamp);
-    return now_s - std::max(0.0, utc_now_s() - seconds(stamp));
+    return std::max(0.0, utc_now_s() - seconds(stamp));
   }
-  return now_s;
-}
-
-// The next packet that waits; kTimeout: none does.
-ReadStatus take(const FileDescriptor& socket, std::uint8_t* data, std::size_t capacity,
-                ReceivedPacket* packet, std::string* error) {
-  iovec place{data, capacity};
-  alignas(cmsghdr) std::array<std::uint8_t, CMSG_SPACE(sizeof(timespec))> control{};
-  msghdr message{};
-  message.msg_iov = &place;
-  message.msg_iovlen = 1;
-  message.msg_control = control.data();
-  message.msg_controllen = control.size();
-  const ssize_t size = ::recvmsg(socket.get(), &message, 0);
-  if (size > 0) {
-    *packet = {static_cast<std::size_t>(size), arrival_of(&message)};
-    return ReadStatus::kOk;
-  }
-  if (size == 0 || errno == EAGAIN || errno == EINTR) return ReadStatus::kTimeout;
-  *error = std::strerror(errno);
-  return ReadStatus::kDisconnected;
+  return 0;
 }
 
 }  // namespace
@@ -139,9 +118,9 @@ ReadStatus take(const FileDescriptor& socket, std::uint8_t* data, std::size_t ca
 ReadStatus RtpPorts::open(const std::string& address, int port, std::string* error) {
   const Listening to = listening_to(address);
   for (int i = 0; i < 2; ++i) {
-    FileDescriptor& socket = sockets_[static_cast<std::size_t>(i)];
-    socket = open_socket(to, port + i);
-    if (socket.is_open()) continue;
+    Socket& socket = sockets_[static_cast<std::size_t>(i)];
+    socket = {open_socket(to, port + i), monotonic_now_s()};
+    if (socket.descriptor.is_open()) continue;
     *error = "cannot listen on the UDP ports " + std::to_string(port) + " and " +
              std::to_string(port + 1) + " (" + std::strerror(errno) + "); does another program?";
     return ReadStatus::kDisconnected;
@@ -149,16 +128,42 @@ ReadStatus RtpPorts::open(const std::string& address, int port, std::string* err
   return ReadStatus::kOk;
 }
 
+// The next packet that waits; kTimeout: none does.
+ReadStatus RtpPorts::take(Socket* socket, std::uint8_t* data, std::size_t capacity,
+                          ReceivedPacket* packet, std::string* error) {
+  iovec place{data, capacity};
+  alignas(cmsghdr) std::array<std::uint8_t, CMSG_SPACE(sizeof(timespec))> control{};
+  msghdr message{};
+  message.msg_iov = &place;
+  message.msg_iovlen = 1;
+  message.msg_control = control.data();
+  message.msg_controllen = control.size();
+  const double before_s = monotonic_now_s();
+  const ssize_t size = ::recvmsg(socket->descriptor.get(), &message, 0);
+  if (size > 0) {
+    const double age_s = age_of(&message);
+    const double now_s = monotonic_now_s();
+    packet->size = static_cast<std::size_t>(size);
+    packet->arrival_s = std::max(socket->not_before_s, now_s - age_s);
+    socket->not_before_s = packet->arrival_s;
+    return ReadStatus::kOk;
+  }
+  if (size < 0 && errno == EAGAIN) socket->not_before_s = before_s;
+  if (size == 0 || errno == EAGAIN || errno == EINTR) return ReadStatus::kTimeout;
+  *error = std::strerror(errno);
+  return ReadStatus::kDisconnected;
+}
+
 ReadStatus RtpPorts::receive(double deadline_s, std::uint8_t* data, std::size_t capacity,
                              ReceivedPacket* packet, std::string* error) {
-  const auto& [media, reports] = sockets_;
+  auto& [media, reports] = sockets_;
   while (!interrupted_) {
-    ReadStatus status = take(media, data, capacity, packet, error);
+    ReadStatus status = take(&media, data, capacity, packet, error);
     if (status == ReadStatus::kOk) {
       const std::optional<RtpHeader> header = parse_rtp_header(data, packet->size);
       amid_picture_ = header && !header->marker;
     } else if (status == ReadStatus::kTimeout) {
-      status = take(reports, data, capacity, packet, error);
+      status = take(&reports, data, capacity, packet, error);
     }
     if (status != ReadStatus::kTimeout) return status;
     const double left_s = deadline_s - monotonic_now_s();
@@ -167,7 +172,8 @@ ReadStatus RtpPorts::receive(double deadline_s, std::uint8_t* data, std::size_t 
       std::this_thread::sleep_for(std::chrono::duration<double>(std::min(left_s, kGather_s)));
       continue;
     }
-    std::array<pollfd, 2> waiting{pollfd{media.get(), POLLIN, 0}, pollfd{reports.get(), POLLIN, 0}};
+    std::array<pollfd, 2> waiting{pollfd{media.descriptor.get(), POLLIN, 0},
+                                  pollfd{reports.descriptor.get(), POLLIN, 0}};
     const double wait_ms = 1e3 * std::min(left_s, kSlice_s);
     (void)::poll(waiting.data(), waiting.size(), static_cast<int>(std::ceil(wait_ms)));
   }

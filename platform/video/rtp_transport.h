@@ -3,7 +3,7 @@
 // (rtsp_session.h). Part of RtpConnection, which takes the packets apart.
 //
 // open() and receive() block until deadline_s (CLOCK_MONOTONIC) at most; after interrupt(), which any
-// thread may call, they return at once, for good.
+// thread may call, they return within 0.1 s, for good.
 
 #include <array>
 #include <atomic>
@@ -56,9 +56,16 @@ class RtpPorts {
   void interrupt() { interrupted_ = true; }  // thread-safe
 
  private:
+  struct Socket {
+    FileDescriptor descriptor;
+    double not_before_s = 0;  // what waits has come since
+  };
+  static ReadStatus take(Socket* socket, std::uint8_t* data, std::size_t capacity,
+                         ReceivedPacket* packet, std::string* error);
+
   std::atomic<bool> interrupted_{false};
-  std::array<FileDescriptor, 2> sockets_;  // RTP, RTCP
-  bool amid_picture_ = false;              // after the last RTP packet
+  std::array<Socket, 2> sockets_;  // RTP, RTCP
+  bool amid_picture_ = false;      // after the last RTP packet
 };
 
 // What a session description or an rtp:// URL says.

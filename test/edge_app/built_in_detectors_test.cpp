@@ -79,17 +79,30 @@ TEST(BuiltInDetectors, WhatANetworkFindsIsNoMoverAgain) {
   BuiltInDetectors detectors(options, nullptr, std::move(network), feed);
   test::PanningCamera camera(0);
   camera.disc.emplace();
-  camera.disc->size_px = 60;
+  camera.disc->size_px = 140;
   camera.disc->brighter = 200;
   camera.disc->velocity = {200, 0};
   constexpr int kFrames = 12;
+  std::int64_t handed_over = 0;
   for (int i = 0; i < kFrames; ++i) {
     const FrameOrientation orientation = camera.orientation(i);
     const test::Pixels image = camera.image(orientation);
     detectors.look(panned_frame(orientation, i, image.view));
+    handed_over += static_cast<std::int64_t>(detectors.boxes().size());
+    // The network's come first, and have names.
+    for (const DetectionBox& mover : detectors.boxes()) {
+      for (const DetectionBox& known : detectors.boxes()) {
+        if (!mover.name.empty() || known.name.empty()) continue;
+        const Vector2<double> from_corner = mover.middle() - Vector2<double>(known.u, known.v);
+        EXPECT_FALSE(from_corner.x() >= 0 && from_corner.x() <= known.width &&
+                     from_corner.y() >= 0 && from_corner.y() <= known.height)
+            << i;
+      }
+    }
   }
   const DetectorsReport report = detectors.report();
-  ASSERT_TRUE(report.onnx);
+  ASSERT_TRUE(report.onnx && report.motion);
+  EXPECT_LT(handed_over, report.onnx->boxes + report.motion->boxes);
   EXPECT_EQ(report.onnx->pictures, kFrames);
   EXPECT_EQ(report.onnx->unjudged, 0);
   EXPECT_GT(report.onnx->boxes, 0);

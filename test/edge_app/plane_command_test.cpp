@@ -186,6 +186,28 @@ TEST(PlaneFitRequest, RefusesInALineWhatItCannotRead) {
     many["points"].back()["name"] = std::to_string(i);
   }
   EXPECT_THAT(error_of(many.dump()), HasSubstr("expected at most 100"));
+  // Each is an orientation more to estimate.
+  nlohmann::json album = yard();
+  album["image"] = {{"width", 1280}, {"height", 720}};
+  const nlohmann::json record = {
+      {"focal_length_px", 1000},
+      {"focal_length_sigma_px", 1},
+      {"aspect", 1},
+      {"radial_distortion", 0},
+      {"centre_offset_px", {0, 0}},
+      {"line_delay_s", 0},
+      {"pan_rad", 0},
+      {"tilt_rad", 0},
+      {"pan_rate_rad_s", 0},
+      {"tilt_rate_rad_s", 0},
+      {"pan_acceleration_rad_s2", 0},
+      {"tilt_acceleration_rad_s2", 0},
+      {"q_base_from_camera", {0.5, -0.5, 0.5, -0.5}},
+      {"orientation_covariance_rad2", {1e-8, 0, 0, 0, 1e-8, 0, 0, 0, 1e-8}}};
+  for (int i = 0; i < 9; ++i) {
+    album["pictures"].push_back({{"name", std::to_string(i)}, {"record", record}});
+  }
+  EXPECT_THAT(error_of(album.dump()), HasSubstr("pictures: 9; expected at most 8"));
 }
 
 }  // namespace

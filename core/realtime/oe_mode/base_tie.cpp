@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/model/angle.h"
 #include "core/realtime/oe_mode/covariance.h"
 
 namespace alidade {
@@ -19,7 +20,7 @@ Matrix2<double> difference_of_shared(const SharedByView& k, const SharedByView& 
   const Vector2<double> extent = k.extent.cwiseMin(t.extent);
   double overlap = 1;
   for (int axis = 0; axis < 2; ++axis) {
-    const double apart = std::abs(k.angle[axis] - t.angle[axis]);
+    const double apart = std::abs(wrap_angle(k.angle[axis] - t.angle[axis]));
     overlap *= apart < extent[axis] ? 1 - apart / extent[axis] : 0;
   }
   Matrix2<double> out = k.covariance + t.covariance;
@@ -72,7 +73,10 @@ bool BaseTie::settle(const BaseMeasurement& measurement, const MapOffset& offset
   if (is_tied_ && !measurement.moved) {
     // Of an answer in the view that was measured, but for its own noise.
     Matrix2<double> known = of_telemetry(offset).covariance;
-    if (by_map) known = is_by_map_ ? covariance_in(asked.shared) : known + offset.covariance;
+    if (by_map) {
+      known = is_by_map_ ? covariance_in(asked.shared)
+                         : known + offset.covariance + asked.shared.covariance;
+    }
     if (told.covariance.trace() > known.trace()) return false;
   }
   tied_ = told;

@@ -10,7 +10,7 @@
 // t gives s with the error e - h_t, and an answer in view k by it errs by h_k - h_t + e, of which little is left where k and t see the same
 // landmarks, however far both are from where the map began:
 //   Var(h_k - h_t) = H_k + H_t - 2 o min(H_k, H_t)     o: share of the view that both see, the least that they have in common
-// with H their shared covariances, each axis by itself; e is all else: the measurement, and the noise of the frame that was measured.
+// which takes the landmarks of a view for the same ones as long as the map lives. With H their shared covariances, each axis by itself; e is all else: the measurement, and the noise of the frame that was measured.
 // Measurements are not averaged: what one errs by, the next one in the same view errs by too. The one by which an answer in the view now
 // measured is better known holds, by its covariance and not by its value; what is known grows old by `drift`.
 // A measurement comes late: ask() keeps what the answer of the frame last processed rested on. Angles are true ones, (pan, tilt), rad.

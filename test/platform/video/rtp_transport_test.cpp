@@ -22,6 +22,7 @@ namespace {
 using Bytes = std::vector<std::uint8_t>;
 constexpr double kLong_s = 20;  // far beyond what any event here takes
 
+// size: 12 or more.
 Bytes rtp(bool last, std::size_t size = 64) {
   Bytes out(size, 0x5a);
   out[0] = 0x80;
@@ -72,7 +73,7 @@ class RtpPortsTest : public ::testing::Test {
 
 TEST_F(RtpPortsTest, GivesThePacketsOfBothPortsWhole) {
   ASSERT_EQ(open("0.0.0.0"), ReadStatus::kOk) << error_;
-  const std::vector<Bytes> sent = {rtp(false, 1), rtp(false), rtp(true, 60'000), rtp(false, 1400)};
+  const std::vector<Bytes> sent = {{0x80}, rtp(false, 12), rtp(true, 60'000), rtp(false, 1400)};
   for (const Bytes& packet : sent) send_to("127.0.0.1", port_, packet);
   for (const Bytes& packet : sent) {
     ASSERT_EQ(receive(), ReadStatus::kOk) << error_;
@@ -111,6 +112,25 @@ TEST_F(RtpPortsTest, APacketIsAsOldAsItsArrival) {
     // The kernel's UTC and CLOCK_MONOTONIC are read one after the other.
     EXPECT_GT(packet_.arrival_s, before_s - kLate_s / 2);
     EXPECT_LE(packet_.arrival_s, monotonic_now_s());
+  }
+}
+
+TEST_F(RtpPortsTest, NoPacketIsOlderThanTheOneBeforeOrThanASocketFoundEmpty) {
+  ASSERT_EQ(open("0.0.0.0"), ReadStatus::kOk) << error_;
+  double last_s = monotonic_now_s();
+  for (int i = 0; i < 300; ++i) {
+    if (i % 30 == 0) {
+      last_s = monotonic_now_s();
+      ASSERT_EQ(receive(0), ReadStatus::kTimeout);
+    }
+    send_to("127.0.0.1", port_, rtp(i % 10 == 9));
+    if (i % 2 == 0) continue;
+    for (int waiting = 0; waiting < 2; ++waiting) {
+      ASSERT_EQ(receive(), ReadStatus::kOk) << error_;
+      EXPECT_GE(packet_.arrival_s, last_s) << i;
+      last_s = packet_.arrival_s;
+    }
+    EXPECT_LE(last_s, monotonic_now_s());
   }
 }
 

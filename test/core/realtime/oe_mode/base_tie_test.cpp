@@ -198,6 +198,8 @@ TEST(BaseTie, WhatLandmarksShareCancelsInTheViewThatWasMeasured) {
   EXPECT_NEAR(difference_of_shared(view(4, 1), view(3, 1))(0, 0), 1, 1e-12);
   EXPECT_NEAR(difference_of_shared(view(4, 1), view(4, 1.1))(1, 1), 2, 1e-12);
   EXPECT_NEAR(difference_of_shared(view(4, 1), view(4, -1))(1, 1), 8, 1e-12);
+  // Pan goes round.
+  EXPECT_NEAR(difference_of_shared(view(4, kPi - 0.05), view(4, 0.05 - kPi))(1, 1), 2, 1e-12);
   // Whatever the axes have in common, it is a covariance.
   SharedByView k = view(4, 1);
   k.covariance(0, 1) = k.covariance(1, 0) = 3.9;
