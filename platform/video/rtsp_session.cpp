@@ -236,7 +236,8 @@ ReadStatus RtspSession::play(const std::string& sdp, std::string* error) {
 
 bool RtspSession::open_ports() {
   std::minstd_rand random(std::random_device{}());
-  std::uniform_int_distribution<int> any(10'000, 30'000);
+  // Above those that programs choose for themselves, an rtp:// URL's among them: who comes first would take them away.
+  std::uniform_int_distribution<int> any(17'000, 30'000);
   for (int i = 0; i < kPortTries; ++i) {
     auto ports = std::make_unique<RtpPorts>();
     std::string error;
