@@ -65,7 +65,7 @@ void SelfCalibration::say_once(const std::string& line) {
 
 void SelfCalibration::begin_anew() {
   session_.clear();
-  first_node_is_due_ = false;
+  first_node_is_wanted_ = false;
   tries_ = 0;
   disagreement_.restart();
 }
@@ -257,7 +257,7 @@ void SelfCalibration::hold_against_published() {
     } else {
       publish(alone);
       first_node_.reset();
-      first_node_is_due_ = true;
+      first_node_is_wanted_ = true;
     }
     return;
   }
@@ -265,13 +265,13 @@ void SelfCalibration::hold_against_published() {
     refine_node(std::move(alone));
     return;
   }
-  if (!first_node_ || !first_node_->refusal.empty()) first_node_is_due_ = true;
+  if (!first_node_ || !first_node_->refusal.empty()) first_node_is_wanted_ = true;
   const SessionCalibration refined = adjust(&published_->calibration);
   if (!refined.refusal.empty()) return;
   if (!clock_offset_known_ ||
       is_sharper(refined.result.calibration, published_->calibration, schedule.worth_publishing)) {
     publish(refined);
-    first_node_is_due_ = true;
+    first_node_is_wanted_ = true;
   }
 }
 

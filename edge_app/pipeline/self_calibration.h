@@ -117,7 +117,7 @@ class SelfCalibration {
   [[nodiscard]] bool storing_is_due() const;
   [[nodiscard]] bool adjusting_is_due() const;
   [[nodiscard]] bool makes_nodes() const { return zooms_ && zoom_.has_value(); }
-  [[nodiscard]] bool first_node_is_wanted() const { return first_node_is_due_ && !zooms_; }
+  [[nodiscard]] bool first_node_is_wanted() const { return first_node_is_wanted_ && !zooms_; }
   [[nodiscard]] bool first_node_is_due() const { return zooms_ && first_node_.has_value(); }
   // Of the session. known: what is published, as prior; null: from the data alone.
   [[nodiscard]] SessionCalibration adjust(const Calibration* known, bool free_centre) const;
@@ -158,7 +158,7 @@ class SelfCalibration {
   std::optional<double> zoom_;
   bool zooms_;  // the camera has more than one zoom
   ZoomNodes nodes_;
-  bool first_node_is_due_ = false;       // of the session as it is
+  bool first_node_is_wanted_ = false;    // of the session as it is
   std::optional<FirstNode> first_node_;  // until it is known that there is another zoom
   double zoom_changed_s_ = -1e9;
   std::optional<double>

@@ -131,7 +131,7 @@ void SelfCalibration::look_for_stored() {
 
 // In a turn of its own: what is published is not to wait for it.
 void SelfCalibration::make_first_node() {
-  first_node_is_due_ = false;
+  first_node_is_wanted_ = false;
   if (!zoom_) return;
   const SessionCalibration made = adjust(nullptr, true);
   if (made.result.status == CalibrationStatus::kCancelled) return;
@@ -169,7 +169,7 @@ void SelfCalibration::settle(SessionCalibration checked) {
   if (!makes_nodes()) {
     contradiction_.restart();
     publish(checked);
-    first_node_is_due_ = true;
+    first_node_is_wanted_ = true;
     return;
   }
   ZoomAddition addition;

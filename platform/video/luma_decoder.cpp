@@ -116,7 +116,6 @@ bool LumaDecoder::send(const AVPacket* packet) {
     const std::string_view jpeg(reinterpret_cast<const char*>(packet->data),
                                 static_cast<std::size_t>(packet->size));
     if (!jpeg_->decode(jpeg, &decoded_.emplace())) {
-      error_ = jpeg_->error();
       decoded_.reset();
       return false;
     }

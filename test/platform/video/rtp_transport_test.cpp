@@ -1,7 +1,7 @@
 #include "platform/video/rtp_transport.h"
 
-#include <arpa/inet.h>
 #include <gtest/gtest.h>
+#include <netdb.h>
 #include <netinet/in.h>
 #include <sys/socket.h>
 
@@ -30,26 +30,16 @@ Bytes rtp(bool last, std::size_t size = 64) {
   return out;
 }
 
-// From the loopback of the family that the address has.
 void send_to(const std::string& address, int port, const Bytes& packet) {
-  const bool ipv6 = address.find(':') != std::string::npos;
-  const FileDescriptor socket(::socket(ipv6 ? AF_INET6 : AF_INET, SOCK_DGRAM, 0));
-  ssize_t sent = 0;
-  if (ipv6) {
-    sockaddr_in6 to{};
-    to.sin6_family = AF_INET6;
-    to.sin6_port = htons(static_cast<std::uint16_t>(port));
-    ASSERT_EQ(::inet_pton(AF_INET6, address.c_str(), &to.sin6_addr), 1);
-    sent = ::sendto(socket.get(), packet.data(), packet.size(), 0,
-                    reinterpret_cast<const sockaddr*>(&to), sizeof to);
-  } else {
-    sockaddr_in to{};
-    to.sin_family = AF_INET;
-    to.sin_port = htons(static_cast<std::uint16_t>(port));
-    ASSERT_EQ(::inet_pton(AF_INET, address.c_str(), &to.sin_addr), 1);
-    sent = ::sendto(socket.get(), packet.data(), packet.size(), 0,
-                    reinterpret_cast<const sockaddr*>(&to), sizeof to);
-  }
+  addrinfo hints{};
+  hints.ai_socktype = SOCK_DGRAM;
+  hints.ai_flags = AI_NUMERICHOST | AI_NUMERICSERV;
+  addrinfo* to = nullptr;
+  ASSERT_EQ(::getaddrinfo(address.c_str(), std::to_string(port).c_str(), &hints, &to), 0);
+  const FileDescriptor socket(::socket(to->ai_family, SOCK_DGRAM, 0));
+  const ssize_t sent =
+      ::sendto(socket.get(), packet.data(), packet.size(), 0, to->ai_addr, to->ai_addrlen);
+  ::freeaddrinfo(to);
   ASSERT_EQ(sent, static_cast<ssize_t>(packet.size()));
 }
 

@@ -24,6 +24,24 @@ BaseMeasurement measured(const Vector2<double>& change, double sigma, bool moved
   return {change, square(sigma), moved};
 }
 
+// Of pan and tilt, independent, from a fixed seed.
+class AngleNoise {
+ public:
+  explicit AngleNoise(unsigned seed) : random_(seed) {}
+  Vector2<double> operator()(double sigma) {
+    const double pan = sigma * normal_(random_);
+    return {pan, sigma * normal_(random_)};
+  }
+
+ private:
+  std::mt19937_64 random_;
+  std::normal_distribution<double> normal_;
+};
+
+double normalised_square(const Vector2<double>& error, const Matrix2<double>& covariance) {
+  return error.dot(covariance.inverse() * error);
+}
+
 TEST(BaseTie, IsTelemetrysBaseUntilItIsTold) {
   BaseTie tie{BaseTieOptions{}};
   EXPECT_FALSE(tie.is_tied());
@@ -132,15 +150,7 @@ TEST(BaseTie, AnswersAreAsGoodAsTheyClaim) {
   constexpr double kTelemetry = 1e-4;
   constexpr double kFrame = 3e-6;
   constexpr double kMeasured = 2e-5;
-  std::mt19937_64 random(7);
-  std::normal_distribution<double> normal;
-  const auto noise = [&](double sigma) {
-    const double pan = sigma * normal(random);
-    return Vector2<double>(pan, sigma * normal(random));
-  };
-  const auto normalised = [](const Vector2<double>& error, const Matrix2<double>& covariance) {
-    return error.dot(covariance.inverse() * error);
-  };
+  AngleNoise noise(7);
   double by_landmarks = 0;
   double by_telemetry = 0;
   double anew = 0;
@@ -167,7 +177,7 @@ TEST(BaseTie, AnswersAreAsGoodAsTheyClaim) {
       const Vector2<double> answered = begun - zero + e + filter.offset().value;
       ASSERT_TRUE(tie.settle({noise(kMeasured) - answered, square(kMeasured)}, filter.offset()));
       const Vector2<double> later = begun - zero + noise(kFrame) + tie.of_map().value;
-      by_landmarks += normalised(later, tie.of_map().covariance + square(kFrame));
+      by_landmarks += normalised_square(later, tie.of_map().covariance + square(kFrame));
     } else {
       const Vector2<double> answered = -zero + noise(kTelemetry);
       tie.note_telemetry({0, 0}, square(kTelemetry), Sensitivity<2>::Zero());
@@ -175,13 +185,13 @@ TEST(BaseTie, AnswersAreAsGoodAsTheyClaim) {
       ASSERT_TRUE(tie.settle({noise(kMeasured) - answered, square(kMeasured)}, filter.offset()));
     }
     const TiedOffset before = tie.of_telemetry(filter.offset());
-    by_telemetry += normalised(-zero + noise(kTelemetry) + before.value,
-                               before.covariance + square(kTelemetry));
+    by_telemetry += normalised_square(-zero + noise(kTelemetry) + before.value,
+                                      before.covariance + square(kTelemetry));
     tie.map_is_lost(filter.offset());
     filter.reset();
     const TiedOffset after = tie.of_telemetry(filter.offset());
-    anew +=
-        normalised(-zero + noise(kTelemetry) + after.value, after.covariance + square(kTelemetry));
+    anew += normalised_square(-zero + noise(kTelemetry) + after.value,
+                              after.covariance + square(kTelemetry));
   }
   // Sums of chi-squares of 2 degrees each: mean 2, variance 4 a run; bounds of four standard deviations.
   EXPECT_NEAR(by_landmarks / (kRuns / 2.0), 2, 4 * 2 / std::sqrt(kRuns / 2.0));
@@ -221,15 +231,7 @@ TEST(BaseTie, LongTurnsWithoutTelemetryAreTiedAnewWhereTheyLead) {
   constexpr double kFrame = 5e-6;     // rad
   constexpr double kMeasured = 3e-5;  // rad
   constexpr int kEach = 15;           // frames
-  std::mt19937_64 random(11);
-  std::normal_distribution<double> normal;
-  const auto noise = [&](double sigma) {
-    const double pan = sigma * normal(random);
-    return Vector2<double>(pan, sigma * normal(random));
-  };
-  const auto normalised = [](const Vector2<double>& error, const Matrix2<double>& covariance) {
-    return error.dot(covariance.inverse() * error);
-  };
+  AngleNoise noise(11);
   const auto view_of = [&](int at) {
     return SharedByView{at * square(kStep), {kField / 4 * at, 0}, {kField, kField}};
   };
@@ -258,11 +260,11 @@ TEST(BaseTie, LongTurnsWithoutTelemetryAreTiedAnewWhereTheyLead) {
         ASSERT_TRUE(tie.ask());
         static_cast<void>(tie.settle({noise(kMeasured) - answered, square(kMeasured)}, {}));
         in_measured_view +=
-            normalised(error_in(at), tie.covariance_in(view_of(at)) + square(kFrame));
+            normalised_square(error_in(at), tie.covariance_in(view_of(at)) + square(kFrame));
         ++measured_views;
       }
       const Vector2<double> error = error_in(at);
-      of_run += normalised(error, tie.covariance_in(view_of(at)) + square(kFrame)) / kTurn;
+      of_run += normalised_square(error, tie.covariance_in(view_of(at)) + square(kFrame)) / kTurn;
       if (at == kViews - 1) at_the_end += error.squaredNorm();
     }
     all += of_run;
