@@ -1,8 +1,11 @@
 #include "platform/video/mjpeg_source.h"
 
+#include <sys/socket.h>
+
 #include <algorithm>
 #include <atomic>
 #include <chrono>
+#include <climits>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -20,7 +23,9 @@ namespace alidade {
 namespace {
 
 constexpr long kReceiveBuffer = 128 * 1024;  // bytes read at a time
-constexpr int kDamagedInARow = 30;           // pictures: more are no accident
+// However many bytes are awaited: what came by then is taken, should they be fewer than was told.
+constexpr double kMostAsleep_s = 0.02;
+constexpr int kDamagedInARow = 30;  // pictures: more are no accident
 // Each part without a later time stamp makes the sender's clock more doubtful, each one with it less.
 constexpr int kDoubtOfABadStamp = 100;
 constexpr int kMostDoubt = 2 * kDoubtOfABadStamp;
@@ -48,6 +53,8 @@ class MjpegSource : public FrameSource {
   bool begin_stream();
   void take_bytes(std::string_view bytes, double arrival_s);
   ReadStatus receive_connection(std::string* error);
+  void wait_for_bytes(double left_s);
+  void set_low_water(std::size_t bytes);
   ReadStatus connection_end(CURLcode code, std::string* error);
   ReadStatus fail(const std::string& error) {
     error_ = name_ + ": " + error;
@@ -59,6 +66,7 @@ class MjpegSource : public FrameSource {
 
   MjpegSourceOptions options_;
   std::string name_;
+  bool is_tls_ = false;
 
   std::atomic<std::int64_t> damaged_{0};
 
@@ -68,6 +76,7 @@ class MjpegSource : public FrameSource {
   CurlEasyPtr easy_;                         // of this connection
   std::optional<MultipartScanner> scanner_;  // of this connection, from its first bytes on
   std::string refusal_;                      // why the answer's body was not taken
+  int low_water_ = 1;                        // bytes at which this connection's socket wakes
   std::int64_t discarded_ = 0;               // by the scanner, as far as counted
   std::int64_t pictures_ = 0;                // of this connection
   bool worked_ = false;                      // a picture has come, of any connection
@@ -105,6 +114,7 @@ MjpegSource::MjpegSource(const MjpegSourceOptions& options) : options_(options) 
     (void)fail("not an MJPEG stream; the URL must be http://host[:port]/path or https://...");
     return;
   }
+  is_tls_ = url.scheme == "https";
   if (options_.user.empty() && options_.password.empty()) {
     options_.user = url.user;
     options_.password = url.password;
@@ -185,6 +195,7 @@ ReadStatus MjpegSource::receive_connection(std::string* error) {
   scanner_.reset();
   refusal_.clear();
   curl_error_[0] = '\0';
+  low_water_ = 1;
   pictures_ = 0;
   last_picture_s_ = monotonic_now_s();
   curl_multi_add_handle(multi_.get(), easy_.get());
@@ -205,10 +216,35 @@ ReadStatus MjpegSource::receive_connection(std::string* error) {
       status = ReadStatus::kDisconnected;
       break;
     }
-    curl_multi_poll(multi_.get(), nullptr, 0, poll_milliseconds(left_s), nullptr);
+    wait_for_bytes(left_s);
   }
   curl_multi_remove_handle(multi_.get(), easy_.get());
   return status;
+}
+
+// A picture comes in many segments, and a thread with priority would wake for each.
+void MjpegSource::wait_for_bytes(double left_s) {
+  set_low_water(scanner_ ? scanner_->missing_bytes() : 1);
+  const double most_s = low_water_ > 1 ? std::min(left_s, kMostAsleep_s) : left_s;
+  int ready = 0;
+  curl_multi_poll(multi_.get(), nullptr, 0, poll_milliseconds(most_s), &ready);
+  if (ready == 0) {
+    set_low_water(1);  // libcurl, too, asks the socket before it reads
+  }
+}
+
+// Not by TLS, whose records need not be as long as what they carry.
+void MjpegSource::set_low_water(std::size_t bytes) {
+  const auto wanted = static_cast<int>(std::min<std::size_t>(bytes, INT_MAX));
+  curl_socket_t socket = CURL_SOCKET_BAD;
+  if (is_tls_ || wanted == low_water_ ||
+      curl_easy_getinfo(easy_.get(), CURLINFO_ACTIVESOCKET, &socket) != CURLE_OK ||
+      socket == CURL_SOCKET_BAD) {
+    return;
+  }
+  if (::setsockopt(socket, SOL_SOCKET, SO_RCVLOWAT, &wanted, sizeof wanted) == 0) {
+    low_water_ = wanted;
+  }
 }
 
 ReadStatus MjpegSource::connection_end(CURLcode code, std::string* error) {

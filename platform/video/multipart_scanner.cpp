@@ -125,6 +125,11 @@ bool MultipartScanner::next(MultipartPart* part) {
   return true;
 }
 
+std::size_t MultipartScanner::missing_bytes() const {
+  const bool known = state_ == State::kBody && lengths_hold_ && content_length_;
+  return known && *content_length_ > buffer_.size() ? *content_length_ - buffer_.size() : 1;
+}
+
 // False when nothing can be done before more bytes come.
 bool MultipartScanner::advance() {
   switch (state_) {
@@ -274,6 +279,7 @@ bool MultipartScanner::read_body() {
   const std::optional<Delimiter> delimiter = find_delimiter();
   const std::size_t known_end = delimiter ? delimiter->begin : buffer_.size();
   if (content_length_ && *content_length_ <= known_end && jpeg_ends_at(buffer_, *content_length_)) {
+    lengths_hold_ = true;
     end_part(*content_length_);
     return true;
   }
@@ -287,6 +293,7 @@ bool MultipartScanner::read_body() {
   if (!delimiter) {
     return false;
   }
+  lengths_hold_ = false;
   end_part(delimiter->begin);
   return true;
 }

@@ -44,6 +44,10 @@ class MultipartScanner {
   // Parts given up because they were longer than max_part_bytes or their headers had no end.
   [[nodiscard]] std::int64_t discarded() const { return discarded_; }
 
+  // How many bytes must come before a whole part can be there: those its Content-Length still wants if the part
+  // before kept to its own, otherwise 1; never 0.
+  [[nodiscard]] std::size_t missing_bytes() const;
+
   // Bytes kept until more come, whole parts aside.
   [[nodiscard]] std::size_t pending_bytes() const { return buffer_.size(); }
 
@@ -75,6 +79,7 @@ class MultipartScanner {
   MultipartPart part_;  // under way
   std::size_t header_bytes_ = 0;
   std::optional<std::size_t> content_length_;
+  bool lengths_hold_ = false;  // the last part ended at its Content-Length
   std::deque<MultipartPart> whole_;
   std::int64_t discarded_ = 0;
 };

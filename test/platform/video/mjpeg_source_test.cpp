@@ -426,6 +426,26 @@ TEST(MjpegSource, SkipsAndCountsDamagedPicturesAndPassesOverText) {
   EXPECT_EQ(source->counters().damaged, 4);
 }
 
+TEST(MjpegSource, TakesAPictureThatIsShorterThanTold) {
+  const std::string whole = part(MjpegServer::picture(1));
+  const std::string jpeg = MjpegServer::picture(3);
+  RawServer server([&](int fd) {
+    if (!server.read_request(fd)) return;
+    RawServer::send(fd, stream_head() + whole + "--b\r\nContent-Length: " +
+                            std::to_string(jpeg.size() + 100'000) + "\r\n\r\n" + jpeg);
+    // All but the delimiter has come when that is what the source waits for.
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    RawServer::send(fd, "\r\n--b\r\n");
+    server.stay_silent(fd);
+  });
+  const auto source = open_mjpeg(options_for(server));
+  Frame frame;
+  for (const int number : {1, 3}) {
+    ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk) << source->error();
+    EXPECT_NEAR(grey_of(frame), MjpegServer::grey_of(number), kGreyTolerance);
+  }
+}
+
 TEST(MjpegSource, ReportsPicturesThatAreAllDamaged) {
   const std::string jpeg = MjpegServer::picture(0);
   const std::string half = jpeg.substr(0, jpeg.size() / 2) + "\xFF\xD9";

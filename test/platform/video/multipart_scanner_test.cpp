@@ -151,6 +151,42 @@ TEST(MultipartScanner, DoesNotBelieveAWrongLength) {
   }
 }
 
+TEST(MultipartScanner, TellsHowManyBytesAreMissingOnceLengthsHold) {
+  std::mt19937 random(3);
+  const std::string first = with_length(jpeg("one"));
+  const std::string second = with_length(jpeg(std::string(200, '2')));
+  const std::size_t end = second.size() - 2;  // the part ends before its line does
+  for (int i = 0; i < 200; ++i) {
+    MultipartScanner scanner("frame", kMax);
+    for (std::size_t at = 0; at < first.size(); ++at) {
+      EXPECT_EQ(scanner.missing_bytes(), 1U);
+      scanner.feed(std::string_view(first).substr(at, 1), 0);
+    }
+    ASSERT_EQ(taken(scanner).size(), 1U);
+    const std::size_t come = random() % end;
+    scanner.feed(std::string_view(second).substr(0, come), 0);
+    const std::size_t missing = scanner.missing_bytes();
+    EXPECT_EQ(missing,
+              come < second.size() - 2 - jpeg(std::string(200, '2')).size() ? 1 : end - come);
+    scanner.feed(std::string_view(second).substr(come, missing - 1), 0);
+    EXPECT_TRUE(taken(scanner).empty() || missing == 1);
+    scanner.feed(std::string_view(second).substr(come + missing - 1), 0);
+    EXPECT_EQ(taken(scanner).size(), 1U);
+    EXPECT_EQ(scanner.missing_bytes(), 1U);
+  }
+}
+
+TEST(MultipartScanner, WaitsForNoLengthOnceOneWasWrong) {
+  MultipartScanner scanner("frame", kMax);
+  scanner.feed(with_length(jpeg("one")), 0);
+  const std::string told_too_much = with_length(jpeg("two"), 600);
+  scanner.feed(told_too_much, 0);
+  EXPECT_GT(scanner.missing_bytes(), 500U);
+  scanner.feed("--frame\r\nContent-Length: 300\r\n\r\n\xFF", 0);
+  EXPECT_EQ(taken(scanner).size(), 2U);
+  EXPECT_EQ(scanner.missing_bytes(), 1U);
+}
+
 TEST(MultipartScanner, SkipsWhatStandsBetweenAPartAndTheDelimiter) {
   EXPECT_EQ(bodies("preamble\r\n" + with_length(jpeg("a")) + "padding" + with_length(jpeg("b"))),
             (Bodies{jpeg("a"), jpeg("b")}));
