@@ -291,9 +291,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   if (elsewhere) {
     // The map is another zoom's.
     image_ = finds_landmarks() ? ImageView{} : image_;
-    // Neither the lens nor the axes of another zoom are this one's.
-    if (!has_result(query) || !orient_between(measured, telemetry_time_s, &record))
-      record.status = RecordStatus::kOtherZoom;
+    orient_between(has_result(query) ? &measured : nullptr, telemetry_time_s, &record);
     return record;
   }
   orient(has_result(query) ? &measured : nullptr, image, nullptr, &record);
@@ -337,22 +335,28 @@ void OrientationStep::judge_reading(const FrameOrientation& found) {
   found_time_s_ = lens_time_s_;
 }
 
-bool OrientationStep::orient_between(const InterpolatedPanTilt& measured, double telemetry_time_s,
+void OrientationStep::orient_between(const InterpolatedPanTilt* measured, double telemetry_time_s,
                                      OrientationRecord* record) {
   const double readout_s =
       std::abs(options_.calibration.line_delay) * options_.calibration.camera.height;
   Calibration between;
-  if (!zoom_lookup_.calibration(options_.zoom_curve, telemetry_time_s, readout_s, &between))
-    return false;
-  FrameOrientation frame;
-  if (!pt_orientation(between, *record->time_s, measured, &frame)) return false;
+  // Neither the lens nor the axes of another zoom are this one's.
+  if (!zoom_lookup_.calibration(options_.zoom_curve, telemetry_time_s, readout_s, &between)) {
+    record->status = RecordStatus::kOtherZoom;
+    return;
+  }
   record->calibrated = true;
   record->camera = pack(between);
+  if (measured == nullptr) return;
+  FrameOrientation frame;
+  if (!pt_orientation(between, *record->time_s, *measured, &frame) ||
+      (oe_ && !oe_->put_into_base(&frame))) {
+    record->status = RecordStatus::kNotFinite;
+    return;
+  }
   record->mode = RecordMode::kPt;
-  if (oe_ && !oe_->put_into_base(&frame)) return false;
   record->orientation = orientation_of(frame);
   note_tie(record);
-  return true;
 }
 
 void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageView& image,

@@ -8,7 +8,7 @@
 // [earliest, latest], sigma = width / sqrt(12), each sample with an error of its own; what took far longer than usual, by a
 // stall, is left out.
 // The frame's middle row is looked up in the telemetry at time + d at once (telemetry_buffer.h): if it lies beyond
-// the newest sample the angle is extrapolated, with growing sigma, for max_extrapolation_s, and beyond that there is
+// the newest trusted angle it is extrapolated, with growing sigma, for max_extrapolation_s, and beyond that there is
 // none: "telemetry too old" (record_status.h). Nothing waits for a later sample. When later samples enclose the frame,
 // OE mode's map learns from them.
 // In OE mode (oe_mode.h) landmarks of the frame's image join in; the same telemetry is the prior.
@@ -177,9 +177,9 @@ class OrientationStep {
   Telemetry telemetry_;
   std::unique_ptr<OeMode> oe_;                // null: PT mode
   std::unique_ptr<StartUpTracker> start_up_;  // null: nobody wants its points
-  // PT mode's record by the zoom curve; false: it has no lens for the moment.
-  [[nodiscard]] bool orient_between(const InterpolatedPanTilt& measured, double telemetry_time_s,
-                                    OrientationRecord* record);
+  // PT mode's record by the zoom curve. Null: the status says already why there is no angle.
+  void orient_between(const InterpolatedPanTilt* measured, double telemetry_time_s,
+                      OrientationRecord* record);
 
   // What the zoom's readings say of a frame's lens; where OE mode excluded that in the frame before, the curve's at the focal length
   // that OE mode found.

@@ -48,7 +48,7 @@ enum class CalibrationNeed : std::uint8_t {
   kTime,           // more of the same
   kSteadyZoom,     // the zoom is moving
   kSteadyDelay,    // the video's delay wanders
-  kYoungTelemetry  // it comes so much later than the video that frames get no angle
+  kYoungTelemetry  // trusted angles come so late, or so seldom, that frames get none
 };
 
 [[nodiscard]] const char* to_string(CalibrationActivity activity);

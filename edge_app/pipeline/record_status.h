@@ -22,20 +22,20 @@ enum class RecordMode : std::uint8_t { kNone, kPt, kOe };
 
 enum class RecordStatus : std::uint8_t {
   kOk,
-  kClockWarmingUp,    // mode PT or OE: too few frames since the (re)start to know their times well
-  kTimeUnknown,       // the frame may have waited for nobody knows how long (FrameClock)
-  kVideoLost,         // no connection to the video source
-  kTelemetryLost,     // no connection to the pan/tilt source, and its last angle is too old
+  kClockWarmingUp,  // mode PT or OE: too few frames since the (re)start to know their times well
+  kTimeUnknown,     // the frame may have waited for nobody knows how long (FrameClock)
+  kVideoLost,       // no connection to the video source
+  kTelemetryLost,  // no connection to the pan/tilt source, and its last angle is too old, or there were fewer than two
   kTelemetryMissing,  // fewer than two usable samples so far
   // The frame lies more than TelemetryLimits::max_extrapolation_s beyond the newest angle that is trusted; by how much
   // says OrientationRecord::telemetry_age_s. What decides it, and which key to change: edge_app/config/README.md.
   kTelemetryTooOld,
-  kTelemetryGap,          // the samples around the frame lie too far apart
-  kFrameBeforeTelemetry,  // the frame is older than the oldest sample kept
-  kTooFewLandmarks,       // mode PT: too few landmarks held
-  kContradiction,         // mode PT: landmarks and telemetry exclude each other
-  kBadImage,              // mode PT: no image, or one that is not of the calibration's size
-  kImageTooLate,          // mode PT: others waited behind the frame, which went without its image
+  kTelemetryGap,  // the samples around the frame lie too far apart
+  kFrameBeforeTelemetry,  // the frame is older than the oldest sample kept, by more than max_extrapolation_s
+  kTooFewLandmarks,  // mode PT: too few landmarks held
+  kContradiction,    // mode PT: landmarks and telemetry exclude each other
+  kBadImage,         // mode PT: no image, or one that is not of the calibration's size
+  kImageTooLate,     // mode PT: others waited behind the frame, which went without its image
   kImageRepeated,  // the image is the one before, sent again while the camera turned (RepeatedImages)
   kOtherZoom,      // no calibration for the zoom that the pan/tilt source reports
   kNotFinite,      // a stamp is not a finite number

@@ -1,6 +1,6 @@
 #pragma once
 // The heads that QuerySource can ask, each with one row. Sources, configuration, tests, fuzz targets and soak
-// take their lists from here; a switch over HeadType or a visit of HeadOptions that lacks one does not
+// take their lists from here, but for the simulated ones, kHeadModels, which a test holds against it; a switch over HeadType or a visit of HeadOptions that lacks one does not
 // compile, and CMake names a file that one lacks. How to add a head: README.md of this folder.
 
 #include <array>

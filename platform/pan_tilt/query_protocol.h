@@ -7,7 +7,7 @@
 // no answer to it (noise, half frames, echoes, late answers to another query, unsolicited lines) is
 // passed over.
 //
-// The fence. give_up() tells that no answer came: it may still come. Unless answers bear the number of
+// The fence. give_up() tells that no usable answer came, none at all or one that is kRefused: the right one may still come. Unless answers bear the number of
 // their query, it would then look like the answer to the same query asked again. So next() asks something
 // else first, whose answer looks different, a fence: heads answer in order, and once the fence is answered,
 // nothing older is under way. find() still knows the answer to what was given up, until next().
@@ -16,7 +16,8 @@
 //   asked for nothing but that (VISCA: the zoom) or a command of which only the acknowledgement counts
 //   (PTU: CI). A refusal answers a fence, too (Answer::Kind::kDone).
 // - Numbered queries (VISCA with header): no fence is needed, the numbers differ.
-// A head with one query, no numbers, and silence about all else cannot be asked: its late answers would be
+// First of a connection, too, and after doubt(): the line may still hold what another program asked.
+// A head with one query, no sequence numbers, and silence about all else cannot be asked: its late answers would be
 // taken for later ones.
 //
 // Angles are degrees as the device counts them; signs and zeros are QuerySource's.
@@ -42,7 +43,7 @@ struct Answer {
     kPanTilt,
     kZoom,
     kDone,    // an answer without a reading
-    kRefused  // the device answers that it does not
+    kRefused  // an answer without use: the device says that it does not, or what it says cannot be
   };
   Kind kind = Kind::kNone;
   double pan_deg = 0;
@@ -60,7 +61,8 @@ class QueryProtocol {
   virtual ~QueryProtocol() = default;
 
   [[nodiscard]] virtual const char* name() const = 0;
-  virtual void restart() = 0;  // a new connection: nothing is known of the device
+  virtual void
+  restart() = 0;  // a new connection, before its first query: nothing is known of the device
   // Never without bytes: an answer is waited for after each. After give_up() other bytes than before it.
   [[nodiscard]] virtual Query next() = 0;
   // A reading lies within a turn, and begins with one of the bytes. None in no bytes.
@@ -74,7 +76,7 @@ class QueryProtocol {
   // Over UDP: whether each datagram is a frame of its own (VISCA's header) and is to be searched alone; false for lines of text.
   [[nodiscard]] virtual bool is_of_datagrams() const = 0;
 
-  // Of one reading of pan and tilt: polls, and bytes of queries and answers together, the longest usual ones: at most a quarter
+  // Of one reading of pan and tilt, without zoom and fences: polls, and bytes of queries and answers together, the longest usual ones: at most a quarter
   // more than a common position takes.
   [[nodiscard]] virtual int polls_per_reading() const = 0;
   [[nodiscard]] virtual int bytes_per_reading() const = 0;

@@ -40,7 +40,7 @@
 namespace alidade::benchmarks {
 namespace {
 
-constexpr int kPoints = 200;
+constexpr int kPoints = LandmarkChoiceOptions().max_chosen;
 constexpr std::size_t kWarmUp = 80;  // frames until the map is full
 constexpr std::size_t kSettle = 4;   // frames that fill the simulated caches
 constexpr std::size_t kCounted = 20;

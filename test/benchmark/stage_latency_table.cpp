@@ -27,7 +27,7 @@ constexpr int kFrames = 40;
 constexpr int kWarmUp = 80;
 constexpr int kCounted = 2000;
 constexpr int kStaged = 1000;
-constexpr int kPoints = 200;
+constexpr int kPoints = LandmarkChoiceOptions().max_chosen;
 
 // The times of one row's calls, and what the thread used in them.
 class Row {

@@ -951,7 +951,7 @@ TEST(OrientationStep, RefusesOptionsOfOeModeThatAreNotValid) {
     const OrientationStep step(options);
     ADD_FAILURE() << "a step that may look for no landmark";
   } catch (const std::invalid_argument& error) {
-    EXPECT_STREQ(error.what(), "OE mode: max_chosen must be 1 to 1024");
+    EXPECT_STREQ(error.what(), "OE mode: max_chosen must be 8 to 1024");
   }
 }
 

@@ -94,6 +94,16 @@ TEST(ZoomStep, HasNoneBeyondTheCurveOrWithoutOne) {
   }
 }
 
+// The curve knows the lens; it is the angle that is missing.
+TEST(ZoomStep, SaysThatTelemetryIsTooOldNotThatTheZoomIsUnknown) {
+  OrientationStep step(zooming_options());
+  for (int i = 0; i < 25; ++i) step.add_telemetry(sample_at(kInterval_s * i, 1500));
+  const OrientationRecord record = frame_at(&step, 24 * kInterval_s + 1);
+  EXPECT_EQ(record.status, RecordStatus::kTelemetryTooOld);
+  EXPECT_FALSE(record.orientation);
+  EXPECT_EQ(record.mode, RecordMode::kNone);
+}
+
 // Telemetry is 50 ms behind, in whole steps; the lens starts and stops. None beyond four sigmas, and those are of use.
 TEST(ZoomStep, FollowsAMovingLensWithAnHonestSigma) {
   constexpr double kClockOffset_s = -0.05;

@@ -19,11 +19,12 @@ double reliability(const VisibleLandmark& visible, const LandmarkMap& map) {
 }  // namespace
 
 bool LandmarkChoiceOptions::validate(const char** error) const {
-  static_assert(kMaxChosen == 1024 && kMaxParts == 96, "as the messages say");
+  static_assert(kLeastChosen == 8 && kMaxChosen == 1024 && kMaxParts == 96, "as the messages say");
   const char* problem = nullptr;
   if (rows < 1 || rows > kMaxParts) problem = "rows must be 1 to 96";
   if (columns < 1 || columns > kMaxParts) problem = "columns must be 1 to 96";
-  if (max_chosen < 1 || max_chosen > kMaxChosen) problem = "max_chosen must be 1 to 1024";
+  if (max_chosen < kLeastChosen || max_chosen > kMaxChosen)
+    problem = "max_chosen must be 8 to 1024";
   if (error != nullptr && problem != nullptr) *error = problem;
   return problem == nullptr;
 }

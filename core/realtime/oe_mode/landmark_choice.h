@@ -20,12 +20,13 @@
 namespace alidade {
 
 struct LandmarkChoiceOptions {
-  static constexpr int kMaxChosen = kMaxFoundLandmarks;  // as the solution has room for
-  static constexpr int kMaxParts = 96;                   // in each direction
+  static constexpr int kLeastChosen = SolveLimits().min_inliers;  // fewer never hold
+  static constexpr int kMaxChosen = kMaxFoundLandmarks;           // as the solution has room for
+  static constexpr int kMaxParts = 96;                            // in each direction
 
-  int max_chosen = 200;  // landmarks, 1 to kMaxChosen
+  int max_chosen = 200;  // landmarks, kLeastChosen to kMaxChosen
   // Parts of the image, 1 to kMaxParts. Where more of them than max_chosen have a landmark, some get none, spread over
-  // the image.
+  // the image; a max_chosen above columns * rows is filled in the order of the map's slots.
   int columns = 20;
   int rows = 12;
 

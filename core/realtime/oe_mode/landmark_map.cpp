@@ -28,8 +28,8 @@ double worth_of(const LandmarkStatistics& statistics, std::uint32_t now) {
   const double rate = (matched + 1) / (std::max<double>(statistics.looked_for, matched) + 2);
   const double memory = kMemory * (1 + (kLongest - 1) * matched / (matched + kOften));
   // Counts of frames may wrap.
-  const auto age = static_cast<double>(static_cast<std::int32_t>(now - statistics.last_frame));
-  return rate * memory / std::max(memory, age);
+  const auto unseen = static_cast<double>(static_cast<std::int32_t>(now - statistics.last_frame));
+  return rate * memory / std::max(memory, unseen);
 }
 
 }  // namespace

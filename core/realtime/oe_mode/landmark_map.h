@@ -75,7 +75,7 @@ class LandmarkMap {
                          int capacity) const;
 
   // Of use, 0 to 1: a landmark that is found when looked for, and not long forgotten; what was found
-  // often is forgotten later. A new one has 1/2 for a second of frames, so that others made soon
+  // often is forgotten later. A new one has 1/2 for 30 frames, so that others made soon
   // after do not drive it out.
   [[nodiscard]] double worth(int slot, std::uint32_t now) const;
 

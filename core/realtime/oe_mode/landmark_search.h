@@ -98,9 +98,9 @@ class LandmarkSearch {
                                     const FrameMotion<double>& predicted, double sigma_px);
 
   struct Fine {
-    int visible = 0;  // fine landmarks only
-    int chosen = 0;   // of these
-    int found = 0;    // of these
+    int fine_visible = 0;
+    int chosen = 0;  // of these
+    int found = 0;   // of these
   };
   // Finds fine landmarks about where `motion` sees them: found() and observations().
   Fine align_fine(const SearchedFrame& frame, const FrameMotion<double>& motion);

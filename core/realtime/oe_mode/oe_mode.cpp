@@ -128,7 +128,7 @@ bool OeMode::build_pyramid(const ImageView& image) {
 OeMode::Solution OeMode::solve_about(const FrameMotion<double>& motion,
                                      const PredictedMotion& predicted) {
   const LandmarkSearch::Fine fine = search_.align_fine(searched(), motion);
-  statistics_.fine_visible = fine.visible;
+  statistics_.fine_visible = fine.fine_visible;
   statistics_.chosen = fine.chosen;
   statistics_.found = fine.found;
   MotionPrior prior = predicted.prior;
@@ -179,15 +179,18 @@ OeMode::Solution OeMode::find_and_solve(const PredictedMotion& predicted,
   if (lens_is_learnt() && map_.size() > 0) return look_for_moved_lens(first, coarse, predicted);
   if (!prediction_.follows(frame_.time_s)) return first;
   // A second look, where the motion before leads to.
-  const int chosen = statistics_.chosen;
+  const OeStatistics first_look = statistics_;
   Solution second = solve_about(prediction_.last_carried_on(frame_.time_s), predicted);
   if (second.status == SolveStatus::kOk && second.solved.inliers >= look.least_held_again &&
       second.solved.inliers >= look.least_held * statistics_.chosen) {
     return second;
   }
-  // No better: landmarks are to be as the first look found them.
-  if (first.status == SolveStatus::kOk) first = solve_about(first.motion, predicted);
-  statistics_.chosen = chosen;
+  // No better: landmarks, where they held, and counts are to be the first look's.
+  if (first.status == SolveStatus::kOk) {
+    first = solve_about(first.motion, predicted);
+  } else {
+    statistics_ = first_look;
+  }
   return first;
 }
 

@@ -88,7 +88,7 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
                                              const LandmarkSearch::Coarse& coarse,
                                              const PredictedMotion& predicted) {
   const LookOptions& look = options_.look;
-  const int chosen = statistics_.chosen;
+  const OeStatistics first_look = statistics_;
   const bool follows = prediction_.follows(frame_.time_s);
   // Better than the first look, if that was something.
   constexpr double kBetter = 0.5;
@@ -141,12 +141,15 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
     set_camera(before);
     lens_.give_up();
   }
-  // No better: landmarks are to be as the first look found them.
+  // No better: landmarks, where they held, and counts are to be the first look's.
   Solution out = first;
   lens_.expect(expected_before);
   if (had_own) set_camera(first.camera);
-  if (first.status == SolveStatus::kOk) out = solve_about(first.motion, predicted);
-  statistics_.chosen = chosen;
+  if (first.status == SolveStatus::kOk) {
+    out = solve_about(first.motion, predicted);
+  } else {
+    statistics_ = first_look;
+  }
   return out;
 }
 

@@ -102,7 +102,7 @@ struct TelemetryCounters {
   std::int64_t out_of_order_stored = 0;
   std::int64_t stale_repeats = 0;
   std::int64_t duplicate_times = 0;
-  std::int64_t too_old = 0;
+  std::int64_t older_than_kept = 0;  // of a full buffer
   std::int64_t not_finite = 0;
 };
 
@@ -308,7 +308,7 @@ class TelemetryBuffer {
       case PushStatus::kDuplicateTime:
         return counters_.duplicate_times;
       case PushStatus::kOlderThanBuffer:
-        return counters_.too_old;
+        return counters_.older_than_kept;
       case PushStatus::kNotFinite:
         break;
     }

@@ -126,7 +126,9 @@ std::vector<HeadKind> kinds_of(HeadType type, Link link) {
                                return kind.head->type != type || kind.link != link;
                              }),
               kinds.end());
-  if (kinds.empty()) throw std::logic_error(std::string(head_of(type).key) + " lacks a link");
+  if (kinds.empty())
+    throw std::logic_error(std::string(head_of(type).key) +
+                           ": head_kinds.cpp lacks one of its three links");
   return kinds;
 }
 

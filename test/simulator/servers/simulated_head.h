@@ -16,7 +16,7 @@ namespace alidade {
 struct HeadPosition {
   double pan_deg = 0;   // to the right
   double tilt_deg = 0;  // up
-  int zoom = 0;
+  int zoom = 0;         // as the protocol counts
 };
 
 class SimulatedHead {
@@ -25,7 +25,7 @@ class SimulatedHead {
   virtual ~SimulatedHead() = default;
 
   virtual void power_on() { received_.clear(); }
-  // Answers to what is complete of the bytes so far, the position as it is now.
+  // Answers to what is complete of the bytes so far, the position as it is now; none is empty.
   virtual std::vector<std::string> take(const std::string& bytes) = 0;
   // Something that nobody asked for.
   virtual std::string unsolicited() = 0;

@@ -46,9 +46,9 @@ class ChosenLandmarks : public testing::Test {
     return slots;
   }
 
-  static LandmarkChoiceOptions at_most(int used) {
+  static LandmarkChoiceOptions at_most(int chosen) {
     LandmarkChoiceOptions options;
-    options.max_chosen = used;
+    options.max_chosen = chosen;
     return options;
   }
 

@@ -55,7 +55,7 @@ TEST_F(SearchedScene, FindsFineLandmarksWhereTheyAre) {
   const LandmarkSearch::Fine fine =
       search_.align_fine(frame(), TexturedScene::motion_at(at + Vector2<double>(0.5, 0.2)));
   EXPECT_GT(fine.chosen, 50);
-  EXPECT_GE(fine.visible, fine.chosen);
+  EXPECT_GE(fine.fine_visible, fine.chosen);
   EXPECT_GT(fine.found, 0.9 * fine.chosen);
   ASSERT_EQ(search_.found().size(), static_cast<std::size_t>(fine.found));
   ASSERT_EQ(search_.observations().size(), search_.found().size());
@@ -175,7 +175,7 @@ TEST_F(SearchedScene, LooksForNoMoreThanItMayAndForTheReliableOfAllTheImage) {
   const LandmarkSearch::Fine fine = search.align_fine(frame(), TexturedScene::motion_at({0, 0}));
   EXPECT_EQ(fine.chosen, 6);
   EXPECT_EQ(fine.found, 6);
-  EXPECT_GT(fine.visible, 10 * 6);
+  EXPECT_GT(fine.fine_visible, 10 * 6);
   ASSERT_EQ(search.chosen().size(), 6U);
   std::set<std::pair<int, int>> parts;
   for (const VisibleLandmark& chosen : search.chosen()) {

@@ -33,6 +33,7 @@ TEST(OeOptions, NameWhatIsNotValid) {
       [](OeOptions* o) { o->prediction.acceleration_fields = 0; },
       [](OeOptions* o) { o->prediction.longest_s = 0; },
       [](OeOptions* o) { o->search.choice.max_chosen = 1025; },
+      [](OeOptions* o) { o->search.choice.max_chosen = 7; },
       [](OeOptions* o) { o->search.choice.columns = 97; },
       [](OeOptions* o) { o->search.choice.rows = 0; },
       [](OeOptions* o) { o->search.choice.columns = 0; },

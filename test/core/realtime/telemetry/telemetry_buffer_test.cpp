@@ -180,7 +180,7 @@ TEST(TelemetryBuffer, KeepsTheNewestWhenFull) {
   EXPECT_EQ(buffer.size(), 8U);
   EXPECT_EQ(buffer.newest_time(), 0.04 * 11);
   EXPECT_EQ(buffer.push(mount.at(0.04 * 3)), PushStatus::kOlderThanBuffer);
-  EXPECT_EQ(buffer.counters().too_old, 1);
+  EXPECT_EQ(buffer.counters().older_than_kept, 1);
   InterpolatedPanTilt result;
   ASSERT_EQ(buffer.query(0.04 * 4, 0, &result), QueryStatus::kOk);
   expect_steady(result, mount, 0.04 * 4);
@@ -532,8 +532,8 @@ TEST(TelemetryBuffer, NeverGivesAnythingButAFiniteResult) {
       ASSERT_TRUE((result.covariance.diagonal().array() >= 0).all());
     }
     const TelemetryCounters& c = buffer.counters();
-    ASSERT_EQ(c.stored + c.out_of_order_stored + c.stale_repeats + c.duplicate_times + c.too_old +
-                  c.not_finite,
+    ASSERT_EQ(c.stored + c.out_of_order_stored + c.stale_repeats + c.duplicate_times +
+                  c.older_than_kept + c.not_finite,
               60);
   }
   EXPECT_GT(results, 3000);
