@@ -12,6 +12,7 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/calibration/calibration_text.h"
+#include "core/calibration/zoom_evidence.h"
 #include "core/model/direction.h"
 #include "test/support/simulated_recording.h"
 
@@ -170,6 +171,31 @@ TEST(ZoomFit, ErrorsAreWhatItsCovarianceSays) {
 }
 
 // A lens that one reading cannot tell from its axes: the others do.
+// Each calibration has the priors of what all share in it, and of its own quantities: the former count once in all, the latter never.
+TEST(ZoomEvidence, CountsSharedPriorsOnceAndThoseOfANodeNever) {
+  using namespace internal;
+  ZoomSample sample;
+  for (int a = 0; a < kZoomSampleSize; ++a) {
+    sample.value[a] = 0.1 * a + 1;
+    sample.prior_information[a] = 3 + a;
+    sample.prior_weighted[a] = 7 - a;
+    sample.information(a, a) = 10 + 2 * a;
+  }
+  ZoomEvidence evidence = no_zoom_evidence({1000, 2000});
+  add_zoom_sample(sample, 0, true, &evidence);
+  add_zoom_sample(sample, 1, false, &evidence);
+  for (int a = 0; a < kZoomSampleSize; ++a) {
+    const bool shared = a >= kZoomQuantityCount;
+    const int row = evidence.row(0, a);
+    const double H = sample.information(a, a);
+    const double prior = sample.prior_information[a];
+    EXPECT_DOUBLE_EQ(evidence.H(row, row), shared ? 2 * H - prior : H - prior) << a;
+    const double g = H * sample.value[a];
+    const double prior_weighted = sample.prior_weighted[a];
+    EXPECT_DOUBLE_EQ(evidence.g[row], shared ? 2 * g - prior_weighted : g - prior_weighted) << a;
+  }
+}
+
 TEST(ZoomFit, OpticalCentreAndAxesPart) {
   const std::vector<Visit>& visits = five_visits();
   // Almost without distortion, which would show the centre.

@@ -153,6 +153,25 @@ TEST(TargetFilter, UpdatesInThePictureAsOnThePlane) {
   EXPECT_LT(a.cov.trace(), prior.cov.trace());
 }
 
+// Over the places at which a target may be measured.
+TEST(TargetFilter, DensityOfAnInnovationIntegratesToOne) {
+  TargetMeasurement measurement;
+  measurement.cov << 9, 2, 2, 4;
+  ExpectedPlace expected;
+  expected.place << 640, 360;
+  expected.cov << 30, -8, -8, 12;
+  constexpr double kStep_px = 0.5;
+  constexpr int kSteps = 100;  // eight standard deviations to each side
+  double sum = 0;
+  for (int i = -kSteps; i <= kSteps; ++i) {
+    for (int j = -kSteps; j <= kSteps; ++j) {
+      measurement.place = expected.place + kStep_px * Vector2<double>(i, j);
+      sum += innovation_of(expected, measurement).density * kStep_px * kStep_px;
+    }
+  }
+  EXPECT_NEAR(sum, 1, 1e-9);
+}
+
 TEST(TargetFilter, WeighsSeveralDetectionsAsTheMixtureTheyAre) {
   const TargetState prior = some_state(TargetSpace::kPlane);
   const auto expected = expected_place(TargetSpace::kPlane, prior, picture_from_plane(900));

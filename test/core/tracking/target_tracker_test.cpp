@@ -116,6 +116,20 @@ TEST(TargetTracker, GivesUpWhatIsInViewAndNotSeen) {
   EXPECT_EQ(confirmed(tracker), 0);
 }
 
+// The gate is as wide as the detection's own noise makes it.
+TEST(TargetTracker, TakesADetectionThatIsAsFarOffAsItMayBe) {
+  TargetTracker tracker({});
+  for (int k = 0; k < 10; ++k) (void)add(Look(k * kDt, {{1, 2}}), &tracker);
+  for (const double offset : {-10.0, 10.0}) {
+    TargetTracker copy = tracker;
+    Look look(10 * kDt, {{1 + offset, 2}});
+    look.detections[0].cov = 100 * Matrix2<double>::Identity();
+    (void)add(look, &copy);
+    ASSERT_EQ(copy.targets().size(), 1U);
+    EXPECT_EQ(copy.targets()[0].detection, 0) << offset;
+  }
+}
+
 TEST(TargetTracker, WaitsForWhatIsOutOfViewAndKnowsItAgain) {
   TargetTracker tracker({});
   const auto place = [](int k) { return Vector2<double>(48 + 0.04 * k, 2); };  // 1 m/s

@@ -143,6 +143,40 @@ TEST(MapOffsetFilter, LearnsFromPendingFramesWhatItWouldHaveLearntInTime) {
   EXPECT_EQ(late.pending(), 0U);
 }
 
+// As if they had been answered with the lens as it is then.
+TEST(MapOffsetFilter, MovesPendingFramesWithTheLens) {
+  Calibration calibration = any_calibration();
+  calibration.covariance.diagonal().setConstant(1e-8);
+  calibration.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength)) = 4;
+  MapOffsetFilter waited{MapOffsetOptions{}};
+  waited.reset(unknown_offset());
+  waited.begin_lens(LensScale::begin(calibration));
+  ASSERT_TRUE(waited.lens().learnt);
+  waited.learn_scale(0, 1e-3, 1e12, Sensitivity<1>::Zero());
+  const double phi = waited.lens().value;
+  ASSERT_GT(std::abs(phi), 5e-4);
+  PendingFrame frame = pending_frame(0.04, {0.1, 0.2});
+  frame.covariance = 1e-10 * Matrix2<double>::Identity();
+  frame.sensitivity(0, index(Parameter::kFocalLength)) = 1e-5;
+  frame.sensitivity(1, index(Parameter::kFocalLength)) = -2e-5;
+  const Vector2<double> by_lens = frame.sensitivity * waited.lens().direction;
+
+  MapOffsetFilter moved = waited;
+  Calibration calibration_there = calibration;
+  moved.move_lens(&calibration_there);
+  PendingFrame frame_there = frame;
+  frame_there.angle += phi * by_lens;
+  moved.add_pending(frame_there);
+  waited.add_pending(frame);
+  waited.move_lens(&calibration);
+
+  const InterpolatedPanTilt late = telemetry_of({0.101, 0.198}, 0, false);
+  for (MapOffsetFilter* filter : {&waited, &moved}) filter->settle_oldest(calibration, &late);
+  ASSERT_GT(moved.offset().value.norm(), 1e-4);
+  EXPECT_LT((waited.offset().value - moved.offset().value).norm(), 1e-12);
+  EXPECT_LT((waited.offset().covariance - moved.offset().covariance).norm(), 1e-18);
+}
+
 TEST(MapOffsetFilter, GivesPendingFramesOnceAndOldestFirstWhenASampleHasPassedThem) {
   MapOffsetFilter filter{MapOffsetOptions{}};
   EXPECT_EQ(filter.enclosed(1e9), nullptr);
