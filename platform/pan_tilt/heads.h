@@ -25,7 +25,7 @@ using HeadOptions = std::variant<PelcoDOptions, ViscaOptions, PtuOptions>;
 
 struct Head {
   HeadType type;
-  const char* key;   // pan_tilt.type of the configuration; KEY_protocol.h, KEY_fuzz.cpp
+  const char* key;   // pan_tilt.type of the configuration; KEY_protocol.h, .cpp, KEY_fuzz.cpp ...
   UsualSigns signs;  // as the protocol defines them
 };
 

@@ -3,7 +3,7 @@
 // come; the protocols are those of heads.h. No I/O, no clock, no exceptions; QuerySource does the talking.
 //
 // One query is under way at a time. next() gives it; find() looks for its answer in all bytes that
-// have come since it was sent (at most kMaxAnswer; a device that babbles loses the oldest). What is
+// have come since it was sent (at most kMaxAnswer; a device that babbles loses the oldest), the latest if there are several. What is
 // no answer to it (noise, half frames, echoes, late answers to another query, unsolicited lines) is
 // passed over.
 //
@@ -16,7 +16,8 @@
 //   asked for nothing but that (VISCA: the zoom) or a command of which only the acknowledgement counts
 //   (PTU: CI). A refusal answers a fence, too (Answer::Kind::kDone).
 // - Numbered queries (VISCA with header): no fence is needed, the numbers differ.
-// First of a connection, too, and after doubt(): the line may still hold what another program asked.
+// First of a connection, too, and after doubt(), unless an answer too many shows by itself: the line may still hold what another
+// program asked. Where the fence is not answered either, QuerySource listens for long, and what was given up may be asked again.
 // A head with one query, no sequence numbers, and silence about all else cannot be asked: its late answers would be
 // taken for later ones.
 //
@@ -32,7 +33,7 @@ constexpr std::size_t kMaxAnswer = 512;  // bytes
 
 struct Query {
   std::string bytes;
-  bool paced = true;  // on the grid of polls; false: at once (before the first poll, and fences)
+  bool paced = true;  // on the grid of polls; false: at once, as fences are asked
 };
 
 struct Answer {

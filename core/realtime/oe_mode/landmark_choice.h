@@ -2,7 +2,7 @@
 // LandmarkChoice: which of the visible fine landmarks are looked for in a frame. This is the one place that
 // decides it: to choose otherwise, change choose(). README.md of this folder says what such a change touches.
 //
-// Up to max_chosen visible fine landmarks: all of them, in their order; preferences begin where there are more. Then the image is divided into columns x rows parts, of each part the
+// Where no more than max_chosen fine landmarks are visible, all are chosen, in their order; preferences begin where there are more. Then the image is divided into columns x rows parts, of each part the
 // most reliable landmark comes first, parts in strides, so that a small max_chosen is spread over the image too;
 // what room is left goes to the others in their order. The same inputs give the same choice: it is made anew within a frame.
 // Reliable is what matched when it was looked for (rule of succession), halved for each octave further up,

@@ -24,7 +24,8 @@ struct LookOptions {
   double least_held = 0.6;
   // Inliers; fewer agree by chance too, and the second look is no better.
   int least_held_again = 40;
-  // Chosen landmarks, and visible coarse ones: with fewer of both a view is new to the map.
+  // Chosen landmarks, and coarse ones in use: with fewer of both a view is new to the map. Also visible ones of any octave that are
+  // left when a handed-over map is doubted.
   int few = 10;
   int few_coarse = 5;
 

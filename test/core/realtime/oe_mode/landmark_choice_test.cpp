@@ -136,9 +136,9 @@ TEST_F(ChosenLandmarks, OfAFullImageAreAsManyAsMayBeOneOfAPartTheMostReliableThe
     const int matched = static_cast<int>((kLookedFor + 1) * uniform(random));
     const int slot = add(u, octave, kLookedFor, matched);
     if (octave == 2) continue;
-    const double worth = (matched + 1.0) / (octave == 0 ? 1 : 2);
-    all[slot] = {u, worth};
-    best[part_of(u)] = std::max(best[part_of(u)], worth);
+    const double reliability = (matched + 1.0) / (octave == 0 ? 1 : 2);
+    all[slot] = {u, reliability};
+    best[part_of(u)] = std::max(best[part_of(u)], reliability);
   }
   const std::vector<int> chosen = choose(options);
   ASSERT_EQ(chosen.size(), static_cast<std::size_t>(options.max_chosen));
@@ -148,9 +148,9 @@ TEST_F(ChosenLandmarks, OfAFullImageAreAsManyAsMayBeOneOfAPartTheMostReliableThe
   std::map<std::pair<int, int>, int> in_twentieths;  // of the image, 5 columns and 4 rows
   for (const int slot : chosen) {
     ASSERT_EQ(all.count(slot), 1U);
-    const auto& [u, worth] = all[slot];
+    const auto& [u, reliability] = all[slot];
     EXPECT_TRUE(parts.insert(part_of(u)).second) << "no part twice";
-    EXPECT_EQ(worth, best[part_of(u)]) << "the most reliable of its part";
+    EXPECT_EQ(reliability, best[part_of(u)]) << "the most reliable of its part";
     ++in_twentieths[{static_cast<int>(u.x() * 5 / kWidth), static_cast<int>(u.y() * 4 / kHeight)}];
   }
   ASSERT_EQ(in_twentieths.size(), 20U);
