@@ -48,6 +48,7 @@ class MjpegSource : public FrameSource {
       curl_multi_wakeup(multi_.get());
     }
   }
+  static int on_socket(void* self, curl_socket_t socket, curlsocktype purpose);
   static std::size_t on_body(char* data, std::size_t size, std::size_t count, void* self);
   bool make_handle();
   bool begin_stream();
@@ -76,7 +77,8 @@ class MjpegSource : public FrameSource {
   CurlEasyPtr easy_;                         // of this connection
   std::optional<MultipartScanner> scanner_;  // of this connection, from its first bytes on
   std::string refusal_;                      // why the answer's body was not taken
-  int low_water_ = 1;                        // bytes at which this connection's socket wakes
+  curl_socket_t socket_ = CURL_SOCKET_BAD;   // of this connection
+  int low_water_ = 1;                        // bytes at which it wakes
   std::int64_t discarded_ = 0;               // by the scanner, as far as counted
   std::int64_t pictures_ = 0;                // of this connection
   bool worked_ = false;                      // a picture has come, of any connection
@@ -134,7 +136,16 @@ bool MjpegSource::make_handle() {
   curl_easy_setopt(easy_.get(), CURLOPT_BUFFERSIZE, kReceiveBuffer);
   curl_easy_setopt(easy_.get(), CURLOPT_WRITEFUNCTION, &MjpegSource::on_body);
   curl_easy_setopt(easy_.get(), CURLOPT_WRITEDATA, this);
+  curl_easy_setopt(easy_.get(), CURLOPT_SOCKOPTFUNCTION, &MjpegSource::on_socket);
+  curl_easy_setopt(easy_.get(), CURLOPT_SOCKOPTDATA, this);
   return true;
+}
+
+int MjpegSource::on_socket(void* self, curl_socket_t socket, curlsocktype /*purpose*/) {
+  auto* source = static_cast<MjpegSource*>(self);
+  source->socket_ = socket;
+  source->low_water_ = 1;
+  return CURL_SOCKOPT_OK;
 }
 
 std::size_t MjpegSource::on_body(char* data, std::size_t size, std::size_t count, void* self) {
@@ -195,7 +206,6 @@ ReadStatus MjpegSource::receive_connection(std::string* error) {
   scanner_.reset();
   refusal_.clear();
   curl_error_[0] = '\0';
-  low_water_ = 1;
   pictures_ = 0;
   last_picture_s_ = monotonic_now_s();
   curl_multi_add_handle(multi_.get(), easy_.get());
@@ -236,13 +246,10 @@ void MjpegSource::wait_for_bytes(double left_s) {
 // Not by TLS, whose records need not be as long as what they carry.
 void MjpegSource::set_low_water(std::size_t bytes) {
   const auto wanted = static_cast<int>(std::min<std::size_t>(bytes, INT_MAX));
-  curl_socket_t socket = CURL_SOCKET_BAD;
-  if (is_tls_ || wanted == low_water_ ||
-      curl_easy_getinfo(easy_.get(), CURLINFO_ACTIVESOCKET, &socket) != CURLE_OK ||
-      socket == CURL_SOCKET_BAD) {
+  if (is_tls_ || wanted == low_water_) {
     return;
   }
-  if (::setsockopt(socket, SOL_SOCKET, SO_RCVLOWAT, &wanted, sizeof wanted) == 0) {
+  if (::setsockopt(socket_, SOL_SOCKET, SO_RCVLOWAT, &wanted, sizeof wanted) == 0) {
     low_water_ = wanted;
   }
 }
