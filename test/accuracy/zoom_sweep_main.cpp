@@ -1,7 +1,7 @@
 // alidade_zoom_sweep: OE mode while the lens zooms, against truth: 1280x720, 20x from 1200 to 24,000 px, line delay -14.2 us, noise of
 // 2 grey levels, JPEG of quality 85, telemetry of 50 urad; at rest, a sweep, at rest, back.
-//   alidade_zoom_sweep [--seed N] [--factor 10] [--sweep 5] [--from 1200] [--fault none|stuck|late|coarse] [--cache DIR] [--exact-curve]
-//                      [--details]
+//   alidade_zoom_sweep [--seed N] [--factor 10] [--sweep 5] [--stop-every 3] [--from 1200] [--fault none|stuck|late|coarse] [--cache DIR]
+//                      [--exact-curve] [--details]
 // Exit status: 0 no frame is beyond 5 sigmas, 1 some are, 2 wrong usage.
 
 #include <CLI/CLI.hpp>
@@ -25,12 +25,16 @@ namespace alidade::test {
 namespace {
 
 constexpr double kRepeatability = 2e-3;
+constexpr double kStop_s = 0.2;      // on the way
+constexpr double kStopping_s = 0.5;  // that the motor takes more for each
+constexpr int kSettling = 5;         // frames
 
 struct Options {
   std::uint64_t seed = 1;
   double from = 1200;
   double factor = 10;
   double sweep_s = 5;
+  double stop_every = 0;  // a factor of the focal length; 0: none
   double rest_s = 2;
   double fields = 0.5;  // of view a second
   std::string fault = "none";
@@ -73,9 +77,24 @@ simulator::Config camera_of(const Options& options) {
   zoom.acceleration = 3;
   zoom.speed = distance / (options.sweep_s - 0.5);
   zoom.path.type = simulator::ZoomPathConfig::Type::kDwell;
-  zoom.path.stops = {{std::nullopt, options.from, options.rest_s},
-                     {std::nullopt, options.from * options.factor, options.rest_s}};
-  config.duration = 2 * (options.sweep_s + options.rest_s);
+  zoom.path.stops = {{std::nullopt, options.from, options.rest_s}};
+  double stopped_s = 0;
+  const auto stop_at = [&](double factor) {
+    zoom.path.stops.push_back({std::nullopt, options.from * factor, kStop_s});
+    stopped_s += kStop_s + kStopping_s;
+  };
+  std::vector<double> on_the_way;
+  if (options.stop_every > 1) {
+    for (double factor = options.stop_every; factor < 0.99 * options.factor;
+         factor *= options.stop_every) {
+      on_the_way.push_back(factor);
+    }
+  }
+  for (const double factor : on_the_way) stop_at(factor);
+  zoom.path.stops.push_back({std::nullopt, options.from * options.factor, options.rest_s});
+  std::reverse(on_the_way.begin(), on_the_way.end());
+  for (const double factor : on_the_way) stop_at(factor);
+  config.duration = 2 * (options.sweep_s + options.rest_s) + stopped_s;
   return config;
 }
 
@@ -122,7 +141,7 @@ std::vector<cv::Mat> film_of(const ZoomingCamera& camera, const simulator::Confi
 }
 
 struct Part {
-  std::vector<double> rms_px, log_errors, sigmas, log_sigmas, cpu_ms;
+  std::vector<double> rms_px, log_errors, sigmas, log_sigmas, cpu_ms, settled_px;
   int frames = 0;
   int oe = 0;
   void print(const char* name) const {
@@ -137,6 +156,10 @@ struct Part {
         root_mean_square(log_errors), common, root_mean_square(about), largest(sigmas),
         largest(log_sigmas), root_mean_square(sigmas), root_mean_square(log_sigmas),
         median(cpu_ms));
+    if (!settled_px.empty()) {
+      std::printf("          from the frame after the fifth on: rms %.3f px (worst %.3f)\n",
+                  root_mean_square(settled_px), largest(settled_px));
+    }
   }
 };
 
@@ -202,6 +225,7 @@ int run(const Options& options) {
     if (frame.mode != OrientationMode::kOe) continue;
     ++part.oe;
     part.rms_px.push_back(e.rms_px);
+    if (&part == &after && since_movement > kSettling) part.settled_px.push_back(e.rms_px);
     part.log_errors.push_back(camera.log_error(k, frame));
     part.sigmas.push_back(e.sigmas);
     part.log_sigmas.push_back(e.log_sigmas);
@@ -227,6 +251,9 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(1200.0, 24000.0));
   app.add_option("--factor", options.factor, "of the focal length")->check(CLI::Range(1.01, 20.0));
   app.add_option("--sweep", options.sweep_s, "s, of a movement")->check(CLI::Range(1.0, 60.0));
+  app.add_option("--stop-every", options.stop_every,
+                 "factor of the focal length after which a movement stops for 0.2 s")
+      ->check(CLI::Range(1.5, 20.0));
   app.add_option("--rest", options.rest_s, "s, between movements")->check(CLI::Range(1.0, 60.0));
   app.add_option("--fields", options.fields, "of view a second, the fastest turn")
       ->check(CLI::Range(0.0, 2.0));
