@@ -10,16 +10,18 @@ namespace alidade {
 namespace {
 
 // At constant velocity, forwards or back.
+// As seen by one to whom time runs backwards.
+void reverse_velocity(TargetState* state) {
+  state->mean.tail<2>() *= -1;
+  state->cov.topRightCorner<2, 2>() *= -1;
+  state->cov.bottomLeftCorner<2, 2>() *= -1;
+}
+
 TargetState moved(const TargetsState& all, const TargetState& from, double dt_s) {
   TargetState state = from;
-  if (dt_s < 0) state.mean.tail<2>() *= -1;
+  if (dt_s < 0) reverse_velocity(&state);
   predict_target(all.space, std::abs(dt_s), all.acceleration_density, &state);
-  if (dt_s < 0) {
-    // Also the covariance of place and velocity is of a velocity that points the other way.
-    state.mean.tail<2>() *= -1;
-    state.cov.topRightCorner<2, 2>() *= -1;
-    state.cov.bottomLeftCorner<2, 2>() *= -1;
-  }
+  if (dt_s < 0) reverse_velocity(&state);
   return state;
 }
 

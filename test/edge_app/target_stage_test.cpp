@@ -237,8 +237,11 @@ TEST(TargetStage, LateFramesGiveWhatTheRightOrderHadGiven) {
   EXPECT_EQ(a.targets[0].target.state.cov, b.targets[0].target.state.cov);
   EXPECT_EQ(*a.record.frame, 79);
   EXPECT_EQ(late.add(walker_seen(28)).status, DetectionStatus::kRepeated);
-  // 2 s back.
-  EXPECT_EQ(late.add(walker_seen(-1)).status, DetectionStatus::kTooLate);
+  // 2 s back. Nothing of it is counted.
+  DetectedFrame too_late = walker_seen(-1);
+  too_late.boxes.push_back(box_with_foot({400, 1079.5}));
+  EXPECT_EQ(late.add(too_late).status, DetectionStatus::kTooLate);
+  EXPECT_EQ(late.state().counters.boxes_cut_off, 0);
   EXPECT_EQ(late.state().counters.of(DetectionStatus::kTakenLate), 1);
 }
 
@@ -272,6 +275,7 @@ TEST(TargetReport, MovesToAnotherFrameAndItsLens) {
     ASSERT_TRUE(reports[0].pixel && reports[0].box);
     EXPECT_LT((*reports[0].pixel - foot_of(mast(), frame, walker_at(number))).norm(), 4);
     EXPECT_NEAR(reports[0].box->height, 66, 1);
+    EXPECT_NEAR(reports[0].box->foot().y(), reports[0].pixel->y(), 1e-9);
     EXPECT_GT(Eigen::SelfAdjointEigenSolver<Matrix4<double>>(reports[0].cov).eigenvalues()[0], 0);
     if (number != 99)
       EXPECT_GT(reports[0].cov.trace(), report_targets(state, state.record)[0].cov.trace());
@@ -282,6 +286,26 @@ TEST(TargetReport, MovesToAnotherFrameAndItsLens) {
   ASSERT_EQ(reports.size(), 1U);
   EXPECT_FALSE(reports[0].pixel || reports[0].box);
   EXPECT_TRUE(reports[0].state);
+}
+
+// Without noise it is where it would have come from, and the other way round.
+TEST(TargetReport, OfBeforeAndAfterHasTheCovarianceOfAStraightWay) {
+  TargetStage stage(plane_options(), mast_plane());
+  for (std::int64_t i = 0; i < 30; ++i) static_cast<void>(stage.add(walker_seen(i)));
+  TargetsState state = stage.state();
+  state.acceleration_density = 0;
+  const Matrix4<double> cov = state.targets.at(0).target.state.cov;
+  const Matrix2<double> of_velocity = cov.bottomRightCorner<2, 2>();
+  for (const std::int64_t number : {10, 45}) {
+    const double dt_s = static_cast<double>(number - 29) * kFramePeriod;
+    const auto reports = report_targets(
+        state, test::record_of(number, swinging_frame(test::watching_calibration(), number)));
+    ASSERT_EQ(reports.size(), 1U);
+    // What plane and lens are uncertain by is in the place's alone.
+    const Matrix2<double> across = cov.topRightCorner<2, 2>() + dt_s * of_velocity;
+    EXPECT_LT((reports[0].cov.topRightCorner<2, 2>() - across).norm(), 1e-6 * across.norm());
+    EXPECT_LT((reports[0].cov.bottomRightCorner<2, 2>() - of_velocity).norm(), 1e-12);
+  }
 }
 
 TEST(TargetReport, TellsWhereOnEarthATargetIs) {
