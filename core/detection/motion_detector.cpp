@@ -361,7 +361,7 @@ MotionAnswer MotionDetector::find(const ImageView& image, const FrameOrientation
       const SmoothedView now{smooth_.data(), options_.width, options_.height};
       drop_uncovered_places(now, regions_.z(), &boxes_);
       join_target_pieces(now, regions_.z(), noise_.sigma() * std::sqrt(kSplineNoise),
-                         options_.change.most_size_px, &boxes_);
+                         options_.change, &boxes_);
     } else {
       answer.status = MotionStatus::kNotExplained;
     }

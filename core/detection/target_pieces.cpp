@@ -15,8 +15,10 @@ namespace {
 using internal::size_of;
 
 constexpr double kReach = 2;  // sizes of the larger box
-constexpr double kBetweenShare = 2.0 / 3;
+constexpr double kBetweenShare = 0.75;
+constexpr double kBetweenNear = 1.0 / 3;  // of c
 constexpr double kChangedShare = 0.5;
+constexpr double kChangedNear = 0.5;  // of c
 constexpr int kPieceZ = 5 * ChangeRegions::kUnit / 2;
 // Of a box, each way, that are looked at; and of the line between two.
 constexpr int kMostAcross = 32;
@@ -46,13 +48,15 @@ bool shows(const SmoothedView& now, const std::int16_t* z, double sigma_grey,
     ++changed;
   });
   if (changed == 0) return false;
-  const double tolerance =
-      0.5 * sum / changed * sigma_grey * kSmoothUnit / double{ChangeRegions::kUnit};
-  const auto near = [&](int grey) { return std::abs(grey - middle) < tolerance; };
-  const auto even = std::count_if(between, between + count, near);
+  const double by = sum / changed * sigma_grey * kSmoothUnit / double{ChangeRegions::kUnit};
+  const auto even = std::count_if(between, between + count, [&](int grey) {
+    return std::abs(grey - middle) < kBetweenNear * by;
+  });
   if (static_cast<double>(even) < kBetweenShare * static_cast<double>(count)) return false;
   int shown = 0;
-  each_changed(now, z, box, [&](int, int grey) { shown += near(grey) ? 1 : 0; });
+  each_changed(now, z, box, [&](int, int grey) {
+    shown += std::abs(grey - middle) < kChangedNear * by ? 1 : 0;
+  });
   return shown > kChangedShare * changed;
 }
 
@@ -67,8 +71,10 @@ DetectionBox joined(const DetectionBox& a, const DetectionBox& b) {
 }
 
 bool of_one_thing(const SmoothedView& now, const std::int16_t* z, double sigma_grey,
-                  const DetectionBox& a, const DetectionBox& b) {
-  if (internal::gap_between(a, b) > kReach * std::max(size_of(a), size_of(b))) return false;
+                  const ChangeOptions& options, const DetectionBox& a, const DetectionBox& b) {
+  const double gap = internal::gap_between(a, b);
+  if (gap <= options.merge_px) return true;
+  if (gap > kReach * std::max(size_of(a), size_of(b))) return false;
   std::array<int, kMostBetween> between;
   std::size_t count = 0;
   internal::each_between(a, b, [&](int u, int v) {
@@ -84,14 +90,15 @@ bool of_one_thing(const SmoothedView& now, const std::int16_t* z, double sigma_g
 }  // namespace
 
 void join_target_pieces(const SmoothedView& now, const std::int16_t* z, double sigma_grey,
-                        double most_size_px, std::vector<DetectionBox>* boxes) {
+                        const ChangeOptions& options, std::vector<DetectionBox>* boxes) {
   bool found = true;
   while (found) {
     found = false;
     for (auto a = boxes->begin(); a != boxes->end(); ++a) {
       for (auto b = a + 1; b != boxes->end();) {
         const DetectionBox both = joined(*a, *b);
-        if (size_of(both) <= most_size_px && of_one_thing(now, z, sigma_grey, *a, *b)) {
+        if (size_of(both) <= options.most_size_px &&
+            of_one_thing(now, z, sigma_grey, options, *a, *b)) {
           *a = both;
           b = boxes->erase(b);
           found = true;

@@ -221,11 +221,10 @@ void run_targets(Study* study) {
 }
 
 void run_sizes(Study* study, int seeds) {
-  Table table{
-      "Sizes, at half a field of view a second; contrast " + number(study->plan.contrast),
-      kHeader,
-      {},
-      {}};
+  Table table{"Sizes, at half a field of view a second; contrast " + number(study->plan.contrast),
+              kHeader,
+              {},
+              {}};
   for (const double size : {8.0, 16.0, 32.0}) {
     Tally sum;
     MotionFilmPlan plan = study->plan;
