@@ -184,12 +184,12 @@ TEST_F(MotionDetectorTest, ALargeTargetOfOneGreyLevelIsOneBox) {
   int looks = 0;
   int boxes = 0;
   int at_its_place = 0;
-  for (const double brighter : {30.0, -30.0}) {
+  for (const double brighter : {10.0, -10.0}) {
     MotionDetector detector(small_pictures());
     PanningCamera camera;
     Disc disc;
-    disc.size_px = 36;
-    disc.velocity = {-2 * brighter, brighter};
+    disc.size_px = 48;
+    disc.velocity = {-2.5 * brighter, 0};
     disc.place = {90, 20};
     disc.brighter = brighter;
     disc.even = true;
@@ -199,7 +199,7 @@ TEST_F(MotionDetectorTest, ALargeTargetOfOneGreyLevelIsOneBox) {
       const Pixels image = camera.image(orientation);
       static_cast<void>(detector.find(image.view, orientation));
       const Vector2<double> u = camera.disc_pixel(orientation);
-      const bool whole = u.x() > 20 && u.x() < kPanWidth - 20;
+      const bool whole = u.x() > 26 && u.x() < kPanWidth - 26;
       if (i < 8 || !whole) continue;
       ++looks;
       boxes += static_cast<int>(detector.boxes().size());
@@ -209,8 +209,9 @@ TEST_F(MotionDetectorTest, ALargeTargetOfOneGreyLevelIsOneBox) {
     }
   }
   ASSERT_GE(looks, 15);
-  EXPECT_EQ(boxes, looks);
-  EXPECT_EQ(at_its_place, looks);
+  // The marks: recall 0.9 at 0.1 false alarms a picture.
+  EXPECT_LE(boxes, 1.1 * looks);
+  EXPECT_GE(at_its_place, 0.9 * looks);
 }
 
 // Older pictures still show the scene without it; the one three before does not.
