@@ -47,10 +47,10 @@ std::vector<std::string> read_class_names(const std::string& path) {
     if (!line.empty() && line.back() == '\r') line.pop_back();
     if (line.empty()) continue;
     if (!is_class_name(line)) {
-      throw CommandError(kExitUsage,
-                         fmt::format("detectors.onnx: {}:{}: is no class's name: it has {} bytes; "
-                                     "expected text of at most {}",
-                                     path, number, line.size(), kLongestClass));
+      throw CommandError(
+          kExitUsage, fmt::format("detectors.onnx: {}:{}: is no class's name ({} bytes); expected "
+                                  "text of at most {} without control characters",
+                                  path, number, line.size(), kLongestClass));
     }
     names.push_back(line);
   }

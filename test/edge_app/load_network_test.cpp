@@ -54,8 +54,10 @@ TEST(LoadNetwork, SaysInOneLineWhichFileIsWrongAndWhatWouldBeRight) {
   const std::string text = directory.write("text.onnx", "nothing of the kind\nnor here\n");
   const std::string none = directory.write("none.onnx", "");
   const std::string absent = directory.path() + "/absent";
+  int written = 0;
   const auto labels = [&](const std::string& lines) {
-    return network_of(cells("v8"), directory.write("labels.txt", lines));
+    const std::string name = std::to_string(++written) + "_labels.txt";
+    return network_of(cells("v8"), directory.write(name, lines));
   };
   const std::string too_long(kLongestClass + 1, 'x');
   NetworkFiles other_size = network_of(cells("v8"));
@@ -75,7 +77,7 @@ TEST(LoadNetwork, SaysInOneLineWhichFileIsWrongAndWhatWouldBeRight) {
       {labels("\n\n"), "labels.txt", "is empty; expected the classes' names, one a line"},
       {labels("a\nb\nc\n"), cells("v8"), "tells 2 classes, but there are 3 labels"},
       {labels("a\n\n" + too_long + "\n"), "labels.txt:3",
-       "is no class's name: it has 33 bytes; expected text of at most 32"},
+       "is no class's name (33 bytes); expected text of at most 32 without control"},
       {labels("a\n\tb\n"), "labels.txt:2", "is no class's name"},
   };
   for (const auto& slip : slips) {
