@@ -13,7 +13,8 @@ constexpr int kHalf = 2;  // of the 5x5 pixels that are summed
 constexpr int kHeldZ = kMostChangeZ * ChangeRegions::kUnit;
 constexpr double kLeastEdge = 2.5;  // sigmas
 constexpr double kMergeShare = 0.75;
-constexpr int kEdgeShare = 3;  // of the largest |z|
+constexpr double kMostMerge = 2;  // of merge_px
+constexpr int kEdgeShare = 3;     // of the largest |z|
 
 }  // namespace
 
@@ -162,8 +163,8 @@ void ChangeRegions::merge_regions() {
         const auto size_of = [](const Region& region) {
           return std::max(region.right - region.left, region.bottom - region.top);
         };
-        const double near =
-            std::max(options_.merge_px, kMergeShare * std::min(size_of(a), size_of(b)));
+        const double near = std::clamp(kMergeShare * std::min(size_of(a), size_of(b)),
+                                       options_.merge_px, kMostMerge * options_.merge_px);
         if (std::max(between_u, between_v) > near) {
           ++k;
           continue;

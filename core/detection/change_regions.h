@@ -2,7 +2,8 @@
 // From normalised differences of each pixel, in sigmas, to the boxes of what has changed.
 //   S(u) = sum of z over the 5x5 pixels about u / its standard deviation, were the scene still
 // |S| >= threshold makes regions of touching pixels; a region's box holds its pixels with |z| of at least a third of its largest, and
-// 2.5. Boxes nearer than merge_px, or than 3/4 of the smaller one's size, become one: what is large and slow changes at its ends only.
+// 2.5. Boxes nearer than merge_px, or than 3/4 of the smaller one's size, become one, but none beyond twice merge_px: what is large and slow
+// changes at its ends only, and what is large and farther apart may be two (target_pieces.h).
 // Score: the largest |S|. z is held to +-6 before it is summed, so that single pixels make no region. The standard deviation of the sum takes z to be white noise seen through the B-spline (spline_image.h).
 // Memory is taken by the constructor: 2 bytes a pixel for z, which is the caller's to fill, and the runs of kMostRuns. For one thread.
 

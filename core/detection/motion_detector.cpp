@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "core/detection/spline_image.h"
+#include "core/detection/target_pieces.h"
 #include "core/detection/uncovered_places.h"
 
 namespace alidade {
@@ -13,6 +14,7 @@ namespace {
 // Variance of white noise seen through the B-spline, at pixel centres and, on average, between them.
 constexpr double kSplineNoiseHere = 0.25;
 constexpr double kSplineNoiseBetween = 0.23;
+constexpr double kSplineNoise = kSplineNoiseHere + kSplineNoiseBetween;
 // The least that samples of a match must be.
 constexpr int kLeastSamples = 50;
 constexpr double kLeastGain = 0.5;
@@ -190,8 +192,7 @@ bool MotionDetector::match_chosen(const FrameOrientation& orientation, MotionAns
     const double blur_change =
         options_.sigma_blur_px2 + std::abs(blur * blur - blur_then * blur_then) / 24;
     DifferenceModel& model = compared.model;
-    model.noise_square =
-        static_cast<float>((kSplineNoiseHere + kSplineNoiseBetween) * noise * noise);
+    model.noise_square = static_cast<float>(kSplineNoise * noise * noise);
     model.shift_square =
         static_cast<float>(options_.sigma_alignment_px * options_.sigma_alignment_px);
     model.blur_square = static_cast<float>(blur_change * blur_change);
@@ -357,8 +358,10 @@ MotionAnswer MotionDetector::find(const ImageView& image, const FrameOrientation
       for (const DetectionBox& box : regions_.boxes()) {
         if (differs_from_recent(box)) boxes_.push_back(box);
       }
-      drop_uncovered_places({smooth_.data(), options_.width, options_.height}, regions_.z(),
-                            &boxes_);
+      const SmoothedView now{smooth_.data(), options_.width, options_.height};
+      drop_uncovered_places(now, regions_.z(), &boxes_);
+      join_target_pieces(now, regions_.z(), noise_.sigma() * std::sqrt(kSplineNoise),
+                         options_.change, &boxes_);
     } else {
       answer.status = MotionStatus::kNotExplained;
     }

@@ -6,7 +6,7 @@
 //   z(u) = (now - light then(warp(u) + shift) - offset) / sigma,   sigma^2 = noise^2 + (shift |gradient|)^2 + (blur |second derivative|)^2
 // The smallest z counts, and none where they differ in sign or there is but one: what one of the earlier pictures explains has not changed, so
 // that the place where a target was earlier is no detection. A box in which nothing differs from the picture three before is of a slow target's place in all
-// of the earlier ones, or of what stands still, and dropped, as is what a target has just uncovered (uncovered_places.h). Noise is the picture's own (image_noise.h); if the scene as a whole differs by more than sigma,
+// of the earlier ones, or of what stands still, and dropped, as is what a target has just uncovered (uncovered_places.h); pieces of a large target become one box (target_pieces.h). Noise is the picture's own (image_noise.h); if the scene as a whole differs by more than sigma,
 // sigma is widened to that. 5x5 pixels together decide (change_regions.h). Why so, and what it cannot find: docs/motion_detection.md.
 //
 // What stands still is not found, and what came to stand within about a second no longer; where it goes it leaves a ghost as long.

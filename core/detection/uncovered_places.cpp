@@ -4,10 +4,13 @@
 #include <cmath>
 #include <cstdlib>
 
+#include "core/detection/box_pairs.h"
 #include "core/detection/change_regions.h"
 
 namespace alidade {
 namespace {
+
+using internal::size_of;
 
 constexpr double kNear = 0.5;
 // Small parts of a target's outline tell nothing of its size.
@@ -19,8 +22,6 @@ struct Change {
   bool brighter;
   double grey;  // now
 };
-
-double size_of(const DetectionBox& box) { return std::max(box.width, box.height); }
 
 Change change_of(const SmoothedView& now, const std::int16_t* z, const DetectionBox& box) {
   double sums[2] = {0, 0};  // of z: darker, brighter
@@ -40,32 +41,17 @@ Change change_of(const SmoothedView& now, const std::int16_t* z, const Detection
   return {which == 1, greys[which] / std::max(pixels[which], 1)};
 }
 
-bool holds(const DetectionBox& box, double u, double v) {
-  return u >= box.u && u <= box.u + box.width && v >= box.v && v <= box.v + box.height;
-}
-
-// Mean of the pixels on the line between the boxes' middles that are in neither. False: there are none.
+// Mean of what lies between. False: there is nothing.
 bool grey_between(const SmoothedView& now, const DetectionBox& a, const DetectionBox& b,
                   double* grey) {
-  const Vector2<double> from = a.middle();
-  const Vector2<double> way = b.middle() - from;
-  const int steps = static_cast<int>(std::ceil(way.norm()));
   double sum = 0;
   int count = 0;
-  for (int i = 1; i < steps; ++i) {
-    const Vector2<double> at = from + way * i / steps;
-    if (holds(a, at.x(), at.y()) || holds(b, at.x(), at.y())) continue;
-    sum += now.row(static_cast<int>(at.y()))[static_cast<int>(at.x())];
+  internal::each_between(a, b, [&](int u, int v) {
+    sum += now.row(v)[u];
     ++count;
-  }
+  });
   *grey = sum / std::max(count, 1);
   return count > 0;
-}
-
-double gap_between(const DetectionBox& a, const DetectionBox& b) {
-  const double across = std::max(a.u, b.u) - std::min(a.u + a.width, b.u + b.width);
-  const double down = std::max(a.v, b.v) - std::min(a.v + a.height, b.v + b.height);
-  return std::max(across, down);
 }
 
 }  // namespace
@@ -73,7 +59,7 @@ double gap_between(const DetectionBox& a, const DetectionBox& b) {
 void drop_uncovered_places(const SmoothedView& now, const std::int16_t* z,
                            std::vector<DetectionBox>* boxes) {
   const auto uncovered_by = [&](const DetectionBox& box, const DetectionBox& front) {
-    const double gap = gap_between(box, front);
+    const double gap = internal::gap_between(box, front);
     if (gap < std::min(box.width, box.height) ||
         gap > std::max({size_of(box), size_of(front), kLeastReach_px})) {
       return false;

@@ -1,6 +1,7 @@
 #include "edge_app/commands/live_targets.h"
 
 #include <fcntl.h>
+#include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
 #include <cerrno>
@@ -34,14 +35,30 @@ std::shared_ptr<const PlaneEstimate> plane_of(const Config& config,
   return config.tracking.targets->tracker.space == TargetSpace::kPlane ? std::move(plane) : nullptr;
 }
 
-std::vector<std::string> lines_of(const std::string& text) {
-  std::vector<std::string> lines;
+// Of a file of one a line; throws CommandError.
+std::vector<std::string> read_class_names(const std::string& path) {
+  std::string text;
+  std::string error;
+  if (!read_file(path, &text, &error)) throw CommandError(kExitUsage, "detectors.onnx: " + error);
+  std::vector<std::string> names;
   std::istringstream in(text);
-  for (std::string line; std::getline(in, line);) {
+  std::string line;
+  for (int number = 1; std::getline(in, line); ++number) {
     if (!line.empty() && line.back() == '\r') line.pop_back();
-    if (!line.empty()) lines.push_back(line);
+    if (line.empty()) continue;
+    if (!is_class_name(line)) {
+      throw CommandError(
+          kExitUsage, fmt::format("detectors.onnx: {}:{}: is no class's name ({} bytes); expected "
+                                  "text of at most {} without control characters",
+                                  path, number, line.size(), kLongestClass));
+    }
+    names.push_back(line);
   }
-  return lines;
+  if (names.empty()) {
+    throw CommandError(kExitUsage, "detectors.onnx: " + path +
+                                       ": is empty; expected the classes' names, one a line");
+  }
+  return names;
 }
 
 }  // namespace
@@ -50,17 +67,11 @@ std::unique_ptr<NetworkDetector> load_network(const std::optional<NetworkFiles>&
   if (!files) return nullptr;
   NetworkOptions options = files->options;
   std::string model;
-  std::string labels;
   std::string error;
-  if (!read_file(files->model, &model, &error) ||
-      (!files->labels.empty() && !read_file(files->labels, &labels, &error))) {
+  if (!read_file(files->model, &model, &error)) {
     throw CommandError(kExitUsage, "detectors.onnx: " + error);
   }
-  options.labels = lines_of(labels);
-  if (!files->labels.empty() && options.labels.empty()) {
-    throw CommandError(kExitUsage, "detectors.onnx: " + files->labels +
-                                       ": is empty; expected the classes' names, one a line");
-  }
+  if (!files->labels.empty()) options.labels = read_class_names(files->labels);
   std::unique_ptr<NetworkDetector> network;
   // OpenCV's worker threads have the priority of the thread that first needs them: not that of the one that starts the real-time thread.
   std::thread([&] {

@@ -7,7 +7,7 @@
 //     height_m, least_height_px, most_height_px, threshold
 //   onnx:                      a network of the user's
 //     model                    its file; needed
-//     labels                   a file with the classes' names, one a line
+//     labels                   a file with the classes' names, one a line, of at most 32 bytes
 //     width_px, height_px      of its input
 //     threshold, most_overlap
 // Files: relative to the configuration's. Takes section tracking, and realtime.mode OE. What each means, and its default: motion_detector.h, person_detector.h,

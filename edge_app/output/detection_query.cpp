@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <nlohmann/json.hpp>
 #include <set>
@@ -39,12 +38,7 @@ bool parse_box(const Json& item, DetectionBox* box, std::string* error) {
   }
   const auto name = item.find("class");
   if (name == item.end()) return true;
-  const bool good = name->is_string() &&
-                    name->get_ref<const std::string&>().size() <= kLongestClass &&
-                    std::none_of(name->get_ref<const std::string&>().begin(),
-                                 name->get_ref<const std::string&>().end(),
-                                 [](char c) { return (c >= 0 && c < ' ') || c == '\x7f'; });
-  if (!good) {
+  if (!name->is_string() || !is_class_name(name->get_ref<const std::string&>())) {
     *error = fmt::format("class must be a text of at most {} bytes in one line", kLongestClass);
     return false;
   }

@@ -238,7 +238,7 @@ ServerResponse targets(const HttpApiSources& sources, const ServerRequest& reque
   OrientationRecord record;
   if (wanted) {
     const std::optional<std::int64_t> number = frame_number(*wanted);
-    if (!number) return http_error(400, "frame must be a frame's number");
+    if (!number) return http_error(400, kFrameNumberRange);
     FrameChoice which;
     which.frame = number;
     ServerResponse refusal;

@@ -1,8 +1,10 @@
 #include "edge_app/output/json_query.h"
 
+#include <charconv>
 #include <cmath>
 #include <limits>
 #include <nlohmann/json.hpp>
+#include <system_error>
 
 namespace alidade {
 
@@ -58,11 +60,11 @@ bool has_known_keys_only(const Json& object, const std::set<std::string>& keys,
 }
 
 std::optional<std::int64_t> frame_number(const std::string& text) {
-  constexpr std::size_t kDigits = 18;
-  if (text.empty() || text.size() > kDigits ||
-      text.find_first_not_of("0123456789") != std::string::npos)
-    return std::nullopt;
-  return std::stoll(text);
+  std::int64_t number = 0;
+  const char* const end = text.data() + text.size();
+  const auto [stop, failure] = std::from_chars(text.data(), end, number);
+  if (failure != std::errc() || stop != end || text.front() == '-') return std::nullopt;
+  return number;
 }
 
 bool parse_frame_choice(const Json& object, FrameChoice* which, std::string* error) {
@@ -77,7 +79,7 @@ bool parse_frame_choice(const Json& object, FrameChoice* which, std::string* err
                       frame->get<std::uint64_t>() <=
                           static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
     if (!fits) {
-      *error = "frame must be an integer, 0 or more";
+      *error = kFrameNumberRange;
       return false;
     }
     which->frame = frame->get<std::int64_t>();

@@ -23,7 +23,9 @@ struct FrameChoice {
 [[nodiscard]] bool has_known_keys_only(const nlohmann::ordered_json& object,
                                        const std::set<std::string>& keys, std::string* error);
 
-// A frame's number as a query has it: digits. Empty: it is none.
+inline constexpr const char* kFrameNumberRange = "frame must be an integer, 0 or more, below 2^63";
+
+// A frame's number as a query has it: digits, of the range that JSON may tell. Empty: it is none.
 [[nodiscard]] std::optional<std::int64_t> frame_number(const std::string& text);
 
 // Keys frame and time_s.

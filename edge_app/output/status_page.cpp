@@ -48,7 +48,7 @@ std::optional<ServerResponse> overlay(ImageTap* tap, const ServerRequest& reques
   std::shared_ptr<const LiveImage> image;
   if (const auto wanted = request.parameter("frame")) {
     const std::optional<std::int64_t> number = frame_number(*wanted);
-    if (!number) return http_error(400, "frame must be a frame's number");
+    if (!number) return http_error(400, kFrameNumberRange);
     image = tap->of_frame(*number);
     if (image == nullptr)
       return http_error(404, "that frame is not among the last that were shown");

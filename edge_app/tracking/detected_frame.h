@@ -2,7 +2,9 @@
 // What a detector found in one frame, and what became of it. Scores are 0 to 1 here. Where the target is, is the middle of the box's lower edge
 // (the foot) on a plane, the middle of the box on the sphere.
 
+#include <algorithm>
 #include <cstddef>
+#include <string>
 #include <vector>
 
 #include "core/detection/detection_box.h"
@@ -11,6 +13,13 @@
 namespace alidade {
 
 inline constexpr std::size_t kLongestClass = 32;  // bytes
+
+// What a class may be called: no longer, and in one line. It is refused, not cut.
+[[nodiscard]] inline bool is_class_name(const std::string& name) {
+  return name.size() <= kLongestClass && std::none_of(name.begin(), name.end(), [](char c) {
+           return (c >= 0 && c < ' ') || c == '\x7f';
+         });
+}
 
 struct DetectedFrame {
   OrientationRecord record;  // of the frame: with a number, a time and an orientation

@@ -1,5 +1,5 @@
 // alidade_map_upkeep: a scene map through a month (test/core/mapping/changing_scene.h), with its upkeep and without: how far the
-// absolute direction drifts, how many landmarks there are, what the paper's proximity check and its updating are worth.
+// absolute direction drifts, how many landmarks there are, what the paper's proximity check and its updating are worth, also to the tracking of targets.
 //   alidade_map_upkeep --days 30
 // Exit status: 0 all figures are as they should be, 1 some are not (listed last), 2 wrong usage.
 
@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <iostream>
 
+#include "test/accuracy/map_tracking.h"
 #include "test/accuracy/table.h"
 #include "test/core/mapping/changing_scene.h"
 
@@ -69,6 +70,12 @@ void print_comparison(const std::string& scene, const std::vector<Lived>& all) {
   table.print(std::cout);
 }
 
+void print_tracking(const std::string& scene, const std::vector<Lived>& all, int views) {
+  std::vector<TrackedMap> maps;
+  for (const Lived& lived : all) maps.push_back({lived.name, lived.days.back()});
+  track_through_maps(scene, maps, views).print(std::cout);
+}
+
 std::vector<Lived> live_each_way(const ChangingSceneOptions& scene) {
   SceneRunOptions full, without_check, without;
   without_check.options.least_proximity = 0;
@@ -83,6 +90,7 @@ int run(const ChangingSceneOptions& month, double bare_days) {
   const std::vector<Lived> lived = live_each_way(month);
   for (const Lived& way : lived) print_days("the month", way);
   print_comparison("the month", lived);
+  print_tracking("the month", lived, month.views);
   const std::vector<SceneDay>& kept = lived.front().days;
   for (const SceneDay& day : kept) {
     if (!(day.drift_px <= 0.2)) missed.push_back("drift " + number(day.drift_px) + " px, mark 0.2");
@@ -98,7 +106,9 @@ int run(const ChangingSceneOptions& month, double bare_days) {
   bare.bare = true;
   bare.trees = 50;
   bare.cars = 0;
-  print_comparison("a scene of which trees take more than half", live_each_way(bare));
+  const std::vector<Lived> lived_with_trees = live_each_way(bare);
+  print_comparison("a scene of which trees take more than half", lived_with_trees);
+  print_tracking("a scene of which trees take more than half", lived_with_trees, bare.views);
   for (const std::string& what : missed) std::cout << "MISSED: " << what << "\n";
   return missed.empty() ? 0 : 1;
 }

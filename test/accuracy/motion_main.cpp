@@ -26,6 +26,19 @@ struct Tally {
   int targets = 0, found = 0, false_alarms = 0;
   double covered = 0, cpu_s = 0, spread = 0, shift_px = 0, miss_px = 0;
   std::vector<DetectionBox> alarms;  // false ones
+
+  void add(const Tally& other) {
+    frames += other.frames;
+    not_ok += other.not_ok;
+    targets += other.targets;
+    found += other.found;
+    false_alarms += other.false_alarms;
+    covered += other.covered;
+    cpu_s += other.cpu_s;
+    miss_px += other.miss_px;
+    spread = std::max(spread, other.spread);
+    shift_px = std::max(shift_px, other.shift_px);
+  }
 };
 
 double cpu_now_s() {
@@ -161,16 +174,7 @@ Tally add(Study* study, Table* table, const std::string& what, MotionFilmPlan pl
     table->rows.push_back(row(what + ", " + scene.name, t));
     std::cerr << table->rows.back()[0] << " " << table->rows.back()[1] << " "
               << table->rows.back()[2] << " " << table->rows.back()[10] << "ms\n";
-    sum.frames += t.frames;
-    sum.not_ok += t.not_ok;
-    sum.targets += t.targets;
-    sum.found += t.found;
-    sum.false_alarms += t.false_alarms;
-    sum.covered += t.covered;
-    sum.cpu_s += t.cpu_s;
-    sum.miss_px += t.miss_px;
-    sum.spread = std::max(sum.spread, t.spread);
-    sum.shift_px = std::max(sum.shift_px, t.shift_px);
+    sum.add(t);
   }
   table->rows.push_back(row(what + ", all", sum));
   return sum;
@@ -216,6 +220,26 @@ void run_targets(Study* study) {
   table.print(std::cout);
 }
 
+void run_sizes(Study* study, int seeds) {
+  Table table{"Sizes, at half a field of view a second; contrast " + number(study->plan.contrast),
+              kHeader,
+              {},
+              {}};
+  for (const double size : {8.0, 16.0, 32.0}) {
+    Tally sum;
+    MotionFilmPlan plan = study->plan;
+    plan.size_px = size;
+    const std::string what = number(size) + " px";
+    for (int i = 0; i < seeds; ++i) {
+      sum.add(add(study, &table, what + ", seed " + std::to_string(plan.seed), plan));
+      ++plan.seed;
+    }
+    table.rows.push_back(row(what + ", all seeds", sum));
+    require_mark(study, what, sum);
+  }
+  table.print(std::cout);
+}
+
 void run_errors(Study* study) {
   Table table{"Errors of orientation, px, at half a field of view a second", kHeader, {}, {}};
   for (const double sigma : {0.0, 0.05, 0.2, 0.5, 1.0}) {
@@ -251,9 +275,10 @@ int main(int argc, char** argv) {
   std::string only;
   std::vector<std::string> photos;
   std::vector<double> speeds{0, 0.25, 0.5, 1};
+  int seeds = 4;
   const std::string data = ALIDADE_TEST_DATA;
   app.add_option("--only", only, "one table")
-      ->check(CLI::IsMember({"speeds", "targets", "errors", "noise"}));
+      ->check(CLI::IsMember({"speeds", "targets", "sizes", "errors", "noise"}));
   app.add_option("--keep", study.kept, "folder for rendered frames, which are made once")
       ->required();
   app.add_option("--show", study.shown,
@@ -262,6 +287,8 @@ int main(int argc, char** argv) {
   app.add_option("--photo", photos, "scenes in place of the usual three");
   app.add_option("--duration", study.plan.duration_s, "of a film, s");
   app.add_option("--seed", study.plan.seed, "of targets and noise");
+  app.add_option("--seeds", seeds, "of the table of sizes, from --seed on")
+      ->check(CLI::PositiveNumber);
   app.add_option("--size", study.plan.size_px, "of targets, px");
   app.add_option("--contrast", study.plan.contrast, "of targets, grey levels");
   app.add_option("--threshold", study.options.change.threshold, "of the detector, sigmas");
@@ -288,6 +315,7 @@ int main(int argc, char** argv) {
   }
   if (only.empty() || only == "speeds") run_speeds(&study, speeds);
   if (only.empty() || only == "targets") run_targets(&study);
+  if (only.empty() || only == "sizes") run_sizes(&study, seeds);
   if (only.empty() || only == "errors") run_errors(&study);
   if (only.empty() || only == "noise") run_noise(&study);
   for (const std::string& what : study.missed) std::cout << "MISSED: " << what << "\n";

@@ -73,13 +73,13 @@ TrackedScene track_scene(const std::vector<SceneFrame>& frames, double noise_px,
     told.false_alarm_density = std::max(false_alarms, 0.01) / (kSceneWidth * kSceneHeight);
     told.detections = detections.data();
     told.count = static_cast<int>(detections.size());
-    const FrameAnswer answer = tracker.add(told, frame.time_s);
-    if (answer.status != FrameStatus::kTaken) continue;
+    if (frame.has_pose && tracker.add(told, frame.time_s).status != FrameStatus::kTaken) continue;
 
     for (std::size_t i = 0; i < frame.targets.size(); ++i) {
       if (!frame.targets[i].in_view) continue;
       scene.truth.push_back(mot_box(k, i + 1, box_at(frame, frame.targets[i].place)));
     }
+    if (!frame.has_pose) continue;
     const Eigen::Matrix3d plane_from_picture = frame.H_picture_from_plane().inverse();
     for (const Target& target : tracker.targets()) {
       if (target.identity == 0 || target.in_view <= 0.5) continue;

@@ -582,6 +582,11 @@ TEST_F(CommandLineTest, ReplayNamesTheLineOfDetectionsThatItCannotUse) {
        {},
        1,
        "d.jsonl:1: boxes: item 0: the box's middle is not in the picture"},
+      {R"({"frame": 20, "boxes": [{"u": 1, "v": 1, "width": 9, "height": 9, "class": ")" +
+           std::string(33, 'x') + R"("}]})",
+       {},
+       1,
+       "d.jsonl:1: boxes: item 0: class must be a text of at most 32 bytes"},
       {std::string(300000, ' '), {}, 1, "d.jsonl:1: is longer than"},
       {middle_box(20), {"--tracking", plain}, 2, "plain.yaml: has no section tracking"},
       {middle_box(20), {"--tracking", groundless}, 2, "groundless.yaml:1: tracking.space"},

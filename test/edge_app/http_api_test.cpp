@@ -389,6 +389,8 @@ TEST_F(HttpApiWithTargetsTest, RefusesEachKindOfBadDetectionsWithItsReason) {
       {R"({"frame": 1, "boxes": [)" + box + "," + box + "," + box + "]}", "400",
        "more boxes than tracking.max_detections"},
       {R"({"frame": 60, "boxes": []})", "404", "later than the newest frame"},
+      {R"({"frame": 9223372036854775807, "boxes": []})", "404", "later than the newest frame"},
+      {R"({"frame": 9223372036854775808, "boxes": []})", "400", "0 or more, below 2^63"},
       {R"({"time_s": 86500, "boxes": []})", "404", "later than the newest frame"},
       {R"({"time_s": 50, "boxes": []})", "404", "no such frame"},
       {R"({"frame": 50, "boxes": []})", "409", "no orientation"},
@@ -402,12 +404,14 @@ TEST_F(HttpApiWithTargetsTest, RefusesEachKindOfBadDetectionsWithItsReason) {
               StartsWith("HTTP/1.1 413 "));
   EXPECT_THAT(get("/api/v1/targets?frame=x"), StartsWith("HTTP/1.1 400 "));
   EXPECT_THAT(get("/api/v1/targets?frame=1000"), StartsWith("HTTP/1.1 404 "));
+  EXPECT_THAT(get("/api/v1/targets?frame=9223372036854775807"), StartsWith("HTTP/1.1 404 "));
+  EXPECT_THAT(get("/api/v1/targets?frame=9223372036854775808"), HasSubstr("below 2^63"));
   const json targets = body_of(get("/api/v1/targets"));
   EXPECT_EQ(targets["targets"], json::array());
   EXPECT_TRUE(targets["frame"].is_null());
-  EXPECT_EQ(targets["detections"]["frames"]["malformed"], 16);
+  EXPECT_EQ(targets["detections"]["frames"]["malformed"], 17);
   EXPECT_EQ(targets["detections"]["frames"]["outside"], 2);
-  EXPECT_EQ(targets["detections"]["frames"]["not_yet"], 2);
+  EXPECT_EQ(targets["detections"]["frames"]["not_yet"], 3);
   EXPECT_THAT(get("/metrics"), HasSubstr("alidade_detection_frames_total{outcome=\"score\"} 1\n"));
 }
 

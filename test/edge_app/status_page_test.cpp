@@ -140,7 +140,8 @@ TEST_F(StatusPageTest, RefusesFramesThatAreNoneOrNotKept) {
     return answer ? answer->status : 0;
   };
   EXPECT_EQ(status("41"), 404);
-  for (const char* frame : {"", "-1", "1.5", "x", "9999999999999999999", "41%20"})
+  EXPECT_EQ(status("9223372036854775807"), 404);
+  for (const char* frame : {"", "-1", "1.5", "x", "9223372036854775808", "41%20"})
     EXPECT_EQ(status(frame), 400) << frame;
 }
 

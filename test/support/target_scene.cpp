@@ -235,8 +235,14 @@ std::vector<SceneFrame> simulate_targets(const TargetSceneOptions& options) {
     SceneFrame frame;
     frame.time_s = t;
     const Eigen::Matrix<double, 3, 4> P = projection(height, pan, tilt, f);
-    frame.P = projection(height, pan + options.camera_noise_px / f * normal(detector),
-                         tilt + options.camera_noise_px / f * normal(detector), f);
+    Eigen::Vector2d off = Eigen::Vector2d::Zero();
+    if (!options.camera_errors.empty()) {
+      const auto second = std::min(static_cast<std::size_t>(t), options.camera_errors.size() - 1);
+      frame.has_pose = options.camera_errors[second].has_value();
+      off = options.camera_errors[second].value_or(off);
+    }
+    frame.P = projection(height, pan + off.x() + options.camera_noise_px / f * normal(detector),
+                         tilt - off.y() + options.camera_noise_px / f * normal(detector), f);
     for (const Person& person : crowd.people()) {
       SceneTarget target;
       target.place = person.place;

@@ -5,6 +5,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 namespace alidade::test {
@@ -28,7 +29,9 @@ struct TargetSceneOptions {
   double false_alarms = 0.1;   // a frame, anywhere in the picture
   double noise_px = 2;         // of each coordinate
   double camera_noise_px = 0;  // the homography is told with the camera turned by so much, white
-  double look_away_s = 0;      // every 15 s the camera looks elsewhere for so long
+  // Likewise turned by so much, rad to the right and down, a second each, the last from then on; none: there is no pose, so no frame of that second is told.
+  std::vector<std::optional<Eigen::Vector2d>> camera_errors;
+  double look_away_s = 0;  // every 15 s the camera looks elsewhere for so long
   bool camera_moves = true;
   std::uint64_t seed = 1;
 };
@@ -48,6 +51,7 @@ struct SceneDetection {
 struct SceneFrame {
   double time_s = 0;
   Eigen::Matrix<double, 3, 4> P;  // picture from world, as told
+  bool has_pose = true;
   std::vector<SceneTarget> targets;
   std::vector<SceneDetection> detections;  // in no order that means anything
 

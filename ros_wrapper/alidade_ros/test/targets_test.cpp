@@ -122,6 +122,10 @@ TEST(Detections, AreAskedAboutByStampOrFrame) {
             nlohmann::json::parse(
                 R"({"u":10.5,"v":20.5,"width":3.0,"height":6.0,"score":0.5,"class":"boat"})"));
   EXPECT_TRUE(json["boxes"][1]["score"].is_null()) << "which the edge refuses";
+  detections.detections[0].label = std::string(33, 'x');
+  ASSERT_TRUE(detections_question(detections, clock_at(1000), &text, &error)) << error;
+  EXPECT_EQ(nlohmann::json::parse(text)["boxes"][0]["class"], std::string(33, 'x'))
+      << "not cut: the edge refuses it and says why";
   detections.by_frame = true;
   detections.frame = 12;
   detections.detections.clear();

@@ -208,6 +208,16 @@ TEST_F(ChangeRegionsTest, ASmallPieceApartFromALargeOneIsAnotherThing) {
   EXPECT_EQ(regions_.boxes().size(), 2U);
 }
 
+TEST_F(ChangeRegionsTest, TwoLargePiecesAreTwoThingsFromTwiceTheDistanceOn) {
+  for (const int gap : {12, 13}) {
+    ChangeRegions regions(kSize, kSize, options_);
+    plant(&regions, 40, 50, 30, 30, 4);
+    plant(&regions, 70 + gap, 55, 30, 30, 4);
+    ASSERT_TRUE(regions.find());
+    EXPECT_EQ(regions.boxes().size(), gap == 12 ? 1U : 2U);
+  }
+}
+
 TEST_F(ChangeRegionsTest, ASinglePixelIsNothing) {
   plant(&regions_, 100, 100, 1, 1, 100);
   plant(&regions_, 20, 100, 3, 3, 1.5);

@@ -16,6 +16,7 @@ inline constexpr int kPanHeight = 192;     // px
 inline constexpr double kPanFocal = 4000;  // px
 inline constexpr double kPanRate = 25;     // frames a second
 inline constexpr double kPanNoise = 2;     // grey levels
+inline constexpr double kPanMean = 120;    // grey level of the scene
 
 // rad: where it is at time 0, and how fast.
 struct Disc {
@@ -23,6 +24,7 @@ struct Disc {
       velocity{0, 0};  // px at the focal length of kPanFocal; right, up; of time 0, a second
   double size_px = 8;
   double brighter = 30;  // grey levels
+  bool even = false;     // of one grey level, else with the scene's waves
 };
 
 class PanningCamera {
@@ -71,11 +73,12 @@ class PanningCamera {
       EXPECT_EQ(frame.direction(u, &d), ProjectionStatus::kOk);
       const double x = kPanFocal * std::atan2(d.y(), d.x());
       const double y = kPanFocal * std::asin(-d.z());
-      double sum = 120;
+      double sum = kPanMean;
       for (const Wave& wave : waves_) sum += 9 * std::cos(wave.u * x + wave.v * y + wave.phase);
       if (disc) {
         const double inside = 0.5 * disc->size_px - (u - centre).norm() + 0.5;
-        sum += disc->brighter * std::min(std::max(inside, 0.0), 1.0);
+        const double share = std::min(std::max(inside, 0.0), 1.0);
+        sum += share * (disc->even ? kPanMean + disc->brighter - sum : disc->brighter);
       }
       const Vector2<double> middle(0.5 * kPanWidth, 0.5 * kPanHeight);
       const double darker = vignetting * (u - middle).squaredNorm() / middle.squaredNorm();

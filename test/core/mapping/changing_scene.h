@@ -13,6 +13,7 @@
 #include <array>
 #include <cmath>
 #include <map>
+#include <optional>
 #include <random>
 #include <vector>
 
@@ -320,6 +321,8 @@ struct SceneDay {
   double sigma_px = 0;  // claimed: the pose's covariance with the common part of its landmarks
   int landmarks = 0;    // at the end
   int born = 0, died = 0, not_close = 0;
+  // Of each view, one after the other: rad, to the right and down in the picture; none: its pose was refused.
+  std::vector<std::optional<Eigen::Vector2d>> errors;
 };
 
 struct SceneRunOptions {
@@ -370,12 +373,14 @@ inline std::vector<SceneDay> live_through(const ChangingSceneOptions& what,
           ++row.views;
           if (pose.status != PoseStatus::kOk) {
             ++row.refused;
+            row.errors.emplace_back();
             continue;
           }
           row.matches += static_cast<double>(pose.inliers.size());
           const Eigen::Vector3d off = R.transpose() * pose.R_base_from_camera.col(2);
           const Eigen::Vector2d error = f * off.head<2>() / off.z();
           square += error.squaredNorm();
+          row.errors.emplace_back(error / f);
           sum[static_cast<std::size_t>(place)] += error;
           ++count[static_cast<std::size_t>(place)];
           UpkeepView view;

@@ -1,0 +1,39 @@
+#pragma once
+// Two boxes of what has changed, and what lies between them.
+
+#include <algorithm>
+#include <cmath>
+
+#include "core/detection/detection_box.h"
+
+namespace alidade::internal {
+
+[[nodiscard]] inline double size_of(const DetectionBox& box) {
+  return std::max(box.width, box.height);
+}
+
+// The larger of that across and that down, px; negative where they overlap.
+[[nodiscard]] inline double gap_between(const DetectionBox& a, const DetectionBox& b) {
+  const double across = std::max(a.u, b.u) - std::min(a.u + a.width, b.u + b.width);
+  const double down = std::max(a.v, b.v) - std::min(a.v + a.height, b.v + b.height);
+  return std::max(across, down);
+}
+
+[[nodiscard]] inline bool holds(const DetectionBox& box, const Vector2<double>& at) {
+  return at.x() >= box.u && at.x() <= box.u + box.width && at.y() >= box.v &&
+         at.y() <= box.v + box.height;
+}
+
+// act(u, v) for the pixels on the line between the boxes' middles that are in neither, a pixel's width apart.
+template <typename Act>
+void each_between(const DetectionBox& a, const DetectionBox& b, Act&& act) {
+  const Vector2<double> from = a.middle();
+  const Vector2<double> way = b.middle() - from;
+  const int steps = static_cast<int>(std::ceil(way.norm()));
+  for (int i = 1; i < steps; ++i) {
+    const Vector2<double> at = from + way * i / steps;
+    if (!holds(a, at) && !holds(b, at)) act(static_cast<int>(at.x()), static_cast<int>(at.y()));
+  }
+}
+
+}  // namespace alidade::internal

@@ -1,0 +1,93 @@
+// What `run` and `check` say of a network that they cannot use.
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "edge_app/commands/command.h"
+#include "edge_app/commands/live_targets.h"
+#include "edge_app/tracking/detected_frame.h"
+#include "test/support/temporary_directory.h"
+
+namespace alidade {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+// test/data/make_networks.py says what they answer.
+std::string cells(const std::string& kind) {
+  return std::string(ALIDADE_TEST_DATA) + "/bright_cells_" + kind + ".onnx";
+}
+
+NetworkFiles network_of(const std::string& model, const std::string& labels = "") {
+  NetworkFiles files;
+  files.model = model;
+  files.labels = labels;
+  files.options.width_px = files.options.height_px = 64;
+  return files;
+}
+
+// The one line that it ends with.
+std::string refusal_of(const NetworkFiles& files) {
+  try {
+    static_cast<void>(load_network(files));
+  } catch (const CommandError& error) {
+    EXPECT_EQ(error.exit_code, kExitUsage);
+    return error.what();
+  }
+  ADD_FAILURE() << files.model << " is taken";
+  return "";
+}
+
+TEST(LoadNetwork, NoneIsAskedForOrOneIsThereWithItsClasses) {
+  EXPECT_FALSE(load_network(std::nullopt));
+  const TemporaryDirectory directory;
+  const std::string longest(kLongestClass, 'x');
+  const auto network = load_network(
+      network_of(cells("v8"), directory.write("labels.txt", "bright\r\n\n" + longest)));
+  ASSERT_TRUE(network);
+  EXPECT_EQ(network->classes(), 2);
+}
+
+TEST(LoadNetwork, SaysInOneLineWhichFileIsWrongAndWhatWouldBeRight) {
+  const TemporaryDirectory directory;
+  const std::string text = directory.write("text.onnx", "nothing of the kind\nnor here\n");
+  const std::string none = directory.write("none.onnx", "");
+  const std::string absent = directory.path() + "/absent";
+  int written = 0;
+  const auto labels = [&](const std::string& lines) {
+    const std::string name = std::to_string(++written) + "_labels.txt";
+    return network_of(cells("v8"), directory.write(name, lines));
+  };
+  const std::string too_long(kLongestClass + 1, 'x');
+  NetworkFiles other_size = network_of(cells("v8"));
+  other_size.options.width_px = 128;
+  const struct {
+    NetworkFiles files;
+    std::string file, saying;
+  } slips[] = {
+      {network_of(absent), absent, "No such file"},
+      {network_of(directory.path()), directory.path(), "cannot be read"},
+      {network_of(text), text, "is no ONNX network that OpenCV can read; export it with opset 12"},
+      {network_of(none), none, "is no ONNX network"},
+      {other_size, cells("v8"), "takes no pictures of 128x64 px"},
+      {network_of(cells("pictures")), cells("pictures"),
+       "has an output of 1x1x8x8; expected 1x(4+classes)xN"},
+      {network_of(cells("v8"), absent), absent, "No such file"},
+      {labels("\n\n"), "labels.txt", "is empty; expected the classes' names, one a line"},
+      {labels("a\nb\nc\n"), cells("v8"), "tells 2 classes, but there are 3 labels"},
+      {labels("a\n\n" + too_long + "\n"), "labels.txt:3",
+       "is no class's name (33 bytes); expected text of at most 32 without control"},
+      {labels("a\n\tb\n"), "labels.txt:2", "is no class's name"},
+  };
+  for (const auto& slip : slips) {
+    const std::string line = refusal_of(slip.files);
+    EXPECT_THAT(line, StartsWith("detectors.onnx: "));
+    EXPECT_THAT(line, HasSubstr(slip.file + ": "));
+    EXPECT_THAT(line, HasSubstr(slip.saying));
+    EXPECT_EQ(line.find('\n'), std::string::npos) << line;
+  }
+}
+
+}  // namespace
+}  // namespace alidade
