@@ -227,7 +227,8 @@ ServerResponse detections(const HttpApiSources& sources, const std::string& body
 
 ServerResponse targets(const HttpApiSources& sources, const ServerRequest& request) {
   if (sources.targets == nullptr) return http_error(404, kNothingTracked);
-  const auto state = sources.targets->newest();
+  const TargetFeed::Snapshot snapshot = sources.targets->snapshot();
+  const auto& state = snapshot.newest;
   Json out{{"frame", nullptr},
            {"time_s", nullptr},
            {"detected_frame", nullptr},
@@ -247,8 +248,8 @@ ServerResponse targets(const HttpApiSources& sources, const ServerRequest& reque
     record = state->record;
   }
   if (state) out = targets_json(*state, record);
-  out["detections"] = target_counters_json(sources.targets->counters());
-  out["detections"]["waiting"] = sources.targets->waiting();
+  out["detections"] = target_counters_json(snapshot.counters);
+  out["detections"]["waiting"] = snapshot.waiting;
   return json_response(out);
 }
 

@@ -180,8 +180,9 @@ void add_link_metrics(const PipelineSummary& summary, MetricsText* out) {
 }
 
 void add_target_metrics(const TargetFeed& feed, MetricsText* out) {
-  const auto newest = feed.newest();
-  const TargetCounters counters = feed.counters();
+  const TargetFeed::Snapshot snapshot = feed.snapshot();
+  const auto& newest = snapshot.newest;
+  const TargetCounters& counters = snapshot.counters;
   out->gauge("alidade_targets", "Targets that are tracked, in view or not");
   out->add(static_cast<std::int64_t>(newest ? newest->targets.size() : 0));
   out->counter("alidade_detection_frames_total", "Frames of detections, by what became of them");
@@ -190,7 +191,7 @@ void add_target_metrics(const TargetFeed& feed, MetricsText* out) {
     out->add(counters.of(status), {{"outcome", label_of(status)}});
   }
   out->gauge("alidade_detection_frames_waiting", "Frames of detections in the queue");
-  out->add(static_cast<std::int64_t>(feed.waiting()));
+  out->add(static_cast<std::int64_t>(snapshot.waiting));
   out->counter("alidade_detection_boxes_total",
                "Boxes of frames that were taken, by what became of them");
   out->add(counters.boxes_taken, {{"outcome", "taken"}});

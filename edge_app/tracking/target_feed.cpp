@@ -57,21 +57,13 @@ void TargetFeed::count_refused(DetectionStatus status) {
   refused_.count(status);
 }
 
-std::shared_ptr<const TargetsState> TargetFeed::newest() const {
+TargetFeed::Snapshot TargetFeed::snapshot() const {
   const std::lock_guard<std::mutex> lock(mutex_);
-  return newest_;
-}
-
-TargetCounters TargetFeed::counters() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  TargetCounters out = counters_;
-  for (std::size_t i = 0; i < out.frames.size(); ++i) out.frames[i] += refused_.frames[i];
+  Snapshot out{newest_, counters_, queue_.size()};
+  for (std::size_t i = 0; i < out.counters.frames.size(); ++i) {
+    out.counters.frames[i] += refused_.frames[i];
+  }
   return out;
-}
-
-std::size_t TargetFeed::waiting() const {
-  const std::lock_guard<std::mutex> lock(mutex_);
-  return queue_.size();
 }
 
 void TargetFeed::run() {

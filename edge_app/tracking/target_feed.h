@@ -36,10 +36,13 @@ class TargetFeed {
   void count_refused(DetectionStatus status);
 
   [[nodiscard]] const TargetOptions& options() const { return options_; }
-  // Null before the first frame that was taken.
-  [[nodiscard]] std::shared_ptr<const TargetsState> newest() const;
-  [[nodiscard]] TargetCounters counters() const;
-  [[nodiscard]] std::size_t waiting() const;
+  // All of one moment.
+  struct Snapshot {
+    std::shared_ptr<const TargetsState> newest;  // null before the first frame that was taken
+    TargetCounters counters;
+    std::size_t waiting = 0;  // frames
+  };
+  [[nodiscard]] Snapshot snapshot() const;
 
  private:
   void run();

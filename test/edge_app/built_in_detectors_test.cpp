@@ -45,7 +45,7 @@ TEST(BuiltInDetectors, TellTheFeedWhatMovesAndNothingOfPicturesThatTheyCannotJud
   // Two pictures before it are what one is compared with.
   EXPECT_EQ(report.motion->unjudged, 2);
   EXPECT_GT(report.motion->boxes, 0);
-  EXPECT_EQ(feed.waiting(), static_cast<std::size_t>(kFrames - 2));
+  EXPECT_EQ(feed.snapshot().waiting, static_cast<std::size_t>(kFrames - 2));
 }
 
 TEST(BuiltInDetectors, APictureTooSmallIsNotJudged) {
@@ -57,7 +57,7 @@ TEST(BuiltInDetectors, APictureTooSmallIsNotJudged) {
   detectors.look(
       panned_frame(test::PanningCamera().orientation(0), 0, ImageView{luma.data(), 32, 32, 32}));
   EXPECT_EQ(detectors.report().motion->unjudged, 1);
-  EXPECT_EQ(feed.waiting(), 0U);
+  EXPECT_EQ(feed.snapshot().waiting, 0U);
 }
 
 // Its answer is known: test/data/make_networks.py.
@@ -107,7 +107,7 @@ TEST(BuiltInDetectors, WhatANetworkFindsIsNoMoverAgain) {
   EXPECT_EQ(report.onnx->unjudged, 0);
   EXPECT_GT(report.onnx->boxes, 0);
   // The network could judge those, too, that motion could not.
-  EXPECT_EQ(feed.waiting(), static_cast<std::size_t>(kFrames));
+  EXPECT_EQ(feed.snapshot().waiting, static_cast<std::size_t>(kFrames));
 }
 
 }  // namespace

@@ -48,14 +48,14 @@ TEST(TargetFeed, TakesWhatItsQueueHoldsAndRefusesTheRest) {
     ASSERT_EQ(feed.offer(ground_seen(i)).status, DetectionStatus::kTaken);
   for (int i = 0; i < 3; ++i)
     EXPECT_EQ(feed.offer(ground_seen(most + i)).status, DetectionStatus::kQueueFull);
-  EXPECT_EQ(feed.waiting(), TargetFeed::kMostWaiting);
-  EXPECT_EQ(feed.newest(), nullptr);
-  EXPECT_EQ(feed.counters().of(DetectionStatus::kQueueFull), 3);
+  EXPECT_EQ(feed.snapshot().waiting, TargetFeed::kMostWaiting);
+  EXPECT_EQ(feed.snapshot().newest, nullptr);
+  EXPECT_EQ(feed.snapshot().counters.of(DetectionStatus::kQueueFull), 3);
   ASSERT_TRUE(feed.start());
   const auto state = news.wait_for(most);
   EXPECT_EQ(state->targets.size(), 1U);
-  EXPECT_EQ(feed.newest()->updates, most);
-  EXPECT_EQ(feed.counters().of(DetectionStatus::kTaken), most);
+  EXPECT_EQ(feed.snapshot().newest->updates, most);
+  EXPECT_EQ(feed.snapshot().counters.of(DetectionStatus::kTaken), most);
   // There is room again.
   ASSERT_EQ(feed.offer(ground_seen(most + 3)).status, DetectionStatus::kTaken);
   EXPECT_EQ(*news.wait_for(most + 1)->record.frame, most + 3);
@@ -79,7 +79,7 @@ TEST(TargetFeed, RefusesAtOnceWhatCanBeSeenAtOnce) {
   EXPECT_EQ(feed.offer(ground_seen(1000)).status, DetectionStatus::kRepeated);
   ASSERT_EQ(feed.offer(ground_seen(1002)).status, DetectionStatus::kTaken);
   static_cast<void>(news.wait_for(2));
-  const TargetCounters counters = feed.counters();
+  const TargetCounters counters = feed.snapshot().counters;
   EXPECT_EQ(counters.of(DetectionStatus::kTooLate), 1);
   EXPECT_EQ(counters.of(DetectionStatus::kBoxOutside), 1);
   EXPECT_EQ(counters.of(DetectionStatus::kMalformed), 1);
@@ -91,7 +91,7 @@ TEST(TargetFeed, EndsWithoutTakingWhatWaits) {
   TargetFeed feed(default_target_options(TargetSpace::kSphere), nullptr);
   EXPECT_EQ(feed.offer(ground_seen(1)).status, DetectionStatus::kTaken);
   feed.stop();
-  EXPECT_EQ(feed.waiting(), 1U);
+  EXPECT_EQ(feed.snapshot().waiting, 1U);
 }
 
 }  // namespace
