@@ -7,11 +7,13 @@
 #include <cmath>
 #include <ctime>
 #include <map>
+#include <numeric>
 #include <ostream>
 #include <random>
 
 #include "core/mapping/localization.h"
 #include "core/mapping/map_building.h"
+#include "test/accuracy/disturbed_picture.h"
 #include "test/accuracy/rendered_stills.h"
 #include "test/accuracy/statistics.h"
 #include "test/accuracy/table.h"
@@ -101,8 +103,8 @@ Eigen::Matrix3d common_turn(const RenderedStills& stills, const std::vector<int>
   return R;
 }
 
-MapBuilder add_stills(const RenderedStills& stills, int count, const MapPicturesOptions& options,
-                      double* feature_s, std::ostream& out) {
+MapBuilder add_stills(const RenderedStills& stills, const std::vector<int>& pictures,
+                      const MapPicturesOptions& options, double* feature_s, std::ostream& out) {
   MapBuildOptions build;
   build.width = stills.config().image.width;
   build.height = stills.config().image.height;
@@ -110,8 +112,10 @@ MapBuilder add_stills(const RenderedStills& stills, int count, const MapPictures
   MapBuilder builder(build);
   std::mt19937_64 random(options.seed + 100);
   std::normal_distribution<double> normal;
-  const FeatureDetector detector;
-  for (int i = 0; i < count; ++i) {
+  FeatureOptions of_features;
+  of_features.max_features = options.features;
+  const FeatureDetector detector(of_features);
+  for (const int i : pictures) {
     const StillView& still = stills.view(i);
     MapView view;
     view.recording = "stills";
@@ -133,7 +137,8 @@ MapBuilder add_stills(const RenderedStills& stills, int count, const MapPictures
     *feature_s += cpu_seconds() - begin;
     builder.add(view, std::move(features));
   }
-  out << count << " pictures, features " << number(*feature_s, 3) << " s CPU" << std::endl;
+  out << pictures.size() << " pictures, features " << number(*feature_s, 3) << " s CPU"
+      << std::endl;
   return builder;
 }
 
@@ -151,14 +156,16 @@ struct Level {
   std::vector<double> log_f, direction, rotation;
 };
 
-void judge_map(const RenderedStills& stills, const MapBuild& build, const Eigen::Matrix3d& common,
-               std::ostream& out, std::vector<std::string>* missed) {
+// pictures: of each keyframe.
+void judge_map(const RenderedStills& stills, const std::vector<int>& pictures,
+               const MapBuild& build, const Eigen::Matrix3d& common, std::ostream& out,
+               std::vector<std::string>* missed) {
   std::map<int, Level> levels;
   std::vector<double> squares;
   std::vector<double> all_f;
   for (std::size_t i = 0; i < build.map.keyframes.size(); ++i) {
     const SceneKeyframe& k = build.map.keyframes[i];
-    const int still = build.of_keyframe[i];
+    const int still = pictures[i];
     const Eigen::Matrix3d R = stills.base_from_camera(still);
     const simulator::Lens lens = stills.lens(still);
     const Camera<double> camera = build.map.camera_of(k);
@@ -199,46 +206,6 @@ void judge_map(const RenderedStills& stills, const MapBuild& build, const Eigen:
                         number(median(squares) / 4, 3) + " (of independent ones 95 %: " +
                         number(interval.low, 3) + " to " + number(interval.high, 3) + ")");
   table.print(out);
-}
-
-// Three octaves of light, a fifth of the picture behind something else: a part of the same picture, mirrored.
-cv::Mat disturbed(const cv::Mat& image, std::mt19937_64* random) {
-  std::uniform_real_distribution<double> share(0, 1);
-  std::normal_distribution<double> normal;
-  const double light = std::pow(2, -3 * share(*random));
-  cv::Mat out = image.clone();
-  const double side = std::sqrt(0.2);
-  const cv::Rect part(static_cast<int>(share(*random) * (1 - side) * image.cols),
-                      static_cast<int>(share(*random) * (1 - side) * image.rows),
-                      static_cast<int>(side * image.cols), static_cast<int>(side * image.rows));
-  for (int v = part.y; v < part.y + part.height; ++v) {
-    for (int u = part.x; u < part.x + part.width; ++u) {
-      out.at<std::uint8_t>(v, u) = image.at<std::uint8_t>(v, image.cols - 1 - u);
-    }
-  }
-  for (int v = 0; v < out.rows; ++v) {
-    for (int u = 0; u < out.cols; ++u) {
-      auto& pixel = out.at<std::uint8_t>(v, u);
-      pixel = cv::saturate_cast<std::uint8_t>(light * pixel + normal(*random));
-    }
-  }
-  return out;
-}
-
-// What is no view of the map: another place (the same mirrored), fog, night.
-cv::Mat elsewhere(const cv::Mat& image, int kind, std::mt19937_64* random) {
-  std::normal_distribution<double> normal;
-  cv::Mat out(image.size(), CV_8U);
-  for (int v = 0; v < out.rows; ++v) {
-    for (int u = 0; u < out.cols; ++u) {
-      const double mirrored = image.at<std::uint8_t>(v, image.cols - 1 - u);
-      double pixel = mirrored;
-      if (kind == 1) pixel = 190 + 0.02 * mirrored + 2 * normal(*random);
-      if (kind == 2) pixel = 6 + 0.01 * mirrored + 2 * normal(*random);
-      out.at<std::uint8_t>(v, u) = cv::saturate_cast<std::uint8_t>(pixel);
-    }
-  }
-  return out;
 }
 
 struct Localizations {
@@ -360,7 +327,12 @@ std::vector<std::string> run_map_pictures(const MapPicturesOptions& options, std
   const RenderedStills stills(views, options.seed, options.cache);
 
   double feature_s = 0;
-  const MapBuilder builder = add_stills(stills, in_map, options, &feature_s, out);
+  std::vector<int> added(static_cast<std::size_t>(in_map));
+  std::iota(added.begin(), added.end(), 0);
+  for (int n = 0; n < options.more; ++n) {
+    added.push_back(in_map + n * static_cast<int>(others.size()) / options.more);
+  }
+  const MapBuilder builder = add_stills(stills, added, options, &feature_s, out);
   const double begin = cpu_seconds();
   double before = begin;
   std::string doing;
@@ -381,12 +353,14 @@ std::vector<std::string> run_map_pictures(const MapPicturesOptions& options, std
     missed.push_back(std::string("the map: ") + to_string(build.status));
     return missed;
   }
-  if (static_cast<int>(build.map.keyframes.size()) != in_map) {
+  if (build.map.keyframes.size() != added.size()) {
     missed.push_back("keyframes: " + std::to_string(build.map.keyframes.size()));
   }
-  const Eigen::Matrix3d common = common_turn(stills, build.of_keyframe, build.map);
+  std::vector<int> pictures;
+  for (const int i : build.of_keyframe) pictures.push_back(added[static_cast<std::size_t>(i)]);
+  const Eigen::Matrix3d common = common_turn(stills, pictures, build.map);
   out << "common turn " << number(rotation_vector(common).norm() * 1e3, 3) << " mrad\n";
-  judge_map(stills, build, common, out, &missed);
+  judge_map(stills, pictures, build, common, out, &missed);
   std::string flaw;
   if (!is_valid(build.map, &flaw)) missed.push_back("the map is not valid: " + flaw);
   if (options.views > 0) {

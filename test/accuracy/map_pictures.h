@@ -12,12 +12,16 @@
 #include <string>
 #include <vector>
 
+#include "core/mapping/features.h"
+
 namespace alidade::test {
 
 struct MapPicturesOptions {
   std::uint64_t seed = 1;
   int views = 100;
   int columns = 5;  // of the map's views at each focal length: 5 * (3 columns - 2) pictures
+  int features = FeatureOptions().max_features;  // of each picture of the map, at most
+  int more = 0;  // of the 500 random views, that are pictures of the map, too
   std::filesystem::path cache = std::filesystem::temp_directory_path() / "alidade-stills";
   bool telemetry = true;      // of the map's pictures
   double angle_noise = 1e-4;  // rad
