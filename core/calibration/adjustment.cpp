@@ -166,6 +166,8 @@ bool Adjustment::covariance(const Linearisation& in, GlobalMatrix* covariance,
   in.H_telemetry.for_each([&](Eigen::Index i, Eigen::Index j, double h) {
     if (h != 0) *telemetry_unknowns += (i == j ? 1 : 2) * h * inverse(i, j);
   });
+  // Megabytes, while what follows, the influences, takes as much.
+  reduced_.resize(0, 0);
   return true;
 }
 
