@@ -5,7 +5,6 @@
 #include <utility>
 
 #include "core/model/angle.h"
-#include "platform/system/realtime.h"
 
 namespace alidade {
 
@@ -24,27 +23,11 @@ double CalibrationSession::newest_s() const {
   return frames_.empty() ? 0 : frames_.back().stamp.receive_time_s;
 }
 
-std::shared_ptr<CalibrationSession::Points> CalibrationSession::points_with_room(
-    std::size_t count) const {
-  constexpr std::size_t kPiece = std::size_t{40} << 10;
-  static_assert(kPiece * sizeof(TrackedPoint) > kFetchedAlone);
-  if (!frames_.empty()) {
-    const std::shared_ptr<Points>& last = frames_.back().points;
-    if (last->capacity() - last->size() >= count) return last;
-  }
-  auto fresh = std::make_shared<Points>();
-  fresh->reserve(std::max(kPiece, count));
-  return fresh;
-}
-
 void CalibrationSession::add(const FrameTracks& tracks) {
-  const auto count = static_cast<std::size_t>(tracks.count);
-  KeptFrame frame{tracks.stamp, points_with_room(count), 0, count};
+  KeptFrame frame{tracks.stamp, {}};
   // Within one session a reconnection is none: whoever clears it sees to that.
   frame.stamp.restarted = false;
-  frame.first = frame.points->size();
-  frame.points->insert(frame.points->end(), tracks.points.begin(),
-                       tracks.points.begin() + tracks.count);
+  frame.points.assign(tracks.points.begin(), tracks.points.begin() + tracks.count);
   frames_.push_back(std::move(frame));
   while (frames_.size() > limits_.max_frames || span_s() > limits_.window_s) frames_.pop_front();
   const double oldest_s = frames_.front().stamp.receive_time_s;
@@ -99,12 +82,11 @@ std::vector<PanTiltSample> CalibrationSession::telemetry() const {
 
 std::vector<CalibrationObservation> CalibrationSession::observations() const {
   std::size_t count = 0;
-  for (const KeptFrame& frame : frames_) count += frame.count;
+  for (const KeptFrame& frame : frames_) count += frame.points.size();
   std::vector<CalibrationObservation> observations;
   observations.reserve(count);
   for (const KeptFrame& frame : frames_) {
-    for (std::size_t i = frame.first; i < frame.first + frame.count; ++i) {
-      const TrackedPoint& point = (*frame.points)[i];
+    for (const TrackedPoint& point : frame.points) {
       observations.push_back(
           {frame.stamp.frame, point.landmark, point.u_px, point.v_px, point.sigma_px});
     }

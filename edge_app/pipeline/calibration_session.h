@@ -70,13 +70,9 @@ class CalibrationSession {
   [[nodiscard]] std::vector<Keyframe> keyframes(const CalibrationResult& result) const;
 
  private:
-  // Of some frames, one after the other. In pieces as large that malloc fetches each by itself: thousands of small ones that come and
-  // go with the frames would lie between all that calibrations take in turn, and none of that would ever be free as a whole.
-  using Points = std::vector<TrackedPoint>;
   struct KeptFrame {
     FrameStamp stamp;
-    std::shared_ptr<Points> points;
-    std::size_t first = 0, count = 0;  // of them
+    std::vector<TrackedPoint> points;
   };
   struct KeptImage {
     std::int64_t frame;
@@ -84,9 +80,6 @@ class CalibrationSession {
     double pan, tilt;  // rad, as measured last before it
     std::shared_ptr<const PackedImage> image;
   };
-
-  // With room for so many more.
-  [[nodiscard]] std::shared_ptr<Points> points_with_room(std::size_t count) const;
 
   SessionLimits limits_;
   std::deque<KeptFrame> frames_;
