@@ -62,7 +62,7 @@ bool see_all(const std::vector<Keyframe>& keyframes, const CalibrationResult& re
 // Room for a landmark takes 1.5 KB: first for as many as keyframes usually show. What they give does not depend on it as long as some
 // is left.
 MapState map_of_all(const std::vector<Keyframe>& keyframes, const CalibrationResult& result) {
-  constexpr std::size_t kUsual = 256;  // of a keyframe
+  constexpr std::size_t kUsual = 240;  // of a keyframe
   OeOptions options = oe_options(result.calibration.camera);
   const int most = options.max_landmarks;
   options.maker.max_new = most;  // a view is there once only

@@ -154,11 +154,11 @@ TEST_F(KeyframeMap, PassesOverImagesThatAreNoneOrOfAnotherSize) {
   EXPECT_TRUE(map_from_keyframes(result_, {}).landmarks.empty());
 }
 
-// There is room for 256 of a keyframe at first.
+// There is room for 240 of a keyframe at first.
 TEST_F(KeyframeMap, HasRoomForAllThatKeyframesShow) {
   std::vector<Keyframe> some = keyframes(1);
   const MapState map = map_from_keyframes(result_, some);
-  ASSERT_GT(map.landmarks.size(), 256U);
+  ASSERT_GT(map.landmarks.size(), 240U);
   // Of these nothing comes, but room for them is there.
   some.resize(16, {kDuration, nullptr});
   const MapState roomy = map_from_keyframes(result_, some);
