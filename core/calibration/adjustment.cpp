@@ -94,6 +94,13 @@ bool Adjustment::solve(const Linearisation& in, double damping, Eigen::VectorXd*
 
 bool Adjustment::minimise(const LossScales& loss, int max_steps, double tolerance,
                           AdjustmentState* state, Linearisation* at) {
+  const bool done = descend(loss, max_steps, tolerance, state, at);
+  forget_reduced();
+  return done;
+}
+
+bool Adjustment::descend(const LossScales& loss, int max_steps, double tolerance,
+                         AdjustmentState* state, Linearisation* at) {
   constexpr double kMaxDamping = 1e8;
   constexpr double kLeastDamping = 1e-10;
   linearise(*state, loss, at);
@@ -166,6 +173,7 @@ bool Adjustment::covariance(const Linearisation& in, GlobalMatrix* covariance,
   in.H_telemetry.for_each([&](Eigen::Index i, Eigen::Index j, double h) {
     if (h != 0) *telemetry_unknowns += (i == j ? 1 : 2) * h * inverse(i, j);
   });
+  forget_reduced();
   return true;
 }
 

@@ -50,6 +50,11 @@ class Adjustment {
 
  private:
   [[nodiscard]] bool reduce(const Linearisation& linearisation, double damping);
+  // Megabytes, and what comes between two minimisations, or after the covariance, takes as much.
+  void forget_reduced() { reduced_.resize(0, 0); }
+  // What minimise() does.
+  [[nodiscard]] bool descend(const LossScales& loss, int max_steps, double tolerance,
+                             AdjustmentState* state, Linearisation* at);
 
   Lineariser lineariser_;
   std::array<bool, kGlobalCount> fixed_;

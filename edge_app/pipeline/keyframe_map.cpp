@@ -38,6 +38,44 @@ double samples_worth_one(const std::vector<double>& errors) {
   return 1 + 2 * sum / variance;
 }
 
+// False: there was no room left for landmarks.
+bool see_all(const std::vector<Keyframe>& keyframes, const CalibrationResult& result,
+             OeMode* mode) {
+  const Camera<double>& camera = result.calibration.camera;
+  const double to_middle_s = result.calibration.line_delay * camera.height / 2;
+  bool has_room = true;
+  std::vector<std::uint8_t> pixels;
+  for (const Keyframe& keyframe : keyframes) {
+    InterpolatedPanTilt prediction = predict(result, keyframe.time_s + to_middle_s, kSigma_px);
+    prediction.acceleration_sigma = kAccelerationSigmaPxPerS2 / camera.focal_length;
+    FrameOrientation orientation;
+    const ImageView image =
+        keyframe.image == nullptr ? ImageView{} : keyframe.image->unpack(&pixels);
+    // Whatever the status: maintain() knows what to do with such a frame.
+    static_cast<void>(mode->process(image, keyframe.time_s, &prediction, &orientation));
+    mode->maintain();
+    has_room = has_room && mode->map().size() < mode->map().capacity();
+  }
+  return has_room;
+}
+
+// Room for a landmark takes 1.5 KB: first for as many as keyframes usually show. What they give does not depend on it as long as some
+// is left.
+MapState map_of_all(const std::vector<Keyframe>& keyframes, const CalibrationResult& result) {
+  constexpr std::size_t kUsual = 240;  // of a keyframe
+  OeOptions options = oe_options(result.calibration.camera);
+  const int most = options.max_landmarks;
+  options.maker.max_new = most;  // a view is there once only
+  const std::size_t usual = kUsual * std::max<std::size_t>(keyframes.size(), 1);
+  options.max_landmarks = static_cast<int>(std::min(usual, static_cast<std::size_t>(most)));
+  for (;; options.max_landmarks = most) {
+    const std::unique_ptr<OeMode> mode = make_oe_mode(options);
+    mode->reset(result.calibration);
+    if (see_all(keyframes, result, mode.get()) || options.max_landmarks == most)
+      return mode->map_state();
+  }
+}
+
 }  // namespace
 
 InterpolatedPanTilt predict(const CalibrationResult& result, double time_s, double sigma_px) {
@@ -98,30 +136,16 @@ Matrix2<double> tie_covariance(const CalibrationResult& result) {
 MapState map_from_keyframes(const CalibrationResult& result,
                             const std::vector<Keyframe>& keyframes) {
   const Camera<double>& camera = result.calibration.camera;
-  const double to_middle_s = result.calibration.line_delay * camera.height / 2;
-  const double acceleration_sigma = kAccelerationSigmaPxPerS2 / camera.focal_length;
-  OeOptions options = oe_options(camera);
-  options.maker.max_new = options.max_landmarks;  // a view is there once only
-  const std::unique_ptr<OeMode> mode = make_oe_mode(options);
-  mode->reset(result.calibration);
-  double tilt = 0;
-  std::vector<std::uint8_t> pixels;
-  for (const Keyframe& keyframe : keyframes) {
-    const double middle_s = keyframe.time_s + to_middle_s;
-    InterpolatedPanTilt prediction = predict(result, middle_s, kSigma_px);
-    prediction.acceleration_sigma = acceleration_sigma;
-    FrameOrientation orientation;
-    const ImageView image =
-        keyframe.image == nullptr ? ImageView{} : keyframe.image->unpack(&pixels);
-    // Whatever the status: maintain() knows what to do with such a frame.
-    static_cast<void>(mode->process(image, keyframe.time_s, &prediction, &orientation));
-    mode->maintain();
-    tilt += result.trajectory.position(middle_s).tilt / static_cast<double>(keyframes.size());
-  }
-  MapState map = mode->map_state();
+  MapState map = map_of_all(keyframes, result);
   map.offset_covariance += tie_covariance(result);
-  map.shear_tilt = tilt;
+  const double to_middle_s = result.calibration.line_delay * camera.height / 2;
+  map.shear_tilt = 0;
+  for (const Keyframe& keyframe : keyframes) {
+    map.shear_tilt += result.trajectory.position(keyframe.time_s + to_middle_s).tilt /
+                      static_cast<double>(keyframes.size());
+  }
   const double rate_sigma = kRatePerAngle * kSigma_px / camera.focal_length;
+  const double acceleration_sigma = kAccelerationSigmaPxPerS2 / camera.focal_length;
   for (Matrix3<double>& shear : map.shear_covariance) {
     shear.setZero();
     shear.diagonal() << 0, rate_sigma * rate_sigma, acceleration_sigma * acceleration_sigma;

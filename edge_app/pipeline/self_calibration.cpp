@@ -266,6 +266,7 @@ void SelfCalibration::hold_against_published() {
     return;
   }
   if (!first_node_ || !first_node_->refusal.empty()) first_node_is_wanted_ = true;
+  alone = {};  // a megabyte
   const SessionCalibration refined = adjust(&published_->calibration);
   if (!refined.refusal.empty()) return;
   if (!clock_offset_known_ ||

@@ -19,6 +19,12 @@
 #include <fstream>
 #include <sstream>
 
+// Set by the linker where it was told to lay that code together (cmake/batch_code.ld), else null.
+extern "C" {
+extern const char alidade_batch_code_begin[] __attribute__((weak));
+extern const char alidade_batch_code_end[] __attribute__((weak));
+}
+
 namespace alidade {
 namespace {
 
@@ -116,64 +122,105 @@ bool is_of_the_real_time_thread(const std::string& path, const std::string& prog
   return false;
 }
 
-// The zeros that a library's data ends with: of no file in /proc/self/smaps, and megabytes in a library of codecs.
-struct Zeros {
+struct Range {
   char* begin = nullptr;
   char* end = nullptr;
-  std::string library;  // empty: the program
+  [[nodiscard]] std::size_t size() const { return static_cast<std::size_t>(end - begin); }
 };
 
-std::vector<Zeros> all_zeros() {
-  std::vector<Zeros> zeros;
-  const auto add = [](dl_phdr_info* object, std::size_t, void* out) {
-    const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
-    const auto whole = [page](std::uintptr_t at) {
-      return reinterpret_cast<char*>((at + page - 1) / page * page);
-    };
-    for (int i = 0; i < object->dlpi_phnum; ++i) {
-      const ElfW(Phdr)& part = object->dlpi_phdr[i];
-      const std::uintptr_t at = object->dlpi_addr + part.p_vaddr;
-      const Zeros found{whole(at + part.p_filesz), whole(at + part.p_memsz), object->dlpi_name};
-      if (part.p_type == PT_LOAD && found.begin < found.end)
-        static_cast<std::vector<Zeros>*>(out)->push_back(found);
+// What is left of a mapping; left_out: whole pages, in any order.
+std::vector<Range> rest_of(const Mapping& mapping, const std::vector<Range>& left_out) {
+  std::vector<Range> rest{{mapping.begin, mapping.begin + mapping.size}};
+  for (const Range& out : left_out) {
+    std::vector<Range> left;
+    for (const Range& range : rest) {
+      const Range before{range.begin, std::min(range.end, out.begin)};
+      const Range behind{std::max(range.begin, out.end), range.end};
+      if (out.end <= range.begin || range.end <= out.begin) {
+        left.push_back(range);
+        continue;
+      }
+      for (const Range& part : {before, behind}) {
+        if (part.begin < part.end) left.push_back(part);
+      }
+    }
+    rest = std::move(left);
+  }
+  return rest;
+}
+
+Range whole_pages(std::uintptr_t begin, std::uintptr_t end) {
+  const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
+  return {reinterpret_cast<char*>((begin + page - 1) / page * page),
+          reinterpret_cast<char*>(end / page * page)};
+}
+
+// What the real-time thread does without, though it is in mappings that are brought in:
+//   - the zeros that the data of other libraries end with: of no file in /proc/self/smaps, and megabytes in a library of codecs
+//   - tables for exceptions, which lie together behind the constants: it throws none
+//   - the program's code of rooms that it never enters
+std::vector<Range> done_without(const std::string& program) {
+  struct Search {
+    const std::string& program;
+    std::vector<Range> found;
+  };
+  Search search{program, {}};
+  const auto look = [](dl_phdr_info* object, std::size_t, void* out) {
+    Search& so_far = *static_cast<Search*>(out);
+    const std::string name = object->dlpi_name;
+    const bool is_needed = name.empty() || is_of_the_real_time_thread(name, so_far.program);
+    const ElfW(Phdr)* const parts = object->dlpi_phdr;
+    const ElfW(Phdr)* const end_of_parts = parts + object->dlpi_phnum;
+    const ElfW(Phdr)* const tables = std::find_if(parts, end_of_parts, [](const ElfW(Phdr) & part) {
+      return part.p_type == PT_GNU_EH_FRAME;
+    });
+    for (const ElfW(Phdr)* part = parts; part != end_of_parts; ++part) {
+      if (part->p_type != PT_LOAD) continue;
+      const std::uintptr_t at = object->dlpi_addr + part->p_vaddr;
+      if (!is_needed && part->p_filesz < part->p_memsz) {
+        so_far.found.push_back(whole_pages(at + part->p_filesz, at + part->p_memsz));
+      }
+      if (is_needed && tables != end_of_parts && part->p_flags == PF_R &&
+          tables->p_vaddr >= part->p_vaddr && tables->p_vaddr < part->p_vaddr + part->p_memsz) {
+        so_far.found.push_back(
+            whole_pages(object->dlpi_addr + tables->p_vaddr, at + part->p_memsz));
+      }
     }
     return 0;
   };
-  dl_iterate_phdr(add, &zeros);
-  return zeros;
+  dl_iterate_phdr(look, &search);
+  if (alidade_batch_code_begin != nullptr) {
+    search.found.push_back(whole_pages(reinterpret_cast<std::uintptr_t>(alidade_batch_code_begin),
+                                       reinterpret_cast<std::uintptr_t>(alidade_batch_code_end)));
+  }
+  return search.found;
 }
 
 // What there is now is locked as it is touched, but for what is brought in.
 bool lock_all() {
   std::array<char, PATH_MAX> program{};
   if (readlink("/proc/self/exe", program.data(), program.size() - 1) < 0) return false;
-  std::vector<Mapping> mappings = all_mappings();
-  for (const Zeros& zeros : all_zeros()) {
-    if (zeros.library.empty() || is_of_the_real_time_thread(zeros.library, program.data()))
-      continue;
-    for (Mapping& mapping : mappings) {
-      // What the kernel has joined to it comes behind it.
-      if (!mapping.path.empty() || mapping.begin != zeros.begin) continue;
-      mapping.size -= std::min(mapping.size, static_cast<std::size_t>(zeros.end - zeros.begin));
-      mapping.begin = zeros.end;
-    }
+  std::vector<Range> brought_in;
+  std::vector<Range> let_go;
+  const std::vector<Range> left_out = done_without(program.data());
+  for (const Mapping& mapping : all_mappings()) {
+    const bool wanted =
+        mapping.is_data() ||
+        (mapping.permissions[0] == 'r' && is_of_the_real_time_thread(mapping.path, program.data()));
+    const std::vector<Range> rest = wanted ? rest_of(mapping, left_out) : std::vector<Range>();
+    brought_in.insert(brought_in.end(), rest.begin(), rest.end());
+    if (!mapping.is_unchanged_file()) continue;
+    const std::vector<Range> others = rest_of(mapping, rest);
+    let_go.insert(let_go.end(), others.begin(), others.end());
   }
-  const auto is_brought_in = [&](const Mapping& mapping) {
-    return mapping.is_data() || (mapping.permissions[0] == 'r' &&
-                                 is_of_the_real_time_thread(mapping.path, program.data()));
-  };
-  for (const Mapping& mapping : mappings) {
-    // What is needed again comes again, from the same file.
-    if (mapping.is_unchanged_file() && !is_brought_in(mapping))
-      static_cast<void>(madvise(mapping.begin, mapping.size, MADV_DONTNEED));
-  }
+  // What is needed again comes again, from the same file.
+  for (const Range& range : let_go)
+    static_cast<void>(madvise(range.begin, range.size(), MADV_DONTNEED));
   if (mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) != 0) return false;
-  for (const Mapping& mapping : mappings) {
-    // A mapping may have gone since: then there is nothing to lock.
-    if (is_brought_in(mapping) && mlock(mapping.begin, mapping.size) != 0 && errno != ENOMEM)
-      return false;
-  }
-  return true;
+  // A mapping may have gone since: then there is nothing to lock.
+  return std::all_of(brought_in.begin(), brought_in.end(), [](const Range& range) {
+    return mlock(range.begin, range.size()) == 0 || errno == ENOMEM;
+  });
 }
 
 void lock_memory(RealtimeReport* report) {

@@ -154,6 +154,21 @@ TEST_F(KeyframeMap, PassesOverImagesThatAreNoneOrOfAnotherSize) {
   EXPECT_TRUE(map_from_keyframes(result_, {}).landmarks.empty());
 }
 
+// There is room for 240 of a keyframe at first.
+TEST_F(KeyframeMap, HasRoomForAllThatKeyframesShow) {
+  std::vector<Keyframe> some = keyframes(1);
+  const MapState map = map_from_keyframes(result_, some);
+  ASSERT_GT(map.landmarks.size(), 240U);
+  // Of these nothing comes, but room for them is there.
+  some.resize(16, {kDuration, nullptr});
+  const MapState roomy = map_from_keyframes(result_, some);
+  ASSERT_EQ(map.landmarks.size(), roomy.landmarks.size());
+  for (std::size_t i = 0; i < map.landmarks.size(); ++i) {
+    EXPECT_EQ(map.landmarks[i].d, roomy.landmarks[i].d) << i;
+    EXPECT_EQ(map.landmarks[i].covariance, roomy.landmarks[i].covariance) << i;
+  }
+}
+
 // Relative; the estimated repetition of white residuals scatters by sqrt(lags / samples), mostly upwards.
 TEST_F(KeyframeMap, IsTiedToTheBaseByTheAverageOfTelemetry) {
   const Matrix2<double> covariance = tie_covariance(result_);

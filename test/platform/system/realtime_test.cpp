@@ -348,6 +348,57 @@ TEST(LockProcessMemory, BringsInTheCodeOfTheProgramAndNotOfAllLibraries) {
   EXPECT_EQ(result, kGood);
 }
 
+// Of a library's constants: the tables for exceptions come last, behind what PT_GNU_EH_FRAME begins with.
+struct Constants {
+  ElfW(Addr) begin = 0, tables = 0, end = 0;
+};
+Constants constants_of_cpp_library() {
+  Constants constants;
+  const auto look = [](dl_phdr_info* object, std::size_t, void* out) {
+    if (std::strstr(object->dlpi_name, "/libstdc++.so") == nullptr) return 0;
+    Constants& found = *static_cast<Constants*>(out);
+    for (int i = 0; i < object->dlpi_phnum; ++i) {
+      if (object->dlpi_phdr[i].p_type == PT_GNU_EH_FRAME)
+        found.tables = object->dlpi_addr + object->dlpi_phdr[i].p_vaddr;
+    }
+    for (int i = 0; i < object->dlpi_phnum; ++i) {
+      const ElfW(Phdr)& part = object->dlpi_phdr[i];
+      const ElfW(Addr) begin = object->dlpi_addr + part.p_vaddr;
+      if (part.p_type != PT_LOAD || part.p_flags != PF_R || found.tables < begin ||
+          found.tables >= begin + part.p_memsz) {
+        continue;
+      }
+      found.begin = begin;
+      found.end = begin + part.p_memsz;
+    }
+    return 1;
+  };
+  dl_iterate_phdr(look, &constants);
+  return constants;
+}
+
+TEST(LockProcessMemory, LeavesOutTablesForExceptions) {
+  if (!kOwnMemoryOnly) GTEST_SKIP() << "the sanitizer touches memory too";
+  const Constants constants = constants_of_cpp_library();
+  if (constants.begin == 0) GTEST_SKIP() << "they are not by themselves";
+  const int result = in_child([&] {
+    if (!lock_process_memory().warnings.empty()) return kNotPermitted;
+    std::istringstream words(
+        line_of_mapping(reinterpret_cast<const char*>(constants.begin), "Rss"));
+    std::string key;
+    long kb = -1;
+    words >> key >> kb;
+    const auto kb_between = [](ElfW(Addr) from, ElfW(Addr) to) {
+      return static_cast<long>((to - from) / 1024);
+    };
+    const long page_kb = kPage / 1024;
+    if (kb < kb_between(constants.begin, constants.tables) - page_kb) return 1;
+    return kb <= kb_between(constants.begin, constants.tables) + 2 * page_kb ? kGood : 2;
+  });
+  if (result == kNotPermitted) GTEST_SKIP() << "not permitted to lock memory";
+  EXPECT_EQ(result, kGood);
+}
+
 TEST(LockProcessMemory, LeavesAllButLargeBlocksWithMalloc) {
   if (!kOwnMemoryOnly) GTEST_SKIP() << "the sanitizer has a malloc of its own";
   const int result = in_child([] {
