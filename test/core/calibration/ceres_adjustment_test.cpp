@@ -271,7 +271,7 @@ AdjustmentProblem make_ugly_problem(const Ugly& ugly) {
                               {wrap_angle(s.mechanics.pan_scale * p.pan + noise),
                                wrap_angle(s.mechanics.tilt_scale * p.tilt - noise)},
                               {1e-4, 2e-4},
-                              true});
+                              {true}});
   }
   // Priors that pull.
   AdjustmentState& mean = problem.priors.mean;
