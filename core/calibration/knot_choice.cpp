@@ -77,7 +77,7 @@ std::vector<double> gains(const std::vector<Pointing>& pointings, const Trajecto
   for (int i = 0; i < size; ++i) entries.emplace_back(i, i, 1e-9 * largest);
   Eigen::SparseMatrix<double> H(size, size);
   H.setFromTriplets(entries.begin(), entries.end());
-  entries = {};  // larger than H
+  entries = std::vector<Eigen::Triplet<double>>();  // larger than H
   const Eigen::SimplicialLDLT<Eigen::SparseMatrix<double>, Eigen::Lower,
                               Eigen::NaturalOrdering<int>>
       ldlt(H);

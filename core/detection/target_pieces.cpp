@@ -20,7 +20,7 @@ constexpr double kBetweenNear = 1.0 / 3;  // of c
 constexpr double kChangedShare = 0.5;
 constexpr double kChangedNear = 0.5;  // of c
 constexpr int kPieceZ = 5 * ChangeRegions::kUnit / 2;
-// Of a box, each way, that are looked at; and of the line between two.
+// Of a box, each way, that are looked at; and of the line between two, which is shorter.
 constexpr int kMostAcross = 32;
 constexpr std::size_t kMostBetween = 512;
 
@@ -80,7 +80,7 @@ bool of_one_thing(const SmoothedView& now, const std::int16_t* z, double sigma_g
   internal::each_between(a, b, [&](int u, int v) {
     if (count < kMostBetween) between[count++] = now.row(v)[u];
   });
-  if (count == 0) return false;
+  if (count == 0 || count == kMostBetween) return false;
   std::nth_element(between.begin(), between.begin() + static_cast<std::ptrdiff_t>(count / 2),
                    between.begin() + static_cast<std::ptrdiff_t>(count));
   return shows(now, z, sigma_grey, a, between.data(), count) ||

@@ -49,7 +49,7 @@ std::vector<std::string> read_class_names(const std::string& path) {
     if (!is_class_name(line)) {
       throw CommandError(
           kExitUsage, fmt::format("detectors.onnx: {}:{}: is no class's name ({} bytes); expected "
-                                  "text of at most {} without control characters",
+                                  "text of at most {} bytes, without control characters",
                                   path, number, line.size(), kLongestClass));
     }
     names.push_back(line);

@@ -14,7 +14,7 @@ namespace alidade {
 
 inline constexpr std::size_t kLongestClass = 32;  // bytes
 
-// What a class may be called: no longer, and in one line. It is refused, not cut.
+// What a class may be called: at most kLongestClass bytes, in one line. What is more is refused, not cut.
 [[nodiscard]] inline bool is_class_name(const std::string& name) {
   return name.size() <= kLongestClass && std::none_of(name.begin(), name.end(), [](char c) {
            return (c >= 0 && c < ' ') || c == '\x7f';

@@ -9,7 +9,6 @@
 namespace alidade {
 namespace {
 
-// At constant velocity, forwards or back.
 // As seen by one to whom time runs backwards.
 void reverse_velocity(TargetState* state) {
   state->mean.tail<2>() *= -1;
@@ -17,6 +16,7 @@ void reverse_velocity(TargetState* state) {
   state->cov.bottomLeftCorner<2, 2>() *= -1;
 }
 
+// At constant velocity, forwards or back.
 TargetState moved(const TargetsState& all, const TargetState& from, double dt_s) {
   TargetState state = from;
   if (dt_s < 0) reverse_velocity(&state);

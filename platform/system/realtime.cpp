@@ -136,7 +136,7 @@ std::vector<Range> rest_of(const Mapping& mapping, const std::vector<Range>& lef
     for (const Range& range : rest) {
       const Range before{range.begin, std::min(range.end, out.begin)};
       const Range behind{std::max(range.begin, out.end), range.end};
-      if (out.end <= range.begin || range.end <= out.begin) {
+      if (out.end <= range.begin || range.end <= out.begin || out.end <= out.begin) {
         left.push_back(range);
         continue;
       }

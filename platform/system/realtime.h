@@ -42,7 +42,7 @@ struct RealtimeReport {
 
 // Locks all memory of the process, now and later, and keeps malloc from returning blocks below kFetchedAlone to the kernel: fresh
 // memory is a page fault. Brought in are all data that there are, this program and the C and C++ libraries, but for their tables for
-// exceptions and the program's code that no thread on a record's way enters (cmake/batch_code.ld); what comes later stays once it was
+// exceptions, where these lie among constants, and the program's code that no thread on a record's way enters (cmake/batch_code.ld); what comes later stays once it was
 // touched. Of the other libraries, a hundred MB of codecs, nothing is kept but what is used from now on: what the loader alone has
 // needed is let go. Before other threads are started, so that none of their stacks is brought in as a whole.
 inline constexpr std::size_t kFetchedAlone = std::size_t{512} << 10;  // bytes

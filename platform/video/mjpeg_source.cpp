@@ -1,6 +1,7 @@
 #include "platform/video/mjpeg_source.h"
 
 #include <sys/socket.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <atomic>
@@ -49,6 +50,7 @@ class MjpegSource : public FrameSource {
     }
   }
   static int on_socket(void* self, curl_socket_t socket, curlsocktype purpose);
+  static int on_close(void* self, curl_socket_t socket);
   static std::size_t on_body(char* data, std::size_t size, std::size_t count, void* self);
   bool make_handle();
   bool begin_stream();
@@ -73,12 +75,12 @@ class MjpegSource : public FrameSource {
 
   // The receiving thread's own.
   char curl_error_[CURL_ERROR_SIZE] = "";
+  curl_socket_t socket_ = CURL_SOCKET_BAD;   // of this connection, if it is open
+  int low_water_ = 1;                        // bytes at which it wakes
   CurlMultiPtr multi_;                       // stop() wakes it up
   CurlEasyPtr easy_;                         // of this connection
   std::optional<MultipartScanner> scanner_;  // of this connection, from its first bytes on
   std::string refusal_;                      // why the answer's body was not taken
-  curl_socket_t socket_ = CURL_SOCKET_BAD;   // of this connection
-  int low_water_ = 1;                        // bytes at which it wakes
   std::int64_t discarded_ = 0;               // by the scanner, as far as counted
   std::int64_t pictures_ = 0;                // of this connection
   bool worked_ = false;                      // a picture has come, of any connection
@@ -138,6 +140,8 @@ bool MjpegSource::make_handle() {
   curl_easy_setopt(easy_.get(), CURLOPT_WRITEDATA, this);
   curl_easy_setopt(easy_.get(), CURLOPT_SOCKOPTFUNCTION, &MjpegSource::on_socket);
   curl_easy_setopt(easy_.get(), CURLOPT_SOCKOPTDATA, this);
+  curl_easy_setopt(easy_.get(), CURLOPT_CLOSESOCKETFUNCTION, &MjpegSource::on_close);
+  curl_easy_setopt(easy_.get(), CURLOPT_CLOSESOCKETDATA, this);
   return true;
 }
 
@@ -146,6 +150,16 @@ int MjpegSource::on_socket(void* self, curl_socket_t socket, curlsocktype /*purp
   source->socket_ = socket;
   source->low_water_ = 1;
   return CURL_SOCKOPT_OK;
+}
+
+// libcurl may have opened two, for a name with two addresses; a number that was closed is soon another file's.
+int MjpegSource::on_close(void* self, curl_socket_t socket) {
+  auto* source = static_cast<MjpegSource*>(self);
+  if (socket == source->socket_) {
+    source->socket_ = CURL_SOCKET_BAD;
+    source->low_water_ = 1;
+  }
+  return ::close(socket);
 }
 
 std::size_t MjpegSource::on_body(char* data, std::size_t size, std::size_t count, void* self) {
@@ -246,7 +260,7 @@ void MjpegSource::wait_for_bytes(double left_s) {
 // Not by TLS, whose records need not be as long as what they carry.
 void MjpegSource::set_low_water(std::size_t bytes) {
   const auto wanted = static_cast<int>(std::min<std::size_t>(bytes, INT_MAX));
-  if (is_tls_ || wanted == low_water_) {
+  if (is_tls_ || socket_ == CURL_SOCKET_BAD || wanted == low_water_) {
     return;
   }
   if (::setsockopt(socket_, SOL_SOCKET, SO_RCVLOWAT, &wanted, sizeof wanted) == 0) {

@@ -15,7 +15,8 @@ int main(int argc, char** argv) {
   app.add_option("--views", options.views, "that are localized")->check(CLI::NonNegativeNumber);
   app.add_option("--columns", options.columns, "of the map's views at each of five focal lengths")
       ->check(CLI::Range(5, 8));
-  app.add_option("--more", options.more, "of the random views, that are in the map, too")
+  app.add_option("--more", options.more,
+                 "of the random views, that are in the map, too; with --views 0")
       ->check(CLI::Range(0, 500));
   app.add_option("--features", options.features, "of each of the map's pictures, at most")
       ->check(CLI::PositiveNumber);

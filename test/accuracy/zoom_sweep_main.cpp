@@ -1,6 +1,6 @@
 // alidade_zoom_sweep: OE mode while the lens zooms, against truth: 1280x720, 20x from 1200 to 24,000 px, line delay -14.2 us, noise of
 // 2 grey levels, JPEG of quality 85, telemetry of 50 urad; at rest, a sweep, at rest, back.
-//   alidade_zoom_sweep [--seed N] [--factor 10] [--sweep 5] [--stop-every 3] [--from 1200] [--fault none|stuck|late|coarse] [--cache DIR]
+//   alidade_zoom_sweep [--seed N] [--factor 10] [--sweep 5] [--stop-every FACTOR] [--from 1200] [--fault none|stuck|late|coarse] [--cache DIR]
 //                      [--exact-curve] [--details]
 // Exit status: 0 no frame is beyond 5 sigmas, 1 some are, 2 wrong usage.
 

@@ -36,7 +36,7 @@ struct LandmarkChoiceOptions {
 
 class LandmarkChoice {
  public:
-  // options: valid. max_visible: of visible landmarks.
+  // options: valid; max_chosen may be less than kLeastChosen, as for a test. max_visible: of visible landmarks.
   LandmarkChoice(const LandmarkChoiceOptions& options, int max_visible);
 
   // Valid until the next call; visible is not changed.

@@ -170,7 +170,6 @@ TEST(ZoomFit, ErrorsAreWhatItsCovarianceSays) {
   EXPECT_LT(chi_square, degrees_of_freedom + 5 * std::sqrt(2.0 * degrees_of_freedom));
 }
 
-// A lens that one reading cannot tell from its axes: the others do.
 // Each calibration has the priors of what all share in it, and of its own quantities: the former count once in all, the latter never.
 TEST(ZoomEvidence, CountsSharedPriorsOnceAndThoseOfANodeNever) {
   using namespace internal;
@@ -196,6 +195,7 @@ TEST(ZoomEvidence, CountsSharedPriorsOnceAndThoseOfANodeNever) {
   }
 }
 
+// A lens that one reading cannot tell from its axes: the others do.
 TEST(ZoomFit, OpticalCentreAndAxesPart) {
   const std::vector<Visit>& visits = five_visits();
   // Almost without distortion, which would show the centre.

@@ -163,8 +163,8 @@ TEST_F(SearchedScene, FindsNothingWhereThereIsNothing) {
 // Every other landmark has served well: of each part of the image such a one is looked for, and found.
 TEST_F(SearchedScene, LooksForNoMoreThanItMayAndForTheReliableOfAllTheImage) {
   LandmarkSearchOptions options;
-  options.choice.max_chosen = 6;
-  options.choice.columns = 3;
+  options.choice.max_chosen = 8;
+  options.choice.columns = 4;
   options.choice.rows = 2;
   LandmarkSearch search(options, scene_.map_.capacity());
   search.reset(scene_.calibration_);
@@ -173,17 +173,17 @@ TEST_F(SearchedScene, LooksForNoMoreThanItMayAndForTheReliableOfAllTheImage) {
     scene_.map_.statistics(slot).matched = slot % 2 == 1 ? 100 : 10;
   }
   const LandmarkSearch::Fine fine = search.align_fine(frame(), TexturedScene::motion_at({0, 0}));
-  EXPECT_EQ(fine.chosen, 6);
-  EXPECT_EQ(fine.found, 6);
-  EXPECT_GT(fine.fine_visible, 10 * 6);
-  ASSERT_EQ(search.chosen().size(), 6U);
+  EXPECT_EQ(fine.chosen, 8);
+  EXPECT_EQ(fine.found, 8);
+  EXPECT_GT(fine.fine_visible, 10 * 8);
+  ASSERT_EQ(search.chosen().size(), 8U);
   std::set<std::pair<int, int>> parts;
   for (const VisibleLandmark& chosen : search.chosen()) {
     EXPECT_EQ(chosen.slot % 2, 1);
-    parts.insert({static_cast<int>(chosen.u.x() * 3 / TexturedScene::kWidth),
+    parts.insert({static_cast<int>(chosen.u.x() * 4 / TexturedScene::kWidth),
                   static_cast<int>(chosen.u.y() * 2 / TexturedScene::kHeight)});
   }
-  EXPECT_EQ(parts.size(), 6U);
+  EXPECT_EQ(parts.size(), 8U);
   search.clear();
   EXPECT_TRUE(search.chosen().empty());
   EXPECT_TRUE(search.found().empty());
