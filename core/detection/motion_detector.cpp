@@ -162,7 +162,7 @@ double MotionDetector::choose_tiles() {
                                options_.width, options_.height);
           }
           if (sight != wanted) continue;
-          tile.which[static_cast<std::size_t>(tile.count++)] = static_cast<std::int8_t>(k);
+          tile.which[tile.count++] = static_cast<std::uint8_t>(k);
           compared.chosen = true;
         }
         if (wanted == TileSight::kAll && tile.count >= 2) break;

@@ -91,8 +91,8 @@ class MotionDetector {
     bool chosen = false;   // by a tile
   };
   struct TileChoice {
-    std::array<std::int8_t, kCompared> which;  // of compared_
-    std::int8_t count;
+    std::array<std::uint8_t, kCompared> which;  // of compared_
+    std::uint8_t count;
   };
   using TileRow = std::array<float, kTile>;
 

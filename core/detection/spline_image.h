@@ -34,8 +34,10 @@ void smooth_image(const ImageView& image, std::uint16_t* out);
   const float y = v - 1.5F;
   const int column = static_cast<int>(x);
   const int row = static_cast<int>(y);
+  // t is not negative, and std::lround() would be a call for each sample.
   const auto step = [](float t) {
-    return static_cast<std::size_t>(t * static_cast<float>(internal::kSplineSteps) + 0.5F);
+    constexpr float kHalf = 0.5F;
+    return static_cast<std::size_t>(t * static_cast<float>(internal::kSplineSteps) + kHalf);
   };
   const auto& across = internal::kSplineWeights[step(x - static_cast<float>(column))];
   const auto& down = internal::kSplineWeights[step(y - static_cast<float>(row))];

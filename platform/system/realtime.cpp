@@ -67,6 +67,11 @@ void set_processor(int cpu, RealtimeReport* report) {
 
 std::atomic<bool> freed_memory_is_kept{false};
 
+// The kernel and the loader tell addresses as numbers.
+char* at_address(std::uintptr_t address) {
+  return reinterpret_cast<char*>(address);  // NOLINT(performance-no-int-to-ptr)
+}
+
 // A range of addresses, from /proc/self/smaps.
 struct Mapping {
   char* begin = nullptr;
@@ -100,7 +105,7 @@ std::vector<Mapping> all_mappings() {
       Mapping& mapping = mappings.emplace_back();
       std::string offset, device, inode;
       words >> mapping.permissions >> offset >> device >> inode >> mapping.path;
-      mapping.begin = reinterpret_cast<char*>(begin);
+      mapping.begin = at_address(begin);
       mapping.size = end - begin;
       if (mapping.permissions.size() != 4) mappings.pop_back();
     } else if (first == "Anonymous:" && !mappings.empty()) {
@@ -151,8 +156,7 @@ std::vector<Range> rest_of(const Mapping& mapping, const std::vector<Range>& lef
 
 Range whole_pages(std::uintptr_t begin, std::uintptr_t end) {
   const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
-  return {reinterpret_cast<char*>((begin + page - 1) / page * page),
-          reinterpret_cast<char*>(end / page * page)};
+  return {at_address((begin + page - 1) / page * page), at_address(end / page * page)};
 }
 
 // What the real-time thread does without, though it is in mappings that are brought in:
