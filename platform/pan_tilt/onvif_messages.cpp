@@ -15,7 +15,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::string_view kBlanks = " \t\r\n";
+constexpr std::string_view kXmlBlanks = " \t\r\n";
 
 constexpr std::size_t kShown = 120;  // bytes of a foreign text that an error repeats
 constexpr const char* kWss = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-";
@@ -116,11 +116,11 @@ pugi::xml_node descendant(pugi::xml_node node, std::initializer_list<std::string
 }
 
 std::string text_of(const pugi::xml_node& node) {
-  return std::string(trimmed(node.child_value(), kBlanks));
+  return std::string(trimmed(node.child_value(), kXmlBlanks));
 }
 
 std::optional<double> attribute(const pugi::xml_node& node, const char* name) {
-  return parse_number(trimmed(node.attribute(name).value(), kBlanks));
+  return parse_number(trimmed(node.attribute(name).value(), kXmlBlanks));
 }
 
 pugi::xml_node load_body(std::string_view bytes, pugi::xml_document* document) {
@@ -137,7 +137,7 @@ pugi::xml_node load_answer(std::string_view bytes, const OnvifCall& call,
       child(load_body(bytes, document), std::string(call.name) + "Response");
   if (!answer) {
     *error = std::string("no answer to ") + call.name + " in '" +
-             shown(trimmed(bytes.substr(0, bytes.find('\n')), kBlanks), kShown) +
+             shown(trimmed(bytes.substr(0, bytes.find('\n')), kXmlBlanks), kShown) +
              "'; is it an ONVIF service?";
   }
   return answer;
@@ -173,7 +173,7 @@ std::string security_header(const OnvifLogin& login) {
 }  // namespace
 
 std::optional<double> parse_xml_time(std::string_view text) {
-  text = trimmed(text, kBlanks);
+  text = trimmed(text, kXmlBlanks);
   Civil civil;
   const auto field = [&text](int* value, std::size_t digits, char before) {
     if (before != '\0' && !take_character(&text, before)) {
@@ -288,7 +288,7 @@ bool parse_onvif_clock(std::string_view body, double* utc_s, std::string* error)
   bool whole = true;
   const auto number = [&](const char* part, const char* name) {
     const std::optional<double> value =
-        parse_number(trimmed(descendant(utc, {part, name}).child_value(), kBlanks));
+        parse_number(trimmed(descendant(utc, {part, name}).child_value(), kXmlBlanks));
     whole = whole && value && std::abs(*value) < 1e4;
     return whole ? static_cast<int>(*value) : 0;
   };

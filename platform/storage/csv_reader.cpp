@@ -15,7 +15,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::string_view kBlanks = " \t";
+constexpr std::string_view kSpaces = " \t";
 
 // The line without its line feed. False at the end of the text; *cut_off: the last line has no line feed.
 bool next_line(std::istream& text, std::string* line, bool* cut_off) {
@@ -33,7 +33,7 @@ void split(std::string_view line, std::vector<std::string_view>* cells) {
   cells->clear();
   for (std::size_t begin = 0; begin <= line.size();) {
     const std::size_t end = std::min(line.find(',', begin), line.size());
-    cells->push_back(trimmed(line.substr(begin, end - begin), kBlanks));
+    cells->push_back(trimmed(line.substr(begin, end - begin), kSpaces));
     begin = end + 1;
   }
 }
@@ -109,7 +109,7 @@ bool parse_csv(std::istream& text, const std::string& name, const std::vector<Cs
     if (number == 1 && line.compare(0, kByteOrderMark.size(), kByteOrderMark) == 0) {
       line.erase(0, kByteOrderMark.size());
     }
-    if (trimmed(line, kBlanks).empty()) {
+    if (trimmed(line, kSpaces).empty()) {
       continue;
     }
     split(line, &texts);

@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-constexpr double kLongestWait_s = 10;  // keeps the milliseconds of a wait within an int
+constexpr double kLongestPoll_s = 10;  // keeps the milliseconds of a wait within an int
 
 void initialise_curl() {
   static std::once_flag initialised;
@@ -54,7 +54,7 @@ std::string login_error(CURL* easy, const std::string& user, long methods) {
 }
 
 int poll_milliseconds(double seconds) {
-  return static_cast<int>(std::ceil(1e3 * std::clamp(seconds, 0.0, kLongestWait_s)));
+  return static_cast<int>(std::ceil(1e3 * std::clamp(seconds, 0.0, kLongestPoll_s)));
 }
 
 }  // namespace alidade

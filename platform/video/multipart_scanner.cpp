@@ -12,7 +12,7 @@ constexpr std::size_t kMaxBoundary = 200;      // bytes of a line; RFC 2046 allo
 constexpr std::size_t kMaxHeaders = 8192;      // bytes of one part's headers
 constexpr std::size_t kMaxDashes = 32;         // before a boundary, with the line end before them
 constexpr std::size_t kMaxDelimiterTail = 32;  // dashes and blanks between boundary and line end
-constexpr const char* kBlanks = " \t\r\n";
+constexpr const char* kHeaderBlanks = " \t\r\n";
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
 
@@ -80,19 +80,20 @@ bool parse_multipart_type(std::string_view content_type, std::string* boundary) 
   }
   for (std::size_t at = small.find(';'); at != std::string::npos; at = small.find(';', at + 1)) {
     const std::string_view rest = std::string_view(small).substr(at + 1);
-    const std::size_t name_at = rest.find_first_not_of(kBlanks);
+    const std::size_t name_at = rest.find_first_not_of(kHeaderBlanks);
     constexpr std::string_view kName = "boundary";
     if (name_at == std::string_view::npos || rest.substr(name_at, kName.size()) != kName) {
       continue;
     }
-    const std::size_t equals = rest.find_first_not_of(kBlanks, name_at + kName.size());
+    const std::size_t equals = rest.find_first_not_of(kHeaderBlanks, name_at + kName.size());
     if (equals == std::string_view::npos || rest[equals] != '=') {
       continue;
     }
-    const std::string_view value = stripped(content_type.substr(at + 1 + equals + 1), kBlanks);
+    const std::string_view value =
+        stripped(content_type.substr(at + 1 + equals + 1), kHeaderBlanks);
     *boundary = !value.empty() && value.front() == '"'
                     ? value.substr(1, value.find('"', 1) - 1)
-                    : stripped(value.substr(0, value.find(';')), kBlanks);
+                    : stripped(value.substr(0, value.find(';')), kHeaderBlanks);
     return true;
   }
   return true;
@@ -158,7 +159,7 @@ bool MultipartScanner::learn_boundary() {
     }
     return false;
   }
-  const std::string_view line = stripped(std::string_view(buffer_).substr(0, end), kBlanks);
+  const std::string_view line = stripped(std::string_view(buffer_).substr(0, end), kHeaderBlanks);
   const bool told = line.substr(0, 2) == "--" && end < kMaxBoundary;
   core_ = told ? core_of(line) : "";
   if (core_.empty()) {
@@ -243,7 +244,7 @@ bool MultipartScanner::read_header_line() {
   if (end == std::string::npos) {
     return false;
   }
-  const std::string line(stripped(std::string_view(buffer_).substr(0, end), kBlanks));
+  const std::string line(stripped(std::string_view(buffer_).substr(0, end), kHeaderBlanks));
   if (stripped(line, "-") == core_) {  // the part had no body
     begin_part(end + 1);
     return true;
@@ -264,12 +265,12 @@ void MultipartScanner::take_header(std::string_view line) {
   if (colon == std::string_view::npos) {
     return;
   }
-  const std::string name = lower(stripped(line.substr(0, colon), kBlanks));
-  const std::string_view value = stripped(line.substr(colon + 1), kBlanks);
+  const std::string name = lower(stripped(line.substr(0, colon), kHeaderBlanks));
+  const std::string_view value = stripped(line.substr(colon + 1), kHeaderBlanks);
   if (name == "content-length") {
     content_length_ = parse_length(value, max_part_bytes_);
   } else if (name == "content-type") {
-    part_.content_type = lower(stripped(value.substr(0, value.find(';')), kBlanks));
+    part_.content_type = lower(stripped(value.substr(0, value.find(';')), kHeaderBlanks));
   } else if (name == "x-timestamp") {
     part_.timestamp_s = parse_seconds(value);
   }

@@ -5,16 +5,16 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t kFixedHeader = 12;            // bytes
-constexpr std::size_t kWord = 4;                    // bytes
-constexpr std::size_t kTimestamp = 4;               // where it stands in RTP's header
-constexpr std::size_t kReportTimestamp = 16;        // the same in a sender report
-constexpr std::uint8_t kSenderReport = 200;         // RTCP's type; others stand behind it
-constexpr std::uint32_t kSecond = 90'000;           // ticks of video's clock
-constexpr std::uint32_t kUnknown = 0xFFFF'FFFF;     // a timestamp, to libavformat
-constexpr std::uint32_t kOnvifReplay = 0xABAC;      // the extension's name
-constexpr std::size_t kReplayWords = 3;             // time in two words, flags in one
-constexpr double kUnixInNtp = 2'208'988'800.0;      // s from 1900 to 1970
+constexpr std::size_t kFixedHeader = 12;                  // bytes
+constexpr std::size_t kWord = 4;                          // bytes
+constexpr std::size_t kTimestamp = 4;                     // where it stands in RTP's header
+constexpr std::size_t kReportTimestamp = 16;              // the same in a sender report
+constexpr std::uint8_t kSenderReport = 200;               // RTCP's type; others stand behind it
+constexpr std::uint32_t kSecond = 90'000;                 // ticks of video's clock
+constexpr std::uint32_t kUnknownTimestamp = 0xFFFF'FFFF;  // a timestamp, to libavformat
+constexpr std::uint32_t kOnvifReplay = 0xABAC;            // the extension's name
+constexpr std::size_t kReplayWords = 3;                   // time in two words, flags in one
+constexpr double kUnixInNtp = 2'208'988'800.0;            // s from 1900 to 1970
 constexpr double kNtpEra = 4'294'967'296.0;         // s that NTP's seconds count before they wrap
 constexpr std::uint32_t kSecondHalf = 0x8000'0000;  // of the era that began in 1900: since 1968
 
@@ -63,7 +63,7 @@ void BearableTimestamps::move(std::uint8_t* data, std::size_t size) {
   }
   const std::uint32_t value = big_endian(timestamp, kWord);
   if (!shift_) shift_ = value == 0 ? kSecond : 0;
-  const std::uint32_t moved = std::min(value + *shift_, kUnknown - 1);
+  const std::uint32_t moved = std::min(value + *shift_, kUnknownTimestamp - 1);
   for (std::size_t i = 0; i < kWord; ++i) {
     timestamp[i] = static_cast<std::uint8_t>(moved >> 8U * (kWord - 1 - i));
   }

@@ -19,9 +19,9 @@ constexpr int kRtspPort = 554;
 constexpr int kRtspsPort = 322;
 constexpr int kRedirections = 5;
 constexpr int kPortTries = 100;
-constexpr double kGoodbye_s = 0.5;  // given to TEARDOWN, so that the camera frees the session
-constexpr double kSlice_s = 0.1;    // of a wait: how late an interruption is noticed at most
-constexpr double kLongest_s = 1e9;  // what the libraries' integers hold
+constexpr double kGoodbye_s = 0.5;    // given to TEARDOWN, so that the camera frees the session
+constexpr double kPollSlice_s = 0.1;  // of a wait: how late an interruption is noticed at most
+constexpr double kLongest_s = 1e9;    // what the libraries' integers hold
 constexpr std::size_t kMaxEarlyPackets = 1000;
 
 // What GStreamer's functions take: microseconds, never 0 (which is for ever).
@@ -347,7 +347,7 @@ bool RtspSession::readable(double wait_s) const {
   if (!socket_ && RtspTls::holds_data(connection_.get())) return true;
   GSocket* const socket = gst_rtsp_connection_get_read_socket(connection_.get());
   pollfd waiting{g_socket_get_fd(socket), POLLIN, 0};
-  return ::poll(&waiting, 1, static_cast<int>(1e3 * std::clamp(wait_s, 0.0, kSlice_s))) > 0;
+  return ::poll(&waiting, 1, static_cast<int>(1e3 * std::clamp(wait_s, 0.0, kPollSlice_s))) > 0;
 }
 
 ReadStatus RtspSession::next_packet(double deadline_s, Packet* packet, std::string* error) {
@@ -382,11 +382,11 @@ ReadStatus RtspSession::receive(double deadline_s, std::uint8_t* data, std::size
     if (ports_) {
       // Video leaves no silence in which to read what the camera says.
       if (monotonic_now_s() >= next_look_s_) {
-        next_look_s_ = monotonic_now_s() + kSlice_s;
+        next_look_s_ = monotonic_now_s() + kPollSlice_s;
         // One that closes this connection and sends on may do so: below, silence is the end.
         if (readable(0)) (void)next_packet(deadline_s, &packet, error);
       }
-      const double slice_end_s = monotonic_now_s() + std::min(left_s, kSlice_s);
+      const double slice_end_s = monotonic_now_s() + std::min(left_s, kPollSlice_s);
       status = ports_->receive(slice_end_s, data, capacity, received, error);
       if (status != ReadStatus::kTimeout) return status;
       if (readable(0)) status = next_packet(deadline_s, &packet, error);

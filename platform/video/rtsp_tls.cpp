@@ -6,11 +6,11 @@ namespace alidade {
 namespace {
 
 // Faults for which no authority vouches; the last where one of the same name has another key.
-constexpr int kUnknown = G_TLS_CERTIFICATE_UNKNOWN_CA | G_TLS_CERTIFICATE_GENERIC_ERROR;
+constexpr int kUnknownIssuer = G_TLS_CERTIFICATE_UNKNOWN_CA | G_TLS_CERTIFICATE_GENERIC_ERROR;
 
 // What is wrong with a certificate, the worst first.
 std::string fault_of(int faults, const std::string& file) {
-  if ((faults & kUnknown) != 0) {
+  if ((faults & kUnknownIssuer) != 0) {
     return file.empty() ? "no authority that is known here has signed it"
                         : "it is neither in " + file + " nor signed by what is";
   }
@@ -67,7 +67,7 @@ ReadStatus RtspTls::refusal(std::string* error) const {
   *error = "the camera's certificate is refused: " + fault_of(faults_, certificate_file_) +
            "; if it is the camera's, save it as a PEM file and set certificate_file";
   // This machine's clock may not be set yet.
-  constexpr int kForGood = kUnknown | G_TLS_CERTIFICATE_BAD_IDENTITY;
+  constexpr int kForGood = kUnknownIssuer | G_TLS_CERTIFICATE_BAD_IDENTITY;
   return (faults_ & kForGood) != 0 ? ReadStatus::kFailed : ReadStatus::kDisconnected;
 }
 
