@@ -5,6 +5,7 @@
 #include <exception>
 #include <opencv2/core/utils/logger.hpp>
 #include <opencv2/dnn.hpp>
+#include <opencv2/dnn/all_layers.hpp>
 #include <opencv2/imgproc.hpp>
 
 namespace alidade {
@@ -49,6 +50,34 @@ bool layout_of(const cv::Mat& output, const NetworkOptions& options, Layout* lay
   layout->candidates = layout->values_first ? output.size[2] : output.size[1];
   layout->classes = values - layout->before_classes();
   return layout->classes >= 1;
+}
+
+int values_between(const cv::dnn::MatShape& shape, std::size_t first, std::size_t end) {
+  int values = 1;
+  for (std::size_t i = first; i < end; ++i) values *= shape[i];
+  return values;
+}
+
+// OpenCV 4.6 forgets the shape of a constant that multiplies, and lays its values along the axes
+// from 1 on. YOLOv8's strides, 1 x N for boxes of 1 x 4 x N, belong elsewhere: ONNX aligns shapes at
+// their ends. Layers that cannot work as they are get the axis where that holds.
+void align_constant_factors(cv::dnn::Net& net, const cv::dnn::MatShape& input) {
+  for (const auto& name : net.getLayerNames()) {
+    const int id = net.getLayerId(name);
+    const auto layer = net.getLayer(id).dynamicCast<cv::dnn::ScaleLayer>();
+    if (!layer || layer->axis != 1 || layer->blobs.empty()) continue;
+    std::vector<cv::dnn::MatShape> inputs, outputs;
+    net.getLayerShapes(input, id, inputs, outputs);
+    const cv::dnn::MatShape& shape = inputs.front();
+    const int factors = static_cast<int>(layer->blobs.front().total());
+    bool works = factors == 1;
+    for (std::size_t end = 2; end <= shape.size(); ++end)
+      works = works || values_between(shape, 1, end) == factors;
+    for (std::size_t axis = 2; !works && axis < shape.size(); ++axis) {
+      works = values_between(shape, axis, shape.size()) == factors;
+      if (works) layer->axis = static_cast<int>(axis);
+    }
+  }
 }
 
 // OpenCV logs what it also throws: the caller is told once.
@@ -124,6 +153,26 @@ struct NetworkDetector::Network {
     }
   }
 
+  // YOLOX's boxes before they are decoded and normalised ones have their middles near 0.
+  [[nodiscard]] bool places_are_pixels(const NetworkOptions& options) const {
+    const auto* values = output.ptr<float>();
+    const int step = layout.values_first ? 1 : layout.before_classes() + layout.classes;
+    for (int i = 0; i < layout.candidates; ++i) {
+      if (static_cast<double>(values[i * step]) > options.width_px / 2.0) return true;
+    }
+    return false;
+  }
+
+  // Once, before forward(). False: as there.
+  bool prepare() {
+    try {
+      align_constant_factors(net, {1, 3, input.rows, input.cols});
+    } catch (const std::exception&) {
+      return false;
+    }
+    return true;
+  }
+
   // False: the network is not for this input.
   bool forward() {
     try {
@@ -166,14 +215,16 @@ std::unique_ptr<NetworkDetector> NetworkDetector::load(const std::string& model,
   } catch (const std::exception&) {
   }
   if (network->net.empty()) {
-    *error = "is no ONNX network that OpenCV can read; export it with opset 12, static shape";
+    *error =
+        "is no ONNX network that OpenCV can read; export it with opset 12, static shape, 32 bits "
+        "a value";
     return nullptr;
   }
   const std::string size =
       std::to_string(options.width_px) + "x" + std::to_string(options.height_px);
   network->input.create(options.height_px, options.width_px, CV_8UC3);
   network->input.setTo(cv::Scalar::all(kPaddingGrey));
-  if (!network->forward()) {
+  if (!network->prepare() || !network->forward()) {
     *error = "takes no pictures of " + size +
              " px with three channels; set width_px and height_px to what it was exported with";
     return nullptr;
@@ -181,6 +232,12 @@ std::unique_ptr<NetworkDetector> NetworkDetector::load(const std::string& model,
   if (!layout_of(network->output, options, &network->layout)) {
     *error = "has an output of " + shape_of(network->output) +
              "; expected 1x(4+classes)xN as of YOLOv8, or 1xNx(5+classes) as of YOLOv5";
+    return nullptr;
+  }
+  if (!network->places_are_pixels(options)) {
+    *error =
+        "tells boxes that are not in pixels of its input: normalised, or of a YOLOX before they "
+        "are decoded";
     return nullptr;
   }
   const auto classes = static_cast<std::size_t>(network->layout.classes);

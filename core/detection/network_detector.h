@@ -2,7 +2,7 @@
 // What a neural network of the user's finds, by OpenCV's cv::dnn: a YOLO exported to ONNX, one input of 1 x 3 x height x width, one output of one of two
 // shapes, N candidates of C classes, told apart by N, which is that of grids of strides 8, 16 and 32, three times
 // that for v5, and else by there being more candidates than values (an export with NMS, 1 x N x 6, cannot be told from v5's):
-//   1 x (4 + C) x N   YOLOv8, v11:  centre u, v, width, height, C class scores
+//   1 x (4 + C) x N   YOLOv8:       centre u, v, width, height, C class scores
 //   1 x N x (5 + C)   YOLOv5:       centre u, v, width, height, objectness, C class scores; the score is objectness x class score
 // in pixels of the input, scores 0 to 1. The picture is scaled to fit, whole and in proportion, in the input's middle, the rest grey 114 (letterbox); values
 // 0 to 1. There is no colour: all three channels are the grey levels. Of boxes that overlap, whatever their class, the surest stays (cv::dnn::NMSBoxes).
@@ -37,7 +37,7 @@ enum class NetworkStatus {
 class NetworkDetector {
  public:
   // model: a file's bytes; options are valid. It looks once, at nothing. Null with one line that says why: no ONNX network, none of this input, of this
-  // output, or of so many classes.
+  // output, none whose boxes are in pixels, or of so many classes.
   [[nodiscard]] static std::unique_ptr<NetworkDetector> load(const std::string& model,
                                                              const NetworkOptions& options,
                                                              std::string* error);

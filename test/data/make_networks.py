@@ -3,7 +3,8 @@
 
 Their answer is known. The input of 64x64 px is cut into 8x8 cells; each is one candidate whose box is 10 px wide and 6 high, 1 px right of and 2 below the
 cell's middle, and again, 1 px farther right and by a tenth less sure. Class 0 is how bright the cell is on average, 0 to 1, class 1 how dark.
-  v8        output 1 x 6 x 128, as of YOLOv8
+  v8        output 1 x 6 x 128, as of YOLOv8: boxes in cells, times the cell's pixels for each candidate at last, a constant of 1 x 128
+  shares    the same without that factor, boxes of 1/64 of these pixels
   v5        output 1 x 128 x 7, as of YOLOv5, objectness 0.8
   pictures  output 1 x 1 x 8 x 8, as of no detector
 """
@@ -45,8 +46,19 @@ def network(kind):
             helper.make_node("Mul", ["scores", "less"], ["lower"]),
             helper.make_node("Concat", ["scores", "lower"], ["both"], axis=2),
         ]
-        if kind == "v8":
-            nodes.append(helper.make_node("Concat", ["boxes", "both"], ["output"], axis=1))
+        if kind in ("v8", "shares"):
+            # Boxes are no constants, or the product would be one.
+            tensors[-1] = constant("boxes", boxes / (CELL_PX if kind == "v8" else CELL_PX * CELLS))
+            tensors += [constant("nothing", [0]), constant("strides", np.full([1, 2 * CELLS**2], CELL_PX))]
+            nodes += [
+                helper.make_node("Mul", ["both", "nothing"], ["zeros"]),
+                helper.make_node("Concat", ["zeros", "zeros"], ["four_zeros"], axis=1),
+                helper.make_node("Add", ["four_zeros", "boxes"], ["unscaled"]),
+                helper.make_node("Mul", ["unscaled", "strides"], ["scaled"]),
+                helper.make_node("Concat", ["scaled" if kind == "v8" else "unscaled", "both"], ["output"], axis=1),
+            ]
+            if kind == "shares":
+                del nodes[-2], tensors[-1]
             shape = [1, 6, 2 * CELLS**2]
         else:
             tensors.append(constant("objectness", np.full([1, 1, 2 * CELLS**2], 0.8)))
@@ -66,5 +78,5 @@ def network(kind):
     return model
 
 
-for kind in ("v8", "v5", "pictures"):
+for kind in ("v8", "shares", "v5", "pictures"):
     onnx.save(network(kind), pathlib.Path(__file__).parent / f"bright_cells_{kind}.onnx")

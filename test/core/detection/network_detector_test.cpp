@@ -139,6 +139,8 @@ TEST(NetworkDetector, SaysInALineWhyItCannotBeUsed) {
   EXPECT_THAT(error_of(v8, other_size), ::testing::HasSubstr("takes no pictures of 128x64 px"));
   EXPECT_THAT(error_of(network_file("pictures"), of_cells()),
               ::testing::HasSubstr("has an output of 1x1x8x8; expected 1x(4+classes)xN"));
+  EXPECT_THAT(error_of(network_file("shares"), of_cells()),
+              ::testing::HasSubstr("tells boxes that are not in pixels of its input"));
   NetworkOptions three = of_cells();
   three.labels = {"a", "b", "c"};
   EXPECT_THAT(error_of(v8, three), ::testing::HasSubstr("tells 2 classes, but there are 3 labels"));
