@@ -3,7 +3,8 @@
 //   s        position: log f (f in px) as the zoom reading has it by a data sheet, or by an earlier calibration
 //   x(s)     = (delta, kappa, c_u, c_v), a cubic B-spline over s
 //   log f    = s + delta(s) + eps,  eps how the lens came to rest in that very picture
-//   k        = kappa (f / R)^2,     R half the image's diagonal, px: kappa is the distortion in the corner (core/model/zoom_curve.h)
+//   k        = kappa (f / R)^2 exp(2 (hold - 1) eps),  R half the image's diagonal, px: kappa is the distortion in the corner
+//              (core/model/zoom_curve.h). A lens that rests off its curve keeps it (hold = 1), or keeps k (hold = 0), or lies between.
 //   c        the optical centre from the image's middle, px
 // Beyond its ends x goes on as it is at the end. Linear in its control points. The constructor allocates.
 
@@ -20,9 +21,12 @@ namespace alidade {
 // delta, kappa, c_u, c_v
 inline constexpr int kLensQuantityCount = 4;
 using LensQuantities = Matrix<double, kLensQuantityCount, 1>;
+using CameraColumn = Matrix<double, kCameraParameterCount, 1>;
 
 class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
  public:
+  static constexpr double kUnknownHold = 0.5;
+
   LensCurve() = default;
 
   // Over log f from first to last, in segments of at most `spacing`; the same at all of them: that of `camera` but for its f.
@@ -51,38 +55,46 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
   [[nodiscard]] int height() const { return height_; }
   [[nodiscard]] double aspect() const { return aspect_; }
   [[nodiscard]] double corner_px() const { return std::hypot(width_, height_) / 2; }
+  [[nodiscard]] double& hold() { return hold_; }
+  [[nodiscard]] double hold() const { return hold_; }
 
   // The weights at s, held to the curve's range.
   [[nodiscard]] Basis basis_at(double s) const { return basis(std::clamp(s, begin_s(), end_s())); }
 
-  [[nodiscard]] Camera<double> camera(double s, const LensQuantities& x, double eps) const {
+  // Of this lens's shape alone. J_*: d (f, alpha, k, c_u, c_v) / d x, / d eps, / d hold.
+  struct Jacobians {
+    Matrix<double, kCameraParameterCount, kLensQuantityCount> J_x;
+    CameraColumn J_eps;
+    CameraColumn J_hold;
+  };
+  [[nodiscard]] Camera<double> camera(double s, const LensQuantities& x, double eps, double hold,
+                                      Jacobians* jacobians = nullptr) const {
     Camera<double> out;
     out.focal_length = std::exp(s + x[0] + eps);
     out.aspect = aspect_;
     out.width = width_;
     out.height = height_;
-    out.radial_distortion = x[1] * out.distortion_of_corner();
+    const double k_by_kappa = out.distortion_of_corner() * std::exp(2 * (hold - 1) * eps);
+    out.radial_distortion = x[1] * k_by_kappa;
     out.set_centre_offset(x.tail<2>());
+    if (jacobians != nullptr) {
+      const double k = out.radial_distortion;
+      jacobians->J_x << out.focal_length, 0, 0, 0,  //
+          0, 0, 0, 0,                               //
+          2 * k, k_by_kappa, 0, 0,                  //
+          0, 0, 1, 0,                               //
+          0, 0, 0, 1;
+      jacobians->J_eps << out.focal_length, 0, 2 * hold * k, 0, 0;
+      jacobians->J_hold << 0, 0, 2 * eps * k, 0, 0;
+    }
     return out;
   }
-  // d (f, alpha, k, c_u, c_v) / d x, of a camera of this lens; the first column is by eps, too.
-  [[nodiscard]] Matrix<double, kCameraParameterCount, kLensQuantityCount> J_camera_x(
-      const Camera<double>& camera) const {
-    Matrix<double, kCameraParameterCount, kLensQuantityCount> J;
-    J << camera.focal_length, 0, 0, 0,                                      //
-        0, 0, 0, 0,                                                         //
-        2 * camera.radial_distortion, camera.distortion_of_corner(), 0, 0,  //
-        0, 0, 1, 0,                                                         //
-        0, 0, 0, 1;
-    return J;
-  }
   [[nodiscard]] Camera<double> camera_at(double s, double eps = 0) const {
-    return camera(s, value(basis_at(s)), eps);
+    return camera(s, value(basis_at(s)), eps, hold_);
   }
 
   // The lens of a focal length, whatever reading belongs to it. J_camera_log: d (f, alpha, k, c_u, c_v) / d log f.
-  [[nodiscard]] Camera<double> camera_of(
-      double log_f, Matrix<double, kCameraParameterCount, 1>* J_camera_log = nullptr) const {
+  [[nodiscard]] Camera<double> camera_of(double log_f, CameraColumn* J_camera_log = nullptr) const {
     // A contraction: delta changes slowly.
     double s = log_f;
     for (int step = 0; step < 30; ++step) {
@@ -92,7 +104,7 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
     }
     const Basis at = basis_at(s);
     const LensQuantities x = value(at);
-    const Camera<double> out = camera(s, x, log_f - s - x[0]);
+    const Camera<double> out = camera(s, x, log_f - s - x[0], hold_);
     if (J_camera_log != nullptr) {
       const bool inside = begin_s() < s && s < end_s();
       const LensQuantities slope = inside ? derivative(at) : LensQuantities(LensQuantities::Zero());
@@ -114,6 +126,7 @@ class LensCurve : public CubicSpline<kLensQuantityCount, LensCurve> {
   int width_ = 0;
   int height_ = 0;
   double aspect_ = 1;
+  double hold_ = kUnknownHold;
 };
 
 }  // namespace alidade

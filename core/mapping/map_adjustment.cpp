@@ -17,6 +17,7 @@
 namespace alidade {
 namespace {
 
+using internal::HoldPriorCost;
 using internal::kPictureBlock;
 using internal::LensBendCost;
 using internal::LensLevelCost;
@@ -41,7 +42,8 @@ bool is_usable(const MapEvidence& evidence, const MapOptions& options) {
   if (options.start && options.start->control_points() != options.lens.control_points()) {
     return false;
   }
-  if (!((options.level_sigma.array() > 0).all() && (options.bend_sigma.array() > 0).all())) {
+  if (!((options.level_sigma.array() > 0).all() && (options.bend_sigma.array() > 0).all() &&
+        options.hold_sigma > 0)) {
     return false;
   }
   for (const MapPicture& picture : evidence.pictures) {
@@ -119,9 +121,13 @@ std::vector<bool> tied(const MapEvidence& evidence, const MapState& state, std::
 struct MapProblem {
   ceres::Problem problem;
   std::vector<double*> landmarks;
-  std::vector<double*> shared;  // pictures, then control points
+  std::vector<double*> shared;  // pictures, then control points, then hold
   std::size_t pictures = 0;
   std::vector<ceres::ResidualBlockId> seen;
+
+  [[nodiscard]] std::size_t unknowns() const {
+    return 2 * landmarks.size() + 4 * (shared.size() - 1) + 1;
+  }
 };
 
 std::unique_ptr<MapProblem> build_problem(const MapEvidence& evidence, const MapOptions& options,
@@ -135,6 +141,7 @@ std::unique_ptr<MapProblem> build_problem(const MapEvidence& evidence, const Map
   for (int i = 0; i < lens.control_points(); ++i) {
     out->shared.push_back(lens.control_point(i).data());
   }
+  out->shared.push_back(&lens.hold());
   std::vector<bool> has_landmark(state->landmarks.size(), false);
   for (std::size_t i = 0; i < used.size(); ++i) {
     if (!used[i]) continue;
@@ -152,7 +159,8 @@ std::unique_ptr<MapProblem> build_problem(const MapEvidence& evidence, const Map
         new ceres::HuberLoss(kBend_sigmas * noise),
         {state->pictures[at].data(), state->landmarks[landmark].data(),
          lens.control_point(first).data(), lens.control_point(first + 1).data(),
-         lens.control_point(first + 2).data(), lens.control_point(first + 3).data()}));
+         lens.control_point(first + 2).data(), lens.control_point(first + 3).data(),
+         &lens.hold()}));
   }
   const bool is_tied_to_base =
       std::any_of(evidence.pictures.begin(), evidence.pictures.end(),
@@ -175,6 +183,8 @@ std::unique_ptr<MapProblem> build_problem(const MapEvidence& evidence, const Map
                              lens.control_point(i - 2).data(), lens.control_point(i - 1).data(),
                              lens.control_point(i).data());
   }
+  problem.AddResidualBlock(new HoldPriorCost(options.lens.hold(), options.hold_sigma), nullptr,
+                           &lens.hold());
   return out;
 }
 
@@ -185,10 +195,11 @@ bool solve(const MapOptions& options, double least_gain, MapProblem* map, bool* 
   solver.linear_solver_type = ceres::SPARSE_SCHUR;
   auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   for (double* block : map->landmarks) ordering->AddElementToGroup(block, 0);
-  // Within a group the order is that of addresses: the lens has one of its own, so that it is the same each time.
-  for (std::size_t i = 0; i < map->shared.size(); ++i) {
+  // Within a group the order is that of addresses: control points and hold have one each, so that it is the same each time.
+  for (std::size_t i = 0; i + 1 < map->shared.size(); ++i) {
     ordering->AddElementToGroup(map->shared[i], i < map->pictures ? 1 : 2);
   }
+  ordering->AddElementToGroup(map->shared.back(), 3);
   solver.linear_solver_ordering = ordering;
   solver.max_num_iterations = options.max_steps;
   solver.num_threads = std::max(1, options.threads);
@@ -207,18 +218,20 @@ bool solve(const MapOptions& options, double least_gain, MapProblem* map, bool* 
 std::vector<double> squares_of(const MapEvidence& evidence, const MapOptions& options,
                                const MapState& state) {
   std::vector<double> out;
+  const double hold = state.lens.hold();
   for (const MapObservation& seen : evidence.observations) {
     const auto at = static_cast<std::size_t>(seen.picture);
     const auto landmark = static_cast<std::size_t>(seen.landmark);
     const MapPicture& picture = evidence.pictures[at];
     const int first = options.lens.basis_at(picture.position).segment;
-    const double* parameters[6] = {
+    const double* parameters[7] = {
         state.pictures[at].data(),
         state.landmarks[landmark].data(),
         state.lens.control_point(first).data(),
         state.lens.control_point(first + 1).data(),
         state.lens.control_point(first + 2).data(),
         state.lens.control_point(first + 3).data(),
+        &hold,
     };
     Vector2<double> r;
     const bool is_seen = state.d_start[landmark].norm() > 0.5 &&
@@ -312,7 +325,7 @@ Eigen::SparseMatrix<double> pictures_by_shared(const MapEvidence& evidence, cons
   }
   Eigen::SparseMatrix<double> out(
       kPictureBlock * pictures,
-      kPictureBlock * pictures + kLensQuantityCount * state.lens.control_points());
+      kPictureBlock * pictures + kLensQuantityCount * state.lens.control_points() + 1);
   out.setFromTriplets(entries.begin(), entries.end());
   return out;
 }
@@ -397,8 +410,7 @@ MapAdjustment adjust_map(const MapEvidence& evidence, const MapOptions& options)
     out.status = MapStatus::kNotDetermined;
     if (!solve(options, round.least_gain, map.get(), &converged, &out.steps)) return out;
     const std::vector<double> squares = squares_of(evidence, options, state);
-    const std::size_t unknowns = 2 * map->landmarks.size() + 4 * map->shared.size();
-    noise = noise_found(squares, used, unknowns);
+    noise = noise_found(squares, used, map->unknowns());
     std::vector<bool> within;
     for (const double square : squares) within.push_back(square < std::pow(round.gate * noise, 2));
     used = tied(evidence, state, within);
@@ -415,6 +427,7 @@ MapAdjustment adjust_map(const MapEvidence& evidence, const MapOptions& options)
   if (!converged) return out;
   const Eigen::SparseMatrix<double> G = pictures_by_shared(evidence, state);
   const double inflation = std::max(1.0, out.noise_scale * out.noise_scale);
+  out.hold_sigma = std::sqrt(inflation * covariance(covariance.rows() - 1, covariance.cols() - 1));
   out.covariance = inflation * (G * covariance * G.transpose());
   write_result(evidence, used, state, &out);
   out.status = MapStatus::kOk;

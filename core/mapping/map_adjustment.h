@@ -4,7 +4,7 @@
 //   landmark j   direction d_j, unit length, base: two unknowns
 //   least        sum rho(|u_ij - project(R_i, lens(s_i, eps_i), d_j)|^2 / sigma_ij^2)        over what was seen (map_projection.h)
 //                + |Log(Rp_i^T R_i)|^2 by cov_p     where there is telemetry: Rp what it says, its backlash in cov_p
-//                + (eps_i / sigma_eps_i)^2 + the lens's own priors
+//                + (eps_i / sigma_eps_i)^2 + the lens's own priors, one of them of its hold
 // rho is Huber's. What lies off by more than the gate is left out, and the rest adjusted again. By Ceres; landmarks are eliminated
 // first (Schur), and the covariance of the pictures is that of the reduced normal matrix, inflated where residuals are larger than
 // claimed. Rotations and directions are differences to their start values, exactly. The pictures have to hang together: without
@@ -56,6 +56,7 @@ struct MapOptions {
   // Sigmas of a control point's delta, kappa, c_u, c_v about the beginning, and of second differences of neighbouring ones.
   LensQuantities level_sigma{0.05, 0.1, 30, 30};
   LensQuantities bend_sigma{0.02, 0.02, 3, 3};
+  double hold_sigma = 0.5;  // of the lens's hold about the beginning
   double most_start_error =
       0.1;                 // rad, of a direction that orientation and lens give to begin with
   double gate_sigmas = 4;  // times the noise that was found
@@ -91,6 +92,7 @@ struct MapAdjustment {
       landmarks;               // base; of zero length where less than two observations are left
   std::vector<int> left_out;   // observations, increasing
   Eigen::MatrixXd covariance;  // (xi, log f) of each picture, 4 rows each
+  double hold_sigma = 0;       // of the lens's hold
   double noise_scale = 0;      // root mean square of the residuals in their sigmas
   int steps = 0;
 

@@ -86,6 +86,7 @@ struct MapBuild {
   int observations = 0;    // that the map rests on
   double residual_px = 0;  // root mean square of an observation's error
   double noise_scale = 0;  // residuals over what was claimed
+  double hold_sigma = 0;   // of the map's lens
   int steps = 0;
 };
 

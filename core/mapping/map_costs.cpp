@@ -30,7 +30,9 @@ bool SeenCost::Evaluate(double const* const* parameters, double* residuals,
   for (int i = 0; i < 4; ++i) {
     x += basis_.weight[i] * Eigen::Map<const LensQuantities>(parameters[2 + i]);
   }
-  const Camera<double> camera = lens_->camera(picture_->position, x, parameters[0][3]);
+  LensCurve::Jacobians by;
+  const Camera<double> camera =
+      lens_->camera(picture_->position, x, parameters[0][3], parameters[6][0], &by);
   Matrix<double, 3, 2> J_d;
   const Vector3<double> d = direction_plus(
       *d_start_, Vector2<double>(Eigen::Map<const Vector2<double>>(parameters[1])), &J_d);
@@ -42,11 +44,10 @@ bool SeenCost::Evaluate(double const* const* parameters, double* residuals,
   Eigen::Map<Vector2<double>> out(residuals);
   out = (seen.u - u_) / sigma_px_;
   if (jacobians == nullptr) return true;
-  const Matrix<double, 2, kLensQuantityCount> J_x =
-      seen.J_u_camera * lens_->J_camera_x(camera) / sigma_px_;
+  const Matrix<double, 2, kLensQuantityCount> J_x = seen.J_u_camera * by.J_x / sigma_px_;
   if (jacobians[0] != nullptr) {
     JacobianRows<2, kPictureBlock> J(jacobians[0]);
-    J << seen.J_u_xi * right_jacobian_so3(xi) / sigma_px_, J_x.col(0);
+    J << seen.J_u_xi * right_jacobian_so3(xi) / sigma_px_, seen.J_u_camera * by.J_eps / sigma_px_;
   }
   if (jacobians[1] != nullptr) {
     JacobianRows<2, 2> J(jacobians[1]);
@@ -56,6 +57,10 @@ bool SeenCost::Evaluate(double const* const* parameters, double* residuals,
     if (jacobians[2 + i] == nullptr) continue;
     JacobianRows<2, kLensQuantityCount> J(jacobians[2 + i]);
     J = basis_.weight[i] * J_x;
+  }
+  if (jacobians[6] != nullptr) {
+    Eigen::Map<Vector2<double>> J(jacobians[6]);
+    J = seen.J_u_camera * by.J_hold / sigma_px_;
   }
   return true;
 }
@@ -112,6 +117,13 @@ bool LensBendCost::Evaluate(double const* const* parameters, double* residuals,
     LensRows J(jacobians[i]);
     J = (kWeights[i] * sigma_.cwiseInverse()).asDiagonal();
   }
+  return true;
+}
+
+bool HoldPriorCost::Evaluate(double const* const* parameters, double* residuals,
+                             double** jacobians) const {
+  residuals[0] = (parameters[0][0] - level_) / sigma_;
+  if (jacobians != nullptr && jacobians[0] != nullptr) jacobians[0][0] = 1 / sigma_;
   return true;
 }
 

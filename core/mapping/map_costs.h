@@ -1,6 +1,6 @@
 #pragma once
 // The terms of map_adjustment.h as Ceres' cost functions, with their Jacobians.
-// A picture's block is (xi, eps) with R = R_start Exp(xi); a landmark's the change of its start direction; the lens's are control points.
+// A picture's block is (xi, eps) with R = R_start Exp(xi); a landmark's the change of its start direction; the lens's are control points, and hold.
 
 #include <ceres/sized_cost_function.h>
 
@@ -10,10 +10,10 @@ namespace alidade::internal {
 
 inline constexpr int kPictureBlock = 4;
 
-// Parameters: picture, landmark, the four control points that act at the picture's position. Residuals: error over sigma.
+// Parameters: picture, landmark, the four control points that act at the picture's position, hold. Residuals: error over sigma.
 class SeenCost
     : public ceres::SizedCostFunction<2, kPictureBlock, 2, kLensQuantityCount, kLensQuantityCount,
-                                      kLensQuantityCount, kLensQuantityCount> {
+                                      kLensQuantityCount, kLensQuantityCount, 1> {
  public:
   // All but the observation have to live as long as this; of lens nothing but its shape is used.
   SeenCost(const MapPicture* picture, const LensCurve* lens, const Vector3<double>* d_start,
@@ -66,6 +66,17 @@ class LensBendCost : public ceres::SizedCostFunction<kLensQuantityCount, kLensQu
 
  private:
   LensQuantities sigma_;
+};
+
+// (hold - level) / sigma
+class HoldPriorCost : public ceres::SizedCostFunction<1, 1> {
+ public:
+  HoldPriorCost(double level, double sigma) : level_(level), sigma_(sigma) {}
+  bool Evaluate(double const* const* parameters, double* residuals,
+                double** jacobians) const override;
+
+ private:
+  double level_, sigma_;
 };
 
 }  // namespace alidade::internal

@@ -65,6 +65,7 @@ class MapMaking {
     }
     out_.residual_px = out_.observations > 0 ? std::sqrt(sum / out_.observations) : 0;
     out_.noise_scale = found_.noise_scale;
+    out_.hold_sigma = found_.hold_sigma;
   }
 
  private:

@@ -137,6 +137,7 @@ bool check_lens(const LensCurve& lens, std::string* error) {
       return refuse("the lens's knots are out of range, or do not increase", error);
     }
   }
+  if (!(std::abs(lens.hold()) <= 10)) return refuse("the lens's hold is out of range", error);
   for (int i = 0; i < lens.control_points(); ++i) {
     const LensQuantities& x = lens.control_point(i);
     if (!x.allFinite() || !(std::abs(x[0]) < 1)) {

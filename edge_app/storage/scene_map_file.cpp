@@ -111,23 +111,25 @@ bool SceneMapFile::check_kind(std::string* error) {
   if (application != kSceneMapApplication)
     return refuse("not a scene map; make one with `alidade map build`", error);
   const std::int64_t format = database_.number_of("PRAGMA user_version");
-  if (!database_.failed() && format != kSceneMapFormat) {
+  const bool without_rest = format == kSceneMapFormatWithoutRest;
+  if (!database_.failed() && format != kSceneMapFormat && !without_rest) {
     return refuse("a scene map of format " + std::to_string(format) + ", this program has format " +
                       std::to_string(kSceneMapFormat) + "; build it again",
                   error);
   }
+  std::vector<std::string> expected(kSceneMapTables.begin(), kSceneMapTables.end());
+  if (without_rest) expected.erase(expected.begin() + kLensRestTable);
   SqliteStatement schema(&database_,
                          "SELECT sql FROM sqlite_schema WHERE sql IS NOT NULL ORDER BY name");
   std::size_t tables = 0;
   bool same = true;
-  while (schema.step() && tables <= kSceneMapTables.size()) {
+  while (schema.step() && tables <= expected.size()) {
     std::string sql;
-    same = same && tables < kSceneMapTables.size() && schema.get_text(0, &sql) &&
-           sql == kSceneMapTables[tables];
+    same = same && tables < expected.size() && schema.get_text(0, &sql) && sql == expected[tables];
     ++tables;
   }
   if (database_.failed()) return refuse_failure(error);
-  if (!same || tables != kSceneMapTables.size()) return refuse(kSceneMapDamaged, error);
+  if (!same || tables != expected.size()) return refuse(kSceneMapDamaged, error);
   return true;
 }
 
@@ -147,8 +149,12 @@ bool SceneMapFile::is_of(int width, int height, std::string* error) const {
 
 bool SceneMapFile::replace(const SceneMap& map, std::string* error) {
   SqliteTransaction transaction(&database_, true);
-  for (const char* table :
-       {"sighting", "picture", "landmark", "keyframe", "lens_point", "lens_knot", "scene"}) {
+  if (database_.number_of("PRAGMA user_version") == kSceneMapFormatWithoutRest) {
+    database_.execute(kSceneMapTables[kLensRestTable]);
+    database_.execute("PRAGMA user_version = " + std::to_string(kSceneMapFormat));
+  }
+  for (const char* table : {"sighting", "picture", "landmark", "keyframe", "lens_rest",
+                            "lens_point", "lens_knot", "scene"}) {
     database_.execute(std::string("DELETE FROM ") + table);
   }
   write_all(map, scene_.revision + 1, &database_);

@@ -1,6 +1,7 @@
 #pragma once
 // scene.map: the scene map on disk (core/mapping/scene_map.h), an SQLite database in WAL mode, of this program's application_id; its
-// user_version is the format's, 1. Tables: scene (one row), lens_knot, lens_point, keyframe, picture, landmark, sighting; columns see
+// user_version is the format's, 2; one of format 1 is read and updated as it is, and becomes one of format 2 when it is replaced. Tables:
+// scene (one row), lens_knot, lens_point, lens_rest (one row), keyframe, picture, landmark, sighting; columns see
 // scene_map_schema.h. Numbers keep their bits; of a covariance the upper half is kept.
 // Each transaction is on disk when the call returns (synchronous = FULL): after a power cut at any moment the map is as one of them
 // left it, and none that returned is lost. Each row has a checksum, and the scene row the sum of them all, so that what SQLite does

@@ -73,7 +73,14 @@ bool SceneMapFile::read_lens(const SceneRow& scene, LensCurve* lens, std::string
         fits = select.get(j, &found.control_point(i)[j]);
       }
     }
-    fits = fits && i == found.control_points() && sum_of(found) == scene.lens_sum;
+    const std::int64_t format = database_.number_of("PRAGMA user_version");
+    const bool with_rest = format != kSceneMapFormatWithoutRest;
+    found.hold() = 1;
+    if (fits && with_rest) {
+      SqliteStatement rest(&database_, "SELECT hold FROM lens_rest");
+      fits = rest.step() && rest.get(0, &found.hold()) && !rest.step();
+    }
+    fits = fits && i == found.control_points() && sum_of(found, with_rest) == scene.lens_sum;
     *lens = found;
   }
   if (database_.failed()) return refuse_failure(error);

@@ -109,12 +109,13 @@ bool SceneRows::take_out(std::int64_t landmark, std::int64_t* sightings,
   return found;
 }
 
-std::int64_t sum_of(const LensCurve& lens) {
+std::int64_t sum_of(const LensCurve& lens, bool with_rest) {
   FieldSum sum;
   for (int i = 0; i <= lens.segments(); ++i) sum.add(lens.knot(i));
   for (int i = 0; i < lens.control_points(); ++i) {
     for (int j = 0; j < kLensQuantityCount; ++j) sum.add(lens.control_point(i)[j]);
   }
+  if (with_rest) sum.add(lens.hold());
   return sum.value();
 }
 
@@ -133,6 +134,9 @@ void write_lens(const LensCurve& lens, SqliteDatabase* database) {
     for (int j = 0; j < kLensQuantityCount; ++j) point.bind(2 + j, lens.control_point(i)[j]);
     point.run();
   }
+  SqliteStatement rest(database, "INSERT INTO lens_rest VALUES(0,?)");
+  rest.bind(1, lens.hold());
+  rest.run();
 }
 
 }  // namespace
@@ -149,7 +153,7 @@ void write_all(const SceneMap& map, std::int64_t revision, SqliteDatabase* datab
   if (map.mechanics) scene.mechanics = *map.mechanics;
   scene.next_landmark = map.next_landmark;
   scene.lens_points = map.lens.control_points();
-  scene.lens_sum = sum_of(map.lens);
+  scene.lens_sum = sum_of(map.lens, true);
   write_lens(map.lens, database);
   SceneRows rows(database, &scene);
   for (const SceneKeyframe& keyframe : map.keyframes) rows.add(keyframe);

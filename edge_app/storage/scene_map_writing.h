@@ -36,9 +36,10 @@ class SceneRows {
       find_landmark_, delete_sightings_, delete_landmark_;
 };
 
-// Into empty tables.
+// Into empty tables, of this program's format.
 void write_all(const SceneMap& map, std::int64_t revision, SqliteDatabase* database);
 
-[[nodiscard]] std::int64_t sum_of(const LensCurve& lens);
+// with_rest: as the format has it that keeps the lens's hold.
+[[nodiscard]] std::int64_t sum_of(const LensCurve& lens, bool with_rest);
 
 }  // namespace alidade

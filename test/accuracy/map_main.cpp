@@ -17,6 +17,11 @@ int main(int argc, char** argv) {
   app.add_option("--noise", options.nearest_px, "of the smallest features, px");
   app.add_option("--wrong", options.wrong_share, "share of wrong observations");
   app.add_option("--repeatability", options.repeatability, "sigma of log f after a movement");
+  app.add_option("--hold", options.hold,
+                 "what the lens keeps that rests off its curve: 1 its corner's distortion, 0 k");
+  app.add_option("--angle-noise", options.angle_noise, "of telemetry, rad");
+  app.add_option("--backlash", options.backlash, "of telemetry, rad, to one side or the other");
+  app.add_flag("--alone", options.alone, "only as a map is built");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

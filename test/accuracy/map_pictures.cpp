@@ -202,6 +202,8 @@ void judge_map(const RenderedStills& stills, const std::vector<int>& pictures,
   }
   const Interval interval = mean_square_interval(4 * static_cast<int>(squares.size()), 0.95);
   table.notes.push_back("f of all: " + both(all_f));
+  table.notes.push_back("the lens's hold " + number(build.map.lens.hold(), 3) + ", its sigma " +
+                        number(build.hold_sigma, 2));
   table.notes.push_back("NEES per number, mean " + number(mean(squares) / 4, 3) + ", median " +
                         number(median(squares) / 4, 3) + " (of independent ones 95 %: " +
                         number(interval.low, 3) + " to " + number(interval.high, 3) + ")");

@@ -22,10 +22,13 @@ struct MapStillsOptions {
   double nearest_px = 0.1;    // noise of the smallest features; of the largest three times as much
   double wrong_share = 0.02;  // of the observations
   double repeatability = 1e-3;  // sigma of log f
-  double angle_noise = 1e-4;    // rad
-  double backlash = 2e-4;       // rad, to one side or the other
-  double roll_wobble = 5e-5;    // rad
-  double sheet_error = 0.01;    // of log f, smooth
+  double hold =
+      1;  // what the lens keeps that rests off its curve: the distortion in the corner (1), or k (0)
+  double angle_noise = 1e-4;  // rad
+  double backlash = 2e-4;     // rad, to one side or the other
+  double roll_wobble = 5e-5;  // rad
+  double sheet_error = 0.01;  // of log f, smooth
+  bool alone = false;         // only as a map is built, without the variants that know less
 };
 
 // Prints the tables; what is not as it should be, one line each.

@@ -19,6 +19,7 @@ class MapBytes {
         map.next_landmark, map.mechanics.has_value());
     for (int i = 0; i <= lens.segments(); ++i) put(lens.knot(i));
     for (int i = 0; i < lens.control_points(); ++i) matrix(lens.control_point(i));
+    put(lens.hold());
     if (map.mechanics) {
       matrix(map.mechanics->pan_axis);
       matrix(map.mechanics->tilt_axis);

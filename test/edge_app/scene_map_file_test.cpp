@@ -9,6 +9,7 @@
 #include <filesystem>
 #include <limits>
 
+#include "edge_app/storage/scene_map_writing.h"
 #include "test/edge_app/changing_scene_map.h"
 #include "test/support/temporary_directory.h"
 
@@ -213,8 +214,28 @@ TEST_F(SceneMapFileTest, RefusesWhatIsNoSceneMap) {
 
 TEST_F(SceneMapFileTest, RefusesAnotherFormat) {
   save(map_before_changes());
-  execute("PRAGMA user_version = 2");
-  expect_refused("of format 2, this program has format 1; build it again");
+  execute("PRAGMA user_version = 3");
+  expect_refused("of format 3, this program has format 2; build it again");
+}
+
+// A map that was written before a lens had a hold: as it was then, updated as it is, replaced by one of today.
+TEST_F(SceneMapFileTest, ReadsTheFormatBefore) {
+  SceneMap map = save(map_before_changes());
+  execute("DROP TABLE lens_rest; PRAGMA user_version = 1");
+  forge([&](SceneRow* scene) { scene->lens_sum = sum_of(map.lens, false); });
+  map.lens.hold() = 1;
+  EXPECT_TRUE(loaded_bytes() == bytes_of(map));
+  SceneMapFile file;
+  ASSERT_TRUE(file.open(path, &error)) << error;
+  const MapChange change = change_of(map, 1);
+  ASSERT_TRUE(file.update(change, &error)) << error;
+  ASSERT_TRUE(apply(change, &map, &error)) << error;
+  EXPECT_TRUE(loaded_bytes() == bytes_of(map));
+  map.lens.hold() = 0.25;
+  ASSERT_TRUE(file.replace(map, &error)) << error;
+  EXPECT_TRUE(loaded_bytes() == bytes_of(map));
+  execute("DROP TABLE lens_rest");
+  expect_refused("damaged");
 }
 
 TEST_F(SceneMapFileTest, RefusesAnotherCamera) {
@@ -280,9 +301,10 @@ TEST_F(SceneMapFileTest, RefusesARowThatWasChangedOrLost) {
         "UPDATE sighting SET u_px = u_px + 1 WHERE landmark = 5",
         "DELETE FROM sighting WHERE landmark = 5", "UPDATE keyframe SET frame = 2 * frame + 1",
         "UPDATE keyframe SET q_x = 'x'", "DELETE FROM picture", "UPDATE lens_knot SET log_f = 7",
-        "UPDATE lens_point SET kappa = 0.1", "DELETE FROM lens_point WHERE number = 2",
-        "DELETE FROM scene", "UPDATE scene SET aspect = 2.0",
-        "INSERT INTO sighting VALUES(5, 3000, 1.0, 1.0, 1.0)"}) {
+        "UPDATE lens_rest SET hold = 0.75", "DELETE FROM lens_rest",
+        "INSERT INTO lens_rest VALUES(1, 0.5)", "UPDATE lens_point SET kappa = 0.1",
+        "DELETE FROM lens_point WHERE number = 2", "DELETE FROM scene",
+        "UPDATE scene SET aspect = 2.0", "INSERT INTO sighting VALUES(5, 3000, 1.0, 1.0, 1.0)"}) {
     std::filesystem::remove(path);
     save(map_before_changes());
     SCOPED_TRACE(sql);

@@ -22,8 +22,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::array<const char*, 7> kTables = {"keyframe", "landmark", "lens_knot", "lens_point",
-                                                "picture",  "scene",    "sighting"};
+constexpr std::array<const char*, 8> kTables = {"keyframe", "landmark", "lens_knot", "lens_point",
+                                                "picture",  "scene",    "sighting",  "lens_rest"};
 
 // In memory, where there is such a folder: each transaction waits for the disk.
 class FuzzFolder {
@@ -239,7 +239,8 @@ void put_lens_right(SqliteDatabase* database) {
   FieldSum sum;
   for (const auto& [sql, columns] :
        {std::pair{"SELECT log_f FROM lens_knot ORDER BY number", 1},
-        std::pair{"SELECT delta, kappa, centre_u, centre_v FROM lens_point ORDER BY number", 4}}) {
+        std::pair{"SELECT delta, kappa, centre_u, centre_v FROM lens_point ORDER BY number", 4},
+        std::pair{"SELECT hold FROM lens_rest", 1}}) {
     SqliteStatement select(database, sql);
     while (select.step()) {
       for (int i = 0; i < columns; ++i) add_column(select, i, &sum);

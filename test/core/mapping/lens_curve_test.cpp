@@ -31,6 +31,24 @@ TEST(LensCurve, IsTheCameraThatItWasMadeOf) {
   EXPECT_EQ(out.height, 720);
 }
 
+TEST(LensCurve, OffItsCurveItKeepsTheCornerOrKOrLiesBetween) {
+  LensCurve lens = wandering_lens();
+  const double s = std::log(3000.0);
+  const Camera<double> on = lens.camera_at(s);
+  const double eps = 0.01;
+  for (const double hold : {0.0, 0.5, 1.0}) {
+    lens.hold() = hold;
+    const Camera<double> off = lens.camera_at(s, eps);
+    EXPECT_NEAR(std::log(off.focal_length / on.focal_length), eps, 1e-12);
+    EXPECT_NEAR(std::log(off.radial_distortion / on.radial_distortion), 2 * hold * eps, 1e-12);
+    EXPECT_EQ(lens.camera_at(s).radial_distortion, on.radial_distortion) << hold;
+  }
+  // With the corner kept, its distortion in pixels is the same.
+  const Camera<double> off = lens.camera_at(s, eps);
+  EXPECT_NEAR(off.radial_distortion / off.distortion_of_corner(),
+              on.radial_distortion / on.distortion_of_corner(), 1e-12);
+}
+
 TEST(LensCurve, TheLensOfAFocalLengthIsThatOfItsPosition) {
   const LensCurve lens = wandering_lens();
   for (double s = std::log(900.0); s < std::log(22000.0); s += 0.07) {

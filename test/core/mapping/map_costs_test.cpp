@@ -64,18 +64,20 @@ TEST(MapCosts, WhatIsSeenHasTheNumericJacobians) {
     seen.sigma_px = 0.2;
     const internal::SeenCost cost(&picture, &lens, &d, seen);
     using Block = Eigen::Vector4d;
-    std::array<Block, 6> values;
+    std::array<Block, 7> values;
     const auto vary = [&](double a, double b, double c, double e) {
       return Block(a * normal(random), b * normal(random), c * normal(random), e * normal(random));
     };
     values[0] = vary(10 / f, 10 / f, 0.02, 0.01);
     values[1] = vary(10 / f, 10 / f, 0, 0);
     for (std::size_t i = 2; i < 6; ++i) values.at(i) = vary(0.01, 0.03, 5, 5);
-    std::array<Block, 6> steps;
+    values[6] = vary(1, 0, 0, 0);
+    std::array<Block, 7> steps;
     steps[0] = Block(1 / f, 1 / f, 1e-3, 1e-3);
     steps[1] = Block::Constant(1 / f);
     for (std::size_t i = 2; i < 6; ++i) steps.at(i) = Block(1e-3, 1e-3, 1, 1);
-    expect_jacobians<2, 4, 6>(cost, values, steps, 5e-14 * f + 1e-10);
+    steps[6] = Block::Constant(1e-1);
+    expect_jacobians<2, 4, 7>(cost, values, steps, 5e-14 * f + 1e-10);
   }
 }
 
@@ -114,6 +116,8 @@ TEST(MapCosts, TheLensesPriorsHaveTheNumericJacobians) {
   expect_jacobians<4, 4, 1>(internal::LensLevelCost({0.01, 0, 1, 1}, sigma), {x}, {step}, 1e-12);
   expect_jacobians<4, 4, 3>(internal::LensBendCost(sigma), {x, 2 * x, -x}, {step, step, step},
                             1e-12);
+  expect_jacobians<1, 1, 1>(internal::HoldPriorCost(0.5, 0.3), {Matrix<double, 1, 1>(0.9)},
+                            {Matrix<double, 1, 1>(1e-1)}, 1e-12);
 }
 
 }  // namespace

@@ -25,6 +25,7 @@ inline SceneMap random_scene_map(std::uint64_t seed, int keyframes, int landmark
     map.lens.control_point(i) << 0.01 * normal(random), 0.02 * normal(random), 5 * normal(random),
         5 * normal(random);
   }
+  map.lens.hold() = part(random);
   map.line_delay = -30e-6;
   map.reference_row = 360;
   map.mechanics.emplace();

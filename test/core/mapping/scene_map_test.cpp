@@ -28,6 +28,7 @@ TEST(SceneMap, ALensIsTheSameOfItsKnotsAndControlPoints) {
   LensCurve again(lens.width(), lens.height(), lens.aspect(), knots);
   ASSERT_EQ(again.control_points(), lens.control_points());
   for (int i = 0; i < lens.control_points(); ++i) again.control_point(i) = lens.control_point(i);
+  again.hold() = lens.hold();
   for (double s = 6.9; s < 9.5; s += 0.0137) {
     const Camera<double> a = lens.camera_at(s, 1e-3), b = again.camera_at(s, 1e-3);
     EXPECT_EQ(a.focal_length, b.focal_length);
@@ -80,6 +81,8 @@ TEST(SceneMap, EachNumberOutOfRangeIsNamed) {
        }},
       {"the lens has", [](SceneMap* m) { m->lens.control_point(2)[1] = kNotANumber; }},
       {"the lens has", [](SceneMap* m) { m->lens.control_point(2)[0] = 2; }},
+      {"hold", [](SceneMap* m) { m->lens.hold() = kNotANumber; }},
+      {"hold", [](SceneMap* m) { m->lens.hold() = -11; }},
       {"line delay", [](SceneMap* m) { m->line_delay = kInfinite; }},
       {"row", [](SceneMap* m) { m->reference_row = kNotANumber; }},
       {"axis", [](SceneMap* m) { m->mechanics->tilt_axis *= 1.1; }},
