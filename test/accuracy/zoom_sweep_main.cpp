@@ -1,13 +1,14 @@
 // alidade_zoom_sweep: OE mode while the lens zooms, against truth: 1280x720, 20x from 1200 to 24,000 px, line delay -14.2 us, noise of
 // 2 grey levels, JPEG of quality 85, telemetry of 50 urad; at rest, a sweep, at rest, back.
 //   alidade_zoom_sweep [--seed N] [--factor 10] [--sweep 5] [--stop-every FACTOR] [--from 1200] [--fault none|stuck|late|coarse] [--cache DIR]
-//                      [--exact-curve] [--details]
+//                      [--exact-curve] [--details] [--compare N]
 // Exit status: 0 no frame is beyond 5 sigmas, 1 some are, 2 wrong usage.
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
 #include <cstdio>
 #include <ctime>
+#include <memory>
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 #include <string>
@@ -18,6 +19,7 @@
 #include "test/accuracy/kept_frames.h"
 #include "test/accuracy/rendered_recording.h"
 #include "test/accuracy/statistics.h"
+#include "test/accuracy/zoom_comparison.h"
 #include "test/simulator/parallel.h"
 #include "test/support/zooming_camera.h"
 
@@ -28,6 +30,9 @@ constexpr double kRepeatability = 2e-3;
 constexpr double kStop_s = 0.2;      // on the way
 constexpr double kStopping_s = 0.5;  // that the motor takes more for each
 constexpr int kSettling = 5;         // frames
+// Of what is compared: calibrations from end to end of the zoom, and frames from a keyframe to the next.
+constexpr int kNodes = 5;
+constexpr int kFramesBetweenKeyframes = 25;
 
 struct Options {
   std::uint64_t seed = 1;
@@ -40,6 +45,7 @@ struct Options {
   std::string fault = "none";
   bool exact_curve = false;
   bool details = false;
+  int compare = 0;    // each so many frames; 0: not
   std::string cache;  // folder
 };
 
@@ -163,6 +169,34 @@ struct Part {
   }
 };
 
+// Of one way to answer, on the frames that are compared.
+struct Answers {
+  std::vector<double> log_errors, rotations_rad, px;
+  int frames = 0;
+  void add(const ZoomingCamera& camera, int k, const std::optional<ZoomAnswer>& answer) {
+    ++frames;
+    if (!answer) return;
+    const ZoomAnswerErrors e = errors_of(camera, k, *answer);
+    log_errors.push_back(e.log_focal_length);
+    rotations_rad.push_back(e.rotation_rad);
+    px.push_back(e.px);
+  }
+  void print(const char* name) const {
+    if (px.empty()) {
+      std::printf("%-32s none of %d\n", name, frames);
+      return;
+    }
+    std::vector<double> sizes = log_errors;
+    for (double& size : sizes) size = std::abs(size);
+    std::printf(
+        "%-32s %3zu of %3d frames, log f %.1e rms (median %.1e), rotation %.1e rad rms (median "
+        "%.1e), pixels' directions %.2f px rms (median %.2f, worst %.2f)\n",
+        name, px.size(), frames, root_mean_square(log_errors), median(sizes),
+        root_mean_square(rotations_rad), median(rotations_rad), root_mean_square(px), median(px),
+        largest(px));
+  }
+};
+
 int run(const Options& options) {
   const simulator::Config config = camera_of(options);
   ZoomingCamera camera(config, std::make_unique<ZoomedPath>(config, options.fields, 4),
@@ -179,6 +213,13 @@ int run(const Options& options) {
   calibration.mechanics.pan_axis.normalize();
   calibration.mechanics.tilt_axis.normalize();
   oe.reset(calibration, FocalLength::kLearnt);
+  std::unique_ptr<KeyframeHomographies> keyframes;
+  std::unique_ptr<NearestNodes> nodes;
+  if (options.compare > 0) {
+    keyframes = std::make_unique<KeyframeHomographies>(camera, film, kFramesBetweenKeyframes);
+    nodes = std::make_unique<NearestNodes>(camera, 1200, 24000, kNodes, calibration.mechanics);
+  }
+  Answers ours, nearest_node, nearest_keyframe;
   Part rest, moving, after;
   int since_movement = 1000;
   double worst = 0;
@@ -222,6 +263,11 @@ int run(const Options& options) {
     worst = std::max({worst, e.sigmas, e.log_sigmas});
     Part& part = moves ? moving : since_movement <= 25 ? after : rest;
     ++part.frames;
+    if (options.compare > 0 && moves && k % options.compare == 0 && !keyframes->is_keyframe(k)) {
+      ours.add(camera, k, answer_of(frame));
+      nearest_node.add(camera, k, nodes->answer(k, telemetry));
+      nearest_keyframe.add(camera, k, keyframes->answer(k));
+    }
     if (frame.mode != OrientationMode::kOe) continue;
     ++part.oe;
     part.rms_px.push_back(e.rms_px);
@@ -237,6 +283,12 @@ int run(const Options& options) {
   rest.print("at rest");
   moving.print("moving");
   after.print("1 s after");
+  if (options.compare > 0) {
+    std::printf("moving, compared:\n");
+    ours.print("OE mode");
+    nearest_node.print("nearest calibration, telemetry");
+    nearest_keyframe.print("homography to nearest keyframe");
+  }
   return worst > 5 ? 1 : 0;
 }
 
@@ -262,6 +314,10 @@ int main(int argc, char** argv) {
   app.add_option("--cache", options.cache, "folder where the rendered film is kept");
   app.add_flag("--exact-curve", options.exact_curve,
                "distortion and optical centre are told as they are");
+  app.add_option("--compare", options.compare,
+                 "each so many frames, others' ways beside OE mode: a calibration at each of five "
+                 "zooms, and the homography to the nearest keyframe")
+      ->check(CLI::Range(1, 1000));
   app.add_flag("--details", options.details, "a line a frame");
   try {
     app.parse(argc, argv);

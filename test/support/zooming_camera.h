@@ -19,6 +19,7 @@
 
 #include "core/model/trigonometry.h"
 #include "core/realtime/frame_orientation.h"
+#include "core/realtime/image/image_view.h"
 #include "core/realtime/oe_mode/frame_lens.h"
 #include "core/realtime/telemetry/telemetry_interpolation.h"
 #include "test/simulator/renderer.h"
@@ -120,6 +121,7 @@ class ZoomingCamera {
   [[nodiscard]] double middle_s(int k) const {
     return time_s(k) + config_.camera.line_delay * config_.image.height / 2;
   }
+  [[nodiscard]] double line_delay() const { return config_.camera.line_delay; }
   [[nodiscard]] std::vector<std::uint8_t> image(int k) const {
     return renderer_.render(time_s(k), k);
   }
