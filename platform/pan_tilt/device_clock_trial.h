@@ -32,12 +32,11 @@ class DeviceClockTrial {
       const double advance_s = *device_time_s - last_device_s_;
       const double ahead_s = (*device_time_s - first_device_s_) - (host_time_s - first_host_s_);
       changes_ += advance_s > 0 ? 1 : 0;
-      if (advance_s < 0 || std::abs(ahead_s) > kSlack_s) {
-        verdict_ = Verdict::kUseless;
-      } else if (changes_ >= kChanges) {
-        verdict_ = fine_ ? Verdict::kUseful : Verdict::kUseless;
-      } else if (answers_ >= kAnswers && host_time_s - first_host_s_ > kPatience_s) {
-        verdict_ = Verdict::kUseless;
+      const bool contradicts = advance_s < 0 || std::abs(ahead_s) > kSlack_s;
+      const bool tells = changes_ >= kChanges;
+      const bool stands = answers_ >= kAnswers && host_time_s - first_host_s_ > kPatience_s;
+      if (contradicts || tells || stands) {
+        verdict_ = !contradicts && tells && fine_ ? Verdict::kUseful : Verdict::kUseless;
       }
     }
     last_device_s_ = *device_time_s;

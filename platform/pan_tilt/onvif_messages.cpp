@@ -127,7 +127,7 @@ pugi::xml_node load_body(std::string_view bytes, pugi::xml_document* document) {
   if (!document->load_buffer(bytes.data(), bytes.size())) {
     return {};
   }
-  return descendant(*document, {"Envelope", "Body"});
+  return descendant(document->root(), {"Envelope", "Body"});
 }
 
 // The element that answers `call`; a null node with *error if it is not there.

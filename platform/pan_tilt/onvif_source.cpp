@@ -206,7 +206,8 @@ HttpConversation::Outcome OnvifConversation::take_status(const HttpAnswer& answe
 
 HttpPollingPlan plan_of(const OnvifSourceOptions& given) {
   HttpPollingPlan plan;
-  static_cast<HttpDeviceOptions&>(plan.options) = given;
+  const HttpDeviceOptions& of_any_device = given;
+  static_cast<HttpDeviceOptions&>(plan.options) = of_any_device;
   plan.options.max_body = kMaxBody;
   plan.options.expected = "an ONVIF answer";
   Url url;

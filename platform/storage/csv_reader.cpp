@@ -96,7 +96,8 @@ bool parse_csv(std::istream& text, const std::string& name, const std::vector<Cs
   for (bool cut_off = false; next_line(text, &line, &cut_off);) {
     ++number;
     const auto malformed = [&](const std::string& what) {
-      *error = name + ":" + std::to_string(number) + ": " + what + "; the columns are " + expected;
+      *error = name + ":" + std::to_string(number) + ": ";
+      *error += what + "; the columns are " + expected;
       return false;
     };
     if (cut_off) {

@@ -50,7 +50,7 @@ int read_description(void* opaque, std::uint8_t* data, int capacity) {
   auto* from = static_cast<Text*>(opaque);
   const std::size_t count =
       std::min(from->text.size() - from->read, static_cast<std::size_t>(capacity));
-  std::memcpy(data, from->text.data() + from->read, count);
+  std::copy_n(from->text.data() + from->read, count, data);
   from->read += count;
   return count == 0 ? AVERROR_EOF : static_cast<int>(count);
 }

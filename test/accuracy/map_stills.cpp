@@ -2,6 +2,7 @@
 
 #include <Eigen/Cholesky>
 #include <Eigen/Geometry>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <ctime>
@@ -11,6 +12,7 @@
 
 #include "core/mapping/map_adjustment.h"
 #include "core/model/mechanics.h"
+#include "test/accuracy/homography_chain.h"
 #include "test/accuracy/statistics.h"
 #include "test/accuracy/table.h"
 #include "test/simulator/lens.h"
@@ -171,9 +173,26 @@ struct Variant {
   bool centre_in_middle = false;
   bool no_distortion = false;
   bool no_telemetry = false;
+  bool homographies = false;  // no adjustment: from one picture to the next
 };
 
+// From the middle of the widest pictures, which is told where it looks, and its true focal length.
+MapAdjustment chain(const Stills& stills) {
+  constexpr int kRoot = kRows * (kColumns / 2) + kRows / 2;
+  const TruePicture& truth = stills.pictures[kRoot];
+  AdjustedPicture known;
+  known.R_base_from_camera = truth.R;
+  known.camera = {truth.lens.focal_length, 1, 0, kWidth, kHeight};
+  std::vector<char> reached;
+  MapAdjustment out;
+  out.pictures = chain_homographies(stills.evidence, kRoot, known, &reached);
+  const bool all = std::find(reached.begin(), reached.end(), 0) == reached.end();
+  out.status = all ? MapStatus::kOk : MapStatus::kNotConnected;
+  return out;
+}
+
 MapAdjustment adjust_variant(const Stills& stills, const Variant& variant) {
+  if (variant.homographies) return chain(stills);
   constexpr double kHeld = 1e-7;
   MapOptions options;
   options.lens = LensCurve({kWide_px, 1, 0, kWidth, kHeight}, stills.first_position,
@@ -314,7 +333,7 @@ void add_run(const Stills& stills, const Variant& variant, VariantResult* out, s
     level.pixels.push_back(errors.pixels_px);
     level.rotation.push_back(errors.rotation_px);
   }
-  if (!variant.no_telemetry) {
+  if (!variant.no_telemetry && !variant.homographies) {
     out->anees.push_back(joint_square(stills.pictures, found) /
                          (4 * static_cast<double>(stills.pictures.size())));
   }
@@ -390,7 +409,8 @@ std::vector<std::string> run_map_stills(const MapStillsOptions& options, std::os
       {"one lens as curves, without telemetry", false, false, false, true},
       {"free focal lengths", true},
       {"free focal lengths, optical centre in the middle", true, true},
-      {"free focal lengths, optical centre in the middle, no distortion", true, true, true}};
+      {"free focal lengths, optical centre in the middle, no distortion", true, true, true},
+      {"homographies from picture to picture, no adjustment", false, false, false, false, true}};
   if (options.alone) variants.resize(1);
   std::vector<VariantResult> results(variants.size());
   int pictures = 0;

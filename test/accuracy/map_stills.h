@@ -1,6 +1,6 @@
 #pragma once
 // The bundle adjustment of a map (core/mapping/map_adjustment.h) on simulated stills: how accurate and how honest it is at each zoom,
-// beside the same with less knowledge of the lens.
+// beside the same with less knowledge of the lens, and beside homographies from picture to picture (homography_chain.h).
 //   scene      directions about the camera, each with a size; a picture sees those of 1.5 to 12 px, half of the time
 //   pictures   5 levels of f, 1200 to 24,000 px, each about the middle of the wider one; half of their field from one to the next
 //   lens       the virtual camera's curves (test/simulator/zoom_curve.h), optical centre off and wandering, f of each picture off

@@ -53,7 +53,7 @@ inline AdjustmentProblem make_adjustment_problem(Simulation simulation, double k
   const Vector2<double> sigma = Vector2<double>::Constant(simulation.pan_tilt_sigma);
   for (const auto& sample : input.telemetry) {
     problem.data.telemetry.push_back(
-        {sample.stamp_s, Vector2<double>(sample.pan_rad, sample.tilt_rad), sigma, {true}});
+        {sample.stamp_s, Vector2<double>(sample.pan_rad, sample.tilt_rad), sigma, {true, true}});
   }
   internal::unwrap(&problem.data.telemetry);
   auto& telemetry = problem.data.telemetry;

@@ -61,7 +61,8 @@ class DirectionManifold final : public ceres::Manifold {
 
 // The parameter blocks that are no control points and no landmarks.
 struct Blocks {
-  Vector2<double> lens;  // log f, distortion
+  Vector2<double> lens;    // log f, distortion
+  Vector2<double> centre;  // px, from the image's middle
   double log_aspect = 0;
   Vector2<double> timing;  // read-out time, shift
   double drift = 0;
@@ -82,6 +83,7 @@ class Shared final : public ceres::EvaluationCallback {
     camera = state_.camera;
     camera.focal_length = std::exp(blocks_.lens[0]);
     camera.aspect = std::exp(blocks_.log_aspect);
+    camera.set_centre_offset(blocks_.centre);
     distortion_unit = camera.distortion_of_corner();
     camera.radial_distortion = blocks_.lens[1] * distortion_unit;
     line_delay = blocks_.timing[0] / camera.height;
@@ -150,8 +152,8 @@ struct Motion {
   }
 };
 
-// Parameters: four control points, lens, timing, pan axis, tilt axis, aspect, landmark.
-class ObservationCost final : public ceres::SizedCostFunction<2, 2, 2, 2, 2, 2, 2, 3, 3, 1, 3> {
+// Parameters: four control points, lens, timing, pan axis, tilt axis, aspect, landmark, centre.
+class ObservationCost final : public ceres::SizedCostFunction<2, 2, 2, 2, 2, 2, 2, 3, 3, 1, 3, 2> {
  public:
   ObservationCost(const AdjustmentObservation& observation, double frame_time_s,
                   const Segment& segment, const Shared& shared, ObservationRow row,
@@ -225,6 +227,9 @@ class ObservationCost final : public ceres::SizedCostFunction<2, 2, 2, 2, 2, 2, 
     }
     if (jacobians[9] != nullptr) {
       write<3>(whiten * J_u_anchor, jacobians[9]);
+    }
+    if (jacobians[10] != nullptr) {
+      write<2>(whiten * J.J_u_camera.rightCols<2>(), jacobians[10]);
     }
     return true;
   }
@@ -341,8 +346,8 @@ class TelemetryCost final : public ceres::SizedCostFunction<2, 2, 2, 2, 2, 1, 1,
   const Segment& segment_;
 };
 
-// Parameters: lens, timing, pan axis, tilt axis, aspect, pan scale, tilt scale, drift.
-class PriorCost final : public ceres::SizedCostFunction<kGlobalCount, 2, 2, 3, 3, 1, 1, 1, 1> {
+// Parameters: lens, timing, pan axis, tilt axis, aspect, pan scale, tilt scale, drift, centre.
+class PriorCost final : public ceres::SizedCostFunction<kGlobalCount, 2, 2, 3, 3, 1, 1, 1, 1, 2> {
  public:
   explicit PriorCost(const AdjustmentPriors& priors)
       : mean_(priors.mean), root_(priors.information.cwiseSqrt()) {}
@@ -354,7 +359,7 @@ class PriorCost final : public ceres::SizedCostFunction<kGlobalCount, 2, 2, 3, 3
     const double stretch = std::exp(2 * (parameters[0][0] - std::log(mean_.camera.focal_length)));
     e[index(Parameter::kFocalLength)] = std::log(mean_.camera.focal_length) - parameters[0][0];
     e[index(Parameter::kRadialDistortion)] = mean_.distortion - parameters[0][1] * stretch;
-    e.segment<2>(index(Parameter::kCentreU)).setZero();  // exact in what is compared
+    e.segment<2>(index(Parameter::kCentreU)) = mean_.camera.centre_offset() - Map2(parameters[8]);
     e[index(Parameter::kLineDelay)] = mean_.readout_s - parameters[1][0];
     e[index(Parameter::kClockOffset)] = mean_.shift_s - parameters[1][1];
     Matrix<double, 2, 3> J_axis[2];
@@ -373,7 +378,7 @@ class PriorCost final : public ceres::SizedCostFunction<kGlobalCount, 2, 2, 3, 3
       const int columns = parameter_block_sizes()[static_cast<std::size_t>(block)];
       jacobians[block][row * columns + column] = root_[row] * value;
     };
-    for (int block = 0; block < 8; ++block) {
+    for (int block = 0; block < 9; ++block) {
       if (jacobians[block] == nullptr) continue;
       const int columns = parameter_block_sizes()[static_cast<std::size_t>(block)];
       std::fill_n(jacobians[block], kGlobalCount * columns, 0.0);
@@ -403,8 +408,12 @@ class PriorCost final : public ceres::SizedCostFunction<kGlobalCount, 2, 2, 3, 3
         case 6:
           set(block, index(Parameter::kTiltScale), 0, -1);
           break;
-        default:
+        case 7:
           set(block, kDrift, 0, -1);
+          break;
+        default:
+          set(block, index(Parameter::kCentreU), 0, -1);
+          set(block, index(Parameter::kCentreV), 1, -1);
       }
     }
     return true;
@@ -423,6 +432,7 @@ struct CeresAdjustment::Implementation {
                  ObservationRow row, const AdjustmentState& start)
       : data(data_in), priors(priors_in), fixed(fixed_in), state(start), shared(state, blocks) {
     blocks.lens << std::log(state.camera.focal_length), state.distortion;
+    blocks.centre = state.camera.centre_offset();
     blocks.log_aspect = std::log(state.camera.aspect);
     blocks.timing << state.readout_s, state.shift_s;
     blocks.drift = state.drift;
@@ -448,7 +458,7 @@ struct CeresAdjustment::Implementation {
     problem->AddResidualBlock(new PriorCost(priors), nullptr, blocks.lens.data(),
                               blocks.timing.data(), blocks.pan_axis.data(), blocks.tilt_axis.data(),
                               &blocks.log_aspect, &blocks.pan_scale, &blocks.tilt_scale,
-                              &blocks.drift);
+                              &blocks.drift, blocks.centre.data());
     set_manifolds();
   }
 
@@ -468,7 +478,8 @@ struct CeresAdjustment::Implementation {
           new ObservationCost(o, frame_time, segment(hint), shared, row, pixel_loss != nullptr),
           pixel_loss.get(), point(hint), point(hint + 1), point(hint + 2), point(hint + 3),
           blocks.lens.data(), blocks.timing.data(), blocks.pan_axis.data(), blocks.tilt_axis.data(),
-          &blocks.log_aspect, state.landmarks[static_cast<std::size_t>(o.landmark)].data());
+          &blocks.log_aspect, state.landmarks[static_cast<std::size_t>(o.landmark)].data(),
+          blocks.centre.data());
     }
   }
 
@@ -512,6 +523,7 @@ struct CeresAdjustment::Implementation {
       }
     };
     set_pair(blocks.lens.data(), Parameter::kFocalLength, Parameter::kRadialDistortion);
+    set_pair(blocks.centre.data(), Parameter::kCentreU, Parameter::kCentreV);
     set_pair(blocks.timing.data(), Parameter::kLineDelay, Parameter::kClockOffset);
     const auto set_single = [&](double* block, int i) {
       if (fixed[static_cast<std::size_t>(i)]) problem->SetParameterBlockConstant(block);
@@ -526,6 +538,7 @@ struct CeresAdjustment::Implementation {
     state.camera.focal_length = std::exp(blocks.lens[0]);
     state.distortion = blocks.lens[1];
     state.camera.aspect = std::exp(blocks.log_aspect);
+    state.camera.set_centre_offset(blocks.centre);
     state.readout_s = blocks.timing[0];
     state.shift_s = blocks.timing[1];
     state.drift = blocks.drift;
@@ -541,6 +554,7 @@ struct CeresAdjustment::Implementation {
     std::vector<GlobalBlock> all = {
         {blocks.lens.data(), {index(Parameter::kFocalLength), index(Parameter::kRadialDistortion)}},
         {&blocks.log_aspect, {index(Parameter::kAspect)}},
+        {blocks.centre.data(), {index(Parameter::kCentreU), index(Parameter::kCentreV)}},
         {blocks.timing.data(), {index(Parameter::kLineDelay), index(Parameter::kClockOffset)}},
         {blocks.pan_axis.data(), {index(Parameter::kPanAxis0), index(Parameter::kPanAxis1)}},
         {blocks.tilt_axis.data(), {index(Parameter::kTiltAxis0), index(Parameter::kTiltAxis1)}},
@@ -606,9 +620,9 @@ ceres::Solver::Summary CeresAdjustment::solve(ceres::Solver::Options options) {
   for (int i = 0; i < in.state.trajectory.control_points(); ++i) {
     if (in.problem->HasParameterBlock(in.point(i))) ordering->AddElementToGroup(in.point(i), 1);
   }
-  for (double* block : {in.blocks.lens.data(), &in.blocks.log_aspect, in.blocks.timing.data(),
-                        &in.blocks.drift, in.blocks.pan_axis.data(), in.blocks.tilt_axis.data(),
-                        &in.blocks.pan_scale, &in.blocks.tilt_scale}) {
+  for (double* block : {in.blocks.lens.data(), in.blocks.centre.data(), &in.blocks.log_aspect,
+                        in.blocks.timing.data(), &in.blocks.drift, in.blocks.pan_axis.data(),
+                        in.blocks.tilt_axis.data(), &in.blocks.pan_scale, &in.blocks.tilt_scale}) {
     ordering->AddElementToGroup(block, 1);
   }
   options.linear_solver_ordering = ordering;

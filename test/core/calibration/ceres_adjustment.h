@@ -2,9 +2,9 @@
 // The adjustment of core/calibration/adjustment.h a second time, by Ceres: the yardstick of its minimum, its
 // covariance and its speed. Same residuals, priors, losses and parameters; directions are ceres::Manifolds.
 // Analytic cost functions; everything that observations share is computed once for each point. Every
-// block that a landmark meets has two local parameters, (log f, distortion), (read-out time, shift), an axis, a
+// block that a landmark meets has two local parameters, (log f, distortion), the optical centre, (read-out time, shift), an axis, a
 // control point, so that the Schur complement runs in Ceres's code for the sizes 2, 2, 2 as long as
-// the aspect is fixed. (All of them in one block of eight would be an eighth faster.)
+// the aspect is fixed. (All of them in one block would be an eighth faster.)
 // Row of an observation: kObserved is the residual of adjustment.h, one Newton step from the observed row, with A held
 // in its derivative. kProjected takes a second step: the full projection, whose Jacobian is exact.
 // Ceres wants to know beforehand which control points a residual meets: a residual that leaves its segment goes

@@ -148,6 +148,7 @@ class Model {
     Eigen::Matrix<S, kGlobalCount, 1> e;
     e << log(f / camera_.focal_length), log(mean.camera.aspect / camera_.aspect),
         mean.distortion - camera_.radial_distortion * (R * R / (f * f)),
+        mean.camera.centre_u - camera_.centre_u, mean.camera.centre_v - camera_.centre_v,
         mean.readout_s - line_delay_ * S(state_.camera.height),
         -direction_minus<S>(mechanics_.pan_axis, mean.mechanics.pan_axis.cast<S>()),
         -direction_minus<S>(mechanics_.tilt_axis, mean.mechanics.tilt_axis.cast<S>()),
@@ -212,7 +213,7 @@ std::vector<Ugly> ugly_scenes() {
 AdjustmentProblem make_ugly_problem(const Ugly& ugly) {
   AdjustmentProblem problem;
   AdjustmentState& s = problem.start;
-  s.camera = {ugly.focal_length, ugly.aspect, 0, 1920, 1080};
+  s.camera = {ugly.focal_length, ugly.aspect, 0, 1920, 1080, 14, -9};
   s.distortion = ugly.distortion;
   s.readout_s = ugly.readout_s;
   s.mechanics.pan_axis = Vector3<double>(0.03, -0.01, 1).normalized();
@@ -271,7 +272,7 @@ AdjustmentProblem make_ugly_problem(const Ugly& ugly) {
                               {wrap_angle(s.mechanics.pan_scale * p.pan + noise),
                                wrap_angle(s.mechanics.tilt_scale * p.tilt - noise)},
                               {1e-4, 2e-4},
-                              {true}});
+                              {true, true}});
   }
   // Priors that pull.
   AdjustmentState& mean = problem.priors.mean;
@@ -279,6 +280,7 @@ AdjustmentProblem make_ugly_problem(const Ugly& ugly) {
   mean.camera.focal_length *= 1.05;
   mean.camera.aspect *= 0.97;
   mean.distortion += 0.05;
+  mean.camera.set_centre_offset({-3, 20});
   mean.readout_s += 0.01;
   mean.mechanics.pan_axis = direction_plus(s.mechanics.pan_axis, Vector2<double>(0.05, -0.1));
   mean.mechanics.tilt_axis = direction_plus(s.mechanics.tilt_axis, Vector2<double>(-0.07, 0.03));
@@ -468,6 +470,7 @@ internal::GlobalVector difference(const AdjustmentState& a, const AdjustmentStat
   internal::GlobalVector d;
   d << std::log(b.camera.focal_length / a.camera.focal_length),
       std::log(b.camera.aspect / a.camera.aspect), b.distortion - a.distortion,
+      b.camera.centre_u - a.camera.centre_u, b.camera.centre_v - a.camera.centre_v,
       b.readout_s - a.readout_s,
       direction_minus<double>(b.mechanics.pan_axis, a.mechanics.pan_axis),
       direction_minus<double>(b.mechanics.tilt_axis, a.mechanics.tilt_axis),

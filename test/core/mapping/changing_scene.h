@@ -5,13 +5,16 @@
 //   light        the sun turns once a day: descriptors change, blobs move by a part of a pixel, some things are there for hours only
 //   cars         groups of things that stand for hours in one half of a view
 //   trees        things in the right half that sway together, slowly; with `bare` nothing lasting stands there
-//   shadows      things that wander by pixels in a minute
+//   shadows      things that wander by pixels in a minute, each day the same way, further along it with the season
+//   season       the sun of an hour comes earlier from day to day
 //   fog          hours in which next to nothing is seen
 // What is matched with the map is found by descriptors near the place where telemetry looks for it; poses are find_pose()'s.
 
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <functional>
 #include <map>
 #include <optional>
 #include <random>
@@ -31,9 +34,11 @@ struct ChangingSceneOptions {
   int views = 22;         // of a visit, a second apart
   int things = 110;       // in a view
   double replaced = 0.4;
-  double light = 1;      // 0: none
-  int cars = 2;          // groups of 20 at a time in a view
-  double shadows = 0.1;  // share of things that wander
+  double light = 1;         // 0: none
+  int cars = 2;             // groups of 20 at a time in a view
+  double shadows = 0.1;     // share of things that wander
+  double season_px = 0;     // that shadows fall further along their way, in 30 days
+  double season_hours = 0;  // by which the light of an hour comes earlier, likewise
   bool fog = true;
   int trees = 0;      // things in a view
   bool bare = false;  // the right 60 % of each view hold trees and nothing else
@@ -216,8 +221,13 @@ class ChangingScene {
   }
 
   [[nodiscard]] double hour(double t_s) const { return std::fmod(t_s / 3600, 24.0); }
+  // In units of 30 days.
+  [[nodiscard]] static double season(double t_s) { return t_s / (30 * kDay_s); }
+  [[nodiscard]] double light_hour(double t_s) const {
+    return hour(t_s) + options_.season_hours * season(t_s);
+  }
   [[nodiscard]] bool lit(const Thing& thing, double t_s) const {
-    return std::fmod(hour(t_s) - thing.lit_from + 24, 24.0) <= thing.lit_hours;
+    return std::fmod(light_hour(t_s) - thing.lit_from + 48, 24.0) <= thing.lit_hours;
   }
   [[nodiscard]] bool in_fog(double t_s) const {
     return std::any_of(fog_from_s_.begin(), fog_from_s_.end(),
@@ -228,15 +238,16 @@ class ChangingScene {
     return options_.light * weather_[static_cast<std::size_t>(day)];
   }
   [[nodiscard]] Eigen::Vector3d direction_of(const Thing& thing, double t_s) const {
-    // A shadow comes back each day; light shifts a blob by up to a twentieth of its scale.
-    const double wandered = thing.wander_px_per_s * std::fmod(t_s, kDay_s);
-    const double shifted =
-        0.05 * thing.scale_px * options_.light * std::cos(2 * kPi * hour(t_s) / 24 + thing.phase);
+    // Light shifts a blob by up to a twentieth of its scale.
+    const double seasonal = thing.wander_px_per_s != 0 ? options_.season_px * season(t_s) : 0;
+    const double wandered = thing.wander_px_per_s * std::fmod(t_s, kDay_s) + seasonal;
+    const double shifted = 0.05 * thing.scale_px * options_.light *
+                           std::cos(2 * kPi * light_hour(t_s) / 24 + thing.phase);
     const double swayed = thing.sway_px * std::sin(2 * kPi * t_s / 9000);
     return (thing.d + (wandered + shifted + swayed) / kFocalLength * thing.wander_to).normalized();
   }
   [[nodiscard]] Descriptor descriptor_of(const Thing& thing, double t_s) {
-    const double angle = 2 * kPi * hour(t_s) / 24, amount = light_at(t_s);
+    const double angle = 2 * kPi * light_hour(t_s) / 24, amount = light_at(t_s);
     const auto c = static_cast<float>(amount * std::cos(angle));
     const auto s = static_cast<float>(amount * std::sin(angle));
     std::array<double, kDescriptorSize> x{};
@@ -320,6 +331,8 @@ struct SceneDay {
       0;  // largest of the places: the mean error of the day against that of the first day
   double sigma_px = 0;  // claimed: the pose's covariance with the common part of its landmarks
   int landmarks = 0;    // at the end
+  int candidates = 0;   // to become landmarks, the most
+  std::int64_t file_bytes = 0;  // at the end, where the map is kept in a file
   int born = 0, died = 0, not_close = 0;
   // Of each view, one after the other: rad, to the right and down in the picture; none: its pose was refused.
   std::vector<std::optional<Eigen::Vector2d>> errors;
@@ -328,6 +341,9 @@ struct SceneDay {
 struct SceneRunOptions {
   bool upkeep = true;
   UpkeepOptions options;
+  // Where the map is kept: called with the map as it begins and no change, then with each change before it is applied. The size of what is
+  // kept, bytes; none: it could not be kept, and that is the end.
+  std::function<std::optional<std::int64_t>(const SceneMap& map, const MapChange& change)> keep;
 };
 
 // Lives through all days; one row each.
@@ -344,6 +360,9 @@ inline std::vector<SceneDay> live_through(const ChangingSceneOptions& what,
   const double f = ChangingScene::kFocalLength;
   std::vector<SceneDay> days;
   std::vector<Eigen::Vector2d> first;
+  std::optional<std::int64_t> bytes = 0;
+  if (how.keep) bytes = how.keep(map, {});
+  if (!bytes) return {};
   const auto places = static_cast<std::size_t>(what.places);
   for (int day = 0; day < what.days; ++day) {
     SceneDay row;
@@ -402,6 +421,9 @@ inline std::vector<SceneDay> live_through(const ChangingSceneOptions& what,
           if (!how.upkeep) continue;
           UpkeepCounts counts;
           const MapChange change = upkeep.show(view, map, &counts);
+          row.candidates = std::max(row.candidates, upkeep.candidates());
+          if (how.keep) bytes = how.keep(map, change);
+          if (!bytes) return {};
           std::string error_text;
           if (!apply(change, &map, &error_text)) {
             std::fprintf(stderr, "%s\n", error_text.c_str());
@@ -426,6 +448,7 @@ inline std::vector<SceneDay> live_through(const ChangingSceneOptions& what,
       row.drift_px = std::max(row.drift_px, (mean - first[i]).norm());
     }
     row.landmarks = static_cast<int>(map.landmarks.size());
+    row.file_bytes = bytes.value_or(0);
     days.push_back(row);
   }
   return days;

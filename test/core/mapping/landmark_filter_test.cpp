@@ -249,5 +249,27 @@ TEST(LandmarkFilter, WithPosesFromTheLandmarksThemselvesItDoesNotBecomeSurerThan
   EXPECT_GT(believing.nees, 2 * kFiveSigmas);
 }
 
+// Where d_x passes d_y the basis turns by about 120 degrees. So coarse a sight hardly tells anything, but moves the landmark across.
+TEST(LandmarkFilter, ItsCovariancesStayWhereTheBasisJumps) {
+  const Vector3<double> across = Vector3<double>(1, -1, 0).normalized();
+  LandmarkState state;
+  state.d_b = (Vector3<double>(1, 1, 1.05).normalized() + 1e-8 * across).normalized();
+  state.covariance << 4e-8, 1e-8, 1e-8, 1e-8;
+  state.shared_covariance << 1e-8, 0, 0, 9e-8;
+  const Matrix<double, 3, 2> before = tangent_basis(state.d_b);
+  const Matrix3<double> own = before * state.covariance * before.transpose();
+  const Matrix3<double> shared = before * state.shared_covariance * before.transpose();
+  LandmarkSight sight;
+  sight.cov_detection = 1e-2 * Matrix2<double>::Identity();
+  sight.cov_of_pose.setZero();
+  sight.y = -0.1 * before.transpose() * across;
+  ASSERT_EQ(update_landmark(sight, Matrix2<double>::Zero(), 0, 4, &state), LandmarkUpdate::kOk);
+  const Matrix<double, 3, 2> after = tangent_basis(state.d_b);
+  ASSERT_GT((after - before).norm(), 1);
+  EXPECT_LT((after * state.covariance * after.transpose() - own).norm(), 1e-4 * own.norm());
+  EXPECT_LT((after * state.shared_covariance * after.transpose() - shared).norm(),
+            1e-4 * shared.norm());
+}
+
 }  // namespace
 }  // namespace alidade::test

@@ -97,6 +97,45 @@ TEST_F(LocalizerTest, UsesAHintAndSurvivesAWrongOne) {
   EXPECT_LT(off_px(despite, picture), 1);
 }
 
+// All that the map holds stands in it twice, as it may for two zooms.
+TEST_F(LocalizerTest, AThingIsNoRivalOfItself) {
+  SceneMap twice = *map_;
+  for (const SceneLandmark& landmark : map_->landmarks) {
+    twice.landmarks.push_back(landmark);
+    twice.landmarks.back().id = twice.next_landmark++;
+  }
+  PicturedScene scene = scene_of(1);
+  const FeatureSet features = scene.features(picture_at(0.1, -0.05, 1700), kFeatureNoise_px);
+  const Localization once = Localizer(*map_).find(features);
+  const Localization found = Localizer(twice).find(features);
+  ASSERT_EQ(once.status, LocalizationStatus::kOk);
+  ASSERT_EQ(found.status, LocalizationStatus::kOk);
+  EXPECT_GT(found.matches, 0.9 * once.matches);
+}
+
+// What the map does not know at a zoom no picture of that zoom knows.
+TEST_F(LocalizerTest, APoseIsNoBetterKnownThanTheMapAtItsZoom) {
+  constexpr double kWide = 1e-6, kNarrow = 4e-6;
+  SceneMap map = *map_;
+  for (SceneKeyframe& k : map.keyframes) {
+    k.covariance =
+        (map.camera_of(k).focal_length < 1800 ? kWide : kNarrow) * Matrix4<double>::Identity();
+  }
+  const Localizer localizer(map);
+  PicturedScene scene = scene_of(1);
+  for (const auto& [f, variance] : {std::pair(1600.0, kWide), std::pair(2100.0, kNarrow)}) {
+    const Localization found =
+        localizer.find(scene.features(picture_at(0.1, 0.05, f), kFeatureNoise_px));
+    ASSERT_EQ(found.status, LocalizationStatus::kOk);
+    const Matrix4<double> of_map = found.pose.covariance - found.covariance_in_map;
+    // Less than a tenth of log f from the nearest: at most 2e-4 of log f and 0.2 px more.
+    for (int i = 0; i < 4; ++i) {
+      EXPECT_GE(of_map(i, i), variance * (1 - 1e-9)) << f;
+      EXPECT_LE(of_map(i, i), variance + 4e-8) << f;
+    }
+  }
+}
+
 // Of 20 views of other scenes none is believed.
 TEST_F(LocalizerTest, RefusesAnotherPlace) {
   const Localizer localizer(*map_);

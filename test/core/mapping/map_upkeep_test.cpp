@@ -132,6 +132,18 @@ TEST_F(UpkeepTest, AThingThatIsMissingOnceBeginsAnew) {
   }
 }
 
+TEST_F(UpkeepTest, AThingThatFogHidesGoesOnAfterIt) {
+  const Vector2<double> thing(530, 333);
+  int i = 0;
+  for (; i < 10; ++i) show(grid(), {thing}, i);
+  for (; i < 15; ++i) {
+    show({1, 6, 19, 24}, {}, i);
+    ASSERT_TRUE(counts.all_hidden);
+  }
+  for (; i < 24; ++i) EXPECT_TRUE(show(grid(), {thing}, i).born.empty()) << i;
+  EXPECT_EQ(show(grid(), {thing}, i).born.size(), 1U);
+}
+
 TEST_F(UpkeepTest, AThingThatMovesIsNotBorn) {
   for (int i = 0; i < 60; ++i) {
     EXPECT_TRUE(show(grid(), {{300.0 + 3 * i, 333}}, i).born.empty()) << i;
@@ -313,6 +325,26 @@ TEST(SphereCell, CellsAreOfTheSizeThatWasAskedFor) {
   }
   // A step of a tenth in a random direction leaves a square in 2 x 0.0637 - 0.004 of all cases.
   EXPECT_NEAR(same, 0.877 * kPairs, 5 * std::sqrt(kPairs * 0.877 * 0.123) + 0.02 * kPairs);
+}
+
+TEST(SphereCell, ARingHasAsManyCellsAsItsAreaHolds) {
+  const double scale = 0.001, side = 20 * std::ldexp(1.0, std::ilogb(scale));
+  for (const int ring : {0, 1, 2, 5, 20, 60, 80}) {
+    const double from_pole = (ring + 0.5) * side;
+    std::set<std::uint64_t> cells;
+    constexpr int kLooks = 20'000;
+    for (int i = 0; i < kLooks; ++i) {
+      const double turn = 2 * kPi * i / kLooks;
+      cells.insert(sphere_cell({std::sin(from_pole) * std::cos(turn),
+                                std::sin(from_pole) * std::sin(turn), std::cos(from_pole)},
+                               scale, 20));
+    }
+    // In sides squared. The ring is curved: 1 - side^2 / 24 of its middle's length times its width.
+    const double area =
+        2 * kPi * (std::cos(ring * side) - std::cos((ring + 1) * side)) / (side * side);
+    EXPECT_LE(static_cast<double>(cells.size()), area * (1 + side * side)) << ring;
+    EXPECT_GT(static_cast<double>(cells.size() + 1), area) << ring;
+  }
 }
 
 TEST(LandmarkUpkeep, TwoDaysLeaveTheDirectionWhereItWas) {

@@ -280,7 +280,7 @@ TEST(Jet, RollingShutterJacobiansAreTheDerivatives) {
       }
     }
   }
-  EXPECT_EQ(checked + refused, 8 * 3 * 4 * 6 * 16);
+  EXPECT_EQ(checked + refused, 9 * 3 * 4 * 8 * 16);
   // Corners of the barrel cameras' margins that are out of the model at the reference row.
   EXPECT_LE(refused, 10);
 }
