@@ -97,7 +97,7 @@ bool parse_csv(std::istream& text, const std::string& name, const std::vector<Cs
     ++number;
     const auto malformed = [&](const std::string& what) {
       *error = name + ":" + std::to_string(number) + ": ";
-      *error += what + "; the columns are " + expected;
+      error->append(what).append("; the columns are ").append(expected);
       return false;
     };
     if (cut_off) {
