@@ -10,14 +10,10 @@ constexpr std::uint8_t kTilt = 0x53;
 constexpr std::uint8_t kZoom = 0x55;
 constexpr std::uint8_t kToAnswer = 0x08;  // an answer's opcode is its query's plus this
 
-std::uint8_t octet_at(std::string_view bytes, std::size_t i) {
-  return static_cast<std::uint8_t>(bytes[i]);
-}
-
 std::uint8_t sum_of(std::string_view frame) {
   unsigned sum = 0;
   for (std::size_t i = 1; i + 1 < kFrame; ++i) {
-    sum += octet_at(frame, i);
+    sum += byte_at(frame, i);
   }
   return static_cast<std::uint8_t>(sum);
 }
@@ -44,16 +40,16 @@ std::optional<PelcoDAnswer> find_pelco_d_answer(std::string_view bytes, int addr
   int other_address = 0;
   for (std::size_t i = 0; i + kFrame <= bytes.size(); ++i) {
     const std::string_view frame = bytes.substr(i, kFrame);
-    if (octet_at(frame, 0) != kSync || octet_at(frame, 3) != opcode) {
+    if (byte_at(frame, 0) != kSync || byte_at(frame, 3) != opcode) {
       continue;
     }
-    if (octet_at(frame, kFrame - 1) != sum_of(frame)) {
+    if (byte_at(frame, kFrame - 1) != sum_of(frame)) {
       wrong_sum = true;
-    } else if (octet_at(frame, 1) != address) {
-      other_address = octet_at(frame, 1);
+    } else if (byte_at(frame, 1) != address) {
+      other_address = byte_at(frame, 1);
     } else {
-      found = PelcoDAnswer{
-          static_cast<std::uint16_t>(octet_at(frame, 4) * 256 + octet_at(frame, 5)), i};
+      found =
+          PelcoDAnswer{static_cast<std::uint16_t>(byte_at(frame, 4) * 256 + byte_at(frame, 5)), i};
       i += kFrame - 1;
     }
   }

@@ -24,12 +24,18 @@
 // Angles are degrees as the device counts them; signs and zeros are QuerySource's.
 
 #include <cstddef>
+#include <cstdint>
 #include <string>
 #include <string_view>
 
 namespace alidade {
 
 constexpr std::size_t kMaxAnswer = 512;  // bytes
+
+// i < bytes.size().
+[[nodiscard]] inline std::uint8_t byte_at(std::string_view bytes, std::size_t i) {
+  return static_cast<std::uint8_t>(bytes[i]);
+}
 
 struct Query {
   std::string bytes;

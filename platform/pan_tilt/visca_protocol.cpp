@@ -17,10 +17,6 @@ constexpr std::string_view kBeginNumbering("\x01", 1);
 constexpr std::string_view kWrongNumber("\x0F\x01", 2);
 constexpr std::string_view kWrongMessage("\x0F\x02", 2);
 
-unsigned byte_at(std::string_view bytes, std::size_t i) {
-  return static_cast<std::uint8_t>(bytes[i]);
-}
-
 // Big endian, `count` bytes.
 std::uint32_t number_at(std::string_view bytes, std::size_t begin, std::size_t count) {
   std::uint32_t value = 0;

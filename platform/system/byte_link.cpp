@@ -18,14 +18,14 @@
 #include <cstring>
 #include <memory>
 
+#include "platform/system/clock.h"
 #include "platform/system/url.h"
 
 namespace alidade {
 namespace {
 
-constexpr std::size_t kChunk = 512;    // bytes
-constexpr double kLongestWait_s = 10;  // keeps the milliseconds of a wait within an int
-constexpr double kBitsPerByte = 10;    // start bit, 8 data bits, stop bit
+constexpr std::size_t kChunk = 512;  // bytes
+constexpr double kBitsPerByte = 10;  // start bit, 8 data bits, stop bit
 
 struct Speed {
   int baud;
@@ -237,9 +237,8 @@ LinkStatus ByteLink::finish_open(double timeout_s) {
 }
 
 LinkStatus ByteLink::wait(short events, double timeout_s) {
-  const double milliseconds = std::ceil(1e3 * std::clamp(timeout_s, 0.0, kLongestWait_s));
   std::array<pollfd, 2> waited = {{{stop_.get(), POLLIN, 0}, {line_.get(), events, 0}}};
-  const int ready = ::poll(waited.data(), waited.size(), static_cast<int>(milliseconds));
+  const int ready = ::poll(waited.data(), waited.size(), poll_milliseconds(timeout_s));
   if (ready > 0 && waited[0].revents != 0) {
     return LinkStatus::kStopped;
   }

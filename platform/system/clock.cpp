@@ -2,8 +2,13 @@
 
 #include <time.h>
 
+#include <algorithm>
+#include <cmath>
+
 namespace alidade {
 namespace {
+
+constexpr double kLongestWait_s = 10;  // keeps the milliseconds of a wait within an int
 
 double now_s(clockid_t clock) {
   timespec now{};
@@ -16,5 +21,9 @@ double now_s(clockid_t clock) {
 double monotonic_now_s() { return now_s(CLOCK_MONOTONIC); }
 
 double utc_now_s() { return now_s(CLOCK_REALTIME); }
+
+int poll_milliseconds(double seconds) {
+  return static_cast<int>(std::ceil(1e3 * std::clamp(seconds, 0.0, kLongestWait_s)));
+}
 
 }  // namespace alidade

@@ -7,4 +7,7 @@ namespace alidade {
 [[nodiscard]] double monotonic_now_s();
 [[nodiscard]] double utc_now_s();
 
+// What a wait of this length is for poll() and curl_multi_poll(): whole milliseconds, rounded up; from 0 to 10 s.
+[[nodiscard]] int poll_milliseconds(double seconds);
+
 }  // namespace alidade

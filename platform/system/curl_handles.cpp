@@ -1,13 +1,9 @@
 #include "platform/system/curl_handles.h"
 
-#include <algorithm>
-#include <cmath>
 #include <mutex>
 
 namespace alidade {
 namespace {
-
-constexpr double kLongestPoll_s = 10;  // keeps the milliseconds of a wait within an int
 
 void initialise_curl() {
   static std::once_flag initialised;
@@ -51,10 +47,6 @@ std::string login_error(CURL* easy, const std::string& user, long methods) {
   return std::string("the camera does not offer HTTP digest ") +
          ((methods & static_cast<long>(CURLAUTH_BASIC)) != 0 ? "or basic " : "") +
          "authentication (401)";
-}
-
-int poll_milliseconds(double seconds) {
-  return static_cast<int>(std::ceil(1e3 * std::clamp(seconds, 0.0, kLongestPoll_s)));
 }
 
 }  // namespace alidade

@@ -26,7 +26,4 @@ using CurlMultiPtr = std::unique_ptr<CURLM, CurlMultiCleanup>;
 // Why the answer was 401, for the person; methods as given above.
 [[nodiscard]] std::string login_error(CURL* easy, const std::string& user, long methods);
 
-// What a wait of this length is for curl_multi_poll: whole milliseconds, rounded up.
-[[nodiscard]] int poll_milliseconds(double seconds);
-
 }  // namespace alidade
