@@ -7,6 +7,8 @@
 #include <opencv2/calib3d.hpp>
 #include <optional>
 
+#include "test/accuracy/matched_homography.h"
+
 namespace alidade::test {
 namespace {
 
@@ -37,11 +39,7 @@ std::optional<Eigen::Matrix3d> homography(const Sights& a, const Sights& b) {
   }
   const cv::Mat H = cv::findHomography(of_b, of_a, cv::RANSAC, 3);
   if (H.empty()) return std::nullopt;
-  Eigen::Matrix3d out;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) out(row, column) = H.at<double>(row, column);
-  }
-  return out;
+  return as_matrix(H);
 }
 
 // False: no camera has such a homography.

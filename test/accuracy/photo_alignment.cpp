@@ -1,7 +1,7 @@
 // alidade_photo_alignment DIR...: patch alignment between neighbouring photos of a camera that turned in
 // place, against the homography that SIFT finds between them.
 //
-// Neighbours are photos that follow each other by name and overlap: at least kFewest features agree with
+// Neighbours are photos that follow each other by name and overlap: 25 features or more agree with
 // one homography. FAST corners of the first are looked for in the second from where the homography puts
 // them plus 1 px each way, with the homography's derivative as warp, as OE mode would with a known
 // camera. SIFT's own error (0.1 to 0.3 px) and what lens and parallax keep from being a homography
@@ -14,25 +14,24 @@
 #include <algorithm>
 #include <filesystem>
 #include <iostream>
-#include <opencv2/calib3d.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <optional>
 #include <vector>
 
 #include "core/realtime/image/fast_corners.h"
 #include "core/realtime/image/image_noise.h"
 #include "core/realtime/image/patch_alignment.h"
+#include "test/accuracy/matched_homography.h"
 
 namespace alidade::test {
 namespace {
 
-constexpr int kFewest = 25;
 constexpr double kBound = 0.3;  // px, of the median
 
 struct Photo {
   cv::Mat image;
-  std::vector<cv::KeyPoint> points;
-  cv::Mat descriptors;
+  PlacedFeatures features;
 
   [[nodiscard]] ImageView view() const {
     return {image.data, image.cols, image.rows, static_cast<std::ptrdiff_t>(image.step[0])};
@@ -43,34 +42,20 @@ Photo read_photo(const std::filesystem::path& file) {
   Photo photo;
   photo.image = cv::imread(file.string(), cv::IMREAD_GRAYSCALE);
   if (photo.image.empty()) throw std::runtime_error(file.string() + ": is no picture");
-  cv::SIFT::create()->detectAndCompute(photo.image, cv::noArray(), photo.points, photo.descriptors);
+  std::vector<cv::KeyPoint> points;
+  cv::SIFT::create()->detectAndCompute(photo.image, cv::noArray(), points,
+                                       photo.features.descriptors);
+  cv::KeyPoint::convert(points, photo.features.points);
   return photo;
 }
 
-// In pixels whose centres are at halves; empty where the photos hardly overlap.
-std::vector<Matrix3<double>> homography(const Photo& from, const Photo& to) {
-  if (from.points.size() < kFewest || to.points.size() < kFewest) return {};
-  std::vector<std::vector<cv::DMatch>> matches;
-  cv::BFMatcher().knnMatch(from.descriptors, to.descriptors, matches, 2);
-  std::vector<cv::Point2f> a;
-  std::vector<cv::Point2f> b;
-  for (const auto& pair : matches) {
-    if (pair.size() < 2 || pair[0].distance > 0.75F * pair[1].distance) continue;
-    a.push_back(from.points[static_cast<std::size_t>(pair[0].queryIdx)].pt);
-    b.push_back(to.points[static_cast<std::size_t>(pair[0].trainIdx)].pt);
-  }
-  if (a.size() < kFewest) return {};
-  cv::setRNGSeed(1);
-  cv::Mat inliers;
-  const cv::Mat found = cv::findHomography(a, b, cv::RANSAC, 1, inliers);
-  if (found.empty() || cv::countNonZero(inliers) < kFewest) return {};
-  Matrix3<double> H;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) H(i, j) = found.at<double>(i, j);
-  }
+// In pixels whose centres are at halves; nothing where the photos hardly overlap.
+std::optional<Matrix3<double>> homography(const Photo& from, const Photo& to) {
+  const auto found = match_homography(from.features, to.features, 1);
+  if (!found) return std::nullopt;
   Matrix3<double> to_halves = Matrix3<double>::Identity();
   to_halves.topRightCorner<2, 1>().setConstant(0.5);
-  return {to_halves * H * to_halves.inverse()};
+  return to_halves * found->H * to_halves.inverse();
 }
 
 struct Differences {
@@ -81,8 +66,8 @@ struct Differences {
 
 void compare(const Photo& from, const Photo& to, Differences* out) {
   const auto found = homography(from, to);
-  if (found.empty()) return;
-  const Matrix3<double>& H = found[0];
+  if (!found) return;
+  const Matrix3<double>& H = *found;
   ++out->pairs;
   FastGrid grid(from.image.cols, from.image.rows, 12);
   std::vector<FastCorner> corners(static_cast<std::size_t>(grid.max_cells()));

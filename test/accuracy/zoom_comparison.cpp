@@ -6,7 +6,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
-#include <opencv2/calib3d.hpp>
+#include <opencv2/features2d.hpp>
 
 #include "core/model/rolling_shutter.h"
 #include "core/realtime/pt_mode.h"
@@ -14,7 +14,6 @@
 namespace alidade::test {
 namespace {
 
-constexpr int kFewest = 25;
 constexpr double kAgrees_px = 2;
 
 // What a camera knows of a frame's lens beside its focal length.
@@ -137,11 +136,11 @@ KeyframeHomographies::KeyframeHomographies(const ZoomingCamera& camera,
   for (int k = 0; k < camera.frames(); k += frames_between) keyframes_.push_back(features_of(k));
 }
 
-KeyframeHomographies::Features KeyframeHomographies::features_of(int k) const {
+PlacedFeatures KeyframeHomographies::features_of(int k) const {
   constexpr int kMost = 1500;
   constexpr float kHalf = 0.5F;  // OpenCV's pixel centres are at whole numbers
   std::vector<cv::KeyPoint> points;
-  Features out;
+  PlacedFeatures out;
   cv::SIFT::create(kMost)->detectAndCompute(film_[static_cast<std::size_t>(k)], cv::noArray(),
                                             points, out.descriptors);
   const Camera<double> camera = told_camera(camera_, k);
@@ -173,35 +172,12 @@ std::optional<ZoomAnswer> KeyframeHomographies::answer(int k) const {
     least = distance;
   }
   if (nearest < 0) return std::nullopt;
-  const Features& keyframe = keyframes_[static_cast<std::size_t>(nearest)];
-  const Features own = features_of(k);
-  if (own.points.size() < kFewest || keyframe.points.size() < kFewest) return std::nullopt;
-  std::vector<std::vector<cv::DMatch>> matches;
-  cv::BFMatcher().knnMatch(keyframe.descriptors, own.descriptors, matches, 2);
-  std::vector<cv::Point2f> from;
-  std::vector<cv::Point2f> to;
-  for (const auto& pair : matches) {
-    if (pair.size() < 2 || pair[0].distance > 0.75F * pair[1].distance) continue;
-    from.push_back(keyframe.points[static_cast<std::size_t>(pair[0].queryIdx)]);
-    to.push_back(own.points[static_cast<std::size_t>(pair[0].trainIdx)]);
-  }
-  if (from.size() < kFewest) return std::nullopt;
-  cv::setRNGSeed(1);
-  cv::Mat inliers;
-  const cv::Mat found = cv::findHomography(from, to, cv::RANSAC, kAgrees_px, inliers);
-  if (found.empty() || cv::countNonZero(inliers) < kFewest) return std::nullopt;
-  Matrix3<double> H;
-  for (int i = 0; i < 3; ++i) {
-    for (int j = 0; j < 3; ++j) H(i, j) = found.at<double>(i, j);
-  }
-  std::vector<Vector2<double>> agreeing;
-  for (std::size_t i = 0; i < from.size(); ++i) {
-    if (inliers.at<std::uint8_t>(static_cast<int>(i)) != 0) {
-      agreeing.emplace_back(from[i].x, from[i].y);
-    }
-  }
+  const PlacedFeatures& keyframe = keyframes_[static_cast<std::size_t>(nearest)];
+  const PlacedFeatures own = features_of(k);
+  const auto found = match_homography(keyframe, own, kAgrees_px);
+  if (!found) return std::nullopt;
   const int key = nearest * frames_between_;
-  const auto solved = turn_and_zoom(H, true_focal_length(camera_, key), agreeing);
+  const auto solved = turn_and_zoom(found->H, true_focal_length(camera_, key), found->agreeing);
   if (!solved) return std::nullopt;
   ZoomAnswer out;
   out.focal_length = solved->focal_length_b;

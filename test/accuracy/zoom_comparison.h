@@ -6,11 +6,11 @@
 
 #include <functional>
 #include <opencv2/core.hpp>
-#include <opencv2/features2d.hpp>
 #include <optional>
 #include <vector>
 
 #include "core/realtime/frame_orientation.h"
+#include "test/accuracy/matched_homography.h"
 #include "test/support/zooming_camera.h"
 
 namespace alidade::test {
@@ -64,16 +64,13 @@ class KeyframeHomographies {
   [[nodiscard]] std::optional<ZoomAnswer> answer(int k) const;
 
  private:
-  struct Features {
-    std::vector<cv::Point2f> points;  // pinhole pixels, of the curve's lens there
-    cv::Mat descriptors;
-  };
-  [[nodiscard]] Features features_of(int k) const;
+  // In pinhole pixels, of the curve's lens there.
+  [[nodiscard]] PlacedFeatures features_of(int k) const;
 
   const ZoomingCamera& camera_;
   const std::vector<cv::Mat>& film_;
   int frames_between_;
-  std::vector<Features> keyframes_;
+  std::vector<PlacedFeatures> keyframes_;
 };
 
 }  // namespace alidade::test
