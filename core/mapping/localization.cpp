@@ -92,6 +92,7 @@ struct Localizer::State {
   [[nodiscard]] std::vector<FeatureMatch> match(const FeatureSet& features,
                                                 const std::vector<int>& among) const {
     std::vector<Descriptor> indexed;
+    indexed.reserve(among.size());
     for (const int i : among) indexed.push_back(descriptors[static_cast<std::size_t>(i)]);
     std::vector<FeatureMatch> matches = believed_matches(
         nearest_features(features.descriptors, indexed), options.ratio, [&](int a, int b) {
@@ -104,6 +105,7 @@ struct Localizer::State {
   [[nodiscard]] std::vector<PoseMatch> pose_matches(
       const FeatureSet& features, const std::vector<FeatureMatch>& matches) const {
     std::vector<PoseMatch> out;
+    out.reserve(matches.size());
     for (const FeatureMatch& m : matches) {
       out.push_back(pose_match(features.features[static_cast<std::size_t>(m.query)], m.indexed));
     }

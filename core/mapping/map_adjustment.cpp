@@ -412,6 +412,7 @@ MapAdjustment adjust_map(const MapEvidence& evidence, const MapOptions& options)
     const std::vector<double> squares = squares_of(evidence, options, state);
     noise = noise_found(squares, used, map->unknowns());
     std::vector<bool> within;
+    within.reserve(squares.size());
     for (const double square : squares) within.push_back(square < std::pow(round.gate * noise, 2));
     used = tied(evidence, state, within);
   }

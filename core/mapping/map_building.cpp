@@ -296,6 +296,7 @@ class Building {
   void keep_adjusted(const std::vector<int>& places) {
     if (found_.pictures.empty()) return;
     std::vector<AdjustedPicture> some;
+    some.reserve(places.size());
     for (const int i : places) some.push_back(found_.pictures[static_cast<std::size_t>(i)]);
     found_.pictures = std::move(some);
   }

@@ -203,16 +203,19 @@ std::optional<double> common_focal_length(const std::vector<LinkedPicture>& pict
   constexpr double kLeastWidths = 0.4;  // f, in widths of the image
   constexpr double kMostWidths = 12;
   std::vector<const PictureLink*> strongest;
+  strongest.reserve(links.size());
   for (const PictureLink& link : links) strongest.push_back(&link);
   std::stable_sort(strongest.begin(), strongest.end(), [](const auto* a, const auto* b) {
     return a->matches.size() > b->matches.size();
   });
   if (strongest.size() > kLinks) strongest.resize(kLinks);
   const double threshold_px = options.threshold_share * width / 2;
+  const double least = std::log(kLeastWidths * width);
+  const int steps = static_cast<int>(std::ceil(std::log(kMostWidths / kLeastWidths) / kStep));
   double most = 0;
   std::optional<double> best;
-  for (double log_f = std::log(kLeastWidths * width); log_f < std::log(kMostWidths * width);
-       log_f += kStep) {
+  for (int step = 0; step < steps; ++step) {
+    const double log_f = least + step * kStep;
     const LensCurve lens = LensCurve::of(plain_camera(width, height, log_f));
     double fit = 0;
     for (const PictureLink* link : strongest) {
@@ -231,6 +234,7 @@ std::optional<double> common_focal_length(const std::vector<LinkedPicture>& pict
 std::vector<std::optional<Matrix3<double>>> start_orientations(
     const std::vector<LinkedPicture>& pictures, const std::vector<PictureLink>& links) {
   std::vector<std::optional<Matrix3<double>>> out;
+  out.reserve(pictures.size());
   std::vector<std::size_t> inliers(pictures.size(), 0);
   for (const LinkedPicture& picture : pictures) out.push_back(picture.R_base_from_camera);
   for (const PictureLink& link : links) {

@@ -60,8 +60,14 @@ std::vector<Vector3<double>> ups(const PlaneProblem& problem) {
   return out;
 }
 
+// The least turn that takes z to `up_b`, a unit vector. By hand, as Eigen's FromTwoVectors() has a singular value decomposition, which
+// takes half of this source's compilation.
 Matrix3<double> R_base_from_world_with(const Vector3<double>& up_b) {
-  return Eigen::Quaterniond::FromTwoVectors(Vector3<double>::UnitZ(), up_b).toRotationMatrix();
+  const double w = std::sqrt(std::max(0.0, 0.5 * (1 + up_b.z())));
+  if (w < 1e-8) {
+    return Vector3<double>(1, -1, -1).asDiagonal();
+  }
+  return Eigen::Quaterniond(w, -0.5 * up_b.y() / w, 0.5 * up_b.x() / w, 0).normalized().toRotationMatrix();
 }
 
 // The height that one datum gives to a plane of height 1; nothing if it does not say.
