@@ -1,7 +1,6 @@
 #include "core/tracking/plane_fit.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <algorithm>
 #include <cmath>
 
@@ -73,12 +72,12 @@ bool points_in_a_line(const PlaneEvidence& evidence) {
   }
   if (count < 2) return false;
   mean /= count;
-  Matrix3<double> sum = Matrix3<double>::Zero();
+  Eigen::MatrixXd sum = Matrix3<double>::Zero();
   for (const PlaneDatum& datum : evidence.data) {
     if (datum.kind == PlaneDatumKind::kPoint)
       sum += (datum.place - mean) * (datum.place - mean).transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix3<double>> eigen(sum, Eigen::EigenvaluesOnly);
+  const internal::SymmetricEigen eigen(sum, Eigen::EigenvaluesOnly);
   return eigen.eigenvalues()[1] < 1e-6 * eigen.eigenvalues()[2];
 }
 
@@ -195,8 +194,8 @@ bool set_covariance(const PlaneEvidence& evidence, const PlaneFitOptions& option
   for (Eigen::Index i = 0; i < N.cols(); ++i) {
     if (!N.col(i).tail<3>().isZero(0)) unit[i] = scale;
   }
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(unit.asDiagonal() * information *
-                                                             unit.asDiagonal());
+  const Eigen::MatrixXd scaled = unit.asDiagonal() * information * unit.asDiagonal();
+  const internal::SymmetricEigen eigen(scaled);
   const Eigen::VectorXd& values = eigen.eigenvalues();
   const Eigen::VectorXd weakest = unit.cwiseProduct(eigen.eigenvectors().col(0));
   if (!(values[0] > 1e-6) || !(values[0] > 1e-13 * values[values.size() - 1])) {
@@ -241,7 +240,7 @@ bool grows_evenly(const PlaneProblem& problem, const PlaneSolution& solution) {
   }
   const Eigen::MatrixXd scaled = unit.cwiseInverse().asDiagonal() * covariance.topLeftCorner(k, k) *
                                  unit.cwiseInverse().asDiagonal();
-  const Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd> eigen(scaled);
+  const internal::SymmetricEigen eigen(scaled);
   for (Eigen::Index axis = 0; axis < k; ++axis) {
     // The looks follow as the information has them.
     const Eigen::VectorXd direction = eigen.eigenvectors().col(axis).cwiseQuotient(unit);
@@ -269,9 +268,9 @@ std::vector<double> set_misfits(const PlaneProblem& problem, const PlaneSolution
     const Eigen::LLT<Matrix2<double>> own(residual.covariance);
     const Eigen::Matrix<double, 2, Eigen::Dynamic> J_white = own.matrixL().solve(J);
     const Vector2<double> r_white = own.matrixL().solve(residual.r);
-    const Matrix2<double> left =
+    const Eigen::MatrixXd left =
         Matrix2<double>::Identity() - J_white * information.solve(J_white.transpose());
-    const Eigen::SelfAdjointEigenSolver<Matrix2<double>> eigen(left);
+    const internal::SymmetricEigen eigen(left);
     DatumFit fit;
     double square = 0;
     int rank = 0;

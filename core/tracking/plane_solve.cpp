@@ -1,7 +1,6 @@
 #include "core/tracking/plane_solve.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
@@ -52,7 +51,7 @@ double chi_square(const PlaneProblem& problem, const std::vector<DatumResidual>&
 
 PlaneProblem::PlaneProblem(const PlaneEvidence& given) : evidence(given), frame(frame_of(given)) {
   for (const Matrix3<double>& covariance : given.looks) {
-    const Eigen::SelfAdjointEigenSolver<Matrix3<double>> eigen(covariance);
+    const SymmetricEigen eigen(Eigen::MatrixXd{covariance});
     roots.push_back(eigen.eigenvectors() *
                     eigen.eigenvalues().cwiseMax(0.0).cwiseSqrt().asDiagonal());
   }

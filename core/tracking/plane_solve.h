@@ -6,12 +6,16 @@
 // unknown, or four where a heading is known and no place.
 
 #include <Eigen/Core>
+#include <Eigen/Eigenvalues>
 #include <optional>
 #include <vector>
 
 #include "core/tracking/plane_residual.h"
 
 namespace alidade::internal {
+
+// Of matrices of any size: each size of its own would cost seconds of compilation.
+using SymmetricEigen = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 
 enum class PlaneFrame {
   kCamera,   // origin below it, Y below the base's forward direction

@@ -1,7 +1,6 @@
 #include "core/tracking/plane_start.h"
 
 #include <Eigen/Cholesky>
-#include <Eigen/Eigenvalues>
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 #include <algorithm>
@@ -25,7 +24,7 @@ const PlaneDatum* first_of(const PlaneProblem& problem, Kind kind) {
 
 // Directions that are at right angles to up: of the horizon, and normals of planes through the camera that hold a vertical line.
 std::optional<Vector3<double>> axis_of_right_angles(const PlaneProblem& problem) {
-  Matrix3<double> sum = Matrix3<double>::Zero();
+  Eigen::MatrixXd sum = Matrix3<double>::Zero();
   for (std::size_t i = 0; i < problem.evidence.data.size(); ++i) {
     if (!problem.counts(i)) continue;
     const PlaneDatum& datum = problem.evidence.data[i];
@@ -37,7 +36,7 @@ std::optional<Vector3<double>> axis_of_right_angles(const PlaneProblem& problem)
     }
     sum += level * level.transpose();
   }
-  const Eigen::SelfAdjointEigenSolver<Matrix3<double>> eigen(sum);
+  const SymmetricEigen eigen(sum);
   if (!(eigen.eigenvalues()[1] > 1e-6)) return std::nullopt;
   return Vector3<double>(eigen.eigenvectors().col(0));
 }
@@ -67,7 +66,9 @@ Matrix3<double> R_base_from_world_with(const Vector3<double>& up_b) {
   if (w < 1e-8) {
     return Vector3<double>(1, -1, -1).asDiagonal();
   }
-  return Eigen::Quaterniond(w, -0.5 * up_b.y() / w, 0.5 * up_b.x() / w, 0).normalized().toRotationMatrix();
+  return Eigen::Quaterniond(w, -0.5 * up_b.y() / w, 0.5 * up_b.x() / w, 0)
+      .normalized()
+      .toRotationMatrix();
 }
 
 // The height that one datum gives to a plane of height 1; nothing if it does not say.
