@@ -158,19 +158,6 @@ class Http(SystemTest):
         check(answer.json(), self.described(path, method, status))
         return answer.json()
 
-    def ground(self):
-        """A plane.yaml: the camera 20 m above the ground looks down by 20 degrees at zero pan and tilt. And where it then looks."""
-        pitch, height = math.radians(-20), 20
-        names = ["heading", "pitch", "roll", "x", "y", "height"]
-        values = dict(zip(names, (0, pitch, 0, 0, 0, height)))
-        sigmas = dict(zip(names, (0, 1e-3, 1e-3, 0, 0, 0.05)))
-        plane = {"format": 1, **{name: {"value": values[name], "sigma": sigmas[name]} for name in names},
-                 "origin": {"latitude_deg": 48, "longitude_deg": 11, "height_m": 500},
-                 "covariance": {"names": names, "matrix": [[sigmas[a] ** 2 * (a == b) for b in names] for a in names]}}
-        file = self.folder / "plane.yaml"
-        file.write_text(json.dumps(plane))
-        return str(file), (0, height / math.tan(-pitch))
-
     def follow_somebody(self, api, place, noise_px=0.5, frames=40):
         """Somebody stands where the camera looks at zero pan and tilt; a detector with noise finds them in each frame."""
         noise = random.Random(7)
