@@ -427,7 +427,7 @@ class Http(SystemTest):
             self.assertEqual(counts[-1], values[name + "_count", labels])
 
     def test_hostile_clients_cost_no_record_and_little_memory(self):
-        run, api = self.start()
+        run, api = self.start(tracking={})
         before = self.memory(run)
         stalled = [api.follow() for _ in range(5)]  # of which nothing is read from now on
         received = self.check_answer(api, "/api/v1/status")["frames"]["received"]
@@ -510,6 +510,9 @@ class Http(SystemTest):
         yield post(direction, b"\x00\xff\xfe" * 1000)
         yield post(direction, b'{"pixels":[[1,2]]}', token="x" * 7000)
         yield post("/api/v1/calibrate", b"x" * 1000)
+        for box, count in ((b'{"u":9,"v":9,"width":9,"height":9}', 10_000), (b'{"u":9,"v":9,"width":9,"height":9}', 3_700),
+                           (b"{}", 10_000), (b"0", 10_000)):
+            yield post("/api/v1/detections", b'{"frame":0,"boxes":[' + b",".join([box] * count) + b"]}")
         for path in (b"/../../../etc/passwd", b"/%2e%2e/%2e%2e/etc/passwd", b"/..%2f..%2fetc%2fpasswd", b"/etc/passwd\x00",
                      b"/%00", b"//etc/passwd", b"/" + b"a" * 7000, b"/?" + b"a=b&" * 1500, b"*", b"/\xf0\x28\x8c\x28"):
             yield get(path)
