@@ -43,6 +43,31 @@ TELL_CLIPPED_TEXT = """
       return draw.call(this, text, u, v);
     };"""
 
+# Thirty on few metres of ground, and one at a pole whose place was known before: the names on the plan.
+NAMES_OF_A_CROWD = """
+    const crowd = {space: 'plane', time_s: 10, detected_frame: 1, targets: []};
+    for (let i = 1; i <= 30; ++i) {
+      crowd.targets.push({identity: i, class: `of class ${'x'.repeat(i)}`, seen_s: i / 10, position_m: [i % 6 * 1.7, i * i % 7 * 1.3],
+        covariance: [[.01, 0], [0, .04]]});
+    }
+    const kept = {targets, trails};
+    trails = new Map();
+    onTargets(crowd);
+    crowd.targets.push({identity: 31, seen_s: 0, position_m: null, azimuth_rad: null, covariance: null});
+    trails.set(31, [[2, 2]]);
+    const names = [];
+    const draw = CanvasRenderingContext2D.prototype.fillText;
+    CanvasRenderingContext2D.prototype.fillText = function (text, u, v) {
+      const {width} = this.measureText(text);
+      const left = u - (this.textAlign === 'right' ? width : 0);
+      if (text.startsWith('#')) names.push({text, left, right: left + width, v, width: this.canvas.clientWidth});
+      return draw.call(this, text, u, v);
+    };
+    drawPlan();
+    CanvasRenderingContext2D.prototype.fillText = draw;
+    ({targets, trails} = kept);
+    return [names, document.getElementById('plan-caption').textContent];"""
+
 
 class StatusPage(SystemTest):
     def setUp(self):
@@ -269,6 +294,28 @@ class StatusPage(SystemTest):
         self.wait_for_text("plan-caption", r"1 target after frame \d+")
         self.browser.set_window_size(1280, 1800)
         self.screenshot("targets.png")
+        self.names_of_a_crowd_can_be_read()
+
+    def names_of_a_crowd_can_be_read(self):
+        """On the plan no name lies on another, none is cut off, and one at a pole stops nothing; on the desktop and on a phone."""
+        for width in (1280, 390):
+            self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
+                "width": width, "height": 1800, "deviceScaleFactor": 1, "mobile": width < 500})
+            names, caption = self.browser.execute_script(NAMES_OF_A_CROWD)
+            self.assertRegex(caption, "^31 targets .*the first 20 are listed$")
+            self.assertGreater(len(names), 8, width)
+            if width == 1280:  # a phone has room for numbers alone
+                self.assertTrue(any("of class" in name["text"] for name in names), names)
+            # Who was seen last is named first.
+            self.assertEqual(names[0]["text"].split()[0], "#30")
+            for i, one in enumerate(names):
+                self.assertGreaterEqual(one["left"], 0, one)
+                self.assertLessEqual(one["right"], one["width"], one)
+                for other in names[:i]:
+                    apart = one["left"] >= other["right"] or one["right"] <= other["left"] or abs(one["v"] - other["v"]) >= 10
+                    self.assertTrue(apart, (one, other))
+            self.screenshot(f"crowd_{width}.png")
+        self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
     def test_says_that_the_program_is_gone_and_follows_the_next_one(self):
         camera = self.camera(settings=SETTINGS)
