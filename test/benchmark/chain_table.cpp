@@ -124,8 +124,11 @@ int run(LatencyReport* report) {
   }
   const double step_s = times.mean_s("camera pose") + times.mean_s("map update");
   for (const char* module : {"decoding", "camera pose", "map update", "detection of motion",
-                             "detection of people", "tracking"})
+                             "detection of people", "tracking"}) {
     report->add(module, times.of(module), {});
+    report->context()["mean_s"][module] = times.mean_s(module);
+    std::printf("mean of %s: %.3f ms\n", module, 1e3 * times.mean_s(module));
+  }
   report->print();
   std::printf("%d of %d frames in OE mode; %d targets\n", oe, kFrames,
               static_cast<int>(stage.state().targets.size()));

@@ -1,9 +1,10 @@
 #!/usr/bin/env python3
 """`alidade run` whose MQTT broker is away for long: `broker_soak.py [seconds]` (3600).
 
-Two edge executables on a mosquitto each. One broker is suspended, a black hole that takes connections and answers none, the other is killed. Meanwhile
-detections come five times a second, so that there is always something new to tell. No record may be lost, neither memory nor files nor threads may grow,
-and when the brokers are back they must have the newest targets, and `online`, within the longest pause between two attempts. Prints a line a minute.
+Two edge executables on a mosquitto each. One broker is suspended, a black hole that takes connections and answers none, the other is
+killed. Meanwhile detections come five times a second, so that there is always something new to tell. No record may be lost, neither
+memory nor files nor threads may grow, and when the brokers are back they must have the newest targets, and `online`, within the longest
+pause between two attempts. Prints a line a minute.
 """
 import http.client
 import json
@@ -119,7 +120,8 @@ def quantile_ms(before, after, part):
 
 class BrokerSoak(SystemTest):
     def line(self, edge, what, before, after, seconds):
-        print(f"{time.strftime('%H:%M:%S')} {edge.name:9} {what:7} {after['rss_kib']:6d} KiB, {after['threads']} threads, {after['files']} files, "
+        print(f"{time.strftime('%H:%M:%S')} {edge.name:9} {what:7} "
+              f"{after['rss_kib']:6d} KiB, {after['threads']} threads, {after['files']} files, "
               f"{(after['records'] - before['records']) / seconds:.2f} records/s, latency p50 {quantile_ms(before, after, 0.5):.2f} "
               f"p99 {quantile_ms(before, after, 0.99):.2f} ms, longest pause {edge.longest_pause_s:.2f} s, dropped {after['dropped']:.0f}, "
               f"detections waiting {after['waiting']:.0f}, published {after['published'] - before['published']:.0f}, "
