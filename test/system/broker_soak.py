@@ -75,6 +75,8 @@ class Edge:
         while (line := self.run.lines.get()) is not None:
             now_s, record = time.monotonic(), json.loads(line)
             frame = record["frame"]
+            if frame is None:  # the camera ends before the run
+                continue
             self.longest_pause_s = max(self.longest_pause_s, now_s - last_s)
             self.frames_left_out += frame - last_frame - 1 if last_frame is not None else 0
             self.records, last_frame, last_s = self.records + 1, frame, now_s
