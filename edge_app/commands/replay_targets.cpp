@@ -60,6 +60,11 @@ ReplayTargets::ReplayTargets(const std::string& detections, const std::string& t
 bool ReplayTargets::read_line(std::string* line) {
   for (;;) {
     const std::size_t end = buffer_.find('\n', begin_);
+    // However it came in pieces.
+    if (std::min(end, buffer_.size()) - begin_ > kMaxDetectionBytes)
+      throw CommandError(kExitFailed, fmt::format("{}:{}: is longer than {} bytes; expected one "
+                                                  "frame a line",
+                                                  name_, line_ + 1, kMaxDetectionBytes));
     if (end != std::string::npos || (ended_ && begin_ < buffer_.size())) {
       const std::size_t last = end == std::string::npos ? buffer_.size() : end;
       line->assign(buffer_, begin_, last - begin_);
@@ -68,10 +73,6 @@ bool ReplayTargets::read_line(std::string* line) {
       return true;
     }
     if (ended_) return false;
-    if (buffer_.size() - begin_ > kMaxDetectionBytes)
-      throw CommandError(kExitFailed, fmt::format("{}:{}: is longer than {} bytes; expected one "
-                                                  "frame a line",
-                                                  name_, line_ + 1, kMaxDetectionBytes));
     buffer_.erase(0, begin_);
     begin_ = 0;
     // What waits for a slow writer still ends with a signal.

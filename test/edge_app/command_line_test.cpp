@@ -17,9 +17,11 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "core/pattern/calibrate_pattern.h"
+#include "edge_app/output/detection_query.h"
 #include "edge_app/storage/lens_file.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/edge_app/process.h"
@@ -605,6 +607,69 @@ TEST_F(CommandLineTest, ReplayNamesTheLineOfDetectionsThatItCannotUse) {
               HasSubstr("--detections"));
   EXPECT_THAT(alidade({"replay", directory_.path(), "--detections", path("nowhere")}).errors,
               HasSubstr("nowhere: cannot be read"));
+}
+
+// A frame of so many boxes, in one line.
+std::string crowd(int frame, int boxes) {
+  std::string line = R"({"frame": )" + std::to_string(frame) + R"(, "boxes": [)";
+  for (int i = 0; i < boxes; ++i)
+    line += std::string(i == 0 ? "" : ",") + R"({"u":9,"v":9,"width":9,"height":9})";
+  return line + "]}\n";
+}
+
+TEST_F(CommandLineTest, ReplayRefusesAFrameOfTenThousandBoxesHoweverItsLineComes) {
+  head_.record(directory_, 60);
+  directory_.write("alidade/calibration.yaml", head_.calibration());
+  // Who stays in the middle of a picture that turns turns as sharply.
+  const std::string agile =
+      directory_.write("agile.yaml", "tracking: {acceleration_density_rad2_s3: 0.01}\n");
+  // Of that length without its end.
+  const auto padded = [](std::string line, std::size_t bytes) {
+    line.insert(line.size() - 1, bytes + 1 - line.size(), ' ');
+    return line;
+  };
+  const std::string ten_thousand = crowd(40, 10'000);
+  ASSERT_GT(ten_thousand.size(), 300'000U);
+  directory_.write("crowd.jsonl", middle_box(20) + ten_thousand);
+  directory_.write("over.jsonl", middle_box(20) + padded(middle_box(40), kMaxDetectionBytes + 1));
+  directory_.write("most.jsonl", middle_box(20) + padded(middle_box(40), kMaxDetectionBytes));
+  for (const char* piece : {"100", "5000", "65536", "1000000"}) {
+    const auto replayed = [&](const char* name) {
+      return run({"/bin/sh", "-c",
+                  "dd if=\"$1/$2.jsonl\" bs=\"$3\" status=none | "
+                  "\"$0\" replay \"$1\" --detections - -o \"$4\"",
+                  ALIDADE_EXECUTABLE, directory_.path(), name, piece, path("out")});
+    };
+    for (const char* name : {"crowd", "over"}) {
+      const Result result = replayed(name);
+      EXPECT_EQ(result.exit_code, 1) << name << ' ' << piece;
+      EXPECT_EQ(last_line(result.errors),
+                "alidade: stdin:2: is longer than 131072 bytes; expected one frame a line\n")
+          << name << ' ' << piece;
+    }
+    EXPECT_EQ(replayed("most").exit_code, 0) << piece;
+  }
+
+  // As many as a line holds are refused with their frame, and those about it are what they would have been.
+  std::string usual;
+  std::string disturbed;
+  for (int i = 20; i < 60; ++i) {
+    if (i != 40) usual += middle_box(i);
+    disturbed += i == 40 ? crowd(i, 3500) : middle_box(i);
+  }
+  directory_.write("quiet.jsonl", usual);
+  directory_.write("loud.jsonl", disturbed);
+  const auto tracked = [&](const char* name) {
+    const Result result =
+        alidade({"replay", directory_.path(), "--detections", path(std::string(name) + ".jsonl"),
+                 "--tracking", agile, "-o", path(name)});
+    EXPECT_EQ(result.exit_code, 0) << result.errors;
+    return std::pair(result.errors, directory_.read(std::string(name) + "/targets.jsonl"));
+  };
+  const auto [says, targets] = tracked("loud");
+  EXPECT_THAT(says, HasSubstr("1 refused (more boxes than tracking.max_detections)"));
+  EXPECT_EQ(targets, tracked("quiet").second);
+  EXPECT_EQ(nlohmann::json::parse(last_line(targets))["targets"].size(), 1U);
 }
 
 TEST_F(CommandLineTest, ReplayGivesTheSameBytesAtAnySpeed) {

@@ -318,7 +318,7 @@ struct Feed {
   TargetLines lines{nullptr};
 };
 
-class HttpApiWithTargetsTest : private Feed, public HttpApiTest {
+class HttpApiWithTargetsTest : protected Feed, public HttpApiTest {
  protected:
   HttpApiWithTargetsTest() : HttpApiTest(test::mast_plane(), &feed, &lines) {
     feed.add_on_news([this](const auto& state) { lines.take(*state); });
@@ -413,6 +413,61 @@ TEST_F(HttpApiWithTargetsTest, RefusesEachKindOfBadDetectionsWithItsReason) {
   EXPECT_EQ(targets["detections"]["frames"]["outside"], 2);
   EXPECT_EQ(targets["detections"]["frames"]["not_yet"], 3);
   EXPECT_THAT(get("/metrics"), HasSubstr("alidade_detection_frames_total{outcome=\"score\"} 1\n"));
+}
+
+TEST_F(HttpApiWithTargetsTest, TenThousandBoxesInOneBodyAreRefusedAndCostTheTargetsNothing) {
+  start();
+  TargetStage alone(feed.options(), test::mast_plane());
+  const auto send = [&](std::int64_t i) {
+    ASSERT_THAT(send_frame(i), StartsWith("HTTP/1.1 202 ")) << i;
+    const FrameOrientation seen_by = test::swinging_frame(test::watching_calibration(), i);
+    const DetectionBox box = test::box_with_foot(test::foot_of(test::mast(), seen_by, stands_at_));
+    ASSERT_EQ(alone.add(test::detected(i, seen_by, {box})).status, DetectionStatus::kTaken);
+    while (feed.snapshot().counters.of(DetectionStatus::kTaken) <= i) std::this_thread::yield();
+  };
+  const auto body_of_boxes = [](const std::string& box, int count) {
+    std::string body = R"({"frame": 20, "boxes": [)" + box;
+    for (int i = 1; i < count; ++i) body += "," + box;
+    return body + "]}";
+  };
+  constexpr int kMany = 10'000;
+  const std::string box = R"({"u":9,"v":9,"width":9,"height":9})";
+  const struct {
+    std::string body;
+    const char* status;
+    const char* reason;
+  } floods[] = {
+      {body_of_boxes(box, kMany), "413", "the body is too large; at most 131072 bytes"},
+      {body_of_boxes(box, 3700), "400", "more boxes than tracking.max_detections"},
+      {body_of_boxes("{}", kMany), "400", "boxes: item 0: u must be a number and is missing"},
+      {body_of_boxes("0", kMany), "400", "boxes: item 0: must be an object"},
+      {body_of_boxes("[]", kMany), "400", "boxes: item 0: must be an object"},
+  };
+  for (std::int64_t i = 0; i < 20; ++i) send(i);
+  ASSERT_EQ(feed.snapshot().newest->targets.size(), 1U);
+  constexpr int kRounds = 10;
+  for (int round = 0; round < kRounds; ++round) {
+    for (const auto& flood : floods) {
+      const std::string answer = post("/api/v1/detections", flood.body);
+      EXPECT_THAT(answer, StartsWith(std::string("HTTP/1.1 ") + flood.status + " "));
+      const std::string error = body_of(answer)["error"];
+      EXPECT_THAT(error, AllOf(HasSubstr(flood.reason), Not(HasSubstr("\n"))));
+    }
+  }
+  // By its head alone, so that none of it is kept.
+  Client client(server_);
+  client.send("POST /api/v1/detections HTTP/1.1\r\nHost: localhost\r\nContent-Length: " +
+              std::to_string(floods[0].body.size()) + "\r\n\r\n");
+  EXPECT_THAT(client.receive(), StartsWith("HTTP/1.1 413 "));
+  for (std::int64_t i = 20; i < 40; ++i) send(i);
+  const auto flooded = feed.snapshot().newest;
+  const TargetsState quiet = alone.state();
+  ASSERT_EQ(flooded->targets.size(), 1U);
+  ASSERT_EQ(quiet.targets.size(), 1U);
+  EXPECT_EQ(flooded->targets[0].target.identity, quiet.targets[0].target.identity);
+  EXPECT_EQ(flooded->targets[0].target.state.mean, quiet.targets[0].target.state.mean);
+  EXPECT_EQ(flooded->targets[0].target.state.cov, quiet.targets[0].target.state.cov);
+  EXPECT_EQ(feed.snapshot().counters.of(DetectionStatus::kTooManyBoxes), kRounds);
 }
 
 TEST_F(HttpApiWithTargetsTest, SaysWhenItsQueueIsFull) {

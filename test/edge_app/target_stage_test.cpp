@@ -178,7 +178,9 @@ TEST(TargetStage, RefusesAWholeFrameWithTheReasonAndTheBoxAtFaultAndTracksGoOn) 
     refused([](Frame f) { f->boxes[1].height = -4; }, DetectionStatus::kBoxOutside, 1);
     refused([](Frame f) { f->boxes[1] = {-1e300, 0, 2e300, 10, 1, ""}; },
             DetectionStatus::kBoxOutside, 1);
-    refused([&](Frame f) { f->boxes.resize(4, good); }, DetectionStatus::kTooManyBoxes, -1);
+    for (const std::size_t many : {std::size_t{4}, std::size_t{10'000}}) {
+      refused([&](Frame f) { f->boxes.resize(many, good); }, DetectionStatus::kTooManyBoxes, -1);
+    }
     refused([](Frame f) { f->record.orientation.reset(); }, DetectionStatus::kNoOrientation, -1);
     refused([](Frame f) { f->record.time_s.reset(); }, DetectionStatus::kNoOrientation, -1);
     DetectedFrame again = walker_seen(i);

@@ -171,6 +171,19 @@ class SystemTest(unittest.TestCase):
         file.write_text(json.dumps(config))
         return file
 
+    def ground(self):
+        """A plane.yaml: the camera 20 m above the ground looks down by 20 degrees at zero pan and tilt. And where it then looks."""
+        pitch, height = math.radians(-20), 20
+        names = ["heading", "pitch", "roll", "x", "y", "height"]
+        values = dict(zip(names, (0, pitch, 0, 0, 0, height)))
+        sigmas = dict(zip(names, (0, 1e-3, 1e-3, 0, 0, 0.05)))
+        plane = {"format": 1, **{name: {"value": values[name], "sigma": sigmas[name]} for name in names},
+                 "origin": {"latitude_deg": 48, "longitude_deg": 11, "height_m": 500},
+                 "covariance": {"names": names, "matrix": [[sigmas[a] ** 2 * (a == b) for b in names] for a in names]}}
+        file = self.folder / "plane.yaml"
+        file.write_text(json.dumps(plane))
+        return str(file), (0, height / math.tan(-pitch))
+
 
 class Truth:
     """The path of truth.csv: angles at any time between its frames."""

@@ -158,19 +158,6 @@ class Http(SystemTest):
         check(answer.json(), self.described(path, method, status))
         return answer.json()
 
-    def ground(self):
-        """A plane.yaml: the camera 20 m above the ground looks down by 20 degrees at zero pan and tilt. And where it then looks."""
-        pitch, height = math.radians(-20), 20
-        names = ["heading", "pitch", "roll", "x", "y", "height"]
-        values = dict(zip(names, (0, pitch, 0, 0, 0, height)))
-        sigmas = dict(zip(names, (0, 1e-3, 1e-3, 0, 0, 0.05)))
-        plane = {"format": 1, **{name: {"value": values[name], "sigma": sigmas[name]} for name in names},
-                 "origin": {"latitude_deg": 48, "longitude_deg": 11, "height_m": 500},
-                 "covariance": {"names": names, "matrix": [[sigmas[a] ** 2 * (a == b) for b in names] for a in names]}}
-        file = self.folder / "plane.yaml"
-        file.write_text(json.dumps(plane))
-        return str(file), (0, height / math.tan(-pitch))
-
     def follow_somebody(self, api, place, noise_px=0.5, frames=40):
         """Somebody stands where the camera looks at zero pan and tilt; a detector with noise finds them in each frame."""
         noise = random.Random(7)
@@ -440,7 +427,7 @@ class Http(SystemTest):
             self.assertEqual(counts[-1], values[name + "_count", labels])
 
     def test_hostile_clients_cost_no_record_and_little_memory(self):
-        run, api = self.start()
+        run, api = self.start(tracking={})
         before = self.memory(run)
         stalled = [api.follow() for _ in range(5)]  # of which nothing is read from now on
         received = self.check_answer(api, "/api/v1/status")["frames"]["received"]
@@ -523,6 +510,9 @@ class Http(SystemTest):
         yield post(direction, b"\x00\xff\xfe" * 1000)
         yield post(direction, b'{"pixels":[[1,2]]}', token="x" * 7000)
         yield post("/api/v1/calibrate", b"x" * 1000)
+        for box, count in ((b'{"u":9,"v":9,"width":9,"height":9}', 10_000), (b'{"u":9,"v":9,"width":9,"height":9}', 3_700),
+                           (b"{}", 10_000), (b"0", 10_000)):
+            yield post("/api/v1/detections", b'{"frame":0,"boxes":[' + b",".join([box] * count) + b"]}")
         for path in (b"/../../../etc/passwd", b"/%2e%2e/%2e%2e/etc/passwd", b"/..%2f..%2fetc%2fpasswd", b"/etc/passwd\x00",
                      b"/%00", b"//etc/passwd", b"/" + b"a" * 7000, b"/?" + b"a=b&" * 1500, b"*", b"/\xf0\x28\x8c\x28"):
             yield get(path)

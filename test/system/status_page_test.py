@@ -43,6 +43,39 @@ TELL_CLIPPED_TEXT = """
       return draw.call(this, text, u, v);
     };"""
 
+# Thirty on few metres of ground and in a part of the picture, and one at a pole whose place was known before: the names on plan and
+# picture, what is drawn over those on the picture, and the plan's caption.
+NAMES_OF_A_CROWD = """
+    const crowd = {space: 'plane', time_s: 10, detected_frame: 1, targets: []};
+    for (let i = 1; i <= 30; ++i) {
+      const [u, v] = [i % 6 * 60, i * i % 7 * 40];
+      crowd.targets.push({identity: i, class: `of class ${'x'.repeat(i)}`, seen_s: i / 10, position_m: [i % 6 * 1.7, i * i % 7 * 1.3],
+        covariance: [[.01, 0], [0, .04]], covariance_px2: [[1, 0], [0, 1]], pixel: [u + 10, v + 50], box: {u, v, width: 20, height: 50}});
+    }
+    const kept = {targets, trails};
+    trails = new Map();
+    onTargets(crowd);
+    crowd.targets.push({identity: 31, seen_s: 0, position_m: null, azimuth_rad: null, covariance: null, box: null});
+    trails.set(31, [[2, 2]]);
+    const names = {plan: [], picture: []};
+    let over = 0;
+    const {fillText, strokeRect} = CanvasRenderingContext2D.prototype;
+    CanvasRenderingContext2D.prototype.fillText = function (text, u, v) {
+      const {width} = this.measureText(text);
+      const left = u - (this.textAlign === 'right' ? width : 0);
+      if (text.startsWith('#')) names[this.canvas.id].push({text, left, right: left + width, v, width: this.canvas.clientWidth});
+      return fillText.call(this, text, u, v);
+    };
+    CanvasRenderingContext2D.prototype.strokeRect = function (...rectangle) {
+      over += names.picture.length;
+      return strokeRect.apply(this, rectangle);
+    };
+    drawPlan();
+    drawTargets(document.getElementById('picture').getContext('2d'), crowd.targets, document.getElementById('picture').clientWidth / 640);
+    Object.assign(CanvasRenderingContext2D.prototype, {fillText, strokeRect});
+    ({targets, trails} = kept);
+    return [names.plan, names.picture, over, document.getElementById('plan-caption').textContent];"""
+
 
 class StatusPage(SystemTest):
     def setUp(self):
@@ -269,6 +302,30 @@ class StatusPage(SystemTest):
         self.wait_for_text("plan-caption", r"1 target after frame \d+")
         self.browser.set_window_size(1280, 1800)
         self.screenshot("targets.png")
+        self.names_of_a_crowd_can_be_read()
+
+    def names_of_a_crowd_can_be_read(self):
+        """No name lies on another or is cut off, no box is drawn over one, and a target at a pole stops nothing."""
+        for width in (1280, 390):
+            self.browser.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", {
+                "width": width, "height": 1800, "deviceScaleFactor": 1, "mobile": width < 500})
+            plan, picture, over, caption = self.browser.execute_script(NAMES_OF_A_CROWD)
+            self.assertRegex(caption, "^31 targets .*the first 20 are listed$")
+            self.assertEqual(over, 0)
+            for names in (plan, picture):
+                self.assertGreater(len(names), 8, width)
+                # Who was seen last is named first.
+                self.assertEqual(names[0]["text"].split()[0], "#30")
+                for i, one in enumerate(names):
+                    self.assertGreaterEqual(one["left"], 0, one)
+                    self.assertLessEqual(one["right"], one["width"], one)
+                    for other in names[:i]:
+                        apart = one["left"] >= other["right"] or one["right"] <= other["left"] or abs(one["v"] - other["v"]) >= 10
+                        self.assertTrue(apart, (one, other))
+            if width == 1280:  # a phone has room for numbers alone
+                self.assertTrue(any("of class" in name["text"] for name in plan), plan)
+            self.screenshot(f"crowd_{width}.png")
+        self.browser.execute_cdp_cmd("Emulation.clearDeviceMetricsOverride", {})
 
     def test_says_that_the_program_is_gone_and_follows_the_next_one(self):
         camera = self.camera(settings=SETTINGS)

@@ -250,6 +250,30 @@ class Live(RosTest):
         wait_until(lambda: len(of_new_edge()) > 50, "two seconds' frames of the new edge")
         self.assert_each_record_came_once(of_new_edge(), self.running_edge)
 
+    def test_a_plane_that_is_gone_after_a_restart_is_told_to_nobody_who_comes_later(self):
+        address = self.running_edge.address
+        self.running_edge.end()
+        plane, _ = self.ground()
+        self.running_edge = self.edge(self.virtual_camera, address=address, plane=plane)
+        transforms = Inbox("/tf_static", TFMessage)
+        self.launch()
+        said, = transforms.wait_for(lambda m: m.transforms, "the plane").transforms
+        self.assertEqual((said.header.frame_id, said.child_frame_id), ("mast_base", "mast_plane"))
+        self.assertAlmostEqual(math.hypot(*vector(said.transform.translation)), 20, delta=1e-9)
+        self.assertIn("child_frame_id: \"mast_plane\"", self.told_to_who_comes_later("/tf_static"))
+
+        self.running_edge.end()
+        self.running_edge = self.edge(self.virtual_camera, address=address)
+        transforms.wait_for(lambda m: not m.transforms, "the news that there is none")
+        self.assertEqual(self.told_to_who_comes_later("/tf_static"), "transforms: []")
+
+    def told_to_who_comes_later(self, topic):
+        """What a process that subscribes only then gets first: within one process subscribers share a connection, and what came by it before."""
+        listener = self.start("rostopic", "echo", "-n", "1", topic)
+        code, lines = listener.end()
+        self.assertEqual(code, 0, listener.error_text())
+        return "\n".join(lines).removesuffix("\n---")
+
     def test_detections_become_targets_and_markers(self):
         """Something stands straight ahead; a detector, which is a node, finds it in each frame that has it."""
         width, height = 6, 4

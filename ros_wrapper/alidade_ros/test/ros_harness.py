@@ -45,10 +45,11 @@ class Inbox:
 
 
 class Edge:
-    """`alidade run` with its HTTP API, and every record that it wrote."""
+    """`alidade run` with its HTTP API, and every record that it wrote. plane: a plane.yaml, the ground under the camera."""
 
-    def __init__(self, test, camera, address="127.0.0.1:0", mode="OE"):
-        config = test.write_config(camera, output={"json": True, "http": address}, realtime={"mode": mode}, tracking={},
+    def __init__(self, test, camera, address="127.0.0.1:0", mode="OE", plane=None):
+        tracking = {"plane": plane} if plane else {}
+        config = test.write_config(camera, output={"json": True, "http": address}, realtime={"mode": mode}, tracking=tracking,
                                    video={"width": 160, "height": 96})
         self.process = test.alidade("run", "-c", config)
         self.address = None
