@@ -172,6 +172,11 @@ ZoomDay::ZoomDay(const ZoomDayPlan& plan) : plan_(plan), config_(camera_of(plan)
   config_.duration = now_s;
   config_.zoom->path.file = directory_.write("zoom.csv", table);
   camera_ = std::make_unique<ZoomingCamera>(config_, std::make_unique<DayPath>(config_, plan.seed), 0);
+  // All that the frames follow from.
+  kept_.emplace("zoom_day",
+                fmt::format("{} {} {} {} {} {} {}", plan.seed, plan.width, plan.rate_hz,
+                            plan.first_rest_s, plan.rest_s, plan.movements, plan.movements_s),
+                plan.cache);
   make_frames();
   make_samples();
   for (std::size_t i = 0; i < frames_.size(); ++i)
@@ -225,12 +230,15 @@ void ZoomDay::make_samples() {
 }
 
 std::vector<std::uint8_t> ZoomDay::image(std::size_t frame) const {
-  std::vector<std::uint8_t> pixels = camera_->image(static_cast<int>(frame));
-  const cv::Mat image(config_.image.height, config_.image.width, CV_8U, pixels.data());
+  const auto k = static_cast<int>(frame);
+  const cv::Mat image = kept_->frame(k, [&] {
+    std::vector<std::uint8_t> pixels = camera_->image(k);
+    return cv::Mat(config_.image.height, config_.image.width, CV_8U, pixels.data()).clone();
+  });
   std::vector<std::uint8_t> coded;
   cv::imencode(".jpg", image, coded, {cv::IMWRITE_JPEG_QUALITY, kJpegQuality});
   const cv::Mat decoded = cv::imdecode(coded, cv::IMREAD_GRAYSCALE);
-  return {decoded.data, decoded.data + pixels.size()};
+  return {decoded.data, decoded.data + decoded.total()};
 }
 
 double ZoomDay::telemetry_sigma() const {

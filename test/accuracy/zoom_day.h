@@ -12,11 +12,14 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "core/model/calibration.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
+#include "test/accuracy/kept_frames.h"
 #include "test/support/temporary_directory.h"
 #include "test/support/zooming_camera.h"
 
@@ -30,6 +33,7 @@ struct ZoomDayPlan {
   double rest_s = 14;        // at the second and third
   int movements = 0;         // after these
   double movements_s = 0;    // in which they are made, with rests between
+  std::string cache;         // folder where rendered frames are kept; empty: nowhere
 };
 
 class ZoomDay {
@@ -74,6 +78,7 @@ class ZoomDay {
   simulator::Config config_;
   std::vector<Rest> rests_;
   std::unique_ptr<ZoomingCamera> camera_;
+  std::optional<KeptFrames> kept_;
   std::vector<Event> events_;
   std::vector<FrameStamp> frames_;
   std::vector<PanTiltSample> samples_;

@@ -1,6 +1,7 @@
 // alidade_zoom_day: what `alidade run` makes of a camera that zooms and of which it knows the data sheet alone, faster than real time
 // and against truth (zoom_day.h): calibrated at two zooms, OE mode at a third between them, then movements of the zoom at random.
-//   alidade_zoom_day [--seed N] [--runs N] [--movements N --minutes M] [--width 480] [--details]     (README.md)
+//   alidade_zoom_day [--seed N] [--runs N] [--movements N --minutes M] [--width 480] [--cache DIR] [--details]
+// (README.md)
 // Exit status: 0 OE mode holds from the first frame at the third zoom, and no record is beyond 5 sigmas; 1 that does not hold; 2 wrong
 // usage.
 
@@ -215,7 +216,9 @@ int main(int argc, char** argv) {
   app.add_option("--width", plan.width, "px, of pictures")->check(CLI::Range(320, 1920));
   app.add_option("--movements", plan.movements, "of the zoom, at random, after the third zoom")
       ->check(CLI::Range(0, 10000));
+  app.add_option("--rate", plan.rate_hz, "of pictures, 1/s")->check(CLI::Range(5.0, 100.0));
   app.add_option("--minutes", options.minutes, "in which these are made")->check(CLI::Range(0.1, 1000.0));
+  app.add_option("--cache", plan.cache, "folder where rendered frames are kept");
   app.add_flag("--details", options.details, "the log, and a line a frame");
   try {
     app.parse(argc, argv);
