@@ -295,6 +295,9 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
       return record;
     }
   }
+  // What is left of a map that was begun at another zoom is that zoom's lens.
+  if (!elsewhere && oe_ && options_.calibrated && oe_->lens_has_moved() && oe_->map().size() == 0)
+    oe_->reset(options_.calibration, focal_length());
   if (elsewhere) {
     // The map is another zoom's.
     image_ = finds_landmarks() ? ImageView{} : image_;
@@ -332,7 +335,7 @@ bool OrientationStep::look_up_lens(double telemetry_time_s, FrameLens* lens) {
 }
 
 bool OrientationStep::reading_jumps(double age_s) const {
-  constexpr double kFastest = 3;     // 1/s: 20 times in a second
+  constexpr double kFastest = 3;      // 1/s: 20 times in a second
   constexpr double kMostSigma = 0.1;  // between two readings that lie far apart it may be anything
   const double change = std::log(read_lens_.camera.focal_length / found_focal_length_);
   const double sigma = std::min(relative_focal_length_sigma(read_lens_), kMostSigma);

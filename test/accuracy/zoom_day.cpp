@@ -92,9 +92,8 @@ class DayPath : public simulator::Path {
     pace_.resize(steps);
     for (std::size_t i = 1; i < steps; ++i) {
       const double t = (static_cast<double>(i) - 0.5) * kStep_s;
-      const double pace =
-          0.8 + std::sin(simulator::kTwoPi * t / 61 + phases_[4]) +
-          0.5 * std::sin(simulator::kTwoPi * t / 23 + phases_[5]);
+      const double pace = 0.8 + std::sin(simulator::kTwoPi * t / 61 + phases_[4]) +
+                          0.5 * std::sin(simulator::kTwoPi * t / 23 + phases_[5]);
       pace_[i] = pace_[i - 1] + kStep_s * std::clamp(pace, 0.05, 1.2);
     }
   }
@@ -142,7 +141,8 @@ ZoomDay::ZoomDay(const ZoomDayPlan& plan) : plan_(plan), config_(camera_of(plan)
   // Parts of the range of log f.
   const double first = 0.3 * unit(random);
   const double second = first + 0.4 + 0.3 * unit(random);
-  std::vector<double> places = {first, second, first + (second - first) * (0.2 + 0.6 * unit(random))};
+  std::vector<double> places = {first, second,
+                                first + (second - first) * (0.2 + 0.6 * unit(random))};
   std::vector<double> rests_s = {plan.first_rest_s, plan.rest_s, plan.rest_s};
   for (int i = 0; i < plan.movements; ++i) places.push_back(unit(random));
   std::vector<double> moves_s;
@@ -158,20 +158,21 @@ ZoomDay::ZoomDay(const ZoomDayPlan& plan) : plan_(plan), config_(camera_of(plan)
   }
   const double mean_rest_s =
       plan.movements > 0 ? std::max(0.0, plan.movements_s - moving_s) / plan.movements : 0;
-  for (int i = 0; i < plan.movements; ++i)
-    rests_s.push_back(0.2 + mean_rest_s * 2 * unit(random));
+  for (int i = 0; i < plan.movements; ++i) rests_s.push_back(0.2 + mean_rest_s * 2 * unit(random));
   std::string table = "time_s,zoom\n";
   double now_s = 0;
   for (std::size_t i = 0; i < places.size(); ++i) {
     const double log_f = log_wide + places[i] * log_range;
     const double reading = curve.reading(curve.part_at(log_f));
     rests_.push_back({now_s, now_s + rests_s[i], std::exp(log_f)});
-    table += fmt::format("{:.6f},{:.9f}\n{:.6f},{:.9f}\n", now_s, reading, now_s + rests_s[i], reading);
+    table +=
+        fmt::format("{:.6f},{:.9f}\n{:.6f},{:.9f}\n", now_s, reading, now_s + rests_s[i], reading);
     now_s += rests_s[i] + (i < moves_s.size() ? moves_s[i] : 0);
   }
   config_.duration = now_s;
   config_.zoom->path.file = directory_.write("zoom.csv", table);
-  camera_ = std::make_unique<ZoomingCamera>(config_, std::make_unique<DayPath>(config_, plan.seed), 0);
+  camera_ =
+      std::make_unique<ZoomingCamera>(config_, std::make_unique<DayPath>(config_, plan.seed), 0);
   // All that the frames follow from.
   kept_.emplace("zoom_day",
                 fmt::format("{} {} {} {} {} {} {}", plan.seed, plan.width, plan.rate_hz,
@@ -183,9 +184,8 @@ ZoomDay::ZoomDay(const ZoomDayPlan& plan) : plan_(plan), config_(camera_of(plan)
     events_.push_back({true, frames_[i].receive_time_s, i});
   for (std::size_t i = 0; i < samples_.size(); ++i)
     events_.push_back({false, samples_[i].latest_time_s, i});
-  std::stable_sort(events_.begin(), events_.end(), [](const Event& a, const Event& b) {
-    return a.host_time_s < b.host_time_s;
-  });
+  std::stable_sort(events_.begin(), events_.end(),
+                   [](const Event& a, const Event& b) { return a.host_time_s < b.host_time_s; });
 }
 
 void ZoomDay::make_frames() {
@@ -207,7 +207,8 @@ void ZoomDay::make_frames() {
 }
 
 void ZoomDay::make_samples() {
-  std::mt19937_64 random = simulator::make_generator(plan_.seed, simulator::Stream::kTelemetryStamp);
+  std::mt19937_64 random =
+      simulator::make_generator(plan_.seed, simulator::Stream::kTelemetryStamp);
   std::exponential_distribution<double> jitter(1 / kPollJitter_s);
   std::uniform_real_distribution<double> unit(0, 1);
   const DayPath path(config_, plan_.seed);
@@ -248,8 +249,9 @@ double ZoomDay::telemetry_sigma() const {
 int ZoomDay::rest_of(std::size_t frame) const {
   const double t = camera_->time_s(static_cast<int>(frame));
   const double end_s = t + config_.camera.line_delay * config_.image.height;
-  const auto next = std::upper_bound(rests_.begin(), rests_.end(), std::max(0.0, std::min(t, end_s)),
-                                     [](double time_s, const Rest& rest) { return time_s < rest.from_s; });
+  const auto next =
+      std::upper_bound(rests_.begin(), rests_.end(), std::max(0.0, std::min(t, end_s)),
+                       [](double time_s, const Rest& rest) { return time_s < rest.from_s; });
   const Rest& rest = *std::prev(next);
   return std::max(t, end_s) <= rest.to_s ? static_cast<int>(next - rests_.begin()) - 1 : -1;
 }

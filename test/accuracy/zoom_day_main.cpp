@@ -49,7 +49,8 @@ struct Tally {
   double first_s = 0;
   bool first_is_oe = false;
 
-  void add(double time_s, const OrientationRecord& record, const FrameErrors& errors, double log_error) {
+  void add(double time_s, const OrientationRecord& record, const FrameErrors& errors,
+           double log_error) {
     if (frames++ == 0) {
       first_s = time_s;
       first_is_oe = record.calibrated && record.mode == RecordMode::kOe;
@@ -149,7 +150,7 @@ bool run(const Options& options) {
       }
       const int rest = day.rest_of(event.index);
       if (rest >= 0) rest_before = rest;
-      Tally& tally = rest >= 0 ? at_rest[static_cast<std::size_t>(rest)]
+      Tally& tally = rest >= 0          ? at_rest[static_cast<std::size_t>(rest)]
                      : rest_before == 1 ? moving_to_third
                                         : moving;
       tally.add(time_s, record, errors, log_error);
@@ -157,7 +158,8 @@ bool run(const Options& options) {
                           std::max(errors.sigmas, errors.log_sigmas) > kMostSigmas;
       if (beyond || options.details) {
         std::printf(
-            "  %8.2f s %s f %8.1f reading %6.0f %s %s, %d landmarks, rms %.3f px, %.2f sigmas, log f "
+            "  %8.2f s %s f %8.1f reading %6.0f %s %s, %d landmarks, rms %.3f px, %.2f sigmas, log "
+            "f "
             "%.1e, %.2f sigmas\n",
             time_s, rest >= 0 ? "rests" : "moves", camera.camera().lens_at(time_s).focal_length,
             record.zoom.value_or(-1), to_string(record.mode), to_string(record.status),
@@ -188,18 +190,22 @@ bool run(const Options& options) {
   moving.print(rests.size() > kNames.size() ? "moving, all else" : "moving to the second");
   if (later.frames > 0) {
     later.print("at rest, later");
-    std::printf("  %d of %zu rests begin in OE mode\n", begun_in_oe, at_rest.size() - kNames.size());
+    std::printf("  %d of %zu rests begin in OE mode\n", begun_in_oe,
+                at_rest.size() - kNames.size());
   }
-  std::printf("  %d calibrations taken over; resident %.0f MiB in the first quarter, %.0f at most\n",
-              consumer.published(), first_mib, most_mib);
+  std::printf(
+      "  %d calibrations taken over; resident %.0f MiB in the first quarter, %.0f at most\n",
+      consumer.published(), first_mib, most_mib);
   Tally all = moving;
   all.add(moving_to_third);
   for (const Tally& tally : at_rest) all.add(tally);
   const Tally& third = at_rest[kThird];
   const bool held = third.first_is_oe && third.oe == third.frames;
   const bool in_time = at_rest[0].first_oe_s && *at_rest[0].first_oe_s <= kLatestOe_s;
-  std::printf("  OE in %s frames of the third zoom from its first on; first OE %s; %d records beyond 5 sigmas\n",
-              held ? "all" : "NOT all", in_time ? "in time" : "LATE", all.beyond);
+  std::printf(
+      "  OE in %s frames of the third zoom from its first on; first OE %s; %d records beyond 5 "
+      "sigmas\n",
+      held ? "all" : "NOT all", in_time ? "in time" : "LATE", all.beyond);
   std::fflush(stdout);
   return held && in_time && all.beyond == 0;
 }
@@ -217,7 +223,8 @@ int main(int argc, char** argv) {
   app.add_option("--movements", plan.movements, "of the zoom, at random, after the third zoom")
       ->check(CLI::Range(0, 10000));
   app.add_option("--rate", plan.rate_hz, "of pictures, 1/s")->check(CLI::Range(5.0, 100.0));
-  app.add_option("--minutes", options.minutes, "in which these are made")->check(CLI::Range(0.1, 1000.0));
+  app.add_option("--minutes", options.minutes, "in which these are made")
+      ->check(CLI::Range(0.1, 1000.0));
   app.add_option("--cache", plan.cache, "folder where rendered frames are kept");
   app.add_flag("--details", options.details, "the log, and a line a frame");
   try {

@@ -233,7 +233,6 @@ TEST_F(FollowedZoom, AfterTwoSecondsWithoutFocusLandmarksHoldAgain) {
     const OrientationRecord record = add(k, reading, k >= from && k < until);
     expect_honest(k, record);
     last = record.mode;
-    if (std::getenv("DBG")) std::printf("%d %s %s %d moves %d\n", k, to_string(record.mode), to_string(record.status), record.landmarks, moves(k));
     if (k >= from && k < until) {
       EXPECT_EQ(record.mode, RecordMode::kPt) << k;
     }

@@ -187,9 +187,10 @@ Calibration LensFollower::answer(const Calibration& calibration, const OwnLens& 
   const double unknown = options_.distortion_change * since;
   const ParameterDirection own_errors = unshared(scale);
   // By landmarks with such errors of their own, and by this frame's, whose distortion alone can pass for that much of log f.
-  const double by_own_errors = (of_it * own_errors.asDiagonal() * of_it.transpose()).value() +
-                               own_errors[kOfDistortion] *
-                                   std::pow(columns_->of_k / calibration.camera.distortion_of_corner(), 2);
+  const double by_own_errors =
+      (of_it * own_errors.asDiagonal() * of_it.transpose()).value() +
+      own_errors[kOfDistortion] *
+          std::pow(columns_->of_k / calibration.camera.distortion_of_corner(), 2);
   Calibration out =
       scale.at(calibration, phi, variance + of_lens + unknown * unknown + by_own_errors,
                sensitivity + of_it);

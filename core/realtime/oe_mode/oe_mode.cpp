@@ -41,6 +41,7 @@ std::size_t OeMode::memory_bytes() const {
 void OeMode::reset(const Calibration& calibration, FocalLength focal_length) {
   lens_.begin(calibration.camera.focal_length);
   given_ = calibration;
+  begun_elsewhere_ = false;
   focal_length_ = focal_length;
   calibration_ = calibration;
   const Camera<double>& camera = calibration.camera;
