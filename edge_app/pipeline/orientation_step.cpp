@@ -10,6 +10,12 @@
 #include "edge_app/pipeline/frame_observations.h"
 
 namespace alidade {
+namespace {
+
+// Standard deviations of a zoom reading and of the focal length that images show: what is more is a wrong reading.
+constexpr double kExcluded = 5;
+
+}  // namespace
 
 OeOptions oe_options(const Camera<double>& camera) {
   constexpr double kLeastColumns = 24;
@@ -249,6 +255,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   const double to_middle_row_s = calibration.line_delay * (0.5 * calibration.camera.height);
   InterpolatedPanTilt measured;
   const double telemetry_time_s = clock.time_s + calibration.clock_offset + to_middle_row_s;
+  lens_time_s_ = telemetry_time_s;
   lasting_sigma_s_ = std::hypot(minimum_delay_sigma_s_, frame_time.off_line_s);
   double time_sigma_s = std::hypot(clock.sigma_s, minimum_delay_sigma_s_);
   QueryStatus query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
@@ -282,12 +289,15 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
     if (follows_lens() && look_up_lens(telemetry_time_s, &lens)) {
       record.calibrated = true;
       record.camera = pack(lens.calibration);
-      const bool excluded = found_focal_length_ > 0;
+      const bool excluded = reading_excluded_;
       orient(has_result(query) ? &measured : nullptr, image, &lens, &record);
-      events->zoom_contradicted = !excluded && found_focal_length_ > 0;
+      events->zoom_contradicted = !excluded && reading_excluded_;
       return record;
     }
   }
+  // What is left of a map that was begun at another zoom is that zoom's lens.
+  if (!elsewhere && oe_ && options_.calibrated && oe_->lens_has_moved() && oe_->map().size() == 0)
+    oe_->reset(options_.calibration, focal_length());
   if (elsewhere) {
     // The map is another zoom's.
     image_ = finds_landmarks() ? ImageView{} : image_;
@@ -306,12 +316,12 @@ bool OrientationStep::look_up_lens(double telemetry_time_s, FrameLens* lens) {
     return false;
   }
   read_lens_ = lens->calibration;
-  lens_time_s_ = telemetry_time_s;
   constexpr double kLongest_s = 0.5;  // without landmarks: as LensTrackOptions::longest_s
   const double age_s = telemetry_time_s - found_time_s_;
   if (!(age_s < kLongest_s)) found_focal_length_ = 0;
+  if (!(found_focal_length_ > 0)) reading_excluded_ = false;
   FrameLens found;
-  if (found_focal_length_ > 0 &&
+  if (found_focal_length_ > 0 && (reading_excluded_ || reading_jumps(age_s)) &&
       lens_of_focal_length(options_.zoom_curve, found_focal_length_ * std::exp(found_rate_ * age_s),
                            &found)) {
     *lens = found;
@@ -324,15 +334,24 @@ bool OrientationStep::look_up_lens(double telemetry_time_s, FrameLens* lens) {
   return true;
 }
 
-void OrientationStep::judge_reading(const FrameOrientation& found) {
-  constexpr double kExcluded = 5;  // standard deviations
-  const Camera<double>& camera = found.calibration.camera;
-  const double change = std::log(camera.focal_length / read_lens_.camera.focal_length);
-  const double sigma = std::hypot(relative_focal_length_sigma(found.calibration),
-                                  relative_focal_length_sigma(read_lens_));
-  found_focal_length_ = std::abs(change) > kExcluded * sigma ? camera.focal_length : 0;
+bool OrientationStep::reading_jumps(double age_s) const {
+  constexpr double kFastest = 3;      // 1/s: 20 times in a second
+  constexpr double kMostSigma = 0.1;  // between two readings that lie far apart it may be anything
+  const double change = std::log(read_lens_.camera.focal_length / found_focal_length_);
+  const double sigma = std::min(relative_focal_length_sigma(read_lens_), kMostSigma);
+  return std::abs(change) > kFastest * std::abs(age_s) + kExcluded * sigma;
+}
+
+void OrientationStep::judge_reading(const FrameOrientation& found, bool against_reading) {
+  found_focal_length_ = found.calibration.camera.focal_length;
   found_rate_ = found.zoom_rate;
   found_time_s_ = lens_time_s_;
+  reading_excluded_ = false;
+  if (!against_reading) return;
+  const double change = std::log(found_focal_length_ / read_lens_.camera.focal_length);
+  const double sigma = std::hypot(relative_focal_length_sigma(found.calibration),
+                                  relative_focal_length_sigma(read_lens_));
+  reading_excluded_ = std::abs(change) > kExcluded * sigma;
 }
 
 void OrientationStep::orient_between(const InterpolatedPanTilt* measured, double telemetry_time_s,
@@ -379,7 +398,7 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
     return;
   }
   record->mode = frame.mode == OrientationMode::kOe ? RecordMode::kOe : RecordMode::kPt;
-  if (lens != nullptr && record->mode == RecordMode::kOe) judge_reading(frame);
+  if (record->mode == RecordMode::kOe) judge_reading(frame, lens != nullptr);
   record->landmarks = frame.landmarks;
   if (focal_length() == FocalLength::kLearnt) record->camera = pack(frame.calibration);
   if (record->mode == RecordMode::kOe) record->residual_px = residual_rms(*oe_);

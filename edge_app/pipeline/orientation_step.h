@@ -181,15 +181,18 @@ class OrientationStep {
   void orient_between(const InterpolatedPanTilt* measured, double telemetry_time_s,
                       OrientationRecord* record);
 
-  // What the zoom's readings say of a frame's lens; where OE mode excluded that in the frame before, the curve's at the focal length
-  // that OE mode found.
+  // What the zoom's readings say of a frame's lens; where OE mode excluded that in the frame before, or no lens goes there so fast,
+  // the curve's at the focal length that OE mode found.
   [[nodiscard]] bool look_up_lens(double telemetry_time_s, FrameLens* lens);
-  // After OE mode's answer: whether it excludes what the reading says.
-  void judge_reading(const FrameOrientation& found);
+  // Faster than any lens from what OE mode found, age_s ago.
+  [[nodiscard]] bool reading_jumps(double age_s) const;
+  // After OE mode's answer: whether it excludes what the reading says, if that was asked.
+  void judge_reading(const FrameOrientation& found, bool against_reading);
 
   std::optional<double> zoom_;  // as last reported
   Calibration read_lens_;       // by the readings, of the frame last added
-  // Of OE mode where it excludes the reading, at that frame's time; focal length 0: it does not.
+  // Of OE mode's latest answer, at that frame's time; focal length 0: there is none, or none of use.
+  bool reading_excluded_ = false;  // by it
   double found_focal_length_ = 0;  // px
   double found_rate_ = 0;          // 1/s
   double found_time_s_ = 0;        // telemetry time

@@ -3,8 +3,6 @@
 //   alidade_endurance [--camera-bump] [--small] [--json FILE] [--plot FILE.html]     (README.md)
 // Exit status: 0 all that is asked holds, 1 it does not (listed last), 2 wrong usage, unreadable files.
 
-#include <unistd.h>
-
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <fstream>
@@ -15,20 +13,12 @@
 #include "test/accuracy/endurance_consumer.h"
 #include "test/accuracy/endurance_day.h"
 #include "test/accuracy/endurance_judge.h"
+#include "test/accuracy/resident_memory.h"
 
 namespace alidade::test {
 namespace {
 
 constexpr std::size_t kBatch = 64;  // frames rendered before they are looked at
-
-// Pages of this process that are in memory, MiB.
-double resident_mib() {
-  std::ifstream statm("/proc/self/statm");
-  double size = 0;
-  double resident = 0;
-  statm >> size >> resident;
-  return resident * static_cast<double>(::sysconf(_SC_PAGESIZE)) / (1 << 20);
-}
 
 constexpr double kZoomTolerance = 2;  // device units: 0.04 % of the focal length
 // Beyond what was in memory when a quarter of the day was over. Records kept for the report are up to 8 MiB of it, the

@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <functional>
 #include <map>
 #include <memory>
 #include <vector>
@@ -78,8 +79,9 @@ class FollowedZoom : public testing::Test {
     return std::round(camera_->camera().zoom()->reading(std::max(0.0, t)));
   }
 
-  // All telemetry to a little behind the frame; stuck: the zoom's reading stands still since then.
-  OrientationRecord add(int k, std::optional<double> stuck = std::nullopt) {
+  // All telemetry to a little behind the frame; told: the zoom's reading at a time, where it is not the lens'; blurred: nothing is seen.
+  OrientationRecord add(int k, const std::function<double(double)>& told = reading,
+                        bool blurred = false) {
     const double until_s = camera_->time_s(k) + 2 * kTelemetryInterval_s;
     for (; fed_s_ <= until_s; fed_s_ += kTelemetryInterval_s) {
       PanTiltSample sample;
@@ -88,7 +90,7 @@ class FollowedZoom : public testing::Test {
       const simulator::Angles angles = camera_->angles_at(fed_s_);
       sample.pan_rad = angles.pan + kTelemetrySigma * normal_(random_);
       sample.tilt_rad = angles.tilt + kTelemetrySigma * normal_(random_);
-      sample.zoom = stuck ? *stuck : reading(fed_s_);
+      sample.zoom = told(fed_s_);
       step_->add_telemetry(sample);
     }
     std::vector<std::uint8_t>& pixels = images_[k];
@@ -97,7 +99,9 @@ class FollowedZoom : public testing::Test {
     stamp.frame = k;
     stamp.receive_time_s = camera_->time_s(k);
     events_ = {};
-    const ImageView image = camera_->view(pixels);
+    std::vector<std::uint8_t> nothing(pixels.size());
+    for (std::uint8_t& grey : nothing) grey = static_cast<std::uint8_t>(127 + random_() % 3);
+    const ImageView image = camera_->view(blurred ? nothing : pixels);
     const AllocationGuard guard;
     const OrientationRecord record = step_->add_frame(stamp, image, &events_);
     step_->maintain();
@@ -170,7 +174,7 @@ TEST_F(FollowedZoom, StaysInOeModeWhereTheReadingIsStuckAndSaysSo) {
     int lost = 0;
     int said = 0;
     for (int k = 2; k < first_of_tele_ + 5; ++k) {
-      const OrientationRecord record = add(k, stuck);
+      const OrientationRecord record = add(k, [stuck](double) { return stuck; });
       if (k <= last_of_wide_) continue;
       expect_honest(k, record);
       lost += record.mode == RecordMode::kOe ? 0 : 1;
@@ -179,6 +183,61 @@ TEST_F(FollowedZoom, StaysInOeModeWhereTheReadingIsStuckAndSaysSo) {
     EXPECT_LE(lost, 1);
     EXPECT_GE(said, 1);
   }
+}
+
+// As no lens can: to the other end for a tenth of a second.
+TEST_F(FollowedZoom, AReadingThatJumpsCostsNoRecordItsHonesty) {
+  const double from_s = camera_->time_s(last_of_wide_ / 2);
+  const auto jumping = [&](double t) {
+    return t >= from_s && t < from_s + 0.1 ? 9999.0 : reading(t);
+  };
+  int held = 0;
+  for (int k = 2; k <= last_of_wide_; ++k) {
+    const OrientationRecord record = add(k, jumping);
+    expect_honest(k, record);
+    held += record.mode == RecordMode::kOe ? 1 : 0;
+  }
+  EXPECT_GE(held, last_of_wide_ - 8) << "but the first, and those of the jump";
+  EXPECT_EQ(add(last_of_wide_ + 1, jumping).mode, RecordMode::kOe);
+}
+
+// From the middle of its range on it begins at its first value again.
+TEST_F(FollowedZoom, AReadingThatWrapsIsExcludedByImages) {
+  const double first = reading(0);
+  const double last = reading(camera_->time_s(first_of_tele_));
+  const auto wrapping = [&](double t) {
+    const double z = reading(t);
+    const double middle = (first + last) / 2;
+    return z < middle ? z : z - middle + first;
+  };
+  int held = 0;
+  int said = 0;
+  for (int k = 2; k < first_of_tele_ + 10; ++k) {
+    const OrientationRecord record = add(k, wrapping);
+    expect_honest(k, record);
+    if (k <= last_of_wide_) continue;
+    held += record.mode == RecordMode::kOe ? 1 : 0;
+    said += events_.zoom_contradicted ? 1 : 0;
+  }
+  EXPECT_GE(held, 0.95 * (first_of_tele_ + 9 - last_of_wide_));
+  EXPECT_GE(said, 1);
+}
+
+// Two seconds in which nothing is seen, as out of focus or where there is no texture, from the middle of a movement on.
+TEST_F(FollowedZoom, AfterTwoSecondsWithoutFocusLandmarksHoldAgain) {
+  const int from = (last_of_wide_ + first_of_tele_) / 2;
+  const int until = from + 50;
+  ASSERT_GT(until, first_of_tele_);
+  RecordMode last = RecordMode::kNone;
+  for (int k = 2; k < camera_->frames() - 2; ++k) {
+    const OrientationRecord record = add(k, reading, k >= from && k < until);
+    expect_honest(k, record);
+    last = record.mode;
+    if (k >= from && k < until) {
+      EXPECT_EQ(record.mode, RecordMode::kPt) << k;
+    }
+  }
+  EXPECT_EQ(last, RecordMode::kOe);
 }
 
 }  // namespace

@@ -23,6 +23,7 @@ bool LensFollowerOptions::validate(const char** error) const {
 }
 
 void LensFollower::begin(double focal_length) {
+  most_unknown_.setZero();
   last_reading_focal_length_ = focal_length;
   track_.reset();
   columns_.reset();
@@ -129,6 +130,7 @@ LearntLens LensFollower::learn(double time_s, const SolvedZoom& zoom, double foc
       (!reading_ || !reading_->moves) &&
       std::abs(zoom_rate) < options_.resting_sigmas * std::sqrt(zoom.covariance(1, 1));
   frames_at_rest_ = rests ? std::min(frames_at_rest_ + 1, options_.frames_at_rest) : 0;
+  note_unknown();
   LearntLens out;
   out.lens.used = true;
   out.lens.covariance = zoom.covariance;
@@ -138,6 +140,36 @@ LearntLens LensFollower::learn(double time_s, const SolvedZoom& zoom, double foc
   out.reading_sigmas =
       std::abs(state.value[0] + scale.value - told) / std::sqrt(reading_variance(scale));
   reading_contradicted_ = out.reading_sigmas > options_.excluded_sigmas;
+  return out;
+}
+
+// Landmarks of this frame have its errors for as long as they are in the map.
+void LensFollower::note_unknown() {
+  if (!reading_) return;
+  const Calibration& told = reading_->calibration;
+  const auto note = [&](Parameter p, double unit) {
+    const int i = index(p);
+    most_unknown_[i] = std::max(most_unknown_[i], told.covariance(i, i) / (unit * unit));
+  };
+  note(Parameter::kRadialDistortion, told.camera.distortion_of_corner());
+  note(Parameter::kCentreU, 1);
+  note(Parameter::kCentreV, 1);
+}
+
+ParameterDirection LensFollower::unshared(const LensScale& scale) const {
+  ParameterDirection out = ParameterDirection::Zero();
+  if (!columns_ || !reading_) return out;
+  const Calibration& told = reading_->calibration;
+  ParameterCovariance<double> in_frame = scale.others;
+  columns_->to_frame(&in_frame);
+  const auto set = [&](Parameter p, double unit, double column) {
+    const int i = index(p);
+    const double most = std::max(told.covariance(i, i), unit * unit * most_unknown_[i]);
+    out[i] = std::max(0.0, most - in_frame(i, i)) / (column * column);
+  };
+  set(Parameter::kRadialDistortion, told.camera.distortion_of_corner(), columns_->of_k);
+  set(Parameter::kCentreU, 1, 1);
+  set(Parameter::kCentreV, 1, 1);
   return out;
 }
 
@@ -153,21 +185,16 @@ Calibration LensFollower::answer(const Calibration& calibration, const OwnLens& 
   // Without a reading distortion and centre are those of the last one.
   const double since = without_reading(calibration.camera);
   const double unknown = options_.distortion_change * since;
+  const ParameterDirection own_errors = unshared(scale);
+  // By landmarks with such errors of their own, and by this frame's, whose distortion alone can pass for that much of log f.
+  const double by_own_errors =
+      (of_it * own_errors.asDiagonal() * of_it.transpose()).value() +
+      own_errors[kOfDistortion] *
+          std::pow(columns_->of_k / calibration.camera.distortion_of_corner(), 2);
   Calibration out =
-      scale.at(calibration, phi, variance + of_lens + unknown * unknown, sensitivity + of_it);
-  if (reading_) {
-    // Distortion and centre err as much as the curve says of this zoom, or as they did with the map's lens.
-    ParameterDirection factors = ParameterDirection::Ones();
-    ParameterCovariance<double> in_frame = scale.others;
-    columns_->to_frame(&in_frame);
-    for (const Parameter p :
-         {Parameter::kRadialDistortion, Parameter::kCentreU, Parameter::kCentreV}) {
-      const double before = in_frame(index(p), index(p));
-      const double there = reading_->calibration.covariance(index(p), index(p));
-      if (before > 0 && there > before) factors[index(p)] = std::sqrt(there / before);
-    }
-    out.covariance = (factors.asDiagonal() * out.covariance * factors.asDiagonal()).eval();
-  }
+      scale.at(calibration, phi, variance + of_lens + unknown * unknown + by_own_errors,
+               sensitivity + of_it);
+  out.covariance.diagonal() += own_errors;
   columns_->to_frame(&out.covariance);
   out.covariance(kOfDistortion, kOfDistortion) +=
       std::pow(unknown * out.camera.distortion_of_corner(), 2);

@@ -124,6 +124,10 @@ class LensFollower {
                                    const LensScale& scale, double phi, double variance,
                                    const Sensitivity<1>& sensitivity) const;
 
+  // Variances of distortion and centre beside what is the same at the map's zoom, as the curve says of this zoom or said of those at
+  // which landmarks were made: of another error there and here. In the map's columns.
+  [[nodiscard]] ParameterDirection unshared(const LensScale& scale) const;
+
   // phi is in the map from here on.
   void move(double phi) { track_.move(phi); }
 
@@ -133,6 +137,7 @@ class LensFollower {
     return track_.age_s(time_s) < options_.track.longest_s;
   }
   [[nodiscard]] double reading_variance(const LensScale& scale) const;
+  void note_unknown();
   // What is unknown of this camera's distortion in the corner, 1, and of its centre, px, as there is no reading: by how much log f
   // is away from the latest one's.
   [[nodiscard]] double without_reading(const Camera<double>& camera) const {
@@ -148,6 +153,8 @@ class LensFollower {
   int frames_lost_ = 0;                   // in a row
   bool reading_contradicted_ = false;     // by the frame that landmarks held last
   double last_reading_focal_length_ = 1;  // px, by the last reading
+  // Variances of distortion in the corner, 1, and centre, px^2, the largest of the readings at which landmarks held since begin().
+  ParameterDirection most_unknown_ = ParameterDirection::Zero();
 };
 
 }  // namespace alidade

@@ -41,6 +41,7 @@ std::size_t OeMode::memory_bytes() const {
 void OeMode::reset(const Calibration& calibration, FocalLength focal_length) {
   lens_.begin(calibration.camera.focal_length);
   given_ = calibration;
+  begun_elsewhere_ = false;
   focal_length_ = focal_length;
   calibration_ = calibration;
   const Camera<double>& camera = calibration.camera;
@@ -255,9 +256,10 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   FrameMotion<double> in_base = motion;
   const TiedOffset added = offset_of_answer(solved);
   in_base.angle = {motion.angle.pan + added.value.x(), motion.angle.tilt + added.value.y()};
-  const Matrix6 covariance = covariance_of_answer(solved, added);
+  Matrix6 covariance = covariance_of_answer(solved, added);
   Sensitivity<6> sensitivity = solved.sensitivity;
   sensitivity.topRows<2>() += added.sensitivity;
+  covariance += sensitivity * lens_.unshared(offset_.lens()).asDiagonal() * sensitivity.transpose();
   if (lens_is_learnt()) {
     if (lens_.columns() != nullptr) learn_own_lens(solution, motion.zoom_rate);
     answers_calibration_ =

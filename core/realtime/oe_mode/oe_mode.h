@@ -118,8 +118,8 @@ class OeMode {
                                  const InterpolatedPanTilt* at_middle_row, const FrameLens* lens,
                                  FrameOrientation* out);
 
-  // Whether the map was begun with another lens than the frame last processed had, or that lens moved.
-  [[nodiscard]] bool lens_has_moved() const { return lens_.follows(); }
+  // Whether the map was begun with another lens than the frame last processed had, or than reset() told, or that lens moved.
+  [[nodiscard]] bool lens_has_moved() const { return lens_.follows() || begun_elsewhere_; }
 
   // Map upkeep with the frame last processed; does nothing where that had no sure orientation.
   void maintain();
@@ -230,6 +230,7 @@ class OeMode {
   FocalLength focal_length_ = FocalLength::kCalibrated;
   Calibration calibration_;          // that the map is made with; but for the focal length as given
   Calibration answers_calibration_;  // where the focal length is learnt
+  bool begun_elsewhere_ = false;     // given_ is a reading's by now
   double moved_phi_ = 0;             // what of phi is in it already
   bool ready_ = false;               // there is room for the calibration's images
   std::uint32_t frames_ = 0;         // count

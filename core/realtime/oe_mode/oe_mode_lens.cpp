@@ -10,6 +10,7 @@ void OeMode::begin_lens() {
   if (lens_.follows() && lens_.reading() != nullptr) {
     // The lens that the map was begun with is gone.
     given_ = lens_.reading()->calibration;
+    begun_elsewhere_ = true;
     search_.change_lens(given_);
     in_view_.change_lens(given_, search_.options().cone_margin);
   }
@@ -44,6 +45,7 @@ bool OeMode::take_lens(const FrameLens* reading) {
       // A map begins with a lens at rest: of one that moves its landmarks would be sheared unawares.
       given_ = reading->calibration;
       reset(given_, focal_length_);
+      begun_elsewhere_ = true;
       return !reading->moves;
     }
     lens_.follow(frame_.time_s - prediction_.since_last_s(frame_.time_s),

@@ -346,6 +346,24 @@ TEST(ZoomFit, IsTheSameInAnyOrderAndWhenAReadingIsVisitedTwice) {
   EXPECT_LT(twice.covariance(0, 0), once.covariance(0, 0)) << "the mean of two repeats better";
 }
 
+// As of a device that counts towards the wide end: f falls as the reading rises, and the curve is the same the other way round.
+TEST(ZoomFit, AReadingMayFallAsTheFocalLengthRises) {
+  std::vector<Calibration> reversed = calibrations(five_visits());
+  for (Calibration& calibration : reversed) calibration.zoom = kFirst + kLast - *calibration.zoom;
+  ZoomFit fit;
+  std::string error;
+  ASSERT_TRUE(fit_zoom(reversed, fit_options(), &fit, &error)) << error;
+  const ZoomCurve curve = five_curve();
+  for (const double reading : {kFirst, 1300.0, 5000.0, 8800.0, kLast}) {
+    Calibration there;
+    Calibration other;
+    ASSERT_TRUE(curve.at(reading, &there));
+    ASSERT_TRUE(fit.curve.at(kFirst + kLast - reading, &other));
+    const double sigma = std::sqrt(there.covariance(0, 0));
+    EXPECT_NEAR(other.camera.focal_length, there.camera.focal_length, 0.5 * sigma) << reading;
+  }
+}
+
 TEST(ZoomFit, RefusesWhatIsNoCurveOfOneCamera) {
   const std::vector<Calibration> good = calibrations(five_visits());
   const auto refusal = [](const std::vector<Calibration>& all) {

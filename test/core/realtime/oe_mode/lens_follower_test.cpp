@@ -307,6 +307,48 @@ TEST_F(FollowedLens, DoubtsDistortionAndCentreWithoutAReading) {
   EXPECT_NEAR(log_variance(anew), log_variance(read), 1e-15);
 }
 
+// In f, too, which a distortion that is off passes for; and as long as landmarks made there are in the map.
+TEST_F(FollowedLens, DoubtsDistortionAndCentreAsTheCurveDidWhereLandmarksWereMade) {
+  constexpr double kUnknown = 0.01;   // in the corner, part of its distance
+  constexpr double kUnknown_px = 3;   // of the centre
+  constexpr double kByCentre = 1e-3;  // of log f, for each px of the centre
+  const auto answer_after = [&](bool vague) {
+    follower_.begin(kMapFocalLength);
+    camera_ = curve_at(kMapFocalLength).camera;
+    follow();
+    FrameLens reading = told(kMapFocalLength, true);
+    const Calibration& sharp = reading.calibration;
+    const ParameterCovariance<double> of_curve = sharp.covariance;
+    if (vague) {
+      const double of_corner = sharp.camera.distortion_of_corner();
+      const int of_k = index(Parameter::kRadialDistortion);
+      reading.calibration.covariance(of_k, of_k) += std::pow(kUnknown * of_corner, 2);
+      const int of_u = index(Parameter::kCentreU);
+      reading.calibration.covariance(of_u, of_u) += kUnknown_px * kUnknown_px;
+    }
+    const Vector2<double> l(std::log(kMapFocalLength), 0);
+    expect(kFrame_s, &reading);
+    static_cast<void>(learn(kFrame_s, l));
+    reading.calibration.covariance = of_curve;
+    expect(2 * kFrame_s, &reading);
+    OwnLens own = learn(2 * kFrame_s, l).lens;
+    own.sensitivity(0, index(Parameter::kCentreU)) = kByCentre;
+    return answer(own);
+  };
+  const Calibration sharp = answer_after(false);
+  const Calibration vague = answer_after(true);
+  const auto more = [&](Parameter p) {
+    return std::sqrt(vague.covariance(index(p), index(p)) - sharp.covariance(index(p), index(p)));
+  };
+  EXPECT_NEAR(more(Parameter::kCentreU), kUnknown_px, 0.01 * kUnknown_px);
+  EXPECT_EQ(vague.covariance(index(Parameter::kCentreV), index(Parameter::kCentreV)),
+            sharp.covariance(index(Parameter::kCentreV), index(Parameter::kCentreV)));
+  const double of_corner = sharp.camera.distortion_of_corner();
+  EXPECT_NEAR(more(Parameter::kRadialDistortion) / of_corner, kUnknown, 0.02 * kUnknown);
+  EXPECT_NEAR(std::sqrt(log_variance(vague) - log_variance(sharp)),
+              std::hypot(kUnknown, kByCentre * kUnknown_px), 0.02 * kUnknown);
+}
+
 TEST_F(FollowedLens, IsGivenUpAfterFramesWithoutLandmarksWhereItsReadingStands) {
   follow();
   const FrameLens rests = told(1.3 * kMapFocalLength);

@@ -175,6 +175,40 @@ TEST_F(ZoomingLens, IsFollowedWhereItsReadingIsStuck) {
   EXPECT_GT(contradictions, frames / 2);
 }
 
+// From the long end back to the wide one by a curve of which the distortion is known there alone, and off by what it says elsewhere,
+// either way: no direction and no focal length is beyond what the answer claims.
+TEST_F(ZoomingLens, ErrsAsItSaysWhereTheCurveKnowsTheDistortionLess) {
+  constexpr double kUnknown = 0.01;  // in the corner, part of its distance, a factor of 4 away
+  const int first = first_of_tele_ + 3;
+  int end = first;
+  while (!moves(end)) ++end;
+  while (moves(end)) ++end;
+  end += 10;
+  ASSERT_LT(end, camera_->frames());
+  for (const double error : {-kUnknown, kUnknown}) {
+    SCOPED_TRACE(error);
+    const auto lens_of = [&](int k) {
+      FrameLens lens = camera_->lens(k, kRepeatability);
+      Camera<double>& camera = lens.calibration.camera;
+      const double away = std::max(0.0, std::log(4000 / camera.focal_length) / std::log(4.0));
+      const double of_corner = camera.distortion_of_corner();
+      camera.radial_distortion += away * error * of_corner;
+      const int of_k = index(Parameter::kRadialDistortion);
+      lens.calibration.covariance(of_k, of_k) += std::pow(away * kUnknown * of_corner, 2);
+      lens.corner_by_zoom -= error / std::log(4.0);
+      return lens;
+    };
+    oe_->reset(lens_of(first).calibration, FocalLength::kLearnt);
+    int held = 0;
+    for (int k = first; k < end; ++k) {
+      const FrameLens lens = lens_of(k);
+      held += process(k, &lens) == OeStatus::kOk ? 1 : 0;
+    }
+    EXPECT_GE(held, 0.95 * (end - first));
+    EXPECT_TRUE(statistics_.own_lens);
+  }
+}
+
 // Readings in steps of 2 % have distortion and centre of another focal length: f comes out as with readings of each frame's own.
 TEST_F(ZoomingLens, IsFollowedAsWellByReadingsInCoarseSteps) {
   constexpr double kQuantum = 200;  // of 9998
