@@ -115,11 +115,11 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
   if (had_own) {
     if (follows && few) {
       set_camera(lens_.with_focal_length(expected_before.value[0], scale, calibration_.camera));
-      const Solution second = look_with_own_lens(carried, predicted);
+      Solution second = look_with_own_lens(carried, predicted);
       if (holds(second)) return second;
     }
     if (lens_.at_rest()) {
-      const Solution moved = look_unawares();
+      Solution moved = look_unawares();
       if (holds(moved)) {
         lens_.note_movement();
         return moved;
@@ -127,18 +127,18 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
     }
     if (lens_.reading() != nullptr && few) {
       set_camera(lens_.expect_by_reading(scale));
-      const Solution by_reading = look_with_own_lens(there, predicted);
+      Solution by_reading = look_with_own_lens(there, predicted);
       if (holds(by_reading)) return by_reading;
     }
   } else if (follows) {
     if (few) {
-      const Solution second = solve_about(carried, predicted);
+      Solution second = solve_about(carried, predicted);
       if (holds(second)) return second;
     }
     lens_.follow(frame_.time_s - prediction_.since_last_s(frame_.time_s),
                  calibration_.camera.focal_length);
     const Camera<double> before = calibration_.camera;
-    const Solution moved = look_unawares();
+    Solution moved = look_unawares();
     if (holds(moved)) return moved;
     set_camera(before);
     lens_.give_up();
