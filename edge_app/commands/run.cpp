@@ -87,10 +87,12 @@ std::unique_ptr<MqttPublisher> make_mqtt(const Config& config, LiveTargets* targ
 void wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport* report,
                       double duration_s) {
   const double end_s = monotonic_now_s() + duration_s;
-  for (double left_s = duration_s; left_s > 0; left_s = end_s - monotonic_now_s()) {
+  double left_s = duration_s;
+  while (left_s > 0) {
     const double wait_s = std::min(left_s, report->period_s());
     if (signals->wait(pipeline.finished_fd(), wait_s) != StopSignals::Event::kTimeout) return;
     report->tell();
+    left_s = end_s - monotonic_now_s();
   }
 }
 
