@@ -509,8 +509,10 @@ TEST_F(HttpApiWithTargetsTest, TellsTargetsWhenAskedAndAsEvents) {
   EXPECT_GT(later["targets"][0]["covariance"][0][0], target["covariance"][0][0]);
   EXPECT_THAT(get("/api/v1/targets?frame=50"), StartsWith("HTTP/1.1 409 "));
   EXPECT_THAT(get("/metrics"), HasSubstr("\nalidade_targets 1\n"));
+  // What comes with its first line may be all of it.
   std::string event = client.receive("event: targets");
-  event = client.receive("\n\n");
+  event.erase(0, event.find("event: targets"));
+  if (event.find("\n\n") == std::string::npos) event += client.receive("\n\n");
   EXPECT_THAT(event, HasSubstr("\"targets\":["));
 }
 
