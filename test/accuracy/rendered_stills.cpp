@@ -1,4 +1,5 @@
 #include "test/accuracy/rendered_stills.h"
+#include "test/accuracy/photos_of_all_scales.h"
 
 #include <algorithm>
 #include <array>
@@ -9,7 +10,6 @@
 #include <random>
 #include <sstream>
 #include <stdexcept>
-#include <tuple>
 
 #include "test/simulator/zoom_curve.h"
 
@@ -47,18 +47,7 @@ simulator::Config stills_config(const std::vector<StillView>& views, std::uint64
   config.image = {kWidth, kHeight, 1 / kEach_s};
   config.duration = kEach_s * static_cast<double>(views.size());
   config.scene.background = 0.6;
-  for (const auto& [name, azimuth, elevation, width] :
-       {std::tuple{"friends_by_Aitzol_Berasategi.jpg", 0.7, 0.4, 1.6},
-        std::tuple{"life_by_Aitzol_Berasategi.jpg", -0.5, 0.0, 7.0},
-        std::tuple{"aitzgorri_by_Aitzol_Berasategi.jpg", 1.0, 1.0, 24.0},
-        std::tuple{"picosdeeuropa_by_Aitzol_Berasategi.jpg", 0.0, 0.0, 100.0}}) {
-    simulator::PatchConfig photo;
-    photo.file = std::string(ALIDADE_TEST_DATA "/") + name;
-    photo.azimuth = radians(azimuth);
-    photo.elevation = radians(elevation);
-    photo.width = radians(width);
-    config.scene.photos.push_back(photo);
-  }
+  add_photos_of_all_scales(&config);
   simulator::PatchConfig around;
   around.projection = simulator::PatchConfig::Projection::kEquirectangular;
   around.width = radians(170);

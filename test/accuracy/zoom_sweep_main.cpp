@@ -12,11 +12,10 @@
 #include <opencv2/imgcodecs.hpp>
 #include <sstream>
 #include <string>
-#include <tuple>
 
-#include "core/model/trigonometry.h"
 #include "core/realtime/oe_mode/oe_mode.h"
 #include "test/accuracy/kept_frames.h"
+#include "test/accuracy/photos_of_all_scales.h"
 #include "test/accuracy/rendered_recording.h"
 #include "test/accuracy/statistics.h"
 #include "test/accuracy/zoom_comparison.h"
@@ -57,18 +56,7 @@ simulator::Config camera_of(const Options& options) {
   config.camera.pan_axis_offset = {-12e-3, 0};
   config.camera.tilt_axis_offset = {0, 14e-3};
   config.scene.background = 0.6;
-  for (const auto& [name, azimuth, elevation, width] :
-       {std::tuple{"friends_by_Aitzol_Berasategi.jpg", 0.7, 0.4, 1.6},
-        std::tuple{"life_by_Aitzol_Berasategi.jpg", -0.5, 0.0, 7.0},
-        std::tuple{"aitzgorri_by_Aitzol_Berasategi.jpg", 1.0, 1.0, 24.0},
-        std::tuple{"picosdeeuropa_by_Aitzol_Berasategi.jpg", 0.0, 0.0, 100.0}}) {
-    simulator::PatchConfig photo;
-    photo.file = std::string(ALIDADE_TEST_DATA "/") + name;
-    photo.azimuth = azimuth * kPi / 180;
-    photo.elevation = elevation * kPi / 180;
-    photo.width = width * kPi / 180;
-    config.scene.photos.push_back(photo);
-  }
+  add_photos_of_all_scales(&config);
   config.sensor.exposure = 1e-3;
   config.sensor.shot_noise = 0.02;
   config.sensor.read_noise = 1.3;  // 2 with the shots
