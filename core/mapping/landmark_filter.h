@@ -3,7 +3,7 @@
 //   seen from      u with sigma_px, in a picture at R, log f, of which (xi, log f) has the covariance cov_pose
 //   innovation     y = G (u - project(R, f, d)),  G = (J_u_d B_d)^-1: where it was seen, from d, in tangent_basis(d), rad
 //   eq. 8          cov_y = J_y_pose cov_pose J_y_pose^T + sigma^2 J_y_u J_y_u^T + P          pose, detection, landmark
-//   eq. 9          K = P cov_y^-1,  d <- d (+) K y
+//   eq. 9          K = P cov_y^-1,  d <- d (+) K y;  pose and detection count 1 / news of it, where the picture says so much that is new
 // The paper counts a pose's error anew in each picture; but a pose that was found from landmarks has their common error, which no number
 // of pictures tells. So a landmark's error has two parts (scene_map.h): its own, P, filtered as above, and the common one, C, which stays
 // (a Schmidt filter's):
@@ -88,21 +88,22 @@ enum class LandmarkUpdate {
 };
 
 // common: Cp. share_of_landmarks: which part of the pose's covariance comes from the landmarks' own errors, 0 to 1: S is so much of it.
+// news: above 0, to 1: which part of what this picture says was not said by the ones before it. Errors of a feature last while the light does.
 [[nodiscard]] inline LandmarkUpdate update_landmark(const LandmarkSight& sight,
                                                     const Matrix2<double>& common,
-                                                    double share_of_landmarks, double gate_sigmas,
-                                                    LandmarkState* state) {
+                                                    double share_of_landmarks, double news,
+                                                    double gate_sigmas, LandmarkState* state) {
   const Matrix2<double> cov_y = innovation_covariance(sight, state->covariance);
   if (!std::isnormal(cov_y.determinant())) return LandmarkUpdate::kSingular;
-  const Matrix2<double> information = cov_y.inverse();
-  if (!(sight.y.dot(information * sight.y) <= gate_sigmas * gate_sigmas)) {
+  if (!(sight.y.dot(cov_y.inverse() * sight.y) <= gate_sigmas * gate_sigmas)) {
     return LandmarkUpdate::kBeyondGate;
   }
-  const Matrix2<double> K = state->covariance * information;
+  const Matrix2<double> of_picture = (sight.cov_detection + sight.cov_of_pose) / news;
+  const Matrix2<double> K = state->covariance * (of_picture + state->covariance).inverse();
   const Matrix2<double> rest = Matrix2<double>::Identity() - K;
   // Joseph's form: stays positive whatever is rounded.
-  const Matrix2<double> own = rest * state->covariance * rest.transpose() +
-                              K * (sight.cov_detection + sight.cov_of_pose) * K.transpose();
+  const Matrix2<double> own =
+      rest * state->covariance * rest.transpose() + K * of_picture * K.transpose();
   const bool is_known_better = common.trace() <= state->shared_covariance.trace();
   const Matrix2<double> root = root_of(state->shared_covariance);
   const Matrix2<double> M =

@@ -11,6 +11,7 @@ namespace alidade {
 namespace {
 
 constexpr double kSecondsADay = 86400;
+constexpr double kLeastNews = 1e-6;
 constexpr double kFinestScale_px = 1.6;
 // Counts are halved here: what was long ago says little of today.
 constexpr std::uint32_t kMostLooks = 200;
@@ -55,6 +56,7 @@ bool UpkeepOptions::validate(const char** error) const {
     if (error != nullptr) *error = what;
     return false;
   };
+  if (!(lasting_s > 0)) return refuse("lasting_s must be positive");
   if (!(sigma_px > 0) || !(least_sigma_px >= 0) || !(gate_sigmas > 0) || !(wander_of_scale >= 0)) {
     return refuse("sigmas, gate and wander must not be negative, sigma_px and gate_sigmas not 0");
   }
@@ -202,14 +204,15 @@ bool LandmarkUpkeep::look(const UpkeepView& view, const SceneMap& map, Picture* 
 bool LandmarkUpkeep::follow_one(const Feature& seen, const Descriptor& descriptor, double now_utc_s,
                                 const Picture& picture, SceneLandmark* landmark) const {
   LandmarkState state{landmark->d_b, landmark->covariance, landmark->shared_covariance};
-  const double days =
-      std::clamp((now_utc_s - landmark->life.last_seen_utc_s) / kSecondsADay, 0.0, 30.0);
+  const double unseen_s = std::max(0.0, now_utc_s - landmark->life.last_seen_utc_s);
+  const double days = std::min(unseen_s / kSecondsADay, 30.0);
   const double wander = options_.wander_of_scale * landmark->scale_rad;
   state.covariance.diagonal().array() += wander * wander * days;
   LandmarkSight sight;
   if (see_landmark(picture.posed, seen.u, options_.sigma_of(seen.scale), state.d_b, &sight) !=
           ProjectionStatus::kOk ||
       update_landmark(sight, picture.common_at(state.d_b), picture.share_of_landmarks,
+                      std::clamp(unseen_s / options_.lasting_s, kLeastNews, 1.0),
                       options_.gate_sigmas, &state) != LandmarkUpdate::kOk) {
     return false;
   }

@@ -1,7 +1,8 @@
 #pragma once
 // LandmarkUpkeep: keeps a scene map true while it is used (Lisanti et al., section 3.3). Each picture whose pose was found from the map is
 // shown to it, and what becomes of the map is given back as one change:
-//   seen       direction by the landmark's own filter (landmark_filter.h), descriptor by a running average with forgetting
+//   seen       direction by the landmark's own filter (landmark_filter.h), descriptor by a running average with forgetting. Pictures that follow one
+//              another say the same: else all landmarks would follow at once what a few that creep (shadows, with the season) make of the pose
 //   born       a feature that no landmark explains, seen at one place in so many pictures running, if it stands close to the landmarks
 //              that gave the pose: the proximity check (Fig. 3), area of their bounding box over that of the box with the new one in it
 //   dead       not found for `patience_s`, and in so many pictures in which it should have been. A miss counts only where what was
@@ -27,6 +28,7 @@ struct UpkeepOptions {
       0.03;  // of a landmark's own direction, at the focal length it was seen with: what no number of pictures makes better
   double gate_sigmas = 4;
   double wander_of_scale = 0.01;  // of a landmark, in its size, in a day: leaves, shadows, warmth
+  double lasting_s = 600;         // > 0: for so long a feature's error is the same, as the light is
   // Appearance
   double forgetting = 0.1;  // weight of a new descriptor
   // Birth

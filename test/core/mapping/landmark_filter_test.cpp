@@ -132,7 +132,7 @@ TEST(LandmarkFilter, WithPosesOfItsOwnItIsAsUncertainAsItSays) {
       ASSERT_EQ(
           see_landmark(estimated, u + kSigma_px * normal2(&random), kSigma_px, state.d_b, &sight),
           ProjectionStatus::kOk);
-      ASSERT_EQ(update_landmark(sight, Matrix2<double>::Zero(), 0, 10, &state),
+      ASSERT_EQ(update_landmark(sight, Matrix2<double>::Zero(), 0, 1, 10, &state),
                 LandmarkUpdate::kOk);
     }
     const Vector2<double> error = direction_minus(state.d_b, d);
@@ -209,7 +209,7 @@ Consistency update_by_themselves(bool with_common_part, int updates) {
       for (std::size_t i = 0; i < landmarks.size(); ++i) {
         static_cast<void>(update_landmark(sights[i],
                                           with_common_part ? common : Matrix2<double>::Zero(),
-                                          with_common_part ? share : 0, 10, &landmarks[i]));
+                                          with_common_part ? share : 0, 1, 10, &landmarks[i]));
       }
     }
     Vector2<double> mean = Vector2<double>::Zero();
@@ -249,6 +249,37 @@ TEST(LandmarkFilter, WithPosesFromTheLandmarksThemselvesItDoesNotBecomeSurerThan
   EXPECT_GT(believing.nees, 2 * kFiveSigmas);
 }
 
+// The same look told four times, each time as a quarter of it, is that look.
+TEST(LandmarkFilter, QuartersOfTheSameLookAreOneLook) {
+  LandmarkSight sight;
+  sight.cov_detection << 4e-8, 1e-8, 1e-8, 2e-8;
+  sight.cov_of_pose = 5e-9 * Matrix2<double>::Identity();
+  const Vector3<double> d = Vector3<double>(1, 0.2, -0.1).normalized();
+  const Vector2<double> y(2e-4, -1e-4);
+  const Vector3<double> seen_at = direction_plus<double>(d, y);
+  const auto begin = [&] {
+    LandmarkState out{d, Matrix2<double>::Zero(), Matrix2<double>::Zero()};
+    out.covariance << 3e-8, -1e-8, -1e-8, 5e-8;
+    return out;
+  };
+  LandmarkState whole = begin();
+  sight.y = y;
+  ASSERT_EQ(update_landmark(sight, Matrix2<double>::Zero(), 0, 1, 10, &whole), LandmarkUpdate::kOk);
+  LandmarkState quarters = begin();
+  for (int i = 0; i < 4; ++i) {
+    sight.y = direction_minus(seen_at, quarters.d_b);
+    ASSERT_EQ(update_landmark(sight, Matrix2<double>::Zero(), 0, 0.25, 10, &quarters),
+              LandmarkUpdate::kOk);
+  }
+  // But for the sphere's curvature.
+  EXPECT_LT((quarters.covariance - whole.covariance).norm(), 1e-4 * whole.covariance.norm());
+  EXPECT_LT((quarters.d_b - whole.d_b).norm(), 1e-3 * (whole.d_b - d).norm());
+  // As large a step as before is beyond the gate, however little of it is news.
+  sight.y = Vector2<double>(4e-3, 0);
+  EXPECT_EQ(update_landmark(sight, Matrix2<double>::Zero(), 0, 0.01, 10, &quarters),
+            LandmarkUpdate::kBeyondGate);
+}
+
 // Where d_x passes d_y the basis turns by about 120 degrees. So coarse a sight hardly tells anything, but moves the landmark across.
 TEST(LandmarkFilter, ItsCovariancesStayWhereTheBasisJumps) {
   const Vector3<double> across = Vector3<double>(1, -1, 0).normalized();
@@ -263,7 +294,7 @@ TEST(LandmarkFilter, ItsCovariancesStayWhereTheBasisJumps) {
   sight.cov_detection = 1e-2 * Matrix2<double>::Identity();
   sight.cov_of_pose.setZero();
   sight.y = -0.1 * before.transpose() * across;
-  ASSERT_EQ(update_landmark(sight, Matrix2<double>::Zero(), 0, 4, &state), LandmarkUpdate::kOk);
+  ASSERT_EQ(update_landmark(sight, Matrix2<double>::Zero(), 0, 1, 4, &state), LandmarkUpdate::kOk);
   const Matrix<double, 3, 2> after = tangent_basis(state.d_b);
   ASSERT_GT((after - before).norm(), 1);
   EXPECT_LT((after * state.covariance * after.transpose() - own).norm(), 1e-4 * own.norm());
