@@ -144,11 +144,13 @@ OeMode::Solution OeMode::solve_about(const FrameMotion<double>& motion,
     prior.zoom = &zoom;
   }
   prior.motion.tail<2>() = predicted.motion.acceleration.vector() - motion.acceleration.vector();
-  const Vector2<double> moved = predicted.motion.angle.vector() - motion.angle.vector();
+  Vector4<double> moved;
+  moved << predicted.motion.angle.vector() - motion.angle.vector(),
+      predicted.motion.rate.vector() - motion.rate.vector();
   if (prior.has_telemetry) {
-    prior.telemetry.head<2>() = moved;
+    prior.telemetry = moved;
   } else {
-    prior.motion.head<2>() = moved;
+    prior.motion.head<4>() = moved;
   }
   Solution out;
   out.motion = motion;
