@@ -201,7 +201,6 @@ int check_links(const CheckOptions& options) {
   check_lens_prior(config, calibration.calibration.camera);
   static_cast<void>(require_plane(config));
   static_cast<void>(load_network(config.detectors.onnx));
-  require_followable_lens(config, options.config, calibration);
   if (!options.json) print_beginning(options.config, calibration);
 
   const Measured measured = measure(config, options.duration_s);

@@ -64,10 +64,15 @@ SceneCheck check_scene(const Config& config, const NamedCalibration& calibration
   scene.mechanics = map.mechanics.value_or(Mechanics<double>());
 
   LocalizationHint hint;
+  const std::optional<CurveRange> range = range_of(calibration.zoom_curve);
   // With telemetry the lens may zoom.
-  if (!has_telemetry(config)) hint.focal_length = focal_length_of(calibration.calibration);
-  hint.angular_velocity =
-      angular_velocity_of(*measured.last, calibration.calibration.camera.focal_length);
+  if (!has_telemetry(config) && !range)
+    hint.focal_length = focal_length_of(calibration.calibration);
+  // How fast pixels move says it of a known lens only.
+  if (has_telemetry(config) || !range) {
+    hint.angular_velocity =
+        angular_velocity_of(*measured.last, calibration.calibration.camera.focal_length);
+  }
   FeatureSet seen;
   scene.found = SceneSearch(map).find({picture.luma, picture.width, picture.height, picture.stride},
                                       hint, &seen);
@@ -82,7 +87,8 @@ SceneCheck check_scene(const Config& config, const NamedCalibration& calibration
       add_problem(&scene.findings, text + "; until a picture is found there are no directions");
     }
   } else if (!has_telemetry(config)) {
-    const std::string other = another_zoom(*scene.found, calibration.calibration, name);
+    const std::string other = range ? beyond_range(*scene.found, *range, name)
+                                    : another_zoom(*scene.found, calibration.calibration, name);
     if (!other.empty()) add_problem(&scene.findings, "scene map: " + other);
   }
   return scene;

@@ -112,7 +112,6 @@ int run_live(const RunOptions& options) {
   } else {
     calibration = choose_calibration(config);
   }
-  require_followable_lens(config, options.config, calibration);
   spdlog::info("calibration: {}", calibration.name);
   PipelineOptions of_pipeline = pipeline_options(config, calibration);
   of_pipeline.step.map = std::move(map);
@@ -142,7 +141,7 @@ int run_live(const RunOptions& options) {
   ImageTap tap;
   if (config.output.http) of_pipeline.tap = &tap;
   if (targets) of_pipeline.detectors = targets->detector_tap();
-  const auto scene = load_scene(config, calibration.calibration.camera);
+  const auto scene = load_scene(config, calibration);
   std::optional<SceneTap> scene_tap;
   if (scene)
     of_pipeline.scene = &scene_tap.emplace(*scene, SceneTapOptions{config.scene_map.interval_s});

@@ -11,23 +11,15 @@ bool has_telemetry(const Config& config) {
   return config.pan_tilt.type != PanTiltConfig::Type::kNone;
 }
 
-void require_followable_lens(const Config& config, const std::string& configuration,
-                             const NamedCalibration& calibration) {
-  if (has_telemetry(config) || calibration.zoom_curve.empty()) return;
-  throw CommandError(
-      kExitUsage,
-      fmt::format("{}: {} is for a lens that zooms, but with pan_tilt.type none nobody reads the "
-                  "zoom; name a calibration of one zoom, and leave the lens there",
-                  configuration, calibration.name));
-}
-
 bool open_scene(const SceneMapConfig& config, int width, int height, SceneMapFile* file,
                 SceneMap* map, std::string* error) {
   return file->open(config.file, error) && file->is_of(width, height, error) &&
          file->read(map, error);
 }
 
-std::unique_ptr<SceneLocalization> load_scene(const Config& config, const Camera<double>& camera) {
+std::unique_ptr<SceneLocalization> load_scene(const Config& config,
+                                              const NamedCalibration& calibration) {
+  const Camera<double>& camera = calibration.calibration.camera;
   const SceneMapConfig& scene_map = config.scene_map;
   if (scene_map.file.empty() || !config.realtime.landmarks) return nullptr;
   SceneMap map;
@@ -50,7 +42,7 @@ std::unique_ptr<SceneLocalization> load_scene(const Config& config, const Camera
   return std::make_unique<SceneLocalization>(
       std::move(map), scene_map.file,
       BaseJudgeOptions{scene_map.zero_sigma_rad, scene_map.correct_moved_base},
-      has_telemetry(config), std::move(store));
+      has_telemetry(config), range_of(calibration.zoom_curve), std::move(store));
 }
 
 }  // namespace alidade

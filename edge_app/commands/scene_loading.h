@@ -13,10 +13,6 @@ namespace alidade {
 
 [[nodiscard]] bool has_telemetry(const Config& config);
 
-// Where there is no telemetry, throws what a calibration of several zooms is refused with. configuration: its file.
-void require_followable_lens(const Config& config, const std::string& configuration,
-                             const NamedCalibration& calibration);
-
 // False: *error, one line: it cannot be read, or is of pictures of another size than width x height.
 [[nodiscard]] bool open_scene(const SceneMapConfig& config, int width, int height,
                               SceneMapFile* file, SceneMap* map, std::string* error);
@@ -24,6 +20,6 @@ void require_followable_lens(const Config& config, const std::string& configurat
 // Null where none is configured, or none that could be used: records need none, and go on without, in telemetry's base. Where there
 // is no telemetry, it throws.
 [[nodiscard]] std::unique_ptr<SceneLocalization> load_scene(const Config& config,
-                                                            const Camera<double>& camera);
+                                                            const NamedCalibration& calibration);
 
 }  // namespace alidade

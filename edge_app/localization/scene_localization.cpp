@@ -16,9 +16,9 @@ namespace {
 constexpr double kMilli = 1e3;
 
 // Of a frame of which nobody knows where it looks.
-LocalizationHint hint_of(const LocalizableFrame& frame) {
+LocalizationHint hint_of(const LocalizableFrame& frame, bool zooms) {
   LocalizationHint hint;
-  hint.focal_length = focal_length_of(unpack(frame.record.camera));
+  if (!zooms) hint.focal_length = focal_length_of(unpack(frame.record.camera));
   hint.angular_velocity = Eigen::Map<const Vector3<double>>(frame.angular_velocity_rad_s.data());
   return hint;
 }
@@ -50,9 +50,10 @@ std::string describe(const BaseOffset& offset) {
 
 SceneLocalization::SceneLocalization(SceneMap map, const std::string& name,
                                      const BaseJudgeOptions& options, bool has_telemetry,
-                                     StoreMapChange store)
+                                     std::optional<CurveRange> range, StoreMapChange store)
     : zero_sigma_(options.zero_sigma),
       has_telemetry_(has_telemetry),
+      range_(range),
       map_(std::move(map)),
       reference_row_(map_.reference_row),
       judge_(options),
@@ -76,8 +77,8 @@ void SceneLocalization::prepare() {
 SceneLocator::Outcome SceneLocalization::look(const LocalizableFrame& frame, ToldBase* told) {
   const double began_s = monotonic_now_s();
   const bool is_whole = !frame.record.orientation;
-  const LocalizationHint hint =
-      is_whole ? hint_of(frame) : hint_of(frame.record, zero_sigma_, reference_row_);
+  const LocalizationHint hint = is_whole ? hint_of(frame, range_.has_value())
+                                         : hint_of(frame.record, zero_sigma_, reference_row_);
   FeatureSet seen;
   const Localization found = searcher_->find(frame.image, hint, &seen);
   count(told->frame, found, monotonic_now_s() - began_s);
@@ -104,7 +105,9 @@ void SceneLocalization::keep_up(const Localization& found, const FeatureSet& see
 SceneLocator::Outcome SceneLocalization::tell_whole(const LocalizableFrame& frame,
                                                     const Localization& found, ToldBase* told) {
   const Calibration calibration = unpack(frame.record.camera);
-  const std::string other = another_zoom(found, calibration, fmt::format("frame {}", told->frame));
+  const std::string name = fmt::format("frame {}", told->frame);
+  const std::string other =
+      range_ ? beyond_range(found, *range_, name) : another_zoom(found, calibration, name);
   if (!other.empty()) {
     if (!std::exchange(is_zoom_said_, true)) spdlog::warn("scene map: {}", other);
     return Outcome::kNotFound;
@@ -121,6 +124,8 @@ SceneLocator::Outcome SceneLocalization::tell_whole(const LocalizableFrame& fram
   told->is_whole = true;
   told->R_base_from_camera = pack_matrix(found.pose.R_base_from_camera * R_reference_from_middle);
   told->R_covariance = pack_matrix(covariance);
+  told->log_f = found.pose.log_f;
+  told->log_f_variance = found.pose.covariance(3, 3);
   if (!std::exchange(is_start_said_, true)) {
     spdlog::info("scene map: frame {} is localized by {} landmarks; directions begin with it",
                  told->frame, found.matches);

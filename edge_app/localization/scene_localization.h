@@ -2,7 +2,7 @@
 // SceneLocalization: where a live picture looks by the scene map, and what that means for telemetry's base. A picture is looked for where its
 // record says, with its focal length, else in all of the map (core/mapping/localization.h); what is refused there changes nothing.
 // A movement of base or zero is logged, once. A frame without an orientation (no telemetry) is looked for in all of the map, by the
-// focal length of its calibration: at another zoom it is not told. What was found, and contradicts nothing, may keep the map up
+// focal length of its calibration: at another zoom it is not told; of a lens that zooms, by any of its zoom curve's. What was found, and contradicts nothing, may keep the map up
 // (scene_upkeep.h). One thread, but for report().
 
 #include <memory>
@@ -21,9 +21,11 @@ namespace alidade {
 
 class SceneLocalization : public SceneLocator {
  public:
-  // name: of the map, for people. has_telemetry: of the camera. store: none: the map is not kept up.
+  // name: of the map, for people. has_telemetry: of the camera; without it, range: of its focal lengths, if the lens zooms. store: none:
+  // the map is not kept up.
   SceneLocalization(SceneMap map, const std::string& name, const BaseJudgeOptions& options,
-                    bool has_telemetry = true, StoreMapChange store = nullptr);
+                    bool has_telemetry = true, std::optional<CurveRange> range = {},
+                    StoreMapChange store = nullptr);
   ~SceneLocalization() override;
 
   void prepare() override;  // makes the index of the map, which is then gone, unless it is kept up
@@ -43,6 +45,7 @@ class SceneLocalization : public SceneLocator {
 
   const double zero_sigma_;
   const bool has_telemetry_;
+  const std::optional<CurveRange> range_;
   bool is_zoom_said_ = false;
   bool is_start_said_ = false;
   SceneMap map_;

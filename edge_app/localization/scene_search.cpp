@@ -2,7 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+
+#include "edge_app/pipeline/zoom_lookup.h"
 
 namespace alidade {
 namespace {
@@ -33,6 +36,28 @@ Localization SceneSearch::find(const ImageView& image, const LocalizationHint& h
 FocalLengthPrior focal_length_of(const Calibration& calibration) {
   return {std::log(calibration.camera.focal_length),
           std::hypot(kFocalLengthSigma, relative_focal_length_sigma(calibration))};
+}
+
+std::optional<CurveRange> range_of(const ZoomCurve& curve) {
+  Calibration first;
+  Calibration last;
+  if (curve.empty() || !curve.at(curve.first_reading(), &first) ||
+      !curve.at(curve.last_reading(), &last)) {
+    return std::nullopt;
+  }
+  const auto [least, most] = std::minmax(first.camera.focal_length, last.camera.focal_length);
+  return CurveRange{least, most};
+}
+
+std::string beyond_range(const Localization& found, const CurveRange& range,
+                         const std::string& picture) {
+  const double f = std::exp(found.pose.log_f);
+  const double beyond = std::exp(kBeyondEnds);
+  if (f * beyond > range.least_px && f < range.most_px * beyond) return "";
+  return fmt::format(
+      "{} was taken with a focal length of {:.0f} px, but the calibration's zoom curve goes from "
+      "{:.0f} to {:.0f} px: calibrate the lens there, too",
+      picture, f, range.least_px, range.most_px);
 }
 
 std::string another_zoom(const Localization& found, const Calibration& calibration,

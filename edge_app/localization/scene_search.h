@@ -2,12 +2,14 @@
 // SceneSearch: asks a scene map where one picture looks, by few features first, and by more of them where those do not tell
 // (core/mapping/localization.h). Batch work: allocates. One thread at a time.
 
+#include <optional>
 #include <string>
 
 #include "core/mapping/features.h"
 #include "core/mapping/localization.h"
 #include "core/mapping/scene_map.h"
 #include "core/model/calibration.h"
+#include "core/model/zoom_curve.h"
 #include "core/realtime/image/image_view.h"
 
 namespace alidade {
@@ -32,6 +34,18 @@ class SceneSearch {
 
 // One line where what was found, kOk, contradicts a calibration that is for one zoom; else empty. picture: which.
 [[nodiscard]] std::string another_zoom(const Localization& found, const Calibration& calibration,
+                                       const std::string& picture);
+
+// Focal lengths of a zoom curve, px.
+struct CurveRange {
+  double least_px = 0;
+  double most_px = 0;
+};
+// None for an empty curve.
+[[nodiscard]] std::optional<CurveRange> range_of(const ZoomCurve& curve);
+
+// The same for a lens that zooms.
+[[nodiscard]] std::string beyond_range(const Localization& found, const CurveRange& range,
                                        const std::string& picture);
 
 }  // namespace alidade

@@ -34,7 +34,8 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
       telemetry_(empty_telemetry(false)),
       // A stored calibration was made with another connection.
       minimum_delay_sigma_s_(
-          options.other_connection && options.calibrated ? options.minimum_delay_sigma_s : 0) {
+          options.other_connection && options.calibrated ? options.minimum_delay_sigma_s : 0),
+      scene_lens_(options.calibration) {
   if (!options.oe) return;
   OeOptions oe = *options.oe;
   oe.max_width = options.calibration.camera.width;

@@ -22,6 +22,7 @@
 // A scene map that knows where a frame looked may say so later: from then on records, PT's too, are in its base.
 // Without telemetry (has_telemetry false) a localized frame tells where the camera looks, followed from there to the next
 // (scene_start.h), until OE mode's landmarks hold, which go on by the frame before. Where they are lost that begins anew: "not localized".
+// With a zoom curve that frame tells the focal length, too, and a second one that the lens stands; from there images alone tell it.
 // While there is no calibration for the camera, or none for the zoom that the pan/tilt source reports, points
 // are followed instead (start_up_tracker.h), for the calibration thread to make one of.
 // After a reconnection the stream's clock begins anew; telemetry from before it is forgotten. The least
@@ -74,7 +75,7 @@ struct OrientationStepOptions {
   MapState map;
   // With OE mode: follow points as long as there is no calibration.
   bool follow_points = false;
-  // False: a scene map alone tells where the camera looks. That takes oe, calibrated, and a lens that does not zoom.
+  // False: a scene map alone tells where the camera looks. That takes oe and calibrated.
   bool has_telemetry = true;
   double zoom_tolerance = 0;  // device units within which the calibration holds
   ZoomCurve zoom_curve;       // for other zooms; may be empty
@@ -170,6 +171,8 @@ class OrientationStep {
   void orient_by_scene(const ImageView& image, OrientationRecord* record);
   // True: landmarks hold from here on, in the base of the localized frame.
   [[nodiscard]] bool begin_by_scene(const ImageView& image, double time_s);
+  // The lens that a localized frame shows. False: it is another than was thought, or none of the zoom curve's.
+  [[nodiscard]] bool take_scene_lens(const ToldBase& told);
 
   OrientationStepOptions options_;
   FrameClock video_clock_;
@@ -184,6 +187,8 @@ class OrientationStep {
   // What the zoom's readings say of a frame's lens; where OE mode excluded that in the frame before, or no lens goes there so fast,
   // the curve's at the focal length that OE mode found.
   [[nodiscard]] bool look_up_lens(double telemetry_time_s, FrameLens* lens);
+  // The zoom curve's at the focal length that OE mode found, age_s ago. False: it found none lately.
+  [[nodiscard]] bool lens_as_found(double age_s, FrameLens* lens) const;
   // Faster than any lens from what OE mode found, age_s ago.
   [[nodiscard]] bool reading_jumps(double age_s) const;
   // After OE mode's answer: whether it excludes what the reading says, if that was asked.
@@ -204,6 +209,7 @@ class OrientationStep {
   double lasting_sigma_s_ = 0;  // of a frame's time, what it has in common with those about it
   RepeatedImages repeated_images_;
   SceneStart scene_start_;           // without telemetry
+  Calibration scene_lens_;           // likewise: that points are followed through
   bool is_beginning_ = false;        // OE mode's map begins by it
   double beginning_since_s_ = 0;     // frame time
   bool answered_by_oe_ = false;      // the frame last added, in whatever mode

@@ -1,10 +1,12 @@
 // What the scene map adds to a step: where the base is, and where a camera without telemetry looks.
 
+#include <algorithm>
 #include <cmath>
 
 #include "edge_app/pipeline/frame_observations.h"
 #include "edge_app/pipeline/orientation_step.h"
 #include "edge_app/pipeline/record_status.h"
+#include "edge_app/pipeline/zoom_lookup.h"
 
 namespace alidade {
 
@@ -17,10 +19,37 @@ bool OrientationStep::ask_where_it_looks(Vector3<double>* angular_velocity) {
 
 void OrientationStep::settle_base(const ToldBase& told) {
   if (told.is_whole) {
-    scene_start_.settle(told);
+    if (take_scene_lens(told)) {
+      scene_start_.settle(told);
+    } else {
+      scene_start_.forget();
+    }
     return;
   }
   if (oe_ && oe_->settle_base(unpack(told))) tied_time_s_ = told.time_s;
+}
+
+// What was followed from the told frame on was followed through the lens of the one before: where that was another, once more.
+bool OrientationStep::take_scene_lens(const ToldBase& told) {
+  if (focal_length() == FocalLength::kCalibrated) return true;
+  FrameLens lens;
+  if (!lens_of_focal_length(options_.zoom_curve, std::exp(told.log_f), &lens)) return false;
+  const double change = told.log_f - std::log(scene_lens_.camera.focal_length);
+  const double sigma =
+      std::hypot(relative_focal_length_sigma(scene_lens_), std::sqrt(told.log_f_variance));
+  scene_lens_ = lens.calibration;
+  Camera<double>& camera = scene_lens_.camera;
+  camera = zoomed(camera, told.log_f - std::log(camera.focal_length));
+  // Told by images, not by the curve.
+  const int f = index(Parameter::kFocalLength);
+  scene_lens_.covariance.row(f).setZero();
+  scene_lens_.covariance.col(f).setZero();
+  scene_lens_.covariance(f, f) = camera.focal_length * camera.focal_length * told.log_f_variance;
+  constexpr double kExcluded = 4;  // standard deviations
+  // Of log f: turns are followed well enough with less, and with more not at all.
+  constexpr double kLeast = 2e-3;
+  constexpr double kMost = 1e-2;
+  return std::abs(change) < std::clamp(kExcluded * sigma, kLeast, kMost);
 }
 
 void OrientationStep::note_tie(OrientationRecord* record) const {
@@ -37,9 +66,19 @@ void OrientationStep::orient_by_scene(const ImageView& image, OrientationRecord*
   record->status = RecordStatus::kNotLocalized;
   if (!finds_landmarks()) return;
   FrameOrientation frame;
-  if (!is_beginning_ && oe_->process(image, *record->time_s, nullptr, &frame) == OeStatus::kOk) {
+  FrameLens lens;
+  constexpr double kStands = 0.02;  // 1/s, of log f: less is the noise of it
+  const bool has_lens = oe_->lens_has_moved() && lens_as_found(lens_time_s_ - found_time_s_, &lens);
+  lens.moves = std::abs(found_rate_) > kStands;
+  if (!is_beginning_ && oe_->process(image, *record->time_s, nullptr, has_lens ? &lens : nullptr,
+                                     &frame) == OeStatus::kOk) {
     scene_start_.forget();
     answered_by_oe_ = true;
+    judge_reading(frame, false);
+    if (focal_length() == FocalLength::kLearnt) {
+      record->camera = pack(frame.calibration);
+      scene_lens_ = frame.calibration;
+    }
     record->mode = RecordMode::kOe;
     record->status = status_of_telemetry(QueryStatus::kOk, false, record->clock_locked);
     record->landmarks = frame.landmarks;
@@ -54,7 +93,7 @@ void OrientationStep::orient_by_scene(const ImageView& image, OrientationRecord*
   } else {
     tracks_.count = 0;
   }
-  scene_start_.add(options_.calibration, tracks_);
+  scene_start_.add(scene_lens_, tracks_);
   if (begin_by_scene(image, *record->time_s)) {
     scene_start_.forget();
     is_beginning_ = false;
@@ -64,18 +103,19 @@ void OrientationStep::orient_by_scene(const ImageView& image, OrientationRecord*
 bool OrientationStep::begin_by_scene(const ImageView& image, double time_s) {
   constexpr double kLongest_s = 1;  // that texture is waited for
   InterpolatedPanTilt by_scene;
-  const bool is_found = scene_start_.find(options_.calibration, time_s, &by_scene);
+  const bool is_found = scene_start_.find(scene_lens_, time_s, &by_scene);
   if (is_beginning_ && (!is_found || !(time_s - beginning_since_s_ < kLongest_s))) {
     is_beginning_ = false;
     scene_start_.forget();
-    oe_->reset(options_.calibration, focal_length());
+    oe_->reset(scene_lens_, focal_length());
     return false;
   }
   if (!is_found) return false;
   if (!is_beginning_) {
     is_beginning_ = true;
     beginning_since_s_ = time_s;
-    oe_->reset(options_.calibration, focal_length());
+    found_focal_length_ = 0;
+    oe_->reset(scene_lens_, focal_length());
   }
   FrameOrientation frame;
   if (oe_->process(image, time_s, &by_scene, &frame) != OeStatus::kOk || !oe_->ask_about_base())

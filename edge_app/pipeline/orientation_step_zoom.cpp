@@ -10,6 +10,7 @@ namespace {
 
 // Standard deviations of a zoom reading and of the focal length that images show: what is more is a wrong reading.
 constexpr double kExcluded = 5;
+constexpr double kLongest_s = 0.5;  // without landmarks: as LensTrackOptions::longest_s
 
 }  // namespace
 
@@ -38,21 +39,28 @@ bool OrientationStep::look_up_lens(double telemetry_time_s, FrameLens* lens) {
     return false;
   }
   read_lens_ = lens->calibration;
-  constexpr double kLongest_s = 0.5;  // without landmarks: as LensTrackOptions::longest_s
   const double age_s = telemetry_time_s - found_time_s_;
   if (!(age_s < kLongest_s)) found_focal_length_ = 0;
   if (!(found_focal_length_ > 0)) reading_excluded_ = false;
   FrameLens found;
   if (found_focal_length_ > 0 && (reading_excluded_ || reading_jumps(age_s)) &&
-      lens_of_focal_length(options_.zoom_curve, found_focal_length_ * std::exp(found_rate_ * age_s),
-                           &found)) {
+      lens_as_found(age_s, &found)) {
     *lens = found;
-    lens->rate = found_rate_;
-    constexpr double kAcceleration = 2;  // 1/s^2, a motor's
-    const double change = kAcceleration * age_s * age_s / 2 * lens->calibration.camera.focal_length;
-    const int f = index(Parameter::kFocalLength);
-    lens->calibration.covariance(f, f) += change * change;
   }
+  return true;
+}
+
+bool OrientationStep::lens_as_found(double age_s, FrameLens* lens) const {
+  if (!(found_focal_length_ > 0) || !(age_s < kLongest_s)) return false;
+  if (!lens_of_focal_length(options_.zoom_curve,
+                            found_focal_length_ * std::exp(found_rate_ * age_s), lens)) {
+    return false;
+  }
+  lens->rate = found_rate_;
+  constexpr double kAcceleration = 2;  // 1/s^2, a motor's
+  const double change = kAcceleration * age_s * age_s / 2 * lens->calibration.camera.focal_length;
+  const int f = index(Parameter::kFocalLength);
+  lens->calibration.covariance(f, f) += change * change;
   return true;
 }
 

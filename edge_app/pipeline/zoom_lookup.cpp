@@ -134,10 +134,9 @@ bool lens_of_focal_length(const ZoomCurve& curve, double focal_length, FrameLens
   double at_a = 0;
   double at_b = 0;
   if (!log_at(a, &at_a) || !log_at(b, &at_b)) return false;
-  constexpr double kBeyond = 0.02;  // of log f: by so much a lens may miss the ends
   if (at_a * at_b > 0) {
     const bool near_a = std::abs(at_a) < std::abs(at_b);
-    if (std::min(std::abs(at_a), std::abs(at_b)) > kBeyond) return false;
+    if (std::min(std::abs(at_a), std::abs(at_b)) > kBeyondEnds) return false;
     if (!curve.at(near_a ? a : b, &lens->calibration)) return false;
     set_slopes(curve, lens);
     lens->moves = true;

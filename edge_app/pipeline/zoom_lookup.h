@@ -46,6 +46,8 @@ class ZoomLookup {
   std::size_t count_ = 0;  // of all
 };
 
+// By so much of log f a lens may miss the curve's ends.
+inline constexpr double kBeyondEnds = 0.02;
 // As the curve has it at the reading where it has this focal length, px: for a lens whose reading is wrong. moves is set. Just beyond
 // an end: as there. False: the curve does not come there.
 [[nodiscard]] bool lens_of_focal_length(const ZoomCurve& curve, double focal_length,

@@ -11,6 +11,7 @@
 #include "core/calibration/zoom_fit.h"
 #include "edge_app/pipeline/orientation_step.h"
 #include "test/support/allocation_guard.h"
+#include "test/support/scene_teller.h"
 #include "test/support/zooming_camera.h"
 
 namespace alidade::test {
@@ -57,11 +58,14 @@ class FollowedZoom : public testing::Test {
     begin(3);
   }
 
-  // seed: of telemetry's noise.
-  void begin(std::uint64_t seed) {
+  // seed: of telemetry's noise, or of what a scene map tells without it.
+  void begin(std::uint64_t seed, bool has_telemetry = true) {
     OrientationStepOptions options;
     options.zoom_curve = curve_;
-    EXPECT_TRUE(curve_.at(reading(0), &options.calibration));
+    // Without telemetry nobody knows at which zoom it begins.
+    const double begins = has_telemetry ? reading(0) : camera_->reading_of(2200);
+    EXPECT_TRUE(curve_.at(begins, &options.calibration));
+    options.has_telemetry = has_telemetry_ = has_telemetry;
     options.calibrated = true;
     options.video_stamp_sigma_s = 1e-5;
     options.telemetry_noise.pan_tilt_sigma = kTelemetrySigma;
@@ -83,7 +87,7 @@ class FollowedZoom : public testing::Test {
   OrientationRecord add(int k, const std::function<double(double)>& told = reading,
                         bool blurred = false) {
     const double until_s = camera_->time_s(k) + 2 * kTelemetryInterval_s;
-    for (; fed_s_ <= until_s; fed_s_ += kTelemetryInterval_s) {
+    for (; has_telemetry_ && fed_s_ <= until_s; fed_s_ += kTelemetryInterval_s) {
       PanTiltSample sample;
       sample.earliest_time_s = fed_s_ - 1e-5;
       sample.latest_time_s = fed_s_ + 1e-5;
@@ -125,6 +129,7 @@ class FollowedZoom : public testing::Test {
   static std::map<int, std::vector<std::uint8_t>> images_;
   std::unique_ptr<OrientationStep> step_;
   StepEvents events_;
+  bool has_telemetry_ = true;
   double fed_s_ = 0;
   std::mt19937_64 random_;
   std::normal_distribution<double> normal_;
@@ -238,6 +243,59 @@ TEST_F(FollowedZoom, AfterTwoSecondsWithoutFocusLandmarksHoldAgain) {
     }
   }
   EXPECT_EQ(last, RecordMode::kOe);
+}
+
+// A camera of which a scene map alone tells where it looks, and with which focal length: that of another zoom than the calibration's, and
+// again after half a second in which nothing is seen; between, images alone.
+TEST_F(FollowedZoom, WithoutTelemetryAMapTellsTheFocalLengthAndImagesFollowIt) {
+  const int dark_from = first_of_tele_ + 1;
+  const int dark_until = dark_from + 13;
+  const auto is_dark = [&](int k) { return k >= dark_from && k < dark_until; };
+  constexpr double kLogSigma = 5e-4;
+  SceneTeller teller(
+      [&](int k) -> std::optional<SceneTeller::Truth> {
+        if (is_dark(k)) return std::nullopt;
+        const double t = camera_->middle_s(k);
+        const simulator::Angles angles = camera_->angles_at(t);
+        return SceneTeller::Truth{
+            R_base_from_camera(Mechanics<double>(), PanTilt<double>{angles.pan, angles.tilt}),
+            std::log(camera_->camera().lens_at(t).focal_length)};
+      },
+      kLogSigma);
+  for (const std::uint64_t seed : {1U, 2U}) {
+    SCOPED_TRACE(seed);
+    begin(seed, false);
+    teller.begin(seed);
+    int first = 0;
+    int moving = 0;
+    int held_moving = 0;
+    int again = 0;
+    for (int k = 2; k < camera_->frames() - 2; ++k) {
+      const OrientationRecord record = add(k, reading, is_dark(k));
+      const bool holds = record.mode == RecordMode::kOe;
+      EXPECT_NE(record.mode, RecordMode::kPt) << k;
+      if (holds) {
+        EXPECT_FALSE(is_dark(k)) << k;
+        expect_honest(k, record);
+        EXPECT_TRUE(record.localized) << k;
+      } else {
+        EXPECT_EQ(record.status, RecordStatus::kNotLocalized) << k;
+      }
+      if (holds && first == 0) first = k;
+      if (holds && again == 0 && k >= dark_until) again = k;
+      if (moves(k)) {
+        ++moving;
+        held_moving += holds ? 1 : 0;
+      }
+      teller.follow(k, record, step_.get());
+    }
+    // Twice told, as the first is of another lens; and some frames to begin.
+    EXPECT_GT(first, 2 * SceneTeller::kAnswered);
+    EXPECT_LE(first, last_of_wide_ - 5);
+    EXPECT_GE(held_moving, 0.95 * moving);
+    EXPECT_LE(again, dark_until + SceneTeller::kAnswered + 6);
+    EXPECT_GT(again, 0);
+  }
 }
 
 }  // namespace

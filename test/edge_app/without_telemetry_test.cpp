@@ -6,7 +6,6 @@
 #include <map>
 #include <memory>
 #include <optional>
-#include <random>
 #include <vector>
 
 #include "core/model/mechanics.h"
@@ -16,6 +15,7 @@
 #include "test/support/allocation_guard.h"
 #include "test/support/frame_errors.h"
 #include "test/support/mountains.h"
+#include "test/support/scene_teller.h"
 
 namespace alidade::test {
 namespace {
@@ -26,8 +26,6 @@ constexpr int kCut = 30;      // the first frame elsewhere
 constexpr int kCovered = 55;  // the first without light
 constexpr int kOpen = 80;
 constexpr int kFrames = 100;
-constexpr int kAnswered = 6;        // frames later
-constexpr double kMapSigma = 1e-4;  // rad: 0.15 px
 
 // Turns by a third of the view a second, and is elsewhere from kCut on.
 class CutPath : public simulator::Path {
@@ -65,39 +63,32 @@ class WithoutTelemetry : public testing::Test {
     options.oe->maker.cell_size_px = 24;
     mechanics_ = calibration.mechanics;
     step_ = std::make_unique<OrientationStep>(options);
-    asked_.reset();
-    random_.seed(seed);
-    normal_.reset();
+    teller_.begin(seed);
   }
 
-  // The localization thread: tells kAnswered frames later, but what shows nothing is not found.
+  [[nodiscard]] Matrix3<double> R_at(double time_s) const {
+    const simulator::Angles angles = path_.at(time_s);
+    return R_base_from_camera(mechanics_, PanTilt<double>{angles.pan, angles.tilt});
+  }
+  // What shows nothing is not found.
+  [[nodiscard]] std::optional<SceneTeller::Truth> truth(int k) const {
+    if (!is_light(k)) return std::nullopt;
+    return SceneTeller::Truth{R_at(middle_s(k))};
+  }
+  [[nodiscard]] static double middle_s(int k) {
+    return k / kRate_hz + config_.camera.line_delay * 135;
+  }
   void localize(int k, const OrientationRecord& record) {
-    if (asked_ && k >= asked_->frame + kAnswered) {
-      if (is_light(static_cast<int>(asked_->frame))) step_->settle_base(*asked_);
-      asked_.reset();
-    }
-    Vector3<double> velocity;
-    if (asked_ || record.orientation || !step_->ask_where_it_looks(&velocity)) return;
-    const double middle_s = k / kRate_hz + config_.camera.line_delay * 135;
-    const simulator::Angles truth = path_.at(middle_s);
-    const Vector3<double> error(kMapSigma * normal_(random_), kMapSigma * normal_(random_),
-                                kMapSigma * normal_(random_));
-    ToldBase told;
-    told.frame = k;
-    told.time_s = *record.time_s;
-    told.is_whole = true;
-    told.R_base_from_camera = pack_matrix(
-        R_base_from_camera(mechanics_, PanTilt<double>{truth.pan, truth.tilt}) * exp_so3(error));
-    told.R_covariance = pack_matrix(kMapSigma * kMapSigma * Matrix3<double>::Identity());
-    asked_ = told;
-    if (!is_light(k)) return;
+    const auto velocity = teller_.follow(k, record, step_.get());
+    if (!velocity || !is_light(k)) return;
     // What pictures of a rolling shutter are localized with.
-    Vector3<double> of_path;
-    const simulator::Angles later = path_.at(middle_s + 1e-3);
-    of_path = angular_velocity(
-        mechanics_, PanTilt<double>{truth.pan, truth.tilt},
-        PanTilt<double>{(later.pan - truth.pan) * 1e3, (later.tilt - truth.tilt) * 1e3});
-    EXPECT_LT((velocity - of_path).norm(), 0.02) << k;
+    const double t = middle_s(k);
+    const simulator::Angles now = path_.at(t);
+    const simulator::Angles later = path_.at(t + 1e-3);
+    const Vector3<double> of_path = angular_velocity(
+        mechanics_, PanTilt<double>{now.pan, now.tilt},
+        PanTilt<double>{(later.pan - now.pan) * 1e3, (later.tilt - now.tilt) * 1e3});
+    EXPECT_LT((*velocity - of_path).norm(), 0.02) << k;
   }
 
   static bool is_light(int k) { return k < kCovered || k >= kOpen; }
@@ -126,9 +117,7 @@ class WithoutTelemetry : public testing::Test {
   static std::map<int, std::vector<std::uint8_t>> images_;
   Mechanics<double> mechanics_;
   std::unique_ptr<OrientationStep> step_;
-  std::optional<ToldBase> asked_;
-  std::mt19937_64 random_;
-  std::normal_distribution<double> normal_;
+  SceneTeller teller_{[this](int k) { return truth(k); }, 0};
 };
 
 simulator::Config WithoutTelemetry::config_;
@@ -155,14 +144,12 @@ TEST_F(WithoutTelemetry, BeginsAgainAfterACutAndANightAndIsNeverSurelyWrong) {
                     unpack(record.orientation->geometry, record.camera), &px, &square);
         EXPECT_LT(square, 25) << k << ", " << px << " px";
         ASSERT_TRUE(record.localized) << k;
-        EXPECT_NEAR(record.localized->sigma_rad, kMapSigma, 0.5 * kMapSigma) << k;
+        EXPECT_NEAR(record.localized->sigma_rad, SceneTeller::kSigma, 0.5 * SceneTeller::kSigma)
+            << k;
         if (k == kCut - 1 || k == kCovered - 1 || k == kFrames - 1) {
           const PanTilt<double> answered{record.orientation->pan_rad, record.orientation->tilt_rad};
           const Vector3<double> axis = R_base_from_camera(mechanics_, answered).col(2);
-          const simulator::Angles truth = path_.at(k / kRate_hz);
-          const Vector3<double> error_c =
-              R_base_from_camera(mechanics_, PanTilt<double>{truth.pan, truth.tilt}).transpose() *
-              axis;
+          const Vector3<double> error_c = R_at(k / kRate_hz).transpose() * axis;
           const auto& covariance = record.orientation->covariance_rad2;
           Matrix2<double> of_axis;  // turned by xi the axis moves by (xi_y, -xi_x)
           of_axis << covariance[4], -covariance[1], -covariance[1], covariance[0];
@@ -172,8 +159,9 @@ TEST_F(WithoutTelemetry, BeginsAgainAfterACutAndANightAndIsNeverSurelyWrong) {
         EXPECT_EQ(record.status, RecordStatus::kNotLocalized) << k;
       }
       // Asked in its second frame, told, begun, and held from the next on.
-      if (k == kAnswered + 4 || k == kCut - 1 || k == kCut + kAnswered + 6 || k == kCovered - 1 ||
-          k == kOpen + kAnswered + 8 || k == kFrames - 1) {
+      if (k == SceneTeller::kAnswered + 4 || k == kCut - 1 ||
+          k == kCut + SceneTeller::kAnswered + 6 || k == kCovered - 1 ||
+          k == kOpen + SceneTeller::kAnswered + 8 || k == kFrames - 1) {
         EXPECT_EQ(record.mode, RecordMode::kOe) << k;
       }
       localize(k, record);
