@@ -54,11 +54,12 @@ class ZoomingLens : public testing::Test {
     return camera_->view(pixels);
   }
 
-  OeStatus process(int k, const FrameLens* lens) {
+  OeStatus process(int k, const FrameLens* lens, bool has_telemetry = true) {
     const InterpolatedPanTilt telemetry = camera_->telemetry(k, 5e-5, 5e-4);
     const ImageView view = image(k);
     const AllocationGuard guard;
-    const OeStatus status = oe_->process(view, camera_->time_s(k), &telemetry, lens, &frame_);
+    const OeStatus status =
+        oe_->process(view, camera_->time_s(k), has_telemetry ? &telemetry : nullptr, lens, &frame_);
     statistics_ = oe_->statistics();
     oe_->maintain();
     EXPECT_EQ(guard.count(), 0);
@@ -173,6 +174,18 @@ TEST_F(ZoomingLens, IsFollowedWhereItsReadingIsStuck) {
   }
   EXPECT_GE(held, 0.95 * frames);
   EXPECT_GT(contradictions, frames / 2);
+}
+
+// Neither angles nor zoom are told on the way: each frame by the one before, and what was expected of its rates is kept in a second look.
+TEST_F(ZoomingLens, IsFollowedByImagesAlone) {
+  begin();
+  for (int k = last_of_wide_ + 1; k < first_of_tele_ + 10; ++k) {
+    const FrameLens lens = camera_->lens_of_focal_length(
+        frame_.calibration.camera.focal_length * std::exp(frame_.zoom_rate * camera_->time_s(1)),
+        kRepeatability);
+    ASSERT_EQ(process(k, oe_->lens_has_moved() ? &lens : nullptr, false), OeStatus::kOk) << k;
+    EXPECT_LT(errors_.rms_px, 0.15) << k;
+  }
 }
 
 // From the long end back to the wide one by a curve of which the distortion is known there alone, and off by what it says elsewhere,
