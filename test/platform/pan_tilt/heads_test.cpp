@@ -55,6 +55,20 @@ TEST_P(EveryHead, IsSimulatedOnceUnderTheSameKey) {
             1);
 }
 
+TEST_P(EveryHead, IsSimulatedWithAZoomIfOneOfItsKindsTellsIt) {
+  const auto model = std::find_if(
+      kHeadModels.begin(), kHeadModels.end(),
+      [](const HeadModel& of_all) { return of_all.name == std::string(GetParam().key); });
+  ASSERT_NE(model, kHeadModels.end());
+  const std::vector<HeadKind> kinds = all_head_kinds();
+  EXPECT_EQ(std::any_of(kinds.begin(), kinds.end(),
+                        [](const HeadKind& kind) {
+                          return kind.head->type == GetParam().type &&
+                                 kind.head->abilities.tells_zoom;
+                        }),
+            model->tele_zoom != 0);
+}
+
 TEST_P(EveryHead, HasAKindOverEachLink) {
   using Link = HeadServer::Link;
   for (const Link link : {Link::kSerial, Link::kTcp, Link::kUdp}) {
@@ -352,7 +366,9 @@ TEST_P(EveryHeadOnASerialLine, HasItsRatesInTheTableOfTheDocumentation) {
   std::vector<std::string> rows;
   std::istringstream table(text_of("docs/heads.md"));
   for (std::string line; std::getline(table, line);) {
-    if (line.rfind(std::string("| ") + protocol_->name(), 0) == 0) rows.push_back(line);
+    // The name alone, or with one of its modes.
+    const std::string begin = std::string("| ") + protocol_->name();
+    if (line.rfind(begin + " |", 0) == 0 || line.rfind(begin + ", ", 0) == 0) rows.push_back(line);
   }
   EXPECT_THAT(rows, Contains(HasSubstr(rates + " |")));
 }
