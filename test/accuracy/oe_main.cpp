@@ -29,7 +29,8 @@ int main(int argc, char** argv) {
       ->check(CLI::Range(2.0, 60.0));
   app.add_option("--max-chosen", options.oe.search.choice.max_chosen,
                  "landmarks looked for in a frame")
-      ->check(CLI::Range(1, alidade::LandmarkChoiceOptions::kMaxChosen));
+      ->check(CLI::Range(alidade::LandmarkChoiceOptions::kLeastChosen,
+                         alidade::LandmarkChoiceOptions::kMaxChosen));
   app.add_option("--telemetry-sigma", options.telemetry_sigma_px, "px of a picture 1920 wide")
       ->check(CLI::PositiveNumber);
   app.add_flag("--small", small, "480x270 pictures, in place of 1920x1080 (960x540: robustness)");
