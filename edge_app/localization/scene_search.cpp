@@ -27,7 +27,7 @@ SceneSearch::SceneSearch(const SceneMap& map)
 Localization SceneSearch::find(const ImageView& image, const LocalizationHint& hint,
                                FeatureSet* seen) const {
   *seen = features_in(quick_, image);
-  const Localization found = localizer_.find(*seen, hint);
+  Localization found = localizer_.find(*seen, hint);
   if (found.status == LocalizationStatus::kOk) return found;
   *seen = features_in(thorough_, image);
   return localizer_.find(*seen, hint);
