@@ -58,6 +58,7 @@ class MotionPrediction {
   // follows(frame_time_s)
   [[nodiscard]] PredictedMotion by_last_frame(double frame_time_s) const;
 
+  [[nodiscard]] bool has_last() const { return has_last_; }
   // Whether the frame before is recent enough to be carried on.
   [[nodiscard]] bool follows(double frame_time_s) const {
     return has_last_ && since_last_s(frame_time_s) < options_.longest_s;

@@ -48,8 +48,10 @@ bool OeMode::take_lens(const FrameLens* reading) {
       begun_elsewhere_ = true;
       return !reading->moves;
     }
-    lens_.follow(frame_.time_s - prediction_.since_last_s(frame_.time_s),
-                 calibration_.camera.focal_length);
+    // When the lens stood where a map that was handed over has it nobody knows.
+    const double since_s = prediction_.has_last() ? prediction_.since_last_s(frame_.time_s)
+                                                  : options_.lens.track.longest_s;
+    lens_.follow(frame_.time_s - since_s, calibration_.camera.focal_length);
   }
   const LensScale& scale = offset_.lens();
   set_camera(lens_.expect_after_last(frame_.time_s, !lens_.at_rest(), scale, calibration_.camera));

@@ -291,5 +291,20 @@ TEST_F(ZoomingLens, HandsOnWhatTheFirstLensMade) {
   EXPECT_EQ(process(last_of_wide_), OeStatus::kOk);
 }
 
+// A calibration of the zoom before, with its map, comes when the lens has left that: nobody has seen it there.
+TEST_F(ZoomingLens, IsLookedForByItsReadingWhereItsMapComesLate) {
+  begin();
+  const Calibration given = camera_->lens_at(0, kRepeatability).calibration;
+  const MapState map = oe_->map_state();
+  for (const int late : {2, 4, 8}) {
+    SCOPED_TRACE(late);
+    oe_->reset(given, map, FocalLength::kLearnt);
+    for (int k = last_of_wide_ + late; k < last_of_wide_ + late + 5; ++k) {
+      EXPECT_EQ(process(k), OeStatus::kOk) << k;
+      EXPECT_LT(errors_.rms_px, 0.15) << k;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace alidade::test
