@@ -2,8 +2,8 @@
 // SceneLocalization: where a live picture looks by the scene map, and what that means for telemetry's base. A picture is looked for where its
 // record says, with its focal length, else in all of the map (core/mapping/localization.h); what is refused there changes nothing.
 // A movement of base or zero is logged, once. A frame without an orientation (no telemetry) is looked for in all of the map, by the
-// focal length of its calibration: at another zoom it is not told; of a lens that zooms, by any of its zoom curve's. What was found, and contradicts nothing, may keep the map up
-// (scene_upkeep.h). One thread, but for report().
+// focal length of its calibration: at another zoom it is not told; of a lens that zooms, by any of its zoom curve's. What was found, and
+// contradicts nothing, may keep the map up (scene_upkeep.h). One thread, but for report().
 
 #include <memory>
 #include <mutex>
