@@ -3,10 +3,18 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <random>
+#include <vector>
+
+#include "core/calibration/landmark_elimination.h"
+#include "core/calibration/reduced_equations.h"
 
 namespace alidade::internal {
 
 namespace {
+
+// A pivot of the scaled matrix is 1 minus the share of a parameter that the others explain.
+constexpr double kMinPivot = 1e-13;
 
 // L^-1 in place of L, a lower triangle; a third of the work of solving for the identity.
 void invert_lower(Eigen::Ref<Eigen::MatrixXd> L) {
@@ -26,6 +34,13 @@ void invert_lower(Eigen::Ref<Eigen::MatrixXd> L) {
   invert_lower(L.bottomRightCorner(size - half, size - half));
 }
 
+bool solve_iteratively(const Linearisation& in, double damping, Eigen::VectorXd* x) {
+  constexpr double kTolerance = 1e-4;  // of a step, which is not exact either
+  ReducedEquations equations;
+  return equations.set(in, damping) && equations.solve(equations.g(), kTolerance, x) &&
+         x->allFinite();
+}
+
 }  // namespace
 
 bool Adjustment::reduce(const Linearisation& in, double damping) {
@@ -33,37 +48,24 @@ bool Adjustment::reduce(const Linearisation& in, double damping) {
   reduced_.diagonal() *= 1 + damping;
   reduced_g_ = in.g;
   const auto camera_row = in.H.rows() - kGlobalCount;
-  std::vector<Matrix2<double>> Y;
-  for (std::size_t l = 0; l < in.H_landmark.size(); ++l) {
-    if (in.touched_begin[l] == in.touched_begin[l + 1]) continue;  // no observation is in use
-    Matrix2<double> V = in.H_landmark[l];
-    V.diagonal() *= 1 + damping;
-    const Eigen::LLT<Matrix2<double>> llt(V);
-    if (llt.info() != Eigen::Success) return false;
-    const Matrix2<double> root_inverse = llt.matrixL().solve(Matrix2<double>::Identity());
-    const Vector2<double> y_g = root_inverse * in.g_landmark[l];
-    const Eigen::Matrix<double, kCameraCount, 2> Y_c = in.H_camera[l] * root_inverse.transpose();
-    const std::size_t begin = in.touched_begin[l];
-    const std::size_t end = in.touched_begin[l + 1];
-    Y.resize(end - begin);
-    for (std::size_t i = begin; i < end; ++i) {
-      Matrix2<double>& Y_i = Y[i - begin];
-      Y_i = in.H_touched[i] * root_inverse.transpose();
-      const int row = 2 * in.touched[i];
-      for (std::size_t j = begin; j <= i; ++j) {
-        reduced_.block<2, 2>(row, 2 * in.touched[j]) -= Y_i * Y[j - begin].transpose();
+  return eliminate_landmarks(in, damping, [&](const EliminatedLandmark& Y) {
+    const int* touched = &in.touched[in.touched_begin[Y.landmark]];
+    for (std::size_t i = 0; i < Y.points.size(); ++i) {
+      const Matrix2<double>& Y_i = Y.points[i];
+      const int row = 2 * touched[i];
+      for (std::size_t j = 0; j <= i; ++j) {
+        reduced_.block<2, 2>(row, 2 * touched[j]) -= Y_i * Y.points[j].transpose();
       }
-      reduced_.block<kCameraCount, 2>(camera_row, row) -= Y_c * Y_i.transpose();
-      reduced_g_.segment<2>(row) -= Y_i * y_g;
+      reduced_.block<kCameraCount, 2>(camera_row, row) -= Y.camera * Y_i.transpose();
+      reduced_g_.segment<2>(row) -= Y_i * Y.gradient;
     }
-    reduced_.block<kCameraCount, kCameraCount>(camera_row, camera_row) -= Y_c * Y_c.transpose();
-    reduced_g_.segment<kCameraCount>(camera_row) -= Y_c * y_g;
-  }
-  return true;
+    reduced_.block<kCameraCount, kCameraCount>(camera_row, camera_row) -=
+        Y.camera * Y.camera.transpose();
+    reduced_g_.segment<kCameraCount>(camera_row) -= Y.camera * Y.gradient;
+  });
 }
 
-bool Adjustment::solve(const Linearisation& in, double damping, Eigen::VectorXd* x,
-                       std::vector<Vector2<double>>* x_landmark) {
+bool Adjustment::solve_directly(const Linearisation& in, double damping, Eigen::VectorXd* x) {
   if (!reduce(in, damping)) return false;
   // Unit diagonal: units of the parameters play no part.
   const Eigen::VectorXd scale = reduced_.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
@@ -71,8 +73,13 @@ bool Adjustment::solve(const Linearisation& in, double damping, Eigen::VectorXd*
   const Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>, Eigen::Lower> llt(reduced_);
   if (llt.info() != Eigen::Success) return false;
   *x = scale.cwiseProduct(llt.solve(scale.cwiseProduct(reduced_g_)));
-  if (!x->allFinite()) return false;
+  return x->allFinite();
+}
 
+bool Adjustment::solve(const Linearisation& in, double damping, Eigen::VectorXd* x,
+                       std::vector<Vector2<double>>* x_landmark) {
+  if (!(is_long(in) && solve_iteratively(in, damping, x)) && !solve_directly(in, damping, x))
+    return false;
   const auto camera_row = in.H.rows() - kGlobalCount;
   x_landmark->resize(in.H_landmark.size());
   for (std::size_t l = 0; l < in.H_landmark.size(); ++l) {
@@ -144,8 +151,12 @@ bool Adjustment::descend(const LossScales& loss, int max_steps, double tolerance
 
 bool Adjustment::covariance(const Linearisation& in, GlobalMatrix* covariance,
                             double* telemetry_unknowns) {
-  // A pivot of the scaled matrix is 1 minus the share of a parameter that the others explain.
-  constexpr double kMinPivot = 1e-13;
+  return (is_long(in) && covariance_iteratively(in, covariance, telemetry_unknowns)) ||
+         covariance_directly(in, covariance, telemetry_unknowns);
+}
+
+bool Adjustment::covariance_directly(const Linearisation& in, GlobalMatrix* covariance,
+                                     double* telemetry_unknowns) {
   if (!reduce(in, 0)) return false;
   const auto size = reduced_.rows();
   const Eigen::VectorXd scale = reduced_.diagonal().cwiseMax(1e-300).cwiseSqrt().cwiseInverse();
@@ -174,6 +185,55 @@ bool Adjustment::covariance(const Linearisation& in, GlobalMatrix* covariance,
     if (h != 0) *telemetry_unknowns += (i == j ? 1 : 2) * h * inverse(i, j);
   });
   forget_reduced();
+  return true;
+}
+
+bool Adjustment::covariance_iteratively(const Linearisation& in, GlobalMatrix* covariance,
+                                        double* telemetry_unknowns) {
+  constexpr double kTolerance = 1e-6;
+  ReducedEquations equations;
+  if (!equations.set(in, 0)) return false;
+  const auto size = in.H.rows();
+  const auto first_global = size - kGlobalCount;
+  global_rows_.setZero(kGlobalCount, size);
+  Eigen::VectorXd x;
+  for (int i = 0; i < kGlobalCount; ++i) {
+    if (fixed_[static_cast<std::size_t>(i)]) continue;
+    if (!equations.solve(Eigen::VectorXd::Unit(size, first_global + i), kTolerance, &x))
+      return false;
+    // The last pivot, were it the last parameter.
+    if (1 < kMinPivot * equations.parameters()(i, i) * x[first_global + i]) return false;
+    global_rows_.row(i) = x.transpose();
+  }
+  *covariance = global_rows_.rightCols<kGlobalCount>();
+  *covariance = (0.5 * (*covariance + covariance->transpose())).eval();
+
+  // H_telemetry = L L^T but for a ridge, as telemetry does not reach all unknowns; over random signs w the mean of (L w)^T H^-1 L w is the
+  // trace (Hutchinson), with a variance of at most 2 / kProbes of it.
+  constexpr int kProbes = 8;
+  constexpr double kProbeTolerance = 1e-3;
+  constexpr double kRidge = 1e-11;
+  std::vector<Eigen::Triplet<double>> entries;
+  in.H_telemetry.for_each([&](Eigen::Index i, Eigen::Index j, double h) {
+    entries.emplace_back(static_cast<int>(i), static_cast<int>(j), h);
+  });
+  in.H.for_each([&](Eigen::Index i, Eigen::Index j, double h) {
+    if (i == j) entries.emplace_back(static_cast<int>(i), static_cast<int>(i), kRidge * h);
+  });
+  Eigen::SparseMatrix<double> H_telemetry(size, size);
+  H_telemetry.setFromTriplets(entries.begin(), entries.end());
+  const OrderedCholesky llt(H_telemetry);
+  if (llt.info() != Eigen::Success) return false;
+  std::mt19937 random;
+  double trace = 0;
+  for (int k = 0; k < kProbes; ++k) {
+    Eigen::VectorXd signs(size);
+    for (double& sign : signs) sign = (random() & 1) != 0 ? 1 : -1;
+    const Eigen::VectorXd b = llt.matrixL() * signs;
+    if (!equations.solve(b, kProbeTolerance, &x)) return false;
+    trace += b.dot(x) / kProbes;
+  }
+  *telemetry_unknowns = trace;
   return true;
 }
 

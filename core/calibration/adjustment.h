@@ -2,8 +2,9 @@
 // Bundle adjustment of one calibration: Levenberg-Marquardt on the exact Jacobians of linearisation.h, landmarks
 // eliminated first.
 // The normal equations are solved here and not by Ceres, against which the tests hold them: Ceres takes longer for the
-// same minimum (docs/measurements.md), and what knots, noise and covariance need of the reduced normal matrix falls out. Landmarks tie distant times together on a path that returns, so the matrix left
-// over the control points is dense.
+// same minimum (docs/measurements.md), and what knots, noise and covariance need of the reduced normal matrix falls out. Landmarks tie
+// distant times together on a path that returns, so the matrix left over the control points is dense: by Cholesky up to
+// kLargestDirect rows, else by conjugate gradients (reduced_equations.h) and, where these do not converge, by Cholesky.
 // Allocates; one object for each thread.
 
 #include <Eigen/Core>
@@ -16,9 +17,12 @@ namespace alidade::internal {
 
 class Adjustment {
  public:
+  static constexpr Eigen::Index kLargestDirect = 900;
+
   Adjustment(const AdjustmentData& data, const AdjustmentPriors& priors,
-             const std::array<bool, kGlobalCount>& fixed)
-      : lineariser_(data, priors, fixed), fixed_(fixed) {}
+             const std::array<bool, kGlobalCount>& fixed,
+             Eigen::Index largest_direct = kLargestDirect)
+      : lineariser_(data, priors, fixed), fixed_(fixed), largest_direct_(largest_direct) {}
 
   void linearise(const AdjustmentState& state, const LossScales& loss, Linearisation* out) {
     lineariser_.linearise(state, loss, out);
@@ -49,6 +53,16 @@ class Adjustment {
   [[nodiscard]] int steps_taken() const { return steps_taken_; }
 
  private:
+  // So many rows that conjugate gradients are faster than Cholesky.
+  [[nodiscard]] bool is_long(const Linearisation& linearisation) const {
+    return linearisation.H.rows() > largest_direct_;
+  }
+  [[nodiscard]] bool solve_directly(const Linearisation& linearisation, double damping,
+                                    Eigen::VectorXd* x);
+  [[nodiscard]] bool covariance_directly(const Linearisation& linearisation,
+                                         GlobalMatrix* covariance, double* telemetry_unknowns);
+  [[nodiscard]] bool covariance_iteratively(const Linearisation& linearisation,
+                                            GlobalMatrix* covariance, double* telemetry_unknowns);
   [[nodiscard]] bool reduce(const Linearisation& linearisation, double damping);
   // Megabytes, and what comes between two minimisations, or after the covariance, takes as much.
   void forget_reduced() { reduced_.resize(0, 0); }
@@ -58,6 +72,7 @@ class Adjustment {
 
   Lineariser lineariser_;
   std::array<bool, kGlobalCount> fixed_;
+  Eigen::Index largest_direct_;
   int steps_taken_ = 0;
   // What served last: a few steps at a time must get as far as many at once.
   double damping_ = 1e-8;

@@ -29,6 +29,7 @@ class BorderedBand {
   }
   // The rows of the parameters: C, then D, both triangles of it.
   [[nodiscard]] Eigen::MatrixXd& border() { return border_; }
+  [[nodiscard]] const Eigen::MatrixXd& border() const { return border_; }
 
   BorderedBand& operator+=(const BorderedBand& other) {
     band_ += other.band_;

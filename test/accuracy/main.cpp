@@ -29,7 +29,7 @@ int main(int argc, char** argv) {
       ->check(CLI::IsMember({"base", "soft", "narrow"}));
   app.add_option("--data", data, "a folder with recordings of known truth, to be compared");
   app.add_flag("--disturbances", disturbances, "base recordings with one thing wrong at a time");
-  app.add_flag("--scaling", scaling, "CPU time for recordings of 10 to 80 s");
+  app.add_flag("--scaling", scaling, "CPU time for recordings of 10 to 320 s");
   app.add_option("--fields", narrow.fields_deg,
                  "of view, degrees, each a whole multiple of the next")
       ->delimiter(',');

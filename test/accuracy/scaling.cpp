@@ -13,7 +13,7 @@ void run_scaling(int runs, std::uint64_t first_seed, Report* report) {
   table.header = {"duration, s", "frames",     "observations",    "segments",
                   "median, s",   "largest, s", "over one before", "exponent"};
   double before = 0;
-  for (const int times : {1, 2, 4, 8}) {
+  for (const int times : {1, 2, 4, 8, 16, 32}) {
     std::vector<double> frames;
     std::vector<double> observations;
     std::vector<double> segments;

@@ -169,6 +169,101 @@ TEST(Adjustment, WhatIsFixedIsNoUnknownOfTheTelemetry) {
   EXPECT_LT(without_fixed, all + 1e-6);
 }
 
+// What conjugate gradients find, and Cholesky.
+class IterativeAdjustment : public ::testing::Test {
+ protected:
+  static constexpr Eigen::Index kAlways = 0;
+
+  void SetUp() override {
+    double i = 0;
+    for (auto& observation : scene_.data.observations) {
+      observation.u += 0.3 * Vector2<double>(std::sin(7.1 * i), std::cos(3.3 * i));
+      ++i;
+    }
+  }
+
+  AdjustmentScene scene_ = make_adjustment_scene();
+};
+
+TEST_F(IterativeAdjustment, TakesTheStepsOfTheDirectOne) {
+  Adjustment direct(scene_.data, scene_.priors, scene_.fixed);
+  Adjustment iterative(scene_.data, scene_.priors, scene_.fixed, kAlways);
+  Linearisation at;
+  direct.linearise(scene_.state, {}, &at);
+  Eigen::VectorXd x;
+  Eigen::VectorXd x_direct;
+  std::vector<Vector2<double>> x_landmark;
+  std::vector<Vector2<double>> x_landmark_direct;
+  for (const double damping : {0.0, 1e-8, 0.3, 1e4}) {
+    ASSERT_TRUE(direct.solve(at, damping, &x_direct, &x_landmark_direct));
+    ASSERT_TRUE(iterative.solve(at, damping, &x, &x_landmark));
+    double promised = x.dot(at.g);
+    double promised_direct = x_direct.dot(at.g);
+    for (std::size_t l = 0; l < x_landmark.size(); ++l) {
+      promised += x_landmark[l].dot(at.g_landmark[l]);
+      promised_direct += x_landmark_direct[l].dot(at.g_landmark[l]);
+    }
+    // The square of an error of 1e-3 of the step, and no gift: what is not a Galerkin projection promises too much.
+    EXPECT_NEAR(promised, promised_direct, 1e-6 * promised_direct) << damping;
+    EXPECT_NE(x, x_direct);
+  }
+}
+
+TEST_F(IterativeAdjustment, EndsAtTheSameMinimum) {
+  AdjustmentState state = scene_.state;
+  AdjustmentState state_direct = scene_.state;
+  Linearisation at;
+  Linearisation at_direct;
+  Adjustment direct(scene_.data, scene_.priors, scene_.fixed);
+  Adjustment iterative(scene_.data, scene_.priors, scene_.fixed, kAlways);
+  ASSERT_TRUE(direct.minimise({}, 20, 1e-4, &state_direct, &at_direct));
+  ASSERT_TRUE(iterative.minimise({}, 20, 1e-4, &state, &at));
+  // Each is within what its last step promised.
+  EXPECT_NEAR(at.cost, at_direct.cost, 1e-4);
+}
+
+TEST_F(IterativeAdjustment, HasTheCovarianceOfTheDirectOne) {
+  scene_.fixed[static_cast<std::size_t>(index(Parameter::kAspect))] = true;
+  Adjustment direct(scene_.data, scene_.priors, scene_.fixed);
+  Adjustment iterative(scene_.data, scene_.priors, scene_.fixed, kAlways);
+  Linearisation at;
+  direct.linearise(scene_.state, {}, &at);
+  GlobalMatrix C;
+  GlobalMatrix C_direct;
+  double unknowns = 0;
+  double unknowns_direct = 0;
+  ASSERT_TRUE(direct.covariance(at, &C_direct, &unknowns_direct));
+  ASSERT_TRUE(iterative.covariance(at, &C, &unknowns));
+  const GlobalVector sigma = C_direct.diagonal().cwiseSqrt();
+  EXPECT_EQ(C.row(index(Parameter::kAspect)), (Eigen::Matrix<double, 1, kGlobalCount>::Zero()));
+  for (int i = 0; i < kGlobalCount; ++i) {
+    for (int j = 0; j < kGlobalCount; ++j) {
+      EXPECT_NEAR(C(i, j), C_direct(i, j), 1e-6 * sigma[i] * sigma[j]) << i << " " << j;
+    }
+  }
+  // Eight random probes: a variance of at most 2 / 8 of it. Four standard deviations.
+  EXPECT_NEAR(unknowns, unknowns_direct, 4 * std::sqrt(unknowns_direct / 4));
+  EXPECT_GT(unknowns_direct, 5);
+
+  const std::vector<Influence> influences = iterative.influences(scene_.state, at);
+  const std::vector<Influence> influences_direct = direct.influences(scene_.state, at);
+  for (std::size_t i = 0; i < influences.size(); ++i) {
+    const Influence difference = influences[i] - influences_direct[i];
+    EXPECT_LE((sigma.cwiseMax(1e-30).cwiseInverse().asDiagonal() * difference).norm(), 1e-5);
+  }
+}
+
+TEST_F(IterativeAdjustment, RefusesWhatTheDirectOneRefuses) {
+  scene_.priors.information.setZero();
+  for (auto& sample : scene_.data.telemetry) sample.used = false;
+  Adjustment iterative(scene_.data, scene_.priors, scene_.fixed, kAlways);
+  Linearisation at;
+  iterative.linearise(scene_.state, {}, &at);
+  GlobalMatrix C;
+  double unknowns = 0;
+  EXPECT_FALSE(iterative.covariance(at, &C, &unknowns));
+}
+
 TEST(Adjustment, NormalMatrixIsTheDerivativeOfItsGradientAtThePerfectFit) {
   const AdjustmentScene scene = make_adjustment_scene();
   Adjustment adjustment(scene.data, scene.priors, scene.fixed);

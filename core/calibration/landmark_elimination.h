@@ -1,0 +1,48 @@
+#pragma once
+// What is left of the normal equations H x = g when each landmark's direction is the best for whatever x is: S = H - Y Y^T, g - Y y with
+// Y = H_touched L^-T, y = L^-1 g_landmark, L L^T = H_landmark, two columns of Y a landmark.
+
+#include <Eigen/Cholesky>
+#include <cstddef>
+#include <vector>
+
+#include "core/calibration/linearisation.h"
+
+namespace alidade::internal {
+
+using CameraRows = Eigen::Matrix<double, kCameraCount, 2>;
+
+// A landmark's columns of Y and what they make of its gradient: rows of control points as in Linearisation::touched.
+struct EliminatedLandmark {
+  std::size_t landmark = 0;
+  std::vector<Matrix2<double>> points;
+  CameraRows camera;
+  Vector2<double> gradient;
+};
+
+// Calls use(EliminatedLandmark) of each landmark that is observed, every diagonal element of H multiplied by 1 + damping.
+// False if the block of one is not positive definite.
+template <class Use>
+[[nodiscard]] bool eliminate_landmarks(const Linearisation& in, double damping, Use use) {
+  EliminatedLandmark out;
+  for (std::size_t l = 0; l < in.H_landmark.size(); ++l) {
+    const std::size_t begin = in.touched_begin[l];
+    const std::size_t end = in.touched_begin[l + 1];
+    if (begin == end) continue;  // no observation is in use
+    Matrix2<double> V = in.H_landmark[l];
+    V.diagonal() *= 1 + damping;
+    const Eigen::LLT<Matrix2<double>> llt(V);
+    if (llt.info() != Eigen::Success) return false;
+    const Matrix2<double> root_inverse = llt.matrixL().solve(Matrix2<double>::Identity());
+    out.landmark = l;
+    out.gradient = root_inverse * in.g_landmark[l];
+    out.camera = in.H_camera[l] * root_inverse.transpose();
+    out.points.resize(end - begin);
+    for (std::size_t i = begin; i < end; ++i)
+      out.points[i - begin] = in.H_touched[i] * root_inverse.transpose();
+    use(static_cast<const EliminatedLandmark&>(out));
+  }
+  return true;
+}
+
+}  // namespace alidade::internal
