@@ -87,8 +87,7 @@ SceneCheck check_scene(const Config& config, const NamedCalibration& calibration
       add_problem(&scene.findings, text + "; until a picture is found there are no directions");
     }
   } else if (!has_telemetry(config)) {
-    const std::string other = range ? beyond_range(*scene.found, *range, name)
-                                    : another_zoom(*scene.found, calibration.calibration, name);
+    const std::string other = another_lens(*scene.found, calibration.calibration, range, name);
     if (!other.empty()) add_problem(&scene.findings, "scene map: " + other);
   }
   return scene;

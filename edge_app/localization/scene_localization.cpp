@@ -106,8 +106,7 @@ SceneLocator::Outcome SceneLocalization::tell_whole(const LocalizableFrame& fram
                                                     const Localization& found, ToldBase* told) {
   const Calibration calibration = unpack(frame.record.camera);
   const std::string name = fmt::format("frame {}", told->frame);
-  const std::string other =
-      range_ ? beyond_range(found, *range_, name) : another_zoom(found, calibration, name);
+  const std::string other = another_lens(found, calibration, range_, name);
   if (!other.empty()) {
     if (!std::exchange(is_zoom_said_, true)) spdlog::warn("scene map: {}", other);
     return Outcome::kNotFound;

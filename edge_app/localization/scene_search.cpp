@@ -49,19 +49,17 @@ std::optional<CurveRange> range_of(const ZoomCurve& curve) {
   return CurveRange{least, most};
 }
 
-std::string beyond_range(const Localization& found, const CurveRange& range,
-                         const std::string& picture) {
+std::string another_lens(const Localization& found, const Calibration& calibration,
+                         const std::optional<CurveRange>& range, const std::string& picture) {
   const double f = std::exp(found.pose.log_f);
-  const double beyond = std::exp(kBeyondEnds);
-  if (f * beyond > range.least_px && f < range.most_px * beyond) return "";
-  return fmt::format(
-      "{} was taken with a focal length of {:.0f} px, but the calibration's zoom curve goes from "
-      "{:.0f} to {:.0f} px: calibrate the lens there, too",
-      picture, f, range.least_px, range.most_px);
-}
-
-std::string another_zoom(const Localization& found, const Calibration& calibration,
-                         const std::string& picture) {
+  if (range) {
+    const double beyond = std::exp(kBeyondEnds);
+    if (f * beyond > range->least_px && f < range->most_px * beyond) return "";
+    return fmt::format(
+        "{} was taken with a focal length of {:.0f} px, but the calibration's zoom curve goes from "
+        "{:.0f} to {:.0f} px: calibrate the lens there, too",
+        picture, f, range->least_px, range->most_px);
+  }
   const FocalLengthPrior prior = focal_length_of(calibration);
   constexpr double kExcluded = 4;  // standard deviations
   if (std::abs(found.pose.log_f - prior.log_f) < kExcluded * prior.sigma) return "";
@@ -69,7 +67,7 @@ std::string another_zoom(const Localization& found, const Calibration& calibrati
       "{} was taken with a focal length of {:.0f} px, but the calibration is for {:.0f} px; "
       "without "
       "telemetry the lens stays at one zoom: put it back there",
-      picture, std::exp(found.pose.log_f), calibration.camera.focal_length);
+      picture, f, calibration.camera.focal_length);
 }
 
 }  // namespace alidade

@@ -32,10 +32,6 @@ class SceneSearch {
 // That of a picture that is taken to be of this calibration's zoom.
 [[nodiscard]] FocalLengthPrior focal_length_of(const Calibration& calibration);
 
-// One line where what was found, kOk, contradicts a calibration that is for one zoom; else empty. picture: which.
-[[nodiscard]] std::string another_zoom(const Localization& found, const Calibration& calibration,
-                                       const std::string& picture);
-
 // Focal lengths of a zoom curve, px.
 struct CurveRange {
   double least_px = 0;
@@ -44,8 +40,10 @@ struct CurveRange {
 // None for an empty curve.
 [[nodiscard]] std::optional<CurveRange> range_of(const ZoomCurve& curve);
 
-// The same for a lens that zooms.
-[[nodiscard]] std::string beyond_range(const Localization& found, const CurveRange& range,
+// One line where what was found, kOk, contradicts the lens of a camera without telemetry: its zoom curve's range or, where there is
+// none, the one zoom that the calibration is for; else empty. picture: which.
+[[nodiscard]] std::string another_lens(const Localization& found, const Calibration& calibration,
+                                       const std::optional<CurveRange>& range,
                                        const std::string& picture);
 
 }  // namespace alidade

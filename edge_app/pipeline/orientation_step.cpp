@@ -329,10 +329,14 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
     return;
   }
   record->mode = frame.mode == OrientationMode::kOe ? RecordMode::kOe : RecordMode::kPt;
-  if (record->mode == RecordMode::kOe) judge_reading(frame, lens != nullptr);
   record->landmarks = frame.landmarks;
+  if (lens == nullptr) allow_for_begun_movement(&frame.calibration);
   if (focal_length() == FocalLength::kLearnt) record->camera = pack(frame.calibration);
-  if (record->mode == RecordMode::kOe) record->residual_px = residual_rms(*oe_);
+  if (record->mode == RecordMode::kOe) {
+    record->residual_px = residual_rms(*oe_);
+    note_found_lens(frame);
+    if (lens != nullptr) judge_reading(frame);
+  }
   record->orientation = orientation_of(frame);
   note_tie(record);
 }

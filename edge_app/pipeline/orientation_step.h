@@ -191,8 +191,12 @@ class OrientationStep {
   [[nodiscard]] bool lens_as_found(double age_s, FrameLens* lens) const;
   // Faster than any lens from what OE mode found, age_s ago.
   [[nodiscard]] bool reading_jumps(double age_s) const;
-  // After OE mode's answer: whether it excludes what the reading says, if that was asked.
-  void judge_reading(const FrameOrientation& found, bool against_reading);
+  // Of a lens that is taken to stand.
+  void allow_for_begun_movement(Calibration* calibration) const;
+  // After OE mode's answer.
+  void note_found_lens(const FrameOrientation& found);
+  // Whether that answer, noted, excludes what the reading says.
+  void judge_reading(const FrameOrientation& found);
 
   std::optional<double> zoom_;  // as last reported
   Calibration read_lens_;       // by the readings, of the frame last added

@@ -69,12 +69,12 @@ void OrientationStep::orient_by_scene(const ImageView& image, OrientationRecord*
   FrameLens lens;
   constexpr double kStands = 0.02;  // 1/s, of log f: less is the noise of it
   const bool has_lens = oe_->lens_has_moved() && lens_as_found(lens_time_s_ - found_time_s_, &lens);
-  lens.moves = std::abs(found_rate_) > kStands;
+  if (has_lens) lens.moves = std::abs(found_rate_) > kStands;
   if (!is_beginning_ && oe_->process(image, *record->time_s, nullptr, has_lens ? &lens : nullptr,
                                      &frame) == OeStatus::kOk) {
     scene_start_.forget();
     answered_by_oe_ = true;
-    judge_reading(frame, false);
+    note_found_lens(frame);
     if (focal_length() == FocalLength::kLearnt) {
       record->camera = pack(frame.calibration);
       scene_lens_ = frame.calibration;

@@ -72,12 +72,21 @@ bool OrientationStep::reading_jumps(double age_s) const {
   return std::abs(change) > kFastest * std::abs(age_s) + kExcluded * sigma;
 }
 
-void OrientationStep::judge_reading(const FrameOrientation& found, bool against_reading) {
+void OrientationStep::allow_for_begun_movement(Calibration* calibration) const {
+  const double change = zoom_lookup_.change_about(options_.zoom_curve, lens_time_s_) *
+                        calibration->camera.focal_length;
+  const int f = index(Parameter::kFocalLength);
+  calibration->covariance(f, f) += change * change;
+}
+
+void OrientationStep::note_found_lens(const FrameOrientation& found) {
   found_focal_length_ = found.calibration.camera.focal_length;
   found_rate_ = found.zoom_rate;
   found_time_s_ = lens_time_s_;
   reading_excluded_ = false;
-  if (!against_reading) return;
+}
+
+void OrientationStep::judge_reading(const FrameOrientation& found) {
   const double change = std::log(found_focal_length_ / read_lens_.camera.focal_length);
   const double sigma = std::hypot(relative_focal_length_sigma(found.calibration),
                                   relative_focal_length_sigma(read_lens_));

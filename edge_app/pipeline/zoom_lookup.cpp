@@ -51,6 +51,24 @@ bool ZoomLookup::stands_at(double zoom, double tolerance, double time_s) const {
          std::abs(older.zoom - zoom) <= tolerance;
 }
 
+ZoomLookup::Range ZoomLookup::range_about(double time_s) const {
+  const std::size_t after = newer_of(time_s);
+  const double newer = reading(after).zoom;
+  const double older = reading(count_ > 1 ? after + 1 : after).zoom;
+  const double next = reading(after > 0 ? after - 1 : after).zoom;
+  return {std::min({newer, older, next}), std::max({newer, older, next})};
+}
+
+double ZoomLookup::change_about(const ZoomCurve& curve, double time_s) const {
+  if (count_ == 0) return 0;
+  const Range range = range_about(time_s);
+  Calibration low;
+  Calibration high;
+  if (range.low == range.high || !curve.at(range.low, &low) || !curve.at(range.high, &high))
+    return 0;
+  return std::abs(std::log(high.camera.focal_length / low.camera.focal_length));
+}
+
 bool ZoomLookup::calibration(const ZoomCurve& curve, double time_s, double readout_s,
                              Calibration* calibration) const {
   if (count_ == 0) return false;
@@ -95,10 +113,8 @@ bool ZoomLookup::lens(const ZoomCurve& curve, double time_s, double readout_s, d
   const std::size_t after = newer_of(time_s);
   const Reading& newer = reading(after);
   const Reading& older = reading(count_ > 1 ? after + 1 : after);
-  const Reading& next = reading(after > 0 ? after - 1 : after);
-  const double low = std::min({newer.zoom, older.zoom, next.zoom});
-  const double high = std::max({newer.zoom, older.zoom, next.zoom});
-  lens->moves = high - low > tolerance;
+  const Range range = range_about(time_s);
+  lens->moves = range.high - range.low > tolerance;
   lens->rate = 0;
   lens->rate_sigma = 0;
   if (!lens->moves) return true;

@@ -19,6 +19,10 @@ class ZoomLookup {
   // Whether the lens stood at this zoom then: the readings about the time are within the tolerance of it.
   [[nodiscard]] bool stands_at(double zoom, double tolerance, double time_s) const;
 
+  // By how much the readings about the time, and the one after them, say that the focal length changed, relatively, as the curve has it:
+  // a lens that begins to move has left its zoom by less than a tolerance at first. 0: by nothing, or the curve does not say.
+  [[nodiscard]] double change_about(const ZoomCurve& curve, double time_s) const;
+
   // As PT mode needs it for a frame whose middle row has this telemetry time and whose rows are read out in readout_s. False: no
   // reading, or the curve ends before it.
   [[nodiscard]] bool calibration(const ZoomCurve& curve, double time_s, double readout_s,
@@ -39,6 +43,12 @@ class ZoomLookup {
     return readings_[(count_ - 1 - back) % kKept];
   }
 
+  struct Range {
+    double low = 0;
+    double high = 0;
+  };
+  // Of the two readings about the time and of the one after them; there is one reading at least.
+  [[nodiscard]] Range range_about(double time_s) const;
   // Of the newer of the two readings about the time, or next to it; there is one at least.
   [[nodiscard]] std::size_t newer_of(double time_s) const;
 

@@ -94,6 +94,28 @@ TEST(ZoomStep, HasNoneBeyondTheCurveOrWithoutOne) {
   }
 }
 
+// In the frame in which a lens leaves its zoom its reading is still that zoom's, by the tolerance.
+TEST(ZoomStep, AMovementThatHasJustBegunCountsForTheFocalLength) {
+  constexpr double kWithin = 2;  // device units
+  OrientationStepOptions options = zooming_options();
+  options.zoom_tolerance = kWithin;
+  const auto sigma_after = [&options](double last_zoom) {
+    OrientationStep step(options);
+    for (int i = 0; i < 24; ++i) step.add_telemetry(sample_at(kInterval_s * i, 1000));
+    step.add_telemetry(sample_at(kInterval_s * 24, last_zoom));
+    const OrientationRecord record = frame_at(&step, 0.93);
+    EXPECT_EQ(record.status, RecordStatus::kOk);
+    EXPECT_EQ(record.camera.zoom, 1000) << "the calibration itself";
+    return focal_length_sigma(record);
+  };
+  const double at_rest = sigma_after(1000);
+  EXPECT_EQ(at_rest, std::sqrt(options.calibration.covariance(0, 0)));
+  // As the curve has it, which is within the nodes' sigmas of the truth.
+  const double change = test::zoom_focal_length(1000 + kWithin) - test::zoom_focal_length(1000);
+  const double begun = sigma_after(1000 + kWithin);
+  EXPECT_NEAR(std::sqrt(begun * begun - at_rest * at_rest), change, 0.05 * change);
+}
+
 // The curve knows the lens; it is the angle that is missing.
 TEST(ZoomStep, SaysThatTelemetryIsTooOldNotThatTheZoomIsUnknown) {
   OrientationStep step(zooming_options());

@@ -2,9 +2,11 @@
 // SceneTeller: the localization thread, for a step without telemetry: asked where a frame looks, it tells some frames later, with an error
 // that it states.
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <random>
+#include <utility>
 
 #include "core/model/rotation.h"
 #include "edge_app/pipeline/orientation_step.h"

@@ -237,6 +237,21 @@ class ZoomingCamera {
     return out;
   }
 
+  // Where a direction in base is seen in frame k; beyond the image's border as if rows went on there. row: near it.
+  [[nodiscard]] std::optional<Vector2<double>> true_pixel(int k, const Vector3<double>& d_base,
+                                                          double row) const {
+    if (const auto seen = camera().project_rolling(d_base, time_s(k))) return *seen;
+    std::optional<Eigen::Vector2d> seen;
+    // A row's shift by the turn within the read-out is a small part of a row.
+    for (int step = 0; step < 8; ++step) {
+      const double time = time_s(k) + row * line_delay();
+      seen =
+          camera().lens_at(time).project(camera().base_from_camera_at(time).transpose() * d_base);
+      if (!seen) return std::nullopt;
+      row = seen->y();
+    }
+    return *seen;
+  }
   // Log of the frame's focal length over the true one, at row 0.
   [[nodiscard]] double log_error(int k, const FrameOrientation& frame) const {
     return std::log(frame.calibration.camera.focal_length /
@@ -296,10 +311,9 @@ inline FrameErrors errors_of(const ZoomingCamera& camera, int k, const FrameOrie
                               (0.02 + 0.96 * row / (kRows - 1)) * size.y());
       Vector3<double> d;
       EXPECT_EQ(frame.direction(u, &d), ProjectionStatus::kOk);
-      const std::optional<Eigen::Vector2d> true_u =
-          camera.camera().project_rolling(d, camera.time_s(k));
+      const std::optional<Eigen::Vector2d> true_u = camera.true_pixel(k, d, u.y());
       if (!true_u) {
-        // So far off that the lens has no pixel for it.
+        // So far off that the lens has no place for it.
         out.sigmas = std::numeric_limits<double>::infinity();
         continue;
       }
