@@ -187,6 +187,7 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
                                                 "calibrated: {}",
                                                 calibrations.size(), jobs.size(), error));
   }
+  for (auto& [recording, job] : jobs) track_movement(recording, &job, signals);
   const std::vector<MovementObservation> movements =
       observe_movements(jobs, calibration_of, calibrations, fit.curve);
   if (!movements.empty()) {

@@ -82,13 +82,13 @@ Tables part_of(const Tables& all, const ZoomStretch& stretch) {
 
 void fill(Tables tables, CalibrationJob* job);
 
-// From one stretch to the next; nothing without tracks of it.
-std::optional<ZoomMovement> movement_between(const Tables& all, const ZoomStretch& from,
-                                             const ZoomStretch& to, CalibrationJob job) {
+// From one stretch to the next, as *to_job's; nothing without tracks of it, or pictures that may hold some.
+void add_movement(const Tables& all, const ZoomStretch& from, const ZoomStretch& to,
+                  CalibrationJob job, CalibrationJob* to_job) {
   const Span all_of_it{from.begin_s, to.end_s};
-  Tables part = part_of(all, all_of_it, all_of_it,
-                        {from.end_s - 2 * kZoomMargin_s, to.begin_s + 2 * kZoomMargin_s});
-  if (part.tracks.empty()) return std::nullopt;
+  const Span tracked{from.end_s - 2 * kZoomMargin_s, to.begin_s + 2 * kZoomMargin_s};
+  Tables part = part_of(all, all_of_it, all_of_it, tracked);
+  if (part.tracks.empty() && !job.tracks_from_video) return;
   ZoomMovement movement;
   movement.from = from;
   movement.to = to;
@@ -96,11 +96,20 @@ std::optional<ZoomMovement> movement_between(const Tables& all, const ZoomStretc
   for (const PanTiltSample& sample : part.telemetry) {
     if (sample.zoom) movement.readings.push_back({stamp_of(sample, polled), *sample.zoom});
   }
+  if (job.tracks_from_video) {
+    CalibrationInput& pictures = to_job->movement_pictures;
+    pictures.width = job.input.width;
+    pictures.height = job.input.height;
+    for (const FrameStamp& frame : part.frames) {
+      if (tracked.holds(frame.receive_time_s))
+        pictures.frames.push_back({frame.frame, frame.receive_time_s, {}});
+    }
+  }
   fill(std::move(part), &job);
   movement.input = std::move(job.input);
   movement.image_stamps = job.options.image_stamps;
   movement.telemetry_stamps = job.options.telemetry_stamps;
-  return movement;
+  to_job->movement = std::move(movement);
 }
 
 void fill(Tables tables, CalibrationJob* job) {
@@ -182,7 +191,7 @@ std::vector<CalibrationJob> load_calibration_jobs(const std::string& directory,
     fill(part_of(tables, stretch), &jobs.back());
     if (jobs.size() > 1) {
       const ZoomStretch& before = stretches[jobs.size() - 2];
-      jobs.back().movement = movement_between(tables, before, stretch, job);
+      add_movement(tables, before, stretch, job, &jobs.back());
     }
   }
   return jobs;

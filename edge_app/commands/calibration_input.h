@@ -21,8 +21,10 @@ struct CalibrationJob {
   bool tracks_from_video = false;    // input.observations are still to be found in the video
   std::optional<double> zoom;        // the reading that all of it has, device units
   std::vector<std::string> remarks;  // about the recording, for the report
-  // Of the zoom, from the stretch of the job before to this one's, where there are tracks of it.
+  // Of the zoom, from the stretch of the job before to this one's, where there are tracks of it or pictures.
   std::optional<ZoomMovement> movement;
+  CalibrationInput
+      movement_pictures;  // tracks_from_video: the frames in which its tracks are still to be found
 };
 
 // The recording, or, if its zoom moves, each stretch in which the reading stands still for kLeastStretch_s, less

@@ -121,6 +121,15 @@ CalibrationResult calibrate_job(const std::string& recording, int passes, Calibr
   return finish(std::move(first));
 }
 
+void track_movement(const std::string& recording, CalibrationJob* job, StopSignals* signals) {
+  if (!job->tracks_from_video || !job->movement) return;
+  VisibleProgress progress(recording, signals);
+  VideoTracks tracks = track_video(recording, job->movement_pictures, [&progress](double done) {
+    if (!progress.show(done, "following points while the zoom moves")) throw progress.cancelled();
+  });
+  job->movement->input.observations = choose_tracks(std::move(tracks.observations));
+}
+
 MapState map_visibly(const std::string& recording, const CalibrationResult& result,
                      StopSignals* signals) {
   VisibleProgress progress(recording, signals);

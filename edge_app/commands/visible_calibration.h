@@ -16,6 +16,9 @@ namespace alidade {
 [[nodiscard]] CalibrationResult calibrate_job(const std::string& recording, int passes,
                                               CalibrationJob* job, StopSignals* signals);
 
+// Finds the tracks of the job's movement in the video, unless the job has them.
+void track_movement(const std::string& recording, CalibrationJob* job, StopSignals* signals);
+
 // Of the recording's video.
 [[nodiscard]] MapState map_visibly(const std::string& recording, const CalibrationResult& result,
                                    StopSignals* signals);

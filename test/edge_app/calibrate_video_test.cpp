@@ -21,6 +21,7 @@ namespace {
 using ::testing::AllOf;
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 namespace fs = std::filesystem;
@@ -208,6 +209,51 @@ TEST_F(CalibrateVideo, WantsOnePassOrTwo) {
   const Result result = calibrate_command({recording(), "--passes", "3"});
   EXPECT_EQ(result.exit_code, 2);
   EXPECT_THAT(result.errors, StartsWith("alidade: "));
+}
+
+// Two dwells and the movement between them; nothing is told but video and telemetry.
+TEST_F(CalibrateVideo, WhatIsSeenWhileTheZoomMovesTellsTheFocalLengthBetween) {
+  film(directory_,
+       "seed: 4\n"
+       "duration_s: 18\n"
+       "image: {width: 320, height: 180, rate_hz: 15}\n"
+       "camera: {line_delay_us: 75, clock_offset_ms: -84.4}\n"
+       "zoom:\n"
+       "  focal_length_px: {wide: 400, tele: 1000}\n"
+       "  shape: 2\n"
+       "  sigma_rep: 0\n"
+       "  backlash: 0\n"
+       "  speed_per_s: 0.5\n"
+       "  path: {type: dwell, stops: [{focal_length_px: 450, rest_s: 8}, {focal_length_px: "
+       "900, rest_s: 8}]}\n"
+       "path: {type: triple_cosine, amplitude: 1, period_s: 7}\n"
+       "sensor: {exposure_ms: 1, read_noise: 1.5, jpeg_quality: 90}\n"
+       "telemetry: {rate_hz: 50, sigma_rad: 2.0e-4}\n"
+       "timing: {image_jitter: {sigma_ms: 0.3}, telemetry_jitter: {sigma_ms: 0.3}}\n" +
+           std::string(kTexture),
+       "zooms");
+  const Result result = calibrate_command({path("zooms"), "--json", "-o", path("out")});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_EQ(nlohmann::json::parse(result.output)["movements"], 1);
+  EXPECT_THAT(result.errors, Not(HasSubstr("was never seen")));
+  Calibration calibration;
+  ZoomCurve curve;
+  std::string error;
+  ASSERT_TRUE(load_calibration(path("out/calibration.yaml"), &calibration, &error, &curve))
+      << error;
+  int between = 0;
+  for (auto row : read_csv(directory_.read("zooms/truth.csv"))) {
+    const double f = std::stod(row["focal_length_px"]);
+    if (f < 500 || f > 800) continue;
+    ++between;
+    Calibration at;
+    ASSERT_TRUE(curve.at(std::stod(row["zoom"]), &at));
+    const double sigma = std::sqrt(at.covariance(0, 0));
+    EXPECT_LT(std::abs(at.camera.focal_length - f), 4 * sigma) << f;
+    // The dwells alone leave 3 % and more of it open.
+    EXPECT_LT(sigma, 0.01 * f);
+  }
+  EXPECT_GT(between, 10);
 }
 
 }  // namespace
