@@ -96,7 +96,7 @@ void add_movement(const Tables& all, const ZoomStretch& from, const ZoomStretch&
   for (const PanTiltSample& sample : part.telemetry) {
     if (sample.zoom) movement.readings.push_back({stamp_of(sample, polled), *sample.zoom});
   }
-  if (job.tracks_from_video) {
+  if (job.tracks_from_video && to.begin_s - from.end_s <= kLongestMovement_s) {
     CalibrationInput& pictures = to_job->movement_pictures;
     pictures.width = job.input.width;
     pictures.height = job.input.height;

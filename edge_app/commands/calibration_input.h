@@ -23,8 +23,8 @@ struct CalibrationJob {
   std::vector<std::string> remarks;  // about the recording, for the report
   // Of the zoom, from the stretch of the job before to this one's, where there are tracks of it or pictures.
   std::optional<ZoomMovement> movement;
-  CalibrationInput
-      movement_pictures;  // tracks_from_video: the frames in which its tracks are still to be found
+  // The frames in whose pictures its tracks are still to be found; none if it has them, or takes too long.
+  CalibrationInput movement_pictures;
 };
 
 // The recording, or, if its zoom moves, each stretch in which the reading stands still for kLeastStretch_s, less

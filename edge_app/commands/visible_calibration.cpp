@@ -122,7 +122,7 @@ CalibrationResult calibrate_job(const std::string& recording, int passes, Calibr
 }
 
 void track_movement(const std::string& recording, CalibrationJob* job, StopSignals* signals) {
-  if (!job->tracks_from_video || !job->movement) return;
+  if (job->movement_pictures.frames.empty()) return;
   VisibleProgress progress(recording, signals);
   VideoTracks tracks = track_video(recording, job->movement_pictures, [&progress](double done) {
     if (!progress.show(done, "following points while the zoom moves")) throw progress.cancelled();

@@ -16,7 +16,7 @@ namespace alidade {
 [[nodiscard]] CalibrationResult calibrate_job(const std::string& recording, int passes,
                                               CalibrationJob* job, StopSignals* signals);
 
-// Finds the tracks of the job's movement in the video, unless the job has them.
+// Finds the tracks of the job's movement in the pictures that may hold some.
 void track_movement(const std::string& recording, CalibrationJob* job, StopSignals* signals);
 
 // Of the recording's video.
