@@ -196,8 +196,11 @@ endfunction()
 # All test programs that another processor can run; what `cmake --build` of an ARM preset builds.
 add_custom_target(processor_programs)
 
-# All that the tests without the label `thorough` need: what suites with sanitizers build.
+# All that the tests without the label `thorough` need, in two parts: the programs of core's rooms, core_*_test, and the others.
+add_custom_target(core_programs)
+add_custom_target(outer_programs)
 add_custom_target(quick_programs)
+add_dependencies(quick_programs core_programs outer_programs)
 
 # alidade_test(core_model_test SOURCES camera_test.cpp ... LINK alidade::model [options])
 # builds the GoogleTest program of a room and registers it with ctest as one entry of that name.
@@ -253,7 +256,11 @@ function(alidade_test name)
   endif()
   add_dependencies(processor_programs ${name})
   if(NOT "thorough" IN_LIST A_LABELS)
-    add_dependencies(quick_programs ${name})
+    if(name MATCHES "^core_")
+      add_dependencies(core_programs ${name})
+    else()
+      add_dependencies(outer_programs ${name})
+    endif()
   endif()
 
   set(left_out)
@@ -313,12 +320,16 @@ function(alidade_benchmark name)
   set_tests_properties(${name} PROPERTIES LABELS benchmark RUN_SERIAL ON TIMEOUT 600)
 endfunction()
 
-# What `ctest -L fuzz` runs, and all that the preset `fuzz` builds.
+# What `ctest -L fuzz` runs, and all that the preset `fuzz` builds, by the outermost folder that a target links.
 add_custom_target(fuzz_programs)
+foreach(part core platform edge)
+  add_custom_target(fuzz_${part}_programs)
+  add_dependencies(fuzz_programs fuzz_${part}_programs)
+endforeach()
 
 # alidade_fuzz_target(vapix LINK alidade::platform [MUTATIONS n] [LONGEST bytes])
 # declares the target of vapix_fuzz.cpp. Under the preset `fuzz` it is a program of its own, fuzz_vapix, linked with
-# libFuzzer: `ctest -L fuzz` lets it search for a minute, from corpus/vapix and regressions/vapix on; what it finds worth
+# libFuzzer: `ctest -L fuzz` lets it search for a minute, or $FUZZ_SECONDS, from corpus/vapix and regressions/vapix on; what it finds worth
 # keeping goes to <build>/fuzz-corpus/vapix/, an input that fails to <build>/fuzz-artifacts/; ten million inputs
 # of no more bytes than that (1024) are `ctest --preset fuzz-long`. In all other builds it is a part of the program that
 # alidade_fuzz_regressions() makes, which runs those files and n mutations of them (5000).
@@ -349,15 +360,25 @@ function(alidade_fuzz_target name)
   file(MAKE_DIRECTORY ${found} ${artifacts})
   alidade_executable(fuzz_${name} SOURCES ${name}_fuzz.cpp LINK ${A_LINK})
   target_link_options(fuzz_${name} PRIVATE -fsanitize=fuzzer)
-  add_dependencies(fuzz_programs fuzz_${name})
-  set(search fuzz_${name} -timeout=30 -print_final_stats=1 -artifact_prefix=${artifacts}/${name}-)
-  add_test(NAME fuzz_${name} COMMAND ${search} -max_total_time=60 ${found} ${inputs})
-  set_tests_properties(fuzz_${name} PROPERTIES LABELS fuzz TIMEOUT 180)
+  set(part core)
+  foreach(library IN LISTS A_LINK)
+    if(library STREQUAL "alidade::platform")
+      set(part platform)
+    elseif(NOT library MATCHES "^alidade::(model|realtime|calibration)$")
+      set(part edge)
+      break()
+    endif()
+  endforeach()
+  add_dependencies(fuzz_${part}_programs fuzz_${name})
+  set(search -timeout=30 -print_final_stats=1 -artifact_prefix=${artifacts}/${name}-)
+  add_test(NAME fuzz_${name} COMMAND sh -c [[exec "$@" -max_total_time="${FUZZ_SECONDS:-60}"]] sh
+    $<TARGET_FILE:fuzz_${name}> ${search} ${found} ${inputs})
+  set_tests_properties(fuzz_${name} PROPERTIES LABELS "fuzz;fuzz-${part}" TIMEOUT 180)
   if(NOT A_LONGEST)
     set(A_LONGEST 1024)
   endif()
   add_test(NAME fuzz_${name}_ten_million
-    COMMAND ${search} -runs=10000000 -max_len=${A_LONGEST} ${found} ${inputs})
+    COMMAND fuzz_${name} ${search} -runs=10000000 -max_len=${A_LONGEST} ${found} ${inputs})
   # A fifth faster; an input that fails tells more when it is run again without.
   set_tests_properties(fuzz_${name}_ten_million PROPERTIES LABELS "fuzz;slow" TIMEOUT 10800
     ENVIRONMENT ASAN_OPTIONS=malloc_context_size=0:quarantine_size_mb=16)
@@ -396,5 +417,5 @@ function(alidade_fuzz_regressions)
   add_test(NAME fuzz_regressions COMMAND fuzz_regressions --all ${CMAKE_CURRENT_SOURCE_DIR})
   set_tests_properties(fuzz_regressions PROPERTIES TIMEOUT 900)
   add_dependencies(processor_programs fuzz_regressions)
-  add_dependencies(quick_programs fuzz_regressions)
+  add_dependencies(outer_programs fuzz_regressions)
 endfunction()
