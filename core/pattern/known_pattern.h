@@ -4,8 +4,8 @@
 //   circles:4x11:20mm          asymmetric grid, as OpenCV counts it: 11 rows of 4, every second one moved by half the distance of
 //                              two circles of a row; the length is half of that distance
 //   symmetric-circles:7x6:20mm distance of neighbours
-//   aprilgrid:6x6:30mm:0.3     tags of family 36h11, numbered from the lower left upwards (kalibr's grid), a tag's side, the gap between
-//                              tags as a part of it
+//   aprilgrid:6x6:30mm:0.3     tags of family 36h11, numbered from the lower left upwards (kalibr's grid), a tag's side with its black
+//                              border, the gap between tags as a part of it
 //   charuco:9x6:30mm:22mm      ChArUco board as OpenCV counts it: squares (one more than inner corners, a row and a column), a square's
 //                              side, a marker's side; then, after another colon, the dictionary of its markers, 4x4_50 if it is left
 //                              out: 4x4_50, 4x4_100, 4x4_250, 4x4_1000, the same with 5x5, 6x6 and 7x7, aruco_original,

@@ -11,6 +11,7 @@
 #include "core/pattern/charuco_grid.h"
 #include "core/pattern/circle_centres.h"
 #include "core/pattern/corner_refinement.h"
+#include "core/pattern/now_and_then.h"
 #include "core/pattern/tag_grid.h"
 
 namespace alidade {
@@ -92,19 +93,7 @@ struct PatternDetector::State {
   std::unique_ptr<internal::TagGrid> tags;
   std::unique_ptr<internal::CharucoGrid> charuco;
   internal::CircleCentres circles;  // of the last image
-  int in_vain = 0;                  // images in a row in which what takes long was of no use
-
-  // Light and distance change slowly: what takes long and did not help in the last images is tried now and then only.
-  template <class Find>
-  bool now_and_then(const Find& find) {
-    constexpr int kPatience = 4;
-    constexpr int kEvery = 8;
-    const bool skip = in_vain >= kPatience && in_vain % kEvery != 0;
-    ++in_vain;
-    if (skip || !find()) return false;
-    in_vain = 0;
-    return true;
-  }
+  internal::NowAndThen now_and_then;
 
   bool find_grid(const cv::Mat& image, std::vector<cv::Point2f>* corners,
                  std::vector<int>* points) {
@@ -192,7 +181,9 @@ std::vector<PatternObservation> PatternDetector::find(const std::uint8_t* luma, 
 }
 
 std::string PatternDetector::doubt() const {
-  return state_->charuco ? state_->charuco->doubt() : std::string();
+  return state_->charuco ? state_->charuco->doubt()
+         : state_->tags  ? state_->tags->doubt()
+                         : std::string();
 }
 
 void follow_half_turns(const KnownPattern& pattern, double max_gap_s, PatternData* data) {

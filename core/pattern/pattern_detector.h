@@ -26,7 +26,7 @@ class PatternDetector {
   [[nodiscard]] std::vector<PatternObservation> find(const std::uint8_t* luma, int width,
                                                      int height, std::ptrdiff_t stride);
 
-  // One line about a pattern that no image so far showed, what was there in its place; empty: nothing to say.
+  // One line, what was there in the pattern's place in the images so far; empty: nothing is known to be.
   [[nodiscard]] std::string doubt() const;
 
  private:

@@ -76,33 +76,54 @@ Shapes circles(const KnownPattern& pattern) {
   return shapes;
 }
 
-Shapes april_grid(const KnownPattern& pattern) {
+// As kalibr draws it: black borders of two cells, black squares beside each corner. around: also outside of the grid, where
+// detectors can do without them.
+Shapes april_grid(const KnownPattern& pattern, bool around) {
+  constexpr int kCode = 6;  // cells a side
+  constexpr int kBorder = 2;
+  constexpr int kSide = kCode + 2 * kBorder;
   Shapes shapes;
   const double size_mm = 1000 * pattern.size_m;
-  const double pitch = size_mm * (1 + pattern.gap);
+  const double gap_mm = size_mm * pattern.gap;
+  const double pitch = size_mm + gap_mm;
+  const double cell = size_mm / kSide;
+  const double start = around ? gap_mm : 0;  // of the first tag
+  const auto run = [&](double left, double top, int column, int row, int width, int height) {
+    shapes.rectangle(left + column * cell, top + row * cell, (width - 1 + kNoSeam) * cell,
+                     (height - 1 + kNoSeam) * cell);
+  };
   apriltag_family_t* family = tag36h11_create();
-  // The border's outer edge is the tag's side; around it lies one white cell.
-  const double cell = size_mm / family->width_at_border;
-  const int white = (family->total_width - family->width_at_border) / 2;
-  for (int row = 0; row < pattern.rows; ++row) {
-    for (int column = 0; column < pattern.columns; ++column) {
-      image_u8_t* image = apriltag_to_image(family, row * pattern.columns + column);
-      for (int y = white; y < image->height - white; ++y) {
-        for (int x = white; x < image->width - white; ++x) {
-          if (image->buf[y * image->stride + x] != 0) continue;
-          shapes.rectangle(column * pitch + (x - white) * cell,
-                           (pattern.rows - 1 - row) * pitch + (y - white) * cell, cell * kNoSeam,
-                           cell * kNoSeam);
-        }
+  for (int tag = 0; tag < pattern.columns * pattern.rows; ++tag) {
+    const double left = start + tag % pattern.columns * pitch;
+    const double top = start + (pattern.rows - 1 - tag / pattern.columns) * pitch;
+    shapes.rectangle(left, top, size_mm, kBorder * cell);
+    shapes.rectangle(left, top + (kSide - kBorder) * cell, size_mm, kBorder * cell);
+    run(left, top, 0, kBorder, kBorder, kCode);
+    shapes.rectangle(left + (kSide - kBorder) * cell, top + kBorder * cell, kBorder * cell,
+                     kCode * cell);
+    image_u8_t* image = apriltag_to_image(family, tag);
+    const int before = (image->width - kCode) / 2;
+    for (int y = 0; y < kCode; ++y) {
+      const auto* row = image->buf + (y + before) * image->stride + before;
+      for (int x = 0; x < kCode; ++x) {
+        int width = 0;
+        while (x + width < kCode && row[x + width] == 0) ++width;
+        if (width > 0) run(left, top, x + kBorder, y + kBorder, width, 1);
+        x += width;
       }
-      // As image_u8_destroy() does, which the shared library does not export.
-      std::free(image->buf);
-      std::free(image);
     }
+    // As image_u8_destroy() does, which the shared library does not export.
+    std::free(image->buf);
+    std::free(image);
   }
   tag36h11_destroy(family);
-  shapes.width_mm = (pattern.columns - 1) * pitch + size_mm;
-  shapes.height_mm = (pattern.rows - 1) * pitch + size_mm;
+  for (int row = around ? 0 : 1; row < pattern.rows + (around ? 1 : 0); ++row) {
+    for (int column = around ? 0 : 1; column < pattern.columns + (around ? 1 : 0); ++column)
+      shapes.rectangle(start + column * pitch - gap_mm, start + row * pitch - gap_mm, gap_mm,
+                       gap_mm);
+  }
+  shapes.width_mm = pattern.columns * pitch - gap_mm + 2 * start;
+  shapes.height_mm = pattern.rows * pitch - gap_mm + 2 * start;
   return shapes;
 }
 
@@ -135,6 +156,33 @@ Shapes charuco(const KnownPattern& pattern) {
   return shapes;
 }
 
+Shapes shapes_of(const KnownPattern& pattern) {
+  switch (pattern.kind) {
+    case PatternKind::kChessboard:
+      return chessboard(pattern, 1000 * pattern.size_m);
+    case PatternKind::kAprilGrid:
+      return april_grid(pattern, true);
+    case PatternKind::kCharuco:
+      return charuco(pattern);
+    case PatternKind::kAsymmetricCircles:
+    case PatternKind::kSymmetricCircles:
+      break;
+  }
+  return circles(pattern);
+}
+
+// Width and height between its margins, mm; upright, or across if the pattern is wider than high.
+std::pair<double, double> room_on(const Paper& paper, const Shapes& shapes) {
+  const double width = paper.width_mm - 2 * kMargin_mm;
+  const double height = paper.height_mm - 2 * kMargin_mm;
+  return shapes.width_mm > shapes.height_mm ? std::pair(height, width) : std::pair(width, height);
+}
+
+bool fits(const Shapes& shapes, const Paper& paper) {
+  const auto [width, height] = room_on(paper, shapes);
+  return shapes.width_mm <= width && shapes.height_mm <= height;
+}
+
 }  // namespace
 
 std::optional<std::string> draw_pattern(const KnownPattern& pattern, const std::string& paper,
@@ -145,24 +193,23 @@ std::optional<std::string> draw_pattern(const KnownPattern& pattern, const std::
     *error = "'" + paper + "' is no paper; expected a4, a3, a2, a1, a0 or letter";
     return std::nullopt;
   }
-  const Shapes shapes = pattern.kind == PatternKind::kChessboard
-                            ? chessboard(pattern, 1000 * pattern.size_m)
-                        : pattern.kind == PatternKind::kAprilGrid ? april_grid(pattern)
-                        : pattern.kind == PatternKind::kCharuco   ? charuco(pattern)
-                                                                  : circles(pattern);
-  double width = found->width_mm;
-  double height = found->height_mm;
-  if (shapes.width_mm > shapes.height_mm) std::swap(width, height);
+  const Paper& sheet = *found;
+  Shapes shapes = shapes_of(pattern);
+  if (pattern.kind == PatternKind::kAprilGrid && !fits(shapes, sheet))
+    shapes = april_grid(pattern, false);
   char text[400];
-  if (shapes.width_mm > width - 2 * kMargin_mm || shapes.height_mm > height - 2 * kMargin_mm) {
+  if (!fits(shapes, sheet)) {
+    const auto [width, height] = room_on(sheet, shapes);
     std::snprintf(text, sizeof text,
                   "the pattern is %.0f x %.0f mm, and %s holds %.0f x %.0f mm; choose a larger "
                   "paper or a smaller pattern",
-                  shapes.width_mm, shapes.height_mm, found->name, width - 2 * kMargin_mm,
-                  height - 2 * kMargin_mm);
+                  shapes.width_mm, shapes.height_mm, sheet.name, width, height);
     *error = text;
     return std::nullopt;
   }
+  const auto [room_width, room_height] = room_on(sheet, shapes);
+  const double width = room_width + 2 * kMargin_mm;
+  const double height = room_height + 2 * kMargin_mm;
   std::snprintf(text, sizeof text,
                 "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"%.1fmm\" height=\"%.1fmm\" "
                 "viewBox=\"0 0 %.1f %.1f\">\n"

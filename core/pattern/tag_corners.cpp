@@ -16,16 +16,19 @@ namespace alidade::internal {
 namespace {
 
 constexpr int kSteps = 2;
-constexpr double kReach_cells =
-    1.6;  // of the window, which shall hold the border and what is next to it
+constexpr double kReach =
+    0.2;  // of the window, of a tag's side: it holds the border, and what is next to it
 constexpr double kLeastReach_px = 2;
+constexpr double kOffNextTag_px = 1.2;  // whose blurred edge the window leaves out
 constexpr double kStartBlur_px = 0.8;
 constexpr double kLeastBlur_px = 0.4;
 constexpr double kLargestBlur_px = 4;
 constexpr double kBlurPrior = 0.3;       // standard deviation of a step, of the blur
 constexpr double kNoise = 3;             // grey levels, beside that prior
 constexpr double kLeastExplained = 0.7;  // of the window's variance
-constexpr int kUnknowns = 6;             // brightness, contrast, position, blur along both axes
+constexpr double kLeastCell_px = 0.5;
+constexpr double kLargestShift = 0.0625;  // in a step, of a tag's side
+constexpr int kUnknowns = 6;              // brightness, contrast, position, blur along both axes
 
 // Cells from a corner inwards: outside, the border, the first of the code, the second and all behind it.
 constexpr int kIntervals = 4;
@@ -62,15 +65,16 @@ struct Profile {
   Weights by_blur;
 };
 
-// place, blur: cells.
-Profile profile(double place, double blur) {
+// place, blur, border: cells.
+Profile profile(double place, double blur, int border) {
   static const NormalDistribution normal;
+  const std::array<int, kIntervals - 1> ends = {0, border, border + 1};
   Profile p;
   p.share << 1, 0, 0, 0;
   p.rate.setZero();
   p.by_blur.setZero();
   for (int edge = 0; edge + 1 < kIntervals; ++edge) {
-    const double z = (place - edge) / blur;
+    const double z = (place - ends[static_cast<std::size_t>(edge)]) / blur;
     const Vector2<double> at = normal(z);
     const Vector2<double> by = Vector2<double>(1, -z) * (at[1] / blur);
     p.share[edge] -= at[0];
@@ -96,14 +100,17 @@ struct Blur {
 // The tag's cells about one of its corners, inwards positive.
 class CornerView {
  public:
-  CornerView(const TagCells& cells, const cv::Matx33d& cells_from_image, const cv::Point2d& corner,
-             const cv::Point2d& origin)
+  // square: a black one touches it from outside. origin: the corner, in cells.
+  CornerView(const TagFace& face, bool square, const cv::Matx33d& cells_from_image,
+             const cv::Point2d& corner, const cv::Point2d& origin)
       : cells_from_image_(cells_from_image),
+        border_(face.border),
+        side_(face.side()),
         origin_(origin),
         inward_(origin.x == 0 ? 1 : -1, origin.y == 0 ? 1 : -1) {
     for (int row = 0; row < kIntervals; ++row) {
       for (int column = 0; column < kIntervals; ++column)
-        white_(row, column) = is_white(cells, row - 1, column - 1) ? 1 : 0;
+        white_(row, column) = is_white(face, square, row, column) ? 1 : 0;
     }
     constexpr double kStep_px = 0.5;
     for (int k = 0; k < 2; ++k) {
@@ -121,18 +128,24 @@ class CornerView {
   // Across edges.
   [[nodiscard]] const Vector2<double>& cell_px() const { return cell_px_; }
   [[nodiscard]] const Matrix2<double>& cells_by_px() const { return J_; }
-  // By row, by column.
+  // By row, by column, of the intervals.
   [[nodiscard]] const Matrix4<double>& white() const { return white_; }
+  [[nodiscard]] int border() const { return border_; }
+  [[nodiscard]] int side() const { return side_; }
 
  private:
-  [[nodiscard]] bool is_white(const TagCells& cells, int row, int column) const {
-    if (row < 0 || column < 0) return row >= 0 || column >= 0;
-    const int r = inward_.y() > 0 ? row : kTagCells - 1 - row;
-    const int c = inward_.x() > 0 ? column : kTagCells - 1 - column;
-    return cells[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
+  // Of the intervals.
+  [[nodiscard]] bool is_white(const TagFace& face, bool square, int row, int column) const {
+    if (row == 0 && column == 0) return !square;
+    if (row == 0 || column == 0) return true;
+    if (row == 1 || column == 1) return false;
+    const int r = inward_.y() > 0 ? row - 2 : kCodeCells + 1 - row;
+    const int c = inward_.x() > 0 ? column - 2 : kCodeCells + 1 - column;
+    return face.is_white[static_cast<std::size_t>(r)][static_cast<std::size_t>(c)];
   }
 
   cv::Matx33d cells_from_image_;
+  int border_, side_;
   cv::Point2d origin_;
   Vector2<double> inward_;
   Matrix4<double> white_;
@@ -141,10 +154,12 @@ class CornerView {
 };
 
 bool fit(const cv::Mat& image, const CornerView& view, const cv::Point2d& corner, const Blur& blur,
-         double gap_cells, CornerFit* result) {
+         double gap, CornerFit* result) {
   const double least_cell = view.cell_px().minCoeff();
-  if (!(least_cell > 0.5)) return false;
-  const double reach = std::max(std::min(kReach_cells, gap_cells), kLeastReach_px / least_cell);
+  if (!(least_cell > kLeastCell_px)) return false;
+  const double reach =
+      std::max(std::min(kReach * view.side(), gap * view.side() - kOffNextTag_px / least_cell),
+               kLeastReach_px / least_cell);
   const Matrix2<double> px_by_cells = view.cells_by_px().inverse();
   const Vector2<double> half = reach * px_by_cells.cwiseAbs().rowwise().sum();
   const cv::Rect window = pixels_about(corner, half.x(), half.y());
@@ -163,8 +178,8 @@ bool fit(const cv::Mat& image, const CornerView& view, const cv::Point2d& corner
     for (int u = window.x; u < window.br().x; ++u) {
       const Vector2<double> place = view.place({static_cast<double>(u), static_cast<double>(v)});
       if (std::abs(place.x()) > reach || std::abs(place.y()) > reach) continue;
-      const Profile x = profile(place.x(), blur_x);
-      const Profile y = profile(place.y(), blur_y);
+      const Profile x = profile(place.x(), blur_x, view.border());
+      const Profile y = profile(place.y(), blur_y, view.border());
       const Weights along_x = view.white().transpose() * y.share;
       const Weights along_y = view.white() * x.share;
       const Vector2<double> rate(x.rate.dot(along_x), y.rate.dot(along_y));
@@ -195,24 +210,24 @@ bool fit(const cv::Mat& image, const CornerView& view, const cv::Point2d& corner
 
 }  // namespace
 
-const std::vector<cv::Point2f>& tag_square() {
-  static const std::vector<cv::Point2f> corners = {
-      {0, kTagCells}, {kTagCells, kTagCells}, {kTagCells, 0}, {0, 0}};
-  return corners;
+std::vector<cv::Point2f> tag_square(int side) {
+  const auto s = static_cast<float>(side);
+  return {{0, s}, {s, s}, {s, 0}, {0, 0}};
 }
 
-bool refine_tag_corners(const cv::Mat& image, const TagCells& cells, double gap_cells,
-                        std::vector<cv::Point2f>* corners) {
+bool refine_tag_corners(const cv::Mat& image, const TagFace& face, const CornerSquares& squares,
+                        double gap, std::vector<cv::Point2f>* corners) {
+  const std::vector<cv::Point2f> square = tag_square(face.side());
   Blur blur;
   for (int step = 0; step < kSteps; ++step) {
-    const cv::Matx33d cells_from_image = cv::getPerspectiveTransform(*corners, tag_square());
+    const cv::Matx33d cells_from_image = cv::getPerspectiveTransform(*corners, square);
     Vector2<double> blur_step = Vector2<double>::Zero();
     for (std::size_t k = 0; k < 4; ++k) {
       cv::Point2f& corner = (*corners)[k];
-      const CornerView view(cells, cells_from_image, corner, tag_square()[k]);
+      const CornerView view(face, squares[k], cells_from_image, corner, square[k]);
       CornerFit found;
-      if (!fit(image, view, corner, blur, gap_cells, &found)) return false;
-      const double limit = 0.5 * view.cell_px().minCoeff();
+      if (!fit(image, view, corner, blur, gap, &found)) return false;
+      const double limit = kLargestShift * face.side() * view.cell_px().minCoeff();
       if (!(found.shift.norm() <= limit) || !(found.explained >= kLeastExplained)) return false;
       corner +=
           cv::Point2f(static_cast<float>(found.shift.x()), static_cast<float>(found.shift.y()));
@@ -222,6 +237,22 @@ bool refine_tag_corners(const cv::Mat& image, const TagCells& cells, double gap_
     blur.y = std::clamp(blur.y + blur_step.y(), kLeastBlur_px, kLargestBlur_px);
   }
   return true;
+}
+
+std::array<double, 4> evidence_of_squares(const cv::Mat& image, const TagFace& face, double gap,
+                                          const std::vector<cv::Point2f>& corners) {
+  const std::vector<cv::Point2f> square = tag_square(face.side());
+  const cv::Matx33d cells_from_image = cv::getPerspectiveTransform(corners, square);
+  std::array<double, 4> evidence{};
+  for (std::size_t k = 0; k < 4; ++k) {
+    const auto explained = [&](bool with) {
+      const CornerView view(face, with, cells_from_image, corners[k], square[k]);
+      CornerFit found;
+      return fit(image, view, corners[k], Blur(), gap, &found) ? found.explained : 0;
+    };
+    evidence[k] = explained(true) - explained(false);
+  }
+  return evidence;
 }
 
 }  // namespace alidade::internal

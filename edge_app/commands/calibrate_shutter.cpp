@@ -125,7 +125,8 @@ std::string hint_for(PatternStatus status, const KnownPattern& pattern) {
       return fmt::format(" {}x{} are {} rows of {} circles", pattern.columns, pattern.rows,
                          pattern.rows, pattern.columns);
     case PatternKind::kAprilGrid:
-      return " The tags are of family 36h11, numbered from 0 on, with a white margin";
+      return " The tags are of family 36h11, numbered from 0 on from the lower left, their black "
+             "border one cell wide or two";
     case PatternKind::kCharuco:
       return fmt::format(
           " {}x{} are squares, every second one with a marker of {}; without markers it is a "
@@ -157,10 +158,21 @@ int calibrate_shutter(const CalibrateShutterOptions& options) {
   check_usage(options);
   const PatternVideo video =
       options.config.empty() ? find_visibly(options, *pattern) : find_live(options, *pattern);
+  const auto warn = [&](const std::vector<std::string>& remarks) {
+    for (const std::string& remark : remarks) spdlog::warn("{}: {}", video.name, remark);
+  };
+  warn(video.remarks);
+  if (!video.doubt.empty()) {
+    // Of an AprilGrid it says what would be right.
+    const bool is_whole = pattern->kind == PatternKind::kAprilGrid;
+    throw CommandError(kExitFailed,
+                       video.name + ": " + video.doubt +
+                           (is_whole ? "" : "." + hint_for(PatternStatus::kNoPattern, *pattern)));
+  }
   const PatternCalibration calibration = calibrate_pattern(video.data);
   std::vector<std::string> remarks = video.remarks;
   remarks.insert(remarks.end(), calibration.remarks.begin(), calibration.remarks.end());
-  for (const std::string& remark : remarks) spdlog::warn("{}: {}", video.name, remark);
+  warn(calibration.remarks);
   if (calibration.status != PatternStatus::kOk) {
     throw CommandError(kExitFailed, video.name + ": " + calibration.message +
                                         hint_for(calibration.status, *pattern));

@@ -140,6 +140,7 @@ class LivePattern {
       return;
     }
     std::vector<std::string> advice = advice_of(progress);
+    if (const std::string doubt = search_.doubt(); !doubt.empty()) advice = {doubt};
     if (advice.empty()) advice.emplace_back("all was shown, go on for some seconds");
     if (advice.size() > kLines) advice.resize(kLines);
     if (advice == said_) return;

@@ -213,7 +213,7 @@ PatternVideo PatternSearch::finish() {
   undo_half_turns();
   if (interlaced_) video_.remarks.emplace_back(kInterlaced);
   for (const std::string& remark : doubts_of(data)) video_.remarks.push_back(remark);
-  if (!detector_.doubt().empty()) video_.remarks.push_back(detector_.doubt());
+  video_.doubt = detector_.doubt();
   if (video_.repeated > 0)
     video_.remarks.push_back(
         fmt::format("{} images repeat the one before and are left out", video_.repeated));

@@ -28,6 +28,7 @@ struct PatternVideo {
   int found = 0;                     // images with the pattern
   int lost = 0;                      // by the stamps
   std::vector<std::string> remarks;  // about the video
+  std::string doubt;  // what is there in place of the pattern; empty: nothing is known
 };
 
 class PatternSearch {
@@ -43,6 +44,9 @@ class PatternSearch {
 
   // look()'s thread: what it has found so far; times are those of arrival.
   [[nodiscard]] const PatternData& found_so_far();
+
+  // look()'s thread: what the images show in place of the pattern; empty: nothing is known.
+  [[nodiscard]] std::string doubt() const { return detector_.doubt(); }
 
   // Ends it. Throws CommandError: too few images, stamps that do not increase.
   [[nodiscard]] PatternVideo finish();

@@ -49,6 +49,21 @@ void write_greys(const TemporaryDirectory& directory, int width, int height,
   directory.write("frames.csv", frames);
 }
 
+// A recording of what the virtual camera sees, in "video".
+void write_film(const TemporaryDirectory& directory, const simulator::Config& config, int images) {
+  const simulator::PatternRenderer renderer(config);
+  directory.write("video/recording.yaml", fmt::format("format: 1\nwidth: {}\nheight: {}\n",
+                                                      config.image.width, config.image.height));
+  std::string frames = "frame,receive_time_s,sequence\n";
+  for (int i = 0; i < images; ++i) {
+    const double time_s = i / config.image.rate_hz;
+    frames += fmt::format("{},{},{}\n", i, 10 + time_s, i);
+    directory.write(fmt::format("video/frames/{:06}.pgm", i),
+                    pgm(config.image.width, config.image.height, renderer.render(time_s, i)));
+  }
+  directory.write("video/frames.csv", frames);
+}
+
 std::vector<double> steady(int count) {
   std::vector<double> stamps;
   for (int i = 0; i < count; ++i) stamps.push_back(10 + 0.05 * i);
@@ -103,17 +118,7 @@ TEST_F(CalibrateShutterCommand, AVideoGivesLensReportAndWay) {
   config.pattern.emplace();
   config.pattern->lens = {300, 301, 190, 118, -0.28, 0.08, 3e-4, -2e-4};
   config.pattern->hand.speed = 0.6;  // which 12 frames a second can follow
-  constexpr int kFrames = 96;
-  const simulator::PatternRenderer renderer(config);
-  directory_.write("video/recording.yaml", "format: 1\nwidth: 376\nheight: 240\n");
-  std::string frames = "frame,receive_time_s,sequence\n";
-  for (int i = 0; i < kFrames; ++i) {
-    const double time_s = i / config.image.rate_hz;
-    frames += fmt::format("{},{},{}\n", i, 10 + time_s, i);
-    directory_.write(fmt::format("video/frames/{:06}.pgm", i),
-                     pgm(config.image.width, config.image.height, renderer.render(time_s, i)));
-  }
-  directory_.write("video/frames.csv", frames);
+  write_film(directory_, config, 96);
   const Result result = calibrate(directory_.path() + "/video");
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, AllOf(HasSubstr("line_delay"), HasSubstr("images show the pattern")));
@@ -166,6 +171,27 @@ TEST_F(CalibrateShutterCommand, NoPatternInAnyFrame) {
   expect_refused(calibrate(directory_.path(), "circles:4x11:20mm"), 1,
                  "4x11 are 11 rows of 4 circles, every second row moved by half");
   expect_refused(calibrate(directory_.path(), "aprilgrid:6x6:30mm:0.3"), 1, "family 36h11");
+}
+
+// kalibr's board under another name: what differs, and what its name would be.
+TEST_F(CalibrateShutterCommand, AnAprilGridThatIsMisnamed) {
+  simulator::Config config;
+  config.image = {376, 240, 12};
+  config.sensor.read_noise = 1;
+  config.pattern.emplace();
+  config.pattern->kind = simulator::PatternConfig::Kind::kAprilGrid;
+  config.pattern->columns = 4;
+  config.pattern->rows = 3;
+  config.pattern->size = 0.05;
+  config.pattern->lens = {300, 301, 190, 118, -0.28, 0.08, 3e-4, -2e-4};
+  write_film(directory_, config, 6);
+  const std::string video = directory_.path() + "/video";
+  expect_refused(calibrate(video, "aprilgrid:4x3:50mm:0.25"), 1,
+                 video +
+                     ": the gap between its tags is 0.30 of a tag's side, not 0.25 as it was "
+                     "named; is it aprilgrid:4x3:50mm:0.30?");
+  expect_refused(calibrate(video, "aprilgrid:3x4:50mm:0.3"), 1,
+                 "its tags lie in rows of 4, not of 3 as it was named");
 }
 
 // Of a build without OpenCV's aruco the package that it lacks.

@@ -239,10 +239,12 @@ void read_pattern(Section& section, PatternConfig* pattern) {
   section.integer("rows", &pattern->rows, {1, 100});
   section.number("size_mm", &pattern->size, kPositive, kMilli);
   section.number("gap", &pattern->gap, kPositive);
+  section.integer("border", &pattern->border, {1, 2});
   section.flag("corner_squares", &pattern->corner_squares);
   section.number("marker_mm", &pattern->marker, kPositive, kMilli);
   section.integer("dictionary", &pattern->dictionary, {0, 20});
   section.flag("old_layout", &pattern->old_layout);
+  section.path("page", &pattern->page);
   section.number("black", &pattern->black, kUnitInterval);
   section.number("white", &pattern->white, kUnitInterval);
   section.number("table", &pattern->table, kUnitInterval);

@@ -147,18 +147,22 @@ struct PatternConfig {
     double k1 = -0.28, k2 = 0.08, p1 = 3e-4, p2 = -2e-4;
   };
   struct Hand {
-    double distance = 0.55;  // m, of the pattern's middle
-    double speed = 1;        // 0 = at rest
-    double reach = 1;        // sideways; from about 2 on the pattern leaves the view in part
+    double distance = 0.55;         // m, of the pattern's middle
+    double speed = 1;               // 0 = at rest
+    double reach = 1;               // sideways; from about 2 on the pattern leaves the view in part
+    Eigen::Vector3d turn{0, 0, 0};  // rad, about x, y and z, added to the hand's own
   };
   Kind kind = Kind::kChessboard;
   int columns = 9, rows = 6;
   double size = 0.03;          // m
   double gap = 0.3;            // AprilGrid: part of size
+  int border = 2;              // AprilGrid: cells; kalibr's
   bool corner_squares = true;  // AprilGrid: kalibr's
   double marker = 0.022;       // m, ChArUco: a marker's side
   int dictionary = 0;          // ChArUco: OpenCV's number of a predefined one
   bool old_layout = false;     // ChArUco: as OpenCV drew it before 4.6
+  std::filesystem::path
+      page;  // an SVG as `calibrate-shutter --print` writes it: seen in place of the drawn board
   double black = 0.16, white = 0.82, table = 0.47;
   double finger = 0;  // m, diameter of what goes round on the board; 0 = nothing
   Lens lens;

@@ -3,13 +3,17 @@
 #include <apriltag/apriltag.h>
 #include <apriltag/tag36h11.h>
 
+#include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <cstdlib>
 #include <opencv2/core.hpp>
 #include <utility>
+
+#include "test/simulator/printed_page.h"
 
 #ifdef ALIDADE_ARUCO
 #include <opencv2/aruco.hpp>
@@ -21,7 +25,7 @@ using Eigen::Vector2d;
 
 namespace {
 
-constexpr int kTagCells = 8;  // a side, with the black border
+constexpr int kCodeCells = 6;  // a side of a tag's code
 
 #ifdef ALIDADE_ARUCO
 cv::Ptr<cv::aruco::Dictionary> codes_of(int dictionary) {
@@ -57,6 +61,7 @@ double box_cover(double depth, const Vector2d& n, const Vector2d& box) {
 
 void PatternBoard::Nodes::set(std::vector<double> nodes) {
   nodes_ = std::move(nodes);
+  first_.clear();
   double least = nodes_.back() - nodes_.front();
   for (int i = 0; i < cells(); ++i) least = std::min(least, length(i));
   steps_per_m_ = 1 / least;
@@ -98,6 +103,7 @@ PatternBoard::PatternBoard(const PatternConfig& config) : config_(config) {
       make_charuco(config);
       break;
   }
+  if (!config.page.empty()) lay_page(read_printed_page(config.page));
 }
 
 #ifdef ALIDADE_ARUCO
@@ -179,10 +185,11 @@ void PatternBoard::make_april_grid(const PatternConfig& config) {
     }
   }
   // Cells: a white margin, a gap, and for each tag its cells and a gap.
+  const int side = kCodeCells + 2 * config.border;
   const auto nodes = [&](int tags) {
     std::vector<double> x{-2 * gap, -gap};
     for (int tag = 0; tag < tags; ++tag) {
-      for (int cell = 0; cell <= kTagCells; ++cell) x.push_back(tag * pitch + cell * s / kTagCells);
+      for (int cell = 0; cell <= side; ++cell) x.push_back(tag * pitch + cell * s / side);
     }
     x.push_back(x.back() + gap);
     x.push_back(x.back() + gap);
@@ -190,16 +197,15 @@ void PatternBoard::make_april_grid(const PatternConfig& config) {
   };
   lay(nodes(config.columns), nodes(config.rows));
 
-  const int tags = config.columns * config.rows;
-  std::vector<std::uint8_t> black(static_cast<std::size_t>(tags * kTagCells * kTagCells), 0);
+  std::vector<std::array<bool, kCodeCells * kCodeCells>> white;  // by tag
   apriltag_family_t* family = tag36h11_create();
-  for (int tag = 0; tag < tags; ++tag) {
+  for (int tag = 0; tag < config.columns * config.rows; ++tag) {
     image_u8_t* image = apriltag_to_image(family, tag);
-    const int white = (image->width - kTagCells) / 2;
-    for (int i = 0; i < kTagCells * kTagCells; ++i) {
-      const int place = (i / kTagCells + white) * image->stride + i % kTagCells + white;
-      black[static_cast<std::size_t>(tag * kTagCells * kTagCells + i)] =
-          image->buf[place] == 0 ? 1 : 0;
+    const int before = (image->width - kCodeCells) / 2;
+    auto& code = white.emplace_back();
+    for (int i = 0; i < kCodeCells * kCodeCells; ++i) {
+      const int place = (i / kCodeCells + before) * image->stride + i % kCodeCells + before;
+      code.at(static_cast<std::size_t>(i)) = image->buf[place] != 0;
     }
     // What image_u8_destroy() does; the shared library does not export it.
     std::free(image->buf);
@@ -211,14 +217,18 @@ void PatternBoard::make_april_grid(const PatternConfig& config) {
     const int c = column - 1;
     const int r = row - 1;
     if (c < 0 || r < 0 || column >= x_.cells() - 1 || row >= y_.cells() - 1) return false;
-    const int in_column = c % (kTagCells + 1);
-    const int in_row = r % (kTagCells + 1);
+    const int in_column = c % (side + 1);
+    const int in_row = r % (side + 1);
     if (in_column == 0 && in_row == 0) return config.corner_squares;
     if (in_column == 0 || in_row == 0) return false;
-    const int tag_row = config.rows - 1 - r / (kTagCells + 1);  // numbered upwards
-    const int tag = tag_row * config.columns + c / (kTagCells + 1);
-    return black[static_cast<std::size_t>((tag * kTagCells + in_row - 1) * kTagCells + in_column -
-                                          1)] != 0;
+    const int code_column = in_column - 1 - config.border;
+    const int code_row = in_row - 1 - config.border;
+    if (std::min(code_column, code_row) < 0 || std::max(code_column, code_row) >= kCodeCells)
+      return true;
+    const int tag_row = config.rows - 1 - r / (side + 1);  // numbered upwards
+    const int tag = tag_row * config.columns + c / (side + 1);
+    return !white[static_cast<std::size_t>(tag)].at(
+        static_cast<std::size_t>(code_row * kCodeCells + code_column));
   });
 }
 
@@ -268,6 +278,59 @@ void PatternBoard::make_charuco(const PatternConfig& config) {
   });
 }
 
+void PatternBoard::lay_page(const PrintedPage& page) {
+  Eigen::AlignedBox2d printed;
+  for (const Eigen::AlignedBox2d& box : page.rectangles) printed.extend(box);
+  for (const PrintedPage::Circle& circle : page.circles) {
+    printed.extend(circle.centre - Vector2d::Constant(circle.radius));
+    printed.extend(circle.centre + Vector2d::Constant(circle.radius));
+  }
+  Eigen::AlignedBox2d grid;
+  for (const Vector2d& point : points_) grid.extend(point);
+  const Vector2d shift = grid.center() - printed.center();
+
+  std::vector<double> x{shift.x(), page.size.x() + shift.x()};
+  std::vector<double> y{shift.y(), page.size.y() + shift.y()};
+  for (const Eigen::AlignedBox2d& box : page.rectangles) {
+    for (const Vector2d& corner : {box.min(), box.max()}) {
+      x.push_back(corner.x() + shift.x());
+      y.push_back(corner.y() + shift.y());
+    }
+  }
+  for (std::vector<double>* nodes : {&x, &y}) {
+    constexpr double kSame = 1e-7;  // m
+    std::sort(nodes->begin(), nodes->end());
+    nodes->erase(
+        std::unique(nodes->begin(), nodes->end(), [](double a, double b) { return b - a < kSame; }),
+        nodes->end());
+  }
+  lay(x, y);
+  const auto columns = static_cast<std::size_t>(x_.cells());
+  std::vector<bool> black(columns * static_cast<std::size_t>(y_.cells()), false);
+  const auto nearest = [](const std::vector<double>& nodes, double at) {
+    return std::lower_bound(nodes.begin(), nodes.end(), at - 1e-6) - nodes.begin();
+  };
+  for (const Eigen::AlignedBox2d& box : page.rectangles) {
+    const auto left = nearest(x, box.min().x() + shift.x());
+    const auto right = nearest(x, box.max().x() + shift.x());
+    const auto bottom = nearest(y, box.max().y() + shift.y());
+    for (auto row = nearest(y, box.min().y() + shift.y()); row < bottom; ++row) {
+      for (auto column = left; column < right; ++column)
+        black[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)] = true;
+    }
+  }
+  above_table_.clear();
+  fill([&](int column, int row) {
+    return black[static_cast<std::size_t>(row) * columns + static_cast<std::size_t>(column)];
+  });
+  radius_ = 0;
+  page_circles_.clear();
+  for (const PrintedPage::Circle& circle : page.circles) {
+    radius_ = circle.radius;  // all alike
+    page_circles_.push_back(circle.centre + shift);
+  }
+}
+
 double PatternBoard::integral(const Place& x, const Place& y) const {
   const auto width = static_cast<std::size_t>(x_.cells()) + 1;
   const double* corner =
@@ -280,6 +343,17 @@ double PatternBoard::integral(const Place& x, const Place& y) const {
 }
 
 double PatternBoard::circles_cover(const Vector2d& place, const Vector2d& box) const {
+  const auto cover = [&](const Vector2d& centre) {
+    const Vector2d from = place - centre;
+    const double distance = from.norm();
+    if (distance < 1e-9) return 1.0;
+    return box_cover(radius_ - distance, from / distance, box);
+  };
+  for (const Vector2d& centre : page_circles_) {
+    const double covered = cover(centre);
+    if (covered > 0) return covered;
+  }
+  if (!page_circles_.empty()) return 0;
   const Vector2d p = place / config_.size;
   int column = static_cast<int>(std::lround(p.x()));
   int row = static_cast<int>(std::lround(p.y()));
@@ -297,10 +371,7 @@ double PatternBoard::circles_cover(const Vector2d& place, const Vector2d& box) c
     }
   }
   if (column < 0 || row < 0 || column >= columns || row >= config_.rows) return 0;
-  const Vector2d from = place - config_.size * Vector2d(column, row);
-  const double distance = from.norm();
-  if (distance < 1e-9) return 1;
-  return box_cover(radius_ - distance, from / distance, box);
+  return cover(config_.size * Vector2d(column, row));
 }
 
 double PatternBoard::brightness(const Vector2d& place, const Vector2d& box) const {

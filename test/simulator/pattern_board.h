@@ -6,10 +6,11 @@
 //   chessboard         columns x rows inner corners, a white square's room around
 //   circles            asymmetric: every second row moved by `size`, neighbours of a row 2 * size apart, rows `size`
 //   symmetric_circles  `size` apart
-//   april_grid         tag36h11 (codes from libapriltag, as printed), side `size`, gap * size between tags; corner squares:
-//                      the black squares that kalibr prints where gaps cross
+//   april_grid         tag36h11 (codes from libapriltag, as printed), side `size`, gap * size between tags; border: cells of black
+//                      about a code, kalibr prints 2; corner squares: the black squares that kalibr prints where gaps cross
 //   charuco            columns x rows squares of OpenCV's board, side `size`, markers with side `marker`; points: the inner corners
-// Circles have a quarter of the least distance of two as radius. Thread-safe after construction.
+// Circles have a quarter of the least distance of two as radius. With a `page`, what is seen is what that SVG file prints, its
+// shapes' middle on the middle of the points. Thread-safe after construction.
 
 #include <Eigen/Core>
 #include <vector>
@@ -17,6 +18,8 @@
 #include "test/simulator/config.h"
 
 namespace alidade::simulator {
+
+struct PrintedPage;
 
 class PatternBoard {
  public:
@@ -59,6 +62,7 @@ class PatternBoard {
   void make_circles(const PatternConfig& config);
   void make_april_grid(const PatternConfig& config);
   void make_charuco(const PatternConfig& config);
+  void lay_page(const PrintedPage& page);
   // Where the cells' columns and rows end, m.
   void lay(const std::vector<double>& x, const std::vector<double>& y);
   // is_black(column, row) of the cells.
@@ -72,6 +76,7 @@ class PatternBoard {
   std::vector<Eigen::Vector2d> points_;
   Eigen::Vector2d low_, high_;
   double radius_ = 0;  // of circles, m
+  std::vector<Eigen::Vector2d> page_circles_;
   // What is of one brightness from node to node: the brightness above the table's, and its integral from the corner to each node.
   Nodes x_, y_;
   std::vector<double> above_table_, integral_;

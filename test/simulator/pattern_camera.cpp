@@ -28,6 +28,7 @@ PatternCamera::PatternCamera(const Config& config, const Vector2d& pattern_middl
       line_delay_(config.camera.line_delay),
       height_(config.image.height),
       distance_(config.pattern->hand.distance),
+      turn_(config.pattern->hand.turn),
       middle_(pattern_middle) {
   const PatternConfig::Hand& hand = config.pattern->hand;
   std::mt19937_64 generator = make_generator(config.seed, Stream::kPath);
@@ -43,7 +44,7 @@ PatternCamera::PatternCamera(const Config& config, const Vector2d& pattern_middl
 }
 
 CameraPose PatternCamera::pose(double time_s) const {
-  std::array<double, 6> x{};
+  std::array<double, 6> x = {0, 0, 0, turn_.x(), turn_.y(), turn_.z()};
   for (std::size_t i = 0; i < 6; ++i) {
     for (const Wave& wave : waves_[i])
       x[i] += wave.amplitude * std::sin(wave.frequency * time_s + wave.phase);

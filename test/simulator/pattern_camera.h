@@ -2,7 +2,7 @@
 // A camera held by hand before a printed pattern: pose over time, lens and read-out, written on its own (nothing of core/).
 //
 //   pose    p_camera = R(t) (p_pattern - middle) + (x(t), y(t), z(t)), R = R_z R_y R_x: each of the six a sum of three sines
-//           (slow and wide, medium, fast and small) whose frequencies and phases come from the seed
+//           (slow and wide, medium, fast and small) whose frequencies and phases come from the seed; the turns from `turn` on
 //   lens    a = x / z, b = y / z, q = a^2 + b^2, s = 1 + k1 q + k2 q^2,
 //           u = f_u (s a + 2 p1 a b + p2 (q + 2 a^2)) + c_u,  v = f_v (s b + p1 (q + 2 b^2) + 2 p2 a b) + c_v
 //   row     row coordinate v is exposed about t0 + v * line_delay
@@ -47,6 +47,7 @@ class PatternCamera {
   double line_delay_;
   int height_;
   double distance_;
+  Eigen::Vector3d turn_;
   Eigen::Vector2d middle_;
   std::array<std::array<Wave, 3>, 6> waves_;
 };

@@ -52,6 +52,18 @@ class LivePatternInBrief(Bench):
         self.assertFalse((self.folder / "wrong").exists())
 
 
+    def test_a_wrong_gap_of_an_april_grid_is_said(self):
+        board = {"kind": "april_grid", "columns": 4, "rows": 3, "size_mm": 50, "lens": SETTINGS["pattern"]["lens"]}
+        camera = self.camera(settings={**SETTINGS, "duration_s": 12, "pattern": board, "live": {"mjpeg_port": 0}})
+        process = self.calibrate("gap", {"type": "mjpeg", "url": camera.others["mjpeg"]}, "--duration", "5",
+                                 pattern="aprilgrid:4x3:50mm:0.25")
+        gap = "the gap between its tags is 0.30 of a tag's side, not 0.25 as it was named"
+        wait_until(lambda: self.said(process, f"images: {gap}"), "the gap, while it is filmed")
+        code, lines = process.end()
+        self.assertEqual((code, lines), (1, []), process.error_text())
+        self.assertIn(gap, process.errors[-1])
+
+
 class LivePattern(Bench):
     def assert_is_true(self, process, lines):
         """Line delay and focal length, as the sigmas say."""

@@ -319,6 +319,7 @@ TEST(Charuco, AnotherPatternIsNotFoundAndSaidSo) {
     // The finest look for other dictionaries takes turns.
     config.image = {752, 480, 20};
     config.pattern->corner_squares = false;
+    config.pattern->border = 1;  // as OpenCV looks for
     const simulator::PatternRenderer renderer(config);
     const std::vector<std::uint8_t> image = renderer.render(0, 0);
     PatternDetector detector(pattern_of(kBoard.text));

@@ -1,12 +1,19 @@
 #include "core/pattern/pattern_detector.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <Eigen/Core>
 #include <algorithm>
 #include <cmath>
+#include <optional>
+#include <string>
+#include <vector>
 
+#include "core/pattern/pattern_drawing.h"
 #include "test/core/pattern/pattern_simulation.h"
 #include "test/core/pattern/printed_pattern.h"
+#include "test/support/temporary_directory.h"
 
 namespace alidade {
 namespace {
@@ -61,15 +68,168 @@ INSTANTIATE_TEST_SUITE_P(Kinds, PrintedPatterns, testing::ValuesIn(printed_patte
 
 constexpr Printed kTags = {"aprilgrid:6x6:27mm:0.3", Kind::kAprilGrid, 6, 6, 0.027, 0, 0};
 
-// The corner squares of kalibr's grids hide most tags from libapriltag: all but one at most are found from the
-// few. In the first image, and where
-// the board has jumped since the last.
-TEST(PatternDetector, AprilGridWithCornerSquaresIsFoundWhole) {
-  const simulator::Config config = scene_of(kTags);
+// How AprilGrids are printed: cells of black about a code, black squares at the tags' corners.
+struct TagLayout {
+  int border;
+  bool corner_squares;
+};
+
+simulator::Config scene_of(const Printed& printed, const TagLayout& layout) {
+  simulator::Config config = scene_of(printed);
+  config.pattern->border = layout.border;
+  config.pattern->corner_squares = layout.corner_squares;
+  return config;
+}
+
+class TagLayouts : public testing::TestWithParam<TagLayout> {};
+
+// One name for all of them. Corner squares hide most tags from libapriltag: all but one at most are found from the
+// few. In the first image, and where the board has jumped since the last.
+TEST_P(TagLayouts, AreFoundWhole) {
+  const simulator::Config config = scene_of(kTags, GetParam());
   const simulator::PatternRenderer renderer(config);
   PatternDetector detector(pattern_of(kTags.text));
+  test::DetectedErrors errors;
   for (const double time_s : {0.0, 2.0, 2.05, 4.0}) {
-    EXPECT_GE(found_in(renderer.render(time_s, 0), config, &detector).size(), 4U * 35U) << time_s;
+    const auto found = found_in(renderer.render(time_s, 0), config, &detector);
+    EXPECT_GE(found.size(), 4U * 35U) << time_s;
+    errors.add(renderer, time_s, pattern_of(kTags.text), found);
+  }
+  EXPECT_EQ(errors.wrong, 0);
+  EXPECT_LT(errors.rms(), GetParam().corner_squares ? 0.01 : 0.018);
+  EXPECT_EQ(detector.doubt(), "");
+}
+
+struct View {
+  const char* what;
+  Eigen::Vector3d turn;  // rad
+  double distance, light, exposure;
+  double rms;  // with squares, px
+};
+
+// Each of its own image: nothing is known from one before.
+TEST_P(TagLayouts, AreFoundInOtherViews) {
+  for (const View& view : {View{"half a turn", {0, 0, M_PI}, 0.5, 1, 2e-3, 0.012},
+                           {"tilted by its side", {0, -0.7, 0.3}, 0.5, 1, 0, 0.012},
+                           {"tilted by its edge", {0.6, 0, 0}, 0.55, 1, 0, 0.012},
+                           {"far", {0, 0, 0}, 0.9, 1, 0, 0.016},
+                           {"dark", {0, 0, 0.2}, 0.5, 0.12, 0, 0.05}}) {
+    simulator::Config config = scene_of(kTags, GetParam());
+    simulator::PatternConfig& pattern = *config.pattern;
+    pattern.hand.turn = view.turn;
+    pattern.hand.distance = view.distance;
+    pattern.hand.reach = 0.3;
+    for (double* part : {&pattern.black, &pattern.white, &pattern.table}) *part *= view.light;
+    config.camera.line_delay = -60e-6;
+    config.sensor.exposure = view.exposure;
+    config.sensor.read_noise = 1;
+    const simulator::PatternRenderer renderer(config);
+    PatternDetector detector(pattern_of(kTags.text));
+    test::DetectedErrors errors;
+    errors.add(renderer, 0, pattern_of(kTags.text),
+               found_in(renderer.render(0, 0), config, &detector));
+    EXPECT_GE(errors.count, 4 * 34) << view.what << detector.doubt();
+    EXPECT_EQ(errors.wrong, 0) << view.what;
+    EXPECT_LT(errors.rms(), view.rms * (GetParam().corner_squares ? 1 : 2)) << view.what;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Prints, TagLayouts,
+                         testing::Values(TagLayout{1, true}, TagLayout{1, false},
+                                         TagLayout{2, true}, TagLayout{2, false}),
+                         [](const auto& layout) {
+                           return std::string(layout.param.border == 1 ? "OneCell" : "TwoCells") +
+                                  (layout.param.corner_squares ? "Squares" : "");
+                         });
+
+// Narrow gaps, more rows than columns: neighbours' edges stay out of what is laid on a corner.
+TEST(PatternDetector, AnAprilGridOfAnotherShapeIsFound) {
+  const Printed printed = {"aprilgrid:5x8:27mm:0.2", Kind::kAprilGrid, 5, 8, 0.027, 0, 0};
+  for (const int border : {1, 2}) {
+    simulator::Config config = scene_of(printed, {border, true});
+    config.pattern->gap = 0.2;
+    config.pattern->hand.distance = 0.5;
+    const test::DetectedErrors errors = errors_of(config, printed.text, 2, 0.4);
+    EXPECT_GE(errors.count, 2 * 4 * 39) << border;
+    EXPECT_EQ(errors.wrong, 0) << border;
+    EXPECT_LT(errors.rms(), 0.015) << border;
+  }
+}
+
+struct Misnamed {
+  const char* what;
+  int columns, rows;
+  double gap;
+  const char* name;
+  const char* doubt;
+};
+
+// A grid that is another than it was named is not found, and in what it is another is said, from the first image on.
+TEST(PatternDetector, AMisnamedAprilGridIsToldAsThat) {
+  for (const Misnamed& misnamed :
+       {Misnamed{"smaller", 6, 6, 0.3, "aprilgrid:6x6:27mm:0.25",
+                 "the gap between its tags is 0.30 of a tag's side, not 0.25 as it was named; is "
+                 "it aprilgrid:6x6:27mm:0.30?"},
+        {"larger", 6, 6, 0.3, "aprilgrid:6x6:27mm:0.35", "is 0.30 of a tag's side, not 0.35"},
+        {"far off", 6, 6, 0.15, "aprilgrid:6x6:27mm:0.5", "is 0.15 of a tag's side, not 0.5 "},
+        {"rows for columns", 7, 5, 0.3, "aprilgrid:5x7:27mm:0.3",
+         "its tags lie in rows of 7, not of 5 as it was named; the tags of a row come first"}}) {
+    for (const bool corner_squares : {true, false}) {
+      simulator::Config config =
+          scene_of({"", Kind::kAprilGrid, misnamed.columns, misnamed.rows, 0.027, 0, 0},
+                   {2, corner_squares});
+      config.pattern->gap = misnamed.gap;
+      const simulator::PatternRenderer renderer(config);
+      PatternDetector detector(pattern_of(misnamed.name));
+      EXPECT_TRUE(found_in(renderer.render(0, 0), config, &detector).empty()) << misnamed.what;
+      EXPECT_THAT(detector.doubt(), testing::HasSubstr(misnamed.doubt)) << misnamed.what;
+    }
+  }
+}
+
+struct Drawn {
+  const char* text;
+  Kind kind;
+  int columns, rows;
+  double size_m;
+  double rms;  // px
+};
+
+// What --print draws, held before the camera: each kind, near, far and at a slant.
+TEST(PatternDetector, WhatIsPrintedIsReadBack) {
+  std::vector<Drawn> all = {
+      {"chessboard:9x6:25mm", Kind::kChessboard, 9, 6, 0.025, 0.035},
+      {"circles:4x11:20mm", Kind::kCircles, 4, 11, 0.02, 0.02},
+      {"symmetric-circles:7x6:25mm", Kind::kSymmetricCircles, 7, 6, 0.025, 0.02},
+      {"aprilgrid:6x6:30mm:0.3", Kind::kAprilGrid, 6, 6, 0.03, 0.02},
+      // On a page without room for the squares around.
+      {"aprilgrid:6x6:36mm:0.3", Kind::kAprilGrid, 6, 6, 0.036, 0.02}};
+  if (simulator::PatternBoard::has_charuco())
+    all.push_back({"charuco:9x6:30mm:22mm", Kind::kCharuco, 9, 6, 0.03, 0.035});
+  const TemporaryDirectory directory;
+  for (const Drawn& drawn : all) {
+    std::string error;
+    const std::optional<std::string> page = draw_pattern(pattern_of(drawn.text), "a3", &error);
+    ASSERT_TRUE(page) << error;
+    simulator::Config config =
+        simulator::pattern_scene(drawn.kind, drawn.columns, drawn.rows, drawn.size_m);
+    config.pattern->page = directory.write("page.svg", *page);
+    config.pattern->hand.reach = 0.3;
+    config.sensor.read_noise = 1;
+    struct At {
+      double distance;
+      Eigen::Vector3d turn;
+    };
+    for (const At& at : {At{0.4, {0, 0, 0}}, {0.55, {0.5, 0, 0.2}}, {0.7, {0, -0.6, 0}}}) {
+      config.pattern->hand.distance = at.distance;
+      config.pattern->hand.turn = at.turn;
+      const test::DetectedErrors errors = errors_of(config, drawn.text, 1, 1);
+      const std::size_t points = pattern_of(drawn.text).points_m().size();
+      EXPECT_GE(errors.count, static_cast<int>(0.9 * static_cast<double>(points)))
+          << drawn.text << " at " << at.distance;
+      EXPECT_EQ(errors.wrong, 0) << drawn.text << " at " << at.distance;
+      EXPECT_LT(errors.rms(), drawn.rms) << drawn.text << " at " << at.distance;
+    }
   }
 }
 

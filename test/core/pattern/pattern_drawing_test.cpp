@@ -39,7 +39,12 @@ TEST(PatternDrawing, DrawsInTrueSize) {
   const std::optional<std::string> tags =
       draw_pattern(pattern_of("aprilgrid:6x6:25mm:0.3"), "a4", &error);
   ASSERT_TRUE(tags) << error;
-  EXPECT_GT(count_of(*tags, "<rect"), 36 * 28);  // each has its border of 28 cells, and some within
+  // kalibr's border of two cells of ten, and the squares between tags; around them they do not fit on this page.
+  EXPECT_THAT(*tags, HasSubstr("width=\"25.0000\" height=\"5.0000\""));
+  const std::string square = "width=\"7.5000\" height=\"7.5000\"";
+  EXPECT_EQ(count_of(*tags, square), 25);
+  EXPECT_EQ(count_of(*draw_pattern(pattern_of("aprilgrid:6x6:25mm:0.3"), "a3", &error), square),
+            49);
 }
 
 TEST(PatternDrawing, SaysWhatDoesNotFit) {

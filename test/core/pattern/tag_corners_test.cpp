@@ -3,6 +3,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <opencv2/imgproc.hpp>
@@ -11,43 +12,58 @@
 namespace alidade::internal {
 namespace {
 
-constexpr double kGap_cells = 2.4;
+constexpr double kGap = 0.3;
 
-TagCells some_code(std::uint64_t seed) {
+// How a grid is printed: cells of black about a tag's code, black squares at its corners.
+struct Layout {
+  int border;
+  bool squares;
+};
+constexpr Layout kKalibrs = {2, true};
+constexpr std::array<Layout, 4> kLayouts = {{{1, true}, {1, false}, kKalibrs, {2, false}}};
+
+TagFace some_tag(std::uint64_t seed, int border) {
   std::mt19937_64 random(seed);
-  TagCells cells{};
-  for (std::size_t row = 1; row < kTagCells - 1; ++row) {
-    for (std::size_t column = 1; column < kTagCells - 1; ++column)
-      cells[row][column] = random() % 2 == 0;
+  TagFace face;
+  face.border = border;
+  for (auto& row : face.is_white) {
+    for (bool& cell : row) cell = random() % 2 == 0;
   }
-  return cells;
+  return face;
 }
 
-// Of kalibr's grid about one tag, x right and y down in cells.
-bool is_white(const TagCells& cells, double x, double y) {
-  const auto outside = [](double z) { return z < 0 || z >= kTagCells; };
-  if (outside(x) || outside(y)) return !(outside(x) && outside(y));
-  return cells[static_cast<std::size_t>(y)][static_cast<std::size_t>(x)];
+// Of a grid about one tag, x right and y down in its cells.
+bool is_white(const TagFace& face, bool squares, double x, double y) {
+  const auto outside = [&](double z) { return z < 0 || z >= face.side(); };
+  if (outside(x) || outside(y)) return !(squares && outside(x) && outside(y));
+  const int row = static_cast<int>(y) - face.border;
+  const int column = static_cast<int>(x) - face.border;
+  if (std::min(row, column) < 0 || std::max(row, column) >= kCodeCells) return false;
+  return face.is_white.at(static_cast<std::size_t>(row)).at(static_cast<std::size_t>(column));
 }
+
+CornerSquares at_each_corner(bool squares) { return {squares, squares, squares, squares}; }
 
 struct TagImage {
   cv::Mat image;
   std::vector<cv::Point2f> corners;  // truth
 };
 
-// Each pixel is the mean of places within it, moved along the blur.
-TagImage seen(const TagCells& cells, double cell_px, double turn, double shear, double blur_px,
-              double noise, std::uint64_t seed) {
+// Each pixel is the mean of places within it, moved along the blur. cell_px: of an eighth of the tag's side.
+TagImage seen(const TagFace& face, bool squares, double cell_px, double turn, double shear,
+              double blur_px, double noise, std::uint64_t seed) {
   std::mt19937_64 random(seed);
   std::uniform_real_distribution<double> uniform(0, 1);
   std::normal_distribution<double> normal(0, noise);
-  const cv::Matx22d A(cell_px * std::cos(turn), -cell_px * shear * std::sin(turn),
-                      cell_px * std::sin(turn), cell_px * shear * std::cos(turn));
+  const double side = face.side();
+  const double own_px = cell_px * 8 / side;
+  const cv::Matx22d A(own_px * std::cos(turn), -own_px * shear * std::sin(turn),
+                      own_px * std::sin(turn), own_px * shear * std::cos(turn));
   const cv::Vec2d middle(40 + uniform(random), 40 + uniform(random));
   const cv::Matx22d to_cells = A.inv();
   TagImage result;
-  for (const auto& [x, y] : {std::pair{0, 8}, {8, 8}, {8, 0}, {0, 0}}) {
-    const cv::Vec2d u = A * cv::Vec2d(x - 4, y - 4) + middle;
+  for (const auto& [x, y] : {std::pair{0., side}, {side, side}, {side, 0.}, {0., 0.}}) {
+    const cv::Vec2d u = A * cv::Vec2d(x - side / 2, y - side / 2) + middle;
     result.corners.emplace_back(static_cast<float>(u[0]), static_cast<float>(u[1]));
   }
   result.image.create(80, 80, CV_8UC1);
@@ -64,8 +80,8 @@ TagImage seen(const TagCells& cells, double cell_px, double turn, double shear, 
         const int k = sample / columns % kRows;
         const double along = blur_px * ((sample / (columns * kRows) + 0.5) / moves - 0.5);
         const cv::Vec2d at(u + (i + 0.5) / columns - 0.5 + along, v + (k + 0.5) / kRows - 0.5);
-        const cv::Vec2d place = to_cells * (at - middle) + cv::Vec2d(4, 4);
-        white += is_white(cells, place[0], place[1]) ? 1 : 0;
+        const cv::Vec2d place = to_cells * (at - middle) + cv::Vec2d(side, side) / 2;
+        white += is_white(face, squares, place[0], place[1]) ? 1 : 0;
       }
       const double grey = 40 + 160.0 * white / samples + normal(random);
       result.image.at<std::uint8_t>(v, u) =
@@ -77,19 +93,21 @@ TagImage seen(const TagCells& cells, double cell_px, double turn, double shear, 
 }
 
 // Of each coordinate, over tags that are turned (by multiples of turn) and foreshortened, started half a pixel off.
-double rms_error(double cell_px, double blur_px, double noise, double turn = 0.5) {
+double rms_error(const Layout& layout, double cell_px, double blur_px, double noise,
+                 double turn = 0.5) {
   double squares = 0;
   int count = 0;
-  for (std::uint64_t seed = 1; seed <= 12; ++seed) {
+  for (std::uint64_t seed = 1; seed <= 6; ++seed) {
     std::mt19937_64 random(seed);
     std::uniform_real_distribution<double> uniform(-0.5, 0.5);
-    const TagCells cells = some_code(seed);
-    const TagImage tag =
-        seen(cells, cell_px, turn * static_cast<double>(seed), 0.8, blur_px, noise, seed);
+    const TagFace face = some_tag(seed, layout.border);
+    const TagImage tag = seen(face, layout.squares, cell_px, turn * static_cast<double>(seed), 0.8,
+                              blur_px, noise, seed);
     std::vector<cv::Point2f> corners = tag.corners;
     for (cv::Point2f& c : corners)
       c += cv::Point2f(static_cast<float>(uniform(random)), static_cast<float>(uniform(random)));
-    if (!refine_tag_corners(tag.image, cells, kGap_cells, &corners)) return 1e9;
+    if (!refine_tag_corners(tag.image, face, at_each_corner(layout.squares), kGap, &corners))
+      return 1e9;
     for (std::size_t i = 0; i < 4; ++i) {
       const cv::Point2f d = corners[i] - tag.corners[i];
       squares += static_cast<double>(d.dot(d));
@@ -100,31 +118,49 @@ double rms_error(double cell_px, double blur_px, double noise, double turn = 0.5
 }
 
 TEST(TagCorners, AreFoundToHundredthsOfAPixel) {
-  EXPECT_LT(rms_error(5, 0, 0), 0.015);
-  EXPECT_LT(rms_error(3, 0, 0), 0.02);
-  EXPECT_LT(rms_error(2.5, 0, 2), 0.03);
-  EXPECT_LT(rms_error(4, 3, 2), 0.04);             // moved by three pixels while it was exposed
-  EXPECT_LT(rms_error(4, 5, 0, M_PI / 2), 0.034);  // along one axis of the tag or the other
+  for (const Layout& layout : kLayouts) {
+    SCOPED_TRACE(testing::Message() << layout.border << ", " << layout.squares);
+    // Without a square two of its four edges are missing.
+    const double more = layout.squares ? 1 : 2;
+    EXPECT_LT(rms_error(layout, 5, 0, 0), 0.015 * more);
+    EXPECT_LT(rms_error(layout, 3, 0, 0), 0.02 * more);
+    EXPECT_LT(rms_error(layout, 2.5, 0, 2), 0.03 * more);
+    EXPECT_LT(rms_error(layout, 4, 3, 2), 0.04 * more);  // moved by three pixels while exposed
+    // Along one axis of the tag or the other.
+    EXPECT_LT(rms_error(layout, 4, 5, 0, M_PI / 2), 0.034 * more);
+  }
+}
+
+TEST(TagCorners, ShowWhetherSquaresAreBesideThem) {
+  for (const Layout& layout : kLayouts) {
+    for (std::uint64_t seed = 1; seed <= 3; ++seed) {
+      const TagFace face = some_tag(seed, layout.border);
+      const TagImage tag = seen(face, layout.squares, 2.5, 0.4 * static_cast<double>(seed), 0.8,
+                                seed % 2 == 0 ? 3 : 0, 2, seed);
+      for (const double evidence : evidence_of_squares(tag.image, face, kGap, tag.corners)) {
+        EXPECT_EQ(evidence > 0, layout.squares) << layout.border << ", seed " << seed;
+        EXPECT_GT(std::abs(evidence), 0.05);
+      }
+    }
+  }
 }
 
 TEST(TagCorners, AreNotFoundWhereSomethingElseIs) {
-  const TagCells cells = some_code(1);
-  const TagImage tag = seen(cells, 4, 0.3, 0.8, 0, 0, 1);
-  std::vector<cv::Point2f> corners = tag.corners;
-  EXPECT_TRUE(refine_tag_corners(tag.image, cells, kGap_cells, &corners));
-  cv::Mat inverted = 255 - tag.image;
-  corners = tag.corners;
-  EXPECT_FALSE(refine_tag_corners(inverted, cells, kGap_cells, &corners));
-  corners = tag.corners;
-  EXPECT_FALSE(
-      refine_tag_corners(cv::Mat(80, 80, CV_8UC1, cv::Scalar(90)), cells, kGap_cells, &corners));
-  corners = tag.corners;
-  for (cv::Point2f& c : corners) c.x -= 30;  // beyond the image
-  EXPECT_FALSE(refine_tag_corners(tag.image, cells, kGap_cells, &corners));
+  const TagFace face = some_tag(1, kKalibrs.border);
+  const CornerSquares squares = at_each_corner(kKalibrs.squares);
+  const TagImage tag = seen(face, kKalibrs.squares, 4, 0.3, 0.8, 0, 0, 1);
+  const auto is_found = [&](const cv::Mat& image, std::vector<cv::Point2f> corners) {
+    return refine_tag_corners(image, face, squares, kGap, &corners);
+  };
+  EXPECT_TRUE(is_found(tag.image, tag.corners));
+  EXPECT_FALSE(is_found(255 - tag.image, tag.corners));
+  EXPECT_FALSE(is_found(cv::Mat(80, 80, CV_8UC1, cv::Scalar(90)), tag.corners));
+  std::vector<cv::Point2f> beyond = tag.corners;  // the image
+  for (cv::Point2f& c : beyond) c.x -= 30;
+  EXPECT_FALSE(is_found(tag.image, beyond));
   cv::Mat covered = tag.image.clone();
   cv::circle(covered, tag.corners[2], 6, cv::Scalar(120), -1);
-  corners = tag.corners;
-  EXPECT_FALSE(refine_tag_corners(covered, cells, kGap_cells, &corners));
+  EXPECT_FALSE(is_found(covered, tag.corners));
 }
 
 }  // namespace
