@@ -6,8 +6,8 @@
 //   angle + rate t + acceleration t^2 / 2,  t = v * line delay.
 // q is R_base_from_camera; covariance and sigma are of a perturbation R * Exp(xi), xi in the camera frame.
 // A record without a frame (video lost) has neither frame nor time_s, one of a frame that may have waited no time_s; one of
-// mode `none` has no orientation and its status says why. Where landmarks were looked for and the answer is telemetry's
-// (mode PT), the status says why too.
+// mode `none` has no orientation and its status says why. Where OE mode is asked for and the answer is telemetry's
+// (mode PT), the status says why too: `ok` is of mode OE then.
 // Fixed size and trivially copyable: crosses the queue to the output thread by value.
 
 #include <array>

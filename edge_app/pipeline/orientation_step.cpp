@@ -110,11 +110,9 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
   }
   telemetry_lost_ = false;
   if (sample.zoom && std::isfinite(*sample.zoom)) {
-    if (zoom_ != sample.zoom) {
-      Calibration there;
-      zoom_on_curve_ = options_.zoom_curve.at(*sample.zoom, &there);
-    }
+    const bool changed = zoom_ != sample.zoom;
     zoom_ = sample.zoom;
+    if (changed) note_curve_here();
     if (!zoom_at_adoption_) zoom_at_adoption_ = sample.zoom;
   }
 
@@ -152,9 +150,11 @@ void OrientationStep::settle_pending_frames() {
 
 void OrientationStep::telemetry_lost() { telemetry_lost_ = true; }
 
-// Of the same curve, by what all its zooms share, and at a zoom to which OE mode has followed the lens.
+// Of the same curve, by what all its zooms share, and at a zoom to which OE mode has followed the lens. What has only begun there is worth
+// less than what was seen from there before.
 bool OrientationStep::keeps_map(const PublishedCalibration& published) const {
   if (!oe_ || !options_.calibrated || !published.calibrated || !oe_->lens_has_moved()) return false;
+  if (!oe_->has_followed_lens() && !published.map.landmarks.empty()) return false;
   const Calibration& now = options_.calibration;
   const Calibration& next = published.calibration;
   Calibration by_curve;
@@ -175,8 +175,7 @@ void OrientationStep::adopt(const PublishedCalibration& published) {
   zoom_at_adoption_ = zoom_;
   minimum_delay_sigma_s_ = 0;
   options_.zoom_curve = published.zoom_curve;
-  Calibration there;
-  zoom_on_curve_ = zoom_ && options_.zoom_curve.at(*zoom_, &there);
+  note_curve_here();
   if (oe_ && !keep) oe_->reset(published.calibration, published.map, focal_length());
 }
 
@@ -261,6 +260,9 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   record.status = status_of_telemetry(query, telemetry_lost_, record.clock_locked);
   tracks_.telemetry_too_old = record.status == RecordStatus::kTelemetryTooOld;
   const bool elsewhere = !zoom_fits() || zoom_moved(telemetry_time_s);
+  // What is left of a map that was begun at another zoom is that zoom's lens.
+  if (!elsewhere && oe_ && options_.calibrated && oe_->lens_has_moved() && oe_->map().size() == 0)
+    oe_->reset(options_.calibration, focal_length());
   if (elsewhere || (oe_ && oe_->lens_has_moved())) {
     FrameLens lens;
     if (follows_lens() && look_up_lens(telemetry_time_s, &lens)) {
@@ -272,9 +274,6 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
       return record;
     }
   }
-  // What is left of a map that was begun at another zoom is that zoom's lens.
-  if (!elsewhere && oe_ && options_.calibrated && oe_->lens_has_moved() && oe_->map().size() == 0)
-    oe_->reset(options_.calibration, focal_length());
   if (elsewhere) {
     // The map is another zoom's.
     image_ = finds_landmarks() ? ImageView{} : image_;
@@ -305,6 +304,9 @@ void OrientationStep::orient_between(const InterpolatedPanTilt* measured, double
     return;
   }
   record->mode = RecordMode::kPt;
+  if (oe_) {
+    record->status = zoom_on_curve_ ? RecordStatus::kFocalLengthUnsure : RecordStatus::kZoomMoves;
+  }
   record->orientation = orientation_of(frame);
   note_tie(record);
 }
@@ -329,6 +331,7 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
     return;
   }
   record->mode = frame.mode == OrientationMode::kOe ? RecordMode::kOe : RecordMode::kPt;
+  if (oe_ && !answered_by_oe_) record->status = RecordStatus::kNotCalibrated;
   record->landmarks = frame.landmarks;
   if (lens == nullptr) allow_for_begun_movement(&frame.calibration);
   if (focal_length() == FocalLength::kLearnt) record->camera = pack(frame.calibration);

@@ -18,7 +18,8 @@
 // (repeated_images.h).
 // A lens that zooms does not come back exactly: with a zoom curve OE mode learns the focal length, too, and the record has it.
 // Where the zoom is another than the calibration's, or moves, its zoom curve gives OE mode, or PT mode, a lens (zoom_lookup.h): OE
-// mode's map stays, also when the calibration of another zoom of the same curve is adopted.
+// mode's map stays, also when the calibration of another zoom of the same curve is adopted; without one it begins there, once the lens
+// stands.
 // A scene map that knows where a frame looked may say so later: from then on records, PT's too, are in its base.
 // Without telemetry (has_telemetry false) a localized frame tells where the camera looks, followed from there to the next
 // (scene_start.h), until OE mode's landmarks hold, which go on by the frame before. Where they are lost that begins anew: "not localized".
@@ -151,10 +152,12 @@ class OrientationStep {
   [[nodiscard]] bool zoom_fits() const;
   // With a zoom curve: the reading fits, but did not when a frame of this telemetry time was taken, or is not known.
   [[nodiscard]] bool zoom_moved(double telemetry_time_s) const;
-  // OE mode has a map that it has followed to this zoom, or can follow there.
+  // OE mode has a map that it has followed to this zoom, or can follow there, or can begin one by the zoom curve.
   [[nodiscard]] bool follows_lens() const {
-    return oe_ && options_.calibrated && zoom_on_curve_ && oe_->map().size() > 0;
+    return oe_ && options_.calibrated && zoom_on_curve_ && (begins_here_ || oe_->map().size() > 0);
   }
+  // What the zoom curve has at the zoom as last reported.
+  void note_curve_here();
   // The map is of use with what is published, and worth more than what comes with it.
   [[nodiscard]] bool keeps_map(const PublishedCalibration& published) const;
   // The base of the record, where the scene map has told it.
@@ -207,6 +210,7 @@ class OrientationStep {
   double found_time_s_ = 0;        // telemetry time
   double lens_time_s_ = 0;         // likewise, of the frame last added
   bool zoom_on_curve_ = false;     // zoom_ is one of the zoom curve's
+  bool begins_here_ = false;       // and sharp enough there for a map to begin
   ZoomLookup zoom_lookup_;
   std::optional<double> zoom_at_adoption_;  // that a calibration without zoom is for
   double minimum_delay_sigma_s_ = 0;

@@ -25,6 +25,14 @@ bool OrientationStep::zoom_fits() const {
          std::abs(*zoom_ - *wanted) <= options_.zoom_tolerance;
 }
 
+void OrientationStep::note_curve_here() {
+  Calibration there;
+  zoom_on_curve_ = zoom_ && options_.zoom_curve.at(*zoom_, &there);
+  // Where nobody calibrates, nothing better will come.
+  const double most = options_.follow_points ? kSharpFocalLength : kRoughFocalLength;
+  begins_here_ = zoom_on_curve_ && relative_focal_length_sigma(there) <= most;
+}
+
 bool OrientationStep::zoom_moved(double telemetry_time_s) const {
   return options_.calibrated && !options_.zoom_curve.empty() && options_.calibration.zoom &&
          !zoom_lookup_.stands_at(*options_.calibration.zoom, options_.zoom_tolerance,

@@ -35,6 +35,8 @@ RecordStatus status_of_landmarks(OeStatus landmarks) {
       return RecordStatus::kContradiction;
     case OeStatus::kBadImage:
       return RecordStatus::kBadImage;
+    case OeStatus::kLensMoves:
+      return RecordStatus::kZoomMoves;
     case OeStatus::kNoPrediction:
     case OeStatus::kNotFinite:
       break;

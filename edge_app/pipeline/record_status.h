@@ -5,9 +5,9 @@
 //   TelemetryBuffer::query()   how the frame lies to the telemetry samples (QueryStatus)
 //   OeMode::process()          whether landmarks held (OeStatus); for frames that telemetry has an answer for
 //   FrameClock                 whether the frame's time is known
-//   OrientationStep            zoom, loss of the video, images sent again (RepeatedImages), not localized yet (SceneStart)
+//   OrientationStep            no calibration, zoom, loss of the video, images sent again (RepeatedImages), not localized yet (SceneStart)
 //   RealtimeStage              images that came too late to be looked at
-// What a person reads of each, and what to do: edge_app/README.md.
+// Where OE mode is asked for, kOk is of mode OE alone. What a person reads of each, and what to do: edge_app/README.md.
 
 #include <array>
 #include <cstddef>
@@ -39,10 +39,14 @@ enum class RecordStatus : std::uint8_t {
   kImageRepeated,  // the image is the one before, sent again while the camera turned (RepeatedImages)
   kOtherZoom,      // no calibration for the zoom that the pan/tilt source reports
   kNotFinite,      // a stamp is not a finite number
-  kNotLocalized  // without telemetry: nobody has found yet, or found again, where the camera looks
+  kNotLocalized,  // without telemetry: nobody has found yet, or found again, where the camera looks
+  kNotCalibrated,  // mode PT: landmarks are not looked for with the data sheet's camera, or a calibration that was withdrawn
+  kZoomMoves,  // mode PT: the lens moves, or has just left the zoom curve, and there is no map yet that it could be followed with
+  // Mode PT: by the zoom curve the focal length is not known well enough here (zoom_lookup.h) for landmarks to be looked for.
+  kFocalLengthUnsure
 };
 
-inline constexpr std::array<RecordStatus, 17> kRecordStatuses = {
+inline constexpr std::array<RecordStatus, 20> kRecordStatuses = {
     RecordStatus::kOk,
     RecordStatus::kClockWarmingUp,
     RecordStatus::kTimeUnknown,
@@ -59,7 +63,10 @@ inline constexpr std::array<RecordStatus, 17> kRecordStatuses = {
     RecordStatus::kImageRepeated,
     RecordStatus::kOtherZoom,
     RecordStatus::kNotFinite,
-    RecordStatus::kNotLocalized};
+    RecordStatus::kNotLocalized,
+    RecordStatus::kNotCalibrated,
+    RecordStatus::kZoomMoves,
+    RecordStatus::kFocalLengthUnsure};
 static_assert(static_cast<std::size_t>(kRecordStatuses.back()) + 1 == kRecordStatuses.size());
 
 // Of a frame whose telemetry was asked for. is_lost: there is no connection to the pan/tilt source. clock_locked: the
@@ -117,6 +124,12 @@ constexpr const char* to_string(RecordStatus status) {
       return "not finite";
     case RecordStatus::kNotLocalized:
       return "not localized";
+    case RecordStatus::kNotCalibrated:
+      return "not calibrated";
+    case RecordStatus::kZoomMoves:
+      return "zoom moves";
+    case RecordStatus::kFocalLengthUnsure:
+      return "focal length uncertain";
   }
   return "unknown status";
 }

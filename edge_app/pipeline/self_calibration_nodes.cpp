@@ -9,6 +9,7 @@
 #include "core/calibration/calibration_difference.h"
 #include "edge_app/pipeline/keyframe_map.h"
 #include "edge_app/pipeline/self_calibration.h"
+#include "edge_app/pipeline/zoom_lookup.h"
 
 namespace alidade {
 namespace {
@@ -18,9 +19,6 @@ ZoomFitOptions fit_options_of(const SessionCalibration& checked) {
   options.common_clock_sigma_s = checked.common_clock_sigma_s;
   return options;
 }
-
-// Standard deviation of log f to which landmarks can be looked for: less than 7 px at the border of 1280.
-constexpr double kSharp = 0.01;
 
 bool look_forward(const Calibration& c, Vector3<double>* d_b) {
   const Vector2<double> middle(0.5 * c.camera.width, 0.5 * c.camera.height);
@@ -95,13 +93,15 @@ void SelfCalibration::look_for_stored() {
   const bool on_curve = nodes_.curve().at(*zoom_, &found->calibration) &&
                         (stored == nullptr || has_free_centre(stored->calibration));
   const double f_sigma = relative_focal_length_sigma(found->calibration);
-  const bool by_curve = on_curve && f_sigma <= kSharp;
+  const bool by_curve = on_curve && f_sigma <= kSharpFocalLength;
   if (on_curve && !by_curve) {
-    // The real-time thread has the curve, and follows points.
-    say_once(fmt::format(
-        "zoom {}: by the zoom curve the focal length is known to {:.2g} %: PT mode with that sigma "
-        "until it is calibrated here",
-        *zoom_, 100 * f_sigma));
+    // The real-time thread has the curve, and follows points, or begins a map, where nothing better will come.
+    if (options_.automatic)
+      say_once(
+          fmt::format("zoom {}: by the zoom curve the focal length is known to {:.2g} %: PT mode "
+                      "with that sigma "
+                      "until it is calibrated here",
+                      *zoom_, 100 * f_sigma));
     return;
   }
   if (stored != nullptr && (!by_curve || look_alike(stored->calibration, found->calibration)))

@@ -56,6 +56,11 @@ class ZoomLookup {
   std::size_t count_ = 0;  // of all
 };
 
+// Standard deviation of log f to which landmarks are looked for by a zoom curve while the camera can still calibrate itself at the
+// reading: less than 7 px at the border of 1280.
+inline constexpr double kSharpFocalLength = 0.01;
+// Likewise where it does not: with more the first landmarks do not hold through a turn.
+inline constexpr double kRoughFocalLength = 0.05;
 // By so much of log f a lens may miss the curve's ends.
 inline constexpr double kBeyondEnds = 0.02;
 // As the curve has it at the reading where it has this focal length, px: for a lens whose reading is wrong. moves is set. Just beyond

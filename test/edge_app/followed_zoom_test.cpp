@@ -21,9 +21,10 @@ constexpr double kTelemetryInterval_s = 0.02;
 constexpr double kTelemetrySigma = 5e-5;  // rad
 
 // As if recordings at some zooms had given them.
-ZoomCurve curve_of(const ZoomingCamera& camera) {
+ZoomCurve curve_of(const ZoomingCamera& camera, const std::vector<double>& focal_lengths = {
+                                                    1000, 1500, 2200, 3300, 5000, 7900}) {
   std::vector<Calibration> nodes;
-  for (const double f : {1000.0, 1500.0, 2200.0, 3300.0, 5000.0, 7900.0}) {
+  for (const double f : focal_lengths) {
     Calibration node = camera.curve_of(camera.reading_of(f), 1e-4);
     for (const Parameter p : {Parameter::kPanAxis0, Parameter::kPanAxis1, Parameter::kTiltAxis0,
                               Parameter::kTiltAxis1, Parameter::kClockOffset}) {
@@ -60,11 +61,15 @@ class FollowedZoom : public testing::Test {
 
   // seed: of telemetry's noise, or of what a scene map tells without it.
   void begin(std::uint64_t seed, bool has_telemetry = true) {
-    OrientationStepOptions options;
-    options.zoom_curve = curve_;
     // Without telemetry nobody knows at which zoom it begins.
-    const double begins = has_telemetry ? reading(0) : camera_->reading_of(2200);
-    EXPECT_TRUE(curve_.at(begins, &options.calibration));
+    begin(seed, has_telemetry, curve_, has_telemetry ? reading(0) : camera_->reading_of(2200));
+  }
+  void begin(std::uint64_t seed, bool has_telemetry, const ZoomCurve& curve, double begins,
+             bool follow_points = false) {
+    OrientationStepOptions options;
+    options.zoom_curve = curve;
+    options.follow_points = follow_points;
+    EXPECT_TRUE(curve.at(begins, &options.calibration));
     options.has_telemetry = has_telemetry_ = has_telemetry;
     options.calibrated = true;
     options.video_stamp_sigma_s = 1e-5;
@@ -76,6 +81,22 @@ class FollowedZoom : public testing::Test {
     fed_s_ = 0;
     random_.seed(seed);
     normal_.reset();
+  }
+
+  // Nothing is known of what was before frame k: a recording begins there.
+  void skip_to(int k) { fed_s_ = std::max(0.0, camera_->time_s(k) - 0.4); }
+  // Frames in OE mode from `first` to before `last`; all others of these are PT's, and say why.
+  int count_oe(int first, int last) {
+    int held = 0;
+    for (int k = first; k < last; ++k) {
+      const OrientationRecord record = add(k);
+      // What the curve errs by is in the shape, too.
+      expect_honest(k, record, std::numeric_limits<double>::infinity());
+      held += record.mode == RecordMode::kOe ? 1 : 0;
+      EXPECT_EQ(record.mode == RecordMode::kOe, record.status == RecordStatus::kOk)
+          << k << ' ' << to_string(record.status);
+    }
+    return held;
   }
 
   [[nodiscard]] static bool moves(int k) { return camera_->lens(k, 0).moves; }
@@ -113,14 +134,15 @@ class FollowedZoom : public testing::Test {
     return record;
   }
 
-  void expect_honest(int k, const OrientationRecord& record) const {
+  // most_px: in OE mode, of the picture's shape.
+  void expect_honest(int k, const OrientationRecord& record, double most_px = 0.3) const {
     ASSERT_TRUE(record.orientation) << k;
     const FrameOrientation frame = unpack(record.orientation->geometry, record.camera);
     const FrameErrors errors = errors_of(*camera_, k, frame);
     EXPECT_LT(errors.sigmas, 5) << k;
     EXPECT_LT(errors.log_sigmas, 5) << k;
     if (record.mode == RecordMode::kOe) {
-      EXPECT_LT(errors.rms_px, 0.3) << k;
+      EXPECT_LT(errors.rms_px, most_px) << k;
     }
   }
 
@@ -168,6 +190,109 @@ TEST_F(FollowedZoom, StaysInOeModeFromOneZoomToTheNext) {
   published.calibration.mechanics.pan_scale = 1.001;
   step_->adopt(published);
   EXPECT_EQ(add(first_of_tele_ + 12).mode, RecordMode::kPt);
+}
+
+// As a recording that begins at another dwell than the calibration's: with the curve's lens there, and a map of its own.
+TEST_F(FollowedZoom, BeginsAtAnyReadingOfTheCurve) {
+  const int first = first_of_tele_ + 1;
+  const int last = first + 20;
+  const double tele = reading(camera_->time_s(first));
+  struct Case {
+    const char* name;
+    ZoomCurve curve;
+    double begins;  // the calibration's reading
+  };
+  for (const Case& c : {Case{"between two nodes", curve_, reading(0)},
+                        Case{"at a node", curve_of(*camera_, {1000, 2200, 4000, 7900}), reading(0)},
+                        Case{"at the curve's end, the calibration's at the other",
+                             curve_of(*camera_, {1000, 2200, 4000}), reading(0)},
+                        Case{"where it is known to some per cent",
+                             curve_of(*camera_, {1000, 5000, 7900}), reading(0)},
+                        Case{"at the calibration's own", curve_, tele}}) {
+    SCOPED_TRACE(c.name);
+    ASSERT_FALSE(c.curve.empty());
+    begin(3, true, c.curve, c.begins);
+    skip_to(first);
+    const OrientationRecord record = add(first - 1);
+    EXPECT_EQ(record.mode, RecordMode::kPt);
+    EXPECT_EQ(record.status, RecordStatus::kTooFewLandmarks);
+    expect_honest(first - 1, record);
+    EXPECT_GE(count_oe(first, last), last - first - 1);
+  }
+}
+
+// A map begins with a lens at rest.
+TEST_F(FollowedZoom, WhereItBeginsWhileTheZoomMovesItSaysSoUntilItStands) {
+  const int first = (last_of_wide_ + first_of_tele_) / 2;
+  begin(3);
+  skip_to(first);
+  // The last steps are less than one of the reading.
+  for (int k = first; k < first_of_tele_ - 3; ++k) {
+    const OrientationRecord record = add(k);
+    EXPECT_EQ(record.mode, RecordMode::kPt) << k;
+    EXPECT_EQ(record.status, RecordStatus::kZoomMoves) << k;
+    expect_honest(k, record);
+  }
+  EXPECT_GE(count_oe(first_of_tele_ - 3, first_of_tele_ + 20), 15);
+}
+
+TEST_F(FollowedZoom, NoRecordThatIsNotOfOeModeIsOkWhateverTheZoomDoes) {
+  const int first = first_of_tele_ + 1;
+  const double tele = reading(camera_->time_s(first));
+  // Outside: the curve ends before.
+  begin(3, true, curve_of(*camera_, {1000, 1200}), reading(0));
+  skip_to(first);
+  OrientationRecord record = add(first);
+  EXPECT_EQ(record.mode, RecordMode::kNone);
+  EXPECT_EQ(record.status, RecordStatus::kOtherZoom);
+  EXPECT_FALSE(record.calibrated);
+  // The lens is about to leave the curve: its last frame there.
+  begin(3, true, curve_of(*camera_, {1000, 2200, 4000}), reading(0));
+  skip_to(first);
+  const double leaves_s = camera_->time_s(first) + 1.5 * kTelemetryInterval_s;
+  record = add(first, [&](double t) { return t < leaves_s ? tele - 1 : 9999.0; });
+  EXPECT_NE(record.mode, RecordMode::kOe);
+  EXPECT_NE(record.status, RecordStatus::kOk);
+  // Where the curve knows little: 4 % for a camera that calibrates itself, which waits for that, 16 % for any other.
+  for (const bool calibrates : {true, false}) {
+    const ZoomCurve rough =
+        calibrates ? curve_of(*camera_, {1000, 5000, 7900}) : curve_of(*camera_, {1000, 7900});
+    begin(3, true, rough, reading(0), calibrates);
+    skip_to(first);
+    record = add(first);
+    EXPECT_EQ(record.mode, RecordMode::kPt);
+    EXPECT_EQ(record.status, RecordStatus::kFocalLengthUnsure);
+    FrameTracks tracks;
+    step_->get_tracks(&tracks);
+    EXPECT_EQ(tracks.tracker == FrameTracks::Tracker::kStartUp, calibrates);
+  }
+  // No picture, and one that shows nothing.
+  begin(3);
+  skip_to(first);
+  record = add(first, reading, true);
+  EXPECT_EQ(record.mode, RecordMode::kPt);
+  EXPECT_EQ(record.status, RecordStatus::kTooFewLandmarks);
+}
+
+// The one of that reading, from before, shows more of the scene than what has begun there.
+TEST_F(FollowedZoom, AStoredMapTakesThePlaceOfOneThatHasJustBegun) {
+  const int first = first_of_tele_ + 1;
+  const auto adopted = [&](const MapState& map) {
+    begin(3);
+    skip_to(first);
+    for (int k = first; k < first + 3; ++k) static_cast<void>(add(k));
+    PublishedCalibration published;
+    EXPECT_TRUE(curve_.at(reading(camera_->time_s(first)), &published.calibration));
+    published.calibrated = true;
+    published.zoom_curve = curve_;
+    published.map = map;
+    step_->adopt(published);
+    return add(first + 3).mode;
+  };
+  EXPECT_EQ(adopted({}), RecordMode::kOe) << "kept";
+  MapState useless;
+  useless.landmarks.emplace_back();
+  EXPECT_EQ(adopted(useless), RecordMode::kPt) << "taken over, however little there is in it";
 }
 
 // Whatever telemetry's noise has made the map's offset: the curve's optical centre errs between its nodes by several times that noise.
@@ -236,7 +361,12 @@ TEST_F(FollowedZoom, AfterTwoSecondsWithoutFocusLandmarksHoldAgain) {
   RecordMode last = RecordMode::kNone;
   for (int k = 2; k < camera_->frames() - 2; ++k) {
     const OrientationRecord record = add(k, reading, k >= from && k < until);
-    expect_honest(k, record);
+    // The map is lost at the end, and begins anew, with the lens as the curve has it.
+    constexpr double kByCurve_px = 1;
+    expect_honest(k, record, k < until ? 0.3 : kByCurve_px);
+    if (k >= until + 3) {
+      EXPECT_EQ(record.mode, RecordMode::kOe) << k;
+    }
     last = record.mode;
     if (k >= from && k < until) {
       EXPECT_EQ(record.mode, RecordMode::kPt) << k;

@@ -657,6 +657,77 @@ TEST_F(OeStepTest, AnswersFromTelemetryAndSaysWhyWhereTheImageDoesNotHelp) {
   }
 }
 
+// Everything that keeps a frame from OE mode, one after the other.
+TEST_F(OeStepTest, NoRecordThatIsNotOfOeModeIsOk) {
+  const auto expect_reason = [](const OrientationRecord& record, RecordStatus status) {
+    EXPECT_NE(record.mode, RecordMode::kOe);
+    EXPECT_STREQ(to_string(record.status), to_string(status));
+  };
+  OrientationStepOptions at_first = options();
+  at_first.calibrated = false;
+  PublishedCalibration published;
+  published.calibration = options().calibration;
+  published.calibrated = true;
+  {
+    SCOPED_TRACE("a connection that may have a backlog");
+    OrientationStepOptions live = options();
+    live.wait_for_pace = true;
+    OrientationStep step(live);
+    rest_.feed(&step, -0.1, 0.05);
+    StepEvents events;
+    expect_reason(step.add_frame(stamp_at(0.02), scene_.image(), &events),
+                  RecordStatus::kTimeUnknown);
+  }
+  OrientationStep step(at_first);
+  int frame = 0;
+  const auto frame_of = [&](const ImageView& image, bool numbered = false) {
+    FrameStamp stamp = stamp_at(0.08 * frame, frame);
+    if (numbered) stamp.sequence = frame;
+    ++frame;
+    StepEvents events;
+    const OrientationRecord record = step.add_frame(stamp, image, &events);
+    step.maintain();
+    return record;
+  };
+  expect_reason(frame_of(scene_.image()), RecordStatus::kTelemetryMissing);
+  rest_.feed(&step, 0, 1.2);
+  expect_reason(frame_of(scene_.image()), RecordStatus::kNotCalibrated);
+  expect_reason(frame_of(ImageView{}), RecordStatus::kNotCalibrated);
+  // As long as a clock filter warms up: that does not keep it from OE mode.
+  expect_reason(frame_of(scene_.image(), true), RecordStatus::kNotCalibrated);
+  step.adopt(published);
+  expect_reason(frame_of(scene_.image()), RecordStatus::kTooFewLandmarks);
+  EXPECT_EQ(frame_of(scene_.image()).status, RecordStatus::kOk);
+  expect_reason(frame_of(ImageView{}), RecordStatus::kBadImage);
+  expect_reason(frame_of(scene_.image(30)), RecordStatus::kContradiction);
+  EXPECT_EQ(frame_of(scene_.image()).mode, RecordMode::kOe);
+  published.calibrated = false;
+  step.adopt(published);
+  expect_reason(frame_of(scene_.image()), RecordStatus::kNotCalibrated);
+  published.calibrated = true;
+  published.calibration.zoom = 7;
+  step.adopt(published);
+  for (const double zoom : {9.0, 7.0}) {
+    PanTiltSample sample = rest_.sample(1.22);
+    sample.zoom = zoom;
+    step.add_telemetry(sample);
+    if (zoom == 9.0) expect_reason(frame_of(scene_.image()), RecordStatus::kOtherZoom);
+  }
+  frame += 20;
+  expect_reason(frame_of(scene_.image()), RecordStatus::kTelemetryTooOld);
+  step.telemetry_lost();
+  expect_reason(frame_of(scene_.image()), RecordStatus::kTelemetryLost);
+  expect_reason(step.video_lost(9), RecordStatus::kVideoLost);
+  // PT mode asks for no landmarks.
+  OrientationStepOptions pt = options();
+  pt.oe.reset();
+  OrientationStep without(pt);
+  rest_.feed(&without, 0, 1);
+  const OrientationRecord record = add_frame(&without, stamp_at(0.5));
+  EXPECT_EQ(record.mode, RecordMode::kPt);
+  EXPECT_EQ(record.status, RecordStatus::kOk);
+}
+
 TEST_F(OeStepTest, LandmarksCarryOnWhereTelemetryIsMissing) {
   build_map();
   step_.telemetry_lost();

@@ -70,7 +70,7 @@ OeStatus OeMode::process(const ImageView& image, double frame_time_s,
        !tie_telemetry(out))) {
     return finish(OeStatus::kNotFinite);
   }
-  if (!has_lens) return finish(OeStatus::kTooFew);
+  if (!has_lens) return finish(OeStatus::kLensMoves);
   if (!build_pyramid(image)) {
     return finish(telemetry != nullptr ? OeStatus::kBadImage : OeStatus::kNoPrediction);
   }

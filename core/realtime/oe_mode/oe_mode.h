@@ -56,7 +56,8 @@ enum class OeStatus {
   kContradiction,  // landmarks and telemetry exclude each other: telemetry, with room for both
   kNoPrediction,   // neither telemetry nor a frame before: nothing is written
   kBadImage,       // none, or not of the calibration's size: telemetry alone
-  kNotFinite       // nothing is written
+  kLensMoves,  // no map begins with a lens that moves, and none is held against an unknown one: telemetry alone
+  kNotFinite  // nothing is written
 };
 
 enum class FocalLength {
@@ -120,6 +121,8 @@ class OeMode {
 
   // Whether the map was begun with another lens than the frame last processed had, or than reset() told, or that lens moved.
   [[nodiscard]] bool lens_has_moved() const { return lens_.follows() || begun_elsewhere_; }
+  // The map was begun before that lens moved, and has been followed since.
+  [[nodiscard]] bool has_followed_lens() const { return lens_.follows(); }
 
   // Map upkeep with the frame last processed; does nothing where that had no sure orientation.
   void maintain();

@@ -271,7 +271,7 @@ TEST_F(ZoomingLens, BeginsItsMapAtRest) {
   const int middle = (last_of_wide_ + first_of_tele_) / 2;
   oe_->reset(camera_->lens(middle, kRepeatability).calibration, FocalLength::kLearnt);
   for (int k = middle + 1; k < first_of_tele_; ++k) {
-    ASSERT_EQ(process(k), OeStatus::kTooFew) << k;
+    ASSERT_EQ(process(k), OeStatus::kLensMoves) << k;
     EXPECT_EQ(frame_.mode, OrientationMode::kPt);
     EXPECT_EQ(oe_->map().size(), 0);
   }
