@@ -23,6 +23,7 @@
 #include "edge_app/commands/partial_file.h"
 #include "edge_app/commands/replay.h"
 #include "edge_app/commands/replay_targets.h"
+#include "edge_app/commands/run_report.h"
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/config/noise_file.h"
 #include "edge_app/output/record_writer.h"
@@ -129,7 +130,10 @@ std::unique_ptr<Images> open_images(const ReplayOptions& options) {
   const bool demanded = options.mode == "OE";
   if (options.mode == "PT") return nullptr;
   if (!has_images(recording)) {
-    if (!demanded) return nullptr;
+    if (!demanded) {
+      spdlog::info("{}: has no pictures (video.mkv or frames/); replayed in PT mode", recording);
+      return nullptr;
+    }
     throw CommandError(kExitUsage, recording +
                                        ": has no pictures (video.mkv or frames/), which OE mode "
                                        "needs; use --mode PT");
@@ -148,16 +152,20 @@ ImageView view_of(const std::optional<Frame>& image) {
   return {image->luma, image->width, image->height, image->stride};
 }
 
-// What the last line tells.
+// What the last two lines tell.
 class Summary {
  public:
+  explicit Summary(bool wants_landmarks) : reasons_(wants_landmarks) {}
+
   void add(const OrientationRecord& record, double step_s) {
     ++frames_;
     if (record.mode == RecordMode::kOe) landmarks_.push_back(record.landmarks);
     if (record.mode == RecordMode::kPt) ++pt_;
+    reasons_.add(record);
     step_s_.add(step_s);
   }
   [[nodiscard]] std::int64_t frames() const { return frames_; }
+  [[nodiscard]] const ReasonCounts& reasons() const { return reasons_; }
   std::string line() {
     const auto oe = static_cast<std::int64_t>(landmarks_.size());
     std::string line =
@@ -175,6 +183,7 @@ class Summary {
   std::int64_t frames_ = 0;
   std::int64_t pt_ = 0;
   std::vector<int> landmarks_;  // of each frame in OE mode
+  ReasonCounts reasons_;
   LatencyHistogram step_s_;
 };
 
@@ -222,7 +231,7 @@ int replay_recording(const ReplayOptions& options) {
   const bool progress = is_terminal(STDERR_FILENO);
   const double start_s = monotonic_now_s();
   std::optional<double> first_s;
-  Summary summary;
+  Summary summary(images != nullptr);
   std::optional<PanTiltSample> sample = next<PanTiltSample>(*pan_tilt);
   while (const std::optional<Frame> frame = next<Frame>(*video)) {
     const FrameStamp& stamp = frame->stamp;
@@ -258,6 +267,9 @@ int replay_recording(const ReplayOptions& options) {
   }
   if (targets) spdlog::info("{}", targets->complete());
   file.complete();
+  const std::string reasons =
+      describe(summary.reasons(), calibration.calibration, calibration.zoom_curve);
+  if (!reasons.empty()) spdlog::info("{}", reasons);
   spdlog::info("{}: {}", file.path(), summary.line());
   return kExitOk;
 }

@@ -181,7 +181,11 @@ int run_live(const RunOptions& options) {
   pipeline.stop();
   if (mqtt) mqtt->stop();
 
-  spdlog::info("{}", describe(pipeline.summary(), of_pipeline.measure_latency));
+  const PipelineSummary summary = pipeline.summary();
+  const std::string reasons =
+      describe(summary.reasons, calibration.calibration, *pipeline.zoom_curve());
+  if (!reasons.empty()) spdlog::info("{}", reasons);
+  spdlog::info("{}", describe(summary, of_pipeline.measure_latency));
   log_source_losses(*video);
   if (writer.dropped() > 0)
     spdlog::warn("{} records not written, as the reader of stdout did not take them",

@@ -50,6 +50,19 @@ std::string describe(const PipelineSummary& summary, bool latency_measured) {
       summary.page_faults.major);
 }
 
+std::string describe(const ReasonCounts& reasons, const Calibration& calibration,
+                     const ZoomCurve& curve) {
+  std::string line = reasons.line();
+  if (reasons.of(RecordStatus::kOtherZoom) == 0) return line;
+  if (!curve.empty()) {
+    line += fmt::format("; the zoom curve has readings {} to {}", curve.first_reading(),
+                        curve.last_reading());
+  } else if (calibration.zoom) {
+    line += fmt::format("; the calibration is for zoom reading {}", *calibration.zoom);
+  }
+  return line;
+}
+
 LifeReport::LifeReport(const ServiceManager& manager, Pipeline* pipeline)
     : manager_(manager), pipeline_(*pipeline), status_s_(monotonic_now_s()) {
   pipeline_.ask_for_pulse();

@@ -318,6 +318,11 @@ ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
                    {"repeated", summary.repeated},
                    {"damaged", losses.damaged},
                    {"not_fetched", losses.dropped}};
+  out["reasons"] = Json::object();
+  for (const RecordStatus status : kRecordStatuses) {
+    if (summary.reasons.of(status) > 0)
+      out["reasons"][to_string(status)] = summary.reasons.of(status);
+  }
   out["links"] = {{"video", link_json(summary.video_link)},
                   {"pan_tilt", link_json(summary.pan_tilt_link)}};
   out["dropped"] = {{"frames", summary.drops.frames},

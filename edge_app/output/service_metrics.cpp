@@ -254,6 +254,13 @@ std::string service_metrics(const HttpApiSources& sources, const HttpCounters& h
   out.add(summary.with_landmarks, {{"mode", "OE"}});
   out.add(summary.with_orientation - summary.with_landmarks, {{"mode", "PT"}});
   out.add(summary.records - summary.with_orientation, {{"mode", "none"}});
+  out.counter(
+      "alidade_records_withheld_total",
+      "Records not in OE mode, or without orientation where that is not asked for, by status");
+  for (const RecordStatus status : kRecordStatuses) {
+    const std::int64_t count = summary.reasons.of(status);
+    if (status != RecordStatus::kOk || count > 0) out.add(count, {{"status", to_string(status)}});
+  }
   out.counter("alidade_frames_lost_total", "Frames lost before they were read, by reason");
   out.add(losses.damaged, {{"reason", "damaged"}});
   out.add(losses.dropped, {{"reason", "not_fetched"}});

@@ -48,6 +48,7 @@ Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink
       finished_(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
       zoom_curve_(std::make_shared<const ZoomCurve>(options.step.zoom_curve)) {
   if (finished_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+  summary_.reasons = ReasonCounts(options.step.oe.has_value());
   for (ImageSlot slot = 0; slot < kImageSlots; ++slot) free_slots_.push_back(slot);
   if (!options.step.has_telemetry)
     pan_tilt_watch_.lost("pan_tilt.type is none: the scene map tells where the camera looks");
@@ -345,6 +346,7 @@ void Pipeline::count(const OutputMessage& message) {
   if (message.record.orientation) ++summary_.with_orientation;
   if (message.record.mode == RecordMode::kOe) ++summary_.with_landmarks;
   if (message.record.status == RecordStatus::kImageRepeated) ++summary_.repeated;
+  summary_.reasons.add(message.record);
   if (message.record.frame && message.record.latency_s)
     summary_.latency.add(*message.record.latency_s);
   if (message.events.video_clock_restarted) ++summary_.clock_restarts;

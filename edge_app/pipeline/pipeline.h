@@ -32,6 +32,7 @@
 #include "edge_app/pipeline/latency_histogram.h"
 #include "edge_app/pipeline/link_watch.h"
 #include "edge_app/pipeline/realtime_stage.h"
+#include "edge_app/pipeline/reason_counts.h"
 #include "edge_app/pipeline/self_calibration.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/system/priority_mutex.h"
@@ -65,6 +66,7 @@ struct PipelineSummary {
   DropCounters drops;
   std::int64_t with_landmarks = 0;  // of these, in OE mode
   std::int64_t repeated = 0;        // frames whose image was the one before, sent again
+  ReasonCounts reasons;             // of the other records
   LatencyHistogram latency;
   // A frame's way: received (its last packet), pushed by the capture thread, taken up by the real-time thread,
   // record made, record written.

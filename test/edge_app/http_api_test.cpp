@@ -148,14 +148,23 @@ TEST_F(HttpApiTest, SaysHowEachLinkDoes) {
 TEST_F(HttpApiTest, SaysWhatIsWrongWithTheVideosTimesAndPictures) {
   EXPECT_TRUE(body_of(get("/api/v1/status"))["video_clock"]["left_out_rate_error"].is_null());
   summary_.repeated = 375;
+  EXPECT_EQ(body_of(get("/api/v1/status"))["reasons"], json::object());
+  OrientationRecord withheld;
+  withheld.status = RecordStatus::kImageRepeated;
+  summary_.reasons.add(withheld);
+  withheld.status = RecordStatus::kNotCalibrated;
+  for (int i = 0; i < 2; ++i) summary_.reasons.add(withheld);
   summary_.delay_wander_s = 0.034;
   summary_.stamps_left_out = -0.02;
   const json status = body_of(get("/api/v1/status"));
   EXPECT_EQ(status["frames"]["repeated"], 375);
+  EXPECT_EQ(status["reasons"], (json{{"picture repeated", 1}, {"not calibrated", 2}}));
   EXPECT_EQ(status["video_clock"]["wander_s"], 0.034);
   EXPECT_EQ(status["video_clock"]["left_out_rate_error"], -0.02);
   const std::string metrics = get("/metrics");
-  for (const char* line : {"alidade_repeated_pictures_total 375", "alidade_video_stamps_left_out 1",
+  for (const char* line : {"alidade_records_withheld_total{status=\"not calibrated\"} 2",
+                           "alidade_records_withheld_total{status=\"too few landmarks\"} 0",
+                           "alidade_repeated_pictures_total 375", "alidade_video_stamps_left_out 1",
                            "alidade_video_clock_wander_seconds 0.034"}) {
     EXPECT_THAT(metrics, HasSubstr(std::string("\n") + line + "\n"));
   }
