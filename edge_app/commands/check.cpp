@@ -132,6 +132,7 @@ void print(const ReportLines& lines) {
 void add_connection(const Connection& connection, const char* what, Findings* findings) {
   if (!connection.error.empty()) add_problem(findings, connection.error);
   if (!connection.waited.empty()) add_advice(findings, connection.waited);
+  for (const std::string& note : connection.notes) add_advice(findings, note);
   if (connection.losses == 0) return;
   add_problem(findings,
               fmt::format("{} {}: the connection was lost {} times during the check, last: {}",

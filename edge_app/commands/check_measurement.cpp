@@ -65,6 +65,7 @@ Connection collect(Source& source, double wait_s, double duration_s, std::atomic
     on_item(item);
   }
   *waits = false;
+  connection.notes = notes_of(source);
   if (!any && connection.error.empty()) connection.error = nothing_came(connection.name, wait_s);
   return connection;
 }

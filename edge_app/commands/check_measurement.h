@@ -26,6 +26,7 @@ struct Connection {
   std::string loss;   // the last one's words
   // What the source waited for last, though the connection stood, before its first item; empty: nothing.
   std::string waited;
+  std::vector<std::string> notes;  // what it found out of its device
   std::string name;
 };
 

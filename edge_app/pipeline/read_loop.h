@@ -1,6 +1,7 @@
 #pragma once
 // read_to_the_end: what a capture or telemetry thread does with its source, from the first item to the
-// last, over losses of the connection. Logs each loss and return, and what a source waits for though its connection stands.
+// last, over losses of the connection. Logs each loss and return, what a source waits for though its connection stands, and what it
+// notes of its device.
 // Allocates and waits: never on the real-time thread.
 
 #include <spdlog/spdlog.h>
@@ -8,6 +9,7 @@
 #include <limits>
 #include <string>
 #include <type_traits>
+#include <vector>
 
 #include "edge_app/pipeline/link_watch.h"
 #include "platform/system/clock.h"
@@ -22,6 +24,16 @@ std::string waiting_of(const Source& source) {
     return source.waiting();
   } else {
     return "";
+  }
+}
+
+// What the source has found out of its device since the last time; of video there is nothing.
+template <typename Source>
+std::vector<std::string> notes_of(Source& source) {
+  if constexpr (std::is_base_of_v<FrameSource, Source>) {
+    return {};
+  } else {
+    return source.take_notes();
   }
 }
 
@@ -65,6 +77,7 @@ std::string read_to_the_end(Source& source, LinkWatch* watch, const OnItem& on_i
         lost = false;
         said.clear();
         watch->item(monotonic_now_s());
+        for (const std::string& note : notes_of(source)) spdlog::warn("{}", note);
         if (!on_item(item)) return "";
         break;
       case ReadStatus::kDisconnected:

@@ -4,6 +4,7 @@
 // thread only, stop() ends it.
 
 #include <string>
+#include <vector>
 
 #include "platform/streams/pan_tilt_sample.h"
 #include "platform/streams/read_status.h"
@@ -23,6 +24,10 @@ class PanTiltSource {
 
   // One line for the person; valid after kDisconnected or kFailed.
   [[nodiscard]] virtual std::string error() const = 0;
+
+  // What the device does otherwise than its protocol says, and what is made of it: lines for the person, each
+  // said once in the source's life. Those since the last call, from the reading thread.
+  [[nodiscard]] virtual std::vector<std::string> take_notes() { return {}; }
 
   // URL without password, device or directory.
   [[nodiscard]] virtual std::string name() const = 0;

@@ -15,7 +15,8 @@
 // - A single query for the position: anything else that the head answers and that moves nothing, be it
 //   asked for nothing but that (VISCA: the zoom) or a command of which only the acknowledgement counts
 //   (PTU: CI). A refusal answers a fence, too (Answer::Kind::kDone).
-// - Numbered queries (VISCA with header): no fence is needed, the numbers differ.
+// - Numbered queries (VISCA with header): no fence is needed, the numbers differ; unless the device does not
+//   answer with the number of the query.
 // First of a connection, too, and after doubt(), unless an answer too many shows by itself: the line may still hold what another
 // program asked. Where the fence is not answered either, QuerySource listens for long, and what was given up may be asked again.
 // A head with one query, no sequence numbers, and silence about all else cannot be asked: its late answers would be
@@ -80,6 +81,8 @@ class QueryProtocol {
   // Bytes came that nobody asked for. Where it matters next() asks a fence, as also after every
   // kQueriesPerFence queries: one answer too many makes each answer that of the query before.
   virtual void doubt() = 0;
+  // In which way the device differs from the protocol, and what is made of it, one line; empty: in none.
+  [[nodiscard]] virtual std::string peculiarity() const { return {}; }
   // Over UDP: whether each datagram is a frame of its own (VISCA's header) and is to be searched alone; false for lines of text.
   [[nodiscard]] virtual bool is_of_datagrams() const = 0;
 

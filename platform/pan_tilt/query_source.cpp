@@ -303,6 +303,7 @@ bool QuerySource::take_reading(const Answer& answer, double earliest_s, double l
   sample->tilt_rad = paired->tilt_rad;
   sample->zoom = zoom_;
   sample->restarted = std::exchange(restarted_, false);
+  notes_.add(name(), protocol_->peculiarity());
   backoff_.reset();
   given_up_ = 0;
   late_s_ = 0;

@@ -29,6 +29,7 @@
 #include "platform/pan_tilt/axis_pairing.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/pan_tilt/query_protocol.h"
+#include "platform/pan_tilt/source_notes.h"
 #include "platform/system/backoff.h"
 #include "platform/system/byte_link.h"
 
@@ -51,6 +52,7 @@ class QuerySource : public PanTiltSource {
   void stop() override;
   [[nodiscard]] std::string error() const override { return error_; }
   [[nodiscard]] std::string name() const override { return link_.name(); }
+  [[nodiscard]] std::vector<std::string> take_notes() override { return notes_.take(); }
 
  private:
   enum class State {
@@ -105,6 +107,7 @@ class QuerySource : public PanTiltSource {
   double late_s_ = 0;           // how long an answer took that was given up; 0: none did
   bool restarted_ = true;
   std::string problem_;  // what came instead of a reading, lately
+  SourceNotes notes_;
 
   // The query under way.
   double sent_s_ = 0;

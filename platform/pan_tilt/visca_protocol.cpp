@@ -16,6 +16,8 @@ constexpr std::uint16_t kControlReply = 0x0201;
 constexpr std::string_view kBeginNumbering("\x01", 1);
 constexpr std::string_view kWrongNumber("\x0F\x01", 2);
 constexpr std::string_view kWrongMessage("\x0F\x02", 2);
+constexpr const char* kNoHeader =
+    "datagrams come without a VISCA header; would header: false be right?";
 
 // Big endian, `count` bytes.
 std::uint32_t number_at(std::string_view bytes, std::size_t begin, std::size_t count) {
@@ -143,7 +145,9 @@ const char* visca_error_text(int code) {
 void ViscaProtocol::restart() {
   numbered_ = false;
   sequence_ = 0;
-  fence_next_ = !options_.header;  // a line keeps what another program asked
+  answered_ = false;
+  other_number_ = false;
+  fence_next_ = needs_fences();  // a line keeps what another program asked
   since_fence_ = 0;
   turn_ = 0;
   heard_length_ = 0;
@@ -152,13 +156,15 @@ void ViscaProtocol::restart() {
 }
 
 Query ViscaProtocol::next() {
+  answered_ = false;
+  other_number_ = false;
   if (options_.header && !numbered_) {
     asked_ = Asked::kNumbering;
     sequence_ = 0;
     return {with_header(kControl, 0, std::string(kBeginNumbering)), false};
   }
   const bool was_zoom = asked_ == Asked::kZoom || asked_ == Asked::kFence;
-  if (fence_next_ || (!options_.header && since_fence_ >= kQueriesPerFence)) {
+  if (fence_next_ || (needs_fences() && since_fence_ >= kQueriesPerFence)) {
     asked_ = Asked::kFence;
   } else if (options_.read_zoom && turn_ == 0 && !was_zoom) {
     asked_ = Asked::kZoom;
@@ -171,7 +177,8 @@ Query ViscaProtocol::next() {
   std::string query(1, static_cast<char>(0x80 + options_.address));
   query += asked_ == Asked::kPosition ? "\x09\x06\x12\xFF" : "\x09\x04\x47\xFF";
   if (options_.header) {
-    return {with_header(kInquiry, ++sequence_, query)};
+    sequence_ = number_stands_ ? heard_number_.value_or(1) : sequence_ + 1;
+    return {with_header(kInquiry, sequence_, query), asked_ != Asked::kFence};
   }
   return {query, asked_ != Asked::kFence};
 }
@@ -179,45 +186,94 @@ Query ViscaProtocol::next() {
 std::string ViscaProtocol::give_up() {
   if (asked_ == Asked::kNumbering) {
     numbered_ = true;  // a device that does not answer control datagrams is asked all the same
+  } else if (!numbers_count_ && !answered_) {
+    number_stands_ = !number_stands_;
   }
-  fence_next_ = !options_.header && asked_ == Asked::kPosition;
+  numbers_count_ = numbers_count_ && !other_number_;
+  fence_next_ = needs_fences() && asked_ == Asked::kPosition;
   return {};
 }
 
+std::string ViscaProtocol::peculiarity() const {
+  if (!options_.header || numbers_count_) {
+    return {};
+  }
+  return std::string("the device's answers ") +
+         (heard_number_ ? "do not bear the sequence numbers of their queries"
+                        : "have no right VISCA header") +
+         "; the order in which they come counts instead";
+}
+
 Answer ViscaProtocol::find(std::string_view bytes) {
+  return options_.header ? find_in_datagram(bytes) : find_in_payload(bytes);
+}
+
+// Sony's tables list the errors among the control commands; devices send either type.
+Answer ViscaProtocol::find_control(const ViscaHeader& header) {
   Answer answer;
-  if (!options_.header) {
-    return find_in_payload(bytes);
+  const std::string_view error = header.payload.substr(0, kWrongNumber.size());
+  if (asked_ == Asked::kNumbering && header.type == kControlReply &&
+      header.payload == kBeginNumbering) {
+    numbered_ = true;
+    answer.kind = Answer::Kind::kDone;
+  } else if (error == kWrongNumber) {
+    numbered_ = false;
+    number_stands_ = false;
+    answered_ = true;
+    answer.kind = Answer::Kind::kRefused;
+    answer.problem = "the device finds the sequence number wrong";
+  } else if (error == kWrongMessage) {
+    answered_ = true;
+    answer.kind = Answer::Kind::kRefused;
+    answer.problem = "the device finds the type of the message wrong";
   }
+  return answer;
+}
+
+Answer ViscaProtocol::find_in_datagram(std::string_view bytes) {
+  Answer answer;
   const std::optional<ViscaHeader> header = parse_visca_header(bytes);
-  if (!header) {
-    answer.problem =
-        bytes.empty() ? "" : "datagrams come without a VISCA header; would header: false be right?";
+  if (header && (header->type == kControlReply || header->type == kControl)) {
+    return find_control(*header);
+  }
+  const std::optional<ViscaFrame> frame =
+      find_visca_frame(header ? header->payload : bytes, options_.address);
+  if (!header && !bytes.empty()) {
+    answer.problem = kNoHeader;
+  }
+  const bool is_its_own = header && header->type == kReply && header->sequence == sequence_;
+  if (is_its_own && !frame) {
+    answer = find_in_payload(header->payload);  // says that it is none
+  }
+  if (asked_ == Asked::kNumbering || !frame || !fits(*frame)) {
     return answer;
   }
-  // Sony's tables list the errors among the control commands; devices send either type.
-  if (header->type == kControlReply || header->type == kControl) {
-    const std::string_view error = header->payload.substr(0, kWrongNumber.size());
-    if (asked_ == Asked::kNumbering && header->type == kControlReply &&
-        header->payload == kBeginNumbering) {
-      numbered_ = true;
-      answer.kind = Answer::Kind::kDone;
-    } else if (error == kWrongNumber) {
-      numbered_ = false;
-      answer.kind = Answer::Kind::kRefused;
-      answer.problem = "the device finds the sequence number wrong";
-    } else if (error == kWrongMessage) {
-      answer.kind = Answer::Kind::kRefused;
-      answer.problem = "the device finds the type of the message wrong";
+  answered_ = true;
+  if (is_its_own) {
+    other_number_ = false;
+    // A number that stands still proves nothing, nor does a first one, which is what many of them always say.
+    numbers_count_ =
+        numbers_count_ || (asked_ == Asked::kFence && !number_stands_ && sequence_ > 1);
+  } else {
+    heard_number_ = header ? std::optional(header->sequence) : std::nullopt;
+    if (numbers_count_) {
+      other_number_ = true;
+      if (header) {
+        answer.problem = "an answer with the sequence number " + std::to_string(header->sequence) +
+                         " came to the query " + std::to_string(sequence_);
+      }
+      return answer;
     }
-    return answer;
   }
-  if (header->type != kReply || header->sequence != sequence_ || asked_ == Asked::kNumbering) {
-    return answer;
-  }
-  answer = find_in_payload(header->payload);
+  answer = find_in_payload(header ? header->payload : bytes);
   answer.begin = 0;
   return answer;
+}
+
+// An answer to what was asked, by its length.
+bool ViscaProtocol::fits(const ViscaFrame& frame) const {
+  return frame.kind == ViscaFrame::Kind::kError ||
+         (frame.kind == ViscaFrame::Kind::kPosition) == (asked_ == Asked::kPosition);
 }
 
 Answer ViscaProtocol::find_in_payload(std::string_view bytes) {

@@ -11,7 +11,12 @@
 // error, looks different.
 //
 // With the header, sequence numbers match answers to queries; the numbering begins anew (control type)
-// with each connection and when the device complains of it.
+// with each connection and when the device complains of it. Some devices answer in the right order with
+// other numbers (always 1, always 0, one off, bytes turned round) or without a header. Where a query got
+// only such answers, numbers count no longer and fences do, as without the header, until the answer to a
+// fence bears the fence's own number. Some of these devices answer none but their own number: where
+// nothing came at all, it is sent that, or counted again. All that holds over a restart, as fences are right
+// for every device.
 
 #include <cstdint>
 #include <optional>
@@ -62,7 +67,8 @@ class ViscaProtocol : public QueryProtocol {
   [[nodiscard]] Query next() override;
   [[nodiscard]] Answer find(std::string_view bytes) override;
   [[nodiscard]] std::string give_up() override;
-  void doubt() override { fence_next_ = !options_.header; }
+  void doubt() override { fence_next_ = needs_fences(); }
+  [[nodiscard]] std::string peculiarity() const override;
   [[nodiscard]] bool is_of_datagrams() const override { return options_.header; }
   [[nodiscard]] int polls_per_reading() const override { return 1; }
   [[nodiscard]] int bytes_per_reading() const override { return 18; }
@@ -70,12 +76,21 @@ class ViscaProtocol : public QueryProtocol {
  private:
   enum class Asked { kNumbering, kFence, kPosition, kZoom };
 
+  [[nodiscard]] bool needs_fences() const { return !options_.header || !numbers_count_; }
+  [[nodiscard]] bool fits(const ViscaFrame& frame) const;
+  [[nodiscard]] Answer find_in_datagram(std::string_view bytes);
+  [[nodiscard]] Answer find_control(const ViscaHeader& header);
   [[nodiscard]] Answer find_in_payload(std::string_view bytes);
 
   ViscaOptions options_;
   Asked asked_ = Asked::kPosition;
   bool numbered_ = false;       // the numbering of the header has begun, or been tried
   std::uint32_t sequence_ = 0;  // of the latest query
+  bool numbers_count_ = true;   // the device's answers bear the numbers of their queries
+  bool number_stands_ = false;  // queries bear the number that the device answers with
+  bool answered_ = false;       // the latest query, with whatever number
+  bool other_number_ = false;   // ... but with none that is its own
+  std::optional<std::uint32_t> heard_number_;  // of such an answer; none: it had no header
   bool fence_next_ = false;
   int since_fence_ = 0;            // positions
   int turn_ = 0;                   // readings since the zoom

@@ -48,9 +48,10 @@ class QuerySourceTest : public ::testing::TestWithParam<HeadKind> {
   PanTiltSample sample_;
 };
 
-const auto name_of = [](const auto& tested) { return tested.param.name(); };
+const auto kind_name_of = [](const auto& tested) { return tested.param.name(); };
 
-INSTANTIATE_TEST_SUITE_P(Heads, QuerySourceTest, ::testing::ValuesIn(all_head_kinds()), name_of);
+INSTANTIATE_TEST_SUITE_P(Heads, QuerySourceTest, ::testing::ValuesIn(all_head_kinds()),
+                         kind_name_of);
 
 TEST_P(QuerySourceTest, DeliversPositionsInTheAxesOfTheModel) {
   for (const HeadPosition& position :
@@ -214,6 +215,105 @@ TEST_P(QuerySourceTest, ReportsBabbleAndComesBackByItself) {
   ASSERT_EQ(read_until(*source, sample_, ReadStatus::kOk), ReadStatus::kOk);
 }
 
+using Numbers = ViscaHead::Numbers;
+
+std::unique_ptr<ViscaHead> visca_with(Numbers numbers, unsigned highest_number = 0) {
+  auto head = std::make_unique<ViscaHead>([] { return kPositionOfHeads; });
+  head->header = true;
+  head->numbers = numbers;
+  head->highest_number = highest_number;
+  return head;
+}
+
+QuerySourceOptions options_over_udp(const HeadServer& server) {
+  QuerySourceOptions options;
+  options.link = {server.address(), 0};
+  options.rate_hz = 1000;
+  options.timeout_s = 0.4;
+  options.max_backoff_s = 0.01;
+  return options;
+}
+
+std::unique_ptr<QueryProtocol> visca_protocol_with_header() {
+  ViscaOptions options;
+  options.header = true;
+  options.pan_deg_per_step = options.tilt_deg_per_step = 1 / 51.2;
+  return make_protocol(options);
+}
+
+class ViscaNumbers : public ::testing::TestWithParam<Numbers> {
+ protected:
+  PanTiltSample sample_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Each, ViscaNumbers,
+                         ::testing::Values(Numbers::kOfTheQuery, Numbers::kOne, Numbers::kZero,
+                                           Numbers::kOneLess, Numbers::kOneMore,
+                                           Numbers::kTurnedRound, Numbers::kNoHeader));
+
+TEST_P(ViscaNumbers, OfAnswersMayBeAnyAndThatIsSaidOnce) {
+  HeadServer server(HeadServer::Link::kUdp, visca_with(GetParam()));
+  QuerySource source(visca_protocol_with_header(), options_over_udp(server));
+  std::string notes;
+  for (int i = 0; i < 2 * kQueriesPerFence; ++i) {
+    ASSERT_EQ(source.read(sample_, kDeadline_s), ReadStatus::kOk) << source.error();
+    EXPECT_LE(difference_deg(sample_.pan_rad, kPositionOfHeads.pan_deg), 1 / 51.2);
+    EXPECT_EQ(sample_.restarted, i == 0);
+    for (const std::string& note : source.take_notes()) notes += note + "\n";
+  }
+  EXPECT_EQ(notes, GetParam() == Numbers::kOfTheQuery ? ""
+                   : GetParam() == Numbers::kNoHeader
+                       ? server.address() +
+                             ": the device's answers have no right VISCA header; the order in "
+                             "which they come counts instead\n"
+                       : server.address() +
+                             ": the device's answers do not bear the sequence numbers of their "
+                             "queries; the order in which they come counts instead\n");
+}
+
+// As a camera that answers queries of the numbers 1 to 3 alone, each with a 1.
+TEST(ViscaNumbersOf, AHeadThatAnswersTheFirstOnesAloneAreAnsweredWithItsOwn) {
+  HeadServer server(HeadServer::Link::kUdp, visca_with(Numbers::kOne, 3));
+  QuerySource source(visca_protocol_with_header(), options_over_udp(server));
+  PanTiltSample sample;
+  ASSERT_EQ(read_until(source, sample, ReadStatus::kOk), ReadStatus::kOk) << source.error();
+  for (int i = 0; i < 2 * kQueriesPerFence; ++i) {
+    ASSERT_EQ(source.read(sample, kDeadline_s), ReadStatus::kOk) << source.error();
+    EXPECT_FALSE(sample.restarted);
+  }
+}
+
+TEST(ViscaNumbersOf, AHeadThatIsLateNowAndThenMisleadNobody) {
+  const std::vector<HeadKind> kinds = all_head_kinds();
+  const auto numbered = std::find_if(kinds.begin(), kinds.end(), [](const HeadKind& kind) {
+    return kind.name() == "ViscaHeaderUdp";
+  });
+  ASSERT_NE(numbered, kinds.end());
+  HeadVariant variant = *numbered->head;
+  variant.set_up = [](SimulatedHead& simulated, HeadServer::Link) {
+    auto& its = dynamic_cast<ViscaHead&>(simulated);
+    its.header = true;
+    its.numbers = Numbers::kOne;
+  };
+  TurningHead head(HeadKind{&variant, HeadServer::Link::kUdp});
+  head.rig.server().answer_s = 0.012;
+  head.rig.server().late_s = 0.13;
+  QuerySourceOptions options = head.rig.options();
+  options.timeout_s = 0.4;
+  const auto source = head.rig.open(options);
+  PanTiltSample sample;
+  ASSERT_EQ(read_until(*source, sample, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  head.rig.server().fault = LineFault::kLate;
+  int samples = 0;
+  EXPECT_TRUE(eventually([&] {
+    if (source->read(sample, kDeadline_s) == ReadStatus::kOk) {
+      head.expect_true_within_its_interval(sample);
+      ++samples;
+    }
+    return samples >= 5 && head.rig.server().faults >= 4;
+  }));
+}
+
 class LineWithFaults : public QuerySourceTest {};
 
 std::vector<HeadKind> other_kinds() {
@@ -228,8 +328,10 @@ std::vector<HeadKind> other_kinds() {
   return others;
 }
 
-INSTANTIATE_TEST_SUITE_P(Heads, LineWithFaults, ::testing::ValuesIn(last_kinds_in_turn()), name_of);
-INSTANTIATE_TEST_SUITE_P(OtherHeads, LineWithFaults, ::testing::ValuesIn(other_kinds()), name_of);
+INSTANTIATE_TEST_SUITE_P(Heads, LineWithFaults, ::testing::ValuesIn(last_kinds_in_turn()),
+                         kind_name_of);
+INSTANTIATE_TEST_SUITE_P(OtherHeads, LineWithFaults, ::testing::ValuesIn(other_kinds()),
+                         kind_name_of);
 
 // Over UDP the second answer then waits behind each first one, that to a fence, too.
 TEST_P(LineWithFaults, GivesReadingsWhereEachAnswerComesTwiceAndIsReadLate) {

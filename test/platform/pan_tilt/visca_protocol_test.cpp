@@ -318,6 +318,66 @@ TEST_F(ViscaWithHeader, DoesWithoutAnAnswerToTheNumbering) {
   EXPECT_EQ(protocol_->next().bytes, datagram(0x0110, 1, "\x81\x09\x06\x12\xFF"));
 }
 
+// A device that answers every query with the number 1, from its second position on.
+TEST_F(ViscaWithHeader, CountsOnTheOrderOfAnswersWhereNumbersAreNoQuerys) {
+  begin_numbering();
+  static_cast<void>(protocol_->next());
+  EXPECT_EQ(protocol_->find(datagram(0x0111, 1, kEleven)).kind, Answer::Kind::kRefused);
+  EXPECT_EQ(protocol_->give_up(), "");
+  static_cast<void>(protocol_->next());
+  const Answer passed_over = protocol_->find(datagram(0x0111, 1, kEleven));
+  EXPECT_EQ(passed_over.kind, Answer::Kind::kNone);  // it may be late
+  EXPECT_EQ(passed_over.problem, "an answer with the sequence number 1 came to the query 2");
+  EXPECT_EQ(protocol_->peculiarity(), "");
+  EXPECT_EQ(protocol_->give_up(), "");
+  const Query fence = protocol_->next();
+  EXPECT_EQ(fence.bytes, datagram(0x0110, 3, kZoomQuery));
+  EXPECT_FALSE(fence.paced);
+  EXPECT_EQ(protocol_->find(datagram(0x0111, 1, kEleven)).kind, Answer::Kind::kNone);  // late
+  EXPECT_EQ(protocol_->find(datagram(0x0111, 1, kZoomAnswer)).kind, Answer::Kind::kDone);
+  EXPECT_EQ(protocol_->next().bytes, datagram(0x0110, 4, "\x81\x09\x06\x12\xFF"));
+  EXPECT_EQ(protocol_->find(datagram(0x0111, 1, kZoomAnswer)).kind, Answer::Kind::kNone);
+  EXPECT_EQ(protocol_->find(datagram(0x0111, 1, kEleven)).kind, Answer::Kind::kPanTilt);
+  EXPECT_THAT(protocol_->peculiarity(), HasSubstr("do not bear the sequence numbers"));
+  // As without a header: a fence where bytes came too many.
+  protocol_->doubt();
+  EXPECT_EQ(protocol_->next().bytes, datagram(0x0110, 5, kZoomQuery));
+}
+
+// The answer to a query was lost, and that to the one before came in its place.
+TEST_F(ViscaWithHeader, CountsOnNumbersAgainOnceAFenceIsAnsweredWithItsOwn) {
+  begin_numbering();
+  for (int i = 0; i < 2; ++i) {
+    static_cast<void>(protocol_->next());
+  }
+  EXPECT_EQ(protocol_->find(datagram(0x0111, 1, kEleven)).kind, Answer::Kind::kNone);
+  EXPECT_EQ(protocol_->give_up(), "");
+  static_cast<void>(protocol_->next());
+  EXPECT_EQ(protocol_->find(datagram(0x0111, 2, kZoomAnswer)).kind, Answer::Kind::kDone);
+  EXPECT_NE(protocol_->peculiarity(), "");
+  protocol_->doubt();
+  static_cast<void>(protocol_->next());
+  EXPECT_EQ(protocol_->find(datagram(0x0111, 4, kZoomAnswer)).kind, Answer::Kind::kDone);
+  EXPECT_EQ(protocol_->peculiarity(), "");
+  static_cast<void>(protocol_->next());
+  EXPECT_EQ(protocol_->find(datagram(0x0111, 4, kEleven)).kind, Answer::Kind::kNone);
+  protocol_->doubt();
+  EXPECT_EQ(protocol_->next().bytes, datagram(0x0110, 6, "\x81\x09\x06\x12\xFF"));
+}
+
+TEST_F(ViscaWithHeader, KnowsAfterARestartThatNumbersDoNotCount) {
+  begin_numbering();
+  static_cast<void>(protocol_->next());
+  static_cast<void>(protocol_->find(datagram(0x0111, 0, kEleven)));
+  static_cast<void>(protocol_->give_up());
+  EXPECT_NE(protocol_->peculiarity(), "");
+  protocol_->restart();
+  begin_numbering();
+  EXPECT_EQ(protocol_->next().bytes, datagram(0x0110, 1, kZoomQuery));
+  EXPECT_EQ(protocol_->find(datagram(0x0111, 0, kZoomAnswer)).kind, Answer::Kind::kDone);
+  EXPECT_NE(protocol_->peculiarity(), "");
+}
+
 TEST(ViscaHeaderTest, RefusesDatagramsOfAnotherLengthThanTheySay) {
   const std::string whole = datagram(0x0111, 0xFFFFFFFF, kEleven);
   const auto header = parse_visca_header(whole);

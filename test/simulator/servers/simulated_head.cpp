@@ -82,6 +82,29 @@ std::string ViscaHead::reply_to(const std::string& query) const {
   return bytes_of({0x90, 0x60, 0x02, 0xFF});
 }
 
+std::string ViscaHead::header_of(const std::string& sequence, long length) const {
+  const std::string start = bytes_of({1, 0x11, 0, length});
+  switch (numbers) {
+    case Numbers::kOfTheQuery:
+      break;
+    case Numbers::kOne:
+      return start + bytes_of({0, 0, 0, 1});
+    case Numbers::kZero:
+      return start + bytes_of({0, 0, 0, 0});
+    case Numbers::kOneLess:
+    case Numbers::kOneMore: {
+      const long number = byte_at(sequence, 2) * 256 + byte_at(sequence, 3) +
+                          (numbers == Numbers::kOneMore ? 1 : -1);
+      return start + bytes_of({0, 0, number / 256, number % 256});
+    }
+    case Numbers::kTurnedRound:
+      return start + std::string(sequence.rbegin(), sequence.rend());
+    case Numbers::kNoHeader:
+      return {};
+  }
+  return start + sequence;
+}
+
 std::vector<std::string> ViscaHead::take(const std::string& bytes) {
   if (header) {
     if (bytes.size() < 9) {
@@ -97,12 +120,15 @@ std::vector<std::string> ViscaHead::take(const std::string& bytes) {
     for (std::size_t i = 4; i < 8; ++i) {
       number = number * 256 + static_cast<unsigned>(byte_at(bytes, i));
     }
-    if (number <= last_sequence_ || forgets_numbering) {
+    if (highest_number != 0 && number > highest_number) {
+      return {};
+    }
+    if ((number <= last_sequence_ && highest_number == 0) || forgets_numbering) {
       return {bytes_of({2, error_is_reply ? 1 : 0, 0, 2}) + sequence + "\x0F\x01"};
     }
     last_sequence_ = number;
     const std::string reply = reply_to(bytes.substr(8));
-    return {bytes_of({1, 0x11, 0, static_cast<long>(reply.size())}) + sequence + reply};
+    return {header_of(sequence, static_cast<long>(reply.size())) + reply};
   }
   std::vector<std::string> replies;
   received_ += bytes;

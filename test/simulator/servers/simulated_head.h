@@ -54,13 +54,19 @@ struct ViscaHead : SimulatedHead {
   double steps_per_deg = 51.2;
   int pan_nibbles = 4;
   int tilt_nibbles = 4;
-  bool header = false;          // of the datagrams
+  bool header = false;  // of the datagrams
+  // The sequence number of an answer, as devices other than Sony's have it.
+  enum class Numbers { kOfTheQuery, kOne, kZero, kOneLess, kOneMore, kTurnedRound, kNoHeader };
+  Numbers numbers = Numbers::kOfTheQuery;
+  unsigned highest_number =
+      0;  // it answers no query of a higher one, and minds none that comes again; 0: any
   bool error_is_reply = false;  // of type 0201 rather than 0200: about a sequence number
   std::atomic<bool> forgets_numbering{false};  // until it is begun anew
   int error = 0;                               // code that answers every query; 0: none
 
  private:
   std::string reply_to(const std::string& query) const;
+  std::string header_of(const std::string& sequence, long length) const;
   unsigned last_sequence_ = 0;
 };
 
