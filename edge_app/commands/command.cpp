@@ -235,6 +235,12 @@ std::unique_ptr<PanTiltSource> make_onvif_source(const PanTiltConfig& config) {
   options.profile = config.profile;
   options.pan_range = radians(config.pan_range_deg);
   options.tilt_range = radians(config.tilt_range_deg);
+  const auto scale = [](const std::optional<std::array<double, 2>>& ends) {
+    return ends ? std::optional<OnvifInterval>({ends->front(), ends->back()}) : std::nullopt;
+  };
+  options.pan_scale = scale(config.pan_scale);
+  options.tilt_scale = scale(config.tilt_scale);
+  options.ptz_path = config.ptz_path;
   return open_onvif(options);
 }
 

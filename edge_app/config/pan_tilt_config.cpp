@@ -10,12 +10,27 @@ namespace {
 
 constexpr NumberRange kAngle{0, 0.1, "rad"};
 
+// Without blanks, too.
+bool is_printable(const std::string& text) {
+  return std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c < '\x7F'; });
+}
+
 // The angles at both ends of a device's own scale, of which none may be the other.
 std::optional<std::array<double, 2>> read_range(YamlSection& section, const std::string& key) {
   const auto ends = section.numbers(key, 2, {-360, 360, "deg"});
   if (!ends) return std::nullopt;
   if (ends->front() == ends->back()) {
     section.fail(key, "spans no angle; give the angles at -1 and at 1");
+  }
+  return std::array<double, 2>{ends->front(), ends->back()};
+}
+
+// What a device tells at these ends, likewise.
+std::optional<std::array<double, 2>> read_scale(YamlSection& section, const std::string& key) {
+  const auto ends = section.numbers(key, 2, {-1e6, 1e6, "of the device's own scale"});
+  if (!ends) return std::nullopt;
+  if (ends->front() == ends->back()) {
+    section.fail(key, "spans nothing; give what the device tells at both ends of the range");
   }
   return std::array<double, 2>{ends->front(), ends->back()};
 }
@@ -27,6 +42,22 @@ void read_onvif(YamlSection& section, PanTiltConfig* pan_tilt) {
   if (pan_tilt->pan_range_deg.has_value() != pan_tilt->tilt_range_deg.has_value()) {
     section.fail(pan_tilt->pan_range_deg ? "tilt_range_deg" : "pan_range_deg",
                  "is missing; give pan_range_deg and tilt_range_deg, or neither");
+  }
+  pan_tilt->pan_scale = read_scale(section, "pan_scale");
+  pan_tilt->tilt_scale = read_scale(section, "tilt_scale");
+  if (pan_tilt->pan_scale.has_value() != pan_tilt->tilt_scale.has_value()) {
+    section.fail(pan_tilt->pan_scale ? "tilt_scale" : "pan_scale",
+                 "is missing; give pan_scale and tilt_scale, or neither");
+  }
+  if (pan_tilt->pan_scale && !pan_tilt->pan_range_deg) {
+    section.fail("pan_scale",
+                 "is what the device tells at both ends of pan_range_deg, which is missing; give "
+                 "pan_range_deg and tilt_range_deg, too");
+  }
+  pan_tilt->ptz_path = section.text("ptz_path").value_or("");
+  if (!pan_tilt->ptz_path.empty() &&
+      (pan_tilt->ptz_path[0] != '/' || !is_printable(pan_tilt->ptz_path))) {
+    section.fail("ptz_path", "must be a path like /onvif/ptz_service; the host is that of url");
   }
   pan_tilt->rate_hz = 10;  // SOAP is work for a camera
 }

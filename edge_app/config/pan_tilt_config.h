@@ -19,11 +19,15 @@ struct PanTiltConfig {
   std::string directory;  // recording
   std::string user;
   std::string password;
-  int camera = 0;       // VAPIX camera number; 0 leaves it out of the query
-  std::string profile;  // onvif: token; empty: the device's first with PTZ
-  // onvif: the angles at -1 and 1 of the generic space.
+  int camera = 0;        // VAPIX camera number; 0 leaves it out of the query
+  std::string profile;   // onvif: token; empty: the device's first with PTZ
+  std::string ptz_path;  // onvif: of the PTZ service; empty: as the device tells
+  // onvif: the angles at both ends of the device's scale, -1 and 1 of the generic space.
   std::optional<std::array<double, 2>> pan_range_deg;
   std::optional<std::array<double, 2>> tilt_range_deg;
+  // onvif: what the device tells at these angles, where it is neither -1 and 1 nor what it declares.
+  std::optional<std::array<double, 2>> pan_scale;
+  std::optional<std::array<double, 2>> tilt_scale;
   double rate_hz = 30;  // onvif: 10 unless given
   double timeout_s = 1;
   double max_backoff_s = 5;

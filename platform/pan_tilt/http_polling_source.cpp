@@ -6,6 +6,7 @@
 #include <string_view>
 #include <utility>
 
+#include "platform/pan_tilt/source_notes.h"
 #include "platform/system/backoff.h"
 #include "platform/system/clock.h"
 #include "platform/system/curl_handles.h"
@@ -52,6 +53,7 @@ class HttpPollingSource : public PanTiltSource {
 
   std::string error() const override { return error_; }
   std::string name() const override { return options_.name; }
+  std::vector<std::string> take_notes() override { return notes_.take(); }
 
  private:
   static std::size_t on_header(char* data, std::size_t size, std::size_t count, void* self);
@@ -63,7 +65,9 @@ class HttpPollingSource : public PanTiltSource {
   // kTimeout: it gave no sample, and was no failure.
   ReadStatus finish_request(CURLcode code, PanTiltSample* sample);
   ReadStatus fail(const std::string& error);
-  ReadStatus disconnect(const std::string& error);
+  ReadStatus disconnect(const std::string& error) { return pause(error, backoff_.next_s()); }
+  ReadStatus refuse(const std::string& error);
+  ReadStatus pause(const std::string& error, double pause_s);
 
   HttpPollingOptions options_;
   std::unique_ptr<HttpConversation> conversation_;
@@ -81,7 +85,9 @@ class HttpPollingSource : public PanTiltSource {
   bool ask_on_ = false;  // the next request does not wait for that
   Backoff backoff_;
   bool restarted_ = true;
-  bool worked_ = false;  // a sample has come
+  bool worked_ = false;  // a sample has come, or could have
+  int refusals_ = 0;     // of the login, since the latest sample
+  SourceNotes notes_;
 
   // The request under way.
   bool under_way_ = false;
@@ -154,12 +160,26 @@ ReadStatus HttpPollingSource::fail(const std::string& error) {
   return ReadStatus::kFailed;
 }
 
-ReadStatus HttpPollingSource::disconnect(const std::string& error) {
+ReadStatus HttpPollingSource::pause(const std::string& error, double pause_s) {
   error_ = options_.name + ": " + error;
   restarted_ = true;
   ask_on_ = false;
-  due_s_ = monotonic_now_s() + backoff_.next_s();
+  due_s_ = monotonic_now_s() + pause_s;
   return ReadStatus::kDisconnected;
+}
+
+// The login, of a device that was in use. The nonces that it gave go with the handle: by the next try they
+// may be too old, and libcurl would take that for a wrong password.
+ReadStatus HttpPollingSource::refuse(const std::string& error) {
+  if (!make_handle()) {
+    return fail(kNoCurl);
+  }
+  const double pause_s =
+      refusals_ == 0 ? backoff_.next_s()
+                     : options_.max_backoff_s *
+                           std::min(kMostRefusalPauses, std::exp2(std::min(refusals_ - 1, 10)));
+  ++refusals_;
+  return pause(error + "; it was right before", pause_s);
 }
 
 void HttpPollingSource::start_request(double now_s) {
@@ -232,7 +252,10 @@ HttpAnswer HttpPollingSource::answer() const {
 
 ReadStatus HttpPollingSource::finish_request(CURLcode code, PanTiltSample* sample) {
   if (code != CURLE_OK) {
-    conversation_->reset();
+    if (conversation_->unanswered() == HttpConversation::Outcome::kAskOn) {
+      ask_on_ = true;
+      return ReadStatus::kTimeout;
+    }
     return disconnect(code == CURLE_WRITE_ERROR
                           ? "the answer is longer than " + std::to_string(options_.max_body) +
                                 " bytes: not " + options_.expected
@@ -252,19 +275,22 @@ ReadStatus HttpPollingSource::finish_request(CURLcode code, PanTiltSample* sampl
   logged_in_ = logged_in_ || (request_.digest && !options_.user.empty() && given.status != 401);
   PanTiltSample taken;
   std::string error;
-  switch (conversation_->take(given, &taken, &error)) {
+  const HttpConversation::Outcome outcome = conversation_->take(given, &taken, &error);
+  switch (outcome) {
     case HttpConversation::Outcome::kFailed:
+    case HttpConversation::Outcome::kRefused:
       if (!worked_) {
         return fail(error);
       }
       conversation_->reset();
-      return disconnect(error);
+      return outcome == HttpConversation::Outcome::kRefused ? refuse(error) : disconnect(error);
     case HttpConversation::Outcome::kDisconnected:
       return disconnect(error);
     case HttpConversation::Outcome::kAskOn:
       ask_on_ = true;
       return ReadStatus::kTimeout;
     case HttpConversation::Outcome::kNothing:
+      worked_ = true;
       return ReadStatus::kTimeout;
     case HttpConversation::Outcome::kSample:
       break;
@@ -276,7 +302,9 @@ ReadStatus HttpPollingSource::finish_request(CURLcode code, PanTiltSample* sampl
   sample->latest_time_s = given.latest_time_s;
   sample->restarted = std::exchange(restarted_, false);
   worked_ = true;
+  refusals_ = 0;
   backoff_.reset();
+  for (const std::string& note : conversation_->notes()) notes_.add(options_.name, note);
   return ReadStatus::kOk;
 }
 

@@ -4,18 +4,19 @@
 
 #include <algorithm>
 #include <array>
+#include <cctype>
 #include <cmath>
 #include <cstdint>
 #include <cstdio>
+#include <iterator>
 #include <pugixml.hpp>
 
+#include "platform/pan_tilt/onvif_time.h"
 #include "platform/system/shown.h"
 #include "platform/system/text.h"
 
 namespace alidade {
 namespace {
-
-constexpr std::string_view kXmlBlanks = " \t\r\n";
 
 constexpr std::size_t kShown = 120;  // bytes of a foreign text that an error repeats
 constexpr const char* kWss = "http://docs.oasis-open.org/wss/2004/01/oasis-200401-wss-";
@@ -40,59 +41,6 @@ std::string escaped(std::string_view text) {
     }
   }
   return xml;
-}
-
-// Exactly `digits` decimal digits at the front of *text, which are taken off.
-std::optional<int> take_digits(std::string_view* text, std::size_t digits) {
-  if (text->size() < digits) {
-    return std::nullopt;
-  }
-  int value = 0;
-  for (const char c : text->substr(0, digits)) {
-    if (c < '0' || c > '9') {
-      return std::nullopt;
-    }
-    value = 10 * value + (c - '0');
-  }
-  text->remove_prefix(digits);
-  return value;
-}
-
-bool take_character(std::string_view* text, char c) {
-  if (text->empty() || text->front() != c) {
-    return false;
-  }
-  text->remove_prefix(1);
-  return true;
-}
-
-// --- time
-
-// Days from 1970-01-01 of the Gregorian calendar, by counting years from 1 March.
-std::int64_t days_from_civil(int year, int month, int day) {
-  const int y = month <= 2 ? year - 1 : year;
-  const int month_from_march = (month + 9) % 12;
-  const int day_of_year = (153 * month_from_march + 2) / 5 + day - 1;
-  return std::int64_t{365} * y + y / 4 - y / 100 + y / 400 + day_of_year - 719468;
-}
-
-struct Civil {
-  int year = 0;
-  int month = 0;
-  int day = 0;
-  int hour = 0;
-  int minute = 0;
-  int second = 0;
-};
-
-std::optional<double> unix_time(const Civil& civil) {
-  const auto within = [](int value, int low, int high) { return value >= low && value <= high; };
-  if (!within(civil.year, 1900, 9999) || !within(civil.month, 1, 12) || !within(civil.day, 1, 31) ||
-      !within(civil.hour, 0, 24) || !within(civil.minute, 0, 59) || !within(civil.second, 0, 60)) {
-    return std::nullopt;
-  }
-  const std::int64_t days = days_from_civil(civil.year, civil.month, civil.day);
-  return static_cast<double>(((days * 24 + civil.hour) * 60 + civil.minute) * 60 + civil.second);
 }
 
 // --- XML
@@ -143,6 +91,66 @@ pugi::xml_node load_answer(std::string_view bytes, const OnvifCall& call,
   return answer;
 }
 
+// A date and time of three and three numbers; none: it is not whole.
+std::optional<double> civil_time(const pugi::xml_node& node) {
+  bool whole = true;
+  const auto number = [&](const char* part, const char* name) {
+    const std::optional<double> value =
+        parse_number(trimmed(descendant(node, {part, name}).child_value(), kXmlBlanks));
+    whole = whole && value && std::abs(*value) < 1e4;
+    return whole ? static_cast<int>(*value) : 0;
+  };
+  CivilTime civil;
+  civil.year = number("Date", "Year");
+  civil.month = number("Date", "Month");
+  civil.day = number("Date", "Day");
+  civil.hour = number("Time", "Hour");
+  civil.minute = number("Time", "Minute");
+  civil.second = number("Time", "Second");
+  return whole ? unix_time(civil) : std::nullopt;
+}
+
+// <Min/><Max/>; none: it is not both.
+std::optional<OnvifInterval> interval(const pugi::xml_node& node) {
+  const auto end = [&node](const char* name) { return parse_number(text_of(child(node, name))); };
+  const std::optional<double> low = end("Min");
+  const std::optional<double> high = end("Max");
+  return low && high ? std::optional(OnvifInterval{*low, *high}) : std::nullopt;
+}
+
+void add_ranges(const pugi::xml_node& spaces, std::vector<OnvifSpaceRange>* ranges) {
+  for (const pugi::xml_node& space : spaces.children()) {
+    if (local_name(space.name()) == "AbsolutePanTiltPositionSpace") {
+      ranges->push_back({text_of(child(space, "URI")), interval(child(space, "XRange")),
+                         interval(child(space, "YRange"))});
+    }
+  }
+}
+
+// Of WS-Security's and ONVIF's codes those that refuse a login.
+bool is_of_login(std::string_view code) {
+  constexpr std::string_view kCodes[] = {"NotAuthorized",   "FailedAuthentication",
+                                         "InvalidSecurity", "InvalidSecurityToken",
+                                         "FailedCheck",     "MessageExpired"};
+  return std::find(std::begin(kCodes), std::end(kCodes), code) != std::end(kCodes);
+}
+
+// Some devices say in the reason alone that they refuse a login.
+bool names_login(std::string reason) {
+  std::transform(reason.begin(), reason.end(), reason.begin(),
+                 [](unsigned char c) { return static_cast<char>(std::tolower(c)); });
+  return reason.find("not authorized") != std::string::npos ||
+         reason.find("unauthorized") != std::string::npos ||
+         reason.find("authorized time check") != std::string::npos ||
+         reason.find("authentication fail") != std::string::npos;
+}
+
+// NoProfile, NoPTZProfile, NoStatus, NoEntity, ...: what was asked was understood.
+bool is_of_a_service(std::string_view code) {
+  return code == "InvalidArgVal" ||
+         (code.size() > 2 && code.substr(0, 2) == "No" && code[2] >= 'A' && code[2] <= 'Z');
+}
+
 std::string base64(std::string_view bytes) {
   std::string text(4 * ((bytes.size() + 2) / 3) + 1, '\0');
   const int size = EVP_EncodeBlock(reinterpret_cast<unsigned char*>(text.data()),
@@ -172,78 +180,19 @@ std::string security_header(const OnvifLogin& login) {
 
 }  // namespace
 
-std::optional<double> parse_xml_time(std::string_view text) {
-  text = trimmed(text, kXmlBlanks);
-  Civil civil;
-  const auto field = [&text](int* value, std::size_t digits, char before) {
-    if (before != '\0' && !take_character(&text, before)) {
-      return false;
-    }
-    const std::optional<int> taken = take_digits(&text, digits);
-    *value = taken.value_or(0);
-    return taken.has_value();
-  };
-  if (!field(&civil.year, 4, '\0') || !field(&civil.month, 2, '-') || !field(&civil.day, 2, '-') ||
-      !field(&civil.hour, 2, 'T') || !field(&civil.minute, 2, ':') ||
-      !field(&civil.second, 2, ':')) {
-    return std::nullopt;
-  }
-  std::optional<double> time_s = unix_time(civil);
-  if (!time_s) {
-    return std::nullopt;
-  }
-  if (take_character(&text, '.')) {
-    double unit = 0.1;
-    std::size_t digits = 0;
-    for (std::optional<int> digit; (digit = take_digits(&text, 1)); ++digits, unit /= 10) {
-      *time_s += unit * *digit;
-    }
-    if (digits == 0) {
-      return std::nullopt;
-    }
-  }
-  if (text.empty() || text == "Z") {
-    return time_s;
-  }
-  const int sign = take_character(&text, '+') ? 1 : take_character(&text, '-') ? -1 : 0;
-  int hours = 0;
-  int minutes = 0;
-  if (sign == 0 || !field(&hours, 2, '\0') || !field(&minutes, 2, ':') || !text.empty()) {
-    return std::nullopt;
-  }
-  return *time_s - sign * (3600.0 * hours + 60.0 * minutes);
-}
-
-std::string xml_time(double utc_s) {
-  // 0 to the year 9999.
-  const auto milliseconds =
-      static_cast<std::int64_t>(std::llround(1e3 * std::clamp(utc_s, 0.0, 253402300799.0)));
-  const std::int64_t seconds = milliseconds / 1000;
-  const std::int64_t days = seconds / 86400;
-  int year = 1970 + static_cast<int>(days / 366);
-  while (days_from_civil(year + 1, 1, 1) <= days) {
-    ++year;
-  }
-  int month = 1;
-  while (month < 12 && days_from_civil(year, month + 1, 1) <= days) {
-    ++month;
-  }
-  const auto day = static_cast<int>(days - days_from_civil(year, month, 1)) + 1;
-  const auto of_day = static_cast<int>(seconds % 86400);
-  std::array<char, 64> text{};
-  std::snprintf(text.data(), text.size(), "%04d-%02d-%02dT%02d:%02d:%02d.%03dZ", year, month, day,
-                of_day / 3600, of_day / 60 % 60, of_day % 60,
-                static_cast<int>(milliseconds % 1000));
-  return text.data();
-}
-
-std::string onvif_request(const OnvifCall& call, const std::string& profile,
+std::string onvif_request(const OnvifCall& call, const std::string& token,
                           const std::optional<OnvifLogin>& login) {
   const std::string name(call.name);
-  const std::string content = name == kGetStatus.name
-                                  ? "<ProfileToken>" + escaped(profile) + "</ProfileToken>"
-                              : name == kGetCapabilities.name ? "<Category>All</Category>"
-                                                              : "";
+  std::string content;
+  if (name == kGetStatus.name) {
+    content = "<ProfileToken>" + escaped(token) + "</ProfileToken>";
+  } else if (name == kGetConfigurationOptions.name) {
+    content = "<ConfigurationToken>" + escaped(token) + "</ConfigurationToken>";
+  } else if (name == kGetCapabilities.name) {
+    content = "<Category>All</Category>";
+  } else if (name == kGetServices.name) {
+    content = "<IncludeCapability>false</IncludeCapability>";
+  }
   return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>"
          "<s:Envelope xmlns:s=\"http://www.w3.org/2003/05/soap-envelope\">" +
          (login ? security_header(*login) : std::string()) + "<s:Body><" + name + " xmlns=\"" +
@@ -273,50 +222,54 @@ std::optional<SoapFault> parse_soap_fault(std::string_view body) {
   reason = reason.empty() ? text_of(child(fault, "faultstring")) : reason;
   SoapFault result;
   const std::string_view local = local_name(what.c_str());
-  result.not_authorized = local == "NotAuthorized" || local == "FailedAuthentication";
+  result.not_authorized = is_of_login(local) || names_login(reason);
+  result.of_a_service = !result.not_authorized && is_of_a_service(local);
   result.text = shown(what + (reason.empty() ? "" : ": " + reason), kShown);
   return result;
 }
 
-bool parse_onvif_clock(std::string_view body, double* utc_s, std::string* error) {
+bool is_onvif_answer(std::string_view body, const OnvifCall& call) {
+  pugi::xml_document document;
+  std::string ignored;
+  return static_cast<bool>(load_answer(body, call, &document, &ignored));
+}
+
+bool parse_onvif_clock(std::string_view body, OnvifClock* clock, std::string* error) {
   pugi::xml_document document;
   const pugi::xml_node answer = load_answer(body, kGetSystemDateAndTime, &document, error);
   if (!answer) {
     return false;
   }
-  const pugi::xml_node utc = descendant(answer, {"SystemDateAndTime", "UTCDateTime"});
-  bool whole = true;
-  const auto number = [&](const char* part, const char* name) {
-    const std::optional<double> value =
-        parse_number(trimmed(descendant(utc, {part, name}).child_value(), kXmlBlanks));
-    whole = whole && value && std::abs(*value) < 1e4;
-    return whole ? static_cast<int>(*value) : 0;
-  };
-  Civil civil;
-  civil.year = number("Date", "Year");
-  civil.month = number("Date", "Month");
-  civil.day = number("Date", "Day");
-  civil.hour = number("Time", "Hour");
-  civil.minute = number("Time", "Minute");
-  civil.second = number("Time", "Second");
-  const std::optional<double> time_s = whole ? unix_time(civil) : std::nullopt;
-  if (!time_s) {
-    *error = "no UTCDateTime in the answer to GetSystemDateAndTime";
+  const pugi::xml_node told = child(answer, "SystemDateAndTime");
+  clock->utc_s = civil_time(child(told, "UTCDateTime"));
+  clock->local_s = civil_time(child(told, "LocalDateTime"));
+  if (!clock->utc_s && !clock->local_s) {
+    *error = "neither UTCDateTime nor LocalDateTime in the answer to GetSystemDateAndTime";
     return false;
   }
-  *utc_s = *time_s;
   return true;
 }
 
 bool parse_onvif_services(std::string_view body, OnvifServices* services, std::string* error) {
   pugi::xml_document document;
-  const pugi::xml_node answer = load_answer(body, kGetCapabilities, &document, error);
-  if (!answer) {
+  *services = {};
+  if (const pugi::xml_node listed = load_answer(body, kGetServices, &document, error)) {
+    for (const pugi::xml_node& service : listed.children()) {
+      const std::string name = text_of(child(service, "Namespace"));
+      std::string* const address = name == kOnvifPtz     ? &services->ptz
+                                   : name == kOnvifMedia ? &services->media
+                                                         : nullptr;
+      if (address != nullptr) {
+        *address = text_of(child(service, "XAddr"));
+      }
+    }
+  } else if (const pugi::xml_node answer = load_answer(body, kGetCapabilities, &document, error)) {
+    const pugi::xml_node capabilities = child(answer, "Capabilities");
+    services->ptz = text_of(descendant(capabilities, {"PTZ", "XAddr"}));
+    services->media = text_of(descendant(capabilities, {"Media", "XAddr"}));
+  } else {
     return false;
   }
-  const pugi::xml_node capabilities = child(answer, "Capabilities");
-  services->ptz = text_of(descendant(capabilities, {"PTZ", "XAddr"}));
-  services->media = text_of(descendant(capabilities, {"Media", "XAddr"}));
   if (services->ptz.empty()) {
     *error = "the device names no PTZ service; pan and tilt cannot be asked for by ONVIF";
     return false;
@@ -324,22 +277,52 @@ bool parse_onvif_services(std::string_view body, OnvifServices* services, std::s
   return true;
 }
 
-bool parse_onvif_profile(std::string_view body, std::string* token, std::string* error) {
+bool parse_onvif_profile(std::string_view body, OnvifProfile* profile, std::string* error) {
   pugi::xml_document document;
   const pugi::xml_node answer = load_answer(body, kGetProfiles, &document, error);
   if (!answer) {
     return false;
   }
-  for (const pugi::xml_node& profile : answer.children()) {
-    *token = profile.attribute("token").value();
-    if (local_name(profile.name()) == "Profiles" && !token->empty() &&
-        child(profile, "PTZConfiguration")) {
+  for (const pugi::xml_node& candidate : answer.children()) {
+    const pugi::xml_node configuration = child(candidate, "PTZConfiguration");
+    profile->token = candidate.attribute("token").value();
+    if (local_name(candidate.name()) == "Profiles" && !profile->token.empty() && configuration) {
+      profile->configuration = configuration.attribute("token").value();
+      profile->node = text_of(child(configuration, "NodeToken"));
       return true;
     }
   }
   *error =
       "none of the device's profiles has a PTZ configuration; add one in the device's settings";
   return false;
+}
+
+bool parse_onvif_ranges(std::string_view body, const std::string& node,
+                        std::vector<OnvifSpaceRange>* ranges, std::string* error) {
+  pugi::xml_document document;
+  ranges->clear();
+  if (const pugi::xml_node nodes = load_answer(body, kGetNodes, &document, error)) {
+    pugi::xml_node mine;
+    for (const pugi::xml_node& candidate : nodes.children()) {
+      if (!node.empty() && candidate.attribute("token").value() == node) {
+        mine = candidate;
+      }
+    }
+    for (const pugi::xml_node& candidate : nodes.children()) {
+      if (!mine || candidate == mine) {
+        add_ranges(child(candidate, "SupportedPTZSpaces"), ranges);
+      }
+    }
+  } else if (const pugi::xml_node options =
+                 load_answer(body, kGetConfigurationOptions, &document, error)) {
+    add_ranges(descendant(options, {"PTZConfigurationOptions", "Spaces"}), ranges);
+  } else {
+    return false;
+  }
+  if (ranges->empty()) {
+    *error = "the device declares no range of absolute pan and tilt";
+  }
+  return !ranges->empty();
 }
 
 bool parse_onvif_status(std::string_view body, OnvifStatus* status, std::string* error) {
@@ -357,25 +340,9 @@ bool parse_onvif_status(std::string_view body, OnvifStatus* status, std::string*
                       : "the device tells its status without a position";
     return false;
   }
-  const std::string space = pan_tilt.attribute("space").value();
-  const std::string_view short_space = std::string_view(space).substr(space.rfind('/') + 1);
-  double limit = 1.01;  // rounding beyond 1 is not rare
-  if (space.empty() || short_space == "PositionGenericSpace") {
-    status->space = OnvifStatus::Space::kGeneric;
-  } else if (short_space == "SphericalPositionSpaceDegrees") {
-    status->space = OnvifStatus::Space::kDegrees;
-    limit = 360;
-  } else {
-    *error = "the position is in the space '" + shown(space, kShown) +
-             "'; known are PositionGenericSpace and SphericalPositionSpaceDegrees";
-    return false;
-  }
-  if (std::abs(*pan) > limit || std::abs(*tilt) > limit) {
-    *error = "the position " + shown(*pan) + ", " + shown(*tilt) + " is outside its space";
-    return false;
-  }
   status->pan = *pan;
   status->tilt = *tilt;
+  status->space = pan_tilt.attribute("space").value();
   status->zoom = attribute(descendant(whole, {"Position", "Zoom"}), "x");
   status->utc_s = parse_xml_time(child(whole, "UtcTime").child_value());
   return true;

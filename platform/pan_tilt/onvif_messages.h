@@ -2,13 +2,14 @@
 // The words of ONVIF (SOAP 1.2): requests as text, answers as values. Pure: bytes in, value or a
 // one-line error out (XML by pugixml, which expands no entities of a document's own); namespace
 // prefixes are as the device likes.
-//   GetSystemDateAndTime, GetCapabilities   device service
-//   GetProfiles                             media service
-//   GetStatus                               PTZ service
+//   GetSystemDateAndTime, GetCapabilities, GetServices   device service
+//   GetProfiles                                          media service
+//   GetStatus, GetNodes, GetConfigurationOptions         PTZ service
 
 #include <optional>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace alidade {
 
@@ -30,11 +31,15 @@ constexpr const char* kOnvifMedia = "http://www.onvif.org/ver10/media/wsdl";
 constexpr const char* kOnvifPtz = "http://www.onvif.org/ver20/ptz/wsdl";
 constexpr OnvifCall kGetSystemDateAndTime{kOnvifDevice, "GetSystemDateAndTime"};
 constexpr OnvifCall kGetCapabilities{kOnvifDevice, "GetCapabilities"};
+constexpr OnvifCall kGetServices{kOnvifDevice, "GetServices"};
 constexpr OnvifCall kGetProfiles{kOnvifMedia, "GetProfiles"};
 constexpr OnvifCall kGetStatus{kOnvifPtz, "GetStatus"};
+constexpr OnvifCall kGetNodes{kOnvifPtz, "GetNodes"};
+constexpr OnvifCall kGetConfigurationOptions{kOnvifPtz, "GetConfigurationOptions"};
 
-// The envelope with the call. profile: the ProfileToken of GetStatus.
-[[nodiscard]] std::string onvif_request(const OnvifCall& call, const std::string& profile,
+// The envelope with the call. token: the ProfileToken of GetStatus, the ConfigurationToken of
+// GetConfigurationOptions; unused by the others.
+[[nodiscard]] std::string onvif_request(const OnvifCall& call, const std::string& token,
                                         const std::optional<OnvifLogin>& login);
 
 // "Content-Type: ..." of that envelope.
@@ -42,42 +47,67 @@ constexpr OnvifCall kGetStatus{kOnvifPtz, "GetStatus"};
 
 struct SoapFault {
   bool not_authorized = false;
-  std::string text;  // "ter:NotAuthorized: Sender not authorized"
+  bool of_a_service = false;  // the right one: it misses a profile or finds an argument wrong
+  std::string text;           // "ter:NotAuthorized: Sender not authorized"
 };
 
 // Empty if the body is no fault.
 [[nodiscard]] std::optional<SoapFault> parse_soap_fault(std::string_view body);
 
-// The device's clock as Unix time, in whole seconds.
-[[nodiscard]] bool parse_onvif_clock(std::string_view body, double* utc_s, std::string* error);
+// The body holds the answer to the call, whatever it says.
+[[nodiscard]] bool is_onvif_answer(std::string_view body, const OnvifCall& call);
 
+// What a device tells of its clock, in whole seconds; one of both at least.
+struct OnvifClock {
+  std::optional<double> utc_s;    // Unix time
+  std::optional<double> local_s;  // local date and time, read as if it were UTC
+};
+[[nodiscard]] bool parse_onvif_clock(std::string_view body, OnvifClock* clock, std::string* error);
+
+// URLs as the device tells them; empty: none.
 struct OnvifServices {
-  std::string ptz;  // URLs
+  std::string ptz;
   std::string media;
 };
+// Of the answer to GetCapabilities or GetServices. False: no PTZ service is named.
 [[nodiscard]] bool parse_onvif_services(std::string_view body, OnvifServices* services,
                                         std::string* error);
 
-// The token of the first profile that has a PTZ configuration.
-[[nodiscard]] bool parse_onvif_profile(std::string_view body, std::string* token,
+// The first profile that has a PTZ configuration, by tokens; the last two may be empty.
+struct OnvifProfile {
+  std::string token;
+  std::string configuration;
+  std::string node;
+};
+[[nodiscard]] bool parse_onvif_profile(std::string_view body, OnvifProfile* profile,
                                        std::string* error);
 
+// Lowest and highest value on the scale of an axis.
+struct OnvifInterval {
+  double low = 0;
+  double high = 0;
+};
+
+// The range of absolute pan and tilt that a device declares for a space.
+struct OnvifSpaceRange {
+  std::string space;  // URI
+  std::optional<OnvifInterval> pan;
+  std::optional<OnvifInterval> tilt;
+};
+// Of the answer to GetNodes or GetConfigurationOptions. node: its spaces are taken, those of all nodes if it
+// is empty or not there. False: none is declared.
+[[nodiscard]] bool parse_onvif_ranges(std::string_view body, const std::string& node,
+                                      std::vector<OnvifSpaceRange>* ranges, std::string* error);
+
+// The position as the device tells it, on whatever scale.
 struct OnvifStatus {
-  enum class Space {
-    kGeneric,  // -1..1 over the ranges of the device
-    kDegrees
-  };
-  Space space = Space::kGeneric;
-  double pan = 0;   // positive to the right
-  double tilt = 0;  // positive upwards
+  double pan = 0;
+  double tilt = 0;
+  std::string space;  // URI of pan and tilt; empty: none is named
   std::optional<double> zoom;
   std::optional<double> utc_s;  // Unix time
 };
 [[nodiscard]] bool parse_onvif_status(std::string_view body, OnvifStatus* status,
                                       std::string* error);
-
-// xs:dateTime and Unix time; without a zone, UTC is meant.
-[[nodiscard]] std::optional<double> parse_xml_time(std::string_view text);
-[[nodiscard]] std::string xml_time(double utc_s);
 
 }  // namespace alidade

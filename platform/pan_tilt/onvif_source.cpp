@@ -4,32 +4,53 @@
 #include <utility>
 
 #include "platform/pan_tilt/device_clock_trial.h"
+#include "platform/pan_tilt/onvif_addresses.h"
+#include "platform/pan_tilt/onvif_login.h"
 #include "platform/pan_tilt/onvif_messages.h"
 #include "platform/system/clock.h"
+#include "platform/system/shown.h"
 
 namespace alidade {
 namespace {
 
-constexpr std::size_t kMaxBody = 256 * 1024;  // bytes; many long profiles
+constexpr std::size_t kMaxOnvifBody = 256 * 1024;  // bytes; many long profiles
 constexpr std::size_t kNonceBytes = 16;
+constexpr std::size_t kShownUrl = 120;
 
-double mapped(double value, const OnvifRange& range) {
-  return range.at_minus_one_rad +
-         (value + 1) / 2 * (range.at_plus_one_rad - range.at_minus_one_rad);
-}
-
-// Where a service that calls itself `told` is reached, coming from `device`.
-std::string service_url(const Url& device, const std::string& told) {
-  Url url;
-  std::string error;
-  if (!parse_url(told, &url, &error)) {
-    url.path = told.empty() || told[0] != '/' ? "/" + told : told;
-  } else if (url.host == device.host && url.scheme == device.scheme) {
-    return url.bare;
+// The addresses at which a service may be, one after the other until it answers at one.
+class ServiceSearch {
+ public:
+  // Those of one that was found before are no longer sought: what fails there fails.
+  void begin(std::vector<std::string> addresses) {
+    if (!found_) {
+      addresses_ = std::move(addresses);
+      at_ = 0;
+    }
+    error_.clear();
   }
-  return device.scheme + "://" + device.host + (device.port.empty() ? "" : ":" + device.port) +
-         url.path;
-}
+  [[nodiscard]] const std::string& address() const { return addresses_.at(at_); }
+  [[nodiscard]] bool is_first() const { return at_ == 0; }
+  void answered() { found_ = true; }
+  [[nodiscard]] bool is_found() const { return found_; }
+
+  // It is not at this address. False: nor at another; *error is then what went wrong at the first.
+  [[nodiscard]] bool next(std::string* error) {
+    if (found_) return false;
+    if (error_.empty()) error_ = *error;
+    if (at_ + 1 < addresses_.size()) {
+      ++at_;
+      return true;
+    }
+    *error = error_;
+    return false;
+  }
+
+ private:
+  std::vector<std::string> addresses_;
+  std::size_t at_ = 0;
+  bool found_ = false;
+  std::string error_;
+};
 
 class OnvifConversation : public HttpConversation {
  public:
@@ -38,24 +59,38 @@ class OnvifConversation : public HttpConversation {
       : options_(options),
         user_(std::move(user)),
         password_(std::move(password)),
-        device_(std::move(device)) {
+        device_(std::move(device)),
+        scale_({options.pan_range, options.pan_scale}, {options.tilt_range, options.tilt_scale}) {
     reset();
   }
 
   HttpRequest next_request(double now_s) override;
   Outcome take(const HttpAnswer& answer, PanTiltSample* sample, std::string* error) override;
-  void reset() override { step_ = user_.empty() ? Step::kServices : Step::kClock; }
+  Outcome unanswered() override;
+  void reset() override;
+  [[nodiscard]] std::vector<std::string> notes() const override;
 
  private:
-  enum class Step { kClock, kServices, kProfile, kStatus };
+  enum class Step { kClock, kCapabilities, kServices, kProfile, kStatus, kNodes, kOptions };
 
+  [[nodiscard]] bool asks_ranges() const {
+    return step_ == Step::kNodes || step_ == Step::kOptions;
+  }
   const OnvifCall& call() const;
   Outcome disconnected() {
     reset();
     return Outcome::kDisconnected;
   }
-  Outcome not_authorized(const std::string& why, std::string* error) const;
+  Outcome go_on(Step step) {
+    step_ = step;
+    return Outcome::kAskOn;
+  }
+  Outcome not_authorized(const std::string& why, bool offers_digest, std::string* error);
+  Outcome not_here(std::string* error);
   Outcome take_clock(const HttpAnswer& answer);
+  Outcome take_services(const HttpAnswer& answer, std::string* error);
+  Outcome find_services();
+  Outcome take_ranges(const HttpAnswer& answer);
   Outcome take_status(const HttpAnswer& answer, PanTiltSample* sample, std::string* error);
 
   OnvifSourceOptions options_;
@@ -65,21 +100,40 @@ class OnvifConversation : public HttpConversation {
   std::random_device random_;
 
   Step step_ = Step::kClock;
-  bool digest_ = false;                        // log in by HTTP digest, not by a token
-  std::optional<double> device_minus_host_s_;  // the device's Unix time less the host's monotonic
-  OnvifServices services_;
-  std::string profile_;
+  OnvifLoginWays login_;
+  OnvifServices services_;  // as the device tells them
+  std::string services_error_;
+  ServiceSearch ptz_;
+  ServiceSearch media_;
+  OnvifProfile profile_;
+  bool ranges_asked_ = false;   // since the connection began
+  bool ranges_silent_ = false;  // asked for them the device says nothing at all
+  OnvifScale scale_;
+  OnvifStatus status_;  // the latest
   DeviceClockTrial trial_;
 };
+
+void OnvifConversation::reset() {
+  step_ = user_.empty() ? Step::kCapabilities : Step::kClock;
+  services_ = {};
+  services_error_.clear();
+  ranges_asked_ = false;
+}
 
 const OnvifCall& OnvifConversation::call() const {
   switch (step_) {
     case Step::kClock:
       return kGetSystemDateAndTime;
-    case Step::kServices:
+    case Step::kCapabilities:
       return kGetCapabilities;
+    case Step::kServices:
+      return kGetServices;
     case Step::kProfile:
       return kGetProfiles;
+    case Step::kNodes:
+      return kGetNodes;
+    case Step::kOptions:
+      return kGetConfigurationOptions;
     case Step::kStatus:
       break;
   }
@@ -87,116 +141,225 @@ const OnvifCall& OnvifConversation::call() const {
 }
 
 HttpRequest OnvifConversation::next_request(double now_s) {
+  const bool digest = !user_.empty() && login_.way() == OnvifLoginWays::Way::kDigest;
   std::optional<OnvifLogin> login;
-  if (!user_.empty() && !digest_ && step_ != Step::kClock) {
+  if (!user_.empty() && !digest && step_ != Step::kClock) {
     login.emplace();
     login->user = user_;
     login->password = password_;
-    login->created_utc_s = device_minus_host_s_ ? now_s + *device_minus_host_s_ : utc_now_s();
+    login->created_utc_s = login_.created_utc_s(now_s, utc_now_s());
     std::uniform_int_distribution<int> byte(0, 255);
     for (std::size_t i = 0; i < kNonceBytes; ++i) {
       login->nonce += static_cast<char>(byte(random_));
     }
   }
   HttpRequest request;
-  request.url = step_ == Step::kStatus    ? service_url(device_, services_.ptz)
-                : step_ == Step::kProfile ? service_url(device_, services_.media)
-                                          : device_.bare;
-  request.body = onvif_request(call(), profile_, login);
+  request.url = step_ == Step::kProfile                   ? media_.address()
+                : step_ == Step::kStatus || asks_ranges() ? ptz_.address()
+                                                          : device_.bare;
+  request.body = onvif_request(
+      call(), step_ == Step::kOptions ? profile_.configuration : profile_.token, login);
   request.headers = {onvif_content_type(call()), "Expect:"};
-  request.digest = digest_;
+  request.digest = digest;
   return request;
 }
 
 HttpConversation::Outcome OnvifConversation::take(const HttpAnswer& answer, PanTiltSample* sample,
                                                   std::string* error) {
   const std::optional<SoapFault> fault = parse_soap_fault(answer.body);
-  if (answer.status == 401 || (fault && fault->not_authorized)) {
-    if (!user_.empty() && !digest_ && answer.offers_digest) {
-      digest_ = true;
-      return Outcome::kAskOn;
-    }
-    if (step_ != Step::kClock) {
-      return not_authorized(fault ? fault->text : "401", error);
-    }
+  const bool refused =
+      answer.status == 401 || answer.status == 403 || (fault && fault->not_authorized);
+  if (asks_ranges()) {
+    return take_ranges(answer);
   }
-  if (step_ == Step::kClock) {
+  if (step_ == Step::kClock && !(refused && answer.offers_digest)) {
     return take_clock(answer);
+  }
+  if (refused) {
+    return not_authorized(fault ? fault->text : std::to_string(answer.status), answer.offers_digest,
+                          error);
   }
   if (fault) {
     *error = std::string("the device answers ") + call().name + " with '" + fault->text + "'";
-    return disconnected();
+    return fault->of_a_service ? disconnected() : not_here(error);
   }
   if (answer.status != 200) {
     *error = "HTTP status " + std::to_string(answer.status) + " for " + call().name;
-    return disconnected();
+    return answer.status == 503 ? disconnected() : not_here(error);
   }
   switch (step_) {
+    case Step::kCapabilities:
     case Step::kServices:
-      if (!parse_onvif_services(answer.body, &services_, error)) {
-        return disconnected();
-      }
-      profile_ = options_.profile;
-      step_ = profile_.empty() ? Step::kProfile : Step::kStatus;
-      return Outcome::kAskOn;
+      return take_services(answer, error);
     case Step::kProfile:
       if (!parse_onvif_profile(answer.body, &profile_, error)) {
+        if (!is_onvif_answer(answer.body, call())) return not_here(error);
+        if (!services_error_.empty()) *error = services_error_;
         return disconnected();
       }
-      step_ = Step::kStatus;
-      return Outcome::kAskOn;
+      media_.answered();
+      return go_on(Step::kStatus);
     case Step::kClock:
+    case Step::kNodes:
+    case Step::kOptions:
     case Step::kStatus:
       break;
   }
   return take_status(answer, sample, error);
 }
 
+// By HTTP digest only where the device offers it, which no wrong login is.
 HttpConversation::Outcome OnvifConversation::not_authorized(const std::string& why,
-                                                            std::string* error) const {
-  *error = user_.empty() ? "the device wants a user and a password (" + why + ")"
-                         : "wrong user or password (" + why +
-                               "); ONVIF may have users of its own in the device";
-  return Outcome::kFailed;
+                                                            bool offers_digest,
+                                                            std::string* error) {
+  const ServiceSearch* const search = step_ == Step::kProfile  ? &media_
+                                      : step_ == Step::kStatus ? &ptz_
+                                                               : nullptr;
+  if (user_.empty()) {
+    *error = "the device wants a user and a password (" + why + ")";
+    return Outcome::kRefused;
+  }
+  *error = "wrong user or password (" + why + "); ONVIF may have users of its own in the device";
+  if (search != nullptr && !search->is_first() && !search->is_found()) {
+    return not_here(error);  // where nothing is, everybody may be refused
+  }
+  if (login_.refused(offers_digest)) {
+    return Outcome::kAskOn;
+  }
+  *error += login_.tried_text();
+  return Outcome::kRefused;
 }
 
-// A device that does not tell its clock, or not before the login, has the host's: the best guess.
-HttpConversation::Outcome OnvifConversation::take_clock(const HttpAnswer& answer) {
-  double utc_s = 0;
-  std::string ignored;
-  device_minus_host_s_.reset();
-  if (parse_onvif_clock(answer.body, &utc_s, &ignored)) {
-    device_minus_host_s_ = utc_s - (answer.earliest_time_s + answer.latest_time_s) / 2;
+// Nobody knows the call at this address.
+HttpConversation::Outcome OnvifConversation::not_here(std::string* error) {
+  switch (step_) {
+    case Step::kCapabilities:
+      services_error_ = *error;
+      return go_on(Step::kServices);
+    case Step::kServices:
+      return find_services();
+    case Step::kProfile:
+      if (media_.next(error)) {
+        return Outcome::kAskOn;
+      }
+      if (!services_error_.empty()) *error = services_error_;
+      if (!media_.is_found()) *error += "; a profile can be named as pan_tilt.profile";
+      break;
+    case Step::kStatus:
+      if (ptz_.next(error)) {
+        return Outcome::kAskOn;
+      }
+      if (!services_error_.empty()) *error = services_error_;
+      if (!ptz_.is_found() && options_.ptz_path.empty()) {
+        *error +=
+            "; no PTZ service is where the device says or where usual: if you know its path, give "
+            "it "
+            "as pan_tilt.ptz_path";
+      }
+      break;
+    case Step::kClock:
+    case Step::kNodes:
+    case Step::kOptions:
+      break;
   }
-  step_ = Step::kServices;
-  return Outcome::kAskOn;
+  return disconnected();
+}
+
+HttpConversation::Outcome OnvifConversation::unanswered() {
+  std::string ignored;
+  if (asks_ranges()) {
+    ranges_silent_ = true;
+    return go_on(Step::kStatus);
+  }
+  // At a port of its own, which is not forwarded.
+  const std::string own = onvif_address(device_, "/");
+  ServiceSearch* const search = step_ == Step::kProfile  ? &media_
+                                : step_ == Step::kStatus ? &ptz_
+                                                         : nullptr;
+  if (search != nullptr && search->address().rfind(own, 0) != 0 && search->next(&ignored)) {
+    return Outcome::kAskOn;
+  }
+  return disconnected();
+}
+
+HttpConversation::Outcome OnvifConversation::take_clock(const HttpAnswer& answer) {
+  OnvifClock clock;
+  std::string ignored;
+  const bool told = parse_onvif_clock(answer.body, &clock, &ignored);
+  const double age_s = monotonic_now_s() - (answer.earliest_time_s + answer.latest_time_s) / 2;
+  login_.set_clock(told ? std::optional(clock) : std::nullopt, monotonic_now_s() - age_s,
+                   utc_now_s() - age_s);
+  return go_on(Step::kCapabilities);
+}
+
+HttpConversation::Outcome OnvifConversation::take_services(const HttpAnswer& answer,
+                                                           std::string* error) {
+  OnvifServices told;
+  const bool names_ptz = parse_onvif_services(answer.body, &told, error);
+  if (!names_ptz && !is_onvif_answer(answer.body, call()) && step_ == Step::kCapabilities) {
+    return disconnected();  // no ONVIF at all
+  }
+  services_.media = told.media.empty() ? services_.media : told.media;
+  services_.ptz = told.ptz;
+  if (!names_ptz) {
+    return not_here(error);
+  }
+  services_error_.clear();
+  return find_services();
+}
+
+// Where they may be: as they are told, if they are.
+HttpConversation::Outcome OnvifConversation::find_services() {
+  ptz_.begin(options_.ptz_path.empty()
+                 ? onvif_addresses(device_, services_.ptz, OnvifService::kPtz)
+                 : std::vector<std::string>{onvif_address(device_, options_.ptz_path)});
+  media_.begin(onvif_addresses(device_, services_.media, OnvifService::kMedia));
+  profile_ = {};
+  profile_.token = options_.profile;
+  return go_on(profile_.token.empty() ? Step::kProfile : Step::kStatus);
+}
+
+// Whatever is answered, the position is asked again.
+HttpConversation::Outcome OnvifConversation::take_ranges(const HttpAnswer& answer) {
+  std::vector<OnvifSpaceRange> ranges;
+  std::string ignored;
+  if (parse_onvif_ranges(answer.body, profile_.node, &ranges, &ignored)) {
+    scale_.set_ranges(std::move(ranges));
+  } else if (step_ == Step::kNodes && !profile_.configuration.empty()) {
+    return go_on(Step::kOptions);
+  }
+  return go_on(Step::kStatus);
 }
 
 HttpConversation::Outcome OnvifConversation::take_status(const HttpAnswer& answer,
                                                          PanTiltSample* sample,
                                                          std::string* error) {
-  OnvifStatus status;
-  if (!parse_onvif_status(answer.body, &status, error)) {
+  if (!is_onvif_answer(answer.body, call())) {
+    static_cast<void>(parse_onvif_status(answer.body, &status_, error));
+    return not_here(error);
+  }
+  ptz_.answered();
+  login_.accepted();
+  if (!parse_onvif_status(answer.body, &status_, error)) {
     return disconnected();
   }
-  if (status.space == OnvifStatus::Space::kDegrees) {
-    sample->pan_rad = kRadPerDeg * status.pan;
-    sample->tilt_rad = kRadPerDeg * status.tilt;
-  } else if (options_.pan_range && options_.tilt_range) {
-    sample->pan_rad = mapped(status.pan, *options_.pan_range);
-    sample->tilt_rad = mapped(status.tilt, *options_.tilt_range);
-  } else {
-    *error =
-        "the device tells pan and tilt as -1..1, not in degrees; give the angles at -1 and 1, from "
-        "its data sheet, as pan_range_deg and tilt_range_deg";
-    return Outcome::kFailed;
+  if (scale_.needs_ranges(status_) && !std::exchange(ranges_asked_, true) && !ranges_silent_) {
+    return go_on(Step::kNodes);
   }
-  sample->zoom = status.zoom;
-  switch (trial_.add(status.utc_s, answer.latest_time_s)) {
+  switch (scale_.angles(status_, &sample->pan_rad, &sample->tilt_rad, error)) {
+    case OnvifScale::Outcome::kOutside:
+      return disconnected();
+    case OnvifScale::Outcome::kNeedsAngles:
+      return Outcome::kFailed;
+    case OnvifScale::Outcome::kOk:
+      break;
+  }
+  sample->zoom = status_.zoom;
+  switch (trial_.add(status_.utc_s, answer.latest_time_s)) {
     case DeviceClockTrial::Verdict::kOpen:
       return Outcome::kNothing;
     case DeviceClockTrial::Verdict::kUseful:
-      sample->device_time_s = status.utc_s;
+      sample->device_time_s = status_.utc_s;
       break;
     case DeviceClockTrial::Verdict::kUseless:
       break;
@@ -204,11 +367,23 @@ HttpConversation::Outcome OnvifConversation::take_status(const HttpAnswer& answe
   return Outcome::kSample;
 }
 
+std::vector<std::string> OnvifConversation::notes() const {
+  std::vector<std::string> notes = {scale_.note(status_)};
+  if (!user_.empty()) notes.push_back(login_.note());
+  if (options_.ptz_path.empty() && services_.ptz.empty()) {
+    notes.push_back("the device names no PTZ service; it is asked at " + ptz_.address());
+  } else if (!ptz_.is_first()) {
+    notes.push_back("no PTZ service answers where the device says, '" +
+                    shown(services_.ptz, kShownUrl) + "'; it is asked at " + ptz_.address());
+  }
+  return notes;
+}
+
 HttpPollingPlan plan_of(const OnvifSourceOptions& given) {
   HttpPollingPlan plan;
   const HttpDeviceOptions& of_any_device = given;
   static_cast<HttpDeviceOptions&>(plan.options) = of_any_device;
-  plan.options.max_body = kMaxBody;
+  plan.options.max_body = kMaxOnvifBody;
   plan.options.expected = "an ONVIF answer";
   Url url;
   plan.error = take_http_url(&url, &plan.options);

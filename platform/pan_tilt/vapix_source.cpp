@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t kMaxBody = 4096;  // bytes; a position has about 100
+constexpr std::size_t kMaxVapixBody = 4096;  // bytes; a position has about 100
 
 class VapixConversation : public HttpConversation {
  public:
@@ -22,7 +22,7 @@ class VapixConversation : public HttpConversation {
   Outcome take(const HttpAnswer& answer, PanTiltSample* sample, std::string* error) override {
     if (answer.status == 401) {
       *error = answer.login_error;
-      return Outcome::kFailed;
+      return Outcome::kRefused;
     }
     if (answer.status != 200) {
       *error = "HTTP status " + std::to_string(answer.status) + " for /axis-cgi/com/ptz.cgi";
@@ -55,7 +55,7 @@ std::string position_url(const Url& url, int camera) {
 HttpPollingPlan plan_of(const VapixSourceOptions& given) {
   HttpPollingPlan plan;
   static_cast<HttpDeviceOptions&>(plan.options) = given;
-  plan.options.max_body = kMaxBody;
+  plan.options.max_body = kMaxVapixBody;
   plan.options.expected = "a camera's position";
   Url url;
   plan.error = take_http_url(&url, &plan.options);

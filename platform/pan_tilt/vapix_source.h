@@ -4,7 +4,7 @@
 // over one kept HTTP connection with digest authentication (one 401 in total, not one a poll).
 // Pace, stamps and threads: http_polling_source.h. kDisconnected: unreachable, timed out, HTTP
 // status other than 200, an `Error:` answer, an answer that is not a position. kFailed: unusable
-// URL; until the first sample also wrong user or password (401).
+// URL; until the first sample also wrong user or password (401), later kDisconnected.
 
 #include <memory>
 #include <string>

@@ -127,25 +127,26 @@ bool is_of_the_real_time_thread(const std::string& path, const std::string& prog
   return false;
 }
 
-struct Range {
+struct AddressRange {
   char* begin = nullptr;
   char* end = nullptr;
   [[nodiscard]] std::size_t size() const { return static_cast<std::size_t>(end - begin); }
 };
 
 // What is left of a mapping; left_out: whole pages, in any order.
-std::vector<Range> rest_of(const Mapping& mapping, const std::vector<Range>& left_out) {
-  std::vector<Range> rest{{mapping.begin, mapping.begin + mapping.size}};
-  for (const Range& out : left_out) {
-    std::vector<Range> left;
-    for (const Range& range : rest) {
-      const Range before{range.begin, std::min(range.end, out.begin)};
-      const Range behind{std::max(range.begin, out.end), range.end};
+std::vector<AddressRange> rest_of(const Mapping& mapping,
+                                  const std::vector<AddressRange>& left_out) {
+  std::vector<AddressRange> rest{{mapping.begin, mapping.begin + mapping.size}};
+  for (const AddressRange& out : left_out) {
+    std::vector<AddressRange> left;
+    for (const AddressRange& range : rest) {
+      const AddressRange before{range.begin, std::min(range.end, out.begin)};
+      const AddressRange behind{std::max(range.begin, out.end), range.end};
       if (out.end <= range.begin || range.end <= out.begin || out.end <= out.begin) {
         left.push_back(range);
         continue;
       }
-      for (const Range& part : {before, behind}) {
+      for (const AddressRange& part : {before, behind}) {
         if (part.begin < part.end) left.push_back(part);
       }
     }
@@ -154,7 +155,7 @@ std::vector<Range> rest_of(const Mapping& mapping, const std::vector<Range>& lef
   return rest;
 }
 
-Range whole_pages(std::uintptr_t begin, std::uintptr_t end) {
+AddressRange whole_pages(std::uintptr_t begin, std::uintptr_t end) {
   const auto page = static_cast<std::uintptr_t>(sysconf(_SC_PAGESIZE));
   return {at_address((begin + page - 1) / page * page), at_address(end / page * page)};
 }
@@ -163,10 +164,10 @@ Range whole_pages(std::uintptr_t begin, std::uintptr_t end) {
 //   - the zeros that the data of other libraries end with: of no file in /proc/self/smaps, and megabytes in a library of codecs
 //   - tables for exceptions, which lie together behind the constants: it throws none
 //   - the program's code of rooms that it never enters
-std::vector<Range> done_without(const std::string& program) {
+std::vector<AddressRange> done_without(const std::string& program) {
   struct Search {
     const std::string& program;
-    std::vector<Range> found;
+    std::vector<AddressRange> found;
   };
   Search search{program, {}};
   const auto look = [](dl_phdr_info* object, std::size_t, void* out) {
@@ -204,25 +205,26 @@ std::vector<Range> done_without(const std::string& program) {
 bool lock_all() {
   std::array<char, PATH_MAX> program{};
   if (readlink("/proc/self/exe", program.data(), program.size() - 1) < 0) return false;
-  std::vector<Range> brought_in;
-  std::vector<Range> let_go;
-  const std::vector<Range> left_out = done_without(program.data());
+  std::vector<AddressRange> brought_in;
+  std::vector<AddressRange> let_go;
+  const std::vector<AddressRange> left_out = done_without(program.data());
   for (const Mapping& mapping : all_mappings()) {
     const bool wanted =
         mapping.is_data() ||
         (mapping.permissions[0] == 'r' && is_of_the_real_time_thread(mapping.path, program.data()));
-    const std::vector<Range> rest = wanted ? rest_of(mapping, left_out) : std::vector<Range>();
+    const std::vector<AddressRange> rest =
+        wanted ? rest_of(mapping, left_out) : std::vector<AddressRange>();
     brought_in.insert(brought_in.end(), rest.begin(), rest.end());
     if (!mapping.is_unchanged_file()) continue;
-    const std::vector<Range> others = rest_of(mapping, rest);
+    const std::vector<AddressRange> others = rest_of(mapping, rest);
     let_go.insert(let_go.end(), others.begin(), others.end());
   }
   // What is needed again comes again, from the same file.
-  for (const Range& range : let_go)
+  for (const AddressRange& range : let_go)
     static_cast<void>(madvise(range.begin, range.size(), MADV_DONTNEED));
   if (mlockall(MCL_CURRENT | MCL_FUTURE | MCL_ONFAULT) != 0) return false;
   // A mapping may have gone since: then there is nothing to lock.
-  return std::all_of(brought_in.begin(), brought_in.end(), [](const Range& range) {
+  return std::all_of(brought_in.begin(), brought_in.end(), [](const AddressRange& range) {
     return mlock(range.begin, range.size()) == 0 || errno == ENOMEM;
   });
 }

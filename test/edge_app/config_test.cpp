@@ -421,7 +421,8 @@ TEST_F(ConfigTest, MjpegAndOnvifSourcesAreRead) {
            "}\n"
            "pan_tilt: {type: onvif, url: http://camera, profile: main, rate_hz: 5, " +
            login +
-           ",\n           pan_range_deg: [-180, 180], tilt_range_deg: [30, -90]}\n"
+           ",\n           pan_range_deg: [-180, 180], tilt_range_deg: [30, -90],\n"
+           "           pan_scale: [0, 360], tilt_scale: [10, 190], ptz_path: /a/ptz}\n"
            "camera: {focal_length_px: 1000}\n"),
       IsEmpty());
   EXPECT_EQ(config_.video.type, VideoConfig::Type::kMjpeg);
@@ -436,6 +437,10 @@ TEST_F(ConfigTest, MjpegAndOnvifSourcesAreRead) {
   ASSERT_TRUE(config_.pan_tilt.pan_range_deg && config_.pan_tilt.tilt_range_deg);
   EXPECT_EQ(config_.pan_tilt.pan_range_deg->front(), -180);
   EXPECT_EQ(config_.pan_tilt.tilt_range_deg->back(), -90);
+  ASSERT_TRUE(config_.pan_tilt.pan_scale && config_.pan_tilt.tilt_scale);
+  EXPECT_EQ(config_.pan_tilt.pan_scale->back(), 360);
+  EXPECT_EQ(config_.pan_tilt.tilt_scale->front(), 10);
+  EXPECT_EQ(config_.pan_tilt.ptz_path, "/a/ptz");
   ASSERT_THAT(load("video: {type: mjpeg, url: 'http://camera/v'}\n"
                    "pan_tilt: {type: onvif, url: http://camera}\n"
                    "camera: {focal_length_px: 1000}\n"),
@@ -881,6 +886,20 @@ INSTANTIATE_TEST_SUITE_P(
                 VIDEO "pan_tilt: {type: onvif, url: http://c, pan_range_deg: [9, 9], "
                       "tilt_range_deg: [0, 1]}\n",
                 ":2: pan_tilt.pan_range_deg", "spans no angle"},
+        Mistake{"OneScaleAlone",
+                VIDEO "pan_tilt: {type: onvif, url: http://c, pan_scale: [0, 360]}\n",
+                ":2: pan_tilt", "give pan_scale and tilt_scale, or neither"},
+        Mistake{"ScaleWithoutAngles",
+                VIDEO "pan_tilt: {type: onvif, url: http://c, pan_scale: [0, 360], "
+                      "tilt_scale: [0, 180]}\n",
+                ":2: pan_tilt.pan_scale", "pan_range_deg, which is missing"},
+        Mistake{"ScaleOfOneValue",
+                VIDEO "pan_tilt: {type: onvif, url: http://c, pan_scale: [9, 9], "
+                      "tilt_scale: [0, 1]}\n",
+                ":2: pan_tilt.pan_scale", "spans nothing"},
+        Mistake{"PtzPathOfAnotherHost",
+                VIDEO "pan_tilt: {type: onvif, url: http://c, ptz_path: 'http://d/ptz'}\n",
+                ":2: pan_tilt.ptz_path", "the host is that of url"},
         Mistake{"OnvifHasNoCameraNumber",
                 VIDEO "pan_tilt: {type: onvif, url: http://c, camera: 1}\n", ":2: pan_tilt.camera",
                 "unknown key"},

@@ -141,7 +141,8 @@ TEST(VapixSource, TriesOnWhenACameraThatHasWorkedRefuses) {
   server.refuse = true;
   for (int i = 0; i < 3; ++i) {
     ASSERT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-    EXPECT_EQ(source->error(), server.url() + "/: wrong user or password (401)");
+    EXPECT_EQ(source->error(),
+              server.url() + "/: wrong user or password (401); it was right before");
   }
   server.refuse = false;
   ASSERT_EQ(read_until(*source, sample, ReadStatus::kOk), ReadStatus::kOk) << source->error();

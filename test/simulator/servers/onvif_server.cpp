@@ -38,10 +38,8 @@ OnvifServer::OnvifServer(OnvifDevice device, int port)
       digest_(device_.user, device_.password,
               device_.login == OnvifDevice::Login::kDigestSha256 ? DigestCheck::Algorithm::kSha256
                                                                  : DigestCheck::Algorithm::kMd5) {
-  server_.handlers().Post("/onvif/.*",
-                          [this](const httplib::Request& request, httplib::Response& response) {
-                            serve(request, response);
-                          });
+  server_.handlers().Post(".*", [this](const httplib::Request& request,
+                                       httplib::Response& response) { serve(request, response); });
   server_.listen(port);
 }
 
@@ -93,26 +91,45 @@ std::string OnvifServer::fault(const std::string& code, const std::string& reaso
          reason + "</env:Text></env:Reason></env:Fault></env:Body>";
 }
 
+std::string OnvifServer::clock_text(const std::string& name, double offset_s) const {
+  const auto now = static_cast<std::time_t>(std::floor(host_utc_s() + clock_offset_s + offset_s));
+  std::tm tm{};
+  ::gmtime_r(&now, &tm);
+  const auto number = [](const char* part, int value) {
+    return std::string("<tt:") + part + ">" + std::to_string(value) + "</tt:" + part + ">";
+  };
+  return "<tt:" + name + "><tt:Time>" + number("Hour", tm.tm_hour) + number("Minute", tm.tm_min) +
+         number("Second", tm.tm_sec) + "</tt:Time><tt:Date>" + number("Year", tm.tm_year + 1900) +
+         number("Month", tm.tm_mon + 1) + number("Day", tm.tm_mday) + "</tt:Date></tt:" + name +
+         ">";
+}
+
 std::string OnvifServer::answer(const std::string& call) const {
   const std::string base = device_.announced_host.empty() ? "" : "http://" + device_.announced_host;
+  const std::string ptz =
+      device_.announced_ptz.empty() ? base + device_.ptz_path : device_.announced_ptz;
   std::string content;
   if (call == "GetSystemDateAndTime") {
-    const auto now = static_cast<std::time_t>(std::floor(host_utc_s() + clock_offset_s));
-    std::tm tm{};
-    ::gmtime_r(&now, &tm);
-    const auto number = [](const char* name, int value) {
-      return std::string("<tt:") + name + ">" + std::to_string(value) + "</tt:" + name + ">";
-    };
-    content =
-        "<tt:SystemDateAndTime><tt:DateTimeType>NTP</tt:DateTimeType><tt:UTCDateTime><tt:Time>" +
-        number("Hour", tm.tm_hour) + number("Minute", tm.tm_min) + number("Second", tm.tm_sec) +
-        "</tt:Time><tt:Date>" + number("Year", tm.tm_year + 1900) + number("Month", tm.tm_mon + 1) +
-        number("Day", tm.tm_mday) + "</tt:Date></tt:UTCDateTime></tt:SystemDateAndTime>";
+    content = "<tt:SystemDateAndTime><tt:DateTimeType>NTP</tt:DateTimeType>" +
+              clock_text("UTCDateTime", told_offset_s) +
+              (local_offset_s != 0 ? clock_text("LocalDateTime", local_offset_s) : "") +
+              "</tt:SystemDateAndTime>";
   } else if (call == "GetCapabilities") {
-    content = "<tt:Capabilities><tt:Device><tt:XAddr>" + base +
-              "/onvif/device_service</tt:XAddr></tt:Device><tt:Media><tt:XAddr>" + base +
-              "/onvif/media</tt:XAddr></tt:Media><tt:PTZ><tt:XAddr>" + base +
-              "/onvif/ptz</tt:XAddr></tt:PTZ></tt:Capabilities>";
+    content = "<tt:Capabilities><tt:Device><tt:XAddr>" + base + device_.device_path +
+              "</tt:XAddr></tt:Device><tt:Media><tt:XAddr>" + base + device_.media_path +
+              "</tt:XAddr></tt:Media><tt:PTZ><tt:XAddr>" + ptz +
+              "</tt:XAddr></tt:PTZ></tt:Capabilities>";
+  } else if (call == "GetServices") {
+    content =
+        "<tt:Service><tt:Namespace>http://www.onvif.org/ver10/media/wsdl</tt:Namespace><tt:XAddr>" +
+        base + device_.media_path +
+        "</tt:XAddr></tt:Service><tt:Service><tt:Namespace>http://www.onvif.org/ver20/ptz/wsdl"
+        "</tt:Namespace><tt:XAddr>" +
+        ptz + "</tt:XAddr></tt:Service>";
+  } else if (call == "GetNodes") {
+    content = device_.nodes;
+  } else if (call == "GetConfigurationOptions") {
+    content = device_.options;
   } else if (call == "GetProfiles") {
     content =
         "<tt:Profiles token=\"fixed\"><tt:Name>a</tt:Name></tt:Profiles>"
@@ -153,19 +170,33 @@ void OnvifServer::serve(const httplib::Request& request, httplib::Response& resp
   const std::string authorization = request.get_header_value("Authorization");
   if (!open && device_.login == Login::kToken && !token_is_good(request.body)) {
     ++refusals;
+    ++wrong_logins;
     return reply(400, fault("ter:NotAuthorized", "Sender not authorized"));
   }
   if (!open && device_.login != Login::kToken &&
       (password_changed || !digest_.accepts("POST", request.target, authorization))) {
     ++refusals;
+    wrong_logins += authorization.empty() ? 0 : 1;
     response.set_header("WWW-Authenticate", digest_.challenge());
     response.status = 401;
     return;
   }
-  const std::string where = call == "GetProfiles" ? "/onvif/media"
-                            : call == "GetStatus" ? "/onvif/ptz"
-                                                  : "/onvif/device_service";
-  if (call.empty() || request.target != where) {
+  const bool of_ptz =
+      call == "GetStatus" || call == "GetNodes" || call == "GetConfigurationOptions";
+  const std::string where = call == "GetProfiles" ? device_.media_path
+                            : of_ptz              ? device_.ptz_path
+                                                  : device_.device_path;
+  if (call == "GetNodes" && device_.silent_about_nodes) {
+    response.status = 200;
+    response.set_content_provider(
+        100'000, "text/xml", [](std::size_t, std::size_t, httplib::DataSink&) { return false; });
+    return;
+  }
+  if (call.empty() || request.target != where ||
+      (call == "GetCapabilities" && !device_.knows_capabilities) ||
+      (call == "GetServices" && !device_.knows_services) ||
+      (call == "GetNodes" && device_.nodes.empty()) ||
+      (call == "GetConfigurationOptions" && device_.options.empty())) {
     return reply(400, fault("ter:ActionNotSupported", "not here"));
   }
   {

@@ -24,11 +24,22 @@ struct OnvifDevice {
   std::string password = "p&ss:\"w";
   bool clock_needs_login = false;  // against the standard
   std::string announced_host =
-      "192.168.1.64";          // in the addresses of its services; empty: a path alone
+      "192.168.1.64";  // in the addresses of its services; empty: a path alone
+  // Of the PTZ service, whole, as GetCapabilities and GetServices tell it; empty: announced_host's and its path.
+  std::string announced_ptz;
+  bool knows_capabilities = true;  // else it answers GetServices alone
+  bool knows_services = true;
+  std::string device_path = "/onvif/device_service";
+  std::string ptz_path = "/onvif/ptz";
+  std::string media_path = "/onvif/media";
   std::string prefix = "tt:";  // of every element's name; "x:" or "" occur, too
   std::function<std::string()> position = [] {
     return R"(<tt:PanTilt x="0.5" y="-0.25"/><tt:Zoom x="0.125"/>)";
   };
+  std::string
+      nodes;  // contents of the answers to GetNodes and GetConfigurationOptions; empty: a fault
+  std::string options;
+  bool silent_about_nodes = false;                                       // hangs up
   std::function<std::string()> utc_time = [] { return std::string(); };  // empty: none
 };
 
@@ -42,6 +53,9 @@ class OnvifServer {
   std::string url() const { return server_.url(); }
 
   std::atomic<double> clock_offset_s{0};  // the device's clock less the host's
+  std::atomic<double> told_offset_s{
+      0};  // what it tells as UTC less that clock, against the standard
+  std::atomic<double> local_offset_s{0};  // what it tells as local time less that clock, if not 0
   std::atomic<bool> password_changed{false};
   // A status other than 200, or a fault's code, for GetStatus.
   std::atomic<int> status{200};
@@ -50,6 +64,7 @@ class OnvifServer {
   void renew_nonce() { digest_.renew_nonce(); }  // as if it had restarted
   int count(const std::string& call) const;      // answered requests
   std::atomic<int> refusals{0};                  // 401 and NotAuthorized
+  std::atomic<int> wrong_logins{0};              // those with a token or credentials
   std::string last_profile() const;
   std::size_t connections() const;
 
@@ -57,6 +72,7 @@ class OnvifServer {
   void serve(const httplib::Request& request, httplib::Response& response);
   bool token_is_good(const std::string& body);
   std::string answer(const std::string& call) const;
+  std::string clock_text(const std::string& name, double offset_s) const;
   std::string fault(const std::string& code, const std::string& reason) const;
 
   OnvifDevice device_;

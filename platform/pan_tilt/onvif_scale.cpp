@@ -1,0 +1,156 @@
+#include "platform/pan_tilt/onvif_scale.h"
+
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "platform/pan_tilt/axis_mapping.h"
+#include "platform/system/shown.h"
+
+namespace alidade {
+namespace {
+
+constexpr OnvifInterval kGenericScale{-1, 1};
+constexpr OnvifInterval kDegreesScale{-360, 360};
+constexpr OnvifRange kDegrees{-360 * kRadPerDeg, 360 * kRadPerDeg};
+constexpr double kRounding = 0.005;    // of a scale: positions beyond its ends by that are not rare
+constexpr double kLargestEnd = 1e6;    // a declared end beyond that is a placeholder
+constexpr double kLeastPan_deg = 180;  // a pan that turns over less is not seen to be in degrees
+constexpr std::size_t kShownSpace = 120;
+constexpr const char* kKeys =
+    "give what it tells at two angles as pan_scale and tilt_scale, and these angles as "
+    "pan_range_deg "
+    "and tilt_range_deg";
+
+std::string_view short_name(const std::string& space) {
+  return std::string_view(space).substr(space.rfind('/') + 1);
+}
+
+bool is_generic(const std::string& space) {
+  return space.empty() || short_name(space) == "PositionGenericSpace";
+}
+
+bool is_degrees(const std::string& space) {
+  return short_name(space) == "SphericalPositionSpaceDegrees";
+}
+
+bool is_within(double value, const OnvifInterval& scale) {
+  const double slack = kRounding * std::abs(scale.high - scale.low);
+  return value >= std::fmin(scale.low, scale.high) - slack &&
+         value <= std::fmax(scale.low, scale.high) + slack;
+}
+
+double mapped(double value, const OnvifInterval& scale, const OnvifRange& range) {
+  return range.at_low_rad +
+         (value - scale.low) / (scale.high - scale.low) * (range.at_high_rad - range.at_low_rad);
+}
+
+bool is_sound(const std::optional<OnvifInterval>& declared) {
+  return declared && declared->low < declared->high && declared->low >= -kLargestEnd &&
+         declared->high <= kLargestEnd;
+}
+
+// A range within -1..1 is that of the generic space with stops; its angles are still those at -1 and 1.
+bool is_wide(const std::optional<OnvifInterval>& declared) {
+  return is_sound(declared) &&
+         (!is_within(declared->low, kGenericScale) || !is_within(declared->high, kGenericScale));
+}
+
+double span(const std::optional<OnvifInterval>& declared) { return declared->high - declared->low; }
+
+// Not steps, nor per cent: a pan of half a turn to a turn over a tilt of half a turn at most.
+bool is_in_degrees(const OnvifSpaceRange& range) {
+  return is_wide(range.pan) && is_wide(range.tilt) && span(range.pan) >= kLeastPan_deg &&
+         span(range.pan) <= 360 && span(range.tilt) <= 180 &&
+         is_within(range.pan->low, kDegreesScale) && is_within(range.pan->high, kDegreesScale) &&
+         is_within(range.tilt->low, kDegreesScale) && is_within(range.tilt->high, kDegreesScale);
+}
+
+std::string text_of(const std::optional<OnvifInterval>& range) {
+  return range ? shown(range->low) + ".." + shown(range->high) : std::string("nothing");
+}
+
+std::string text_of(const OnvifSpaceRange& range) {
+  return "pan " + text_of(range.pan) + " and tilt " + text_of(range.tilt);
+}
+
+}  // namespace
+
+bool OnvifScale::needs_ranges(const OnvifStatus& status) const {
+  return !pan_.scale && !is_degrees(status.space);
+}
+
+// That of the space itself if there is one; a generic space need not be named.
+const OnvifSpaceRange* OnvifScale::declared(const std::string& space) const {
+  for (const OnvifSpaceRange& range : ranges_) {
+    if (range.space == space || (is_generic(range.space) && is_generic(space))) return &range;
+  }
+  return nullptr;
+}
+
+OnvifScale::Outcome OnvifScale::angles(const OnvifStatus& status, double* pan_rad, double* tilt_rad,
+                                       std::string* error) const {
+  const OnvifSpaceRange* const range = needs_ranges(status) ? declared(status.space) : nullptr;
+  const bool no_angles = !pan_.angles || !tilt_.angles;
+  const bool degrees = (is_degrees(status.space) && !pan_.scale) ||
+                       (no_angles && range != nullptr && is_in_degrees(*range));
+  const bool any_wide = range != nullptr && (is_wide(range->pan) || is_wide(range->tilt));
+  if (!pan_.scale && !degrees && !any_wide && !is_generic(status.space)) {
+    *error =
+        "the position is in the space '" + shown(status.space, kShownSpace) +
+        "'; known are PositionGenericSpace and SphericalPositionSpaceDegrees; of another one, " +
+        kKeys;
+    return Outcome::kOutside;
+  }
+  const auto scale_of = [&](const OnvifAxis& axis,
+                            const std::optional<OnvifInterval> OnvifSpaceRange::*which) {
+    if (axis.scale) return *axis.scale;
+    const bool wide = range != nullptr && is_wide(range->*which);
+    return wide ? *(range->*which) : degrees ? kDegreesScale : kGenericScale;
+  };
+  const OnvifInterval pan_scale = scale_of(pan_, &OnvifSpaceRange::pan);
+  const OnvifInterval tilt_scale = scale_of(tilt_, &OnvifSpaceRange::tilt);
+  if (!is_within(status.pan, pan_scale) || !is_within(status.tilt, tilt_scale)) {
+    *error = "the position " + shown(status.pan) + ", " + shown(status.tilt) +
+             " is outside its space, pan " + text_of(pan_scale) + " and tilt " +
+             text_of(tilt_scale) +
+             (pan_.scale ? "; are pan_scale and tilt_scale right?" : std::string("; ") + kKeys);
+    return Outcome::kOutside;
+  }
+  if (degrees) {
+    *pan_rad = status.pan * kRadPerDeg;
+    *tilt_rad = status.tilt * kRadPerDeg;
+    return Outcome::kOk;
+  }
+  if (no_angles) {
+    *error =
+        any_wide
+            ? "the device tells pan and tilt as " + text_of(*range) +
+                  ", by its own declaration; give the angles at these ends, from its data sheet, "
+                  "as pan_range_deg and tilt_range_deg"
+            : "the device tells pan and tilt as -1..1, not in degrees; give the angles at -1 and "
+              "1, "
+              "from its data sheet, as pan_range_deg and tilt_range_deg";
+    return Outcome::kNeedsAngles;
+  }
+  *pan_rad = mapped(status.pan, pan_scale, *pan_.angles);
+  *tilt_rad = mapped(status.tilt, tilt_scale, *tilt_.angles);
+  return Outcome::kOk;
+}
+
+std::string OnvifScale::note(const OnvifStatus& status) const {
+  const OnvifSpaceRange* const range = needs_ranges(status) ? declared(status.space) : nullptr;
+  if (range == nullptr) return {};
+  if (!is_sound(range->pan) || !is_sound(range->tilt)) {
+    return "the device declares " + text_of(*range) +
+           ", which is no range; taken as -1..1 where it is none";
+  }
+  if (!is_wide(range->pan) && !is_wide(range->tilt)) return {};
+  return "the device declares " + text_of(*range) +
+         (pan_.angles && tilt_.angles
+              ? " in place of -1..1: pan_range_deg and tilt_range_deg are taken as the angles at "
+                "these ends"
+              : " in place of -1..1: taken as degrees, 0 where pan_zero_deg and tilt_zero_deg say");
+}
+
+}  // namespace alidade
