@@ -6,9 +6,9 @@
 // where it can be nothing else; -1..1 with the user's angles at its ends, as the standard has it. A position
 // beyond its scale is none. Pure.
 
-#include <array>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "platform/pan_tilt/onvif_messages.h"
