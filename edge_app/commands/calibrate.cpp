@@ -131,7 +131,8 @@ int calibrate_one(const std::string& recording, const CalibrateOptions& options,
   directory.add(
       "report", "report.html",
       calibration_report({recording, job.input, job.options, result, job.remarks, ALIDADE_VERSION,
-                          fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr)))}));
+                          fmt::format("{:%Y-%m-%d %H:%M} UTC", fmt::gmtime(std::time(nullptr))),
+                          job.untracked}));
   if (job.tracks_from_video)
     directory.add("tracks", "tracks.csv", tracks_text(job.input.observations));
   if (result.ok()) {

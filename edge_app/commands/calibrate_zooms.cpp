@@ -168,8 +168,8 @@ int calibrate_zooms(const CalibrateOptions& options, std::vector<ZoomJob> jobs,
     for (const std::string& remark : job.remarks) spdlog::warn("{}: {}", name, remark);
     if (!result.frames.empty()) {
       directory.add("report", fmt::format("report-{}.html", i + 1).c_str(),
-                    calibration_report(
-                        {name, job.input, job.options, result, job.remarks, ALIDADE_VERSION, now}));
+                    calibration_report({name, job.input, job.options, result, job.remarks,
+                                        ALIDADE_VERSION, now, job.untracked}));
     }
     if (!result.ok()) {
       spdlog::warn("{}: left out: {}: {}", name, to_string(result.status), result.message);

@@ -10,6 +10,7 @@
 #include "core/calibration/known_camera.h"
 #include "core/calibration/zoom_movement.h"
 #include "edge_app/config/value_file.h"
+#include "edge_app/pipeline/track_choice.h"
 
 namespace alidade {
 
@@ -18,7 +19,9 @@ struct CalibrationJob {
   CalibrationOptions options;
   KnownCamera known;  // beside the options
   CalibrationValues guess;
-  bool tracks_from_video = false;    // input.observations are still to be found in the video
+  bool tracks_from_video = false;  // input.observations are still to be found in the video
+  std::optional<UntrackedFrames>
+      untracked;                     // frames without one, where they were found in the video
   std::optional<double> zoom;        // the reading that all of it has, device units
   std::vector<std::string> remarks;  // about the recording, for the report
   // Of the zoom, from the stretch of the job before to this one's, where there are tracks of it or pictures.

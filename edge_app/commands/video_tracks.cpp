@@ -81,6 +81,7 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
               kExitFailed, fmt::format("{}: pictures of {}x{} px are too small to follow points in",
                                        directory, image.width, image.height));
         }
+        if (tracker.observation_count() == 0) tracks.without[frame] = Untracked::kNoPoint;
         for (int i = 0; i < tracker.observation_count(); ++i) {
           const TrackObservation& seen = tracker.observations()[i];
           tracks.observations.push_back({frame, seen.landmark, seen.u.x(), seen.u.y(), seen.sigma});
@@ -107,16 +108,21 @@ VideoTracks track_video(const std::string& directory, const CalibrationInput& in
   for_each_image(
       directory, input, progress, &tracks.remarks, [&](std::int64_t frame, const ImageView& image) {
         const auto time = times.find(frame);
-        if (time == times.end()) return;  // no telemetry accompanies it
+        if (time == times.end()) {
+          tracks.without[frame] = Untracked::kNoTelemetry;
+          return;
+        }
         const InterpolatedPanTilt prediction =
             predict(estimate, time->second + to_middle_s, kFirstSigma_px);
         FrameOrientation orientation;
         const OeStatus status = mode->process(image, time->second, &prediction, &orientation);
+        const std::size_t before = tracks.observations.size();
         for (int i = 0; status == OeStatus::kOk && i < mode->statistics().found; ++i) {
           const OeObservation& found = mode->observations()[i];
           if (const auto sigma = track_sigma(found))
             tracks.observations.push_back({frame, found.id, found.u.x(), found.u.y(), *sigma});
         }
+        if (tracks.observations.size() == before) tracks.without[frame] = Untracked::kNoPoint;
         mode->maintain();
       });
   return tracks;

@@ -15,11 +15,13 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/realtime/oe_mode/map_state.h"
+#include "edge_app/pipeline/track_choice.h"
 
 namespace alidade {
 
 struct VideoTracks {
   std::vector<CalibrationObservation> observations;
+  UntrackedFrames without;           // frames without an observation, if they were looked for
   std::vector<std::string> remarks;  // about the video, for the report
 };
 

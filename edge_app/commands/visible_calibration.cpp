@@ -3,12 +3,14 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <cstdint>
+#include <unordered_set>
 #include <utility>
 #include <vector>
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/video_tracks.h"
-#include "edge_app/pipeline/calibration_streams.h"
+#include "edge_app/pipeline/track_choice.h"
 
 namespace alidade {
 namespace {
@@ -61,6 +63,26 @@ KnownCameraCalibration calibrate_visibly(const CalibrationJob& job, double begin
   return calibrated;
 }
 
+// Of what was found, as many as an adjustment takes, and which frames are then without.
+void use_tracks(VideoTracks tracks, CalibrationJob* job, std::vector<std::string>* remarks) {
+  UntrackedFrames found = std::move(tracks.without);
+  const std::size_t before = without_shared_pixels(tracks.observations).size();
+  job->input.observations = choose_tracks(std::move(tracks.observations), kMaxObservations, &found);
+  std::unordered_set<std::int64_t> seen;
+  for (const CalibrationObservation& one : job->input.observations) seen.insert(one.frame);
+  UntrackedFrames& untracked = job->untracked.emplace();
+  for (const CalibrationFrame& frame : job->input.frames) {
+    if (seen.count(frame.frame) > 0) continue;
+    const auto why = found.find(frame.frame);
+    untracked[frame.frame] = why == found.end() ? Untracked::kNoPicture : why->second;
+  }
+  if (before <= kMaxObservations) return;
+  remarks->push_back(fmt::format(
+      "video: {} of {} observations are used, as more than {} take too long: evenly over the "
+      "recording, of the points that moved farthest",
+      job->input.observations.size(), before, kMaxObservations));
+}
+
 // Finds tracks, without or with a first estimate, and calibrates with them.
 KnownCameraCalibration calibrate_video(const std::string& recording,
                                        const CalibrationResult* estimate, CalibrationJob* job,
@@ -75,7 +97,7 @@ KnownCameraCalibration calibrate_video(const std::string& recording,
   VideoTracks tracks = estimate == nullptr ? track_video(recording, job->input, look)
                                            : track_video(recording, job->input, *estimate, look);
   *remarks = std::move(tracks.remarks);
-  job->input.observations = choose_tracks(std::move(tracks.observations));
+  use_tracks(std::move(tracks), job, remarks);
   return calibrate_visibly(*job, kShareOfLooking, progress);
 }
 
@@ -106,6 +128,7 @@ CalibrationResult calibrate_job(const std::string& recording, int passes, Calibr
   const bool usable = first.result.ok() || first.result.status == CalibrationStatus::kWeak;
   if (passes > 1 && usable) {
     const std::vector<CalibrationObservation> first_tracks = job->input.observations;
+    const auto first_untracked = job->untracked;
     progress.set_part(0.5, 1);
     KnownCameraCalibration second =
         calibrate_video(recording, &first.result, job, &remarks, &progress);
@@ -113,6 +136,7 @@ CalibrationResult calibrate_job(const std::string& recording, int passes, Calibr
       first = std::move(second);
     } else {
       job->input.observations = first_tracks;
+      job->untracked = first_untracked;
       remarks.push_back(fmt::format(
           "the second look at the video led to no calibration ({}: {}); this is the first one's",
           to_string(second.result.status), second.result.message));

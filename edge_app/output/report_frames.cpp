@@ -1,5 +1,6 @@
 // The report's page itself, and which frames of the recording it shows: those that were used, and the gaps between them.
 
+#include <array>
 #include <cmath>
 #include <cstdint>
 #include <unordered_set>
@@ -57,6 +58,20 @@ void ReportPage::line_between_gaps(const std::vector<TimedPoint>& points, const 
   end_piece();
 }
 
+namespace {
+
+// In the order of Untracked; the last: of a table of tracks that was given.
+constexpr std::array<const char*, 6> kUntrackedLines = {
+    "whose picture is missing or could not be decoded",
+    "outside the telemetry's time span, or of no use to the first look at the video",
+    "in which no point was followed: too plain or too blurred",
+    "whose points were followed through fewer than 5 frames: too plain, too blurred, or too fast",
+    "whose points were left out, as more than 30000 observations take too long",
+    "of which tracks.csv has no point"};
+static_assert(kMinSightings == 5 && kMaxObservations == 30000);
+
+}  // namespace
+
 std::vector<std::string> unused_frames(const ReportPage& page) {
   std::unordered_set<std::int64_t> known;
   for (const FrameResult& frame : page.result().frames) known.insert(frame.frame);
@@ -64,18 +79,25 @@ std::vector<std::string> unused_frames(const ReportPage& page) {
   for (const CalibrationObservation& seen : page.report().input.observations) {
     observed.insert(seen.frame);
   }
-  int without_points = 0;
+  // By Untracked; the last: nobody knows.
+  std::array<int, kUntrackedLines.size()> without_points{};
   int left_out = 0;
+  const auto& untracked = page.report().untracked;
+  const auto line_of = [&untracked](std::int64_t frame) {
+    if (!untracked) return kUntrackedLines.size() - 1;
+    const auto why = untracked->find(frame);
+    return why == untracked->end() ? kUntrackedLines.size() - 1
+                                   : static_cast<std::size_t>(why->second);
+  };
   for (const CalibrationFrame& frame : page.report().input.frames) {
     // Those without a stamp and those named before are told of with the exclusions.
     if (!std::isfinite(frame.stamp_s) || !known.insert(frame.frame).second) continue;
-    ++(observed.count(frame.frame) != 0 ? left_out : without_points);
+    ++(observed.count(frame.frame) != 0 ? left_out : without_points[line_of(frame.frame)]);
   }
   std::vector<std::string> lines;
-  if (without_points > 0) {
-    lines.push_back(fmt::format(
-        "{} frames in which no point was followed: too plain, too blurred, or not decoded",
-        without_points));
+  for (std::size_t why = 0; why < without_points.size(); ++why) {
+    if (without_points[why] > 0)
+      lines.push_back(fmt::format("{} frames {}", without_points[why], kUntrackedLines[why]));
   }
   if (left_out > 0) {
     lines.push_back(fmt::format(

@@ -4,12 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
-#include <limits>
 #include <numeric>
-#include <tuple>
-#include <unordered_map>
-#include <unordered_set>
 #include <utility>
 
 #include "edge_app/pipeline/stale_repeats.h"
@@ -162,79 +157,6 @@ void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
   options->telemetry_stamps = polled && square_widths > 0     ? StampNoise::kOwnTimes
                               : noise.telemetry_stamp_sigma_s ? StampNoise::kSymmetric
                                                               : StampNoise::kOneSided;
-}
-
-std::vector<CalibrationObservation> without_shared_pixels(
-    std::vector<CalibrationObservation> observations) {
-  std::unordered_map<std::int64_t, double> information;  // of each landmark, 1/px^2
-  for (const CalibrationObservation& seen : observations)
-    information[seen.landmark] += 1 / (seen.sigma_px * seen.sigma_px);
-  const auto rank = [&information](const CalibrationObservation& seen) {
-    return std::make_tuple(seen.frame, -information.at(seen.landmark), seen.landmark);
-  };
-  std::sort(observations.begin(), observations.end(),
-            [&rank](const CalibrationObservation& a, const CalibrationObservation& b) {
-              return rank(a) < rank(b);
-            });
-  // In their own memory: there may be 100,000 of them.
-  auto kept = observations.begin();
-  auto of_frame = kept;
-  for (const CalibrationObservation& seen : observations) {
-    if (kept != observations.begin() && std::prev(kept)->frame != seen.frame) of_frame = kept;
-    if (std::none_of(of_frame, kept, [&seen](const CalibrationObservation& better) {
-          return std::hypot(seen.u_px - better.u_px, seen.v_px - better.v_px) < kSharedPixels_px;
-        })) {
-      *kept++ = seen;
-    }
-  }
-  observations.erase(kept, observations.end());
-  return observations;
-}
-
-std::vector<CalibrationObservation> choose_tracks(std::vector<CalibrationObservation> observations,
-                                                  std::size_t max_observations) {
-  observations = without_shared_pixels(std::move(observations));
-  struct Track {
-    std::int64_t landmark = 0;
-    std::size_t count = 0;
-    double left = std::numeric_limits<double>::infinity();
-    double top = std::numeric_limits<double>::infinity();
-    double right = -std::numeric_limits<double>::infinity();
-    double bottom = -std::numeric_limits<double>::infinity();
-    [[nodiscard]] double extent() const { return std::hypot(right - left, bottom - top); }
-  };
-  std::unordered_map<std::int64_t, Track> all;
-  for (const CalibrationObservation& seen : observations) {
-    Track& track = all[seen.landmark];
-    track.landmark = seen.landmark;
-    ++track.count;
-    track.left = std::min(track.left, seen.u_px);
-    track.right = std::max(track.right, seen.u_px);
-    track.top = std::min(track.top, seen.v_px);
-    track.bottom = std::max(track.bottom, seen.v_px);
-  }
-  std::vector<Track> tracks;
-  for (const auto& [landmark, track] : all) {
-    if (track.count >= kMinSightings) tracks.push_back(track);
-  }
-  // The second criterion makes the choice the same each time.
-  std::sort(tracks.begin(), tracks.end(), [](const Track& a, const Track& b) {
-    return a.extent() != b.extent() ? a.extent() > b.extent() : a.landmark < b.landmark;
-  });
-  std::unordered_set<std::int64_t> chosen;
-  std::size_t count = 0;
-  for (const Track& track : tracks) {
-    count += track.count;
-    if (count > max_observations) break;
-    chosen.insert(track.landmark);
-  }
-  const auto is_left_out = [&chosen](const CalibrationObservation& seen) {
-    return chosen.count(seen.landmark) == 0;
-  };
-  observations.erase(std::remove_if(observations.begin(), observations.end(), is_left_out),
-                     observations.end());
-  observations.shrink_to_fit();
-  return observations;
 }
 
 }  // namespace alidade

@@ -1,5 +1,5 @@
 #pragma once
-// From the stamps of frames and samples, and from tracks, to what calibrate() takes; for a recording as for the
+// From the stamps of frames and samples to what calibrate() takes; for a recording as for the
 // calibration thread.
 //   clocks  Frames are counted by their sequence numbers, else by sender times that lie on a steady grid,
 //           else by their stamps. Telemetry likewise (sequence, device time); samples that were polled have
@@ -11,7 +11,6 @@
 //   restarts  A sender's clock begins anew after a reconnection: the longest part without one is used.
 // Pure functions; they allocate.
 
-#include <cstddef>
 #include <string>
 #include <vector>
 
@@ -31,20 +30,5 @@ void add_frames(std::vector<FrameStamp> stamps, CalibrationInput* input,
                 CalibrationOptions* options, std::vector<std::string>* remarks);
 void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
                    CalibrationOptions* options, std::vector<std::string>* remarks);
-
-// Two landmarks may be one corner, seen in two octaves: the noise of its pixels is in both, which are then no two
-// observations (docs/calibration.md). Of those of a frame that lie closer than this one is left, that of the landmark
-// with the most information; by frame.
-inline constexpr double kSharedPixels_px = 8;
-[[nodiscard]] std::vector<CalibrationObservation> without_shared_pixels(
-    std::vector<CalibrationObservation> observations);
-
-// Leaves what an adjustment can use in reasonable time: without shared pixels, landmarks seen kMinSightings times or
-// more, and of these, if there are more than max_observations, those that moved farthest through the image.
-inline constexpr int kMinSightings = 5;
-inline constexpr std::size_t kMaxObservations = 30000;
-[[nodiscard]] std::vector<CalibrationObservation> choose_tracks(
-    std::vector<CalibrationObservation> observations,
-    std::size_t max_observations = kMaxObservations);
 
 }  // namespace alidade

@@ -12,6 +12,7 @@
 #include "core/calibration/held_out.h"
 #include "core/calibration/partial_inverse.h"
 #include "edge_app/pipeline/calibration_streams.h"
+#include "edge_app/pipeline/track_choice.h"
 
 namespace alidade {
 namespace {

@@ -9,6 +9,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "edge_app/output/svg_plot.h"
 #include "test/support/simulated_recording.h"
@@ -25,12 +26,13 @@ struct Calibrated {
   }
   [[nodiscard]] std::string report(const std::string& name = "recording") const {
     return calibration_report(
-        {name, input, options, result, remarks, "1.2.3", "2026-03-01 12:00 UTC"});
+        {name, input, options, result, remarks, "1.2.3", "2026-03-01 12:00 UTC", untracked});
   }
   CalibrationInput input;
   CalibrationOptions options;
   CalibrationResult result;
   std::vector<std::string> remarks;
+  std::optional<UntrackedFrames> untracked;
 };
 
 std::size_t count(const std::string& text, const std::string& part) {
@@ -79,7 +81,7 @@ TEST(CalibrationReport, ShowsAndExplainsFramesThatWereNotUsed) {
   }
   const std::string page = run.report();
   EXPECT_THAT(page, HasSubstr(fmt::format("frames used, of {}", run.input.frames.size())));
-  EXPECT_THAT(page, HasSubstr("<li>29 frames in which no point was followed"));
+  EXPECT_THAT(page, HasSubstr("<li>29 frames of which tracks.csv has no point"));
   EXPECT_THAT(page, HasSubstr("<li>1 frames of whose points none was used"));
   EXPECT_THAT(page, HasSubstr(fmt::format("<li>no frame from {:.2f} to {:.2f} s",
                                           begin_s - used[0].time_s, end_s - used[0].time_s)));
@@ -90,6 +92,36 @@ TEST(CalibrationReport, ShowsAndExplainsFramesThatWereNotUsed) {
   EXPECT_EQ(count(page, "<path class=\"line ink\" d=\"M") -
                 count(Calibrated{test::Simulation()}.report(), "<path class=\"line ink\" d=\"M"),
             1U);
+}
+
+// Each of them, and no other: a frame that the limit left out is neither plain nor blurred.
+TEST(CalibrationReport, NamesWhatLeftAFrameWithoutATrack) {
+  Calibrated run{test::Simulation()};
+  std::vector<FrameResult>& used = run.result.frames;
+  const std::vector<Untracked> reasons = {Untracked::kNoPicture, Untracked::kNoTelemetry,
+                                          Untracked::kNoPoint, Untracked::kTooShort,
+                                          Untracked::kBeyondLimit};
+  const std::vector<const char*> lines = {
+      "frames whose picture is missing or could not be decoded", "frames outside the telemetry",
+      "frames in which no point was followed",
+      "frames whose points were followed through fewer than 5 frames",
+      "frames whose points were left out, as more than 30000 observations take too long"};
+  for (std::size_t why = 0; why < reasons.size(); ++why) {
+    SCOPED_TRACE(lines[why]);
+    Calibrated one = run;
+    one.result.frames.erase(one.result.frames.begin() + 61, one.result.frames.begin() + 68);
+    std::set<std::int64_t> without;
+    for (std::size_t i = 61; i < 68; ++i) without.insert(used[i].frame);
+    one.untracked.emplace();
+    for (const std::int64_t frame : without) (*one.untracked)[frame] = reasons[why];
+    for (CalibrationObservation& seen : one.input.observations) {
+      if (without.count(seen.frame) > 0) seen.frame = -1;
+    }
+    const std::string page = one.report();
+    for (std::size_t other = 0; other < lines.size(); ++other) {
+      EXPECT_EQ(count(page, std::string("<li>7 ") + lines[other]), other == why ? 1U : 0U);
+    }
+  }
 }
 
 TEST(CalibrationReport, LoadsNothingAndRunsNothing) {

@@ -156,46 +156,6 @@ TEST(CalibrationStreams, TimesBesideTheirGridAreNotCounted) {
   EXPECT_EQ(counts_of({0, 0.1, 0.2, 0.3 - 0.026, 0.4, 0.5, 0.6}), none) << "before its place";
 }
 
-// |sightings| of each landmark, the first of which moves farthest.
-std::vector<CalibrationObservation> tracks_of(const std::vector<int>& sightings) {
-  std::vector<CalibrationObservation> all;
-  for (std::size_t l = 0; l < sightings.size(); ++l) {
-    for (int f = 0; f < sightings[l]; ++f) {
-      const auto name = static_cast<std::int64_t>(l);
-      all.push_back({f, name, f * (10.0 - static_cast<double>(l)),
-                     2 * kSharedPixels_px * static_cast<double>(l), 0.3});
-    }
-  }
-  return all;
-}
-
-TEST(CalibrationStreams, ATrackOfJustEnoughSightingsIsUsed) {
-  EXPECT_EQ(choose_tracks(tracks_of({kMinSightings - 1, kMinSightings}), 100).size(),
-            static_cast<std::size_t>(kMinSightings));
-}
-
-TEST(CalibrationStreams, AsManyObservationsAsAllowedAreUsed) {
-  EXPECT_EQ(choose_tracks(tracks_of({10, 10, 10}), 20).size(), 20U);
-  EXPECT_EQ(choose_tracks(tracks_of({10, 10, 10}), 19).size(), 10U);
-}
-
-// Landmark 2 is known best; 1 comes as close to it as shared pixels and leaves again; 3 is in another frame.
-TEST(CalibrationStreams, PixelsThatTwoLandmarksShareAreSeenOnce) {
-  const double near = kSharedPixels_px - 0.1;
-  const double far = kSharedPixels_px + 0.1;
-  std::vector<CalibrationObservation> all = {{1, 1, 100 + near, 50, 0.1}, {1, 2, 100, 50, 0.04},
-                                             {2, 1, 100, 50 - far, 0.1},  {2, 2, 100, 50, 0.2},
-                                             {3, 1, 90, 40, 0.1},         {3, 2, 93, 36, 0.2},
-                                             {4, 3, 93, 36, 0.2}};
-  std::vector<std::pair<std::int64_t, std::int64_t>> left;
-  for (const auto& seen : without_shared_pixels(all)) left.emplace_back(seen.frame, seen.landmark);
-  const std::vector<std::pair<std::int64_t, std::int64_t>> expected = {
-      {1, 2}, {2, 2}, {2, 1}, {3, 2}, {4, 3}};
-  EXPECT_EQ(left, expected);
-  for (CalibrationObservation& seen : all) seen.frame = 7 - seen.frame;
-  EXPECT_EQ(without_shared_pixels(all).size(), expected.size()) << "in any order";
-}
-
 TEST(CalibrationStreams, NothingIsNothing) {
   const Told told({});
   EXPECT_TRUE(told.input.telemetry.empty());
