@@ -116,23 +116,29 @@ void judge_bounds(TelemetryReport* report, const TelemetryNeeds& needs) {
 
 void judge_zoom(TelemetryReport* report, const TelemetryNeeds& needs) {
   const std::string where = "pan/tilt " + needs.source + ": ";
-  if (report->other_zoom) {
-    add_advice(
-        &report->findings,
-        fmt::format("{}the zoom changed from {} to {}; each zoom has a calibration of its own, "
-                    "none while it changes: hold it, or widen calibration.zoom_tolerance",
-                    where, *report->other_zoom, *report->zoom));
+  if (report->other_zoom && !needs.has_zoom_curve) {
+    add_advice(&report->findings,
+               fmt::format("{}the zoom changed from {} to {}; each zoom has a calibration of its "
+                           "own, none while it changes: hold it",
+                           where, *report->other_zoom, *report->zoom));
   }
   if (!report->zoom || !needs.zoom ||
-      std::abs(*report->zoom - *needs.zoom) <= needs.zoom_tolerance) {
+      std::abs(*report->zoom - *needs.zoom) <= report->zoom_jitter.tolerance) {
     return;
   }
-  report->findings.push_back(
-      {needs.makes_calibrations ? Severity::kAdvice : Severity::kProblem,
-       fmt::format(
-           "{}the zoom is {}, but the calibration is for {}; set the camera's zoom back, or "
-           "calibrate at this one",
-           where, *report->zoom, *needs.zoom)});
+  const std::string zooms = needs.zooms.empty() ? fmt::format("{}", *needs.zoom) : needs.zooms;
+  if (needs.makes_calibrations) {
+    add_advice(&report->findings,
+               fmt::format("{}the zoom is {}, but the calibration is for {}; run has no direction "
+                           "here until it has calibrated, for which the camera has to pan and "
+                           "tilt; or set the camera's zoom back",
+                           where, *report->zoom, zooms));
+  } else {
+    add_problem(&report->findings,
+                fmt::format("{}the zoom is {}, but the calibration is for {}; set the camera's "
+                            "zoom back, or calibrate at this one",
+                            where, *report->zoom, zooms));
+  }
 }
 
 std::string degrees(const AxisReport& axis, const char* name) {
@@ -164,6 +170,8 @@ TelemetryReport check_telemetry(const std::vector<PanTiltSample>& samples,
                     needs.source, report.useless, report.samples));
   }
   if (usable.empty()) return report;
+  report.zoom_jitter = steady_zoom(needs.zoom_tolerance, &usable);
+  report.lens_at_zoom = needs.lens_at_zoom;
   std::vector<double> intervals;
   std::vector<double> bounds;
   std::vector<ClockedStamp> stamps;
@@ -177,7 +185,7 @@ TelemetryReport check_telemetry(const std::vector<PanTiltSample>& samples,
     stamps.push_back(
         {sample.latest_time_s, sample.device_time_s, sample.sequence, sample.restarted});
     if (!sample.zoom || !std::isfinite(*sample.zoom)) continue;
-    if (report.zoom && std::abs(*sample.zoom - *report.zoom) > needs.zoom_tolerance) {
+    if (report.zoom && std::abs(*sample.zoom - *report.zoom) > report.zoom_jitter.tolerance) {
       report.other_zoom = report.zoom;
     }
     report.zoom = sample.zoom;
@@ -243,9 +251,15 @@ ReportLines describe(const TelemetryReport& report) {
                                                     : ""));
   lines.emplace_back("quantum", step(report.pan, "pan") + ", " + step(report.tilt, "tilt"));
   if (report.zoom) {
-    lines.emplace_back("zoom", report.other_zoom ? fmt::format("{}, changed from {}", *report.zoom,
-                                                               *report.other_zoom)
-                                                 : fmt::format("{}, unchanged", *report.zoom));
+    std::string zoom = report.other_zoom
+                           ? fmt::format("{}, changed from {}", *report.zoom, *report.other_zoom)
+                           : fmt::format("{}, unchanged", *report.zoom);
+    if (report.zoom_jitter.sigma > 0) {
+      zoom += fmt::format("; jitters by {:.2g}, what differs by up to {:.2g} is one zoom",
+                          report.zoom_jitter.sigma, report.zoom_jitter.tolerance);
+    }
+    if (!report.lens_at_zoom.empty()) zoom += "; " + report.lens_at_zoom;
+    lines.emplace_back("zoom", zoom);
   }
   if (report.clock.kind != StampKind::kArrival) {
     lines.emplace_back("clock filter", describe(report.clock));

@@ -21,6 +21,7 @@
 #include "edge_app/check/clock_check.h"
 #include "edge_app/check/finding.h"
 #include "edge_app/check/spread.h"
+#include "edge_app/pipeline/steady_samples.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 
 namespace alidade {
@@ -33,10 +34,14 @@ struct TelemetryNeeds {
   double max_extrapolation_s = 0.25;  // TelemetryLimits
   double angle_sigma_rad = 1e-4;      // TelemetryNoise, as run will take them
   double resolution_rad = 0;
-  double focal_length_px = 0;      // 0: unknown
-  double clock_offset_s = 0;       // images are looked up so much later
-  std::optional<double> zoom;      // that the calibration is for
-  double zoom_tolerance = 0;       // device units
+  double focal_length_px = 0;  // 0: unknown
+  double clock_offset_s = 0;   // images are looked up so much later
+  std::optional<double> zoom;  // that the calibration is for
+  std::string zooms;           // the same in words, with those of its zoom curve
+  std::string lens_at_zoom;    // what is known of the lens at the zoom that was told last
+  bool has_zoom_curve = false;
+  // Device units within which two zoom readings are one; none: as their jitter shows.
+  std::optional<double> zoom_tolerance;
   bool makes_calibrations = true;  // run calibrates at another zoom
   bool landmarks = true;           // OE mode
 };
@@ -64,8 +69,10 @@ struct TelemetryReport {
   double longest_change_s = 0;  // from an angle's first sample to the next angle
   AxisReport pan;
   AxisReport tilt;
-  std::optional<double> zoom;        // last told
+  std::optional<double> zoom;        // last told, without jitter
   std::optional<double> other_zoom;  // that differs from it by more than the tolerance
+  ZoomJitter zoom_jitter;
+  std::string lens_at_zoom;  // as in TelemetryNeeds
   ClockReport clock;
   // Samples as the motion check takes them: finite, in order of time, fresh.
   std::vector<PanTiltSample> fresh;

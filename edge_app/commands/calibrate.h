@@ -10,7 +10,8 @@ namespace alidade {
 struct CalibrateOptions {
   std::vector<std::string> recordings;  // their directories
   std::string directory;                // empty: <recording>/alidade
-  double zoom_tolerance = 0;            // device units within which two readings are one
+  // Device units within which two zoom readings are one; none: as their jitter shows.
+  std::optional<double> zoom_tolerance;
   bool json = false;
   int passes = 2;     // of finding tracks in the video
   std::string prior;  // a lens.yaml; empty: none

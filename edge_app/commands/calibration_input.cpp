@@ -10,10 +10,12 @@
 #include <utility>
 
 #include "core/calibration/zoom_stretches.h"
+#include "core/model/median.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/video_tracks.h"
 #include "edge_app/config/noise_file.h"
 #include "edge_app/pipeline/calibration_streams.h"
+#include "edge_app/pipeline/steady_samples.h"
 #include "platform/storage/recording.h"
 
 namespace alidade {
@@ -49,6 +51,18 @@ std::vector<ZoomReading> zoom_readings(const std::vector<PanTiltSample>& telemet
     if (sample.zoom) readings.push_back({sample.latest_time_s, *sample.zoom});
   }
   return readings;
+}
+
+// Where the first reading is not yet that of the rest.
+void set_levels(const std::vector<ZoomReading>& readings, std::vector<ZoomStretch>* stretches) {
+  for (ZoomStretch& stretch : *stretches) {
+    std::vector<double> zooms;
+    for (const ZoomReading& reading : readings) {
+      if (reading.time_s >= stretch.begin_s && reading.time_s <= stretch.end_s)
+        zooms.push_back(reading.zoom);
+    }
+    stretch.zoom = median(std::move(zooms));
+  }
 }
 
 struct Span {
@@ -124,7 +138,7 @@ void fill(Tables tables, CalibrationJob* job) {
 }  // namespace
 
 std::vector<CalibrationJob> load_calibration_jobs(const std::string& directory,
-                                                  double zoom_tolerance) {
+                                                  std::optional<double> zoom_tolerance) {
   const auto require = [](bool ok, const std::string& error) {
     if (!ok) throw CommandError(kExitUsage, error);
   };
@@ -164,21 +178,30 @@ std::vector<CalibrationJob> load_calibration_jobs(const std::string& directory,
     require(read_tracks_csv(directory, &tables.tracks, &error), error);
     check_size(directory, info, tables.tracks);
   }
+  const ZoomJitter jitter = steady_zoom(zoom_tolerance, &tables.telemetry);
+  if (jitter.sigma > 0) {
+    job.remarks.push_back(
+        fmt::format("telemetry.csv: the zoom reading jitters by {:.2g} (one standard deviation): "
+                    "what differs by up to {:.2g} is taken for one zoom; --zoom-tolerance says "
+                    "otherwise",
+                    jitter.sigma, jitter.tolerance));
+  }
   const std::vector<ZoomReading> readings = zoom_readings(tables.telemetry);
-  const std::vector<ZoomStretch> all = find_zoom_stretches(readings, {zoom_tolerance});
+  const std::vector<ZoomStretch> all = find_zoom_stretches(readings, {jitter.tolerance});
   if (all.size() <= 1) {
     if (!all.empty()) job.zoom = all.front().zoom;
     fill(tables, &job);
     return {job};
   }
-  const std::vector<ZoomStretch> stretches = find_zoom_stretches(
-      readings, {zoom_tolerance, ZoomStretchOptions().glitch_s, kLeastStretch_s});
-  require(!stretches.empty(),
-          fmt::format(
-              "{}: the zoom reading never stands still for {:g} s; dwell at each zoom for "
-              "10 s and more while the camera pans and tilts{}",
-              directory, kLeastStretch_s,
-              zoom_tolerance > 0 ? "" : ", or give --zoom-tolerance to a reading that flickers"));
+  std::vector<ZoomStretch> stretches = find_zoom_stretches(
+      readings, {jitter.tolerance, ZoomStretchOptions().glitch_s, kLeastStretch_s});
+  require(
+      !stretches.empty(),
+      fmt::format("{}: the zoom reading never stands still for {:g} s; dwell at each zoom for "
+                  "10 s and more while the camera pans and tilts{}",
+                  directory, kLeastStretch_s,
+                  zoom_tolerance ? "" : ", or give --zoom-tolerance to a reading that flickers"));
+  if (jitter.sigma > 0) set_levels(readings, &stretches);
   if (stretches.size() == 1) {
     job.remarks.push_back(fmt::format("the zoom moves: only the {:.0f} s at reading {:g} are used",
                                       stretches.front().end_s - stretches.front().begin_s,

@@ -6,6 +6,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <cmath>
 #include <cstdio>
 #include <optional>
 #include <string>
@@ -21,9 +23,11 @@
 #include "edge_app/commands/check_measurement.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/lens_prior.h"
+#include "edge_app/commands/live_calibration.h"
 #include "edge_app/commands/live_targets.h"
 #include "edge_app/commands/scene_loading.h"
 #include "edge_app/output/mqtt_connection.h"
+#include "edge_app/pipeline/steady_samples.h"
 
 namespace alidade {
 namespace {
@@ -70,6 +74,42 @@ MotionReport motion_of(const Measured& measured, const VideoReport& video,
   return check_motion(shifts, telemetry.fresh, needs);
 }
 
+std::string zooms_of(const NamedCalibration& calibration) {
+  const ZoomCurve& curve = calibration.zoom_curve;
+  if (!calibration.calibration.zoom) return "";
+  if (curve.empty()) return fmt::format("{}", *calibration.calibration.zoom);
+  // As far as ZoomCurve::at() goes beyond its nodes.
+  const double range = curve.last_reading() - curve.first_reading();
+  return fmt::format("readings {:g} to {:g}, by the zoom curve of {}",
+                     curve.first_reading() - range, curve.last_reading() + range, calibration.name);
+}
+
+// What `run` has at the zoom that was told last; as it began, where it has nothing there.
+struct CalibrationHere {
+  NamedCalibration calibration;
+  std::string lens;  // in words; empty: no zoom is told, or nothing is known there
+};
+
+CalibrationHere calibration_here(const Measured& measured, const Config& config,
+                                 const StartingCalibration& start) {
+  std::vector<PanTiltSample> samples = measured.samples;
+  const ZoomJitter jitter = steady_zoom(config.calibration.zoom_tolerance, &samples);
+  const auto told = std::find_if(samples.rbegin(), samples.rend(), [](const PanTiltSample& sample) {
+    return sample.zoom && std::isfinite(*sample.zoom);
+  });
+  if (told == samples.rend()) return {start.calibration, ""};
+  const auto found = calibration_at(start, *told->zoom, jitter.tolerance);
+  if (!found) return {start.calibration, ""};
+  if (!found->calibrated) return {*found, ""};
+  const Calibration& c = found->calibration;
+  std::string lens = fmt::format(
+      "f is {:.1f} +- {:.2g} px there ({})", c.camera.focal_length,
+      std::sqrt(c.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength))),
+      found->name);
+  if (!found->zoom_curve.empty()) lens = "within the zoom curve; " + lens;
+  return {*found, lens};
+}
+
 TelemetryNeeds telemetry_needs(const Measured& measured, const Config& config,
                                const NamedCalibration& calibration,
                                const OrientationStepOptions& step) {
@@ -84,6 +124,8 @@ TelemetryNeeds telemetry_needs(const Measured& measured, const Config& config,
   needs.focal_length_px = calibration.calibration.camera.focal_length;
   needs.clock_offset_s = calibration.calibrated ? calibration.calibration.clock_offset : 0;
   needs.zoom = calibration.calibration.zoom;
+  needs.has_zoom_curve = !calibration.zoom_curve.empty();
+  needs.zooms = zooms_of(calibration);
   needs.zoom_tolerance = config.calibration.zoom_tolerance;
   needs.makes_calibrations = config.calibration.automatic;
   needs.landmarks = config.realtime.landmarks;
@@ -198,22 +240,27 @@ std::string broker_error(const MqttOptions& options) {
 
 int check_links(const CheckOptions& options) {
   const Config config = require_config(options.config);
-  const NamedCalibration calibration = choose_calibration(config);
-  check_lens_prior(config, calibration.calibration.camera);
+  const StartingCalibration start =
+      load_starting_calibration(config, options.config, CalibrationStore::Use::kLook);
+  // Where run calibrates it has been loaded already.
+  if (!start.calibrating.calibration)
+    check_lens_prior(config, start.calibration.calibration.camera);
   static_cast<void>(require_plane(config));
   static_cast<void>(load_network(config.detectors.onnx));
-  if (!options.json) print_beginning(options.config, calibration);
+  if (!options.json) print_beginning(options.config, start.calibration);
 
   const Measured measured = measure(config, options.duration_s);
+  const auto [calibration, lens] = calibration_here(measured, config, start);
   const OrientationStepOptions step = step_options(config, calibration);
   const Camera<double>& camera = calibration.calibration.camera;
   const VideoNeeds video_needs{measured.video.name, calibration.name, camera.width, camera.height,
                                config.realtime.landmarks};
   const VideoReport video = check_video(measured.frames, measured.counters,
                                         measured.counters_at_start, step.video_clock, video_needs);
+  TelemetryNeeds of_telemetry = telemetry_needs(measured, config, calibration, step);
+  of_telemetry.lens_at_zoom = lens;
   const TelemetryReport telemetry =
-      check_telemetry(measured.samples, measured.delivered_s, step.telemetry_clock,
-                      telemetry_needs(measured, config, calibration, step));
+      check_telemetry(measured.samples, measured.delivered_s, step.telemetry_clock, of_telemetry);
 
   CheckReport report{
       options.config, calibration, measured, video, telemetry, {}, {}, {}, {}, {}, {}, {}};
@@ -226,6 +273,13 @@ int check_links(const CheckOptions& options) {
   const auto add = [&report](const Findings& more) {
     report.findings.insert(report.findings.end(), more.begin(), more.end());
   };
+  if (start.calibrating.calibration && camera.width == 0 && video.width > 0) {
+    add_problem(&report.findings,
+                fmt::format("{}: video.width and video.height are missing: without a calibration, "
+                            "OE mode needs the size of the picture; set width: {} and height: {}, "
+                            "or realtime.mode: PT",
+                            options.config, video.width, video.height));
+  }
   add(video.findings);
   add(measured.images.findings);
   add(report.repeats.findings);

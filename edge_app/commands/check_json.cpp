@@ -139,7 +139,8 @@ std::string check_json(const CheckReport& report) {
   json["calibration"] = {{"name", report.calibration.name},
                          {"calibrated", report.calibration.calibrated},
                          {"focal_length_px", calibration.camera.focal_length},
-                         {"clock_offset_s", calibration.clock_offset}};
+                         {"clock_offset_s", calibration.clock_offset},
+                         {"zoom", or_null(calibration.zoom)}};
   json["video"] = video_json(report);
   json["pan_tilt"] = pan_tilt_json(report);
   json["motion"] = motion_json(report.motion);

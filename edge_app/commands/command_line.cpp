@@ -74,6 +74,14 @@ void add_record(CLI::App& app, int* exit_code) {
   command->callback([options, exit_code] { *exit_code = record_streams(*options); });
 }
 
+void add_zoom_tolerance(CLI::App* command, std::optional<double>* tolerance) {
+  command
+      ->add_option("--zoom-tolerance", *tolerance,
+                   "Zoom readings that differ by no more are one, in units of the device (default: "
+                   "as their jitter shows)")
+      ->check(CLI::NonNegativeNumber);
+}
+
 void add_replay(CLI::App& app, int* exit_code) {
   auto options = std::make_shared<ReplayOptions>();
   CLI::App* command = app.add_subcommand(
@@ -87,6 +95,7 @@ void add_replay(CLI::App& app, int* exit_code) {
       ->add_option("--mode", options->mode,
                    "OE or PT (default: OE if the recording has pictures, PT if not)")
       ->check(CLI::IsMember({"OE", "PT"}));
+  add_zoom_tolerance(command, &options->zoom_tolerance);
   CLI::Option* detections = command->add_option(
       "--detections", options->detections,
       "What a detector found in the frames: JSON Lines as POST /api/v1/detections has them, or - "
@@ -122,11 +131,7 @@ void add_calibrate(CLI::App& app, int* exit_code) {
       ->required();
   command->add_option("-o,--output", options->directory,
                       "Directory for the results (default: DIR/alidade, of several the first's)");
-  command
-      ->add_option("--zoom-tolerance", options->zoom_tolerance,
-                   "Zoom readings that differ by no more are one, in units of the device")
-      ->check(CLI::NonNegativeNumber)
-      ->capture_default_str();
+  add_zoom_tolerance(command, &options->zoom_tolerance);
   command->add_flag("--json", options->json, "The result on stdout as one line of JSON");
   command
       ->add_option(

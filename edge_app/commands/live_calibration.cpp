@@ -9,6 +9,7 @@
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/lens_prior.h"
+#include "edge_app/commands/scene_loading.h"
 
 namespace alidade {
 namespace {
@@ -28,17 +29,16 @@ void set_lens_prior(const Config& config, SelfCalibrationOptions* options) {
   }
 }
 
-}  // namespace
-
-Calibrating begin_calibrating(const Config& config, const std::string& path) {
+Calibrating begin_calibrating(const Config& config, const std::string& path,
+                              CalibrationStore::Use use) {
   Calibrating result;
   SelfCalibrationOptions options;
   const int width = config.video.width;
   const int height = config.video.height;
   if (!config.calibration.file.empty()) {
-    result.store = std::make_unique<CalibrationStore>(config.calibration.file,
-                                                      config.calibration.zoom_tolerance);
-    for (const std::string& line : result.store->load(width, height))
+    result.store = std::make_unique<CalibrationStore>(
+        config.calibration.file, config.calibration.zoom_tolerance.value_or(0));
+    for (const std::string& line : result.store->load(width, height, use))
       spdlog::info("calibration: {}", line);
   }
   const StoredCalibration* stored =
@@ -68,13 +68,14 @@ Calibrating begin_calibrating(const Config& config, const std::string& path) {
   Camera<double>& camera = options.data_sheet.camera;
   camera.width = stored == nullptr ? width : stored->calibration.camera.width;
   camera.height = stored == nullptr ? height : stored->calibration.camera.height;
-  if (camera.width == 0) {
+  // Who only looks sees what size there is.
+  if (camera.width == 0 && use == CalibrationStore::Use::kKeep) {
     throw CommandError(
         kExitUsage, path +
                         ": video.width and video.height are missing: without a calibration, OE "
                         "mode needs the size of the picture; give them, or set realtime.mode: PT");
   }
-  if (config.calibration.automatic && !config.calibration.prior.empty())
+  if (config.calibration.automatic && !config.calibration.prior.empty() && camera.width > 0)
     set_lens_prior(config, &options);
   if (config.pan_tilt.angle_sigma_rad) {
     options.noise.pan_tilt_sigma_rad = std::hypot(
@@ -85,6 +86,42 @@ Calibrating begin_calibrating(const Config& config, const std::string& path) {
   options.automatic = config.calibration.automatic;
   result.calibration = std::make_unique<SelfCalibration>(options, result.store.get());
   return result;
+}
+
+}  // namespace
+
+StartingCalibration load_starting_calibration(const Config& config, const std::string& path,
+                                              CalibrationStore::Use use) {
+  StartingCalibration start;
+  if (!config.realtime.landmarks || is_recording(config) || !has_telemetry(config)) {
+    start.calibration = choose_calibration(config);
+    return start;
+  }
+  start.calibrating = begin_calibrating(config, path, use);
+  const auto first = start.calibrating.calibration->first();
+  start.calibration = {first->calibration, first->calibrated, first->name, first->zoom_curve};
+  start.map = first->map;
+  return start;
+}
+
+std::optional<NamedCalibration> calibration_at(const StartingCalibration& start, double zoom,
+                                               double tolerance) {
+  const NamedCalibration& first = start.calibration;
+  const std::optional<double>& its = first.calibration.zoom;
+  if (!its || std::abs(zoom - *its) <= tolerance) return first;
+  NamedCalibration there = first;
+  CalibrationStore* store = start.calibrating.store.get();
+  if (store != nullptr) {
+    store->set_zoom_tolerance(tolerance);
+    const StoredCalibration* stored = store->find(zoom);
+    if (stored == nullptr) return std::nullopt;
+    there.calibration = stored->calibration;
+    there.name = stored->path;
+    return there;
+  }
+  if (!first.zoom_curve.at(zoom, &there.calibration)) return std::nullopt;
+  there.name = first.name + ", between its zooms";
+  return there;
 }
 
 }  // namespace alidade

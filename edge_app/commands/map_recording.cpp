@@ -6,10 +6,12 @@
 #include <cmath>
 #include <filesystem>
 #include <limits>
+#include <optional>
 
 #include "core/calibration/number_text.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/video_tracks.h"
+#include "edge_app/pipeline/steady_samples.h"
 #include "platform/video/recording_frame_source.h"
 
 namespace alidade {
@@ -152,6 +154,7 @@ MapRecording load_map_recording(const std::string& directory, bool with_telemetr
                      [](const PanTiltSample& a, const PanTiltSample& b) {
                        return a.latest_time_s < b.latest_time_s;
                      });
+    steady_zoom(std::nullopt, &out.telemetry);
   }
   return out;
 }

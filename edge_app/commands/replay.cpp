@@ -200,6 +200,7 @@ int replay_recording(const ReplayOptions& options) {
   if (!load_noise(options.recording, &noise, &error)) throw CommandError(kExitFailed, error);
   const std::unique_ptr<Images> images = open_images(options);
   OrientationStepOptions of_step = step_options(noise, calibration);
+  of_step.zoom_tolerance = options.zoom_tolerance;
   if (images) of_step.oe = oe_options(calibration.calibration.camera);
   // Stamps that scatter to both sides are no arrivals.
   of_step.wait_for_pace = !noise.image_stamp_sigma_s;

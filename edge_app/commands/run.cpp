@@ -101,17 +101,8 @@ void wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport
 int run_live(const RunOptions& options) {
   const Config config = require_config(options.config);
   const std::shared_ptr<const PlaneEstimate> plane = require_plane(config);
-  Calibrating calibrating;
-  NamedCalibration calibration;
-  MapState map;
-  if (config.realtime.landmarks && !is_recording(config) && has_telemetry(config)) {
-    calibrating = begin_calibrating(config, options.config);
-    const auto first = calibrating.calibration->first();
-    calibration = {first->calibration, first->calibrated, first->name, first->zoom_curve};
-    map = first->map;
-  } else {
-    calibration = choose_calibration(config);
-  }
+  auto [calibrating, calibration, map] =
+      load_starting_calibration(config, options.config, CalibrationStore::Use::kKeep);
   spdlog::info("calibration: {}", calibration.name);
   PipelineOptions of_pipeline = pipeline_options(config, calibration);
   of_pipeline.step.map = std::move(map);
@@ -151,8 +142,8 @@ int run_live(const RunOptions& options) {
   sources.summary = [&pipeline] { return pipeline.summary(); };
   sources.zoom_curve = [&pipeline] { return pipeline.zoom_curve(); };
   sources.video_losses = [&video] { return video->counters(); };
-  sources.ask_for_calibration = [&calibrating] {
-    return calibrating.calibration && calibrating.calibration->ask_for_fresh();
+  sources.ask_for_calibration = [self = calibrating.calibration.get()] {
+    return self != nullptr && self->ask_for_fresh();
   };
   sources.plane = plane;
   sources.fit_plane = answer_plane_fit;

@@ -113,8 +113,7 @@ CalibrationConfig read_calibration(YamlSection section, const std::string& path)
   if (const auto file = section.text("file")) calibration.file = path_relative_to(path, *file);
   if (const auto prior = section.text("prior")) calibration.prior = path_relative_to(path, *prior);
   calibration.automatic = section.truth("auto").value_or(calibration.automatic);
-  calibration.zoom_tolerance = section.number("zoom_tolerance", {0, 1e6, "units of the device"})
-                                   .value_or(calibration.zoom_tolerance);
+  calibration.zoom_tolerance = section.number("zoom_tolerance", {0, 1e6, "units of the device"});
   section.finish();
   return calibration;
 }

@@ -64,7 +64,8 @@ struct CalibrationConfig {
   std::string prior;  // a lens.yaml; empty: none
   // Live only: calibrate while the camera moves, and store the result in file.
   bool automatic = true;
-  double zoom_tolerance = 0;  // device units within which a calibration holds
+  // Device units within which two zoom readings are one; none: as their jitter shows (steady_zoom.h).
+  std::optional<double> zoom_tolerance;
 };
 
 struct SceneMapConfig {

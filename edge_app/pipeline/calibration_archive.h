@@ -27,6 +27,9 @@ class CalibrationArchive {
   // the next find() or save().
   [[nodiscard]] virtual const StoredCalibration* find(std::optional<double> zoom) const = 0;
 
+  // Device units within which two zooms are one, from now on.
+  virtual void set_zoom_tolerance(double) {}
+
   // Empty: there is none.
   [[nodiscard]] virtual const ZoomCurve& zoom_curve() const = 0;
 

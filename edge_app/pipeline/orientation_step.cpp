@@ -32,6 +32,7 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
       video_clock_(options.video_clock, options.video_stamp_sigma_s, options.wait_for_pace),
       telemetry_clock_(options.telemetry_clock),
       telemetry_(empty_telemetry(false)),
+      steady_zoom_(options.zoom_tolerance),
       // A stored calibration was made with another connection.
       minimum_delay_sigma_s_(
           options.other_connection && options.calibrated ? options.minimum_delay_sigma_s : 0),
@@ -109,12 +110,8 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
     if (oe_) oe_->forget_pending();
   }
   telemetry_lost_ = false;
-  if (sample.zoom && std::isfinite(*sample.zoom)) {
-    const bool changed = zoom_ != sample.zoom;
-    zoom_ = sample.zoom;
-    if (changed) note_curve_here();
-    if (!zoom_at_adoption_) zoom_at_adoption_ = sample.zoom;
-  }
+  const bool has_zoom = sample.zoom && std::isfinite(*sample.zoom);
+  if (has_zoom) take_zoom(sample.latest_time_s, *sample.zoom);
 
   TelemetrySample timed;
   timed.pan = sample.pan_rad;
@@ -129,7 +126,7 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
     timed.time_s = sample.latest_time_s - width_s / 2;
     timed.time_sigma_s = width_s > 0 ? width_s / std::sqrt(12.0) : options_.telemetry_stamp_sigma_s;
   }
-  if (sample.zoom) zoom_lookup_.add(timed.time_s, *sample.zoom);
+  if (has_zoom) zoom_lookup_.add(timed.time_s, *zoom_);
   // What the buffer refuses (a duplicate, a value that is not finite) it counts, and the records'
   // sigma says the rest.
   static_cast<void>(telemetry_.push(timed));
@@ -183,7 +180,7 @@ OrientationRecord OrientationStep::empty_record() const {
   OrientationRecord record;
   record.calibrated = options_.calibrated && zoom_fits();
   record.camera = pack(options_.calibration);
-  record.zoom = zoom_;
+  record.zoom = told_zoom_;
   return record;
 }
 

@@ -35,6 +35,7 @@
 
 #include "core/model/calibration.h"
 #include "core/model/clock_filter.h"
+#include "core/model/steady_zoom.h"
 #include "core/realtime/image/image_view.h"
 #include "core/realtime/oe_mode/oe_mode.h"
 #include "core/realtime/pt_mode.h"
@@ -78,8 +79,9 @@ struct OrientationStepOptions {
   bool follow_points = false;
   // False: a scene map alone tells where the camera looks. That takes oe and calibrated.
   bool has_telemetry = true;
-  double zoom_tolerance = 0;  // device units within which the calibration holds
-  ZoomCurve zoom_curve;       // for other zooms; may be empty
+  // Device units within which two zoom readings are one; none: as their jitter shows.
+  std::optional<double> zoom_tolerance;
+  ZoomCurve zoom_curve;  // for other zooms; may be empty
   double minimum_delay_sigma_s =
       5e-3;  // by how much a new connection's least delay differs, one standard deviation
 };
@@ -201,7 +203,11 @@ class OrientationStep {
   // Whether that answer, noted, excludes what the reading says.
   void judge_reading(const FrameOrientation& found);
 
-  std::optional<double> zoom_;  // as last reported
+  void take_zoom(double time_s, double reading);
+
+  std::optional<double> told_zoom_;  // as last reported
+  SteadyZoom steady_zoom_;
+  std::optional<double> zoom_;  // the same without jitter
   Calibration read_lens_;       // by the readings, of the frame last added
   // Of OE mode's latest answer, at that frame's time; focal length 0: there is none, or none of use.
   bool reading_excluded_ = false;  // by it

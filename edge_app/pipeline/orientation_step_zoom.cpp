@@ -18,11 +18,24 @@ FocalLength OrientationStep::focal_length() const {
   return options_.zoom_curve.empty() ? FocalLength::kCalibrated : FocalLength::kLearnt;
 }
 
+void OrientationStep::take_zoom(double time_s, double reading) {
+  told_zoom_ = reading;
+  const double zoom = steady_zoom_.add(time_s, reading);
+  const bool changed = zoom_ != zoom;
+  zoom_ = zoom;
+  if (changed) note_curve_here();
+  // What was told until now was that zoom with its jitter.
+  const bool jittered =
+      zoom_at_adoption_ && steady_zoom_.found_now() &&
+      std::abs(*zoom_at_adoption_ - zoom) <= SteadyZoom::kFar * steady_zoom_.sigma();
+  if (!zoom_at_adoption_ || jittered) zoom_at_adoption_ = zoom;
+}
+
 bool OrientationStep::zoom_fits() const {
   const std::optional<double>& wanted =
       options_.calibration.zoom ? options_.calibration.zoom : zoom_at_adoption_;
   return !options_.calibrated || !zoom_ || !wanted ||
-         std::abs(*zoom_ - *wanted) <= options_.zoom_tolerance;
+         std::abs(*zoom_ - *wanted) <= steady_zoom_.tolerance();
 }
 
 void OrientationStep::note_curve_here() {
@@ -35,14 +48,14 @@ void OrientationStep::note_curve_here() {
 
 bool OrientationStep::zoom_moved(double telemetry_time_s) const {
   return options_.calibrated && !options_.zoom_curve.empty() && options_.calibration.zoom &&
-         !zoom_lookup_.stands_at(*options_.calibration.zoom, options_.zoom_tolerance,
+         !zoom_lookup_.stands_at(*options_.calibration.zoom, steady_zoom_.tolerance(),
                                  telemetry_time_s);
 }
 
 bool OrientationStep::look_up_lens(double telemetry_time_s, FrameLens* lens) {
   const double readout_s =
       std::abs(options_.calibration.line_delay) * options_.calibration.camera.height;
-  if (!zoom_lookup_.lens(options_.zoom_curve, telemetry_time_s, readout_s, options_.zoom_tolerance,
+  if (!zoom_lookup_.lens(options_.zoom_curve, telemetry_time_s, readout_s, steady_zoom_.tolerance(),
                          lens)) {
     return false;
   }

@@ -30,6 +30,7 @@ SelfCalibration::SelfCalibration(const SelfCalibrationOptions& options, Calibrat
     : options_(options),
       archive_(archive),
       session_(options.session),
+      steady_zoom_(options.zoom_tolerance),
       zooms_(options.zooms),
       contradiction_(options.contradiction),
       disagreement_(options.disagreement),
@@ -76,7 +77,7 @@ void SelfCalibration::begin_fresh() {
 }
 
 bool SelfCalibration::zoom_fits(const std::optional<double>& wanted) const {
-  return !zoom_ || !wanted || std::abs(*zoom_ - *wanted) <= options_.zoom_tolerance;
+  return !zoom_ || !wanted || std::abs(*zoom_ - *wanted) <= steady_zoom_.tolerance();
 }
 
 bool SelfCalibration::is_calibrated_here() const {

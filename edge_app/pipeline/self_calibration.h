@@ -24,6 +24,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
+#include "core/model/steady_zoom.h"
 #include "core/realtime/image/image_view.h"
 #include "edge_app/pipeline/calibration_archive.h"
 #include "edge_app/pipeline/calibration_feed.h"
@@ -60,8 +61,9 @@ struct SelfCalibrationOptions {
   CalibrationOptions adjustment;  // priors of a first calibration
   KnownCamera camera;             // what is known of it beside them
   CalibrationNoise noise;
-  double zoom_tolerance = 0;  // device units within which a calibration holds
-  bool zooms = false;         // known beforehand; else the second reading tells
+  // Device units within which two zoom readings are one; none: as their jitter shows.
+  std::optional<double> zoom_tolerance;
+  bool zooms = false;  // known beforehand; else the second reading tells
   SessionLimits session;
   CalibrationSchedule schedule;
   CalibrationChecks checks;
@@ -106,6 +108,7 @@ class SelfCalibration {
   void begin_fresh();
   void judge_zoom(const PanTiltSample& sample);
   void take_zoom(double zoom, double changed_s);
+  void take_jitter(double zoom);
   void clock_began_anew();
   void look_for_stored();
   [[nodiscard]] bool is_rejected(const Calibration& calibration) const;
@@ -155,6 +158,7 @@ class SelfCalibration {
     bool clock_holds = true;
   };
 
+  SteadyZoom steady_zoom_;
   std::optional<double> zoom_;
   bool zooms_;  // the camera has more than one zoom
   ZoomNodes nodes_;

@@ -50,6 +50,18 @@ void SelfCalibration::take_zoom(double zoom, double changed_s) {
   begin_anew();
 }
 
+// What was taken for other zooms were this one's readings.
+void SelfCalibration::take_jitter(double zoom) {
+  messages_.push_back(
+      fmt::format("the zoom reading jitters by {:.2g} (one standard deviation): what differs by up "
+                  "to {:.2g} is taken for one zoom; calibration.zoom_tolerance says otherwise",
+                  steady_zoom_.sigma(), steady_zoom_.tolerance()));
+  if (archive_ != nullptr) archive_->set_zoom_tolerance(steady_zoom_.tolerance());
+  zooms_ = options_.zooms || !nodes_.empty();
+  odd_zoom_s_.reset();
+  zoom_ = zoom;
+}
+
 void SelfCalibration::judge_zoom(const PanTiltSample& sample) {
   const double time_s = sample.latest_time_s;
   if (sample.zoom && !std::isfinite(*sample.zoom)) {
@@ -65,14 +77,20 @@ void SelfCalibration::judge_zoom(const PanTiltSample& sample) {
     return;
   }
   last_zoom_s_ = time_s;
-  const double zoom = *sample.zoom;
-  if (zoom_ && std::abs(zoom - *zoom_) <= options_.zoom_tolerance) {
+  const double zoom = steady_zoom_.add(time_s, *sample.zoom);
+  if (steady_zoom_.found_now()) {
+    take_jitter(zoom);
+    return;
+  }
+  if (zoom_ && std::abs(zoom - *zoom_) <= steady_zoom_.tolerance()) {
     if (odd_zoom_s_) {
       say_once(fmt::format(
           "the zoom reading left {} and was back within {:g} s, as no lens can: taken for a glitch",
           *zoom_, options_.schedule.zoom_glitch_s));
     }
     odd_zoom_s_.reset();
+    // The first reading is not yet the level of the rest.
+    if (steady_zoom_.rest() && !is_calibrated_here()) zoom_ = zoom;
     return;
   }
   const bool stood = zoom_ && time_s > zoom_changed_s_ + options_.schedule.zoom_settles_s;

@@ -130,7 +130,9 @@ bool ZoomLookup::lens(const ZoomCurve& curve, double time_s, double readout_s, d
   // As even as calibration() has it, between two readings; beyond them anything up to a stop.
   const bool beyond = time_s > newer.time_s || time_s < older.time_s;
   constexpr double kUneven = 0.3;
-  lens->rate_sigma = (beyond ? 1 : kUneven) * std::abs(lens->rate);
+  // Either reading may be off by half of the tolerance.
+  const double of_readings = tolerance / std::abs(newer.zoom - older.zoom) / std::sqrt(2.0);
+  lens->rate_sigma = std::hypot(beyond ? 1 : kUneven, of_readings) * std::abs(lens->rate);
   return true;
 }
 

@@ -119,15 +119,18 @@ bool find_map(const fs::path& yaml, const std::string& text, fs::path* map, std:
   return !map->empty();
 }
 
-void load_map_beside(const fs::path& yaml, const std::string& text, StoredCalibration* stored,
-                     std::vector<std::string>* lines) {
+constexpr const char* kWouldSetAside = "not used; run would set it aside";
+
+void load_map_beside(const fs::path& yaml, const std::string& text, CalibrationStore::Use use,
+                     StoredCalibration* stored, std::vector<std::string>* lines) {
   fs::path path;
   MapContent content;
   std::string error;
   if (!find_map(yaml, text, &path, &error)) {
     lines->push_back(error);
   } else if (!path.empty() && !load_map(path.string(), stored->calibration, &content, &error)) {
-    lines->push_back(fmt::format("{}; {}", error, set_aside(path)));
+    lines->push_back(fmt::format(
+        "{}; {}", error, use == CalibrationStore::Use::kLook ? kWouldSetAside : set_aside(path)));
   }
   stored->map = std::move(content.map);
 }
@@ -141,7 +144,8 @@ std::string zoom_text(std::optional<double> zoom) {
 CalibrationStore::CalibrationStore(std::string file, double zoom_tolerance)
     : file_(std::move(file)), zoom_tolerance_(std::max(zoom_tolerance, 0.0)) {}
 
-std::vector<std::string> CalibrationStore::load(int width, int height) {
+std::vector<std::string> CalibrationStore::load(int width, int height, Use use) {
+  use_ = use;
   entries_.clear();
   curve_ = {};
   curve_path_.clear();
@@ -164,6 +168,10 @@ std::vector<std::string> CalibrationStore::load(int width, int height) {
   return lines;
 }
 
+std::string CalibrationStore::set_file_aside(const std::string& path) const {
+  return use_ == Use::kLook ? kWouldSetAside : set_aside_with_maps(path);
+}
+
 void CalibrationStore::load_file(const std::string& path, int width, int height,
                                  std::vector<std::string>* lines) {
   std::error_code ignored;
@@ -178,14 +186,13 @@ void CalibrationStore::load_file(const std::string& path, int width, int height,
   ZoomCurve curve;
   if (!read_file(path, &text, &error) ||
       !parse_calibration(text, path, &stored.calibration, &error, &curve)) {
-    lines->push_back(fmt::format("{}; {}", error, set_aside_with_maps(path)));
+    lines->push_back(fmt::format("{}; {}", error, set_file_aside(path)));
     return;
   }
   const Camera<double>& camera = stored.calibration.camera;
   if ((width > 0 && camera.width != width) || (height > 0 && camera.height != height)) {
     lines->push_back(fmt::format("{}: for pictures of {}x{} px, but these have {}x{}; {}", path,
-                                 camera.width, camera.height, width, height,
-                                 set_aside_with_maps(path)));
+                                 camera.width, camera.height, width, height, set_file_aside(path)));
     return;
   }
   const std::optional<double>& zoom = stored.calibration.zoom;
@@ -202,7 +209,7 @@ void CalibrationStore::load_file(const std::string& path, int width, int height,
     lines->push_back(fmt::format("{}: zoom curve from reading {} to {}", path,
                                  curve.first_reading(), curve.last_reading()));
   }
-  load_map_beside(path, text, &stored, lines);
+  load_map_beside(path, text, use_, &stored, lines);
   lines->push_back(fmt::format("{}: calibration for {}, {} landmarks", path, zoom_text(zoom),
                                stored.map.landmarks.size()));
   entries_.push_back({std::move(stored), false});

@@ -28,11 +28,13 @@ class CalibrationStore final : public CalibrationArchive {
   explicit CalibrationStore(std::string file, double zoom_tolerance = 0);
 
   // Reads all there are; width, height: px of the video, 0: any size. Returns lines for the log: what
-  // was loaded, what was set aside and why.
-  [[nodiscard]] std::vector<std::string> load(int width, int height);
+  // was loaded, what was set aside and why. kLook: no file is touched.
+  enum class Use { kKeep, kLook };
+  [[nodiscard]] std::vector<std::string> load(int width, int height, Use use = Use::kKeep);
 
   [[nodiscard]] bool empty() const { return entries_.empty(); }
   [[nodiscard]] const StoredCalibration* find(std::optional<double> zoom) const override;
+  void set_zoom_tolerance(double tolerance) override { zoom_tolerance_ = tolerance; }
   [[nodiscard]] const ZoomCurve& zoom_curve() const override { return curve_; }
   [[nodiscard]] bool save(const StoredCalibration& calibration, std::string* error) override;
   [[nodiscard]] bool has_pending() const override;
@@ -46,6 +48,8 @@ class CalibrationStore final : public CalibrationArchive {
     bool pending = false;
   };
 
+  // With the maps of a calibration; says what was done, or would be.
+  [[nodiscard]] std::string set_file_aside(const std::string& path) const;
   void load_file(const std::string& path, int width, int height, std::vector<std::string>* lines);
   [[nodiscard]] std::optional<std::size_t> nearest(std::optional<double> zoom) const;
   [[nodiscard]] std::string free_path(const StoredCalibration& stored) const;
@@ -53,6 +57,7 @@ class CalibrationStore final : public CalibrationArchive {
 
   std::string file_;
   double zoom_tolerance_;
+  Use use_ = Use::kKeep;
   std::vector<Entry> entries_;
   ZoomCurve curve_;
   std::string curve_path_;             // of the file that holds it

@@ -39,7 +39,7 @@ EnduranceConsumer::EnduranceConsumer(const OrientationStepOptions& step,
       width_(step.calibration.camera.width),
       height_(step.calibration.camera.height) {
   if (!calibrating) return;
-  archive_ = std::make_unique<MemoryArchive>(calibrating->zoom_tolerance);
+  archive_ = std::make_unique<MemoryArchive>(calibrating->zoom_tolerance.value_or(0));
   calibrating_ = std::make_unique<SelfCalibration>(*calibrating, archive_.get());
 }
 

@@ -4,13 +4,18 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <nlohmann/json.hpp>
+#include <random>
+#include <sstream>
 #include <string>
 #include <vector>
 
 #include "edge_app/storage/calibration_file.h"
+#include "platform/system/whole_file.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/edge_app/recording_files.h"
 #include "test/support/temporary_directory.h"
@@ -19,6 +24,7 @@ namespace alidade {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 namespace fs = std::filesystem;
 
@@ -44,6 +50,57 @@ class CalibrateZooms : public ::testing::Test {
     const CalibrationInput input = test::simulate(at_zoom(reading, seed));
     test::write_recording(folder, input);
     test::write_telemetry(folder, input, 1, std::vector<double>(input.telemetry.size(), reading));
+    return folder.path();
+  }
+  // One recording that dwells for 12 s at each zoom and moves for two seconds between. told: the reading, of a zoom that
+  // was reached upwards (1) or downwards (-1).
+  std::string record_dwells(const std::string& name, const std::vector<double>& zooms,
+                            const std::function<double(double, double)>& told) {
+    constexpr int kMoving = 60;  // telemetry samples
+    CalibrationInput all;
+    std::vector<double> readings;
+    double direction = 1;
+    for (std::size_t i = 0; i < zooms.size(); ++i) {
+      const CalibrationInput dwell = test::simulate(at_zoom(zooms[i], 4 + i));
+      const double shift_s =
+          14.0 * static_cast<double>(i);  // telemetry is a second longer at either end
+      if (i == 0) {
+        all = dwell;
+        all.frames.clear();
+        all.telemetry.clear();
+        all.observations.clear();
+      } else {
+        direction = zooms[i] > zooms[i - 1] ? 1 : -1;
+        for (int k = 1; k < kMoving; ++k) {
+          CalibrationTelemetry moving = all.telemetry.back();
+          moving.stamp_s += 1.0 / 30;
+          ++*moving.sequence;
+          all.telemetry.push_back(moving);
+          const double part = k / static_cast<double>(kMoving);
+          readings.push_back(told(zooms[i - 1] + part * (zooms[i] - zooms[i - 1]), direction));
+        }
+      }
+      for (CalibrationTelemetry sample : dwell.telemetry) {
+        sample.stamp_s += shift_s;
+        *sample.sequence += std::lround(shift_s * 30);
+        all.telemetry.push_back(sample);
+        readings.push_back(told(zooms[i], direction));
+      }
+      for (CalibrationFrame frame : dwell.frames) {
+        frame.frame += static_cast<std::int64_t>(1000 * i);
+        frame.stamp_s += shift_s;
+        *frame.sequence += std::lround(shift_s * 15);
+        all.frames.push_back(frame);
+      }
+      for (CalibrationObservation seen : dwell.observations) {
+        seen.frame += static_cast<std::int64_t>(1000 * i);
+        seen.landmark += static_cast<std::int64_t>(100000 * i);
+        all.observations.push_back(seen);
+      }
+    }
+    const TemporaryDirectory& folder = folders_[name];
+    test::write_recording(folder, all);
+    test::write_telemetry(folder, all, 1, readings);
     return folder.path();
   }
   [[nodiscard]] std::string output() const { return output_.path() + "/out"; }
@@ -103,44 +160,99 @@ TEST_F(CalibrateZooms, ManyRecordingsBecomeOneCurve) {
 
 // One recording: it dwells, zooms in during two seconds, and dwells again.
 TEST_F(CalibrateZooms, DwellsOfOneRecordingBecomeOne) {
-  constexpr double kMovement_s = 2;
-  CalibrationInput all = test::simulate(at_zoom(0, 4));
-  CalibrationInput second = test::simulate(at_zoom(1, 5));
-  std::vector<double> zoom(all.telemetry.size(), 0);
-  const double shift_s = 12 + kMovement_s;  // telemetry is a second longer at either end
-  const auto telemetry = static_cast<std::int64_t>(std::lround(shift_s * 30));
-  const auto frames = static_cast<std::int64_t>(std::lround(shift_s * 15));
-  for (int i = 1; i < 30 * kMovement_s; ++i) {
-    CalibrationTelemetry moving = all.telemetry.back();
-    moving.stamp_s += 1.0 / 30;
-    ++*moving.sequence;
-    all.telemetry.push_back(moving);
-    zoom.push_back(i / (30 * kMovement_s));
-  }
-  for (CalibrationTelemetry sample : second.telemetry) {
-    sample.stamp_s += shift_s;
-    *sample.sequence += telemetry;
-    all.telemetry.push_back(sample);
-    zoom.push_back(1);
-  }
-  for (CalibrationFrame frame : second.frames) {
-    frame.frame += 1000;
-    frame.stamp_s += shift_s;
-    *frame.sequence += frames;
-    all.frames.push_back(frame);
-  }
-  for (CalibrationObservation seen : second.observations) {
-    seen.frame += 1000;
-    seen.landmark += 100000;
-    all.observations.push_back(seen);
-  }
-  const TemporaryDirectory& folder = folders_["dwells"];
-  test::write_recording(folder, all);
-  test::write_telemetry(folder, all, 1, zoom);
-  const Result result = calibrate({folder.path()});
+  const Result result =
+      calibrate({record_dwells("dwells", {0, 1}, [](double zoom, double) { return zoom; })});
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   expect_curve_of({0, 1});
   EXPECT_THAT(result.output, HasSubstr("line_delay"));
+  EXPECT_THAT(result.errors, Not(HasSubstr("jitters")));
+}
+
+// A device of 10,000 readings whose potentiometer jitters by one of them and has play; one that tells 0 to 1; one whose
+// reading lies between two steps.
+class JitteringZoom : public CalibrateZooms, public ::testing::WithParamInterface<int> {};
+
+TEST_P(JitteringZoom, CostsNoDwell) {
+  struct Device {
+    double scale;  // of a reading of at_zoom(), which is a factor of two
+    double offset;
+    double sigma;
+    double play;
+    double step;
+  };
+  const std::vector<Device> devices = {
+      {2000, 3000, 1, 5, 1}, {0.2, 0.3, 3e-4, 0, 0}, {2000.25, 3000.5, 0.3, 0, 1}};
+  const Device& d = devices[static_cast<std::size_t>(GetParam())];
+  std::mt19937 random(7);
+  std::normal_distribution<double> jitter(0, d.sigma);
+  const std::vector<double> zooms = {0, 1, 0.5};
+  const Result result =
+      calibrate({record_dwells("dwells", zooms,
+                               [&](double zoom, double direction) {
+                                 const double told = d.offset + d.scale * zoom +
+                                                     direction * d.play / 2 + jitter(random);
+                                 return d.step > 0 ? d.step * std::round(told / d.step) : told;
+                               }),
+                 "--json"});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.errors, HasSubstr("the zoom reading jitters by"));
+  EXPECT_THAT(result.errors, Not(HasSubstr("only the")));
+  Calibration any;
+  ZoomCurve curve;
+  std::string error;
+  ASSERT_TRUE(load_calibration(output() + "/calibration.yaml", &any, &error, &curve)) << error;
+  ASSERT_EQ(curve.content().nodes, 3);
+  int at = 0;
+  for (const double zoom : {0.0, 0.5, 1.0}) {
+    const Calibration node = curve.node(at++);
+    EXPECT_NEAR(*node.zoom, d.offset + d.scale * zoom, d.play / 2 + d.sigma + d.step / 2) << zoom;
+    EXPECT_LT(std::abs(node.camera.focal_length - at_zoom(zoom, 1).focal_length),
+              5 * std::sqrt(node.covariance(0, 0)))
+        << zoom;
+  }
+  // All of each dwell but the second at either end, which nobody can tell from the movement.
+  for (int dwell = 1; dwell <= 3; ++dwell) {
+    std::string report;
+    ASSERT_TRUE(
+        read_file(output() + "/report-" + std::to_string(dwell) + ".html", &report, &error));
+    EXPECT_THAT(report, HasSubstr("jitters"));
+  }
+  // The same rule: every frame of a dwell has its direction, with the curve's lens.
+  const Result replayed = run({ALIDADE_EXECUTABLE, "replay", folders_["dwells"].path(),
+                               "--calibration", output() + "/calibration.yaml", "--json"});
+  ASSERT_EQ(replayed.exit_code, 0) << replayed.errors;
+  std::istringstream lines(replayed.output);
+  int frames = 0;
+  int with_direction = 0;
+  for (std::string line; std::getline(lines, line);) {
+    const auto record = nlohmann::json::parse(line);
+    ++frames;
+    with_direction += record["mode"] == "PT" ? 1 : 0;
+  }
+  EXPECT_GE(with_direction, 0.97 * frames) << replayed.errors;
+}
+
+INSTANTIATE_TEST_SUITE_P(Devices, JitteringZoom, ::testing::Values(0, 1, 2));
+
+// Reached from either side a reading differs by the play; the two visits are of one zoom, as near as a lens comes back.
+TEST_F(CalibrateZooms, AReadingThatIsReachedFromEitherSideIsOnTheCurveTwice) {
+  std::mt19937 random(7);
+  std::normal_distribution<double> jitter(0, 1);
+  const Result result =
+      calibrate({record_dwells("dwells", {0, 1, 0}, [&](double zoom, double direction) {
+        return std::round(3000 + 2000 * zoom + 2.5 * direction + jitter(random));
+      })});
+  ASSERT_EQ(result.exit_code, 0) << result.errors;
+  Calibration any;
+  ZoomCurve curve;
+  std::string error;
+  ASSERT_TRUE(load_calibration(output() + "/calibration.yaml", &any, &error, &curve)) << error;
+  for (const double zoom : {0.0, 0.25, 0.5, 1.0}) {
+    ASSERT_TRUE(curve.at(3000 + 2000 * zoom, &any));
+    EXPECT_LT(std::abs(any.camera.focal_length - at_zoom(zoom, 1).focal_length),
+              4 * std::sqrt(any.covariance(0, 0)))
+        << zoom;
+  }
 }
 
 TEST_F(CalibrateZooms, SaysWhatCannotBeOneCurve) {

@@ -346,6 +346,16 @@ TEST_F(CalibrationStoreTest, SetsAsideWhatIsOfAnotherSizeWithItsMap) {
   EXPECT_THAT(files(), Contains(map + ".damaged"));
 }
 
+TEST_F(CalibrationStoreTest, WhoOnlyLooksTouchesNoFile) {
+  put(some(900));
+  const std::set<std::string> before = files();
+  CalibrationStore looking = store();
+  EXPECT_THAT(looking.load(1920, 1080, CalibrationStore::Use::kLook),
+              ElementsAre(HasSubstr("run would set it aside")));
+  EXPECT_TRUE(looking.empty());
+  EXPECT_EQ(files(), before);
+}
+
 TEST_F(CalibrationStoreTest, AnySizeWillDoIfNoneIsGiven) {
   put(some(1000));
   CalibrationStore any = store();

@@ -1,6 +1,7 @@
 // `alidade check` as a person meets it, on recordings of the virtual camera that are played at their pace: a healthy setup,
 // and what goes wrong when one is put together. The virtual camera shares no code with what is tested.
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -15,12 +16,14 @@
 #include <thread>
 #include <vector>
 
+#include "edge_app/storage/calibration_file.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/platform/support/eventually.h"
 #include "test/platform/support/rtp_relay.h"
 #include "test/platform/support/rtp_sender.h"
 #include "test/support/temporary_directory.h"
 #include "test/support/udp_port_pair.h"
+#include "test/support/zoom_nodes.h"
 
 namespace alidade {
 namespace {
@@ -102,6 +105,51 @@ class CheckCommand : public ::testing::Test {
                              focal_length_px + "}\n")};
     arguments.insert(arguments.end(), more.begin(), more.end());
     return alidade(arguments);
+  }
+
+  // Over readings 1000 to 2000; the virtual camera stands at 1625.
+  static ZoomCurve curve_of_camera() {
+    std::vector<Calibration> nodes;
+    for (const double reading : {1000.0, 1250.0, 1500.0, 1750.0, 2000.0}) {
+      Calibration c = test::zoom_calibration(reading);
+      const double scale = 900 / test::zoom_focal_length(1625);
+      c.camera = {scale * c.camera.focal_length, 1, 0, 320, 180, 0, 0};
+      const int f = index(Parameter::kFocalLength);
+      c.covariance(f, f) *= scale * scale;
+      c.line_delay = 75e-6;
+      c.clock_offset = -0.0844;
+      nodes.push_back(c);
+    }
+    ZoomFit fit;
+    std::string error;
+    EXPECT_TRUE(fit_zoom(nodes, {}, &fit, &error)) << error;
+    return fit.curve;
+  }
+  // Of a camera that tells this zoom, calibrated by that curve.
+  Result check_at(double zoom) {
+    if (!fs::exists(path("recording"))) take_healthy();
+    std::istringstream rows(directory_.read("recording/telemetry.csv"));
+    std::ostringstream changed;
+    std::string line;
+    std::getline(rows, line);
+    const std::size_t columns = line.find(",zoom");  // at the end, if any
+    changed << line.substr(0, columns) << ",zoom\n";
+    while (std::getline(rows, line)) {
+      changed << (columns == std::string::npos ? line : line.substr(0, line.rfind(','))) << ','
+              << zoom << "\n";
+    }
+    std::ofstream(path("recording/telemetry.csv")) << changed.str();
+    CalibrationNotes notes;
+    notes.zoom_curve = curve_of_camera();
+    const Calibration first = notes.zoom_curve.node(0);
+    std::string error;
+    EXPECT_TRUE(save_calibration(path("calibration.yaml"), first, notes, &error)) << error;
+    const std::string file = directory_.write(
+        "alidade.yaml",
+        "video: {type: recording, directory: recording}\n"
+        "pan_tilt: {type: recording, directory: recording, angle_sigma_rad: 5.0e-5}\n"
+        "calibration: {file: calibration.yaml, auto: false}\n");
+    return alidade({"check", "--duration", "1", "-c", file});
   }
 
   TemporaryDirectory directory_;
@@ -234,6 +282,22 @@ TEST_F(CheckCommand, SaysThatTheFocalLengthIsAnother) {
   EXPECT_THAT(findings(result.errors),
               ElementsAre(AllOf(StartsWith("alidade: camera.focal_length_px: "),
                                 HasSubstr("set camera.focal_length_px: 9"))));
+}
+
+TEST_F(CheckCommand, InsideTheZoomCurveIsNoOtherZoom) {
+  const Result inside = check_at(1625);
+  EXPECT_EQ(inside.exit_code, 0);
+  EXPECT_THAT(findings(inside.errors), IsEmpty());
+  EXPECT_THAT(inside.output, AllOf(HasSubstr("1625, unchanged; within the zoom curve; f is "),
+                                   HasSubstr("between its zooms")));
+  Calibration there;
+  ASSERT_TRUE(curve_of_camera().at(1625, &there));
+  EXPECT_THAT(inside.output, HasSubstr(fmt::format("f is {:.1f} +- ", there.camera.focal_length)));
+  const Result outside = check_at(4000);
+  EXPECT_EQ(outside.exit_code, 1);
+  EXPECT_THAT(outside.errors,
+              HasSubstr("the zoom is 4000, but the calibration is for readings 0 to 3000, by the "
+                        "zoom curve of "));
 }
 
 TEST_F(CheckCommand, TellsALinkThatIsDead) {

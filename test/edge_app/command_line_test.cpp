@@ -318,6 +318,36 @@ TEST_F(CommandLineTest, RunWithoutCalibratingTakesCalibrationsOfSeveralZooms) {
   EXPECT_THAT(result.errors, AllOf(HasSubstr("zoom 1"), HasSubstr("zoom 2")));
 }
 
+// What run stored under its zoom, without a data sheet.
+TEST_F(CommandLineTest, CheckTakesTheCalibrationThatRunTakes) {
+  const std::string stored = head_.calibration() + "zoom: 1\n";
+  directory_.write("calibration.zoom-1.yaml", stored);
+  const std::string config =
+      live_config(", width: 1920, height: 1080", "calibration: {file: calibration.yaml}\n");
+  const Result check = alidade({"check", "-c", config, "--duration", "0.1"});
+  EXPECT_THAT(check.output,
+              HasSubstr("calibration    " + path("calibration.zoom-1.yaml") + ": 1920x1080 px"));
+  EXPECT_THAT(check.errors,
+              AllOf(Not(HasSubstr("cannot be read")), Not(HasSubstr("no calibration yet"))));
+  // Of another size: run would set it aside, who looks does not.
+  const std::string other =
+      live_config(", width: 640, height: 480",
+                  "camera: {focal_length_px: 30000}\ncalibration: {file: calibration.yaml}\n");
+  const Result of_another_size = alidade({"check", "-c", other, "--duration", "0.1"});
+  EXPECT_THAT(of_another_size.output, HasSubstr("calibration    data sheet: not calibrated"));
+  EXPECT_THAT(of_another_size.errors, HasSubstr("run would set it aside"));
+  EXPECT_EQ(directory_.read("calibration.zoom-1.yaml"), stored);
+  // Nothing at all: the reason is run's.
+  const std::string nothing =
+      live_config(", width: 320, height: 240", "calibration: {file: elsewhere.yaml}\n");
+  for (const char* name : {"run", "check"}) {
+    const Result result = alidade({name, "-c", nothing, "--duration", "0.1"});
+    EXPECT_EQ(result.exit_code, 2) << name;
+    EXPECT_THAT(result.errors, HasSubstr("camera.focal_length_px is missing: " +
+                                         path("elsewhere.yaml") + " holds no calibration"));
+  }
+}
+
 TEST_F(CommandLineTest, CalibrateShutterTakesOneVideo) {
   const std::string live = live_config();
   const auto calibrate = [](std::vector<std::string> arguments) {

@@ -295,6 +295,27 @@ TEST_F(FollowedZoom, AStoredMapTakesThePlaceOfOneThatHasJustBegun) {
   EXPECT_EQ(adopted(useless), RecordMode::kPt) << "taken over, however little there is in it";
 }
 
+// By one of 10,000, as a potentiometer does, and as one that is coarser.
+TEST_F(FollowedZoom, StaysInOeModeWithAReadingThatJitters) {
+  for (const double sigma : {1.0, 3.0}) {
+    SCOPED_TRACE(sigma);
+    begin(3);
+    std::mt19937_64 random(9);
+    std::normal_distribution<double> jitter(0, sigma);
+    const auto told = [&](double t) { return std::round(reading(t) + jitter(random)); };
+    // Until the jitter is known.
+    constexpr int kKnown = 8;
+    int held = 0;
+    for (int k = 0; k < first_of_tele_ + 5; ++k) {
+      const OrientationRecord record = add(k, told);
+      if (k < kKnown) continue;
+      expect_honest(k, record);
+      held += record.mode == RecordMode::kOe ? 1 : 0;
+    }
+    EXPECT_GE(held, 0.95 * (first_of_tele_ + 5 - kKnown));
+  }
+}
+
 // Whatever telemetry's noise has made the map's offset: the curve's optical centre errs between its nodes by several times that noise.
 TEST_F(FollowedZoom, StaysInOeModeWhereTheReadingIsStuckAndSaysSo) {
   const double stuck = reading(0);

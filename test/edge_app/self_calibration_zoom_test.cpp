@@ -5,6 +5,7 @@
 
 #include <cmath>
 #include <filesystem>
+#include <random>
 
 #include "core/calibration/calibration_difference.h"
 #include "edge_app/storage/calibration_store.h"
@@ -51,6 +52,11 @@ class ZoomingCamera : public ::testing::Test {
     s.duration_s = duration_s;
     test::Feed how;
     how.zoom = reading;
+    if (jitter_ > 0) {
+      how.zoom_at = [this, reading](double) {
+        return reading + jitter_ * std::normal_distribution<double>()(random_);
+      };
+    }
     how.from_s = from_s_;
     how.first_frame = first_frame_;
     from_s_ += duration_s + 4;
@@ -64,6 +70,8 @@ class ZoomingCamera : public ::testing::Test {
     return std::log(c.camera.focal_length / zoomed(reading).focal_length);
   }
 
+  double jitter_ = 0;  // sigma of the readings
+  std::mt19937 random_{8};
   double from_s_ = 0;
   std::int64_t first_frame_ = 0;
   SelfCalibration calibration_;
@@ -74,6 +82,28 @@ TEST_F(ZoomingCamera, OneOfOneZoomHasNoNodeAndAnExactCentre) {
   ASSERT_FALSE(published.empty());
   EXPECT_EQ(nodes(published), 0);
   EXPECT_FALSE(published.back().calibration->calibration.has_centre());
+}
+
+// By a 10,000th of a lens that zooms 30 times: one zoom is one, two are two, and two that are half a per cent apart are.
+TEST_F(ZoomingCamera, AReadingThatJittersIsOneZoom) {
+  jitter_ = 0.05;
+  const auto first = dwell(0, zoomed(0));
+  ASSERT_FALSE(first.empty());
+  EXPECT_EQ(nodes(first), 0);
+  EXPECT_FALSE(first.back().calibration->calibration.has_centre()) << "there is no other zoom";
+  const auto messages = calibration_.take_messages();
+  EXPECT_THAT(messages, Contains(HasSubstr("the zoom reading jitters by 0.05")));
+  EXPECT_THAT(messages, Not(Contains(HasSubstr("glitch"))));
+  const auto second = dwell(200, zoomed(200, 4));
+  ASSERT_FALSE(second.empty());
+  ASSERT_EQ(nodes(second), 2);
+  const ZoomCurve& curve = second.back().calibration->zoom_curve;
+  EXPECT_NEAR(*curve.node(0).zoom, 0, jitter_);
+  EXPECT_NEAR(*curve.node(1).zoom, 200, jitter_);
+  const auto beside = dwell(200.7, zoomed(200.7, 5));
+  ASSERT_FALSE(beside.empty());
+  EXPECT_EQ(nodes(beside), 3);
+  EXPECT_NEAR(*beside.back().calibration->calibration.zoom, 200.7, jitter_);
 }
 
 TEST_F(ZoomingCamera, HasACurveFromTheSecondZoomOn) {

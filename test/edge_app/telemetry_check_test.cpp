@@ -196,6 +196,23 @@ TEST(TelemetryCheck, LooksAtTheZoom) {
   samples.back().zoom = 120;
   EXPECT_EQ(check(samples).other_zoom, 100);
   EXPECT_THAT(advice(check(samples).findings), ElementsAre(HasSubstr("changed from 100 to 120")));
+  needed = needs();
+  needed.has_zoom_curve = true;
+  EXPECT_THAT(check(samples, needed).findings, IsEmpty()) << "the curve holds at both";
+}
+
+TEST(TelemetryCheck, TellsJitterOfTheZoomFromAMovement) {
+  auto samples = samples_of(swing);
+  std::mt19937 random(3);
+  std::normal_distribution<double> jitter(0, 1);
+  for (PanTiltSample& sample : samples) sample.zoom = std::round(8171 + jitter(random));
+  TelemetryNeeds needed = needs();
+  needed.zoom = 8172;
+  const TelemetryReport report = check(samples, needed);
+  EXPECT_THAT(report.findings, IsEmpty());
+  EXPECT_FALSE(report.other_zoom);
+  EXPECT_THAT(describe(report),
+              Contains(Pair("zoom", AllOf(HasSubstr("unchanged"), HasSubstr("jitters by 1")))));
 }
 
 TEST(TelemetryCheck, SaysThatIntervalsEndBeforeTheyBegin) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <memory>
+#include <random>
 #include <string>
 #include <vector>
 
@@ -78,6 +79,46 @@ TEST(ZoomStep, AReadingThatIsNoNumberIsLeftOut) {
   EXPECT_EQ(record.mode, RecordMode::kPt);
   EXPECT_EQ(record.status, RecordStatus::kOk);
   EXPECT_EQ(record.camera.zoom, 1500);
+}
+
+// One calibration at one zoom, and none for others: jitter is no other zoom, a movement is; a tolerance that is given counts.
+TEST(ZoomStep, JitterIsNoOtherZoom) {
+  for (const bool says_zoom : {true, false}) {
+    for (const double sigma : {1.0, 3e-4}) {
+      const double level = sigma == 1 ? 8171 : 0.8171;
+      std::mt19937 random(4);
+      std::normal_distribution<double> jitter(0, sigma);
+      const auto told = [&](double zoom) {
+        return sigma == 1 ? std::round(zoom + jitter(random)) : zoom + jitter(random);
+      };
+      OrientationStepOptions options;
+      options.calibration = test::zoom_calibration(1000);
+      options.calibration.zoom.reset();
+      if (says_zoom) options.calibration.zoom = level;
+      options.calibrated = true;
+      auto step = std::make_unique<OrientationStep>(options);
+      int none = 0;
+      double now_s = 0;
+      const auto stand_at = [&](double zoom, int samples) {
+        none = 0;
+        for (int i = 0; i < samples; ++i, now_s += kInterval_s) {
+          step->add_telemetry(sample_at(now_s, told(zoom)));
+          none += frame_at(step.get(), now_s).mode == RecordMode::kNone ? 1 : 0;
+        }
+      };
+      stand_at(level, 40);
+      stand_at(level, 500);
+      EXPECT_EQ(none, 0) << sigma;
+      stand_at(level + 15 * sigma, 100);
+      EXPECT_GE(none, 95) << "half a per cent of the focal length";
+      stand_at(level, 100);
+      EXPECT_LE(none, 5) << sigma;
+      options.zoom_tolerance = 0;
+      step = std::make_unique<OrientationStep>(options);
+      stand_at(level, 500);
+      EXPECT_GE(none, 200) << "as it was asked for";
+    }
+  }
 }
 
 TEST(ZoomStep, HasNoneBeyondTheCurveOrWithoutOne) {
