@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "edge_app/pipeline/capture_clock.h"
 
@@ -33,6 +34,49 @@ void measure_raw_rate(const std::vector<ClockedStamp>& stamps, ClockReport* repo
   report->raw_rate_sigma = slope->deviation / std::sqrt(static_cast<double>(slope->count));
 }
 
+// Quartz keeps 200 millionths, the filter's own limit. Half a percent is what a steady drift of the arrival by 50 ms
+// looks like in 10 s; what is beyond it, and beyond chance, is no clock in seconds.
+bool is_no_clock(const ClockReport& clock) {
+  constexpr double kNoClock = 5e-3;
+  constexpr double kChance = 6;  // standard deviations
+  return clock.raw_rate_error &&
+         std::abs(*clock.raw_rate_error) > kNoClock + kChance * clock.raw_rate_sigma;
+}
+
+// Whether items were left out of which the stamps know nothing: these rise by one step for them all.
+bool do_stamps_count(const std::vector<ClockedStamp>& stamps) {
+  constexpr double kSame_s = 1.5e-4;
+  constexpr double kLeftOut = 1.6;  // steps
+  constexpr double kShare = 0.03;
+  std::vector<double> steps;
+  std::vector<double> intervals;
+  for (std::size_t i = 1; i < stamps.size(); ++i) {
+    steps.push_back(*stamps[i].sender_time_s - *stamps[i - 1].sender_time_s);
+    intervals.push_back(stamps[i].receive_time_s - stamps[i - 1].receive_time_s);
+  }
+  const std::optional<Spread> usual = spread_of(steps);
+  if (!usual) return false;
+  std::size_t even = 0;
+  std::size_t left_out = 0;
+  for (std::size_t i = 0; i < steps.size(); ++i) {
+    if (std::abs(steps[i] - usual->median) > kSame_s) continue;
+    ++even;
+    left_out += intervals[i] > kLeftOut * usual->median ? 1 : 0;
+  }
+  const auto all = static_cast<double>(steps.size());
+  return static_cast<double>(even) > (1 - kShare) * all &&
+         static_cast<double>(left_out) > kShare * all;
+}
+
+// A few in a row without a stamp say nothing of the others.
+StampKind kind_at_end(const std::vector<ClockedStamp>& stamps) {
+  const auto last = std::find_if(stamps.rbegin(), stamps.rend(), [](const ClockedStamp& stamp) {
+    return kind_of(stamp) != StampKind::kArrival;
+  });
+  const bool told = last != stamps.rend() && last - stamps.rbegin() <= CaptureClock::kUntold;
+  return told ? kind_of(*last) : StampKind::kArrival;
+}
+
 }  // namespace
 
 ClockReport check_clock(const std::vector<ClockedStamp>& stamps, const ClockFilterOptions& options,
@@ -52,7 +96,7 @@ ClockReport check_clock(const std::vector<ClockedStamp>& stamps, const ClockFilt
     if (estimate) report.sigma_s = estimate->sigma_s;
   }
   const ClockFilter<>& filter = clock.filter();
-  report.kind = stamps.empty() ? StampKind::kArrival : kind_of(stamps.back());
+  report.kind = kind_at_end(stamps);
   if (report.kind != StampKind::kArrival) {
     report.state = filter.state();
     report.rate_error = report.kind == StampKind::kSender ? filter.skew() : 0;
@@ -71,30 +115,38 @@ ClockReport check_clock(const std::vector<ClockedStamp>& stamps, const ClockFilt
       lateness.push_back(stamps[i].receive_time_s - times[i]);
     }
     report.lateness_s = spread_of(lateness);
-    const std::vector<ClockedStamp> connection(
-        stamps.begin() + static_cast<std::ptrdiff_t>(line_since), stamps.end());
-    if (report.kind == StampKind::kSender &&
-        std::all_of(connection.begin(), connection.end(),
-                    [](const ClockedStamp& stamp) { return stamp.sender_time_s.has_value(); })) {
+    if (report.kind == StampKind::kSender) {
+      std::vector<ClockedStamp> connection;
+      std::copy_if(stamps.begin() + static_cast<std::ptrdiff_t>(line_since), stamps.end(),
+                   std::back_inserter(connection),
+                   [](const ClockedStamp& stamp) { return stamp.sender_time_s.has_value(); });
       measure_raw_rate(connection, &report);
+      report.usable = !is_no_clock(report);
+      report.counts = !report.usable && do_stamps_count(connection);
     }
+  }
+  if (!report.usable) {
+    std::transform(stamps.begin(), stamps.end(), times.begin(),
+                   [](const ClockedStamp& stamp) { return stamp.receive_time_s; });
   }
   if (time_s != nullptr) *time_s = std::move(times);
   return report;
 }
 
 void judge_clock(const ClockReport& clock, const std::string& what, Findings* findings) {
-  // Quartz keeps 200 millionths, the filter's own limit. Half a percent is what a steady drift of the arrival by 50 ms
-  // looks like in 10 s; what is beyond it, and beyond chance, is no clock in seconds.
-  constexpr double kNoClock = 5e-3;
-  constexpr double kChance = 6;  // standard deviations
-  if (clock.raw_rate_error &&
-      std::abs(*clock.raw_rate_error) > kNoClock + kChance * clock.raw_rate_sigma) {
+  if (!clock.usable) {
+    const double seconds = 1 / (1 + clock.raw_rate_error.value_or(0));
     add_problem(
         findings,
-        fmt::format("{}: the sender's clock counts {:.3g} seconds in each of the host's; its "
-                    "time stamps cannot be used: correct the camera's stream settings",
-                    what, 1 / (1 + *clock.raw_rate_error)));
+        clock.counts
+            ? fmt::format(
+                  "{}: its time stamps count pictures and tell no time: {:.3g} seconds in each "
+                  "of the host's; arrival times are taken instead: set the camera to a "
+                  "rate that it keeps, or its stamps to its clock",
+                  what, seconds)
+            : fmt::format("{}: the sender's clock counts {:.3g} seconds in each of the host's; its "
+                          "time stamps cannot be used: correct the camera's stream settings",
+                          what, seconds));
     return;
   }
   if (clock.counters.restarts > 0) {
@@ -114,6 +166,7 @@ void judge_clock(const ClockReport& clock, const std::string& what, Findings* fi
 
 std::string describe(const ClockReport& clock) {
   if (clock.kind == StampKind::kArrival) return "none: each item has the time of its arrival";
+  if (!clock.usable) return "not used: its time stamps are no times; arrival times instead";
   std::string text = clock.state == ClockState::kLocked ? "locked" : "warming up";
   text += clock.kind == StampKind::kSender
               ? fmt::format(", rate error {:+.0f} ppm", 1e6 * clock.rate_error)

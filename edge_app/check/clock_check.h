@@ -33,6 +33,9 @@ struct ClockReport {
   // The same rate without the filter's prior, with its standard deviation: what a broken clock shows.
   std::optional<double> raw_rate_error;
   double raw_rate_sigma = 0;
+  // False: its stamps are no times (see judge_clock); those of the items are their arrivals.
+  bool usable = true;
+  bool counts = false;  // because they count items
 };
 
 // An item of a stream as its clock sees it.
@@ -43,7 +46,7 @@ struct ClockedStamp {
   bool restarted = false;
 };
 
-// *time_s (if not null): each item's time by the last line; the receive time without a clock.
+// *time_s (if not null): each item's time by the last line; the receive time without a clock, or with one that cannot be one.
 [[nodiscard]] ClockReport check_clock(const std::vector<ClockedStamp>& stamps,
                                       const ClockFilterOptions& options,
                                       std::vector<double>* time_s = nullptr);

@@ -283,9 +283,16 @@ std::string nothing_came(const std::string& source, double wait_s) {
 
 void log_source_losses(const FrameSource& source) {
   const FrameSourceCounters counters = source.counters();
-  if (counters.damaged == 0 && counters.dropped == 0) return;
-  spdlog::warn("{}: {} frames damaged, {} dropped before they were read", source.name(),
-               counters.damaged, counters.dropped);
+  if (counters.damaged > 0 || counters.dropped > 0) {
+    spdlog::warn("{}: {} frames damaged, {} dropped before they were read", source.name(),
+                 counters.damaged, counters.dropped);
+  }
+  if (counters.unstamped > 0 || counters.foreign_packets > 0 || counters.garbage_bytes > 0) {
+    spdlog::warn(
+        "{}: {} frames whose time stamp could not be true; {} packets that are not of the session, "
+        "and {} bytes that are of no packet, left out",
+        source.name(), counters.unstamped, counters.foreign_packets, counters.garbage_bytes);
+  }
 }
 
 bool is_recording(const Config& config) {

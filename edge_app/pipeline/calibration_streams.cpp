@@ -72,20 +72,43 @@ std::vector<std::int64_t> count_on_grid(const std::vector<double>& times) {
   return count_on_grid(times, period);
 }
 
-// sequence(item) and sender_time(item) are optionals.
+// Gives those between two counts theirs, where as many are missing as there are.
+void fill_counts(Counts* counts) {
+  std::size_t before = counts->size();
+  for (std::size_t i = 0; i < counts->size(); ++i) {
+    if (!(*counts)[i]) continue;
+    if (before < i) {
+      const std::int64_t between = *(*counts)[i] - *(*counts)[before];
+      const bool fits = between == static_cast<std::int64_t>(i - before);
+      for (std::size_t k = before + 1; fits && k < i; ++k) (*counts)[k] = *(*counts)[k - 1] + 1;
+    }
+    before = i;
+  }
+}
+
+// sequence(item) and sender_time(item) are optionals. A few items whose time stamp could not be true have none.
 template <class Item, class Sequence, class SenderTime>
 Counts count_items(const std::vector<Item>& items, Sequence sequence, SenderTime sender_time) {
+  constexpr double kMostHave = 0.8;
   const auto all = [&items](auto has) { return std::all_of(items.begin(), items.end(), has); };
   Counts counts;
   if (all([&](const Item& item) { return sequence(item).has_value(); })) {
     for (const Item& item : items) counts.push_back(sequence(item));
-  } else if (all([&](const Item& item) { return sender_time(item).has_value(); })) {
-    std::vector<double> times(items.size());
-    std::transform(items.begin(), items.end(), times.begin(),
-                   [&](const Item& item) { return *sender_time(item); });
-    for (const std::int64_t count : count_on_grid(times)) counts.emplace_back(count);
+    return counts;
+  }
+  std::vector<double> times;
+  std::vector<std::size_t> timed;
+  for (std::size_t i = 0; i < items.size(); ++i) {
+    if (!sender_time(items[i])) continue;
+    times.push_back(*sender_time(items[i]));
+    timed.push_back(i);
   }
   counts.resize(items.size());
+  if (static_cast<double>(times.size()) < kMostHave * static_cast<double>(items.size()))
+    return counts;
+  const std::vector<std::int64_t> on_grid = count_on_grid(times);
+  for (std::size_t k = 0; k < on_grid.size(); ++k) counts[timed[k]] = on_grid[k];
+  fill_counts(&counts);
   return counts;
 }
 

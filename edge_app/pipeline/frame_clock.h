@@ -16,8 +16,9 @@
 //                   was seen of it. Such a frame is of unknown age only beyond that.
 //                   Where the sender tells absolute times, too, pictures that these and the connection before say are fresh
 //                   are answered from the third on, and behind a backlog the pace is believed sooner (utc_line.h).
-//                   Stamps that run at another rate than the pictures come (stamp_rate.h) tell nothing: once that is shown
-//                   they are left out, on later connections too, and what else the stream tells goes on alone.
+//                   Stamps that run at another rate than the pictures come (stamp_rate.h), or count them (stamp_count.h), tell
+//                   nothing: once that is shown they are left out, on later connections too, and what else the stream
+//                   tells goes on alone. Behind a count, pictures may be missing: uneven_arrivals.h in place of receipt_clock.h.
 //   count alone     (V4L2: stamps of the driver.) The same but for the start: a driver holds back a few buffers only. Where the
 //                   driver stamped a frame when it was taken, that is its age, and a count that leaves the stamps is of a camera
 //                   with another rate by now: such frames have their stamps, and from kManyStrays in a row on another line.
@@ -34,11 +35,14 @@
 
 #include "core/model/arrival_pace.h"
 #include "core/model/delay_wander.h"
+#include "core/model/stamp_count.h"
 #include "core/model/stamp_rate.h"
 #include "edge_app/pipeline/capture_clock.h"
 #include "edge_app/pipeline/receipt_clock.h"
+#include "edge_app/pipeline/uneven_arrivals.h"
 #include "edge_app/pipeline/utc_line.h"
 #include "platform/streams/frame.h"
+#include "platform/video/stamp_guard.h"
 
 namespace alidade {
 
@@ -56,6 +60,7 @@ struct FrameTime {
   double moved_s = 0;
   bool stamps_left_out = false;                 // the sender's: they run at another rate
   std::optional<double> stamp_rate_error = {};  // their rate less one, in the first such frame
+  bool stamps_count = false;                    // pictures, in that frame
 };
 
 class FrameClock {
@@ -67,7 +72,8 @@ class FrameClock {
         least_step_s_(options.min_delay_step_s),
         wait_for_pace_(wait_for_pace),
         clock_(options),
-        receipts_(stamp_sigma_s) {}
+        receipts_(stamp_sigma_s),
+        uneven_(stamp_sigma_s) {}
 
   // The connection that begins with the next frame does so without a backlog.
   void expect_fresh() { fresh_ = true; }
@@ -105,12 +111,18 @@ class FrameClock {
     if (!finite || (!begins_ && kind != kind_ && ++strange_ < kStrangeInARow)) {
       return unusable(stamp);
     }
-    const bool begins = begins_ || kind != kind_;
+    if (begins_ || kind != kind_) guard_.restart();
+    const StampGuard::Verdict verdict =
+        kind == Kind::kSenderTime ? guard_.judge(stamp.receive_time_s, *stamp.sender_time_s)
+                                  : StampGuard::Verdict::kGood;
+    if (verdict == StampGuard::Verdict::kBad) return unusable(stamp);
+    const bool begins = begins_ || kind != kind_ || verdict == StampGuard::Verdict::kJumped;
     const bool anew = begins && kind_ != Kind::kNew;
     strange_ = 0;
     begins_ = false;
     if (begins) begin(kind);
     if (begins) rate_.restart();
+    if (begins) count_.restart();
     if (kind == Kind::kSenderTime && runs_off(stamp)) return leave_stamps_out(stamp);
     if (kind == Kind::kSenderTime) utc_.watch(stamp);
     FrameTime time = by_what_is_told(stamp);
@@ -124,18 +136,22 @@ class FrameClock {
 
   bool runs_off(const FrameStamp& stamp) {
     rate_.add(stamp.receive_time_s, *stamp.sender_time_s);
-    return rate_.off().has_value();
+    count_.add(stamp.receive_time_s, *stamp.sender_time_s);
+    return rate_.off() || count_.rate_error();
   }
 
   FrameTime leave_stamps_out(const FrameStamp& stamp) {
     stamps_left_out_ = true;
+    stamps_count_ = count_.rate_error().has_value();
     utc_.forget();
     begin(stamp.sequence ? Kind::kSequence : Kind::kNothing);
+    if (stamps_count_) uneven_.restart(count_.step_s());
     FrameStamp without = stamp;
     without.sender_time_s.reset();
     FrameTime time = by_what_is_told(without);
     time.clock.restarted = true;
-    time.stamp_rate_error = rate_.off();
+    time.stamp_rate_error = stamps_count_ ? count_.rate_error() : rate_.off();
+    time.stamps_count = stamps_count_;
     return time;
   }
 
@@ -173,10 +189,12 @@ class FrameClock {
     pace_.restart();
     wander_.restart();
     receipts_.restart();
+    uneven_.restart();
   }
 
   FrameTime by_receipt(const FrameStamp& stamp) {
-    const ReceiptClock::Answer answer = receipts_.update(stamp.receive_time_s);
+    const ReceiptClock::Answer answer = stamps_count_ ? uneven_.update(stamp.receive_time_s)
+                                                      : receipts_.update(stamp.receive_time_s);
     FrameTime time;
     time.clock.time_s = answer.time_s;
     time.clock.sigma_s = answer.sigma_s;
@@ -313,9 +331,12 @@ class FrameClock {
   bool wait_for_pace_;
   CaptureClock clock_;
   ReceiptClock receipts_;
+  UnevenArrivals uneven_;
   ArrivalPace pace_;  // of a stream that waits, or of late frames
   DelayWander wander_;
+  StampGuard guard_;
   StampRate rate_;
+  StampCount count_;
   UtcLine utc_;
   Kind kind_ = Kind::kNew;
   bool begins_ = true;  // with the next usable frame
@@ -331,6 +352,7 @@ class FrameClock {
   bool behind_backlog_ = false;
   int strays_ = 0;  // in a row
   bool stamps_left_out_ = false;
+  bool stamps_count_ = false;
 };
 
 }  // namespace alidade

@@ -199,6 +199,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   events->video_delay_stepped = clock.delay_stepped;
   events->video_delay_wander_s = frame_time.wander_s;
   events->stamps_left_out = frame_time.stamp_rate_error;
+  events->stamps_count = frame_time.stamps_count;
   if (clock.restarted || clock.delay_stepped)
     minimum_delay_sigma_s_ = std::hypot(options_.minimum_delay_sigma_s, frame_time.moved_s);
   answered_by_oe_ = false;

@@ -102,6 +102,7 @@ struct StepEvents {
   // The sender's time stamps run at another rate than the pictures come, and are left out from this frame on: their
   // rate less one.
   std::optional<double> stamps_left_out;
+  bool stamps_count = false;  // these count pictures
 };
 
 class OrientationStep {

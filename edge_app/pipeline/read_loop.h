@@ -1,7 +1,7 @@
 #pragma once
 // read_to_the_end: what a capture or telemetry thread does with its source, from the first item to the
 // last, over losses of the connection. Logs each loss and return, what a source waits for though its connection stands, and what it
-// notes of its device.
+// notes of its device or finds wrong with its stream.
 // Allocates and waits: never on the real-time thread.
 
 #include <spdlog/spdlog.h>
@@ -27,11 +27,15 @@ std::string waiting_of(const Source& source) {
   }
 }
 
-// What the source has found out of its device since the last time; of video there is nothing.
+// What the source has found out of its device since the last time; of video, what is wrong with the stream.
 template <typename Source>
 std::vector<std::string> notes_of(Source& source) {
   if constexpr (std::is_base_of_v<FrameSource, Source>) {
-    return {};
+    std::vector<std::string> notes;
+    for (std::string remark = source.remark(); !remark.empty(); remark = source.remark()) {
+      notes.push_back(remark);
+    }
+    return notes;
   } else {
     return source.take_notes();
   }

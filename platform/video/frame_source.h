@@ -16,8 +16,11 @@ namespace alidade {
 
 // What a source that receives and decodes on its own could not deliver.
 struct FrameSourceCounters {
-  std::int64_t damaged = 0;  // frames that were incomplete or not decodable
-  std::int64_t dropped = 0;  // frames that read() did not fetch in time
+  std::int64_t damaged = 0;          // frames that were incomplete or not decodable
+  std::int64_t dropped = 0;          // frames that read() did not fetch in time
+  std::int64_t unstamped = 0;        // frames whose time stamp cannot be true: they have none
+  std::int64_t foreign_packets = 0;  // that the session has not agreed upon
+  std::int64_t garbage_bytes = 0;    // that belong to no packet
 };
 
 class FrameSource {
@@ -40,6 +43,10 @@ class FrameSource {
   // One line for the person: what is waited for though the connection stands, since when, and what would shorten it. Empty:
   // nothing, or not for long. Thread-safe.
   [[nodiscard]] virtual std::string waiting() const { return ""; }
+
+  // One line for the person: what is wrong with the stream though its pictures come, and what was done about it. Each kind
+  // once; empty: nothing new. Thread-safe.
+  [[nodiscard]] virtual std::string remark() { return ""; }
 
   // Since the source was made; thread-safe. Zeros where the source does not count.
   [[nodiscard]] virtual FrameSourceCounters counters() const { return {}; }

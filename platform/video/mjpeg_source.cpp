@@ -18,6 +18,8 @@
 #include "platform/video/jpeg_decoder.h"
 #include "platform/video/multipart_scanner.h"
 #include "platform/video/receiving_thread.h"
+#include "platform/video/remarks.h"
+#include "platform/video/stamp_guard.h"
 #include "platform/video/stream_copy.h"
 
 namespace alidade {
@@ -27,8 +29,8 @@ constexpr long kReceiveBuffer = 128 * 1024;  // bytes read at a time
 // However many bytes are awaited: what came by then is taken, should they be fewer than was told.
 constexpr double kMostAsleep_s = 0.02;
 constexpr int kDamagedInARow = 30;  // pictures: more are no accident
-// Each part without a later time stamp makes the sender's clock more doubtful, each one with it less.
-constexpr int kDoubtOfABadStamp = 100;
+// Each part without a new time stamp that can be true makes the sender's clock more doubtful, each one with it less.
+constexpr int kDoubtOfABadStamp = 20;
 constexpr int kMostDoubt = 2 * kDoubtOfABadStamp;
 constexpr const char* kNoCurl = "libcurl does not start";
 constexpr long kMethods = static_cast<long>(CURLAUTH_DIGEST | CURLAUTH_BASIC);
@@ -41,7 +43,10 @@ class MjpegSource : public FrameSource {
   void stop() override { thread_.stop(); }
   std::string error() const override { return error_; }
   std::string name() const override { return name_; }
-  FrameSourceCounters counters() const override { return {damaged_, thread_.dropped()}; }
+  FrameSourceCounters counters() const override {
+    return {damaged_, thread_.dropped(), unstamped_};
+  }
+  std::string remark() override { return remarks_.take(); }
 
  private:
   void interrupt() {
@@ -72,6 +77,8 @@ class MjpegSource : public FrameSource {
   bool is_tls_ = false;
 
   std::atomic<std::int64_t> damaged_{0};
+  std::atomic<std::int64_t> unstamped_{0};
+  Remarks remarks_;
 
   // The receiving thread's own.
   char curl_error_[CURL_ERROR_SIZE] = "";
@@ -93,7 +100,8 @@ class MjpegSource : public FrameSource {
   std::int64_t next_frame_ = 0;
   int damaged_in_a_row_ = 0;
   int clock_doubt_ = 0;  // above kMostDoubt: none for the rest of the connection
-  std::optional<double> last_sender_time_s_;  // of this connection
+  std::optional<double> last_sender_time_s_;  // of this connection, as told
+  StampGuard stamps_;
   JpegDecoder decoder_;
   CodecParametersPtr parameters_ = picture_parameters(AV_CODEC_ID_MJPEG);
   StreamCopy copy_;
@@ -362,24 +370,34 @@ ReadStatus MjpegSource::deliver(MultipartPart part, Frame& frame) {
   return ReadStatus::kOk;
 }
 
-// A step back cannot be a part that was overtaken: the stream keeps their order.
 void MjpegSource::stamp_sender_time(const MultipartPart& part, FrameStamp* stamp) {
   if (stamp->restarted) {
     clock_doubt_ = 0;
     last_sender_time_s_.reset();
+    stamps_.restart();
   }
   if (clock_doubt_ > kMostDoubt) {
     return;
   }
-  const bool back =
-      part.timestamp_s && last_sender_time_s_ && *part.timestamp_s < *last_sender_time_s_;
   const bool stands = !part.timestamp_s || part.timestamp_s == last_sender_time_s_;
-  clock_doubt_ = back || stands ? clock_doubt_ + kDoubtOfABadStamp : std::max(0, clock_doubt_ - 1);
-  if (stands || clock_doubt_ > kMostDoubt) {
+  if (part.timestamp_s) last_sender_time_s_ = part.timestamp_s;
+  auto verdict = StampGuard::Verdict::kBad;
+  if (!stands) {
+    const double expected_s = stamps_.expected_s(stamp->receive_time_s);
+    verdict = stamps_.judge(stamp->receive_time_s, *part.timestamp_s);
+    if (verdict == StampGuard::Verdict::kBad) {
+      ++unstamped_;
+      remarks_.say(0, name_ + ": " + bad_stamp_remark(*part.timestamp_s - expected_s));
+    }
+  }
+  if (verdict == StampGuard::Verdict::kBad) {
+    clock_doubt_ += kDoubtOfABadStamp;
     return;
   }
-  stamp->sender_time_s = last_sender_time_s_ = part.timestamp_s;
-  stamp->restarted = stamp->restarted || back;
+  const bool jumped = verdict == StampGuard::Verdict::kJumped;
+  clock_doubt_ = jumped ? 0 : std::max(0, clock_doubt_ - 1);
+  stamp->sender_time_s = part.timestamp_s;
+  stamp->restarted = stamp->restarted || jumped;
 }
 
 }  // namespace

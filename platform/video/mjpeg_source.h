@@ -8,10 +8,10 @@
 // and a read() can time out without hurting the stream.
 // - receive_time_s: arrival of the first byte of the picture's part, headers included. Unlike the
 //   last byte's, it does not depend on how large the picture is.
-// - sender_time_s: the part's X-Timestamp. A step back is a clock that was set: the frame says that it
-//   begins anew (restarted). A part without a stamp, or with that of the part before, has no sender time.
-//   After three of these in a row, or more than one in a hundred, the camera has no clock for the rest of
-//   the connection: too coarse, or mixed with receive times, it would be worse than none.
+// - sender_time_s: the part's X-Timestamp, where it can be true (stamp_guard.h). Where some agree on another time, the clock
+//   was set: the frame says that it begins anew (restarted). A part without a stamp, or with that of the part before, has
+//   no sender time. After three of these or of those that cannot be true in a row, or more than one in twenty, the camera has
+//   no clock for the rest of the connection: too coarse, or mixed with receive times, it would be worse than none.
 // - Damaged pictures are skipped and counted; many in a row are reported. When the reader is too
 //   slow, the oldest that wait are dropped and counted.
 // - copy_to: each delivered picture is also stored as it came in that Matroska file, in which a kill

@@ -12,6 +12,7 @@ constexpr std::size_t kMaxBoundary = 200;      // bytes of a line; RFC 2046 allo
 constexpr std::size_t kMaxHeaders = 8192;      // bytes of one part's headers
 constexpr std::size_t kMaxDashes = 32;         // before a boundary, with the line end before them
 constexpr std::size_t kMaxDelimiterTail = 32;  // dashes and blanks between boundary and line end
+constexpr std::size_t kMaxName = 32;  // bytes of a header's name that follows a boundary at once
 constexpr const char* kHeaderBlanks = " \t\r\n";
 
 char lower(char c) { return c >= 'A' && c <= 'Z' ? static_cast<char>(c - 'A' + 'a') : c; }
@@ -64,6 +65,32 @@ std::optional<double> parse_seconds(std::string_view text) {
     return std::nullopt;
   }
   return value;
+}
+
+// What stands directly behind a boundary, without a line end.
+enum class Follows { kNothing, kPart, kUnknown };
+
+// kPart: a header, or a JPEG. kUnknown: more bytes must come to tell.
+Follows what_follows(std::string_view bytes) {
+  if (bytes.empty()) return Follows::kUnknown;
+  if (bytes[0] == '\xFF') {
+    if (bytes.size() < 2) return Follows::kUnknown;
+    return bytes[1] == '\xD8' ? Follows::kPart : Follows::kNothing;
+  }
+  for (std::size_t i = 0; i < kMaxName; ++i) {
+    if (i == bytes.size()) return Follows::kUnknown;
+    const char c = lower(bytes[i]);
+    if (c == ':' && i > 0) return Follows::kPart;
+    const bool in_name = (c >= 'a' && c <= 'z') || (i > 0 && (c == '-' || c == '_'));
+    if (!in_name) return Follows::kNothing;
+  }
+  return Follows::kNothing;
+}
+
+// Where the first header begins in a line like "--boundaryContent-Type: image/jpeg"; npos: nowhere.
+std::size_t header_behind_boundary(std::string_view line) {
+  const std::string small = lower(line);
+  return std::min(small.find("content-"), small.find("x-timestamp:"));
 }
 
 bool jpeg_ends_at(std::string_view bytes, std::size_t end) {
@@ -161,7 +188,8 @@ bool MultipartScanner::learn_boundary() {
   }
   const std::string_view line = stripped(std::string_view(buffer_).substr(0, end), kHeaderBlanks);
   const bool told = line.substr(0, 2) == "--" && end < kMaxBoundary;
-  core_ = told ? core_of(line) : "";
+  core_ =
+      told ? core_of(stripped(line.substr(0, header_behind_boundary(line)), kHeaderBlanks)) : "";
   if (core_.empty()) {
     drop_front(end + 1);
   } else {
@@ -193,7 +221,14 @@ std::optional<MultipartScanner::Delimiter> MultipartScanner::find_delimiter() {
     if (end == buffer_.size()) {
       return std::nullopt;  // the line may go on
     }
-    if (buffer_[end] != '\n' || !(at_line_start || at - begin >= 2)) {
+    const bool dashed = at - begin >= 2;
+    const bool ends_line = buffer_[end] == '\n' && (at_line_start || dashed);
+    const std::string_view ahead(buffer_);
+    const bool may_go_on =
+        dashed && ahead.substr(after, end - after).find('-') == std::string_view::npos;
+    const Follows follows = may_go_on ? what_follows(ahead.substr(end)) : Follows::kNothing;
+    if (!ends_line && follows == Follows::kUnknown) return std::nullopt;
+    if (!ends_line && follows == Follows::kNothing) {
       ++scan_;
       continue;
     }
@@ -203,7 +238,7 @@ std::optional<MultipartScanner::Delimiter> MultipartScanner::find_delimiter() {
         --begin;
       }
     }
-    return Delimiter{begin, end + 1};
+    return Delimiter{begin, ends_line ? end + 1 : end};
   }
 }
 
@@ -285,7 +320,8 @@ bool MultipartScanner::read_body() {
     return true;
   }
   // Without a delimiter the last bytes may be the beginning of one.
-  const std::size_t not_body = delimiter ? 0 : kMaxDashes + core_.size() + kMaxDelimiterTail;
+  const std::size_t not_body =
+      delimiter ? 0 : kMaxDashes + core_.size() + kMaxDelimiterTail + kMaxName;
   if (known_end > max_part_bytes_ + not_body) {
     ++discarded_;
     state_ = State::kSkip;

@@ -5,8 +5,8 @@
 //
 // Bytes go in as they come, in pieces of any size. Tolerated: any number of dashes around the
 // boundary, in the declaration, and many in the stream; a boundary that is not declared (the first line
-// that begins with "--" tells it); lines that end in LF alone; no line end before a delimiter; parts
-// without headers; a Content-Length that is missing or wrong.
+// that begins with "--" tells it); lines that end in LF alone; no line end before a delimiter, and none
+// behind it where a header or a JPEG follows at once, as browsers read it; parts without headers; a Content-Length that is missing or wrong.
 // A part ends at its Content-Length if a JPEG ends there, too (FF D9), and at the next delimiter
 // otherwise; so a camera that tells no length delivers a picture when the next delimiter comes.
 // Pure: no I/O, no clock, no exceptions but for memory, which is bounded by max_part_bytes and the

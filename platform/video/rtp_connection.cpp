@@ -17,6 +17,7 @@ extern "C" {
 #include "platform/system/url.h"
 #include "platform/video/luma_decoder.h"
 #include "platform/video/rtsp_session.h"
+#include "platform/video/session_description.h"
 
 namespace alidade {
 namespace {
@@ -93,6 +94,9 @@ ReadStatus RtpConnection::nothing_received(std::string* error) const {
                                              : "nothing received for %g s",
                 options_.timeout_s);
   *error = text;
+  if (filter_.foreign() > 0 && !filter_.source()) {
+    *error += "; what comes is of " + filter_.foreign_kind();
+  }
   if (arrival_s_ > 0 && !any_picture_ && options_.url.rfind("rtp://", 0) == 0) {
     *error += "; is what comes " + options_.format + "?";
   }
@@ -137,6 +141,8 @@ ReadStatus RtpConnection::open_demuxer(const std::string& sdp, std::string* erro
     *error = "no usable SDP description: " + av_error_text(code);
     return ReadStatus::kFailed;
   }
+  const std::optional<VideoDescription> video = find_video(sdp);
+  filter_ = StreamFilter(video ? video->payload_type : -1, transport_->agreed_source());
   // libavformat writes its receiver reports there, too: `direct` keeps them out of the buffer, and no
   // write function means nowhere.
   packets_.reset(make_io(2 * kMaxPacket, this, &RtpConnection::next_packet));
@@ -152,16 +158,21 @@ int RtpConnection::next_packet(void* self, std::uint8_t* data, int capacity) {
   auto* connection = static_cast<RtpConnection*>(self);
   ReceivedPacket packet;
   const double deadline_s = connection->last_picture_s_ + connection->options_.timeout_s;
-  // Where packets come without end, no wait does.
-  connection->transport_status_ =
-      monotonic_now_s() > deadline_s
-          ? ReadStatus::kTimeout
-          : connection->transport_->receive(deadline_s, data, static_cast<std::size_t>(capacity),
-                                            &packet, &connection->transport_error_);
-  if (connection->transport_status_ != ReadStatus::kOk) return AVERROR_EXIT;
-  connection->arrival_s_ = packet.arrival_s;
+  do {
+    // Where packets come without end, no wait does.
+    connection->transport_status_ =
+        monotonic_now_s() > deadline_s
+            ? ReadStatus::kTimeout
+            : connection->transport_->receive(deadline_s, data, static_cast<std::size_t>(capacity),
+                                              &packet, &connection->transport_error_);
+    if (connection->transport_status_ != ReadStatus::kOk) return AVERROR_EXIT;
+    connection->arrival_s_ = packet.arrival_s;
+  } while (!connection->filter_.takes(data, packet.size, packet.arrival_s));
+  if (reporting_source(data, packet.size)) connection->report_is_old_ = false;
   connection->timestamps_.move(data, packet.size);
   if (const auto header = parse_rtp_header(data, packet.size)) {
+    connection->filter_.for_each_between(
+        [connection](const RtpHeader& other) { connection->ends_.packet_in(other); });
     connection->ends_.packet_in(*header);
   }
   return static_cast<int>(packet.size);
@@ -262,11 +273,7 @@ ReadStatus RtpConnection::read(AccessUnit* unit, std::string* error) {
   last_picture_s_ = monotonic_now_s();
   any_picture_ = true;
   const AVPacket& packet = *unit->packet;
-  if (packet.pts != AV_NOPTS_VALUE) {
-    unit->sender_time_s = static_cast<double>(packet.pts) * av_q2d(format_->streams[0]->time_base);
-    if (!unit->sender_utc_s) unit->sender_utc_s = utc(packet);
-  }
-  if (sender_jumped(*unit)) {
+  if (packet.pts != AV_NOPTS_VALUE && another_sender(unit)) {
     *error = "the sender's clock jumped: it began anew";
     return ReadStatus::kDisconnected;
   }
@@ -329,18 +336,31 @@ std::optional<double> RtpConnection::utc(const AVPacket& packet) const {
   return std::abs(ahead_s - wraps * wrap_s) < kAgreement_s ? utc_s - wraps * wrap_s : utc_s;
 }
 
-// A gap of the link moves the arrival against the sender's clock by less than timeout_s. More is
-// another sender on the same port: libavformat's view of the clock must then begin anew, too.
-bool RtpConnection::sender_jumped(const AccessUnit& unit) {
-  bool jumped = false;
-  if (unit.sender_time_s) {
-    jumped = last_sender_time_s_ &&
-             std::abs((*unit.sender_time_s - *last_sender_time_s_) -
-                      (unit.receive_time_s - last_receive_time_s_)) > options_.timeout_s + 1;
-    last_sender_time_s_ = unit.sender_time_s;
-    last_receive_time_s_ = unit.receive_time_s;
+// Stamps the picture, if its stamp can be true. Another sender on the same port begins anew with all: libavformat's view of the
+// clock must, too.
+bool RtpConnection::another_sender(AccessUnit* unit) {
+  // libavformat unwraps from one stamp to the next, which wild ones mislead by whole wraps.
+  const double tick_s = av_q2d(format_->streams[0]->time_base);
+  const double wrap_s = 4294967296.0 * tick_s;
+  const double told_s = static_cast<double>(unit->packet->pts) * tick_s;
+  const double expected_s = stamps_.expected_s(unit->receive_time_s);
+  const double wraps = any_stamp_ ? std::round((expected_s - told_s) / wrap_s) : 0;
+  const double sender_s = told_s + wraps * wrap_s;
+  const StampGuard::Verdict verdict = stamps_.judge(unit->receive_time_s, sender_s);
+  if (verdict == StampGuard::Verdict::kBad) {
+    ++bad_stamps_;
+    bad_stamp_off_s_ = sender_s - expected_s;
+    return false;
   }
-  return jumped;
+  any_stamp_ = true;
+  const bool other = stamped_by_ && stamped_by_ != filter_.source();
+  stamped_by_ = filter_.source();
+  unit->begins_anew = verdict == StampGuard::Verdict::kJumped;
+  if (unit->begins_anew && other) return true;
+  report_is_old_ = report_is_old_ || unit->begins_anew;
+  unit->sender_time_s = sender_s;
+  if (!unit->sender_utc_s && !report_is_old_) unit->sender_utc_s = utc(*unit->packet);
+  return false;
 }
 
 }  // namespace alidade

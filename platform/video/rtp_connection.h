@@ -19,17 +19,20 @@
 #include "platform/video/picture_ends.h"
 #include "platform/video/rtp_source.h"
 #include "platform/video/rtp_transport.h"
+#include "platform/video/stamp_guard.h"
+#include "platform/video/stream_filter.h"
 
 namespace alidade {
 
 struct AccessUnit {
-  PacketPtr packet;           // one whole picture
-  double receive_time_s = 0;  // CLOCK_MONOTONIC
-  std::optional<double> sender_time_s;
+  PacketPtr packet;                     // one whole picture
+  double receive_time_s = 0;            // CLOCK_MONOTONIC
+  std::optional<double> sender_time_s;  // none: not told, or it cannot be true
   std::optional<double> sender_utc_s;
-  bool key = false;     // decoding can begin with it: a key frame or a recovery point
-  bool whole = true;    // nothing of it was lost
-  bool follows = true;  // nothing was lost between it and the picture before
+  bool begins_anew = false;  // the sender's clock, with this one
+  bool key = false;          // decoding can begin with it: a key frame or a recovery point
+  bool whole = true;         // nothing of it was lost
+  bool follows = true;       // nothing was lost between it and the picture before
 };
 
 class RtpConnection {
@@ -54,6 +57,12 @@ class RtpConnection {
 
   // Pieces that arrived damaged and were left out.
   [[nodiscard]] std::int64_t damaged() const { return damaged_; }
+  // What else was left out of it.
+  [[nodiscard]] const StreamFilter& filter() const { return filter_; }
+  [[nodiscard]] std::int64_t garbage() const { return transport_ ? transport_->garbage() : 0; }
+  [[nodiscard]] std::int64_t bad_stamps() const { return bad_stamps_; }
+  // By how much the last of these was off.
+  [[nodiscard]] double bad_stamp_off_s() const { return bad_stamp_off_s_; }
 
  private:
   struct FreeIo {
@@ -68,7 +77,7 @@ class RtpConnection {
   [[nodiscard]] bool append(AccessUnit* piece);
   [[nodiscard]] bool inspect(AccessUnit* unit);
   [[nodiscard]] std::optional<double> utc(const AVPacket& packet) const;
-  [[nodiscard]] bool sender_jumped(const AccessUnit& unit);
+  [[nodiscard]] bool another_sender(AccessUnit* unit);
   ReadStatus nothing_received(std::string* error) const;
 
   const RtpSourceOptions& options_;
@@ -91,8 +100,13 @@ class RtpConnection {
   int last_output_number_ = 0;  // of the picture before, in the order in which they are to be seen
   AccessUnit growing_;          // H.264, H.265: the picture whose pieces are arriving
   bool grown_ = false;          // and its last one came
-  std::optional<double> last_sender_time_s_;
-  double last_receive_time_s_ = 0;
+  StreamFilter filter_;
+  StampGuard stamps_;
+  bool any_stamp_ = false;
+  std::optional<std::uint32_t> stamped_by_;  // SSRC of the last good stamp
+  bool report_is_old_ = false;  // the sender's last one is of its clock before it jumped
+  std::int64_t bad_stamps_ = 0;
+  double bad_stamp_off_s_ = 0;
   std::int64_t damaged_ = 0;
 };
 

@@ -40,6 +40,8 @@ std::optional<RtpHeader> parse_rtp_header(const std::uint8_t* data, std::size_t 
   header.marker = (data[1] & 0x80U) != 0;
   header.sequence = static_cast<std::uint16_t>(big_endian(data + 2, 2));
   header.timestamp = big_endian(data + 4, 4);
+  header.payload_type = data[1] & 0x7FU;
+  header.source = big_endian(data + 8, 4);
   const bool has_extension = (data[0] & 0x10U) != 0;
   const std::size_t extension = kFixedHeader + kWord * (data[0] & 0x0FU);  // behind the CSRCs
   if (!has_extension || size < extension + kWord) return header;
@@ -52,11 +54,18 @@ std::optional<RtpHeader> parse_rtp_header(const std::uint8_t* data, std::size_t 
   return header;
 }
 
+std::optional<std::uint32_t> reporting_source(const std::uint8_t* data, std::size_t size) {
+  if (size < kReportTimestamp + kWord || data[0] >> 6U != 2 || data[1] != kSenderReport) {
+    return std::nullopt;
+  }
+  return big_endian(data + kWord, kWord);
+}
+
 void BearableTimestamps::move(std::uint8_t* data, std::size_t size) {
   std::uint8_t* timestamp = nullptr;
   if (parse_rtp_header(data, size)) {
     timestamp = data + kTimestamp;
-  } else if (size >= kReportTimestamp + kWord && data[0] >> 6U == 2 && data[1] == kSenderReport) {
+  } else if (reporting_source(data, size)) {
     timestamp = data + kReportTimestamp;
   } else {
     return;

@@ -13,6 +13,7 @@
 #include "platform/system/url.h"
 #include "platform/video/luma_decoder.h"
 #include "platform/video/receiving_thread.h"
+#include "platform/video/remarks.h"
 #include "platform/video/rtp_connection.h"
 #include "platform/video/stream_copy.h"
 
@@ -42,16 +43,29 @@ class RtpSource : public FrameSource {
   void stop() override { thread_.stop(); }
   std::string error() const override { return error_; }
   std::string name() const override { return options_.url; }
-  FrameSourceCounters counters() const override { return {damaged_, thread_.dropped()}; }
+  FrameSourceCounters counters() const override {
+    return {damaged_, thread_.dropped(), unstamped_, foreign_packets_, garbage_bytes_};
+  }
   std::string waiting() const override;
+  std::string remark() override { return remarks_.take(); }
 
  private:
+  // What of a connection was added to the counters.
+  struct Counted {
+    std::int64_t damaged = 0;
+    std::int64_t unstamped = 0;
+    std::int64_t foreign_packets = 0;
+    std::int64_t garbage_bytes = 0;
+  };
   struct Arrived {
     AccessUnit unit;
     std::shared_ptr<const AVCodecParameters> parameters;  // of the unit's connection
   };
 
+  enum Remark { kForeignPackets, kGarbage, kBadStamp };
+
   void check();
+  void count(const RtpConnection& connection);
   ReadStatus receive_connection(std::string* error);
   void interrupt();
   void push(Arrived arrived);
@@ -68,6 +82,10 @@ class RtpSource : public FrameSource {
   RtpSourceOptions options_;
 
   std::atomic<std::int64_t> damaged_{0};
+  std::atomic<std::int64_t> unstamped_{0};
+  std::atomic<std::int64_t> foreign_packets_{0};
+  std::atomic<std::int64_t> garbage_bytes_{0};
+  Remarks remarks_;
 
   // Since when pictures come that a key frame must precede, by CLOCK_MONOTONIC; < 0: they need not wait. At a connection's
   // beginning (and where a slow reader left pictures), and after a loss.
@@ -80,6 +98,7 @@ class RtpSource : public FrameSource {
   // The receiving thread's own.
   bool wait_for_key_ = true;
   bool worked_ = false;  // a connection before this one has brought pictures
+  Counted counted_;      // of this connection
 
   // read()'s own.
   std::string error_;
@@ -175,13 +194,12 @@ ReadStatus RtpSource::receive_connection(std::string* error) {
   }
   ReadStatus status = thread_.stopped() ? ReadStatus::kStopped : connection.open(error);
   wait_for_key_ = true;
-  std::int64_t damaged = 0;
+  counted_ = {};
   bool works = false;
   while (status == ReadStatus::kOk) {
     Arrived arrived;
     status = connection.read(&arrived.unit, error);
-    damaged_ += connection.damaged() - damaged;
-    damaged = connection.damaged();
+    count(connection);
     if (status == ReadStatus::kOk) {
       arrived.parameters = connection.parameters();
       push(std::move(arrived));
@@ -195,6 +213,29 @@ ReadStatus RtpSource::receive_connection(std::string* error) {
   const std::lock_guard<std::mutex> lock(mutex_);
   connection_ = nullptr;
   return status;
+}
+
+void RtpSource::count(const RtpConnection& connection) {
+  const Counted now{connection.damaged(), connection.bad_stamps(), connection.filter().foreign(),
+                    connection.garbage()};
+  damaged_ += now.damaged - counted_.damaged;
+  unstamped_ += now.unstamped - counted_.unstamped;
+  foreign_packets_ += now.foreign_packets - counted_.foreign_packets;
+  garbage_bytes_ += now.garbage_bytes - counted_.garbage_bytes;
+  const std::string of = options_.url + ": ";
+  if (now.foreign_packets > counted_.foreign_packets) {
+    remarks_.say(kForeignPackets, of + "packets of " + connection.filter().foreign_kind() +
+                                      " come among the video's; the session has not agreed upon "
+                                      "them: they are counted and left out");
+  }
+  if (now.garbage_bytes > counted_.garbage_bytes) {
+    remarks_.say(kGarbage, of + "bytes come that belong to no packet; they are counted and passed "
+                                "over: a fault of the camera, or of a relay in between");
+  }
+  if (now.unstamped > counted_.unstamped) {
+    remarks_.say(kBadStamp, of + bad_stamp_remark(connection.bad_stamp_off_s()));
+  }
+  counted_ = now;
 }
 
 void RtpSource::interrupt() {
@@ -236,6 +277,7 @@ ReadStatus RtpSource::read(Frame& frame, double timeout_s) {
 // Turns a picture's data into the frame; kTimeout if that cannot be done with this one.
 ReadStatus RtpSource::deliver(Arrived arrived, Frame& frame) {
   AccessUnit unit = std::move(arrived.unit);
+  restarted_ = restarted_ || unit.begins_anew;
   if (arrived.parameters != parameters_) {
     parameters_ = std::move(arrived.parameters);
     in_decoder_.clear();

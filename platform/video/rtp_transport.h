@@ -9,6 +9,7 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <utility>
 
@@ -38,6 +39,11 @@ class RtpTransport {
                                            std::string* error) = 0;
 
   virtual void interrupt() = 0;
+
+  // Of the open transport: the SSRC of the packets that will come, if the sender told it.
+  [[nodiscard]] virtual std::optional<std::uint32_t> agreed_source() const { return std::nullopt; }
+  // Bytes passed over because they belong to no packet.
+  [[nodiscard]] virtual std::int64_t garbage() const { return 0; }
 };
 
 // A pair of UDP ports, for RTP and RTCP.

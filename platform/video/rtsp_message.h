@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <utility>
 
 namespace alidade {
@@ -23,6 +24,8 @@ class RtspMessage {
     gst_rtsp_message_unset(&message_);
     return &message_;
   }
+  // As RtspFraming gives it, the body left out. False: neither a request nor a response.
+  [[nodiscard]] bool parse(std::string_view text);
   GstRTSPMsgType type() { return gst_rtsp_message_get_type(&message_); }
   int status() const { return message_.type_data.response.code; }
   const char* reason() const { return message_.type_data.response.reason; }

@@ -23,6 +23,8 @@ constexpr double kGoodbye_s = 0.5;    // given to TEARDOWN, so that the camera f
 constexpr double kPollSlice_s = 0.1;  // of a wait: how late an interruption is noticed at most
 constexpr double kLongest_s = 1e9;    // what the libraries' integers hold
 constexpr std::size_t kMaxEarlyPackets = 1000;
+constexpr const char* kClosed = "the camera closed the connection";
+constexpr const char* kNotRtsp = "what the camera sends is not RTSP";
 
 // What GStreamer's functions take: microseconds, never 0 (which is for ever).
 gint64 microseconds_until(double deadline_s) {
@@ -69,9 +71,9 @@ ReadStatus RtspSession::lost(GstRTSPResult result, std::string* error) const {
   if (interrupted_) return ReadStatus::kStopped;
   if (result == GST_RTSP_ETIMEOUT) return ReadStatus::kTimeout;
   if (result == GST_RTSP_EEOF) {
-    *error = "the camera closed the connection";
+    *error = kClosed;
   } else if (result == GST_RTSP_EPARSE) {
-    *error = "what the camera sends is not RTSP";
+    *error = kNotRtsp;
   } else {
     gchar* text = gst_rtsp_strresult(result);
     *error = text;
@@ -220,10 +222,11 @@ ReadStatus RtspSession::play(const std::string& sdp, std::string* error) {
   GstRTSPTransport* agreed = nullptr;
   gst_rtsp_transport_new(&agreed);
   if (gst_rtsp_transport_parse(answer.header(GST_RTSP_HDR_TRANSPORT).c_str(), agreed) ==
-          GST_RTSP_OK &&
-      agreed->interleaved.min >= 0) {
-    first_channel_ = agreed->interleaved.min;
+      GST_RTSP_OK) {
+    if (agreed->interleaved.min >= 0) first_channel_ = agreed->interleaved.min;
+    if (agreed->ssrc != 0) source_ = agreed->ssrc;
   }
+  framing_.set_channels(first_channel_);
   gst_rtsp_transport_free(agreed);
 
   status = ask({GST_RTSP_PLAY, session_url_, GST_RTSP_HDR_RANGE, "npt=0.000-"}, &answer, error);
@@ -343,33 +346,82 @@ ReadStatus RtspSession::ping(std::string* error) {
   return send({ping_, session_url_}, monotonic_now_s() + options_.timeout_s, error);
 }
 
-bool RtspSession::readable(double wait_s) const {
-  if (!socket_ && RtspTls::holds_data(connection_.get())) return true;
-  GSocket* const socket = gst_rtsp_connection_get_read_socket(connection_.get());
-  pollfd waiting{g_socket_get_fd(socket), POLLIN, 0};
-  return ::poll(&waiting, 1, static_cast<int>(1e3 * std::clamp(wait_s, 0.0, kPollSlice_s))) > 0;
+// Reads what is there, after at most wait_s. kTimeout: nothing.
+ReadStatus RtspSession::fill(double wait_s, std::string* error) {
+  wait_s = std::clamp(wait_s, 0.0, kPollSlice_s);
+  if (!socket_) return fill_by_tls(wait_s, error);
+  auto* const input =
+      G_POLLABLE_INPUT_STREAM(g_io_stream_get_input_stream(G_IO_STREAM(socket_.get())));
+  for (bool waited = wait_s == 0;; waited = true) {
+    const auto [room, size] = framing_.room();
+    GError* failure = nullptr;
+    const gssize count =
+        g_pollable_input_stream_read_nonblocking(input, room, size, nullptr, &failure);
+    if (count > 0) {
+      framing_.came(static_cast<std::size_t>(count), monotonic_now_s());
+      return ReadStatus::kOk;
+    }
+    const bool blocks = g_error_matches(failure, G_IO_ERROR, G_IO_ERROR_WOULD_BLOCK) != FALSE;
+    *error = count == 0 ? kClosed : failure->message;
+    g_clear_error(&failure);
+    if (!blocks) return interrupted_ ? ReadStatus::kStopped : ReadStatus::kDisconnected;
+    if (waited) return ReadStatus::kTimeout;
+    pollfd waiting{g_socket_get_fd(g_socket_connection_get_socket(socket_.get())), POLLIN, 0};
+    (void)::poll(&waiting, 1, static_cast<int>(1e3 * wait_s));
+  }
 }
 
-ReadStatus RtspSession::next_packet(double deadline_s, Packet* packet, std::string* error) {
+// GStreamer's library, which alone has the stream within TLS, reads as many bytes as it is told, and loses those that came
+// before a timeout: so the first is waited for by itself.
+ReadStatus RtspSession::fill_by_tls(double wait_s, std::string* error) {
+  const std::size_t wanted = framing_.missing();
+  auto* const room = reinterpret_cast<guint8*>(framing_.room().first);
+  GstRTSPResult result = gst_rtsp_connection_read_usec(
+      connection_.get(), room, 1, microseconds_until(monotonic_now_s() + wait_s));
+  if (result == GST_RTSP_ETIMEOUT) return ReadStatus::kTimeout;
+  if (result == GST_RTSP_OK && wanted > 1) {
+    result =
+        gst_rtsp_connection_read_usec(connection_.get(), room + 1, static_cast<guint>(wanted - 1),
+                                      microseconds_until(monotonic_now_s() + options_.timeout_s));
+    if (result == GST_RTSP_ETIMEOUT) result = GST_RTSP_EEOF;
+  }
+  if (result != GST_RTSP_OK) return lost(result, error);
+  framing_.came(wanted, monotonic_now_s());
+  return ReadStatus::kOk;
+}
+
+ReadStatus RtspSession::take_message(std::string_view text, std::string* error) {
   RtspMessage message;
-  const ReadStatus status = next_message(deadline_s, &message, error);
-  if (status != ReadStatus::kOk) return status;
+  if (!message.parse(text)) return ReadStatus::kOk;
   if (message.type() == GST_RTSP_MESSAGE_REQUEST) {
     reply(&message);
-  } else if (message.type() == GST_RTSP_MESSAGE_RESPONSE) {
+  } else if (message.status() == GST_RTSP_STS_UNAUTHORIZED && accept_challenge(&message) &&
+             !std::exchange(pinged_again_, true)) {
     // To a ping. Digest's number used once may have run out: the session would, too, before the next.
-    if (message.status() == GST_RTSP_STS_UNAUTHORIZED && accept_challenge(&message) &&
-        !std::exchange(pinged_again_, true)) {
-      return ping(error);
-    }
-  } else if (message.type() == GST_RTSP_MESSAGE_DATA) {
-    guint8 channel = 0;
-    gst_rtsp_message_parse_data(message.get(), &channel);
-    const auto [data, size] = message.body();
-    if (channel == first_channel_ || channel == first_channel_ + 1)
-      packet->assign(data, data + size);
+    return ping(error);
   }
   return ReadStatus::kOk;
+}
+
+ReadStatus RtspSession::next_packet(double wait_s, RtspFraming::Item* packet, std::string* error) {
+  for (bool filled = false;; filled = true) {
+    for (*packet = framing_.next(); packet->kind != RtspFraming::Item::Kind::kNone;
+         *packet = framing_.next()) {
+      if (packet->kind == RtspFraming::Item::Kind::kMessage) {
+        const ReadStatus status = take_message(packet->bytes, error);
+        if (status != ReadStatus::kOk) return status;
+      } else if (packet->channel == first_channel_ || packet->channel == first_channel_ + 1) {
+        return ReadStatus::kOk;
+      }
+    }
+    if (framing_.is_lost()) {
+      *error = kNotRtsp;
+      return ReadStatus::kDisconnected;
+    }
+    if (filled) return ReadStatus::kTimeout;
+    const ReadStatus status = fill(wait_s, error);
+    if (status != ReadStatus::kOk) return status;
+  }
 }
 
 ReadStatus RtspSession::receive(double deadline_s, std::uint8_t* data, std::size_t capacity,
@@ -378,31 +430,34 @@ ReadStatus RtspSession::receive(double deadline_s, std::uint8_t* data, std::size
     ReadStatus status = keep_alive(error);
     if (status != ReadStatus::kOk) return status;
     const double left_s = deadline_s - monotonic_now_s();
-    Packet packet;
+    RtspFraming::Item within;
     if (ports_) {
       // Video leaves no silence in which to read what the camera says.
       if (monotonic_now_s() >= next_look_s_) {
         next_look_s_ = monotonic_now_s() + kPollSlice_s;
         // One that closes this connection and sends on may do so: below, silence is the end.
-        if (readable(0)) (void)next_packet(deadline_s, &packet, error);
+        (void)next_packet(0, &within, error);
       }
       const double slice_end_s = monotonic_now_s() + std::min(left_s, kPollSlice_s);
       status = ports_->receive(slice_end_s, data, capacity, received, error);
       if (status != ReadStatus::kTimeout) return status;
-      if (readable(0)) status = next_packet(deadline_s, &packet, error);
+      status = next_packet(0, &within, error);
     } else if (!early_.empty()) {
-      packet = std::move(early_.front());
+      const Packet packet = std::move(early_.front());
       early_.pop_front();
-      status = ReadStatus::kOk;
-    } else {
-      status = readable(left_s) ? next_packet(deadline_s, &packet, error) : ReadStatus::kTimeout;
-    }
-    if (status != ReadStatus::kOk && status != ReadStatus::kTimeout) return status;
-    if (!packet.empty() && packet.size() <= capacity && !ports_) {
+      if (packet.empty() || packet.size() > capacity) continue;
       std::copy(packet.begin(), packet.end(), data);
       *received = {packet.size(), monotonic_now_s()};
       return ReadStatus::kOk;
+    } else {
+      status = next_packet(left_s, &within, error);
+      if (status == ReadStatus::kOk && within.bytes.size() <= capacity) {
+        std::copy(within.bytes.begin(), within.bytes.end(), data);
+        *received = {within.bytes.size(), within.arrival_s};
+        return ReadStatus::kOk;
+      }
     }
+    if (status != ReadStatus::kOk && status != ReadStatus::kTimeout) return status;
     if (monotonic_now_s() >= deadline_s) return ReadStatus::kTimeout;
   }
   return ReadStatus::kStopped;

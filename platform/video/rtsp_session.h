@@ -2,6 +2,7 @@
 // RtspSession: the video of an RTSP camera (RFC 2326), its packets within the RTSP connection or by UDP,
 // with GStreamer's RTSP library; over TLS (rtsps://) only within (rtsp_tls.h). Logs in by digest or basic,
 // follows redirections, keeps the session alive. Part of RtpConnection.
+// Once it plays, the bytes are taken apart here (rtsp_framing.h): GStreamer's library ends at the first that is wrong.
 
 #include <gst/rtsp/gstrtspconnection.h>
 
@@ -9,11 +10,14 @@
 #include <deque>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "platform/video/rtp_source.h"
 #include "platform/video/rtp_transport.h"
+#include "platform/video/rtsp_framing.h"
 #include "platform/video/rtsp_tls.h"
 
 namespace alidade {
@@ -32,6 +36,8 @@ class RtspSession : public RtpTransport {
   [[nodiscard]] ReadStatus receive(double deadline_s, std::uint8_t* data, std::size_t capacity,
                                    ReceivedPacket* packet, std::string* error) override;
   void interrupt() override;
+  [[nodiscard]] std::optional<std::uint32_t> agreed_source() const override { return source_; }
+  [[nodiscard]] std::int64_t garbage() const override { return framing_.garbage(); }
 
  private:
   using Packet = std::vector<std::uint8_t>;
@@ -53,11 +59,14 @@ class RtspSession : public RtpTransport {
   [[nodiscard]] bool accept_challenge(RtspMessage* answer);
   [[nodiscard]] ReadStatus next_message(double deadline_s, RtspMessage* message,
                                         std::string* error);
-  // The next packet within the connection, if the next message is one.
-  [[nodiscard]] ReadStatus next_packet(double deadline_s, Packet* packet, std::string* error);
+  // After PLAY. What came within the connection: kOk with a packet of the video; kTimeout: none so far.
+  [[nodiscard]] ReadStatus next_packet(double wait_s, RtspFraming::Item* packet,
+                                       std::string* error);
+  [[nodiscard]] ReadStatus fill(double wait_s, std::string* error);
+  [[nodiscard]] ReadStatus fill_by_tls(double wait_s, std::string* error);
+  [[nodiscard]] ReadStatus take_message(std::string_view text, std::string* error);
   [[nodiscard]] ReadStatus keep_alive(std::string* error);
   [[nodiscard]] ReadStatus ping(std::string* error);
-  [[nodiscard]] bool readable(double wait_s) const;
   void reply(RtspMessage* request);
   [[nodiscard]] ReadStatus lost(GstRTSPResult result, std::string* error) const;
 
@@ -80,10 +89,12 @@ class RtspSession : public RtpTransport {
   std::unique_ptr<GSocketConnection, GObjectUnref>
       socket_;  // null over TLS: it is the connection's
   std::unique_ptr<GstRTSPConnection, FreeConnection> connection_;
-  std::unique_ptr<RtpPorts> ports_;  // by UDP only
-  int first_port_ = 0;               // RTP's; RTCP's is the next
-  int first_channel_ = 0;            // the same within the connection
-  std::deque<Packet> early_;         // came before the answer to PLAY
+  std::unique_ptr<RtpPorts> ports_;      // by UDP only
+  int first_port_ = 0;                   // RTP's; RTCP's is the next
+  int first_channel_ = 0;                // the same within the connection
+  std::optional<std::uint32_t> source_;  // SSRC, as the answer to SETUP has it
+  std::deque<Packet> early_;             // came before the answer to PLAY
+  RtspFraming framing_;                  // of what came after it
 };
 
 }  // namespace alidade

@@ -71,11 +71,4 @@ ReadStatus RtspTls::refusal(std::string* error) const {
   return (faults_ & kForGood) != 0 ? ReadStatus::kFailed : ReadStatus::kDisconnected;
 }
 
-bool RtspTls::holds_data(GstRTSPConnection* connection) {
-  GTlsConnection* tls = gst_rtsp_connection_get_tls(connection, nullptr);
-  GInputStream* input = tls == nullptr ? nullptr : g_io_stream_get_input_stream(G_IO_STREAM(tls));
-  return input != nullptr && G_IS_POLLABLE_INPUT_STREAM(input) &&
-         g_pollable_input_stream_is_readable(G_POLLABLE_INPUT_STREAM(input)) != FALSE;
-}
-
 }  // namespace alidade

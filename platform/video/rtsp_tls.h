@@ -29,9 +29,6 @@ class RtspTls {
   // Why it could not connect, if the certificate was refused: then *error is one line. kOk: it was not.
   [[nodiscard]] ReadStatus refusal(std::string* error) const;
 
-  // Whether something waits within TLS, where poll() on the socket does not see it.
-  [[nodiscard]] static bool holds_data(GstRTSPConnection* connection);
-
  private:
   static gboolean accept(GTlsConnection* tls, GTlsCertificate* certificate,
                          GTlsCertificateFlags faults, gpointer self);

@@ -36,6 +36,12 @@ std::optional<VideoDescription> find_video(const std::string& sdp) {
     if (video.address.empty()) video.address = "0.0.0.0";
     if (gst_sdp_media_get_port(media) > kLastPort) return std::nullopt;
     video.port = static_cast<int>(gst_sdp_media_get_port(media));
+    if (gst_sdp_media_formats_len(media) > 0) {
+      const std::string format = text(gst_sdp_media_get_format(media, 0));
+      const bool is_type = !format.empty() && format.size() <= 3 &&
+                           format.find_first_not_of("0123456789") == std::string::npos;
+      if (is_type) video.payload_type = std::stoi(format);
+    }
     video.control = text(gst_sdp_media_get_attribute_val(media, "control"));
     video.session_control = text(gst_sdp_message_get_attribute_val(parsed, "control"));
     return video;

@@ -8,9 +8,10 @@
 namespace alidade {
 
 struct VideoDescription {
-  std::string address;          // to listen to; 0.0.0.0 if none is given
-  int port = 0;                 // UDP, for RTP; 0: to be agreed upon by RTSP
-  std::string control;          // a=control of the video; empty if not given
+  std::string address;    // to listen to; 0.0.0.0 if none is given
+  int port = 0;           // UDP, for RTP; 0: to be agreed upon by RTSP
+  int payload_type = -1;  // the first that the m= line names, and the one that is read; -1: none
+  std::string control;    // a=control of the video; empty if not given
   std::string session_control;  // and of the session
 };
 

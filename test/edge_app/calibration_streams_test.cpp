@@ -125,6 +125,18 @@ std::vector<std::optional<std::int64_t>> counts_of(const std::vector<double>& se
   return counts;
 }
 
+TEST(CalibrationStreams, AFrameWhoseStampCouldNotBeTrueIsCountedByItsNeighbours) {
+  std::vector<FrameStamp> stamps = sent_at({0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 11, 12});
+  stamps[4].sender_time_s.reset();
+  std::vector<std::optional<std::int64_t>> counts;
+  for (const CalibrationFrame& frame : frames_of(stamps)) counts.push_back(frame.sequence);
+  for (std::size_t i = 0; i < counts.size(); ++i) {
+    EXPECT_EQ(counts[i], static_cast<std::int64_t>(i < 10 ? i : i + 1)) << i;
+  }
+  stamps[10].sender_time_s.reset();
+  EXPECT_EQ(frames_of(stamps)[10].sequence, std::nullopt) << "one was lost before or behind it";
+}
+
 TEST(CalibrationStreams, OfEqualPartsBetweenReconnectionsTheFirstIsUsed) {
   std::vector<FrameStamp> stamps = sent_at({0, 1, 2, 3, 4, 5, 6, 7});
   for (const std::size_t anew : {2u, 5u}) stamps[anew].restarted = true;

@@ -9,6 +9,8 @@
 #include <cstdint>
 #include <limits>
 #include <optional>
+#include <ostream>
+#include <random>
 #include <vector>
 
 #include "edge_app/pipeline/fresh_beginning.h"
@@ -414,6 +416,129 @@ TEST_P(StampsAtAnotherRate, AreLeftOutAfterHalfAMinute) {
   int unknown = 0;
   for (double t = 70; t < 75; t += kInterval_s) unknown += add_at(t, t == 70).known ? 0 : 1;
   EXPECT_LT(unknown, 20);
+}
+
+// As a recording may hold them: hours off, back, told again, unknown to each other.
+TEST_F(FrameClockTest, AStampThatCannotBeTrueIsOnePictureWithoutATime) {
+  const std::vector<double> off = {7200, -7200, -10, -kInterval_s, 3, 1e9};
+  for (const bool fresh : {false, true}) {
+    clock_ = FrameClock{ClockFilterOptions{}, 5e-3, true};
+    if (fresh) clock_.expect_fresh();
+    for (int i = 0; i < 1500; ++i) {
+      const double t = kInterval_s * i;
+      const std::size_t n = static_cast<std::size_t>(i / 50) % off.size();
+      // Every second time two in a row.
+      const bool bad = i % 50 == 7 || i % 100 == 8;
+      const double wrong = i % 50 == 8 ? -50 : off[n];
+      const FrameTime time = add(t + (bad ? wrong : 0), t);
+      EXPECT_FALSE(time.clock.restarted) << i;
+      EXPECT_EQ(time.known, !bad && (fresh || i >= 13)) << i;
+      if (time.known) {
+        EXPECT_NEAR(time.clock.time_s, t, 5 * time.clock.sigma_s) << i;
+      }
+    }
+  }
+}
+
+TEST_F(FrameClockTest, AClockThatWasSetIsFollowedOnceThreeStampsAgree) {
+  play(0, 20);
+  sender_ahead_s_ -= 3600;
+  EXPECT_FALSE(add(20, 20).known);
+  EXPECT_FALSE(add(20.04, 20.04).known);
+  EXPECT_TRUE(add(20.08, 20.08).clock.restarted);
+  EXPECT_GT(play(20.12, 25), 105);
+}
+
+// A camera that stamps its pictures by their count, and leaves some out, or takes them at another rate than it says.
+struct Counting {
+  const char* name;
+  double step_s;    // of the stamps
+  double period_s;  // of the pictures, in truth
+  double left_out;  // share of them
+  int burst;        // as many in a row
+  double found_s;   // at the latest
+  double known;     // share of the pictures behind that
+};
+
+void PrintTo(const Counting& counting, std::ostream* out) { *out << counting.name; }
+
+class StampsThatCount : public FrameClockTest, public testing::WithParamInterface<Counting> {};
+
+TEST_P(StampsThatCount, AreLeftOutAndArrivalsTellTheTime) {
+  const Counting& camera = GetParam();
+  std::mt19937 random(4);
+  std::exponential_distribution<double> delay_s(1 / 2e-3);
+  std::uniform_real_distribution<double> chance(0, 1);
+  std::optional<double> left_out_s;
+  int behind = 0;
+  int known = 0;
+  double squares = 0;
+  int skip = 0;
+  int sent = 0;
+  for (int i = 0; camera.period_s * i < 110; ++i) {
+    if (skip == 0 && chance(random) < camera.left_out / camera.burst) skip = camera.burst;
+    if (skip > 0) {
+      --skip;
+      continue;
+    }
+    const double t = camera.period_s * i;
+    FrameStamp stamp;
+    stamp.receive_time_s = t + delay_s(random);
+    stamp.sender_time_s = 90 + std::round(90'000 * camera.step_s * sent++) / 90'000;
+    stamp.restarted = sent == 1;
+    const FrameTime time = clock_.update(stamp);
+    if (time.stamp_rate_error) {
+      left_out_s = t;
+      EXPECT_TRUE(time.stamps_count);
+      EXPECT_LT(*time.stamp_rate_error, 0) << "they run slower";
+    }
+    if (!left_out_s) continue;
+    ++behind;
+    if (!time.known) continue;
+    ++known;
+    EXPECT_NEAR(time.clock.time_s, t, 5 * time.clock.sigma_s) << t;
+    squares += std::pow((time.clock.time_s - t) / time.clock.sigma_s, 2);
+  }
+  ASSERT_TRUE(left_out_s);
+  EXPECT_LT(*left_out_s, camera.found_s);
+  EXPECT_GT(known, camera.known * behind);
+  EXPECT_LT(squares, 1.3 * known);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Cameras, StampsThatCount,
+    testing::Values(Counting{"LeavesSomeOut", 0.04, 0.04, 0.16, 1, 20, 0.9},
+                    Counting{"LeavesSeveralOut", 0.04, 0.04, 0.1, 3, 25, 0.85},
+                    Counting{"OfThirtyLeavesOut", 1001.0 / 30'000, 1001.0 / 30'000, 0.08, 1, 30,
+                             0.95},
+                    Counting{"SlowerThanItSays", 1.0 / 30, 1.0 / 24, 0, 1, 25, 0.95},
+                    Counting{"SlowerAndLeavesOut", 1.0 / 30, 1.0 / 24, 0.1, 1, 25, 0.8}),
+    [](const auto& which) { return which.param.name; });
+
+// Its stamps tell of what it leaves out: they are times.
+TEST_F(FrameClockTest, StampsOfACameraThatLeavesPicturesOutAreKept) {
+  std::mt19937 random(4);
+  std::exponential_distribution<double> delay_s(1 / 2e-3);
+  int unknown = 0;
+  for (int i = 0; i < 3000; ++i) {
+    if (random() % 6 == 0) continue;
+    const FrameTime time = add(kInterval_s * i, kInterval_s * i + delay_s(random));
+    EXPECT_FALSE(time.stamps_left_out) << i;
+    unknown += time.known ? 0 : 1;
+  }
+  EXPECT_LT(unknown, 40);
+}
+
+// A link that is too slow for a while: what waits grows to two seconds, and comes when there is room again.
+TEST_F(FrameClockTest, StampsOfAStreamWhoseBacklogGrowsAreKept) {
+  play(0, 20);
+  for (double t = 20; t < 34; t += kInterval_s) {
+    EXPECT_FALSE(add(t, t + 0.13 * (t - 20) + 3e-3 * std::fmod(t, 0.7)).stamps_left_out) << t;
+  }
+  for (double t = 34; t < 36.5; t += kInterval_s) {
+    EXPECT_FALSE(add(t, 36.0 + 0.01 * (t - 34)).stamps_left_out) << t;
+  }
+  EXPECT_GT(play(36.6, 60), 550);
 }
 
 INSTANTIATE_TEST_SUITE_P(Rates, StampsAtAnotherRate, testing::Values(0.02, -0.02));

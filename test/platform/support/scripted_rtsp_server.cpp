@@ -34,6 +34,7 @@ struct ScriptedRtspServer::Stream {
   bool playing = false;
   std::unique_ptr<RtpRelay> relay;
   std::unique_ptr<RtpSender> sender;
+  std::int64_t packets = 0;  // sent within the connection
 };
 
 int ScriptedRtspServer::count(const std::string& method, const std::string& text) const {
@@ -96,14 +97,20 @@ bool ScriptedRtspServer::answer(int fd, const RtspRequest& request, Stream* stre
               "\r\n\r\n" + answer.body);
 }
 
-bool ScriptedRtspServer::send_picture(int fd, Stream* stream) {
+bool ScriptedRtspServer::send_picture(int fd, Stream* stream) const {
+  const std::int64_t picture = stream->sender->sent();
   stream->sender->send();
   std::string within;
   stream->relay->forward([&](RtpRelay::Packets& packets) {
+    if (change_packets) change_packets(picture, &packets);
     if (!stream->by_tcp) return;
     for (const RtpRelay::Packet& packet : packets) {
-      within += {'$', 0, static_cast<char>(packet.size() >> 8U), static_cast<char>(packet.size())};
-      within.append(packet.begin(), packet.end());
+      std::string bytes = {'$', 0, static_cast<char>(packet.size() >> 8U),
+                           static_cast<char>(packet.size())};
+      bytes.append(packet.begin(), packet.end());
+      if (change_bytes) change_bytes(stream->packets, &bytes);
+      ++stream->packets;
+      within += bytes;
     }
     packets.clear();
   });

@@ -4,6 +4,7 @@
 // redirects, boots. Its pictures tell their number by their grey (rtp_sender.h).
 
 #include <atomic>
+#include <cstdint>
 #include <functional>
 #include <memory>
 #include <mutex>
@@ -51,11 +52,16 @@ class ScriptedRtspServer {
       false};                    // closes its side of the RTSP connection, sends on by UDP
   std::atomic<bool> ask{false};  // once, OPTIONS with CSeq 77, at the next picture
 
+  // Changes the packets of each picture; after that, within the connection, what is sent for each of them. Set before
+  // anybody connects.
+  std::function<void(std::int64_t picture, RtpRelay::Packets*)> change_packets;
+  std::function<void(std::int64_t packet, std::string*)> change_bytes;
+
  private:
   struct Stream;
   void serve(int fd);
   bool answer(int fd, const RtspRequest& request, Stream* stream);
-  static bool send_picture(int fd, Stream* stream);
+  bool send_picture(int fd, Stream* stream) const;
 
   Script script_;
   mutable std::mutex mutex_;

@@ -91,6 +91,15 @@ std::vector<Style> styles() {
   style.headers = "Content-Length: 20\r\n";
   style.length = false;
   all.push_back({"WrongLength", style});
+  style = {};
+  style.before = "--myboundary";
+  all.push_back({"NoLineEndBehindTheBoundary", style});
+  style.length = false;
+  style.after = "";
+  all.push_back({"NoLineEndAroundTheBoundaryAndNoLength", style});
+  style.before = "--myboundary  ";
+  style.headers = "content-type: image/jpeg\n";
+  all.push_back({"BlanksBehindTheBoundaryAndLineFeeds", style});
   return all;
 }
 
@@ -260,6 +269,8 @@ class MjpegSourceClock : public ::testing::Test {
     EXPECT_EQ(read_until(*source_, frame, ReadStatus::kOk), ReadStatus::kOk) << source_->error();
     return frame;
   }
+  FrameSourceCounters counters() const { return source_->counters(); }
+  std::string remark() { return source_->remark(); }
   void expect(const std::vector<double>& times) {
     for (std::size_t i = 0; i < times.size(); ++i) {
       EXPECT_EQ(read().stamp.sender_time_s.value_or(-1), times[i]) << i;
@@ -284,13 +295,36 @@ class MjpegSourceClock : public ::testing::Test {
   std::unique_ptr<FrameSource> source_;  // before the server, which waits for it
 };
 
-TEST_F(MjpegSourceClock, BeginsAnewWhereItIsSetBack) {
-  send({{100, 100.5, 100.25, 100.75}, {50, 50.5}});
-  for (const bool restarted : {true, false, true, false, true, false}) {
+// As soon as some agree on it.
+TEST_F(MjpegSourceClock, BeginsAnewWhereItIsSet) {
+  send({{100, 100.5, 50, 50.5, 51, 51.5, 7000, 7000.5, 7001, 7001.5}, {50, 50.5}});
+  const std::vector<double> told = {100, 100.5, -1, -1, 51, 51.5, -1, -1, 7001, 7001.5, 50, 50.5};
+  for (std::size_t i = 0; i < told.size(); ++i) {
     const FrameStamp stamp = read().stamp;
-    EXPECT_TRUE(stamp.sender_time_s);
-    EXPECT_EQ(stamp.restarted, restarted) << stamp.frame;
+    EXPECT_EQ(stamp.sender_time_s.value_or(-1), told[i]) << i;
+    EXPECT_EQ(stamp.restarted, i == 0 || i == 4 || i == 8 || i == 10) << i;
   }
+}
+
+// One in a connection of its own each, as no more pictures wait than those of a second.
+TEST_F(MjpegSourceClock, GoesOnOverStampsThatCannotBeTrue) {
+  const std::vector<double> off = {7200, -10, -5000, 1e9, 2, -0.04};
+  std::vector<std::vector<double>> sent(off.size());
+  for (std::size_t i = 0; i < off.size(); ++i) {
+    for (int n = 0; n < 16; ++n) sent[i].push_back(9000 + 0.25 * n + (n == 8 ? off[i] : 0));
+  }
+  sent.back()[8] = sent.back()[7];  // told again
+  send(sent);
+  for (const std::vector<double>& connection : sent) {
+    for (std::size_t n = 0; n < connection.size(); ++n) {
+      const FrameStamp stamp = read().stamp;
+      EXPECT_EQ(stamp.sender_time_s.value_or(-1), n == 8 ? -1 : connection[n]) << n;
+      EXPECT_EQ(stamp.restarted, n == 0) << n;
+    }
+  }
+  EXPECT_EQ(counters().unstamped, 5) << "one told no new time";
+  EXPECT_THAT(remark(), HasSubstr("a picture's time stamp cannot be true: it is +7.2e+03 s off"));
+  EXPECT_EQ(remark(), "");
 }
 
 TEST_F(MjpegSourceClock, IsNotGivenUpForAPartWithoutANewStamp) {
@@ -305,7 +339,7 @@ TEST_F(MjpegSourceClock, IsForgottenUntilTheNextConnectionWhereItStands) {
 
 TEST_F(MjpegSourceClock, IsForgottenWhereItRunsBackwards) {
   send({{9, 8, 7, 6, 7, 8}});
-  expect({9, 8, 7, -1, -1, -1});
+  expect({9, -1, -1, -1, -1, -1});
 }
 
 TEST_F(MjpegSourceClock, IsForgottenWhereItIsCoarserThanTheFrames) {

@@ -131,6 +131,50 @@ TEST(MultipartScanner, NeedsNoLineEndBeforeADelimiter) {
   EXPECT_EQ(bodies(part + part + "--frame\r\n"), (Bodies{jpeg("a"), jpeg("a")}));
 }
 
+// The headers, or the picture, follow the boundary at once.
+TEST(MultipartScanner, NeedsNoLineEndBehindABoundary) {
+  const Bodies expected{jpeg("a"), jpeg("--frame "), jpeg("--framed\r\n--frame7:")};
+  for (const std::string end : {"\r\n", "\n"}) {
+    for (const std::string& before : {end, std::string()}) {
+      for (const std::string blanks : {"", " ", "  \t"}) {
+        for (const bool told : {true, false}) {
+          const std::string boundary = "--frame" + blanks;
+          std::string with_headers;
+          std::string without;
+          for (const std::string& body : expected) {
+            const std::string length =
+                told ? "Content-Length: " + std::to_string(body.size()) + end : "";
+            with_headers +=
+                boundary + "Content-Type: image/jpeg" + end + length + end + body + before;
+            without += boundary + body + before;
+          }
+          for (const char* declared : {"frame", "--frame", ""}) {
+            for (const std::size_t piece : {1U, 7U, 10'000U}) {
+              EXPECT_EQ(bodies(with_headers + "--frame" + end, declared, piece), expected)
+                  << declared << " " << told << " " << piece;
+            }
+          }
+          EXPECT_EQ(bodies(without + "--frame" + end, "frame", 3), expected);
+        }
+      }
+    }
+  }
+}
+
+TEST(MultipartScanner, LearnsABoundaryWhoseHeadersFollowAtOnce) {
+  std::string stream;
+  for (const char* body : {"a", "longer than ten"}) {
+    stream += "--frameContent-Length: " + std::to_string(jpeg(body).size()) +
+              "\r\nContent-Type: image/jpeg\r\n\r\n" + jpeg(body) + "\r\n";
+  }
+  EXPECT_EQ(bodies(stream, ""), (Bodies{jpeg("a"), jpeg("longer than ten")}));
+}
+
+TEST(MultipartScanner, TakesNoTextWithinAPartForAHeaderBehindABoundary) {
+  const std::string body = jpeg("\nframes: 3\n--frame-rate: 25\n--frame\xFF\xD9 ");
+  EXPECT_EQ(bodies("--frame\r\n\r\n" + body + "\r\n--frame\r\n"), Bodies{body});
+}
+
 TEST(MultipartScanner, NeedsNoHeaders) {
   EXPECT_EQ(
       bodies("--frame\r\n\r\n" + jpeg("a") + "\r\n--frame\r\n" + jpeg("b") + "\r\n--frame\r\n"),

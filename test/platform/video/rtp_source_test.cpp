@@ -386,6 +386,191 @@ TEST_P(RtpSourceWith, DropsWhatASlowReaderLeavesAndGoesOnAtAKeyFrame) {
   }
 }
 
+// What a camera sends beside its pictures, in the same channel.
+struct Foreign {
+  const char* name;
+  int payload_type;      // added to the pictures' own
+  bool other_source;     // SSRC
+  std::uint16_t begins;  // its numbering
+  bool marked;
+};
+
+void PrintTo(const Foreign& foreign, std::ostream* out) { *out << foreign.name; }
+
+class RtpSourceBeside : public ::testing::TestWithParam<std::tuple<Codec, Foreign>> {
+ protected:
+  // Bears the picture's own time stamp.
+  RtpRelay::Packet foreign_to(RtpRelay::Packet packet) {
+    const Foreign& kind = std::get<Foreign>(GetParam());
+    const int own_type = packet[1] & 0x7F;
+    packet[1] =
+        static_cast<std::uint8_t>((own_type + kind.payload_type) % 128 | (kind.marked ? 0x80 : 0));
+    packet[2] = static_cast<std::uint8_t>(number_ >> 8U);
+    packet[3] = static_cast<std::uint8_t>(number_);
+    ++number_;
+    if (kind.other_source) packet[11] = static_cast<std::uint8_t>(packet[11] ^ 0x55U);
+    packet.resize(40, 0x55);
+    return packet;
+  }
+
+ private:
+  std::uint16_t number_ = std::get<Foreign>(GetParam()).begins;
+};
+
+INSTANTIATE_TEST_SUITE_P(
+    Streams, RtpSourceBeside,
+    ::testing::Combine(::testing::Values(Codec::kMjpeg, Codec::kH264, Codec::kH265),
+                       ::testing::Values(Foreign{"Metadata", 11, false, 7, true},
+                                         Foreign{"ItsOwnSource", 1, true, 65'530, false})),
+    [](const auto& which) {
+      return ::testing::PrintToString(std::get<Codec>(which.param)) +
+             std::get<Foreign>(which.param).name;
+    });
+
+TEST_P(RtpSourceBeside, ForeignPacketsEveryPictureComesWhole) {
+  const Codec codec = std::get<Codec>(GetParam());
+  const int port = test::udp_port_pair();
+  const auto source = open_rtp(options_for(port, codec));
+  listen(*source, port);
+  RtpRelay relay(port);
+  RtpSender sender(codec, relay.port(), 1, codec == Codec::kMjpeg ? 1200 : 100);
+  for (int frames = 0; frames < 30;) {
+    ASSERT_LT(sender.sent(), 100) << "they come as fast as they are sent";
+    sender.send();
+    relay.forward([&](RtpRelay::Packets& packets) {
+      RtpRelay::Packets all;
+      for (const RtpRelay::Packet& packet : packets) {
+        all.push_back(packet);
+        all.push_back(foreign_to(packet));
+      }
+      packets = all;
+    });
+    Frame frame;
+    while (source->read(frame, 0.02) == ReadStatus::kOk) {
+      EXPECT_NEAR(grey_of(frame), RtpSender::grey_of(frames++), kGreyTolerance);
+    }
+  }
+  EXPECT_EQ(source->counters().damaged, 0);
+  EXPECT_GE(source->counters().foreign_packets, 29);
+  EXPECT_THAT(source->remark(), HasSubstr("come among the video's; the session has not agreed"));
+  EXPECT_EQ(source->remark(), "") << "said once";
+}
+
+TEST_P(RtpSourceWith, SaysWhichTypeComesInPlaceOfTheOneAgreedUpon) {
+  options_.timeout_s = 0.3;
+  const auto source = open_rtp(options_);
+  listen(*source, port_);
+  RtpRelay relay(port_);
+  RtpSender sender(GetParam(), relay.port());
+  ReadStatus status = ReadStatus::kTimeout;
+  while (status == ReadStatus::kTimeout) {
+    sender.send();
+    relay.forward([](RtpRelay::Packets& packets) {
+      for (RtpRelay::Packet& packet : packets) {
+        packet[1] = static_cast<std::uint8_t>(101 | (packet[1] & 0x80));
+      }
+    });
+    Frame frame;
+    status = source->read(frame, 0.02);
+  }
+  ASSERT_EQ(status, ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(),
+              HasSubstr(GetParam() == Codec::kMjpeg ? "payload type 101 in place of 26"
+                                                    : "payload type 101 in place of 96"));
+}
+
+// What becomes of the stamps of a sender whose time stamps are changed on their way.
+class RtpSourceStamps : public RtpSourceWith {
+ protected:
+  // Plays so many pictures; in each, `ticks_off` is added to the time stamp.
+  void play(int pictures, const std::function<std::uint32_t(std::int64_t)>& ticks_off,
+            const std::function<void(const Frame&)>& look) {
+    const auto source = open_rtp(options_);
+    listen(*source, port_);
+    RtpRelay relay(port_);
+    relay.begin_at(400'000'000);
+    RtpSender sender(GetParam(), relay.port());
+    for (int frames = 0; frames < pictures;) {
+      ASSERT_LT(sender.sent(), 2 * pictures);
+      const std::uint32_t off = ticks_off(sender.sent());
+      sender.send();
+      relay.forward([off](RtpRelay::Packets& packets) {
+        for (RtpRelay::Packet& packet : packets) {
+          std::uint32_t ticks = 0;
+          for (std::size_t i = 4; i < 8; ++i) ticks = ticks << 8U | packet[i];
+          ticks += off;
+          for (std::size_t i = 0; i < 4; ++i) {
+            packet[4 + i] = static_cast<std::uint8_t>(ticks >> (24 - 8 * i));
+          }
+        }
+      });
+      Frame frame;
+      for (auto status = ReadStatus::kOk; status == ReadStatus::kOk;) {
+        status = source->read(frame, 0.02);
+        ASSERT_NE(status, ReadStatus::kDisconnected) << source->error();
+        if (status != ReadStatus::kOk) break;
+        EXPECT_NEAR(grey_of(frame), RtpSender::grey_of(frames++), kGreyTolerance);
+        look(frame);
+      }
+    }
+    counters_ = source->counters();
+    remark_ = source->remark();
+  }
+  FrameSourceCounters counters_;
+  std::string remark_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Codecs, RtpSourceStamps,
+                         ::testing::Values(Codec::kMjpeg, Codec::kH264, Codec::kH265),
+                         ::testing::PrintToStringParamName());
+
+constexpr std::uint32_t kHour = 3600U * 90'000U;
+
+TEST_P(RtpSourceStamps, ThatCannotBeTrueAreLeftOutPictureByPicture) {
+  const std::vector<std::uint32_t> wrong = {2 * kHour,   0U - 2 * kHour, 0U - 10 * 90'000U,
+                                            0x8000'0000, 7 * kHour,      0U - 400'000'000U,
+                                            5 * 90'000U, 1'700'000'000U, 2'900'000'000U};
+  const auto is_bad = [&](std::int64_t n) {
+    // The last two in a row.
+    return (n % 6 == 5 && n / 6 < 8) || n == 48;
+  };
+  FrameStamp first;
+  play(
+      60,
+      [&](std::int64_t n) {
+        return is_bad(n) ? wrong[n == 48 ? 8 : static_cast<std::size_t>(n / 6)] : 0;
+      },
+      [&](const Frame& frame) {
+        const std::int64_t n = frame.stamp.frame;
+        if (n == 0) first = frame.stamp;
+        EXPECT_EQ(frame.stamp.restarted, n == 0) << n;
+        ASSERT_EQ(frame.stamp.sender_time_s.has_value(), !is_bad(n)) << n;
+        if (frame.stamp.sender_time_s) {
+          EXPECT_NEAR(number_of(frame, first), static_cast<double>(n), 1e-3) << n;
+        }
+      });
+  EXPECT_EQ(counters_.unstamped, 9);
+  EXPECT_EQ(counters_.damaged, 0);
+  EXPECT_THAT(remark_, HasSubstr("a picture's time stamp cannot be true: it is +7.2e+03 s off"));
+}
+
+TEST_P(RtpSourceStamps, OfAClockThatWasSetAreBelievedOnceSomeAgree) {
+  for (const std::uint32_t step : {3 * kHour, 0U - 90'000U}) {
+    std::optional<double> before_s;
+    play(
+        30, [step](std::int64_t n) { return n >= 12 ? step : 0; },
+        [&](const Frame& frame) {
+          const std::int64_t n = frame.stamp.frame;
+          EXPECT_EQ(frame.stamp.sender_time_s.has_value(), n != 12 && n != 13) << n;
+          EXPECT_EQ(frame.stamp.restarted, n == 0 || n == 14) << n;
+          if (n > 14 && frame.stamp.sender_time_s && before_s) {
+            EXPECT_NEAR(*frame.stamp.sender_time_s - *before_s, RtpSender::kPeriod_s, 1e-4);
+          }
+          before_s = frame.stamp.sender_time_s;
+        });
+  }
+}
+
 TEST_P(RtpSourceWith, BeginsAnewWithAnotherSender) {
   options_.timeout_s = 1;
   const auto source = open_rtp(options_);

@@ -177,6 +177,85 @@ TEST(RtspSession, KeepsThePacketsThatComeBeforeTheAnswerToPlay) {
   }
 }
 
+// Bytes that a camera, or what stands between, puts before the packets of its connection.
+TEST(RtspSession, PassesOverBytesThatBelongToNoPacket) {
+  const std::vector<std::string> garbage = {"x",
+                                            std::string("\0\0\0\0", 4),
+                                            "$",
+                                            "$$$$",
+                                            std::string("$\0\0\0", 4),
+                                            "RTSP",
+                                            "\r\nOPTIO",
+                                            "text",
+                                            "\x80\x1a\xff\n",
+                                            std::string("$\x01\xff\xff", 4)};
+  for (const int each : {1, 9}) {
+    ScriptedRtspServer server;
+    server.change_bytes = [&](std::int64_t packet, std::string* bytes) {
+      const auto which = static_cast<std::size_t>(packet / each) % garbage.size();
+      if (packet % each == each - 1) *bytes = garbage[which] + *bytes;
+    };
+    const auto source = open_rtp(options_for(server));
+    Frame frame;
+    for (int i = 0; i < 60; ++i) {
+      ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+      ASSERT_NEAR(frame.luma[0], RtpSender::grey_of(i), 3) << i;
+    }
+    EXPECT_EQ(source->counters().damaged, 0);
+    EXPECT_GT(source->counters().garbage_bytes, 0);
+    EXPECT_THAT(source->remark(), HasSubstr("bytes come that belong to no packet"));
+    EXPECT_EQ(source->remark(), "");
+    EXPECT_EQ(server.count("PLAY"), 1);
+  }
+}
+
+TEST(RtspSession, AnswersTheCameraBesideBytesThatBelongToNoPacket) {
+  ScriptedRtspServer server;
+  server.change_bytes = [](std::int64_t, std::string* bytes) { *bytes = "..." + *bytes; };
+  const auto source = open_rtp(options_for(server));
+  Frame frame;
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  server.ask = true;
+  read_while_waiting(*source, [&] { return server.count("RTSP/1.0", "CSeq: 77") == 1; });
+}
+
+TEST(RtspSession, EndsWhereWhatComesIsNoRtspAnyMore) {
+  ScriptedRtspServer server;
+  server.change_bytes = [](std::int64_t packet, std::string* bytes) {
+    if (packet > 10) *bytes = std::string(5000, 'x');
+  };
+  const auto source = open_rtp(options_for(server));
+  Frame frame;
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("what the camera sends is not RTSP"));
+}
+
+// The answer to SETUP names the source; another camera's packets of the same type come first.
+TEST(RtspSession, TakesThePacketsOfTheSourceThatItsAnswerNames) {
+  ScriptedRtspServer server([](const RtspRequest& request, RtspAnswer* answer) {
+    if (request.method != "SETUP") return;
+    answer->headers.insert(answer->headers.find("\r\n"), ";ssrc=0A0B0C0D");
+  });
+  server.change_packets = [](std::int64_t, RtpRelay::Packets* packets) {
+    RtpRelay::Packets all;
+    for (RtpRelay::Packet& packet : *packets) {
+      all.push_back(packet);
+      for (std::size_t i = 0; i < 4; ++i) packet[8 + i] = static_cast<std::uint8_t>(0x0A + i);
+      for (std::size_t i = 12; i < all.back().size(); ++i) all.back()[i] ^= 0x5AU;
+      all.back()[2] ^= 0x10U;
+      all.push_back(packet);
+    }
+    *packets = all;
+  };
+  const auto source = open_rtp(options_for(server));
+  Frame frame;
+  for (int i = 0; i < 20; ++i) {
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+    EXPECT_NEAR(frame.luma[0], RtpSender::grey_of(i), 3);
+  }
+  EXPECT_EQ(source->counters().damaged, 0);
+}
+
 struct Refusal {
   const char* name;
   const char* method;

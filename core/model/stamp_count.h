@@ -1,0 +1,151 @@
+#pragma once
+// StampCount: do a sender's stamps count its items in place of telling time?
+//
+//   sender_i = constant + step (i + lost in the network),  whatever time passes between two items
+//
+// Such a sender leaves items out, or takes them at another rate, and its stamps know nothing of it: receive - sender rises, and
+// never comes down again. So does a backlog that grows, but not for ever. Shown is it where all stamps are on one grid, and the
+// least receive - sender of each second, of the last kParts at most, never fell and rose
+//   by whole steps  (to kOnStep of one): by kSteps in kFewParts or more. No backlog grows so;
+//   or anyhow       by kApart_s, but by kNearApart_s where each second's rise is no more than kNear.
+// A rise of more than kStall_s at once is something that stood still, and begins anew.
+// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are seconds.
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <limits>
+#include <optional>
+#include <type_traits>
+
+namespace alidade {
+
+class StampCount {
+ public:
+  static constexpr std::size_t kParts = 32;
+  static constexpr std::size_t kFewParts = 12;
+  static constexpr double kSteps = 6;
+  static constexpr double kApart_s = 3;
+  static constexpr double kNearApart_s = 1;
+  static constexpr double kNear = 0.06;
+
+  void restart() { *this = StampCount(); }
+
+  // Finite values.
+  void add(double receive_s, double sender_s) {
+    const double step_s = sender_s - last_sender_s_;
+    const bool first = !any_;
+    any_ = true;
+    last_sender_s_ = sender_s;
+    if (first) return begin_part(receive_s);
+    if (!(step_s > 0) || step_s > kLongestStep_s) return restart();
+    if (step_s_ == 0 || step_s < step_s_ - kSame_s) {
+      step_s_ = step_s;
+      size_ = 0;
+      begin_part(receive_s);
+    }
+    // The grid is found by its finest step; what is off it is no count.
+    const double steps = std::round(step_s / step_s_);
+    if (std::abs(step_s - steps * step_s_) > kSame_s) {
+      size_ = 0;
+      begin_part(receive_s);
+      return;
+    }
+    if (items_ >= kLeastItems && receive_s - since_s_ >= kPart_s) end_part(receive_s);
+    const double level_s = receive_s - sender_s;
+    ++items_;
+    if (level_s >= part_.level_s) return;
+    part_ = {receive_s, level_s};
+  }
+
+  // The stamps' rate less one, if they are shown to count.
+  [[nodiscard]] std::optional<double> rate_error() const {
+    if (size_ < kFewParts) return std::nullopt;
+    const Part& first = part(0);
+    const Part& last = part(size_ - 1);
+    const double apart_s = last.level_s - first.level_s;
+    const double span_s = last.receive_s - first.receive_s;
+    const double enough_s = rises_slowly() ? kNearApart_s : kApart_s;
+    if (apart_s < enough_s && !(apart_s >= kSteps * step_s_ && rises_by_steps()))
+      return std::nullopt;
+    return -apart_s / span_s;
+  }
+
+  [[nodiscard]] double step_s() const { return step_s_; }
+
+ private:
+  static constexpr double kSame_s = 1.5e-4;
+  static constexpr double kLongestStep_s = 1;
+  static constexpr double kPart_s = 1;
+  static constexpr double kBack_s = 0.02;
+  static constexpr double kStall_s = 0.5;
+  static constexpr double kOnStep = 0.15;
+  static constexpr std::size_t kLeastItems = 3;
+
+  struct Part {
+    double receive_s = 0;  // of the item that comes down farthest
+    double level_s = std::numeric_limits<double>::infinity();
+  };
+
+  [[nodiscard]] const Part& part(std::size_t i) const { return parts_[(begin_ + i) % kParts]; }
+
+  void begin_part(double receive_s) {
+    since_s_ = receive_s;
+    items_ = 0;
+    part_ = Part();
+  }
+
+  void end_part(double receive_s) {
+    if (size_ > 0) {
+      const double rise_s = part_.level_s - part(size_ - 1).level_s;
+      if (rise_s < -kBack_s || rise_s > kStall_s) size_ = 0;
+    }
+    if (size_ == kParts) {
+      begin_ = (begin_ + 1) % kParts;
+      --size_;
+    }
+    parts_[(begin_ + size_) % kParts] = part_;
+    ++size_;
+    begin_part(receive_s);
+  }
+
+  [[nodiscard]] bool rises_slowly() const {
+    for (std::size_t i = 1; i < size_; ++i) {
+      if (part(i).level_s - part(i - 1).level_s > kNear * kPart_s) return false;
+    }
+    return true;
+  }
+
+  // About the phase that most have: that of the first may be late itself.
+  [[nodiscard]] bool rises_by_steps() const {
+    double sine = 0;
+    double cosine = 0;
+    constexpr double kTurn = 6.283185307179586;
+    for (std::size_t i = 0; i < size_; ++i) {
+      const double turns = (part(i).level_s - part(0).level_s) / step_s_;
+      sine += std::sin(kTurn * turns);
+      cosine += std::cos(kTurn * turns);
+    }
+    const double phase = std::atan2(sine, cosine) / kTurn;
+    for (std::size_t i = 0; i < size_; ++i) {
+      const double turns = (part(i).level_s - part(0).level_s) / step_s_ - phase;
+      if (std::abs(turns - std::round(turns)) > kOnStep) return false;
+    }
+    return true;
+  }
+
+  std::array<Part, kParts> parts_{};  // the oldest at begin_
+  std::size_t begin_ = 0;
+  std::size_t size_ = 0;
+  Part part_;  // of this second
+  double since_s_ = 0;
+  std::size_t items_ = 0;
+  bool any_ = false;
+  double last_sender_s_ = 0;
+  double step_s_ = 0;  // the grid's; 0: not known
+};
+
+static_assert(std::is_trivially_copyable_v<StampCount>);
+
+}  // namespace alidade

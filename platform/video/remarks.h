@@ -1,0 +1,47 @@
+#pragma once
+// Remarks: what a source has to say about its stream besides losses, each kind once in its life.
+// Thread-safe.
+
+#include <cstdio>
+#include <deque>
+#include <mutex>
+#include <set>
+#include <string>
+#include <utility>
+
+namespace alidade {
+
+class Remarks {
+ public:
+  void say(int kind, std::string text) {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (said_.insert(kind).second) new_.push_back(std::move(text));
+  }
+
+  // The next that was not taken yet; empty: none.
+  [[nodiscard]] std::string take() {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (new_.empty()) return "";
+    std::string text = std::move(new_.front());
+    new_.pop_front();
+    return text;
+  }
+
+ private:
+  std::mutex mutex_;
+  std::set<int> said_;
+  std::deque<std::string> new_;
+};
+
+// Of a stamp that cannot be true, by so much.
+[[nodiscard]] inline std::string bad_stamp_remark(double off_s) {
+  char text[192];
+  std::snprintf(
+      text, sizeof text,
+      "a picture's time stamp cannot be true: it is %+.3g s off the others; such pictures "
+      "are counted and have no stamp: a fault of the camera's clock",
+      off_s);
+  return text;
+}
+
+}  // namespace alidade

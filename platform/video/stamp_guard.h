@@ -1,0 +1,85 @@
+#pragma once
+// StampGuard: which of a stream's time stamps can be true.
+//
+// Pictures are sent in the order in which they are taken, and none comes before it was taken. So each stamp is greater than
+// the one before, and receive - sender falls below the least so far by no more than kEarly_s, which is more than a
+// network's delay changes by; but for a backlog, which comes at once and in steps of the usual length.
+// A stamp that is not so
+//   is bad   by itself: its picture has none;
+//   jumped   as the kAgreeing-th in a row that go on from each other like that: the sender's clock is another by now;
+//            or, where they are on the line that held before the last good one, that one was bad, and these are good.
+// How much later than before a picture comes tells nothing: it may have waited.
+// Fixed memory, no allocation, no exceptions. Seconds.
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+
+namespace alidade {
+
+class StampGuard {
+ public:
+  enum class Verdict : std::uint8_t { kGood, kBad, kJumped };
+
+  static constexpr double kEarly_s = 0.3;
+  static constexpr int kAgreeing = 3;
+
+  // The first is good whatever it is.
+  void restart() { line_ = other_ = Line{}; }
+
+  [[nodiscard]] Verdict judge(double receive_s, double sender_s) {
+    if (!std::isfinite(receive_s) || !std::isfinite(sender_s)) return Verdict::kBad;
+    if (line_.items == 0 || line_.goes_on(receive_s, sender_s)) {
+      line_.add(receive_s, sender_s);
+      other_ = Line{};
+      return Verdict::kGood;
+    }
+    if (!other_.goes_on(receive_s, sender_s)) other_ = Line{};
+    other_.add(receive_s, sender_s);
+    if (other_.items < kAgreeing) return Verdict::kBad;
+    const bool came_back = std::abs(other_.least_s - line_.level_before_s) < kEarly_s;
+    line_ = other_;
+    other_ = Line{};
+    return came_back ? Verdict::kGood : Verdict::kJumped;
+  }
+
+  // Where the next stamp would be if its picture were as late as the last good one's; 0 before the first.
+  [[nodiscard]] double expected_s(double receive_s) const {
+    return line_.items == 0 ? 0 : line_.last_s + (receive_s - line_.received_s);
+  }
+
+ private:
+  static constexpr double kEarlyAtFirst_s = 10;  // while no step is known
+  static constexpr double kLongStep = 4;         // times the usual
+
+  struct Line {
+    int items = 0;
+    double received_s = 0;
+    double last_s = 0;
+    double least_s = 0;         // receive - sender
+    double level_before_s = 0;  // the same of the last stamp but one
+    double step_s = 0;          // between two stamps, without the long ones; 0: not known
+
+    [[nodiscard]] bool goes_on(double receive_s, double sender_s) const {
+      const double step = sender_s - last_s;
+      if (items == 0 || !(step > 0)) return false;
+      const double early_s = step_s > 0 ? kEarly_s : kEarlyAtFirst_s;
+      return receive_s - sender_s >= least_s - early_s || step <= kLongStep * step_s;
+    }
+    void add(double receive_s, double sender_s) {
+      const double level_s = receive_s - sender_s;
+      level_before_s = items == 0 ? level_s : received_s - last_s;
+      least_s = items == 0 ? level_s : std::min(least_s, level_s);
+      if (items > 0)
+        step_s = step_s > 0 ? std::min(sender_s - last_s, 2 * step_s) : sender_s - last_s;
+      received_s = receive_s;
+      last_s = sender_s;
+      items = std::min(items + 1, kAgreeing);
+    }
+  };
+
+  Line line_;
+  Line other_;  // that the last ones, all bad so far, would be on
+};
+
+}  // namespace alidade

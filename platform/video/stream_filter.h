@@ -1,0 +1,71 @@
+#pragma once
+// StreamFilter: which RTP and RTCP packets of a channel are of the stream that the session agreed upon.
+//
+//   payload type  the description's. Packets of another (metadata, audio, repair) are foreign, whatever time they bear.
+//   source        the SSRC that SETUP's answer names, if it comes; else the first that comes. Another of the right type is a
+//                 sender that began anew, and is followed at once. Where the one before comes back, two are sending: that
+//                 one stays, and the other is foreign until it has been silent for kSilent_s.
+//   reports       of a foreign source are foreign.
+// Fixed memory. One thread at a time.
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "platform/video/rtp_packet.h"
+
+namespace alidade {
+
+class StreamFilter {
+ public:
+  static constexpr double kSilent_s = 1;
+
+  // payload_type < 0: any. source: as SETUP's answer has it.
+  explicit StreamFilter(int payload_type = -1, std::optional<std::uint32_t> source = std::nullopt)
+      : payload_type_(payload_type), agreed_(source) {}
+
+  // Whether it is the stream's own, RTP or RTCP. Each packet, in the order of arrival. What is neither is not judged: true.
+  [[nodiscard]] bool takes(const std::uint8_t* data, std::size_t size, double arrival_s);
+
+  // Foreign packets of the own source, left out since the own packet before the last, that were numbered between these two:
+  // they were not lost. For each, in order of arrival: use(header).
+  template <class Use>
+  void for_each_between(Use use) const {
+    const int span = behind(last_sequence_);
+    for (std::size_t i = 0; i < asides_; ++i) {
+      const int at = behind(aside_[i].sequence);
+      if (at > 0 && at < span) use(aside_[i]);
+    }
+  }
+
+  [[nodiscard]] std::optional<std::uint32_t> source() const { return source_; }
+  [[nodiscard]] std::int64_t foreign() const { return foreign_; }
+  // What they are, in a person's words; empty: none came.
+  [[nodiscard]] const std::string& foreign_kind() const { return kind_; }
+
+ private:
+  [[nodiscard]] int behind(std::uint16_t sequence) const {
+    return static_cast<std::uint16_t>(sequence - before_);
+  }
+  [[nodiscard]] bool is_own_source(std::uint32_t source, double arrival_s);
+  bool leave_out(const RtpHeader& header);
+
+  int payload_type_;
+  std::optional<std::uint32_t> agreed_;
+  std::optional<std::uint32_t> source_;          // followed
+  std::optional<std::uint32_t> left_;            // followed before it
+  std::optional<std::uint32_t> foreign_source_;  // the last
+  bool two_send_ = false;
+  double heard_s_ = 0;  // the source that is followed
+  std::uint16_t before_ = 0;
+  std::uint16_t last_sequence_ = 0;
+  std::array<RtpHeader, 32> aside_{};
+  std::size_t asides_ = 0;
+  bool asides_are_old_ = false;  // an own packet came behind them
+  std::int64_t foreign_ = 0;
+  std::string kind_;
+};
+
+}  // namespace alidade
