@@ -17,9 +17,9 @@ inline constexpr std::size_t kLongestClass = 32;  // bytes
 // What a class may be called: at most kLongestClass bytes, in one line. What is more is refused, not cut.
 [[nodiscard]] inline bool is_class_name(const std::string& name) {
   // As unsigned char: whether a plain one has a sign is the processor's choice, and ARM's has none.
-  return name.size() <= kLongestClass && std::none_of(name.begin(), name.end(), [](unsigned char c) {
-           return c < ' ' || c == '\x7f';
-         });
+  return name.size() <= kLongestClass &&
+         std::none_of(name.begin(), name.end(),
+                      [](unsigned char c) { return c < ' ' || c == '\x7f'; });
 }
 
 struct DetectedFrame {
