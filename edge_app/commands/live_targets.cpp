@@ -112,6 +112,7 @@ void LiveTargets::start() {
 
 void LiveTargets::stop() {
   feed_.stop();
+  spdlog::info("targets: {}", detections_text(feed_.snapshot().counters));
   if (writer_ && writer_->dropped() > 0)
     spdlog::warn(
         "{} lines of targets not written, as the reader of output.targets did not take "

@@ -122,9 +122,6 @@ void ReplayTargets::take() {
     return;
   }
   const DetectionAnswer answer = stage_.add(frame);
-  if (answer.box >= 0)
-    throw CommandError(kExitFailed, fmt::format("{}:{}: boxes: item {}: {}", name_, line_,
-                                                answer.box, to_string(answer.status)));
   if (is_taken(answer.status) && !writer_.write(targets_line(stage_.state())))
     throw CommandError(kExitFailed, writer_.error());
 }
@@ -146,17 +143,7 @@ void ReplayTargets::add(const OrientationRecord& record) {
 std::string ReplayTargets::complete() {
   while (waiting_ || next()) take();
   out_.complete();
-  const TargetsState state = stage_.state();
-  const TargetCounters& counters = state.counters;
-  std::string line = fmt::format("{}: {} frames of detections", out_.path(), state.updates);
-  if (counters.of(DetectionStatus::kTakenLate) > 0)
-    line += fmt::format(" ({} late)", counters.of(DetectionStatus::kTakenLate));
-  for (int i = 0; i < kDetectionStatusCount; ++i) {
-    const auto status = static_cast<DetectionStatus>(i);
-    if (is_taken(status) || counters.of(status) == 0) continue;
-    line += fmt::format(", {} refused ({})", counters.of(status), to_string(status));
-  }
-  return line;
+  return out_.path() + ": " + detections_text(stage_.state().counters);
 }
 
 }  // namespace alidade

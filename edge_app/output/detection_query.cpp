@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <array>
+#include <limits>
 #include <nlohmann/json.hpp>
 #include <set>
 #include <utility>
@@ -30,11 +31,11 @@ bool parse_box(const Json& item, DetectionBox* box, std::string* error) {
     const auto found = item.find(key);
     const bool is_there = found != item.end();
     if (!is_there && std::string(key) == "score") continue;
-    if (!is_there || !found->is_number()) {
+    if (!is_there || !(found->is_number() || found->is_null())) {
       *error = fmt::format("{} must be a number{}", key, is_there ? "" : " and is missing");
       return false;
     }
-    *value = found->get<double>();
+    *value = found->is_null() ? std::numeric_limits<double>::quiet_NaN() : found->get<double>();
   }
   const auto name = item.find("class");
   if (name == item.end()) return true;

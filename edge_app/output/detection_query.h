@@ -3,8 +3,9 @@
 //
 //   {"frame": N | "time_s": t, "boxes": [{"u": 10, "v": 20, "width": 30, "height": 70, "score": 0.9, "class": "person"}, ...]}
 //
-// Boxes as in detected_frame.h; score (1) and class (none) may be left out, and no box is an answer, too. Whether numbers make sense for the
-// frame is check_detections()'s to say. Read strictly (json_query.h).
+// Boxes as in detection_box.h; score (1) and class (none) may be left out, and no box is an answer, too. A number that is null, as JSON
+// writes one that is not finite, is a NaN here. Whether numbers make sense for the frame is check_detections()'s to say. Read strictly
+// (json_query.h).
 
 #include <string>
 #include <vector>

@@ -206,20 +206,20 @@ ServerResponse detections(const HttpApiSources& sources, const std::string& body
     feed.count_refused(found);
     return http_error(http_status_of(found), to_string(found));
   }
-  Json accepted{{"accepted", true},
-                {"frame", *frame.record.frame},
-                {"time_s", *frame.record.time_s},
-                {"boxes", frame.boxes.size()}};
+  Json accepted{
+      {"accepted", true}, {"frame", *frame.record.frame}, {"time_s", *frame.record.time_s}};
+  const std::size_t boxes = frame.boxes.size();
   const DetectionAnswer answer = feed.offer(std::move(frame));
+  accepted["boxes"] = boxes - answer.left_out.size();
+  accepted["left_out"] = Json::array();
+  for (const DetectionAnswer::LeftOut& one : answer.left_out)
+    accepted["left_out"].push_back({{"box", one.box}, {"reason", to_string(one.fault)}});
   if (is_taken(answer.status)) {
     ServerResponse response = json_response(accepted);
     response.status = 202;
     return response;
   }
-  const std::string where =
-      answer.box >= 0 ? fmt::format("boxes: item {}: ", answer.box) : std::string();
-  ServerResponse refusal =
-      http_error(http_status_of(answer.status), where + to_string(answer.status));
+  ServerResponse refusal = http_error(http_status_of(answer.status), to_string(answer.status));
   if (answer.status == DetectionStatus::kQueueFull)
     refusal.headers.emplace_back("Retry-After", "1");
   return refusal;

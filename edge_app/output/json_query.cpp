@@ -43,6 +43,10 @@ bool parse_json_object(const std::string& body, int deepest, const std::set<std:
   *object = Json::parse(body, nullptr, false);
   if (!object->is_object()) {
     *error = "the body must be a JSON object";
+    for (const char* word : {"NaN", "Infinity"}) {
+      if (object->is_discarded() && body.find(word) != std::string::npos)
+        *error += std::string("; ") + word + " is no number of JSON";
+    }
     return false;
   }
   return has_known_keys_only(*object, keys, error);

@@ -194,10 +194,8 @@ void add_target_metrics(const TargetFeed& feed, MetricsText* out) {
   out->add(static_cast<std::int64_t>(snapshot.waiting));
   out->counter("alidade_detection_boxes_total",
                "Boxes of frames that were taken, by what became of them");
-  out->add(counters.boxes_taken, {{"outcome", "taken"}});
-  out->add(counters.boxes_below_score, {{"outcome", "below_score"}});
-  out->add(counters.boxes_cut_off, {{"outcome", "cut_off"}});
-  out->add(counters.boxes_without_place, {{"outcome", "without_place"}});
+  for (const auto& outcome : counters.boxes())
+    out->add(outcome.boxes, {{"outcome", outcome.label}});
   out->counter("alidade_target_births_refused_total",
                "Targets not begun, as tracking.max_targets were there");
   out->add(counters.births_refused);

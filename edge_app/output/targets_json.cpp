@@ -84,12 +84,10 @@ Json target_counters_json(const TargetCounters& counters) {
     const auto status = static_cast<DetectionStatus>(i);
     frames[label_of(status)] = counters.of(status);
   }
+  Json boxes;
+  for (const auto& outcome : counters.boxes()) boxes[outcome.label] = outcome.boxes;
   return {{"frames", std::move(frames)},
-          {"boxes",
-           {{"taken", counters.boxes_taken},
-            {"below_score", counters.boxes_below_score},
-            {"cut_off", counters.boxes_cut_off},
-            {"without_place", counters.boxes_without_place}}},
+          {"boxes", std::move(boxes)},
           {"births_refused", counters.births_refused}};
 }
 

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -27,14 +28,12 @@ struct DetectedFrame {
   std::vector<DetectionBox> boxes;
 };
 
+// What became of a frame.
 enum class DetectionStatus {
   kTaken,
   kTakenLate,  // put in its place, later frames done again
   kMalformed,  // not what can be read
   kTooManyBoxes,
-  kBoxNotFinite,
-  kBoxOutside,  // its middle is not in the picture, or it has no size, or one beyond twice the picture's
-  kBadScore,
   kUnknownFrame,  // not among those that are kept
   kFrameNotYet,   // later than the newest
   kTooLate,  // more than tracker.history_s, or history_frames, behind the newest that was taken
@@ -54,9 +53,22 @@ inline constexpr int kDetectionStatusCount = static_cast<int>(DetectionStatus::k
 // One word, for metrics.
 [[nodiscard]] const char* label_of(DetectionStatus status);
 
+// Why a box is of no use. It is left out; the frame's others count.
+enum class BoxFault { kNotFinite, kBadScore, kNoSize, kTooLarge, kOutside };
+inline constexpr int kBoxFaultCount = static_cast<int>(BoxFault::kOutside) + 1;
+
+// In a picture of this size; none: it can be used.
+[[nodiscard]] std::optional<BoxFault> fault_of(const DetectionBox& box, int width, int height);
+[[nodiscard]] const char* to_string(BoxFault fault);
+[[nodiscard]] const char* label_of(BoxFault fault);
+
 struct DetectionAnswer {
+  struct LeftOut {
+    std::size_t box;  // counted from 0
+    BoxFault fault;
+  };
   DetectionStatus status = DetectionStatus::kTaken;
-  int box = -1;  // the one at fault
+  std::vector<LeftOut> left_out;  // of a frame that is taken
 };
 
 }  // namespace alidade

@@ -27,9 +27,8 @@ DetectionStatus status_of(FrameStatus status) {
       return DetectionStatus::kFrameNotYet;
     case FrameStatus::kTooManyDetections:
       return DetectionStatus::kTooManyBoxes;
-    case FrameStatus::kDetectionOutside:
-      return DetectionStatus::kBoxOutside;
     case FrameStatus::kBadFrame:
+    case FrameStatus::kDetectionOutside:
     case FrameStatus::kDetectionNotFinite:
     case FrameStatus::kDetectionCovariance:
       break;
@@ -37,15 +36,8 @@ DetectionStatus status_of(FrameStatus status) {
   return DetectionStatus::kNoGeometry;
 }
 
-DetectionStatus status_of(const DetectionBox& box, const PlainCalibration& camera) {
-  for (const double value : {box.u, box.v, box.width, box.height, box.score})
-    if (!std::isfinite(value)) return DetectionStatus::kBoxNotFinite;
-  if (!(box.score >= 0 && box.score <= 1)) return DetectionStatus::kBadScore;
-  const Vector2<double> middle = box.middle();
-  const bool inside = box.width > 0 && box.height > 0 && box.width <= 2.0 * camera.width &&
-                      box.height <= 2.0 * camera.height && middle.x() >= 0 &&
-                      middle.x() <= camera.width && middle.y() >= 0 && middle.y() <= camera.height;
-  return inside ? DetectionStatus::kTaken : DetectionStatus::kBoxOutside;
+std::optional<BoxFault> fault_in_picture(const DetectionBox& box, const PlainCalibration& camera) {
+  return fault_of(box, camera.width, camera.height);
 }
 
 }  // namespace
@@ -61,10 +53,8 @@ DetectionAnswer check_detections(const DetectedFrame& frame, const TargetOptions
     return answer;
   }
   for (std::size_t i = 0; i < frame.boxes.size(); ++i) {
-    answer.status = status_of(frame.boxes[i], frame.record.camera);
-    if (answer.status == DetectionStatus::kTaken) continue;
-    answer.box = static_cast<int>(i);
-    return answer;
+    if (const auto fault = fault_in_picture(frame.boxes[i], frame.record.camera))
+      answer.left_out.push_back({i, *fault});
   }
   return answer;
 }
@@ -79,13 +69,17 @@ DetectionAnswer TargetStage::add(const DetectedFrame& frame) {
   return answer;
 }
 
-// The boxes that tell a place, and their places.
+// The boxes that can be used and tell a place, and their places.
 void TargetStage::choose(const DetectedFrame& frame, const FrameView& view) {
   chosen_.clear();
   measured_.clear();
   const double sigma_px = options_.detection_sigma_px;
   const Matrix2<double> cov_u = sigma_px * sigma_px * Matrix2<double>::Identity();
   for (const DetectionBox& box : frame.boxes) {
+    if (const auto fault = fault_in_picture(box, frame.record.camera)) {
+      ++counters_.boxes_unusable[static_cast<std::size_t>(*fault)];
+      continue;
+    }
     if (box.score < options_.least_score) {
       ++counters_.boxes_below_score;
       continue;

@@ -1,8 +1,8 @@
 #pragma once
 // TargetStage: frames' detections in, targets out. Each frame is taken with its record: its camera and orientation give each box its place
-// (frame_view.h), the tracker the rest (core/tracking/target_tracker.h). Refused is a whole frame, with the reason and the box at fault, and
-// nothing changes then; a box that merely tells no place on the plane is left out and counted. A frame may be late: history_s and
-// history_frames. Equal calls give equal results. For one thread; allocates.
+// (frame_view.h), the tracker the rest (core/tracking/target_tracker.h). A frame that is refused changes nothing. A box that is of no use
+// (BoxFault), or tells no place on the plane, is left out and counted. A frame may be late: history_s and history_frames. Equal calls
+// give equal results. For one thread; allocates.
 
 #include <deque>
 #include <map>
@@ -15,7 +15,7 @@
 
 namespace alidade {
 
-// Whether a frame can be taken, as far as itself shows. Any thread.
+// Whether a frame can be taken, and which of its boxes are left out, as far as itself shows. Any thread.
 [[nodiscard]] DetectionAnswer check_detections(const DetectedFrame& frame,
                                                const TargetOptions& options);
 

@@ -15,8 +15,10 @@ namespace alidade {
 
 struct TargetCounters {
   std::array<std::int64_t, kDetectionStatusCount> frames{};  // by what became of them
+  // Of frames that were taken. Those that are of no use:
+  std::array<std::int64_t, kBoxFaultCount> boxes_unusable{};
   std::int64_t boxes_taken = 0;
-  // Of frames that were taken, boxes that say nothing of a target's place.
+  // Those that say nothing of a target's place:
   std::int64_t boxes_below_score = 0;
   std::int64_t boxes_cut_off =
       0;  // by the picture's lower edge: on a plane, their foot is not seen
@@ -28,7 +30,20 @@ struct TargetCounters {
   [[nodiscard]] std::int64_t of(DetectionStatus status) const {
     return frames[static_cast<std::size_t>(status)];
   }
+  [[nodiscard]] std::int64_t of(BoxFault fault) const {
+    return boxes_unusable[static_cast<std::size_t>(fault)];
+  }
+  struct BoxCount {
+    const char* label;  // one word, for metrics
+    const char* words;  // for people
+    std::int64_t boxes;
+  };
+  // All boxes of frames that were taken, by what became of them; those that were taken first.
+  [[nodiscard]] std::vector<BoxCount> boxes() const;
 };
+
+// In one line for people: frames, refusals and boxes that were left out, with the reasons.
+[[nodiscard]] std::string detections_text(const TargetCounters& counters);
 
 // How a target was when it was last seen.
 struct TargetLook {

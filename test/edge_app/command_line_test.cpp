@@ -610,10 +610,6 @@ TEST_F(CommandLineTest, ReplayNamesTheLineOfDetectionsThatItCannotUse) {
   } slips[] = {
       {middle_box(20) + "{\"frame\": 21}\n", {}, 1, "d.jsonl:2: boxes must be an array"},
       {middle_box(20) + "\n\nx\n", {}, 1, "d.jsonl:4: the body must be a JSON object"},
-      {"{\"frame\": 20, \"boxes\": [{\"u\": 5000, \"v\": 1, \"width\": 9, \"height\": 9}]}",
-       {},
-       1,
-       "d.jsonl:1: boxes: item 0: the box's middle is not in the picture"},
       {R"({"frame": 20, "boxes": [{"u": 1, "v": 1, "width": 9, "height": 9, "class": ")" +
            std::string(33, 'x') + R"("}]})",
        {},
@@ -637,6 +633,38 @@ TEST_F(CommandLineTest, ReplayNamesTheLineOfDetectionsThatItCannotUse) {
               HasSubstr("--detections"));
   EXPECT_THAT(alidade({"replay", directory_.path(), "--detections", path("nowhere")}).errors,
               HasSubstr("nowhere: cannot be read"));
+}
+
+// A detector's file of another system, with a box in it whose middle is beyond the picture, one without a size and one without a place.
+TEST_F(CommandLineTest, ReplayLeavesOutBoxesThatAreOfNoUseAndCountsThem) {
+  head_.record(directory_, 40);
+  std::string right;
+  std::string spoilt;
+  for (int i = 20; i < 40; ++i) {
+    const std::string line = middle_box(i);
+    right += line;
+    std::string bad = R"({"u": 1915, "v": 530, "width": 20, "height": 20}, )";
+    if (i == 30) bad += R"({"u": 9, "v": 9, "width": 0, "height": 20}, )";
+    if (i == 35) bad += R"({"u": null, "v": null, "width": 5, "height": 20}, )";
+    spoilt += line.substr(0, line.find('[') + 1) + bad + line.substr(line.find('[') + 1);
+    spoilt.insert(spoilt.size() - 1, "\r");
+  }
+  directory_.write("right.jsonl", right);
+  directory_.write("spoilt.jsonl", spoilt + "\r\n");
+  for (const char* name : {"right", "spoilt"}) {
+    const Result result = alidade({"replay", directory_.path(), "--calibration",
+                                   directory_.write("c.yaml", head_.calibration()), "--detections",
+                                   path(std::string(name) + ".jsonl"), "-o", path(name)});
+    ASSERT_EQ(result.exit_code, 0) << result.errors;
+    if (name == std::string("right")) {
+      EXPECT_THAT(result.errors, Not(HasSubstr("left out")));
+    } else {
+      EXPECT_THAT(result.errors,
+                  HasSubstr("20 frames of detections; boxes left out: 1 (a number of it is not "
+                            "finite), 1 (its width or height is not above 0), 20 (its middle"));
+    }
+  }
+  EXPECT_EQ(directory_.read("spoilt/targets.jsonl"), directory_.read("right/targets.jsonl"));
 }
 
 // A frame of so many boxes, in one line.

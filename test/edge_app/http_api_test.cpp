@@ -367,7 +367,8 @@ TEST_F(HttpApiWithTargetsTest, RefusesEachKindOfBadDetectionsWithItsReason) {
     const char* reason;
   } refusals[] = {
       {"not JSON", "400", "must be a JSON object"},
-      {R"({"frame": 1, "boxes": [{"u": NaN, "v": 1, "width": 1, "height": 1}]})", "400", "object"},
+      {R"({"frame": 1, "boxes": [{"u": NaN, "v": 1, "width": 1, "height": 1}]})", "400",
+       "object; NaN is no number of JSON"},
       {R"({"frame": 1, "boxes": [{"u": 1e999, "v": 1, "width": 1, "height": 1}]})", "400",
        "object"},
       {R"({"boxes": []})", "400", "frame or time_s is missing"},
@@ -389,12 +390,6 @@ TEST_F(HttpApiWithTargetsTest, RefusesEachKindOfBadDetectionsWithItsReason) {
       {R"({"frame": 1, "boxes": [{"u": 1, "v": 1, "width": 1, "height": 1, "class": ")" +
            std::string(33, 'x') + R"("}]})",
        "400", "class must be a text"},
-      {R"({"frame": 1, "boxes": [)" + box + ", " +
-           R"({"u": 1900, "v": 5, "width": 50, "height": 9})" + "]}",
-       "400", "boxes: item 1: the box's middle is not in the picture"},
-      {R"({"frame": 1, "boxes": [{"u": 1, "v": 1, "width": -1, "height": 1}]})", "400", "no size"},
-      {R"({"frame": 1, "boxes": [{"u": 1, "v": 1, "width": 1, "height": 1, "score": 2}]})", "400",
-       "item 0: the score"},
       {R"({"frame": 1, "boxes": [)" + box + "," + box + "," + box + "]}", "400",
        "more boxes than tracking.max_detections"},
       {R"({"frame": 60, "boxes": []})", "404", "later than the newest frame"},
@@ -419,9 +414,45 @@ TEST_F(HttpApiWithTargetsTest, RefusesEachKindOfBadDetectionsWithItsReason) {
   EXPECT_EQ(targets["targets"], json::array());
   EXPECT_TRUE(targets["frame"].is_null());
   EXPECT_EQ(targets["detections"]["frames"]["malformed"], 17);
-  EXPECT_EQ(targets["detections"]["frames"]["outside"], 2);
   EXPECT_EQ(targets["detections"]["frames"]["not_yet"], 3);
-  EXPECT_THAT(get("/metrics"), HasSubstr("alidade_detection_frames_total{outcome=\"score\"} 1\n"));
+  EXPECT_THAT(get("/metrics"),
+              HasSubstr("alidade_detection_frames_total{outcome=\"no_orientation\"} 1\n"));
+}
+
+TEST_F(HttpApiWithTargetsTest, LeavesOutABoxThatIsOfNoUseAndSaysWhich) {
+  start();
+  const std::string good = R"({"u": 900, "v": 500, "width": 20, "height": 50})";
+  const struct {
+    std::string box;
+    const char* outcome;
+    const char* reason;
+  } bad[] = {
+      {R"({"u": 1900, "v": 5, "width": 50, "height": 9})", "outside", "middle is not in the"},
+      {R"({"u": 1, "v": 1, "width": -1, "height": 1})", "no_size", "width or height is not above"},
+      {R"({"u": 1, "v": 1, "width": 1, "height": 1, "score": 2})", "score", "score is not from 0"},
+      {R"({"u": null, "v": 1, "width": 1, "height": 1})", "not_finite", "a number of it is not"}};
+  std::int64_t frame = 0;
+  for (const auto& one : bad) {
+    const std::string number = std::to_string(++frame);
+    const std::string answer =
+        post("/api/v1/detections",
+             R"({"frame": )" + number + R"(, "boxes": [)" + good + "," + one.box + "]}\r\n");
+    EXPECT_THAT(answer, StartsWith("HTTP/1.1 202 ")) << one.box;
+    const json told = body_of(answer);
+    EXPECT_EQ(told["boxes"], 1);
+    ASSERT_EQ(told["left_out"].size(), 1U);
+    EXPECT_EQ(told["left_out"][0]["box"], 1);
+    EXPECT_THAT(told["left_out"][0]["reason"].get<std::string>(), HasSubstr(one.reason));
+  }
+  while (feed.snapshot().counters.of(DetectionStatus::kTaken) < frame) std::this_thread::yield();
+  const std::string metrics = get("/metrics");
+  for (const auto& one : bad) {
+    EXPECT_THAT(metrics, HasSubstr(std::string("alidade_detection_boxes_total{outcome=\"") +
+                                   one.outcome + "\"} 1\n"));
+  }
+  const json boxes = body_of(get("/api/v1/targets"))["detections"]["boxes"];
+  EXPECT_EQ(boxes["taken"], 4);
+  EXPECT_EQ(boxes["outside"], 1);
 }
 
 TEST_F(HttpApiWithTargetsTest, TenThousandBoxesInOneBodyAreRefusedAndCostTheTargetsNothing) {

@@ -73,18 +73,20 @@ TEST(TargetFeed, RefusesAtOnceWhatCanBeSeenAtOnce) {
   DetectedFrame outside = ground_seen(1001);
   outside.boxes[0].u = -4000;
   const DetectionAnswer answer = feed.offer(outside);
-  EXPECT_EQ(answer.status, DetectionStatus::kBoxOutside);
-  EXPECT_EQ(answer.box, 0);
+  EXPECT_EQ(answer.status, DetectionStatus::kTaken);
+  ASSERT_EQ(answer.left_out.size(), 1U);
+  EXPECT_EQ(answer.left_out[0].fault, BoxFault::kOutside);
   feed.count_refused(DetectionStatus::kMalformed);
-  EXPECT_EQ(feed.offer(ground_seen(1000)).status, DetectionStatus::kRepeated);
-  ASSERT_EQ(feed.offer(ground_seen(1002)).status, DetectionStatus::kTaken);
   static_cast<void>(news.wait_for(2));
+  EXPECT_EQ(feed.offer(ground_seen(1001)).status, DetectionStatus::kRepeated);
+  ASSERT_EQ(feed.offer(ground_seen(1002)).status, DetectionStatus::kTaken);
+  static_cast<void>(news.wait_for(3));
   const TargetCounters counters = feed.snapshot().counters;
   EXPECT_EQ(counters.of(DetectionStatus::kTooLate), 1);
-  EXPECT_EQ(counters.of(DetectionStatus::kBoxOutside), 1);
+  EXPECT_EQ(counters.of(BoxFault::kOutside), 1);
   EXPECT_EQ(counters.of(DetectionStatus::kMalformed), 1);
   EXPECT_EQ(counters.of(DetectionStatus::kRepeated), 1);
-  EXPECT_EQ(counters.of(DetectionStatus::kTaken), 2);
+  EXPECT_EQ(counters.of(DetectionStatus::kTaken), 3);
 }
 
 TEST(TargetFeed, EndsWithoutTakingWhatWaits) {

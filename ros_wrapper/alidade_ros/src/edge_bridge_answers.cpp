@@ -23,6 +23,7 @@ void EdgeBridge::diagnose_connection(diagnostic_updater::DiagnosticStatusWrapper
   status.add("connections", counters.connections);
   status.add("detections taken", detections_taken_);
   status.add("detections refused", detections_refused_);
+  status.add("boxes left out", boxes_left_out_);
   if (!detections_error_.empty()) status.add("why, last", detections_error_);
   status.add("steps of the wall clock", clock_.steps());
   if (const auto uncertainty = clock_.uncertainty_s()) {

@@ -49,9 +49,18 @@ void EdgeBridge::forward_detections(const alidade_msgs::Detections& detections) 
     if (!connected_) error = error_;
     asked = connected_;
   }
-  if (asked) error = client_.post("/api/v1/detections", question).error;
+  std::size_t left_out = 0;
+  if (asked) {
+    const HttpClient::Answer answer = client_.post("/api/v1/detections", question);
+    error = answer.error;
+    std::string why;
+    left_out = detections_left_out(answer.body, &why);
+    if (left_out > 0)
+      ROS_WARN_THROTTLE(10, "of one frame, boxes left out: %zu (%s)", left_out, why.c_str());
+  }
   if (!error.empty()) ROS_WARN_THROTTLE(10, "detections refused: %s", error.c_str());
   const std::lock_guard<std::mutex> lock(mutex_);
+  boxes_left_out_ += left_out;
   if (error.empty()) {
     ++detections_taken_;
   } else {

@@ -144,4 +144,16 @@ bool detections_question(const alidade_msgs::Detections& detections, const Clock
   return true;
 }
 
+std::size_t detections_left_out(const std::string& answer, std::string* why) {
+  try {
+    const Json told = Json::parse(answer);
+    const Json& left_out = told.at("left_out");
+    if (left_out.empty()) return 0;
+    *why = left_out.at(0).at("reason").get<std::string>();
+    return left_out.size();
+  } catch (const Json::exception&) {
+    return 0;  // an edge that says nothing of it
+  }
+}
+
 }  // namespace alidade_ros

@@ -121,7 +121,7 @@ TEST(Detections, AreAskedAboutByStampOrFrame) {
   EXPECT_EQ(json["boxes"][0],
             nlohmann::json::parse(
                 R"({"u":10.5,"v":20.5,"width":3.0,"height":6.0,"score":0.5,"class":"boat"})"));
-  EXPECT_TRUE(json["boxes"][1]["score"].is_null()) << "which the edge refuses";
+  EXPECT_TRUE(json["boxes"][1]["score"].is_null()) << "which the edge leaves out";
   detections.detections[0].label = std::string(33, 'x');
   ASSERT_TRUE(detections_question(detections, clock_at(1000), &text, &error)) << error;
   EXPECT_EQ(nlohmann::json::parse(text)["boxes"][0]["class"], std::string(33, 'x'))
@@ -134,6 +134,17 @@ TEST(Detections, AreAskedAboutByStampOrFrame) {
   detections.by_frame = false;
   EXPECT_FALSE(detections_question(detections, ClockMap(), &text, &error));
   EXPECT_NE(error.find("clock"), std::string::npos);
+}
+
+TEST(Detections, TellsWhatTheEdgeHasLeftOut) {
+  std::string why;
+  EXPECT_EQ(detections_left_out(R"({"accepted":true,"boxes":1,"left_out":[]})", &why), 0U);
+  EXPECT_EQ(detections_left_out(R"({"error":"no such frame"})", &why), 0U);
+  EXPECT_EQ(detections_left_out("", &why), 0U);
+  EXPECT_EQ(why, "");
+  EXPECT_EQ(detections_left_out(R"({"left_out":[{"box":1,"reason":"outside"},{"box":2}]})", &why),
+            2U);
+  EXPECT_EQ(why, "outside");
 }
 
 const Marker* find(const MarkerArray& array, const std::string& ns) {

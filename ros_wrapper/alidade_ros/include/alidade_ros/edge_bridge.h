@@ -123,7 +123,8 @@ class EdgeBridge {
   bool plane_is_old_ = true;
   std::uint64_t detections_taken_ = 0;
   std::uint64_t detections_refused_ = 0;
-  std::string detections_error_;  // of the last that were refused
+  std::uint64_t boxes_left_out_ = 0;  // of detections that were taken
+  std::string detections_error_;      // of the last that were refused
   bool calibration_is_old_ = true;
   bool wake_ = false;
   bool ending_ = false;

@@ -7,6 +7,7 @@
 #include <alidade_msgs/Detections.h>
 #include <alidade_msgs/Targets.h>
 
+#include <cstddef>
 #include <string>
 
 #include "alidade_ros/clock_map.h"
@@ -23,5 +24,7 @@ namespace alidade_ros {
 [[nodiscard]] bool detections_question(const alidade_msgs::Detections& detections,
                                        const ClockMap& clock, std::string* json,
                                        std::string* error);
+// How many boxes the edge has left out, by its answer, and why the first.
+[[nodiscard]] std::size_t detections_left_out(const std::string& answer, std::string* why);
 
 }  // namespace alidade_ros
