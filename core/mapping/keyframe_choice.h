@@ -44,8 +44,13 @@ class KeyframeChoice {
   // turn_rate, rad/s; zoom_rate, d log f / dt, 1/s; readout_s: of the whole image.
   [[nodiscard]] bool is_slow(double log_f, double turn_rate, double zoom_rate,
                              double readout_s) const {
-    return std::abs(turn_rate) * std::exp(log_f) * readout_s <= options_.most_motion_px &&
-           std::abs(zoom_rate) * readout_s <= options_.most_log_f_change;
+    return haste(log_f, turn_rate, zoom_rate, readout_s) <= 1;
+  }
+  // The same, over what is slow: above 1 it is not.
+  [[nodiscard]] double haste(double log_f, double turn_rate, double zoom_rate,
+                             double readout_s) const {
+    return std::max(std::abs(turn_rate) * std::exp(log_f) * readout_s / options_.most_motion_px,
+                    std::abs(zoom_rate) * readout_s / options_.most_log_f_change);
   }
   [[nodiscard]] bool is_new(const SeenPlace& place) const {
     return std::all_of(kept_.begin(), kept_.end(),

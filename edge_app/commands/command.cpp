@@ -14,6 +14,7 @@
 #include "platform/pan_tilt/query_source.h"
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
 #include "platform/pan_tilt/vapix_source.h"
+#include "platform/storage/recording.h"
 #include "platform/video/mjpeg_source.h"
 #include "platform/video/recording_frame_source.h"
 #include "platform/video/rtp_source.h"
@@ -26,6 +27,14 @@ Config require_config(const std::string& path) {
   std::string error;
   if (!load_config(path, &config, &error)) throw CommandError(kExitUsage, error);
   for (const std::string& warning : config.warnings) spdlog::warn("{}", warning);
+  if (is_recording(config)) {
+    // What is wrong with a recording its source says, or who needs the size.
+    RecordingInfo info;
+    if (read_recording_info(config.video.directory, &info, &error)) {
+      config.video.width = info.width;
+      config.video.height = info.height;
+    }
+  }
   return config;
 }
 
@@ -63,7 +72,9 @@ NamedCalibration choose_calibration(const Config& config) {
   if (!file.empty() && !not_yet) {
     NamedCalibration chosen = require_calibration_file(file);
     const Camera<double>& camera = chosen.calibration.camera;
-    if (video.width > 0 && (video.width != camera.width || video.height != camera.height)) {
+    // A recording's frames say it themselves.
+    if (!is_recording(config) && video.width > 0 &&
+        (video.width != camera.width || video.height != camera.height)) {
       throw CommandError(
           kExitUsage,
           fmt::format(

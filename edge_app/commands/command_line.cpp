@@ -69,7 +69,9 @@ void add_record(CLI::App& app, int* exit_code) {
   command->add_option("-c,--config", options->config, "Configuration (YAML)")->required();
   command->add_option("-o,--output", options->directory, "Directory of the new recording")
       ->required();
-  command->add_option("--duration", options->duration_s, "End after so many seconds")
+  command
+      ->add_option("--duration", options->duration_s,
+                   "End so many seconds after the first frame that is stored")
       ->check(is_duration);
   command->callback([options, exit_code] { *exit_code = record_streams(*options); });
 }

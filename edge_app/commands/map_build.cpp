@@ -49,11 +49,52 @@ void require_one_size(const std::vector<MapRecording>& recordings) {
   }
 }
 
-// By place where telemetry tells it, beside those that are there, else evenly over time.
+// How fast the pictures of a map may turn.
+struct Pace {
+  double readout_s = 0;    // of a picture
+  bool is_known = false;   // by a calibration: telemetry then tells where each row looks
+  std::size_t frames = 0;  // whose speed telemetry tells
+  std::size_t fast = 0;    // of them, too fast
+  double longest_f = 0;    // px, of all
+  [[nodiscard]] double most_haste() const { return is_known ? kMostKnownHaste : 1; }
+
+  // In the words and the numbers of somebody who turns the camera.
+  [[nodiscard]] std::string text() const {
+    const double most_px = KeyframeChoiceOptions().most_motion_px * most_haste();
+    std::string out = fmt::format("so slowly that a picture moves by at most {:g} px", most_px);
+    if (longest_f == 0) return out + " while it is read out";
+    out += fmt::format(
+        " in the {:.3g} ms in which it is read out, {:.2g} deg/s at a focal length of "
+        "{:.0f} px",
+        1e3 * readout_s, 180 / kPi * most_px / longest_f / readout_s, longest_f);
+    if (!is_known) {
+      out += fmt::format(
+          " (that read-out is a guess: with a calibration, as of `alidade calibrate`, beside the "
+          "first recording or by --calibration, {:g} px are well)",
+          KeyframeChoiceOptions().most_motion_px * kMostKnownHaste);
+    }
+    return out;
+  }
+
+ private:
+  // Where each row's motion is known, blur is what is left.
+  static constexpr double kMostKnownHaste = 5;
+};
+
+// Where nothing tells the read-out.
+constexpr double kGuessedReadout_s = 0.03;
+
+// By place where telemetry tells it, beside those that are there, else evenly over time. Slow ones first; places that no slow one shows, by
+// the slowest that do.
 std::vector<Chosen> choose(const std::vector<MapRecording>& recordings,
                            const std::vector<std::vector<MapView>>& views, const SceneMap& there,
-                           const MapBuildOptions& build, int most) {
-  const double readout_s = std::abs(build.line_delay) * build.height;
+                           const MapBuildOptions& build, int most, Pace* pace) {
+  struct Fast {
+    double haste;
+    Chosen chosen;
+    SeenPlace place;
+  };
+  std::vector<Fast> fast;
   KeyframeChoice choice(build.width, build.height);
   for (const SceneKeyframe& k : there.keyframes) {
     if (k.telemetry) choice.keep({*k.telemetry, k.position});
@@ -67,14 +108,28 @@ std::vector<Chosen> choose(const std::vector<MapRecording>& recordings,
         if (recordings[r].telemetry.empty() || !view.log_f) others.push_back({r, i});
         continue;
       }
-      // Without a read-out that is known nothing that moves can be trusted.
-      const bool is_slow = choice.is_slow(*view.log_f, view.angular_velocity.norm(), view.zoom_rate,
-                                          readout_s > 0 ? readout_s : 0.03);
+      const double haste =
+          choice.haste(*view.log_f, view.angular_velocity.norm(), view.zoom_rate, pace->readout_s);
       const SeenPlace place{*view.telemetry, *view.log_f};
-      if (!is_slow || !choice.is_new(place)) continue;
-      choice.keep(place);
-      placed.push_back({r, i});
+      ++pace->frames;
+      pace->longest_f = std::max(pace->longest_f, std::exp(*view.log_f));
+      if (haste > 1) {
+        fast.push_back({haste, {r, i}, place});
+        if (haste <= pace->most_haste()) continue;
+        ++pace->fast;
+      } else if (choice.is_new(place)) {
+        choice.keep(place);
+        placed.push_back({r, i});
+      }
     }
+  }
+  std::stable_sort(fast.begin(), fast.end(),
+                   [](const Fast& a, const Fast& b) { return a.haste < b.haste; });
+  for (const Fast& one : fast) {
+    if (one.haste > pace->most_haste()) break;
+    if (!choice.is_new(one.place)) continue;
+    choice.keep(one.place);
+    placed.push_back(one.chosen);
   }
   const auto thinned = [](const std::vector<Chosen>& all, std::size_t count) {
     if (all.size() <= count) return all;
@@ -86,8 +141,9 @@ std::vector<Chosen> choose(const std::vector<MapRecording>& recordings,
   std::vector<Chosen> out = thinned(placed, limit);
   const std::vector<Chosen> rest = thinned(others, limit - std::min(limit, out.size()));
   out.insert(out.end(), rest.begin(), rest.end());
-  std::stable_sort(out.begin(), out.end(),
-                   [](const Chosen& a, const Chosen& b) { return a.recording < b.recording; });
+  std::sort(out.begin(), out.end(), [](const Chosen& a, const Chosen& b) {
+    return std::pair(a.recording, a.frame) < std::pair(b.recording, b.frame);
+  });
   return out;
 }
 
@@ -148,7 +204,13 @@ std::string names_of(const MapBuilder& builder, const std::vector<int>& pictures
   return out;
 }
 
-[[noreturn]] void refuse(const MapBuilder& builder, const MapBuild& build) {
+// What was left out as it moved, before a refusal that it may explain.
+std::string fast_text(const Pace& pace) {
+  return pace.fast == 0 ? ""
+                        : fmt::format("; {} of {} frames moved too fast", pace.fast, pace.frames);
+}
+
+[[noreturn]] void refuse(const MapBuilder& builder, const MapBuild& build, const Pace& pace) {
   const std::string what = to_string(build.status);
   switch (build.status) {
     case MapBuildStatus::kNotConnected: {
@@ -157,11 +219,11 @@ std::string names_of(const MapBuilder& builder, const std::vector<int>& pictures
         parts += fmt::format("{}{} ({})", g > 0 ? "; " : "", build.groups[g].size(),
                              names_of(builder, build.groups[g]));
       }
-      throw CommandError(kExitFailed,
-                         fmt::format("{}: {} parts, of pictures {}; add recordings that pass from "
-                                     "one to the other, slowly and at zooms between, or take the "
-                                     "largest with --largest-part",
-                                     what, build.groups.size(), parts));
+      throw CommandError(
+          kExitFailed, fmt::format("{}: {} parts, of pictures {}{}; add recordings that pass "
+                                   "from one to the other, at zooms between, {}; or take the "
+                                   "largest with --largest-part",
+                                   what, build.groups.size(), parts, fast_text(pace), pace.text()));
     }
     case MapBuildStatus::kNoTexture:
       throw CommandError(kExitFailed,
@@ -240,7 +302,12 @@ int build_map(const MapBuildCommand& options) {
   const FeatureDetector detector;
   const SceneMap there = map_to_add(options.add, build);
   add_keyframes(there, views.front().front().angle_sigma, detector, &builder);
-  const std::vector<Chosen> chosen = choose(recordings, views, there, build, options.keyframes);
+  Pace pace;
+  pace.is_known = known != nullptr;
+  pace.readout_s = std::abs(build.line_delay) * build.height;
+  if (pace.readout_s == 0) pace.readout_s = kGuessedReadout_s;
+  const std::vector<Chosen> chosen =
+      choose(recordings, views, there, build, options.keyframes, &pace);
   std::size_t done = 0;
   for (std::size_t r = 0; r < recordings.size(); ++r) {
     std::vector<std::size_t> frames;
@@ -264,10 +331,11 @@ int build_map(const MapBuildCommand& options) {
     });
   }
   if (builder.size() < 2) {
-    throw CommandError(kExitFailed,
-                       fmt::format("{} of {} frames can be keyframes: a map needs pictures taken "
-                                   "slowly, with telemetry about their time; see alidade check",
-                                   builder.size(), recordings.front().frames.size()));
+    throw CommandError(
+        kExitFailed, fmt::format("{} of {} frames can be keyframes{}: a map needs pictures with "
+                                 "telemetry about their time, that move {}; see alidade check",
+                                 builder.size(), recordings.front().frames.size(), fast_text(pace),
+                                 pace.text()));
   }
   const MapBuild result =
       builder.build([&](double part, const char* what) { progress.say(0.4 + 0.6 * part, what); });
@@ -279,7 +347,7 @@ int build_map(const MapBuildCommand& options) {
   if (!result.not_connected.empty()) {
     spdlog::warn("left out, as they hang on no other: {}", names_of(builder, result.not_connected));
   }
-  if (result.status != MapBuildStatus::kOk) refuse(builder, result);
+  if (result.status != MapBuildStatus::kOk) refuse(builder, result, pace);
   std::string error;
   if (!save_scene_map(options.map, result.map, &error)) throw CommandError(kExitFailed, error);
   std::fputs(

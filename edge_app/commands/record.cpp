@@ -1,6 +1,6 @@
 // `alidade record`: the live streams as a recording. The video stream is copied by its source, not
 // encoded again; the stamps of both streams go to the recording's tables. The recording begins with
-// the first frame; telemetry from shortly before it is kept.
+// the first frame, and so does its duration; telemetry from shortly before it is kept.
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -14,6 +14,7 @@
 #include <fstream>
 #include <limits>
 #include <mutex>
+#include <optional>
 #include <system_error>
 #include <thread>
 
@@ -65,12 +66,12 @@ class Recorder {
       : video_(video),
         pan_tilt_(pan_tilt),
         directory_(std::move(directory)),
-        finished_(::eventfd(0, EFD_CLOEXEC)) {
-    if (finished_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
+        news_(::eventfd(0, EFD_CLOEXEC)) {
+    if (news_ < 0) throw std::system_error(errno, std::generic_category(), "eventfd");
   }
   ~Recorder() {
     stop();
-    ::close(finished_);
+    ::close(news_);
   }
   Recorder(const Recorder&) = delete;
   Recorder& operator=(const Recorder&) = delete;
@@ -87,8 +88,30 @@ class Recorder {
     threads_.clear();
   }
 
-  // Polls readable when a stream failed for good or the disk takes no more.
-  [[nodiscard]] int finished_fd() const { return finished_; }
+  // Polls readable when the first frame was stored, the video was lost, a stream failed for good, or the disk takes no more, until
+  // forget_news().
+  [[nodiscard]] int news_fd() const { return news_; }
+  void forget_news() {
+    eventfd_t ignored = 0;
+    static_cast<void>(::eventfd_read(news_, &ignored));
+  }
+  [[nodiscard]] bool has_failed() {
+    const std::lock_guard<std::mutex> lock(error_mutex_);
+    return !error_.empty();
+  }
+  // When the first frame was stored.
+  [[nodiscard]] std::optional<double> begin_s() const {
+    const double at_s = begin_s_;
+    return at_s > 0 ? std::optional(at_s) : std::nullopt;
+  }
+  // From the first stored frame to the last, with the last one's period.
+  [[nodiscard]] double length_s() const {
+    const double span_s = last_receive_s_ - first_receive_s_;
+    return frames_ > 1 ? span_s * static_cast<double>(frames_) / static_cast<double>(frames_ - 1)
+                       : 0;
+  }
+  // Nobody is there, as far as the last attempt says.
+  [[nodiscard]] bool is_lost() const { return lost_; }
   [[nodiscard]] long frames() const { return frames_; }
   [[nodiscard]] long samples() const { return samples_; }
 
@@ -117,11 +140,21 @@ class Recorder {
                         video_.name(), width_, height_, frame.width, frame.height));
       }
       if (!writer_.add_frame(frame.stamp, &error)) return fail(error);
-      ++frames_;
+      last_receive_s_ = frame.stamp.receive_time_s;
+      lost_ = false;
+      if (++frames_ == 1) {
+        first_receive_s_ = frame.stamp.receive_time_s;
+        begin_s_ = monotonic_now_s();
+        static_cast<void>(::eventfd_write(news_, 1));
+      }
       return true;
     };
     LinkWatch watch;  // nobody asks it
-    const std::string error = read_to_the_end<Frame>(video_, &watch, on_frame, [](double) {});
+    const auto on_loss = [this](double) {
+      lost_ = true;
+      static_cast<void>(::eventfd_write(news_, 1));
+    };
+    const std::string error = read_to_the_end<Frame>(video_, &watch, on_frame, on_loss);
     if (!error.empty()) fail(error);
   }
 
@@ -148,18 +181,22 @@ class Recorder {
   bool fail(const std::string& error) {
     const std::lock_guard<std::mutex> lock(error_mutex_);
     if (error_.empty()) error_ = error;
-    static_cast<void>(::eventfd_write(finished_, 1));
+    static_cast<void>(::eventfd_write(news_, 1));
     return false;
   }
 
   FrameSource& video_;
   PanTiltSource& pan_tilt_;
   std::string directory_;
-  int finished_;
+  int news_;
   RecordingWriter writer_;
   std::atomic<bool> open_{false};  // writer_ is open
   int width_ = 0;                  // video thread
   int height_ = 0;
+  double first_receive_s_ = 0;
+  double last_receive_s_ = 0;
+  std::atomic<bool> lost_{false};
+  std::atomic<double> begin_s_{0};  // 0: not yet
   std::atomic<long> frames_{0};
   std::atomic<long> samples_{0};
   std::mutex error_mutex_;
@@ -167,22 +204,42 @@ class Recorder {
   std::vector<std::thread> threads_;
 };
 
-void wait_with_progress(StopSignals& signals, const Recorder& recorder, double duration_s) {
+// Until so much is stored (true), no frame has come for long, something failed, or a signal came.
+bool wait_with_progress(StopSignals& signals, Recorder& recorder, double duration_s) {
   constexpr double kProgressPeriod_s = 1;
+  // A stream may begin with many seconds without a key frame.
+  constexpr double kMostWaiting_s = 60;
   const bool show = is_terminal(STDERR_FILENO);
   const double start_s = monotonic_now_s();
-  const double end_s = start_s + duration_s;
   while (true) {
+    const std::optional<double> begin_s = recorder.begin_s();
+    const double wait_s = recorder.is_lost() ? duration_s : std::max(duration_s, kMostWaiting_s);
+    const double end_s = begin_s ? *begin_s + duration_s : start_s + wait_s;
     const double left_s = end_s - monotonic_now_s();
     const auto event =
-        signals.wait(recorder.finished_fd(), show ? std::min(left_s, kProgressPeriod_s) : left_s);
+        signals.wait(recorder.news_fd(), show ? std::min(left_s, kProgressPeriod_s) : left_s);
     if (show) {
       fmt::print(stderr, "\r{:.0f} s: {} frames, {} telemetry samples ",
-                 monotonic_now_s() - start_s, recorder.frames(), recorder.samples());
+                 begin_s ? monotonic_now_s() - *begin_s : 0.0, recorder.frames(),
+                 recorder.samples());
     }
-    if (event == StopSignals::Event::kTimeout && monotonic_now_s() < end_s) continue;
+    const bool news = event == StopSignals::Event::kDescriptor && !recorder.has_failed();
+    if (news) recorder.forget_news();
+    if (news || (event == StopSignals::Event::kTimeout && monotonic_now_s() < end_s)) continue;
     if (show) fmt::print(stderr, "\n");
-    return;
+    return event == StopSignals::Event::kTimeout;
+  }
+}
+
+// The streams have ended: what of the time that was asked for is not there.
+void say_what_is_missing(const std::string& directory, const Recorder& recorder, double asked_s) {
+  // Frames at both ends may be on their way.
+  constexpr double kShare = 0.95;
+  if (recorder.frames() > 0 && recorder.length_s() < kShare * asked_s) {
+    spdlog::warn(
+        "{}: {:.1f} s are stored of the {:g} s asked for: video stopped coming, or began "
+        "anew; see `alidade check`",
+        directory, recorder.length_s(), asked_s);
   }
 }
 
@@ -209,11 +266,15 @@ int record_streams(const RecordOptions& options) {
   const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
   Recorder recorder(*video, *pan_tilt, options.directory);
   recorder.start();
-  wait_with_progress(signals, recorder, options.duration_s);
+  const bool all = wait_with_progress(signals, recorder, options.duration_s);
   recorder.stop();
   const std::string error = recorder.finish();
-  spdlog::info("{}: {} frames, {} telemetry samples stored", options.directory, recorder.frames(),
-               recorder.samples());
+  spdlog::info("{}: {:.1f} s, {} frames, {} telemetry samples stored", options.directory,
+               recorder.length_s(), recorder.frames(), recorder.samples());
+  if (all) say_what_is_missing(options.directory, recorder, options.duration_s);
+  if (recorder.frames() > 0 && recorder.samples() == 0) {
+    spdlog::warn("{}: no telemetry came; see `alidade check`", pan_tilt->name());
+  }
   log_source_losses(*video);
   if (!error.empty()) throw CommandError(kExitFailed, error);
   return kExitOk;

@@ -62,8 +62,12 @@ NamedCalibration find_calibration(const ReplayOptions& options) {
   if (!options.calibration.empty()) return require_calibration_file(options.calibration);
   const fs::path beside = fs::path(options.recording) / "alidade" / "calibration.yaml";
   if (!fs::exists(beside)) {
-    throw CommandError(kExitUsage, options.recording + ": has no calibration (" + beside.string() +
-                                       "); name one with --calibration FILE");
+    throw CommandError(
+        kExitUsage,
+        fmt::format("{0}: has no calibration ({1}): make one with `alidade calibrate {0}`, or name "
+                    "the one that `alidade run` has stored, its calibration.file, with "
+                    "--calibration FILE",
+                    options.recording, beside.string()));
   }
   return require_calibration_file(beside.string());
 }
@@ -75,7 +79,8 @@ void check_size(const RecordingInfo& info, const NamedCalibration& calibration,
   throw CommandError(
       kExitFailed,
       fmt::format(
-          "{}: frames of {}x{} px, but {} is for {}x{} px; name the calibration of this size",
+          "{}: frames of {}x{} px, but {} is for {}x{} px; name the calibration of this size with "
+          "--calibration, or record with the calibration's as video.width and video.height",
           recording, info.width, info.height, calibration.name, camera.width, camera.height));
 }
 

@@ -26,6 +26,7 @@
 #include "edge_app/output/status_page.h"
 #include "edge_app/pipeline/pipeline.h"
 #include "edge_app/storage/calibration_store.h"
+#include "platform/storage/recording.h"
 #include "platform/system/clock.h"
 #include "platform/system/realtime.h"
 #include "platform/system/service_manager.h"
@@ -100,6 +101,12 @@ void wait_for_the_end(StopSignals* signals, const Pipeline& pipeline, LifeReport
 
 int run_live(const RunOptions& options) {
   const Config config = require_config(options.config);
+  if (is_recording(config)) {
+    RecordingInfo info;
+    std::string error;
+    if (!read_recording_info(config.video.directory, &info, &error))
+      throw CommandError(kExitFailed, error);
+  }
   const std::shared_ptr<const PlaneEstimate> plane = require_plane(config);
   auto [calibrating, calibration, map] =
       load_starting_calibration(config, options.config, CalibrationStore::Use::kKeep);

@@ -2,6 +2,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
 
 #include <cmath>
 #include <cstdint>
@@ -253,6 +254,19 @@ TEST_F(CalibrateZooms, AReadingThatIsReachedFromEitherSideIsOnTheCurveTwice) {
               4 * std::sqrt(any.covariance(0, 0)))
         << zoom;
   }
+}
+
+// The virtual camera that is there to be tried rests as long at each zoom as a refusal asks for.
+TEST(ZoomCameraExample, DwellsAsLongAsIsAskedFor) {
+  constexpr double kAsked_s = 10;
+  const YAML::Node camera =
+      YAML::LoadFile(ALIDADE_TEST_DATA "/../simulator/examples/zoom_camera.yaml");
+  double rests_s = 0;
+  for (const YAML::Node& stop : camera["zoom"]["path"]["stops"]) {
+    EXPECT_GE(stop["rest_s"].as<double>(), kAsked_s);
+    rests_s += stop["rest_s"].as<double>();
+  }
+  EXPECT_GT(camera["duration_s"].as<double>(), rests_s) << "and all of them are seen";
 }
 
 TEST_F(CalibrateZooms, SaysWhatCannotBeOneCurve) {

@@ -455,6 +455,20 @@ TEST_F(CommandLineTest, RecordWithoutACameraFailsAndStoresNoRecording) {
   EXPECT_FALSE(std::filesystem::exists(path("new/recording.yaml")));
 }
 
+TEST_F(CommandLineTest, ReplayWithoutACalibrationNamesBothWaysToOne) {
+  head_.record(directory_, 10);
+  const Result result = alidade({"replay", directory_.path()});
+  EXPECT_EQ(result.exit_code, 2);
+  EXPECT_THAT(last_line(result.errors),
+              AllOf(HasSubstr("has no calibration"),
+                    HasSubstr("`alidade calibrate " + directory_.path() + "`"),
+                    HasSubstr("`alidade run` has stored"), HasSubstr("--calibration FILE")));
+  // What run has stored is one that it takes.
+  directory_.write("stored.yaml", head_.calibration());
+  EXPECT_EQ(alidade({"replay", directory_.path(), "--calibration", path("stored.yaml")}).exit_code,
+            0);
+}
+
 TEST_F(CommandLineTest, RecordRefusesADirectoryThatHoldsARecording) {
   directory_.write("old/frames.csv", "frame,receive_time_s\n");
   const Result result = alidade({"record", "-c", live_config(), "-o", path("old")});

@@ -17,6 +17,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using ::testing::Not;
 
 class HttpLinks : public ::testing::Test {
  protected:
@@ -112,6 +113,46 @@ TEST_F(HttpLinks, AreRecorded) {
   EXPECT_EQ(read_csv(result.output).size(),
             read_csv(directory_.read("recording/frames.csv")).size());
   EXPECT_THAT(result.output, HasSubstr(",PT,"));
+  // In OE mode the size of its pictures is the recording's own: video.width and video.height have no place beside it.
+  result = alidade({"run", "--csv", "-c",
+                    directory_.write("looked_at.yaml",
+                                     "video: {type: recording, directory: recording}\n"
+                                     "pan_tilt: {type: recording, directory: recording}\n"
+                                     "camera: {focal_length_px: 1000}\n")});
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_EQ(read_csv(result.output).size(),
+            read_csv(directory_.read("recording/frames.csv")).size());
+  directory_.write("recording/recording.yaml", "format: 1\nwidth: 96\n");
+  result = alidade({"run", "-c", directory_.path() + "/looked_at.yaml"});
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(last_line(result.errors), AllOf(HasSubstr("recording.yaml"), HasSubstr("height")));
+}
+
+// Connected at once, but without a picture for longer than the whole recording is to be: as between two key frames far apart.
+TEST_F(HttpLinks, AreRecordedForTheWholeDurationFromTheFirstPictureOn) {
+  video_.allowed = 0;
+  Process process(command(
+      {"record", "-c", config(), "-o", directory_.path() + "/recording", "--duration", "0.3"}));
+  const int before = head_.count("GetStatus");
+  ASSERT_TRUE(eventually([&] { return head_.count("GetStatus") >= before + 15; }));
+  video_.allowed = 1 << 30;
+  static_cast<void>(process.read_all());
+  EXPECT_EQ(process.wait(), 0) << process.errors();
+  EXPECT_THAT(process.errors(), Not(HasSubstr("asked for")));
+  const auto frames = read_csv(directory_.read("recording/frames.csv"));
+  ASSERT_GT(frames.size(), 2U);
+  EXPECT_GT(std::stod(frames.back().at("receive_time_s")) -
+                std::stod(frames.front().at("receive_time_s")),
+            0.95 * 0.3);
+}
+
+TEST_F(HttpLinks, AreSaidToBeRecordedForLessWhereThePicturesStop) {
+  video_.allowed = 5;
+  const Result result = alidade(
+      {"record", "-c", config(), "-o", directory_.path() + "/recording", "--duration", "1"});
+  EXPECT_EQ(result.exit_code, 0) << result.errors;
+  EXPECT_THAT(result.errors, HasSubstr("are stored of the 1 s asked for: video stopped coming"));
+  EXPECT_EQ(read_csv(directory_.read("recording/frames.csv")).size(), 5U);
 }
 
 TEST_F(HttpLinks, SayInOneLineWhatIsMissing) {

@@ -17,6 +17,7 @@
 namespace alidade {
 namespace {
 
+using ::testing::AllOf;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
@@ -173,6 +174,40 @@ TEST_F(MapCommands, BuildAddsWhatIsNewToAMap) {
   EXPECT_GT(after["levels"][0]["pan_rad"][1].get<double>(),
             before["levels"][0]["pan_rad"][1].get<double>() + 0.3);
   EXPECT_NEAR(after["levels"][0]["focal_length_px"][0].get<double>(), 800, 8);
+}
+
+// What `alidade calibrate` asks for: ten seconds along a figure that crosses some fields of view. Most of its pictures move by more than 10 px
+// while they are read out.
+TEST_F(MapCommands, BuildTakesTheRecordingThatCalibrateAsksForOnceItIsCalibrated) {
+  film("figure",
+       "seed: 3\nduration_s: 10\nimage: {width: 480, height: 270, rate_hz: 12}\n"
+       "camera: {focal_length_px: 700, line_delay_us: 50, clock_offset_ms: -30}\n"
+       "path: {type: triple_cosine, amplitude: 1.2, period_s: 10}\n"
+       "sensor: {read_noise: 1, jpeg_quality: 95}\nrecording: {images: png}\n"
+       "telemetry: {rate_hz: 30, sigma_rad: 5.0e-5}\n" +
+           std::string(kMapTexture));
+  const auto build = [](const std::vector<std::string>& more) {
+    std::vector<std::string> arguments = {"build", path("figure"), "-o", path("figure.map"),
+                                          "--json"};
+    arguments.insert(arguments.end(), more.begin(), more.end());
+    return map_command(arguments);
+  };
+  // What would help, in numbers: 10 px in a read-out that is a guess.
+  const Result slow = build({"--focal-length", "700"});
+  EXPECT_EQ(slow.exit_code, 1);
+  EXPECT_THAT(
+      last_line(slow.errors),
+      AllOf(HasSubstr("frames moved too fast"), HasSubstr("at most 10 px in the 30 ms"),
+            HasSubstr("27 deg/s at a focal length of 700 px"), HasSubstr("`alidade calibrate`")));
+  const Result built = build({"--calibration", path("figure/truth.yaml")});
+  ASSERT_EQ(built.exit_code, 0) << built.errors;
+  const auto json = nlohmann::json::parse(built.output);
+  EXPECT_GE(json["keyframes"].get<int>(), 15);
+  EXPECT_NEAR(json["levels"][0]["focal_length_px"][0].get<double>(), 700, 2);
+  // All of the figure: three fields of view to either side.
+  EXPECT_LT(json["levels"][0]["pan_rad"][0].get<double>(), -0.6);
+  EXPECT_GT(json["levels"][0]["pan_rad"][1].get<double>(), 0.6);
+  EXPECT_LT(json["residual_px"].get<double>(), 1);
 }
 
 TEST_F(MapCommands, PicturesOfAnotherSizeAndNoneAreRefused) {

@@ -42,6 +42,8 @@ TEST(KeyframeChoice, TakesNothingThatMovesFast) {
   EXPECT_FALSE(choice.is_slow(log_f, -0.5, 0, 0.02));
   EXPECT_FALSE(choice.is_slow(log_f, 0, 0.3, 0.02));
   EXPECT_TRUE(choice.is_slow(log_f, 5, 3, 0));
+  EXPECT_NEAR(choice.haste(log_f, -0.5, 0, 0.02), 0.5 * std::exp(log_f) * 0.02 / 10, 1e-12);
+  EXPECT_NEAR(choice.haste(log_f, 0, 0.3, 0.02), 3, 1e-12);
 }
 
 TEST(KeyframeChoice, RefusesOptionsOutOfRange) {
