@@ -21,17 +21,17 @@ struct Difference {
 
 Difference difference_of(const CalibrationPrior& known, double alone, double sigma_alone,
                          double unit, const char* unit_name) {
-  const auto estimate = [&](double value, double sigma) {
-    return short_text(value / unit) + " +- " + short_text(sigma / unit);
+  const auto estimate = [&](double value, double sigma_of) {
+    return estimate_text(value / unit, sigma_of / unit, unit_name);
   };
   Difference difference;
   const double sigma = std::hypot(known.sigma, sigma_alone);
   const double error = std::abs(alone - known.value);
   difference.relative = error / std::abs(known.value);
   difference.sigmas = error == 0 ? 0 : error / sigma;
-  difference.text = estimate(known.value, known.sigma) + unit_name +
-                    " is known, the recording alone gives " + estimate(alone, sigma_alone) +
-                    unit_name + ", " + short_text(std::round(difference.sigmas)) + " sigmas apart";
+  difference.text = estimate(known.value, known.sigma) + " is known, the recording alone gives " +
+                    estimate(alone, sigma_alone) + ", " +
+                    short_text(std::round(difference.sigmas)) + " sigmas apart";
   return difference;
 }
 
@@ -81,7 +81,7 @@ class KnownCameraTrial {
     CalibrationOptions& options = done_.options;
     if (known_.line_delay.wanted) {
       const Difference d = difference_of(known_.line_delay.prior, alone.line_delay,
-                                         sigma(Parameter::kLineDelay), 1e-6, " us/row");
+                                         sigma(Parameter::kLineDelay), 1e-6, "us/row");
       if (d.sigmas <= kMostSigmas) {
         options.line_delay = known_.line_delay.prior;
       } else {
@@ -112,7 +112,7 @@ class KnownCameraTrial {
     if (!known_.focal_length.wanted && !known_.radial_distortion.wanted) return;
     CalibrationOptions& options = done_.options;
     const Difference f = difference_of(known_.focal_length.prior, alone.camera.focal_length,
-                                       parameter_sigma(alone, Parameter::kFocalLength), 1, " px");
+                                       parameter_sigma(alone, Parameter::kFocalLength), 1, "px");
     if (f.sigmas > kMostSigmas) {
       say(f.relative > kAnotherZoom
               ? "found at another zoom, focal length and distortion do not count here: " + f.text

@@ -6,18 +6,22 @@
 #include <cstdio>
 
 #include "core/calibration/correlation.h"
+#include "core/calibration/number_text.h"
 
 namespace alidade::internal {
 
 namespace {
 
 // Limits of use. An error of the clock offset shows at the mount's rate, one of the others over half an image.
-constexpr double kMinImageMotion_px = 5;         // px in half a second
-constexpr double kMinCorrelation = 0.6;          // of image motion and telemetry
-constexpr double kMinTravelShare = 0.03;         // of the image's width, of each axis
-constexpr double kMinRateVariation = 0.05;       // of the rate
-constexpr double kMaxFieldOfViewRatio = 0.2;     // least focal length / width: 136 deg
-constexpr double kMaxFocalLengthError = 0.05;    // relative
+constexpr double kMinImageMotion_px = 5;   // px in half a second
+constexpr double kMinCorrelation = 0.6;    // of image motion and telemetry
+constexpr double kMinTravelShare = 0.03;   // of the image's width, of each axis
+constexpr double kGoodTravelShare = 0.25;  // what is asked for where it was less
+constexpr double kMaxAxisTurn =
+    60 * kPi / 180;                            // of an axis from its nominal: what a file may hold
+constexpr double kMinRateVariation = 0.05;     // of the rate
+constexpr double kMaxFieldOfViewRatio = 0.2;   // least focal length / width: 136 deg
+constexpr double kMaxFocalLengthError = 0.05;  // relative
 constexpr double kMaxClockOffsetError_s = 0.01;  // s
 constexpr double kMaxReadoutError_s = 5e-3;      // s from the first to the last row
 constexpr double kMaxDistortionError = 0.02;     // of the distance from the centre, in the corner
@@ -26,6 +30,43 @@ std::string text(const char* format, double a, double b = 0) {
   char buffer[320];
   std::snprintf(buffer, sizeof buffer, format, a, b);
   return buffer;
+}
+
+const char* axis_name(int axis) { return axis == 0 ? "pan" : "tilt"; }
+
+// Begins with the axis's name. f: focal length, px.
+std::string moved_little(int axis, double range, double f, int width) {
+  constexpr double kDegrees = 180 / kPi;
+  const double good = kGoodTravelShare * width;
+  return axis_name(axis) +
+         text(" moves the image by %.0f px (%.2g deg) only", range * f, kDegrees * range) +
+         text(": both axes have to move, by a good part of the image (%.0f px, %.2g deg) or more",
+              good, kDegrees * good / f);
+}
+
+// What no calibration can be made of, or file hold: an axis that did not move after all, as what telemetry says of it is noise, or one
+// that comes out far from where a head has it.
+CalibrationStatus check_axes(const Calibration& c, const MotionExtent& motion, std::string* why) {
+  const double f = c.camera.focal_length;
+  const Mechanics<double> nominal;
+  for (int axis = 0; axis < 2; ++axis) {
+    const double range_px = motion.range[axis] * f;
+    const Vector3<double>& found = axis == 0 ? c.mechanics.pan_axis : c.mechanics.tilt_axis;
+    const Vector3<double>& expected = axis == 0 ? nominal.pan_axis : nominal.tilt_axis;
+    const double turn = std::acos(std::clamp(found.dot(expected), -1.0, 1.0));
+    const bool is_there = range_px >= kMinTravelShare * c.camera.width;
+    if (is_there && turn <= kMaxAxisTurn) continue;
+    const bool is_little = range_px < kGoodTravelShare * c.camera.width;
+    *why = is_little ? moved_little(axis, motion.range[axis], f, c.camera.width)
+                     : std::string(axis_name(axis)) + " does not turn the image as it says";
+    if (turn > kMaxAxisTurn) {
+      *why +=
+          text("; its axis comes out %.0f deg from where it should lie: is ", turn * 180 / kPi) +
+          (axis == 0 ? "pan right" : "tilt up") + " positive?";
+    }
+    return is_little ? CalibrationStatus::kOneAxisOnly : CalibrationStatus::kTelemetryMismatch;
+  }
+  return CalibrationStatus::kOk;
 }
 
 // The direction in which the parameters are most uncertain together.
@@ -139,11 +180,7 @@ CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
   }
   for (int axis = 0; axis < 2; ++axis) {
     if (extent.range[axis] * in_px >= kMinTravelShare * input.width) continue;
-    *why = std::string(axis == 0 ? "pan" : "tilt") +
-           text(
-               " moves the image by %.0f px only: both axes have to move, by a good part of the "
-               "image or more",
-               extent.range[axis] * in_px);
+    *why = moved_little(axis, extent.range[axis], in_px, input.width);
     return CalibrationStatus::kOneAxisOnly;
   }
   return CalibrationStatus::kOk;
@@ -153,6 +190,8 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
            CalibrationResult* result) {
   const Calibration& c = result->calibration;
   auto& advice = result->quality.advice;
+  result->status = check_axes(c, motion, &result->message);
+  if (result->status != CalibrationStatus::kOk) return;
   describe_weakest(result);
 
   std::vector<std::string> reasons;
@@ -210,9 +249,9 @@ void judge(const CalibrationOptions& options, const MotionExtent& motion,
   if (reasons.empty()) {
     result->status = CalibrationStatus::kOk;
     result->message =
-        text("focal length %.1f px (sigma %.2g)", c.camera.focal_length,
-             parameter_sigma(c, Parameter::kFocalLength)) +
-        text(", clock offset %.3f ms (sigma %.2g)", 1e3 * c.clock_offset, 1e3 * d_error);
+        "focal length " +
+        estimate_text(c.camera.focal_length, parameter_sigma(c, Parameter::kFocalLength), "px") +
+        ", clock offset " + estimate_text(1e3 * c.clock_offset, 1e3 * d_error, "ms");
     return;
   }
   result->status = CalibrationStatus::kWeak;

@@ -1,9 +1,9 @@
 #pragma once
 // Can these data support a calibration, and what would help? Two looks:
 //   check_motion   before the adjustment: no motion, one axis only, telemetry that does not describe the video.
-//   judge          after it, from the covariance: a parameter that the data leave (nearly) open, constant velocity, a
-//                  scale that cannot be told from the focal length, axes and scales that only the prior holds;
-//                  the weakest direction in words.
+//   judge          after it: an axis that did not move after all, or comes out where no head has it. From the covariance: a
+//                  parameter that the data leave (nearly) open, constant velocity, a scale that cannot be told from the focal
+//                  length, axes and scales that only the prior holds; the weakest direction in words.
 // The limits are those of use: what the calibration is for is to point a pixel. Allocates.
 
 #include <string>

@@ -157,8 +157,8 @@ void write_zoom_curve(const ZoomCurve& curve, YAML::Emitter* out) {
     const int row = kZoomQuantityCount * i;
     const double f = std::exp(content.level[0] + content.value(row, 0));
     o << YAML::EndMap
-      << YAML::Comment("focal length " + short_text(f) + " +- " +
-                       short_text(f * std::sqrt(content.covariance(row, row))) + " px");
+      << YAML::Comment("focal length " +
+                       estimate_text(f, f * std::sqrt(content.covariance(row, row)), "px"));
   }
   o << YAML::EndSeq << YAML::Key << "covariance" << YAML::Value << YAML::BeginMap << YAML::Key
     << "names" << YAML::Value << YAML::Flow << YAML::BeginSeq;

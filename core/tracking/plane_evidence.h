@@ -56,7 +56,8 @@ struct PlaneDatum {
 struct PlaneEvidence {
   std::vector<PlaneDatum> data;
   std::vector<Matrix3<double>>
-      looks;  // covariance of each look's turn, rad^2, about the base's axes
+      looks;                // covariance of each look's turn, rad^2, about the base's axes
+  bool y_is_north = false;  // places are of the earth: a heading has to come from the data
 };
 
 [[nodiscard]] inline PlaneDatum camera_height(double height_m, double sigma_m) {

@@ -383,8 +383,9 @@ PlaneFit fit_plane(const PlaneEvidence& evidence, const PlaneFitOptions& options
   const PlaneSolution& solution = *found.best;
   PlaneFit out;
   out.plane = solution.state.plane;
-  out.origin_below_camera = problem.frame != PlaneFrame::kUser;
-  out.heading_of_base = problem.frame == PlaneFrame::kCamera;
+  out.origin_below_camera =
+      problem.frame == PlaneFrame::kCamera || problem.frame == PlaneFrame::kHeading;
+  out.heading_of_base = problem.frame == PlaneFrame::kCamera || problem.frame == PlaneFrame::kPlace;
   if (!set_covariance(evidence, options, solution, &out)) return out;
   if (found.ambiguous || !grows_evenly(problem, solution)) {
     return refused(PlaneFitStatus::kAmbiguous,

@@ -14,14 +14,17 @@ namespace {
 constexpr int kMostSteps = 100;
 
 PlaneFrame frame_of(const PlaneEvidence& evidence) {
-  PlaneFrame frame = PlaneFrame::kCamera;
+  int places = 0;
+  bool has_heading = false;
   for (const PlaneDatum& datum : evidence.data) {
-    if (datum.kind == PlaneDatumKind::kPlace || datum.kind == PlaneDatumKind::kPoint)
-      return PlaneFrame::kUser;
+    if (datum.kind == PlaneDatumKind::kPlace || datum.kind == PlaneDatumKind::kPoint) ++places;
     if (datum.kind == PlaneDatumKind::kHeading || datum.kind == PlaneDatumKind::kBearing)
-      frame = PlaneFrame::kHeading;
+      has_heading = true;
   }
-  return frame;
+  if (places == 0) return has_heading ? PlaneFrame::kHeading : PlaneFrame::kCamera;
+  // Two places tell a heading.
+  const bool tells_heading = places > 1 || has_heading || evidence.y_is_north;
+  return tells_heading ? PlaneFrame::kUser : PlaneFrame::kPlace;
 }
 
 bool residuals_of(const PlaneProblem& problem, const PlaneState& state,
@@ -59,11 +62,13 @@ PlaneProblem::PlaneProblem(const PlaneEvidence& given) : evidence(given), frame(
 
 PlaneUnknowns plane_unknowns(PlaneFrame frame, const WorldPlane& plane) {
   if (frame == PlaneFrame::kUser) return PlaneUnknowns::Identity(6, 6);
-  PlaneUnknowns out = PlaneUnknowns::Zero(6, frame == PlaneFrame::kCamera ? 3 : 4);
+  const int count = frame == PlaneFrame::kCamera ? 3 : frame == PlaneFrame::kHeading ? 4 : 5;
+  PlaneUnknowns out = PlaneUnknowns::Zero(6, count);
   out(0, 0) = out(1, 1) = out(5, 2) = 1;
   if (frame == PlaneFrame::kHeading) {
     out(2, 3) = 1;
   } else {
+    if (frame == PlaneFrame::kPlace) out(3, 3) = out(4, 4) = 1;
     // The heading stays.
     const Vector3<double> J = heading_jacobian(plane);
     if (J.z() != 0) out.row(2).head<2>() = -J.head<2>().transpose() / J.z();
@@ -74,8 +79,8 @@ PlaneUnknowns plane_unknowns(PlaneFrame frame, const WorldPlane& plane) {
 WorldPlane in_frame(PlaneFrame frame, const WorldPlane& plane) {
   WorldPlane out = plane;
   if (frame == PlaneFrame::kUser) return out;
-  out.position.head<2>().setZero();
-  if (frame == PlaneFrame::kCamera) {
+  if (frame != PlaneFrame::kPlace) out.position.head<2>().setZero();
+  if (frame != PlaneFrame::kHeading) {
     out.R_base_from_world =
         plane.R_base_from_world * rotation_about(Vector3<double>(0, 0, 1), -heading(plane));
   }

@@ -3,7 +3,7 @@
 // step and renewed with each: where it rests, J^T C^-1 r = 0 for C there.
 //   least   sum r_i^T C_i^-1 r_i + |z|^2     over the plane's unknowns and the looks z (plane_residual.h)
 // Unknown are all six of (xi, p) where data tie the camera to w. Where none does, w is the camera's (world_plane.h): three are
-// unknown, or four where a heading is known and no place.
+// unknown, or four where a heading is known and no place, or five where one place is known and no heading.
 
 #include <Eigen/Core>
 #include <Eigen/Eigenvalues>
@@ -20,6 +20,7 @@ using SymmetricEigen = Eigen::SelfAdjointEigenSolver<Eigen::MatrixXd>;
 enum class PlaneFrame {
   kCamera,   // origin below it, Y below the base's forward direction
   kHeading,  // origin below it, headings as the data count them
+  kPlace,    // as the data's one place has it, Y below the base's forward direction
   kUser      // as the data's places have it
 };
 

@@ -151,7 +151,8 @@ double badness(const PlaneProblem& problem, const WorldPlane& start) {
 
 std::vector<WorldPlane> plane_starts(const PlaneProblem& problem, int most) {
   const PlaneDatum* known = first_of(problem, Kind::kHeading);
-  const int headings = problem.frame == PlaneFrame::kCamera || known != nullptr ? 1 : 8;
+  const bool defined = problem.frame == PlaneFrame::kCamera || problem.frame == PlaneFrame::kPlace;
+  const int headings = defined || known != nullptr ? 1 : 8;
   std::vector<std::pair<double, WorldPlane>> rated;
   for (const Vector3<double>& up_b : ups(problem)) {
     for (int i = 0; i < headings; ++i) {

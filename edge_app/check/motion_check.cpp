@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 
+#include "core/calibration/number_text.h"
 #include "edge_app/check/motion_fit.h"
 
 namespace alidade {
@@ -130,7 +131,7 @@ const char* to_string(AxisVerdict verdict) {
     case AxisVerdict::kUnclear:
       return "sign unclear: turn it to and fro at changing speed";
     case AxisVerdict::kRight:
-      return "sign right";
+      return "sign correct";
     case AxisVerdict::kReversed:
       return "sign REVERSED";
   }
@@ -207,8 +208,8 @@ ReportLines describe(const MotionReport& report) {
   }
   std::string text = fmt::format("pan {}, tilt {}", to_string(report.pan), to_string(report.tilt));
   if (report.focal_length_px) {
-    text += fmt::format("; focal length about {:.0f} px, clock offset about {:.0f} ms",
-                        *report.focal_length_px, 1e3 * *report.clock_offset_s);
+    text += fmt::format("; focal length about {:.0f} px, clock offset about {} ms",
+                        *report.focal_length_px, rounded_text(1e3 * *report.clock_offset_s, 0));
   }
   return {{"motion", text}};
 }

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/calibration/number_text.h"
 #include "core/model/angle.h"
 #include "edge_app/check/telemetry_measures.h"
 #include "edge_app/pipeline/stale_repeats.h"
@@ -142,8 +143,8 @@ void judge_zoom(TelemetryReport* report, const TelemetryNeeds& needs) {
 }
 
 std::string degrees(const AxisReport& axis, const char* name) {
-  return fmt::format("{} {:.2f} to {:.2f} deg", name, kDegrees * axis.least,
-                     kDegrees * axis.largest);
+  return fmt::format("{} {} to {} deg", name, rounded_text(kDegrees * axis.least, 2),
+                     rounded_text(kDegrees * axis.largest, 2));
 }
 
 std::string step(const AxisReport& axis, const char* name) {

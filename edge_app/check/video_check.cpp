@@ -70,10 +70,15 @@ void judge_size(VideoReport* report, const VideoNeeds& needs) {
   if (report->size_fits) return;
   add_problem(
       &report->findings,
-      fmt::format("video {}: frames of {}x{} px, but {} is for {}x{} px; set the camera to the "
-                  "calibration's size or calibrate at this one",
-                  needs.source, report->width, report->height, needs.calibration_name, needs.width,
-                  needs.height));
+      needs.is_calibrated
+          ? fmt::format("video {}: frames of {}x{} px, but {} is for {}x{} px; set the camera (and "
+                        "video.width and video.height) to this, or calibrate at the frames' size",
+                        needs.source, report->width, report->height, needs.calibration_name,
+                        needs.width, needs.height)
+          : fmt::format("video {}: frames of {}x{} px, but video.width and video.height are {} and "
+                        "{}; set them to {} and {}",
+                        needs.source, report->width, report->height, needs.width, needs.height,
+                        report->width, report->height));
 }
 
 void judge_coding(VideoReport* report, const VideoNeeds& needs,

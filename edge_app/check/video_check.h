@@ -37,7 +37,8 @@ struct VideoNeeds {
   std::string calibration_name;  // what the size below is of
   int width = 0;                 // px; 0: any
   int height = 0;
-  bool images = true;  // OE mode: each frame has to be decoded in time
+  bool images = true;         // OE mode: each frame has to be decoded in time
+  bool is_calibrated = true;  // false: the size is the configuration's
 };
 
 struct VideoReport {

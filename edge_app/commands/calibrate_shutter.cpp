@@ -84,7 +84,8 @@ std::string text_of(const PatternCalibration& calibration, const PatternVideo& v
       video.found, video.images, calibration.observations, calibration.left_out,
       calibration.sigma_px);
   for (const LensRow& row : lens_rows(calibration)) {
-    text += fmt::format("  {:<17}{:>14} ± {} {}\n", row.name, row.value, row.sigma, row.unit);
+    const std::string sigma = (row.sigma == "exact" ? "" : "± ") + row.sigma;
+    text += fmt::format("  {:<17}{:>14} {} {}\n", row.name, row.value, sigma, row.unit);
   }
   if (calibration.has_global_shutter())
     text += "the line delay is 0 within 3 sigmas: a global shutter, or rows too fast to tell\n";

@@ -11,13 +11,13 @@
 #include <nlohmann/json.hpp>
 #include <utility>
 
+#include "core/calibration/number_text.h"
 #include "core/calibration/zoom_fit.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/output_directory.h"
 #include "edge_app/commands/visible_calibration.h"
 #include "edge_app/output/calibration_json.h"
 #include "edge_app/output/calibration_report.h"
-#include "edge_app/output/value_text.h"
 #include "edge_app/storage/calibration_file.h"
 
 namespace alidade {
@@ -79,8 +79,7 @@ std::string zooms_text(const ZoomFit& fit, const std::vector<Calibration>& nodes
   const Calibration& any = nodes.front();
   const auto line = [&](const char* name, double value, Parameter p, double unit, const char* of) {
     const double sigma = parameter_sigma(any, p) / unit;
-    text += fmt::format("{}  {} +- {} {}\n", name, value_text(value / unit, sigma),
-                        sigma_text(sigma), of);
+    text += fmt::format("{}  {}\n", name, estimate_text(value / unit, sigma, of));
   };
   line("line_delay", any.line_delay, Parameter::kLineDelay, 1e-6, "us/row");
   line("clock_offset", any.clock_offset, Parameter::kClockOffset, 1e-3, "ms");

@@ -14,6 +14,7 @@
 #include <unordered_map>
 #include <vector>
 
+#include "core/calibration/number_text.h"
 #include "edge_app/check/motion_check.h"
 #include "edge_app/check/repeat_check.h"
 #include "edge_app/check/telemetry_check.h"
@@ -163,8 +164,8 @@ std::string headline(const VideoReport& video, const VideoNeeds& needs) {
 std::string headline(const TelemetryReport& telemetry) {
   constexpr double kDegrees = 180 / kPi;
   if (telemetry.samples == 0) return "failed";
-  return fmt::format("pan {:.4f} deg, tilt {:.4f} deg, {}", kDegrees * telemetry.pan.last,
-                     kDegrees * telemetry.tilt.last, rate_of(telemetry.rate_hz));
+  return fmt::format("pan {} deg, tilt {} deg, {}", rounded_text(kDegrees * telemetry.pan.last, 4),
+                     rounded_text(kDegrees * telemetry.tilt.last, 4), rate_of(telemetry.rate_hz));
 }
 
 void print(const ReportLines& lines) {
@@ -211,11 +212,10 @@ void print_report(const CheckReport& report, const VideoNeeds& video_needs) {
 void print_beginning(const std::string& configuration, const NamedCalibration& calibration) {
   const Camera<double>& camera = calibration.calibration.camera;
   fmt::print("configuration  {}: ok\n", configuration);
-  fmt::print("calibration    {}: {}focal length {:.1f} px, clock offset {:.1f} ms\n",
-             calibration.name,
+  fmt::print("calibration    {}: {}focal length {:.1f} px, clock offset {} ms\n", calibration.name,
              calibration.calibrated ? fmt::format("{}x{} px, ", camera.width, camera.height)
                                     : "not calibrated, ",
-             camera.focal_length, 1e3 * calibration.calibration.clock_offset);
+             camera.focal_length, rounded_text(1e3 * calibration.calibration.clock_offset, 1));
   std::fflush(stdout);
 }
 
@@ -226,8 +226,9 @@ void check_lens_prior(const Config& config, const Camera<double>& camera) {
   const KnownCamera known =
       load_lens_prior(config.calibration.prior, camera.width, camera.height, &remarks);
   for (const std::string& remark : remarks) spdlog::warn("{}", remark);
-  spdlog::info("{}: line delay {:.3f} +- {:.3f} us", config.calibration.prior,
-               1e6 * known.line_delay.prior.value, 1e6 * known.line_delay.prior.sigma);
+  spdlog::info(
+      "{}: line delay {}", config.calibration.prior,
+      estimate_text(1e6 * known.line_delay.prior.value, 1e6 * known.line_delay.prior.sigma, "us"));
 }
 
 // Empty: it takes the connection.
@@ -253,8 +254,9 @@ int check_links(const CheckOptions& options) {
   const auto [calibration, lens] = calibration_here(measured, config, start);
   const OrientationStepOptions step = step_options(config, calibration);
   const Camera<double>& camera = calibration.calibration.camera;
-  const VideoNeeds video_needs{measured.video.name, calibration.name, camera.width, camera.height,
-                               config.realtime.landmarks};
+  const VideoNeeds video_needs{
+      measured.video.name, calibration.name,          camera.width,
+      camera.height,       config.realtime.landmarks, calibration.calibrated};
   const VideoReport video = check_video(measured.frames, measured.counters,
                                         measured.counters_at_start, step.video_clock, video_needs);
   TelemetryNeeds of_telemetry = telemetry_needs(measured, config, calibration, step);

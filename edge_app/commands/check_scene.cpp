@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "core/calibration/number_text.h"
 #include "core/model/nearest_angles.h"
 #include "edge_app/commands/scene_loading.h"
 #include "edge_app/localization/scene_search.h"
@@ -110,13 +111,15 @@ ReportLines describe(const SceneCheck& scene) {
   const PicturePose& pose = scene.found->pose;
   const PanTilt<double> angle = nearest_angles(scene.mechanics, pose.R_base_from_camera).angle;
   const auto sigma = [&pose](int i) { return std::sqrt(pose.covariance(i, i)); };
-  return {{"looks at", fmt::format("pan {:.4f} deg, tilt {:.4f} deg (sigma {:.4f} sideways, {:.4f} "
-                                   "up and down, {:.4f} about the axis)",
-                                   kDegrees * angle.pan, kDegrees * angle.tilt, kDegrees * sigma(1),
-                                   kDegrees * sigma(0), kDegrees * sigma(2))},
-          {"by", fmt::format("{}, {} landmarks, focal length {:.1f} px (sigma {:.1f})", name,
-                             scene.found->matches, pose.camera.focal_length,
-                             pose.camera.focal_length * sigma(3))}};
+  const double f = pose.camera.focal_length;
+  return {{"looks at", fmt::format("pan {} deg, tilt {} deg (sigma {} sideways, {} up and down, {} "
+                                   "about the axis)",
+                                   value_text(kDegrees * angle.pan, kDegrees * sigma(1)),
+                                   value_text(kDegrees * angle.tilt, kDegrees * sigma(0)),
+                                   sigma_text(kDegrees * sigma(1)), sigma_text(kDegrees * sigma(0)),
+                                   sigma_text(kDegrees * sigma(2)))},
+          {"by", fmt::format("{}, {} landmarks, focal length {}", name, scene.found->matches,
+                             estimate_text(f, f * sigma(3), "px"))}};
 }
 
 }  // namespace alidade

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 #include <vector>
 
+#include "core/calibration/number_text.h"
 #include "core/model/median.h"
 #include "core/model/trigonometry.h"
 
@@ -71,6 +72,9 @@ double map_residual_px(const SceneMap& map) {
 }
 
 std::string map_text(const SceneMap& map) {
+  const auto span_text = [](double least, double most) {
+    return rounded_text(least, 1) + " to " + rounded_text(most, 1);
+  };
   std::string out = fmt::format("{}x{} px, {} keyframes, {} landmarks\n", map.lens.width(),
                                 map.lens.height(), map.keyframes.size(), map.landmarks.size());
   out += fmt::format("{:>16}  {:>9}  {:>9}  {:>16}  {:>16}  {:>9}\n", "f, px", "sigma, %",
@@ -83,9 +87,8 @@ std::string map_text(const SceneMap& map) {
     out += fmt::format("{:>16}  {:>9.2g}  {:>9}  {:>16}  {:>16}  {:>9}\n",
                        fmt::format("{:.0f} to {:.0f}", f_least, f_most),
                        100 * median(level.f_sigma) / median(level.f), level.f.size(),
-                       fmt::format("{:.1f} to {:.1f}", pan_least * kDegrees, pan_most * kDegrees),
-                       fmt::format("{:.1f} to {:.1f}", tilt_least * kDegrees, tilt_most * kDegrees),
-                       level.landmarks);
+                       span_text(pan_least * kDegrees, pan_most * kDegrees),
+                       span_text(tilt_least * kDegrees, tilt_most * kDegrees), level.landmarks);
   }
   return out;
 }

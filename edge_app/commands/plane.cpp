@@ -2,6 +2,7 @@
 // one of the data contradicts, is reported and not written.
 
 #include "edge_app/commands/plane.h"
+#include "core/calibration/number_text.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -50,10 +51,11 @@ std::string values_text(const PlaneFit& fit) {
   for (int i = 0; i < kPlaneParameterCount; ++i) {
     const double unit = is_angle(i) ? 180 / kPi : 1;
     const double sigma = std::sqrt(values.covariance(i, i));
-    text += fmt::format("  {:<8}{:>12.4f} ", kPlaneValueNames[static_cast<std::size_t>(i)],
-                        values.value[i] * unit);
-    text += sigma > 0 ? fmt::format("± {:.4f} {}\n", sigma * unit, is_angle(i) ? "deg" : "m")
-                      : std::string("by definition\n");
+    text += fmt::format("  {:<8}{:>12} ", kPlaneValueNames[static_cast<std::size_t>(i)],
+                        value_text(values.value[i] * unit, sigma * unit));
+    text += sigma > 0
+                ? fmt::format("± {} {}\n", sigma_text(sigma * unit), is_angle(i) ? "deg" : "m")
+                : std::string("by definition\n");
   }
   return text;
 }

@@ -101,6 +101,7 @@ class PlaneDataReader {
   void read_origin(YamlSection section) {
     data_.origin = geodetic(section, required(section, "height_m", kMetres, "above the ellipsoid"));
     frame_ = LocalFrame(*data_.origin);
+    data_.evidence.y_is_north = true;
     section.finish();
   }
 

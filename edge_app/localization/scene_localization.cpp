@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "core/calibration/number_text.h"
 #include "core/model/rotation.h"
 #include "platform/system/clock.h"
 
@@ -39,11 +40,11 @@ LocalizationHint hint_of(const OrientationRecord& record, double zero_sigma, dou
 }
 
 std::string describe(const BaseOffset& offset) {
-  return fmt::format(
-      "pan {:+.2f} mrad, tilt {:+.2f} mrad (sigma {:.2f}, {:.2f}), roll {:+.2f} mrad",
-      kMilli * offset.zero.pan, kMilli * offset.zero.tilt,
-      kMilli * std::sqrt(offset.covariance(0, 0)), kMilli * std::sqrt(offset.covariance(1, 1)),
-      kMilli * offset.roll);
+  const auto of = [&offset](double value, int i) {
+    return estimate_text(kMilli * value, kMilli * std::sqrt(offset.covariance(i, i)), "mrad");
+  };
+  return fmt::format("pan {}, tilt {}, roll {} mrad", of(offset.zero.pan, 0),
+                     of(offset.zero.tilt, 1), rounded_text(kMilli * offset.roll, 2));
 }
 
 }  // namespace

@@ -7,16 +7,17 @@
 #include <nlohmann/json.hpp>
 #include <optional>
 
+#include "core/calibration/number_text.h"
 #include "edge_app/output/calibration_json.h"
-#include "edge_app/output/value_text.h"
 
 namespace alidade {
 namespace {
 
 std::string prior_text(const std::optional<CalibrationPrior>& prior, double unit) {
   if (!prior) return "none";
-  if (prior->sigma == 0) return fmt::format("{:.6g}, exact", prior->value / unit);
-  return fmt::format("{:.6g} ± {:.2g}", prior->value / unit, prior->sigma / unit);
+  const double sigma = prior->sigma / unit;
+  const std::string value = value_text(prior->value / unit, sigma);
+  return value + (sigma > 0 ? " ± " : ", ") + sigma_text(sigma);
 }
 
 SummaryRow scalar_row(const Calibration& calibration, Parameter parameter, double value,

@@ -2,7 +2,7 @@
 
 #include <cstddef>
 
-#include "edge_app/output/value_text.h"
+#include "core/calibration/number_text.h"
 
 namespace alidade {
 

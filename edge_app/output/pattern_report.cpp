@@ -7,13 +7,13 @@
 #include <cstddef>
 #include <limits>
 
+#include "core/calibration/number_text.h"
 #include "core/pattern/image_cells.h"
 #include "core/pattern/pattern_view.h"
 #include "edge_app/output/html_page.h"
 #include "edge_app/output/lens_rows.h"
 #include "edge_app/output/report_page.h"
 #include "edge_app/output/svg_plot.h"
-#include "edge_app/output/value_text.h"
 
 namespace alidade {
 namespace {

@@ -133,12 +133,15 @@ void Pipeline::finish() { static_cast<void>(::eventfd_write(finished_, 1)); }
 bool Pipeline::check_size(const Frame& frame) {
   if (options_.width == 0) return true;
   if (frame.width == options_.width && frame.height == options_.height) return true;
+  const std::string found =
+      fmt::format("{}: frames of {}x{} px", video_.name(), frame.width, frame.height);
   fail(
-      fmt::format("{}: frames of {}x{} px, but {} is for {}x{} px; calibrate at this size or "
-                  "set the camera to "
-                  "the calibration's",
-                  video_.name(), frame.width, frame.height, options_.calibration_name,
-                  options_.width, options_.height));
+      options_.step.calibrated
+          ? fmt::format("{}, but {} is for {}x{} px; set the camera (and video.width and "
+                        "video.height) to this, or calibrate at the size of the frames",
+                        found, options_.calibration_name, options_.width, options_.height)
+          : fmt::format("{}, but video.width and video.height are {} and {}; set them to {} and {}",
+                        found, options_.width, options_.height, frame.width, frame.height));
   return false;
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "core/calibration/calibration_difference.h"
+#include "core/calibration/number_text.h"
 #include "core/calibration/zoom_fit.h"
 #include "edge_app/pipeline/calibration_refusal.h"
 #include "edge_app/pipeline/keyframe_map.h"
@@ -15,13 +16,14 @@ namespace alidade {
 namespace {
 
 std::string describe(const Calibration& c) {
-  return fmt::format(
-      "focal length {:.1f} +- {:.1f} px, radial distortion {:.4g} +- {:.2g}, line delay {:.3f} +- "
-      "{:.3f} us, clock offset {:.2f} +- {:.2f} ms",
-      c.camera.focal_length, parameter_sigma(c, Parameter::kFocalLength),
-      c.camera.radial_distortion, parameter_sigma(c, Parameter::kRadialDistortion),
-      1e6 * c.line_delay, 1e6 * parameter_sigma(c, Parameter::kLineDelay), 1e3 * c.clock_offset,
-      1e3 * parameter_sigma(c, Parameter::kClockOffset));
+  const auto estimate = [&c](double value, Parameter parameter, double unit, const char* name) {
+    return estimate_text(value / unit, parameter_sigma(c, parameter) / unit, name);
+  };
+  return fmt::format("focal length {}, radial distortion {}, line delay {}, clock offset {}",
+                     estimate(c.camera.focal_length, Parameter::kFocalLength, 1, "px"),
+                     estimate(c.camera.radial_distortion, Parameter::kRadialDistortion, 1, ""),
+                     estimate(c.line_delay, Parameter::kLineDelay, 1e-6, "us"),
+                     estimate(c.clock_offset, Parameter::kClockOffset, 1e-3, "ms"));
 }
 
 }  // namespace

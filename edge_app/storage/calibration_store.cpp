@@ -191,8 +191,10 @@ void CalibrationStore::load_file(const std::string& path, int width, int height,
   }
   const Camera<double>& camera = stored.calibration.camera;
   if ((width > 0 && camera.width != width) || (height > 0 && camera.height != height)) {
-    lines->push_back(fmt::format("{}: for pictures of {}x{} px, but these have {}x{}; {}", path,
-                                 camera.width, camera.height, width, height, set_file_aside(path)));
+    lines->push_back(
+        fmt::format("{}: for pictures of {}x{} px, but video.width and video.height are {} and "
+                    "{}; {}",
+                    path, camera.width, camera.height, width, height, set_file_aside(path)));
     return;
   }
   const std::optional<double>& zoom = stored.calibration.zoom;

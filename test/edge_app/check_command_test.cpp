@@ -178,7 +178,7 @@ TEST_F(CheckCommand, PassesAHealthySetup) {
   EXPECT_THAT(result.output,
               AllOf(HasSubstr("320x180 px"), HasSubstr("points to follow"),
                     HasSubstr("while the head turns; 0 of "),
-                    HasSubstr("pan sign right, tilt sign right; focal length about "),
+                    HasSubstr("pan sign correct, tilt sign correct; focal length about "),
                     Not(HasSubstr("advice"))));
 }
 
@@ -254,7 +254,7 @@ TEST_F(CheckCommand, SaysThatTiltIsReversed) {
   EXPECT_THAT(findings(result.errors),
               ElementsAre(AllOf(HasSubstr(path("recording")), HasSubstr("tilt is reversed"),
                                 HasSubstr("turn the sign of tilt_rad"))));
-  EXPECT_THAT(result.output, HasSubstr("pan sign right, tilt sign REVERSED"));
+  EXPECT_THAT(result.output, HasSubstr("pan sign correct, tilt sign REVERSED"));
 }
 
 TEST_F(CheckCommand, SaysHowLongADeviceRepeatsOldAngles) {

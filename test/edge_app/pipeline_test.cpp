@@ -477,6 +477,7 @@ TEST_F(PipelineTest, FinishesWhenFramesAreNotOfTheCalibrationsSize) {
   options.width = 1280;
   options.height = 720;
   options.calibration_name = "calibration.yaml";
+  options.step.calibrated = true;
   Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options);
   pipeline.start();
   video_.push(frame());
@@ -485,6 +486,22 @@ TEST_F(PipelineTest, FinishesWhenFramesAreNotOfTheCalibrationsSize) {
   EXPECT_THAT(pipeline.error(),
               AllOf(HasSubstr("1920x1080"), HasSubstr("1280x720"), HasSubstr("calibration.yaml")));
   EXPECT_TRUE(sink_.records().empty());
+}
+
+TEST_F(PipelineTest, FinishesWhenFramesAreNotOfTheConfiguredSizeAndNamesItsKeys) {
+  PipelineOptions options = options_for_tests();
+  options.width = 1280;
+  options.height = 720;
+  options.calibration_name = "data sheet";
+  options.step.calibrated = false;
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options);
+  pipeline.start();
+  video_.push(frame());
+  ASSERT_TRUE(finished(pipeline));
+  pipeline.stop();
+  EXPECT_THAT(pipeline.error(),
+              HasSubstr("frames of 1920x1080 px, but video.width and video.height "
+                        "are 1280 and 720; set them to 1920 and 1080"));
 }
 
 TEST_F(PipelineTest, FinishesWithoutAnErrorWhenTheReaderGoes) {

@@ -17,8 +17,10 @@
 namespace alidade {
 namespace {
 
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 namespace fs = std::filesystem;
@@ -56,7 +58,8 @@ TEST_F(PlaneCommand, WritesThePlaneBesideTheDataAndTellsHowEachFits) {
   const Result result = alidade({"plane", "fit", write(kYard)});
   EXPECT_EQ(result.exit_code, 0) << result.errors;
   EXPECT_THAT(result.output, HasSubstr("heading"));
-  EXPECT_THAT(result.output, HasSubstr("10.0000 ±"));
+  EXPECT_THAT(result.output, ContainsRegex("height +10\\.00+ ± 0\\.0[0-9]+ m\n"));
+  EXPECT_THAT(result.output, Not(HasSubstr("-0.0")));
   for (const char* name : {"height", "level", "kerb", "drain", "pole"})
     EXPECT_THAT(result.output, HasSubstr(name));
   PlaneEstimate plane;
@@ -95,6 +98,32 @@ TEST_F(PlaneCommand, RefusesWhatIsNotDeterminedWithWhatWouldHelp) {
   EXPECT_EQ(result.exit_code, 1);
   EXPECT_THAT(result.output, IsEmpty());
   EXPECT_THAT(last_line(result.errors), HasSubstr("tilt is not determined: give the base's level"));
+}
+
+// As the status page sends it: height and level are enough, and one point more takes nothing away.
+TEST_F(PlaneCommand, TakesHeightAndLevelAlsoWithOnePointAndWithoutAny) {
+  const std::string known = "format: 1\nheight: {height_m: 10, sigma_m: 0.05}\nlevel: {sigma_deg: 0.1}\n";
+  for (const char* points :
+       {"points: []\n", "points: [{name: kerb, direction: [30, 0, 10], sigma_rad: 2e-4, x_m: 100, "
+                        "y_m: 30, sigma_m: 0.02}]\n"}) {
+    const Result result = alidade({"plane", "fit", write(known + points)});
+    EXPECT_EQ(result.exit_code, 0) << points << result.errors;
+    EXPECT_THAT(result.output, HasSubstr("nothing says where north is"));
+    EXPECT_TRUE(fs::exists(in_directory("plane.yaml")));
+  }
+  PlaneEstimate plane;
+  std::string error;
+  ASSERT_TRUE(load_plane(in_directory("plane.yaml"), &plane, &error)) << error;
+  EXPECT_NEAR(plane.plane.position.x(), 100, 0.01);
+  EXPECT_NEAR(plane.plane.position.z(), 10, 1e-6);
+  // Of the earth a place has a north, which nothing tells here.
+  const Result north = alidade(
+      {"plane", "fit",
+       write(known + "origin: {latitude_deg: 48, longitude_deg: 11, height_m: 500}\npoints: [{name: kerb, "
+                     "direction: [30, 0, 10], sigma_rad: 2e-4, latitude_deg: 48, longitude_deg: "
+                     "11, height_m: 500, sigma_m: 0.02}]\n")});
+  EXPECT_EQ(north.exit_code, 1);
+  EXPECT_THAT(last_line(north.errors), HasSubstr("heading is not determined: give a heading"));
 }
 
 TEST_F(PlaneCommand, ASlipIsBadUsageWithFileAndLine) {

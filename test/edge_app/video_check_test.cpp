@@ -153,6 +153,11 @@ TEST(VideoCheck, SaysThatTheSizeIsAnother) {
   frames.front().width = 1280;
   EXPECT_THAT(problems(checked(frames).findings),
               ElementsAre(HasSubstr("1280x360 px, but calibration.yaml is for 640x360 px")));
+  VideoNeeds told = video_needs();
+  told.is_calibrated = false;
+  EXPECT_THAT(problems(check_video(frames, {}, {}, ClockFilterOptions(), told).findings),
+              ElementsAre(HasSubstr("but video.width and video.height are 640 and 360; set them to "
+                                    "1280 and 360")));
 }
 
 TEST(VideoCheck, SaysThatAClockIsNone) {

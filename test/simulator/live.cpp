@@ -140,7 +140,7 @@ std::vector<std::vector<std::uint8_t>> encoded_frames(const Config& config, cons
     throw std::runtime_error(error);
   }
   std::vector<std::vector<std::uint8_t>> frames(count);
-  const Progress progress("rendering frame", count);
+  Progress progress("rendering frame", count);
   const std::size_t batch = 4 * processors();
   for (std::size_t start = 0; start < count && !stop; start += batch) {
     const std::size_t size = std::min(batch, count - start);

@@ -5,8 +5,10 @@
 
 #include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstddef>
 #include <cstdio>
+#include <functional>
 #include <future>
 #include <string>
 #include <thread>
@@ -33,20 +35,46 @@ void parallel_for(std::size_t count, const Work& work) {
   for (std::future<void>& worker : workers) worker.get();
 }
 
-// A line on stderr that is written anew, if stderr is a terminal.
+inline double steady_now_s() {
+  const auto since = std::chrono::steady_clock::now().time_since_epoch();
+  return std::chrono::duration<double>(since).count();
+}
+
+// How far long work is, and how long it will still take: on a terminal one line that is written anew, elsewhere (a log, a script) a line
+// each five seconds, so that what is done at once says nothing.
 class Progress {
  public:
-  Progress(std::string what, std::size_t total)
-      : what_(std::move(what)), total_(total), shown_(isatty(STDERR_FILENO) == 1) {}
-  void show(std::size_t done) const {
-    if (!shown_) return;
-    std::fprintf(stderr, "\r%s %zu/%zu%s", what_.c_str(), done, total_, done == total_ ? "\n" : "");
+  static constexpr double kPeriod_s = 5;
+
+  Progress(std::string what, std::size_t total, std::FILE* to = stderr,
+           std::function<double()> now_s = steady_now_s)
+      : what_(std::move(what)),
+        total_(total),
+        to_(to),
+        now_s_(std::move(now_s)),
+        rewritten_(isatty(fileno(to)) == 1),
+        begin_s_(now_s_()),
+        said_s_(begin_s_) {}
+
+  void show(std::size_t done) {
+    const double now_s = now_s_();
+    if (!rewritten_ && now_s - said_s_ < kPeriod_s) return;
+    said_s_ = now_s;
+    const double left = static_cast<double>(total_ - done) / static_cast<double>(done);
+    std::fprintf(to_, "%s%s %zu/%zu, %.0f s left %s",
+                 rewritten_ ? "\r" : "alidade-simulate: ", what_.c_str(), done, total_,
+                 (now_s - begin_s_) * left, rewritten_ && done < total_ ? "" : "\n");
+    std::fflush(to_);
   }
 
  private:
   std::string what_;
   std::size_t total_;
-  bool shown_;
+  std::FILE* to_;
+  std::function<double()> now_s_;
+  bool rewritten_;
+  double begin_s_;
+  double said_s_;
 };
 
 }  // namespace alidade::simulator

@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 #include <fstream>
 #include <set>
@@ -19,6 +20,7 @@
 #include <string>
 #include <vector>
 
+#include "test/simulator/parallel.h"
 #include "test/simulator/servers/av_client.h"
 #include "test/simulator/servers/simulated_head.h"
 #include "test/support/temporary_directory.h"
@@ -59,12 +61,15 @@ class Child {
   Child(const Child&) = delete;
   Child& operator=(const Child&) = delete;
 
-  // Empty at the end.
+  // Empty at the end. How far a long work is, a slow machine may say.
   std::string read_line() {
     std::string line;
-    for (int c = std::fgetc(output_); c != EOF && c != '\n'; c = std::fgetc(output_)) {
-      line += static_cast<char>(c);
-    }
+    do {
+      line.clear();
+      for (int c = std::fgetc(output_); c != EOF && c != '\n'; c = std::fgetc(output_)) {
+        line += static_cast<char>(c);
+      }
+    } while (line.find("rendering frame ") != std::string::npos);
     return line;
   }
   void signal(int number) const { kill(process_, number); }
@@ -85,6 +90,29 @@ constexpr const char* kStillCamera =
     "camera: {focal_length_px: 1000, clock_offset_ms: -50, pan_scale: 1.5}\n"
     "path: {amplitude: 0, pan_deg: 12, tilt_deg: -3}\n"
     "truth_dir: truth\n";
+
+TEST(VirtualCameraProgram, SaysEachFiveSecondsHowFarItsLongWorkIs) {
+  std::FILE* const log = std::tmpfile();
+  ASSERT_NE(log, nullptr);
+  double now_s = 100;
+  simulator::Progress progress("rendering frame", 900, log, [&now_s] { return now_s; });
+  for (std::size_t done = 30; done <= 900; done += 30) {
+    now_s += 1;
+    progress.show(done);
+  }
+  std::rewind(log);
+  std::string text(2000, ' ');
+  text.resize(std::fread(text.data(), 1, text.size(), log));
+  std::fclose(log);
+  EXPECT_THAT(text, testing::StartsWith("alidade-simulate: rendering frame 150/900, 25 s left \n"));
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 6);
+  // What is done at once says nothing.
+  std::FILE* const quick = std::tmpfile();
+  ASSERT_NE(quick, nullptr);
+  simulator::Progress("rendering frame", 9, quick, [] { return 0.0; }).show(9);
+  EXPECT_EQ(std::ftell(quick), 0);
+  std::fclose(quick);
+}
 
 TEST(VirtualCameraProgram, PrintsItsVersionAndItsHelp) {
   Child version({"--version"});

@@ -178,7 +178,7 @@ void write_images(const Config& config, const std::vector<FrameEvent>& frames, c
   } else {
     fs::create_directory(directory / "frames");
   }
-  const Progress progress("rendering frame", frames.size());
+  Progress progress("rendering frame", frames.size());
   // Rendered side by side in batches, written in order.
   const std::size_t batch = 4 * processors();
   for (std::size_t start = 0; start < frames.size(); start += batch) {

@@ -178,7 +178,7 @@ class Run(SystemTest):
         self.assertEqual(code, 0, check.error_text())
         report = "\n".join(lines)
         self.assertIn("320x192 px (as expected)", report)
-        self.assertIn("pan sign right, tilt sign right", report)
+        self.assertIn("pan sign correct, tilt sign correct", report)
 
     def test_check_says_that_nobody_is_there(self):
         camera = self.camera()

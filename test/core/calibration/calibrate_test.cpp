@@ -17,6 +17,7 @@ using test::draw_base_simulation;
 using test::simulate;
 using test::Simulation;
 using ::testing::HasSubstr;
+using ::testing::StartsWith;
 
 // One error in 1.5e5 of a Gaussian is larger; a test looks at some hundred.
 constexpr double kSigmas = 4.5;
@@ -353,6 +354,54 @@ TEST(Calibrate, RefusesPanAloneAndTiltAlone) {
     const CalibrationResult result = calibrate(simulate(s));
     EXPECT_EQ(result.status, CalibrationStatus::kOneAxisOnly) << result.message;
     EXPECT_THAT(result.message, HasSubstr(axis == 0 ? "tilt" : "pan"));
+  }
+}
+
+// What its telemetry says of the resting axis is noise, as far as an axis that moves would have gone.
+TEST(Calibrate, RefusesAnAxisThatMovesInItsNoiseOnly) {
+  for (const int axis : {0, 1}) {
+    Simulation s = small_simulation(16);
+    s.path = [axis](double t) {
+      Eigen::Vector2d angle = Eigen::Vector2d::Zero();
+      angle[axis] = 0.4 * std::sin(t);
+      return angle;
+    };
+    CalibrationInput input = simulate(s);
+    // From end to end more than the least that is taken for motion.
+    std::mt19937_64 random(5);
+    std::normal_distribution<double> normal(0, 0.006 * input.width / s.focal_length);
+    for (auto& sample : input.telemetry)
+      (axis == 0 ? sample.tilt_rad : sample.pan_rad) += normal(random);
+    input.noise.pan_tilt_sigma_rad.reset();
+    const CalibrationResult result = calibrate(input);
+    EXPECT_EQ(result.status, CalibrationStatus::kOneAxisOnly) << result.message;
+    EXPECT_THAT(result.message, StartsWith(axis == 0 ? "tilt moves" : "pan moves"));
+    EXPECT_THAT(result.message, HasSubstr("both axes have to move"));
+  }
+}
+
+// An axis that hardly moves and runs the other way fits with its axis turned over: the file of such a calibration could not be read.
+TEST(Calibrate, SaysByHowMuchAnAxisMovedThatComesOutTurnedOver) {
+  for (const int axis : {0, 1}) {
+    Simulation s = small_simulation(16);
+    const double little = 0.1 * s.width / s.focal_length / 2;
+    s.path = [axis, little](double t) {
+      Eigen::Vector2d angle;
+      angle[axis] = 0.4 * std::sin(t) + 0.1 * std::sin(2.7 * t);
+      angle[1 - axis] = little * std::sin(1.3 * t);
+      return angle;
+    };
+    CalibrationInput input = simulate(s);
+    for (auto& sample : input.telemetry) {
+      double& angle = axis == 0 ? sample.tilt_rad : sample.pan_rad;
+      angle = -angle;
+    }
+    const CalibrationResult result = calibrate(input);
+    EXPECT_FALSE(result.ok());
+    if (result.status == CalibrationStatus::kNotConverged) continue;
+    EXPECT_EQ(result.status, CalibrationStatus::kOneAxisOnly) << result.message;
+    EXPECT_THAT(result.message, StartsWith(axis == 0 ? "tilt moves" : "pan moves"));
+    EXPECT_THAT(result.message, HasSubstr(axis == 0 ? "tilt up positive?" : "pan right positive?"));
   }
 }
 

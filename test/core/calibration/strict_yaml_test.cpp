@@ -67,5 +67,25 @@ TEST(NumberText, ExactTextIsShortAndReadsBackAsTheSameBits) {
   EXPECT_EQ(short_text(0.123456789), "0.123457");
 }
 
+TEST(NumberText, AnEstimateHasTheDigitsOfItsSigmaAndNoMinusBeforeZero) {
+  EXPECT_EQ(value_text(939.99874, 0.0095), "939.9987");
+  EXPECT_EQ(sigma_text(0.0095), "0.0095");
+  EXPECT_EQ(estimate_text(939.99874, 0.0095, "px"), "939.9987 +- 0.0095 px");
+  EXPECT_EQ(estimate_text(940, 34.4, "px"), "940 +- 34 px");
+  EXPECT_EQ(estimate_text(-0.00001, 0.012, ""), "0.000 +- 0.012");
+  EXPECT_EQ(estimate_text(12345, 1234.5, "px"), "12345 +- 1234 px");
+  // Never +- 0.0, and what no estimate is has no sigma.
+  EXPECT_EQ(estimate_text(1, 3e-9, ""), "1.0000000000 +- 3.0e-09");
+  EXPECT_EQ(estimate_text(1, 0, "px"), "1 px, exact");
+  // As seconds become microseconds.
+  EXPECT_EQ(value_text(9.9999999999e-6 / 1e-6, 0), "10");
+  EXPECT_EQ(value_text(14.2e-6 / 1e-6, 0), "14.2");
+  EXPECT_EQ(value_text(-0.0, 0), "0");
+  EXPECT_EQ(rounded_text(-0.00004, 4), "0.0000");
+  EXPECT_EQ(rounded_text(-0.4, 0), "0");
+  EXPECT_EQ(rounded_text(-0.06, 1), "-0.1");
+  EXPECT_EQ(rounded_text(-10, 0), "-10");
+}
+
 }  // namespace
 }  // namespace alidade

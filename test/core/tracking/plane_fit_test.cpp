@@ -258,6 +258,38 @@ TEST(PlaneFit, WhatNothingChecksHasNoMisfit) {
   EXPECT_LT((J.transpose() * fit.plane.covariance.topLeftCorner<3, 3>()).norm(), 1e-15);
 }
 
+// More than height and level alone, which are enough: what ties the camera to a place takes nothing away.
+TEST(PlaneFit, WithOnePlaceOrPointTheHeadingIsTheBases) {
+  for (std::uint64_t seed = 1; seed <= 10; ++seed) {
+    for (const bool is_point : {true, false}) {
+      PlaneScene scene = PlaneScene::of_camera(seed);
+      scene.add_height();
+      scene.add_level();
+      const PlaneFit alone = fit_plane(scene.evidence);
+      ASSERT_EQ(alone.status, PlaneFitStatus::kOk) << alone.message;
+      const Vector2<double> moved(300, -70);
+      scene.truth.position.head<2>() += moved;
+      if (is_point) {
+        scene.add_point({moved.x() + 5, moved.y() + 60, 0});
+      } else {
+        scene.add_place();
+      }
+      const PlaneFit fit = fit_plane(scene.evidence);
+      ASSERT_EQ(fit.status, PlaneFitStatus::kOk) << fit.message;
+      EXPECT_TRUE(fit.heading_of_base);
+      EXPECT_FALSE(fit.origin_below_camera);
+      EXPECT_EQ(fit.degrees_of_freedom, 0);
+      const auto sigma = fit.plane.covariance.diagonal().cwiseSqrt().eval();
+      for (int axis = 0; axis < 2; ++axis) {
+        EXPECT_NEAR(fit.plane.position[axis], scene.truth.position[axis], 5 * sigma[3 + axis])
+            << seed;
+      }
+      EXPECT_NEAR(fit.plane.height(), alone.plane.height(), 1e-6);
+      EXPECT_NEAR(heading(fit.plane), 0, 1e-9);
+    }
+  }
+}
+
 TEST(PlaneFit, LargerResidualsThanStatedMakeLargerSigmas) {
   PlaneScene scene(5);
   scene.sight_sigma = 3e-3;
@@ -319,14 +351,16 @@ INSTANTIATE_TEST_SUITE_P(
                               scene->add_height();
                               scene->add_horizon(0.5);
                             }},
-                    Refusal{"NoHeading", PlaneFitStatus::kUndetermined, "heading",
+                    Refusal{"NoNorthOfAPlace", PlaneFitStatus::kUndetermined, "heading",
                             [](PlaneScene* scene) {
+                              scene->evidence.y_is_north = true;
                               scene->add_height();
                               scene->add_level();
                               scene->add_place();
                             }},
-                    Refusal{"OnePoint", PlaneFitStatus::kUndetermined, "heading",
+                    Refusal{"NoNorthOfAPoint", PlaneFitStatus::kUndetermined, "heading",
                             [](PlaneScene* scene) {
+                              scene->evidence.y_is_north = true;
                               scene->add_height();
                               scene->add_level();
                               scene->add_point({60, 10, 0});
