@@ -16,6 +16,21 @@ constexpr double kLogFMargin = 0.1;  // beyond the lens's range
 // Of a place on the image, by the feature's size, px: as it comes out of maps; what a picture has more of is found from it.
 double place_sigma_px(double scale_px) { return std::max(0.15, 0.06 * scale_px); }
 
+// Where a direction is seen, at the row that it is seen in. False: nowhere.
+bool seen_at(const Camera<double>& camera, const PictureMotion& motion,
+             const Matrix3<double>& R_base_from_camera, const Vector3<double>& d_b,
+             Vector2<double>* u) {
+  const bool moves = motion.zoom_rate != 0 || !motion.angular_velocity.isZero(0);
+  double row = motion.reference_row;
+  for (int step = 0; step < (moves ? 3 : 1); ++step) {
+    if (pixel_from_map(camera, motion, R_base_from_camera, row, d_b, u) != ProjectionStatus::kOk) {
+      return false;
+    }
+    row = u->y();
+  }
+  return true;
+}
+
 }  // namespace
 
 const char* to_string(LocalizationStatus status) {
@@ -61,6 +76,7 @@ struct Localizer::State {
 
   LocalizationOptions options;
   LensCurve lens;
+  std::optional<Mechanics<double>> mechanics;
   double line_delay = 0;
   double reference_row = 0;
   std::vector<Landmark> landmarks;
@@ -133,14 +149,11 @@ struct Localizer::State {
       if (l.d_b.dot(axis) < least_cosine) continue;
       const double scale_px = l.scale_rad * f;
       if (scale_px < kLeastScale_px || scale_px > most_scale_px) continue;
-      MapProjection seen;
-      if (project_from_map(camera, motion, place.R_base_from_camera, camera.height / 2.0, l.d_b,
-                           &seen) != ProjectionStatus::kOk) {
-        continue;
-      }
-      const bool is_inside = seen.u.x() > -margin_px && seen.u.x() < camera.width + margin_px &&
-                             seen.u.y() > -margin_px && seen.u.y() < camera.height + margin_px;
-      if (is_inside) out.push_back({static_cast<int>(i), seen.u, scale_px});
+      Vector2<double> seen;
+      if (!seen_at(camera, motion, place.R_base_from_camera, l.d_b, &seen)) continue;
+      const bool is_inside = seen.x() > -margin_px && seen.x() < camera.width + margin_px &&
+                             seen.y() > -margin_px && seen.y() < camera.height + margin_px;
+      if (is_inside) out.push_back({static_cast<int>(i), seen, scale_px});
     }
     return out;
   }
@@ -192,7 +205,10 @@ struct Localizer::State {
   [[nodiscard]] PoseKnowledge knowledge(const LocalizationHint& hint) const {
     PoseKnowledge out;
     out.lens = lens;
-    out.motion = {hint.angular_velocity, hint.zoom_rate, line_delay, reference_row};
+    out.motion = {hint.angular_velocity, hint.zoom_rate, hint.line_delay.value_or(line_delay),
+                  reference_row};
+    out.motion_doubt = hint.motion_doubt;
+    out.turned_by = mechanics;
     out.focal_length = hint.focal_length;
     out.least_log_f = lens.begin_s() - kLogFMargin;
     out.most_log_f = lens.end_s() + kLogFMargin;
@@ -200,10 +216,11 @@ struct Localizer::State {
   }
 
   // Again with all landmarks about the places that a first pose gives them.
-  [[nodiscard]] bool refine(const FeatureSet& features, const PoseKnowledge& knowledge,
+  [[nodiscard]] bool refine(const FeatureSet& features, PoseKnowledge knowledge,
                             Localization* out) const {
     const Place place{out->pose.R_base_from_camera, out->pose.log_f};
-    std::vector<Visible> there = visible(place, knowledge.motion, 0);
+    knowledge.motion_start = out->pose.motion;
+    std::vector<Visible> there = visible(place, out->pose.motion, 0);
     out->expected = static_cast<int>(there.size());
     const auto matches = match_near(features, std::move(there), options.near_px);
     PoseOptions pose_options;
@@ -257,8 +274,9 @@ struct Localizer::State {
     out.status = LocalizationStatus::kNotInMap;
     const FocalLengthPrior& f = *hint.focal_length;
     const double half = std::hypot(lens.width(), lens.height()) / 2;
-    const double radius_px =
-        3 * (hint.R_sigma * std::exp(f.log_f) + f.sigma * half) + options.near_px;
+    const double radius_px = 3 * (hint.R_sigma * std::exp(f.log_f) + f.sigma * half +
+                                  motion_reach_px(knowledge, f.log_f)) +
+                             options.near_px;
     if (radius_px > lens.width() / 4.0) return out;
     const auto matches = match_near(
         features, visible({*hint.R_base_from_camera, f.log_f}, knowledge.motion, radius_px),
@@ -328,6 +346,7 @@ Localizer::Localizer(const SceneMap& map, const LocalizationOptions& options) : 
   State& s = *state_;
   s.options = options;
   s.lens = map.lens;
+  s.mechanics = map.mechanics;
   s.line_delay = map.line_delay;
   s.reference_row = map.reference_row;
   for (const SceneKeyframe& keyframe : map.keyframes) {

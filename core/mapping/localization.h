@@ -3,7 +3,8 @@
 //   with a hint     features are compared with the landmarks that should lie near them
 //   without         retrieval: k-d trees over all landmarks' descriptors, each near one a vote for the keyframes that saw it; the
 //                   keyframes with most votes are tried, the picture's features against their landmarks
-//   pose            picture_pose.h; then again with all landmarks that should be seen there
+//   pose            picture_pose.h; then again with all landmarks that should be seen there; it holds for the map's reference row, its middle one
+//   motion          of the camera while the picture is read out: what the hint does not tell is found with the pose
 // A rival of the nearest landmark is only what lies elsewhere: the same thing may stand in the map for several zooms. What the
 // keyframe of the nearest focal length does not know, of base and lens, is added to the pose's covariance. Refused is what could be wrong: too few matches, too few of those that should be
 // there, two places that fit. Repeated texture fails the ratio test, or has a rival.
@@ -53,8 +54,11 @@ struct LocalizationHint {
   std::optional<Matrix3<double>> R_base_from_camera;
   double R_sigma = 0;  // rad
   std::optional<FocalLengthPrior> focal_length;
+  // What the camera does while it is read out, and what is not known of that: by itself nothing is.
   Vector3<double> angular_velocity = Vector3<double>::Zero();  // camera frame, rad/s
   double zoom_rate = 0;                                        // d log f / dt, 1/s
+  MotionDoubt motion_doubt = kUnknownMotion;
+  std::optional<double> line_delay;  // s/row; none: the map's
 };
 
 struct LocalizedFeature {

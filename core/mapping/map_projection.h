@@ -4,7 +4,8 @@
 //   M(v) = Exp(w t), t = (v - reference row) * line delay,   camera at row v: log f more by zoom_rate t, the corner's distortion as it is
 // w is the camera's turn rate in its own frame, constant over a picture. The angles' rates are what is constant (rolling_shutter.h);
 // the difference is second order in the turn during one read-out. v is the row that was measured: errors of it move t, see
-// reprojection_error_covariance() of rolling_shutter.h. No allocation.
+// reprojection_error_covariance() of rolling_shutter.h. A picture tells rates times line delay only: with a line delay of 1 / height they
+// are what the camera does over the image's height (in_heights()). No allocation.
 
 #include "core/model/camera.h"
 #include "core/model/rolling_shutter.h"
@@ -21,12 +22,20 @@ struct PictureMotion {
   [[nodiscard]] double time_of_row(double v) const { return (v - reference_row) * line_delay; }
 };
 
+// The same with the time of an image's height for a second. What a line delay of 0 says of rates is nothing.
+[[nodiscard]] inline PictureMotion in_heights(const PictureMotion& motion, int height) {
+  const double read_out = motion.line_delay * height;
+  return {motion.angular_velocity * read_out, motion.zoom_rate * read_out, 1.0 / height,
+          motion.reference_row};
+}
+
 struct MapProjection {
   Vector2<double> u;                                    // px
   Vector2<double> J_u_row;                              // the image's motion per row
   Matrix<double, 2, 3> J_u_xi;                          // of R Exp(xi)
   Matrix<double, 2, 3> J_u_d;                           // of d in base
   Matrix<double, 2, kCameraParameterCount> J_u_camera;  // of the camera at the reference row
+  Matrix<double, 2, 4> J_u_motion;                      // of w, zoom rate
 };
 
 [[nodiscard]] inline ProjectionStatus project_from_map(const Camera<double>& camera,
@@ -37,25 +46,42 @@ struct MapProjection {
   const double time = motion.time_of_row(row);
   const Vector3<double> d_reference = R_base_from_camera.transpose() * d_b;
   const bool turns = time != 0 && !motion.angular_velocity.isZero(0);
+  const Vector3<double> turn = -time * motion.angular_velocity;
   const Matrix3<double> R_row_from_reference =
-      turns ? exp_so3(Vector3<double>(-time * motion.angular_velocity))
-            : Matrix3<double>(Matrix3<double>::Identity());
+      turns ? exp_so3(turn) : Matrix3<double>(Matrix3<double>::Identity());
   const Vector3<double> d_row = R_row_from_reference * d_reference;
   const bool zooms = motion.zoom_rate != 0;
   const Camera<double> at_row = zooms ? zoomed(camera, motion.zoom_rate * time) : camera;
   Matrix<double, 2, 3> J_u_row_frame;
   const ProjectionStatus status = project(at_row, d_row, &out->u, &J_u_row_frame, &out->J_u_camera);
   if (status != ProjectionStatus::kOk) return status;
-  Vector2<double> J_u_time = J_u_row_frame * (skew(d_row) * motion.angular_velocity);
-  if (zooms) {
-    J_u_time += motion.zoom_rate * by_zoom(at_row, out->J_u_camera);
-    refer_to_reference_row(camera, at_row, &out->J_u_camera);
-  }
+  const Matrix<double, 2, 3> J_u_turned = J_u_row_frame * skew(d_row);
+  const Vector2<double> J_u_log_f = by_zoom(at_row, out->J_u_camera);
+  const Vector2<double> J_u_time =
+      J_u_turned * motion.angular_velocity + motion.zoom_rate * J_u_log_f;
+  out->J_u_motion << time * J_u_turned, time * J_u_log_f;
+  if (turns) out->J_u_motion.leftCols<3>() *= left_jacobian_so3(turn);
+  if (zooms) refer_to_reference_row(camera, at_row, &out->J_u_camera);
   out->J_u_row = motion.line_delay * J_u_time;
   const Matrix<double, 2, 3> J_u_reference = J_u_row_frame * R_row_from_reference;
   out->J_u_xi = J_u_reference * skew(d_reference);
   out->J_u_d = J_u_reference * R_base_from_camera.transpose();
   return ProjectionStatus::kOk;
+}
+
+// The pixel alone.
+[[nodiscard]] inline ProjectionStatus pixel_from_map(const Camera<double>& camera,
+                                                     const PictureMotion& motion,
+                                                     const Matrix3<double>& R_base_from_camera,
+                                                     double row, const Vector3<double>& d_b,
+                                                     Vector2<double>* u) {
+  const double time = motion.time_of_row(row);
+  Vector3<double> d_row = R_base_from_camera.transpose() * d_b;
+  if (time != 0 && !motion.angular_velocity.isZero(0)) {
+    d_row = exp_so3(Vector3<double>(-time * motion.angular_velocity)) * d_row;
+  }
+  const double change = motion.zoom_rate * time;
+  return change != 0 ? project(zoomed(camera, change), d_row, u) : project(camera, d_row, u);
 }
 
 // The direction that a pixel shows, unit length, base.

@@ -131,7 +131,8 @@ MapChange LandmarkUpkeep::show(const UpkeepView& view, const SceneMap& map, Upke
 bool LandmarkUpkeep::look(const UpkeepView& view, const SceneMap& map, Picture* picture) const {
   if (!valid_ || view.features == nullptr || !view.R_base_from_camera.allFinite() ||
       !std::isfinite(view.log_f) || !view.covariance.allFinite() ||
-      !view.angular_velocity.allFinite() || !std::isfinite(view.zoom_rate) ||
+      !view.motion.angular_velocity.allFinite() || !std::isfinite(view.motion.zoom_rate) ||
+      !std::isfinite(view.motion.line_delay) || !std::isfinite(view.motion.reference_row) ||
       !std::isfinite(view.time_utc_s) ||
       view.features->descriptors.size() != view.features->features.size()) {
     return false;
@@ -139,7 +140,7 @@ bool LandmarkUpkeep::look(const UpkeepView& view, const SceneMap& map, Picture* 
   PosedPicture& posed = picture->posed;
   posed.R_base_from_camera = view.R_base_from_camera;
   posed.camera = map.lens.camera_of(view.log_f, &posed.J_camera_log);
-  posed.motion = {view.angular_velocity, view.zoom_rate, map.line_delay, map.reference_row};
+  posed.motion = view.motion;
   posed.cov_pose = view.covariance;
   picture->taken.assign(view.features->size(), 0);
 

@@ -67,8 +67,7 @@ struct UpkeepView {
   Matrix3<double> R_base_from_camera = Matrix3<double>::Identity();
   double log_f = 0;
   Matrix4<double> covariance = Matrix4<double>::Zero();  // of (xi, log f), against the landmarks
-  Vector3<double> angular_velocity = Vector3<double>::Zero();
-  double zoom_rate = 0;
+  PictureMotion motion;
   const FeatureSet* features = nullptr;
   std::vector<UpkeepMatch>
       matches;  // those that the pose was found from; a feature and a landmark once each

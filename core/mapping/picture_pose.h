@@ -7,9 +7,12 @@
 //               out has to be the mount's. Best of many random twos: MSAC (Torr, Zisserman 2000)
 //   then least squares over all inliers (Huber), each weighted by its own and its landmark's covariance, with f's prior; covariance
 //               inflated where residuals are larger than claimed
+//   motion      what the camera does while the picture is read out (map_projection.h) is known, or is adjusted, too, about what is
+//               thought of it: rows that are exposed one after another tell it. The pose holds for the reference row
 // Refused is what could be wrong, see PoseStatus. Equal input gives equal results. Allocates; no shared state.
 
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -32,10 +35,23 @@ struct FocalLengthPrior {
   double sigma = 0;  // above 0
 };
 
+// What is not known of a motion: sigmas of what it does over the image's height. 0: it is as told. Infinity: nothing is known, but that no
+// camera moves further than some widths of the image a second.
+struct MotionDoubt {
+  double turn = 0;   // rad, of each of the mount's axes
+  double log_f = 0;  // of the change of log f
+};
+inline constexpr MotionDoubt kUnknownMotion{std::numeric_limits<double>::infinity(),
+                                            std::numeric_limits<double>::infinity()};
+
 // What is known of the picture beforehand.
 struct PoseKnowledge {
   LensCurve lens;
-  PictureMotion motion;
+  PictureMotion motion;  // with a line delay of 0 it tells nothing: the mean is a camera at rest
+  MotionDoubt motion_doubt;
+  std::optional<PictureMotion> motion_start;  // where the search begins, as PicturePose has it
+  std::optional<Mechanics<double>>
+      turned_by;  // a mount whose axes turn the picture meanwhile; none: mechanics, or any axis
   std::optional<Mechanics<double>> mechanics;  // none: the rotation is free
   std::optional<FocalLengthPrior> focal_length;
   double least_log_f = 0;  // the range that f is sought in
@@ -79,11 +95,17 @@ struct PicturePose {
       Matrix4<double>::Zero();           // of xi in R Exp(xi) (camera frame, rad), log f
   Camera<double> camera;                 // of log_f
   std::optional<PanTilt<double>> angle;  // true angles, with a mount
-  std::vector<int> inliers;              // of the matches, increasing
-  double noise_scale = 0;                // root mean square of the residuals in their sigmas
-  double chance_log10 = 0;               // see most_chance_log10
+  PictureMotion motion;  // as known; found with what was doubted: in heights (map_projection.h)
+  Matrix4<double> motion_covariance =
+      Matrix4<double>::Zero();  // of its w and zoom rate; 0 where it was known
+  std::vector<int> inliers;     // of the matches, increasing
+  double noise_scale = 0;       // root mean square of the residuals in their sigmas
+  double chance_log10 = 0;      // see most_chance_log10
   int trials = 0;
 };
+
+// How far off the motion's mean what is not known of it may put a pixel of the first or last row, px: one sigma.
+[[nodiscard]] double motion_reach_px(const PoseKnowledge& knowledge, double log_f);
 
 [[nodiscard]] PicturePose find_pose(const std::vector<PoseMatch>& matches,
                                     const PoseKnowledge& knowledge,

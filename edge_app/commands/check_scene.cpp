@@ -74,6 +74,7 @@ SceneCheck check_scene(const Config& config, const NamedCalibration& calibration
     hint.angular_velocity =
         angular_velocity_of(*measured.last, calibration.calibration.camera.focal_length);
   }
+  if (calibration.calibration.line_delay != 0) hint.line_delay = calibration.calibration.line_delay;
   FeatureSet seen;
   scene.found = SceneSearch(map).find({picture.luma, picture.width, picture.height, picture.stride},
                                       hint, &seen);

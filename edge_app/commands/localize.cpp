@@ -37,6 +37,7 @@ class Asking {
         quick_(localization_features(true)),
         width_(map.lens.width()),
         height_(map.lens.height()),
+        line_delay_(map.line_delay),
         mechanics_(map.mechanics.value_or(Mechanics<double>())) {}
 
   void picture(const std::string& path) {
@@ -72,13 +73,19 @@ class Asking {
       const FrameStamp& stamp = recording.frames[frame];
       const MapView view = map_view(recording, stamp, known, focal_lengths);
       LocalizationHint hint;
+      const double line_delay =
+          known != nullptr && known->line_delay != 0 ? known->line_delay : line_delay_;
+      if (view.telemetry) {
+        hint.angular_velocity = view.angular_velocity;
+        hint.zoom_rate = view.zoom_rate;
+        hint.line_delay = line_delay;
+        hint.motion_doubt = motion_doubt(recording, stamp, known, focal_lengths, view, line_delay);
+      }
       if (view.telemetry && view.log_f) {
         hint.R_base_from_camera =
             R_base_from_camera(mechanics_, true_from_measured(mechanics_, *view.telemetry));
         hint.R_sigma = view.angle_sigma;
         hint.focal_length = FocalLengthPrior{*view.log_f, 0.02};
-        hint.angular_velocity = view.angular_velocity;
-        hint.zoom_rate = view.zoom_rate;
       }
       ordered_json json;
       json["recording"] = directory;
@@ -109,6 +116,7 @@ class Asking {
   FeatureDetector detector_;
   FeatureDetector quick_;
   int width_, height_;
+  double line_delay_;
   Mechanics<double> mechanics_;
 };
 

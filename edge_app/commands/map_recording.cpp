@@ -26,6 +26,12 @@ constexpr double kRangeSigma = 0.1;
 constexpr double kCalibratedAngleSigma = 5e-4;
 constexpr double kNominalAngleSigma = 1e-2;
 
+// s, how far telemetry's time may be off the picture's, and what an unknown read-out takes; of a known line delay, what is not known of it.
+constexpr double kKnownClock_s = 0.05;
+constexpr double kUnknownClock_s = 1;
+constexpr double kUnknownReadOut_s = 0.03;
+constexpr double kLineDelayShare = 0.02;
+
 // Telemetry about a time; none before the first sample and after the last.
 struct Telling {
   PanTilt<double> measured;
@@ -55,6 +61,14 @@ std::optional<Telling> telling_at(const std::vector<PanTiltSample>& samples, dou
     out.zoom = a.zoom ? a.zoom : b.zoom;
   }
   return out;
+}
+
+// When telemetry has to be asked about a frame, in its own clock.
+double telemetry_time_of(const MapRecording& recording, const FrameStamp& frame,
+                         const Calibration* calibration) {
+  if (calibration == nullptr) return frame.receive_time_s;
+  const double middle_s = calibration->line_delay * recording.info.height / 2;
+  return frame.receive_time_s + middle_s + calibration->clock_offset;
 }
 
 double focal_length_of(const std::string& text) {
@@ -167,10 +181,8 @@ MapView map_view(const MapRecording& recording, const FrameStamp& frame,
   view.time_utc_s = frame.sender_utc_s.value_or(0);
   const Calibration nominal;
   const Calibration& c = calibration != nullptr ? *calibration : nominal;
-  const double line_delay = calibration != nullptr ? c.line_delay : 0;
-  const double clock_offset = calibration != nullptr ? c.clock_offset : 0;
-  const double middle_s = line_delay * recording.info.height / 2;
-  const auto told = telling_at(recording.telemetry, frame.receive_time_s + middle_s + clock_offset);
+  const auto told =
+      telling_at(recording.telemetry, telemetry_time_of(recording, frame, calibration));
   const auto f = known.at(told ? told->zoom : std::nullopt);
   if (f) view.log_f = f->log_f;
   if (!told) return view;
@@ -186,6 +198,58 @@ MapView map_view(const MapRecording& recording, const FrameStamp& frame,
     if (f && later) view.zoom_rate = (later->log_f - f->log_f) / kStep_s;
   }
   return view;
+}
+
+MotionDoubt motion_doubt(const MapRecording& recording, const FrameStamp& frame,
+                         const Calibration* calibration, const FocalLengthKnowledge& known,
+                         const MapView& view, double line_delay) {
+  const double time_s = telemetry_time_of(recording, frame, calibration);
+  const double window_s = calibration != nullptr ? kKnownClock_s : kUnknownClock_s;
+  const std::vector<PanTiltSample>& samples = recording.telemetry;
+  // The sample before the window, or the one before the two about the frame.
+  auto first =
+      std::lower_bound(samples.begin(), samples.end(), time_s - window_s,
+                       [](const PanTiltSample& s, double t) { return s.latest_time_s < t; });
+  for (int i = 0; i < 2 && first != samples.begin(); ++i) --first;
+  double most_turn = 0, turn_off = 0, most_zoom = 0, zoom_off = 0;
+  bool is_zoom_told = true;
+  int intervals = 0;
+  for (auto a = first; a != samples.end() && std::next(a) != samples.end(); ++a) {
+    const PanTiltSample& b = *std::next(a);
+    const double span = b.latest_time_s - a->latest_time_s;
+    if (!(span > 0)) continue;
+    const Vector2<double> way = minus(PanTilt<double>{b.pan_rad, b.tilt_rad}, PanTilt<double>{a->pan_rad, a->tilt_rad});
+    const Calibration nominal;
+    const Mechanics<double>& mechanics =
+        (calibration != nullptr ? *calibration : nominal).mechanics;
+    const Vector3<double> w = angular_velocity(
+        mechanics, true_from_measured(mechanics, {a->pan_rad, a->tilt_rad}),
+        true_from_measured(mechanics, PanTilt<double>{way.x() / span, way.y() / span}));
+    most_turn = std::max(most_turn, w.norm());
+    turn_off = std::max(turn_off, (w - view.angular_velocity).norm());
+    const auto f_a = known.at(a->zoom);
+    const auto f_b = known.at(b.zoom);
+    if (a->zoom && b.zoom && *a->zoom == *b.zoom) {
+      zoom_off = std::max(zoom_off, std::abs(view.zoom_rate));
+    } else if (a->zoom && b.zoom && f_a && f_b) {
+      const double rate = (f_b->log_f - f_a->log_f) / span;
+      most_zoom = std::max(most_zoom, std::abs(rate));
+      zoom_off = std::max(zoom_off, std::abs(rate - view.zoom_rate));
+    } else {
+      is_zoom_told = false;
+    }
+    ++intervals;
+    if (a->latest_time_s > time_s + window_s) break;
+  }
+  MotionDoubt out = kUnknownMotion;
+  if (!view.telemetry || intervals < 2) return out;
+  const double read_out_s = std::abs(line_delay) * recording.info.height;
+  const auto doubt = [&](double off, double most) {
+    return read_out_s > 0 ? read_out_s * (off + kLineDelayShare * most) : kUnknownReadOut_s * most;
+  };
+  out.turn = doubt(turn_off, most_turn);
+  if (is_zoom_told) out.log_f = doubt(zoom_off, most_zoom);
+  return out;
 }
 
 void for_each_picture(const MapRecording& recording, const std::vector<std::size_t>& frames,

@@ -15,13 +15,44 @@ namespace alidade {
 namespace {
 
 constexpr double kMilli = 1e3;
+// Of a turn rate that points followed from one frame to the next tell: what may change of it meanwhile, and px over the image's height.
+constexpr double kFollowedShare = 0.25;
+constexpr double kFollowed_px = 0.2;
+
+// s, of all rows.
+double read_out_of(const Calibration& calibration) {
+  return std::abs(calibration.line_delay) * calibration.camera.height;
+}
 
 // Of a frame of which nobody knows where it looks.
 LocalizationHint hint_of(const LocalizableFrame& frame, bool zooms) {
+  const Calibration calibration = unpack(frame.record.camera);
   LocalizationHint hint;
-  if (!zooms) hint.focal_length = focal_length_of(unpack(frame.record.camera));
+  if (!zooms) hint.focal_length = focal_length_of(calibration);
   hint.angular_velocity = Eigen::Map<const Vector3<double>>(frame.angular_velocity_rad_s.data());
+  hint.line_delay = calibration.line_delay;
+  hint.motion_doubt.turn =
+      kFollowedShare * read_out_of(calibration) * hint.angular_velocity.norm() +
+      kFollowed_px / calibration.camera.focal_length;
+  if (!zooms) hint.motion_doubt.log_f = 0;
   return hint;
+}
+
+// What a record does not know of how its rows differ.
+MotionDoubt motion_doubt_of(const OrientationRecord& record, const FrameOrientation& frame) {
+  const Calibration& calibration = frame.calibration;
+  const double rate_sigma = std::sqrt(frame.motion_covariance.block<2, 2>(2, 2).trace());
+  const double rate = std::hypot(frame.rate.pan, frame.rate.tilt);
+  const double delay_sigma =
+      parameter_sigma(calibration, Parameter::kLineDelay) * calibration.camera.height;
+  MotionDoubt out;
+  out.turn = std::hypot(read_out_of(calibration) * rate_sigma, delay_sigma * rate);
+  // Where telemetry alone answers, nobody has looked whether the lens moves.
+  const bool is_zoom_untold = frame.mode == OrientationMode::kPt && record.zoom.has_value();
+  out.log_f = is_zoom_untold ? kUnknownMotion.log_f
+                             : std::hypot(read_out_of(calibration) * frame.zoom_rate_sigma,
+                                          delay_sigma * frame.zoom_rate);
+  return out;
 }
 
 LocalizationHint hint_of(const OrientationRecord& record, double zero_sigma, double reference_row) {
@@ -36,6 +67,8 @@ LocalizationHint hint_of(const OrientationRecord& record, double zero_sigma, dou
   hint.focal_length = focal_length_of(calibration);
   hint.angular_velocity = angular_velocity(calibration.mechanics, angle, frame.rate);
   hint.zoom_rate = frame.zoom_rate;
+  hint.motion_doubt = motion_doubt_of(record, frame);
+  hint.line_delay = calibration.line_delay;
   return hint;
 }
 
@@ -86,14 +119,13 @@ SceneLocator::Outcome SceneLocalization::look(const LocalizableFrame& frame, Tol
   if (found.status != LocalizationStatus::kOk) return Outcome::kNotFound;
   const Outcome outcome = is_whole ? tell_whole(frame, found, told) : judge(frame, found, told);
   // What a second picture is to confirm teaches nothing.
-  if (outcome == Outcome::kTold) keep_up(found, seen, hint);
+  if (outcome == Outcome::kTold) keep_up(found, seen);
   return outcome;
 }
 
-void SceneLocalization::keep_up(const Localization& found, const FeatureSet& seen,
-                                const LocalizationHint& hint) {
+void SceneLocalization::keep_up(const Localization& found, const FeatureSet& seen) {
   if (!upkeep_.keeps_up()) return;
-  upkeep_.show(found, seen, hint, utc_now_s(), &map_);
+  upkeep_.show(found, seen, utc_now_s(), &map_);
   if (upkeep_.is_due()) {
     searcher_ = std::make_unique<const SceneSearch>(map_);
     upkeep_.index_made();

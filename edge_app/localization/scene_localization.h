@@ -37,7 +37,7 @@ class SceneLocalization : public SceneLocator {
  private:
   [[nodiscard]] Outcome judge(const LocalizableFrame& frame, const Localization& found,
                               ToldBase* told);
-  void keep_up(const Localization& found, const FeatureSet& seen, const LocalizationHint& hint);
+  void keep_up(const Localization& found, const FeatureSet& seen);
   [[nodiscard]] Outcome tell_whole(const LocalizableFrame& frame, const Localization& found,
                                    ToldBase* told);
   void count(std::int64_t frame, const Localization& found, double took_s);

@@ -4,16 +4,16 @@
 
 namespace alidade {
 
-void SceneUpkeep::show(const Localization& found, const FeatureSet& features,
-                       const LocalizationHint& hint, double time_utc_s, SceneMap* map) {
+void SceneUpkeep::show(const Localization& found, const FeatureSet& features, double time_utc_s,
+                       SceneMap* map) {
   if (!keeps_up()) return;
   UpkeepView view;
   view.time_utc_s = time_utc_s;
   view.R_base_from_camera = found.pose.R_base_from_camera;
   view.log_f = found.pose.log_f;
-  view.covariance = found.covariance_in_map;
-  view.angular_velocity = hint.angular_velocity;
-  view.zoom_rate = hint.zoom_rate;
+  // Of the first or last row, from which the pose's is half an image away: there it is known least.
+  view.covariance = found.covariance_in_map + found.pose.motion_covariance / 4;
+  view.motion = found.pose.motion;
   view.features = &features;
   // What has died since the index was made is found there, but counts no more.
   for (const LocalizedFeature& m : found.matched) {

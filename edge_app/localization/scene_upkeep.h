@@ -24,9 +24,9 @@ class SceneUpkeep {
   explicit SceneUpkeep(StoreMapChange store) : store_(std::move(store)) {}
 
   [[nodiscard]] bool keeps_up() const { return store_ != nullptr; }
-  // found: kOk, of these features, by this hint. *map: as on disk, before and after.
-  void show(const Localization& found, const FeatureSet& features, const LocalizationHint& hint,
-            double time_utc_s, SceneMap* map);
+  // found: kOk, of these features. *map: as on disk, before and after.
+  void show(const Localization& found, const FeatureSet& features, double time_utc_s,
+            SceneMap* map);
 
   // So much has come and gone since the index was made.
   [[nodiscard]] bool is_due() const { return changed_ >= kWorthAnIndex; }

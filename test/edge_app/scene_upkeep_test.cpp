@@ -68,7 +68,7 @@ TEST_F(SceneUpkeepTest, IsOnDiskWhenItReturns) {
   SceneUpkeep upkeep(
       [&](const MapChange& change, std::string* why) { return file.update(change, why); });
   for (int view = 1; view <= 3; ++view) {
-    upkeep.show(found_, seen_, {}, kNow_utc_s + view, &map_);
+    upkeep.show(found_, seen_, kNow_utc_s + view, &map_);
     EXPECT_EQ(upkeep.report().pictures, view);
     EXPECT_EQ(upkeep.report().updates, view);
     // All 40 are in view, and one was not found.
@@ -97,7 +97,7 @@ TEST_F(SceneUpkeepTest, TellsBirthsAndDeaths) {
   seen_.descriptors.push_back(descriptor);
   constexpr double kDay_s = 86400;
   for (int view = 0; view < 25; ++view) {
-    upkeep.show(found_, seen_, {}, kNow_utc_s + 0.5 * kDay_s * view, &map_);
+    upkeep.show(found_, seen_, kNow_utc_s + 0.5 * kDay_s * view, &map_);
   }
   EXPECT_EQ(upkeep.report().born, 1);
   EXPECT_EQ(upkeep.report().died, 1);
@@ -111,8 +111,8 @@ TEST_F(SceneUpkeepTest, EndsWhereTheDiskTakesNothing) {
     return ++asked == 0;
   });
   EXPECT_TRUE(upkeep.keeps_up());
-  upkeep.show(found_, seen_, {}, kNow_utc_s, &map_);
-  upkeep.show(found_, seen_, {}, kNow_utc_s + 1, &map_);
+  upkeep.show(found_, seen_, kNow_utc_s, &map_);
+  upkeep.show(found_, seen_, kNow_utc_s + 1, &map_);
   EXPECT_FALSE(upkeep.keeps_up());
   EXPECT_EQ(asked, 1);
   EXPECT_EQ(upkeep.report().updates, 0);

@@ -83,6 +83,18 @@ TEST(MapProjection, ItsJacobiansAreTheNumericOnes) {
       const auto by_row = numeric_jacobian<2, 1>(
           [&](const Matrix<double, 1, 1>& rows) { return seen(camera, R, u.y() + rows[0], d); },
           1.0);
+      const auto by_motion = numeric_jacobian<2, 4>(
+          [&](const Vector4<double>& off) -> std::optional<Vector2<double>> {
+            PictureMotion other = motion;
+            other.angular_velocity += off.head<3>();
+            other.zoom_rate += off[3];
+            Vector2<double> u_of;
+            if (pixel_from_map(camera, other, R, u.y(), d, &u_of) != ProjectionStatus::kOk) {
+              return std::nullopt;
+            }
+            return u_of;
+          },
+          Vector4<double>(100 / f, 100 / f, 0.1, 0.1));
       const double per_corner = std::pow(f / 734, 2);
       const auto by_camera = numeric_jacobian<2, 5>(
           [&](const Matrix<double, 5, 1>& off) {
@@ -95,14 +107,16 @@ TEST(MapProjection, ItsJacobiansAreTheNumericOnes) {
             return seen(with, R, u.y(), d);
           },
           Matrix<double, 5, 1>(1e-3 * f, 1e-3, 1e-3 * per_corner, 1, 1));
-      evaluated += by_xi.evaluated + by_d.evaluated + by_row.evaluated + by_camera.evaluated;
+      evaluated += by_xi.evaluated + by_d.evaluated + by_row.evaluated + by_camera.evaluated +
+                   by_motion.evaluated;
       EXPECT_LT((disagreement<2, 3>(at.J_u_xi, by_xi, noise)), 1);
       EXPECT_LT((disagreement<2, 3>(at.J_u_d, by_d, noise)), 1);
       EXPECT_LT((disagreement<2, 1>(at.J_u_row, by_row, noise)), 1);
       EXPECT_LT((disagreement<2, 5>(at.J_u_camera, by_camera, noise)), 1);
+      EXPECT_LT((disagreement<2, 4>(at.J_u_motion, by_motion, noise)), 1);
     }
   }
-  EXPECT_EQ(evaluated, static_cast<int>(pictures().size()) * 10 * 4 * 12);
+  EXPECT_EQ(evaluated, static_cast<int>(pictures().size()) * 10 * 4 * 16);
 }
 
 TEST(MapProjection, WhatIsBehindTheCameraIsNotSeen) {
