@@ -218,7 +218,8 @@ MotionDoubt motion_doubt(const MapRecording& recording, const FrameStamp& frame,
     const PanTiltSample& b = *std::next(a);
     const double span = b.latest_time_s - a->latest_time_s;
     if (!(span > 0)) continue;
-    const Vector2<double> way = minus(PanTilt<double>{b.pan_rad, b.tilt_rad}, PanTilt<double>{a->pan_rad, a->tilt_rad});
+    const Vector2<double> way =
+        minus(PanTilt<double>{b.pan_rad, b.tilt_rad}, PanTilt<double>{a->pan_rad, a->tilt_rad});
     const Calibration nominal;
     const Mechanics<double>& mechanics =
         (calibration != nullptr ? *calibration : nominal).mechanics;

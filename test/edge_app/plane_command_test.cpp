@@ -102,10 +102,12 @@ TEST_F(PlaneCommand, RefusesWhatIsNotDeterminedWithWhatWouldHelp) {
 
 // As the status page sends it: height and level are enough, and one point more takes nothing away.
 TEST_F(PlaneCommand, TakesHeightAndLevelAlsoWithOnePointAndWithoutAny) {
-  const std::string known = "format: 1\nheight: {height_m: 10, sigma_m: 0.05}\nlevel: {sigma_deg: 0.1}\n";
+  const std::string known =
+      "format: 1\nheight: {height_m: 10, sigma_m: 0.05}\nlevel: {sigma_deg: 0.1}\n";
   for (const char* points :
-       {"points: []\n", "points: [{name: kerb, direction: [30, 0, 10], sigma_rad: 2e-4, x_m: 100, "
-                        "y_m: 30, sigma_m: 0.02}]\n"}) {
+       {"points: []\n",
+        "points: [{name: kerb, direction: [30, 0, 10], sigma_rad: 2e-4, x_m: 100, "
+        "y_m: 30, sigma_m: 0.02}]\n"}) {
     const Result result = alidade({"plane", "fit", write(known + points)});
     EXPECT_EQ(result.exit_code, 0) << points << result.errors;
     EXPECT_THAT(result.output, HasSubstr("nothing says where north is"));
@@ -119,9 +121,10 @@ TEST_F(PlaneCommand, TakesHeightAndLevelAlsoWithOnePointAndWithoutAny) {
   // Of the earth a place has a north, which nothing tells here.
   const Result north = alidade(
       {"plane", "fit",
-       write(known + "origin: {latitude_deg: 48, longitude_deg: 11, height_m: 500}\npoints: [{name: kerb, "
-                     "direction: [30, 0, 10], sigma_rad: 2e-4, latitude_deg: 48, longitude_deg: "
-                     "11, height_m: 500, sigma_m: 0.02}]\n")});
+       write(known +
+             "origin: {latitude_deg: 48, longitude_deg: 11, height_m: 500}\npoints: [{name: kerb, "
+             "direction: [30, 0, 10], sigma_rad: 2e-4, latitude_deg: 48, longitude_deg: "
+             "11, height_m: 500, sigma_m: 0.02}]\n")});
   EXPECT_EQ(north.exit_code, 1);
   EXPECT_THAT(last_line(north.errors), HasSubstr("heading is not determined: give a heading"));
 }
