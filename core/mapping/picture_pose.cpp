@@ -17,6 +17,7 @@ namespace {
 
 using internal::adjust_pose;
 using internal::has_unknown_motion;
+using internal::moves_too_far;
 using internal::PoseState;
 using internal::two_point_pose;
 using internal::TwoPointPose;
@@ -209,6 +210,8 @@ const char* to_string(PoseStatus status) {
       return "another pose explains nearly as many matches";
     case PoseStatus::kNotDetermined:
       return "the matches do not determine the pose";
+    case PoseStatus::kTooFast:
+      return "the camera moved too far while the picture was read out";
   }
   return "unknown status";
 }
@@ -267,6 +270,10 @@ PicturePose find_pose(const std::vector<PoseMatch>& matches, const PoseKnowledge
   const auto fit = internal::fit_of(matches, out.inliers, knowledge, state, noise);
   if (!fit) {
     out.status = PoseStatus::kNotDetermined;
+    return out;
+  }
+  if (has_unknown_motion(told) && moves_too_far(knowledge, state)) {
+    out.status = PoseStatus::kTooFast;
     return out;
   }
   out.covariance = fit->covariance;

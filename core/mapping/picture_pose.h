@@ -82,6 +82,7 @@ enum class PoseStatus {
   kCollinear,      // or about one line
   kRival,          // repeated texture: another pose explains nearly as much
   kNotDetermined,  // the adjustment has no minimum
+  kTooFast,  // the motion that was found is beyond what a head does, and beyond what is modelled
 };
 
 [[nodiscard]] const char* to_string(PoseStatus status);

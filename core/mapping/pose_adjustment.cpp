@@ -198,6 +198,13 @@ Matrix4<double> information_of_motion(const PoseKnowledge& knowledge, const Pose
 
 }  // namespace
 
+bool moves_too_far(const PoseKnowledge& knowledge, const PoseState& state) {
+  constexpr double kMost = 2;  // of the widest prior's sigmas
+  const double turn_px = state.motion.angular_velocity.head<2>().norm() * std::exp(state.log_f);
+  return turn_px > kMost * kWidestShift * knowledge.lens.width() ||
+         std::abs(state.motion.zoom_rate) > kMost * kWidestZoom;
+}
+
 bool has_unknown_motion(const PoseKnowledge& knowledge) {
   return knowledge.motion_doubt.turn > 0 || knowledge.motion_doubt.log_f > 0;
 }

@@ -28,6 +28,9 @@ struct PoseFit {
 
 [[nodiscard]] bool has_unknown_motion(const PoseKnowledge& knowledge);
 
+// While the picture was read out, the camera did what no head does: nothing was checked there.
+[[nodiscard]] bool moves_too_far(const PoseKnowledge& knowledge, const PoseState& state);
+
 // Levenberg-Marquardt, errors by Huber in sigmas times `noise`; false: no minimum.
 [[nodiscard]] bool adjust_pose(const std::vector<PoseMatch>& matches,
                                const std::vector<int>& inliers, const PoseKnowledge& knowledge,

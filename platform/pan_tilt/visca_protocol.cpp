@@ -266,6 +266,8 @@ Answer ViscaProtocol::find_in_datagram(std::string_view bytes) {
     }
   }
   answer = find_in_payload(header ? header->payload : bytes);
+  // What refuses and answers without a header most likely does not know it.
+  if (!header && answer.kind == Answer::Kind::kRefused) answer.problem = kNoHeader;
   answer.begin = 0;
   return answer;
 }

@@ -229,7 +229,7 @@ TEST_F(CalibrateCommand, SaysWhichPartOfALensFileContradictsTheRecording) {
   const Result result = calibrate_command({path(), "--prior", lens});
   ASSERT_EQ(result.exit_code, 0) << result.errors;
   for (const char* what :
-       {"line delay contradicts the recording and is left out: 30.0000 +- 0.0010 us/row is known",
+       {"line delay contradicts the recording and is left out: 30.0000 +- 0.0015 us/row is known",
         "found at another zoom, focal length and distortion do not count here"}) {
     EXPECT_THAT(result.errors, HasSubstr(what));
     EXPECT_THAT(directory_.read("alidade/report.html"), HasSubstr(what));

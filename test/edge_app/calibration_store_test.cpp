@@ -333,7 +333,8 @@ TEST_F(CalibrationStoreTest, SetsAsideWhatIsOfAnotherSizeWithItsMap) {
   const std::string yaml = directory_.read("calibration.yaml");
   CalibrationStore other = store();
   EXPECT_THAT(other.load(1920, 1080),
-              ElementsAre(AllOf(HasSubstr("640x480"), HasSubstr("1920x1080"),
+              ElementsAre(AllOf(HasSubstr("640x480"),
+                                HasSubstr("video.width and video.height are 1920 and 1080"),
                                 HasSubstr("set aside as calibration.yaml.damaged"))));
   EXPECT_EQ(other.find({}), nullptr);
   StoredCalibration large = some(3000);

@@ -424,7 +424,8 @@ TEST_F(CommandLineTest, VideoSizeOtherThanTheCalibrationsIsABadConfiguration) {
       "calibration: {file: calibration.yaml}\n");
   const Result result = alidade({"run", "-c", config});
   EXPECT_EQ(result.exit_code, 2);
-  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"), HasSubstr("1280x720")));
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"),
+                                   HasSubstr("video.width and video.height are 1280 and 720")));
 }
 
 TEST_F(CommandLineTest, CheckNamesAnUnreachableCameraByItsAddress) {
@@ -785,7 +786,8 @@ TEST_F(CommandLineTest, ReplayRefusesACalibrationOfAnotherSize) {
   directory_.write("alidade/calibration.yaml", head_.calibration(1280, 720));
   const Result result = alidade({"replay", directory_.path()});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"), HasSubstr("1280x720")));
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"),
+                                   HasSubstr("video.width and video.height are 1280 and 720")));
   EXPECT_FALSE(std::filesystem::exists(path("alidade/orientation.csv")));
 }
 
@@ -870,7 +872,8 @@ TEST_F(CommandLineTest, RunEndsWhenFramesAreNotOfTheCalibrationsSize) {
   directory_.write("calibration.yaml", head_.calibration(1280, 720));
   const Result result = alidade({"run", "-c", recorded_config()});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"), HasSubstr("1280x720")));
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"),
+                                   HasSubstr("video.width and video.height are 1280 and 720")));
 }
 
 TEST_F(CommandLineTest, CheckReportsBothStreamsAndTheSizes) {
@@ -883,7 +886,8 @@ TEST_F(CommandLineTest, CheckReportsBothStreamsAndTheSizes) {
   directory_.write("calibration.yaml", head_.calibration(1280, 720));
   result = alidade({"check", "-c", recorded_config(), "--duration", "0.5"});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"), HasSubstr("1280x720")));
+  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"),
+                                   HasSubstr("video.width and video.height are 1280 and 720")));
 }
 
 // Streams of an hour, so that only the event under test ends the program.

@@ -126,7 +126,8 @@ TEST_F(PlaneCommand, TakesHeightAndLevelAlsoWithOnePointAndWithoutAny) {
              "direction: [30, 0, 10], sigma_rad: 2e-4, latitude_deg: 48, longitude_deg: "
              "11, height_m: 500, sigma_m: 0.02}]\n")});
   EXPECT_EQ(north.exit_code, 1);
-  EXPECT_THAT(last_line(north.errors), HasSubstr("heading is not determined: give a heading"));
+  EXPECT_THAT(last_line(north.errors),
+              HasSubstr("heading and place are not determined: give a heading"));
 }
 
 TEST_F(PlaneCommand, ASlipIsBadUsageWithFileAndLine) {
