@@ -786,8 +786,9 @@ TEST_F(CommandLineTest, ReplayRefusesACalibrationOfAnotherSize) {
   directory_.write("alidade/calibration.yaml", head_.calibration(1280, 720));
   const Result result = alidade({"replay", directory_.path()});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"),
-                                   HasSubstr("video.width and video.height are 1280 and 720")));
+  EXPECT_THAT(result.errors,
+              AllOf(HasSubstr("1920x1080"), HasSubstr("calibration.yaml is for 1280x720 px"),
+                    HasSubstr("video.width and video.height")));
   EXPECT_FALSE(std::filesystem::exists(path("alidade/orientation.csv")));
 }
 
@@ -872,8 +873,9 @@ TEST_F(CommandLineTest, RunEndsWhenFramesAreNotOfTheCalibrationsSize) {
   directory_.write("calibration.yaml", head_.calibration(1280, 720));
   const Result result = alidade({"run", "-c", recorded_config()});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"),
-                                   HasSubstr("video.width and video.height are 1280 and 720")));
+  EXPECT_THAT(result.errors,
+              AllOf(HasSubstr("1920x1080"), HasSubstr("calibration.yaml is for 1280x720 px"),
+                    HasSubstr("video.width and video.height")));
 }
 
 TEST_F(CommandLineTest, CheckReportsBothStreamsAndTheSizes) {
@@ -886,8 +888,9 @@ TEST_F(CommandLineTest, CheckReportsBothStreamsAndTheSizes) {
   directory_.write("calibration.yaml", head_.calibration(1280, 720));
   result = alidade({"check", "-c", recorded_config(), "--duration", "0.5"});
   EXPECT_EQ(result.exit_code, 1);
-  EXPECT_THAT(result.errors, AllOf(HasSubstr("1920x1080"),
-                                   HasSubstr("video.width and video.height are 1280 and 720")));
+  EXPECT_THAT(result.errors,
+              AllOf(HasSubstr("1920x1080"), HasSubstr("calibration.yaml is for 1280x720 px"),
+                    HasSubstr("video.width and video.height")));
 }
 
 // Streams of an hour, so that only the event under test ends the program.
