@@ -176,7 +176,7 @@ class SteadyZoom {
     double trend = 0;
     for (std::size_t i = 0; i < kLatest; ++i) {
       const double at = latest_[(readings_ - 1 - i) % kLatest];
-      trend += (i < kLatest / 2 ? at : -at) / static_cast<double>(kLatest / 2);
+      trend += (i < kLatest / 2 ? at : -at) / (static_cast<double>(kLatest) / 2);
     }
     const auto [low, high] = std::minmax_element(latest_.begin(), latest_.end());
     // Three of its own sigmas.
