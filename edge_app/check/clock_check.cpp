@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
-#include <iterator>
 
 #include "edge_app/pipeline/capture_clock.h"
+#include "platform/video/stamp_guard.h"
 
 namespace alidade {
 namespace {
@@ -43,10 +43,11 @@ bool is_no_clock(const ClockReport& clock) {
          std::abs(*clock.raw_rate_error) > kNoClock + kChance * clock.raw_rate_sigma;
 }
 
-// Whether items were left out of which the stamps know nothing: these rise by one step for them all.
+// Whether items were left out of which the stamps know nothing: these go on by whole steps, each shorter than the time
+// that passed.
 bool do_stamps_count(const std::vector<ClockedStamp>& stamps) {
   constexpr double kSame_s = 1.5e-4;
-  constexpr double kLeftOut = 1.6;  // steps
+  constexpr double kLeftOut = 0.6;  // of a step
   constexpr double kShare = 0.03;
   std::vector<double> steps;
   std::vector<double> intervals;
@@ -55,17 +56,43 @@ bool do_stamps_count(const std::vector<ClockedStamp>& stamps) {
     intervals.push_back(stamps[i].receive_time_s - stamps[i - 1].receive_time_s);
   }
   const std::optional<Spread> usual = spread_of(steps);
-  if (!usual) return false;
+  if (!usual || !(usual->median > 0)) return false;
   std::size_t even = 0;
   std::size_t left_out = 0;
   for (std::size_t i = 0; i < steps.size(); ++i) {
-    if (std::abs(steps[i] - usual->median) > kSame_s) continue;
+    const double whole = std::max(1.0, std::round(steps[i] / usual->median)) * usual->median;
+    if (std::abs(steps[i] - whole) > kSame_s) continue;
     ++even;
-    left_out += intervals[i] > kLeftOut * usual->median ? 1 : 0;
+    left_out += intervals[i] > whole + kLeftOut * usual->median ? 1 : 0;
   }
   const auto all = static_cast<double>(steps.size());
   return static_cast<double>(even) > (1 - kShare) * all &&
          static_cast<double>(left_out) > kShare * all;
+}
+
+// The longest part of a stream in which the sender's clock goes on, and no item stood still on its way.
+std::vector<ClockedStamp> longest_part(const std::vector<ClockedStamp>& stamps) {
+  constexpr double kStoodStill_s = 0.5;
+  std::vector<ClockedStamp> longest;
+  std::vector<ClockedStamp> part;
+  const auto end_part = [&] {
+    if (part.size() > longest.size()) longest.swap(part);
+    part.clear();
+  };
+  StampGuard guard;
+  for (const ClockedStamp& stamp : stamps) {
+    if (!stamp.sender_time_s) continue;
+    if (stamp.restarted) guard.restart();
+    const auto verdict = guard.judge(stamp.receive_time_s, *stamp.sender_time_s);
+    if (verdict == StampGuard::Verdict::kBad) continue;
+    const bool stood_still =
+        !part.empty() && stamp.receive_time_s - part.back().receive_time_s >
+                             *stamp.sender_time_s - *part.back().sender_time_s + kStoodStill_s;
+    if (stamp.restarted || stood_still || verdict == StampGuard::Verdict::kJumped) end_part();
+    part.push_back(stamp);
+  }
+  end_part();
+  return longest;
 }
 
 // A few in a row without a stamp say nothing of the others.
@@ -116,16 +143,15 @@ ClockReport check_clock(const std::vector<ClockedStamp>& stamps, const ClockFilt
     }
     report.lateness_s = spread_of(lateness);
     if (report.kind == StampKind::kSender) {
-      std::vector<ClockedStamp> connection;
-      std::copy_if(stamps.begin() + static_cast<std::ptrdiff_t>(line_since), stamps.end(),
-                   std::back_inserter(connection),
-                   [](const ClockedStamp& stamp) { return stamp.sender_time_s.has_value(); });
-      measure_raw_rate(connection, &report);
+      // Not since the line began: what is no clock begins it anew again and again.
+      const std::vector<ClockedStamp> part = longest_part(stamps);
+      measure_raw_rate(part, &report);
       report.usable = !is_no_clock(report);
-      report.counts = !report.usable && do_stamps_count(connection);
+      report.counts = !report.usable && do_stamps_count(part);
     }
   }
   if (!report.usable) {
+    report.lateness_s.reset();
     std::transform(stamps.begin(), stamps.end(), times.begin(),
                    [](const ClockedStamp& stamp) { return stamp.receive_time_s; });
   }
@@ -162,6 +188,12 @@ void judge_clock(const ClockReport& clock, const std::string& what, Findings* fi
                            "followed: look for a changed route or a buffer that filled up",
                            what, 1e3 * clock.delay_shift_s));
   }
+}
+
+std::string why_no_times(const ClockReport& clock) {
+  if (clock.usable) return "";
+  return clock.counts ? "the camera's time stamps count pictures"
+                      : "the camera's time stamps are no times";
 }
 
 std::string describe(const ClockReport& clock) {

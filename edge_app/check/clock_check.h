@@ -54,6 +54,9 @@ struct ClockedStamp {
 // `what`: "video URL". A clock that cannot be one, or that jumps, is a problem; a minimum delay that shifts, advice.
 void judge_clock(const ClockReport& clock, const std::string& what, Findings* findings);
 
+// In words; empty: its stamps are times, or it bears none.
+[[nodiscard]] std::string why_no_times(const ClockReport& clock);
+
 [[nodiscard]] std::string describe(const ClockReport& clock);
 
 }  // namespace alidade

@@ -134,6 +134,8 @@ const char* to_string(AxisVerdict verdict) {
       return "sign correct";
     case AxisVerdict::kReversed:
       return "sign REVERSED";
+    case AxisVerdict::kNotJudged:
+      return "sign not judged";
   }
   return "";
 }
@@ -159,6 +161,11 @@ MotionReport check_motion(const std::vector<TimedShift>& shifts,
     return report;
   }
 
+  if (!needs.no_times.empty()) {
+    report.not_judged = needs.no_times;
+    report.pan = report.tilt = AxisVerdict::kNotJudged;
+    return report;
+  }
   const MotionSearch search(motions, head, needs.clock_offset_s, kLeastTimes);
   if (search.fits.empty()) return report;
   const auto score = [](const MotionFit& at) { return explained(at, {0, 0}); };
@@ -205,6 +212,9 @@ ReportLines describe(const MotionReport& report) {
             ? "the picture moves, but not the head: signs are not checked"
             : "the camera did not move: turn it during the check to have signs checked";
     return {{"motion", text}};
+  }
+  if (!report.not_judged.empty()) {
+    return {{"motion", "signs are not judged: " + report.not_judged}};
   }
   std::string text = fmt::format("pan {}, tilt {}", to_string(report.pan), to_string(report.tilt));
   if (report.focal_length_px) {

@@ -9,6 +9,7 @@
 //   at least 80 % is explained with this sign, and no offset searched explains 4/5 of that with the other:
 //   an even swing fits half a period later as well with the sign reversed, and tells nothing;
 // and that an axis is reversed, only where the search is sure (MotionSearch) and the other axis is understood if it moved.
+// Where the image's times cannot be believed (needs.no_times), nothing that needs them is judged.
 // Image motion that follows the other axis better than its own is an image that is turned by a quarter.
 // An image that moves by a quarter of its width while the head reports one angle, or stands still while the head reports
 // as much, is not of this head, or the head does not measure.
@@ -36,13 +37,15 @@ struct MotionNeeds {
   std::string reverse_pan;
   std::string reverse_tilt;
   std::string turn_image;  // by 180 degrees
+  std::string no_times;    // why the image's times are none; empty: they can be believed
 };
 
 enum class AxisVerdict {
   kNotMoved,  // too little to tell
   kUnclear,   // moved, but the two do not agree enough
   kRight,
-  kReversed
+  kReversed,
+  kNotJudged  // the image has no times that can be believed
 };
 
 struct MotionReport {
@@ -55,6 +58,7 @@ struct MotionReport {
       focal_length_px;                   // of the axes whose sign is told, where the search is sure
   std::optional<double> clock_offset_s;  // known to some 20 ms
   double explained = 0;                  // share of the image's motion
+  std::string not_judged;                // why, where the image's times are none
   Findings findings;
 };
 

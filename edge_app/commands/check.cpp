@@ -72,6 +72,7 @@ MotionReport motion_of(const Measured& measured, const VideoReport& video,
       "turn it by 180 degrees in the camera's settings and set camera.upside_down: true; if it is "
       "upright, for pan " +
       needs.reverse_pan + ", for tilt " + needs.reverse_tilt;
+  needs.no_times = why_no_times(video.clock);
   return check_motion(shifts, telemetry.fresh, needs);
 }
 

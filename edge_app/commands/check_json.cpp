@@ -28,6 +28,7 @@ Json as_json(const ClockReport& clock) {
                      : clock.kind == StampKind::kSequence ? "sequence"
                                                           : "arrival";
   return {{"stamps", kind},
+          {"usable", clock.usable},
           {"locked", clock.state == ClockState::kLocked},
           {"sigma_s", clock.sigma_s},
           {"lateness_s", as_json(clock.lateness_s)}};
@@ -50,6 +51,8 @@ const char* name_of(AxisVerdict verdict) {
       return "right";
     case AxisVerdict::kReversed:
       return "reversed";
+    case AxisVerdict::kNotJudged:
+      return "not judged";
   }
   return "";
 }
@@ -69,6 +72,9 @@ Json video_json(const CheckReport& report) {
                {"damaged", video.counters.damaged},
                {"dropped", video.counters.dropped},
                {"dropped_at_start", video.at_start.dropped},
+               {"unstamped", video.counters.unstamped},
+               {"foreign_packets", video.counters.foreign_packets},
+               {"garbage_bytes", video.counters.garbage_bytes},
                {"decode_s", as_json(video.decode_s)},
                {"clock", any ? as_json(video.clock) : Json()}});
   json["pictures"] = {{"looked_at", images.images},

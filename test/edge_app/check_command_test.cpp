@@ -257,6 +257,33 @@ TEST_F(CheckCommand, SaysThatTiltIsReversed) {
   EXPECT_THAT(result.output, HasSubstr("pan sign correct, tilt sign REVERSED"));
 }
 
+// Upside down against the telemetry, too: nothing may be claimed of it.
+TEST_F(CheckCommand, JudgesNoSignsWhereTimeStampsCountPictures) {
+  take_healthy();
+  std::istringstream rows(directory_.read("recording/frames.csv"));
+  std::ostringstream counted("frame,receive_time_s,sender_time_s\n", std::ios::ate);
+  std::string row;
+  std::getline(rows, row);
+  for (int i = 0, sent = 0; std::getline(rows, row); ++i) {
+    if (i % 6 == 2 || i % 17 == 8) continue;
+    const std::size_t frame_and_receipt = row.find(',', row.find(',') + 1);
+    counted << row.substr(0, frame_and_receipt) << ',' << 0.04 * ++sent << "\n";
+  }
+  std::ofstream(path("recording/frames.csv")) << counted.str();
+  change_telemetry([](std::vector<std::string>* cells) {
+    for (const std::size_t axis : {1U, 2U}) {
+      std::string& angle = cells->at(axis);
+      angle = angle.front() == '-' ? angle.substr(1) : "-" + angle;
+    }
+  });
+  const Result result = check();
+  EXPECT_EQ(result.exit_code, 1);
+  EXPECT_THAT(findings(result.errors), ElementsAre(HasSubstr("its time stamps count pictures")));
+  EXPECT_THAT(
+      result.output,
+      HasSubstr("motion       signs are not judged: the camera's time stamps count pictures"));
+}
+
 TEST_F(CheckCommand, SaysHowLongADeviceRepeatsOldAngles) {
   film(directory_, ", internal_rate_hz: 5");
   const Result result = check();

@@ -18,6 +18,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Pair;
 
 constexpr double kFocalLength = 2000;  // px
 constexpr double kOffset = -0.12;      // s
@@ -174,6 +175,34 @@ TEST(MotionCheck, TellsNothingOfAImageThatGoesItsOwnWay) {
   EXPECT_EQ(report.pan, AxisVerdict::kUnclear);
   EXPECT_EQ(report.tilt, AxisVerdict::kUnclear);
   EXPECT_THAT(report.findings, IsEmpty());
+}
+
+// Whatever the image seems to show: the right signs, one reversed, upside down, turned by a quarter.
+TEST(MotionCheck, TellsNoSignsWithoutTimes) {
+  std::vector<Scene> scenes = {Scene(wander), Scene(wander, {1, -1}), Scene(wander, {-1, -1}),
+                               Scene(wander)};
+  for (TimedShift& shift : scenes.back().shifts) shift.shift = {shift.shift[1], -shift.shift[0]};
+  for (Scene& scene : scenes) {
+    scene.needs.no_times = "the camera's time stamps count pictures";
+    scene.needs.focal_length_px = 2 * kFocalLength;
+    scene.needs.calibrated = true;
+    const MotionReport report = scene.check();
+    EXPECT_EQ(report.pan, AxisVerdict::kNotJudged);
+    EXPECT_EQ(report.tilt, AxisVerdict::kNotJudged);
+    EXPECT_FALSE(report.focal_length_px);
+    EXPECT_FALSE(report.clock_offset_s);
+    EXPECT_THAT(report.findings, IsEmpty());
+    EXPECT_THAT(describe(report),
+                ElementsAre(Pair("motion",
+                                 "signs are not judged: the camera's time stamps count "
+                                 "pictures")));
+  }
+}
+
+TEST(MotionCheck, NoticesAHeadThatReportsOneAngleWithoutTimes) {
+  Scene scene(wander, {0, 0});
+  scene.needs.no_times = "the camera's time stamps are no times";
+  EXPECT_THAT(problems(scene.check().findings), ElementsAre(HasSubstr("always the same angles")));
 }
 
 TEST(MotionCheck, AsksToMoveACameraAtRest) {

@@ -168,6 +168,65 @@ TEST(VideoCheck, SaysThatAClockIsNone) {
               ElementsAre(HasSubstr("counts 2.25 seconds in each of the host's")));
 }
 
+// 10 s of a camera that leaves out a share of its pictures, of which its stamps know nothing; of the rest a share is lost.
+std::vector<CheckedFrame> counting_stream(double period_s, double left_out, double lost) {
+  std::mt19937 random(4);
+  std::uniform_real_distribution<double> chance(0, 1);
+  std::exponential_distribution<double> delay(1 / 1e-3);
+  std::vector<CheckedFrame> frames;
+  int sent = 0;
+  for (int i = 0; i * period_s < 10; ++i) {
+    if (chance(random) < left_out) continue;
+    ++sent;
+    if (chance(random) < lost) continue;
+    CheckedFrame frame = stream(1).front();
+    frame.stamp.frame = static_cast<std::int64_t>(frames.size());
+    frame.stamp.restarted = frames.empty();
+    frame.stamp.sender_time_s = 1000 + period_s * sent;
+    frame.stamp.receive_time_s = 7 + period_s * i + delay(random);
+    frames.push_back(frame);
+  }
+  return frames;
+}
+
+TEST(VideoCheck, StampsThatCountPicturesAreNoTimes) {
+  struct Camera {
+    double rate_hz;
+    double left_out;
+    double lost;
+  };
+  for (const auto& [rate_hz, left_out, lost] :
+       {Camera{25, 0.16, 0}, Camera{30, 0.4, 0}, Camera{25, 0.7, 0}, Camera{25, 0.05, 0},
+        Camera{12.5, 0.2, 0}, Camera{25, 0.16, 0.05}}) {
+    const auto frames = counting_stream(1 / rate_hz, left_out, lost);
+    const VideoReport report = checked(frames);
+    const std::string what = std::to_string(rate_hz) + " " + std::to_string(left_out);
+    EXPECT_FALSE(report.clock.usable) << what;
+    EXPECT_TRUE(report.clock.counts) << what;
+    EXPECT_THAT(problems(report.findings), ElementsAre(HasSubstr("count pictures"))) << what;
+    EXPECT_THAT(why_no_times(report.clock), HasSubstr("count pictures")) << what;
+    EXPECT_EQ(report.time_s.back(), frames.back().stamp.receive_time_s) << what;
+    EXPECT_FALSE(report.clock.lateness_s) << what;
+  }
+}
+
+// What stamps tell truly: that is no count.
+TEST(VideoCheck, PicturesThatAreMissingOrWaitAreNoCount) {
+  std::vector<CheckedFrame> missing;
+  for (const CheckedFrame& frame : stream()) {
+    if (frame.stamp.frame % 6 != 2) missing.push_back(frame);
+  }
+  EXPECT_TRUE(checked(missing).clock.usable);
+  std::vector<CheckedFrame> waited = stream();
+  for (std::size_t i = 100; i < 140; ++i)
+    waited[i].stamp.receive_time_s = waited[140].stamp.receive_time_s;
+  EXPECT_TRUE(checked(waited).clock.usable);
+  std::vector<CheckedFrame> later = stream();
+  for (std::size_t i = 125; i < later.size(); ++i) later[i].stamp.receive_time_s += 0.9;
+  EXPECT_TRUE(checked(later).clock.usable);
+  EXPECT_EQ(why_no_times(checked(later).clock), "");
+}
+
 TEST(VideoCheck, TakesAnyQuartzForAClock) {
   for (const double ppm : {-150.0, 150.0}) {
     std::vector<CheckedFrame> frames = stream();
