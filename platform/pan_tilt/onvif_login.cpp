@@ -24,6 +24,7 @@ void OnvifLoginWays::set_clock(const std::optional<OnvifClock>& told, double mon
     return time_s ? std::optional(*time_s - monotonic_s) : std::nullopt;
   };
   const OnvifClock clock = told.value_or(OnvifClock());
+  tells_utc_ = clock.utc_s.has_value();
   device_minus_monotonic_s_ = less_monotonic(clock.utc_s ? clock.utc_s : clock.local_s);
   local_minus_monotonic_s_ = less_monotonic(clock.local_s);
   utc_minus_monotonic_s_ = utc_s - monotonic_s;
@@ -116,7 +117,9 @@ void OnvifLoginWays::accepted() {
 std::string OnvifLoginWays::text_of(Way way) const {
   switch (way) {
     case Way::kDeviceClock:
-      return "the clock that it tells (" + lead_text(lead_s(way).value_or(0)) + " this host's)";
+      return std::string(tells_utc_ ? "the clock that it tells ("
+                                    : "the local time that it tells (") +
+             lead_text(lead_s(way).value_or(0)) + " this host's)";
     case Way::kHostClock:
       return "this host's clock";
     case Way::kLocalClock:
@@ -130,10 +133,13 @@ std::string OnvifLoginWays::text_of(Way way) const {
 std::string OnvifLoginWays::note() const {
   const std::optional<double> told_s = lead_s(Way::kDeviceClock);
   if (good_ == Way::kHostClock && told_s && std::abs(*told_s) >= kSameClock_s) {
+    if (!tells_utc_) {
+      return "the device tells a local time and no UTC, but takes logins by this host's clock "
+             "alone; logins go by that";
+    }
     return "the device tells a UTC " + lead_text(*told_s) +
            " this host's, but takes logins by this host's alone; is that its local time? Logins go "
-           "by this "
-           "host's clock";
+           "by this host's clock";
   }
   if (good_ == Way::kLocalClock) {
     return "the device takes logins by its local time alone, not by the UTC that it tells; logins "

@@ -31,6 +31,7 @@ class OnvifLoginWays {
   [[nodiscard]] bool refused(bool offers_digest);
   // It was good, now at the latest.
   void accepted();
+  [[nodiscard]] bool was_good() const { return good_.has_value(); }
 
   // "; tried by ..." where by more than one clock.
   [[nodiscard]] std::string tried_text() const { return tried_text_; }
@@ -49,6 +50,7 @@ class OnvifLoginWays {
   bool offers_digest_ = false;  // in one of the refusals
   bool again_ = false;          // way_ was refused once since it was good
   std::string tried_text_;
+  bool tells_utc_ = true;  // the device; else at most a local time
   // The clocks that the device tells, less the host's monotonic one and less its UTC.
   std::optional<double> device_minus_monotonic_s_;
   std::optional<double> local_minus_monotonic_s_;

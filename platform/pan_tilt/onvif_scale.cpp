@@ -19,8 +19,7 @@ constexpr double kLeastPan_deg = 180;  // a pan that turns over less is not seen
 constexpr std::size_t kShownSpace = 120;
 constexpr const char* kKeys =
     "give what it tells at two angles as pan_scale and tilt_scale, and these angles as "
-    "pan_range_deg "
-    "and tilt_range_deg";
+    "pan_range_deg and tilt_range_deg";
 
 std::string_view short_name(const std::string& space) {
   return std::string_view(space).substr(space.rfind('/') + 1);
@@ -56,6 +55,12 @@ bool is_wide(const std::optional<OnvifInterval>& declared) {
          (!is_within(declared->low, kGenericScale) || !is_within(declared->high, kGenericScale));
 }
 
+// A pan that begins or ends in the middle of -1..1 may be a scale of its own.
+bool is_half(const OnvifSpaceRange& range) {
+  return is_sound(range.pan) && is_sound(range.tilt) && !is_wide(range.pan) &&
+         !is_wide(range.tilt) && (range.pan->low == 0 || range.pan->high == 0);
+}
+
 double span(const std::optional<OnvifInterval>& declared) { return declared->high - declared->low; }
 
 // Not steps, nor per cent: a pan of half a turn to a turn over a tilt of half a turn at most.
@@ -74,26 +79,34 @@ std::string text_of(const OnvifSpaceRange& range) {
   return "pan " + text_of(range.pan) + " and tilt " + text_of(range.tilt);
 }
 
+std::string as_scales(const OnvifSpaceRange& range) {
+  const auto key = [](const char* name, const std::optional<OnvifInterval>& ends) {
+    return std::string(name) + ": [" + shown(ends->low) + ", " + shown(ends->high) + "]";
+  };
+  return key("pan_scale", range.pan) + " and " + key("tilt_scale", range.tilt);
+}
+
 }  // namespace
 
 bool OnvifScale::needs_ranges(const OnvifStatus& status) const {
   return !pan_.scale && !is_degrees(status.space);
 }
 
-// That of the space itself if there is one; a generic space need not be named.
+// That of the space itself if there is one; a generic space need not be named, nor the only one.
 const OnvifSpaceRange* OnvifScale::declared(const std::string& space) const {
   for (const OnvifSpaceRange& range : ranges_) {
     if (range.space == space || (is_generic(range.space) && is_generic(space))) return &range;
   }
-  return nullptr;
+  return space.empty() && ranges_.size() == 1 ? &ranges_.front() : nullptr;
 }
 
 OnvifScale::Outcome OnvifScale::angles(const OnvifStatus& status, double* pan_rad, double* tilt_rad,
                                        std::string* error) const {
   const OnvifSpaceRange* const range = needs_ranges(status) ? declared(status.space) : nullptr;
   const bool no_angles = !pan_.angles || !tilt_.angles;
-  const bool degrees = (is_degrees(status.space) && !pan_.scale) ||
-                       (no_angles && range != nullptr && is_in_degrees(*range));
+  const bool space_of_degrees =
+      !pan_.scale && is_degrees(range == nullptr ? status.space : range->space);
+  const bool degrees = space_of_degrees || (no_angles && range != nullptr && is_in_degrees(*range));
   const bool any_wide = range != nullptr && (is_wide(range->pan) || is_wide(range->tilt));
   if (!pan_.scale && !degrees && !any_wide && !is_generic(status.space)) {
     *error =
@@ -105,6 +118,7 @@ OnvifScale::Outcome OnvifScale::angles(const OnvifStatus& status, double* pan_ra
   const auto scale_of = [&](const OnvifAxis& axis,
                             const std::optional<OnvifInterval> OnvifSpaceRange::*which) {
     if (axis.scale) return *axis.scale;
+    if (space_of_degrees) return kDegreesScale;
     const bool wide = range != nullptr && is_wide(range->*which);
     return wide ? *(range->*which) : degrees ? kDegreesScale : kGenericScale;
   };
@@ -123,14 +137,14 @@ OnvifScale::Outcome OnvifScale::angles(const OnvifStatus& status, double* pan_ra
     return Outcome::kOk;
   }
   if (no_angles) {
-    *error =
-        any_wide
-            ? "the device tells pan and tilt as " + text_of(*range) +
-                  ", by its own declaration; give the angles at these ends, from its data sheet, "
-                  "as pan_range_deg and tilt_range_deg"
-            : "the device tells pan and tilt as -1..1, not in degrees; give the angles at -1 and "
-              "1, "
-              "from its data sheet, as pan_range_deg and tilt_range_deg";
+    constexpr const char* kAngles = " from its data sheet, as pan_range_deg and tilt_range_deg";
+    const bool half = range != nullptr && is_half(*range);
+    *error = any_wide || half ? "the device tells pan and tilt as " + text_of(*range) +
+                                    ", by its own declaration; give the angles at these ends," +
+                                    kAngles + (half ? ", and " + as_scales(*range) : "")
+                              : "the device tells pan and tilt as -1..1, not in degrees; give the "
+                                "angles at -1 and 1," +
+                                    std::string(kAngles);
     return Outcome::kNeedsAngles;
   }
   *pan_rad = mapped(status.pan, pan_scale, *pan_.angles);
@@ -145,9 +159,15 @@ std::string OnvifScale::note(const OnvifStatus& status) const {
     return "the device declares " + text_of(*range) +
            ", which is no range; taken as -1..1 where it is none";
   }
+  if (is_half(*range)) {
+    return "the device declares " + text_of(*range) +
+           ", a part of -1..1: pan_range_deg and tilt_range_deg are taken as the angles at -1 and "
+           "1; if they are those at these ends, add " +
+           as_scales(*range);
+  }
   if (!is_wide(range->pan) && !is_wide(range->tilt)) return {};
   return "the device declares " + text_of(*range) +
-         (pan_.angles && tilt_.angles
+         (pan_.angles && tilt_.angles && !is_degrees(range->space)
               ? " in place of -1..1: pan_range_deg and tilt_range_deg are taken as the angles at "
                 "these ends"
               : " in place of -1..1: taken as degrees, 0 where pan_zero_deg and tilt_zero_deg say");

@@ -219,7 +219,10 @@ HttpConversation::Outcome OnvifConversation::not_authorized(const std::string& w
     *error = "the device wants a user and a password (" + why + ")";
     return Outcome::kRefused;
   }
-  *error = "wrong user or password (" + why + "); ONVIF may have users of its own in the device";
+  // One that was good may be that of a clock that was set.
+  *error = login_.was_good() ? "the login is refused (" + why + ")"
+                             : "wrong user or password (" + why +
+                                   "); ONVIF may have users of its own in the device";
   if (search != nullptr && !search->is_first() && !search->is_found()) {
     return not_here(error);  // where nothing is, everybody may be refused
   }
@@ -253,8 +256,7 @@ HttpConversation::Outcome OnvifConversation::not_here(std::string* error) {
       if (!ptz_.is_found() && options_.ptz_path.empty()) {
         *error +=
             "; no PTZ service is where the device says or where usual: if you know its path, give "
-            "it "
-            "as pan_tilt.ptz_path";
+            "it as pan_tilt.ptz_path";
       }
       break;
     case Step::kClock:

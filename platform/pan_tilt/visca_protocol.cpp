@@ -10,7 +10,6 @@ constexpr char kEnd = '\xFF';
 constexpr std::size_t kHeader = 8;    // bytes
 constexpr std::size_t kLongest = 12;  // bytes of a frame without its end
 constexpr std::uint16_t kInquiry = 0x0110;
-constexpr std::uint16_t kReply = 0x0111;
 constexpr std::uint16_t kControl = 0x0200;
 constexpr std::uint16_t kControlReply = 0x0201;
 constexpr std::string_view kBeginNumbering("\x01", 1);
@@ -241,7 +240,8 @@ Answer ViscaProtocol::find_in_datagram(std::string_view bytes) {
   if (!header && !bytes.empty()) {
     answer.problem = kNoHeader;
   }
-  const bool is_its_own = header && header->type == kReply && header->sequence == sequence_;
+  // Whatever its type: some devices answer with an inquiry's.
+  const bool is_its_own = header && header->sequence == sequence_;
   if (is_its_own && !frame) {
     answer = find_in_payload(header->payload);  // says that it is none
   }

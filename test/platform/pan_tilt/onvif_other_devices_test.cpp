@@ -162,8 +162,8 @@ TEST(OnvifOtherDevices, ADeviceInUseThatRefusesIsSaidAndAskedAgain) {
     server.password_changed = true;
     for (int i = 0; i < 4; ++i) {
       ASSERT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-      EXPECT_THAT(source->error(),
-                  AllOf(HasSubstr("wrong user or password"), HasSubstr("it was right before")));
+      EXPECT_THAT(source->error(), AllOf(HasSubstr("/: the login is refused ("),
+                                         HasSubstr("; it was right before")));
       server.renew_nonce();
     }
     server.password_changed = false;
@@ -207,6 +207,18 @@ TEST(OnvifLoginWays, TakeTheHostsClockForOneThatIsNotTold) {
   ways.set_clock({}, 100, 1e9);
   EXPECT_EQ(ways.way(), Way::kHostClock);
   EXPECT_FALSE(ways.refused(false));
+}
+
+TEST(OnvifLoginWays, TakeALocalTimeForNoUtc) {
+  OnvifLoginWays ways;
+  OnvifClock clock;
+  clock.local_s = 1e9 + 19800;
+  ways.set_clock(clock, 100, 1e9);
+  EXPECT_TRUE(ways.refused(false));
+  ways.accepted();
+  EXPECT_EQ(ways.note(),
+            "the device tells a local time and no UTC, but takes logins by this host's clock "
+            "alone; logins go by that");
 }
 
 // Of a device in use each pause brings one login: first that which was good.
@@ -452,6 +464,15 @@ TEST(OnvifScale, IsOfDegreesWhereTheSpaceSaysSo) {
   EXPECT_FALSE(scale.needs_ranges(at(0, 0, degrees)));
   EXPECT_NEAR(scaled(scale, at(179.5, -12, degrees)).pan_rad, 179.5 * kRadPerDeg, 1e-12);
   EXPECT_EQ(scaled(scale, at(400, 0, degrees)).outcome, OnvifScale::Outcome::kOutside);
+  // A position need not name the only space that there is.
+  const OnvifAxis axis{OnvifRange{-1, 1}, {}};
+  OnvifScale unnamed(axis, axis);
+  unnamed.set_ranges({{degrees, OnvifInterval{-180, 180}, OnvifInterval{-90, 90}}});
+  EXPECT_NEAR(scaled(unnamed, at(181.5, -12)).pan_rad, 181.5 * kRadPerDeg, 1e-12);
+  EXPECT_THAT(unnamed.note(at(181.5, -12)), HasSubstr("taken as degrees"));
+  unnamed.set_ranges({{degrees, OnvifInterval{-180, 180}, OnvifInterval{-90, 90}},
+                      {"", OnvifInterval{-1, 1}, OnvifInterval{-1, 1}}});
+  EXPECT_DOUBLE_EQ(scaled(unnamed, at(0.5, 0)).pan_rad, 0.5);
 }
 
 TEST(OnvifScale, RefusesPositionsOutsideAndSpacesThatItDoesNotKnow) {
@@ -477,6 +498,16 @@ TEST(OnvifScale, TakesADeclaredRangeForWhatItCanBeAlone) {
   scale.set_ranges({{"", OnvifInterval{-0.5, 0.5}, OnvifInterval{0, 1}}});
   EXPECT_DOUBLE_EQ(scaled(scale, at(0.5, 0)).pan_rad, 0.5);
   EXPECT_EQ(scale.note(at(0.5, 0)), "");
+  // Half a turn of a pan is hardly a stop.
+  scale.set_ranges({{"", OnvifInterval{0, 1}, OnvifInterval{0, 1}}});
+  EXPECT_DOUBLE_EQ(scaled(scale, at(0.5, 0)).pan_rad, 0.5);
+  EXPECT_THAT(scale.note(at(0.5, 0)), AllOf(HasSubstr("declares pan 0..1 and tilt 0..1, a part"),
+                                            HasSubstr("pan_scale: [0, 1] and tilt_scale: [0, 1]")));
+  OnvifScale half({}, {});
+  half.set_ranges({{"", OnvifInterval{0, 1}, OnvifInterval{0, 1}}});
+  EXPECT_THAT(scaled(half, at(0.5, 0)).error,
+              HasSubstr("give the angles at these ends, from its data sheet, as pan_range_deg and "
+                        "tilt_range_deg, and pan_scale: [0, 1] and tilt_scale: [0, 1]"));
   for (const OnvifInterval& interval :
        {OnvifInterval{0, 100}, OnvifInterval{0, 255}, OnvifInterval{0, 36000}}) {
     OnvifScale unknown({}, {});

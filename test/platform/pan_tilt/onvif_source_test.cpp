@@ -214,7 +214,7 @@ TEST_P(OnvifSourceLogin, TriesOnWhenADeviceThatHasWorkedRefuses) {
   server.password_changed = true;
   for (int i = 0; i < 3; ++i) {
     ASSERT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
-    EXPECT_THAT(source->error(), HasSubstr("wrong user or password"));
+    EXPECT_THAT(source->error(), HasSubstr("the login is refused"));
   }
   server.password_changed = false;
   ASSERT_EQ(read_until(*source, sample, ReadStatus::kOk), ReadStatus::kOk) << source->error();

@@ -283,10 +283,23 @@ TEST_F(ViscaWithHeader, TakesOnlyTheAnswerWithTheNumberOfTheQuery) {
   EXPECT_EQ(protocol_->find(datagram(0x0111, 1, kEleven)).kind, Answer::Kind::kRefused);
   static_cast<void>(protocol_->next());
   EXPECT_EQ(protocol_->find(datagram(0x0111, 1, kEleven)).kind, Answer::Kind::kNone);
-  EXPECT_EQ(protocol_->find(datagram(0x0110, 2, kEleven)).kind, Answer::Kind::kNone);
   EXPECT_EQ(protocol_->find(kEleven).kind, Answer::Kind::kNone);
   EXPECT_THAT(protocol_->find(kEleven).problem, HasSubstr("without a VISCA header"));
   EXPECT_EQ(protocol_->find(datagram(0x0111, 2, kEleven)).kind, Answer::Kind::kPanTilt);
+}
+
+// Some devices answer with the type of an inquiry.
+TEST_F(ViscaWithHeader, TakesTheNumberOfTheQueryUnderAnyType) {
+  begin_numbering();
+  for (const int type : {0x0111, 0x0110, 0x0101}) {
+    static_cast<void>(protocol_->next());
+    static_cast<void>(protocol_->find(datagram(type, 1, kEleven)));
+    static_cast<void>(protocol_->next());
+    EXPECT_EQ(protocol_->find(datagram(type, 2, kEleven)).kind, Answer::Kind::kPanTilt);
+    EXPECT_EQ(protocol_->peculiarity(), "");
+    protocol_->restart();
+    begin_numbering();
+  }
 }
 
 TEST_F(ViscaWithHeader, BeginsTheNumberingAnewWhenTheDeviceComplains) {
