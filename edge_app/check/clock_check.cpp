@@ -34,8 +34,9 @@ void measure_raw_rate(const std::vector<ClockedStamp>& stamps, ClockReport* repo
   report->raw_rate_sigma = slope->deviation / std::sqrt(static_cast<double>(slope->count));
 }
 
-// Quartz keeps 200 millionths, the filter's own limit. Half a percent is what a steady drift of the arrival by 50 ms
-// looks like in 10 s; what is beyond it, and beyond chance, is no clock in seconds.
+// Quartz keeps 200 millionths, the filter's own limit. Half a percent is what a steady drift of the
+// arrival by 50 ms looks like in 10 s; what is beyond it, and beyond chance, is no clock in
+// seconds.
 bool is_no_clock(const ClockReport& clock) {
   constexpr double kNoClock = 5e-3;
   constexpr double kChance = 6;  // standard deviations
@@ -43,8 +44,8 @@ bool is_no_clock(const ClockReport& clock) {
          std::abs(*clock.raw_rate_error) > kNoClock + kChance * clock.raw_rate_sigma;
 }
 
-// Whether items were left out of which the stamps know nothing: these go on by whole steps, each shorter than the time
-// that passed.
+// Whether items were left out of which the stamps know nothing: these go on by whole steps, each
+// shorter than the time that passed.
 bool do_stamps_count(const std::vector<ClockedStamp>& stamps) {
   constexpr double kSame_s = 1.5e-4;
   constexpr double kLeftOut = 0.6;  // of a step
@@ -70,7 +71,8 @@ bool do_stamps_count(const std::vector<ClockedStamp>& stamps) {
          static_cast<double>(left_out) > kShare * all;
 }
 
-// The longest part of a stream in which the sender's clock goes on, and no item stood still on its way.
+// The longest part of a stream in which the sender's clock goes on, and no item stood still on its
+// way.
 std::vector<ClockedStamp> longest_part(const std::vector<ClockedStamp>& stamps) {
   constexpr double kStoodStill_s = 0.5;
   std::vector<ClockedStamp> longest;

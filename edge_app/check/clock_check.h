@@ -46,7 +46,8 @@ struct ClockedStamp {
   bool restarted = false;
 };
 
-// *time_s (if not null): each item's time by the last line; the receive time without a clock, or with one that cannot be one.
+// *time_s (if not null): each item's time by the last line; the receive time without a clock, or
+// with one that cannot be one.
 [[nodiscard]] ClockReport check_clock(const std::vector<ClockedStamp>& stamps,
                                       const ClockFilterOptions& options,
                                       std::vector<double>* time_s = nullptr);

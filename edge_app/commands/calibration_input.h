@@ -32,8 +32,8 @@ struct CalibrationJob {
 
 // The recording, or, if its zoom moves, each stretch in which the reading stands still for kLeastStretch_s, less
 // kZoomMargin_s at either end, as image and telemetry are not yet known to be of one clock. With what it says of its stamps
-// and scales in the options. zoom_tolerance: device units within which two readings are one; none: as their jitter shows. Throws
-// CommandError.
+// and scales in the options. zoom_tolerance: device units within which two readings are one; none:
+// as their jitter shows. Throws CommandError.
 inline constexpr double kLeastStretch_s = 6;
 inline constexpr double kZoomMargin_s = 1;
 [[nodiscard]] std::vector<CalibrationJob> load_calibration_jobs(

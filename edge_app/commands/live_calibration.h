@@ -1,6 +1,6 @@
 #pragma once
-// The calibration that `alidade run` begins with and goes on to make: what is stored, else the data sheet. The one owner of which
-// that is.
+// The calibration that `alidade run` begins with and goes on to make: what is stored, else the data
+// sheet. The one owner of which that is.
 
 #include <memory>
 #include <optional>
@@ -26,12 +26,14 @@ struct StartingCalibration {
   MapState map;
 };
 
-// path: of the configuration, for errors. use: kLook touches no file. Throws CommandError where there is nothing to begin with.
+// path: of the configuration, for errors. use: kLook touches no file. Throws CommandError where
+// there is nothing to begin with.
 [[nodiscard]] StartingCalibration load_starting_calibration(const Config& config,
                                                             const std::string& path,
                                                             CalibrationStore::Use use);
 
-// What `run` has at a zoom reading as soon as the camera is there; none: nothing yet. tolerance: within which two readings are one.
+// What `run` has at a zoom reading as soon as the camera is there; none: nothing yet. tolerance:
+// within which two readings are one.
 [[nodiscard]] std::optional<NamedCalibration> calibration_at(const StartingCalibration& start,
                                                              double zoom, double tolerance);
 

@@ -8,8 +8,9 @@
 
 namespace alidade {
 
-// "status" and "matches"; with kOk, angles, orientation and lens when "reference_row" was exposed, their standard deviations, and how much
-// the camera turned (in its own frame) and log f changed from the first row to the last, too.
+// "status" and "matches"; with kOk, angles, orientation and lens when "reference_row" was exposed,
+// their standard deviations, and how much the camera turned (in its own frame) and log f changed
+// from the first row to the last, too.
 void add_localization(const Localization& found, const Mechanics<double>& mechanics,
                       nlohmann::ordered_json* json);
 

@@ -84,8 +84,8 @@ struct Pace {
 // Where nothing tells the read-out.
 constexpr double kGuessedReadout_s = 0.03;
 
-// By place where telemetry tells it, beside those that are there, else evenly over time. Slow ones first; places that no slow one shows, by
-// the slowest that do.
+// By place where telemetry tells it, beside those that are there, else evenly over time. Slow ones
+// first; places that no slow one shows, by the slowest that do.
 std::vector<Chosen> choose(const std::vector<MapRecording>& recordings,
                            const std::vector<std::vector<MapView>>& views, const SceneMap& there,
                            const MapBuildOptions& build, int most, Pace* pace) {

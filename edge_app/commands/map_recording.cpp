@@ -26,7 +26,8 @@ constexpr double kRangeSigma = 0.1;
 constexpr double kCalibratedAngleSigma = 5e-4;
 constexpr double kNominalAngleSigma = 1e-2;
 
-// s, how far telemetry's time may be off the picture's, and what an unknown read-out takes; of a known line delay, what is not known of it.
+// s, how far telemetry's time may be off the picture's, and what an unknown read-out takes; of a
+// known line delay, what is not known of it.
 constexpr double kKnownClock_s = 0.05;
 constexpr double kUnknownClock_s = 1;
 constexpr double kUnknownReadOut_s = 0.03;

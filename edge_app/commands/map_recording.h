@@ -58,8 +58,9 @@ struct MapRecording {
 [[nodiscard]] MapView map_view(const MapRecording& recording, const FrameStamp& frame,
                                const Calibration* calibration, const FocalLengthKnowledge& known);
 
-// What telemetry does not know of the camera's motion while one frame is read out: what its rates differ by about that time, the wider where
-// no calibration tells its clock. view: of this frame. line_delay: s/row; 0: not known, and view's rates tell nothing but a bound.
+// What telemetry does not know of the camera's motion while one frame is read out: what its rates
+// differ by about that time, the wider where no calibration tells its clock. view: of this frame.
+// line_delay: s/row; 0: not known, and view's rates tell nothing but a bound.
 [[nodiscard]] MotionDoubt motion_doubt(const MapRecording& recording, const FrameStamp& frame,
                                        const Calibration* calibration,
                                        const FocalLengthKnowledge& known, const MapView& view,

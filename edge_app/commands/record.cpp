@@ -88,8 +88,8 @@ class Recorder {
     threads_.clear();
   }
 
-  // Polls readable when the first frame was stored, the video was lost, a stream failed for good, or the disk takes no more, until
-  // forget_news().
+  // Polls readable when the first frame was stored, the video was lost, a stream failed for good,
+  // or the disk takes no more, until forget_news().
   [[nodiscard]] int news_fd() const { return news_; }
   void forget_news() {
     eventfd_t ignored = 0;

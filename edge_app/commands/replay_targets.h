@@ -2,7 +2,8 @@
 // ReplayTargets: detections of a file or of stdin, beside a replay's records, to targets.jsonl. JSON Lines: each as POST /api/v1/detections has it.
 // A line is read when a record has come and those before it are done with, and waits until its frame has a record; a line for the frame at
 // hand ends the reading until the next record. So a detector that is told each record may answer it, lines may be late, and the same
-// lines give the same bytes. A line that cannot be read is an error with its number; frames that a live run would refuse, and boxes that it leaves out, are told at the end.
+// lines give the same bytes. A line that cannot be read is an error with its number; frames that a
+// live run would refuse, and boxes that it leaves out, are told at the end.
 
 #include <cstddef>
 #include <cstdint>

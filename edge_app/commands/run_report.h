@@ -1,6 +1,6 @@
 #pragma once
-// What `alidade run` tells of itself beside its records: the last lines of its log, of which `replay` has one too, and a service
-// manager.
+// What `alidade run` tells of itself beside its records: the last lines of its log, of which
+// `replay` has one too, and a service manager.
 
 #include <string>
 
@@ -12,8 +12,8 @@ namespace alidade {
 // Frames, records of each mode, latency and its parts, losses, page faults: one line.
 [[nodiscard]] std::string describe(const PipelineSummary& summary, bool latency_measured);
 
-// Why records were not in OE mode (reason_counts.h), and what zoom readings the calibration is for where that is the reason.
-// Empty: all were.
+// Why records were not in OE mode (reason_counts.h), and what zoom readings the calibration is for
+// where that is the reason. Empty: all were.
 [[nodiscard]] std::string describe(const ReasonCounts& reasons, const Calibration& calibration,
                                    const ZoomCurve& curve);
 

@@ -168,8 +168,8 @@ ReadStatus HttpPollingSource::pause(const std::string& error, double pause_s) {
   return ReadStatus::kDisconnected;
 }
 
-// The login, of a device that was in use. The nonces that it gave go with the handle: by the next try they
-// may be too old, and libcurl would take that for a wrong password.
+// The login, of a device that was in use. The nonces that it gave go with the handle: by the next
+// try they may be too old, and libcurl would take that for a wrong password.
 ReadStatus HttpPollingSource::refuse(const std::string& error) {
   if (!make_handle()) {
     return fail(kNoCurl);

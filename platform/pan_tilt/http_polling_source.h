@@ -9,10 +9,10 @@
 // in two pieces may hold the second back for the 40 ms of a delayed acknowledgement: that limits
 // the rate, not the interval. kDisconnected: unreachable, timed out, or what the conversation
 // takes for such; the next try comes after a growing pause. kFailed: unusable URL, or what the
-// conversation takes for good, a refused login among it, said only until the first sample has come: a device
-// that starts again may refuse for a while. It is then tried again ever more rarely, up to kMostRefusalPauses
-// of the longest pause apart, as devices lock a user out after a few wrong logins. read() runs the transfer
-// on the calling thread; it allocates.
+// conversation takes for good, a refused login among it, said only until the first sample has come:
+// a device that starts again may refuse for a while. It is then tried again ever more rarely, up to
+// kMostRefusalPauses of the longest pause apart, as devices lock a user out after a few wrong
+// logins. read() runs the transfer on the calling thread; it allocates.
 
 #include <memory>
 #include <optional>
@@ -56,18 +56,21 @@ class HttpConversation {
   // now_s: host CLOCK_MONOTONIC.
   virtual HttpRequest next_request(double now_s) = 0;
   virtual Outcome take(const HttpAnswer& answer, PanTiltSample* sample, std::string* error) = 0;
-  // A request got no answer. kAskOn: next_request() has another to make at once; else kDisconnected.
+  // A request got no answer. kAskOn: next_request() has another to make at once; else
+  // kDisconnected.
   virtual Outcome unanswered() {
     reset();
     return Outcome::kDisconnected;
   }
   // What had worked has failed: begin anew.
   virtual void reset() = 0;
-  // What the device does otherwise than its protocol says, as far as is known, for PanTiltSource::take_notes.
+  // What the device does otherwise than its protocol says, as far as is known, for
+  // PanTiltSource::take_notes.
   [[nodiscard]] virtual std::vector<std::string> notes() const { return {}; }
 };
 
-// Of HttpDeviceOptions::max_backoff_s: the longest pause between two tries of a login that was right before.
+// Of HttpDeviceOptions::max_backoff_s: the longest pause between two tries of a login that was
+// right before.
 constexpr double kMostRefusalPauses = 12;
 
 // What the user says about any device that is polled.

@@ -6,7 +6,8 @@
 namespace alidade {
 namespace {
 
-// Clocks that differ by less are one: devices tell whole seconds, and take tokens that are some seconds old.
+// Clocks that differ by less are one: devices tell whole seconds, and take tokens that are some
+// seconds old.
 constexpr double kSameClock_s = 3;
 
 std::string lead_text(double lead_s) {

@@ -1,11 +1,13 @@
 #pragma once
-// OnvifLoginWays: in which ways a login at an ONVIF device is tried, in which order, and which was good.
+// OnvifLoginWays: in which ways a login at an ONVIF device is tried, in which order, and which was
+// good.
 //
-// A WS-UsernameToken names the time of its creation, which the device holds against a clock: the one that it
-// tells as UTC; or the true time, where what it tells as UTC is its local time; or the local time that it
-// tells besides. Other devices want HTTP digest, and offer it. Devices lock a user out after three to five
-// wrong logins: at most kMostTries differ in one go, no clock is tried twice, and where a login was good
-// before, one is tried after each pause (HttpPollingSource), and each way twice: the clock may have been set.
+// A WS-UsernameToken names the time of its creation, which the device holds against a clock: the
+// one that it tells as UTC; or the true time, where what it tells as UTC is its local time; or the
+// local time that it tells besides. Other devices want HTTP digest, and offer it. Devices lock a
+// user out after three to five wrong logins: at most kMostTries differ in one go, no clock is tried
+// twice, and where a login was good before, one is tried after each pause (HttpPollingSource), and
+// each way twice: the clock may have been set.
 
 #include <optional>
 #include <string>

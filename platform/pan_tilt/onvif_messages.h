@@ -94,8 +94,8 @@ struct OnvifSpaceRange {
   std::optional<OnvifInterval> pan;
   std::optional<OnvifInterval> tilt;
 };
-// Of the answer to GetNodes or GetConfigurationOptions. node: its spaces are taken, those of all nodes if it
-// is empty or not there. False: none is declared.
+// Of the answer to GetNodes or GetConfigurationOptions. node: its spaces are taken, those of all
+// nodes if it is empty or not there. False: none is declared.
 [[nodiscard]] bool parse_onvif_ranges(std::string_view body, const std::string& node,
                                       std::vector<OnvifSpaceRange>* ranges, std::string* error);
 

@@ -49,7 +49,8 @@ bool is_sound(const std::optional<OnvifInterval>& declared) {
          declared->high <= kLargestEnd;
 }
 
-// A range within -1..1 is that of the generic space with stops; its angles are still those at -1 and 1.
+// A range within -1..1 is that of the generic space with stops; its angles are still those at -1
+// and 1.
 bool is_wide(const std::optional<OnvifInterval>& declared) {
   return is_sound(declared) &&
          (!is_within(declared->low, kGenericScale) || !is_within(declared->high, kGenericScale));

@@ -1,10 +1,10 @@
 #pragma once
 // OnvifScale: from the numbers in which an ONVIF device tells its position to angles.
 //
-// In order: the scale that the user states; degrees, where the space says so; the range that the device
-// declares for the space, where it reaches beyond -1..1, with the user's angles at its ends, or as degrees
-// where it can be nothing else; -1..1 with the user's angles at its ends, as the standard has it. A position
-// beyond its scale is none. Pure.
+// In order: the scale that the user states; degrees, where the space says so; the range that the
+// device declares for the space, where it reaches beyond -1..1, with the user's angles at its ends,
+// or as degrees where it can be nothing else; -1..1 with the user's angles at its ends, as the
+// standard has it. A position beyond its scale is none. Pure.
 
 #include <optional>
 #include <string>
@@ -42,7 +42,8 @@ class OnvifScale {
   };
   [[nodiscard]] Outcome angles(const OnvifStatus& status, double* pan_rad, double* tilt_rad,
                                std::string* error) const;
-  // What was made of a declared range for positions in the space of this one; empty: nothing unusual.
+  // What was made of a declared range for positions in the space of this one; empty: nothing
+  // unusual.
   [[nodiscard]] std::string note(const OnvifStatus& status) const;
 
  private:

@@ -3,8 +3,8 @@
 // kept HTTP connection. Pace, stamps and threads: http_polling_source.h.
 //
 // At each (re)connection it asks for the device's clock (if it has to log in), for its services
-// (GetCapabilities, or GetServices), for a profile with PTZ if none is configured, and for the range of its
-// positions (GetNodes, or GetConfigurationOptions) if they are not in degrees.
+// (GetCapabilities, or GetServices), for a profile with PTZ if none is configured, and for the
+// range of its positions (GetNodes, or GetConfigurationOptions) if they are not in degrees.
 // - Services: only at the host of `url`, where the device says, or else where usual: onvif_addresses.h.
 // - Login: a WS-UsernameToken by the clock that the device tells, or another, or HTTP digest where it is
 //   offered: onvif_login.h.
@@ -13,7 +13,8 @@
 //   answers of a source's life are withheld until that is known: all its samples have it, or none.
 // kDisconnected: unreachable, timed out, a SOAP fault, HTTP status other than 200, an answer that is
 // no position. kFailed: unusable URL; until the first sample also wrong user or password, a scale
-// without angles. Later a refused login may be that of a device that restarts or whose clock was set.
+// without angles. Later a refused login may be that of a device that restarts or whose clock was
+// set.
 
 #include <memory>
 #include <optional>

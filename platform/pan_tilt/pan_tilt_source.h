@@ -25,8 +25,9 @@ class PanTiltSource {
   // One line for the person; valid after kDisconnected or kFailed.
   [[nodiscard]] virtual std::string error() const = 0;
 
-  // What the device does otherwise than its protocol says, and what is made of it: lines for the person, each
-  // said once in the source's life. Those since the last call, from the reading thread.
+  // What the device does otherwise than its protocol says, and what is made of it: lines for the
+  // person, each said once in the source's life. Those since the last call, from the reading
+  // thread.
   [[nodiscard]] virtual std::vector<std::string> take_notes() { return {}; }
 
   // URL without password, device or directory.

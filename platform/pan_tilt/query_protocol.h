@@ -81,7 +81,8 @@ class QueryProtocol {
   // Bytes came that nobody asked for. Where it matters next() asks a fence, as also after every
   // kQueriesPerFence queries: one answer too many makes each answer that of the query before.
   virtual void doubt() = 0;
-  // In which way the device differs from the protocol, and what is made of it, one line; empty: in none.
+  // In which way the device differs from the protocol, and what is made of it, one line; empty: in
+  // none.
   [[nodiscard]] virtual std::string peculiarity() const { return {}; }
   // Over UDP: whether each datagram is a frame of its own (VISCA's header) and is to be searched alone; false for lines of text.
   [[nodiscard]] virtual bool is_of_datagrams() const = 0;

@@ -251,7 +251,8 @@ Answer ViscaProtocol::find_in_datagram(std::string_view bytes) {
   answered_ = true;
   if (is_its_own) {
     other_number_ = false;
-    // A number that stands still proves nothing, nor does a first one, which is what many of them always say.
+    // A number that stands still proves nothing, nor does a first one, which is what many of them
+    // always say.
     numbers_count_ =
         numbers_count_ || (asked_ == Asked::kFence && !number_stands_ && sequence_ > 1);
   } else {

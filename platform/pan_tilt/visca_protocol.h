@@ -11,12 +11,12 @@
 // error, looks different.
 //
 // With the header, sequence numbers match answers to queries; the numbering begins anew (control type)
-// with each connection and when the device complains of it. Some devices answer in the right order with
-// other numbers (always 1, always 0, one off, bytes turned round) or without a header. Where a query got
-// only such answers, numbers count no longer and fences do, as without the header, until the answer to a
-// fence bears the fence's own number. Some of these devices answer none but their own number: where
-// nothing came at all, it is sent that, or counted again. All that holds over a restart, as fences are right
-// for every device.
+// with each connection and when the device complains of it. Some devices answer in the right order
+// with other numbers (always 1, always 0, one off, bytes turned round) or without a header. Where a
+// query got only such answers, numbers count no longer and fences do, as without the header, until
+// the answer to a fence bears the fence's own number. Some of these devices answer none but their
+// own number: where nothing came at all, it is sent that, or counted again. All that holds over a
+// restart, as fences are right for every device.
 
 #include <cstdint>
 #include <optional>
