@@ -159,6 +159,12 @@ int RtpConnection::next_packet(void* self, std::uint8_t* data, int capacity) {
   ReceivedPacket packet;
   const double deadline_s = connection->last_picture_s_ + connection->options_.timeout_s;
   do {
+    if (const auto held = connection->filter_.release()) {
+      packet = {held->bytes.size(), held->arrival_s};
+      std::copy(held->bytes.begin(), held->bytes.end(), data);
+      connection->arrival_s_ = packet.arrival_s;
+      break;
+    }
     // Where packets come without end, no wait does.
     connection->transport_status_ =
         monotonic_now_s() > deadline_s

@@ -106,7 +106,7 @@ RtspFraming::Extent RtspFraming::message_at(std::string_view bytes) {
 
 RtspFraming::Item RtspFraming::next() {
   missing_ = 1;
-  while (begin_ < end_) {
+  while (begin_ < end_ && !is_lost()) {
     const std::string_view bytes(buffer_.data() + begin_, end_ - begin_);
     if (is_line_end(bytes.front()) && garbage_in_a_row_ == 0) {
       ++begin_;

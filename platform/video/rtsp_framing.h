@@ -43,7 +43,7 @@ class RtspFraming {
 
   // Bytes that belong to no packet and no message.
   [[nodiscard]] std::int64_t garbage() const { return garbage_; }
-  // More than kMaxGarbage of them in a row: it is no RTSP.
+  // More than kMaxGarbage of them in a row: it is no RTSP, and nothing more is found.
   [[nodiscard]] bool is_lost() const { return garbage_in_a_row_ > kMaxGarbage; }
 
  private:

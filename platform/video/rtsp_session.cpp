@@ -3,6 +3,8 @@
 #include <poll.h>
 
 #include <algorithm>
+#include <cstdlib>
+#include <cstring>
 #include <optional>
 #include <random>
 #include <utility>
@@ -37,6 +39,17 @@ std::string resolve(const std::string& base, const std::string& control) {
   if (control.empty() || control == "*") return base;
   if (control.find("://") != std::string::npos) return control;
   return base + (base.empty() || base.back() != '/' ? "/" : "") + control;
+}
+
+// The SSRC that RTP-Info tells (RFC 7826, 18.45), if it does.
+std::optional<std::uint32_t> source_in(const std::string& rtp_info) {
+  constexpr const char* kName = "ssrc=";
+  const std::size_t at = rtp_info.find(kName);
+  if (at == std::string::npos) return std::nullopt;
+  const unsigned long source =
+      std::strtoul(rtp_info.c_str() + at + std::strlen(kName), nullptr, 16);
+  if (source == 0 || source > 0xFFFFFFFFUL) return std::nullopt;
+  return static_cast<std::uint32_t>(source);
 }
 
 std::string refusal(int status, const char* reason) {
@@ -229,10 +242,14 @@ ReadStatus RtspSession::play(const std::string& sdp, std::string* error) {
   framing_.set_channels(first_channel_);
   gst_rtsp_transport_free(agreed);
 
+  played_ = true;
   status = ask({GST_RTSP_PLAY, session_url_, GST_RTSP_HDR_RANGE, "npt=0.000-"}, &answer, error);
   if (status == ReadStatus::kOk && answer.status() != GST_RTSP_STS_OK) {
     *error = refusal(answer.status(), answer.reason());
     return ReadStatus::kDisconnected;
+  }
+  if (!source_ && status == ReadStatus::kOk) {
+    source_ = source_in(answer.header(GST_RTSP_HDR_RTP_INFO));
   }
   return status;
 }
@@ -270,12 +287,7 @@ ReadStatus RtspSession::ask(const Request& request, RtspMessage* answer, std::st
     while (status == ReadStatus::kOk) {
       status = next_message(deadline_s_, answer, error);
       if (status != ReadStatus::kOk || answer->type() == GST_RTSP_MESSAGE_RESPONSE) break;
-      const auto [data, size] = answer->body();
-      if (answer->type() == GST_RTSP_MESSAGE_REQUEST) {
-        reply(answer);
-      } else if (answer->type() == GST_RTSP_MESSAGE_DATA && early_.size() < kMaxEarlyPackets) {
-        early_.emplace_back(data, data + size);
-      }
+      if (answer->type() == GST_RTSP_MESSAGE_REQUEST) reply(answer);
     }
     if (status != ReadStatus::kOk || answer->status() != GST_RTSP_STS_UNAUTHORIZED) return status;
     if (options_.user.empty()) {
@@ -322,9 +334,29 @@ bool RtspSession::accept_challenge(RtspMessage* answer) {
 }
 
 ReadStatus RtspSession::next_message(double deadline_s, RtspMessage* message, std::string* error) {
+  if (played_) return next_message_amid_packets(deadline_s, message, error);
   const GstRTSPResult result = gst_rtsp_connection_receive_usec(
       connection_.get(), message->cleared(), microseconds_until(deadline_s));
   return result == GST_RTSP_OK ? ReadStatus::kOk : lost(result, error);
+}
+
+// Packets may come before the answer to PLAY, and what belongs to none.
+ReadStatus RtspSession::next_message_amid_packets(double deadline_s, RtspMessage* message,
+                                                  std::string* error) {
+  while (monotonic_now_s() < deadline_s) {
+    for (auto item = framing_.next(); item.kind != RtspFraming::Item::Kind::kNone;
+         item = framing_.next()) {
+      if (item.kind == RtspFraming::Item::Kind::kMessage) {
+        if (message->parse(item.bytes)) return ReadStatus::kOk;
+      } else if (is_of_video(item) && early_.size() < kMaxEarlyPackets) {
+        early_.emplace_back(item.bytes.begin(), item.bytes.end());
+      }
+    }
+    if (interrupted_) return ReadStatus::kStopped;
+    const ReadStatus status = fill(deadline_s - monotonic_now_s(), error);
+    if (status != ReadStatus::kOk && status != ReadStatus::kTimeout) return status;
+  }
+  return ReadStatus::kTimeout;
 }
 
 // Cameras ask whether we are still there.
@@ -348,6 +380,10 @@ ReadStatus RtspSession::ping(std::string* error) {
 
 // Reads what is there, after at most wait_s. kTimeout: nothing.
 ReadStatus RtspSession::fill(double wait_s, std::string* error) {
+  if (framing_.is_lost()) {
+    *error = kNotRtsp;
+    return ReadStatus::kDisconnected;
+  }
   wait_s = std::clamp(wait_s, 0.0, kPollSlice_s);
   if (!socket_) return fill_by_tls(wait_s, error);
   auto* const input =
@@ -410,13 +446,9 @@ ReadStatus RtspSession::next_packet(double wait_s, RtspFraming::Item* packet, st
       if (packet->kind == RtspFraming::Item::Kind::kMessage) {
         const ReadStatus status = take_message(packet->bytes, error);
         if (status != ReadStatus::kOk) return status;
-      } else if (packet->channel == first_channel_ || packet->channel == first_channel_ + 1) {
+      } else if (is_of_video(*packet)) {
         return ReadStatus::kOk;
       }
-    }
-    if (framing_.is_lost()) {
-      *error = kNotRtsp;
-      return ReadStatus::kDisconnected;
     }
     if (filled) return ReadStatus::kTimeout;
     const ReadStatus status = fill(wait_s, error);

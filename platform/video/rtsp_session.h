@@ -2,7 +2,8 @@
 // RtspSession: the video of an RTSP camera (RFC 2326), its packets within the RTSP connection or by UDP,
 // with GStreamer's RTSP library; over TLS (rtsps://) only within (rtsp_tls.h). Logs in by digest or basic,
 // follows redirections, keeps the session alive. Part of RtpConnection.
-// Once it plays, the bytes are taken apart here (rtsp_framing.h): GStreamer's library ends at the first that is wrong.
+// From PLAY on the bytes are taken apart here (rtsp_framing.h): GStreamer's library ends at the first
+// that is wrong.
 
 #include <gst/rtsp/gstrtspconnection.h>
 
@@ -59,6 +60,11 @@ class RtspSession : public RtpTransport {
   [[nodiscard]] bool accept_challenge(RtspMessage* answer);
   [[nodiscard]] ReadStatus next_message(double deadline_s, RtspMessage* message,
                                         std::string* error);
+  [[nodiscard]] ReadStatus next_message_amid_packets(double deadline_s, RtspMessage* message,
+                                                     std::string* error);
+  [[nodiscard]] bool is_of_video(const RtspFraming::Item& item) const {
+    return item.channel == first_channel_ || item.channel == first_channel_ + 1;
+  }
   // After PLAY. What came within the connection: kOk with a packet of the video; kTimeout: none so far.
   [[nodiscard]] ReadStatus next_packet(double wait_s, RtspFraming::Item* packet,
                                        std::string* error);
@@ -81,6 +87,7 @@ class RtspSession : public RtpTransport {
   std::string base_url_;     // what the description's addresses are relative to
   std::string session_url_;  // what PLAY is for; empty: nothing to tear down
   GstRTSPMethod ping_ = GST_RTSP_OPTIONS;
+  bool played_ = false;        // PLAY was asked for
   bool pinged_again_ = false;  // with a new login
   double next_look_s_ = 0;     // by UDP: for what the camera says
   std::atomic<bool> interrupted_{false};
@@ -94,7 +101,7 @@ class RtspSession : public RtpTransport {
   int first_channel_ = 0;                // the same within the connection
   std::optional<std::uint32_t> source_;  // SSRC, as the answer to SETUP has it
   std::deque<Packet> early_;             // came before the answer to PLAY
-  RtspFraming framing_;                  // of what came after it
+  RtspFraming framing_;                  // of what comes after PLAY
 };
 
 }  // namespace alidade

@@ -386,7 +386,7 @@ TEST_P(RtpSourceWith, DropsWhatASlowReaderLeavesAndGoesOnAtAKeyFrame) {
   }
 }
 
-// What a camera sends beside its pictures, in the same channel.
+// What comes beside a camera's pictures, in the same channel.
 struct Foreign {
   const char* name;
   int payload_type;      // added to the pictures' own
@@ -421,7 +421,8 @@ INSTANTIATE_TEST_SUITE_P(
     Streams, RtpSourceBeside,
     ::testing::Combine(::testing::Values(Codec::kMjpeg, Codec::kH264, Codec::kH265),
                        ::testing::Values(Foreign{"Metadata", 11, false, 7, true},
-                                         Foreign{"ItsOwnSource", 1, true, 65'530, false})),
+                                         Foreign{"ItsOwnSource", 1, true, 65'530, false},
+                                         Foreign{"ASecondSender", 0, true, 17, false})),
     [](const auto& which) {
       return ::testing::PrintToString(std::get<Codec>(which.param)) +
              std::get<Foreign>(which.param).name;

@@ -209,6 +209,36 @@ TEST(RtspSession, PassesOverBytesThatBelongToNoPacket) {
   }
 }
 
+TEST(RtspSession, PassesOverBytesBeforeTheAnswerToPlay) {
+  for (const std::string& garbage :
+       {std::string("x"), std::string("\0\0\0\0$\0", 6), std::string("RTSP/2.0 junk\r\n\r\n$\x07"),
+        "\xff\xd8\xff" + std::string(3000, 'j')}) {
+    const ScriptedRtspServer server([&](const RtspRequest& request, RtspAnswer* answer) {
+      if (request.method != "PLAY") return;
+      answer->before = garbage;
+      answer->pictures_before = true;
+    });
+    const auto source = open_rtp(options_for(server));
+    Frame frame;
+    for (int i = 0; i < 5; ++i) {
+      ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+      EXPECT_NEAR(frame.luma[0], RtpSender::grey_of(i), 3);
+    }
+    EXPECT_GE(source->counters().garbage_bytes, static_cast<std::int64_t>(garbage.size()));
+    EXPECT_EQ(server.count("PLAY"), 1);
+  }
+}
+
+TEST(RtspSession, EndsWhereGarbageComesInPlaceOfTheAnswerToPlay) {
+  const ScriptedRtspServer server([&](const RtspRequest& request, RtspAnswer* answer) {
+    if (request.method == "PLAY") answer->before = std::string(RtspFraming::kMaxGarbage + 9, 'x');
+  });
+  const auto source = open_rtp(options_for(server));
+  Frame frame;
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("what the camera sends is not RTSP"));
+}
+
 TEST(RtspSession, AnswersTheCameraBesideBytesThatBelongToNoPacket) {
   ScriptedRtspServer server;
   server.change_bytes = [](std::int64_t, std::string* bytes) { *bytes = "..." + *bytes; };
@@ -230,11 +260,18 @@ TEST(RtspSession, EndsWhereWhatComesIsNoRtspAnyMore) {
   EXPECT_THAT(source->error(), HasSubstr("what the camera sends is not RTSP"));
 }
 
-// The answer to SETUP names the source; another camera's packets of the same type come first.
-TEST(RtspSession, TakesThePacketsOfTheSourceThatItsAnswerNames) {
+// Which answer: that to PLAY, or to SETUP.
+class RtspSessionWithTwoSenders : public ::testing::TestWithParam<bool> {};
+INSTANTIATE_TEST_SUITE_P(, RtspSessionWithTwoSenders, ::testing::Bool());
+
+// Another camera's packets of the same type come first.
+TEST_P(RtspSessionWithTwoSenders, TakesThePacketsOfTheSourceThatAnAnswerNames) {
   ScriptedRtspServer server([](const RtspRequest& request, RtspAnswer* answer) {
-    if (request.method != "SETUP") return;
-    answer->headers.insert(answer->headers.find("\r\n"), ";ssrc=0A0B0C0D");
+    if (request.method == "SETUP" && !GetParam()) {
+      answer->headers.insert(answer->headers.find("\r\n"), ";ssrc=0A0B0C0D");
+    } else if (request.method == "PLAY" && GetParam()) {
+      answer->headers += "RTP-Info: url=\"x\" ssrc=0A0B0C0D:seq=1\r\n";
+    }
   });
   server.change_packets = [](std::int64_t, RtpRelay::Packets* packets) {
     RtpRelay::Packets all;
