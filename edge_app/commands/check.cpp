@@ -108,7 +108,12 @@ CalibrationHere calibration_here(const Measured& measured, const Config& config,
       "f is {:.1f} +- {:.2g} px there ({})", c.camera.focal_length,
       std::sqrt(c.covariance(index(Parameter::kFocalLength), index(Parameter::kFocalLength))),
       found->name);
-  if (!found->zoom_curve.empty()) lens = "within the zoom curve; " + lens;
+  if (!found->zoom_curve.empty()) {
+    lens = (is_between_zooms(found->zoom_curve, c.zoom.value_or(*told->zoom))
+                ? "within the zoom curve; "
+                : "beyond the zooms of the curve; ") +
+           lens;
+  }
   return {*found, lens};
 }
 

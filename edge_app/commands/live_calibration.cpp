@@ -120,7 +120,7 @@ std::optional<NamedCalibration> calibration_at(const StartingCalibration& start,
     return there;
   }
   if (!first.zoom_curve.at(zoom, &there.calibration)) return std::nullopt;
-  there.name = first.name + ", between its zooms";
+  there.name = name_on_curve(first.name, first.zoom_curve, zoom);
   return there;
 }
 

@@ -235,7 +235,7 @@ std::optional<std::size_t> CalibrationStore::nearest(std::optional<double> zoom)
 const StoredCalibration* CalibrationStore::find(std::optional<double> zoom) const {
   std::optional<std::size_t> found = nearest(zoom);
   if (!found && zoom && curve_.at(*zoom, &between_.calibration)) {
-    between_.path = fmt::format("{}, between its zooms", curve_path_);
+    between_.path = name_on_curve(curve_path_, curve_, *zoom);
     return &between_;
   }
   if (!found && !zoom && !curve_.empty()) {

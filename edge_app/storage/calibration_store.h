@@ -17,9 +17,21 @@
 #include <string>
 #include <vector>
 
+#include "core/model/zoom_curve.h"
 #include "edge_app/pipeline/calibration_archive.h"
 
 namespace alidade {
+
+// A curve goes on beyond its first and last zoom, with less certainty.
+[[nodiscard]] inline bool is_between_zooms(const ZoomCurve& curve, double reading) {
+  return (reading - curve.first_reading()) * (reading - curve.last_reading()) <= 0;
+}
+
+// What the curve of a file has at a reading, as people are told of it.
+[[nodiscard]] inline std::string name_on_curve(const std::string& path, const ZoomCurve& curve,
+                                               double reading) {
+  return path + (is_between_zooms(curve, reading) ? ", between its zooms" : ", beyond its zooms");
+}
 
 class CalibrationStore final : public CalibrationArchive {
  public:

@@ -320,6 +320,9 @@ TEST_F(CheckCommand, InsideTheZoomCurveIsNoOtherZoom) {
   Calibration there;
   ASSERT_TRUE(curve_of_camera().at(1625, &there));
   EXPECT_THAT(inside.output, HasSubstr(fmt::format("f is {:.1f} +- ", there.camera.focal_length)));
+  EXPECT_THAT(check_at(2100).output, AllOf(HasSubstr("2100, unchanged; beyond the zooms of the "
+                                                     "curve; f is "),
+                                           HasSubstr("beyond its zooms")));
   const Result outside = check_at(4000);
   EXPECT_EQ(outside.exit_code, 1);
   EXPECT_THAT(outside.errors,
