@@ -318,6 +318,9 @@ ServerResponse status(const HttpApiSources& sources, const HttpServer& server) {
                    {"repeated", summary.repeated},
                    {"damaged", losses.damaged},
                    {"not_fetched", losses.dropped}};
+  out["video_faults"] = {{"unstamped", losses.unstamped},
+                         {"foreign_packets", losses.foreign_packets},
+                         {"garbage_bytes", losses.garbage_bytes}};
   out["reasons"] = Json::object();
   for (const RecordStatus status : kRecordStatuses) {
     if (summary.reasons.of(status) > 0)

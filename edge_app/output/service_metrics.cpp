@@ -262,6 +262,14 @@ std::string service_metrics(const HttpApiSources& sources, const HttpCounters& h
   out.counter("alidade_frames_lost_total", "Frames lost before they were read, by reason");
   out.add(losses.damaged, {{"reason", "damaged"}});
   out.add(losses.dropped, {{"reason", "not_fetched"}});
+  out.counter("alidade_frames_unstamped_total", "Frames whose time stamp cannot be true");
+  out.add(losses.unstamped);
+  out.counter("alidade_video_foreign_packets_total",
+              "Packets that the video's session has not agreed upon, left out");
+  out.add(losses.foreign_packets);
+  out.counter("alidade_video_garbage_bytes_total",
+              "Bytes of the video's connection that are of no packet, passed over");
+  out.add(losses.garbage_bytes);
   add_link_metrics(summary, &out);
   out.counter("alidade_queue_dropped_total",
               "Messages lost to full queues; those to the calibration cost no record");

@@ -45,7 +45,7 @@ class HttpApiTest : public ::testing::Test {
     sources.target_lines = lines;
     sources.live = &live_;
     sources.summary = [this] { return summary_; };
-    sources.video_losses = [] { return FrameSourceCounters{3, 4}; };
+    sources.video_losses = [] { return FrameSourceCounters{3, 4, 5, 6, 7}; };
     sources.ask_for_calibration = [this] { return asked_ = calibrating_; };
     sources.zoom_curve = [this] { return curve_; };
     sources.plane = std::move(plane);
@@ -118,6 +118,11 @@ TEST_F(HttpApiTest, BeforeTheFirstRecordThereIsNothingAndThatIsSaid) {
   EXPECT_TRUE(status["latency_s"].is_null());
   EXPECT_EQ(status["frames"]["damaged"], 3);
   EXPECT_EQ(status["frames"]["not_fetched"], 4);
+  EXPECT_EQ(status["video_faults"],
+            json({{"unstamped", 5}, {"foreign_packets", 6}, {"garbage_bytes", 7}}));
+  EXPECT_THAT(get("/metrics"), AllOf(HasSubstr("\nalidade_frames_unstamped_total 5\n"),
+                                     HasSubstr("\nalidade_video_foreign_packets_total 6\n"),
+                                     HasSubstr("\nalidade_video_garbage_bytes_total 7\n")));
   EXPECT_EQ(body_of(get("/api/v1/history"))["time_s"], json::array());
   EXPECT_THAT(get("/metrics"), HasSubstr("\nalidade_frames_total 0\n"));
 }
