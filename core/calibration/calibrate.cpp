@@ -1,7 +1,9 @@
 #include "core/calibration/calibrate.h"
 
+#include <cstddef>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "core/calibration/calibration_result.h"
 #include "core/calibration/input_selection.h"
@@ -19,6 +21,19 @@ using internal::StageStatus;
 StageStatus report(const CalibrationOptions& options, double done, const char* what) {
   if (!options.progress || options.progress(done, what)) return {};
   return {CalibrationStatus::kCancelled, "cancelled"};
+}
+
+// Image clock.
+std::vector<double> times_of_used_frames(const internal::AdjustmentData& data) {
+  std::vector<char> is_used(data.frame_time_s.size(), 0);
+  for (const auto& o : data.observations) {
+    if (o.used) is_used[static_cast<std::size_t>(o.frame)] = 1;
+  }
+  std::vector<double> times;
+  for (std::size_t i = 0; i < is_used.size(); ++i) {
+    if (is_used[i] != 0) times.push_back(data.frame_time_s[i]);
+  }
+  return times;
 }
 
 // Stage by stage; the first that refuses says why.
@@ -62,7 +77,9 @@ StageStatus run(const CalibrationInput& input, const CalibrationOptions& options
 
   internal::fill_result(input, options, clocks, start.prior, selected, adjustment.adjusted(),
                         result);
-  internal::judge(options, internal::measure_motion(result->trajectory), result);
+  internal::judge(options,
+                  internal::measure_motion(result->trajectory, times_of_used_frames(selected.data)),
+                  result);
   return {result->status, std::move(result->message)};
 }
 

@@ -55,7 +55,7 @@ std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baselin
 }
 
 MotionMatch match_motion(const std::vector<ImageMotion>& motion, const TrajectorySpline& telemetry,
-                         double centre_s, double half_range_s) {
+                         double centre_s, double half_range_s, const Vector2<double>& signs) {
   // The telemetry on a grid: every candidate needs it at all frames.
   constexpr double kGridStep_s = 2e-3;
   const int grid_size =
@@ -88,8 +88,8 @@ MotionMatch match_motion(const std::vector<ImageMotion>& motion, const Trajector
       Vector2<double> from;
       Vector2<double> to;
       if (!look_up(m.from_s + shift, &from) || !look_up(m.to_s + shift, &to)) continue;
-      const Vector2<double> p(-std::cos(0.5 * (from[1] + to[1])) * (to[0] - from[0]),
-                              to[1] - from[1]);
+      const Vector2<double> p(-std::cos(0.5 * (from[1] + to[1])) * signs.x() * (to[0] - from[0]),
+                              signs.y() * (to[1] - from[1]));
       mp += m.shift.cwiseProduct(p);
       mm += m.shift.cwiseAbs2();
       pp += p.cwiseAbs2();
@@ -127,6 +127,54 @@ MotionMatch match_motion(const std::vector<ImageMotion>& motion, const Trajector
   best.at_edge = at_edge;
   best.apart = apart;
   return best;
+}
+
+namespace {
+
+// Of pan and of tilt alone, with the signs that they have.
+Vector2<double> axis_correlation(const std::vector<ImageMotion>& motion,
+                                 const TrajectorySpline& telemetry, const MotionMatch& match) {
+  Vector2<double> mp = Vector2<double>::Zero();
+  Vector2<double> mm = Vector2<double>::Zero();
+  Vector2<double> pp = Vector2<double>::Zero();
+  for (const ImageMotion& m : motion) {
+    const double from_s = m.from_s + match.shift_s;
+    const double to_s = m.to_s + match.shift_s;
+    if (from_s < telemetry.begin_s() || to_s > telemetry.end_s()) continue;
+    const Vector2<double> turned =
+        telemetry.position(to_s).vector() - telemetry.position(from_s).vector();
+    const Vector2<double> shift(-m.shift.x(), m.shift.y());
+    mp += shift.cwiseProduct(turned);
+    mm += shift.cwiseAbs2();
+    pp += turned.cwiseAbs2();
+  }
+  // What does not move has none.
+  return mp.cwiseQuotient(mm.cwiseProduct(pp).cwiseSqrt().cwiseMax(1e-300));
+}
+
+}  // namespace
+
+ReversedAxes reversed_axes(const std::vector<ImageMotion>& motion,
+                           const TrajectorySpline& telemetry, double centre_s, double half_range_s,
+                           const MotionMatch& match) {
+  constexpr double kMinCorrelation = 0.9;
+  constexpr double kMinAxisCorrelation = 0.8;
+  constexpr double kMuchLess = 1.0 / 3;  // of what the signs as they are leave unexplained
+  const auto unexplained = [](const MotionMatch& m) { return 1 - m.correlation * m.correlation; };
+  double least = kMuchLess * unexplained(match);
+  ReversedAxes reversed;
+  for (const Vector2<double>& signs :
+       {Vector2<double>(-1, 1), Vector2<double>(1, -1), Vector2<double>(-1, -1)}) {
+    const MotionMatch other = match_motion(motion, telemetry, centre_s, half_range_s, signs);
+    if (other.correlation < kMinCorrelation || unexplained(other) > least) continue;
+    // An axis that hardly moves shows no sign: what the other one does to the image tells nothing of it.
+    const Vector2<double> each = signs.cwiseProduct(axis_correlation(motion, telemetry, other));
+    if (signs.x() < 0 && each.x() < kMinAxisCorrelation) continue;
+    if (signs.y() < 0 && each.y() < kMinAxisCorrelation) continue;
+    least = unexplained(other);
+    reversed = {signs.x() < 0, signs.y() < 0};
+  }
+  return reversed;
 }
 
 }  // namespace alidade::internal

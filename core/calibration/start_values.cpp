@@ -116,10 +116,12 @@ StageStatus find_motion(const CalibrationInput& input, const CalibrationOptions&
 
   const auto image = image_motion(selected->data, 0.5);
   const double centre = options.clock_offset ? options.clock_offset->value : 0;
-  for (double range = options.clock_offset_search_s;; range *= 2) {
+  double range = options.clock_offset_search_s;
+  for (;; range *= 2) {
     motion->match = match_motion(image, *smooth, centre, range);
     if (!motion->match.at_edge || range > end - begin) break;
   }
+  motion->match.reversed = reversed_axes(image, *smooth, centre, range, motion->match);
   StageStatus status;
   status.status = check_motion(image, *smooth, motion->match, input, &status.message);
   return status;

@@ -2,7 +2,9 @@
 
 #include <Eigen/Eigenvalues>
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <cstddef>
 #include <cstdio>
 
 #include "core/calibration/correlation.h"
@@ -42,6 +44,28 @@ std::string moved_little(int axis, double range, double f, int width) {
          text(" moves the image by %.0f px (%.2g deg) only", range * f, kDegrees * range) +
          text(": both axes have to move, by a good part of the image (%.0f px, %.2g deg) or more",
               good, kDegrees * good / f);
+}
+
+std::string reversed_text(const ReversedAxes& reversed) {
+  constexpr const char* kHow = ": the image moves the other way than the telemetry's angles say; ";
+  if (reversed.pan && reversed.tilt) {
+    return std::string("pan and tilt are both reversed") + kHow +
+           "pan right and tilt up must be positive, or is the image upside down?";
+  }
+  return std::string(axis_name(reversed.pan ? 0 : 1)) + " is reversed" + kHow +
+         (reversed.pan ? "pan right" : "tilt up") + " must be positive, or is the image mirrored?";
+}
+
+// Of the telemetry, all through the image's motion; at its ends where they do not meet.
+std::vector<double> times_beside(const std::vector<ImageMotion>& motion,
+                                 const TrajectorySpline& telemetry, const MotionMatch& match) {
+  std::vector<double> times;
+  for (const ImageMotion& m : motion) {
+    for (const double time : {m.from_s, m.to_s}) {
+      times.push_back(std::clamp(time + match.shift_s, telemetry.begin_s(), telemetry.end_s()));
+    }
+  }
+  return times;
 }
 
 // What no calibration can be made of, or file hold: an axis that did not move after all, as what telemetry says of it is noise, or one
@@ -94,27 +118,32 @@ void describe_weakest(CalibrationResult* result) {
 
 }  // namespace
 
-MotionExtent measure_motion(const TrajectorySpline& trajectory) {
-  constexpr int kSteps = 1000;
-  Vector2<double> low = Vector2<double>::Constant(1e300);
-  Vector2<double> high = -low;
+MotionExtent measure_motion(const TrajectorySpline& trajectory,
+                            const std::vector<double>& times_s) {
+  constexpr double kApart = 0.01;  // of the times, at either end of the range
+  std::array<std::vector<double>, 2> angles;
   Vector2<double> sum = Vector2<double>::Zero();
   Vector2<double> squares = Vector2<double>::Zero();
   MotionExtent extent;
-  extent.largest_rate.setZero();
-  for (int i = 0; i <= kSteps; ++i) {
-    const auto basis = trajectory.basis(trajectory.begin_s() +
-                                        (trajectory.end_s() - trajectory.begin_s()) * i / kSteps);
+  extent.range = extent.largest_rate = extent.varying_rate = Vector2<double>::Zero();
+  if (times_s.empty()) return extent;
+  for (const double time : times_s) {
+    const auto basis = trajectory.basis(time);
     const Vector2<double> angle = trajectory.position(basis).vector();
     const Vector2<double> rate = trajectory.rate(basis).vector();
-    low = low.cwiseMin(angle);
-    high = high.cwiseMax(angle);
+    for (int axis = 0; axis < 2; ++axis)
+      angles[static_cast<std::size_t>(axis)].push_back(angle[axis]);
     extent.largest_rate = extent.largest_rate.cwiseMax(rate.cwiseAbs());
     sum += rate;
     squares += rate.cwiseAbs2();
   }
-  const double n = kSteps + 1;
-  extent.range = high - low;
+  const auto n = static_cast<double>(times_s.size());
+  const auto apart = static_cast<std::size_t>(kApart * n);
+  for (int axis = 0; axis < 2; ++axis) {
+    std::vector<double>& all = angles[static_cast<std::size_t>(axis)];
+    std::sort(all.begin(), all.end());
+    extent.range[axis] = all[all.size() - 1 - apart] - all[apart];
+  }
   extent.varying_rate = (squares / n - (sum / n).cwiseAbs2()).cwiseMax(0).cwiseSqrt();
   return extent;
 }
@@ -145,7 +174,7 @@ CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
         largest_shift);
     return CalibrationStatus::kNoMotion;
   }
-  const MotionExtent extent = measure_motion(telemetry);
+  const MotionExtent extent = measure_motion(telemetry, times_beside(motion, telemetry, match));
   const double rate = extent.largest_rate.norm();
   const double in_px = match.focal_length;
   if (match.correlation > kMinCorrelation && in_px < kMaxFieldOfViewRatio * input.width) {
@@ -168,6 +197,10 @@ CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
   if (match.apart) {
     *why = "telemetry accompanies less than half of the video: was its connection lost meanwhile?";
     return CalibrationStatus::kBadInput;
+  }
+  if (match.reversed.pan || match.reversed.tilt) {
+    *why = reversed_text(match.reversed);
+    return CalibrationStatus::kTelemetryMismatch;
   }
   if (match.correlation < kMinCorrelation) {
     *why = text(

@@ -25,11 +25,13 @@ namespace alidade::internal {
 
 // The motion that was there, true angles.
 struct MotionExtent {
-  Vector2<double> range;         // rad, largest less smallest
+  Vector2<double> range;         // rad, largest less smallest, a few times apart
   Vector2<double> largest_rate;  // rad/s
   Vector2<double> varying_rate;  // rad/s, standard deviation of the rate
 };
-[[nodiscard]] MotionExtent measure_motion(const TrajectorySpline& trajectory);
+// At these times of the trajectory: before and after the pictures nothing but noisy telemetry holds it.
+[[nodiscard]] MotionExtent measure_motion(const TrajectorySpline& trajectory,
+                                          const std::vector<double>& times_s);
 
 // Fills status, message, condition, weakest_direction and advice of a result whose calibration is complete.
 void judge(const CalibrationOptions& options, const MotionExtent& motion,

@@ -97,6 +97,20 @@ TEST(Judge, SaysOfAnAxisThatOnlyItsPriorHoldsIt) {
   }
 }
 
+// The file of such a calibration could not be read.
+TEST(Judge, RefusesAnAxisThatComesOutTurnedOver) {
+  CalibrationResult result = good_result();
+  result.calibration.mechanics.tilt_axis = -Vector3<double>::UnitY();
+  judge({}, kMotion, &result);
+  EXPECT_EQ(result.status, CalibrationStatus::kTelemetryMismatch);
+  EXPECT_THAT(result.message, HasSubstr("180 deg from where it should lie: is tilt up positive?"));
+  MotionExtent little = kMotion;
+  little.range[1] = 0.1;
+  judge({}, little, &result);
+  EXPECT_EQ(result.status, CalibrationStatus::kOneAxisOnly);
+  EXPECT_THAT(result.message, HasSubstr("tilt moves the image by 200 px"));
+}
+
 // The mount turns at a steady rate with a sine on top. With amplitude a of the rate, relative to its mean v, the rate's
 // standard deviation is a v / sqrt(2), and its largest value (1 + a) v: their ratio is the variation.
 TrajectorySpline turning(double amplitude) {
@@ -119,7 +133,8 @@ CalibrationStatus status_at(double amplitude, double correlation = 0.99,
   CalibrationInput input;
   input.width = 1920;
   input.height = 1080;
-  const std::vector<ImageMotion> motion(5, {0, 0.5, {50, 30}});
+  std::vector<ImageMotion> motion;
+  for (int i = 0; i <= 190; ++i) motion.push_back({0.05 * i, 0.05 * i + 0.5, {50, 30}});
   MotionMatch match;
   match.correlation = correlation;
   match.focal_length = focal_length;
@@ -147,7 +162,9 @@ TEST(CheckMotion, RefusesAFieldOfViewThatNoLensHas) {
 }
 
 TEST(MeasureMotion, FindsRangeAndRates) {
-  const MotionExtent extent = measure_motion(turning(0));
+  std::vector<double> times;
+  for (int i = 0; i <= 50; ++i) times.push_back(0.2 * i);
+  const MotionExtent extent = measure_motion(turning(0), times);
   EXPECT_NEAR(extent.range[0], 0.5, 1e-9);
   EXPECT_NEAR(extent.largest_rate[1], 0.03, 1e-9);
   EXPECT_NEAR(extent.varying_rate[0], 0, 1e-6);
