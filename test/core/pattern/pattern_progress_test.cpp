@@ -99,6 +99,17 @@ TEST(PatternProgress, WhatLacksIsSaidAndNothingElse) {
   }
 }
 
+TEST(PatternProgress, HowMuchTooFastItMovesIsSaid) {
+  PatternProgress progress = progress_of(test::simulate_pattern(shown_well(1)));
+  // 2^4 times what may be: twice the speed.
+  progress.unfollowed = 15.9 * 0.025;
+  EXPECT_THAT(advice_of(progress), ::testing::ElementsAre(HasSubstr("at 50 % of this speed")));
+  progress.unfollowed = 1.01 * 0.025;
+  EXPECT_THAT(advice_of(progress), ::testing::ElementsAre(HasSubstr("at 90 % of this speed")));
+  progress.found = 0.3;
+  EXPECT_THAT(advice_of(progress), ::testing::ElementsAre(HasSubstr("few images, 30 % of them")));
+}
+
 // As far as before, in four times the time, and held still in between.
 TEST(PatternProgress, MotionThatIsTooSlowIsSaid) {
   test::PatternScene scene = shown_well(1);
