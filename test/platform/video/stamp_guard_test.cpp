@@ -44,6 +44,17 @@ TEST_F(StampGuardTest, LeavesOutWhatIsWrongByItself) {
   play(1);
 }
 
+TEST_F(StampGuardTest, GoesOnAsBeforeBehindAStampThatLookedTrue) {
+  StampGuard guard;
+  for (int i = 0; i < 40; ++i) {
+    const double at_s = 0.04 * i;
+    const bool behind = i == 21 || i == 22;
+    EXPECT_EQ(guard.judge(at_s + 0.1, at_s + (i == 20 ? 0.25 : 0)),
+              behind ? StampGuard::Verdict::kBad : StampGuard::Verdict::kGood)
+        << i;
+  }
+}
+
 TEST_F(StampGuardTest, BelievesNoneOfARandomClock) {
   std::mt19937 random(1);
   std::uniform_real_distribution<double> any(-20'000, 20'000);
