@@ -36,16 +36,16 @@ class LivePatternInBrief(Bench):
     def test_a_wrong_pattern_or_size_is_said(self):
         camera = self.camera(settings={**SETTINGS, "duration_s": 12, "live": {"mjpeg_port": 0}})
         mjpeg = {"type": "mjpeg", "url": camera.others["mjpeg"]}
-        wrong = self.calibrate("wrong", mjpeg, "--duration", "4", pattern="chessboard:7x5:30mm")
+        wrong = self.calibrate("wrong", mjpeg, pattern="chessboard:7x5:30mm")
         size = self.calibrate("size", {"type": "rtsp", "url": camera.video_url, "width": 640, "height": 480})
         code, _ = size.end()
         self.assertEqual(code, 1, size.error_text())
         self.assertIn("images are of 376x240 px, but the configuration's video is 640x480 px", size.errors[-1])
 
-        code, lines = wrong.end()
+        for text in ("in 0 of ", "the pattern is not found; is it this pattern"):
+            wait_until(lambda: self.said(wrong, text), f"'{text}', while it is filmed")
+        code, lines = wrong.end(signal.SIGINT)
         self.assertEqual((code, lines), (1, []), wrong.error_text())
-        self.assertTrue(self.said(wrong, "in 0 of "), wrong.error_text())
-        self.assertTrue(self.said(wrong, "the pattern is not found; is it this pattern"), wrong.error_text())
         self.assertTrue(wrong.errors[-1].startswith(f"alidade: {mjpeg['url']}: the pattern was found in no frame"),
                         wrong.error_text())
         self.assertIn("7x5 are inner corners", wrong.errors[-1])
@@ -55,11 +55,11 @@ class LivePatternInBrief(Bench):
     def test_a_wrong_gap_of_an_april_grid_is_said(self):
         board = {"kind": "april_grid", "columns": 4, "rows": 3, "size_mm": 50, "lens": SETTINGS["pattern"]["lens"]}
         camera = self.camera(settings={**SETTINGS, "duration_s": 12, "pattern": board, "live": {"mjpeg_port": 0}})
-        process = self.calibrate("gap", {"type": "mjpeg", "url": camera.others["mjpeg"]}, "--duration", "5",
+        process = self.calibrate("gap", {"type": "mjpeg", "url": camera.others["mjpeg"]},
                                  pattern="aprilgrid:4x3:50mm:0.25")
         gap = "the gap between its tags is 0.30 of a tag's side, not 0.25 as it was named"
         wait_until(lambda: self.said(process, f"images: {gap}"), "the gap, while it is filmed")
-        code, lines = process.end()
+        code, lines = process.end(signal.SIGINT)
         self.assertEqual((code, lines), (1, []), process.error_text())
         self.assertIn(gap, process.errors[-1])
 
