@@ -16,9 +16,13 @@ namespace alidade::test {
 
 class Client {
  public:
-  explicit Client(const HttpServer& server) : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
+  // from: another address of this machine's own network, as 127.0.0.2.
+  explicit Client(const HttpServer& server, const std::string& from = "127.0.0.1")
+      : socket_(::socket(AF_INET, SOCK_STREAM, 0)) {
     sockaddr_in address{};
     address.sin_family = AF_INET;
+    EXPECT_EQ(::inet_pton(AF_INET, from.c_str(), &address.sin_addr), 1);
+    EXPECT_EQ(::bind(socket_, reinterpret_cast<sockaddr*>(&address), sizeof address), 0) << from;
     address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
     const std::string text = server.address();
     address.sin_port =

@@ -322,7 +322,7 @@ TEST_F(HttpServerTest, AHandlerWithoutAnAnswerIsAskedAgainUntilItHasOne) {
 TEST_F(HttpServerTest, ThoseWhoWaitTakeNoThread) {
   late_s_ = 1e4;
   constexpr int kEach = 100;
-  options_.limits.max_connections = 1000;
+  options_.limits.max_strangers = 1000;
   options_.limits.max_streams = kEach;
   start();
   std::vector<std::unique_ptr<Client>> clients;
@@ -361,16 +361,16 @@ TEST_F(HttpServerTest, AnEndlessAnswerGoesOnWhenItIsWoken) {
   EXPECT_EQ(clients[0]->receive(), "");
 }
 
-TEST_F(HttpServerTest, RefusesConnectionsBeyondTheLimitAndServesAgainAfterThem) {
-  options_.limits.max_connections = 2;
+TEST_F(HttpServerTest, BeyondTheLimitTheOldestConnectionGivesWay) {
+  options_.limits.max_strangers = 2;
   options_.limits.head_timeout_s = 60;
   start();
   {
     Client first(*server_);
     Client second(*server_);
     wait_until([this] { return server_->counters().connections == 2; });
-    Client third(*server_);
-    EXPECT_THAT(third.receive(), StartsWith("HTTP/1.1 503 "));
+    EXPECT_THAT(get("/open"), StartsWith("HTTP/1.1 200 "));
+    EXPECT_THAT(first.receive(), StartsWith("HTTP/1.1 503 "));
     EXPECT_EQ(server_->counters().refused, 1);
   }
   wait_until([this] { return server_->counters().connections == 0; });

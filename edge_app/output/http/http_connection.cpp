@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/post.hpp>
 #include <boost/asio/read.hpp>
 #include <boost/asio/read_until.hpp>
 #include <boost/beast/http/status.hpp>
@@ -23,10 +22,15 @@ namespace asio = boost::asio;
 constexpr double kAskAgainS = 0.01;  // a handler that has no answer yet
 constexpr double kSayAgainS = 0.5;   // an endless answer that has nothing to say
 constexpr double kCancelAgainS = 0.05;
+constexpr int kCancelTimes = 5;
 constexpr double kWholeAnswerS = 60;  // the longest that one finite answer may take
 constexpr double kLingerS = 1;        // for what a client is still sending after its answer
 constexpr std::size_t kLingerBytes = std::size_t{256} << 10;
 constexpr std::size_t kLingerPiece = 4096;
+// As it stands, for when memory is short.
+constexpr std::string_view kTooMany =
+    "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nRetry-After: 1\r\n"
+    "Content-Length: 33\r\nConnection: close\r\n\r\n{\"error\":\"too many connections\"}\n";
 constexpr char kContinue[] = "HTTP/1.1 100 Continue\r\n\r\n";
 
 bool has_header(const ServerResponse& response, const char* name) {
@@ -64,22 +68,42 @@ std::optional<ServerResponse> call(const HttpHandler& handler, const ServerReque
 
 }  // namespace
 
-HttpConnection::HttpConnection(asio::ip::tcp::socket socket, const HttpService& service)
-    : socket_(std::move(socket)), timer_(socket_.get_executor()), service_(service) {
+HttpConnection::HttpConnection(asio::ip::tcp::socket socket, const HttpAddress& address,
+                               const HttpService& service)
+    : socket_(std::move(socket)),
+      timer_(socket_.get_executor()),
+      service_(service),
+      client_{address, false} {
   ++service_.tally.connections;
 }
 
 HttpConnection::~HttpConnection() {
-  if (service_.streams.erase(this) > 0) --service_.tally.streams;
+  leave_place();
   --service_.tally.connections;
 }
 
+template <typename Stage>
+void HttpConnection::guarded(Stage stage) {
+  if (ended_) return;
+  try {
+    stage();
+  } catch (...) {
+    drop();
+    throw;
+  }
+}
+
 void HttpConnection::begin() {
+  guarded([this] { read_head(); });
+}
+
+void HttpConnection::read_head() {
+  take_place(&service_.places.strangers);
   within(service_.limits.head_timeout_s, &HttpConnection::stop_reading);
   asio::async_read_until(socket_, asio::dynamic_buffer(received_, service_.limits.max_head_bytes),
                          "\r\n\r\n",
                          [self = shared_from_this()](const Error& error, std::size_t size) {
-                           self->take_head(error, size);
+                           self->guarded([&] { self->take_head(error, size); });
                          });
 }
 
@@ -99,7 +123,8 @@ void HttpConnection::take_head(const Error& error, std::size_t size) {
   ServerResponse refusal;
   if (!parse_http_head(std::string_view(received_).substr(0, size), &head_, &refusal))
     return answer(std::move(refusal));
-  route_ = service_.gate.admit(head_, monotonic_now_s(), &refusal);
+  route_ = service_.gate.admit(head_, monotonic_now_s(), &client_, &refusal);
+  if (client_.has_token) take_place(&service_.places.with_token);
   if (route_ == nullptr) return answer(std::move(refusal));
   std::size_t length = 0;
   if (head_.method == "POST" && !body_length(head_, route_->max_body, &length, &refusal))
@@ -118,9 +143,11 @@ void HttpConnection::take_head(const Error& error, std::size_t size) {
 void HttpConnection::read_body() {
   if (body_came_ == request_.body.size()) return take_body(Error());
   within(service_.limits.body_timeout_s, &HttpConnection::stop_reading);
-  asio::async_read(
-      socket_, asio::buffer(&request_.body[body_came_], request_.body.size() - body_came_),
-      [self = shared_from_this()](const Error& error, std::size_t) { self->take_body(error); });
+  asio::async_read(socket_,
+                   asio::buffer(&request_.body[body_came_], request_.body.size() - body_came_),
+                   [self = shared_from_this()](const Error& error, std::size_t) {
+                     self->guarded([&] { self->take_body(error); });
+                   });
 }
 
 void HttpConnection::take_body(const Error& error) {
@@ -135,25 +162,29 @@ void HttpConnection::take_body(const Error& error) {
 
 void HttpConnection::ask_handler() {
   without_deadline();
-  asio::post(service_.handlers, [self = shared_from_this()]() mutable {
-    HttpConnection& asking = *self;
-    auto response = call(asking.route_->handler, asking.request_);
-    asio::post(asking.socket_.get_executor(),
-               [self = std::move(self), response = std::move(response)]() mutable {
-                 self->take_answer(std::move(response));
-               });
-  });
+  service_.handlers.ask(shared_from_this());
 }
 
-void HttpConnection::take_answer(std::optional<ServerResponse> response) {
-  if (response) return answer(std::move(*response));
-  request_.waited_s = monotonic_now_s() - complete_s_;
-  within(kAskAgainS, &HttpConnection::ask_handler);
+void HttpConnection::work() noexcept {
+  try {
+    response_ = call(route_->handler, request_);
+  } catch (...) {
+    failed_ = true;
+  }
+}
+
+void HttpConnection::take_answer() {
+  guarded([this] {
+    if (failed_) return drop();
+    if (response_) return answer(std::move(*response_));
+    request_.waited_s = monotonic_now_s() - complete_s_;
+    within(kAskAgainS, &HttpConnection::ask_handler);
+  });
 }
 
 void HttpConnection::answer(ServerResponse response) {
   const bool head_only = head_.method == "HEAD";
-  if (response.stream && service_.tally.streams >= service_.limits.max_streams) {
+  if (response.stream && !head_only && !take_stream_place()) {
     ++service_.tally.refused;
     response = http_error(503, "too many streams");
   }
@@ -161,13 +192,23 @@ void HttpConnection::answer(ServerResponse response) {
   answer_deadline_s_ = monotonic_now_s() + kWholeAnswerS;
   if (response.stream && !head_only) {
     stream_ = std::move(response.stream);
-    service_.streams.insert(this);
-    ++service_.tally.streams;
     answer_deadline_s_ = std::numeric_limits<double>::infinity();
     return send(std::move(text), &HttpConnection::say_more);
   }
   if (!head_only) text += response.body;
   send(std::move(text), &HttpConnection::linger);
+}
+
+bool HttpConnection::take_stream_place() {
+  FairPlaces<HttpConnection>& streams = service_.places.streams;
+  if (streams.full()) {
+    HttpConnection* const leaving = streams.one_too_many(client_.address);
+    if (leaving == nullptr) return false;
+    leaving->give_way();
+  }
+  take_place(&streams);
+  ++service_.tally.streams;
+  return true;
 }
 
 void HttpConnection::say_more() {
@@ -185,7 +226,18 @@ void HttpConnection::say_more() {
 }
 
 void HttpConnection::wake() {
-  if (silent_) say_more();
+  if (silent_) guarded([this] { say_more(); });
+}
+
+void HttpConnection::give_way() {
+  ++service_.tally.refused;
+  if (!spoke_) {
+    // Without waiting; a client that does not take it goes without.
+    Error ignored;
+    socket_.non_blocking(true, ignored);
+    socket_.write_some(asio::buffer(kTooMany), ignored);
+  }
+  drop();
 }
 
 // Lets a client that is still sending read its answer: closing at once would reset the connection.
@@ -203,7 +255,7 @@ void HttpConnection::discard() {
                           [self = shared_from_this()](const Error& error, std::size_t count) {
                             self->discarded_ += count;
                             if (error || self->discarded_ >= kLingerBytes) return self->drop();
-                            self->discard();
+                            self->guarded([&] { self->discard(); });
                           });
 }
 
@@ -211,6 +263,7 @@ void HttpConnection::send(std::string text, Step then) {
   sending_ = std::move(text);
   sent_ = 0;
   after_sending_ = then;
+  spoke_ = true;
   send_rest();
 }
 
@@ -220,11 +273,29 @@ void HttpConnection::send_rest() {
   socket_.async_write_some(asio::buffer(sending_) + sent_,
                            [self = shared_from_this()](const Error& error, std::size_t count) {
                              if (error) return self->drop();
-                             self->sent_ += count;
-                             if (self->sent_ < self->sending_.size()) return self->send_rest();
-                             self->without_deadline();
-                             ((*self).*(self->after_sending_))();
+                             self->guarded([&] { self->take_sent(count); });
                            });
+}
+
+void HttpConnection::take_sent(std::size_t count) {
+  sent_ += count;
+  if (sent_ < sending_.size()) return send_rest();
+  without_deadline();
+  (this->*after_sending_)();
+}
+
+void HttpConnection::take_place(FairPlaces<HttpConnection>* places) {
+  if (places->full()) places->oldest_of_the_greediest()->give_way();
+  leave_place();
+  places->take(this, client_.address);
+  place_ = places;
+}
+
+void HttpConnection::leave_place() {
+  if (place_ == nullptr) return;
+  place_->leave(this);
+  if (place_ == &service_.places.streams) --service_.tally.streams;
+  place_ = nullptr;
 }
 
 void HttpConnection::within(double time_s, Step late) {
@@ -234,7 +305,7 @@ void HttpConnection::within(double time_s, Step late) {
   timer_.async_wait([self = shared_from_this(), late](const Error& error) {
     // One that was set anew has not expired, even if this call was already on its way.
     if (error || self->timer_.expiry() > Clock::now()) return;
-    ((*self).*late)();
+    self->guarded([&] { ((*self).*late)(); });
   });
 }
 
@@ -242,8 +313,9 @@ void HttpConnection::without_deadline() {
   timer_.expires_at(asio::steady_timer::time_point::max());
 }
 
-// Again and again until the read says so: one that pauses between two pieces is not met.
+// Again and again until the read says so: one that pauses between two pieces is not met. One that failed never says so.
 void HttpConnection::stop_reading() {
+  if (++cancelled_ > kCancelTimes) return drop();
   late_ = true;
   Error ignored;
   socket_.cancel(ignored);
@@ -257,6 +329,10 @@ void HttpConnection::drop_stalled() {
 
 // Ends whatever is under way, and with it the last that keeps this alive.
 void HttpConnection::drop() {
+  const auto keep = shared_from_this();
+  ended_ = true;
+  leave_place();
+  service_.handlers.forget(this);
   without_deadline();
   Error ignored;
   socket_.close(ignored);

@@ -5,18 +5,19 @@
 //   head --> gate --> body --> handler --> answer --> linger --> closed
 //
 // A refusal is an answer, too. An endless answer is asked for more whenever all was taken, until the client is gone.
-// Network thread but for the handler, which runs on a handlers' thread while the connection does nothing else.
+// Network thread but for the handler, which runs on a handlers' thread while the connection does nothing else. What is
+// thrown in a stage, where memory has run out, ends this connection and is passed on.
 
-#include <boost/asio/io_context.hpp>
 #include <boost/asio/ip/tcp.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <cstddef>
 #include <memory>
 #include <optional>
-#include <set>
 #include <string>
 
+#include "edge_app/output/http/http_fairness.h"
 #include "edge_app/output/http/http_gate.h"
+#include "edge_app/output/http/http_handlers.h"
 #include "edge_app/output/http/http_head.h"
 #include "edge_app/output/http/http_message.h"
 #include "edge_app/output/http/http_options.h"
@@ -25,18 +26,31 @@ namespace alidade {
 
 class HttpConnection;
 
+// The places that connections hold: each one, until it ends.
+struct HttpPlaces {
+  explicit HttpPlaces(const HttpLimits& limits)
+      : strangers(limits.max_strangers),
+        with_token(limits.max_with_token),
+        streams(limits.max_streams) {}
+
+  FairPlaces<HttpConnection> strangers;
+  FairPlaces<HttpConnection> with_token;
+  FairPlaces<HttpConnection> streams;  // those whose answer is endless
+};
+
 // What the connections of a server share.
 struct HttpService {
   const HttpLimits& limits;
   HttpGate& gate;
   HttpTally& tally;
-  boost::asio::io_context& handlers;
-  std::set<HttpConnection*>& streams;  // those whose answer is endless
+  HttpHandlers& handlers;
+  HttpPlaces& places;
 };
 
 class HttpConnection final : public std::enable_shared_from_this<HttpConnection> {
  public:
-  HttpConnection(boost::asio::ip::tcp::socket socket, const HttpService& service);
+  HttpConnection(boost::asio::ip::tcp::socket socket, const HttpAddress& address,
+                 const HttpService& service);
   ~HttpConnection();
   HttpConnection(const HttpConnection&) = delete;
   HttpConnection& operator=(const HttpConnection&) = delete;
@@ -45,17 +59,26 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
   void begin();
   // An endless answer may have more to say.
   void wake();
+  // Somebody else takes its place: says so, if nothing was said yet, and ends.
+  void give_way();
+
+  [[nodiscard]] const HttpClient& client() const { return client_; }
+  // Asks the handler; on any thread.
+  void work() noexcept;
+  // Behind it.
+  void take_answer();
 
  private:
   using Error = boost::system::error_code;
   using Step = void (HttpConnection::*)();
 
+  void read_head();
   void take_head(const Error& error, std::size_t size);
   void read_body();
   void take_body(const Error& error);
   void ask_handler();
-  void take_answer(std::optional<ServerResponse> response);
   void answer(ServerResponse response);
+  [[nodiscard]] bool take_stream_place();
   void say_more();
   void linger();
   void discard();
@@ -63,6 +86,14 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
   // Sends, then goes on with the step.
   void send(std::string text, Step then);
   void send_rest();
+  void take_sent(std::size_t count);
+
+  // Of the oldest of whoever has most, where all are taken.
+  void take_place(FairPlaces<HttpConnection>* places);
+  void leave_place();
+
+  template <typename Stage>
+  void guarded(Stage stage);
 
   // Calls the step unless the next deadline is set before; one at a time.
   void within(double time_s, Step late);
@@ -74,14 +105,21 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
   boost::asio::ip::tcp::socket socket_;
   boost::asio::steady_timer timer_;
   const HttpService service_;
+  HttpClient client_;
+  FairPlaces<HttpConnection>* place_ = nullptr;
+  bool spoke_ = false;  // something was sent
+  bool ended_ = false;
 
   std::string received_;  // the head, and what came with it
   bool late_ = false;     // a read was ended by its deadline
+  int cancelled_ = 0;     // how often that was tried
   HttpHead head_;
   const HttpRoute* route_ = nullptr;
   ServerRequest request_;
   std::size_t body_came_ = 0;
   double complete_s_ = 0;  // when the request was
+  std::optional<ServerResponse> response_;
+  bool failed_ = false;  // there can be no response
 
   std::string sending_;
   std::size_t sent_ = 0;

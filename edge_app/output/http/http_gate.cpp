@@ -1,6 +1,5 @@
 #include "edge_app/output/http/http_gate.h"
 
-#include <algorithm>
 #include <boost/asio/ip/address.hpp>
 #include <string_view>
 #include <utility>
@@ -45,39 +44,35 @@ HttpCounters HttpTally::now() const {
   return out;
 }
 
-RateLimit::RateLimit(double per_s) : per_s_(per_s), most_(std::max(1.0, per_s)), left_(most_) {}
-
-bool RateLimit::take(double now_s) {
-  left_ = std::min(most_, left_ + per_s_ * std::max(0.0, now_s - last_s_));
-  last_s_ = now_s;
-  if (left_ < 1) return false;
-  left_ -= 1;
-  return true;
-}
-
 HttpGate::HttpGate(const HttpServerOptions& options, HttpTally* tally)
     : token_(options.token),
       own_host_(options.host),
-      rate_(options.limits.requests_per_s),
+      rate_of_strangers_(options.limits.requests_per_s),
+      rate_with_token_(options.limits.requests_per_s),
       tally_(*tally) {}
 
 void HttpGate::add(const std::string& method, const std::string& path, HttpRoute route) {
   routes_[path][method] = std::move(route);
 }
 
-const HttpRoute* HttpGate::admit(const HttpHead& head, double now_s, ServerResponse* refusal) {
+const HttpRoute* HttpGate::admit(const HttpHead& head, double now_s, HttpClient* client,
+                                 ServerResponse* refusal) {
+  client->has_token = shows_token(head);
   const HttpRoute* route = nullptr;
-  auto error = check(head, now_s, &route);
+  auto error = check(head, now_s, *client, &route);
   if (!error) return route;
   *refusal = std::move(*error);
   return nullptr;
 }
 
 std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s,
-                                              const HttpRoute** route) {
-  if (!rate_.take(now_s)) {
+                                              const HttpClient& client, const HttpRoute** route) {
+  FairRate& rate = client.has_token ? rate_with_token_ : rate_of_strangers_;
+  if (!rate.take(client.address, now_s)) {
     ++tally_.refused;
-    return http_error(429, "too many requests; ask less often");
+    ServerResponse error = http_error(429, "too many requests; ask less often");
+    error.headers.emplace_back("Retry-After", "1");
+    return error;
   }
   if (!host_is_trusted(head))
     return http_error(403, "the Host header names another machine; use an address, or set a token");
@@ -95,7 +90,7 @@ std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s
     return error;
   }
   *route = &found->second;
-  if (found->second.access == HttpAccess::kToken && !has_token(head)) {
+  if (found->second.access == HttpAccess::kToken && !token_.empty() && !client.has_token) {
     ++tally_.unauthorized;
     ServerResponse error = http_error(401, "this needs the header `Authorization: Bearer TOKEN`");
     error.headers.emplace_back("WWW-Authenticate", "Bearer");
@@ -104,8 +99,8 @@ std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s
   return std::nullopt;
 }
 
-bool HttpGate::has_token(const HttpHead& head) const {
-  if (token_.empty()) return true;
+bool HttpGate::shows_token(const HttpHead& head) const {
+  if (token_.empty()) return false;
   constexpr std::string_view kScheme = "Bearer ";
   const std::string_view given = head.authorization;
   return given.substr(0, kScheme.size()) == kScheme &&

@@ -8,6 +8,7 @@
 #include <optional>
 #include <string>
 
+#include "edge_app/output/http/http_fairness.h"
 #include "edge_app/output/http/http_head.h"
 #include "edge_app/output/http/http_message.h"
 #include "edge_app/output/http/http_options.h"
@@ -46,17 +47,10 @@ struct HttpTally {
   [[nodiscard]] HttpCounters now() const;
 };
 
-// As many requests as have been earned since the last, at most a second's worth.
-class RateLimit {
- public:
-  explicit RateLimit(double per_s);
-  [[nodiscard]] bool take(double now_s);
-
- private:
-  const double per_s_;
-  const double most_;
-  double left_;
-  double last_s_ = 0;
+// Who asks: by address, and whether the token was shown. Where none is set nobody shows it.
+struct HttpClient {
+  HttpAddress address;
+  bool has_token = false;
 };
 
 class HttpGate {
@@ -66,19 +60,22 @@ class HttpGate {
   // Before the first admit().
   void add(const std::string& method, const std::string& path, HttpRoute route);
 
-  // One thread. The route that answers; null: *refusal is the answer.
-  [[nodiscard]] const HttpRoute* admit(const HttpHead& head, double now_s, ServerResponse* refusal);
+  // One thread. The route that answers; null: *refusal is the answer. Says whether the client has the token.
+  [[nodiscard]] const HttpRoute* admit(const HttpHead& head, double now_s, HttpClient* client,
+                                       ServerResponse* refusal);
 
  private:
   [[nodiscard]] std::optional<ServerResponse> check(const HttpHead& head, double now_s,
+                                                    const HttpClient& client,
                                                     const HttpRoute** route);
-  [[nodiscard]] bool has_token(const HttpHead& head) const;
+  [[nodiscard]] bool shows_token(const HttpHead& head) const;
   [[nodiscard]] bool origin_is_own(const HttpHead& head) const;
   [[nodiscard]] bool host_is_trusted(const HttpHead& head) const;
 
   const std::string token_;
   const std::string own_host_;
-  RateLimit rate_;
+  FairRate rate_of_strangers_;
+  FairRate rate_with_token_;
   HttpTally& tally_;
   std::map<std::string, std::map<std::string, HttpRoute>> routes_;  // by path and method
 };

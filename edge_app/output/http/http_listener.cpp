@@ -7,15 +7,17 @@
 #include <unistd.h>
 
 #include <boost/asio/buffer.hpp>
-#include <boost/asio/executor_work_guard.hpp>
 #include <boost/asio/posix/stream_descriptor.hpp>
 #include <boost/asio/steady_timer.hpp>
 #include <cerrno>
 #include <chrono>
 #include <sstream>
 #include <system_error>
+#include <thread>
 #include <utility>
 #include <vector>
+
+#include "platform/system/clock.h"
 
 namespace alidade {
 namespace {
@@ -24,11 +26,12 @@ namespace asio = boost::asio;
 using Error = boost::system::error_code;
 using Tcp = asio::ip::tcp;
 
-constexpr int kBacklog = 128;
+constexpr int kBacklog = 1024;
 // What the kernel keeps for a client that does not read, doubled by it: some seconds of records.
 constexpr int kSendBufferBytes = 64 << 10;
 // Where descriptors have run out the client stays in the queue: do not spin until something is closed.
 constexpr std::chrono::milliseconds kAcceptAgain{20};
+constexpr double kSilenceS = 10;  // after a failure that was said
 
 int make_event() {
   const int descriptor = ::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK);
@@ -38,27 +41,28 @@ int make_event() {
 
 void close_on_exec(int descriptor) { static_cast<void>(::fcntl(descriptor, F_SETFD, FD_CLOEXEC)); }
 
-// Without waiting; a client that does not take it goes without.
-void refuse(Tcp::socket* socket) {
-  const std::string body = http_error(503, "too many connections").body;
-  const std::string answer = fmt::format(
-      "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\n"
-      "Content-Length: {}\r\nConnection: close\r\n\r\n{}",
-      body.size(), body);
-  Error ignored;
-  socket->non_blocking(true, ignored);
-  socket->write_some(asio::buffer(answer), ignored);
-}
+// Counts a wait as long as there is one, whether it ends or is lost: the library drops what it has no memory for.
+class Waiting {
+ public:
+  explicit Waiting(int* count) : count_(count) { ++*count_; }
+  Waiting(Waiting&& other) noexcept : count_(std::exchange(other.count_, nullptr)) {}
+  Waiting(const Waiting&) = delete;
+  Waiting& operator=(const Waiting&) = delete;
+  Waiting& operator=(Waiting&&) = delete;
+  ~Waiting() {
+    if (count_ != nullptr) --*count_;
+  }
 
-// What is thrown where memory has run out ends one connection and nothing else.
-void serve(asio::io_context* context) {
-  while (true) {
-    try {
-      context->run();
-      return;
-    } catch (const std::exception& e) {
-      spdlog::error("HTTP: connection dropped: {}", e.what());
-    }
+ private:
+  int* count_;
+};
+
+// Even this may fail then.
+void say_failure(const char* what) noexcept {
+  try {
+    spdlog::error("HTTP: connection dropped: {}", what);
+  } catch (...) {
+    return;
   }
 }
 
@@ -67,8 +71,6 @@ void serve(asio::io_context* context) {
 // In the order in which one needs the other.
 struct HttpListener::Network {
   asio::io_context context{1};
-  asio::io_context handlers;
-  asio::executor_work_guard<asio::io_context::executor_type> work{handlers.get_executor()};
   Tcp::acceptor acceptor{context};
   asio::steady_timer accept_again{context};
   asio::posix::stream_descriptor wake{context};
@@ -79,6 +81,8 @@ HttpListener::HttpListener(const HttpServerOptions& options, HttpGate* gate, Htt
       gate_(*gate),
       tally_(*tally),
       wake_(make_event()),
+      places_(options.limits),
+      handlers_(wake_),
       network_(std::make_unique<Network>()) {}
 
 HttpListener::~HttpListener() {
@@ -124,19 +128,43 @@ bool HttpListener::open(std::string* address, std::string* error) {
   return true;
 }
 
-void HttpListener::serve_network() { serve(&network_->context); }
-void HttpListener::serve_handlers() { serve(&network_->handlers); }
-
-HttpService HttpListener::service() {
-  return {options_.limits, gate_, tally_, network_->handlers, streams_};
+// What is thrown where memory has run out ends one connection and nothing else.
+void HttpListener::serve_network() {
+  double silent_until_s = 0;
+  while (!network_->context.stopped()) {
+    try {
+      serve_some();
+    } catch (const std::exception& e) {
+      if (monotonic_now_s() < silent_until_s) continue;
+      silent_until_s = monotonic_now_s() + kSilenceS;
+      say_failure(e.what());
+    }
+  }
 }
 
+void HttpListener::serve_some() {
+  try {
+    if (watching_ == 0) {
+      wait_for_wake();
+      static_cast<void>(::eventfd_write(wake_, 1));  // what was to be done when it was lost
+    }
+    if (accepting_ == 0) accept();
+  } catch (...) {
+    std::this_thread::sleep_for(kAcceptAgain);
+    throw;
+  }
+  network_->context.run();
+}
+
+void HttpListener::serve_handlers() { handlers_.serve(); }
+
 void HttpListener::accept() {
-  network_->acceptor.async_accept([this](const Error& error, Tcp::socket socket) {
+  network_->acceptor.async_accept([this, waiting = Waiting(&accepting_)](const Error& error,
+                                                                         Tcp::socket socket) {
     if (error == asio::error::operation_aborted) return;
     if (error) {
       network_->accept_again.expires_after(kAcceptAgain);
-      network_->accept_again.async_wait([this](const Error& ended) {
+      network_->accept_again.async_wait([this, again = Waiting(&accepting_)](const Error& ended) {
         if (!ended) accept();
       });
       return;
@@ -148,39 +176,49 @@ void HttpListener::accept() {
 
 void HttpListener::take(Tcp::socket socket) {
   close_on_exec(socket.native_handle());
-  Error ignored;
-  socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), ignored);
-  socket.set_option(Tcp::no_delay(true), ignored);
-  if (tally_.connections >= options_.limits.max_connections) {
-    ++tally_.refused;
-    refuse(&socket);
-    return;
-  }
-  std::make_shared<HttpConnection>(std::move(socket), service())->begin();
+  Error error;
+  const Tcp::endpoint peer = socket.remote_endpoint(error);
+  if (error) return;  // gone again
+  socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), error);
+  socket.set_option(Tcp::no_delay(true), error);
+  const HttpService service{options_.limits, gate_, tally_, handlers_, places_};
+  std::make_shared<HttpConnection>(std::move(socket), http_address(peer.address()), service)
+      ->begin();
 }
 
 void HttpListener::wait_for_wake() {
-  network_->wake.async_wait(asio::posix::stream_descriptor::wait_read, [this](const Error& error) {
-    if (error) return;
-    eventfd_t count = 0;
-    static_cast<void>(::eventfd_read(wake_, &count));
-    wait_for_wake();
-    // One may end while it is woken.
-    std::vector<std::shared_ptr<HttpConnection>> woken;
-    for (HttpConnection* stream : streams_) woken.push_back(stream->shared_from_this());
-    for (const auto& stream : woken) stream->wake();
-  });
+  network_->wake.async_wait(asio::posix::stream_descriptor::wait_read,
+                            [this, waiting = Waiting(&watching_)](const Error& error) {
+                              if (error) return;
+                              eventfd_t count = 0;
+                              static_cast<void>(::eventfd_read(wake_, &count));
+                              wait_for_wake();
+                              handlers_.collect();
+                              if (!news_.exchange(false)) return;
+                              // One may end while it is woken.
+                              std::vector<std::shared_ptr<HttpConnection>> woken;
+                              places_.streams.for_each([&](HttpConnection* stream) {
+                                woken.push_back(stream->shared_from_this());
+                              });
+                              for (const auto& stream : woken) stream->wake();
+                            });
 }
 
-void HttpListener::wake() { static_cast<void>(::eventfd_write(wake_, 1)); }
+void HttpListener::wake() {
+  news_ = true;
+  static_cast<void>(::eventfd_write(wake_, 1));
+}
 
 void HttpListener::stop() {
   if (network_ == nullptr) return;
   network_->context.stop();
-  network_->handlers.stop();
+  handlers_.stop();
 }
 
-// The contexts drop what waits in them, and so the connections.
-void HttpListener::close() { network_.reset(); }
+// The context drops what waits in it, and so the connections.
+void HttpListener::close() {
+  handlers_.clear();
+  network_.reset();
+}
 
 }  // namespace alidade

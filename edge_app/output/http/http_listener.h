@@ -1,15 +1,17 @@
 #pragma once
-// HttpListener: accepts clients up to a limit and lets their connections run; wakes endless answers.
+// HttpListener: accepts clients and lets their connections run; wakes endless answers. Where memory or descriptors have run
+// out, clients are lost; it accepts again as soon as there are some.
 //
 // One thread runs serve_network(): all sockets, all deadlines. A few run serve_handlers().
 
+#include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <memory>
-#include <set>
 #include <string>
 
 #include "edge_app/output/http/http_connection.h"
 #include "edge_app/output/http/http_gate.h"
+#include "edge_app/output/http/http_handlers.h"
 #include "edge_app/output/http/http_options.h"
 
 namespace alidade {
@@ -40,7 +42,7 @@ class HttpListener {
  private:
   struct Network;
 
-  [[nodiscard]] HttpService service();
+  void serve_some();
   void accept();
   void take(boost::asio::ip::tcp::socket socket);
   void wait_for_wake();
@@ -48,8 +50,12 @@ class HttpListener {
   const HttpServerOptions& options_;
   HttpGate& gate_;
   HttpTally& tally_;
-  std::set<HttpConnection*> streams_;
   const int wake_;  // eventfd; outlives the network, as others may write to it at any time
+  std::atomic<bool> news_{false};
+  HttpPlaces places_;
+  HttpHandlers handlers_;
+  int accepting_ = 0;  // that wait for it; none: the last was lost
+  int watching_ = 0;   // likewise for wake_
   std::unique_ptr<Network> network_;
 };
 

@@ -14,9 +14,10 @@ std::optional<std::string> ServerRequest::parameter(const std::string& name) con
 ServerResponse http_error(int status, const std::string& line) {
   ServerResponse response;
   response.status = status;
-  response.body = nlohmann::json{{"error", line}}.dump(-1, ' ', true,
-                                                       nlohmann::json::error_handler_t::replace) +
-                  "\n";
+  // Of a JSON object the library's destructor allocates, and ends the program where it cannot.
+  using Json = nlohmann::json;
+  const std::string text = Json(line).dump(-1, ' ', true, Json::error_handler_t::replace);
+  response.body = "{\"error\":" + text + "}\n";
   return response;
 }
 

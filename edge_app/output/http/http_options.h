@@ -7,13 +7,17 @@
 namespace alidade {
 
 struct HttpLimits {
-  int max_connections = 64;  // at once; beyond: 503
-  int max_streams = 32;      // of these, how many may be endless answers; beyond: 503
+  // At once. The next takes the place of the oldest of the address that has most.
+  int max_strangers = 128;  // that have not shown the token, or where none is set
+  int max_with_token = 64;
+  int max_streams =
+      32;  // endless answers; beyond: 503, but the address that has most gives one to one with less
   std::size_t max_head_bytes = 8192;
   double head_timeout_s = 5;   // from the connection to the head's last byte
   double body_timeout_s = 10;  // from there to the body's last byte
   double write_timeout_s = 10;
-  double requests_per_s = 500;  // of all clients together; as many may come at once
+  double requests_per_s =
+      500;  // of all strangers, and of all with the token; shared by their addresses
 };
 
 struct HttpServerOptions {

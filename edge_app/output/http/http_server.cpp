@@ -2,16 +2,10 @@
 
 #include <utility>
 
+#include "edge_app/output/http/http_handlers.h"
 #include "edge_app/output/http/http_listener.h"
 
 namespace alidade {
-namespace {
-
-// So that one long computation does not hold up all others.
-constexpr int kHandlerThreads = 2;
-
-}  // namespace
-
 HttpServer::HttpServer(const HttpServerOptions& options)
     : options_(options),
       gate_(options_, &tally_),
@@ -31,7 +25,7 @@ void HttpServer::post(const std::string& path, HttpAccess access, std::size_t ma
 bool HttpServer::start(std::string* error) {
   if (!listener_->open(&address_, error)) return false;
   bool started = threads_.start([this] { listener_->serve_network(); });
-  for (int i = 0; i < kHandlerThreads; ++i)
+  for (int i = 0; i < HttpHandlers::kThreads; ++i)
     started = started && threads_.start([this] { listener_->serve_handlers(); });
   if (started) return true;
   stop();

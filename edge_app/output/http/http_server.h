@@ -1,13 +1,14 @@
 #pragma once
 // HttpServer: routes and handlers behind a door that hostile or broken clients cannot hold open.
 //
-//   one request a connection; one thread for all connections, two for the handlers; a connection beyond
-//   max_connections is answered 503 at once.
+//   one request a connection; one thread for all connections, two for the handlers. Who has the token has places, a
+//   rate and handlers' time before all others; within both groups addresses share alike (http_fairness.h).
+//   places  where max_strangers or max_with_token are taken, the oldest of the address that has most is answered 503
 //   head    must be complete within head_timeout_s, in max_head_bytes, else 408, 431
 //   body    of a POST must state its length, up to the route's limit, and come within body_timeout_s, else 411, 413, 400;
 //           any other request's is not read
 //   answer  a client that takes nothing for write_timeout_s is dropped
-//   rate    requests_per_s with as many at once, of all clients together, else 429
+//   rate    an address's share of requests_per_s, with as many at once, else 429
 //   token   if one is set, routes that are not open want `Authorization: Bearer TOKEN`, else 401; compared in
 //           a time that does not tell how much of it was right; never logged
 //   method  another than the path's is answered 405, with those that it has in Allow

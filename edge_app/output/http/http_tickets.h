@@ -1,0 +1,36 @@
+#pragma once
+// HttpTickets: what a page of this server shows to open an endless answer, where there is no token. A page of another site can
+// make a browser ask for a stream, but cannot read a ticket. Each is 128 random bits, for one use within some seconds.
+// Any thread.
+
+#include <cstddef>
+#include <deque>
+#include <mutex>
+#include <optional>
+#include <string>
+
+namespace alidade {
+
+class HttpTickets {
+ public:
+  static constexpr double kValidS = 10;
+  static constexpr std::size_t kMost = 1024;  // then the oldest goes
+
+  // Nothing: the system has no random bits.
+  [[nodiscard]] std::optional<std::string> issue(double now_s);
+  // Whether it was issued, is still valid and was not used before.
+  [[nodiscard]] bool take(const std::string& ticket, double now_s);
+
+ private:
+  struct Ticket {
+    std::string text;
+    double issued_s;
+  };
+
+  void forget_the_old(double now_s);
+
+  std::mutex mutex_;
+  std::deque<Ticket> tickets_;  // the oldest first
+};
+
+}  // namespace alidade
