@@ -387,23 +387,18 @@ void Pipeline::log_old_telemetry(const OrientationRecord& record) {
 
 void Pipeline::log_clock(const OutputMessage& message) {
   const StepEvents& events = message.events;
-  if (events.stamps_left_out && events.stamps_count) {
+  if (events.stamps_left_out) {
+    const bool counts = events.stamps_count;
     spdlog::warn(
-        "{}: its time stamps count pictures and tell no time: they run at {:.2f} % of the rate at "
-        "which "
-        "its pictures come, and are left out from frame {} on: a picture's time is known by its "
-        "arrival, to {:.0f} ms, and less well behind one that is missing; set the camera to a rate "
-        "that it keeps, or its stamps to its clock",
-        video_.name(), 100 * (1 + *events.stamps_left_out), *message.record.frame,
-        1e3 * options_.step.video_stamp_sigma_s);
-  } else if (events.stamps_left_out) {
-    spdlog::warn(
-        "{}: its time stamps run at {:.2f} % of the rate at which its pictures come, and are left "
-        "out from frame "
-        "{} on: a picture's time is known by its arrival, to {:.0f} ms; a camera that counts its "
-        "stamps at a rate it does not keep may be set to that rate",
-        video_.name(), 100 * (1 + *events.stamps_left_out), *message.record.frame,
-        1e3 * options_.step.video_stamp_sigma_s);
+        "{}: its time stamps {} at {:.2f} % of the rate at which its pictures come, and are left "
+        "out from frame {} on: a picture's time is known by its arrival, to {:.0f} ms{}; {}",
+        video_.name(), counts ? "count pictures and tell no time: they run" : "run",
+        100 * (1 + *events.stamps_left_out), *message.record.frame,
+        1e3 * options_.step.video_stamp_sigma_s,
+        counts ? ", and less well behind one that is missing" : "",
+        counts ? "set the camera to a rate that it keeps, or its stamps to its clock"
+               : "a camera that counts its stamps at a rate it does not keep may be set to that "
+                 "rate");
   } else if (events.video_clock_restarted) {
     spdlog::info("{}: clock filter restarted at frame {}", video_.name(), *message.record.frame);
   }

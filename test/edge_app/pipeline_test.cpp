@@ -472,36 +472,41 @@ TEST_F(PipelineTest, FinishesWithTheErrorOfASourceThatFailed) {
   EXPECT_EQ(pipeline.error(), "http://camera: wrong user or password (401)");
 }
 
-TEST_F(PipelineTest, FinishesWhenFramesAreNotOfTheCalibrationsSize) {
-  PipelineOptions options = options_for_tests();
-  options.width = 1280;
-  options.height = 720;
+class PipelineOfAnotherSizeTest : public PipelineTest {
+ protected:
+  std::string error_of(const PipelineOptions& options) {
+    Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options);
+    pipeline.start();
+    video_.push(frame());
+    EXPECT_TRUE(finished(pipeline));
+    pipeline.stop();
+    EXPECT_TRUE(sink_.records().empty());
+    return pipeline.error();
+  }
+
+  PipelineOptions options_of_720_rows() {
+    PipelineOptions options = options_for_tests();
+    options.width = 1280;
+    options.height = 720;
+    return options;
+  }
+};
+
+TEST_F(PipelineOfAnotherSizeTest, FinishesWhenFramesAreNotOfTheCalibrationsSize) {
+  PipelineOptions options = options_of_720_rows();
   options.calibration_name = "calibration.yaml";
   options.step.calibrated = true;
-  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options);
-  pipeline.start();
-  video_.push(frame());
-  ASSERT_TRUE(finished(pipeline));
-  pipeline.stop();
-  EXPECT_THAT(pipeline.error(),
+  EXPECT_THAT(error_of(options),
               AllOf(HasSubstr("1920x1080"), HasSubstr("1280x720"), HasSubstr("calibration.yaml")));
-  EXPECT_TRUE(sink_.records().empty());
 }
 
-TEST_F(PipelineTest, FinishesWhenFramesAreNotOfTheConfiguredSizeAndNamesItsKeys) {
-  PipelineOptions options = options_for_tests();
-  options.width = 1280;
-  options.height = 720;
+TEST_F(PipelineOfAnotherSizeTest, FinishesWhenFramesAreNotOfTheConfiguredSizeAndNamesItsKeys) {
+  PipelineOptions options = options_of_720_rows();
   options.calibration_name = "data sheet";
   options.step.calibrated = false;
-  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options);
-  pipeline.start();
-  video_.push(frame());
-  ASSERT_TRUE(finished(pipeline));
-  pipeline.stop();
-  EXPECT_THAT(pipeline.error(),
-              HasSubstr("frames of 1920x1080 px, but video.width and video.height "
-                        "are 1280 and 720; set them to 1920 and 1080"));
+  EXPECT_THAT(error_of(options),
+              HasSubstr("frames of 1920x1080 px, but video.width and "
+                        "video.height are 1280 and 720; set them to 1920 and 1080"));
 }
 
 TEST_F(PipelineTest, FinishesWithoutAnErrorWhenTheReaderGoes) {
