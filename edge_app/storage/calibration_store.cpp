@@ -80,6 +80,14 @@ std::vector<fs::path> maps_of(const fs::path& yaml) {
   return maps;
 }
 
+// A calibration of the store, or a map of one.
+bool is_of_store(const fs::path& file, const std::string& name) {
+  const std::string stem = file.stem().string();
+  const bool is_ours = begins_with(name, stem + ".zoom-") || begins_with(name, stem + kMapMark);
+  return name == file.filename() ||
+         (is_ours && (ends_with(name, kExtension) || ends_with(name, kMapExtension)));
+}
+
 // Says what was done with a file that is of no use: moved to a name of its own where that is possible.
 std::string set_aside(const fs::path& path, const char* as = ".damaged") {
   fs::path aside = path.string() + as;
@@ -156,6 +164,13 @@ std::vector<std::string> CalibrationStore::load(int width, int height, Use use) 
   std::vector<std::string> names;
   std::string unreadable;
   if (!list(folder, &names, &unreadable)) lines.push_back(unreadable);
+  if (use_ == Use::kKeep) {
+    const int removed = remove_unfinished(
+        folder.string(), [&file](const std::string& name) { return is_of_store(file, name); });
+    if (removed > 0)
+      lines.push_back(fmt::format("{}: {} unfinished {} of a killed process removed", file_,
+                                  removed, removed == 1 ? "file" : "files"));
+  }
   std::vector<fs::path> files;
   if (is_there(file)) files.push_back(file);
   const std::string begin = file.stem().string() + ".zoom-";

@@ -9,7 +9,7 @@
 // NAME.damaged, .damaged.1 ...), said, and never used. A map that is damaged costs the map only.
 // Each file is written atomically: first the map, under a name that no other content has, then the yaml
 // that names it, and only then the old map is removed. A power cut leaves the old pair or the new one, and
-// perhaps a map that nobody names, which the next save removes.
+// perhaps a map that nobody names, which the next save removes. What a killed process left unfinished goes at load().
 // Not for the real-time thread. One thread.
 
 #include <cstddef>

@@ -1,24 +1,33 @@
 #include "platform/system/whole_file.h"
 
 #include <fcntl.h>
+#include <sys/file.h>
 #include <sys/stat.h>
 #include <unistd.h>
 
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
+#include <filesystem>
 #include <fstream>
 #include <sstream>
+#include <system_error>
+#include <vector>
 
 namespace alidade {
 
 namespace {
 
+constexpr const char* kUnfinished = ".unfinished-";
+constexpr const char* kRandom = "XXXXXX";  // what mkostemp puts letters and digits for
+
 // A file beside the target, renamed onto it once it is safely on disk; otherwise removed.
 class TemporaryFile {
  public:
-  explicit TemporaryFile(const std::string& target) : name_(target + ".XXXXXX") {
+  explicit TemporaryFile(const std::string& target) : name_(target + kUnfinished + kRandom) {
     descriptor_ = ::mkostemp(name_.data(), O_CLOEXEC);
+    // Where the file system has no locks, nobody can take one, either.
+    if (descriptor_ >= 0) static_cast<void>(::flock(descriptor_, LOCK_EX | LOCK_NB));
   }
   TemporaryFile(const TemporaryFile&) = delete;
   TemporaryFile& operator=(const TemporaryFile&) = delete;
@@ -50,12 +59,33 @@ class TemporaryFile {
   bool renamed_ = false;
 };
 
+std::string folder_of(const std::string& path) {
+  const std::size_t slash = path.find_last_of('/');
+  return slash == std::string::npos ? "." : path.substr(0, slash + 1);
+}
+
+// What it would have become; empty: it is no unfinished file.
+std::string finished_name(const std::string& name) {
+  const std::size_t mark = name.rfind(kUnfinished);
+  const std::size_t length = std::strlen(kUnfinished) + std::strlen(kRandom);
+  return mark == std::string::npos || name.size() != mark + length ? "" : name.substr(0, mark);
+}
+
+// Unless somebody is writing it.
+bool remove_left_over(const std::string& path) {
+  const int descriptor = ::open(path.c_str(), O_RDONLY | O_NOFOLLOW | O_NONBLOCK | O_CLOEXEC);
+  if (descriptor < 0) return false;
+  struct stat status {};
+  const bool left_over = ::fstat(descriptor, &status) == 0 && S_ISREG(status.st_mode) &&
+                         ::flock(descriptor, LOCK_EX | LOCK_NB) == 0 && ::unlink(path.c_str()) == 0;
+  ::close(descriptor);
+  return left_over;
+}
+
 // Makes the rename survive a power cut, where the file system can do so; elsewhere the old file,
 // whole, may come back.
 void sync_folder_of(const std::string& path) {
-  const std::size_t slash = path.find_last_of('/');
-  const std::string folder = slash == std::string::npos ? "." : path.substr(0, slash + 1);
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  const int descriptor = ::open(folder_of(path).c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
   if (descriptor < 0) return;
   ::fsync(descriptor);
   ::close(descriptor);
@@ -65,6 +95,8 @@ void sync_folder_of(const std::string& path) {
 
 bool write_file_atomically(const std::string& path, const std::string& content,
                            std::string* error) {
+  const std::string own = std::filesystem::path(path).filename().string();
+  remove_unfinished(folder_of(path), [&own](const std::string& name) { return name == own; });
   TemporaryFile file(path);
   if (!file.replace(path, content)) {
     *error = path + ": cannot be written: " + std::strerror(errno);
@@ -86,6 +118,21 @@ bool move_into_place(const std::string& from, const std::string& to, std::string
   }
   sync_folder_of(to);
   return true;
+}
+
+int remove_unfinished(const std::string& folder,
+                      const std::function<bool(const std::string& name)>& is_ours) {
+  namespace fs = std::filesystem;
+  std::vector<std::string> found;
+  std::error_code error;
+  for (fs::directory_iterator at(folder, error); !error && at != fs::directory_iterator();
+       at.increment(error)) {
+    const std::string target = finished_name(at->path().filename().string());
+    if (!target.empty() && is_ours(target)) found.push_back(at->path().string());
+  }
+  int removed = 0;
+  for (const std::string& path : found) removed += remove_left_over(path) ? 1 : 0;
+  return removed;
 }
 
 bool read_file(const std::string& path, std::string* content, std::string* error) {

@@ -448,6 +448,25 @@ TEST_F(CalibrationStoreTest,
   EXPECT_EQ(files().size(), 2U);
 }
 
+TEST_F(CalibrationStoreTest, WhatAKilledProcessLeftUnfinishedGoesAtTheStart) {
+  put(some(1000));
+  for (const char* name :
+       {"calibration.yaml.unfinished-a1B2c3", "calibration.zoom-5.yaml.unfinished-a1B2c3",
+        "calibration.map-1a2b3c4d.bin.unfinished-a1B2c3"})
+    directory_.write(name, "half");
+  for (const char* other : {"calibration.yaml.backup", "other.yaml.unfinished-a1B2c3"})
+    directory_.write(other, "somebody's");
+  const auto before = std::distance(fs::directory_iterator(directory_.path()), {});
+  CalibrationStore looking = store();
+  static_cast<void>(looking.load(kWidth, kHeight, CalibrationStore::Use::kLook));
+  EXPECT_EQ(std::distance(fs::directory_iterator(directory_.path()), {}), before);
+  CalibrationStore loaded = store();
+  EXPECT_THAT(loaded.load(kWidth, kHeight),
+              Contains(path() + ": 3 unfinished files of a killed process removed"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(directory_.path()), {}), before - 3);
+  EXPECT_FALSE(loaded.empty());
+}
+
 TEST_F(CalibrationStoreTest, HalfWrittenFilesBesideAreNotTakenForAnything) {
   put(some(1000));
   directory_.write("calibration.yaml.Ab12cD", "format: 1\n");

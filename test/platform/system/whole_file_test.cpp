@@ -1,8 +1,11 @@
 #include "platform/system/whole_file.h"
 
+#include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/file.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <iterator>
@@ -52,6 +55,44 @@ TEST(WholeFile, SaysWhyItCannotBeReadOrWritten) {
   EXPECT_THAT(error, HasSubstr("cannot be written: No such file or directory"));
   EXPECT_FALSE(write_file_atomically(folder.path(), "x", &error)) << "a folder";
   EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 0);
+}
+
+// As it is killed: the name is another one each time, as mkostemp makes it.
+TEST(WholeFile, WhatAKilledProcessLeftUnfinishedGoesAtTheNextWrite) {
+  const TemporaryDirectory folder;
+  const std::string path = folder.path() + "/file";
+  folder.write("file.unfinished-a1B2c3", "hal");
+  folder.write("file.unfinished-ZZZZZZ", "");
+  for (const char* other : {"file.backup", "file.a1B2c3", "file.unfinished-long-one",
+                            "file.unfinished-", "other.unfinished-a1B2c3"})
+    folder.write(other, "somebody's");
+  std::string error;
+  ASSERT_TRUE(write_file_atomically(path, "whole", &error)) << error;
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder.path()), {}), 6);
+  EXPECT_EQ(folder.read("file"), "whole");
+}
+
+TEST(WholeFile, WhatIsBeingWrittenStays) {
+  const TemporaryDirectory folder;
+  const std::string path = folder.write("file.unfinished-a1B2c3", "half");
+  const int writing = ::open(path.c_str(), O_WRONLY | O_CLOEXEC);
+  ASSERT_EQ(::flock(writing, LOCK_EX), 0);
+  const auto ours = [](const std::string& name) { return name == "file"; };
+  EXPECT_EQ(remove_unfinished(folder.path(), ours), 0);
+  ::close(writing);
+  EXPECT_EQ(remove_unfinished(folder.path(), ours), 1);
+  EXPECT_EQ(remove_unfinished(folder.path() + "/none", ours), 0);
+}
+
+TEST(WholeFile, NoLinkOrFolderOrPipeIsTakenForAnUnfinishedOne) {
+  const TemporaryDirectory folder;
+  const std::string begin = folder.path() + "/file.unfinished-";
+  folder.write("precious", "kept");
+  std::filesystem::create_symlink(folder.path() + "/precious", begin + "aaaaaa");
+  std::filesystem::create_directory(begin + "bbbbbb");
+  ASSERT_EQ(::mkfifo((begin + "cccccc").c_str(), 0600), 0);
+  EXPECT_EQ(remove_unfinished(folder.path(), [](const std::string&) { return true; }), 0);
+  EXPECT_EQ(folder.read("precious"), "kept");
 }
 
 }  // namespace
