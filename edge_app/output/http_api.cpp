@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
+#include <mutex>
 #include <nlohmann/json.hpp>
 
 #include "edge_app/output/calibration_json.h"
@@ -99,16 +101,41 @@ ServerResponse scene_map(const HttpApiSources& sources) {
   return json_response(scene_json(sources.scene(), monotonic_now_s()));
 }
 
-ServerResponse calibrate(const HttpApiSources& sources) {
+// A fresh start throws away what the one before has gathered: not more often than one takes.
+struct CalibrationPause {
+  static constexpr double kPauseS = 120;
+  std::mutex mutex;
+  std::optional<double> began_s;
+};
+
+ServerResponse calibrate(const HttpApiSources& sources, CalibrationPause* pause) {
+  const std::lock_guard<std::mutex> lock(pause->mutex);
+  const double now_s = monotonic_now_s();
+  const double since_s = now_s - pause->began_s.value_or(now_s);
+  if (pause->began_s && since_s < CalibrationPause::kPauseS) {
+    const double left_s = std::ceil(CalibrationPause::kPauseS - since_s);
+    ServerResponse refusal = http_error(
+        429, fmt::format("a fresh calibration was begun {:.0f} s ago; the next may be in {:.0f} s",
+                         since_s, left_s));
+    refusal.headers.emplace_back("Retry-After", fmt::format("{:.0f}", left_s));
+    return refusal;
+  }
   if (!sources.ask_for_calibration())
     return http_error(409,
                       "nothing is calibrated here: that needs mode OE, live video and "
                       "calibration.auto: true");
+  pause->began_s = now_s;
   ServerResponse response =
       json_response({{"accepted", true},
                      {"note", "move the camera; status says what it needs, and when it is done"}});
   response.status = 202;
   return response;
+}
+
+ServerResponse stream_ticket(HttpTickets* tickets) {
+  const auto ticket = tickets->issue(monotonic_now_s());
+  if (!ticket) return http_error(503, "the system has no random numbers yet; ask again");
+  return json_response({{"ticket", *ticket}, {"valid_s", HttpTickets::kValidS}});
 }
 
 // The record that a request is about. False: *error says why there is none.
@@ -385,7 +412,9 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
               [](const ServerRequest&) { return text_response("application/yaml", kOpenApi); });
   server->get("/api/v1/orientation", HttpAccess::kToken,
               [sources](const ServerRequest&) { return orientation(sources); });
-  server->get("/api/v1/stream", HttpAccess::kToken, [sources](const ServerRequest&) {
+  server->post("/api/v1/stream/ticket", HttpAccess::kToken, kMaxQueryBytes,
+               [server](const ServerRequest&) { return stream_ticket(&server->tickets()); });
+  server->get("/api/v1/stream", HttpAccess::kStream, [sources](const ServerRequest&) {
     ServerResponse response;
     response.type = "text/event-stream";
     response.headers.emplace_back("Cache-Control", "no-cache");
@@ -412,7 +441,9 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
   server->get("/api/v1/map", HttpAccess::kToken,
               [sources](const ServerRequest&) { return scene_map(sources); });
   server->post("/api/v1/calibrate", HttpAccess::kToken, kMaxQueryBytes,
-               [sources](const ServerRequest&) { return calibrate(sources); });
+               [sources, pause = std::make_shared<CalibrationPause>()](const ServerRequest&) {
+                 return calibrate(sources, pause.get());
+               });
   server->post(
       "/api/v1/direction", HttpAccess::kToken, kMaxQueryBytes,
       [sources](const ServerRequest& request) { return directions(sources, request.body); });

@@ -314,6 +314,43 @@ TEST_F(HttpApiTest, PassesOnThatAFreshCalibrationIsWanted) {
   EXPECT_TRUE(asked_);
 }
 
+TEST_F(HttpApiTest, AFreshCalibrationIsNotBegunAnewBeforeItCanBeDone) {
+  calibrating_ = true;
+  EXPECT_THAT(post("/api/v1/calibrate", ""), StartsWith("HTTP/1.1 202 "));
+  for (int i = 0; i < 3; ++i) {
+    asked_ = false;
+    const std::string again = post("/api/v1/calibrate", "");
+    EXPECT_THAT(again, AllOf(StartsWith("HTTP/1.1 429 "), HasSubstr("\r\nRetry-After: 1")));
+    EXPECT_THAT(
+        body_of(again)["error"].get<std::string>(),
+        AllOf(StartsWith("a fresh calibration was begun "), HasSubstr("the next may be in 1")));
+    EXPECT_FALSE(asked_);
+  }
+}
+
+TEST_F(HttpApiTest, ABrowserGetsTheTicketThatItsStreamNeeds) {
+  const std::string answer = post("/api/v1/stream/ticket", "{}");
+  EXPECT_THAT(answer, AllOf(StartsWith("HTTP/1.1 200 "), HasSubstr("Cache-Control: no-store")));
+  const json ticket = body_of(answer);
+  EXPECT_EQ(ticket["valid_s"], 10);
+  const auto follow = [this](const std::string& query) {
+    Client client(server_);
+    client.send("GET /api/v1/stream" + query +
+                " HTTP/1.1\r\nHost: 192.0.2.1\r\nUser-Agent: Mozilla/5.0\r\n\r\n");
+    return client.receive("\r\n\r\n");
+  };
+  EXPECT_THAT(follow(""), StartsWith("HTTP/1.1 403 "));
+  const std::string query = "?ticket=" + ticket["ticket"].get<std::string>();
+  EXPECT_THAT(follow(query), StartsWith("HTTP/1.1 200 "));
+  EXPECT_THAT(follow(query), StartsWith("HTTP/1.1 403 "));
+  EXPECT_THAT(get("/api/v1/stream/ticket"), StartsWith("HTTP/1.1 405 "));
+  Client foreign(server_);
+  foreign.send(
+      "POST /api/v1/stream/ticket HTTP/1.1\r\nHost: 192.0.2.1\r\nOrigin: http://evil.example\r\n"
+      "Content-Length: 0\r\n\r\n");
+  EXPECT_THAT(foreign.receive(), StartsWith("HTTP/1.1 403 "));
+}
+
 TEST_F(HttpApiTest, WithoutTrackingThereAreNoTargets) {
   EXPECT_THAT(post("/api/v1/detections", R"({"frame": 1, "boxes": []})"),
               AllOf(StartsWith("HTTP/1.1 409 "), HasSubstr("section tracking")));

@@ -19,6 +19,7 @@
 #include <thread>
 #include <vector>
 
+#include "platform/system/clock.h"
 #include "test/edge_app/http_client.h"
 
 namespace alidade {
@@ -84,6 +85,9 @@ class HttpServerTest : public ::testing::Test {
     server_->get("/flood", HttpAccess::kOpen,
                  [](const ServerRequest&) { return endless(std::make_unique<Flood>()); });
     server_->get("/wait", HttpAccess::kOpen, [this](const ServerRequest&) {
+      return endless(std::make_unique<Words>(&words_));
+    });
+    server_->get("/stream", HttpAccess::kStream, [this](const ServerRequest&) {
       return endless(std::make_unique<Words>(&words_));
     });
     server_->get("/late", HttpAccess::kOpen,
@@ -461,6 +465,92 @@ TEST_F(HttpServerTest, APageOfAnotherSiteCanAskNothing) {
   }
   EXPECT_THAT(post("x", "Origin: http://localhost\r\n"), StartsWith("HTTP/1.1 200 "));
   EXPECT_THAT(get("/closed", "Origin: http://localhost\r\n"), StartsWith("HTTP/1.1 200 "));
+}
+
+// What browsers send for <img>, <script> or a fetch without CORS in a page of another site: over HTTPS or to this machine,
+// over plain HTTP, and with all that the page can leave out.
+constexpr const char* kForeignRequests[] = {
+    "Sec-Fetch-Site: cross-site\r\nSec-Fetch-Mode: no-cors\r\nSec-Fetch-Dest: image\r\n",
+    "User-Agent: Mozilla/5.0 (X11; Linux x86_64)\r\nReferer: http://evil.example/\r\n",
+    "user-agent: Mozilla/5.0\r\nAccept: */*\r\n",
+    "Accept: image/avif,image/webp,*/*;q=0.8\r\n",
+    "Accept: text/html\r\n",
+    "Accept-Language: de\r\n",
+    "Cookie: a=b\r\n",
+    "Sec-CH-UA: \"x\"\r\n",
+    "Upgrade-Insecure-Requests: 1\r\n"};
+
+TEST_F(HttpServerTest, APageOfAnotherSiteOpensNoStream) {
+  options_.limits.requests_per_s = 1e4;
+  start();
+  for (const char* headers : kForeignRequests) {
+    for (const char* path : {"/stream", "/stream?ticket=", "/stream?ticket=0123456789abcdef"})
+      EXPECT_THAT(get(path, headers), StartsWith("HTTP/1.1 403 ")) << path << ": " << headers;
+  }
+  EXPECT_EQ(server_->counters().streams, 0);
+  for (const char* headers : {"User-Agent: curl/7.88.1\r\nAccept: */*\r\n", "",
+                              "User-Agent: python-requests/2.28\r\nAccept-Encoding: gzip\r\n"}) {
+    Client client(*server_);
+    client.send(std::string("GET /stream HTTP/1.1\r\nHost: 192.0.2.1\r\n") + headers + "\r\n");
+    EXPECT_THAT(client.receive("begun\n"), StartsWith("HTTP/1.1 200 ")) << headers;
+  }
+}
+
+TEST_F(HttpServerTest, ATicketOpensOneStreamWithinSomeSeconds) {
+  start();
+  const double now_s = monotonic_now_s();
+  const auto stream = [this](const std::string& ticket) {
+    Client client(*server_);
+    client.send("GET /stream?ticket=" + ticket + " HTTP/1.1\r\nHost: localhost\r\n" +
+                kForeignRequests[1] + "\r\n");
+    return client.receive("\n");
+  };
+  const auto ticket = server_->tickets().issue(now_s);
+  ASSERT_TRUE(ticket);
+  EXPECT_THAT(stream(*ticket), StartsWith("HTTP/1.1 200 "));
+  EXPECT_THAT(stream(*ticket), StartsWith("HTTP/1.1 403 ")) << "used";
+  const auto old = server_->tickets().issue(now_s - HttpTickets::kValidS - 1);
+  EXPECT_THAT(stream(old.value_or("")), StartsWith("HTTP/1.1 403 "));
+}
+
+// A link on another site's page may lead to the status page; what that page embeds is refused.
+TEST_F(HttpServerTest, WhatABrowserSaysIsOfAnotherSiteIsRefusedButForALink) {
+  start();
+  for (const char* site : {"cross-site", "same-site"}) {
+    const std::string from = std::string("Sec-Fetch-Site: ") + site + "\r\n";
+    for (const char* how : {"Sec-Fetch-Mode: no-cors\r\nSec-Fetch-Dest: image\r\n",
+                            "Sec-Fetch-Mode: navigate\r\nSec-Fetch-Dest: iframe\r\n", ""})
+      EXPECT_THAT(get("/closed", from + how), StartsWith("HTTP/1.1 403 ")) << how;
+    EXPECT_THAT(get("/open", from + "Sec-Fetch-Mode: navigate\r\nSec-Fetch-Dest: document\r\n"),
+                StartsWith("HTTP/1.1 200 "));
+  }
+  for (const char* site : {"same-origin", "none"})
+    EXPECT_THAT(get("/closed", std::string("Sec-Fetch-Site: ") + site + "\r\n"),
+                StartsWith("HTTP/1.1 200 "));
+}
+
+TEST_F(HttpServerTest, WithATokenABrowserNeedsNoTicket) {
+  options_.token = "right-horse";
+  start();
+  EXPECT_THAT(get("/stream", kForeignRequests[1]), StartsWith("HTTP/1.1 401 "));
+  Client client(*server_);
+  client.send(std::string("GET /stream HTTP/1.1\r\nHost: localhost\r\n"
+                          "Authorization: Bearer right-horse\r\n") +
+              kForeignRequests[2] + "\r\n");
+  EXPECT_THAT(client.receive("begun\n"), StartsWith("HTTP/1.1 200 "));
+}
+
+TEST(HttpTickets, AreNeverTheSameAndTheOldestGoFirst) {
+  HttpTickets tickets;
+  const auto first = tickets.issue(0);
+  const auto second = tickets.issue(0);
+  ASSERT_TRUE(first && second);
+  EXPECT_NE(*first, *second);
+  EXPECT_EQ(first->size(), 32U);
+  for (std::size_t i = 1; i < HttpTickets::kMost; ++i) static_cast<void>(tickets.issue(1));
+  EXPECT_FALSE(tickets.take(*first, 1));
+  EXPECT_TRUE(tickets.take(*second, 1));
+  EXPECT_FALSE(tickets.take("", 1));
 }
 
 TEST_F(HttpServerTest, BehindAProxyWithTlsThePageWithTheTokenMayAsk) {

@@ -460,7 +460,7 @@ class Http(SystemTest):
         self.assertGreater(status["http"]["refused"], 0)
         after = self.memory(run)
         if not os.environ.get("ALIDADE_SANITIZE"):
-            # 64 heads and a few bodies. A thread each for 64 clients would take more.
+            # 128 heads and a few bodies. A thread each for as many clients would take more.
             self.assertLess(after - before, 10e6)
             self.assertLess(self.threads(run), 16)
         for client, file in stalled:

@@ -1,5 +1,6 @@
 #include "edge_app/output/http/http_gate.h"
 
+#include <algorithm>
 #include <boost/asio/ip/address.hpp>
 #include <string_view>
 #include <utility>
@@ -77,7 +78,8 @@ std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s
   if (!host_is_trusted(head))
     return http_error(403, "the Host header names another machine; use an address, or set a token");
   // A browser would not let that page see the answer; asking costs us work all the same, and streams their places.
-  if (!origin_is_own(head)) return http_error(403, "a page of another site may not ask this");
+  if (!origin_is_own(head) || head.from_other_site)
+    return http_error(403, "a page of another site may not ask this");
   const auto path = routes_.find(head.path);
   if (path == routes_.end()) return http_error(404, "no such path; see /api/v1/openapi.yaml");
   const auto found = path->second.find(head.method == "HEAD" ? "GET" : head.method);
@@ -90,13 +92,27 @@ std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s
     return error;
   }
   *route = &found->second;
-  if (found->second.access == HttpAccess::kToken && !token_.empty() && !client.has_token) {
+  const HttpAccess access = found->second.access;
+  if (access != HttpAccess::kOpen && !token_.empty() && !client.has_token) {
     ++tally_.unauthorized;
     ServerResponse error = http_error(401, "this needs the header `Authorization: Bearer TOKEN`");
     error.headers.emplace_back("WWW-Authenticate", "Bearer");
     return error;
   }
+  // A browser that another site's page leads here sends no Origin, and over plain HTTP not even Sec-Fetch-Site.
+  if (access == HttpAccess::kStream && token_.empty() && head.of_browser &&
+      !shows_ticket(head, now_s))
+    return http_error(
+        403,
+        "a browser needs a ticket of POST /api/v1/stream/ticket for this, as ?ticket=; "
+        "other clients send no headers of browsers, or set a token");
   return std::nullopt;
+}
+
+bool HttpGate::shows_ticket(const HttpHead& head, double now_s) {
+  return std::any_of(head.parameters.begin(), head.parameters.end(), [&](const auto& parameter) {
+    return parameter.first == "ticket" && tickets_.take(parameter.second, now_s);
+  });
 }
 
 bool HttpGate::shows_token(const HttpHead& head) const {

@@ -12,12 +12,14 @@
 #include "edge_app/output/http/http_head.h"
 #include "edge_app/output/http/http_message.h"
 #include "edge_app/output/http/http_options.h"
+#include "edge_app/output/http/http_tickets.h"
 
 namespace alidade {
 
 enum class HttpAccess {
-  kToken,  // wants the token, if there is one
-  kOpen    // never
+  kToken,   // wants the token, if there is one
+  kStream,  // so; without one, what a browser sends must show a ticket
+  kOpen     // never
 };
 
 struct HttpRoute {
@@ -60,6 +62,9 @@ class HttpGate {
   // Before the first admit().
   void add(const std::string& method, const std::string& path, HttpRoute route);
 
+  // Any thread.
+  [[nodiscard]] HttpTickets& tickets() { return tickets_; }
+
   // One thread. The route that answers; null: *refusal is the answer. Says whether the client has the token.
   [[nodiscard]] const HttpRoute* admit(const HttpHead& head, double now_s, HttpClient* client,
                                        ServerResponse* refusal);
@@ -69,6 +74,7 @@ class HttpGate {
                                                     const HttpClient& client,
                                                     const HttpRoute** route);
   [[nodiscard]] bool shows_token(const HttpHead& head) const;
+  [[nodiscard]] bool shows_ticket(const HttpHead& head, double now_s);
   [[nodiscard]] bool origin_is_own(const HttpHead& head) const;
   [[nodiscard]] bool host_is_trusted(const HttpHead& head) const;
 
@@ -76,6 +82,7 @@ class HttpGate {
   const std::string own_host_;
   FairRate rate_of_strangers_;
   FairRate rate_with_token_;
+  HttpTickets tickets_;
   HttpTally& tally_;
   std::map<std::string, std::map<std::string, HttpRoute>> routes_;  // by path and method
 };

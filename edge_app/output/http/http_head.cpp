@@ -80,6 +80,40 @@ std::optional<ServerResponse> length_refusal(const HttpHead& head) {
   return std::nullopt;
 }
 
+using Fields = http::request<http::empty_body>;
+
+std::string_view text_of(const Fields& fields, http::field name) {
+  const auto value = fields[name];
+  return {value.data(), value.size()};
+}
+std::string_view text_of(const Fields& fields, const char* name) {
+  const auto value = fields[name];
+  return {value.data(), value.size()};
+}
+
+// Each of them alone is enough: browsers differ, and send fewer over plain HTTP.
+bool is_of_browser(const Fields& fields) {
+  using boost::algorithm::istarts_with;
+  for (const auto& field : fields) {
+    const auto name = field.name_string();
+    if (istarts_with(std::string_view(name.data(), name.size()), "sec-")) return true;
+  }
+  const std::string_view accepted = text_of(fields, http::field::accept);
+  return fields.count(http::field::origin) > 0 || fields.count(http::field::referer) > 0 ||
+         fields.count(http::field::accept_language) > 0 || fields.count(http::field::cookie) > 0 ||
+         fields.count("Upgrade-Insecure-Requests") > 0 ||
+         accepted.find("image/") != std::string_view::npos ||
+         accepted.find("text/html") != std::string_view::npos ||
+         istarts_with(text_of(fields, http::field::user_agent), "mozilla/");
+}
+
+bool is_from_other_site(const Fields& fields) {
+  const std::string_view site = text_of(fields, "Sec-Fetch-Site");
+  const bool followed = text_of(fields, "Sec-Fetch-Mode") == "navigate" &&
+                        text_of(fields, "Sec-Fetch-Dest") == "document";
+  return (site == "cross-site" || site == "same-site") && !followed;
+}
+
 }  // namespace
 
 bool parse_http_head(std::string_view text, HttpHead* head, ServerResponse* refusal) {
@@ -100,22 +134,21 @@ bool parse_http_head(std::string_view text, HttpHead* head, ServerResponse* refu
     return false;
   }
   const auto& fields = parser.get();
-  const auto text_of = [&fields](http::field name) {
-    const auto value = fields[name];
-    return std::string(value.data(), value.size());
-  };
   const std::string_view target(fields.target().data(), fields.target().size());
   const std::size_t end = std::min(target.find('?'), target.size());
   head->method = std::string(fields.method_string().data(), fields.method_string().size());
   head->path = decoded(target.substr(0, end), false);
   parse_query(target.substr(std::min(end + 1, target.size())), head);
-  head->host = text_of(http::field::host);
-  head->origin = text_of(http::field::origin);
-  head->authorization = text_of(http::field::authorization);
+  head->host = text_of(fields, http::field::host);
+  head->origin = text_of(fields, http::field::origin);
+  head->authorization = text_of(fields, http::field::authorization);
+  head->of_browser = is_of_browser(fields);
+  head->from_other_site = is_from_other_site(fields);
   head->transfer_encoding = fields.count(http::field::transfer_encoding) > 0;
   head->content_encoding = fields.count(http::field::content_encoding) > 0;
-  head->expects_continue = fields.version() > 10 &&
-                           boost::algorithm::iequals(text_of(http::field::expect), "100-continue");
+  head->expects_continue =
+      fields.version() > 10 &&
+      boost::algorithm::iequals(text_of(fields, http::field::expect), "100-continue");
   return true;
 }
 

@@ -18,6 +18,8 @@ struct HttpHead {
   std::string host;
   std::string origin;
   std::string authorization;
+  bool of_browser = false;  // it has a header that browsers send, and that no page can take away
+  bool from_other_site = false;              // the browser says so; but for a link that is followed
   std::vector<std::string> content_lengths;  // as they stand, one a field
   bool transfer_encoding = false;
   bool content_encoding = false;

@@ -12,8 +12,11 @@
 //   token   if one is set, routes that are not open want `Authorization: Bearer TOKEN`, else 401; compared in
 //           a time that does not tell how much of it was right; never logged
 //   method  another than the path's is answered 405, with those that it has in Allow
-//   pages of other sites   a request whose Origin is not this server is refused (403); so is, without a token, a Host
-//           that is a name other than localhost (DNS rebinding)
+//   pages of other sites   a request whose Origin is not this server is refused (403); so is one of which the
+//           browser says that it is from another site, and without a token a Host that is a name other than
+//           localhost (DNS rebinding)
+//   streams   without a token a request for one that has a browser's headers must show a ticket, else 403: a page of another
+//           site can have a browser send it, but cannot read a ticket (http_tickets.h)
 // Every error is JSON, {"error": "one line"}. Threads run at the normal scheduling policy, niced.
 
 #include <memory>
@@ -38,6 +41,9 @@ class HttpServer {
   // Before start(). A route is an exact path; HEAD is answered as GET is.
   void get(const std::string& path, HttpAccess access, HttpHandler handler);
   void post(const std::string& path, HttpAccess access, std::size_t max_body, HttpHandler handler);
+
+  // For routes of HttpAccess::kStream. Any thread.
+  [[nodiscard]] HttpTickets& tickets() { return gate_.tickets(); }
 
   // Binds and listens; once. False with one line in *error.
   [[nodiscard]] bool start(std::string* error);
