@@ -251,6 +251,8 @@ class Progress {
 }  // namespace
 
 int build_map(const MapBuildCommand& options) {
+  std::string error;
+  if (!may_write_scene_map(options.map, &error)) throw CommandError(kExitFailed, error);
   std::vector<MapRecording> recordings;
   std::vector<double> readings;
   for (const std::string& directory : options.recordings) {
@@ -348,7 +350,6 @@ int build_map(const MapBuildCommand& options) {
     spdlog::warn("left out, as they hang on no other: {}", names_of(builder, result.not_connected));
   }
   if (result.status != MapBuildStatus::kOk) refuse(builder, result, pace);
-  std::string error;
   if (!save_scene_map(options.map, result.map, &error)) throw CommandError(kExitFailed, error);
   std::fputs(
       options.json ? map_json(result.map, options.map).c_str() : map_text(result.map).c_str(),

@@ -23,6 +23,13 @@ void set_up(SqliteDatabase* database) {
   }
 }
 
+// A copy that another tool made may be without a log, and so could not be changed (sqlite.h).
+void set_up_log(SqliteDatabase* database) {
+  if (database->text_of("PRAGMA journal_mode") == "wal") return;
+  database->execute("PRAGMA journal_mode = OFF");
+  database->execute("PRAGMA journal_mode = WAL");
+}
+
 void make_tables(SqliteDatabase* database) {
   database->execute("PRAGMA application_id = " + std::to_string(kSceneMapApplication));
   database->execute("PRAGMA user_version = " + std::to_string(kSceneMapFormat));
@@ -30,6 +37,7 @@ void make_tables(SqliteDatabase* database) {
 }
 
 bool write_new(const std::string& path, const SceneMap& map, std::string* error) {
+  if (!may_write_scene_map(path, error)) return false;
   // A log that outlived its database would be taken for this one's.
   for (const char* rest : {"-wal", "-shm"}) ::unlink((path + rest).c_str());
   const std::string temporary = path + ".new";
@@ -60,6 +68,12 @@ bool write_new(const std::string& path, const SceneMap& map, std::string* error)
 }
 
 }  // namespace
+
+bool may_write_scene_map(const std::string& path, std::string* error) {
+  const std::string foreign = foreign_file_beside(path);
+  if (!foreign.empty()) *error = path + ": " + foreign_file_text(foreign);
+  return foreign.empty();
+}
 
 bool save_scene_map(const std::string& path, const SceneMap& map, std::string* error) {
   std::string flaw;
@@ -148,6 +162,7 @@ bool SceneMapFile::is_of(int width, int height, std::string* error) const {
 }
 
 bool SceneMapFile::replace(const SceneMap& map, std::string* error) {
+  set_up_log(&database_);
   SqliteTransaction transaction(&database_, true);
   if (database_.number_of("PRAGMA user_version") == kSceneMapFormatWithoutRest) {
     database_.execute(kSceneMapTables[kLensRestTable]);
@@ -172,6 +187,7 @@ bool SceneMapFile::update(const MapChange& change, std::string* error) {
       if (!is_valid(landmark, &flaw)) return refuse("refused to write: " + flaw, error);
     }
   }
+  set_up_log(&database_);
   SqliteTransaction transaction(&database_, true);
   if (database_.failed()) return refuse_failure(error);
   SceneRow scene;

@@ -25,6 +25,9 @@ namespace alidade {
 // Whole or not at all. A scene map that is there is replaced; another file, or a damaged one, is not.
 [[nodiscard]] bool save_scene_map(const std::string& path, const SceneMap& map, std::string* error);
 
+// False: what lies beside that place does not let a map be there. To be asked before minutes of work.
+[[nodiscard]] bool may_write_scene_map(const std::string& path, std::string* error);
+
 class SceneMapFile {
  public:
   // Checks all but the rows, which read() does.

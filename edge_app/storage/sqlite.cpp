@@ -1,10 +1,72 @@
 #include "edge_app/storage/sqlite.h"
 
 #include <sqlite3.h>
+#include <sys/stat.h>
 
 #include <cstring>
 
 namespace alidade {
+namespace {
+
+constexpr std::string_view kJournal = "-journal";
+
+const sqlite3_vfs& system_files() {
+  static const sqlite3_vfs files = *sqlite3_vfs_find(nullptr);
+  return files;
+}
+
+bool is_journal(const char* path) {
+  const std::string_view name = path != nullptr ? path : "";
+  return name.size() >= kJournal.size() && name.substr(name.size() - kJournal.size()) == kJournal;
+}
+
+// SQLite looks for a journal whenever it begins to read: one that appears after open() is not found either.
+int is_accessible(sqlite3_vfs* files, const char* path, int how, int* result) {
+  if (!is_journal(path)) return system_files().xAccess(files, path, how, result);
+  *result = 0;
+  return SQLITE_OK;
+}
+
+int open_file(sqlite3_vfs* files, const char* path, sqlite3_file* file, int flags, int* opened) {
+  if ((flags & (SQLITE_OPEN_MAIN_JOURNAL | SQLITE_OPEN_SUPER_JOURNAL)) == 0)
+    return system_files().xOpen(files, path, file, flags, opened);
+  file->pMethods = nullptr;
+  return SQLITE_CANTOPEN;
+}
+
+// The system's files without journals, under a name of their own.
+const char* files_without_journals() {
+  static constexpr const char* kName = "alidade";
+  static sqlite3_vfs files = [] {
+    sqlite3_vfs made = system_files();
+    made.pNext = nullptr;
+    made.zName = kName;
+    made.xAccess = is_accessible;
+    made.xOpen = open_file;
+    return made;
+  }();
+  static const int registered = sqlite3_vfs_register(&files, 0);
+  return registered == SQLITE_OK ? kName : nullptr;
+}
+
+}  // namespace
+
+std::string foreign_file_beside(const std::string& database) {
+  for (const char* rest : {kJournal.data(), "-wal", "-shm"}) {
+    const std::string path = database + rest;
+    struct stat status = {};
+    // Through a link another file would be written.
+    if (::lstat(path.c_str(), &status) == 0 && (rest == kJournal || !S_ISREG(status.st_mode)))
+      return path;
+  }
+  return "";
+}
+
+std::string foreign_file_text(const std::string& file) {
+  return file +
+         " lies beside it, which this program did not put there and which could change or delete "
+         "other files; remove it";
+}
 
 void SqliteDatabase::Close::operator()(sqlite3* handle) const { sqlite3_close_v2(handle); }
 
@@ -15,10 +77,19 @@ bool SqliteDatabase::open(const std::string& path, bool create) {
   sqlite3* handle = nullptr;
   const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_NOMUTEX | SQLITE_OPEN_EXRESCODE |
                     (create ? SQLITE_OPEN_CREATE : 0);
-  const int code = sqlite3_open_v2(path.c_str(), &handle, flags, nullptr);
+  const char* const files = files_without_journals();
+  const int code =
+      files != nullptr ? sqlite3_open_v2(path.c_str(), &handle, flags, files) : SQLITE_ERROR;
   handle_.reset(handle);
   if (code != SQLITE_OK) {
     fail(code);
+    handle_.reset();
+    return false;
+  }
+  // Of the file itself, where path is a link to it. Nothing of it was read so far.
+  foreign_file_ = foreign_file_beside(sqlite3_db_filename(handle, "main"));
+  if (!foreign_file_.empty()) {
+    fail(SQLITE_CANTOPEN);
     handle_.reset();
     return false;
   }
@@ -62,6 +133,7 @@ std::string SqliteDatabase::failure_text() const {
     return std::string(what) +
            (system_error_ != 0 ? std::string(": ") + std::strerror(system_error_) : std::string());
   };
+  if (!foreign_file_.empty()) return foreign_file_text(foreign_file_);
   switch (failure_) {
     case SQLITE_OK:
       return "";

@@ -1,6 +1,8 @@
 #pragma once
 // SQLite's handles, owned: a connection, a statement, a transaction. The first failure of a connection is kept until it is asked for, so
 // that many steps can be taken and one question be asked at the end; after a failure statements do nothing. One thread at a time.
+// Changes go to a write-ahead log (NAME-wal, NAME-shm) or unlogged: a rollback journal is never made, and none is believed. One that lies
+// beside a database was put there, and SQLite would delete the files that it names.
 
 #include <cstddef>
 #include <cstdint>
@@ -14,11 +16,16 @@ struct sqlite3_stmt;
 
 namespace alidade {
 
+// What lies beside a database, and is not what SQLite leaves there for this program; empty: nothing. What a user is told of it.
+[[nodiscard]] std::string foreign_file_beside(const std::string& database);
+[[nodiscard]] std::string foreign_file_text(const std::string& file);
+
 class SqliteDatabase {
  public:
   SqliteDatabase() = default;
 
   // An existing file, or one that is made. True: opened; the file may be no database nevertheless, which the first statement shows.
+  // False also where there is a foreign_file_beside() it.
   [[nodiscard]] bool open(const std::string& path, bool create);
   void close();
   [[nodiscard]] bool is_open() const { return handle_ != nullptr; }
@@ -34,7 +41,10 @@ class SqliteDatabase {
   [[nodiscard]] int failure() const { return failure_; }  // SQLite's primary code
   // What a user is told of the failure.
   [[nodiscard]] std::string failure_text() const;
-  void forget_failure() { failure_ = 0; }
+  void forget_failure() {
+    failure_ = 0;
+    foreign_file_.clear();
+  }
 
  private:
   friend class SqliteStatement;
@@ -47,6 +57,7 @@ class SqliteDatabase {
   std::unique_ptr<sqlite3, Close> handle_;
   int failure_ = 0;
   int system_error_ = 0;  // errno
+  std::string foreign_file_;
 };
 
 class SqliteStatement {

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "test/edge_app/alidade_command.h"
+#include "test/edge_app/forged_journal.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {
@@ -112,6 +113,27 @@ TEST_F(MapCommands, InfoAndCheckReadIt) {
   const Result check = map_command({"check", path("scene.map")});
   EXPECT_EQ(check.exit_code, 0) << check.errors;
   EXPECT_THAT(check.output, HasSubstr("whole"));
+}
+
+TEST_F(MapCommands, EachRefusesAForgedJournalWhichDeletesNothing) {
+  const std::string victim = directory_->write("victim", "of no concern to a map");
+  const std::string map = path("beside.map");
+  fs::copy(path("scene.map"), map);
+  test::forge_journal(map + "-journal", victim);
+  const std::string why = map + "-journal lies beside it, which this program did not put there";
+  const std::vector<std::vector<std::string>> commands = {
+      {"map", "info", map},
+      {"map", "check", map},
+      {"map", "export", map, "-o", path("no")},
+      {"map", "build", path("walk"), "-o", map, "--focal-length", "810"},
+      {"localize", map, path("walk") + "/frames/000000.png"}};
+  for (const std::vector<std::string>& arguments : commands) {
+    const Result result = alidade(arguments);
+    EXPECT_NE(result.exit_code, 0) << arguments[1];
+    EXPECT_THAT(last_line(result.errors), AllOf(HasSubstr(why), HasSubstr("remove it")));
+  }
+  EXPECT_EQ(directory_->read("victim"), "of no concern to a map");
+  EXPECT_TRUE(fs::exists(map + "-journal"));
 }
 
 TEST_F(MapCommands, ExportWritesKeyframesPicturesAndAPanorama) {

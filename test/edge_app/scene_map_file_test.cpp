@@ -11,6 +11,7 @@
 
 #include "edge_app/storage/scene_map_writing.h"
 #include "test/edge_app/changing_scene_map.h"
+#include "test/edge_app/forged_journal.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade::test {
@@ -144,6 +145,78 @@ TEST_F(SceneMapFileTest, ALogThatOutlivedItsMapIsNotTakenForTheNewOnes) {
   std::filesystem::rename(path + ".kept", path + "-wal");
   const SceneMap other = save(random_scene_map(4, 9, 60));
   EXPECT_TRUE(loaded_bytes() == bytes_of(other));
+}
+
+TEST_F(SceneMapFileTest, AForgedJournalIsRefusedAndDeletesNothing) {
+  const SceneMap map = save(map_before_changes());
+  const std::string victim = directory.write("victim", "of no concern to a map");
+  const std::string journal = path + "-journal";
+  forge_journal(journal, victim);
+  expect_refused(journal + " lies beside it");
+  EXPECT_NE(error.find("remove it"), std::string::npos) << error;
+  EXPECT_FALSE(save_scene_map(path, map, &error));
+  EXPECT_TRUE(std::filesystem::exists(journal));
+  EXPECT_EQ(directory.read("victim"), "of no concern to a map");
+  // The journal of a link lies beside what it leads to.
+  const std::string link = directory.path() + "/link.map";
+  std::filesystem::create_symlink(path, link);
+  SceneMapFile file;
+  EXPECT_FALSE(file.open(link, &error));
+  EXPECT_EQ(error.find(link + ": " + journal), 0U) << error;
+  // A link as a journal, too, wherever it leads.
+  std::filesystem::rename(journal, directory.path() + "/elsewhere");
+  std::filesystem::create_symlink(directory.path() + "/elsewhere", journal);
+  expect_refused(journal + " lies beside it");
+  std::filesystem::remove(directory.path() + "/elsewhere");
+  expect_refused(journal + " lies beside it");
+  std::filesystem::remove(journal);
+  EXPECT_TRUE(loaded_bytes() == bytes_of(map));
+  EXPECT_EQ(directory.read("victim"), "of no concern to a map");
+}
+
+TEST_F(SceneMapFileTest, AJournalForgedOnceTheMapIsOpenIsNotBelieved) {
+  const SceneMap map = save(map_before_changes());
+  const std::string victim = directory.write("victim", "of no concern to a map");
+  SqliteDatabase database;
+  ASSERT_TRUE(database.open(path, false));
+  forge_journal(path + "-journal", victim);
+  EXPECT_EQ(database.number_of("SELECT count(*) FROM keyframe"),
+            static_cast<std::int64_t>(map.keyframes.size()));
+  EXPECT_FALSE(database.failed()) << database.failure_text();
+  EXPECT_EQ(directory.read("victim"), "of no concern to a map");
+}
+
+TEST_F(SceneMapFileTest, AJournalWhereAMapShallBeIsRefusedAndNoMapWritten) {
+  const std::string victim = directory.write("victim", "of no concern to a map");
+  forge_journal(path + "-journal", victim);
+  EXPECT_FALSE(may_write_scene_map(path, &error));
+  EXPECT_FALSE(save_scene_map(path, map_before_changes(), &error));
+  EXPECT_EQ(error.find(path + ": " + path + "-journal lies beside it"), 0U) << error;
+  EXPECT_FALSE(std::filesystem::exists(path));
+  EXPECT_TRUE(std::filesystem::exists(path + "-journal"));
+}
+
+TEST_F(SceneMapFileTest, ALogThatLeadsToAnotherFileIsRefusedAndThatFileKept) {
+  save(map_before_changes());
+  directory.write("victim", "of no concern to a map");
+  for (const char* rest : {"-wal", "-shm"}) {
+    std::filesystem::create_symlink(directory.path() + "/victim", path + rest);
+    expect_refused(path + rest + " lies beside it");
+    std::filesystem::remove(path + rest);
+  }
+  EXPECT_EQ(directory.read("victim"), "of no concern to a map");
+}
+
+TEST_F(SceneMapFileTest, ACopyThatAnotherToolMadeIsReadAndCanBeChanged) {
+  SceneMap map = save(map_before_changes());
+  execute("PRAGMA journal_mode = OFF");  // of this connection; the next has a rollback journal
+  EXPECT_TRUE(loaded_bytes() == bytes_of(map));
+  SceneMapFile file;
+  ASSERT_TRUE(file.open(path, &error)) << error;
+  const MapChange change = change_of(map, 1);
+  ASSERT_TRUE(file.update(change, &error)) << error;
+  ASSERT_TRUE(apply(change, &map, &error)) << error;
+  EXPECT_TRUE(loaded_bytes() == bytes_of(map));
 }
 
 TEST_F(SceneMapFileTest, AChangeThatDoesNotFitChangesNothing) {

@@ -321,6 +321,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     }
     for (int i = 0; i < 12 && !input.empty(); ++i) change_one(&input, &database);
     put_right(right, &database);
+    database.execute("PRAGMA journal_mode = WAL");
   }
   // A byte of the file, too.
   if ((right & 16U) != 0) {
