@@ -29,6 +29,27 @@ void set_lens_prior(const Config& config, SelfCalibrationOptions* options) {
   }
 }
 
+// What may then be done with it. Throws CommandError where it is another process's.
+CalibrationStore::Use lock_store(const Config& config, CalibrationStore* store) {
+  std::string why;
+  switch (store->lock(&why)) {
+    case FileLock::Result::kTaken:
+      break;
+    case FileLock::Result::kInUse:
+      // Who makes no calibrations reads those of who does.
+      if (!config.calibration.automatic) return CalibrationStore::Use::kLook;
+      throw CommandError(kExitFailed,
+                         fmt::format("calibration.file {}; give each camera a file of its own, or, "
+                                     "to use what that process stores, set calibration.auto: false",
+                                     why));
+    case FileLock::Result::kImpossible:
+      if (config.calibration.automatic)
+        spdlog::warn("{}; no other process may keep calibrations there", why);
+      break;
+  }
+  return CalibrationStore::Use::kKeep;
+}
+
 Calibrating begin_calibrating(const Config& config, const std::string& path,
                               CalibrationStore::Use use) {
   Calibrating result;
@@ -38,7 +59,9 @@ Calibrating begin_calibrating(const Config& config, const std::string& path,
   if (!config.calibration.file.empty()) {
     result.store = std::make_unique<CalibrationStore>(
         config.calibration.file, config.calibration.zoom_tolerance.value_or(0));
-    for (const std::string& line : result.store->load(width, height, use))
+    const CalibrationStore::Use may =
+        use == CalibrationStore::Use::kKeep ? lock_store(config, result.store.get()) : use;
+    for (const std::string& line : result.store->load(width, height, may))
       spdlog::info("calibration: {}", line);
   }
   const StoredCalibration* stored =

@@ -14,6 +14,7 @@
 #include "edge_app/commands/localization_json.h"
 #include "edge_app/commands/map_recording.h"
 #include "edge_app/storage/scene_map_file.h"
+#include "platform/system/whole_file.h"
 #include "platform/video/picture_file.h"
 
 namespace alidade {
@@ -43,6 +44,7 @@ class Asking {
   void picture(const std::string& path) {
     Picture picture;
     std::string error;
+    if (!open_to_read(path, &error).is_open()) throw CommandError(kExitUsage, error);
     if (!read_picture_file(path, &picture, &error)) throw CommandError(kExitUsage, error);
     require_size(path, picture.width, picture.height);
     ordered_json json;

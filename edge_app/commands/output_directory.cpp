@@ -10,11 +10,26 @@ namespace alidade {
 
 namespace fs = std::filesystem;
 
-OutputDirectory::OutputDirectory(const std::string& given, const std::string& recording) {
+std::string output_path(const std::string& given, const std::string& recording) {
   std::error_code error;
   const fs::path from(recording);
   const fs::path beside = fs::is_directory(from, error) ? from : from.parent_path();
-  const fs::path path = given.empty() ? beside / "alidade" : fs::path(given);
+  return given.empty() ? (beside / "alidade").string() : given;
+}
+
+FileLock lock_calibration_in(const std::string& directory) {
+  const std::string file = (fs::path(directory) / "calibration.yaml").string();
+  FileLock lock;
+  std::string why;
+  std::error_code ignored;
+  if (fs::exists(file + ".lock", ignored) && lock.take(file, &why) == FileLock::Result::kInUse)
+    throw CommandError(kExitFailed, why + "; give another directory with -o");
+  return lock;
+}
+
+OutputDirectory::OutputDirectory(const std::string& given, const std::string& recording) {
+  std::error_code error;
+  const fs::path path = output_path(given, recording);
   fs::create_directories(path, error);
   if (error) {
     throw CommandError(kExitFailed, path.string() + ": cannot be made: " + error.message() +

@@ -6,11 +6,19 @@
 #include <utility>
 #include <vector>
 
+#include "platform/system/file_lock.h"
+
 namespace alidade {
+
+// given: of -o; empty: `alidade` in the recording, or beside it if it is a file.
+[[nodiscard]] std::string output_path(const std::string& given, const std::string& recording);
+
+// To be held while calibration.yaml is made for it. Throws CommandError where a `run` keeps its calibrations in that file.
+[[nodiscard]] FileLock lock_calibration_in(const std::string& directory);
 
 class OutputDirectory {
  public:
-  // given: of -o; empty: `alidade` in the recording, or beside it if it is a file. Throws CommandError.
+  // Of output_path(). Throws CommandError.
   OutputDirectory(const std::string& given, const std::string& recording);
 
   // write(path, &error) -> bool. Remembers the file under `kind`. Throws CommandError.

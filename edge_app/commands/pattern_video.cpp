@@ -5,6 +5,7 @@
 #include <memory>
 
 #include "edge_app/commands/command.h"
+#include "platform/system/whole_file.h"
 #include "platform/video/recording_frame_source.h"
 #include "platform/video/video_file.h"
 
@@ -20,6 +21,8 @@ std::unique_ptr<FrameSource> open_video(const std::string& video) {
                        video + ": is not there; expected a recording's directory or a video file");
   }
   if (fs::is_directory(video, error)) return open_recorded_frames({video, true, false});
+  std::string why;
+  if (!open_to_read(video, &why).is_open()) throw CommandError(kExitFailed, why);
   return open_video_file(video);
 }
 

@@ -8,11 +8,12 @@
 
 #include "edge_app/config/link_keys.h"
 #include "edge_app/config/yaml_section.h"
+#include "platform/streams/picture_size.h"
 
 namespace alidade {
 namespace {
 
-constexpr NumberRange kPixels{1, 65536, "px"};
+constexpr NumberRange kPixels{1, kMostPictureSide, "px"};
 
 VideoConfig read_video(YamlSection section, const std::string& path) {
   VideoConfig video;

@@ -4,7 +4,8 @@
 
 #include <cstdlib>
 #include <filesystem>
-#include <fstream>
+
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 
@@ -57,11 +58,13 @@ void read_login(YamlSection& section, std::string* user, std::string* password) 
 
 std::string first_line_of(const YamlSection& section, const std::string& key,
                           const std::string& file, const std::string& what) {
-  std::ifstream in(file);
-  std::string line;
-  if (!std::getline(in, line)) {
+  std::string text;
+  std::string error;
+  if (!read_file(file, &text, &error)) section.fail(key, error + "; put the " + what + " there");
+  if (text.empty()) {
     section.fail(key, fmt::format("cannot read a line of {}; put the {} there", file, what));
   }
+  std::string line = text.substr(0, text.find('\n'));
   const char* blanks = " \t\r";
   line.erase(0, line.find_first_not_of(blanks));
   line.erase(line.find_last_not_of(blanks) + 1);

@@ -2,15 +2,13 @@
 
 #include <algorithm>
 #include <cmath>
-#include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "core/calibration/number_text.h"
 #include "edge_app/config/nearest_word.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {
@@ -39,14 +37,12 @@ bool parse_yaml(const std::string& text, const std::string& name,
 
 bool read_yaml_file(const std::string& path, const std::function<void(YamlSection&)>& read,
                     std::string* error) {
-  std::ifstream file(path);
-  std::stringstream text;
-  // A directory opens, but does not read; an empty file sets failbit, and is an empty section.
-  if (!file || std::filesystem::is_directory(path) || (text << file.rdbuf(), file.bad())) {
-    *error = path + ": cannot be read; expected a YAML file";
+  std::string text;
+  if (!read_file(path, &text, error)) {
+    error->append("; expected a YAML file");
     return false;
   }
-  return parse_yaml(text.str(), path, read, error);
+  return parse_yaml(text, path, read, error);
 }
 
 YamlSection::YamlSection(const YAML::Node& node, std::string name, std::string file)

@@ -7,11 +7,11 @@
 
 #include <algorithm>
 #include <cerrno>
-#include <fstream>
 #include <system_error>
 
 #include "platform/system/clock.h"
 #include "platform/system/shown.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {
@@ -25,8 +25,9 @@ bool library_is_ready() {
 }
 
 bool is_readable(const std::string& file) {
-  std::ifstream in(file);
-  return in.good() && in.peek() != std::ifstream::traits_type::eof();
+  std::string bytes;
+  std::string ignored;
+  return read_file(file, &bytes, &ignored) && !bytes.empty();
 }
 
 }  // namespace

@@ -13,6 +13,11 @@ namespace alidade {
 [[nodiscard]] bool load_calibration(const std::string& path, Calibration* calibration,
                                     std::string* error, ZoomCurve* curve = nullptr);
 
+// The text of such a file; refused also where no picture of ours is as large. path stands for it in errors.
+[[nodiscard]] bool parse_stored_calibration(const std::string& text, const std::string& path,
+                                            Calibration* calibration, std::string* error,
+                                            ZoomCurve* curve = nullptr);
+
 // Atomic: a reader, or a power cut, meets the old file or the new one, never half of one. A
 // calibration that load_calibration() would refuse is refused here.
 [[nodiscard]] bool save_calibration(const std::string& path, const Calibration& calibration,

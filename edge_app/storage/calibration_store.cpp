@@ -152,6 +152,12 @@ std::string zoom_text(std::optional<double> zoom) {
 CalibrationStore::CalibrationStore(std::string file, double zoom_tolerance)
     : file_(std::move(file)), zoom_tolerance_(std::max(zoom_tolerance, 0.0)) {}
 
+FileLock::Result CalibrationStore::lock(std::string* why) {
+  std::error_code ignored;  // where there can be no folder there can be no lock, which says so
+  fs::create_directories(folder_of(file_), ignored);
+  return lock_.take(file_, why);
+}
+
 std::vector<std::string> CalibrationStore::load(int width, int height, Use use) {
   use_ = use;
   entries_.clear();
@@ -200,7 +206,7 @@ void CalibrationStore::load_file(const std::string& path, int width, int height,
   std::string error;
   ZoomCurve curve;
   if (!read_file(path, &text, &error) ||
-      !parse_calibration(text, path, &stored.calibration, &error, &curve)) {
+      !parse_stored_calibration(text, path, &stored.calibration, &error, &curve)) {
     lines->push_back(fmt::format("{}; {}", error, set_file_aside(path)));
     return;
   }

@@ -19,6 +19,7 @@
 
 #include "core/model/zoom_curve.h"
 #include "edge_app/pipeline/calibration_archive.h"
+#include "platform/system/file_lock.h"
 
 namespace alidade {
 
@@ -35,7 +36,7 @@ namespace alidade {
 
 class CalibrationStore final : public CalibrationArchive {
  public:
-  // file: the configuration's calibration.file; its folder is created at the first save.
+  // file: the configuration's calibration.file; its folder is created by lock() and by the first save.
   // zoom_tolerance: device units within which two zooms are one.
   explicit CalibrationStore(std::string file, double zoom_tolerance = 0);
 
@@ -43,6 +44,9 @@ class CalibrationStore final : public CalibrationArchive {
   // was loaded, what was set aside and why. kLook: no file is touched.
   enum class Use { kKeep, kLook };
   [[nodiscard]] std::vector<std::string> load(int width, int height, Use use = Use::kKeep);
+
+  // To be taken before load(): of several processes that kept their calibrations here, one would remove another's map.
+  [[nodiscard]] FileLock::Result lock(std::string* why);
 
   [[nodiscard]] bool empty() const { return entries_.empty(); }
   [[nodiscard]] const StoredCalibration* find(std::optional<double> zoom) const override;
@@ -68,6 +72,7 @@ class CalibrationStore final : public CalibrationArchive {
   [[nodiscard]] bool write(Entry* entry, std::string* error);
 
   std::string file_;
+  FileLock lock_;
   double zoom_tolerance_;
   Use use_ = Use::kKeep;
   std::vector<Entry> entries_;

@@ -352,7 +352,9 @@ bool parse_map(const std::string& bytes, const std::string& name, const Calibrat
 bool load_map(const std::string& path, const Calibration& calibration, MapContent* content,
               std::string* error) {
   std::string bytes;
-  return read_file(path, &bytes, error) && parse_map(bytes, path, calibration, content, error);
+  constexpr std::size_t kMostBytes = std::size_t{256} << 20;
+  return read_file(path, &bytes, error, kMostBytes) &&
+         parse_map(bytes, path, calibration, content, error);
 }
 
 bool save_map(const std::string& path, const MapContent& content, const Calibration& calibration,

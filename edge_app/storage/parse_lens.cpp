@@ -1,9 +1,11 @@
+#include <algorithm>
 #include <string>
 #include <vector>
 
 #include "core/calibration/estimate_reader.h"
 #include "core/calibration/number_text.h"
 #include "edge_app/storage/lens_file.h"
+#include "platform/streams/picture_size.h"
 #include "platform/system/whole_file.h"
 
 namespace alidade {
@@ -42,6 +44,10 @@ class LensReader {
     file_.check_top("a lens", known);
     LensEstimate estimate;
     file_.read_image(&estimate.width, &estimate.height);
+    if (std::max(estimate.width, estimate.height) > kMostPictureSide) {
+      file_.fail(file_.root()["image"],
+                 "image is larger than " + std::to_string(kMostPictureSide) + " px");
+    }
     EstimateRows rows{names, {}, join(names), "the unit of the value"};
     std::vector<double> sigmas;
     for (int i = 0; i < kLensParameterCount; ++i) {

@@ -1,25 +1,41 @@
 #include "platform/storage/csv_reader.h"
 
+#include <ext/stdio_filebuf.h>
+
 #include <algorithm>
 #include <cerrno>
 #include <cmath>
 #include <cstddef>
 #include <cstdlib>
 #include <cstring>
-#include <fstream>
+#include <istream>
 #include <string_view>
 
 #include "platform/system/shown.h"
 #include "platform/system/text.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {
 
 constexpr std::string_view kSpaces = " \t";
 
-// The line without its line feed. False at the end of the text; *cut_off: the last line has no line feed.
+constexpr std::size_t kLongestLine = 65536;  // bytes
+
+// The line without its line feed. False at the end of the text; *cut_off: the last line has no line feed. Of one that is too long
+// the beginning, longer than kLongestLine.
 bool next_line(std::istream& text, std::string* line, bool* cut_off) {
-  if (!std::getline(text, *line)) {
+  line->clear();
+  for (char piece[4096]; line->size() <= kLongestLine;) {
+    text.getline(piece, sizeof piece);
+    const auto size = static_cast<std::size_t>(text.gcount());
+    const bool goes_on = text.fail() && !text.eof() && !text.bad() && size == sizeof piece - 1;
+    const bool has_end = !goes_on && !text.eof() && !text.fail();
+    line->append(piece, has_end ? size - 1 : size);
+    if (!goes_on) break;
+    text.clear();
+  }
+  if (text.bad() || (text.fail() && line->empty())) {
     return false;
   }
   *cut_off = text.eof();
@@ -100,6 +116,9 @@ bool parse_csv(std::istream& text, const std::string& name, const std::vector<Cs
       error->append(what).append("; the columns are ").append(expected);
       return false;
     };
+    if (line.size() > kLongestLine) {
+      return malformed("a line of more than " + std::to_string(kLongestLine) + " bytes");
+    }
     if (cut_off) {
       *error = name + ":" + std::to_string(number) +
                ": the file is cut off: its last line does not end with a newline; delete that "
@@ -145,13 +164,14 @@ bool parse_csv(std::istream& text, const std::string& name, const std::vector<Cs
 
 bool read_csv(const std::string& path, const std::vector<CsvColumn>& columns,
               const AddCsvRow& add_row, std::string* error) {
-  errno = 0;
-  std::ifstream file(path, std::ios::binary);
-  if (!file) {
-    *error = path + ": " + std::strerror(errno);
+  FileDescriptor file = open_to_read(path, error);
+  if (!file.is_open()) {
     return false;
   }
-  return parse_csv(file, path, columns, add_row, error);
+  errno = 0;
+  __gnu_cxx::stdio_filebuf<char> buffer(file.release(), std::ios::in | std::ios::binary);
+  std::istream text(&buffer);
+  return parse_csv(text, path, columns, add_row, error);
 }
 
 }  // namespace alidade

@@ -3,12 +3,13 @@
 #include <yaml-cpp/yaml.h>
 
 #include <algorithm>
-#include <fstream>
-#include <sstream>
+#include <istream>
 #include <vector>
 
 #include "platform/storage/csv_reader.h"
+#include "platform/streams/picture_size.h"
 #include "platform/system/shown.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {
@@ -101,6 +102,10 @@ bool parse_recording_info(const std::string& text, const std::string& name, Reco
       if (*value < 1) {
         return flaw(root[key].Mark(), std::string(key) + " must be positive");
       }
+      if (*value > kMostPictureSide) {
+        return flaw(root[key].Mark(), std::string(key) + " is larger than " +
+                                          std::to_string(kMostPictureSide) + " px");
+      }
     }
     if (root["notes"] && root["notes"].IsScalar()) {
       read.notes = root["notes"].Scalar();
@@ -114,13 +119,12 @@ bool parse_recording_info(const std::string& text, const std::string& name, Reco
 
 bool read_recording_info(const std::string& directory, RecordingInfo* info, std::string* error) {
   const std::string path = directory + "/recording.yaml";
-  std::ifstream file(path);
-  std::ostringstream text;
-  if (!file || (text << file.rdbuf()).bad()) {  // an empty file only makes it fail
-    *error = path + ": cannot be read; a recording is a directory with this file";
+  std::string text;
+  if (!read_file(path, &text, error)) {
+    error->append("; a recording is a directory with this file");
     return false;
   }
-  return parse_recording_info(text.str(), path, info, error);
+  return parse_recording_info(text, path, info, error);
 }
 
 bool parse_frames_csv(std::istream& text, const std::string& name, std::vector<FrameStamp>* frames,

@@ -6,12 +6,12 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <cstdint>
 #include <cstdlib>
 #include <cstring>
 #include <filesystem>
-#include <fstream>
-#include <sstream>
 #include <system_error>
+#include <utility>
 #include <vector>
 
 namespace alidade {
@@ -135,16 +135,49 @@ int remove_unfinished(const std::string& folder,
   return removed;
 }
 
-bool read_file(const std::string& path, std::string* content, std::string* error) {
-  std::ifstream file(path, std::ios::binary);
-  file.peek();  // a folder opens, but cannot be read
-  if (!file.is_open() || file.bad()) {
-    *error = path + ": cannot be read: " + std::strerror(errno);
+FileDescriptor open_to_read(const std::string& path, std::string* error) {
+  const auto refuse = [&](const std::string& why) {
+    *error = path + ": cannot be read: " + why;
+    return FileDescriptor();
+  };
+  // A pipe would be waited for, a terminal taken.
+  FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK | O_NOCTTY));
+  // A socket cannot be opened.
+  if (!file.is_open() && errno == ENXIO) return refuse("not a file, but a socket or a device");
+  if (!file.is_open()) return refuse(std::strerror(errno));
+  struct stat status = {};
+  if (::fstat(file.get(), &status) != 0) return refuse(std::strerror(errno));
+  if (S_ISDIR(status.st_mode)) return refuse("not a file, but a folder");
+  if (S_ISFIFO(status.st_mode)) return refuse("not a file, but a pipe");
+  if (!S_ISREG(status.st_mode)) return refuse("not a file, but a device");
+  return file;
+}
+
+bool read_file(const std::string& path, std::string* content, std::string* error,
+               std::size_t most_bytes) {
+  const FileDescriptor file = open_to_read(path, error);
+  if (!file.is_open()) return false;
+  const auto refuse = [&](const std::string& why) {
+    *error = path + ": cannot be read: " + why;
     return false;
+  };
+  struct stat status = {};
+  if (::fstat(file.get(), &status) != 0) return refuse(std::strerror(errno));
+  const std::string too_large = "larger than " + std::to_string(most_bytes >> 20) + " MB";
+  if (status.st_size > 0 && static_cast<std::uint64_t>(status.st_size) > most_bytes)
+    return refuse(too_large);
+  std::string bytes;
+  bytes.reserve(static_cast<std::size_t>(status.st_size));
+  // It may grow meanwhile, and what the kernel makes as it is read has no size.
+  for (char piece[16384];;) {
+    const ssize_t n = ::read(file.get(), piece, sizeof piece);
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return refuse(std::strerror(errno));
+    if (n == 0) break;
+    bytes.append(piece, static_cast<std::size_t>(n));
+    if (bytes.size() > most_bytes) return refuse(too_large);
   }
-  std::ostringstream bytes;
-  bytes << file.rdbuf();
-  *content = bytes.str();
+  *content = std::move(bytes);
   return true;
 }
 

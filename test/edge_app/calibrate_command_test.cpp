@@ -5,7 +5,7 @@
 #include <fcntl.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
-#include <sys/stat.h>
+#include <signal.h>
 
 #include <cmath>
 #include <filesystem>
@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 #include <sstream>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "edge_app/storage/calibration_file.h"
@@ -471,14 +472,9 @@ TEST_F(CalibrateCommand, BadOptionsAreOneLineAndExitCodeTwo) {
 
 TEST_F(CalibrateCommand, EndsCleanlyWhenInterrupted) {
   record(test::Simulation());
-  ASSERT_EQ(::mkfifo(path("guess.yaml").c_str(), 0600), 0);
   Process process({ALIDADE_EXECUTABLE, "calibrate", path()});
-  {
-    // Opens when the program reads the other end: it listens to signals by then.
-    std::ofstream guess(path("guess.yaml"));
-    process.send(SIGINT);
-    guess << "focal_length: {value: 4000}\n";
-  }
+  while (!process.blocks(SIGINT)) std::this_thread::yield();  // then it listens to it
+  process.send(SIGINT);
   EXPECT_EQ(process.wait(), 1);
   EXPECT_THAT(process.errors(), EndsWith(path() + ": calibration interrupted; nothing stored\n"));
   EXPECT_FALSE(fs::exists(path("alidade")));

@@ -90,7 +90,7 @@ TEST(CalibrationFile, SaysWhyAFileCannotBeReadOrWritten) {
   EXPECT_FALSE(load_calibration(folder.path() + "/none.yaml", &calibration, &error));
   EXPECT_EQ(error, folder.path() + "/none.yaml: cannot be read: No such file or directory");
   EXPECT_FALSE(load_calibration(folder.path(), &calibration, &error));
-  EXPECT_THAT(error, HasSubstr("cannot be read: Is a directory"));
+  EXPECT_THAT(error, HasSubstr("cannot be read: not a file, but a folder"));
   EXPECT_FALSE(load_calibration(folder.write("empty.yaml", ""), &calibration, &error));
   EXPECT_THAT(error, HasSubstr("empty.yaml:1: not a calibration"));
   EXPECT_FALSE(save_calibration(folder.path() + "/no/x.yaml", some_calibration(), &error));

@@ -10,6 +10,7 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <fstream>
 #include <string>
 #include <system_error>
 #include <vector>
@@ -68,6 +69,15 @@ class Process {
     output_ = nullptr;
   }
   void send(int signal) const { ::kill(pid_, signal); }
+  // Whether it has that signal wait for it to be asked for.
+  [[nodiscard]] bool blocks(int signal) const {
+    std::ifstream status("/proc/" + std::to_string(pid_) + "/status");
+    for (std::string line; std::getline(status, line);) {
+      if (line.rfind("SigBlk:", 0) != 0) continue;
+      return (std::stoull(line.substr(7), nullptr, 16) >> (signal - 1) & 1U) != 0;
+    }
+    return false;
+  }
 
   // Waits for its end: its exit code, or 128 + the signal that ended it.
   int wait() {

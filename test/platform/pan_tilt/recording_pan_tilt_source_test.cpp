@@ -51,7 +51,7 @@ TEST(RecordingPanTiltSource, FailsForGoodWhenTheTableIsMissingOrMalformed) {
   const auto missing = source_of(directory);
   PanTiltSample sample;
   EXPECT_EQ(missing->read(sample, 0), ReadStatus::kFailed);
-  EXPECT_THAT(missing->error(), HasSubstr("telemetry.csv: No such file"));
+  EXPECT_THAT(missing->error(), HasSubstr("telemetry.csv: cannot be read: No such file"));
   directory.write("telemetry.csv", "receive_time_s,pan_rad,tilt_rad\n0,0,0\n1,east,0\n");
   const auto malformed = source_of(directory);
   EXPECT_EQ(malformed->read(sample, 0), ReadStatus::kFailed);

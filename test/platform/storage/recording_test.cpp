@@ -180,7 +180,7 @@ TEST(FramesCsv, SaysThatItIsMissing) {
   std::vector<FrameStamp> frames;
   std::string error;
   EXPECT_FALSE(read_frames_csv(directory.path(), &frames, &error));
-  EXPECT_EQ(error, directory.path() + "/frames.csv: No such file or directory");
+  EXPECT_EQ(error, directory.path() + "/frames.csv: cannot be read: No such file or directory");
 }
 
 TEST(TelemetryCsv, ReadsEveryColumn) {

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <iterator>
 #include <string>
+#include <utility>
 
 #include "test/support/temporary_directory.h"
 
@@ -49,7 +50,7 @@ TEST(WholeFile, SaysWhyItCannotBeReadOrWritten) {
   EXPECT_FALSE(read_file(folder.path() + "/none", &content, &error));
   EXPECT_EQ(error, folder.path() + "/none: cannot be read: No such file or directory");
   EXPECT_FALSE(read_file(folder.path(), &content, &error));
-  EXPECT_THAT(error, HasSubstr("cannot be read: Is a directory"));
+  EXPECT_THAT(error, HasSubstr("cannot be read: not a file, but a folder"));
   EXPECT_EQ(content, "kept");
   EXPECT_FALSE(write_file_atomically(folder.path() + "/no/file", "x", &error));
   EXPECT_THAT(error, HasSubstr("cannot be written: No such file or directory"));
@@ -93,6 +94,45 @@ TEST(WholeFile, NoLinkOrFolderOrPipeIsTakenForAnUnfinishedOne) {
   ASSERT_EQ(::mkfifo((begin + "cccccc").c_str(), 0600), 0);
   EXPECT_EQ(remove_unfinished(folder.path(), [](const std::string&) { return true; }), 0);
   EXPECT_EQ(folder.read("precious"), "kept");
+}
+
+// Each would be waited for, or has no end.
+TEST(WholeFile, PipesAndDevicesAreRefusedAtOnce) {
+  const TemporaryDirectory folder;
+  const std::string pipe = folder.path() + "/pipe";
+  ASSERT_EQ(::mkfifo(pipe.c_str(), 0600), 0);
+  const std::string link = folder.path() + "/link";
+  std::filesystem::create_symlink(pipe, link);
+  for (const auto& [path, why] : {std::pair(pipe, "a pipe"), std::pair(link, "a pipe"),
+                                  std::pair(std::string("/dev/zero"), "a device"),
+                                  std::pair(std::string("/dev/null"), "a device")}) {
+    std::string content = "kept";
+    std::string error;
+    EXPECT_FALSE(read_file(path, &content, &error));
+    EXPECT_EQ(error, path + ": cannot be read: not a file, but " + why);
+    EXPECT_EQ(content, "kept");
+  }
+}
+
+TEST(WholeFile, ALargerOneThanAllowedIsRefusedUnread) {
+  const TemporaryDirectory folder;
+  const std::string path = folder.write("file", std::string(2 << 20, 'x'));
+  std::string content;
+  std::string error;
+  EXPECT_TRUE(read_file(path, &content, &error, 2 << 20)) << error;
+  EXPECT_EQ(content.size(), std::size_t{2} << 20);
+  std::filesystem::resize_file(path, std::uintmax_t{1} << 40);  // a hole
+  EXPECT_FALSE(read_file(path, &content, &error));
+  EXPECT_EQ(error, path + ": cannot be read: larger than 4 MB");
+  EXPECT_EQ(content.size(), std::size_t{2} << 20);
+}
+
+// What the kernel makes while it is read says that it has no bytes.
+TEST(WholeFile, OneWithoutASizeIsReadToItsEnd) {
+  std::string content;
+  std::string error;
+  EXPECT_TRUE(read_file("/proc/self/maps", &content, &error)) << error;
+  EXPECT_THAT(content, HasSubstr("stack"));
 }
 
 }  // namespace
