@@ -1,25 +1,27 @@
 // alidade: the program. Results go to stdout or files; the log and one-line errors to stderr.
 
 #include <signal.h>
-#include <spdlog/sinks/stdout_color_sinks.h>
-#include <spdlog/spdlog.h>
 
-#include <cstdio>
+#include <cstring>
 #include <exception>
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/command_line.h"
+#include "edge_app/commands/log.h"
+#include "edge_app/commands/network_trial.h"
 
 int main(int argc, char** argv) {
   try {
     signal(SIGPIPE, SIG_IGN);  // a reader that goes away is an error of write(2)
-    spdlog::set_default_logger(spdlog::stderr_color_mt("alidade"));
-    spdlog::set_pattern("%H:%M:%S.%e %^%l%$ %v");
+    alidade::start_log();
+    if (argc > 1 && std::strcmp(argv[1], alidade::kNetworkTrial) == 0)
+      return alidade::run_network_trial(argc, argv);
+    alidade::allow_network_trials();
     return alidade::run_command_line(argc, argv);
   } catch (const std::exception& e) {
-    std::fprintf(stderr, "alidade: %s\n", e.what());
+    alidade::print_error(e.what());
   } catch (...) {
-    std::fprintf(stderr, "alidade: unknown failure\n");
+    alidade::print_error("unknown failure");
   }
   return alidade::kExitFailed;
 }

@@ -26,9 +26,11 @@
 #include "edge_app/commands/lens_prior.h"
 #include "edge_app/commands/live_calibration.h"
 #include "edge_app/commands/live_targets.h"
+#include "edge_app/commands/log.h"
 #include "edge_app/commands/scene_loading.h"
 #include "edge_app/output/mqtt_connection.h"
 #include "edge_app/pipeline/steady_samples.h"
+#include "platform/system/escaped.h"
 
 namespace alidade {
 namespace {
@@ -175,7 +177,7 @@ std::string headline(const TelemetryReport& telemetry) {
 }
 
 void print(const ReportLines& lines) {
-  for (const auto& [label, text] : lines) fmt::print("  {:<13}{}\n", label, text);
+  for (const auto& [label, text] : lines) fmt::print("  {:<13}{}\n", label, escaped(text));
 }
 
 void add_connection(const Connection& connection, const char* what, Findings* findings) {
@@ -191,11 +193,12 @@ void add_connection(const Connection& connection, const char* what, Findings* fi
 // The report and what would help on stdout; what is wrong on stderr.
 void print_report(const CheckReport& report, const VideoNeeds& video_needs) {
   const Measured& measured = report.measured;
-  fmt::print("video          {}: {}\n", measured.video.name, headline(report.video, video_needs));
+  fmt::print("video          {}: {}\n", escaped(measured.video.name),
+             headline(report.video, video_needs));
   print(describe(report.video));
   print(describe(measured.images));
   print(describe(report.repeats));
-  fmt::print("pan/tilt       {}: {}\n", measured.pan_tilt.name,
+  fmt::print("pan/tilt       {}: {}\n", escaped(measured.pan_tilt.name),
              report.has_telemetry ? headline(report.telemetry) : "no telemetry, by configuration");
   print(describe(report.telemetry));
   if (report.motion) {
@@ -203,22 +206,24 @@ void print_report(const CheckReport& report, const VideoNeeds& video_needs) {
     print(describe(*report.motion));
   }
   if (!report.scene.file.empty()) {
-    fmt::print("scene map      {}: {}\n", report.scene.file, headline(report.scene));
+    fmt::print("scene map      {}: {}\n", escaped(report.scene.file), headline(report.scene));
     print(describe(report.scene));
   }
   if (!report.broker.empty())
-    fmt::print("mqtt           {}: {}\n", report.broker,
+    fmt::print("mqtt           {}: {}\n", escaped(report.broker),
                report.broker_error.empty() ? "connected" : "failed");
   for (const Finding& finding : report.findings) {
-    if (finding.severity == Severity::kAdvice) fmt::print("advice         {}\n", finding.text);
+    if (finding.severity == Severity::kAdvice)
+      fmt::print("advice         {}\n", escaped(finding.text));
   }
 }
 
 // What is known before anything was measured.
 void print_beginning(const std::string& configuration, const NamedCalibration& calibration) {
   const Camera<double>& camera = calibration.calibration.camera;
-  fmt::print("configuration  {}: ok\n", configuration);
-  fmt::print("calibration    {}: {}focal length {:.1f} px, clock offset {} ms\n", calibration.name,
+  fmt::print("configuration  {}: ok\n", escaped(configuration));
+  fmt::print("calibration    {}: {}focal length {:.1f} px, clock offset {} ms\n",
+             escaped(calibration.name),
              calibration.calibrated ? fmt::format("{}x{} px, ", camera.width, camera.height)
                                     : "not calibrated, ",
              camera.focal_length, rounded_text(1e3 * calibration.calibration.clock_offset, 1));
@@ -309,7 +314,7 @@ int check_links(const CheckOptions& options) {
     print_report(report, video_needs);
   }
   for (const Finding& finding : report.findings) {
-    if (finding.severity == Severity::kProblem) fmt::print(stderr, "alidade: {}\n", finding.text);
+    if (finding.severity == Severity::kProblem) print_error(finding.text);
   }
   return is_ok(report.findings) ? kExitOk : kExitFailed;
 }

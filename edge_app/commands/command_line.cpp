@@ -17,6 +17,7 @@
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/live_pattern.h"
 #include "edge_app/commands/localize.h"
+#include "edge_app/commands/log.h"
 #include "edge_app/commands/map_build.h"
 #include "edge_app/commands/map_export.h"
 #include "edge_app/commands/map_info.h"
@@ -382,11 +383,10 @@ int run_command_line(int argc, char** argv) {
     if (e.get_exit_code() == static_cast<int>(CLI::ExitCodes::Success)) {
       return app.exit(e);  // --help, --version
     }
-    const std::string line = usage_error(app, {argv + 1, argv + argc}, e);
-    std::fprintf(stderr, "alidade: %s\n", line.c_str());
+    print_error(usage_error(app, {argv + 1, argv + argc}, e));
     return kExitUsage;
   } catch (const CommandError& e) {
-    std::fprintf(stderr, "alidade: %s\n", e.what());
+    print_error(e.what());
     return e.exit_code;
   }
 }

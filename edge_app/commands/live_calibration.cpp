@@ -32,19 +32,23 @@ void set_lens_prior(const Config& config, SelfCalibrationOptions* options) {
 // What may then be done with it. Throws CommandError where it is another process's.
 CalibrationStore::Use lock_store(const Config& config, CalibrationStore* store) {
   std::string why;
+  if (!config.calibration.automatic) {
+    // Who makes no calibrations reads those of who does, and keeps nobody out.
+    FileLock in_use;
+    return in_use.take(config.calibration.file, &why) == FileLock::Result::kInUse
+               ? CalibrationStore::Use::kLook
+               : CalibrationStore::Use::kKeep;
+  }
   switch (store->lock(&why)) {
     case FileLock::Result::kTaken:
       break;
     case FileLock::Result::kInUse:
-      // Who makes no calibrations reads those of who does.
-      if (!config.calibration.automatic) return CalibrationStore::Use::kLook;
       throw CommandError(kExitFailed,
                          fmt::format("calibration.file {}; give each camera a file of its own, or, "
                                      "to use what that process stores, set calibration.auto: false",
                                      why));
     case FileLock::Result::kImpossible:
-      if (config.calibration.automatic)
-        spdlog::warn("{}; no other process may keep calibrations there", why);
+      spdlog::warn("{}; no other process may keep calibrations there", why);
       break;
   }
   return CalibrationStore::Use::kKeep;

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include "edge_app/commands/command.h"
+#include "edge_app/commands/network_trial.h"
 #include "platform/system/realtime.h"
 #include "platform/system/whole_file.h"
 
@@ -34,6 +35,8 @@ std::shared_ptr<const PlaneEstimate> plane_of(const Config& config,
                                               std::shared_ptr<const PlaneEstimate> plane) {
   return config.tracking.targets->tracker.space == TargetSpace::kPlane ? std::move(plane) : nullptr;
 }
+
+constexpr std::size_t kMostNetworkBytes = std::size_t{1} << 30;
 
 // Of a file of one a line; throws CommandError.
 std::vector<std::string> read_class_names(const std::string& path) {
@@ -68,10 +71,13 @@ std::unique_ptr<NetworkDetector> load_network(const std::optional<NetworkFiles>&
   NetworkOptions options = files->options;
   std::string model;
   std::string error;
-  if (!read_file(files->model, &model, &error)) {
+  if (!read_file(files->model, &model, &error, kMostNetworkBytes)) {
     throw CommandError(kExitUsage, "detectors.onnx: " + error);
   }
   if (!files->labels.empty()) options.labels = read_class_names(files->labels);
+  if (!survives_trial(model, options, &error)) {
+    throw CommandError(kExitUsage, "detectors.onnx: " + files->model + ": " + error);
+  }
   std::unique_ptr<NetworkDetector> network;
   // OpenCV's worker threads have the priority of the thread that first needs them: not that of the one that starts the real-time thread.
   std::thread([&] {

@@ -36,6 +36,7 @@ VideoConfig read_video(YamlSection section, const std::string& path) {
     if (const auto file = section.text("certificate_file")) {
       if (!by_tls) section.fail("certificate_file", "is for rtsps:// only");
       video.certificate_file = path_relative_to(path, *file);
+      refuse_other_than_file(section, "certificate_file", video.certificate_file);
     }
   } else if (*type == "mjpeg") {
     video.type = VideoConfig::Type::kMjpeg;
@@ -55,6 +56,7 @@ VideoConfig read_video(YamlSection section, const std::string& path) {
       video.format = section.choice("format", {"MJPG", "H264", "H265"}).value_or(video.format);
     } else {
       video.url = path_relative_to(path, video.url);
+      refuse_other_than_file(section, "url", video.url);
     }
   }
   if (video.type != VideoConfig::Type::kRecording) {

@@ -56,6 +56,13 @@ void read_login(YamlSection& section, std::string* user, std::string* password) 
   *password = value;
 }
 
+void refuse_other_than_file(const YamlSection& section, const std::string& key,
+                            const std::string& path) {
+  std::error_code ignored;
+  std::string error;
+  if (fs::exists(path, ignored) && !open_to_read(path, &error).is_open()) section.fail(key, error);
+}
+
 std::string first_line_of(const YamlSection& section, const std::string& key,
                           const std::string& file, const std::string& what) {
   std::string text;

@@ -24,6 +24,10 @@ inline constexpr NumberRange kSeconds{0.1, 3600, "s"};
 // user and password_env.
 void read_login(YamlSection& section, std::string* user, std::string* password);
 
+// Fails where something that is no file has the path. One that is missing its reader tells.
+void refuse_other_than_file(const YamlSection& section, const std::string& key,
+                            const std::string& path);
+
 // The first line of a file that holds a secret, without the blanks around it. what: what it holds, for the error.
 [[nodiscard]] std::string first_line_of(const YamlSection& section, const std::string& key,
                                         const std::string& file, const std::string& what);

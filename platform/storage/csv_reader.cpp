@@ -20,13 +20,13 @@ namespace {
 
 constexpr std::string_view kSpaces = " \t";
 
-constexpr std::size_t kLongestLine = 65536;  // bytes
+constexpr std::size_t kLongestCsvLine = 65536;  // bytes
 
 // The line without its line feed. False at the end of the text; *cut_off: the last line has no line feed. Of one that is too long
-// the beginning, longer than kLongestLine.
+// the beginning, longer than kLongestCsvLine.
 bool next_line(std::istream& text, std::string* line, bool* cut_off) {
   line->clear();
-  for (char piece[4096]; line->size() <= kLongestLine;) {
+  for (char piece[4096]; line->size() <= kLongestCsvLine;) {
     text.getline(piece, sizeof piece);
     const auto size = static_cast<std::size_t>(text.gcount());
     const bool goes_on = text.fail() && !text.eof() && !text.bad() && size == sizeof piece - 1;
@@ -116,8 +116,8 @@ bool parse_csv(std::istream& text, const std::string& name, const std::vector<Cs
       error->append(what).append("; the columns are ").append(expected);
       return false;
     };
-    if (line.size() > kLongestLine) {
-      return malformed("a line of more than " + std::to_string(kLongestLine) + " bytes");
+    if (line.size() > kLongestCsvLine) {
+      return malformed("a line of more than " + std::to_string(kLongestCsvLine) + " bytes");
     }
     if (cut_off) {
       *error = name + ":" + std::to_string(number) +
