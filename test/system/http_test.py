@@ -213,6 +213,7 @@ class Http(SystemTest):
         calibration = self.check_answer(api, "/api/v1/calibration")
         self.assertEqual(calibration["image"], {key: IMAGE[key] for key in ("width", "height")})
         self.check_answer(api, "/api/v1/calibrate", 409, b"")
+        self.check_answer(api, "/api/v1/stream/ticket", body={})
         self.assertEqual(self.check_answer(api, "/api/v1/plane")["height"]["value"], 20)
         known = {"format": 1, "level": {"sigma_deg": 0.1}, "height": {"height_m": 20, "sigma_m": 0.1}}
         self.assertIn("height", self.check_answer(api, "/api/v1/plane/fit", body=known)["plane_yaml"])
@@ -258,7 +259,7 @@ class Http(SystemTest):
         for path in ("/api/v1/orientation", "/api/v1/status", "/api/v1/history", "/api/v1/calibration", "/api/v1/targets"):
             self.check_answer(api, path, 401, token="wrong-horse")
             self.check_answer(api, path, 401, token=None)
-        for path in ("/api/v1/direction", "/api/v1/pixel", "/api/v1/calibrate", "/api/v1/detections"):
+        for path in ("/api/v1/direction", "/api/v1/pixel", "/api/v1/calibrate", "/api/v1/detections", "/api/v1/stream/ticket"):
             self.check_answer(api, path, 401, {}, token=None)
         self.end(run)
         told = [json.loads(line) for line in (self.folder / "targets.jsonl").read_text().splitlines()]

@@ -42,14 +42,19 @@ std::string decoded(std::string_view text, bool in_query) {
 }
 
 void parse_query(std::string_view query, HttpHead* head) {
-  while (!query.empty()) {
-    const std::size_t end = std::min(query.find('&'), query.size());
-    const std::string_view pair = query.substr(0, end);
-    query.remove_prefix(std::min(end + 1, query.size()));
-    if (pair.empty()) continue;
-    const std::size_t equals = std::min(pair.find('='), pair.size());
-    head->parameters.emplace_back(decoded(pair.substr(0, equals), true),
-                                  decoded(pair.substr(std::min(equals + 1, pair.size())), true));
+  const auto text_between = [](const char* begin, const char* end) {
+    return std::string_view(begin, static_cast<std::size_t>(end - begin));
+  };
+  const char* const end = query.data() + query.size();
+  for (const char* begin = query.data(); begin < end;) {
+    const char* const pair_end = std::find(begin, end, '&');
+    const char* const equals = std::find(begin, pair_end, '=');
+    if (begin < pair_end) {
+      const char* const value = equals == pair_end ? pair_end : equals + 1;
+      head->parameters.emplace_back(decoded(text_between(begin, equals), true),
+                                    decoded(text_between(value, pair_end), true));
+    }
+    begin = pair_end == end ? end : pair_end + 1;
   }
 }
 
@@ -98,12 +103,12 @@ bool is_of_browser(const Fields& fields) {
     const auto name = field.name_string();
     if (istarts_with(std::string_view(name.data(), name.size()), "sec-")) return true;
   }
-  const std::string_view accepted = text_of(fields, http::field::accept);
+  const std::string accepted(text_of(fields, http::field::accept));
   return fields.count(http::field::origin) > 0 || fields.count(http::field::referer) > 0 ||
          fields.count(http::field::accept_language) > 0 || fields.count(http::field::cookie) > 0 ||
          fields.count("Upgrade-Insecure-Requests") > 0 ||
-         accepted.find("image/") != std::string_view::npos ||
-         accepted.find("text/html") != std::string_view::npos ||
+         boost::algorithm::contains(accepted, "image/") ||
+         boost::algorithm::contains(accepted, "text/html") ||
          istarts_with(text_of(fields, http::field::user_agent), "mozilla/");
 }
 
