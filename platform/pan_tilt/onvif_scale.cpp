@@ -12,7 +12,6 @@ namespace {
 
 constexpr OnvifInterval kGenericScale{-1, 1};
 constexpr OnvifInterval kDegreesScale{-360, 360};
-constexpr OnvifRange kDegrees{-360 * kRadPerDeg, 360 * kRadPerDeg};
 constexpr double kRounding = 0.005;    // of a scale: positions beyond its ends by that are not rare
 constexpr double kLargestEnd = 1e6;    // a declared end beyond that is a placeholder
 constexpr double kLeastPan_deg = 180;  // a pan that turns over less is not seen to be in degrees
