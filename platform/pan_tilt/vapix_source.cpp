@@ -54,7 +54,8 @@ std::string position_url(const Url& url, int camera) {
 
 HttpPollingPlan plan_of(const VapixSourceOptions& given) {
   HttpPollingPlan plan;
-  static_cast<HttpDeviceOptions&>(plan.options) = given;
+  const HttpDeviceOptions& of_any_device = given;
+  static_cast<HttpDeviceOptions&>(plan.options) = of_any_device;
   plan.options.max_body = kMaxVapixBody;
   plan.options.expected = "a camera's position";
   Url url;
