@@ -9,6 +9,7 @@
 
 #include "platform/system/clock.h"
 #include "platform/video/rtp_source.h"
+#include "platform/video/rtsp_framing.h"
 #include "test/platform/support/eventually.h"
 #include "test/platform/support/scripted_rtsp_server.h"
 
