@@ -221,9 +221,11 @@ class Http(SystemTest):
         self.check_answer(api, "/api/v1/plane/fit", 400, {"format": 1, "houses": []})
         self.check_answer(api, "/api/v1/map", 404)
         self.follow_somebody(api, place)
-        frame = self.check_answer(api, "/api/v1/orientation")["frame"]
         targets = self.check_answer(api, "/api/v1/targets")
         self.assertEqual(len(targets["targets"]), 1)
+        # One of which no detections have come yet.
+        wait_until(lambda: api.ask("api/v1/orientation").json()["frame"] > targets["detected_frame"], "a later frame")
+        frame = self.check_answer(api, "/api/v1/orientation")["frame"]
         later = api.ask(f"api/v1/targets?frame={frame}").json()
         self.assertEqual((later["frame"], later["detected_frame"]), (frame, targets["detected_frame"]))
         for body, status in (({"frame": 10**9, "boxes": []}, 404), ({"frame": targets["detected_frame"], "boxes": []}, 409),
