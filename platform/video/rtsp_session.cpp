@@ -18,7 +18,7 @@ namespace {
 constexpr int kRedirections = 5;
 constexpr int kPortTries = 100;
 constexpr double kGoodbye_s = 0.5;    // given to TEARDOWN, so that the camera frees the session
-constexpr double kPollSlice_s = 0.1;  // by UDP: of a wait
+constexpr double kUdpSlice_s = 0.1;  // by UDP: of a wait
 
 // A control attribute (RFC 2326, C.1.1) against the address that it is relative to.
 std::string resolve(const std::string& base, const std::string& control) {
@@ -287,11 +287,11 @@ ReadStatus RtspSession::receive(double deadline_s, std::uint8_t* data, std::size
     if (ports_) {
       // Video leaves no silence in which to read what the camera says.
       if (monotonic_now_s() >= next_look_s_) {
-        next_look_s_ = monotonic_now_s() + kPollSlice_s;
+        next_look_s_ = monotonic_now_s() + kUdpSlice_s;
         // One that closes this connection and sends on may do so: below, silence is the end.
         (void)next_packet(0, &within, error);
       }
-      const double slice_end_s = monotonic_now_s() + std::min(left_s, kPollSlice_s);
+      const double slice_end_s = monotonic_now_s() + std::min(left_s, kUdpSlice_s);
       status = ports_->receive(slice_end_s, data, capacity, received, error);
       if (status != ReadStatus::kTimeout) return status;
       status = next_packet(0, &within, error);
