@@ -96,6 +96,7 @@ class HttpPollingSource : public PanTiltSource {
   double started_s_ = 0;
   double previous_answer_s_ = 0;  // to this request: a 401 before the answer
   double answer_s_ = 0;           // when the first bytes of the latest answer were here
+  std::size_t header_bytes_ = 0;
   std::string body_;
 };
 
@@ -140,7 +141,8 @@ std::size_t HttpPollingSource::on_header(char* data, std::size_t size, std::size
     poll->answer_s_ = monotonic_now_s();
     poll->body_.clear();
   }
-  return bytes;
+  poll->header_bytes_ += bytes;
+  return poll->header_bytes_ <= kMostHeaderBytes ? bytes : 0;
 }
 
 std::size_t HttpPollingSource::on_body(char* data, std::size_t size, std::size_t count,
@@ -204,6 +206,7 @@ void HttpPollingSource::start_request(double now_s) {
     curl_easy_setopt(easy_.get(), CURLOPT_HTTPGET, 1L);
   }
   body_.clear();
+  header_bytes_ = 0;
   curl_error_[0] = '\0';
   answer_s_ = 0;
   previous_answer_s_ = 0;
@@ -256,7 +259,8 @@ ReadStatus HttpPollingSource::finish_request(CURLcode code, PanTiltSample* sampl
       ask_on_ = true;
       return ReadStatus::kTimeout;
     }
-    return disconnect(code == CURLE_WRITE_ERROR
+    return disconnect(header_bytes_ > kMostHeaderBytes ? kHeadersTooLong
+                      : code == CURLE_WRITE_ERROR
                           ? "the answer is longer than " + std::to_string(options_.max_body) +
                                 " bytes: not " + options_.expected
                       : curl_error_[0] != '\0' ? curl_error_

@@ -3,6 +3,7 @@
 
 #include <curl/curl.h>
 
+#include <cstddef>
 #include <memory>
 #include <string>
 
@@ -16,6 +17,10 @@ struct CurlMultiCleanup {
 };
 using CurlEasyPtr = std::unique_ptr<CURL, CurlEasyCleanup>;
 using CurlMultiPtr = std::unique_ptr<CURLM, CurlMultiCleanup>;
+
+// Of an answer's headers, whichever HTTP link: libcurl keeps all of them, without end.
+constexpr std::size_t kMostHeaderBytes = 64U << 10U;
+constexpr const char* kHeadersTooLong = "the answer's headers are longer than 64 KB";
 
 // A handle without proxy and signals; null if libcurl does not start. methods: CURLAUTH_..., used
 // if user is not empty. error_buffer of CURL_ERROR_SIZE bytes must outlive the handle.

@@ -56,6 +56,7 @@ class MjpegSource : public FrameSource {
   }
   static int on_socket(void* self, curl_socket_t socket, curlsocktype purpose);
   static int on_close(void* self, curl_socket_t socket);
+  static std::size_t on_header(char* data, std::size_t size, std::size_t count, void* self);
   static std::size_t on_body(char* data, std::size_t size, std::size_t count, void* self);
   bool make_handle();
   bool begin_stream();
@@ -87,6 +88,7 @@ class MjpegSource : public FrameSource {
   CurlMultiPtr multi_;                       // stop() wakes it up
   CurlEasyPtr easy_;                         // of this connection
   std::optional<MultipartScanner> scanner_;  // of this connection, from its first bytes on
+  std::size_t header_bytes_ = 0;             // of this connection's answers
   std::string refusal_;                      // why the answer's body was not taken
   std::int64_t discarded_ = 0;               // by the scanner, as far as counted
   std::int64_t pictures_ = 0;                // of this connection
@@ -144,6 +146,8 @@ bool MjpegSource::make_handle() {
   }
   curl_easy_setopt(easy_.get(), CURLOPT_URL, name_.c_str());
   curl_easy_setopt(easy_.get(), CURLOPT_BUFFERSIZE, kReceiveBuffer);
+  curl_easy_setopt(easy_.get(), CURLOPT_HEADERFUNCTION, &MjpegSource::on_header);
+  curl_easy_setopt(easy_.get(), CURLOPT_HEADERDATA, this);
   curl_easy_setopt(easy_.get(), CURLOPT_WRITEFUNCTION, &MjpegSource::on_body);
   curl_easy_setopt(easy_.get(), CURLOPT_WRITEDATA, this);
   curl_easy_setopt(easy_.get(), CURLOPT_SOCKOPTFUNCTION, &MjpegSource::on_socket);
@@ -168,6 +172,15 @@ int MjpegSource::on_close(void* self, curl_socket_t socket) {
     source->low_water_ = 1;
   }
   return ::close(socket);
+}
+
+std::size_t MjpegSource::on_header(char* /*data*/, std::size_t size, std::size_t count,
+                                   void* self) {
+  auto* source = static_cast<MjpegSource*>(self);
+  source->header_bytes_ += size * count;
+  if (source->header_bytes_ <= kMostHeaderBytes) return size * count;
+  source->refusal_ = kHeadersTooLong;
+  return 0;  // ends the transfer with CURLE_WRITE_ERROR
 }
 
 std::size_t MjpegSource::on_body(char* data, std::size_t size, std::size_t count, void* self) {
@@ -227,6 +240,7 @@ ReadStatus MjpegSource::receive_connection(std::string* error) {
   }
   scanner_.reset();
   refusal_.clear();
+  header_bytes_ = 0;
   curl_error_[0] = '\0';
   pictures_ = 0;
   last_picture_s_ = monotonic_now_s();

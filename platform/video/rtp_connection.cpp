@@ -94,13 +94,15 @@ ReadStatus RtpConnection::nothing_received(std::string* error) const {
                                              : "nothing received for %g s",
                 options_.timeout_s);
   *error = text;
-  if (filter_.foreign() > 0 && !filter_.source()) {
-    *error += "; what comes is of " + filter_.foreign_kind();
-  }
+  if (foreign() > 0 && !filter_.source()) *error += "; what comes is of " + foreign_kind();
   if (arrival_s_ > 0 && !any_picture_ && options_.url.rfind("rtp://", 0) == 0) {
     *error += "; is what comes " + options_.format + "?";
   }
   return ReadStatus::kDisconnected;
+}
+
+std::string RtpConnection::foreign_kind() const {
+  return filter_.foreign() > 0 ? filter_.foreign_kind() : transport_->foreign_kind();
 }
 
 ReadStatus RtpConnection::open(std::string* error) {
@@ -276,7 +278,6 @@ bool RtpConnection::append(AccessUnit* piece) {
 ReadStatus RtpConnection::read(AccessUnit* unit, std::string* error) {
   const ReadStatus status = read_picture(unit, error);
   if (status != ReadStatus::kOk) return status;
-  last_picture_s_ = monotonic_now_s();
   any_picture_ = true;
   const AVPacket& packet = *unit->packet;
   if (packet.pts != AV_NOPTS_VALUE && another_sender(unit)) {
@@ -288,6 +289,7 @@ ReadStatus RtpConnection::read(AccessUnit* unit, std::string* error) {
              " stream has B-frames, which come late; switch them off in the camera";
     return ReadStatus::kFailed;
   }
+  if (unit->whole) last_picture_s_ = monotonic_now_s();
   return ReadStatus::kOk;
 }
 

@@ -57,8 +57,11 @@ class RtpConnection {
 
   // Pieces that arrived damaged and were left out.
   [[nodiscard]] std::int64_t damaged() const { return damaged_; }
-  // What else was left out of it.
-  [[nodiscard]] const StreamFilter& filter() const { return filter_; }
+  // Packets that the session has not agreed upon, or that are not its sender's; and what the last are.
+  [[nodiscard]] std::int64_t foreign() const {
+    return filter_.foreign() + (transport_ ? transport_->foreign() : 0);
+  }
+  [[nodiscard]] std::string foreign_kind() const;
   [[nodiscard]] std::int64_t garbage() const { return transport_ ? transport_->garbage() : 0; }
   [[nodiscard]] std::int64_t bad_stamps() const { return bad_stamps_; }
   // By how much the last of these was off.
@@ -89,7 +92,7 @@ class RtpConnection {
   ReadStatus transport_status_ = ReadStatus::kOk;
   std::string transport_error_;
   double arrival_s_ = 0;       // of the last packet
-  double last_picture_s_ = 0;  // when it was whole; or the connection's beginning
+  double last_picture_s_ = 0;  // when the last that came whole did; or the connection's beginning
   bool any_picture_ = false;
   BearableTimestamps timestamps_;
   PictureEnds ends_;

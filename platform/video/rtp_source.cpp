@@ -216,7 +216,7 @@ ReadStatus RtpSource::receive_connection(std::string* error) {
 }
 
 void RtpSource::count(const RtpConnection& connection) {
-  const Counted now{connection.damaged(), connection.bad_stamps(), connection.filter().foreign(),
+  const Counted now{connection.damaged(), connection.bad_stamps(), connection.foreign(),
                     connection.garbage()};
   damaged_ += now.damaged - counted_.damaged;
   unstamped_ += now.unstamped - counted_.unstamped;
@@ -224,7 +224,7 @@ void RtpSource::count(const RtpConnection& connection) {
   garbage_bytes_ += now.garbage_bytes - counted_.garbage_bytes;
   const std::string of = options_.url + ": ";
   if (now.foreign_packets > counted_.foreign_packets) {
-    remarks_.say(kForeignPackets, of + "packets of " + connection.filter().foreign_kind() +
+    remarks_.say(kForeignPackets, of + "packets of " + connection.foreign_kind() +
                                       " come among the video's; the session has not agreed upon "
                                       "them: they are counted and left out");
   }

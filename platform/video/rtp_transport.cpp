@@ -15,6 +15,7 @@
 #include <thread>
 
 #include "platform/system/clock.h"
+#include "platform/system/shown.h"
 #include "platform/video/rtp_packet.h"
 #include "platform/video/session_description.h"
 
@@ -38,24 +39,36 @@ struct Listening {
   bool is_group = false;  // multicast
 };
 
-// A sender's address only tells whether it is IPv4 (names are taken to be) or IPv6.
-Listening listening_to(const std::string& address) {
-  Listening out;
+// What is no number is taken for IPv4, any.
+SocketAddress numeric(const std::string& address) {
+  SocketAddress out;
   sockaddr_in ipv4{};
   sockaddr_in6 ipv6{};
   if (::inet_pton(AF_INET6, address.c_str(), &ipv6.sin6_addr) == 1) {
     ipv6.sin6_family = AF_INET6;
-    out.is_group = IN6_IS_ADDR_MULTICAST(&ipv6.sin6_addr);
-    if (!out.is_group) ipv6.sin6_addr = in6addr_any;
-    std::memcpy(&out.address.storage, &ipv6, out.address.size = sizeof ipv6);
+    std::memcpy(&out.storage, &ipv6, out.size = sizeof ipv6);
     return out;
   }
   ipv4.sin_family = AF_INET;
-  out.is_group = ::inet_pton(AF_INET, address.c_str(), &ipv4.sin_addr) == 1 &&
-                 IN_MULTICAST(ntohl(ipv4.sin_addr.s_addr));
-  if (!out.is_group) ipv4.sin_addr.s_addr = htonl(INADDR_ANY);
-  std::memcpy(&out.address.storage, &ipv4, out.address.size = sizeof ipv4);
+  (void)::inet_pton(AF_INET, address.c_str(), &ipv4.sin_addr);
+  std::memcpy(&out.storage, &ipv4, out.size = sizeof ipv4);
   return out;
+}
+
+bool is_multicast(const SocketAddress& address) {
+  if (address.storage.ss_family == AF_INET6) {
+    return IN6_IS_ADDR_MULTICAST(
+        &reinterpret_cast<const sockaddr_in6*>(&address.storage)->sin6_addr);
+  }
+  return IN_MULTICAST(
+      ntohl(reinterpret_cast<const sockaddr_in*>(&address.storage)->sin_addr.s_addr));
+}
+
+// A sender's address only tells whether it is IPv4 or IPv6.
+Listening listening_to(const std::string& address) {
+  const SocketAddress told = numeric(address);
+  if (is_multicast(told)) return {told, true};
+  return {numeric(told.storage.ss_family == AF_INET6 ? "::" : "0.0.0.0"), false};
 }
 
 SocketAddress with_port(SocketAddress address, int port) {
@@ -73,15 +86,23 @@ bool set(const FileDescriptor& socket, int level, int name, const Value& value) 
   return ::setsockopt(socket.get(), level, name, &value, sizeof value) == 0;
 }
 
-bool join(const FileDescriptor& socket, const SocketAddress& group) {
+// Where the senders are known the network is told, too (RFC 4607): some bring a group's packets only then.
+bool join(const FileDescriptor& socket, const SocketAddress& group, const UdpSenders& senders) {
+  const int level = group.storage.ss_family == AF_INET6 ? IPPROTO_IPV6 : IPPROTO_IP;
+  for (const std::string& sender : senders.names()) {
+    group_source_req request{};
+    request.gsr_group = group.storage;
+    request.gsr_source = numeric(sender).storage;
+    if (!set(socket, level, MCAST_JOIN_SOURCE_GROUP, request)) return false;
+  }
+  if (!senders.empty()) return true;
   group_req request{};
   request.gr_group = group.storage;
-  return set(socket, group.storage.ss_family == AF_INET6 ? IPPROTO_IPV6 : IPPROTO_IP,
-             MCAST_JOIN_GROUP, request);
+  return set(socket, level, MCAST_JOIN_GROUP, request);
 }
 
 // None: errno says why.
-FileDescriptor open_socket(const Listening& to, int port) {
+FileDescriptor open_socket(const Listening& to, int port, const UdpSenders& senders) {
   const int family = to.address.storage.ss_family;
   FileDescriptor socket(::socket(family, SOCK_DGRAM | SOCK_CLOEXEC | SOCK_NONBLOCK, 0));
   if (!socket.is_open()) return socket;
@@ -93,7 +114,7 @@ FileDescriptor open_socket(const Listening& to, int port) {
   const bool works = (!to.is_group || set(socket, SOL_SOCKET, SO_REUSEADDR, 1)) &&
                      (family != AF_INET6 || set(socket, IPPROTO_IPV6, IPV6_V6ONLY, 1)) &&
                      ::bind(socket.get(), bound.get(), bound.size) == 0 &&
-                     (!to.is_group || join(socket, to.address));
+                     (!to.is_group || join(socket, to.address, senders));
   if (!works) socket.reset();
   return socket;
 }
@@ -115,11 +136,13 @@ double age_of(msghdr* message) {
 
 }  // namespace
 
-ReadStatus RtpPorts::open(const std::string& address, int port, std::string* error) {
+ReadStatus RtpPorts::open(const std::string& address, int port, const UdpSenders& senders,
+                          std::string* error) {
   const Listening to = listening_to(address);
+  senders_ = senders;
   for (int i = 0; i < 2; ++i) {
     Socket& socket = sockets_[static_cast<std::size_t>(i)];
-    socket = {open_socket(to, port + i), monotonic_now_s()};
+    socket = {open_socket(to, port + i, senders), monotonic_now_s()};
     if (socket.descriptor.is_open()) continue;
     *error = "cannot listen on the UDP ports " + std::to_string(port) + " and " +
              std::to_string(port + 1) + " (" + std::strerror(errno) + "); does another program?";
@@ -128,19 +151,22 @@ ReadStatus RtpPorts::open(const std::string& address, int port, std::string* err
   return ReadStatus::kOk;
 }
 
-// The next packet that waits; kTimeout: none does.
+// The next packet that waits; kTimeout: none does, or it is somebody else's.
 ReadStatus RtpPorts::take(Socket* socket, std::uint8_t* data, std::size_t capacity,
                           ReceivedPacket* packet, std::string* error) {
   iovec place{data, capacity};
   alignas(cmsghdr) std::array<std::uint8_t, CMSG_SPACE(sizeof(timespec))> control{};
   msghdr message{};
+  sockaddr_storage from{};
+  message.msg_name = &from;
+  message.msg_namelen = sizeof from;
   message.msg_iov = &place;
   message.msg_iovlen = 1;
   message.msg_control = control.data();
   message.msg_controllen = control.size();
   const double before_s = monotonic_now_s();
   const ssize_t size = ::recvmsg(socket->descriptor.get(), &message, 0);
-  if (size > 0) {
+  if (size > 0 && senders_.take(from)) {
     const double age_s = age_of(&message);
     const double now_s = monotonic_now_s();
     packet->size = static_cast<std::size_t>(size);
@@ -149,7 +175,7 @@ ReadStatus RtpPorts::take(Socket* socket, std::uint8_t* data, std::size_t capaci
     return ReadStatus::kOk;
   }
   if (size < 0 && errno == EAGAIN) socket->not_before_s = before_s;
-  if (size == 0 || errno == EAGAIN || errno == EINTR) return ReadStatus::kTimeout;
+  if (size >= 0 || errno == EAGAIN || errno == EINTR) return ReadStatus::kTimeout;
   *error = std::strerror(errno);
   return ReadStatus::kDisconnected;
 }
@@ -191,7 +217,14 @@ ReadStatus UdpTransport::open(double /*deadline_s*/, std::string* sdp, std::stri
     *error = "the session description names no port, as for RTSP; give the rtsp:// URL";
     return ReadStatus::kFailed;
   }
-  return ports_.open(video->address, video->port, error);
+  UdpSenders senders;
+  for (const std::string& sender : video->senders) {
+    if (senders.add(sender)) continue;
+    *error = "the session description's source-filter names '" + shown(sender) +
+             "'; write the sender's numeric address";
+    return ReadStatus::kFailed;
+  }
+  return ports_.open(video->address, video->port, senders, error);
 }
 
 }  // namespace alidade

@@ -15,6 +15,7 @@
 
 #include "platform/system/file_descriptor.h"
 #include "platform/video/frame_source.h"
+#include "platform/video/udp_senders.h"
 
 namespace alidade {
 
@@ -42,6 +43,9 @@ class RtpTransport {
 
   // Of the open transport: the SSRC of the packets that will come, if the sender told it.
   [[nodiscard]] virtual std::optional<std::uint32_t> agreed_source() const { return std::nullopt; }
+  // Packets of somebody else than the sender, left out, and whose in a person's words.
+  [[nodiscard]] virtual std::int64_t foreign() const { return 0; }
+  [[nodiscard]] virtual std::string foreign_kind() const { return ""; }
   // Bytes passed over because they belong to no packet.
   [[nodiscard]] virtual std::int64_t garbage() const { return 0; }
 };
@@ -55,21 +59,26 @@ class RtpPorts {
  public:
   static constexpr double kGather_s = 150e-6;
 
-  // address: the group to join, or of the sender.
-  [[nodiscard]] ReadStatus open(const std::string& address, int port, std::string* error);
+  // address: the group to join, or of the sender. senders: whose packets are taken, on both ports.
+  [[nodiscard]] ReadStatus open(const std::string& address, int port, const UdpSenders& senders,
+                                std::string* error);
   [[nodiscard]] ReadStatus receive(double deadline_s, std::uint8_t* data, std::size_t capacity,
                                    ReceivedPacket* packet, std::string* error);
   void interrupt() { interrupted_ = true; }  // thread-safe
+  // One more sender, whom the first has named. What is no numeric address is left out.
+  void also_from(const std::string& address) { (void)senders_.add(address); }
+  [[nodiscard]] const UdpSenders& senders() const { return senders_; }
 
  private:
   struct Socket {
     FileDescriptor descriptor;
     double not_before_s = 0;  // what waits has come since
   };
-  static ReadStatus take(Socket* socket, std::uint8_t* data, std::size_t capacity,
-                         ReceivedPacket* packet, std::string* error);
+  ReadStatus take(Socket* socket, std::uint8_t* data, std::size_t capacity, ReceivedPacket* packet,
+                  std::string* error);
 
   std::atomic<bool> interrupted_{false};
+  UdpSenders senders_;
   std::array<Socket, 2> sockets_;  // RTP, RTCP
   bool amid_picture_ = false;      // after the last RTP packet
 };
@@ -84,6 +93,10 @@ class UdpTransport : public RtpTransport {
     return ports_.receive(deadline_s, data, capacity, packet, error);
   }
   void interrupt() override { ports_.interrupt(); }
+  [[nodiscard]] std::int64_t foreign() const override { return ports_.senders().foreign(); }
+  [[nodiscard]] std::string foreign_kind() const override {
+    return ports_.senders().foreign_kind();
+  }
 
  private:
   std::string sdp_;

@@ -26,7 +26,7 @@ unsigned byte_at(std::string_view bytes, std::size_t at) {
 
 bool is_line_end(char c) { return c == '\r' || c == '\n'; }
 
-// Of the body; none: not a number, or longer than a message may be.
+// Of the body, at most one byte more than a message may have; none: not a number.
 std::optional<std::size_t> body_size(std::string_view head) {
   constexpr std::string_view kName = "content-length:";
   const auto same = [](char a, char b) {
@@ -39,8 +39,8 @@ std::optional<std::size_t> body_size(std::string_view head) {
   while (*digit == ' ' || *digit == '\t') ++digit;
   if (*digit < '0' || *digit > '9') return std::nullopt;
   for (; *digit >= '0' && *digit <= '9'; ++digit) {
-    value = 10 * value + static_cast<std::size_t>(*digit - '0');
-    if (value > RtspFraming::kMaxMessage) return std::nullopt;
+    value =
+        std::min(10 * value + static_cast<std::size_t>(*digit - '0'), RtspFraming::kMaxMessage + 1);
   }
   return value;
 }
@@ -65,7 +65,7 @@ void RtspFraming::came(std::size_t bytes, double arrival_s) {
 
 RtspFraming::Extent RtspFraming::packet_at(std::string_view bytes) const {
   if (bytes.front() != '$') return {Guess::kNot};
-  if (bytes.size() < kPacketHead) return {Guess::kMayBecome, kPacketHead};
+  if (bytes.size() < kPacketHead) return {Guess::kMayBecome};
   const int behind_first = static_cast<int>(byte_at(bytes, 1)) - first_channel_;
   const bool known = behind_first == 0 || behind_first == 1;
   const std::size_t length = byte_at(bytes, 2) << 8U | byte_at(bytes, 3);
@@ -75,11 +75,11 @@ RtspFraming::Extent RtspFraming::packet_at(std::string_view bytes) const {
   if (length < kLeastPacket || !possible) return {Guess::kNot};
   if (bytes.size() == kPacketHead) return {Guess::kMayBecome};
   if (byte_at(bytes, kPacketHead) >> 6U != 2) return {Guess::kNot};
-  if (bytes.size() < kPacketHead + length) return {Guess::kMayBecome, kPacketHead + length};
+  if (bytes.size() < kPacketHead + length) return {Guess::kMayBecome};
   return {Guess::kIs, kPacketHead + length};
 }
 
-RtspFraming::Extent RtspFraming::message_at(std::string_view bytes) {
+RtspFraming::Extent RtspFraming::message_at(std::string_view bytes) const {
   const bool begins = std::any_of(kBeginnings.begin(), kBeginnings.end(), [&](auto beginning) {
     const std::size_t common = std::min(bytes.size(), beginning.size());
     return bytes.substr(0, common) == beginning.substr(0, common);
@@ -91,21 +91,22 @@ RtspFraming::Extent RtspFraming::message_at(std::string_view bytes) {
       const bool empty = at == line || (at == line + 1 && bytes[line] == '\r');
       if (empty) {
         const auto body = body_size(bytes.substr(0, at + 1));
-        if (!body || at + 1 + *body > kMaxMessage) return {Guess::kNot};
+        if (!body) return {Guess::kNot};
+        if (at + 1 + *body > kMaxMessage) return {Guess::kTooLong};
         if (bytes.size() < at + 1 + *body) return {Guess::kMayBecome};
         return {Guess::kIs, at + 1 + *body};
       }
       line = at + 1;
-    } else if (bytes[at] != '\r' && bytes[at] != '\t' &&
-               std::isprint(static_cast<unsigned char>(bytes[at])) == 0) {
+    } else if (packets_ ? bytes[at] != '\r' && bytes[at] != '\t' &&
+                              std::isprint(static_cast<unsigned char>(bytes[at])) == 0
+                        : bytes[at] == '\0') {
       return {Guess::kNot};
     }
   }
-  return {bytes.size() < kMaxHead ? Guess::kMayBecome : Guess::kNot};
+  return {bytes.size() < kMaxHead ? Guess::kMayBecome : Guess::kTooLong};
 }
 
 RtspFraming::Item RtspFraming::next() {
-  missing_ = 1;
   while (begin_ < end_ && !is_lost()) {
     const std::string_view bytes(buffer_.data() + begin_, end_ - begin_);
     if (is_line_end(bytes.front()) && garbage_in_a_row_ == 0) {
@@ -115,10 +116,10 @@ RtspFraming::Item RtspFraming::next() {
     const Extent packet = packet_at(bytes);
     const Extent message = packet.guess == Guess::kNot ? message_at(bytes) : Extent{};
     if (packet.guess == Guess::kMayBecome || message.guess == Guess::kMayBecome) {
-      missing_ = packet.size > bytes.size() ? packet.size - bytes.size() : 1;
       return {};
     }
-    if (packet.guess == Guess::kNot && message.guess == Guess::kNot) {
+    if (packet.guess != Guess::kIs && message.guess != Guess::kIs) {
+      had_long_message_ = had_long_message_ || message.guess == Guess::kTooLong;
       ++begin_;
       ++garbage_;
       ++garbage_in_a_row_;

@@ -1,11 +1,17 @@
 #include "platform/video/rtsp_link.h"
 
+#include <netdb.h>
 #include <poll.h>
+#include <sys/socket.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
+#include <gst/rtsp/gstrtspurl.h>
+
 #include "platform/system/clock.h"
+#include "platform/system/watchdog.h"
 #include "platform/video/rtsp_message.h"
 
 namespace alidade {
@@ -15,42 +21,41 @@ constexpr int kRtspPort = 554;
 constexpr int kRtspsPort = 322;
 constexpr double kPollSlice_s = 0.1;  // of a wait: how late an interruption is noticed at most
 constexpr double kLongest_s = 1e9;    // what the libraries' integers hold
-constexpr std::size_t kMaxEarlyPackets = 1000;
+constexpr std::size_t kMaxEarlyBytes = 4 << 20;
 constexpr const char* kClosed = "the camera closed the connection";
 constexpr const char* kNotRtsp = "what the camera sends is not RTSP";
 
-// What GStreamer's functions take: microseconds, never 0 (which is for ever).
-gint64 microseconds_until(double deadline_s) {
-  const double left_s = std::clamp(deadline_s - monotonic_now_s(), 0.0, kLongest_s);
-  return 1 + static_cast<gint64>(1e6 * left_s);
+bool is_ready(int descriptor, short events, double wait_s) {
+  pollfd waiting{descriptor, events, 0};
+  return ::poll(&waiting, 1, static_cast<int>(std::ceil(1e3 * wait_s))) > 0;
 }
 
 }  // namespace
 
+// The socket is shut down for reading only: a farewell can still go out.
 void RtspLink::interrupt() {
   interrupted_ = true;
-  g_cancellable_cancel(cancellable_.get());
   const std::lock_guard<std::mutex> lock(mutex_);
-  if (connection_) gst_rtsp_connection_flush(connection_.get(), TRUE);
+  if (connecting_) g_cancellable_cancel(connecting_.get());
+  if (descriptor_ >= 0) ::shutdown(descriptor_, SHUT_RD);
 }
 
-void RtspLink::resume() { gst_rtsp_connection_flush(connection_.get(), FALSE); }
+// Shut down first: TLS would wait until its own farewell has room.
+void RtspLink::close() {
+  const std::lock_guard<std::mutex> lock(mutex_);
+  if (descriptor_ >= 0) ::shutdown(descriptor_, SHUT_RDWR);
+  descriptor_ = -1;
+  connection_.reset();
+  framing_ = RtspFraming();
+}
 
-ReadStatus RtspLink::lost(GstRTSPResult result, std::string* error) const {
+ReadStatus RtspLink::lost(const std::string& why, std::string* error) const {
   if (interrupted_) return ReadStatus::kStopped;
-  if (result == GST_RTSP_ETIMEOUT) return ReadStatus::kTimeout;
-  if (result == GST_RTSP_EEOF) {
-    *error = kClosed;
-  } else if (result == GST_RTSP_EPARSE) {
-    *error = kNotRtsp;
-  } else {
-    gchar* text = gst_rtsp_strresult(result);
-    *error = text;
-    g_free(text);
-  }
+  *error = why;
   return ReadStatus::kDisconnected;
 }
 
+// GLib's own time-outs begin anew with each address and each byte.
 ReadStatus RtspLink::connect(const std::string& address, double deadline_s, std::string* error) {
   GstRTSPUrl* parsed = nullptr;
   if (gst_rtsp_url_parse(address.c_str(), &parsed) != GST_RTSP_OK) {
@@ -58,90 +63,109 @@ ReadStatus RtspLink::connect(const std::string& address, double deadline_s, std:
     return ReadStatus::kFailed;
   }
   const std::unique_ptr<GstRTSPUrl, void (*)(GstRTSPUrl*)> url(parsed, &gst_rtsp_url_free);
-  const bool by_tls = (parsed->transports & GST_RTSP_LOWER_TRANS_TLS) != 0;
-  if (parsed->port == 0) {
-    parsed->port = static_cast<guint16>(by_tls ? kRtspsPort : kRtspPort);
-  }
-  return by_tls ? connect_by_tls(*parsed, deadline_s, error)
-                : connect_plainly(*parsed, deadline_s, error);
-}
-
-ReadStatus RtspLink::connect_plainly(const GstRTSPUrl& url, double deadline_s, std::string* error) {
+  const bool by_tls = (url->transports & GST_RTSP_LOWER_TRANS_TLS) != 0;
+  const int usual_port = by_tls ? kRtspsPort : kRtspPort;
+  const guint16 port = url->port == 0 ? static_cast<guint16>(usual_port) : url->port;
+  close();
   const std::unique_ptr<GSocketClient, GObjectUnref> client(g_socket_client_new());
-  // In whole seconds, rounded up; 0 would be for ever.
-  const double left_s = std::clamp(deadline_s - monotonic_now_s(), 0.0, kLongest_s);
-  g_socket_client_set_timeout(client.get(), 1 + static_cast<guint>(left_s));
   g_socket_client_set_enable_proxy(client.get(), FALSE);
-  GError* failure = nullptr;
-  std::unique_ptr<GSocketConnection, GObjectUnref> socket(g_socket_client_connect_to_host(
-      client.get(), url.host, url.port, cancellable_.get(), &failure));
-  if (!socket) {
-    *error = failure->message;
-    g_error_free(failure);
-    return interrupted_ ? ReadStatus::kStopped : ReadStatus::kDisconnected;
+  if (by_tls) {
+    const ReadStatus status = tls_.prepare(error);
+    if (status != ReadStatus::kOk) return status;
+    g_socket_client_set_tls(client.get(), TRUE);
+    g_signal_connect(client.get(), "event", G_CALLBACK(&RtspLink::on_event), this);
   }
-  GSocket* plain = g_socket_connection_get_socket(socket.get());
-  g_socket_set_timeout(plain, 0);  // each wait has its own
-  GstRTSPConnection* connection = nullptr;
-  const GstRTSPResult result =
-      gst_rtsp_connection_create_from_socket(plain, url.host, url.port, nullptr, &connection);
-  if (result != GST_RTSP_OK) return lost(result, error);
+  {
+    const std::lock_guard<std::mutex> lock(mutex_);
+    if (interrupted_) return ReadStatus::kStopped;
+    connecting_.reset(g_cancellable_new());
+  }
+  GError* failure = nullptr;
+  Watchdog watchdog(std::clamp(deadline_s - monotonic_now_s(), 0.0, kLongest_s),
+                    [this] { g_cancellable_cancel(connecting_.get()); });
+  GSocketConnection* connection =
+      g_socket_client_connect_to_host(client.get(), url->host, port, connecting_.get(), &failure);
+  const bool too_late = watchdog.stand_down();
+  const std::unique_ptr<GError, void (*)(GError*)> owner(failure, &g_error_free);
+  if (connection == nullptr) {
+    return too_late && !interrupted_ ? ReadStatus::kTimeout
+                                     : not_connected(*failure, by_tls, error);
+  }
+  GIOStream* const stream = G_IO_STREAM(connection);
   const std::lock_guard<std::mutex> lock(mutex_);
   connection_.reset(connection);
-  socket_ = std::move(socket);
-  if (interrupted_) gst_rtsp_connection_flush(connection, TRUE);
+  descriptor_ = g_socket_get_fd(g_socket_connection_get_socket(connection));
+  input_ = G_POLLABLE_INPUT_STREAM(g_io_stream_get_input_stream(stream));
+  output_ = G_POLLABLE_OUTPUT_STREAM(g_io_stream_get_output_stream(stream));
+  return interrupted_ ? ReadStatus::kStopped : ReadStatus::kOk;
+}
+
+void RtspLink::on_event(GSocketClient* /*client*/, GSocketClientEvent event,
+                        GSocketConnectable* /*to*/, GIOStream* stream, gpointer self) {
+  if (event != G_SOCKET_CLIENT_TLS_HANDSHAKING) return;
+  static_cast<RtspLink*>(self)->tls_.judge(G_TLS_CONNECTION(stream));
+}
+
+ReadStatus RtspLink::not_connected(const GError& failure, bool by_tls, std::string* error) const {
+  if (interrupted_) return ReadStatus::kStopped;
+  const ReadStatus refused = tls_.refusal(error);
+  if (by_tls && refused != ReadStatus::kOk) return refused;
+  return lost(by_tls && failure.domain == G_TLS_ERROR
+                  ? "the camera answers, but speaks no TLS there; is it the port of rtsp://?"
+                  : failure.message,
+              error);
+}
+
+std::string RtspLink::peer() const {
+  sockaddr_storage address{};
+  socklen_t size = sizeof address;
+  auto* generic = reinterpret_cast<sockaddr*>(&address);
+  char text[NI_MAXHOST] = "";
+  if (::getpeername(descriptor_, generic, &size) != 0 ||
+      ::getnameinfo(generic, size, text, sizeof text, nullptr, 0, NI_NUMERICHOST) != 0) {
+    return "";
+  }
+  const std::string name = text;
+  return name.substr(0, name.find('%'));  // without IPv6's scope
+}
+
+ReadStatus RtspLink::send(const std::string& text, double deadline_s, std::string* error) {
+  for (std::size_t sent = 0; sent < text.size();) {
+    if (interrupted_) return ReadStatus::kStopped;
+    GError* failure = nullptr;
+    const gssize count = g_pollable_output_stream_write_nonblocking(
+        output_, text.data() + sent, text.size() - sent, nullptr, &failure);
+    const std::unique_ptr<GError, void (*)(GError*)> owner(failure, &g_error_free);
+    if (count > 0) {
+      sent += static_cast<std::size_t>(count);
+      continue;
+    }
+    if (g_error_matches(failure, G_IO_ERROR, G_IO_ERROR_WOULD_BLOCK) == FALSE) {
+      return lost(failure == nullptr ? kClosed : failure->message, error);
+    }
+    const double left_s = deadline_s - monotonic_now_s();
+    if (left_s <= 0) return ReadStatus::kTimeout;
+    (void)is_ready(descriptor_, POLLOUT, std::min(left_s, kPollSlice_s));
+  }
   return ReadStatus::kOk;
 }
 
-// By GStreamer's own way to connect: it takes no socket on which TLS is spoken.
-ReadStatus RtspLink::connect_by_tls(const GstRTSPUrl& url, double deadline_s, std::string* error) {
-  GstRTSPConnection* connection = nullptr;
-  const GstRTSPResult made = gst_rtsp_connection_create(&url, &connection);
-  if (made != GST_RTSP_OK) return lost(made, error);
-  {
-    const std::lock_guard<std::mutex> lock(mutex_);
-    connection_.reset(connection);
-    socket_.reset();
-    if (interrupted_) gst_rtsp_connection_flush(connection, TRUE);
-  }
-  ReadStatus status = tls_.prepare(connection, error);
-  if (status != ReadStatus::kOk) return status;
-  const GstRTSPResult result =
-      gst_rtsp_connection_connect_usec(connection, microseconds_until(deadline_s));
-  if (result == GST_RTSP_OK) return ReadStatus::kOk;
-  status = tls_.refusal(error);
-  if (status != ReadStatus::kOk) return status;
-  if (interrupted_ || result == GST_RTSP_ETIMEOUT) return lost(result, error);
-  // GStreamer's library does not say why.
-  status = connect_plainly(url, deadline_s, error);
-  if (status != ReadStatus::kOk) return status;
-  *error = "the camera answers, but speaks no TLS there; is it the port of rtsp://?";
-  return ReadStatus::kDisconnected;
-}
-
-ReadStatus RtspLink::send(RtspMessage* message, double deadline_s, std::string* error) {
-  const GstRTSPResult result = gst_rtsp_connection_send_usec(connection_.get(), message->get(),
-                                                             microseconds_until(deadline_s));
-  return result == GST_RTSP_OK ? ReadStatus::kOk : lost(result, error);
+void RtspLink::send_farewell(const std::string& text) {
+  if (descriptor_ < 0) return;
+  GError* failure = nullptr;
+  g_pollable_output_stream_write_nonblocking(output_, text.data(), text.size(), nullptr, &failure);
+  g_clear_error(&failure);
 }
 
 ReadStatus RtspLink::next_message(double deadline_s, RtspMessage* message, std::string* error) {
-  if (packets_) return next_message_amid_packets(deadline_s, message, error);
-  const GstRTSPResult result = gst_rtsp_connection_receive_usec(
-      connection_.get(), message->cleared(), microseconds_until(deadline_s));
-  return result == GST_RTSP_OK ? ReadStatus::kOk : lost(result, error);
-}
-
-// Packets may come before the answer to PLAY, and what belongs to none.
-ReadStatus RtspLink::next_message_amid_packets(double deadline_s, RtspMessage* message,
-                                               std::string* error) {
   while (monotonic_now_s() < deadline_s) {
     for (auto item = framing_.next(); item.kind != RtspFraming::Item::Kind::kNone;
          item = framing_.next()) {
       if (item.kind == RtspFraming::Item::Kind::kMessage) {
         if (message->parse(item.bytes)) return ReadStatus::kOk;
-      } else if (is_of_video(item) && early_.size() < kMaxEarlyPackets) {
+      } else if (is_of_video(item) && early_bytes_ + item.bytes.size() <= kMaxEarlyBytes) {
         early_.emplace_back(item.bytes.begin(), item.bytes.end());
+        early_bytes_ += item.bytes.size();
       }
     }
     if (interrupted_) return ReadStatus::kStopped;
@@ -161,24 +185,29 @@ bool RtspLink::early_packet(Packet* packet) {
   if (early_.empty()) return false;
   *packet = std::move(early_.front());
   early_.pop_front();
+  early_bytes_ -= packet->size();
   return true;
+}
+
+// Once packets may come, some garbage among them is passed over.
+bool RtspLink::is_rtsp(std::string* error) const {
+  if (!framing_.is_lost() && (packets_ || framing_.garbage() == 0)) return true;
+  *error = !packets_ && framing_.had_long_message()
+               ? "the camera's answer is longer than " +
+                     std::to_string(RtspFraming::kMaxMessage >> 10U) + " KB: not a description"
+               : kNotRtsp;
+  return false;
 }
 
 // Reads what is there, after at most wait_s. kTimeout: nothing.
 ReadStatus RtspLink::fill(double wait_s, std::string* error) {
-  if (framing_.is_lost()) {
-    *error = kNotRtsp;
-    return ReadStatus::kDisconnected;
-  }
+  if (!is_rtsp(error)) return ReadStatus::kDisconnected;
   wait_s = std::clamp(wait_s, 0.0, kPollSlice_s);
-  if (!socket_) return fill_by_tls(wait_s, error);
-  auto* const input =
-      G_POLLABLE_INPUT_STREAM(g_io_stream_get_input_stream(G_IO_STREAM(socket_.get())));
   for (bool waited = wait_s == 0;; waited = true) {
     const auto [room, size] = framing_.room();
     GError* failure = nullptr;
     const gssize count =
-        g_pollable_input_stream_read_nonblocking(input, room, size, nullptr, &failure);
+        g_pollable_input_stream_read_nonblocking(input_, room, size, nullptr, &failure);
     if (count > 0) {
       framing_.came(static_cast<std::size_t>(count), monotonic_now_s());
       return ReadStatus::kOk;
@@ -188,28 +217,8 @@ ReadStatus RtspLink::fill(double wait_s, std::string* error) {
     g_clear_error(&failure);
     if (!blocks) return interrupted_ ? ReadStatus::kStopped : ReadStatus::kDisconnected;
     if (waited) return ReadStatus::kTimeout;
-    pollfd waiting{g_socket_get_fd(g_socket_connection_get_socket(socket_.get())), POLLIN, 0};
-    (void)::poll(&waiting, 1, static_cast<int>(1e3 * wait_s));
+    (void)is_ready(descriptor_, POLLIN, wait_s);
   }
-}
-
-// GStreamer's library, which alone has the stream within TLS, reads as many bytes as it is told, and loses those that came
-// before a timeout: so the first is waited for by itself.
-ReadStatus RtspLink::fill_by_tls(double wait_s, std::string* error) {
-  const std::size_t wanted = framing_.missing();
-  auto* const room = reinterpret_cast<guint8*>(framing_.room().first);
-  GstRTSPResult result = gst_rtsp_connection_read_usec(
-      connection_.get(), room, 1, microseconds_until(monotonic_now_s() + wait_s));
-  if (result == GST_RTSP_ETIMEOUT) return ReadStatus::kTimeout;
-  if (result == GST_RTSP_OK && wanted > 1) {
-    result =
-        gst_rtsp_connection_read_usec(connection_.get(), room + 1, static_cast<guint>(wanted - 1),
-                                      microseconds_until(monotonic_now_s() + options_.timeout_s));
-    if (result == GST_RTSP_ETIMEOUT) result = GST_RTSP_EEOF;
-  }
-  if (result != GST_RTSP_OK) return lost(result, error);
-  framing_.came(wanted, monotonic_now_s());
-  return ReadStatus::kOk;
 }
 
 ReadStatus RtspLink::next(double wait_s, RtspFraming::Item* item, std::string* error) {

@@ -1,10 +1,11 @@
 #pragma once
-// RtspLink: the connection to an RTSP camera, with or without TLS (rtsp_tls.h): requests go out, answers and packets
-// come in. It knows nothing of what they mean. Part of RtspSession.
-// From PLAY on the bytes are taken apart here (rtsp_framing.h): GStreamer's library ends at the first
-// that is wrong.
+// RtspLink: the connection to an RTSP camera, with or without TLS (rtsp_tls.h): messages go out, messages and packets come
+// in. It knows nothing of what they mean. Part of RtspSession.
+// By GLib's sockets, and not GStreamer's RTSP connection: that waits for a message's end without end, takes any length that
+// it is told, and ends at the first byte that is wrong. Here every call has one deadline, whatever comes meanwhile, and ends
+// with interrupt(); what comes is read as far as it is there and taken apart by rtsp_framing.h, which bounds the memory.
 
-#include <gst/rtsp/gstrtspconnection.h>
+#include <gio/gio.h>
 
 #include <atomic>
 #include <cstdint>
@@ -27,17 +28,20 @@ class RtspLink {
  public:
   using Packet = std::vector<std::uint8_t>;
 
-  explicit RtspLink(const RtpSourceOptions& options)
-      : options_(options), tls_(options.certificate_file) {}
+  explicit RtspLink(const RtpSourceOptions& options) : tls_(options.certificate_file) {}
+  ~RtspLink() { close(); }
   RtspLink(const RtspLink&) = delete;
   RtspLink& operator=(const RtspLink&) = delete;
 
+  // Name, connection and TLS's greeting within the deadline.
   [[nodiscard]] ReadStatus connect(const std::string& address, double deadline_s,
                                    std::string* error);
-  // The library's: it adds the login and the session's name to what is sent. Null before connect().
-  [[nodiscard]] GstRTSPConnection* connection() const { return connection_.get(); }
+  // The numeric address of the camera, or of what stands for it; empty: unknown.
+  [[nodiscard]] std::string peer() const;
 
-  [[nodiscard]] ReadStatus send(RtspMessage* message, double deadline_s, std::string* error);
+  [[nodiscard]] ReadStatus send(const std::string& text, double deadline_s, std::string* error);
+  // As far as there is room for it at once; after interrupt(), too.
+  void send_farewell(const std::string& text);
   // Packets that come before it are kept: early_packet().
   [[nodiscard]] ReadStatus next_message(double deadline_s, RtspMessage* message,
                                         std::string* error);
@@ -50,41 +54,35 @@ class RtspLink {
   [[nodiscard]] bool early_packet(Packet* packet);
   [[nodiscard]] std::int64_t garbage() const { return framing_.garbage(); }
 
-  // From another thread: every call from now on ends, but what is sent behind resume().
-  void interrupt();
-  void resume();
+  void interrupt();  // from any thread: every call from now on ends
   [[nodiscard]] bool interrupted() const { return interrupted_; }
 
  private:
-  [[nodiscard]] ReadStatus connect_plainly(const GstRTSPUrl& url, double deadline_s,
-                                           std::string* error);
-  [[nodiscard]] ReadStatus connect_by_tls(const GstRTSPUrl& url, double deadline_s,
-                                          std::string* error);
-  [[nodiscard]] ReadStatus next_message_amid_packets(double deadline_s, RtspMessage* message,
-                                                     std::string* error);
+  static void on_event(GSocketClient* client, GSocketClientEvent event, GSocketConnectable* to,
+                       GIOStream* stream, gpointer self);
+  [[nodiscard]] ReadStatus not_connected(const GError& failure, bool by_tls,
+                                         std::string* error) const;
+  void close();
   [[nodiscard]] bool is_of_video(const RtspFraming::Item& item) const {
     return item.channel == first_channel_ || item.channel == first_channel_ + 1;
   }
   [[nodiscard]] ReadStatus fill(double wait_s, std::string* error);
-  [[nodiscard]] ReadStatus fill_by_tls(double wait_s, std::string* error);
-  [[nodiscard]] ReadStatus lost(GstRTSPResult result, std::string* error) const;
+  [[nodiscard]] bool is_rtsp(std::string* error) const;
+  [[nodiscard]] ReadStatus lost(const std::string& why, std::string* error) const;
 
-  struct FreeConnection {
-    void operator()(GstRTSPConnection* connection) const { gst_rtsp_connection_free(connection); }
-  };
-
-  const RtpSourceOptions& options_;
   RtspTls tls_;
   std::atomic<bool> interrupted_{false};
-  std::unique_ptr<GCancellable, GObjectUnref> cancellable_{g_cancellable_new()};
   std::mutex mutex_;  // lets interrupt() see whole what of these is there
-  std::unique_ptr<GSocketConnection, GObjectUnref>
-      socket_;  // null over TLS: it is the connection's
-  std::unique_ptr<GstRTSPConnection, FreeConnection> connection_;
+  std::unique_ptr<GCancellable, GObjectUnref> connecting_;
+  std::unique_ptr<GSocketConnection, GObjectUnref> connection_;
+  int descriptor_ = -1;                    // of its socket
+  GPollableInputStream* input_ = nullptr;  // its bytes, out of TLS
+  GPollableOutputStream* output_ = nullptr;
   bool packets_ = false;  // may come
   int first_channel_ = 0;
   std::deque<Packet> early_;  // came before the answer to PLAY
-  RtspFraming framing_;       // of what comes after PLAY
+  std::size_t early_bytes_ = 0;
+  RtspFraming framing_;
 };
 
 }  // namespace alidade

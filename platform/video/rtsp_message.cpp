@@ -20,11 +20,16 @@ std::string take(std::string_view* what, char separator) {
   return taken;
 }
 
+std::string_view take_line(std::string_view* text) {
+  const std::string_view line = text->substr(0, text->find('\n'));
+  text->remove_prefix(std::min(line.size() + 1, text->size()));
+  return line;
+}
+
 }  // namespace
 
 bool RtspMessage::parse(std::string_view text) {
-  std::string_view first = text.substr(0, text.find('\n'));
-  text.remove_prefix(std::min(first.size() + 1, text.size()));
+  std::string_view first = take_line(&text);
   const std::string word = take(&first, ' ');
   if (word.rfind("RTSP/", 0) == 0) {
     const int code = std::atoi(take(&first, ' ').c_str());
@@ -38,15 +43,36 @@ bool RtspMessage::parse(std::string_view text) {
     gst_rtsp_message_init_request(cleared(), method, take(&first, ' ').c_str());
   }
   while (!text.empty()) {
-    std::string_view line = text.substr(0, text.find('\n'));
-    text.remove_prefix(std::min(line.size() + 1, text.size()));
-    if (without_blanks(line).empty()) return true;
+    std::string_view line = take_line(&text);
+    if (without_blanks(line).empty()) break;
     if (line.find(':') == std::string_view::npos) continue;
     const std::string name = take(&line, ':');
-    const std::string value(without_blanks(line));
+    std::string value(without_blanks(line));
+    // Goes on in the lines behind it that begin with a blank.
+    while (!text.empty() && (text.front() == ' ' || text.front() == '\t')) {
+      const std::string_view more = without_blanks(take_line(&text));
+      if (!more.empty()) value.append(" ").append(more);
+    }
     gst_rtsp_message_add_header_by_name(get(), name.c_str(), value.c_str());
   }
+  gst_rtsp_message_set_body(get(), reinterpret_cast<const guint8*>(text.data()),
+                            static_cast<guint>(text.size()));
   return true;
+}
+
+std::string RtspMessage::text() {
+  std::string first;
+  if (type() == GST_RTSP_MESSAGE_REQUEST) {
+    const auto& request = message_.type_data.request;
+    first = std::string(gst_rtsp_method_as_text(request.method)) + " " + request.uri + " RTSP/1.0";
+  } else {
+    first = "RTSP/1.0 " + std::to_string(status()) + " " + reason();
+  }
+  GString* headers = g_string_new(nullptr);
+  gst_rtsp_message_append_headers(get(), headers);
+  std::string all = first + "\r\n" + headers->str + "\r\n";
+  g_string_free(headers, TRUE);
+  return all;
 }
 
 }  // namespace alidade

@@ -24,8 +24,10 @@ class RtspMessage {
     gst_rtsp_message_unset(&message_);
     return &message_;
   }
-  // As RtspFraming gives it, the body left out. False: neither a request nor a response.
+  // As RtspFraming gives it. False: neither a request nor a response.
   [[nodiscard]] bool parse(std::string_view text);
+  // As it is sent; of one that we make, and so without a body.
+  [[nodiscard]] std::string text();
   GstRTSPMsgType type() { return gst_rtsp_message_get_type(&message_); }
   int status() const { return message_.type_data.response.code; }
   const char* reason() const { return message_.type_data.response.reason; }
@@ -34,7 +36,7 @@ class RtspMessage {
     gst_rtsp_message_get_header(&message_, field, &value, 0);
     return value == nullptr ? "" : value;
   }
-  // The library makes a list one header an item, where the field may be a list.
+  // In one header, or in several.
   bool lists(GstRTSPHeaderField field, const char* item) {
     gchar* value = nullptr;
     for (int i = 0; gst_rtsp_message_get_header(&message_, field, &value, i) == GST_RTSP_OK; ++i) {
@@ -46,7 +48,7 @@ class RtspMessage {
     guint8* data = nullptr;
     guint size = 0;
     gst_rtsp_message_get_body(&message_, &data, &size);
-    return {data, size == 0 ? 0 : size - 1};  // the library adds a NUL and counts it
+    return {data, size};
   }
 
  private:

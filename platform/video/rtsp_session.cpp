@@ -1,5 +1,7 @@
 #include "platform/video/rtsp_session.h"
 
+#include <gst/rtsp/gstrtsptransport.h>
+
 #include <algorithm>
 #include <cstdlib>
 #include <cstring>
@@ -17,8 +19,12 @@ namespace {
 
 constexpr int kRedirections = 5;
 constexpr int kPortTries = 100;
-constexpr double kGoodbye_s = 0.5;    // given to TEARDOWN, so that the camera frees the session
+constexpr double kReply_s = 0.5;     // given to an answer to the camera's own question
 constexpr double kUdpSlice_s = 0.1;  // by UDP: of a wait
+constexpr const char* kTimeout = "timeout=";
+constexpr double kUsualTimeout_s = 60;  // of a session (RFC 2326, 12.37)
+constexpr double kPingEarlier_s = 5;
+constexpr double kLeastPing_s = 0.5;
 
 // A control attribute (RFC 2326, C.1.1) against the address that it is relative to.
 std::string resolve(const std::string& base, const std::string& control) {
@@ -50,11 +56,9 @@ RtspSession::RtspSession(const RtpSourceOptions& options)
 
 RtspSession::~RtspSession() {
   if (!session_url_.empty()) {
-    link_.resume();
     RtspMessage goodbye;
-    gst_rtsp_message_init_request(goodbye.cleared(), GST_RTSP_TEARDOWN, session_url_.c_str());
-    std::string unsaid;
-    (void)link_.send(&goodbye, monotonic_now_s() + kGoodbye_s, &unsaid);
+    make({GST_RTSP_TEARDOWN, session_url_}, &goodbye);
+    link_.send_farewell(goodbye.text());
   }
 }
 
@@ -68,6 +72,7 @@ ReadStatus RtspSession::open(double deadline_s, std::string* sdp, std::string* e
   deadline_s_ = deadline_s;
   for (int i = 0; i <= kRedirections; ++i) {
     const std::string asked = url_;
+    login_ = RtspLogin();
     ReadStatus status = link_.connect(url_, deadline_s_, error);
     if (status == ReadStatus::kOk) status = describe(sdp, error);
     if (status == ReadStatus::kOk && url_ == asked) status = play(*sdp, error);
@@ -134,6 +139,7 @@ ReadStatus RtspSession::play(const std::string& sdp, std::string* error) {
     return ReadStatus::kDisconnected;
   }
   session_url_ = resolve(base_url_, video->session_control);
+  begin_session(answer.header(GST_RTSP_HDR_SESSION));
   int first_channel = 0;
   GstRTSPTransport* agreed = nullptr;
   gst_rtsp_transport_new(&agreed);
@@ -141,6 +147,7 @@ ReadStatus RtspSession::play(const std::string& sdp, std::string* error) {
       GST_RTSP_OK) {
     if (agreed->interleaved.min >= 0) first_channel = agreed->interleaved.min;
     if (agreed->ssrc != 0) source_ = agreed->ssrc;
+    if (ports_ && agreed->source != nullptr) ports_->also_from(agreed->source);
   }
   gst_rtsp_transport_free(agreed);
 
@@ -156,15 +163,30 @@ ReadStatus RtspSession::play(const std::string& sdp, std::string* error) {
   return status;
 }
 
+// Its name and, where it is told, after how long without a request the camera ends it (RFC 2326, 12.37).
+void RtspSession::begin_session(const std::string& header) {
+  const std::size_t end = std::min(header.find(';'), header.size());
+  session_ = header.substr(0, header.find_last_not_of(' ', end == 0 ? 0 : end - 1) + 1);
+  const std::size_t told = header.find(kTimeout);
+  const double timeout_s =
+      told == std::string::npos ? 0 : std::atof(header.c_str() + told + std::strlen(kTimeout));
+  const double lasts_s = timeout_s > 0 ? timeout_s : kUsualTimeout_s;
+  ping_period_s_ = std::max(kLeastPing_s, lasts_s - std::min(kPingEarlier_s, lasts_s / 2));
+  ping_at_s_ = monotonic_now_s() + ping_period_s_;
+}
+
 bool RtspSession::open_ports() {
   std::minstd_rand random(std::random_device{}());
   // Above those that programs choose for themselves, an rtp:// URL's among them: who comes first would take them away.
   std::uniform_int_distribution<int> any(17'000, 30'000);
+  const std::string peer = link_.peer();
+  UdpSenders camera;
+  if (!camera.add(peer)) return false;
   for (int i = 0; i < kPortTries; ++i) {
     auto ports = std::make_unique<RtpPorts>();
     std::string error;
     first_port_ = 2 * any(random);
-    if (ports->open("0.0.0.0", first_port_, &error) == ReadStatus::kOk) {
+    if (ports->open(peer, first_port_, camera, &error) == ReadStatus::kOk) {
       const std::lock_guard<std::mutex> lock(mutex_);
       ports_ = std::move(ports);
       return true;
@@ -173,11 +195,24 @@ bool RtspSession::open_ports() {
   return false;
 }
 
+void RtspSession::make(const Request& request, RtspMessage* message) {
+  gst_rtsp_message_init_request(message->cleared(), request.method, request.url.c_str());
+  gst_rtsp_message_add_header(message->get(), GST_RTSP_HDR_CSEQ,
+                              std::to_string(++requests_).c_str());
+  gst_rtsp_message_add_header(message->get(), request.header, request.value.c_str());
+  if (!session_.empty()) {
+    gst_rtsp_message_add_header(message->get(), GST_RTSP_HDR_SESSION, session_.c_str());
+  }
+  const std::string login = login_.header(request.method, request.url);
+  if (!login.empty()) {
+    gst_rtsp_message_add_header(message->get(), GST_RTSP_HDR_AUTHORIZATION, login.c_str());
+  }
+}
+
 ReadStatus RtspSession::send(const Request& request, double deadline_s, std::string* error) {
   RtspMessage message;
-  gst_rtsp_message_init_request(message.cleared(), request.method, request.url.c_str());
-  gst_rtsp_message_add_header(message.get(), request.header, request.value.c_str());
-  return link_.send(&message, deadline_s, error);
+  make(request, &message);
+  return link_.send(message.text(), deadline_s, error);
 }
 
 // Sends the request, logs in if that is wanted, and waits for the answer.
@@ -206,7 +241,7 @@ ReadStatus RtspSession::ask(const Request& request, RtspMessage* answer, std::st
   }
 }
 
-// From here on GStreamer's library adds the login to each request.
+// From here on each request has the login.
 bool RtspSession::accept_challenge(RtspMessage* answer) {
   GstRTSPAuthCredential** offered =
       gst_rtsp_message_parse_auth_credentials(answer->get(), GST_RTSP_HDR_WWW_AUTHENTICATE);
@@ -220,14 +255,7 @@ bool RtspSession::accept_challenge(RtspMessage* answer) {
     }
     if (usable) best = *each;
   }
-  if (best != nullptr) {
-    gst_rtsp_connection_clear_auth_params(link_.connection());
-    gst_rtsp_connection_set_auth(link_.connection(), best->scheme, options_.user.c_str(),
-                                 options_.password.c_str());
-    for (GstRTSPAuthParam** p = best->params; p != nullptr && *p != nullptr; ++p) {
-      gst_rtsp_connection_set_auth_param(link_.connection(), (*p)->name, (*p)->value);
-    }
-  }
+  if (best != nullptr) login_ = RtspLogin(*best, options_.user, options_.password);
   const bool accepted = best != nullptr;
   gst_rtsp_auth_credentials_free(offered);
   return accepted;
@@ -238,12 +266,12 @@ void RtspSession::reply(RtspMessage* request) {
   RtspMessage answer;
   gst_rtsp_message_init_response(answer.cleared(), GST_RTSP_STS_OK, "OK", request->get());
   std::string unsaid;
-  (void)link_.send(&answer, monotonic_now_s() + kGoodbye_s, &unsaid);
+  (void)link_.send(answer.text(), monotonic_now_s() + kReply_s, &unsaid);
 }
 
 ReadStatus RtspSession::keep_alive(std::string* error) {
-  if (gst_rtsp_connection_next_timeout_usec(link_.connection()) > 0) return ReadStatus::kOk;
-  gst_rtsp_connection_reset_timeout(link_.connection());
+  if (monotonic_now_s() < ping_at_s_) return ReadStatus::kOk;
+  ping_at_s_ = monotonic_now_s() + ping_period_s_;
   pinged_again_ = false;
   return ping(error);
 }
@@ -265,15 +293,14 @@ ReadStatus RtspSession::take_message(std::string_view text, std::string* error) 
   return ReadStatus::kOk;
 }
 
+// A message is taken alone: who floods with them holds nobody beyond a deadline.
 ReadStatus RtspSession::next_packet(double wait_s, RtspFraming::Item* packet, std::string* error) {
-  for (;; wait_s = 0) {
-    ReadStatus status = link_.next(wait_s, packet, error);
-    if (status != ReadStatus::kOk || packet->kind == RtspFraming::Item::Kind::kPacket) {
-      return status;
-    }
-    status = take_message(packet->bytes, error);
-    if (status != ReadStatus::kOk) return status;
+  ReadStatus status = link_.next(wait_s, packet, error);
+  if (status != ReadStatus::kOk || packet->kind == RtspFraming::Item::Kind::kPacket) {
+    return status;
   }
+  status = take_message(packet->bytes, error);
+  return status == ReadStatus::kOk ? ReadStatus::kTimeout : status;
 }
 
 ReadStatus RtspSession::receive(double deadline_s, std::uint8_t* data, std::size_t capacity,

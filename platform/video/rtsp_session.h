@@ -15,6 +15,7 @@
 #include "platform/video/rtp_transport.h"
 #include "platform/video/rtsp_framing.h"
 #include "platform/video/rtsp_link.h"
+#include "platform/video/rtsp_login.h"
 
 namespace alidade {
 
@@ -33,6 +34,12 @@ class RtspSession : public RtpTransport {
                                    ReceivedPacket* packet, std::string* error) override;
   void interrupt() override;
   [[nodiscard]] std::optional<std::uint32_t> agreed_source() const override { return source_; }
+  [[nodiscard]] std::int64_t foreign() const override {
+    return ports_ ? ports_->senders().foreign() : 0;
+  }
+  [[nodiscard]] std::string foreign_kind() const override {
+    return ports_ ? ports_->senders().foreign_kind() : "";
+  }
   [[nodiscard]] std::int64_t garbage() const override { return link_.garbage(); }
 
  private:
@@ -47,6 +54,8 @@ class RtspSession : public RtpTransport {
   [[nodiscard]] ReadStatus play(const std::string& sdp, std::string* error);
   [[nodiscard]] bool open_ports();
   [[nodiscard]] ReadStatus ask(const Request& request, RtspMessage* answer, std::string* error);
+  void make(const Request& request, RtspMessage* message);
+  void begin_session(const std::string& header);
   [[nodiscard]] ReadStatus send(const Request& request, double deadline_s, std::string* error);
   [[nodiscard]] bool accept_challenge(RtspMessage* answer);
   // After PLAY. What came within the connection: kOk with a packet of the video; kTimeout: none so far.
@@ -62,7 +71,12 @@ class RtspSession : public RtpTransport {
   std::string url_;          // after redirections
   std::string base_url_;     // what the description's addresses are relative to
   std::string session_url_;  // what PLAY is for; empty: nothing to tear down
+  std::string session_;      // its name, as the camera gave it
+  double ping_period_s_ = 0;
+  double ping_at_s_ = 0;
   GstRTSPMethod ping_ = GST_RTSP_OPTIONS;
+  RtspLogin login_;                      // to this connection
+  int requests_ = 0;                     // sent
   bool pinged_again_ = false;            // with a new login
   double next_look_s_ = 0;               // by UDP: for what the camera says
   std::optional<std::uint32_t> source_;  // SSRC, as the answer to SETUP has it

@@ -1,7 +1,5 @@
 #include "platform/video/rtsp_tls.h"
 
-#include <memory>
-
 namespace alidade {
 namespace {
 
@@ -25,25 +23,27 @@ std::string fault_of(int faults, const std::string& file) {
 
 }  // namespace
 
-ReadStatus RtspTls::prepare(GstRTSPConnection* connection, std::string* error) {
+ReadStatus RtspTls::prepare(std::string* error) {
   if (g_tls_backend_supports_tls(g_tls_backend_get_default()) == FALSE) {
     *error = "this machine has no TLS for RTSP; install the package glib-networking";
     return ReadStatus::kFailed;
   }
   if (!certificate_file_.empty()) {
     GError* failure = nullptr;
-    const std::unique_ptr<GTlsDatabase, GObjectUnref> known(
-        g_tls_file_database_new(certificate_file_.c_str(), &failure));
-    if (!known) {
+    known_.reset(G_TLS_DATABASE(g_tls_file_database_new(certificate_file_.c_str(), &failure)));
+    if (!known_) {
       *error = certificate_file_ + ": no certificates in PEM form: " + failure->message;
       g_error_free(failure);
       return ReadStatus::kFailed;
     }
-    gst_rtsp_connection_set_tls_database(connection, known.get());
   }
   faults_ = 0;
-  gst_rtsp_connection_set_accept_certificate_func(connection, &RtspTls::accept, this, nullptr);
   return ReadStatus::kOk;
+}
+
+void RtspTls::judge(GTlsConnection* connection) {
+  if (known_) g_tls_connection_set_database(connection, known_.get());
+  g_signal_connect(connection, "accept-certificate", G_CALLBACK(&RtspTls::accept), this);
 }
 
 // Asked about a certificate that did not pass.

@@ -1,10 +1,11 @@
 #pragma once
-// RtspTls: what RTSP over TLS (rtsps://) asks of a connection of GStreamer's RTSP library, beside RTSP itself: whose
-// certificate is trusted, and what waits within TLS. Part of RtspSession.
+// RtspTls: what RTSP over TLS (rtsps://) asks of a connection, beside RTSP itself: whose certificate is trusted. Part of
+// RtspLink.
 
-#include <gst/rtsp/gstrtspconnection.h>
+#include <gio/gio.h>
 
 #include <atomic>
+#include <memory>
 #include <string>
 #include <utility>
 
@@ -23,8 +24,10 @@ class RtspTls {
   RtspTls(const RtspTls&) = delete;
   RtspTls& operator=(const RtspTls&) = delete;
 
-  // Before it connects; the connection must not do that after this object's end. kFailed: *error is one line.
-  [[nodiscard]] ReadStatus prepare(GstRTSPConnection* connection, std::string* error);
+  // Before a connection is made. kFailed: *error is one line.
+  [[nodiscard]] ReadStatus prepare(std::string* error);
+  // As its greeting begins. It must not outlive this object.
+  void judge(GTlsConnection* connection);
 
   // Why it could not connect, if the certificate was refused: then *error is one line. kOk: it was not.
   [[nodiscard]] ReadStatus refusal(std::string* error) const;
@@ -34,6 +37,7 @@ class RtspTls {
                          GTlsCertificateFlags faults, gpointer self);
 
   std::string certificate_file_;
+  std::unique_ptr<GTlsDatabase, GObjectUnref> known_;  // what is in it
   // GTlsCertificateFlags of the certificate that was refused. GLib asks on a thread of its own.
   std::atomic<int> faults_{0};
 };

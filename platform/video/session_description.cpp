@@ -3,6 +3,7 @@
 #include <gst/sdp/gstsdpmessage.h>
 
 #include <memory>
+#include <sstream>
 
 namespace alidade {
 namespace {
@@ -14,6 +15,19 @@ struct FreeSdp {
 };
 
 std::string text(const char* value) { return value == nullptr ? "" : value; }
+
+// " incl IN IP4 GROUP SENDER ..."
+std::vector<std::string> senders_in(const std::string& source_filter) {
+  std::istringstream words(source_filter);
+  std::string mode;
+  std::string net;
+  std::string family;
+  std::string to;
+  words >> mode >> net >> family >> to;
+  std::vector<std::string> senders;
+  for (std::string sender; mode == "incl" && words >> sender;) senders.push_back(sender);
+  return senders;
+}
 
 }  // namespace
 
@@ -44,6 +58,10 @@ std::optional<VideoDescription> find_video(const std::string& sdp) {
     }
     video.control = text(gst_sdp_media_get_attribute_val(media, "control"));
     video.session_control = text(gst_sdp_message_get_attribute_val(parsed, "control"));
+    video.senders = senders_in(text(gst_sdp_media_get_attribute_val(media, "source-filter")));
+    if (video.senders.empty()) {
+      video.senders = senders_in(text(gst_sdp_message_get_attribute_val(parsed, "source-filter")));
+    }
     return video;
   }
   return std::nullopt;

@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <string>
+#include <vector>
 
 namespace alidade {
 
@@ -13,6 +14,8 @@ struct VideoDescription {
   int payload_type = -1;  // the first that the m= line names, and the one that is read; -1: none
   std::string control;    // a=control of the video; empty if not given
   std::string session_control;  // and of the session
+  // Who sends, as a=source-filter has it (RFC 4570); empty: not told. Nothing but `incl` counts.
+  std::vector<std::string> senders;
 };
 
 // Nothing if the text describes no video.

@@ -45,7 +45,9 @@ void send_to(const std::string& address, int port, const Bytes& packet) {
 
 class RtpPortsTest : public ::testing::Test {
  protected:
-  ReadStatus open(const std::string& address) { return ports_.open(address, port_, &error_); }
+  ReadStatus open(const std::string& address) {
+    return ports_.open(address, port_, senders_, &error_);
+  }
   ReadStatus receive(double wait_s = kLong_s) {
     return ports_.receive(monotonic_now_s() + wait_s, data_.data(), data_.size(), &packet_,
                           &error_);
@@ -56,6 +58,7 @@ class RtpPortsTest : public ::testing::Test {
 
   int port_ = test::udp_port_pair();
   RtpPorts ports_;
+  UdpSenders senders_;
   ReceivedPacket packet_;
   std::string error_;
   std::array<std::uint8_t, 65'536> data_{};
@@ -142,9 +145,9 @@ TEST_F(RtpPortsTest, AGroupHasSeveralListenersThatHearNoOtherGroup) {
   const std::string group = "239.255.77.1";
   if (open(group) != ReadStatus::kOk) GTEST_SKIP() << "no multicast here: " << error_;
   RtpPorts second;
-  ASSERT_EQ(second.open(group, port_, &error_), ReadStatus::kOk) << error_;
+  ASSERT_EQ(second.open(group, port_, senders_, &error_), ReadStatus::kOk) << error_;
   RtpPorts other;
-  ASSERT_EQ(other.open("239.255.77.2", port_, &error_), ReadStatus::kOk) << error_;
+  ASSERT_EQ(other.open("239.255.77.2", port_, senders_, &error_), ReadStatus::kOk) << error_;
   send_to(group, port_, rtp(true));
   ASSERT_EQ(receive(), ReadStatus::kOk) << error_;
   EXPECT_EQ(received(), rtp(true));
@@ -158,7 +161,7 @@ TEST_F(RtpPortsTest, AGroupHasSeveralListenersThatHearNoOtherGroup) {
 
 TEST_F(RtpPortsTest, SaysThatAPortIsTaken) {
   RtpPorts first;
-  ASSERT_EQ(first.open("0.0.0.0", port_ + 1, &error_), ReadStatus::kOk) << error_;
+  ASSERT_EQ(first.open("0.0.0.0", port_ + 1, senders_, &error_), ReadStatus::kOk) << error_;
   EXPECT_EQ(open("0.0.0.0"), ReadStatus::kDisconnected);
   EXPECT_EQ(error_, "cannot listen on the UDP ports " + std::to_string(port_) + " and " +
                         std::to_string(port_ + 1) +
