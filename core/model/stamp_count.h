@@ -8,7 +8,7 @@
 // least receive - sender of each second, of the last kParts at most, never fell and rose
 //   by whole steps  (to kOnStep of one): by kSteps in kFewParts or more. No backlog grows so;
 //   or anyhow       by kApart_s, but by kNearApart_s where each second's rise is no more than kNear.
-// A rise of more than kStall_s at once is something that stood still, and begins anew.
+// A rise of more than kStall_s with nothing received for so long is something that stood still, and begins anew.
 // Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are seconds.
 
 #include <algorithm>
@@ -38,7 +38,10 @@ class StampCount {
     const bool first = !any_;
     any_ = true;
     last_sender_s_ = sender_s;
-    if (first) return begin_part(receive_s);
+    if (first) {
+      last_receive_s_ = receive_s;
+      return begin_part(receive_s);
+    }
     if (!(step_s > 0) || step_s > kLongestStep_s) return restart();
     if (step_s_ == 0 || step_s < step_s_ - kSame_s) {
       step_s_ = step_s;
@@ -54,6 +57,8 @@ class StampCount {
     }
     if (items_ >= kLeastItems && receive_s - since_s_ >= kPart_s) end_part(receive_s);
     const double level_s = receive_s - sender_s;
+    longest_gap_s_ = std::max(longest_gap_s_, receive_s - last_receive_s_);
+    last_receive_s_ = receive_s;
     ++items_;
     if (level_s >= part_.level_s) return;
     part_ = {receive_s, level_s};
@@ -93,13 +98,15 @@ class StampCount {
   void begin_part(double receive_s) {
     since_s_ = receive_s;
     items_ = 0;
+    longest_gap_s_ = 0;
     part_ = Part();
   }
 
   void end_part(double receive_s) {
     if (size_ > 0) {
       const double rise_s = part_.level_s - part(size_ - 1).level_s;
-      if (rise_s < -kBack_s || rise_s > kStall_s) size_ = 0;
+      const double stall_s = std::max(longest_gap_s_, gap_before_s_);
+      if (rise_s < -kBack_s || (rise_s > kStall_s && stall_s > kStall_s)) size_ = 0;
     }
     if (size_ == kParts) {
       begin_ = (begin_ + 1) % kParts;
@@ -107,6 +114,7 @@ class StampCount {
     }
     parts_[(begin_ + size_) % kParts] = part_;
     ++size_;
+    gap_before_s_ = longest_gap_s_;
     begin_part(receive_s);
   }
 
@@ -141,6 +149,9 @@ class StampCount {
   Part part_;  // of this second
   double since_s_ = 0;
   std::size_t items_ = 0;
+  double longest_gap_s_ = 0;  // in it, without an item
+  double gap_before_s_ = 0;   // in the one before
+  double last_receive_s_ = 0;
   bool any_ = false;
   double last_sender_s_ = 0;
   double step_s_ = 0;  // the grid's; 0: not known

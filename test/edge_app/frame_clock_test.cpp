@@ -512,7 +512,9 @@ INSTANTIATE_TEST_SUITE_P(
                     Counting{"OfThirtyLeavesOut", 1001.0 / 30'000, 1001.0 / 30'000, 0.08, 1, 30,
                              0.95},
                     Counting{"SlowerThanItSays", 1.0 / 30, 1.0 / 24, 0, 1, 25, 0.95},
-                    Counting{"SlowerAndLeavesOut", 1.0 / 30, 1.0 / 24, 0.1, 1, 25, 0.8}),
+                    Counting{"SlowerAndLeavesOut", 1.0 / 30, 1.0 / 24, 0.1, 1, 25, 0.8},
+                    Counting{"HalvesItsRateByNight", 0.04, 0.08, 0, 1, 25, 0.95},
+                    Counting{"LeavesMostOut", 0.04, 0.04, 0.6, 1, 25, 0.65}),
     [](const auto& which) { return which.param.name; });
 
 // Its stamps tell of what it leaves out: they are times.
