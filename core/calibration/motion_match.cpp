@@ -126,6 +126,8 @@ MotionMatch match_motion(const std::vector<ImageMotion>& motion, const Trajector
   }
   best.at_edge = at_edge;
   best.apart = apart;
+  best.centre_s = centre_s;
+  best.half_range_s = half_range_s;
   return best;
 }
 
@@ -155,8 +157,7 @@ Vector2<double> axis_correlation(const std::vector<ImageMotion>& motion,
 }  // namespace
 
 ReversedAxes reversed_axes(const std::vector<ImageMotion>& motion,
-                           const TrajectorySpline& telemetry, double centre_s, double half_range_s,
-                           const MotionMatch& match) {
+                           const TrajectorySpline& telemetry, const MotionMatch& match) {
   constexpr double kMinCorrelation = 0.9;
   constexpr double kMinAxisCorrelation = 0.8;
   constexpr double kMuchLess = 1.0 / 3;  // of what the signs as they are leave unexplained
@@ -165,7 +166,8 @@ ReversedAxes reversed_axes(const std::vector<ImageMotion>& motion,
   ReversedAxes reversed;
   for (const Vector2<double>& signs :
        {Vector2<double>(-1, 1), Vector2<double>(1, -1), Vector2<double>(-1, -1)}) {
-    const MotionMatch other = match_motion(motion, telemetry, centre_s, half_range_s, signs);
+    const MotionMatch other =
+        match_motion(motion, telemetry, match.centre_s, match.half_range_s, signs);
     if (other.correlation < kMinCorrelation || unexplained(other) > least) continue;
     // An axis that hardly moves shows no sign: what the other one does to the image tells nothing of it.
     const Vector2<double> each = signs.cwiseProduct(axis_correlation(motion, telemetry, other));

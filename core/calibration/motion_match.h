@@ -21,19 +21,14 @@ struct ImageMotion {
 // Over baselines of about baseline_s, along chains of frames that share landmarks.
 [[nodiscard]] std::vector<ImageMotion> image_motion(const AdjustmentData& data, double baseline_s);
 
-// Whether pan and tilt of the telemetry count the other way than the image shows.
-struct ReversedAxes {
-  bool pan = false;
-  bool tilt = false;
-};
-
 struct MotionMatch {
   double shift_s = 0;  // telemetry time = image time + shift_s
   double focal_length = 0;
   double correlation = 0;  // of the motions, 1 = perfect
   bool at_edge = false;    // of the range that was searched
   bool apart = false;      // no shift gives half of the video's motion telemetry beside it
-  ReversedAxes reversed;   // as reversed_axes() says
+  double centre_s = 0;     // where it was searched
+  double half_range_s = 0;
 };
 
 // The best shift within half_range_s of centre_s, to 0.1 ms. signs: of pan and tilt, -1 reverses one.
@@ -41,10 +36,16 @@ struct MotionMatch {
                                        const TrajectorySpline& telemetry, double centre_s,
                                        double half_range_s, const Vector2<double>& signs = {1, 1});
 
+// Whether pan and tilt of the telemetry count the other way than the image shows.
+struct ReversedAxes {
+  bool pan = false;
+  bool tilt = false;
+};
+
 // The axes with whose signs reversed the telemetry leaves much less of the image's motion unexplained
-// than as it is, `match`. None where the recording does not tell.
+// than as it is, `match`. None where the recording does not tell. Searches three times as long as match_motion().
 [[nodiscard]] ReversedAxes reversed_axes(const std::vector<ImageMotion>& motion,
-                                         const TrajectorySpline& telemetry, double centre_s,
-                                         double half_range_s, const MotionMatch& match);
+                                         const TrajectorySpline& telemetry,
+                                         const MotionMatch& match);
 
 }  // namespace alidade::internal

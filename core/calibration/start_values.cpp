@@ -121,7 +121,6 @@ StageStatus find_motion(const CalibrationInput& input, const CalibrationOptions&
     motion->match = match_motion(image, *smooth, centre, range);
     if (!motion->match.at_edge || range > end - begin) break;
   }
-  motion->match.reversed = reversed_axes(image, *smooth, centre, range, motion->match);
   StageStatus status;
   status.status = check_motion(image, *smooth, motion->match, input, &status.message);
   return status;

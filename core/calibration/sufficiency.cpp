@@ -161,8 +161,7 @@ CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
   if (motion.size() < 3) {
     *why =
         "hardly two frames share three landmarks over half a second: track landmarks longer, or "
-        "move "
-        "more slowly";
+        "move by less than half a picture in that time";
     return CalibrationStatus::kTooFewLandmarks;
   }
   double largest_shift = 0;
@@ -198,8 +197,9 @@ CalibrationStatus check_motion(const std::vector<ImageMotion>& motion,
     *why = "telemetry accompanies less than half of the video: was its connection lost meanwhile?";
     return CalibrationStatus::kBadInput;
   }
-  if (match.reversed.pan || match.reversed.tilt) {
-    *why = reversed_text(match.reversed);
+  const ReversedAxes reversed = reversed_axes(motion, telemetry, match);
+  if (reversed.pan || reversed.tilt) {
+    *why = reversed_text(reversed);
     return CalibrationStatus::kTelemetryMismatch;
   }
   if (match.correlation < kMinCorrelation) {

@@ -134,7 +134,7 @@ CalibrationStatus status_at(double amplitude, double correlation = 0.99,
   input.width = 1920;
   input.height = 1080;
   std::vector<ImageMotion> motion;
-  for (int i = 0; i <= 190; ++i) motion.push_back({0.05 * i, 0.05 * i + 0.5, {50, 30}});
+  for (int i = 0; i <= 190; ++i) motion.push_back({0.05 * i, 0.05 * i + 0.5, {-50, 30}});
   MotionMatch match;
   match.correlation = correlation;
   match.focal_length = focal_length;
