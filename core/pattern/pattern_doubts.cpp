@@ -57,8 +57,9 @@ std::vector<std::string> doubts_of(const PatternData& data) {
   if (jumps >= kFewestJumps) {
     doubts.push_back(internal::formatted(
         "the pattern jumps through the image %.0f times from one frame to the next; is there a "
-        "second one in view? Cover it, or move more slowly",
-        jumps));
+        "second one in view? Cover it; or move by less than %.0f %% of the pattern's diagonal a "
+        "frame",
+        jumps, 100 * kJump));
   }
   if (twice >= kFewestJumps) {
     doubts.push_back(internal::formatted(

@@ -238,16 +238,16 @@ std::vector<std::string> advice_of(const PatternProgress& progress) {
              : internal::formatted("the pattern is not found since %.0f s", progress.last_seen_s)) +
         "; is it this pattern, whole in view, in focus and lit?");
   } else if (progress.found < kSeldom) {
-    lines.push_back(internal::formatted(
-        "the pattern is found in few images, %.0f %% of them; move more slowly, or give more light "
-        "and keep it in view",
-        10 * std::round(10 * progress.found)));
+    lines.push_back(
+        internal::formatted("the pattern is found in few images, %.0f %% of them; move half as "
+                            "fast, or give more light "
+                            "and keep it in view",
+                            10 * std::round(10 * progress.found)));
   } else if (progress.unfollowed > kUnfollowed) {
     // What a cubic through the frames around misses grows as the fourth power of the speed. In tens, so
     // that the line is another only when it has changed.
     lines.push_back(internal::formatted(
-        "move more slowly, the image moves too far from one frame to the next: at %.0f %% of this "
-        "speed or less",
+        "move at %.0f %% of this speed or less, the image moves too far from one frame to the next",
         10 * std::max(1.0, std::floor(10 * std::pow(kUnfollowed / progress.unfollowed, 0.25)))));
   }
   // Before it was seen at all nothing of the rest is of use.
