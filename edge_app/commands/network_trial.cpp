@@ -23,6 +23,7 @@
 
 #include "platform/system/clock.h"
 #include "platform/system/file_descriptor.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {
@@ -51,15 +52,6 @@ void limit_addresses([[maybe_unused]] std::size_t model_bytes) {
 #endif
 }
 
-bool write_all_of(int file, const std::string& bytes) {
-  for (std::size_t done = 0; done < bytes.size();) {
-    const ssize_t n = ::write(file, bytes.data() + done, bytes.size() - done);
-    if (n < 0 && errno != EINTR) return false;
-    if (n > 0) done += static_cast<std::size_t>(n);
-  }
-  return true;
-}
-
 struct Trial {
   pid_t process = -1;
   FileDescriptor says;
@@ -67,7 +59,7 @@ struct Trial {
 
 std::optional<Trial> begin_trial(const std::string& model, const NetworkOptions& options) {
   const FileDescriptor file(::memfd_create("network", MFD_CLOEXEC));
-  if (!file.is_open() || !write_all_of(file.get(), model)) return std::nullopt;
+  if (!file.is_open() || !write_all(file.get(), model)) return std::nullopt;
   int ends[2] = {-1, -1};
   if (::pipe2(ends, O_CLOEXEC) != 0) return std::nullopt;
   Trial trial;
@@ -150,13 +142,9 @@ int run_network_trial(int argc, char** argv) {
   std::string error;
   try {
     limit_addresses(static_cast<std::size_t>(status.st_size));
-    std::string model(static_cast<std::size_t>(status.st_size), '\0');
-    for (std::size_t done = 0; done < model.size();) {
-      const ssize_t n =
-          ::pread(STDIN_FILENO, &model[done], model.size() - done, static_cast<off_t>(done));
-      if (n <= 0) return kRefused;
-      done += static_cast<std::size_t>(n);
-    }
+    std::string model;
+    if (!read_file("/proc/self/fd/0", &model, &error, static_cast<std::size_t>(status.st_size)))
+      return kRefused;
     if (NetworkDetector::load(model, options, &error)) return 0;
   } catch (const std::exception&) {
     error = "needs more memory than it may take";

@@ -11,6 +11,8 @@
 #include <optional>
 #include <system_error>
 
+#include "platform/system/whole_file.h"
+
 namespace alidade {
 namespace {
 
@@ -28,18 +30,6 @@ std::string text(const std::optional<std::int64_t>& number) {
 
 std::string failure(const std::string& path, int code) {
   return "cannot write " + path + ": " + std::strerror(code);
-}
-
-bool write_all(int fd, const std::string& bytes) {
-  std::size_t done = 0;
-  while (done < bytes.size()) {
-    const ssize_t count = ::write(fd, bytes.data() + done, bytes.size() - done);
-    if (count < 0 && errno != EINTR) {
-      return false;
-    }
-    done += count > 0 ? static_cast<std::size_t>(count) : 0;
-  }
-  return true;
 }
 
 }  // namespace

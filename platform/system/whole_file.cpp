@@ -39,14 +39,7 @@ class TemporaryFile {
 
   // False leaves the reason in errno.
   bool replace(const std::string& target, const std::string& content) {
-    if (descriptor_ < 0) return false;
-    std::size_t written = 0;
-    while (written < content.size()) {
-      const ssize_t n = ::write(descriptor_, content.data() + written, content.size() - written);
-      if (n < 0 && errno == EINTR) continue;
-      if (n < 0) return false;
-      written += static_cast<std::size_t>(n);
-    }
+    if (descriptor_ < 0 || !write_all(descriptor_, content)) return false;
     // mkostemp lets the owner alone read it; what is stored here is no secret.
     renamed_ = ::fchmod(descriptor_, 0644) == 0 && ::fsync(descriptor_) == 0 &&
                ::rename(name_.c_str(), target.c_str()) == 0;
@@ -133,6 +126,16 @@ int remove_unfinished(const std::string& folder,
   int removed = 0;
   for (const std::string& path : found) removed += remove_left_over(path) ? 1 : 0;
   return removed;
+}
+
+bool write_all(int descriptor, std::string_view bytes) {
+  while (!bytes.empty()) {
+    const ssize_t n = ::write(descriptor, bytes.data(), bytes.size());
+    if (n < 0 && errno == EINTR) continue;
+    if (n < 0) return false;
+    bytes.remove_prefix(static_cast<std::size_t>(n));
+  }
+  return true;
 }
 
 FileDescriptor open_to_read(const std::string& path, std::string* error) {

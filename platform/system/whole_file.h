@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <functional>
 #include <string>
+#include <string_view>
 
 #include "platform/system/file_descriptor.h"
 
@@ -24,6 +25,9 @@ namespace alidade {
 // Removes what killed processes left unfinished in a folder of files whose names are ours. Says how many.
 int remove_unfinished(const std::string& folder,
                       const std::function<bool(const std::string& name)>& is_ours);
+
+// What an open file takes, however many calls that needs. False leaves the reason in errno.
+[[nodiscard]] bool write_all(int descriptor, std::string_view bytes);
 
 // A closed one leaves `path: cannot be read: why` in *error. Waits for nobody.
 [[nodiscard]] FileDescriptor open_to_read(const std::string& path, std::string* error);
