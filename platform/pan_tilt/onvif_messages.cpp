@@ -23,7 +23,7 @@ constexpr const char* kWss = "http://docs.oasis-open.org/wss/2004/01/oasis-20040
 
 // --- text
 
-std::string escaped(std::string_view text) {
+std::string xml_escaped(std::string_view text) {
   std::string xml;
   for (const char c : text) {
     switch (c) {
@@ -169,7 +169,7 @@ std::string security_header(const OnvifLogin& login) {
   const std::string wss(kWss);
   return "<s:Header><w:Security s:mustUnderstand=\"1\" xmlns:w=\"" + wss +
          "wssecurity-secext-1.0.xsd\" xmlns:u=\"" + wss +
-         "wssecurity-utility-1.0.xsd\"><w:UsernameToken><w:Username>" + escaped(login.user) +
+         "wssecurity-utility-1.0.xsd\"><w:UsernameToken><w:Username>" + xml_escaped(login.user) +
          "</w:Username><w:Password Type=\"" + wss + "username-token-profile-1.0#PasswordDigest\">" +
          base64({reinterpret_cast<const char*>(digest.data()), size}) +
          "</w:Password><w:Nonce EncodingType=\"" + wss +
@@ -185,9 +185,9 @@ std::string onvif_request(const OnvifCall& call, const std::string& token,
   const std::string name(call.name);
   std::string content;
   if (name == kGetStatus.name) {
-    content = "<ProfileToken>" + escaped(token) + "</ProfileToken>";
+    content = "<ProfileToken>" + xml_escaped(token) + "</ProfileToken>";
   } else if (name == kGetConfigurationOptions.name) {
-    content = "<ConfigurationToken>" + escaped(token) + "</ConfigurationToken>";
+    content = "<ConfigurationToken>" + xml_escaped(token) + "</ConfigurationToken>";
   } else if (name == kGetCapabilities.name) {
     content = "<Category>All</Category>";
   } else if (name == kGetServices.name) {

@@ -2,20 +2,26 @@
 // Foreign text and numbers as an error shows them: short, on one line, with nothing that a terminal
 // would obey.
 
-#include <algorithm>
 #include <cstddef>
 #include <cstdio>
 #include <string>
 #include <string_view>
 
+#include "platform/system/escaped.h"
+
 namespace alidade {
 
-// The first `most` bytes; '?' for what is not printable ASCII.
+// The first `most` bytes, cut between characters of UTF-8, escaped.
 [[nodiscard]] inline std::string shown(std::string_view text, std::size_t most = 80) {
-  std::string line(text.substr(0, most));
-  std::replace_if(
-      line.begin(), line.end(), [](char c) { return c < ' ' || c > '~'; }, '?');
-  return line;
+  const auto is_inside = [&](std::size_t at) {
+    return (static_cast<unsigned char>(text[at]) & 0xC0U) == 0x80U;
+  };
+  if (text.size() > most) {
+    std::size_t end = most;
+    while (end > 0 && most - end < 3 && is_inside(end)) --end;
+    text = text.substr(0, is_inside(end) ? most : end);
+  }
+  return escaped(text);
 }
 
 // Nine digits; a forged 1e300 has not three hundred.

@@ -119,7 +119,7 @@ TEST(SoapFault, TellsTheInnermostCodeAndTheReason) {
       "<S:Reason><S:Text>No such\nprofile</S:Text></S:Reason></S:Fault>";
   const std::optional<SoapFault> fault = parse_soap_fault(envelope(inner));
   ASSERT_TRUE(fault);
-  EXPECT_EQ(fault->text, "ter:NoProfile: No such?profile");
+  EXPECT_EQ(fault->text, "ter:NoProfile: No such\\nprofile");
   EXPECT_FALSE(fault->not_authorized);
   EXPECT_TRUE(fault->of_a_service);
 }

@@ -485,7 +485,7 @@ TEST(OnvifScale, RefusesPositionsOutsideAndSpacesThatItDoesNotKnow) {
   const Scaled unknown = scaled(scale, at(0, 0, "http://vendor/Steps\n"));
   EXPECT_EQ(unknown.outcome, OnvifScale::Outcome::kOutside);
   EXPECT_THAT(unknown.error,
-              AllOf(HasSubstr("the space 'http://vendor/Steps?'"), HasSubstr("pan_scale")));
+              AllOf(HasSubstr("the space 'http://vendor/Steps\\n'"), HasSubstr("pan_scale")));
   const OnvifAxis stated{OnvifRange{-1, 1}, OnvifInterval{-100, 100}};
   EXPECT_DOUBLE_EQ(scaled(OnvifScale(stated, stated), at(50, 0, "http://vendor/Steps")).pan_rad,
                    0.5);

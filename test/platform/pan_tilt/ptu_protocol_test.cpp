@@ -58,7 +58,7 @@ INSTANTIATE_TEST_SUITE_P(
         Line{"TheLatest", "* 1\r\n* 2\r\n* 3", kNumber, 2, "", 5},
         Line{"Error", "! Illegal argument: XX\r\n", kError, 0, "Illegal argument: XX", 0},
         Line{"LimitReached", "!P\r\n", kError, 0, "P", 0},
-        Line{"ErrorCannotSpoilATerminal", "! \x1b[2J\r\n", kError, 0, "?[2J", 0}),
+        Line{"ErrorCannotSpoilATerminal", "! \x1b[2J\r\n", kError, 0, "\\x1b[2J", 0}),
     [](const auto& tested) { return tested.param.name; });
 
 TEST(PtuProtocol, PassesOverWhatIsNoWholeLine) {

@@ -4,6 +4,8 @@
 
 #include <string>
 
+#include "platform/system/shown.h"
+
 namespace alidade {
 namespace {
 
@@ -34,6 +36,17 @@ TEST(Escaped, NoUtf8IsShownByteForByte) {
   EXPECT_EQ(escaped("\xe3\x82"), "\\xe3\\x82") << "cut off";
   EXPECT_EQ(escaped("\xc0\x9b"), "\\xc0\\x9b") << "longer than it must be";
   EXPECT_EQ(escaped("\xed\xa0\x80"), "\\xed\\xa0\\x80") << "half of a pair";
+}
+
+TEST(Shown, IsShortAndEscapedAndCutBetweenCharacters) {
+  EXPECT_EQ(shown("a\x1b[2J", 3), "a\\x1b[");
+  EXPECT_EQ(shown("gr\u00fcn", 3), "gr");
+  EXPECT_EQ(shown("gr\u00fcn", 4), "gr\u00fc");
+  EXPECT_EQ(shown("\U0001F4F7", 3), "");
+  EXPECT_EQ(shown("\x80\x80\x80\x80\x80", 4), "\\x80\\x80\\x80\\x80") << "no UTF-8";
+  EXPECT_EQ(shown("", 0), "");
+  // What an error shows goes to the log, which escapes once more.
+  EXPECT_EQ(escaped(shown("a\n\x9b\\")), shown("a\n\x9b\\"));
 }
 
 }  // namespace

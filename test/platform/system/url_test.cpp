@@ -47,7 +47,7 @@ TEST(Url, ShowsAUrlItCannotParseOnOneLine) {
   Url url;
   std::string error;
   EXPECT_FALSE(parse_url("cam\nera\x1b[2J", &url, &error));
-  EXPECT_EQ(url.bare, "cam?era?[2J");
+  EXPECT_EQ(url.bare, "cam\\nera\\x1b[2J");
 }
 
 }  // namespace
