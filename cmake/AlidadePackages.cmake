@@ -25,16 +25,29 @@ foreach(file alidade.1 changelog)
     COMMAND_ERROR_IS_FATAL ANY)
 endforeach()
 
+# alidade_unit(NAME alidade@NAME ...): one camera, or one of several, whose configuration and state bear its name.
+function(alidade_unit file)
+  cmake_parse_arguments(A "" "NAME;DESCRIPTION;CONFIGURATION;STATE;OWN_ENVIRONMENT" "" ${ARGN})
+  foreach(word NAME DESCRIPTION CONFIGURATION STATE OWN_ENVIRONMENT)
+    set(${word} "${A_${word}}")
+  endforeach()
+  configure_file(${packaging}/alidade.service.in ${packages_dir}/${file} @ONLY)
+endfunction()
+alidade_unit(alidade.service NAME alidade CONFIGURATION alidade STATE alidade)
+alidade_unit(alidade@.service NAME alidade@NAME DESCRIPTION ": %i" CONFIGURATION %i STATE alidade/%i
+  OWN_ENVIRONMENT "EnvironmentFile=-/etc/alidade/%i.environment\n")
+
 install(FILES ${packages_dir}/alidade.1.gz DESTINATION ${CMAKE_INSTALL_MANDIR}/man1 COMPONENT runtime)
 # Found there by its name: the program's.
 install(FILES ${packaging}/alidade.bash-completion DESTINATION ${CMAKE_INSTALL_DATADIR}/bash-completion/completions
   RENAME alidade COMPONENT runtime)
 install(DIRECTORY ${PROJECT_SOURCE_DIR}/edge_app/examples/ DESTINATION ${CMAKE_INSTALL_DATADIR}/doc/alidade/examples
-  COMPONENT runtime FILES_MATCHING PATTERN "*.yaml")
+  COMPONENT runtime FILES_MATCHING PATTERN "*.yaml" PATTERN "*.conf")
 # What only a package may lay down: `cmake --install` leaves the system's own folders alone.
 install(FILES ${PROJECT_SOURCE_DIR}/edge_app/examples/service.yaml DESTINATION /etc/alidade RENAME alidade.yaml
   COMPONENT system EXCLUDE_FROM_ALL)
-install(FILES ${packaging}/alidade.service DESTINATION /lib/systemd/system COMPONENT system EXCLUDE_FROM_ALL)
+install(FILES ${packages_dir}/alidade.service ${packages_dir}/alidade@.service DESTINATION /lib/systemd/system
+  COMPONENT system EXCLUDE_FROM_ALL)
 install(FILES ${packaging}/60-alidade.rules DESTINATION /lib/udev/rules.d COMPONENT system EXCLUDE_FROM_ALL)
 install(FILES ${packaging}/copyright ${packages_dir}/changelog.gz DESTINATION /usr/share/doc/alidade
   COMPONENT system EXCLUDE_FROM_ALL)

@@ -61,10 +61,11 @@ class Contents(unittest.TestCase):
     def test_the_program_comes_with_all_that_belongs_to_it(self):
         root = self.unpacked("alidade")
         files = {str(f.relative_to(root)) for f in root.rglob("*") if f.is_file()}
-        examples = {f"usr/share/doc/alidade/examples/{f.name}" for f in (PROJECT / "edge_app/examples").glob("*.yaml")}
+        examples = {f"usr/share/doc/alidade/examples/{f.name}" for kind in ("yaml", "conf")
+                    for f in (PROJECT / "edge_app/examples").glob(f"*.{kind}")}
         self.assertGreaterEqual(len(examples), 4)
         self.assertEqual(files, examples | {
-            "etc/alidade/alidade.yaml", "lib/systemd/system/alidade.service", "lib/udev/rules.d/60-alidade.rules",
+            "etc/alidade/alidade.yaml", "lib/systemd/system/alidade.service", "lib/systemd/system/alidade@.service", "lib/udev/rules.d/60-alidade.rules",
             "usr/bin/alidade", "usr/share/bash-completion/completions/alidade", "usr/share/doc/alidade/changelog.gz", "usr/share/doc/alidade/copyright",
             "usr/share/man/man1/alidade.1.gz"})
 
@@ -117,17 +118,26 @@ class Contents(unittest.TestCase):
             owner = output_of("dpkg", "-S", f"/usr/lib/{TRIPLETS[NATIVE]}/lib{library}.so").split(":")[0]
             self.assertIn(owner, known, f"-l{library}")
 
-    def test_systemd_understands_the_unit(self):
+    def test_systemd_understands_the_units_and_little_is_left_open(self):
         root = self.unpacked("alidade")
-        unit = root / "lib/systemd/system/alidade.service"
-        text = unit.read_text(encoding="utf-8")
-        self.assertIn("=/usr/bin/alidade run ", text)
-        unit.write_text(text.replace("=/usr/bin/", f"={root}/usr/bin/"), encoding="utf-8")
-        done = subprocess.run(["systemd-analyze", "verify", "--man=no", "--recursive-errors=no", unit],
-                              capture_output=True, text=True, check=False)
-        self.assertEqual((done.returncode, done.stdout + done.stderr), (0, ""))
-        # Out of 10; what a service needs that uses devices, the network and real-time priorities.
-        output_of("systemd-analyze", "security", "--offline=true", "--threshold=25", unit)
+        units = root / "lib/systemd/system"
+        addresses = (root / "usr/share/doc/alidade/examples/addresses.conf").read_text(encoding="utf-8")
+        for name, file in (("alidade.service", "alidade.service"), ("alidade@gate.service", "alidade@.service")):
+            with self.subTest(unit=name):
+                text = (units / file).read_text(encoding="utf-8")
+                self.assertIn("=/usr/bin/alidade run ", text)
+                self.assertNotIn("@NAME@", text)
+                unit = root / name
+                # As it comes, and with the drop-in that is an example.
+                for more in ("", addresses):
+                    unit.write_text(text.replace("=/usr/bin/", f"={root}/usr/bin/") + more, encoding="utf-8")
+                    done = subprocess.run(["systemd-analyze", "verify", "--man=no", "--recursive-errors=no", unit],
+                                          capture_output=True, text=True, check=False)
+                    self.assertEqual((done.returncode, done.stdout + done.stderr), (0, ""))
+                    # Out of 100; what is left is the network, devices and real-time priority.
+                    output_of("systemd-analyze", "security", "--offline=true", "--threshold=14", unit)
+                for kept in ("MemoryMax=", "LimitCORE=0", "LimitRTPRIO=95", "DeviceAllow=char-video4linux rw"):
+                    self.assertIn(f"\n{kept}", text)
 
     def test_lintian_finds_no_error(self):
         done = subprocess.run(["lintian", "--fail-on", "error,warning", "--allow-root", package("alidade"), package("alidade-dev")],
