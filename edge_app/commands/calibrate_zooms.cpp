@@ -19,6 +19,7 @@
 #include "edge_app/output/calibration_json.h"
 #include "edge_app/output/calibration_report.h"
 #include "edge_app/storage/calibration_file.h"
+#include "platform/system/text.h"
 
 namespace alidade {
 namespace {
@@ -88,8 +89,8 @@ std::string zooms_text(const ZoomFit& fit, const std::vector<Calibration>& nodes
       "off\n",
       fit.chi_square, fit.degrees_of_freedom, 100 * fit.curve.content().repeatability);
   const auto [usual, largest] = sigmas_between(fit.curve);
-  text += fmt::format("between them f is known to {:.2g} %, {:.2g} % at most, from {} movement{}\n",
-                      100 * usual, 100 * largest, movements, movements == 1 ? "" : "s");
+  text += fmt::format("between them f is known to {:.2g} %, {:.2g} % at most, from {}\n",
+                      100 * usual, 100 * largest, counted(movements, "movement"));
   return text;
 }
 

@@ -31,6 +31,7 @@
 #include "edge_app/output/mqtt_connection.h"
 #include "edge_app/pipeline/steady_samples.h"
 #include "platform/system/escaped.h"
+#include "platform/system/text.h"
 
 namespace alidade {
 namespace {
@@ -186,8 +187,8 @@ void add_connection(const Connection& connection, const char* what, Findings* fi
   for (const std::string& note : connection.notes) add_advice(findings, note);
   if (connection.losses == 0) return;
   add_problem(findings,
-              fmt::format("{} {}: the connection was lost {} times during the check, last: {}",
-                          what, connection.name, connection.losses, connection.loss));
+              fmt::format("{} {}: the connection was lost {} during the check, last: {}", what,
+                          connection.name, counted(connection.losses, "time"), connection.loss));
 }
 
 // The report and what would help on stdout; what is wrong on stderr.

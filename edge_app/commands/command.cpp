@@ -15,6 +15,7 @@
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
 #include "platform/pan_tilt/vapix_source.h"
 #include "platform/storage/recording.h"
+#include "platform/system/text.h"
 #include "platform/video/mjpeg_source.h"
 #include "platform/video/recording_frame_source.h"
 #include "platform/video/rtp_source.h"
@@ -295,14 +296,15 @@ std::string nothing_came(const std::string& source, double wait_s) {
 void log_source_losses(const FrameSource& source) {
   const FrameSourceCounters counters = source.counters();
   if (counters.damaged > 0 || counters.dropped > 0) {
-    spdlog::warn("{}: {} frames damaged, {} dropped before they were read", source.name(),
-                 counters.damaged, counters.dropped);
+    spdlog::warn("{}: {} damaged, {} dropped before they were read", source.name(),
+                 counted(counters.damaged, "frame"), counters.dropped);
   }
   if (counters.unstamped > 0 || counters.foreign_packets > 0 || counters.garbage_bytes > 0) {
     spdlog::warn(
-        "{}: {} frames whose time stamp could not be true; {} packets that are not of the session, "
-        "and {} bytes that are of no packet, left out",
-        source.name(), counters.unstamped, counters.foreign_packets, counters.garbage_bytes);
+        "{}: {} whose time stamp could not be true; {} of another session, and {} of no packet, "
+        "left out",
+        source.name(), counted(counters.unstamped, "frame"),
+        counted(counters.foreign_packets, "packet"), counted(counters.garbage_bytes, "byte"));
   }
 }
 

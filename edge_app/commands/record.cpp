@@ -23,6 +23,7 @@
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/pipeline/read_loop.h"
 #include "platform/storage/recording_writer.h"
+#include "platform/system/text.h"
 
 namespace alidade {
 namespace {
@@ -219,9 +220,9 @@ bool wait_with_progress(StopSignals& signals, Recorder& recorder, double duratio
     const auto event =
         signals.wait(recorder.news_fd(), show ? std::min(left_s, kProgressPeriod_s) : left_s);
     if (show) {
-      fmt::print(stderr, "\r{:.0f} s: {} frames, {} telemetry samples ",
-                 begin_s ? monotonic_now_s() - *begin_s : 0.0, recorder.frames(),
-                 recorder.samples());
+      fmt::print(stderr, "\r{:.0f} s: {}, {} ", begin_s ? monotonic_now_s() - *begin_s : 0.0,
+                 counted(recorder.frames(), "frame"),
+                 counted(recorder.samples(), "telemetry sample"));
     }
     const bool news = event == StopSignals::Event::kDescriptor && !recorder.has_failed();
     if (news) recorder.forget_news();
@@ -269,8 +270,9 @@ int record_streams(const RecordOptions& options) {
   const bool all = wait_with_progress(signals, recorder, options.duration_s);
   recorder.stop();
   const std::string error = recorder.finish();
-  spdlog::info("{}: {:.1f} s, {} frames, {} telemetry samples stored", options.directory,
-               recorder.length_s(), recorder.frames(), recorder.samples());
+  spdlog::info("{}: {:.1f} s, {}, {} stored", options.directory, recorder.length_s(),
+               counted(recorder.frames(), "frame"),
+               counted(recorder.samples(), "telemetry sample"));
   if (all) say_what_is_missing(options.directory, recorder, options.duration_s);
   if (recorder.frames() > 0 && recorder.samples() == 0) {
     spdlog::warn("{}: no telemetry came; see `alidade check`", pan_tilt->name());

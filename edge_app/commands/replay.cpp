@@ -32,6 +32,7 @@
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
 #include "platform/storage/recording.h"
 #include "platform/system/clock.h"
+#include "platform/system/text.h"
 #include "platform/video/recording_frame_source.h"
 
 namespace alidade {
@@ -173,8 +174,8 @@ class Summary {
   [[nodiscard]] const ReasonCounts& reasons() const { return reasons_; }
   std::string line() {
     const auto oe = static_cast<std::int64_t>(landmarks_.size());
-    std::string line =
-        fmt::format("{} frames: OE {}, PT {}, none {}", frames_, oe, pt_, frames_ - oe - pt_);
+    std::string line = fmt::format("{}: OE {}, PT {}, none {}", counted(frames_, "frame"), oe, pt_,
+                                   frames_ - oe - pt_);
     if (!landmarks_.empty()) {
       const auto middle = landmarks_.begin() + static_cast<std::ptrdiff_t>(oe / 2);
       std::nth_element(landmarks_.begin(), middle, landmarks_.end());

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "platform/system/clock.h"
+#include "platform/system/text.h"
 
 namespace alidade {
 namespace {
@@ -39,15 +40,16 @@ std::string describe(const PipelineSummary& summary, bool latency_measured) {
                 quantiles(summary.computing), quantiles(summary.writing))
           : "latency not measured on a recording";
   return fmt::format(
-      "{} frames; {} records: OE {}, PT {}, none {}; {}; dropped by full queues: {} frames, {} "
-      "telemetry samples, {} records; {} pictures too late, {} repeated; page faults of the "
+      "{}; {}: OE {}, PT {}, none {}; {}; dropped by full queues: {}, {}, {}; {} "
+      "pictures too late, {} repeated; page faults of the "
       "real-time thread: "
       "{} minor, {} major",
-      summary.frames, summary.records, summary.with_landmarks,
+      counted(summary.frames, "frame"), counted(summary.records, "record"), summary.with_landmarks,
       summary.with_orientation - summary.with_landmarks, summary.records - summary.with_orientation,
-      latency, summary.drops.frames, summary.drops.telemetry, summary.drops.records,
-      summary.drops.late_images, summary.repeated, summary.page_faults.minor,
-      summary.page_faults.major);
+      latency, counted(summary.drops.frames, "frame"),
+      counted(summary.drops.telemetry, "telemetry sample"),
+      counted(summary.drops.records, "record"), summary.drops.late_images, summary.repeated,
+      summary.page_faults.minor, summary.page_faults.major);
 }
 
 std::string describe(const ReasonCounts& reasons, const Calibration& calibration,

@@ -17,6 +17,7 @@
 #include "edge_app/pipeline/calibration_feed.h"
 #include "edge_app/pipeline/keyframe_map.h"
 #include "edge_app/pipeline/orientation_step.h"
+#include "platform/system/text.h"
 #include "platform/video/recording_frame_source.h"
 
 namespace alidade {
@@ -51,11 +52,11 @@ void for_each_image(const std::string& directory, const CalibrationInput& input,
   for (const std::string& remark : video->remarks()) remarks->push_back(remark);
   if (video->damaged_frames() > 0) {
     remarks->push_back(
-        fmt::format("video: {} pictures could not be decoded", video->damaged_frames()));
+        fmt::format("video: {} could not be decoded", counted(video->damaged_frames(), "picture")));
   }
   if (video->missing_frames() > 0) {
-    remarks->push_back(
-        fmt::format("video: ends {} frames before frames.csv does", video->missing_frames()));
+    remarks->push_back(fmt::format("video: ends {} before frames.csv does",
+                                   counted(video->missing_frames(), "frame")));
   }
 }
 

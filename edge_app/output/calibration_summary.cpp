@@ -9,6 +9,7 @@
 
 #include "core/calibration/number_text.h"
 #include "edge_app/output/calibration_json.h"
+#include "platform/system/text.h"
 
 namespace alidade {
 namespace {
@@ -97,9 +98,10 @@ std::string summary_text(const CalibrationResult& result, const CalibrationOptio
   }
   const CalibrationQuality& quality = result.quality;
   text += fmt::format(
-      "from {} frames, {} observations of {} landmarks, {} telemetry samples; "
+      "from {}, {} of {}, {}; "
       "residuals / noise: image {:.2f}, telemetry {:.2f}\n",
-      quality.frames, quality.observations, quality.landmarks, quality.telemetry,
+      counted(quality.frames, "frame"), counted(quality.observations, "observation"),
+      counted(quality.landmarks, "landmark"), counted(quality.telemetry, "telemetry sample"),
       quality.pixel_sigma_ratio, quality.telemetry_sigma_ratio);
   if (quality.repetition > 1.1) {
     text += fmt::format(

@@ -6,6 +6,7 @@
 #include <unordered_set>
 
 #include "edge_app/output/report_page.h"
+#include "platform/system/text.h"
 
 namespace alidade::report {
 namespace {
@@ -97,13 +98,14 @@ std::vector<std::string> unused_frames(const ReportPage& page) {
   std::vector<std::string> lines;
   for (std::size_t why = 0; why < without_points.size(); ++why) {
     if (without_points[why] > 0)
-      lines.push_back(fmt::format("{} frames {}", without_points[why], kUntrackedLines[why]));
+      lines.push_back(
+          fmt::format("{} {}", counted(without_points[why], "frame"), kUntrackedLines[why]));
   }
   if (left_out > 0) {
     lines.push_back(fmt::format(
-        "{} frames of whose points none was used: outliers, seen in no other frame, or outside the "
+        "{} of whose points none was used: outliers, seen in no other frame, or outside the "
         "telemetry's time span",
-        left_out));
+        counted(left_out, "frame")));
   }
   for (const Span& gap : page.gaps()) {
     constexpr std::size_t kMost = 8;  // lines

@@ -13,6 +13,7 @@
 
 #include "edge_app/pipeline/read_loop.h"
 #include "platform/system/clock.h"
+#include "platform/system/text.h"
 
 namespace alidade {
 namespace {
@@ -444,8 +445,8 @@ void Pipeline::log_events(const OutputMessage& message) {
   const double now_s = monotonic_now_s();
   if (drops.total() == drops_logged_.total() || now_s < drops_logged_at_s_ + kDropLogInterval_s)
     return;
-  spdlog::warn("queues full: {} frames, {} telemetry samples, {} records dropped so far",
-               drops.frames, drops.telemetry, drops.records);
+  spdlog::warn("queues full: {}, {}, {} dropped so far", counted(drops.frames, "frame"),
+               counted(drops.telemetry, "telemetry sample"), counted(drops.records, "record"));
   drops_logged_ = drops;
   drops_logged_at_s_ = now_s;
 }

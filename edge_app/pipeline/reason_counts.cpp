@@ -1,4 +1,5 @@
 #include "edge_app/pipeline/reason_counts.h"
+#include "platform/system/text.h"
 
 #include <fmt/format.h>
 
@@ -29,10 +30,8 @@ std::string ReasonCounts::line() const {
   std::string line = wants_landmarks_ ? "not in OE mode: " : "without orientation: ";
   for (const RecordStatus status : seen) {
     const bool first = status == seen.front();
-    line += fmt::format("{}{}{} '{}'", first ? "" : ", ", of(status),
-                        !first            ? ""
-                        : of(status) == 1 ? " record"
-                                          : " records",
+    line += fmt::format("{} '{}'",
+                        first ? counted(of(status), "record") : ", " + std::to_string(of(status)),
                         to_string(status));
     if (status != RecordStatus::kOtherZoom || !zooms_) continue;
     line += zooms_->low == zooms_->high

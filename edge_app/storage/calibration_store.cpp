@@ -14,6 +14,7 @@
 
 #include "edge_app/storage/calibration_file.h"
 #include "edge_app/storage/map_file.h"
+#include "platform/system/text.h"
 #include "platform/system/whole_file.h"
 
 namespace alidade {
@@ -174,8 +175,8 @@ std::vector<std::string> CalibrationStore::load(int width, int height, Use use) 
     const int removed = remove_unfinished(
         folder.string(), [&file](const std::string& name) { return is_of_store(file, name); });
     if (removed > 0)
-      lines.push_back(fmt::format("{}: {} unfinished {} of a killed process removed", file_,
-                                  removed, removed == 1 ? "file" : "files"));
+      lines.push_back(fmt::format("{}: {} of a killed process removed", file_,
+                                  counted(removed, "unfinished file")));
   }
   std::vector<fs::path> files;
   if (is_there(file)) files.push_back(file);

@@ -1,4 +1,5 @@
 #include "edge_app/tracking/target_state.h"
+#include "platform/system/text.h"
 
 namespace alidade {
 
@@ -19,7 +20,7 @@ std::vector<TargetCounters::BoxCount> TargetCounters::boxes() const {
 std::string detections_text(const TargetCounters& counters) {
   const std::int64_t late = counters.of(DetectionStatus::kTakenLate);
   std::string text =
-      std::to_string(counters.of(DetectionStatus::kTaken) + late) + " frames of detections";
+      counted(counters.of(DetectionStatus::kTaken) + late, "frame") + " of detections";
   if (late > 0) text += " (" + std::to_string(late) + " late)";
   for (int i = 0; i < kDetectionStatusCount; ++i) {
     const auto status = static_cast<DetectionStatus>(i);

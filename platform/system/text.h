@@ -1,8 +1,9 @@
 #pragma once
-// Pieces of foreign text: blanks taken off, numbers read.
+// Pieces of text: blanks taken off, numbers read, things counted.
 
 #include <cmath>
 #include <cstddef>
+#include <cstdint>
 #include <cstdlib>
 #include <optional>
 #include <string>
@@ -25,6 +26,11 @@ namespace alidade {
   const double value = std::strtod(copy.c_str(), &end);
   return end != copy.c_str() && *end == '\0' && std::isfinite(value) ? std::optional(value)
                                                                      : std::nullopt;
+}
+
+// `1 frame`, `2 frames`.
+[[nodiscard]] inline std::string counted(std::int64_t number, std::string_view thing) {
+  return std::to_string(number) + " " + std::string(thing) + (number == 1 ? "" : "s");
 }
 
 }  // namespace alidade

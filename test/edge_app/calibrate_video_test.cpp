@@ -202,7 +202,7 @@ TEST_F(CalibrateVideo, SaysThatTheVideoEndsBeforeItsTimesDo) {
   directory_.write("copy/frames.csv", directory_.read("copy/frames.csv") + "200,8,8,200\n");
   const Result result = calibrate_command({cut, "--passes", "1"});
   EXPECT_EQ(result.exit_code, 0) << result.errors;
-  EXPECT_THAT(result.errors, HasSubstr("video: ends 1 frames before frames.csv does"));
+  EXPECT_THAT(result.errors, HasSubstr("video: ends 1 frame before frames.csv does"));
 }
 
 TEST_F(CalibrateVideo, WantsOnePassOrTwo) {

@@ -82,7 +82,7 @@ TEST(CalibrationReport, ShowsAndExplainsFramesThatWereNotUsed) {
   const std::string page = run.report();
   EXPECT_THAT(page, HasSubstr(fmt::format("frames used, of {}", run.input.frames.size())));
   EXPECT_THAT(page, HasSubstr("<li>29 frames of which tracks.csv has no point"));
-  EXPECT_THAT(page, HasSubstr("<li>1 frames of whose points none was used"));
+  EXPECT_THAT(page, HasSubstr("<li>1 frame of whose points none was used"));
   EXPECT_THAT(page, HasSubstr(fmt::format("<li>no frame from {:.2f} to {:.2f} s",
                                           begin_s - used[0].time_s, end_s - used[0].time_s)));
   // Errors in u and v, pan and tilt, and theirs.
