@@ -166,6 +166,15 @@ OrientationStepOptions step_options(const RecordingNoise& noise,
   return options;
 }
 
+namespace {
+
+// A picture of another size is said, not looked at: no camera can ask for more memory than the configured one.
+std::int64_t most_pixels(const VideoConfig& config) {
+  return config.width > 0 ? std::int64_t{config.width} * config.height : kMostLivePixels;
+}
+
+}  // namespace
+
 std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool decode,
                                                const std::string& copy_to) {
   if (config.type == VideoConfig::Type::kRecording) {
@@ -179,6 +188,7 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
     options.decode = decode;
     options.timeout_s = config.timeout_s;
     options.max_backoff_s = config.max_backoff_s;
+    options.max_pixels = most_pixels(config);
     options.copy_to = copy_to;
     return open_mjpeg(options);
   }
@@ -204,6 +214,7 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
   options.decode = decode;
   options.timeout_s = config.timeout_s;
   options.max_backoff_s = config.max_backoff_s;
+  options.max_pixels = most_pixels(config);
   options.copy_to = copy_to;
   return open_rtp(options);
 }

@@ -120,7 +120,12 @@ int run_live(const RunOptions& options) {
   if (options.csv) format = OutputFormat::kCsv;
 
   StopSignals signals;
-  const auto video = make_frame_source(config.video, config.realtime.landmarks);
+  VideoConfig of_video = config.video;
+  if (of_video.width == 0 && of_video.type != VideoConfig::Type::kV4l2) {
+    of_video.width = of_pipeline.width;
+    of_video.height = of_pipeline.height;
+  }
+  const auto video = make_frame_source(of_video, config.realtime.landmarks);
   const auto pan_tilt = make_pan_tilt_source(config.pan_tilt);
   spdlog::info("video: {}; pan/tilt: {}", video->name(), pan_tilt->name());
   spdlog::info("real-time thread: {}", describe(of_pipeline.realtime));

@@ -1,13 +1,31 @@
 #include "platform/video/av_file.h"
 
+#include <vector>
+
+#include "platform/streams/picture_size.h"
+
 namespace alidade {
+namespace {
+
+// It decodes, and would take a forged size for true.
+int find_stream_info(AVFormatContext* format) {
+  std::vector<AVDictionary*> options(format->nb_streams, nullptr);
+  for (AVDictionary*& of_stream : options) {
+    av_dict_set_int(&of_stream, "max_pixels", kMostFilePixels, 0);
+  }
+  const int code = avformat_find_stream_info(format, options.empty() ? nullptr : options.data());
+  for (AVDictionary*& of_stream : options) av_dict_free(&of_stream);
+  return code;
+}
+
+}  // namespace
 
 AvFile::~AvFile() { avformat_close_input(&format_); }
 
 bool AvFile::open(const std::string& path, std::string* error) {
   int code = avformat_open_input(&format_, path.c_str(), nullptr, nullptr);
   if (code >= 0) {
-    code = avformat_find_stream_info(format_, nullptr);  // how far pictures are out of order
+    code = find_stream_info(format_);  // how far pictures are out of order
   }
   if (code < 0) {
     *error = path + ": " + av_error_text(code);

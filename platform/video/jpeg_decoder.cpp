@@ -2,10 +2,10 @@
 
 #include <turbojpeg.h>
 
+#include "platform/streams/picture_size.h"
+
 namespace alidade {
 namespace {
-
-constexpr long kMaxPixels = 100'000'000;  // keeps a few forged bytes from asking for gigabytes
 
 const unsigned char* bytes_of(std::string_view jpeg) {
   return reinterpret_cast<const unsigned char*>(jpeg.data());
@@ -44,9 +44,9 @@ bool JpegDecoder::read_size(std::string_view jpeg, int* width, int* height) {
   if (colours == TJCS_CMYK || colours == TJCS_YCCK) {
     return fail("the JPEG picture is in printing colours; use grey or YCbCr pictures");
   }
-  if (static_cast<long>(*width) * *height > kMaxPixels) {
+  if (std::int64_t{*width} * *height > kMostFilePixels) {
     return fail("the JPEG picture claims " + std::to_string(*width) + "x" +
-                std::to_string(*height) + " pixels; at most " + std::to_string(kMaxPixels) +
+                std::to_string(*height) + " pixels; at most " + std::to_string(kMostFilePixels) +
                 " are taken");
   }
   return true;

@@ -28,7 +28,8 @@ std::optional<CodedBy> coded_by(AVCodecID codec) {
   return std::nullopt;
 }
 
-bool LumaDecoder::open(const AVCodecParameters& parameters, bool low_delay) {
+bool LumaDecoder::open(const AVCodecParameters& parameters, bool low_delay,
+                       std::int64_t max_pixels) {
   context_.reset();
   jpeg_.reset();
   decoded_.reset();
@@ -61,6 +62,7 @@ bool LumaDecoder::open(const AVCodecParameters& parameters, bool low_delay) {
   }
   if (code >= 0) {
     context_->thread_count = 1;
+    context_->max_pixels = max_pixels;
     if (low_delay) {
       context_->flags |= AV_CODEC_FLAG_LOW_DELAY;
       context_->has_b_frames = 0;

@@ -14,6 +14,7 @@
 #include <optional>
 #include <string>
 
+#include "platform/streams/picture_size.h"
 #include "platform/video/av_handles.h"
 #include "platform/video/coded_picture.h"
 #include "platform/video/jpeg_decoder.h"
@@ -34,8 +35,9 @@ class LumaDecoder {
   };
 
   // low_delay: never hold a picture back to put it in order, whatever the stream's parameter sets allow for. Data of H.264
-  // and H.265 has to be Annex B then.
-  [[nodiscard]] bool open(const AVCodecParameters& parameters, bool low_delay);
+  // and H.265 has to be Annex B then. A picture of more than max_pixels, to whole blocks, cannot be decoded.
+  [[nodiscard]] bool open(const AVCodecParameters& parameters, bool low_delay,
+                          std::int64_t max_pixels = kMostFilePixels);
 
   // One whole picture, or null for "no more will come". False: the data cannot be decoded.
   [[nodiscard]] bool send(const AVPacket* packet);

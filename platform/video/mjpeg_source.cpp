@@ -209,7 +209,7 @@ bool MjpegSource::begin_stream() {
                "camera's MJPEG stream";
     return false;
   }
-  scanner_.emplace(boundary, options_.max_picture_bytes);
+  scanner_.emplace(boundary, most_picture_bytes(options_.max_pixels));
   discarded_ = 0;
   return true;
 }
@@ -342,8 +342,14 @@ ReadStatus MjpegSource::read(Frame& frame, double timeout_s) {
 ReadStatus MjpegSource::deliver(MultipartPart part, Frame& frame) {
   Picture picture;
   const double before_s = monotonic_now_s();
-  if (options_.decode ? !decoder_.decode(part.body, &picture)
-                      : !decoder_.read_size(part.body, &picture.width, &picture.height)) {
+  bool usable = decoder_.read_size(part.body, &picture.width, &picture.height);
+  const bool fits = std::int64_t{picture.width} * picture.height <= options_.max_pixels;
+  if (usable && !fits && !options_.copy_to.empty()) {
+    ++damaged_;
+    return ReadStatus::kTimeout;
+  }
+  if (usable && fits && options_.decode) usable = decoder_.decode(part.body, &picture);
+  if (!usable) {
     ++damaged_;
     if (++damaged_in_a_row_ < kDamagedInARow) {
       return ReadStatus::kTimeout;
@@ -378,7 +384,7 @@ ReadStatus MjpegSource::deliver(MultipartPart part, Frame& frame) {
   frame.luma = picture.luma;
   frame.stride = picture.stride;
   frame.owner = std::move(picture.owner);
-  if (options_.decode) {
+  if (options_.decode && fits) {
     frame.decode_s = decode_s;
   }
   return ReadStatus::kOk;

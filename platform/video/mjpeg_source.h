@@ -25,6 +25,7 @@
 #include <memory>
 #include <string>
 
+#include "platform/streams/picture_size.h"
 #include "platform/video/frame_source.h"
 
 namespace alidade {
@@ -36,8 +37,10 @@ struct MjpegSourceOptions {
   bool decode = true;        // false: Frame::luma stays null, only the headers are read
   double timeout_s = 3;      // without a picture for so long, the connection counts as lost
   double max_backoff_s = 5;  // longest pause between two tries
-  std::size_t max_picture_bytes = 16U << 20U;  // a longer part is no picture
-  std::string copy_to;                         // video.mkv to copy the pictures into; empty: none
+  // A larger picture is not decoded: its frame has its size, and no luma. In a copy there is none. A part that is longer
+  // than such a picture can be (most_picture_bytes) is none.
+  std::int64_t max_pixels = kMostLivePixels;
+  std::string copy_to;  // video.mkv to copy the pictures into; empty: none
 };
 
 [[nodiscard]] std::unique_ptr<FrameSource> open_mjpeg(const MjpegSourceOptions& options);

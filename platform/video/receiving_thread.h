@@ -29,7 +29,7 @@ template <class Picture>
 class ReceivingThread {
  public:
   static constexpr std::size_t kMaxPictures = 32;       // a second of video
-  static constexpr std::size_t kMaxBytes = 64U << 20U;  // of the pictures that wait
+  static constexpr std::size_t kMaxBytes = 24U << 20U;  // of the pictures that wait
 
   // Lives through one connection, on the receiving thread: calls push(), and returns why it ended:
   // kDisconnected or kFailed with *error, or kStopped. interrupt ends it, from any thread.
@@ -97,10 +97,10 @@ class ReceivingThread {
     changed_.notify_all();
   }
 
-  // For the connection: whether the next picture would push another one out.
-  [[nodiscard]] bool full() {
+  // For the connection: whether the next picture, of so many bytes, would push another one out.
+  [[nodiscard]] bool full(std::size_t bytes) {
     const std::lock_guard<std::mutex> lock(mutex_);
-    return pictures_ >= kMaxPictures;
+    return pictures_ > 0 && (pictures_ >= kMaxPictures || bytes_ + bytes > kMaxBytes);
   }
 
   // For the connection: drops the pictures that wait.

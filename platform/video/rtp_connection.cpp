@@ -22,7 +22,6 @@ extern "C" {
 namespace alidade {
 namespace {
 
-constexpr int kMaxPicture = 32 << 20;    // bytes of compressed data
 constexpr int kMaxPacket = 65'536;       // bytes: RTSP's and UDP's lengths have 16 bits
 constexpr int kMaxDescription = 16'384;  // bytes that libavformat reads
 
@@ -246,7 +245,9 @@ ReadStatus RtpConnection::read_picture(AccessUnit* unit, std::string* error) {
     }
     if (next) *unit = std::exchange(growing_, AccessUnit{});
     if (!append(&piece)) {
-      *error = "a picture of more than " + std::to_string(kMaxPicture >> 20) + " MB";
+      *error = "a picture of more than " +
+               std::to_string(most_picture_bytes(options_.max_pixels) >> 10U) +
+               " KB; is video.width and video.height right?";
       return ReadStatus::kDisconnected;
     }
     grown_ = end.last;
@@ -264,7 +265,8 @@ bool RtpConnection::append(AccessUnit* piece) {
     return true;
   }
   const int end = growing_.packet->size;
-  if (end > kMaxPicture - piece->packet->size ||
+  const auto most = static_cast<int>(most_picture_bytes(options_.max_pixels));
+  if (end > most - piece->packet->size ||
       av_grow_packet(growing_.packet.get(), piece->packet->size) < 0) {
     return false;
   }
@@ -316,12 +318,28 @@ bool RtpConnection::inspect(AccessUnit* unit) {
     at_once = coded.needs_no_other || coded.right_after == 0;
     const bool overtaken = parser_->output_picture_number < last_output_number_;
     last_output_number_ = parser_->output_picture_number;
+    judge_size(unit);
     if (parser_->pict_type == AV_PICTURE_TYPE_B && (coded_by_ == CodedBy::kH264 || overtaken)) {
       return false;
     }
   }
   unit->packet->flags = unit->key && at_once ? AV_PKT_FLAG_KEY : 0;
   return true;
+}
+
+// By the whole blocks, too, of which a forged picture may show the least part.
+void RtpConnection::judge_size(AccessUnit* unit) const {
+  constexpr std::int64_t kBlock = 64;  // px, H.265's largest
+  const auto pixels = [](int width, int height) { return std::int64_t{width} * height; };
+  unit->width = parser_->width;
+  unit->height = parser_->height;
+  const std::int64_t edges = kBlock * (unit->width + unit->height + kBlock);
+  if (pixels(parser_->coded_width, parser_->coded_height) >
+      pixels(unit->width, unit->height) + edges) {
+    unit->width = parser_->coded_width;
+    unit->height = parser_->coded_height;
+  }
+  unit->too_large = pixels(unit->width, unit->height) > options_.max_pixels;
 }
 
 // libavformat adds to each packet what the latest RTCP report says about its timestamp, but without

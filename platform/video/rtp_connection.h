@@ -33,6 +33,10 @@ struct AccessUnit {
   bool key = false;          // decoding can begin with it: a key frame or a recovery point
   bool whole = true;         // nothing of it was lost
   bool follows = true;       // nothing was lost between it and the picture before
+  // H.264 and H.265, as its parameter sets say; 0: unknown.
+  int width = 0;
+  int height = 0;
+  bool too_large = false;  // for RtpSourceOptions::max_pixels
 };
 
 class RtpConnection {
@@ -79,6 +83,7 @@ class RtpConnection {
   [[nodiscard]] ReadStatus read_picture(AccessUnit* unit, std::string* error);
   [[nodiscard]] bool append(AccessUnit* piece);
   [[nodiscard]] bool inspect(AccessUnit* unit);
+  void judge_size(AccessUnit* unit) const;
   [[nodiscard]] std::optional<double> utc(const AVPacket& packet) const;
   [[nodiscard]] bool another_sender(AccessUnit* unit);
   ReadStatus nothing_received(std::string* error) const;

@@ -23,6 +23,12 @@ namespace {
 constexpr std::size_t kDecoderCapacity = 16;  // pictures: the most that H.264 may hold back
 constexpr double kWorthSaying_s = 3;          // most cameras send a key frame more often
 
+// The decoder counts the blocks at a picture's edges as a whole.
+std::int64_t with_whole_blocks(std::int64_t pixels) {
+  constexpr std::int64_t kBlock = 64;  // px, H.265's largest
+  return pixels + 2 * kBlock * (kMostPictureSide + kBlock);
+}
+
 void begin_waiting(std::atomic<double>* since_s) {
   if (*since_s < 0) *since_s = monotonic_now_s();
 }
@@ -75,6 +81,7 @@ class RtpSource : public FrameSource {
     return ReadStatus::kFailed;
   }
   ReadStatus deliver(Arrived arrived, Frame& frame);
+  void give(const AccessUnit& unit, int width, int height, Frame& frame);
   [[nodiscard]] bool can_be_decoded(const AccessUnit& unit);
   ReadStatus decode(AccessUnit* unit, Picture* picture);
   void spoil();
@@ -155,7 +162,7 @@ void RtpSource::check() {
 
 // Where pictures are dropped, all are: those that follow cannot be decoded up to the next key frame.
 void RtpSource::push(Arrived arrived) {
-  if (thread_.full()) {
+  if (thread_.full(static_cast<std::size_t>(arrived.unit.packet->size))) {
     thread_.drop_all();
     wait_for_key_ = true;
   }
@@ -283,13 +290,22 @@ ReadStatus RtpSource::deliver(Arrived arrived, Frame& frame) {
     in_decoder_.clear();
     size_known_ = false;
     spoilt_ = false;
-    if (!decoder_.open(*parameters_, true)) {
+    if (!decoder_.open(*parameters_, true, with_whole_blocks(options_.max_pixels))) {
       return fail(decoder_.error());
     }
   }
   Picture picture;
   const double before_s = monotonic_now_s();
   const bool copies = !options_.copy_to.empty();
+  if (unit.too_large) {
+    spoil();
+    if (copies) {
+      ++damaged_;
+      return ReadStatus::kTimeout;
+    }
+    give(unit, unit.width, unit.height, frame);
+    return ReadStatus::kOk;
+  }
   if (options_.decode || copies || !size_known_) {
     const bool decodable = can_be_decoded(unit);
     if (!decodable && (copies || !unit.whole)) return ReadStatus::kTimeout;
@@ -307,14 +323,7 @@ ReadStatus RtpSource::deliver(Arrived arrived, Frame& frame) {
                            unit.receive_time_s, &error)) {
     return fail(std::move(error));
   }
-  frame = Frame{};
-  frame.stamp.frame = next_frame_++;
-  frame.stamp.receive_time_s = unit.receive_time_s;
-  frame.stamp.sender_time_s = unit.sender_time_s;
-  frame.stamp.sender_utc_s = unit.sender_utc_s;
-  frame.stamp.restarted = std::exchange(restarted_, false);
-  frame.width = width_;
-  frame.height = height_;
+  give(unit, width_, height_, frame);
   if (options_.decode && picture.luma != nullptr) {
     frame.luma = picture.luma;
     frame.stride = picture.stride;
@@ -323,6 +332,18 @@ ReadStatus RtpSource::deliver(Arrived arrived, Frame& frame) {
     frame.interlaced = picture.interlaced;
   }
   return ReadStatus::kOk;
+}
+
+// A frame without luma.
+void RtpSource::give(const AccessUnit& unit, int width, int height, Frame& frame) {
+  frame = Frame{};
+  frame.stamp.frame = next_frame_++;
+  frame.stamp.receive_time_s = unit.receive_time_s;
+  frame.stamp.sender_time_s = unit.sender_time_s;
+  frame.stamp.sender_utc_s = unit.sender_utc_s;
+  frame.stamp.restarted = std::exchange(restarted_, false);
+  frame.width = width;
+  frame.height = height;
 }
 
 // Whether the picture came whole, and all that it is coded from. After a loss that is so from the next one on at which

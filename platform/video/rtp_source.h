@@ -35,6 +35,7 @@
 #include <memory>
 #include <string>
 
+#include "platform/streams/picture_size.h"
 #include "platform/video/frame_source.h"
 
 namespace alidade {
@@ -54,7 +55,9 @@ struct RtpSourceOptions {
   std::string certificate_file;
   double timeout_s = 3;      // without a whole picture for so long, the connection counts as lost
   double max_backoff_s = 5;  // longest pause between two tries
-  std::string copy_to;       // video.mkv to copy the stream into; empty: none
+  // A larger picture is not decoded: its frame has its size, and no luma. In a copy there is none.
+  std::int64_t max_pixels = kMostLivePixels;
+  std::string copy_to;  // video.mkv to copy the stream into; empty: none
 };
 
 [[nodiscard]] std::unique_ptr<FrameSource> open_rtp(const RtpSourceOptions& options);

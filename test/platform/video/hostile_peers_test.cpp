@@ -1,5 +1,5 @@
 // Cameras, and who stands between, that never come to an end: each link is lost in its time, is made again, and can be
-// stopped whatever state the other side is in. And who sends datagrams to a port that is not meant for him.
+// stopped whatever state the other side is in. No picture asks for more memory than the configured one. And who sends datagrams to a port that is not meant for him.
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -14,6 +14,7 @@
 #include "platform/video/rtsp_framing.h"
 #include "platform/video/udp_senders.h"
 #include "test/platform/support/eventually.h"
+#include "test/platform/support/mjpeg_server.h"
 #include "test/platform/support/scripted_rtsp_server.h"
 #include "test/simulator/servers/digest_check.h"
 #include "test/support/temporary_directory.h"
@@ -178,6 +179,60 @@ TEST(RtspAnswerTooLong, IsRefusedByWhatItSaysOfItself) {
     Frame frame;
     ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
     EXPECT_THAT(source->error(), HasSubstr("the camera's answer is longer than 64 KB"));
+  }
+}
+
+// The next frame of plain RTP, pictures of which are sent until it comes.
+ReadStatus next_by_rtp(FrameSource& source, RtpSender& sender, Frame& frame) {
+  ReadStatus status = ReadStatus::kTimeout;
+  for (const double end_s = monotonic_now_s() + kDeadline_s;
+       status == ReadStatus::kTimeout && monotonic_now_s() < end_s;) {
+    sender.send();
+    status = source.read(frame, 0.02);
+  }
+  return status;
+}
+
+class PictureSize : public ::testing::TestWithParam<RtpSender::Codec> {};
+INSTANTIATE_TEST_SUITE_P(, PictureSize,
+                         ::testing::Values(RtpSender::Codec::kH264, RtpSender::Codec::kH265),
+                         ::testing::PrintToStringParamName());
+
+TEST_P(PictureSize, BeyondTheConfiguredOneIsSaidAndNotDecoded) {
+  constexpr std::int64_t kPixels = RtpSender::kWidth * RtpSender::kHeight;
+  for (const std::int64_t most : {kPixels, kPixels - 1}) {
+    const int port = test::udp_port_pair();
+    RtpSourceOptions options;
+    options.url = "rtp://@:" + std::to_string(port);
+    options.format = GetParam() == RtpSender::Codec::kH264 ? "H264" : "H265";
+    options.max_pixels = most;
+    options.timeout_s = kNever_s;
+    const auto source = open_rtp(options);
+    Frame frame;
+    (void)source->read(frame, 0);
+    ASSERT_TRUE(eventually([&] { return rtp_port_taken(port); }));
+    RtpSender sender(GetParam(), port);
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_EQ(next_by_rtp(*source, sender, frame), ReadStatus::kOk) << source->error();
+      EXPECT_EQ(frame.width, RtpSender::kWidth);
+      EXPECT_EQ(frame.height, RtpSender::kHeight);
+      EXPECT_EQ(frame.luma != nullptr, most == kPixels);
+    }
+  }
+}
+
+TEST(PictureSizeOfMjpeg, BeyondTheConfiguredOneIsSaidAndNotDecoded) {
+  const MjpegServer server;
+  for (const bool fits : {true, false}) {
+    MjpegSourceOptions options;
+    options.url = server.url();
+    options.max_pixels = MjpegServer::kWidth * MjpegServer::kHeight - (fits ? 0 : 1);
+    const auto source = open_mjpeg(options);
+    Frame frame;
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+    EXPECT_EQ(frame.width, MjpegServer::kWidth);
+    EXPECT_EQ(frame.height, MjpegServer::kHeight);
+    EXPECT_EQ(frame.luma != nullptr, fits);
   }
 }
 

@@ -451,7 +451,7 @@ TEST(MjpegSource, SkipsAndCountsDamagedPicturesAndPassesOverText) {
     server.stay_silent(fd);
   });
   MjpegSourceOptions options = options_for(server);
-  options.max_picture_bytes = 50'000;
+  options.max_pixels = 96 * 64;
   const auto source = open_mjpeg(options);
   Frame frame;
   ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kOk) << source->error();
