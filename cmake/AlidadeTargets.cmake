@@ -32,6 +32,34 @@ if(ALIDADE_FUZZ)
   target_compile_options(alidade_options INTERFACE -fsanitize=fuzzer-no-link)
 endif()
 
+# What makes a slip in memory hard to use for an attack, in all that is shipped: canaries on the stack, checked calls of the C library,
+# no jump over the stack's guard page, and calls and jumps that land only where the compiler meant them to. For builds that optimise:
+# _FORTIFY_SOURCE does nothing in others. The sanitizers see more without it.
+add_library(alidade_hardening INTERFACE)
+if(ALIDADE_HARDEN)
+  if(ALIDADE_SANITIZE OR ALIDADE_FUZZ)
+    message(FATAL_ERROR "ALIDADE_HARDEN hides from sanitizers and fuzzing what they are to find: leave it OFF here")
+  endif()
+  target_compile_options(alidade_hardening INTERFACE -fstack-protector-strong -fstack-clash-protection
+    $<$<NOT:$<CONFIG:Debug>>:-U_FORTIFY_SOURCE$<SEMICOLON>-D_FORTIFY_SOURCE=3>)
+  if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|amd64|AMD64")
+    target_compile_options(alidade_hardening INTERFACE -fcf-protection=full)
+  elseif(CMAKE_SYSTEM_PROCESSOR MATCHES "aarch64|arm64")
+    target_compile_options(alidade_hardening INTERFACE -mbranch-protection=standard)
+  endif()
+endif()
+
+# alidade_harden(target)
+# compiles a library's own sources so, and links a program, whose symbols are then resolved at its start: never on the real-time thread,
+# and their table is read-only from then on. Not for tests: they are not shipped.
+function(alidade_harden target)
+  get_target_property(type ${target} TYPE)
+  target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:alidade_hardening>)
+  if(type STREQUAL "EXECUTABLE")
+    target_link_options(${target} PRIVATE -pie -Wl,-z,relro,-z,now,-z,noexecstack)
+  endif()
+endfunction()
+
 # alidade_leave_unchecked(target)
 # for the rooms of mathematics and the tests: each of Eigen's accesses would carry these checks, half of what such a source costs. The address
 # sanitizer and Eigen's own assertions find what they are for; the preset `fuzz` has them. A property: an option of the target itself would
@@ -63,6 +91,7 @@ function(alidade_prelude name)
   add_library(alidade_${name}_prelude OBJECT ${PROJECT_SOURCE_DIR}/cmake/prelude.cpp)
   target_link_libraries(alidade_${name}_prelude PRIVATE alidade_options ${A_LINK})
   target_compile_options(alidade_${name}_prelude PRIVATE ${A_OPTIONS} ${ALIDADE_COMPILER_MEMORY})
+  alidade_harden(alidade_${name}_prelude)
   target_precompile_headers(alidade_${name}_prelude PRIVATE ${A_HEADERS})
   set_property(GLOBAL PROPERTY ALIDADE_PRELUDE_LINKS_${name} ${A_LINK})
 endfunction()
@@ -88,6 +117,7 @@ function(alidade_library name)
     set(scope PUBLIC)
     target_link_libraries(${target} PRIVATE $<BUILD_INTERFACE:alidade_options> ${A_PRIVATE})
     target_compile_options(${target} PRIVATE ${A_OPTIONS} ${ALIDADE_COMPILER_MEMORY})
+    alidade_harden(${target})
     if(A_UNITY)
       alidade_unity(${target})
     endif()
