@@ -2,11 +2,14 @@
 
 #include <fmt/format.h>
 #include <mosquitto.h>
+#include <openssl/ssl.h>
 #include <poll.h>
 #include <sys/socket.h>
 
 #include <algorithm>
+#include <array>
 #include <cerrno>
+#include <cstdint>
 #include <system_error>
 
 #include "platform/system/clock.h"
@@ -174,20 +177,71 @@ bool MqttConnection::has_broken_off(bool* hung_up) {
   return true;
 }
 
+// Whether this result of the library is an end; then the error is set.
+bool MqttConnection::has_failed(int code) {
+  if (code == MOSQ_ERR_SUCCESS && mosquitto_socket(client_) >= 0) return false;
+  if (ending_) return true;
+  fail(errno, code == MOSQ_ERR_SUCCESS ? MOSQ_ERR_CONN_LOST : code);
+  return true;
+}
+
+// The library takes memory for as long a packet as the broker tells, up to 256 MB. A publisher is sent nothing but answers of two
+// or four bytes.
+MqttConnection::Incoming MqttConnection::look_at_what_comes() const {
+  std::array<std::uint8_t, 4> bytes{};
+  int count = 0;
+  if (options_.tls) {
+    auto* const tls = static_cast<SSL*>(mosquitto_ssl_get(client_));
+    if (tls == nullptr || SSL_is_init_finished(tls) == 0) return Incoming::kUnknown;
+    count = SSL_peek(tls, bytes.data(), static_cast<int>(bytes.size()));
+    if (count <= 0) return Incoming::kUnknown;
+  } else {
+    count = static_cast<int>(
+        ::recv(socket(), bytes.data(), bytes.size(), MSG_PEEK | MSG_DONTWAIT | MSG_NOSIGNAL));
+    if (count < 0 && (errno == EAGAIN || errno == EINTR)) return Incoming::kNothing;
+    if (count <= 0) return Incoming::kUnknown;
+  }
+  constexpr std::array<std::uint8_t, 5> kAnswers = {0x20, 0x40, 0x50, 0x70, 0xD0};
+  constexpr std::uint8_t kAnswerToPing = 0xD0;
+  const int length = bytes[0] == kAnswerToPing ? 0 : 2;
+  if (std::find(kAnswers.begin(), kAnswers.end(), bytes[0]) == kAnswers.end() ||
+      (count > 1 && bytes[1] != length)) {
+    return Incoming::kForeign;
+  }
+  return count < 2 + length ? Incoming::kHalfAnswer : Incoming::kAnswer;
+}
+
+bool MqttConnection::read_answers() {
+  constexpr int kMost = 16;        // then others have their turn
+  constexpr int kMostPackets = 1;  // as its manual has it
+  constexpr double kHalf_s = 1;
+  for (int i = 0; i < kMost; ++i) {
+    const Incoming incoming = look_at_what_comes();
+    if (incoming == Incoming::kForeign) {
+      return fail_with(
+          "what comes is no answer that a broker gives to a publisher; is a broker there, and does "
+          "mqtt.url say rightly whether with TLS (mqtts://)?");
+    }
+    if (incoming == Incoming::kHalfAnswer) {
+      const double now_s = monotonic_now_s();
+      if (half_since_s_ < 0) half_since_s_ = now_s;
+      if (now_s - half_since_s_ < kHalf_s) return true;
+      return fail_with("half an answer has come, and the other half has not");
+    }
+    half_since_s_ = -1;
+    if (incoming == Incoming::kNothing) return true;
+    if (has_failed(mosquitto_loop_read(client_, kMostPackets)) || !error_.empty()) return false;
+    if (incoming == Incoming::kUnknown) return true;
+  }
+  return true;
+}
+
 bool MqttConnection::step() {
-  const auto failed = [this](int code) {
-    if (code == MOSQ_ERR_SUCCESS && mosquitto_socket(client_) >= 0) return false;
-    if (ending_) return true;
-    fail(errno, code == MOSQ_ERR_SUCCESS ? MOSQ_ERR_CONN_LOST : code);
-    return true;
-  };
   bool hung_up = false;
   if (!connected_ && has_broken_off(&hung_up)) return false;
-  constexpr int kMostPackets = 1;  // as its manual has it
-  if (failed(mosquitto_loop_read(client_, kMostPackets)) || !error_.empty()) return false;
-  if (mosquitto_want_write(client_) && failed(mosquitto_loop_write(client_, kMostPackets)))
-    return false;
-  if (failed(mosquitto_loop_misc(client_)) || !error_.empty()) return false;
+  if (!read_answers()) return false;
+  if (mosquitto_want_write(client_) && has_failed(mosquitto_loop_write(client_, 1))) return false;
+  if (has_failed(mosquitto_loop_misc(client_)) || !error_.empty()) return false;
   if (connected_) return true;
   if (hung_up) {
     fail(0, MOSQ_ERR_CONN_LOST);
@@ -208,6 +262,8 @@ double MqttConnection::patience_s() const {
   constexpr double kKeepAlive_s = 1;
   constexpr double kAnswer_s = 0.1;
   constexpr double kTls_s = 0.02;
+  constexpr double kOtherHalf_s = 0.02;
+  if (!wants_to_read()) return kOtherHalf_s;
   if (connected_) return kKeepAlive_s;
   return options_.tls ? kTls_s : kAnswer_s;
 }
@@ -233,7 +289,8 @@ std::string MqttConnection::try_once(const MqttOptions& options) {
   MqttConnection connection(of_a_stranger, nullptr);
   if (!connection.begin()) return connection.error();
   while (!connection.is_connected()) {
-    pollfd socket{connection.socket(), POLLIN, 0};
+    pollfd socket{connection.socket(), 0, 0};
+    if (connection.wants_to_read()) socket.events |= POLLIN;
     if (connection.wants_to_write()) socket.events |= POLLOUT;
     static_cast<void>(::poll(&socket, 1, static_cast<int>(kMilli * connection.patience_s())));
     if (!connection.step()) return connection.error();

@@ -41,7 +41,8 @@ class MqttConnection {
   [[nodiscard]] const std::string& error() const { return error_; }
 
   [[nodiscard]] int socket() const;  // negative: none
-  // Whether to wait for room in socket(), too, and how long at most: while TLS begins it does not say what it waits for.
+  // For what to wait there, and how long at most: while TLS begins it does not say what it waits for.
+  [[nodiscard]] bool wants_to_read() const { return half_since_s_ < 0; }
   [[nodiscard]] bool wants_to_write() const;
   [[nodiscard]] double patience_s() const;
 
@@ -57,8 +58,13 @@ class MqttConnection {
   [[nodiscard]] static std::string try_once(const MqttOptions& options);
 
  private:
+  enum class Incoming { kNothing, kAnswer, kHalfAnswer, kForeign, kUnknown };
+
   [[nodiscard]] bool set_up();
+  [[nodiscard]] Incoming look_at_what_comes() const;
+  [[nodiscard]] bool read_answers();
   [[nodiscard]] bool has_broken_off(bool* hung_up);
+  [[nodiscard]] bool has_failed(int code);
   void fail(int error_number, int code);
   void fail_refused(int answer);
   [[nodiscard]] bool fail_with(const std::string& what);
@@ -67,7 +73,8 @@ class MqttConnection {
   mosquitto* client_ = nullptr;
   bool connected_ = false;
   bool ending_ = false;
-  double give_up_s_ = 0;  // monotonic
+  double give_up_s_ = 0;      // monotonic
+  double half_since_s_ = -1;  // so long an answer has not been whole; < 0: none is half
   std::string error_;
   std::string last_complaint_;  // of the library
   std::string set_up_error_;

@@ -19,7 +19,7 @@ namespace alidade {
 namespace {
 
 constexpr double kClockPeriod_s = 10;
-constexpr double kFarewell_s = 1;
+constexpr double kFarewell_s = 0.5;
 
 std::shared_ptr<const std::string> shared(std::string text) {
   return std::make_shared<const std::string>(std::move(text));
@@ -203,6 +203,7 @@ void MqttPublisher::wait_for(const MqttConnection* connection, double until_s) {
   std::array<pollfd, 2> both = {{{news_.get(), POLLIN, 0}, {-1, POLLIN, 0}}};
   if (connection != nullptr) {
     both[1].fd = connection->socket();
+    if (!connection->wants_to_read()) both[1].events = 0;
     if (connection->wants_to_write()) both[1].events |= POLLOUT;
   }
   constexpr double kMilli = 1000;

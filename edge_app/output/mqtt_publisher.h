@@ -38,7 +38,7 @@ class MqttPublisher final : public RecordSink {
   ~MqttPublisher() override;
 
   [[nodiscard]] bool start();  // false: there can be no thread
-  // Says offline, if the broker is there and takes it within a second.
+  // Says offline, if the broker is there and takes it within half a second.
   void stop();
 
   // Any thread; waits for nobody.

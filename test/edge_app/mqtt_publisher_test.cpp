@@ -17,6 +17,7 @@
 #include "platform/system/clock.h"
 #include "platform/system/file_descriptor.h"
 #include "test/edge_app/process.h"
+#include "test/platform/support/raw_server.h"
 #include "test/platform/support/test_certificate.h"
 #include "test/support/temporary_directory.h"
 
@@ -330,6 +331,47 @@ TEST(MqttPublisher, ASilentBrokerIsGivenUp) {
   options.port = ntohs(address.sin_port);
   options.timeout_s = 0.2;
   EXPECT_THAT(MqttConnection::try_once(options), HasSubstr("no answer within 0.2 s"));
+}
+
+constexpr const char* kTaken = "\x20\x02\0\0";  // CONNACK
+
+// What a broker sends behind its CONNACK, or in place of it, and what is said of that.
+struct BadBroker {
+  std::string name;
+  std::string sends;
+  const char* says;
+};
+
+class MqttConnectionTo : public ::testing::TestWithParam<BadBroker> {};
+INSTANTIATE_TEST_SUITE_P(
+    , MqttConnectionTo,
+    ::testing::Values(BadBroker{"APublisher",
+                                std::string(kTaken, 4) +
+                                    std::string("\x30\xff\xff\xff\x7f\0\1x", 8),
+                                "what comes is no answer that a broker gives"},
+                      BadBroker{"ALongAnswer", std::string(kTaken, 4) + "\x40\xff\xff\xff\x7f",
+                                "what comes is no answer that a broker gives"},
+                      BadBroker{"AWebServer", "HTTP/1.1 400 Bad Request\r\n\r\n",
+                                "what comes is no answer that a broker gives"},
+                      BadBroker{"HalfAnAnswer", "\x20\x02", "half an answer has come"}),
+    [](const auto& which) { return which.param.name; });
+
+TEST_P(MqttConnectionTo, IsEnded) {
+  const RawServer server([&](int fd) {
+    char byte = 0;
+    if (::recv(fd, &byte, 1, MSG_PEEK) != 1 || !RawServer::send(fd, GetParam().sends)) return;
+    ::shutdown(fd, SHUT_WR);
+    while (::recv(fd, &byte, 1, 0) > 0) {
+    }
+  });
+  MqttOptions options;
+  options.host = "127.0.0.1";
+  options.port = server.port();
+  MqttConnection connection(options, nullptr);
+  ASSERT_TRUE(connection.begin());
+  const double end_s = monotonic_now_s() + kPatience_s;
+  while (connection.step() && monotonic_now_s() < end_s) ::poll(nullptr, 0, 5);
+  EXPECT_THAT(connection.error(), HasSubstr(GetParam().says));
 }
 
 }  // namespace
