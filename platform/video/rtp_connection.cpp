@@ -247,7 +247,7 @@ ReadStatus RtpConnection::read_picture(AccessUnit* unit, std::string* error) {
     if (!append(&piece)) {
       *error = "a picture of more than " +
                std::to_string(most_picture_bytes(options_.max_pixels) >> 10U) +
-               " KB; is video.width and video.height right?";
+               " KB; are video.width and video.height right?";
       return ReadStatus::kDisconnected;
     }
     grown_ = end.last;
