@@ -88,6 +88,7 @@ void add_fields(const OrientationRecord& record, Line* line) {
   std::optional<std::array<double, 2>> localized;
   if (record.localized) localized = {{record.localized->age_s, record.localized->sigma_rad}};
   line->add_object("localized", kLocalized, localized);
+  line->add("time_sigma_s", record.time_s ? std::optional(record.time_sigma_s) : std::nullopt);
 }
 
 // One line, in memory of its own; what has no value is said by the word that the kind of line has for that.

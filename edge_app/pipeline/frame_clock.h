@@ -13,7 +13,8 @@
 //                   A frame that comes before a young line by more than kEarly_s shows that all before it had
 //                   waited: as at a reconnection.
 //                   Where frames leave the line and come back (delay_wander.h), delay or stamps wander: sigma has what
-//                   was seen of it. Such a frame is of unknown age only beyond that.
+//                   was seen of it. Such a frame is of unknown age only beyond that. Nor is a stamp believed at once that
+//                   jumps where the arrival does not (stamp_jumps.h).
 //                   Where the sender tells absolute times, too, pictures that these and the connection before say are fresh
 //                   are answered from the third on, and behind a backlog the pace is believed sooner (utc_line.h).
 //                   Stamps that run at another rate than the pictures come (stamp_rate.h), or count them (stamp_count.h), tell
@@ -36,6 +37,7 @@
 #include "core/model/arrival_pace.h"
 #include "core/model/delay_wander.h"
 #include "core/model/stamp_count.h"
+#include "core/model/stamp_jumps.h"
 #include "core/model/stamp_rate.h"
 #include "edge_app/pipeline/capture_clock.h"
 #include "edge_app/pipeline/receipt_clock.h"
@@ -123,6 +125,9 @@ class FrameClock {
     if (begins) begin(kind);
     if (begins) rate_.restart();
     if (begins) count_.restart();
+    if (begins) jumps_.restart();
+    if (kind == Kind::kSenderTime)
+      jumps_.add(stamp.receive_time_s, *stamp.sender_time_s, behind_backlog_);
     if (kind == Kind::kSenderTime && runs_off(stamp)) return leave_stamps_out(stamp);
     if (kind == Kind::kSenderTime) utc_.watch(stamp);
     FrameTime time = by_what_is_told(stamp);
@@ -299,7 +304,8 @@ class FrameClock {
     const double late_s =
         stamp.receive_time_s - clock_.filter().delay_shift_s() - time->clock.time_s;
     watch_wander(stamp.receive_time_s, late_s, time->clock.sigma_s);
-    time->clock.sigma_s = std::hypot(time->clock.sigma_s, wander_.off_s());
+    time->clock.sigma_s =
+        std::hypot(time->clock.sigma_s, std::max(wander_.off_s(), jumps_.off_s()));
     if (late_s <= ArrivalPace::kBacklog_s + wander_.off_s()) {
       runs_on_ = runs_on_ || (late_ && late_s < ArrivalPace::kBacklog_s / 2);
       late_ = late_ && !runs_on_ && late_s >= ArrivalPace::kBacklog_s / 2;
@@ -337,6 +343,7 @@ class FrameClock {
   StampGuard guard_;
   StampRate rate_;
   StampCount count_;
+  StampJumps jumps_;
   UtcLine utc_;
   Kind kind_ = Kind::kNew;
   bool begins_ = true;  // with the next usable frame

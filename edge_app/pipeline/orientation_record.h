@@ -38,7 +38,7 @@ struct OrientationRecord {
 
   std::optional<std::int64_t> frame;
   std::optional<double> time_s;  // capture of row 0 on the filtered host clock
-  double time_sigma_s = 0;       // of time_s, as the clock filter has it
+  double time_sigma_s = 0;       // of time_s, against what the clock offset was found with
   bool clock_locked = false;     // the clock filter has seen enough
   double receive_time_s = 0;     // of the frame, or of the news of the loss
   RecordMode mode = RecordMode::kNone;

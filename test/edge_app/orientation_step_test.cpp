@@ -1098,6 +1098,52 @@ TEST_F(OeStepTest, LooksAtAnImageOnce) {
   EXPECT_EQ(tracks.points[0].u_px, first);
 }
 
+// A camera's time stamps, of the true time since its first picture.
+struct FalseStamps {
+  const char* name;
+  double (*stamp_s)(int picture, double time_s);
+};
+
+class TimesSigma : public ::testing::TestWithParam<FalseStamps> {};
+
+TEST_P(TimesSigma, CoversWhatTheTimeStampsAreWrongBy) {
+  OrientationStepOptions options = options_without_offsets();
+  options.wait_for_pace = true;
+  options.minimum_delay_sigma_s = 2e-3;
+  OrientationStep step(options);
+  std::mt19937 random(5);
+  std::exponential_distribution<double> delay_s(1 / 1e-3);
+  int known = 0;
+  int beyond = 0;
+  double farthest_s = 0;
+  for (int i = 0; i < 25 * 40; ++i) {
+    const double time_s = 100 + 0.04 * i;
+    FrameStamp stamp = stamp_at(time_s + delay_s(random), i);
+    stamp.sender_time_s = 5000 + GetParam().stamp_s(i, time_s - 100);
+    stamp.restarted = i == 0;
+    const OrientationRecord record = add_frame(&step, stamp);
+    if (!record.time_s) continue;
+    ++known;
+    const double error_s = std::abs(*record.time_s - time_s);
+    farthest_s = std::max(farthest_s, error_s);
+    beyond += error_s > 3 * record.time_sigma_s ? 1 : 0;
+  }
+  EXPECT_GT(known, 900);
+  EXPECT_GT(farthest_s, 0.0199) << "else there is nothing to be covered";
+  EXPECT_LE(beyond, known / 50);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Of, TimesSigma,
+    testing::Values(
+        FalseStamps{"OneStep", [](int, double t) { return t + (t > 20 ? 0.02 : 0); }},
+        FalseStamps{"OneStepBack", [](int, double t) { return t - (t > 20 ? 0.02 : 0); }},
+        FalseStamps{"ThereAndBackEachSecond",
+                    [](int, double t) { return t + 0.02 * (static_cast<int>(t) % 2); }},
+        FalseStamps{"NowAndThen", [](int i, double t) { return t + (i * i % 7 > 3 ? 0.02 : 0); }},
+        FalseStamps{"OnePercentFast", [](int, double t) { return 1.01 * t; }}),
+    [](const auto& one) { return one.param.name; });
+
 // The line's error and that of the least delay below it.
 TEST_F(OeStepTest, TheTimesSigmaIsThatOfTwoIndependentErrors) {
   const auto sigma_after_a_reconnection = [](double minimum_delay_sigma_s) {

@@ -17,6 +17,7 @@ OrientationRecord full_record() {
   OrientationRecord record;
   record.frame = 7;
   record.time_s = 12345.678901234;
+  record.time_sigma_s = 0.000244140625;
   record.receive_time_s = 12345.75;
   record.mode = RecordMode::kOe;
   record.calibrated = true;
@@ -68,7 +69,7 @@ TEST(RecordFormat, WritesAllFieldsAsOneJsonLine) {
       R"("orientation_covariance_rad2":[1e-10,2e-12,0.0,2e-12,4e-10,0.0,0.0,0.0,9e-10],)"
       R"("reference_row":0.0,"landmarks":187,"residual_px":0.0625,)"
       R"("line_delay_s":-1.42e-05,"focal_length_px":32008.0,"focal_length_sigma_px":24.0,"aspect":1.0,"radial_distortion":55.4,"centre_offset_px":[3.5,-2.0],)"
-      R"("latency_s":2.5e-05,"telemetry_age_s":-0.03125,"zoom":3000.0,"zoom_rate_per_s":-0.375,"zoom_rate_sigma_per_s":0.00390625,"localized":{"age_s":4.5,"sigma_rad":1e-05}})"
+      R"("latency_s":2.5e-05,"telemetry_age_s":-0.03125,"zoom":3000.0,"zoom_rate_per_s":-0.375,"zoom_rate_sigma_per_s":0.00390625,"localized":{"age_s":4.5,"sigma_rad":1e-05},"time_sigma_s":0.000244140625})"
       "\n");
 }
 
@@ -81,7 +82,7 @@ TEST(RecordFormat, WritesNullForWhatARecordLacks) {
       R"("q_base_from_camera":null,"orientation_sigma_rad":null,)"
       R"("orientation_covariance_rad2":null,"reference_row":0.0,"landmarks":0,"residual_px":null,)"
       R"("line_delay_s":0.0,"focal_length_px":1000.0,"focal_length_sigma_px":0.0,"aspect":1.0,"radial_distortion":0.0,"centre_offset_px":[0.0,0.0],)"
-      R"("latency_s":null,"telemetry_age_s":null,"zoom":null,"zoom_rate_per_s":null,"zoom_rate_sigma_per_s":null,"localized":null})"
+      R"("latency_s":null,"telemetry_age_s":null,"zoom":null,"zoom_rate_per_s":null,"zoom_rate_sigma_per_s":null,"localized":null,"time_sigma_s":null})"
       "\n");
 }
 
@@ -98,14 +99,14 @@ TEST(RecordFormat, WritesCsvColumnsInTheOrderOfTheHeader) {
             "orientation_covariance_rad2_8,reference_row,landmarks,residual_px,"
             "line_delay_s,focal_length_px,focal_length_sigma_px,aspect,radial_distortion,"
             "centre_offset_u_px,centre_offset_v_px,latency_s,telemetry_age_s,zoom,zoom_rate_per_s,"
-            "zoom_rate_sigma_per_s,localized_age_s,localized_sigma_rad\n");
+            "zoom_rate_sigma_per_s,localized_age_s,localized_sigma_rad,time_sigma_s\n");
   EXPECT_EQ(
       csv_line(full_record()),
       "7,12345.678901234,12345.75,OE,ok,true,watching,,0.5,-0.25,0.125,-0.0625,0.03125,-0.015625,"
       "0.5,-0.5,0.5,0.5,1e-05,2e-05,3e-05,"
       "1e-10,2e-12,0.0,2e-12,4e-10,0.0,0.0,0.0,9e-10,0.0,187,0.0625,"
       "-1.42e-05,32008.0,24.0,1.0,55.4,3.5,-2.0,2.5e-05,-0.03125,3000.0,-0.375,0.00390625,4.5,1e-"
-      "05\n");
+      "05,0.000244140625\n");
 }
 
 TEST(RecordFormat, LeavesCsvCellsEmptyForWhatARecordLacks) {
@@ -113,7 +114,7 @@ TEST(RecordFormat, LeavesCsvCellsEmptyForWhatARecordLacks) {
   EXPECT_EQ(
       line,
       ",,3.5,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,,,,,,,,,,0.0,0,,0.0,1000.0,"
-      "0.0,1.0,0.0,0.0,0.0,,,,,,,\n");
+      "0.0,1.0,0.0,0.0,0.0,,,,,,,,\n");
   const std::string header = csv_header();
   EXPECT_EQ(std::count(line.begin(), line.end(), ','),
             std::count(header.begin(), header.end(), ','));
@@ -135,7 +136,7 @@ TEST(RecordFormat, WhatIsNotFiniteHasNoValue) {
   EXPECT_TRUE(nlohmann::json::parse(json_line(record))["receive_time_s"].is_null());
   EXPECT_EQ(csv_line(record),
             ",,,none,video lost,false,collecting,tilt more,,,,,,,,,,,,,,,,,,,,,,,0.0,0,,0.0,1000.0,"
-            "0.0,1.0,0.0,0.0,0.0,,,,,,,\n");
+            "0.0,1.0,0.0,0.0,0.0,,,,,,,,\n");
 }
 
 TEST(RecordFormat, EveryFieldIsInTheDescriptionOfTheApi) {

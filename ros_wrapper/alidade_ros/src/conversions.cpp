@@ -87,6 +87,7 @@ alidade_msgs::FrameOrientation frame_orientation(const Record& record, std::uint
   message.has_frame = record.frame.has_value();
   message.frame = record.frame.value_or(-1);
   message.time = record.time_s.value_or(kNan);
+  message.time_sigma = record.time_sigma_s.value_or(kNan);
   message.receive_time = record.receive_time_s;
   message.latency = record.latency_s.value_or(kNan);
   message.mode = mode_number(record.mode);

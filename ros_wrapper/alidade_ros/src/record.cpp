@@ -62,6 +62,7 @@ bool parse_record(const std::string& text, Record* record, std::string* error) {
     Record r;
     r.frame = optional_of<std::int64_t>(json, "frame");
     r.time_s = optional_of<double>(json, "time_s");
+    r.time_sigma_s = optional_of<double>(json, "time_sigma_s");
     r.receive_time_s = json.at("receive_time_s").get<double>();
     r.latency_s = optional_of<double>(json, "latency_s");
     r.telemetry_age_s = optional_of<double>(json, "telemetry_age_s");

@@ -23,7 +23,8 @@ from visualization_msgs.msg import Marker, MarkerArray
 FRAMES = 500
 CLOCK_S = 1e-5  # by which the wall clock of a frame may become better known after its message
 SCALARS = {  # field of the message: field of the record, factor
-    "frame": ("frame", 1), "time": ("time_s", 1), "receive_time": ("receive_time_s", 1), "latency": ("latency_s", 1),
+    "frame": ("frame", 1), "time": ("time_s", 1), "time_sigma": ("time_sigma_s", 1),
+    "receive_time": ("receive_time_s", 1), "latency": ("latency_s", 1),
     "status": ("status", None), "calibrated": ("calibrated", 1), "calibration": ("calibration", None),
     "reference_row": ("reference_row", 1), "pan": ("pan_rad", -1), "tilt": ("tilt_rad", -1),
     "pan_rate": ("pan_rate_rad_s", -1), "tilt_rate": ("tilt_rate_rad_s", -1),

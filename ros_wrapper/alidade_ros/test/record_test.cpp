@@ -11,7 +11,7 @@ const char* const kRecord =
         "tilt_rate_rad_s":0.4,"pan_acceleration_rad_s2":0.5,"tilt_acceleration_rad_s2":0.6,
         "q_base_from_camera":[0.5,0.5,0.5,0.5],"orientation_covariance_rad2":[1,2,3,4,5,6,7,8,9],
         "reference_row":0,"landmarks":40,"residual_px":0.08,"line_delay_s":1e-5,"focal_length_px":2600,
-        "aspect":1,"radial_distortion":13.9,"latency_s":0.002,"telemetry_age_s":-0.01,"zoom":3000,"zoom_rate_per_s":0.25,"zoom_rate_sigma_per_s":0.01,"focal_length_sigma_px":1.5,"of_a_newer_edge":[]})";
+        "aspect":1,"radial_distortion":13.9,"latency_s":0.002,"telemetry_age_s":-0.01,"zoom":3000,"zoom_rate_per_s":0.25,"zoom_rate_sigma_per_s":0.01,"focal_length_sigma_px":1.5,"time_sigma_s":0.02,"of_a_newer_edge":[]})";
 
 TEST(Record, IsReadWhole) {
   Record record;
@@ -26,6 +26,7 @@ TEST(Record, IsReadWhole) {
   EXPECT_EQ(record.orientation->covariance_rad2[5], 6);
   EXPECT_EQ(record.residual_px, 0.08);
   EXPECT_EQ(record.telemetry_age_s, -0.01);
+  EXPECT_EQ(record.time_sigma_s, 0.02);
   EXPECT_EQ(record.zoom, 3000);
   EXPECT_EQ(record.zoom_rate_per_s, 0.25);
   EXPECT_EQ(record.zoom_rate_sigma_per_s, 0.01);
@@ -45,6 +46,7 @@ TEST(Record, MayBeOfNoFrame) {
   EXPECT_FALSE(record.frame);
   EXPECT_FALSE(record.orientation);
   EXPECT_FALSE(record.telemetry_age_s) << "as an older edge, which does not tell it";
+  EXPECT_FALSE(record.time_sigma_s);
   EXPECT_FALSE(record.zoom);
   EXPECT_FALSE(record.zoom_rate_per_s);
   EXPECT_EQ(record.needs, "pan more");

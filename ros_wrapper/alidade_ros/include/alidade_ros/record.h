@@ -30,6 +30,7 @@ struct Record {
 
   std::optional<std::int64_t> frame;
   std::optional<double> time_s;
+  std::optional<double> time_sigma_s;
   double receive_time_s = 0;
   std::optional<double> latency_s;
   std::optional<double> telemetry_age_s;  // how far it lies beyond the newest trusted angle
