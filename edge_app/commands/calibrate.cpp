@@ -166,8 +166,8 @@ int calibrate_one(const std::string& recording, const CalibrateOptions& options,
 
 int calibrate_recordings(const CalibrateOptions& options) {
   StopSignals signals;
-  const FileLock lock =
-      lock_calibration_in(output_path(options.directory, options.recordings.front()));
+  const OutputLock lock(output_path(options.directory, options.recordings.front()) +
+                        "/calibration.yaml");
   std::vector<ZoomJob> jobs = load_jobs(options);
   if (jobs.size() > 1) return calibrate_zooms(options, std::move(jobs), &signals);
   return calibrate_one(jobs.front().recording, options, std::move(jobs.front().job), &signals);

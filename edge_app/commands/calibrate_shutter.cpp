@@ -157,6 +157,7 @@ int calibrate_shutter(const CalibrateShutterOptions& options) {
     return kExitOk;
   }
   check_usage(options);
+  const OutputLock lock(output_path(options.directory, options.video) + "/lens.yaml");
   const PatternVideo video =
       options.config.empty() ? find_visibly(options, *pattern) : find_live(options, *pattern);
   const auto warn = [&](const std::vector<std::string>& remarks) {

@@ -16,6 +16,7 @@
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/map_recording.h"
 #include "edge_app/commands/map_report.h"
+#include "edge_app/commands/output_directory.h"
 #include "edge_app/pipeline/small_image.h"
 #include "edge_app/storage/scene_map_file.h"
 #include "platform/video/jpeg_decoder.h"
@@ -253,6 +254,7 @@ class Progress {
 int build_map(const MapBuildCommand& options) {
   std::string error;
   if (!may_write_scene_map(options.map, &error)) throw CommandError(kExitFailed, error);
+  const OutputLock lock(options.map);
   std::vector<MapRecording> recordings;
   std::vector<double> readings;
   for (const std::string& directory : options.recordings) {

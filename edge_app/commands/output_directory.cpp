@@ -17,14 +17,22 @@ std::string output_path(const std::string& given, const std::string& recording) 
   return given.empty() ? (beside / "alidade").string() : given;
 }
 
-FileLock lock_calibration_in(const std::string& directory) {
-  const std::string file = (fs::path(directory) / "calibration.yaml").string();
-  FileLock lock;
+OutputLock::OutputLock(const std::string& file) {
+  std::error_code error;
+  const fs::path folder = fs::absolute(file, error).parent_path();
+  for (fs::path one = folder; !one.empty() && !fs::exists(one, error) && !error;
+       one = one.parent_path())
+    made_.push_back(one.string());
+  fs::create_directories(folder, error);
   std::string why;
-  std::error_code ignored;
-  if (fs::exists(file + ".lock", ignored) && lock.take(file, &why) == FileLock::Result::kInUse)
-    throw CommandError(kExitFailed, why + "; give another directory with -o");
-  return lock;
+  if (lock_.take(file, &why) != FileLock::Result::kInUse) return;
+  throw CommandError(kExitFailed, why + "; give another place with -o, or wait for it to end");
+}
+
+OutputLock::~OutputLock() {
+  lock_.release_and_remove();
+  std::error_code not_empty;
+  for (const std::string& folder : made_) fs::remove(folder, not_empty);
 }
 
 OutputDirectory::OutputDirectory(const std::string& given, const std::string& recording) {

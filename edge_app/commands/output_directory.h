@@ -13,8 +13,20 @@ namespace alidade {
 // given: of -o; empty: `alidade` in the recording, or beside it if it is a file.
 [[nodiscard]] std::string output_path(const std::string& given, const std::string& recording);
 
-// To be held while calibration.yaml is made for it. Throws CommandError where a `run` keeps its calibrations in that file.
-[[nodiscard]] FileLock lock_calibration_in(const std::string& directory);
+// Held while a command makes what it will write: another one that would write there says who has it, as where a `run` keeps its
+// calibrations in that file. Makes the file's folder, and leaves nothing of its own behind. Where there can be no lock there is none.
+class OutputLock {
+ public:
+  // Throws CommandError where it is in use.
+  explicit OutputLock(const std::string& file);
+  ~OutputLock();
+  OutputLock(const OutputLock&) = delete;
+  OutputLock& operator=(const OutputLock&) = delete;
+
+ private:
+  FileLock lock_;
+  std::vector<std::string> made_;  // folders, the innermost first
+};
 
 class OutputDirectory {
  public:

@@ -39,6 +39,14 @@ std::string holder_of(int file) {
                                        : "process " + shown(all.substr(0, end), kMostBytes);
 }
 
+// Who had it may have taken the file away between its opening and its locking here.
+bool stands_there(int file, const std::string& name) {
+  struct stat opened = {};
+  struct stat named = {};
+  return ::fstat(file, &opened) == 0 && ::lstat(name.c_str(), &named) == 0 &&
+         opened.st_dev == named.st_dev && opened.st_ino == named.st_ino;
+}
+
 }  // namespace
 
 FileLock::Result FileLock::take(const std::string& path, std::string* why) {
@@ -48,7 +56,9 @@ FileLock::Result FileLock::take(const std::string& path, std::string* why) {
     return Result::kImpossible;
   };
   constexpr int kFlags = O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK | O_NOCTTY;
-  FileDescriptor file(::open(name.c_str(), O_RDWR | O_CREAT | kFlags, 0644));
+  FileDescriptor file(::open(name.c_str(), O_RDWR | O_CREAT | O_EXCL | kFlags, 0644));
+  const bool is_made = file.is_open();
+  if (!is_made) file.reset(::open(name.c_str(), O_RDWR | O_CREAT | kFlags, 0644));
   // Another user's: it can be locked, but not written.
   if (!file.is_open() && (errno == EACCES || errno == EROFS))
     file.reset(::open(name.c_str(), O_RDONLY | kFlags));
@@ -61,12 +71,20 @@ FileLock::Result FileLock::take(const std::string& path, std::string* why) {
     *why = path + ": in use by " + holder_of(file.get());
     return Result::kInUse;
   }
+  if (!stands_there(file.get(), name)) return take(path, why);
   const std::string holder = this_process();
   // Only to tell others: the lock holds without it.
   if (::ftruncate(file.get(), 0) == 0)
     static_cast<void>(::pwrite(file.get(), holder.data(), holder.size(), 0) < 0);
   file_ = std::move(file);
+  made_ = is_made ? name : "";
   return Result::kTaken;
+}
+
+void FileLock::release_and_remove() {
+  if (file_.is_open() && !made_.empty()) ::unlink(made_.c_str());
+  made_.clear();
+  release();
 }
 
 }  // namespace alidade

@@ -1,7 +1,7 @@
 #pragma once
-// FileLock: what is kept under a path belongs to one process at a time. A lock of the kernel's on PATH.lock, which stays there and holds
-// the number and the command of who has it: it ends with its process, whatever ended that, and none is ever left behind. Processes of
-// other hosts are kept out where the network file system has locks. Advisory: who only reads needs none.
+// FileLock: what is kept under a path belongs to one process at a time. A lock of the kernel's on PATH.lock, which holds
+// the number and the command of who has it and stays there, unless it is removed by who made it: the lock itself ends with its process,
+// whatever ended that. Processes of other hosts are kept out where the network file system has locks. Advisory: who only reads needs none.
 
 #include <string>
 
@@ -20,9 +20,12 @@ class FileLock {
   // Waits for nobody. What is not taken leaves one line in *why.
   [[nodiscard]] Result take(const std::string& path, std::string* why);
   void release() { file_.reset(); }
+  // So, and takes PATH.lock away if this object made it.
+  void release_and_remove();
 
  private:
   FileDescriptor file_;
+  std::string made_;  // PATH.lock
 };
 
 }  // namespace alidade

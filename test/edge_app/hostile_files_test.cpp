@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 #include <signal.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <filesystem>
 #include <fstream>
@@ -13,6 +14,7 @@
 #include <utility>
 #include <vector>
 
+#include "platform/system/file_lock.h"
 #include "test/edge_app/alidade_command.h"
 #include "test/edge_app/process.h"
 #include "test/support/temporary_directory.h"
@@ -118,11 +120,38 @@ TEST_F(HostileFiles, OneProcessKeepsItsCalibrationInAFile) {
                  "kept/calibration.yaml: in use by process " + holder.substr(0, holder.find('\n')));
   EXPECT_THAT(holder, HasSubstr("run -c " + file));
   expect_refused({"calibrate", directory_.path(), "-o", path("kept")},
-                 "give another directory with -o");
+                 "give another place with -o");
   first.send(SIGKILL);
   EXPECT_EQ(first.wait(), 128 + SIGKILL);
   const Result third = alidade({"run", "-c", file, "--duration", "0.1"});
   EXPECT_EQ(third.exit_code, 0) << third.errors;
+}
+
+// Before it reads anything: what it would make at length would be the other's loss.
+TEST_F(HostileFiles, OneCommandAtATimeWritesToAPlace) {
+  const std::string usual = "in use by process " + std::to_string(::getpid()) + " (";
+  fs::create_directories(path("out"));
+  FileLock calibrating;
+  FileLock finding_a_lens;
+  FileLock mapping;
+  std::string why;
+  ASSERT_EQ(calibrating.take(path("out/calibration.yaml"), &why), FileLock::Result::kTaken) << why;
+  ASSERT_EQ(finding_a_lens.take(path("out/lens.yaml"), &why), FileLock::Result::kTaken) << why;
+  ASSERT_EQ(mapping.take(path("out.map"), &why), FileLock::Result::kTaken) << why;
+  expect_refused({"calibrate", directory_.path(), "-o", path("out")},
+                 path("out/calibration.yaml") + ": " + usual);
+  expect_refused({"calibrate-shutter", directory_.path(), "--pattern", "chessboard:9x6:20mm", "-o",
+                  path("out")},
+                 path("out/lens.yaml") + ": " + usual);
+  const std::vector<std::string> map_build = {
+      "map", "build", directory_.path(), "-o", path("out.map"), "--focal-length", "400"};
+  expect_refused(map_build, path("out.map") + ": " + usual);
+  mapping.release_and_remove();
+  EXPECT_THAT(alidade(map_build).errors, Not(HasSubstr("in use")));
+  EXPECT_FALSE(fs::exists(path("out.map.lock")));
+  // What is refused leaves nothing behind.
+  EXPECT_NE(alidade({"calibrate", path("nowhere"), "-o", path("deep/er")}).exit_code, 0);
+  EXPECT_FALSE(fs::exists(path("deep")));
 }
 
 TEST_F(HostileFiles, WhatATerminalWouldObeyIsShownInErrorsAndLog) {

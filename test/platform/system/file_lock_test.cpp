@@ -33,6 +33,25 @@ TEST(FileLock, TheNextIsToldWhoHasIt) {
   EXPECT_EQ(second.take(path, &why), FileLock::Result::kTaken) << why;
 }
 
+TEST(FileLock, IsTakenAwayByWhoMadeItAndOnlyByThem) {
+  const TemporaryDirectory folder;
+  const std::string path = folder.path() + "/scene.map";
+  FileLock first, second, third;
+  std::string why;
+  ASSERT_EQ(first.take(path, &why), FileLock::Result::kTaken) << why;
+  first.release();
+  ASSERT_EQ(second.take(path, &why), FileLock::Result::kTaken) << why;
+  second.release_and_remove();
+  EXPECT_TRUE(std::filesystem::exists(path + ".lock"));
+  std::filesystem::remove(path + ".lock");
+  ASSERT_EQ(first.take(path, &why), FileLock::Result::kTaken) << why;
+  EXPECT_EQ(second.take(path, &why), FileLock::Result::kInUse);
+  first.release_and_remove();
+  EXPECT_FALSE(std::filesystem::exists(path + ".lock"));
+  EXPECT_EQ(second.take(path, &why), FileLock::Result::kTaken) << why;
+  EXPECT_EQ(third.take(path, &why), FileLock::Result::kInUse);
+}
+
 TEST(FileLock, EndsWithItsProcessHoweverThatEnds) {
   const TemporaryDirectory folder;
   const std::string path = folder.path() + "/calibration.yaml";
