@@ -26,6 +26,7 @@ NATIVE = subprocess.run(["dpkg", "--print-architecture"], check=True, capture_ou
 TRIPLETS = {"amd64": "x86_64-linux-gnu", "arm64": "aarch64-linux-gnu", "armhf": "arm-linux-gnueabihf"}
 EMULATORS = {"amd64": "x86_64", "arm64": "aarch64", "armhf": "arm"}
 FRAMES = 50
+NEWER = "99.0"
 WANTED = "/etc/systemd/system/multi-user.target.wants/alidade.service"
 
 
@@ -44,6 +45,37 @@ def package(name):
 
 def field(name, which):
     return output_of("dpkg-deb", "--field", package(name), which).strip()
+
+
+def unpack_and_change(deb, folder, version):
+    """The same package with another version, made into the folder."""
+    with tempfile.TemporaryDirectory() as work:
+        output_of("dpkg-deb", "--raw-extract", deb, f"{work}/root")
+        control = pathlib.Path(work, "root/DEBIAN/control")
+        control.write_text(re.sub(r"^Version: .*$", f"Version: {version}", control.read_text(encoding="utf-8"), flags=re.M), encoding="utf-8")
+        output_of("dpkg-deb", "--root-owner-group", "-Zgzip", "--build", f"{work}/root", folder)
+
+
+def make_repository(folder):
+    """This package and a newer one, in a repository signed by a key of its own; and another key, which signed nothing."""
+    home = folder / "gnupg"
+    home.mkdir(mode=0o700)
+    environment = {**os.environ, "GNUPGHOME": str(home)}
+    packages = folder / "packages"
+    packages.mkdir()
+    shutil.copy(package("alidade"), packages)
+    unpack_and_change(package("alidade"), packages, NEWER)
+    try:
+        for name in ("signer", "stranger"):
+            output_of("gpg", "--batch", "--quiet", "--passphrase", "", "--quick-generate-key", name, "ed25519", "sign", "never", env=environment)
+        output_of(PROJECT / "scripts/sign-packages", "signer", packages, env=environment)
+        (packages / "apt/stranger.gpg").write_bytes(
+            subprocess.run(["gpg", "--batch", "--export", "stranger"], check=True, capture_output=True, env=environment).stdout)
+        for deb in packages.glob("*.deb"):
+            output_of("gpg", "--batch", "--quiet", "--verify", f"{deb}.asc", deb, env=environment)
+    finally:
+        subprocess.run(["gpgconf", "--kill", "gpg-agent"], check=False, env=environment)
+    return packages / "apt"
 
 
 def dependencies():
@@ -166,7 +198,8 @@ class Installed(unittest.TestCase):
             # Natively, udev too, which reads the rules; elsewhere nothing that alidade does not need.
             include = dependencies() + (["udev"] if ARCHITECTURE == NATIVE else [])
             # The root's path is the hook's last argument.
-            hook = [sys.executable, "-B", __file__, "inside", ARCHITECTURE, PACKAGES, recording]
+            hook = [sys.executable, "-B", __file__, "inside", ARCHITECTURE, PACKAGES, recording,
+                    make_repository(pathlib.Path(folder))]
             mode = "root" if os.geteuid() == 0 else "unshare"
             command = ["mmdebstrap", f"--mode={mode}", "--variant=apt", f"--architectures={ARCHITECTURE}",
                        "--components=main", "--format=null", f"--include={','.join(include)}", '--aptopt=APT::Install-Recommends "false"',
@@ -244,7 +277,58 @@ def snapshot(root):
     return found
 
 
-def inside(root, recording):
+def kept_by_upgrade_and_downgrade(root, chroot, repository):
+    """apt takes the package from the signed repository, a newer one, and the older again: what the program has stored stays."""
+    shutil.copytree(repository, f"{root}/tmp/repository")
+    os.makedirs(f"{root}/tmp/lists/partial")
+    version = field("alidade", "Version")
+
+    def apt(*words, key="alidade", code=0):
+        pathlib.Path(root, "tmp/alidade.list").write_text(f"deb [signed-by=/tmp/repository/{key}.gpg] file:/tmp/repository bookworm main\n", encoding="ascii")
+        return chroot("apt-get", "-o", "Dir::Etc::SourceList=/tmp/alidade.list", "-o", "Dir::Etc::SourceParts=-",
+                      "-o", "Dir::State::Lists=/tmp/lists", "-o", "APT::Sandbox::User=root", "-y", *words, code=code)
+
+    def installed():
+        return chroot("dpkg-query", "-W", "-f", "${Version}", "alidade")
+
+    # Nothing that another has signed, or that was changed since.
+    assert "is not signed" in apt("update", key="stranger", code=100)
+    lists = pathlib.Path(root, f"tmp/repository/dists/bookworm/main/binary-{ARCHITECTURE}")
+    kept = {file: file.read_bytes() for file in lists.iterdir()}
+    for file in kept:
+        file.unlink()
+    (lists / "Packages").write_bytes(kept[lists / "Packages"].replace(b"SHA256: ", b"SHA256: 0"))
+    apt("update", "-o", "Acquire::AllowInsecureRepositories=false", code=100)
+    for file, content in kept.items():
+        file.write_bytes(content)
+    apt("update")
+
+    apt("install", "--no-install-recommends", f"alidade={version}")
+    assert installed() == version
+    stored = {"var/lib/alidade/calibration.yaml": "a calibration\n", "var/lib/alidade/calibration.map": "a map\n",
+              "var/lib/alidade/gate/calibration.yaml": "of an instance\n", "etc/alidade/gate.yaml": "its configuration\n",
+              "etc/alidade/environment": "CAMERA_PASSWORD=secret\n"}
+    for path, text in stored.items():
+        pathlib.Path(root, path).parent.mkdir(exist_ok=True)
+        pathlib.Path(root, path).write_text(text, encoding="utf-8")
+        chroot("chown", "alidade:alidade", f"/{path}")
+    before = {path: os.lstat(f"{root}/{path}") for path in stored}
+    # The newest that is there, and back.
+    for wanted, words in ((NEWER, ("upgrade",)), (version, ("install", "--allow-downgrades", f"alidade={version}"))):
+        apt(*words)
+        assert installed() == wanted, installed()
+        for path, text in stored.items():
+            now = os.lstat(f"{root}/{path}")
+            assert pathlib.Path(root, path).read_text(encoding="utf-8") == text, path
+            assert (now.st_uid, now.st_gid, now.st_mode) == tuple(getattr(before[path], f"st_{which}") for which in ("uid", "gid", "mode")), path
+    chroot("dpkg", "--purge", "alidade")
+    assert not os.path.lexists(f"{root}/var/lib/alidade") and not os.path.lexists(f"{root}/etc/alidade/environment")
+    # What an administrator wrote stays his.
+    assert os.listdir(f"{root}/etc/alidade") == ["gate.yaml"]
+    shutil.rmtree(f"{root}/etc/alidade")
+
+
+def inside(root, recording, repository):
     """The hook: everything that is done to the root."""
     def chroot(*command, code=0):
         done = subprocess.run(["chroot", root, *command], stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False,
@@ -260,6 +344,7 @@ def inside(root, recording):
     shutil.copytree(recording, f"{root}/tmp/recording")
     before = snapshot(root)
 
+    kept_by_upgrade_and_downgrade(root, chroot, repository)
     chroot("dpkg", "--install", "/tmp/alidade.deb")
     assert chroot("alidade", "--version") == f"alidade {field('alidade', 'Version')}\n"
     assert chroot("dpkg", "--verify", "alidade") == ""
@@ -317,7 +402,7 @@ if __name__ == "__main__":
     what, ARCHITECTURE, folder, *more = sys.argv[1:]
     PACKAGES = pathlib.Path(folder).resolve()
     if what == "inside":
-        inside(more[1], more[0])
+        inside(more[2], more[0], more[1])
     else:
         SIMULATE = more[0] if more else ""
         unittest.main(argv=[sys.argv[0], "-v", what])
