@@ -63,10 +63,14 @@ std::unique_ptr<HttpServer> start_http(const Config& config, const HttpApiSource
   auto server = std::make_unique<HttpServer>(*config.output.http);
   add_api_routes(server.get(), sources);
   add_status_page(server.get(), tap);
+  const HttpServerOptions& options = *config.output.http;
   std::string error;
+  if (!server->check_tls(&error)) throw CommandError(kExitUsage, error);
   if (!server->start(&error)) throw CommandError(kExitFailed, error);
-  spdlog::info("HTTP: listening on http://{}/{}", server->address(),
-               config.output.http->token.empty() ? "" : ", with a token");
+  spdlog::info("HTTP: listening on {}://{}/{}", options.tls ? "https" : "http", server->address(),
+               !options.tokens.empty() ? fmt::format(", with {} tokens", options.tokens.size())
+               : options.token.empty() ? ""
+                                       : ", with a token");
   return server;
 }
 

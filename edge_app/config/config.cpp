@@ -8,7 +8,10 @@
 
 #include "edge_app/config/link_keys.h"
 #include "edge_app/config/yaml_section.h"
+#include "edge_app/output/http/http_tokens.h"
 #include "platform/streams/picture_size.h"
+#include "platform/system/file_stamp.h"
+#include "platform/system/whole_file.h"
 
 namespace alidade {
 namespace {
@@ -150,9 +153,9 @@ RealtimeConfig read_realtime(YamlSection section) {
 }
 
 // "127.0.0.1:8080", "[::1]:8080", "name:8080"
-HttpServerOptions read_address(const YamlSection& section, const std::string& text) {
+void read_address(const YamlSection& section, const std::string& text, HttpServerOptions* options) {
   constexpr int kHighestPort = 65535;
-  HttpServerOptions http;
+  HttpServerOptions& http = *options;
   const std::size_t colon = text.rfind(':');
   const std::string port = colon == std::string::npos ? "" : text.substr(colon + 1);
   http.host = text.substr(0, colon);
@@ -168,37 +171,64 @@ HttpServerOptions read_address(const YamlSection& section, const std::string& te
                                      text));
   }
   http.port = std::stoi(port);
-  return http;
 }
 
-std::string read_token(YamlSection& section, const std::string& path) {
+std::string token_of_environment(const YamlSection& section, const std::string& variable) {
+  const char* value = std::getenv(variable.c_str());
+  if (value != nullptr) return value;
+  section.fail(
+      "token_env",
+      fmt::format("the environment has no variable '{}'; export it with the token", variable));
+}
+
+void read_tokens(YamlSection& section, const std::string& path, HttpServerOptions* http,
+                 std::vector<std::string>* warnings) {
   const std::optional<std::string> variable = section.text("token_env");
-  const std::optional<std::string> file = section.text("token_file");
-  if (!variable && !file) return "";
-  const char* key = variable ? "token_env" : "token_file";
+  const std::optional<std::string> one = section.text("token_file");
+  const std::optional<std::string> several = section.text("tokens_file");
+  if (!variable && !one && !several) return;
+  const char* key = variable ? "token_env" : one ? "token_file" : "tokens_file";
   if (!section.has("http")) section.fail(key, "stands without http; add http");
-  if (variable && file) section.fail("token_file", "and token_env exclude each other; keep one");
-  std::string token;
-  if (variable) {
-    const char* value = std::getenv(variable->c_str());
-    if (value == nullptr) {
-      section.fail(
-          key,
-          fmt::format("the environment has no variable '{}'; export it with the token", *variable));
-    }
-    token = value;
-  } else {
-    token = first_line_of(section, "token_file", path_relative_to(path, *file), "token");
+  if (variable && one) section.fail("token_file", "and token_env exclude each other; keep one");
+  if (several && (variable || one))
+    section.fail("tokens_file", fmt::format("and {} exclude each other; keep one", key));
+  if (!variable) {
+    http->token_file = path_relative_to(path, several ? *several : *one);
+    http->token_file_holds_several = several.has_value();
+    http->token_file_stamp = FileStamp(http->token_file);
+    if (http->token_file_stamp.is_public())
+      warnings->push_back(fmt::format("{}: other users of this machine can read {}; chmod o= it",
+                                      section.where(key), http->token_file));
   }
-  constexpr std::size_t kShortest = 8;
-  const bool printable =
-      std::all_of(token.begin(), token.end(), [](char c) { return c > ' ' && c < 0x7f; });
-  if (token.size() < kShortest || !printable) {
+  if (several) {
+    std::string text;
+    std::string error;
+    if (!read_file(http->token_file, &text, &error))
+      section.fail(key, error + "; put lines `view TOKEN` or `control TOKEN` there");
+    if (!parse_tokens(text, &http->tokens, &error))
+      section.fail(key, http->token_file + ": " + error);
+    return;
+  }
+  http->token = variable ? token_of_environment(section, *variable)
+                         : first_line_of(section, key, http->token_file, "token");
+  if (!is_usable_token(http->token)) {
     section.fail(key, fmt::format("gives no token that can be used; expected at least {} letters, "
                                   "digits or signs without blanks",
-                                  kShortest));
+                                  kShortestToken));
   }
-  return token;
+}
+
+std::optional<HttpTlsOptions> read_tls(YamlSection& section, const std::string& path) {
+  YamlSection tls = section.section("tls");
+  if (!section.has("tls")) return std::nullopt;
+  if (!section.has("http")) section.fail("tls", "stands without http; add http");
+  HttpTlsOptions options;
+  options.certificate = path_relative_to(path, required_text(tls, "certificate", "server.pem"));
+  options.key = path_relative_to(path, required_text(tls, "key", "server.key"));
+  tls.finish();
+  refuse_other_than_file(tls, "certificate", options.certificate);
+  refuse_other_than_file(tls, "key", options.key);
+  return options;
 }
 
 OutputConfig read_output(YamlSection section, const std::string& path,
@@ -209,14 +239,16 @@ OutputConfig read_output(YamlSection section, const std::string& path,
   if (json.value_or(false) && csv)
     section.fail("csv", "json and csv cannot both go to stdout; keep one");
   if (csv) output.stdout_format = OutputFormat::kCsv;
-  const std::string token = read_token(section, path);
+  HttpServerOptions http;
+  read_tokens(section, path, &http, warnings);
+  http.tls = read_tls(section, path);
   if (const std::optional<std::string> address = section.text("http")) {
-    output.http = read_address(section, *address);
-    output.http->token = token;
-    if (token.empty() && !is_loopback(output.http->host)) {
+    read_address(section, *address, &http);
+    output.http = http;
+    if (http.token.empty() && http.tokens.empty() && !is_loopback(http.host)) {
       warnings->push_back(section.where("http") +
                           ": listens to other machines without a token: whoever reaches it may use "
-                          "it; set token_env or token_file, or listen on 127.0.0.1");
+                          "it; set token_env, token_file or tokens_file, or listen on 127.0.0.1");
     }
     if (json && !*json && !csv) output.stdout_format.reset();
   }

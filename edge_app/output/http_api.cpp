@@ -436,11 +436,11 @@ void add_api_routes(HttpServer* server, const HttpApiSources& sources) {
   server->get("/api/v1/targets", HttpAccess::kToken,
               [sources](const ServerRequest& request) { return targets(sources, request); });
   server->post(
-      "/api/v1/detections", HttpAccess::kToken, kMaxDetectionBytes,
+      "/api/v1/detections", HttpAccess::kControl, kMaxDetectionBytes,
       [sources](const ServerRequest& request) { return detections(sources, request.body); });
   server->get("/api/v1/map", HttpAccess::kToken,
               [sources](const ServerRequest&) { return scene_map(sources); });
-  server->post("/api/v1/calibrate", HttpAccess::kToken, kMaxQueryBytes,
+  server->post("/api/v1/calibrate", HttpAccess::kControl, kMaxQueryBytes,
                [sources, pause = std::make_shared<CalibrationPause>()](const ServerRequest&) {
                  return calibrate(sources, pause.get());
                });

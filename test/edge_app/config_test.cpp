@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/stat.h>
 
 #include <cstdlib>
 #include <fstream>
@@ -135,6 +136,37 @@ TEST_F(ConfigTest, TheHttpServerHasAnAddressAndATokenFromElsewhere) {
               IsEmpty());
   EXPECT_EQ(config_.output.http->token, "other-horse");
   EXPECT_EQ(config_.output.stdout_format, OutputFormat::kCsv);
+}
+
+TEST_F(ConfigTest, TheHttpServerMayHaveTokensWithRightsAndACertificate) {
+  const std::string minimal = kMinimal;
+  directory_.write("tokens", "view my-horse-1\ncontrol my-horse-2\n");
+  const std::string file = directory_.path() + "/tokens";
+  ASSERT_EQ(::chmod(file.c_str(), 0640), 0);
+  ASSERT_THAT(load(minimal + "output:\n  http: '0.0.0.0:80'\n  tokens_file: tokens\n"
+                             "  tls: {certificate: server.pem, key: /etc/server.key}\n"),
+              IsEmpty());
+  const HttpServerOptions& http = *config_.output.http;
+  ASSERT_EQ(http.tokens.size(), 2U);
+  EXPECT_EQ(http.tokens[0].right, HttpRight::kView);
+  EXPECT_EQ(http.tokens[1].right, HttpRight::kControl);
+  EXPECT_EQ(http.token, "");
+  EXPECT_EQ(http.token_file, file);
+  ASSERT_TRUE(http.tls);
+  EXPECT_EQ(http.tls->certificate, directory_.path() + "/server.pem");
+  EXPECT_EQ(http.tls->key, "/etc/server.key");
+  EXPECT_THAT(config_.warnings, IsEmpty());
+  ASSERT_EQ(::chmod(file.c_str(), 0644), 0);
+  ASSERT_THAT(load(minimal + "output: {http: '0.0.0.0:80', tokens_file: tokens}\n"), IsEmpty());
+  ASSERT_THAT(config_.warnings, ::testing::SizeIs(1));
+  EXPECT_THAT(
+      config_.warnings[0],
+      ::testing::AllOf(HasSubstr(":4: output.tokens_file: other users of this machine can read"),
+                       HasSubstr("chmod o=")));
+  directory_.write("tokens", "view my-horse-1\ncontrl my-horse-2\n");
+  EXPECT_THAT(load(minimal + "output: {http: '0.0.0.0:80', tokens_file: tokens}\n"),
+              ::testing::AllOf(HasSubstr(":4: output.tokens_file: "),
+                               HasSubstr("tokens: line 2 names no right")));
 }
 
 TEST_F(ConfigTest, ABrokersPasswordMayStandInAFileAndIsToCrossNoNetworkInTheClear) {
@@ -850,6 +882,19 @@ INSTANTIATE_TEST_SUITE_P(
                 ":4: output.token_env", "has no variable 'ALIDADE_TEST_UNSET'"},
         Mistake{"NoTokenFile", MINIMAL "output: {http: '127.0.0.1:0', token_file: nowhere}\n",
                 ":4: output.token_file", "nowhere: cannot be read: No such file"},
+        Mistake{"TokensBesideAToken",
+                MINIMAL "output: {http: '127.0.0.1:0', token_file: t, tokens_file: u}\n",
+                ":4: output.tokens_file", "and token_file exclude each other; keep one"},
+        Mistake{"NoTokensFile", MINIMAL "output: {http: '127.0.0.1:0', tokens_file: nowhere}\n",
+                ":4: output.tokens_file", "nowhere: cannot be read: No such file"},
+        Mistake{"TlsWithoutHttp", MINIMAL "output: {tls: {certificate: c, key: k}}\n",
+                ":4: output.tls", "stands without http; add http"},
+        Mistake{"TlsWithoutKey", MINIMAL "output: {http: '127.0.0.1:0', tls: {certificate: c}}\n",
+                ":4: output.tls.key", "is missing"},
+        Mistake{"TlsOfADevice",
+                MINIMAL "output: {http: '127.0.0.1:0', tls: {certificate: /dev/zero, key: k}}\n",
+                ":4: output.tls.certificate",
+                "/dev/zero: cannot be read: not a file, but a device"},
         Mistake{"TokenOfADevice", MINIMAL "output: {http: '127.0.0.1:0', token_file: /dev/zero}\n",
                 ":4: output.token_file", "/dev/zero: cannot be read: not a file, but a device"},
         Mistake{"BothFormats", MINIMAL "output: {json: true, csv: true}\n", ":4: output.csv",

@@ -127,6 +127,22 @@ TEST_F(HostileFiles, OneProcessKeepsItsCalibrationInAFile) {
   EXPECT_EQ(third.exit_code, 0) << third.errors;
 }
 
+TEST_F(HostileFiles, ACertificateThatCannotBeUsedEndsTheStart) {
+  const auto run = [&](const std::string& tls) {
+    return std::vector<std::string>{"run", "-c",
+                                    config("output: {http: '127.0.0.1:0', tls: {" + tls + "}}\n"),
+                                    "--duration", "1"};
+  };
+  expect_refused(run("certificate: none.pem, key: none.key"),
+                 "HTTP: " + path("none.pem") + ": cannot be read: No such file");
+  directory_.write("words.pem", "words\n");
+  expect_refused(run("certificate: words.pem, key: words.pem"),
+                 "words.pem: holds no certificate; expected one as PEM");
+  expect_refused(run("certificate: " + pipe("pipe.pem") + ", key: words.pem"),
+                 ":5: output.tls.certificate: " + path("pipe.pem") +
+                     ": cannot be read: not a file, but a pipe");
+}
+
 // Before it reads anything: what it would make at length would be the other's loss.
 TEST_F(HostileFiles, OneCommandAtATimeWritesToAPlace) {
   const std::string usual = "in use by process " + std::to_string(::getpid()) + " (";

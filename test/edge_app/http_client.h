@@ -38,6 +38,8 @@ class Client {
     static_cast<void>(::send(socket_, text.data(), text.size(), MSG_NOSIGNAL));
   }
 
+  [[nodiscard]] int descriptor() const { return socket_; }
+
   // It will send nothing more.
   void end() { ::shutdown(socket_, SHUT_WR); }
 

@@ -127,6 +127,28 @@ TEST_F(HttpCrowdTest, WithoutATokenSlowBodiesHoldNobodyUp) {
   EXPECT_LE(server_->counters().connections, 8);
 }
 
+// What is asked only once its body has come takes nothing of the others' rate until then.
+TEST_F(HttpCrowdTest, ABodyThatNeverComesTakesNoShareOfTheRate) {
+  options_.limits.max_strangers = 200;
+  options_.limits.requests_per_s = 1e-6;  // one each, and none for days
+  start();
+  Client* const slow =
+      connect("127.0.0.2", "POST /echo HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5\r\n\r\n");
+  while (server_->counters().requests < 1) std::this_thread::yield();
+  EXPECT_THAT(ask("127.0.0.2", get("/closed")), StartsWith("HTTP/1.1 200 "));
+  slow->send("whole");
+  EXPECT_THAT(slow->receive(), StartsWith("HTTP/1.1 429 ")) << "now it is asked for";
+  // What is refused by its head is asked for at once, whatever body it announces.
+  const std::string nowhere =
+      "POST /nowhere HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5\r\n\r\n";
+  EXPECT_THAT(ask("127.0.0.3", nowhere), StartsWith("HTTP/1.1 404 "));
+  EXPECT_THAT(ask("127.0.0.3", nowhere), StartsWith("HTTP/1.1 429 "));
+  const std::string large =
+      "POST /echo HTTP/1.1\r\nHost: localhost\r\nContent-Length: 5000\r\n\r\n";
+  EXPECT_THAT(ask("127.0.0.4", large), StartsWith("HTTP/1.1 413 "));
+  EXPECT_THAT(ask("127.0.0.4", large), StartsWith("HTTP/1.1 429 "));
+}
+
 // Of the two addresses the one with one slow client keeps it.
 TEST_F(HttpCrowdTest, TheAddressThatHoldsMostGivesWay) {
   start();
@@ -226,6 +248,22 @@ TEST(FairRate, OneThatFloodsTakesNothingFromAnother) {
 TEST(FairRate, ManyThatFloodTakeNothingOfAShare) {
   FairRate rate(500);
   EXPECT_EQ(served(&rate, "192.0.2.1", 8, "198.51.100.", 50, 5000), 1);
+}
+
+// 150 addresses that ask for little leave the rest to whoever asks for more than its share.
+TEST(FairRate, WhatOthersLeaveIsThereForWhoeverAsks) {
+  FairRate rate(500);
+  EXPECT_EQ(served(&rate, "192.0.2.1", 100, "198.51.100.", 150, 150), 1);
+}
+
+TEST(FairRate, AllTogetherHaveNoMoreThanThereIs) {
+  FairRate rate(500);
+  int taken = 0;
+  for (int i = 0; i < 200000; ++i) {
+    const std::string from = "198.51.100." + std::to_string(1 + i % 7);
+    taken += rate.take(address_of(from), 1e-4 * i) ? 1 : 0;
+  }
+  EXPECT_LT(taken, 500 * 21.5);
 }
 
 TEST(FairRate, AloneAnAddressHasAllAndNoMore) {

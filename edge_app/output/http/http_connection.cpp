@@ -1,12 +1,15 @@
 #include "edge_app/output/http/http_connection.h"
 
 #include <fmt/format.h>
+#include <openssl/err.h>
+#include <openssl/ssl.h>
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <boost/asio/buffer.hpp>
 #include <boost/asio/read.hpp>
 #include <boost/asio/read_until.hpp>
+#include <boost/asio/ssl/error.hpp>
 #include <boost/beast/http/status.hpp>
 #include <chrono>
 #include <limits>
@@ -31,6 +34,9 @@ constexpr std::size_t kLingerPiece = 4096;
 constexpr std::string_view kTooMany =
     "HTTP/1.1 503 Service Unavailable\r\nContent-Type: application/json\r\nRetry-After: 1\r\n"
     "Content-Length: 33\r\nConnection: close\r\n\r\n{\"error\":\"too many connections\"}\n";
+constexpr std::string_view kPlainHttp =
+    "HTTP/1.1 400 Bad Request\r\nContent-Type: application/json\r\nContent-Length: 56\r\n"
+    "Connection: close\r\n\r\n{\"error\":\"this server speaks TLS; ask it for https://\"}\n";
 constexpr char kContinue[] = "HTTP/1.1 100 Continue\r\n\r\n";
 
 bool has_header(const ServerResponse& response, const char* name) {
@@ -68,10 +74,10 @@ std::optional<ServerResponse> call(const HttpHandler& handler, const ServerReque
 
 }  // namespace
 
-HttpConnection::HttpConnection(asio::ip::tcp::socket socket, const HttpAddress& address,
-                               const HttpService& service)
-    : socket_(std::move(socket)),
-      timer_(socket_.get_executor()),
+HttpConnection::HttpConnection(asio::ip::tcp::socket socket, std::shared_ptr<HttpTls::Context> tls,
+                               const HttpAddress& address, const HttpService& service)
+    : transport_(std::move(socket), std::move(tls)),
+      timer_(transport_.get_executor()),
       service_(service),
       client_{address, false} {
   ++service_.tally.connections;
@@ -94,17 +100,35 @@ void HttpConnection::guarded(Stage stage) {
 }
 
 void HttpConnection::begin() {
-  guarded([this] { read_head(); });
+  guarded([this] {
+    take_place(&service_.places.strangers);
+    within(service_.limits.head_timeout_s, &HttpConnection::stop_reading);
+    if (!transport_.has_tls()) return read_head();
+    transport_.async_handshake([self = shared_from_this()](const Error& error) {
+      self->guarded([&] { self->take_handshake(error); });
+    });
+  });
+}
+
+void HttpConnection::take_handshake(const Error& error) {
+  if (!error) return read_head();
+  const bool is_plain =
+      error.category() == asio::error::get_ssl_category() &&
+      ERR_GET_REASON(static_cast<unsigned long>(error.value())) == SSL_R_HTTP_REQUEST;
+  if (!is_plain) return drop();
+  ++service_.tally.refused;
+  Error ignored;
+  transport_.socket().non_blocking(true, ignored);
+  transport_.socket().write_some(asio::buffer(kPlainHttp), ignored);
+  linger_plainly();
 }
 
 void HttpConnection::read_head() {
-  take_place(&service_.places.strangers);
-  within(service_.limits.head_timeout_s, &HttpConnection::stop_reading);
-  asio::async_read_until(socket_, asio::dynamic_buffer(received_, service_.limits.max_head_bytes),
-                         "\r\n\r\n",
-                         [self = shared_from_this()](const Error& error, std::size_t size) {
-                           self->guarded([&] { self->take_head(error, size); });
-                         });
+  asio::async_read_until(
+      transport_, asio::dynamic_buffer(received_, service_.limits.max_head_bytes), "\r\n\r\n",
+      [self = shared_from_this()](const Error& error, std::size_t size) {
+        self->guarded([&] { self->take_head(error, size); });
+      });
 }
 
 void HttpConnection::take_head(const Error& error, std::size_t size) {
@@ -123,12 +147,17 @@ void HttpConnection::take_head(const Error& error, std::size_t size) {
   ServerResponse refusal;
   if (!parse_http_head(std::string_view(received_).substr(0, size), &head_, &refusal))
     return answer(std::move(refusal));
-  route_ = service_.gate.admit(head_, monotonic_now_s(), &client_, &refusal);
+  body_to_come_ = body_is_to_come(head_, received_.size() - size);
+  route_ = service_.gate.admit(head_, monotonic_now_s(), body_to_come_, &client_, &refusal);
   if (client_.has_token) take_place(&service_.places.with_token);
   if (route_ == nullptr) return answer(std::move(refusal));
   std::size_t length = 0;
-  if (head_.method == "POST" && !body_length(head_, route_->max_body, &length, &refusal))
-    return answer(std::move(refusal));
+  if (head_.method == "POST" && !body_length(head_, route_->max_body, &length, &refusal)) {
+    ServerResponse beyond;
+    const bool charged =
+        !body_to_come_ || service_.gate.charge(client_, monotonic_now_s(), &beyond);
+    return answer(charged ? std::move(refusal) : std::move(beyond));
+  }
   request_.method = head_.method;
   request_.path = head_.path;
   request_.parameters = std::move(head_.parameters);
@@ -143,7 +172,7 @@ void HttpConnection::take_head(const Error& error, std::size_t size) {
 void HttpConnection::read_body() {
   if (body_came_ == request_.body.size()) return take_body(Error());
   within(service_.limits.body_timeout_s, &HttpConnection::stop_reading);
-  asio::async_read(socket_,
+  asio::async_read(transport_,
                    asio::buffer(&request_.body[body_came_], request_.body.size() - body_came_),
                    [self = shared_from_this()](const Error& error, std::size_t) {
                      self->guarded([&] { self->take_body(error); });
@@ -157,6 +186,9 @@ void HttpConnection::take_body(const Error& error) {
                                         : "the request's body is shorter than it said"));
   }
   complete_s_ = monotonic_now_s();
+  ServerResponse refusal;
+  if (body_to_come_ && !service_.gate.charge(client_, complete_s_, &refusal))
+    return answer(std::move(refusal));
   ask_handler();
 }
 
@@ -231,19 +263,23 @@ void HttpConnection::wake() {
 
 void HttpConnection::give_way() {
   ++service_.tally.refused;
-  if (!spoke_) {
-    // Without waiting; a client that does not take it goes without.
-    Error ignored;
-    socket_.non_blocking(true, ignored);
-    socket_.write_some(asio::buffer(kTooMany), ignored);
-  }
+  if (!spoke_) transport_.write_now(kTooMany);
   drop();
 }
 
 // Lets a client that is still sending read its answer: closing at once would reset the connection.
 void HttpConnection::linger() {
+  if (!transport_.has_tls()) return linger_plainly();
+  within(kLingerS, &HttpConnection::drop);
+  transport_.async_end([self = shared_from_this()](const Error&) {
+    self->guarded([&] { self->linger_plainly(); });
+  });
+}
+
+// What still comes is discarded as it stands.
+void HttpConnection::linger_plainly() {
   Error error;
-  socket_.shutdown(asio::ip::tcp::socket::shutdown_send, error);
+  transport_.socket().shutdown(asio::ip::tcp::socket::shutdown_send, error);
   if (error) return drop();
   within(kLingerS, &HttpConnection::drop);
   received_.resize(kLingerPiece);
@@ -251,12 +287,12 @@ void HttpConnection::linger() {
 }
 
 void HttpConnection::discard() {
-  socket_.async_read_some(asio::buffer(received_),
-                          [self = shared_from_this()](const Error& error, std::size_t count) {
-                            self->discarded_ += count;
-                            if (error || self->discarded_ >= kLingerBytes) return self->drop();
-                            self->guarded([&] { self->discard(); });
-                          });
+  transport_.socket().async_read_some(
+      asio::buffer(received_), [self = shared_from_this()](const Error& error, std::size_t count) {
+        self->discarded_ += count;
+        if (error || self->discarded_ >= kLingerBytes) return self->drop();
+        self->guarded([&] { self->discard(); });
+      });
 }
 
 void HttpConnection::send(std::string text, Step then) {
@@ -270,11 +306,11 @@ void HttpConnection::send(std::string text, Step then) {
 void HttpConnection::send_rest() {
   within(std::min(service_.limits.write_timeout_s, answer_deadline_s_ - monotonic_now_s()),
          &HttpConnection::drop_stalled);
-  socket_.async_write_some(asio::buffer(sending_) + sent_,
-                           [self = shared_from_this()](const Error& error, std::size_t count) {
-                             if (error) return self->drop();
-                             self->guarded([&] { self->take_sent(count); });
-                           });
+  transport_.async_write_some(asio::buffer(sending_) + sent_,
+                              [self = shared_from_this()](const Error& error, std::size_t count) {
+                                if (error) return self->drop();
+                                self->guarded([&] { self->take_sent(count); });
+                              });
 }
 
 void HttpConnection::take_sent(std::size_t count) {
@@ -318,7 +354,7 @@ void HttpConnection::stop_reading() {
   if (++cancelled_ > kCancelTimes) return drop();
   late_ = true;
   Error ignored;
-  socket_.cancel(ignored);
+  transport_.socket().cancel(ignored);
   within(kCancelAgainS, &HttpConnection::stop_reading);
 }
 
@@ -335,7 +371,7 @@ void HttpConnection::drop() {
   service_.handlers.forget(this);
   without_deadline();
   Error ignored;
-  socket_.close(ignored);
+  transport_.socket().close(ignored);
 }
 
 }  // namespace alidade

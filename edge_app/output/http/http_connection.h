@@ -21,6 +21,7 @@
 #include "edge_app/output/http/http_head.h"
 #include "edge_app/output/http/http_message.h"
 #include "edge_app/output/http/http_options.h"
+#include "edge_app/output/http/http_transport.h"
 
 namespace alidade {
 
@@ -49,8 +50,9 @@ struct HttpService {
 
 class HttpConnection final : public std::enable_shared_from_this<HttpConnection> {
  public:
-  HttpConnection(boost::asio::ip::tcp::socket socket, const HttpAddress& address,
-                 const HttpService& service);
+  // tls: null for plain HTTP.
+  HttpConnection(boost::asio::ip::tcp::socket socket, std::shared_ptr<HttpTls::Context> tls,
+                 const HttpAddress& address, const HttpService& service);
   ~HttpConnection();
   HttpConnection(const HttpConnection&) = delete;
   HttpConnection& operator=(const HttpConnection&) = delete;
@@ -72,6 +74,7 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
   using Error = boost::system::error_code;
   using Step = void (HttpConnection::*)();
 
+  void take_handshake(const Error& error);
   void read_head();
   void take_head(const Error& error, std::size_t size);
   void read_body();
@@ -81,6 +84,7 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
   [[nodiscard]] bool take_stream_place();
   void say_more();
   void linger();
+  void linger_plainly();
   void discard();
 
   // Sends, then goes on with the step.
@@ -102,7 +106,7 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
   void drop_stalled();
   void drop();
 
-  boost::asio::ip::tcp::socket socket_;
+  HttpTransport transport_;
   boost::asio::steady_timer timer_;
   const HttpService service_;
   HttpClient client_;
@@ -116,6 +120,7 @@ class HttpConnection final : public std::enable_shared_from_this<HttpConnection>
   HttpHead head_;
   const HttpRoute* route_ = nullptr;
   ServerRequest request_;
+  bool body_to_come_ = false;  // when the head was there: then the request costs once it has
   std::size_t body_came_ = 0;
   double complete_s_ = 0;  // when the request was
   std::optional<ServerResponse> response_;

@@ -19,7 +19,7 @@ HttpAddress http_address(const boost::asio::ip::address& peer) {
   return HttpAddress(bytes);
 }
 
-FairRate::FairRate(double per_s) : per_s_(per_s) {}
+FairRate::FairRate(double per_s) : per_s_(per_s) { all_.left = per_s; }
 
 bool FairRate::take(const HttpAddress& address, double now_s) {
   forget_the_idle(now_s);
@@ -31,9 +31,25 @@ bool FairRate::take(const HttpAddress& address, double now_s) {
   account.left = std::min(std::max(1.0, share_per_s),
                           account.left + share_per_s * std::max(0.0, now_s - account.last_s));
   account.last_s = now_s;
-  if (account.left < 1) return false;
-  account.left -= 1;
+  all_.left = std::min(per_s_, all_.left + per_s_ * std::max(0.0, now_s - all_.last_s));
+  all_.last_s = now_s;
+  const bool is_own = account.left >= 1;
+  if (!is_own && all_.left - 1 < per_s_ / 2) return false;
+  if (is_own) account.left -= 1;
+  all_.left = std::max(0.0, all_.left - 1);
   return true;
+}
+
+void RecentAddresses::add(const HttpAddress& address, double now_s) {
+  last_s_[address] = now_s;
+  if (last_s_.size() <= kMost) return;
+  last_s_.erase(std::min_element(last_s_.begin(), last_s_.end(),
+                                 [](const auto& a, const auto& b) { return a.second < b.second; }));
+}
+
+bool RecentAddresses::has(const HttpAddress& address, double now_s) const {
+  const auto found = last_s_.find(address);
+  return found != last_s_.end() && now_s <= found->second + kRecentS;
 }
 
 void FairRate::forget_the_idle(double now_s) {

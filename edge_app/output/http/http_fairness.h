@@ -15,7 +15,8 @@ using HttpAddress = boost::asio::ip::address_v6;
 [[nodiscard]] HttpAddress http_address(const boost::asio::ip::address& peer);
 
 // Requests a second of all addresses together. Each that asked within the last second has the same share of them, at
-// most a second's worth at once, and one at least. Of more addresses than are kept apart the rest has one share.
+// most a second's worth at once, and one at least; beyond it, what others leave, while more than half of a second's worth is
+// left. Of more addresses than are kept apart the rest has one share.
 class FairRate {
  public:
   explicit FairRate(double per_s);
@@ -34,7 +35,21 @@ class FairRate {
 
   const double per_s_;
   double swept_s_ = 0;
+  Account all_;  // together
   std::map<HttpAddress, Account> accounts_;
+};
+
+// Addresses that did something within the last ten minutes. Of more than are kept the one that did it longest ago goes.
+class RecentAddresses {
+ public:
+  void add(const HttpAddress& address, double now_s);
+  [[nodiscard]] bool has(const HttpAddress& address, double now_s) const;
+
+  static constexpr std::size_t kMost = 1024;
+  static constexpr double kRecentS = 600;
+
+ private:
+  std::map<HttpAddress, double> last_s_;
 };
 
 // So many places, held by the address and in the order in which they were taken. Nothing is allocated after construction.

@@ -8,16 +8,6 @@
 namespace alidade {
 namespace {
 
-// Looks at all of what was given, wherever it first differs.
-bool is_token(std::string_view given, const std::string& token) {
-  std::size_t difference = given.size() ^ token.size();
-  for (std::size_t i = 0; i < given.size(); ++i) {
-    difference |= static_cast<std::size_t>(static_cast<unsigned char>(given[i]) ^
-                                           static_cast<unsigned char>(token[i % token.size()]));
-  }
-  return difference == 0;
-}
-
 // "host:8080" -> "host", "[::1]:8080" -> "::1"
 std::string host_of(const std::string& field) {
   const std::size_t closing = field.find(']');
@@ -46,35 +36,52 @@ HttpCounters HttpTally::now() const {
 }
 
 HttpGate::HttpGate(const HttpServerOptions& options, HttpTally* tally)
-    : token_(options.token),
+    : tokens_(options),
+      has_tls_(options.tls.has_value()),
       own_host_(options.host),
       rate_of_strangers_(options.limits.requests_per_s),
       rate_with_token_(options.limits.requests_per_s),
+      handshakes_of_strangers_(options.limits.requests_per_s),
+      handshakes_of_known_(options.limits.requests_per_s),
       tally_(*tally) {}
 
 void HttpGate::add(const std::string& method, const std::string& path, HttpRoute route) {
   routes_[path][method] = std::move(route);
 }
 
-const HttpRoute* HttpGate::admit(const HttpHead& head, double now_s, HttpClient* client,
-                                 ServerResponse* refusal) {
-  client->has_token = shows_token(head);
+const HttpRoute* HttpGate::admit(const HttpHead& head, double now_s, bool body_to_come,
+                                 HttpClient* client, ServerResponse* refusal) {
+  const std::optional<HttpRight> right = tokens_.right_of(head.authorization, now_s);
+  client->has_token = right.has_value();
+  if (has_tls_ && client->has_token) showed_token_.add(client->address, now_s);
+  client->right = right.value_or(HttpRight::kView);
+  if (!body_to_come && !charge(*client, now_s, refusal)) return nullptr;
   const HttpRoute* route = nullptr;
   auto error = check(head, now_s, *client, &route);
   if (!error) return route;
-  *refusal = std::move(*error);
+  if (!body_to_come || charge(*client, now_s, refusal)) *refusal = std::move(*error);
   return nullptr;
+}
+
+bool HttpGate::may_shake_hands(const HttpAddress& address, double now_s) {
+  FairRate& rate =
+      showed_token_.has(address, now_s) ? handshakes_of_known_ : handshakes_of_strangers_;
+  if (rate.take(address, now_s)) return true;
+  ++tally_.refused;
+  return false;
+}
+
+bool HttpGate::charge(const HttpClient& client, double now_s, ServerResponse* refusal) {
+  FairRate& rate = client.has_token ? rate_with_token_ : rate_of_strangers_;
+  if (rate.take(client.address, now_s)) return true;
+  ++tally_.refused;
+  *refusal = http_error(429, "too many requests; ask less often");
+  refusal->headers.emplace_back("Retry-After", "1");
+  return false;
 }
 
 std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s,
                                               const HttpClient& client, const HttpRoute** route) {
-  FairRate& rate = client.has_token ? rate_with_token_ : rate_of_strangers_;
-  if (!rate.take(client.address, now_s)) {
-    ++tally_.refused;
-    ServerResponse error = http_error(429, "too many requests; ask less often");
-    error.headers.emplace_back("Retry-After", "1");
-    return error;
-  }
   if (!host_is_trusted(head))
     return http_error(403, "the Host header names another machine; use an address, or set a token");
   // A browser would not let that page see the answer; asking costs us work all the same, and streams their places.
@@ -93,14 +100,27 @@ std::optional<ServerResponse> HttpGate::check(const HttpHead& head, double now_s
   }
   *route = &found->second;
   const HttpAccess access = found->second.access;
-  if (access != HttpAccess::kOpen && !token_.empty() && !client.has_token) {
+  if (access != HttpAccess::kOpen && tokens_.any() && !client.has_token) {
     ++tally_.unauthorized;
-    ServerResponse error = http_error(401, "this needs the header `Authorization: Bearer TOKEN`");
-    error.headers.emplace_back("WWW-Authenticate", "Bearer");
+    const bool tried = !head.authorization.empty();
+    ServerResponse error =
+        http_error(401, tried ? "the header Authorization shows no token of this server; expected "
+                                "`Authorization: Bearer TOKEN`"
+                              : "this needs the header `Authorization: Bearer TOKEN`");
+    error.headers.emplace_back("WWW-Authenticate",
+                               tried ? "Bearer error=\"invalid_token\"" : "Bearer");
+    return error;
+  }
+  if (access == HttpAccess::kControl && tokens_.any() && client.right != HttpRight::kControl) {
+    ++tally_.unauthorized;
+    ServerResponse error = http_error(
+        403, "this changes something, and the token may only view; use one that may control");
+    error.headers.emplace_back("WWW-Authenticate",
+                               "Bearer error=\"insufficient_scope\", scope=\"control\"");
     return error;
   }
   // A browser that another site's page leads here sends no Origin, and over plain HTTP not even Sec-Fetch-Site.
-  if (access == HttpAccess::kStream && token_.empty() && head.of_browser &&
+  if (access == HttpAccess::kStream && !tokens_.any() && head.of_browser &&
       !shows_ticket(head, now_s))
     return http_error(
         403,
@@ -115,25 +135,17 @@ bool HttpGate::shows_ticket(const HttpHead& head, double now_s) {
   });
 }
 
-bool HttpGate::shows_token(const HttpHead& head) const {
-  if (token_.empty()) return false;
-  constexpr std::string_view kScheme = "Bearer ";
-  const std::string_view given = head.authorization;
-  return given.substr(0, kScheme.size()) == kScheme &&
-         is_token(given.substr(kScheme.size()), token_);
-}
-
 // Behind a proxy with TLS the page is of https; with a token it is no matter who else has that name.
 bool HttpGate::origin_is_own(const HttpHead& head) const {
-  return head.origin.empty() || head.origin == "http://" + head.host ||
-         (!token_.empty() && head.origin == "https://" + head.host);
+  return head.origin.empty() || (!has_tls_ && head.origin == "http://" + head.host) ||
+         ((has_tls_ || tokens_.any()) && head.origin == "https://" + head.host);
 }
 
-// A token cannot be had by a page of another site, whatever name that site takes.
+// A token cannot be had by a page of another site, whatever name that site takes; nor has that a certificate for its own name here.
 bool HttpGate::host_is_trusted(const HttpHead& head) const {
   const std::string host = host_of(head.host);
-  return !token_.empty() || head.host.empty() || host == "localhost" || host == own_host_ ||
-         is_address(host);
+  return has_tls_ || tokens_.any() || head.host.empty() || host == "localhost" ||
+         host == own_host_ || is_address(host);
 }
 
 }  // namespace alidade

@@ -13,13 +13,15 @@
 #include "edge_app/output/http/http_message.h"
 #include "edge_app/output/http/http_options.h"
 #include "edge_app/output/http/http_tickets.h"
+#include "edge_app/output/http/http_tokens.h"
 
 namespace alidade {
 
 enum class HttpAccess {
-  kToken,   // wants the token, if there is one
-  kStream,  // so; without one, what a browser sends must show a ticket
-  kOpen     // never
+  kToken,    // wants a token, if there are any
+  kControl,  // one that may control
+  kStream,   // as kToken; where there are none, what a browser sends must show a ticket
+  kOpen      // never
 };
 
 struct HttpRoute {
@@ -49,10 +51,11 @@ struct HttpTally {
   [[nodiscard]] HttpCounters now() const;
 };
 
-// Who asks: by address, and whether the token was shown. Where none is set nobody shows it.
+// Who asks: by address, and whether a token was shown, and what that may do. Where none is set nobody shows one.
 struct HttpClient {
   HttpAddress address;
   bool has_token = false;
+  HttpRight right = HttpRight::kView;
 };
 
 class HttpGate {
@@ -65,23 +68,33 @@ class HttpGate {
   // Any thread.
   [[nodiscard]] HttpTickets& tickets() { return tickets_; }
 
-  // One thread. The route that answers; null: *refusal is the answer. Says whether the client has the token.
-  [[nodiscard]] const HttpRoute* admit(const HttpHead& head, double now_s, HttpClient* client,
-                                       ServerResponse* refusal);
+  // One thread. Whether a client may begin with TLS: its address's share, apart for those that showed a token lately. Counted
+  // where not.
+  [[nodiscard]] bool may_shake_hands(const HttpAddress& address, double now_s);
+
+  // One thread. The route that answers; null: *refusal is the answer. Says whether the client has the token. A request whose
+  // body is still to come costs nothing yet: then charge() when it has.
+  [[nodiscard]] const HttpRoute* admit(const HttpHead& head, double now_s, bool body_to_come,
+                                       HttpClient* client, ServerResponse* refusal);
+  // False: the client's share is used up, *refusal is the answer.
+  [[nodiscard]] bool charge(const HttpClient& client, double now_s, ServerResponse* refusal);
 
  private:
   [[nodiscard]] std::optional<ServerResponse> check(const HttpHead& head, double now_s,
                                                     const HttpClient& client,
                                                     const HttpRoute** route);
-  [[nodiscard]] bool shows_token(const HttpHead& head) const;
   [[nodiscard]] bool shows_ticket(const HttpHead& head, double now_s);
   [[nodiscard]] bool origin_is_own(const HttpHead& head) const;
   [[nodiscard]] bool host_is_trusted(const HttpHead& head) const;
 
-  const std::string token_;
+  HttpTokens tokens_;
+  const bool has_tls_;
   const std::string own_host_;
   FairRate rate_of_strangers_;
   FairRate rate_with_token_;
+  FairRate handshakes_of_strangers_;
+  FairRate handshakes_of_known_;
+  RecentAddresses showed_token_;
   HttpTickets tickets_;
   HttpTally& tally_;
   std::map<std::string, std::map<std::string, HttpRoute>> routes_;  // by path and method

@@ -175,4 +175,12 @@ bool body_length(const HttpHead& head, std::size_t max_body, std::size_t* length
   return true;
 }
 
+bool body_is_to_come(const HttpHead& head, std::size_t came) {
+  std::size_t length = 0;
+  ServerResponse ignored;
+  return head.method == "POST" &&
+         body_length(head, std::numeric_limits<std::size_t>::max(), &length, &ignored) &&
+         length > came;
+}
+
 }  // namespace alidade

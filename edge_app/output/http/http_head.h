@@ -33,4 +33,7 @@ struct HttpHead {
 [[nodiscard]] bool body_length(const HttpHead& head, std::size_t max_body, std::size_t* length,
                                ServerResponse* refusal);
 
+// Whether the head of a POST says that more of a body comes than has.
+[[nodiscard]] bool body_is_to_come(const HttpHead& head, std::size_t came);
+
 }  // namespace alidade

@@ -83,7 +83,9 @@ HttpListener::HttpListener(const HttpServerOptions& options, HttpGate* gate, Htt
       wake_(make_event()),
       places_(options.limits),
       handlers_(wake_),
-      network_(std::make_unique<Network>()) {}
+      network_(std::make_unique<Network>()) {
+  if (options.tls) tls_.emplace(*options.tls);
+}
 
 HttpListener::~HttpListener() {
   close();
@@ -91,6 +93,14 @@ HttpListener::~HttpListener() {
 }
 
 bool HttpListener::open(std::string* address, std::string* error) {
+  if (tls_) {
+    std::vector<std::string> warnings;
+    if (!tls_->load(error, &warnings)) {
+      *error = "HTTP: " + *error;
+      return false;
+    }
+    for (const std::string& warning : warnings) spdlog::warn("HTTP: {}", warning);
+  }
   const std::string where = fmt::format("{}:{}", options_.host, options_.port);
   Error code;
   Tcp::resolver resolver(network_->context);
@@ -181,9 +191,16 @@ void HttpListener::take(Tcp::socket socket) {
   if (error) return;  // gone again
   socket.set_option(asio::socket_base::send_buffer_size(kSendBufferBytes), error);
   socket.set_option(Tcp::no_delay(true), error);
+  const HttpAddress address = http_address(peer.address());
+  const double now_s = monotonic_now_s();
+  std::shared_ptr<HttpTls::Context> tls;
+  if (tls_) {
+    // It costs more than most requests.
+    if (!gate_.may_shake_hands(address, now_s)) return;
+    tls = tls_->context(now_s);
+  }
   const HttpService service{options_.limits, gate_, tally_, handlers_, places_};
-  std::make_shared<HttpConnection>(std::move(socket), http_address(peer.address()), service)
-      ->begin();
+  std::make_shared<HttpConnection>(std::move(socket), std::move(tls), address, service)->begin();
 }
 
 void HttpListener::wait_for_wake() {

@@ -7,12 +7,14 @@
 #include <atomic>
 #include <boost/asio/io_context.hpp>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "edge_app/output/http/http_connection.h"
 #include "edge_app/output/http/http_gate.h"
 #include "edge_app/output/http/http_handlers.h"
 #include "edge_app/output/http/http_options.h"
+#include "edge_app/output/http/http_tls.h"
 
 namespace alidade {
 
@@ -52,6 +54,7 @@ class HttpListener {
   HttpTally& tally_;
   const int wake_;  // eventfd; outlives the network, as others may write to it at any time
   std::atomic<bool> news_{false};
+  std::optional<HttpTls> tls_;
   HttpPlaces places_;
   HttpHandlers handlers_;
   int accepting_ = 0;  // that wait for it; none: the last was lost

@@ -2,7 +2,11 @@
 // Where an HttpServer listens, who may ask, and what one client may cost.
 
 #include <cstddef>
+#include <optional>
 #include <string>
+#include <vector>
+
+#include "platform/system/file_stamp.h"
 
 namespace alidade {
 
@@ -20,10 +24,32 @@ struct HttpLimits {
       500;  // of all strangers, and of all with the token; shared by their addresses
 };
 
+enum class HttpRight {
+  kView,    // whatever changes nothing
+  kControl  // everything
+};
+
+struct HttpToken {
+  std::string text;
+  HttpRight right = HttpRight::kControl;
+};
+
+// PEM files, read anew when they have changed.
+struct HttpTlsOptions {
+  std::string certificate;  // the server's first, then those between it and the authority
+  std::string key;
+};
+
 struct HttpServerOptions {
   std::string host = "127.0.0.1";
-  int port = 0;       // 0: one that is free
-  std::string token;  // empty: none is asked for
+  int port = 0;                   // 0: one that is free
+  std::string token;              // may do everything; without it and tokens none is asked for
+  std::vector<HttpToken> tokens;  // further ones
+  // Where the tokens were read and are read anew when it has changed; empty: they stay. http_tokens.h.
+  std::string token_file;
+  bool token_file_holds_several = false;
+  FileStamp token_file_stamp;
+  std::optional<HttpTlsOptions> tls;
   HttpLimits limits;
 };
 

@@ -1,9 +1,12 @@
 #include "edge_app/output/http/http_server.h"
 
+#include <string>
 #include <utility>
+#include <vector>
 
 #include "edge_app/output/http/http_handlers.h"
 #include "edge_app/output/http/http_listener.h"
+#include "edge_app/output/http/http_tls.h"
 
 namespace alidade {
 HttpServer::HttpServer(const HttpServerOptions& options)
@@ -20,6 +23,13 @@ void HttpServer::get(const std::string& path, HttpAccess access, HttpHandler han
 void HttpServer::post(const std::string& path, HttpAccess access, std::size_t max_body,
                       HttpHandler handler) {
   gate_.add("POST", path, {access, max_body, std::move(handler)});
+}
+
+bool HttpServer::check_tls(std::string* error) const {
+  std::vector<std::string> ignored;
+  if (!options_.tls || HttpTls(*options_.tls).load(error, &ignored)) return true;
+  *error = "HTTP: " + *error;
+  return false;
 }
 
 bool HttpServer::start(std::string* error) {

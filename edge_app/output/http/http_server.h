@@ -9,8 +9,9 @@
 //           any other request's is not read
 //   answer  a client that takes nothing for write_timeout_s is dropped
 //   rate    an address's share of requests_per_s, with as many at once, else 429
-//   token   if one is set, routes that are not open want `Authorization: Bearer TOKEN`, else 401; compared in
-//           a time that does not tell how much of it was right; never logged
+//   token   if one is set, routes that are not open want `Authorization: Bearer TOKEN`, else 401, and those that change something
+//           one that may control, else 403; never logged (http_tokens.h)
+//   TLS     if a certificate is set (http_tls.h): the handshake is part of the head's time, and counted as a request is, before it
 //   method  another than the path's is answered 405, with those that it has in Allow
 //   pages of other sites   a request whose Origin is not this server is refused (403); so is one of which the
 //           browser says that it is from another site, and without a token a Host that is a name other than
@@ -45,6 +46,8 @@ class HttpServer {
   // For routes of HttpAccess::kStream. Any thread.
   [[nodiscard]] HttpTickets& tickets() { return gate_.tickets(); }
 
+  // Before start(): whether certificate and key can be used, or none are asked for. False with one line in *error.
+  [[nodiscard]] bool check_tls(std::string* error) const;
   // Binds and listens; once. False with one line in *error.
   [[nodiscard]] bool start(std::string* error);
   // After start(): "127.0.0.1:8080", with the port that was found.
