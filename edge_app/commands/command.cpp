@@ -185,6 +185,7 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
     options.url = config.url;
     options.user = config.user;
     options.password = config.password;
+    options.rules = config.rules;
     options.decode = decode;
     options.timeout_s = config.timeout_s;
     options.max_backoff_s = config.max_backoff_s;
@@ -206,6 +207,7 @@ std::unique_ptr<FrameSource> make_frame_source(const VideoConfig& config, bool d
   options.url = config.url;
   options.user = config.user;
   options.password = config.password;
+  options.rules = config.rules;
   options.format = config.format;
   options.transport = config.transport == VideoConfig::Transport::kUdp
                           ? RtpSourceOptions::Transport::kUdp
@@ -239,6 +241,7 @@ Options http_options(const PanTiltConfig& config) {
   options.url = config.url;
   options.user = config.user;
   options.password = config.password;
+  options.rules = config.rules;
   return options;
 }
 

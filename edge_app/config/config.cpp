@@ -29,6 +29,7 @@ VideoConfig read_video(YamlSection section, const std::string& path) {
     video.type = VideoConfig::Type::kRtsp;
     video.url = required_url(section, "rtsp://camera/stream", {"rtsp://", "rtsps://"});
     read_login(section, &video.user, &video.password);
+    video.rules = read_link_rules(section);
     const bool by_tls = video.url.rfind("rtsps://", 0) == 0;
     if (section.choice("transport", {"tcp", "udp"}).value_or("tcp") == "udp") {
       if (by_tls) {
@@ -45,6 +46,7 @@ VideoConfig read_video(YamlSection section, const std::string& path) {
     video.type = VideoConfig::Type::kMjpeg;
     video.url = required_url(section, "http://camera/mjpg/video.mjpg", {"http://", "https://"});
     read_login(section, &video.user, &video.password);
+    video.rules = read_link_rules(section);
   } else if (*type == "v4l2") {
     video.type = VideoConfig::Type::kV4l2;
     video.device = path_relative_to(path, required_text(section, "device", "/dev/video0"));

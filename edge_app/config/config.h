@@ -16,7 +16,8 @@
 #include "edge_app/config/tracking_config.h"
 #include "edge_app/output/http/http_options.h"
 #include "edge_app/output/record_format.h"  // OutputFormat
-#include "platform/video/v4l2_mode.h"       // V4l2Format
+#include "platform/system/link_rules.h"
+#include "platform/video/v4l2_mode.h"  // V4l2Format
 
 namespace alidade {
 
@@ -35,6 +36,7 @@ struct VideoConfig {
   int height = 0;                          // px
   std::string user;                        // rtsp, mjpeg
   std::string password;
+  LinkRules rules;                        // rtsp, mjpeg
   Transport transport = Transport::kTcp;  // rtsp
   std::string certificate_file;           // rtsps://; empty: the system's
   double timeout_s = 3;                   // silence that counts as a loss

@@ -56,6 +56,17 @@ void read_login(YamlSection& section, std::string* user, std::string* password) 
   *password = value;
 }
 
+LinkRules read_link_rules(YamlSection& section) {
+  LinkRules rules;
+  if (section.choice("follow_redirects", {"same-host", "any"}) == "any") {
+    rules.redirects = LinkRules::Redirects::kAny;
+  }
+  if (const auto auth = section.choice("auth", {"digest", "any"})) {
+    rules.auth = *auth == "any" ? LinkRules::Auth::kAny : LinkRules::Auth::kDigest;
+  }
+  return rules;
+}
+
 void refuse_other_than_file(const YamlSection& section, const std::string& key,
                             const std::string& path) {
   std::error_code ignored;

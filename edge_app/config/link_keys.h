@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "edge_app/config/yaml_section.h"
+#include "platform/system/link_rules.h"
 
 namespace alidade {
 
@@ -23,6 +24,9 @@ inline constexpr NumberRange kSeconds{0.1, 3600, "s"};
 
 // user and password_env.
 void read_login(YamlSection& section, std::string* user, std::string* password);
+
+// follow_redirects and auth.
+[[nodiscard]] LinkRules read_link_rules(YamlSection& section);
 
 // Fails where something that is no file has the path. One that is missing its reader tells.
 void refuse_other_than_file(const YamlSection& section, const std::string& key,

@@ -15,6 +15,15 @@ bool is_printable(const std::string& text) {
   return std::all_of(text.begin(), text.end(), [](char c) { return c > ' ' && c < '\x7F'; });
 }
 
+// /path or :8080/path.
+bool is_path_of_a_service(const std::string& text) {
+  const std::size_t path = text.find('/');
+  if (path == std::string::npos) return false;
+  const std::string port = text.substr(0, path);
+  return port.empty() || (port.size() > 1 && port.size() <= 6 && port[0] == ':' &&
+                          port.find_first_not_of("0123456789", 1) == std::string::npos);
+}
+
 // The angles at both ends of a device's own scale, of which none may be the other.
 std::optional<std::array<double, 2>> read_range(YamlSection& section, const std::string& key) {
   const auto ends = section.numbers(key, 2, {-360, 360, "deg"});
@@ -56,8 +65,10 @@ void read_onvif(YamlSection& section, PanTiltConfig* pan_tilt) {
   }
   pan_tilt->ptz_path = section.text("ptz_path").value_or("");
   if (!pan_tilt->ptz_path.empty() &&
-      (pan_tilt->ptz_path[0] != '/' || !is_printable(pan_tilt->ptz_path))) {
-    section.fail("ptz_path", "must be a path like /onvif/ptz_service; the host is that of url");
+      (!is_path_of_a_service(pan_tilt->ptz_path) || !is_printable(pan_tilt->ptz_path))) {
+    section.fail("ptz_path",
+                 "must be a path like /onvif/ptz_service, or with a port of its own like "
+                 "':8080/onvif/ptz_service'; the host is that of url");
   }
   pan_tilt->rate_hz = 10;  // SOAP is work for a camera
 }
@@ -92,6 +103,7 @@ PanTiltType read_pan_tilt_type(YamlSection& section) {
 void read_http_device(YamlSection& section, PanTiltConfig* pan_tilt) {
   pan_tilt->url = required_url(section, "http://camera", {"http://", "https://"});
   read_login(section, &pan_tilt->user, &pan_tilt->password);
+  pan_tilt->rules = read_link_rules(section);
 }
 
 // The keys of the type alone.

@@ -7,6 +7,7 @@
 
 #include "edge_app/config/head_config.h"
 #include "edge_app/config/yaml_section.h"
+#include "platform/system/link_rules.h"
 
 namespace alidade {
 
@@ -19,6 +20,7 @@ struct PanTiltConfig {
   std::string directory;  // recording
   std::string user;
   std::string password;
+  LinkRules rules;       // vapix, onvif
   int camera = 0;        // VAPIX camera number; 0 leaves it out of the query
   std::string profile;   // onvif: token; empty: the device's first with PTZ
   std::string ptz_path;  // onvif: of the PTZ service; empty: as the device tells

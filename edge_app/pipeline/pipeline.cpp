@@ -131,19 +131,18 @@ void Pipeline::fail(const std::string& error) {
 // Fails only if the counter is full, and then the descriptor is readable already.
 void Pipeline::finish() { static_cast<void>(::eventfd_write(finished_, 1)); }
 
-bool Pipeline::check_size(const Frame& frame) {
-  if (options_.width == 0) return true;
-  if (frame.width == options_.width && frame.height == options_.height) return true;
-  const std::string found =
-      fmt::format("{}: frames of {}x{} px", video_.name(), frame.width, frame.height);
-  fail(
-      options_.step.calibrated
-          ? fmt::format("{}, but {} is for {}x{} px; set the camera (and video.width and "
-                        "video.height) to this, or calibrate at the size of the frames",
-                        found, options_.calibration_name, options_.width, options_.height)
-          : fmt::format("{}, but video.width and video.height are {} and {}; set them to {} and {}",
-                        found, options_.width, options_.height, frame.width, frame.height));
-  return false;
+std::string Pipeline::size_fault(const Frame& frame) const {
+  if (options_.width == 0) return "";
+  if (frame.width == options_.width && frame.height == options_.height) return "";
+  const std::string found = fmt::format("frames of {}x{} px", frame.width, frame.height);
+  return options_.step.calibrated
+             ? fmt::format(
+                   "{}, but {} is for {}x{} px; set the camera (and video.width and "
+                   "video.height) to this, or calibrate at the size of the frames",
+                   found, options_.calibration_name, options_.width, options_.height)
+             : fmt::format(
+                   "{}, but video.width and video.height are {} and {}; set them to {} and {}",
+                   found, options_.width, options_.height, frame.width, frame.height);
 }
 
 // The image stays where it is until its slot comes back; a frame whose image finds no slot goes without.
@@ -190,7 +189,7 @@ void Pipeline::capture() {
   const auto on_frame = [&](const Frame& frame) {
     if (!decodes) take_place(ThreadDuty::kDecoding);
     decodes = true;
-    return check_size(frame) && push(frame);
+    return push(frame);
   };
   const auto on_loss = [this](double now_s) {
     VideoMessage message;
@@ -198,7 +197,9 @@ void Pipeline::capture() {
     message.time_s = now_s;
     stage_.push(message);
   };
-  const std::string error = read_to_the_end<Frame>(video_, &video_watch_, on_frame, on_loss);
+  const std::string error =
+      read_to_the_end<Frame>(video_, &video_watch_, on_frame, on_loss,
+                             [this](const Frame& frame) { return size_fault(frame); });
   if (!error.empty()) fail(error);
   stage_.end_input();
 }

@@ -127,7 +127,7 @@ class Pipeline {
   void log_repeated(const OrientationRecord& record);
   void account_way(const OutputMessage& message, double written_s);
   bool push(const Frame& frame);
-  bool check_size(const Frame& frame);
+  [[nodiscard]] std::string size_fault(const Frame& frame) const;
   void fail(const std::string& error);
   void finish();
 

@@ -61,14 +61,36 @@ class WaitingLog {
   double next_s_ = 0;
 };
 
+// Finds no fault with an item.
+struct TakesAll {
+  template <typename Item>
+  std::string operator()(const Item& /*item*/) const {
+    return "";
+  }
+};
+
+// Whether the source gave up the connection by which such an item came.
+template <typename Source>
+bool refuse(Source& source, const std::string& fault) {
+  if constexpr (std::is_base_of_v<FrameSource, Source>) {
+    return source.refuse(fault);
+  } else {
+    return false;
+  }
+}
+
 // Item: Frame or PanTiltSample. on_item(item) returns false to end. on_loss(now_s) is called at a loss
-// and then each second until the next item. *watch is told of all that. Returns the source's error if it failed for good.
-template <typename Item, typename Source, typename OnItem, typename OnLoss>
+// and then each second until the next item. fault_of(item): why it cannot be used; empty: it can. The first such ends with that
+// error; once one was good, what comes is the peer's doing, and the source refuses it. *watch is told of all that. Returns the
+// source's error if it failed for good.
+template <typename Item, typename Source, typename OnItem, typename OnLoss,
+          typename FaultOf = TakesAll>
 std::string read_to_the_end(Source& source, LinkWatch* watch, const OnItem& on_item,
-                            const OnLoss& on_loss) {
+                            const OnLoss& on_loss, const FaultOf& fault_of = {}) {
   constexpr double kReadTimeout_s = 0.2;  // bounds how late a notice of a loss can be
   constexpr double kNoticePeriod_s = 1;
   bool lost = false;
+  bool any_good = false;
   double next_notice_s = 0;
   std::string said;
   std::string waited;
@@ -77,6 +99,11 @@ std::string read_to_the_end(Source& source, LinkWatch* watch, const OnItem& on_i
   while (true) {
     switch (source.read(item, kReadTimeout_s)) {
       case ReadStatus::kOk:
+        if (const std::string fault = fault_of(item); !fault.empty()) {
+          if (any_good && refuse(source, fault)) break;
+          return source.name() + ": " + fault;
+        }
+        any_good = true;
         if (lost) spdlog::info("{}: connected again", source.name());
         lost = false;
         said.clear();

@@ -10,12 +10,15 @@
 #include "platform/system/backoff.h"
 #include "platform/system/clock.h"
 #include "platform/system/curl_handles.h"
+#include "platform/system/shown.h"
 
 namespace alidade {
 namespace {
 
+constexpr std::size_t kShownUrl = 120;  // bytes
 constexpr const char* kNoCurl = "libcurl does not start";
-constexpr long kMethod = static_cast<long>(CURLAUTH_DIGEST);
+constexpr long kDigest = static_cast<long>(CURLAUTH_DIGEST);
+constexpr long kBasic = static_cast<long>(CURLAUTH_BASIC);
 
 struct HeaderListCleanup {
   void operator()(curl_slist* list) const { curl_slist_free_all(list); }
@@ -56,11 +59,20 @@ class HttpPollingSource : public PanTiltSource {
   std::vector<std::string> take_notes() override { return notes_.take(); }
 
  private:
+  [[nodiscard]] bool is_by_tls() const { return asked_.rfind("https://", 0) == 0; }
   static std::size_t on_header(char* data, std::size_t size, std::size_t count, void* self);
   static std::size_t on_body(char* data, std::size_t size, std::size_t count, void* self);
   bool make_handle();
   void start_request(double now_s);
+  void send_request(const std::string& url, bool elsewhere);
+  // kOk: the answer is none. kTimeout: it is asked elsewhere.
+  ReadStatus follow_redirection();
   bool request_is_over(CURLcode* code);
+  [[nodiscard]] long status() const {
+    long status = 0;
+    curl_easy_getinfo(easy_.get(), CURLINFO_RESPONSE_CODE, &status);
+    return status;
+  }
   HttpAnswer answer() const;
   // kTimeout: it gave no sample, and was no failure.
   ReadStatus finish_request(CURLcode code, PanTiltSample* sample);
@@ -79,6 +91,7 @@ class HttpPollingSource : public PanTiltSource {
   CurlMultiPtr multi_;
   CurlEasyPtr easy_;        // one for all requests: it keeps the connection and the digest's nonce
   bool logged_in_ = false;  // the nonce was good
+  long method_ = kDigest;   // basic only where it is permitted, and nothing else offered
 
   double period_s_;
   double due_s_ = 0;     // when the next poll is to be sent
@@ -92,6 +105,9 @@ class HttpPollingSource : public PanTiltSource {
   // The request under way.
   bool under_way_ = false;
   HttpRequest request_;
+  std::string asked_;  // its URL, after so many redirections
+  int redirections_ = 0;
+  bool elsewhere_ = false;  // not where the login goes
   HeaderListPtr headers_;
   double started_s_ = 0;
   double previous_answer_s_ = 0;  // to this request: a 401 before the answer
@@ -120,7 +136,7 @@ HttpPollingSource::HttpPollingSource(HttpPollingPlan plan)
 }
 
 bool HttpPollingSource::make_handle() {
-  easy_ = make_http_handle(options_.user, options_.password, kMethod, curl_error_);
+  easy_ = make_http_handle(options_.user, options_.password, method_, curl_error_);
   if (!easy_) {
     return false;
   }
@@ -173,6 +189,7 @@ ReadStatus HttpPollingSource::pause(const std::string& error, double pause_s) {
 // The login, of a device that was in use. The nonces that it gave go with the handle: by the next
 // try they may be too old, and libcurl would take that for a wrong password.
 ReadStatus HttpPollingSource::refuse(const std::string& error) {
+  method_ = kDigest;
   if (!make_handle()) {
     return fail(kNoCurl);
   }
@@ -192,12 +209,19 @@ void HttpPollingSource::start_request(double now_s) {
                  : due_s_ + period_s_ * std::max(1.0, std::ceil((now_s - due_s_) / period_s_));
   }
   request_ = conversation_->next_request(now_s);
+  redirections_ = 0;
+  send_request(request_.url, false);
+}
+
+void HttpPollingSource::send_request(const std::string& url, bool elsewhere) {
+  asked_ = url;
+  elsewhere_ = elsewhere;
   headers_ = header_list(request_.headers);
-  curl_easy_setopt(easy_.get(), CURLOPT_URL, request_.url.c_str());
+  curl_easy_setopt(easy_.get(), CURLOPT_URL, asked_.c_str());
   curl_easy_setopt(easy_.get(), CURLOPT_HTTPHEADER, headers_.get());
   if (!options_.user.empty()) {
     curl_easy_setopt(easy_.get(), CURLOPT_HTTPAUTH,
-                     request_.digest ? kMethod : static_cast<long>(CURLAUTH_NONE));
+                     request_.digest && !elsewhere ? method_ : static_cast<long>(CURLAUTH_NONE));
   }
   if (request_.body) {
     curl_easy_setopt(easy_.get(), CURLOPT_POSTFIELDS, request_.body->c_str());
@@ -231,12 +255,13 @@ bool HttpPollingSource::request_is_over(CURLcode* code) {
 
 HttpAnswer HttpPollingSource::answer() const {
   HttpAnswer answer;
-  curl_easy_getinfo(easy_.get(), CURLINFO_RESPONSE_CODE, &answer.status);
+  answer.status = status();
   if (answer.status == 401) {
-    long offered = 0;
-    curl_easy_getinfo(easy_.get(), CURLINFO_HTTPAUTH_AVAIL, &offered);
-    answer.offers_digest = (offered & kMethod) != 0;
-    answer.login_error = login_error(easy_.get(), options_.user, kMethod);
+    const long offered = offered_methods(easy_.get());
+    const bool basic = options_.rules.permits_basic(is_by_tls());
+    answer.offers_digest = (offered & (basic ? kDigest | kBasic : kDigest)) != 0;
+    answer.only_basic = !basic && (offered & (kDigest | kBasic)) == kBasic;
+    answer.login_error = login_error(easy_.get(), options_.user, method_);
   }
   answer.body = body_;
   // The request was sent after the connection stood (libcurl counts from a moment after started_s_)
@@ -253,6 +278,25 @@ HttpAnswer HttpPollingSource::answer() const {
   return answer;
 }
 
+ReadStatus HttpPollingSource::follow_redirection() {
+  const Redirection next =
+      redirection_of(easy_.get(), options_.configured, asked_, options_.rules.redirects);
+  std::string error = next.error;
+  if (next.url.empty() && error.empty()) return ReadStatus::kOk;
+  if (error.empty() && ++redirections_ > kMostRedirections) {
+    error = "more than " + std::to_string(kMostRedirections) + " redirections";
+  } else if (error.empty() && !next.takes_login && request_.body_logs_in) {
+    error = "redirected to " + shown(next.url, kShownUrl) +
+            ": refused, as the request holds the login, which goes to url only: set url to that";
+  }
+  if (!error.empty()) {
+    conversation_->reset();
+    return disconnect(error);
+  }
+  send_request(next.url, !next.takes_login);
+  return ReadStatus::kTimeout;
+}
+
 ReadStatus HttpPollingSource::finish_request(CURLcode code, PanTiltSample* sample) {
   if (code != CURLE_OK) {
     if (conversation_->unanswered() == HttpConversation::Outcome::kAskOn) {
@@ -266,7 +310,21 @@ ReadStatus HttpPollingSource::finish_request(CURLcode code, PanTiltSample* sampl
                       : curl_error_[0] != '\0' ? curl_error_
                                                : curl_easy_strerror(code));
   }
+  const ReadStatus followed = follow_redirection();
+  if (followed != ReadStatus::kOk) return followed;
+  if (elsewhere_ && status() == 401) {
+    return disconnect("redirected to " + shown(asked_, kShownUrl) +
+                      ", which wants a login (401); it goes to url only: set url to that");
+  }
   const HttpAnswer given = answer();
+  if (given.status == 401 && request_.digest && method_ == kDigest && !options_.user.empty() &&
+      options_.rules.permits_basic(is_by_tls()) &&
+      (offered_methods(easy_.get()) & (kDigest | kBasic)) == kBasic) {
+    method_ = kBasic;
+    if (!make_handle()) return fail(kNoCurl);
+    send_request(request_.url, false);
+    return ReadStatus::kTimeout;
+  }
   if (given.status == 401 && std::exchange(logged_in_, false)) {
     // A camera that has restarted does not know the nonces it gave, and where it does not call them stale
     // libcurl believes that the password is wrong: once more, without them.
@@ -350,6 +408,7 @@ std::string take_http_url(Url* url, HttpPollingOptions* options) {
   std::string error;
   const bool is_url = parse_url(options->url, url, &error);
   options->name = url->bare;
+  options->configured = *url;
   if (!is_url) {
     return error;
   }

@@ -21,6 +21,7 @@
 
 #include "platform/pan_tilt/axis_mapping.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
+#include "platform/system/link_rules.h"
 #include "platform/system/url.h"
 
 namespace alidade {
@@ -30,12 +31,14 @@ struct HttpRequest {
   std::optional<std::string> body;   // POSTed; none: GET
   std::vector<std::string> headers;  // "Name: value"
   bool digest = true;                // log in by HTTP digest, if there is a user
+  bool body_logs_in = false;         // the body holds a login, and goes nowhere else
 };
 
 struct HttpAnswer {
   long status = 0;
   std::string body;
-  bool offers_digest = false;  // with 401
+  bool offers_digest = false;  // with 401; or basic, where it is permitted (link_rules.h)
+  bool only_basic = false;     // with 401: offered, and not permitted
   std::string login_error;     // with 401: one line on what may be wrong
   double earliest_time_s = 0;
   double latest_time_s = 0;
@@ -78,6 +81,7 @@ struct HttpDeviceOptions {
   std::string url;   // http://host[:port] or https://...
   std::string user;  // these go before what the URL may hold
   std::string password;
+  LinkRules rules;
   AxisMapping pan;  // of the angle that is taken from an answer
   AxisMapping tilt;
   double rate_hz = 30;
@@ -87,6 +91,7 @@ struct HttpDeviceOptions {
 
 struct HttpPollingOptions : HttpDeviceOptions {
   std::string name;             // of the source: the URL without password
+  Url configured;               // the same
   std::size_t max_body = 4096;  // bytes of an answer
   std::string expected;         // what an answer is: "a camera's position"
 };

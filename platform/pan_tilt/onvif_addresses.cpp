@@ -52,12 +52,12 @@ bool is_number(const std::string& text) {
 }  // namespace
 
 std::string onvif_address(const Url& device, const std::string& path) {
-  return device.scheme + "://" + device.host + (device.port.empty() ? "" : ":" + device.port) +
-         path;
+  const bool own_port = !device.port.empty() && path.rfind(':', 0) != 0;
+  return device.scheme + "://" + device.host + (own_port ? ":" + device.port : "") + path;
 }
 
 std::vector<std::string> onvif_addresses(const Url& device, const std::string& told_text,
-                                         OnvifService service) {
+                                         OnvifService service, bool other_port) {
   std::vector<std::string> addresses;
   const auto add = [&addresses](const std::string& address) {
     if (std::find(addresses.begin(), addresses.end(), address) == addresses.end()) {
@@ -72,10 +72,9 @@ std::vector<std::string> onvif_addresses(const Url& device, const std::string& t
                                     : std::string_view());
   if (!told.path.empty()) {
     if (::strcasecmp(told.host.c_str(), device.host.c_str()) == 0 &&
-        ::strcasecmp(told.scheme.c_str(), device.scheme.c_str()) == 0 &&
-        (told.port.empty() || is_number(told.port))) {
-      add(device.scheme + "://" + device.host + (told.port.empty() ? "" : ":" + told.port) +
-          told.path);
+        ::strcasecmp(told.scheme.c_str(), device.scheme.c_str()) == 0 && other_port &&
+        is_number(told.port)) {
+      add(onvif_address(device, ":" + told.port + told.path));
     }
     if (prefix.empty() || told.path.rfind(prefix + "/", 0) == 0) {
       add(onvif_address(device, told.path));

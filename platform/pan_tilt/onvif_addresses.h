@@ -14,13 +14,14 @@ enum class OnvifService { kMedia, kPtz };
 
 // URLs to try, best first, none twice; all of `device`'s host, whatever host is told, as logins go
 // there. device: of the device service. told: what the device tells, may be empty. A port of its
-// own counts where the host that is told is the device's. Then the path that is told, at the
-// device's own port, also behind the prefix of a proxy (http://proxy/cam1/onvif/device_service),
+// own counts where the host that is told is the device's and no login goes along (other_port). Then the
+// path that is told, at the device's own port, also behind the prefix of a proxy (http://proxy/cam1/onvif/device_service),
 // then the paths that are usual.
 [[nodiscard]] std::vector<std::string> onvif_addresses(const Url& device, const std::string& told,
-                                                       OnvifService service);
+                                                       OnvifService service,
+                                                       bool other_port = false);
 
-// http://host:port of device with this path.
+// http://host:port of device with this path, or with the port that stands before it: ":8080/path".
 [[nodiscard]] std::string onvif_address(const Url& device, const std::string& path);
 
 }  // namespace alidade

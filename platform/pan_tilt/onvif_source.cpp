@@ -85,7 +85,7 @@ class OnvifConversation : public HttpConversation {
     step_ = step;
     return Outcome::kAskOn;
   }
-  Outcome not_authorized(const std::string& why, bool offers_digest, std::string* error);
+  Outcome not_authorized(const std::string& why, const HttpAnswer& answer, std::string* error);
   Outcome not_here(std::string* error);
   Outcome take_clock(const HttpAnswer& answer);
   Outcome take_services(const HttpAnswer& answer, std::string* error);
@@ -161,6 +161,7 @@ HttpRequest OnvifConversation::next_request(double now_s) {
       call(), step_ == Step::kOptions ? profile_.configuration : profile_.token, login);
   request.headers = {onvif_content_type(call()), "Expect:"};
   request.digest = digest;
+  request.body_logs_in = login.has_value();
   return request;
 }
 
@@ -176,8 +177,7 @@ HttpConversation::Outcome OnvifConversation::take(const HttpAnswer& answer, PanT
     return take_clock(answer);
   }
   if (refused) {
-    return not_authorized(fault ? fault->text : std::to_string(answer.status), answer.offers_digest,
-                          error);
+    return not_authorized(fault ? fault->text : std::to_string(answer.status), answer, error);
   }
   if (fault) {
     *error = std::string("the device answers ") + call().name + " with '" + fault->text + "'";
@@ -210,7 +210,7 @@ HttpConversation::Outcome OnvifConversation::take(const HttpAnswer& answer, PanT
 
 // By HTTP digest only where the device offers it, which no wrong login is.
 HttpConversation::Outcome OnvifConversation::not_authorized(const std::string& why,
-                                                            bool offers_digest,
+                                                            const HttpAnswer& answer,
                                                             std::string* error) {
   const ServiceSearch* const search = step_ == Step::kProfile  ? &media_
                                       : step_ == Step::kStatus ? &ptz_
@@ -226,10 +226,10 @@ HttpConversation::Outcome OnvifConversation::not_authorized(const std::string& w
   if (search != nullptr && !search->is_first() && !search->is_found()) {
     return not_here(error);  // where nothing is, everybody may be refused
   }
-  if (login_.refused(offers_digest)) {
+  if (login_.refused(answer.offers_digest)) {
     return Outcome::kAskOn;
   }
-  *error += login_.tried_text();
+  *error += answer.only_basic ? std::string("; ") + kOnlyBasic : login_.tried_text();
   return Outcome::kRefused;
 }
 
@@ -256,7 +256,7 @@ HttpConversation::Outcome OnvifConversation::not_here(std::string* error) {
       if (!ptz_.is_found() && options_.ptz_path.empty()) {
         *error +=
             "; no PTZ service is where the device says or where usual: if you know its path, give "
-            "it as pan_tilt.ptz_path";
+            "it as pan_tilt.ptz_path, with a port of its own as ':PORT/PATH'";
       }
       break;
     case Step::kClock:
@@ -313,9 +313,9 @@ HttpConversation::Outcome OnvifConversation::take_services(const HttpAnswer& ans
 // Where they may be: as they are told, if they are.
 HttpConversation::Outcome OnvifConversation::find_services() {
   ptz_.begin(options_.ptz_path.empty()
-                 ? onvif_addresses(device_, services_.ptz, OnvifService::kPtz)
+                 ? onvif_addresses(device_, services_.ptz, OnvifService::kPtz, user_.empty())
                  : std::vector<std::string>{onvif_address(device_, options_.ptz_path)});
-  media_.begin(onvif_addresses(device_, services_.media, OnvifService::kMedia));
+  media_.begin(onvif_addresses(device_, services_.media, OnvifService::kMedia, user_.empty()));
   profile_ = {};
   profile_.token = options_.profile;
   return go_on(profile_.token.empty() ? Step::kProfile : Step::kStatus);

@@ -30,7 +30,7 @@ struct OnvifSourceOptions : HttpDeviceOptions {
   OnvifSourceOptions() { rate_hz = 10; }  // SOAP is work for a camera
 
   std::string profile;  // token; empty: the device's first profile with PTZ
-  // "/..." of the PTZ service at url's host and port; empty: as the device tells.
+  // "/..." of the PTZ service at url's host and port, or ":8080/..." at another port; empty: as the device tells.
   std::string ptz_path;
   std::optional<OnvifRange> pan_range;
   std::optional<OnvifRange> tilt_range;

@@ -1,7 +1,8 @@
 #pragma once
 // open_vapix(): polls an Axis camera for its pan, tilt and zoom:
 //   GET /axis-cgi/com/ptz.cgi?query=position[&camera=N]
-// over one kept HTTP connection with digest authentication (one 401 in total, not one a poll).
+// over one kept HTTP connection with digest authentication (one 401 in total, not one a poll), or basic
+// where that is permitted and nothing else offered (link_rules.h).
 // Pace, stamps and threads: http_polling_source.h. kDisconnected: unreachable, timed out, HTTP
 // status other than 200, an `Error:` answer, an answer that is not a position. kFailed: unusable
 // URL; until the first sample also wrong user or password (401), later kDisconnected.

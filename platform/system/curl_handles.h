@@ -7,6 +7,8 @@
 #include <memory>
 #include <string>
 
+#include "platform/system/link_rules.h"
+
 namespace alidade {
 
 struct CurlEasyCleanup {
@@ -28,7 +30,14 @@ constexpr const char* kHeadersTooLong = "the answer's headers are longer than 64
                                            long methods, char* error_buffer);
 [[nodiscard]] CurlMultiPtr make_curl_multi();
 
+// The CURLAUTH_... that an answer of 401 offers.
+[[nodiscard]] long offered_methods(CURL* easy);
+
 // Why the answer was 401, for the person; methods as given above.
 [[nodiscard]] std::string login_error(CURL* easy, const std::string& user, long methods);
+
+// Where a whole answer of the URL `asked` sends the client on; url and error empty: nowhere.
+[[nodiscard]] Redirection redirection_of(CURL* easy, const Url& configured,
+                                         const std::string& asked, LinkRules::Redirects rule);
 
 }  // namespace alidade

@@ -62,4 +62,12 @@ bool parse_url(const std::string& text, Url* url, std::string* error) {
   return true;
 }
 
+std::string resolved_url(const std::string& base, const std::string& told) {
+  const Handle handle = parsed(base);
+  if (!handle || curl_url_set(handle.get(), CURLUPART_URL, told.c_str(), kAnyScheme) != CURLUE_OK) {
+    return {};
+  }
+  return part(handle, CURLUPART_URL, kAnyScheme);
+}
+
 }  // namespace alidade

@@ -18,4 +18,7 @@ struct Url {
 // False: text is no URL; *error says so, and url->bare is what of it can be shown.
 [[nodiscard]] bool parse_url(const std::string& text, Url* url, std::string* error);
 
+// `told`, which may be relative to the URL `base`, as a whole one; empty: neither.
+[[nodiscard]] std::string resolved_url(const std::string& base, const std::string& told);
+
 }  // namespace alidade

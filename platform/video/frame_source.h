@@ -30,6 +30,11 @@ class FrameSource {
   // Waits at most timeout_s for the next frame. Fills frame only on kOk.
   [[nodiscard]] virtual ReadStatus read(Frame& frame, double timeout_s) = 0;
 
+  // From the reading thread: the frame that read() has just given cannot be used, for this reason. True: the connection is
+  // given up, read() reports it as kDisconnected with the reason, and it is tried again after a growing pause. False: this
+  // source has none to give up.
+  [[nodiscard]] virtual bool refuse(const std::string& /*reason*/) { return false; }
+
   // Thread-safe, idempotent. Every later read() returns kStopped.
   virtual void stop() = 0;
 

@@ -10,10 +10,12 @@
 #include <cmath>
 #include <cstring>
 #include <optional>
+#include <thread>
 #include <utility>
 
 #include "platform/system/clock.h"
 #include "platform/system/curl_handles.h"
+#include "platform/system/shown.h"
 #include "platform/system/url.h"
 #include "platform/video/jpeg_decoder.h"
 #include "platform/video/multipart_scanner.h"
@@ -28,12 +30,19 @@ namespace {
 constexpr long kReceiveBuffer = 128 * 1024;  // bytes read at a time
 // However many bytes are awaited: what came by then is taken, should they be fewer than was told.
 constexpr double kMostAsleep_s = 0.02;
+constexpr int kUselessInARow =
+    1000;  // parts that are no pictures; one or two before each are usual
+// Who has woken the thread so often for one picture sends it byte by byte: from then on as often as the pause allows.
+constexpr int kWakesForAPicture = 256;
+constexpr auto kPauseOfWakes = std::chrono::milliseconds(1);
 constexpr int kDamagedInARow = 30;  // pictures: more are no accident
 // Each part without a new time stamp that can be true makes the sender's clock more doubtful, each one with it less.
 constexpr int kDoubtOfABadStamp = 20;
 constexpr int kMostDoubt = 2 * kDoubtOfABadStamp;
+constexpr std::size_t kShownUrl = 120;  // bytes
 constexpr const char* kNoCurl = "libcurl does not start";
-constexpr long kMethods = static_cast<long>(CURLAUTH_DIGEST | CURLAUTH_BASIC);
+constexpr long kDigest = static_cast<long>(CURLAUTH_DIGEST);
+constexpr long kDigestOrBasic = static_cast<long>(CURLAUTH_DIGEST | CURLAUTH_BASIC);
 
 class MjpegSource : public FrameSource {
  public:
@@ -41,6 +50,10 @@ class MjpegSource : public FrameSource {
   ReadStatus read(Frame& frame, double timeout_s) override;
 
   void stop() override { thread_.stop(); }
+  bool refuse(const std::string& reason) override {
+    thread_.refuse(reason);
+    return true;
+  }
   std::string error() const override { return error_; }
   std::string name() const override { return name_; }
   FrameSourceCounters counters() const override {
@@ -54,14 +67,16 @@ class MjpegSource : public FrameSource {
       curl_multi_wakeup(multi_.get());
     }
   }
+  [[nodiscard]] bool is_by_tls() const { return asked_.rfind("https://", 0) == 0; }
   static int on_socket(void* self, curl_socket_t socket, curlsocktype purpose);
   static int on_close(void* self, curl_socket_t socket);
   static std::size_t on_header(char* data, std::size_t size, std::size_t count, void* self);
   static std::size_t on_body(char* data, std::size_t size, std::size_t count, void* self);
-  bool make_handle();
+  bool make_handle(const std::string& url, bool logs_in);
   bool begin_stream();
   void take_bytes(std::string_view bytes, double arrival_s);
   ReadStatus receive_connection(std::string* error);
+  ReadStatus receive_answer(CURLcode* code, std::string* error);
   void wait_for_bytes(double left_s);
   void set_low_water(std::size_t bytes);
   ReadStatus connection_end(CURLcode code, std::string* error);
@@ -75,7 +90,7 @@ class MjpegSource : public FrameSource {
 
   MjpegSourceOptions options_;
   std::string name_;
-  bool is_tls_ = false;
+  Url configured_;
 
   std::atomic<std::int64_t> damaged_{0};
   std::atomic<std::int64_t> unstamped_{0};
@@ -83,6 +98,9 @@ class MjpegSource : public FrameSource {
 
   // The receiving thread's own.
   char curl_error_[CURL_ERROR_SIZE] = "";
+  std::string asked_;     // the URL, after redirections
+  bool logs_in_ = false;  // there
+  long methods_ = kDigest;
   curl_socket_t socket_ = CURL_SOCKET_BAD;   // of this connection, if it is open
   int low_water_ = 1;                        // bytes at which it wakes
   CurlMultiPtr multi_;                       // stop() wakes it up
@@ -90,6 +108,8 @@ class MjpegSource : public FrameSource {
   std::optional<MultipartScanner> scanner_;  // of this connection, from its first bytes on
   std::size_t header_bytes_ = 0;             // of this connection's answers
   std::string refusal_;                      // why the answer's body was not taken
+  int useless_in_a_row_ = 0;                 // parts
+  int wakes_ = 0;                            // since the last picture
   std::int64_t discarded_ = 0;               // by the scanner, as far as counted
   std::int64_t pictures_ = 0;                // of this connection
   bool worked_ = false;                      // a picture has come, of any connection
@@ -128,7 +148,7 @@ MjpegSource::MjpegSource(const MjpegSourceOptions& options) : options_(options) 
     (void)fail("not an MJPEG stream; the URL must be http://host[:port]/path or https://...");
     return;
   }
-  is_tls_ = url.scheme == "https";
+  configured_ = url;
   if (options_.user.empty() && options_.password.empty()) {
     options_.user = url.user;
     options_.password = url.password;
@@ -139,12 +159,15 @@ MjpegSource::MjpegSource(const MjpegSourceOptions& options) : options_(options) 
   }
 }
 
-bool MjpegSource::make_handle() {
-  easy_ = make_http_handle(options_.user, options_.password, kMethods, curl_error_);
+bool MjpegSource::make_handle(const std::string& url, bool logs_in) {
+  asked_ = url;
+  logs_in_ = logs_in;
+  methods_ = options_.rules.permits_basic(is_by_tls()) ? kDigestOrBasic : kDigest;
+  easy_ = make_http_handle(logs_in ? options_.user : "", options_.password, methods_, curl_error_);
   if (!easy_) {
     return false;
   }
-  curl_easy_setopt(easy_.get(), CURLOPT_URL, name_.c_str());
+  curl_easy_setopt(easy_.get(), CURLOPT_URL, asked_.c_str());
   curl_easy_setopt(easy_.get(), CURLOPT_BUFFERSIZE, kReceiveBuffer);
   curl_easy_setopt(easy_.get(), CURLOPT_HEADERFUNCTION, &MjpegSource::on_header);
   curl_easy_setopt(easy_.get(), CURLOPT_HEADERDATA, this);
@@ -196,7 +219,10 @@ std::size_t MjpegSource::on_body(char* data, std::size_t size, std::size_t count
     return 0;  // ends the transfer with CURLE_WRITE_ERROR
   }
   source->take_bytes({data, bytes}, arrival_s);
-  return bytes;
+  if (source->useless_in_a_row_ <= kUselessInARow) return bytes;
+  source->refusal_ = "more than " + std::to_string(kUselessInARow) +
+                     " parts in a row are no pictures: no camera's stream";
+  return 0;
 }
 
 bool MjpegSource::begin_stream() {
@@ -216,16 +242,24 @@ bool MjpegSource::begin_stream() {
 
 void MjpegSource::take_bytes(std::string_view bytes, double arrival_s) {
   scanner_->feed(bytes, arrival_s);
-  damaged_ += scanner_->discarded() - std::exchange(discarded_, scanner_->discarded());
+  const std::int64_t discarded =
+      scanner_->discarded() - std::exchange(discarded_, scanner_->discarded());
+  damaged_ += discarded;
+  useless_in_a_row_ += static_cast<int>(discarded);
   MultipartPart part;
   while (scanner_->next(&part)) {
     if (part.body.compare(0, 2, "\xFF\xD8") == 0) {
       ++pictures_;
+      useless_in_a_row_ = 0;
+      wakes_ = 0;
       worked_ = true;
       last_picture_s_ = arrival_s;
       const std::size_t size = part.body.size();
       thread_.push(std::move(part), size);
-    } else if (part.content_type.empty() || part.content_type.rfind("image/", 0) == 0) {
+      continue;
+    }
+    ++useless_in_a_row_;
+    if (part.content_type.empty() || part.content_type.rfind("image/", 0) == 0) {
       ++damaged_;
     }  // else text between the pictures
   }
@@ -234,25 +268,46 @@ void MjpegSource::take_bytes(std::string_view bytes, double arrival_s) {
 // One connection from its beginning to its end. Each logs in anew: a camera that has restarted does not know
 // the nonces it gave, and where it does not call them stale libcurl believes that the password is wrong.
 ReadStatus MjpegSource::receive_connection(std::string* error) {
-  if (!make_handle()) {
-    *error = kNoCurl;
-    return ReadStatus::kDisconnected;
+  last_picture_s_ = monotonic_now_s();
+  Redirection next{name_, true, ""};
+  for (int i = 0; i <= kMostRedirections; ++i) {
+    if (!make_handle(next.url, next.takes_login)) {
+      *error = kNoCurl;
+      return ReadStatus::kDisconnected;
+    }
+    CURLcode code = CURLE_OK;
+    const ReadStatus status = receive_answer(&code, error);
+    if (status != ReadStatus::kOk) return status;
+    next = redirection_of(easy_.get(), configured_, asked_, options_.rules.redirects);
+    if (next.url.empty()) {
+      *error = next.error;
+      return next.error.empty() ? connection_end(code, error) : ReadStatus::kDisconnected;
+    }
   }
+  *error = "more than " + std::to_string(kMostRedirections) + " redirections, the last to " +
+           shown(asked_, kShownUrl);
+  return ReadStatus::kDisconnected;
+}
+
+// kOk: it has ended with this code.
+ReadStatus MjpegSource::receive_answer(CURLcode* code, std::string* error) {
   scanner_.reset();
   refusal_.clear();
   header_bytes_ = 0;
+  useless_in_a_row_ = 0;
+  wakes_ = 0;
   curl_error_[0] = '\0';
   pictures_ = 0;
-  last_picture_s_ = monotonic_now_s();
   curl_multi_add_handle(multi_.get(), easy_.get());
   ReadStatus status = ReadStatus::kStopped;
-  while (!thread_.stopped()) {
+  while (!thread_.ending()) {
     int running = 0;
     curl_multi_perform(multi_.get(), &running);
     int queued = 0;
     const CURLMsg* message = curl_multi_info_read(multi_.get(), &queued);
     if (message != nullptr && message->msg == CURLMSG_DONE) {
-      status = connection_end(message->data.result, error);
+      *code = message->data.result;
+      status = ReadStatus::kOk;
       break;
     }
     const double left_s = last_picture_s_ + options_.timeout_s - monotonic_now_s();
@@ -270,6 +325,7 @@ ReadStatus MjpegSource::receive_connection(std::string* error) {
 
 // A picture comes in many segments, and a thread with priority would wake for each.
 void MjpegSource::wait_for_bytes(double left_s) {
+  if (++wakes_ > kWakesForAPicture) std::this_thread::sleep_for(kPauseOfWakes);
   set_low_water(scanner_ ? scanner_->missing_bytes() : 1);
   const double most_s = low_water_ > 1 ? std::min(left_s, kMostAsleep_s) : left_s;
   int ready = 0;
@@ -282,7 +338,7 @@ void MjpegSource::wait_for_bytes(double left_s) {
 // Not by TLS, whose records need not be as long as what they carry.
 void MjpegSource::set_low_water(std::size_t bytes) {
   const auto wanted = static_cast<int>(std::min<std::size_t>(bytes, INT_MAX));
-  if (is_tls_ || socket_ == CURL_SOCKET_BAD || wanted == low_water_) {
+  if (is_by_tls() || socket_ == CURL_SOCKET_BAD || wanted == low_water_) {
     return;
   }
   if (::setsockopt(socket_, SOL_SOCKET, SO_RCVLOWAT, &wanted, sizeof wanted) == 0) {
@@ -294,8 +350,10 @@ ReadStatus MjpegSource::connection_end(CURLcode code, std::string* error) {
   long status = 0;
   curl_easy_getinfo(easy_.get(), CURLINFO_RESPONSE_CODE, &status);
   if (status == 401) {
-    *error = login_error(easy_.get(), options_.user, kMethods);
-    return worked_ ? ReadStatus::kDisconnected : ReadStatus::kFailed;
+    *error = logs_in_ ? login_error(easy_.get(), options_.user, methods_)
+                      : "redirected to " + shown(asked_, kShownUrl) +
+                            ", which wants a login (401); it goes to url only: set url to that";
+    return worked_ || !logs_in_ ? ReadStatus::kDisconnected : ReadStatus::kFailed;
   }
   if (!refusal_.empty()) {
     *error = refusal_;
@@ -355,10 +413,9 @@ ReadStatus MjpegSource::deliver(MultipartPart part, Frame& frame) {
       return ReadStatus::kTimeout;
     }
     damaged_in_a_row_ = 0;
-    restarted_ = true;
-    error_ = name_ + ": " + std::to_string(kDamagedInARow) +
-             " pictures in a row cannot be used; the last one: " + decoder_.error();
-    return ReadStatus::kDisconnected;
+    thread_.refuse(std::to_string(kDamagedInARow) +
+                   " pictures in a row cannot be used; the last one: " + decoder_.error());
+    return ReadStatus::kTimeout;
   }
   damaged_in_a_row_ = 0;
   const double decode_s = monotonic_now_s() - before_s;
@@ -371,7 +428,9 @@ ReadStatus MjpegSource::deliver(MultipartPart part, Frame& frame) {
     std::memcpy(packet->data, part.body.data(), part.body.size());
     if (!copy_.add(options_.copy_to, *parameters_, picture.width, picture.height, *packet,
                    part.first_byte_s, &error)) {
-      return fail(error);
+      if (!copy_.is_another_stream()) return fail(error);
+      thread_.refuse(error);
+      return ReadStatus::kTimeout;
     }
   }
   frame = Frame{};

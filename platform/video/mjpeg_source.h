@@ -1,7 +1,7 @@
 #pragma once
 // open_mjpeg(): JPEG pictures one after another in the answer to one HTTP request
-// (multipart/x-mixed-replace; libcurl, multipart_scanner.h, libjpeg-turbo), with HTTP digest or basic
-// authentication.
+// (multipart/x-mixed-replace; libcurl, multipart_scanner.h, libjpeg-turbo), with a login by
+// link_rules.h.
 //
 // A thread of its own, started by the first read() and so with the scheduling of the capture
 // thread, connects, stamps and queues; read() decodes. So a stamp is never late by a decoding time,
@@ -16,8 +16,8 @@
 //   slow, the oldest that wait are dropped and counted.
 // - copy_to: each delivered picture is also stored as it came in that Matroska file, in which a kill
 //   loses at most the last second. The file goes on over reconnections.
-// kDisconnected: unreachable, no whole picture for timeout_s, HTTP status other than 200, an answer
-// that is no multipart stream. kFailed: unusable URL, copy_to cannot be written; wrong user or password
+// kDisconnected: unreachable, no whole picture for timeout_s, a redirection that is refused (link_rules.h), another HTTP
+// status than 200, an answer that is no multipart stream. kFailed: unusable URL, copy_to cannot be written; wrong user or password
 // (401), said only until the first picture has come, as a camera that starts again may refuse for a moment.
 
 #include <cstddef>
@@ -26,6 +26,7 @@
 #include <string>
 
 #include "platform/streams/picture_size.h"
+#include "platform/system/link_rules.h"
 #include "platform/video/frame_source.h"
 
 namespace alidade {
@@ -34,6 +35,7 @@ struct MjpegSourceOptions {
   std::string url;   // http://host[:port]/path or https://...
   std::string user;  // these go before what the URL may hold
   std::string password;
+  LinkRules rules;
   bool decode = true;        // false: Frame::luma stays null, only the headers are read
   double timeout_s = 3;      // without a picture for so long, the connection counts as lost
   double max_backoff_s = 5;  // longest pause between two tries

@@ -10,6 +10,7 @@ namespace {
 
 constexpr std::size_t kMaxBoundary = 200;      // bytes of a line; RFC 2046 allows a boundary 70
 constexpr std::size_t kMaxHeaders = 8192;      // bytes of one part's headers
+constexpr int kMaxHeaderLines = 64;            // of one part
 constexpr std::size_t kMaxDashes = 32;         // before a boundary, with the line end before them
 constexpr std::size_t kMaxDelimiterTail = 32;  // dashes and blanks between boundary and line end
 constexpr std::size_t kMaxName = 32;  // bytes of a header's name that follows a boundary at once
@@ -139,6 +140,7 @@ void MultipartScanner::feed(std::string_view bytes, double arrival_s) {
   if (std::exchange(stamp_next_byte_, false)) {
     part_.first_byte_s = arrival_s;
   }
+  if (used_ > buffer_.size() / 2) buffer_.erase(0, std::exchange(used_, 0));
   buffer_.append(bytes);
   while (advance()) {
   }
@@ -155,7 +157,7 @@ bool MultipartScanner::next(MultipartPart* part) {
 
 std::size_t MultipartScanner::missing_bytes() const {
   const bool known = state_ == State::kBody && lengths_hold_ && content_length_;
-  return known && *content_length_ > buffer_.size() ? *content_length_ - buffer_.size() : 1;
+  return known && *content_length_ > pending_bytes() ? *content_length_ - pending_bytes() : 1;
 }
 
 // False when nothing can be done before more bytes come.
@@ -174,19 +176,20 @@ bool MultipartScanner::advance() {
 }
 
 void MultipartScanner::drop_front(std::size_t count) {
-  buffer_.erase(0, count);
+  used_ += count;
   scan_ -= std::min(scan_, count);
 }
 
 bool MultipartScanner::learn_boundary() {
-  const std::size_t end = buffer_.find('\n');
+  const std::size_t end = rest().find('\n');
   if (end == std::string::npos) {
-    if (buffer_.size() > kMaxBoundary) {
+    if (pending_bytes() > kMaxBoundary) {
       buffer_.assign(kMaxBoundary, ' ');  // no boundary; only its line end is still of interest
+      used_ = 0;
     }
     return false;
   }
-  const std::string_view line = stripped(std::string_view(buffer_).substr(0, end), kHeaderBlanks);
+  const std::string_view line = stripped(rest().substr(0, end), kHeaderBlanks);
   const bool told = line.substr(0, 2) == "--" && end < kMaxBoundary;
   core_ =
       told ? core_of(stripped(line.substr(0, header_behind_boundary(line)), kHeaderBlanks)) : "";
@@ -200,41 +203,41 @@ bool MultipartScanner::learn_boundary() {
 
 // Moves scan_ on as far as it can decide.
 std::optional<MultipartScanner::Delimiter> MultipartScanner::find_delimiter() {
+  const std::string_view bytes = rest();
   for (;;) {
-    const std::size_t at = buffer_.find(core_, scan_);
+    const std::size_t at = bytes.find(core_, scan_);
     if (at == std::string::npos) {
-      scan_ = std::max(scan_, buffer_.size() - std::min(buffer_.size(), core_.size() - 1));
+      scan_ = std::max(scan_, bytes.size() - std::min(bytes.size(), core_.size() - 1));
       return std::nullopt;
     }
     scan_ = at;
     std::size_t begin = at;
-    while (begin > 0 && at - begin < kMaxDashes - 2 && buffer_[begin - 1] == '-') {
+    while (begin > 0 && at - begin < kMaxDashes - 2 && bytes[begin - 1] == '-') {
       --begin;
     }
-    const bool at_line_start = begin == 0 || buffer_[begin - 1] == '\n';
+    const bool at_line_start = begin == 0 || bytes[begin - 1] == '\n';
     const std::size_t after = at + core_.size();
     std::size_t end = after;
-    while (end < buffer_.size() && end - after < kMaxDelimiterTail &&
-           std::string_view("- \t\r").find(buffer_[end]) != std::string_view::npos) {
+    while (end < bytes.size() && end - after < kMaxDelimiterTail &&
+           std::string_view("- \t\r").find(bytes[end]) != std::string_view::npos) {
       ++end;
     }
-    if (end == buffer_.size()) {
+    if (end == bytes.size()) {
       return std::nullopt;  // the line may go on
     }
     const bool dashed = at - begin >= 2;
-    const bool ends_line = buffer_[end] == '\n' && (at_line_start || dashed);
-    const std::string_view ahead(buffer_);
+    const bool ends_line = bytes[end] == '\n' && (at_line_start || dashed);
     const bool may_go_on =
-        dashed && ahead.substr(after, end - after).find('-') == std::string_view::npos;
-    const Follows follows = may_go_on ? what_follows(ahead.substr(end)) : Follows::kNothing;
+        dashed && bytes.substr(after, end - after).find('-') == std::string_view::npos;
+    const Follows follows = may_go_on ? what_follows(bytes.substr(end)) : Follows::kNothing;
     if (!ends_line && follows == Follows::kUnknown) return std::nullopt;
     if (!ends_line && follows == Follows::kNothing) {
       ++scan_;
       continue;
     }
-    if (begin > 0 && buffer_[begin - 1] == '\n') {
+    if (begin > 0 && bytes[begin - 1] == '\n') {
       --begin;
-      if (begin > 0 && buffer_[begin - 1] == '\r') {
+      if (begin > 0 && bytes[begin - 1] == '\r') {
         --begin;
       }
     }
@@ -247,8 +250,9 @@ void MultipartScanner::begin_part(std::size_t delimiter_end) {
   scan_ = 0;
   part_ = MultipartPart{};
   part_.first_byte_s = arrival_s_;
-  stamp_next_byte_ = buffer_.empty();
+  stamp_next_byte_ = pending_bytes() == 0;
   header_bytes_ = 0;
+  header_lines_ = 0;
   content_length_.reset();
   state_ = State::kHeaders;
 }
@@ -265,13 +269,14 @@ bool MultipartScanner::skip_to_delimiter() {
 }
 
 bool MultipartScanner::read_header_line() {
-  if (!buffer_.empty() &&
-      buffer_.front() == '\xFF') {  // a picture without the empty line before it
+  const std::string_view bytes = rest().substr(0, kMaxHeaders + 1);
+  if (!bytes.empty() && bytes.front() == '\xFF') {  // a picture without the empty line before it
     state_ = State::kBody;
     return true;
   }
-  const std::size_t end = buffer_.find('\n');
-  if (header_bytes_ + std::min(end, buffer_.size()) > kMaxHeaders) {
+  const std::size_t end = bytes.find('\n');
+  if (header_bytes_ + std::min(end, bytes.size()) > kMaxHeaders ||
+      header_lines_ == kMaxHeaderLines) {
     ++discarded_;
     state_ = State::kSkip;
     return true;
@@ -279,12 +284,13 @@ bool MultipartScanner::read_header_line() {
   if (end == std::string::npos) {
     return false;
   }
-  const std::string line(stripped(std::string_view(buffer_).substr(0, end), kHeaderBlanks));
+  const std::string line(stripped(bytes.substr(0, end), kHeaderBlanks));
   if (stripped(line, "-") == core_) {  // the part had no body
     begin_part(end + 1);
     return true;
   }
   header_bytes_ += end + 1;
+  ++header_lines_;
   drop_front(end + 1);
   if (line.empty()) {
     scan_ = 0;
@@ -313,8 +319,8 @@ void MultipartScanner::take_header(std::string_view line) {
 
 bool MultipartScanner::read_body() {
   const std::optional<Delimiter> delimiter = find_delimiter();
-  const std::size_t known_end = delimiter ? delimiter->begin : buffer_.size();
-  if (content_length_ && *content_length_ <= known_end && jpeg_ends_at(buffer_, *content_length_)) {
+  const std::size_t known_end = delimiter ? delimiter->begin : pending_bytes();
+  if (content_length_ && *content_length_ <= known_end && jpeg_ends_at(rest(), *content_length_)) {
     lengths_hold_ = true;
     end_part(*content_length_);
     return true;
@@ -337,10 +343,8 @@ bool MultipartScanner::read_body() {
 
 // What follows is skipped up to the delimiter.
 void MultipartScanner::end_part(std::size_t body_end) {
-  std::string rest = buffer_.substr(body_end);
-  buffer_.resize(body_end);
-  part_.body = std::move(buffer_);
-  buffer_ = std::move(rest);
+  part_.body = rest().substr(0, body_end);
+  drop_front(body_end);
   scan_ = 0;
   state_ = State::kSkip;
   if (!part_.body.empty()) {

@@ -9,7 +9,7 @@
 // behind it where a header or a JPEG follows at once, as browsers read it; parts without headers; a Content-Length that is missing or wrong.
 // A part ends at its Content-Length if a JPEG ends there, too (FF D9), and at the next delimiter
 // otherwise; so a camera that tells no length delivers a picture when the next delimiter comes.
-// Pure: no I/O, no clock, no exceptions but for memory, which is bounded by max_part_bytes and the
+// What a byte costs does not depend on how the bytes are cut into lines and parts. Pure: no I/O, no clock, no exceptions but for memory, which is bounded by max_part_bytes and the
 // piece fed. After each feed() call next() until it has nothing more.
 
 #include <cstddef>
@@ -41,7 +41,7 @@ class MultipartScanner {
   // The next whole part, in order of arrival.
   [[nodiscard]] bool next(MultipartPart* part);
 
-  // Parts given up because they were longer than max_part_bytes or their headers had no end.
+  // Parts given up because they were longer than max_part_bytes, or their headers too many or without an end.
   [[nodiscard]] std::int64_t discarded() const { return discarded_; }
 
   // How many bytes must come before a whole part can be there: those its Content-Length still wants if the part
@@ -49,7 +49,7 @@ class MultipartScanner {
   [[nodiscard]] std::size_t missing_bytes() const;
 
   // Bytes kept until more come, whole parts aside.
-  [[nodiscard]] std::size_t pending_bytes() const { return buffer_.size(); }
+  [[nodiscard]] std::size_t pending_bytes() const { return buffer_.size() - used_; }
 
  private:
   enum class State { kLearnBoundary, kSkip, kHeaders, kBody };
@@ -68,16 +68,20 @@ class MultipartScanner {
   void begin_part(std::size_t delimiter_end);
   void end_part(std::size_t body_end);
   void drop_front(std::size_t count);
+  // What is not used up yet; places count from its beginning.
+  [[nodiscard]] std::string_view rest() const { return std::string_view(buffer_).substr(used_); }
 
   std::string core_;  // the boundary without the dashes around it
   std::size_t max_part_bytes_;
   State state_;
-  std::string buffer_;    // not yet used up
-  std::size_t scan_ = 0;  // no delimiter's core begins before this place in buffer_
+  std::string buffer_;
+  std::size_t used_ = 0;  // of it, at its beginning
+  std::size_t scan_ = 0;  // no delimiter's core begins before this place in rest()
   double arrival_s_ = 0;  // of the piece being fed
   bool stamp_next_byte_ = false;
   MultipartPart part_;  // under way
   std::size_t header_bytes_ = 0;
+  int header_lines_ = 0;
   std::optional<std::size_t> content_length_;
   bool lengths_hold_ = false;  // the last part ended at its Content-Length
   std::deque<MultipartPart> whole_;

@@ -58,6 +58,22 @@ class ReceivingThread {
     interrupt_();
   }
   [[nodiscard]] bool stopped() const { return stopped_; }
+  // For the connection: whether it is to end.
+  [[nodiscard]] bool ending() const { return stopped_ || refused_; }
+
+  // For read()'s thread: what the connection brings is of no use, for this reason, which next() will report. It ends, what
+  // waits goes, and the pauses before the next ones grow as long as each brings the like.
+  void refuse(std::string reason) {
+    {
+      const std::lock_guard<std::mutex> lock(mutex_);
+      refused_ = true;
+      refusal_ = std::move(reason);
+      distrusted_ = true;
+      accepted_ = false;
+      clear();
+    }
+    interrupt_();
+  }
   [[nodiscard]] std::int64_t dropped() const { return dropped_; }
 
   // For read(): the next picture (kOk) or report, at the latest by `deadline`. The first call starts the
@@ -68,6 +84,7 @@ class ReceivingThread {
       thread_ = std::thread([this] { run(); });
     }
     std::unique_lock<std::mutex> lock(mutex_);
+    distrusted_ = distrusted_ && !std::exchange(accepted_, false);
     changed_.wait_until(lock, deadline, [this] { return stopped_ || !queue_.empty(); });
     if (stopped_) {
       return ReadStatus::kStopped;
@@ -77,6 +94,7 @@ class ReceivingThread {
     }
     Event event = std::move(queue_.front());
     remove(queue_.begin());
+    accepted_ = event.status == ReadStatus::kOk;
     *picture = std::move(event.picture);
     *error = std::move(event.error);
     return event.status;
@@ -86,7 +104,8 @@ class ReceivingThread {
   void push(Picture picture, std::size_t bytes) {
     {
       const std::lock_guard<std::mutex> lock(mutex_);
-      backoff_.reset();
+      if (refused_) return;
+      if (!distrusted_) backoff_.reset();
       queue_.push_back({ReadStatus::kOk, "", std::move(picture), bytes});
       bytes_ += bytes;
       ++pictures_;
@@ -126,6 +145,12 @@ class ReceivingThread {
     return queue_.erase(at);
   }
 
+  void clear() {
+    queue_.clear();
+    pictures_ = 0;
+    bytes_ = 0;
+  }
+
   void drop_oldest() {
     const auto is_picture = [](const Event& event) { return event.status == ReadStatus::kOk; };
     const Position after = remove(std::find_if(queue_.begin(), queue_.end(), is_picture));
@@ -137,11 +162,19 @@ class ReceivingThread {
 
   void run() {
     while (!stopped_) {
+      {
+        const std::lock_guard<std::mutex> lock(mutex_);
+        refused_ = false;
+      }
       Event event{ReadStatus::kStopped, "", Picture{}, 0};
       event.status = connection_(&event.error);
       std::unique_lock<std::mutex> lock(mutex_);
       if (stopped_) {
         return;
+      }
+      if (refused_) {
+        event.status = ReadStatus::kDisconnected;
+        event.error = refusal_;
       }
       const bool failed = event.status == ReadStatus::kFailed;
       if (!queue_.empty() && queue_.back().status != ReadStatus::kOk) {
@@ -157,7 +190,7 @@ class ReceivingThread {
     }
   }
 
-  Backoff backoff_;  // the receiving thread's
+  Backoff backoff_;  // guarded by mutex_
   Connection connection_;
   std::function<void()> interrupt_;
   std::mutex mutex_;
@@ -165,6 +198,10 @@ class ReceivingThread {
   std::deque<Event> queue_;           // guarded by mutex_
   std::size_t pictures_ = 0;          // guarded by mutex_
   std::size_t bytes_ = 0;             // guarded by mutex_
+  bool accepted_ = false;             // guarded by mutex_; the last picture, unless it is refused
+  bool distrusted_ = false;           // guarded by mutex_; since a refusal nothing was accepted
+  std::string refusal_;               // guarded by mutex_
+  std::atomic<bool> refused_{false};  // set under mutex_: the connection
   std::atomic<bool> stopped_{false};  // set under mutex_, read anywhere
   std::atomic<std::int64_t> dropped_{0};
   std::thread thread_;  // read()'s own

@@ -47,6 +47,10 @@ class RtpSource : public FrameSource {
   ReadStatus read(Frame& frame, double timeout_s) override;
 
   void stop() override { thread_.stop(); }
+  bool refuse(const std::string& reason) override {
+    thread_.refuse(reason);
+    return true;
+  }
   std::string error() const override { return error_; }
   std::string name() const override { return options_.url; }
   FrameSourceCounters counters() const override {
@@ -79,6 +83,12 @@ class RtpSource : public FrameSource {
     error_ = options_.url + ": " + std::move(error);
     failed_ = true;
     return ReadStatus::kFailed;
+  }
+  // What a peer sends ends the program only before the first frame; then the connection.
+  ReadStatus fail_or_refuse(const std::string& error) {
+    if (next_frame_ == 0) return fail(error);
+    thread_.refuse(error);
+    return ReadStatus::kTimeout;
   }
   ReadStatus deliver(Arrived arrived, Frame& frame);
   void give(const AccessUnit& unit, int width, int height, Frame& frame);
@@ -199,7 +209,7 @@ ReadStatus RtpSource::receive_connection(std::string* error) {
     const std::lock_guard<std::mutex> lock(mutex_);
     connection_ = &connection;
   }
-  ReadStatus status = thread_.stopped() ? ReadStatus::kStopped : connection.open(error);
+  ReadStatus status = thread_.ending() ? ReadStatus::kStopped : connection.open(error);
   wait_for_key_ = true;
   counted_ = {};
   bool works = false;
@@ -214,9 +224,9 @@ ReadStatus RtpSource::receive_connection(std::string* error) {
     }
   }
   no_first_key_since_s_ = -1;
-  // A camera that boots may refuse for a while what it is good for.
-  if (status == ReadStatus::kFailed && worked_) status = ReadStatus::kDisconnected;
+  // A camera that boots may refuse for a while what it is good for; and what a peer sends ends no program that it has served.
   worked_ = worked_ || works;
+  if (status == ReadStatus::kFailed && worked_) status = ReadStatus::kDisconnected;
   const std::lock_guard<std::mutex> lock(mutex_);
   connection_ = nullptr;
   return status;
@@ -291,7 +301,7 @@ ReadStatus RtpSource::deliver(Arrived arrived, Frame& frame) {
     size_known_ = false;
     spoilt_ = false;
     if (!decoder_.open(*parameters_, true, with_whole_blocks(options_.max_pixels))) {
-      return fail(decoder_.error());
+      return fail_or_refuse(decoder_.error());
     }
   }
   Picture picture;
@@ -321,7 +331,7 @@ ReadStatus RtpSource::deliver(Arrived arrived, Frame& frame) {
   std::string error;
   if (copies && !copy_.add(options_.copy_to, *parameters_, width_, height_, *unit.packet,
                            unit.receive_time_s, &error)) {
-    return fail(std::move(error));
+    return copy_.is_another_stream() ? fail_or_refuse(error) : fail(std::move(error));
   }
   give(unit, width_, height_, frame);
   if (options_.decode && picture.luma != nullptr) {
@@ -380,7 +390,7 @@ ReadStatus RtpSource::decode(AccessUnit* unit, Picture* picture) {
       result = decoder_.receive(picture);
       damaged = damaged || result == LumaDecoder::Result::kDamaged;
     } while (result == LumaDecoder::Result::kDamaged);
-    if (result == LumaDecoder::Result::kUnsupported) return fail(decoder_.error());
+    if (result == LumaDecoder::Result::kUnsupported) return fail_or_refuse(decoder_.error());
     damaged = damaged && others_need_it;
   }
   if (damaged) {

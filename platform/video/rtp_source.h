@@ -27,15 +27,17 @@
 // Streams with B-frames are refused: they come out of order and late. Such as only allow for them are not, nor do their
 // pictures wait for any.
 // kDisconnected: refused, not there, no such stream, no pictures. kFailed: no password or a wrong one, a
-// certificate that is not trusted, no video, another codec, B-frames, a transport that the camera does not send by; after a connection that
-// brought pictures these, too, are kDisconnected, as a camera that boots may be all that for a moment.
-// An unusable URL, a copy that cannot be written and pictures without luma are always kFailed.
+// certificate that is not trusted, no video, another codec, B-frames, a transport that the camera does not send by, pictures without luma; once
+// pictures have come these, too, are kDisconnected: a camera that boots may be all that for a moment, and no peer ends the
+// program. A redirection that is refused (link_rules.h) is always kDisconnected, an unusable URL and a copy that cannot be written always
+// kFailed.
 
 #include <cstdint>
 #include <memory>
 #include <string>
 
 #include "platform/streams/picture_size.h"
+#include "platform/system/link_rules.h"
 #include "platform/video/frame_source.h"
 
 namespace alidade {
@@ -46,6 +48,7 @@ struct RtpSourceOptions {
   std::string url;
   std::string user;  // these go before what the URL may hold
   std::string password;
+  LinkRules rules;                        // of rtsp:// and rtsps://
   std::string format = "MJPG";            // rtp:// only: MJPG, H264 or H265
   Transport transport = Transport::kTcp;  // rtsp:// only: RTP interleaved with RTSP, or in UDP;
                                           // rtsps:// knows the first only

@@ -17,7 +17,7 @@
 namespace alidade {
 namespace {
 
-constexpr int kRedirections = 5;
+constexpr std::size_t kShownUrl = 120;  // bytes
 constexpr int kPortTries = 100;
 constexpr double kReply_s = 0.5;     // given to an answer to the camera's own question
 constexpr double kUdpSlice_s = 0.1;  // by UDP: of a wait
@@ -52,7 +52,10 @@ std::string refusal(int status, const char* reason) {
 }  // namespace
 
 RtspSession::RtspSession(const RtpSourceOptions& options)
-    : options_(options), url_(options.url), link_(options) {}
+    : options_(options), url_(options.url), link_(options) {
+  std::string ignored;
+  (void)parse_url(options.url, &configured_, &ignored);
+}
 
 RtspSession::~RtspSession() {
   if (!session_url_.empty()) {
@@ -70,19 +73,31 @@ void RtspSession::interrupt() {
 
 ReadStatus RtspSession::open(double deadline_s, std::string* sdp, std::string* error) {
   deadline_s_ = deadline_s;
-  for (int i = 0; i <= kRedirections; ++i) {
-    const std::string asked = url_;
+  for (int i = 0; i <= kMostRedirections; ++i) {
+    redirected_ = false;
     login_ = RtspLogin();
     ReadStatus status = link_.connect(url_, deadline_s_, error);
     if (status == ReadStatus::kOk) status = describe(sdp, error);
-    if (status == ReadStatus::kOk && url_ == asked) status = play(*sdp, error);
-    if (status != ReadStatus::kOk || url_ == asked) return status;
+    if (status == ReadStatus::kOk && !redirected_) status = play(*sdp, error);
+    if (status != ReadStatus::kOk || !redirected_) return status;
   }
-  *error = "more than " + std::to_string(kRedirections) + " redirections";
+  *error = "more than " + std::to_string(kMostRedirections) + " redirections";
   return ReadStatus::kDisconnected;
 }
 
-// kOk with another url_ than before: redirected.
+// What a peer tells ends no program: it may tell another tomorrow.
+ReadStatus RtspSession::redirect(const std::string& location, std::string* error) {
+  const Redirection next = judge_redirection(configured_, url_, location, options_.rules.redirects);
+  if (next.url.empty()) {
+    *error = next.error;
+    return ReadStatus::kDisconnected;
+  }
+  url_ = next.url;
+  logs_in_ = next.takes_login;
+  redirected_ = true;
+  return ReadStatus::kOk;
+}
+
 ReadStatus RtspSession::describe(std::string* sdp, std::string* error) {
   RtspMessage options;
   ReadStatus status = ask({GST_RTSP_OPTIONS, url_}, &options, error);
@@ -94,8 +109,7 @@ ReadStatus RtspSession::describe(std::string* sdp, std::string* error) {
   const int code = answer.status();
   const std::string location = answer.header(GST_RTSP_HDR_LOCATION);
   if (code / 100 == 3 && !location.empty()) {
-    url_ = location;
-    return ReadStatus::kOk;
+    return redirect(location, error);
   }
   if (code != GST_RTSP_STS_OK) {
     *error = code == GST_RTSP_STS_NOT_FOUND ? "no such stream on this camera (404)"
@@ -225,30 +239,36 @@ ReadStatus RtspSession::ask(const Request& request, RtspMessage* answer, std::st
       if (answer->type() == GST_RTSP_MESSAGE_REQUEST) reply(answer);
     }
     if (status != ReadStatus::kOk || answer->status() != GST_RTSP_STS_UNAUTHORIZED) return status;
-    if (options_.user.empty()) {
-      *error = "the camera wants a user and a password (401)";
-      return ReadStatus::kFailed;
-    }
-    if (logged_in) {
-      *error = "wrong user or password (401)";
-      return ReadStatus::kFailed;
-    }
-    if (!accept_challenge(answer)) {
-      *error = "the camera offers neither digest (MD5) nor basic authentication (401)";
-      return ReadStatus::kFailed;
-    }
+    status = log_in(answer, logged_in, error);
+    if (status != ReadStatus::kOk) return status;
     logged_in = true;
   }
 }
 
+// answer: 401. refused: with a login.
+ReadStatus RtspSession::log_in(RtspMessage* answer, bool refused, std::string* error) {
+  if (!logs_in_) {
+    *error = "redirected to " + shown(url_, kShownUrl) +
+             ", which wants a login (401); it goes to url only: set url to that";
+    return ReadStatus::kDisconnected;
+  }
+  *error = options_.user.empty() ? "the camera wants a user and a password (401)"
+           : refused             ? "wrong user or password (401)"
+                                 : accept_challenge(answer);
+  return error->empty() ? ReadStatus::kOk : ReadStatus::kFailed;
+}
+
 // From here on each request has the login.
-bool RtspSession::accept_challenge(RtspMessage* answer) {
+std::string RtspSession::accept_challenge(RtspMessage* answer) {
+  const bool basic = options_.rules.permits_basic(url_.rfind("rtsps://", 0) == 0);
+  bool offers_basic = false;
   GstRTSPAuthCredential** offered =
       gst_rtsp_message_parse_auth_credentials(answer->get(), GST_RTSP_HDR_WWW_AUTHENTICATE);
   const GstRTSPAuthCredential* best = nullptr;
   for (GstRTSPAuthCredential** each = offered; each != nullptr && *each != nullptr; ++each) {
+    offers_basic = offers_basic || (*each)->scheme == GST_RTSP_AUTH_BASIC;
     bool usable = (*each)->scheme == GST_RTSP_AUTH_DIGEST ||
-                  ((*each)->scheme == GST_RTSP_AUTH_BASIC && best == nullptr);
+                  ((*each)->scheme == GST_RTSP_AUTH_BASIC && basic && best == nullptr);
     for (GstRTSPAuthParam** p = (*each)->params; p != nullptr && *p != nullptr; ++p) {
       usable = usable && (g_ascii_strcasecmp((*p)->name, "algorithm") != 0 ||
                           g_ascii_strcasecmp((*p)->value, "MD5") == 0);
@@ -258,7 +278,10 @@ bool RtspSession::accept_challenge(RtspMessage* answer) {
   if (best != nullptr) login_ = RtspLogin(*best, options_.user, options_.password);
   const bool accepted = best != nullptr;
   gst_rtsp_auth_credentials_free(offered);
-  return accepted;
+  if (accepted) return "";
+  return offers_basic && !basic
+             ? std::string(kOnlyBasic) + " (401)"
+             : "the camera offers neither digest (MD5) nor basic authentication (401)";
 }
 
 // Cameras ask whether we are still there.
@@ -285,8 +308,8 @@ ReadStatus RtspSession::take_message(std::string_view text, std::string* error) 
   if (!message.parse(text)) return ReadStatus::kOk;
   if (message.type() == GST_RTSP_MESSAGE_REQUEST) {
     reply(&message);
-  } else if (message.status() == GST_RTSP_STS_UNAUTHORIZED && accept_challenge(&message) &&
-             !std::exchange(pinged_again_, true)) {
+  } else if (message.status() == GST_RTSP_STS_UNAUTHORIZED && logs_in_ &&
+             accept_challenge(&message).empty() && !std::exchange(pinged_again_, true)) {
     // To a ping. Digest's number used once may have run out: the session would, too, before the next.
     return ping(error);
   }

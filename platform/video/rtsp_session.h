@@ -1,6 +1,6 @@
 #pragma once
 // RtspSession: the video of an RTSP camera (RFC 2326), its packets within the RTSP connection (rtsp_link.h) or by UDP;
-// over TLS (rtsps://) only within. Logs in by digest or basic, follows redirections, keeps the session alive.
+// over TLS (rtsps://) only within. Logs in and follows redirections as link_rules.h permits, keeps the session alive.
 // Part of RtpConnection.
 
 #include <gst/rtsp/gstrtspdefs.h>
@@ -11,6 +11,7 @@
 #include <string>
 #include <string_view>
 
+#include "platform/system/url.h"
 #include "platform/video/rtp_source.h"
 #include "platform/video/rtp_transport.h"
 #include "platform/video/rtsp_framing.h"
@@ -57,7 +58,10 @@ class RtspSession : public RtpTransport {
   void make(const Request& request, RtspMessage* message);
   void begin_session(const std::string& header);
   [[nodiscard]] ReadStatus send(const Request& request, double deadline_s, std::string* error);
-  [[nodiscard]] bool accept_challenge(RtspMessage* answer);
+  [[nodiscard]] ReadStatus redirect(const std::string& location, std::string* error);
+  [[nodiscard]] ReadStatus log_in(RtspMessage* answer, bool refused, std::string* error);
+  // Empty: accepted; or why not.
+  [[nodiscard]] std::string accept_challenge(RtspMessage* answer);
   // After PLAY. What came within the connection: kOk with a packet of the video; kTimeout: none so far.
   [[nodiscard]] ReadStatus next_packet(double wait_s, RtspFraming::Item* packet,
                                        std::string* error);
@@ -67,8 +71,11 @@ class RtspSession : public RtpTransport {
   void reply(RtspMessage* request);
 
   const RtpSourceOptions& options_;
-  double deadline_s_ = 0;    // of open()
+  double deadline_s_ = 0;  // of open()
+  Url configured_;
   std::string url_;          // after redirections
+  bool redirected_ = false;  // by the latest answer
+  bool logs_in_ = true;      // at url_
   std::string base_url_;     // what the description's addresses are relative to
   std::string session_url_;  // what PLAY is for; empty: nothing to tear down
   std::string session_;      // its name, as the camera gave it

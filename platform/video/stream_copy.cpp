@@ -133,11 +133,13 @@ bool StreamCopy::add(const std::string& path, const AVCodecParameters& parameter
                      int height, const AVPacket& picture, double receive_time_s,
                      std::string* error) {
   int code = 0;
+  another_ = false;
   if (format_ == nullptr) {
     code = create(path, parameters, width, height, picture);
     first_receive_time_s_ = receive_time_s;
   } else if (parameters.codec_id != parameters_->codec_id || width != parameters_->width ||
              height != parameters_->height || !same_extradata(parameters, *parameters_)) {
+    another_ = true;
     *error = path + " began as " + avcodec_get_name(parameters_->codec_id) + " of " +
              std::to_string(parameters_->width) + "x" + std::to_string(parameters_->height) +
              ", the stream is now another one (" + avcodec_get_name(parameters.codec_id) + " " +

@@ -32,6 +32,8 @@ class StreamCopy {
   [[nodiscard]] bool add(const std::string& path, const AVCodecParameters& parameters, int width,
                          int height, const AVPacket& picture, double receive_time_s,
                          std::string* error);
+  // Whether the last picture was not added because of that; the file can still go on.
+  [[nodiscard]] bool is_another_stream() const { return another_; }
 
  private:
   [[nodiscard]] int create(const std::string& path, const AVCodecParameters& parameters, int width,
@@ -39,6 +41,7 @@ class StreamCopy {
 
   AVFormatContext* format_ = nullptr;
   bool header_written_ = false;
+  bool another_ = false;
   CodecParametersPtr parameters_;  // of the connection that began the file
   double first_receive_time_s_ = 0;
   std::int64_t last_pts_ = -1;

@@ -479,6 +479,39 @@ TEST_F(ConfigTest, MjpegAndOnvifSourcesAreRead) {
               IsEmpty());
   EXPECT_EQ(config_.pan_tilt.rate_hz, 10);
   EXPECT_FALSE(config_.pan_tilt.pan_range_deg);
+  ASSERT_THAT(load("video: {type: mjpeg, url: 'http://camera/v'}\n"
+                   "pan_tilt: {type: onvif, url: http://camera, ptz_path: ':8080/ptz'}\n"
+                   "camera: {focal_length_px: 1000}\n"),
+              IsEmpty());
+  EXPECT_EQ(config_.pan_tilt.ptz_path, ":8080/ptz");
+}
+
+TEST_F(ConfigTest, SaysWhereALoginGoesAndHow) {
+  for (const std::string video :
+       {"rtsp, url: 'rtsp://camera/s'", "mjpeg, url: 'http://camera/v'"}) {
+    for (const std::string head : {"vapix", "onvif"}) {
+      const auto load_with = [&](const std::string& keys) {
+        return load("video: {type: " + video + keys + "}\npan_tilt: {type: " + head +
+                    ", url: http://camera" + keys + "}\ncamera: {focal_length_px: 1000}\n");
+      };
+      ASSERT_THAT(load_with(""), IsEmpty());
+      for (const LinkRules& rules : {config_.video.rules, config_.pan_tilt.rules}) {
+        EXPECT_EQ(rules.redirects, LinkRules::Redirects::kSameHost);
+        EXPECT_FALSE(rules.auth);
+      }
+      ASSERT_THAT(load_with(", follow_redirects: any, auth: any"), IsEmpty());
+      for (const LinkRules& rules : {config_.video.rules, config_.pan_tilt.rules}) {
+        EXPECT_EQ(rules.redirects, LinkRules::Redirects::kAny);
+        EXPECT_EQ(rules.auth, LinkRules::Auth::kAny);
+      }
+      ASSERT_THAT(load_with(", follow_redirects: same-host, auth: digest"), IsEmpty());
+      EXPECT_EQ(config_.video.rules.redirects, LinkRules::Redirects::kSameHost);
+      EXPECT_EQ(config_.pan_tilt.rules.auth, LinkRules::Auth::kDigest);
+      EXPECT_THAT(load_with(", auth: basic"), HasSubstr("expected one of digest, any"));
+      EXPECT_THAT(load_with(", follow_redirects: all"),
+                  HasSubstr("expected one of same-host, any"));
+    }
+  }
 }
 
 TEST_F(ConfigTest, CamerasCountToTheRightAndUpUnlessToldOtherwise) {
@@ -946,6 +979,12 @@ INSTANTIATE_TEST_SUITE_P(
                 ":2: pan_tilt.pan_scale", "spans nothing"},
         Mistake{"PtzPathOfAnotherHost",
                 VIDEO "pan_tilt: {type: onvif, url: http://c, ptz_path: 'http://d/ptz'}\n",
+                ":2: pan_tilt.ptz_path", "the host is that of url"},
+        Mistake{"PtzPathThatChangesTheHost",
+                VIDEO "pan_tilt: {type: onvif, url: http://c, ptz_path: '.evil:80/ptz'}\n",
+                ":2: pan_tilt.ptz_path", "the host is that of url"},
+        Mistake{"PtzPathWithAUser",
+                VIDEO "pan_tilt: {type: onvif, url: http://c, ptz_path: ':80@evil/ptz'}\n",
                 ":2: pan_tilt.ptz_path", "the host is that of url"},
         Mistake{"OnvifHasNoCameraNumber",
                 VIDEO "pan_tilt: {type: onvif, url: http://c, camera: 1}\n", ":2: pan_tilt.camera",

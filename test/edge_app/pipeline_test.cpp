@@ -509,6 +509,30 @@ TEST_F(PipelineOfAnotherSizeTest, FinishesWhenFramesAreNotOfTheConfiguredSizeAnd
                         "video.height are 1280 and 720; set them to 1920 and 1080"));
 }
 
+// Whoever stands between camera and program can send a picture.
+TEST_F(PipelineOfAnotherSizeTest, RefusesALinkWhosePicturesChangeTheirSizeAndGoesOnWhenItIsRight) {
+  PipelineOptions options = options_for_tests();
+  options.width = frame().width;
+  options.height = frame().height;
+  Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options);
+  pipeline.start();
+  static_cast<void>(push_until(RecordStatus::kOk));
+  Frame other = frame();
+  other.width = 640;
+  // One in mid-stream, and again behind each reconnection.
+  for (int i = 0; i < 3; ++i) video_.push(other);
+  static_cast<void>(wait_for(RecordStatus::kVideoLost, 1));
+  EXPECT_FALSE(finished_now(pipeline));
+  const LinkHealth refused = pipeline.summary().video_link;
+  EXPECT_FALSE(refused.connected);
+  EXPECT_THAT(refused.reason, HasSubstr("frames of 640x1080 px, but"));
+  EXPECT_EQ(refused.reconnections, 0);
+  static_cast<void>(push_until(RecordStatus::kOk));
+  EXPECT_TRUE(pipeline.summary().video_link.connected);
+  pipeline.stop();
+  EXPECT_EQ(pipeline.error(), "");
+}
+
 TEST_F(PipelineTest, FinishesWithoutAnErrorWhenTheReaderGoes) {
   Pipeline pipeline(video_, pan_tilt_, sink_, nullptr, options_for_tests());
   sink_.close("");

@@ -18,7 +18,7 @@ namespace alidade {
 
 // Interface is FrameSource or PanTiltSource, Item its Frame or PanTiltSample.
 template <typename Interface, typename Item>
-class ScriptedSource final : public Interface {
+class ScriptedSource : public Interface {
  public:
   explicit ScriptedSource(std::string name) : name_(std::move(name)) {}
 
@@ -74,7 +74,14 @@ class ScriptedSource final : public Interface {
   bool stopped_ = false;
 };
 
-using ScriptedVideo = ScriptedSource<FrameSource, Frame>;
+class ScriptedVideo final : public ScriptedSource<FrameSource, Frame> {
+ public:
+  using ScriptedSource::ScriptedSource;
+  bool refuse(const std::string& reason) override {
+    push(ReadStatus::kDisconnected, name() + ": " + reason);
+    return true;
+  }
+};
 using ScriptedPanTilt = ScriptedSource<PanTiltSource, PanTiltSample>;
 
 class CollectingSink final : public RecordSink {

@@ -242,7 +242,7 @@ TEST(OnvifAddresses, AreOfTheDeviceItselfWhateverItTells) {
     Url device;
     std::string error;
     EXPECT_TRUE(parse_url(device_url, &device, &error)) << error;
-    const std::vector<std::string> all = onvif_addresses(device, told, OnvifService::kPtz);
+    const std::vector<std::string> all = onvif_addresses(device, told, OnvifService::kPtz, true);
     const std::string own = device.scheme + "://" + device.host;
     for (const std::string& address : all) EXPECT_THAT(address, StartsWith(own));
     EXPECT_THAT(all, ::testing::Contains(HasSubstr("/onvif/ptz_service")));
@@ -260,6 +260,13 @@ TEST(OnvifAddresses, AreOfTheDeviceItselfWhateverItTells) {
   EXPECT_EQ(first_of(device, "/p"), "http://cam:81/p");
   EXPECT_EQ(first_of(device, "p"), "http://cam:81/p");
   EXPECT_EQ(first_of(device, "http://evil"), "http://cam:81/");
+  Url with_login;
+  std::string ignored;
+  ASSERT_TRUE(parse_url(device, &with_login, &ignored));
+  EXPECT_EQ(onvif_addresses(with_login, "http://cam:8080/p", OnvifService::kPtz).front(),
+            "http://cam:81/p")
+      << "a login goes to the configured port only";
+  EXPECT_EQ(onvif_address(with_login, ":8080/p"), "http://cam:8080/p");
   EXPECT_EQ(first_of(device, ""), "http://cam:81/onvif/ptz_service");
   EXPECT_EQ(first_of("http://proxy/cam1/onvif/device_service", "http://10.0.0.5/onvif/p"),
             "http://proxy/cam1/onvif/p");
@@ -342,6 +349,23 @@ TEST(OnvifOtherDevices, ALoginGoesToNoOtherHost) {
   PanTiltSample sample;
   ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
   EXPECT_EQ(other.connections(), 0);
+}
+
+TEST(OnvifOtherDevices, ALoginGoesToNoOtherPortUnlessTheUserNamesIt) {
+  OnvifDevice device = device_of(DeviceLogin::kToken);
+  OnvifServer other(device);
+  const std::string port = std::to_string(other.port());
+  device.announced_ptz = "http://127.0.0.1:" + port + "/onvif/ptz";
+  OnvifServer server(device);
+  OnvifSourceOptions options = options_for(server, device);
+  PanTiltSample sample;
+  const auto source = open_onvif(options);
+  ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
+  EXPECT_EQ(other.count("GetStatus"), 0);
+  options.ptz_path = ":" + port + "/onvif/ptz";
+  const auto told = open_onvif(options);
+  ASSERT_EQ(told->read(sample, kDeadline_s), ReadStatus::kOk) << told->error();
+  EXPECT_GT(other.count("GetStatus"), 0);
 }
 
 // --- its scale

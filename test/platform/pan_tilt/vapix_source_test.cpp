@@ -3,16 +3,20 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <iterator>
 #include <memory>
+#include <string>
 #include <thread>
+#include <utility>
 
 #include "platform/system/clock.h"
 #include "test/platform/support/axis_server.h"
 #include "test/platform/support/eventually.h"
 #include "test/platform/support/raw_server.h"
+#include "test/simulator/servers/digest_check.h"
 
 namespace alidade {
 namespace {
@@ -175,21 +179,95 @@ TEST(VapixSource, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
   EXPECT_THAT(anonymous->error(), HasSubstr("the camera wants a user and a password (401)"));
 }
 
-TEST(VapixSource, SaysThatACameraOffersNoDigest) {
-  RawServer server([&server](int fd) {
-    while (server.read_request(fd)) {
-      RawServer::send(fd,
-                      "HTTP/1.1 401 Unauthorized\r\nWWW-Authenticate: Basic realm=\"x\"\r\n"
-                      "Content-Length: 0\r\n\r\n");
+// Answers as told, without a login only where none is wanted; and counts the logins that it saw.
+class SayingServer {
+ public:
+  explicit SayingServer(std::string challenge = "") : challenge_(std::move(challenge)) {}
+  [[nodiscard]] std::string url() const { return url_of(server_); }
+  std::atomic<int> logins{0};
+  std::atomic<int> requests{0};
+  std::string location;  // set before anybody asks; of every answer but /there
+
+ private:
+  void serve(int fd) {
+    std::string request;
+    while (server_.read_request(fd, &request)) {
+      ++requests;
+      const bool logs_in = !header_of(request, "Authorization").empty();
+      logins += logs_in ? 1 : 0;
+      const std::string body = "pan=10.0\r\ntilt=5.0\r\nzoom=1\r\n";
+      RawServer::send(
+          fd, !challenge_.empty() && !logs_in ? "HTTP/1.1 401 Unauthorized\r\nWWW-Authenticate: " +
+                                                    challenge_ + "\r\nContent-Length: 0\r\n\r\n"
+              : !location.empty() && request.find("/there") == std::string::npos
+                  ? "HTTP/1.1 302 Found\r\nLocation: " + location + "\r\nContent-Length: 0\r\n\r\n"
+                  : "HTTP/1.1 200 OK\r\nContent-Length: " + std::to_string(body.size()) +
+                        "\r\n\r\n" + body);
     }
-  });
-  VapixSourceOptions options = vapix_options(url_of(server));
+  }
+  std::string challenge_;
+  RawServer server_{[this](int fd) { serve(fd); }};
+};
+
+constexpr const char* kBasicOnly = "Basic realm=\"x\"";
+constexpr const char* kAnyDigest = "Digest realm=\"x\", nonce=\"1\", qop=\"auth\"";
+
+VapixSourceOptions with_login(const SayingServer& server) {
+  VapixSourceOptions options = vapix_options(server.url());
   options.user = "user";
   options.password = "secret";
-  const auto source = open_vapix(options);
+  return options;
+}
+
+TEST(VapixSource, SendsNoPasswordInClearUnlessTheUserSaysSo) {
+  SayingServer server(kBasicOnly);
+  VapixSourceOptions options = with_login(server);
   PanTiltSample sample;
-  EXPECT_EQ(read_until(*source, sample, ReadStatus::kFailed), ReadStatus::kFailed);
-  EXPECT_THAT(source->error(), HasSubstr("does not offer HTTP digest"));
+  {
+    const auto source = open_vapix(options);
+    EXPECT_EQ(read_until(*source, sample, ReadStatus::kFailed), ReadStatus::kFailed);
+    EXPECT_THAT(source->error(),
+                HasSubstr("by basic the password would cross the network in clear"));
+    EXPECT_THAT(source->error(), HasSubstr("set auth: any"));
+    EXPECT_EQ(server.logins, 0);
+  }
+  options.rules.auth = LinkRules::Auth::kAny;
+  const auto source = open_vapix(options);
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
+  }
+}
+
+TEST(VapixSource, TakesItsLoginNowhereElse) {
+  SayingServer other(kBasicOnly);
+  SayingServer camera(kAnyDigest);
+  camera.location = other.url() + "/there?a=b";
+  VapixSourceOptions options = with_login(camera);
+  options.rules.auth = LinkRules::Auth::kAny;
+  PanTiltSample sample;
+  {
+    const auto source = open_vapix(options);
+    ASSERT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_THAT(source->error(), StartsWith(camera.url() + "/: redirected to " + other.url() +
+                                            "/there?a=b, another port: refused"));
+    EXPECT_EQ(other.requests, 0);
+  }
+  options.rules.redirects = LinkRules::Redirects::kAny;
+  const auto source = open_vapix(options);
+  ASSERT_EQ(read_until(*source, sample, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("/there?a=b, which wants a login (401)"));
+  EXPECT_GT(other.requests, 0);
+  EXPECT_EQ(other.logins, 0);
+}
+
+TEST(VapixSource, FollowsARedirectionToItsOwnCamera) {
+  SayingServer camera(kAnyDigest);
+  camera.location = "/there";
+  const auto source = open_vapix(with_login(camera));
+  PanTiltSample sample;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_EQ(source->read(sample, kDeadline_s), ReadStatus::kOk) << source->error();
+  }
 }
 
 TEST(VapixSource, FailsAtOnceOnAUrlItCannotUse) {

@@ -6,11 +6,15 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <netinet/tcp.h>
+
+#include <atomic>
 #include <cmath>
 #include <filesystem>
 #include <iterator>
 #include <memory>
 #include <thread>
+#include <utility>
 #include <vector>
 
 #include "platform/storage/recording_writer.h"
@@ -159,6 +163,7 @@ TEST_P(MjpegSourceLogin, LogsIn) {
   MjpegSourceOptions options = options_for(server.url());
   options.user = MjpegServer::kUser;
   options.password = MjpegServer::kPassword;
+  options.rules.auth = LinkRules::Auth::kAny;
   const auto source = open_mjpeg(options);
   Frame frame;
   for (int i = 0; i < 3; ++i) {
@@ -171,8 +176,10 @@ TEST_P(MjpegSourceLogin, FailsForGoodOnAWrongPasswordAndDoesNotShowIt) {
   const MjpegServer server({}, GetParam());
   Frame frame;
   {
-    const auto source = open_mjpeg(options_for(
-        "http://us%20er:guess@127.0.0.1:" + std::to_string(server.port()) + "/video.cgi?x=y"));
+    MjpegSourceOptions options = options_for(
+        "http://us%20er:guess@127.0.0.1:" + std::to_string(server.port()) + "/video.cgi?x=y");
+    options.rules.auth = LinkRules::Auth::kAny;
+    const auto source = open_mjpeg(options);
     EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
     EXPECT_EQ(source->error(), server.url() + ": wrong user or password (401)");
     EXPECT_EQ(source->read(frame, 0), ReadStatus::kFailed);
@@ -187,6 +194,7 @@ TEST_P(MjpegSourceLogin, LogsInAgainWhenTheCameraHasForgottenItsNonces) {
   MjpegSourceOptions options = options_for(server.url());
   options.user = MjpegServer::kUser;
   options.password = MjpegServer::kPassword;
+  options.rules.auth = LinkRules::Auth::kAny;
   const auto source = open_mjpeg(options);
   Frame frame;
   for (int life = 0; life < 3; ++life) {
@@ -203,6 +211,7 @@ TEST_P(MjpegSourceLogin, TriesOnWhenACameraThatHasWorkedRefuses) {
   MjpegSourceOptions options = options_for(server.url());
   options.user = MjpegServer::kUser;
   options.password = MjpegServer::kPassword;
+  options.rules.auth = LinkRules::Auth::kAny;
   const auto source = open_mjpeg(options);
   Frame frame;
   ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
@@ -221,6 +230,129 @@ TEST_P(MjpegSourceLogin, TriesOnWhenACameraThatHasWorkedRefuses) {
 INSTANTIATE_TEST_SUITE_P(Methods, MjpegSourceLogin,
                          ::testing::Values(Login::kBasic, Login::kDigestMd5, Login::kDigestSha256),
                          [](const auto& which) { return login_name(which.param); });
+
+TEST(MjpegSource, SendsNoPasswordInClearUnlessTheUserSaysSo) {
+  const MjpegServer server({}, Login::kBasic);
+  MjpegSourceOptions options = options_for(server.url());
+  options.user = MjpegServer::kUser;
+  options.password = MjpegServer::kPassword;
+  const auto source = open_mjpeg(options);
+  Frame frame;
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+  EXPECT_THAT(source->error(),
+              AllOf(StartsWith(server.url() + ": the camera offers no digest authentication"),
+                    HasSubstr("set auth: any")));
+  EXPECT_EQ(server.refusals, 1) << "asked once, without a login";
+}
+
+// Answers one request with this redirection.
+std::string sent_on_to(const std::string& location) {
+  return "HTTP/1.1 302 Found\r\nLocation: " + location + "\r\nContent-Length: 0\r\n\r\n";
+}
+
+TEST(MjpegSource, TakesItsLoginNowhereElse) {
+  const MjpegServer there({}, Login::kBasic);
+  std::string location = there.url();
+  RawServer here([&](int fd) {
+    std::string request;
+    if (here.read_request(fd, &request)) RawServer::send(fd, sent_on_to(location));
+  });
+  MjpegSourceOptions options = options_for(here);
+  options.user = MjpegServer::kUser;
+  options.password = MjpegServer::kPassword;
+  options.rules.auth = LinkRules::Auth::kAny;
+  Frame frame;
+  {
+    const auto source = open_mjpeg(options);
+    EXPECT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_THAT(source->error(), StartsWith(options.url + ": redirected to " + there.url() +
+                                            ", another port: refused"));
+    EXPECT_EQ(there.refusals, 0);
+  }
+  options.rules.redirects = LinkRules::Redirects::kAny;
+  const auto source = open_mjpeg(options);
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr(there.url() + ", which wants a login (401)"));
+  EXPECT_GE(there.refusals, 1) << "though the right login would have been let in";
+}
+
+TEST(MjpegSource, FollowsARedirectionWhereItMay) {
+  const MjpegServer there;
+  std::atomic<int> asked{0};
+  RawServer here([&](int fd) {
+    std::string request;
+    if (!here.read_request(fd, &request)) return;
+    const int which = ++asked;
+    RawServer::send(fd, sent_on_to(which == 1 ? "/within?x=y" : there.url()));
+  });
+  MjpegSourceOptions options = options_for(here);
+  options.rules.redirects = LinkRules::Redirects::kAny;
+  const auto source = open_mjpeg(options);
+  Frame frame;
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  EXPECT_EQ(asked, 2);
+}
+
+TEST(MjpegSource, GivesUpRedirectionsInACircleAndToWhatIsNoCamera) {
+  for (const auto& [location, says] : {std::pair{"/", "more than 5 redirections"},
+                                       {"file:///etc/passwd", "no address of this kind"},
+                                       {"rtsp://127.0.0.1/x", "no address of this kind"}}) {
+    RawServer here([&here, to = std::string(location)](int fd) {
+      while (here.read_request(fd)) RawServer::send(fd, sent_on_to(to));
+    });
+    const auto source = open_mjpeg(options_for(here));
+    Frame frame;
+    EXPECT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_THAT(source->error(), HasSubstr(says));
+  }
+}
+
+TEST(MjpegSource, GivesUpAConnectionThatIsRefused) {
+  const MjpegServer server;
+  const auto source = open_mjpeg(options_for(server.url()));
+  Frame frame;
+  for (int life = 0; life < 3; ++life) {
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+    ASSERT_TRUE(source->refuse("of another size"));
+    ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kDisconnected);
+    EXPECT_EQ(source->error(), server.url() + ": of another size");
+  }
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  EXPECT_TRUE(frame.stamp.restarted);
+}
+
+TEST(MjpegSource, GivesUpAStreamOfPartsThatAreNoPictures) {
+  RawServer server([&server](int fd) {
+    if (!server.read_request(fd)) return;
+    RawServer::send(fd, stream_head());
+    std::string parts;
+    for (int i = 0; i < 2000; ++i) parts += "--b\r\nContent-Type: text/plain\r\n\r\nx\r\n";
+    RawServer::send(fd, parts);
+    server.stay_silent(fd);
+  });
+  const auto source = open_mjpeg(options_for(server));
+  Frame frame;
+  EXPECT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("more than 1000 parts in a row are no pictures"));
+}
+
+TEST(MjpegSource, TakesAPictureThatComesInTinyPieces) {
+  RawServer server([&server](int fd) {
+    if (!server.read_request(fd)) return;
+    const int on = 1;
+    ::setsockopt(fd, IPPROTO_TCP, TCP_NODELAY, &on, sizeof on);
+    const std::string picture = MjpegServer::picture(1);
+    const std::string bytes = stream_head() + "--b\r\n\r\n" + picture + "\r\n--b\r\n";
+    for (std::size_t at = 0; at < bytes.size(); at += 2) {
+      if (!RawServer::send(fd, bytes.substr(at, 2))) return;
+    }
+    server.stay_silent(fd);
+  });
+  const auto source = open_mjpeg(options_for(server));
+  Frame frame;
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  EXPECT_NEAR(grey_of(frame), MjpegServer::grey_of(1), kGreyTolerance);
+}
 
 TEST(MjpegSource, FailsAtOnceOnAUrlItCannotUse) {
   Frame frame;
@@ -377,7 +509,8 @@ TEST(MjpegSource, SaysWhatTheAnswerIsInPlaceOfAStream) {
   for (const Answer& answer :
        {Answer{"404 Not Found\r\nContent-Type: text/html", "HTTP status 404"},
         Answer{"500 Internal Server Error\r\nContent-Type: text/html", "HTTP status 500"},
-        Answer{"302 Found\r\nLocation: /login", "HTTP status 302"},
+        Answer{"302 Found\r\nLocation: /login",
+               "more than 5 redirections, the last to http://127.0.0.1:"},
         Answer{"200 OK\r\nContent-Type: text/html", "the answer is text/html, not a stream"},
         Answer{"200 OK\r\nContent-Type: image/jpeg", "the answer is image/jpeg, not a stream"},
         Answer{"200 OK\r\nX: y", "the answer is of no type, not a stream"}}) {
@@ -596,6 +729,31 @@ TEST(MjpegSource, CopiesThePicturesOverReconnections) {
   }
   EXPECT_GE(frames, 11);
   EXPECT_EQ(recording->missing_frames(), 0);
+}
+
+// One of another size in mid-stream cannot be in the copy, and ends neither it nor the program.
+TEST(MjpegSource, GoesOnWithACopyBehindAPictureThatDoesNotFit) {
+  const TemporaryDirectory directory;
+  RawServer server([&server](int fd) {
+    if (!server.read_request(fd)) return;
+    RawServer::send(fd, stream_head());
+    const auto send = [&](const std::string& picture) {
+      RawServer::send(fd, "--b\r\nContent-Length: " + std::to_string(picture.size()) + "\r\n\r\n" +
+                              picture + "\r\n");
+    };
+    send(MjpegServer::picture(1));
+    if (server.connections() == 1) send(picture_file("mjpeg", 32, 16, 100));
+    server.stay_silent(fd);
+  });
+  MjpegSourceOptions options = options_for(server);
+  options.copy_to = directory.path() + "/video.mkv";
+  const auto source = open_mjpeg(options);
+  Frame frame;
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  EXPECT_THAT(source->error(), HasSubstr("video.mkv began as mjpeg of 96x64"));
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  EXPECT_EQ(frame.width, MjpegServer::kWidth);
 }
 
 TEST(MjpegSource, StopEndsAReadThatGetsNoAnswer) {

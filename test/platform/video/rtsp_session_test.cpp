@@ -55,11 +55,148 @@ TEST_P(RtspSessionBy, FollowsARedirection) {
     if (request.method != "DESCRIBE") return;
     *answer = {"302 Moved Temporarily", "Location: " + there.url() + "\r\n", "", "", false};
   });
-  const auto source = open_rtp(options_for(here, GetParam()));
+  RtpSourceOptions options = options_for(here, GetParam());
+  options.rules.redirects = LinkRules::Redirects::kAny;
+  const auto source = open_rtp(options);
   Frame frame;
   ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
   EXPECT_EQ(here.count("SETUP"), 0);
   EXPECT_EQ(there.count("PLAY"), 1);
+}
+
+RtspAnswer challenge(const std::string& how) {
+  return {"401 Unauthorized", "WWW-Authenticate: " + how + "\r\n", "", "", false};
+}
+
+constexpr const char* kBasic = "Basic realm=\"r\"";
+constexpr const char* kDigest = "Digest realm=\"r\", nonce=\"n\"";
+
+// Wants a login of each request; then sends on to `location`, if there is one.
+ScriptedRtspServer::Script with_login(const std::string& how, const std::string& location = "") {
+  return [how, location](const RtspRequest& request, RtspAnswer* answer) {
+    if (request.text.find("Authorization: ") == std::string::npos) {
+      *answer = challenge(how);
+    } else if (request.method == "DESCRIBE" && !location.empty() &&
+               request.text.find("/within") == std::string::npos) {
+      *answer = {"302 Moved Temporarily", "Location: " + location + "\r\n", "", "", false};
+    }
+  };
+}
+
+int logins(const ScriptedRtspServer& server) {
+  return server.count("OPTIONS", "Authorization: ") + server.count("DESCRIBE", "Authorization: ");
+}
+
+RtpSourceOptions with_user(RtpSourceOptions options) {
+  options.user = "user";
+  options.password = "secret";
+  options.max_backoff_s = 0.01;
+  return options;
+}
+
+TEST_P(RtspSessionBy, TakesItsLoginToNoOtherServer) {
+  const ScriptedRtspServer there(with_login(kBasic));
+  const ScriptedRtspServer here(with_login(kDigest, there.url()));
+  RtpSourceOptions options = with_user(options_for(here, GetParam()));
+  options.rules.auth = LinkRules::Auth::kAny;
+  Frame frame;
+  {
+    const auto source = open_rtp(options);
+    for (int i = 0; i < 2; ++i) {
+      ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+      EXPECT_THAT(source->error(), HasSubstr(here.url() + ": redirected to " + there.url() +
+                                             ", another port: refused"));
+    }
+    EXPECT_EQ(there.count("OPTIONS"), 0);
+  }
+  options.rules.redirects = LinkRules::Redirects::kAny;
+  const auto source = open_rtp(options);
+  for (int i = 0; i < 2; ++i) {
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+    EXPECT_THAT(source->error(),
+                HasSubstr("redirected to " + there.url() + ", which wants a login (401)"));
+  }
+  EXPECT_GT(there.count("OPTIONS"), 0);
+  EXPECT_EQ(logins(there), 0);
+  EXPECT_GT(logins(here), 0);
+}
+
+TEST(RtspSession, TakesItsLoginAlongWithinTheServer) {
+  const ScriptedRtspServer server(with_login(kDigest, "/within"));
+  const auto source = open_rtp(with_user(options_for(server)));
+  Frame frame;
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  EXPECT_GE(server.count("DESCRIBE", "/within"), 1);
+}
+
+TEST(RtspSession, IsEndedByNoRedirectionFromItsBeginningOn) {
+  for (const char* location :
+       {"file:///etc/passwd", "http://127.0.0.1/", "rtsp://", "rtspt://x/"}) {
+    const ScriptedRtspServer server([&](const RtspRequest& request, RtspAnswer* answer) {
+      if (request.method != "DESCRIBE") return;
+      *answer = {"302 Found", std::string("Location: ") + location + "\r\n", "", "", false};
+    });
+    const auto source = open_rtp(options_for(server));
+    Frame frame;
+    for (int i = 0; i < 3; ++i) {
+      ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+      EXPECT_THAT(source->error(), HasSubstr(": refused")) << location;
+    }
+  }
+}
+
+TEST(RtspSession, SendsNoPasswordInClearUnlessTheUserSaysSo) {
+  const ScriptedRtspServer server(with_login(kBasic));
+  RtpSourceOptions options = with_user(options_for(server));
+  Frame frame;
+  {
+    const auto source = open_rtp(options);
+    EXPECT_EQ(read_until(*source, frame, ReadStatus::kFailed), ReadStatus::kFailed);
+    EXPECT_THAT(source->error(),
+                HasSubstr("by basic the password would cross the network in clear"));
+    EXPECT_THAT(source->error(), HasSubstr("set auth: any (401)"));
+    EXPECT_EQ(logins(server), 0);
+  }
+  options.rules.auth = LinkRules::Auth::kAny;
+  const auto source = open_rtp(options);
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+}
+
+// In the midst of a session that began by digest, and behind a restart of the camera.
+TEST(RtspSession, SendsNoPasswordInClearWhereDigestWasOffered) {
+  std::atomic<bool> downgraded{false};
+  ScriptedRtspServer server([&](const RtspRequest& request, RtspAnswer* answer) {
+    with_login(kDigest)(request, answer);
+    if (downgraded) *answer = challenge(kBasic);
+  });
+  const auto source = open_rtp(with_user(options_for(server)));
+  Frame frame;
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  downgraded = true;
+  server.hang_up = true;
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kDisconnected), ReadStatus::kDisconnected);
+  }
+  EXPECT_THAT(source->error(), HasSubstr("would cross the network in clear"));
+  for (const char* method : {"OPTIONS", "DESCRIBE", "SETUP", "PLAY", "GET_PARAMETER"}) {
+    EXPECT_EQ(server.count(method, "Authorization: Basic"), 0) << method;
+  }
+  downgraded = false;
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+}
+
+TEST_P(RtspSessionBy, GivesUpAConnectionThatIsRefused) {
+  const ScriptedRtspServer server;
+  const auto source = open_rtp(options_for(server, GetParam()));
+  Frame frame;
+  for (int life = 0; life < 3; ++life) {
+    ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+    ASSERT_TRUE(source->refuse("of another size"));
+    ASSERT_EQ(source->read(frame, kDeadline_s), ReadStatus::kDisconnected);
+    EXPECT_EQ(source->error(), server.url() + ": of another size");
+  }
+  ASSERT_EQ(read_until(*source, frame, ReadStatus::kOk), ReadStatus::kOk) << source->error();
+  EXPECT_TRUE(frame.stamp.restarted);
 }
 
 TEST_P(RtspSessionBy, PingsByGetParameterWhereTheCameraOffersIt) {

@@ -1,0 +1,77 @@
+#include "platform/system/link_rules.h"
+
+#include <algorithm>
+#include <cctype>
+
+#include "platform/system/shown.h"
+
+namespace alidade {
+namespace {
+
+constexpr std::size_t kMostShown = 120;  // bytes of a foreign address
+
+bool is_by_tls(const Url& url) { return !url.scheme.empty() && url.scheme.back() == 's'; }
+
+std::string without_tls(const std::string& scheme) {
+  return !scheme.empty() && scheme.back() == 's' ? scheme.substr(0, scheme.size() - 1) : scheme;
+}
+
+std::string in_small_letters(std::string text) {
+  std::transform(text.begin(), text.end(), text.begin(), [](char c) {
+    return static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  });
+  return text;
+}
+
+std::string port_of(const Url& url) {
+  if (!url.port.empty()) return url.port;
+  if (url.scheme == "https") return "443";
+  if (url.scheme == "http") return "80";
+  return url.scheme == "rtsps" ? "322" : "554";
+}
+
+// What makes the address another one than that configured; empty: it is the same.
+std::string difference(const Url& configured, const Url& told) {
+  if (in_small_letters(told.host) != in_small_letters(configured.host)) return "another host";
+  if (told.scheme != configured.scheme) return "another scheme";
+  if (port_of(told) != port_of(configured)) return "another port";
+  return "";
+}
+
+std::string origin_of(const Url& url) {
+  return url.scheme + "://" + url.host + (url.port.empty() ? "" : ":" + url.port);
+}
+
+}  // namespace
+
+// The address to ask is put together of what was judged: another reader of the one that was told might find another host
+// in it.
+Redirection judge_redirection(const Url& configured, const std::string& asked,
+                              const std::string& told, LinkRules::Redirects rule) {
+  Redirection result;
+  Url url;
+  std::string ignored;
+  const bool is_url = parse_url(resolved_url(asked, told), &url, &ignored);
+  const std::string what =
+      "redirected to " + shown(is_url ? url.bare : told.substr(told.rfind('@') + 1), kMostShown);
+  if (!is_url || url.host.empty() || without_tls(url.scheme) != without_tls(configured.scheme)) {
+    result.error = what + ", which is no address of this kind: refused";
+    return result;
+  }
+  const std::string other = difference(configured, url);
+  if (is_by_tls(configured) && !is_by_tls(url)) {
+    result.error = what + ", away from TLS: refused";
+  } else if (other.empty()) {
+    result.takes_login = true;
+    result.url = origin_of(configured) + url.path;
+  } else if (rule == LinkRules::Redirects::kAny) {
+    result.url = origin_of(url) + url.path;
+  } else {
+    result.error = what + ", " + other +
+                   ": refused; if that is the camera, set url to it, or follow_redirects: any, "
+                   "which leaves out user and password";
+  }
+  return result;
+}
+
+}  // namespace alidade
