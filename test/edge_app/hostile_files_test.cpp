@@ -139,7 +139,7 @@ TEST_F(HostileFiles, ACertificateThatCannotBeUsedEndsTheStart) {
   expect_refused(run("certificate: words.pem, key: words.pem"),
                  "words.pem: holds no certificate; expected one as PEM");
   expect_refused(run("certificate: " + pipe("pipe.pem") + ", key: words.pem"),
-                 ":5: output.tls.certificate: " + path("pipe.pem") +
+                 ":4: output.tls.certificate: " + path("pipe.pem") +
                      ": cannot be read: not a file, but a pipe");
 }
 

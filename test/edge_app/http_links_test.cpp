@@ -77,7 +77,7 @@ TEST_F(HttpLinks, SayToCheckWhenTheyBreak) {
   EXPECT_EQ(process.wait(), 1);
   EXPECT_THAT(process.errors(), HasSubstr("alidade: pan/tilt " + head_.url()));
   EXPECT_THAT(process.errors(),
-              HasSubstr("the connection was lost 1 times during the check, last: "));
+              HasSubstr("the connection was lost 1 time during the check, last: "));
 }
 
 class HttpLinksInTime : public HttpLinks {

@@ -296,7 +296,9 @@ INSTANTIATE_TEST_SUITE_P(
         ToldAddresses{"AnotherNetwork", "http://192.168.1.64:8080/onvif/ptz", "/onvif/ptz", true,
                       true, false},
         ToldAddresses{"AnyHost", "http://0.0.0.0/onvif/ptz", "/onvif/ptz", true, true, false},
-        ToldAddresses{"APortThatIsNotForwarded", "http://127.0.0.1:9/onvif/ptz", "/onvif/ptz"},
+        // No login goes to another port than the url's.
+        ToldAddresses{"APortThatIsNotForwarded", "http://127.0.0.1:9/onvif/ptz", "/onvif/ptz", true,
+                      true, false},
         ToldAddresses{"ThePathOfAnotherService", "http://10.0.0.1/onvif/media", "/onvif/PTZ"},
         ToldAddresses{"NoPtzAtAll", " ", "/onvif/ptz_service"},
         ToldAddresses{"ByGetServicesAlone", "http://10.0.0.1/odd/ptz", "/odd/ptz", false, true,

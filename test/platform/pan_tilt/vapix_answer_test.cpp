@@ -81,9 +81,7 @@ INSTANTIATE_TEST_SUITE_P(
         Answer{"WebPage",
                "<html>\x01\xff<body>a very long page, a very long page, a very long "
                "page, a very long page, a very long page</body></html>\n",
-               "'<html>"
-               "??"
-               "<body>"}),
+               "'<html>\\x01\\xff<body>"}),
     [](const auto& answer) { return answer.param.name; });
 
 }  // namespace

@@ -166,7 +166,7 @@ TEST(FramesCsv, TakesAByteOrderMarkAndBlankLines) {
 TEST(FramesCsv, TakesANumberWithAZeroByteForNone) {
   const FramesCsv csv(std::string("frame,receive_time_s\n0,1\0005\n", 27));
   EXPECT_FALSE(csv.ok);
-  EXPECT_THAT(csv.error, HasSubstr("'1?5' in column receive_time_s is not a number"));
+  EXPECT_THAT(csv.error, HasSubstr("'1\\x005' in column receive_time_s is not a number"));
 }
 
 TEST(FramesCsv, TakesAFileThatIsCutOffInItsLastNumberForMalformed) {
