@@ -44,14 +44,19 @@ PatternVideo find_visibly(const CalibrateShutterOptions& options, const KnownPat
   return video;
 }
 
-PatternVideo find_live(const CalibrateShutterOptions& options, const KnownPattern& pattern) {
-  const VideoConfig config = require_video_config(options.config);
+VideoConfig require_live_video(const CalibrateShutterOptions& options) {
+  VideoConfig config = require_video_config(options.config);
   if (config.type == VideoConfig::Type::kRecording) {
     throw CommandError(
         kExitUsage, fmt::format("{}: video.type: a recording is no live video; give its directory "
                                 "instead: alidade calibrate-shutter {}",
                                 options.config, config.directory));
   }
+  return config;
+}
+
+PatternVideo find_live(const VideoConfig& config, const CalibrateShutterOptions& options,
+                       const KnownPattern& pattern) {
   PatternVideo video = film_pattern(config, pattern, options.duration_s.value_or(kUsualFilm_s));
   spdlog::info("{}: calibrating, the pattern is in {} of {} images; Ctrl-C ends it at once",
                video.name, video.found, video.images);
@@ -157,9 +162,11 @@ int calibrate_shutter(const CalibrateShutterOptions& options) {
     return kExitOk;
   }
   check_usage(options);
+  std::optional<VideoConfig> live;
+  if (!options.config.empty()) live = require_live_video(options);
   const OutputLock lock(output_path(options.directory, options.video) + "/lens.yaml");
   const PatternVideo video =
-      options.config.empty() ? find_visibly(options, *pattern) : find_live(options, *pattern);
+      live ? find_live(*live, options, *pattern) : find_visibly(options, *pattern);
   const auto warn = [&](const std::vector<std::string>& remarks) {
     for (const std::string& remark : remarks) spdlog::warn("{}: {}", video.name, remark);
   };

@@ -24,7 +24,7 @@ std::string required_text(YamlSection& section, const std::string& key,
 
 std::string required_url(YamlSection& section, const std::string& example,
                          const std::vector<std::string>& schemes) {
-  const std::string url = required_text(section, "url", example);
+  std::string url = required_text(section, "url", example);
   bool known = false;
   std::string rest;
   for (const std::string& scheme : schemes) {

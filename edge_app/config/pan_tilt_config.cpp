@@ -91,8 +91,9 @@ std::vector<PanTiltType> pan_tilt_types() {
 
 PanTiltType read_pan_tilt_type(YamlSection& section) {
   const std::vector<PanTiltType> types = pan_tilt_types();
-  std::vector<std::string> keys;
-  for (const PanTiltType& type : types) keys.push_back(type.key);
+  std::vector<std::string> keys(types.size());
+  std::transform(types.begin(), types.end(), keys.begin(),
+                 [](const PanTiltType& type) { return type.key; });
   const std::optional<std::string> key = section.choice("type", keys);
   if (!key) section.fail_missing("type", "expected one of " + join(keys));
   return *std::find_if(types.begin(), types.end(),
