@@ -1,5 +1,8 @@
 #include "edge_app/commands/output_directory.h"
 
+#include <signal.h>
+#include <unistd.h>
+
 #include <filesystem>
 #include <system_error>
 
@@ -9,6 +12,24 @@
 namespace alidade {
 
 namespace fs = std::filesystem;
+namespace {
+
+constexpr int kEndings[] = {SIGINT, SIGTERM, SIGHUP};
+const OutputLock* held = nullptr;
+
+void change_endings(void (*from)(int), void (*to)(int)) {
+  for (const int signal : kEndings) {
+    struct sigaction now = {};
+    // What somebody else handles or ignores stays so.
+    if (::sigaction(signal, nullptr, &now) != 0 || now.sa_handler != from) continue;
+    struct sigaction next = {};
+    next.sa_handler = to;
+    next.sa_flags = static_cast<int>(SA_RESETHAND);
+    static_cast<void>(::sigaction(signal, &next, nullptr));
+  }
+}
+
+}  // namespace
 
 std::string output_path(const std::string& given, const std::string& recording) {
   std::error_code error;
@@ -25,11 +46,22 @@ OutputLock::OutputLock(const std::string& file) {
     made_.push_back(one.string());
   fs::create_directories(folder, error);
   std::string why;
-  if (lock_.take(file, &why) != FileLock::Result::kInUse) return;
-  throw CommandError(kExitFailed, why + "; give another place with -o, or wait for it to end");
+  if (lock_.take(file, &why) == FileLock::Result::kInUse)
+    throw CommandError(kExitFailed, why + "; give another place with -o, or wait for it to end");
+  held = this;
+  change_endings(SIG_DFL, &OutputLock::end);
+}
+
+// Only what a handler may call; the signal does what it would have done as soon as this returns.
+void OutputLock::end(int signal) {
+  if (!held->lock_.made().empty()) static_cast<void>(::unlink(held->lock_.made().c_str()));
+  for (const std::string& folder : held->made_) static_cast<void>(::rmdir(folder.c_str()));
+  static_cast<void>(::raise(signal));
 }
 
 OutputLock::~OutputLock() {
+  change_endings(&OutputLock::end, SIG_DFL);
+  held = nullptr;
   lock_.release_and_remove();
   std::error_code not_empty;
   for (const std::string& folder : made_) fs::remove(folder, not_empty);

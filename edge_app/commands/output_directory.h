@@ -14,7 +14,8 @@ namespace alidade {
 [[nodiscard]] std::string output_path(const std::string& given, const std::string& recording);
 
 // Held while a command makes what it will write: another one that would write there says who has it, as where a `run` keeps its
-// calibrations in that file. Makes the file's folder, and leaves nothing of its own behind. Where there can be no lock there is none.
+// calibrations in that file. Makes the file's folder, and leaves nothing of its own behind, not even where SIGINT, SIGTERM or SIGHUP
+// ends the program meanwhile. Where there can be no lock there is none. One at a time.
 class OutputLock {
  public:
   // Throws CommandError where it is in use.
@@ -24,6 +25,8 @@ class OutputLock {
   OutputLock& operator=(const OutputLock&) = delete;
 
  private:
+  static void end(int signal);
+
   FileLock lock_;
   std::vector<std::string> made_;  // folders, the innermost first
 };

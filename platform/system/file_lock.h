@@ -22,10 +22,12 @@ class FileLock {
   void release() { file_.reset(); }
   // So, and takes PATH.lock away if this object made it.
   void release_and_remove();
+  // PATH.lock, if this object made it.
+  [[nodiscard]] const std::string& made() const { return made_; }
 
  private:
   FileDescriptor file_;
-  std::string made_;  // PATH.lock
+  std::string made_;
 };
 
 }  // namespace alidade
