@@ -313,8 +313,7 @@ ReadStatus HttpPollingSource::finish_request(CURLcode code, PanTiltSample* sampl
   const ReadStatus followed = follow_redirection();
   if (followed != ReadStatus::kOk) return followed;
   if (elsewhere_ && status() == 401) {
-    return disconnect("redirected to " + shown(asked_, kShownUrl) +
-                      ", which wants a login (401); it goes to url only: set url to that");
+    return disconnect(login_wanted_elsewhere(asked_));
   }
   const HttpAnswer given = answer();
   if (given.status == 401 && request_.digest && method_ == kDigest && !options_.user.empty() &&

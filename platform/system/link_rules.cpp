@@ -74,4 +74,9 @@ Redirection judge_redirection(const Url& configured, const std::string& asked,
   return result;
 }
 
+std::string login_wanted_elsewhere(const std::string& url) {
+  return "redirected to " + shown(url, kMostShown) +
+         ", which wants a login (401); it goes to url only: set url to that";
+}
+
 }  // namespace alidade

@@ -44,4 +44,7 @@ struct Redirection {
 [[nodiscard]] Redirection judge_redirection(const Url& configured, const std::string& asked,
                                             const std::string& told, LinkRules::Redirects rule);
 
+// Why a link ends whose redirection led to `url`, where a login is wanted that does not go there.
+[[nodiscard]] std::string login_wanted_elsewhere(const std::string& url);
+
 }  // namespace alidade

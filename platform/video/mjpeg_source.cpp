@@ -351,8 +351,7 @@ ReadStatus MjpegSource::connection_end(CURLcode code, std::string* error) {
   curl_easy_getinfo(easy_.get(), CURLINFO_RESPONSE_CODE, &status);
   if (status == 401) {
     *error = logs_in_ ? login_error(easy_.get(), options_.user, methods_)
-                      : "redirected to " + shown(asked_, kShownUrl) +
-                            ", which wants a login (401); it goes to url only: set url to that";
+                      : login_wanted_elsewhere(asked_);
     return worked_ || !logs_in_ ? ReadStatus::kDisconnected : ReadStatus::kFailed;
   }
   if (!refusal_.empty()) {

@@ -17,7 +17,6 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t kShownUrl = 120;  // bytes
 constexpr int kPortTries = 100;
 constexpr double kReply_s = 0.5;     // given to an answer to the camera's own question
 constexpr double kUdpSlice_s = 0.1;  // by UDP: of a wait
@@ -248,8 +247,7 @@ ReadStatus RtspSession::ask(const Request& request, RtspMessage* answer, std::st
 // answer: 401. refused: with a login.
 ReadStatus RtspSession::log_in(RtspMessage* answer, bool refused, std::string* error) {
   if (!logs_in_) {
-    *error = "redirected to " + shown(url_, kShownUrl) +
-             ", which wants a login (401); it goes to url only: set url to that";
+    *error = login_wanted_elsewhere(url_);
     return ReadStatus::kDisconnected;
   }
   *error = options_.user.empty() ? "the camera wants a user and a password (401)"
