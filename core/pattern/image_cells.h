@@ -28,12 +28,13 @@ class ImageCells {
   }
   // Upper left corner, px.
   [[nodiscard]] Vector2<double> low(int cell) const {
-    return {cell % kColumns * size_.x() / kColumns, cell / kColumns * size_.y() / rows_};
+    const int row = cell / kColumns;
+    return {cell % kColumns * size_.x() / kColumns, row * size_.y() / rows_};
   }
   // Lower right corner, px.
   [[nodiscard]] Vector2<double> high(int cell) const {
-    return {(cell % kColumns + 1) * size_.x() / kColumns,
-            (cell / kColumns + 1) * size_.y() / rows_};
+    const int row = cell / kColumns;
+    return {(cell % kColumns + 1) * size_.x() / kColumns, (row + 1) * size_.y() / rows_};
   }
 
  private:

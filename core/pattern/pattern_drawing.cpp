@@ -94,8 +94,9 @@ Shapes april_grid(const KnownPattern& pattern, bool around) {
   };
   apriltag_family_t* family = tag36h11_create();
   for (int tag = 0; tag < pattern.columns * pattern.rows; ++tag) {
+    const int row_below = tag / pattern.columns;
     const double left = start + tag % pattern.columns * pitch;
-    const double top = start + (pattern.rows - 1 - tag / pattern.columns) * pitch;
+    const double top = start + (pattern.rows - 1 - row_below) * pitch;
     shapes.rectangle(left, top, size_mm, kBorder * cell);
     shapes.rectangle(left, top + (kSide - kBorder) * cell, size_mm, kBorder * cell);
     run(left, top, 0, kBorder, kBorder, kCode);

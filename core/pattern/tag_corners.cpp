@@ -39,7 +39,7 @@ class NormalDistribution {
  public:
   NormalDistribution() {
     for (int i = 0; i <= kEntries; ++i) {
-      const double z = (i - kEntries / 2) / kPerSigma;
+      const double z = (i - kMiddle) / kPerSigma;
       entries_[static_cast<std::size_t>(i)] = {0.5 * std::erfc(-z / std::sqrt(2.0)),
                                                std::exp(-z * z / 2) / std::sqrt(2 * kPi)};
     }
@@ -47,7 +47,7 @@ class NormalDistribution {
 
   // Integral up to z, density at z.
   [[nodiscard]] Vector2<double> operator()(double z) const {
-    const double x = std::clamp(z * kPerSigma + kEntries / 2, 0.0, kEntries - 0.001);
+    const double x = std::clamp(z * kPerSigma + kMiddle, 0.0, kEntries - 0.001);
     const auto i = static_cast<std::size_t>(x);
     const double part = x - static_cast<double>(i);
     return (1 - part) * entries_[i] + part * entries_[i + 1];
@@ -55,7 +55,8 @@ class NormalDistribution {
 
  private:
   static constexpr double kPerSigma = 100;
-  static constexpr int kEntries = 1000;
+  static constexpr int kMiddle = 500;
+  static constexpr int kEntries = 2 * kMiddle;
   std::array<Vector2<double>, kEntries + 1> entries_;
 };
 

@@ -107,6 +107,7 @@ double TagSpacing::measured_gap() const {
   if (gaps.size() < kFewestGaps) return pattern_.gap;
   const double gap = median_of(gaps);
   std::vector<double> off;
+  off.reserve(gaps.size());
   for (const double g : gaps) off.push_back(std::abs(g - gap));
   const double sigma = 1.25 * 1.48 * median_of(off) / std::sqrt(static_cast<double>(gaps.size()));
   const double least = rough ? kLeastRoughError : kLeastGapError;

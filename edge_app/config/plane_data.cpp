@@ -169,7 +169,7 @@ class PlaneDataReader {
   PlaneSight sight_in(YamlSection& section, const std::string& key) {
     if (!section.has(key)) section.fail_missing(key, "give a direction, or a picture and a pixel");
     YamlSection inside = section.section(key);
-    const PlaneSight sight = sight_of(inside);
+    PlaneSight sight = sight_of(inside);
     inside.finish();
     return sight;
   }

@@ -27,6 +27,7 @@ using Names = std::unordered_set<std::int64_t>;
 std::unordered_map<std::int64_t, std::size_t> places_of(
     const std::vector<CalibrationObservation>& observations) {
   std::vector<std::int64_t> names;
+  names.reserve(observations.size());
   for (const CalibrationObservation& seen : observations) names.push_back(seen.frame);
   std::sort(names.begin(), names.end());
   names.erase(std::unique(names.begin(), names.end()), names.end());

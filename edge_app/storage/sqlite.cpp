@@ -53,7 +53,7 @@ const char* files_without_journals() {
 
 std::string foreign_file_beside(const std::string& database) {
   for (const char* rest : {kJournal.data(), "-wal", "-shm"}) {
-    const std::string path = database + rest;
+    std::string path = database + rest;
     struct stat status = {};
     // Through a link another file would be written.
     if (::lstat(path.c_str(), &status) == 0 && (rest == kJournal || !S_ISREG(status.st_mode)))

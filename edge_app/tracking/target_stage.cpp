@@ -63,7 +63,7 @@ TargetStage::TargetStage(const TargetOptions& options, std::shared_ptr<const Pla
     : options_(options), plane_(std::move(plane)), tracker_(options.tracker) {}
 
 DetectionAnswer TargetStage::add(const DetectedFrame& frame) {
-  const DetectionAnswer answer = take(frame);
+  DetectionAnswer answer = take(frame);
   counters_.count(answer.status);
   counters_.births_refused = tracker_.births_refused();
   return answer;

@@ -15,7 +15,7 @@ std::string_view without_blanks(std::string_view text) {
 // The next of `what` up to the separator, which goes, too.
 std::string take(std::string_view* what, char separator) {
   const std::size_t end = std::min(what->find(separator), what->size());
-  const std::string taken(without_blanks(what->substr(0, end)));
+  std::string taken(without_blanks(what->substr(0, end)));
   what->remove_prefix(std::min(end + 1, what->size()));
   return taken;
 }
