@@ -89,8 +89,9 @@ std::string zooms_text(const ZoomFit& fit, const std::vector<Calibration>& nodes
       "off\n",
       fit.chi_square, fit.degrees_of_freedom, 100 * fit.curve.content().repeatability);
   const auto [usual, largest] = sigmas_between(fit.curve);
-  text += fmt::format("between them f is known to {:.2g} %, {:.2g} % at most, from {}\n",
-                      100 * usual, 100 * largest, counted(movements, "movement"));
+  text +=
+      fmt::format("between them f is known to {:.2g} %, {:.2g} % at most, from {}\n", 100 * usual,
+                  100 * largest, counted(static_cast<std::int64_t>(movements), "movement"));
   return text;
 }
 
