@@ -14,6 +14,10 @@ target_compile_options(alidade_options INTERFACE
   $<$<NOT:$<BOOL:$<TARGET_PROPERTY:UNITY_BUILD>>>:-Wshadow>
   -Wall -Wextra -Wpedantic -Wconversion -Wnon-virtual-dtor -Wold-style-cast
   -Woverloaded-virtual -Wnull-dereference -Werror)
+# As for those who use core/model: a prelude is taken only where the same macros are defined.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "^armv[67]")
+  target_compile_definitions(alidade_options INTERFACE EIGEN_DONT_VECTORIZE)
+endif()
 # GCC's collection of garbage is a tenth of its time; without it a source takes 2 GB at most. For libraries: tests are clang's.
 cmake_host_system_information(RESULT host_memory_mb QUERY TOTAL_PHYSICAL_MEMORY)
 if(CMAKE_CXX_COMPILER_ID STREQUAL "GNU" AND host_memory_mb GREATER 8000)
