@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "core/detection/detection_box.h"
+#include "core/ground/world_plane.h"
 #include "core/realtime/frame_orientation.h"
 #include "core/realtime/image/image_view.h"
-#include "core/tracking/world_plane.h"
 
 namespace alidade {
 

@@ -1,6 +1,6 @@
 #include "core/tracking/target_scale.h"
 
-#include "core/tracking/image_plane.h"
+#include "core/ground/image_plane.h"
 
 namespace alidade {
 

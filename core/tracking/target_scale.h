@@ -7,8 +7,8 @@
 // target's height at most, and changes that height by 0.2 % (target_scale_test). The paper's homology W (plane_homography.h) gives the same
 // for a camera with neither. No allocation.
 
+#include "core/ground/world_plane.h"
 #include "core/realtime/frame_orientation.h"
-#include "core/tracking/world_plane.h"
 
 namespace alidade {
 

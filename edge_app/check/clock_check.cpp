@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "edge_app/pipeline/capture_clock.h"
+#include "edge_app/clocks/capture_clock.h"
 #include "platform/video/stamp_guard.h"
 
 namespace alidade {

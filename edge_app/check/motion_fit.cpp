@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "core/model/angle.h"
-#include "edge_app/pipeline/stale_repeats.h"
+#include "edge_app/self_calibration/stale_repeats.h"
 
 namespace alidade {
 namespace {

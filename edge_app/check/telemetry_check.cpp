@@ -8,7 +8,7 @@
 #include "core/calibration/number_text.h"
 #include "core/model/angle.h"
 #include "edge_app/check/telemetry_measures.h"
-#include "edge_app/pipeline/stale_repeats.h"
+#include "edge_app/self_calibration/stale_repeats.h"
 
 namespace alidade {
 namespace {

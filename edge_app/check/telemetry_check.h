@@ -21,7 +21,7 @@
 #include "edge_app/check/clock_check.h"
 #include "edge_app/check/finding.h"
 #include "edge_app/check/spread.h"
-#include "edge_app/pipeline/steady_samples.h"
+#include "edge_app/self_calibration/steady_samples.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 
 namespace alidade {

@@ -5,7 +5,7 @@
 
 #include "core/model/angle.h"
 #include "core/realtime/telemetry/telemetry_buffer.h"
-#include "edge_app/pipeline/stale_repeats.h"
+#include "edge_app/self_calibration/stale_repeats.h"
 
 namespace alidade {
 namespace {

@@ -14,8 +14,8 @@
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/video_tracks.h"
 #include "edge_app/config/noise_file.h"
-#include "edge_app/pipeline/calibration_streams.h"
-#include "edge_app/pipeline/steady_samples.h"
+#include "edge_app/self_calibration/calibration_streams.h"
+#include "edge_app/self_calibration/steady_samples.h"
 #include "platform/storage/recording.h"
 
 namespace alidade {

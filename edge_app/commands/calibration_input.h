@@ -10,7 +10,7 @@
 #include "core/calibration/known_camera.h"
 #include "core/calibration/zoom_movement.h"
 #include "edge_app/config/value_file.h"
-#include "edge_app/pipeline/track_choice.h"
+#include "edge_app/self_calibration/track_choice.h"
 
 namespace alidade {
 

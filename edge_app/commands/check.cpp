@@ -29,7 +29,7 @@
 #include "edge_app/commands/log.h"
 #include "edge_app/commands/scene_loading.h"
 #include "edge_app/output/mqtt_connection.h"
-#include "edge_app/pipeline/steady_samples.h"
+#include "edge_app/self_calibration/steady_samples.h"
 #include "platform/system/escaped.h"
 #include "platform/system/text.h"
 

@@ -16,7 +16,7 @@
 
 #include "edge_app/commands/command.h"
 #include "edge_app/pipeline/read_loop.h"
-#include "edge_app/pipeline/repeated_images.h"
+#include "edge_app/step/repeated_images.h"
 #include "platform/system/clock.h"
 
 namespace alidade {

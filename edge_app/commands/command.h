@@ -7,10 +7,10 @@
 #include <stdexcept>
 #include <string>
 
-#include "core/tracking/plane_estimate.h"
+#include "core/ground/plane_estimate.h"
 #include "edge_app/config/config.h"
 #include "edge_app/config/noise_file.h"
-#include "edge_app/pipeline/orientation_step.h"
+#include "edge_app/step/orientation_step.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
 

@@ -8,7 +8,7 @@
 
 #include "edge_app/commands/command.h"
 #include "edge_app/config/config.h"
-#include "edge_app/pipeline/self_calibration.h"
+#include "edge_app/self_calibration/self_calibration.h"
 #include "edge_app/storage/calibration_store.h"
 
 namespace alidade {

@@ -17,8 +17,8 @@
 #include "edge_app/commands/map_recording.h"
 #include "edge_app/commands/map_report.h"
 #include "edge_app/commands/output_directory.h"
-#include "edge_app/pipeline/small_image.h"
 #include "edge_app/storage/scene_map_file.h"
+#include "edge_app/taps/small_image.h"
 #include "platform/video/jpeg_decoder.h"
 
 namespace alidade {

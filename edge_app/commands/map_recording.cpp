@@ -11,7 +11,7 @@
 #include "core/calibration/number_text.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/video_tracks.h"
-#include "edge_app/pipeline/steady_samples.h"
+#include "edge_app/self_calibration/steady_samples.h"
 #include "platform/video/recording_frame_source.h"
 
 namespace alidade {

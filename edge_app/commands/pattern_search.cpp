@@ -11,7 +11,7 @@
 #include "core/model/stamp_rate.h"
 #include "core/pattern/pattern_doubts.h"
 #include "edge_app/commands/command.h"
-#include "edge_app/pipeline/repeated_images.h"
+#include "edge_app/step/repeated_images.h"
 
 namespace alidade {
 namespace {

@@ -14,8 +14,8 @@
 #include <set>
 #include <string>
 
+#include "core/ground/plane_fit.h"
 #include "core/model/trigonometry.h"
-#include "core/tracking/plane_fit.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/config/plane_data.h"
 #include "edge_app/output/json_query.h"

@@ -19,6 +19,7 @@
 #include <system_error>
 #include <vector>
 
+#include "edge_app/clocks/fresh_beginning.h"
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/partial_file.h"
 #include "edge_app/commands/replay.h"
@@ -27,7 +28,6 @@
 #include "edge_app/commands/stop_signals.h"
 #include "edge_app/config/noise_file.h"
 #include "edge_app/output/record_writer.h"
-#include "edge_app/pipeline/fresh_beginning.h"
 #include "edge_app/pipeline/latency_histogram.h"
 #include "platform/pan_tilt/recording_pan_tilt_source.h"
 #include "platform/storage/recording.h"

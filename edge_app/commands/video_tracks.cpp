@@ -14,9 +14,9 @@
 #include "core/realtime/oe_mode/oe_mode.h"
 #include "core/realtime/start_up/start_up_tracker.h"
 #include "edge_app/commands/command.h"
-#include "edge_app/pipeline/calibration_feed.h"
-#include "edge_app/pipeline/keyframe_map.h"
-#include "edge_app/pipeline/orientation_step.h"
+#include "edge_app/self_calibration/keyframe_map.h"
+#include "edge_app/step/calibration_feed.h"
+#include "edge_app/step/orientation_step.h"
 #include "platform/system/text.h"
 #include "platform/video/recording_frame_source.h"
 

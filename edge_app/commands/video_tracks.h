@@ -15,7 +15,7 @@
 
 #include "core/calibration/calibrate.h"
 #include "core/realtime/oe_mode/map_state.h"
-#include "edge_app/pipeline/track_choice.h"
+#include "edge_app/self_calibration/track_choice.h"
 
 namespace alidade {
 

@@ -10,7 +10,7 @@
 
 #include "edge_app/commands/command.h"
 #include "edge_app/commands/video_tracks.h"
-#include "edge_app/pipeline/track_choice.h"
+#include "edge_app/self_calibration/track_choice.h"
 
 namespace alidade {
 namespace {

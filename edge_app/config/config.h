@@ -15,7 +15,7 @@
 #include "edge_app/config/pan_tilt_config.h"
 #include "edge_app/config/tracking_config.h"
 #include "edge_app/output/http/http_options.h"
-#include "edge_app/output/record_format.h"  // OutputFormat
+#include "edge_app/record/record_format.h"  // OutputFormat
 #include "platform/system/link_rules.h"
 #include "platform/video/v4l2_mode.h"  // V4l2Format
 

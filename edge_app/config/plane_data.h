@@ -24,8 +24,8 @@
 #include <optional>
 #include <string>
 
-#include "core/tracking/local_frame.h"
-#include "core/tracking/plane_evidence.h"
+#include "core/ground/local_frame.h"
+#include "core/ground/plane_evidence.h"
 
 namespace alidade {
 

@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "core/mapping/localization.h"
-#include "edge_app/pipeline/orientation_record.h"
-#include "edge_app/pipeline/scene_report.h"
-#include "edge_app/pipeline/told_base.h"
+#include "edge_app/record/orientation_record.h"
+#include "edge_app/step/scene_report.h"
+#include "edge_app/step/told_base.h"
 
 namespace alidade {
 

@@ -14,8 +14,8 @@
 #include "edge_app/localization/base_judge.h"
 #include "edge_app/localization/scene_search.h"
 #include "edge_app/localization/scene_upkeep.h"
-#include "edge_app/pipeline/scene_report.h"
-#include "edge_app/pipeline/scene_tap.h"
+#include "edge_app/step/scene_report.h"
+#include "edge_app/taps/scene_tap.h"
 
 namespace alidade {
 

@@ -11,7 +11,7 @@
 #include "core/mapping/localization.h"
 #include "core/mapping/map_change.h"
 #include "core/mapping/map_upkeep.h"
-#include "edge_app/pipeline/scene_report.h"
+#include "edge_app/step/scene_report.h"
 
 namespace alidade {
 

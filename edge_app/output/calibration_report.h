@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "core/calibration/calibrate.h"
-#include "edge_app/pipeline/track_choice.h"
+#include "edge_app/self_calibration/track_choice.h"
 
 namespace alidade {
 

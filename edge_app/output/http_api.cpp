@@ -17,10 +17,10 @@
 #include "edge_app/output/pixel_query.h"
 #include "edge_app/output/plane_json.h"
 #include "edge_app/output/record_events.h"
-#include "edge_app/output/record_format.h"
 #include "edge_app/output/scene_json.h"
 #include "edge_app/output/service_metrics.h"
 #include "edge_app/output/targets_json.h"
+#include "edge_app/record/record_format.h"
 #include "platform/system/clock.h"
 
 namespace alidade {

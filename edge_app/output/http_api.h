@@ -7,13 +7,13 @@
 #include <memory>
 #include <string>
 
-#include "core/tracking/plane_estimate.h"
+#include "core/ground/plane_estimate.h"
 #include "edge_app/output/http/http_server.h"
 #include "edge_app/output/live_state.h"
 #include "edge_app/output/mqtt_publisher.h"
 #include "edge_app/output/target_lines.h"
 #include "edge_app/pipeline/pipeline.h"
-#include "edge_app/pipeline/scene_report.h"
+#include "edge_app/step/scene_report.h"
 #include "edge_app/tracking/built_in_detectors.h"
 #include "edge_app/tracking/target_feed.h"
 #include "platform/video/frame_source.h"

@@ -7,7 +7,7 @@
 #include <mutex>
 #include <random>
 
-#include "edge_app/output/record_format.h"
+#include "edge_app/record/record_format.h"
 #include "platform/system/clock.h"
 
 namespace alidade {

@@ -18,7 +18,7 @@
 #include <utility>
 #include <vector>
 
-#include "edge_app/pipeline/orientation_record.h"
+#include "edge_app/record/orientation_record.h"
 #include "platform/system/priority_mutex.h"
 
 namespace alidade {

@@ -11,7 +11,7 @@
 #include <utility>
 
 #include "edge_app/output/clock_pair.h"
-#include "edge_app/output/record_format.h"
+#include "edge_app/record/record_format.h"
 #include "platform/system/backoff.h"
 #include "platform/system/clock.h"
 

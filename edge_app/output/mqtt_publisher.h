@@ -18,7 +18,7 @@
 
 #include "edge_app/output/mqtt_connection.h"
 #include "edge_app/output/mqtt_options.h"
-#include "edge_app/pipeline/orientation_record.h"
+#include "edge_app/record/orientation_record.h"
 #include "platform/system/file_descriptor.h"
 #include "platform/system/niced_threads.h"
 #include "platform/system/priority_mutex.h"

@@ -11,7 +11,7 @@
 #include "core/model/direction.h"
 #include "edge_app/output/json_query.h"
 #include "edge_app/output/plane_json.h"
-#include "edge_app/pipeline/frame_geometry.h"
+#include "edge_app/record/frame_geometry.h"
 
 namespace alidade {
 namespace {

@@ -15,10 +15,10 @@
 #include <string>
 #include <vector>
 
+#include "core/ground/plane_estimate.h"
 #include "core/model/linear_algebra.h"
-#include "core/tracking/plane_estimate.h"
 #include "edge_app/output/json_query.h"
-#include "edge_app/pipeline/orientation_record.h"
+#include "edge_app/record/orientation_record.h"
 
 namespace alidade {
 

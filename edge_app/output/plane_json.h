@@ -4,8 +4,8 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "core/tracking/plane_estimate.h"
-#include "core/tracking/plane_fit.h"
+#include "core/ground/plane_estimate.h"
+#include "core/ground/plane_fit.h"
 
 namespace alidade {
 

@@ -3,7 +3,7 @@
 
 #include <vector>
 
-#include "edge_app/pipeline/orientation_record.h"
+#include "edge_app/record/orientation_record.h"
 
 namespace alidade {
 

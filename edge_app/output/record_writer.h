@@ -5,8 +5,8 @@
 #include <string>
 
 #include "edge_app/output/line_writer.h"
-#include "edge_app/output/record_format.h"
-#include "edge_app/pipeline/orientation_record.h"
+#include "edge_app/record/orientation_record.h"
+#include "edge_app/record/record_format.h"
 
 namespace alidade {
 

@@ -3,7 +3,7 @@
 
 #include <nlohmann/json_fwd.hpp>
 
-#include "edge_app/pipeline/scene_report.h"
+#include "edge_app/step/scene_report.h"
 
 namespace alidade {
 

@@ -7,7 +7,7 @@
 #include <optional>
 
 #include "edge_app/output/json_query.h"
-#include "edge_app/pipeline/small_image.h"
+#include "edge_app/taps/small_image.h"
 
 namespace alidade {
 namespace {

@@ -10,7 +10,7 @@
 #include <string>
 
 #include "edge_app/output/http/http_server.h"
-#include "edge_app/pipeline/image_tap.h"
+#include "edge_app/taps/image_tap.h"
 
 namespace alidade {
 

@@ -22,12 +22,12 @@
 #include <cstdint>
 #include <type_traits>
 
-#include "edge_app/pipeline/detector_tap.h"
-#include "edge_app/pipeline/image_slot.h"
-#include "edge_app/pipeline/image_tap.h"
-#include "edge_app/pipeline/orientation_step.h"
-#include "edge_app/pipeline/scene_tap.h"
-#include "edge_app/pipeline/semaphore.h"
+#include "edge_app/step/orientation_step.h"
+#include "edge_app/taps/detector_tap.h"
+#include "edge_app/taps/image_slot.h"
+#include "edge_app/taps/image_tap.h"
+#include "edge_app/taps/scene_tap.h"
+#include "platform/system/semaphore.h"
 
 namespace alidade {
 

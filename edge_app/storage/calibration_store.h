@@ -18,7 +18,7 @@
 #include <vector>
 
 #include "core/model/zoom_curve.h"
-#include "edge_app/pipeline/calibration_archive.h"
+#include "edge_app/self_calibration/calibration_archive.h"
 #include "platform/system/file_lock.h"
 
 namespace alidade {

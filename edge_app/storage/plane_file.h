@@ -12,8 +12,8 @@
 
 #include <string>
 
-#include "core/tracking/plane_estimate.h"
-#include "core/tracking/plane_fit.h"
+#include "core/ground/plane_estimate.h"
+#include "core/ground/plane_fit.h"
 
 namespace alidade {
 

@@ -14,7 +14,7 @@
 #include "core/detection/motion_detector.h"
 #include "core/detection/network_detector.h"
 #include "core/detection/person_detector.h"
-#include "edge_app/pipeline/detector_tap.h"
+#include "edge_app/taps/detector_tap.h"
 #include "edge_app/tracking/target_feed.h"
 
 namespace alidade {

@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "core/detection/detection_box.h"
-#include "edge_app/pipeline/orientation_record.h"
+#include "edge_app/record/orientation_record.h"
 
 namespace alidade {
 

@@ -4,8 +4,8 @@
 #include <array>
 #include <cstddef>
 
+#include "core/ground/plane_homography.h"
 #include "core/model/direction.h"
-#include "core/tracking/plane_homography.h"
 
 namespace alidade {
 namespace {

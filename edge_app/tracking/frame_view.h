@@ -13,9 +13,9 @@
 
 #include <optional>
 
+#include "core/ground/world_plane.h"
 #include "core/tracking/target_frame.h"
-#include "core/tracking/world_plane.h"
-#include "edge_app/pipeline/orientation_record.h"
+#include "edge_app/record/orientation_record.h"
 
 namespace alidade {
 

@@ -2,8 +2,8 @@
 
 #include <cmath>
 
+#include "core/ground/image_plane.h"
 #include "core/model/direction.h"
-#include "core/tracking/image_plane.h"
 #include "edge_app/tracking/frame_view.h"
 
 namespace alidade {

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <utility>
 
-#include "core/tracking/image_plane.h"
+#include "core/ground/image_plane.h"
 #include "edge_app/tracking/target_report.h"
 
 namespace alidade {

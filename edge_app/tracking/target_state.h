@@ -7,7 +7,7 @@
 #include <string>
 #include <vector>
 
-#include "core/tracking/plane_estimate.h"
+#include "core/ground/plane_estimate.h"
 #include "core/tracking/target_tracker.h"
 #include "edge_app/tracking/detected_frame.h"
 

@@ -14,8 +14,8 @@
 #include <variant>
 #include <vector>
 
-#include "edge_app/pipeline/orientation_step.h"
-#include "edge_app/pipeline/self_calibration.h"
+#include "edge_app/self_calibration/self_calibration.h"
+#include "edge_app/step/orientation_step.h"
 
 namespace alidade::test {
 

@@ -26,7 +26,7 @@
 #include <vector>
 
 #include "core/model/calibration.h"
-#include "edge_app/pipeline/published_calibration.h"
+#include "edge_app/record/published_calibration.h"
 #include "platform/pan_tilt/pan_tilt_source.h"
 #include "platform/video/frame_source.h"
 #include "test/simulator/camera_model.h"

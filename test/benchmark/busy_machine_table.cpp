@@ -26,8 +26,8 @@
 #include <vector>
 
 #include "edge_app/pipeline/pipeline.h"
-#include "edge_app/pipeline/semaphore.h"
 #include "platform/system/clock.h"
+#include "platform/system/semaphore.h"
 #include "platform/video/mjpeg_source.h"
 #include "platform/video/rtp_source.h"
 #include "test/benchmark/calibration_load.h"

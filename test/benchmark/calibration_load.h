@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "edge_app/pipeline/realtime_stage.h"
-#include "edge_app/pipeline/self_calibration.h"
-#include "edge_app/pipeline/semaphore.h"
+#include "edge_app/self_calibration/self_calibration.h"
+#include "platform/system/semaphore.h"
 #include "test/benchmark/turning_camera.h"
 
 namespace alidade::benchmarks {

@@ -16,7 +16,7 @@
 #include <string_view>
 #include <vector>
 
-#include "edge_app/pipeline/orientation_step.h"
+#include "edge_app/step/orientation_step.h"
 #include "edge_app/tracking/built_in_detectors.h"
 #include "edge_app/tracking/frame_view.h"
 #include "edge_app/tracking/target_stage.h"

@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "edge_app/pipeline/detector_tap.h"
+#include "edge_app/taps/detector_tap.h"
 #include "edge_app/tracking/built_in_detectors.h"
 #include "edge_app/tracking/target_feed.h"
 #include "test/benchmark/latency_report.h"

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <memory>
 
-#include "core/tracking/plane_estimate.h"
+#include "core/ground/plane_estimate.h"
 #include "edge_app/tracking/detected_frame.h"
 #include "edge_app/tracking/frame_view.h"
 

@@ -3,8 +3,8 @@
 
 #include <cstdint>
 
-#include "edge_app/pipeline/frame_geometry.h"
-#include "edge_app/pipeline/orientation_record.h"
+#include "edge_app/record/frame_geometry.h"
+#include "edge_app/record/orientation_record.h"
 #include "test/fuzz/fuzz_target.h"
 
 namespace alidade {

@@ -6,7 +6,7 @@
 
 #include <filesystem>
 
-#include "test/edge_app/process.h"
+#include "test/support/process.h"
 #include "test/support/temporary_directory.h"
 
 namespace alidade {

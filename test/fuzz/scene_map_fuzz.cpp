@@ -14,7 +14,7 @@
 #include "edge_app/storage/scene_map_file.h"
 #include "edge_app/storage/scene_map_rows.h"
 #include "platform/system/whole_file.h"
-#include "test/edge_app/changing_scene_map.h"
+#include "test/edge_app/storage/changing_scene_map.h"
 #include "test/fuzz/fuzz_target.h"
 
 namespace alidade {

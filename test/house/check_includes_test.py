@@ -49,7 +49,8 @@ class CheckIncludes(unittest.TestCase):
     def test_lets_commands_join_the_rooms_of_the_program(self):
         code, output = check({"edge_app/commands/a.cpp": "".join(
             f'#include "edge_app/{room}/a.h"\n'
-            for room in ("commands", "pipeline", "tracking", "check", "storage", "output", "config"))})
+            for room in ("commands", "pipeline", "step", "record", "clocks", "self_calibration", "taps", "tracking", "check", "storage", "output",
+                         "config"))})
         self.assertEqual(code, 0, output)
 
     def test_accepts_the_include_folder_of_a_catkin_package(self):
@@ -73,6 +74,7 @@ class CheckIncludes(unittest.TestCase):
                 ("core/realtime/image/a.h", "#include <mutex>"),
                 ("core/calibration/a.cpp", '#include "platform/system/clock.h"'),
                 ("core/calibration/a.cpp", "#include <fstream>"),
+                ("core/ground/a.h", '#include "core/tracking/target_tracker.h"'),
                 ("platform/video/a.cpp", '#include "core/model/camera.h"'),
                 ("platform/video/a.cpp", '#include "platform/pan_tilt/pan_tilt_source.h"'),
                 ("platform/pan_tilt/a.cpp", '#include "platform/video/frame_source.h"'),
@@ -83,6 +85,10 @@ class CheckIncludes(unittest.TestCase):
                 ("edge_app/pipeline/a.cpp", '#include "test/support/guard.h"'),
                 ("edge_app/pipeline/a.h", '#include "edge_app/storage/calibration_store.h"'),
                 ("edge_app/pipeline/a.cpp", '#include "edge_app/tracking/target_feed.h"'),
+                ("edge_app/record/a.h", '#include "edge_app/step/orientation_step.h"'),
+                ("edge_app/clocks/a.h", '#include "edge_app/record/record_status.h"'),
+                ("edge_app/step/a.cpp", '#include "edge_app/self_calibration/self_calibration.h"'),
+                ("edge_app/taps/a.cpp", '#include "edge_app/pipeline/realtime_stage.h"'),
                 ("edge_app/check/a.h", '#include "edge_app/output/metrics.h"'),
                 ("edge_app/output/a.cpp", '#include "edge_app/config/config.h"'),
                 ("edge_app/storage/a.cpp", '#include "edge_app/config/yaml_section.h"'),

@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "core/model/rotation.h"
-#include "edge_app/pipeline/orientation_step.h"
+#include "edge_app/step/orientation_step.h"
 
 namespace alidade::test {
 

@@ -2,8 +2,8 @@
 
 #include <gtest/gtest.h>
 
-#include "core/tracking/image_plane.h"
-#include "test/core/tracking/watching_camera.h"
+#include "core/ground/image_plane.h"
+#include "test/core/ground/watching_camera.h"
 
 namespace alidade::test {
 namespace {

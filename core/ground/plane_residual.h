@@ -1,0 +1,38 @@
+#pragma once
+// One datum's residual: what the plane says of it, minus what was seen, and how that moves with the plane and with every error.
+//   height, place    p minus the datum                             heading          heading minus the datum, the short way
+//   level, vertical  up minus the datum, in its tangent basis       horizon          the direction's elevation
+//   point, bearing   direction minus the sight, in its tangent basis
+//   length           distance of the two places minus the datum
+//   upright          direction of (place of the foot, height) minus the head's sight, in its tangent basis: foot eliminated
+// Looks (plane_evidence.h) are unknowns beside the plane: turn = root z, z of unit variance, root root^T the look's covariance.
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "core/ground/plane_evidence.h"
+#include "core/ground/world_plane.h"
+
+namespace alidade::internal {
+
+struct PlaneState {
+  WorldPlane plane;
+  Eigen::VectorXd looks;  // z, three of each
+};
+
+// Of size 1: the second row is 0, its variance 1.
+struct DatumResidual {
+  int size = 2;
+  Vector2<double> r = Vector2<double>::Zero();
+  Matrix<double, 2, kPlaneParameterCount> J_plane = Matrix<double, 2, kPlaneParameterCount>::Zero();
+  Matrix<double, 2, 3> J_sight_look = Matrix<double, 2, 3>::Zero();  // by z of the sight's look
+  Matrix<double, 2, 3> J_other_look = Matrix<double, 2, 3>::Zero();
+  Matrix2<double> covariance = Matrix2<double>::Identity();  // by the datum's own errors
+};
+
+// roots: of the looks' covariances. False: the datum means nothing on this plane, as a foot above the horizon.
+[[nodiscard]] bool datum_residual(const PlaneDatum& datum,
+                                  const std::vector<Matrix3<double>>& roots,
+                                  const PlaneState& state, DatumResidual* out);
+
+}  // namespace alidade::internal

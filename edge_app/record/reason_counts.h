@@ -1,0 +1,39 @@
+#pragma once
+// ReasonCounts: why records were not in OE mode, or, where that is not asked for, had no orientation at all: how many had which
+// status. Fixed size; add() allocates nothing.
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+
+#include "edge_app/record/orientation_record.h"
+#include "edge_app/record/record_status.h"
+
+namespace alidade {
+
+class ReasonCounts {
+ public:
+  // wants_landmarks: OE mode is asked for.
+  explicit ReasonCounts(bool wants_landmarks = true) : wants_landmarks_(wants_landmarks) {}
+
+  void add(const OrientationRecord& record);
+  [[nodiscard]] std::int64_t of(RecordStatus status) const {
+    return counts_[static_cast<std::size_t>(status)];
+  }
+  // "not in OE mode: 12 records 'not calibrated', 3 'too few landmarks'", the most frequent first; empty: there were none. The zoom
+  // readings for which there was no calibration are named.
+  [[nodiscard]] std::string line() const;
+
+ private:
+  struct Range {
+    double low = 0;
+    double high = 0;
+  };
+
+  bool wants_landmarks_;
+  std::array<std::int64_t, kRecordStatuses.size()> counts_{};
+  std::optional<Range> zooms_;  // without a calibration
+};
+
+}  // namespace alidade

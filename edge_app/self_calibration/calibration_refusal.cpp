@@ -1,0 +1,63 @@
+#include "edge_app/self_calibration/calibration_refusal.h"
+
+#include <fmt/format.h>
+
+namespace alidade {
+namespace {
+
+constexpr double kFewPictures = 0.5;  // of those that the camera took
+
+CalibrationNeed need_of(const SessionCalibration& checked) {
+  const CalibrationResult& result = checked.result;
+  switch (result.status) {
+    case CalibrationStatus::kNoMotion:
+      return CalibrationNeed::kMotion;
+    case CalibrationStatus::kOneAxisOnly:
+      return checked.refusal.rfind("pan", 0) == 0 ? CalibrationNeed::kPan : CalibrationNeed::kTilt;
+    case CalibrationStatus::kConstantVelocity:
+      return CalibrationNeed::kAcceleration;
+    case CalibrationStatus::kTooFewLandmarks:
+      return CalibrationNeed::kTexture;
+    case CalibrationStatus::kTelemetryMismatch:
+      return CalibrationNeed::kAgreement;
+    case CalibrationStatus::kWeak:
+      return result.quality.weak_in_time ? CalibrationNeed::kAcceleration : CalibrationNeed::kTime;
+    default:
+      return CalibrationNeed::kTime;
+  }
+}
+
+// Of the pictures that the camera took meanwhile, where its clock or count tells how many those were.
+double share_taken_up(const CalibrationResult& result, std::size_t frames) {
+  const auto taken_up = static_cast<double>(frames);
+  return taken_up / (taken_up + result.image_timing.lost);
+}
+
+// Whether more pictures of the same motion would help.
+bool pictures_would_help(const CalibrationResult& result) {
+  switch (result.status) {
+    case CalibrationStatus::kOk:
+    case CalibrationStatus::kWeak:
+    case CalibrationStatus::kTelemetryMismatch:
+    case CalibrationStatus::kNotConverged:
+      return true;
+    default:
+      return false;
+  }
+}
+
+}  // namespace
+
+CalibrationRefusal why_refused(const SessionCalibration& checked, std::size_t frames) {
+  const CalibrationResult& result = checked.result;
+  const std::string why = fmt::format(" ({}): {}", to_string(result.status), checked.refusal);
+  const double taken_up = share_taken_up(result, frames);
+  if (taken_up >= kFewPictures || !pictures_would_help(result)) return {need_of(checked), why};
+  const std::string few =
+      fmt::format("only {:.0f} % of the pictures came here: is the machine too slow, or too busy?",
+                  100 * taken_up);
+  return {CalibrationNeed::kPictures,
+          result.status == CalibrationStatus::kTelemetryMismatch ? ": " + few : why + "; " + few};
+}
+
+}  // namespace alidade

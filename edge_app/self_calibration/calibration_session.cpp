@@ -1,0 +1,137 @@
+#include "edge_app/self_calibration/calibration_session.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "core/model/angle.h"
+
+namespace alidade {
+
+void CalibrationSession::clear() {
+  frames_.clear();
+  images_.clear();
+}
+
+double CalibrationSession::span_s() const {
+  return frames_.empty()
+             ? 0
+             : frames_.back().stamp.receive_time_s - frames_.front().stamp.receive_time_s;
+}
+
+double CalibrationSession::newest_s() const {
+  return frames_.empty() ? 0 : frames_.back().stamp.receive_time_s;
+}
+
+void CalibrationSession::add(const FrameTracks& tracks) {
+  KeptFrame frame{tracks.stamp, {}};
+  // Within one session a reconnection is none: whoever clears it sees to that.
+  frame.stamp.restarted = false;
+  frame.points.assign(tracks.points.begin(), tracks.points.begin() + tracks.count);
+  frames_.push_back(std::move(frame));
+  while (frames_.size() > limits_.max_frames || span_s() > limits_.window_s) frames_.pop_front();
+  const double oldest_s = frames_.front().stamp.receive_time_s;
+  while (!telemetry_.empty() &&
+         telemetry_.front().latest_time_s < oldest_s - limits_.telemetry_margin_s) {
+    telemetry_.pop_front();
+  }
+  images_.erase(std::remove_if(
+                    images_.begin(), images_.end(),
+                    [oldest_s](const KeptImage& image) { return image.receive_time_s < oldest_s; }),
+                images_.end());
+}
+
+void CalibrationSession::add(const PanTiltSample& sample) {
+  last_angle_ = {sample.pan_rad, sample.tilt_rad};
+  if (sample.restarted) telemetry_.clear();
+  telemetry_.push_back(sample);
+  if (telemetry_.size() > limits_.max_samples) telemetry_.pop_front();
+}
+
+bool CalibrationSession::wants_keyframe(const Camera<double>& camera) const {
+  if (frames_.empty() || telemetry_.empty()) return false;
+  const double apart = limits_.keyframes_apart * camera.width / camera.focal_length;
+  return std::all_of(images_.begin(), images_.end(), [&](const KeptImage& image) {
+    const double pan = wrap_angle(image.pan - last_angle_.pan) * std::cos(image.tilt);
+    return std::hypot(pan, image.tilt - last_angle_.tilt) > apart;
+  });
+}
+
+void CalibrationSession::add_keyframe(const ImageView& image) {
+  if (images_.size() >= limits_.max_keyframes) images_.erase(images_.begin());
+  const FrameStamp& stamp = frames_.back().stamp;
+  images_.push_back({stamp.frame, stamp.receive_time_s, last_angle_.pan, last_angle_.tilt,
+                     std::make_shared<PackedImage>(image)});
+  const auto bytes = [this] {
+    std::size_t sum = 0;
+    for (const KeptImage& kept : images_) sum += kept.image->bytes();
+    return sum;
+  };
+  while (images_.size() > 1 && bytes() > limits_.max_keyframe_bytes) images_.erase(images_.begin());
+}
+
+std::vector<FrameStamp> CalibrationSession::stamps() const {
+  std::vector<FrameStamp> stamps;
+  for (const KeptFrame& frame : frames_) stamps.push_back(frame.stamp);
+  return stamps;
+}
+
+std::vector<PanTiltSample> CalibrationSession::telemetry() const {
+  return {telemetry_.begin(), telemetry_.end()};
+}
+
+std::vector<CalibrationObservation> CalibrationSession::observations() const {
+  std::size_t count = 0;
+  for (const KeptFrame& frame : frames_) count += frame.points.size();
+  std::vector<CalibrationObservation> observations;
+  observations.reserve(count);
+  for (const KeptFrame& frame : frames_) {
+    for (const TrackedPoint& point : frame.points) {
+      observations.push_back(
+          {frame.stamp.frame, point.landmark, point.u_px, point.v_px, point.sigma_px});
+    }
+  }
+  return observations;
+}
+
+bool CalibrationSession::is_held_out(std::size_t place) {
+  constexpr std::size_t kEvery = 10;
+  return place % kEvery == kEvery / 2;
+}
+
+FrameTimes CalibrationSession::frame_times(const CalibrationResult& result) const {
+  FrameTimes time_of;
+  for (const FrameResult& frame : result.frames) time_of[frame.frame] = frame.time_s;
+  for (std::size_t i = 1; i + 1 < frames_.size(); ++i) {
+    const FrameStamp& before = frames_[i - 1].stamp;
+    const FrameStamp& after = frames_[i + 1].stamp;
+    const FrameStamp& own = frames_[i].stamp;
+    const auto from = time_of.find(before.frame);
+    const auto to = time_of.find(after.frame);
+    if (!is_held_out(i) || from == time_of.end() || to == time_of.end()) continue;
+    double share = 0.5;
+    if (before.sender_time_s && own.sender_time_s && after.sender_time_s) {
+      share = (*own.sender_time_s - *before.sender_time_s) /
+              (*after.sender_time_s - *before.sender_time_s);
+    } else if (before.sequence && own.sequence && after.sequence) {
+      share = static_cast<double>(*own.sequence - *before.sequence) /
+              static_cast<double>(*after.sequence - *before.sequence);
+    }
+    if (share > 0 && share < 1)
+      time_of[own.frame] = from->second + share * (to->second - from->second);
+  }
+  return time_of;
+}
+
+std::vector<Keyframe> CalibrationSession::keyframes(const CalibrationResult& result) const {
+  const FrameTimes time_of = frame_times(result);
+  std::vector<Keyframe> keyframes;
+  for (const KeptImage& image : images_) {
+    const auto time = time_of.find(image.frame);
+    if (time == time_of.end()) continue;
+    keyframes.push_back({time->second, image.image});
+  }
+  return keyframes;
+}
+
+}  // namespace alidade

@@ -1,0 +1,256 @@
+// SelfCalibration where the camera zooms: from the calibration of a dwell to a node of the zoom curve.
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "core/calibration/calibration_difference.h"
+#include "edge_app/self_calibration/keyframe_map.h"
+#include "edge_app/self_calibration/self_calibration.h"
+#include "edge_app/step/zoom_lookup.h"
+
+namespace alidade {
+namespace {
+
+ZoomFitOptions fit_options_of(const SessionCalibration& checked) {
+  ZoomFitOptions options = zoom_fit_options(checked.adjustment);
+  options.common_clock_sigma_s = checked.common_clock_sigma_s;
+  return options;
+}
+
+bool look_forward(const Calibration& c, Vector3<double>* d_b) {
+  const Vector2<double> middle(0.5 * c.camera.width, 0.5 * c.camera.height);
+  Vector3<double> d_c;
+  if (unproject(c.camera, middle, &d_c) != ProjectionStatus::kOk) return false;
+  *d_b = R_base_from_camera(c.mechanics, PanTilt<double>{}) * d_c;
+  return true;
+}
+
+// Whether a map that was made with one calibration is where another one looks: what the axes and the optical centre trade turns it,
+// and kept_map() allows for three times as much.
+bool look_alike(const Calibration& a, const Calibration& b) {
+  constexpr double kMost_rad = 3e-4;
+  Vector3<double> of_a;
+  Vector3<double> of_b;
+  return look_forward(a, &of_a) && look_forward(b, &of_b) && (of_a - of_b).norm() <= kMost_rad;
+}
+
+}  // namespace
+
+void SelfCalibration::take_zoom(double zoom, double changed_s) {
+  if (zoom_) {
+    zoom_changed_s_ = changed_s;
+    zooms_ = true;
+    nodes_.leave();
+  }
+  zoom_ = zoom;
+  odd_zoom_s_.reset();
+  begin_anew();
+}
+
+// What was taken for other zooms were this one's readings.
+void SelfCalibration::take_jitter(double zoom) {
+  messages_.push_back(
+      fmt::format("the zoom reading jitters by {:.2g} (one standard deviation): what differs by up "
+                  "to {:.2g} is taken for one zoom; calibration.zoom_tolerance says otherwise",
+                  steady_zoom_.sigma(), steady_zoom_.tolerance()));
+  if (archive_ != nullptr) archive_->set_zoom_tolerance(steady_zoom_.tolerance());
+  zooms_ = options_.zooms || !nodes_.empty();
+  odd_zoom_s_.reset();
+  zoom_ = zoom;
+}
+
+void SelfCalibration::judge_zoom(const PanTiltSample& sample) {
+  const double time_s = sample.latest_time_s;
+  if (sample.zoom && !std::isfinite(*sample.zoom)) {
+    say_once("the pan/tilt source tells a zoom reading that is no number; such are left out");
+  }
+  if (!sample.zoom || !std::isfinite(*sample.zoom)) {
+    if (zoom_ && time_s > last_zoom_s_ + options_.schedule.zoom_silence_s) {
+      say_once(fmt::format(
+          "no zoom reading for {:g} s; the last, {}, is taken to hold: does the pan/tilt link tell "
+          "the zoom in every answer?",
+          options_.schedule.zoom_silence_s, *zoom_));
+    }
+    return;
+  }
+  last_zoom_s_ = time_s;
+  const double zoom = steady_zoom_.add(time_s, *sample.zoom);
+  if (steady_zoom_.found_now()) {
+    take_jitter(zoom);
+    return;
+  }
+  if (zoom_ && std::abs(zoom - *zoom_) <= steady_zoom_.tolerance()) {
+    if (odd_zoom_s_) {
+      say_once(fmt::format(
+          "the zoom reading left {} and was back within {:g} s, as no lens can: taken for a glitch",
+          *zoom_, options_.schedule.zoom_glitch_s));
+    }
+    odd_zoom_s_.reset();
+    // The first reading is not yet the level of the rest.
+    if (steady_zoom_.rest() && !is_calibrated_here()) zoom_ = zoom;
+    return;
+  }
+  const bool stood = zoom_ && time_s > zoom_changed_s_ + options_.schedule.zoom_settles_s;
+  if (stood && !odd_zoom_s_) odd_zoom_s_ = time_s;
+  if (odd_zoom_s_ && time_s < *odd_zoom_s_ + options_.schedule.zoom_glitch_s) return;
+  // A movement has not ended before its last reading.
+  take_zoom(zoom, time_s);
+}
+
+// The zoom is another one: is it one that the camera had before, or one of the curve's?
+void SelfCalibration::look_for_stored() {
+  if (!zoom_ || is_calibrated_here() || now_s_ < zoom_changed_s_ + options_.schedule.zoom_arrives_s)
+    return;
+  const StoredCalibration* stored = archive_ == nullptr ? nullptr : archive_->find(zoom_);
+  // One that claims to hold for any zoom would have fitted already.
+  if (stored != nullptr && !stored->calibration.zoom) stored = nullptr;
+  auto found = std::make_shared<PublishedCalibration>();
+  const bool on_curve = nodes_.curve().at(*zoom_, &found->calibration) &&
+                        (stored == nullptr || has_free_centre(stored->calibration));
+  const double f_sigma = relative_focal_length_sigma(found->calibration);
+  const bool by_curve = on_curve && f_sigma <= kSharpFocalLength;
+  if (on_curve && !by_curve) {
+    // The real-time thread has the curve, and follows points, or begins a map, where nothing better will come.
+    if (options_.automatic)
+      say_once(
+          fmt::format("zoom {}: by the zoom curve the focal length is known to {:.2g} %: PT mode "
+                      "with that sigma "
+                      "until it is calibrated here",
+                      *zoom_, 100 * f_sigma));
+    return;
+  }
+  if (stored != nullptr && (!by_curve || look_alike(stored->calibration, found->calibration)))
+    found->map = kept_map(stored->map);
+  if (by_curve) {
+    found->name = "zoom curve";
+  } else if (stored != nullptr) {
+    found->calibration = stored->calibration;
+    found->name = stored->path.empty() ? "live" : stored->path;
+  } else {
+    return;
+  }
+  if (is_rejected(found->calibration)) return;
+  found->calibrated = true;
+  found->zoom_curve = nodes_.curve();
+  messages_.push_back(fmt::format("zoom {}: the calibration {} holds", *zoom_, found->name));
+  published_ = next_ = found;
+  fresh_wanted_ = false;
+  doubtful_ = false;
+  if (!makes_nodes()) contradiction_.restart();
+  // Which connection a stored one was made with is not known.
+  clock_offset_known_ = by_curve && nodes_.clock_is_known();
+  watch_interval_s_ =
+      makes_nodes() ? options_.schedule.next_try_s : options_.schedule.first_watch_s;
+  need_ = CalibrationNeed::kNothing;
+}
+
+// In a turn of its own: what is published is not to wait for it.
+void SelfCalibration::make_first_node() {
+  first_node_is_wanted_ = false;
+  if (!zoom_) return;
+  const SessionCalibration made = adjust(nullptr, true);
+  if (made.result.status == CalibrationStatus::kCancelled) return;
+  FirstNode node;
+  node.refusal = made.refusal;
+  node.result.calibration = made.result.calibration;
+  node.result.quality = made.result.quality;
+  node.result.exclusions = made.result.exclusions;
+  if (made.refusal.empty())
+    node.map = map_from_keyframes(made.result, session_.keyframes(made.result));
+  first_node_ = std::move(node);
+}
+
+// The camera has another zoom.
+void SelfCalibration::take_first_node() {
+  const FirstNode first = std::move(*first_node_);
+  first_node_.reset();
+  if (!nodes_.empty() || !makes_nodes()) return;
+  const Calibration& calibration = first.result.calibration;
+  if (!first.refusal.empty()) {
+    messages_.push_back(fmt::format(
+        "zoom {}: no node of the zoom curve until the camera is there again: with a free optical "
+        "centre, {}",
+        *calibration.zoom, first.refusal));
+    return;
+  }
+  nodes_.begin_anew(calibration);
+  nodes_.leave();
+  if (!first.clock_holds) nodes_.clock_began_anew();
+  store(first.result, first.map);
+}
+
+// Where there was no calibration, or a fresh one is wanted.
+void SelfCalibration::settle(SessionCalibration checked) {
+  if (!makes_nodes()) {
+    contradiction_.restart();
+    publish(checked);
+    first_node_is_wanted_ = true;
+    return;
+  }
+  ZoomAddition addition;
+  std::string why;
+  if (nodes_.add(checked.result.calibration, fit_options_of(checked), &addition, &why)) {
+    take_node(addition, &checked);
+  } else {
+    contradict_nodes(checked, why);
+  }
+}
+
+// Where there is one, with which it agrees.
+void SelfCalibration::refine_node(SessionCalibration alone) {
+  ZoomAddition addition;
+  std::string why;
+  if (!nodes_.add(alone.result.calibration, fit_options_of(alone), &addition, &why)) {
+    contradict_nodes(alone, why);
+    return;
+  }
+  contradiction_.restart();
+  if (!nodes_.has_visit() || !clock_offset_known_ ||
+      is_sharper(addition.calibration, published_->calibration,
+                 options_.schedule.worth_publishing)) {
+    take_node(addition, &alone);
+  }
+}
+
+void SelfCalibration::take_node(const ZoomAddition& addition, SessionCalibration* checked) {
+  if (!nodes_.has_visit()) watch_interval_s_ = options_.schedule.first_watch_s;
+  nodes_.take(addition);
+  contradiction_.restart();
+  checked->result.calibration = addition.calibration;
+  publish(*checked);
+  if (!addition.node) return;
+  const ZoomCurve& curve = nodes_.curve();
+  messages_.push_back(fmt::format("zoom curve: {} nodes from reading {} to {}", curve.visits(),
+                                  curve.first_reading(), curve.last_reading()));
+  // What it was made of is in the node.
+  session_.clear();
+}
+
+// It may be that reading alone: the others are kept until another one says so.
+void SelfCalibration::contradict_nodes(const SessionCalibration& alone, const std::string& why) {
+  messages_.push_back(fmt::format("zoom {}: not of the zoom curve: {}", *zoom_, why));
+  const auto verdict = contradiction_.judge(std::numeric_limits<double>::infinity());
+  if (fresh_wanted_ || verdict == ContradictionJudge::Verdict::kBelieved) {
+    contradiction_.restart();
+    begin_nodes_anew(alone);
+  } else {
+    publish(alone);
+  }
+}
+
+void SelfCalibration::begin_nodes_anew(const SessionCalibration& alone) {
+  const std::string aside = archive_ == nullptr ? "" : archive_->set_zooms_aside();
+  messages_.push_back(
+      fmt::format("another camera or lens than the zoom curve's, or moved on its mount, or its "
+                  "reading does not "
+                  "follow the lens: a new curve begins at zoom {}{}{}",
+                  *zoom_, aside.empty() ? "" : "; ", aside));
+  nodes_.begin_anew(alone.result.calibration);
+  rejected_.clear();
+  publish(alone);
+}
+
+}  // namespace alidade

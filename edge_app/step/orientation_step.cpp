@@ -1,0 +1,371 @@
+#include "edge_app/step/orientation_step.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <stdexcept>
+#include <string>
+
+#include "edge_app/step/frame_observations.h"
+
+namespace alidade {
+
+OeOptions oe_options(const Camera<double>& camera) {
+  constexpr double kLeastColumns = 24;
+  OeOptions options;
+  options.max_width = camera.width;
+  options.max_height = camera.height;
+  options.maker.cell_size_px =
+      std::max(LandmarkMakerOptions::kLeastCellSize_px,
+               std::min(options.maker.cell_size_px, camera.width / kLeastColumns));
+  return options;
+}
+
+std::unique_ptr<OeMode> make_oe_mode(const OeOptions& options) {
+  const char* error = nullptr;
+  if (!options.validate(&error)) throw std::invalid_argument(std::string("OE mode: ") + error);
+  return std::make_unique<OeMode>(options);
+}
+
+OrientationStep::OrientationStep(const OrientationStepOptions& options)
+    : options_(options),
+      video_clock_(options.video_clock, options.video_stamp_sigma_s, options.wait_for_pace),
+      telemetry_clock_(options.telemetry_clock),
+      telemetry_(empty_telemetry(false)),
+      steady_zoom_(options.zoom_tolerance),
+      // A stored calibration was made with another connection.
+      minimum_delay_sigma_s_(
+          options.other_connection && options.calibrated ? options.minimum_delay_sigma_s : 0),
+      scene_lens_(options.calibration) {
+  if (!options.oe) return;
+  OeOptions oe = *options.oe;
+  oe.max_width = options.calibration.camera.width;
+  oe.max_height = options.calibration.camera.height;
+  oe_ = make_oe_mode(oe);
+  oe_->reset(options.calibration, options.map, focal_length());
+  if (!options.follow_points && options.has_telemetry) return;
+  StartUpOptions start_up;
+  start_up.width = oe.max_width;
+  start_up.height = oe.max_height;
+  start_up.max_points = kMaxFramePoints;
+  start_up_ = std::make_unique<StartUpTracker>(start_up);
+}
+
+namespace {
+
+// What a delay errs by, or a clock that wanders, is the same in many frames: more of them do not average it. At another time
+// the rate is another, too: by the acceleration a, and the angle by its second order, a t^2 / 2.
+void allow_for_lasting_error(double sigma_s, InterpolatedPanTilt* measured) {
+  if (!(sigma_s > 0)) return;
+  const double square = sigma_s * sigma_s;
+  const std::array<double, 2> rate = {measured->rate.pan, measured->rate.tilt};
+  double share = 0;
+  for (int axis = 0; axis < 2; ++axis) {
+    const double of_rate = rate[static_cast<std::size_t>(axis)];
+    double& variance = measured->covariance(axis, axis);
+    const double lasting = square * of_rate * of_rate;
+    if (lasting > 0) share = std::max(share, std::min(1.0, lasting / variance));
+    variance += measured->acceleration_square[axis] * square * square / 4;
+    measured->covariance(2 + axis, 2 + axis) += measured->acceleration_square[axis] * square;
+  }
+  measured->correlation_time_s =
+      std::max(measured->correlation_time_s, share * DelayWander::kMemory_s);
+}
+
+}  // namespace
+
+OrientationStep::Telemetry OrientationStep::empty_telemetry(bool filtered) const {
+  // Filtered times share the error of their line; polled ones have each an error of its own, which a
+  // bound beyond every stamp's sigma says.
+  constexpr double kAllOwn_s = 1e3;
+  TelemetryNoise noise = options_.telemetry_noise;
+  if (!filtered) noise.period_sigma_s = kAllOwn_s;
+  return Telemetry(noise, options_.telemetry_limits);
+}
+
+// A stall leaves a question, or its answer, lying about for long; when in that time the answer was true nobody
+// knows, nor how fast the head turned, where it is one of the first two, which give the rate.
+bool OrientationStep::is_stalled_poll(const PanTiltSample& sample) {
+  const double width_s = sample.latest_time_s - sample.earliest_time_s;
+  const std::optional<double> newest_s = telemetry_.newest_time();
+  const bool begins =
+      telemetry_.size() < 2 ||
+      sample.latest_time_s > newest_s.value_or(0) + options_.telemetry_limits.max_gap_s;
+  const double longest_s = begins ? 0.02 : 0.1;  // no stall is shorter
+  constexpr double kTimesTheUsual = 2.5;
+  constexpr double kGrowth = 1.5;  // of the usual, a poll: a device may be slow, or become slow
+  const bool stalled = width_s > std::max(longest_s, kTimesTheUsual * usual_poll_s_);
+  usual_poll_s_ = width_s < usual_poll_s_ ? usual_poll_s_ + (width_s - usual_poll_s_) / 4
+                                          : std::min(width_s, kGrowth * usual_poll_s_);
+  return stalled;
+}
+
+void OrientationStep::add_telemetry(const PanTiltSample& sample) {
+  const std::optional<ClockEstimate> clock = telemetry_clock_.update(
+      sample.latest_time_s, sample.device_time_s, sample.sequence, sample.restarted);
+  const bool filtered = clock.has_value();
+  if (sample.restarted || filtered != telemetry_filtered_ || (clock && clock->restarted)) {
+    telemetry_ = empty_telemetry(filtered);
+    telemetry_filtered_ = filtered;
+    if (oe_) oe_->forget_pending();
+  }
+  telemetry_lost_ = false;
+  const bool has_zoom = sample.zoom && std::isfinite(*sample.zoom);
+  if (has_zoom) take_zoom(sample.latest_time_s, *sample.zoom);
+
+  TelemetrySample timed;
+  timed.pan = sample.pan_rad;
+  timed.tilt = sample.tilt_rad;
+  const double width_s = sample.latest_time_s - sample.earliest_time_s;
+  const bool line_holds = clock && clock->state == ClockState::kLocked;
+  if (options_.wait_for_pace && is_stalled_poll(sample) && !line_holds) return;
+  if (clock) {
+    timed.time_s = clock->time_s;
+    timed.time_sigma_s = clock->sigma_s;
+  } else {
+    timed.time_s = sample.latest_time_s - width_s / 2;
+    timed.time_sigma_s = width_s > 0 ? width_s / std::sqrt(12.0) : options_.telemetry_stamp_sigma_s;
+  }
+  if (has_zoom) zoom_lookup_.add(timed.time_s, *zoom_);
+  // What the buffer refuses (a duplicate, a value that is not finite) it counts, and the records'
+  // sigma says the rest.
+  static_cast<void>(telemetry_.push(timed));
+  settle_pending_frames();
+}
+
+void OrientationStep::settle_pending_frames() {
+  const std::optional<double> newest_s = telemetry_.newest_time();
+  if (!oe_ || !newest_s) return;
+  TelemetryLookUp look_up;
+  while (oe_->pending(*newest_s, &look_up)) {
+    InterpolatedPanTilt late;
+    const QueryStatus query = telemetry_.query(look_up.time_s, look_up.time_sigma_s, &late);
+    allow_for_lasting_error(lasting_sigma_s_, &late);
+    oe_->settle_pending(query == QueryStatus::kOk ? &late : nullptr);
+  }
+}
+
+void OrientationStep::telemetry_lost() { telemetry_lost_ = true; }
+
+// Of the same curve, by what all its zooms share, and at a zoom to which OE mode has followed the lens. What has only begun there is worth
+// less than what was seen from there before.
+bool OrientationStep::keeps_map(const PublishedCalibration& published) const {
+  if (!oe_ || !options_.calibrated || !published.calibrated || !oe_->lens_has_moved()) return false;
+  if (!oe_->has_followed_lens() && !published.map.landmarks.empty()) return false;
+  const Calibration& now = options_.calibration;
+  const Calibration& next = published.calibration;
+  Calibration by_curve;
+  return oe_->statistics().status == OeStatus::kOk && next.zoom &&
+         published.zoom_curve.at(*next.zoom, &by_curve) &&
+         by_curve.camera.focal_length == next.camera.focal_length &&
+         now.line_delay == next.line_delay && now.clock_offset == next.clock_offset &&
+         now.mechanics.pan_axis == next.mechanics.pan_axis &&
+         now.mechanics.tilt_axis == next.mechanics.tilt_axis &&
+         now.mechanics.pan_scale == next.mechanics.pan_scale &&
+         now.mechanics.tilt_scale == next.mechanics.tilt_scale;
+}
+
+void OrientationStep::adopt(const PublishedCalibration& published) {
+  const bool keep = keeps_map(published);
+  options_.calibration = published.calibration;
+  options_.calibrated = published.calibrated;
+  zoom_at_adoption_ = zoom_;
+  minimum_delay_sigma_s_ = 0;
+  options_.zoom_curve = published.zoom_curve;
+  note_curve_here();
+  if (oe_ && !keep) oe_->reset(published.calibration, published.map, focal_length());
+}
+
+OrientationRecord OrientationStep::empty_record() const {
+  OrientationRecord record;
+  record.calibrated = options_.calibrated && zoom_fits();
+  record.camera = pack(options_.calibration);
+  record.zoom = told_zoom_;
+  return record;
+}
+
+OrientationRecord OrientationStep::video_lost(double now_s) const {
+  OrientationRecord record = empty_record();
+  record.receive_time_s = now_s;
+  record.status = RecordStatus::kVideoLost;
+  return record;
+}
+
+OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const ImageView& image,
+                                             StepEvents* events) {
+  const FrameTime frame_time = video_clock_.update(stamp);
+  const ClockEstimate& clock = frame_time.clock;
+  events->video_clock_restarted = clock.restarted;
+  events->video_delay_stepped = clock.delay_stepped;
+  events->video_delay_wander_s = frame_time.wander_s;
+  events->stamps_left_out = frame_time.stamp_rate_error;
+  events->stamps_count = frame_time.stamps_count;
+  if (clock.restarted || clock.delay_stepped)
+    minimum_delay_sigma_s_ = std::hypot(options_.minimum_delay_sigma_s, frame_time.moved_s);
+  answered_by_oe_ = false;
+  image_ = image;
+  tracks_.stamp = stamp;
+  tracks_.stamp.receive_time_s -= frame_time.delay_shift_s;  // as if the delay had not stepped
+  if (frame_time.stamps_left_out) tracks_.stamp.sender_time_s.reset();
+  tracks_.time_s = clock.time_s;
+  tracks_.time_is_of_use = frame_time.of_use;
+  tracks_.clock_restarted = clock.restarted;
+  tracks_.delay_stepped = clock.delay_stepped;
+  tracks_.delay_wander_s = frame_time.wander_s;
+  tracks_.telemetry_too_old = false;
+  tracks_.tracker = FrameTracks::Tracker::kNone;
+
+  OrientationRecord record = empty_record();
+  record.frame = stamp.frame;
+  record.receive_time_s = stamp.receive_time_s;
+  if (!frame_time.known) {
+    record.status = RecordStatus::kTimeUnknown;
+    // The map would learn from an angle of another time.
+    if (finds_landmarks()) image_ = ImageView{};
+    return record;
+  }
+  record.time_s = clock.time_s;
+  const Calibration& calibration = options_.calibration;
+  const double to_middle_row_s = calibration.line_delay * (0.5 * calibration.camera.height);
+  InterpolatedPanTilt measured;
+  const double telemetry_time_s = clock.time_s + calibration.clock_offset + to_middle_row_s;
+  lens_time_s_ = telemetry_time_s;
+  lasting_sigma_s_ = std::hypot(minimum_delay_sigma_s_, frame_time.off_line_s);
+  double time_sigma_s = std::hypot(clock.sigma_s, minimum_delay_sigma_s_);
+  QueryStatus query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
+  if (repeated_images_.judge(image, clock.time_s, has_result(query) ? &measured : nullptr,
+                             calibration.camera.focal_length)) {
+    record.time_s.reset();
+    record.status = RecordStatus::kImageRepeated;
+    image_ = ImageView{};
+    return record;
+  }
+  if (repeated_images_.sigma_s() > 0) {
+    time_sigma_s = std::hypot(time_sigma_s, repeated_images_.sigma_s());
+    query = telemetry_.query(telemetry_time_s, time_sigma_s, &measured);
+  }
+  if (!options_.has_telemetry) {
+    record.time_sigma_s = time_sigma_s;
+    record.clock_locked = clock.state == ClockState::kLocked;
+    orient_by_scene(image, &record);
+    return record;
+  }
+  allow_for_lasting_error(lasting_sigma_s_, &measured);
+  if (const auto newest_s = telemetry_.newest_time())
+    record.telemetry_age_s = telemetry_time_s - *newest_s;
+  record.time_sigma_s = time_sigma_s;
+  record.clock_locked = clock.state == ClockState::kLocked;
+  record.status = status_of_telemetry(query, telemetry_lost_, record.clock_locked);
+  tracks_.telemetry_too_old = record.status == RecordStatus::kTelemetryTooOld;
+  const bool elsewhere = !zoom_fits() || zoom_moved(telemetry_time_s);
+  // What is left of a map that was begun at another zoom is that zoom's lens.
+  if (!elsewhere && oe_ && options_.calibrated && oe_->lens_has_moved() && oe_->map().size() == 0)
+    oe_->reset(options_.calibration, focal_length());
+  if (elsewhere || (oe_ && oe_->lens_has_moved())) {
+    FrameLens lens;
+    if (follows_lens() && look_up_lens(telemetry_time_s, &lens)) {
+      record.calibrated = true;
+      record.camera = pack(lens.calibration);
+      const bool excluded = reading_excluded_;
+      orient(has_result(query) ? &measured : nullptr, image, &lens, &record);
+      events->zoom_contradicted = !excluded && reading_excluded_;
+      return record;
+    }
+  }
+  if (elsewhere) {
+    // The map is another zoom's.
+    image_ = finds_landmarks() ? ImageView{} : image_;
+    orient_between(has_result(query) ? &measured : nullptr, telemetry_time_s, &record);
+    return record;
+  }
+  orient(has_result(query) ? &measured : nullptr, image, nullptr, &record);
+  return record;
+}
+
+void OrientationStep::orient_between(const InterpolatedPanTilt* measured, double telemetry_time_s,
+                                     OrientationRecord* record) {
+  const double readout_s =
+      std::abs(options_.calibration.line_delay) * options_.calibration.camera.height;
+  Calibration between;
+  // Neither the lens nor the axes of another zoom are this one's.
+  if (!zoom_lookup_.calibration(options_.zoom_curve, telemetry_time_s, readout_s, &between)) {
+    record->status = RecordStatus::kOtherZoom;
+    return;
+  }
+  record->calibrated = true;
+  record->camera = pack(between);
+  if (measured == nullptr) return;
+  FrameOrientation frame;
+  if (!pt_orientation(between, *record->time_s, *measured, &frame) ||
+      (oe_ && !oe_->put_into_base(&frame))) {
+    record->status = RecordStatus::kNotFinite;
+    return;
+  }
+  record->mode = RecordMode::kPt;
+  if (oe_) {
+    record->status = zoom_on_curve_ ? RecordStatus::kFocalLengthUnsure : RecordStatus::kZoomMoves;
+  }
+  record->orientation = orientation_of(frame);
+  note_tie(record);
+}
+
+void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageView& image,
+                             const FrameLens* lens, OrientationRecord* record) {
+  FrameOrientation frame;
+  if (finds_landmarks()) {
+    const OeStatus status = oe_->process(image, *record->time_s, measured, lens, &frame);
+    answered_by_oe_ = true;
+    // That the frame's time is not yet known well, sigma says too.
+    if (measured != nullptr && status != OeStatus::kOk)
+      record->status = status_of_landmarks(status);
+  } else if (measured != nullptr &&
+             pt_orientation(options_.calibration, *record->time_s, *measured, &frame) && oe_ &&
+             !oe_->put_into_base(&frame)) {
+    // Where this fails the frame stays without orientation.
+    frame = FrameOrientation();
+  }
+  if (frame.mode == OrientationMode::kNone) {
+    if (measured != nullptr) record->status = RecordStatus::kNotFinite;
+    return;
+  }
+  record->mode = frame.mode == OrientationMode::kOe ? RecordMode::kOe : RecordMode::kPt;
+  if (oe_ && !answered_by_oe_) record->status = RecordStatus::kNotCalibrated;
+  record->landmarks = frame.landmarks;
+  if (lens == nullptr) allow_for_begun_movement(&frame.calibration);
+  if (focal_length() == FocalLength::kLearnt) record->camera = pack(frame.calibration);
+  if (record->mode == RecordMode::kOe) {
+    record->residual_px = residual_rms(*oe_);
+    note_found_lens(frame);
+    if (lens != nullptr) judge_reading(frame);
+  }
+  record->orientation = orientation_of(frame);
+  note_tie(record);
+}
+
+void OrientationStep::maintain() {
+  if (finds_landmarks()) {
+    oe_->maintain();
+    if (image_.valid()) tracks_.tracker = FrameTracks::Tracker::kOe;
+  } else if (start_up_ && image_.valid()) {
+    if (start_up_->process(image_) != StartUpStatus::kBadImage)
+      tracks_.tracker = FrameTracks::Tracker::kStartUp;
+  }
+  image_ = {};
+}
+
+void OrientationStep::get_tracks(FrameTracks* tracks) const {
+  *tracks = tracks_;
+  tracks->count = 0;
+  if (tracks_.tracker == FrameTracks::Tracker::kStartUp) alidade::get_tracks(*start_up_, tracks);
+  if (tracks_.tracker == FrameTracks::Tracker::kOe) alidade::get_tracks(*oe_, tracks);
+}
+
+void OrientationStep::get_landmarks(FrameLandmarks* landmarks) const {
+  landmarks->kind = FrameLandmarks::Kind::kNone;
+  landmarks->count = 0;
+  if (tracks_.tracker == FrameTracks::Tracker::kStartUp)
+    alidade::get_landmarks(*start_up_, landmarks);
+  if (tracks_.tracker == FrameTracks::Tracker::kOe) alidade::get_landmarks(*oe_, landmarks);
+}
+
+}  // namespace alidade
