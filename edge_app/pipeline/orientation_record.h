@@ -61,7 +61,7 @@ struct OrientationRecord {
   struct Localized {
     double age_s = 0;      // of that frame
     double sigma_rad = 0;  // that the tie adds to a direction: root mean square of pan and tilt
-    // rad, to be added to telemetry's true angles to be in the map's base
+    // rad, to be added to telemetry's true angles to be in the map's base.
     PanTilt<double> telemetry_zero;
   };
   std::optional<Localized> localized;

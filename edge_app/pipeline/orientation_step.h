@@ -215,7 +215,7 @@ class OrientationStep {
   ZoomLookup zoom_lookup_;
   std::optional<double> zoom_at_adoption_;  // the zoom of a calibration that has none
   double minimum_delay_sigma_s_ = 0;
-  // s: the part of a frame's time error that neighbouring frames share
+  // s: the part of a frame's time error that neighbouring frames share.
   double lasting_sigma_s_ = 0;
   RepeatedImages repeated_images_;
   SceneStart scene_start_;           // without telemetry

@@ -28,7 +28,7 @@ enum class RecordStatus : std::uint8_t {
   kClockWarmingUp,  // mode PT or OE: too few frames since the (re)start to know the time well
   kTimeUnknown,     // the frame may have waited for an unknown time (FrameClock)
   kVideoLost,       // no connection to the video source
-  // no connection to the pan/tilt source; its last angle is too old, or there were fewer than two
+  // No connection to the pan/tilt source; its last angle is too old, or there were fewer than two.
   kTelemetryLost,
   kTelemetryMissing,  // fewer than two usable samples so far
   // The frame lies more than TelemetryLimits::max_extrapolation_s beyond the newest trusted angle.

@@ -59,7 +59,7 @@ class UnevenArrivals {
   }
 
  private:
-  // of the usual interval: the picture had waited behind another
+  // Of the usual interval: the picture had waited behind another.
   static constexpr double kShort = 0.6;
   static constexpr double kLearn = 0.005;
 
