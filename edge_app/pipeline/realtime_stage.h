@@ -182,8 +182,8 @@ class RealtimeStage {
   bool unheard_frame_restart_ = false;
   bool unheard_delay_step_ = false;
   bool unheard_sample_restart_ = false;
-  TappedFrame tapped_frame_;            // likewise
-  LocalizableFrame localizable_frame_;  // likewise
+  TappedFrame tapped_frame_;            // likewise too large for its stack
+  LocalizableFrame localizable_frame_;  // likewise too large for its stack
   Semaphore feed_;
   Semaphore input_;
   Semaphore output_;
