@@ -17,7 +17,8 @@ StampKind kind_of(const ClockedStamp& stamp) {
                              : StampKind::kArrival;
 }
 
-// Median slope of receive over sender times, half the stream apart: jitter of single frames does not matter.
+// Median slope of receive over sender times, taken half the stream apart, so jitter of single
+// frames does not matter.
 void measure_raw_rate(const std::vector<ClockedStamp>& stamps, ClockReport* report) {
   constexpr std::size_t kLeastPairs = 10;
   const std::size_t half = stamps.size() / 2;
@@ -34,9 +35,8 @@ void measure_raw_rate(const std::vector<ClockedStamp>& stamps, ClockReport* repo
   report->raw_rate_sigma = slope->deviation / std::sqrt(static_cast<double>(slope->count));
 }
 
-// Quartz keeps 200 millionths, the filter's own limit. Half a percent is what a steady drift of the
-// arrival by 50 ms looks like in 10 s; what is beyond it, and beyond chance, is no clock in
-// seconds.
+// Quartz keeps 200 millionths, the filter's own limit. A steady drift of the arrivals by 50 ms
+// looks like half a percent in 10 s. A rate beyond that, and beyond chance, is no clock in seconds.
 bool is_no_clock(const ClockReport& clock) {
   constexpr double kNoClock = 5e-3;
   constexpr double kChance = 6;  // standard deviations
@@ -44,7 +44,7 @@ bool is_no_clock(const ClockReport& clock) {
          std::abs(*clock.raw_rate_error) > kNoClock + kChance * clock.raw_rate_sigma;
 }
 
-// Whether items were left out of which the stamps know nothing: these go on by whole steps, each
+// Whether items were left out without the stamps knowing: the stamps go on in whole steps, each
 // shorter than the time that passed.
 bool do_stamps_count(const std::vector<ClockedStamp>& stamps) {
   constexpr double kSame_s = 1.5e-4;
@@ -71,8 +71,7 @@ bool do_stamps_count(const std::vector<ClockedStamp>& stamps) {
          static_cast<double>(left_out) > kShare * all;
 }
 
-// The longest part of a stream in which the sender's clock goes on, and no item stood still on its
-// way.
+// The longest part of a stream in which the sender's clock runs on and no item was held up.
 std::vector<ClockedStamp> longest_part(const std::vector<ClockedStamp>& stamps) {
   constexpr double kStoodStill_s = 0.5;
   std::vector<ClockedStamp> longest;
@@ -97,7 +96,7 @@ std::vector<ClockedStamp> longest_part(const std::vector<ClockedStamp>& stamps) 
   return longest;
 }
 
-// A few in a row without a stamp say nothing of the others.
+// A few items in a row without a stamp say nothing about the others.
 StampKind kind_at_end(const std::vector<ClockedStamp>& stamps) {
   const auto last = std::find_if(stamps.rbegin(), stamps.rend(), [](const ClockedStamp& stamp) {
     return kind_of(stamp) != StampKind::kArrival;
@@ -114,7 +113,7 @@ ClockReport check_clock(const std::vector<ClockedStamp>& stamps, const ClockFilt
   CaptureClock clock(options);
   std::vector<double> times;
   std::int64_t reconnections = 0;
-  std::size_t line_since = 0;  // the item at which the filter's line last began anew
+  std::size_t line_since = 0;  // the item at which the filter's line last restarted
   for (const ClockedStamp& stamp : stamps) {
     const bool reconnected = stamp.restarted && !times.empty();
     const std::optional<ClockEstimate> estimate =
@@ -133,7 +132,7 @@ ClockReport check_clock(const std::vector<ClockedStamp>& stamps, const ClockFilt
     report.counters = filter.counters();
     report.counters.restarts = std::max<std::int64_t>(0, report.counters.restarts - reconnections);
     report.delay_shift_s = filter.delay_shift_s();
-    // The last line knows more than the answers that came while it was found.
+    // The last line is better known than the answers while it was being found.
     std::vector<double> lateness;
     for (std::size_t i = line_since; i < stamps.size(); ++i) {
       if (kind_of(stamps[i]) != report.kind) continue;
@@ -145,7 +144,7 @@ ClockReport check_clock(const std::vector<ClockedStamp>& stamps, const ClockFilt
     }
     report.lateness_s = spread_of(lateness);
     if (report.kind == StampKind::kSender) {
-      // Not since the line began: what is no clock begins it anew again and again.
+      // Not only since the line began: stamps that are no clock restart it again and again.
       const std::vector<ClockedStamp> part = longest_part(stamps);
       measure_raw_rate(part, &report);
       report.usable = !is_no_clock(report);

@@ -1,10 +1,11 @@
 #pragma once
-// What a stream's stamps are worth: the pipeline's own clock filter (capture_clock.h) run over them, and what its line
-// leaves over.
-//
-//   lateness  of an item: its receive time less the filter's last line at its sender's time (or count)
-//   raw rate  host seconds a sender's second by the median slope over half of the stream, without the filter's prior: a
-//             clock that is none shows there, and not in a filter that believes in quartz
+// How good a stream's time stamps are: runs the pipeline's own clock filter (capture_clock.h) over
+// them.
+//   lateness  of an item: receive time minus the filter's final line at the item's sender time or
+//             count
+//   raw rate  host seconds per sender second: the median slope over half of the stream, without the
+//             filter's prior. It reveals stamps that are no clock; the filter, which assumes
+//             quartz, does not.
 // Seconds. Pure functions; they allocate and do not throw, whatever the stamps hold.
 
 #include <cstdint>
@@ -20,25 +21,25 @@ namespace alidade {
 
 enum class StampKind : std::uint8_t { kArrival, kSequence, kSender };
 
-// What the filter makes of a stream's stamps.
+// The filter's result for a stream's stamps.
 struct ClockReport {
   StampKind kind = StampKind::kArrival;
   ClockState state = ClockState::kWarmingUp;
-  double rate_error = 0;   // host seconds a sender's second, less 1, by the filter; 0 for counts
-  double period_s = 0;     // of a count, by the filter
+  double rate_error = 0;   // host s per sender s, less 1, by the filter; 0 for counts
+  double period_s = 0;     // of one count, by the filter
   double sigma_s = 0;      // of the line at the last item
-  ClockCounters counters;  // restarts at a reconnection not included
+  ClockCounters counters;  // without restarts at a reconnection
   double delay_shift_s = 0;
   std::optional<Spread> lateness_s;
-  // The same rate without the filter's prior, with its standard deviation: what a broken clock shows.
+  // The same rate without the filter's prior, with its standard deviation: shows a broken clock.
   std::optional<double> raw_rate_error;
   double raw_rate_sigma = 0;
-  // False: its stamps are no times (see judge_clock); those of the items are their arrivals.
+  // False: the stamps are no times (see judge_clock()), and the items' times are their arrivals.
   bool usable = true;
-  bool counts = false;  // because they count items
+  bool counts = false;  // not usable because they count items
 };
 
-// An item of a stream as its clock sees it.
+// What a clock needs of an item.
 struct ClockedStamp {
   double receive_time_s = 0;
   std::optional<double> sender_time_s;
@@ -46,16 +47,17 @@ struct ClockedStamp {
   bool restarted = false;
 };
 
-// *time_s (if not null): each item's time by the last line; the receive time without a clock, or
-// with one that cannot be one.
+// *time_s (if not null): each item's time by the final line. The receive time if there is no clock,
+// or no usable one.
 [[nodiscard]] ClockReport check_clock(const std::vector<ClockedStamp>& stamps,
                                       const ClockFilterOptions& options,
                                       std::vector<double>* time_s = nullptr);
 
-// `what`: "video URL". A clock that cannot be one, or that jumps, is a problem; a minimum delay that shifts, advice.
+// `what`: "video URL". A clock that is none, or jumps, is a problem. A step of the least delay is
+// advice.
 void judge_clock(const ClockReport& clock, const std::string& what, Findings* findings);
 
-// In words; empty: its stamps are times, or it bears none.
+// In words; empty if the stamps are times, or there are none.
 [[nodiscard]] std::string why_no_times(const ClockReport& clock);
 
 [[nodiscard]] std::string describe(const ClockReport& clock);

@@ -1,9 +1,9 @@
 #pragma once
-// What a check says of a link: measured numbers are for the report, a finding is something to do.
+// A finding of a check: something to do about a link. (Measured numbers go to the report instead.)
 //   problem  run would refuse, stop, or answer wrongly or much worse than it could: exit code 1
-//   advice   works, and would work better
-// One line: what is wrong, where, what would be right. The rules stand with their reasons beside the code that
-// applies them.
+//   advice   works, and could work better
+// One line: what is wrong, where, what would be right. Each rule stands, with its reason, beside
+// the code that applies it.
 
 #include <string>
 #include <utility>
@@ -20,7 +20,7 @@ struct Finding {
 
 using Findings = std::vector<Finding>;
 
-// For a person: label and text.
+// For people: label and text.
 using ReportLines = std::vector<std::pair<std::string, std::string>>;
 
 inline void add_problem(Findings* findings, std::string text) {

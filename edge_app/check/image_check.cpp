@@ -15,15 +15,16 @@ double median_of(const std::vector<double>& values) {
   return spread ? spread->median : 0;
 }
 
-// An image in which 98 % of the pixels lie within so few grey levels shows nothing: corners need
-// contrasts of 10 (LandmarkMakerOptions::corner_threshold).
+// An image with 98 % of its pixels within so few grey levels shows nothing: corners need contrasts
+// of 10 (LandmarkMakerOptions::corner_threshold).
 constexpr double kNothing = 10;
 
 void judge(ImageReport* report, const ImageNeeds& needs) {
-  // OE mode takes a view with fewer landmarks than 10 as unknown, and one with fewer than 50 as poor (oe_mode.cpp).
+  // With fewer than 10 landmarks OE mode takes a view as new (LookOptions::few), with fewer than 50
+  // as empty (LandmarkMakerOptions::empty_view).
   constexpr double kTooFewPoints = 10;
   constexpr double kFewPoints = 50;
-  // A corner in what is saturated does not exist; a third of the image lost is worth another exposure.
+  // Saturated parts show no corners. If a third of the image is lost, another exposure is worth it.
   constexpr double kMuchSaturated = 1.0 / 3;
   const Severity severity = needs.landmarks ? Severity::kProblem : Severity::kAdvice;
   const auto add = [&](Severity as, const std::string& text) {
@@ -112,7 +113,8 @@ void ImageCheck::add(std::int64_t frame, const ImageView& image, bool connected)
   if (status == StartUpStatus::kBadImage) return;
   points_.push_back(tracker_->observation_count());
   noise_.push_back(tracker_->statistics().noise);
-  if (status == StartUpStatus::kLost) return;  // the next one is compared with the same frame again
+  // The next image is compared with the same frame again.
+  if (status == StartUpStatus::kLost) return;
   if (status == StartUpStatus::kOk && connected && before_) {
     shifts_.push_back({*before_, frame, tracker_->statistics().shift});
   }

@@ -1,14 +1,14 @@
 #pragma once
-// Whether images show what landmarks need, and how the scene moves through them, one image after the other: none is
+// Checks whether images show what landmarks need, and how the scene moves through them. No image is
 // kept.
-//
-//   light    histogram of every 8th pixel of every 8th row. Dark: grey levels up to 16, which is black in video's
-//            narrow range. Saturated: the topmost level that occurs and the one below it, if that is 230 or more: where
-//            the sensor's or the codec's range ends, whichever range it is.
-//   texture  points that the start-up tracker (core/realtime) finds and follows: the same corners, with the same demands
-//            on contrast, as those that a calibration and OE mode begin with
-//   motion   the tracker's shift of the image's centre from one image to the next, px
-// Allocates when an image's size changes, and for what it notes of each. One thread.
+//   light    histogram of every 8th pixel of every 8th row. Dark: grey levels up to 16, black in
+//            video's narrow range. Saturated: the topmost level that occurs and the one below it,
+//            if it is 230 or more: there the range of the sensor or codec ends, whichever range it
+//            is.
+//   texture  points that the start-up tracker (core/realtime) finds and follows: corners, with the
+//            contrast that a calibration and OE mode demand at their start
+//   motion   px, the tracker's shift of the image's centre from one image to the next
+// Allocates when the image size changes, and for its notes of each image. One thread.
 
 #include <cstdint>
 #include <memory>
@@ -23,7 +23,7 @@
 
 namespace alidade {
 
-// By how much what the image's centre shows moved from frame `from` to frame `to`.
+// By how much the scene at the image's centre moved from frame `from` to frame `to`.
 struct ImageShift {
   std::int64_t from = 0;
   std::int64_t to = 0;
@@ -32,22 +32,22 @@ struct ImageShift {
 
 struct Light {
   double mean = 0;       // grey levels
-  double range = 0;      // grey levels, from the 1 % darkest to the 1 % brightest
+  double range = 0;      // grey levels, from the darkest 1 % to the brightest 1 %
   double dark = 0;       // share of the pixels
   double saturated = 0;  // share of the pixels
 };
 
-// Of one image, valid().
+// image: valid().
 [[nodiscard]] Light measure_light(const ImageView& image);
 
 struct ImageNeeds {
   std::string source;
-  bool landmarks = true;  // OE mode; without it images that show nothing are advice
+  bool landmarks = true;  // OE mode; in PT mode images that show nothing are advice only
 };
 
 struct ImageReport {
   std::size_t images = 0;
-  std::size_t without = 0;  // frames that came without an image
+  std::size_t without = 0;  // frames without an image
   Light light;              // medians
   std::optional<Spread> points;
   double noise = 0;  // of a pixel, grey levels, median
@@ -57,7 +57,7 @@ struct ImageReport {
 
 class ImageCheck {
  public:
-  // frame: its number; connected: nothing is known to lie between this one and the one before.
+  // frame: its number. connected: as far as known, no frame is missing since the one before.
   void add(std::int64_t frame, const ImageView& image, bool connected);
 
   [[nodiscard]] ImageReport report(const ImageNeeds& needs) const;
@@ -66,7 +66,7 @@ class ImageCheck {
   std::unique_ptr<StartUpTracker> tracker_;
   int width_ = 0;
   int height_ = 0;
-  std::optional<std::int64_t> before_;  // the frame that the tracker compares with
+  std::optional<std::int64_t> before_;  // the frame with which the tracker compares
   std::vector<Light> lights_;
   std::vector<double> points_;
   std::vector<double> noise_;

@@ -12,11 +12,12 @@
 namespace alidade {
 namespace {
 
-constexpr double kMoved_px = 2;     // rms over a baseline
+constexpr double kMoved_px = 2;     // root mean square over a baseline
 constexpr double kLeastTimes = 8;   // baselines without overlap
 constexpr double kExplained = 0.8;  // of an axis's motion
-constexpr double kUnlike = 0.8;     // what the other sign may explain, of what this one does
-constexpr double kLeastHeadRange_rad = 1e-3;  // less turns no image visibly
+// Of what this sign explains: the most that the other sign may explain.
+constexpr double kUnlike = 0.8;
+constexpr double kLeastHeadRange_rad = 1e-3;  // less does not move an image visibly
 
 AxisVerdict judge_axis(const MotionSearch& search, std::size_t best, std::size_t axis) {
   const MotionFit& fit = search.fits[best];
@@ -27,7 +28,7 @@ AxisVerdict judge_axis(const MotionSearch& search, std::size_t best, std::size_t
   const int sign = sums.mp > 0 ? 1 : -1;
   std::array<int, 2> reversed = {0, 0};
   reversed[axis] = -sign;
-  // Beside another axis that fixes the offset, an even swing of this one may be told after all.
+  // If the other axis fixes the offset, the sign of an even swing can be known after all.
   const auto score = [&](const MotionFit& at) { return explained(at, reversed); };
   const MotionFit& other = search.fits[search.best(score)];
   const bool fits_reversed = other.own[axis].mp * sign < 0 &&
@@ -69,8 +70,9 @@ void judge_signs(MotionReport* report, const MotionNeeds& needs) {
   }
 }
 
-// A data sheet's focal length begins a calibration well if it is right to 20 % (examples/alidade.yaml); a calibration's
-// is known far better than this check is, some percent.
+// A data sheet's focal length is good enough to start a calibration if it is right to 20 %
+// (examples/alidade.yaml). A calibration's is known far better than this check measures, which is
+// to some percent.
 void judge_scale(MotionReport* report, const MotionNeeds& needs) {
   constexpr double kGuess = 0.2;
   constexpr double kCalibrated = 0.1;
@@ -87,7 +89,8 @@ void judge_scale(MotionReport* report, const MotionNeeds& needs) {
                                                  *report->focal_length_px)));
 }
 
-// The search's steps and the samples' age leave some 20 ms open; three times that is another link's delay.
+// The search's steps and the samples' age leave some 20 ms open. Three times that is another link's
+// delay.
 void judge_offset(MotionReport* report, const MotionNeeds& needs) {
   constexpr double kFar_s = 0.06;
   if (!needs.calibrated || !report->clock_offset_s ||
@@ -102,7 +105,7 @@ void judge_offset(MotionReport* report, const MotionNeeds& needs) {
                   1e3 * *report->clock_offset_s));
 }
 
-// A mount that shakes moves the image by some pixels, too; a quarter of its width is no shaking.
+// A shaking mount moves the image by some pixels, too, but not by a quarter of its width.
 void judge_presence(MotionReport* report, double image_px, double head_rad,
                     const MotionNeeds& needs) {
   const double much_px = 0.25 * needs.image_width_px;
@@ -151,7 +154,7 @@ MotionReport check_motion(const std::vector<TimedShift>& shifts,
   report.head_moved = head.range() > kLeastHeadRange_rad;
   double squares = 0;
   for (const TimedShift& motion : motions) squares += motion.shift.squaredNorm();
-  // Motions overlap by half.
+  // The motions overlap by half.
   const bool enough = 0.5 * static_cast<double>(motions.size()) >= kLeastTimes;
   report.image_moved =
       !motions.empty() && std::sqrt(squares / static_cast<double>(motions.size())) >= kMoved_px;
@@ -180,7 +183,7 @@ MotionReport check_motion(const std::vector<TimedShift>& shifts,
   }
   report.pan = judge_axis(search, best, 0);
   report.tilt = judge_axis(search, best, 1);
-  // At an offset that is none, the head looks reversed by chance.
+  // At a wrong clock offset the head may look reversed by chance.
   const bool doubtful =
       !search.sure || report.pan == AxisVerdict::kUnclear || report.tilt == AxisVerdict::kUnclear;
   for (AxisVerdict* verdict : {&report.pan, &report.tilt}) {

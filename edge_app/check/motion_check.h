@@ -1,18 +1,10 @@
 #pragma once
-// Whether pan and tilt turn the image the way they say: signs, focal length and clock offset, roughly, from the
-// image's motion against the telemetry's.
-//
-// The clock offset is where most of the image's motion is explained (motion_fit.h), with each combination of signs by
-// itself. A sign is told only with evidence:
-//   the axis moved the image by 2 px rms over those 0.3 s (the tracker errs by a tenth of that),
-//   in eight such times or more, of which
-//   at least 80 % is explained with this sign, and no offset searched explains 4/5 of that with the other:
-//   an even swing fits half a period later as well with the sign reversed, and tells nothing;
-// and that an axis is reversed, only where the search is sure (MotionSearch) and the other axis is understood if it moved.
-// Where the image's times cannot be believed (needs.no_times), nothing that needs them is judged.
-// Image motion that follows the other axis better than its own is an image that is turned by a quarter.
-// An image that moves by a quarter of its width while the head reports one angle, or stands still while the head reports
-// as much, is not of this head, or the head does not measure.
+// Checks roughly, from the image's motion and the telemetry's, whether pan and tilt have the right
+// signs, and which focal length and clock offset fit. The clock offset is the one that explains
+// most of the image's motion (motion_fit.h). A sign is stated only if the axis moved the image by 2
+// px rms over 0.3 s (the tracker errs by a tenth of that) in eight baselines or more, if this sign
+// explains at least 80 % of that motion, and if no offset explains 4/5 of that with the other sign.
+// Reasons and the other rules: docs/derivations.md.
 // Good to some percent. Radians, seconds, px. Pure; allocates.
 
 #include <optional>
@@ -33,19 +25,19 @@ struct MotionNeeds {
   std::string focal_length_from;
   bool calibrated = false;
   double clock_offset_s = 0;  // of the calibration, else 0
-  // What turns a sign where it is configured: "set pan_tilt.tilt_positive: down".
+  // How to reverse a sign in the configuration: "set pan_tilt.tilt_positive: down".
   std::string reverse_pan;
   std::string reverse_tilt;
   std::string turn_image;  // by 180 degrees
-  std::string no_times;    // why the image's times are none; empty: they can be believed
+  std::string no_times;    // why the image's times cannot be used; empty: they can
 };
 
 enum class AxisVerdict {
-  kNotMoved,  // too little to tell
-  kUnclear,   // moved, but the two do not agree enough
+  kNotMoved,  // too little to judge
+  kUnclear,   // moved, but image and head do not agree well enough
   kRight,
   kReversed,
-  kNotJudged  // the image has no times that can be believed
+  kNotJudged  // the image's times cannot be used
 };
 
 struct MotionReport {
@@ -53,16 +45,16 @@ struct MotionReport {
   AxisVerdict tilt = AxisVerdict::kNotMoved;
   bool image_moved = false;
   bool head_moved = false;
-  bool quarter_turn = false;  // pan moves the image up or down, tilt to the side
-  std::optional<double>
-      focal_length_px;                   // of the axes whose sign is told, where the search is sure
-  std::optional<double> clock_offset_s;  // known to some 20 ms
+  bool quarter_turn = false;  // pan moves the image vertically, tilt horizontally
+  // px, from the axes whose sign is stated; set if the search is sure.
+  std::optional<double> focal_length_px;
+  std::optional<double> clock_offset_s;  // known to about 20 ms
   double explained = 0;                  // share of the image's motion
-  std::string not_judged;                // why, where the image's times are none
+  std::string not_judged;                // why the image's times cannot be used
   Findings findings;
 };
 
-// shifts and samples in order of time; samples without stale repeats.
+// shifts, samples: in order of time. samples: without stale repeats.
 [[nodiscard]] MotionReport check_motion(const std::vector<TimedShift>& shifts,
                                         const std::vector<PanTiltSample>& samples,
                                         const MotionNeeds& needs);

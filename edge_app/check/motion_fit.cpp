@@ -77,8 +77,6 @@ double HeadPath::range() const {
   return (most - least).maxCoeff();
 }
 
-// Motions over the baseline, along shifts that join; each begins where the one before began its second half, so that
-// about half of them are independent.
 std::vector<TimedShift> over_baseline(const std::vector<TimedShift>& shifts) {
   std::vector<TimedShift> motions;
   std::size_t next_begin = 0;
@@ -101,7 +99,6 @@ std::vector<TimedShift> over_baseline(const std::vector<TimedShift>& shifts) {
   return motions;
 }
 
-// How far the image's centre came from where it began, px, along shifts that join.
 double image_range(const std::vector<TimedShift>& shifts) {
   double farthest = 0;
   Vector2<double> place = Vector2<double>::Zero();
@@ -115,7 +112,6 @@ double image_range(const std::vector<TimedShift>& shifts) {
 
 double share(double part, double whole) { return whole > 0 ? part / whole : 0; }
 
-// What is explained if the axes have these signs; 0: either, whichever fits.
 double explained(const MotionFit& fit, const std::array<int, 2>& signs) {
   double sum = 0;
   for (std::size_t axis = 0; axis < 2; ++axis) {
@@ -130,7 +126,7 @@ double crossed(const MotionFit& fit) {
 
 MotionSearch::MotionSearch(const std::vector<TimedShift>& motions, const HeadPath& head,
                            double around_s, double least_times) {
-  // Motions overlap by half.
+  // The motions overlap by half.
   const double least = std::max(2 * least_times, 0.5 * static_cast<double>(motions.size()));
   const auto score = [](const MotionFit& fit) { return explained(fit, {0, 0}); };
   std::size_t covered = 0;

@@ -11,10 +11,11 @@
 namespace alidade {
 namespace {
 
-constexpr double kAbout_s = 0.25;  // more than video and telemetry lie apart
+constexpr double kAbout_s = 0.25;  // more than the offset between video and telemetry
 constexpr double kTurning_px = 20;
 
-// How far the image moved from the last sample before the interval to the first one behind it, px; 0 where there is none.
+// px, how far the image moved from the first sample after from_s to the first one after to_s; 0 if
+// there is none.
 double moved_px(const std::vector<PanTiltSample>& samples, double from_s, double to_s,
                 double focal_length_px) {
   const auto earlier = [](const PanTiltSample& sample, double time_s) {

@@ -1,8 +1,8 @@
 #pragma once
-// Whether pictures are sent again: a converter of frame rates, a night mode or a grabber repeats a picture where it has no
-// new one, and the rate is not what it seems. Equal pictures of a camera at rest tell nothing; only frames about which
-// the head moved the image by kTurning_px within kAbout_s to both sides are judged.
-// Radians, seconds, px. Pure; allocates.
+// Checks whether pictures are sent again. A frame rate converter, a night mode or a grabber repeats
+// a picture if it has no new one, so the rate is not what it seems. Equal pictures of a camera at
+// rest say nothing. So a frame is judged only if the head moved the image by kTurning_px from
+// kAbout_s before to kAbout_s after it. Radians, seconds, px. Pure; allocates.
 
 #include <cstddef>
 #include <optional>
@@ -17,12 +17,12 @@ namespace alidade {
 
 struct RepeatNeeds {
   std::string video;           // of the image
-  double focal_length_px = 0;  // of the calibration or the data sheet
+  double focal_length_px = 0;  // from the calibration or the data sheet
 };
 
 struct RepeatReport {
   std::size_t turning = 0;   // frames while the head turned
-  std::size_t repeated = 0;  // of these, equal to the one before
+  std::size_t repeated = 0;  // of `turning`: equal to the frame before
   std::optional<double> fresh_hz;
   Findings findings;
 };

@@ -1,5 +1,6 @@
 #pragma once
-// How measured values lie: what is usual, and how bad it gets. Values that are not finite do not count.
+// How measured values are distributed: the usual value, and how bad it gets. Values that are not
+// finite are ignored.
 // Pure; allocates.
 
 #include <algorithm>
@@ -13,14 +14,14 @@ namespace alidade {
 
 struct Spread {
   double median = 0;
-  double deviation =
-      0;            // 1.4826 times the median distance from the median: sigma, if they are normal
-  double most = 0;  // 95 % are not larger
+  // 1.4826 times the median distance from the median: sigma, if the values are normal.
+  double deviation = 0;
+  double most = 0;  // 95 % of the values are no larger
   double largest = 0;
   std::size_t count = 0;
 };
 
-// Empty without a finite value.
+// Empty if there is no finite value.
 [[nodiscard]] inline std::optional<Spread> spread_of(const std::vector<double>& values) {
   std::vector<double> sorted;
   std::copy_if(values.begin(), values.end(), std::back_inserter(sorted),

@@ -20,7 +20,8 @@ bool is_finite(const PanTiltSample& sample) {
          std::isfinite(sample.earliest_time_s) && std::isfinite(sample.latest_time_s);
 }
 
-// PT mode interpolates between samples and goes on beyond the newest, both for so long only.
+// PT mode interpolates between samples, and extrapolates beyond the newest one, both only for a
+// limited time.
 void judge_rate(TelemetryReport* report, const TelemetryNeeds& needs) {
   constexpr double kMuchSlower = 0.8;
   constexpr double kReserve = 1.2;
@@ -54,8 +55,8 @@ void judge_rate(TelemetryReport* report, const TelemetryNeeds& needs) {
   }
 }
 
-// TelemetryBuffer takes repeats for longer than max_repeat_s as a head at rest: if they are stale, the angle is wrong
-// by all the way that it turned meanwhile.
+// TelemetryBuffer takes repeats longer than max_repeat_s as a head at rest. If they are stale, the
+// angle is wrong by all that the head turned meanwhile.
 void judge_repeats(TelemetryReport* report, const TelemetryNeeds& needs) {
   constexpr double kReserve = 1.2;
   constexpr double kRounding = 1e-6;
@@ -69,8 +70,8 @@ void judge_repeats(TelemetryReport* report, const TelemetryNeeds& needs) {
                   std::ceil(100 * kReserve * report->longest_change_s - kRounding) / 100));
 }
 
-// Rounding to q has a standard deviation of q / sqrt(12): where that exceeds the noise that run assumes, its sigmas
-// are too small unless it is told of q.
+// Rounding to steps of q has a standard deviation of q / sqrt(12). If that exceeds the noise that
+// run assumes, its sigmas are too small unless q is configured.
 void judge_resolution(TelemetryReport* report, const TelemetryNeeds& needs) {
   const double resolution = std::max(report->pan.resolution, report->tilt.resolution);
   const double limit = std::sqrt(12.0) * needs.angle_sigma_rad;
@@ -90,8 +91,9 @@ void judge_resolution(TelemetryReport* report, const TelemetryNeeds& needs) {
   }
 }
 
-// OE mode looks for landmarks within three sigmas of the prediction and, where that fails, within 96 px (oe_mode.cpp).
-// Uniform within its bounds, a sample's time has a sigma of width / sqrt(12).
+// OE mode searches within three sigmas of the prediction and, if that fails, within 96 px
+// (LandmarkSearchOptions::wide_search_px). A time uniform within its bounds has a sigma of width /
+// sqrt(12).
 void judge_bounds(TelemetryReport* report, const TelemetryNeeds& needs) {
   constexpr double kFarthest_px = 96;
   if (report->negative_bounds > 0) {

@@ -1,17 +1,18 @@
 #pragma once
-// What samples of a pan/tilt source show that no data sheet tells.
-//
-//   polls     the median time between two samples; the longest
-//   age       how far back the newest angle known lies at worst, just before the next sample is delivered; while
-//             the head rests, a repeat is known to be true only up to max_repeat_s before (TelemetryBuffer)
-//   changes   how often the device really measures: the median time between two new values while the head turns.
-//             Known where the steps are larger than rounding (2 steps on an axis); a head that creeps or rests does not
-//             show it.
+// What the samples of a pan/tilt source show beyond its data sheet. Pure functions; they allocate
+// and do not throw, whatever the samples hold. Angles rad, times s.
+//   polls       the median and the longest time between two samples
+//   age         how old the newest known angle is just before the next sample is delivered. While
+//               the head rests, a repeat is known to be true only up to max_repeat_s before its
+//               time (TelemetryBuffer).
+//   changes     how often the device measures: the median time between new values while the head
+//               turns. Needs steps larger than rounding (2 steps on an axis); a head that creeps or
+//               rests does not show it.
 //   resolution  of each axis (stale_repeats.h)
-//   bounds    latest - earliest of each sample: within so much its time is known
-//   stale     repeats of an old angle while the head turned (stale_repeats.h), as a share of all samples taken while
-//             it turned; how long an angle was repeated, and when the next one came, bound what max_repeat_s has to be
-// Angles rad, times s. Pure functions; they allocate and do not throw, whatever the samples hold.
+//   bounds      latest - earliest of each sample: how well its time is known
+//   stale       repeats of an old angle while the head turned (stale_repeats.h), as a share of all
+//               samples while it turned. How long an angle was repeated, and when the next one
+//               came, give limits for max_repeat_s.
 
 #include <array>
 #include <optional>
@@ -28,19 +29,19 @@ namespace alidade {
 
 struct TelemetryNeeds {
   std::string source;
-  std::optional<double> rate_hz;      // that polls were asked for
+  std::optional<double> rate_hz;      // of the requested polls
   double max_repeat_s = 0.1;          // TelemetryLimits
   double max_gap_s = 0.5;             // TelemetryLimits
   double max_extrapolation_s = 0.25;  // TelemetryLimits
-  double angle_sigma_rad = 1e-4;      // TelemetryNoise, as run will take them
+  double angle_sigma_rad = 1e-4;      // TelemetryNoise, as used by run
   double resolution_rad = 0;
   double focal_length_px = 0;  // 0: unknown
-  double clock_offset_s = 0;   // images are looked up so much later
-  std::optional<double> zoom;  // that the calibration is for
-  std::string zooms;           // the same in words, with those of its zoom curve
-  std::string lens_at_zoom;    // what is known of the lens at the zoom that was told last
+  double clock_offset_s = 0;   // images are looked up this much later
+  std::optional<double> zoom;  // the calibration's
+  std::string zooms;           // the same in words, with the zooms of its curve
+  std::string lens_at_zoom;    // what is known of the lens at the latest zoom reading
   bool has_zoom_curve = false;
-  // Device units within which two zoom readings are one; none: as their jitter shows.
+  // Device units: readings no further apart are one zoom. Empty: found from their jitter.
   std::optional<double> zoom_tolerance;
   bool makes_calibrations = true;  // run calibrates at another zoom
   bool landmarks = true;           // OE mode
@@ -48,38 +49,38 @@ struct TelemetryNeeds {
 
 struct AxisReport {
   double last = 0;   // rad
-  double least = 0;  // rad, turns counted
+  double least = 0;  // rad, unwrapped
   double largest = 0;
   double resolution = 0;  // rad; 0: none found
-  double top_rate = 0;    // rad/s: 95 % of the time it turned no faster
+  double top_rate = 0;    // rad/s: 95 % of the time the head turned no faster
 };
 
 struct TelemetryReport {
   std::size_t samples = 0;
-  std::size_t useless = 0;        // not finite; looked at no further
+  std::size_t useless = 0;        // samples that are not finite; ignored otherwise
   std::optional<double> rate_hz;  // of the samples that came
   std::optional<Spread> interval_s;
   std::optional<double> change_hz;  // new values a second while the head turns
   std::optional<Spread> bounds_s;
   std::optional<Spread> age_s;
-  std::size_t negative_bounds = 0;  // of samples whose latest time is before their earliest
+  std::size_t negative_bounds = 0;  // samples whose latest time is before their earliest
   std::size_t turning = 0;          // samples taken while the head turned
   std::size_t stale = 0;
   double longest_stale_s = 0;   // from an angle's first sample to its last stale repeat
   double longest_change_s = 0;  // from an angle's first sample to the next angle
   AxisReport pan;
   AxisReport tilt;
-  std::optional<double> zoom;        // last told, without jitter
-  std::optional<double> other_zoom;  // that differs from it by more than the tolerance
+  std::optional<double> zoom;        // latest reading, without jitter
+  std::optional<double> other_zoom;  // an earlier one that differs by more than the tolerance
   ZoomJitter zoom_jitter;
   std::string lens_at_zoom;  // as in TelemetryNeeds
   ClockReport clock;
-  // Samples as the motion check takes them: finite, in order of time, fresh.
+  // Samples for the motion check: finite, in order of time, fresh.
   std::vector<PanTiltSample> fresh;
   Findings findings;
 };
 
-// delivered_s: when each sample came from its source, on the clock of its times.
+// delivered_s: when each sample came from its source, on the clock of the sample times.
 [[nodiscard]] TelemetryReport check_telemetry(const std::vector<PanTiltSample>& samples,
                                               const std::vector<double>& delivered_s,
                                               const ClockFilterOptions& clock,

@@ -10,25 +10,26 @@
 namespace alidade {
 namespace {
 
-constexpr std::size_t kLeastChanges = 8;  // below it a median is one of accidents
+constexpr std::size_t kLeastChanges = 8;  // with fewer a median is accidental
 
-// The head goes one way through the value of a run, by steps that rounding does not explain.
+// The head passes through the value of a run in one direction, in steps that rounding does not
+// explain.
 bool passes(double before, double at, double after, double resolution) {
   constexpr double kBeyondRounding = 2;   // steps
-  constexpr double kSmallest_rad = 2e-7;  // steps of a rounding in a file are none
+  constexpr double kSmallest_rad = 2e-7;  // smaller steps come from rounding in a file
   const double in = wrap_angle(at - before);
   const double out = wrap_angle(after - at);
   return in * out > 0 && std::min(std::abs(in), std::abs(out)) >
                              std::max(kBeyondRounding * resolution, kSmallest_rad);
 }
 
-// Whether an axis goes one way about run i: of all its ways over four runs to both sides, most lead on. Noise goes
-// to and fro.
+// Whether an axis moves in one direction around run i: over four runs to both sides most of its
+// path leads on. Noise goes to and fro.
 bool leads_on(const std::vector<PanTiltSample>& samples, const std::vector<EqualRun>& runs,
               std::size_t i, double PanTiltSample::*angle) {
   constexpr std::size_t kReach = 4;
-  constexpr double kMost =
-      0.7;  // of 8 ways by chance: never; of a turn that reverses within them: less
+  // Never reached by chance over 8 steps, nor by a turn that reverses within them.
+  constexpr double kMost = 0.7;
   const std::size_t first = i - std::min(i, kReach);
   const std::size_t last = std::min(i + kReach, runs.size() - 1);
   if (last - first < kReach) return false;
@@ -112,7 +113,7 @@ std::optional<Spread> ages_of(const std::vector<PanTiltSample>& samples,
     sample.time_s = (samples[i].earliest_time_s + samples[i].latest_time_s) / 2;
     sample.pan = samples[i].pan_rad;
     sample.tilt = samples[i].tilt_rad;
-    // What it refuses is no angle known.
+    // A sample that the buffer refuses adds no known angle.
     static_cast<void>(buffer.push(sample));
   }
   return spread_of(ages);

@@ -1,6 +1,7 @@
 #pragma once
-// The numbers of a TelemetryReport that need more than counting: each axis, the samples taken while the head turned, and
-// the age of the newest angle known. What they mean: telemetry_check.h. Pure; allocates.
+// Those numbers of a TelemetryReport that need more than counting: each axis, the samples while the
+// head turned, and the age of the newest known angle. Their meaning: telemetry_check.h. Pure;
+// allocates.
 
 #include <optional>
 #include <vector>
@@ -11,16 +12,17 @@
 
 namespace alidade {
 
-// Needs a sample; all finite. Without the top rate.
+// samples: at least one, all finite. Leaves top_rate unset.
 [[nodiscard]] AxisReport measure_axis(const std::vector<PanTiltSample>& samples,
                                       double PanTiltSample::*angle);
 
-// change_hz, the top rates, turning, stale and how long repeats lasted. stale: find_stale_repeats(samples). Needs the
-// axes' resolutions in *report.
+// Sets change_hz, the top rates, turning, stale and how long repeats lasted. stale:
+// find_stale_repeats(samples). Needs the axes' resolutions in *report.
 void measure_turning(const std::vector<PanTiltSample>& samples, const std::vector<bool>& stale,
                      TelemetryReport* report);
 
-// Just before each sample was delivered, how far back the newest angle known lay, as the real-time step knows it.
+// s: how old the newest known angle was just before each sample was delivered, as the real-time
+// step knows it.
 [[nodiscard]] std::optional<Spread> ages_of(const std::vector<PanTiltSample>& samples,
                                             const std::vector<double>& delivered_s,
                                             const TelemetryNeeds& needs);

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-// Sender times between two neighbours, or receive times where the sender tells none.
+// Intervals between neighbours: of the sender's times, else of the receive times.
 std::vector<double> intervals(const std::vector<CheckedFrame>& frames) {
   std::vector<double> intervals;
   for (std::size_t i = 1; i < frames.size(); ++i) {
@@ -88,8 +88,8 @@ void judge_coding(VideoReport* report, const VideoNeeds& needs,
   if (interlaced) add_problem(&report->findings, "video " + needs.source + ": " + kInterlaced);
 }
 
-// Each frame that is lost is an answer that does not come, and a step of the landmarks that is twice as long. One
-// in ten is no accident on a link that fits its stream.
+// Each lost frame is a missing answer, and doubles a step of the landmarks. One in ten is no
+// accident on a link that fits its stream.
 void judge_losses(VideoReport* report, const VideoNeeds& needs) {
   constexpr double kFew = 0.01;
   constexpr double kMany = 0.1;
@@ -108,7 +108,7 @@ void judge_losses(VideoReport* report, const VideoNeeds& needs) {
         "lower the camera's rate or size, or use a faster machine");
   judge(std::max<std::int64_t>(0, report->counters.damaged - report->at_start.damaged),
         "were damaged", "look for packet loss; lower the bit rate, or use transport: tcp");
-  // What was dropped or damaged here leaves a gap, too.
+  // Frames that were dropped or damaged here leave gaps, too.
   const std::int64_t elsewhere =
       report->lost.value_or(0) - report->counters.dropped - report->counters.damaged;
   if (report->skips_or_lost) {
@@ -122,8 +122,9 @@ void judge_losses(VideoReport* report, const VideoNeeds& needs) {
   }
 }
 
-// The capture thread decodes one image after the other: what takes longer than a period piles up. A fifth is
-// kept for images that are harder than those of a few seconds.
+// The capture thread decodes one image after the other. If that takes longer than a period, images
+// pile up. A fifth is kept in reserve for images that are harder to decode than those of a few
+// seconds.
 void judge_decoding(VideoReport* report, const VideoNeeds& needs) {
   constexpr double kBusy = 0.8;
   if (!needs.images || !report->decode_s || !report->rate_hz) return;
@@ -136,10 +137,11 @@ void judge_decoding(VideoReport* report, const VideoNeeds& needs) {
                   needs.source, 1e3 * report->decode_s->median, 1e3 / *report->rate_hz));
 }
 
-// Without a clock the filter cannot tell late from slow: a frame's time is wrong by what its arrival scatters. OE mode
-// corrects that where landmarks hold; PT mode's angle is wrong by rate times scatter.
+// Without a clock the filter cannot distinguish late from slow: a frame's time is wrong by the
+// scatter of its arrival. OE mode corrects that if landmarks hold. PT mode's angle is wrong by rate
+// times scatter.
 void judge_arrival_only(VideoReport* report, const VideoNeeds& needs) {
-  constexpr double kLeastScatter_s = 1e-3;  // what a clock's line leaves over on a bad day
+  constexpr double kLeastScatter_s = 1e-3;  // what a clock's line leaves at worst
   if (report->clock.kind != StampKind::kArrival || !report->interval_s ||
       report->interval_s->deviation < kLeastScatter_s) {
     return;

@@ -1,12 +1,11 @@
 #pragma once
-// What the stamps of a video stream show: its rate and how even it is, what was lost, what its clock is worth,
-// and whether this machine keeps up.
-//
-//   intervals  of the sender's times; of the receive times where the sender tells none. Their median is the period,
-//              their deviation what is left of jitter once the arrival does not matter.
-//   losses     gaps in the sequence numbers; else of the sender's times, where these lie on a steady grid: there nothing
-//              tells a frame that was lost from one that the camera left out
-// Frames after a reconnection begin anew: no interval and no loss reaches across.
+// What the time stamps of a video stream show: its rate and how even it is, what was lost, how good
+// its clock is, and whether this machine keeps up.
+//   intervals  of the sender's times, else of the receive times. Their median is the period, their
+//              deviation the jitter that remains without the arrival.
+//   losses     gaps in the sequence numbers; else in the sender's times if these lie on a steady
+//              grid. The latter do not show whether a frame was lost or left out by the camera.
+// No interval and no loss reaches across a reconnection.
 // Seconds. Pure functions; they allocate and do not throw, whatever the stamps hold.
 
 #include <cstdint>
@@ -29,12 +28,12 @@ struct CheckedFrame {
   int height = 0;
   std::optional<double> decode_s;
   bool interlaced = false;  // its coding
-  bool repeats = false;     // its image is exactly the one before
+  bool repeats = false;     // its image equals the one before exactly
 };
 
 struct VideoNeeds {
-  std::string source;            // whose frames they are: URL or directory
-  std::string calibration_name;  // what the size below is of
+  std::string source;            // URL or directory
+  std::string calibration_name;  // whose size is given below
   int width = 0;                 // px; 0: any
   int height = 0;
   bool images = true;         // OE mode: each frame has to be decoded in time
@@ -43,24 +42,24 @@ struct VideoNeeds {
 
 struct VideoReport {
   std::size_t frames = 0;
-  int width = 0;  // px, of the first
+  int width = 0;  // px, of the first frame
   int height = 0;
   bool size_fits = true;
-  StampedAt stamped_at = StampedAt::kArrival;  // of the last
+  StampedAt stamped_at = StampedAt::kArrival;  // of the last frame
   std::optional<double> rate_hz;               // of the frames that came
   std::optional<Spread> interval_s;            // see above
-  std::optional<std::int64_t> lost;            // empty: nothing tells
-  bool skips_or_lost = false;                  // they are told by the sender's times
+  std::optional<std::int64_t> lost;            // empty: not known
+  bool skips_or_lost = false;                  // `lost` comes from the sender's times
   FrameSourceCounters counters;
-  FrameSourceCounters at_start;  // of these, in the first seconds
+  FrameSourceCounters at_start;  // the part of `counters` from the first seconds
   std::optional<Spread> decode_s;
   ClockReport clock;
   std::vector<double> time_s;  // of each frame
   Findings findings;
 };
 
-// at_start: the part of counters that was counted in the first seconds. A relay or camera may begin with a burst of kept
-// pictures, which overflows queues of any machine, and once.
+// at_start: the part of `counters` from the first seconds. A relay or camera may begin with a burst
+// of kept pictures, which overflows the queues of any machine once.
 [[nodiscard]] VideoReport check_video(const std::vector<CheckedFrame>& frames,
                                       const FrameSourceCounters& counters,
                                       const FrameSourceCounters& at_start,

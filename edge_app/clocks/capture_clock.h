@@ -1,8 +1,9 @@
 #pragma once
-// CaptureClock: the capture time of each item of one stream, from what the stream tells: its sender's
-// clock, else its sequence numbers, through a ClockFilter. A stream that tells neither has no clock
-// and its caller takes the receive time; so it does for up to kUntold items in a row of one that has. Begins anew at a
-// reconnection, and if the stream changes what it tells. Fixed memory, no allocation, one thread.
+// CaptureClock: the capture time of each item of a stream, by a ClockFilter over the sender's
+// clock, else over the sequence numbers. A stream with neither gets no estimate: the caller then
+// uses the receive time. The same holds for up to kUntold items in a row that lack stamps in a
+// stream that has them. Restarts at a reconnection, and when the kind of stamps changes.
+// Seconds, host clock. Fixed memory, no allocation, one thread.
 
 #include <cstdint>
 #include <optional>
@@ -17,7 +18,7 @@ class CaptureClock {
 
   explicit CaptureClock(const ClockFilterOptions& options) : filter_(options) {}
 
-  // Empty without a sender time and a sequence number.
+  // Empty if there is neither a sender time nor a sequence number.
   std::optional<ClockEstimate> update(double receive_time_s, std::optional<double> sender_time_s,
                                       std::optional<std::int64_t> sequence, bool reconnected) {
     const Kind kind = sender_time_s ? Kind::kSenderTime : sequence ? Kind::kSequence : Kind::kNone;
@@ -37,7 +38,7 @@ class CaptureClock {
     return estimate;
   }
 
-  // What it has found so far, for reports.
+  // The filter's state, for reports.
   [[nodiscard]] const ClockFilter<>& filter() const { return filter_; }
 
  private:
@@ -46,7 +47,7 @@ class CaptureClock {
   ClockFilter<> filter_;
   Kind kind_ = Kind::kNone;
   bool started_ = false;
-  int untold_ = 0;  // in a row
+  int untold_ = 0;  // items without stamps, in a row
 };
 
 }  // namespace alidade

@@ -1,33 +1,14 @@
 #pragma once
-// FrameClock: the capture time of each frame of a live stream, and whether it is known.
+// FrameClock: the capture time of each frame of a live stream, and whether that time is known.
 //
-// A frame is stamped when it arrives, and may have waited before that for nobody knows how long: behind a relay or
-// a network that stood still, in a cache that a new reader is served from, in the socket of this process while it was
-// stopped. What is known of its age depends on what the stream tells:
-//   sender's clock  At a (re)connection nothing until the arrivals have shown the sender's pace (arrival_pace.h); the
-//                   CaptureClock then learns from the items that showed it, and if none before them waited, from all. From
-//                   then on the line holds also for what waits, if the sender's clock runs on while its items wait. It is
-//                   believed to once it was seen to: late frames came down to the line again. Until then a frame
-//                   later than ArrivalPace::kBacklog_s is of unknown age: the sender may have stood still, and its clock
-//                   with it. Where such frames come at the pace, it did, and the clock begins anew.
-//                   A frame that comes before a young line by more than kEarly_s shows that all before it had
-//                   waited: as at a reconnection.
-//                   Where frames leave the line and come back (delay_wander.h), delay or stamps wander: sigma has what
-//                   was seen of it. Such a frame is of unknown age only beyond that. Nor is a stamp believed at once that
-//                   jumps where the arrival does not (stamp_jumps.h).
-//                   Where the sender tells absolute times, too, pictures that these and the connection before say are fresh
-//                   are answered from the third on, and behind a backlog the pace is believed sooner (utc_line.h).
-//                   Stamps that run at another rate than the pictures come (stamp_rate.h), or count them (stamp_count.h), tell
-//                   nothing: once that is shown they are left out, on later connections too, and what else the stream
-//                   tells goes on alone. Behind a count, pictures may be missing: uneven_arrivals.h in place of receipt_clock.h.
-//   count alone     (V4L2: stamps of the driver.) The same but for the start: a driver holds back a few buffers only. Where the
-//                   driver stamped a frame when it was taken, that is its age, and a count that leaves the stamps is of a camera
-//                   with another rate by now: such frames have their stamps, and from kManyStrays in a row on another line.
-//   nothing         receipt_clock.h.
-// A recording's later frames may show that those which its connection begins with did not wait (fresh_beginning.h): then
-// nothing is waited for at its beginning, and the rest is as above.
-// wait_for_pace false (stamps that are no arrivals, or of a recording that is read as a source): CaptureClock alone.
-// Fixed memory, no allocation, one thread. Seconds.
+// A frame may have waited for an unknown time before it arrived and was stamped: behind a relay or
+// a network that stood still, in a cache, or in the socket of this process. Its time comes from the
+// sender's clock, else from the sequence numbers, else from arrivals alone (receipt_clock.h,
+// uneven_arrivals.h). Time stamps that run at a wrong rate, or count pictures, are left out.
+// Derivation: docs/derivations.md.
+// wait_for_pace false (the receive times are no arrivals, or a recording is read as a source):
+// CaptureClock alone.
+// Seconds. Fixed memory, no allocation, one thread.
 
 #include <algorithm>
 #include <cmath>
@@ -50,24 +31,24 @@ namespace alidade {
 
 struct FrameTime {
   ClockEstimate clock;
-  bool known = true;   // false: clock.time_s may be late by any time
-  bool of_use = true;  // false: nor will it be known later, when the pace or the line is
-  // Steps of the least delay, which the receive time contains and the line does not.
+  bool known = true;   // false: clock.time_s may be late by any amount
+  bool of_use = true;  // false: it will not be known later either, when the pace or the line is
+  // Sum of the steps of the least delay. The receive time contains it, the line does not.
   double delay_shift_s = 0;
-  // By how much frames leave the line; contained in clock.sigma_s, and the same in neighbouring frames.
+  // By how much frames leave the line. Included in clock.sigma_s; common to neighbouring frames.
   double off_line_s = 0;
-  double wander_s = 0;  // the same where they do again and again, else 0
-  // With a restart or step of the clock: by how much the line may be another than the one before, whichever of delay and
-  // stamps it was that moved.
+  double wander_s = 0;  // the same if frames leave the line again and again, else 0
+  // At a restart or step of the clock: by how much the new line may differ from the old one,
+  // whether the delay or the stamps moved.
   double moved_s = 0;
-  bool stamps_left_out = false;                 // the sender's: they run at another rate
-  std::optional<double> stamp_rate_error = {};  // their rate less one, in the first such frame
-  bool stamps_count = false;                    // pictures, in that frame
+  bool stamps_left_out = false;                 // the sender's stamps are not used: wrong rate
+  std::optional<double> stamp_rate_error = {};  // rate less one, in the first such frame
+  bool stamps_count = false;                    // in that frame: the stamps count pictures
 };
 
 class FrameClock {
  public:
-  // stamp_sigma_s: one standard deviation of a receive time that has to do for the time itself.
+  // stamp_sigma_s: one standard deviation of a receive time that is used as the capture time.
   FrameClock(const ClockFilterOptions& options, double stamp_sigma_s, bool wait_for_pace)
       : stamp_sigma_s_(stamp_sigma_s),
         settle_s_(options.settle_s),
@@ -77,7 +58,7 @@ class FrameClock {
         receipts_(stamp_sigma_s),
         uneven_(stamp_sigma_s) {}
 
-  // The connection that begins with the next frame does so without a backlog.
+  // The connection that begins with the next frame has no backlog.
   void expect_fresh() { fresh_ = true; }
 
   FrameTime update(const FrameStamp& stamp) {
@@ -94,12 +75,12 @@ class FrameClock {
 
   static constexpr int kStrangeInARow = 3;
   static constexpr int kFreshInARow = 3;     // a backlog comes down faster than it was sent
-  static constexpr double kEarly_s = 0.02;   // the least delay of a connection differs by less
-  static constexpr double kAstray_s = 0.01;  // more than a driver's stamps jitter
+  static constexpr double kEarly_s = 0.02;   // least delays of two connections differ by less
+  static constexpr double kAstray_s = 0.01;  // more than the jitter of a driver's stamps
   static constexpr int kManyStrays = 25;
-  static constexpr double kStoodStill_s = 0.5;  // half of the window at the pace that tells
-  static constexpr double kGate = 6;            // sigmas of a line, in which items come down to it
-  static constexpr double kOpen = 3;            // sigmas that a line says itself
+  static constexpr double kStoodStill_s = 0.5;  // half of the window in which the pace is shown
+  static constexpr double kGate = 6;  // sigmas of the line: items below it have come down to it
+  static constexpr double kOpen = 3;  // sigmas that the line itself leaves open
 
   FrameTime judge(const FrameStamp& stamp) {
     if (!wait_for_pace_) return {ask_clock(stamp, stamp.restarted)};
@@ -109,7 +90,7 @@ class FrameClock {
     const bool finite = std::isfinite(stamp.receive_time_s) &&
                         (!stamp.sender_time_s || std::isfinite(*stamp.sender_time_s));
     begins_ = begins_ || stamp.restarted;
-    // A part of a stream with stamps that has none is no other stream yet.
+    // A few frames without stamps in a stream that has them are not a new stream.
     if (!finite || (!begins_ && kind != kind_ && ++strange_ < kStrangeInARow)) {
       return unusable(stamp);
     }
@@ -160,7 +141,7 @@ class FrameClock {
     return time;
   }
 
-  // The estimate without any of the above.
+  // The estimate of CaptureClock alone.
   ClockEstimate ask_clock(const FrameStamp& stamp, bool anew) {
     ClockEstimate clock;
     clock.time_s = stamp.receive_time_s;
@@ -203,7 +184,7 @@ class FrameClock {
     FrameTime time;
     time.clock.time_s = answer.time_s;
     time.clock.sigma_s = answer.sigma_s;
-    time.clock.state = ClockState::kLocked;  // it will not be known better
+    time.clock.state = ClockState::kLocked;  // it will not become better known
     fresh_ = fresh_ && !answer.known;
     if (fresh_) {
       time.clock.time_s = stamp.receive_time_s;
@@ -218,7 +199,7 @@ class FrameClock {
     const double level_s = stamp.receive_time_s - *stamp.sender_time_s;
     const std::optional<UtcLine::Age> age = utc_.age(stamp);
     const bool agrees = age && age->agrees();
-    if (age && age->late_s < -UtcLine::kAgrees_s) utc_.forget();  // nothing comes before its time
+    if (age && age->late_s < -UtcLine::kAgrees_s) utc_.forget();  // nothing arrives before its time
     const auto shown = pace_.shown(ArrivalPace::kLeastHalf_s, agrees);
     if (!shown) {
       FrameTime time = unusable(stamp);
@@ -232,7 +213,7 @@ class FrameClock {
       time.known = true;
       return time;
     }
-    // Fresh ones that the absolute clock does not say are fresh: it was set.
+    // Fresh frames that the absolute clock calls old or early: that clock was set.
     if (age && std::abs(age->late_s - (level_s - shown->least_s)) > UtcLine::kAgrees_s)
       utc_.forget();
     const bool backlog = pace_.saw_backlog(shown->least_s);
@@ -243,7 +224,7 @@ class FrameClock {
       if (line_begins_) line_since_s_ = pace_.receive_s(i);
       line_begins_ = false;
     }
-    time.clock.restarted = backlog;  // those before it have other times
+    time.clock.restarted = backlog;  // the frames before it have other times
     time.known = !time.clock.rejected;
     waiting_ = false;
     return time;
@@ -285,11 +266,11 @@ class FrameClock {
     }
     time->clock.time_s = stamp.receive_time_s;
     time->clock.sigma_s = stamp_sigma_s_;
-    time->of_use = false;  // calibrations go by the count
+    time->of_use = false;  // calibrations use the count
     return true;
   }
 
-  // All that the stream has shown so far was of a backlog, or of another clock.
+  // All that the stream has shown so far belonged to a backlog, or to another clock.
   FrameTime begin_again(const FrameStamp& stamp) {
     begin(kind_);
     utc_.forget();
@@ -319,8 +300,8 @@ class FrameClock {
     if (pace_.shown(kStoodStill_s)) *time = begin_again(stamp);
   }
 
-  // A backlog comes at once and is worked off: until it is, it tells nothing of the delay. What wanders was seen before
-  // it is as late as that.
+  // A backlog arrives at once and is worked off. Until then it says nothing of the delay. If the
+  // delay was seen to wander before, lateness counts as wander instead.
   void watch_wander(double receive_s, double late_s, double sigma_s) {
     const double gate_s = std::max(least_step_s_, kGate * sigma_s);
     if (late_s > ArrivalPace::kBacklog_s && wander_.off_s() < ArrivalPace::kBacklog_s / 2) {
@@ -338,7 +319,7 @@ class FrameClock {
   CaptureClock clock_;
   ReceiptClock receipts_;
   UnevenArrivals uneven_;
-  ArrivalPace pace_;  // of a stream that waits, or of late frames
+  ArrivalPace pace_;  // while waiting for the pace, or of late frames
   DelayWander wander_;
   StampGuard guard_;
   StampRate rate_;
@@ -346,16 +327,16 @@ class FrameClock {
   StampJumps jumps_;
   UtcLine utc_;
   Kind kind_ = Kind::kNew;
-  bool begins_ = true;  // with the next usable frame
-  bool fresh_ = false;  // until a frame's time is known by what came
+  bool begins_ = true;  // begins with the next usable frame
+  bool fresh_ = false;  // until arrivals make a frame's time known
   bool began_fresh_ = false;
-  int fresh_by_utc_ = 0;  // of the connection's first frames, in a row
-  int strange_ = 0;       // stamps of another kind in a row
-  bool waiting_ = false;  // for the pace
+  int fresh_by_utc_ = 0;  // fresh first frames of the connection, in a row
+  int strange_ = 0;       // frames with stamps of another kind, in a row
+  bool waiting_ = false;  // for the sender's pace
   bool line_begins_ = true;
   double line_since_s_ = 0;  // receive time
-  bool late_ = false;        // the last frame, by more than jitter
-  bool runs_on_ = false;     // the sender's clock, while its items wait; as seen on any connection
+  bool late_ = false;        // the last frame was late by more than jitter
+  bool runs_on_ = false;     // the sender's clock, while its frames wait; as seen on any connection
   bool behind_backlog_ = false;
   int strays_ = 0;  // in a row
   bool stamps_left_out_ = false;

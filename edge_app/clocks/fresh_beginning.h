@@ -1,7 +1,7 @@
 #pragma once
-// begins_fresh(): of a recording, whether what was received first had not waited for long before that. Live nobody knows
-// (frame_clock.h); of a recording the later frames tell.
-// Seconds. Pure; allocates.
+// begins_fresh(): whether the first frames of a recording arrived without a long wait. In a live
+// stream nobody knows (frame_clock.h). In a recording the later frames show it. Seconds. Pure;
+// allocates.
 
 #include <algorithm>
 #include <cstddef>
@@ -13,8 +13,9 @@
 
 namespace alidade {
 
-// stamps: in order of arrival. By the sender's clock: the first frame is not later than the least late one of the first
-// kLook_s by more than jitter. By arrivals alone: there is no burst among those.
+// stamps: in order of arrival. With sender times: the first frame is later than the least late one
+// of the first kLook_s by no more than jitter. Without: there is no burst among the arrivals of the
+// first kLook_s.
 [[nodiscard]] inline bool begins_fresh(const std::vector<FrameStamp>& stamps) {
   constexpr double kLook_s = 10;
   constexpr double kBurst = 0.4;  // of the usual interval

@@ -1,19 +1,13 @@
 #pragma once
-// ReceiptClock: the capture times of a stream that tells nothing of its own: its items are stamped when they are
-// received, and that is how young they can be at most.
+// ReceiptClock: the capture times of a stream of which only arrivals are known. They are upper
+// limits.
 //
-// Pictures come one a period, so the count of those that came, times the period, is a clock that can only be slow (by
-// what was lost). Held against it the arrivals show their pace (ArrivalPace), and each how late it is: what waited for L
-// more than those before may be old by up to L, or be fresh behind a loss. An item is
-//   known           while L is at most kLongest_s: its time is the middle of what is possible, and sigma covers it;
-//   of unknown age  beyond, until the count comes up with the arrivals (all that waited has come, none was lost), or
-//                   the arrivals show the pace (the rest was lost).
-// The first period is the slope, by least squares, of kFirst_s of even arrivals, not faster than kFastest_s; by n items with
-// delays of standard deviation s it is known to sqrt(12) s / n^(3/2). Later ones are of the least delays at the ends of
-// a longer stretch. A period gives way, also after a reconnection, to a slower one after kFirst_s, to a faster one after
-// kAnew_s of even arrivals: until then those look like a backlog, and a backlog that comes evenly for longer looks like
-// a faster camera.
-// Fixed memory, no allocation, one thread. Seconds of the host's clock.
+// Items come one a period, so their count times the period is a clock, which can only be slow (by
+// what was lost). An item that arrives L later than this clock says may be up to L old, or fresh
+// behind a loss. Up to kLongest_s its time is the middle of what is possible, and sigma covers it.
+// Beyond, its age is unknown until the count has caught up with the arrivals, or the arrivals show
+// their pace (ArrivalPace). How the period is learnt: docs/derivations.md.
+// Seconds of the host's clock. Fixed memory, no allocation, one thread.
 
 #include <algorithm>
 #include <cmath>
@@ -25,18 +19,18 @@ namespace alidade {
 
 class ReceiptClock {
  public:
-  static constexpr double kLongest_s = 0.05;  // within which a head hardly changes its rate
+  static constexpr double kLongest_s = 0.05;  // a head hardly changes its rate in this time
 
   struct Answer {
     double time_s = 0;
     double sigma_s = 0;
-    bool known = false;
+    bool known = false;  // false: time_s may be late by any amount
   };
 
   // stamp_sigma_s: of the receive time of a punctual item, s.
   explicit ReceiptClock(double stamp_sigma_s) : stamp_sigma_s_(stamp_sigma_s) {}
 
-  // Of the connection. The period of the one before is remembered.
+  // Call at a (re)connection. The period of the connection before is kept.
   void restart() {
     began_ = paced_ = known_ = false;
     arrivals_.restart();
@@ -61,10 +55,10 @@ class ReceiptClock {
   static constexpr double kPunctual_s = 0.01;
   static constexpr double kFirst_s = 1;
   static constexpr double kAnew_s = 30;
-  static constexpr double kFastest_s = 1.0 / 70;  // period
+  static constexpr double kFastest_s = 1.0 / 70;  // s, period
   static constexpr double kSlower = 1.02;
   static constexpr double kLeastIntervals = 4;
-  static constexpr double kEnoughItems = 100;  // for a period
+  static constexpr double kEnoughItems = 100;  // to learn a period from
   static constexpr double kManyItems = 1000;
 
   Answer hold_against_pace(double receive_time_s) {
@@ -82,7 +76,7 @@ class ReceiptClock {
       fresh_count_ = count_;
       refine_period();
     } else if (paced_ && receive_time_s < expected_s() - kPunctual_s) {
-      // Faster than the pace: what came before had waited, or the camera is another.
+      // Faster than the pace: the items before had waited, or the camera is another one.
       paced_ = false;
     }
     if (!paced_) return unknown;
@@ -95,10 +89,11 @@ class ReceiptClock {
 
   static double double_of(std::size_t n) { return static_cast<double>(n); }
 
-  // When the item last added would have come at the latest, were it fresh and none lost.
+  // When the item added last would have arrived at the latest, if it were fresh and none had been
+  // lost.
   [[nodiscard]] double expected_s() const { return fresh_s_ + period_s_ * (count_ - fresh_count_); }
 
-  // The arrivals from the given one on, with a clock of this period.
+  // The arrivals from index `from` on, with a clock of this period.
   [[nodiscard]] ArrivalPace paced(std::size_t from, double period_s) const {
     ArrivalPace pace;
     for (std::size_t i = from; i < arrivals_.size(); ++i) {
@@ -107,7 +102,8 @@ class ReceiptClock {
     return pace;
   }
 
-  // A period from the last arrivals alone, if they are even. A backlog is never slower than the pace.
+  // Learns a period from the latest arrivals alone, if they are even. A backlog is never slower
+  // than the pace.
   void learn_period(double receive_time_s) {
     const bool first = !(period_s_ > 0);
     const double unknown_s = receive_time_s - unknown_since_s_;
@@ -124,7 +120,7 @@ class ReceiptClock {
     paced_ = false;
   }
 
-  // By the least delays at both ends: what comes late between them does no harm.
+  // From the least delays at both ends, so late items in between do no harm.
   void refine_period() {
     const double items = fresh_count_ - first_fresh_count_;
     if (items < std::min(period_items_, kEnoughItems)) return;
@@ -140,7 +136,7 @@ class ReceiptClock {
     period_sigma_s_ = std::sqrt(12.0) * stamp_sigma_s_ / (items * std::sqrt(items));
   }
 
-  // Of the arrivals over their count, by least squares.
+  // Of arrival over count, by least squares.
   [[nodiscard]] double slope_since(std::size_t from) const {
     const double n = double_of(arrivals_.size() - from);
     const double middle = (n - 1) / 2;
@@ -153,18 +149,18 @@ class ReceiptClock {
   }
 
   double stamp_sigma_s_;
-  ArrivalPace arrivals_;  // over their count
+  ArrivalPace arrivals_;  // receive time, count
   double count_ = 0;
   bool began_ = false;
   bool paced_ = false;  // fresh_s_ is known
-  bool known_ = false;  // the last item was
+  bool known_ = false;  // the last item's time was known
   double unknown_since_s_ = 0;
   double period_s_ = 0;  // 0: not known
   double period_sigma_s_ = 0;
-  double period_items_ = 0;   // that it is from
+  double period_items_ = 0;   // number of items it was learnt from
   double fresh_s_ = 0;        // arrival of a fresh item with the least delay
   double fresh_count_ = 0;    // its count
-  double first_fresh_s_ = 0;  // the same at the beginning of the stretch that the period is from
+  double first_fresh_s_ = 0;  // the same at the beginning of the span used for the period
   double first_fresh_count_ = 0;
 };
 

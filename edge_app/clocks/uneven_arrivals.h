@@ -1,13 +1,15 @@
 #pragma once
-// UnevenArrivals: the capture times of a live stream of which arrivals alone tell, and whose camera leaves pictures out, now and then or
-// often, so that its pictures are no count of time (as receipt_clock.h takes them to be).
+// UnevenArrivals: the capture times of a live stream of which only arrivals are known and whose
+// camera leaves pictures out, now and then or often. So its pictures are no measure of time, as
+// receipt_clock.h assumes.
 //
-// A picture that comes after more than the usual interval has waited for the rest of it at most, or came behind one
-// that was left out: its time is the middle of what is possible, and sigma covers it. What waits behind it comes at once, each
-// less late by what was made up. A picture that comes at the usual interval, or later, follows one that had not waited.
-// Of unknown age are those that may be late by more than kLongest_s, and a connection's first ones, until kPunctual in a row
-// have come at the usual interval.
-// Fixed memory, no allocation, one thread. Seconds of the host's clock.
+// A picture that comes after more than the usual interval has waited for the excess at most, or
+// came behind a missing one. Its time is the middle of what is possible, and sigma covers it.
+// Pictures that waited behind it follow at once, each less late by the time made up. A picture at
+// the usual interval, or later, follows one that had not waited. Ages beyond kLongest_s are
+// unknown, as are those at a connection's beginning until kPunctual pictures in a row came at the
+// usual interval.
+// Seconds of the host's clock. Fixed memory, no allocation, one thread.
 
 #include <algorithm>
 #include <cmath>
@@ -23,7 +25,7 @@ class UnevenArrivals {
 
   explicit UnevenArrivals(double stamp_sigma_s) : stamp_sigma_s_(stamp_sigma_s) {}
 
-  // Of the connection. The usual interval is remembered. interval_s: a first guess of it, or 0.
+  // Call at a (re)connection. The usual interval is kept. interval_s: a first guess of it, or 0.
   void restart(double interval_s = 0) {
     if (interval_s > 0) usual_s_ = interval_s;
     began_ = false;
@@ -47,9 +49,9 @@ class UnevenArrivals {
       late_s_ = std::max(0.0, late_s_ - (usual_s_ - interval_s));
       if (punctual_ < kPunctual) punctual_ = 0;
     }
-    // The median: those behind a picture that was left out do not lengthen it.
+    // The median of intervals: those that follow a missing picture do not lengthen it.
     usual_s_ *= interval_s > usual_s_ ? 1 + kLearn : 1 - kLearn;
-    // A jitter that the receive time's sigma has.
+    // Jitter that the receive time's sigma already covers.
     const double late_s = std::max(0.0, late_s_ - stamp_sigma_s_);
     const bool known = punctual_ == kPunctual && late_s <= kLongest_s;
     return {receive_time_s - late_s / 2, std::hypot(stamp_sigma_s_, late_s / std::sqrt(12.0)),
@@ -57,15 +59,16 @@ class UnevenArrivals {
   }
 
  private:
-  static constexpr double kShort = 0.6;  // of the usual interval: it had waited behind another
+  // Of the usual interval: the picture had waited behind another.
+  static constexpr double kShort = 0.6;
   static constexpr double kLearn = 0.005;
 
   double stamp_sigma_s_;
   double usual_s_ = 0;  // interval
   double last_s_ = 0;
-  double late_s_ = 0;  // at most, the last picture
+  double late_s_ = 0;  // upper limit, of the last picture
   bool began_ = false;
-  int punctual_ = 0;  // in a row, at a connection's beginning
+  int punctual_ = 0;  // in a row, at the connection's beginning
 };
 
 }  // namespace alidade

@@ -1,18 +1,15 @@
 #pragma once
-// UtcLine: what a sender's absolute clock (FrameStamp::sender_utc_s: ONVIF's capture time in each packet, or RTCP's reports)
-// tells of the age of pictures at a reconnection, where the clock of its time stamps begins anew.
-//
-//   before   host time = line(sender), sender = utc - ahead       as last seen through the connection before
+// UtcLine: the age of pictures at a reconnection, where the sender's clock restarts, by the
+// sender's absolute clock (FrameStamp::sender_utc_s: ONVIF's capture time in each packet, or RTCP's
+// reports). Beyond PTCEE.
+//   before   host time = line(sender), sender = utc - ahead     as last seen on the old connection
 //   after    time = line(utc - ahead), late = receive - time
-//
-// An absolute clock may be set meanwhile, by any step, and reports may be nonsense. What is late may therefore be old, or
-// of a clock that was put back: that nobody can tell. But an age that is none, to kAgrees_s, is two clocks' word: a picture
-// as old as a step is long, to that, would be a coincidence. So nothing but that is ever concluded, and sigma covers the
-// clock's error within kAgrees_s: it contains `late`, the line's and the delays' own.
-// Believed is
-//   ahead    once it held for kProven_s: to kSteady_s. What leaves that begins anew, and what was kept is forgotten;
-//   the line if it was locked and still is known to kSharp_s, which for hours it is not.
-// Fixed memory, no allocation, one thread. Seconds. Beyond PTCEE.
+// An absolute clock may be set meanwhile, and reports may be nonsense. So only an age near zero, to
+// kAgrees_s, is trusted: then two clocks agree, as a picture as old as a clock step would be a
+// coincidence. Sigma includes `late`, the line's and the delays' own. `ahead` is used once it held
+// to kSteady_s for kProven_s; a change forgets what was kept. The line is used if it was locked and
+// is still known to kSharp_s, which does not last for hours.
+// Seconds. Fixed memory, no allocation, one thread.
 
 #include <cmath>
 #include <optional>
@@ -24,16 +21,16 @@ namespace alidade {
 
 class UtcLine {
  public:
-  static constexpr double kAgrees_s = 0.02;  // the least delay of a connection differs by less
+  static constexpr double kAgrees_s = 0.02;  // least delays of two connections differ by less
 
   struct Age {
-    double time_s = 0;   // as the line before has it
-    double sigma_s = 0;  // of that, if it agrees
-    double late_s = 0;   // the receive time less that
+    double time_s = 0;   // by the line of the connection before
+    double sigma_s = 0;  // of time_s, if the age agrees
+    double late_s = 0;   // receive time minus time_s
     [[nodiscard]] bool agrees() const { return std::abs(late_s) <= kAgrees_s; }
   };
 
-  // Each frame with a sender's clock, in the order of arrival.
+  // Call for each frame with a sender's clock, in order of arrival.
   void watch(const FrameStamp& stamp) {
     if (!tells(stamp)) return;
     const double ahead_s = *stamp.sender_utc_s - *stamp.sender_time_s;
@@ -46,7 +43,8 @@ class UtcLine {
     seen_s_ = stamp.receive_time_s;
   }
 
-  // The connection has ended. filter: its line; null if it had none that was believed. off_line_s: by how much frames left it.
+  // The connection has ended. filter: its line; null if there is none to be believed. off_line_s:
+  // by how much frames left it.
   void end_connection(const ClockFilter<>* filter, double off_line_s) {
     if (filter != nullptr && filter->state() == ClockState::kLocked && steady_since_s_ &&
         seen_s_ - *steady_since_s_ >= kProven_s) {
@@ -55,13 +53,13 @@ class UtcLine {
     steady_since_s_.reset();
   }
 
-  // What was kept is wrong, or what it was kept of.
+  // What was kept, or its connection, is wrong.
   void forget() {
     kept_.reset();
     steady_since_s_.reset();
   }
 
-  // Of a frame of a later connection; none: nothing is known.
+  // For a frame of a later connection. Empty: nothing is known.
   [[nodiscard]] std::optional<Age> age(const FrameStamp& stamp) const {
     if (!kept_ || !tells(stamp)) return std::nullopt;
     const ClockFilter<>& filter = kept_->filter;
@@ -77,8 +75,8 @@ class UtcLine {
 
  private:
   static constexpr double kSteady_s = 5e-3;
-  static constexpr double kProven_s =
-      10;  // a rate that is off by more than 5e-4 does not hold so long
+  // A rate that is off by more than 5e-4 does not hold for so long.
+  static constexpr double kProven_s = 10;
   static constexpr double kSharp_s = 5e-3;
 
   struct Kept {

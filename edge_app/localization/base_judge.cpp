@@ -6,9 +6,9 @@
 namespace alidade {
 namespace {
 
-constexpr double kBelieved = 25;  // chi-square, 2 degrees of freedom: one in 3e5 is larger
+constexpr double kBelieved = 25;  // chi-square, 2 degrees of freedom: larger once in 3e5
 
-// Of (pan, tilt), from that of xi.
+// Covariance of (pan, tilt), from that of xi.
 Matrix2<double> angle_covariance(const Matrix<double, 3, 2>& J_xi_angle,
                                  const Matrix3<double>& covariance) {
   const Matrix<double, 2, 3> to_angle = J_angle_xi(J_xi_angle);

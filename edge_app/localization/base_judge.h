@@ -1,9 +1,11 @@
 #pragma once
-// BaseJudge: what it means that a picture was localized: how far its record is off, and whether telemetry's zero or the base has moved.
+// BaseJudge: how far a record is off the localized picture, and whether telemetry's zero or the
+// base has moved.
 //   change = localized angle - record's angle, at the row for which the map's pose holds
-// A record in telemetry's base is expected within zero_sigma of the map's; one in the map's base within what it claims. A change beyond that is
-// a movement, if a second picture says the same. A movement is told as such, so that what was known counts no more, or reported only.
-// Pure: no thread, no clock. Allocates nothing.
+// A record in telemetry's base is expected within zero_sigma of the map's base; one in the map's
+// base within its own sigma. A larger change is a movement once a second picture confirms it. A
+// movement is either corrected, so that what was known no longer counts, or only reported. Pure: no
+// thread, no clock. Allocates nothing.
 
 #include <optional>
 
@@ -15,22 +17,23 @@
 namespace alidade {
 
 struct BaseJudgeOptions {
-  double zero_sigma = 1e-3;  // rad, > 0: of telemetry's zero from one start to the next
-  bool correct = true;       // a movement; false: report it only
+  double zero_sigma = 1e-3;  // rad, > 0: change of telemetry's zero between starts
+  bool correct = true;       // correct movements; false: only report them
 };
 
 class BaseJudge {
  public:
   enum class Verdict {
-    kExpected,   // within what was to be expected: to be told
-    kSuspected,  // beyond that: a second picture is to say so, too
-    kMoved,      // it did: to be told
-    kReported    // it did: not to be told
+    kExpected,   // within the expected: use it
+    kSuspected,  // beyond it: a second picture has to confirm it
+    kMoved,      // confirmed: use it
+    kReported    // confirmed: only report it
   };
 
   explicit BaseJudge(const BaseJudgeOptions& options = {}) : options_(options) {}
 
-  // found: kOk, of the record's frame, which has an orientation. told: all but frame and time.
+  // found: kOk, of the record's frame, which has an orientation. *told: sets all but frame and
+  // time_s.
   [[nodiscard]] Verdict judge(const OrientationRecord& record, const Localization& found,
                               double reference_row, ToldBase* told, BaseOffset* offset);
 

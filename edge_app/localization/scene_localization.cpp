@@ -15,16 +15,17 @@ namespace alidade {
 namespace {
 
 constexpr double kMilli = 1e3;
-// Of a turn rate that points followed from one frame to the next tell: what may change of it meanwhile, and px over the image's height.
+// Of a turn rate from points followed between two frames: the share that may change meanwhile, and
+// px over the image's height.
 constexpr double kFollowedShare = 0.25;
 constexpr double kFollowed_px = 0.2;
 
-// s, of all rows.
+// s, for all rows.
 double read_out_of(const Calibration& calibration) {
   return std::abs(calibration.line_delay) * calibration.camera.height;
 }
 
-// Of a frame of which nobody knows where it looks.
+// For a frame whose direction is unknown.
 LocalizationHint hint_of(const LocalizableFrame& frame, bool zooms) {
   const Calibration calibration = unpack(frame.record.camera);
   LocalizationHint hint;
@@ -38,7 +39,7 @@ LocalizationHint hint_of(const LocalizableFrame& frame, bool zooms) {
   return hint;
 }
 
-// What a record does not know of how its rows differ.
+// How uncertain a record is about the motion between its rows.
 MotionDoubt motion_doubt_of(const OrientationRecord& record, const FrameOrientation& frame) {
   const Calibration& calibration = frame.calibration;
   const double rate_sigma = std::sqrt(frame.motion_covariance.block<2, 2>(2, 2).trace());
@@ -47,7 +48,7 @@ MotionDoubt motion_doubt_of(const OrientationRecord& record, const FrameOrientat
       parameter_sigma(calibration, Parameter::kLineDelay) * calibration.camera.height;
   MotionDoubt out;
   out.turn = std::hypot(read_out_of(calibration) * rate_sigma, delay_sigma * rate);
-  // Where telemetry alone answers, nobody has looked whether the lens moves.
+  // Where telemetry alone answers, nothing shows whether the lens moves.
   const bool is_zoom_untold = frame.mode == OrientationMode::kPt && record.zoom.has_value();
   out.log_f = is_zoom_untold ? kUnknownMotion.log_f
                              : std::hypot(read_out_of(calibration) * frame.zoom_rate_sigma,
@@ -118,7 +119,7 @@ SceneLocator::Outcome SceneLocalization::look(const LocalizableFrame& frame, Tol
   count(told->frame, found, monotonic_now_s() - began_s);
   if (found.status != LocalizationStatus::kOk) return Outcome::kNotFound;
   const Outcome outcome = is_whole ? tell_whole(frame, found, told) : judge(frame, found, told);
-  // What a second picture is to confirm teaches nothing.
+  // A result that a second picture has to confirm teaches nothing.
   if (outcome == Outcome::kTold) keep_up(found, seen);
   return outcome;
 }

@@ -1,9 +1,11 @@
 #pragma once
-// SceneLocalization: where a live picture looks by the scene map, and what that means for telemetry's base. A picture is looked for where its
-// record says, with its focal length, else in all of the map (core/mapping/localization.h); what is refused there changes nothing.
-// A movement of base or zero is logged, once. A frame without an orientation (no telemetry) is looked for in all of the map, by the
-// focal length of its calibration: at another zoom it is not told; of a lens that zooms, by any of its zoom curve's. What was found, and
-// contradicts nothing, may keep the map up (scene_upkeep.h). One thread, but for report().
+// SceneLocalization: where a live picture looks by the scene map, and what that means for
+// telemetry's base. A picture is searched where its record says, with the record's focal length,
+// else in the whole map (core/mapping/localization.h). One that is not found changes nothing. A
+// movement of base or zero is logged once. A frame without orientation (no telemetry) is searched
+// in the whole map, with its calibration's focal length; a result at another zoom is refused. For a
+// lens that zooms, any focal length of its zoom curve is accepted. A result that contradicts
+// nothing may update the map (scene_upkeep.h). One thread, except for report().
 
 #include <memory>
 #include <mutex>
@@ -21,14 +23,14 @@ namespace alidade {
 
 class SceneLocalization : public SceneLocator {
  public:
-  // name: of the map, for people. has_telemetry: of the camera; without it, range: of its focal lengths, if the lens zooms. store: none:
-  // the map is not kept up.
+  // name: of the map, for people. has_telemetry: the camera has telemetry. range: without
+  // telemetry, the focal lengths of a lens that zooms. store: null: the map is not kept up.
   SceneLocalization(SceneMap map, const std::string& name, const BaseJudgeOptions& options,
                     bool has_telemetry = true, std::optional<CurveRange> range = {},
                     StoreMapChange store = nullptr);
   ~SceneLocalization() override;
 
-  void prepare() override;  // makes the index of the map, which is then gone, unless it is kept up
+  void prepare() override;  // builds the index; frees the map unless it is kept up
   [[nodiscard]] Outcome look(const LocalizableFrame& frame, ToldBase* told) override;
 
   // Any thread but the real-time one.
@@ -54,7 +56,7 @@ class SceneLocalization : public SceneLocator {
   BaseJudge judge_;
   SceneUpkeep upkeep_;
 
-  mutable std::mutex mutex_;  // of what follows
+  mutable std::mutex mutex_;  // guards what follows
   SceneReport report_;
 };
 

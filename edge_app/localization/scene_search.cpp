@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-// What is not known of a picture's lens beside the calibration's own sigma: of log f.
+// Of log f: the uncertainty of a picture's lens beyond the calibration's own sigma.
 constexpr double kFocalLengthSigma = 5e-3;
 
 FeatureSet features_in(const FeatureDetector& detector, const ImageView& image) {

@@ -1,6 +1,7 @@
 #pragma once
-// SceneSearch: asks a scene map where one picture looks, by few features first, and by more of them where those do not tell
-// (core/mapping/localization.h). Batch work: allocates. One thread at a time.
+// SceneSearch: finds where one picture looks in a scene map: with few features first, and with more
+// if those do not suffice (core/mapping/localization.h). Batch work: allocates. One thread at a
+// time.
 
 #include <optional>
 #include <string>
@@ -16,10 +17,11 @@ namespace alidade {
 
 class SceneSearch {
  public:
-  // Makes the index of the map, which need not outlive this.
+  // Builds the index of the map, which need not outlive this object.
   explicit SceneSearch(const SceneMap& map);
 
-  // image: of the map's size. *seen: what it was found by, or looked for last.
+  // image: of the map's size. *seen: the features of the last search, with which the picture was
+  // found or not.
   [[nodiscard]] Localization find(const ImageView& image, const LocalizationHint& hint,
                                   FeatureSet* seen) const;
 
@@ -29,19 +31,20 @@ class SceneSearch {
   FeatureDetector thorough_;
 };
 
-// That of a picture that is taken to be of this calibration's zoom.
+// The prior for a picture that is taken to be at this calibration's zoom.
 [[nodiscard]] FocalLengthPrior focal_length_of(const Calibration& calibration);
 
-// Focal lengths of a zoom curve, px.
+// The focal lengths of a zoom curve, px.
 struct CurveRange {
   double least_px = 0;
   double most_px = 0;
 };
-// None for an empty curve.
+// Empty for an empty curve.
 [[nodiscard]] std::optional<CurveRange> range_of(const ZoomCurve& curve);
 
-// One line where what was found, kOk, contradicts the lens of a camera without telemetry: its zoom curve's range or, where there is
-// none, the one zoom that the calibration is for; else empty. picture: which.
+// One line if a result (kOk) contradicts the lens of a camera without telemetry: the range of its
+// zoom curve or, without a curve, the one zoom of its calibration. Else empty. picture: its name in
+// the line.
 [[nodiscard]] std::string another_lens(const Localization& found, const Calibration& calibration,
                                        const std::optional<CurveRange>& range,
                                        const std::string& picture);

@@ -11,11 +11,11 @@ void SceneUpkeep::show(const Localization& found, const FeatureSet& features, do
   view.time_utc_s = time_utc_s;
   view.R_base_from_camera = found.pose.R_base_from_camera;
   view.log_f = found.pose.log_f;
-  // Of the first or last row, from which the pose's is half an image away: there it is known least.
+  // Of the first or last row, half an image away from the pose's row: there it is known least.
   view.covariance = found.covariance_in_map + found.pose.motion_covariance / 4;
   view.motion = found.pose.motion;
   view.features = &features;
-  // What has died since the index was made is found there, but counts no more.
+  // Landmarks that died since the index was built are still found, but no longer count.
   for (const LocalizedFeature& m : found.matched) {
     if (landmark_index(*map, m.landmark) >= 0) view.matches.push_back({m.feature, m.landmark});
   }

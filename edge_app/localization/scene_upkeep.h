@@ -1,8 +1,9 @@
 #pragma once
-// SceneUpkeep: keeps the scene map in use true by the pictures that were found in it (core/mapping/map_upkeep.h), and on disk: one
-// transaction a picture, there when it returns, so that whatever ends the process costs no more than the picture under way.
-// What the disk does not take is said once and ends the upkeep; the map goes on as it stands on disk. Whoever localizes has an index of
-// the map as it was: is_due() says when another is worth its while. One thread.
+// SceneUpkeep: keeps the scene map in use true by the pictures found in it
+// (core/mapping/map_upkeep.h), in memory and on disk. Each picture is one transaction, on disk when
+// show() returns: whatever ends the process costs no more than the present picture. If the disk
+// refuses, that is logged once and the upkeep ends; the map stays as it is on disk. The localizer's
+// index is of an earlier state of the map: is_due() says when a new one is worthwhile. One thread.
 
 #include <cstdint>
 #include <functional>
@@ -15,20 +16,21 @@
 
 namespace alidade {
 
-// Stores a change of the map as one transaction. False: *error, one line, and the map on disk is as it was.
+// Stores a change of the map as one transaction. False: one line in *error, and the map on disk is
+// unchanged.
 using StoreMapChange = std::function<bool(const MapChange& change, std::string* error)>;
 
 class SceneUpkeep {
  public:
-  // store: none: nothing is kept up.
+  // store: null: nothing is kept up.
   explicit SceneUpkeep(StoreMapChange store) : store_(std::move(store)) {}
 
   [[nodiscard]] bool keeps_up() const { return store_ != nullptr; }
-  // found: kOk, of these features. *map: as on disk, before and after.
+  // found: kOk, from these features. *map: equals the map on disk, before and after.
   void show(const Localization& found, const FeatureSet& features, double time_utc_s,
             SceneMap* map);
 
-  // So much has come and gone since the index was made.
+  // Enough landmarks have come and gone since the index was built.
   [[nodiscard]] bool is_due() const { return changed_ >= kWorthAnIndex; }
   void index_made() { changed_ = 0; }
 

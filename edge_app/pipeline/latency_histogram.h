@@ -1,7 +1,7 @@
 #pragma once
-// LatencyHistogram: quantiles of a positive quantity over any length of time in fixed memory.
-// Buckets grow by 5 % from 1 us to beyond 100 s, so a quantile is right to 5 %; smaller and larger
-// values fall into the first and last bucket. One thread.
+// LatencyHistogram: quantiles of a positive quantity over any length of time, in fixed memory.
+// Buckets grow by 5 % from 1 us to beyond 100 s, so a quantile is right to 5 %. Smaller and larger
+// values fall into the first and the last bucket. One thread.
 
 #include <algorithm>
 #include <array>
@@ -22,7 +22,8 @@ class LatencyHistogram {
     longest_s_ = std::max(longest_s_, seconds);
   }
 
-  // Upper edge of the bucket that holds the quantile, s, but no more than the longest; 0 if nothing was added.
+  // Upper edge of the bucket that holds the quantile, s, but no more than the longest value. 0 if
+  // nothing was added.
   [[nodiscard]] double quantile(double fraction) const {
     if (total_ == 0) return 0;
     const double wanted = fraction * static_cast<double>(total_);
@@ -42,7 +43,7 @@ class LatencyHistogram {
 
   static constexpr std::size_t kBuckets = 384;
   [[nodiscard]] std::int64_t count(std::size_t bucket) const { return counts_[bucket]; }
-  // What a bucket holds is no longer; but for the last one, which holds all the rest.
+  // No value in a bucket is longer, except in the last one, which holds all the rest.
   [[nodiscard]] static double upper_edge_s(std::size_t bucket) {
     return kLowest * std::pow(kGrowth, static_cast<double>(bucket));
   }

@@ -1,11 +1,11 @@
 #pragma once
-// LinkWatch: how the link of one source does, for those who ask while it is read: whether it stands, why not, how often it
-// came back, how old its last item is and how many come a second.
-//
-//   rate   1 / mean interval between the items of the last kMemory, however they are bunched; no more than 1 / age, so that
-//          it falls when nothing comes
-// The reading thread tells it: item() takes no lock, lost() and waiting() one for the length of a string. now() may be called by any
-// thread. Times are seconds of the host's CLOCK_MONOTONIC.
+// LinkWatch: the health of a source's link, for those who ask while it is read: whether it is
+// connected, why not, how often it came back, how old its last item is, and how many items come a
+// second.
+//   rate  1 / mean interval between items over the last kMemory, however unevenly they come; no
+//         more than 1 / age, so that it falls when nothing comes
+// The reading thread reports to it: item() takes no lock, lost() and waiting() take one to copy a
+// string. Any thread may call now(). Times are seconds of the host's CLOCK_MONOTONIC.
 
 #include <atomic>
 #include <cstdint>
@@ -17,12 +17,12 @@
 namespace alidade {
 
 struct LinkHealth {
-  bool connected = false;  // items come, or may: nothing is known to be wrong since the last
-  // Why there is no connection, or what is waited for though it stands, one line; empty while all is well, and as long as
-  // it was not tried.
+  bool connected = false;  // nothing is known to be wrong since the last item
+  // One line: why there is no connection, or what a standing connection waits for. Empty while all
+  // is well, and before the first attempt.
   std::string reason;
   std::int64_t reconnections = 0;
-  std::optional<double> age_s;    // since the last item; empty before the first
+  std::optional<double> age_s;    // since the last item; empty before the first one
   std::optional<double> rate_hz;  // empty before the second item of a connection
 };
 
@@ -34,7 +34,8 @@ class LinkWatch {
   void item(double now_s);
   // Reading thread. The connection was lost or refused, or a further attempt failed.
   void lost(const std::string& reason);
-  // Reading thread. What the source waits for though its connection stands (FrameSource::waiting); empty: nothing.
+  // Reading thread. What the source waits for although it is connected (FrameSource::waiting());
+  // empty: nothing.
   void waiting(const std::string& reason);
 
   [[nodiscard]] LinkHealth now(double now_s) const;
@@ -44,8 +45,8 @@ class LinkWatch {
   std::atomic<std::int64_t> reconnections_{0};
   std::atomic<double> last_s_{-1};      // < 0: none yet
   std::atomic<double> interval_s_{-1};  // < 0: fewer than two items of this connection
-  int intervals_ = 0;                   // reading thread: that interval_s_ is the mean of
-  bool fresh_ = true;                   // reading thread: the next item is its connection's first
+  int intervals_ = 0;  // reading thread: the number of intervals in the mean interval_s_
+  bool fresh_ = true;  // reading thread: the next item is the first of its connection
   mutable PriorityMutex mutex_;
   std::string reason_;   // guarded by mutex_
   std::string waiting_;  // guarded by mutex_

@@ -53,7 +53,7 @@ Pipeline::Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink
   for (ImageSlot slot = 0; slot < kImageSlots; ++slot) free_slots_.push_back(slot);
   if (!options.step.has_telemetry)
     pan_tilt_watch_.lost("pan_tilt.type is none: the scene map tells where the camera looks");
-  // Records made before the calibration thread first wakes say it too.
+  // So that records made before the calibration thread first wakes have it too.
   if (calibration_ != nullptr) stage_.report(calibration_->report());
 }
 
@@ -64,7 +64,7 @@ Pipeline::~Pipeline() {
 
 void Pipeline::start() {
   if (options_.realtime.lock_memory) log_granted("memory", lock_process_memory());
-  // The consumers first, so that nothing is dropped at the start.
+  // Consumers first, so that nothing is dropped at the start.
   threads_.emplace_back(&Pipeline::write_output, this);
   if (calibration_ != nullptr) {
     threads_.emplace_back(&Pipeline::calibrate, this);
@@ -85,16 +85,16 @@ void Pipeline::start() {
 }
 
 void Pipeline::stop() {
-  // The capture thread's end goes through the queues and ends the others behind it.
+  // The end of the capture thread passes through the queues and ends the other threads.
   video_.stop();
   pan_tilt_.stop();
   sink_.interrupt();
   if (calibration_ != nullptr) {
     calibration_->cancel();
-    // It ends at its next look at that, which a thread that runs last may reach after minutes.
+    // It ends when it next checks for this. At lowest priority that may take minutes.
     if (!threads_.empty()) static_cast<void>(set_usual_priority(calibrating_));
   }
-  // Likewise: with the picture that they look at.
+  // Likewise: these end after the picture that they look at.
   if (options_.scene != nullptr && !threads_.empty())
     static_cast<void>(set_usual_priority(localizing_));
   if (options_.detectors != nullptr && !threads_.empty())
@@ -128,7 +128,7 @@ void Pipeline::fail(const std::string& error) {
   finish();
 }
 
-// Fails only if the counter is full, and then the descriptor is readable already.
+// Fails only if the counter is full; then the descriptor is readable already.
 void Pipeline::finish() { static_cast<void>(::eventfd_write(finished_, 1)); }
 
 std::string Pipeline::size_fault(const Frame& frame) const {
@@ -145,7 +145,8 @@ std::string Pipeline::size_fault(const Frame& frame) const {
                    found, options_.width, options_.height, frame.width, frame.height);
 }
 
-// The image stays where it is until its slot comes back; a frame whose image finds no slot goes without.
+// The image stays where it is until its slot comes back. Without a free slot the frame goes without
+// its image.
 bool Pipeline::push(const Frame& frame) {
   if (frame.interlaced && !std::exchange(interlaced_logged_, true)) {
     spdlog::warn("{}: {}", video_.name(), kInterlaced);
@@ -167,7 +168,8 @@ bool Pipeline::push(const Frame& frame) {
   return true;
 }
 
-// The calling thread's scheduling. What is not permitted the real-time thread has said: it asks for more.
+// Sets the calling thread's scheduling. What is not permitted was reported by the real-time thread,
+// which asks for more.
 void Pipeline::take_place(ThreadDuty duty) const {
   const int priority = priority_of(duty, options_.realtime.priority);
   if (priority > 0 || options_.realtime.lock_memory)
@@ -175,15 +177,17 @@ void Pipeline::take_place(ThreadDuty duty) const {
   static_cast<void>(share_processor());
 }
 
-// Where nobody looks at images, what a record passes takes microseconds on each thread, and to wake another processor takes
-// longer: one for all of them. At normal priority that is the kernel's to decide, who knows what else there is to do.
+// In PT mode a record takes microseconds on each thread, and waking another processor takes longer.
+// So all threads on its way share one processor. At normal priority that is left to the kernel,
+// which knows the other load.
 bool Pipeline::share_processor() const {
   if (way_processor_ < 0 || ::sched_getscheduler(0) != SCHED_FIFO) return false;
   return apply_realtime({0, way_processor_, false}).warnings.empty();
 }
 
 void Pipeline::capture() {
-  // A link's own thread is started by the first read, and with the caller's scheduling; from the first frame on this one decodes.
+  // The first read starts a link's own thread, which inherits this scheduling. From the first frame
+  // on this thread decodes.
   take_place(ThreadDuty::kBrief);
   bool decodes = false;
   const auto on_frame = [&](const Frame& frame) {
@@ -219,7 +223,7 @@ void Pipeline::read_telemetry() {
 }
 
 void Pipeline::run_realtime() {
-  // Start-up: the last that may allocate or log on this thread.
+  // Start-up: the last chance for this thread to allocate or log.
   log_granted("real-time thread",
               apply_realtime({options_.realtime.priority, options_.realtime.cpu, false}));
   if (share_processor())
@@ -231,7 +235,7 @@ void Pipeline::run_realtime() {
   } while (stage_.process());
   const PageFaults at_end = thread_page_faults();
   realtime_thread_.store(0, std::memory_order_release);
-  // Nothing is in a hurry here.
+  // Nothing is urgent any more.
   const std::lock_guard<PriorityMutex> lock(summary_mutex_);
   page_faults_ = {at_end.minor - faults_at_start_.minor, at_end.major - faults_at_start_.major};
 }
@@ -314,7 +318,7 @@ void Pipeline::write_output() {
       const bool was_open = open;
       if (open) open = sink_.write(message.record);
       const double written_s = monotonic_now_s();
-      // Nobody waits for what is logged.
+      // Logging comes last, as nobody waits for it.
       log_events(message);
       if (!was_open) continue;
       account_way(message, written_s);
@@ -360,7 +364,8 @@ void Pipeline::count(const OutputMessage& message) {
   if (message.events.stamps_left_out) summary_.stamps_left_out = message.events.stamps_left_out;
 }
 
-// Nothing else in the log tells why such records have no angle of telemetry: no connection is known to be lost.
+// Nothing else in the log says why such records have no telemetry: no connection is known to be
+// lost.
 void Pipeline::log_old_telemetry(const OrientationRecord& record) {
   if (record.status != RecordStatus::kTelemetryTooOld || !record.telemetry_age_s) return;
   const double now_s = monotonic_now_s();

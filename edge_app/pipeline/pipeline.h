@@ -1,24 +1,19 @@
 #pragma once
 // Pipeline: the threads of `alidade run` between two sources and a sink of records.
-//
-//   capture thread    frame source -> queue       | reads, checks the image size, logs losses
-//   telemetry thread  pan/tilt source -> queue    |
-//   real-time thread  RealtimeStage::process(); scheduled as RealtimeOptions say
-//   calibration thread  SelfCalibration, with the lowest priority: tracks and telemetry in, a calibration
-//                     with its map out, which the real-time thread takes over between two frames
-//   output thread     queue -> sink; logs what the real-time thread may not log; counts
-//   localization thread  SceneTap, with the lowest priority; only if there is a scene map
-//   tap thread        ImageTap: small images, for those who ask; only if there is a tap
-//   detector thread   DetectorTap, with the lowest priority; only if there is a detector
-//
-// Where the real-time thread has a priority, all on a record's way have theirs below it, in this order: the link's own thread,
-// which stamps arrivals, telemetry and output; decoding. So a record waits for no other program, and none of them for the step.
-// In PT mode they then share one processor: the real-time thread's, or any.
-// Memory is locked before they start, and each touches its stack before its first item.
-// A source that loses its connection is waited for; records of mode `none` are made at the loss and
-// then each second until it is back. The pipeline is finished when the video has ended, a source
-// has failed for good, or the sink takes no more; stop() ends it at any time.
-// One thread owns the pipeline and calls everything here, but for summary().
+//   capture       frame source -> queue; reads, checks the image size, logs losses
+//   telemetry     pan/tilt source -> queue; likewise
+//   real-time     RealtimeStage::process(); scheduled as RealtimeOptions say
+//   calibration   SelfCalibration: tracks and telemetry in, a calibration with its map out, which
+//                 the real-time thread adopts between two frames
+//   output        queue -> sink; logs what the real-time thread may not log; counts
+//   localization  SceneTap, if there is a scene map
+//   tap           ImageTap, small images on request, if there is a tap
+//   detector      DetectorTap, if there is a detector
+// Priorities, processors and memory locking: ARCHITECTURE.md, threads of `alidade run`.
+// A source that loses its connection is waited for. Records of mode `none` are made at the loss and
+// then each second. The pipeline is finished when the video has ended, a source has failed for
+// good, or the sink takes no more. stop() ends it at any time. One thread owns the pipeline and
+// calls everything here, except summary() and zoom_curve().
 
 #include <atomic>
 #include <cstdint>
@@ -44,32 +39,33 @@ namespace alidade {
 struct PipelineOptions {
   OrientationStepOptions step;
   RealtimeOptions realtime;
-  // Frames of any other size end the pipeline with an error that names calibration_name. 0: any.
+  // px. Frames of another size end the pipeline with an error that names calibration_name. 0: any
+  // size.
   int width = 0;
   int height = 0;
   std::string calibration_name;
-  bool measure_latency = true;       // false for a recording, whose stamps are of another clock
-  ImageTap* tap = nullptr;           // borrowed like the sources; null: nobody asks for images
+  bool measure_latency = true;       // false for a recording: its stamps are of another clock
+  ImageTap* tap = nullptr;           // borrowed, like the sources; null: nobody asks for images
   SceneTap* scene = nullptr;         // likewise; null: there is no scene map
-  DetectorTap* detectors = nullptr;  // likewise; null: there is none
+  DetectorTap* detectors = nullptr;  // likewise; null: there is no detector
 };
 
 struct PipelineSummary {
   std::int64_t clock_restarts = 0;
   std::int64_t delay_steps = 0;
-  double delay_wander_s = 0;  // of the video, as of the last frame; 0: it does not wander
-  // The rate of the sender's time stamps, less one, where they are left out for it.
+  double delay_wander_s = 0;  // s, of the video, as of the last frame; 0: it does not wander
+  // The rate of the sender's time stamps, less one, if they are left out because of it.
   std::optional<double> stamps_left_out;
   std::int64_t records = 0;
   std::int64_t frames = 0;
   std::int64_t with_orientation = 0;
   DropCounters drops;
-  std::int64_t with_landmarks = 0;  // of these, in OE mode
-  std::int64_t repeated = 0;        // frames whose image was the one before, sent again
+  std::int64_t with_landmarks = 0;  // of with_orientation, those in OE mode
+  std::int64_t repeated = 0;        // frames whose image was sent again
   ReasonCounts reasons;             // of the other records
   LatencyHistogram latency;
-  // A frame's way: received (its last packet), pushed by the capture thread, taken up by the real-time thread,
-  // record made, record written.
+  // The parts of a frame's way: from arrival of its last packet to the push by the capture thread,
+  // to the take-up by the real-time thread, to the finished record, to the written record.
   LatencyHistogram decoding;
   LatencyHistogram waiting;
   LatencyHistogram computing;
@@ -81,7 +77,7 @@ struct PipelineSummary {
 
 class Pipeline {
  public:
-  // Borrows all until it is destroyed. calibration: null if nothing is to be calibrated.
+  // Borrows everything until it is destroyed. calibration: null if nothing is to be calibrated.
   Pipeline(FrameSource& video, PanTiltSource& pan_tilt, RecordSink& sink,
            SelfCalibration* calibration, const PipelineOptions& options);
   ~Pipeline();
@@ -90,23 +86,23 @@ class Pipeline {
 
   void start();
 
-  // A descriptor that polls readable once the pipeline is finished.
+  // A descriptor that becomes readable once the pipeline is finished.
   [[nodiscard]] int finished_fd() const { return finished_; }
 
-  // Whether records could get through: a sign of life goes the way of a record, through the real-time thread and the
-  // output thread. Neither waits for a camera or a head, so that only a thread that hangs, or a sink that takes
-  // nothing, leaves it unanswered.
+  // Checks whether records could get through. A pulse goes the way of a record, through the
+  // real-time and the output thread. Neither waits for a camera or a head, so only a thread that
+  // hangs, or a sink that takes nothing, leaves it unanswered.
   void ask_for_pulse() { stage_.ask_for_pulse(); }
   [[nodiscard]] bool pulse_is_answered() const { return stage_.pulse_is_answered(); }
 
-  // Ends the threads and waits for them; records on their way are still written.
+  // Ends the threads and waits for them. Records on their way are still written.
   void stop();
 
-  // After stop(): why it failed, one line; empty if it did not.
+  // After stop(): one line that says why the pipeline failed; empty if it did not.
   [[nodiscard]] const std::string& error() const { return error_; }
-  // Any thread, at any time: what has come so far.
+  // Any thread, at any time: what has happened so far.
   [[nodiscard]] PipelineSummary summary() const;
-  // Likewise: the zoom curve in use, perhaps an empty one.
+  // Any thread, at any time: the zoom curve in use; may be empty.
   [[nodiscard]] std::shared_ptr<const ZoomCurve> zoom_curve() const;
 
  private:
@@ -140,27 +136,27 @@ class Pipeline {
   bool interlaced_logged_ = false;  // capture thread
   LinkWatch video_watch_;
   LinkWatch pan_tilt_watch_;
-  std::vector<Frame> images_;  // capture thread: by slot, those that somebody still looks at
-  std::vector<ImageSlot> free_slots_;  // capture thread
-  int way_processor_;                  // of the threads on a record's way; -1: each has its own
-  int finished_;                       // eventfd
-  std::mutex error_mutex_;             // the first of several threads to fail is heard; not on the
-  std::string error_;                  // real-time thread
-  mutable PriorityMutex summary_mutex_;  // the real-time thread does not take it
+  std::vector<Frame> images_;            // capture thread: by slot, those still in use
+  std::vector<ImageSlot> free_slots_;    // capture thread
+  int way_processor_;                    // of all threads on a record's way; -1: not shared
+  int finished_;                         // eventfd
+  std::mutex error_mutex_;               // guards error_; never taken by the real-time thread
+  std::string error_;                    // of the first thread that failed
+  mutable PriorityMutex summary_mutex_;  // never taken by the running real-time thread
   PipelineSummary summary_;
-  std::shared_ptr<const ZoomCurve> zoom_curve_;  // under summary_mutex_
+  std::shared_ptr<const ZoomCurve> zoom_curve_;  // guarded by summary_mutex_
   PageFaults page_faults_;                       // real-time thread, at its end
-  PageFaults faults_at_start_;                   // real-time thread, before it says its number
-  std::atomic<int> realtime_thread_{0};          // 0: not running
-  DropCounters drops_logged_;                    // output thread
+  PageFaults faults_at_start_;           // real-time thread, before it sets realtime_thread_
+  std::atomic<int> realtime_thread_{0};  // its id; 0: not running
+  DropCounters drops_logged_;            // output thread
   double drops_logged_at_s_ = 0;
   double old_telemetry_logged_at_s_ = -1e9;  // output thread
   double wander_logged_at_s_ = -1e9;         // output thread
   double repeated_logged_at_s_ = -1e9;       // output thread
   std::vector<std::thread> threads_;
-  pthread_t calibrating_{};  // one of them, if there is a calibration
-  pthread_t localizing_{};   // one of them, if there is a scene map
-  pthread_t detecting_{};    // one of them, if there is a detector
+  pthread_t calibrating_{};  // one of threads_, if there is a calibration
+  pthread_t localizing_{};   // one of threads_, if there is a scene map
+  pthread_t detecting_{};    // one of threads_, if there is a detector
 };
 
 }  // namespace alidade

@@ -1,8 +1,8 @@
 #pragma once
-// read_to_the_end: what a capture or telemetry thread does with its source, from the first item to the
-// last, over losses of the connection. Logs each loss and return, what a source waits for though its connection stands, and what it
-// notes of its device or finds wrong with its stream.
-// Allocates and waits: never on the real-time thread.
+// read_to_the_end(): reads a source from the first item to the last, over losses of the connection,
+// for a capture or telemetry thread. Logs each loss and return, what a connected source waits for,
+// and what it notes of its device or finds wrong with its stream. Allocates and waits: never on the
+// real-time thread.
 
 #include <spdlog/spdlog.h>
 
@@ -17,7 +17,7 @@
 
 namespace alidade {
 
-// What the source waits for; telemetry has nothing to wait for.
+// What the source waits for; always empty for telemetry.
 template <typename Source>
 std::string waiting_of(const Source& source) {
   if constexpr (std::is_base_of_v<FrameSource, Source>) {
@@ -27,7 +27,8 @@ std::string waiting_of(const Source& source) {
   }
 }
 
-// What the source has found out of its device since the last time; of video, what is wrong with the stream.
+// What the source has found out about its device since the last call; for video, what is wrong with
+// the stream.
 template <typename Source>
 std::vector<std::string> notes_of(Source& source) {
   if constexpr (std::is_base_of_v<FrameSource, Source>) {
@@ -41,7 +42,7 @@ std::vector<std::string> notes_of(Source& source) {
   }
 }
 
-// Says what is waited for: at once, and then ever more rarely, as it may last.
+// Logs what is waited for: at once, then with growing pauses, as the wait may last.
 class WaitingLog {
  public:
   void say(const std::string& waiting, double now_s) {
@@ -61,7 +62,7 @@ class WaitingLog {
   double next_s_ = 0;
 };
 
-// Finds no fault with an item.
+// Accepts every item.
 struct TakesAll {
   template <typename Item>
   std::string operator()(const Item& /*item*/) const {
@@ -69,7 +70,7 @@ struct TakesAll {
   }
 };
 
-// Whether the source gave up the connection by which such an item came.
+// Whether the source gave up the connection that delivered the faulty item.
 template <typename Source>
 bool refuse(Source& source, const std::string& fault) {
   if constexpr (std::is_base_of_v<FrameSource, Source>) {
@@ -79,15 +80,16 @@ bool refuse(Source& source, const std::string& fault) {
   }
 }
 
-// Item: Frame or PanTiltSample. on_item(item) returns false to end. on_loss(now_s) is called at a loss
-// and then each second until the next item. fault_of(item): why it cannot be used; empty: it can. The first such ends with that
-// error; once one was good, what comes is the peer's doing, and the source refuses it. *watch is told of all that. Returns the
+// Item: Frame or PanTiltSample. on_item(item): returns false to end. on_loss(now_s): called at a
+// loss and then each second until the next item. fault_of(item): why an item cannot be used; empty
+// if it can. A faulty first item ends the loop with that error. After a good item a fault is the
+// peer's doing, and the source gives up the connection. *watch is informed of all this. Returns the
 // source's error if it failed for good.
 template <typename Item, typename Source, typename OnItem, typename OnLoss,
           typename FaultOf = TakesAll>
 std::string read_to_the_end(Source& source, LinkWatch* watch, const OnItem& on_item,
                             const OnLoss& on_loss, const FaultOf& fault_of = {}) {
-  constexpr double kReadTimeout_s = 0.2;  // bounds how late a notice of a loss can be
+  constexpr double kReadTimeout_s = 0.2;  // limits how late a loss is noticed
   constexpr double kNoticePeriod_s = 1;
   bool lost = false;
   bool any_good = false;

@@ -5,7 +5,7 @@
 namespace alidade {
 namespace {
 
-// A page that is touched for the first time is a page fault: this touches all of a queue's.
+// Touches all memory of a queue, as the first touch of a page is a page fault.
 template <class Message, class Queue>
 void touch(Queue* queue) {
   while (queue->push(Message())) {
@@ -26,7 +26,7 @@ RealtimeStage::RealtimeStage(const OrientationStepOptions& options, bool measure
       tap_(tap),
       scene_(scene),
       detectors_(detectors) {
-  // Those that the real-time thread fills.
+  // The queues that the real-time thread fills.
   touch<OutputMessage>(&output_queue_);
   touch<FeedFrame>(&feed_frames_);
   touch<PanTiltSample>(&feed_samples_);
@@ -79,7 +79,7 @@ void RealtimeStage::adopt_published() {
   const PublishedCalibration* calibration = nullptr;
   while (published_.pop(calibration)) {
     step_.adopt(*calibration);
-    // There is room for all that were published.
+    // There is room for all published calibrations.
     adopted_.push(calibration);
     feed_.post();
   }
@@ -172,7 +172,7 @@ void RealtimeStage::localize(const VideoMessage& message, const OrientationRecor
   *lent = scene_->push(localizable_frame_);
 }
 
-// Last, as it takes every picture that the others leave.
+// Called last, as it takes every picture that the others leave.
 void RealtimeStage::detect(const VideoMessage& message, const OrientationRecord& record,
                            bool* lent) {
   const bool can_lend = message.image.valid() && message.slot != kNoImageSlot;

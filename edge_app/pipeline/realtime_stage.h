@@ -1,21 +1,21 @@
 #pragma once
 // RealtimeStage: the queues around the real-time thread, and what that thread does when woken.
 //
-//   capture thread     --VideoMessage---------->  |           | --OutputMessage--> output thread
-//   telemetry thread   --TelemetryMessage------>  | process() | --ImageSlot----> capture thread
-//   calibration thread --PublishedCalibration-->  |           | --FeedFrame,
-//                                                 |           |   PanTiltSample--> calibration thread
-//   ImageTap         --a wish---------------->  |           | --TappedFrame----> ImageTap
-//   SceneTap --ToldBase------------->  |           | --LocalizableFrame--> SceneTap
-//                                                 |           | --DetectableFrame---> DetectorTap
+//   capture thread     --VideoMessage--------->  |           | --OutputMessage---> output thread
+//   telemetry thread   --TelemetryMessage----->  | process() | --ImageSlot-------> capture thread
+//   calibration thread --PublishedCalibration->  |           | --FeedFrame,
+//                                                |           |   PanTiltSample---> calibration
+//   ImageTap           --request-------------->  |           | --TappedFrame-----> ImageTap
+//   SceneTap           --ToldBase------------->  |           | --LocalizableFrame> SceneTap
+//                                                |           | --DetectableFrame-> DetectorTap
 //
-// Images stay where the decoder put them: a frame occupies a slot of the capture thread, and whoever had the
-// image last, this thread, the calibration thread, the localization thread or a tap, gives the slot back.
-// Each queue has one producer and one consumer, a fixed capacity and fixed-size messages. A full
-// queue drops the new message and counts it; nobody waits for anybody. In OE mode a live frame that has waited for
-// long while others wait behind it goes without its image: where the processor cannot keep up, some records are
-// telemetry's, and none is seconds late. process() allocates nothing,
-// takes no lock, logs nothing and throws nothing; what it writes the constructor has touched.
+// Images stay where the decoder put them: a frame occupies a slot of the capture thread, and the
+// last thread to use the image returns the slot. Each queue has one producer, one consumer, a fixed
+// capacity and fixed-size messages. A full queue drops the new message and counts it; no thread
+// waits for another. In OE mode a live frame that has waited for long while others wait behind it
+// loses its image: on a slow processor some records are telemetry's, but none is seconds late.
+// process() allocates nothing, takes no lock, logs nothing and throws nothing; the constructor has
+// touched all memory that it writes.
 
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
@@ -37,8 +37,8 @@ struct VideoMessage {
   FrameStamp stamp;  // kFrame
   ImageView image;   // kFrame; not valid() if nobody looks at images
   ImageSlot slot = kNoImageSlot;
-  double decoded_s = 0;  // host time when the frame was pushed
-  double time_s = 0;     // kLost: host time of the news
+  double decoded_s = 0;  // s, host time at the push of the frame
+  double time_s = 0;     // s, kLost: host time of the news
 };
 
 struct TelemetryMessage {
@@ -50,7 +50,8 @@ struct TelemetryMessage {
 struct OutputMessage {
   OrientationRecord record;
   StepEvents events;
-  // Host times on a frame's way: pushed by the capture thread, taken up here, record made.
+  // s, host times: frame pushed by the capture thread, taken up by the real-time thread, record
+  // made.
   double decoded_s = 0;
   double taken_s = 0;
   double made_s = 0;
@@ -73,29 +74,29 @@ struct DropCounters {
   std::int64_t frames = 0;
   std::int64_t telemetry = 0;
   std::int64_t records = 0;
-  // Frames and samples that the calibration thread was too busy to hear of: no loss for the records.
+  // Frames and samples for which the calibration thread was too busy. The records lose nothing.
   std::int64_t unheard = 0;
-  // Images that nobody looked at, so that the frames behind them need not wait.
+  // Images left out so that the frames behind them need not wait.
   std::int64_t late_images = 0;
   [[nodiscard]] std::int64_t total() const { return frames + telemetry + records; }
 };
 
 class RealtimeStage {
  public:
-  // measure_latency: receive times are of this host's running clock (not of a recording).
-  // feed: there is a calibration thread. tap, scene, detectors: borrowed; null: nobody asks for images, there is no scene map, no detector.
+  // measure_latency: receive times are of this host's running clock, not of a recording. feed:
+  // there is a calibration thread. tap, scene, detectors: borrowed; null if there is none.
   RealtimeStage(const OrientationStepOptions& options, bool measure_latency, bool feed,
                 ImageTap* tap = nullptr, SceneTap* scene = nullptr,
                 DetectorTap* detectors = nullptr);
 
-  // Capture thread: a slot that nobody needs, one after the other.
+  // Capture thread: pops one slot that is no longer in use.
   bool pop_returned(ImageSlot& slot) {
     return returned_.pop(slot) || returned_by_calibration_.pop(slot) ||
            (tap_ != nullptr && tap_->pop_returned(slot)) ||
            (scene_ != nullptr && scene_->pop_returned(slot)) ||
            (detectors_ != nullptr && detectors_->pop_returned(slot));
   }
-  // Capture thread. False: the queue is full, the message and its slot are refused.
+  // Capture thread. False: the queue is full; the message and its slot are refused.
   bool push(const VideoMessage& message);
   void end_input();  // no video will follow
   // Telemetry thread.
@@ -112,7 +113,7 @@ class RealtimeStage {
   // Output thread: sleeps until there is something to do.
   void wait_output() { output_.wait(); }
   bool pop(OutputMessage& message) { return output_queue_.pop(message); }
-  // True: what can still be popped now is the last.
+  // True: what can be popped after this call is the last.
   [[nodiscard]] bool output_ended() const { return output_ended_.load(std::memory_order_acquire); }
 
   // Calibration thread: sleeps until there is something to do, or the output has ended.
@@ -124,20 +125,20 @@ class RealtimeStage {
     return telemetry_lost_.load(std::memory_order_relaxed);
   }
   void give_back(ImageSlot slot) { returned_by_calibration_.push(slot); }
-  // The next frame's image is wanted.
+  // Requests the next frame's image.
   void want_image() { image_wanted_.store(true, std::memory_order_relaxed); }
-  // The real-time thread takes it over between two frames. It lives on until pop_adopted() gives it back. False:
-  // too many wait already.
+  // The real-time thread adopts it between two frames. It must live until pop_adopted() returns it.
+  // False: too many wait already.
   bool publish(const PublishedCalibration* calibration);
   bool pop_adopted(const PublishedCalibration*& calibration) { return adopted_.pop(calibration); }
   void report(CalibrationReport report) { report_.store(report, std::memory_order_relaxed); }
 
-  // Any thread: asks for a sign of life. It goes the way of a record: the real-time thread passes it on between two
-  // frames, and the output thread answers it between two records.
+  // Any thread: asks for a sign of life. It goes the way of a record: the real-time thread passes
+  // it on between two frames, and the output thread answers it between two records.
   void ask_for_pulse();
   // Output thread.
   void answer_pulse();
-  // Any thread: whether the last one asked for is answered.
+  // Any thread: whether the latest request is answered.
   [[nodiscard]] bool pulse_is_answered() const;
 
   // Any thread.
@@ -177,24 +178,25 @@ class RealtimeStage {
   std::atomic<bool> video_lost_{false};
   std::atomic<bool> telemetry_lost_{false};
   FeedFrame feed_frame_;  // real-time thread: too large for its stack
-  // Real-time thread: what those that found no room had to tell of the clocks, for the next that does.
+  // Real-time thread: clock news of messages that found no room, for the next message that does.
   bool unheard_frame_restart_ = false;
   bool unheard_delay_step_ = false;
   bool unheard_sample_restart_ = false;
-  TappedFrame tapped_frame_;            // likewise
-  LocalizableFrame localizable_frame_;  // likewise
+  TappedFrame tapped_frame_;            // likewise too large for its stack
+  LocalizableFrame localizable_frame_;  // likewise too large for its stack
   Semaphore feed_;
   Semaphore input_;
   Semaphore output_;
-  // Flags and not messages, so that a full queue cannot lose them. Set with release after the last
-  // push and read with acquire before the queue is emptied, so nothing pushed earlier is missed.
+  // Flags instead of messages, so that a full queue cannot lose them. They are set with release
+  // after the last push and read with acquire before the queue is emptied, so nothing pushed
+  // earlier is missed.
   std::atomic<bool> input_ended_{false};
   std::atomic<bool> output_ended_{false};
-  // Counted up by who asks; a thread that hangs hands no number on.
+  // Numbers of requests. A thread that hangs passes none on.
   std::atomic<std::uint32_t> pulse_asked_{0};
   std::atomic<std::uint32_t> pulse_passed_on_{0};
   std::atomic<std::uint32_t> pulse_answered_{0};
-  // Statistics only: relaxed, each written by one thread.
+  // Statistics only: relaxed; each is written by one thread.
   std::atomic<std::int64_t> dropped_frames_{0};
   std::atomic<std::int64_t> dropped_telemetry_{0};
   std::atomic<std::int64_t> dropped_records_{0};

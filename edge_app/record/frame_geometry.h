@@ -1,7 +1,8 @@
 #pragma once
-// FrameGeometry: all that gives any pixel of a frame a direction, and back, with covariance: the numbers of a
-// FrameOrientation, and PlainCalibration those of a Calibration, as they cross the queue to the output thread by
-// value. Eigen's matrices are not trivially copyable; matrices are stored row by row here.
+// FrameGeometry and PlainCalibration: the numbers of a FrameOrientation and of a Calibration.
+// Together they give any pixel of a frame a direction, and back, with covariance. They cross the
+// queue to the output thread by value: Eigen's matrices are not trivially copyable, so matrices are
+// stored here as arrays, row by row.
 // Units, frames and meaning: frame_orientation.h, calibration.h. Packing allocates nothing.
 
 #include <array>
@@ -33,11 +34,11 @@ struct PlainCalibration {
 
 struct FrameGeometry {
   OrientationMode mode = OrientationMode::kNone;
-  PanTilt<double> angle;  // true, not wrapped
-  PanTilt<double> rate;
-  PanTilt<double> acceleration;
-  double zoom_rate = 0;        // 1/s
-  double zoom_rate_sigma = 0;  // 1/s; 0: none is told
+  PanTilt<double> angle;         // rad, true angle, not wrapped
+  PanTilt<double> rate;          // rad/s
+  PanTilt<double> acceleration;  // rad/s^2
+  double zoom_rate = 0;          // 1/s
+  double zoom_rate_sigma = 0;    // 1/s; 0: unknown
   std::array<double, 36> motion_covariance{};
   std::array<double, 6 * kParameterCount> motion_sensitivity{};
 };
@@ -48,7 +49,7 @@ static_assert(std::is_trivially_copyable_v<PlainCalibration> &&
 [[nodiscard]] FrameGeometry pack(const FrameOrientation& frame);
 
 [[nodiscard]] Calibration unpack(const PlainCalibration& calibration);
-// What direction() and pixel() need; the other members are as in a new FrameOrientation.
+// Restores what direction() and pixel() need. The other members keep their default values.
 [[nodiscard]] FrameOrientation unpack(const FrameGeometry& geometry,
                                       const PlainCalibration& calibration);
 

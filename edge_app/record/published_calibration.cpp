@@ -3,8 +3,8 @@
 namespace alidade {
 
 MapState kept_map(const MapState& map) {
-  // Far more than telemetry errs by, and few enough pixels to find landmarks over: 30 at 30000 px. What was moved farther
-  // contradicts telemetry.
+  // Far more than telemetry's error, but few enough pixels to find landmarks over: 30 at 30000 px.
+  // If the base moved farther, landmarks contradict telemetry.
   constexpr double kMoved_rad = 1e-3;
   MapState kept = map;
   kept.offset_covariance += kMoved_rad * kMoved_rad * Matrix2<double>::Identity();

@@ -1,7 +1,7 @@
 #pragma once
-// PublishedCalibration: what the calibration thread hands to the real-time thread: a calibration and the map
-// made with it, as one object that is never changed. CalibrationReport: what the calibration thread
-// is doing and what it needs, for records and log.
+// PublishedCalibration: a calibration and the map made with it, as one object that never changes,
+// for the real-time thread. CalibrationReport: what the calibration thread does and needs, for
+// records and log.
 
 #include <cstdint>
 #include <string>
@@ -14,47 +14,48 @@ namespace alidade {
 
 struct PublishedCalibration {
   Calibration calibration;
-  bool calibrated = false;  // false: the data sheet's values; landmarks are not looked for
+  bool calibrated = false;  // false: data-sheet values; landmarks are not looked for
   MapState map;             // may be empty
   std::string name;         // for people: a file, "data sheet", "live"
   ZoomCurve zoom_curve;     // for other zooms, and while the zoom moves; may be empty
 };
 
-// A map from before a restart, or kept for another zoom, as it may be handed over: it knows the base to a fraction of what
-// telemetry does, but not by how much that was moved meanwhile, or the head's zero. Telemetry's first answers tell.
+// Prepares a map from before a restart, or of another zoom, for use now. Such a map knows the base
+// more precisely than telemetry does, but the base or the head's zero may have moved since. So its
+// offset gets a covariance of (1 mrad)^2 more, and telemetry's first answers determine it.
 [[nodiscard]] MapState kept_map(const MapState& map);
 
 // What the calibration thread is doing.
 enum class CalibrationActivity : std::uint8_t {
   kOff,         // no automatic calibration: the calibration stays as it is
-  kCollecting,  // no calibration for this camera at this zoom: watches the camera move
-  kAdjusting,   // computes one
-  kWatching,    // there is one; new data is held against it, and refines it
-  kDoubtful     // there is one that landmarks or telemetry contradict: withdrawn, collects anew
+  kCollecting,  // no calibration for this camera at this zoom: waits for motion
+  kAdjusting,   // computes a calibration
+  kWatching,    // there is a calibration; new data tests and refines it
+  kDoubtful     // landmarks or telemetry contradicted the calibration: withdrawn, collects anew
 };
 
-// What would help it.
+// What would help the calibration.
 enum class CalibrationNeed : std::uint8_t {
   kNothing,
   kVideo,          // no frames come
   kTelemetry,      // no pan/tilt samples come
   kMotion,         // the camera must move
-  kPan,            // it tilts only
-  kTilt,           // it pans only
+  kPan,            // the camera only tilts
+  kTilt,           // the camera only pans
   kAcceleration,   // constant velocity: clock offset and line delay stay unknown
   kTexture,        // scene too plain: too few landmarks
   kAgreement,      // telemetry does not describe the motion in the video
-  kPictures,       // most of them never come here: the machine has too much to do
-  kTime,           // more of the same
+  kPictures,       // most pictures never come here: the machine has too much to do
+  kTime,           // more of the same motion
   kSteadyZoom,     // the zoom is moving
   kSteadyDelay,    // the video's delay wanders
-  kYoungTelemetry  // trusted angles come so late, or so seldom, that frames get none
+  kYoungTelemetry  // trusted angles come too late or too seldom for many frames
 };
 
 [[nodiscard]] const char* to_string(CalibrationActivity activity);
 [[nodiscard]] const char* to_string(CalibrationNeed need);  // "tilt more"; empty for kNothing
 
-struct alignas(2) CalibrationReport {  // one word to every compiler: threads exchange it whole
+struct alignas(2) CalibrationReport {  // one unit to every compiler: threads exchange it whole
   CalibrationActivity activity = CalibrationActivity::kOff;
   CalibrationNeed need = CalibrationNeed::kNothing;
 };

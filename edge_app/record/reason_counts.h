@@ -1,6 +1,6 @@
 #pragma once
-// ReasonCounts: why records were not in OE mode, or, where that is not asked for, had no orientation at all: how many had which
-// status. Fixed size; add() allocates nothing.
+// ReasonCounts: how many records had which status, among those not in OE mode, or, if OE mode is
+// not asked for, among those without orientation. Fixed size; add() allocates nothing.
 
 #include <array>
 #include <cstdint>
@@ -21,8 +21,8 @@ class ReasonCounts {
   [[nodiscard]] std::int64_t of(RecordStatus status) const {
     return counts_[static_cast<std::size_t>(status)];
   }
-  // "not in OE mode: 12 records 'not calibrated', 3 'too few landmarks'", the most frequent first; empty: there were none. The zoom
-  // readings for which there was no calibration are named.
+  // "not in OE mode: 12 records 'not calibrated', 3 'too few landmarks'", the most frequent first.
+  // Names the zoom readings that had no calibration. Empty if there were no such records.
   [[nodiscard]] std::string line() const;
 
  private:
@@ -33,7 +33,7 @@ class ReasonCounts {
 
   bool wants_landmarks_;
   std::array<std::int64_t, kRecordStatuses.size()> counts_{};
-  std::optional<Range> zooms_;  // without a calibration
+  std::optional<Range> zooms_;  // readings without a calibration
 };
 
 }  // namespace alidade

@@ -1,13 +1,16 @@
 #pragma once
-// RecordMode and RecordStatus: how a record's orientation was found, and why it is not better or is none at all.
-//
-// A status comes from one of these:
-//   TelemetryBuffer::query()   how the frame lies to the telemetry samples (QueryStatus)
-//   OeMode::process()          whether landmarks held (OeStatus); for frames that telemetry has an answer for
-//   FrameClock                 whether the frame's time is known
-//   OrientationStep            no calibration, zoom, loss of the video, images sent again (RepeatedImages), not localized yet (SceneStart)
-//   RealtimeStage              images that came too late to be looked at
-// Where OE mode is asked for, kOk is of mode OE alone. What a person reads of each, and what to do: edge_app/README.md.
+// RecordMode and RecordStatus: how a record's orientation was found, and why it is not better or
+// missing. A status comes from one of:
+//   TelemetryBuffer::query()  where the frame's time lies relative to the telemetry samples
+//                             (QueryStatus)
+//   OeMode::process()         whether landmarks held (OeStatus), if telemetry has an answer for the
+//                             frame
+//   FrameClock                whether the frame's time is known
+//   OrientationStep           no calibration, zoom, video lost, repeated images (RepeatedImages),
+//                             not localized (SceneStart)
+//   RealtimeStage             images too late to be looked at
+// If OE mode is asked for, kOk occurs in mode OE only. What each means to a user and what to do:
+// edge_app/README.md.
 
 #include <array>
 #include <cstddef>
@@ -22,27 +25,30 @@ enum class RecordMode : std::uint8_t { kNone, kPt, kOe };
 
 enum class RecordStatus : std::uint8_t {
   kOk,
-  kClockWarmingUp,  // mode PT or OE: too few frames since the (re)start to know their times well
-  kTimeUnknown,     // the frame may have waited for nobody knows how long (FrameClock)
+  kClockWarmingUp,  // mode PT or OE: too few frames since the (re)start to know the time well
+  kTimeUnknown,     // the frame may have waited for an unknown time (FrameClock)
   kVideoLost,       // no connection to the video source
-  kTelemetryLost,  // no connection to the pan/tilt source, and its last angle is too old, or there were fewer than two
+  // No connection to the pan/tilt source; its last angle is too old, or there were fewer than two.
+  kTelemetryLost,
   kTelemetryMissing,  // fewer than two usable samples so far
-  // The frame lies more than TelemetryLimits::max_extrapolation_s beyond the newest angle that is trusted; by how much
-  // says OrientationRecord::telemetry_age_s. What decides it, and which key to change: edge_app/config/README.md.
+  // The frame lies more than TelemetryLimits::max_extrapolation_s beyond the newest trusted angle.
+  // By how much: OrientationRecord::telemetry_age_s. The causes, and which key to change:
+  // edge_app/config/README.md.
   kTelemetryTooOld,
-  kTelemetryGap,  // the samples around the frame lie too far apart
-  kFrameBeforeTelemetry,  // the frame is older than the oldest sample kept, by more than max_extrapolation_s
-  kTooFewLandmarks,  // mode PT: too few landmarks held
-  kContradiction,    // mode PT: landmarks and telemetry exclude each other
-  kBadImage,         // mode PT: no image, or one that is not of the calibration's size
-  kImageTooLate,     // mode PT: others waited behind the frame, which went without its image
-  kImageRepeated,  // the image is the one before, sent again while the camera turned (RepeatedImages)
+  kTelemetryGap,          // the samples around the frame lie too far apart
+  kFrameBeforeTelemetry,  // older than the oldest sample kept by more than max_extrapolation_s
+  kTooFewLandmarks,       // mode PT: too few landmarks held
+  kContradiction,         // mode PT: landmarks and telemetry exclude each other
+  kBadImage,              // mode PT: no image, or not of the calibration's size
+  kImageTooLate,          // mode PT: other frames waited behind this one, so it lost its image
+  kImageRepeated,  // the image before was sent again while the camera turned (RepeatedImages)
   kOtherZoom,      // no calibration for the zoom that the pan/tilt source reports
   kNotFinite,      // a stamp is not a finite number
-  kNotLocalized,  // without telemetry: nobody has found yet, or found again, where the camera looks
-  kNotCalibrated,  // mode PT: landmarks are not looked for with the data sheet's camera, or a calibration that was withdrawn
-  kZoomMoves,  // mode PT: the lens moves, or has just left the zoom curve, and there is no map yet that it could be followed with
-  // Mode PT: by the zoom curve the focal length is not known well enough here (zoom_lookup.h) for landmarks to be looked for.
+  kNotLocalized,   // without telemetry: it is not known, or no longer known, where the camera looks
+  kNotCalibrated,  // mode PT: no calibration, or a withdrawn one: landmarks are not looked for
+  kZoomMoves,  // mode PT: the lens moves, or has just left the zoom curve; no map to follow it with
+  // Mode PT: the zoom curve does not know the focal length well enough here for landmarks to be
+  // looked for (zoom_lookup.h).
   kFocalLengthUnsure
 };
 
@@ -69,11 +75,11 @@ inline constexpr std::array<RecordStatus, 20> kRecordStatuses = {
     RecordStatus::kFocalLengthUnsure};
 static_assert(static_cast<std::size_t>(kRecordStatuses.back()) + 1 == kRecordStatuses.size());
 
-// Of a frame whose telemetry was asked for. is_lost: there is no connection to the pan/tilt source. clock_locked: the
-// frame's time is known as well as it will be.
+// For a frame whose telemetry was queried. is_lost: there is no connection to the pan/tilt source.
+// clock_locked: the frame's time is known as well as it will be.
 [[nodiscard]] RecordStatus status_of_telemetry(QueryStatus query, bool is_lost, bool clock_locked);
 
-// Of a frame for which telemetry has an answer: why the record is telemetry's, if it is; kOk: it is not.
+// For a frame for which telemetry has an answer: why the record is telemetry's. kOk: it is not.
 [[nodiscard]] RecordStatus status_of_landmarks(OeStatus landmarks);
 
 constexpr const char* to_string(RecordMode mode) {

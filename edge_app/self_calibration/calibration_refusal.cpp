@@ -27,7 +27,8 @@ CalibrationNeed need_of(const SessionCalibration& checked) {
   }
 }
 
-// Of the pictures that the camera took meanwhile, where its clock or count tells how many those were.
+// The share of the camera's pictures that were looked at, if its clock or count shows how many it
+// took.
 double share_taken_up(const CalibrationResult& result, std::size_t frames) {
   const auto taken_up = static_cast<double>(frames);
   return taken_up / (taken_up + result.image_timing.lost);

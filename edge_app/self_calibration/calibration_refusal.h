@@ -1,7 +1,7 @@
 #pragma once
-// Why a session gave no calibration, and what would help. Where most of the pictures never came to be looked at, as on a
-// machine with too much to do, that is said too; and that telemetry did not describe the motion in the few that came is
-// then not said, for nobody knows it. Pure; allocates.
+// Why a session gave no calibration, and what would help. If most pictures were never looked at, as
+// on an overloaded machine, the reason says so. A mismatch between telemetry and motion is then not
+// reported, as too few pictures were seen to judge it. Pure; allocates.
 
 #include <cstddef>
 #include <string>
@@ -13,10 +13,10 @@ namespace alidade {
 
 struct CalibrationRefusal {
   CalibrationNeed need = CalibrationNeed::kTime;
-  std::string why;  // begins with " (" or ": ", to stand behind "not calibrated yet"
+  std::string why;  // begins with " (" or ": ", to follow "not calibrated yet"
 };
 
-// Of a session of so many frames. Needs a refusal.
+// checked: must have a refusal. frames: the number of frames in its session.
 [[nodiscard]] CalibrationRefusal why_refused(const SessionCalibration& checked, std::size_t frames);
 
 }  // namespace alidade

@@ -25,7 +25,7 @@ double CalibrationSession::newest_s() const {
 
 void CalibrationSession::add(const FrameTracks& tracks) {
   KeptFrame frame{tracks.stamp, {}};
-  // Within one session a reconnection is none: whoever clears it sees to that.
+  // There is no reconnection within a session: its owner clears it at one.
   frame.stamp.restarted = false;
   frame.points.assign(tracks.points.begin(), tracks.points.begin() + tracks.count);
   frames_.push_back(std::move(frame));

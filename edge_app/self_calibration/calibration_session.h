@@ -1,9 +1,11 @@
 #pragma once
-// CalibrationSession: what was seen of one camera at one zoom through one connection, in bounded memory: stamps and
-// tracks of the frames, telemetry, and some images (keyframes). What is older than the limits is forgotten.
+// CalibrationSession: what was observed of one camera, at one zoom, through one connection: time
+// stamps and tracks of frames, telemetry, and some images (keyframes). Memory is bounded: whatever
+// exceeds the limits is forgotten, the oldest first.
 //
-// Every tenth frame is held out: a calibration of the session does not use it, and is tried on it. Its time then lies
-// between its neighbours', as its sender's clock or its count has it.
+// Every tenth frame is held out: a calibration of the session does not use it and is tested on it.
+// Its time is interpolated between its neighbours' times, by the sender's clock or by the sequence
+// numbers.
 // Radians, seconds, px. Allocates. One thread.
 
 #include <cstddef>
@@ -25,14 +27,15 @@
 namespace alidade {
 
 struct SessionLimits {
-  double window_s = 40;  // of frames
+  double window_s = 40;  // s, of frames
   std::size_t max_frames = 1500;
   std::size_t max_keyframes = 16;
-  std::size_t max_keyframe_bytes = std::size_t{10}
-                                   << 20;  // of all, packed: 8 of 1080 lines; one stays in any case
-  std::size_t max_samples = 20000;         // of telemetry; without frames nothing else bounds it
-  double telemetry_margin_s = 2;  // kept before the first frame: the clock offset may be so large
-  double keyframes_apart = 0.3;   // of the field of view
+  // Bytes of all packed keyframes: eight of 1080 lines. One keyframe stays in any case.
+  std::size_t max_keyframe_bytes = std::size_t{10} << 20;
+  std::size_t max_samples = 20000;  // of telemetry; without frames nothing else bounds it
+  // s, kept before the first frame: the clock offset may be as large.
+  double telemetry_margin_s = 2;
+  double keyframes_apart = 0.3;  // fields of view
 };
 
 class CalibrationSession {
@@ -43,30 +46,30 @@ class CalibrationSession {
   void clear();
 
   void add(const FrameTracks& tracks);
-  // One that begins a new connection (restarted) makes those before it forgotten.
+  // A sample with `restarted`, the first of a new connection, makes all earlier samples forgotten.
   void add(const PanTiltSample& sample);
   // Whether the head points where no image was taken yet. False without frames or telemetry.
   [[nodiscard]] bool wants_keyframe(const Camera<double>& camera) const;
-  // The image of the frame last added; copied. Takes the place of the oldest where there are enough, or
-  // where they take too much memory. Needs a frame.
+  // Copies the image of the frame added last. Replaces the oldest image if there are max_keyframes,
+  // and drops the oldest ones while they exceed max_keyframe_bytes. Needs a frame.
   void add_keyframe(const ImageView& image);
 
   [[nodiscard]] bool empty() const { return frames_.empty(); }
   [[nodiscard]] std::size_t frames() const { return frames_.size(); }
-  // Receive times; 0 without frames.
+  // By receive times, s; 0 without frames.
   [[nodiscard]] double span_s() const;
   [[nodiscard]] double newest_s() const;
 
-  // Frames in the order in which they came.
+  // Frames are in order of arrival.
   [[nodiscard]] std::vector<FrameStamp> stamps() const;
   [[nodiscard]] std::vector<PanTiltSample> telemetry() const;
   [[nodiscard]] std::vector<CalibrationObservation> observations() const;
 
-  // By the frame's place among the stamps.
+  // By the frame's index among the stamps.
   [[nodiscard]] static bool is_held_out(std::size_t place);
-  // Of the frames that the result used, and of the held-out ones between two of them.
+  // Times of the frames that the result used, and of each held-out frame between two of those.
   [[nodiscard]] FrameTimes frame_times(const CalibrationResult& result) const;
-  // Those of frames that have a time.
+  // Images of frames that have a time.
   [[nodiscard]] std::vector<Keyframe> keyframes(const CalibrationResult& result) const;
 
  private:
@@ -77,7 +80,7 @@ class CalibrationSession {
   struct KeptImage {
     std::int64_t frame;
     double receive_time_s;
-    double pan, tilt;  // rad, as measured last before it
+    double pan, tilt;  // rad, measured, of the last sample before it
     std::shared_ptr<const PackedImage> image;
   };
 

@@ -14,7 +14,7 @@ namespace {
 
 using Counts = std::vector<std::optional<std::int64_t>>;
 
-// Leaves the longest part without a reconnection.
+// Keeps only the longest part without a reconnection.
 template <class Item>
 void keep_longest_part(const char* what, std::vector<Item>* items,
                        std::vector<std::string>* remarks) {
@@ -38,10 +38,10 @@ void keep_longest_part(const char* what, std::vector<Item>* items,
                              items->begin() + static_cast<std::ptrdiff_t>(best_end));
 }
 
-// The count of each time on a steady grid of about this period; empty if they do not lie on one.
+// The index of each time on a steady grid of about this period; empty if they do not lie on one.
 std::vector<std::int64_t> count_on_grid(const std::vector<double>& times, double period) {
   constexpr double kMaxDistance = 0.25;  // of the period
-  // Counted from one item to the next, which an error of the period does not harm; then checked on the
+  // Counted from one item to the next, so an error of the period does no harm. Then checked on the
   // grid of the whole.
   std::vector<std::int64_t> counts = {0};
   for (std::size_t i = 1; i < times.size(); ++i) {
@@ -57,7 +57,8 @@ std::vector<std::int64_t> count_on_grid(const std::vector<double>& times, double
   return counts;
 }
 
-// The same for the usual step, else, where most items are missing, as on a machine that has too much to do, for the shortest.
+// The same with the usual step as period; else, if most items are missing, as on an overloaded
+// machine, with the shortest step.
 std::vector<std::int64_t> count_on_grid(const std::vector<double>& times) {
   if (times.size() < 3) return {};
   std::vector<double> steps;
@@ -72,7 +73,7 @@ std::vector<std::int64_t> count_on_grid(const std::vector<double>& times) {
   return count_on_grid(times, period);
 }
 
-// Gives those between two counts theirs, where as many are missing as there are.
+// Fills missing counts between two known ones, if as many are missing as fit between them.
 void fill_counts(Counts* counts) {
   std::size_t before = counts->size();
   for (std::size_t i = 0; i < counts->size(); ++i) {
@@ -86,7 +87,8 @@ void fill_counts(Counts* counts) {
   }
 }
 
-// sequence(item) and sender_time(item) are optionals. A few items whose time stamp could not be true have none.
+// sequence(item) and sender_time(item) are optionals. A few items have no sender time, because it
+// could not be true.
 template <class Item, class Sequence, class SenderTime>
 Counts count_items(const std::vector<Item>& items, Sequence sequence, SenderTime sender_time) {
   constexpr double kMostHave = 0.8;
@@ -141,7 +143,7 @@ double stamp_of(const PanTiltSample& sample, bool polled) {
 void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
                    CalibrationOptions* options, std::vector<std::string>* remarks) {
   const bool polled = is_polled(samples);
-  // Polled samples bear the host's times, which go on over a reconnection.
+  // Polled samples have the host's times, which go on over a reconnection.
   if (!polled) keep_longest_part("telemetry.csv", &samples, remarks);
   const Counts counts = count_items(
       samples, [](const PanTiltSample& sample) { return sample.sequence; },
@@ -171,12 +173,12 @@ void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,
         std::sqrt(square_widths / static_cast<double>(widths.size()) / 12);
   }
   if (polled && square_widths > 0) {
-    // Where in the interval a device looks, it does so in every poll.
+    // A device answers at the same place of the interval in every poll.
     const auto middle = widths.begin() + static_cast<std::ptrdiff_t>(widths.size() / 2);
     std::nth_element(widths.begin(), middle, widths.end());
     noise.telemetry_common_sigma_s = *middle / std::sqrt(12.0);
   }
-  // Only an interval tells a poll from a stream whose device sends neither count nor time.
+  // Only an interval distinguishes a poll from a stream whose device sends neither count nor time.
   options->telemetry_stamps = polled && square_widths > 0     ? StampNoise::kOwnTimes
                               : noise.telemetry_stamp_sigma_s ? StampNoise::kSymmetric
                                                               : StampNoise::kOneSided;

@@ -1,15 +1,18 @@
 #pragma once
-// From the stamps of frames and samples to what calibrate() takes; for a recording as for the
-// calibration thread.
-//   clocks  Frames are counted by their sequence numbers, else by sender times that lie on a steady grid,
-//           else by their stamps. Telemetry likewise (sequence, device time); samples that were polled have
-//           no clock of their own, and were true in the middle of [earliest_time_s, receive_time_s], give or
-//           take width / sqrt(12): each by itself, and, as a device answers in its own way, all alike.
-//   repeats of an old angle while the head turned say nothing of their own time: left out (stale_repeats.h).
-//   stamps  of receipt: with a stamp sigma in the input's noise they err to both sides, otherwise they are late
-//           only, as for `run` and `replay`.
-//   restarts  A sender's clock begins anew after a reconnection: the longest part without one is used.
-// Pure functions; they allocate.
+// Converts the time stamps of frames and samples to the input of calibrate(), for recordings and
+// for the calibration thread. Pure functions; they allocate.
+//   counts    Frames are counted by sequence number, else by sender times if these lie on a steady
+//             grid. Without either only their receive times are used. Telemetry likewise (sequence,
+//             device time).
+//   polls     A polled sample has no clock of its own. It was true in the middle of
+//             [earliest_time_s, latest_time_s], with sigma = width / sqrt(12). Each poll has an
+//             error of its own, and all share one: a device answers at a fixed place.
+//   repeats   Repeats of an old angle while the head turned say nothing of their own time. They are
+//             left out (stale_repeats.h).
+//   noise     Receive times err to both sides if the input's noise has a stamp sigma. Otherwise
+//             they are only ever late, as in `run` and `replay`.
+//   restarts  A sender's clock restarts at a reconnection: only the longest part without one is
+//             used.
 
 #include <string>
 #include <vector>
@@ -20,12 +23,14 @@
 
 namespace alidade {
 
-// Whether the samples are answers to questions, each of about when its stamps say, without a clock or count of the head's own.
+// Whether the samples are answers to polls, without a clock or count of the head's own.
 [[nodiscard]] bool is_polled(const std::vector<PanTiltSample>& samples);
-// When a sample was true, by its stamps: one of those that were polled in the middle of its interval.
+// The time at which a sample was true, s: the middle of its interval if polled, else its receive
+// time.
 [[nodiscard]] double stamp_of(const PanTiltSample& sample, bool polled);
 
-// Frames into input->frames, and what is known of their stamps into *options; remarks get a line for what was left out.
+// Appends frames to input->frames, sets what is known of their stamps in *options, and adds a line
+// to *remarks for whatever was left out.
 void add_frames(std::vector<FrameStamp> stamps, CalibrationInput* input,
                 CalibrationOptions* options, std::vector<std::string>* remarks);
 void add_telemetry(std::vector<PanTiltSample> samples, CalibrationInput* input,

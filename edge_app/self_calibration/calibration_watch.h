@@ -1,5 +1,6 @@
 #pragma once
-// What says that a published calibration is no longer the camera's: small judges with a memory of their own.
+// Judges that tell when a published calibration no longer fits the camera. Each keeps a short
+// memory.
 // Seconds of the host's clock. Allocates little. One thread.
 
 #include <algorithm>
@@ -9,12 +10,12 @@
 
 namespace alidade {
 
-// Calibrations of later motion, each held against the published one.
+// Compares calibrations of later motion with the published one.
 struct ContradictionOptions {
-  // Chi-square of the difference (calibration_difference.h): 99.9 % of those of 8 numbers lie below 26, and sigmas may
-  // be 1.5 times too small.
+  // Chi-square of the difference (calibration_difference.h): for 8 parameters 99.9 % lie below 26.
+  // The sigmas may be 1.5 times too small.
   double least_chi_square = 60;
-  int believed_after = 2;  // in a row: one may be chance
+  int believed_after = 2;  // contradictions in a row: a single one may be chance
 };
 
 class ContradictionJudge {
@@ -37,18 +38,19 @@ class ContradictionJudge {
   int in_a_row_ = 0;
 };
 
-// Frames in which landmarks contradict telemetry: in half of those of some seconds, and the calibration is withdrawn.
+// Counts frames in which landmarks contradict telemetry. If half of the frames of some seconds do,
+// the calibration is withdrawn.
 struct DisagreementOptions {
-  double span_s = 8;
-  double share = 0.5;             // of the frames
-  std::size_t least_frames = 40;  // that tell anything
+  double span_s = 8;              // s
+  double share = 0.5;             // of the frames in span_s
+  std::size_t least_frames = 40;  // fewer are not judged
 };
 
 class DisagreementJudge {
  public:
   explicit DisagreementJudge(const DisagreementOptions& options = {}) : options_(options) {}
 
-  // True: withdraw it. Times in order.
+  // True: withdraw the calibration. time_s: in order.
   bool judge(double time_s, bool contradicted) {
     frames_.emplace_back(time_s, contradicted);
     while (frames_.front().first < time_s - options_.span_s) frames_.pop_front();

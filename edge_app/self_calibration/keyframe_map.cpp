@@ -11,13 +11,13 @@
 namespace alidade {
 namespace {
 
-// Of the trajectory about a keyframe, where the adjustment's knots are too few for the motion.
+// Errors of the trajectory at a keyframe, where the adjustment has too few knots for the motion.
 constexpr double kSigma_px = 0.2;
 constexpr double kRatePerAngle = 20;  // 1/s
 constexpr double kAccelerationSigmaPxPerS2 = 80;
 
-// By how many samples' worth an error lasts: 1 + 2 sum of the autocorrelations, up to where pairs of them
-// are no longer positive (Geyer): beyond that there is but noise to add up.
+// The number of samples over which an error lasts: 1 + 2 sum of the autocorrelations, up to where
+// pairs of them are no longer positive (Geyer). Beyond that there is only noise to add up.
 double samples_worth_one(const std::vector<double>& errors) {
   const std::size_t count = errors.size();
   double mean = 0;
@@ -38,7 +38,7 @@ double samples_worth_one(const std::vector<double>& errors) {
   return 1 + 2 * sum / variance;
 }
 
-// False: there was no room left for landmarks.
+// False: the map was full.
 bool see_all(const std::vector<Keyframe>& keyframes, const CalibrationResult& result,
              OeMode* mode) {
   const Camera<double>& camera = result.calibration.camera;
@@ -51,7 +51,7 @@ bool see_all(const std::vector<Keyframe>& keyframes, const CalibrationResult& re
     FrameOrientation orientation;
     const ImageView image =
         keyframe.image == nullptr ? ImageView{} : keyframe.image->unpack(&pixels);
-    // Whatever the status: maintain() knows what to do with such a frame.
+    // Whatever the status: maintain() handles every kind of frame.
     static_cast<void>(mode->process(image, keyframe.time_s, &prediction, &orientation));
     mode->maintain();
     has_room = has_room && mode->map().size() < mode->map().capacity();
@@ -59,13 +59,14 @@ bool see_all(const std::vector<Keyframe>& keyframes, const CalibrationResult& re
   return has_room;
 }
 
-// Room for a landmark takes 1.5 KB: first for as many as keyframes usually show. What they give does not depend on it as long as some
-// is left.
+// A landmark takes 1.5 KB, so there is room first only for as many as keyframes usually show. If
+// that fills up, all is done once more with the full room. The result is the same as long as some
+// room is left.
 MapState map_of_all(const std::vector<Keyframe>& keyframes, const CalibrationResult& result) {
   constexpr std::size_t kUsual = 240;  // of a keyframe
   OeOptions options = oe_options(result.calibration.camera);
   const int most = options.max_landmarks;
-  options.maker.max_new = most;  // a view is there once only
+  options.maker.max_new = most;  // each view occurs only once
   const std::size_t usual = kUsual * std::max<std::size_t>(keyframes.size(), 1);
   options.max_landmarks = static_cast<int>(std::min(usual, static_cast<std::size_t>(most)));
   for (;; options.max_landmarks = most) {
@@ -79,7 +80,7 @@ MapState map_of_all(const std::vector<Keyframe>& keyframes, const CalibrationRes
 }  // namespace
 
 InterpolatedPanTilt predict(const CalibrationResult& result, double time_s, double sigma_px) {
-  constexpr double kHalfSpan_s = 0.02;        // over which the acceleration is taken
+  constexpr double kHalfSpan_s = 0.02;        // for the acceleration
   constexpr double kCorrelationTime_s = 0.5;  // about a segment of the trajectory
   const TrajectorySpline& trajectory = result.trajectory;
   const Mechanics<double>& mechanics = result.calibration.mechanics;
@@ -122,7 +123,7 @@ Matrix2<double> tie_covariance(const CalibrationResult& result) {
       standardised.push_back(error / sigma);
       information += 1 / (sigma * sigma);
     }
-    // Where errors are but rounding, all may be one.
+    // If the errors are only rounding, all may be the same error.
     double variance = square / std::max(1, count);
     if (information > 0) {
       const double ratio = std::max(1.0, result.quality.telemetry_sigma_ratio);

@@ -1,14 +1,11 @@
 #pragma once
-// The map that belongs to a calibration, from some images of the recording it was made of.
-//   pass     OeMode over the keyframes, with the trajectory in place of telemetry: what they show goes
-//            where the trajectory says, to a fraction of a pixel, in the base frame
-//   offset   what ties trajectory and map to the base frame is telemetry's noise, averaged over the recording:
-//              cov = 2 max(1, ratio)^2 tau / sum(1 / sigma^2)      for each axis
-//            sigma as the calibration used it, ratio of the residuals to it, tau = 1 + 2 sum of the residuals'
-//            autocorrelations: samples whose errors repeat each other count as one. The 2 is for safety.
-//   shear    how far the trajectory's rates and accelerations may be wrong
-// Angles rad, times s on the image clock.
-// Pure; allocates; some 10 ms a keyframe. Not for the real-time thread.
+// The landmark map that belongs to a calibration, made from some images (keyframes) of its
+// recording. OeMode runs over the keyframes with the calibration's trajectory in place of
+// telemetry. So the map lies in the base frame, to a fraction of a pixel. Its offset covariance
+// includes that of the tie to the base (tie_covariance()), and its shear covariance says how far
+// the trajectory's rates and accelerations may be wrong. Derivation: docs/derivations.md.
+// Angles rad, times s on the image clock. Pure; allocates; about 10 ms a keyframe. Not for the
+// real-time thread.
 
 #include <memory>
 #include <vector>
@@ -21,21 +18,23 @@
 namespace alidade {
 
 struct Keyframe {
-  double time_s = 0;  // of row 0
-  // Of the calibration's size; another, or none, is passed over.
+  double time_s = 0;  // s, image clock, of row 0
+  // Passed over if null, or not of the calibration's size.
   std::shared_ptr<const PackedImage> image;
 };
 
-// In order of time, within the trajectory's span. An empty map if none can be used.
+// keyframes: in order of time, within the trajectory's span. An empty map if none can be used.
 [[nodiscard]] MapState map_from_keyframes(const CalibrationResult& result,
                                           const std::vector<Keyframe>& keyframes);
 
-// What the trajectory says of a time, in the units of telemetry, for OeMode::process(). sigma_px: of its
-// angles; its rates are taken to be wrong by twenty times that in a second.
+// What the trajectory says at a time, as telemetry would measure it (angles times scale), for
+// OeMode::process(). sigma_px: of the angles, in the image. The sigma of the rates is 20 times that
+// per second.
 [[nodiscard]] InterpolatedPanTilt predict(const CalibrationResult& result, double time_s,
                                           double sigma_px);
 
-// rad^2, of (pan, tilt): see above, offset.
+// rad^2, of (pan, tilt): how well trajectory and map are tied to the base frame. Derivation:
+// docs/derivations.md.
 [[nodiscard]] Matrix2<double> tie_covariance(const CalibrationResult& result);
 
 }  // namespace alidade

@@ -8,7 +8,7 @@
 namespace alidade {
 namespace {
 
-// In place, of rows without gaps; the first pixel of a row follows the last of the one before.
+// In place, rows without gaps. The first pixel of a row follows the last one of the row before.
 void to_differences(std::vector<std::uint8_t>* pixels) {
   std::uint8_t before = 0;
   for (std::uint8_t& pixel : *pixels) {
@@ -26,7 +26,7 @@ void to_values(std::vector<std::uint8_t>* differences) {
   }
 }
 
-// Differences are noise about 0: Huffman codes are all there is to gain, and fast.
+// Differences are noise about 0, so Huffman codes are the only gain, and fast.
 bool deflate_all(const std::vector<std::uint8_t>& from, std::vector<std::uint8_t>* to) {
   z_stream stream{};
   if (deflateInit2(&stream, 1, Z_DEFLATED, -MAX_WBITS, MAX_MEM_LEVEL, Z_HUFFMAN_ONLY) != Z_OK)
@@ -64,7 +64,7 @@ PackedImage::PackedImage(const ImageView& image) : width_(image.width), height_(
     pixels.insert(pixels.end(), image.row(row), image.row(row) + width_);
   to_differences(&pixels);
   if (deflate_all(pixels, &bytes_) && bytes_.size() < pixels.size()) return;
-  // As large as before means: as it was.
+  // No smaller than before: kept as it was. unpack() recognises that by the size.
   to_values(&pixels);
   bytes_ = std::move(pixels);
 }

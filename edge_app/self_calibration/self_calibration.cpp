@@ -56,7 +56,7 @@ SelfCalibration::SelfCalibration(const SelfCalibrationOptions& options, Calibrat
   zooms_ = zooms_ || !nodes_.empty();
   first->zoom_curve = nodes_.curve();
   published_ = first;
-  // The connection that it was made with is another one.
+  // It was made over another connection.
   clock_offset_known_ = stored == nullptr;
 }
 
@@ -96,7 +96,7 @@ void SelfCalibration::clock_began_anew() {
 }
 
 bool SelfCalibration::judge_delay(const FrameTracks& tracks) {
-  constexpr double kSteady = 0.5;  // of what is too much: it fades slowly
+  constexpr double kSteady = 0.5;  // of the limit: wander fades slowly
   const double most_s = options_.schedule.most_wander_s;
   const bool wanders = tracks.delay_wander_s > (delay_wanders_ ? kSteady * most_s : most_s);
   if (wanders != delay_wanders_) {
@@ -220,7 +220,7 @@ void SelfCalibration::publish(const SessionCalibration& checked) {
   need_ = CalibrationNeed::kNothing;
 }
 
-// Without what an earlier calibration says.
+// Calibrates without an earlier calibration as prior.
 void SelfCalibration::try_first() {
   ++tries_;
   SessionCalibration checked = adjust(nullptr);
@@ -229,7 +229,7 @@ void SelfCalibration::try_first() {
     settle(std::move(checked));
     return;
   }
-  // The program ends: nobody is to do anything about it.
+  // The program ends: nobody need do anything about it.
   if (checked.result.status == CalibrationStatus::kCancelled) return;
   const CalibrationRefusal refusal = why_refused(checked, session_.frames());
   need_ = refusal.need;
@@ -240,11 +240,11 @@ void SelfCalibration::hold_against_published() {
   const CalibrationSchedule& schedule = options_.schedule;
   watch_interval_s_ = std::min(2 * watch_interval_s_, schedule.longest_watch_s);
   SessionCalibration alone = adjust(nullptr);
-  // Motion that does not suffice tells nothing against what is known.
+  // Insufficient motion says nothing against what is known.
   if (!alone.refusal.empty()) return;
   const double chi_square =
       difference_chi_square(published_->calibration, alone.result.calibration, clock_offset_known_);
-  // That a reading agrees with itself tells nothing of the curve.
+  // A reading that agrees with itself says nothing about the curve.
   const bool agrees = makes_nodes() && chi_square <= options_.contradiction.least_chi_square;
   const ContradictionJudge::Verdict verdict =
       agrees ? ContradictionJudge::Verdict::kAgrees : contradiction_.judge(chi_square);
@@ -269,7 +269,7 @@ void SelfCalibration::hold_against_published() {
     return;
   }
   if (!first_node_ || !first_node_->refusal.empty()) first_node_is_wanted_ = true;
-  alone = {};  // a megabyte
+  alone = {};  // frees a megabyte
   const SessionCalibration refined = adjust(&published_->calibration);
   if (!refined.refusal.empty()) return;
   if (!clock_offset_known_ ||
@@ -283,7 +283,7 @@ void SelfCalibration::add(const FrameTracks& tracks) {
   now_s_ = std::max(now_s_, tracks.stamp.receive_time_s);
   last_frame_s_ = tracks.stamp.receive_time_s;
   video_is_lost_ = false;
-  // The clock offset of the frames before is not that of the frames to come.
+  // Frames before and after have different clock offsets.
   if (tracks.clock_restarted || tracks.delay_stepped) {
     if (!session_.empty()) begin_anew();
     if (is_calibrated_here()) clock_offset_known_ = false;
@@ -293,7 +293,7 @@ void SelfCalibration::add(const FrameTracks& tracks) {
   if (judge_delay(tracks)) return;
   judge_agreement(tracks);
   if (tracks.tracker == FrameTracks::Tracker::kNone || !tracks.time_is_of_use) return;
-  // Behind a machine that is too busy frames of the zoom before come after the reading of the next.
+  // On an overloaded machine, frames of the previous zoom may come after the new reading.
   if (tracks.stamp.receive_time_s < zoom_changed_s_ + options_.schedule.zoom_settles_s) return;
   if (tracks.tracker != tracker_) {
     begin_anew();

@@ -1,4 +1,4 @@
-// SelfCalibration where the camera zooms: from the calibration of a dwell to a node of the zoom curve.
+// SelfCalibration, the part for zooms: from the calibration of a dwell to a node of the zoom curve.
 
 #include <fmt/format.h>
 
@@ -28,8 +28,8 @@ bool look_forward(const Calibration& c, Vector3<double>* d_b) {
   return true;
 }
 
-// Whether a map that was made with one calibration is where another one looks: what the axes and the optical centre trade turns it,
-// and kept_map() allows for three times as much.
+// Whether a map made with one calibration is where the other one looks. An exchange between the
+// axes and the optical centre turns it; kept_map() allows for three times this limit.
 bool look_alike(const Calibration& a, const Calibration& b) {
   constexpr double kMost_rad = 3e-4;
   Vector3<double> of_a;
@@ -50,7 +50,7 @@ void SelfCalibration::take_zoom(double zoom, double changed_s) {
   begin_anew();
 }
 
-// What was taken for other zooms were this one's readings.
+// Readings taken for other zooms were this zoom's.
 void SelfCalibration::take_jitter(double zoom) {
   messages_.push_back(
       fmt::format("the zoom reading jitters by {:.2g} (one standard deviation): what differs by up "
@@ -96,16 +96,16 @@ void SelfCalibration::judge_zoom(const PanTiltSample& sample) {
   const bool stood = zoom_ && time_s > zoom_changed_s_ + options_.schedule.zoom_settles_s;
   if (stood && !odd_zoom_s_) odd_zoom_s_ = time_s;
   if (odd_zoom_s_ && time_s < *odd_zoom_s_ + options_.schedule.zoom_glitch_s) return;
-  // A movement has not ended before its last reading.
+  // A movement lasts at least until its last reading.
   take_zoom(zoom, time_s);
 }
 
-// The zoom is another one: is it one that the camera had before, or one of the curve's?
+// At a new zoom: was the camera there before, or is it on the curve?
 void SelfCalibration::look_for_stored() {
   if (!zoom_ || is_calibrated_here() || now_s_ < zoom_changed_s_ + options_.schedule.zoom_arrives_s)
     return;
   const StoredCalibration* stored = archive_ == nullptr ? nullptr : archive_->find(zoom_);
-  // One that claims to hold for any zoom would have fitted already.
+  // A calibration without a zoom, which holds for any, would have fitted already.
   if (stored != nullptr && !stored->calibration.zoom) stored = nullptr;
   auto found = std::make_shared<PublishedCalibration>();
   const bool on_curve = nodes_.curve().at(*zoom_, &found->calibration) &&
@@ -113,7 +113,8 @@ void SelfCalibration::look_for_stored() {
   const double f_sigma = relative_focal_length_sigma(found->calibration);
   const bool by_curve = on_curve && f_sigma <= kSharpFocalLength;
   if (on_curve && !by_curve) {
-    // The real-time thread has the curve, and follows points, or begins a map, where nothing better will come.
+    // The real-time thread has the curve. It follows points, or begins a map where nothing better
+    // will come.
     if (options_.automatic)
       say_once(
           fmt::format("zoom {}: by the zoom curve the focal length is known to {:.2g} %: PT mode "
@@ -140,14 +141,14 @@ void SelfCalibration::look_for_stored() {
   fresh_wanted_ = false;
   doubtful_ = false;
   if (!makes_nodes()) contradiction_.restart();
-  // Which connection a stored one was made with is not known.
+  // For a stored one the connection is unknown.
   clock_offset_known_ = by_curve && nodes_.clock_is_known();
   watch_interval_s_ =
       makes_nodes() ? options_.schedule.next_try_s : options_.schedule.first_watch_s;
   need_ = CalibrationNeed::kNothing;
 }
 
-// In a turn of its own: what is published is not to wait for it.
+// In a work() of its own, so that publishing does not wait for it.
 void SelfCalibration::make_first_node() {
   first_node_is_wanted_ = false;
   if (!zoom_) return;
@@ -163,7 +164,7 @@ void SelfCalibration::make_first_node() {
   first_node_ = std::move(node);
 }
 
-// The camera has another zoom.
+// Called once the camera has another zoom.
 void SelfCalibration::take_first_node() {
   const FirstNode first = std::move(*first_node_);
   first_node_.reset();
@@ -182,7 +183,7 @@ void SelfCalibration::take_first_node() {
   store(first.result, first.map);
 }
 
-// Where there was no calibration, or a fresh one is wanted.
+// Called where there was no calibration, or a fresh one is wanted.
 void SelfCalibration::settle(SessionCalibration checked) {
   if (!makes_nodes()) {
     contradiction_.restart();
@@ -199,7 +200,7 @@ void SelfCalibration::settle(SessionCalibration checked) {
   }
 }
 
-// Where there is one, with which it agrees.
+// Called where there is a calibration, and `alone` agrees with it.
 void SelfCalibration::refine_node(SessionCalibration alone) {
   ZoomAddition addition;
   std::string why;
@@ -225,11 +226,11 @@ void SelfCalibration::take_node(const ZoomAddition& addition, SessionCalibration
   const ZoomCurve& curve = nodes_.curve();
   messages_.push_back(fmt::format("zoom curve: {} nodes from reading {} to {}", curve.visits(),
                                   curve.first_reading(), curve.last_reading()));
-  // What it was made of is in the node.
+  // Its data is in the node now.
   session_.clear();
 }
 
-// It may be that reading alone: the others are kept until another one says so.
+// Perhaps this reading alone is wrong: the other nodes are kept until a second one contradicts.
 void SelfCalibration::contradict_nodes(const SessionCalibration& alone, const std::string& why) {
   messages_.push_back(fmt::format("zoom {}: not of the zoom curve: {}", *zoom_, why));
   const auto verdict = contradiction_.judge(std::numeric_limits<double>::infinity());

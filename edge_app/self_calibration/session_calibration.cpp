@@ -17,7 +17,8 @@
 namespace alidade {
 namespace {
 
-// common_s: of what all polls have in common, which is in the known clock offset as in the new data.
+// common_s: the error common to all polls. It is in the known clock offset and in the new data
+// alike.
 void set_priors(const KnownCalibration& known, double inflation, double common_s,
                 CalibrationOptions* adjustment) {
   const Calibration& calibration = known.calibration;
@@ -45,8 +46,8 @@ void set_priors(const KnownCalibration& known, double inflation, double common_s
   }
 }
 
-// The covariance by factor^2, but for the priors' part: one calibration of many gives its priors back (zoom_fit.h). False: it is not
-// positive.
+// Multiplies the covariance by factor^2, except the priors' part, as a calibration that becomes one
+// of many returns its priors (zoom_fit.h). False: the covariance is not positive.
 bool grow_beyond_priors(const CalibrationOptions& made_with, double factor,
                         Calibration* calibration) {
   Eigen::VectorXd prior = Eigen::VectorXd::Zero(kParameterCount);  // information
@@ -66,7 +67,7 @@ bool grow_beyond_priors(const CalibrationOptions& made_with, double factor,
   return true;
 }
 
-// Leaves the others in *observations.
+// Returns the held-out observations and leaves the others in *observations.
 std::vector<CalibrationObservation> take_held_out(
     const std::vector<FrameStamp>& stamps, std::vector<CalibrationObservation>* observations) {
   std::unordered_map<std::int64_t, std::size_t> place_of;
@@ -80,7 +81,7 @@ std::vector<CalibrationObservation> take_held_out(
   return held_out;
 }
 
-// Empty: none.
+// Empty: not refused.
 std::string refusal_of(const CalibrationQuality& quality, double hold_out, double unit,
                        const CalibrationChecks& checks) {
   if (hold_out > checks.worst_hold_out * unit) {
@@ -117,14 +118,15 @@ SessionCalibration calibrate_session(const CalibrationSession& session,
   std::vector<std::string> remarks;
   add_frames(stamps, &input, &adjustment, &remarks);
   add_telemetry(session.telemetry(), &input, &adjustment, &remarks);
-  // No two calibrations average out what all polls have in common: it is added to the result instead.
+  // The error common to all polls is not averaged out by several calibrations. It is added to the
+  // result instead.
   const double common_s = std::exchange(input.noise.telemetry_common_sigma_s, 0.0);
   if (known != nullptr) set_priors(*known, options.prior_inflation, common_s, &adjustment);
   input.observations = choose_tracks(session.observations(), options.max_observations);
   const std::vector<CalibrationObservation> held_out = take_held_out(stamps, &input.observations);
 
   SessionCalibration checked;
-  // What is published has it in it.
+  // A published calibration already contains what is known of the camera.
   KnownCameraCalibration calibrated =
       calibrate_knowing(input, adjustment, known == nullptr ? options.camera : KnownCamera());
   checked.result = std::move(calibrated.result);

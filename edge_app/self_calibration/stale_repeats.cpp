@@ -11,13 +11,14 @@
 namespace alidade {
 namespace {
 
-// Steps of a rounding in a file, or of arithmetic, are none of the device's.
+// Steps of a file's rounding, or of arithmetic, are not the device's.
 constexpr double kSmallestStep_rad = 2e-7;
-constexpr std::size_t kLeastSteps =
-    8;  // by chance 8 lie near multiples once in 0.06^-8 = 6e9 times
+// Eight gaps lie near multiples by chance once in 0.06^-8 = 6e9 cases.
+constexpr std::size_t kLeastSteps = 8;
 
-// Whether ascending gaps are multiples of q; improves q. From gaps of a few steps to larger ones, as q gets better: its
-// error, times their number, must stay below what counts as near.
+// Whether ascending gaps are multiples of q; improves q. Goes from gaps of a few steps to larger
+// ones as q gets better: the error of q times the number of steps must stay below what counts as
+// near.
 bool fits(const std::vector<double>& gaps, double* q) {
   constexpr double kShare = 0.95;     // of the gaps that must be near a multiple
   constexpr double kLeastUsed = 0.3;  // of all gaps
@@ -54,7 +55,8 @@ bool fits(const std::vector<double>& gaps, double* q) {
   return false;
 }
 
-// Whether gaps of so many steps occur that even motion, each poll as far as the one before, cannot be meant.
+// Whether the gaps vary too much for an even motion, in which each poll is as far as the one
+// before.
 bool vary(const std::vector<double>& gaps, double q) {
   std::map<std::int64_t, std::size_t> counts;
   std::size_t most = 0;
@@ -67,7 +69,7 @@ struct Axis {
   double resolution;
 };
 
-// The run before, the run itself and two after it; see the header.
+// run: the run before, the run itself, and two after it; see the header.
 bool is_stale(const std::vector<PanTiltSample>& samples, const EqualRun* run, const Axis& axis) {
   constexpr double kHiddenSteps = 1.5;
   constexpr double kExplained = 0.75;
@@ -82,7 +84,7 @@ bool is_stale(const std::vector<PanTiltSample>& samples, const EqualRun* run, co
   const double out = wrap_angle(angle[2] - angle[1]);
   const double after = wrap_angle(angle[3] - angle[2]) / (time_s[3] - time_s[2]);
   if (!(before * out > 0) || !(out * after > 0)) return false;
-  // So long at least: a poll that took long may have been true at its end.
+  // The shortest time it may have lasted: a slow poll may have been true at its end.
   const double held_s =
       samples[run[1].end - 1].earliest_time_s - samples[run[1].begin].latest_time_s;
   const double least = std::min(std::abs(before), std::abs(after)) * held_s;
@@ -101,7 +103,7 @@ double resolution_of(const std::vector<PanTiltSample>& samples, double PanTiltSa
 }  // namespace
 
 double device_resolution(const std::vector<double>& angles_rad) {
-  constexpr int kMostParts = 6;  // the smallest gap seen may be so many quanta
+  constexpr int kMostParts = 6;  // the smallest gap may be so many steps
   std::vector<double> sorted;
   std::copy_if(angles_rad.begin(), angles_rad.end(), std::back_inserter(sorted),
                [](double angle) { return std::isfinite(angle); });
@@ -113,7 +115,7 @@ double device_resolution(const std::vector<double>& angles_rad) {
   if (gaps.size() < kLeastSteps) return 0;
   std::sort(gaps.begin(), gaps.end());
   double resolution = 0;
-  // The smallest gap may be a wild angle's: then one of the next ones tells.
+  // The smallest gap may come from a wild angle: then one of the next ones gives the step.
   for (const double share : {0.0, 0.02, 0.05, 0.1, 0.2}) {
     const double base = gaps[static_cast<std::size_t>(share * static_cast<double>(gaps.size()))];
     for (int parts = 1; parts <= kMostParts; ++parts) {
@@ -122,7 +124,8 @@ double device_resolution(const std::vector<double>& angles_rad) {
         resolution = std::max(resolution, q);
     }
   }
-  // A head that turns evenly gives even steps without any resolution, but never the same angle twice.
+  // A head that turns evenly gives even steps without any resolution, but never the same angle
+  // twice.
   const bool recur = 10 * (sorted.size() - gaps.size() - 1) >= sorted.size();
   return resolution > 0 && (recur || vary(gaps, resolution)) ? resolution : 0;
 }

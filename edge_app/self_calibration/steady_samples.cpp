@@ -13,7 +13,8 @@ namespace {
 
 bool has_zoom(const PanTiltSample& sample) { return sample.zoom && std::isfinite(*sample.zoom); }
 
-// The nearest sequence that never turns back, of a movement from one level to another; as it is, if it does so by more than jitter.
+// Replaces a movement from one level to another by the nearest sequence that never turns back.
+// Leaves it as it is if it turns back by more than jitter.
 void steady_movement(double from, double to, double most,
                      const std::vector<PanTiltSample*>& moving) {
   const double sign = to > from ? 1 : -1;
@@ -51,7 +52,7 @@ ZoomJitter steady_zoom(std::optional<double> tolerance, std::vector<PanTiltSampl
     if (has_zoom(sample)) first.add(sample.latest_time_s, *sample.zoom);
   }
   if (!first.has_jitter()) return {0, first.tolerance()};
-  // Once more from the beginning, with the jitter known.
+  // A second pass, with the jitter known.
   SteadyZoom second;
   second.know(first.sigma());
   struct Rest {
@@ -59,7 +60,7 @@ ZoomJitter steady_zoom(std::optional<double> tolerance, std::vector<PanTiltSampl
     std::vector<PanTiltSample*> samples;
   };
   std::map<std::size_t, Rest> rests;
-  std::map<std::size_t, std::vector<PanTiltSample*>> movements;  // by how many rests were before
+  std::map<std::size_t, std::vector<PanTiltSample*>> movements;  // by the number of rests before
   for (PanTiltSample& sample : *samples) {
     if (!has_zoom(sample)) continue;
     const double reading = *sample.zoom;
@@ -73,7 +74,7 @@ ZoomJitter steady_zoom(std::optional<double> tolerance, std::vector<PanTiltSampl
     rest.samples.push_back(&sample);
   }
   for (auto& [number, rest] : rests) {
-    // One that creeps has no level.
+    // A rest that creeps has no level.
     const double level = second.rounded(median(rest.readings));
     for (PanTiltSample* sample : rest.samples) {
       if (std::abs(*sample->zoom - level) <= second.tolerance()) sample->zoom = level;
@@ -83,7 +84,7 @@ ZoomJitter steady_zoom(std::optional<double> tolerance, std::vector<PanTiltSampl
   std::size_t count = 0;
   for (const auto& [number, rest] : rests) {
     const auto movement = movements.find(count);
-    // Glitches of the rest before are far from it.
+    // Glitches in the rest before lie far from it.
     if (count > 0 && movement != movements.end())
       steady_movement(before, *rest.samples.front()->zoom, SteadyZoom::kFar * second.sigma(),
                       movement->second);

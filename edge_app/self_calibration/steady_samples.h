@@ -1,6 +1,7 @@
 #pragma once
-// steady_zoom(): the zoom readings of a whole recording without their jitter (core/model/steady_zoom.h), each rest with the one
-// level that all of its readings have in the middle. Exact readings stay as they are. Pure; allocates.
+// steady_zoom(): removes the jitter from the zoom readings of a whole recording
+// (core/model/steady_zoom.h). All readings of one rest get one level, their median. Exact readings
+// stay as they are. Pure; allocates.
 
 #include <optional>
 #include <vector>
@@ -11,10 +12,11 @@ namespace alidade {
 
 struct ZoomJitter {
   double sigma = 0;      // device units; 0: there is none
-  double tolerance = 0;  // within which two readings that are left are one
+  double tolerance = 0;  // device units: readings no further apart are one zoom
 };
 
-// tolerance: device units, as a person gave it, and nothing is changed; none: it is found. samples: by time.
+// tolerance: device units, as set by the user, and nothing is changed; empty: it is found. samples:
+// in order of time.
 ZoomJitter steady_zoom(std::optional<double> tolerance, std::vector<PanTiltSample>* samples);
 
 }  // namespace alidade

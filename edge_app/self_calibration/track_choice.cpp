@@ -13,7 +13,7 @@ namespace {
 
 struct Track {
   std::int64_t landmark = 0;
-  std::vector<std::size_t> frames;  // places in the order of all
+  std::vector<std::size_t> frames;  // places in the order of all frames
   double left = std::numeric_limits<double>::infinity();
   double top = std::numeric_limits<double>::infinity();
   double right = -std::numeric_limits<double>::infinity();
@@ -36,7 +36,7 @@ std::unordered_map<std::int64_t, std::size_t> places_of(
   return places;
 }
 
-// Of every stride-th frame, long enough, the one that moved farthest first.
+// Tracks over every stride-th frame, long enough; those that moved farthest first.
 std::vector<Track> tracks_in(const std::vector<CalibrationObservation>& observations,
                              const std::unordered_map<std::int64_t, std::size_t>& places,
                              std::size_t stride) {
@@ -56,7 +56,7 @@ std::vector<Track> tracks_in(const std::vector<CalibrationObservation>& observat
   for (auto& [landmark, track] : all) {
     if (track.frames.size() >= kMinSightings) tracks.push_back(std::move(track));
   }
-  // The second criterion makes the choice the same each time.
+  // The second criterion makes the order deterministic.
   std::sort(tracks.begin(), tracks.end(), [](const Track& a, const Track& b) {
     return a.extent() != b.extent() ? a.extent() > b.extent() : a.landmark < b.landmark;
   });
@@ -69,7 +69,8 @@ std::size_t size_of(const std::vector<Track>& tracks) {
   return size;
 }
 
-// Those that half of their frames need to have so many; returns how many observations that makes.
+// Chooses each track of which at least half of the frames still have fewer than in_each. Returns
+// the number of observations.
 std::size_t take_in_each_frame(const std::vector<Track>& tracks, std::size_t frames,
                                std::size_t in_each, Names* chosen) {
   chosen->clear();
@@ -87,7 +88,8 @@ std::size_t take_in_each_frame(const std::vector<Track>& tracks, std::size_t fra
   return size;
 }
 
-// As many in each frame as fit, and then what else fits; returns how many in each frame.
+// Chooses as many tracks in each frame as fit, then whatever else fits. Returns the number in each
+// frame.
 std::size_t take_evenly(const std::vector<Track>& tracks, std::size_t frames,
                         std::size_t max_observations, Names* chosen) {
   std::size_t enough = 0;
@@ -124,7 +126,7 @@ std::vector<CalibrationObservation> without_shared_pixels(
             [&rank](const CalibrationObservation& a, const CalibrationObservation& b) {
               return rank(a) < rank(b);
             });
-  // In their own memory: there may be 100,000 of them.
+  // In place: there may be 100,000 of them.
   auto kept = observations.begin();
   auto of_frame = kept;
   for (const CalibrationObservation& seen : observations) {

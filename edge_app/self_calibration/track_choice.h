@@ -1,11 +1,12 @@
 #pragma once
-// Which of the tracks that were found an adjustment is given, so that it ends in reasonable time: live and from a recording.
-//   pixels    two landmarks may be one corner: one of them is left in a frame
-//   sightings landmarks seen kMinSightings times or more
-//   limit     if those are more than max_observations, evenly over the recording's frames: as many landmarks in each as fit, of
-//             these the ones that moved farthest through the image, each with all of its sightings. Where fewer than
-//             kLeastInAFrame would be left in a frame, every second frame counts, or every third, ...
-// Pure functions; they allocate.
+// Chooses the tracks that an adjustment uses, so that it ends in reasonable time, live and from a
+// recording. Pure functions; they allocate.
+//   pixels     two landmarks may be one corner: only one of them is kept in a frame
+//   sightings  landmarks seen kMinSightings times or more
+//   limit      above max_observations, evenly over the frames: as many landmarks in each frame as
+//              fit, those that moved farthest through the image first, each with all of its
+//              sightings. If that leaves fewer than kLeastInAFrame in a frame, only every second
+//              frame counts, or every third, ...
 
 #include <cstddef>
 #include <cstdint>
@@ -16,27 +17,29 @@
 
 namespace alidade {
 
-// Two landmarks may be one corner, seen in two octaves: the noise of its pixels is in both, which are then no two
-// observations (docs/calibration.md). Of those of a frame that lie closer than this one is left, that of the landmark
-// with the most information; by frame.
+// Two landmarks may be one corner, seen in two octaves. They share the noise of its pixels, so they
+// are not two observations (docs/calibration.md). Of the observations of a frame that lie closer
+// than this, only that of the landmark with the most information is kept. The result is sorted by
+// frame.
 inline constexpr double kSharedPixels_px = 8;
 [[nodiscard]] std::vector<CalibrationObservation> without_shared_pixels(
     std::vector<CalibrationObservation> observations);
 
-// Why a frame has none of the tracks.
+// Why a frame has no tracks left.
 enum class Untracked {
-  kNoPicture,    // it is missing or could not be decoded
-  kNoTelemetry,  // nobody looked for points in it, as nothing tells where it looks
+  kNoPicture,    // missing, or could not be decoded
+  kNoTelemetry,  // no points were looked for, as nothing says where the frame looks
   kNoPoint,      // none was found or followed
   kTooShort,     // followed through fewer than kMinSightings frames
-  kBeyondLimit,  // of more than max_observations
+  kBeyondLimit,  // left out because of max_observations
 };
 using UntrackedFrames = std::unordered_map<std::int64_t, Untracked>;
 
 inline constexpr int kMinSightings = 5;
 inline constexpr std::size_t kMaxObservations = 30000;
 inline constexpr std::size_t kLeastInAFrame = 12;
-// *untracked: gets the frames of the observations of which none is left, if it is not null.
+// *untracked, if not null: gets each frame of the observations of which none is left, with the
+// reason.
 [[nodiscard]] std::vector<CalibrationObservation> choose_tracks(
     std::vector<CalibrationObservation> observations,
     std::size_t max_observations = kMaxObservations, UntrackedFrames* untracked = nullptr);

@@ -17,7 +17,7 @@ void ZoomNodes::leave() {
 
 bool ZoomNodes::add(const Calibration& alone, ZoomFitOptions options, ZoomAddition* addition,
                     std::string* error) const {
-  // Sigmas that are 1.5 times too small are no other camera.
+  // Sigmas 1.5 times too small do not mean another camera.
   options.two_cameras = 14;
   options.clock_is_another = !clock_is_known_;
   if (curve_.empty() && (!first_ || visited_ || *first_->zoom == *alone.zoom)) {

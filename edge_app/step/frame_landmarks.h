@@ -1,11 +1,9 @@
 #pragma once
-// FrameLandmarks: what the real-time thread saw in one frame, for people to look at.
-//
-//   landmark   of OE mode: where the solution expects it, and its residual: found minus expected
-//   point      of an uncalibrated camera: where it was found; nothing is expected
-//
-// px of the full image (CONVENTIONS.md). On an edge a landmark is found across it only: its residual has no
-// part along it. Fixed size and trivially copyable: crosses a queue by value.
+// FrameLandmarks: what the real-time thread saw in one frame, for display.
+//   landmark  of OE mode: where the solution expects it, and its residual, found minus expected
+//   point     of an uncalibrated camera: where it was found; nothing is expected
+// px of the full image (CONVENTIONS.md). An edge is located across itself only: its residual has no
+// part along the edge. Fixed size and trivially copyable: crosses a queue by value.
 
 #include <array>
 #include <cstdint>
@@ -16,7 +14,7 @@
 
 namespace alidade {
 
-// Of one frame, that the real-time thread hands on; what is found beyond that is left out.
+// The most points that the real-time thread passes on for one frame. Further ones are left out.
 inline constexpr int kMaxFramePoints = 256;
 
 struct FramePoint {
@@ -30,17 +28,17 @@ struct FramePoint {
 struct FrameLandmarks {
   enum class Kind : std::uint8_t {
     kNone,      // nothing was looked for, or nothing held
-    kPoints,    // u and v only
-    kLandmarks  // all
+    kPoints,    // u_px, v_px
+    kLandmarks  // all members
   };
   Kind kind = Kind::kNone;
   int count = 0;
-  std::array<FramePoint, kMaxFramePoints> found{};  // the first `count`
+  std::array<FramePoint, kMaxFramePoints> found{};  // the first `count` are valid
 };
 static_assert(std::is_trivially_copyable_v<FrameLandmarks>);
 
-// px, the part of a residual that was observed. An edge's covariance is that of its open direction but for a
-// ten-thousandth: cov / trace projects on that direction.
+// The part of a residual that was observed, px. An edge's covariance lies along its open direction,
+// apart from one part in ten thousand, so cov / trace projects onto that direction.
 [[nodiscard]] inline Vector2<double> observed_residual(const OeObservation& found) {
   const double trace = found.covariance.trace();
   if (trace < kUnobservedVariance) return found.residual;

@@ -1,6 +1,6 @@
 #pragma once
-// What an estimator saw in the frame that it processed last: as tracks for the calibration thread, and for people to
-// look at. px of the full image (CONVENTIONS.md). No allocation.
+// Converts what an estimator saw in the frame it processed last to tracks for the calibration
+// thread, and to landmarks for display. px of the full image (CONVENTIONS.md). No allocation.
 
 #include <optional>
 
@@ -11,16 +11,16 @@
 
 namespace alidade {
 
-// Set points, their count and oe_status; the rest stays. More than there is room for are left out.
+// Sets points and count, and leaves the rest. Points that exceed the room are left out.
 void get_tracks(const StartUpTracker& tracker, FrameTracks* tracks);
-// Without an answer from landmarks (status not kOk) no points.
+// Also sets oe_status. No points unless it is kOk.
 void get_tracks(const OeMode& mode, FrameTracks* tracks);
 
 void get_landmarks(const StartUpTracker& tracker, FrameLandmarks* landmarks);
-// Each where the solution expects it, with its residual.
+// Each at the position that the solution expects, with its residual.
 void get_landmarks(const OeMode& mode, FrameLandmarks* landmarks);
 
-// px, root mean square of the lengths of the residuals that held the result; none where nothing held one.
+// px, root mean square length of the inliers' residuals. Empty if there are none.
 [[nodiscard]] std::optional<double> residual_rms(const OeMode& mode);
 
 }  // namespace alidade

@@ -33,7 +33,7 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
       telemetry_clock_(options.telemetry_clock),
       telemetry_(empty_telemetry(false)),
       steady_zoom_(options.zoom_tolerance),
-      // A stored calibration was made with another connection.
+      // A stored calibration was made over another connection.
       minimum_delay_sigma_s_(
           options.other_connection && options.calibrated ? options.minimum_delay_sigma_s : 0),
       scene_lens_(options.calibration) {
@@ -53,8 +53,9 @@ OrientationStep::OrientationStep(const OrientationStepOptions& options)
 
 namespace {
 
-// What a delay errs by, or a clock that wanders, is the same in many frames: more of them do not average it. At another time
-// the rate is another, too: by the acceleration a, and the angle by its second order, a t^2 / 2.
+// A delay error, or a clock that wanders, is the same in many frames, so more frames do not average
+// it out. A time error t changes the rate by a t, with the acceleration a, and the angle in second
+// order by a t^2 / 2.
 void allow_for_lasting_error(double sigma_s, InterpolatedPanTilt* measured) {
   if (!(sigma_s > 0)) return;
   const double square = sigma_s * sigma_s;
@@ -75,16 +76,17 @@ void allow_for_lasting_error(double sigma_s, InterpolatedPanTilt* measured) {
 }  // namespace
 
 OrientationStep::Telemetry OrientationStep::empty_telemetry(bool filtered) const {
-  // Filtered times share the error of their line; polled ones have each an error of its own, which a
-  // bound beyond every stamp's sigma says.
+  // Filtered times share the error of their line. Polled times have an error each, which a bound
+  // beyond every stamp's sigma expresses.
   constexpr double kAllOwn_s = 1e3;
   TelemetryNoise noise = options_.telemetry_noise;
   if (!filtered) noise.period_sigma_s = kAllOwn_s;
   return Telemetry(noise, options_.telemetry_limits);
 }
 
-// A stall leaves a question, or its answer, lying about for long; when in that time the answer was true nobody
-// knows, nor how fast the head turned, where it is one of the first two, which give the rate.
+// During a stall a poll, or its answer, waits for long. Nobody knows when in that time the answer
+// was true; nor how fast the head turned, if it is one of the first two samples, which give the
+// rate.
 bool OrientationStep::is_stalled_poll(const PanTiltSample& sample) {
   const double width_s = sample.latest_time_s - sample.earliest_time_s;
   const std::optional<double> newest_s = telemetry_.newest_time();
@@ -93,7 +95,7 @@ bool OrientationStep::is_stalled_poll(const PanTiltSample& sample) {
       sample.latest_time_s > newest_s.value_or(0) + options_.telemetry_limits.max_gap_s;
   const double longest_s = begins ? 0.02 : 0.1;  // no stall is shorter
   constexpr double kTimesTheUsual = 2.5;
-  constexpr double kGrowth = 1.5;  // of the usual, a poll: a device may be slow, or become slow
+  constexpr double kGrowth = 1.5;  // of the usual time, per poll: a device may be or become slow
   const bool stalled = width_s > std::max(longest_s, kTimesTheUsual * usual_poll_s_);
   usual_poll_s_ = width_s < usual_poll_s_ ? usual_poll_s_ + (width_s - usual_poll_s_) / 4
                                           : std::min(width_s, kGrowth * usual_poll_s_);
@@ -127,8 +129,8 @@ void OrientationStep::add_telemetry(const PanTiltSample& sample) {
     timed.time_sigma_s = width_s > 0 ? width_s / std::sqrt(12.0) : options_.telemetry_stamp_sigma_s;
   }
   if (has_zoom) zoom_lookup_.add(timed.time_s, *zoom_);
-  // What the buffer refuses (a duplicate, a value that is not finite) it counts, and the records'
-  // sigma says the rest.
+  // The buffer counts what it refuses (a duplicate, a value that is not finite), and the records'
+  // sigma shows the effect.
   static_cast<void>(telemetry_.push(timed));
   settle_pending_frames();
 }
@@ -147,8 +149,9 @@ void OrientationStep::settle_pending_frames() {
 
 void OrientationStep::telemetry_lost() { telemetry_lost_ = true; }
 
-// Of the same curve, by what all its zooms share, and at a zoom to which OE mode has followed the lens. What has only begun there is worth
-// less than what was seen from there before.
+// True if the new calibration is of the same curve, with the same shared parameters, at a zoom to
+// which OE mode has followed the lens. A map that has only begun there is worth less than what was
+// seen from there before.
 bool OrientationStep::keeps_map(const PublishedCalibration& published) const {
   if (!oe_ || !options_.calibrated || !published.calibrated || !oe_->lens_has_moved()) return false;
   if (!oe_->has_followed_lens() && !published.map.landmarks.empty()) return false;
@@ -258,7 +261,8 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
   record.status = status_of_telemetry(query, telemetry_lost_, record.clock_locked);
   tracks_.telemetry_too_old = record.status == RecordStatus::kTelemetryTooOld;
   const bool elsewhere = !zoom_fits() || zoom_moved(telemetry_time_s);
-  // What is left of a map that was begun at another zoom is that zoom's lens.
+  // A map begun at another zoom has lost all its landmarks: the present zoom's calibration is used
+  // again.
   if (!elsewhere && oe_ && options_.calibrated && oe_->lens_has_moved() && oe_->map().size() == 0)
     oe_->reset(options_.calibration, focal_length());
   if (elsewhere || (oe_ && oe_->lens_has_moved())) {
@@ -273,7 +277,7 @@ OrientationRecord OrientationStep::add_frame(const FrameStamp& stamp, const Imag
     }
   }
   if (elsewhere) {
-    // The map is another zoom's.
+    // The map belongs to another zoom.
     image_ = finds_landmarks() ? ImageView{} : image_;
     orient_between(has_result(query) ? &measured : nullptr, telemetry_time_s, &record);
     return record;
@@ -287,7 +291,7 @@ void OrientationStep::orient_between(const InterpolatedPanTilt* measured, double
   const double readout_s =
       std::abs(options_.calibration.line_delay) * options_.calibration.camera.height;
   Calibration between;
-  // Neither the lens nor the axes of another zoom are this one's.
+  // Lens and axes of another zoom cannot be used here.
   if (!zoom_lookup_.calibration(options_.zoom_curve, telemetry_time_s, readout_s, &between)) {
     record->status = RecordStatus::kOtherZoom;
     return;
@@ -315,13 +319,13 @@ void OrientationStep::orient(const InterpolatedPanTilt* measured, const ImageVie
   if (finds_landmarks()) {
     const OeStatus status = oe_->process(image, *record->time_s, measured, lens, &frame);
     answered_by_oe_ = true;
-    // That the frame's time is not yet known well, sigma says too.
+    // If the frame's time is not yet known well, sigma says so too.
     if (measured != nullptr && status != OeStatus::kOk)
       record->status = status_of_landmarks(status);
   } else if (measured != nullptr &&
              pt_orientation(options_.calibration, *record->time_s, *measured, &frame) && oe_ &&
              !oe_->put_into_base(&frame)) {
-    // Where this fails the frame stays without orientation.
+    // If this fails, the frame has no orientation.
     frame = FrameOrientation();
   }
   if (frame.mode == OrientationMode::kNone) {

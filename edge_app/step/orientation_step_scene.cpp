@@ -1,4 +1,5 @@
-// What the scene map adds to a step: where the base is, and where a camera without telemetry looks.
+// OrientationStep, the part with the scene map: where the base is, and where a camera without
+// telemetry looks.
 
 #include <algorithm>
 #include <cmath>
@@ -29,7 +30,8 @@ void OrientationStep::settle_base(const ToldBase& told) {
   if (oe_ && oe_->settle_base(unpack(told))) tied_time_s_ = told.time_s;
 }
 
-// What was followed from the told frame on was followed through the lens of the one before: where that was another, once more.
+// Points after the localized frame were followed through the lens known before. If that lens was
+// wrong, a second localization is needed.
 bool OrientationStep::take_scene_lens(const ToldBase& told) {
   if (focal_length() == FocalLength::kCalibrated) return true;
   FrameLens lens;
@@ -40,13 +42,13 @@ bool OrientationStep::take_scene_lens(const ToldBase& told) {
   scene_lens_ = lens.calibration;
   Camera<double>& camera = scene_lens_.camera;
   camera = zoomed(camera, told.log_f - std::log(camera.focal_length));
-  // Told by images, not by the curve.
+  // From images, not from the curve.
   const int f = index(Parameter::kFocalLength);
   scene_lens_.covariance.row(f).setZero();
   scene_lens_.covariance.col(f).setZero();
   scene_lens_.covariance(f, f) = camera.focal_length * camera.focal_length * told.log_f_variance;
   constexpr double kExcluded = 4;  // standard deviations
-  // Of log f: turns are followed well enough with less, and with more not at all.
+  // Of log f: with less, turns are followed well enough; with more, not at all.
   constexpr double kLeast = 2e-3;
   constexpr double kMost = 1e-2;
   return std::abs(change) < std::clamp(kExcluded * sigma, kLeast, kMost);
@@ -67,7 +69,7 @@ void OrientationStep::orient_by_scene(const ImageView& image, OrientationRecord*
   if (!finds_landmarks()) return;
   FrameOrientation frame;
   FrameLens lens;
-  constexpr double kStands = 0.02;  // 1/s, of log f: less is the noise of it
+  constexpr double kStands = 0.02;  // 1/s, of log f: less is its noise
   const bool has_lens = oe_->lens_has_moved() && lens_as_found(lens_time_s_ - found_time_s_, &lens);
   if (has_lens) lens.moves = std::abs(found_rate_) > kStands;
   if (!is_beginning_ && oe_->process(image, *record->time_s, nullptr, has_lens ? &lens : nullptr,
@@ -87,7 +89,7 @@ void OrientationStep::orient_by_scene(const ImageView& image, OrientationRecord*
     note_tie(record);
     return;
   }
-  // Landmarks may still be found again; whoever comes first.
+  // Landmarks may still be found again; whichever of the two succeeds first is used.
   if (image.valid() && start_up_->process(image) != StartUpStatus::kBadImage) {
     alidade::get_tracks(*start_up_, &tracks_);
   } else {
@@ -101,7 +103,7 @@ void OrientationStep::orient_by_scene(const ImageView& image, OrientationRecord*
 }
 
 bool OrientationStep::begin_by_scene(const ImageView& image, double time_s) {
-  constexpr double kLongest_s = 1;  // that texture is waited for
+  constexpr double kLongest_s = 1;  // s, wait for texture
   InterpolatedPanTilt by_scene;
   const bool is_found = scene_start_.find(scene_lens_, time_s, &by_scene);
   if (is_beginning_ && (!is_found || !(time_s - beginning_since_s_ < kLongest_s))) {
@@ -120,7 +122,8 @@ bool OrientationStep::begin_by_scene(const ImageView& image, double time_s) {
   FrameOrientation frame;
   if (oe_->process(image, time_s, &by_scene, &frame) != OeStatus::kOk || !oe_->ask_about_base())
     return false;
-  // The angles of its map are the scene map's from here on, whatever was known before of the base.
+  // From here on the angles of OE mode's map are the scene map's, whatever was known of the base
+  // before.
   BaseMeasurement measurement;
   measurement.change = -oe_->telemetry_zero().value;
   measurement.covariance = by_scene.covariance.topLeftCorner<2, 2>();

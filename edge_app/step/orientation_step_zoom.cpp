@@ -1,4 +1,5 @@
-// What a zoom adds to a step: what its readings say of a frame's lens, and whether images allow that.
+// OrientationStep, the part with the zoom: the frame's lens by the zoom readings, and whether
+// images allow that lens.
 
 #include <algorithm>
 #include <cmath>
@@ -8,9 +9,10 @@
 namespace alidade {
 namespace {
 
-// Standard deviations of a zoom reading and of the focal length that images show: what is more is a wrong reading.
+// Standard deviations between a zoom reading and the focal length that images show. Beyond them the
+// reading is wrong.
 constexpr double kExcluded = 5;
-constexpr double kLongest_s = 0.5;  // without landmarks: as LensTrackOptions::longest_s
+constexpr double kLongest_s = 0.5;  // without landmarks, as LensTrackOptions::longest_s
 
 }  // namespace
 
@@ -24,7 +26,7 @@ void OrientationStep::take_zoom(double time_s, double reading) {
   const bool changed = zoom_ != zoom;
   zoom_ = zoom;
   if (changed) note_curve_here();
-  // What was told until now was that zoom with its jitter.
+  // Until now the reading was that zoom with its jitter.
   const bool jittered =
       zoom_at_adoption_ && steady_zoom_.found_now() &&
       std::abs(*zoom_at_adoption_ - zoom) <= SteadyZoom::kFar * steady_zoom_.sigma();
@@ -41,7 +43,7 @@ bool OrientationStep::zoom_fits() const {
 void OrientationStep::note_curve_here() {
   Calibration there;
   zoom_on_curve_ = zoom_ && options_.zoom_curve.at(*zoom_, &there);
-  // Where nobody calibrates, nothing better will come.
+  // Where nobody calibrates, no better curve will come.
   const double most = options_.follow_points ? kSharpFocalLength : kRoughFocalLength;
   begins_here_ = zoom_on_curve_ && relative_focal_length_sigma(there) <= most;
 }
@@ -87,7 +89,7 @@ bool OrientationStep::lens_as_found(double age_s, FrameLens* lens) const {
 
 bool OrientationStep::reading_jumps(double age_s) const {
   constexpr double kFastest = 3;      // 1/s: 20 times in a second
-  constexpr double kMostSigma = 0.1;  // between two readings that lie far apart it may be anything
+  constexpr double kMostSigma = 0.1;  // between two readings far apart it may be anything
   const double change = std::log(read_lens_.camera.focal_length / found_focal_length_);
   const double sigma = std::min(relative_focal_length_sigma(read_lens_), kMostSigma);
   return std::abs(change) > kFastest * std::abs(age_s) + kExcluded * sigma;

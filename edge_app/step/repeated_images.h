@@ -1,14 +1,15 @@
 #pragma once
-// RepeatedImages: which images of a stream are exactly the one before, and sent again though the camera had turned?
+// RepeatedImages: which images of a stream repeat the one before exactly, although the camera had
+// turned.
 //
-// Converters of frame rates, night modes and grabbers send a picture again where they have no new one. It shows what was
-// seen a while ago, at the stamp of now. A camera at rest sends equal images, too, if its coding swallows the noise: they
-// are right. So an equal image is
-//   repeated    if telemetry says that it should have moved, by kMoved_px and kSigmas of what telemetry knows, since the first
-//               of its like; or within kMemory_s of such a one.
-// A stream whose fresh images do not all come after equally many repeats has them late by up to an interval.
-// Images are compared by a digest of each kRowStep-th row, 8 bytes at a time: 10 us at 1920x1080. Fixed memory, no allocation,
-// one thread. Seconds, px.
+// Frame rate converters, night modes and grabbers send an image again if they have no new one. It
+// is older than its stamp says. A camera at rest also sends equal images if its coding swallows the
+// noise: those are right. So an equal image counts as repeated if telemetry says that it should
+// have moved by kMoved_px since the first equal one, after kSigmas of telemetry's uncertainty are
+// taken off; and for kMemory_s after such an image. If the numbers of repeats vary, fresh images
+// are late by up to one interval.
+// Seconds, px. Fixed memory, no allocation, one thread. Every kRowStep-th row is compared by
+// digest: 10 us at 1920x1080.
 
 #include <algorithm>
 #include <array>
@@ -24,7 +25,7 @@
 
 namespace alidade {
 
-// Equal for equal images, and but for chance for no others of which a sampled row differs. image: valid.
+// Equal for equal images. Different, but for chance, if a sampled row differs. image: valid.
 [[nodiscard]] inline std::uint64_t image_digest(const ImageView& image) {
   constexpr int kRowStep = 32;
   constexpr std::size_t kLanes = 4;
@@ -55,7 +56,8 @@ namespace alidade {
 
 class RepeatedImages {
  public:
-  // A frame, its time, and telemetry's answer for it, null if there is none. True: the image is one sent again.
+  // A frame, its time, and telemetry's answer for it (null if there is none). True: the image was
+  // sent again.
   bool judge(const ImageView& image, double time_s, const InterpolatedPanTilt* measured,
              double focal_length_px) {
     if (!image.valid()) return false;
@@ -78,7 +80,7 @@ class RepeatedImages {
     return time_s < until_s_;
   }
 
-  // One standard deviation of what a fresh image is late by, of the frame last judged.
+  // s, one standard deviation: how late a fresh image is, as of the frame judged last.
   [[nodiscard]] double sigma_s() const {
     const bool late = last_s_ < until_s_ && last_s_ < uneven_until_s_;
     return late ? interval_s_ / std::sqrt(12.0) : 0;
@@ -103,9 +105,9 @@ class RepeatedImages {
   std::optional<std::uint64_t> digest_;  // of the image before
   double last_s_ = 0;
   double interval_s_ = 0;
-  double fresh_s_ = 0;           // the first of its like
-  int run_ = 0;                  // repeats of it
-  std::optional<int> last_run_;  // of the one before
+  double fresh_s_ = 0;           // time of the first equal image
+  int run_ = 0;                  // repeats since then
+  std::optional<int> last_run_;  // repeats of the image before
   double until_s_ = kNever;
   double uneven_until_s_ = kNever;
 };

@@ -7,9 +7,9 @@
 namespace alidade {
 namespace {
 
-// As MotionPredictionOptions: what is to be expected of a motor, in fields of view.
+// As in MotionPredictionOptions: what a motor may do, in fields of view.
 constexpr double kAcceleration_fields = 10;
-// The mount turns about two axes only; what is left over is roll, by which rays and map may differ.
+// The mount turns about two axes only. What is left is roll, by which rays and map may differ.
 constexpr double kMostRoll_rad = 0.03;
 
 }  // namespace

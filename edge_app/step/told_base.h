@@ -1,6 +1,7 @@
 #pragma once
-// ToldBase: what the localization thread tells the real-time thread of one frame: how much further it looked, in the scene map's base,
-// than its record says; or, where that has no orientation, where it looked. Fixed size and trivially copyable: crosses the queue by value.
+// ToldBase: the localization thread's result for one frame, for the real-time thread: by how much
+// the frame's record is off in the scene map's base; or, if the record has no orientation, where it
+// looked. Fixed size and trivially copyable: crosses the queue by value.
 
 #include <array>
 #include <cstdint>
@@ -13,16 +14,17 @@ namespace alidade {
 
 struct ToldBase {
   std::int64_t frame = 0;
-  double time_s = 0;                   // of the record
+  double time_s = 0;                   // s, of the record
   std::array<double, 2> change_rad{};  // (pan, tilt), true angles: as localized minus as answered
   std::array<double, 3> covariance{};  // rad^2, of the localization: pan, pan with tilt, tilt
-  bool moved = false;                  // the base, or telemetry's zero, is known to have moved
-  // Of a frame without an orientation: where it looked when its middle row was exposed, row by row, and the covariance of
-  // R Exp(xi), xi in the camera frame, rad^2. change and covariance are then 0.
+  bool moved = false;                  // the base or telemetry's zero has moved
+  // For a frame without an orientation: its orientation when the middle row was exposed, row by
+  // row, and the covariance of R Exp(xi), xi in the camera frame, rad^2. change_rad and covariance
+  // are then 0.
   bool is_whole = false;
   std::array<double, 9> R_base_from_camera{};
   std::array<double, 9> R_covariance{};
-  double log_f = 0;  // f in px, and its variance
+  double log_f = 0;  // f in px
   double log_f_variance = 0;
 };
 static_assert(std::is_trivially_copyable_v<ToldBase>);

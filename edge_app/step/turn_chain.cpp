@@ -11,9 +11,10 @@ namespace {
 
 constexpr int kLeastPoints = 12;
 constexpr double kLongest_s = 0.5;  // from a frame to the next
-// Of a point's place: its own sigma says nothing of what all its places have in common, nor of what a tracker errs by from frame to frame.
+// Of a point's position. Its own sigma covers neither what all its positions share nor a tracker's
+// errors between frames.
 constexpr double kPointSigma_px = 0.15;
-// Of the variance: points near each other err together.
+// Of the variance: points near each other share errors.
 constexpr double kInflation = 4;
 constexpr double kCauchy = 3;  // sigmas
 
@@ -62,7 +63,7 @@ std::optional<TurnChain::Step> TurnChain::step(double line_delay, double elapsed
       const Vector3<double> off = before.d - there;
       const double variance = now.sigma * now.sigma + before.sigma * before.sigma;
       const double square = off.squaredNorm() / variance;
-      // The first rounds pull in what a start at no turn leaves far off.
+      // The first rounds take in points that a start without a turn leaves far off.
       const double weight = round < 2 ? 1 : 1 / (1 + square / (kCauchy * kCauchy * misfit));
       const Matrix3<double> J = -share * skew(there);
       normal += weight / variance * (J.transpose() * J);
@@ -81,7 +82,7 @@ std::optional<TurnChain::Step> TurnChain::step(double line_delay, double elapsed
   out.covariance =
       kInflation * misfit *
       Eigen::LDLT<Matrix3<double>>(normal).solve(Matrix3<double>(Matrix3<double>::Identity()));
-  // More than that, and most of them move by themselves, or the rays are another lens's.
+  // Beyond this most points move by themselves, or the rays are another lens's.
   constexpr double kMostMisfit = 100;
   if (!all_finite(out.covariance) || misfit > kMostMisfit) return std::nullopt;
   return out;

@@ -1,12 +1,13 @@
 #pragma once
-// TurnChain: how a camera turned since some frame, by points that are followed from frame to frame (start_up_tracker.h), without telemetry.
-//
-//   b_before = Exp(s w) b_now,  s = 1 + l (v_now - v_before) / T     per point, b: its ray in the camera frame
-//
-// w: rotation vector from this frame's middle row to the one before's, over the time T between them; l: line delay, so that a rolling
-// shutter that turns at an even rate does no harm. Robust least squares (Cauchy): what moves by itself counts little.
-//   R_from_now = R_from_before Exp(w)    with the covariance of all steps, of R Exp(xi), xi in this frame's camera
-// A step with too few points, or too long after the one before, breaks the chain. Fixed memory; no allocation. One thread.
+// TurnChain: how a camera has turned since some frame, without telemetry, by points followed from
+// frame to frame (start_up_tracker.h). For each point with ray b in the camera frame:
+//   b_before = Exp(s w) b_now,  s = 1 + l (v_now - v_before) / T
+// w is the rotation vector from this frame's middle row to that of the frame before, T the time
+// between them. l is the line delay: a rolling shutter that turns at an even rate does no harm.
+// Robust least squares (Cauchy): points that move by themselves count little. The steps multiply,
+// R_from_now = R_from_before Exp(w), with the covariance of all steps, of R Exp(xi), xi in this
+// frame's camera frame. A step with too few points, or after too long a time, breaks the chain.
+// Radians, seconds. Fixed memory; no allocation. One thread.
 
 #include <array>
 #include <optional>
@@ -18,21 +19,21 @@ namespace alidade {
 
 class TurnChain {
  public:
-  // The next frame's points; tracks.time_s and points are read.
+  // The next frame's points; reads tracks.time_s and the points.
   void add(const Calibration& calibration, const FrameTracks& tracks);
-  // The chain begins at the frame last added. False: there is nothing to follow in it, or no step led there.
+  // Begins the chain at the frame added last. False: no step led to that frame.
   [[nodiscard]] bool begin();
   void forget();
 
-  // Of the frame last added; none without a step to it.
+  // rad/s, camera frame, of the frame added last; empty if no step led to it.
   [[nodiscard]] const std::optional<Vector3<double>>& angular_velocity() const { return velocity_; }
-  // Of its last step: from the frame before to the one last added.
+  // s, of the last step: from the frame before to the frame added last.
   [[nodiscard]] double step_s() const { return step_s_; }
-  // Of the mean rate over the step, (rad/s)^2.
+  // (rad/s)^2, of the mean rate over the step.
   [[nodiscard]] const Matrix3<double>& velocity_covariance() const { return velocity_covariance_; }
 
   [[nodiscard]] bool holds() const { return holds_; }
-  // holds(): from the frame last added to the one where it began.
+  // If holds(): from the frame added last to the first one, and its covariance, rad^2.
   [[nodiscard]] const Matrix3<double>& R_first_from_now() const { return R_first_from_now_; }
   [[nodiscard]] const Matrix3<double>& covariance() const { return covariance_; }
 
@@ -50,7 +51,7 @@ class TurnChain {
   [[nodiscard]] std::optional<Step> step(double line_delay, double elapsed_s) const;
   void take(const Calibration& calibration, const FrameTracks& tracks);
 
-  std::array<Ray, kMaxFramePoints> before_;  // by landmark
+  std::array<Ray, kMaxFramePoints> before_;  // sorted by landmark
   std::array<Ray, kMaxFramePoints> now_;
   int before_count_ = 0;
   int now_count_ = 0;

@@ -6,9 +6,9 @@
 namespace alidade {
 namespace {
 
-// By a step along the curve from the lens' reading, to either side where the curve goes on.
+// From a step along the curve, to whichever side the curve continues.
 void set_slopes(const ZoomCurve& curve, FrameLens* lens) {
-  constexpr double kStep = 5e-3;  // of the readings' range
+  constexpr double kStep = 5e-3;  // of the range of readings
   const double step = kStep * (curve.last_reading() - curve.first_reading());
   const double reading = *lens->calibration.zoom;
   lens->corner_by_zoom = 0;
@@ -18,7 +18,7 @@ void set_slopes(const ZoomCurve& curve, FrameLens* lens) {
   const Camera<double>& from = lens->calibration.camera;
   const Camera<double>& to = beside.camera;
   const double change = std::log(to.focal_length / from.focal_length);
-  // A lens that turns over there, or does not zoom.
+  // Smaller: the lens does not zoom there, or turns over.
   constexpr double kLeast = 1e-6;
   if (!(std::abs(change) > kLeast)) return;
   lens->corner_by_zoom = (to.radial_distortion / to.distortion_of_corner() -
@@ -72,9 +72,9 @@ double ZoomLookup::change_about(const ZoomCurve& curve, double time_s) const {
 bool ZoomLookup::calibration(const ZoomCurve& curve, double time_s, double readout_s,
                              Calibration* calibration) const {
   if (count_ == 0) return false;
-  // Of a way that is followed between two readings, by a motor that starts or stops there.
+  // Share of the way between two readings: the motor starts or stops there.
   constexpr double kUneven = 0.15;
-  // A movement is over when readings have told nothing for so long.
+  // A movement is over when no reading has come for this long.
   constexpr double kLongest_s = 1;
   const std::size_t after = newer_of(time_s);
   const Reading& newer = reading(after);
@@ -86,18 +86,18 @@ bool ZoomLookup::calibration(const ZoomCurve& curve, double time_s, double reado
     const double rate = (newer.zoom - older.zoom) / interval_s;
     const double after_s = std::clamp(time_s - newer.time_s, -interval_s, kLongest_s);
     zoom += rate * after_s;
-    // Before the oldest reading the lens moved likewise, or not yet.
+    // Before the oldest reading the lens moved likewise, or did not move yet.
     const double beyond_s = std::max({after_s, older.time_s - time_s, 0.0});
     spread = std::abs(rate) * (std::min(beyond_s, kLongest_s) / 2 + readout_s / 4) +
              kUneven * std::abs(newer.zoom - older.zoom);
   }
   if (!curve.at(zoom, calibration)) {
-    // What the movement was thought to go on to.
+    // The extrapolated zoom is off the curve.
     zoom = newer.zoom;
     if (!curve.at(zoom, calibration)) return false;
   }
   if (spread == 0) return true;
-  // Either way from there, where the curve goes on.
+  // Either way from there, where the curve continues.
   Calibration moved;
   if (!curve.at(zoom + spread, &moved) && !curve.at(zoom - spread, &moved)) return false;
   const double change = moved.camera.focal_length - calibration->camera.focal_length;
@@ -118,7 +118,7 @@ bool ZoomLookup::lens(const ZoomCurve& curve, double time_s, double readout_s, d
   lens->rate = 0;
   lens->rate_sigma = 0;
   if (!lens->moves) return true;
-  // A motor's speeds, where the curve does not reach.
+  // The speed of motors, for use where the curve does not reach.
   constexpr double kAnyRate = 1;  // 1/s
   lens->rate_sigma = kAnyRate;
   Calibration from;
@@ -127,16 +127,16 @@ bool ZoomLookup::lens(const ZoomCurve& curve, double time_s, double readout_s, d
     return true;
   const double change = std::log(to.camera.focal_length / from.camera.focal_length);
   lens->rate = change / (newer.time_s - older.time_s);
-  // As even as calibration() has it, between two readings; beyond them anything up to a stop.
+  // Between two readings as even as in calibration(); beyond them anything up to a stop.
   const bool beyond = time_s > newer.time_s || time_s < older.time_s;
   constexpr double kUneven = 0.3;
-  // Either reading may be off by half of the tolerance.
+  // Each reading may be off by half of the tolerance.
   const double of_readings = tolerance / std::abs(newer.zoom - older.zoom) / std::sqrt(2.0);
   lens->rate_sigma = std::hypot(beyond ? 1 : kUneven, of_readings) * std::abs(lens->rate);
   return true;
 }
 
-// By regula falsi, as the curve is monotone and smooth (Illinois: the end that stays counts half).
+// Regula falsi, as the curve is monotone and smooth (Illinois: the end that stays counts half).
 bool lens_of_focal_length(const ZoomCurve& curve, double focal_length, FrameLens* lens) {
   if (curve.empty() || !(focal_length > 0)) return false;
   constexpr int kMaxSteps = 30;

@@ -1,6 +1,6 @@
 #pragma once
-// calibration.yaml on disk; what it says: core/calibration/calibration_text.h. Not for the real-time thread. No shared
-// state.
+// calibration.yaml on disk; its content: core/calibration/calibration_text.h. Not for the real-time
+// thread. No shared state.
 
 #include <string>
 
@@ -8,18 +8,19 @@
 
 namespace alidade {
 
-// False leaves one line in *error: `path: cannot be read: why`, or what is wrong in which line.
-// curve, if not null: its zoom curve, empty without one.
+// False: one line in *error: `path: cannot be read: why`, or what is wrong in which line. curve (if
+// not null): gets the file's zoom curve; empty if there is none.
 [[nodiscard]] bool load_calibration(const std::string& path, Calibration* calibration,
                                     std::string* error, ZoomCurve* curve = nullptr);
 
-// The text of such a file; refused also where no picture of ours is as large. path stands for it in errors.
+// Parses the text of such a file. Also refuses images larger than any picture accepted here. path:
+// named in errors.
 [[nodiscard]] bool parse_stored_calibration(const std::string& text, const std::string& path,
                                             Calibration* calibration, std::string* error,
                                             ZoomCurve* curve = nullptr);
 
-// Atomic: a reader, or a power cut, meets the old file or the new one, never half of one. A
-// calibration that load_calibration() would refuse is refused here.
+// Atomic: a reader, or a power cut, finds the old file or the new one, never half of one. Refuses a
+// calibration that load_calibration() would refuse.
 [[nodiscard]] bool save_calibration(const std::string& path, const Calibration& calibration,
                                     const CalibrationNotes& notes, std::string* error);
 [[nodiscard]] bool save_calibration(const std::string& path, const Calibration& calibration,

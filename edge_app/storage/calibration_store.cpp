@@ -41,7 +41,7 @@ bool ends_with(const std::string& text, const std::string& end) {
   return text.size() >= end.size() && text.compare(text.size() - end.size(), end.size(), end) == 0;
 }
 
-// Names in a folder, in order. False and the reason if it cannot be read.
+// The names in a folder, sorted. False with the reason in *error if it cannot be read.
 bool list(const fs::path& folder, std::vector<std::string>* names, std::string* error) {
   std::error_code failure;
   fs::directory_iterator at(folder, failure);
@@ -53,11 +53,12 @@ bool list(const fs::path& folder, std::vector<std::string>* names, std::string* 
   return !failure;
 }
 
-// The maps that were written for a yaml, the current one and those that a power cut left behind.
+// The maps written for a yaml: the current one, and those that a power cut left behind.
 constexpr const char* kMapMark = ".map-";
 constexpr const char* kMapExtension = ".bin";
 
-// Other content, other name. (The checksum of all, with the file's own at its end, would be the same for all.)
+// Another content gets another name. (The checksum over the whole file, which ends with its own,
+// would always be the same.)
 fs::path map_path(const fs::path& yaml, const std::string& content) {
   const auto check = static_cast<std::uint32_t>(
       crc32_z(0, reinterpret_cast<const unsigned char*>(content.data()), content.size() - 4));
@@ -81,7 +82,7 @@ std::vector<fs::path> maps_of(const fs::path& yaml) {
   return maps;
 }
 
-// A calibration of the store, or a map of one.
+// Whether a file is a calibration of the store, or its map.
 bool is_of_store(const fs::path& file, const std::string& name) {
   const std::string stem = file.stem().string();
   const bool is_ours = begins_with(name, stem + ".zoom-") || begins_with(name, stem + kMapMark);
@@ -89,7 +90,7 @@ bool is_of_store(const fs::path& file, const std::string& name) {
          (is_ours && (ends_with(name, kExtension) || ends_with(name, kMapExtension)));
 }
 
-// Says what was done with a file that is of no use: moved to a name of its own where that is possible.
+// Renames an unusable file, if possible, and says what was done.
 std::string set_aside(const fs::path& path, const char* as = ".damaged") {
   fs::path aside = path.string() + as;
   for (int i = 1; is_there(aside); ++i) aside = fmt::format("{}{}.{}", path.string(), as, i);
@@ -99,14 +100,14 @@ std::string set_aside(const fs::path& path, const char* as = ".damaged") {
   return "set aside as " + aside.filename().string();
 }
 
-// With the maps of a calibration, which another one would otherwise replace.
+// Also renames the maps of the calibration, which another calibration would otherwise replace.
 std::string set_aside_with_maps(const fs::path& yaml, const char* as = ".damaged") {
   for (const fs::path& map : maps_of(yaml)) static_cast<void>(set_aside(map, as));
   return set_aside(yaml, as);
 }
 
-// The map that a calibration names, which was parsed before; an empty path if it names none. False with a
-// line if it names none that is there.
+// The map that a calibration, parsed before, names; an empty path if it names none. False with one
+// line if that map does not exist, or cannot be a map.
 bool find_map(const fs::path& yaml, const std::string& text, fs::path* map, std::string* error) {
   map->clear();
   const YAML::Node root = YAML::Load(text);
@@ -117,7 +118,8 @@ bool find_map(const fs::path& yaml, const std::string& text, fs::path* map, std:
     *error = fmt::format("{}: its map {} is not a file beside it: not used", yaml.string(),
                          name.string());
   } else if (name.extension() != kMapExtension) {
-    // What is no map is set aside: never another file that a slip named, such as the configuration.
+    // A file that is no map would be set aside. That must not happen to another file named by
+    // mistake, such as the configuration.
     *error =
         fmt::format("{}: its map {} does not end in .bin: not used", yaml.string(), name.string());
   } else if (!is_there(path)) {
@@ -154,7 +156,7 @@ CalibrationStore::CalibrationStore(std::string file, double zoom_tolerance)
     : file_(std::move(file)), zoom_tolerance_(std::max(zoom_tolerance, 0.0)) {}
 
 FileLock::Result CalibrationStore::lock(std::string* why) {
-  std::error_code ignored;  // where there can be no folder there can be no lock, which says so
+  std::error_code ignored;  // a folder that cannot be made prevents the lock, which says so
   fs::create_directories(folder_of(file_), ignored);
   return lock_.take(file_, why);
 }
@@ -321,7 +323,7 @@ bool CalibrationStore::save_pending(std::string* error) {
   return all;
 }
 
-// A name for a new file that no other calibration has: what a file holds counts, not how it is called.
+// A name for a new file that no other calibration has. A file's content counts, not its name.
 std::string CalibrationStore::free_path(const StoredCalibration& stored) const {
   const std::optional<double>& zoom = stored.calibration.zoom;
   const fs::path file(file_);
@@ -339,8 +341,8 @@ std::string CalibrationStore::free_path(const StoredCalibration& stored) const {
   return path;
 }
 
-// The map comes first, under a name of its own, then the calibration that names it, then the old map goes:
-// whatever comes between, the calibration on disk has its map beside it.
+// First the map is written, under a name of its own, then the calibration that names it; then the
+// old map is removed. So at any moment the calibration on disk has its map beside it.
 bool CalibrationStore::write(Entry* entry, std::string* error) {
   StoredCalibration& stored = entry->stored;
   const fs::path path = stored.path.empty() ? free_path(stored) : stored.path;
@@ -354,7 +356,7 @@ bool CalibrationStore::write(Entry* entry, std::string* error) {
   bool map_is_new = false;
   std::string map_flaw;
   stored.notes.landmarks.clear();
-  // A new calibration at one reading leaves the others alone.
+  // A new calibration at one reading does not change the others' files.
   const bool holds_curve =
       curve_path_.empty() ? !stored.notes.zoom_curve.empty() : path == curve_path_;
   stored.notes.zoom_curve = holds_curve ? curve_ : ZoomCurve();

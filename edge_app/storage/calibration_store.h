@@ -1,15 +1,19 @@
 #pragma once
-// CalibrationStore: the calibrations of one camera on disk, one for each zoom setting, each with its map.
-//   FILE                      the calibration without zoom (INTERFACES: calibration.file)
-//   STEM.zoom-1234.5.yaml     the one at that zoom, beside it; the zoom that it holds counts, not its name
-//   either                    may hold the camera's zoom curve, which gives a calibration where no file has one: the file of
-//                             the calibration with which it came, FILE if there was none
-//   *.map-1a2b3c4d.bin        the map that a yaml names, beside it, tied to it by checksum (map_file.h)
-// A file that is damaged, cannot be read, or is not of this image size, is set aside with its maps (renamed to
-// NAME.damaged, .damaged.1 ...), said, and never used. A map that is damaged costs the map only.
-// Each file is written atomically: first the map, under a name that no other content has, then the yaml
-// that names it, and only then the old map is removed. A power cut leaves the old pair or the new one, and
-// perhaps a map that nobody names, which the next save removes. What a killed process left unfinished goes at load().
+// CalibrationStore: the calibrations of one camera on disk, one for each zoom setting, each with
+// its map.
+//   FILE                   the calibration without zoom (calibration.file of the configuration)
+//   STEM.zoom-1234.5.yaml  the one at that zoom, beside it. The zoom inside the file counts, not
+//                          its name.
+//   *.map-1a2b3c4d.bin     the map that a yaml names, beside it, tied to it by checksum
+//                          (map_file.h)
+// The zoom curve, used where no file has a calibration, is in the file of the calibration that
+// brought it; in FILE if that had no file yet.
+// A file that is damaged, unreadable or for another image size is set aside with its maps
+// (NAME.damaged, .damaged.1 ...), which is logged, and never used. A damaged map costs only the
+// map. Files are written atomically: first the map, under a name that no other content has, then
+// the yaml that names it, then the old map is removed. A power cut leaves the old pair or the new
+// one, and perhaps an unnamed map, which the next save removes. load() removes unfinished files of
+// a killed process.
 // Not for the real-time thread. One thread.
 
 #include <cstddef>
@@ -23,12 +27,12 @@
 
 namespace alidade {
 
-// A curve goes on beyond its first and last zoom, with less certainty.
+// A curve also continues beyond its first and last zoom, with less certainty.
 [[nodiscard]] inline bool is_between_zooms(const ZoomCurve& curve, double reading) {
   return (reading - curve.first_reading()) * (reading - curve.last_reading()) <= 0;
 }
 
-// What the curve of a file has at a reading, as people are told of it.
+// The name, for people, of what a file's curve gives at a reading.
 [[nodiscard]] inline std::string name_on_curve(const std::string& path, const ZoomCurve& curve,
                                                double reading) {
   return path + (is_between_zooms(curve, reading) ? ", between its zooms" : ", beyond its zooms");
@@ -36,16 +40,17 @@ namespace alidade {
 
 class CalibrationStore final : public CalibrationArchive {
  public:
-  // file: the configuration's calibration.file; its folder is created by lock() and by the first save.
-  // zoom_tolerance: device units within which two zooms are one.
+  // file: the configuration's calibration.file. lock() and the first save create its folder.
+  // zoom_tolerance: device units; readings no further apart are one zoom.
   explicit CalibrationStore(std::string file, double zoom_tolerance = 0);
 
-  // Reads all there are; width, height: px of the video, 0: any size. Returns lines for the log: what
-  // was loaded, what was set aside and why. kLook: no file is touched.
+  // Reads all files. width, height: px of the video; 0: any size. Returns lines for the log: what
+  // was loaded, what was set aside and why. kLook: changes no file.
   enum class Use { kKeep, kLook };
   [[nodiscard]] std::vector<std::string> load(int width, int height, Use use = Use::kKeep);
 
-  // To be taken before load(): of several processes that kept their calibrations here, one would remove another's map.
+  // Call before load(): of several processes that kept their calibrations here, one would remove
+  // another's map.
   [[nodiscard]] FileLock::Result lock(std::string* why);
 
   [[nodiscard]] bool empty() const { return entries_.empty(); }
@@ -55,7 +60,7 @@ class CalibrationStore final : public CalibrationArchive {
   [[nodiscard]] bool save(const StoredCalibration& calibration, std::string* error) override;
   [[nodiscard]] bool has_pending() const override;
   [[nodiscard]] bool save_pending(std::string* error) override;
-  // Renamed to NAME.replaced, .replaced.1 ..., with their maps.
+  // Renames them to NAME.replaced, .replaced.1 ..., with their maps.
   [[nodiscard]] std::string set_zooms_aside() override;
 
  private:
@@ -64,7 +69,7 @@ class CalibrationStore final : public CalibrationArchive {
     bool pending = false;
   };
 
-  // With the maps of a calibration; says what was done, or would be.
+  // Sets a calibration aside with its maps, unless kLook. Says what was done, or would be done.
   [[nodiscard]] std::string set_file_aside(const std::string& path) const;
   void load_file(const std::string& path, int width, int height, std::vector<std::string>* lines);
   [[nodiscard]] std::optional<std::size_t> nearest(std::optional<double> zoom) const;
@@ -77,8 +82,8 @@ class CalibrationStore final : public CalibrationArchive {
   Use use_ = Use::kKeep;
   std::vector<Entry> entries_;
   ZoomCurve curve_;
-  std::string curve_path_;             // of the file that holds it
-  mutable StoredCalibration between_;  // by the curve: what find() made last
+  std::string curve_path_;             // of the file that holds curve_
+  mutable StoredCalibration between_;  // what find() last made from the curve
 };
 
 }  // namespace alidade

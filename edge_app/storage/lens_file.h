@@ -1,13 +1,15 @@
 #pragma once
-// lens.yaml of `alidade calibrate-shutter`, the same lens as ROS's camera_info, and the camera's way.
+// Files of `alidade calibrate-shutter`: lens.yaml, the same lens as ROS's camera_info, and the
+// camera's trajectory.
 //   format: 1
 //   image: {width: 752, height: 480}
-//   focal_length_u: {value: 600.1, sigma: 0.03}     so for each of kLensParameterNames, in LensParameter's units
-//   covariance: {names: [...], matrix: [[...]]}     of all of them; 0 for what was fixed
-//   quality: {...}                                  optional: not kept, it belongs to the run that wrote it
-// Pixels have the centre of the top-left one at (0.5, 0.5), in camera_info at (0, 0). Reading is strict: an unknown, missing or
-// doubled key, text for a number, a number that is not finite or betrays another unit is an error in one line, `file:line: what;
-// what would be right`. Reading back what was written gives the same bits.
+//   focal_length_u: {value: 600.1, sigma: 0.03}   likewise each of kLensParameterNames
+//   covariance: {names: [...], matrix: [[...]]}   of all parameters; 0 for fixed ones
+//   quality: {...}                                optional; not read back
+// The centre of the top-left pixel is at (0.5, 0.5), in camera_info at (0, 0). Reading is strict:
+// an unknown, missing or doubled key, text in place of a number, a number that is not finite or
+// suggests another unit gives an error in one line, `file:line: what; what would be right`. What
+// was written is read back bit by bit.
 
 #include <string>
 
@@ -16,12 +18,12 @@
 namespace alidade {
 
 struct LensNotes {
-  std::string pattern;  // as the person named it
+  std::string pattern;  // as the user named it
   int width = 0;        // px
   int height = 0;       // px
 };
 
-// What a lens.yaml says.
+// The content of a lens.yaml.
 struct LensEstimate {
   int width = 0;   // px
   int height = 0;  // px
@@ -29,10 +31,10 @@ struct LensEstimate {
   LensMatrix covariance = LensMatrix::Zero();
 };
 
-// Text in, lens or error out. name stands for the file in errors.
+// name: of the file, in errors.
 [[nodiscard]] bool parse_lens(const std::string& text, const std::string& name, LensEstimate* lens,
                               std::string* error);
-// The same for a file: one that cannot be read is an error, too.
+// The same for a file. One that cannot be read is an error, too.
 [[nodiscard]] bool load_lens(const std::string& path, LensEstimate* lens, std::string* error);
 
 [[nodiscard]] std::string format_lens(const PatternCalibration& calibration,
@@ -40,7 +42,8 @@ struct LensEstimate {
 [[nodiscard]] std::string format_camera_info(const PatternCalibration& calibration,
                                              const LensNotes& notes);
 
-// time_s,x_m,y_m,z_m,q_x,q_y,q_z,q_w of each frame that was used: the camera in the pattern's frame, when row 0 was exposed.
+// A line time_s,x_m,y_m,z_m,q_x,q_y,q_z,q_w for each frame used: the camera in the pattern's frame,
+// when row 0 was exposed.
 [[nodiscard]] std::string format_trajectory(const PatternCalibration& calibration,
                                             const PatternData& data);
 

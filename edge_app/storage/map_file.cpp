@@ -24,7 +24,7 @@ constexpr char kMagic[] = "ALIDMAP\n";
 constexpr std::size_t kMagicSize = sizeof kMagic - 1;
 constexpr std::uint32_t kVersion = 3;
 constexpr std::size_t kVersionEnd = 12;
-constexpr std::size_t kHeaderSizeWithout = 176;  // sensitivities, two rows
+constexpr std::size_t kHeaderSizeWithout = 176;  // of one without sensitivities (two rows)
 constexpr std::size_t kPointSize = 60;
 constexpr std::size_t kLandmarkSizeWithout = 376;
 constexpr std::size_t kChecksumSize = 4;
@@ -73,7 +73,7 @@ class Writer {
   std::string bytes_;
 };
 
-// The caller has checked that the bytes are there.
+// The caller has checked that there are enough bytes.
 class Cursor {
  public:
   Cursor(const std::string& bytes, std::size_t offset) : bytes_(bytes), offset_(offset) {}
@@ -132,8 +132,8 @@ std::uint32_t checksum(const std::string& bytes, std::size_t size) {
       crc32_z(0, reinterpret_cast<const unsigned char*>(bytes.data()), size));
 }
 
-// Semidefinite: judged on the correlations, by all principal minors. Rounding may leave those of a
-// singular one slightly negative.
+// Whether a covariance is positive semidefinite: all principal minors of the correlations. Rounding
+// may make those of a singular matrix slightly negative.
 template <int kSize>
 bool is_positive(const Matrix<double, kSize, kSize>& covariance) {
   constexpr double kRounding = 1e-9;
@@ -159,7 +159,7 @@ constexpr const char* kNotFinite = "has a number that is not finite";
 constexpr const char* kNoUnit = "has a direction that is no unit vector";
 constexpr const char* kNotPositive = "has a covariance that is not positive";
 
-// What is wrong; "" for nothing.
+// "" if nothing is wrong.
 const char* flaw_of(const CalibrationLandmark& point) {
   if (!point.d_b.allFinite() || !point.covariance.allFinite()) return kNotFinite;
   if (!is_unit(point.d_b)) return kNoUnit;
@@ -231,7 +231,7 @@ void write(const Landmark& landmark, const std::vector<Parameter>& parameters, W
 }
 
 void read(Cursor* in, const std::vector<Parameter>& parameters, Landmark* landmark) {
-  // One that does not fit is out of range all the same.
+  // A value that does not fit is out of range as well.
   landmark->octave = static_cast<std::uint8_t>(std::min(in->u32(), std::uint32_t{0xff}));
   in->vector(&landmark->d);
   in->symmetric(&landmark->covariance);
@@ -311,7 +311,7 @@ bool parse_map(const std::string& bytes, const std::string& name, const Calibrat
   const std::uint64_t points = in.u64();
   const std::uint64_t landmarks = in.u64();
   const std::size_t end = bytes.size() - kChecksumSize;
-  // Bounded one by one, so that the sum cannot overflow.
+  // Checked one by one, so that the sum cannot overflow.
   if (points > end / kPointSize || landmarks > end / landmark_size ||
       header_size + points * kPointSize + landmarks * landmark_size != end) {
     return refuse("its size does not fit its " + std::to_string(points) + " points and " +

@@ -1,6 +1,9 @@
 #pragma once
-// map.bin: what one calibration knows of the scene, beside its calibration.yaml: the points that were
-// adjusted with it, and the map for OE mode. Little-endian, packed:
+// map.bin: what one calibration knows of the scene, beside its calibration.yaml: the points
+// adjusted with it, and OE mode's map. Its directions contain that calibration's errors, so it is
+// refused with any other calibration. Not for the real-time thread: allocates, reads and writes
+// files. No shared state. Little-endian, packed; sizes for a calibration without (with) an optical
+// centre of its own, which has 11 (13) parameters_of():
 //   offset 0   8 bytes  "ALIDMAP\n"
 //          8   u32      format version, 3
 //         12   u32      calibration_check() of the calibration it belongs to
@@ -8,17 +11,16 @@
 //         24   u64      number of landmarks m
 //         32   2 f64    offset of the map: pan, tilt, rad, base minus map
 //         48   3 f64    its covariance: xx, xy, yy, rad^2
-//         72   6 f64    covariance of pan's shear: upper half, by rows, of (angle, rate, acceleration)
-//        120   6 f64    of tilt's
-//        168   f64      the tilt that the shear is told for, rad
-//        176   22 f64   sensitivity of the offset: by rows pan, tilt, in the order of parameters_of() the
-//                       calibration: 26 of one whose optical centre is not the image's middle; what follows is 32 bytes on
-//        352   n times 60 bytes:
+//         72   6 f64    covariance of pan's shear (angle, rate, acceleration): upper half, by rows
+//        120   6 f64    the same of tilt's shear
+//        168   f64      the tilt at which the shear holds, rad
+//        176   22 f64   (26) sensitivity of the offset: rows pan, tilt; columns parameters_of()
+//        352            (384) n times 60 bytes:
 //                 i64     point's name in the tracks
 //                 3 f64   d_b, unit direction in the base
-//                 3 f64   cov_d: xx, xy, yy in tangent_basis(d_b), rad^2; the calibration taken as exact
+//                 3 f64   cov_d: xx, xy, yy in tangent_basis(d_b), rad^2; calibration exact
 //                 u32     observations
-//              m times 464 bytes (480), see Landmark in core/realtime/oe_mode/landmark_map.h:
+//              m times 464 bytes (480), see Landmark in core/realtime/oe_mode/landmark.h:
 //                 u32     octave, 0 to 7
 //                 3 f64   d, unit direction in the map's frame
 //                 3 f64   covariance: xx, xy, yy, rad^2
@@ -30,10 +32,8 @@
 //                 u32     frames in which it was found, no more than those
 //                 f32     mean square of the normalised residual
 //        end   u32      CRC-32 of everything before
-// A later version may change anything after the version. Earlier ones, without sensitivities, are refused.
-// A map is of use only with the calibration it was made with: its directions carry that one's errors,
-// so another's is refused.
-// Not for the real-time thread: allocates, reads and writes files. No shared state.
+// A later version may change anything after the version number. Earlier versions, without
+// sensitivities, are refused.
 
 #include <cstdint>
 #include <string>
@@ -50,10 +50,10 @@ struct MapContent {
   MapState map;
 };
 
-// CRC-32 of the parameters' values, which calibration.yaml keeps bit by bit.
+// CRC-32 of the parameters' values, which calibration.yaml preserves bit by bit.
 [[nodiscard]] std::uint32_t calibration_check(const Calibration& calibration);
 
-// Pure: bytes in, content or one line of error out. name stands for the file in errors.
+// Pure. False: one line in *error. name: of the file, in errors.
 [[nodiscard]] bool parse_map(const std::string& bytes, const std::string& name,
                              const Calibration& calibration, MapContent* content,
                              std::string* error);
@@ -62,7 +62,7 @@ struct MapContent {
 [[nodiscard]] bool load_map(const std::string& path, const Calibration& calibration,
                             MapContent* content, std::string* error);
 
-// Atomic. What load_map() would refuse is refused here.
+// Atomic. Refuses what load_map() would refuse.
 [[nodiscard]] bool save_map(const std::string& path, const MapContent& content,
                             const Calibration& calibration, std::string* error);
 

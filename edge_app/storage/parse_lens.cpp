@@ -26,7 +26,7 @@ EstimateRange plausible_range(LensParameter parameter) {
   }
 }
 
-// Of one standard deviation, in the unit of the value.
+// The largest plausible standard deviation, in the unit of the value.
 double largest_sigma(LensParameter parameter) {
   const EstimateRange range = plausible_range(parameter);
   return range.most - range.least;
@@ -82,7 +82,7 @@ class LensReader {
   }
 
  private:
-  // Values that betray another unit or another image.
+  // Refuses values that suggest another unit or another image.
   void check_plausible(const LensEstimate& estimate) const {
     const auto value = [&](LensParameter parameter) { return estimate.lens[index(parameter)]; };
     const auto name = [](LensParameter parameter) {

@@ -1,14 +1,15 @@
 #pragma once
 // plane.yaml of `alidade plane fit`: the ground under the camera.
 //   format: 1
-//   origin: {latitude_deg: 48.1, longitude_deg: 11.5, height_m: 520}     optional: x is east and y north of it (local_frame.h)
-//   heading: {value: 0.7, sigma: 0.002}     rad, of the base's forward direction, clockwise from y
-//   pitch, roll                             rad, of the base: forward lifted, right side lowered
-//   x, y, height                            m, of the camera's optical centre
-//   covariance: {names: [...], matrix: [[...]]}     of these six, all named; 0 for what the camera itself defines
-//   quality: {...}                                  optional: not kept, it belongs to the run that wrote it
-// Reading is strict, as of lens.yaml: every slip is an error in one line, `file:line: what; what would be right`. What is written is
-// read back to rounding.
+//   origin: {latitude_deg: 48.1, longitude_deg: 11.5, height_m: 520}
+//                                            optional: x is east, y north of it (local_frame.h)
+//   heading: {value: 0.7, sigma: 0.002}      rad, of the base's forward direction, clockwise from y
+//   pitch, roll                              rad, of the base: forward lifted, right side lowered
+//   x, y, height                             m, of the camera's optical centre
+//   covariance: {names: [...], matrix: ...}  of these six; 0 for what the camera itself defines
+//   quality: {...}                           optional; not read back
+// Reading is strict, as for lens.yaml: every mistake gives an error in one line, `file:line: what;
+// what would be right`. What was written is read back up to rounding.
 
 #include <string>
 
@@ -19,10 +20,11 @@ namespace alidade {
 
 [[nodiscard]] bool parse_plane(const std::string& text, const std::string& name,
                                PlaneEstimate* estimate, std::string* error);
-// The same for a file: one that cannot be read is an error, too.
+// The same for a file. One that cannot be read is an error, too.
 [[nodiscard]] bool load_plane(const std::string& path, PlaneEstimate* estimate, std::string* error);
 
-// The base's forward direction must not point straight up or down (kLeastForward): its heading would mean nothing.
+// The base's forward direction must not point straight up or down (kLeastForward), where it has no
+// heading.
 [[nodiscard]] std::string format_plane(const PlaneEstimate& estimate, const PlaneFit& fit);
 
 }  // namespace alidade

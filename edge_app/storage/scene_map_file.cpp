@@ -13,7 +13,7 @@ namespace alidade {
 namespace {
 
 void set_up(SqliteDatabase* database) {
-  // The largest is a picture; a row has a few hundred bytes beside.
+  // The largest value is a picture; the rest of a row takes a few hundred bytes.
   database->limit_length(static_cast<int>(SceneMap::kMostPictureBytes) + 65536);
   for (const char* pragma :
        {"PRAGMA trusted_schema = OFF", "PRAGMA cell_size_check = ON", "PRAGMA foreign_keys = ON",
@@ -23,7 +23,7 @@ void set_up(SqliteDatabase* database) {
   }
 }
 
-// A copy that another tool made may be without a log, and so could not be changed (sqlite.h).
+// A copy made by another tool may have no log, so it could not be changed (sqlite.h).
 void set_up_log(SqliteDatabase* database) {
   if (database->text_of("PRAGMA journal_mode") == "wal") return;
   database->execute("PRAGMA journal_mode = OFF");
@@ -38,7 +38,7 @@ void make_tables(SqliteDatabase* database) {
 
 bool write_new(const std::string& path, const SceneMap& map, std::string* error) {
   if (!may_write_scene_map(path, error)) return false;
-  // A log that outlived its database would be taken for this one's.
+  // A log that outlived its database would be taken for this database's.
   for (const char* rest : {"-wal", "-shm"}) ::unlink((path + rest).c_str());
   const std::string temporary = path + ".new";
   for (const char* rest : {"", "-wal", "-shm", "-journal"}) ::unlink((temporary + rest).c_str());
@@ -46,7 +46,7 @@ bool write_new(const std::string& path, const SceneMap& map, std::string* error)
   bool written = database.open(temporary, true);
   if (written) {
     set_up(&database);
-    // Nobody sees it before it is whole, and safely on disk.
+    // Nobody sees the file before it is complete and safely on disk.
     database.execute("PRAGMA synchronous = OFF");
     database.execute("PRAGMA journal_mode = OFF");
     {

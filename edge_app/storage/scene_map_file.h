@@ -1,15 +1,12 @@
 #pragma once
-// scene.map: the scene map on disk (core/mapping/scene_map.h), an SQLite database in WAL mode, of this program's application_id; its
-// user_version is the format's, 2; one of format 1 is read and updated as it is, and becomes one of format 2 when it is replaced. Tables:
-// scene (one row), lens_knot, lens_point, lens_rest (one row), keyframe, picture, landmark, sighting; columns see
-// scene_map_schema.h. Numbers keep their bits; of a covariance the upper half is kept.
-// Each transaction is on disk when the call returns (synchronous = FULL): after a power cut at any moment the map is as one of them
-// left it, and none that returned is lost. Each row has a checksum, and the scene row the sum of them all, so that what SQLite does
-// not notice is refused: a changed bit, a lost row.
-// What does not hold is one line, `path: what; what would be right`: missing, not a scene map, another format, cut off or damaged,
-// larger than SceneMap allows, in use, not writable, disk full. After an error the file is as before.
-// Memory: what the map itself takes, about 0.5 KB a landmark and as much a keyframe, its picture only where asked for, beside 8 MB.
-// Not for the real-time thread. A SceneMapFile belongs to one thread at a time; several processes may read while one writes.
+// scene.map: the scene map on disk (core/mapping/scene_map.h), an SQLite database in WAL mode with
+// this program's application_id. Columns: scene_map_schema.h; numbers keep their bits; of a
+// covariance the upper half is kept. user_version is the format, 2. A map of format 1 is read and
+// updated as it is, and becomes format 2 when it is replaced. Each transaction is on disk when the
+// call returns (synchronous = FULL): after a power cut the map is as one of them left it, and none
+// that returned is lost. Checksums of the rows, and their sum in the scene row, reveal what SQLite
+// does not notice: a changed bit, a lost row.
+// Not for the real-time thread.
 
 #include <cstdint>
 #include <string>
@@ -22,15 +19,19 @@
 
 namespace alidade {
 
-// Whole or not at all. A scene map that is there is replaced; another file, or a damaged one, is not.
+// All or nothing. Replaces a scene map, but neither another file nor a damaged map.
 [[nodiscard]] bool save_scene_map(const std::string& path, const SceneMap& map, std::string* error);
 
-// False: what lies beside that place does not let a map be there. To be asked before minutes of work.
+// False: a file beside that place forbids a map there. Ask before minutes of work.
 [[nodiscard]] bool may_write_scene_map(const std::string& path, std::string* error);
 
+// One thread at a time; several processes may read while one writes. An error is one line, `path:
+// what; what would be right` (missing, not a scene map, another format, cut off or damaged, larger
+// than SceneMap allows, in use, not writable, disk full), and the file is as before. Memory: the
+// map itself, about 0.5 KB per landmark and per keyframe, plus 8 MB; pictures only on request.
 class SceneMapFile {
  public:
-  // Checks all but the rows, which read() does.
+  // Checks everything except the rows, which read() checks.
   [[nodiscard]] bool open(const std::string& path, std::string* error);
 
   // As of the last open(), read() or update().
@@ -40,17 +41,18 @@ class SceneMapFile {
   [[nodiscard]] std::int64_t keyframes() const { return scene_.keyframes; }
   [[nodiscard]] std::int64_t landmarks() const { return scene_.landmarks; }
 
-  // False: the map of a camera with another size of image.
+  // False: the map belongs to a camera with another image size.
   [[nodiscard]] bool is_of(int width, int height, std::string* error) const;
 
-  // All of one moment. Without pictures those are empty; they can be had one by one.
+  // All from one moment. Without pictures the keyframes' pictures are empty; read_picture() reads
+  // one.
   [[nodiscard]] bool read(SceneMap* map, std::string* error, bool with_pictures = false);
   [[nodiscard]] bool read_picture(std::int64_t keyframe, std::vector<std::uint8_t>* picture,
                                   std::string* error);
 
-  // One transaction. Refused where somebody else wrote since this one read or wrote.
+  // One transaction. Refused if another process has written since this one read or wrote.
   [[nodiscard]] bool update(const MapChange& change, std::string* error);
-  // All of it by another map, which is_valid(), in one transaction.
+  // Replaces the whole map by another one, which is_valid(), in one transaction.
   [[nodiscard]] bool replace(const SceneMap& map, std::string* error);
 
  private:
@@ -69,7 +71,7 @@ class SceneMapFile {
   SceneRow scene_;
 };
 
-// open() and read(): what a command needs.
+// open() and read() in one.
 [[nodiscard]] bool load_scene_map(const std::string& path, SceneMap* map, std::string* error,
                                   bool with_pictures = false);
 

@@ -1,4 +1,4 @@
-// SceneMapFile's reading: what the tables hold, each number of it doubted.
+// SceneMapFile, the reading part. Every number in the tables is checked.
 
 #include <utility>
 
@@ -10,7 +10,7 @@ namespace alidade {
 
 namespace {
 
-// No file comes as far, and each has a next one.
+// No file reaches it, and each revision has a next one.
 constexpr std::int64_t kMostRevision = std::int64_t{1} << 53;
 
 }  // namespace
@@ -19,7 +19,7 @@ bool SceneMapFile::read_scene(SceneRow* scene, std::string* error) {
   SqliteStatement select(&database_, "SELECT * FROM scene");
   std::int64_t id = 0, sum = 0;
   SceneRow found;
-  // The id is not a field.
+  // The id is not one of scene_fields().
   bool fits = select.step() && select.get(0, &id) && id == 1;
   if (fits) {
     ReadRow row(&select, 1);
@@ -99,7 +99,7 @@ bool SceneMapFile::read_keyframes(bool with_pictures, std::int64_t* row_sum, Sce
     fits = row.end(&sum) && map->keyframes.size() <= SceneMap::kMostKeyframes;
     add_sum(sum, 1, row_sum);
   }
-  // Without pictures their own sums are believed: they are looked at when a picture is read.
+  // Without pictures the stored sums are used unchecked. A picture is checked when it is read.
   SqliteStatement pictures(&database_,
                            with_pictures ? "SELECT * FROM picture" : "SELECT crc FROM picture");
   while (fits && pictures.step()) {

@@ -1,6 +1,7 @@
 #pragma once
-// The rows of scene.map: which number stands in which column, written once for reading and writing. Each row ends with the CRC-32 of its
-// fields, little-endian, a null as one byte: SQLite itself does not notice a bit that changes inside a number.
+// The rows of scene.map: which number is in which column, defined once for reading and writing.
+// Each row ends with the CRC-32 of its fields (little-endian; a null is one byte), because SQLite
+// does not notice a bit that changes inside a number.
 
 #include <zlib.h>
 
@@ -38,7 +39,7 @@ class FieldSum {
   unsigned long sum_ = crc32_z(0, nullptr, 0);
 };
 
-// Binds one field after the other, from the first parameter on.
+// Binds one field after the other, beginning with the first parameter.
 class WrittenRow {
  public:
   explicit WrittenRow(SqliteStatement* statement) : statement_(statement) {}
@@ -69,7 +70,7 @@ class WrittenRow {
       for (int j = i; j < kSize; ++j) field(m(i, j));
     }
   }
-  // Binds the sum, and returns it.
+  // Binds the sum and returns it.
   std::int64_t end() {
     statement_->bind(++at_, sum_.value());
     return sum_.value();
@@ -86,7 +87,7 @@ class WrittenRow {
   int at_ = 0;
 };
 
-// Takes one column after the other.
+// Reads one column after the other.
 class ReadRow {
  public:
   explicit ReadRow(const SqliteStatement* statement, int first = 0)
@@ -139,7 +140,7 @@ class ReadRow {
       }
     }
   }
-  // False: a field is of another type, or the sum differs.
+  // False: a field has another type, or the sum differs.
   [[nodiscard]] bool end(std::int64_t* sum) {
     std::int64_t stored = 0;
     *sum = sum_.value();
@@ -153,9 +154,9 @@ class ReadRow {
   bool fits_ = true;
 };
 
-// What stands of the whole map in the row of table `scene`.
+// The row of table `scene`: what concerns the whole map.
 struct SceneRow {
-  std::int64_t revision = 0;  // one more with each transaction
+  std::int64_t revision = 0;  // increases by one with each transaction
   std::int64_t width = 0, height = 0;
   double aspect = 1;
   double line_delay = 0, reference_row = 0;
@@ -165,11 +166,11 @@ struct SceneRow {
   std::int64_t lens_points = 0;
   std::int64_t lens_sum = 0;
   std::int64_t keyframes = 0, landmarks = 0, sightings = 0;
-  std::int64_t row_sum =
-      0;  // of the sums of all rows of keyframes, pictures and landmarks, modulo 2^63
+  // Sum of the checksums of all rows of keyframes, pictures and landmarks, modulo 2^63.
+  std::int64_t row_sum = 0;
 };
 
-// Adds, without overflow.
+// Adds (sign > 0) or subtracts, modulo 2^63.
 inline void add_sum(std::int64_t sum, std::int64_t sign, std::int64_t* total) {
   constexpr std::uint64_t kLow = ~std::uint64_t{0} >> 1U;
   const auto a = static_cast<std::uint64_t>(*total);
@@ -177,7 +178,7 @@ inline void add_sum(std::int64_t sum, std::int64_t sign, std::int64_t* total) {
   *total = static_cast<std::int64_t>((sign > 0 ? a + b : a - b) & kLow);
 }
 
-// V is const where it is written.
+// V is const when writing.
 template <class Row, class V>
 void each(Row* row, V& vector) {
   for (int i = 0; i < vector.size(); ++i) row->field(vector[i]);
@@ -213,7 +214,7 @@ void keyframe_fields(Row* row, Keyframe& k) {
   row->field(k.time_utc_s);
   row->field(k.zoom);
   row->field(k.position);
-  // Both or none, as two columns.
+  // Both or neither, as two columns.
   std::optional<double> pan, tilt;
   if (k.telemetry) {
     pan = k.telemetry->pan;

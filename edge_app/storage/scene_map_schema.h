@@ -1,6 +1,7 @@
 #pragma once
-// The tables of scene.map. The whole schema of a file must be this text: what else a database can hold (triggers, views) is refused.
-// Columns have no type of their own, as one would change bits: -0.0 becomes 0 in a column of REAL.
+// The tables of scene.map. A file's whole schema must be exactly this text: anything else in a
+// database (triggers, views) is refused. Columns have no type, as a type may change bits: a REAL
+// column turns -0.0 into 0.
 
 #include <array>
 #include <cstddef>
@@ -11,14 +12,15 @@ namespace alidade {
 
 inline constexpr std::int64_t kSceneMapApplication = 0x414C534D;  // "ALSM"
 inline constexpr std::int64_t kSceneMapFormat = 2;
-// Still read: it lacks kLensRestTable, and its lens keeps the distortion in the corner (LensCurve::hold() = 1).
+// Can still be read: it lacks kLensRestTable, and its lens keeps the distortion of the corner
+// (LensCurve::hold() = 1).
 inline constexpr std::int64_t kSceneMapFormatWithoutRest = 1;
 
-// Of a file whose bytes nothing can be made of.
+// For a file whose content makes no sense.
 inline constexpr const char* kSceneMapDamaged =
     "damaged, or cut off; build it again, or put back a copy";
 
-// As they are made, and as sqlite_schema lists them by name.
+// In the order of sqlite_schema, by name, which is also the order in which they are made.
 inline const std::array<std::string, 8> kSceneMapTables = {
     "CREATE TABLE keyframe(id INTEGER PRIMARY KEY, recording, frame, time_utc_s, zoom, position, "
     "telemetry_pan, telemetry_tilt, "

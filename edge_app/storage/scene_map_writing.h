@@ -1,6 +1,7 @@
 #pragma once
-// What is written into the tables of scene.map, row by row; the scene row's sums and counts follow. A failure is the database's
-// (SqliteDatabase::failed()); after one, rows are not written. Inside a transaction of the caller's.
+// Writes the tables of scene.map, row by row, and keeps sums and counts of the scene row up to
+// date. Call inside a transaction. A failure is the database's (SqliteDatabase::failed()); after
+// one nothing is written.
 
 #include <cstdint>
 
@@ -12,12 +13,12 @@ namespace alidade {
 
 class SceneRows {
  public:
-  // Borrows both. *scene: as it stands in the database, until put_scene().
+  // Borrows both. *scene: as in the database, until put_scene().
   SceneRows(SqliteDatabase* database, SceneRow* scene);
 
   void add(const SceneKeyframe& keyframe);
   void add(const SceneLandmark& landmark);
-  // False: there is none.
+  // False: there is no such landmark.
   [[nodiscard]] bool change(const SceneLandmark& landmark);
   [[nodiscard]] bool remove(std::int64_t landmark);
   void put_scene();
@@ -36,10 +37,10 @@ class SceneRows {
       find_landmark_, delete_sightings_, delete_landmark_;
 };
 
-// Into empty tables, of this program's format.
+// Into empty tables of this program's format.
 void write_all(const SceneMap& map, std::int64_t revision, SqliteDatabase* database);
 
-// with_rest: as the format has it that keeps the lens's hold.
+// with_rest: for the format that stores the lens's hold().
 [[nodiscard]] std::int64_t sum_of(const LensCurve& lens, bool with_rest);
 
 }  // namespace alidade

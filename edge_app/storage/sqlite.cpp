@@ -20,7 +20,8 @@ bool is_journal(const char* path) {
   return name.size() >= kJournal.size() && name.substr(name.size() - kJournal.size()) == kJournal;
 }
 
-// SQLite looks for a journal whenever it begins to read: one that appears after open() is not found either.
+// SQLite looks for a journal whenever it begins to read. This also hides one that appears after
+// open().
 int is_accessible(sqlite3_vfs* files, const char* path, int how, int* result) {
   if (!is_journal(path)) return system_files().xAccess(files, path, how, result);
   *result = 0;
@@ -34,7 +35,7 @@ int open_file(sqlite3_vfs* files, const char* path, sqlite3_file* file, int flag
   return SQLITE_CANTOPEN;
 }
 
-// The system's files without journals, under a name of their own.
+// The system's files without journals, registered under a name of its own.
 const char* files_without_journals() {
   static constexpr const char* kName = "alidade";
   static sqlite3_vfs files = [] {
@@ -55,7 +56,7 @@ std::string foreign_file_beside(const std::string& database) {
   for (const char* rest : {kJournal.data(), "-wal", "-shm"}) {
     std::string path = database + rest;
     struct stat status = {};
-    // Through a link another file would be written.
+    // Through a link, another file would be written.
     if (::lstat(path.c_str(), &status) == 0 && (rest == kJournal || !S_ISREG(status.st_mode)))
       return path;
   }
@@ -86,7 +87,7 @@ bool SqliteDatabase::open(const std::string& path, bool create) {
     handle_.reset();
     return false;
   }
-  // Of the file itself, where path is a link to it. Nothing of it was read so far.
+  // For the file itself, if path is a link to it. Nothing has been read from it so far.
   foreign_file_ = foreign_file_beside(sqlite3_db_filename(handle, "main"));
   if (!foreign_file_.empty()) {
     fail(SQLITE_CANTOPEN);

@@ -1,8 +1,10 @@
 #pragma once
-// SQLite's handles, owned: a connection, a statement, a transaction. The first failure of a connection is kept until it is asked for, so
-// that many steps can be taken and one question be asked at the end; after a failure statements do nothing. One thread at a time.
-// Changes go to a write-ahead log (NAME-wal, NAME-shm) or unlogged: a rollback journal is never made, and none is believed. One that lies
-// beside a database was put there, and SQLite would delete the files that it names.
+// RAII for SQLite's handles: a connection, a statement, a transaction. A connection keeps its first
+// failure until asked, and after it statements do nothing: so many steps can be taken with one
+// check at the end. One thread at a time.
+// Changes go to a write-ahead log (NAME-wal, NAME-shm) or are unlogged. A rollback journal is never
+// written and never believed: one beside a database was put there by others, and SQLite would
+// delete the files that it names.
 
 #include <cstddef>
 #include <cstdint>
@@ -16,7 +18,8 @@ struct sqlite3_stmt;
 
 namespace alidade {
 
-// What lies beside a database, and is not what SQLite leaves there for this program; empty: nothing. What a user is told of it.
+// A file beside a database that SQLite does not leave there for this program; empty: there is none.
+// And the text for the user.
 [[nodiscard]] std::string foreign_file_beside(const std::string& database);
 [[nodiscard]] std::string foreign_file_text(const std::string& file);
 
@@ -24,22 +27,22 @@ class SqliteDatabase {
  public:
   SqliteDatabase() = default;
 
-  // An existing file, or one that is made. True: opened; the file may be no database nevertheless, which the first statement shows.
-  // False also where there is a foreign_file_beside() it.
+  // Opens an existing file, or makes one. True: opened; whether it is a database only the first
+  // statement shows. False also if there is a foreign_file_beside() it.
   [[nodiscard]] bool open(const std::string& path, bool create);
   void close();
   [[nodiscard]] bool is_open() const { return handle_ != nullptr; }
 
   void execute(const std::string& sql);
-  // Of a `PRAGMA` or `SELECT` with one row and column; 0 where it fails.
+  // Of a `PRAGMA` or `SELECT` with one row and column. 0, or empty, if it fails.
   [[nodiscard]] std::int64_t number_of(const std::string& sql);
   [[nodiscard]] std::string text_of(const std::string& sql);
-  // No text or blob longer than this is read or written.
+  // No longer text or blob is read or written.
   void limit_length(int bytes);
 
   [[nodiscard]] bool failed() const { return failure_ != 0; }
   [[nodiscard]] int failure() const { return failure_; }  // SQLite's primary code
-  // What a user is told of the failure.
+  // The text for the user.
   [[nodiscard]] std::string failure_text() const;
   void forget_failure() {
     failure_ = 0;
@@ -73,11 +76,11 @@ class SqliteStatement {
 
   // True: there is a row. False: at the end, or failed.
   [[nodiscard]] bool step();
-  // To the end, and back to the beginning.
+  // Steps to the end, then resets.
   void run();
   void reset();
 
-  // Columns are counted from 0. False: of another type.
+  // Columns are counted from 0. False: another type.
   [[nodiscard]] bool get(int column, double* value) const;
   [[nodiscard]] bool get(int column, std::int64_t* value) const;
   [[nodiscard]] bool get_blob(int column, std::vector<std::uint8_t>* bytes) const;
@@ -92,16 +95,16 @@ class SqliteStatement {
   std::unique_ptr<sqlite3_stmt, Finalize> handle_;
 };
 
-// Undone at the end unless it was committed.
+// Rolls back at its end unless it was committed.
 class SqliteTransaction {
  public:
-  // For writing: nobody else can write until its end. For reading: all of one moment.
+  // for_writing: nobody else can write until the end. Else all reads are of one moment.
   SqliteTransaction(SqliteDatabase* database, bool for_writing);
   ~SqliteTransaction();
   SqliteTransaction(const SqliteTransaction&) = delete;
   SqliteTransaction& operator=(const SqliteTransaction&) = delete;
 
-  // True: it is done, and on disk as `PRAGMA synchronous` has it.
+  // True: done, and on disk as `PRAGMA synchronous` demands.
   [[nodiscard]] bool commit();
 
  private:

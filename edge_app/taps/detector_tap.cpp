@@ -8,7 +8,8 @@ ImageSlot DetectorTap::put(const OrientationRecord& record, const ImageView& ima
   frame.record = record;
   frame.image = image;
   frame.slot = slot;
-  // Release: the frame is there for who takes it. Acquire: who had the other one is done with it.
+  // Release: the frame is complete for whoever takes it. Acquire: whoever had the other frame is
+  // done with it.
   const unsigned before = waiting_.exchange(written_ | kFresh, std::memory_order_acq_rel);
   written_ = before & ~kFresh;
   put_.post();
@@ -23,7 +24,7 @@ void DetectorTap::end() {
 }
 
 const DetectableFrame* DetectorTap::take() {
-  // Only this thread makes it old.
+  // Only this thread clears kFresh.
   if ((waiting_.load(std::memory_order_relaxed) & kFresh) == 0) return nullptr;
   read_ = waiting_.exchange(read_, std::memory_order_acq_rel) & ~kFresh;
   return &frames_[read_];

@@ -1,14 +1,16 @@
 #pragma once
-// DetectorTap: the newest picture of the live video with its frame's record, for detectors on a thread of their own.
+// DetectorTap: hands the newest live picture, with its frame's record, to detectors on a thread of
+// their own.
 //
 //   real-time thread ---DetectableFrame, newest wins---> detector thread (FrameDetector)
 //                                                            | ImageSlot
 //                                                            +--> capture thread
 //
-// Only frames in OE mode: what moves is told from what stands by comparing pictures to a fraction of a pixel, and telemetry alone is off by
-// pixels at the long end of a zoom. A mailbox of one place: who looks takes the picture out, and one that comes before is replaced, and
-// counted. Three frames in fixed memory, whose owners change by one atomic exchange (a triple buffer), so that the real-time thread
-// neither waits nor allocates; the picture is lent with its slot, not copied.
+// Only frames in OE mode are handed over: detectors find motion by comparing pictures to a fraction
+// of a pixel, and telemetry alone is off by pixels at the long end of a zoom. The mailbox has one
+// place. A picture that is not taken before the next one is replaced and counted. Three frames in
+// fixed memory change owner by one atomic exchange (a triple buffer), so the real-time thread
+// neither waits nor allocates. The picture is lent with its slot, not copied.
 
 #include <array>
 #include <atomic>
@@ -24,13 +26,13 @@
 namespace alidade {
 
 struct DetectableFrame {
-  OrientationRecord record;  // in mode OE, with number, time and orientation
+  OrientationRecord record;  // in mode OE, with frame number, time and orientation
   ImageView image;           // lent with its slot
   ImageSlot slot = kNoImageSlot;
 };
 static_assert(std::is_trivially_copyable_v<DetectableFrame>);
 
-// Who looks. Called by the detector thread alone.
+// The detector. Called by the detector thread alone.
 class FrameDetector {
  public:
   virtual ~FrameDetector() = default;
@@ -42,36 +44,38 @@ class DetectorTap {
   // Borrows the detector.
   explicit DetectorTap(FrameDetector& detector) : detector_(detector) {}
 
-  // Real-time thread: whether a frame of this record can be looked at.
+  // Real-time thread: whether the frame of this record can be handed over.
   [[nodiscard]] static bool takes(const OrientationRecord& record) {
     return record.mode == RecordMode::kOe && record.frame && record.time_s && record.orientation;
   }
-  // Real-time thread. The slot of the picture that nobody looks at any more, as this one replaces it; kNoImageSlot: of none.
+  // Real-time thread. Returns the slot of the picture that this one replaces; kNoImageSlot if it
+  // replaces none.
   [[nodiscard]] ImageSlot put(const OrientationRecord& record, const ImageView& image,
                               ImageSlot slot);
-  // Real-time thread: nothing will follow.
+  // Real-time thread: no frame will follow.
   void end();
 
-  // Detector thread: until end(). What waits then is given back, and not looked at.
+  // Detector thread: runs until end(). A picture that still waits then is returned without being
+  // looked at.
   void run();
 
-  // Capture thread: a slot that was looked at, one after the other.
+  // Capture thread: pops one slot whose picture is no longer in use.
   bool pop_returned(ImageSlot& slot) { return returned_.pop(slot); }
 
-  // Any thread: pictures that were replaced.
+  // Any thread: the number of pictures that were replaced.
   [[nodiscard]] std::int64_t replaced() const { return replaced_.load(std::memory_order_relaxed); }
 
  private:
-  static constexpr unsigned kFresh = 4;  // beside the number of a frame
+  static constexpr unsigned kFresh = 4;  // flag beside the index of a frame: not taken yet
 
-  // Detector thread. Null: nothing new.
+  // Detector thread. Null if there is nothing new.
   [[nodiscard]] const DetectableFrame* take();
 
   FrameDetector& detector_;
   std::array<DetectableFrame, 3> frames_;
-  unsigned written_ = 0;              // real-time thread's
-  std::atomic<unsigned> waiting_{1};  // nobody's; with kFresh: not taken yet
-  unsigned read_ = 2;                 // detector thread's
+  unsigned written_ = 0;              // index; owned by the real-time thread
+  std::atomic<unsigned> waiting_{1};  // index, with kFresh if not taken yet; owned by neither
+  unsigned read_ = 2;                 // index; owned by the detector thread
   std::atomic<bool> ended_{false};
   std::atomic<std::int64_t> replaced_{0};
   boost::lockfree::spsc_queue<ImageSlot, boost::lockfree::capacity<2 * kImageSlots>> returned_;

@@ -1,6 +1,6 @@
 #pragma once
-// ImageSlot: where the capture thread keeps an image that others still look at. Whoever had it last gives the
-// slot back.
+// ImageSlot: the place where the capture thread keeps an image that others still look at. The last
+// one to use the image returns the slot.
 
 #include <cstdint>
 

@@ -7,7 +7,7 @@
 namespace alidade {
 
 ImageTap::ImageTap(std::chrono::milliseconds interval) : interval_(interval) {
-  // The real-time thread must not be the first to touch what it fills.
+  // Touches the queue's memory: the real-time thread must not be the first to do so.
   while (frames_.push(TappedFrame())) {
   }
   frames_.reset();

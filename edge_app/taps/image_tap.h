@@ -1,14 +1,15 @@
 #pragma once
-// ImageTap: now and then an image of the live video, small, with what the real-time thread saw in that frame,
-// for somebody who asks.
+// ImageTap: on request, a small version of a live image with what the real-time thread saw in that
+// frame.
 //
-//   asking thread ---a wish---> real-time thread ---TappedFrame---> tap thread ---LiveImage---> asking thread
-//                                                                       | ImageSlot
-//                                                                       +--> capture thread
+//   asking thread --request--> real-time thread --TappedFrame--> tap thread --LiveImage--> asking
+//                                                                    | ImageSlot           thread
+//                                                                    +--> capture thread
 //
-// Made only for those who ask, and five times a second at most, however many they are: who asks within
-// an interval of the newest image gets that one. To the real-time thread the wish is one atomic flag, and the hand-over
-// a push of a fixed-size message and a post; the image is lent with its slot, not copied.
+// Images are made on request only, and at most five times a second for all askers together: a
+// request within an interval of the newest image is answered with that one. For the real-time
+// thread a request is one atomic flag, and the hand-over is one push of a fixed-size message and
+// one post. The image is lent with its slot, not copied.
 
 #include <atomic>
 #include <boost/lockfree/spsc_queue.hpp>
@@ -39,9 +40,9 @@ static_assert(std::is_trivially_copyable_v<TappedFrame>);
 
 struct LiveImage {
   std::int64_t frame = 0;
-  int width = 0;  // px, of the frame
+  int width = 0;  // px, of the full image
   int height = 0;
-  std::string jpeg;  // at most ImageTap::kMaxWidth wide; empty: could not be made
+  std::string jpeg;  // at most ImageTap::kMaxWidth wide; empty: encoding failed
   FrameLandmarks landmarks;
 };
 
@@ -53,26 +54,28 @@ class ImageTap {
 
   explicit ImageTap(std::chrono::milliseconds interval = kInterval);
 
-  // Any thread but the real-time one. The newest image, if it is not older than the interval; else the next one, which
-  // is waited for. Null: none came within the time given, or close() was called.
+  // Any thread but the real-time one. Returns the newest image if it is no older than the interval,
+  // else waits for the next one. Null if none came within `patience`, or close() was called.
   [[nodiscard]] std::shared_ptr<const LiveImage> ask(std::chrono::milliseconds patience);
-  // Any thread but the real-time one. One of the last kKept images; null: it is not among them.
+  // Any thread but the real-time one. One of the last kKept images; null if the frame is not among
+  // them.
   [[nodiscard]] std::shared_ptr<const LiveImage> of_frame(std::int64_t frame) const;
 
-  // Any thread but the real-time one: nobody waits, from this moment on.
+  // Any thread but the real-time one. From now on nobody waits: all requests are answered with
+  // null.
   void close();
 
-  // Real-time thread. True: the next frame with an image is wanted, and whoever was told so has to push one.
+  // Real-time thread. True: the next frame with an image is wanted, and the caller has to push one.
   bool take_wish() { return wanted_.exchange(false, std::memory_order_relaxed); }
-  // Real-time thread. False: not taken, the wish stands again.
+  // Real-time thread. False: the queue is full; the request stands again.
   bool push(const TappedFrame& frame);
-  // Real-time thread: nothing will follow.
+  // Real-time thread: no frame will follow.
   void end();
 
-  // Tap thread: makes images until end(), and closes.
+  // Tap thread: makes images until end(), then closes.
   void run();
 
-  // Capture thread: a slot that nobody looks at, one after the other.
+  // Capture thread: pops one slot whose image is no longer in use.
   bool pop_returned(ImageSlot& slot) { return returned_.pop(slot); }
 
  private:
@@ -82,17 +85,17 @@ class ImageTap {
   const std::chrono::milliseconds interval_;
   std::atomic<bool> wanted_{false};
   std::atomic<bool> ended_{false};
-  // One wish, one frame: there is never more than one.
+  // One request, one frame: there is never more than one in the queue.
   boost::lockfree::spsc_queue<TappedFrame, boost::lockfree::capacity<2>> frames_;
   boost::lockfree::spsc_queue<ImageSlot, boost::lockfree::capacity<2 * kImageSlots>> returned_;
   Semaphore pushed_;
 
-  mutable std::mutex mutex_;  // of what follows; never on the real-time thread
+  mutable std::mutex mutex_;  // guards the members below; never taken by the real-time thread
   std::condition_variable made_;
   bool wish_under_way_ = false;
   bool closed_ = false;
   Clock::time_point newest_at_;
-  std::deque<std::shared_ptr<const LiveImage>> images_;  // the newest last
+  std::deque<std::shared_ptr<const LiveImage>> images_;  // newest last
 };
 
 }  // namespace alidade

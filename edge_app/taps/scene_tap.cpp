@@ -9,7 +9,7 @@ namespace alidade {
 
 SceneTap::SceneTap(SceneLocator& locator, const SceneTapOptions& options)
     : options_(options), locator_(locator) {
-  // The real-time thread must not be the first to touch what it fills.
+  // Touches the queue's memory: the real-time thread must not be the first to do so.
   while (frames_.push(LocalizableFrame())) {
   }
   frames_.reset();
@@ -44,7 +44,7 @@ void SceneTap::run(const std::function<void()>& wake) {
     pushed_.wait();
     const bool is_last = ended_.load(std::memory_order_acquire);
     for (LocalizableFrame frame; frames_.pop(frame);) {
-      // At the end nobody waits for it.
+      // After the end nobody waits for a result.
       if (!is_last) look(frame, wake);
       returned_.push(frame.slot);
       busy_.store(false, std::memory_order_release);

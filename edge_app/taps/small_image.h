@@ -1,8 +1,7 @@
 #pragma once
-// small_jpeg: an image made small enough for a status page, as a grey JPEG.
-//
-// Each of its pixels is the mean of factor x factor pixels, factor = ceil(width / max_width); what is left over
-// at the right and at the bottom is cut off. Allocates; about a millisecond for 1920x1080.
+// small_jpeg(): shrinks an image for a status page, as a grey JPEG. Each small pixel is the mean of
+// factor x factor pixels, factor = ceil(width / max_width). What is left over at the right and at
+// the bottom is cut off. Allocates; about 1 ms for 1920x1080.
 
 #include <string>
 
@@ -10,10 +9,10 @@
 
 namespace alidade {
 
-// Pixels of the image to one of the small one, each way.
+// The number of image pixels per small pixel, in each direction.
 [[nodiscard]] int shrinking_factor(int width, int max_width);
 
-// Empty: the image is not valid(), or smaller than one pixel of the small one, or the encoder has failed.
+// Empty: the image is not valid(), is smaller than one small pixel, or the encoder failed.
 [[nodiscard]] std::string small_jpeg(const ImageView& image, int max_width);
 
 }  // namespace alidade

@@ -7,7 +7,8 @@
 namespace alidade {
 namespace {
 
-// All that a detector asks of a frame; the record's own geometry has what directions need alone.
+// Restores all that a detector needs of a frame; the record's geometry has only what directions
+// need.
 bool complete_orientation(const OrientationRecord& record, FrameOrientation* out) {
   const FrameOrientation told = unpack(record.orientation->geometry, record.camera);
   if (!make_frame_orientation(told.calibration, *record.time_s, told.mode, record.landmarks,
@@ -75,7 +76,7 @@ bool BuiltInDetectors::find_motion(const ImageView& image, const FrameOrientatio
     MotionOptions options = *options_.motion;
     options.width = image.width;
     options.height = image.height;
-    // Too small or too large to be compared.
+    // The picture is too small or too large for this detector.
     if (!options.validate()) {
       count(&report_.motion, false, 0);
       return false;
@@ -100,7 +101,7 @@ void BuiltInDetectors::look(const DetectableFrame& frame) {
   if (!judged) return;
   const auto most = static_cast<std::size_t>(feed_.options().tracker.max_detections);
   if (boxes_.size() > most) boxes_.resize(most);
-  // What becomes of it the feed counts.
+  // The feed counts the outcome.
   static_cast<void>(feed_.offer({frame.record, boxes_}));
 }
 

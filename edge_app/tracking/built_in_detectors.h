@@ -1,10 +1,12 @@
 #pragma once
-// BuiltInDetectors: what the user's network finds (core/detection/network_detector.h), people (person_detector.h), and what moves (motion_detector.h), in
-// the pictures that a DetectorTap hands over. All detectors' boxes of a frame go to the TargetFeed together, as if somebody had sent them; where no detector
-// could judge the picture, nothing goes there, as that is no answer.
-// Scores become 0 to 1: of motion, the share of the largest that there is; of a person, 1 / (1 + e^-s), s the distance from the SVM's plane. Neither
-// is a probability. A box whose middle is in one of a detector before, in this order, is of the same thing, and left out.
-// Memory is taken with the first picture, whose size all others must have. For the detector thread, but for report().
+// BuiltInDetectors: runs the user's network (core/detection/network_detector.h), the person
+// detector (person_detector.h) and the motion detector (motion_detector.h), in this order, on the
+// pictures of a DetectorTap. All boxes of a frame go to the TargetFeed together, as if a client had
+// sent them. If no detector could judge the picture, nothing is sent.
+// Scores become 0 to 1, but are no probabilities: of motion the share of the largest possible
+// score; of a person 1 / (1 + e^-s), s the distance from the SVM's plane. A box whose middle lies
+// in a box of an earlier detector is taken for the same thing and left out. Memory is taken with
+// the first picture; all others must have its size. For the detector thread, except for report().
 
 #include <cstdint>
 #include <memory>
@@ -21,50 +23,51 @@ namespace alidade {
 
 struct NetworkFiles {
   std::string model;       // path
-  std::string labels;      // path; empty: none
-  NetworkOptions options;  // but for the labels, which the file tells
+  std::string labels;      // path; empty: no labels
+  NetworkOptions options;  // without the labels, which come from the file
 };
 
 struct BuiltInDetectorOptions {
-  std::optional<MotionOptions>
-      motion;  // but for width and height, which the first picture tells; empty: off
-  std::optional<PersonOptions> people;  // takes a plane; empty: off
+  // Without width and height, which come from the first picture. Empty: off.
+  std::optional<MotionOptions> motion;
+  std::optional<PersonOptions> people;  // needs a plane; empty: off
   std::optional<NetworkFiles> onnx;     // empty: off
 
   [[nodiscard]] bool any() const { return motion || people || onnx; }
 };
 
 struct DetectorCounters {
-  std::int64_t pictures = 0;  // that it looked at
-  std::int64_t unjudged = 0;  // of these, that it could say nothing of
-  std::int64_t boxes = 0;     // that it found
+  std::int64_t pictures = 0;  // looked at
+  std::int64_t unjudged = 0;  // of these, not judged
+  std::int64_t boxes = 0;     // found
 };
 
 struct DetectorsReport {
-  std::int64_t replaced = 0;  // pictures not looked at, as a newer one came
+  std::int64_t replaced = 0;  // pictures replaced by newer ones before they were looked at
   std::optional<DetectorCounters> motion, people, onnx;
 };
 
 class BuiltInDetectors : public FrameDetector {
  public:
-  // options are valid. plane: may be null without people; network: that of options.onnx, null without. Borrows the feed.
+  // options: valid. plane: may be null without people. network: for options.onnx, else null.
+  // Borrows the feed.
   BuiltInDetectors(const BuiltInDetectorOptions& options,
                    std::shared_ptr<const PlaneEstimate> plane,
                    std::unique_ptr<NetworkDetector> network, TargetFeed& feed);
 
   void look(const DetectableFrame& frame) override;
 
-  // Of the picture last looked at, what was handed over; for the thread that looks.
+  // Detector thread: the boxes that were sent for the last picture.
   [[nodiscard]] const std::vector<DetectionBox>& boxes() const { return boxes_; }
   // Any thread.
   [[nodiscard]] DetectorsReport report() const;
 
  private:
-  // False: it could not judge the picture.
+  // False: the picture could not be judged.
   [[nodiscard]] bool find_by_network(const ImageView& image);
   [[nodiscard]] bool find_people(const ImageView& image, const FrameOrientation& orientation);
   [[nodiscard]] bool find_motion(const ImageView& image, const FrameOrientation& orientation);
-  // Those of them that are of nothing that was found before, after finish(&box).
+  // Adds those boxes that lie on nothing found before, after finish(&box).
   template <typename Finish>
   void take(const std::vector<DetectionBox>& found, Finish&& finish);
   void count(std::optional<DetectorCounters>* counters, bool judged, std::size_t boxes);
@@ -75,8 +78,8 @@ class BuiltInDetectors : public FrameDetector {
   std::unique_ptr<MotionDetector> motion_;
   std::unique_ptr<PersonDetector> people_;
   std::unique_ptr<NetworkDetector> network_;
-  std::vector<DetectionBox> boxes_;  // of the picture at hand
-  mutable std::mutex mutex_;         // of what follows
+  std::vector<DetectionBox> boxes_;  // of the present picture
+  mutable std::mutex mutex_;         // guards what follows
   DetectorsReport report_;
 };
 

@@ -1,6 +1,7 @@
 #pragma once
-// What a detector found in one frame, and what became of it. Scores are 0 to 1 here. Where the target is, is the middle of the box's lower edge
-// (the foot) on a plane, the middle of the box on the sphere.
+// What a detector found in one frame, and what became of it. Scores are 0 to 1. The place of a
+// target is the middle of the box's lower edge (its foot) on a plane, and the middle of the box on
+// the sphere.
 
 #include <algorithm>
 #include <cstddef>
@@ -15,9 +16,10 @@ namespace alidade {
 
 inline constexpr std::size_t kLongestClass = 32;  // bytes
 
-// What a class may be called: at most kLongestClass bytes, in one line. What is more is refused, not cut.
+// Whether a class may have this name: at most kLongestClass bytes, in one line. A longer name is
+// refused, not cut.
 [[nodiscard]] inline bool is_class_name(const std::string& name) {
-  // As unsigned char: whether a plain one has a sign is the processor's choice, and ARM's has none.
+  // As unsigned char, because plain char is signed or not by processor (unsigned on ARM).
   return name.size() <= kLongestClass &&
          std::none_of(name.begin(), name.end(),
                       [](unsigned char c) { return c < ' ' || c == '\x7f'; });
@@ -31,13 +33,13 @@ struct DetectedFrame {
 // What became of a frame.
 enum class DetectionStatus {
   kTaken,
-  kTakenLate,  // put in its place, later frames done again
-  kMalformed,  // not what can be read
+  kTakenLate,  // put in its place; later frames are processed again
+  kMalformed,  // cannot be read
   kTooManyBoxes,
-  kUnknownFrame,  // not among those that are kept
-  kFrameNotYet,   // later than the newest
-  kTooLate,  // more than tracker.history_s, or history_frames, behind the newest that was taken
-  kNoOrientation,  // its record has none
+  kUnknownFrame,   // not among the frames kept
+  kFrameNotYet,    // later than the newest frame
+  kTooLate,        // over tracker.history_s, or history_frames, behind the newest one taken
+  kNoOrientation,  // its record has no orientation
   kRepeated,       // the frame's detections have come already
   kNoGeometry,     // its picture and the world do not fit together
   kQueueFull
@@ -53,22 +55,22 @@ inline constexpr int kDetectionStatusCount = static_cast<int>(DetectionStatus::k
 // One word, for metrics.
 [[nodiscard]] const char* label_of(DetectionStatus status);
 
-// Why a box is of no use. It is left out; the frame's others count.
+// Why a box cannot be used. It is left out; the other boxes of the frame count.
 enum class BoxFault { kNotFinite, kBadScore, kNoSize, kTooLarge, kOutside };
 inline constexpr int kBoxFaultCount = static_cast<int>(BoxFault::kOutside) + 1;
 
-// In a picture of this size; none: it can be used.
+// For a picture of this size, px. Empty: the box can be used.
 [[nodiscard]] std::optional<BoxFault> fault_of(const DetectionBox& box, int width, int height);
 [[nodiscard]] const char* to_string(BoxFault fault);
 [[nodiscard]] const char* label_of(BoxFault fault);
 
 struct DetectionAnswer {
   struct LeftOut {
-    std::size_t box;  // counted from 0
+    std::size_t box;  // index, from 0
     BoxFault fault;
   };
   DetectionStatus status = DetectionStatus::kTaken;
-  std::vector<LeftOut> left_out;  // of a frame that is taken
+  std::vector<LeftOut> left_out;  // if the frame is taken
 };
 
 }  // namespace alidade

@@ -10,7 +10,7 @@
 namespace alidade {
 namespace {
 
-// Of the pinhole camera, by a direction in its frame, d_c.z() > 0.
+// Of the pinhole camera. d_c: direction in the camera frame, d_c.z() > 0.
 Matrix<double, 2, 3> pinhole_jacobian(const Matrix3<double>& K, const Vector3<double>& d_c) {
   const double z = d_c.z();
   Matrix<double, 2, 3> J;
@@ -69,7 +69,7 @@ ViewRegion FrameView::find_region() const {
   const double h = frame_.calibration.camera.height;
   const std::array<Vector2<double>, 4> corners = {Vector2<double>(0, 0), Vector2<double>(w, 0),
                                                   Vector2<double>(w, h), Vector2<double>(0, h)};
-  constexpr std::size_t kSteps = 8;  // a side
+  constexpr std::size_t kSteps = 8;  // per side
   std::array<Vector2<double>, 4 * kSteps> rim;
   for (std::size_t i = 0; i < rim.size(); ++i) {
     const Vector2<double>& from = corners[i / kSteps];

@@ -1,7 +1,8 @@
 #pragma once
-// TargetFeed: a TargetStage on a thread of its own, niced, behind a bounded queue. Whoever has detections offers them and is told
-// at once whether they are taken up; nobody waits for the thread, and the threads on a record's way know nothing of it.
-// What offer() takes may still be refused by the stage, as a late frame that has come already; that is counted.
+// TargetFeed: a TargetStage on a niced thread of its own, behind a bounded queue. offer() answers
+// at once whether detections are taken; nobody waits for the thread, and the threads on a record's
+// way do not depend on it. A frame that offer() has taken may still be refused by the stage, as a
+// late frame that came before; that is counted.
 
 #include <condition_variable>
 #include <deque>
@@ -25,20 +26,20 @@ class TargetFeed {
   TargetFeed(const TargetFeed&) = delete;
   TargetFeed& operator=(const TargetFeed&) = delete;
 
-  // Before start(). Called on the thread after each frame that was taken.
+  // Call before start(). on_news is called on the feed's thread after each frame that was taken.
   void add_on_news(OnNews on_news) { on_news_.push_back(std::move(on_news)); }
-  [[nodiscard]] bool start();  // false: there can be no thread
-  void stop();                 // what waits is left
+  [[nodiscard]] bool start();  // false: no thread could be started
+  void stop();                 // frames that still wait are dropped
 
-  // Any thread. Counts what it refuses.
+  // Any thread. Counts refused frames.
   [[nodiscard]] DetectionAnswer offer(DetectedFrame frame);
-  // Any thread: a frame that was refused before it could be offered.
+  // Any thread: counts a frame that was refused before it could be offered.
   void count_refused(DetectionStatus status);
 
   [[nodiscard]] const TargetOptions& options() const { return options_; }
-  // All of one moment.
+  // The state of one moment.
   struct Snapshot {
-    std::shared_ptr<const TargetsState> newest;  // null before the first frame that was taken
+    std::shared_ptr<const TargetsState> newest;  // null before the first frame taken
     TargetCounters counters;
     std::size_t waiting = 0;  // frames
   };
@@ -49,15 +50,15 @@ class TargetFeed {
 
   const TargetOptions options_;
   std::vector<OnNews> on_news_;
-  TargetStage stage_;  // the thread's
+  TargetStage stage_;  // used by the thread only
 
-  mutable std::mutex mutex_;  // of all that follows; held for moments
+  mutable std::mutex mutex_;  // guards what follows; held only briefly
   std::condition_variable offered_;
   std::deque<DetectedFrame> queue_;
   bool ends_ = false;
   std::shared_ptr<const TargetsState> newest_;
   TargetCounters counters_;  // the stage's, as of its last frame
-  TargetCounters refused_;   // before they reached it
+  TargetCounters refused_;   // frames refused before the stage
   NicedThreads thread_;
 };
 

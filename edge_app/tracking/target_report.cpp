@@ -9,14 +9,14 @@
 namespace alidade {
 namespace {
 
-// As seen by one to whom time runs backwards.
+// Reverses the direction of time.
 void reverse_velocity(TargetState* state) {
   state->mean.tail<2>() *= -1;
   state->cov.topRightCorner<2, 2>() *= -1;
   state->cov.bottomLeftCorner<2, 2>() *= -1;
 }
 
-// At constant velocity, forwards or back.
+// Moves a target at constant velocity, forwards or back.
 TargetState moved(const TargetsState& all, const TargetState& from, double dt_s) {
   TargetState state = from;
   if (dt_s < 0) reverse_velocity(&state);
@@ -25,7 +25,7 @@ TargetState moved(const TargetsState& all, const TargetState& from, double dt_s)
   return state;
 }
 
-// Of azimuth and elevation of a unit direction away from the poles.
+// Jacobian of azimuth and elevation of a unit direction away from the poles.
 Matrix<double, 2, 3> angles_jacobian(const Vector3<double>& d) {
   const double level = d.head<2>().norm();
   Matrix<double, 2, 3> J;
@@ -68,7 +68,7 @@ bool on_sphere(const FrameView& view, const TargetState& state, TargetReport* ou
       !view.contains(u))
     return true;
   out->pixel = u;
-  // The chart's y axis is where azimuth grows, its -z axis where elevation does.
+  // Azimuth grows along the chart's y axis, elevation along its -z axis.
   Matrix<double, 3, 2> J_d_place;
   J_d_place << state.R_base_from_chart.col(1), -state.R_base_from_chart.col(2);
   const Matrix2<double> J = J_u_d * J_d_place;
@@ -76,7 +76,7 @@ bool on_sphere(const FrameView& view, const TargetState& state, TargetReport* ou
   return true;
 }
 
-// px a metre, or px a radian.
+// px per metre, or px per radian.
 double scale_of(const TargetsState& all, const FrameView& view, const TargetReport& report) {
   if (!all.plane) return view.focal_length();
   const Vector3<double> P_w(report.state->x(), report.state->y(), 0);

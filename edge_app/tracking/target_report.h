@@ -1,8 +1,9 @@
 #pragma once
-// TargetReport: a target as people and programs are told of it, in any frame: its state is moved to that frame's middle row at constant
-// velocity, back as well, and is projected into its picture. Covariances hold what the filter knows and what the calibration and the plane leave
-// open, which is the same for all targets and frames: as it was where the target was last seen, if it is out of view.
-// The box is that of its last detection, as large as the target is in this frame.
+// TargetReport: a target as people and programs get it, in any frame. Its state is moved to that
+// frame's middle row at constant velocity, also back in time, and projected into the frame's
+// picture. Covariances include the filter's and those of calibration and plane, which all targets
+// and frames share. For a target out of view the latter are as they were where it was last seen.
+// The box is that of its last detection, scaled to this frame.
 
 #include <cstdint>
 #include <optional>
@@ -15,27 +16,30 @@ namespace alidade {
 
 struct TargetReport {
   std::uint64_t identity = 0;
-  std::string name;  // class; empty: not told
+  std::string name;  // class; empty: unknown
   double score = 0;
-  double born_s = 0;
-  double seen_s = 0;    // time of the last frame it was seen in
-  double in_view = 1;   // how likely it was in view of the last frame that was taken
-  Vector3<double> d_b;  // from the camera, of its foot on a plane
-  // Plane: X, Y (m) and their rates. Sphere: azimuth, elevation (rad) and their rates; empty at a pole.
+  double born_s = 0;    // s
+  double seen_s = 0;    // s, time of the last frame in which it was seen
+  double in_view = 1;   // probability that it was in view of the last frame taken
+  Vector3<double> d_b;  // from the camera; on a plane, to its foot
+  // Plane: X, Y (m) and their rates. Sphere: azimuth, elevation (rad) and their rates; empty at a
+  // pole.
   std::optional<Vector4<double>> state;
   Matrix4<double> cov = Matrix4<double>::Zero();
-  std::optional<GeodeticPosition> on_earth;  // where the plane has an origin
-  // Where it is in the picture, if it is inside: its foot on a plane, its middle on the sphere; and how uncertain that is, px^2.
+  std::optional<GeodeticPosition> on_earth;  // if the plane has an origin
+  // Its place in the picture, px, if inside (its foot on a plane, its middle on the sphere), and
+  // the covariance, px^2.
   std::optional<Vector2<double>> pixel;
   Matrix2<double> cov_px = Matrix2<double>::Zero();
-  std::optional<DetectionBox> box;  // of a target in the picture
+  std::optional<DetectionBox> box;  // if the target is in the picture
 };
 
 // record: with a time and an orientation.
 [[nodiscard]] std::vector<TargetReport> report_targets(const TargetsState& state,
                                                        const OrientationRecord& record);
 
-// What calibration and plane leave open of a place seen at pixel u, m^2 or rad^2 (azimuth, elevation). False: it has no place.
+// The covariance that calibration and plane give a place seen at pixel u, m^2 or rad^2 (azimuth,
+// elevation). False: the pixel has no place.
 [[nodiscard]] bool shared_covariance(const FrameOrientation& shared_frame,
                                      const PlaneEstimate* plane, const Vector2<double>& u,
                                      Matrix2<double>* cov);

@@ -10,9 +10,9 @@
 namespace alidade {
 namespace {
 
-// Nearer to the picture's lower edge a foot may as well lie below it.
+// If a box ends nearer to the picture's lower edge, its foot may lie below the edge.
 constexpr double kFootMargin_px = 1;
-// Class votes count so far back.
+// Limits how long class votes count.
 constexpr double kMostClassWeight = 5;
 
 DetectionStatus status_of(FrameStatus status) {
@@ -69,7 +69,7 @@ DetectionAnswer TargetStage::add(const DetectedFrame& frame) {
   return answer;
 }
 
-// The boxes that can be used and tell a place, and their places.
+// Chooses the usable boxes that have a place, and measures their places.
 void TargetStage::choose(const DetectedFrame& frame, const FrameView& view) {
   chosen_.clear();
   measured_.clear();
@@ -120,7 +120,7 @@ DetectionAnswer TargetStage::take(const DetectedFrame& frame) {
   tracked.false_alarm_density = options_.false_alarms / view.area_px2();
   tracked.detections = measured_.data();
   tracked.count = static_cast<int>(measured_.size());
-  // A frame with a record is not of the future.
+  // A frame that has a record is not in the future.
   answer.status = status_of(tracker_.add(tracked, tracked.time_s).status);
   if (!is_taken(answer.status)) {
     counters_ = before;
@@ -153,7 +153,7 @@ void TargetStage::look_at_targets(bool newest) {
   for (const Target& target : tracker_.targets()) {
     if (target.identity == 0 || target.detection < 0) continue;
     TargetLook& look = looks_[target.identity];
-    // What a late frame changes of the past the newest frame's boxes need not say again.
+    // If a late frame changes the past, the newest frame's boxes need not be counted again.
     if (!newest && look.scale > 0) continue;
     const DetectionBox& box = boxes_[static_cast<std::size_t>(target.detection)];
     look.score = box.score;

@@ -1,8 +1,9 @@
 #pragma once
-// TargetStage: frames' detections in, targets out. Each frame is taken with its record: its camera and orientation give each box its place
-// (frame_view.h), the tracker the rest (core/tracking/target_tracker.h). A frame that is refused changes nothing. A box that is of no use
-// (BoxFault), or tells no place on the plane, is left out and counted. A frame may be late: history_s and history_frames. Equal calls
-// give equal results. For one thread; allocates.
+// TargetStage: makes targets from frames' detections. The frame's record, with camera and
+// orientation, gives each box its place (frame_view.h); the tracker does the rest
+// (core/tracking/target_tracker.h). A frame that is refused changes nothing. A box that cannot be
+// used (BoxFault), or has no place on the plane, is left out and counted. A frame may come late,
+// within history_s and history_frames. Deterministic. For one thread; allocates.
 
 #include <deque>
 #include <map>
@@ -15,21 +16,22 @@
 
 namespace alidade {
 
-// Whether a frame can be taken, and which of its boxes are left out, as far as itself shows. Any thread.
+// Any thread: whether the frame can be taken, and which of its boxes are left out, judged by the
+// frame alone.
 [[nodiscard]] DetectionAnswer check_detections(const DetectedFrame& frame,
                                                const TargetOptions& options);
 
 class TargetStage {
  public:
-  // options are valid; plane: null on the sphere.
+  // options: valid. plane: null on the sphere.
   TargetStage(const TargetOptions& options, std::shared_ptr<const PlaneEstimate> plane);
 
   DetectionAnswer add(const DetectedFrame& frame);
 
-  // One that was refused before it came here.
+  // Counts a frame that was refused before it came here.
   void count(DetectionStatus status) { counters_.count(status); }
 
-  // With what was counted. updates is 0 before the first frame, whose record then means nothing.
+  // Includes the counters. updates is 0 before the first frame; `record` is then meaningless.
   [[nodiscard]] TargetsState state() const;
 
  private:
@@ -43,9 +45,9 @@ class TargetStage {
   TargetCounters counters_;
   std::int64_t updates_ = 0;
   OrientationRecord newest_;
-  std::deque<double> taken_s_;  // times of the frames that were taken lately
+  std::deque<double> taken_s_;  // s, times of the frames taken lately
   std::map<std::uint64_t, TargetLook> looks_;
-  // Of the frame at hand, and of the newest: boxes that tell a place.
+  // Boxes with a place: of the present frame, and of the newest one.
   std::vector<DetectionBox> chosen_, boxes_;
   std::vector<TargetMeasurement> measured_;
 };

@@ -1,5 +1,5 @@
 #pragma once
-// TargetsState: all targets after a frame's detections, as it is handed on: an immutable value.
+// TargetsState: all targets after a frame's detections, as an immutable value to pass on.
 
 #include <array>
 #include <cstdint>
@@ -14,17 +14,17 @@
 namespace alidade {
 
 struct TargetCounters {
-  std::array<std::int64_t, kDetectionStatusCount> frames{};  // by what became of them
-  // Of frames that were taken. Those that are of no use:
+  std::array<std::int64_t, kDetectionStatusCount> frames{};  // by outcome
+  // Boxes of frames that were taken. Those that cannot be used:
   std::array<std::int64_t, kBoxFaultCount> boxes_unusable{};
   std::int64_t boxes_taken = 0;
-  // Those that say nothing of a target's place:
+  // Those that do not show a target's place:
   std::int64_t boxes_below_score = 0;
-  std::int64_t boxes_cut_off =
-      0;  // by the picture's lower edge: on a plane, their foot is not seen
-  std::int64_t boxes_without_place =
-      0;  // above the horizon or too near to it, or where the lens has no direction
-  std::int64_t births_refused = 0;  // as tracker.max_targets were there
+  // By the picture's lower edge: on a plane, their foot is not seen.
+  std::int64_t boxes_cut_off = 0;
+  // Above the horizon or too near to it, or where the lens has no direction.
+  std::int64_t boxes_without_place = 0;
+  std::int64_t births_refused = 0;  // because there were tracker.max_targets
 
   void count(DetectionStatus status) { ++frames[static_cast<std::size_t>(status)]; }
   [[nodiscard]] std::int64_t of(DetectionStatus status) const {
@@ -38,26 +38,26 @@ struct TargetCounters {
     const char* words;  // for people
     std::int64_t boxes;
   };
-  // All boxes of frames that were taken, by what became of them; those that were taken first.
+  // All boxes of frames that were taken, by outcome; those taken first.
   [[nodiscard]] std::vector<BoxCount> boxes() const;
 };
 
-// In one line for people: frames, refusals and boxes that were left out, with the reasons.
+// One line for people: frames, refusals and boxes left out, with the reasons.
 [[nodiscard]] std::string detections_text(const TargetCounters& counters);
 
-// How a target was when it was last seen.
+// The appearance of a target when it was last seen.
 struct TargetLook {
-  std::string name;   // class that most of its detections have lately
-  double weight = 0;  // of that against other classes
+  std::string name;   // class of most of its recent detections
+  double weight = 0;  // of that class against the others
   double score = 0;   // of the last detection
   double width = 0;   // px, of its box
   double height = 0;  // px
-  double scale = 0;   // px a metre there, or px a radian
-  Matrix2<double> shared_cov = Matrix2<double>::Zero();  // m^2 or rad^2: of calibration and plane
+  double scale = 0;   // px per metre at its place, or px per radian
+  Matrix2<double> shared_cov = Matrix2<double>::Zero();  // m^2 or rad^2, of calibration and plane
 };
 
 struct TrackedTarget {
-  Target target;  // with an identity
+  Target target;  // its identity is set
   TargetLook look;
 };
 
@@ -66,9 +66,9 @@ struct TargetsState {
   TargetSpace space = TargetSpace::kPlane;
   double acceleration_density = 0;
   std::shared_ptr<const PlaneEstimate> plane;  // null on the sphere
-  double time_s = 0;                           // of the targets: middle row of the record's frame
-  OrientationRecord record;                    // of the newest frame that was taken
-  std::vector<TrackedTarget> targets;          // by identity
+  double time_s = 0;                   // s, of the targets: middle row of the record's frame
+  OrientationRecord record;            // of the newest frame taken
+  std::vector<TrackedTarget> targets;  // sorted by identity
   TargetCounters counters;
 };
 

@@ -1,6 +1,6 @@
 #pragma once
-// Semaphore: how one thread wakes another without either holding a lock. post() never waits, so the
-// real-time thread may call it; wait() sleeps until a post. POSIX semaphore (a futex underneath).
+// Semaphore: wakes another thread without a lock. post() never waits, so the real-time thread may
+// call it; wait() sleeps until a post. POSIX semaphore (a futex underneath).
 
 #include <semaphore.h>
 
