@@ -105,7 +105,7 @@ bool make_frame_orientation(const Calibration& calibration, double time_s, Orien
         camera_at_row(calibration.camera, motion, calibration.line_delay, 0.0);
   }
   out->zoom_rate = motion.zoom_rate;
-  out->zoom_rate_sigma = 0;
+  out->zoom_rate_sigma.reset();
   out->angle = angle;
   out->rate = rate;
   out->acceleration = motion.acceleration;

@@ -54,7 +54,7 @@ struct FrameOrientation {
   // rad/s^2, true, constant during the frame; 0 in PT mode, which has its effect in the covariance
   PanTilt<double> acceleration;
   double zoom_rate = 0;        // 1/s, d log f / dt; the calibration's camera is that of row 0
-  double zoom_rate_sigma = 0;  // 1/s, where the frame tells it; 0: the lens is taken as at rest
+  std::optional<double> zoom_rate_sigma;  // 1/s; none: the lens is taken as at rest
   MotionCovariance motion_covariance = MotionCovariance::Zero();  // WITHOUT the calibration's part
   Sensitivity<6> motion_sensitivity = Sensitivity<6>::Zero();     // which this tells
   Matrix3<double> R_base_from_camera = r_frd_from_rdf<double>();

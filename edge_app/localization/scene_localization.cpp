@@ -51,7 +51,7 @@ MotionDoubt motion_doubt_of(const OrientationRecord& record, const FrameOrientat
   // Where telemetry alone answers, nothing shows whether the lens moves.
   const bool is_zoom_untold = frame.mode == OrientationMode::kPt && record.zoom.has_value();
   out.log_f = is_zoom_untold ? kUnknownMotion.log_f
-                             : std::hypot(read_out_of(calibration) * frame.zoom_rate_sigma,
+                             : std::hypot(read_out_of(calibration) * frame.zoom_rate_sigma.value_or(0),
                                           delay_sigma * frame.zoom_rate);
   return out;
 }

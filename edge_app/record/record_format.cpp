@@ -10,86 +10,14 @@
 #include <iterator>
 #include <optional>
 #include <string_view>
-#include <type_traits>
 #include <utility>
+
+#include "edge_app/record/record_fields.h"
 
 namespace alidade {
 namespace {
 
-constexpr double kReferenceRow = 0;         // at which angles, rates and q hold
 constexpr std::size_t kLongestLine = 2048;  // bytes that most lines do not exceed
-
-template <std::size_t kSize>
-using Columns = std::array<const char*, kSize>;
-constexpr Columns<4> kQ = {"q_x", "q_y", "q_z", "q_w"};
-constexpr Columns<2> kCentre = {"centre_offset_u_px", "centre_offset_v_px"};
-// "localized." in JSON, "localized_" in CSV.
-constexpr Columns<2> kLocalized = {"age_s", "sigma_rad"};
-constexpr Columns<3> kSigma = {"orientation_sigma_rad_0", "orientation_sigma_rad_1",
-                               "orientation_sigma_rad_2"};
-constexpr Columns<9> kCovariance = {
-    "orientation_covariance_rad2_0", "orientation_covariance_rad2_1",
-    "orientation_covariance_rad2_2", "orientation_covariance_rad2_3",
-    "orientation_covariance_rad2_4", "orientation_covariance_rad2_5",
-    "orientation_covariance_rad2_6", "orientation_covariance_rad2_7",
-    "orientation_covariance_rad2_8"};
-
-// All fields in their order, each to line.add(name, value) or line.add(name, columns, values).
-template <class Line>
-void add_fields(const OrientationRecord& record, Line* line) {
-  using Orientation = OrientationRecord::Orientation;
-  // A member of the orientation, if there is one.
-  const auto of_orientation = [&record](auto member) {
-    using Member = std::decay_t<decltype(std::declval<Orientation>().*member)>;
-    return record.orientation ? std::optional<Member>((*record.orientation).*member) : std::nullopt;
-  };
-  line->add("frame", record.frame);
-  line->add("time_s", record.time_s);
-  line->add("receive_time_s", record.receive_time_s);
-  line->add("mode", std::string_view(to_string(record.mode)));
-  line->add("status", std::string_view(to_string(record.status)));
-  line->add("calibrated", record.calibrated);
-  line->add("calibration", std::string_view(to_string(record.calibration.activity)));
-  std::optional<std::string_view> needs;
-  if (record.calibration.need != CalibrationNeed::kNothing)
-    needs = to_string(record.calibration.need);
-  line->add("needs", needs);
-  line->add("pan_rad", of_orientation(&Orientation::pan_rad));
-  line->add("tilt_rad", of_orientation(&Orientation::tilt_rad));
-  line->add("pan_rate_rad_s", of_orientation(&Orientation::pan_rate_rad_s));
-  line->add("tilt_rate_rad_s", of_orientation(&Orientation::tilt_rate_rad_s));
-  line->add("pan_acceleration_rad_s2", of_orientation(&Orientation::pan_acceleration_rad_s2));
-  line->add("tilt_acceleration_rad_s2", of_orientation(&Orientation::tilt_acceleration_rad_s2));
-  line->add("q_base_from_camera", kQ, of_orientation(&Orientation::q_base_from_camera));
-  line->add("orientation_sigma_rad", kSigma, of_orientation(&Orientation::sigma_rad));
-  line->add("orientation_covariance_rad2", kCovariance,
-            of_orientation(&Orientation::covariance_rad2));
-  line->add("reference_row", kReferenceRow);
-  line->add("landmarks", std::int64_t{record.landmarks});
-  line->add("residual_px", record.residual_px);
-  line->add("line_delay_s", record.camera.line_delay);
-  line->add("focal_length_px", record.camera.focal_length);
-  line->add("focal_length_sigma_px", std::sqrt(record.camera.covariance[0]));
-  line->add("aspect", record.camera.aspect);
-  line->add("radial_distortion", record.camera.radial_distortion);
-  line->add("centre_offset_px", kCentre,
-            std::optional(std::array<double, 2>{record.camera.centre_u, record.camera.centre_v}));
-  line->add("latency_s", record.latency_s);
-  line->add("telemetry_age_s", record.telemetry_age_s);
-  line->add("zoom", record.zoom);
-  std::optional<double> zoom_rate;
-  std::optional<double> zoom_rate_sigma;
-  if (record.orientation && record.orientation->geometry.zoom_rate_sigma > 0) {
-    zoom_rate = record.orientation->geometry.zoom_rate;
-    zoom_rate_sigma = record.orientation->geometry.zoom_rate_sigma;
-  }
-  line->add("zoom_rate_per_s", zoom_rate);
-  line->add("zoom_rate_sigma_per_s", zoom_rate_sigma);
-  std::optional<std::array<double, 2>> localized;
-  if (record.localized) localized = {{record.localized->age_s, record.localized->sigma_rad}};
-  line->add_object("localized", kLocalized, localized);
-  line->add("time_sigma_s", record.time_s ? std::optional(record.time_sigma_s) : std::nullopt);
-}
 
 // One line, in memory of its own; what has no value is said by the word that the kind of line has for that.
 class Text {

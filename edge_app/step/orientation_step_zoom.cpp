@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "core/realtime/oe_mode/lens_track.h"
 #include "edge_app/step/orientation_step.h"
 
 namespace alidade {
@@ -12,7 +13,6 @@ namespace {
 // Standard deviations between a zoom reading and the focal length that images show. Beyond them the
 // reading is wrong.
 constexpr double kExcluded = 5;
-constexpr double kLongest_s = 0.5;  // without landmarks, as LensTrackOptions::longest_s
 
 }  // namespace
 
@@ -63,7 +63,7 @@ bool OrientationStep::look_up_lens(double telemetry_time_s, FrameLens* lens) {
   }
   read_lens_ = lens->calibration;
   const double age_s = telemetry_time_s - found_time_s_;
-  if (!(age_s < kLongest_s)) found_focal_length_ = 0;
+  if (!(age_s < LensTrackOptions().longest_s)) found_focal_length_ = 0;
   if (!(found_focal_length_ > 0)) reading_excluded_ = false;
   FrameLens found;
   if (found_focal_length_ > 0 && (reading_excluded_ || reading_jumps(age_s)) &&
@@ -74,7 +74,7 @@ bool OrientationStep::look_up_lens(double telemetry_time_s, FrameLens* lens) {
 }
 
 bool OrientationStep::lens_as_found(double age_s, FrameLens* lens) const {
-  if (!(found_focal_length_ > 0) || !(age_s < kLongest_s)) return false;
+  if (!(found_focal_length_ > 0) || !(age_s < LensTrackOptions().longest_s)) return false;
   if (!lens_of_focal_length(options_.zoom_curve,
                             found_focal_length_ * std::exp(found_rate_ * age_s), lens)) {
     return false;

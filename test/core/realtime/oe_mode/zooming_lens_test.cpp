@@ -124,8 +124,9 @@ TEST_F(ZoomingLens, IsFollowedOverTwoOctavesAndBackToRest) {
                                         camera_->camera().lens_at(middle_s - 1e-3).focal_length) /
                                2e-3;
     EXPECT_NEAR(frame_.zoom_rate, middle_rate, 0.02) << k;
-    ASSERT_GT(frame_.zoom_rate_sigma, 0) << k;
-    rate_squares += std::pow((frame_.zoom_rate - middle_rate) / frame_.zoom_rate_sigma, 2);
+    ASSERT_TRUE(frame_.zoom_rate_sigma) << k;
+    ASSERT_GT(*frame_.zoom_rate_sigma, 0) << k;
+    rate_squares += std::pow((frame_.zoom_rate - middle_rate) / *frame_.zoom_rate_sigma, 2);
   }
   EXPECT_GT(moving, 40);
   EXPECT_LT(std::sqrt(rms_square / moving), 0.05);
