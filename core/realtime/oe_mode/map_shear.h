@@ -22,8 +22,9 @@ namespace alidade {
 
 struct MapShearOptions {
   double longest_s = 0.5;  // s, > 0; longest time between neighbouring frames
-  // > 0; error by which a surprise is allowed for. Missing derivatives of the polynomial have a
-  // thirtieth of the surprise as effect, a jerk between two frames up to several times that.
+  // > 0; share of a surprise that counts as error of the curve. Derivatives that the polynomial
+  // lacks cause a thirtieth of their surprise, a jerk between two frames up to several times as
+  // much.
   double of_surprise = 1.0 / 6;
   double max_surprise = 25;  // chi-square, 2 degrees of freedom, > 0; gate of a correction
   double doubt = 2;  // >= 1; factor for the variance of rate and acceleration if it is rejected
