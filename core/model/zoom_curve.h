@@ -1,9 +1,8 @@
 #pragma once
 // ZoomCurve: a calibration for any zoom reading z of a lens, interpolated between calibrations at
 // some readings, its nodes.
-//   y(z) = (log f, kappa, c_u, c_v);   kappa = k (R / f)^2: distortion in the corner, R half the
-//                                      image's diagonal (px)
-//   x = (z - z_first) / (z_last - z_first)
+//   y(z) = (log f, kappa, c_u, c_v);   kappa = k (R / f)^2: distortion in the corner,
+//   R half the image's diagonal (px);  x = (z - z_first) / (z_last - z_first)
 //   y_j(z) = level_j + Gaussian process in x with the covariance of ZoomSmoothness
 // Line delay, axes, scales, aspect and clock offset are the same at all readings
 // (kSharedParameters). A lens does not return exactly: each movement offsets log f by eps ~ N(0,

@@ -1,14 +1,12 @@
 #pragma once
 // FrameOrientation: the camera's orientation while one frame was exposed, from whichever mode found
-// it. It gives the direction of each pixel.
-//   R_base_from_camera at row 0 (PTCEE 45), angular velocity (PTCEE 46), and for any row v
-//   direction = R_base_from_camera(angle + rate t + acceleration t^2 / 2) unproject(u),  t = v *
-//   line_delay   (PTCEE 26, 27, and beyond)
+// it: R_base_from_camera at row 0 (PTCEE 45), angular velocity (PTCEE 46), and for any row v
+//   direction = R_base_from_camera(angle + rate t + acceleration t^2 / 2) unproject(u),
+//   t = v * line_delay   (PTCEE 26, 27, and beyond)
 // Angles are TRUE (rad): the measured ones divided by the calibrated scales. Frames: base b (FRD),
 // camera c (RDF). An orientation is perturbed as R Exp(xi), xi in the camera frame (PTCEE 5).
-// Pixels are continuous; the centre of the top-left one is (0.5, 0.5).
-// Covariances are first-order and contain the calibration's. No allocation; plain values; any
-// number of threads may read one.
+// Pixels are continuous; the centre of the top-left one is (0.5, 0.5). Covariances are first-order
+// and contain the calibration's. No allocation; plain values; any number of threads may read one.
 
 #include <Eigen/Geometry>
 #include <cstdint>

@@ -3,8 +3,7 @@
 // Angles are true (pan, tilt), rad.
 //   outer angle = telemetry's angle + z      z: telemetry's zero in the outer base
 //   outer angle = map angle + s              s: OE mode's map in the outer base
-//   z = s - o                                o: the map's offset against telemetry
-//   (map_offset_filter.h), not changed here
+//   z = s - o                                o: map_offset_filter.h's offset, not changed here
 // A measurement of a frame answered by landmarks gives s; one of a frame answered by telemetry
 // gives z. If the map begins anew, z remains. Before the first measurement z is exactly 0: the base
 // is telemetry's. Of two measurements, the one with the smaller covariance in the present view is

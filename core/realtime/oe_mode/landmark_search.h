@@ -1,15 +1,11 @@
 #pragma once
-// LandmarkSearch: finds the map's landmarks in a frame, from a predicted motion. Lists and counts
-// use these words:
-//   visible  the motion puts them into the image
-//            visible_landmarks.h
-//            the first few of each coarse octave correct pan and tilt together
-//            coarse_alignment.h (PTCEE 30, 31)
-//   chosen   visible fine ones to look for
-//            landmark_choice.h
+// LandmarkSearch: finds the map's landmarks in a frame, from a predicted motion. Coarse ones first
+// correct pan and tilt together (coarse_alignment.h, PTCEE 30, 31). Names of the stages of fine
+// ones:
+//   visible  the motion puts them into the image             visible_landmarks.h
+//   chosen   visible ones to look for                        landmark_choice.h
 //   found    chosen ones aligned one by one, with rolling shutter (PTCEE 32, 33)
-//   inlier   found ones that agree with the solution
-//            orientation_solve.h
+//   inlier   found ones that agree with the solution         orientation_solve.h
 // A landmark's patch is kept as this view shows it. It is prepared again when the view has changed
 // enough; until then positions are corrected for the change (docs/oe_mode.md).
 // The constructor takes all memory; nothing else allocates, waits or throws. One thread.

@@ -1,17 +1,14 @@
 #pragma once
 // LensScale: phi, the difference of log f from the map's calibration, as a lens does not return
-// exactly to its zoom curve (zoom_curve.h). Learnt together with the map's offset g, as telemetry
-// ties the two.
-//   f(phi) = f exp(phi),   k(phi) = k exp(2 phi)   constant distortion in the corner; an exact k
-//                          stays
-//   d / d phi = S a of all that has a Sensitivity S,   a = (f, 2 k or 0) at the parameters f and k,
-//   else 0
+// exactly to its zoom curve (zoom_curve.h). Learnt with the map's offset g, as telemetry ties the
+// two.
+//   f(phi) = f exp(phi),   k(phi) = k exp(2 phi): same distortion in the corner; an exact k stays
+//   d / d phi = S a of all that has a Sensitivity S;  a = (f, 2 k or 0) at parameters f, k, else 0
 // Errors: those of the calibration are a phi + e; e, of covariance `others`, is independent of what
 // follows. (g, phi) have their own noise plus their sensitivity times e. Landmarks and motions are
 // stored for phi = 0; S a is their change with phi.
 // Once the lens has moved (lens_track.h), phi is the scale of the map's directions. A frame's
-// camera then has its own f times exp(phi), and LensColumns converts its parameter columns. Plain
-// values; no allocation.
+// camera then has its own f times exp(phi); see LensColumns. Plain values; no allocation.
 
 #include "core/model/calibration.h"
 #include "core/realtime/oe_mode/covariance.h"

@@ -4,11 +4,10 @@
 // f is the one with which the map's landmarks fit at phi = 0 (lens_scale.h); the camera's is f
 // exp(phi). While the lens moves, each frame alone determines it to some 1e-5. A frame's prior is
 // the previous state, extrapolated:
-//   log f' = log f + rate dt,   rate' = rate,   both driven by an acceleration that is constant
-//                               between two frames, white from frame to frame.
-// At rest it is learnt once, as landmarks of neighbouring frames have the same error
-// (variance_inflation(), covariance.h).
-// Fixed memory; no allocation. One thread.
+//   log f' = log f + rate dt,   rate' = rate
+// Both are driven by an acceleration that is constant between two frames and white from frame to
+// frame. At rest l is learnt once, as landmarks of neighbouring frames have the same error
+// (variance_inflation(), covariance.h). Fixed memory; no allocation. One thread.
 
 #include "core/model/calibration.h"
 #include "core/realtime/oe_mode/covariance.h"

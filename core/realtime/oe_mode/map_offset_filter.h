@@ -58,7 +58,7 @@ struct OffsetInnovation {
   Vector2<double> value = Vector2<double>::Zero();       // rad
   Matrix2<double> covariance = Matrix2<double>::Zero();  // rad^2, from noise
   Matrix2<double> shared_covariance =
-      Matrix2<double>::Zero();                               // rad^2, by what the landmarks share
+      Matrix2<double>::Zero();  // rad^2, from the landmarks' common error
   Matrix2<double> by_calibration = Matrix2<double>::Zero();  // rad^2, see SolvedZoom
   Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
   Vector2<double> by_lens = Vector2<double>::Zero();  // rad per unit of phi; see MapOffset::learn()
@@ -73,7 +73,7 @@ struct PendingFrame {
   Matrix2<double> covariance =
       Matrix2<double>::Zero();  // rad^2, of angle, from noise and map shear
   Matrix2<double> shared_covariance =
-      Matrix2<double>::Zero();                               // rad^2, by what the landmarks share
+      Matrix2<double>::Zero();  // rad^2, from the landmarks' common error
   Matrix2<double> by_calibration = Matrix2<double>::Zero();  // rad^2, see SolvedZoom
   Sensitivity<2> sensitivity = Sensitivity<2>::Zero();       // of angle
 };

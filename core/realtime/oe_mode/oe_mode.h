@@ -1,16 +1,12 @@
 #pragma once
 // OeMode: a frame's orientation from telemetry and landmarks, to a few hundredths of a pixel (PTCEE
-// sections V-A, V-C). One estimator for OE and PT: without landmarks the solution is telemetry's,
-// with its covariance. If landmarks contradict telemetry beyond both covariances, the answer is
-// telemetry's with a covariance that covers both, and the mode is PT.
-// The map begins empty, in the frame of the first telemetry, or is handed over by another OeMode.
+// sections V-A, V-C). Derivation: docs/oe_mode.md. Steps: see process() and maintain().
+// One estimator for OE and PT: without landmarks the solution is telemetry's, with its covariance.
+// If landmarks contradict telemetry beyond both covariances, the answer is telemetry's with a
+// covariance that covers both, and the mode is PT.
 // Map, offset and answer carry their dependence on the calibration (Sensitivity). The answer's
 // covariance includes the calibration's.
-// A zoom curve's focal length is learnt too (lens_scale.h). Such a lens may also move
-// (lens_follower.h). From outside, a frame's orientation in another base may be given later
-// (base_tie.h).
 // Fixed memory, taken by the constructor; nothing else allocates, waits or throws. One thread.
-// Derivation: docs/oe_mode.md. Steps: see process() and maintain().
 
 #include <cstddef>
 #include <cstdint>
@@ -73,7 +69,8 @@ class OeMode {
   OeMode(const OeMode&) = delete;
   OeMode& operator=(const OeMode&) = delete;
 
-  // Begins anew with an empty map. Real-time safe.
+  // Begins anew with an empty map, which starts in the frame of the first telemetry. Real-time
+  // safe.
   void reset(const Calibration& calibration, FocalLength focal_length = FocalLength::kCalibrated);
   // The same with this map: made with this calibration, by this mount, with no restart since that
   // moved its zero. OE mode starts with its first frame. Invalid landmarks, and those without room,
@@ -85,18 +82,12 @@ class OeMode {
              FocalLength focal_length = FocalLength::kCalibrated);
 
   // Steps:
-  //   1 predict pan and tilt from telemetry or, without it, the previous frame
-  //   motion_prediction.h
-  //   2 coarse alignment in pan and tilt, coarse to fine (PTCEE 30, 31)
-  //   landmark_search.h
-  //   3 choose landmarks, project them with rolling shutter, align (PTCEE 32, 33)
-  //   landmark_search.h
-  //   4 solve angle, rate, acceleration and the map's offset robustly, with
-  //     telemetry as prior (PTCEE 35). If few hold, repeat 3 and 4 from where
-  //     the previous frame leads
-  //     orientation_solve.h
-  //   5 answer, and learn the map's offset
-  //   map_offset_filter.h
+  //   1 predict pan and tilt from telemetry or the previous frame   motion_prediction.h
+  //   2 coarse alignment in pan and tilt (PTCEE 30, 31)             landmark_search.h
+  //   3 choose landmarks, align them, rolling shutter (32, 33)      landmark_search.h
+  //   4 solve motion and offset robustly, telemetry as prior (35)   orientation_solve.h
+  //     If few hold, repeat 3 and 4 from where the previous frame leads.
+  //   5 answer, and learn the map's offset                          map_offset_filter.h
   // frame_time_s: t0, row 0 on the image clock. at_middle_row: telemetry at t0 + clock_offset +
   // line_delay * height / 2; null if there is none. The image must outlive the next maintain().
   // *out is written with every status but kNoPrediction and kNotFinite.
@@ -106,12 +97,14 @@ class OeMode {
                                  const InterpolatedPanTilt* at_middle_row, FrameOrientation* out) {
     return process(image, frame_time_s, at_middle_row, nullptr, out);
   }
-  // The same for a zooming lens, with FocalLength::kLearnt. lens: what is known of it; null:
-  // nothing new. If it is missing or wrong, the previous frames and the image determine f as far as
-  // they can. Frames of a lens that moves solve log f and its rate too, and look for landmarks in
-  // the octaves that show them at about their size. The map stays; it begins with a lens at rest.
-  // Distortion and centre come from `lens`, along its curve to the image's f. If its focal length
-  // is excluded (reading_sigmas), the caller passes the curve's at the f that was found.
+  // The same for a lens with a zoom curve and FocalLength::kLearnt. Its focal length is learnt from
+  // the first frame on (lens_scale.h), and it may move (lens_follower.h). Frames of a moving lens
+  // solve log f and its rate too, and look for landmarks in the octaves that show them at about
+  // their size. The map stays; it begins with a lens at rest.
+  // lens: what is known of it; null: nothing new. If it is missing or wrong, the previous frames
+  // and the image determine f as far as they can. Distortion and centre come from `lens`, along its
+  // curve to the image's f. If its focal length is excluded (reading_sigmas), the caller passes the
+  // curve's at the f that was found.
   [[nodiscard]] OeStatus process(const ImageView& image, double frame_time_s,
                                  const InterpolatedPanTilt* at_middle_row, const FrameLens* lens,
                                  FrameOrientation* out);
@@ -139,8 +132,9 @@ class OeMode {
   // Telemetry's clock began anew: earlier times cannot be asked for any more.
   void forget_pending();
 
-  // Announces a measurement of the last frame's orientation. Replaces an earlier one. False if the
-  // frame has no answer.
+  // Announces a measurement of the last frame's orientation in an outer base, such as a scene
+  // map's. Replaces an earlier one. False if the frame has no answer. Once measured, all answers,
+  // also PT's, are in that base, whatever becomes of map and calibration (base_tie.h).
   bool ask_about_base() { return tie_.ask(); }
   // The measurement. False if what is known is better, or none was announced.
   bool settle_base(const BaseMeasurement& measurement) {

@@ -1,12 +1,10 @@
 #pragma once
 // Solves the orientation of one frame from landmarks found in it, with telemetry as prior (PTCEE
-// 35, and beyond).
-//   x = (angle, rate, acceleration) of pan and tilt at the reference row, map's frame; g = (pan,
-//   tilt) offset, base minus map
-//   landmarks:  found - predicted = J (dx_angle + t dx_rate + t^2/2 dx_acceleration) + noise, t the
-//               row's time
-//   telemetry:  angle = x_angle + g, rate = x_rate.   Priors: small accelerations, g from earlier
-//               frames
+// 35, and beyond). Unknowns: x = (angle, rate, acceleration) of pan and tilt at the reference row,
+// map's frame; g = (pan, tilt) offset, base minus map. Priors: small accelerations; g from earlier
+// frames.
+//   found - predicted = J (dx_angle + t dx_rate + t^2/2 dx_acceleration) + noise, t the row's time
+//   telemetry's angle = x_angle + g,   its rate = x_rate
 // A learnt focal length adds phi (LensScale), a lens that has moved adds its own l (ZoomPrior). The
 // calibration is taken as exact; Sensitivity carries the dependence on it.
 // Pure functions; no allocation. Derivation: docs/oe_mode.md.
