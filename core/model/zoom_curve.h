@@ -31,8 +31,8 @@ inline constexpr std::array<Parameter, 9> kSharedParameters = {
     Parameter::kPanScale, Parameter::kTiltScale, Parameter::kClockOffset};
 inline constexpr int kSharedCount = static_cast<int>(kSharedParameters.size());
 
-// Covariance of the process y_j, with L, S, q in the unit of the quantity; x is 0 to 1 over the
-// nodes:
+// Covariance of the process y_j. L, S, q are the members, in the unit of the quantity; x is 0 to 1
+// over the nodes:
 //   K(x, x') = L^2 + S^2 (x - 1/2)(x' - 1/2) + q^2 W(x + 1, x' + 1),   W(s, t) = m^2 (3 M - m) / 6,
 //   m, M = min, max(s, t)
 // W is that of a twice integrated random walk (Wahba 1978). Its mean is a cubic spline. Its

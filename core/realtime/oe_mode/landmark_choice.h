@@ -1,14 +1,14 @@
 #pragma once
 // LandmarkChoice: selects the visible fine landmarks to look for in a frame. choose() is the only
-// place that decides it. README.md of this folder lists what a change of it touches.
+// place that decides it. What a change of it touches: docs/landmark_choice.md.
 // If at most max_chosen fine landmarks are visible, all are chosen, in their order. Otherwise the
 // image is divided into columns x rows parts. The most reliable landmark of each part comes first,
 // with a stride between parts, so that a small max_chosen is spread over the image too. The
 // remaining room goes to the others in their order. The same inputs give the same choice, as it is
 // repeated within a frame.
 // Reliability is the share of matches when looked for (rule of succession), halved for each coarser
-// octave, which has half the resolution.
-// The constructor takes all memory; nothing else allocates. One thread.
+// octave, which has half the resolution. The constructor takes all memory; nothing else allocates.
+// One thread.
 
 #include <cstdint>
 #include <vector>
