@@ -16,7 +16,7 @@ constexpr std::size_t kLandmarksAhead = 2;
 // Difference of two predicted positions that are accurate to a pixel.
 constexpr double kSameView_px = 2;
 
-// Factor of a warp by which a zoom changes it ahead, before it is prepared again.
+// Factor on a warp: the zoom expected until the patch is prepared again.
 float zoomed_ahead(const SearchedFrame& frame, float tolerance) {
   if (!frame.zooms) return 1;
   constexpr double kAhead_s = 0.1;  // of a slow zoom

@@ -29,7 +29,7 @@ struct LookOptions {
   int few = 10;
   int few_coarse = 5;
 
-  // False and one line in *error (if not null) when a value is not valid.
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
@@ -49,7 +49,7 @@ struct OeOptions {
   MapUpkeepOptions upkeep;
   LandmarkMakerOptions maker;
 
-  // False and one line in *error (if not null) when a value is not valid.
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
