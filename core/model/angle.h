@@ -1,11 +1,11 @@
 #pragma once
-// Pan and tilt angles (rad) on the torus, without seams: a difference goes the short way round.
-//   wrap_angle(x)    the angle in [-pi, pi) that differs from x by whole turns; an x already there
-//                    is returned unchanged, bit by bit; NaN and infinities give NaN
-//   plus(p, xi)      wrap(p + xi)                                                     (PTCEE 13)
-//   minus(q, p)      wrap(q - p)                                                      (PTCEE 14)
-// The paper's complex numbers of unit length (PTCEE 12) are replaced by the wrap. All Jacobians are
-// the identity, that of minus with respect to p its negative (PTCEE 15).
+// Pan and tilt angles (rad) with wrap-around: a difference takes the short way round.
+//   wrap_angle(x)   x in [-pi, pi), by whole turns. An x already there comes back bit for bit.
+//                   NaN and infinity give NaN.
+//   plus(p, xi)     wrap(p + xi)   (PTCEE 13)
+//   minus(q, p)     wrap(q - p)    (PTCEE 14)
+// The wrap replaces the paper's complex numbers of unit length (PTCEE 12). All Jacobians are the
+// identity, except that of minus with respect to p, which is its negative (PTCEE 15).
 // Pan is positive to the right, tilt positive upwards. No allocation.
 
 #include <cmath>

@@ -1,22 +1,12 @@
 #pragma once
-// ArrivalPace: do the items of a stream come at their sender's pace, or are they a backlog?
-//
+// ArrivalPace: detects whether a stream's items come at their sender's pace or are a backlog.
 //   receive_i - sender_i = constant + delay_i + age_i
-//
-// Behind a stall (a relay, a network or a process that stood still) items wait, and then come faster than they were
-// sent: receive - sender falls until the last that waited is here. What it will fall to nobody knows while it falls, so
-// nobody knows the age of an item. The pace is shown by two neighbouring halves of a window: the least
-// receive - sender of the one is that of the other, and neither is a single item's. Minima, as delays are only ever too
-// long; that they agree to tolerance is asked for at both sides, as one that rises is a new stall.
-//   tolerance  kSame_s, or 3 standard deviations of the least of a half's n delays, were they exponential: their mean
-//              above the least, divided by n; what waited by more than kBacklog_s is no delay. A steady fall by D between
-//              the halves has a mean of D / 2 above the least, so 3 D / (2 n), and is no pace for any D beyond kSame_s: at
-//              the shortest window a backlog that is worked off 0.8 % faster than it grows.
-//   windows    kLeastHalf_s and its doubles, so that slow streams and delays with a rhythm (key frames) have theirs.
-//              Where a backlog was seen, from the double on: what remains of it may come more slowly. Unless something else
-//              tells that it is over, too.
-// A stream that is late by a constant cannot be told from a network with that delay.
-// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are seconds.
+// After a stall (a relay, a network or a process that stood still) items wait and then come faster
+// than they were sent. receive - sender falls until the last waiting item is here. Nobody knows
+// while it falls where it will end, so an item's age is unknown. A stream that is late by a
+// constant cannot be told from a network with that delay.
+// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are
+// seconds.
 
 #include <algorithm>
 #include <array>
@@ -33,10 +23,10 @@ class ArrivalPace {
   static constexpr double kBacklog_s = 0.1;  // longer waits are no jitter
   static constexpr double kLeastHalf_s = 0.25;
 
-  // The stretch of items that shows the pace, without what was left of a backlog.
+  // The run of items that shows the pace, without the rest of a backlog.
   struct Shown {
-    std::size_t first = 0;  // of the items kept
-    double least_s = 0;     // its least receive - sender
+    std::size_t first = 0;  // index among the items kept
+    double least_s = 0;     // its minimum of receive - sender
   };
 
   void restart() {
@@ -44,7 +34,7 @@ class ArrivalPace {
     greatest_s_ = -std::numeric_limits<double>::infinity();
   }
 
-  // Finite values. An item that was overtaken teaches nothing; one that is far back is of another clock.
+  // Values must be finite. An overtaken item is ignored. One far back is of another clock: restart.
   void add(double receive_s, double sender_s) {
     if (size_ > 0 && !(sender_s > item(size_ - 1).sender_s)) {
       if (sender_s > item(size_ - 1).sender_s - kOvertaken_s) return;
@@ -59,8 +49,14 @@ class ArrivalPace {
     greatest_s_ = std::max(greatest_s_, receive_s - sender_s);
   }
 
-  // By the items up to the last one; none: not shown, or no more. In windows with halves of least_half_s or more.
-  // no_backlog: something else tells that the last one did not wait.
+  // Judges the items up to the last one. Empty: the pace is not shown, or no longer. It is shown if
+  // the minima of receive - sender in two neighbouring halves of a window agree to the tolerance,
+  // each confirmed by a second item. Minima, as delays only ever add; in both directions, as a rise
+  // is a new stall. Halves are kLeastHalf_s and its doubles, so that slow streams and delays with a
+  // rhythm (key frames) have one that fits.
+  // least_half_s: the shortest half used. After a backlog the shortest window is not used, as the
+  // rest of a backlog may come more slowly. no_backlog: something else shows that the last item did
+  // not wait, so it is used.
   [[nodiscard]] std::optional<Shown> shown(double least_half_s = kLeastHalf_s,
                                            bool no_backlog = false) const {
     if (size_ < 2 * kLeastItems) return std::nullopt;
@@ -82,12 +78,12 @@ class ArrivalPace {
     return std::nullopt;
   }
 
-  // Has an item since the restart waited for so much longer than those of this level?
+  // True if an item since the restart waited longer than those at this level by longer_s.
   [[nodiscard]] bool saw_backlog(double least_s, double longer_s = kBacklog_s) const {
     return greatest_s_ > least_s + longer_s;
   }
 
-  // The latest items, oldest first.
+  // The latest items, oldest first; s.
   [[nodiscard]] std::size_t size() const { return size_; }
   [[nodiscard]] double receive_s(std::size_t i) const { return item(i).receive_s; }
   [[nodiscard]] double sender_s(std::size_t i) const { return item(i).sender_s; }
@@ -96,6 +92,11 @@ class ArrivalPace {
   static constexpr std::size_t kItems = 128;
   static constexpr std::size_t kLeastItems = 2;  // in a half
   static constexpr int kWindows = 6;             // up to 8 s
+  // Tolerance: kSame_s, or 3 standard deviations of a half's minimum of n exponential delays: their
+  // mean above the minimum, divided by n. Waits of more than kBacklog_s are no delays.
+  // A steady fall by D between the halves has a mean of D / 2 above the minimum, so the tolerance
+  // is 3 D / (2 n): such a fall is no pace for any D beyond kSame_s. At the shortest window this is
+  // a backlog that is worked off 0.8 % faster than it grows.
   static constexpr double kSame_s = 2e-3;
   static constexpr double kNear_s = 5e-3;
   static constexpr double kOvertaken_s = 1;
@@ -108,9 +109,9 @@ class ArrivalPace {
     std::size_t first = 0;
     std::size_t items = 0;
     double least_s = std::numeric_limits<double>::infinity();
-    double second_s = std::numeric_limits<double>::infinity();  // the least but one
-    double spread_s = 0;  // standard deviation of the least, were the delays exponential
-    // Not a moment on the way down.
+    double second_s = std::numeric_limits<double>::infinity();  // the second lowest
+    double spread_s = 0;  // standard deviation of the minimum if the delays are exponential
+    // True if the minimum is not a moment in a fall.
     [[nodiscard]] bool stands() const {
       return items >= kLeastItems && second_s - least_s <= std::max(kNear_s, spread_s);
     }
@@ -135,7 +136,7 @@ class ArrivalPace {
     double n = 0;
     for (std::size_t i = half.first; i < end; ++i) {
       const double above_s = level(i) - half.least_s;
-      if (above_s > kBacklog_s) continue;  // no delay, and one such would pass for a wide spread
+      if (above_s > kBacklog_s) continue;  // not a delay: one such would look like a wide spread
       sum_s += above_s;
       ++n;
     }

@@ -1,8 +1,8 @@
 #pragma once
-// One calibration of a camera at one zoom: the parameters of the model, and how well each is known.
-// The parameters are numbered by Parameter, the order of rows and columns of every covariance and
-// parameter Jacobian of Alidade. An axis has two numbers, its change (rad) in its own tangent_basis
-// (direction.h). SI units; see the members. Plain values; no allocation.
+// One calibration of a camera at one zoom: the parameters of the model and their covariance.
+// Parameter numbers the parameters. This is the order of rows and columns of every covariance and
+// parameter Jacobian in Alidade. An axis has two parameters: its change (rad) in its own
+// tangent_basis (direction.h). SI units; see the members. Plain values; no allocation.
 
 #include <algorithm>
 #include <cmath>
@@ -73,9 +73,10 @@ inline constexpr int kParameterCount = static_cast<int>(Parameter::kCount);
 template <class S>
 using ParameterCovariance = Matrix<S, kParameterCount, kParameterCount>;
 
-// d x / d Parameter of n numbers that are estimated with a calibration: how they come out by another
-// one from the same measurements. Sensitivity * covariance * Sensitivity^T is what the calibration's error
-// adds to theirs ("consider" covariance, Schmidt 1966).
+// dx / d Parameter of n numbers x that were estimated with a calibration. It says how x changes if
+// the same measurements are evaluated with another calibration. The calibration's error adds
+// Sensitivity * covariance * Sensitivity^T to the covariance of x ("consider" covariance, Schmidt
+// 1966).
 template <int n>
 using Sensitivity = Matrix<double, n, kParameterCount>;
 
@@ -85,10 +86,10 @@ struct Calibration {
   Mechanics<double> mechanics;
   double clock_offset = 0;     // s: telemetry clock = image clock + clock_offset
   std::optional<double> zoom;  // device units at which this calibration holds
-  // Zero rows are parameters taken as exact.
+  // A zero row marks a parameter that is taken as exact.
   ParameterCovariance<double> covariance = ParameterCovariance<double>::Zero();
 
-  // Whether the optical centre is anything but the image's middle exactly.
+  // False only if the optical centre is exactly the image's middle: offset and variance are 0.
   [[nodiscard]] bool has_centre() const {
     return camera.centre_u != 0 || camera.centre_v != 0 ||
            covariance(index(Parameter::kCentreU), index(Parameter::kCentreU)) != 0 ||
@@ -96,17 +97,18 @@ struct Calibration {
   }
 };
 
-// One standard deviation, in the unit of the parameter; a variance that rounding left negative counts as 0.
+// One standard deviation, in the unit of the parameter. A variance that rounding made negative
+// counts as 0.
 [[nodiscard]] inline double parameter_sigma(const Calibration& calibration, Parameter parameter) {
   return std::sqrt(std::max(0.0, calibration.covariance(index(parameter), index(parameter))));
 }
 
-// Of the focal length over itself, which is that of its logarithm.
+// sigma of the focal length divided by the focal length, which is the sigma of log f.
 [[nodiscard]] inline double relative_focal_length_sigma(const Calibration& calibration) {
   return parameter_sigma(calibration, Parameter::kFocalLength) / calibration.camera.focal_length;
 }
 
-// Of any parameter that is a number by itself: all but the axes', which give 0, as they are counted from the axis.
+// Value of a parameter. The four axis parameters give 0: they are changes from the axis.
 [[nodiscard]] inline double parameter_value(const Calibration& calibration, Parameter parameter) {
   switch (parameter) {
     case Parameter::kFocalLength:

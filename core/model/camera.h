@@ -2,17 +2,11 @@
 // The base camera: perspective with one term of radial distortion (PTCEE 28, 29), RDF frame.
 //   x = (d_1, d_2) / d_3,   s = 1 + k |x|^2
 //   u = f x_1 s + w/2 + c_u,      v = alpha f x_2 s + h/2 + c_v
-// Pixels are continuous, the centre of the top-left pixel is at (0.5, 0.5). The image's border
-// plays no part: pixels outside it have directions too. At one zoom the optical centre's offset c can
-// hardly be told from a turn by c / f, and is taken as 0; over several zooms it shows.
-// The inverse needs no iteration. With r_d = |x| s and q = k r_d^2, the ratio m = |x| / r_d solves
-// m + q m^3 = 1, so it is a function of q alone:
-//   q > 0: m = sinh(asinh(y)/3) 3/y,   q < 0: m = sin(asin(y)/3) 3/y,   y = sqrt(27 |q| / 4).
-// Neither cancels, so m keeps its relative accuracy for any q; about q = 0, where the derivative of
-// y is singular, a series stands in.
-// For k < 0 the model turns back at 3 |k| |x|^2 = 1 (y = 1): no direction beyond has a pixel, no
-// pixel beyond has a direction.
+// Pixels are continuous; the centre of the top-left pixel is (0.5, 0.5). Pixels outside the image
+// have directions too. For k < 0 the model turns back at 3 |k| |x|^2 = 1: no direction beyond has a
+// pixel, and no pixel beyond has a direction. Both ways are closed forms.
 // Domain: f > 0, alpha > 0. Outputs are written with kOk only. No allocation.
+// Derivation: docs/derivations.md.
 
 #include <cmath>
 
@@ -23,12 +17,12 @@ namespace alidade {
 
 template <class S>
 struct Camera {
-  S focal_length = S(1);       // f, px, of the horizontal direction
+  S focal_length = S(1);       // px; f, of the horizontal direction
   S aspect = S(1);             // alpha = f_v / f_u
   S radial_distortion = S(0);  // k
   int width = 0;               // px
   int height = 0;              // px
-  S centre_u = S(0);           // c, px: of the optical centre from the image's middle
+  S centre_u = S(0);           // px; c, optical centre minus the image's middle
   S centre_v = S(0);
 
   template <class T>
@@ -42,18 +36,18 @@ struct Camera {
     centre_u = c.x();
     centre_v = c.y();
   }
-  // px, of the image
+  // px, in the image
   [[nodiscard]] Vector2<S> optical_centre() const {
     return {S(width) / S(2) + centre_u, S(height) / S(2) + centre_v};
   }
-  // (f / R)^2, R half the image's diagonal, px: k of a lens whose distortion in the corner, kappa, is 1.
+  // k / kappa = (f / R)^2. kappa is the distortion in the corner, R half the image's diagonal (px).
   [[nodiscard]] S distortion_of_corner() const {
     const S per_corner = focal_length / S(0.5 * std::hypot(width, height));
     return per_corner * per_corner;
   }
 };
 
-// f, alpha, k, c_u, c_v: the first of Parameter.
+// f, alpha, k, c_u, c_v: the first five of Parameter.
 inline constexpr int kCameraParameterCount = 5;
 
 namespace internal {

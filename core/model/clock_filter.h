@@ -1,27 +1,13 @@
 #pragma once
-// ClockFilter: from jittery arrival times to the times at which a steady clock ticked.
-//
-//   receive_i = offset + rate * sender_i + delay_i        (host CLOCK_MONOTONIC, seconds)
-//
-// sender_i is the sender's clock in seconds (RTP, device time; rate = 1 + skew) or a count (V4L2
-// sequence; rate = period). The filter estimates the line and answers line(sender_i) with its
-// standard deviation. A constant least delay cannot be seen: the line contains it, and so does the
-// clock offset d that the visual calibration estimates; hence the line must not step.
-//   kOneSided   a packet is never early: one_sided_clock.h.
-//   kSymmetric  zero-mean noise: symmetric_clock.h.
-// Bad input, in the order in which it is looked for:
-//   not finite   rejected: answered by the receive time, or the last answer.
-//   wild         sender backwards or receive before the line by restart_gap_s, or after it by ten
-//                times that. Rejected, answered from the receive time; the third in a row starts a
-//                new line (restarted).
-//   step of the minimum delay
-//                one-sided only: for settle_s every item stays above the line, or some come before
-//                it, by more than min_delay_step_s and by a steady amount. Flagged once and subtracted
-//                from all later receive times, so the line goes on for as long as it takes; its
-//                sigma grows by what the step is uncertain. While warming up the line moves where it falls,
-//                and keeps where it rises, unless an early item had dragged it down.
-// Lost items are gaps in sender; repeated and reordered items are answered and teach nothing.
-// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. Beyond PTCEE 20, 21.
+// ClockFilter: turns jittery receive times into the times at which a steady clock ticked.
+//   receive_i = offset + rate * sender_i + delay_i        (host CLOCK_MONOTONIC, s)
+// sender_i is the sender's clock (s; RTP or device time; rate = 1 + skew) or a count (V4L2
+// sequence; rate = period). Answers line(sender_i) with its standard deviation. Beyond PTCEE 20,
+// 21.
+// The constant minimum delay is not observable: it stays in the line and in the calibrated clock
+// offset d. So the line must not step. kOneSided, items are never early: one_sided_clock.h;
+// kSymmetric, zero-mean noise: symmetric_clock.h. Bad input: accept().
+// Fixed memory, trivially copyable, no allocation, no exceptions; one thread.
 
 #include <algorithm>
 #include <cmath>
@@ -51,7 +37,7 @@ class ClockFilter {
     return accept(receive_time_s, static_cast<double>(sequence), sequence_rate_prior(options_));
   }
 
-  // Host time of any sender time (or count), by the line so far. 0 before the first item.
+  // Host time of any sender time or count, by the present line. 0 before the first item.
   double to_host(double sender) const {
     return started_ ? anchor_receive_ + line().value_at(sender - anchor_sender_) : 0.0;
   }
@@ -61,23 +47,23 @@ class ClockFilter {
     return is_one_sided() ? sigma_at(one_sided_, x) : sigma_at(symmetric_, x);
   }
 
-  // Seconds of host clock per second of sender clock, less one; or the period of a counted stream.
+  // skew: host seconds per sender second, minus 1. period_s: period of a counted stream.
   double skew() const { return line().slope - 1; }
   double period_s() const { return line().slope; }
 
-  // Sum of the steps since the start: what the minimum delay is, less what it was at first.
+  // Sum of the steps since the start: the present minimum delay minus the first one.
   double delay_shift_s() const { return is_one_sided() ? one_sided_.shift_s() : 0.0; }
-  // Receive time of the first item after the last step that delay_stepped announced.
+  // Receive time of the first item after the last step that was flagged by delay_stepped.
   double delay_shift_since_s() const { return is_one_sided() ? one_sided_.shift_since_s() : 0.0; }
-  // What the steps so far have made uncertain; contained in every sigma.
+  // Standard deviation of delay_shift_s(). Every sigma contains it.
   double delay_shift_sigma_s() const {
     return is_one_sided() ? std::sqrt(one_sided_.shift_variance()) : 0.0;
   }
 
-  // Mean delay above the least one (one-sided) or sigma of the noise (symmetric).
+  // Mean delay above the minimum (one-sided), or sigma of the noise (symmetric).
   double jitter_s() const { return is_one_sided() ? one_sided_.jitter_s() : symmetric_.jitter_s(); }
 
-  // For a reconnection that the caller knows of. The next item starts a new line.
+  // For a reconnection that the caller knows of: the next item starts a new line.
   void restart() {
     ++counters_.restarts;
     announce_restart_ = true;
@@ -91,7 +77,7 @@ class ClockFilter {
   ClockState state() const { return state_; }
 
  private:
-  static constexpr double kMaxSpan_s = 1e12;  // beyond it differences of stamps mean nothing
+  static constexpr double kMaxSpan_s = 1e12;  // differences of stamps beyond it mean nothing
   static constexpr int kWildToRestart = 3;    // in a row
   static constexpr double kGate = 6;          // sigmas
 
@@ -100,6 +86,14 @@ class ClockFilter {
     return is_one_sided() ? one_sided_.line() : symmetric_.line();
   }
 
+  // Bad input, in the order of the checks:
+  //   not finite  Rejected. The answer is the receive time, or the last answer if that is not
+  //               finite.
+  //   wild        See is_wild(). Rejected; the answer comes from the receive time. The third in a
+  //               row starts a new line (restarted).
+  //   step of the minimum delay, one-sided only
+  //               See one_sided_clock.h. Flagged once; the line does not step.
+  // Lost items are gaps in sender. Repeated and reordered items are answered but teach nothing.
   ClockEstimate accept(double receive, double sender, const ClockRatePrior& prior) {
     return is_one_sided() ? accept(&one_sided_, receive, sender, prior)
                           : accept(&symmetric_, receive, sender, prior);
@@ -173,6 +167,8 @@ class ClockFilter {
     return {receive, x, receive - anchor_receive_, sigma_at(clock, x), x > last_x_};
   }
 
+  // Sender backwards by restart_gap_s, receive time before the line by restart_gap_s, or after it
+  // by ten times that. Both limits at the line are at least 6 and 60 sigma.
   template <class Clock>
   bool is_wild(const Clock& clock, const internal::ClockItem& item) const {
     if (!(std::abs(item.x) < kMaxSpan_s && std::abs(item.y) < kMaxSpan_s)) {
@@ -184,8 +180,8 @@ class ClockFilter {
            residual > 10 * gate;
   }
 
-  // Besides the line's own: the wander of the skew since the last item and within a window (docs/clocks.md),
-  // the resolution of the stamps, and the steps of the minimum delay.
+  // Variance of the line, plus: the wander of the skew since the last item and within the window
+  // (docs/clocks.md), the resolution of the stamps, and the steps of the minimum delay.
   template <class Clock>
   double sigma_at(const Clock& clock, double x) const {
     const LineEstimate& line = clock.line();
@@ -205,13 +201,13 @@ class ClockFilter {
   int wild_ = 0;
   double last_time_ = 0;
 
-  // The lines are in seconds since these, so that a double resolves far below a microsecond.
+  // The lines count from these, so that a double resolves far below a microsecond.
   double anchor_receive_ = 0;
   double anchor_sender_ = 0;
   double first_receive_ = 0;
   double last_x_ = 0;
 
-  // The options say which of the two serves.
+  // options_.jitter selects which of the two is used.
   internal::OneSidedClock<Capacity> one_sided_;
   internal::SymmetricClock symmetric_;
 };

@@ -1,13 +1,13 @@
 #pragma once
-// smooth_clock(): ClockFilter's task for a whole recording. Every item is judged by what came before and after it,
-// so its time is better known than the filter can know it. Same model, options and flags as
-// clock_filter.h, which runs first and finds the bad items, restarts and steps of the minimum delay; then every
-// stretch of the recording gets the line of the window around it:
+// smooth_clock(): ClockFilter's task for a whole recording, better known by what comes after an
+// item. Same model, options and flags as clock_filter.h, which first finds bad items, restarts and
+// steps. Then each part of the recording gets the line of the window around it:
 //   kOneSided   Bayesian lower line (lower_line.h) over window_s.
-//   kSymmetric  least squares with Huber weights over the window at which noise and wander of the
-//               skew balance: noise^2 / (item rate * window) = skew_wander^2 * window^3 / 140 (docs/clocks.md).
-// delay_stepped marks the first item with the new minimum delay (in the filter: the item that proved it).
-// Rejected items keep what the filter said. Allocates nothing: the caller lends all arrays.
+//   kSymmetric  least squares with Huber weights. The window balances noise and wander of the skew:
+//               noise^2 / (item rate * window) = skew_wander^2 * window^3 / 140 (docs/clocks.md).
+// delay_stepped marks the first item with the new minimum delay; in the filter, the item that
+// proves it. Rejected items keep the filter's answer. Allocates nothing: the caller lends all
+// arrays.
 
 #include <algorithm>
 #include <array>
@@ -54,17 +54,17 @@ class ClockSmoother {
         judge_after = kNever;
       }
       if (estimate.rejected) {
-        y_[i] = i > begin ? y_[i - 1] : 0.0;  // only for the order in time
+        y_[i] = i > begin ? y_[i - 1] : 0.0;  // only to keep the order in time
         continue;
       }
       y_[i] = receive_[i] - shift;
-      estimate.sigma_s = filter.delay_shift_sigma_s();  // until smooth() adds the line's
+      estimate.sigma_s = filter.delay_shift_sigma_s();  // smooth() adds the line's sigma later
       if (estimate.state == ClockState::kWarmingUp) {
         estimate.time_s = y_[i];
       } else if (judge_after == kNever) {
         judge_after = receive_[i] + 2 * options_.settle_s;
       } else if (receive_[i] >= judge_after) {
-        // The first line that no early item of the warm-up can have dragged down.
+        // The first line that an early item of the warm-up cannot have dragged down.
         for (std::size_t j = begin; j < i; ++j) {
           if (receive_[j] < judge_after && !estimates_[j].rejected) {
             estimates_[j].time_s = filter.to_host(sender_(j));
@@ -85,19 +85,19 @@ class ClockSmoother {
 
  private:
   static constexpr std::size_t kSlots = 256;
-  static constexpr std::size_t kLeastItems = 32;  // of a window, as far as there are as many
+  static constexpr std::size_t kLeastItems = 32;  // of a window, if there are so many
   static constexpr int kIterations = 4;
   static constexpr double kNever = -1;
 
   bool one_sided() const { return options_.jitter == ClockJitter::kOneSided; }
 
-  // May item i teach? time_s holds the best line so far.
+  // True if item i may be used for the line. time_s holds the best line so far.
   bool usable(std::size_t i) const {
     return !estimates_[i].rejected &&
            !(one_sided() && y_[i] < estimates_[i].time_s - options_.min_delay_step_s);
   }
 
-  // The minimum delay stepped at receive time `since`, as item `last` proved.
+  // Item `last` proved that the minimum delay stepped at receive time `since`.
   void back_date_step(std::size_t begin, std::size_t last, double step, double since) {
     const double sigma = estimates_[last].sigma_s;
     estimates_[last].delay_stepped = false;
@@ -112,7 +112,7 @@ class ClockSmoother {
       } else if (step > 0 || receive_[j] < since - options_.settle_s / 10) {
         break;
       }
-      // Before a fall the last items may have either minimum delay: raised they do no harm.
+      // The last items before a fall may have either minimum delay. Raising them does no harm.
       y_[j] -= step;
     }
     estimates_[first].delay_stepped = true;
@@ -135,12 +135,12 @@ class ClockSmoother {
           140 * noise_ * noise_ / (items_per_s * options_.skew_wander * options_.skew_wander),
           0.25);
     }
-    window = std::min(window, last_time - first_time);  // also where skew_wander is 0
+    window = std::min(window, last_time - first_time);  // also if skew_wander is 0
 
     std::size_t low = begin;
     std::size_t high = begin;
     for (std::size_t from = begin; from < end;) {
-      // The line serves a quarter of its window, in the middle where there is data on both sides.
+      // The line is used for the middle quarter of its window, with data on both sides.
       std::size_t to = from + 1;
       while (to < end && y_[to] < y_[from] + window / 4) {
         ++to;
@@ -170,7 +170,7 @@ class ClockSmoother {
     anchor_receive_ = y_[from];
     LineEstimate line;
     if (!(one_sided() ? fit_one_sided(a, b, &line) : fit_symmetric(a, b, &line))) {
-      return;  // nothing but rejected items
+      return;  // only rejected items
     }
     const double span = y_[b - 1] - y_[a];
     const double wander = options_.skew_wander * options_.skew_wander * span * span * span /
@@ -195,7 +195,7 @@ class ClockSmoother {
     const double slot_width = (y_[b - 1] - y_[a]) / (kSlots - 1);
     double slope = rate_;
     double scale = options_.expected_jitter_s;
-    // The slope decides which item of a slot is the lowest, and the scale how wide the line is.
+    // The slope decides which item of a slot is the lowest. The scale sets the line's uncertainty.
     for (int k = 0; k < kIterations; ++k) {
       std::size_t slots = 0;
       double slot_end = -std::numeric_limits<double>::infinity();
@@ -265,7 +265,7 @@ class ClockSmoother {
         }
       }
       if (k >= 2) {
-        // Mean of the logarithm: outliers cannot carry it away. E log|N(0,1)| = -0.635.
+        // Mean logarithm, which outliers cannot carry away. E log|N(0,1)| = -0.635.
         constexpr double kGuessWeight = 2;
         const double freedom = n > 2 ? 0.5 * std::log(n / (n - 2)) : 0.0;
         noise = std::exp((kGuessWeight * std::log(options_.expected_jitter_s) + log_sum +
@@ -289,7 +289,7 @@ class ClockSmoother {
   const double* receive_;
   const std::size_t n_;
   ClockEstimate* estimates_;
-  double* y_;  // receive times, steps of the minimum delay taken out
+  double* y_;  // receive times without the steps of the minimum delay
   double rate_ = 1;
   double noise_ = 0;
   double anchor_sender_ = 0;
@@ -298,7 +298,7 @@ class ClockSmoother {
 
 }  // namespace internal
 
-// estimates[i] for item i of n, in order of arrival; scratch: room for n values.
+// Writes estimates[0 .. n-1], one for each item in order of arrival. scratch: room for n values.
 inline void smooth_clock(const ClockFilterOptions& options, const double* receive_time_s,
                          const double* sender_time_s, std::size_t n, ClockEstimate* estimates,
                          double* scratch) {

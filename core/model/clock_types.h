@@ -1,6 +1,6 @@
 #pragma once
-// What the clock filters take and give: options, the prior of a clock's rate, the answer for one item.
-// Plain structs; all times are seconds of the host's clock.
+// Input and output of the clock filters: options, prior of a clock's rate, answer for one item.
+// Plain structs. All times are seconds of the host's clock.
 
 #include <cmath>
 #include <cstdint>
@@ -15,17 +15,17 @@ enum class ClockJitter {
 struct ClockFilterOptions {
   ClockJitter jitter = ClockJitter::kOneSided;
   double window_s = 60;               // host time that the line of kOneSided remembers
-  double nominal_period_s = 0;        // of a sequence; 0 = unknown: estimated
-  double nominal_period_sigma_s = 0;  // 0 = max_skew * nominal_period_s
+  double nominal_period_s = 0;        // of a sequence; 0: unknown, estimated
+  double nominal_period_sigma_s = 0;  // 0: max_skew * nominal_period_s
   double max_skew = 200e-6;           // |rate - 1| of a sender clock
   double skew_wander = 1.5e-7;        // 1/sqrt(s): random walk of the skew
   double expected_jitter_s = 5e-3;    // first guess, soon outweighed by the data
-  double stamp_resolution_s = 1e-6;   // of the stamps, e.g. 1/90000 for RTP
-  double min_delay_step_s = 1e-3;     // smaller steps of the minimum delay are followed
-  double settle_s = 10;               // time to lock, and to confirm a step of the minimum delay
-  double restart_gap_s = 1;           // a step of the sender clock that no network explains
+  double stamp_resolution_s = 1e-6;   // of the stamps, such as 1/90000 for RTP
+  double min_delay_step_s = 1e-3;     // the line follows smaller steps of the minimum delay
+  double settle_s = 10;               // until lock, and to confirm a step of the minimum delay
+  double restart_gap_s = 1;           // step of the sender clock that no network explains
 
-  // False and one line in *error (if not null) when a value is out of its range.
+  // False if a value is out of range. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const {
     const auto positive = [](double v) { return std::isfinite(v) && v > 0; };
     const auto not_negative = [](double v) { return std::isfinite(v) && v >= 0; };
@@ -48,8 +48,7 @@ struct ClockFilterOptions {
   }
 };
 
-// What is known of the rate before the first item: uniform in rate +- half_range. Host seconds per sender
-// second, or per count.
+// Prior of the rate: uniform in rate +- half_range. Host seconds per sender second or per count.
 struct ClockRatePrior {
   double rate;
   double half_range;
@@ -70,7 +69,7 @@ inline ClockRatePrior sequence_rate_prior(const ClockFilterOptions& options) {
 }
 
 enum class ClockState {
-  kWarmingUp,  // usable, sigma_s says how well; the line may still move by more than min_delay_step_s
+  kWarmingUp,  // usable; the line may still move by more than min_delay_step_s
   kLocked      // settle_s of data seen, and sigma_s below min_delay_step_s
 };
 
@@ -78,9 +77,9 @@ struct ClockEstimate {
   double time_s = 0;   // filtered host time of this item; always finite
   double sigma_s = 0;  // one standard deviation of time_s
   ClockState state = ClockState::kWarmingUp;
-  bool rejected = false;   // stamps unusable: time_s comes from the receive time or the last item
-  bool restarted = false;  // this item is the first after a restart
-  bool delay_stepped = false;  // this item proves that the minimum delay stepped; not followed
+  bool rejected = false;       // stamps unusable: time_s is from the receive time or last item
+  bool restarted = false;      // this item is the first after a restart
+  bool delay_stepped = false;  // this item proves a step of the minimum delay; not followed
 };
 
 struct ClockCounters {
@@ -92,14 +91,14 @@ struct ClockCounters {
 
 namespace internal {
 
-// One item as a line sees it: relative to the item the line began with, so that a double resolves far below
-// a microsecond.
+// One item relative to the first item of the line, so that a double resolves far below a
+// microsecond.
 struct ClockItem {
   double receive_s;  // as stamped
   double x;          // sender seconds, or counts
   double y;          // host seconds
   double sigma_s;    // of the line at x, before this item
-  bool newer;        // x is beyond all before it; others teach nothing
+  bool newer;        // x is beyond all earlier ones; other items do not update the line
 };
 
 }  // namespace internal

@@ -1,13 +1,13 @@
 #pragma once
-// CubicSpline<N, Derived>: N coordinates over time as a cubic (4th-order) B-spline with free knots (Oth 1, section 4.1).
+// CubicSpline<N, Derived>: N coordinates over time as a cubic (4th-order) B-spline with free knots
+// (Oth 1, section 4.1).
 //   x(t) = sum_{i=0..3} w_i(t) c_{s+i},   s the segment with knot_s <= t < knot_{s+1}
-// c_j are control points. The weights of a segment are
-// cubic polynomials of (t - knot_s) / (knot_{s+1} - knot_s) by the recursion of Cox and de Boor.
-// Before the first and after the last knot the end segments' polynomials go on. A knot can be
-// inserted anywhere without changing the curve (Boehm), which is how segments are split where the
-// motion needs it (Oth, section 4.2). For batch estimators: unlike all else here it allocates, in the constructor and in
-// split(). Free of shared state.
-// Derived: the class that is made of it, which split() gives.
+// c_j are control points. The weights w_i are cubic polynomials of (t - knot_s) / (knot_{s+1} -
+// knot_s), by the recursion of Cox and de Boor. Before the first and after the last knot, the end
+// segments' polynomials continue. split() inserts knots without changing the curve (Boehm; Oth,
+// section 4.2).
+// For batch estimators: the constructor and split() allocate. No shared state. Derived is the
+// subclass, the type that split() returns.
 
 #include <algorithm>
 #include <cstddef>
@@ -17,7 +17,7 @@
 
 namespace alidade {
 
-// The four weights of control points segment .. segment + 3, and their derivatives (1/s).
+// Weights of control points segment .. segment + 3, and their derivatives (1/s).
 struct SplineBasis {
   int segment = 0;
   Vector4<double> weight;
@@ -32,7 +32,8 @@ class CubicSpline {
 
   CubicSpline() = default;
 
-  // One segment between each two knots, all control points 0. Needs two knots or more, increasing.
+  // One segment between neighbouring knots; all control points 0. Needs two or more knots,
+  // increasing.
   explicit CubicSpline(const std::vector<double>& knots_s) {
     const double first_length = knots_s[1] - knots_s[0];
     const double last_length = knots_s.back() - knots_s[knots_s.size() - 2];
@@ -49,7 +50,7 @@ class CubicSpline {
   [[nodiscard]] double begin_s() const { return knot(0); }
   [[nodiscard]] double end_s() const { return knot(segments()); }
 
-  // hint is the likely segment; any value is allowed.
+  // hint: the likely segment. Any value is allowed.
   [[nodiscard]] int segment_at(double time_s, int hint = 0) const {
     const int last = segments() - 1;
     hint = std::clamp(hint, 0, last);
@@ -65,7 +66,7 @@ class CubicSpline {
     return basis_in(segment_at(time_s, hint), time_s);
   }
 
-  // By the polynomials of this segment, also where the time lies in another.
+  // Uses the polynomials of this segment, even if the time lies in another.
   [[nodiscard]] Basis basis_in(int segment, double time_s) const {
     Basis result;
     result.segment = segment;
@@ -96,7 +97,7 @@ class CubicSpline {
     return control_points_[static_cast<std::size_t>(i)];
   }
 
-  // The same curve with a knot more in the middle of each of these segments, given in increasing order.
+  // The same curve with one more knot in the middle of each given segment. Indices must increase.
   [[nodiscard]] Derived split(const std::vector<int>& segments_to_split) const {
     Derived result = static_cast<const Derived&>(*this);
     result.insert_knots(segments_to_split);
@@ -105,7 +106,7 @@ class CubicSpline {
 
  private:
   void insert_knots(const std::vector<int>& segments_to_split) {
-    // Right to left, so that the indices of the segments still to come hold.
+    // From right to left, so that the indices of the remaining segments stay valid.
     for (auto it = segments_to_split.rbegin(); it != segments_to_split.rend(); ++it) {
       const int s = *it;
       const double t = 0.5 * (knot(s) + knot(s + 1));
@@ -135,13 +136,13 @@ class CubicSpline {
     for (std::size_t s = 0; s < segments; ++s) {
       const double* t = &knots_[s + 3];  // t[0] <= time < t[1]
       const double length = t[1] - t[0];
-      // Row i of B: the i-th of the degree + 1 splines that live here, in powers of x.
+      // Row i of B: the i-th of the degree + 1 splines that are nonzero here, in powers of x.
       Matrix4<double> B = Matrix4<double>::Zero();
       B(0, 0) = 1;
       for (int degree = 1; degree <= 3; ++degree) {
         Matrix4<double> next = Matrix4<double>::Zero();
         for (int i = 0; i < degree; ++i) {
-          // Spline i of the lower degree starts at a, ends at b; it passes its share on to both.
+          // Spline i of the lower degree is nonzero from a to b. It contributes to two splines.
           const double a = t[i + 1 - degree];
           const double b = t[i + 1];
           const double slope = length / (b - a);
@@ -158,7 +159,7 @@ class CubicSpline {
     }
   }
 
-  std::vector<double> knots_;  // three more before the first segment and after the last
+  std::vector<double> knots_;  // with three extra before the first segment and after the last
   std::vector<Point> control_points_;
   std::vector<Matrix4<double>> from_power_;  // weights = from_power_[segment] (1, x, x^2, x^3)
 };

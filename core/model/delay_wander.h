@@ -1,20 +1,12 @@
 #pragma once
-// DelayWander: do the items of a stream leave the line of its clock, and by how much?
-//
-//   lateness_i = receive_i - line(sender_i): where the line holds, the least of a window is 0 but for chance
-//
-// The least delay of a stream is constant, or it steps (MinimumDelayStep). Where it rises and falls for ever, either the delay
-// wanders, as behind a relay whose buffer fills and empties, or the sender's stamps do, and arrivals tell the time
-// better than the line. Stamps alone cannot tell which: so much of an item's time is not known.
-//   off the line  the least lateness of two neighbouring parts of a window is beyond the gate, and beyond chance: were the n
-//                 delays exponential, with the least m and the mean m + s, then m > c s would happen with the odds
-//                 (1 + c)^-(n - 1), which kOdds sets to e^-10. Or two items come before the line by more than the gate:
-//                 nothing is early. By how much: the greater of the parts' least, and once more their difference, as the
-//                 latest item is farther than either.
-//   windows       of parts of kPart_s, which follow, and of kLongPart_s, which see what jitter hides from the others.
-//   wanders       it is off the line by kWander_s for more than kShare of the time, of the last kMemory_s. What was seen
-//                 then fades no faster than that: what wanders comes back to the line, and leaves it again.
-// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are seconds of the host's clock.
+// DelayWander: detects whether a stream's items leave the line of its clock repeatedly, and how
+// far.
+//   lateness_i = receive_i - line(sender_i); its minimum over a window is about 0 on the line
+// The minimum delay is constant, or it steps (MinimumDelayStep). If it rises and falls for ever,
+// one of two wanders: the delay, as behind a relay whose buffer fills and empties, or the stamps,
+// and arrivals tell the time better than the line. Stamps alone cannot tell which, so the distance
+// from the line is an uncertainty of an item's time (docs/clocks.md).
+// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. Host clock, seconds.
 
 #include <algorithm>
 #include <array>
@@ -26,15 +18,17 @@ namespace alidade {
 
 class DelayWander {
  public:
+  // Two windows: parts of kPart_s follow quickly, parts of kLongPart_s see what jitter hides from
+  // those.
   static constexpr double kPart_s = 0.25;
   static constexpr double kLongPart_s = 1;
   static constexpr double kWander_s = 1e-3;
   static constexpr double kMemory_s = 20;
 
-  // The line is another one. What was seen before is not forgotten.
+  // For a new line. What was seen before is kept.
   void restart() { windows_ = {{{kPart_s, {}, {}}, {kLongPart_s, {}, {}}}}; }
 
-  // receive_s: in order. gate_s: what the line itself leaves open, >= 0.
+  // receive_s: in order. gate_s: the line's own uncertainty, >= 0.
   void add(double receive_s, double lateness_s, double gate_s) {
     const double since_s = std::max(0.0, receive_s - last_s_);
     last_s_ = receive_s;
@@ -44,13 +38,15 @@ class DelayWander {
       now_s_ = std::max(now_s_, window.off_s(gate_s));
     }
     seen_s_ = std::max(now_s_, seen_s_ * std::exp(-since_s / kMemory_s));
-    // A silence is one part at most.
+    // A silence counts as one part at most.
     const double off = now_s_ > kWander_s ? 1 : 0;
     share_ += (off - share_) * std::min(since_s, kPart_s) / kMemory_s;
   }
 
+  // True if the stream was off the line by kWander_s for more than kShare of the last kMemory_s.
   [[nodiscard]] bool wanders() const { return share_ > kShare; }
-  // By how much an item may be off the line, as of the last one.
+  // How far an item may be off the line, as of the last item. Fades by kMemory_s if the stream
+  // wanders.
   [[nodiscard]] double off_s() const { return wanders() ? seen_s_ : now_s_; }
 
  private:
@@ -62,7 +58,7 @@ class DelayWander {
     double since_s = 0;
     double items = 0;
     double least_s = std::numeric_limits<double>::infinity();
-    double second_s = std::numeric_limits<double>::infinity();  // the least but one
+    double second_s = std::numeric_limits<double>::infinity();  // the second lowest
     double sum_s = 0;
 
     void add(double receive_s, double lateness_s) {
@@ -87,7 +83,13 @@ class DelayWander {
       young.add(receive_s, lateness_s);
     }
 
-    // 0: it is on the line.
+    // Distance from the line; 0: on the line. Off the line means one of two things:
+    // - The minimum lateness of both parts is beyond the gate and beyond chance. If n exponential
+    // delays have the minimum m and the mean m + s, m > c s has odds of (1 + c)^-(n - 1). kOdds
+    // sets them to e^-10.
+    // - Two items come before the line by more than the gate, as nothing is early.
+    // The distance is the larger minimum of the parts, plus their difference: the latest item is
+    // farther off than either.
     [[nodiscard]] double off_s(double gate_s) const {
       if (old.items == 0) return 0;
       const double items = old.items + young.items;
@@ -97,7 +99,7 @@ class DelayWander {
       const double second_s =
           std::min(std::max(old.least_s, young.least_s), std::min(old.second_s, young.second_s));
       if (least_s <= late_s && second_s >= -gate_s) return 0;
-      // A part that has just begun says too little of its least.
+      // A part that has just begun has too few items for its minimum.
       const double now_s = young.items >= kLeastItems ? young.least_s : old.least_s;
       return std::max(std::abs(old.least_s), std::abs(now_s)) + std::abs(now_s - old.least_s);
     }

@@ -1,15 +1,14 @@
 #pragma once
-// S^2: directions d, unit 3-vectors, and their tangent planes (PTCEE 8 to 11).
+// S^2: directions d (unit 3-vectors) and their tangent planes (PTCEE 8 to 11).
 //   tangent_basis    B_d = [d x h / |d x h|,  d x (d x h) / |d x (d x h)|]           (PTCEE 9)
-//                    with h the coordinate axis least aligned with d
+//                    h is the coordinate axis least aligned with d, the lower one in a tie:
+//                    B of e_z is [e_y, -e_x], B of e_y is [-e_z, -e_x]
 //   direction_plus   d (+) xi = cos|xi| d + sin|xi| B_d xi / |xi|                    (PTCEE 10, 11)
-//   direction_minus  the xi with |xi| <= pi such that from (+) xi = to; at the antipode, to which
-//                    every way leads, xi = (pi, 0)
-// A 2-vector xi (rad) means something only beside the d whose basis it uses: the basis jumps where
-// h changes. Ties go to the lower axis: B of e_z is [e_y, -e_x], B of e_y is [-e_z, -e_x].
-// Jacobians with respect to a direction have three columns and are valid for tangential changes of
-// it, with h held. The Jacobian of direction_minus does not exist at the antipode, where it is left
-// unwritten. No allocation.
+//   direction_minus  the xi with |xi| <= pi and from (+) xi = to; at the antipode xi = (pi, 0)
+// A 2-vector xi (rad) has meaning only with the d whose basis it uses: the basis jumps where h
+// changes. Jacobians with respect to a direction have three columns and hold for tangential
+// changes, with h fixed. At the antipode direction_minus has no Jacobian and leaves it unwritten.
+// No allocation.
 
 #include <Eigen/Geometry>
 

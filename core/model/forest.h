@@ -1,12 +1,13 @@
 #pragma once
-// A forest as the parent of each node, roots their own: which nodes are one group (Tarjan 1975, with halved paths). No allocation.
+// A forest stored as the parent of each node; a root is its own parent. Nodes with the same root
+// are one group (Tarjan 1975, with path halving). No allocation.
 
 #include <cstddef>
 #include <vector>
 
 namespace alidade::internal {
 
-// Of a node's tree; shortens the way there.
+// Root of a node's tree. Shortens the path to it.
 [[nodiscard]] inline int root_of(int node, std::vector<int>* parent) {
   while ((*parent)[static_cast<std::size_t>(node)] != node) {
     int& above = (*parent)[static_cast<std::size_t>(node)];

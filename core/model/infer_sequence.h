@@ -1,7 +1,8 @@
 #pragma once
-// infer_sequence(): counts for a recording without them: which multiple of the period lies between neighbouring
-// items. Losses are gaps, a duplicate repeats its count. Good for noise up to a sixth of a period
-// (sigma); the period may be off by 1 %: it is tracked. Allocates nothing.
+// infer_sequence(): gives counts to a recording that has none, by finding how many periods lie
+// between neighbouring items. Losses are gaps; a duplicate repeats its count.
+// Works for noise up to a sixth of a period (sigma). The period may be off by 1 %, as it is
+// tracked. Allocates nothing.
 
 #include <algorithm>
 #include <array>
@@ -15,16 +16,18 @@ namespace internal {
 
 constexpr std::size_t kItemsAhead = 12;
 
-// late[j]: periods by which item j of the next n comes later than if nothing were lost or doubled.
-// Fits a piecewise constant to it (L1, each step has its price; back by at most one, a duplicate)
-// and returns its value at item 0: so noise of half a period in single items does no harm.
+// late[j]: how many periods item j of the next n is later than without losses and duplicates.
+// Fits a piecewise constant to it (L1, with a price for each step; a step back is one at most, a
+// duplicate) and returns its value at item 0. So noise of half a period in single items does no
+// harm.
 inline double periods_skipped(const std::array<double, kItemsAhead>& late, std::size_t n,
                               double price) {
   std::array<double, kItemsAhead + 1> value{};  // candidates; the first is "no step"
   for (std::size_t j = 0; j < n; ++j) {
     value[j + 1] = std::round(late[j]);
   }
-  // Dynamic programme from the far end; cost[v]: of items j, j + 1, ... with value[v] at item j.
+  // Dynamic programme from the far end. cost[v]: cost of items j, j + 1, ... with value[v] at item
+  // j.
   std::array<double, kItemsAhead + 1> cost{};
   for (std::size_t j = n; j-- > 0;) {
     if (j + 1 < n) {
@@ -54,7 +57,8 @@ inline double periods_skipped(const std::array<double, kItemsAhead>& late, std::
 
 }  // namespace internal
 
-// receive_time_s and sequence: n values. False if period_s (s, more than 0) or a receive time is unusable.
+// receive_time_s and sequence: n values. period_s: s, > 0. False if period_s or a receive time is
+// unusable.
 [[nodiscard]] inline bool infer_sequence(const double* receive_time_s, std::size_t n,
                                          double period_s, std::int64_t* sequence) {
   constexpr double kTracking = 1.0 / 16;

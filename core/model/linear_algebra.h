@@ -1,7 +1,7 @@
 #pragma once
-// Short names for the fixed-size Eigen types that the model uses. Everything in core/model is a
-// template on the scalar S: float, double or an automatic-differentiation type such as ceres::Jet,
-// and calls sin, sqrt, ... through argument-dependent lookup. Nothing here allocates or throws.
+// Short names for the fixed-size Eigen types of the model. The geometry in core/model is templates
+// on the scalar S: float, double or an automatic-differentiation type such as ceres::Jet. It calls
+// sin, sqrt, ... through argument-dependent lookup. Nothing here allocates or throws.
 //
 // Names: R_a_from_b rotates coordinates of frame b into frame a; d_a is a unit vector in frame a;
 // J_out_in is the Jacobian of out with respect to in. A Jacobian argument is an optional output
@@ -28,8 +28,8 @@ using Matrix3 = Matrix<S, 3, 3>;
 template <class S>
 using Matrix4 = Matrix<S, 4, 4>;
 
-// C++20's std::type_identity_t: a parameter of type NonDeduced<T> takes no part in deducing S, so
-// that callers may pass Eigen expressions and nullptr.
+// C++20's std::type_identity_t. S is not deduced from a parameter of type NonDeduced<T>, so callers
+// may pass Eigen expressions and nullptr.
 template <class T>
 struct TypeIdentity {
   using type = T;
@@ -47,7 +47,7 @@ template <class S, int kRows, int kColumns>
   return true;
 }
 
-// Without what rounding makes of a covariance.
+// Removes the asymmetry of a covariance that rounding causes.
 template <int kSize>
 [[nodiscard]] Matrix<double, kSize, kSize> symmetric(const Matrix<double, kSize, kSize>& m) {
   return 0.5 * (m + m.transpose());

@@ -1,11 +1,12 @@
 #pragma once
-// The lower line (lower_line.h) under the lowest item of each time slot of a sliding window.
-//
-// At first each item has a slot of its own; when all slots are taken, neighbours are joined in pairs until the
-// slots span the window, from then on the oldest is dropped. Once locked a slot must have aged by a tenth of settle_s
-// before it counts, so that the items that betray a fall of the minimum delay have not yet moved the line,
-// and bound_rate() holds the rate to what the last window said, as far as clocks wander.
-// Fixed memory, trivially copyable, no allocation, no exceptions. x in sender seconds or counts, y in host seconds.
+// The lower line (lower_line.h) below the lowest item of each time slot of a sliding window.
+// At first each item has its own slot. When all slots are taken, neighbours are joined in pairs
+// until the slots span the window. From then on the oldest is dropped.
+// Once locked, a slot counts only at an age of settle_s / 10, so that items that reveal a fall of
+// the minimum delay have not yet moved the line. bound_rate() then limits the rate to the last
+// window's, as far as clocks wander.
+// Fixed memory, trivially copyable, no allocation, no exceptions. x: sender seconds or counts; y:
+// host seconds; both from the first item.
 
 #include <algorithm>
 #include <array>
@@ -26,7 +27,7 @@ class LowerEnvelope {
  public:
   explicit LowerEnvelope(const ClockFilterOptions& options) : options_(options) {}
 
-  // Forgets all; the next item stands at x = 0, y = 0.
+  // Forgets all. The next item is at x = 0, y = 0.
   void start(const ClockRatePrior& prior) {
     prior_ = prior;
     rate_min_ = prior.rate - prior.half_range;
@@ -35,13 +36,14 @@ class LowerEnvelope {
     line_ = {0, 0, prior.rate, scale_ * scale_, 0, prior.half_range * prior.half_range / 3};
     slots_ = 0;
     held_from_ = kNever;
-    slot_width_ = 0;  // at first each item has its own
+    slot_width_ = 0;  // at first each item has its own slot
     locked_ = false;
   }
 
   void lock() { locked_ = true; }
 
-  // From now on what lies at host time y or later does not count, until release(), if enough lies before.
+  // Until release(), items at host time y or later do not count. Ignored if too few items lie
+  // before y.
   void hold(double y) {
     if (held_from_ < kNever || (slots_ >= kLeastHeld && y_[kLeastHeld - 1] < y)) {
       held_from_ = y;
@@ -50,12 +52,12 @@ class LowerEnvelope {
   void release() { held_from_ = kNever; }
 
   [[nodiscard]] const LineEstimate& line() const { return line_; }
-  // Host time that the slots span.
+  // s; host time that the slots span.
   [[nodiscard]] double memory_s() const {
     return slots_ > 0 ? (x_[slots_ - 1] - x_[0]) * line_.slope : 0.0;
   }
 
-  // An item with x beyond all before it, which counts if it is the lowest of its slot.
+  // x must be beyond all earlier ones. The item counts if it is the lowest of its slot.
   void insert(double receive_s, double x, double y) {
     if (slots_ > 0 && receive_s - slot_since_ < slot_width_) {
       const std::size_t last = slots_ - 1;
@@ -78,13 +80,13 @@ class LowerEnvelope {
     fit(x);
   }
 
-  // Drops the slots that are too young to count; the next item opens one.
+  // Drops the slots that are too young to count. The next item opens one.
   void drop_unsettled(double receive_s) {
     slots_ = settled_slots();
     slot_since_ = receive_s - slot_width_;
   }
 
-  // Drops what lies before host time y, but for the youngest slot.
+  // Drops the slots before host time y, except for the youngest.
   void forget_before(double y) {
     std::size_t kept = 0;
     for (std::size_t i = 0; i < slots_; ++i) {
@@ -96,7 +98,7 @@ class LowerEnvelope {
     slots_ = kept;
   }
 
-  // Takes a step of the minimum delay out of what lies after host time y.
+  // Subtracts a step of the minimum delay from the slots at host time y or later.
   void subtract_from(double y, double step_s) {
     for (std::size_t i = 0; i < slots_; ++i) {
       if (y_[i] >= y) {
@@ -105,7 +107,7 @@ class LowerEnvelope {
     }
   }
 
-  // From here on the rate may leave what the window says only as far as clocks wander.
+  // From now on the rate may leave this window's only as far as clocks wander.
   void bound_rate() {
     constexpr double kReach = 6;  // sigmas
     const double reach = kReach * std::sqrt(line_.var_slope) + 1e-9 * prior_.rate +
@@ -172,8 +174,8 @@ class LowerEnvelope {
   std::array<double, Capacity> y_{};
   std::size_t slots_ = 0;
   double slot_width_ = 0;  // s
-  double slot_since_ = 0;  // receive time at which the youngest slot began
-  double scale_ = 0;       // of the slots' residuals, s
+  double slot_since_ = 0;  // s; receive time at which the youngest slot began
+  double scale_ = 0;       // s; of the slots' residuals
   double rate_min_ = 0;
   double rate_max_ = 0;
 };

@@ -1,15 +1,14 @@
 #pragma once
-// The line below a cloud of points whose errors are never negative.
-//
-// Points (x_i, y_i), x strictly increasing, obey y_i = h + b x_i + e_i with e_i >= 0 and a density
-// near zero of 1/scale (exponential, or anything that looks so close to its minimum). With b uniform
-// in [slope_min, slope_max] and a flat prior on h the posterior is
-//   p(h, b) ~ exp(n (h + b mean(x)) / scale)   where   h + b x_i <= y_i for all i,
-// whose mode is the linear programme "highest line below all points". Only the lower convex hull
-// counts; between two neighbouring edge slopes one vertex binds and b is a truncated exponential,
-// so mean and covariance are sums of closed forms: no iteration, no sampling. The mean lies below
-// the mode by scale / n and more: this is the shrinkage that makes a young estimate honest.
-// Allocates nothing, no exceptions; the caller lends the memory of the hull. Any consistent units.
+// The line below a cloud of points whose errors are never negative: posterior mean and covariance.
+// Points (x_i, y_i), x strictly increasing: y_i = h + b x_i + e_i. e_i >= 0 has the density 1/scale
+// near zero (exponential, or similar close to its minimum). Priors: b uniform in [slope_min,
+// slope_max], h flat. Posterior:
+//   p(h, b) ~ exp(n (h + b mean(x)) / scale)   where   h + b x_i <= y_i for all i
+// Only the lower convex hull counts. The moments are sums of closed forms: no iteration, no
+// sampling. The mean lies below the mode (the highest line below all points) by scale / n and more,
+// which makes a young estimate honest.
+// No allocation, no exceptions; the caller lends the hull's memory. Any consistent units.
+// Derivation: docs/clocks.md.
 
 #include <algorithm>
 #include <cmath>
@@ -18,7 +17,7 @@
 
 namespace alidade {
 
-// A straight line with covariance: value and slope at the abscissa x.
+// A straight line with covariance; value and slope are those at the abscissa x.
 struct LineEstimate {
   double x = 0;
   double value = 0;
@@ -34,7 +33,7 @@ struct LineEstimate {
   }
 };
 
-// Indices of the vertices of the lower convex hull, left to right; returns their number.
+// Writes the indices of the lower convex hull's vertices, left to right. Returns their number.
 inline std::size_t lower_hull(const double* x, const double* y, std::size_t n,
                               std::uint16_t* hull) {
   std::size_t size = 0;
@@ -54,8 +53,8 @@ inline std::size_t lower_hull(const double* x, const double* y, std::size_t n,
 
 namespace internal {
 
-// Integral, mean and variance of exp(rate * t) over [0, width], the integral relative to
-// exp(rate * width) if rate > 0 and to 1 otherwise.
+// Integral, mean and variance of exp(rate * t) over [0, width]. The integral is relative to
+// exp(rate * width) if rate > 0, to 1 otherwise.
 struct TruncatedExponential {
   double mass, mean, variance;
 
@@ -78,8 +77,8 @@ struct TruncatedExponential {
 
 }  // namespace internal
 
-// Posterior mean and covariance at abscissa `at`. n >= 1, scale > 0, slope_min < slope_max;
-// hull: room for n indices.
+// Posterior mean and covariance at abscissa `at`. n >= 1, scale > 0, slope_min < slope_max. hull:
+// room for n indices.
 inline LineEstimate fit_lower_line(const double* x, const double* y, std::size_t n, double scale,
                                    double slope_min, double slope_max, double at,
                                    std::uint16_t* hull) {
@@ -91,7 +90,7 @@ inline LineEstimate fit_lower_line(const double* x, const double* y, std::size_t
   mean_x = x[0] + mean_x / static_cast<double>(n);
   const double rate = static_cast<double>(n) / scale;
 
-  // While b is between the slopes of the edges left and right of vertex j the line hangs on j.
+  // The line hangs on vertex j while b is between the slopes of the edges left and right of it.
   const auto binding_from = [&](std::size_t j) {
     if (j == 0) return slope_min;
     const double slope = (y[hull[j]] - y[hull[j - 1]]) / (x[hull[j]] - x[hull[j - 1]]);
@@ -126,7 +125,7 @@ inline LineEstimate fit_lower_line(const double* x, const double* y, std::size_t
     }
     const double xj = x[hull[j]];
     const double yj = y[hull[j]];
-    const double growth = rate * (mean_x - xj);  // of the log density with b
+    const double growth = rate * (mean_x - xj);  // slope of the log density in b
     const internal::TruncatedExponential piece(growth, to - from);
     const double top = yj + (growth > 0 ? to : from) * (mean_x - xj);
     const double weight = piece.mass * std::exp(rate * (top - peak));
@@ -152,9 +151,9 @@ inline LineEstimate fit_lower_line(const double* x, const double* y, std::size_t
   return line;
 }
 
-// Scale of the delays from their residuals above the lowest point, seen along a fitted line: a low
-// quantile, since what counts is the density next to the minimum (heavy tails do not), but not of
-// fewer than a handful of points. `least` keeps it positive; `guess` weighs as much as two points.
+// Scale of the delays, from their residuals above the lowest point along a fitted line. Uses a low
+// quantile, as the density next to the minimum counts and heavy tails do not: rank n / 8, but at
+// least min(n / 2, 16). `least` keeps the scale positive. `guess` weighs as much as two points.
 // residual: room for n values.
 inline double delay_scale(const double* x, const double* y, std::size_t n, const LineEstimate& line,
                           double least, double guess, double* residual) {
@@ -170,7 +169,7 @@ inline double delay_scale(const double* x, const double* y, std::size_t n, const
   const double lowest = *std::min_element(residual, residual + rank);
   const double count = static_cast<double>(n);
   const double low = static_cast<double>(rank);
-  // The last factor makes up for the squared error that a scale from few points causes.
+  // The last factor corrects for the squared error of a scale from few points.
   const double scale =
       std::max((residual[rank] - lowest) / -std::log1p(-(low - 0.5) / count), least) *
       (1 + 1 / (low + 1));

@@ -1,14 +1,14 @@
 #pragma once
-// Pan/tilt mechanics: from angles to the camera's orientation and angular velocity.
+// Pan/tilt mechanics: camera orientation and angular velocity from the angles.
 //   R_base_from_camera(p) = Exp(pan a_pan) Exp(tilt a_tilt) R_frd_from_rdf           (PTCEE 16)
 //   measured angle = scale * true angle                                               (PTCEE 17)
 //   w = R_frd_from_rdf^T (Exp(-tilt a_tilt) a_pan pan' + a_tilt tilt')                (PTCEE 46)
-// Frames: base b is FRD (forward, right, down), fixed to the mount; camera c is RDF (right, down,
-// forward). Axes are unit vectors in b; pan about +z (down) is positive to the right, tilt about +y
-// (right) is positive upwards. Angles in rad, not wrapped by these functions; rates in rad/s.
-// Jacobians of the orientation are those of xi in R Exp(xi), xi in the camera frame (PTCEE 5).
-// An axis changes by a 2-vector in its own tangent_basis (direction.h): J_*_axes has the columns
-// pan axis 0, 1, tilt axis 0, 1. Domain: unit axes, scales other than 0. No allocation.
+// Base b is FRD (forward, right, down), fixed to the mount; camera c is RDF (right, down, forward).
+// Axes are unit vectors in b: pan about +z is positive to the right, tilt about +y is positive
+// upwards. Angles in rad, not wrapped here; rates in rad/s. Scales must not be 0.
+// Jacobians of the orientation are those of xi in R Exp(xi), camera frame (PTCEE 5). An axis
+// changes by a 2-vector in its own tangent_basis (direction.h). J_*_axes: pan axis 0, 1, tilt axis
+// 0, 1. No allocation.
 
 #include "core/model/angle.h"
 #include "core/model/direction.h"
@@ -40,8 +40,8 @@ template <class S>
 
 namespace internal {
 
-// Exp(angle (+) of a changed axis) = Exp(angle axis) Exp(J eta): the right Jacobian times angle,
-// which for a change at right angles to the axis is sin(angle) I - (1 - cos(angle)) [axis].
+// Exp(angle changed_axis) = Exp(angle axis) Exp(J eta): the right Jacobian times angle. For a
+// change at right angles to the axis it is sin(angle) I - (1 - cos(angle)) [axis].
 template <class S>
 [[nodiscard]] Matrix<S, 3, 2> rotation_axis_jacobian(const Vector3<S>& axis, const S& angle) {
   using std::cos;
@@ -113,7 +113,7 @@ template <class S>
   return {mechanics.pan_scale * true_angle.pan, mechanics.tilt_scale * true_angle.tilt};
 }
 
-// The inverse: J_angle = diag(1 / scale), J_scale = diag(-true angle / scale).
+// The inverse. J_angle = diag(1 / scale), J_scale = diag(-true angle / scale).
 template <class S>
 [[nodiscard]] PanTilt<S> true_from_measured(const Mechanics<S>& mechanics,
                                             const PanTilt<S>& measured_angle) {

@@ -1,5 +1,6 @@
 #pragma once
-// median(): the upper one of two in the middle. values must not be empty. Allocates.
+// median(): of an even number of values, the upper one of the two in the middle. values must not be
+// empty. Allocates.
 
 #include <algorithm>
 #include <cstddef>

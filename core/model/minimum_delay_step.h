@@ -1,12 +1,12 @@
 #pragma once
-// MinimumDelayStep: does the least delay of a stream step, and when and by how much did it?
-//
-// A rise: for settle_s no item comes down to the line. A fall: some come before it. Both are a step only if the least
-// residuals of two neighbouring halves of settle_s agree: otherwise the new minimum is none. Fed with residuals
-// (receive time less line); keeps two runs of items, those that stay late and those from the first early one on.
-// A rise is suspected long before it is judged: the chance that n exponential delays of mean s all stay beyond m is
-// e^(-n m / s); of the stretches of late items up to the last one that with the greatest n m / s is kept.
+// MinimumDelayStep: detects a step of a stream's minimum delay, its time and its size, from
+// residuals (receive time minus line). Two runs of items are kept: late ones, and all from the
+// first early one on.
+//   rise  no item comes down to the line for settle_s
+//   fall  some items come before the line
+// It is a step only if the minimum residuals of two neighbouring halves of settle_s agree.
 // Fixed memory, trivially copyable, no allocation, no exceptions. All times are host seconds.
+// Statistics: docs/clocks.md.
 
 #include <algorithm>
 #include <cmath>
@@ -19,7 +19,7 @@ namespace alidade::internal {
 
 struct DelayStep {
   double since_s = 0;  // receive time of the first item with the new minimum
-  double step_s = 0;   // new minimum delay less the old one
+  double step_s = 0;   // new minimum delay minus the old one
   double sigma_s = 0;  // of step_s
 };
 
@@ -33,14 +33,15 @@ class MinimumDelayStep {
     stretch_ = {};
   }
 
-  // An item came down to the line: no rise.
+  // An item came down to the line, so there is no rise.
   void end_late_run() {
     late_ = {};
     stretch_ = {};
   }
 
-  // Has a run lasted until this receive time and shown a step? Both runs begin anew then. To be asked before the
-  // item is added to a run. rate_sigma: of the line's rate, host seconds per host second, by which the halves may differ.
+  // The step, if a run has lasted until this receive time and shows one. Both runs then begin anew.
+  // Call it before the item is added to a run. rate_sigma: of the line's rate (host seconds per
+  // host second); the halves may differ by it.
   std::optional<DelayStep> judge(double receive_s, double rate_sigma = 0) {
     const double drift_s = kReach * rate_sigma * settle_s_ / 2;
     const std::optional<DelayStep> fall = judge(&early_, true, receive_s, drift_s);
@@ -48,11 +49,11 @@ class MinimumDelayStep {
   }
 
   void add_late(double receive_s, double residual_s) { late_.add(receive_s, residual_s, false); }
-  // The same item, where the mean delay above the line has been mean_s.
+  // The same item; mean_s: usual mean delay above the line.
   void suspect(double receive_s, double residual_s, double mean_s) {
     stretch_.add(receive_s, residual_s, std::max(mean_s, resolution_s_));
   }
-  // All items from the first early one on, early or not.
+  // For all items from the first early one on, early or not.
   void add_after_early(double receive_s, double residual_s, bool is_early) {
     early_.add(receive_s, residual_s, is_early);
   }
@@ -63,20 +64,23 @@ class MinimumDelayStep {
     return stretch_.items >= kLeastItems && stretch_.score >= kSameMinimum &&
            stretch_.last - stretch_.first >= settle_s_ / 20;
   }
-  // Receive time of its first item.
+  // Receive time of the suspected rise's first item.
   [[nodiscard]] double suspected_since_s() const { return stretch_.first; }
 
  private:
-  static constexpr double kSameMinimum = 20;  // e^-20: odds that chance explains the difference
+  static constexpr double kSameMinimum = 20;  // e^-20: odds that the difference is chance
   static constexpr double kLeastItems = 3;    // in half a run
   static constexpr double kReach = 6;         // sigmas
 
+  // A suspected rise, long before it is judged. n exponential delays of mean s all exceed m with
+  // probability e^(-n m / s). Of the late items up to the last, keeps the run with the greatest n m
+  // / s.
   struct Stretch {
     double items = 0;
     double first = 0;  // receive times
     double last = 0;
     double least = std::numeric_limits<double>::infinity();
-    double score = 0;  // -log of the chance
+    double score = 0;  // -log of the probability
 
     void add(double receive, double residual, double mean) {
       const double longer = (items + 1) * std::min(least, residual) / mean;
@@ -96,9 +100,9 @@ class MinimumDelayStep {
   struct Run {
     bool active = false;
     double first = 0;   // receive time of the first item
-    double since = 0;   // ... of the older half
-    double middle = 0;  // ... of the younger half
-    double older = 0;   // least residual
+    double since = 0;   // of the older half's first item
+    double middle = 0;  // of the younger half's first item
+    double older = 0;   // minimum residual
     double younger = 0;
     // Of the younger half:
     double items = 0;
@@ -123,7 +127,7 @@ class MinimumDelayStep {
       younger = std::numeric_limits<double>::infinity();
       items = early = sum = 0;
     }
-    // Standard deviation of the least residual of a half, were its delays exponential.
+    // Standard deviation of a half's minimum residual if its delays are exponential.
     [[nodiscard]] double spread() const { return (sum / items - younger) / items; }
   };
 

@@ -1,11 +1,12 @@
 #pragma once
-// OneSidedClock: the line of a stream whose items are never early, for ClockFilter, which says what an item is.
-//
-// The line is the lower envelope of a sliding window. It contains the minimum delay; where that steps (MinimumDelayStep),
-// the step is subtracted from all later receive times and the line goes on, with a variance that grows by the
-// step's. While a rise is suspected the late items do not count, or they would tilt a line whose rate is not yet known.
-// A line that fewer than kLeastOnLine items have come down to is an early item's that dragged it down: it moves
-// instead, and only what came since counts then.
+// OneSidedClock: the line of a stream whose items are never early. Used by ClockFilter.
+// The line is the lower envelope of a sliding window. It contains the minimum delay. A step of that
+// (minimum_delay_step.h) beyond min_delay_step_s is subtracted from all later receive times: the
+// line continues, and its variance grows by the step's.
+// While a rise is suspected, late items do not count, as they would tilt a line whose rate is not
+// yet known. Before the lock the line follows a fall. If fewer than kLeastOnLine items have come
+// down to the line before a rise, an early item had dragged it down: the line moves up instead, and
+// only items since the rise count.
 // Fixed memory, trivially copyable, no allocation, no exceptions. All times are host seconds.
 
 #include <algorithm>
@@ -33,7 +34,7 @@ class OneSidedClock {
     envelope_.start(prior);
   }
 
-  // Takes back what steps did to the line, which answers no more until start().
+  // Forgets the steps. The line answers no more until start().
   void restart() {
     shift_s_ = shift_variance_ = 0;
     locked_ = false;
@@ -41,7 +42,7 @@ class OneSidedClock {
     steps_.restart();
   }
 
-  // The line will not move by itself any more: steps of the minimum delay can be told from it.
+  // From now on the line does not move by itself, so steps of the minimum delay show against it.
   void lock(double receive_s) {
     locked_ = true;
     bound_since_s_ = receive_s;
@@ -53,7 +54,7 @@ class OneSidedClock {
     const double receive = item.receive_s;
     const double y = item.y - shift_s_;
     const double residual = y - line().value_at(item.x);
-    // The sigma of a held line grows; what is late must not come down to the line by that.
+    // The sigma of a held line grows. This must not make a late item count as on the line.
     const double sigma =
         steps_.suspects_rise() ? std::min(item.sigma_s, sigma_on_line_s_) : item.sigma_s;
     const double gate = std::max(options_.min_delay_step_s, kGate * sigma);
@@ -75,7 +76,7 @@ class OneSidedClock {
         }
         return true;
       }
-      // An early item in the warm-up had dragged the line down.
+      // An early item of the warm-up had dragged the line down.
       envelope_.forget_before(step->since_s - anchor_receive_s_ - shift_s_);
     }
     if (residual >= gate) {
@@ -96,7 +97,7 @@ class OneSidedClock {
     if (early || steps_.suspects_fall()) {
       steps_.add_after_early(receive, residual, early);
     }
-    // While a fall is being judged nothing may pull the line down.
+    // While a fall is being judged, nothing may pull the line down.
     if (item.newer && (!steps_.suspects_fall() || residual >= 0)) {
       envelope_.insert(receive, item.x, y);
       if (line().value_at(item.x) < y - residual - gate) {
@@ -111,29 +112,29 @@ class OneSidedClock {
   }
 
   [[nodiscard]] const LineEstimate& line() const { return envelope_.line(); }
-  // By how much the item is later than the line says.
+  // s; how much later the item is than the line says.
   [[nodiscard]] double residual(const ClockItem& item) const {
     return item.y - shift_s_ - line().value_at(item.x);
   }
-  // The host time of an item by its receive time alone.
+  // Host time of an item from its receive time alone.
   [[nodiscard]] double without_line(double receive_s) const {
     return receive_s - shift_s_ - delay_s_;
   }
-  // Mean delay above the minimum.
+  // s; mean delay above the minimum.
   [[nodiscard]] double jitter_s() const { return delay_s_; }
-  // Host time that the line remembers.
+  // s; host time that the line remembers.
   [[nodiscard]] double memory_s() const { return envelope_.memory_s(); }
 
-  // Sum of the steps, what they have made uncertain (s^2), and the receive time since which the last holds.
+  // Sum of the steps (s), its variance (s^2), and the receive time at which the last step began.
   [[nodiscard]] double shift_s() const { return shift_s_; }
   [[nodiscard]] double shift_variance() const { return shift_variance_; }
   [[nodiscard]] double shift_since_s() const { return shift_since_s_; }
 
  private:
-  static constexpr double kGate = 6;  // sigmas that no honest item leaves on the early side
+  static constexpr double kGate = 6;  // sigmas; no valid item is earlier than that
   static constexpr double kLeastOnLine = 3;
 
-  // The true line goes on: what changes is the minimum delay.
+  // The true line continues; the minimum delay changes.
   void subtract(const DelayStep& step, double line_sigma_s) {
     envelope_.subtract_from(step.since_s - anchor_receive_s_ - shift_s_, step.step_s);
     shift_s_ += step.step_s;
@@ -148,12 +149,12 @@ class OneSidedClock {
   MinimumDelayStep steps_;
   double anchor_receive_s_ = 0;
   double delay_s_ = 0;
-  // When an item last came down to the line:
+  // As of the last item that came down to the line:
   double usual_delay_s_ = 0;    // delay_s_
   double sigma_on_line_s_ = 0;  // of the line
   bool locked_ = false;
-  double on_line_ = 0;        // items that came down to the line since one dragged it down
-  double bound_since_s_ = 0;  // when the rate was bounded last
+  double on_line_ = 0;        // items that came down to the line since an early one dragged it
+  double bound_since_s_ = 0;  // when the rate was last bounded
   double shift_s_ = 0;
   double shift_variance_ = 0;
   double shift_since_s_ = 0;

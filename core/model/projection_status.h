@@ -1,6 +1,6 @@
 #pragma once
-// Why a projection or a back-projection has, or has not, a result.
-// Outputs are written with kOk only.
+// Result of a projection or back-projection: ok, or why there is none. Outputs are written with kOk
+// only.
 
 namespace alidade {
 

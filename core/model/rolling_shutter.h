@@ -1,21 +1,13 @@
 #pragma once
-// The camera as it is: rows exposed one after the other while the mount turns.
+// Camera whose rows are exposed one after the other while the mount turns.
 //   row v is exposed at t(v) = t0 + v * line_delay, any sign of line_delay
 //   angle(v) = angle + rate t + acceleration t^2 / 2,  t = (v - reference_row) * line_delay
 //   back-projection, direct:    d_b = R_base_from_camera(angle(v)) unproject(u),  v = u_v
 //   projection, solved for v:   v = project(R_base_from_camera(angle(v))^T d_b)_v
-//   while the lens zooms:       log f(v) = log f + zoom_rate t, the distortion in the corner as it is: k(v) = k (f(v) / f)^2
-// Where PTCEE 26, 27 hold the body rate constant, here the ANGLES move at constant rates, or, where
-// somebody knows them, at constant accelerations: half a field of view a second gained in a second bends a
-// frame that is read out in 30 ms by 0.1 px.
-// v is a continuous coordinate of the whole row axis: the row solved for may lie outside the image.
-// A row is unique while the image of the direction moves down more slowly than the read-out, slope
-// d project_v / d v < 1. Where that fails between the reference row and the solution, the status is
-// kNoRow; a direction that the camera refuses at the reference row is refused with its status.
-// Jacobians of the solved pixel follow from the implicit function theorem. J_*_motion has the
-// columns pan, tilt, pan rate, tilt rate (of the true angles; by accelerations it is t / 2 times that
-// by rates); J_*_parameters those of Parameter,
-// where scales and clock offset are 0: they act on the motion, see motion_parameter_jacobian().
+// v is continuous; the solved row may lie outside the image. It is unique while the slope d
+// project_v / d v < 1: the direction's image moves down more slowly than the read-out. If that
+// fails between the reference row and the solution, the status is kNoRow. A direction that the
+// camera refuses at the reference row gets that status.
 // Domain: as camera.h and mechanics.h. Outputs are written with kOk only. No allocation.
 
 #include <Eigen/Core>
@@ -27,9 +19,13 @@
 
 namespace alidade {
 
-// The mount's motion about one frame: TRUE angles (rad) when the row reference_row is exposed, and
-// rates (rad/s) then, constant accelerations (rad/s^2); and that of the lens: d log f / dt (1/s), where the camera is as it is
-// when reference_row is exposed.
+// The motion of mount and lens about one frame: TRUE angles (rad), rates (rad/s) and constant
+// accelerations (rad/s^2) when reference_row is exposed. zoom_rate is d log f / dt (1/s): log f(v)
+// = log f + zoom_rate t. The distortion in the corner is constant, k(v) = k (f(v) / f)^2. The
+// camera is that at reference_row.
+// PTCEE 26, 27 hold the body rate constant. Here the ANGLES move at constant rates or, if known, at
+// constant accelerations. A rate that grows by half a field of view per second within a second
+// bends a frame with a read-out of 30 ms by 0.1 px.
 template <class S>
 struct FrameMotion {
   PanTilt<S> angle;
@@ -45,14 +41,14 @@ struct FrameMotion {
   }
 };
 
-// When a row is exposed, s after the reference row.
+// s after the reference row, when `row` is exposed.
 template <class S>
 [[nodiscard]] S time_of_row(const FrameMotion<S>& motion, const NonDeduced<S>& line_delay,
                             const NonDeduced<S>& row) {
   return (row - motion.reference_row) * line_delay;
 }
 
-// True angles, not wrapped, when a row is exposed.
+// True angles when `row` is exposed, not wrapped.
 template <class S>
 [[nodiscard]] PanTilt<S> angle_at_row(const FrameMotion<S>& motion, const NonDeduced<S>& line_delay,
                                       const NonDeduced<S>& row) {
@@ -70,7 +66,7 @@ template <class S>
           motion.rate.tilt + motion.acceleration.tilt * time};
 }
 
-// The camera with another focal length: log f is `change` more, and the distortion in the corner as it was.
+// The camera with log f increased by `change` and the same distortion in the corner.
 template <class S>
 [[nodiscard]] Camera<S> zoomed(const Camera<S>& camera, const NonDeduced<S>& change) {
   using std::exp;
@@ -81,7 +77,7 @@ template <class S>
   return out;
 }
 
-// When a row is exposed.
+// The camera when `row` is exposed.
 template <class S>
 [[nodiscard]] Camera<S> camera_at_row(const Camera<S>& camera, const FrameMotion<S>& motion,
                                       const NonDeduced<S>& line_delay, const NonDeduced<S>& row) {
@@ -89,14 +85,15 @@ template <class S>
   return zoomed(camera, motion.zoom_rate * time_of_row(motion, line_delay, row));
 }
 
-// d y / d log f with the distortion in the corner as it is, from y's Jacobian by the camera.
+// d y / d log f at constant distortion in the corner, from y's Jacobian with respect to the camera.
 template <class S, int kRows>
 [[nodiscard]] Matrix<S, kRows, 1> by_zoom(const Camera<S>& camera,
                                           const Matrix<S, kRows, kCameraParameterCount>& J_camera) {
   return camera.focal_length * J_camera.col(0) + S(2) * camera.radial_distortion * J_camera.col(2);
 }
 
-// From that by the camera of a row to that by the camera of the reference row.
+// Converts a Jacobian with respect to the camera at a row to one with respect to the camera at the
+// reference row.
 template <class S, int kRows>
 void refer_to_reference_row(const Camera<S>& camera, const Camera<S>& at_row,
                             Matrix<S, kRows, kCameraParameterCount>* J_camera) {
@@ -105,9 +102,9 @@ void refer_to_reference_row(const Camera<S>& camera, const Camera<S>& at_row,
   J_camera->col(2) *= factor * factor;
 }
 
-// d (pan, tilt, pan rate, tilt rate) / d Parameter of a motion made from MEASURED angles that were
-// looked up at the image's time plus clock_offset, with rates constant about that time. The total
-// Jacobian of a pixel or direction is J_parameters + J_motion * motion_parameter_jacobian(...).
+// d (pan, tilt, pan rate, tilt rate) / d Parameter of a motion from MEASURED angles, looked up at
+// the image's time plus clock_offset, with rates constant about that time. The total Jacobian of a
+// pixel or direction is J_parameters + J_motion * motion_parameter_jacobian(...).
 template <class S>
 [[nodiscard]] Matrix<S, 4, kParameterCount> motion_parameter_jacobian(
     const Mechanics<S>& mechanics, const FrameMotion<S>& motion) {
@@ -121,6 +118,9 @@ template <class S>
   return J;
 }
 
+// J_*_motion, here and below: columns pan, tilt, pan rate, tilt rate (true angles). The column by
+// an acceleration is t / 2 times that by the rate. J_*_parameters: columns as Parameter. Scales and
+// clock offset are 0, as they act on the motion: see motion_parameter_jacobian().
 template <class S>
 [[nodiscard]] ProjectionStatus rolling_shutter_unproject(
     const Camera<S>& camera, const Mechanics<S>& mechanics, const NonDeduced<S>& line_delay,
@@ -174,8 +174,8 @@ template <class S>
   return ProjectionStatus::kOk;
 }
 
-// Where a direction would be seen if every row were exposed when `row` is (PTCEE 41, 42). J_u_row
-// is the image's motion per row, whose second component is the slope above.
+// Pixel of a direction if every row were exposed when `row` is (PTCEE 41, 42). J_u_row is the
+// image's motion per row. Its second component is the slope above.
 template <class S>
 [[nodiscard]] ProjectionStatus project_at_row(
     const Camera<S>& camera, const Mechanics<S>& mechanics, const NonDeduced<S>& line_delay,
@@ -221,6 +221,7 @@ template <class S>
   return ProjectionStatus::kOk;
 }
 
+// Solves for the row by Newton's method. Jacobians follow from the implicit function theorem.
 template <class S>
 [[nodiscard]] ProjectionStatus rolling_shutter_project(
     const Camera<S>& camera, const Mechanics<S>& mechanics, const NonDeduced<S>& line_delay,
@@ -228,8 +229,8 @@ template <class S>
     NonDeduced<Matrix<S, 2, 3>>* J_u_d = nullptr, NonDeduced<Matrix<S, 2, 4>>* J_u_motion = nullptr,
     NonDeduced<Matrix<S, 2, kParameterCount>>* J_u_parameters = nullptr) {
   using std::abs;
-  // Newton doubles the correct digits with each step: three steps are common, and a step below the
-  // rounding of the projection itself is the last that can help.
+  // Newton doubles the correct digits with each step; three steps are usual. A step below the
+  // rounding of the projection is the last that helps.
   constexpr int kMaxSteps = 20;
   const S tolerance = S(16) * S(Eigen::NumTraits<S>::epsilon()) *
                       (camera.focal_length * camera.aspect + S(camera.height));
@@ -252,7 +253,7 @@ template <class S>
   if (status != ProjectionStatus::kOk) return status;
   if (J_u_row.y() >= S(1)) return ProjectionStatus::kNoRow;
   *u = projected;
-  // At a fixed row u changes by G; with the row that follows it, by G + J_u_row G_v / (1 - slope).
+  // At a fixed row u changes by G. As the row follows, u changes by G + J_u_row G_v / (1 - slope).
   Matrix2<S> J_u_fixed = Matrix2<S>::Identity();
   J_u_fixed.col(1) += J_u_row / (S(1) - J_u_row.y());
   if (J_u_d != nullptr) *J_u_d = (J_u_fixed * *J_u_d).eval();
@@ -261,9 +262,8 @@ template <class S>
   return ProjectionStatus::kOk;
 }
 
-// Covariance of the reprojection error e = u - project_at_row(row = u_v) that a pixel noise of
-// cov_u causes: A cov_u A^T with A = I - [0, J_u_row], because a row error moves the row time too
-// (Oth 18 to 21).
+// Covariance of the reprojection error e = u - project_at_row(row = u_v) for the pixel noise cov_u:
+// A cov_u A^T with A = I - [0, J_u_row], as a row error also moves the row's time (Oth 18 to 21).
 template <class S>
 [[nodiscard]] Matrix2<S> reprojection_error_covariance(const Vector2<S>& J_u_row,
                                                        const Matrix2<S>& cov_u) {
@@ -272,10 +272,10 @@ template <class S>
   return A * cov_u * A.transpose();
 }
 
-// First-order covariance (rad^2) of a pixel's direction in tangent_basis(d_b), from the independent
-// covariances of the pixel, the motion and the parameters and the Jacobians of
-// rolling_shutter_unproject(). For a motion made from measured angles, cov_motion is the
-// measurement's noise alone and J_d_parameters the total Jacobian, see motion_parameter_jacobian().
+// First-order covariance (rad^2) of a pixel's direction in tangent_basis(d_b). Inputs: Jacobians of
+// rolling_shutter_unproject(), and independent covariances of pixel, motion and parameters. For a
+// motion from measured angles, cov_motion is the measurement noise alone and J_d_parameters the
+// total Jacobian; see motion_parameter_jacobian().
 template <class S>
 [[nodiscard]] Matrix2<S> direction_covariance(const Vector3<S>& d_b, const Matrix<S, 3, 2>& J_d_u,
                                               const Matrix<S, 3, 4>& J_d_motion,

@@ -1,15 +1,11 @@
 #pragma once
-// StampCount: do a sender's stamps count its items in place of telling time?
-//
+// StampCount: detects stamps that count items instead of telling time.
 //   sender_i = constant + step (i + lost in the network),  whatever time passes between two items
-//
-// Such a sender leaves items out, or takes them at another rate, and its stamps know nothing of it: receive - sender rises, and
-// never comes down again. So does a backlog that grows, but not for ever. Shown is it where all stamps are on one grid, and the
-// least receive - sender of each second, of the last kParts at most, never fell and rose
-//   by whole steps  (to kOnStep of one): by kSteps in kFewParts or more. No backlog grows so;
-//   or anyhow       by kApart_s, but by kNearApart_s where each second's rise is no more than kNear.
-// A rise of more than kStall_s with nothing received for so long is something that stood still, and begins anew.
-// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are seconds.
+// Such a sender leaves items out or takes them at another rate, and its stamps do not show it:
+// receive - sender rises and never falls again. A growing backlog rises too, but not for ever
+// (docs/clocks.md).
+// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are
+// seconds.
 
 #include <algorithm>
 #include <array>
@@ -32,7 +28,7 @@ class StampCount {
 
   void restart() { *this = StampCount(); }
 
-  // Finite values.
+  // Values must be finite.
   void add(double receive_s, double sender_s) {
     const double step_s = sender_s - last_sender_s_;
     const bool first = !any_;
@@ -48,7 +44,7 @@ class StampCount {
       size_ = 0;
       begin_part(receive_s);
     }
-    // The grid is found by its finest step; what is off it is no count.
+    // The finest step defines the grid. Stamps off the grid do not count items.
     const double steps = std::round(step_s / step_s_);
     if (std::abs(step_s - steps * step_s_) > kSame_s) {
       size_ = 0;
@@ -64,7 +60,11 @@ class StampCount {
     part_ = {receive_s, level_s};
   }
 
-  // The stamps' rate less one, if they are shown to count.
+  // The stamps' rate minus 1, if they are shown to count. All stamps must be on one grid. The
+  // minima of receive - sender in kFewParts to kParts seconds must never have fallen, and rise
+  //   by whole steps  to within kOnStep of a step, and by kSteps or more: no backlog grows like
+  //                   that;
+  //   or in any way   by kApart_s, or by kNearApart_s if no second's rise exceeds kNear.
   [[nodiscard]] std::optional<double> rate_error() const {
     if (size_ < kFewParts) return std::nullopt;
     const Part& first = part(0);
@@ -89,7 +89,7 @@ class StampCount {
   static constexpr std::size_t kLeastItems = 3;
 
   struct Part {
-    double receive_s = 0;  // of the item that comes down farthest
+    double receive_s = 0;  // of the item with the lowest level
     double level_s = std::numeric_limits<double>::infinity();
   };
 
@@ -102,6 +102,7 @@ class StampCount {
     part_ = Part();
   }
 
+  // A rise of more than kStall_s, after nothing was received for so long, is a stall: start anew.
   void end_part(double receive_s) {
     if (size_ > 0) {
       const double rise_s = part_.level_s - part(size_ - 1).level_s;
@@ -125,7 +126,7 @@ class StampCount {
     return true;
   }
 
-  // About the phase that most have: that of the first may be late itself.
+  // Measured from the mean phase, as the first item may itself be late.
   [[nodiscard]] bool rises_by_steps() const {
     double sine = 0;
     double cosine = 0;
@@ -146,15 +147,15 @@ class StampCount {
   std::array<Part, kParts> parts_{};  // the oldest at begin_
   std::size_t begin_ = 0;
   std::size_t size_ = 0;
-  Part part_;  // of this second
+  Part part_;  // the current second
   double since_s_ = 0;
   std::size_t items_ = 0;
-  double longest_gap_s_ = 0;  // in it, without an item
-  double gap_before_s_ = 0;   // in the one before
+  double longest_gap_s_ = 0;  // in the current second, without an item
+  double gap_before_s_ = 0;   // in the second before
   double last_receive_s_ = 0;
   bool any_ = false;
   double last_sender_s_ = 0;
-  double step_s_ = 0;  // the grid's; 0: not known
+  double step_s_ = 0;  // of the grid; 0: unknown
 };
 
 static_assert(std::is_trivially_copyable_v<StampCount>);

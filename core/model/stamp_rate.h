@@ -1,16 +1,12 @@
 #pragma once
-// StampRate: do a sender's stamps run at another rate than its items come?
-//
+// StampRate: detects stamps that run at another rate than the items arrive.
 //   receive_i - sender_i = constant + b receive_i + delay_i,    stamps' rate = 1 - b
-//
-// A clock of quartz keeps |b| below 2e-4. Stamps counted at a nominal rate that the camera does not keep, or on a clock of
-// another frequency than told, run off the arrivals evenly and for ever. So does, for a while, a backlog that is being
-// worked off (b < 0), or one that grows (b > 0): those end, and come as evenly as pictures are large. Shown is b
-//   evenly       the least receive - sender of each second, less b as known by then, lie for the last kParts on one line, to
-//                kEven_s or 3 standard deviations of the least of a second's delays, were they exponential;
-//   for so long  that no backlog is meant: until they ran apart by kApart_s, or, where |b| is more than kNear, which no
-//                clock is off by, by kFarApart_s.
-// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are seconds.
+// A quartz clock keeps |b| below 2e-4. Stamps counted at a nominal rate that the camera does not
+// keep, or on a clock of another frequency than stated, drift from the arrivals evenly and for
+// ever. A backlog that shrinks (b < 0) or grows (b > 0) drifts too, but it ends, and it is uneven
+// as pictures differ in size (docs/clocks.md).
+// Fixed memory, trivially copyable, no allocation, no exceptions; one thread. All times are
+// seconds.
 
 #include <algorithm>
 #include <array>
@@ -24,7 +20,7 @@ namespace alidade {
 
 class StampRate {
  public:
-  static constexpr double kQuartz = 1e-3;  // |b| that a line may be held to
+  static constexpr double kQuartz = 1e-3;  // smaller |b| may be a clock's and are not reported
   static constexpr double kNear = 0.05;
   static constexpr double kApart_s = 0.5;
   static constexpr double kFarApart_s = 10;
@@ -32,7 +28,7 @@ class StampRate {
 
   void restart() { *this = StampRate(); }
 
-  // Finite values. Items that were overtaken teach nothing.
+  // Values must be finite. Overtaken items are ignored.
   void add(double receive_s, double sender_s) {
     if (items_ > 0 && receive_s - last_receive_s_ > kLongestGap_s) restart();
     if (any_ && !(sender_s > last_sender_s_)) {
@@ -53,7 +49,12 @@ class StampRate {
     part_ = {receive_s, level_s, 0};
   }
 
-  // The stamps' rate less one, if it is shown to be another.
+  // The stamps' rate minus 1, if it is shown to be another. b is shown if both hold:
+  //   evenly       the last kParts seconds' minima of receive - sender (chosen with b removed, as
+  //                known by then) lie on one line, to kEven_s or 3 standard deviations of a minimum
+  //                of exponential delays;
+  //   long enough  to exclude a backlog: the drift has reached kApart_s, or kFarApart_s if |b|
+  //                exceeds kNear, which no clock is off by.
   [[nodiscard]] std::optional<double> off() const {
     if (!even_since_s_ || std::abs(slope_) < kQuartz) return std::nullopt;
     const double apart_s = std::abs(slope_) * (last_receive_s_ - *even_since_s_);
@@ -71,9 +72,9 @@ class StampRate {
   static constexpr double kNone_s = std::numeric_limits<double>::infinity();
 
   struct Part {
-    double receive_s = 0;  // of the item that comes down farthest
+    double receive_s = 0;  // of the item with the lowest level
     double level_s = 0;
-    double spread_s = 0;  // standard deviation of the least, were the delays exponential
+    double spread_s = 0;  // standard deviation of the minimum if the delays are exponential
   };
 
   void end_part() {
@@ -117,10 +118,10 @@ class StampRate {
   std::array<Part, kParts> parts_{};  // the oldest at next_, once full
   std::size_t next_ = 0;
   std::size_t size_ = 0;
-  Part part_;  // of this second, and of it:
+  Part part_;  // the current second; and its:
   double since_s_ = 0;
   double items_ = 0;
-  double sum_s_ = 0;  // of the levels less slope_ times the time since the first of them
+  double sum_s_ = 0;  // of the levels minus slope_ times the time since since_s_
   double least_s_ = kNone_s;
   bool any_ = false;
   double last_receive_s_ = 0;

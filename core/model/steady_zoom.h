@@ -1,10 +1,12 @@
 #pragma once
-// SteadyZoom: what a lens's zoom readings say without their jitter; the one owner of when two readings are one zoom.
-//   exact     readings that stand still, or move, without turning back all the time go through as they are
-//   jitter    is known by changes that turn back as often as chance makes them, about a level that stands; sigma by
-//             their differences and spread. From then on a level stands for the readings of a rest, until the median
-//             of the latest five has left it; readings of a movement go through
-// A tolerance that is given takes the place of all that: readings go through. Fixed memory; allocates nothing.
+// SteadyZoom: removes jitter from a lens's zoom readings. The only place that decides whether two
+// readings are the same zoom.
+//   no jitter   readings that stand still, or move without reversing all the time, pass unchanged
+//   jitter      is detected by changes that reverse as often as chance has it, about a constant
+//               level; sigma comes from their differences and spread. From then on readings at rest
+//               are replaced by the level, until the median of the latest five leaves it; readings
+//               of a movement pass unchanged
+// A given tolerance replaces all that: readings pass unchanged. Fixed memory; no allocation.
 
 #include <algorithm>
 #include <array>
@@ -16,13 +18,13 @@ namespace alidade {
 
 class SteadyZoom {
  public:
-  static constexpr double kFar = 6;  // sigmas: from a level so far are movements, and glitches
+  static constexpr double kFar = 6;  // sigmas; readings farther off are movements or glitches
 
   SteadyZoom() = default;
-  // tolerance: device units within which two readings are one; none: it is found.
+  // tolerance: device units; two readings within it are the same zoom. None: found from the jitter.
   explicit SteadyZoom(std::optional<double> tolerance) : given_(tolerance) {}
 
-  // A finite reading, device units; seconds. Returns the steady one.
+  // zoom: finite, device units. Returns the steady reading.
   double add(double time_s, double zoom) {
     found_now_ = false;
     if (given_) return zoom;
@@ -39,7 +41,7 @@ class SteadyZoom {
     return rests_ ? at_rest(zoom) : moving(zoom);
   }
 
-  // The jitter of readings that were seen before; the next one begins a rest.
+  // Sets the jitter known from earlier readings. The next reading begins a rest.
   void know(double sigma) {
     sigma_ = own_sigma_ = creep_ = sigma;
     rests_ = true;
@@ -47,17 +49,18 @@ class SteadyZoom {
   }
 
   [[nodiscard]] bool has_jitter() const { return sigma_ > 0; }
-  // That of the last reading showed it.
+  // True if the last reading revealed the jitter.
   [[nodiscard]] bool found_now() const { return found_now_; }
   [[nodiscard]] double sigma() const { return sigma_; }  // device units
-  // How many rests there were: counts up where one begins. Nothing: the last reading went through.
+  // Number of the present rest; it counts up when one begins. Empty if the last reading passed
+  // unchanged.
   [[nodiscard]] std::optional<std::size_t> rest() const {
     return steadied_ ? std::optional<std::size_t>(rest_) : std::nullopt;
   }
-  // Within which two steady readings are of one zoom, device units.
+  // Device units; two steady readings within it are the same zoom.
   [[nodiscard]] double tolerance() const { return given_.value_or(kOneZoom * sigma_); }
 
-  // To no more figures than the jitter leaves.
+  // Rounded to the figures that the jitter leaves significant. Needs has_jitter().
   [[nodiscard]] double rounded(double zoom) const {
     const double figures = std::floor(std::log10(sigma_));
     const double unit = std::pow(10, std::abs(figures));
@@ -65,11 +68,11 @@ class SteadyZoom {
   }
 
  private:
-  static constexpr std::size_t kLatest = 8;    // readings by which a rest is known
-  static constexpr std::size_t kChanges = 16;  // by which jitter is known, at most
-  static constexpr double kOneZoom = 2;        // sigmas: a level errs by less than half of one
-  static constexpr double kMoved = 2.5;        // sigmas, of the median of five: 4.5 of its own
-  static constexpr double kSpread = 7;         // sigmas: of readings about one level
+  static constexpr std::size_t kLatest = 8;    // readings that define a rest
+  static constexpr std::size_t kChanges = 16;  // changes that define jitter, at most
+  static constexpr double kOneZoom = 2;        // sigmas; a level errs by less than half a sigma
+  static constexpr double kMoved = 2.5;        // sigmas; for the median of five: 4.5 of its own
+  static constexpr double kSpread = 7;         // sigmas; widest spread of readings about one level
 
   struct Change {
     double time_s = 0;
@@ -106,7 +109,8 @@ class SteadyZoom {
     std::nth_element(size.begin(), middle, size.begin() + static_cast<std::ptrdiff_t>(n - 1));
     const double spread = high - low;
     if (turns < 0.45 * steps || spread > kSpread * *middle) return;
-    // What is large may be glitches, or a zoom that is moved to and fro: white noise alone changes and turns so often.
+    // A large spread may be glitches, or a zoom moved to and fro. Only white noise changes and
+    // reverses so often.
     constexpr double kSmall = 0.02;  // of the largest reading
     const bool is_large = spread > kSmall * largest_;
     const auto readings = static_cast<double>(change(0).reading - change(n - 1).reading);
@@ -151,7 +155,7 @@ class SteadyZoom {
   }
 
   double at_rest(double zoom) {
-    constexpr std::size_t kMost = 32;  // readings, of a level: one that creeps is followed
+    constexpr std::size_t kMost = 32;  // readings in a level, at most: a creeping level is followed
     steadied_ = false;
     if (of_level_ == 0) {
       level_ = zoom;
@@ -179,7 +183,7 @@ class SteadyZoom {
       trend += (i < kLatest / 2 ? at : -at) / (static_cast<double>(kLatest) / 2);
     }
     const auto [low, high] = std::minmax_element(latest_.begin(), latest_.end());
-    // Three of its own sigmas.
+    // sigmas; three of the trend's own
     constexpr double kTrend = 2.1;
     if (std::abs(trend) > kTrend * sigma_ || *high - *low > kSpread * sigma_) return zoom;
     const double before = level_;
@@ -189,7 +193,8 @@ class SteadyZoom {
     return rounded(level_);
   }
 
-  // A level that leaves and comes back by little, as a motor that hunts: its jitter is no white noise, and larger.
+  // A level that leaves and returns by little, as with a motor that hunts: the jitter is larger
+  // than white noise shows.
   void note_creep(double step) {
     constexpr double kLongest_s = 20;
     constexpr double kLargest = 4;  // sigmas
@@ -203,26 +208,26 @@ class SteadyZoom {
   }
 
   std::optional<double> given_;
-  double largest_ = 0;                    // of all, without its sign
+  double largest_ = 0;                    // magnitude, of all readings
   std::array<double, kLatest> latest_{};  // readings
   std::size_t readings_ = 0;              // all
-  std::array<Change, kChanges> changed_;  // readings other than the one before
+  std::array<Change, kChanges> changed_;  // readings that differ from the one before
   std::size_t changes_ = 0;               // all
   std::size_t next_learning_ = 0;         // changes
-  double sigma_ = 0;                      // the larger of the next two; 0: no jitter is known
-  double own_sigma_ = 0;                  // by changes from reading to reading
-  double creep_ = 0;                      // by levels
-  std::size_t averaged_ = 0;              // what own_sigma_ is the mean of
+  double sigma_ = 0;                      // the larger of the next two; 0: no jitter known
+  double own_sigma_ = 0;                  // from changes between readings
+  double creep_ = 0;                      // from changes between levels
+  std::size_t averaged_ = 0;              // estimates averaged in own_sigma_
   bool found_now_ = false;
   bool rests_ = true;
   bool steadied_ = false;
   double level_ = 0;
   std::size_t of_level_ = 0;  // readings
-  std::size_t begun_ = 0;     // readings before the rest
+  std::size_t begun_ = 0;     // number of readings before the rest
   std::size_t since_moved_ = 0;
   std::size_t rest_ = 0;
   double time_s_ = 0;
-  double step_ = 0;  // from the level before to this one, if small
+  double step_ = 0;  // from the previous level to this one; 0 unless small
   double step_s_ = 0;
 };
 

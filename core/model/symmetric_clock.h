@@ -1,13 +1,13 @@
 #pragma once
-// SymmetricClock: the line of a stream whose stamps err to both sides, for ClockFilter, which says what an item is.
-//
-// State (value, rate) at x; between items the skew walks with density q = skew_wander^2 rate^3 per count or second
-// of x, which adds over dx
+// SymmetricClock: the line of a stream whose stamps have zero-mean errors. Used by ClockFilter.
+// State (value, rate) at x. Between items the skew walks with density q = skew_wander^2 rate^3 per
+// count or second of x. Over dx this adds
 //   Q = q [dx^3/3  dx^2/2; dx^2/2  dx].
-// The first items are joined by weighted least squares, later ones by a Kalman filter. Errors beyond 2.5 sigmas are
-// weighed down (Huber); the noise level is the mean logarithm of the errors. Derivation: docs/clocks.md.
-// The same interface as OneSidedClock; there is no minimum delay that could step.
-// Fixed memory, trivially copyable, no allocation, no exceptions.
+// The first items are joined by weighted least squares, later ones by a Kalman filter. Errors
+// beyond 2.5 sigmas are down-weighted (Huber). The noise level is the mean logarithm of the errors.
+// Derivation: docs/clocks.md.
+// Same interface as OneSidedClock; there is no minimum delay that could step. Fixed memory,
+// trivially copyable, no allocation, no exceptions.
 
 #include <algorithm>
 #include <cmath>
@@ -17,7 +17,8 @@
 
 namespace alidade::internal {
 
-// The line at x, later than line->x, when its slope walks with the given density: E d slope^2 = density dx.
+// Moves the line on to x >= line->x. Its slope walks with the given density: E d slope^2 = density
+// dx.
 inline void walk_to(double x, double density, LineEstimate* line) {
   const double dx = x - line->x;
   const double walk = density * dx;
@@ -52,7 +53,7 @@ class SymmetricClock {
     double weight = 1;
     if (young_.items > 0) {
       const double sigmas = std::abs(innovation) / std::sqrt(line_.var_value + noise_s_ * noise_s_);
-      // Mean of the logarithm: outliers cannot carry it away. E log|N(0,1)| = -0.635.
+      // Mean logarithm, which outliers cannot carry away. E log|N(0,1)| = -0.635.
       const double log_size = std::log(std::clamp(sigmas, 1e-3, 3.0)) + 0.635;
       const double n = std::min(young_.items, kNoiseMemory);
       noise_s_ =
@@ -81,9 +82,9 @@ class SymmetricClock {
     return item.y - line_.value_at(item.x);
   }
   [[nodiscard]] double without_line(double receive_s) const { return receive_s; }
-  // Standard deviation of the stamps' noise.
+  // s; standard deviation of the stamps' noise.
   [[nodiscard]] double jitter_s() const { return noise_s_; }
-  // The walk of the skew is in the line's own variance.
+  // 0: the walk of the skew is in the line's own variance.
   [[nodiscard]] double memory_s() const { return 0; }
   [[nodiscard]] double shift_s() const { return 0; }
   [[nodiscard]] double shift_variance() const { return 0; }
@@ -95,8 +96,8 @@ class SymmetricClock {
   static constexpr double kNoiseMemory = 1000;  // items
   static constexpr double kYoungItems = 64;
 
-  // Weighted least squares of the first items: unlike a Kalman filter's their covariance follows
-  // the noise level while it is still being learnt.
+  // Weighted least squares of the first items. Unlike a Kalman filter's, its covariance follows the
+  // noise level while that is still being learnt.
   struct YoungLine {
     double items = 0;
     double weight = 0, mean_x = 0, mean_y = 0, sxx = 0, sxy = 0;

@@ -1,14 +1,14 @@
 #pragma once
-// ZoomCurve: one calibration for every zoom reading z of a lens, from those at some readings, its nodes.
-//   y(z) = (log f, kappa, c_u, c_v)   kappa = k (R / f)^2, R half the image's diagonal, px: the distortion in the corner
-//   x = (z - z_first) / (z_last - z_first)
-//   y_j(z) = level_j + Gaussian process of covariance
-//     K_j(x, x') = L_j^2 + S_j^2 (x - 1/2)(x' - 1/2) + q_j^2 W(x + 1, x' + 1),   W(s, t) = m^2 (3 M - m) / 6,  m, M = min, max(s, t)
-// W is a twice integrated random walk's (Wahba 1978): its mean is a cubic spline, its variance grows with the cube of the
-// distance from the nodes, between and beyond them. A lens does not come back exactly: each movement leaves log f off by
-// eps ~ N(0, repeatability^2), at a node and at use. Line delay, axes, scales, aspect and clock offset are the same at all
-// readings (SharedParameter). A node between the dwells tells of y itself, what movements of the zoom showed of it
-// (is_between). Made by core/calibration/zoom_fit.h. Fixed memory; no allocation.
+// ZoomCurve: a calibration for any zoom reading z of a lens, interpolated between calibrations at
+// some readings, its nodes.
+//   y(z) = (log f, kappa, c_u, c_v);   kappa = k (R / f)^2: distortion in the corner,
+//   R half the image's diagonal (px);  x = (z - z_first) / (z_last - z_first)
+//   y_j(z) = level_j + Gaussian process in x with the covariance of ZoomSmoothness
+// Line delay, axes, scales, aspect and clock offset are the same at all readings
+// (kSharedParameters). A lens does not return exactly: each movement offsets log f by eps ~ N(0,
+// repeatability^2), at a node and at use. A node between dwells (is_between) is y itself, as
+// movements of the zoom showed it.
+// Made by core/calibration/zoom_fit.h. Fixed memory; no allocation.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -24,20 +24,25 @@ namespace alidade {
 enum class ZoomQuantity : int { kLogFocalLength, kCornerDistortion, kCentreU, kCentreV, kCount };
 inline constexpr int kZoomQuantityCount = static_cast<int>(ZoomQuantity::kCount);
 
-// What does not, in this order.
+// What does not depend on the reading, in this order.
 inline constexpr std::array<Parameter, 9> kSharedParameters = {
     Parameter::kAspect,   Parameter::kLineDelay, Parameter::kPanAxis0,
     Parameter::kPanAxis1, Parameter::kTiltAxis0, Parameter::kTiltAxis1,
     Parameter::kPanScale, Parameter::kTiltScale, Parameter::kClockOffset};
 inline constexpr int kSharedCount = static_cast<int>(kSharedParameters.size());
 
-// L, S and q above, in the unit of the quantity; x is 0 to 1 over the nodes.
+// Covariance of the process y_j. L, S, q are the members, in the unit of the quantity; x is 0 to 1
+// over the nodes:
+//   K(x, x') = L^2 + S^2 (x - 1/2)(x' - 1/2) + q^2 W(x + 1, x' + 1),   W(s, t) = m^2 (3 M - m) / 6,
+//   m, M = min, max(s, t)
+// W is that of a twice integrated random walk (Wahba 1978). Its mean is a cubic spline. Its
+// variance grows with the cube of the distance from the nodes, between and beyond them.
 struct ZoomSmoothness {
   double level_sigma = 0;
   double slope_sigma = 0;
   double roughness = 0;
 
-  // Of the process at two x of at least -1.
+  // K at two x of at least -1.
   [[nodiscard]] double covariance(double x, double other) const {
     const double low = std::min(x, other) + 1;
     const double high = std::max(x, other) + 1;
@@ -53,19 +58,20 @@ class ZoomCurve {
   template <int max_rows, int max_columns>
   using Bounded = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, max_rows, max_columns>;
 
-  // All that at() needs; matrices have the size of the nodes that there are.
+  // All that at() needs. Matrices have the size of the actual nodes.
   struct Content {
     int nodes = 0;
-    std::array<double, kMaxNodes> reading{};   // not decreasing; the first and the last differ
+    std::array<double, kMaxNodes> reading{};   // not decreasing; first and last differ
     std::array<bool, kMaxNodes> is_between{};  // without a visit: the value has no eps
     std::array<double, kZoomQuantityCount> level{};
     std::array<ZoomSmoothness, kZoomQuantityCount> smoothness;
     double repeatability = 0;  // sigma of log f after a movement
     Calibration shared;        // its image size and shared parameters count
-    // Node by node the quantities less their level, eps of that visit included.
+    // Node by node the quantities minus their level, with eps of that visit.
     Bounded<kZoomQuantityCount * kMaxNodes, 1> value;
     Bounded<kMaxSize, kMaxSize> covariance;  // of value, then the shared parameters
-    // Inverse covariance of the process at the nodes, repeatability at visits included, of each quantity.
+    // For each quantity: inverse covariance of the process at the nodes, with repeatability at
+    // visits.
     std::array<Bounded<kMaxNodes, kMaxNodes>, kZoomQuantityCount> inverse;
   };
 
@@ -74,7 +80,7 @@ class ZoomCurve {
 
   [[nodiscard]] bool empty() const { return c_.nodes == 0; }
   [[nodiscard]] const Content& content() const { return c_; }
-  // Nodes that are not between dwells.
+  // Number of nodes that are not between dwells.
   [[nodiscard]] int visits() const {
     const auto begin = c_.is_between.begin();
     return static_cast<int>(std::count(begin, begin + c_.nodes, false));
@@ -84,8 +90,8 @@ class ZoomCurve {
     return c_.reading[static_cast<std::size_t>(c_.nodes - 1)];
   }
 
-  // The calibration after a movement to this reading, its zoom set. False for an empty curve, and for a reading that is
-  // not finite or further from the nodes than these from each other.
+  // The calibration after a movement to this reading, with its zoom set. False for an empty curve,
+  // and for a reading that is not finite or farther beyond the nodes than the nodes' span.
   [[nodiscard]] bool at(double reading, Calibration* calibration) const {
     if (empty() || !std::isfinite(reading)) return false;
     const double x = position(reading);
@@ -105,7 +111,7 @@ class ZoomCurve {
       covariance(j, j) = std::max(0.0, smooth.covariance(x, x) - k.dot(weight[q]));
     }
     covariance(0, 0) += c_.repeatability * c_.repeatability;
-    // Columns: how each quantity's error goes with all that is in covariance.
+    // Columns: covariance of each quantity with all that is in c_.covariance.
     Eigen::Matrix<double, Eigen::Dynamic, kZoomQuantityCount, 0, kMaxSize, kZoomQuantityCount>
         of_all(c_.covariance.rows(), kZoomQuantityCount);
     of_all.setZero();
@@ -124,7 +130,8 @@ class ZoomCurve {
     return true;
   }
 
-  // The calibration of a node, 0 to content().nodes - 1, as it was at that visit; between visits without what a movement adds.
+  // The calibration of a node, 0 to content().nodes - 1, as it was at that visit. A node between
+  // visits has no eps.
   [[nodiscard]] Calibration node(int i) const {
     Calibration calibration;
     const int first = row(i, 0);
@@ -160,7 +167,7 @@ class ZoomCurve {
     const double per_corner = camera.distortion_of_corner();
     camera.radial_distortion = per_corner * y[1];
     camera.set_centre_offset(y.tail<2>());
-    Matrix4<double> J = Matrix4<double>::Identity();  // of f, k, c by y
+    Matrix4<double> J = Matrix4<double>::Identity();  // d (f, k, c) / d y
     J(0, 0) = camera.focal_length;
     J(1, 0) = 2 * camera.radial_distortion;
     J(1, 1) = per_corner;

@@ -5,7 +5,8 @@
 namespace alidade {
 namespace {
 
-// Of a pixel or direction of one row, from its Jacobians by (angle, rate) there and by the parameters.
+// Covariance of a pixel or direction of one row, from its Jacobians with respect to (angle, rate)
+// there and to the parameters.
 Matrix2<double> covariance(const FrameOrientation& frame, double row,
                            const Matrix<double, 2, 4>& J_motion,
                            const Sensitivity<2>& J_parameters) {
@@ -58,7 +59,7 @@ Sensitivity<6> telemetry_sensitivity(const Mechanics<double>& mechanics,
                                      const FrameMotion<double>& motion) {
   Sensitivity<6> out;
   out << motion_parameter_jacobian(mechanics, motion), Sensitivity<2>::Zero();
-  // A longer line delay makes it look later.
+  // A longer line delay makes the look-up later.
   out.col(index(Parameter::kLineDelay)).head<2>() = motion.reference_row * motion.rate.vector();
   return out;
 }

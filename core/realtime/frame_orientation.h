@@ -1,19 +1,16 @@
 #pragma once
-// FrameOrientation: how the camera looked into the world while one frame was exposed, and so the
-// direction of each of its pixels, whichever mode found it.
-//
-//   R_base_from_camera at row 0 (PTCEE 45), angular velocity (PTCEE 46), and, for any row v,
+// FrameOrientation: the camera's orientation while one frame was exposed, from whichever mode found
+// it: R_base_from_camera at row 0 (PTCEE 45), angular velocity (PTCEE 46), and for any row v
 //   direction = R_base_from_camera(angle + rate t + acceleration t^2 / 2) unproject(u),
 //   t = v * line_delay   (PTCEE 26, 27, and beyond)
-//
-// Angles are TRUE ones (rad), i.e. the measured ones divided by the calibrated scales; frames b (FRD)
-// and c (RDF). An orientation is perturbed as R Exp(xi), xi in the camera frame (PTCEE 5). Pixels are
-// continuous, the centre of the top-left one is at (0.5, 0.5). Covariances are first-order and
-// contain the calibration's own covariance. No allocation; plain values, any number of threads may
-// read one.
+// Angles are TRUE (rad): the measured ones divided by the calibrated scales. Frames: base b (FRD),
+// camera c (RDF). An orientation is perturbed as R Exp(xi), xi in the camera frame (PTCEE 5).
+// Pixels are continuous; the centre of the top-left one is (0.5, 0.5). Covariances are first-order
+// and contain the calibration's. No allocation; plain values; any number of threads may read one.
 
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <optional>
 
 #include "core/model/calibration.h"
 #include "core/model/projection_status.h"
@@ -22,7 +19,7 @@
 namespace alidade {
 
 enum class OrientationMode {
-  kNone,  // no orientation: the other fields mean nothing
+  kNone,  // no orientation; the other fields are invalid
   kPt,    // from telemetry
   kOe     // from telemetry and landmarks
 };
@@ -39,24 +36,26 @@ enum class OrientationMode {
   return "unknown mode";
 }
 
-// Of (pan, tilt, pan rate, tilt rate, pan acceleration, tilt acceleration).
+// Order: pan, tilt, pan rate, tilt rate, pan acceleration, tilt acceleration.
 using MotionCovariance = Matrix<double, 6, 6>;
 
 struct FrameOrientation {
-  double time_s = 0;  // capture of row 0, image clock
+  double time_s = 0;  // s, image clock; capture of row 0
   OrientationMode mode = OrientationMode::kNone;
-  int landmarks = 0;        // that held the result
-  Calibration calibration;  // by which it was found
+  int landmarks = 0;        // number used (inliers)
+  Calibration calibration;  // used to find the orientation
 
   // At row 0.
   PanTilt<double> angle;  // rad, true, not wrapped
   PanTilt<double> rate;   // rad/s, true
-  // rad/s^2, true, constant during the frame; 0 in PT mode, which has its effect in the covariance
+  // rad/s^2, true, constant during the frame. 0 in PT mode, where the covariance contains its
+  // effect.
   PanTilt<double> acceleration;
-  double zoom_rate = 0;        // 1/s, d log f / dt; the calibration's camera is that of row 0
-  std::optional<double> zoom_rate_sigma;  // 1/s; none: the lens is taken as at rest
+  double zoom_rate = 0;  // 1/s, d log f / dt; calibration.camera holds at row 0
+  // 1/s; none: the frame does not show it, and the lens is taken as at rest.
+  std::optional<double> zoom_rate_sigma;
   MotionCovariance motion_covariance = MotionCovariance::Zero();  // WITHOUT the calibration's part
-  Sensitivity<6> motion_sensitivity = Sensitivity<6>::Zero();     // which this tells
+  Sensitivity<6> motion_sensitivity = Sensitivity<6>::Zero();     // gives the calibration's part
   Matrix3<double> R_base_from_camera = r_frd_from_rdf<double>();
   Matrix3<double> orientation_covariance = Matrix3<double>::Zero();  // rad^2, of xi
   Vector3<double> angular_velocity = Vector3<double>::Zero();        // rad/s, camera frame
@@ -68,22 +67,23 @@ struct FrameOrientation {
     return Eigen::Quaterniond(R_base_from_camera);
   }
 
-  // Direction of pixel u in b at its own row's time; cov, if not null, is its covariance (rad^2) in
-  // tangent_basis(*d_b) for an exactly known u.
+  // Direction of pixel u in b at the time of its own row. cov, if not null, is its covariance
+  // (rad^2) in tangent_basis(*d_b) for an exact u.
   [[nodiscard]] ProjectionStatus direction(const Vector2<double>& u, Vector3<double>* d_b,
                                            Matrix2<double>* cov = nullptr) const;
 
-  // The pixel that sees a direction, inside the image or not; cov (px^2) for an exactly known d_b.
+  // The pixel that sees a direction, inside the image or not. cov (px^2) is for an exact d_b.
   [[nodiscard]] ProjectionStatus pixel(const Vector3<double>& d_b, Vector2<double>* u,
                                        Matrix2<double>* cov = nullptr) const;
 };
 
-// Of a motion that telemetry tells, looked up when the reference row is exposed.
+// Sensitivity of a motion from telemetry, looked up when the reference row is exposed.
 [[nodiscard]] Sensitivity<6> telemetry_sensitivity(const Mechanics<double>& mechanics,
                                                    const FrameMotion<double>& motion);
 
-// Fills everything from the true motion about any row, at which the calibration's camera holds, its measurement's covariance and its
-// sensitivity. False if a result is not finite; *out is then untouched.
+// Fills *out from the true motion, its measurement covariance and its sensitivity. The motion's
+// reference row may be any; the calibration's camera must hold there. False if a result is not
+// finite; *out is then unchanged.
 [[nodiscard]] bool make_frame_orientation(const Calibration& calibration, double time_s,
                                           OrientationMode mode, int landmarks,
                                           const FrameMotion<double>& motion,

@@ -1,14 +1,11 @@
 #pragma once
-// PT mode: a frame's orientation from telemetry alone (PTCEE section V-C, 44 to 46). No pixel is
-// touched.
-//
+// PT mode: a frame's orientation from telemetry alone (PTCEE section V-C, 44 to 46). Uses no pixel.
 //   measured angle and rate at  t0 + clock_offset + line_delay * height / 2,
-//   divided by the scales, carried to row 0 at that rate.
-//
-// t0 is the capture time of row 0 on the image clock, clock_offset turns it into telemetry time. The
-// paper looks up the time of row 0; the middle row is as far as possible from no row of the frame, so
-// that an accelerating mount does the least harm. What harm remains (half the acceleration times the
-// square of the time to the middle row, on average over the rows) is added to the covariance.
+//   divided by the scales, extrapolated to row 0 at that rate.
+// t0 is the capture time of row 0 on the image clock; clock_offset converts it to telemetry time.
+// The paper looks up row 0. The middle row is nearest to all rows, so an accelerating mount does
+// the least harm. The remaining error (half the acceleration times the squared time to the middle
+// row, averaged over the rows) is added to the covariance.
 // No allocation, no state, no waiting.
 
 #include "core/model/calibration.h"
@@ -17,12 +14,12 @@
 
 namespace alidade {
 
-// From a measured state of the time at which the middle row was exposed. False if a result is not
-// finite; *out is then untouched.
+// From the measured state when the middle row was exposed. False if a result is not finite; *out is
+// then unchanged.
 [[nodiscard]] bool pt_orientation(const Calibration& calibration, double frame_time_s,
                                   const InterpolatedPanTilt& at_middle_row, FrameOrientation* out);
 
-// frame_time_s is t0, one standard deviation of it frame_time_sigma_s. *out is written if
+// frame_time_s is t0, frame_time_sigma_s its standard deviation. *out is written if
 // has_result(status).
 template <std::size_t Capacity>
 [[nodiscard]] QueryStatus pt_orientation(const Calibration& calibration,

@@ -50,9 +50,10 @@ MotionDoubt motion_doubt_of(const OrientationRecord& record, const FrameOrientat
   out.turn = std::hypot(read_out_of(calibration) * rate_sigma, delay_sigma * rate);
   // Where telemetry alone answers, nothing shows whether the lens moves.
   const bool is_zoom_untold = frame.mode == OrientationMode::kPt && record.zoom.has_value();
-  out.log_f = is_zoom_untold ? kUnknownMotion.log_f
-                             : std::hypot(read_out_of(calibration) * frame.zoom_rate_sigma.value_or(0),
-                                          delay_sigma * frame.zoom_rate);
+  out.log_f = is_zoom_untold
+                  ? kUnknownMotion.log_f
+                  : std::hypot(read_out_of(calibration) * frame.zoom_rate_sigma.value_or(0),
+                               delay_sigma * frame.zoom_rate);
   return out;
 }
 

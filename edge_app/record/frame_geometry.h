@@ -34,10 +34,10 @@ struct PlainCalibration {
 
 struct FrameGeometry {
   OrientationMode mode = OrientationMode::kNone;
-  PanTilt<double> angle;         // rad, true angle, not wrapped
-  PanTilt<double> rate;          // rad/s
-  PanTilt<double> acceleration;  // rad/s^2
-  double zoom_rate = 0;          // 1/s
+  PanTilt<double> angle;                  // rad, true angle, not wrapped
+  PanTilt<double> rate;                   // rad/s
+  PanTilt<double> acceleration;           // rad/s^2
+  double zoom_rate = 0;                   // 1/s
   std::optional<double> zoom_rate_sigma;  // 1/s; none: the lens is taken as at rest
   std::array<double, 36> motion_covariance{};
   std::array<double, 6 * kParameterCount> motion_sensitivity{};

@@ -1,21 +1,20 @@
 #pragma once
-// ask_ahead: asks memory for what is needed soon, and does not wait for it. A frame and its map are larger than the cache: what the
-// last frame has used is gone, and waiting for it is a third of a frame's time.
-// Nothing is read: any address will do. No allocation.
+// ask_ahead: prefetches memory that is needed soon, without waiting. A frame and its map are larger
+// than the cache. Without it, waiting for memory takes a third of a frame's time. Reads nothing, so
+// any address is valid. No allocation.
 
 namespace alidade {
 
-inline constexpr int kCacheLine = 64;  // bytes; where lines are longer some are asked for twice
+inline constexpr int kCacheLine = 64;  // bytes; longer lines are partly requested twice
 
-// The line that holds this address.
+// The cache line of this address.
 inline void ask_ahead(const void* address) {
   constexpr int kRead = 0;
-  constexpr int kOfUseForLong =
-      2;  // into the second cache: the first is too small to hold it until then
+  constexpr int kOfUseForLong = 2;  // second-level cache: the first is too small to keep it
   __builtin_prefetch(address, kRead, kOfUseForLong);
 }
 
-// All lines from one address up to another.
+// All cache lines from begin up to end.
 inline void ask_ahead(const void* begin, const void* end) {
   for (const auto* at = static_cast<const char*>(begin); at < end; at += kCacheLine) ask_ahead(at);
 }

@@ -1,9 +1,8 @@
 #pragma once
-// Sixteen bytes at a time, by the compiler's own vectors: one source for SSE2 and for NEON, which
-// every x86-64 and ARM64 processor has.
-//
-// Besides: four floats. Whatever loads and stores touches no byte beyond what it names, and needs no alignment. max, min, shuffle
-// and the steps from bytes to floats become one instruction each. For little-endian processors.
+// Vectors of sixteen bytes or four floats, by the compiler's vector extensions: one source for SSE2
+// and NEON, which every x86-64 and ARM64 processor has. Little-endian processors only.
+// Loads and stores touch only the bytes they name and need no alignment. max, min, shuffle and the
+// steps from bytes to floats compile to one instruction each.
 
 #include <cstdint>
 #include <cstring>
@@ -33,7 +32,7 @@ inline void store(ByteVector v, std::uint8_t* to) { std::memcpy(to, &v, sizeof(v
 
 [[nodiscard]] inline ByteVector broadcast(std::uint8_t value) { return ByteVector{} + value; }
 
-// Whether a lane of a is greater than the same lane of b.
+// True if any lane of a is greater than the same lane of b.
 [[nodiscard]] inline bool any_greater(ByteVector a, ByteVector b) {
   const auto greater = a > b;
   std::uint64_t halves[2];
@@ -41,7 +40,7 @@ inline void store(ByteVector v, std::uint8_t* to) { std::memcpy(to, &v, sizeof(v
   return (halves[0] | halves[1]) != 0;
 }
 
-// Lanes of two vectors in any order: those of a come first, then those of b.
+// Lanes of two vectors in any order. Indices first count those of a, then those of b.
 template <int... kLanes, class V>
 [[nodiscard]] inline V shuffle(V a, V b) {
 #if defined(__clang__)
@@ -62,7 +61,8 @@ namespace internal {
 using IntVector = std::int32_t __attribute__((vector_size(16)));
 using LongVector = std::uint64_t __attribute__((vector_size(16)));
 
-// The first eight bytes, as far as Word reaches; by the compilers' own conversion they go one by one.
+// The first sizeof(Word) bytes, at most eight, as 16-bit lanes. The compilers' own conversion works
+// byte by byte.
 template <class Word>
 [[nodiscard]] inline ShortVector load_shorts(const std::uint8_t* from) {
   Word word;
@@ -86,12 +86,12 @@ template <class Word>
 
 }  // namespace internal
 
-// Four bytes as numbers.
+// Four bytes as floats.
 [[nodiscard]] inline FloatVector load_four(const std::uint8_t* from) {
   return internal::low_floats(internal::load_shorts<std::uint32_t>(from));
 }
 
-// Eight bytes as numbers.
+// Eight bytes as floats.
 [[nodiscard]] inline EightFloats load_eight(const std::uint8_t* from) {
   const ShortVector shorts = internal::load_shorts<std::uint64_t>(from);
   return {internal::low_floats(shorts), internal::high_floats(shorts)};

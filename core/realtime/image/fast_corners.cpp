@@ -30,7 +30,8 @@ constexpr std::array<std::array<int, 2>, kCircle> kOffsets = {{{0, -3},
                                                                {-2, -2},
                                                                {-1, -3}}};
 
-// Every arc of 9 holds one of each two opposite pixels: a bound on the scores from n pairs.
+// Upper bound of the scores from n pairs of opposite pixels: every arc of 9 contains one of each
+// pair.
 template <int kPairs>
 ByteVector score_bound(ByteVector centre, const std::array<ByteVector, 2 * kPairs>& pairs) {
   ByteVector brightest = max(pairs[0], pairs[1]);
@@ -42,8 +43,8 @@ ByteVector score_bound(ByteVector centre, const std::array<ByteVector, 2 * kPair
   return max(subtract_saturated(brightest, centre), subtract_saturated(centre, darkest));
 }
 
-// Scores of 16 pixels from the pixels of their circles. The minimum over an arc of 9 comes from those
-// over 2, 4 and 8.
+// Scores of 16 pixels from the pixels of their circles. The minimum over an arc of 9 is built from
+// those over 2, 4 and 8.
 ByteVector scores(ByteVector centre, const std::array<ByteVector, kCircle>& circle) {
   std::array<ByteVector, kCircle> low = circle;
   std::array<ByteVector, kCircle> high = circle;
@@ -64,7 +65,7 @@ ByteVector scores(ByteVector centre, const std::array<ByteVector, kCircle>& circ
   return max(subtract_saturated(brightest, centre), subtract_saturated(centre, darkest));
 }
 
-// Whether a pixel's neighbour beats it: of equals the first in reading order wins.
+// True if a neighbour beats the pixel. Of equals the first in reading order wins.
 bool beaten(const ImageView& image, const FastCorner& corner) {
   for (int dv = -1; dv <= 1; ++dv) {
     for (int du = -1; du <= 1; ++du) {
@@ -120,7 +121,7 @@ void FastGrid::search_row(const ImageView& image, int v) {
     FastCorner& best = best_[static_cast<std::size_t>(cell)];
     const int cell_end = std::min(first + cell_size_, end);
     for (int u = first; u < cell_end; u += kByteLanes) {
-      // Sixteen pixels that end with the image; those of other cells are left out below.
+      // Sixteen pixels, not beyond the image's end. Pixels of other cells are skipped below.
       const int start = std::min(u, end - kByteLanes);
       const ByteVector to_beat = broadcast(best.score);
       const auto centre = load<ByteVector>(centres + start);
@@ -157,7 +158,7 @@ FastResult FastGrid::detect(const ImageView& image, std::uint8_t threshold, Fast
 
   const int end = image.height - kRadius;
   for (int first = kRadius; first < end; first += cell_size_) {
-    // A place in row 0, which has no corners, means none yet.
+    // Row 0 has no corners, so v = 0 means none yet.
     std::fill(best_.begin(), best_.end(), FastCorner{0, 0, threshold});
     for (int v = first; v < std::min(first + cell_size_, end); ++v) search_row(image, v);
     for (const FastCorner& best : best_) {

@@ -1,20 +1,13 @@
 #pragma once
-// FastGrid: FAST-9 corners that spread over the image, at most one a cell (PTCEE section V-A, 49).
-//
-// A pixel is a corner if 9 neighbouring pixels of the 16 on the circle of radius 3 around it are all
-// brighter, or all darker, than it by more than the threshold. Its score is the largest threshold for
-// which that is so, plus one:
-//
-//   score = max over the 16 arcs of 9 of max(min(arc) - centre, centre - max(arc)),
-//
-// and it is a corner if score > threshold. (OpenCV's response is score - 1.)
-// A cell keeps its best corner, the first in reading order of equals; a corner is then given only if it is
-// the best of its 3x3 pixels too (one beyond the cell's border may be better, and then stands in that
-// cell). So all corners given are among those of FAST with non-maximum suppression.
-// The centre of a corner's pixel is (u + 0.5, v + 0.5). Cells are squares from pixel (3, 3) on; the three
-// outermost rows and columns have no corners.
-// A cell's best raises the threshold for the rest of the cell, which is what makes this fast.
-// Cells are allocated by the constructor; detect() allocates nothing, waits for nothing.
+// FastGrid: FAST-9 corners spread over the image, at most one per cell (PTCEE section V-A, 49).
+// A pixel is a corner if 9 neighbouring pixels of the 16 on the circle of radius 3 are all
+// brighter, or all darker, than it by more than the threshold. Its score is the largest such
+// threshold plus one:
+//   score = max over the 16 arcs of 9 of max(min(arc) - centre, centre - max(arc)).
+// A pixel is a corner if score > threshold. (OpenCV's response is score - 1.) The centre of its
+// pixel is (u + 0.5, v + 0.5). Cells are squares from pixel (3, 3) on. The three outermost rows and
+// columns have no corners.
+// The constructor allocates; detect() allocates nothing and waits for nothing.
 
 #include <cstdint>
 #include <vector>
@@ -31,27 +24,30 @@ struct FastCorner {
 
 enum class FastStatus {
   kOk,
-  kOverflow,  // there were more corners than the caller had room for; see FastResult::dropped
+  kOverflow,  // more corners than capacity; see FastResult::dropped
   kNoImage,   // not ImageView::valid()
-  kTooSmall,  // less than 22 x 7 pixels
-  kTooLarge   // wider or higher than the constructor was told
+  kTooSmall,  // below 22 x 7 pixels
+  kTooLarge   // larger than the constructor's maximum
 };
 
 struct FastResult {
   FastStatus status = FastStatus::kOk;
-  int count = 0;  // corners written
-  int dropped =
-      0;  // corners found and not written for lack of room: the last in reading order of cells
+  int count = 0;    // corners written
+  int dropped = 0;  // not written for lack of room: the last in reading order of cells
 };
 
 class FastGrid {
  public:
-  // cell_size in pixels; at least 8. Sizes up to 65535.
+  // cell_size: px, at least 8. Sizes up to 65535.
   FastGrid(int max_width, int max_height, int cell_size);
   FastGrid(const FastGrid&) = delete;
   FastGrid& operator=(const FastGrid&) = delete;
 
-  // Corners in reading order of their cells; max_cells() of them always have room.
+  // Corners in reading order of their cells. Room for max_cells() always suffices.
+  // A cell keeps its best corner, the first in reading order of equals. It is returned only if it
+  // is also the best of its 3x3 pixels, which may belong to another cell. So all corners are among
+  // those of FAST with non-maximum suppression. The best score of a cell raises the threshold for
+  // its rest, which makes this fast.
   [[nodiscard]] FastResult detect(const ImageView& image, std::uint8_t threshold,
                                   FastCorner* corners, int capacity);
 
@@ -66,10 +62,10 @@ class FastGrid {
   int cell_size_;
   int max_columns_;
   int max_rows_;
-  std::vector<FastCorner> best_;  // of one row of cells
+  std::vector<FastCorner> best_;  // for one row of cells
 };
 
-// Of one pixel at least 3 pixels inside the image.
+// Score of a pixel at least 3 pixels inside the image.
 [[nodiscard]] std::uint8_t fast_score(const ImageView& image, int u, int v);
 
 }  // namespace alidade

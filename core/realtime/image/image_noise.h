@@ -1,8 +1,8 @@
 #pragma once
-// The noise of an image, from the image alone: standard deviation of white noise, in grey levels, by the
-// second differences of the smoothest quarter of a sample of its pixels (Immerkaer 1996, made robust).
-// Where all is textured it is too large. Never below what rounding to whole grey levels makes.
-// Pure; no allocation.
+// Noise of an image, from the image alone: standard deviation of white noise (grey levels), from
+// the second differences of the smoothest quarter of a sample of its pixels (Immerkaer 1996, made
+// robust). Too large if everything is textured. Never below the noise of rounding to whole grey
+// levels. Pure; no allocation.
 
 #include <vector>
 
@@ -10,27 +10,27 @@
 
 namespace alidade {
 
-// scratch: room for as many samples as shall be taken, at least 1.
+// scratch: room for `capacity` samples, at least 1.
 [[nodiscard]] double image_noise(const ImageView& image, float* scratch, int capacity);
 
 struct RunningNoiseOptions {
-  double expected = 2;  // grey levels, > 0: until an image tells
-  int samples = 2048;   // that an image is looked at by, at least 1
+  double expected = 2;  // grey levels, > 0; until the first image
+  int samples = 2048;   // samples per image, at least 1
   double memory = 0.1;  // weight of the latest image, 0 to 1
 
-  // False and one line in *error (if not null) when a value is not valid.
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
-// The noise of a camera's images, one standard deviation in grey levels, averaged over the latest. Of the
-// images and not of what alignment leaves over, which motion blur makes larger. Memory is taken by the
-// constructor; nothing else allocates.
+// Noise of a camera's images: one standard deviation (grey levels), averaged over the latest ones.
+// It comes from the images, not from alignment residuals, which motion blur increases. The
+// constructor takes all memory.
 class RunningNoise {
  public:
   explicit RunningNoise(const RunningNoiseOptions& options);
 
   void reset() { sigma_ = options_.expected; }
-  // first: nothing before it counts. image: valid.
+  // first: earlier images do not count. image: valid.
   void learn(const ImageView& image, bool first);
   [[nodiscard]] double sigma() const { return sigma_; }
 

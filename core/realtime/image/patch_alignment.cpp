@@ -19,9 +19,9 @@ constexpr int kTaps = CubicSpline::kTaps;
 constexpr int kSource = kSize + kTaps - 1;  // pixels under a patch, in each direction
 constexpr double kHalf = 0.5 * (kSize - 1);
 
-// Correlation of the noise of two points 0, 1, 2 px apart, times the variance of a point's noise: the
-// spline's correlation with itself, averaged over the fraction of a pixel (the B-spline of degree 7;
-// what it has at 3 px, 0.0002, is left out).
+// Correlation of the noise of two points 0, 1, 2 px apart, times the variance of a point's noise.
+// It is the spline's autocorrelation, averaged over the fraction of a pixel (the B-spline of degree
+// 7). Its value at 3 px, 0.0002, is left out.
 constexpr float kNoise0 = 2416.0F / 5040;
 constexpr float kNoise1 = 1191.0F / 5040;
 constexpr float kNoise2 = 120.0F / 5040;
@@ -30,7 +30,7 @@ constexpr float kNoise2 = 120.0F / 5040;
 using Row = EightFloats;
 static_assert(kSize == 8 && kTaps == 4, "as a row holds eight points, and shifted() makes four");
 
-// Of eleven pixels, those that lie 0, 1, 2 and 3 px right of the first of each point's.
+// From eleven pixels: those 0, 1, 2 and 3 px right of each point's first.
 std::array<Row, kTaps> shifted(const std::uint8_t* pixels) {
   const Row first = load_eight(pixels);
   const Row last = load_eight(pixels + 3);
@@ -78,7 +78,7 @@ void sample_grid(const ImageView& image, const TapPlace& place, Points* value, P
 
 float sum_of_product(const Points& a, const Points& b) { return (a * b).sum(); }
 
-// R times a field of values at the points; noise beyond the patch is no noise of its points.
+// R times a field of values at the points. Noise beyond the patch is ignored.
 Points correlate(const Points& field) {
   const auto along_rows = [](const Points& in) {
     Points out = kNoise0 * in;
@@ -98,11 +98,11 @@ Points correlate(const Points& field) {
   return out;
 }
 
-// What light adds to a patch: a level and a slope each way, as orthonormal fields.
+// Effect of light on a patch: a level and a slope in each direction, as orthonormal fields.
 struct Light {
   Points level = Points::Constant(1.0F / kSize);
   Points slope_u, slope_v;
-  float trace = 0;  // of these three with R: what a fit of them takes out of unit noise
+  float trace = 0;  // of the three fields with R: what fitting them takes out of unit noise
 
   Light() {
     for (int j = 0; j < kSize; ++j) {
@@ -171,7 +171,7 @@ PrepareStatus sample_reference(const ImageView& reference, const Vector2<double>
   return PrepareStatus::kOk;
 }
 
-// Of a displacement's weights with the gradients and the points' places.
+// Moments of a displacement's weights with the gradients and the points' positions.
 Matrix2<float> moments(const Points& to, const Points& du, const Points& dv) {
   const auto place = Eigen::Array<float, kSize, 1>::LinSpaced(-static_cast<float>(kHalf),
                                                               static_cast<float>(kHalf));
@@ -217,7 +217,7 @@ PrepareStatus prepare(const ImageView& reference, const Vector2<double>& centre,
   light().take_out_of(&dv);
   const float energy = sum_of_product(value, value);
   const Vector2<float> value_gradient(sum_of_product(value, du), sum_of_product(value, dv));
-  // What of the gradients neither light nor gain can imitate.
+  // The part of the gradients that neither light nor gain can imitate.
   const float per_energy = energy > 0 ? 1 / energy : 0;
   du -= value_gradient.x() * per_energy * value;
   dv -= value_gradient.y() * per_energy * value;
@@ -286,7 +286,7 @@ AlignmentStatus align(const ReferencePatch& reference, const ImageView& image,
       out->iterations = iteration;
       return AlignmentStatus::kUnlike;
     }
-    // Beyond 1 px the linearisation promises more than it knows.
+    // The linearisation is not reliable beyond 1 px.
     Vector2<double> step = (moved / gain).cast<double>();
     const double length = step.norm();
     if (length > 1) step /= length;
@@ -303,7 +303,7 @@ AlignmentStatus align(const ReferencePatch& reference, const ImageView& image,
     const Points residual = contrast - gain * reference.value;
     const double energy = sum_of_product(contrast, contrast);
     const double left = sum_of_product(residual, residual);
-    // Both sides were rounded to whole grey levels, and so have at least a variance of 1/12.
+    // Both sides are rounded to whole grey levels, so each has at least the variance 1/12.
     const double variance = std::max(left / reference.residual_trace, (1.0 + gain * gain) / 12);
     out->position = u;
     out->covariance = (variance / (gain * gain) * (kNoiseFreedom / (kNoiseFreedom - 2))) *

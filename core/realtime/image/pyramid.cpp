@@ -11,8 +11,8 @@ namespace {
 // Whole cache lines, so that no two octaves share one.
 std::ptrdiff_t row_stride(int width) { return (static_cast<std::ptrdiff_t>(width) + 63) / 64 * 64; }
 
-// The means of eight squares, from 16 bytes of an upper and of a lower row. Neighbours are the low
-// and the high byte of one word, whichever of them comes first.
+// Means of eight 2x2 squares, from 16 bytes of an upper and of a lower row. Neighbours are the low
+// and high byte of one word, in either order.
 ShortVector means(const std::uint8_t* upper, const std::uint8_t* lower) {
   const auto a = load<ShortVector>(upper);
   const auto b = load<ShortVector>(lower);
@@ -33,7 +33,7 @@ TwoRows two_rows(const ImageView& image, int first) {
   return {image.row(first), image.row(first + 1)};
 }
 
-// A row of `width` means. Meanwhile memory is asked for two rows that come later, where kAskAhead.
+// A row of `width` means. If kAskAhead, prefetches two later rows meanwhile.
 template <bool kAskAhead>
 void halve(const TwoRows& in, const TwoRows& later, int width, std::uint8_t* out) {
   int u = 0;
@@ -89,10 +89,11 @@ PyramidStatus Pyramid::build(const ImageView& image, int octaves) {
   return PyramidStatus::kOk;
 }
 
-// Two rows of an octave become one of the next while they are in the cache, which holds no whole image; and as most of
-// the time would go into waiting for the image, memory is asked for its rows well before they are needed.
+// Halves two rows of an octave to one of the next while they are in the cache, which does not hold
+// a whole image. Most of the time would go into waiting for the image, so its rows are prefetched
+// well before they are needed.
 void Pyramid::fill() {
-  constexpr int kRowsAhead = 8;  // half of it waits, twice of it gains nothing
+  constexpr int kRowsAhead = 8;  // with half as many it waits, with twice as many it gains nothing
   const ImageView& image = views_[0];
   for (int v = 0; v < views_[1].height; ++v) {
     const int later = std::min(2 * v + kRowsAhead, image.height - 2);
@@ -107,7 +108,7 @@ void Pyramid::fill() {
   }
 }
 
-// Octaves but the first lie in memory_, one after the other.
+// Octaves from 1 on are in memory_, one after the other.
 std::uint8_t* Pyramid::row_of(int octave, int v) {
   const ImageView& view = views_[static_cast<std::size_t>(octave)];
   return memory_.data() + (view.row(v) - memory_.data());

@@ -1,15 +1,12 @@
 #pragma once
-// Pyramid: an image at half, quarter, ... size, each octave the mean of 2x2 pixels of the one before,
-// rounded to the nearest grey level (halves up).
-//
-//   octave l has floor(width / 2^l) x floor(height / 2^l) pixels; a last odd column or row is left out.
-//   A point u of the image lies at u / 2^l of octave l, exactly, because pixel (i, j) covers
-//   [i, i+1] x [j, j+1] with its centre at (i + 0.5, j + 0.5).
-//
-// Octave 0 is the image itself and is not copied: the caller's memory must outlive the use of it.
-// White noise of sigma grey levels becomes about sigma / 2^l, and each octave's rounding adds a
-// standard deviation of 0.3 and, upwards, 1/8 of a grey level to the mean.
-// All memory is taken by the constructor; build() allocates nothing, waits for nothing.
+// Pyramid: an image at half, quarter, ... size. Each octave is the mean of 2x2 pixels of the
+// previous one, rounded to the nearest grey level (halves up).
+// Octave l has floor(width / 2^l) x floor(height / 2^l) pixels; a last odd column or row is
+// dropped. A point u of the image is exactly at u / 2^l of octave l, as pixel (i, j) covers [i,
+// i+1] x [j, j+1]. White noise of sigma grey levels becomes about sigma / 2^l. Each octave's
+// rounding adds a standard deviation of 0.3 and, as it rounds up, 1/8 of a grey level to the mean.
+// Octave 0 is the image itself, not a copy: the caller's memory must outlive its use. The
+// constructor takes all memory; build() allocates nothing and waits for nothing.
 
 #include <array>
 #include <cstdint>
@@ -22,21 +19,21 @@ namespace alidade {
 enum class PyramidStatus {
   kOk,
   kNoImage,  // not ImageView::valid()
-  kTooLarge  // wider or higher than the constructor was told
+  kTooLarge  // larger than the constructor's maximum
 };
 
 class Pyramid {
  public:
   static constexpr int kMaxOctaves = 8;
 
-  // For images up to max_width x max_height and up to max_octaves, octave 0 among them; larger
-  // and smaller numbers of octaves than 1 to kMaxOctaves are taken as these.
+  // For images up to max_width x max_height and up to max_octaves, including octave 0. max_octaves
+  // is clamped to 1 to kMaxOctaves.
   Pyramid(int max_width, int max_height, int max_octaves);
   Pyramid(const Pyramid&) = delete;
   Pyramid& operator=(const Pyramid&) = delete;
 
-  // Makes the first `octaves` octaves: fewer where the constructor was told fewer, or where the next
-  // would have no pixel. On failure there are none.
+  // Makes the first `octaves` octaves: fewer if the constructor's maximum is lower, or if the next
+  // one would have no pixel. On failure there are none.
   [[nodiscard]] PyramidStatus build(const ImageView& image, int octaves);
 
   [[nodiscard]] int octaves() const { return octaves_; }

@@ -1,6 +1,6 @@
 #pragma once
-// The small image by which a point is found again: cut out where the point was seen first, larger than the
-// patch that is compared, so that it can be warped (patch_alignment.h).
+// The small image by which a point is found again. It is cut out where the point was first seen,
+// and is larger than the compared patch, so that it can be warped (patch_alignment.h).
 
 #include <array>
 #include <cstdint>
@@ -10,7 +10,7 @@
 namespace alidade {
 
 inline constexpr int kReferencePixels = 16;  // in each direction
-// The point itself in its reference image, px: the centre of pixel (8, 8).
+// px; the point in its reference image: the centre of pixel (8, 8).
 inline constexpr double kReferenceCentre = 8.5;
 
 // Row by row, grey levels.

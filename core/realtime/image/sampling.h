@@ -1,18 +1,14 @@
 #pragma once
-// The grey value and its gradient between pixels, by one of three kernels:
-//
+// Grey value and gradient between pixels, by one of three kernels:
 //   value(u) = sum_k image[k] w(u - c_k),   gradient(u) = sum_k image[k] w'(u - c_k),
-//
-// c_k the pixels' centres, w a product of one function of u and the same of v. The gradient is exactly
-// the derivative of the value.
-//
+// c_k are the pixels' centres; w is a product of one function of u and the same of v. The gradient
+// is exactly the derivative of the value.
 //   Bilinear      2x2  continuous; the gradient jumps at pixel centres
-//   CatmullRom    4x4  continuous gradient; goes through the pixels
-//   CubicSpline   4x4  the cubic B-spline without prefilter: blurs (standard deviation 0.58 px) instead
-//                      of going through the pixels, almost alike wherever the point lies
-//
-// README.md has what each costs the position of a pattern that is compared at two fractions of a pixel.
-// Points whose taps leave the image are refused; nothing is extrapolated. Pure functions.
+//   CatmullRom    4x4  continuous gradient; interpolates the pixels
+//   CubicSpline   4x4  cubic B-spline without prefilter: blurs (standard deviation 0.58 px) almost
+//                 equally at any position, does not interpolate the pixels
+// Points whose taps leave the image are refused. Pure functions. Position errors by kernel:
+// docs/measurements.md.
 
 #include <cmath>
 
@@ -25,7 +21,7 @@ namespace alidade {
 template <int kCount>
 struct Taps {
   float weight[kCount];
-  float slope[kCount];  // derivative of weight by the point's position, 1/px
+  float slope[kCount];  // 1/px; derivative of weight with respect to the position
 };
 
 struct Bilinear {
@@ -54,7 +50,7 @@ struct CubicSpline {
   }
 };
 
-// Where a point lies among the taps of a kernel with kTaps of them in each direction.
+// Position of a point among the kTaps x kTaps taps of a kernel.
 struct TapPlace {
   int column, row;  // of the first tap
   float t_u, t_v;   // [0, 1)
@@ -62,17 +58,17 @@ struct TapPlace {
 
 enum class SampleStatus {
   kOk,
-  kOutsideMargin  // a tap would lie outside the image, or the point is not finite
+  kOutsideMargin  // a tap is outside the image, or the point is not finite
 };
 
-// For a point, or for the first of a block of points 1 px apart, columns x rows of them.
+// For a point, or for the first of columns x rows points 1 px apart.
 template <int kTaps>
 [[nodiscard]] inline SampleStatus find_taps(const ImageView& image, double u, double v, int columns,
                                             int rows, TapPlace* out) {
   constexpr int kBefore = kTaps / 2 - 1;
   const double x = u - (0.5 + kBefore);
   const double y = v - (0.5 + kBefore);
-  // Compared before the cast, which could not hold all of them; false for NaN.
+  // Compared before the cast, as not every value fits an int. False for NaN.
   if (!(x >= 0 && y >= 0 && x < image.width - (kTaps + columns - 2) &&
         y < image.height - (kTaps + rows - 2))) {
     return SampleStatus::kOutsideMargin;

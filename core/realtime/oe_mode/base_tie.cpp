@@ -16,7 +16,7 @@ bool BaseTieOptions::validate(const char** error) const {
 }
 
 Matrix2<double> difference_of_shared(const SharedByView& k, const SharedByView& t) {
-  // Where one lens sees less than the other, what it sees decides.
+  // If one lens sees less than the other, its view decides.
   const Vector2<double> extent = k.extent.cwiseMin(t.extent);
   double overlap = 1;
   for (int axis = 0; axis < 2; ++axis) {
@@ -26,7 +26,7 @@ Matrix2<double> difference_of_shared(const SharedByView& k, const SharedByView& 
   Matrix2<double> out = k.covariance + t.covariance;
   const Vector2<double> common = k.covariance.diagonal().cwiseMin(t.covariance.diagonal());
   out.diagonal() -= 2 * overlap * common;
-  // What of the correlation of the axes is left is not known: as much as there may be.
+  // The remaining correlation of the axes is unknown: allow as much as is possible.
   const double most = std::sqrt(std::max(0.0, out(0, 0) * out(1, 1)));
   out(0, 1) = out(1, 0) = std::clamp((1 - overlap) * out(0, 1), -most, most);
   return out;
@@ -71,7 +71,7 @@ bool BaseTie::settle(const BaseMeasurement& measurement, const MapOffset& offset
                            -asked.added.sensitivity};
   const bool by_map = asked.kind == Answer::Kind::kLandmarks;
   if (is_tied_ && !measurement.moved) {
-    // Of an answer in the view that was measured, but for its own noise.
+    // Covariance of an answer in the measured view, without its own noise.
     Matrix2<double> known = of_telemetry(offset).covariance;
     if (by_map) {
       known = is_by_map_ ? covariance_in(asked.shared)

@@ -40,7 +40,7 @@ Found count_found(const Group& group, const Vector2<double>& angle, double min_c
   return found;
 }
 
-// The shift whose patches are most alike, of a grid 2 px of this octave apart.
+// The shift of the most similar patches, from a grid with 2 px of this octave between shifts.
 Vector2<double> search(const Group& group, double radius_px) {
   constexpr int kMaxSteps = 5;
   Matrix2<double> J = Matrix2<double>::Zero();
@@ -84,9 +84,9 @@ bool common_step(const Group& group, const CoarseOptions& options, Vector2<doubl
       continue;
     }
     Term& term = terms[static_cast<std::size_t>(count++)];
-    // Beyond 1.5 px the linearisation promises more than it knows.
+    // The linearisation is not reliable beyond 1.5 px.
     term.step = step.step / std::max(1.0, step.step.norm() / 1.5);
-    // Equal noise everywhere: weighted by contrast alone, so that hidden patches cannot outweigh.
+    // Equal noise everywhere: the weight is contrast alone, so that hidden patches cannot dominate.
     const Matrix2<double> variance =
         (reference.unit_covariance + 100 * reference.unobserved).cast<double>();
     term.information = variance.inverse();

@@ -1,7 +1,7 @@
 #pragma once
-// What the estimators of OE mode share about motions and covariances.
-// A motion is the vector (pan, tilt, pan rate, tilt rate, pan acceleration, tilt acceleration): rad, rad/s,
-// rad/s^2. Pure functions; no allocation.
+// Shared formulas of OE mode's estimators for motions and covariances. A motion is the vector (pan,
+// tilt, pan rate, tilt rate, pan acceleration, tilt acceleration): rad, rad/s, rad/s^2. Pure
+// functions; no allocation.
 
 #include <algorithm>
 #include <cmath>
@@ -14,7 +14,7 @@ namespace alidade {
 using Vector6 = Matrix<double, 6, 1>;
 using Matrix6 = Matrix<double, 6, 6>;
 
-// Angles at t seconds after the motion's reference row; x is a motion or changes of one, a column each.
+// Angles at t seconds after the motion's reference row. x: a motion, or changes of one in columns.
 template <int kColumns>
 [[nodiscard]] Matrix<double, 2, kColumns> angle_at(const Matrix<double, 6, kColumns>& x, double t) {
   return x.template topRows<2>() + t * x.template middleRows<2>(2) +
@@ -29,7 +29,7 @@ inline void add(const Vector6& change, FrameMotion<double>* motion) {
                           motion->acceleration.tilt + change[5]};
 }
 
-// Of a symmetric matrix; only the upper triangle is read. Not finite where m is singular.
+// Inverse of a symmetric matrix; reads only the upper triangle. Not finite if m is singular.
 [[nodiscard]] inline Matrix2<double> inverse_of(const Matrix2<double>& m) {
   const double determinant = m(0, 0) * m(1, 1) - m(0, 1) * m(0, 1);
   Matrix2<double> inverse;
@@ -37,7 +37,7 @@ inline void add(const Vector6& change, FrameMotion<double>* motion) {
   return inverse / determinant;
 }
 
-// Of (rate, acceleration) of one axis: 0 is pan, 1 is tilt.
+// Covariance of (rate, acceleration) of one axis: 0 is pan, 1 is tilt.
 [[nodiscard]] inline Matrix2<double> rate_covariance(const Matrix6& motion, int axis) {
   Matrix2<double> out;
   out << motion(2 + axis, 2 + axis), motion(2 + axis, 4 + axis), motion(4 + axis, 2 + axis),
@@ -45,7 +45,8 @@ inline void add(const Vector6& change, FrameMotion<double>* motion) {
   return out;
 }
 
-// Whether all principal minors of order 1 and 2 allow it: what these let pass of a 3x3 harms nothing.
+// True if the principal minors of order 1 and 2 are those of a covariance. A 3x3 that fails only at
+// order 3 does no harm.
 template <int kSize>
 [[nodiscard]] bool is_covariance(const Matrix<double, kSize, kSize>& m) {
   constexpr double kRounding = 1e-9;
@@ -58,9 +59,9 @@ template <int kSize>
   return all_finite(m);
 }
 
-// By which factor to inflate the variance of a measurement that was used elapsed_s ago already, if its error
-// has that correlation time: so many measurements together are then worth one per correlation time. At least
-// 1; correlation_time_s >= 0; infinite elapsed_s: never used.
+// Factor by which to inflate the variance of a measurement whose error has this correlation time,
+// if one was last used elapsed_s ago. Many measurements then count as one per correlation time. >=
+// 1; correlation_time_s >= 0; elapsed_s is infinite if none was used.
 [[nodiscard]] inline double variance_inflation(double correlation_time_s, double elapsed_s) {
   constexpr double kLeastElapsed_s = 1e-3;
   return std::max(1.0, correlation_time_s / std::max(std::abs(elapsed_s), kLeastElapsed_s));

@@ -1,20 +1,22 @@
 #pragma once
-// FrameLens: what is known of the lens of one frame without its image, by a zoom reading and a zoom curve (core/model/zoom_curve.h).
-// Plain values.
+// FrameLens: the lens of one frame as known without its image, from a zoom reading and a zoom curve
+// (core/model/zoom_curve.h). Plain values.
 
 #include "core/model/calibration.h"
 
 namespace alidade {
 
 struct FrameLens {
-  // When the middle row is exposed; its covariance holds the curve's, the lens' repeatability and what the reading's time errs by.
+  // When the middle row is exposed. The covariance contains the curve's, the lens's repeatability,
+  // and the effect of the reading's time error.
   Calibration calibration;
   double rate = 0;        // 1/s, d log f / dt
   double rate_sigma = 0;  // 1/s
-  // Not: the lens stands where it stood in the frame before, as far as its readings tell.
+  // False: as far as readings show, the lens has not moved since the previous frame.
   bool moves = false;
-  // How distortion in the corner, 1, and optical centre, px, go with log f along the curve there: they are taken at the focal length
-  // that the frame shows, which a reading in coarse steps has not.
+  // Slopes along the curve: d distortion in the corner (1) and d optical centre (px) per unit of
+  // log f. Both are taken at the focal length that the frame shows, which a coarse reading does not
+  // have.
   double corner_by_zoom = 0;
   Vector2<double> centre_by_zoom = Vector2<double>::Zero();
 };

@@ -1,6 +1,6 @@
 #pragma once
-// Landmark: a far point that the camera can recognise: its direction, the small image by which it is found
-// again, how well both are known and how well they have served (PTCEE section V-A). Plain values.
+// Landmark: a far point that the camera recognises: its direction, its small reference image, their
+// covariance and its record (PTCEE section V-A). Plain values.
 
 #include <cstdint>
 
@@ -10,36 +10,37 @@
 
 namespace alidade {
 
-// How it has served, over all frames that held: fine ones were looked for when they were chosen, and matched when
-// they were inliers (landmark_search.h); coarse ones when they were compared, and looked alike.
+// Its record over all frames in which landmarks held. A fine one is looked for when chosen, and
+// matched when an inlier (landmark_search.h). A coarse one is looked for when compared, and matched
+// when similar.
 struct LandmarkStatistics {
   std::uint32_t looked_for = 0;  // frames
   std::uint32_t matched = 0;     // of these
   std::uint16_t missed_in_a_row = 0;
-  std::uint32_t last_frame = 0;  // count of frames when made or last looked for; 0: handed over
-  // Mean square of the normalised residual when matched, running: 1 if its covariances are right.
+  std::uint32_t last_frame = 0;  // frame count when made or last looked for; 0: handed over
+  // Running mean square of the normalised residual when matched. 1 if the covariances are right.
   float residual_square = 1;
 };
 
 using LandmarkSensitivity = Matrix<float, 2, kParameterCount>;
 
 struct Landmark {
-  std::uint32_t id = 0;                          // never given twice by one map
-  std::uint8_t octave = 0;                       // of the pyramid its image was taken from
+  std::uint32_t id = 0;                          // never reused by one map
+  std::uint8_t octave = 0;                       // of the pyramid, of its reference image
   Vector3<double> d = Vector3<double>::UnitX();  // unit, in the map's frame
-  // rad^2, of d in tangent_basis(d): its own part, independent of other landmarks' ...
+  // rad^2, of d in tangent_basis(d): its own part, independent of other landmarks.
   Matrix2<double> covariance = Matrix2<double>::Zero();
-  // ... and rad^2 of (pan, tilt) of the frame that it came from, shared by all made there.
+  // rad^2, (pan, tilt) of the frame it was made in: shared by all landmarks made there.
   Matrix2<double> shared_covariance = Matrix2<double>::Zero();
-  // Of d in tangent_basis(d): all that was made with the calibration shares its errors.
+  // Of d in tangent_basis(d). All landmarks made with the calibration share its errors.
   LandmarkSensitivity sensitivity = LandmarkSensitivity::Zero();
-  // d(reference pixel, px of its octave) / d(tangent_basis(d) coordinates, rad), as the camera saw
-  // it then, rolling shutter and distortion included.
+  // d(reference pixel, px of its octave) / d(tangent_basis(d) coordinates, rad) when it was made,
+  // with rolling shutter and distortion.
   Matrix2<double> J_pixel_tangent = Matrix2<double>::Identity();
   ReferencePixels pixels{};
   LandmarkStatistics statistics;
 
-  // Lives as long as the landmark.
+  // Valid as long as the landmark.
   [[nodiscard]] ImageView image() const { return view_of(pixels); }
 };
 

@@ -7,7 +7,8 @@ namespace alidade {
 namespace {
 
 constexpr int kNone = -1;
-// From one part to the next: a prime above kMaxParts, so that it divides no number of parts and all are met.
+// Step from one part to the next: a prime above kMaxParts. It divides no number of parts, so all
+// parts are visited.
 constexpr std::size_t kStride = 97;
 static_assert(kStride > LandmarkChoiceOptions::kMaxParts);
 

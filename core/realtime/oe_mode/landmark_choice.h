@@ -1,13 +1,14 @@
 #pragma once
-// LandmarkChoice: which of the visible fine landmarks are looked for in a frame. This is the one place that
-// decides it: to choose otherwise, change choose(). README.md of this folder says what such a change touches.
-//
-// Where no more than max_chosen fine landmarks are visible, all are chosen, in their order; preferences begin where there are more. Then the image is divided into columns x rows parts, of each part the
-// most reliable landmark comes first, parts in strides, so that a small max_chosen is spread over the image too;
-// what room is left goes to the others in their order. The same inputs give the same choice: it is made anew within a frame.
-// Reliable is what matched when it was looked for (rule of succession), halved for each octave further up,
-// which sees half as sharply.
-// Memory is taken by the constructor; nothing else allocates. One thread.
+// LandmarkChoice: selects the visible fine landmarks to look for in a frame. choose() is the only
+// place that decides it. What a change of it touches: docs/landmark_choice.md.
+// If at most max_chosen fine landmarks are visible, all are chosen, in their order. Otherwise the
+// image is divided into columns x rows parts. The most reliable landmark of each part comes first,
+// with a stride between parts, so that a small max_chosen is spread over the image too. The
+// remaining room goes to the others in their order. The same inputs give the same choice, as it is
+// repeated within a frame.
+// Reliability is the share of matches when looked for (rule of succession), halved for each coarser
+// octave, which has half the resolution. The constructor takes all memory; nothing else allocates.
+// One thread.
 
 #include <cstdint>
 #include <vector>
@@ -20,33 +21,35 @@
 namespace alidade {
 
 struct LandmarkChoiceOptions {
-  static constexpr int kLeastChosen = SolveLimits().min_inliers;  // fewer never hold
-  static constexpr int kMaxChosen = kMaxFoundLandmarks;           // as the solution has room for
+  static constexpr int kLeastChosen = SolveLimits().min_inliers;  // with fewer no solution holds
+  static constexpr int kMaxChosen = kMaxFoundLandmarks;           // limit of the solution
   static constexpr int kMaxParts = 96;                            // in each direction
 
   int max_chosen = 200;  // landmarks, kLeastChosen to kMaxChosen
-  // Parts of the image, 1 to kMaxParts. Where more of them than max_chosen have a landmark, some get none, spread over
-  // the image; a max_chosen above columns * rows is filled in the order of the map's slots.
+  // Parts of the image, 1 to kMaxParts. If more parts than max_chosen have a landmark, some get
+  // none, spread over the image. A max_chosen above columns * rows is filled in the order of the
+  // map's slots.
   int columns = 20;
   int rows = 12;
 
-  // False and one line in *error (if not null) when a value is not valid.
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
 class LandmarkChoice {
  public:
-  // options: valid; max_chosen may be less than kLeastChosen, as for a test. max_visible: of visible landmarks.
+  // options: valid, except that tests may set max_chosen below kLeastChosen. max_visible: largest
+  // number of visible landmarks.
   LandmarkChoice(const LandmarkChoiceOptions& options, int max_visible);
 
-  // Valid until the next call; visible is not changed.
+  // The result is valid until the next call.
   const std::vector<VisibleLandmark>& choose(const std::vector<VisibleLandmark>& visible,
                                              const LandmarkMap& map, const Octaves& octaves,
                                              const Camera<double>& camera);
-  // As choose() left it.
+  // Result of the last choose().
   [[nodiscard]] const std::vector<VisibleLandmark>& chosen() const { return chosen_; }
   void clear();
-  // How many visible fine landmarks choose() had the choice of.
+  // Number of visible fine landmarks in the last choose().
   [[nodiscard]] int fine_visible() const { return fine_visible_; }
 
   [[nodiscard]] const LandmarkChoiceOptions& options() const { return options_; }
@@ -58,7 +61,7 @@ class LandmarkChoice {
   LandmarkChoiceOptions options_;
   int fine_visible_ = 0;
   std::vector<VisibleLandmark> chosen_;
-  std::vector<int> best_;            // index of visible, by part of the image; kNone
+  std::vector<int> best_;            // by part of the image: index of visible, or kNone
   std::vector<std::uint8_t> taken_;  // by index of visible
 };
 

@@ -12,9 +12,9 @@ namespace alidade {
 namespace {
 
 constexpr int kLeastCornerCell_px = 8;  // of FastGrid
-constexpr int kCornerBorder_px = 3;     // where FastGrid finds nothing
+constexpr int kCornerBorder_px = 3;     // FastGrid finds no corners there
 constexpr int kNoLimit = std::numeric_limits<int>::max();
-// From the cell where a frame's search begins to the next frame's.
+// Step from a frame's first searched cell to the next frame's.
 constexpr std::uint32_t kCellStride = 97;
 
 }  // namespace
@@ -47,7 +47,7 @@ LandmarkMaker::LandmarkMaker(const LandmarkMakerOptions& options, const OctaveOp
   int most_corners = 0;
   for (int octave = 0; octave < Pyramid::kMaxOctaves; ++octave) {
     const int cell = corner_cell(octave);
-    // Fine octaves are searched cell by cell, where landmarks are missing; coarse ones at once.
+    // Fine octaves are searched only in cells without landmarks; coarse ones completely.
     const bool fine = octave < octaves.first_coarse;
     grids_.push_back(std::make_unique<FastGrid>(
         fine ? cell + 2 * kCornerBorder_px : max_width >> octave,
@@ -193,13 +193,13 @@ bool LandmarkMaker::make_one(const View& view, const FastCorner& corner, int oct
   Sensitivity<2> sensitivity =
       to_tangent * (J_d_parameters + J_d_motion * view.frame.sensitivity.topRows<4>());
   landmark.J_pixel_tangent = J_tangent_u.inverse() / to_image;
-  // Where its point lies is exact; what makes it find itself elsewhere is the image's noise.
+  // The reference point is exact by definition. The image's noise makes it find itself elsewhere.
   const Matrix2<double> J_tangent_pixel = to_image * J_tangent_u;
   const double noise = view.octaves.noise(octave);
   landmark.covariance = noise * noise * J_tangent_pixel * patch.unit_covariance.cast<double>() *
                         J_tangent_pixel.transpose();
   if (view.lens != nullptr) {
-    // What the frame errs by in its own lens is not the map's scale.
+    // The error of the frame's own lens is not the map's scale.
     const OwnLens& own = view.frame.lens;
     const double time_s = time_of_row(view.frame.motion, calibration.line_delay, u.y());
     const Vector2<double> by_zoom =

@@ -1,11 +1,11 @@
 #pragma once
-// LandmarkMaker: new landmarks from a frame whose motion is known: FAST corners in cells of the image that
-// show none yet (PTCEE 36).
-//
-// Cells of octave l are cell_size_px * min(2^l, largest_cells) wide, px of the image. Fine octaves are searched
-// cell by cell, each time from another one on, so that a budget reaches all in turn; of the coarse ones, one is
-// searched as a whole each time. A view with few landmarks takes all it can at once.
-// Memory is taken by the constructor; nothing else allocates, waits or throws. One thread.
+// LandmarkMaker: makes landmarks from a frame with known motion: FAST corners in cells of the image
+// that show none yet (PTCEE 36).
+// Cells of octave l are cell_size_px * min(2^l, largest_cells) wide (px of the image). Fine octaves
+// are searched cell by cell, each time from another cell on, so that the budget reaches all cells
+// in turn. Of the coarse octaves one is searched completely each time. A view with few landmarks
+// takes all it can at once.
+// The constructor takes all memory; nothing else allocates, waits or throws. One thread.
 
 #include <cstdint>
 #include <memory>
@@ -25,15 +25,14 @@ namespace alidade {
 struct LandmarkMakerOptions {
   static constexpr double kLeastCellSize_px = 16;
 
-  double cell_size_px = 80;  // of octave 0 at the image's centre, >= kLeastCellSize_px
-  double largest_cells = 3;  // times cell_size_px, >= 1: the cells of coarse octaves
-  int max_new = 100;         // landmarks that one call may make, where the view is not empty
-  int empty_view = 50;       // landmarks; with fewer a view is empty
-  std::uint8_t corner_threshold = 10;  // of FAST, grey levels
-  double textured =
-      0.25;  // of the cells of the first coarse octave, in [0, 1]: so many show a corner
+  double cell_size_px = 80;  // px, of octave 0, at the image's centre; >= kLeastCellSize_px
+  double largest_cells = 3;  // times cell_size_px, >= 1; largest cells of coarse octaves
+  int max_new = 100;         // landmarks per call, if the view is not empty
+  int empty_view = 50;       // landmarks; a view with fewer is empty
+  std::uint8_t corner_threshold = 10;  // grey levels, of FAST
+  double textured = 0.25;  // in [0, 1]; share of the first coarse octave's cells with a corner
 
-  // False and one line in *error (if not null) when a value is not valid.
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
@@ -45,13 +44,14 @@ class LandmarkMaker {
   LandmarkMaker(const LandmarkMaker&) = delete;
   LandmarkMaker& operator=(const LandmarkMaker&) = delete;
 
-  // frame.motion is that of the image in the pyramid; visible: landmarks of the map that it shows. lens: where the frame has its
-  // own, as SearchedFrame has it. Returns the share of landmarks in view that is new, 0 to 1.
+  // frame.motion belongs to the image in the pyramid. visible: landmarks of the map in the image.
+  // lens: if the frame has its own, as in SearchedFrame. Returns the share of new landmarks in
+  // view, 0 to 1.
   double make(const Calibration& calibration, const Pyramid& pyramid, const Octaves& octaves,
               const ProcessedFrame& frame, const std::vector<VisibleLandmark>& visible,
               LandmarkMap* map, const LensColumns* lens = nullptr);
 
-  // Whether the image has something to show.
+  // True if the image has enough texture to show landmarks.
   [[nodiscard]] bool is_textured(const Pyramid& pyramid, const Octaves& octaves);
 
   // rad, for LandmarkMap::clear().
@@ -70,7 +70,7 @@ class LandmarkMaker {
   [[nodiscard]] double cell_px(int octave) const;
   [[nodiscard]] int corner_cell(int octave) const;
   [[nodiscard]] int cells(int size_px, int octave) const;
-  // In one octave, no more than budget; how many were made.
+  // Makes at most `budget` landmarks in one octave. Returns their number.
   int make_coarse(const View& view, int octave, int budget);
   int make_fine(const View& view, int octave, int budget);
   [[nodiscard]] std::uint8_t& cell_at(const View& view, int octave, const Vector2<double>& u);
@@ -78,7 +78,7 @@ class LandmarkMaker {
 
   LandmarkMakerOptions options_;
   std::vector<std::unique_ptr<FastGrid>> grids_;  // by octave
-  std::vector<std::uint8_t> cell_taken_;          // of the image, at one octave
+  std::vector<std::uint8_t> cell_taken_;          // of the image, for one octave
   std::vector<FastCorner> corners_;
 };
 

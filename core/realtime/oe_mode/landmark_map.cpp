@@ -11,18 +11,18 @@ namespace {
 constexpr double kMinCellSize = 1e-6;  // rad
 constexpr double kUnitTolerance = 1e-6;
 constexpr int kNone = -1;
-constexpr std::size_t kBlock = 16;   // slots that find() looks at together
+constexpr std::size_t kBlock = 16;   // slots that find() tests together
 constexpr float kFarAway = 4;        // a coordinate of a free slot: no direction is near it
-constexpr double kWorthOfNew = 0.5;  // as worth() has it
+constexpr double kWorthOfNew = 0.5;  // the worth() of a new landmark
 
 bool is_unit(const Vector3<double>& d) {
   return std::abs(d.squaredNorm() - 1) <= 2 * kUnitTolerance;  // false if not finite
 }
 
-// Found when looked for, by the rule of succession, times a memory of some seconds of frames.
+// Share found when looked for (rule of succession), times a memory of some seconds of frames.
 double worth_of(const LandmarkStatistics& statistics, std::uint32_t now) {
   constexpr double kMemory = 30;  // frames
-  constexpr double kLongest = 4;  // times kMemory, of what was found often
+  constexpr double kLongest = 4;  // times kMemory, for landmarks found often
   constexpr double kOften = 30;   // frames
   const double matched = statistics.matched;
   const double rate = (matched + 1) / (std::max<double>(statistics.looked_for, matched) + 2);
@@ -95,7 +95,7 @@ LandmarkSensitivity& LandmarkMap::sensitivity(int slot) {
   return landmarks_[static_cast<std::size_t>(slot)].sensitivity;
 }
 
-// Every ring is as high as the others; its columns are about as wide as it is high in its middle.
+// All rings have the same height. A ring's cells are about as wide as it is high, at its middle.
 LandmarkMap::Key LandmarkMap::cell_of(const Vector3<double>& d, int octave, int zoom) const {
   zoom = std::clamp(zoom, -kMaxZoom, kMaxZoom);
   const int rings =
@@ -107,14 +107,14 @@ LandmarkMap::Key LandmarkMap::cell_of(const Vector3<double>& d, int octave, int 
   const int columns = std::max(1, static_cast<int>(std::round(around / height)));
   const double turn = std::atan2(d.y(), d.x()) / (2 * kPi) + 0.5;
   int column = static_cast<int>(turn * columns);
-  if (column >= columns) column = 0;  // pi is where -pi is
+  if (column >= columns) column = 0;  // pi and -pi are the same column
   // Fewer than 2^23 of either, by kMinCellSize.
   return static_cast<Key>(zoom & 0xff) << 56 | static_cast<Key>(octave) << 48 |
          static_cast<Key>(ring) << 24 | static_cast<Key>(column);
 }
 
 std::size_t LandmarkMap::home(Key key) const {
-  key *= 0x9e3779b97f4a7c15U;  // 2^64 over the golden ratio: neighbours go far apart
+  key *= 0x9e3779b97f4a7c15U;  // 2^64 / golden ratio: spreads neighbours
   return static_cast<std::size_t>(key ^ key >> 32) & (table_.size() - 1);
 }
 
@@ -172,7 +172,7 @@ InsertStatus LandmarkMap::insert(const Landmark& landmark, std::uint32_t now, in
 void LandmarkMap::retire(int slot) {
   if (!occupied(slot)) return;
   const auto i = static_cast<std::size_t>(slot);
-  // What was pushed along by the entry that goes moves back, so that no search ends in the gap.
+  // Entries displaced by the removed one move back, so that no search ends at the gap.
   const std::size_t mask = table_.size() - 1;
   std::size_t gap = position(cells_[i]);
   for (std::size_t next = (gap + 1) & mask; table_[next] != kNone; next = (next + 1) & mask) {
@@ -199,15 +199,16 @@ bool LandmarkMap::cell_taken(const Vector3<double>& d, int octave, int zoom) con
   return table_[position(cell_of(d, octave, zoom))] != kNone;
 }
 
-// Squares of chords are compared, which floats resolve to 2e-7 rad at any angle, while cosines near 1
-// would be coarse. Only what is too close to the limit for floats is looked at in double.
+// Compares squares of chords, which floats resolve to 2e-7 rad at any angle; cosines near 1 would
+// be coarse. Only what is too close to the limit for floats is tested in double.
 int LandmarkMap::find(const Vector3<double>& centre, double cosine_of_angle, int* slots,
                       int capacity) const {
-  constexpr double kRounding = 2e-7;  // rad, of both directions as floats: bound 1.3e-7
-  constexpr double kRelative = 1e-6;  // of the arithmetic: bound 3e-7
+  constexpr double kRounding = 2e-7;  // rad, of both directions as floats: below 1.3e-7
+  constexpr double kRelative = 1e-6;  // of the arithmetic: below 3e-7
   if (!is_unit(centre) || !(std::abs(cosine_of_angle) <= 1)) return 0;
   const Vector3<double> d = centre.normalized();
-  if (cosine_of_angle <= -1) cosine_of_angle = -2;  // all, the antipode in spite of rounding
+  if (cosine_of_angle <= -1)
+    cosine_of_angle = -2;  // all, including the antipode in spite of rounding
   const double chord = std::sqrt(2 - 2 * cosine_of_angle);
   const double inner = std::max(0.0, chord - kRounding);
   const double outer = chord + kRounding;
@@ -230,7 +231,7 @@ int LandmarkMap::find(const Vector3<double>& centre, double cosine_of_angle, int
     if (any == 0) continue;
     std::array<int, kBlock> candidates;
     std::size_t n = 0;
-    for (std::size_t i = 0; i < kBlock; ++i) {  // without a branch: which ones cannot be guessed
+    for (std::size_t i = 0; i < kBlock; ++i) {  // without an unpredictable branch
       candidates[n] = static_cast<int>(begin + i);
       n += static_cast<std::size_t>(squares[i] <= perhaps);
     }

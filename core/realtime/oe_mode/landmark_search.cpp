@@ -11,12 +11,12 @@
 namespace alidade {
 namespace {
 
-// Landmarks between the one that memory is asked for and the one that is looked at.
+// Landmarks between the prefetched one and the present one.
 constexpr std::size_t kLandmarksAhead = 2;
-// By so little places differ that are known to a pixel or so.
+// Difference of two predicted positions that are accurate to a pixel.
 constexpr double kSameView_px = 2;
 
-// Of a warp: what the zoom makes of it before it is prepared again.
+// Factor on a warp: the zoom expected until the patch is prepared again.
 float zoomed_ahead(const SearchedFrame& frame, float tolerance) {
   if (!frame.zooms) return 1;
   constexpr double kAhead_s = 0.1;  // of a slow zoom
@@ -94,7 +94,7 @@ LandmarkSearch::Coarse LandmarkSearch::align_coarse(const SearchedFrame& frame,
 LandmarkSearch::Fine LandmarkSearch::align_fine(const SearchedFrame& frame,
                                                 const FrameMotion<double>& motion) {
   const ViewProjection view(frame.calibration, motion);
-  // At many zooms many landmarks were made, and what coarse alignment saw of them serves again.
+  // With many zooms there are many landmarks. What coarse alignment saw of them is used again.
   if (!frame.zooms || !knows_view_) find_visible(frame, view);
   knows_view_ = false;
   choose_fine(frame);
@@ -116,7 +116,8 @@ void LandmarkSearch::find_visible(const SearchedFrame& frame, const ViewProjecti
   visible_.find(frame.calibration, frame.map, view, frame.pyramid.octaves(), frame.lens != nullptr);
 }
 
-// Of a landmark that is looked for soon. Its pixels are needed where its patch is prepared again, which is rare.
+// Prefetches a landmark that is looked for soon. Its pixels are needed only if its patch is
+// prepared again, which is rare.
 void LandmarkSearch::ask_for(const SearchedFrame& frame, const VisibleLandmark& wanted) const {
   const Landmark& landmark = frame.map.at(wanted.slot);
   ask_ahead(&landmark, &landmark.pixels);
@@ -142,10 +143,10 @@ const ReferencePatch* LandmarkSearch::reference(const SearchedFrame& frame, int 
   const float tolerance = warp_tolerance(frame, octave);
   const Matrix2<float> wanted = A.cast<float>();
   if (prepared.id != landmark.id || !((prepared.A - wanted).cwiseAbs().maxCoeff() <= tolerance)) {
-    // Seen as it was, it needs no resampling.
+    // Seen as it was made, it needs no resampling.
     const bool alike =
         (wanted - Matrix2<float>::Identity()).cwiseAbs().maxCoeff() <= 0.5F * tolerance;
-    // As it will be seen when the lens has zoomed through half of what it serves for.
+    // As it will be seen after the lens has zoomed through half of the patch's useful range.
     prepared.A = zoomed_ahead(frame, tolerance) * wanted;
     if (alike) prepared.A.setIdentity();
     prepared.id = landmark.id;

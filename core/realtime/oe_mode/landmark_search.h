@@ -1,18 +1,14 @@
 #pragma once
-// LandmarkSearch: finds the map's landmarks in a frame, from a predicted motion.
-//
-//   1 visible  landmarks that the motion puts into the image   visible_landmarks.h
-//   2          of the coarse octaves the first few of each,    coarse_alignment.h (PTCEE 30, 31)
-//              together, move the prediction over pan and tilt
-//   3 chosen   of the visible fine ones: they are looked for   landmark_choice.h
-//   4 found    of the chosen: projected with rolling shutter,
-//              each aligned by itself (PTCEE 32, 33)
-//     inliers  of the found: in agreement with the solution    orientation_solve.h
-//
-// Each word is the name of its stage, in lists and counts alike.
-// A landmark's patch is kept as this view shows it, and prepared again when the view has changed enough; until then positions
-// are corrected for the change (docs/oe_mode.md).
-// Memory is taken by the constructor; nothing else allocates, waits or throws. One thread.
+// LandmarkSearch: finds the map's landmarks in a frame, from a predicted motion. Coarse ones first
+// correct pan and tilt together (coarse_alignment.h, PTCEE 30, 31). Names of the stages of fine
+// ones:
+//   visible  the motion puts them into the image             visible_landmarks.h
+//   chosen   visible ones to look for                        landmark_choice.h
+//   found    chosen ones aligned one by one, with rolling shutter (PTCEE 32, 33)
+//   inlier   found ones that agree with the solution         orientation_solve.h
+// A landmark's patch is kept as this view shows it. It is prepared again when the view has changed
+// enough; until then positions are corrected for the change (docs/oe_mode.md).
+// The constructor takes all memory; nothing else allocates, waits or throws. One thread.
 
 #include <cstdint>
 #include <vector>
@@ -35,18 +31,19 @@ class ViewProjection;
 struct LandmarkSearchOptions {
   LandmarkChoiceOptions choice;
   int coarse_patches = 40;  // of each coarse octave, 1 to kMaxCoarsePatches
-  // As the reference was seen; a patch is prepared again when an element of its warp changed by this, > 0.
+  // > 0; a patch is prepared again when an element of its warp has changed by this.
   float fine_warp_tolerance = 0.02F;
   float coarse_warp_tolerance = 0.04F;
-  // While the lens zooms every view is another one; what is coarse leads to a few tenths of a pixel only.
+  // While the lens zooms every view differs; coarse patches lead to a few tenths of a pixel only.
   float zooming_warp_tolerance = 0.05F;
   float zooming_coarse_warp_tolerance = 0.1F;
-  double cone_margin = 1.3;  // see VisibleLandmarks::reset(), >= 1
-  double search_sigmas = 3;  // of the prediction, that the first search among coarse octaves covers
-  double coarse_reach_px = 0.75;  // px of the coarsest octave that alignment finds without a search
-  double wide_search_px = 96;     // px of the image, searched where the first search finds nothing
+  double cone_margin = 1.3;  // >= 1, see VisibleLandmarks::reset()
+  double search_sigmas = 3;  // sigmas of the prediction; first coarse range
+  double coarse_reach_px =
+      0.75;                    // px of the coarsest octave; alignment reaches it without a search
+  double wide_search_px = 96;  // px of the image; search range if the first search fails
 
-  // False and one line in *error (if not null) when a value is not valid.
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
@@ -55,22 +52,22 @@ struct OeObservation {
   int slot = 0;                                          // of the map
   std::uint32_t id = 0;                                  // of the landmark
   int octave = 0;                                        // in which it was found
-  Vector2<double> u = Vector2<double>::Zero();           // px of the image, where it was found
+  Vector2<double> u = Vector2<double>::Zero();           // px of the image
   Matrix2<double> covariance = Matrix2<double>::Zero();  // px^2, of u
   Vector2<double> residual = Vector2<double>::Zero();  // px, found minus predicted by the solution
   bool inlier = false;
 };
 
-// What is searched, and in what: borrowed for one call.
+// The searched frame; references are borrowed for one call.
 struct SearchedFrame {
   const Calibration& calibration;
   const LandmarkMap& map;
   const Pyramid& pyramid;
   const Octaves& octaves;
-  // Where the frame's lens is another than the map's, its columns of sensitivities; null: the same.
+  // Sensitivity columns of the frame's lens if that differs from the map's; null if not.
   const LensColumns* lens = nullptr;
   bool zooms = false;    // the lens moves
-  double zoom_rate = 0;  // 1/s, of log f, as expected
+  double zoom_rate = 0;  // 1/s, expected rate of log f
 };
 
 class LandmarkSearch {
@@ -85,15 +82,15 @@ class LandmarkSearch {
     visible_.change_lens(calibration, options_.cone_margin);
     knows_view_ = false;
   }
-  // Nothing is found; to begin a frame with, and when the map is cleared.
+  // Forgets all results: at the beginning of a frame, and when the map is cleared.
   void clear();
 
   struct Coarse {
-    bool aligned = false;        // false: the coarse octaves fit nowhere near
-    FrameMotion<double> motion;  // where they fit, or as predicted
-    double shift_px = 0;         // by which they moved the prediction, px at the image's centre
+    bool aligned = false;        // false: no fit of the coarse octaves
+    FrameMotion<double> motion;  // corrected, or as predicted
+    double shift_px = 0;         // px at the image's centre, correction of the prediction
   };
-  // sigma_px: of the prediction at the image's centre, px.
+  // sigma_px: px, of the prediction at the image's centre.
   [[nodiscard]] Coarse align_coarse(const SearchedFrame& frame,
                                     const FrameMotion<double>& predicted, double sigma_px);
 
@@ -102,14 +99,15 @@ class LandmarkSearch {
     int chosen = 0;  // of these
     int found = 0;   // of these
   };
-  // Finds fine landmarks about where `motion` sees them: found() and observations().
+  // Finds fine landmarks near where `motion` predicts them: see found() and observations().
   Fine align_fine(const SearchedFrame& frame, const FrameMotion<double>& motion);
 
-  // Completes observations(): residuals after this correction of `motion` (rad, rad/s, rad/s^2), inliers as
-  // the solution marked them in found(). zoom: correction of the lens (1, 1/s), where the frame has its own.
+  // Completes observations(): residuals after this correction of `motion` (rad, rad/s, rad/s^2),
+  // and the inliers that the solution marked in found(). zoom: correction of the lens (1, 1/s), if
+  // the frame has its own.
   void conclude(const Vector6& correction, const Vector2<double>& zoom = Vector2<double>::Zero());
 
-  // The steps of the two stages, in their order, for those who look at each by itself.
+  // The steps of the two stages, in order, for callers that test each alone.
   void find_visible(const SearchedFrame& frame, const ViewProjection& view);
   void prepare_coarse(const SearchedFrame& frame, const ViewProjection& view);
   [[nodiscard]] bool fit_coarse(const SearchedFrame& frame, double sigma_px,
@@ -117,14 +115,14 @@ class LandmarkSearch {
   void choose_fine(const SearchedFrame& frame);
   void fit_fine(const SearchedFrame& frame, const ViewProjection& view);
 
-  // Fine landmarks of the latest search. The solution writes into found().
+  // Fine landmarks of the latest search. The solution writes to found().
   [[nodiscard]] std::vector<FoundLandmark>& found() { return found_; }
   [[nodiscard]] const std::vector<FoundLandmark>& found() const { return found_; }
-  // Of found(), one each.
+  // One for each of found().
   [[nodiscard]] const std::vector<OeObservation>& observations() const { return observations_; }
-  // Of found(), one each: d u / d landmark's tangent coordinates, px/rad.
+  // One for each of found(): d u / d landmark's tangent coordinates, px/rad.
   [[nodiscard]] const std::vector<Matrix2<double>>& J_tangent() const { return J_tangent_; }
-  // found() are a part of them, in their order.
+  // found() is a subset, in the same order.
   [[nodiscard]] const std::vector<VisibleLandmark>& chosen() const { return choice_.chosen(); }
   // Coarse landmarks of the latest search, and their slots.
   [[nodiscard]] const std::vector<CoarsePatch>& coarse() const { return coarse_; }
@@ -137,7 +135,7 @@ class LandmarkSearch {
   struct Prepared {
     ReferencePatch patch;
     Matrix2<float> A;
-    Matrix2<float> B;      // the view that was asked for last is A (I + B)
+    Matrix2<float> B;      // the latest view asked for is A (I + B)
     std::uint32_t id = 0;  // of the landmark it belongs to
     PrepareStatus status = PrepareStatus::kTooFlat;
   };
@@ -149,7 +147,7 @@ class LandmarkSearch {
 
   LandmarkSearchOptions options_;
   VisibleLandmarks visible_;
-  bool knows_view_ = false;  // visible_ has what the next look shall see
+  bool knows_view_ = false;  // visible_ is valid for the next search
   LandmarkChoice choice_;
   std::vector<Prepared> prepared_;  // by slot
   std::vector<CoarsePatch> coarse_;

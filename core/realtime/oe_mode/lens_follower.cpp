@@ -62,7 +62,7 @@ Camera<double> LensFollower::with_focal_length(double log_focal_length, const Le
   const Calibration& told = reading_->calibration;
   const double change = log_focal_length - std::log(told.camera.focal_length);
   Camera<double> out = zoomed(told.camera, change);
-  // Where the reading is not believed the curve is followed no further.
+  // Follow the curve only as far as the reading is believed.
   const double most = options_.excluded_sigmas * relative_focal_length_sigma(told);
   const double along = std::clamp(change + scale.value, -most, most);
   out.radial_distortion += along * reading_->corner_by_zoom * out.distortion_of_corner();
@@ -79,14 +79,14 @@ Camera<double> LensFollower::expect_by_reading(const LensScale& scale) {
   return zoomed(calibration.camera, -scale.value);
 }
 
-// Of log f at phi = 0.
+// Variance of log f at phi = 0.
 double LensFollower::reading_variance(const LensScale& scale) const {
   return std::pow(relative_focal_length_sigma(reading_->calibration), 2) + scale.variance;
 }
 
 bool LensFollower::reading_tells_more(double time_s) const {
   if (!reading_ || (reading_contradicted_ && is_young(time_s))) return false;
-  // The movement that is carried on ends unseen.
+  // An extrapolated movement may end unnoticed.
   const double variance = std::pow(relative_focal_length_sigma(reading_->calibration), 2);
   return !(expected_.covariance(0, 0) < variance);
 }
@@ -95,7 +95,7 @@ void LensFollower::answer_unseen(double time_s, const LensScale& scale,
                                  const Camera<double>& camera, Calibration* answer) const {
   if (reading_) *answer = reading_->calibration;
   if (!is_young(time_s) || (reading_ && !reading_contradicted_)) return;
-  // What images told lately is worth more.
+  // What images showed recently is more accurate.
   answer->camera = zoomed(camera, scale.value);
   const double f = answer->camera.focal_length;
   answer->covariance(kOfFocalLength, kOfFocalLength) =
@@ -143,7 +143,7 @@ LearntLens LensFollower::learn(double time_s, const SolvedZoom& zoom, double foc
   return out;
 }
 
-// Landmarks of this frame have its errors for as long as they are in the map.
+// Landmarks of this frame keep its errors as long as they are in the map.
 void LensFollower::note_unknown() {
   if (!reading_) return;
   const Calibration& told = reading_->calibration;
@@ -177,16 +177,17 @@ Calibration LensFollower::answer(const Calibration& calibration, const OwnLens& 
                                  const LensScale& scale, double phi, double variance,
                                  const Sensitivity<1>& sensitivity) const {
   if (!columns_ || !own.used) return scale.at(calibration, phi, variance, sensitivity);
-  // The frame's own errors besides, in its last row as in its middle one.
+  // Adds the frame's own errors, in its last row as in its middle one.
   const double half_s = calibration.line_delay * (0.5 * calibration.camera.height);
   const double of_lens = own.covariance(0, 0) + half_s * half_s * own.covariance(1, 1);
   Sensitivity<1> of_it = own.sensitivity.row(0);
   scale.make_independent(&of_it);
-  // Without a reading distortion and centre are those of the last one.
+  // Without a reading, distortion and centre are those of the last one.
   const double since = without_reading(calibration.camera);
   const double unknown = options_.distortion_change * since;
   const ParameterDirection own_errors = unshared(scale);
-  // By landmarks with such errors of their own, and by this frame's, whose distortion alone can pass for that much of log f.
+  // From landmarks with such errors, and from this frame's: its distortion error alone can look
+  // like that change of log f.
   const double by_own_errors =
       (of_it * own_errors.asDiagonal() * of_it.transpose()).value() +
       own_errors[kOfDistortion] *

@@ -1,16 +1,16 @@
 #pragma once
-// LensFollower: the lens of each frame, once it has left the one that the map was begun with: what its reading tells of it, what is
-// expected before landmarks are looked at, what they make of that, and the calibration of the answer (docs/oe_mode.md, "A lens that
-// moves").
-//
-//   begin_frame()                            what the zoom reading tells of the frame, if there is one
-//   follow()                                 the lens leaves the map's, and stays apart from it until begin() or give_up()
-//   expect_after_last(), expect_by_reading() by the frames before (lens_track.h), or by the reading: the last one asked for counts
-//   look_through()                           the camera that landmarks are looked for with
-//   learn()                                  what they made of it
-//
-// log f is the one by which the map's landmarks fit with phi = 0 (lens_scale.h): the camera's f is f exp(phi).
-// Fixed memory; no allocation. One thread.
+// LensFollower: the lens of each frame, once it differs from the one the map began with: what the
+// reading says, what is expected before landmarks are found, what they show, and the calibration of
+// the answer. Order of calls:
+//   begin_frame()          takes the zoom reading, if there is one
+//   follow()               the lens leaves the map's; followed until begin() or give_up()
+//   expect_after_last(), expect_by_reading()
+//                          from the previous frames (lens_track.h) or the reading; last call counts
+//   look_through()         sets the camera to find landmarks with
+//   learn()                takes what they showed
+// log f is the one with which the map's landmarks fit at phi = 0 (lens_scale.h); the camera's f is
+// f exp(phi). Fixed memory; no allocation. One thread. Derivation: docs/oe_mode.md, "A lens that
+// moves".
 
 #include <cmath>
 #include <optional>
@@ -26,25 +26,25 @@ namespace alidade {
 
 struct LensFollowerOptions {
   LensTrackOptions track;
-  int frames_at_rest =
-      3;  // >= 1: so many in a row without a rate, or a reading that it moves: it stands
-  double resting_sigmas = 4;  // > 0: of a rate, one standard deviation: what is less is none
+  int frames_at_rest = 3;  // >= 1; frames in a row without a rate or a moving reading until at rest
+  double resting_sigmas = 4;  // sigmas, > 0; a smaller rate counts as none
   double excluded_sigmas =
-      5;  // > 0: of reading and landmarks together: what is more is a wrong reading
+      5;  // sigmas, > 0, of reading and landmarks together; beyond it the reading is wrong
   int frames_lost_for_good =
-      50;  // >= 1: so many without landmarks, though the reading stands: they are another lens'
-  // What is unknown without a reading, for each unit that log f is away from the latest one, one standard deviation, >= 0:
-  double distortion_change = 0.02;  // in the corner, part of its distance
+      50;  // >= 1; frames lost at a resting reading until landmarks are another lens's
+  // Uncertainty without a reading, one standard deviation per unit of log f from the latest
+  // reading, >= 0:
+  double distortion_change = 0.02;  // of the corner's distance
   double centre_change_px = 5;
 
-  // False and one line in *error (if not null) when a value is not valid.
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
-// What landmarks made of a frame's lens.
+// A frame's lens, learnt from landmarks.
 struct LearntLens {
   OwnLens lens;
-  // By how many of both's standard deviations its log f is not the reading's; 0 without one.
+  // |log f minus the reading's|, in standard deviations of both; 0 without a reading.
   double reading_sigmas = 0;
 };
 
@@ -54,92 +54,94 @@ class LensFollower {
   explicit LensFollower(const LensFollowerOptions& options)
       : options_(options), track_(options.track) {}
 
-  // The lens is the map's, of this focal length, px.
+  // The lens is the map's. focal_length: px.
   void begin(double focal_length);
-  // reading: null: none.
+  // reading: null if there is none.
   void begin_frame(const FrameLens* reading);
   [[nodiscard]] const FrameLens* reading() const { return reading_ ? &*reading_ : nullptr; }
-  // The reading is of a lens that moves, or of another than this one, px.
+  // True if the reading is of a moving lens or of another focal length (px).
   [[nodiscard]] bool reads_other_than(double focal_length) const {
     return reading_ &&
            (reading_->moves || reading_->calibration.camera.focal_length != focal_length);
   }
 
-  // It was at rest with that focal length, px, at that time.
+  // At time_s the lens was at rest with this focal length (px).
   void follow(double time_s, double focal_length);
-  // It is the map's after all.
+  // The lens is the map's after all.
   void give_up();
   [[nodiscard]] bool follows() const { return track_.active(); }
 
-  // A lens that moved stands.
+  // True if a lens that moved is at rest.
   [[nodiscard]] bool at_rest() const { return frames_at_rest_ >= options_.frames_at_rest; }
-  // It does not: landmarks found it somewhere else.
+  // The lens moves: landmarks found it elsewhere.
   void note_movement() { frames_at_rest_ = 0; }
   [[nodiscard]] bool moves() const { return columns_.has_value() && !at_rest(); }
 
-  // The frame's camera at phi = 0. may_move: since the frame before; latest: the camera of that.
+  // The frame's camera at phi = 0. may_move: since the previous frame. latest: that frame's camera.
   [[nodiscard]] Camera<double> expect_after_last(double time_s, bool may_move,
                                                  const LensScale& scale,
                                                  const Camera<double>& latest);
-  // The same by the reading; there is one.
+  // The same from the reading, which must exist.
   [[nodiscard]] Camera<double> expect_by_reading(const LensScale& scale);
-  // The frame's camera where log f is log_focal_length at phi = 0: distortion and centre as the curve has them there, or, without a
-  // reading, as in `latest`.
+  // The frame's camera at this log f and phi = 0. Distortion and centre are the curve's there or,
+  // without a reading, those of `latest`.
   [[nodiscard]] Camera<double> with_focal_length(double log_focal_length, const LensScale& scale,
                                                  const Camera<double>& latest) const;
-  // Of log f and its rate, without the frame's landmarks.
+  // State of log f and its rate, without the frame's landmarks.
   [[nodiscard]] const LensTrack::State& expected() const { return expected_; }
-  // As it was before looks that found nothing.
+  // Restores the state after looks that found nothing.
   void expect(const LensTrack::State& state) { expected_ = state; }
-  // Whether the reading is believed and tells more of log f than the frames before.
+  // True if the reading is believed and its log f is better known than from the previous frames.
   [[nodiscard]] bool reading_tells_more(double time_s) const;
-  // Whether anything tells the lens of that time.
+  // True if a reading or recent landmarks show the lens.
   [[nodiscard]] bool is_known(double time_s) const {
     return reading_.has_value() || is_young(time_s);
   }
-  // The calibration of an answer without landmarks, in *answer, the latest one's; camera: as expect_after_last() gave it.
+  // Updates *answer (the latest one's calibration) for an answer without landmarks. camera: from
+  // expect_after_last().
   void answer_unseen(double time_s, const LensScale& scale, const Camera<double>& camera,
                      Calibration* answer) const;
 
   void look_through(const LensScale& scale, const Camera<double>& camera) {
     columns_.emplace(scale, camera);
   }
-  // Of the camera looked through last; null: the map's lens.
+  // For the camera of look_through(); null: the map's lens.
   [[nodiscard]] const LensColumns* columns() const { return columns_ ? &*columns_ : nullptr; }
-  // What is known of it for a solution about this camera and rate, 1/s.
+  // Prior for a solution about this camera and rate (1/s).
   [[nodiscard]] ZoomPrior prior(const Camera<double>& camera, double zoom_rate) const;
 
-  // zoom, zoom_rate: as solved; focal_length: px, with it, at phi = 0.
+  // zoom, zoom_rate: as solved. focal_length: px, with the correction, at phi = 0.
   [[nodiscard]] LearntLens learn(double time_s, const SolvedZoom& zoom, double focal_length,
                                  double zoom_rate, const LensScale& scale);
   void note_lost() { frames_lost_ += columns_ ? 1 : 0; }
-  // Neither the curve nor the frames before lead to it.
+  // True if neither the curve nor the previous frames lead to the lens.
   [[nodiscard]] bool is_lost_for_good() const {
     return columns_ && frames_lost_ >= options_.frames_lost_for_good && reading_ &&
            !reading_->moves;
   }
-  // The calibration of an answer by landmarks: calibration: of the frame at phi = 0; own: of its lens; phi: the map's scale, with
-  // its variance and sensitivity.
+  // The calibration of an answer with landmarks. calibration: of the frame at phi = 0. own: of its
+  // lens. phi, variance, sensitivity: the map's scale.
   [[nodiscard]] Calibration answer(const Calibration& calibration, const OwnLens& own,
                                    const LensScale& scale, double phi, double variance,
                                    const Sensitivity<1>& sensitivity) const;
 
-  // Variances of distortion and centre beside what is the same at the map's zoom, as the curve says of this zoom or said of those at
-  // which landmarks were made: of another error there and here. In the map's columns.
+  // Variances of distortion and centre that are not shared with the map's zoom: the curve's at this
+  // zoom, or at zooms where landmarks were made. They are errors of their own, there and here. In
+  // the map's columns.
   [[nodiscard]] ParameterDirection unshared(const LensScale& scale) const;
 
-  // phi is in the map from here on.
+  // From now on phi is in the map.
   void move(double phi) { track_.move(phi); }
 
  private:
-  // Landmarks told it lately.
+  // True if landmarks showed the lens recently.
   [[nodiscard]] bool is_young(double time_s) const {
     return track_.age_s(time_s) < options_.track.longest_s;
   }
   [[nodiscard]] double reading_variance(const LensScale& scale) const;
   void note_unknown();
-  // What is unknown of this camera's distortion in the corner, 1, and of its centre, px, as there is no reading: by how much log f
-  // is away from the latest one's.
+  // Distance of log f from the latest reading's, for the uncertainty of distortion and centre; 0
+  // with a reading.
   [[nodiscard]] double without_reading(const Camera<double>& camera) const {
     return reading_ ? 0 : std::log(camera.focal_length / last_reading_focal_length_);
   }
@@ -147,13 +149,14 @@ class LensFollower {
   LensFollowerOptions options_;
   LensTrack track_;
   std::optional<FrameLens> reading_;    // of the frame
-  std::optional<LensColumns> columns_;  // of the camera that is looked through
+  std::optional<LensColumns> columns_;  // for the camera of look_through()
   LensTrack::State expected_;
   int frames_at_rest_ = 0;                // in a row
   int frames_lost_ = 0;                   // in a row
-  bool reading_contradicted_ = false;     // by the frame that landmarks held last
-  double last_reading_focal_length_ = 1;  // px, by the last reading
-  // Variances of distortion in the corner, 1, and centre, px^2, the largest of the readings at which landmarks held since begin().
+  bool reading_contradicted_ = false;     // by the last frame in which landmarks held
+  double last_reading_focal_length_ = 1;  // px
+  // Variances of distortion in the corner (1) and centre (px^2): the largest of the readings at
+  // which landmarks held since begin().
   ParameterDirection most_unknown_ = ParameterDirection::Zero();
 };
 

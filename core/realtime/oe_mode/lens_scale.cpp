@@ -32,7 +32,8 @@ LensScale LensScale::begin(const Calibration& calibration) {
   out.others = T * P * T.transpose();
   out.others = symmetric<kParameterCount>(out.others);
   const ParameterDirection with_phi = T * P.col(kOfF) / f;
-  // What e tells of phi is in the sensitivity, and the rest is noise. Parameters taken as exact tell nothing.
+  // The part of phi that e explains goes into the sensitivity, the rest into the noise. Exact
+  // parameters explain nothing.
   ParameterDirection scale = ParameterDirection::Zero();
   for (int i = 0; i < kParameterCount; ++i) {
     if (out.others(i, i) > 0) scale[i] = 1 / std::sqrt(out.others(i, i));
@@ -45,7 +46,7 @@ LensScale LensScale::begin(const Calibration& calibration) {
   const ParameterDirection told = correlation.ldlt().solve(scale.cwiseProduct(with_phi));
   out.sensitivity = scale.cwiseProduct(told).transpose();
   const double rest = variance - out.sensitivity.dot(with_phi.transpose());
-  // A covariance that is none would leave less than nothing.
+  // An invalid covariance would leave a negative rest.
   if (!all_finite(out.sensitivity) || !(rest > 0)) {
     out.sensitivity.setZero();
     out.variance = variance;

@@ -1,13 +1,14 @@
 #pragma once
-// LensScale: phi, by how much log f differs from the calibration that the map is made with: a lens does not come back exactly to
-// where a zoom curve has it (zoom_curve.h). Learnt together with the map's offset g, which telemetry ties to it.
-//   f(phi) = f exp(phi),   k(phi) = k exp(2 phi)   the distortion in the corner stays; a k that is exact stays itself
-//   d / d phi = S a of all that has a Sensitivity S,   a = (f, 2 k or 0) at the parameters f and k, else 0
-// Errors: of the calibration a phi + e, with e, of covariance `others`, independent of what follows; of (g, phi) their own noise plus
-// their sensitivity times e. Landmarks and motions are kept as they come out at phi = 0; what they make of phi is S a.
-// Where the lens has moved since (lens_track.h) all this stays the map's: phi is then the scale of the map's directions, and a frame's
-// own camera has f exp(phi) of its own f. Columns of its parameters become the map's by LensColumns.
-// Plain values; no allocation.
+// LensScale: phi, the difference of log f from the map's calibration, as a lens does not return
+// exactly to its zoom curve (zoom_curve.h). Learnt with the map's offset g, as telemetry ties the
+// two.
+//   f(phi) = f exp(phi),   k(phi) = k exp(2 phi): same distortion in the corner; an exact k stays
+//   d / d phi = S a of all that has a Sensitivity S;  a = (f, 2 k or 0) at parameters f, k, else 0
+// Errors: those of the calibration are a phi + e; e, of covariance `others`, is independent of what
+// follows. (g, phi) have their own noise plus their sensitivity times e. Landmarks and motions are
+// stored for phi = 0; S a is their change with phi.
+// Once the lens has moved (lens_track.h), phi is the scale of the map's directions. A frame's
+// camera then has its own f times exp(phi); see LensColumns. Plain values; no allocation.
 
 #include "core/model/calibration.h"
 #include "core/realtime/oe_mode/covariance.h"
@@ -16,7 +17,7 @@ namespace alidade {
 
 using ParameterDirection = Matrix<double, kParameterCount, 1>;
 
-// Not learnt: phi is 0, and what f errs by is the calibration's covariance, as of any other parameter.
+// Not learnt: phi is 0, and the error of f is in the calibration's covariance, like any other.
 struct LensScale {
   bool learnt = false;
   double value = 0;                                                  // phi
@@ -26,42 +27,43 @@ struct LensScale {
   ParameterDirection direction = ParameterDirection::Zero();         // a
   ParameterCovariance<double> others = ParameterCovariance<double>::Zero();
 
-  // As this calibration's covariance has it. Not learnt where that takes f as exact, or is none.
+  // From this calibration's covariance. Not learnt if f is exact or the covariance is invalid.
   [[nodiscard]] static LensScale begin(const Calibration& calibration);
 
-  // What measurement = phi + noise adds, by its information (1/variance, may be 0) and its sensitivity (Kalman).
+  // Kalman update with measurement = phi + noise. information: 1 / variance, may be 0.
   void learn(double measurement, double information, const Sensitivity<1>& its_sensitivity,
              Vector2<double>* offset, Matrix2<double>* offset_covariance,
              Sensitivity<2>* offset_sensitivity);
 
-  // The calibration at `phi`, with the covariance that follows where phi is known to this variance and sensitivity.
+  // The calibration at `phi`, with the covariance for phi's variance and sensitivity.
   [[nodiscard]] Calibration at(const Calibration& calibration, double phi, double phi_variance,
                                const Sensitivity<1>& phi_sensitivity) const;
   [[nodiscard]] Calibration at_value(const Calibration& calibration) const {
     return at(calibration, value, variance, sensitivity);
   }
 
-  // A sensitivity that leaves its column of f out of d / d phi.
+  // Sets the column of f so that S a = 0: d / d phi is then not in the sensitivity.
   template <int kRows>
   void make_independent(Sensitivity<kRows>* sensitivity_of_it) const {
     const int f = index(Parameter::kFocalLength);
     const int k = index(Parameter::kRadialDistortion);
     sensitivity_of_it->col(f) = -(direction[k] / direction[f]) * sensitivity_of_it->col(k);
   }
-  // The calibration at `phi`, without its covariance; what phi is counted from moves along.
+  // Moves the calibration to `phi`, without its covariance. phi then counts from there.
   void move_calibration(double phi, Calibration* calibration);
 
  private:
-  // Returns the direction there.
+  // Returns the direction a there.
   [[nodiscard]] ParameterDirection move(double phi, Camera<double>* camera) const;
 };
 
-// Parameters of a frame's own lens in terms of the map's, by f and k at the map's lens, a = (f_a, a_k):
-//   change of log f, the distortion in the corner as it is    f_a: in the column of f
-//   change of the distortion in the corner                    k (f_a / f)^2: in the column of k
-// All others are the same for both. d / d phi stays S a.
+// Converts parameter columns of a frame's own lens to the map's, with the map's lens a = (f_a,
+// a_k):
+//   change of log f at constant distortion in the corner    f_a: in the column of f
+//   change of the distortion in the corner                  k (f_a / f)^2: in the column of k
+// All other columns are the same for both. d / d phi stays S a.
 struct LensColumns {
-  // camera: of the frame.
+  // camera: the frame's.
   LensColumns(const LensScale& lens, const Camera<double>& camera);
 
   template <int kRows>

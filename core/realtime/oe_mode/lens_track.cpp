@@ -5,9 +5,9 @@
 namespace alidade {
 namespace {
 
-// Of landmarks, which err alike for long: as MapOffsetOptions::shared_correlation_time_s.
+// Of the landmarks' common error: as MapOffsetOptions::shared_correlation_time_s.
 constexpr double kCorrelation_s = 10;
-// Of a lens at rest: nothing shows less.
+// Sigma of the rate at rest: smaller rates do not show.
 constexpr double kRestingRate = 1e-6;  // 1/s
 
 }  // namespace
@@ -50,7 +50,7 @@ LensTrack::State LensTrack::predicted(double time_s, bool moves) const {
   out.covariance = carry * state_.covariance * carry.transpose() +
                    options_.acceleration * options_.acceleration * push * push.transpose();
   out.covariance = symmetric(out.covariance);
-  // A lens that nobody saw move can stand still again.
+  // A lens that was not seen to move may be at rest again.
   out.covariance(0, 0) += options_.least_sigma * options_.least_sigma;
   out.covariance(1, 1) += kRestingRate * kRestingRate;
   out.sensitivity = carry * state_.sensitivity;
@@ -62,7 +62,7 @@ void LensTrack::learn(double time_s, bool moves, const State& predicted, const S
   time_s_ = time_s;
   if (moves || !rested_) {
     state_ = solved;
-    // The first frame at rest still has what the movement told.
+    // The first frame at rest still contains the movement.
     rested_ = !moves;
     learnt_at_rest_s_ = time_s;
     return;
@@ -73,7 +73,7 @@ void LensTrack::learn(double time_s, bool moves, const State& predicted, const S
   state_.covariance(0, 0) = prior;
   if (!(information > 0)) return;
   const double inflation = variance_inflation(kCorrelation_s, dt);
-  // Of the step that the solution took, this share.
+  // Take this share of the solution's step.
   const double gain = prior * information / (inflation + prior * information);
   const double full = prior * information / (1 + prior * information);
   const double share = gain / full;

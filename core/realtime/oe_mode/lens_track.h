@@ -1,11 +1,13 @@
 #pragma once
-// LensTrack: the lens from frame to frame, as the landmarks show it: l = (log f, d log f / dt) at a frame's middle row.
-//
-// f is the one by which the map's landmarks fit with phi = 0 (lens_scale.h): the camera's is f exp(phi). While the lens moves, frames
-// know it to some 1e-5 each by themselves, and a frame's prior is the one before, carried on:
-//   log f' = log f + rate dt,   rate' = rate,   both driven by a white acceleration that lasts from frame to frame.
-// At rest it is learnt once, as neighbouring frames' landmarks err alike (variance_inflation(), covariance.h).
-// Fixed memory; no allocation. One thread.
+// LensTrack: the lens from frame to frame, as landmarks show it: l = (log f, d log f / dt) at a
+// frame's middle row.
+// f is the one with which the map's landmarks fit at phi = 0 (lens_scale.h); the camera's is f
+// exp(phi). While the lens moves, each frame alone determines it to some 1e-5. A frame's prior is
+// the previous state, extrapolated:
+//   log f' = log f + rate dt,   rate' = rate
+// Both are driven by an acceleration that is constant between two frames and white from frame to
+// frame. At rest l is learnt once, as landmarks of neighbouring frames have the same error
+// (variance_inflation(), covariance.h). Fixed memory; no allocation. One thread.
 
 #include "core/model/calibration.h"
 #include "core/realtime/oe_mode/covariance.h"
@@ -14,13 +16,13 @@
 namespace alidade {
 
 struct LensTrackOptions {
-  double acceleration = 2;  // 1/s^2, > 0: of log f, one standard deviation, while the lens moves
-  double drift = 1e-7;      // 1 / sqrt(s), >= 0: of log f at rest
-  double longest_s = 0.5;   // s, > 0: that it is carried on for without landmarks
-  // 1, > 0: of log f at rest, as far as landmarks that err alike for long tell it at the best.
+  double acceleration = 2;  // 1/s^2, > 0; sigma of log f's acceleration while the lens moves
+  double drift = 1e-7;      // 1 / sqrt(s), >= 0; of log f at rest
+  double longest_s = 0.5;   // s, > 0; longest extrapolation without landmarks
+  // 1, > 0; smallest sigma of log f at rest, as landmarks have a common error for long.
   double least_sigma = 3e-6;
 
-  // False and one line in *error (if not null) when a value is not valid.
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
@@ -37,17 +39,18 @@ class LensTrack {
 
   // The lens is the map's.
   void reset() { active_ = false; }
-  // It may differ from the map's from here on: at rest with that focal length, exactly.
+  // From now on it may differ from the map's. It starts at rest at this log focal length, known to
+  // least_sigma.
   void begin(double time_s, double log_focal_length);
   [[nodiscard]] bool active() const { return active_; }
 
-  // How long ago landmarks told it, s.
+  // s; time since landmarks showed the lens.
   [[nodiscard]] double age_s(double time_s) const { return std::abs(time_s - time_s_); }
-  // Without this frame; moves: it may have since the frame before.
+  // State without this frame. moves: the lens may have moved since the previous frame.
   [[nodiscard]] State predicted(double time_s, bool moves) const;
-  // What a frame with landmarks says, whose prior was predicted.
+  // Takes the solution of a frame with landmarks, whose prior was `predicted`.
   void learn(double time_s, bool moves, const State& predicted, const State& solved);
-  // phi is in the map from here on.
+  // From now on phi is in the map.
   void move(double phi) { state_.value[0] += phi; }
 
   [[nodiscard]] const State& state() const { return state_; }
@@ -58,7 +61,7 @@ class LensTrack {
   bool active_ = false;
   double time_s_ = 0;
   double learnt_at_rest_s_ = 0;
-  bool rested_ = false;  // learnt at rest already, since it moved
+  bool rested_ = false;  // already learnt at rest since it moved
   State state_;
 };
 

@@ -50,7 +50,7 @@ void ShearCorrection::straighten(const Calibration& calibration, const FrameMoti
   const auto elevation_of = [&](const Vector3<double>& d) {
     return -std::asin(std::clamp(a_pan.dot(d), -1.0, 1.0));
   };
-  // Of the optical axis of a frame that looks at `tilt`.
+  // Elevation of the optical axis of a frame that looks at `tilt`.
   const double origin =
       elevation_of(ViewProjection(calibration, motion).optical_axis()) - (motion.angle.tilt - tilt);
   for (int slot = 0; slot < map->capacity(); ++slot) {
@@ -135,7 +135,7 @@ Matrix2<double> MapShear::angle_covariance() const {
   return Vector2<double>(covariances_[0](0, 0), covariances_[1](0, 0)).asDiagonal();
 }
 
-// The curve through the earlier angles tells what was to be expected now; a jerk surprises it.
+// The curve through the earlier angles predicts this one. A jerk shows as a surprise.
 void MapShear::add_frame(double middle_row_time_s, const FrameMotion<double>& motion,
                          const Matrix6& motion_covariance) {
   const double since_s = middle_row_time_s - frames_[0].time_s;
@@ -167,7 +167,7 @@ std::optional<ShearCorrection> MapShear::correct() {
   if (frame_count_ < frames_.size() || half_readout_s_ == 0) return std::nullopt;
   if (std::abs(frames_.back().s_per_rad / s_per_rad_ - 1) > kSameLens) return std::nullopt;
   const Frame& middle = frames_[kCurve / 2];
-  // s, between frames, on average.
+  // s, mean time between frames.
   const double h = (frames_[0].time_s - frames_[kCurve - 1].time_s) / (kCurve - 1);
   Matrix<double, kCurve, kCurve> powers;
   for (std::size_t i = 0; i < kCurve; ++i) {
@@ -206,8 +206,8 @@ std::optional<ShearCorrection> MapShear::correct() {
                    acceleration_surprise * acceleration_surprise;
     const Matrix2<double> to_information = (shear.bottomRightCorner<2, 2>() + noise).inverse();
     if (!(wrong.dot(to_information * wrong) < options_.max_surprise)) {
-      // A jerk, or a shear beyond what was thought: if it stays, it will be believed. What it has done to the
-      // angle is told by move_to() alone: nothing here could ever take that back.
+      // A jerk, or a shear larger than expected: if it stays, it will be believed. Its effect on
+      // the angle comes from move_to() alone, as nothing here could ever remove it again.
       const double factor = std::sqrt(options_.doubt);
       const Vector3<double> doubt(1, factor, factor);
       shear = (doubt.asDiagonal() * shear * doubt.asDiagonal()).eval();
@@ -215,7 +215,7 @@ std::optional<ShearCorrection> MapShear::correct() {
     }
     const Matrix<double, 3, 2> gain = shear.rightCols<2>() * to_information;
     const Vector3<double> error = gain * wrong;
-    // The angle has gone wrong with the way from where the map began, by the rate that was.
+    // The angle error has grown with the way from where the map began, by the former rate error.
     out.angle[axis] = error[0];
     out.rate[axis] = error[1];
     out.acceleration[axis] = error[2];

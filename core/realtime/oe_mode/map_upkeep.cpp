@@ -57,7 +57,7 @@ void MapUpkeep::mark(std::uint32_t frame, int slot, bool matched, double residua
 
 void MapUpkeep::refine(const ProcessedFrame& frame, const LandmarkSearch& search,
                        LandmarkMap* map) const {
-  std::size_t next = 0;  // of those found, which are a part of the chosen in their order
+  std::size_t next = 0;  // index of found(), a subset of chosen() in the same order
   for (const VisibleLandmark& chosen : search.chosen()) {
     const int slot = chosen.slot;
     if (next == search.found().size() || search.observations()[next].slot != slot) {
@@ -104,7 +104,7 @@ void MapUpkeep::judge_coarse(const Calibration& calibration, const Pyramid& pyra
     const int slot = search.coarse_slots()[i];
     Vector2<double> u;
     PatchStep step;
-    // One that has left the image was not missed.
+    // A landmark that has left the image was not missed.
     if (!view.project(map->at(slot).d, &u) ||
         !measure_step(*patch.reference, pyramid.octave(patch.octave),
                       std::ldexp(1.0, -patch.octave) * u, &step)) {

@@ -1,10 +1,10 @@
 #pragma once
-// MotionPrediction: how the camera moves in a frame, before its image is looked at: by telemetry, or, where
-// there is none, by the frame before, carried on.
-//
-// By telemetry: its angles and rates in true units, less the map's offset. By the frame before: angle and rate
-// carried on; that the mount accelerates meanwhile is in the covariance. Accelerations are known where
-// somebody knows them (InterpolatedPanTilt::acceleration_sigma), else to acceleration_fields.
+// MotionPrediction: the camera's motion in a frame before its image is used, from telemetry or,
+// without it, from the previous frame.
+// From telemetry: its angles and rates in true units, minus the map's offset. From the previous
+// frame: angle and rate, extrapolated; the covariance allows for an acceleration. An acceleration
+// is known if someone provides it (InterpolatedPanTilt::acceleration_sigma), else to
+// acceleration_fields.
 // No allocation. One thread.
 
 #include "core/model/calibration.h"
@@ -17,27 +17,26 @@
 namespace alidade {
 
 struct MotionPredictionOptions {
-  // Fields of view per s^2, of either axis, one standard deviation: weak knowledge, for frames with few
-  // landmarks. > 0
+  // Fields of view per s^2, > 0; sigma of either axis. A weak prior, for frames with few landmarks.
   double acceleration_fields = 10;
-  double longest_s = 0.5;  // s, > 0: from a frame to the next without telemetry
+  double longest_s = 0.5;  // s, > 0; longest extrapolation without telemetry
 
-  // False and one line in *error (if not null) when a value is not valid.
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
 struct PredictedMotion {
   FrameMotion<double> motion;                           // map's frame, about the middle row
-  Matrix6 covariance = Matrix6::Zero();                 // of motion, apart from the map's offset
+  Matrix6 covariance = Matrix6::Zero();                 // of motion, without the map's offset
   Sensitivity<6> sensitivity = Sensitivity<6>::Zero();  // of motion
   Matrix2<double> offset_covariance =
-      Matrix2<double>::Zero();  // rad^2, what the map's offset adds to angles
-  Matrix2<double> angle_covariance = Matrix2<double>::Zero();  // rad^2, of angles, all together
-  // For the solution, relative to `motion`; its offset_covariance is left to the caller.
+      Matrix2<double>::Zero();  // rad^2, added to angles by the map's offset
+  Matrix2<double> angle_covariance = Matrix2<double>::Zero();  // rad^2, of angles, in total
+  // For the solution, relative to `motion`. The caller sets its offset_covariance.
   MotionPrior prior;
 };
 
-// At a constant acceleration for t seconds; what it is later, nobody knows.
+// The motion t seconds later, at constant acceleration. The acceleration after that is unknown: 0.
 [[nodiscard]] FrameMotion<double> carried_on(const FrameMotion<double>& from, double t);
 
 class MotionPrediction {
@@ -46,35 +45,35 @@ class MotionPrediction {
   explicit MotionPrediction(const MotionPredictionOptions& options) : options_(options) {}
 
   void reset(const Calibration& calibration);
-  // The calibration has another lens.
+  // For another lens of the calibration.
   void change_lens(const Calibration& calibration);
-  // No frame before.
+  // Forgets the previous frame.
   void forget() { has_last_ = false; }
 
   // inflation: of the variance of telemetry's angles, see MapOffsetFilter::inflation().
   [[nodiscard]] PredictedMotion by_telemetry(const Calibration& calibration,
                                              const InterpolatedPanTilt& telemetry,
                                              const MapOffset& offset, double inflation) const;
-  // follows(frame_time_s)
+  // Needs follows(frame_time_s).
   [[nodiscard]] PredictedMotion by_last_frame(double frame_time_s) const;
 
   [[nodiscard]] bool has_last() const { return has_last_; }
-  // Whether the frame before is recent enough to be carried on.
+  // True if the previous frame is recent enough to extrapolate.
   [[nodiscard]] bool follows(double frame_time_s) const {
     return has_last_ && since_last_s(frame_time_s) < options_.longest_s;
   }
-  // s, in either direction of time; 0 without a frame before.
+  // s, in either direction of time; 0 without a previous frame.
   [[nodiscard]] double since_last_s(double frame_time_s) const;
-  // The frame before, carried on to this one with its acceleration; follows(frame_time_s).
+  // The previous motion, extrapolated with its acceleration. Needs follows(frame_time_s).
   [[nodiscard]] FrameMotion<double> last_carried_on(double frame_time_s) const;
 
-  // covariance: of motion, by the frame's own noise; shared_covariance: rad^2, of its angles, by what the
-  // landmarks share.
+  // covariance: of motion, from the frame's own noise. shared_covariance: rad^2, of its angles,
+  // from the landmarks' common error.
   void remember(double frame_time_s, const FrameMotion<double>& motion, const Matrix6& covariance,
                 const Matrix2<double>& shared_covariance, const Sensitivity<6>& sensitivity);
-  // The same motion, as the corrected map shows it.
+  // Replaces the remembered motion by that of the corrected map.
   void correct(const FrameMotion<double>& motion) { last_motion_ = motion; }
-  // As it comes out by parameters that are `change` times this direction away.
+  // Changes the remembered motion to parameters that are `change` * direction away.
   void move(double change, const ParameterDirection& direction);
 
  private:

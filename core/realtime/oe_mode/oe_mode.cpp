@@ -7,7 +7,7 @@
 namespace alidade {
 namespace {
 
-// Of the frame's own lens, 1/s, by its noise and that of phi.
+// 1/s; sigma of the zoom rate of the frame's own lens, from its noise and that of phi.
 double rate_sigma(const SolvedMotion& solved) {
   const SolvedZoom& zoom = solved.zoom;
   return std::sqrt(zoom.covariance(1, 1) +
@@ -174,21 +174,21 @@ OeMode::Solution OeMode::find_and_solve(const PredictedMotion& predicted,
   const bool doubtful = first.status == SolveStatus::kTooFew ||
                         (first.status == SolveStatus::kOk &&
                          first.solved.inliers < look.least_held * statistics_.chosen);
-  // A lens that moves unawares is seen by residuals first, all of which may still be inliers.
+  // A lens that moves unnoticed shows in the residuals first. All may still be inliers.
   constexpr double kMisfit = 6;  // times the covariance claimed
   const bool misfit = lens_is_learnt() && !lens_.moves() && first.status == SolveStatus::kOk &&
                       first.solved.inflation > kMisfit;
   if (!doubtful && !misfit) return first;
   if (lens_is_learnt() && map_.size() > 0) return look_for_moved_lens(first, coarse, predicted);
   if (!prediction_.follows(frame_.time_s)) return first;
-  // A second look, where the motion before leads to.
+  // A second look, where the previous motion leads.
   const OeStatistics first_look = statistics_;
   Solution second = solve_about(prediction_.last_carried_on(frame_.time_s), predicted);
   if (second.status == SolveStatus::kOk && second.solved.inliers >= look.least_held_again &&
       second.solved.inliers >= look.least_held * statistics_.chosen) {
     return second;
   }
-  // No better: landmarks, where they held, and counts are to be the first look's.
+  // Not better: restore the first look's landmarks, if they held, and counts.
   if (first.status == SolveStatus::kOk) {
     first = solve_about(first.motion, predicted);
   } else {
@@ -207,7 +207,7 @@ OeStatus OeMode::answer_without_landmarks(const PredictedMotion& predicted,
   frame_.covariance = predicted.covariance;
   frame_.shared_covariance = predicted.offset_covariance;
   frame_.sensitivity = predicted.sensitivity;
-  // Where no landmark was to be expected, telemetry may place new ones.
+  // Where no landmark is expected, telemetry may place new ones.
   const bool new_view = has_telemetry && !lens_.moves() && statistics_.chosen < options_.look.few &&
                         static_cast<int>(search_.coarse().size()) < options_.look.few_coarse;
   frame_.use = new_view ? MapUse::kNewView : MapUse::kLost;
@@ -215,7 +215,7 @@ OeStatus OeMode::answer_without_landmarks(const PredictedMotion& predicted,
                     solution.status == SolveStatus::kTooFew && has_telemetry && !new_view);
   if (!has_telemetry) return finish(OeStatus::kNoPrediction);
   if (!contradiction) return finish(OeStatus::kTooFew);
-  // One of the two is wrong, and nobody here can tell which: the answer has to cover both.
+  // One of the two is wrong, and it is unknown which: the answer must cover both.
   MotionCovariance covering = out->motion_covariance;
   covering.topLeftCorner<2, 2>() +=
       solution.solved.innovation * solution.solved.innovation.transpose();
@@ -240,7 +240,7 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
                 solved.sensitivity.topRows<2>());
   }
   if (offset_.contradicted() && !enclosed) {
-    // Until telemetry that belongs to a frame says otherwise.
+    // Until telemetry at a frame's time agrees.
     Solution contradiction = solution;
     contradiction.status = SolveStatus::kContradiction;
     return answer_without_landmarks(predicted, contradiction, out);
@@ -277,7 +277,7 @@ OeStatus OeMode::answer_with_landmarks(const PredictedMotion& predicted, const S
   if (lens_.columns() != nullptr) out->zoom_rate_sigma = rate_sigma(solved);
   note_landmarks_answer(solved, added);
   if (enclosed) {
-    // What contradicts does not come this far: see solve_orientation().
+    // A contradiction does not get here: see solve_orientation().
     static_cast<void>(offset_.learn(
         frame_.time_s,
         {solved.innovation, solved.innovation_covariance, solved.shared_covariance,

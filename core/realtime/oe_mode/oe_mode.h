@@ -1,36 +1,11 @@
 #pragma once
-// OE mode: a frame's orientation from telemetry and from landmarks seen in the frame, to a few hundredths
-// of a pixel (PTCEE sections V-A, V-C).
-//
-//   process()   1 predict pan and tilt from telemetry, or, without it, from the    motion_prediction.h
-//                 frame before
-//               2 coarse alignment over pan and tilt, coarse to fine (PTCEE 30, 31)  landmark_search.h
-//               3 choose landmarks of the map, project them with rolling shutter,    landmark_search.h
-//                 align each patch (PTCEE 32, 33)
-//               4 solve angle, rate and acceleration of pan and tilt, and the        orientation_solve.h
-//                 offset of map against telemetry, robustly, with telemetry as
-//                 prior (PTCEE 35); where few hold, 3 and 4 once more, from
-//                 where the frame before leads to
-//               5 answer, and learn the map's offset                                 map_offset_filter.h
-//   maintain()  after the answer is out, from the frame's result (processed_frame.h):
-//               6 refine and retire landmarks (PTCEE 36)                             map_upkeep.h
-//               7 straighten the map by what neighbouring frames tell                map_shear.h
-//               8 make landmarks where cells are empty                               landmark_maker.h
-//
-// One estimator for OE and PT: without landmarks the solution is telemetry's, with its covariance. Where
-// landmarks contradict telemetry beyond what both claim, the answer is telemetry's with a covariance
-// that covers both, and the mode is PT.
-// How map, offset and answer follow the calibration they were found with is carried along (Sensitivity),
-// and what its covariance makes of that is in the answer's.
-// The map begins empty, in the frame that the first telemetry gave it, or as another OeMode left it.
-// What was handed over is believed as far as images bear it out: a map that telemetry contradicts is
-// forgotten after 50 frames, as is, after 50 frames that show other things, what should be in view of it.
-// Where the calibration's focal length is that of a zoom curve it is learnt too, from the first frame on, and the answer's
-// calibration has it (lens_scale.h); landmarks follow.
-// Such a lens may move, too: with what is known of it from frame to frame (FrameLens), frames solve log f and its rate besides
-// (lens_follower.h), and landmarks are looked for in the octaves in which they have about their size. The map stays; it begins with a lens at rest.
-// Who knows from outside where a frame looked (a scene map) may say so later: from then on answers, PT's too, are in that base
-// (base_tie.h), whatever becomes of map and calibration.
+// OeMode: a frame's orientation from telemetry and landmarks, to a few hundredths of a pixel (PTCEE
+// sections V-A, V-C). Derivation: docs/oe_mode.md. Steps: see process() and maintain().
+// One estimator for OE and PT: without landmarks the solution is telemetry's, with its covariance.
+// If landmarks contradict telemetry beyond both covariances, the answer is telemetry's with a
+// covariance that covers both, and the mode is PT.
+// Map, offset and answer carry their dependence on the calibration (Sensitivity). The answer's
+// covariance includes the calibration's.
 // Fixed memory, taken by the constructor; nothing else allocates, waits or throws. One thread.
 
 #include <cstddef>
@@ -53,38 +28,38 @@ namespace alidade {
 enum class OeStatus {
   kOk,             // orientation from landmarks and telemetry
   kTooFew,         // too few landmarks held: telemetry alone
-  kContradiction,  // landmarks and telemetry exclude each other: telemetry, with room for both
-  kNoPrediction,   // neither telemetry nor a frame before: nothing is written
-  kBadImage,       // none, or not of the calibration's size: telemetry alone
-  kLensMoves,  // no map begins with a lens that moves, and none is held against an unknown one: telemetry alone
-  kNotFinite  // nothing is written
+  kContradiction,  // landmarks and telemetry exclude each other: telemetry, covering both
+  kNoPrediction,   // neither telemetry nor a previous frame: nothing is written
+  kBadImage,       // no image, or not of the calibration's size: telemetry alone
+  kLensMoves,      // no map begins with a moving lens, or the lens is unknown: telemetry alone
+  kNotFinite       // nothing is written
 };
 
 enum class FocalLength {
-  kCalibrated,  // with the covariance that the calibration has
-  kLearnt       // besides, from the images: the lens has come back from a movement
+  kCalibrated,  // with the covariance of the calibration
+  kLearnt       // also from the images: the lens has returned from a movement
 };
 
 struct OeStatistics {
   OeStatus status = OeStatus::kNoPrediction;
-  // Landmarks by stage, see landmark_search.h; each a part of those before.
+  // Landmarks by stage (landmark_search.h); each number is a part of the one before.
   int fine_visible = 0;        // of the fine octaves (octaves.h), in the image
-  int chosen = 0;              // and looked for
+  int chosen = 0;              // looked for
   int found = 0;               // by patch alignment
   int inliers = 0;             // in agreement with the solution
-  double coarse_shift_px = 0;  // by which coarse alignment moved the prediction, image centre
+  double coarse_shift_px = 0;  // px at the image's centre, correction by coarse alignment
   PanTilt<double> map_offset;  // rad, base minus map
   Matrix2<double> map_offset_covariance = Matrix2<double>::Zero();  // rad^2
-  // The frame's lens was solved for by itself, as it had moved since the map was begun; and by how many of both's standard
-  // deviations its log f is not what the zoom reading says.
+  // own_lens: the frame's lens was solved for, as it had moved since the map began. reading_sigmas:
+  // |log f minus the zoom reading's| in standard deviations of both.
   bool own_lens = false;
   double reading_sigmas = 0;
 };
 
-// What telemetry is to be asked for again.
+// A telemetry query to repeat.
 struct TelemetryLookUp {
-  double time_s = 0;        // telemetry clock
-  double time_sigma_s = 0;  // one standard deviation
+  double time_s = 0;        // s, telemetry clock
+  double time_sigma_s = 0;  // s
 };
 
 class OeMode {
@@ -94,64 +69,88 @@ class OeMode {
   OeMode(const OeMode&) = delete;
   OeMode& operator=(const OeMode&) = delete;
 
-  // Begins anew: empty map, nothing remembered. Real-time safe.
+  // Begins anew with an empty map, which starts in the frame of the first telemetry. Real-time
+  // safe.
   void reset(const Calibration& calibration, FocalLength focal_length = FocalLength::kCalibrated);
-  // The same, but with this map, made with this calibration, by this mount without a restart that
-  // moved its zero; it is in OE mode in its first frame. Landmarks that are not valid, or that there is
-  // no room for, are left out; a map that is not valid is none. Real-time safe: 0.3 us a landmark.
+  // The same with this map: made with this calibration, by this mount, with no restart since that
+  // moved its zero. OE mode starts with its first frame. Invalid landmarks, and those without room,
+  // are left out; an invalid map is ignored. Real-time safe: 0.3 us per landmark.
+  // A handed-over map is believed as far as images confirm it. It is forgotten if telemetry
+  // contradicts it for 50 frames. Landmarks that should be in view are forgotten if 50 frames show
+  // other things.
   void reset(const Calibration& calibration, const MapState& map,
              FocalLength focal_length = FocalLength::kCalibrated);
 
+  // Steps:
+  //   1 predict pan and tilt from telemetry or the previous frame   motion_prediction.h
+  //   2 coarse alignment in pan and tilt (PTCEE 30, 31)             landmark_search.h
+  //   3 choose landmarks, align them, rolling shutter (32, 33)      landmark_search.h
+  //   4 solve motion and offset robustly, telemetry as prior (35)   orientation_solve.h
+  //     If few hold, repeat 3 and 4 from where the previous frame leads.
+  //   5 answer, and learn the map's offset                          map_offset_filter.h
   // frame_time_s: t0, row 0 on the image clock. at_middle_row: telemetry at t0 + clock_offset +
-  // line_delay * height / 2, null if there is none. The image must outlive the maintain() that
-  // follows. *out is written with every status but kNoPrediction and kNotFinite.
-  // Extrapolated telemetry is a prior for this frame only: the map's offset learns nothing from it, and the
-  // frame is pending.
+  // line_delay * height / 2; null if there is none. The image must outlive the next maintain().
+  // *out is written with every status but kNoPrediction and kNotFinite.
+  // Extrapolated telemetry is a prior for this frame only: the map's offset does not learn from it,
+  // and the frame becomes pending.
   [[nodiscard]] OeStatus process(const ImageView& image, double frame_time_s,
                                  const InterpolatedPanTilt* at_middle_row, FrameOrientation* out) {
     return process(image, frame_time_s, at_middle_row, nullptr, out);
   }
-  // The same behind a lens that zooms, with FocalLength::kLearnt; lens: what is known of it, null: nothing new. Where that is
-  // missing or wrong the frames before and the image tell f, as far as they can. Distortion and centre are taken from `lens`, along its
-  // curve to the f that the image tells: where its focal length is excluded (reading_sigmas), the caller hands in the curve's at the
-  // focal length that was found.
+  // The same for a lens with a zoom curve and FocalLength::kLearnt. Its focal length is learnt from
+  // the first frame on (lens_scale.h), and it may move (lens_follower.h). Frames of a moving lens
+  // solve log f and its rate too, and look for landmarks in the octaves that show them at about
+  // their size. The map stays; it begins with a lens at rest.
+  // lens: what is known of it; null: nothing new. If it is missing or wrong, the previous frames
+  // and the image determine f as far as they can. Distortion and centre come from `lens`, along its
+  // curve to the image's f. If its focal length is excluded (reading_sigmas), the caller passes the
+  // curve's at the f that was found.
   [[nodiscard]] OeStatus process(const ImageView& image, double frame_time_s,
                                  const InterpolatedPanTilt* at_middle_row, const FrameLens* lens,
                                  FrameOrientation* out);
 
-  // Whether the map was begun with another lens than the frame last processed had, or than reset() told, or that lens moved.
+  // True if the map began with another lens than that of the last frame or of reset(), or if the
+  // lens moved.
   [[nodiscard]] bool lens_has_moved() const { return lens_.follows() || begun_elsewhere_; }
-  // The map was begun before that lens moved, and has been followed since.
+  // True if the map began before that lens moved, and has been kept since.
   [[nodiscard]] bool has_followed_lens() const { return lens_.follows(); }
 
-  // Map upkeep with the frame last processed; does nothing where that had no sure orientation.
+  // Upkeep of the map with the last frame (processed_frame.h), to be called after its answer is
+  // out. Does nothing if that frame has no sure orientation.
+  //   6 refine and retire landmarks (PTCEE 36)      map_upkeep.h
+  //   7 straighten the map by neighbouring frames   map_shear.h
+  //   8 make landmarks where cells are empty        landmark_maker.h
   void maintain();
 
-  // Late telemetry. True, and what telemetry is to be asked for, if a frame is pending and telemetry up to
-  // newest_sample_s (telemetry clock) encloses its time: the oldest of up to MapOffsetFilter::kMaxPending.
+  // Late telemetry. True, with *look_up, if telemetry up to newest_sample_s (telemetry clock)
+  // encloses the time of a pending frame: the oldest of up to MapOffsetFilter::kMaxPending.
   [[nodiscard]] bool pending(double newest_sample_s, TelemetryLookUp* look_up) const;
-  // Telemetry's answer for that frame; null: it has none. The map's offset learns from it, unless it is
-  // extrapolated, and the frame is pending no more. Where such telemetry contradicts landmarks, so do the frames
-  // that follow it.
+  // Telemetry's answer for that frame; null if it has none. The map's offset learns from it unless
+  // it is extrapolated, and the frame is no longer pending. If it contradicts landmarks, so do the
+  // frames that follow it.
   void settle_pending(const InterpolatedPanTilt* late);
-  // Telemetry's clock began anew: nobody can be asked for what was.
+  // Telemetry's clock began anew: earlier times cannot be asked for any more.
   void forget_pending();
 
-  // Somebody measures where the frame last processed looked; who asked before is forgotten. False: it has no answer.
+  // Announces a measurement of the last frame's orientation in an outer base, such as a scene
+  // map's. Replaces an earlier one. False if the frame has no answer. Once measured, all answers,
+  // also PT's, are in that base, whatever becomes of map and calibration (base_tie.h).
   bool ask_about_base() { return tie_.ask(); }
-  // What came of it. False: nothing that is better than what is known.
+  // The measurement. False if what is known is better, or none was announced.
   bool settle_base(const BaseMeasurement& measurement) {
     return tie_.settle(measurement, offset_.offset());
   }
   [[nodiscard]] const BaseTie& tie() const { return tie_; }
-  // How telemetry's zero lies in the base; 0 as long as nothing is known from outside.
+  // Telemetry's zero in the base; 0 as long as nothing is known from outside.
   [[nodiscard]] TiedOffset telemetry_zero() const { return tie_.of_telemetry(offset_.offset()); }
-  // Puts telemetry's answer about any frame into the base. False: what comes out is not finite, and *out is as it was.
+  // Converts telemetry's answer for any frame to the base. False if the result is not finite; *out
+  // is then unchanged.
   [[nodiscard]] bool put_into_base(FrameOrientation* out) const;
 
-  // Of the frame last processed.
+  // Of the last processed frame.
   [[nodiscard]] const OeStatistics& statistics() const { return statistics_; }
-  // statistics().found of them, residuals and inliers by the solution; without one, by the prediction.
+  // statistics().found observations. Residuals and inliers are the solution's or, without one, the
+  // prediction's.
   [[nodiscard]] const OeObservation* observations() const { return search_.observations().data(); }
   [[nodiscard]] const LandmarkMap& map() const { return map_; }
 
@@ -163,9 +162,9 @@ class OeMode {
  private:
   struct Solution {
     SolveStatus status = SolveStatus::kTooFew;
-    FrameMotion<double> motion;  // about which it was linearised, map's frame
+    FrameMotion<double> motion;  // point of linearisation, map's frame
     SolvedMotion solved;
-    Camera<double> camera;  // likewise
+    Camera<double> camera;  // at the point of linearisation
   };
 
   [[nodiscard]] SearchedFrame searched() const {
@@ -193,7 +192,8 @@ class OeMode {
   OeStatus answer_with_landmarks(const PredictedMotion& predicted, const Solution& solution,
                                  FrameOrientation* out);
 
-  // By what is known from outside too, for a frame that landmarks answer: what is added to the map's angles, and all the covariance.
+  // Base of an answer with landmarks, including what is known from outside: what is added to the
+  // map's angles, and the total covariance.
   [[nodiscard]] TiedOffset offset_of_answer(const SolvedMotion& solved) const;
   [[nodiscard]] Matrix6 covariance_of_answer(const SolvedMotion& solved,
                                              const TiedOffset& added) const;
@@ -202,12 +202,13 @@ class OeMode {
   [[nodiscard]] bool tie_telemetry(FrameOrientation* out);
 
   [[nodiscard]] bool lens_is_learnt() const { return offset_.lens().learnt; }
-  // Of answers: with the focal length as learnt so far.
+  // Calibration of answers: with the focal length as learnt so far.
   [[nodiscard]] const Calibration& answers_calibration() const {
     return lens_is_learnt() ? answers_calibration_ : calibration_;
   }
   void begin_lens();
-  // The lens of this frame. False: nothing to begin a map with, or to look for one.
+  // Takes the lens of this frame. False if it can neither begin a map nor be used to find
+  // landmarks.
   [[nodiscard]] bool take_lens(const FrameLens* reading);
   void set_camera(const Camera<double>& camera);
   [[nodiscard]] Solution look_with_own_lens(FrameMotion<double> motion,
@@ -229,16 +230,16 @@ class OeMode {
   void forget_map();
 
   OeOptions options_;
-  Calibration given_;  // by reset()
+  Calibration given_;  // by reset(), or of a reading: see begun_elsewhere_
   FocalLength focal_length_ = FocalLength::kCalibrated;
-  Calibration calibration_;          // that the map is made with; but for the focal length as given
-  Calibration answers_calibration_;  // where the focal length is learnt
-  bool begun_elsewhere_ = false;     // given_ is a reading's by now
-  double moved_phi_ = 0;             // what of phi is in it already
-  bool ready_ = false;               // there is room for the calibration's images
+  Calibration calibration_;          // of the map; as given but for the focal length
+  Calibration answers_calibration_;  // if the focal length is learnt
+  bool begun_elsewhere_ = false;     // given_ is a reading's
+  double moved_phi_ = 0;             // part of phi that is in calibration_
+  bool ready_ = false;               // images of the calibration's size fit
   std::uint32_t frames_ = 0;         // count
 
-  Pyramid pyramid_;  // of the frame last looked at
+  Pyramid pyramid_;  // of the last frame used
   Octaves octaves_;
   RunningNoise noise_;
   LandmarkMap map_;
@@ -251,11 +252,11 @@ class OeMode {
   MapUpkeep upkeep_;
   LandmarkMaker maker_;
   VisibleLandmarks in_view_;       // of maintain()
-  double share_of_new_ = 0;        // of the landmarks in view, made by the maintain() before
-  double cells_focal_length_ = 1;  // px, that the map's cells are for
+  double share_of_new_ = 0;        // share of landmarks in view that the last maintain() made
+  double cells_focal_length_ = 1;  // px, of the map's cells
 
   OeStatistics statistics_;
-  ProcessedFrame frame_;  // process() writes it, maintain() uses it up
+  ProcessedFrame frame_;  // written by process(), used up by maintain()
 };
 
 }  // namespace alidade

@@ -1,4 +1,4 @@
-// The base that OeMode answers in: telemetry's, or one that was told from outside.
+// The base of OeMode's answers: telemetry's, or one given from outside.
 
 #include "core/realtime/oe_mode/oe_mode.h"
 
@@ -20,7 +20,7 @@ SharedByView OeMode::shared_by_view(const SolvedMotion& solved) const {
           {camera.width / camera.focal_length, camera.height / camera.focal_length}};
 }
 
-// Where the map itself is tied, what telemetry does not know of its offset is of no matter.
+// If the map itself is tied, the uncertainty of its offset against telemetry does not matter.
 Matrix6 OeMode::covariance_of_answer(const SolvedMotion& solved, const TiedOffset& added) const {
   const bool by_map = tie_.is_by_map();
   Matrix6 covariance = by_map ? solved.frame_covariance : solved.covariance;

@@ -1,4 +1,4 @@
-// The lens that OeMode looks through: that of the map, its scale learnt, or the frame's own once it has moved.
+// The lens of OeMode: the map's with its scale learnt, or the frame's own once it has moved.
 
 #include <cmath>
 
@@ -8,7 +8,7 @@ namespace alidade {
 
 void OeMode::begin_lens() {
   if (lens_.follows() && lens_.reading() != nullptr) {
-    // The lens that the map was begun with is gone.
+    // The lens that the map began with is gone.
     given_ = lens_.reading()->calibration;
     begun_elsewhere_ = true;
     search_.change_lens(given_);
@@ -23,7 +23,8 @@ void OeMode::begin_lens() {
   if (lens_is_learnt()) answers_calibration_ = given_;
 }
 
-// Motion and sensitivity are those at phi = 0: at its value, and by all of it.
+// Input: motion and sensitivity at phi = 0. Output: at phi's value, with the total dependence on
+// it.
 void OeMode::add_lens(const SolvedLens& lens, FrameMotion<double>* in_base,
                       Sensitivity<6>* sensitivity) const {
   Vector6 by_lens = lens.motion_by_lens;
@@ -42,13 +43,13 @@ bool OeMode::take_lens(const FrameLens* reading) {
   if (!lens_.follows()) {
     if (!lens_.reads_other_than(given_.camera.focal_length)) return true;
     if (map_.size() == 0) {
-      // A map begins with a lens at rest: of one that moves its landmarks would be sheared unawares.
+      // A map begins with a lens at rest. Landmarks of a moving one would be sheared unnoticed.
       given_ = reading->calibration;
       reset(given_, focal_length_);
       begun_elsewhere_ = true;
       return !reading->moves;
     }
-    // When the lens stood where a map that was handed over has it nobody knows.
+    // It is unknown when the lens was last at the position of a handed-over map.
     const double since_s = prediction_.has_last() ? prediction_.since_last_s(frame_.time_s)
                                                   : options_.lens.track.longest_s;
     lens_.follow(frame_.time_s - since_s, calibration_.camera.focal_length);
@@ -60,7 +61,7 @@ bool OeMode::take_lens(const FrameLens* reading) {
   return lens_.is_known(frame_.time_s);
 }
 
-// Everything that depends on how wide the view is.
+// Updates everything that depends on the width of the view.
 void OeMode::set_camera(const Camera<double>& camera) {
   calibration_.camera = camera;
   lens_.look_through(offset_.lens(), camera);
@@ -70,7 +71,8 @@ void OeMode::set_camera(const Camera<double>& camera) {
   shear_.change_lens(calibration_);
 }
 
-// Twice, where the first look finds another lens than was expected: patches and rows are another's then.
+// Looks twice if the first look finds another lens than expected, as patches and rows are then
+// another lens's.
 OeMode::Solution OeMode::look_with_own_lens(FrameMotion<double> motion,
                                             const PredictedMotion& predicted) {
   constexpr double kFar_px = 0.5;  // in the corners
@@ -87,14 +89,14 @@ OeMode::Solution OeMode::look_with_own_lens(FrameMotion<double> motion,
   return solve_about(motion, predicted);
 }
 
-// Few landmarks hold: the lens may have moved, whatever its readings tell, or stand where they tell.
+// Few landmarks hold: the lens may have moved whatever its readings say, or be where they say.
 OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
                                              const LandmarkSearch::Coarse& coarse,
                                              const PredictedMotion& predicted) {
   const LookOptions& look = options_.look;
   const OeStatistics first_look = statistics_;
   const bool follows = prediction_.follows(frame_.time_s);
-  // Better than the first look, if that was something.
+  // Required factor of improvement on the first look, if that held.
   constexpr double kBetter = 0.5;
   const bool few = first.status != SolveStatus::kOk ||
                    first.solved.inliers < look.least_held * statistics_.chosen;
@@ -105,7 +107,8 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
   };
   const FrameMotion<double> carried =
       follows ? prediction_.last_carried_on(frame_.time_s) : coarse.motion;
-  // Coarse octaves find the view whatever the lens does in a frame; a motion that is carried on is a few pixels off.
+  // Coarse octaves find the view whatever the lens does in a frame. An extrapolated motion is a few
+  // pixels off.
   const FrameMotion<double>& there = coarse.aligned ? coarse.motion : carried;
   const bool had_own = lens_.columns() != nullptr;
   const LensTrack::State expected_before = lens_.expected();
@@ -145,7 +148,7 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
     set_camera(before);
     lens_.give_up();
   }
-  // No better: landmarks, where they held, and counts are to be the first look's.
+  // Not better: restore the first look's landmarks, if they held, and counts.
   Solution out = first;
   lens_.expect(expected_before);
   if (had_own) set_camera(first.camera);
@@ -157,7 +160,7 @@ OeMode::Solution OeMode::look_for_moved_lens(const Solution& first,
   return out;
 }
 
-// The lens that a frame has shown; calibration and frame have it from here on.
+// Takes the lens that a frame has shown into calibration and frame.
 void OeMode::learn_own_lens(const Solution& solution, double zoom_rate) {
   const SolvedZoom& zoom = solution.solved.zoom;
   set_camera(zoomed(solution.camera, zoom.correction[0]));

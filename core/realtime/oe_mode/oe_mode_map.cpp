@@ -1,4 +1,4 @@
-// The map that OeMode has: handed over, kept up by frames, begun anew.
+// The map of OeMode: handed over, kept up by frames, begun anew.
 
 #include <algorithm>
 #include <cmath>
@@ -41,12 +41,12 @@ MapState OeMode::map_state() const {
   out.landmarks.reserve(static_cast<std::size_t>(map_.size()));
   for (int slot = 0; slot < map_.capacity(); ++slot) {
     if (!map_.occupied(slot)) continue;
-    // Those that another lens made are of no use to the one that the map is handed over with.
+    // Landmarks made with another lens are useless to the lens of the hand-over.
     if (lens_.follows() && octaves_larger(map_.at(slot), given_.camera.focal_length) != 0) continue;
     out.landmarks.push_back(map_.at(slot));
   }
   if (lens_is_learnt()) {
-    // As they are by the calibration that was given.
+    // As they are with the calibration that was given.
     for (Landmark& landmark : out.landmarks) {
       landmark.d =
           direction_plus<double>(landmark.d, -moved_phi_ * by_lens(landmark, offset_.lens()));
@@ -92,7 +92,7 @@ void OeMode::maintain() {
     return;
   }
   const MapUse use = frame_.use;
-  frame_.use = MapUse::kNone;  // whatever is done below, once
+  frame_.use = MapUse::kNone;  // whatever follows is done once
   if (use != MapUse::kHeld && use != MapUse::kNewView) return;
   noise_.learn(frame_.image, map_.size() == 0);
   octaves_.set_noise(noise_.sigma());
@@ -112,13 +112,13 @@ void OeMode::maintain() {
       maker_.make(calibration_, pyramid_, octaves_, frame_,
                   in_view_.find(calibration_, map_, view, pyramid_.octaves(), columns != nullptr),
                   &map_, columns);
-  // So much of the map has this frame's scale from here on.
+  // This share of the map now has this frame's scale.
   if (columns != nullptr) offset_.doubt_scale(share_of_new_ * frame_.lens.covariance(0, 0));
   follow_lens();
 }
 
-// What was handed over and is not found where it should be has gone, or was never there, if the image has
-// something to show: that is taken in its place.
+// Handed-over landmarks that are not found where they should be are gone or were never there, if
+// the image has texture. New ones take their place.
 void OeMode::doubt_map() {
   const ViewProjection view(calibration_, frame_.motion);
   const std::vector<VisibleLandmark>& visible =
@@ -128,7 +128,7 @@ void OeMode::doubt_map() {
   frame_.use = left < options_.look.few ? MapUse::kNewView : MapUse::kLost;
 }
 
-// The map's frame is what telemetry says now.
+// The map's frame becomes telemetry's present one.
 void OeMode::begin_map() {
   const MapOffset& before = offset_.offset();
   tie_.map_is_lost(before);
@@ -153,7 +153,7 @@ void OeMode::straighten_map() {
   }
   shear_.add_frame(frame_.time_s + calibration_.line_delay * frame_.motion.reference_row,
                    frame_.motion, frame_.covariance);
-  // New landmarks take over the errors of the frame they are made in.
+  // New landmarks inherit the errors of the frame they are made in.
   shear_.inherit(share_of_new_, frame_.covariance);
   const auto correction = shear_.correct();
   if (!correction) return;
@@ -166,14 +166,16 @@ void OeMode::straighten_map() {
   frame_.motion = correction->straightened(frame_.motion);
   prediction_.correct(frame_.motion);
   if (!correction->crooked) return;
-  // This frame's motion is right by this: better landmarks than those of the first can be had.
+  // This frame's motion is now right, so new landmarks will be better than those of the first
+  // frame.
   clear_landmarks();
   shear_.inherit(1, frame_.covariance);
 }
 
-// What is known of the lens goes into the calibration where it shows, and all that came with that follows.
+// Once it shows in the image, puts what is known of the lens into the calibration, and moves all
+// that came with it.
 void OeMode::follow_lens() {
-  constexpr double kShows_px = 0.1;  // in the image's corners; until then the linear problem has it
+  constexpr double kShows_px = 0.1;  // in the image's corners; below it the linear problem has it
   const LensScale& lens = offset_.lens();
   const Camera<double>& camera = calibration_.camera;
   const double phi = lens.value;

@@ -1,5 +1,5 @@
 #pragma once
-// OeOptions: everything that OE mode can be told, each estimator's in its own struct beside it.
+// OeOptions: all options of OE mode. Each estimator's are in its own struct in its own header.
 
 #include "core/realtime/image/image_noise.h"
 #include "core/realtime/oe_mode/base_tie.h"
@@ -14,22 +14,22 @@
 
 namespace alidade {
 
-// When landmarks are looked for, where, and what it means that none hold.
+// When and where landmarks are looked for, and what it means if none hold.
 struct LookOptions {
-  // px, at the image's centre: where coarse octaves fit nowhere, fine landmarks are worth a look only if the
-  // prediction is that sure, one standard deviation.
+  // px, at the image's centre: largest sigma of a prediction at which fine landmarks are looked for
+  // although the coarse octaves do not fit.
   double nearby_px = 2;
-  // Texture that repeats can hold the coarse octaves elsewhere: where a smaller share of the chosen landmarks than
-  // this are inliers, 0 to 1, there is a second look, where the motion before leads to.
+  // 0 to 1; share of the chosen landmarks. With fewer inliers there is a second look, where the
+  // previous motion leads, as the coarse octaves can match a repeated texture elsewhere.
   double least_held = 0.6;
-  // Inliers; fewer agree by chance too, and the second look is no better.
+  // Inliers that a second look needs, as fewer can agree by chance.
   int least_held_again = 40;
-  // Chosen landmarks, and coarse ones in use: with fewer of both a view is new to the map. Also visible ones of any octave that are
-  // left when a handed-over map is doubted.
+  // Chosen landmarks, and coarse ones in use; a view with fewer of both is new to the map. few is
+  // also the number of visible ones that must be left when a handed-over map is doubted.
   int few = 10;
   int few_coarse = 5;
 
-  // False and one line in *error (if not null) when a value is not valid.
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
@@ -49,7 +49,7 @@ struct OeOptions {
   MapUpkeepOptions upkeep;
   LandmarkMakerOptions maker;
 
-  // False and one line in *error (if not null) when a value is not valid.
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 

@@ -1,5 +1,6 @@
 #pragma once
-// The sums of orientation_solve.cpp: landmarks and prior as a linear problem, times in units of half the read-out. Internal.
+// Sums for orientation_solve.cpp: landmarks and prior as a linear problem. Times are in units of
+// half the read-out. Internal.
 
 #include <Eigen/LU>
 #include <array>
@@ -8,7 +9,7 @@
 
 namespace alidade::internal {
 
-// A landmark as the sums want it, times in units of half the read-out.
+// One landmark's part of the sums. Times are in units of half the read-out.
 struct Term {
   Matrix2<double> information;  // 1/px^2
   Matrix2<double> JtWJ;
@@ -16,31 +17,33 @@ struct Term {
   double t;
 };
 
-// The unknowns but for the offset; phi stays 0 where it is not one.
+// The unknowns without the offset. phi is 0 if it is not an unknown.
 struct MotionAndLens {
   Vector6 x = Vector6::Zero();  // scaled
   double phi = 0;
   Vector2<double> zoom = Vector2<double>::Zero();  // scaled; of a frame's own lens
 };
 
-// Which of them residuals depend on besides x.
+// Unknowns that the residuals depend on.
 enum class Unknowns { kMotion, kMotionAndLens, kAll };
 
-// The row of phi in the normal equations of (x, phi):  N x - c phi = b,  information phi - c x = b_phi.
+// Row of phi in the normal equations of (x, phi):
+//   N x - c phi = b,  information phi - c x = b_phi.
 struct LensRow {
   Vector6 c = Vector6::Zero();
   double information = 0;
   double b = 0;
 };
 
-// The rows of the frame's own lens l, prior included:  N l + C' x - c phi = b;  all as if landmarks' covariances were not inflated.
+// Rows of the frame's own lens l, prior included:  N l + C' x - c phi = b.  Without inflation of
+// the landmarks' covariances.
 struct ZoomRows {
   Matrix2<double> inverse = Matrix2<double>::Zero();  // of N
   Matrix<double, 6, 2> C = Matrix<double, 6, 2>::Zero();
   Vector2<double> c = Vector2<double>::Zero();
   Vector2<double> b = Vector2<double>::Zero();
 
-  // What follows for x, and for phi and x, once l is eliminated.
+  // Eliminates l from the rows of x, or of phi and x.
   void eliminate(Matrix6* of_x, Vector6* right) const {
     const Matrix<double, 6, 2> by = C * inverse;
     *of_x -= by * C.transpose();
@@ -52,7 +55,7 @@ struct ZoomRows {
     row->information -= c.dot(by);
     row->b += by.dot(b);
   }
-  // l at x and phi; and what a unit of phi adds, where it adds x_by_phi to x.
+  // l at x and phi; and the change of l per unit of phi if x changes by x_by_phi.
   [[nodiscard]] Vector2<double> at(const Vector6& x, double phi) const {
     return inverse * (b - C.transpose() * x + c * phi);
   }
@@ -61,7 +64,7 @@ struct ZoomRows {
   }
 };
 
-// What is known before of l, scaled.
+// Prior of l, scaled.
 struct ScaledZoomPrior {
   Vector2<double> value;
   Matrix2<double> information;
@@ -70,7 +73,7 @@ struct ScaledZoomPrior {
 
 class OrientationProblem {
  public:
-  // lens: null where phi is known to be 0. zoom: null where the frame's lens is the map's.
+  // lens: null if phi is known to be 0. zoom: null if the frame's lens is the map's.
   OrientationProblem(FoundLandmark* landmarks, int count, double unit_s, const LensScale* lens,
                      const ZoomPrior* zoom)
       : landmarks_(landmarks),
@@ -96,7 +99,7 @@ class OrientationProblem {
     }
   }
 
-  // Of x in scaled units, from landmarks with these weights.
+  // Normal equations of x, scaled, from landmarks with these weights.
   void normal_equations(const double* weights, Matrix6* N, Vector6* b) const {
     Matrix2<double> A[5];
     Vector2<double> c[3];
@@ -122,7 +125,7 @@ class OrientationProblem {
     *b << c[0], c[1], c[2] / 2;
   }
 
-  // Of landmarks alone; lens.
+  // Row of phi from landmarks alone. Needs a lens.
   [[nodiscard]] LensRow lens_row(const double* weights) const {
     LensRow row;
     for (int i = 0; i < count_; ++i) {
@@ -139,7 +142,7 @@ class OrientationProblem {
     return row;
   }
 
-  // How -lens_row().b changes with the parameters; inliers only.
+  // Change of -lens_row().b with the parameters; inliers only.
   [[nodiscard]] Sensitivity<1> lens_row_of_sensitivities() const {
     Sensitivity<1> row = Sensitivity<1>::Zero();
     for (int i = 0; i < count_; ++i) {
@@ -151,7 +154,7 @@ class OrientationProblem {
     return row;
   }
 
-  // The right-hand side of normal_equations(), of sensitivities in place of residuals, inliers only.
+  // Right-hand side of normal_equations() with sensitivities in place of residuals; inliers only.
   [[nodiscard]] Sensitivity<6> right_of_sensitivities() const {
     std::array<Sensitivity<2>, 3> c;
     for (Sensitivity<2>& m : c) m.setZero();
@@ -168,7 +171,7 @@ class OrientationProblem {
     return right;
   }
 
-  // Of l; landmarks with these weights.
+  // Rows of l from landmarks with these weights.
   [[nodiscard]] ZoomRows zoom_rows(const double* weights, double inflation) const {
     ZoomRows rows;
     Matrix2<double> N = inflation * zoom_.information;
@@ -191,7 +194,7 @@ class OrientationProblem {
     return rows;
   }
 
-  // How zoom_rows().b changes with the parameters; inliers only.
+  // Change of zoom_rows().b with the parameters; inliers only.
   [[nodiscard]] Sensitivity<2> zoom_rows_of_sensitivities(double inflation) const {
     Sensitivity<2> rows = inflation * zoom_.information * zoom_.sensitivity;
     for (int i = 0; i < count_; ++i) {
@@ -205,7 +208,8 @@ class OrientationProblem {
     return rows;
   }
 
-  // unknowns: as unknowns(); a constant of those who ask for all landmarks.
+  // Residual of landmark i at these unknowns. A template parameter, so that loops over all
+  // landmarks do not branch.
   template <Unknowns unknowns>
   [[nodiscard]] Vector2<double> left(int i, const MotionAndLens& at) const {
     const auto of_it = static_cast<std::size_t>(i);
@@ -248,9 +252,10 @@ class OrientationProblem {
   double unit_s_;
   const LensScale* lens_;
   bool zooms_;
-  ScaledZoomPrior zoom_;  // where zooms_
+  ScaledZoomPrior zoom_;  // if zooms_
   std::array<Term, kMaxFoundLandmarks> terms_;
-  // px, d residual / d phi; apart from the terms, which all solutions go through. Not written without a lens.
+  // px, d residual / d phi. Separate from the terms, which all solutions read. Not written without
+  // a lens.
   std::array<Vector2<double>, kMaxFoundLandmarks> s_;
 };
 

@@ -30,7 +30,7 @@ double median(double* values, int count) {
   return *middle;
 }
 
-// The row of phi, of landmarks and of the frames before.
+// The row of phi, from landmarks and previous frames.
 LensRow row_of_lens(const OrientationProblem& problem, const ScaledPrior& prior,
                     const double* weights, double inflation, const ZoomRows* zoom) {
   LensRow row = problem.lens_row(weights);
@@ -42,15 +42,15 @@ LensRow row_of_lens(const OrientationProblem& problem, const ScaledPrior& prior,
   return row;
 }
 
-// x from landmarks, the frames before and telemetry's rates, without its angles; x at a known phi, and phi by those without what
-// is known from before.
+// Solution from landmarks, previous frames and telemetry's rates, without its angles: x at phi = 0,
+// its dependence on phi, and phi from those alone.
 struct WithoutAngles {
   Vector6 x;
   Matrix6 covariance;
   LensRow row;
   Vector6 by_lens = Vector6::Zero();
   double information = 0;
-  double phi = 0;  // with what is known from before
+  double phi = 0;  // with its prior
   double phi_information = 0;
   ZoomRows zoom;
 
@@ -83,7 +83,7 @@ WithoutAngles solve_without_angles(const OrientationProblem& problem, const Scal
   if (lens == nullptr) return out;
   out.row = row_of_lens(problem, prior, weights, inflation, problem.zooms() ? &out.zoom : nullptr);
   out.by_lens = factor.solve(out.row.c);
-  // Landmarks that came with this lens know nothing of it, but for rounding.
+  // Landmarks made with this lens have no information on it, but for rounding.
   out.information = std::max(0.0, out.row.information - out.row.c.dot(out.by_lens));
   const double known = 1 / lens->variance;
   out.phi_information = out.information / prior.scale_inflation + known;
@@ -92,8 +92,7 @@ WithoutAngles solve_without_angles(const OrientationProblem& problem, const Scal
   return out;
 }
 
-// What telemetry's angles should be more than landmarks', and how well that is known, where landmarks and what is known from
-// before tell phi.
+// Adapts the innovation and its expected covariance to phi as known from landmarks and its prior.
 void expect_of_lens(const LensScale& lens, const WithoutAngles& own, Vector2<double>* innovation,
                     Matrix2<double>* expected) {
   const Vector2<double> offset_by_phi = lens.covariance_with_offset / lens.variance;
@@ -103,7 +102,8 @@ void expect_of_lens(const LensScale& lens, const WithoutAngles& own, Vector2<dou
                offset_by_phi * lens.covariance_with_offset.transpose();
 }
 
-// Of the innovation, by errors of the calibration: right: of `own`, how its right-hand side changes with the parameters.
+// Covariance of the innovation from errors of the calibration. right: change of the right-hand side
+// of `own` with the parameters.
 Matrix2<double> innovation_by_calibration(const MotionPrior& prior, const WithoutAngles& own,
                                           const Sensitivity<6>& right) {
   const Sensitivity<2> of_landmarks = own.covariance.topRows<2>() * right;
@@ -114,7 +114,7 @@ Matrix2<double> innovation_by_calibration(const MotionPrior& prior, const Withou
   return symmetric(out);
 }
 
-// What most landmarks say about the angles alone.
+// Median of the angles from each landmark alone.
 Vector2<double> middle_of_landmarks(const FoundLandmark* landmarks, int count) {
   std::array<double, kMaxFoundLandmarks> pan;
   std::array<double, kMaxFoundLandmarks> tilt;
@@ -151,7 +151,7 @@ double median_square(const Squares& squares, int count) {
   return median(sorted.data(), count) / kChiSquare2Median;
 }
 
-// Residuals against their covariances, averaged over neighbours: 1 if they are independent.
+// Squared mean residuals of neighbours over their covariances: 1 if the residuals are independent.
 double neighbours_inflation(const OrientationProblem& problem, const FoundLandmark* landmarks,
                             double width, double height, const MotionAndLens& x) {
   constexpr int kColumns = 10;
@@ -206,7 +206,8 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   std::array<double, kMaxFoundLandmarks> weights;
   constexpr int kRobustSteps = 6;
   for (int step = 0; step < kRobustSteps; ++step) {
-    // The scale that half of the landmarks show; a shrinking one lets few capture the rest.
+    // The scale from the median. A scale that shrinks further would let a few landmarks capture the
+    // rest.
     scale_square = std::clamp(median_square(squares, count), 1.0, max_square);
     const double c = 4 * scale_square;
     for (std::size_t i = 0; i < static_cast<std::size_t>(count); ++i) {
@@ -218,7 +219,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
     find_squares(problem, x, &squares);
   }
 
-  // All or nothing, by the scale of those that are in.
+  // Inlier or not, by the scale of the inliers.
   int inliers = 0;
   constexpr int kGateSteps = 3;
   for (int step = 0; step < kGateSteps; ++step) {
@@ -245,7 +246,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
       std::max(scale_square, neighbours_inflation(problem, landmarks, width, height, x));
   const WithoutAngles own = solve_without_angles(problem, scaled, weights.data(), inflation, true);
 
-  // What the landmarks have in common counts as an offset of this frame's own.
+  // The landmarks' common error counts as an offset of this frame.
   Matrix2<double> shared = Matrix2<double>::Zero();
   double total = 0;
   for (int i = 0; i < count; ++i) {
@@ -297,7 +298,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
     }
   }
   if (prior.has_telemetry || lens != nullptr) {
-    // The rates were used once already: here again from the beginning, with the angles.
+    // The rates are already used in `own`: start again, with the angles.
     Matrix6 N;
     Vector6 b;
     problem.normal_equations(weights.data(), &N, &b);
@@ -307,7 +308,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
     Vector8 right = Vector8::Zero();
     right.head<6>() = b / inflation + scaled.motion_b;
     sensitivity.topRows<6>() = right_of_sensitivities;
-    // An offset known exactly has no information matrix; nothing is known to a millionth of this.
+    // An exactly known offset has no information matrix. Nothing is known to a millionth of this.
     constexpr double kLeastVariance = 1e-20;  // rad^2
     const Matrix2<double> offset_covariance =
         prior_offset + kLeastVariance * Matrix2<double>::Identity();
@@ -328,7 +329,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
       posterior = factor.solve(Matrix8::Identity());
       sensitivity = (posterior * sensitivity).eval();
     } else {
-      // Of (g, phi).
+      // Information of the prior of (g, phi).
       Matrix3<double> known;
       known << offset_covariance, lens->covariance_with_offset,
           lens->covariance_with_offset.transpose(), lens->variance;
@@ -360,7 +361,7 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
         solved.measured_sensitivity =
             (own.by_lens.transpose() * right_of_own - of_row) / own.information;
       }
-      // The share of it that frames before said already is taken out.
+      // Removes the share that earlier frames said already.
       const double old = (1 - 1 / prior.scale_inflation) * own.information;
       const Vector8 by_lens = posterior * c;
       const double information = own.row.information - old + known(2, 2) - c.dot(by_lens);
@@ -420,7 +421,8 @@ SolveStatus solve_orientation(FoundLandmark* landmarks, int count, const MotionP
   for (int i = 0; i < count; ++i) {
     landmarks[i].normalised_square = squares[static_cast<std::size_t>(i)];
   }
-  // What nothing tells has no finite variance, and the factorisation gives it none.
+  // An unknown that nothing determines has no finite variance. The factorisation then gives no
+  // valid one.
   if (!all_finite(out->correction) || !all_finite(out->covariance) ||
       !all_finite(out->offset_correction) || !(out->covariance.diagonal().minCoeff() > 0)) {
     return SolveStatus::kNotFinite;

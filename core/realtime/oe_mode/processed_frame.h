@@ -1,5 +1,5 @@
 #pragma once
-// ProcessedFrame: what process() found of a frame, for the upkeep of the map (maintain()). Plain values.
+// ProcessedFrame: results of process() for the upkeep of the map in maintain(). Plain values.
 
 #include <cstdint>
 
@@ -10,29 +10,30 @@
 
 namespace alidade {
 
-// What telemetry said of a frame's time.
+// Telemetry at a frame's time.
 enum class FrameTelemetry {
   kNone,
-  kExtrapolated,  // from samples before
+  kExtrapolated,  // from earlier samples
   kEnclosed       // by samples on both sides
 };
 
-// What a frame can do for the map.
+// Use of a frame for the map.
 enum class MapUse {
-  kNone,     // nothing is sure
+  kNone,     // no reliable result
   kLost,     // landmarks do not hold, though some should be in view
-  kNewView,  // no landmarks are in view: telemetry places new ones
+  kNewView,  // no landmarks in view: telemetry places new ones
   kHeld      // landmarks held
 };
 
-// The frame's lens, where that is not the map's (lens_track.h): how well log f (1) and its rate (1/s) are known beside the map's scale.
+// The frame's lens if it is not the map's (lens_track.h): covariance of log f (1) and its rate
+// (1/s), without the map's scale.
 struct OwnLens {
   bool used = false;
   Matrix2<double> covariance = Matrix2<double>::Zero();
   Sensitivity<2> sensitivity = Sensitivity<2>::Zero();
-  int zoom = 0;  // of cells, see LandmarkMap
+  int zoom = 0;  // of the map's cells, see LandmarkMap
 
-  // Of log f, t seconds after the middle row.
+  // Variance of log f t seconds after the middle row.
   [[nodiscard]] double variance(double t) const {
     return covariance(0, 0) + t * (2 * covariance(0, 1) + t * covariance(1, 1));
   }
@@ -42,19 +43,19 @@ struct OwnLens {
 };
 
 struct ProcessedFrame {
-  std::uint32_t frame = 0;  // count of frames
-  double time_s = 0;        // row 0, image clock
+  std::uint32_t frame = 0;  // frame count
+  double time_s = 0;        // s, image clock, row 0
   MapUse use = MapUse::kNone;
-  ImageView image;  // valid until maintain() has run
+  ImageView image;  // valid until maintain() returns
   FrameTelemetry telemetry = FrameTelemetry::kNone;
-  double look_up_time_s = 0;  // telemetry clock, as telemetry was asked for it
+  double look_up_time_s = 0;  // s, telemetry clock; the time asked for
   double look_up_sigma_s = 0;
-  FrameMotion<double> motion;  // map's frame, about the middle row; its zoom_rate is solved
-  Matrix6 covariance = Matrix6::Zero();  // of motion, by the frame's own noise
+  FrameMotion<double> motion;  // map's frame, about the middle row; with the solved zoom_rate
+  Matrix6 covariance = Matrix6::Zero();  // of motion, from the frame's own noise
   Matrix2<double> shared_covariance =
-      Matrix2<double>::Zero();                          // rad^2, of its angles, by the map's
+      Matrix2<double>::Zero();                          // rad^2, of its angles, from the map's
   Sensitivity<6> sensitivity = Sensitivity<6>::Zero();  // of motion
-  double inflation = 1;  // of the landmarks' covariances, by what their residuals show
+  double inflation = 1;  // of the landmarks' covariances, from their residuals
   OwnLens lens;
 };
 

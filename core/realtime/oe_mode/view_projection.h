@@ -1,12 +1,14 @@
 #pragma once
-// ViewProjection: where many directions are seen in one frame, cheaply, through the rolling shutter.
-//
-// The same model as rolling_shutter.h, with the orientation prepared once a frame: R_camera_from_base
-// as a quadratic in the row through its values at the first, middle and last row. What that leaves out is
-// below (w T)^3 / 15 rad for a turn of w rad/s and half the read-out T: 3e-4 px for a field of view of
-// 60 degrees crossed in a second at 25 us a row. The row is found by a secant from a first guess.
-// A lens that zooms (FrameMotion::zoom_rate): as if the direction's third component shrank from row to row by exp(-zoom_rate t).
-// Pure; no allocation. Directions outside the image are projected too, as far as the camera goes.
+// ViewProjection: fast projection of many directions into one frame, with rolling shutter.
+// Same model as rolling_shutter.h. The orientation is prepared once per frame: R_camera_from_base
+// is a quadratic in the row, through its values at the first, middle and last row. The error is
+// below (w T)^3 / 15 rad for a rotation of w rad/s and half the read-out T: 3e-4 px if a field of
+// view of 60 degrees is crossed in a second at 25 us a row. The row is found by a secant from a
+// first guess.
+// A zooming lens (FrameMotion::zoom_rate) scales the direction's third component by exp(-zoom_rate
+// t).
+// Pure; no allocation. Directions outside the image are projected too, as far as the camera model
+// goes.
 
 #include <Eigen/Core>
 #include <algorithm>
@@ -18,12 +20,13 @@
 
 namespace alidade {
 
-// A direction in the frame, and how its pixel follows motion and direction, the row's own time included.
+// A direction in the frame, and the derivatives of its pixel, including the change of the row's
+// time.
 struct SeenDirection {
   Vector2<double> u;         // px
-  double time_s;             // of its row, after the reference row
-  Matrix2<double> J_angle;   // d u / d (pan, tilt) at that time, px/rad
-  Matrix<double, 2, 3> J_d;  // d u / d direction (tangential changes), px/rad
+  double time_s;             // s, of its row after the reference row
+  Matrix2<double> J_angle;   // px/rad, d u / d (pan, tilt) at that time
+  Matrix<double, 2, 3> J_d;  // px/rad, d u / d direction (tangential changes)
 };
 
 class ViewProjection {
@@ -49,13 +52,13 @@ class ViewProjection {
     to_middle_row_ = camera_.focal_length / calibration.camera.focal_length;
   }
 
-  // False where the camera has no pixel for it or the row does not settle.
+  // False if the camera has no pixel for it, or the row does not converge.
   [[nodiscard]] bool project(const Vector3<double>& d, Vector2<double>* u) const {
     Path path;
     return find(d, &path, u);
   }
 
-  // To a pixel or so, for choosing.
+  // To about a pixel, for choosing.
   [[nodiscard]] bool project_roughly(const Vector3<double>& d, Vector2<double>* u) const {
     const Vector3<double> middle = R_[0] * d;
     if (alidade::project(camera_, middle, u) != ProjectionStatus::kOk) return false;
@@ -72,7 +75,7 @@ class ViewProjection {
     Path path;
     if (!find(d, &path, &out->u)) return false;
     const double s = parameter(out->u.y());
-    const Vector3<double> d_c = path.at(s);  // but for the zoom
+    const Vector3<double> d_c = path.at(s);  // without the zoom
     Vector3<double> zoomed_d_c = d_c;
     Vector3<double> slope = path.slope(s);
     if (zoom_to_last_row_ != 0) zoom(s, &zoomed_d_c, &slope);
@@ -112,11 +115,11 @@ class ViewProjection {
     return true;
   }
 
-  // Of the camera at the middle row, in b.
+  // Optical axis at the middle row, in b.
   [[nodiscard]] Vector3<double> optical_axis() const { return R_[0].row(2).transpose(); }
 
  private:
-  // The direction in camera coordinates, as the quadratic of the row.
+  // The direction in camera coordinates, as a quadratic in the row.
   struct Path {
     Vector3<double> c0, c1, c2;
     [[nodiscard]] Vector3<double> at(double s) const { return c0 + s * (c1 + s * c2); }
@@ -125,7 +128,7 @@ class ViewProjection {
 
   [[nodiscard]] double parameter(double row) const { return (row - middle_row_) / middle_row_; }
   [[nodiscard]] double depth(double s) const { return std::exp(-zoom_to_last_row_ * s); }
-  // A direction in camera coordinates and how it changes with s, as the zoom of that row makes them.
+  // Applies a row's zoom to a direction in camera coordinates and to its derivative by s.
   void zoom(double s, Vector3<double>* d_c, Vector3<double>* slope) const {
     const double factor = depth(s);
     slope->z() = factor * (slope->z() - zoom_to_last_row_ * d_c->z());
@@ -133,18 +136,18 @@ class ViewProjection {
   }
 
   [[nodiscard]] bool find(const Vector3<double>& d, Path* path, Vector2<double>* u) const {
-    constexpr double kTolerance = 1e-4;  // px; the pixel's own error is that times its slope
+    constexpr double kTolerance = 1e-4;  // px; the pixel's error is this times its slope
     constexpr int kMaxSteps = 8;
     *path = {R_[0] * d, R_[1] * d, R_[2] * d};
     if (alidade::project(camera_, path->c0, u) != ProjectionStatus::kOk) return false;
     if (line_delay_ == 0) return true;
     double row = middle_row_;
     double v = u->y();
-    // Also because a difference quotient over a step that is rounding alone would be anything.
+    // Also, a difference quotient over a step of mere rounding would be meaningless.
     if (std::abs(v - row) < kTolerance) return true;
     double slope = 0;
     for (int step = 0; step < kMaxSteps; ++step) {
-      // Far outside the image the quadratic is an extrapolation, and nobody asks.
+      // Far outside the image the quadratic would be extrapolated, and it is not needed.
       const double next = row + (v - row) / (1 - slope);
       if (!(next > -0.5 * camera_.height && next < 1.5 * camera_.height)) return false;
       Vector3<double> d_c = path->at(parameter(next));
@@ -160,11 +163,11 @@ class ViewProjection {
   }
 
   Camera<double> camera_;     // at the middle row
-  double to_middle_row_ = 1;  // its focal length over that at the reference row
+  double to_middle_row_ = 1;  // its focal length divided by that at the reference row
   double line_delay_;
   FrameMotion<double> motion_;
   double middle_row_;
-  double zoom_to_last_row_;  // change of log f from the middle row on
+  double zoom_to_last_row_;  // change of log f from the middle row to the last
   Matrix3<double> R_[3];     // camera from base: R_[0] + s R_[1] + s^2 R_[2], s from -1 to 1
   Matrix<double, 3, 2> J_xi_angle_;
   Matrix<double, 3, 4> J_xi_axes_;

@@ -18,7 +18,8 @@ VisibleLandmarks::VisibleLandmarks(int capacity) {
 int octaves_larger(const Landmark& landmark, double focal_length) {
   const double made_square =
       std::ldexp(std::abs(landmark.J_pixel_tangent.determinant()), 2 * landmark.octave);
-  // The rounded binary logarithm of the square's root, by exponents alone: it is asked of all that are near.
+  // The rounded binary logarithm of the square's root, from exponents alone: it is needed for all
+  // landmarks nearby.
   const int exponent = std::ilogb(2 * focal_length * focal_length / made_square);
   return (exponent - (exponent & 1)) / 2;
 }
@@ -36,7 +37,7 @@ void VisibleLandmarks::change_lens(const Calibration& calibration, double cone_m
   for (const Vector2<double>& corner : {Vector2<double>(0, 0), Vector2<double>(w, 0),
                                         Vector2<double>(0, h), Vector2<double>(w, h)}) {
     Vector3<double> d_c;
-    // A corner beyond the distortion's limit sees nothing: the cone to it may be anything.
+    // A corner beyond the distortion's limit sees nothing: any cone to it will do.
     const bool seen = unproject(camera, corner, &d_c) == ProjectionStatus::kOk;
     cone = std::max(cone, seen ? std::acos(std::min(1.0, d_c.z())) : kPi / 2);
   }

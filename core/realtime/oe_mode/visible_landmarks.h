@@ -1,6 +1,6 @@
 #pragma once
-// VisibleLandmarks: the landmarks of the map that a predicted view puts into the image, of all octaves.
-// Memory is taken by the constructor; nothing else allocates. One thread.
+// VisibleLandmarks: the map's landmarks that a predicted view puts into the image, of all octaves.
+// The constructor takes all memory; nothing else allocates. One thread.
 
 #include <vector>
 
@@ -13,11 +13,11 @@ class ViewProjection;
 
 struct VisibleLandmark {
   int slot;           // of the map
-  int octave;         // in which it is seen: the landmark's, but where the lens has zoomed
-  Vector2<double> u;  // px of the image, predicted, to a pixel or so; its patch is all in it
+  int octave;         // in which it is seen: the landmark's, unless the lens has zoomed
+  Vector2<double> u;  // px of the image, predicted to about a pixel; all its patch is in the image
 };
 
-// By how many octaves a landmark is larger in an image of this focal length, px, than in the one that it was made of.
+// How many octaves larger a landmark appears at this focal length (px) than in its reference image.
 [[nodiscard]] int octaves_larger(const Landmark& landmark, double focal_length);
 
 class VisibleLandmarks {
@@ -25,15 +25,15 @@ class VisibleLandmarks {
   // capacity: of the map.
   explicit VisibleLandmarks(int capacity);
 
-  // cone_margin: room for what the camera turns while it reads out, and for a wrong prediction, times the
-  // angle from the optical axis to the farthest corner.
+  // cone_margin: factor for the angle from the optical axis to the farthest corner; allows for the
+  // camera's turn during read-out and for a wrong prediction.
   void reset(const Calibration& calibration, double cone_margin);
-  // The calibration has another lens.
+  // For another lens of the calibration.
   void change_lens(const Calibration& calibration, double cone_margin);
 
   // In ascending order of slots; valid until the next call. octaves: of the image. across_octaves:
-  // landmarks were made with other focal lengths, too.
-  // Each is seen in the octave in which it has about its size then, and not at all where the image has none.
+  // landmarks may be made at other focal lengths; each is then seen in the octave in which it has
+  // about its original size, or not at all if the image lacks that octave.
   const std::vector<VisibleLandmark>& find(const Calibration& calibration, const LandmarkMap& map,
                                            const ViewProjection& view, int octaves,
                                            bool across_octaves);
@@ -41,7 +41,7 @@ class VisibleLandmarks {
                                            const ViewProjection& view) {
     return find(calibration, map, view, 0, false);
   }
-  // As find() left it.
+  // Result of the last find().
   [[nodiscard]] const std::vector<VisibleLandmark>& latest() const { return visible_; }
 
   [[nodiscard]] std::size_t memory_bytes() const;

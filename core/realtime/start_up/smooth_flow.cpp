@@ -8,18 +8,18 @@
 namespace alidade {
 namespace {
 
-// Of the terms of each order, relative to the motion: by what a field of 100 degrees, a camera looking
-// steeply up, and 10 % of distortion can bring.
+// Prior sigma of the terms of each order, relative to the motion: the limits are a field of 100
+// degrees, a camera looking steeply up, and 10 % distortion.
 constexpr double kPriorOfOrder[] = {100, 3, 1, 0.3};
 constexpr double kLeastMotion = 4;  // px
 constexpr int kOrders[] = {0, 1, 1, 2, 2, 2, 3, 3, 3, 3};
-// Order after order, so that what moves by itself at an edge of the image is out before a term could bend
+// The order rises, so that an object moving at the image's edge is excluded before a term can bend
 // towards it.
 constexpr int kOrderOfIteration[] = {1, 1, 2, 2, 3, 3, 3};
 constexpr int kTermsOfOrder[] = {1, 3, 6, 10};
-// The median distance of two normal components, in standard deviations.
+// Median length of a 2-vector of normal components, in standard deviations.
 constexpr double kMedianDistance = 1.1774;
-// Where a sample has a quarter of its weight, in standard deviations.
+// Distance at which a sample has a quarter of its weight, in standard deviations.
 constexpr double kCutOff = 2;
 
 }  // namespace
@@ -59,7 +59,7 @@ Matrix2<double> SmoothFlow::gradient(const Vector2<double>& u) const {
   return per_px_ * coefficients_.transpose() * slopes;
 }
 
-// Standard deviation of a component, from the median of the distances, which are kept.
+// Standard deviation of a component, from the median distance. Stores the distances.
 double SmoothFlow::left_over(const FlowSample* samples, int count) {
   for (int i = 0; i < count; ++i) {
     const auto slot = static_cast<std::size_t>(i);

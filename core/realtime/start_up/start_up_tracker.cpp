@@ -13,22 +13,22 @@
 namespace alidade {
 namespace {
 
-constexpr int kMinWidth = 64;        // px
-constexpr int kMinHeight = 32;       // px
-constexpr int kSmallestOctave = 64;  // px, its longer side at most
-constexpr int kDetailRadius = 2;     // px of that octave; coarser brightness is left out of it
+constexpr int kMinWidth = 64;              // px
+constexpr int kMinHeight = 32;             // px
+constexpr int kSmallestOctave = 64;        // px, its longer side at most
+constexpr int kDetailRadius = 2;           // px of that octave; coarser brightness is removed
 constexpr double kLargestShift = 1.0 / 3;  // of the image
 constexpr double kLeastLikeness = 0.1;     // correlation of two frames at the best shift
 
-// Noise alone shows gradients of 0.5 sigma: a new point has four times that.
+// Noise alone shows gradients of 0.5 sigma. A new point needs four times that.
 constexpr double kContrastOfNoise = 2;
 constexpr double kLeastContrast = 3;  // grey levels / px
-constexpr double kStepContrast = 2;   // likewise, of a patch of the frame before
+constexpr double kStepContrast = 2;   // grey levels / px, of a patch of the previous frame
 constexpr double kLeastCorrelation = 0.9;
-constexpr double kMaxDeformation = 0.7;  // Frobenius norm, of the warp's difference from none
+constexpr double kMaxDeformation = 0.7;  // Frobenius norm of the warp minus identity
 constexpr int kMaxMisses = 2;
 constexpr double kFlowSigma = 0.05;  // px of the octave at hand
-// Of the distance from the smooth motion: of what is left over by all, and of the point's own.
+// Limits of the distance from the smooth motion, in sigmas of all residuals and of the point's own.
 constexpr double kMaxDeviations = 5;
 constexpr double kMaxOwnDeviations = 4;
 constexpr double kMemory = 0.9;  // of former distances, from frame to frame
@@ -117,7 +117,7 @@ StartUpStatus StartUpTracker::process(const ImageView& image) {
                                                  : StartUpStatus::kBlank;
 }
 
-// Without it vignetting and a bright sky would decide which shift fits best.
+// Without this, vignetting and a bright sky would decide which shift fits best.
 void StartUpTracker::make_detail(Frame* frame) const {
   const ImageView& image = frame->pyramid.octave(frame->pyramid.octaves() - 1);
   for (int v = 0; v < image.height; ++v) {
@@ -241,7 +241,7 @@ void StartUpTracker::align_with_first(const Frame& now) {
     if (status != AlignmentStatus::kConverged) continue;
     point.is_found = true;
     point.found = scale * alignment.position;
-    // The noise of both images stands in the alignment's covariance: that of this frame is left.
+    // The alignment's covariance contains the noise of both images. Keep that of this frame.
     const double own = 1 / (1 + alignment.gain * alignment.gain);
     point.covariance = own * scale * scale * alignment.covariance;
     point.noise = static_cast<float>(std::sqrt(own) * alignment.noise_sigma);
@@ -258,7 +258,7 @@ void StartUpTracker::align_with_first(const Frame& now) {
     const Vector2<double> deviation = point.found - point.predicted;
     point.deviation = kMemory * point.deviation + deviation;
     point.is_found = std::isfinite(left_over) && deviation.norm() < limit;
-    // Something that goes its own way, slowly.
+    // An object that moves by itself, slowly.
     if (!(point.deviation.norm() < 2 * limit)) {
       point.is_found = false;
       point.misses = kMaxMisses;
@@ -267,7 +267,7 @@ void StartUpTracker::align_with_first(const Frame& now) {
   }
 }
 
-// From what alignment left over, where enough points tell.
+// From alignment residuals if there are enough points, else from the image.
 void StartUpTracker::estimate_noise(const Frame& now) {
   for (int octave = 0; octave < kReferenceOctaves; ++octave) {
     std::ptrdiff_t count = 0;
@@ -289,7 +289,7 @@ void StartUpTracker::estimate_noise(const Frame& now) {
   statistics_.noise = noise_[0];
 }
 
-// Takes the points into this frame, without those that are over.
+// Moves the points to this frame and drops those that ended.
 void StartUpTracker::end_points() {
   int kept = 0;
   for (int i = 0; i < point_count_; ++i) {

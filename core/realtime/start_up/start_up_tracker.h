@@ -1,22 +1,14 @@
 #pragma once
-// StartUpTracker: keypoint tracks from the video of a camera that nobody has calibrated, for the first
-// calibration (PTCEE section V-A). Neither focal length nor distortion, read-out, mount or telemetry are
-// asked for: a wrong one can therefore do no harm.
-//
-//   1 the whole image's shift since the frame before, to 2^l px, by comparing all shifts of a small octave
-//   2 the motion of the points, coarse to fine, as one smooth function of the place (smooth_flow.h)
-//   3 each point against its image in the frame where it was found, so that nothing drifts, warped
-//     by the gradients of the motion since then (patch_alignment.h)
-//   4 points that contradict the others' motion are not believed
-//   5 new points, FAST corners, where there are none
-//
-// An observation tells where a landmark appears: pixels, as in CONVENTIONS.md. Its covariance is what differs from
-// one observation to the next, by the noise of its own frame; what all observations of a landmark have
-// in common, the noise of its reference image, moves the landmark instead.
-// A point that leaves the image, or is not found in two frames running, ends; should it come back, it is
-// a new landmark. Frames without anything in common with the one before end all points.
-// Follows shifts of up to a third of the image between frames. Fixed memory, taken by the constructor;
-// nothing else allocates, waits or throws. One thread.
+// StartUpTracker: keypoint tracks from the video of an uncalibrated camera, for the first
+// calibration (PTCEE section V-A). Uses no focal length, distortion, read-out, mount or telemetry,
+// so a wrong one cannot do harm.
+// An observation is where a landmark appears: px, as in CONVENTIONS.md. Its covariance is the part
+// that differs between observations: the noise of its own frame. The noise of the reference image
+// is common to all observations of a landmark and moves the landmark instead.
+// A point ends if it leaves the image or is not found in two successive frames; later it is a new
+// landmark. Frames with nothing in common with the previous one end all points. Shifts of up to a
+// third of the image between frames are followed.
+// The constructor takes all memory; nothing else allocates, waits or throws. One thread.
 
 #include <array>
 #include <cstddef>
@@ -36,11 +28,11 @@ struct StartUpOptions {
   int width = 1920;                    // px, of every frame
   int height = 1080;                   // px
   int max_points = 250;                // followed at a time
-  std::uint8_t corner_threshold = 10;  // of FAST, grey levels; more where noise asks for it
+  std::uint8_t corner_threshold = 10;  // grey levels, of FAST; raised by noise
 };
 
 struct TrackObservation {
-  std::uint32_t landmark = 0;                            // never given twice
+  std::uint32_t landmark = 0;                            // never reused
   Vector2<double> u = Vector2<double>::Zero();           // px
   Matrix2<double> covariance = Matrix2<double>::Zero();  // px^2
   double sigma = 0;                                      // px, sqrt(trace / 2)
@@ -48,21 +40,22 @@ struct TrackObservation {
 
 enum class StartUpStatus {
   kOk,
-  kBegun,    // no points to follow: all are new
-  kLost,     // the points were not found; the next frame is compared with the same one as this
+  kBegun,    // no points to follow; all are new
+  kLost,     // the points were not found; the next frame is compared with the same previous frame
   kBlank,    // nothing to follow and nothing new
-  kBadImage  // none, or of another size than the constructor was told, or that was below 64 x 32 px
+  kBadImage  // no image, not of the constructor's size, or below 64 x 32 px
 };
 
 struct StartUpStatistics {
   StartUpStatus status = StartUpStatus::kBlank;
   int looked_for = 0;  // points expected inside the image
-  int found = 0;       // that alignment found
-  int believed = 0;    // that agreed with the others
+  int found = 0;       // found by alignment
+  int believed = 0;    // agreed with the others
   int ended = 0;
   int begun = 0;
-  Vector2<double> shift = Vector2<double>::Zero();  // px since the frame before, image centre
-  double noise = 0;                                 // of a pixel, grey levels
+  Vector2<double> shift =
+      Vector2<double>::Zero();  // px since the previous frame, at the image's centre
+  double noise = 0;             // grey levels, of a pixel
 };
 
 class StartUpTracker {
@@ -71,10 +64,19 @@ class StartUpTracker {
   StartUpTracker(const StartUpTracker&) = delete;
   StartUpTracker& operator=(const StartUpTracker&) = delete;
 
+  // Steps:
+  //   1 the whole image's shift since the previous frame, to 2^l px, by comparing all shifts of a
+  //   small octave
+  //   2 the motion of the points, coarse to fine, as one smooth function of the position
+  //   (smooth_flow.h)
+  //   3 each point against its image in the frame where it was found, so that nothing drifts;
+  //   warped by the gradients of the motion since then (patch_alignment.h)
+  //   4 points that contradict the others' motion are rejected
+  //   5 new points, FAST corners, where there are none
   // The image need not outlive the call.
   [[nodiscard]] StartUpStatus process(const ImageView& image);
 
-  // Of the frame last processed.
+  // Of the last processed frame.
   [[nodiscard]] const TrackObservation* observations() const { return observations_.data(); }
   [[nodiscard]] int observation_count() const { return observation_count_; }
   [[nodiscard]] const StartUpStatistics& statistics() const { return statistics_; }
@@ -88,11 +90,11 @@ class StartUpTracker {
     std::uint32_t landmark;
     int octave;
     int misses;                   // in a row
-    Vector2<double> u;            // px, in the frame compared with
+    Vector2<double> u;            // px, in the previous frame
     Matrix2<double> J_now_first;  // d(px now) / d(px in the frame where it was found)
     Vector2<double> predicted;    // px, in this frame
     Vector2<double> found;        // px, in this frame, if is_found
-    Vector2<double> deviation;    // px, from the smooth motion: a sum that forgets
+    Vector2<double> deviation;    // px, from the smooth motion: a fading sum
     Matrix2<double> covariance;
     float noise;  // grey levels, of a pixel of this frame
     bool is_found;
@@ -118,11 +120,11 @@ class StartUpTracker {
   StartUpOptions options_;
   int octaves_;
   std::array<Frame, 2> frames_;
-  int current_ = 0;  // the other is the frame before
+  int current_ = 0;  // the other is the previous frame
   bool have_before_ = false;
   int lost_frames_ = 0;
   SmoothFlow flow_;
-  std::vector<Point> points_;  // the first point_count_
+  std::vector<Point> points_;  // the first point_count_ are used
   int point_count_ = 0;
   std::vector<FlowSample> samples_;
   double spacing_;  // px, of new points

@@ -1,17 +1,12 @@
 #pragma once
-// TelemetryBuffer: the latest pan/tilt samples in order of time, and the mount's angle, rate and
-// covariance at any time they cover (PTCEE 22 to 25; see telemetry_interpolation.h).
-//
-// Times are seconds of one clock, the telemetry clock: an image taken at image-time t is looked up at
-// t + clock_offset. Angles are rad as measured, any turn; differences go the short way round, so no
-// two neighbouring samples may lie half a turn apart.
-// Late samples are put in their place. A query outside the samples goes on at the constant rate of
-// the nearest ones for max_extrapolation_s, with growing covariance, and is then refused.
-// Stale repeats: a device that is polled faster than it measures gives the same value again, which
-// was true when it first came but need not be true now. A run of equal values is therefore taken
-// as true from its first stamp until max_repeat_s (the longest time between two measurements of the
-// device) before its last, and as unknown after that. The value that ends such a run may be as old
-// as the last repeat, which is added to the variance of its time.
+// TelemetryBuffer: the latest pan/tilt samples in order of time. Gives the mount's angle, rate and
+// covariance at a time (PTCEE 22 to 25; see telemetry_interpolation.h).
+// Times are seconds of the telemetry clock: an image taken at image time t is looked up at t +
+// clock_offset. Angles are rad as measured, any turn. Differences go the short way round, so
+// neighbouring samples must be less than half a turn apart.
+// Late samples are inserted in order. A query beyond the samples extrapolates the nearest ones at
+// constant rate for max_extrapolation_s, with growing covariance, and is refused after that. Stale
+// repeats: see repeat().
 // Fixed memory, trivially copyable, no allocation. For one thread: the owner's.
 
 #include <algorithm>
@@ -28,17 +23,17 @@ namespace alidade {
 
 struct TelemetrySample {
   double time_s = 0;        // telemetry clock
-  double time_sigma_s = 0;  // one standard deviation of time_s
+  double time_sigma_s = 0;  // s
   double pan = 0;           // rad, measured
   double tilt = 0;          // rad, measured
 };
 
 struct TelemetryLimits {
-  double max_gap_s = 0.5;             // no answer between samples further apart
-  double max_extrapolation_s = 0.25;  // before the oldest sample and after the newest trusted angle
-  double max_repeat_s = 0.1;          // 0 = the device measures afresh for every poll
+  double max_gap_s = 0.5;             // no answer between samples farther apart
+  double max_extrapolation_s = 0.25;  // before the oldest and after the newest trusted angle
+  double max_repeat_s = 0.1;  // of the device, between two measurements; 0: each poll is new
 
-  // False and one line in *error (if not null) when a value is not valid.
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const {
     const auto not_negative = [](double v) { return std::isfinite(v) && v >= 0; };
     const char* problem = nullptr;
@@ -52,22 +47,22 @@ struct TelemetryLimits {
 
 enum class PushStatus {
   kStored,
-  kOutOfOrderStored,  // older than the newest, put in its place
-  kStaleRepeat,       // the newest value again, too soon to mean that the mount stands still
-  kDuplicateTime,     // there is a sample of this time; the first stays
-  kOlderThanBuffer,   // older than everything in a full buffer
-  kNotFinite          // a value is not finite, or the time's sigma is negative
+  kOutOfOrderStored,  // older than the newest; inserted in order
+  kStaleRepeat,       // the newest value again, too soon to show that the mount stands still
+  kDuplicateTime,     // a sample of this time exists and stays
+  kOlderThanBuffer,   // older than all samples of a full buffer
+  kNotFinite          // a value is not finite, or time_sigma_s is negative
 };
 
 enum class QueryStatus {
   kOk,
-  kExtrapolated,  // a result, but outside the samples
+  kExtrapolated,  // has a result, but beyond the samples
   kEmpty,
   kOneSample,        // no rate
-  kBeforeTelemetry,  // further before the oldest sample than may be extrapolated
-  kTelemetryTooOld,  // further after the newest trusted angle than max_extrapolation_s
+  kBeforeTelemetry,  // farther before the oldest sample than max_extrapolation_s
+  kTelemetryTooOld,  // farther after the newest trusted angle than max_extrapolation_s
   kGap,              // the samples around this time are too far apart
-  kNotFinite  // the time is not finite, its sigma is not one, or the result cannot be represented
+  kNotFinite         // time or sigma invalid, or the result cannot be represented
 };
 
 [[nodiscard]] constexpr bool has_result(QueryStatus status) {
@@ -96,7 +91,7 @@ enum class QueryStatus {
   return "unknown status";
 }
 
-// Pushes by status.
+// Number of pushes by status.
 struct TelemetryCounters {
   std::int64_t stored = 0;
   std::int64_t out_of_order_stored = 0;
@@ -121,7 +116,7 @@ class TelemetryBuffer {
     return status;
   }
 
-  // Where the mount pointed at time_s, which is itself uncertain by time_sigma_s. *out is written if
+  // State of the mount at time_s, whose standard deviation is time_sigma_s. *out is written if
   // has_result(status).
   [[nodiscard]] QueryStatus query(double time_s, double time_sigma_s,
                                   InterpolatedPanTilt* out) const {
@@ -161,14 +156,15 @@ class TelemetryBuffer {
     return beyond ? QueryStatus::kExtrapolated : QueryStatus::kOk;
   }
 
-  // After a restart of the device or of its clock. Counters stay.
+  // For a restart of the device or of its clock. Counters stay.
   void clear() {
     size_ = 0;
     repeated_ = false;
   }
 
   [[nodiscard]] std::size_t size() const { return size_; }
-  // Of the newest trusted angle: the newest sample's, or of stale repeats max_repeat_s before the last of them.
+  // s; time of the newest trusted angle: the newest sample, or max_repeat_s before the last of a
+  // run of stale repeats.
   [[nodiscard]] std::optional<double> newest_time() const {
     if (size_ == 0) return std::nullopt;
     return knot(size_ - 1).time_s;
@@ -181,12 +177,12 @@ class TelemetryBuffer {
   }
   [[nodiscard]] TelemetryKnot& knot(std::size_t i) { return knots_[(first_ + i) & (Capacity - 1)]; }
 
-  // Whether knots i and i + 1 belong to one motion.
+  // True if knots i and i + 1 belong to one motion.
   [[nodiscard]] bool connected(std::size_t i) const {
     return !knot(i + 1).held && knot(i + 1).time_s - knot(i).time_s <= limits_.max_gap_s;
   }
 
-  // Beyond the newest knot, by so much; before the oldest it makes no difference.
+  // beyond_s after the newest knot. Negative before the oldest one, where all differences are used.
   [[nodiscard]] Vector2<double> expected_acceleration_square(double beyond_s) const {
     const TelemetryKnot& newest = knot(size_ - 1);
     ExpectedAcceleration expected(noise_, beyond_s);
@@ -198,8 +194,8 @@ class TelemetryBuffer {
     return expected.square();
   }
 
-  // i such that time_s lies between the knots i and i + 1, or beyond that one of them which is an
-  // end of the buffer. Needs two knots.
+  // i such that time_s lies between knots i and i + 1, or beyond the end of the buffer that is one
+  // of them. Needs two knots.
   [[nodiscard]] std::size_t segment(double time_s) const {
     std::size_t low = 0;           // not after time_s, or 0
     std::size_t high = size_ - 1;  // after time_s, or the newest
@@ -248,6 +244,10 @@ class TelemetryBuffer {
     repeated_ = false;
   }
 
+  // A device that is polled faster than it measures repeats its value. It was true when it first
+  // came, but need not be true now. So a run of equal values is trusted from its first stamp until
+  // max_repeat_s before its last, and unknown after that. The value that ends a run may be as old
+  // as the last repeat; insert() adds this to the variance of its time.
   PushStatus repeat(TelemetryKnot added) {
     if (added.time_s == last_poll_s_) return PushStatus::kDuplicateTime;
     if (added.time_s < last_poll_s_) return PushStatus::kStaleRepeat;
@@ -291,7 +291,7 @@ class TelemetryBuffer {
     return PushStatus::kOutOfOrderStored;
   }
 
-  // Turns the angles of a knot by whole turns until they are next to a neighbour's.
+  // Shifts the angles of a knot by whole turns until they are next to a neighbour's.
   static void continue_from(const TelemetryKnot& neighbour, TelemetryKnot* added) {
     added->pan = neighbour.pan + wrap_angle(added->pan - neighbour.pan);
     added->tilt = neighbour.tilt + wrap_angle(added->tilt - neighbour.tilt);
@@ -319,9 +319,9 @@ class TelemetryBuffer {
   TelemetryLimits limits_;
   TelemetryCounters counters_;
   std::array<TelemetryKnot, Capacity> knots_{};
-  std::size_t first_ = 0;  // place of the oldest knot, modulo Capacity
+  std::size_t first_ = 0;  // index of the oldest knot, modulo Capacity
   std::size_t size_ = 0;
-  // The run of equal values at the newest end: when it was last seen, and its value.
+  // The run of equal values at the newest end: time of the last poll, value.
   double last_poll_s_ = 0;
   double run_pan_ = 0;
   double run_tilt_ = 0;

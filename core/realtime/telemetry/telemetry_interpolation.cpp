@@ -9,29 +9,29 @@ namespace {
 
 constexpr int kCubicCoefficients = 4;
 constexpr int kLeastCubicSamples = kCubicCoefficients + 2;
-// Smallest norm of a power of time once the lower ones are taken out: samples bunched at fewer than
-// four times fall below.
+// Smallest norm of a power of time after the lower ones are projected out. Samples bunched at fewer
+// than four times fall below it.
 constexpr double kLeastIndependence = 1e-4;
 
 // 95 % quantiles of chi-square with 2, 3 and 4 degrees of freedom.
 constexpr std::array<double, 3> kChiSquareBound = {5.991, 7.815, 9.488};
 static_assert(kInterpolationWindow - kLeastCubicSamples + 1 == kChiSquareBound.size());
 
-// One column a sample; the columns beyond the last sample are zero.
+// One column per sample; unused columns are zero.
 template <int kRows>
 using Rows = Eigen::Matrix<double, kRows, kInterpolationWindow, Eigen::RowMajor>;
 
-// Pan and tilt, relative to one of the samples.
+// Pan and tilt relative to one of the samples.
 using Angles = Rows<2>;
 
-// An answer as weighted sums of the samples: rows angle, rate.
+// An answer as weighted sums of the samples. Rows: angle, rate.
 struct Weights {
   Rows<2> of_sample = Rows<2>::Zero();
-  // What an acceleration of 1 rad/s^2 does to (angle, rate) unseen by the sums.
+  // Effect of an acceleration of 1 rad/s^2 on (angle, rate) that the sums do not contain.
   Vector2<double> acceleration_effect = Vector2<double>::Zero();
 };
 
-// What one sample's angle is worth, without the errors of its time.
+// Variance of one sample's angle, without the errors of its time.
 double angle_variance(const TelemetryNoise& noise) {
   return noise.pan_tilt_sigma * noise.pan_tilt_sigma + noise.resolution * noise.resolution / 12;
 }
@@ -49,13 +49,13 @@ Weights line_weights(const TelemetryKnot* knots, int before, double time_s) {
   return weights;
 }
 
-// What three angles have to be multiplied by to give their acceleration.
+// Weights of three angles whose sum is their acceleration.
 Vector3<double> second_difference(double h0, double h1) {
   return {2 / (h0 * (h0 + h1)), -2 / (h0 * h1), 2 / (h1 * (h0 + h1))};
 }
 
-// Largest square of the acceleration that the second differences about the line's two samples show,
-// less what noise alone makes of it.
+// Largest squared acceleration in the second differences at the line's two samples, minus the part
+// of noise.
 Vector2<double> acceleration_square_by_differences(const TelemetryKnot* knots, int count,
                                                    int before, const Angles& angles,
                                                    double variance) {
@@ -71,8 +71,8 @@ Vector2<double> acceleration_square_by_differences(const TelemetryKnot* knots, i
   return largest;
 }
 
-// Weights of the least-squares cubic's value and slope at time_s. False if the samples cannot carry
-// a cubic, or do not lie on one.
+// Weights of the least-squares cubic's value and slope at time_s. False if the samples do not
+// determine a cubic, or do not lie on one.
 bool cubic_weights(const TelemetryKnot* knots, int count, double time_s, const Angles& angles,
                    double variance, Weights* weights, Vector2<double>* acceleration_square) {
   if (count < kLeastCubicSamples) return false;
@@ -116,7 +116,7 @@ bool cubic_weights(const TelemetryKnot* knots, int count, double time_s, const A
     for (int i = 0; i < kCubicCoefficients; ++i) residual -= residual.dot(Q.row(i)) * Q.row(i);
     const double rate = angles.row(axis).dot(to_coefficients.row(1)) / scale;
     if (!(residual.squaredNorm() <= bound * (variance + own_variance * rate * rate))) return false;
-    // What noise may feign does not count.
+    // Count it only if noise cannot explain it.
     const double acceleration = to_acceleration * angles.row(axis).dot(to_coefficients.row(2));
     const double square = acceleration * acceleration;
     (*acceleration_square)[axis] = square > 4 * acceleration_variance ? square : 0;
@@ -188,7 +188,7 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
     angles.col(i) << knots[i].pan - origin.pan, knots[i].tilt - origin.tilt;
   }
 
-  // Beyond the ends: the state at the end, carried on at a constant rate.
+  // Beyond the ends: the state at the end, continued at a constant rate.
   const double inside_s = std::clamp(time_s, knots[0].time_s, knots[count - 1].time_s);
   const double beyond_s = time_s - inside_s;
   Weights weights;
@@ -214,7 +214,7 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
   const Vector2<double> rate = angles * weights.of_sample.row(1).transpose();
 
   Matrix2<double> by_angle = Matrix2<double>::Zero();  // (angle, rate) from unit angle variances
-  Matrix2<double> by_time = Matrix2<double>::Zero();   // ... from the samples' own time variances
+  Matrix2<double> by_time = Matrix2<double>::Zero();   // (angle, rate) from own_variance
   for (int i = 0; i < count; ++i) {
     const Matrix2<double> square = weights.of_sample.col(i) * weights.of_sample.col(i).transpose();
     by_angle += square;
@@ -235,17 +235,19 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
           effect[i] * effect[j] * acceleration_square;
     }
   }
-  // E[(a tau^2 / 2)^2] of a normal tau: what a time error makes where the mount turns round, and the rate says nothing.
+  // E[(a tau^2 / 2)^2] of a normal tau: the effect of a time error where the mount turns round and
+  // the rate is 0.
   covariance.diagonal().head<2>() +=
       0.75 * shared_time_variance * shared_time_variance * acceleration_square;
   for (int axis = 0; axis < 2; ++axis) {
-    // All samples of an axis that moves less than a step are rounded alike: averaging them does
-    // not help.
+    // If an axis moves less than a step, all its samples are rounded alike, and averaging does not
+    // help.
     if (std::abs(rate[axis]) * span_s < noise.resolution) {
       covariance(axis, axis) += noise.resolution * noise.resolution / 12;
     }
   }
-  // Samples at almost the same time give any rate, and far turns, of which rounding leaves no angle.
+  // Samples at almost the same time give any rate, and angles so far that rounding leaves nothing
+  // of them.
   constexpr double kFarthest = 1e6;  // rad
   if (!(std::abs(angle[0]) <= kFarthest && std::abs(angle[1]) <= kFarthest) || !all_finite(rate) ||
       !all_finite(covariance) || !all_finite(acceleration_square)) {
@@ -259,8 +261,9 @@ bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int co
   out->acceleration_square = acceleration_square;
   out->extrapolated = beyond_s != 0;
   out->samples = cubic ? count : 2;
-  // White samples h apart tell sigma^2 h in a unit of time, whatever answers are made of them. What the
-  // clock and an unknown acceleration do stays alike for longer than neighbouring samples last.
+  // White samples at distance h have the variance sigma^2 h per unit of time, for any answers made
+  // of them. Errors of the clock and of an unknown acceleration last longer than neighbouring
+  // samples do.
   constexpr double kLasting = 1;  // s
   const double white_time_s = span_s / (count - 1) / by_angle(0, 0);
   out->correlation_time_s = 0;

@@ -1,18 +1,15 @@
 #pragma once
-// Where the mount pointed between two telemetry samples, how fast it turned, and how well that is
-// known: the mathematics behind TelemetryBuffer, on a short run of neighbouring samples.
-//
-// The plain answer is PTCEE 22 to 25: a straight line through the two samples around the time asked
-// for. Where at least 6 (at most 8) neighbours lie on a cubic in time within their noise, that cubic
-// answers instead, as it averages the noise and follows the curve. It is fitted by least squares and
-// held against a chi-square bound (95 %); a jerk of the mount fails the test, and the line speaks,
-// with the curvature of its surroundings added to its covariance. Both answers are weighted sums of
-// the samples, so one formula gives the exact first-order covariance of angle and rate together.
-//
-// A stamp's error has a part that neighbouring samples share (a clock's offset) and a part of its
-// own; the difference of two own parts has the standard deviation period_sigma_s (PTCEE 20, 21, made
-// symmetric in the two samples). A rate w turns a time error tau into an angle error w tau of both
-// axes, an acceleration a into a tau^2 / 2. Angles in rad as measured, times in s on the telemetry clock. No allocation.
+// Angle and rate of the mount between telemetry samples, with covariance. Used by TelemetryBuffer
+// on a short run of neighbouring samples. Angles in rad as measured; times in s, telemetry clock.
+// The plain answer is a straight line through the two samples around the time (PTCEE 22 to 25). A
+// least-squares cubic replaces it if 6 to 8 neighbours pass a chi-square test (95 %): it averages
+// the noise and follows the curve. A jerk fails the test. The line's covariance then includes the
+// curvature of its surroundings. Both answers are weighted sums of the samples, so the first-order
+// covariance of angle and rate is exact.
+// A stamp's error has a part shared by neighbouring samples (a clock's offset) and its own part.
+// The difference of two own parts has the standard deviation period_sigma_s (PTCEE 20, 21, made
+// symmetric). At rate w a time error tau gives an angle error w tau on both axes, at acceleration
+// a, a tau^2 / 2. No allocation.
 
 #include <cstdint>
 #include <limits>
@@ -24,14 +21,14 @@ namespace alidade {
 
 struct TelemetryNoise {
   double pan_tilt_sigma = 1e-4;   // rad, white noise of one measured angle
-  double resolution = 0;          // rad, smallest step of a measured angle; 0 = none
+  double resolution = 0;          // rad, smallest step of a measured angle; 0: none
   double period_sigma_s = 50e-6;  // s, of the time between two neighbouring samples
-  // rad/s^2, acceleration to expect of either axis where the samples do not show it: beside a jerk, and
-  // with too few samples. Beyond the newest sample the least to expect; 0: the mount keeps its rate. One
-  // standard deviation.
+  // rad/s^2, one standard deviation; acceleration expected of either axis where the samples do not
+  // show it: near a jerk, and with too few samples. Beyond the newest sample it is the minimum. 0:
+  // the mount keeps its rate.
   double acceleration_sigma = 0.1;
 
-  // False and one line in *error (if not null) when a value is not valid.
+  // False if a value is invalid. *error, if not null, then says which in one line.
   [[nodiscard]] bool validate(const char** error = nullptr) const;
 };
 
@@ -40,49 +37,49 @@ struct TelemetryKnot {
   double time_s;
   double pan;              // rad, continuous: not wrapped
   double tilt;             // rad, continuous
-  double shared_variance;  // s^2, of the stamp: the part shared with the neighbours
+  double shared_variance;  // s^2, of the stamp: part shared with the neighbours
   double own_variance;     // s^2, of the stamp: this sample's own part
-  bool held;               // the mount stood still since the knot before
+  bool held;               // the mount stood still since the previous knot
 };
 
 struct InterpolatedPanTilt {
-  double time_s = 0;        // that was asked for, telemetry clock
-  double time_sigma_s = 0;  // of it, one standard deviation
+  double time_s = 0;        // s, telemetry clock
+  double time_sigma_s = 0;  // s
   PanTilt<double> angle;    // rad, measured units, wrapped
   PanTilt<double> rate;     // rad/s, measured units
-  // Of (pan, tilt, pan rate, tilt rate).
+  // Order: pan, tilt, pan rate, tilt rate.
   Matrix4<double> covariance = Matrix4<double>::Zero();
-  // (rad/s^2)^2, expected square of the acceleration (pan, tilt) about this time.
+  // (rad/s^2)^2, expected square of the acceleration (pan, tilt) near this time.
   Vector2<double> acceleration_square = Vector2<double>::Zero();
-  // rad/s^2, the acceleration itself, where somebody knows it; of either axis.
+  // rad/s^2, the acceleration itself, if known.
   PanTilt<double> acceleration = {};
-  double acceleration_sigma = std::numeric_limits<double>::infinity();  // > 0
-  bool extrapolated = false;  // the time lies beyond the samples
-  int samples = 0;            // how many the answer rests on: 2 is the straight line
-  // s, after which the error of the angle is another: the same samples answer for a while, and what the
-  // clock or an unknown acceleration does lasts for about a second. So much time is worth one
-  // independent answer.
+  double acceleration_sigma = std::numeric_limits<double>::infinity();  // rad/s^2, > 0
+  bool extrapolated = false;  // the time is beyond the samples
+  int samples = 0;            // samples used; 2: the straight line
+  // s, until the angle's error is independent. The same samples answer for a while, and the errors
+  // of the clock or of an unknown acceleration last about a second. Answers within this time are
+  // worth one independent answer.
   double correlation_time_s = 0;
 };
 
-// What acceleration to expect of a mount that goes on as it did: the fourth root of the mean fourth power of
-// what second differences show of its last seconds, less what noise makes of them. The fourth power, as a
-// mount that stops at once does so seldom and by much. Knots are given from the newest back.
+// Expected acceleration of a mount that continues as before: the fourth root of the mean fourth
+// power of the last seconds' second differences, minus their noise. The fourth power, as a mount
+// that stops abruptly does so rarely and strongly. Knots are added from the newest to older ones.
 class ExpectedAcceleration {
  public:
-  static constexpr double kMemory = 5;  // s, that are worth looking at
+  static constexpr double kMemory = 5;  // s; older knots are not needed
 
-  // step_s: of the differences; about as long as what is to be extrapolated.
+  // s, of the differences; about the time to extrapolate.
   ExpectedAcceleration(const TelemetryNoise& noise, double step_s);
   void add(const TelemetryKnot& knot);
-  // Squares (pan, tilt), (rad/s^2)^2; at least acceleration_sigma's, and what brings the latest rate to rest
-  // in a second.
+  // Squares (pan, tilt), (rad/s^2)^2. At least acceleration_sigma's, and what stops the latest rate
+  // within a second.
   [[nodiscard]] Vector2<double> square() const;
 
  private:
   TelemetryNoise noise_;
   double step_s_;
-  TelemetryKnot newest_{};  // the two that the next one makes a difference with
+  TelemetryKnot newest_{};  // these two and the next knot make a difference
   TelemetryKnot middle_{};
   int knots_ = 0;
   int differences_ = 0;
@@ -92,10 +89,10 @@ class ExpectedAcceleration {
 
 inline constexpr int kInterpolationWindow = 8;
 
-// knots[0..count), 2 <= count <= kInterpolationWindow, times strictly ascending; the time asked for
-// lies between knots[before] and knots[before + 1], or beyond the end that is nearest to it.
-// beyond_square: (rad/s^2)^2, (pan, tilt), accelerations to expect beyond the ends. False if the result
-// cannot be represented; *out is then untouched.
+// knots[0..count): 2 <= count <= kInterpolationWindow, times strictly ascending. time_s lies
+// between knots[before] and knots[before + 1], or beyond the nearer end. beyond_square:
+// (rad/s^2)^2, (pan, tilt), expected accelerations beyond the ends.
+// False if the result cannot be represented; *out is then unchanged.
 [[nodiscard]] bool interpolate(const TelemetryNoise& noise, const TelemetryKnot* knots, int count,
                                int before, double time_s, double time_sigma_s,
                                const Vector2<double>& beyond_square, InterpolatedPanTilt* out);
