@@ -13,7 +13,7 @@
 namespace alidade {
 
 struct PanTiltSample {
-  double earliest_time_s = 0;  // s; request sent (a stream: the same as latest_time_s)
+  double earliest_time_s = 0;  // request sent (a stream: the same as latest_time_s)
   // s; first byte of the answer received, or later; of a paired sample, that of the tilt
   double latest_time_s = 0;
   double pan_rad = 0;
